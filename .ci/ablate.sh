@@ -22,7 +22,7 @@ usage() {
                    4 tests of the servo; 5 cutting, isos, edges   (5)
   --jobs N         so many runs at once   (1)
   --again          forget what was measured before
-  --page FILE      write what is measured as a page (docs/ablation.md)
+  --page FILE      write what is measured as a page
 
 Rows move by more than 1 % of their limit (of their value where they have none), or get lost. Runs go
 from cheap to dear and end after the stage in which a row is lost, or worse by 5 % of its limit. Exit
@@ -134,7 +134,7 @@ check() {
   while IFS= read -r file; do
     errors=$("${CXX:-c++}" -std=c++20 -I "$folder" -S -o /dev/null "$folder/$file" 2>&1) ||
       die "$list: $file: does not compile: $(grep -m 1 error <<<"$errors"); mend it"
-  done < <(printf '%s\n' controller/servo/swept_force.cpp "${files[@]}" | grep '\.cpp$' | sort -u)
+  done < <(printf '%s\n' controller/servo/contact_force.cpp "${files[@]}" | grep '\.cpp$' | sort -u)
   echo "ablate: ${#names[@]} texts stand once each and compile"
 }
 
@@ -261,7 +261,7 @@ tell() {
 
 # constants: how many the contact names.
 constants() {
-  grep -rhE 'constexpr' controller/kernel/proxy controller/kernel/point_shell controller/servo/proxy_contact.hpp |
+  grep -rhE 'constexpr' controller/kernel/proxy controller/kernel/point_shell controller/kernel/proxy/proxy.hpp |
     grep -oE '\bk[A-Z][A-Za-z]* =' | wc -l
 }
 

@@ -12,23 +12,22 @@ rooms='
 shared/numeric shared/volume shared/wire shared/text shared/posix shared/segment
 
 controller/kernel/point_shell controller/kernel controller/kernel/proxy controller/kernel/sets
-controller/law controller/servo/kinematics controller/servo controller/law/registry
-controller/stability controller/scene controller/sandbox controller/volume/file controller/volume controller/tool controller/load
-controller/plan/tables controller/plan/method controller/plan controller/plan/cost controller/volume_tool
-controller/device/port controller/device/driver
-controller/shell/guard controller/shell controller/shell/probe controller
+controller/law controller/servo controller/law/registry
+controller/stability controller/input controller/scene controller/volume/file controller/volume controller/tool controller/load
+controller/plan/tables controller/plan/method controller/plan controller/volume_tool
+controller/device/port controller/device/firewire controller/device
+controller/loop controller/run controller
 
 record
 
-hil hil/devmodel hil/front hil/front/fuse hil/front/firewire hil/front/usb hil/front/uhid
-hil/front/usbip hil/script hil/fault hil/program
+hil hil/device hil/front hil/front/fuse hil/front/firewire hil/front/usb hil/script hil/program
 
-lab/rig lab/accuracy lab/energy lab/extremes lab/faults lab/bench lab/burs lab/ranges lab/zwidth/map lab/zwidth/picture lab/zwidth lab/law lab/sweep lab/bridge lab
+lab/run lab/rig lab/accuracy lab/bench lab/stability lab/contact lab/safety lab/ranges lab/commands lab/bridge lab
 
-visualizer visualizer/sound visualizer/view visualizer/gl visualizer/cast visualizer/surface visualizer/texture
-visualizer/render visualizer/compose visualizer/space_mouse visualizer/app visualizer/bench visualizer/monkey
+visualizer/scene visualizer/sound visualizer/gl visualizer/cast visualizer/cast/simd visualizer/surface
+visualizer/render visualizer/redraw visualizer/compose visualizer/panels visualizer/picture visualizer/app visualizer/bench visualizer/monkey
 
-bridge/wire bridge/stream bridge/mirror bridge/igtl bridge/page bridge/net bridge
+bridge/wire bridge/stream bridge/igtl bridge/page bridge/net bridge/join bridge/serve bridge
 '
 programs=(shared controller record hil lab visualizer bridge)
 hash='^[[:space:]]*#[[:space:]]*include[[:space:]]*'
@@ -112,21 +111,21 @@ broken() {
 
   # Each big library has one home; hidapi a second one, for what is no haptic device.
   includes '<libusb' "${programs[@]}" | grep -v '^controller/device/port/'
-  includes '<hidapi' "${programs[@]}" | grep -vE '^(controller/device/port/|visualizer/space_mouse/)'
+  includes '<hidapi' "${programs[@]}" | grep -vE '^(controller/device/port/|visualizer/app/hand_control.cpp)'
   # The kernel's FireWire interface has two sides: the driver that calls it, the node that serves it.
   includes '<linux/firewire' "${programs[@]}" |
-    grep -vE '^(controller/device/port|hil/front/firewire)/'
+    grep -vE '^(controller/device/firewire|hil/front/firewire)/'
   includes '<(GL/|GLES|EGL/|GLFW/|epoxy/|glm/|imgui)' "${programs[@]}" | grep -v '^visualizer/'
-  includes '<AL/' "${programs[@]}" | grep -v '^visualizer/sound/sound_player.cpp:'
+  includes '<AL/' "${programs[@]}" | grep -v '^visualizer/sound/sound_link.cpp:'
   # Setting the machine's clock must not reach the loop: its times are CLOCK_MONOTONIC.
   grep -rnE --include='*.[ch]pp' 'system_clock|CLOCK_REALTIME|gettimeofday|timespec_get' \
-    controller/servo controller/shell controller/device shared/segment \
+    controller/servo controller/loop controller/run controller/device shared/segment \
     shared/posix/monotonic_clock.hpp || true
   includes '<itk' "${programs[@]}" | grep -v '^controller/volume/file/foreign_[a-z]*\.[ch]pp:'
-  includes '<(boost|openssl)/' "${programs[@]}" | grep -v '^bridge/net/'
-  includes '<lz4' "${programs[@]}" | grep -v '^bridge/wire/lz4_block.cpp:'
+  includes '<(boost|openssl)/' "${programs[@]}" | grep -vE '^bridge/(net|join|serve)/'
+  includes '<lz4' "${programs[@]}" | grep -v '^bridge/wire/compression.cpp:'
   includes '<igtl' "${programs[@]}" | grep -v '^bridge/igtl/'
-  includes '<qrencode' "${programs[@]}" | grep -v '^bridge/net/qr_code.cpp:'
+  includes '<qrencode' "${programs[@]}" | grep -v '^bridge/serve/serve.cpp:'
 }
 
 found=$(broken || true)

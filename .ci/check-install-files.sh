@@ -6,7 +6,7 @@
 set -euo pipefail
 cd "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/.."
 rules=controller/device/60-kerf.rules
-unit=controller/shell/kerf@.service
+unit=controller/run/kerf@.service
 failures=0
 complain() {
   echo "check-install-files: $*" >&2
@@ -26,11 +26,11 @@ constant() { sed -nE "s/.* $2 = 0x([0-9A-Fa-f]+);.*/\L\1/p" "shared/wire/$1"; }
 expect_ids() {
   grep -qE "\"$1\".*\"$2\"" "$rules" || complain "$rules: no rule for $1:$2 of shared/wire"
 }
-expect_ids firewire "0x$(constant omni_constants.hpp kVendorOui)"
-expect_ids "$(constant falcon_usb.hpp kVendorId)" "$(constant falcon_usb.hpp kProductId)"
+expect_ids firewire "0x$(constant omni.hpp kVendorOui)"
+expect_ids "$(constant falcon.hpp kVendorId)" "$(constant falcon.hpp kProductId)"
 for firmware in Mbed Teensy; do
-  expect_ids "$(constant wooden_constants.hpp "k${firmware}VendorId")" \
-    "$(constant wooden_constants.hpp "k${firmware}ProductId")"
+  expect_ids "$(constant woodenhaptics.hpp "k${firmware}VendorId")" \
+    "$(constant woodenhaptics.hpp "k${firmware}ProductId")"
 done
 
 if command -v systemd-analyze >/dev/null; then

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <iostream>
 
-#include "bridge/net/identity.hpp"
-#include "bridge/net/join.hpp"
-#include "bridge/net/serve.hpp"
+#include "bridge/join/join.hpp"
+#include "bridge/net/certificate.hpp"
+#include "bridge/serve/serve.hpp"
 #include "shared/posix/program.hpp"
 #include "shared/posix/stop_signals.hpp"
 #include "shared/text/command_line.hpp"

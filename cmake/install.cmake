@@ -88,7 +88,7 @@ install(DIRECTORY shared controller record hil lab DESTINATION ${headers}
 # What each program compiles for itself: a main, and the allocator that counts.
 install(FILES controller/main.cpp DESTINATION ${CMAKE_INSTALL_DATADIR}/kerf/controller)
 install(FILES lab/main.cpp DESTINATION ${CMAKE_INSTALL_DATADIR}/kerf/lab)
-install(FILES controller/shell/guard/allocation_counter.cpp DESTINATION ${CMAKE_INSTALL_DATADIR}/kerf)
+install(FILES controller/loop/allocation_counter.cpp DESTINATION ${CMAKE_INSTALL_DATADIR}/kerf)
 
 foreach(port usb hid)  # what these need, the project needs, too
   set(kerf_has_${port} OFF)

@@ -4,7 +4,7 @@
 #include <stdexcept>
 #include <string_view>
 
-#include "shared/text/words.hpp"
+#include "shared/text/text.hpp"
 
 namespace kerf {
 

@@ -8,13 +8,13 @@
 
 namespace kerf {
 
-/// What a column of a tick log says. Name, type and count are those of `layout_table.hpp`, in its
-/// order; the compiler sees that no column is without its row here.
+/// Meaning of a column of a tick log. Name, type and count are those of `layout_table.hpp`, in its
+/// order; the compiler checks that every column has its row here.
 struct LogColumn {
   std::string_view name;
-  std::string_view unit;  ///< empty: a plain number
+  std::string_view unit;  ///< if empty, a plain number
   std::string_view meaning;
-  std::string_view valid = {};  ///< when; empty: in every row
+  std::string_view valid = {};  ///< condition; if empty, in every row
 };
 
 /// One bit of the column `flags`, or one value of a column that is a code.

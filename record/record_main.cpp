@@ -2,12 +2,11 @@
 #include <filesystem>
 #include <iostream>
 
+#include "record/force_plot.hpp"
 #include "record/log_columns.hpp"
-#include "record/manifest.hpp"
-#include "record/summary.hpp"
-#include "shared/posix/new_file.hpp"
+#include "record/recording.hpp"
+#include "shared/posix/atomic_file.hpp"
 #include "shared/posix/program.hpp"
-#include "shared/posix/run_files.hpp"
 #include "shared/posix/stop_signals.hpp"
 #include "shared/text/command_line.hpp"
 

@@ -1,11 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <atomic>
 #include <cstdint>
+#include <filesystem>
+#include <string>
 #include <vector>
 
 #include "record/tick_log.hpp"
+#include "shared/segment/command.hpp"
 #include "shared/segment/reader.hpp"
+
+// The recorder: ring of ticks to log, and the run of kerf-recorder.
 
 namespace kerf {
 
@@ -15,17 +21,17 @@ struct RecordGap {
   std::uint64_t count = 0;
 };
 
-/// Carries the state ring into a tick log. Loss is counted, never silent.
+/// Copies the state ring into a tick log. Losses are counted.
 class Recorder {
  public:
   /// Starts at the oldest record that the ring still has.
   Recorder(const SegmentReader& reader, TickLogWriter& log);
 
-  /// Appends what was published since the last call; returns how many records. A record that does
-  /// not come whole is tried again at the next call.
+  /// Appends the records published since the last call; returns their number. A torn record is read
+  /// again at the next call.
   std::uint64_t poll();
 
-  /// After the end of the controller: `poll`, and what still does not come whole is a gap.
+  /// After the end of the controller: `poll`; a record that is still torn is a gap.
   void drain();
 
   /// Published before the start and already overwritten then: no loss of this recorder.
@@ -33,7 +39,7 @@ class Recorder {
   /// At most `kMaxGaps`; `lost` counts on.
   [[nodiscard]] const std::vector<RecordGap>& gaps() const noexcept { return gaps_; }
   [[nodiscard]] std::uint64_t lost() const noexcept { return lost_; }
-  /// Most records that ever waited for one poll.
+  /// Most waiting records of all polls.
   [[nodiscard]] std::uint64_t largest_lag() const noexcept { return largest_lag_; }
 
   static constexpr std::size_t kMaxGaps = 4096;
@@ -51,5 +57,22 @@ class Recorder {
   std::uint64_t largest_lag_ = 0;
   std::vector<RecordGap> gaps_;
 };
+
+/// Options of kerf-recorder.
+struct RecorderOptions {
+  std::string name = kUsualName;
+  std::filesystem::path out;
+  double wait_s = 10;  ///< for the controller to appear
+  bool strict = false;
+  std::filesystem::path report;  ///< may be empty
+};
+
+/// False if help or version was requested, and printed. Throws `UsageError`.
+[[nodiscard]] bool parse_options(int argc, char** argv, RecorderOptions& options);
+
+/// Records the controller `options.name` into the folder `options.out` until it ends or `stop`:
+/// ticks.npy, scene.json, manifest.json. Returns the exit code: 0, or 1 under `strict` if ticks
+/// were lost. Bad input and a full disk throw.
+[[nodiscard]] int run_recorder(const RecorderOptions& options, const std::atomic<bool>& stop);
 
 }  // namespace kerf

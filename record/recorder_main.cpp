@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "record/recorder_run.hpp"
+#include "record/recorder.hpp"
 #include "shared/posix/program.hpp"
 #include "shared/posix/stop_signals.hpp"
 

@@ -9,25 +9,35 @@
 #include <fstream>
 #include <functional>
 #include <span>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "shared/segment/layout.hpp"
 #include "shared/volume/voxel_grid.hpp"
 
+// The tick log: an NPY file of one row per tick.
+
 namespace kerf {
 
+/// A recording that cannot be written or read. One line: "place: value; way out".
+class RecordError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
 /// The log of a run: an NPY file of `TickRecord` rows behind a header of fixed size, so that it can
-/// be appended to and opens in NumPy as it is (`np.load(path, mmap_mode="r")["position_mm"]`).
+/// be extended and opens directly in NumPy (`np.load(path, mmap_mode="r")["position_mm"]`).
 ///
-/// The column table is generated from `layout_table.hpp`. The row count in the header follows at
-/// every `sync`; rows behind it are whole all the same.
+/// The column table is generated from `layout_table.hpp`. The row count in the header is updated at
+/// every `sync`; later rows are complete, too.
 inline constexpr std::size_t kTickLogHeaderBytes = 4096;
 
 /// The header of a log of `rows` rows: exactly `kTickLogHeaderBytes`.
 [[nodiscard]] std::string tick_log_header(std::uint64_t rows);
 
-/// Writes one log. Not thread-safe. Failures are a `RecordError`; the file then holds whole rows.
+/// Writes one log. Not thread-safe. A failure throws `RecordError`; the file then has complete
+/// rows.
 class TickLogWriter {
  public:
   /// Refuses a path that exists: a recording is never overwritten.
@@ -55,13 +65,13 @@ class TickLogWriter {
   std::vector<TickRecord> buffer_;
 };
 
-/// Reads one log, row by row: as long as it may be, it needs no memory.
+/// Reads one log, row by row, with constant memory.
 class TickLogReader {
  public:
-  /// Throws `RecordError` where the file is none of this layout or is cut inside a row it counts.
+  /// Throws `RecordError` if the file has another layout or ends inside a counted row.
   explicit TickLogReader(std::filesystem::path path);
 
-  /// Whole rows in the file, those behind the header's count included.
+  /// Complete rows in the file, also those beyond the count of the header.
   [[nodiscard]] std::uint64_t rows() const noexcept { return rows_; }
 
   /// Calls `visit` for each row in order. Throws `RecordError` at a row whose checksum is wrong.
@@ -78,9 +88,8 @@ class TickLogReader {
                    double{vector[2]} * vector[2]);
 }
 
-/// Volume taken away in one tick: density units over full density, times the voxel of the volume
-/// that changed (the first one, where a tick changed several). Negative where an undo gives it
-/// back.
+/// Volume removed in one tick: density units over full density, times the voxel of the changed
+/// volume (the first one, if a tick changed several). Negative for an undo.
 [[nodiscard]] inline double removed_mm3(const TickRecord& record,
                                         std::span<const double> voxel_mm3) noexcept {
   if (record.removed == 0 || voxel_mm3.empty()) return 0;

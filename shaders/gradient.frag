@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #version 450 core
 // Direction of the density gradient, per voxel edge: one of three, chosen by a define. From samples
-// on the fly, or from what was worked out for each voxel (visualizer/view/gradient.hpp).
+// on the fly, or from what was worked out for each voxel (visualizer/scene/gradient.hpp).
 
 uniform sampler3D u_density;   // 0..1, inside a border of air one voxel thick
 uniform vec3 u_texels;         // its extent

@@ -12,6 +12,13 @@
 
 namespace kerf::bridge {
 
+/// OpenIGTLink's device name of each volume: its name in the scene, at most 20 bytes, each another;
+/// "volume 1" and so on where the scene's text does not tell.
+[[nodiscard]] std::vector<std::string> device_names(const SegmentInfo& segment);
+
+/// Of the labels of volumes of these names: "NAME labels", by the same rules.
+[[nodiscard]] std::vector<std::string> label_names(const std::vector<std::string>& volumes);
+
 /// One packed message; several clients may wait for the same.
 using IgtlBytes = std::shared_ptr<const std::vector<std::byte>>;
 

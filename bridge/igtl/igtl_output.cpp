@@ -1,10 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
+
 #include "bridge/igtl/igtl_output.hpp"
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cerrno>
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
 #include <cstring>
+#include <deque>
 #include <optional>
 #include <stdexcept>
 #include <thread>
@@ -18,12 +24,112 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-#include "bridge/igtl/device_names.hpp"
-#include "bridge/igtl/igtl_client.hpp"
 #include "bridge/igtl/igtl_messages.hpp"
-#include "shared/segment/hand_over.hpp"
+#include "shared/segment/connection.hpp"
+#include "shared/volume/voxel_grid.hpp"
 
 namespace kerf::bridge {
+
+/// One client: its socket, what waits for it, and what it does not have yet. Never blocks.
+///
+/// At most one image waits, and as many messages of other kinds as the caller adds while none of
+/// those waits, so its memory is bounded by the largest volume.
+class IgtlClient {
+ public:
+  enum class Kind : std::uint8_t { image, pose };
+
+  /// Takes over `socket`, which does not block.
+  explicit IgtlClient(int socket) noexcept : socket_(socket) {}
+  ~IgtlClient();
+  IgtlClient(const IgtlClient&) = delete;
+  IgtlClient& operator=(const IgtlClient&) = delete;
+
+  [[nodiscard]] int socket() const noexcept { return socket_; }
+  [[nodiscard]] bool waits() const noexcept { return !queue_.empty(); }
+  /// A message of this kind waits, or is being sent.
+  [[nodiscard]] bool waits(Kind kind) const noexcept;
+  void add(IgtlBytes message, Kind kind);
+
+  /// Sends what the socket takes, and throws away what came. False where the client has gone, or
+  /// has taken nothing for `patience` while something waited.
+  [[nodiscard]] bool serve(std::chrono::milliseconds patience);
+
+  std::vector<VoxelBox> lacks;     ///< by volume; the caller's
+  std::vector<bool> lacks_labels;  ///< by volume; the caller's
+
+ private:
+  struct Waiting {
+    IgtlBytes message;
+    Kind kind;
+  };
+  using Clock = std::chrono::steady_clock;
+
+  [[nodiscard]] bool throw_away() const;
+  [[nodiscard]] bool send_some();
+
+  int socket_;
+  std::deque<Waiting> queue_;
+  std::size_t sent_ = 0;  ///< of the first message
+  Clock::time_point last_progress_ = Clock::now();
+};
+
+namespace {
+
+/// Of one call, so that a large image holds up no other client for long.
+constexpr std::size_t kBytesAtOnce = std::size_t{1} << 20;
+constexpr int kReadsAtOnce = 16;
+
+bool must_wait(int error) {
+  return error == EAGAIN || error == EWOULDBLOCK || error == EINTR;
+}
+
+}  // namespace
+
+IgtlClient::~IgtlClient() {
+  close(socket_);
+}
+
+bool IgtlClient::waits(Kind kind) const noexcept {
+  return std::any_of(queue_.begin(), queue_.end(),
+                     [&](const Waiting& waiting) { return waiting.kind == kind; });
+}
+
+void IgtlClient::add(IgtlBytes message, Kind kind) {
+  if (queue_.empty()) last_progress_ = Clock::now();
+  queue_.push_back({std::move(message), kind});
+}
+
+bool IgtlClient::serve(std::chrono::milliseconds patience) {
+  if (!throw_away() || !send_some()) return false;
+  return queue_.empty() || Clock::now() - last_progress_ <= patience;
+}
+
+bool IgtlClient::throw_away() const {
+  std::array<char, 4096> unread;
+  for (int reads = 0; reads < kReadsAtOnce; ++reads) {
+    const ssize_t got = recv(socket_, unread.data(), unread.size(), MSG_DONTWAIT);
+    if (got == 0) return false;
+    if (got < 0) return must_wait(errno);
+  }
+  return true;
+}
+
+bool IgtlClient::send_some() {
+  for (std::size_t left = kBytesAtOnce; left > 0 && !queue_.empty();) {
+    const std::vector<std::byte>& message = *queue_.front().message;
+    const std::size_t piece = std::min(left, message.size() - sent_);
+    const ssize_t took = send(socket_, message.data() + sent_, piece, MSG_NOSIGNAL | MSG_DONTWAIT);
+    if (took < 0) return must_wait(errno);
+    last_progress_ = Clock::now();
+    sent_ += static_cast<std::size_t>(took);
+    left -= static_cast<std::size_t>(took);
+    if (sent_ < message.size()) continue;
+    queue_.pop_front();
+    sent_ = 0;
+  }
+  return true;
+}
+
 namespace {
 
 using Clock = std::chrono::steady_clock;

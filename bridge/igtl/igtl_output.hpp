@@ -6,7 +6,7 @@
 #include <memory>
 #include <string>
 
-#include "shared/segment/usual_name.hpp"
+#include "shared/segment/command.hpp"
 
 namespace kerf::bridge {
 

@@ -1,16 +1,115 @@
 // SPDX-License-Identifier: Apache-2.0
+
 #include "bridge/net/address.hpp"
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cstddef>
 #include <cstdint>
+#include <utility>
 
-#include "bridge/net/bridge_error.hpp"
-#include "bridge/net/host_names.hpp"
-#include "shared/text/words.hpp"
+#include <arpa/inet.h>
+#include <ifaddrs.h>
+#include <netinet/in.h>
+#include <unistd.h>
+
+#include "shared/text/text.hpp"
 
 namespace kerf::bridge {
+namespace {
+
+constexpr std::size_t kLongestName = 253, kLongestLabel = 63;  // RFC 1035
+
+/// Empty for what is neither IPv4 nor an IPv6 address that is reached without naming an interface.
+std::string text_of(const sockaddr* address) {
+  std::array<char, INET6_ADDRSTRLEN> text{};
+  if (address == nullptr) return {};
+  if (address->sa_family == AF_INET) {
+    const auto* const v4 = reinterpret_cast<const sockaddr_in*>(address);
+    inet_ntop(AF_INET, &v4->sin_addr, text.data(), text.size());
+  } else if (address->sa_family == AF_INET6) {
+    const auto* const v6 = reinterpret_cast<const sockaddr_in6*>(address);
+    if (IN6_IS_ADDR_LINKLOCAL(&v6->sin6_addr)) return {};
+    inet_ntop(AF_INET6, &v6->sin6_addr, text.data(), text.size());
+  }
+  return text.data();
+}
+
+/// This machine's name; empty where it has none.
+std::string machine_name() {
+  std::array<char, 256> name{};
+  return gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "";
+}
+
+}  // namespace
+
+bool is_address(const std::string& host) noexcept {
+  in6_addr address{};
+  return inet_pton(AF_INET, host.c_str(), &address) == 1 ||
+         inet_pton(AF_INET6, host.c_str(), &address) == 1;
+}
+
+std::string why_no_host(const std::string& host) {
+  if (is_address(host)) return {};
+  if (host.empty()) return "is empty; give a name or an address";
+  if (host.size() > kLongestName) return "is longer than 253 characters; give a name of DNS";
+  if (host.find('*') != std::string::npos) return "is a wildcard; name each machine";
+  if (host.front() == '[') return "an IPv6 address stands without brackets here";
+  if (host.find("://") != std::string::npos) return "is a URL; give the host alone";
+  const std::size_t strange =
+      host.find_first_not_of("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-_.");
+  if (strange != std::string::npos && host[strange] == ':') {
+    return "is no IPv6 address, and a port does not belong here; give the host alone";
+  }
+  if (strange != std::string::npos) {
+    return "is no name and no address; give letters, digits, - and ., or an address";
+  }
+  std::string_view rest = host;
+  for (bool more = true; more;) {
+    const std::size_t dot = rest.find('.');
+    const std::string_view label = rest.substr(0, dot);
+    if (label.empty()) return "has nothing before or after a dot; give a name or an address";
+    if (label.size() > kLongestLabel) return "has a part longer than 63 characters; DNS has none";
+    if (label.front() == '-' || label.back() == '-')
+      return "has a - at an end of a part; DNS has none";
+    more = dot != rest.npos;
+    if (more) rest.remove_prefix(dot + 1);
+    // A browser takes what ends in a number for an IPv4 address.
+    if (!more && label.find_first_not_of("0123456789") == label.npos) {
+      return "is no IPv4 address; give four numbers from 0 to 255";
+    }
+  }
+  return {};
+}
+
+bool is_loopback(std::string_view host) noexcept {
+  return host == "localhost" || host == "::1" ||
+         (host.starts_with("127.") && host.find_first_not_of("0123456789.") == host.npos);
+}
+
+std::vector<std::string> own_addresses() {
+  std::vector<std::string> out;
+  ifaddrs* all = nullptr;
+  if (getifaddrs(&all) != 0) return out;
+  for (const ifaddrs* one = all; one != nullptr; one = one->ifa_next) {
+    std::string text = text_of(one->ifa_addr);
+    if (!text.empty()) out.push_back(std::move(text));
+  }
+  freeifaddrs(all);
+  return out;
+}
+
+std::vector<std::string> own_hosts() {
+  std::vector<std::string> out;
+  if (const std::string name = machine_name(); why_no_host(name + ".local").empty()) {
+    out = {name, name + ".local"};
+  }
+  out.emplace_back("localhost");
+  for (std::string& address : own_addresses()) out.push_back(std::move(address));
+  return out;
+}
+
 namespace {
 
 constexpr std::size_t kLongest = 253;  // of a name in DNS; a token is shorter

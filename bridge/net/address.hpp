@@ -1,10 +1,34 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <stdexcept>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace kerf::bridge {
+
+/// What ends the program at start: one line "place: value; way out".
+struct BridgeError : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+/// Whether `host` is an address, IPv4 or IPv6 without brackets, not a name.
+[[nodiscard]] bool is_address(const std::string& host) noexcept;
+
+/// Why `host` is neither a name that a certificate can have nor an address, with the way out; empty
+/// where it is one.
+[[nodiscard]] std::string why_no_host(const std::string& host);
+
+/// Whether what is sent to `host` never leaves this machine, by its text alone.
+[[nodiscard]] bool is_loopback(std::string_view host) noexcept;
+
+/// Its addresses that others may reach and loopback's: IPv4 and global IPv6, as text.
+[[nodiscard]] std::vector<std::string> own_addresses();
+
+/// Name, name.local, localhost and addresses: by what a browser may call it. A machine's name that
+/// is none is left out.
+[[nodiscard]] std::vector<std::string> own_hosts();
 
 /// Where a bridge serves, as `kerf-bridge serve` prints it.
 struct BridgeAddress {

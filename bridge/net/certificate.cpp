@@ -1,17 +1,29 @@
 // SPDX-License-Identifier: Apache-2.0
+
 #include "bridge/net/certificate.hpp"
 
+#include <algorithm>
 #include <array>
+#include <cstddef>
 #include <cstdint>
+#include <filesystem>
+#include <iostream>
+#include <string_view>
+#include <system_error>
+#include <utility>
 
 #include <openssl/bio.h>
+#include <openssl/err.h>
 #include <openssl/pem.h>
 #include <openssl/rand.h>
+#include <openssl/ssl.h>
+#include <openssl/x509.h>
 #include <openssl/x509v3.h>
+#include <sys/stat.h>
 
-#include "bridge/net/bridge_error.hpp"
-#include "bridge/net/host_names.hpp"
-#include "shared/text/words.hpp"
+#include "bridge/net/address.hpp"
+#include "shared/posix/atomic_file.hpp"
+#include "shared/text/text.hpp"
 
 namespace kerf::bridge {
 namespace {
@@ -161,6 +173,241 @@ std::string end_of(const X509* certificate) {
   const Bio bio(BIO_new(BIO_s_mem()));
   ASN1_TIME_print(bio.get(), X509_get0_notAfter(certificate));
   return text_of(bio);
+}
+
+namespace {
+
+constexpr const char* kMake = "make one: kerf bridge make-identity ";
+
+std::string text_of_file(const std::filesystem::path& file, const std::filesystem::path& folder) {
+  std::string text = text_in(file);
+  if (text.empty()) {
+    throw BridgeError("--identity " + folder.string() + ": " + file.filename().string() +
+                      " is missing, empty or not to be read; " + kMake + folder.string());
+  }
+  return text;
+}
+
+}  // namespace
+
+TlsKeys load_tls_keys(const std::filesystem::path& folder) {
+  const auto refuse = [&folder](const std::string& why) {
+    return BridgeError("--identity " + folder.string() + ": " + why + "; " + kMake +
+                       folder.string());
+  };
+  TlsKeys out{
+      text_of_file(folder / "cert.pem", folder), text_of_file(folder / "key.pem", folder), "", {}};
+  struct stat status {};
+  if (stat((folder / "key.pem").c_str(), &status) == 0 &&
+      (status.st_mode & (S_IRWXG | S_IRWXO)) != 0) {
+    throw BridgeError("--identity " + folder.string() +
+                      ": key.pem is open to other users; chmod 600 it");
+  }
+  const Certificate certificate = certificate_of(out.chain_pem);
+  if (!certificate) throw refuse("cert.pem is no certificate");
+  const Key key = key_of(out.key_pem);
+  if (!key) throw refuse("key.pem is no private key without a password");
+  if (X509_check_private_key(certificate.get(), key.get()) != 1) {
+    throw refuse("key.pem is not that of cert.pem");
+  }
+  if (X509_cmp_current_time(X509_get0_notAfter(certificate.get())) < 0) {
+    throw refuse("the certificate ended on " + end_of(certificate.get()));
+  }
+  if (X509_cmp_current_time(X509_get0_notBefore(certificate.get())) > 0) {
+    throw refuse("the certificate holds from a later day on; is the clock right?");
+  }
+  out.fingerprint = fingerprint_of(certificate.get());
+  out.names = dns_names_of(certificate.get());
+  return out;
+}
+
+TlsKeys self_signed_keys(const std::vector<std::string>& hosts) {
+  const Key key = new_key();
+  CertificateSpec spec;
+  spec.name = "kerf bridge";
+  spec.hosts = hosts;
+  const Certificate certificate = new_certificate(spec, key.get(), nullptr, nullptr);
+  return {pem_of(certificate.get()), pem_of(key.get()), fingerprint_of(certificate.get()),
+          dns_names_of(certificate.get())};
+}
+
+namespace {
+
+/// 64 hex digits, with or without colons, as `fingerprint_of` has them; empty for anything else.
+[[nodiscard]] std::string fingerprint_in(std::string_view text) {
+  std::string out;
+  std::size_t digits = 0;
+  for (const char c : text) {
+    if (c == ':') continue;
+    const std::size_t value = std::string_view("0123456789abcdef0123456789ABCDEF").find(c);
+    if (value == std::string_view::npos) return {};
+    if (digits != 0 && digits % 2 == 0) out += ':';
+    out += "0123456789ABCDEF"[value & 15];
+    ++digits;
+  }
+  return digits == 64 ? out : std::string();
+}
+
+[[nodiscard]] int index_of_trust() {
+  static const int index = SSL_get_ex_new_index(0, nullptr, nullptr, nullptr, nullptr);
+  return index;
+}
+
+}  // namespace
+
+ServerTrust::ServerTrust(std::string host, const std::filesystem::path& ca,
+                         const std::string& fingerprint)
+    : host_(std::move(host)), ca_(ca) {
+  if (fingerprint.empty()) return;
+  fingerprint_ = fingerprint_in(fingerprint);
+  if (!ca.empty()) throw BridgeError("--fingerprint: with --ca; take one of them");
+  if (fingerprint_.empty()) {
+    throw BridgeError("--fingerprint: no 64 hex digits; take the SHA-256 that serve prints");
+  }
+}
+
+void ServerTrust::apply_to(ssl_ctx_st* context) {
+  SSL_CTX_set_min_proto_version(context, TLS1_3_VERSION);
+  SSL_CTX_set_verify(context, SSL_VERIFY_PEER, &ServerTrust::verify);
+  if (ca_.empty()) return;
+  std::error_code fault;  // nobody may write into a pipe, which OpenSSL would wait for
+  if (!std::filesystem::is_regular_file(ca_, fault) ||
+      SSL_CTX_load_verify_locations(context, ca_.c_str(), nullptr) != 1) {
+    ERR_clear_error();
+    throw BridgeError("--ca " + ca_.string() +
+                      ": no certificate to be read; take ca.pem of make-identity");
+  }
+}
+
+void ServerTrust::begin(ssl_st* connection) {
+  refusal_.clear();
+  SSL_set_ex_data(connection, index_of_trust(), this);
+  X509_VERIFY_PARAM* const rules = SSL_get0_param(connection);
+  if (is_address(host_)) {
+    X509_VERIFY_PARAM_set1_ip_asc(rules, host_.c_str());
+  } else {
+    X509_VERIFY_PARAM_set1_host(rules, host_.c_str(), host_.size());
+    SSL_set_tlsext_host_name(connection, host_.c_str());
+  }
+}
+
+int ServerTrust::verify(int verified, x509_store_ctx_st* chain) {
+  const auto* const connection = static_cast<const SSL*>(
+      X509_STORE_CTX_get_ex_data(chain, SSL_get_ex_data_X509_STORE_CTX_idx()));
+  auto* const trust = static_cast<ServerTrust*>(SSL_get_ex_data(connection, index_of_trust()));
+  return trust->believe(verified != 0, chain) ? 1 : 0;
+}
+
+bool ServerTrust::believe(bool verified, x509_store_ctx_st* chain) {
+  const int error = X509_STORE_CTX_get_error(chain);
+  const X509* const certificate = X509_STORE_CTX_get0_cert(chain);  // the server's own
+  const std::string seen = certificate == nullptr ? std::string() : fingerprint_of(certificate);
+  if (seen.empty()) {
+    refusal_ = "its certificate cannot be read; make another";
+    return false;
+  }
+  const bool in_time =
+      error != X509_V_ERR_CERT_HAS_EXPIRED && error != X509_V_ERR_CERT_NOT_YET_VALID;
+  if (!in_time) {
+    refusal_ = std::string("its certificate: ") + X509_verify_cert_error_string(error) +
+               "; set the clock, or make-identity there again";
+    return false;
+  }
+  if (!fingerprint_.empty()) {
+    if (fingerprint_ == seen) return true;
+    refusal_ = "its certificate has another fingerprint, " + seen +
+               "; somebody is in between, or serve was started anew: compare with what it prints";
+    return false;
+  }
+  if (!ca_.empty()) {
+    if (verified) return true;
+    refusal_ = "--ca " + ca_.string() + " does not vouch for it (" +
+               X509_verify_cert_error_string(error) + "); its fingerprint is " + seen;
+    return false;
+  }
+  refusal_ =
+      "nobody vouches for its certificate; where serve or make-identity prints the same, add "
+      "--fingerprint " +
+      seen;
+  return false;
+}
+
+namespace {
+
+constexpr int kCaDays = 3650;
+
+struct Authority {
+  Certificate certificate;
+  Key key;
+  bool is_new = false;
+};
+
+/// The CA of the folder, made where there is none.
+Authority authority_in(const std::filesystem::path& folder) {
+  const std::filesystem::path file = folder / "ca.pem", key_file = folder / "ca-key.pem";
+  if (std::filesystem::exists(file) || std::filesystem::exists(key_file)) {
+    Authority out{certificate_of(text_in(file)), key_of(text_in(key_file))};
+    if (!out.certificate || !out.key ||
+        X509_check_private_key(out.certificate.get(), out.key.get()) != 1) {
+      throw BridgeError(folder.string() +
+                        ": ca.pem and ca-key.pem are no CA and its key; take another folder");
+    }
+    if (X509_cmp_current_time(X509_get0_notAfter(out.certificate.get())) < 0) {
+      throw BridgeError(folder.string() + ": the CA ended on " + end_of(out.certificate.get()) +
+                        "; take another folder");
+    }
+    return out;
+  }
+  Authority out{nullptr, new_key(), true};
+  CertificateSpec spec;
+  spec.name = "kerf lab CA";
+  spec.days = kCaDays;
+  out.certificate = new_certificate(spec, out.key.get(), nullptr, nullptr);
+  return out;
+}
+
+}  // namespace
+
+int run_make_identity(const IdentityOptions& options) {
+  require_hosts(options.hosts);  // before anything is made
+  for (auto host = options.hosts.begin(); host != options.hosts.end(); ++host) {
+    if (std::find(options.hosts.begin(), host, *host) == host) continue;
+    throw BridgeError(one_line("--host " + *host + ": stands there twice; name each host once"));
+  }
+  const std::filesystem::path& folder = options.folder;
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error) {
+    throw BridgeError(folder.string() + ": " + error.message() + "; choose another folder");
+  }
+  const Authority authority = authority_in(folder);
+  CertificateSpec spec;
+  spec.hosts = options.hosts.empty() ? own_hosts() : options.hosts;
+  spec.name = spec.hosts.front().substr(0, 64);  // X.509's most
+  spec.days = options.days;
+  const Key key = new_key();
+  const Certificate certificate =
+      new_certificate(spec, key.get(), authority.certificate.get(), authority.key.get());
+  const Certificate replaced = certificate_of(text_in(folder / "cert.pem"));
+  // The program's umask makes them 0600.
+  if (authority.is_new) {
+    write_new_file(folder / "ca-key.pem", pem_of(authority.key.get()));
+    write_new_file(folder / "ca.pem", pem_of(authority.certificate.get()));
+  }
+  write_new_file(folder / "key.pem", pem_of(key.get()));
+  write_new_file(folder / "cert.pem",
+                 pem_of(certificate.get()) + pem_of(authority.certificate.get()));
+  std::cout << escaped(folder.string()) << ": certificate for";
+  for (const std::string& host : spec.hosts) std::cout << ' ' << host;
+  std::cout << ", until " << end_of(certificate.get()) << '\n';
+  std::cout << "SHA-256 " << fingerprint_of(certificate.get()) << '\n'
+            << (authority.is_new ? "a new CA: " : "by the CA: ")
+            << "give ca.pem to browsers and to "
+            << "kerf bridge join; ca-key.pem stays here\n";
+  if (replaced) {
+    std::cout << "the one before, " << fingerprint_of(replaced.get()) << ", is replaced\n";
+  }
+  return 0;
 }
 
 }  // namespace kerf::bridge

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <filesystem>
 #include <memory>
 #include <string>
 #include <vector>
@@ -47,5 +48,66 @@ void require_hosts(const std::vector<std::string>& hosts);
 [[nodiscard]] std::vector<std::string> dns_names_of(X509* certificate);
 /// The day of its end, as OpenSSL tells it.
 [[nodiscard]] std::string end_of(const X509* certificate);
+
+/// What a server shows and what it proves it with.
+struct TlsKeys {
+  std::string chain_pem;  ///< its certificate, then those above it
+  std::string key_pem;
+  std::string fingerprint;         ///< SHA-256 of the certificate, hex with colons
+  std::vector<std::string> names;  ///< DNS names that it holds for
+};
+
+/// From a folder of `make-identity`. Throws `BridgeError` where a file is missing, open to others,
+/// damaged, out of date or not its partner's.
+[[nodiscard]] TlsKeys load_tls_keys(const std::filesystem::path& folder);
+
+/// Made now, for `hosts` (names and addresses); nobody vouches for it.
+[[nodiscard]] TlsKeys self_signed_keys(const std::vector<std::string>& hosts);
+
+}  // namespace kerf::bridge
+
+struct ssl_st;  // OpenSSL's own names
+struct ssl_ctx_st;
+struct x509_store_ctx_st;
+
+namespace kerf::bridge {
+
+/// Why a viewer believes that the other side is the one it means: the lab's CA vouches for it, or
+/// its certificate is the one whose fingerprint was told. Without either nothing is believed, and
+/// the refusal tells the fingerprint seen. One connection at a time.
+class ServerTrust {
+ public:
+  /// Throws `BridgeError` where the CA cannot be read, the fingerprint is none, or both are given.
+  ServerTrust(std::string host, const std::filesystem::path& ca, const std::string& fingerprint);
+  ServerTrust(const ServerTrust&) = delete;
+  ServerTrust& operator=(const ServerTrust&) = delete;
+
+  /// Once; must outlive `context`'s connections.
+  void apply_to(ssl_ctx_st* context);
+  /// Before each handshake.
+  void begin(ssl_st* connection);
+  /// After a handshake that failed: one line; empty: the certificate was not the reason.
+  [[nodiscard]] const std::string& refusal() const noexcept { return refusal_; }
+
+ private:
+  [[nodiscard]] bool believe(bool verified, x509_store_ctx_st* chain);
+  [[nodiscard]] static int verify(int verified, x509_store_ctx_st* chain);
+
+  std::string host_;
+  std::filesystem::path ca_;
+  std::string fingerprint_;  // empty: none was told
+  std::string refusal_;
+};
+
+/// `kerf-bridge make-identity`.
+struct IdentityOptions {
+  std::filesystem::path folder;
+  std::vector<std::string> hosts;  ///< names and addresses of the machine; empty: this one's
+  int days = 825;
+};
+
+/// Makes DIR/ca.pem, ca-key.pem (kept where they are there), cert.pem and key.pem, and tells what
+/// they are. Throws `BridgeError`.
+int run_make_identity(const IdentityOptions& options);
 
 }  // namespace kerf::bridge

@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "bridge/wire/block_plan.hpp"
+#include "bridge/wire/messages.hpp"
 #include "shared/segment/reader.hpp"
 
 namespace kerf::bridge {

@@ -3,6 +3,8 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
+#include <vector>
 
 #include "shared/segment/layout.hpp"
 
@@ -85,7 +87,7 @@ struct FrameHead {
   std::uint64_t tick;
   std::int64_t taken_ns;  ///< when the snapshot of the pass was taken
   std::int64_t heartbeat_ns;
-  std::uint64_t set_hash;  ///< of all that the viewer holds after this frame (set_hash.hpp)
+  std::uint64_t set_hash;  ///< of all that the viewer holds after this frame
   std::uint32_t lifecycle;
   std::uint32_t blocks;
   std::uint32_t raw_bytes;
@@ -139,5 +141,63 @@ struct CommandMessage {
   std::uint32_t sequence;  ///< chosen by the viewer
 };
 static_assert(sizeof(CommandMessage) == 16);
+
+/// The part of one held block in a set hash; the hash is their sum mod 2^64 over all held blocks,
+/// so it does not depend on the order, and a new version costs one difference. Two sets of versions
+/// with one hash are as unlikely as two equal random 64-bit numbers.
+[[nodiscard]] constexpr std::uint64_t block_hash(std::uint32_t id, std::uint64_t version,
+                                                 std::uint64_t session) noexcept {
+  std::uint64_t z = (version ^ session) * 0x9e3779b97f4a7c15 + id * 0xd1342543de82ef95 + 1;
+  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9;
+  z = (z ^ (z >> 27)) * 0x94d049bb133111eb;
+  return z ^ (z >> 31);
+}
+
+/// `hash` after block `id` went from version `old` (0: not held) to `version`.
+[[nodiscard]] constexpr std::uint64_t with_block(std::uint64_t hash, std::uint32_t id,
+                                                 std::uint64_t old, std::uint64_t version,
+                                                 std::uint64_t session) noexcept {
+  if (old != 0) hash -= block_hash(id, old, session);
+  return hash + block_hash(id, version, session);
+}
+
+inline constexpr std::size_t kTextBlockBytes = 1024;
+inline constexpr std::size_t kDensityBlockBytes = 1024;  ///< a brick: 512 densities, x fastest
+inline constexpr std::size_t kLabelBlockBytes = 512;     ///< the labels of a brick, likewise
+inline constexpr std::uint64_t kConstantVersion = 2;     ///< of text and labels
+
+enum class BlockKind : std::uint8_t { text, density, labels };
+
+/// Blocks of one kind with numbers that follow each other.
+struct BlockPlane {
+  BlockKind kind;
+  std::uint32_t volume;  ///< of density and labels
+  std::uint32_t first;   ///< number of its first block
+  std::uint32_t count;
+  [[nodiscard]] std::size_t block_bytes() const noexcept {
+    return kind == BlockKind::labels ? kLabelBlockBytes : kDensityBlockBytes;
+  }
+};
+
+/// How all that a viewer holds is numbered: scene text (the last block padded with zeros), then
+/// each volume's density, then the labels of each volume that has them. Within a volume the number
+/// is that of the brick (BrickGrid).
+class BlockPlan {
+ public:
+  BlockPlan() = default;
+  /// `volumes`: bricks per volume and whether `off_labels` is not 0.
+  BlockPlan(std::uint32_t scene_bytes, std::span<const VolumeDescriptor> volumes);
+
+  [[nodiscard]] const std::vector<BlockPlane>& planes() const noexcept { return planes_; }
+  [[nodiscard]] std::uint32_t count() const noexcept { return count_; }
+  /// `id` is below `count()`.
+  [[nodiscard]] const BlockPlane& plane_of(std::uint32_t id) const noexcept;
+
+ private:
+  void add(BlockKind kind, std::uint32_t volume, std::uint32_t count);
+
+  std::vector<BlockPlane> planes_;
+  std::uint32_t count_ = 0;
+};
 
 }  // namespace kerf::bridge

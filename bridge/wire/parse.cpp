@@ -9,9 +9,9 @@
 #include <type_traits>
 #include <utility>
 
-#include "bridge/wire/lz4_block.hpp"
+#include "bridge/wire/compression.hpp"
 #include "shared/volume/brick_grid.hpp"
-#include "shared/volume/scene_limits.hpp"
+#include "shared/volume/voxel_grid.hpp"
 
 namespace kerf::bridge {
 namespace {

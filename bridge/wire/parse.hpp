@@ -10,7 +10,6 @@
 #include <variant>
 #include <vector>
 
-#include "bridge/wire/block_plan.hpp"
 #include "bridge/wire/messages.hpp"
 
 namespace kerf::bridge {

@@ -2,17 +2,125 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
 #include <type_traits>
 
 #include "controller/kernel/gradient.hpp"
+#include "controller/kernel/kernel_set.hpp"
 #include "controller/kernel/overlap.hpp"
-#include "controller/kernel/removal_rate.hpp"
+#include "shared/numeric/numbers.hpp"
 #include "shared/volume/voxel_grid.hpp"
 
 namespace kerf {
+
+// 1 - exp(-x) for load time: from + - * / alone, so the last bit does not depend on a libm.
+
+/// For x >= 0 by its series; full double precision below 1/4.
+[[nodiscard]] constexpr double decay_small(double x) noexcept {
+  double term = x, sum = 0;
+  for (int n = 2; n < 16; ++n) {
+    sum += term;
+    term *= -x / n;
+  }
+  return sum;
+}
+
+/// For any x >= 0: within 1e-13.
+[[nodiscard]] constexpr double decay(double x) noexcept {
+  constexpr int kHalvings = 8;
+  constexpr double kWhole = 42.0;  // exp(-x) is below 1e-18
+  if (!(x < kWhole)) return 1.0;
+  double part = decay_small(x / (1 << kHalvings));
+  for (int i = 0; i < kHalvings; ++i) part = part * (2 - part);
+  return part;
+}
+
+/// What one tick removes of a voxel with overlap c (docs/theory.md 7.5): the fraction c *
+/// min(1, kT), or 1 - exp(-c kT) in the exact form, whose result after a given time does not depend
+/// on the rate.
+///
+/// Fixed: the fraction at c = 1 is `mantissa` 2^-(15 + exponent). The exact form bends c by a table
+/// of f(c) / f(1) with linear steps between 257 entries: within (kT)^2 / (8 * 256^2) / f(1) and two
+/// weight steps, never falling. Made at load time by `removal_rate`.
+template <class N>
+struct RemovalRate {
+  static constexpr std::size_t kSteps = 256;
+
+  typename N::Weight mantissa{};  ///< fixed: 16384..32768, or 0 for nothing; floating: the fraction
+  int exponent = 0;               ///< fixed: 0..32; floating: 0
+  bool bent = false;
+  std::array<typename N::Weight, kSteps + 1> bend{};
+};
+
+namespace detail {
+
+/// A weight from 0..1, rounded.
+template <class N>
+[[nodiscard]] constexpr typename N::Weight weight_from(double fraction) noexcept {
+  if constexpr (N::kIsFixed) {
+    return static_cast<typename N::Weight>(fraction * N::kWeightOne + 0.5);
+  } else {
+    return static_cast<typename N::Weight>(fraction);
+  }
+}
+
+}  // namespace detail
+
+/// Above this exp(-kT) is below 1e-13 of a density step: more changes nothing.
+inline constexpr double kMaxRateTimesTick = 42.0;
+
+/// `k_times_t` is rate times tick; up to 2^-33, negative or NaN removes nothing. Load time.
+template <class N>
+[[nodiscard]] constexpr RemovalRate<N> removal_rate(double k_times_t,
+                                                    bool exact_exponential) noexcept {
+  using Rate = RemovalRate<N>;
+  Rate rate;
+  if (!(k_times_t > 0)) return rate;
+  double fraction = k_times_t < 1 ? k_times_t : 1;
+  if (exact_exponential) {
+    const double kt = k_times_t < kMaxRateTimesTick ? k_times_t : kMaxRateTimesTick;
+    const double step = decay_small(kt / double(Rate::kSteps));
+    std::array<double, Rate::kSteps + 1> decay{};
+    for (std::size_t i = 0; i < Rate::kSteps; ++i) decay[i + 1] = decay[i] + (1 - decay[i]) * step;
+    fraction = decay[Rate::kSteps];
+    rate.bent = true;
+    for (std::size_t i = 0; i <= Rate::kSteps; ++i) {
+      rate.bend[i] = detail::weight_from<N>(decay[i] / fraction);
+    }
+  }
+  if constexpr (N::kIsFixed) {
+    while (fraction <= 0.5 && rate.exponent < 32) {
+      fraction *= 2;
+      ++rate.exponent;
+    }
+    rate.mantissa = fraction > 0.5 ? detail::weight_from<N>(fraction) : 0;
+  } else {
+    rate.mantissa = detail::weight_from<N>(fraction);
+  }
+  return rate;
+}
+
+/// The overlap ratio after the bend of the exact form; 0 stays 0 and kWeightOne stays itself.
+template <class N>
+[[nodiscard]] constexpr typename N::Weight bent_ratio(const RemovalRate<N>& rate,
+                                                      typename N::Weight ratio) noexcept {
+  using Weight = typename N::Weight;
+  if (!rate.bent) return ratio;
+  if constexpr (N::kIsFixed) {
+    const auto i = static_cast<std::size_t>(ratio >> 7);  // 2^15 in 256 steps of 2^7
+    if (i >= rate.kSteps) return rate.bend[rate.kSteps];
+    const Weight rise = rate.bend[i + 1] - rate.bend[i];
+    return rate.bend[i] + ((rise * (ratio & 127) + 64) >> 7);
+  } else {
+    const Weight place = ratio * Weight(rate.kSteps);
+    const auto i = static_cast<std::size_t>(place);
+    if (i >= rate.kSteps) return rate.bend[rate.kSteps];
+    return rate.bend[i] + (rate.bend[i + 1] - rate.bend[i]) * (place - Weight(i));
+  }
+}
 
 // One tick of cutting, in this order: `overlap`, `modification_sum`, `remove`, `refresh_gradients`.
 // Force comes first: `modification_sum` sees the density and the gradients from before the removal.
@@ -116,6 +224,43 @@ constexpr Removed remove(const VoxelGrid& grid, std::span<Density> density,
         removed.changed = removed.changed.united({{x, y, z}, {x + 1, y + 1, z + 1}});
       }
     }
+  }
+  return removed;
+}
+
+namespace detail {
+
+/// The exact form of the removal rate, entry by entry: it is a table look-up.
+inline void bend_ratios(const TickBox& box, const BoxScratch& scratch,
+                        const RemovalRate<FixedNumbers>& rate) noexcept {
+  std::int16_t* ratio = scratch.ratio + kRatioRowPad;
+  const std::int32_t rows = (box.size.y + 1) * (box.size.z + 1);
+  for (std::int32_t row = 0; row < rows; ++row, ratio += box.row_lanes + kRatioRowPad) {
+    if (scratch.live[row] == 0) continue;
+    for (std::int32_t x = 2; x <= box.size.x + 2; ++x) {
+      ratio[x] = static_cast<std::int16_t>(-bent_ratio(rate, std::int32_t{-ratio[x]}));
+    }
+  }
+}
+
+}  // namespace detail
+
+/// Takes from the volume what the ratios in the scratch say: `remove`. `carry` has at least
+/// row_lanes entries.
+[[nodiscard]] inline Removed cut_box(const KernelSet& kernels, const TickBox& box,
+                                     const BoxScratch& scratch, const VoxelGrid& grid,
+                                     std::span<Density> density, VoxelIndex origin,
+                                     const RemovalRate<FixedNumbers>& rate,
+                                     std::span<std::uint16_t> carry) noexcept {
+  Removed removed;
+  if (rate.mantissa == 0) return removed;
+  if (rate.bent) detail::bend_ratios(box, scratch, rate);
+  const BoxCut cut = kernels.cut(box, {static_cast<std::uint16_t>(rate.mantissa), rate.exponent},
+                                 grid, density.data(), origin, scratch, carry.data());
+  removed.density_steps = cut.density_steps;
+  if (cut.density_steps != 0) {
+    removed.changed = {{origin.x + cut.lo.x, origin.y + cut.lo.y, origin.z + cut.lo.z},
+                       {origin.x + cut.hi.x + 1, origin.y + cut.hi.y + 1, origin.z + cut.hi.z + 1}};
   }
   return removed;
 }

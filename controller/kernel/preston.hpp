@@ -6,10 +6,9 @@
 #include <cstdint>
 #include <span>
 
-#include "controller/kernel/covered_steps.hpp"
 #include "controller/kernel/covered_voxels.hpp"
+#include "controller/kernel/cut_budget.hpp"
 #include "controller/kernel/milling.hpp"
-#include "controller/kernel/preston_budget.hpp"
 
 namespace kerf {
 
@@ -139,7 +138,7 @@ template <class N>
 }
 
 /// Takes from one volume what `drive` cuts in one tick of the voxels that the tool covers, where it
-/// is after its advance into the surface (force_cut_plan.hpp); their list, `CoveredVoxels<N>` or
+/// is after its advance into the surface (servo_plan.hpp); their list, `CoveredVoxels<N>` or
 /// `CoveredGroups`, is used up.
 ///
 /// Removed steps, carry and `lost` add up to the budgets of all ticks: in fixed exactly, each

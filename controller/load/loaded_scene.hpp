@@ -7,9 +7,12 @@
 #include <vector>
 
 #include "controller/scene/scene.hpp"
-#include "controller/tool/scene_tool.hpp"
+#include "controller/tool/tool_shapes.hpp"
+#include "controller/volume/denoise.hpp"
 #include "controller/volume/file/volume_image.hpp"
-#include "controller/volume/volume_noise.hpp"
+#include "shared/numeric/linear_algebra.hpp"
+
+// A scene after loading, and the geometry of its volumes.
 
 namespace kerf {
 
@@ -28,20 +31,46 @@ struct SceneVolume {
   Pose pose;
   Density iso = 32768;
   bool solid = true;
-  Noise noise;                          ///< that was found
-  int denoised = 0;                     ///< passes that were made against it
+  Noise noise;                          ///< as estimated
+  int denoised = 0;                     ///< passes made against it
   std::vector<std::string> proposal{};  ///< of --volume: "what=chosen" for each choice
-  std::vector<Material> proposed{};     ///< the materials that belong to it
-  bool enclosed = false;  ///< not cropped, solid at its border: a layer of air was laid around it
+  std::vector<Material> proposed{};     ///< the materials for it
+  bool enclosed = false;  ///< not cropped, solid at its border: a layer of air was added
 };
 
-/// A scene after loading: everything the controller needs, in double, checked. Load time only.
+/// A scene after loading: all inputs of the controller, in double, checked. Load time only.
 struct LoadedScene : SceneSettings {
   std::vector<SceneVolume> volumes;
   std::vector<SceneTool> tools;
   std::size_t active_tool = 0;
-  std::vector<VolumeSpec> volume_specs;  ///< as the file and the command line say them
+  std::vector<VolumeSpec> volume_specs;  ///< as written in the file and on the command line
   std::vector<ToolSpec> tool_specs;      ///< the same, with the sizes in effect
 };
+
+using Point3 = vec3::Vec;  ///< mm
+
+/// World from source when a scene gives no orientation: the source's z axis points up (world y), so
+/// that a scan of a standing patient stands: (x, y, z) -> (x, z, -y).
+inline constexpr Matrix3 kSourceStanding = {1, 0, 0, 0, 0, 1, 0, -1, 0};
+
+/// Pose of a volume whose box has its middle at `middle_mm` in the world, rotated by `orientation`
+/// (world from the source file's frame) after the directions of the file itself.
+[[nodiscard]] Pose place_volume(const VolumeImage& image, const Matrix3& orientation,
+                                const Point3& middle_mm);
+
+/// Axis-parallel world box around a volume: all of its voxels, whole.
+struct WorldBox {
+  Point3 lo_mm, hi_mm;
+};
+[[nodiscard]] WorldBox world_box(const SceneVolume& volume);
+
+/// First contact of a hand that comes down from +y: the highest point at which the density reaches
+/// the volume's iso on the vertical line through the middle of its box, or, if that line hits
+/// nothing, on the line through the solid voxel nearest to it in (x, z). Between voxels the density
+/// is trilinear, outside it is 0.
+///
+/// The point is exact to 1/100 of the smallest voxel edge, and walls thinner than a quarter of that
+/// edge may be missed on the first line. Throws SceneError when no voxel reaches iso.
+[[nodiscard]] Point3 first_surface_from_above(const SceneVolume& volume);
 
 }  // namespace kerf

@@ -7,11 +7,10 @@
 #include <utility>
 #include <variant>
 
-#include "controller/tool/tool_shaft.hpp"
 #include "controller/tool/tool_shapes.hpp"
 #include "shared/numeric/fnv1a.hpp"
-#include "shared/posix/hex64.hpp"
 #include "shared/text/json.hpp"
+#include "shared/text/text.hpp"
 
 namespace kerf {
 namespace {

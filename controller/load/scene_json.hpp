@@ -4,7 +4,7 @@
 #include <string>
 
 #include "controller/load/loaded_scene.hpp"
-#include "controller/scene/scene_key.hpp"
+#include "controller/scene/scene_keys.hpp"
 
 namespace kerf {
 

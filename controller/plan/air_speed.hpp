@@ -8,11 +8,11 @@
 #include <cstdint>
 #include <numbers>
 
-#include "controller/kernel/point_shell/free_bricks.hpp"
-#include "controller/kernel/proxy/tool_query.hpp"
+#include "controller/kernel/point_shell/point_table.hpp"
+#include "controller/kernel/proxy/contact_query.hpp"
 #include "controller/load/loaded_scene.hpp"
 #include "controller/plan/plan_contact.hpp"
-#include "controller/servo/contact_plan.hpp"
+#include "controller/servo/servo_plan.hpp"
 
 namespace kerf {
 

@@ -8,26 +8,23 @@
 #include <span>
 #include <vector>
 
-#include "controller/kernel/proxy/tool_query.hpp"
+#include "controller/input/load_error.hpp"
+#include "controller/kernel/proxy/contact_query.hpp"
 #include "controller/plan/air_speed.hpp"
-#include "controller/plan/method/methods.hpp"
+#include "controller/plan/method/tool_method.hpp"
 #include "controller/plan/plan_contact.hpp"
 #include "controller/plan/plan_device.hpp"
-#include "controller/plan/plan_laws.hpp"
-#include "controller/plan/plan_preston.hpp"
 #include "controller/plan/plan_tools.hpp"
-#include "controller/plan/plan_volumes.hpp"
 #include "controller/plan/servo_memory.hpp"
-#include "controller/plan/tables/aligned_tool.hpp"
-#include "controller/plan/tick_timing.hpp"
-#include "controller/scene/scene_error.hpp"
+#include "controller/plan/tables/sample_tables.hpp"
+#include "controller/plan/worst_tick.hpp"
 #include "controller/servo/servo_step.hpp"
 
 namespace kerf {
 namespace {
 
-/// A quarter of a second: a bur that the hand's tremor lifts is back within a period of it, an
-/// eighth of a second at 8 Hz; to lift it on purpose and put it elsewhere takes longer.
+/// Ticks in a quarter of a second: a bur that the hand's tremor lifts is back within a period of
+/// it, an eighth of a second at 8 Hz; to lift it on purpose and set it down elsewhere takes longer.
 std::uint32_t stroke_pause_ticks(std::int32_t rate_hz) {
   constexpr int kPerS = 4;
   return static_cast<std::uint32_t>(std::max(1, rate_hz / kPerS));

@@ -6,15 +6,65 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <string>
 
+#include "controller/input/load_error.hpp"
 #include "controller/load/loaded_scene.hpp"
-#include "controller/plan/method/matrices.hpp"
-#include "controller/scene/scene_error.hpp"
+#include "controller/plan/method/lattice.hpp"
 #include "controller/servo/servo_plan.hpp"
+
+// The solid volumes of a scene and its swept contact in the loop's numbers: frames, proxy,
+// coupling. Load time.
 
 namespace kerf {
 
-// The swept contact of a scene: where its space lies and how stiff the hand is held to the proxy.
+/// Refuses a spacing whose voxels per mm do not fit the loop's number for it.
+template <class N>
+void check_spacing(const LoadedScene& scene, const SceneVolume& volume) {
+  constexpr double kSmallestMm = 0.008;  // Ratio ends at 128
+  const auto& h = volume.image.spacing_mm;
+  const double smallest = std::min({h[0], h[1], h[2]});
+  if (!N::kIsFixed || smallest >= kSmallestMm) return;
+  throw SceneError(scene.path + ": volume " + volume.name + ": spacing_mm " +
+                   std::to_string(smallest) +
+                   " is below the 0.008 of fixed-point numbers; resample it, or set "
+                   "servo.numeric = \"double\"");
+}
+
+/// Position of one solid volume, and the transforms into it.
+template <class N>
+[[nodiscard]] VolumePlan<N> plan_volume(const SceneVolume& volume, std::size_t scene_index) {
+  using Real = typename N::Real;
+  const Matrix rotation = matrix_of(volume.pose.orientation);
+  const auto& h = volume.image.spacing_mm;
+  const double largest = std::max({h[0], h[1], h[2]});
+  VolumePlan<N> plan;
+  plan.scene_index = scene_index;
+  plan.grid = volume.image.grid;
+  plan.iso = volume.iso;
+  plan.position_mm = rounded<WorldVec<Real>, Real>(volume.pose.position_mm);
+  plan.voxel_from_world = rounded<typename N::Ratio, VoxelSpace, WorldSpace>(
+      into_volume(rotation, {1 / h[0], 1 / h[1], 1 / h[2]}));
+  plan.normal_from_world = rounded<typename N::Unit, VoxelSpace, WorldSpace>(
+      into_volume(rotation, {h[0] / largest, h[1] / largest, h[2] / largest}));
+  plan.largest_spacing_mm = Real(largest);
+  return plan;
+}
+
+/// The solid volumes of the scene, in its order. Throws SceneError if there is none, or one whose
+/// voxels the loop's numbers cannot hold.
+template <class N>
+void plan_volumes(const LoadedScene& scene, ServoPlan<N>& plan) {
+  for (std::size_t i = 0; i < scene.volumes.size(); ++i) {
+    if (!scene.volumes[i].solid) continue;
+    check_spacing<N>(scene, scene.volumes[i]);
+    plan.volumes[plan.volume_count++] = plan_volume<N>(scene.volumes[i], i);
+  }
+  if (plan.volume_count == 0) {
+    throw SceneError(scene.path +
+                     ": no [[volume]] is solid; set solid = true for the one to touch");
+  }
+}
 
 /// Edge of the finest voxel of the solid volumes.
 [[nodiscard]] inline double contact_unit_mm(const LoadedScene& scene) {
@@ -44,8 +94,8 @@ inline std::array<double, 3> middle_mm(const SceneVolume& volume) {
 
 }  // namespace contact_parts
 
-/// The origin is the middle of the first solid volume. Throws SceneError for a volume so far from
-/// it that the proxy could not get there.
+/// Contact space and coupling. The origin is the middle of the first solid volume. Throws
+/// SceneError for a volume so far from it that the proxy could not reach it.
 template <class N>
 void plan_contact(const LoadedScene& scene, ServoPlan<N>& plan) {
   using Real = typename N::Real;
@@ -73,7 +123,7 @@ void plan_contact(const LoadedScene& scene, ServoPlan<N>& plan) {
                       typename N::Unit(scene.force.damping_ns_per_mm)};
 }
 
-/// How volume `v` of the plan lies in contact space.
+/// Frame of a volume in contact space.
 template <class N>
 [[nodiscard]] ContactFrame<N> contact_frame(const LoadedScene& scene, const SceneVolume& volume) {
   const double unit_mm = contact_unit_mm(scene);
@@ -93,7 +143,7 @@ template <class N>
           rounded<VoxelVec<typename N::Real>, typename N::Real>(origin_vox)};
 }
 
-/// How the proxy of a tool with these point shells moves.
+/// Motion of the proxy of a tool with these point shells.
 template <class N>
 void plan_proxy(const LoadedScene& scene, const SceneTool& tool, SweptTool<N>& swept) {
   constexpr double kRampNPerMs = 0.1;  // after a start inside of the solid: docs/theory.md 4.7

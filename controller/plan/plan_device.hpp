@@ -7,20 +7,22 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "controller/input/load_error.hpp"
+#include "controller/law/registry/law_registry.hpp"
 #include "controller/load/loaded_scene.hpp"
-#include "controller/plan/method/matrices.hpp"
+#include "controller/plan/method/lattice.hpp"
 #include "controller/servo/servo_plan.hpp"
-#include "shared/wire/falcon_constants.hpp"
-#include "shared/wire/omni_constants.hpp"
-#include "shared/wire/wooden_constants.hpp"
+#include "shared/wire/falcon.hpp"
+#include "shared/wire/omni.hpp"
+#include "shared/wire/woodenhaptics.hpp"
+
+// The device of a scene, its limits and its laws in the loop's numbers. Load time.
 
 namespace kerf {
 
-// The device of a scene in the loop's numbers: joints, motors, kinematics, limits.
-
 namespace device_parts {
 
-/// How a joint of the servo's kinematics follows its encoder, and its motor the joint.
+/// Map from the encoder to a joint of the servo's kinematics, and from the joint to its motor.
 struct JointSense {
   double home_rad = 0;       ///< angle where the count is 0
   double rad_per_count = 0;  ///< signed
@@ -91,8 +93,8 @@ inline std::int32_t motor_count_end(Personality personality) {
   return wooden::kMaxMilliamps;
 }
 
-/// No tip is farther than this from where its encoders, rounded to whole counts, put it: half a
-/// count of one joint with all of the arm behind it. The Omni's 0.056 mm is its data sheet's 0.055.
+/// Largest distance of a tip from the position that its encoders, rounded to whole counts, give:
+/// half a count of one joint with the whole arm. The Omni's 0.056 mm is its data sheet's 0.055.
 inline double tip_noise_mm(Personality personality) {
   switch (personality) {
     case Personality::omni:
@@ -107,7 +109,7 @@ inline double tip_noise_mm(Personality personality) {
 
 }  // namespace device_parts
 
-/// The device, its place in the scene and its motors, as the loop's numbers hold them.
+/// The device, its position in the scene and its motors.
 template <class N>
 void plan_device(const DeviceSettings& device, ServoPlan<N>& plan) {
   using Real = typename N::Real;
@@ -162,6 +164,25 @@ void plan_limits(const LoadedScene& scene, ServoPlan<N>& plan) {
                  .not_finite_ticks = static_cast<std::uint32_t>(2 * rate_hz / 1000),
                  .fade_in_ticks = at_least(100),
                  .rest_ticks = at_least(50)};
+}
+
+/// The laws that a scene names. Throws SceneError for one that this program does not know.
+template <class N>
+void plan_laws(const LoadedScene& scene, ServoPlan<N>& plan) {
+  const LawLoop loop{.rate_hz = double(scene.servo.rate_hz),
+                     .tip_noise_mm = device_parts::tip_noise_mm(scene.device.personality)};
+  const auto law = [&]<template <class> class In>(const LawChoice& choice, const char* key,
+                                                  LawPlan<In<N>, typename N::Real>& into) {
+    try {
+      into = plan_law<In, N>(choice, loop);
+    } catch (const LawError& error) {
+      throw SceneError(scene.path + ": " + key + " \"" + choice.name + '"' + error.what());
+    }
+  };
+  law.template operator()<ForceInput>(scene.force.law, "force.law", plan.force_law);
+  law.template operator()<VelocityInput>(scene.servo.velocity, "servo.velocity", plan.velocity);
+  law.template operator()<StabiliserInput>(scene.force.stabiliser, "force.stabiliser",
+                                           plan.stabiliser);
 }
 
 }  // namespace kerf

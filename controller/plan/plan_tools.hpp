@@ -6,16 +6,102 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <numbers>
 
-#include "controller/kernel/aligned_table.hpp"
+#include "controller/kernel/covered_voxels.hpp"
+#include "controller/kernel/kernel_set.hpp"
+#include "controller/load/loaded_scene.hpp"
 #include "controller/plan/method/lattice.hpp"
-#include "controller/plan/method/matrices.hpp"
 #include "controller/plan/method/tool_method.hpp"
-#include "controller/plan/plan_preston.hpp"
 #include "controller/servo/servo_plan.hpp"
-#include "controller/servo/sum_to_force.hpp"
+
+// The tools of a scene in its volumes, and cutting by force, in the loop's numbers. Load time.
 
 namespace kerf {
+
+/// Rates at which force cuts `volume`, without its labels. A voxel without a label, and a volume
+/// without labels, is cut as enamel.
+template <class N>
+[[nodiscard]] PrestonPlan<N> plan_preston(const LoadedScene& scene, const SceneVolume& volume) {
+  const auto& h = volume.image.spacing_mm;
+  const double steps_per_mm3 = kDensityMax / (h[0] * h[1] * h[2]);
+  const double enamel = scene.cut.machinability_mm3_per_s_n / scene.servo.rate_hz * steps_per_mm3;
+  PrestonPlan<N> plan;
+  plan.rate[0] = force_rate<N>(enamel);
+  for (std::size_t m = 1; m < scene.materials.size(); ++m) {
+    const Material& material = scene.materials[m];
+    plan.forbidden[m] = material.forbidden;
+    if (!material.forbidden) plan.rate[m] = force_rate<N>(enamel * material.machinability);
+  }
+  return plan;
+}
+
+/// From voxel edges to rim radii of the tool along the world's axes, for a `SpindleFrame`.
+template <class N>
+[[nodiscard]] Transform<typename N::Ratio, WorldSpace, VoxelSpace> rims_from_voxel(
+    const SceneTool& tool, const SceneVolume& volume) {
+  Matrix m = matrix_of(volume.pose.orientation);
+  for (auto& row : m) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      row[axis] *= volume.image.spacing_mm[axis] / tool.radius_mm;
+    }
+  }
+  return rounded<typename N::Ratio, WorldSpace, VoxelSpace>(m);
+}
+
+/// For a `BearingPlane`.
+template <class N>
+[[nodiscard]] typename N::Ratio bearing_steepness(const SceneTool& tool,
+                                                  const ContactPlan<N>& contact) {
+  const double rim = tool.radius_mm * static_cast<double>(contact.units_per_mm);
+  return typename N::Ratio(tool.round ? 1 : std::clamp(rim, 1.0, kSteepest));
+}
+
+template <class N>
+[[nodiscard]] SpindlePlan<N> plan_spindle(const LoadedScene& scene) {
+  const SpindleSettings& spindle = scene.spindle;
+  const double omega_per_s = spindle.speed_krpm * 1000 * 2 * std::numbers::pi / 60;
+  // g mm^2 / s^2 is 10^-6 N mm.
+  const double run_up_s = spindle.inertia_g_mm2 * 1e-6 * omega_per_s / spindle.stall_torque_n_mm;
+  return spindle_plan<N>(spindle.speed_krpm / kReferenceSpeedKrpm, spindle.stall_torque_n_mm,
+                         run_up_s, 1.0 / scene.servo.rate_hz);
+}
+
+template <class N>
+[[nodiscard]] FrictionPlan<N> plan_friction(const LoadedScene& scene) {
+  return friction_plan<N>(scene.cut.friction, 1.0 / scene.servo.rate_hz);
+}
+
+/// The whole cutting plan. `ForceCutMemory` adds the labels later.
+template <class N>
+[[nodiscard]] ForceCutPlan<N> plan_force_cut(const LoadedScene& scene, const ServoPlan<N>& plan) {
+  ForceCutPlan<N> cut;
+  cut.on = scene.cut.model == CutModel::preston;
+  if (!cut.on) return cut;
+  constexpr double kDeeperPerS = 100, kBackPerS = 1;  // units: there in 10 ms, back in a second
+  cut.threshold_n = typename N::Real(scene.cut.threshold_n);
+  cut.deeper_step = typename N::Real(kDeeperPerS / scene.servo.rate_hz);
+  cut.back_step = typename N::Real(kBackPerS / scene.servo.rate_hz);
+  cut.spindle = plan_spindle<N>(scene);
+  cut.friction = plan_friction<N>(scene);
+  std::array<double, kMaxVolumes> voxel_mm3{};
+  for (std::size_t v = 0; v < plan.volume_count; ++v) {
+    const SceneVolume& volume = scene.volumes[plan.volumes[v].scene_index];
+    const auto& h = volume.image.spacing_mm;
+    voxel_mm3[v] = h[0] * h[1] * h[2];
+    cut.volume[v] = plan_preston<N>(scene, volume);
+  }
+  const double largest = *std::max_element(voxel_mm3.begin(), voxel_mm3.end());
+  for (std::size_t v = 0; v < plan.volume_count; ++v) {
+    const double share = voxel_mm3[v] / largest;
+    if constexpr (N::kIsFixed) {
+      cut.voxel_share[v] = typename N::Unit(share).raw();
+    } else {
+      cut.voxel_share[v] = static_cast<CutBudget<N>>(share);
+    }
+  }
+  return cut;
+}
 
 /// Smallest n with 2^n >= x; exact, unlike a logarithm, whose last bit differs between machines.
 [[nodiscard]] inline int bits_of(double x) {
@@ -23,7 +109,7 @@ namespace kerf {
   return std::ldexp(1.0, floor) < x ? floor + 1 : floor;
 }
 
-/// Newtons per unit of an exact sum, as the loop's numbers hold it.
+/// Newtons per unit of an exact sum.
 template <class N>
 [[nodiscard]] SumToForce<N> sum_to_force(const Matrix& newtons_per_step, const SumUnit& sum) {
   SumToForce<N> map;
@@ -73,8 +159,8 @@ template <class N>
   return reach;
 }
 
-/// Steps and forces of one tool in one volume, as its method wants them; `table` is that of the
-/// method `aligned`.
+/// Steps and forces of one tool in one volume, for its method; `table` is that of the method
+/// `aligned`.
 template <class N>
 [[nodiscard]] ToolInVolume<N> plan_tool(const ToolCase& what, const ToolMethod& method,
                                         const AlignedTable* table) {

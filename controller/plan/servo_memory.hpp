@@ -1,29 +1,252 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "controller/input/load_error.hpp"
+#include "controller/kernel/cut_budget.hpp"
 #include "controller/load/loaded_scene.hpp"
-#include "controller/plan/contact_memory.hpp"
-#include "controller/plan/force_cut_memory.hpp"
-#include "controller/plan/method/method_memory.hpp"
-#include "controller/plan/servo_snapshot.hpp"
-#include "controller/plan/tables/tick_memory.hpp"
+#include "controller/plan/compile.hpp"
+#include "controller/plan/method/tool_method.hpp"
+#include "controller/plan/plan_contact.hpp"
+#include "controller/plan/tables/free_brick_map.hpp"
+#include "controller/plan/tables/point_shell_table.hpp"
+#include "controller/plan/tables/sample_tables.hpp"
 #include "controller/servo/servo_plan.hpp"
 #include "controller/servo/servo_state.hpp"
-#include "controller/servo/volume_reset.hpp"
+#include "controller/servo/volume_restore.hpp"
+#include "controller/tool/surface_samples.hpp"
+#include "controller/tool/tool_shapes.hpp"
+
+// All arrays that a compiled scene steps on, and the snapshot of them. Load time. Only compile.cpp
+// includes this.
 
 namespace kerf {
 
-/// Owner of all arrays that a compiled scene steps on. First tools and methods tell its parts what
-/// they need; then `take` makes the memory. What nobody needs does not exist. Load time.
+[[noreturn]] inline void refuse_snapshot() {
+  throw std::invalid_argument(
+      "snapshot: is of another scene; restore it into one that was compiled alike");
+}
+
+/// Copies arrays into others of the same sizes.
+template <class Arrays>
+void restore_arrays(const Arrays& kept, Arrays& arrays) {
+  const auto same = [](const auto& a, const auto& b) { return a.size() == b.size(); };
+  if (!std::equal(kept.begin(), kept.end(), arrays.begin(), arrays.end(), same)) refuse_snapshot();
+  for (std::size_t i = 0; i < kept.size(); ++i) std::ranges::copy(kept[i], arrays[i].begin());
+}
+
+/// The values and arrays of one servo.
+template <class N>
+struct SnapshotOf final : ServoSnapshot {
+  SnapshotOf(const ServoState<N>& of, std::vector<std::vector<Density>> density,
+             std::array<std::vector<Gradient<N>>, kMaxVolumes> gradient,
+             std::array<std::vector<RemovalCarry<N>>, kMaxVolumes> carry,
+             std::array<std::vector<std::uint64_t>, kMaxVolumes> blocks,
+             std::vector<KeptBrick> stroke_pool,
+             std::array<std::vector<std::uint32_t>, kMaxVolumes> stroke_bricks)
+      : state(of),
+        densities(std::move(density)),
+        gradients(std::move(gradient)),
+        carries(std::move(carry)),
+        cut_blocks(std::move(blocks)),
+        pool(std::move(stroke_pool)),
+        kept_in(std::move(stroke_bricks)) {}
+
+  /// The kept values, with the memory of `here`.
+  [[nodiscard]] ServoState<N> state_in(const ServoState<N>& here) const {
+    ServoState<N> placed = state;
+    placed.volumes = here.volumes;
+    placed.overlap = here.overlap;
+    placed.gradient_scratch = here.gradient_scratch;
+    placed.scratch = here.scratch;
+    placed.stroke.pool = here.stroke.pool;
+    placed.stroke.kept_in = here.stroke.kept_in;
+    placed.contact.volumes = here.contact.volumes;
+    placed.contact.behind = here.contact.behind;
+    placed.force_cut.list = here.force_cut.list;
+    return placed;
+  }
+
+  [[nodiscard]] double largest_carry() const override {
+    double largest = 0;
+    const auto count = [&](double voxels) { largest = std::max(largest, std::abs(voxels)); };
+    for (const auto& by_lane : carries) {
+      for (const auto owed : by_lane) {
+        count(static_cast<double>(owed) / (N::kIsFixed ? 65536.0 : 1.0) / kDensityMax);
+      }
+    }
+    const double voxel = kDensityMax * (N::kIsFixed ? std::ldexp(1.0, kBudgetBits) : 1.0);
+    for (const auto& volume : state.force_cut.volume) {
+      for (const auto owed : volume.carry) count(static_cast<double>(owed) / voxel);
+    }
+    return largest;
+  }
+
+  ServoState<N> state;  ///< its pointers are those of the servo that was kept: see `state_in`
+  std::vector<std::vector<Density>> densities;                  ///< by volume of the scene
+  std::array<std::vector<Gradient<N>>, kMaxVolumes> gradients;  ///< by volume of the plan
+  std::array<std::vector<RemovalCarry<N>>, kMaxVolumes> carries;
+  std::array<std::vector<std::uint64_t>, kMaxVolumes> cut_blocks;
+  std::vector<KeptBrick> pool;
+  std::array<std::vector<std::uint32_t>, kMaxVolumes> kept_in;
+};
+
+/// Owner of the arrays of the swept contact: surfaces of the tools, their transformed copies in
+/// each volume and the volumes' free bricks. Empty for the paper's force.
+template <class N>
+class ContactMemory {
+ public:
+  /// Samples of a tool's surface, at a fixed address.
+  PointShell<N> hold_point_shell(const LoadedScene& scene, const SceneTool& tool) {
+    const double unit_mm = contact_unit_mm(scene);
+    const auto samples = named(scene, [&] { return surface_samples(tool, unit_mm); });
+    return hold(tool.name, unit_mm, {samples, close_samples(tool, unit_mm)}, tool.round, places_);
+  }
+
+  /// The same for the parts behind the tool's head.
+  PartsBehind<N> hold_parts_behind(const LoadedScene& scene, const SceneTool& tool) {
+    const double unit_mm = contact_unit_mm(scene);
+    PartsBehind<N> behind;
+    for (const ToolPart& part : parts_behind(tool)) {
+      const auto samples = named(scene, [&] { return part_samples(tool, part, unit_mm); });
+      auto& places = places_behind_[behind.count];
+      places.resize(places_.size());
+      behind.part[behind.count++] = {
+          hold(tool.name + "'s " + part.name, unit_mm, samples, false, places),
+          typename N::Real(part.middle_mm / unit_mm)};
+    }
+    return behind;
+  }
+
+  /// Makes room in one more volume of the plan.
+  void hold_volume(const SceneVolume& volume) {
+    names_.push_back(volume.name);
+    const VoxelGrid& grid = volume.image.grid;
+    const auto bricks = [](std::int32_t voxels) {
+      return static_cast<std::size_t>((voxels + kFreeBrick - 1) / kFreeBrick);
+    };
+    map_bytes_.push_back(bricks(grid.nx) * bricks(grid.ny) * bricks(grid.nz));
+    places_.emplace_back();
+  }
+
+  /// The field that contact reads in volume `v` of the plan; `density` is that of the servo.
+  void take(const LoadedScene& scene, const SceneVolume& volume, std::size_t v,
+            std::span<const Density> density, ContactState<N>& state) {
+    const MappedField& field = fields_.emplace_back(volume.image.grid, density, volume.iso);
+    state.volumes[v] = {field.field(), contact_frame<N>(scene, volume), places_[v].places()};
+    for (std::size_t part = 0; part < kMostBehind; ++part) {
+      state.behind[part][v] = state.volumes[v];
+      if (v < places_behind_[part].size()) {
+        state.behind[part][v].places = places_behind_[part][v].places();
+      }
+    }
+  }
+
+  [[nodiscard]] std::vector<ArrayBytes> arrays() const {
+    std::vector<ArrayBytes> list;
+    for (const auto& [name, tool] : tools_) {
+      list.push_back({"surface of " + name, tool.bytes(), true});
+    }
+    for (std::size_t v = 0; v < names_.size(); ++v) {
+      std::size_t places = places_[v].bytes();
+      for (const auto& behind : places_behind_) places += v < behind.size() ? behind[v].bytes() : 0;
+      list.push_back({"places in " + names_[v], places, true});
+      list.push_back({"free bricks of " + names_[v], map_bytes_[v], false});
+    }
+    return list;
+  }
+
+ private:
+  /// Calls `make`; puts the scene's name before a complaint.
+  static auto named(const LoadedScene& scene, const auto& make) {
+    try {
+      return make();
+    } catch (const SceneError& error) {
+      throw SceneError(scene.path + ": " + error.what());
+    }
+  }
+
+  PointShell<N> hold(const std::string& name, double unit_mm, PartSamples mm, bool round,
+                     std::vector<PlaceMemory<N>>& places) {
+    for (auto& at : mm.samples) {
+      for (double& x : at) x /= unit_mm;
+    }
+    for (SurfaceSample& sample : mm.close) {
+      for (double& x : sample.at) x /= unit_mm;
+    }
+    const auto& held = tools_.emplace_back(name, ToolPoints<N>(mm.samples, round, mm.close)).second;
+    for (PlaceMemory<N>& in_volume : places) in_volume.hold(held.point_shell());
+    return held.point_shell();
+  }
+
+  std::vector<std::pair<std::string, ToolPoints<N>>> tools_;
+  std::vector<std::string> names_;  ///< by volume of the plan
+  std::vector<std::size_t> map_bytes_;
+  std::vector<PlaceMemory<N>> places_;
+  std::array<std::vector<PlaceMemory<N>>, kMostBehind> places_behind_;  ///< if a tool has a part
+  std::vector<MappedField> fields_;
+};
+
+/// Owner of the arrays of cutting by force for each volume of the plan: the list of voxels under
+/// the tool, and a copy of the labels. Empty in other models.
+template <class N>
+class ForceCutMemory {
+ public:
+  /// Reserves the list of a tool in volume `v` of the plan, the next one or a known one.
+  void hold(const ToolCase& in, std::size_t v) {
+    if (v == volumes_.size()) {
+      volumes_.push_back({in.volume.name, in.volume.image.labels.size(), 0, {}, {}});
+    }
+    std::size_t& length = volumes_[v].length;
+    length = std::max(length, most_listed(in, nullptr));
+  }
+
+  /// Allocates; points plan and state at it.
+  void take(const LoadedScene& scene, ServoPlan<N>& plan, ForceCutState<N>& state) {
+    for (std::size_t v = 0; v < volumes_.size(); ++v) {
+      Volume& volume = volumes_[v];
+      volume.list.resize(volume.length);
+      volume.labels = scene.volumes[plan.volumes[v].scene_index].image.labels;
+      state.list[v] = volume.list;
+      plan.force_cut.volume[v].labels = volume.labels;
+    }
+  }
+
+  [[nodiscard]] std::vector<ArrayBytes> arrays() const {
+    std::vector<ArrayBytes> list;
+    for (const Volume& volume : volumes_) {
+      list.push_back({"voxels under the tool in " + volume.name,
+                      volume.length * sizeof(CoveredEntry<N>), false});
+      if (volume.label_count == 0) continue;
+      list.push_back({"materials of " + volume.name, volume.label_count * sizeof(Label), false});
+    }
+    return list;
+  }
+
+ private:
+  struct Volume {
+    std::string name;
+    std::size_t label_count, length;
+    std::vector<CoveredEntry<N>> list;
+    std::vector<Label> labels;
+  };
+
+  std::vector<Volume> volumes_;
+};
+
+/// Owner of all arrays that a compiled scene steps on. First tools and methods reserve in its
+/// parts; then `take` allocates. An array that no one reserves does not exist.
 template <class N>
 class ServoMemory {
  public:
@@ -37,7 +260,7 @@ class ServoMemory {
     }
   }
 
-  /// The samples of the next tool; they stay where they are.
+  /// The samples of the next tool, at a fixed address.
   std::span<const ToolOffset> hold_samples(const SceneTool& tool) {
     return samples_.emplace_back(tool.name, tool.offsets).second;
   }
@@ -95,7 +318,7 @@ class ServoMemory {
   [[nodiscard]] SnapshotOf<N> keep(const ServoState<N>& state) const {
     return {state, densities_, gradients_, carries_, cut_blocks_, pool_, kept_in_};
   }
-  /// The arrays keep their places: plan and state point at them. Throws std::invalid_argument where
+  /// The arrays keep their addresses: plan and state point at them. Throws std::invalid_argument if
   /// the snapshot is of another scene.
   void restore(const SnapshotOf<N>& kept, ServoState<N>& state) {
     restore_arrays(kept.densities, densities_);
@@ -108,7 +331,7 @@ class ServoMemory {
     state = kept.state_in(state);
   }
 
-  /// All of it by name, as it is before `take`.
+  /// All arrays by name, with their sizes before `take`.
   [[nodiscard]] std::vector<ArrayBytes> arrays() const {
     std::vector<ArrayBytes> list;
     const auto add = [&](const std::string& name, std::size_t bytes, bool taken) {
@@ -145,8 +368,8 @@ class ServoMemory {
   }
 
  private:
-  /// Of the bricks of a stroke, and of those that may be cut next: 16 MiB hold 8 cm^3 of voxels of
-  /// 0.1 mm, a tooth several times over; small volumes fit whole.
+  /// Entries for the bricks of a stroke, and for those that may be cut next: 16 MiB hold 8 cm^3 of
+  /// voxels of 0.1 mm, several teeth; small volumes fit whole.
   [[nodiscard]] std::size_t pool_size() const {
     constexpr std::size_t kMost = (std::size_t{16} << 20) / sizeof(KeptBrick);
     std::size_t bricks = 0;
@@ -166,7 +389,7 @@ class ServoMemory {
   std::vector<std::pair<std::string, std::vector<ToolOffset>>> samples_;
   std::array<std::vector<Gradient<N>>, kMaxVolumes> gradients_;  ///< by volume of the plan
   std::array<std::vector<RemovalCarry<N>>, kMaxVolumes> carries_;
-  std::array<std::vector<Density>, kMaxVolumes> firsts_;  ///< where something is cut, as the next
+  std::array<std::vector<Density>, kMaxVolumes> firsts_;  ///< if the scene cuts, as the next
   std::array<std::vector<std::uint64_t>, kMaxVolumes> cut_blocks_;
   std::vector<KeptBrick> pool_;  ///< of the last stroke, as the next
   std::array<std::vector<std::uint32_t>, kMaxVolumes> kept_in_;

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-# Sources of this folder but for plan/cost: its own build takes them, and the golden run of another
-# processor.
-set(kerf_table_sources aligned_tool close_cells free_brick_map sample_tool tool_points tick_memory)
+# The sources of this folder that the core-only build takes too.
+set(kerf_table_sources free_brick_map point_shell_table sample_tables)
 list(TRANSFORM kerf_table_sources REPLACE "(.+)" "${CMAKE_CURRENT_LIST_DIR}/tables/\\1.cpp")
 
 file(GLOB kerf_plan_sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_LIST_DIR}/method/*.cpp)

@@ -12,17 +12,30 @@
 
 #include "controller/kernel/gradient.hpp"
 #include "controller/law/registry/law_registry.hpp"
-#include "controller/scene/phantom_shapes.hpp"
 #include "shared/volume/voxel_grid.hpp"
 #include "shared/wire/personality.hpp"
 
+// A scene file as values: its checked settings, and the defaults of all others. No array is read
+// yet (controller/load). Limits and words first, then one struct per table of the file.
+
 namespace kerf {
 
-// A scene file as values: what it says, checked, with the defaults of what it leaves out. No array
-// is read yet (controller/load). Limits first.
+/// The shapes of the phantom, in a box of 32 x 32 x 20 mm, z up:
+///
+///   molar          a lower molar of enamel, dentin and pulp
+///   carious_molar  the same with a lesion below its fissures: a fourth label
+///   wall           solid in the lower half of the box
+///   ball           of 8 mm radius
+///   torus          about z, ring of 10 mm, tube of 4 mm
+///
+/// The last three have no labels, and their surface at a density of 0.5.
+inline constexpr std::string_view kMolar = "molar";
+inline constexpr std::string_view kCariousMolar = "carious_molar";
+inline constexpr std::array<std::string_view, 5> kPhantomShapes = {kMolar, kCariousMolar, "wall",
+                                                                   "ball", "torus"};
 
-/// The shapes a [[tool]] can have, its tip (the lowest point of the head) toward -y and the shaft
-/// toward +y. All but the mesh are solids of revolution about the y axis:
+/// The shapes that a [[tool]] can have, its tip (the lowest point of the head) toward -y and the
+/// shaft toward +y. All but the mesh are solids of revolution about the y axis:
 ///
 ///   ball           a sphere
 ///   cylinder       flat at both ends
@@ -37,7 +50,7 @@ inline constexpr std::array<std::string_view, 8> kShapeWords = {
     "ball", "cylinder", "cone", "inverted_cone", "flame", "wheel", "pear", kMeshShape};
 inline constexpr auto kToolShapes = std::span(kShapeWords).first<7>();  ///< of revolution
 
-/// What the scene says about the size of one tool; all in mm unless counted in pitches.
+/// Size of one tool in the scene; all in mm unless counted in pitches.
 struct ToolSize {
   double pitch_mm = 0.125;                 ///< distance of the samples
   double radius_mm = 1.0;                  ///< largest radius; used when `size_vox` is empty
@@ -45,13 +58,13 @@ struct ToolSize {
   std::optional<std::int32_t> size_vox{};  ///< the head fills a cube of so many pitches
 };
 
-/// What the scene says of the parts behind the head, which are felt and never cut. Cylinders about
+/// The parts behind the head in the scene, which are felt and never cut. Cylinders about
 /// the tool's axis; a handpiece begins where the shaft ends.
 struct ShaftSize {
-  std::optional<double> radius_mm{};  ///< none: no shaft is felt
+  std::optional<double> radius_mm{};  ///< if empty, no shaft is felt
   std::optional<double> length_mm{};  ///< from the tool's tip to the shaft's end, head included
-  std::optional<double> handpiece_radius_mm{};  ///< none: there is none
-  std::optional<double> handpiece_length_mm{};  ///< none: its radius
+  std::optional<double> handpiece_radius_mm{};  ///< if empty, there is none
+  std::optional<double> handpiece_length_mm{};  ///< if empty, its radius
 };
 
 inline constexpr double kMinWorkspaceScale = 0.01, kMaxWorkspaceScale = 100;
@@ -63,7 +76,7 @@ inline constexpr int kMaxRateHz = 8000;           // one tick per cycle of the F
 inline constexpr std::size_t kMaxMaterials = 32;  // labels are small indices
 
 // Gains that all number types of the loop hold with room to spare: in fixed point a stiffness ends
-// at 128 N/mm, a damping at 2 N s/mm. What a device bears is a matter of its port.
+// at 128 N/mm, a damping at 2 N s/mm. The limits of a device are those of its port.
 inline constexpr double kMinStiffnessNPerMm = 0.001;
 inline constexpr double kMaxStiffnessNPerMm = 100;
 inline constexpr double kMaxDampingNsPerMm = 1;
@@ -76,22 +89,22 @@ inline constexpr std::string_view kPhantomFile = "phantom";
 inline constexpr double kEnamelMm3PerSN = 0.083;
 inline constexpr double kReferenceSpeedKrpm = 300;
 
-/// A [[material]]; its place in the list is the label of its voxels.
+/// A [[material]]; its index in the list is the label of its voxels.
 struct Material {
   std::string name;
-  bool in_scene = false;                         ///< the scene's text names it
-  double iso = 0.5;                              ///< density, 0..1
-  std::optional<double> felt_iso{};              ///< where its surface lies; none: volume's iso
-  double machinability = 1.0;                    ///< removal rate over that of enamel
-  bool forbidden = false;                        ///< never cut by force, and told when pressed upon
+  bool in_scene = false;             ///< the scene's text names it
+  double iso = 0.5;                  ///< density, 0..1
+  std::optional<double> felt_iso{};  ///< density of its surface; if empty, the volume's iso
+  double machinability = 1.0;        ///< removal rate over that of enamel
+  bool forbidden = false;            ///< never cut by force; a press on it is reported
   std::array<double, 3> colour{0.9, 0.87, 0.8};  ///< linear RGB, 0..1
 };
 
 /// The numbers of the loop.
 enum class NumericKind : std::uint8_t { fixed, float32, float64 };
 enum class ForceModel : std::uint8_t {
-  paper,  ///< sum of gradients over the tool's samples
-  proxy   ///< swept contact of the tool's surface, coupled to the hand
+  paper,  ///< sum of gradients over the samples of the tool
+  proxy   ///< swept contact of the tool surface, coupled to the hand
 };
 /// How material leaves (docs/cutting.md).
 enum class CutModel : std::uint8_t { none, overlap, overlap_exact, preston };
@@ -102,17 +115,17 @@ inline constexpr std::array<std::string_view, 2> kDenoiseWords = {"auto", "off"}
 inline constexpr int kMostDenoise =
     3;  ///< passes; more would move a scan's edges (docs/theory.md 2.4)
 
-// The tables of a scene file. What a member means, its unit and range: scene_keys.cpp.
+// The tables of a scene file. Meaning, unit and range of a member: scene_keys.cpp.
 
 /// [device]
 struct DeviceSettings {
   Personality personality = Personality::omni;
   double workspace_scale = 1.0;  ///< x_scene = scale * x_device
-  bool fit = false;              ///< the first volume tells the scale
+  bool fit = false;              ///< the scale follows from the first volume
   std::array<double, 3> offset_mm{0, 0, 0};
-  std::optional<std::array<double, 3>> torque_scale;  ///< none: the motors stay off
+  std::optional<std::array<double, 3>> torque_scale;  ///< if empty, the motors stay off
   std::array<double, 3> dock_rad{0.0, 0.23, -0.37};
-  std::optional<std::array<double, 3>> encoder_sign;  ///< 1 or -1 each; none: 1
+  std::optional<std::array<double, 3>> encoder_sign;  ///< 1 or -1 each; if empty, 1
 };
 
 /// [force]
@@ -122,9 +135,9 @@ struct ForceSettings {
   double stiffness_n_per_mm = 0.4;
   double damping_ns_per_mm = 0.002;
   double friction = 0.0;
-  LawChoice law{LawKind::force, "", {}};              ///< none: the coupling
-  LawChoice stabiliser{LawKind::stabiliser, "", {}};  ///< none
-  bool unchecked_gain = false;  ///< a loop that its device's model calls unstable is no mistake
+  LawChoice law{LawKind::force, "", {}};              ///< if without a name, the coupling
+  LawChoice stabiliser{LawKind::stabiliser, "", {}};  ///< if without a name, none
+  bool unchecked_gain = false;  ///< accept a loop that the model of its device calls unstable
 };
 
 /// [cut]
@@ -132,7 +145,7 @@ struct CutSettings {
   CutModel model = CutModel::preston;
   double rate_per_s = 20.0;  ///< k; 1/T is the paper's own step
   double p1_n_per_mm2 = 0.06;
-  // Of the model preston:
+  // If the model is preston:
   double machinability_mm3_per_s_n = kEnamelMm3PerSN;
   double threshold_n = 0.05;
   double friction = 0.5;
@@ -161,10 +174,10 @@ struct ServoSettings {
   LawChoice velocity{LawKind::velocity, "foaw", {}};
 };
 
-/// What a scene says of everything but volumes and tools; the same before and after loading.
+/// All settings of a scene but volumes and tools; the same before and after loading.
 struct SceneSettings {
   std::string path;
-  std::string title;  ///< [scene] title; empty: none
+  std::string title;  ///< [scene] title; may be empty
   std::vector<Material> materials;
   DeviceSettings device;
   ForceSettings force;
@@ -172,48 +185,49 @@ struct SceneSettings {
   SpindleSettings spindle;
   LimitSettings limits;
   ServoSettings servo;
-  std::string hand_script;  ///< [hand] script, relative to the working directory; empty: none
+  std::string hand_script;  ///< [hand] script, relative to the working directory; may be empty
   std::string hand_place;   ///< begins a complaint about it
 };
 
-/// One [[volume]] as the scene file says it; `where` begins a complaint about what it holds.
+/// One [[volume]] as written; `where` begins a complaint about its content.
 struct VolumeSpec {
   std::string where;  ///< `file:line`
   std::string name;
   std::string file;                                 ///< as written
   std::string shape{kMolar};                        ///< one of kPhantomShapes, with the phantom
   std::optional<VoxelGrid> phantom_size;            ///< only with file = "phantom"
-  std::optional<std::array<double, 3>> spacing_mm;  ///< none: what the file says
+  std::optional<std::array<double, 3>> spacing_mm;  ///< if empty, the spacing of the file
   std::optional<std::array<double, 2>> window;      ///< source values of density 0 and 1
-  std::optional<double> iso;                        ///< density 0..1; none: Otsu's threshold
+  std::optional<double> iso;                        ///< density 0..1; if empty, Otsu's threshold
   Denoise denoise = Denoise::automatic;
   bool crop = true;
   bool solid = true;
-  std::array<double, 3> position_mm{0, 0, 0};        ///< world place of the middle of its box
-  std::optional<std::array<double, 4>> orientation;  ///< world from source; none: z axis up
+  std::array<double, 3> position_mm{0, 0, 0};  ///< world position of the middle of its box
+  std::optional<std::array<double, 4>>
+      orientation;  ///< world from source; if empty, the z axis is up
 };
 
-/// One [[tool]] as the scene file says it; the places begin complaints about size and pitch.
+/// One [[tool]] as written; the `..._place` members begin complaints about size and pitch.
 struct ToolSpec {
   std::string where;  ///< `file:line`, of a mesh
   std::string size_place, pitch_place;
   std::string name;
-  std::string bur;  ///< as written; what it stands for is in the other members
+  std::string bur;  ///< as written; its expansion is in the other members
   std::string shape;
   std::string file;          ///< of a mesh, as written
   double scale = 1;          ///< mm per unit of the mesh
-  bool pitch_given = false;  ///< else the smallest voxel of what can be touched
+  bool pitch_given = false;  ///< else the smallest voxel of the solid volumes
   ToolSize size;
   ShaftSize shaft;
   std::string shaft_place;  ///< begins complaints about the shaft
   bool turns = true;
 };
 
-/// A scene file after parsing: every value checked, no file but its own read, no array made.
+/// A scene file after parsing: every value is checked, no other file is read, no array is made.
 struct Scene : SceneSettings {
   std::vector<VolumeSpec> volumes;
   std::vector<ToolSpec> tools;
-  bool offset_given = false;     ///< else the device origin is put on the first surface
+  bool offset_given = false;     ///< else the device origin is moved to the first surface
   bool cut_in_one_tick = false;  ///< rate_per_s = "1/T", the paper's own step
 };
 

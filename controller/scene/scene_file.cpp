@@ -2,25 +2,277 @@
 #include "controller/scene/scene_file.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
+#include <cmath>
+#include <cstddef>
+#include <cstdlib>
+#include <filesystem>
 #include <fstream>
 #include <ios>
 #include <iterator>
 #include <string>
 #include <system_error>
 #include <utility>
+#include <variant>
 #include <vector>
 
-#include "controller/scene/burs.hpp"
-#include "controller/scene/materials.hpp"
-#include "controller/scene/scene_rules.hpp"
+#include "controller/input/load_error.hpp"
+#include "controller/scene/scene.hpp"
+#include "controller/scene/scene_presets.hpp"
 #include "controller/scene/scene_table.hpp"
-#include "controller/scene/scene_text.hpp"
-#include "shared/posix/failure.hpp"
-#include "shared/posix/unreachable.hpp"
+#include "shared/posix/error_text.hpp"
+#include "shared/text/text.hpp"
 
 namespace kerf {
 namespace {
+
+/// A text; but a number that no double holds, as 1e400, is infinite: beyond every range.
+TomlValue value_of(const std::string& text) {
+  char* stop = nullptr;
+  errno = 0;
+  const double number = std::strtod(text.c_str(), &stop);
+  if (errno != ERANGE || *stop != '\0') return text;
+  return number;
+}
+
+/// The value; a text if TOML cannot read it. Line 0: it is in no file.
+TomlNode value_node(const SceneSetting& setting) {
+  TomlNode node;
+  try {
+    node = parse_toml("v = " + setting.value).entries.at(0);
+  } catch (const TomlError&) {
+    node.form = TomlNode::Form::value;
+    node.value = value_of(setting.value);
+    node.shown =
+        one_line(std::holds_alternative<double>(node.value) ? setting.value : written(node.value));
+  }
+  node.line = node.key_line = 0;
+  return node;
+}
+
+/// The entry of that key, new where there is none.
+TomlNode& entry_of(TomlNode& table, std::string_view key) {
+  const auto found = std::ranges::find(table.entries, key, &TomlNode::key);
+  if (found != table.entries.end()) return *found;
+  TomlNode& entry = table.entries.emplace_back();
+  entry.key = key;
+  return entry;
+}
+
+}  // namespace
+
+SceneSetting parse_setting(std::string_view text, SceneKeys keys) {
+  const std::size_t equals = text.find('=');
+  const std::string place = "--set " + one_line(text);
+  if (equals == text.npos || equals == 0 || equals + 1 == text.size() || one_line(text) != text) {
+    refuse(place, ": not KEY=VALUE; write such as force.stiffness_n_per_mm=0.3");
+  }
+  const std::string_view key = text.substr(0, equals);
+  if (std::ranges::find(keys, key, &SceneKey::name) == keys.end()) {
+    std::vector<std::string_view> known;
+    for (const SceneKey& row : keys) known.push_back(row.name);
+    const std::string_view near = nearest(key, known);
+    refuse("--set " + std::string(key),
+           " is no key of a scene; " +
+               (near.empty() ? "" : "did you mean " + std::string(near) + "? ") +
+               "docs/scene-keys.md has all");
+  }
+  return {std::string(key), std::string(text.substr(equals + 1))};
+}
+
+void put_settings(std::span<const SceneSetting> settings, TomlNode& root) {
+  for (const SceneSetting& setting : settings) {
+    const std::size_t dot = setting.key.find('.'), last = setting.key.rfind('.');
+    const std::string table = setting.key.substr(0, dot), key = setting.key.substr(last + 1);
+    const auto put = [&](TomlNode& into) {
+      // `[[volume]]` has a table below it, `pose`.
+      TomlNode& below =
+          last == dot ? into : entry_of(into, setting.key.substr(dot + 1, last - dot - 1));
+      TomlNode node = value_node(setting);
+      node.key = key;
+      entry_of(below, key) = std::move(node);
+    };
+    if (most_of(table) == 0) {
+      put(entry_of(root, table));
+      continue;
+    }
+    TomlNode* list = root.find(table) == nullptr ? nullptr : &entry_of(root, table);
+    if (list == nullptr || list->entries.empty()) {
+      refuse("--set " + setting.key, ": the scene has no [[" + table + "]]; write one in its file");
+    }
+    for (TomlNode& entry : list->entries) put(entry);
+  }
+}
+
+namespace {
+
+// Rules between keys, which no single row of the table can hold, and values that follow from
+// others. `table` has been read into the value beside it. Each throws SceneError.
+
+std::string stem_of(const std::string& file) {
+  return std::filesystem::path(file).stem().string();
+}
+
+void make_unit(const SceneTable& table, std::array<double, 4>& q) {
+  constexpr double kTolerance = 0.01;  // rounded by hand, not forgotten
+  const double length = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+  if (std::abs(length - 1) > kTolerance) {
+    refuse(table.place("pose.orientation"),
+           " has length " + short_text(length) + "; write a unit quaternion [x, y, z, w]");
+  }
+  for (double& component : q) component /= length;
+}
+
+/// Of a solid of revolution; a mesh has its own size.
+void check_size(const SceneTable& table, const ToolSpec& tool) {
+  const ToolSize& size = tool.size;
+  if (!table.has("radius_mm") && !table.has("size_vox")) {
+    refuse(table.place(), " needs either radius_mm or size_vox; write one of them");
+  }
+  if (table.has("radius_mm") && table.has("size_vox")) {
+    refuse(table.place("radius_mm"), " contradicts size_vox; leave one of the two out");
+  }
+  if (!size.length_mm) return;
+  if (size.size_vox) {
+    refuse(table.place("length_mm"), " contradicts size_vox, which is a cube; leave it out");
+  }
+  if (tool.shape == "ball") {
+    refuse(table.place("length_mm"), " contradicts the ball, which is round; leave it out");
+  }
+  if (tool.shape == "wheel" && *size.length_mm > 2 * size.radius_mm) {
+    refuse(table.place("length_mm"),
+           " is more than the wheel's diameter; use at most " + number_text(2 * size.radius_mm));
+  }
+}
+
+/// For any tool; limits by the length of the head are checked once that is known (load_scene.cpp).
+void check_shaft(const SceneTable& table, ToolSpec& tool) {
+  const ShaftSize& shaft = tool.shaft;
+  if (shaft.radius_mm && !shaft.length_mm) {
+    refuse(table.place("shaft_radius_mm"),
+           " has no length; write shaft_length_mm, from the tool's tip to the shaft's end");
+  }
+  if (shaft.length_mm && !shaft.radius_mm) {
+    refuse(table.place("shaft_length_mm"), " has no radius; write shaft_radius_mm");
+  }
+  if (shaft.handpiece_radius_mm && !shaft.radius_mm) {
+    refuse(table.place("handpiece_radius_mm"),
+           " has no shaft to hold; write shaft_radius_mm and shaft_length_mm");
+  }
+  if (shaft.handpiece_length_mm && !shaft.handpiece_radius_mm) {
+    refuse(table.place("handpiece_length_mm"), " has no radius; write handpiece_radius_mm");
+  }
+  if (shaft.handpiece_radius_mm && *shaft.handpiece_radius_mm < *shaft.radius_mm) {
+    refuse(table.place("handpiece_radius_mm"),
+           " is narrower than the shaft; use at least " + number_text(*shaft.radius_mm));
+  }
+  if (shaft.length_mm) tool.shaft_place = table.place("shaft_length_mm");
+}
+
+void finish_volume(const SceneTable& table, VolumeSpec& volume) {
+  volume.where = table.where("file");
+  if (!table.has("name")) volume.name = stem_of(volume.file);
+  if (volume.window && (*volume.window)[0] >= (*volume.window)[1]) {
+    refuse(table.place("window"), " is empty; write [low, high] with low < high");
+  }
+  if (volume.orientation) make_unit(table, *volume.orientation);
+}
+
+void finish_tool(const SceneTable& table, ToolSpec& tool) {
+  std::string name;
+  if (tool.shape == kMeshShape) {
+    tool.where = table.where("file");
+    tool.size_place = table.place("file");
+    name = stem_of(tool.file);
+  } else {
+    check_size(table, tool);
+    const bool in_voxels = tool.size.size_vox.has_value();
+    tool.size_place = table.place(in_voxels ? "size_vox" : "radius_mm");
+    name = tool.shape + " " +
+           (in_voxels ? std::to_string(*tool.size.size_vox) + " vox"
+                      : number_text(tool.size.radius_mm) + " mm");
+  }
+  check_shaft(table, tool);
+  tool.pitch_given = table.has("pitch_mm");
+  if (tool.pitch_given) tool.pitch_place = table.place("pitch_mm");
+  if (!table.has("name")) tool.name = name;
+}
+
+/// The material of that name: one of the list, or a new one at its end with its known properties.
+Material& material_named(const SceneTable& table, const std::string& name,
+                         std::vector<Material>& materials) {
+  if (name == materials.front().name) {
+    refuse(table.place("name"), " is air and has no properties; use another name");
+  }
+  const auto material = std::ranges::find(materials, name, &Material::name);
+  return material != materials.end() ? *material : materials.emplace_back(known_material(name));
+}
+
+void finish_device(const SceneTable& table, Scene& scene) {
+  scene.offset_given = table.has("offset_mm");
+  for (const double sign : scene.device.encoder_sign.value_or(std::array{1.0, 1.0, 1.0})) {
+    if (std::abs(sign) == 1) continue;
+    refuse(
+        table.place("encoder_sign"),
+        " is not 1 or -1 at each joint; ./kerf controller --probe shows which (docs/devices.md)");
+  }
+  if (!scene.device.torque_scale) return;
+  for (const double scale : *scene.device.torque_scale) {
+    if (std::abs(scale) >= kMinTorqueScale) continue;
+    refuse(table.place("torque_scale"),
+           " is below 0.001 N mm per count; leave the key out to keep the motors off");
+  }
+}
+
+/// The paper's force has no normal that could cut by force: unless the scene names another model of
+/// cutting, it comes with that of the paper.
+void choose_cut(const SceneTable& table, Scene& scene) {
+  scene.cut_in_one_tick = table.is_text("rate_per_s");
+  if (scene.force.model == ForceModel::paper && !table.has("model")) {
+    scene.cut.model = CutModel::overlap;
+  }
+}
+
+/// The overlap models cut every material, forbidden or not.
+void refuse_uncut(const Scene& scene) {
+  if (scene.cut.model == CutModel::none || scene.cut.model == CutModel::preston) return;
+  for (const Material& material : scene.materials) {
+    if (!material.forbidden) continue;
+    refuse(scene.path, ": material " + material.name +
+                           " is forbidden, and this cut.model cuts everything; set model "
+                           "= \"preston\", or leave forbidden out");
+  }
+}
+
+/// The paper's force is computed for heads alone.
+void refuse_unfelt(const Scene& scene) {
+  if (scene.force.model == ForceModel::proxy) return;
+  for (const ToolSpec& tool : scene.tools) {
+    if (!tool.shaft.length_mm) continue;
+    refuse(tool.shaft_place,
+           " is felt by a proxy alone; set force.model = \"proxy\", or leave the shaft out");
+  }
+}
+
+/// A law replaces the coupling, so the keys of the coupling have no effect.
+void refuse_idle_coupling(const SceneTable& table, const ForceSettings& force) {
+  if (force.law.name.empty()) return;
+  for (const char* key : {"stiffness_n_per_mm", "damping_ns_per_mm"}) {
+    if (table.has(key)) {
+      refuse(table.place(key), " is of the coupling, and force.law is in its place; leave it out");
+    }
+  }
+}
+
+void finish_limits(const SceneTable& table, LimitSettings& limits) {
+  if (limits.continuous_force_n <= limits.force_n) return;
+  if (table.has("continuous_force_n")) {
+    refuse(table.place("continuous_force_n"),
+           " is out of range; use 0.01 to " + number_text(limits.force_n));
+  }
+  limits.continuous_force_n = limits.force_n;
+}
 
 /// A scene file after parsing, and its tables beside the rows of their keys.
 struct SceneTables {

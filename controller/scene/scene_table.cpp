@@ -5,17 +5,19 @@
 #include <array>
 #include <cmath>
 #include <optional>
+#include <string_view>
 #include <utility>
 #include <variant>
+#include <vector>
 
+#include "controller/input/load_error.hpp"
 #include "controller/law/registry/law_registry.hpp"
-#include "controller/scene/scene_text.hpp"
-#include "shared/text/words.hpp"
+#include "shared/text/text.hpp"
 
 namespace kerf {
 namespace {
 
-/// Takes the value that stands at a key into its slot, if it is of that type and allowed.
+/// Takes the value of a key into its slot, if it is of that type and allowed.
 struct Take {
   const SceneKey& key;
   const TomlNode& node;
@@ -51,7 +53,7 @@ struct Take {
     }
     *into = Denoise{static_cast<std::int8_t>(passes)};
   }
-  /// The name of a law, and those of its settings that are given.
+  /// The name of a law, and its given settings.
   void operator()(LawChoice* into) const {
     const TomlNode* name = node.form == TomlNode::Form::table ? node.find("name") : nullptr;
     const std::string* text = name == nullptr ? nullptr : std::get_if<std::string>(&name->value);
@@ -106,7 +108,7 @@ struct Take {
   }
 
  private:
-  /// One of the key's words, where any are given.
+  /// One of the words of the key, if it has any.
   [[nodiscard]] std::string text() const {
     const std::string* text = std::get_if<std::string>(&node.value);
     if (text == nullptr) refuse(place, " is not text; put it in quotes");
@@ -121,7 +123,7 @@ struct Take {
     refuse(place,
            unknown_word(*text, words, "\"") + (or_number ? ", or " + range_text(lo, hi) : ""));
   }
-  /// Whether a word stands for a number.
+  /// Whether the value is a word in place of a number.
   [[nodiscard]] bool is_word() const {
     if (key.allowed.words.empty() || !std::holds_alternative<std::string>(node.value)) return false;
     return !text().empty();
@@ -197,9 +199,81 @@ std::string SceneTable::place() const {
 }
 
 std::string place_of(const TomlNode& node, std::string_view name, const std::string& file) {
-  // What stands in no line was set from outside.
+  // A node without a line comes from the command line.
   const std::string at = node.line == 0 ? " --set " : std::to_string(node.line) + ": ";
   return file + ":" + at + std::string(name) + " = " + node.shown;
+}
+
+namespace {
+
+/// `; did you mean ..?`: the nearest name in the same table, and the same name in others.
+std::string advice(std::string_view prefix, std::string_view name, SceneKeys keys) {
+  const std::vector<std::string_view> beside = names_below(prefix, keys);
+  std::vector<std::string> likely;
+  if (const std::string_view near = nearest(name, beside); !near.empty()) {
+    likely.push_back(std::string(prefix) + std::string(near));
+  }
+  for (const SceneKey& key : keys) {
+    for (std::size_t begin = 0, end = 0; end != key.name.npos; begin = end + 1) {
+      end = key.name.find('.', begin);
+      if (key.name.substr(begin, end - begin) != name) continue;
+      const std::string whole(key.name.substr(0, end));
+      if (std::ranges::find(likely, whole) == likely.end()) likely.push_back(whole);
+    }
+  }
+  if (likely.empty()) return "; known here: " + listed(beside);
+  std::string line;
+  for (const std::string& meant : likely) {
+    const auto row = std::ranges::find(keys, meant, &SceneKey::name);
+    const bool has_unit = row != keys.end() && !row->unit.empty();
+    line += (line.empty() ? "" : " or ") + meant +
+            (has_unit ? " (in " + std::string(row->unit) + ")" : "");
+  }
+  return "; did you mean " + line + "?";
+}
+
+/// A node at the name of a table must be a table, or a list of tables.
+void check_form(const TomlNode& node, const std::string& name, const std::string& file) {
+  const std::size_t limit = most_of(name);
+  const auto is_table = [](const TomlNode& n) { return n.form == TomlNode::Form::table; };
+  if (limit == 0) {
+    const bool inner = name.find('.') != name.npos;
+    if (is_table(node)) return;
+    refuse(place_of(node, name, file),
+           " is not a table; write " + (inner ? node.key + " = { .. }" : "[" + name + "]"));
+  }
+  if (node.form != TomlNode::Form::array || node.entries.empty() ||
+      !std::ranges::all_of(node.entries, is_table)) {
+    refuse(place_of(node, name, file), " is not a list of tables; write [[" + name + "]]");
+  }
+  if (node.entries.size() > limit) {
+    refuse(place_of(node, name, file), " has " + std::to_string(node.entries.size()) +
+                                           " entries; use at most " + std::to_string(limit));
+  }
+}
+
+void check_below(const TomlNode& table, const std::string& prefix, const std::string& file,
+                 SceneKeys keys) {
+  const std::vector<std::string_view> known = names_below(prefix, keys);
+  for (const TomlNode& node : table.entries) {
+    const std::string name = prefix + node.key;
+    if (std::ranges::find(known, node.key) == known.end()) {
+      refuse(file + ":" + std::to_string(node.key_line) + ":" + std::to_string(node.key_column),
+             ": " + one_line(name) + " is not a known key" + advice(prefix, node.key, keys));
+    }
+    if (std::ranges::find(keys, name, &SceneKey::name) != keys.end()) continue;
+    check_form(node, name, file);
+    if (node.form == TomlNode::Form::table) check_below(node, name + ".", file, keys);
+    if (node.form == TomlNode::Form::array) {
+      for (const TomlNode& entry : node.entries) check_below(entry, name + ".", file, keys);
+    }
+  }
+}
+
+}  // namespace
+
+void check_names(const TomlNode& root, const std::string& file, SceneKeys keys) {
+  check_below(root, "", file, keys);
 }
 
 }  // namespace kerf

@@ -5,21 +5,21 @@
 #include <string_view>
 #include <vector>
 
-#include "controller/scene/scene_key.hpp"
+#include "controller/scene/scene_keys.hpp"
 #include "shared/text/toml.hpp"
 
 namespace kerf {
 
-/// One table of a scene file beside its rows of the table of keys. Each fault throws SceneError
-/// with one line `file:line: table.key = value is ..; way out`.
+/// One table of a scene file beside its rows of the table of keys. Each fault throws SceneError,
+/// one line: `file:line: table.key = value is ..; way out`.
 ///
 /// Refers to the parsed file and to the rows, which must outlive it. Load time only.
 class SceneTable {
  public:
-  /// `node`: an empty table where the file has none.
+  /// `node`: an empty table if the file has none.
   SceneTable(std::string name, std::string file, const TomlNode& node, SceneKeys keys);
 
-  /// Sets what the keys say that count in every scene; each value has the right type and range.
+  /// Sets the keys that count in every scene; each value has the right type and range.
   void read(SceneParts& parts) const;
   /// Sets those whose condition holds now, and refuses the others.
   void read_conditional(SceneParts& parts) const;
@@ -43,9 +43,9 @@ class SceneTable {
   std::vector<SceneKey> keys_;
 };
 
-/// Every name in the file must be that of a row, and every table of the form that it has there. The
-/// first that is not throws SceneError: with line and column, and with the keys that it resembles
-/// in its own table or has the name of in another. Load time.
+/// Throws SceneError for the first name in the file that no row has, and for a table of another
+/// form than in the table of keys: with line and column, with similar keys of the same table and
+/// with the same name in other tables. Load time.
 void check_names(const TomlNode& root, const std::string& file, SceneKeys keys);
 
 /// `file:line: name = value`.

@@ -6,7 +6,6 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "controller/law/work_of_hand.hpp"
 #include "shared/numeric/energy_source.hpp"
 #include "shared/numeric/numbers.hpp"
 #include "shared/numeric/vec.hpp"

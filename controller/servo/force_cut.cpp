@@ -1,14 +1,173 @@
 // SPDX-License-Identifier: Apache-2.0
+
 #include "controller/servo/force_cut.hpp"
 
 #include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
 
-#include "controller/kernel/proxy/contact_math.hpp"
+#include "controller/kernel/covered_voxels.hpp"
+#include "controller/kernel/proxy/contact_space.hpp"
 #include "controller/servo/method_step.hpp"
-#include "controller/servo/press_shares.hpp"
-#include "controller/servo/stroke.hpp"
+#include "controller/servo/volume_restore.hpp"
+
+// How the materials of all volumes share a tool's press (docs/theory.md 6.2). Servo thread; no
+// heap.
 
 namespace kerf {
+
+/// What the tool covers of all volumes. Each `load` is a part of one `whole`.
+template <class N>
+struct CoveredVolumes {
+  std::array<Covered<N>, kMaxVolumes> in{};
+  std::array<CutWeight<N>, kMaxVolumes> borne{};  ///< by what is in there, of the whole
+  CutWeight<N> whole{};
+};
+
+/// Shares of the loads of a tool's contacts, added up contact by contact.
+template <class N>
+class PressShares {
+ public:
+  PressShares(const ServoPlan<N>& plan, const ServoState<N>& state,
+              const CoveredVolumes<N>& covered) noexcept
+      : plan_(plan), state_(state), covered_(covered) {}
+
+  /// A contact that bears `load_n`; `form_in(v)` is its form in volume v. Nothing where no voxel
+  /// that reaches the iso lies at it.
+  template <class FormIn>
+  void add(typename N::Real load_n, FormIn&& form_in) noexcept {
+    std::array<CoveredLoads<N>, kMaxVolumes> at;
+    CutWeight<N> ahead{}, bearing{};
+    for (std::size_t v = 0; v < plan_.volume_count; ++v) {
+      at[v] = loads(covered_.in[v], form_in(v), state_.volumes[v].density, plan_.volumes[v].iso);
+      for (std::size_t m = 0; m < kMaxCutMaterials; ++m) {
+        ahead += at[v].ahead[m] = in_largest_voxels(at[v].ahead[m], v);
+        bearing += at[v].bearing[m] = in_largest_voxels(at[v].bearing[m], v);
+      }
+    }
+    if (!(bearing > 0)) return;
+    whole_ += portion_of(load_n, bearing, bearing);
+    for (std::size_t v = 0; v < plan_.volume_count; ++v) {
+      for (std::size_t m = 0; m < kMaxCutMaterials; ++m) {
+        if (at[v].bearing[m] > 0) borne_[v][m] += portion_of(load_n, at[v].bearing[m], bearing);
+        if (at[v].ahead[m] > 0) ahead_[v][m] += portion_of(load_n, at[v].ahead[m], ahead);
+      }
+    }
+  }
+
+  [[nodiscard]] bool some() const noexcept { return whole_ > 0; }
+
+  /// What bears shares the press. What bears nothing takes none of it, but must get out of the
+  /// tool's way: it leaves as if it had the part that it has of what lies at the contacts.
+  void give(CoveredVolumes<N>& covered) const noexcept {
+    covered.whole = whole_;
+    for (std::size_t v = 0; v < plan_.volume_count; ++v) {
+      covered.borne[v] = {};
+      covered.in[v].whole = whole_;
+      for (std::size_t m = 0; m < kMaxCutMaterials; ++m) {
+        covered.borne[v] += borne_[v][m];
+        covered.in[v].load[m] = borne_[v][m] > 0 ? borne_[v][m] : ahead_[v][m];
+      }
+    }
+  }
+
+  [[nodiscard]] CutWeight<N> in_largest_voxels(CutWeight<N> weight, std::size_t v) const noexcept {
+    return static_cast<CutWeight<N>>(
+        portion<N>(static_cast<CutBudget<N>>(weight), plan_.force_cut.voxel_share[v]));
+  }
+
+ private:
+  /// load_n times part / whole. Fixed: 2^22 steps of the load times 2^30.
+  [[nodiscard]] static CutWeight<N> portion_of(typename N::Real load_n, CutWeight<N> part,
+                                               CutWeight<N> whole) noexcept {
+    if constexpr (N::kIsFixed) {
+      return static_cast<CutWeight<N>>(share_of<N>(part, whole)) *
+             static_cast<CutWeight<N>>(load_n.raw());
+    } else {
+      return share_of<N>(part, whole) * load_n;
+    }
+  }
+
+  const ServoPlan<N>& plan_;
+  const ServoState<N>& state_;
+  const CoveredVolumes<N>& covered_;
+  std::array<ByMaterial<CutWeight<N>>, kMaxVolumes> ahead_{}, borne_{};
+  CutWeight<N> whole_{};
+};
+
+/// What the tool bears on, at a place of its centre where it cuts: the head's planes or, where none
+/// of them meets what reaches the iso, all of that. Leaves all as it is where there is none.
+template <class N>
+void find_loads(const ServoPlan<N>& plan, const ServoState<N>& state,
+                WorldVec<typename N::Real> centre_mm, const ToolContact<N>& at,
+                CoveredVolumes<N>& covered) noexcept {
+  using Real = typename N::Real;
+  using Ratio = typename N::Ratio;
+  const ToolPlan<N>& tool = plan.tools[state.active_tool];
+  PressShares<N> shares(plan, state, covered);
+  for (std::size_t i = 0; i < at.plane_count; ++i) {
+    const PressedPlane<N>& plane = at.planes[i];
+    if (plane.behind) continue;
+    const Real arm_mm =
+        along<N>(relabel<ContactSpace>(plane.normal), relabel<ContactSpace>(plane.arm_mm)) *
+        plan.workspace_scale;
+    const BearingPlane<N> bears{relabel<WorldSpace>(plane.normal),
+                                tool.round ? Ratio(-1) : Ratio(arm_mm / tool.rim_mm),
+                                tool.steepness};
+    shares.add(plane.load_n, [&](std::size_t v) {
+      return ahead_form<N>(place_in(plan.volumes[v], centre_mm), tool.in_volume[v].rims_from_voxel,
+                           bears);
+    });
+  }
+  if (!shares.some()) {
+    shares.add(Real(1), [](std::size_t) { return ahead_everywhere<N>(); });
+  }
+  if (shares.some()) shares.give(covered);
+}
+
+/// Whether the press meets anything where the tool covers these voxels: what it can cut, or what
+/// reaches the iso and bears it. Softer matter that is forbidden does neither.
+template <class N>
+[[nodiscard]] bool meets_press(const ServoPlan<N>& plan, const ServoState<N>& state,
+                               const CoveredVolumes<N>& covered) noexcept {
+  for (std::size_t v = 0; v < plan.volume_count; ++v) {
+    if (covers_what_is_cut(plan.force_cut.volume[v], covered.in[v])) return true;
+  }
+  for (std::size_t v = 0; v < plan.volume_count; ++v) {
+    const CoveredLoads<N> at =
+        loads(covered.in[v], ahead_everywhere<N>(), state.volumes[v].density, plan.volumes[v].iso);
+    for (const CutWeight<N> bearing : at.bearing) {
+      if (bearing > 0) return true;
+    }
+  }
+  return false;
+}
+
+/// Covers all volumes with the tool's centre at `centre_mm`, where it cuts.
+template <class N>
+[[nodiscard]] CoveredVolumes<N> cover_all(const ServoPlan<N>& plan, ServoState<N>& state,
+                                          WorldVec<typename N::Real> centre_mm,
+                                          const ToolContact<N>& at) noexcept {
+  CoveredVolumes<N> covered;
+  std::size_t materials = 0;
+  for (std::size_t v = 0; v < plan.volume_count; ++v) {
+    covered.in[v] = cover(plan, state, v, centre_mm, at);
+    for (const CutWeight<N> weight : covered.in[v].weight) materials += weight > 0 ? 1 : 0;
+  }
+  const PressShares<N> by_weight(plan, state, covered);
+  for (std::size_t v = 0; v < plan.volume_count; ++v) {
+    covered.borne[v] = by_weight.in_largest_voxels(covered.in[v].whole, v);
+    covered.whole += covered.borne[v];
+  }
+  for (std::size_t v = 0; v < plan.volume_count; ++v) {
+    for (CutWeight<N>& load : covered.in[v].load) load = by_weight.in_largest_voxels(load, v);
+    covered.in[v].whole = covered.whole;
+  }
+  if (materials > 1) find_loads(plan, state, centre_mm, at, covered);
+  return covered;
+}
+
 namespace {
 
 /// Axes of the spindle. A round tool has the same samples in every orientation, but turns about its

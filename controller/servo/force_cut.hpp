@@ -4,9 +4,9 @@
 #include <array>
 #include <cstddef>
 
+#include "controller/servo/contact_force.hpp"
 #include "controller/servo/servo_plan.hpp"
 #include "controller/servo/servo_state.hpp"
-#include "controller/servo/tool_contact.hpp"
 
 namespace kerf {
 

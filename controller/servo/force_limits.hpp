@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cstdint>
 
-#include "shared/numeric/clamped.hpp"
 #include "shared/numeric/numbers.hpp"
 #include "shared/numeric/vec.hpp"
 

@@ -1,14 +1,151 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstddef>
+#include <cstdint>
 #include <span>
 
-#include "controller/servo/device_report.hpp"
-#include "controller/servo/servo_output.hpp"
+#include "shared/numeric/energy_source.hpp"
 #include "shared/volume/voxel_grid.hpp"
 
 namespace kerf {
+
+/// What the device said in this tick, as it came: counts, not angles. The only input of the servo
+/// step besides commands, and therefore what a replay needs.
+///
+/// `parked` is the sign that the hand is not at work: the stylus sits in the inkwell (Omni), the
+/// centre button of the grip is held (Falcon), the arm has not left the home pose since its
+/// calibration button was pressed (WoodenHaptics). Parked at rest calibrates; motors stay off while
+/// parked.
+struct DeviceReport {
+  bool fresh = false;                      ///< false: nothing arrived since the last tick
+  std::array<std::int16_t, 3> encoder{};   ///< counts, wrap at 16 bits
+  std::array<std::uint16_t, 3> wiper_a{};  ///< gimbal pots, both wipers; zero where there is none
+  std::array<std::uint16_t, 3> wiper_b{};
+  bool button1 = false, button2 = false;  ///< pressed
+  bool parked = false;
+  bool homed = true;          ///< false: absolute encoders have no meaning yet
+  std::uint32_t counter = 0;  ///< packet counter of the device, or of the driver where it has none
+};
+
+/// A change asked for by a person or a program; applied at a tick boundary.
+struct ServoCommand {
+  enum class Kind : std::uint32_t {
+    none,
+    select_tool,
+    hold,
+    fade_in,  ///< force starts again from 0: after a stall of the servo
+    reset,    ///< the volumes' first content, over some ticks; at once where nothing is cut
+    undo      ///< the volumes before the last stroke, likewise; refused where there is none
+  };
+  Kind kind = Kind::none;
+  std::uint32_t argument = 0;  ///< index of the tool; hold: 1 on, 0 off
+};
+
+inline constexpr double kContactThresholdN = 0.01;  ///< a tick with more force is a contact tick
+
+/// Where the safety of the loop stands. Motors are on in `ramping` and `active` only. Values go
+/// into logs: append only.
+enum class Phase : std::uint8_t {
+  off,          ///< no report has come yet
+  calibrating,  ///< never parked at rest yet, or homing lost: the joint angles are unknown
+  armed,        ///< calibrated and parked: waits for the hand
+  ramping,      ///< taken in hand: force fades in
+  active,
+  fault  ///< latched; parking at rest clears it
+};
+
+/// Why the force went to zero. Values go into logs: append only.
+enum class Fault : std::uint32_t {
+  none = 0,
+  stale_input = 1,  ///< no report for 20 ms
+  not_finite = 2,   ///< NaN after kinematics for more than 2 ms
+  overspeed = 3,    ///< tip faster than the limit
+  // A law of the scene gave something that is no number:
+  force_law = 4,
+  velocity_estimator = 5,
+  stabiliser = 6
+};
+
+[[nodiscard]] constexpr const char* fault_name(Fault fault) noexcept {
+  switch (fault) {
+    case Fault::none:
+      return "none";
+    case Fault::stale_input:
+      return "stale_input";
+    case Fault::not_finite:
+      return "not_finite";
+    case Fault::overspeed:
+      return "overspeed";
+    case Fault::force_law:
+      return "force_law";
+    case Fault::velocity_estimator:
+      return "velocity_estimator";
+    case Fault::stabiliser:
+      return "stabiliser";
+  }
+  return "unknown";
+}
+
+/// A plane that the tool presses on, at the device port.
+struct PlaneLoad {
+  std::array<double, 3> normal{};  ///< out of the solid
+  std::array<double, 3> arm_mm{};  ///< from the tool's centre to the contact
+  double load_n = 0;               ///< along the normal, before any limit
+};
+inline constexpr std::size_t kMaxPlaneLoads = 3;
+
+/// Everything one tick decided: motor counts for the device, the rest for the eyes and the log.
+///
+/// Physical values are converted from the loop's numbers exactly; nothing here flows back.
+struct ServoOutput {
+  std::array<std::int16_t, 3> motor_counts{};  ///< signed counts of the device, 0 = no torque
+  bool motors_on = false;
+  Phase phase = Phase::off;
+  Fault fault = Fault::none;
+  bool started = false;    ///< was armed and taken in hand at least once: ticks count
+  bool stale = false;      ///< no fresh report in this tick
+  bool clamped = false;    ///< force, slew, thermal or motor limit was active
+  bool contact = false;    ///< commanded force above 0.01 N
+  bool forbidden = false;  ///< the tool presses on a forbidden material
+  std::uint64_t forbidden_materials = 0;  ///< which: bit m is material m of the scene
+  bool refused = false;    ///< the tool finds no free place near the hand, and feels nothing
+  bool shaft = false;      ///< what presses on shaft or handpiece is above 0.01 N
+  bool held = false;       ///< by a command: no force and no cut
+  bool undoing = false;    ///< the last stroke is undone: likewise
+  bool undoable = false;   ///< it can be
+  bool resetting = false;  ///< volumes go back to their first content: what changed was not cut
+
+  std::array<std::int32_t, 3> joint_counts{};  ///< unwrapped since calibration
+  std::array<double, 3> gimbal_rad{};          ///< yaw, pitch, roll
+  std::array<double, 3> position_mm{};         ///< tip in the scene
+  std::array<double, 9> rotation{};            ///< world from the tool as felt, row-major
+  std::array<double, 3> velocity_mm_per_s{};   ///< device port, as estimated
+  std::array<double, 3> force_n{};             ///< sent to the hand, device port
+  std::array<double, 3> contact_n{};           ///< part of it before limits, device port
+  std::array<double, 3> modification_n{};      ///< and of the cutting: reaction, or friction
+  std::array<double, 3> torque_n_mm{};         ///< motor torques
+  std::array<double, 3> proxy_offset_mm{};     ///< from the tip to the proxy's, in the scene
+  std::array<double, 3> tip_torque_n_mm{};     ///< of contact and cutting about the tip
+  std::array<PlaneLoad, kMaxPlaneLoads> planes{};
+  std::uint32_t plane_count = 0;  ///< of the planes that hold the tool
+  double absorbed_mj = 0;         ///< SUM -F_sent . dx of the run; + = taken from the hand
+  double port_minimum_mj = 0;     ///< lowest value of it so far
+  /// `absorbed_mj` by source, in steps of 2^-32 mJ: exact in fixed, and their sum is.
+  std::array<std::int64_t, kEnergySources> energy_steps{};
+
+  double press_n = 0;        ///< normal force that cuts, in the scene
+  double spindle_ratio = 0;  ///< speed over the reference speed, in this tick's cut
+  double spindle_load = 0;   ///< torque over the stall torque
+  std::uint32_t active_tool = 0;
+  std::int64_t samples_read = 0;    ///< of the tool's surface, by contact (sample_reader.hpp)
+  std::uint64_t removed_steps = 0;  ///< density steps removed in this tick, all volumes
+  std::array<std::uint64_t, kMaxVolumes> removed_by_volume{};
+  std::array<std::uint64_t, kMaxVolumes> returned_by_volume{};  ///< of a stroke that is undone
+  std::array<VoxelBox, kMaxVolumes> changed{};                  ///< voxels that changed, by volume
+  std::uint64_t output_hash = 0;                                ///< chain over all ticks
+};
 
 /// A compiled scene that can be stepped, whatever numbers it computes in.
 ///

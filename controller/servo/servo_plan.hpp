@@ -1,29 +1,214 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <type_traits>
 
+#include "controller/kernel/covered_voxels.hpp"
 #include "controller/kernel/gradient.hpp"
 #include "controller/kernel/kernel_set.hpp"
 #include "controller/kernel/milling.hpp"
-#include "controller/kernel/tool_pose.hpp"
-#include "controller/law/force_law.hpp"
-#include "controller/law/stabiliser.hpp"
-#include "controller/law/velocity_estimator.hpp"
-#include "controller/servo/contact_plan.hpp"
-#include "controller/servo/device_plan.hpp"
-#include "controller/servo/force_cut_plan.hpp"
+#include "controller/kernel/preston.hpp"
+#include "controller/kernel/proxy/constraint_set.hpp"
+#include "controller/kernel/proxy/contact_query.hpp"
+#include "controller/kernel/proxy/proxy.hpp"
+#include "controller/kernel/sampling.hpp"
+#include "controller/kernel/spindle.hpp"
+#include "controller/law/law.hpp"
+#include "controller/law/virtual_coupling.hpp"
 #include "controller/servo/force_limits.hpp"
-#include "controller/servo/method_list.hpp"
-#include "controller/servo/sum_to_force.hpp"
+#include "controller/servo/kinematics.hpp"
 #include "controller/servo/supervisor.hpp"
-#include "shared/volume/scene_limits.hpp"
+#include "shared/numeric/numbers.hpp"
+#include "shared/numeric/vec.hpp"
 #include "shared/volume/voxel_grid.hpp"
+#include "shared/wire/personality.hpp"
 
 namespace kerf {
+
+/// Turns an exact sum of weighted gradients (voxel axes; docs/theory.md 7) into a force at the
+/// device port (N): one matrix that holds pressure, sample volume, voxel size, rotation and
+/// workspace scale.
+///
+/// Floating point: a plain matrix.
+template <class N>
+struct SumToForce {
+  std::array<std::array<typename N::Real, 3>, 3> row{};
+};
+
+/// Fixed point: F = SUM_k mantissa[i][k] * (sum[k] >> pre_shift) >> post_shift, in Q15.16 N.
+///
+/// `pre_shift` is chosen at load so that the largest possible sum keeps 38 bits; with 22-bit
+/// mantissas three products stay below 2^62. The sum itself is never cut: it saturates once, here.
+template <>
+struct SumToForce<FixedNumbers> {
+  std::array<std::array<std::int32_t, 3>, 3> mantissa{};
+  int pre_shift = 0;
+  int post_shift = 0;
+};
+
+template <class N>
+[[nodiscard]] constexpr DeviceVec<typename N::Real> force_of_sum(
+    const SumToForce<N>& map, Vec<typename N::Sum, VoxelSpace> sum) noexcept {
+  using Real = typename N::Real;
+  if constexpr (N::kIsFixed) {
+    constexpr std::int64_t kLimit = std::int64_t{1} << 38;
+    const auto reduced = [&](std::int64_t s) {
+      return std::clamp(round_shift(s, map.pre_shift), -kLimit, kLimit);
+    };
+    const std::array<std::int64_t, 3> s{reduced(sum.x), reduced(sum.y), reduced(sum.z)};
+    const auto component = [&](std::size_t i) {
+      const auto& m = map.mantissa[i];
+      const std::int64_t wide = m[0] * s[0] + m[1] * s[1] + m[2] * s[2];
+      return Real::from_raw(saturate_i32(round_shift(wide, map.post_shift)));
+    };
+    return {component(0), component(1), component(2)};
+  } else {
+    const auto component = [&](std::size_t i) {
+      const auto& m = map.row[i];
+      return m[0] * sum.x + m[1] * sum.y + m[2] * sum.z;
+    };
+    return {component(0), component(1), component(2)};
+  }
+}
+
+}  // namespace kerf
+
+/// The methods: ways to compute contact and cut of one tool in one volume. A method is a line here,
+/// a step (as method_step.cpp) and a file for load time (as
+/// controller/plan/method/method_splat.cpp): two files, because the loop includes nothing that
+/// allocates. All else comes from this list.
+///
+/// A line: the name, the class of the step, and for which numbers `N` it serves. The order is that
+/// of preference: the first that serves is taken, and the last one serves always.
+#define KERF_METHODS(METHOD)                                                                \
+  /* The swept proxy feels, and nothing is cut. */                                          \
+  METHOD(surface, SurfaceStep, true)                                                        \
+  /* A correlation of the density with one table (controller/kernel/kernel_set.hpp). */     \
+  METHOD(aligned, AlignedStep, N::kIsFixed)                                                 \
+  /* Weights added up in the volume (controller/kernel/kernel_set.hpp). */                  \
+  METHOD(splat, SplatStep, N::kIsFixed)                                                     \
+  /* Stored gradients, weighted at every sample (controller/kernel/overlap_methods.hpp). */ \
+  METHOD(gather, GatherStep, true)
+
+namespace kerf {
+
+#define KERF_ENUMERATOR(name, Step, serves) name,
+enum class Method : std::uint8_t { KERF_METHODS(KERF_ENUMERATOR) };
+#undef KERF_ENUMERATOR
+
+/// Radians per encoder count, finer than Angle, so that a whole turn of counts is exact to the last
+/// bit of it: in fixed point an integer with 40 fraction bits.
+template <class N>
+using AnglePerCount = std::conditional_t<N::kIsFixed, std::int64_t, double>;
+inline constexpr int kAnglePerCountBits = 40;
+
+/// One motor and its encoder.
+template <class N>
+struct JointPlan {
+  typename N::Angle home_rad;          ///< where the count is 0
+  AnglePerCount<N> angle_per_count{};  ///< signed: the encoder's sense
+  typename N::Real counts_per_n_mm{};  ///< motor counts per torque, signed
+};
+
+/// Most readings of the gimbal that are summed: 20 ms at 8 kHz, the highest rate.
+inline constexpr std::size_t kMaxGimbalSamples = 160;
+
+/// Everything constant of the held device.
+template <class N>
+struct DevicePlan {
+  Personality personality = Personality::omni;
+  std::array<JointPlan<N>, 3> joints{};
+  /// Encoders are absolute once the device is `homed`; else they count from the place where it was
+  /// parked at rest.
+  bool absolute_encoders = false;
+  SerialArm<N> serial{};  ///< of the Omni and WoodenHaptics
+  DeltaArm<N> delta{};    ///< of the Falcon
+
+  std::size_t gimbal_samples = 1;  ///< in 20 ms, of a device with a gimbal
+
+  bool motors_configured = false;
+  std::int32_t motor_count_end = 0;  ///< motor counts lie within +- this
+};
+
+/// Where contact space lies, and how the proxy's spring becomes a force; constant during a run.
+template <class N>
+struct ContactPlan {
+  bool swept = false;                      ///< else the paper's sums are felt
+  WorldVec<typename N::Real> origin_mm;    ///< of contact space
+  typename N::Ratio units_per_mm{};        ///< of the world
+  typename N::Ratio device_mm_per_unit{};  ///< unit over workspace scale
+  typename N::Ratio mm_per_unit{};         ///< of the world
+  Coupling<N> coupling;
+};
+
+/// A tool's surface and how its proxy moves.
+template <class N>
+struct SweptTool {
+  PointShell<N> point_shell;  ///< of the head
+  PartsBehind<N> behind;
+  bool turned = false;  ///< by the stylus; else it keeps the world's axes, or is a ball alone
+  ProxyPlan<N> proxy;
+};
+
+/// What one tick hands to the next; the memory of `volumes` belongs to the compiled scene.
+template <class N>
+struct ContactState {
+  using Volumes = std::array<ContactVolume<N>, kMaxVolumes>;  ///< by index of the plan's volumes
+  Volumes volumes{};
+  std::array<Volumes, kMostBehind> behind{};  ///< the same with places of the parts behind the head
+  ProxyState<N> proxy;
+};
+
+/// The tool cuts kCutAdvance inside of the surface that it rests on, so that its groove leaves it
+/// play (docs/theory.md 6.3); units of contact space. While it finds less than its force would cut
+/// it reaches deeper, up to kDeepestAdvance, and then slowly back.
+///
+/// It may find less because its inner samples end inside of its surface, by up to a pitch
+/// (SampleLattice::cover): its rims then rest on matter of which they cover little. A ball that is
+/// given by its radius has samples at its surface at six poles alone.
+inline constexpr double kCutAdvance = 0.25, kDeepestAdvance = 1;
+
+/// Cutting by force; constant during a run. Arrays: by index of the plan's volumes.
+template <class N>
+struct ForceCutPlan {
+  bool on = false;
+  typename N::Real threshold_n{};  ///< force in the scene that cuts nothing yet
+  typename N::Real deeper_step{};  ///< of the advance in a tick that finds too little, units
+  typename N::Real back_step{};    ///< of the advance in any other
+  SpindlePlan<N> spindle;
+  FrictionPlan<N> friction;
+  std::array<PrestonPlan<N>, kMaxVolumes> volume{};
+  /// Size of a voxel over that of the largest, as a `share_of`.
+  std::array<CutBudget<N>, kMaxVolumes> voxel_share{};
+};
+
+/// What the tool covers: groups for the kernels of fixed point, voxel by voxel otherwise.
+template <class N>
+using Covered = std::conditional_t<N::kIsFixed, CoveredGroups, CoveredVoxels<N>>;
+template <class N>
+using CoveredEntry = typename decltype(Covered<N>::list)::value_type;
+
+/// The part that changes; the lists belong to the compiled scene.
+template <class N>
+struct ForceCutState {
+  typename N::Real advance{kCutAdvance};
+  SpindleState<N> spindle;
+  Vec<typename N::Real, ToolSpace> friction_n;  ///< felt in the next tick, force in the scene
+  std::array<PrestonState<N>, kMaxVolumes> volume{};
+  std::array<std::span<CoveredEntry<N>>, kMaxVolumes> list{};  ///< scratch of one tick
+
+  /// A new tool stands still and has cut nothing; what the materials are owed stays.
+  constexpr void change_tool() noexcept {
+    advance = typename N::Real(kCutAdvance);
+    spindle = {};
+    friction_n = {};
+  }
+};
 
 /// A solid volume as the loop sees it; constant during a run.
 template <class N>
@@ -67,7 +252,7 @@ struct ToolPlan {
   bool round = false;
   bool turns = true;              ///< with the stylus; else the tool keeps the world's axes
   typename N::Real rim_mm{};      ///< largest radius about the shaft
-  typename N::Ratio steepness{};  ///< of its contacts' bearing (covered_loads.hpp)
+  typename N::Ratio steepness{};  ///< of its contacts' bearing (covered_voxels.hpp)
   SweptTool<N> swept;             ///< where the swept proxy is felt
   std::array<ToolInVolume<N>, kMaxVolumes> in_volume{};  ///< by index of the plan's volumes
 };

@@ -7,17 +7,14 @@
 #include <span>
 
 #include "controller/kernel/gradient.hpp"
+#include "controller/kernel/kernel_set.hpp"
 #include "controller/kernel/milling.hpp"
-#include "controller/kernel/splat_table.hpp"
-#include "controller/law/law_plan.hpp"
-#include "controller/servo/contact_plan.hpp"
-#include "controller/servo/device_plan.hpp"
+#include "controller/law/law.hpp"
 #include "controller/servo/energy_ledger.hpp"
-#include "controller/servo/force_cut_plan.hpp"
 #include "controller/servo/force_limits.hpp"
-#include "controller/servo/kinematics/forward_kinematics.hpp"
-#include "controller/servo/kinematics/rotation.hpp"
-#include "controller/servo/servo_output.hpp"
+#include "controller/servo/kinematics.hpp"
+#include "controller/servo/servo.hpp"
+#include "controller/servo/servo_plan.hpp"
 #include "controller/servo/supervisor.hpp"
 #include "shared/numeric/fnv1a.hpp"
 #include "shared/volume/brick_grid.hpp"
@@ -31,10 +28,10 @@ struct VolumeState {
   std::span<Gradient<N>> gradient;   ///< empty where no tool gathers
   std::span<RemovalCarry<N>> carry;  ///< fractions of density steps still owed
   std::span<const Density> first;    ///< content before the first cut; empty where nothing is cut
-  std::span<std::uint64_t> cut_blocks;  ///< what differs from it (volume_reset.hpp)
+  std::span<std::uint64_t> cut_blocks;  ///< what differs from it (volume_restore.hpp)
 };
 
-/// How far a reset of the volumes has come (volume_reset.hpp).
+/// How far a reset of the volumes has come (volume_restore.hpp).
 struct ResetState {
   bool runs = false;
   std::size_t volume = 0, block = 0;  ///< to be looked at next
@@ -47,8 +44,8 @@ struct KeptBrick {
   std::array<Density, kBrickVoxels> density{};  ///< of its voxels that exist, x fastest
 };
 
-/// The last stroke, and what may belong to the next (stroke.hpp). `pool` is a ring; places in it
-/// only grow: begin .. next is the last stroke, next .. end waits for one.
+/// The last stroke, and what may belong to the next (volume_restore.hpp). `pool` is a ring; places
+/// in it only grow: begin .. next is the last stroke, next .. end waits for one.
 struct StrokeState {
   std::span<KeptBrick> pool;                                  ///< empty where nothing is cut
   std::array<std::span<std::uint32_t>, kMaxVolumes> kept_in;  ///< by brick: in which generation

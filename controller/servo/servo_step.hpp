@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "controller/servo/device_report.hpp"
-#include "controller/servo/servo_output.hpp"
+#include "controller/servo/servo.hpp"
 #include "controller/servo/servo_plan.hpp"
 #include "controller/servo/servo_state.hpp"
 

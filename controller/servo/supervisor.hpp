@@ -3,7 +3,7 @@
 
 #include <cstdint>
 
-#include "controller/servo/servo_output.hpp"
+#include "controller/servo/servo.hpp"
 
 namespace kerf {
 

@@ -4,11 +4,17 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <limits>
+#include <map>
+#include <numbers>
 #include <span>
+#include <utility>
+#include <vector>
 
-#include "controller/tool/mesh_rims.hpp"
-#include "shared/numeric/vec3.hpp"
+#include "controller/tool/tool_mesh.hpp"
+#include "shared/numeric/linear_algebra.hpp"
 
 namespace kerf {
 namespace {
@@ -17,14 +23,227 @@ using Point = ToolMesh::Point;
 using vec3::doubled_area, vec3::dot, vec3::length, vec3::unit;
 using vec3::operator+, vec3::operator-, vec3::operator*;
 
+// Rims and points.
+
+// Between two samples a pitch apart an edge of angle t stands 1/2 tan(t / 2) pitches above both.
+// That may be 0.04 units, the depth of a wedged tool (SweepRules::kWedged) less the tolerance.
+// The same holds for a row of samples along a rim that bends.
+const double kSharp = 2 * std::atan(2 * 0.04);
+const double kCosRim = std::cos(kSharp);
+const double kStraight = 2 * std::sin(kSharp / 2);  // sum of two unit vectors that part by it
+constexpr double kPointShare = 0.05;  // of the full angle, that a point lacks at least
+// Pitches from a rim into both faces, and from a point along each of its rims. Tuned: on tilted
+// planes a cylinder of 48 sides and a square bar then rest within 0.01 voxels of the ideal in the
+// mean and 0.07 at most. On the rims and points themselves a bar rests 0.06 too high in the mean;
+// twice as far from a rim one that lies on an edge is 0.075 too low.
+constexpr double kFromRim = 0.015, kFromPoint = 0.04;
+constexpr double kNearest = 0.6;  // pitches
+
+struct Face {
+  Point normal;    // of length 1, or zero
+  Point opposite;  // corner that is not on the edge
+};
+
+struct Rim {
+  std::uint32_t a, b;
+  Point inward;  // across the edge into both faces, the sum of two unit vectors
+};
+
+/// Across the edge from a to b, into the face.
+Point inward_of(const Point& a, const Point& b, const Face& face) {
+  const Point along = unit(b - a), to = face.opposite - a;
+  return unit(to - dot(along, to) * along);
+}
+
+std::vector<Rim> rims_of(const ToolMesh& mesh) {
+  std::map<std::pair<std::uint32_t, std::uint32_t>, std::vector<Face>> edges;
+  for (const ToolMesh::Triangle& t : mesh.triangles) {
+    const Point normal = unit(doubled_area(mesh.corners(t)));
+    for (std::size_t k = 0; k < 3; ++k) {
+      edges[std::minmax(t[k], t[(k + 1) % 3])].push_back({normal, mesh.points_mm[t[(k + 2) % 3]]});
+    }
+  }
+  std::vector<Rim> rims;
+  for (const auto& [edge, faces] : edges) {
+    if (faces.size() != 2) continue;
+    const Point &a = mesh.points_mm[edge.first], &b = mesh.points_mm[edge.second];
+    if (dot(faces[0].normal, faces[1].normal) > kCosRim) continue;
+    const Point into = inward_of(a, b, faces[1]);
+    if (dot(faces[0].normal, into) >= 0) continue;  // a groove
+    rims.push_back({edge.first, edge.second, inward_of(a, b, faces[0]) + into});
+  }
+  return rims;
+}
+
+/// Whether a corner lacks so much of the full angle that it is a point.
+std::vector<bool> points_of(const ToolMesh& mesh) {
+  std::vector<double> angle(mesh.points_mm.size());
+  for (const ToolMesh::Triangle& t : mesh.triangles) {
+    const auto corner = mesh.corners(t);
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Point u = unit(corner[(k + 1) % 3] - corner[k]);
+      const Point v = unit(corner[(k + 2) % 3] - corner[k]);
+      angle[t[k]] += std::acos(std::clamp(dot(u, v), -1.0, 1.0));
+    }
+  }
+  std::vector<bool> is_point(angle.size());
+  for (std::size_t i = 0; i < angle.size(); ++i) {
+    is_point[i] = angle[i] < 2 * std::numbers::pi * (1 - kPointShare);
+  }
+  return is_point;
+}
+
+/// Samples that keep a distance from each other.
+class ApartSamples {
+ public:
+  explicit ApartSamples(double apart_mm) : apart_mm_(apart_mm) {}
+
+  void add(const Point& p) {
+    const Cell at = cell_of(p);
+    Cell cell{};
+    for (cell[0] = at[0] - 1; cell[0] <= at[0] + 1; ++cell[0]) {
+      for (cell[1] = at[1] - 1; cell[1] <= at[1] + 1; ++cell[1]) {
+        for (cell[2] = at[2] - 1; cell[2] <= at[2] + 1; ++cell[2]) {
+          // A cell is as wide as the distance; it holds few.
+          const auto [begin, end] = cells_.equal_range(cell);
+          for (auto near = begin; near != end; ++near) {
+            if (length(samples_[near->second] - p) < apart_mm_) return;
+          }
+        }
+      }
+    }
+    cells_.emplace(at, samples_.size());
+    samples_.push_back(p);
+  }
+
+  [[nodiscard]] std::vector<Point> samples() && { return std::move(samples_); }
+
+ private:
+  using Cell = std::array<std::int64_t, 3>;
+
+  [[nodiscard]] Cell cell_of(const Point& p) const {
+    Cell cell{};
+    for (std::size_t i = 0; i < 3; ++i)
+      cell[i] = static_cast<std::int64_t>(std::floor(p[i] / apart_mm_));
+    return cell;
+  }
+
+  double apart_mm_;
+  std::vector<Point> samples_;
+  std::multimap<Cell, std::size_t> cells_;
+};
+
+/// Rims joined to rows, from one end to the other or all round.
+class RimRows {
+ public:
+  RimRows(const ToolMesh& mesh, const std::vector<Rim>& rims, const std::vector<bool>& is_end)
+      : mesh_(mesh), rims_(rims), is_end_(is_end), at_(mesh.points_mm.size()), done_(rims.size()) {
+    for (std::size_t r = 0; r < rims.size(); ++r) {
+      at_[rims[r].a].push_back(r);
+      at_[rims[r].b].push_back(r);
+    }
+  }
+
+  void sample(double pitch_mm, ApartSamples& samples) {
+    for (std::uint32_t corner = 0; corner < at_.size(); ++corner) {
+      if (!is_end_[corner]) continue;
+      for (const std::size_t r : at_[corner]) sample_row(corner, r, pitch_mm, samples);
+    }
+    for (std::size_t r = 0; r < rims_.size(); ++r) sample_row(rims_[r].a, r, pitch_mm, samples);
+  }
+
+ private:
+  struct Step {
+    std::uint32_t from, to;
+    std::size_t rim;
+  };
+
+  /// The row from a corner over one of its rims to an end, or back to its begin.
+  std::vector<Step> row_from(std::uint32_t corner, std::size_t rim) {
+    std::vector<Step> row;
+    while (!done_[rim]) {
+      done_[rim] = true;
+      const std::uint32_t to = rims_[rim].a == corner ? rims_[rim].b : rims_[rim].a;
+      row.push_back({corner, to, rim});
+      if (is_end_[to]) break;
+      rim = at_[to][0] == rim ? at_[to][1] : at_[to][0];
+      corner = to;
+    }
+    return row;
+  }
+
+  [[nodiscard]] double length_of(const Step& step) const {
+    return length(mesh_.points_mm[step.to] - mesh_.points_mm[step.from]);
+  }
+
+  /// Samples a row without its ends, which have samples of their own.
+  void sample_row(std::uint32_t corner, std::size_t rim, double pitch_mm, ApartSamples& samples) {
+    const std::vector<Step> row = row_from(corner, rim);
+    double length_mm = 0;
+    for (const Step& step : row) length_mm += length_of(step);
+    if (!(length_mm > 0)) return;
+    const auto count = std::max(1.0, std::round(length_mm / pitch_mm));
+    double next = is_end_[row.front().from] ? 1 : 0.5, passed_mm = 0;
+    const double last = is_end_[row.front().from] ? count - 0.5 : count;
+    for (const Step& step : row) {
+      const double step_mm = length_of(step);
+      for (; next < last && next * length_mm / count <= passed_mm + step_mm; ++next) {
+        const double share = (next * length_mm / count - passed_mm) / step_mm;
+        const Point &from = mesh_.points_mm[step.from], &to = mesh_.points_mm[step.to];
+        const Point on = (1 - share) * from + share * to;
+        samples.add(on + kFromRim * pitch_mm * rims_[step.rim].inward);
+      }
+      passed_mm += step_mm;
+    }
+  }
+
+  const ToolMesh& mesh_;
+  const std::vector<Rim>& rims_;
+  const std::vector<bool>& is_end_;
+  std::vector<std::vector<std::size_t>> at_;  // the rims at each corner
+  std::vector<bool> done_;
+};
+
+/// Samples of the sharp features of a mesh: one on each point, and rows along its rims, one every
+/// `pitch_mm` or nearly so. They lie a little inside of the rim. None is nearer to another than 0.6
+/// of that, so that a rough surface gets no more than a smooth one.
+///
+/// A rim is an edge that sticks out by more than 9.2 degrees between its faces: a lathe of 40 sides
+/// and more is round. A point is a corner that lacks more than a twentieth of the full angle, or in
+/// which a rim bends or ends.
+std::vector<Point> rim_samples(const ToolMesh& mesh, double pitch_mm) {
+  const std::vector<Rim> rims = rims_of(mesh);
+  std::vector<int> meeting(mesh.points_mm.size());
+  std::vector<Point> inward(mesh.points_mm.size());
+  for (const Rim& rim : rims) {
+    const Point direction = unit(mesh.points_mm[rim.b] - mesh.points_mm[rim.a]);
+    ++meeting[rim.a];
+    ++meeting[rim.b];
+    inward[rim.a] = inward[rim.a] + direction;
+    inward[rim.b] = inward[rim.b] - direction;
+  }
+  std::vector<bool> is_end = points_of(mesh);
+  ApartSamples samples(kNearest * pitch_mm);
+  for (std::size_t i = 0; i < is_end.size(); ++i) {
+    const bool bends = length(inward[i]) > kStraight;
+    is_end[i] = is_end[i] || (meeting[i] != 0 && (meeting[i] != 2 || bends));
+    if (!is_end[i]) continue;
+    samples.add(mesh.points_mm[i] + kFromPoint * pitch_mm * inward[i]);
+  }
+  RimRows(mesh, rims, is_end).sample(pitch_mm, samples);
+  return std::move(samples).samples();
+}
+
+// The samples of the whole surface.
+
 constexpr std::size_t kNone = std::numeric_limits<std::size_t>::max();
 
-/// A place on the surface.
+/// A position on the surface.
 struct Dot {
   Point at, normal;
 };
 
-/// A sample; one of a rim belongs to all faces and stays where it is.
+/// A sample; one of a rim belongs to all faces and is not moved.
 struct Site {
   Point at, normal;
   bool rim;
@@ -35,7 +254,7 @@ double squared_distance(const Point& a, const Point& b) {
   return dot(d, d);
 }
 
-/// Even over the area: so many in all, within each triangle by an additive sequence.
+/// Dots spread evenly over the area: so many in all, within each triangle by an additive sequence.
 std::vector<Dot> spread_dots(const ToolMesh& mesh, std::size_t count) {
   // Fractions of the plastic number, the golden section of two dimensions (Roberts 2018).
   constexpr double kFirst = 0.7548776662466927, kSecond = 0.5698402909980532;
@@ -58,7 +277,7 @@ std::vector<Dot> spread_dots(const ToolMesh& mesh, std::size_t count) {
   return dots;
 }
 
-/// The sites by cells of a grid, so that the nearest is found among few.
+/// The sites in cells of a grid, so that few are searched for the nearest.
 class SiteGrid {
  public:
   SiteGrid(std::span<const Site> sites, double cell_mm) : sites_(sites) {
@@ -86,7 +305,7 @@ class SiteGrid {
       order_[next[index_of(cell_of(sites[s].at))]++] = s;
   }
 
-  /// The nearest site that a dot sees; kNone where there is none in the cells around it.
+  /// The nearest site that faces the same way as a dot; kNone if the cells around it have none.
   [[nodiscard]] std::size_t nearest(const Dot& dot) const {
     const std::array<int, 3> at = cell_of(dot.at);
     std::size_t best = kNone;
@@ -154,7 +373,7 @@ void begin_sites(std::span<Dot> dots, std::size_t count, std::vector<Site>& site
   begin_sites(dots.subspan(half), count - count / 2, sites);
 }
 
-/// Which side of a cube looks the same way.
+/// The side of a cube with the most similar normal.
 int facing(const Point& normal) {
   int widest = 0;
   for (int i = 1; i < 3; ++i) {
@@ -164,7 +383,7 @@ int facing(const Point& normal) {
   return 2 * widest + (normal[static_cast<std::size_t>(widest)] < 0 ? 1 : 0);
 }
 
-/// The same for each side of the mesh alone, so that a thin one has its share on both faces.
+/// The same for each side of the mesh alone, so that both faces of a thin one get their part.
 void begin_sites_by_side(std::span<Dot> dots, std::size_t count, std::vector<Site>& sites) {
   const std::size_t all = dots.size(), known = sites.size();
   auto rest = dots.begin();
@@ -178,7 +397,7 @@ void begin_sites_by_side(std::span<Dot> dots, std::size_t count, std::vector<Sit
   }
 }
 
-/// Lloyd's step: each site goes to the middle of its dots, then back to the surface.
+/// Lloyd's step: moves each site to the middle of its dots, then back to the surface.
 void relax(std::span<const Dot> dots, double distance_mm, std::vector<Site>& sites) {
   const SiteGrid grid(sites, distance_mm);
   std::vector<std::size_t> owner(dots.size());

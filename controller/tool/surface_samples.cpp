@@ -8,8 +8,8 @@
 #include <span>
 #include <sstream>
 
+#include "controller/input/load_error.hpp"
 #include "controller/kernel/point_shell/point_table.hpp"
-#include "controller/scene/scene_error.hpp"
 #include "controller/tool/mesh_surface.hpp"
 #include "controller/tool/tool_shapes.hpp"
 

@@ -6,33 +6,39 @@
 #include <cmath>
 #include <vector>
 
-#include "controller/tool/scene_tool.hpp"
-#include "controller/tool/surface_sample.hpp"
-#include "controller/tool/tool_shaft.hpp"
+#include "controller/tool/tool_shapes.hpp"
+
+// The surface samples of any tool, for contact, and the dense ones for a closer look.
 
 namespace kerf {
 
-/// Distances of the surface samples, in edges of the finest voxel. Contact needs them even, and no
-/// farther apart than the edge of a density is wide.
+/// A sample of a tool's surface, in the tool's axes.
+struct SurfaceSample {
+  std::array<double, 3> at;  ///< from the tool's centre
+  std::array<double, 3>
+      normal;  ///< outward, of length 1; 0 on a rim or a point, where it is not unique
+};
+
+/// Distances of the surface samples, in edges of the finest voxel. Contact needs them evenly
+/// spread, and no farther apart than the width of a density's edge.
 ///
-/// What touches is a cap of the ball whose area grows with the radius, so that the same number of
-/// samples does when their distance grows with its root: a ball of 8 gets 805, of 31.5 gets 7981.
+/// The touching cap of a ball has an area that grows with the radius, so the same number of samples
+/// is enough if their distance grows with the root of it: a ball of 8 gets 805, of 31.5 gets 7981.
 /// (With 515 for a radius of 8 the worst normal on a ball of 6 is 0.6 degrees off instead of 0.25.)
 [[nodiscard]] inline double ball_sample_pitch(double radius_units) {
   return std::clamp(std::sqrt(radius_units / 8), 1.0, 1.25);
 }
 inline constexpr double kShapeSamplePitch = 1.0;
 
-/// What touches is a part of the surface: the pitch of a small tool shrinks until there are so
-/// many.
+/// Only a part of the surface touches: the pitch of a small tool shrinks until there are so many.
 inline constexpr int kMinSurfaceSamples = 512;
 
-/// A query reads each sample, some 2 ns of the tick's time apiece.
+/// A query reads each sample, which takes some 2 ns of the tick.
 inline constexpr int kMaxSurfaceSamples = 8000;
 
-/// Of a part behind the head. One that would have more gets a wider pitch, up to kWidestPartPitch.
-/// Closer looks tell its contacts as exactly as a head's; but a point or a loose bit that is
-/// narrower than the pitch may go unnoticed.
+/// Most samples of a part behind the head. One that would have more gets a wider pitch, up to
+/// kWidestPartPitch. Closer looks find its contacts as exactly as those of a head; but a point or a
+/// loose piece of material that is narrower than the pitch may be missed.
 inline constexpr int kMostPartSamples = 2048;
 inline constexpr double kWidestPartPitch = 4;
 
@@ -48,7 +54,7 @@ inline constexpr double kMostReach = 1024;
 /// angle from the one before. The last ring before a rim lies 0.05 distances from it. That is
 /// tuned: on tilted planes a cylinder of radius 5 and length 16 then rests 0.004 voxels too low in
 /// the mean; with a ring on the rim itself 0.03 too high, with rings 0.15 and 0.85 distances from
-/// it 0.07 too low. A point gets a sample of its own: no sum over a few rings would tell how far it
+/// it 0.07 too low. A point gets a sample of its own: a sum over a few rings cannot show how far it
 /// reaches.
 ///
 /// Throws SceneError above kMaxSurfaceSamples.
@@ -56,10 +62,10 @@ inline constexpr double kMostReach = 1024;
                                                                  double unit_mm);
 
 /// Samples kClosePitch units apart of a tool that is no ball, in the same way, for a closer look at
-/// a contact (contact_closeup.hpp). None of a ball. Load time.
+/// a contact. None for a ball. Load time.
 [[nodiscard]] std::vector<SurfaceSample> close_samples(const SceneTool& tool, double unit_mm);
 
-/// Both for a part behind the head of `tool` (tool_shaft.hpp), in mm from the part's own middle.
+/// Both for a part behind the head of `tool`, in mm from the middle of the part.
 /// Throws SceneError for a part that is too large or too long for its unit. Load time.
 struct PartSamples {
   std::vector<std::array<double, 3>> samples;

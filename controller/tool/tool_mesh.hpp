@@ -4,15 +4,22 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
+
+#include "controller/input/sandbox.hpp"
+
+// The closed mesh of a tool, and the STL file that it comes from.
 
 namespace kerf {
 
-/// Largest mesh of a tool: a picture of it and its text in the segment stay small.
+/// Largest mesh of a tool, so that a picture of it and its text in the segment stay small.
 inline constexpr std::size_t kMaxMeshTriangles = 65536;
-inline constexpr double kLargestMeshMm = 1000;  ///< farthest coordinate: a slip of the unit shows
+inline constexpr double kLargestMeshMm =
+    1000;  ///< farthest coordinate, so that a wrong unit is noticed
 
 /// The closed surface of a tool in its own frame: the spindle turns about y, the shaft is toward
 /// +y, and the middle of its height is at y = 0. Whole nanometres, so that they are short as text.
@@ -28,16 +35,36 @@ struct ToolMesh {
   }
 };
 
-/// A triangle before its corners are known to be those of others.
+/// A triangle whose corners are not yet joined with those of others.
 using LooseTriangle = std::array<std::array<float, 3>, 3>;
 
 /// Joins triangles at corners of equal coordinates. `scale` is mm per unit of theirs; `place`
-/// begins a complaint. Triangles with two equal corners are left out. A mesh that is turned inside
-/// out is turned back, and so is each part of it, joined by edges, that is no hollow in another.
+/// begins a complaint. Triangles with two equal corners are left out. An inside-out mesh is
+/// turned outward, and so is each part of it, joined by edges, that is no hollow in another.
 ///
 /// Throws SceneError for coordinates beyond kLargestMeshMm, for an edge without a partner, for
-/// neighbours that are turned against each other, and where nothing is enclosed. Load time.
+/// neighbours of opposite orientation, and if no volume is enclosed. Load time.
 [[nodiscard]] ToolMesh join_triangles(std::span<const LooseTriangle> triangles, double scale,
                                       const std::string& place);
+
+/// Largest STL file: as text a triangle takes some 300 bytes.
+inline constexpr std::uintmax_t kMaxStlBytes = std::uintmax_t{512} * kMaxMeshTriangles;
+
+/// The triangles of an STL file, binary or text, in the file's own unit; its normals are not read.
+///
+/// Binary: 80 bytes of header, u32 count, then 50 bytes each: normal and three corners as f32, and
+/// two unused bytes; little-endian. Text: `solid`, `facet normal`, `outer loop`, three
+/// `vertex`, `endloop`, `endfacet`, `endsolid`, in any case; several solids are one mesh. A file
+/// whose size is that of its binary count is binary, with any first word; any other without a zero
+/// byte is text.
+///
+/// `place` begins a complaint. Throws SceneError with the line or the number of bytes for any other
+/// file, or one above kMaxMeshTriangles. Any thread; load time.
+[[nodiscard]] std::vector<LooseTriangle> parse_stl(std::string_view bytes,
+                                                   const std::string& place);
+
+/// The same of a file of at most kMaxStlBytes, in a sandbox.
+[[nodiscard]] std::vector<LooseTriangle> read_stl(const std::filesystem::path& path,
+                                                  int cpu_s = kReadCpuSeconds);
 
 }  // namespace kerf

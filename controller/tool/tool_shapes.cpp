@@ -4,18 +4,19 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <cstddef>
 #include <numbers>
 #include <utility>
 
-#include "controller/tool/sample_lattice.hpp"
+#include "controller/tool/inner_samples.hpp"
 
 namespace kerf {
 namespace {
 
 constexpr double kInvertedConeNeck = 0.6;  // radius at the shaft over radius at the tip
-constexpr double kFlameBelly = 0.6;        // where a flame is widest, as a part of its length
+constexpr double kFlameBelly = 0.6;        // widest height of a flame over its length
 constexpr double kFlameNeck = 0.5;         // its radius at the shaft over the largest
-constexpr double kPearBelly = 0.3;         // where a pear is widest, as a part of its length
+constexpr double kPearBelly = 0.3;         // widest height of a pear over its length
 constexpr double kPearNeck = 0.65;         // its radius at the shaft over the largest
 
 /// Radius at `rise` = 0 (tip) .. 1 (shaft) over the largest radius; for shapes that only stretch.
@@ -59,8 +60,8 @@ struct HeadGrid {
 
 HeadGrid head_grid(std::string_view shape, const ToolSize& size) {
   const HeadSize head = head_size(shape, size);
-  // A radius of exactly n pitches reaches n samples, however the quotient was rounded. Of what is
-  // no ball the lattice reaches as far as the surface (SampleLattice::cover).
+  // A radius of exactly n pitches reaches n samples, for any rounding of the quotient. Except for a
+  // ball the lattice reaches as far as the surface (SampleLattice::cover).
   const double pitches = head.radius_mm / size.pitch_mm;
   const double reach =
       shape == "ball" ? std::floor(pitches * (1 + 1e-12)) : std::ceil(pitches * (1 - 1e-12));
@@ -69,7 +70,7 @@ HeadGrid head_grid(std::string_view shape, const ToolSize& size) {
   return {across, std::max(1.0, std::round(head.length_mm / size.pitch_mm))};
 }
 
-/// Rings a quarter of a pitch apart, of places as far apart.
+/// Covers rings a quarter of a pitch apart, at positions as far apart.
 void cover_surface(const SceneTool& tool, SampleLattice& lattice) {
   const double apart_mm = tool.pitch_mm / 4;
   const double long_mm = std::numbers::pi / 2 * (tool.length_mm + tool.radius_mm);
@@ -117,7 +118,7 @@ SceneTool make_tool(std::string name, std::string shape, const ToolSize& size) {
 
   SampleLattice lattice(across, along);
   const double half_pitch_mm = size.pitch_mm / 2;
-  // A sample that lies on the surface is kept, however the radius was rounded.
+  // A sample on the surface is kept for any rounding of the radius.
   const double on_surface = 1e-9 * head.radius_mm * head.radius_mm;
   for (std::int32_t y = 0; y < along; ++y) {
     const double radius_mm = profile_radius_mm(tool, (2 * y + 1 - along) * half_pitch_mm);
@@ -158,6 +159,81 @@ std::vector<std::array<double, 2>> tool_profile(const SceneTool& tool, int steps
   }
   line.push_back({half_mm, 0.0});
   return line;
+}
+
+namespace {
+
+using Profile = std::vector<std::array<double, 2>>;
+
+/// Begin of the shaft's wall, and inner radius of the face there.
+struct Beginning {
+  double y_mm, face_mm;
+};
+
+Beginning beginning_of(const SceneTool& tool) {
+  const double wide_mm = tool.shaft.radius_mm;
+  if (!tool.mesh.triangles.empty()) return {tool.length_mm / 2, 0};
+  const Profile head = tool_profile(tool, 2048);
+  for (std::size_t k = head.size() - 1; k > 0; --k) {
+    const auto &low = head[k - 1], &high = head[k];
+    if (low[1] < wide_mm) continue;
+    const double share = (low[1] - wide_mm) / (low[1] - high[1]);
+    return {std::lerp(low[0], high[0], share), wide_mm};
+  }
+  return {tool.length_mm / 2, profile_radius_mm(tool, tool.length_mm / 2)};
+}
+
+ToolPart part_of(const char* name, Profile profile) {
+  const double middle_mm = (profile.front()[0] + profile.back()[0]) / 2;
+  return {name, std::move(profile), middle_mm};
+}
+
+}  // namespace
+
+ToolShaft tool_shaft(const ShaftSize& size, double head_length_mm) {
+  ToolShaft shaft;
+  if (!size.radius_mm) return shaft;
+  shaft.radius_mm = *size.radius_mm;
+  shaft.end_mm = *size.length_mm - head_length_mm / 2;
+  if (!size.handpiece_radius_mm) return shaft;
+  shaft.handpiece_radius_mm = *size.handpiece_radius_mm;
+  shaft.handpiece_end_mm =
+      shaft.end_mm + size.handpiece_length_mm.value_or(*size.handpiece_radius_mm);
+  return shaft;
+}
+
+std::vector<ToolPart> parts_behind(const SceneTool& tool) {
+  const ToolShaft& shaft = tool.shaft;
+  std::vector<ToolPart> parts;
+  if (!(shaft.radius_mm > 0)) return parts;
+  const auto [y_mm, face_mm] = beginning_of(tool);
+  Profile profile;
+  if (face_mm < shaft.radius_mm) profile.push_back({y_mm, face_mm});
+  profile.push_back({y_mm, shaft.radius_mm});
+  profile.push_back({shaft.end_mm, shaft.radius_mm});
+  const bool handpiece = shaft.handpiece_radius_mm > 0;
+  if (!handpiece) profile.push_back({shaft.end_mm, 0});
+  parts.push_back(part_of("shaft", std::move(profile)));
+  if (!handpiece) return parts;
+  profile = {};
+  if (shaft.radius_mm < shaft.handpiece_radius_mm) {
+    profile.push_back({shaft.end_mm, shaft.radius_mm});
+  }
+  profile.push_back({shaft.end_mm, shaft.handpiece_radius_mm});
+  profile.push_back({shaft.handpiece_end_mm, shaft.handpiece_radius_mm});
+  profile.push_back({shaft.handpiece_end_mm, 0});
+  parts.push_back(part_of("handpiece", std::move(profile)));
+  return parts;
+}
+
+std::vector<std::array<double, 2>> shaft_profile(const SceneTool& tool) {
+  Profile outline;
+  for (const ToolPart& part : parts_behind(tool)) {
+    for (const auto& point : part.profile) {
+      if (outline.empty() || outline.back() != point) outline.push_back(point);
+    }
+  }
+  return outline;
 }
 
 }  // namespace kerf

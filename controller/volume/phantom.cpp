@@ -7,10 +7,9 @@
 #include <thread>
 #include <vector>
 
-#include "controller/volume/file/volume_limits.hpp"
-#include "controller/volume/phantom_shape.hpp"
-#include "controller/volume/volume_density.hpp"
-#include "shared/posix/helper_thread.hpp"
+#include "controller/volume/file/volume_image.hpp"
+#include "controller/volume/windowing.hpp"
+#include "shared/posix/threads.hpp"
 
 namespace kerf {
 namespace {
@@ -31,12 +30,12 @@ struct Halves {
   VoxelBox low, high;
 };
 
-/// Share of a voxel of edge `h_mm` at this distance from a boundary that lies inside.
+/// Fraction of a voxel of edge `h_mm` inside of a boundary at this distance.
 double share_inside(double distance_mm, double h_mm) noexcept {
   return std::clamp(0.5 - distance_mm / (2.0 * h_mm), 0.0, 1.0);
 }
 
-/// Where all of a block lies to a boundary: no voxel of it needs to look again.
+/// Side of a boundary on which a whole block lies: its voxels need no test of their own.
 enum class Side : std::uint8_t { unknown, outside, inside };
 
 struct Sides {
@@ -44,8 +43,8 @@ struct Sides {
 };
 
 /// Samples the shape block by block. A boundary that is far from the middle of a block is far from
-/// all of it, and is not looked at there again; a block of one material is filled. Others are
-/// halved down to `kLeaf` voxels.
+/// all of it, and is not tested there again; a block of one material is filled. Others are halved
+/// down to `kLeaf` voxels.
 class Sampler {
  public:
   explicit Sampler(VolumeImage& image)
@@ -79,7 +78,7 @@ class Sampler {
     sample(half.high, sides);
   }
 
-  /// Looks from the middle of the block at the boundaries that its parent did not decide.
+  /// Tests, at the middle of the block, the boundaries that its parent did not decide.
   void look(const VoxelBox& box, Sides& sides) const noexcept {
     const VoxelIndex n = box.extent();
     const VoxelIndex last{n.x - 1, n.y - 1, n.z - 1};
@@ -113,7 +112,7 @@ class Sampler {
                                        : fill(box, kPhantomPulp, kLabelPulp);
   }
 
-  /// Share of the voxel inside the boundary, from 0 to 1 over two voxels. `value` is `field(p)`.
+  /// Fraction of the voxel inside the boundary, from 0 to 1 over two voxels. `value` is `field(p)`.
   [[nodiscard]] double cover(phantom::Field field, phantom::Point p, const phantom::Levels& levels,
                              double value) const noexcept {
     if (value >= far_mm_) return 0.0;
@@ -151,7 +150,7 @@ class Sampler {
 
   void sample_voxel(std::size_t at, phantom::Point p, const phantom::Levels& levels,
                     const Sides& sides) {
-    // Of a side that is known the share is whole, as `cover` would find.
+    // On a known side the fraction is 0 or 1, as `cover` would find.
     const bool looks = sides.outer == Side::unknown || sides.dentin == Side::unknown;
     const double outer = looks ? phantom::outer_field(p, levels.here) : 0.0;
     double tooth = 1.0;
@@ -171,7 +170,7 @@ class Sampler {
         kPhantomEnamel * (tooth - dentin) + kPhantomDentin * (dentin - pulp) + kPhantomPulp * pulp;
     image_.density[at] = nearest_density(density);
     if (image_.density[at] == 0) return;
-    // What fills most of the voxel's solid part.
+    // The label of the largest solid part of the voxel.
     if (2.0 * pulp > tooth) {
       image_.labels[at] = kLabelPulp;
     } else {
@@ -186,7 +185,7 @@ class Sampler {
   double far_mm_;  ///< a field value beyond this is more than one voxel from its boundary
 };
 
-/// Calls `visit` with the index and the place of each voxel.
+/// Calls `visit` with the index and the position of each voxel.
 void for_each_voxel(const VolumeImage& image, const auto& visit) {
   std::size_t at = 0;
   const auto& origin = image.origin_mm;

@@ -8,12 +8,42 @@
 #include <string>
 #include <vector>
 
-#include "controller/volume/surface_choice.hpp"
-#include "controller/volume/volume_density.hpp"
+#include "controller/volume/file/volume_image.hpp"
+#include "controller/volume/file/volume_io.hpp"
+#include "controller/volume/windowing.hpp"
+
+// A proposal for a scan of which nothing else is known: surface, window, materials, labels,
+// doubtful spacing.
 
 namespace kerf {
 
-/// What a user wants otherwise; values of the file.
+/// Hounsfield's scale (DICOM PS3.3 C.11.1.1.2): -1000 is air and 0 is water, by definition.
+inline constexpr double kAirHu = -1000, kWaterHu = 0;
+
+/// The threshold between the solid and its surroundings, in values of the file.
+struct SurfaceChoice {
+  bool hounsfield = false;  ///< air of -1000 occurs, and the values fit in 16 bits
+  double skin = 0;          ///< Otsu's threshold of all values: below is air
+  std::optional<double>
+      hard;  ///< that of the values above: a second, denser class; empty if there is one class
+  bool covered = false;  ///< the denser class lies below a skin of the other
+  double iso = 0;        ///< `hard` if that is covered, else `skin`
+};
+
+/// Chooses from the histogram and the positions of the classes:
+///
+/// - Two thresholds by Otsu's rule, the second for the values above the first.
+/// - In HU the second splits the values between water and 1500 HU, and counts if it is above all
+/// soft
+///   tissue and blood; then it is bone.
+/// - Without a scale: bone is hidden below skin, enamel lies bare. So the denser class is taken if
+/// air is
+///   rarely near its surface.
+///
+/// `image`: the whole range of the file, `range`, as densities. Load time.
+[[nodiscard]] SurfaceChoice choose_surface(const VolumeImage& image, Window range);
+
+/// Choices of the user in place of the proposal; values of the file.
 struct ProposalWishes {
   std::optional<double> iso{};
   std::optional<Window> window{};
@@ -23,18 +53,18 @@ struct ProposalWishes {
 /// A tissue by its density alone; its colour claims no diagnosis.
 struct ProposedMaterial {
   std::string name;
-  double from = 0;                 ///< value of the file from which it is seen
+  double from = 0;                 ///< value of the file from which it is drawn
   std::array<double, 3> colour{};  ///< linear RGB
 };
 
-/// What is felt and seen of a scan of which nobody has said anything; values of the file.
+/// Proposed settings for a scan of which nothing is known; values of the file.
 struct VolumeProposal {
-  SurfaceChoice surface;  ///< as the histogram has it, whatever the wishes
+  SurfaceChoice surface;  ///< by the histogram, whatever the wishes
   double iso = 0;
   Window window;               ///< becomes density 0 and 1
-  VoxelBox solid;              ///< of what was kept and is at least iso
-  std::size_t parts = 0;       ///< that were kept
-  std::size_t parts_away = 0;  ///< that were taken away
+  VoxelBox solid;              ///< of the kept voxels of at least iso
+  std::size_t parts = 0;       ///< kept
+  std::size_t parts_away = 0;  ///< removed
   std::uint64_t voxels_away = 0;
   std::vector<ProposedMaterial> materials;  ///< softest first
 
@@ -45,32 +75,56 @@ struct VolumeProposal {
 };
 
 struct ProposedVolume {
-  VolumeImage image;  ///< of that window, without what was taken away, not cropped
+  VolumeImage image;  ///< of that window, without the removed parts, not cropped
   VolumeProposal proposal;
 };
 
 /// Fewer voxels than 3 x 3 x 3 are noise: no tool rests on them.
 inline constexpr std::uint64_t kLeastPart = 27;
 
-/// Looks at a scan and decides, each by its own rule:
+/// Proposes, each by its own rule:
 ///
 /// - iso: `choose_surface`.
-/// - what is away: parts of fewer than kLeastPart voxels, and parts of which most lies outside of
-///   the body (body_mask.hpp). The largest stays. Where bone or skin is felt, all that lies outside
-///   of the body becomes air.
-/// - window: from the median of what lies around the surface, so that it stands out of nothing, up
-///   to the 99.9th percentile of what is solid, but no further than makes the iso a quarter: a
-///   surface deep down the scale would lose its steps.
+/// - removed parts: those of fewer than kLeastPart voxels, and those that lie mostly outside of the
+/// body
+///   (`BodyMask`). The largest stays. If the surface is bone or skin, all voxels outside of the
+///   body become air.
+/// - window: from the median of the densities around the surface, which becomes 0, up to the 99.9th
+///   percentile of the solid densities, but no further than makes the iso a quarter: a surface far
+///   down the scale would lose its steps.
 ///
 /// `image`: `range`, all values of the file, as densities; it is changed in place. Throws
-/// SceneError where nothing reaches the iso, or the window is empty. Load time.
+/// SceneError if no voxel reaches the iso, or the window is empty. Load time.
 [[nodiscard]] ProposedVolume propose_volume(VolumeImage image, Window range,
                                             const ProposalWishes& wishes = {});
 
-/// One line for each choice, without its end: what was chosen, and why.
+/// One line for each choice, without its end: the choice, and why.
 struct ProposalLine {
   std::string what, chosen;
 };
 [[nodiscard]] std::vector<ProposalLine> proposal_lines(const VolumeProposal& proposal);
+
+/// If a file holds only labels, turns `image`, its densities, into a solid of them, each label at
+/// full density, and returns true. Labels are whole numbers up to 255 of which 0 and at least two
+/// others occur, in blocks with nothing between them, as no scan has them. Throws SceneError, which
+/// begins with `place`, if a label is higher than the number of materials of a scene. Load time.
+[[nodiscard]] bool take_label_map(const SourceVolume& source, VolumeImage& image,
+                                  const std::string& place);
+
+/// The longest side of a voxel over its shortest: thick slices have 50; in longer voxels a tool
+/// has more samples than the loop can count.
+inline constexpr double kMostStretched = 60;
+[[nodiscard]] bool is_stretched(const VolumeFrame& frame);
+
+/// Reason why the voxel size of a file may be wrong, for a message that begins with "spacing";
+/// empty if it may be right:
+///
+/// - 1 x 1 x 1 mm without HU: libraries write that for an unknown size.
+/// - The solid box is longer than 2 m, the reach of a scanner, or shorter than 0.5 mm: then the
+/// numbers are
+///   micrometres or metres.
+/// - A voxel is stretched.
+[[nodiscard]] std::string odd_spacing(const VolumeFrame& frame, const VoxelBox& solid,
+                                      bool hounsfield);
 
 }  // namespace kerf

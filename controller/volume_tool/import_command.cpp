@@ -3,34 +3,133 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <filesystem>
+#include <limits>
 #include <ostream>
 #include <sstream>
+#include <string>
 #include <system_error>
 #include <utility>
 
-#include "controller/load/scene_load.hpp"
+#include "controller/input/load_error.hpp"
+#include "controller/load/load_scene.hpp"
 #include "controller/plan/compile.hpp"
-#include "controller/scene/scene_error.hpp"
+#include "controller/scene/scene_file.hpp"
+#include "controller/scene/scene_presets.hpp"
+#include "controller/volume/crop_resample.hpp"
+#include "controller/volume/denoise.hpp"
 #include "controller/volume/file/volume_io.hpp"
 #include "controller/volume/file/volume_write.hpp"
-#include "controller/volume/label_map.hpp"
-#include "controller/volume/spacing_check.hpp"
-#include "controller/volume/volume_crop.hpp"
-#include "controller/volume/volume_denoise.hpp"
-#include "controller/volume/volume_noise.hpp"
 #include "controller/volume/volume_proposal.hpp"
 #include "controller/volume_tool/import_preview.hpp"
-#include "controller/volume_tool/import_scene.hpp"
-#include "controller/volume_tool/volume_options.hpp"
-#include "shared/posix/new_file.hpp"
-#include "shared/posix/run_files.hpp"
-#include "shared/text/number.hpp"
-#include "shared/text/words.hpp"
+#include "controller/volume_tool/volume_commands.hpp"
+#include "shared/posix/atomic_file.hpp"
+#include "shared/text/json.hpp"
+#include "shared/text/text.hpp"
 
 namespace kerf {
 namespace fs = std::filesystem;
+
+/// Content of the scene of an imported volume, beside the file.
+struct ImportedScene {
+  std::string source;                        ///< the imported path, for a comment
+  std::filesystem::path volume;              ///< beside the scene
+  const VolumeProposal* proposal = nullptr;  ///< null for a volume with labels
+  Label last_label = 0;                      ///< the highest that a voxel has
+  double iso_density = 0;
+  int passes = 0;                                     ///< against noise, made by the import
+  int longest_vox = std::numeric_limits<int>::max();  ///< no tool is larger
+};
+
 namespace {
+
+/// On one line of a comment, for any bytes in the name.
+std::string comment(const std::string& name) {
+  std::string text = Json(name).canonical();
+  std::ranges::replace(text, '\x7f', ' ');
+  return text;
+}
+
+bool is_control(char c) {
+  return static_cast<unsigned char>(c) < ' ' || c == '\x7f';
+}
+
+/// Balls of these sizes, those that fit; for a volume smaller than all of them, one as large as it.
+std::string tools_text(int longest_vox) {
+  std::ostringstream text;
+  const auto add = [&text](int size_vox) {
+    text << "\n[[tool]]\nname = \"ball " << size_vox
+         << "\"\nshape = \"ball\"\nsize_vox = " << size_vox << "  # in voxels of this volume\n";
+  };
+  bool any = false;
+  for (const int size_vox : {16, 10, 24}) {
+    if (size_vox > longest_vox) continue;
+    add(size_vox);
+    any = true;
+  }
+  if (!any) add(longest_vox);
+  return text.str();
+}
+
+constexpr const char* kDevice = R"(
+[device]
+personality = "omni"
+fit = true  # the volume fills the workspace; cutting, as for voxels of 0.125 mm, grows with its own
+
+[force]
+stiffness_n_per_mm = 0.4   # of the coupling, at the device
+damping_ns_per_mm = 0.002
+
+[cut]
+machinability_mm3_per_s_n = 4  # tuned: to see a cavity within seconds
+)";
+
+/// Reads that text as the controller will, as `scene`, and throws SceneError if it is no scene of
+/// `volume`.
+void check_imported_scene(const std::string& text, const std::filesystem::path& scene,
+                          const std::filesystem::path& volume) {
+  const std::string name = volume.filename().string();
+  const bool plain = std::ranges::none_of(name, is_control);
+  if (plain && parse_scene(text, scene).volumes.front().file == name) return;
+  throw SceneError(volume.string() +
+                   ": a scene cannot name this file (its name has control characters, or is no "
+                   "UTF-8); give another with --out");
+}
+
+/// The text of a scene (TOML) with this volume alone, fitted to any device as --volume fits it.
+std::string imported_scene_text(const ImportedScene& scene) {
+  std::ostringstream text;
+  text << "# Made by kerf volume import from " << comment(scene.source)
+       << "\n# ./kerf demo --scene THIS; what each key means: "
+          "docs/scene-keys.md\n\n[[volume]]\nfile = "
+       << Json(scene.volume.filename().string()).canonical()
+       << "\nwindow = [0, 65535]\niso = " << scene.iso_density;
+  if (scene.proposal != nullptr) {
+    text << "  # " << scene.proposal->iso << scene.proposal->unit() << " of the source, where "
+         << scene.proposal->window.lo << " is 0 and " << scene.proposal->window.hi << " is 1";
+  }
+  text << "\ndenoise = \"off\"  # the import made " << scene.passes
+       << (scene.passes == 1 ? " pass" : " passes") << "\ncrop = false     # the import did\n";
+  if (scene.proposal != nullptr) {
+    text << "\n# By density alone; no voxel has a label.\n";
+    for (const ProposedMaterial& material : scene.proposal->materials) {
+      const auto& c = material.colour;
+      text << "[[material]]\nname = " << Json(material.name).canonical()
+           << "\niso = " << scene.proposal->density_of(material.from) << "\ncolour = [" << c[0]
+           << ", " << c[1] << ", " << c[2] << "]\n";
+    }
+  }
+  for (std::size_t label = default_materials().size(); label <= scene.last_label; ++label) {
+    const Material material = label_material(label, scene.iso_density);
+    const auto& c = material.colour;
+    text << "\n[[material]]\nname = " << Json(material.name).canonical()
+         << "\niso = " << material.iso << "\ncolour = [" << c[0] << ", " << c[1] << ", " << c[2]
+         << "]\n";
+  }
+  text << tools_text(scene.longest_vox) << kDevice;
+  return text.str();
+}
 
 void line(std::ostream& out, std::string what, const std::string& chosen, const char* change) {
   what.resize(11, ' ');
@@ -45,7 +144,7 @@ std::string size_text(const VolumeFrame& frame) {
   return text.str();
 }
 
-/// No tool fits such a scene, whoever gave the spacing.
+/// No tool fits such a scene, with a spacing of the file or of the user.
 void refuse_stretched(const std::string& path, const VolumeFrame& frame) {
   if (!is_stretched(frame)) return;
   const auto& s = frame.spacing_mm;
@@ -56,7 +155,7 @@ void refuse_stretched(const std::string& path, const VolumeFrame& frame) {
   throw SceneError(text.str());
 }
 
-/// The longest side, in the shortest edges of a voxel: what a tool may be as large as.
+/// The longest side, in the shortest edges of a voxel: the largest size of a tool.
 int longest_vox(const VolumeFrame& frame) {
   const auto& s = frame.spacing_mm;
   const double longest_mm =
@@ -77,7 +176,7 @@ const char* way_to_change(const std::string& what) {
 
 }  // namespace
 
-/// What is written.
+/// The written files.
 struct ImportCommand::Files {
   fs::path volume, labels, scene, preview;
 };

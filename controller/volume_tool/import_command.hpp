@@ -5,7 +5,7 @@
 #include <iosfwd>
 #include <string>
 
-#include "controller/sandbox/sandbox.hpp"
+#include "controller/input/sandbox.hpp"
 #include "controller/volume/file/volume_image.hpp"
 #include "shared/text/command_line.hpp"
 
@@ -16,7 +16,7 @@ struct ProposalWishes;
 struct ReadOptions;
 
 /// kerf-volume import: any CT to a .nrrd of densities, a scene and a preview, by the proposal of
-/// volume_proposal.hpp; says in one line each what it chose and how to change it.
+/// volume_proposal.hpp; prints one line for each choice, with the option that changes it.
 class ImportCommand {
  public:
   explicit ImportCommand(Arguments& app);
@@ -30,15 +30,15 @@ class ImportCommand {
  private:
   struct Files;
   [[nodiscard]] Files files() const;
-  /// What the command line says of reading the file, and of what is proposed for it.
+  /// The options for reading the file, and those that replace a proposal.
   [[nodiscard]] ReadOptions read_options() const;
   [[nodiscard]] ProposalWishes wishes() const;
-  /// All of them, of a scene that runs, or none.
+  /// Writes all files, with a scene that runs, or none.
   void write(VolumeImage image, ImportedScene scene, const std::string& preview,
              const Files& to) const;
-  /// `odd`: what is to be told of the file's spacing, where the user gave none.
+  /// Refuses an odd spacing of the file, unless the user gave one.
   void refuse_odd(const std::string& odd) const;
-  /// What asks for a surface, where labels are one.
+  /// Refuses options for the surface, which the labels define.
   void refuse_beside_labels() const;
   void import_labelled(VolumeImage image, const std::string& values, const Files& files,
                        std::ostream& out) const;

@@ -2,32 +2,218 @@
 #include "controller/volume_tool/volume_commands.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdint>
+#include <cstdio>
 #include <exception>
 #include <filesystem>
 #include <ostream>
+#include <sstream>
 #include <string>
+#include <string_view>
+#include <system_error>
 #include <vector>
 
-#include "controller/scene/scene_error.hpp"
+#include "controller/input/load_error.hpp"
+#include "controller/volume/crop_resample.hpp"
+#include "controller/volume/denoise.hpp"
 #include "controller/volume/file/volume_io.hpp"
 #include "controller/volume/file/volume_write.hpp"
 #include "controller/volume/phantom.hpp"
-#include "controller/volume/volume_crop.hpp"
-#include "controller/volume/volume_density.hpp"
-#include "controller/volume/volume_resample.hpp"
+#include "controller/volume/windowing.hpp"
 #include "controller/volume_tool/import_command.hpp"
-#include "controller/volume_tool/volume_info.hpp"
-#include "controller/volume_tool/volume_options.hpp"
-#include "shared/posix/failure.hpp"
-#include "shared/posix/run_files.hpp"
+#include "shared/posix/atomic_file.hpp"
+#include "shared/posix/error_text.hpp"
 #include "shared/text/command_line.hpp"
-#include "shared/text/words.hpp"
+#include "shared/text/json.hpp"
+#include "shared/text/text.hpp"
 
 namespace kerf {
 namespace {
 
-/// What the commands that read a volume have in common.
+std::vector<double> numbers(const std::string& option, const std::string& text, char separator) {
+  std::vector<double> values;
+  std::istringstream parts(text + separator);
+  for (std::string part; std::getline(parts, part, separator);) {
+    const auto value = number_in(part);
+    if (!value) throw SceneError(option + ": '" + part + "' is not a number; see --help");
+    values.push_back(*value);
+  }
+  return values;
+}
+
+}  // namespace
+
+std::array<double, 3> spacing_from(const std::string& text) {
+  const std::vector<double> s = numbers("--spacing", text, ',');
+  if (s.size() == 1) return {s[0], s[0], s[0]};
+  if (s.size() == 3) return {s[0], s[1], s[2]};
+  throw SceneError("--spacing: " + text + " has " + std::to_string(s.size()) +
+                   " numbers; give one, or three as x,y,z (mm)");
+}
+
+Window window_from(const std::string& text) {
+  const std::vector<double> w = numbers("--window", text, ',');
+  if (w.size() != 2) {
+    throw SceneError("--window: " + text + " is not a range; give lo,hi in values of the file");
+  }
+  if (!(w[0] < w[1])) {
+    throw SceneError("--window: " + text + " is empty; give lo,hi with lo < hi");
+  }
+  return {w[0], w[1]};
+}
+
+VoxelGrid grid_from(const std::string& option, const std::string& text) {
+  const std::vector<double> n = numbers(option, text, 'x');
+  const auto whole = [](double v) { return v >= 1.0 && v <= 1e6 && v == std::floor(v); };
+  if (n.size() != 3 || !std::all_of(n.begin(), n.end(), whole)) {
+    throw SceneError(option + ": " + text +
+                     " is not a size; give three counts such as 256x256x161");
+  }
+  return {static_cast<std::int32_t>(n[0]), static_cast<std::int32_t>(n[1]),
+          static_cast<std::int32_t>(n[2])};
+}
+
+std::vector<std::filesystem::path> files_read(const std::filesystem::path& volume) {
+  std::vector<std::filesystem::path> files{volume};
+  const std::filesystem::path labels = labels_path(volume);
+  std::error_code fault;
+  if (exists(symlink_status(labels, fault))) files.push_back(labels);
+  return files;
+}
+
+namespace {
+
+[[noreturn]] void refuse_there(const std::filesystem::path& path) {
+  throw SceneError(path.string() +
+                   ": is there already; take another name, or --force to replace it");
+}
+
+}  // namespace
+
+void refuse_replacing(const std::filesystem::path& path, bool force) {
+  std::error_code fault;
+  if (!force && exists(symlink_status(path, fault))) refuse_there(path);
+}
+
+void commit(NewFiles& files, bool force) {
+  if (force) return files.commit();
+  if (const auto there = files.commit_if_new()) refuse_there(*there);
+}
+
+namespace {
+
+/// The figures of `kerf-volume info`.
+struct VolumeInfo : VolumeFrame {
+  static constexpr std::size_t kHistogramBins = 64;
+
+  std::string file;
+  bool has_spacing = true;
+  double min = 0, max = 0;  ///< values of the file
+  Window window;
+  Density otsu = 0;
+  double otsu_value = 0;   ///< the same threshold in values of the file
+  Noise noise;             ///< of the voxels at or above it
+  VoxelBox solid;          ///< tightest box of the voxels at or above it
+  double solid_ratio = 0;  ///< their fraction of all voxels, 0..1
+  std::array<std::uint64_t, kHistogramBins> histogram{};  ///< over the window, equal steps
+};
+
+/// One character per bin, taller with the logarithm of the count.
+std::string bars(const VolumeInfo& info) {
+  constexpr std::array<const char*, 9> kBars{" ", "▁", "▂", "▃", "▄", "▅", "▆", "▇", "█"};
+  const double most =
+      static_cast<double>(*std::max_element(info.histogram.begin(), info.histogram.end()));
+  std::string line;
+  for (const std::uint64_t count : info.histogram) {
+    const double height = std::log1p(static_cast<double>(count)) / std::log1p(most);
+    line += kBars[static_cast<std::size_t>(std::ceil(height * (kBars.size() - 1)))];
+  }
+  return line;
+}
+
+/// The noise in one line: in values of a file of that window, and the passes of a scene against it.
+std::string noise_line(const Noise& noise, Window window) {
+  if (noise.share == 0) return "noise      none found";
+  const int passes = passes_for(noise);
+  char text[128];
+  std::snprintf(
+      text, sizeof text,
+      "noise      %.4g (%.3g %% of the surface's step); denoise = \"auto\" makes %d pass%s",
+      noise.density * (window.hi - window.lo), 100 * noise.share, passes, passes == 1 ? "" : "es");
+  return text;
+}
+
+VolumeInfo describe(const std::string& file, const SourceVolume& volume, Window window) {
+  const VolumeImage image = apply_window(volume, window);
+  VolumeInfo info;
+  static_cast<VolumeFrame&>(info) = volume;
+  info.file = file;
+  info.has_spacing = volume.has_spacing;
+  info.min = volume.min;
+  info.max = volume.max;
+  info.window = window;
+  info.otsu = otsu_threshold(image);
+  info.otsu_value = window.lo + (window.hi - window.lo) * info.otsu / kDensityMax;
+  info.noise = noise_of(image.grid, image.density, info.otsu);
+  info.solid = solid_box(image, info.otsu);
+  const auto solid = std::count_if(image.density.begin(), image.density.end(),
+                                   [&](Density d) { return d >= info.otsu; });
+  info.solid_ratio = static_cast<double>(solid) / static_cast<double>(image.density.size());
+  for (const Density d : image.density) {
+    ++info.histogram[std::size_t{d} * VolumeInfo::kHistogramBins >> 16];
+  }
+  return info;
+}
+
+void print(const VolumeInfo& info, std::ostream& out) {
+  const auto& s = info.spacing_mm;
+  const auto& o = info.origin_mm;
+  const auto& d = info.direction;
+  out << "file       " << escaped(info.file) << "\nsize       " << info.grid.nx << " x "
+      << info.grid.ny << " x " << info.grid.nz << " voxels\nspacing    ";
+  if (info.has_spacing) {
+    out << s[0] << " x " << s[1] << " x " << s[2] << " mm\nextent     " << s[0] * info.grid.nx
+        << " x " << s[1] * info.grid.ny << " x " << s[2] * info.grid.nz << " mm\n";
+  } else {
+    out << "not in the file; give it with --spacing or spacing_mm\n";
+  }
+  out << "origin     " << o[0] << " " << o[1] << " " << o[2] << " mm\ndirection  (" << d[0] << " "
+      << d[3] << " " << d[6] << ") (" << d[1] << " " << d[4] << " " << d[7] << ") (" << d[2] << " "
+      << d[5] << " " << d[8] << ")\nvalues     " << info.min << " .. " << info.max
+      << "\nwindow     " << info.window.lo << " .. " << info.window.hi << "\notsu       "
+      << info.otsu_value << " (density " << info.otsu / kDensityMax << ")\n"
+      << noise_line(info.noise, info.window) << "\nsolid box  (" << info.solid.lo.x << ", "
+      << info.solid.lo.y << ", " << info.solid.lo.z << ") .. (" << info.solid.hi.x - 1 << ", "
+      << info.solid.hi.y - 1 << ", " << info.solid.hi.z - 1 << "), " << 100.0 * info.solid_ratio
+      << " % of the voxels are solid\nhistogram  |" << bars(info) << "| (log)\n";
+}
+
+/// As JSON. Throws FileError if it cannot be written.
+void write_report(const VolumeInfo& info, const std::filesystem::path& path) {
+  const auto corner = [](VoxelIndex v) { return std::array{v.x, v.y, v.z}; };
+  const Json report{{"denoise_passes", passes_for(info.noise)},
+                    {"direction", info.direction},
+                    {"file", info.file},
+                    {"has_spacing", info.has_spacing},
+                    {"histogram", info.histogram},
+                    {"max", info.max},
+                    {"min", info.min},
+                    {"noise_density", info.noise.density},
+                    {"noise_share", info.noise.share},
+                    {"origin_mm", info.origin_mm},
+                    {"otsu_density", info.otsu / kDensityMax},
+                    {"otsu_value", info.otsu_value},
+                    {"size_vox", std::array{info.grid.nx, info.grid.ny, info.grid.nz}},
+                    {"solid_box", {{"hi", corner(info.solid.hi)}, {"lo", corner(info.solid.lo)}}},
+                    {"solid_ratio", info.solid_ratio},
+                    {"spacing_mm", info.spacing_mm},
+                    {"window", std::array{info.window.lo, info.window.hi}}};
+  write_new_file(path, report.document());
+}
+
+/// The input of the commands that read a volume.
 struct Source {
   std::string file, spacing, window;
   int cpu_s = kReadCpuSeconds;
@@ -73,7 +259,7 @@ struct Target {
     command.flag("--raw", raw, "write without compression");
     command.flag("--force", force, "replace the file, and the labels beside it, where it is there");
   }
-  /// Before the work.
+  /// Call before the work.
   void check(const std::vector<std::filesystem::path>& read) const {
     check_volume_path(file);
     const std::filesystem::path labels = labels_path(file);

@@ -6,7 +6,7 @@
 #include <exception>
 #include <thread>
 
-#include "shared/segment/hand_over.hpp"
+#include "shared/segment/connection.hpp"
 
 int main(int argc, char** argv) {
   try {

@@ -3,9 +3,9 @@
 // of its tip and the force that it gets.    press SCENE.toml
 #include <cstdio>
 
-#include "controller/load/scene_load.hpp"
+#include "controller/load/load_scene.hpp"
 #include "controller/plan/compile.hpp"
-#include "lab/rig/fake_arm.hpp"
+#include "lab/rig/kinematic_arm.hpp"
 
 int main(int argc, char** argv) {
   if (argc != 2) return std::fprintf(stderr, "press: no scene; give one, such as wall.toml\n"), 2;

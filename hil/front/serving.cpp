@@ -3,15 +3,13 @@
 
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <ctime>
 #include <system_error>
 
 #include <poll.h>
 
-#include "shared/posix/cores.hpp"
 #include "shared/posix/monotonic_clock.hpp"
-#include "shared/wire/turn.hpp"
+#include "shared/posix/threads.hpp"
 
 namespace kerf {
 namespace {
@@ -29,7 +27,7 @@ void send(PacketLink& client, PacketDevice& device, FrontStats& stats) noexcept 
   }
 }
 
-/// All that is due as one turn, which may be none.
+/// Sends all that is due as one turn, which may be empty.
 void send_turn(PacketLink& client, PacketDevice& device, FrontStats& stats) noexcept {
   Turn turn;
   std::uint64_t packets = 0;
@@ -135,6 +133,33 @@ std::string make_real_time(int priority, int cpu) {
   if (missing.empty()) return {};
   return "no right to " + missing + ": packets may be milliseconds late; run as root, set an " +
          "rtprio limit, or say --priority 0";
+}
+
+HelloLink::HelloLink(PacketLink& client, const LinkHello& own)
+    : PacketLink(client.descriptor()), client_(client), own_(own) {}
+
+std::span<const std::uint8_t> HelloLink::take(std::span<std::uint8_t> buffer) noexcept {
+  const auto packet = client_.take(buffer);
+  closed_ = client_.closed();
+  if (packet.empty() || !greets_) return packet;
+  const auto hello = decode_hello(packet);
+  greets_ = hello.has_value();
+  if (!greets_) return packet;
+  static_cast<void>(client_.send(encode(own_)));
+  refusal_ = discord(*hello, own_);
+  if (!refusal_.empty()) {
+    closed_ = true;
+  } else if (!last_.empty()) {
+    static_cast<void>(client_.send(last_));
+  }
+  return {};
+}
+
+PacketLink::Sent HelloLink::send(std::span<const std::uint8_t> packet) noexcept {
+  if (greets_) last_.assign(packet.begin(), packet.end());
+  const Sent sent = client_.send(packet);
+  closed_ = closed_ || client_.closed();
+  return sent;
 }
 
 }  // namespace kerf

@@ -7,27 +7,31 @@
 #include <limits>
 #include <span>
 #include <string>
+#include <vector>
 
-#include "hil/devmodel/packet_device.hpp"
-#include "shared/numeric/histogram.hpp"
+#include "hil/device/packet_device.hpp"
+#include "shared/numeric/statistics.hpp"
+#include "shared/wire/emulator_link.hpp"
 
+/// Serves an emulated device to a host: in real time, in lock-step, or behind one descriptor of the
+/// kernel; the link to the host, and its handshake.
 namespace kerf {
 
-/// The way to one host: whole packets, none merged. One thread.
+/// A connection to one host: whole packets, none merged. One thread.
 class PacketLink {
  public:
   enum class Sent : std::uint8_t { yes, full, closed };
 
   virtual ~PacketLink() = default;
 
-  /// Oldest waiting packet into `buffer`; a longer one is cut. Empty when none waits, and then
-  /// `closed` tells whether the other end is gone. Never blocks.
+  /// Oldest waiting packet into `buffer`; a longer one is cut. Empty if none waits; `closed` then
+  /// reports whether the peer is gone. Never blocks.
   [[nodiscard]] virtual std::span<const std::uint8_t> take(
       std::span<std::uint8_t> buffer) noexcept = 0;
   /// As `take`, but waits up to `timeout_ms` for a packet.
   [[nodiscard]] std::span<const std::uint8_t> wait(std::span<std::uint8_t> buffer,
                                                    int timeout_ms) noexcept;
-  /// Never blocks: `full` when the other end does not read.
+  /// Never blocks: `full` if the peer does not read.
   [[nodiscard]] virtual Sent send(std::span<const std::uint8_t> packet) noexcept = 0;
   [[nodiscard]] bool closed() const noexcept { return closed_; }
   [[nodiscard]] int descriptor() const noexcept { return fd_; }
@@ -43,34 +47,34 @@ inline constexpr std::int64_t kNsPerCycle = 125'000;  ///< of the bus
 
 inline constexpr std::int64_t kForeverNs = std::numeric_limits<std::int64_t>::max();
 
-/// How long a stop request may wait.
+/// A stop request is seen within this time.
 inline constexpr int kStopCheckMs = 100;
 inline constexpr std::int64_t kStopCheckNs = kStopCheckMs * std::int64_t{1'000'000};
 
-/// Whether something can be read from `fd` within the time.
+/// Returns true if `fd` can be read within the time.
 [[nodiscard]] bool readable(int fd, int timeout_ms) noexcept;
 
-/// The same, for as long as that takes: false when `patience_ns` are over or `stop` became true,
-/// seen within kStopCheckMs.
+/// The same with a longer time: false if `patience_ns` are over or `stop` became true, seen within
+/// kStopCheckMs.
 [[nodiscard]] bool readable_within(int fd, std::int64_t patience_ns,
                                    const std::atomic<bool>& stop) noexcept;
 
-/// What both ways of serving share.
+/// When to stop serving.
 struct ServeLimits {
   std::int64_t cycles = 0;  ///< bus cycles to serve in all; 0 = until the client leaves
   const std::atomic<bool>& stop;
 
-  /// How long that is from `served` bus cycles on, by the clock: how long to wait for a client.
+  /// The rest of that time after `served` bus cycles, by the clock: how long to wait for a client.
   [[nodiscard]] std::int64_t left_ns(std::int64_t served) const noexcept {
     return cycles == 0 ? kForeverNs : (cycles - served) * kNsPerCycle;
   }
-  /// Whether that is all, after `served` bus cycles.
+  /// Returns true if the limit is reached after `served` bus cycles, or a stop was requested.
   [[nodiscard]] bool reached(std::int64_t served) const noexcept {
     return stop.load(std::memory_order_relaxed) || (cycles != 0 && served >= cycles);
   }
 };
 
-/// What the front saw.
+/// Counts of a front.
 struct FrontStats {
   std::uint64_t sent = 0;
   std::uint64_t dropped = 0;  ///< the client did not read
@@ -80,17 +84,17 @@ struct FrontStats {
 };
 
 /// Serves one client in real time: every `packet_cycles` bus cycles, at absolute deadlines, the
-/// packets of the host are applied and the device's packet is sent, where one is due. Never waits
-/// for the client: what it does not read is dropped and counted. Returns when the client leaves, at
-/// the limit or at a stop.
+/// packets of the host are applied and the device's packet is sent, if one is due. Never waits for
+/// the client: packets that it does not read are dropped and counted. Returns when the client
+/// leaves, at the limit or at a stop.
 void serve_real_time(PacketLink& client, PacketDevice& device, int packet_cycles,
                      const ServeLimits& limits, FrontStats& stats);
 
-/// How a lock-step run takes its turns.
+/// The turns of a lock-step run.
 struct LockStepTurns {
   int tick_cycles = 8;  ///< bus cycles of a tick
-  /// All packets of a tick go as one turn (turn.hpp), an empty one where nothing is due: for
-  /// devices whose packets a fault may keep back or double. Only kerf's own controller reads turns.
+  /// All packets of a tick go as one turn (`Turn`), an empty one if nothing is due: for devices
+  /// whose packets a fault may keep back or double. Only kerf's own controller reads turns.
   bool says_nothing_came = false;
   bool speaks_first = true;  ///< the device, before any packet of the host
 };
@@ -101,27 +105,51 @@ struct LockStepTurns {
 void serve_lockstep(PacketLink& client, PacketDevice& device, const LockStepTurns& turns,
                     const ServeLimits& limits, FrontStats& stats);
 
-/// A device that a kernel drives through one descriptor: requests come, answers and what the device
-/// says by itself go. One thread.
+/// A device that a kernel drives through one descriptor: requests arrive; answers and the device's
+/// own packets leave. One thread.
 class KernelDevice {
  public:
   virtual ~KernelDevice() = default;
-  /// Readable when the kernel asks; negative while the device is unplugged.
+  /// Readable if the kernel has a request; negative while the device is unplugged.
   [[nodiscard]] virtual int descriptor() const noexcept = 0;
-  /// Takes what waits there, without waiting for more.
+  /// Handles the requests that wait there, without waiting for more.
   virtual void answer() = 0;
-  /// When `wake` is due although nobody asks, CLOCK_MONOTONIC ns.
+  /// The time at which `wake` is due without a request, CLOCK_MONOTONIC ns.
   [[nodiscard]] virtual std::int64_t next_wake_ns() const noexcept = 0;
   virtual void wake() = 0;
 };
 
 /// Serves while `goes_on`, which is asked between two steps and at least every 100 ms. `lateness`
-/// records how late `wake` was called.
+/// records the lateness of each `wake`.
 void serve_kernel(KernelDevice& device, const std::function<bool()>& goes_on, Histogram& lateness);
 
 /// Gives the calling thread SCHED_FIFO `priority` (0: leave it as it is) on core `cpu` (negative:
-/// the last one, where the servo runs: a wake-up across cores costs far more than one on the same).
-/// Returns what is missing and what it costs as one line, or nothing.
+/// the last one, that of the servo: a wake-up across cores costs far more than one on the same).
+/// Returns one line on the missing rights and the effect, or an empty string.
 [[nodiscard]] std::string make_real_time(int priority, int cpu);
+
+/// A link to a client that may send a hello before its first packet (`LinkHello`). Each hello is
+/// answered, since UDP may lose an answer, and the device's last packet is sent again after it, so
+/// that a lock-step session begins with its first report. A hello that does not fit is answered
+/// too, and closes the link. A client without a hello is served all the same.
+class HelloLink final : public PacketLink {
+ public:
+  /// `client` outlives it.
+  HelloLink(PacketLink& client, const LinkHello& own);
+
+  [[nodiscard]] std::span<const std::uint8_t> take(
+      std::span<std::uint8_t> buffer) noexcept override;
+  [[nodiscard]] Sent send(std::span<const std::uint8_t> packet) noexcept override;
+
+  /// The reason if the client was refused, else empty.
+  [[nodiscard]] const std::string& refusal() const noexcept { return refusal_; }
+
+ private:
+  PacketLink& client_;
+  LinkHello own_;
+  bool greets_ = true;              ///< the client has sent nothing but hellos yet
+  std::vector<std::uint8_t> last_;  ///< of the device, while it greets
+  std::string refusal_;
+};
 
 }  // namespace kerf

@@ -5,20 +5,19 @@
 #include <ostream>
 #include <utility>
 
-#include "hil/front/firewire/firewire_host_node.hpp"
 #include "hil/front/firewire/firewire_node.hpp"
 #include "hil/front/fuse/fuse_mount.hpp"
-#include "hil/front/uhid/uhid_arm.hpp"
 #include "hil/front/usb/hidraw_node.hpp"
 #include "hil/front/usb/usbfs_node.hpp"
-#include "hil/front/usbip/usbip_falcon.hpp"
+#include "hil/front/usb/usbip_falcon.hpp"
+#include "hil/front/usb/wooden_hid.hpp"
 #include "shared/posix/monotonic_clock.hpp"
-#include "shared/text/words.hpp"
+#include "shared/text/text.hpp"
 
 namespace kerf {
 namespace {
 
-/// Since when nobody uses a device, by the clock: its own time stands still then.
+/// The start of a device's idle time, by the clock: its own time stands still then.
 class Unused {
  public:
   [[nodiscard]] bool for_longer_than(std::int64_t ns, bool in_use) noexcept {
@@ -31,7 +30,7 @@ class Unused {
   std::int64_t since_ns_ = monotonic_ns();
 };
 
-/// Serves `node` as `mount`/`name`, and what else is in `folder`; `cycles()` since the start.
+/// Serves `node` as `mount`/`name`, and the other nodes of `folder`; `cycles()` since the start.
 template <class Node, class Cycles>
 void serve_node(BusService& service, FuseMount& folder, const std::string& mount,
                 const char* device, const std::string& name, Node& node, Cycles cycles) {

@@ -8,7 +8,7 @@
 
 #include "hil/front/firewire/firewire_bus.hpp"
 #include "hil/front/serving.hpp"
-#include "hil/front/usb/ftdi_falcon.hpp"
+#include "hil/front/usb/falcon_usb.hpp"
 #include "hil/front/usb/usb_device.hpp"
 #include "hil/front/usb/wooden_hid.hpp"
 #include "hil/program/emulated_device.hpp"
@@ -16,13 +16,13 @@
 namespace kerf {
 
 /// A device that is served on a bus, and when that ends: at a stop, at the limit of bus cycles,
-/// once its client is gone, or when nobody used it for as long as the rest of the limit.
+/// once its client is gone, or if it was unused for the rest of the limit.
 struct BusService {
   EmulatedDevice& device;
   const ServeLimits& limits;
   bool stay = false;  ///< go on when the client is gone
   FrontStats& stats;
-  std::ostream& out;  ///< is told where the device is
+  std::ostream& out;  ///< gets the device's path
 
   bool was_left = false;
 
@@ -36,7 +36,7 @@ struct BusService {
   }
 };
 
-// `--front fuse`: the device node of a device in the folder `mount`. Each throws `HilError` where
+// `--front fuse`: the device node of a device in the folder `mount`. Each throws `HilError` if
 // nothing can be mounted.
 void serve_fuse(BusService& service, const std::string& mount, const FirewireSettings& omni);
 void serve_fuse(BusService& service, const std::string& mount, const FtdiFalcon::Settings& falcon,
@@ -45,7 +45,7 @@ void serve_fuse(BusService& service, const std::string& mount, const WoodenHid::
 
 /// `--front usbip`: the Falcon at a virtual USB port of this machine's kernel. It stays until it is
 /// stopped or its time is over, because USB/IP does not tell when a program lets go. Throws
-/// `HilError` where the kernel cannot.
+/// `HilError` if the kernel cannot.
 void serve_usbip(BusService& service, const FtdiFalcon::Settings& falcon,
                  std::vector<ScriptedUsbFault> script);
 

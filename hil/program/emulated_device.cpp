@@ -2,17 +2,23 @@
 #include "hil/program/emulated_device.hpp"
 
 #include <algorithm>
+#include <array>
 #include <string>
+#include <utility>
 
-#include "hil/devmodel/falcon_model.hpp"
-#include "hil/devmodel/omni_model.hpp"
-#include "hil/devmodel/wooden_model.hpp"
+#include "hil/device/falcon.hpp"
+#include "hil/device/omni.hpp"
+#include "hil/device/wooden.hpp"
 #include "hil/hil_error.hpp"
 #include "hil/script/hand_script_file.hpp"
 #include "shared/numeric/fnv1a.hpp"
+#include "shared/wire/emulator_link.hpp"
 
 namespace kerf {
 namespace {
+
+constexpr std::int64_t kLookCycles = kCyclesPerSecond / 20;  // for another window: each 50 ms
+constexpr int kMaxWishesPerLook = 16;  // a flooding window cannot hold the device
 
 std::optional<HandScript> hand_of(const EmulatorOptions& o) {
   if (o.hand.empty() && o.hand_socket.empty()) return std::nullopt;
@@ -22,7 +28,7 @@ std::optional<HandScript> hand_of(const EmulatorOptions& o) {
   return script;
 }
 
-/// Faults of a device; one of its host can only be played where both are in one program.
+/// Faults of a device; one of its host can only be played if both are in one program.
 FaultScript faults_of(const EmulatorOptions& o) {
   if (o.fault.empty()) return {};
   FaultScript script = read_fault_script(o.fault);
@@ -33,7 +39,7 @@ FaultScript faults_of(const EmulatorOptions& o) {
   return script;
 }
 
-/// What any device takes from the command line.
+/// Parameters of a device from script and command line.
 template <class Params>
 Params plant_of(const EmulatorOptions& o, const PlantValues& of_script) {
   Params params;
@@ -47,6 +53,36 @@ Params plant_of(const EmulatorOptions& o, const PlantValues& of_script) {
 }
 
 }  // namespace
+
+void HandServer::look_for_windows() noexcept {
+  auto newcomer = server_.accept_waiting();
+  if (!newcomer) return;
+  const bool taken = window_.has_value();
+  static_cast<void>(newcomer->send(encode(taken ? HandGreeting::taken : HandGreeting::yours)));
+  if (!taken) window_.emplace(std::move(*newcomer));
+}
+
+void HandServer::lead(Emulator& emulator, int cycles) noexcept {
+  since_look_ += cycles;
+  if (since_look_ >= kLookCycles && emulator.can_be_led()) {
+    since_look_ = 0;
+    look_for_windows();
+  }
+  if (!window_) return;
+  std::array<std::uint8_t, kHandWishBytes + 1> buffer;  // a longer packet is seen to be wrong
+  std::optional<HandWish> newest;
+  for (int taken = 0; taken < kMaxWishesPerLook; ++taken) {
+    const auto packet = window_->take(buffer);
+    if (packet.empty()) break;
+    const auto wish = decode_hand_wish(packet);
+    ++(wish ? wishes_ : refused_);
+    if (wish) newest = wish;
+  }
+  if (newest) emulator.wish(*newest);
+  if (!window_->closed()) return;
+  window_.reset();
+  emulator.forsake();
+}
 
 std::unique_ptr<DeviceModel> make_device(const EmulatorOptions& o, const PlantValues& of_script) {
   switch (o.personality) {

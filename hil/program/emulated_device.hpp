@@ -5,19 +5,48 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
-#include "hil/devmodel/emulator.hpp"
-#include "hil/devmodel/packet_device.hpp"
-#include "hil/fault/faulty_device.hpp"
-#include "hil/front/hand_server.hpp"
+#include "hil/device/emulator.hpp"
+#include "hil/device/packet_device.hpp"
+#include "hil/front/socket_servers.hpp"
 #include "hil/program/emulator_options.hpp"
 #include "hil/script/fault_script.hpp"
+#include "hil/script/faulty_device.hpp"
 
+/// The device of kerf-emulator: model, hand and faults for each client, and the socket of a window
+/// that leads the hand.
 namespace kerf {
 
-/// The device model that the options describe, and where they say nothing of its plant, the hand
-/// script. Throws `HilError` for a plant that cannot be.
+/// The socket at which a window leads the hand: packets of `HandWish`.
+///
+/// Once the hand is at its start, one window at a time is accepted; a second one gets `taken` and
+/// is closed, and one of another user is refused. A packet that is no wish is dropped and counted.
+/// Never waits. One thread.
+class HandServer {
+ public:
+  /// Throws `HilError`; see SeqpacketServer.
+  explicit HandServer(const std::string& path) : server_(path, "--hand-socket") {}
+
+  /// Passes the newest wish to the emulator's hand, and `forsake` if the window has gone. Call
+  /// between two polls of the host; `cycles` bus cycles have passed since the last call.
+  void lead(Emulator& emulator, int cycles) noexcept;
+
+  [[nodiscard]] std::uint64_t wishes() const noexcept { return wishes_; }
+  [[nodiscard]] std::uint64_t refused() const noexcept { return refused_; }
+
+ private:
+  void look_for_windows() noexcept;
+
+  SeqpacketServer server_;
+  std::optional<SeqpacketLink> window_;
+  std::int64_t since_look_ = 0;  ///< bus cycles
+  std::uint64_t wishes_ = 0, refused_ = 0;
+};
+
+/// The device model of the options; plant parameters that they leave out come from the hand script.
+/// Throws `HilError` for an impossible plant.
 [[nodiscard]] std::unique_ptr<DeviceModel> make_device(const EmulatorOptions& options,
                                                        const PlantValues& of_script);
 
@@ -37,7 +66,7 @@ class EmulatedDevice final : public PacketDevice {
   /// For a new client. Allocates.
   void renew();
 
-  /// Where a window leads the hand; none without `--hand-socket`.
+  /// The socket of a window that leads the hand; empty without `--hand-socket`.
   [[nodiscard]] const std::optional<HandServer>& leader() const noexcept { return leader_; }
   [[nodiscard]] const DeviceModel& model() const noexcept { return emulator_->model(); }
   /// Of all clients together.
@@ -46,7 +75,7 @@ class EmulatedDevice final : public PacketDevice {
   }
   /// Packets that faults kept from them.
   [[nodiscard]] std::uint64_t withheld() const noexcept { return withheld_ + faulty_->withheld(); }
-  /// What the fault script has done to the last client.
+  /// The faults that the last client has met.
   [[nodiscard]] std::vector<InjectedFault> injected() const { return faulty_->injected(); }
 
  private:

@@ -9,11 +9,10 @@
 #include <string_view>
 #include <utility>
 
-#include "hil/devmodel/bus_cycle.hpp"
+#include "hil/device/packet_device.hpp"
 #include "hil/hil_error.hpp"
-#include "shared/text/number.hpp"
-#include "shared/text/words.hpp"
-#include "shared/wire/wooden_constants.hpp"
+#include "shared/text/text.hpp"
+#include "shared/wire/woodenhaptics.hpp"
 
 namespace kerf {
 namespace {

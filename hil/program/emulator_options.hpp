@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "hil/devmodel/plant_keys.hpp"
+#include "hil/device/plant_params.hpp"
 #include "hil/front/firewire/firewire_bus.hpp"
 #include "hil/front/usb/usb_device.hpp"
 #include "shared/text/command_line.hpp"
@@ -15,7 +15,7 @@
 
 namespace kerf {
 
-/// What the fronts that speak for a whole bus (fuse, usbip, uhid) take from the command line.
+/// Options of the fronts that speak for a whole bus (fuse, usbip, uhid).
 struct BusOptions {
   std::string mount;
   int packet_hz = 8000;
@@ -27,7 +27,7 @@ struct BusOptions {
 
 void declare_bus(Arguments& app, BusOptions& options);
 
-/// Throws `HilError` for what no bus can be. `lockstep_hz`: servo rate in lock-step, 0 = real time.
+/// Throws `HilError` for an impossible bus. `lockstep_hz`: servo rate in lock-step, 0 = real time.
 [[nodiscard]] FirewireSettings firewire_settings(const BusOptions& options, int lockstep_hz);
 
 /// The same for the other two devices' buses, which have no lock-step.
@@ -62,7 +62,7 @@ struct EmulatorOptions {
   std::string report;
 };
 
-/// Tells `app` about all options. What `options` holds then is checked one by one only.
+/// Declares all options. `app` then checks each value by itself only.
 void declare(Arguments& app, EmulatorOptions& options);
 
 /// Finds the personality. Throws `HilError` for options that do not fit together.

@@ -1,32 +1,92 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "hil/program/program.hpp"
 
+#include <array>
+#include <cstddef>
 #include <ostream>
 #include <string>
+#include <vector>
 
-#include "hil/devmodel/bus_cycle.hpp"
-#include "hil/front/hello_link.hpp"
-#include "hil/front/seqpacket_server.hpp"
+#include "hil/device/packet_device.hpp"
 #include "hil/front/serving.hpp"
-#include "hil/front/udp_server.hpp"
+#include "hil/front/socket_servers.hpp"
 #include "hil/hil_error.hpp"
 #include "hil/program/bus_service.hpp"
 #include "hil/program/emulated_device.hpp"
 #include "hil/program/emulator_options.hpp"
-#include "hil/program/run_report.hpp"
-#include "shared/posix/failure.hpp"
+#include "shared/posix/atomic_file.hpp"
+#include "shared/posix/error_text.hpp"
 #include "shared/text/command_line.hpp"
-#include "shared/text/words.hpp"
+#include "shared/text/json.hpp"
+#include "shared/text/text.hpp"
 
 namespace kerf {
+
 namespace {
+
+double seconds_of(std::int64_t cycles) {
+  return static_cast<double>(cycles) / kCyclesPerSecond;
+}
+
+/// The faults that have begun, one by one.
+Json injected_list(const std::vector<InjectedFault>& faults) {
+  Json list = Json::List{};
+  for (const InjectedFault& fault : faults) {
+    list.push_back({{"kind", kFaultWords[static_cast<std::size_t>(fault.kind)]},
+                    {"packets", fault.of_commands ? "commands" : "reports"},
+                    {"at_s", seconds_of(fault.at_cycle)},
+                    {"changed", fault.changed}});
+  }
+  return list;
+}
+
+/// Throws FileError now if the report could not be written after the run, or would replace a file
+/// that the run reads.
+void check_report(const EmulatorOptions& options) {
+  check_outputs({options.hand, options.fault}, {{"--report", options.report, ".json"}});
+}
+
+/// Writes the figures of a run as JSON: under another name first, then renamed, so the file is
+/// whole or absent. Times in s from the first client on, device time. Counts are those of all
+/// clients together, the device's state at the end is the last one's. Throws FileError.
+void write_run_report(const std::string& file, const EmulatedDevice& device,
+                      const FrontStats& front) {
+  const EmulatorStats stats = device.stats();
+  const DeviceModel& model = device.model();
+  const DeviceVec<double> tip = model.tip_mm();
+  Json report;
+  report["personality"] = model.name();
+  report["seconds"] = seconds_of(stats.cycles);
+  report["packets_sent"] = front.sent;
+  report["packets_dropped"] = front.dropped;
+  report["packets_withheld"] = device.withheld();
+  report["injected"] = injected_list(device.injected());
+  report["commands_received"] = stats.commands;
+  report["commands_refused"] = stats.refused;
+  report["resyncs"] = front.resyncs;
+  report["wake_us"] = {{"p50", front.wake.percentile_us(0.5)},
+                       {"p99", front.wake.percentile_us(0.99)},
+                       {"max", front.wake.max_us()}};
+  report["peak_motor_force_n"] = stats.peak_motor_force_n;
+  report["calibrated"] = model.calibration() == Calibration::done;
+  report["docked"] = model.docked();
+  report["undocked_at_s"] = stats.undocked_at ? Json(seconds_of(*stats.undocked_at)) : nullptr;
+  report["final_tip_mm"] = std::array{tip.x, tip.y, tip.z};
+  if (device.leader()) {
+    report["wishes"] = device.leader()->wishes();
+    report["wishes_refused"] = device.leader()->refused();
+  }
+  report["report_hash"] = hex64(stats.report_hash);
+
+  write_new_file(file, report.document());
+}
 
 void describe(const EmulatorOptions& o, std::ostream& out) {
   const auto scale = make_device(o, {})->params().torque_scale();
   out << "torque_scale=" << scale[0] << ',' << scale[1] << ',' << scale[2] << '\n';
 }
 
-Hello hello_of(const EmulatorOptions& o) {
+LinkHello hello_of(const EmulatorOptions& o) {
   return {o.personality, o.lockstep, o.lockstep ? o.rate_hz : kCyclesPerSecond / o.packet_cycles};
 }
 

@@ -10,7 +10,7 @@
 
 namespace kerf {
 
-/// What goes wrong. Names in fault files are those of `kFaultWords`.
+/// A kind of fault. Names in fault files are those of `kFaultWords`.
 enum class FaultKind : std::uint8_t {
   lose,       ///< packets vanish
   delay,      ///< packets come `ms` late
@@ -21,12 +21,12 @@ enum class FaultKind : std::uint8_t {
   stick,      ///< the encoder of `axis` stands still
   jump,       ///< it is off by `counts`
   wander,     ///< it is off by a random walk of steps up to `counts`
-  park,       ///< the device says that it is parked
-  chatter,    ///< it says so at random
-  unhome,     ///< the device says that it is not homed (Falcon)
+  park,       ///< the device reports that it is parked
+  chatter,    ///< it reports so at random
+  unhome,     ///< the device reports that it is not homed (Falcon)
   noise,      ///< the low bits of the gimbal pots are noise (Omni)
-  silence,    ///< the device says nothing, and still hears
-  unplug,     ///< it neither says nor hears anything
+  silence,    ///< the device sends nothing, and still receives
+  unplug,     ///< it neither sends nor receives
   host_late,  ///< the host stands still for `ms`
 };
 
@@ -34,7 +34,7 @@ inline constexpr std::array<std::string_view, 16> kFaultWords{
     "lose",   "delay", "duplicate", "reorder", "truncate", "corrupt", "stick",  "jump",
     "wander", "park",  "chatter",   "unhome",  "noise",    "silence", "unplug", "host_late"};
 
-/// What starts the clock of a script; words in fault files are those of `kFaultClockWords`.
+/// The start of a script's clock; words in fault files are those of `kFaultClockWords`.
 enum class FaultClock : std::uint8_t {
   push,   ///< the motors' first push (0.05 N at the tip)
   start,  ///< the emulator
@@ -42,8 +42,8 @@ enum class FaultClock : std::uint8_t {
 
 inline constexpr std::array<std::string_view, 2> kFaultClockWords{"push", "start"};
 
-/// What a controller that keeps its safety contract latches in such a run, and nothing else; words
-/// in fault files.
+/// The only fault that a controller latches in such a run if it keeps its safety contract; words in
+/// fault files.
 inline constexpr std::array<std::string_view, 4> kLatchWords{"none", "stale_input", "not_finite",
                                                              "overspeed"};
 
@@ -60,7 +60,7 @@ struct DeviceFault {
 };
 
 struct FaultScript {
-  std::vector<DeviceFault> faults;  ///< none: all goes well
+  std::vector<DeviceFault> faults;  ///< empty: all goes well
   std::uint32_t seed = 1;
   FaultClock clock = FaultClock::push;
   std::string latches{};   ///< of kLatchWords; empty: chance or the device decides
@@ -72,9 +72,9 @@ struct FaultScript {
 ///
 ///     seed = 1               # of everything random below
 ///     clock = "push"         # begins when the motors first push; or "start": with the emulator
-///     latches = "none"       # what kerf-lab faults demands: a word of kLatchWords; none: nothing
-///     seconds = 4            # how long kerf-lab faults plays it
-///     [[fault]]              # at least one, but where seconds says how long all goes well
+///     latches = "none"       # demanded by kerf-lab faults: a word of kLatchWords; if missing,
+///     nothing seconds = 4            # how long kerf-lab faults plays it
+///     [[fault]]              # at least one, unless seconds says how long all goes well
 ///     kind = "lose"          # a word of kFaultWords
 ///     packets = "reports"    # or "commands"; of lose, delay, duplicate, reorder, truncate,
 ///                            # corrupt

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "hil/script/script_table.hpp"
-#include "shared/wire/omni_constants.hpp"
+#include "shared/wire/omni.hpp"
 
 namespace kerf {
 namespace {
@@ -67,7 +67,7 @@ HandStep step_of(const ScriptTable& table) {
   return step;
 }
 
-/// What `[device]` and `[hand]` say of the plant.
+/// Plant parameters of `[device]` and `[hand]`.
 PlantValues plant_of(const ScriptTable& top, const std::string& place) {
   PlantValues values;
   for (const std::string_view name : {"device", "hand"}) {

@@ -5,7 +5,7 @@
 #include <string>
 #include <string_view>
 
-#include "hil/devmodel/hand_script.hpp"
+#include "hil/device/hand_script.hpp"
 
 namespace kerf {
 

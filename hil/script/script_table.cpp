@@ -10,10 +10,8 @@
 #include <utility>
 
 #include "hil/hil_error.hpp"
-#include "shared/posix/failure.hpp"
-#include "shared/posix/unreachable.hpp"
-#include "shared/text/number.hpp"
-#include "shared/text/words.hpp"
+#include "shared/posix/error_text.hpp"
+#include "shared/text/text.hpp"
 
 namespace kerf {
 namespace {

@@ -15,15 +15,15 @@ namespace kerf {
 
 inline constexpr double kMaxScriptSeconds = 3600;
 
-/// A range and how to say it.
+/// A range of numbers.
 struct ScriptRange {
   double low;
   double high;
   bool above_low = false;  ///< `low` itself is refused
 };
 
-/// One table of a script with what is needed to complain about it: every getter throws `HilError`
-/// with file, line, key, value and way out. Refers to the parsed file, which must outlive it.
+/// One table of a script and its name in errors: every getter throws `HilError` with file, line,
+/// key, value and way out. Refers to the parsed file, which must outlive it.
 class ScriptTable {
  public:
   /// `name` is empty for the whole file.
@@ -46,7 +46,7 @@ class ScriptTable {
   [[nodiscard]] std::string word(std::string_view key, const std::string& otherwise,
                                  std::span<const std::string_view> words) const;
   [[nodiscard]] bool flag(std::string_view key) const;
-  /// The table `[key]`; none where it is absent.
+  /// The table `[key]`; null if it is absent.
   [[nodiscard]] const TomlNode* table(std::string_view key) const;
   /// The tables of `[[key]]`, at least one and at most `most`.
   [[nodiscard]] std::span<const TomlNode> tables(const std::string& key, std::size_t most) const;
@@ -61,10 +61,10 @@ class ScriptTable {
   std::string name_;
 };
 
-/// Text of `place` as TOML; throws `HilError` with place, line and what is wrong.
+/// Text of `place` as TOML; throws `HilError` with place, line and reason.
 [[nodiscard]] TomlNode parse_script(std::string_view text, const std::string& place);
 
-/// The whole of a regular file of at most 1 MiB; `example` is named where there is none.
+/// The whole of a regular file of at most 1 MiB; the error names `example` if there is none.
 [[nodiscard]] std::string read_script(const std::filesystem::path& file,
                                       const std::string& example);
 

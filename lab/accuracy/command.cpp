@@ -1,15 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "lab/accuracy/command.hpp"
-
 #include <cstdio>
+#include <memory>
 #include <ostream>
+#include <string>
 #include <vector>
 
 #include "lab/accuracy/page.hpp"
 #include "lab/accuracy/study.hpp"
-#include "lab/rig/lab_run.hpp"
-#include "record/gnuplot.hpp"
-#include "shared/posix/progress_bar.hpp"
+#include "lab/run/lab_command.hpp"
+#include "lab/run/lab_run.hpp"
+#include "record/force_plot.hpp"
+#include "shared/posix/program.hpp"
 
 namespace kerf::accuracy {
 namespace {
@@ -26,7 +27,16 @@ std::string line_of(const Entry& entry) {
   return text;
 }
 
-}  // namespace
+/// `kerf-lab accuracy`: each knob of the contact force against analytic shapes.
+class Command final : public LabCommand {
+ public:
+  explicit Command(Arguments& program);
+  [[nodiscard]] int run(std::ostream& out) const override;
+
+ private:
+  std::string report_, csv_, plot_, page_;
+  int core_ = -1;
+};
 
 Command::Command(Arguments& program)
     : LabCommand(program, "accuracy", "each knob of the contact force against analytic shapes") {
@@ -62,4 +72,9 @@ int Command::run(std::ostream& out) const {
   return 0;
 }
 
+}  // namespace
 }  // namespace kerf::accuracy
+
+std::unique_ptr<kerf::LabCommand> kerf::make_accuracy_command(Arguments& program) {
+  return std::make_unique<accuracy::Command>(program);
+}

@@ -7,8 +7,8 @@
 #include <numbers>
 #include <random>
 
-#include "controller/kernel/trilinear.hpp"
-#include "lab/accuracy/method_parts.hpp"
+#include "controller/kernel/sampling.hpp"
+#include "lab/accuracy/contact_method.hpp"
 
 namespace kerf::accuracy {
 namespace {
@@ -57,7 +57,7 @@ void add_normals(const ContactMethod& method, const ContactCase& at, std::size_t
   }
 }
 
-/// Steps along the face: where nothing but the sampling changes the force, all of it is error.
+/// Steps along the face: if only the sampling changes the force, all of the change is error.
 void add_steps(const ForceAt& force, const Contact& contact, int count, Spread& errors) {
   const Point step = along_face(contact.normal)[0] * kStepMm;
   Point before = force(contact.centre_mm);

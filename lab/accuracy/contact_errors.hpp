@@ -35,11 +35,11 @@ class Spread {
   std::size_t count_ = 0;
 };
 
-/// What a method does wrong. Forces are shares of p0 pi R^2, works shares of the work that goes to
+/// Errors of a method. Forces are shares of p0 pi R^2, works shares of the work that goes to
 /// and fro on the way.
 struct ContactErrors {
   Spread theory;         ///< |F - F_theory|
-  Spread direction_deg;  ///< between the two, where theory has a tenth of full scale
+  Spread direction_deg;  ///< between the two, if theory has a tenth of full scale
   Spread normal_deg;     ///< of one sample at the voxels on the face, against the true normal
   Spread sample_loop;    ///< closed loops of one sample about a place on the face
   Spread tool_loop;      ///< the same of the whole tool, about the contact

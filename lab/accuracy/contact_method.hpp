@@ -2,23 +2,27 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "controller/kernel/gradient.hpp"
-#include "controller/kernel/tool_pose.hpp"
-#include "lab/accuracy/analytic_shapes.hpp"
+#include "controller/kernel/sampling.hpp"
+#include "lab/accuracy/subjects.hpp"
+#include "shared/numeric/numbers.hpp"
+#include "shared/numeric/vec.hpp"
 
+/// Ways to compute the contact force, behind one interface: the choices of an accuracy study, and
+/// the parts that their implementations share.
 namespace kerf::accuracy {
-
-// What an accuracy study varies.
 
 enum class Arithmetic : std::uint8_t {
   q8,       ///< trilinear weights of 8 bits: less than kerf keeps
   q12,      ///< of 12 bits
-  q15,      ///< of 15 bits: what the servo runs
+  q15,      ///< of 15 bits: the servo's
   float32,  ///< the servo's float
   float64,  ///< the servo's double, the truth of the others
 };
@@ -44,7 +48,7 @@ struct ContactChoice {
   friend bool operator==(const ContactChoice&, const ContactChoice&) = default;
 };
 
-/// Whether the servo has it, in its kernels or templates; else it is the lab's plain text.
+/// Returns true if the servo has it, in its kernels or templates; else it is the lab's plain code.
 [[nodiscard]] bool is_servos(const ContactChoice& choice);
 
 /// A round tool, sampled as a scene's tool of this radius and pitch would be.
@@ -80,5 +84,56 @@ class ContactMethod {
 /// F = -p0 a^3 SUM grad_mm, a the pitch.
 [[nodiscard]] Point force_share(const ContactMethod& method, const AnalyticVolume& volume,
                                 const BallTool& tool, Point centre_mm);
+
+// Parts that the methods share.
+
+using Voxels = VoxelVec<double>;
+using Offsets = std::span<const ToolOffset>;
+
+inline constexpr std::array<ToolOffset, 1> kOneSample{};
+
+/// Unturned.
+template <class N>
+ToolPose<N> pose_at(Voxels centre, double pitch_vox) {
+  using Real = typename N::Real;
+  ToolPose<N> pose;
+  pose.centre_vox = {Real(centre.x), Real(centre.y), Real(centre.z)};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const double step = pitch_vox * double(N::kStepOne);
+    if constexpr (N::kIsFixed) {
+      pose.step[axis][axis] = static_cast<typename N::Step>(std::lround(step));
+    } else {
+      pose.step[axis][axis] = static_cast<typename N::Step>(step);
+    }
+  }
+  return pose;
+}
+
+/// `unit`: the value of one density step per voxel in the sum.
+template <class N>
+Voxels full_densities(SumVec<N> sum, double unit) {
+  const double scale = 1 / (unit * kDensityMax);
+  return {double(sum.x) * scale, double(sum.y) * scale, double(sum.z) * scale};
+}
+
+template <class N>
+std::vector<Gradient<N>> field_of(GradientKernel kernel, const AnalyticVolume& volume) {
+  std::vector<Gradient<N>> field(volume.grid.voxel_count());
+  GradientScratch scratch;
+  refresh_gradients<N>(kernel, volume.grid, volume.density, volume.grid.box(), field, scratch);
+  return field;
+}
+
+/// Q0.15 weights rounded half up to `Bits` fraction bits, still in Q0.15: the servo's lerp gives
+/// with them the bits that a lerp of `Bits` would give.
+template <int Bits>
+[[nodiscard]] constexpr VoxelVec<FixedNumbers::Weight> coarse_weights(
+    VoxelVec<FixedNumbers::Weight> w) noexcept {
+  constexpr int kDropped = 15 - Bits;
+  const auto coarse = [](FixedNumbers::Weight v) {
+    return static_cast<FixedNumbers::Weight>(round_shift(v, kDropped)) * (1 << kDropped);
+  };
+  return {coarse(w.x), coarse(w.y), coarse(w.z)};
+}
 
 }  // namespace kerf::accuracy

@@ -2,10 +2,12 @@
 #include "lab/accuracy/study.hpp"
 
 #include <cmath>
+#include <cstdio>
 #include <optional>
 #include <utility>
 
 #include "lab/accuracy/subjects.hpp"
+#include "shared/text/json.hpp"
 
 namespace kerf::accuracy {
 namespace {
@@ -73,7 +75,7 @@ void add(Figures& figures, const std::string& shape, const ContactErrors& errors
 /// Ticks on the ball along a loop, as a hand moves: from place to near place.
 TickTimes time_contact(const ContactMethod& method, const ContactCase& at, int ticks) {
   const TiltedLoop loop{at.contacts.front().centre_mm, at.contacts.front().normal};
-  volatile double sink = 0;  // what the compiler may not leave out
+  volatile double sink = 0;  // so that the compiler keeps the sum
   return time_ticks(
       ticks, [] {},
       [&](int i) {
@@ -184,6 +186,42 @@ std::vector<Entry> study(
   }
   add_orders(entries);
   return entries;
+}
+
+std::string csv(const std::vector<Entry>& entries) {
+  std::string text = "knob,value,shape,metric,figure,unit,us_p50,us_p99,us_max\n";
+  for (const Entry& entry : entries) {
+    char times[64];
+    std::snprintf(times, sizeof times, "%.3f,%.3f,%.3f\n", entry.times.p50_ns / 1e3,
+                  entry.times.p99_ns / 1e3, entry.times.max_ns / 1e3);
+    for (const Figure& figure : entry.figures) {
+      char value[32];
+      std::snprintf(value, sizeof value, "%.6g", figure.figure);
+      text += entry.knob + ',' + entry.value + ',' + figure.shape + ',' + figure.metric + ',' +
+              value + ',' + figure.unit + ',' + times;
+    }
+  }
+  return text;
+}
+
+std::string json(const std::vector<Entry>& entries, int core) {
+  Json report;
+  report["core"] = core;
+  report["rows"] = Json::List{};
+  for (const Entry& entry : entries) {
+    for (const Figure& figure : entry.figures) {
+      report["rows"].push_back({{"knob", entry.knob},
+                                {"value", entry.value},
+                                {"shape", figure.shape},
+                                {"metric", figure.metric},
+                                {"figure", figure.figure},
+                                {"unit", figure.unit},
+                                {"us_p50", entry.times.p50_ns / 1e3},
+                                {"us_p99", entry.times.p99_ns / 1e3},
+                                {"us_max", entry.times.max_ns / 1e3}});
+    }
+  }
+  return report.document();
 }
 
 }  // namespace kerf::accuracy

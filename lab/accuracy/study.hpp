@@ -8,28 +8,28 @@
 #include <vector>
 
 #include "lab/accuracy/contact_errors.hpp"
-#include "lab/rig/tick_timer.hpp"
+#include "lab/run/lab_run.hpp"
 
 namespace kerf::accuracy {
 
 /// One figure of one choice.
 struct Figure {
-  std::string shape;  ///< plane, ball, torus, plate, crease, layered ball; or all, or what it is of
+  std::string shape;  ///< plane, ball, torus, plate, crease, layered ball; or all, or the subject
   std::string metric;
   double figure;
   std::string unit;
 };
 
-/// A knob in one position, all others where the servo has them.
+/// A knob in one position, all others at the servo's.
 struct Entry {
   std::string knob, value;
-  bool standard =
-      false;  ///< what the servo runs without the method `aligned`: one measurement, in each knob
+  /// The servo without the method `aligned`: one measurement, in each knob.
+  bool standard = false;
   TickTimes times;
   std::vector<Figure> figures;
   bool plain = false;  ///< text of the lab: its times are not those of kernels
 
-  /// The figure of a metric; nullptr where it was not measured.
+  /// The figure of a metric; null if it was not measured.
   [[nodiscard]] const double* find(std::string_view metric, std::string_view shape = "all") const;
 };
 
@@ -42,8 +42,14 @@ struct Scope {
   int ticks = 1000;            ///< timed
 };
 
-/// `told` hears how far it is (0..1) and what is measured now.
+/// `progress` gets the fraction done (0..1) and the current measurement.
 [[nodiscard]] std::vector<Entry> study(
     const Scope& scope, const std::function<void(double share, const std::string& what)>& progress);
+
+/// All figures of a study as a table, one row for each: knob, value, shape, metric, figure, unit,
+/// and the tick's us p50, p99, max.
+[[nodiscard]] std::string csv(const std::vector<Entry>& entries);
+/// The same as JSON, with the core that it ran on.
+[[nodiscard]] std::string json(const std::vector<Entry>& entries, int core);
 
 }  // namespace kerf::accuracy

@@ -6,20 +6,15 @@
 #include <numbers>
 #include <span>
 
-#include "controller/kernel/aligned.hpp"
-#include "controller/kernel/contact.hpp"
-#include "controller/kernel/covered_groups.hpp"
-#include "controller/kernel/gather.hpp"
+#include "controller/kernel/covered_voxels.hpp"
 #include "controller/kernel/milling.hpp"
+#include "controller/kernel/overlap_methods.hpp"
 #include "controller/kernel/preston.hpp"
-#include "controller/kernel/splat.hpp"
-#include "controller/plan/method/covered_bound.hpp"
-#include "controller/plan/tables/aligned_tool.hpp"
-#include "controller/plan/tables/sample_tool.hpp"
-#include "controller/plan/tables/tick_memory.hpp"
+#include "controller/plan/method/tool_bounds.hpp"
+#include "controller/plan/tables/sample_tables.hpp"
 #include "lab/bench/paper_baseline.hpp"
 #include "lab/rig/bench_scene.hpp"
-#include "lab/rig/tick_timer.hpp"
+#include "lab/run/lab_run.hpp"
 
 namespace kerf {
 namespace {
@@ -38,7 +33,7 @@ PaperPose paper_pose(const Place& p, const Matrix& rotation) {
   return pose;
 }
 
-/// The tool of a row and where it is at each of its ticks.
+/// The tool of a row and its position at each tick.
 struct Ticks {
   std::string name;
   std::vector<ToolOffset> tool;
@@ -157,7 +152,7 @@ class Bench {
     });
   }
 
-  /// Cutting by force at 1 N, from the overlap to what leaves the volume; the reference lists voxel
+  /// Cutting by force at 1 N, from the overlap to the removal; the reference lists voxel
   /// by voxel. The paper's row is its whole tick of cutting.
   void press(const std::vector<Density>& density, const Ticks& ticks) {
     begin(ticks);

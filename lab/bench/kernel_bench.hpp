@@ -14,7 +14,7 @@ struct KernelRow {
   std::string numeric;  ///< float (the paper) or fixed
   std::string isa;  ///< paper, reference (method `gather`, plain templates), scalar, avx2, avx512
   double p50_ns = 0, p99_ns = 0;
-  double baseline_p50_ns = 0;  ///< in this run, the same tick: the paper's form where it has one
+  double baseline_p50_ns = 0;  ///< in this run, the same tick: the paper's form if it has one
   std::size_t bytes = 0;       ///< memory of the tick beyond two bytes a voxel
 
   [[nodiscard]] double ratio() const noexcept { return baseline_p50_ns / p50_ns; }
@@ -25,7 +25,7 @@ struct KernelRow {
 [[nodiscard]] std::vector<KernelRow> bench_kernels(
     const std::function<void(const KernelRow&)>& add_row);
 
-/// What the volume's place in memory costs a tick of the 16-voxel ball: the copy of its box out of
+/// Cost of the volume's memory layout for a tick of the 16-voxel ball: the copy of its box out of
 /// a linear volume and out of bricks of 8^3 voxels, warm and with the caches swept before each tick
 /// (the baseline is the linear copy), and contact and milling in volumes from 128 x 128 x 80 to
 /// 512^3 (the baseline is the smallest).

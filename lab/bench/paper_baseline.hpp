@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "controller/kernel/tool_pose.hpp"
+#include "controller/kernel/sampling.hpp"
 #include "shared/volume/voxel_grid.hpp"
 
 namespace kerf {

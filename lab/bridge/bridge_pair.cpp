@@ -13,9 +13,9 @@
 #include <unistd.h>
 
 #include "hil/hil_error.hpp"
-#include "shared/posix/hex64.hpp"
 #include "shared/posix/stop_signals.hpp"
-#include "shared/segment/segment_memory.hpp"
+#include "shared/segment/segment.hpp"
+#include "shared/text/text.hpp"
 
 namespace kerf::two_machines {
 namespace {
@@ -23,7 +23,7 @@ namespace {
 constexpr const char* kPort = "7400";
 constexpr std::chrono::milliseconds kStopLook{50};
 
-/// Runs to its end; throws with its last line where it failed.
+/// Runs to its end; throws with its last line if it failed.
 void run_to_end(sweep::Child& child, const std::string& what) {
   while (!child.ended()) pause(std::chrono::milliseconds(2));
   if (*child.ended() != 0) throw HilError(what + ": " + child.last_line());

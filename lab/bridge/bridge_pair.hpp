@@ -11,7 +11,7 @@
 
 namespace kerf::two_machines {
 
-/// Sleeps; throws `HilError` where a signal asks for the end, so that all that was started ends.
+/// Sleeps; throws `HilError` if a signal asks for the end, so that all that was started ends.
 void pause(std::chrono::nanoseconds time);
 
 /// A folder of this process alone, with the sockets of segments in it; goes with its owner.
@@ -43,9 +43,9 @@ class BridgePair {
   BridgePair(const TwoNetworks& networks, const BridgeFiles& files, bool dedicated_link);
 
   void start_serve();
-  /// Throws `HilError` with its last words where it has ended by itself.
+  /// Throws `HilError` with its last line if it has ended by itself.
   void require_serve();
-  /// Kills it where it lives, as by SIGKILL.
+  /// Kills it if it lives, as by SIGKILL.
   void kill_serve();
   [[nodiscard]] sweep::Child& serve() { return *serve_; }
   /// A viewer that makes the segment `name`; goes with its owner.

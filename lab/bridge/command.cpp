@@ -1,17 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "lab/bridge/command.hpp"
-
 #include <cstdint>
+#include <iosfwd>
+#include <memory>
 #include <ostream>
+#include <string>
 #include <utility>
 #include <vector>
 
 #include "lab/bridge/bridge_pair.hpp"
 #include "lab/bridge/measurements.hpp"
 #include "lab/bridge/two_networks.hpp"
-#include "lab/rig/lab_run.hpp"
+#include "lab/run/lab_command.hpp"
+#include "lab/run/lab_run.hpp"
 #include "shared/posix/stop_signals.hpp"
-#include "shared/text/format.hpp"
+#include "shared/text/text.hpp"
 
 namespace kerf::two_machines {
 namespace {
@@ -20,7 +22,7 @@ constexpr std::int32_t kAllLayers = 21, kFewLayers = 4;
 constexpr int kPublishPairs = 9;  // so that a sign is one: all larger by chance, 1 in 512
 const std::vector<std::string> kParts{"all", "links", "kills", "stopped", "publish", "crowd"};
 
-/// A figure beside its goal: "0.14 (0.2)", and an exclamation mark where it is missed.
+/// A figure beside its goal: "0.14 (0.2)", and an exclamation mark if it is missed.
 [[nodiscard]] std::string beside_goal(double value, double goal, const char* pattern) {
   const std::string text = format(pattern, value);
   if (goal == 0) return text;
@@ -40,7 +42,7 @@ constexpr double kServeGoalPercent = 3;
                 r.equal ? "yes" : "NO");
 }
 
-/// All that a run measures, as the page has it; false where a volume was not the near one's.
+/// All measurements of a run, as on the page; returns false if a volume was not the near one's.
 class Table {
  public:
   Table(std::ostream& out, const BridgeFiles& files, double seconds, bool quick, std::uint64_t seed)
@@ -137,7 +139,21 @@ class Table {
   std::string text_;
 };
 
-}  // namespace
+/// `kerf-lab bridge`, which `./kerf bench bridge` is: how late the picture on a second machine is,
+/// over links that lose, delay and throttle packets, and its cost.
+class Command final : public LabCommand {
+ public:
+  explicit Command(Arguments& program);
+  /// 77 if this machine forbids network namespaces.
+  [[nodiscard]] int run(std::ostream& out) const override;
+
+ private:
+  double seconds_ = 15;
+  std::uint64_t seed_ = 1;
+  bool quick_ = false;
+  std::string only_, link_;
+  std::string page_;
+};
 
 Command::Command(Arguments& program)
     : LabCommand(program, "bridge", "the picture on a second machine, over good and bad links") {
@@ -181,4 +197,9 @@ int Command::run(std::ostream& out) const {
   return table.held() ? 0 : 1;
 }
 
+}  // namespace
 }  // namespace kerf::two_machines
+
+std::unique_ptr<kerf::LabCommand> kerf::make_bridge_command(Arguments& program) {
+  return std::make_unique<two_machines::Command>(program);
+}

@@ -1,26 +1,25 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "lab/bridge/demo_command.hpp"
-
 #include <algorithm>
 #include <chrono>
 #include <csignal>
 #include <cstdlib>
 #include <filesystem>
+#include <iosfwd>
 #include <memory>
 #include <ostream>
 #include <sstream>
+#include <string>
 #include <utility>
 #include <vector>
 
 #include "hil/hil_error.hpp"
 #include "lab/bridge/bridge_pair.hpp"
 #include "lab/bridge/two_networks.hpp"
-#include "shared/posix/shipped_file.hpp"
+#include "lab/run/lab_command.hpp"
+#include "shared/posix/program.hpp"
 #include "shared/posix/stop_signals.hpp"
-#include "shared/text/file_text.hpp"
-#include "shared/text/format.hpp"
 #include "shared/text/json.hpp"
-#include "shared/text/number.hpp"
+#include "shared/text/text.hpp"
 
 namespace kerf::two_machines {
 namespace {
@@ -33,7 +32,7 @@ using sweep::program_beside;
 constexpr int kPictures = 12;
 constexpr const char* kFarName = "far";
 
-/// The value of `name=value`, a line of `text`; empty where there is none.
+/// The value of `name=value`, a line of `text`; empty if there is none.
 [[nodiscard]] std::string value_in(const std::string& text, const std::string& name) {
   std::istringstream lines(text);
   for (std::string line; std::getline(lines, line);) {
@@ -55,7 +54,7 @@ bool wait_for(Child& child, seconds patience, Condition there) {
 }
 
 [[nodiscard]] bool has_display() {
-  // NOLINTNEXTLINE(concurrency-mt-unsafe): nobody writes the environment
+  // NOLINTNEXTLINE(concurrency-mt-unsafe): no thread writes the environment
   return std::getenv("DISPLAY") != nullptr || std::getenv("WAYLAND_DISPLAY") != nullptr;
 }
 
@@ -126,7 +125,7 @@ class Demo {
                         at("emulator.log"));
   }
 
-  /// The controller's exit code; 1 where a part of the demo ended before its time, which is told.
+  /// The controller's exit code; 1 if a part of the demo ended before its time, which is reported.
   int wait_for_end() {
     while (!controller_->ended()) {
       for (const auto& [name, part] :
@@ -185,12 +184,28 @@ class Demo {
   BridgeFiles files_;
   std::string told_;
   bool window_ = false;
-  std::string broken_;  ///< what ended before its time, and how; empty: nothing
+  std::string broken_;  ///< the part that ended before its time, and how; empty if none
   std::unique_ptr<BridgePair> pair_;
   std::unique_ptr<Child> controller_, join_, visualizer_, emulator_;
 };
 
-}  // namespace
+/// `kerf-lab two-machines`, which `./kerf demo --two-machines` is: controller, emulated device and
+/// `kerf-bridge serve` on one machine, `join` and the visualizer on another, both of them network
+/// namespaces of this one.
+class DemoCommand final : public LabCommand {
+ public:
+  explicit DemoCommand(Arguments& program);
+  /// The controller's exit code, 1 if the picture never came, 77 if this machine forbids
+  /// network namespaces.
+  [[nodiscard]] int run(std::ostream& out) const override;
+
+ private:
+  std::string scene_;
+  double seconds_ = 10;
+  double loss_percent_ = 0, delay_ms_ = 0, mbit_ = 0;
+  std::string size_;
+  std::string out_;
+};
 
 DemoCommand::DemoCommand(Arguments& program)
     : LabCommand(program, "two-machines", "a demo whose picture is on a second machine"),
@@ -233,4 +248,9 @@ int DemoCommand::run(std::ostream& out) const {
   return code != 0 ? code : demo.has_picture() ? 0 : 1;
 }
 
+}  // namespace
 }  // namespace kerf::two_machines
+
+std::unique_ptr<kerf::LabCommand> kerf::make_two_machines_command(Arguments& program) {
+  return std::make_unique<two_machines::DemoCommand>(program);
+}

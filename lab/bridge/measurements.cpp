@@ -11,8 +11,8 @@
 #include <span>
 #include <utility>
 
-#include "lab/bridge/far_viewer.hpp"
-#include "shared/numeric/percentile.hpp"
+#include "lab/bridge/volume_source.hpp"
+#include "shared/numeric/statistics.hpp"
 #include "shared/posix/monotonic_clock.hpp"
 
 namespace kerf::two_machines {
@@ -39,7 +39,7 @@ struct Scene {
       : networks(link),
         volume(BridgePair::kNearName, load, layers),
         pair(networks, files, dedicated_link) {
-    sleep_s(0.5);  // it listens by then, or tells why not
+    sleep_s(0.5);  // it listens by then, or has reported why not
     pair.require_serve();
   }
   TwoNetworks networks;
@@ -92,7 +92,7 @@ CaseResult run_case(const Case& what, const BridgeFiles& files, double seconds) 
   const auto join = scene.pair.join("far");
   if (!viewer.joins_within(kJoinPatience)) return out;
   out.join_s = seconds_since(start_ns);
-  sleep_s(1);  // what changed during the join is caught up
+  sleep_s(1);  // changes during the join are caught up
   const ProcessCost serve_before = cost_of(scene.pair.serve()), join_before = cost_of(*join);
   const std::uint64_t bytes_before = scene.networks.bytes_to_far();
   const std::int64_t from_ns = monotonic_ns();

@@ -6,12 +6,12 @@
 #include <vector>
 
 #include "lab/bridge/bridge_pair.hpp"
-#include "lab/bridge/link.hpp"
-#include "lab/bridge/milled_volume.hpp"
+#include "lab/bridge/two_networks.hpp"
+#include "lab/bridge/volume_source.hpp"
 
 namespace kerf::two_machines {
 
-/// One row of the table: a link, a load, and what is asked of the bridge there.
+/// One row of the table: a link, a load, and the goals of the bridge there.
 struct Case {
   std::string name;
   LinkSettings link;

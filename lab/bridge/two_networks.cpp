@@ -22,7 +22,7 @@
 #include <unistd.h>
 
 #include "shared/posix/monotonic_clock.hpp"
-#include "shared/segment/segment_error.hpp"
+#include "shared/segment/segment.hpp"
 
 namespace kerf::two_machines {
 namespace {

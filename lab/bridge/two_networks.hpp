@@ -1,18 +1,83 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
 #include <filesystem>
 #include <memory>
+#include <optional>
+#include <random>
 #include <stdexcept>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
-#include "lab/bridge/link.hpp"
-#include "lab/sweep/child.hpp"
+#include "lab/run/child_process.hpp"
 
+/// Two machines on this one: network namespaces and a bad link between them.
 namespace kerf::two_machines {
+
+/// The behaviour of a link, the same for each direction.
+struct LinkSettings {
+  double loss = 0;         ///< fraction of packets, at random
+  double delay_ms = 0;     ///< of each direction
+  double mbit = 0;         ///< 10^6 bit/s; 0: no bound
+  std::uint64_t seed = 1;  ///< the same losses for the same packets
+};
+
+/// One direction of a link, in its caller's time: it loses packets, sends them one after the other
+/// at its rate from a queue of 100 ms, which drops the excess, and then it delays.
+class Link {
+ public:
+  using Packet = std::vector<std::byte>;
+  static constexpr std::int64_t kQueueNs = 100'000'000;
+
+  Link(const LinkSettings& settings, std::uint64_t direction)
+      : settings_(settings), random_(settings.seed * 2 + direction) {}
+
+  /// Takes a packet; returns false if it is lost.
+  bool offer(std::int64_t now_ns, Packet packet) {
+    const bool lucky = uniform_(random_) >= settings_.loss;
+    const std::int64_t start_ns = std::max(now_ns, line_free_ns_);
+    if (!lucky || start_ns - now_ns > kQueueNs) return false;
+    const double bits = 8.0 * static_cast<double>(packet.size());
+    line_free_ns_ =
+        start_ns +
+        (settings_.mbit > 0 ? static_cast<std::int64_t>(bits * 1e3 / settings_.mbit) : 0);
+    const auto delay_ns = static_cast<std::int64_t>(settings_.delay_ms * 1e6);
+    queue_.push_back({line_free_ns_ + delay_ns, std::move(packet)});
+    return true;
+  }
+
+  /// The time at which the next packet comes out; empty if none is on its way.
+  [[nodiscard]] std::optional<std::int64_t> next_ns() const {
+    if (queue_.empty()) return std::nullopt;
+    return queue_.front().due_ns;
+  }
+
+  /// The next packet that is out by `now_ns`.
+  [[nodiscard]] std::optional<Packet> take(std::int64_t now_ns) {
+    if (queue_.empty() || queue_.front().due_ns > now_ns) return std::nullopt;
+    Packet out = std::move(queue_.front().packet);
+    queue_.pop_front();
+    return out;
+  }
+
+ private:
+  struct Queued {
+    std::int64_t due_ns;
+    Packet packet;
+  };
+  LinkSettings settings_;
+  std::mt19937_64 random_;
+  std::uniform_real_distribution<double> uniform_;
+  std::deque<Queued> queue_;
+  std::int64_t line_free_ns_ = 0;
+};
 
 /// This machine forbids network namespaces or TUN devices: one line with the reason.
 struct NoNamespaces : std::runtime_error {
@@ -32,7 +97,7 @@ class File {
   int fd_;
 };
 
-/// Exit code where this machine forbids networks of one's own, as ctest knows it.
+/// Exit code if this machine forbids network namespaces, as ctest knows it.
 inline constexpr int kSkipped = 77;
 
 /// Two networks of their own, as two machines have them, and a link between. The link forwards
@@ -65,13 +130,13 @@ class TwoNetworks {
  private:
   struct Machine {
     File network;  // its namespace
-    File device;   // what the kernel routes there comes out here
+    File device;   // packets that the kernel routes there come out here
   };
   [[nodiscard]] Machine make(const char* address) const;
   void relay();
 
   LinkSettings settings_;
-  File home_;  // where this process belongs
+  File home_;  // network of this process
   Machine near_, far_;
   File stop_;
   std::atomic<bool> cut_{false};
@@ -79,8 +144,8 @@ class TwoNetworks {
   std::thread relay_;
 };
 
-/// Once, before the first `TwoNetworks` and a second thread: the right to make namespaces, where
-/// this user has it only in a user namespace of its own. Throws `NoNamespaces`.
+/// Once, before the first `TwoNetworks` and a second thread: the right to make namespaces, if this
+/// user has it only in a user namespace of its own. Throws `NoNamespaces`.
 void enter_user_namespace();
 
 }  // namespace kerf::two_machines

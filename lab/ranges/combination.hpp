@@ -6,11 +6,33 @@
 #include <string>
 #include <vector>
 
+#include "controller/load/loaded_scene.hpp"
 #include "controller/scene/scene.hpp"
+#include "controller/servo/servo.hpp"
 #include "lab/ranges/key_levels.hpp"
 #include "lab/ranges/rules.hpp"
 
+/// One scene of any combination of values: its input, its run, and the rules that it must keep.
 namespace kerf::ranges {
+
+/// A state that the servo must have reached after a tick.
+struct Mark {
+  enum class Kind { active, faded, armed } kind;
+  std::size_t tick;
+};
+
+/// The hardest input of one scene: reports that park, leave, press, slide and turn, are lost, come
+/// twice, jump, are nonsense, stop, and recover from all of that by parking, twice. Ends in a
+/// press.
+struct HardHand {
+  std::vector<DeviceReport> reports;
+  std::vector<Mark> marks;
+  std::size_t recovered = 0;  ///< tick after the last disturbance at which it is armed again
+};
+
+/// `scene` has volumes. About 0.75 s at its rate. The start lies above the solid at the device's
+/// origin; the press goes three voxels into it, or as deep as the speed limit allows.
+[[nodiscard]] HardHand hard_hand(const LoadedScene& scene);
 
 /// The files that scenes of a run name, in a folder that goes with this: a half space of 32^3
 /// voxels of 0.25 mm with air above it, labelled enamel over dentin, and the mesh of a bur.
@@ -27,7 +49,7 @@ class SceneFolder {
   std::filesystem::path path_;
 };
 
-/// What became of one scene.
+/// The outcome of one scene.
 struct Outcome {
   bool refused = false;
   std::string refusal;
@@ -39,11 +61,11 @@ struct Outcome {
 /// Loads the scene of these values in these numbers and plays the hard hand to it. Rules besides
 /// those of every tick (rules.hpp):
 ///
-///   line       what the loader refuses is one line "place: value; way out"
+///   line       a refusal of the loader is one line "place: value; way out"
 ///   faded      after 25 ms of silence the motors are off, without force
 ///   armed      50 ms parked at rest forgive every fault
 ///   active     100 ms after it was taken in hand the motors are on, if they are known
-///   removed    densities fall by exactly what the ticks told
+///   removed    densities fall by exactly the amount that the ticks reported
 ///   again      a second servo gives the same bits for the same reports
 ///   recovered  a servo restored from the state after the last recovery gives the same bits
 ///
@@ -51,7 +73,7 @@ struct Outcome {
 [[nodiscard]] Outcome run_combination(const KeyTexts& texts, NumericKind numeric,
                                       const std::filesystem::path& file);
 
-/// Loads it only: whether it is refused, and how.
+/// Loads it only, and reports the refusal if there is one.
 [[nodiscard]] Outcome load_combination(const KeyTexts& texts, NumericKind numeric,
                                        const std::filesystem::path& file);
 

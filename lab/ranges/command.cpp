@@ -1,27 +1,28 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "lab/ranges/command.hpp"
-
 #include <algorithm>
 #include <cstdio>
+#include <iosfwd>
+#include <memory>
 #include <ostream>
 #include <stdexcept>
+#include <string>
 #include <thread>
+#include <vector>
 
-#include "controller/scene/scene_setting.hpp"
+#include "controller/scene/scene_file.hpp"
 #include "hil/hil_error.hpp"
 #include "lab/ranges/extreme_rows.hpp"
-#include "lab/ranges/interrupted.hpp"
 #include "lab/ranges/key_study.hpp"
 #include "lab/ranges/long_run.hpp"
-#include "lab/ranges/pair_study.hpp"
-#include "lab/rig/lab_run.hpp"
-#include "shared/posix/progress_bar.hpp"
+#include "lab/run/lab_command.hpp"
+#include "lab/run/lab_run.hpp"
+#include "shared/posix/program.hpp"
 #include "shared/text/json.hpp"
 
 namespace kerf::ranges {
 namespace {
 
-/// What plays just this scene.
+/// The command that plays just this scene.
 std::string command_of(const Broken& broken) {
   std::string line = "./kerf lab ranges --numeric " + std::string(word_of(broken.numeric));
   for (const auto& [key, text] : broken.texts) line += " --set '" + key + "=" + text + "'";
@@ -61,7 +62,7 @@ std::string long_line(NumericKind numeric, const LongRun& run) {
   return text;
 }
 
-/// What a run tells and writes.
+/// The printed and written output of a run.
 class Teller {
  public:
   explicit Teller(std::ostream& out) : out_(out) {}
@@ -166,7 +167,20 @@ void tell_one(const KeyTexts& texts, const Effort& effort, Teller& teller) {
   }
 }
 
-}  // namespace
+/// `kerf-lab ranges`: the servo at the ends of all settings, judged by rule.
+class Command final : public LabCommand {
+ public:
+  explicit Command(Arguments& program);
+  [[nodiscard]] int run(std::ostream& out) const override;
+
+ private:
+  [[nodiscard]] int study(std::ostream& out) const;
+
+  std::vector<std::string> numerics_, set_;
+  std::string report_;
+  int combinations_ = 5000, seed_ = 1, jobs_ = 0;
+  double hours_ = 0;
+};
 
 Command::Command(Arguments& program)
     : LabCommand(program, "ranges", "the servo at the ends of all that can be set, by rule") {
@@ -249,4 +263,9 @@ int Command::study(std::ostream& out) const {
   return teller.violations() == 0 ? 0 : 1;
 }
 
+}  // namespace
 }  // namespace kerf::ranges
+
+std::unique_ptr<kerf::LabCommand> kerf::make_ranges_command(Arguments& program) {
+  return std::make_unique<ranges::Command>(program);
+}

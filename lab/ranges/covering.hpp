@@ -11,11 +11,11 @@ namespace kerf::ranges {
 /// One level of each factor; -1: the factor is left out.
 using Levels = std::vector<int>;
 
-/// What rows are made of.
+/// The factors of rows.
 struct Factors {
   std::vector<int> level_counts;
   std::vector<bool> rare;    ///< by factor: stands in an eighth of the rows, else in half
-  std::size_t deciding = 0;  ///< so many come first: what others may have depends on them
+  std::size_t deciding = 0;  ///< so many come first: the levels of others depend on them
   /// Which levels a factor may have beside those of a row.
   std::function<bool(const Levels& row, std::size_t factor, int level)> may;
 };

@@ -18,13 +18,13 @@ struct ShownBy {
 struct ExtremeRow {
   const char* name;
   const char* rule;
-  /// Measures what no test shows; null: the tests do. Tells what was found, and breaks by adding
-  /// to the tally.
+  /// Measures a rule that no test shows; null if tests do. Returns the finding, and adds violations
+  /// to the list.
   std::string (*measure)(const Effort&, const std::vector<KeyRow>& keys, std::vector<Violation>&);
   std::vector<ShownBy> shown_by;
 };
 
-/// All of them. `keys` of a measurement: what `study_keys` found.
+/// All of them. `keys` of a measurement: the rows of `study_keys`.
 [[nodiscard]] std::span<const ExtremeRow> extreme_rows();
 
 }  // namespace kerf::ranges

@@ -30,7 +30,7 @@ std::string list_text(std::size_t length, const std::string& first, const std::s
   return text + "]";
 }
 
-/// How a slot's value is written: its length where it is a list, and whether its numbers are whole.
+/// The form of a slot's value: its length if it is a list, and whether its numbers are whole.
 struct Form {
   bool is_switch = false, has_numbers = false, whole = false;
   std::size_t length = 0;  ///< of a list; 0: one value
@@ -131,7 +131,7 @@ void add_laws(LawKind kind, KeyLevels& levels) {
   if (!levels.ends.empty()) levels.beyond.emplace_back("{ name = \"nonsense\" }");
 }
 
-/// What stands beside a key, where the scene has no word of its own on it: several keys make one
+/// Keys beside a key, if the scene sets them nowhere else: several keys make one
 /// thing. An empty value leaves the base's own out.
 struct Companion {
   const char *key, *value;  ///< null: with any value
@@ -152,14 +152,14 @@ constexpr Companion kCompanions[] = {
     {"tool.handpiece_length_mm", nullptr, "tool.shaft_length_mm", "4.0"},
 };
 
-/// What keys without a default of their own hold in the plain scene.
+/// Values in the plain scene of keys without a default of their own.
 constexpr std::pair<std::string_view, const char*> kPlain[] = {
     {"volume.spacing_mm", "0.25"}, {"tool.scale", "1.0"},       {"tool.pitch_mm", "0.25"},
     {"tool.size_vox", "8"},        {"tool.length_mm", "2.0"},   {"volume.denoise", "1"},
     {"volume.iso", "0.5"},         {"device.offset_mm", "0.0"},
 };
 
-/// Ends that lie within a row's range, because of a rule of their own (scene_rules.cpp).
+/// Ends that lie within a row's range, because of a rule of their own (scene_file.cpp).
 constexpr std::pair<std::string_view, const char*> kInnerEnds[] = {
     {"device.torque_scale", "[0.001, -0.001, 0.001]"},
     {"volume.pose.orientation", "[1.0, 0.0, 0.0, 0.0]"},
@@ -183,7 +183,7 @@ std::string value_of_key(std::string_view name, const KeyTexts& texts) {
     const auto at = list->find(name);
     if (at != list->end()) return at->second;
   }
-  // The paper's force brings its own cut (scene_rules.cpp: choose_cut).
+  // The paper's force brings its own cut (scene_file.cpp: choose_cut).
   if (name == "cut.model" && value_of_key("force.model", texts) == quoted("paper")) {
     return quoted("overlap");
   }

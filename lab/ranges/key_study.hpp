@@ -10,10 +10,19 @@
 #include "controller/scene/scene.hpp"
 #include "lab/ranges/combination.hpp"
 #include "lab/ranges/key_levels.hpp"
+#include "shared/posix/stop_signals.hpp"
 
+/// Studies of all keys at their ends: each alone, and all pairs.
 namespace kerf::ranges {
 
-/// How much a run does.
+/// Thrown out of a study whose program was asked to end.
+struct Interrupted {};
+
+inline void end_if_asked() {
+  if (stop_requested()) throw Interrupted();
+}
+
+/// The size of a study.
 struct Effort {
   std::vector<NumericKind> numerics;
   std::size_t combinations = 0;  ///< of keys at their ends, at least
@@ -41,20 +50,35 @@ struct Tally {
 struct KeyRow {
   KeyLevels levels;
   std::vector<std::string> accepted;  ///< ends that the loader takes in this scene
-  std::size_t beyond_refused = 0;     ///< of what lies beyond the ends, in all numbers
+  std::size_t beyond_refused = 0;     ///< of the values beyond the ends, in all numbers
   Tally ends;
 };
 
-struct PairRows;
-
-/// What a study calls while it runs. One thread at a time.
-struct StudyEvents {
-  std::function<void(double share, const std::string& what)> progress;  ///< 0..1, at work on what
-  std::function<void(const Broken&)> broken;                            ///< at once
-  std::function<void(const PairRows&)> part;  ///< what there is after each hundred rows
+/// All pairs of ends of two keys.
+struct PairRows {
+  std::size_t arrays = 0;
+  std::size_t pairs = 0, together = 0;  ///< of one array's pairs; that stood together in a run
+  std::size_t never = 0;                ///< that contradict each other, or are refused together
+  Tally tally;
 };
 
-/// Each end of each key alone, and what lies just beyond, in all numbers.
+/// Called while a study runs, by one thread at a time.
+struct StudyEvents {
+  std::function<void(double share, const std::string& what)> progress;  ///< 0..1, and the work
+  std::function<void(const Broken&)> broken;                            ///< at once
+  std::function<void(const PairRows&)> part;  ///< the rows so far, after each hundred
+};
+
+/// Each end of each key alone, and the values just beyond, in all numbers.
 [[nodiscard]] std::vector<KeyRow> study_keys(const Effort& effort, const StudyEvents& events);
+
+/// Covering arrays of the accepted ends, one after the other until there are as many combinations
+/// as the effort says. A row that the loader refuses gives up the key that the refusal names, until
+/// it loads; pairs that were lost so are tried by themselves after the first array.
+[[nodiscard]] PairRows study_pairs(const std::vector<KeyRow>& keys, const Effort& effort,
+                                   const StudyEvents& events);
+
+/// Takes keys out of a scene as long as it still breaks the rule.
+[[nodiscard]] Broken shrunk(Broken broken);
 
 }  // namespace kerf::ranges

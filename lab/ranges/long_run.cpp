@@ -10,11 +10,10 @@
 #include <memory>
 #include <string>
 
-#include "controller/load/scene_load.hpp"
+#include "controller/load/load_scene.hpp"
 #include "controller/plan/compile.hpp"
 #include "lab/ranges/combination.hpp"
-#include "lab/ranges/hard_hand.hpp"
-#include "lab/ranges/watched_servo.hpp"
+#include "lab/ranges/rules.hpp"
 
 namespace kerf::ranges {
 namespace {

@@ -9,14 +9,14 @@
 
 namespace kerf::ranges {
 
-/// What a long run came to. Rules besides those of every tick (rules.hpp):
+/// The outcome of a long run. Rules besides those of every tick (rules.hpp):
 ///
 ///   halves   the second half, by another servo that was restored from the state between the two,
 ///            ends in the same bits
 ///   carry    cutting owes at most one voxel
 ///   ledger   the energy that ticks without a gap book is SUM -F . dx, to the numbers' rounding
 ///   clock    the force fades in over the same ticks each time
-///   removed  densities fell by exactly what the ticks told
+///   removed  densities fell by exactly the amount that the ticks reported
 struct LongRun {
   std::uint64_t ticks = 0, removed = 0, ramps = 0;
   std::uint64_t shortest_ramp = 0, longest_ramp = 0;  ///< ticks

@@ -8,8 +8,8 @@
 #include <utility>
 
 #include "controller/plan/plan_device.hpp"
-#include "shared/numeric/vec3.hpp"
-#include "shared/text/format.hpp"
+#include "shared/numeric/linear_algebra.hpp"
+#include "shared/text/text.hpp"
 
 namespace kerf::ranges {
 namespace {
@@ -119,7 +119,7 @@ void Rules::look_at(const DeviceReport& report, const ServoOutput& out) {
   const Vector moved_mm = known_ ? out.position_mm - last_mm_ : Vector{};
   ++gap_;
   largest_gap_n_ = std::max(largest_gap_n_, length(last_force_n_));
-  // Below the rounding of the places that are told nobody here knows which way the hand went.
+  // Below the rounding of the reported positions the hand's direction is unknown.
   const double unknown_mm = place_error_mm_ * scale_;
   const bool leaves =
       report.fresh && dot(last_force_n_, moved_mm) >= -unknown_mm * length(last_force_n_);

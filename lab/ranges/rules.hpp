@@ -2,15 +2,19 @@
 #pragma once
 
 #include <array>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <numeric>
 #include <string>
 #include <vector>
 
 #include "controller/load/loaded_scene.hpp"
-#include "controller/servo/device_report.hpp"
-#include "controller/servo/servo_output.hpp"
+#include "controller/plan/compile.hpp"
+#include "controller/servo/servo.hpp"
+#include "shared/numeric/fnv1a.hpp"
 
+/// Rules of every tick, and the state of a servo as hashes and sums.
 namespace kerf::ranges {
 
 /// A rule that was broken; of each rule the first tick is kept.
@@ -19,12 +23,12 @@ struct Violation {
   std::string what;
 };
 
-/// What every tick of every scene keeps, whatever the hand does (docs/safety.md). Rules:
+/// The rules that every tick of every scene keeps, for any input (docs/safety.md):
 ///
 ///   finite      every number of the output is one
 ///   clamp       |F| is at most limits.force_n
 ///   slew        |F - F'| is at most limits.slew_n_per_ms; but a force may fall along its own
-///               direction at once where the hand leaves with it or a motor is at its end, and the
+///               direction at once if the hand leaves with it or a motor is at its end, and the
 ///               motors may go off
 ///   off         motors that are off get no counts and give no force; they are on without a fault
 ///               only, while the phase is ramping or active
@@ -51,10 +55,45 @@ class Rules {
   bool legs_;
   int motor_end_;
   std::size_t zero_ticks_, tick_ = 0, stale_ticks_ = 0, gap_ = 0;
-  bool known_ = false;  ///< where the tip was
+  bool known_ = false;  ///< the last position of the tip
   Vector last_force_n_{}, last_mm_{};
   double last_mj_ = 0, largest_gap_n_ = 0;
   std::vector<Violation> violations_;
 };
+
+/// Sum of all densities of the scene.
+[[nodiscard]] inline std::uint64_t sum_of(const Servo& servo, std::size_t volumes) {
+  std::uint64_t sum = 0;
+  for (std::size_t v = 0; v < volumes; ++v) {
+    const auto density = servo.density(v);
+    sum = std::accumulate(density.begin(), density.end(), sum);
+  }
+  return sum;
+}
+
+/// Hash of the last output and the state after it; the output hash is a chain over all ticks.
+[[nodiscard]] inline std::uint64_t hash_of(const Servo& servo, std::size_t volumes,
+                                           const ServoOutput& last) {
+  std::uint64_t hash = fnv1a_step(last.output_hash, std::bit_cast<std::uint64_t>(last.absorbed_mj));
+  for (const double mm : last.position_mm)
+    hash = fnv1a_step(hash, std::bit_cast<std::uint64_t>(mm));
+  for (const double mm : last.proxy_offset_mm) {
+    hash = fnv1a_step(hash, std::bit_cast<std::uint64_t>(mm));
+  }
+  for (std::size_t v = 0; v < volumes; ++v) {
+    for (const Density density : servo.density(v)) hash = fnv1a_step(hash, density);
+  }
+  return hash;
+}
+
+/// The most samples that contact may read in a tick of the active tool.
+[[nodiscard]] inline std::uint64_t most_samples(const SceneCosts& costs, const LoadedScene& scene) {
+  std::uint64_t samples = 0;
+  for (const TickCost& cost : costs.ticks) {
+    const bool counts = cost.tool == scene.active_tool && cost.shape.swept;
+    if (counts) samples += cost.stages.front().operations;
+  }
+  return samples;
+}
 
 }  // namespace kerf::ranges

@@ -9,7 +9,7 @@
 #include <numbers>
 #include <vector>
 
-#include "controller/kernel/tool_pose.hpp"
+#include "controller/kernel/sampling.hpp"
 #include "shared/volume/voxel_grid.hpp"
 
 // Volumes, tools and places of the benchmarks.
@@ -18,7 +18,7 @@ namespace kerf::bench {
 using Place = std::array<double, 3>;
 using Matrix = std::array<std::array<double, 3>, 3>;
 
-/// What the compiler may not leave out.
+/// A value that the compiler must compute.
 inline volatile std::int64_t g_sink = 0;
 inline void use(std::int64_t value) {
   g_sink = value;

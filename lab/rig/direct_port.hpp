@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <deque>
@@ -10,16 +11,34 @@
 #include <vector>
 
 #include "controller/device/port/packet_port.hpp"
-#include "hil/devmodel/packet_device.hpp"
+#include "hil/device/falcon.hpp"
+#include "hil/device/omni.hpp"
+#include "hil/device/packet_device.hpp"
+#include "hil/device/wooden.hpp"
+#include "shared/wire/personality.hpp"
 
+/// An emulated device in the same process: its port, and the torque scale of its unit.
 namespace kerf {
+
+/// N mm per motor count of the emulated unit: a scene's `device.torque_scale`.
+[[nodiscard]] inline std::array<double, 3> torque_scale_of(Personality personality) {
+  switch (personality) {
+    case Personality::falcon:
+      return FalconParams().torque_scale();
+    case Personality::woodenhaptics:
+      return WoodenParams().torque_scale();
+    case Personality::omni:
+      break;
+  }
+  return OmniParams().torque_scale();
+}
 
 /// The port to an emulated device in the same process. `device` outlives it.
 class DirectPort final : public PacketPort {
  public:
   explicit DirectPort(PacketDevice& device) : device_(device) {}
 
-  /// One bus cycle of the device; what it says waits here.
+  /// One bus cycle of the device; its packets wait here.
   void cycle() {
     device_.advance(1);
     for (auto packet = device_.next_packet(); !packet.empty(); packet = device_.next_packet()) {

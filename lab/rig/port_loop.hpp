@@ -9,8 +9,8 @@
 #include <type_traits>
 #include <vector>
 
-#include "controller/law/stabiliser.hpp"
-#include "controller/law/velocity_window.hpp"
+#include "controller/law/law.hpp"
+#include "controller/law/velocity_estimators.hpp"
 #include "controller/servo/energy_ledger.hpp"
 #include "controller/servo/force_limits.hpp"
 
@@ -32,7 +32,7 @@ struct PortLoop {
   double longest_mm = 1000;  ///< farther off the loop counts as diverged, and ends
 };
 
-/// What a `PortLoop` did.
+/// The outcome of a `PortLoop`.
 struct PortLoopRun {
   std::vector<double> at_mm;    ///< of each tick
   std::vector<double> force_n;  ///< sent in it, up

@@ -2,9 +2,10 @@
 #pragma once
 
 #include <array>
+#include <concepts>
 #include <cstdint>
 
-#include "shared/numeric/fixed.hpp"
+#include "shared/numeric/numbers.hpp"
 
 namespace kerf {
 
@@ -104,6 +105,78 @@ template <class S, class To, class From>
     for (std::size_t j = 0; j < 3; ++j) t.row[j][i] = m.row[i][j];
   }
   return t;
+}
+
+/// Shortens `v` to at most `length`, keeping its direction. A shorter vector is returned as it is.
+template <std::floating_point S, class Space>
+[[nodiscard]] inline Vec<S, Space> clamped(Vec<S, Space> v, S length) noexcept {
+  const S current = norm(v);
+  return current <= length ? v : v * (length / current);
+}
+/// Fixed: `norm` rounds down and so do the products here, so the result is never longer.
+template <int F, class Space>
+[[nodiscard]] constexpr Vec<Fixed<F>, Space> clamped(Vec<Fixed<F>, Space> v,
+                                                     Fixed<F> length) noexcept {
+  const Fixed<F> current = norm(v);
+  if (current < length) return v;
+  const std::int64_t above = std::int64_t{current.raw()} + 1;
+  const auto shortened = [&](Fixed<F> component) {
+    return Fixed<F>::from_raw(saturate_i32(std::int64_t{component.raw()} * length.raw() / above));
+  };
+  return {shortened(v.x), shortened(v.y), shortened(v.z)};
+}
+
+// The loop's numbers as doubles, for the output.
+
+template <class S>
+[[nodiscard]] constexpr double as_double(S value) noexcept {
+  return static_cast<double>(value);
+}
+
+template <class S, class Space>
+[[nodiscard]] constexpr std::array<double, 3> as_doubles(Vec<S, Space> v) noexcept {
+  return {as_double(v.x), as_double(v.y), as_double(v.z)};
+}
+
+template <class S, class Space>
+[[nodiscard]] bool all_finite(Vec<S, Space> v) noexcept {
+  return is_finite(v.x) && is_finite(v.y) && is_finite(v.z);
+}
+
+/// -F . d: the work that the hand does against F along d, in mJ. Exact in fixed, where Q16 times
+/// Q16 has 32 fraction bits; saturates at 2^31 mJ.
+template <class N>
+[[nodiscard]] constexpr typename N::Energy work_of_hand(
+    DeviceVec<typename N::Real> force_n, DeviceVec<typename N::Real> moved_mm) noexcept {
+  if constexpr (N::kIsFixed) {
+    const auto term = [](Q16 f, Q16 d) { return -(std::int64_t{f.raw()} * d.raw()); };
+    return saturating_add(saturating_add(term(force_n.x, moved_mm.x), term(force_n.y, moved_mm.y)),
+                          term(force_n.z, moved_mm.z));
+  } else {
+    return -dot(force_n, moved_mm);
+  }
+}
+
+/// a + b, saturating in fixed.
+template <class N>
+[[nodiscard]] constexpr typename N::Energy sum_of_energy(typename N::Energy a,
+                                                         typename N::Energy b) noexcept {
+  if constexpr (N::kIsFixed) {
+    return saturating_add(a, b);
+  } else {
+    return a + b;
+  }
+}
+
+/// a - b, likewise.
+template <class N>
+[[nodiscard]] constexpr typename N::Energy difference_of_energy(typename N::Energy a,
+                                                                typename N::Energy b) noexcept {
+  if constexpr (N::kIsFixed) {
+    return saturating_add(a, b == INT64_MIN ? INT64_MAX : -b);
+  } else {
+    return a - b;
+  }
 }
 
 }  // namespace kerf

@@ -1,17 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
+
 #include "shared/posix/program.hpp"
 
+#include <chrono>
 #include <csignal>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
 #include <iostream>
 #include <stdexcept>
 #include <string>
+#include <system_error>
 
 #include <fcntl.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "shared/posix/failure.hpp"
+#include "shared/posix/error_text.hpp"
 
 namespace kerf {
 namespace {
@@ -50,6 +56,40 @@ int run_program(const char* program, const std::function<int()>& work) {
     std::cerr << program << ": " << failure_text() << '\n';
     return 2;
   }
+}
+
+std::string processor_name() {
+  std::ifstream table("/proc/cpuinfo");
+  for (std::string line; std::getline(table, line);) {
+    const auto colon = line.find(": ");
+    if (line.starts_with("model name") && colon != std::string::npos) return line.substr(colon + 2);
+  }
+  return "a processor that does not tell its name";
+}
+
+std::string today() {
+  using namespace std::chrono;
+  const year_month_day day{floor<days>(system_clock::now())};
+  char text[32];
+  std::snprintf(text, sizeof text, "%04d-%02u-%02u", static_cast<int>(day.year()),
+                static_cast<unsigned>(day.month()), static_cast<unsigned>(day.day()));
+  return text;
+}
+
+std::string shipped_file(const std::string& name) {
+  namespace fs = std::filesystem;
+  std::error_code error;
+  if (name.empty() || fs::exists(name, error)) return name;
+  constexpr int kMostUp = 6;
+  fs::path folder = fs::read_symlink("/proc/self/exe", error).parent_path();
+  for (int up = 0; up <= kMostUp && !folder.empty(); ++up) {
+    for (const fs::path& place : {folder / name, folder / "share/kerf" / name}) {
+      if (fs::exists(place, error)) return place.string();
+    }
+    if (folder == folder.root_path()) break;
+    folder = folder.parent_path();
+  }
+  return name;
 }
 
 }  // namespace kerf

@@ -8,6 +8,10 @@
 
 namespace kerf {
 
+/// Name of a controller's segment, and of the controller that a reader looks for, where nobody says
+/// another (`--name`).
+inline constexpr const char* kUsualName = "kerf";
+
 /// What a reader may wish of the controller.
 enum class CommandKind : std::uint32_t {
   select_tool = 1,  ///< argument: index into the scene's tools

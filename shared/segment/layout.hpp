@@ -1,9 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <span>
+
+#include "shared/numeric/energy_source.hpp"
+#include "shared/volume/checksum.hpp"
 
 namespace kerf {
 
@@ -165,6 +170,13 @@ struct TickRecord {
   std::uint32_t crc32c;       ///< filled by the writer, over bytes 8 up to this one
 };
 
+/// The checksum that a tick record carries: of all bytes between its sequence number and it.
+[[nodiscard]] inline std::uint32_t tick_record_crc(const TickRecord& record) noexcept {
+  constexpr std::size_t kFirst = offsetof(TickRecord, tick);
+  return crc32c(
+      std::as_bytes(std::span(&record, 1)).subspan(kFirst, offsetof(TickRecord, crc32c) - kFirst));
+}
+
 inline constexpr std::uint32_t kFlagButton1 = 1U << 0;
 inline constexpr std::uint32_t kFlagButton2 = 1U << 1;
 inline constexpr std::uint32_t kFlagContact = 1U << 2;
@@ -203,5 +215,11 @@ struct DirtyRecord {
   std::uint64_t box_hash;  ///< `box_hash` of the densities in the box; 0 where it is too large
   std::uint64_t reserved0;
 };
+
+/// The column of each `EnergySource` in a tick record, in mJ with 32 fraction bits.
+inline constexpr std::array<std::int64_t TickRecord::*, kEnergySources> kEnergyColumns = {
+    &TickRecord::energy_spring,  &TickRecord::energy_damping,   &TickRecord::energy_friction,
+    &TickRecord::energy_cutting, &TickRecord::energy_limits,    &TickRecord::energy_hold,
+    &TickRecord::energy_leak,    &TickRecord::energy_stabiliser};
 
 }  // namespace kerf

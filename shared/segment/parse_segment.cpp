@@ -6,12 +6,12 @@
 #include <cstring>
 #include <string>
 
-#include "shared/posix/hex64.hpp"
 #include "shared/segment/layout_table.hpp"
 #include "shared/segment/reader.hpp"
-#include "shared/segment/segment_plan.hpp"
-#include "shared/segment/shared_words.hpp"
-#include "shared/volume/scene_limits.hpp"
+#include "shared/segment/segment.hpp"
+#include "shared/segment/seqlock.hpp"
+#include "shared/text/text.hpp"
+#include "shared/volume/voxel_grid.hpp"
 
 namespace kerf {
 namespace {

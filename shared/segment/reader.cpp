@@ -13,8 +13,8 @@
 #include <sys/mman.h>
 #include <sys/stat.h>
 
-#include "shared/segment/hash.hpp"
-#include "shared/segment/shared_words.hpp"
+#include "shared/segment/seqlock.hpp"
+#include "shared/volume/checksum.hpp"
 
 namespace kerf {
 namespace {

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "shared/segment/layout.hpp"
-#include "shared/segment/segment_error.hpp"
+#include "shared/segment/segment.hpp"
 #include "shared/volume/brick_grid.hpp"
 
 namespace kerf {

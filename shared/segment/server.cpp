@@ -1,7 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
+
 #include <algorithm>
+#include <array>
+#include <atomic>
+#include <bit>
 #include <cerrno>
+#include <cstdint>
 #include <cstring>
+#include <optional>
 #include <string>
 #include <thread>
 #include <utility>
@@ -17,15 +23,45 @@
 #include <sys/un.h>
 #include <unistd.h>
 
-#include "shared/posix/failure.hpp"
-#include "shared/posix/peer.hpp"
+#include "shared/posix/error_text.hpp"
+#include "shared/posix/sockets.hpp"
 #include "shared/posix/stop_signals.hpp"
-#include "shared/segment/hand_over.hpp"
-#include "shared/segment/hand_over_wire.hpp"
+#include "shared/segment/connection.hpp"
 #include "shared/segment/layout_table.hpp"
-#include "shared/segment/spsc_queue.hpp"
 
 namespace kerf {
+
+/// A queue of `N` items between one thread that pushes and one that takes. Wait-free on both sides;
+/// a full queue refuses.
+template <class T, std::uint32_t N>
+class SpscQueue {
+  static_assert(std::has_single_bit(N));
+
+ public:
+  [[nodiscard]] bool push(const T& item) noexcept {
+    const std::uint32_t tail = tail_.load(std::memory_order_relaxed);
+    if (tail - head_.load(std::memory_order_acquire) == N) return false;
+    items_[tail & (N - 1)] = item;
+    tail_.store(tail + 1, std::memory_order_release);
+    return true;
+  }
+
+  [[nodiscard]] std::optional<T> take() noexcept {
+    const std::uint32_t head = head_.load(std::memory_order_relaxed);
+    if (head == tail_.load(std::memory_order_acquire)) return std::nullopt;
+    const T item = items_[head & (N - 1)];
+    head_.store(head + 1, std::memory_order_release);
+    return item;
+  }
+
+ private:
+  // Both sides count on for ever and wrap; the difference is the fill. A line each, so that the
+  // taker's line moves only when it takes.
+  alignas(64) std::atomic<std::uint32_t> head_{0};
+  alignas(64) std::atomic<std::uint32_t> tail_{0};
+  std::array<T, N> items_{};
+};
+
 namespace {
 
 /// The socket at `path` that readers ask; the path goes with it.
@@ -77,8 +113,8 @@ class Listener {
   return fd;
 }
 
-[[nodiscard]] bool send_hello(int peer, const Hello& hello, int segment) noexcept {
-  Hello message = hello;
+[[nodiscard]] bool send_hello(int peer, const SegmentHello& hello, int segment) noexcept {
+  SegmentHello message = hello;
   iovec part{&message, sizeof message};
   alignas(cmsghdr) char control[CMSG_SPACE(sizeof(int))] = {};
   msghdr header{};
@@ -171,7 +207,7 @@ struct SegmentServer::State {
   Listener listener;
   OwnedFd segment;
   OwnedFd stop;
-  Hello hello;
+  SegmentHello hello;
   CommandLimits limits;
   Answer others;  // where the commands are not for `commands`
   std::vector<pollfd> polled;

@@ -9,13 +9,10 @@
 #include <utility>
 
 #include "shared/posix/monotonic_clock.hpp"
-#include "shared/segment/dirty_bricks.hpp"
-#include "shared/segment/hash.hpp"
-#include "shared/segment/record_ring.hpp"
-#include "shared/segment/segment_memory.hpp"
-#include "shared/segment/segment_plan.hpp"
-#include "shared/segment/shared_words.hpp"
-#include "shared/volume/density_hash.hpp"
+#include "shared/segment/segment.hpp"
+#include "shared/segment/seqlock.hpp"
+#include "shared/volume/brick_set.hpp"
+#include "shared/volume/checksum.hpp"
 
 namespace kerf {
 namespace {

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "shared/segment/layout.hpp"
-#include "shared/segment/segment_error.hpp"
+#include "shared/segment/segment.hpp"
 #include "shared/volume/brick_grid.hpp"
 
 namespace kerf {
@@ -18,28 +18,6 @@ namespace kerf {
 /// touches 27; what is beyond waits for the next ticks, so a whole-volume reset cannot cost a
 /// deadline.
 inline constexpr std::uint32_t kMaxBricksPerTick = 512;
-
-/// One volume, as readers are to see it at tick 0.
-struct SegmentVolumeSpec {
-  VoxelGrid grid;  ///< each edge 1..65535
-  std::array<double, 3> spacing_mm{1, 1, 1};
-  std::array<double, 3> origin_mm{0, 0, 0};  ///< world position of the centre of voxel (0, 0, 0)
-  std::array<float, 4> orientation{0, 0, 0, 1};
-  std::uint32_t material = 0;
-  std::uint32_t iso = 32768;
-  std::span<const Density> density;  ///< copied by `create`
-  std::span<const Label> labels;     ///< empty, or one per voxel; copied by `create`
-};
-
-/// All that a segment is made from.
-struct SegmentSpec {
-  std::vector<SegmentVolumeSpec> volumes;  ///< 1..8
-  std::string scene_json;
-  std::uint64_t config_hash = 0;
-  std::uint32_t tick_ns = 1'000'000;
-  std::string build_id;        ///< cut to 63 characters
-  bool mirror_updates = true;  ///< false: nothing is cut, so no dirty ring and no brick updates
-};
 
 /// The one writer of a segment: a sealed memfd, mapped, populated, the volumes in it as tick 0.
 ///

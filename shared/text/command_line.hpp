@@ -7,6 +7,36 @@
 #include <string>
 #include <vector>
 
+namespace kerf {
+
+/// An option or an argument, as a person may write it.
+struct ManualOption {
+  std::vector<std::string> names;  ///< `--scene`, `-h`; of an argument by its place, its name alone
+  std::string value;               ///< the word that stands for it; empty: takes none
+  std::vector<std::string> choices;  ///< all that it may be; empty: anything
+  std::string meaning;
+};
+
+/// What a program takes, or one of its commands.
+struct ManualPart {
+  std::string name, about, footer;
+  std::vector<ManualOption> places, options;
+};
+
+struct Manual {
+  ManualPart program;
+  std::vector<ManualPart> commands;
+  std::string version;
+};
+
+/// As a page of section 1 for man.
+[[nodiscard]] std::string man_page(const Manual& manual);
+
+/// As a script for bash-completion: options, commands and choices; else files.
+[[nodiscard]] std::string bash_completion(const Manual& manual);
+
+}  // namespace kerf
+
 namespace CLI {  // NOLINT(readability-identifier-naming): the library's name
 class App;
 class Option;
@@ -85,7 +115,7 @@ class CommandLine : public Arguments {
   CommandLine& operator=(const CommandLine&) = delete;
 
   /// False: help or version was asked for, and stands on `out`; or, for the build, which installs
-  /// them, by `--man` or `--completion` alone, the pages of manual.hpp. Throws `UsageError`.
+  /// them, by `--man` or `--completion` alone, the man page or the completion. Throws `UsageError`.
   [[nodiscard]] bool parse(int argc, const char* const* argv, std::ostream& out);
 
  private:

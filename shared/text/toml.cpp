@@ -6,8 +6,7 @@
 #include <type_traits>
 #include <utility>
 
-#include "shared/text/number.hpp"
-#include "shared/text/words.hpp"
+#include "shared/text/text.hpp"
 
 // toml++ without exceptions. Debian's 3.3.0 asserts that a table header begins with a letter of a
 // key before it has looked: `[!]` in a file would end the program. The check behind the assertion

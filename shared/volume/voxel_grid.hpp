@@ -7,6 +7,11 @@
 
 namespace kerf {
 
+// What the servo's fixed arrays hold and the segment has descriptors for; a scene file with more is
+// refused.
+inline constexpr std::size_t kMaxVolumes = 8;
+inline constexpr std::size_t kMaxTools = 16;
+
 /// A voxel by its number along each axis, from 0.
 struct VoxelIndex {
   std::int32_t x = 0, y = 0, z = 0;
@@ -68,5 +73,15 @@ struct VoxelGrid {
 using Density = std::uint16_t;  ///< 0 = air, 65535 = scene maximum
 using Label = std::uint8_t;     ///< material, index into the scene's material table; 0 = none
 inline constexpr double kDensityMax = 65535.0;
+
+/// Calls `take(x, y, z)` for each voxel of a box in the order of memory: x fastest, then y.
+template <class Take>
+constexpr void for_each_voxel(const VoxelBox& box, const Take& take) {
+  for (std::int32_t z = box.lo.z; z < box.hi.z; ++z) {
+    for (std::int32_t y = box.lo.y; y < box.hi.y; ++y) {
+      for (std::int32_t x = box.lo.x; x < box.hi.x; ++x) take(x, y, z);
+    }
+  }
+}
 
 }  // namespace kerf

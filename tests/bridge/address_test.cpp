@@ -5,8 +5,7 @@
 
 #include <doctest/doctest.h>
 
-#include "bridge/net/bridge_error.hpp"
-#include "bridge/net/server_trust.hpp"
+#include "bridge/net/certificate.hpp"
 
 using namespace kerf::bridge;
 

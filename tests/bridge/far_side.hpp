@@ -13,7 +13,6 @@
 
 #include "bridge/wire/messages.hpp"
 #include "bridge/wire/parse.hpp"
-#include "bridge/wire/set_hash.hpp"
 #include "shared/volume/brick_grid.hpp"
 
 namespace kerf::test {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What `join` says where it cannot work: one line, at once.
-#include "bridge/net/join.hpp"
+#include "bridge/join/join.hpp"
 
 #include <algorithm>
 #include <fstream>
@@ -13,10 +13,8 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-#include "bridge/net/bridge_error.hpp"
+#include "bridge/net/address.hpp"
 #include "bridge/net/certificate.hpp"
-#include "bridge/net/identity.hpp"
-#include "bridge/net/tls_keys.hpp"
 #include "tests/bridge/join_words.hpp"
 #include "tests/bridge/server_bench.hpp"
 

@@ -6,8 +6,8 @@
 #include <sstream>
 #include <string>
 
-#include "bridge/net/bridge_error.hpp"
-#include "bridge/net/join.hpp"
+#include "bridge/join/join.hpp"
+#include "bridge/net/address.hpp"
 
 namespace kerf::test {
 

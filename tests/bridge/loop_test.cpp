@@ -11,13 +11,13 @@
 
 #include <doctest/doctest.h>
 
-#include "bridge/mirror/mirror.hpp"
+#include "bridge/stream/mirror.hpp"
 #include "bridge/stream/run_snapshot.hpp"
 #include "bridge/stream/stream.hpp"
 #include "bridge/wire/parse.hpp"
 #include "shared/segment/reader.hpp"
 #include "shared/segment/writer.hpp"
-#include "shared/volume/density_hash.hpp"
+#include "shared/volume/checksum.hpp"
 #include "tests/segment/segment_support.hpp"
 #include "tests/segment/test_folder.hpp"
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The far end of a bridge, fed by hand: what local readers find, and what makes it start afresh.
-#include "bridge/mirror/mirror.hpp"
+#include "bridge/stream/mirror.hpp"
 
 #include <algorithm>
 #include <atomic>
@@ -10,7 +10,6 @@
 
 #include <doctest/doctest.h>
 
-#include "bridge/mirror/command_desk.hpp"
 #include "tests/bridge/sender.hpp"
 #include "tests/segment/test_folder.hpp"
 

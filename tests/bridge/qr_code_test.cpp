@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "bridge/net/qr_code.hpp"
-
 #include <cstddef>
 #include <cstdlib>
 #include <fstream>
@@ -10,6 +8,7 @@
 #include <doctest/doctest.h>
 #include <qrencode.h>
 
+#include "bridge/serve/serve.hpp"
 #include "tests/segment/test_folder.hpp"
 
 using kerf::bridge::qr_code;

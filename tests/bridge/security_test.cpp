@@ -9,11 +9,9 @@
 #include <openssl/ssl.h>
 #include <sys/stat.h>
 
-#include "bridge/net/access.hpp"
-#include "bridge/net/bridge_error.hpp"
+#include "bridge/net/address.hpp"
 #include "bridge/net/certificate.hpp"
-#include "bridge/net/identity.hpp"
-#include "bridge/net/tls_keys.hpp"
+#include "bridge/net/tokens.hpp"
 #include "tests/bridge/server_bench.hpp"
 
 using namespace kerf;

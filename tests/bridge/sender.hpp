@@ -7,9 +7,8 @@
 #include <utility>
 #include <vector>
 
-#include "bridge/wire/lz4_block.hpp"
+#include "bridge/wire/compression.hpp"
 #include "bridge/wire/messages.hpp"
-#include "bridge/wire/set_hash.hpp"
 #include "shared/segment/layout_table.hpp"
 #include "shared/volume/brick_grid.hpp"
 

@@ -13,8 +13,8 @@
 
 #include <unistd.h>
 
-#include "bridge/net/server.hpp"
-#include "shared/segment/hand_over.hpp"
+#include "bridge/serve/server.hpp"
+#include "shared/segment/connection.hpp"
 #include "tests/bridge/far_side.hpp"
 #include "tests/bridge/raw_client.hpp"
 #include "tests/segment/segment_support.hpp"

@@ -12,7 +12,7 @@
 
 #include <doctest/doctest.h>
 
-#include "bridge/net/bridge_error.hpp"
+#include "bridge/net/address.hpp"
 #include "bridge/wire/messages.hpp"
 #include "tests/bridge/server_bench.hpp"
 

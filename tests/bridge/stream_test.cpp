@@ -14,9 +14,8 @@
 
 #include <doctest/doctest.h>
 
-#include "bridge/stream/link_rate.hpp"
-#include "bridge/stream/pack_choice.hpp"
 #include "bridge/stream/run_snapshot.hpp"
+#include "bridge/wire/compression.hpp"
 #include "tests/bridge/far_side.hpp"
 #include "tests/segment/segment_support.hpp"
 

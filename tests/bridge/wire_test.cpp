@@ -12,11 +12,9 @@
 
 #include <doctest/doctest.h>
 
-#include "bridge/wire/block_plan.hpp"
-#include "bridge/wire/lz4_block.hpp"
+#include "bridge/wire/compression.hpp"
 #include "bridge/wire/messages.hpp"
 #include "bridge/wire/parse.hpp"
-#include "bridge/wire/set_hash.hpp"
 
 using namespace kerf;
 using namespace kerf::bridge;

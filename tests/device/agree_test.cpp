@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/device/port/agree.hpp"
-
 #include <atomic>
 #include <cstdint>
 #include <stdexcept>
@@ -9,17 +7,18 @@
 
 #include <doctest/doctest.h>
 
-#include "shared/wire/omni_packet.hpp"
+#include "controller/device/open_port.hpp"
+#include "shared/wire/omni.hpp"
 #include "tests/device/fake_port.hpp"
 
-using kerf::Hello;
+using kerf::LinkHello;
 using kerf::Personality;
 using kerf::test::FakePort;
 
 namespace {
 
 const std::atomic<bool> kGoOn{false};
-constexpr Hello kOurs{Personality::omni, true, 1000};
+constexpr LinkHello kOurs{Personality::omni, true, 1000};
 
 std::string refusal_of(FakePort& port, int patience_ms, const std::atomic<bool>& stop = kGoOn) {
   try {
@@ -47,7 +46,7 @@ TEST_CASE("the hello goes first, and what the device said before the answer is d
 
 TEST_CASE("a partner that does not fit is refused with the place and both words") {
   FakePort port;
-  port.push(encode(Hello{Personality::falcon, true, 1000}));
+  port.push(encode(LinkHello{Personality::falcon, true, 1000}));
   CHECK(refusal_of(port, 5000).find("--port x: the controller wants a device omni") == 0);
 }
 

@@ -11,8 +11,8 @@
 
 #include <doctest/doctest.h>
 
-#include "hil/front/usb/falcon_boot_loader.hpp"
-#include "shared/wire/falcon_framer.hpp"
+#include "hil/front/usb/falcon_usb.hpp"
+#include "shared/wire/falcon.hpp"
 
 using kerf::falcon::FtdiRequest;
 

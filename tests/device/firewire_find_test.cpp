@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/device/port/firewire_find.hpp"
-
 #include <filesystem>
 #include <stdexcept>
 #include <string>
@@ -8,7 +6,8 @@
 #include <doctest/doctest.h>
 #include <unistd.h>
 
-#include "controller/device/port/firewire_streams.hpp"
+#include "controller/device/firewire/firewire_file.hpp"
+#include "controller/device/firewire/firewire_streams.hpp"
 
 using kerf::cycle_of_stamp;
 using kerf::cycles_between;

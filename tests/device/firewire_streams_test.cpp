@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/device/port/firewire_streams.hpp"
+#include "controller/device/firewire/firewire_streams.hpp"
 
 #include <algorithm>
 #include <array>

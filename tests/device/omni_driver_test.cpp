@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/device/driver/omni_driver.hpp"
-
 #include <cstdint>
 
 #include <doctest/doctest.h>
 
-#include "shared/wire/omni_packet.hpp"
+#include "controller/device/device_driver.hpp"
+#include "shared/wire/omni.hpp"
 #include "tests/device/fake_port.hpp"
 
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/device/port/open_port.hpp"
+#include "controller/device/open_port.hpp"
 
 #include <atomic>
 #include <stdexcept>

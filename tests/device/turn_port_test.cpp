@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/device/port/turn_port.hpp"
-
 #include <array>
 #include <cstdint>
 #include <memory>
@@ -9,6 +7,7 @@
 
 #include <doctest/doctest.h>
 
+#include "controller/device/port/socket_port.hpp"
 #include "tests/device/fake_port.hpp"
 
 namespace {

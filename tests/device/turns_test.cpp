@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/device/port/turns.hpp"
-
 #include <doctest/doctest.h>
+
+#include "controller/device/port/io_mailbox.hpp"
 
 using kerf::Turns;
 

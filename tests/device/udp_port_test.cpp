@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/device/port/udp_port.hpp"
-
 #include <array>
 #include <cstdint>
 #include <optional>
@@ -9,7 +7,8 @@
 
 #include <doctest/doctest.h>
 
-#include "hil/front/udp_server.hpp"
+#include "controller/device/port/socket_port.hpp"
+#include "hil/front/socket_servers.hpp"
 
 namespace {
 

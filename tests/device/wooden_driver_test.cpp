@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/device/driver/wooden_driver.hpp"
-
 #include <array>
 #include <cstdint>
 
 #include <doctest/doctest.h>
 
-#include "shared/wire/wooden_packet.hpp"
+#include "controller/device/device_driver.hpp"
+#include "shared/wire/woodenhaptics.hpp"
 #include "tests/device/fake_port.hpp"
 
 using kerf::WoodenCommand;

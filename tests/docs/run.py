@@ -45,10 +45,8 @@ NOT_HERE = {
     "holds a core for a minute; with other options it runs here or in the tests lab and examples_python": [
         "./kerf lab zwidth --rate", "./kerf lab zwidth --map", "./kerf lab zwidth --arm",
         "./kerf lab zwidth --stabiliser", "parallel ./kerf lab zwidth", "./kerf lab merge", "./kerf sweep"],
-    "runs in the test hil_guest": ["hil/guest/guest.sh"],
     "runs in the test docs_site": ["./kerf docs$"],
     "installs packages and builds": ["./kerf setup$"],
-    "changes the sources and builds them; .ci/run does": ["./kerf lab ablate --page"],
     "measures for minutes; the tests of lab run parts of it": [
         "./kerf lab accuracy --page", "./kerf lab extremes", "./kerf lab zwidth --page", "./kerf lab faults --rate all"],
     "needs network namespaces; the test bridge_net does the same": ["./kerf demo --two-machines"],

@@ -19,8 +19,8 @@ import browser
 
 MOST_BYTES = 5_000_000
 # What a reader types, and the section that must come among the first three.
-SEARCHES = [("zigzag_mm", "script-keys.html#hands"), ("exit codes", "exit-codes.html#exit-codes"),
-            ("mouse pointer wheel", "mouse.html#a-hand-without-a-device-pointer-keys-gamepad-spacemouse"),
+SEARCHES = [("zigzag_mm", "script-keys.html#hands"), ("exit codes", "reports.html#exit-codes"),
+            ("mouse pointer wheel", "window.html#a-hand-without-a-device-pointer-keys-gamepad-spacemouse"),
             ("threshold tissue HU", "own-volume.html#a-volume-of-your-own"),
             ("omni encoder wire", "wire.html#omni"), ("state_head", "segment.html#segmentheader")]
 

@@ -13,7 +13,7 @@
 
 #include <stdlib.h>
 
-#include "bridge/mirror/mirror.hpp"
+#include "bridge/stream/mirror.hpp"
 #include "bridge/wire/parse.hpp"
 #include "tests/bridge/sender.hpp"
 

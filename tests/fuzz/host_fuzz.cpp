@@ -13,9 +13,9 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-#include "hil/front/uhid/uhid_arm.hpp"
-#include "hil/front/usbip/usbip_falcon.hpp"
-#include "shared/wire/falcon_packet.hpp"
+#include "hil/front/usb/usbip_falcon.hpp"
+#include "hil/front/usb/wooden_hid.hpp"
+#include "shared/wire/falcon.hpp"
 
 namespace {
 

@@ -15,9 +15,9 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "controller/sandbox/sandbox.hpp"
-#include "controller/scene/scene_error.hpp"
-#include "controller/tool/stl_file.hpp"
+#include "controller/input/load_error.hpp"
+#include "controller/input/sandbox.hpp"
+#include "controller/tool/tool_mesh.hpp"
 #include "controller/volume/file/volume_io.hpp"
 
 /// Files of one kind, KERF_FUZZ_END, through the sandbox: whatever they do to the library that

@@ -9,15 +9,12 @@
 #include <cstdlib>
 #include <span>
 
-#include "controller/device/driver/falcon_driver.hpp"
-#include "controller/device/driver/omni_driver.hpp"
-#include "controller/device/driver/wooden_driver.hpp"
-#include "controller/device/port/firewire_streams.hpp"
-#include "shared/wire/falcon_framer.hpp"
-#include "shared/wire/falcon_packet.hpp"
-#include "shared/wire/hello.hpp"
-#include "shared/wire/omni_packet.hpp"
-#include "shared/wire/wooden_packet.hpp"
+#include "controller/device/device_driver.hpp"
+#include "controller/device/firewire/firewire_streams.hpp"
+#include "shared/wire/emulator_link.hpp"
+#include "shared/wire/falcon.hpp"
+#include "shared/wire/omni.hpp"
+#include "shared/wire/woodenhaptics.hpp"
 
 namespace {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/scene/scene_error.hpp"
+#include "controller/input/load_error.hpp"
 #include "controller/scene/scene_file.hpp"
 #include "tests/fuzz/text_fuzz.hpp"
 

@@ -12,8 +12,7 @@
 
 #include "shared/segment/command.hpp"
 #include "shared/segment/reader.hpp"
-#include "shared/segment/segment_error.hpp"
-#include "shared/segment/segment_plan.hpp"
+#include "shared/segment/segment.hpp"
 #include "shared/segment/writer.hpp"
 #include "tests/segment/segment_support.hpp"
 

@@ -12,12 +12,12 @@
 #include <memory>
 #include <span>
 
+#include "controller/input/load_error.hpp"
 #include "controller/load/loaded_scene.hpp"
 #include "controller/plan/compile.hpp"
-#include "controller/plan/cost/work_budget.hpp"
-#include "controller/scene/scene_error.hpp"
+#include "controller/plan/work_budget.hpp"
 #include "controller/tool/tool_shapes.hpp"
-#include "lab/rig/fake_arm.hpp"
+#include "lab/rig/kinematic_arm.hpp"
 
 namespace {
 

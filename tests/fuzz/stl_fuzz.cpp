@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <utility>
 
-#include "controller/scene/scene_error.hpp"
+#include "controller/input/load_error.hpp"
+#include "controller/tool/inner_samples.hpp"
 #include "controller/tool/mesh_surface.hpp"
-#include "controller/tool/mesh_tool.hpp"
-#include "controller/tool/stl_file.hpp"
+#include "controller/tool/tool_mesh.hpp"
 #include "controller/tool/tool_shapes.hpp"
 #include "tests/fuzz/text_fuzz.hpp"
 

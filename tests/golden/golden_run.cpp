@@ -8,7 +8,7 @@
 
 #include "controller/plan/compile.hpp"
 #include "controller/tool/tool_shapes.hpp"
-#include "shared/volume/density_hash.hpp"
+#include "shared/volume/checksum.hpp"
 #include "tests/golden/golden_script.hpp"
 #include "tests/kernel/hash.hpp"
 

@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "controller/servo/device_report.hpp"
+#include "controller/servo/servo.hpp"
 
 /// The hand of the golden run, in integers: joint counts, pots, gaps and commands by tick.
 namespace kerf::test {

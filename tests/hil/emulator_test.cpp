@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "hil/devmodel/emulator.hpp"
+#include "hil/device/emulator.hpp"
 
 #include <array>
 #include <cmath>
@@ -10,10 +10,10 @@
 
 #include <doctest/doctest.h>
 
-#include "hil/devmodel/falcon_model.hpp"
-#include "hil/devmodel/reach_curve.hpp"
+#include "hil/device/falcon.hpp"
+#include "hil/device/hand.hpp"
 #include "hil/script/hand_script_file.hpp"
-#include "shared/wire/falcon_packet.hpp"
+#include "shared/wire/falcon.hpp"
 
 namespace {
 

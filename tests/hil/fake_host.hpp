@@ -15,7 +15,7 @@
 #include <sys/un.h>
 #include <unistd.h>
 
-#include "shared/wire/omni_packet.hpp"
+#include "shared/wire/omni.hpp"
 
 namespace kerf::test {
 

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "hil/devmodel/falcon_arm.hpp"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -8,6 +6,7 @@
 #include <doctest/doctest.h>
 #include <rapidcheck.h>
 
+#include "hil/device/falcon.hpp"
 #include "tests/hil/model_runs.hpp"
 
 namespace {

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "hil/devmodel/falcon_model.hpp"
-
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -8,6 +6,7 @@
 #include <doctest/doctest.h>
 #include <rapidcheck.h>
 
+#include "hil/device/falcon.hpp"
 #include "tests/hil/model_runs.hpp"
 
 namespace {

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "hil/fault/faulty_device.hpp"
+#include "hil/script/faulty_device.hpp"
 
 #include <vector>
 
 #include <doctest/doctest.h>
 
-#include "shared/wire/omni_packet.hpp"
+#include "shared/wire/omni.hpp"
 
 using kerf::DeviceFault;
 using kerf::FaultKind;

@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "hil/devmodel/guided_hand.hpp"
-
 #include <cmath>
 #include <limits>
 
 #include <doctest/doctest.h>
 
-#include "hil/devmodel/emulator.hpp"
-#include "hil/devmodel/omni_model.hpp"
+#include "hil/device/emulator.hpp"
+#include "hil/device/hand.hpp"
+#include "hil/device/omni.hpp"
 
 namespace {
 

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "hil/devmodel/hand_motion.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <string>
@@ -8,9 +6,10 @@
 
 #include <doctest/doctest.h>
 
-#include "hil/devmodel/falcon_model.hpp"
-#include "hil/devmodel/omni_model.hpp"
-#include "hil/devmodel/wooden_model.hpp"
+#include "hil/device/falcon.hpp"
+#include "hil/device/hand.hpp"
+#include "hil/device/omni.hpp"
+#include "hil/device/wooden.hpp"
 #include "hil/script/hand_script_file.hpp"
 
 namespace {

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "hil/front/hand_server.hpp"
-
 #include <array>
 #include <cstring>
 #include <optional>
@@ -13,6 +11,7 @@
 #include <unistd.h>
 
 #include "hil/hil_error.hpp"
+#include "hil/program/emulated_device.hpp"
 #include "tests/hil/fake_host.hpp"
 
 namespace {

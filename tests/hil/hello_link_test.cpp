@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "hil/front/hello_link.hpp"
-
 #include <algorithm>
 #include <array>
 #include <atomic>
@@ -14,18 +12,19 @@
 #include <fcntl.h>
 #include <unistd.h>
 
-#include "hil/devmodel/emulator.hpp"
-#include "shared/wire/omni_packet.hpp"
+#include "hil/device/emulator.hpp"
+#include "hil/front/serving.hpp"
+#include "shared/wire/omni.hpp"
 
 namespace {
 
-using kerf::Hello;
 using kerf::HelloLink;
+using kerf::LinkHello;
 using kerf::Personality;
 using Sent = kerf::PacketLink::Sent;
 using Bytes = std::vector<std::uint8_t>;
 
-constexpr Hello kOwn{Personality::omni, true, 1000};
+constexpr LinkHello kOwn{Personality::omni, true, 1000};
 
 /// A client in memory; nobody waits for it.
 class FakeClient final : public kerf::PacketLink {
@@ -82,7 +81,7 @@ TEST_CASE("a hello is answered, the device's last packet follows, and each one a
 TEST_CASE("one that does not fit hears what is here, and the link closes") {
   Meeting m;
   CHECK(m.link.send(Bytes{1}) == Sent::yes);
-  m.client.say(encode(Hello{Personality::omni, false, 1000}));
+  m.client.say(encode(LinkHello{Personality::omni, false, 1000}));
   CHECK(m.link.take(m.buffer).empty());
   CHECK(m.link.closed());
   CHECK(m.link.refusal().find("the emulator runs in lock-step") == 0);
@@ -93,7 +92,7 @@ TEST_CASE("a client without a hello is served as it is, and a late hello is only
   Meeting m;
   const auto command = encode(kerf::OmniCommand{});
   m.client.say(command);
-  m.client.say(encode(Hello{Personality::falcon, false, 8000}));
+  m.client.say(encode(LinkHello{Personality::falcon, false, 8000}));
   CHECK(m.link.take(m.buffer).size() == command.size());
   CHECK(m.link.take(m.buffer).size() == kerf::kHelloBytes);
   CHECK(m.client.heard.empty());

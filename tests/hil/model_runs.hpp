@@ -5,7 +5,7 @@
 
 #include <rapidcheck.h>
 
-#include "hil/devmodel/device_model.hpp"
+#include "hil/device/device_model.hpp"
 
 namespace kerf::test {
 

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "hil/devmodel/omni_arm.hpp"
-
 #include <cmath>
 
 #include <doctest/doctest.h>
 #include <rapidcheck.h>
+
+#include "hil/device/omni.hpp"
 
 namespace {
 

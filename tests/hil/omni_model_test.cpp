@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "hil/devmodel/omni_model.hpp"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -11,6 +9,7 @@
 #include <doctest/doctest.h>
 #include <rapidcheck.h>
 
+#include "hil/device/omni.hpp"
 #include "tests/hil/model_runs.hpp"
 
 namespace {

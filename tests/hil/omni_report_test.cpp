@@ -7,8 +7,8 @@
 
 #include <doctest/doctest.h>
 
-#include "hil/devmodel/omni_model.hpp"
-#include "shared/wire/omni_constants.hpp"
+#include "hil/device/omni.hpp"
+#include "shared/wire/omni.hpp"
 #include "tests/hil/model_runs.hpp"
 
 namespace {

@@ -13,10 +13,10 @@
 #include <doctest/doctest.h>
 #include <rapidcheck.h>
 
-#include "hil/devmodel/emulator.hpp"
-#include "hil/devmodel/falcon_model.hpp"
-#include "hil/devmodel/omni_model.hpp"
-#include "hil/devmodel/wooden_model.hpp"
+#include "hil/device/emulator.hpp"
+#include "hil/device/falcon.hpp"
+#include "hil/device/omni.hpp"
+#include "hil/device/wooden.hpp"
 #include "hil/script/hand_script_file.hpp"
 #include "tests/hil/model_runs.hpp"
 

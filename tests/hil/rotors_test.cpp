@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // Inertia in the joints, rigid and behind a structural mode, seen through an Omni.
-#include "hil/devmodel/rotors.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
 
 #include <doctest/doctest.h>
 
-#include "hil/devmodel/omni_model.hpp"
+#include "hil/device/omni.hpp"
+#include "hil/device/plant.hpp"
 #include "tests/hil/model_runs.hpp"
 
 namespace {

@@ -6,7 +6,7 @@
 #include <poll.h>
 
 #include "hil/front/serving.hpp"
-#include "shared/numeric/histogram.hpp"
+#include "shared/numeric/statistics.hpp"
 #include "shared/posix/monotonic_clock.hpp"
 
 namespace kerf::test {

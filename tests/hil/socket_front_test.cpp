@@ -9,9 +9,9 @@
 
 #include <doctest/doctest.h>
 
-#include "hil/devmodel/emulator.hpp"
-#include "hil/front/seqpacket_server.hpp"
+#include "hil/device/emulator.hpp"
 #include "hil/front/serving.hpp"
+#include "hil/front/socket_servers.hpp"
 #include "hil/hil_error.hpp"
 #include "hil/script/hand_script_file.hpp"
 #include "tests/hil/fake_host.hpp"

@@ -6,8 +6,8 @@
 
 #include <doctest/doctest.h>
 
-#include "controller/stability/stable_gains.hpp"
-#include "hil/devmodel/arm_plant.hpp"
+#include "controller/stability/gain_limits.hpp"
+#include "hil/device/plant.hpp"
 
 namespace {
 

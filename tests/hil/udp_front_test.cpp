@@ -15,10 +15,10 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-#include "hil/devmodel/emulator.hpp"
-#include "hil/devmodel/falcon_model.hpp"
+#include "hil/device/emulator.hpp"
+#include "hil/device/falcon.hpp"
 #include "hil/front/serving.hpp"
-#include "hil/front/udp_server.hpp"
+#include "hil/front/socket_servers.hpp"
 #include "hil/hil_error.hpp"
 #include "shared/posix/monotonic_clock.hpp"
 

@@ -16,10 +16,10 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-#include "hil/devmodel/emulator.hpp"
-#include "hil/devmodel/wooden_model.hpp"
-#include "hil/front/uhid/uhid_arm.hpp"
-#include "shared/wire/wooden_packet.hpp"
+#include "hil/device/emulator.hpp"
+#include "hil/device/wooden.hpp"
+#include "hil/front/usb/wooden_hid.hpp"
+#include "shared/wire/woodenhaptics.hpp"
 #include "tests/hil/serve_for.hpp"
 
 namespace {

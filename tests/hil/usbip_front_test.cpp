@@ -16,10 +16,10 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-#include "hil/devmodel/emulator.hpp"
-#include "hil/devmodel/falcon_model.hpp"
-#include "hil/front/usbip/usbip_falcon.hpp"
-#include "shared/wire/falcon_packet.hpp"
+#include "hil/device/emulator.hpp"
+#include "hil/device/falcon.hpp"
+#include "hil/front/usb/usbip_falcon.hpp"
+#include "shared/wire/falcon.hpp"
 #include "tests/hil/serve_for.hpp"
 
 namespace {

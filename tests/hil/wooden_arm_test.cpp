@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "hil/devmodel/wooden_arm.hpp"
-
 #include <cmath>
 #include <numbers>
 
 #include <doctest/doctest.h>
 #include <rapidcheck.h>
 
+#include "hil/device/wooden.hpp"
 #include "tests/hil/model_runs.hpp"
 
 namespace {

@@ -9,9 +9,8 @@
 #include <span>
 #include <vector>
 
-#include "controller/kernel/aligned.hpp"
-#include "controller/plan/tables/aligned_tool.hpp"
-#include "controller/plan/tables/tick_memory.hpp"
+#include "controller/kernel/overlap_methods.hpp"
+#include "controller/plan/tables/sample_tables.hpp"
 #include "tests/kernel/exact_field.hpp"
 
 /// Volumes, tools and the two ways to compute one tick of the method `aligned`.

@@ -8,7 +8,7 @@
 
 #include <doctest/doctest.h>
 
-#include "controller/plan/tables/aligned_tool.hpp"
+#include "controller/plan/tables/sample_tables.hpp"
 #include "tests/kernel/definitions.hpp"
 #include "tests/kernel/exact_field.hpp"
 

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // A closer look at a contact: which samples it takes, and their sums in every instruction set.
-#include "controller/kernel/point_shell/close_sums.hpp"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -15,8 +13,9 @@
 #include <doctest/doctest.h>
 
 #include "controller/kernel/kernel_set.hpp"
-#include "controller/kernel/proxy/contact_closeup.hpp"
-#include "controller/plan/tables/close_cells.hpp"
+#include "controller/kernel/point_shell/point_sums.hpp"
+#include "controller/kernel/proxy/closeup.hpp"
+#include "controller/plan/tables/point_shell_table.hpp"
 #include "tests/case_count.hpp"
 #include "tests/kernel/contact_support.hpp"
 

@@ -4,10 +4,10 @@
 
 #include <doctest/doctest.h>
 
-#include "controller/kernel/contact.hpp"
 #include "controller/kernel/milling.hpp"
-#include "controller/kernel/penetration.hpp"
+#include "controller/kernel/overlap_methods.hpp"
 #include "controller/kernel/preston.hpp"
+#include "controller/kernel/sampling.hpp"
 
 using namespace kerf;
 

@@ -9,8 +9,8 @@
 
 #include <doctest/doctest.h>
 
-#include "lab/rig/loft.hpp"
-#include "lab/rig/posed_tool.hpp"
+#include "lab/rig/geometry.hpp"
+#include "lab/rig/tool_meshes.hpp"
 #include "tests/kernel/contact_support.hpp"
 
 using namespace kerf;

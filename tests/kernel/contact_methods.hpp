@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "controller/plan/tables/aligned_tool.hpp"
+#include "controller/plan/tables/sample_tables.hpp"
 #include "tests/kernel/exact_field.hpp"
 
 /// The contact force of an unturned tool of the volume's pitch by each method: SUM_i grad(rho /

@@ -6,11 +6,10 @@
 #include <cstdint>
 #include <span>
 
-#include "controller/kernel/aligned_table.hpp"
 #include "controller/kernel/gradient.hpp"
+#include "controller/kernel/kernel_set.hpp"
 #include "controller/kernel/overlap.hpp"
-#include "controller/kernel/tool_pose.hpp"
-#include "controller/kernel/trilinear.hpp"
+#include "controller/kernel/sampling.hpp"
 
 // Gradients and the methods `aligned` and `splat` by their definitions, without tables: every fast
 // path has these bits.

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/kernel/point_shell/free_way.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -8,6 +6,7 @@
 
 #include <doctest/doctest.h>
 
+#include "controller/kernel/point_shell/free_path.hpp"
 #include "controller/plan/tables/free_brick_map.hpp"
 #include "tests/case_count.hpp"
 #include "tests/kernel/contact_support.hpp"

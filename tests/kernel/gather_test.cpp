@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // Contact of the method `gather`: every instruction set against `contact_sum`, bit for bit.
-#include "controller/kernel/gather.hpp"
-
 #include <array>
 #include <cstdint>
 #include <random>
@@ -10,7 +8,8 @@
 
 #include <doctest/doctest.h>
 
-#include "controller/plan/tables/sample_tool.hpp"
+#include "controller/kernel/overlap_methods.hpp"
+#include "controller/plan/tables/sample_tables.hpp"
 #include "tests/case_count.hpp"
 #include "tests/kernel/aligned_support.hpp"
 

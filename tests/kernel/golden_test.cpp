@@ -6,7 +6,7 @@
 
 #include <doctest/doctest.h>
 
-#include "controller/kernel/penetration.hpp"
+#include "controller/kernel/sampling.hpp"
 #include "tests/kernel/hash.hpp"
 #include "tests/kernel/support.hpp"
 

@@ -8,7 +8,7 @@
 
 #include "shared/numeric/fnv1a.hpp"
 #include "shared/numeric/vec.hpp"
-#include "shared/posix/hex64.hpp"
+#include "shared/text/text.hpp"
 
 namespace kerf::test {
 

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/kernel/penetration.hpp"
-
 #include <doctest/doctest.h>
 
+#include "controller/kernel/sampling.hpp"
 #include "tests/kernel/support.hpp"
 
 using namespace kerf;

@@ -8,10 +8,9 @@
 
 #include <doctest/doctest.h>
 
-#include "controller/kernel/covered_groups.hpp"
-#include "controller/kernel/covered_loads.hpp"
-#include "controller/kernel/splat.hpp"
-#include "controller/plan/tables/sample_tool.hpp"
+#include "controller/kernel/covered_voxels.hpp"
+#include "controller/kernel/overlap_methods.hpp"
+#include "controller/plan/tables/sample_tables.hpp"
 #include "tests/kernel/aligned_support.hpp"
 #include "tests/kernel/preston_support.hpp"
 

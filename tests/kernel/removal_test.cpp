@@ -7,7 +7,7 @@
 #include <doctest/doctest.h>
 #include <rapidcheck.h>
 
-#include "controller/kernel/removal_rate.hpp"
+#include "controller/kernel/milling.hpp"
 #include "tests/kernel/support.hpp"
 
 using namespace kerf;

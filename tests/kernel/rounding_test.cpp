@@ -9,12 +9,11 @@
 
 #include <doctest/doctest.h>
 
-#include "controller/kernel/aligned_table.hpp"
 #include "controller/kernel/gradient.hpp"
+#include "controller/kernel/kernel_set.hpp"
+#include "controller/kernel/milling.hpp"
 #include "controller/kernel/overlap.hpp"
-#include "controller/kernel/removal_rate.hpp"
-#include "controller/kernel/tool_pose.hpp"
-#include "controller/kernel/trilinear.hpp"
+#include "controller/kernel/sampling.hpp"
 
 using namespace kerf;
 

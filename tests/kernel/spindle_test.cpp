@@ -9,7 +9,6 @@
 
 #include <doctest/doctest.h>
 
-#include "controller/kernel/cutting_friction.hpp"
 #include "tests/kernel/preston_support.hpp"
 
 using namespace kerf;

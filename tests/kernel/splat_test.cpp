@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // The method `splat`: every instruction set against its definition, bit for bit.
-#include "controller/kernel/splat.hpp"
-
 #include <array>
 #include <cstdint>
 #include <random>
@@ -10,8 +8,8 @@
 
 #include <doctest/doctest.h>
 
-#include "controller/plan/tables/sample_tool.hpp"
-#include "controller/plan/tables/tick_memory.hpp"
+#include "controller/kernel/overlap_methods.hpp"
+#include "controller/plan/tables/sample_tables.hpp"
 #include "tests/case_count.hpp"
 #include "tests/kernel/aligned_support.hpp"
 #include "tests/kernel/definitions.hpp"

@@ -10,11 +10,11 @@
 #include <span>
 #include <vector>
 
-#include "controller/kernel/contact.hpp"
 #include "controller/kernel/gradient.hpp"
 #include "controller/kernel/milling.hpp"
-#include "controller/kernel/tool_pose.hpp"
-#include "lab/rig/body.hpp"
+#include "controller/kernel/overlap_methods.hpp"
+#include "controller/kernel/sampling.hpp"
+#include "lab/rig/geometry.hpp"
 
 /// Analytic volumes, tools and poses for the kernel tests.
 namespace kerf::test {

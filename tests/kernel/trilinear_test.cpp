@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/kernel/trilinear.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -10,6 +8,7 @@
 #include <doctest/doctest.h>
 #include <rapidcheck.h>
 
+#include "controller/kernel/sampling.hpp"
 #include "shared/numeric/numbers.hpp"
 #include "tests/kernel/support.hpp"
 

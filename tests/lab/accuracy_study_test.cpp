@@ -8,7 +8,6 @@
 
 #include <doctest/doctest.h>
 
-#include "lab/accuracy/label_places.hpp"
 #include "lab/accuracy/page.hpp"
 #include "lab/accuracy/study.hpp"
 

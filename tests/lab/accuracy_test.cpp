@@ -10,7 +10,7 @@
 #include <doctest/doctest.h>
 
 #include "lab/accuracy/contact_errors.hpp"
-#include "lab/accuracy/spline.hpp"
+#include "lab/accuracy/reference_methods.hpp"
 
 using namespace kerf;
 using namespace kerf::accuracy;

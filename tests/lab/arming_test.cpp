@@ -5,12 +5,12 @@
 
 #include <doctest/doctest.h>
 
-#include "controller/device/driver/device_driver.hpp"
-#include "hil/devmodel/bus_cycle.hpp"
-#include "hil/devmodel/emulator.hpp"
-#include "hil/devmodel/falcon_model.hpp"
-#include "hil/devmodel/omni_model.hpp"
-#include "hil/devmodel/wooden_model.hpp"
+#include "controller/device/device_driver.hpp"
+#include "hil/device/emulator.hpp"
+#include "hil/device/falcon.hpp"
+#include "hil/device/omni.hpp"
+#include "hil/device/packet_device.hpp"
+#include "hil/device/wooden.hpp"
 #include "lab/rig/direct_port.hpp"
 #include "tests/servo/support.hpp"
 

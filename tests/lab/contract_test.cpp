@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "lab/faults/contract.hpp"
+#include "lab/safety/contract.hpp"
 
 #include <algorithm>
 #include <array>
@@ -9,9 +9,9 @@
 
 #include <doctest/doctest.h>
 
-#include "hil/devmodel/omni_model.hpp"
-#include "lab/faults/device_wire.hpp"
-#include "shared/wire/omni_packet.hpp"
+#include "hil/device/omni.hpp"
+#include "lab/safety/device_wire.hpp"
+#include "shared/wire/omni.hpp"
 #include "tests/servo/support.hpp"
 
 using kerf::OmniCommand;

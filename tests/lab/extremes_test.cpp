@@ -9,12 +9,12 @@
 #include <doctest/doctest.h>
 #include <unistd.h>
 
-#include "lab/extremes/comparison.hpp"
-#include "lab/extremes/page.hpp"
-#include "lab/extremes/worst_tick.hpp"
+#include "lab/contact/comparison.hpp"
+#include "lab/contact/page.hpp"
+#include "lab/contact/tick_rows.hpp"
 #include "lab/program.hpp"
 #include "lab/rig/contact_rig.hpp"
-#include "lab/rig/exact_touch.hpp"
+#include "lab/rig/exact_contact.hpp"
 #include "tests/json.hpp"
 
 using namespace kerf::extremes;

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "lab/faults/fault_run.hpp"
+#include "lab/safety/fault_run.hpp"
 
 #include <doctest/doctest.h>
 
-#include "hil/devmodel/falcon_model.hpp"
+#include "hil/device/falcon.hpp"
 #include "tests/servo/support.hpp"
 
 using kerf::DeviceFault;

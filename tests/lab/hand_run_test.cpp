@@ -4,7 +4,7 @@
 
 #include <doctest/doctest.h>
 
-#include "lab/extremes/hands.hpp"
+#include "lab/contact/hands.hpp"
 
 using namespace kerf::extremes;
 

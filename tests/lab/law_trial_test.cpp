@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Laws that do what no law may: each is told in one line, and the lab goes on.
-#include "controller/shell/law_trial.hpp"
+#include "controller/run/law_trial.hpp"
 
 #include <array>
 #include <cmath>
@@ -15,7 +15,7 @@
 
 #include <doctest/doctest.h>
 
-#include "controller/law/law_row.hpp"
+#include "controller/law/law.hpp"
 #include "controller/law/registry/law_registry.hpp"
 #include "lab/program.hpp"
 

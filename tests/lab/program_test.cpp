@@ -10,7 +10,7 @@
 #include <doctest/doctest.h>
 
 #include "lab/bench/kernel_bench.hpp"
-#include "lab/rig/lab_run.hpp"
+#include "lab/run/lab_run.hpp"
 
 namespace {
 

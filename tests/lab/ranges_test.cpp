@@ -12,17 +12,15 @@
 
 #include <doctest/doctest.h>
 
-#include "controller/load/scene_load.hpp"
+#include "controller/load/load_scene.hpp"
 #include "controller/plan/compile.hpp"
 #include "lab/program.hpp"
 #include "lab/ranges/combination.hpp"
 #include "lab/ranges/covering.hpp"
 #include "lab/ranges/extreme_rows.hpp"
-#include "lab/ranges/hard_hand.hpp"
 #include "lab/ranges/key_levels.hpp"
 #include "lab/ranges/key_study.hpp"
 #include "lab/ranges/long_run.hpp"
-#include "lab/ranges/pair_study.hpp"
 #include "lab/ranges/rules.hpp"
 
 using namespace kerf;

@@ -1,15 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // What a shaft may bear of a press: faces, edges and gaps in closed form.
-#include "lab/rig/shaft_touch.hpp"
-
 #include <array>
 #include <cmath>
 #include <numbers>
 
 #include <doctest/doctest.h>
 
-#include "lab/rig/body.hpp"
-#include "lab/rig/shaft_rig.hpp"
+#include "lab/rig/contact_rig.hpp"
+#include "lab/rig/exact_contact.hpp"
+#include "lab/rig/geometry.hpp"
 
 using namespace kerf;
 using namespace kerf::extremes;

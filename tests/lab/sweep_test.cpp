@@ -6,8 +6,7 @@
 #include <doctest/doctest.h>
 
 #include "hil/hil_error.hpp"
-#include "lab/sweep/axis.hpp"
-#include "lab/sweep/table.hpp"
+#include "lab/run/grid.hpp"
 #include "tests/programs/pair.hpp"
 
 using kerf::test::eventually;

@@ -20,7 +20,7 @@ grep -q '<svg' portraits.svg
 "$lab" zwidth --arm --portraits arm.svg --cells 1:0.003 --seconds 0.3
 grep -q 'corner' arm.svg
 "$lab" zwidth --quick --jobs 2 --page stability.md
-grep -q '## What each knob does' stability.md
+grep -q '## The effect of each parameter' stability.md
 grep -q '](plots/stability.devices.svg)' stability.md
 grep -q '<svg' plots/stability.devices.svg
 grep -q '<svg' plots/stability.rates.svg

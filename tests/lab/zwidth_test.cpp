@@ -13,16 +13,16 @@
 
 #include <doctest/doctest.h>
 
-#include "controller/law/law_row.hpp"
-#include "controller/stability/one_axis_plant.hpp"
-#include "controller/stability/stable_gains.hpp"
+#include "controller/law/law.hpp"
+#include "controller/stability/axis_simulation.hpp"
+#include "controller/stability/gain_limits.hpp"
 #include "hil/hil_error.hpp"
 #include "lab/program.hpp"
-#include "lab/zwidth/map/arm.hpp"
-#include "lab/zwidth/map/axes.hpp"
-#include "lab/zwidth/map/map.hpp"
-#include "lab/zwidth/map/one_axis.hpp"
-#include "lab/zwidth/map/part_file.hpp"
+#include "lab/stability/arm.hpp"
+#include "lab/stability/axes.hpp"
+#include "lab/stability/map.hpp"
+#include "lab/stability/map_file.hpp"
+#include "lab/stability/one_axis.hpp"
 
 using namespace kerf;
 using namespace kerf::zwidth;

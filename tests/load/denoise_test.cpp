@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "controller/volume/denoise.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -9,11 +11,10 @@
 
 #include <doctest/doctest.h>
 
+#include "controller/load/load_scene.hpp"
 #include "controller/load/scene_json.hpp"
-#include "controller/load/scene_load.hpp"
-#include "controller/volume/volume_crop.hpp"
-#include "controller/volume/volume_denoise.hpp"
-#include "controller/volume/volume_density.hpp"
+#include "controller/volume/crop_resample.hpp"
+#include "controller/volume/windowing.hpp"
 #include "tests/scene/support.hpp"
 
 using namespace kerf;

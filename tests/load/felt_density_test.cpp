@@ -1,14 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/load/felt_density.hpp"
-
 #include <filesystem>
 #include <string>
 #include <vector>
 
 #include <doctest/doctest.h>
 
-#include "controller/load/scene_load.hpp"
-#include "controller/scene/materials.hpp"
+#include "controller/load/load_scene.hpp"
+#include "controller/scene/scene_presets.hpp"
 #include "tests/scene/support.hpp"
 
 using namespace kerf;

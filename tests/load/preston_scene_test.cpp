@@ -9,10 +9,10 @@
 
 #include "controller/load/scene_json.hpp"
 #include "controller/plan/compile.hpp"
-#include "controller/plan/method/covered_bound.hpp"
-#include "controller/plan/plan_preston.hpp"
-#include "controller/scene/materials.hpp"
+#include "controller/plan/method/tool_bounds.hpp"
+#include "controller/plan/plan_tools.hpp"
 #include "controller/scene/scene_file.hpp"
+#include "controller/scene/scene_presets.hpp"
 #include "controller/tool/tool_shapes.hpp"
 #include "tests/scene/support.hpp"
 

@@ -8,7 +8,7 @@
 
 #include <doctest/doctest.h>
 
-#include "controller/scene/materials.hpp"
+#include "controller/scene/scene_presets.hpp"
 #include "controller/tool/tool_shapes.hpp"
 #include "shared/numeric/fnv1a.hpp"
 #include "tests/json.hpp"

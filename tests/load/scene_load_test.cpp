@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/load/scene_load.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
@@ -11,9 +9,10 @@
 
 #include <doctest/doctest.h>
 
-#include "controller/load/scene_place.hpp"
+#include "controller/load/load_scene.hpp"
+#include "controller/load/loaded_scene.hpp"
 #include "controller/plan/compile.hpp"
-#include "lab/rig/loft.hpp"
+#include "lab/rig/tool_meshes.hpp"
 #include "tests/scene/support.hpp"
 #include "tests/tool/stl_support.hpp"
 

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/load/scene_place.hpp"
-
 #include <cmath>
 #include <string>
 
 #include <doctest/doctest.h>
 #include <rapidcheck.h>
 
+#include "controller/load/loaded_scene.hpp"
 #include "tests/scene/support.hpp"
 
 namespace {

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "shared/numeric/fixed.hpp"
-
 #include <cmath>
 #include <limits>
 
 #include <doctest/doctest.h>
 #include <rapidcheck.h>
 
+#include "shared/numeric/numbers.hpp"
 #include "shared/numeric/vec.hpp"
 
 using kerf::Fixed;

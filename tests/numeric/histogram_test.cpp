@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "shared/numeric/histogram.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <vector>
 
 #include <doctest/doctest.h>
 #include <rapidcheck.h>
+
+#include "shared/numeric/statistics.hpp"
 
 TEST_CASE("percentiles are at most one bucket (3.2 %) above the exact ones, the maximum is exact") {
   CHECK(rc::check([] {

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "shared/numeric/percentile.hpp"
-
 #include <algorithm>
 #include <vector>
 
 #include <doctest/doctest.h>
 #include <rapidcheck.h>
+
+#include "shared/numeric/statistics.hpp"
 
 TEST_CASE("a percentile is the smallest value that so large a share does not exceed") {
   CHECK(rc::check([] {

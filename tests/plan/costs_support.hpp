@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstdlib>
 
-#include "controller/plan/method/matrices.hpp"
+#include "controller/plan/method/lattice.hpp"
 #include "controller/tool/tool_shapes.hpp"
 #include "tests/servo/support.hpp"
 

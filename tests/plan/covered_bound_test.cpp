@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // How much a tool is said to cover, against what it does.
-#include "controller/plan/method/covered_bound.hpp"
-
 #include <algorithm>
 #include <cstddef>
 #include <cstdlib>
@@ -10,13 +8,11 @@
 
 #include <doctest/doctest.h>
 
-#include "controller/kernel/aligned.hpp"
-#include "controller/kernel/covered_groups.hpp"
+#include "controller/kernel/covered_voxels.hpp"
 #include "controller/kernel/overlap.hpp"
-#include "controller/kernel/splat.hpp"
-#include "controller/plan/tables/aligned_tool.hpp"
-#include "controller/plan/tables/sample_tool.hpp"
-#include "controller/plan/tables/tick_memory.hpp"
+#include "controller/kernel/overlap_methods.hpp"
+#include "controller/plan/method/tool_bounds.hpp"
+#include "controller/plan/tables/sample_tables.hpp"
 #include "tests/plan/costs_support.hpp"
 
 using namespace kerf;

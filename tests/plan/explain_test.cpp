@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/plan/cost/explain.hpp"
-
 #include <cstdint>
 #include <string>
 #include <vector>
 
 #include <doctest/doctest.h>
 
-#include "controller/plan/cost/work_budget.hpp"
+#include "controller/plan/work_budget.hpp"
+#include "controller/run/scene_check.hpp"
 #include "tests/json.hpp"
 #include "tests/servo/support.hpp"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/plan/cost/gain_margin.hpp"
+#include "controller/plan/gain_margin.hpp"
 
 #include <array>
 #include <filesystem>
@@ -8,10 +8,10 @@
 
 #include <doctest/doctest.h>
 
-#include "controller/law/law_row.hpp"
-#include "controller/load/scene_load.hpp"
-#include "controller/stability/device_figures.hpp"
-#include "controller/stability/stable_gains.hpp"
+#include "controller/law/law.hpp"
+#include "controller/load/load_scene.hpp"
+#include "controller/stability/gain_limits.hpp"
+#include "controller/stability/sampled_loop.hpp"
 #include "tests/servo/support.hpp"
 
 using namespace kerf;

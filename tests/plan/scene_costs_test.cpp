@@ -12,15 +12,12 @@
 
 #include <doctest/doctest.h>
 
-#include "controller/kernel/contact.hpp"
 #include "controller/kernel/overlap.hpp"
-#include "controller/kernel/splat.hpp"
-#include "controller/plan/cost/work_budget.hpp"
-#include "controller/plan/method/methods.hpp"
-#include "controller/plan/tables/aligned_tool.hpp"
-#include "controller/plan/tables/sample_tool.hpp"
-#include "controller/plan/tables/tick_memory.hpp"
-#include "controller/plan/tick_timing.hpp"
+#include "controller/kernel/overlap_methods.hpp"
+#include "controller/plan/method/tool_method.hpp"
+#include "controller/plan/tables/sample_tables.hpp"
+#include "controller/plan/work_budget.hpp"
+#include "controller/plan/worst_tick.hpp"
 #include "controller/scene/scene_file.hpp"
 #include "tests/plan/costs_support.hpp"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The rates that the README promises of each shipped scene, against what the budget takes.
+// The rates that docs/scenes.md promises of each shipped scene, against what the budget takes.
 #include <filesystem>
 #include <fstream>
 #include <map>
@@ -8,9 +8,9 @@
 
 #include <doctest/doctest.h>
 
-#include "controller/load/scene_load.hpp"
+#include "controller/load/load_scene.hpp"
 #include "controller/plan/compile.hpp"
-#include "controller/plan/cost/work_budget.hpp"
+#include "controller/plan/work_budget.hpp"
 
 using namespace kerf;
 
@@ -36,7 +36,7 @@ std::vector<std::string> cells_of(const std::string& line) {
 using Promises = std::map<std::string, std::map<std::string, double>>;
 
 Promises read_promises() {
-  std::ifstream file(kScenes.parent_path() / "README.md");
+  std::ifstream file(kScenes.parent_path() / "docs" / "scenes.md");
   std::vector<std::string> sets;
   Promises promises;
   for (std::string line; std::getline(file, line);) {
@@ -57,7 +57,8 @@ Promises read_promises() {
 
 }  // namespace
 
-TEST_CASE("each shipped scene is taken at the rates that the README says, refused at the next") {
+TEST_CASE(
+    "each shipped scene is taken at the rates that docs/scenes.md says, refused at the next") {
   const Promises promises = read_promises();
   std::size_t scenes = 0;
   for (const auto& entry : fs::directory_iterator(kScenes)) {

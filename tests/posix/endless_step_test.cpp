@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "shared/posix/endless_step.hpp"
-
 #include <chrono>
 #include <thread>
 
 #include <doctest/doctest.h>
+
+#include "shared/posix/threads.hpp"
 
 namespace {
 

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // In a folder that others may write to: what they have put there is neither followed nor cut.
-#include "shared/posix/new_file.hpp"
-
 #include <array>
 #include <csignal>
 #include <cstddef>
@@ -19,7 +17,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "shared/posix/new_files.hpp"
+#include "shared/posix/atomic_file.hpp"
 
 namespace fs = std::filesystem;
 using kerf::FileError;

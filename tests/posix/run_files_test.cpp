@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // What a run writes never takes the place of what it reads, nor of another kind of file.
-#include "shared/posix/run_files.hpp"
-
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -10,7 +8,7 @@
 
 #include <doctest/doctest.h>
 
-#include "shared/posix/new_file.hpp"
+#include "shared/posix/atomic_file.hpp"
 
 namespace fs = std::filesystem;
 

@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "shared/posix/unreachable.hpp"
-
 #include <cstdlib>
 #include <filesystem>
 #include <string>
 
 #include <doctest/doctest.h>
 
-#include "shared/posix/new_file.hpp"
+#include "shared/posix/atomic_file.hpp"
+#include "shared/posix/error_text.hpp"
 
 namespace fs = std::filesystem;
 using kerf::why_unreachable;

@@ -10,7 +10,7 @@
 
 #include <unistd.h>
 
-#include "shared/segment/hand_over.hpp"
+#include "shared/segment/connection.hpp"
 #include "tests/json.hpp"
 #include "tests/programs/process.hpp"
 

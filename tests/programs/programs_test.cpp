@@ -12,9 +12,9 @@
 #include <doctest/doctest.h>
 
 #include "shared/numeric/fnv1a.hpp"
-#include "shared/posix/hex64.hpp"
-#include "shared/segment/hand_over.hpp"
-#include "shared/volume/density_hash.hpp"
+#include "shared/segment/connection.hpp"
+#include "shared/text/text.hpp"
+#include "shared/volume/checksum.hpp"
 #include "tests/json.hpp"
 #include "tests/programs/pair.hpp"
 

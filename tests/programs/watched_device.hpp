@@ -8,15 +8,15 @@
 #include <memory>
 #include <span>
 
-#include "hil/devmodel/emulator.hpp"
-#include "hil/devmodel/falcon_model.hpp"
-#include "hil/devmodel/omni_model.hpp"
-#include "hil/devmodel/wooden_model.hpp"
+#include "hil/device/emulator.hpp"
+#include "hil/device/falcon.hpp"
+#include "hil/device/omni.hpp"
+#include "hil/device/wooden.hpp"
 #include "shared/posix/monotonic_clock.hpp"
-#include "shared/wire/falcon_packet.hpp"
-#include "shared/wire/omni_packet.hpp"
+#include "shared/wire/falcon.hpp"
+#include "shared/wire/omni.hpp"
 #include "shared/wire/personality.hpp"
-#include "shared/wire/wooden_packet.hpp"
+#include "shared/wire/woodenhaptics.hpp"
 
 namespace kerf::test {
 

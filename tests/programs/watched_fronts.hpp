@@ -8,10 +8,8 @@
 #include <string>
 #include <thread>
 
-#include "hil/front/hello_link.hpp"
-#include "hil/front/seqpacket_server.hpp"
 #include "hil/front/serving.hpp"
-#include "hil/front/udp_server.hpp"
+#include "hil/front/socket_servers.hpp"
 #include "hil/front/usb/hidraw_node.hpp"
 #include "hil/front/usb/usbfs_node.hpp"
 #include "tests/hil/fuse/mounted_node.hpp"

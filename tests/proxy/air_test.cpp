@@ -7,8 +7,8 @@
 #include <doctest/doctest.h>
 
 #include "controller/plan/air_speed.hpp"
-#include "lab/rig/air_flight.hpp"
-#include "lab/rig/shaft_rig.hpp"
+#include "lab/rig/contact_motions.hpp"
+#include "lab/rig/contact_rig.hpp"
 #include "tests/case_count.hpp"
 
 using namespace kerf;

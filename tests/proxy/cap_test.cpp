@@ -5,7 +5,7 @@
 
 #include <doctest/doctest.h>
 
-#include "controller/kernel/proxy/ball_cap.hpp"
+#include "controller/kernel/proxy/closeup.hpp"
 #include "tests/proxy/solid_field.hpp"
 
 using namespace kerf;

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // What steps tell of a bowl, against hollows whose bottom is known.
-#include "controller/kernel/proxy/curvature.hpp"
-
 #include <cmath>
 #include <vector>
 
 #include <doctest/doctest.h>
 
+#include "controller/kernel/proxy/constraint_set.hpp"
 #include "tests/proxy/solid_field.hpp"
 
 using namespace kerf;

@@ -4,7 +4,7 @@
 
 #include <doctest/doctest.h>
 
-#include "lab/rig/edge_slide.hpp"
+#include "lab/rig/contact_motions.hpp"
 #include "tests/case_count.hpp"
 
 using namespace kerf;

@@ -3,8 +3,8 @@
 
 #include <algorithm>
 
-#include "controller/kernel/proxy/tool_turn.hpp"
-#include "lab/rig/points.hpp"
+#include "controller/kernel/proxy/contact_space.hpp"
+#include "lab/rig/geometry.hpp"
 
 namespace kerf::test {
 

@@ -6,8 +6,7 @@
 
 #include <doctest/doctest.h>
 
-#include "lab/rig/iso_rest.hpp"
-#include "lab/rig/wall_shake.hpp"
+#include "lab/rig/contact_motions.hpp"
 #include "tests/case_count.hpp"
 
 using namespace kerf;

@@ -7,7 +7,7 @@
 
 #include <doctest/doctest.h>
 
-#include "lab/rig/guided_tool.hpp"
+#include "lab/rig/contact_rig.hpp"
 #include "tests/case_count.hpp"
 
 using namespace kerf;

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/servo/proxy_contact.hpp"
-
 #include <algorithm>
 #include <limits>
 
 #include <doctest/doctest.h>
 
+#include "controller/kernel/proxy/proxy.hpp"
 #include "tests/kernel/contact_support.hpp"
 #include "tests/proxy/flat_field.hpp"
 

@@ -8,8 +8,8 @@
 
 #include <doctest/doctest.h>
 
-#include "lab/rig/posed_tool.hpp"
-#include "lab/rig/shaft_rig.hpp"
+#include "lab/rig/contact_rig.hpp"
+#include "lab/rig/geometry.hpp"
 
 using namespace kerf;
 using namespace kerf::extremes;

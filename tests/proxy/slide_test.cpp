@@ -6,8 +6,8 @@
 
 #include <doctest/doctest.h>
 
-#include "lab/rig/bump_slide.hpp"
-#include "lab/rig/rest.hpp"
+#include "lab/rig/contact_motions.hpp"
+#include "lab/rig/contact_rig.hpp"
 
 using namespace kerf;
 using namespace kerf::extremes;

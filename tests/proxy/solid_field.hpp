@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <utility>
 
-#include "controller/kernel/proxy/tool_turn.hpp"
-#include "lab/rig/points.hpp"
+#include "controller/kernel/proxy/contact_space.hpp"
+#include "lab/rig/geometry.hpp"
 
 namespace kerf::test {
 

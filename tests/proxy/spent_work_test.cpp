@@ -6,7 +6,7 @@
 
 #include <doctest/doctest.h>
 
-#include "controller/servo/proxy_contact.hpp"
+#include "controller/kernel/proxy/proxy.hpp"
 #include "tests/proxy/solid_field.hpp"
 
 using namespace kerf;

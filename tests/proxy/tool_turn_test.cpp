@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/kernel/proxy/tool_turn.hpp"
-
 #include <numbers>
 
 #include <doctest/doctest.h>
 
-#include "lab/rig/points.hpp"
+#include "controller/kernel/proxy/contact_space.hpp"
+#include "lab/rig/geometry.hpp"
 
 using namespace kerf;
 using namespace kerf::extremes;

@@ -5,7 +5,7 @@
 
 #include <doctest/doctest.h>
 
-#include "lab/rig/wall_shake.hpp"
+#include "lab/rig/contact_motions.hpp"
 #include "tests/case_count.hpp"
 
 using namespace kerf;

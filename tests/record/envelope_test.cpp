@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "record/envelope.hpp"
-
 #include <algorithm>
 #include <vector>
 
 #include <doctest/doctest.h>
 #include <rapidcheck.h>
+
+#include "record/force_plot.hpp"
 
 using kerf::Envelope;
 

@@ -3,7 +3,7 @@
 
 #include <doctest/doctest.h>
 
-#include "controller/servo/servo_output.hpp"
+#include "controller/servo/servo.hpp"
 #include "tests/record/record_support.hpp"
 
 using namespace kerf;

@@ -9,7 +9,7 @@
 #include <doctest/doctest.h>
 
 #include "shared/numeric/energy_source.hpp"
-#include "shared/segment/hand_over.hpp"
+#include "shared/segment/connection.hpp"
 #include "tests/segment/segment_support.hpp"
 #include "tests/segment/test_folder.hpp"
 

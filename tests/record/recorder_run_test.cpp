@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "record/recorder_run.hpp"
-
 #include <array>
 #include <chrono>
 #include <csignal>
@@ -9,6 +7,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "record/recorder.hpp"
 #include "record/tick_log.hpp"
 #include "tests/json.hpp"
 #include "tests/record/record_support.hpp"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "record/recorder.hpp"
 
-#include "shared/segment/mirror_writer.hpp"
+#include "shared/segment/replica_writer.hpp"
 #include "tests/record/record_support.hpp"
 
 using namespace kerf;

@@ -8,8 +8,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "record/record_error.hpp"
-#include "shared/segment/hash.hpp"
+#include "shared/volume/checksum.hpp"
 #include "tests/record/record_support.hpp"
 
 using namespace kerf;

@@ -3,9 +3,9 @@
 
 #include <sys/stat.h>
 
-#include "record/manifest.hpp"
-#include "record/summary.hpp"
-#include "shared/posix/new_file.hpp"
+#include "record/force_plot.hpp"
+#include "record/recording.hpp"
+#include "shared/posix/atomic_file.hpp"
 #include "tests/json.hpp"
 #include "tests/record/record_support.hpp"
 

@@ -10,7 +10,7 @@
 
 #include <doctest/doctest.h>
 
-#include "controller/scene/materials.hpp"
+#include "controller/scene/scene_presets.hpp"
 #include "tests/scene/support.hpp"
 
 namespace {

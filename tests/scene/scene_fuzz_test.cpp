@@ -8,7 +8,7 @@
 #include <doctest/doctest.h>
 #include <rapidcheck.h>
 
-#include "controller/load/scene_load.hpp"
+#include "controller/load/load_scene.hpp"
 #include "controller/scene/scene_file.hpp"
 #include "tests/scene/support.hpp"
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Every row of the table of keys, by tests that are made from it: what it allows is read, and every
 // slip has its answer of one line.
+#include "controller/scene/scene_keys.hpp"
+
 #include <array>
 #include <cmath>
 #include <fstream>
@@ -13,13 +15,12 @@
 
 #include <doctest/doctest.h>
 
-#include "controller/law/law_row.hpp"
+#include "controller/input/load_error.hpp"
+#include "controller/law/law.hpp"
 #include "controller/law/registry/law_registry.hpp"
 #include "controller/load/scene_json.hpp"
 #include "controller/scene/scene_file.hpp"
-#include "controller/scene/scene_key.hpp"
-#include "controller/scene/scene_page.hpp"
-#include "controller/scene/scene_text.hpp"
+#include "controller/scene/scene_reference.hpp"
 #include "controller/volume/phantom.hpp"
 #include "tests/scene/scene_lines.hpp"
 #include "tests/scene/support.hpp"

@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "controller/scene/scene_key.hpp"
+#include "controller/scene/scene_keys.hpp"
 
 namespace kerf::test {
 

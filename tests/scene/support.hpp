@@ -10,8 +10,8 @@
 
 #include <unistd.h>
 
+#include "controller/input/load_error.hpp"
 #include "controller/load/loaded_scene.hpp"
-#include "controller/scene/scene_error.hpp"
 
 namespace kerf::test {
 

@@ -5,7 +5,7 @@
 #include <doctest/doctest.h>
 #include <rapidcheck.h>
 
-#include "shared/segment/dirty_bricks.hpp"
+#include "shared/volume/brick_set.hpp"
 
 using namespace kerf;
 

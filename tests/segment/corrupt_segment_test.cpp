@@ -9,9 +9,9 @@
 #include <sys/mman.h>
 #include <unistd.h>
 
-#include "shared/posix/hex64.hpp"
 #include "shared/segment/layout_table.hpp"
 #include "shared/segment/reader.hpp"
+#include "shared/text/text.hpp"
 #include "tests/segment/segment_support.hpp"
 
 using namespace kerf;

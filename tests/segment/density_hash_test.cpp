@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "shared/volume/density_hash.hpp"
-
 #include <cstddef>
 #include <cstdint>
 #include <vector>
 
 #include <doctest/doctest.h>
 #include <rapidcheck.h>
+
+#include "shared/volume/checksum.hpp"
 
 using namespace kerf;
 

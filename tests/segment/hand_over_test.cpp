@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "shared/segment/hand_over.hpp"
-
 #include <array>
 #include <csignal>
 #include <cstring>
@@ -15,7 +13,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "shared/volume/density_hash.hpp"
+#include "shared/segment/connection.hpp"
+#include "shared/volume/checksum.hpp"
 #include "tests/segment/segment_support.hpp"
 #include "tests/segment/test_folder.hpp"
 

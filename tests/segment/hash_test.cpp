@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "shared/segment/hash.hpp"
-
 #include <cstring>
 #include <string_view>
 #include <vector>
 
 #include <doctest/doctest.h>
 #include <rapidcheck.h>
+
+#include "shared/volume/checksum.hpp"
 
 using namespace kerf;
 

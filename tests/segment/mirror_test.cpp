@@ -6,7 +6,7 @@
 #include <unistd.h>
 
 #include "shared/segment/reader.hpp"
-#include "shared/volume/density_hash.hpp"
+#include "shared/volume/checksum.hpp"
 #include "tests/segment/segment_support.hpp"
 
 using namespace kerf;

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // The segment of another machine, rebuilt from what arrives: readers must not see a difference.
-#include "shared/segment/mirror_writer.hpp"
-
 #include <algorithm>
 #include <atomic>
 #include <chrono>
@@ -16,9 +14,10 @@
 #include <doctest/doctest.h>
 #include <unistd.h>
 
-#include "shared/segment/hand_over.hpp"
+#include "shared/segment/connection.hpp"
 #include "shared/segment/reader.hpp"
-#include "shared/volume/density_hash.hpp"
+#include "shared/segment/replica_writer.hpp"
+#include "shared/volume/checksum.hpp"
 #include "tests/segment/segment_support.hpp"
 #include "tests/segment/test_folder.hpp"
 

@@ -3,9 +3,8 @@
 
 #include <doctest/doctest.h>
 
-#include "shared/segment/hash.hpp"
 #include "shared/segment/reader.hpp"
-#include "shared/volume/density_hash.hpp"
+#include "shared/volume/checksum.hpp"
 #include "tests/segment/segment_support.hpp"
 
 using namespace kerf;

@@ -8,7 +8,7 @@
 #include <sys/mman.h>
 
 #include "shared/segment/reader.hpp"
-#include "shared/segment/shared_words.hpp"
+#include "shared/segment/seqlock.hpp"
 #include "tests/segment/segment_support.hpp"
 
 using namespace kerf;

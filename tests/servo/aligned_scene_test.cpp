@@ -10,8 +10,8 @@
 
 #include <doctest/doctest.h>
 
-#include "controller/plan/method/methods.hpp"
-#include "controller/scene/scene_error.hpp"
+#include "controller/input/load_error.hpp"
+#include "controller/plan/method/tool_method.hpp"
 #include "controller/tool/tool_shapes.hpp"
 #include "tests/servo/support.hpp"
 

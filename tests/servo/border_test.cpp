@@ -8,8 +8,8 @@
 #include <doctest/doctest.h>
 
 #include "controller/tool/tool_shapes.hpp"
-#include "controller/volume/volume_crop.hpp"
-#include "lab/rig/miller.hpp"
+#include "controller/volume/crop_resample.hpp"
+#include "lab/rig/cutting_hand.hpp"
 #include "tests/case_count.hpp"
 #include "tests/servo/support.hpp"
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // What a hand gains or loses on a closed way over a solid that nobody cuts.
-#include "lab/energy/closed_loops.hpp"
-
 #include <doctest/doctest.h>
+
+#include "lab/stability/energy_measures.hpp"
 
 TEST_CASE("F5 through the whole servo: a closed way takes nothing but friction, and leaks") {
   for (const kerf::energy::LoopWork& row : kerf::energy::closed_loops()) {

@@ -8,7 +8,7 @@
 #include <rapidcheck.h>
 
 #include "controller/scene/scene.hpp"
-#include "controller/servo/contact_plan.hpp"
+#include "controller/servo/servo_plan.hpp"
 
 using kerf::coupling_force;
 using kerf::DeviceVec;

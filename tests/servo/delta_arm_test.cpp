@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/servo/kinematics/delta_arm.hpp"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -11,7 +9,8 @@
 #include <doctest/doctest.h>
 
 #include "controller/plan/plan_device.hpp"
-#include "shared/wire/falcon_constants.hpp"
+#include "controller/servo/kinematics.hpp"
+#include "shared/wire/falcon.hpp"
 
 using kerf::DeviceVec;
 using kerf::DoubleNumbers;

@@ -10,11 +10,11 @@
 
 #include <doctest/doctest.h>
 
-#include "controller/scene/materials.hpp"
-#include "controller/shell/guard/allocation_counter.hpp"
+#include "controller/loop/allocation_counter.hpp"
+#include "controller/scene/scene_presets.hpp"
 #include "controller/tool/tool_shapes.hpp"
 #include "controller/volume/phantom.hpp"
-#include "lab/rig/miller.hpp"
+#include "lab/rig/cutting_hand.hpp"
 #include "tests/case_count.hpp"
 #include "tests/servo/support.hpp"
 

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "controller/servo/kinematics.hpp"
+
 #include <cmath>
 #include <cstdint>
 #include <memory>
@@ -7,11 +9,9 @@
 #include <rapidcheck.h>
 
 #include "controller/plan/plan_device.hpp"
-#include "controller/servo/device_pose.hpp"
-#include "controller/servo/kinematics/omni_gimbal.hpp"
-#include "controller/servo/kinematics/serial_arm.hpp"
-#include "hil/devmodel/omni_arm.hpp"
-#include "shared/wire/omni_constants.hpp"
+#include "controller/servo/sense.hpp"
+#include "hil/device/omni.hpp"
+#include "shared/wire/omni.hpp"
 
 using kerf::DeviceVec;
 using kerf::DoubleNumbers;

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Laws of a test's own file in the whole servo step: what they see, what holds whatever they give.
+#include "controller/law/law.hpp"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -11,7 +13,6 @@
 
 #include <doctest/doctest.h>
 
-#include "controller/law/law_row.hpp"
 #include "controller/law/registry/law_registry.hpp"
 #include "tests/servo/support.hpp"
 

@@ -10,10 +10,10 @@
 
 #include <doctest/doctest.h>
 
-#include "controller/scene/materials.hpp"
+#include "controller/scene/scene_presets.hpp"
 #include "controller/tool/tool_shapes.hpp"
 #include "controller/volume/phantom.hpp"
-#include "lab/rig/miller.hpp"
+#include "lab/rig/cutting_hand.hpp"
 #include "tests/servo/support.hpp"
 
 using namespace kerf;

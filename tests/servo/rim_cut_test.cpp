@@ -7,7 +7,7 @@
 #include <doctest/doctest.h>
 
 #include "controller/tool/tool_shapes.hpp"
-#include "lab/rig/miller.hpp"
+#include "lab/rig/cutting_hand.hpp"
 #include "tests/case_count.hpp"
 #include "tests/servo/support.hpp"
 

@@ -5,8 +5,8 @@
 
 #include <doctest/doctest.h>
 
-#include "controller/scene/scene_error.hpp"
-#include "controller/shell/guard/allocation_counter.hpp"
+#include "controller/input/load_error.hpp"
+#include "controller/loop/allocation_counter.hpp"
 #include "tests/servo/support.hpp"
 
 using kerf::LoadedScene;

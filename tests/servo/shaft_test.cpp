@@ -7,10 +7,9 @@
 
 #include <doctest/doctest.h>
 
-#include "controller/shell/guard/allocation_counter.hpp"
-#include "controller/tool/tool_shaft.hpp"
+#include "controller/loop/allocation_counter.hpp"
 #include "controller/tool/tool_shapes.hpp"
-#include "lab/rig/miller.hpp"
+#include "lab/rig/cutting_hand.hpp"
 #include "tests/servo/support.hpp"
 
 using namespace kerf;

@@ -7,10 +7,10 @@
 
 #include <doctest/doctest.h>
 
-#include "controller/load/felt_density.hpp"
-#include "controller/scene/materials.hpp"
-#include "lab/rig/miller.hpp"
-#include "lab/rig/rest.hpp"
+#include "controller/load/load_scene.hpp"
+#include "controller/scene/scene_presets.hpp"
+#include "lab/rig/contact_rig.hpp"
+#include "lab/rig/cutting_hand.hpp"
 #include "tests/servo/support.hpp"
 
 using namespace kerf;

@@ -10,10 +10,9 @@
 
 #include <doctest/doctest.h>
 
-#include "controller/law/energy_bounding.hpp"
-#include "controller/law/passivity_controller.hpp"
+#include "controller/law/stabilisers.hpp"
 #include "lab/rig/port_loop.hpp"
-#include "shared/numeric/vec3.hpp"
+#include "shared/numeric/linear_algebra.hpp"
 
 using namespace kerf;
 

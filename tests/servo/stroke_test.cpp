@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The command `undo`: the volumes go back to what they were before the last stroke, and the hand
 // notices only that its force is gone and comes back slowly.
-#include "controller/servo/stroke.hpp"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -13,8 +11,9 @@
 
 #include <doctest/doctest.h>
 
-#include "controller/shell/guard/allocation_counter.hpp"
-#include "shared/volume/density_hash.hpp"
+#include "controller/loop/allocation_counter.hpp"
+#include "controller/servo/volume_restore.hpp"
+#include "shared/volume/checksum.hpp"
 #include "tests/servo/cut_kinds.hpp"
 #include "tests/servo/support.hpp"
 

@@ -11,8 +11,8 @@
 
 #include "controller/load/loaded_scene.hpp"
 #include "controller/plan/compile.hpp"
-#include "lab/rig/fake_arm.hpp"
-#include "shared/numeric/vec3.hpp"
+#include "lab/rig/kinematic_arm.hpp"
+#include "shared/numeric/linear_algebra.hpp"
 
 namespace kerf::test {
 

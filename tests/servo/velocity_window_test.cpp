@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/law/velocity_window.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -8,6 +6,8 @@
 
 #include <doctest/doctest.h>
 #include <rapidcheck.h>
+
+#include "controller/law/velocity_estimators.hpp"
 
 using kerf::DeviceVec;
 using kerf::DoubleNumbers;

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The command `reset`: the volumes go back to their first content, and the hand notices only that
 // its force is gone and comes back slowly.
-#include "controller/servo/volume_reset.hpp"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -15,8 +13,9 @@
 
 #include <doctest/doctest.h>
 
-#include "controller/shell/guard/allocation_counter.hpp"
-#include "shared/volume/density_hash.hpp"
+#include "controller/loop/allocation_counter.hpp"
+#include "controller/servo/volume_restore.hpp"
+#include "shared/volume/checksum.hpp"
 #include "tests/servo/cut_kinds.hpp"
 #include "tests/servo/support.hpp"
 

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/shell/check_scene.hpp"
-
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -9,8 +7,9 @@
 
 #include <doctest/doctest.h>
 
+#include "controller/run/scene_check.hpp"
 #include "controller/tool/tool_shapes.hpp"
-#include "shared/posix/new_file.hpp"
+#include "shared/posix/atomic_file.hpp"
 
 using namespace kerf;
 namespace fs = std::filesystem;

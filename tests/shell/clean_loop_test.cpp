@@ -15,16 +15,15 @@
 #include <sys/syscall.h>
 #include <unistd.h>
 
-#include "controller/device/driver/omni_driver.hpp"
+#include "controller/device/device_driver.hpp"
 #include "controller/device/port/socket_port.hpp"
+#include "controller/load/load_scene.hpp"
 #include "controller/load/scene_json.hpp"
-#include "controller/load/scene_load.hpp"
+#include "controller/loop/motor_guard.hpp"
+#include "controller/loop/servo_loop.hpp"
 #include "controller/plan/compile.hpp"
-#include "controller/shell/guard/call_guard.hpp"
-#include "controller/shell/guard/motor_guard.hpp"
-#include "controller/shell/scene_segment.hpp"
-#include "controller/shell/servo_loop.hpp"
-#include "shared/segment/segment_plan.hpp"
+#include "controller/run/run_start.hpp"
+#include "shared/segment/segment.hpp"
 #include "tests/programs/process.hpp"
 #include "tests/shell/system_call_count.hpp"
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/shell/clock.hpp"
-
 #include <doctest/doctest.h>
+
+#include "controller/loop/tick_source.hpp"
 
 TEST_CASE("deadlines keep their distance, and missed ones are skipped and counted") {
   constexpr std::int64_t kPeriodNs = 2'000'000;

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "shared/posix/failure.hpp"
-
 #include <cerrno>
 #include <filesystem>
 #include <ios>
@@ -10,6 +8,8 @@
 #include <system_error>
 
 #include <doctest/doctest.h>
+
+#include "shared/posix/error_text.hpp"
 
 namespace {
 

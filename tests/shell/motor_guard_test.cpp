@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/shell/guard/motor_guard.hpp"
+#include "controller/loop/motor_guard.hpp"
 
 #include <algorithm>
 #include <array>
@@ -17,10 +17,10 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "controller/device/driver/omni_driver.hpp"
+#include "controller/device/device_driver.hpp"
 #include "shared/posix/monotonic_clock.hpp"
 #include "shared/posix/stop_signals.hpp"
-#include "shared/wire/omni_packet.hpp"
+#include "shared/wire/omni.hpp"
 
 namespace {
 

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "controller/run/probe.hpp"
+
 #include <cerrno>
 #include <filesystem>
 #include <fstream>
@@ -6,9 +8,7 @@
 #include <doctest/doctest.h>
 #include <unistd.h>
 
-#include "controller/shell/probe/probe_advice.hpp"
-#include "controller/shell/probe/probe_nodes.hpp"
-#include "controller/shell/probe/probe_view.hpp"
+#include "controller/run/probe_nodes.hpp"
 #include "tests/programs/process.hpp"
 
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/shell/run_report.hpp"
+#include "controller/run/run_report.hpp"
 
 #include <string>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/shell/servo_loop.hpp"
+#include "controller/loop/servo_loop.hpp"
 
 #include <atomic>
 #include <cmath>
@@ -11,12 +11,12 @@
 #include <doctest/doctest.h>
 #include <unistd.h>
 
-#include "controller/device/driver/omni_driver.hpp"
+#include "controller/device/device_driver.hpp"
 #include "controller/load/scene_json.hpp"
 #include "controller/plan/compile.hpp"
-#include "controller/shell/scene_segment.hpp"
+#include "controller/run/run_start.hpp"
 #include "shared/segment/reader.hpp"
-#include "shared/wire/omni_packet.hpp"
+#include "shared/wire/omni.hpp"
 #include "tests/servo/support.hpp"
 
 namespace {

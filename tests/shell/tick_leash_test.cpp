@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/shell/tick_leash.hpp"
-
 #include <atomic>
 #include <chrono>
 #include <cstdint>
@@ -14,6 +12,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "controller/loop/tick_source.hpp"
 #include "tests/programs/process.hpp"
 
 using kerf::TickLeash;

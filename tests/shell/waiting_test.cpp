@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/shell/waiting.hpp"
-
 #include <string>
 #include <vector>
 
 #include <doctest/doctest.h>
+
+#include "controller/loop/wait_state.hpp"
 
 using kerf::DeviceReport;
 using kerf::Personality;

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/shell/watchdog.hpp"
-
 #include <chrono>
 #include <thread>
 
@@ -8,9 +6,10 @@
 #include <pthread.h>
 #include <sched.h>
 
-#include "controller/device/driver/omni_driver.hpp"
-#include "shared/posix/cores.hpp"
-#include "shared/wire/omni_packet.hpp"
+#include "controller/device/device_driver.hpp"
+#include "controller/loop/servo_loop.hpp"
+#include "shared/posix/threads.hpp"
+#include "shared/wire/omni.hpp"
 
 namespace {
 

@@ -2,8 +2,6 @@
 // The time-domain loop against the exact boundary and against maps that another simulator made
 // (100 sub-steps of semi-implicit Euler, Karnopp's stiction, 0.1 mm before the wall, K in steps of
 // 3 %).
-#include "controller/stability/one_axis.hpp"
-
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -11,9 +9,9 @@
 
 #include <doctest/doctest.h>
 
-#include "controller/stability/device_figures.hpp"
-#include "controller/stability/stable_gains.hpp"
-#include "controller/stability/wall_push.hpp"
+#include "controller/stability/axis_simulation.hpp"
+#include "controller/stability/gain_limits.hpp"
+#include "controller/stability/sampled_loop.hpp"
 
 using namespace kerf;
 

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/stability/passive_limits.hpp"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -8,7 +6,7 @@
 
 #include <doctest/doctest.h>
 
-#include "controller/stability/stable_gains.hpp"
+#include "controller/stability/gain_limits.hpp"
 
 namespace {
 

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/stability/stable_gains.hpp"
-
 #include <array>
 #include <cmath>
 #include <cstddef>
 #include <vector>
 
 #include <doctest/doctest.h>
+
+#include "controller/stability/gain_limits.hpp"
 
 namespace {
 

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "shared/text/file_text.hpp"
-
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -8,6 +6,8 @@
 
 #include <doctest/doctest.h>
 #include <sys/stat.h>
+
+#include "shared/text/text.hpp"
 
 using kerf::text_in;
 

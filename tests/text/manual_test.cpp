@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "shared/text/manual.hpp"
-
 #include <sstream>
 
 #include <doctest/doctest.h>

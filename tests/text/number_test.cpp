@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "shared/text/number.hpp"
-
 #include <doctest/doctest.h>
+
+#include "shared/text/text.hpp"
 
 using kerf::number_in;
 

@@ -6,7 +6,7 @@
 
 #include <doctest/doctest.h>
 
-#include "shared/text/words.hpp"
+#include "shared/text/text.hpp"
 
 using namespace kerf;
 

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "shared/text/words.hpp"
-
 #include <string>
 
 #include <doctest/doctest.h>
+
+#include "shared/text/text.hpp"
 
 using kerf::escaped;
 using kerf::one_line;

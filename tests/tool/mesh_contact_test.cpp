@@ -4,8 +4,8 @@
 
 #include <doctest/doctest.h>
 
-#include "lab/rig/loft.hpp"
-#include "lab/rig/rest.hpp"
+#include "lab/rig/contact_rig.hpp"
+#include "lab/rig/tool_meshes.hpp"
 
 using namespace kerf;
 using namespace kerf::extremes;

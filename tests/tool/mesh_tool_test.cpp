@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/tool/mesh_tool.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
@@ -9,14 +7,15 @@
 
 #include <doctest/doctest.h>
 
-#include "controller/load/scene_load.hpp"
-#include "controller/scene/scene_error.hpp"
+#include "controller/input/load_error.hpp"
+#include "controller/load/load_scene.hpp"
+#include "controller/tool/inner_samples.hpp"
 #include "controller/tool/mesh_surface.hpp"
-#include "controller/tool/stl_file.hpp"
 #include "controller/tool/surface_samples.hpp"
+#include "controller/tool/tool_mesh.hpp"
 #include "controller/tool/tool_shapes.hpp"
-#include "lab/rig/loft.hpp"
-#include "shared/numeric/vec3.hpp"
+#include "lab/rig/tool_meshes.hpp"
+#include "shared/numeric/linear_algebra.hpp"
 #include "tests/scene/support.hpp"
 #include "tests/tool/stl_support.hpp"
 

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/tool/stl_file.hpp"
-
 #include <algorithm>
 #include <array>
 #include <cctype>
@@ -12,7 +10,7 @@
 #include <sys/stat.h>
 
 #include "controller/tool/tool_mesh.hpp"
-#include "lab/rig/loft.hpp"
+#include "lab/rig/tool_meshes.hpp"
 #include "tests/scene/support.hpp"
 #include "tests/tool/stl_support.hpp"
 

@@ -9,7 +9,7 @@
 
 #include <doctest/doctest.h>
 
-#include "controller/scene/scene_error.hpp"
+#include "controller/input/load_error.hpp"
 #include "controller/tool/tool_shapes.hpp"
 
 using namespace kerf;

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/tool/tool_shaft.hpp"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -8,7 +6,7 @@
 
 #include <doctest/doctest.h>
 
-#include "controller/scene/scene_error.hpp"
+#include "controller/input/load_error.hpp"
 #include "controller/tool/surface_samples.hpp"
 #include "controller/tool/tool_shapes.hpp"
 

@@ -10,9 +10,9 @@
 #include <sys/resource.h>
 #include <sys/wait.h>
 
-#include "controller/sandbox/sandbox.hpp"
-#include "controller/scene/scene_error.hpp"
-#include "controller/tool/stl_file.hpp"
+#include "controller/input/load_error.hpp"
+#include "controller/input/sandbox.hpp"
+#include "controller/tool/tool_mesh.hpp"
 #include "tests/volume/volume_files.hpp"
 
 using namespace kerf;

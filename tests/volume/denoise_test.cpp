@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "controller/volume/denoise.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -7,8 +9,6 @@
 #include <vector>
 
 #include <doctest/doctest.h>
-
-#include "controller/volume/volume_denoise.hpp"
 
 using namespace kerf;
 

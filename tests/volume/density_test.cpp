@@ -5,8 +5,8 @@
 #include <doctest/doctest.h>
 #include <rapidcheck.h>
 
-#include "controller/scene/scene_error.hpp"
-#include "controller/volume/volume_density.hpp"
+#include "controller/input/load_error.hpp"
+#include "controller/volume/windowing.hpp"
 #include "tests/volume/volume_files.hpp"
 
 using namespace kerf;

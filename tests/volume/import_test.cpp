@@ -14,9 +14,8 @@
 #include "controller/scene/scene_file.hpp"
 #include "controller/volume/file/volume_write.hpp"
 #include "controller/volume/phantom.hpp"
-#include "controller/volume/volume_density.hpp"
+#include "controller/volume/windowing.hpp"
 #include "controller/volume_tool/import_preview.hpp"
-#include "controller/volume_tool/png_file.hpp"
 #include "tests/case_count.hpp"
 #include "tests/volume/volume_files.hpp"
 

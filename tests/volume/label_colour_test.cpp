@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // Seen by three kinds of eyes, after Vienot, Brettel and Mollon (1999).
-#include "shared/volume/label_colour.hpp"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <vector>
 
 #include <doctest/doctest.h>
+
+#include "shared/volume/material.hpp"
 
 namespace {
 

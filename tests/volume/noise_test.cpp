@@ -9,9 +9,8 @@
 
 #include <doctest/doctest.h>
 
+#include "controller/volume/denoise.hpp"
 #include "controller/volume/phantom.hpp"
-#include "controller/volume/volume_denoise.hpp"
-#include "controller/volume/volume_noise.hpp"
 
 using namespace kerf;
 

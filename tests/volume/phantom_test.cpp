@@ -9,9 +9,8 @@
 #include <doctest/doctest.h>
 #include <rapidcheck.h>
 
-#include "controller/scene/scene_error.hpp"
-#include "controller/volume/phantom_shape.hpp"
-#include "controller/volume/volume_density.hpp"
+#include "controller/input/load_error.hpp"
+#include "controller/volume/windowing.hpp"
 #include "shared/numeric/fnv1a.hpp"
 #include "tests/volume/volume_files.hpp"
 

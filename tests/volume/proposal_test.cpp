@@ -7,8 +7,7 @@
 
 #include <doctest/doctest.h>
 
-#include "controller/scene/scene_error.hpp"
-#include "controller/volume/spacing_check.hpp"
+#include "controller/input/load_error.hpp"
 #include "controller/volume/volume_proposal.hpp"
 #include "tests/volume/volume_files.hpp"
 

@@ -4,9 +4,9 @@
 
 #include <doctest/doctest.h>
 
-#include "controller/volume/volume_crop.hpp"
-#include "controller/volume/volume_density.hpp"
-#include "controller/volume/volume_noise.hpp"
+#include "controller/volume/crop_resample.hpp"
+#include "controller/volume/denoise.hpp"
+#include "controller/volume/windowing.hpp"
 #include "tests/volume/volume_files.hpp"
 
 using namespace kerf;

@@ -8,8 +8,8 @@
 #include <sys/un.h>
 #include <unistd.h>
 
-#include "controller/scene/scene_error.hpp"
-#include "controller/volume/file/volume_limits.hpp"
+#include "controller/input/load_error.hpp"
+#include "controller/volume/file/volume_image.hpp"
 #include "tests/volume/volume_files.hpp"
 
 using namespace kerf;

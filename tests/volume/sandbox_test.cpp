@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/sandbox/sandbox.hpp"
+#include "controller/input/sandbox.hpp"
 
 #include <array>
 #include <atomic>
@@ -24,8 +24,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "controller/sandbox/sandbox_rights.hpp"
-#include "controller/scene/scene_error.hpp"
+#include "controller/input/load_error.hpp"
+#include "controller/input/sandbox_rights.hpp"
 #include "tests/volume/volume_files.hpp"
 
 using namespace kerf;

@@ -1,12 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/volume/solid_parts.hpp"
-
 #include <algorithm>
 #include <random>
 
 #include <doctest/doctest.h>
 
-#include "controller/volume/body_mask.hpp"
+#include "controller/volume/connected_parts.hpp"
 #include "tests/volume/volume_files.hpp"
 
 using namespace kerf;

@@ -9,7 +9,7 @@
 
 #include <zlib.h>
 
-#include "controller/scene/scene_error.hpp"
+#include "controller/input/load_error.hpp"
 #include "controller/volume_tool/volume_commands.hpp"
 
 namespace kerf::test {

@@ -8,10 +8,10 @@
 
 #include <doctest/doctest.h>
 
-#include "controller/load/scene_load.hpp"
+#include "controller/load/load_scene.hpp"
 #include "controller/volume/file/volume_write.hpp"
 #include "controller/volume/phantom.hpp"
-#include "controller/volume/volume_density.hpp"
+#include "controller/volume/windowing.hpp"
 #include "tests/json.hpp"
 #include "tests/volume/volume_files.hpp"
 

@@ -6,10 +6,10 @@
 #include <rapidcheck.h>
 #include <sys/resource.h>
 
-#include "controller/scene/scene_error.hpp"
+#include "controller/input/load_error.hpp"
 #include "controller/volume/file/volume_write.hpp"
-#include "controller/volume/volume_density.hpp"
-#include "shared/posix/new_file.hpp"
+#include "controller/volume/windowing.hpp"
+#include "shared/posix/atomic_file.hpp"
 #include "tests/volume/volume_files.hpp"
 
 using namespace kerf;

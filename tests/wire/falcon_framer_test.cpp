@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "shared/wire/falcon_framer.hpp"
-
 #include <vector>
 
 #include <doctest/doctest.h>
 #include <rapidcheck.h>
+
+#include "shared/wire/falcon.hpp"
 
 using kerf::falcon::Framer;
 

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "shared/wire/hello.hpp"
-
 #include <algorithm>
 #include <cstdint>
 #include <string>
@@ -9,18 +7,19 @@
 #include <doctest/doctest.h>
 #include <rapidcheck.h>
 
-#include "shared/wire/falcon_packet.hpp"
-#include "shared/wire/omni_packet.hpp"
-#include "shared/wire/wooden_packet.hpp"
+#include "shared/wire/emulator_link.hpp"
+#include "shared/wire/falcon.hpp"
+#include "shared/wire/omni.hpp"
+#include "shared/wire/woodenhaptics.hpp"
 
 using kerf::decode_hello;
 using kerf::discord;
-using kerf::Hello;
+using kerf::LinkHello;
 using kerf::Personality;
 
 namespace {
 
-constexpr Hello kOmni{Personality::omni, false, 1000};
+constexpr LinkHello kOmni{Personality::omni, false, 1000};
 
 /// One line that names the way out.
 bool is_told(const std::string& line) {
@@ -31,8 +30,8 @@ bool is_told(const std::string& line) {
 
 TEST_CASE("a hello comes back, and any other byte makes it none or another one") {
   CHECK(rc::check([] {
-    const Hello hello{static_cast<Personality>(*rc::gen::inRange(0, 3)),
-                      *rc::gen::arbitrary<bool>(), *rc::gen::inRange(0, 8001)};
+    const LinkHello hello{static_cast<Personality>(*rc::gen::inRange(0, 3)),
+                          *rc::gen::arbitrary<bool>(), *rc::gen::inRange(0, 8001)};
     auto bytes = encode(hello);
     RC_ASSERT(decode_hello(bytes) == hello);
     bytes[*rc::gen::inRange<std::size_t>(0, bytes.size())] ^=
@@ -62,7 +61,7 @@ TEST_CASE("no packet of a device or for one is a hello") {
 TEST_CASE("what two sides differ in is told with both, and what to start instead") {
   CHECK(discord(kOmni, kOmni).empty());
   CHECK(discord(kOmni, {Personality::omni, false, 2000}).empty());  // each keeps its own clock
-  const Hello locked{Personality::omni, true, 1000};
+  const LinkHello locked{Personality::omni, true, 1000};
   CHECK(discord(locked, locked).empty());
 
   const std::string device = discord(kOmni, {Personality::falcon, true, 500});

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "shared/wire/omni_packet.hpp"
-
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -9,6 +7,7 @@
 #include <doctest/doctest.h>
 #include <rapidcheck.h>
 
+#include "shared/wire/omni.hpp"
 #include "tests/wire/hex.hpp"
 
 namespace {

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "shared/wire/wooden_packet.hpp"
-
 #include <algorithm>
 #include <array>
 #include <cstdint>
@@ -8,6 +6,8 @@
 
 #include <doctest/doctest.h>
 #include <rapidcheck.h>
+
+#include "shared/wire/woodenhaptics.hpp"
 
 namespace {
 

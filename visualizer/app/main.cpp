@@ -2,8 +2,8 @@
 #include "shared/posix/program.hpp"
 #include "shared/posix/stop_signals.hpp"
 #include "visualizer/app/run.hpp"
-#include "visualizer/error.hpp"
 #include "visualizer/gl/window.hpp"
+#include "visualizer/scene/visualizer_error.hpp"
 
 int main(int argc, char** argv) {
   return kerf::run_program("kerf-visualizer", [&] {

@@ -8,12 +8,11 @@
 #include <string_view>
 
 #include "shared/text/command_line.hpp"
-#include "shared/text/words.hpp"
-#include "visualizer/app/keys.hpp"
-#include "visualizer/error.hpp"
+#include "shared/text/text.hpp"
+#include "visualizer/panels/key_table.hpp"
 #include "visualizer/render/renderer.hpp"
-#include "visualizer/render/renderer_choice.hpp"
-#include "visualizer/view/transfer_file.hpp"
+#include "visualizer/scene/appearance.hpp"
+#include "visualizer/scene/visualizer_error.hpp"
 
 namespace kerf {
 

@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "shared/segment/usual_name.hpp"
-#include "visualizer/view/look.hpp"
-#include "visualizer/view/pixel_rect.hpp"
+#include "shared/segment/command.hpp"
+#include "visualizer/scene/appearance.hpp"
+#include "visualizer/scene/pixel_rect.hpp"
 
 namespace kerf {
 

@@ -11,12 +11,12 @@
 #include <string>
 #include <vector>
 
-#include "visualizer/compose/hand_painter.hpp"
-#include "visualizer/error.hpp"
-#include "visualizer/render/renderer_choice.hpp"
+#include "visualizer/compose/tool_painter.hpp"
+#include "visualizer/picture/image_files.hpp"
+#include "visualizer/render/renderer.hpp"
+#include "visualizer/scene/appearance.hpp"
+#include "visualizer/scene/visualizer_error.hpp"
 #include "visualizer/surface/mesh_file.hpp"
-#include "visualizer/view/file_out.hpp"
-#include "visualizer/view/transfer_file.hpp"
 
 namespace kerf {
 namespace {

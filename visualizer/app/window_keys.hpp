@@ -5,12 +5,12 @@
 #include <optional>
 #include <string>
 
-#include "visualizer/app/film.hpp"
 #include "visualizer/app/options.hpp"
-#include "visualizer/app/picture.hpp"
-#include "visualizer/app/window_figures.hpp"
 #include "visualizer/gl/window.hpp"
-#include "visualizer/view/session.hpp"
+#include "visualizer/panels/overlay.hpp"
+#include "visualizer/picture/image_files.hpp"
+#include "visualizer/picture/picture.hpp"
+#include "visualizer/scene/session.hpp"
 
 namespace kerf {
 

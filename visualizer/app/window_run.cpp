@@ -6,9 +6,9 @@
 #include <cstdio>
 #include <utility>
 
-#include "shared/posix/new_file.hpp"
+#include "shared/posix/atomic_file.hpp"
 #include "visualizer/app/run.hpp"
-#include "visualizer/render/renderer_choice.hpp"
+#include "visualizer/render/renderer.hpp"
 
 namespace kerf {
 

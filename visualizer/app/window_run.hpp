@@ -8,20 +8,17 @@
 
 #include <glm/glm.hpp>
 
-#include "visualizer/app/film.hpp"
-#include "visualizer/app/force_plot.hpp"
-#include "visualizer/app/hand_link.hpp"
+#include "visualizer/app/hand_control.hpp"
 #include "visualizer/app/options.hpp"
-#include "visualizer/app/picture.hpp"
-#include "visualizer/app/pointer_hand.hpp"
-#include "visualizer/app/window_figures.hpp"
 #include "visualizer/app/window_keys.hpp"
 #include "visualizer/gl/context.hpp"
 #include "visualizer/gl/target.hpp"
 #include "visualizer/gl/window.hpp"
-#include "visualizer/space_mouse/space_mouse.hpp"
-#include "visualizer/view/frame_report.hpp"
-#include "visualizer/view/session.hpp"
+#include "visualizer/panels/overlay.hpp"
+#include "visualizer/picture/image_files.hpp"
+#include "visualizer/picture/picture.hpp"
+#include "visualizer/scene/frame_report.hpp"
+#include "visualizer/scene/session.hpp"
 
 namespace kerf {
 

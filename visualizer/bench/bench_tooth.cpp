@@ -7,7 +7,7 @@
 
 #include <glm/gtc/matrix_transform.hpp>
 
-#include "shared/volume/voxel_loops.hpp"
+#include "shared/volume/voxel_grid.hpp"
 
 namespace kerf {
 

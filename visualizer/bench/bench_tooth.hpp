@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "visualizer/view/scene_view.hpp"
+#include "visualizer/scene/scene_view.hpp"
 
 namespace kerf {
 

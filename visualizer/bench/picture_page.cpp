@@ -6,7 +6,7 @@
 #include <cstdio>
 #include <string_view>
 
-#include "shared/posix/provenance.hpp"
+#include "shared/posix/program.hpp"
 #include "shared/text/json.hpp"
 
 namespace kerf {

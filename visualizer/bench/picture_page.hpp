@@ -5,8 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "visualizer/bench/normal_errors.hpp"
-#include "visualizer/bench/picture_rows.hpp"
+#include "visualizer/bench/picture_bench.hpp"
 
 namespace kerf {
 

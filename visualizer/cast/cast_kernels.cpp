@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "visualizer/cast/cast_kernels.hpp"
+
 #include <array>
 #include <cstddef>
-
-#include "visualizer/cast/cast_job.hpp"
 
 #if defined(KERF_X86_CAST)
 #include <cpuid.h>

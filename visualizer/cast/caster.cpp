@@ -5,8 +5,8 @@
 #include <string>
 #include <system_error>
 
-#include "shared/posix/cores.hpp"
-#include "visualizer/error.hpp"
+#include "shared/posix/threads.hpp"
+#include "visualizer/scene/visualizer_error.hpp"
 
 namespace kerf {
 

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "visualizer/cast/cast_volume.hpp"
-#include "visualizer/view/camera.hpp"
+#include "visualizer/scene/camera.hpp"
 
 namespace kerf {
 

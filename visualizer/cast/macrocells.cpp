@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
+
 #include "visualizer/cast/macrocells.hpp"
 
 #include <algorithm>
+#include <cmath>
 
-#include "shared/volume/voxel_loops.hpp"
+#include "shared/volume/voxel_grid.hpp"
 
 namespace kerf {
 
@@ -78,6 +80,98 @@ std::vector<std::array<std::uint16_t, 4>> Macrocells::boundary_faces(const Voxel
     }
   });
   return faces;
+}
+
+namespace {
+
+constexpr double kSlack = 1e-4;  // of a distance; and pixels: the kernels compute with 24 bits
+constexpr CastBlock kEmpty{1e30F, 0.0F};
+
+/// The planes through the eye and the sides of a rectangle of blocks, positive outside of it for
+/// all of a cell whose lowest corner is taken.
+std::array<glm::dvec4, 4> sides_of(const PixelRect& blocks, const glm::dmat4x3& pixel_from_cell) {
+  const glm::dmat3x4 row = glm::transpose(pixel_from_cell);
+  const auto pixel = [](std::int32_t block) { return static_cast<double>(block * kCastBlock); };
+  std::array<glm::dvec4, 4> sides{
+      (pixel(blocks.x0) - kSlack) * row[2] - row[0], row[0] - (pixel(blocks.x1) + kSlack) * row[2],
+      (pixel(blocks.y0) - kSlack) * row[2] - row[1], row[1] - (pixel(blocks.y1) + kSlack) * row[2]};
+  for (glm::dvec4& side : sides) {
+    for (int axis = 0; axis < 3; ++axis) side.w += std::min(side[axis], 0.0);
+  }
+  return sides;
+}
+
+bool is_beside(const CellBlocks::Cell& cell, const std::array<glm::dvec4, 4>& sides) {
+  return std::any_of(sides.begin(), sides.end(), [&](const glm::dvec4& side) {
+    return cell[0] * side.x + cell[1] * side.y + cell[2] * side.z + side.w > 0.0;
+  });
+}
+
+}  // namespace
+
+void CellBlocks::draw(std::span<const Cell> cells, bool begin_inside,
+                      const glm::dmat4& world_from_cell, const View& view, std::int32_t width,
+                      std::int32_t height, const PixelRect& part) {
+  const auto up = [](std::int32_t pixels) { return (pixels + kCastBlock - 1) / kCastBlock; };
+  across_ = up(width);
+  blocks_.resize(static_cast<std::size_t>(across_) * static_cast<std::size_t>(up(height)));
+  drawn_ = {part.x0 / kCastBlock, part.y0 / kCastBlock, up(part.x1), up(part.y1)};
+  for (std::int32_t y = drawn_.y0; y < drawn_.y1; ++y) {
+    std::fill_n(blocks_.begin() + y * across_ + drawn_.x0, drawn_.x1 - drawn_.x0, kEmpty);
+  }
+  // x and y in pixels times the distance, which is z.
+  glm::dmat4 pixel_from_eye(0.0);
+  pixel_from_eye[0][0] = 0.5 * width / (view.tan_half_height * view.aspect);
+  pixel_from_eye[1][1] = 0.5 * height / view.tan_half_height;
+  pixel_from_eye[2] =
+      glm::dvec4(pixel_from_eye[0][0] * view.middle_right - 0.5 * width, -0.5 * height, -1.0, 0.0);
+  pixel_from_eye[3][3] = 1.0;
+  const glm::dmat4x3 pixel_from_cell(pixel_from_eye * view.eye_from_world * world_from_cell);
+  const std::array<glm::dvec4, 4> sides = sides_of(drawn_, pixel_from_cell);
+  for (const Cell& cell : cells) {
+    if (is_beside(cell, sides)) continue;
+    const glm::dvec3 corner = pixel_from_cell * glm::dvec4(cell[0], cell[1], cell[2], 1.0);
+    glm::dvec2 low(1e30);
+    glm::dvec2 high(-1e30);
+    double nearest_mm = 1e30;
+    double farthest_mm = -1e30;
+    for (int i = 0; i < 8; ++i) {
+      const glm::dvec3 at = corner + ((i & 1) != 0 ? pixel_from_cell[0] : glm::dvec3(0.0)) +
+                            ((i & 2) != 0 ? pixel_from_cell[1] : glm::dvec3(0.0)) +
+                            ((i & 4) != 0 ? pixel_from_cell[2] : glm::dvec3(0.0));
+      nearest_mm = std::min(nearest_mm, at.z);
+      farthest_mm = std::max(farthest_mm, at.z);
+      low = glm::min(low, glm::dvec2(at) / at.z);
+      high = glm::max(high, glm::dvec2(at) / at.z);
+    }
+    // One beyond the far plane is kept: a ray that ends inside leaves through it.
+    if (farthest_mm < view.near_mm) continue;
+    if (nearest_mm < 0.5 * view.near_mm) {  // the eye may be inside: it is anywhere in the picture
+      low = glm::dvec2(0.0);
+      high = glm::dvec2(width, height);
+    }
+    const double begin_mm = begin_inside ? view.near_mm : nearest_mm * (1.0 - kSlack);
+    cover(low - kSlack, high + kSlack,
+          {static_cast<float>(begin_mm), static_cast<float>(farthest_mm * (1.0 + kSlack))});
+  }
+}
+
+void CellBlocks::cover(const glm::dvec2& low, const glm::dvec2& high, const CastBlock& range) {
+  const auto block = [](double pixel, std::int32_t first, std::int32_t end) {
+    return static_cast<std::int32_t>(
+        std::clamp(std::floor(pixel / kCastBlock), first - 1.0, static_cast<double>(end)));
+  };
+  const std::int32_t x0 = std::max(block(low.x, drawn_.x0, drawn_.x1), drawn_.x0);
+  const std::int32_t x1 = std::min(block(high.x, drawn_.x0, drawn_.x1), drawn_.x1 - 1);
+  const std::int32_t y0 = std::max(block(low.y, drawn_.y0, drawn_.y1), drawn_.y0);
+  const std::int32_t y1 = std::min(block(high.y, drawn_.y0, drawn_.y1), drawn_.y1 - 1);
+  for (std::int32_t y = y0; y <= y1; ++y) {
+    for (std::int32_t x = x0; x <= x1; ++x) {
+      CastBlock& at = blocks_[static_cast<std::size_t>(y * across_ + x)];
+      at.begin_mm = std::min(at.begin_mm, range.begin_mm);
+      at.end_mm = std::max(at.end_mm, range.end_mm);
+    }
+  }
 }
 
 }  // namespace kerf

@@ -8,8 +8,8 @@
 #include <epoxy/egl.h>
 #include <epoxy/gl.h>
 
-#include "visualizer/error.hpp"
 #include "visualizer/gl/window.hpp"
+#include "visualizer/scene/visualizer_error.hpp"
 
 namespace kerf {
 

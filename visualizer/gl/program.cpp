@@ -6,7 +6,7 @@
 #include <glm/gtc/matrix_inverse.hpp>
 #include <glm/gtc/type_ptr.hpp>
 
-#include "visualizer/error.hpp"
+#include "visualizer/scene/visualizer_error.hpp"
 
 namespace kerf {
 

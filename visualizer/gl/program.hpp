@@ -9,8 +9,8 @@
 
 #include <glm/glm.hpp>
 
-#include "visualizer/gl/names.hpp"
-#include "visualizer/view/camera.hpp"
+#include "visualizer/gl/gl_objects.hpp"
+#include "visualizer/scene/camera.hpp"
 
 namespace kerf {
 

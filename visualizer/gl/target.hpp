@@ -5,8 +5,8 @@
 #include <span>
 #include <vector>
 
-#include "visualizer/gl/names.hpp"
-#include "visualizer/view/pixel_rect.hpp"
+#include "visualizer/gl/gl_objects.hpp"
+#include "visualizer/scene/pixel_rect.hpp"
 
 namespace kerf {
 

@@ -11,7 +11,7 @@
 #include <GLFW/glfw3.h>
 #include <epoxy/glx.h>
 
-#include "visualizer/error.hpp"
+#include "visualizer/scene/visualizer_error.hpp"
 
 namespace kerf {
 

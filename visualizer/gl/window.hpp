@@ -7,7 +7,7 @@
 
 #include "visualizer/gl/context.hpp"
 #include "visualizer/gl/target.hpp"
-#include "visualizer/view/pixel_rect.hpp"
+#include "visualizer/scene/pixel_rect.hpp"
 
 struct GLFWwindow;
 

@@ -13,12 +13,12 @@
 #include "shared/posix/program.hpp"
 #include "shared/posix/stop_signals.hpp"
 #include "shared/text/command_line.hpp"
-#include "visualizer/error.hpp"
 #include "visualizer/gl/context.hpp"
 #include "visualizer/gl/window.hpp"
 #include "visualizer/monkey/monkey.hpp"
-#include "visualizer/view/file_out.hpp"
-#include "visualizer/view/frame_report.hpp"
+#include "visualizer/picture/image_files.hpp"
+#include "visualizer/scene/frame_report.hpp"
+#include "visualizer/scene/visualizer_error.hpp"
 
 namespace {
 

@@ -8,8 +8,8 @@
 
 #include <imgui.h>
 
-#include "visualizer/error.hpp"
-#include "visualizer/render/renderer_choice.hpp"
+#include "visualizer/render/renderer.hpp"
+#include "visualizer/scene/visualizer_error.hpp"
 
 namespace kerf {
 

@@ -12,8 +12,7 @@
 #include "visualizer/app/options.hpp"
 #include "visualizer/app/window_run.hpp"
 #include "visualizer/gl/context.hpp"
-#include "visualizer/monkey/dice.hpp"
-#include "visualizer/monkey/monkey_controller.hpp"
+#include "visualizer/monkey/test_controller.hpp"
 
 namespace kerf {
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "visualizer/render/cast_renderer.hpp"
 
-#include "visualizer/view/camera.hpp"
-#include "visualizer/view/transfer_function.hpp"
+#include "visualizer/scene/appearance.hpp"
+#include "visualizer/scene/camera.hpp"
 
 namespace kerf {
 

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "visualizer/cast/dirty_job.hpp"
+#include "visualizer/cast/cast_kernels.hpp"
 #include "visualizer/gl/context.hpp"
 
 namespace kerf {

@@ -8,10 +8,9 @@
 #include <vector>
 
 #include "visualizer/gl/program.hpp"
-#include "visualizer/render/ray_entries.hpp"
+#include "visualizer/render/macrocell_faces.hpp"
 #include "visualizer/render/renderer.hpp"
-#include "visualizer/texture/cells_on_gpu.hpp"
-#include "visualizer/texture/solid_on_gpu.hpp"
+#include "visualizer/render/volume_textures.hpp"
 
 namespace kerf {
 

@@ -6,7 +6,7 @@
 #include <glm/gtc/matrix_inverse.hpp>
 
 #include "visualizer/gl/context.hpp"
-#include "visualizer/view/camera.hpp"
+#include "visualizer/scene/camera.hpp"
 
 namespace kerf {
 

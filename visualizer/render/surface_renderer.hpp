@@ -8,9 +8,9 @@
 #include "visualizer/gl/program.hpp"
 #include "visualizer/gl/target.hpp"
 #include "visualizer/render/renderer.hpp"
+#include "visualizer/render/volume_textures.hpp"
 #include "visualizer/surface/surface_on_gpu.hpp"
 #include "visualizer/surface/volume_surface.hpp"
-#include "visualizer/texture/solid_on_gpu.hpp"
 
 namespace kerf {
 

@@ -6,7 +6,7 @@
 
 #include <sys/types.h>
 
-#include "visualizer/sound/spindle_voice.hpp"
+#include "visualizer/sound/spindle_sound.hpp"
 
 namespace kerf {
 

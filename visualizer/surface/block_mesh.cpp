@@ -1,17 +1,124 @@
 // SPDX-License-Identifier: Apache-2.0
+
 #include "visualizer/surface/block_mesh.hpp"
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 #include <cstring>
 #include <functional>
+#include <optional>
 #include <utility>
 
-#include "visualizer/surface/cube_cases.hpp"
-#include "visualizer/surface/neighbourhood.hpp"
-#include "visualizer/surface/vertex_look.hpp"
-
 namespace kerf {
+
+namespace {
+
+constexpr std::size_t kMostTriangles = 5;  // more would not compile
+
+struct CubeCase {
+  std::uint8_t triangles = 0;
+  std::array<CubeTriangle, kMostTriangles> list{};
+};
+
+using Loop = std::array<std::uint8_t, kCubeEdges>;
+
+constexpr unsigned edge_between(unsigned a, unsigned b) {
+  const unsigned axis = (a ^ b) == 1 ? 0 : (a ^ b) == 2 ? 1 : 2;
+  const unsigned low = a & b;
+  return 4 * axis + (low >> (axis + 1) % 3 & 1) + 2 * (low >> (axis + 2) % 3 & 1);
+}
+
+/// Whether both edges are sides of one face.
+constexpr bool share_face(unsigned a, unsigned b) {
+  const auto faces = [](unsigned edge) {
+    const unsigned axis = edge / 4;
+    return 1U << (2 * ((axis + 1) % 3) + (edge & 1)) |
+           1U << (2 * ((axis + 2) % 3) + (edge >> 1 & 1));
+  };
+  return (faces(a) & faces(b)) != 0;
+}
+
+constexpr bool is_solid(unsigned solid, unsigned corner) {
+  return (solid >> corner & 1) != 0;
+}
+
+/// The lines on all faces: for each cut edge the one that the surface goes on to, with solid on the
+/// left as seen from outside the cube.
+constexpr Loop lines_of(unsigned solid) {
+  Loop next{};
+  for (unsigned face = 0; face < 6; ++face) {
+    const unsigned u = 1U << (face / 2 + 1) % 3;
+    const unsigned v = 1U << (face / 2 + 2) % 3;
+    const unsigned side = (face & 1) << face / 2;
+    // Counter-clockwise from outside.
+    std::array<unsigned, 4> ring{side, side | u, side | u | v, side | v};
+    if (side == 0) std::swap(ring[1], ring[3]);
+    for (unsigned start = 0; start < 4; ++start) {
+      if (is_solid(solid, ring[start]) || !is_solid(solid, ring[(start + 1) % 4])) continue;
+      unsigned end = start + 1;
+      while (is_solid(solid, ring[(end + 1) % 4])) ++end;
+      next[edge_between(ring[start], ring[(start + 1) % 4])] =
+          static_cast<std::uint8_t>(edge_between(ring[end % 4], ring[(end + 1) % 4]));
+    }
+  }
+  return next;
+}
+
+/// Fills points `first`..`last` of a loop with triangles; false where every way needs a side on a
+/// face.
+constexpr bool fill(const Loop& loop, std::size_t first, std::size_t last, CubeCase& out) {
+  if (last - first < 2) return true;
+  const auto inner = [&](std::size_t a, std::size_t b) {
+    return b - a == 1 || !share_face(loop[a], loop[b]);
+  };
+  for (std::size_t apex = first + 1; apex < last; ++apex) {
+    if (!inner(first, apex) || !inner(apex, last)) continue;
+    const std::uint8_t before = out.triangles;
+    out.list[out.triangles++] = {loop[first], loop[apex], loop[last]};
+    if (fill(loop, first, apex, out) && fill(loop, apex, last, out)) return true;
+    out.triangles = before;
+  }
+  return false;
+}
+
+constexpr CubeCase case_of(unsigned solid) {
+  const Loop next = lines_of(solid);
+  CubeCase out;
+  unsigned done = 0;
+  for (unsigned edge = 0; edge < kCubeEdges; ++edge) {
+    const unsigned start = edge_start(edge);
+    const bool cut = is_solid(solid, start) != is_solid(solid, start | 1U << edge / 4);
+    if (!cut || (done >> edge & 1) != 0) continue;
+    Loop loop{};
+    std::size_t points = 0;
+    for (unsigned at = edge; (done >> at & 1) == 0; at = next[at]) {
+      done |= 1U << at;
+      loop[points++] = static_cast<std::uint8_t>(at);
+    }
+    if (!fill(loop, 0, points - 1, out)) throw "a loop without a triangulation";  // no such case
+  }
+  return out;
+}
+
+// One evaluation per case: compilers bound the work of each.
+template <unsigned Solid>
+constexpr CubeCase kCase = case_of(Solid);
+
+template <unsigned... Solid>
+constexpr std::array<CubeCase, sizeof...(Solid)> all_cases(
+    std::integer_sequence<unsigned, Solid...>) {
+  return {kCase<Solid>...};
+}
+
+constexpr auto kCases = all_cases(std::make_integer_sequence<unsigned, 256>{});
+
+}  // namespace
+
+std::span<const CubeTriangle> cube_triangles(unsigned solid) noexcept {
+  const CubeCase& found = kCases[solid];
+  return {found.list.data(), found.triangles};
+}
 
 namespace {
 
@@ -220,6 +327,134 @@ BlockMesh extract_block(const SurfaceSource& source, VoxelIndex block) {
   BlockMesh mesh = Extraction(near, source.iso).run();
   for (SurfaceVertex& vertex : mesh.vertices) dress(vertex, source, start, near);
   return mesh;
+}
+
+namespace {
+
+constexpr float kNormalLength = 32767.0F;
+
+/// To the nearest; for |value| < 2^15.
+int rounded(float value) {
+  return static_cast<int>(value + 32768.5F) - 32768;
+}
+
+std::uint16_t unit16(float share) {
+  return static_cast<std::uint16_t>(std::clamp(share, 0.0F, 1.0F) * 65535.0F + 0.5F);
+}
+
+/// `Gradient::farid5` up to a factor: it looks farther than a neighbourhood.
+glm::vec3 wide_gradient(const VolumeSamples& volume, VoxelIndex at) {
+  constexpr GradientTaps kTaps = gradient_taps(Gradient::farid5);
+  constexpr int kReach = gradient_reach(Gradient::farid5);
+  glm::vec3 sum(0.0F);
+  for (int z = 0; z <= 2 * kReach; ++z) {
+    for (int y = 0; y <= 2 * kReach; ++y) {
+      float slope = 0.0F, smooth = 0.0F;
+      for (int x = 0; x <= 2 * kReach; ++x) {
+        const auto i = static_cast<std::size_t>(x);
+        const float density =
+            volume.density_at(VoxelIndex{at.x + x - kReach, at.y + y - kReach, at.z + z - kReach});
+        slope += kTaps.slope[i] * density;
+        smooth += kTaps.smooth[i] * density;
+      }
+      const auto j = static_cast<std::size_t>(y), k = static_cast<std::size_t>(z);
+      sum += glm::vec3(kTaps.smooth[j] * kTaps.smooth[k] * slope,
+                       kTaps.slope[j] * kTaps.smooth[k] * smooth,
+                       kTaps.smooth[j] * kTaps.slope[k] * smooth);
+    }
+  }
+  return sum;
+}
+
+/// From what the vertex holds, not from what it was made of: to do it again gives the same bits.
+FinePoint inward_of(const SurfaceVertex& vertex, const glm::vec3& inverse_square_spacing) {
+  glm::vec3 along(vertex.normal[0], vertex.normal[1], vertex.normal[2]);
+  float length = kNormalLength;
+  if (inverse_square_spacing != glm::vec3(1.0F)) {
+    along *= inverse_square_spacing;
+    length = std::sqrt(glm::dot(along, along));
+  }
+  const glm::vec3 step = along * (-float{kFinePerVoxel} / length);
+  return {rounded(step.x), rounded(step.y), rounded(step.z)};
+}
+
+/// Of a voxel `at`, whose density is `sample` of a neighbourhood; up to a factor.
+glm::vec3 gradient_of(const SurfaceSource& source, const Density* sample, VoxelIndex at) {
+  switch (source.gradient) {
+    case Gradient::corners:
+      return Neighbourhood::corner_gradient(sample);
+    case Gradient::central:
+      return Neighbourhood::central_gradient(sample);
+    case Gradient::farid5:
+      break;
+  }
+  return wide_gradient(source.volume, at);
+}
+
+}  // namespace
+
+void dress(SurfaceVertex& vertex, const SurfaceSource& source, VoxelIndex start,
+           const Neighbourhood& near) {
+  std::array<int, 3> from{};
+  std::size_t axis = 0;  // along which its cube edge runs
+  int along = 0;
+  for (std::size_t i = 0; i < 3; ++i) {
+    from[i] = vertex.position[i] >> kFineLog2;
+    const int rest = vertex.position[i] & (kFinePerVoxel - 1);
+    if (rest != 0) {
+      axis = i;
+      along = rest;
+    }
+  }
+  const Density* low = near.at(from[0], from[1], from[2]);
+  const Density* high = low + Neighbourhood::kStride[axis];
+  VoxelIndex end{start.x + from[0], start.y + from[1], start.z + from[2]};
+  const glm::vec3 low_slope = gradient_of(source, low, end);
+  (axis == 0 ? end.x : axis == 1 ? end.y : end.z) += 1;
+  const glm::vec3 high_slope = gradient_of(source, high, end);
+  const glm::vec3 slope =
+      glm::mix(low_slope, high_slope, static_cast<float>(along) / float{kFinePerVoxel});
+  const float length = std::sqrt(glm::dot(slope, slope));
+  glm::vec3 outward(0.0F);
+  if (length > 0.0F) {
+    outward = slope * (-1.0F / length);
+  } else {  // a lone voxel looks the same on all sides
+    outward[static_cast<int>(axis)] = *high > *low ? -1.0F : 1.0F;
+  }
+  for (int i = 0; i < 3; ++i) {
+    vertex.normal[static_cast<std::size_t>(i)] =
+        static_cast<std::int16_t>(rounded(outward[i] * kNormalLength));
+  }
+  const FinePoint at = fine_place(vertex, start);
+  const FinePoint inward = inward_of(vertex, source.inverse_square_spacing);
+  const glm::vec3 colour = source.look->colour(source.volume, at, inward);
+  vertex.colour = {unit16(colour.r), unit16(colour.g), unit16(colour.b)};
+  vertex.openness = unit16(source.look->openness(source.volume, at, inward));
+}
+
+DirtyMeshCells update_look(const SurfaceSource& source, VoxelIndex block, const VoxelBox& changed,
+                           BlockMesh& mesh) {
+  const VoxelIndex start = block_start(block);
+  const VoxelBox colours = changed.grown(SurfaceLook::kColourReachVox);
+  const VoxelBox all = changed.grown(SurfaceLook::kOpennessReachVox);
+  std::optional<Neighbourhood> near;
+  DirtyMeshCells cells;
+  for (SurfaceVertex& vertex : mesh.vertices) {
+    const SurfaceVertex before = vertex;
+    const FinePoint at = fine_place(vertex, start);
+    const VoxelIndex voxel = VolumeSamples::voxel_below(at);
+    if (!all.contains(voxel)) continue;
+    if (colours.contains(voxel)) {
+      if (!near) near.emplace(source.volume, start);
+      dress(vertex, source, start, *near);
+    } else {
+      const FinePoint inward = inward_of(vertex, source.inverse_square_spacing);
+      if (!SurfaceLook::openness_depends_on(changed, at, inward)) continue;
+      vertex.openness = unit16(source.look->openness(source.volume, at, inward));
+    }
+    if (vertex != before) cells.add(vertex);
+  }
+  return cells;
 }
 
 }  // namespace kerf

@@ -11,8 +11,8 @@
 
 #include <glm/gtc/matrix_inverse.hpp>
 
-#include "shared/posix/new_file.hpp"
-#include "visualizer/error.hpp"
+#include "shared/posix/atomic_file.hpp"
+#include "visualizer/scene/visualizer_error.hpp"
 
 namespace kerf {
 

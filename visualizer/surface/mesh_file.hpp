@@ -9,8 +9,8 @@
 
 #include <glm/glm.hpp>
 
+#include "visualizer/scene/scene_view.hpp"
 #include "visualizer/surface/volume_surface.hpp"
-#include "visualizer/view/scene_view.hpp"
 
 namespace kerf {
 

@@ -1,15 +1,107 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
+#include <array>
+#include <bit>
 #include <cstdint>
+#include <optional>
+#include <span>
 #include <vector>
 
-#include "visualizer/gl/names.hpp"
-#include "visualizer/surface/frustum_culling.hpp"
-#include "visualizer/surface/range_pool.hpp"
+#include <glm/glm.hpp>
+
+#include "visualizer/gl/gl_objects.hpp"
+#include "visualizer/surface/block_mesh.hpp"
 #include "visualizer/surface/volume_surface.hpp"
 
 namespace kerf {
+
+/// Parts of one growing array, for meshes that come and go: a part has a power of two of elements,
+/// and a freed one is taken again for a mesh of its size.
+class RangePool {
+ public:
+  struct Range {
+    std::uint32_t first = 0;
+    std::uint32_t capacity = 0;  ///< 0: none
+  };
+
+  /// Room for `count` elements, the old range of the same owner given back or kept; `count` 0 gives
+  /// it back.
+  [[nodiscard]] Range fit(Range old, std::uint32_t count) {
+    const std::uint32_t capacity = count == 0 ? 0 : std::max(kLeast, std::bit_ceil(count));
+    if (capacity == old.capacity) return old;
+    if (old.capacity != 0) free_of(old.capacity).push_back(old.first);
+    if (capacity == 0) return {};
+    std::vector<std::uint32_t>& free = free_of(capacity);
+    if (free.empty()) {
+      free.push_back(size_);
+      size_ += capacity;
+    }
+    const Range range{free.back(), capacity};
+    free.pop_back();
+    return range;
+  }
+  /// Elements that the array needs.
+  [[nodiscard]] std::uint32_t size() const noexcept { return size_; }
+
+ private:
+  static constexpr std::uint32_t kLeast = 32;
+
+  [[nodiscard]] std::vector<std::uint32_t>& free_of(std::uint32_t capacity) {
+    return free_[static_cast<std::size_t>(std::countr_zero(capacity))];
+  }
+
+  std::array<std::vector<std::uint32_t>, 32> free_;  ///< by log2 of the capacity
+  std::uint32_t size_ = 0;
+};
+
+/// Where the surface of a block lies and which way it faces, in voxel coordinates.
+struct BlockBounds {
+  glm::vec3 centre{0.0F};
+  glm::vec3 half{0.0F};  ///< of the edges of the box around its vertices
+  /// The box around the unit normals of its triangles.
+  glm::vec3 normal_centre{0.0F};
+  glm::vec3 normal_half{0.0F};
+};
+[[nodiscard]] BlockBounds bounds_of(const BlockMesh& mesh, VoxelIndex block);
+
+/// Culls the blocks of a surface, and the triangles of a block, against the view frustum of each
+/// part of a picture that is drawn again. Conservative: what it leaves out covers no pixel; some of
+/// what it keeps may cover none either.
+class FrustumCulling {
+ public:
+  /// A rectangle of whole pixels in normalised device coordinates; the picture is -1 to 1.
+  struct Part {
+    glm::dvec2 lo, hi;
+  };
+  /// With `eye_voxel`, blocks that turn their back to the eye are culled too. Without it they are
+  /// not: a clip plane opens the surface, and its inside shows.
+  FrustumCulling(const glm::dmat4& clip_from_voxel, const std::optional<glm::dvec3>& eye_voxel,
+                 std::span<const Part> parts);
+
+  enum class Visible : std::uint8_t { nothing, some, all };
+  /// `nothing`: the block is outside of all parts, or turns its back to the eye. `all`: it lies
+  /// within one part. `some`: neither can be told.
+  [[nodiscard]] Visible visible(const BlockBounds& block) const;
+
+  /// Squared distance in voxel edges from the eye to the middle of the block, to sort blocks from
+  /// front to back; 0 without an eye.
+  [[nodiscard]] float distance_2(VoxelIndex block) const;
+
+  /// Appends to `visible` the triangles of a block's mesh that may touch a part, in their order.
+  void append_visible(const BlockMesh& mesh, const BlockBounds& bounds, VoxelIndex block,
+                      std::vector<BlockTriangle>& visible) const;
+
+ private:
+  /// The four sides of a part's frustum; positive inside.
+  using Planes = std::array<glm::vec4, 4>;
+
+  std::optional<glm::vec3> eye_;
+  std::array<glm::vec4, 2> near_far_;
+  Planes around_;  ///< of the box around all parts: culls most blocks at once
+  std::vector<Planes> parts_;
+};
 
 /// A GL buffer that keeps its content when it grows.
 class GrowingBuffer {

@@ -7,10 +7,9 @@
 #include <thread>
 #include <utility>
 
-#include "shared/posix/cores.hpp"
-#include "shared/posix/helper_thread.hpp"
-#include "shared/volume/voxel_loops.hpp"
-#include "visualizer/surface/vertex_look.hpp"
+#include "shared/posix/threads.hpp"
+#include "shared/volume/voxel_grid.hpp"
+#include "visualizer/surface/block_mesh.hpp"
 
 namespace kerf {
 

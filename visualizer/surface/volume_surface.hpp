@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "shared/volume/brick_grid.hpp"
+#include "visualizer/scene/scene_view.hpp"
 #include "visualizer/surface/block_mesh.hpp"
-#include "visualizer/view/scene_view.hpp"
 
 namespace kerf {
 

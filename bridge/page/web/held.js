@@ -6,7 +6,7 @@ import {Volume} from './volume.js';
 
 const u64 = x => BigInt.asUintN(64, x);
 
-/** As bridge/wire/set_hash.hpp. */
+/** As bridge/wire/messages.hpp. */
 export function mixed(id, version) {
   let z = u64(version * 0x9e3779b97f4a7c15n + BigInt(id) * 0xd1342543de82ef95n + 1n);
   z = u64((z ^ z >> 30n) * 0xbf58476d1ce4e5b9n);

@@ -9,7 +9,7 @@
 #include <iterator>
 #include <system_error>
 
-#include "shared/wire/falcon_framer.hpp"
+#include "shared/wire/falcon.hpp"
 
 namespace kerf {
 namespace {

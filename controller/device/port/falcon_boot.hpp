@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "shared/wire/falcon_usb.hpp"
+#include "shared/wire/falcon.hpp"
 
 namespace kerf {
 

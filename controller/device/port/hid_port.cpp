@@ -17,9 +17,9 @@
 #include <unistd.h>
 
 #include "controller/device/port/packet_port.hpp"
-#include "shared/posix/failure.hpp"
+#include "shared/posix/error_text.hpp"
 #include "shared/posix/stop_signals.hpp"
-#include "shared/wire/wooden_constants.hpp"
+#include "shared/wire/woodenhaptics.hpp"
 
 namespace kerf {
 namespace {

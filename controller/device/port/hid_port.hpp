@@ -13,7 +13,6 @@
 #include <semaphore.h>
 
 #include "controller/device/port/io_mailbox.hpp"
-#include "controller/device/port/io_thread.hpp"
 #include "controller/device/port/packet_port.hpp"
 
 struct hid_device_;

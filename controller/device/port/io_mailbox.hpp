@@ -11,14 +11,56 @@
 #include <poll.h>
 
 #include "shared/posix/monotonic_clock.hpp"
+#include "shared/posix/threads.hpp"
+
+// Between the servo and the I/O thread of a port: core and priority of that thread, packets in both
+// directions, and the turn on a half-duplex line.
+//
+// The packets pass without a lock, a system call or an allocation: the writer of a slot publishes
+// it with release, the reader checks it with acquire, and the other way round for an empty slot.
 
 namespace kerf {
 
-// What stands between the servo and an I/O thread: packets in both directions, without a lock, a
-// system call or an allocation. Whoever fills a place publishes it with release, whoever empties it
-// looks with acquire, and the other way round for the empty place.
+/// Core and priority of the I/O threads of a port: the servo's core, above the servo, since the
+/// device comes first.
+struct IoThread {
+  int core = -1;      ///< -1: the last one, the default of the servo
+  int priority = 81;  ///< SCHED_FIFO
+};
 
-/// A packet in there; one that is longer than kMaxBytes is cut.
+/// Gives the calling thread that core and priority. Without the right to either, packets are later;
+/// the start of the servo reports that to the user.
+inline void become(const IoThread& io) noexcept {
+  static_cast<void>(pin_to_core(io.core >= 0 ? io.core : allowed_cores().back()));
+  static_cast<void>(set_fifo(io.priority));
+}
+
+/// The turn on a half-duplex line, where a device answers each command once. A command that waits
+/// for its turn can be replaced by a newer one; in the buffer of the device it could only grow old.
+///
+/// Times in ns of any clock that goes forward. One thread.
+class Turns {
+ public:
+  /// An answer that takes longer counts as lost, and the host has the turn again.
+  static constexpr std::int64_t kPatienceNs = 4'000'000;
+
+  [[nodiscard]] bool ours(std::int64_t now_ns) const noexcept {
+    return unanswered_ == 0 || now_ns >= answer_due_ns_;
+  }
+  /// A command has left, in its turn or out of it.
+  void sent(std::int64_t now_ns) noexcept {
+    unanswered_ = ours(now_ns) ? 1 : unanswered_ + 1;
+    answer_due_ns_ = now_ns + kPatienceNs;
+  }
+  /// An answer has come; or a command is known not to have arrived.
+  void answered() noexcept { unanswered_ = std::max(unanswered_ - 1, 0); }
+
+ private:
+  int unanswered_ = 0;
+  std::int64_t answer_due_ns_ = 0;
+};
+
+/// A packet between the threads; one longer than kMaxBytes is cut.
 struct MailboxPacket {
   static constexpr std::size_t kMaxBytes = 64;
 
@@ -26,7 +68,7 @@ struct MailboxPacket {
     size = std::min(packet.size(), kMaxBytes);
     std::copy_n(packet.begin(), size, bytes.begin());
   }
-  /// The size of the packet, of which `out` gets what it can hold.
+  /// Returns the size of the packet; copies as much as `out` holds.
   std::size_t copy_to(std::span<std::uint8_t> out) const noexcept {
     std::copy_n(bytes.begin(), std::min(size, out.size()), out.begin());
     return size;
@@ -39,7 +81,7 @@ struct MailboxPacket {
 /// Reports: one writer, one reader, oldest first. Wait-free.
 class Inbox {
  public:
-  /// The writer. False when the reader has fallen behind by kPlaces: the packet is lost then.
+  /// The writer. False if the reader is kPlaces behind: the packet is lost then.
   bool put(std::span<const std::uint8_t> packet) noexcept {
     const std::size_t end = end_.load(std::memory_order_relaxed);
     if (end - begin_.load(std::memory_order_acquire) == kPlaces) return false;
@@ -79,12 +121,11 @@ class Inbox {
 };
 
 /// The next command: any thread and any signal handler writes, one reader takes the newest, and
-/// what is older is void: a reader that was held up does not send what was true before. Each packet
-/// has a place of its own, so a writer that a crash stopped in the middle of one keeps nobody from
-/// the others.
+/// older ones are dropped: a delayed reader sends no outdated command. Each packet has a slot of
+/// its own, so a writer that a crash stopped in the middle of one does not block the others.
 class Outbox {
  public:
-  /// False when all places are in the hands of others.
+  /// False if other threads hold all slots.
   bool put(std::span<const std::uint8_t> packet) noexcept {
     Place* const place = claim_oldest();
     if (!place) return false;
@@ -100,18 +141,18 @@ class Outbox {
       if (ticket == kFree || !claim(place, ticket)) continue;
       if (ticket > newest_taken_) {
         newest_taken_ = ticket;
-        on_its_way_.store(true);  // before the place is free: `send_and_wait` looks at both
+        on_its_way_.store(true);  // before the slot is free: `send_and_wait` checks both
         size = place.packet.copy_to(out);
       }
       place.ticket.store(kFree, std::memory_order_release);
     }
     return size;
   }
-  /// The reader: whether what it took has not left the process yet.
+  /// The reader: whether the packet that it took is still in the process.
   void set_on_its_way(bool is) noexcept { on_its_way_.store(is); }
 
   /// Any thread but the reader's, any signal handler: calls `send`, again while it fails, and waits
-  /// until everything has left; false when that takes longer than so many milliseconds.
+  /// until all packets have left; false if that takes longer than so many milliseconds.
   template <class Send>
   bool send_and_wait(const Send& send, int milliseconds) const noexcept {
     bool is_put = send();
@@ -141,12 +182,12 @@ class Outbox {
   };
   static_assert(std::atomic<std::uint64_t>::is_always_lock_free);
 
-  /// Nobody else touches the place from now on. False where its ticket is another one by now.
+  /// Claims the slot for the caller alone. False if its ticket has changed.
   [[nodiscard]] static bool claim(Place& place, std::uint64_t ticket) noexcept {
     return ticket != kInHand &&
            place.ticket.compare_exchange_strong(ticket, kInHand, std::memory_order_acquire);
   }
-  /// A free place, or that of the oldest packet, which is void by now.
+  /// A free slot, or that of the oldest packet, which is outdated.
   [[nodiscard]] Place* claim_oldest() noexcept {
     for (std::size_t tries = 0; tries < kPlaces; ++tries) {
       Place* oldest = nullptr;
@@ -165,7 +206,7 @@ class Outbox {
   std::array<Place, kPlaces> places_{};
   std::atomic<std::uint64_t> next_ticket_{kFree + 1};
   std::atomic<bool> on_its_way_{false};
-  std::uint64_t newest_taken_ = kFree;  ///< the reader's: what is older came too late
+  std::uint64_t newest_taken_ = kFree;  ///< of the reader: older packets came too late
 };
 
 }  // namespace kerf

@@ -6,9 +6,9 @@
 #include <cstdint>
 
 #include "controller/kernel/point_shell/point_table.hpp"
-#include "controller/kernel/proxy/constraint_plane.hpp"
-#include "controller/kernel/proxy/tool_turn.hpp"
-#include "shared/numeric/fixed.hpp"
+#include "controller/kernel/proxy/constraint_set.hpp"
+#include "controller/kernel/proxy/contact_space.hpp"
+#include "shared/numeric/numbers.hpp"
 #include "shared/numeric/vec.hpp"
 
 namespace kerf {
@@ -212,8 +212,8 @@ template <class N>
 }
 
 /// The constraint plane of one volume's contact, by the samples of the point shell alone. `reach`
-/// of the tool is in units. A closer look corrects it near rest (closer_look.hpp). Its normal is
-/// 0 where the tool feels the same all round.
+/// of the tool is in units. A closer look corrects it near rest (contact_refinement.hpp). Its
+/// normal is 0 where the tool feels the same all round.
 template <class N>
 [[nodiscard]] constexpr ConstraintPlane<N> plane_of(const PointMeans<N>& means,
                                                     typename N::Real reach, bool round) noexcept {

@@ -6,8 +6,7 @@
 #include <cstdint>
 
 #include "controller/kernel/proxy/constraint_set.hpp"
-#include "controller/kernel/proxy/curvature.hpp"
-#include "controller/kernel/proxy/tool_turn.hpp"
+#include "controller/kernel/proxy/contact_space.hpp"
 
 namespace kerf {
 

@@ -5,7 +5,7 @@
 
 #include <immintrin.h>
 
-#include "controller/kernel/sets/load_pairs.hpp"
+#include "controller/kernel/sets/set_common.hpp"
 
 namespace kerf {
 namespace {
@@ -173,12 +173,11 @@ struct Simd {
 }  // namespace
 }  // namespace kerf
 
-#include "controller/kernel/sets/close_vector.hpp"
 #include "controller/kernel/sets/correlate_vector.hpp"
-#include "controller/kernel/sets/cover_lanes_vector.hpp"
+#include "controller/kernel/sets/cover_vector.hpp"
 #include "controller/kernel/sets/gather_vector.hpp"
 #include "controller/kernel/sets/point_vector.hpp"
-#include "controller/kernel/sets/the_set.hpp"
+#include "controller/kernel/sets/set_table.hpp"
 
 namespace kerf {
 

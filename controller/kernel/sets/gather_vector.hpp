@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "controller/kernel/sets/sample_place.hpp"
+#include "controller/kernel/sets/set_common.hpp"
 #include "shared/volume/voxel_grid.hpp"
 
 // Contact of the method `gather` for AVX2 and AVX-512; `Simd` as in box_vector.hpp.

@@ -5,7 +5,7 @@
 
 #include <arm_neon.h>
 
-#include "controller/kernel/sets/whole_write.hpp"
+#include "controller/kernel/sets/set_common.hpp"
 
 namespace kerf {
 namespace {
@@ -96,9 +96,8 @@ struct Simd {
 }  // namespace kerf
 
 #include "controller/kernel/sets/correlate_vector.hpp"
-#include "controller/kernel/sets/cover_lanes.hpp"
-#include "controller/kernel/sets/plain_loops.hpp"
-#include "controller/kernel/sets/the_set.hpp"
+#include "controller/kernel/sets/scalar_loops.hpp"
+#include "controller/kernel/sets/set_table.hpp"
 
 namespace kerf {
 

@@ -200,9 +200,8 @@ BoxCut cut(const TickBox& tool, const CutRate& rate, const VoxelGrid& grid, Dens
 }  // namespace
 }  // namespace kerf
 
-#include "controller/kernel/sets/cover_lanes.hpp"
-#include "controller/kernel/sets/plain_loops.hpp"
-#include "controller/kernel/sets/the_set.hpp"
+#include "controller/kernel/sets/scalar_loops.hpp"
+#include "controller/kernel/sets/set_table.hpp"
 
 namespace kerf {
 

@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <cstring>
 
-#include "controller/kernel/sets/sample_place.hpp"
-#include "controller/kernel/splat_table.hpp"
+#include "controller/kernel/kernel_set.hpp"
+#include "controller/kernel/sets/set_common.hpp"
 
 // The method `splat` as loops that a compiler turns into vectors, one text for every instruction
 // set. Included after the set's own `filter_z`, `press_row` and `RowSums`; internal linkage, for

@@ -3,12 +3,9 @@
 
 #include <algorithm>
 
-#include "controller/law/difference.hpp"
-#include "controller/law/energy_bounding.hpp"
-#include "controller/law/foaw.hpp"
-#include "controller/law/passivity_controller.hpp"
-#include "shared/text/number.hpp"
-#include "shared/text/words.hpp"
+#include "controller/law/stabilisers.hpp"
+#include "controller/law/velocity_estimators.hpp"
+#include "shared/text/text.hpp"
 
 namespace kerf {
 namespace {

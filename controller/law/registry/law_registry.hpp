@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "controller/law/law_row.hpp"
+#include "controller/law/law.hpp"
 
 namespace kerf {
 

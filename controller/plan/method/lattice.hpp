@@ -2,30 +2,78 @@
 #pragma once
 
 #include <array>
+#include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <span>
 #include <vector>
 
-#include "controller/kernel/tool_pose.hpp"
+#include "controller/kernel/sampling.hpp"
 #include "controller/load/loaded_scene.hpp"
-#include "controller/plan/method/matrices.hpp"
+#include "shared/numeric/linear_algebra.hpp"
+#include "shared/numeric/vec.hpp"
+
+// Matrices of the scene compiler, made in double and rounded to the loop's numbers; and the lattice
+// of a tool's samples in a volume.
 
 namespace kerf {
 
-/// Voxels per pitch along each axis of a tool that does not turn. A round tool is laid along the
-/// volume's axes, so the volume's orientation does not matter to it; any other keeps the world's.
+using Matrix = std::array<std::array<double, 3>, 3>;
+
+[[nodiscard]] inline Matrix matrix_of(const std::array<double, 4>& quaternion) {
+  const Matrix3 m = rotation_of(quaternion);
+  return {{{m[0], m[1], m[2]}, {m[3], m[4], m[5]}, {m[6], m[7], m[8]}}};
+}
+
+/// row_scale * transpose(rotation): world to the volume's axes.
+[[nodiscard]] inline Matrix into_volume(const Matrix& rotation,
+                                        const std::array<double, 3>& row_scale) {
+  Matrix m{};
+  for (std::size_t i = 0; i < 3; ++i) {
+    for (std::size_t j = 0; j < 3; ++j) m[i][j] = row_scale[i] * rotation[j][i];
+  }
+  return m;
+}
+
+template <class S, class To, class From>
+[[nodiscard]] Transform<S, To, From> rounded(const Matrix& m) {
+  Transform<S, To, From> t;
+  for (std::size_t i = 0; i < 3; ++i) {
+    for (std::size_t j = 0; j < 3; ++j) t.row[i][j] = S(m[i][j]);
+  }
+  return t;
+}
+
+template <class V, class S>
+[[nodiscard]] V rounded(const std::array<double, 3>& v) {
+  return {S(v[0]), S(v[1]), S(v[2])};
+}
+
+/// Voxels as a step of the loop's numbers.
+template <class N>
+[[nodiscard]] typename N::Step step_of(double voxels) {
+  if constexpr (N::kIsFixed) {
+    return static_cast<std::int32_t>(std::lround(voxels * N::kStepOne));
+  } else {
+    return static_cast<typename N::Step>(voxels);
+  }
+}
+
+/// Voxels per pitch along each axis of a tool that does not turn. A round tool takes the axes of
+/// the volume, whatever its orientation; any other keeps those of the world.
 [[nodiscard]] Matrix unturned_steps(const SceneTool& tool, const SceneVolume& volume);
 
-/// Where the tool's axes lie in the volume: each along one of its axes, forth (1) or back (-1).
+/// The tool's axes in the volume: each along one of its axes, forward (1) or backward (-1).
 using LatticeTurn = std::array<std::array<std::int16_t, 3>, 3>;
 
-/// The turn between the lattice of a tool that does not turn and that of the volume, where the two
-/// are one to the last bit of fixed-point numbers: pitch and voxel edges equal, axes parallel.
+/// The permutation between the lattice of a tool that does not turn and that of the volume, if the
+/// two are equal to the last bit of fixed-point numbers: pitch and voxel edges equal, axes
+/// parallel.
 [[nodiscard]] std::optional<LatticeTurn> lattice_turn(const SceneTool& tool,
                                                       const SceneVolume& volume);
 
-/// The samples as the volume's axes count them.
+/// The samples along the axes of the volume.
 [[nodiscard]] std::vector<ToolOffset> turned(std::span<const ToolOffset> offsets,
                                              const LatticeTurn& turn);
 

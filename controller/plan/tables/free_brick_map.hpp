@@ -6,7 +6,6 @@
 #include <span>
 #include <vector>
 
-#include "controller/kernel/point_shell/free_bricks.hpp"
 #include "controller/kernel/point_shell/point_table.hpp"
 
 namespace kerf {

@@ -1,25 +1,28 @@
 // SPDX-License-Identifier: Apache-2.0
+// A DICOM file, or the slices of a series in a folder.
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <optional>
+#include <sstream>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
 
-#include "controller/volume/file/foreign_io.hpp"
+#include "controller/volume/file/foreign_itk.hpp"
 // ITK from here on.
 #include <itkGDCMImageIO.h>
 #include <itkMetaDataObject.h>
 
-#include "controller/volume/file/library_messages.hpp"
-#include "controller/volume/file/volume_limits.hpp"
-#include "controller/volume/file/volume_source.hpp"
-#include "shared/text/number.hpp"
-#include "shared/text/words.hpp"
+#include "controller/volume/file/volume_image.hpp"
+#include "shared/numeric/linear_algebra.hpp"
+#include "shared/text/text.hpp"
 
 namespace kerf::volume {
 namespace fs = std::filesystem;
+using vec3::Vec, vec3::cross, vec3::dot, vec3::length;
+using vec3::operator-, vec3::operator*;
 namespace {
 
 /// The value of a tag on the first level of the file.
@@ -37,11 +40,30 @@ std::string trimmed(const std::string& text) {
   return text.substr(first, text.find_last_not_of(kPadding) + 1 - first);
 }
 
+/// The distances in a DICOM value: decimal numbers, finite and above 0, with backslashes between
+/// (PS3.5 6.2, DS). None if any part is something else.
+std::vector<double> dicom_distances(std::string_view text) {
+  constexpr std::string_view kPadding{" \0", 2};  // to an even length
+  std::vector<double> distances;
+  for (std::size_t next = 0; next != text.npos;) {
+    next = text.find('\\');
+    std::string_view word = text.substr(0, next);
+    if (next != text.npos) text.remove_prefix(next + 1);
+    word.remove_prefix(std::min(word.find_first_not_of(kPadding), word.size()));
+    word = word.substr(0, word.find_last_not_of(kPadding) + 1);
+    if (word.starts_with('+')) word.remove_prefix(1);
+    const auto value = number_in(word);
+    if (!value || !(*value > 0)) return {};
+    distances.push_back(*value);
+  }
+  return distances;
+}
+
 constexpr const char* kPixelSpacing = "0028|0030";
 
-/// GDCM fills in 1 mm where a file names no spacing between pixels, none that is a number, or only
-/// one that its kind of image does not go by, such as a CT's at the detector (0018|1164). What no
-/// tag of the file's first level tells may come from deeper in it.
+/// GDCM fills in 1 mm if a file has no spacing between pixels, none that is a number, or only one
+/// that does not count for its kind of image, such as that of a CT at the detector (0018|1164). A
+/// spacing without a tag on the first level of the file may come from deeper in it.
 bool names_spacing(const itk::GDCMImageIO& io) {
   const bool may_be_filled_in = io.GetSpacing(0) == 1.0 && io.GetSpacing(1) == 1.0;
   for (const char* tag : {kPixelSpacing, "0018|1164"}) {
@@ -53,7 +75,8 @@ bool names_spacing(const itk::GDCMImageIO& io) {
   return !may_be_filled_in;
 }
 
-/// The same of the slices of one file: where its pixels' spacing is on the first level, theirs is.
+/// The same for the slices of one file: their distance is on the same level as the spacing of
+/// pixels.
 bool names_slice_distance(const itk::GDCMImageIO& io) {
   if (!value_of(io, kPixelSpacing) || io.GetSpacing(2) != 1.0) return true;
   return dicom_distances(value_of(io, "0018|0088").value_or("")) == std::vector{1.0};
@@ -134,8 +157,8 @@ std::string text_of(const Series& series) {
          std::to_string(size[1]) + ")";
 }
 
-/// Which one is wanted: by its place in the list, or by a part of its name or identifier. Without a
-/// word the only one that has more than one slice: the others are overviews.
+/// Index of the wanted series: by its number in the list, or by a part of its name or identifier.
+/// Without a word the only one that has more than one slice: the others are overviews.
 std::size_t chosen_series(const fs::path& folder, const std::vector<Series>& all,
                           const std::string& wanted) {
   std::vector<std::size_t> fit;
@@ -159,7 +182,59 @@ std::size_t chosen_series(const fs::path& folder, const std::vector<Series>& all
                    "; choose one with ./kerf volume import --series:" + list);
 }
 
-/// The images as one stack: what they have in common, and their order in space.
+/// One slice of a DICOM series and its depth along the normal.
+struct Slice {
+  fs::path file;
+  Vec origin_mm;
+  double depth_mm;
+};
+
+/// The slices do not follow one another evenly: names the one whose distance to the slice before it
+/// is the oddest. Most others are right, so the median is what is usual.
+[[noreturn]] void refuse_uneven(const fs::path& folder, const std::vector<Slice>& slices) {
+  std::vector<double> apart;
+  for (std::size_t i = 1; i < slices.size(); ++i) {
+    apart.push_back(slices[i].depth_mm - slices[i - 1].depth_mm);
+  }
+  std::vector<double> sorted = apart;
+  std::ranges::sort(sorted);
+  const double usual = sorted[sorted.size() / 2];
+  const auto oddest = std::ranges::max_element(
+      apart, {}, [&](double distance) { return std::abs(distance - usual); });
+  const auto slice = static_cast<std::size_t>(oddest - apart.begin()) + 1;
+  std::ostringstream text;
+  text << folder.string() << ": " << *oddest << " mm before slice "
+       << slices[slice].file.filename().string() << " where " << usual
+       << " mm is usual; add the missing slices or remove doubled ones";
+  throw SceneError(text.str());
+}
+
+/// The common distance along `normal`, mm, of two slices or more in the order of their depths.
+/// Refuses gaps and a slanted stack: throws SceneError with `folder` as the place.
+double slice_distance(const fs::path& folder, const std::vector<Slice>& slices, const Vec& normal) {
+  const double step =
+      (slices.back().depth_mm - slices.front().depth_mm) / static_cast<double>(slices.size() - 1);
+  const double slack_mm = std::max(0.02 * step, 1e-3);  // positions are rounded in the files
+  for (std::size_t i = 1; i < slices.size(); ++i) {
+    const Vec apart = slices[i].origin_mm - slices[i - 1].origin_mm;
+    const double depth = dot(apart, normal);
+    const Vec aside = apart - depth * normal;
+    if (std::abs(depth - step) > slack_mm) refuse_uneven(folder, slices);
+    if (length(aside) > slack_mm) {
+      throw SceneError(folder.string() +
+                       ": its axes are not at right angles (tilted gantry); resample it to a "
+                       "straight grid first");
+    }
+  }
+  return step;
+}
+
+/// Kind of the values of all slices.
+constexpr ValueKind common_kind(ValueKind a, ValueKind b) noexcept {
+  return a == b ? a : ValueKind::float32;
+}
+
+/// The images as one stack: their common properties, and their order in space.
 struct Stack {
   VolumeClaim claim;
   std::vector<Slice> slices;
@@ -168,8 +243,8 @@ struct Stack {
 Stack stack_of(const fs::path& folder, const std::vector<Image>& images) {
   const Image& first = images.front();
   Stack stack{first.claim, {}};
-  const Place x = first.claim.axes[0], y = first.claim.axes[1];
-  const Place normal = cross(x, y);
+  const Vec x = first.claim.axes[0], y = first.claim.axes[1];
+  const Vec normal = cross(x, y);
   for (const Image& image : images) {
     const VolumeClaim& own = image.claim;
     // What no tag names is a guess, and differs from one time to the next.

@@ -1,22 +1,144 @@
 // SPDX-License-Identifier: Apache-2.0
+// A folder of PNG or TIFF slices as one volume, in the order of the numbers in their names.
 #include <algorithm>
+#include <charconv>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <span>
 #include <string>
 #include <vector>
 
-#include "controller/volume/file/foreign_io.hpp"
+#include "controller/volume/file/foreign_itk.hpp"
 // ITK from here on.
 #include <itkPNGImageIO.h>
 #include <itkTIFFImageIO.h>
 
-#include "controller/volume/file/library_messages.hpp"
-#include "controller/volume/file/slice_names.hpp"
+#include "controller/input/load_error.hpp"
 
 namespace kerf::volume {
 namespace fs = std::filesystem;
-
 namespace {
 
-/// Those of the kind; one of the other kind would be of another stack.
+bool is_digit(char c) {
+  return '0' <= c && c <= '9';
+}
+
+/// A name as its groups of digits and the text around them.
+struct SliceName {
+  std::string text;  ///< with the folder; a zero byte, which no name has, for each group
+  std::vector<std::string> groups;
+
+  explicit SliceName(const fs::path& file) : text(file.parent_path().string() + '/') {
+    bool in_group = false;
+    for (const char c : file.stem().string()) {
+      if (!is_digit(c)) {
+        text += c;
+      } else if (in_group) {
+        groups.back() += c;
+      } else {
+        text += '\0';
+        groups.emplace_back(1, c);
+      }
+      in_group = is_digit(c);
+    }
+  }
+};
+
+/// The text of most names; of equally many that which comes first.
+std::string usual_text(const std::vector<SliceName>& names) {
+  std::map<std::string, std::size_t> count;
+  for (const SliceName& name : names) ++count[name.text];
+  const auto most =
+      std::ranges::max_element(names, {}, [&](const SliceName& name) { return count[name.text]; });
+  return most->text;
+}
+
+[[noreturn]] void refuse_stranger(const fs::path& file, const fs::path& slice) {
+  throw SceneError(file.string() + ": is no slice of the stack of " + slice.filename().string() +
+                   "; keep one stack of slices, and no other picture, in a folder");
+}
+
+/// The last group that differs between names of one text, which have one or more.
+std::size_t counting_group(const std::vector<SliceName>& names) {
+  const std::vector<std::string>& first = names.front().groups;
+  for (std::size_t g = first.size(); g-- > 0;) {
+    const auto differs = [&](const SliceName& name) { return name.groups[g] != first[g]; };
+    if (std::ranges::any_of(names, differs)) return g;
+  }
+  return first.size() - 1;
+}
+
+std::int64_t number_of(const fs::path& file, const std::string& digits) {
+  std::int64_t number = 0;
+  const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), number);
+  if (error == std::errc{} && end == digits.data() + digits.size()) return number;
+  throw SceneError(file.string() + ": " + digits + " is no number of a slice; renumber the stack");
+}
+
+/// The step between most slices, the smallest of equally many.
+std::int64_t usual_step(const std::vector<std::int64_t>& numbers) {
+  std::map<std::int64_t, std::size_t> count;
+  for (std::size_t i = 1; i < numbers.size(); ++i) ++count[numbers[i] - numbers[i - 1]];
+  return std::ranges::max_element(count, {}, [](const auto& row) { return row.second; })->first;
+}
+
+/// The name of `file` with another number, as long as its own.
+std::string renumbered(const fs::path& file, const std::string& digits, std::int64_t number) {
+  std::string name = file.filename().string();
+  std::string text = std::to_string(number);
+  if (text.size() < digits.size()) text.insert(0, digits.size() - text.size(), '0');
+  return name.replace(name.rfind(digits), digits.size(), text);
+}
+
+/// Refuses files that are not one whole stack of slices by their names: pictures of two stacks, two
+/// slices of one number, a missing slice. The last group of digits that differs between the names
+/// counts the slices; its steps are even, of 1 or more. `files`: in the order of their numbers, two
+/// or more.
+///
+/// Throws SceneError that names the slice.
+void check_slice_names(std::span<const fs::path> files) {
+  std::vector<SliceName> names(files.begin(), files.end());
+  const std::string usual = usual_text(names);
+  const auto own =
+      static_cast<std::size_t>(std::ranges::find(names, usual, &SliceName::text) - names.begin());
+  if (names[own].groups.empty()) {
+    throw SceneError(files[own].string() +
+                     ": has no number in its name; number the slices of the stack");
+  }
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    if (names[i].text != usual) refuse_stranger(files[i], files[own]);
+  }
+  const std::size_t group = counting_group(names);
+
+  std::vector<std::int64_t> numbers;
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    std::vector<std::string>& groups = names[i].groups;
+    numbers.push_back(number_of(files[i], groups[group]));
+    for (std::size_t g = 0; g < group; ++g) {
+      if (groups[g] != names.front().groups[g]) refuse_stranger(files[i], files.front());
+    }
+  }
+  const std::int64_t step = usual_step(numbers);
+  for (std::size_t i = 1; i < files.size(); ++i) {
+    const std::string before = files[i - 1].filename().string();
+    const std::int64_t apart = numbers[i] - numbers[i - 1];
+    if (apart == 0) {
+      throw SceneError(files[i].string() + ": has the same number as " + before +
+                       "; keep one of them");
+    }
+    if (apart == step) continue;
+    const std::string missing =
+        renumbered(files[i - 1], names[i - 1].groups[group], numbers[i - 1] + step);
+    throw SceneError(files[i].string() + ": follows " + before + ", " +
+                     (apart > step ? missing + " is missing; add it, or"
+                                   : "where steps of " + std::to_string(step) + " are usual;") +
+                     " number the slices in even steps");
+  }
+}
+
+/// The files of the kind; refuses those of the other kind, which belong to another stack.
 std::vector<fs::path> pictures_among(const std::vector<fs::path>& files, VolumeKind kind) {
   std::vector<fs::path> pictures;
   for (const fs::path& file : files) {
@@ -42,7 +164,7 @@ void read_slice_stack(const fs::path& folder, const std::vector<fs::path>& besid
     throw SceneError(folder.string() + ": one picture; name a folder that holds all slices");
   }
   check_slice_names(files);
-  // One for each file: that of TIFF would tell of the first file again.
+  // A new reader for each file: a used one of TIFF reports the first file again.
   const auto reader = [kind] {
     return kind == VolumeKind::png_stack ? ImageIo::Pointer(itk::PNGImageIO::New())
                                          : ImageIo::Pointer(itk::TIFFImageIO::New());

@@ -9,9 +9,11 @@
 #include <string>
 #include <vector>
 
-#include "controller/sandbox/sandbox_reader.hpp"
-#include "controller/volume/file/voxel_values.hpp"
-#include "shared/numeric/vec3.hpp"
+#include "controller/input/sandbox.hpp"
+#include "controller/volume/file/volume_image.hpp"
+#include "shared/numeric/linear_algebra.hpp"
+
+// The readers of foreign volumes as the program calls them, in the sandbox. No ITK here.
 
 namespace kerf::volume {
 
@@ -27,27 +29,30 @@ enum class VolumeKind : std::uint8_t {
   raw
 };
 
-/// What a volume file says of itself, as it crosses from the sandbox: plain bytes, none believed.
+/// The header of a volume as it comes out of the sandbox: plain bytes, none of them trusted.
 struct VolumeClaim {
   std::array<std::int64_t, 3> size{};
-  std::uint32_t voxel_bytes = 0;  ///< of the memory that is asked for, at least those of a value
+  std::uint32_t voxel_bytes = 0;  ///< of the requested memory, at least those of a value
   ValueKind kind = ValueKind::float32;
   std::uint32_t has_spacing = 1;  ///< else `spacing_mm` is a library's guess
   std::array<double, 3> spacing_mm{1, 1, 1}, origin_mm{};
-  std::array<vec3::Vec, 3> axes{};  ///< the way that each points
-  std::array<char, 256> note{};     ///< what was chosen among several, for the user
+  std::array<vec3::Vec, 3> axes{};  ///< direction of each
+  std::array<char, 256> note{};     ///< the choice among several, for the user
 };
 
-/// Tells the claim and gives the memory for it.
+/// Hands over the claim and returns the memory for it.
 using Offer = std::function<std::span<std::byte>(const VolumeClaim&)>;
 
 /// In the sandbox: parses the file or folder with the libraries, offers a VolumeClaim and fills the
-/// memory with a value for each voxel, x fastest, from its begin. What lies after them is the
-/// file's own voxels, which were there first. `folder` holds the files of a folder, for slices;
+/// memory with a value for each voxel, x fastest, from its begin. The rest of the memory is left
+/// over from the voxels as the file has them. `folder` holds the files of a folder, for slices;
 /// other files may be among them. `series`: which of several, by its number or a part of its name.
 /// Throws SceneError, or std::bad_alloc.
 void read_foreign_volume(const std::filesystem::path& path, VolumeKind kind,
                          const std::vector<std::filesystem::path>& folder,
                          const std::string& series, SandboxReader& sandbox);
+
+/// In the sandbox. Throws SceneError for a file whose size is not that of the layout.
+void read_raw(const std::filesystem::path& path, const RawLayout& layout, const Offer& offer);
 
 }  // namespace kerf::volume

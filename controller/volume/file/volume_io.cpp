@@ -3,25 +3,28 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cmath>
 #include <cstddef>
 #include <cstring>
 #include <limits>
+#include <span>
 #include <string>
 #include <system_error>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
 #include <unistd.h>
 
-#include "controller/sandbox/sandbox.hpp"
-#include "controller/scene/scene_error.hpp"
+#include "controller/input/load_error.hpp"
+#include "controller/input/sandbox.hpp"
+#include "controller/volume/file/file_headers.hpp"
 #include "controller/volume/file/foreign_volume.hpp"
-#include "controller/volume/file/volume_header.hpp"
-#include "controller/volume/file/volume_limits.hpp"
-#include "controller/volume/file/volume_source.hpp"
+#include "controller/volume/file/volume_image.hpp"
 #include "controller/volume/file/volume_write.hpp"
-#include "shared/posix/unreachable.hpp"
-#include "shared/text/words.hpp"
+#include "shared/numeric/linear_algebra.hpp"
+#include "shared/posix/error_text.hpp"
+#include "shared/text/text.hpp"
 
 namespace kerf {
 namespace fs = std::filesystem;
@@ -47,7 +50,7 @@ struct Kind {
   const char* name;
 };
 
-/// What a folder holds, by the names of its files.
+/// Kind of the volume in a folder, by the names of its files.
 Kind kind_of_folder(const std::vector<fs::path>& files) {
   std::size_t png = 0, tiff = 0;
   for (const fs::path& file : files) {
@@ -118,8 +121,8 @@ bool in_natural_order(const std::string& a, const std::string& b) {
   return a.size() != b.size() ? a.size() < b.size() : a < b;
 }
 
-/// The regular files of a folder, but hidden ones, in the order of their names, or, where there is
-/// none but an index, those of its folders, as on a disc of DICOM; none where `path` is no folder.
+/// The regular files of a folder, but hidden ones, in the order of their names. If it has none but
+/// an index, those of its folders, as on a disc of DICOM; none if `path` is no folder.
 std::vector<fs::path> files_in(const fs::path& path) {
   constexpr int kDeepest = 5;
   constexpr std::size_t kMostFiles = 20000;
@@ -130,7 +133,7 @@ std::vector<fs::path> files_in(const fs::path& path) {
        entry.increment(fault)) {
     if (entry.depth() >= kDeepest) entry.disable_recursion_pending();
     const std::string name = entry->path().filename().string();
-    const bool hidden = name.starts_with('.');  // as those that macOS puts beside each file
+    const bool hidden = name.starts_with('.');  // such as those of macOS beside each file
     if (hidden) entry.disable_recursion_pending();
     std::error_code gone;
     if (hidden || name == "DICOMDIR" || !entry->is_regular_file(gone)) continue;
@@ -149,7 +152,7 @@ std::vector<fs::path> files_in(const fs::path& path) {
   return files;
 }
 
-/// The largest file. None that can be read is larger than the largest volume's voxels.
+/// Size of the largest file, at most that of the largest volume's voxels.
 std::uint64_t largest_bytes(const std::vector<fs::path>& files) {
   std::uint64_t most = 0;
   for (const fs::path& file : files) {
@@ -160,12 +163,121 @@ std::uint64_t largest_bytes(const std::vector<fs::path>& files) {
   return std::min(most, static_cast<std::uint64_t>(kMaxVoxels) * sizeof(double));
 }
 
-/// Checks what the sandbox says of the file; gives the memory for it.
+// The steps that fill a SourceVolume, whatever library read the file. Each checks its part and
+// throws SceneError with `path` as the place.
+
+using Axis = vec3::Vec;
+using vec3::cross, vec3::dot, vec3::unit;
+using vec3::operator-, vec3::operator*;
+
+/// Refuses sizes that are empty or above the limits.
+void set_grid(const fs::path& path, const std::array<std::int64_t, 3>& size, SourceVolume& volume) {
+  check_grid(path.string(), size[0], size[1], size[2]);
+  volume.grid = {static_cast<std::int32_t>(size[0]), static_cast<std::int32_t>(size[1]),
+                 static_cast<std::int32_t>(size[2])};
+}
+
+/// Takes the spacing of the option, else that of the file. If both lack it, refuses unless the
+/// options allow that.
+void set_spacing(const fs::path& path, const ReadOptions& options, bool in_file,
+                 const std::array<double, 3>& from_file, SourceVolume& volume) {
+  volume.has_spacing = in_file || options.spacing_mm.has_value();
+  if (options.spacing_mm) {
+    volume.spacing_mm = *options.spacing_mm;
+  } else if (in_file) {
+    volume.spacing_mm = from_file;
+  } else if (!options.allow_missing_spacing) {
+    throw SceneError(path.string() +
+                     ": spacing is not in the file; add `spacing_mm = [x, y, z]` to the scene or "
+                     "`--spacing x,y,z` (mm)");
+  }
+  check_spacing(path.string(), volume.spacing_mm);
+}
+
+/// Refuses an origin that is not finite.
+void set_origin(const fs::path& path, const std::array<double, 3>& origin_mm,
+                SourceVolume& volume) {
+  for (const double o : origin_mm) {
+    if (std::isfinite(o)) continue;
+    throw SceneError(path.string() +
+                     ": its origin is not a number of mm; correct the header, or leave it out");
+  }
+  volume.origin_mm = origin_mm;
+}
+
+/// Of floats, which may be no numbers.
+void set_float_range(const fs::path& path, std::span<const float> values, SourceVolume& volume) {
+  float min = std::numeric_limits<float>::infinity();
+  float max = -min;
+  std::uint64_t bad = 0;
+  std::uint64_t first_bad = 0;
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const float v = values[i];
+    if (!std::isfinite(v) && bad++ == 0) first_bad = i;
+    min = std::min(min, v);
+    max = std::max(max, v);
+  }
+  if (bad != 0) {
+    refuse_not_finite(path, bad, first_bad, static_cast<std::uint64_t>(volume.grid.nx),
+                      static_cast<std::uint64_t>(volume.grid.ny));
+  }
+  volume.min = static_cast<double>(min);
+  volume.max = static_cast<double>(max);
+}
+
+/// Sets `min` and `max` from the values; refuses NaN and infinity.
+void set_range(const fs::path& path, SourceVolume& volume) {
+  volume.values.visit([&]<class T>(std::span<const T> values) {
+    if constexpr (std::is_same_v<T, float>) {
+      set_float_range(path, values, volume);
+    } else {
+      T least = values.front(), most = least;
+      for (const T v : values) {  // a loop that the compiler turns into vectors
+        least = std::min(least, v);
+        most = std::max(most, v);
+      }
+      volume.min = least;
+      volume.max = most;
+    }
+  });
+}
+
+/// Sets the direction from three axes that should be at right angles, exactly so afterwards. A
+/// left-handed file has its last axis reversed: same picture, right-handed axes. After the values,
+/// the spacing and the origin.
+void set_frame(const fs::path& path, Axis x, Axis y, Axis z, SourceVolume& volume) {
+  constexpr double kSkew = 2e-3;  // files round their cosines; a shear is far above this
+  const double skew =
+      std::max({std::abs(dot(x, y)), std::abs(dot(y, z)), std::abs(dot(z, x)),
+                std::abs(dot(x, x) - 1.0), std::abs(dot(y, y) - 1.0), std::abs(dot(z, z) - 1.0)});
+  if (!(skew < kSkew)) {
+    throw SceneError(path.string() +
+                     ": its axes are not at right angles; resample it to a straight grid first");
+  }
+  x = unit(x);
+  y = unit(y - dot(x, y) * x);
+  const Axis right_handed = cross(x, y);
+  if (dot(right_handed, z) < 0.0) {
+    const auto layer = static_cast<std::ptrdiff_t>(volume.values.bytes().size()) / volume.grid.nz;
+    auto low = volume.values.bytes().begin();
+    auto high = volume.values.bytes().end();
+    for (; high - low >= 2 * layer; low += layer) {
+      high -= layer;
+      std::swap_ranges(low, low + layer, high);
+    }
+    const double depth_mm = volume.spacing_mm[2] * (volume.grid.nz - 1);
+    volume.origin_mm = volume.origin_mm - depth_mm * right_handed;
+  }
+  volume.direction = {x[0], y[0], right_handed[0], x[1], y[1], right_handed[1],
+                      x[2], y[2], right_handed[2]};
+}
+
+/// Checks the header that the sandbox reports; returns the bytes of memory for it.
 std::size_t accept(const fs::path& path, const ReadOptions& options, const VolumeClaim& claim,
                    SourceVolume& source) {
-  volume::set_grid(path, claim.size, source);
-  volume::set_spacing(path, options, claim.has_spacing != 0, claim.spacing_mm, source);
-  volume::set_origin(path, claim.origin_mm, source);
+  set_grid(path, claim.size, source);
+  set_spacing(path, options, claim.has_spacing != 0, claim.spacing_mm, source);
+  set_origin(path, claim.origin_mm, source);
   const std::uint64_t each = std::clamp<std::uint64_t>(claim.voxel_bytes, bytes_of(claim.kind), 8);
   return source.grid.voxel_count() * each;
 }
@@ -204,8 +316,8 @@ SourceVolume read_volume(const fs::path& path, const ReadOptions& options) {
   source.values = VoxelValues(memory.bytes(), claim.kind, source.grid.voxel_count());
   source.note = note_of(claim);
   source.memory = std::move(memory);
-  volume::set_range(path, source);
-  volume::set_frame(path, claim.axes[0], claim.axes[1], claim.axes[2], source);
+  set_range(path, source);
+  set_frame(path, claim.axes[0], claim.axes[1], claim.axes[2], source);
   return source;
 }
 

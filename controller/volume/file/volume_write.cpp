@@ -12,8 +12,8 @@
 
 #include <zlib.h>
 
-#include "controller/scene/scene_error.hpp"
-#include "shared/posix/new_file.hpp"
+#include "controller/input/load_error.hpp"
+#include "shared/posix/atomic_file.hpp"
 
 namespace kerf {
 namespace fs = std::filesystem;
@@ -101,10 +101,6 @@ void write_voxels(NewFile& file, const VolumeImage& image, const std::vector<T>&
   }
   file.close();
 }
-
-}  // namespace
-
-namespace {
 
 constexpr std::string_view kLabelsEnd = "-labels";
 

@@ -5,7 +5,7 @@
 #include <filesystem>
 
 #include "controller/volume/file/volume_image.hpp"
-#include "shared/posix/new_files.hpp"
+#include "shared/posix/atomic_file.hpp"
 
 namespace kerf {
 

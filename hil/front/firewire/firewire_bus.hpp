@@ -9,17 +9,15 @@
 #include <utility>
 #include <vector>
 
-#include "hil/devmodel/packet_device.hpp"
-#include "hil/front/firewire/bus_clock.hpp"
+#include "hil/device/packet_device.hpp"
+#include "hil/front/firewire/bus_registers.hpp"
 #include "hil/front/firewire/iso_context.hpp"
-#include "hil/front/firewire/iso_resources.hpp"
-#include "hil/front/firewire/omni_registers.hpp"
 #include "shared/numeric/fnv1a.hpp"
 
 namespace kerf {
 
-/// What will happen in a later bus cycle: answers on their way, time-outs, scripted faults. Things
-/// of one cycle happen in the order in which they were entered.
+/// Actions of later bus cycles: answers on their way, time-outs, scripted faults. Actions of one
+/// cycle run in the order in which they were entered.
 class Agenda {
  public:
   static constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::max();
@@ -30,7 +28,7 @@ class Agenda {
   [[nodiscard]] std::int64_t next() const noexcept {
     return entries_.empty() ? kNever : entries_.begin()->first;
   }
-  /// What is due up to and in `cycle`, also what that adds.
+  /// Runs all that is due up to and in `cycle`, including actions added meanwhile.
   void run(std::int64_t cycle) {
     while (next() <= cycle) entries_.extract(entries_.begin()).mapped()();
   }
@@ -39,7 +37,7 @@ class Agenda {
   std::multimap<std::int64_t, std::function<void()>> entries_;
 };
 
-/// What may happen to a bus.
+/// A fault of a bus.
 enum class BusFault : std::uint8_t {
   reset,         ///< another node resets the bus
   device_reset,  ///< the device itself does: clients hear of it half a second later
@@ -48,18 +46,18 @@ enum class BusFault : std::uint8_t {
   back,          ///< the device is there again
 };
 
-/// A fault, and when it strikes.
+/// A fault and its time.
 struct ScriptedFault {
   std::int64_t cycle = 0;  ///< counted from the start of the bus
   BusFault fault = BusFault::reset;
 };
 
-/// How bus and device behave in one run.
+/// The behaviour of bus and device in one run.
 struct FirewireSettings {
   BusClock clock = BusClock::lock_step();
   int packet_cycles = 1;    ///< cycles per packet of the device: 1 = 8 kHz, 8 = 1 kHz
   int lockstep_cycles = 8;  ///< that a FLUSH_ISO of the received stream lets pass in lock-step
-  /// What the real device does in a bus reset is not known: stream on, or forget channels and
+  /// The real device's behaviour in a bus reset is not known: stream on, or forget channels and
   /// enable bit.
   bool reset_stops_stream = false;
   std::uint32_t packed_serial = 0x82B6'980C;
@@ -67,7 +65,7 @@ struct FirewireSettings {
   std::vector<ScriptedFault> script;
 };
 
-/// What the bus has seen.
+/// Counts of a run.
 struct FirewireStats {
   std::uint64_t commands = 0;  ///< packets of the host that reached the device
   std::uint64_t reports = 0;   ///< packets of the device that reached an open
@@ -76,20 +74,20 @@ struct FirewireStats {
   std::uint64_t command_hash = kFnv1aBasis;
 };
 
-/// The bus and the device on it, cycle by cycle: who sends on which channel, generations,
+/// The bus and the device on it, cycle by cycle: the senders of its channels, generations,
 /// resources, faults. Advances only when asked to catch up with its clock. One thread.
 class FirewireBus {
  public:
-  /// Hears of what concerns every client.
+  /// Called for events that concern every client.
   class Listener {
    public:
     virtual ~Listener() = default;
-    /// The generation is new, which the host's own node tells at once.
+    /// The generation is new; the host's own node reports this at once.
     virtual void generation_is_new() = 0;
-    /// After that: resources are to be claimed again now, the device's clients to be told
+    /// After that: claims resources again now, and reports the reset to the device's clients
     /// `event_delay` cycles later.
     virtual void bus_was_reset(std::int64_t event_delay) = 0;
-    /// The channel that a foreign node should take in a reset; -1 for none.
+    /// The channel that a foreign node should take in a reset; -1 if none.
     [[nodiscard]] virtual std::int32_t channel_in_use() const = 0;
     virtual void device_is_gone() = 0;
   };
@@ -116,9 +114,9 @@ class FirewireBus {
   [[nodiscard]] std::int64_t cycle() const noexcept { return cycle_; }
   [[nodiscard]] std::int64_t reset_cycle() const noexcept { return reset_cycle_; }
   [[nodiscard]] std::uint32_t generation() const noexcept { return generation_; }
-  /// Whether the device is on the bus.
+  /// Returns true if the device is on the bus.
   [[nodiscard]] bool present() const noexcept { return present_; }
-  /// Whether clients take it to be there: they hear of a loss two seconds later.
+  /// Returns true if clients take it to be there: they learn of a loss two seconds later.
   [[nodiscard]] bool listed() const noexcept { return listed_; }
   [[nodiscard]] OmniRegisters& registers() noexcept { return registers_; }
   [[nodiscard]] const OmniRegisters& registers() const noexcept { return registers_; }
@@ -126,7 +124,7 @@ class FirewireBus {
   [[nodiscard]] const FirewireStats& stats() const noexcept { return stats_; }
   /// The next cycle in which something is due that a client may wait for.
   [[nodiscard]] std::int64_t next_due() const noexcept { return agenda_.next(); }
-  /// The same with interrupts and the script; `Agenda::kNever` for none.
+  /// The same with interrupts and the script; `Agenda::kNever` if none.
   [[nodiscard]] std::int64_t next_event() const noexcept;
 
  private:

@@ -13,8 +13,8 @@
 
 #include <linux/firewire-cdev.h>
 
-#include "hil/front/firewire/event_queue.hpp"
 #include "hil/front/firewire/firewire_bus.hpp"
+#include "hil/front/firewire/iso_context.hpp"
 #include "hil/front/fuse/fuse_node.hpp"
 
 namespace kerf {
@@ -39,12 +39,12 @@ class FirewireClient : public std::enable_shared_from_this<FirewireClient> {
   [[nodiscard]] EventQueue& events() noexcept { return events_; }
   [[nodiscard]] const std::optional<IsoContext>& context() const noexcept { return context_; }
 
-  /// After a bus reset: claims its channels and bandwidth again. What is lost to another client is
-  /// told by an event.
+  /// After a bus reset: claims its channels and bandwidth again. An event reports each loss to
+  /// another client.
   void reclaim_resources();
-  /// Queues a BUS_RESET event where GET_INFO was called before.
+  /// Queues a BUS_RESET event if GET_INFO was called before.
   void tell_bus_reset();
-  /// The lowest isochronous channel that it holds; -1 for none.
+  /// The lowest isochronous channel that it holds; -1 if none.
   [[nodiscard]] std::int32_t lowest_channel() const noexcept;
   [[nodiscard]] std::uint32_t node() const noexcept { return node_; }
   /// From now on everything is ENODEV.
@@ -59,7 +59,7 @@ class FirewireClient : public std::enable_shared_from_this<FirewireClient> {
     std::uint64_t closure;
   };
 
-  // Each returns what the ioctl returns, or a negative errno.
+  // Each returns the ioctl's result, or a negative errno.
   int handle(const FuseIoctl& call);
   int get_info(const FuseIoctl& call);
   int send_request(const FuseIoctl& call);

@@ -33,7 +33,7 @@ FuseAnswer FirewireNode::take(Open& open, std::size_t size) {
   return {.bytes = std::span<const std::uint8_t>(taken_).first(std::min(size, taken_.size()))};
 }
 
-/// The kernel knows no O_NONBLOCK here: who reads when there is nothing sleeps.
+/// The kernel knows no O_NONBLOCK here: a read without an event sleeps.
 std::optional<FuseAnswer> FirewireNode::read(FuseOpen id, FuseRequest request,
                                              std::uint64_t /*offset*/, std::size_t size) {
   bus_.catch_up();
@@ -97,7 +97,7 @@ void FirewireNode::wake() {
   deliver();
 }
 
-/// Answers reads that wait for an event, and wakes those who poll for one.
+/// Answers reads that wait for an event, and wakes clients that poll for one.
 void FirewireNode::deliver() {
   for (auto& [id, open] : opens_) {
     EventQueue& events = open.client->events();

@@ -4,22 +4,25 @@
 #include <cstddef>
 #include <cstdint>
 #include <deque>
+#include <limits>
 #include <map>
 #include <memory>
+#include <optional>
 
 #include "hil/front/firewire/firewire_bus.hpp"
 #include "hil/front/firewire/firewire_client.hpp"
 #include "hil/front/fuse/fuse_node.hpp"
 
+/// The device nodes of an emulated FireWire bus as files: that of the Omni, and that of the host's
+/// card.
 namespace kerf {
 
-/// The device node of an emulated Omni on FireWire (`/dev/fw*`, linux/firewire-cdev.h): what a
-/// driver that uses ioctl(), read() and poll() cannot tell from the kernel's. Without mmap().
+/// The device node of an emulated Omni on FireWire (`/dev/fw*`, linux/firewire-cdev.h): to a
+/// driver that uses ioctl(), read() and poll() it is like the kernel's. Without mmap().
 ///
 /// In real time the bus catches up with the clock at every call and at interrupts; in lock-step
-/// time stands still except where a client flushes its received stream, which lets one servo period
-/// pass, or sleeps for an answer, which takes it to that answer. Then a run is repeated bit for
-/// bit.
+/// time stands still unless a client flushes its received stream, which lets one servo period pass,
+/// or sleeps for an answer, which takes it to that answer. Such a run repeats bit for bit.
 class FirewireNode final : public FuseNode, private FirewireBus::Listener {
  public:
   FirewireNode(const FirewireSettings& settings, PacketDevice& device)
@@ -27,7 +30,7 @@ class FirewireNode final : public FuseNode, private FirewireBus::Listener {
 
   [[nodiscard]] bool present() const noexcept override { return bus_.listed(); }
   void open(FuseOpen open) override { add(open, kOmniNodeId); }
-  /// An open of the host's own node on this bus (firewire_host_node.hpp).
+  /// An open of the host's own node on this bus (`FirewireHostNode`).
   void open_host(FuseOpen open) { add(open, kHostNodeId); }
   void release(FuseOpen open) override;
   std::optional<FuseAnswer> read(FuseOpen open, FuseRequest request, std::uint64_t offset,
@@ -38,9 +41,9 @@ class FirewireNode final : public FuseNode, private FirewireBus::Listener {
   [[nodiscard]] std::int64_t next_wake_ns() const noexcept override;
   void wake() override;
 
-  /// Somebody had a stream, and nobody has the node open any more.
+  /// A client had a stream, and the node is open no more.
   [[nodiscard]] bool left() const noexcept { return streamed_ && !in_use(); }
-  /// Somebody has it open.
+  /// The node is open.
   [[nodiscard]] bool in_use() const noexcept { return !opens_.empty(); }
   [[nodiscard]] const FirewireBus& bus() const noexcept { return bus_; }
   /// Largest number of events that one open has let wait.
@@ -76,6 +79,37 @@ class FirewireNode final : public FuseNode, private FirewireBus::Listener {
   bool streamed_ = false;
   std::size_t high_water_ = 0;
   std::uint64_t double_starts_ = 0;
+};
+
+/// The node of the host's own card (`/dev/fw0` if the card came up alone), beside that of the
+/// device: programs that know every node of a bus, such as those above libraw1394, begin with it
+/// and ask it for channels and bandwidth. Its opens are opens of the same bus, so the device node
+/// serves them; it stays when the device is unplugged. In the same folder as
+/// `device`, which outlives it.
+class FirewireHostNode final : public FuseNode {
+ public:
+  explicit FirewireHostNode(FirewireNode& device) : device_(device) {}
+
+  [[nodiscard]] bool present() const noexcept override { return true; }
+  void open(FuseOpen open) override { device_.open_host(open); }
+  void release(FuseOpen open) override { device_.release(open); }
+  std::optional<FuseAnswer> read(FuseOpen open, FuseRequest request, std::uint64_t offset,
+                                 std::size_t size) override {
+    return device_.read(open, request, offset, size);
+  }
+  std::optional<FuseAnswer> ioctl(FuseOpen open, const FuseIoctl& call) override {
+    return device_.ioctl(open, call);
+  }
+  std::uint32_t poll(FuseOpen open, bool sleeps) override { return device_.poll(open, sleeps); }
+  void interrupted(FuseRequest request) override { device_.interrupted(request); }
+  /// The device node wakes for both.
+  [[nodiscard]] std::int64_t next_wake_ns() const noexcept override {
+    return std::numeric_limits<std::int64_t>::max();
+  }
+  void wake() override {}
+
+ private:
+  FirewireNode& device_;
 };
 
 }  // namespace kerf

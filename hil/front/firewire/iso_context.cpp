@@ -4,18 +4,15 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
-#include <cstring>
 
 #include <linux/firewire-cdev.h>
-
-#include "hil/front/firewire/bus_clock.hpp"
 
 namespace kerf {
 namespace {
 
 constexpr std::size_t kHeaderPageBytes = 4096;
 constexpr std::size_t kDescriptorBytes = 16;
-constexpr std::uint8_t kStaleByte = 0xA5;  // what an unused part of a receive buffer holds
+constexpr std::uint8_t kStaleByte = 0xA5;  // content of the unused part of a receive buffer
 
 constexpr std::uint32_t payload_bytes(std::uint32_t control) noexcept {
   return control & 0xFFFF;
@@ -71,7 +68,7 @@ IsoContext::Queued IsoContext::queue(std::span<const std::uint8_t> entries, bool
   return queued;
 }
 
-/// False when descriptor memory is full. Block sizes: ohci.c, queue_iso_transmit and
+/// Returns false if descriptor memory is full. Block sizes: ohci.c, queue_iso_transmit and
 /// queue_iso_packet_per_buffer.
 bool IsoContext::append(std::uint32_t control, std::span<const std::uint8_t> data) {
   const bool interrupts = (control & FW_CDEV_ISO_INTERRUPT) != 0;
@@ -100,7 +97,7 @@ bool IsoContext::append(std::uint32_t control, std::span<const std::uint8_t> dat
 int IsoContext::start(std::int64_t cycle, std::uint32_t tags) noexcept {
   if (descriptors_.empty()) return ENODATA;
   if (running_) ++double_starts_;
-  // What was done but not yet looked at runs again.
+  // Descriptors that were done but not yet handled run again.
   done_ = 0;
   running_ = true;
   halted_ = false;
@@ -131,7 +128,8 @@ void IsoContext::receive(std::uint32_t tag, std::span<const std::uint8_t> packet
     ++missed_;
     return;
   }
-  // The header of the packet and its time stamp, then the packet; big-endian, cut to what fits.
+  // The header of the packet and its time stamp, then the packet; big-endian, cut to the header
+  // size.
   std::vector<std::uint8_t>& data = descriptors_[done_].data;
   data.assign(std::max<std::size_t>(settings_.header_size, 8), kStaleByte);
   put_big_endian(data, static_cast<std::uint32_t>(packet.size()) << 16 | tag << 14 |
@@ -148,7 +146,7 @@ void IsoContext::done(std::int64_t cycle) {
   if (descriptor.interrupts) complete(false);
 }
 
-/// The driver looks at what the engine has done.
+/// The driver handles the descriptors that the engine has completed.
 void IsoContext::complete(bool flush) {
   for (; done_ > 0; --done_) {
     const Descriptor& front = descriptors_.front();

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "hil/front/fuse/fuse_channel.hpp"
 
+#include <algorithm>
 #include <cerrno>
 #include <ctime>
 #include <system_error>
@@ -14,7 +15,7 @@
 #include <unistd.h>
 
 #include "hil/hil_error.hpp"
-#include "shared/posix/failure.hpp"
+#include "shared/posix/error_text.hpp"
 #include "shared/posix/monotonic_clock.hpp"
 
 namespace kerf {
@@ -24,12 +25,19 @@ std::string reason() {
   return std::generic_category().message(errno);
 }
 
+constexpr std::size_t kPageBytes = 4096;
+
+void* pointer(std::uint64_t address) noexcept {
+  // An address of another process: never followed here, only handed to the kernel.
+  return reinterpret_cast<void*>(address);  // NOLINT(performance-no-int-to-ptr)
+}
+
 }  // namespace
 
 FuseChannel::FuseChannel(std::string folder) : folder_(std::move(folder)) {
   struct stat file {};
   if (stat(folder_.c_str(), &file) != 0 && errno == ENOTCONN) {
-    umount2(folder_.c_str(), MNT_DETACH);  // what an emulator that was killed has left
+    umount2(folder_.c_str(), MNT_DETACH);  // left by an emulator that was killed
   }
   if (stat(folder_.c_str(), &file) != 0 || !S_ISDIR(file.st_mode)) {
     throw HilError("--mount: " + folder_ + " is no folder; make one");
@@ -82,12 +90,39 @@ void FuseChannel::reply(std::uint64_t id, int error, std::span<const std::uint8_
   header.len = static_cast<std::uint32_t>(sizeof header + head.size() + rest.size());
   header.error = -error;
   header.unique = id;
-  // writev() takes what it only reads as iovec, whose pointer is not const.
+  // writev() only reads, but takes an iovec, whose pointer is not const.
   const std::array<iovec, 3> parts{{{&header, sizeof header},
                                     {const_cast<std::uint8_t*>(head.data()), head.size()},
                                     {const_cast<std::uint8_t*>(rest.data()), rest.size()}}};
   // ENOENT: the client was killed meanwhile.
   static_cast<void>(writev(fd_, parts.data(), static_cast<int>(parts.size())));
+}
+
+std::size_t read_caller(pid_t thread, std::uint64_t address, std::span<std::uint8_t> out) noexcept {
+  const iovec here{out.data(), out.size()};
+  const iovec there{pointer(address), out.size()};
+  if (process_vm_readv(thread, &here, 1, &there, 1, 0) == static_cast<ssize_t>(out.size())) {
+    return out.size();
+  }
+  // The kernel promises whole elements only: page by page, to find the end of the memory.
+  std::size_t done = 0;
+  while (done < out.size()) {
+    const std::size_t to_page_end = kPageBytes - (address + done) % kPageBytes;
+    const std::size_t size = std::min(to_page_end, out.size() - done);
+    const iovec part{&out[done], size};
+    const iovec from{pointer(address + done), size};
+    if (process_vm_readv(thread, &part, 1, &from, 1, 0) != static_cast<ssize_t>(size)) break;
+    done += size;
+  }
+  return done;
+}
+
+bool write_caller(pid_t thread, std::uint64_t address,
+                  std::span<const std::uint8_t> bytes) noexcept {
+  // The system call takes both ends as iovec, whose pointer is not const.
+  const iovec here{const_cast<std::uint8_t*>(bytes.data()), bytes.size()};
+  const iovec there{pointer(address), bytes.size()};
+  return process_vm_writev(thread, &here, 1, &there, 1, 0) == static_cast<ssize_t>(bytes.size());
 }
 
 }  // namespace kerf

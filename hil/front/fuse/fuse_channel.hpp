@@ -10,7 +10,9 @@
 #include <string>
 
 #include <linux/fuse.h>
+#include <sys/types.h>
 
+/// The kernel's side of a FUSE folder: its messages, and the memory of the process that calls.
 namespace kerf {
 
 /// One message of the kernel; the body stays valid until the next one is received.
@@ -21,7 +23,7 @@ struct FuseMessage {
   [[nodiscard]] std::uint64_t id() const noexcept { return header.unique; }
 };
 
-/// `T` from the first bytes of a body; nothing when there are too few.
+/// `T` from the first bytes of a body; empty if there are too few.
 template <class T>
 [[nodiscard]] std::optional<T> fuse_body(std::span<const std::uint8_t> bytes) noexcept {
   T value{};
@@ -37,12 +39,12 @@ template <class T>
 
 /// A mounted folder and the messages about it: linux/fuse.h on /dev/fuse itself.
 ///
-/// Not by a file-system library, because device nodes need what such a one hides: the caller's
+/// Not through a file-system library, because one hides things that device nodes need: the caller's
 /// thread, the raw argument of an ioctl, and answers that come later. The folder is unmounted at
 /// the end; clients that are still inside get ENOTCONN.
 class FuseChannel {
  public:
-  static constexpr std::size_t kMaxWrite = 32768;  ///< bytes of one write(), told in INIT
+  static constexpr std::size_t kMaxWrite = 32768;  ///< bytes of one write(), announced in INIT
 
   /// Throws `HilError` when /dev/fuse or the right to mount is missing, or `folder` is no folder.
   explicit FuseChannel(std::string folder);
@@ -50,9 +52,9 @@ class FuseChannel {
   FuseChannel(const FuseChannel&) = delete;
   FuseChannel& operator=(const FuseChannel&) = delete;
 
-  /// Whether a message is there within the time.
+  /// Returns true if a message is there within the time.
   [[nodiscard]] bool wait(std::int64_t ns) const noexcept;
-  /// Nothing when none is there, or the folder was unmounted: `gone`.
+  /// Empty if none is there, or the folder was unmounted: `gone`.
   [[nodiscard]] std::optional<FuseMessage> receive() noexcept;
   [[nodiscard]] bool gone() const noexcept { return gone_; }
 
@@ -64,7 +66,7 @@ class FuseChannel {
                   std::span<const std::uint8_t> rest = {}) noexcept {
     reply(id, 0, fuse_bytes(body), rest);
   }
-  /// Something that nobody asked for; `code` is one of fuse_notify_code.
+  /// An unsolicited message; `code` is one of fuse_notify_code.
   void notify(int code, std::span<const std::uint8_t> body) noexcept { reply(0, -code, body); }
 
  private:
@@ -73,5 +75,17 @@ class FuseChannel {
   bool gone_ = false;
   std::array<std::uint8_t, kMaxWrite + 4096> buffer_{};
 };
+
+// Memory of the process whose thread called, for pointers inside an ioctl's structure. Needs the
+// right to trace that process: the same user, or root. Any address is allowed; a copy ends at an
+// address that is not mapped.
+
+/// Copies from `address` on and returns the number of bytes that could be read.
+[[nodiscard]] std::size_t read_caller(pid_t thread, std::uint64_t address,
+                                      std::span<std::uint8_t> out) noexcept;
+
+/// Returns false if not all bytes could be written.
+[[nodiscard]] bool write_caller(pid_t thread, std::uint64_t address,
+                                std::span<const std::uint8_t> bytes) noexcept;
 
 }  // namespace kerf

@@ -39,7 +39,7 @@ void FuseMount::add(std::string name, FuseNode& node) {
 
 void FuseMount::serve(const std::function<bool()>& goes_on) {
   while (!channel_.gone() && wait(goes_on)) serve_one();
-  for (const Named& named : nodes_) named.node->wake();  // what was on its way arrives
+  for (const Named& named : nodes_) named.node->wake();  // packets on their way arrive
 }
 
 /// Wakes nodes when they are due, until a request is there; false when it does not go on.

@@ -11,30 +11,30 @@
 
 #include "hil/front/fuse/fuse_channel.hpp"
 #include "hil/front/fuse/fuse_node.hpp"
-#include "shared/numeric/histogram.hpp"
+#include "shared/numeric/statistics.hpp"
 
 namespace kerf {
 
 /// A folder whose files are device nodes: open, read, write, ioctl and poll reach a `FuseNode`.
 ///
-/// One thread, which must never touch its own folder. A client that asks for nonsense gets an
+/// One thread, which must never touch its own folder. A nonsensical call gets an
 /// errno.
 class FuseMount final : public FuseReplies {
  public:
-  /// Throws `HilError` when /dev/fuse or the right to mount is missing, or `folder` is no folder.
+  /// Throws `HilError` if /dev/fuse or the right to mount is missing, or `folder` is no folder.
   explicit FuseMount(std::string folder) : channel_(std::move(folder)) {}
 
   /// Before `serve`. The node outlives the mount.
   void add(std::string name, FuseNode& node);
 
   /// Serves while `goes_on`, which is asked between requests and at least every 100 ms, or until
-  /// somebody else unmounts.
+  /// another process unmounts.
   void serve(const std::function<bool()>& goes_on);
 
   void answer(FuseRequest request, const FuseAnswer& answer) noexcept override;
   void wake_pollers(FuseOpen open) noexcept override;
 
-  /// How late `FuseNode::wake` was called.
+  /// Lateness of the calls of `FuseNode::wake`.
   [[nodiscard]] const Histogram& lateness() const noexcept { return lateness_; }
   [[nodiscard]] std::uint64_t requests() const noexcept { return requests_; }
 
@@ -72,7 +72,8 @@ class FuseMount final : public FuseReplies {
   std::vector<Named> nodes_;
   FuseOpen last_open_ = 0;
   std::map<FuseOpen, FuseNode*> opens_;
-  std::map<FuseOpen, std::uint64_t> pollers_;  ///< who sleeps in poll(), by the kernel's name
+  std::map<FuseOpen, std::uint64_t>
+      pollers_;  ///< the kernel's name of an open that sleeps in poll()
   std::map<FuseRequest, Parked> parked_;
   std::uint64_t requests_ = 0;
   Histogram lateness_;

@@ -14,7 +14,7 @@ namespace kerf {
 using FuseOpen = std::uint64_t;     ///< names one open of a node, never used twice
 using FuseRequest = std::uint64_t;  ///< names a call of a client until it is answered
 
-/// What a call returns to the client: an errno, or bytes and a result of 0 and above.
+/// The answer to a call: an errno, or bytes and a result of 0 and above.
 struct FuseAnswer {
   int error = 0;            ///< 0 or a positive errno; the rest is ignored then
   std::int32_t result = 0;  ///< of ioctl()
@@ -33,7 +33,7 @@ struct FuseIoctl {
   std::size_t output_bytes = 0;           ///< room that `command` says comes back
 };
 
-/// How a node answers calls that it left open, and wakes those who sleep in poll().
+/// The way for a node to answer calls that it left open, and to wake clients that sleep in poll().
 class FuseReplies {
  public:
   virtual ~FuseReplies() = default;
@@ -52,15 +52,15 @@ class FuseNode {
 
   /// Before the first call.
   void attach(FuseReplies& replies) noexcept { replies_ = &replies; }
-  /// False: the name is not there, and cannot be opened.
+  /// If false, the name is not there and cannot be opened.
   [[nodiscard]] virtual bool present() const noexcept = 0;
 
-  /// Whether lseek() works; else it says ESPIPE, as on most devices.
+  /// Returns true if lseek() works; else it fails with ESPIPE, as on most devices.
   [[nodiscard]] virtual bool seekable() const noexcept { return false; }
 
   virtual void open(FuseOpen open) = 0;
   virtual void release(FuseOpen open) = 0;
-  /// `offset` grows from read to read where the node is seekable, else it is 0.
+  /// `offset` grows from read to read if the node is seekable, else it is 0.
   virtual std::optional<FuseAnswer> read(FuseOpen open, FuseRequest request, std::uint64_t offset,
                                          std::size_t size) = 0;
   virtual std::optional<FuseAnswer> write(FuseOpen /*open*/, FuseRequest /*request*/,
@@ -73,7 +73,7 @@ class FuseNode {
   /// A signal met the client of a parked call: answer it now, with EINTR.
   virtual void interrupted(FuseRequest /*request*/) {}
 
-  /// When `wake` is due although nobody calls, CLOCK_MONOTONIC ns; INT64_MAX for never.
+  /// The time at which `wake` is due without a call, CLOCK_MONOTONIC ns; INT64_MAX for never.
   [[nodiscard]] virtual std::int64_t next_wake_ns() const noexcept = 0;
   virtual void wake() = 0;
 

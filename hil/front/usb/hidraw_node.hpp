@@ -36,7 +36,7 @@ class HidrawNode final : public FuseNode, private HidHost {
   [[nodiscard]] std::int64_t next_wake_ns() const noexcept override;
   void wake() override;
 
-  /// Somebody has written, and nobody has the node open any more.
+  /// A client has written, and the node is open no more.
   [[nodiscard]] bool left() const noexcept { return used_ && !in_use(); }
   /// Somebody has it open.
   [[nodiscard]] bool in_use() const noexcept { return !opens_.empty(); }

@@ -9,15 +9,32 @@
 #include <utility>
 #include <vector>
 
-#include "hil/devmodel/bus_cycle.hpp"
-#include "hil/devmodel/packet_device.hpp"
-#include "hil/front/usb/usb_clock.hpp"
+#include "hil/device/packet_device.hpp"
 #include "shared/posix/monotonic_clock.hpp"
 
+/// The parts that emulated USB devices share: time, faults, control requests, bytes of descriptors.
 namespace kerf {
 
+/// The clock of an emulated USB device. Any thread.
+class UsbClock {
+ public:
+  virtual ~UsbClock() = default;
+  /// In ns; never goes back.
+  [[nodiscard]] virtual std::int64_t now_ns() const noexcept = 0;
+  /// The CLOCK_MONOTONIC time at which to check whether this clock has reached `ns`.
+  [[nodiscard]] virtual std::int64_t look_ns(std::int64_t ns) const noexcept = 0;
+};
+
+/// The machine's clock.
+class MachineClock final : public UsbClock {
+ public:
+  [[nodiscard]] std::int64_t now_ns() const noexcept override { return monotonic_ns(); }
+  [[nodiscard]] std::int64_t look_ns(std::int64_t ns) const noexcept override { return ns; }
+};
+inline const MachineClock kMachineClock;
+
 /// The time of an emulated USB device: frames of 1 ms by a clock. Its mechanics catch up cycle by
-/// cycle (125 us), and whoever drives this handles the packets that fall due.
+/// cycle (125 us), and the caller handles the packets that fall due.
 class UsbTime {
  public:
   explicit UsbTime(const UsbClock& clock) noexcept : clock_(clock), began_ns_(clock.now_ns()) {}
@@ -38,7 +55,7 @@ class UsbTime {
   }
   /// Since the start, in cycles.
   [[nodiscard]] std::int64_t cycle() const noexcept { return cycle_; }
-  /// When to look for the next frame, CLOCK_MONOTONIC.
+  /// The time to check for the next frame, CLOCK_MONOTONIC.
   [[nodiscard]] std::int64_t next_frame_ns() const noexcept {
     const std::int64_t frame = cycle_ / kCyclesPerUsbFrame + 1;
     return clock_.look_ns(began_ns_ + frame * kCyclesPerUsbFrame * kNsPerCycle);
@@ -51,19 +68,19 @@ class UsbTime {
   std::int64_t cycle_ = 0;
 };
 
-/// What may happen to a device on USB.
+/// A fault of a device on USB.
 enum class UsbFault : std::uint8_t {
   stall,   ///< the endpoint that is read halts until the host clears it (Falcon)
   split,   ///< for 0.1 s the serial line is slow: packets come in pieces (Falcon)
-  deaf,    ///< for 0.1 s it takes nothing: what the host writes has to wait (FUSE nodes)
+  deaf,    ///< for 0.1 s it takes nothing: writes of the host have to wait (FUSE nodes)
   vanish,  ///< unplugged
   back,    ///< plugged in again, without power having been lost
 };
 
-/// How long one lasts that passes by itself.
+/// Duration of a fault that passes by itself.
 inline constexpr int kUsbFaultFrames = 100;
 
-/// A fault, and when it strikes.
+/// A fault and its time.
 struct ScriptedUsbFault {
   std::int64_t cycle = 0;  ///< of 125 us, counted from the start
   UsbFault fault = UsbFault::vanish;
@@ -108,7 +125,7 @@ struct UsbSetup {
   return {b[0], b[1], word(2), word(4), word(6)};
 }
 
-// What descriptors are written from.
+// Bytes of descriptors.
 constexpr int low(std::uint16_t value) noexcept {
   return value & 0xFF;
 }

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "hil/front/fuse/fuse_node.hpp"
-#include "hil/front/usb/falcon_plug.hpp"
+#include "hil/front/usb/falcon_usb.hpp"
 
 namespace kerf {
 
@@ -38,18 +38,18 @@ class UsbfsNode final : public FuseNode, private UsbHost {
   [[nodiscard]] std::int64_t next_wake_ns() const noexcept override;
   void wake() override;
 
-  /// Somebody had transfers, and nobody has the node open any more.
+  /// A client had transfers, and the node is open no more.
   [[nodiscard]] bool left() const noexcept { return used_ && !in_use(); }
   /// Somebody has it open.
   [[nodiscard]] bool in_use() const noexcept { return !opens_.empty(); }
   /// Times that an endpoint was freed while reads waited there, which the kernel does not allow
-  /// (usb_clear_halt): what becomes of them is up to its controller.
+  /// (usb_clear_halt): their fate is up to its controller.
   [[nodiscard]] int rash_clears() const noexcept { return rash_clears_; }
   [[nodiscard]] const FtdiFalcon& chip() const noexcept { return plug_.chip(); }
 
  private:
-  /// A transfer of a client: its structure, where that stands in the client's memory, and the data
-  /// that are copied there when the client reaps it.
+  /// A transfer of a client: its structure, the address of that in the client's memory, and the
+  /// data that are copied there when the client reaps it.
   struct Urb {
     std::uint64_t address = 0;
     std::uint8_t type = 0;
@@ -63,12 +63,12 @@ class UsbfsNode final : public FuseNode, private UsbHost {
   };
   struct Open {
     std::deque<Urb> reads, writes, done;
-    bool announced = false;  ///< pollers know of what is done
+    bool announced = false;  ///< pollers know of the finished transfers
     bool gone = false;       ///< the device was unplugged: nothing works any more
   };
 
   [[nodiscard]] static std::optional<Urb> read_urb(const FuseIoctl& call) noexcept;
-  // Each returns what the ioctl returns, or a negative errno.
+  // Each returns the ioctl's result, or a negative errno.
   int submit(Open& open, FuseOpen id, const FuseIoctl& call);
   int submit_control(Open& open, Urb urb, pid_t thread);
   int submit_bulk(Open& open, Urb urb, pid_t thread);

@@ -8,10 +8,12 @@
 #include <string_view>
 #include <vector>
 
-#include "hil/devmodel/packet_device.hpp"
+#include "hil/device/packet_device.hpp"
+#include "hil/front/serving.hpp"
 #include "hil/front/usb/usb_device.hpp"
-#include "shared/wire/wooden_constants.hpp"
+#include "shared/wire/woodenhaptics.hpp"
 
+/// The HID side of an emulated WoodenHaptics arm, and the same device in the kernel's HID stack.
 namespace kerf {
 
 /// The host's side of `WoodenHid`.
@@ -22,9 +24,9 @@ class HidHost {
   virtual void plugged(bool in) = 0;
 };
 
-/// What the HID side of an emulated WoodenHaptics arm is made of: who it is, its report descriptor,
-/// one report each 1 ms, and what a script does to it. How a host asks differs between fronts.
-/// Feature reports and numbered reports are not there: the firmware has none. One thread.
+/// The HID side of an emulated WoodenHaptics arm: its identity, its report descriptor, one report
+/// each 1 ms, and the faults of a script. Requests of a host differ between fronts. No feature
+/// reports and no numbered reports: the firmware has none. One thread.
 class WoodenHid {
  public:
   struct Settings {
@@ -48,7 +50,8 @@ class WoodenHid {
   /// A vendor page with one report each way (HID 1.11, 6.2.2).
   [[nodiscard]] std::vector<std::uint8_t> report_descriptor() const;
 
-  /// To the present: `host` hears each report while the arm is plugged in, and of the plug.
+  /// To the present: `host` gets each report while the arm is plugged in, and each change of the
+  /// plug.
   void catch_up(HidHost& host);
   /// An output report as a program writes it: its number, 0, then its bytes.
   void out(std::span<const std::uint8_t> report) noexcept;
@@ -70,5 +73,43 @@ class WoodenHid {
   std::int64_t deaf_until_ = 0;
   std::uint64_t reports_ = 0;
 };
+
+/// An emulated WoodenHaptics arm in the kernel's HID stack, by /dev/uhid (linux/uhid.h): the
+/// kernel's own hidraw node stands above it. Reports go while the node is open.
+class UhidArm final : public KernelDevice, private HidHost {
+ public:
+  /// `fd` is /dev/uhid, or a socket that keeps messages apart. Owned here.
+  UhidArm(int fd, const WoodenHid::Settings& settings, PacketDevice& device);
+  UhidArm(const UhidArm&) = delete;
+  UhidArm& operator=(const UhidArm&) = delete;
+  ~UhidArm() override;
+
+  [[nodiscard]] int descriptor() const noexcept override { return fd_; }
+  void answer() override;
+  [[nodiscard]] std::int64_t next_wake_ns() const noexcept override {
+    return arm_.time().next_frame_ns();
+  }
+  void wake() override { arm_.catch_up(*this); }
+
+  /// A client has written, and the node is open no more.
+  [[nodiscard]] bool left() const noexcept { return used_ && !open_; }
+  [[nodiscard]] const WoodenHid& arm() const noexcept { return arm_; }
+  /// Reports that the kernel did not take.
+  [[nodiscard]] std::uint64_t lost() const noexcept { return lost_; }
+
+ private:
+  void hear(std::span<const std::uint8_t> report) override;
+  void plugged(bool in) override;
+  void create();
+
+  WoodenHid arm_;
+  int fd_;
+  bool open_ = false;
+  bool used_ = false;
+  std::uint64_t lost_ = 0;
+};
+
+/// /dev/uhid, open; throws `HilError` if it is missing or may not be opened.
+[[nodiscard]] int open_uhid();
 
 }  // namespace kerf

@@ -22,11 +22,11 @@
 #include <igtlTransformMessage.h>
 #include <igtlUnit.h>
 
-#include "bridge/igtl/device_names.hpp"
+#include "bridge/igtl/igtl_messages.hpp"
 #include "bridge/igtl/igtl_output.hpp"
-#include "shared/numeric/rotation.hpp"
-#include "shared/segment/hand_over.hpp"
-#include "shared/volume/density_hash.hpp"
+#include "shared/numeric/linear_algebra.hpp"
+#include "shared/segment/connection.hpp"
+#include "shared/volume/checksum.hpp"
 #include "tests/segment/segment_support.hpp"
 #include "tests/segment/test_folder.hpp"
 #include "tests/servo/support.hpp"

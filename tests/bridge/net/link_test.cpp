@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // The relay of the two machines: what it does to packets is what it says.
-#include "lab/bridge/link.hpp"
-
 #include <cstdint>
 #include <vector>
 
 #include <doctest/doctest.h>
+
+#include "lab/bridge/two_networks.hpp"
 
 using kerf::two_machines::Link;
 using kerf::two_machines::LinkSettings;

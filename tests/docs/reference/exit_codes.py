@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""docs/exit-codes.md: how each program ends, by the last words of its --help."""
+"""a section of docs/reports.md: how each program ends, by the last words of its --help."""
 import re
 
 from source import Lack, same, table
@@ -14,7 +14,7 @@ SILENT = {
 }
 
 
-def page(root, programs):
+def section(root, programs):
     rows, silent = [], []
     for name in programs.names():
         told = re.search(r"^Exit codes: 0 fine, 1 (.*), 2 (bad input or set-up.*)\.$", programs.help(name), re.M)
@@ -31,7 +31,7 @@ def page(root, programs):
     if "Every command exits with 0: fine; 1: ran, and a check failed; 2: bad input or set-up." not in kerf:
         raise Lack("./kerf --help: other words about exit codes; tests/docs/reference has to follow")
     rows.insert(0, ("`./kerf`", "ran, and a check failed; of a demo: a program of it did", "bad input or set-up"))
-    return f"""# Exit codes
+    return f"""## Exit codes
 
 0: fine. With 2 comes one line on the standard error: place, value, way out ([errors](errors.md)).
 

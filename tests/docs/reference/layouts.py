@@ -22,7 +22,7 @@ MEANINGS = {
     "blocks": "how many follow", "raw_bytes": "of the payload, before it was packed", "payload_bytes": "as it follows",
     "ring": "0 ticks, 1 dirty", "count": "records", "first": "index of the first record", "stride": "from one index to the next",
     "sent_ns": "when it was sent", "frame": "1, 2, ...; the frame that was applied", "argument": "of the command, above"}
-SAID = {"set_hash": "sum over all that the viewer holds after this frame (`bridge/wire/set_hash.hpp`)",
+SAID = {"set_hash": "sum over all that the viewer holds after this frame (`bridge/wire/messages.hpp`)",
         "record_bytes": "size of a `TickRecord`", "dirty_bytes": "size of a `DirtyRecord`", "status": "above",
         "index": "of the command, as `last_command` will show it", "kind": "above", "hi": "end of the box: it does not belong to it",
         "removed": "density units taken away; by an undo: given back"}
@@ -83,7 +83,7 @@ def segment(root, programs):
 
 What the controller writes and every reader maps, read-only: layout {file.number('kLayoutMajor')}.{file.number('kLayoutMinor')}, little-endian, natural alignment, offsets
 instead of pointers. An installed kerf and `python/kerf_reader` have readers ([packages](packages.md)). The
-magic is `KERFSHM1`. `abi_hash` is a hash of all that stands below: a reader of another layout refuses the segment.
+magic is `KERFSHM1`. `abi_hash` is a hash of the layout below: a reader with another hash refuses the segment.
 
 The controller named NAME listens at `$XDG_RUNTIME_DIR/kerf/NAME.sock`, else `/tmp/kerf-$UID/NAME.sock`. It answers a
 connection with {8 + 4 + 4 + 8 + 8} bytes (magic, major, minor, `abi_hash`, `session_id`) and the segment's file descriptor.
@@ -99,8 +99,8 @@ connection with {8 + 4 + 4 + 8 + 8} bytes (magic, major, minor, `abi_hash`, `ses
 | `off_bricks`, of a volume | bricks of 8 x 8 x 8 densities, u16, x fastest |
 | `off_labels`, of a volume | u8 for each voxel, x fastest, never changed; 0: none |
 
-A reader copies a record or a brick, and takes it where the sequence or version word was even and the same before and
-after. The servo never waits for a reader.
+To read a record or a brick, read its sequence or version word, copy, and read the word again. Keep the copy if both
+values are equal and even. The servo never waits for a reader.
 
 `lifecycle`: {choices(file, 'Lifecycle')}; from 3 on it is final.
 `cause` of a box: {choices(file, 'DirtyCause')}.
@@ -117,11 +117,11 @@ def drawing(file, begin):
 
 
 def wire(root, programs):
-    omni, falcon = Source(root, "shared/wire/omni_packet.hpp"), Source(root, "shared/wire/falcon_packet.hpp")
-    wooden, hello = Source(root, "shared/wire/wooden_packet.hpp"), Source(root, "shared/wire/hello.hpp")
-    wish, turn = Source(root, "shared/wire/hand_wish.hpp"), Source(root, "shared/wire/turn.hpp")
+    omni, falcon = Source(root, "shared/wire/omni.hpp"), Source(root, "shared/wire/falcon.hpp")
+    wooden, hello = Source(root, "shared/wire/woodenhaptics.hpp"), Source(root, "shared/wire/emulator_link.hpp")
+    wish, turn = Source(root, "shared/wire/emulator_link.hpp"), Source(root, "shared/wire/emulator_link.hpp")
     bridge, command = Source(root, "bridge/wire/messages.hpp"), Source(root, "shared/segment/command.hpp")
-    plan, most_kib = Source(root, "bridge/wire/block_plan.hpp"), re.search(r"kMaxMessageBytes = (\d+) \* 1024", bridge.text)[1]
+    plan, most_kib = Source(root, "bridge/wire/messages.hpp"), re.search(r"kMaxMessageBytes = (\d+) \* 1024", bridge.text)[1]
     same("shared/wire", ["omni", "falcon", "wooden", "hello", "hand_wish", "turn"],
          {re.sub("_(packet|constants|usb|framer)$", "", path.stem) for path in (root / "shared/wire").glob("*.hpp")}
          - {"little_endian", "personality"})
@@ -153,7 +153,7 @@ lowest bits.
 
 ## Falcon
 
-Serial, in packets of {Source(root, 'shared/wire/falcon_constants.hpp').number('kPacketBytes')} printable bytes; `shared/wire/falcon_usb.hpp` has the way there over USB.
+Serial, in packets of {Source(root, 'shared/wire/falcon.hpp').number('kPacketBytes')} printable bytes; `shared/wire/falcon.hpp` has the way there over USB.
 
 {drawing(falcon, 'namespace kerf {')}
 

@@ -16,8 +16,8 @@ import reports
 import script_keys
 from source import Lack
 
-PAGES = {"script-keys.md": script_keys.page, "reports.md": reports.page, "segment.md": layouts.segment,
-         "wire.md": layouts.wire, "exit-codes.md": exit_codes.page}
+PAGES = {"script-keys.md": script_keys.page, "segment.md": layouts.segment, "wire.md": layouts.wire,
+         "reports.md": lambda *where: f"{reports.page(*where).rstrip()}\n\n{exit_codes.section(*where)}"}
 BY = "Made by `tests/docs/reference/make.py` from what the programs say and from their source.\n"
 
 

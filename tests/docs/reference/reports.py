@@ -9,7 +9,7 @@ SPREAD = "`p50`, `p99`, `p999`, `max`"
 # of its own, or stands in `inner`.
 REPORTS = [
     ("Controller: a run", "`./kerf controller --report FILE`, and `report.json` of a demo.",
-     [("controller/shell/run_report.cpp", name) for name in ("std::string report_json(", "Json percentiles(", "Json list(")],
+     [("controller/run/run_report.cpp", name) for name in ("std::string report_json(", "Json percentiles(", "Json list(")],
      ["p50", "p99", "p999", "max", "tick", "name", "what", "effect"], [
         ("program, version", "", "kerf-controller and its version"),
         ("scene, device, numeric", "", "file of the scene; device and numbers of the loop, empty where it was not loaded yet"),
@@ -48,7 +48,7 @@ REPORTS = [
         ("start_to_force_ms", "ms", "from the start to the first force that was sent; null: none was"),
         ("volume_hash, output_hash", "", "of all that was removed, and of all that was sent")]),
     ("Controller: what a scene costs", "`./kerf controller --explain --report FILE` ([architecture](architecture.md)).",
-     [("controller/plan/cost/explain.cpp", "std::string explanation_json(")], ["stage", "name", "bytes"], [
+     [("controller/run/scene_check.cpp", "std::string explanation_json(")], ["stage", "name", "bytes"], [
         ("program, version, scene, rate_hz, numeric, cut", "", "as in a run; the law of cutting"),
         ("machine, machine_factor", "", "instructions of this processor; time here over work on the reference machine"),
         ("budget_us", "us", "of work, for one tool in all volumes"),
@@ -66,7 +66,7 @@ REPORTS = [
         ("work_us, predicted_us", "us", "their price on the reference machine; here"),
         ("arrays, total_bytes", "bytes", "memory, each with `name` and `bytes`; the sum")]),
     ("Emulator", "`./kerf emulator --report FILE`, and `emulator.json` of a demo.",
-     [("hil/program/run_report.cpp", "void write_run_report("), ("hil/program/run_report.cpp", "Json injected_list(")],
+     [("hil/program/program.cpp", "void write_run_report("), ("hil/program/program.cpp", "Json injected_list(")],
      ["p50", "p99", "max", "kind", "packets", "at_s", "changed"], [
         ("personality", "", "which device"),
         ("seconds", "s", "of the device's time"),
@@ -83,14 +83,14 @@ REPORTS = [
         ("final_tip_mm", "mm", "x, y, z in the device's frame"),
         ("wishes, wishes_refused", "", "with `--hand-socket`: of the window; that were none"),
         ("report_hash", "", "of all bytes that were handed out")]),
-    ("Recorder", "`./kerf recorder --report FILE`.", [("record/recorder_run.cpp", "void write_report(")], [], [
+    ("Recorder", "`./kerf recorder --report FILE`.", [("record/recorder.cpp", "void write_report(")], [], [
         ("rows", "", "ticks in the log"),
         ("lost_ticks, gaps", "", "ticks that were overwritten before they were read; in how many places"),
         ("missed_before_start", "", "ticks published before the recorder came, and gone"),
         ("largest_lag_ticks", "ticks", "how far it was behind at most"),
         ("end_reason", "", "`clean end`, `fault`, `stopped` or `controller gone`")]),
     ("Manifest of a log", "`manifest.json` beside `ticks.npy` ([the log](log.md)).",
-     [("record/manifest.cpp", "void write_manifest(")], ["size_vox", "spacing_mm", "initial_hash", "first_index", "count"], [
+     [("record/recording.cpp", "void write_manifest(")], ["size_vox", "spacing_mm", "initial_hash", "first_index", "count"], [
         ("kerf, compiler, build_id", "", "version, compiler and build of the controller and the recorder"),
         ("abi_hash", "", "of the layout of a row"),
         ("session_id, config_hash", "", "of the run; of its settings"),
@@ -99,7 +99,7 @@ REPORTS = [
         ("volumes", "", "each with `size_vox`, `spacing_mm`, `initial_hash`"),
         ("rows, lost_ticks, missed_before_start, end_reason", "", "as above; `end_reason` is `running` until the end"),
         ("gaps", "", "each with `first_index` and `count`")]),
-    ("Summary of a log", "`./kerf record info LOG --report FILE`.", [("record/summary.cpp", "Json figures(")], [], [
+    ("Summary of a log", "`./kerf record info LOG --report FILE`.", [("record/recording.cpp", "Json figures(")], [], [
         ("rows, first_tick, last_tick, seconds", "", "what the log covers"),
         ("lost_ticks, missed_before_start, end_reason", "", "as above"),
         ("contact_ticks, shaft_ticks, stale_ticks, faults", "", "ticks of that kind; faults that latched"),
@@ -109,7 +109,7 @@ REPORTS = [
         ("port_energy_mj, port_minimum_mj", "mJ", "work at the device port; its lowest value. And for each source below: "
          "`spring_mj` ...")]),
     ("Visualizer", "`./kerf visualizer --report FILE`, and `visualizer.json` of a demo.",
-     [("visualizer/view/frame_report.cpp", "void FrameReport::write("), ("visualizer/view/frame_report.cpp", "Json spread(")],
+     [("visualizer/scene/frame_report.cpp", "void FrameReport::write("), ("visualizer/scene/frame_report.cpp", "Json spread(")],
      ["p50", "p95", "p99", "max"], [
         ("renderer, gl_renderer, context", "", "of kerf; of OpenGL; where it drew"),
         ("width, height", "pixels", "of the picture"),
@@ -123,7 +123,7 @@ REPORTS = [
         ("attach_ms", "ms", "from asking for the controller to its first complete volumes"),
         ("late_join_ms", "ms", "from there to the first picture"),
         ("clean_end", "", "true: the controller ended cleanly")]),
-    ("Volume", "`./kerf volume info FILE --report FILE`.", [("controller/volume_tool/volume_info.cpp", "void write_report(")],
+    ("Volume", "`./kerf volume info FILE --report FILE`.", [("controller/volume_tool/volume_commands.cpp", "void write_report(")],
      ["hi", "lo"], [
         ("file", "", "its path"),
         ("size_vox, spacing_mm, has_spacing", "voxels, mm", "x, y, z; whether the file has a spacing"),
@@ -144,7 +144,7 @@ def page(root, programs):
         there = set().union(*(Source(root, path).json_keys(name) for path, name in functions))
         if title == "Controller: what a scene costs":  # of a lambda within
             there |= {"operations", "work_us", "timed_operations", "predicted_us"}
-        if functions[0][0].endswith(("manifest.cpp", "summary.cpp", "hil/program/run_report.cpp")):
+        if functions[0][0].endswith(("record/recording.cpp", "hil/program/program.cpp")):
             there |= set(re.findall(r'\w\["([a-z_0-9]+)"\]', Source(root, functions[0][0]).body(functions[0][1])))
         same(functions[0][0], [key for row in rows for key in row[0].split(", ")] + inner, there)
         parts.append(f"## {title}\n\n{way}\n\n" + table(("key", "unit", "meaning"), [
@@ -153,8 +153,8 @@ def page(root, programs):
     energies = re.findall(r"^  (\w+),?\s+///< (.*)", source.text, re.M)
     same(source.path, [word for word, _ in energies], source.words("kEnergySourceNames"))
     ports = []
-    for name, port in (("firewire", "fw"), ("usb", "usb"), ("hid", "hid")):
-        file = Source(root, f"controller/device/port/{name}_port.cpp")
+    for name, port in (("firewire/firewire", "fw"), ("port/usb", "usb"), ("port/hid", "hid")):
+        file = Source(root, f"controller/device/{name}_port.cpp")
         body = re.search(r"::counters\(\) const \{(.*?)\n\}", file.text, re.S)[1]
         ports.append((f"`{port}`", ", ".join(f"`{key}`" for key in re.findall(r'\{"(\w+)",', body))))
     return f"""# Reports

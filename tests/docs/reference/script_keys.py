@@ -30,14 +30,14 @@ def hand(root):
         ("repeat", "true", "false", "from this step to the last again and again; of one step")]
     same(f"{file.path}: the file", [row[0] for row in top], file.allowed("HandScript parse_hand_script("))
     same(f"{file.path}: [[step]]", [row[0] for row in step], file.allowed("HandStep step_of("))
-    header = Source(root, "hil/devmodel/hand_script.hpp")
+    header = Source(root, "hil/device/hand_script.hpp")
     same_defaults(file.path, top, file.defaults("HandScript parse_hand_script(", header))
     same_defaults(file.path, step, file.defaults("HandStep step_of(", header))
     heads = ("key", "values", "default", "meaning")
-    keys = Source(root, "hil/devmodel/plant_keys.hpp")
+    keys = Source(root, "hil/device/plant_params.hpp")
     rows = re.findall(r'\{"(device|hand)", "(\w+)", "(--[\w-]+)", ([\w.]+), ([\w.]+), (?:true|false),\s+"([^"]+)"', keys.text)
     same(f"{keys.path}: kPlantKeys", [row[1] for row in rows], re.findall(r'\{"(?:device|hand)", "(\w+)"', keys.text))
-    params = Source(root, "hil/devmodel/plant_params.hpp")
+    params = Source(root, "hil/device/plant_params.hpp")
     plant = [(f"`[{where}] {key}`", f"{low} to {params.number(high) if high.startswith('k') else high}", f"`{option}`", meaning)
              for where, key, option, low, high, meaning in rows]
     code = lambda rows: [(f"`{row[0]}`", *row[1:]) for row in rows]
@@ -110,7 +110,7 @@ Of a `[[fault]]`. A key that its kind does not have is refused:
 
 
 def opacities(root):
-    file, view = Source(root, "visualizer/view/transfer_file.cpp"), Source(root, "visualizer/view/transfer_function.cpp")
+    file, view = Source(root, "visualizer/scene/appearance.cpp"), Source(root, "visualizer/scene/appearance.cpp")
     same(f"{file.path}: tables", ["opacity"], set(re.findall(r'entry\.key == "(\w+)"', file.text)))
     return f"""## Opacities
 

@@ -8,8 +8,7 @@
 #include <span>
 #include <string>
 
-#include "shared/wire/falcon_packet.hpp"
-#include "shared/wire/falcon_usb.hpp"
+#include "shared/wire/falcon.hpp"
 
 struct libusb_context;
 struct libusb_device_handle;

@@ -10,9 +10,9 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "controller/device/driver/omni_driver.hpp"
-#include "controller/device/port/firewire_port.hpp"
-#include "controller/shell/guard/motor_guard.hpp"
+#include "controller/device/device_driver.hpp"
+#include "controller/device/firewire/firewire_port.hpp"
+#include "controller/loop/motor_guard.hpp"
 #include "tests/hil/fuse/mounted_node.hpp"
 
 namespace {

@@ -12,9 +12,9 @@
 
 #include <doctest/doctest.h>
 
-#include "hil/devmodel/omni_model.hpp"
-#include "hil/fault/faulty_device.hpp"
-#include "lab/faults/contract.hpp"
+#include "hil/device/omni.hpp"
+#include "hil/script/faulty_device.hpp"
+#include "lab/safety/contract.hpp"
 #include "tests/hil/fuse/usb_session.hpp"
 
 namespace {

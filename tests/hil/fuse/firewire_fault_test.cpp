@@ -10,7 +10,7 @@
 
 #include <doctest/doctest.h>
 
-#include "controller/shell/guard/allocation_counter.hpp"
+#include "controller/loop/allocation_counter.hpp"
 #include "tests/hil/fuse/lockstep_session.hpp"
 
 using kerf::BusFault;

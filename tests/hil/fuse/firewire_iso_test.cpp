@@ -11,7 +11,7 @@
 #include <doctest/doctest.h>
 
 #include "shared/posix/monotonic_clock.hpp"
-#include "shared/wire/omni_packet.hpp"
+#include "shared/wire/omni.hpp"
 #include "tests/hil/fuse/firewire_bench.hpp"
 
 using kerf::FirewireSettings;

@@ -11,10 +11,10 @@
 
 #include <doctest/doctest.h>
 
-#include "controller/device/port/firewire_port.hpp"
+#include "controller/device/firewire/firewire_port.hpp"
 #include "hil/front/serving.hpp"
 #include "shared/posix/monotonic_clock.hpp"
-#include "shared/wire/omni_packet.hpp"
+#include "shared/wire/omni.hpp"
 #include "tests/hil/fuse/mounted_node.hpp"
 #include "tests/hil/fuse/spread.hpp"
 

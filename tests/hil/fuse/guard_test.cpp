@@ -8,8 +8,7 @@
 #include <doctest/doctest.h>
 #include <unistd.h>
 
-#include "controller/shell/guard/call_guard.hpp"
-#include "controller/shell/guard/motor_guard.hpp"
+#include "controller/loop/motor_guard.hpp"
 #include "tests/hil/fuse/usb_session.hpp"
 
 namespace {

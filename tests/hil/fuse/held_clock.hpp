@@ -5,7 +5,7 @@
 #include <mutex>
 #include <optional>
 
-#include "hil/front/usb/usb_clock.hpp"
+#include "hil/front/usb/usb_device.hpp"
 #include "shared/posix/monotonic_clock.hpp"
 
 namespace kerf::test {

@@ -15,8 +15,8 @@
 
 #include <doctest/doctest.h>
 
-#include "controller/shell/guard/allocation_counter.hpp"
-#include "shared/wire/wooden_packet.hpp"
+#include "controller/loop/allocation_counter.hpp"
+#include "shared/wire/woodenhaptics.hpp"
 #include "tests/hil/fuse/usb_session.hpp"
 
 using kerf::HidPort;

@@ -4,8 +4,8 @@
 #include <atomic>
 #include <memory>
 
-#include "controller/device/driver/omni_driver.hpp"
-#include "controller/device/port/firewire_port.hpp"
+#include "controller/device/device_driver.hpp"
+#include "controller/device/firewire/firewire_port.hpp"
 #include "hil/script/hand_script_file.hpp"
 #include "tests/hil/fuse/mounted_node.hpp"
 #include "tests/servo/support.hpp"

@@ -11,7 +11,7 @@
 #include <thread>
 #include <utility>
 
-#include "hil/devmodel/emulator.hpp"
+#include "hil/device/emulator.hpp"
 #include "hil/front/firewire/firewire_node.hpp"
 #include "hil/front/fuse/fuse_mount.hpp"
 

@@ -10,8 +10,8 @@
 
 #include <doctest/doctest.h>
 
-#include "controller/device/driver/omni_driver.hpp"
-#include "controller/device/port/firewire_port.hpp"
+#include "controller/device/device_driver.hpp"
+#include "controller/device/firewire/firewire_port.hpp"
 #include "tests/hil/fuse/mounted_node.hpp"
 
 namespace {

@@ -18,9 +18,9 @@
 #include <sys/mman.h>
 #include <unistd.h>
 
-#include "controller/device/driver/omni_driver.hpp"
-#include "controller/device/port/firewire_port.hpp"
-#include "hil/front/firewire/firewire_host_node.hpp"
+#include "controller/device/device_driver.hpp"
+#include "controller/device/firewire/firewire_port.hpp"
+#include "hil/front/firewire/firewire_node.hpp"
 #include "tests/hil/clients/raw1394_client.hpp"
 #include "tests/hil/fuse/mounted_node.hpp"
 #include "tests/hil/fuse/plain_client.hpp"

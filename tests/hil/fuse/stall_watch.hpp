@@ -9,8 +9,8 @@
 #include <utility>
 #include <vector>
 
-#include "shared/posix/cores.hpp"
 #include "shared/posix/monotonic_clock.hpp"
+#include "shared/posix/threads.hpp"
 
 namespace kerf::test {
 

@@ -8,8 +8,8 @@
 
 #include "controller/device/port/hid_port.hpp"
 #include "controller/device/port/usb_port.hpp"
-#include "shared/wire/falcon_packet.hpp"
-#include "shared/wire/wooden_packet.hpp"
+#include "shared/wire/falcon.hpp"
+#include "shared/wire/woodenhaptics.hpp"
 #include "tests/hil/fuse/private_sysfs.hpp"
 #include "tests/hil/fuse/usb_session.hpp"
 

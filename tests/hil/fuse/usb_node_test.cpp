@@ -17,8 +17,8 @@
 #include <sys/ioctl.h>
 #include <unistd.h>
 
-#include "shared/wire/falcon_packet.hpp"
-#include "shared/wire/wooden_packet.hpp"
+#include "shared/wire/falcon.hpp"
+#include "shared/wire/woodenhaptics.hpp"
 #include "tests/hil/fuse/usb_session.hpp"
 
 using kerf::UsbFault;

@@ -20,9 +20,9 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "controller/shell/guard/allocation_counter.hpp"
-#include "controller/shell/guard/motor_guard.hpp"
-#include "shared/wire/falcon_packet.hpp"
+#include "controller/loop/allocation_counter.hpp"
+#include "controller/loop/motor_guard.hpp"
+#include "shared/wire/falcon.hpp"
 #include "tests/hil/fuse/usb_session.hpp"
 
 using kerf::Personality;

@@ -9,10 +9,10 @@
 
 #include <doctest/doctest.h>
 
-#include "controller/device/port/open_port.hpp"
+#include "controller/device/open_port.hpp"
 #include "hil/program/program.hpp"
-#include "shared/wire/falcon_packet.hpp"
-#include "shared/wire/wooden_packet.hpp"
+#include "shared/wire/falcon.hpp"
+#include "shared/wire/woodenhaptics.hpp"
 #include "tests/hil/fuse/mounted_node.hpp"
 
 namespace {

@@ -13,11 +13,11 @@
 #include <utility>
 #include <vector>
 
-#include "controller/device/driver/device_driver.hpp"
-#include "controller/device/port/open_port.hpp"
-#include "controller/device/port/turns.hpp"
-#include "hil/devmodel/falcon_model.hpp"
-#include "hil/devmodel/wooden_model.hpp"
+#include "controller/device/device_driver.hpp"
+#include "controller/device/open_port.hpp"
+#include "controller/device/port/io_mailbox.hpp"
+#include "hil/device/falcon.hpp"
+#include "hil/device/wooden.hpp"
 #include "hil/front/serving.hpp"
 #include "hil/front/usb/hidraw_node.hpp"
 #include "hil/front/usb/usbfs_node.hpp"

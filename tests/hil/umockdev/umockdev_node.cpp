@@ -11,7 +11,7 @@
 #include <sys/ioctl.h>
 #include <unistd.h>
 
-#include "hil/front/fuse/caller_memory.hpp"
+#include "hil/front/fuse/fuse_channel.hpp"
 #include "hil/front/serving.hpp"
 #include "shared/posix/monotonic_clock.hpp"
 

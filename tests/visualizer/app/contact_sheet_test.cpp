@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "visualizer/app/contact_sheet.hpp"
-
 #include <algorithm>
 #include <filesystem>
 #include <set>
@@ -10,9 +8,10 @@
 #include "tests/programs/process.hpp"
 #include "tests/visualizer/render/golden_picture.hpp"
 #include "tests/visualizer/render/teeth.hpp"
+#include "visualizer/app/headless.hpp"
 #include "visualizer/app/options.hpp"
-#include "visualizer/error.hpp"
 #include "visualizer/render/renderer.hpp"
+#include "visualizer/scene/visualizer_error.hpp"
 
 using namespace kerf;
 using namespace kerf::test;

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "visualizer/app/film.hpp"
-
 #include <array>
 #include <cmath>
 #include <csignal>
@@ -17,9 +15,9 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "shared/posix/new_file.hpp"
+#include "shared/posix/atomic_file.hpp"
 #include "tests/visualizer/gl/gl_fixture.hpp"
-#include "visualizer/app/video_file.hpp"
+#include "visualizer/picture/image_files.hpp"
 
 using namespace kerf;
 using namespace kerf::test;

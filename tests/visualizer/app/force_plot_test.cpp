@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "visualizer/app/force_plot.hpp"
-
 #include <doctest/doctest.h>
+
+#include "visualizer/panels/overlay.hpp"
 
 using namespace kerf;
 

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "visualizer/app/frame_schedule.hpp"
-
 #include <vector>
 
 #include <doctest/doctest.h>
+
+#include "visualizer/app/headless.hpp"
 
 using namespace kerf;
 

@@ -13,7 +13,7 @@
 #include "tests/json.hpp"
 #include "tests/programs/process.hpp"
 #include "tests/visualizer/app/window_fixture.hpp"
-#include "visualizer/view/session.hpp"
+#include "visualizer/scene/session.hpp"
 
 using namespace kerf::test;
 using namespace std::chrono_literals;

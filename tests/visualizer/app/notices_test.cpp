@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <doctest/doctest.h>
 
-#include "visualizer/app/window_figures.hpp"
 #include "visualizer/app/window_keys.hpp"
+#include "visualizer/panels/overlay.hpp"
 
 using namespace kerf;
 

@@ -8,8 +8,8 @@
 #include <doctest/doctest.h>
 #include <rapidcheck.h>
 
-#include "visualizer/error.hpp"
-#include "visualizer/render/renderer_choice.hpp"
+#include "visualizer/render/renderer.hpp"
+#include "visualizer/scene/visualizer_error.hpp"
 
 using namespace kerf;
 

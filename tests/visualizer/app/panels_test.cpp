@@ -10,8 +10,8 @@
 #include <doctest/doctest.h>
 
 #include "tests/visualizer/gl/gl_faults.hpp"
-#include "visualizer/app/overlay.hpp"
 #include "visualizer/gl/context.hpp"
+#include "visualizer/panels/overlay.hpp"
 
 using namespace kerf;
 

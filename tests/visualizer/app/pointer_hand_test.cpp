@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "visualizer/app/pointer_hand.hpp"
-
 #include <array>
 #include <cmath>
 
 #include <doctest/doctest.h>
+
+#include "visualizer/app/hand_control.hpp"
 
 using namespace kerf;
 

@@ -21,15 +21,15 @@
 #include <doctest/doctest.h>
 #include <unistd.h>
 
-#include "shared/posix/cores.hpp"
-#include "shared/posix/new_file.hpp"
-#include "shared/segment/hand_over.hpp"
+#include "shared/posix/atomic_file.hpp"
+#include "shared/posix/threads.hpp"
+#include "shared/segment/connection.hpp"
 #include "tests/json.hpp"
 #include "tests/visualizer/render/rgb_picture.hpp"
-#include "visualizer/error.hpp"
 #include "visualizer/gl/context.hpp"
 #include "visualizer/render/renderer.hpp"
-#include "visualizer/view/session.hpp"
+#include "visualizer/scene/session.hpp"
+#include "visualizer/scene/visualizer_error.hpp"
 
 using namespace kerf;
 namespace fs = std::filesystem;

@@ -3,7 +3,7 @@
 
 #include <doctest/doctest.h>
 
-#include "visualizer/app/window_figures.hpp"
+#include "visualizer/panels/overlay.hpp"
 
 using namespace kerf;
 using namespace std::chrono_literals;

@@ -13,10 +13,10 @@
 #include <glm/gtc/matrix_transform.hpp>
 #include <unistd.h>
 
-#include "shared/posix/new_file.hpp"
+#include "shared/posix/atomic_file.hpp"
 #include "tests/visualizer/gl/gl_fixture.hpp"
 #include "tests/visualizer/surface/mesh_checks.hpp"
-#include "visualizer/error.hpp"
+#include "visualizer/scene/visualizer_error.hpp"
 #include "visualizer/surface/mesh_file.hpp"
 
 using namespace kerf;

@@ -14,8 +14,8 @@
 #include "tests/programs/process.hpp"
 #include "tests/visualizer/app/window_fixture.hpp"
 #include "visualizer/app/run.hpp"
-#include "visualizer/error.hpp"
 #include "visualizer/gl/window.hpp"
+#include "visualizer/scene/visualizer_error.hpp"
 
 using namespace kerf;
 using namespace kerf::test;

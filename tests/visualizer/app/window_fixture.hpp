@@ -9,7 +9,7 @@
 
 #include <unistd.h>
 
-#include "shared/segment/hand_over.hpp"
+#include "shared/segment/connection.hpp"
 #include "shared/segment/writer.hpp"
 #include "tests/json.hpp"
 #include "tests/visualizer/render/rgb_picture.hpp"

@@ -8,7 +8,7 @@
 #include <doctest/doctest.h>
 
 #include "tests/visualizer/app/window_fixture.hpp"
-#include "visualizer/view/transfer_file.hpp"
+#include "visualizer/scene/appearance.hpp"
 
 using namespace kerf;
 using namespace kerf::test;

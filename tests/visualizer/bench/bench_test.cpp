@@ -4,7 +4,7 @@
 
 #include <doctest/doctest.h>
 
-#include "shared/posix/page_part.hpp"
+#include "shared/posix/atomic_file.hpp"
 #include "tests/json.hpp"
 #include "tests/visualizer/gl/gl_fixture.hpp"
 #include "visualizer/bench/bench_tooth.hpp"

@@ -12,7 +12,7 @@
 #include "tests/visualizer/gl/gl_fixture.hpp"
 #include "tests/visualizer/render/exact_body.hpp"
 #include "visualizer/cast/caster.hpp"
-#include "visualizer/error.hpp"
+#include "visualizer/scene/visualizer_error.hpp"
 
 using namespace kerf;
 using namespace kerf::test;

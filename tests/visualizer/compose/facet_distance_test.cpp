@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // Distances to a mesh, against a body whose distance is known.
-#include "visualizer/compose/facet_distance.hpp"
-
 #include <algorithm>
 #include <cmath>
 
 #include <doctest/doctest.h>
 #include <glm/gtc/matrix_transform.hpp>
+
+#include "visualizer/compose/tool_volume.hpp"
 
 using namespace kerf;
 

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "visualizer/compose/mesh.hpp"
-
 #include <cmath>
 #include <map>
 #include <numbers>
 #include <tuple>
 
 #include <doctest/doctest.h>
+
+#include "visualizer/compose/tool_mesh.hpp"
 
 using namespace kerf;
 

@@ -12,13 +12,13 @@
 #include <doctest/doctest.h>
 #include <unistd.h>
 
-#include "shared/segment/hand_over.hpp"
+#include "shared/segment/connection.hpp"
 #include "shared/segment/writer.hpp"
 #include "tests/visualizer/gl/gl_fixture.hpp"
-#include "visualizer/app/picture.hpp"
-#include "visualizer/error.hpp"
-#include "visualizer/render/renderer_choice.hpp"
-#include "visualizer/view/camera.hpp"
+#include "visualizer/picture/picture.hpp"
+#include "visualizer/render/renderer.hpp"
+#include "visualizer/scene/camera.hpp"
+#include "visualizer/scene/visualizer_error.hpp"
 
 using namespace kerf;
 using namespace kerf::test;

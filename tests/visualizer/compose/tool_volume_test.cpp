@@ -11,10 +11,10 @@
 #include <glm/gtc/matrix_transform.hpp>
 
 #include "tests/visualizer/render/order_scene.hpp"
-#include "visualizer/compose/mesh.hpp"
-#include "visualizer/compose/scene_painter.hpp"
-#include "visualizer/error.hpp"
-#include "visualizer/view/transfer_function.hpp"
+#include "visualizer/compose/picture_layers.hpp"
+#include "visualizer/compose/tool_mesh.hpp"
+#include "visualizer/scene/appearance.hpp"
+#include "visualizer/scene/visualizer_error.hpp"
 
 using namespace kerf;
 using namespace kerf::test;

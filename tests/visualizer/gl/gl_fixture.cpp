@@ -7,8 +7,8 @@
 #include <doctest/doctest.h>
 #include <glm/gtc/matrix_transform.hpp>
 
-#include "visualizer/error.hpp"
 #include "visualizer/gl/context.hpp"
+#include "visualizer/scene/visualizer_error.hpp"
 
 namespace kerf::test {
 

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "visualizer/render/iso_renderer.hpp"
-#include "visualizer/view/camera.hpp"
+#include "visualizer/scene/camera.hpp"
 
 namespace kerf::test {
 

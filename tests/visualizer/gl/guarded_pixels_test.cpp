@@ -11,7 +11,7 @@
 #include <unistd.h>
 
 #include "tests/visualizer/gl/gl_fixture.hpp"
-#include "visualizer/gl/names.hpp"
+#include "visualizer/gl/gl_objects.hpp"
 #include "visualizer/gl/target.hpp"
 
 using namespace kerf;

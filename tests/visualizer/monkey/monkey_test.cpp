@@ -10,7 +10,7 @@
 #include <doctest/doctest.h>
 #include <unistd.h>
 
-#include "visualizer/error.hpp"
+#include "visualizer/scene/visualizer_error.hpp"
 
 using namespace kerf;
 namespace fs = std::filesystem;

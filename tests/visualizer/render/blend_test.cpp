@@ -9,8 +9,8 @@
 
 #include "tests/visualizer/gl/gl_fixture.hpp"
 #include "tests/visualizer/render/renderer_fixture.hpp"
-#include "visualizer/error.hpp"
-#include "visualizer/render/blend_renderer.hpp"
+#include "visualizer/render/translucent_renderers.hpp"
+#include "visualizer/scene/visualizer_error.hpp"
 
 using namespace kerf;
 using namespace kerf::test;

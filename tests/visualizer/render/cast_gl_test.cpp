@@ -12,10 +12,9 @@
 #include "tests/visualizer/render/exact_body.hpp"
 #include "tests/visualizer/render/renderer_fixture.hpp"
 #include "tests/visualizer/render/teeth.hpp"
-#include "visualizer/compose/mesh_painter.hpp"
-#include "visualizer/render/blend_renderer.hpp"
+#include "visualizer/compose/tool_painter.hpp"
 #include "visualizer/render/cast_renderer.hpp"
-#include "visualizer/render/slices_renderer.hpp"
+#include "visualizer/render/translucent_renderers.hpp"
 
 using namespace kerf;
 using namespace kerf::test;

@@ -4,7 +4,7 @@
 #include <doctest/doctest.h>
 #include <rapidcheck.h>
 
-#include "visualizer/texture/cells_on_gpu.hpp"
+#include "visualizer/render/macrocell_faces.hpp"
 
 using namespace kerf;
 

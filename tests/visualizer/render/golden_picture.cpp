@@ -9,7 +9,7 @@
 
 #include <doctest/doctest.h>
 
-#include "visualizer/view/file_out.hpp"
+#include "visualizer/picture/image_files.hpp"
 
 namespace kerf::test {
 

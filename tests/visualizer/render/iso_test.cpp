@@ -9,7 +9,7 @@
 
 #include "tests/visualizer/gl/gl_fixture.hpp"
 #include "tests/visualizer/render/renderer_fixture.hpp"
-#include "visualizer/error.hpp"
+#include "visualizer/scene/visualizer_error.hpp"
 
 using namespace kerf;
 using namespace kerf::test;

@@ -7,7 +7,7 @@
 #include <glm/gtc/matrix_transform.hpp>
 
 #include "tests/visualizer/gl/gl_fixture.hpp"
-#include "visualizer/compose/mesh_painter.hpp"
+#include "visualizer/compose/tool_painter.hpp"
 
 using namespace kerf;
 using namespace kerf::test;

@@ -7,7 +7,7 @@
 
 #include <glm/gtc/matrix_transform.hpp>
 
-#include "visualizer/view/transfer_function.hpp"
+#include "visualizer/scene/appearance.hpp"
 
 namespace kerf::test {
 

@@ -16,8 +16,8 @@
 #include <glm/gtc/matrix_transform.hpp>
 
 #include "tests/visualizer/render/order_scene.hpp"
-#include "visualizer/compose/mesh_painter.hpp"
-#include "visualizer/compose/scene_painter.hpp"
+#include "visualizer/compose/picture_layers.hpp"
+#include "visualizer/compose/tool_painter.hpp"
 
 using namespace kerf;
 using namespace kerf::test;

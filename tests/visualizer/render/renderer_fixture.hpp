@@ -6,7 +6,7 @@
 #include <memory>
 
 #include "tests/visualizer/gl/gl_fixture.hpp"
-#include "visualizer/view/transfer_function.hpp"
+#include "visualizer/scene/appearance.hpp"
 
 namespace kerf::test {
 

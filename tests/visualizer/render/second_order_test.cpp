@@ -7,7 +7,7 @@
 
 #include "tests/visualizer/render/exact_body.hpp"
 #include "tests/visualizer/render/renderer_fixture.hpp"
-#include "visualizer/bench/normal_errors.hpp"
+#include "visualizer/bench/picture_bench.hpp"
 
 using namespace kerf;
 using namespace kerf::test;

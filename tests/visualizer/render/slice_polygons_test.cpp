@@ -5,7 +5,7 @@
 #include <glm/gtc/matrix_transform.hpp>
 #include <rapidcheck.h>
 
-#include "visualizer/render/slices_renderer.hpp"
+#include "visualizer/render/translucent_renderers.hpp"
 
 using namespace kerf;
 

@@ -8,8 +8,7 @@
 
 #include "tests/visualizer/gl/gl_fixture.hpp"
 #include "tests/visualizer/render/renderer_fixture.hpp"
-#include "visualizer/render/blend_renderer.hpp"
-#include "visualizer/render/slices_renderer.hpp"
+#include "visualizer/render/translucent_renderers.hpp"
 
 using namespace kerf;
 using namespace kerf::test;

@@ -11,10 +11,10 @@
 
 #include <doctest/doctest.h>
 
-#include "shared/numeric/percentile.hpp"
+#include "shared/numeric/statistics.hpp"
 #include "tests/visualizer/gl/gl_fixture.hpp"
+#include "visualizer/scene/frame_report.hpp"
 #include "visualizer/surface/volume_surface.hpp"
-#include "visualizer/view/frame_report.hpp"
 
 using namespace kerf;
 using namespace kerf::test;

@@ -11,7 +11,7 @@
 
 #include "controller/volume/file/volume_io.hpp"
 #include "controller/volume/phantom.hpp"
-#include "controller/volume/volume_density.hpp"
+#include "controller/volume/windowing.hpp"
 #include "tests/visualizer/gl/gl_fixture.hpp"
 
 namespace kerf::test {

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "controller/volume/file/volume_image.hpp"
-#include "visualizer/view/scene_view.hpp"
+#include "visualizer/scene/scene_view.hpp"
 
 namespace kerf::test {
 

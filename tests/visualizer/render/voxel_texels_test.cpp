@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "visualizer/texture/voxel_texels.hpp"
-
 #include <cstdlib>
 
 #include <doctest/doctest.h>
 #include <rapidcheck.h>
+
+#include "visualizer/render/volume_textures.hpp"
 
 using namespace kerf;
 

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "visualizer/sound/spindle_voice.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -9,7 +7,7 @@
 
 #include <doctest/doctest.h>
 
-#include "visualizer/sound/tool_sound.hpp"
+#include "visualizer/sound/spindle_sound.hpp"
 
 using namespace kerf;
 

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "visualizer/space_mouse/space_mouse.hpp"
-
 #include <algorithm>
 #include <cstddef>
 #include <vector>
 
 #include <doctest/doctest.h>
+
+#include "visualizer/app/hand_control.hpp"
 
 using namespace kerf;
 

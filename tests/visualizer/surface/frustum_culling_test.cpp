@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // Which triangles of a block are drawn through parts of the picture.
-#include "visualizer/surface/frustum_culling.hpp"
-
 #include <algorithm>
 
 #include <doctest/doctest.h>
 
 #include "tests/visualizer/surface/mesh_checks.hpp"
+#include "visualizer/surface/surface_on_gpu.hpp"
 
 using namespace kerf;
 using namespace kerf::test;

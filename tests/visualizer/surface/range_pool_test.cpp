@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "visualizer/surface/range_pool.hpp"
-
 #include <array>
 #include <random>
 
 #include <doctest/doctest.h>
+
+#include "visualizer/surface/surface_on_gpu.hpp"
 
 using kerf::RangePool;
 

@@ -11,7 +11,7 @@
 #include <glm/gtc/matrix_transform.hpp>
 
 #include "tests/visualizer/surface/mesh_checks.hpp"
-#include "visualizer/surface/cube_cases.hpp"
+#include "visualizer/surface/block_mesh.hpp"
 
 using namespace kerf;
 using namespace kerf::test;

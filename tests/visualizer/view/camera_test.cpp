@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "visualizer/view/camera.hpp"
+#include "visualizer/scene/camera.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "visualizer/view/file_out.hpp"
-
 #include <csignal>
 #include <filesystem>
 #include <fstream>
@@ -12,8 +10,9 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
-#include "shared/posix/new_file.hpp"
-#include "visualizer/error.hpp"
+#include "shared/posix/atomic_file.hpp"
+#include "visualizer/picture/image_files.hpp"
+#include "visualizer/scene/visualizer_error.hpp"
 
 using namespace kerf;
 namespace fs = std::filesystem;

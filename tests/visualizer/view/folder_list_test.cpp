@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the window offers to open, and what it says of folders and files that give nothing.
-#include "visualizer/view/folder_list.hpp"
-
 #include <algorithm>
 #include <fstream>
 #include <string>
@@ -9,6 +7,8 @@
 
 #include <doctest/doctest.h>
 #include <unistd.h>
+
+#include "visualizer/panels/control_panels.hpp"
 
 using namespace kerf;
 namespace fs = std::filesystem;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "visualizer/view/frame_report.hpp"
+#include "visualizer/scene/frame_report.hpp"
 
 #include <doctest/doctest.h>
 

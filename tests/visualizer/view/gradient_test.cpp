@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "visualizer/view/gradient.hpp"
+#include "visualizer/scene/gradient.hpp"
 
 #include <string>
 
@@ -7,7 +7,7 @@
 #include <rapidcheck.h>
 
 #include "tests/visualizer/render/renderer_fixture.hpp"
-#include "visualizer/error.hpp"
+#include "visualizer/scene/visualizer_error.hpp"
 
 using namespace kerf;
 using namespace kerf::test;

@@ -12,9 +12,8 @@
 
 #include "tests/visualizer/gl/gl_fixture.hpp"
 #include "tests/visualizer/render/renderer_fixture.hpp"
-#include "visualizer/error.hpp"
-#include "visualizer/view/transfer_file.hpp"
-#include "visualizer/view/transfer_function.hpp"
+#include "visualizer/scene/appearance.hpp"
+#include "visualizer/scene/visualizer_error.hpp"
 
 using namespace kerf;
 using namespace kerf::test;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <doctest/doctest.h>
 
-#include "visualizer/view/transfer_function.hpp"
+#include "visualizer/scene/appearance.hpp"
 
 using namespace kerf;
 

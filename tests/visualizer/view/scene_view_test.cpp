@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "visualizer/view/scene_view.hpp"
+#include "visualizer/scene/scene_view.hpp"
 
 #include <cmath>
 #include <string>
@@ -7,7 +7,7 @@
 #include <doctest/doctest.h>
 #include <rapidcheck.h>
 
-#include "visualizer/error.hpp"
+#include "visualizer/scene/visualizer_error.hpp"
 
 using namespace kerf;
 

@@ -6,9 +6,9 @@
 
 #include <doctest/doctest.h>
 
-#include "visualizer/view/material_score.hpp"
-#include "visualizer/view/silhouette.hpp"
-#include "visualizer/view/slice_views.hpp"
+#include "visualizer/scene/cross_sections.hpp"
+#include "visualizer/scene/scene_view.hpp"
+#include "visualizer/scene/session.hpp"
 
 using namespace kerf;
 

@@ -6,7 +6,7 @@
 
 #include "tests/visualizer/gl/gl_fixture.hpp"
 #include "visualizer/render/renderer.hpp"
-#include "visualizer/view/camera.hpp"
+#include "visualizer/scene/camera.hpp"
 
 using namespace kerf;
 using namespace kerf::test;

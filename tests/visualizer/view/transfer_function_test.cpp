@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "visualizer/view/transfer_function.hpp"
-
 #include <doctest/doctest.h>
 #include <rapidcheck.h>
 
-#include "visualizer/texture/voxel_texels.hpp"
+#include "visualizer/render/volume_textures.hpp"
+#include "visualizer/scene/appearance.hpp"
 
 using namespace kerf;
 

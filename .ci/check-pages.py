@@ -1,0 +1,80 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Whether the pages that a command makes are older than the sources that make them:
+
+    .ci/check-pages.py                  prints each stale page with the command that renews it; exit code 1 if there is one
+    .ci/check-pages.py --stamp PAGE...  after a page was made anew: writes the hash of its sources as its last line
+
+A page ends with <!-- made by: COMMAND; sources: HASH -->. The hash is over the contents of the sources, in the order of
+their paths, without the paths, so a renamed file alone makes no page stale. Pages that a test makes again and compares
+(scene-keys, script-keys, reports, segment, wire, log, errors) need no hash."""
+import hashlib
+import pathlib
+import re
+import sys
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+RIG = ["lab/rig/*"]
+# Page, the command that makes it, the sources of its rows and texts.
+PAGES = {
+    "docs/accuracy.md": ("./kerf lab accuracy --page docs/accuracy.md", ["lab/accuracy/*", *RIG]),
+    "docs/contact.md": ("./kerf lab extremes --page docs/contact.md", ["lab/contact/*", *RIG]),
+    "docs/energy.md": ("./kerf lab energy --page docs/energy.md", ["lab/stability/energy_*"]),
+    "docs/stability.md": ("./kerf lab zwidth --page docs/stability.md",
+                          ["lab/stability/*", "!lab/stability/energy_*", "controller/stability/*"]),
+    "docs/performance.md": ("./kerf bench kernels --page docs/performance.md", ["lab/bench/*", *RIG]),
+    "docs/pictures.md": ("./kerf bench pictures --page docs/pictures.md", ["visualizer/bench/*"]),
+    "docs/second-machine.md": ("./kerf bench bridge --page docs/second-machine.md", ["lab/bridge/*"]),
+}
+STAMP = re.compile(r"\n*<!-- made by: (.*); sources: ([0-9a-f]{16}) -->\n*\Z")
+
+
+def sources(globs):
+    """The files of some globs; those of a glob behind ! are left out. A glob without a file is an error of the table."""
+    found, left_out = set(), set()
+    for glob in globs:
+        files = {file for file in ROOT.glob(glob.lstrip("!")) if file.is_file() and file.suffix in (".cpp", ".hpp", ".py")}
+        if not files:
+            sys.exit(f"check-pages: {glob}: no such source; correct the table of .ci/check-pages.py")
+        (left_out if glob.startswith("!") else found).update(files)
+    return sorted(found - left_out)
+
+
+def hash_of(globs):
+    total = hashlib.sha256()
+    for file in sources(globs):
+        total.update(hashlib.sha256(file.read_bytes()).digest())
+    return total.hexdigest()[:16]
+
+
+def stamp(page):
+    if page not in PAGES:
+        sys.exit(f"check-pages: {page}: not in the table; it has {', '.join(PAGES)}")
+    command, globs = PAGES[page]
+    text = STAMP.sub("", (ROOT / page).read_text(encoding="utf-8")).rstrip("\n")
+    (ROOT / page).write_text(f"{text}\n\n<!-- made by: {command}; sources: {hash_of(globs)} -->\n", encoding="utf-8")
+
+
+def stale():
+    for page, (command, globs) in PAGES.items():
+        found = STAMP.search((ROOT / page).read_text(encoding="utf-8"))
+        if not found:
+            yield f"{page}: no hash of its sources; run {command}, then .ci/check-pages.py --stamp {page}"
+        elif found[1] != command or found[2] != hash_of(globs):
+            yield f"{page}: older than its sources; run {command}, then .ci/check-pages.py --stamp {page}"
+
+
+def main(words):
+    if words[:1] == ["--stamp"] and len(words) > 1:
+        for page in words[1:]:
+            stamp(page)
+        return 0
+    if words:
+        sys.exit(f"check-pages: {words[0]}: unknown; give nothing, or --stamp PAGE")
+    wrong = list(stale())
+    print(*wrong, sep="\n", end="\n" if wrong else "")
+    return 1 if wrong else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

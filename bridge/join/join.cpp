@@ -1,0 +1,406 @@
+// SPDX-License-Identifier: Apache-2.0
+
+#include "bridge/join/join.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <exception>
+#include <optional>
+#include <ostream>
+#include <span>
+#include <string>
+#include <utility>  // before Boost 1.74's awaitable, which needs it
+
+#include <boost/asio/awaitable.hpp>
+#include <boost/asio/co_spawn.hpp>
+#include <boost/asio/steady_timer.hpp>
+
+#include "bridge/net/address.hpp"
+#include "bridge/net/certificate.hpp"
+#include "bridge/net/link.hpp"
+#include "bridge/net/tcp_socket.hpp"
+#include "bridge/net/tokens.hpp"
+#include "bridge/stream/mirror.hpp"
+#include "bridge/wire/messages.hpp"
+#include "bridge/wire/parse.hpp"
+#include "shared/numeric/statistics.hpp"
+#include "shared/posix/monotonic_clock.hpp"
+#include "shared/text/text.hpp"
+
+namespace kerf::bridge {
+
+/// Ends a connection that cannot get better by trying again, unless it once worked.
+struct Hopeless : BridgeError {
+  using BridgeError::BridgeError;
+};
+
+/// Leads `ws`, a fresh socket, from its first packet to a WebSocket that talks. Throws `Hopeless`,
+/// or what may be better the next time: `BridgeError` and Boost's system_error.
+asio::awaitable<void> dial(WebSocket& ws, const BridgeAddress& address, ServerTrust& trust);
+
+/// What the server said by closing, 4001 and so on, to who showed a token or none: throws as
+/// `dial`.
+[[noreturn]] void throw_closed(std::uint16_t code, bool had_token);
+
+namespace {
+
+namespace websocket = beast::websocket;
+using asio::use_awaitable;
+using namespace std::chrono_literals;
+
+constexpr auto kConnectPatience = 1500ms;  // a lost SYN comes again after 1 s
+constexpr auto kGreetingPatience = 10s;    // TLS and HTTP over a slow link
+
+[[noreturn]] void throw_no_trust(const ServerTrust& trust, const ErrorCode& error) {
+  if (const std::string reason = trust.refusal(); !reason.empty()) throw Hopeless(reason);
+  if (error.category() == asio::error::get_ssl_category()) {
+    throw Hopeless("no TLS 1.3 there; is it a kerf-bridge serve, and off loopback?");
+  }
+  throw boost::system::system_error(error);
+}
+
+/// True where something answered that is no HTTP, and not where it broke off.
+[[nodiscard]] bool is_no_http(const ErrorCode& error) {
+  using Http = beast::http::error;
+  return error == Http::bad_version || error == Http::bad_line_ending ||
+         error == Http::bad_status || error == Http::bad_reason || error == Http::bad_field ||
+         error == Http::bad_value;
+}
+
+[[noreturn]] void throw_no_welcome(const ErrorCode& error, unsigned status) {
+  if (is_no_http(error)) throw Hopeless("speaks no HTTP; take the port of a kerf-bridge serve");
+  if (error != websocket::error::upgrade_declined) throw boost::system::system_error(error);
+  if (status == 400) throw Hopeless("takes no unencrypted viewers; take wss://");
+  if (status == 404) throw Hopeless("no kerf-bridge serve answers; take its port");
+  if (status == 421) {
+    throw Hopeless("does not know itself by this name; take the address it prints");
+  }
+  const std::string answer = "answers " + std::to_string(status) + "; is it a kerf-bridge serve?";
+  // Those of a gateway whose server is not up yet, or has too much to do: that may change.
+  if (status >= 500 || status == 429) throw BridgeError(answer);
+  throw Hopeless(answer);
+}
+
+}  // namespace
+
+asio::awaitable<void> dial(WebSocket& ws, const BridgeAddress& address, ServerTrust& trust) {
+  Link& link = ws.next_layer();
+  beast::tcp_stream& tcp_stream = link.next_layer();
+  tcp::resolver resolver(ws.get_executor());
+  const auto places = co_await resolver.async_resolve(address.host, address.port, use_awaitable);
+  if (!link.is_tls()) {  // whatever a name stands for here
+    for (const auto& place : places) {
+      if (place.endpoint().address().is_loopback()) continue;
+      throw Hopeless("is " + place.endpoint().address().to_string() +
+                     ", and unencrypted is for loopback only; take wss://");
+    }
+  }
+  tcp_stream.expires_after(kConnectPatience);
+  co_await tcp_stream.async_connect(places, use_awaitable);
+  tcp_stream.socket().set_option(tcp::no_delay(true));
+  tcp_stream.expires_after(kGreetingPatience);
+  ErrorCode error;
+  if (link.is_tls()) {
+    trust.begin(link.tls().native_handle());
+    co_await link.tls().async_handshake(asio::ssl::stream_base::client, quiet(error));
+    if (error) throw_no_trust(trust, error);
+  }
+  ws.read_message_max(kMaxMessageBytes);
+  const std::string target =
+      kBridgePath + (address.token.empty() ? std::string() : "?token=" + address.token);
+  websocket::response_type response;
+  co_await ws.async_handshake(response, address.host_and_port(), target, quiet(error));
+  if (error) throw_no_welcome(error, response.result_int());
+  tcp_stream.expires_never();
+  ws.binary(true);
+}
+
+void throw_closed(std::uint16_t code, bool had_token) {
+  switch (static_cast<CloseCode>(code)) {
+    case CloseCode::no_token:
+      if (!had_token) {
+        throw Hopeless("asks for a token; take all of the wss:// address it prints, in quotes");
+      }
+      throw Hopeless("the token is not one of its own; take the wss:// address it prints");
+    case CloseCode::too_many:
+      throw BridgeError("has as many viewers as it takes");
+    case CloseCode::too_slow:
+      throw BridgeError("had no answer from here for 5 s");
+    case CloseCode::not_understood:
+      throw BridgeError("does not understand this program; use programs of one build");
+  }
+  throw BridgeError("closed the connection");
+}
+
+namespace {
+
+namespace websocket = beast::websocket;
+using asio::use_awaitable;
+using namespace std::chrono_literals;
+
+constexpr std::int64_t kSilenceNs = 2 * kNsPerSecond;    // of a run: it has a sign of life, 60 Hz
+constexpr std::int64_t kLongWaitNs = 10 * kNsPerSecond;  // for a run: the server has none
+constexpr std::int64_t kSayWaitNs = kNsPerSecond;        // before that is told
+constexpr const char* kNoRun = "has no controller yet";
+constexpr const char* kEndless = "answers without end; is it a kerf-bridge serve?";
+constexpr auto kFirstPause = 50ms, kLongestPause = 800ms;  // between two tries
+constexpr auto kWatchPeriod = 20ms;
+// Certificates and an HTTP head. Beast reads an answer that refuses to its end, however long.
+constexpr std::uint64_t kMaxWelcomeBytes = 256 * 1024;
+
+/// With the token of `--token-file`, where that is given.
+[[nodiscard]] BridgeAddress address_in(const JoinOptions& options) {
+  BridgeAddress out = parse_address(options.address);
+  if (options.token_file.empty()) return out;
+  const std::string place = "--token-file " + options.token_file.string() + ": ";
+  if (!out.token.empty()) throw BridgeError(place + "the address has a token; give one of both");
+  Tokens tokens;
+  tokens.add_file(options.token_file, "--token-file", Right::look);
+  out.token = tokens.first();
+  return out;
+}
+
+class Joiner {
+ public:
+  Joiner(const JoinOptions& options, const std::atomic<bool>& stop, std::ostream& out)
+      : address_(address_in(options)),
+        name_(options.name),
+        wait_s_(options.wait_s),
+        trust_(address_.host, options.ca, options.fingerprint),
+        stop_(stop),
+        out_(out),
+        mirror_(options.name, options.most_mib << 20,
+                [this](const Command& command) { return desk_.ask(command); }) {
+    if (address_.secure) trust_.apply_to(tls_.native_handle());
+  }
+
+  int run() {
+    std::exception_ptr failure;
+    const auto ended = [&](const std::exception_ptr& error) {
+      failure = error;
+      io_.stop();
+    };
+    asio::co_spawn(io_, stay_joined(), ended);
+    asio::co_spawn(io_, watch(), ended);
+    for (bool over = false; !over;) {
+      try {
+        io_.run();
+        over = true;
+      } catch (const std::bad_alloc&) {
+        // Beast makes room for whatever an answer promises. The attempt has ended with its handler.
+        if (link_ == nullptr || connected_) throw;
+        lost(kEndless);
+        link_ = nullptr;
+        asio::co_spawn(io_, stay_joined(), ended);
+      }
+    }
+    desk_.set_link(CommandDesk::Link::down);
+    if (failure) std::rethrow_exception(failure);
+    if (age_.count() != 0) {
+      say(format(
+          "age of the picture p50 %.1f, p99 %.1f, max %.1f ms; %llu states, joined %u times, "
+          "%llu packets waited for a lost one",
+          age_.percentile_us(0.5) / 1e3, age_.percentile_us(0.99) / 1e3, age_.max_us() / 1e3,
+          static_cast<unsigned long long>(mirror_.passes()), joins_,
+          static_cast<unsigned long long>(waited_)));
+    }
+    return 0;
+  }
+
+ private:
+  void say(const std::string& line) { out_ << "kerf-bridge: " << line << std::endl; }
+
+  /// A reason is told once, not with every try.
+  void lost(const std::string& reason) {
+    if (std::exchange(last_reason_, reason) != reason) {
+      say(place() + reason + "; trying again");
+    }
+  }
+
+  asio::awaitable<void> stay_joined() {
+    for (auto pause = kFirstPause; !stop_; pause = std::min(pause * 2, kLongestPause)) {
+      const unsigned joins_before = joins_;
+      since_ns_ = monotonic_ns();
+      try {
+        co_await follow(WebSocket(tcp::socket(io_), address_.secure ? &tls_ : nullptr));
+      } catch (const Hopeless& error) {
+        if (joins_ == 0) throw BridgeError(place() + error.what());
+        lost(error.what());
+      } catch (const WireError& error) {  // another try would hear the same
+        if (joins_ == 0) throw BridgeError(place() + error.what());
+        lost(error.what());
+      } catch (const SegmentError&) {
+        if (joins_ == 0) throw;
+        lost(last_error());
+      } catch (const std::exception&) {
+        lost(why_closed_.empty() ? last_error() : why_closed_);
+      }
+      desk_.set_link(CommandDesk::Link::down);
+      if (joins_ != joins_before) pause = kFirstPause;
+      asio::steady_timer timer(io_, pause);
+      co_await timer.async_wait(use_awaitable);
+    }
+  }
+
+  /// One connection, from its first packet to whatever ends it, which it throws.
+  asio::awaitable<void> follow(WebSocket ws) {
+    why_closed_.clear();
+    greeted_ = false;
+    waited_here_ = 0;
+    connected_ = false;
+    heard_ns_ = monotonic_ns();
+    beast::tcp_stream& link = ws.next_layer().next_layer();
+    struct Watched {  // the watch may close it while it lives
+      Joiner& joiner;
+      explicit Watched(Joiner& j, beast::tcp_stream& watched) : joiner(j) { j.link_ = &watched; }
+      ~Watched() { joiner.link_ = nullptr; }
+    } const watched(*this, link);
+    co_await dial(ws, address_, trust_);
+    connected_ = true;
+    opened_ns_ = heard_ns_ = monotonic_ns();
+    beast::flat_buffer in;
+    for (;;) {
+      in.clear();
+      ErrorCode error;
+      co_await ws.async_read(in, quiet(error));
+      // A reason that came counts, however the connection ended after it.
+      const std::uint16_t reason = ws.reason().code;
+      if (error && reason != websocket::close_code::none)
+        throw_closed(reason, !address_.token.empty());
+      if (error) throw boost::system::system_error(error);
+      heard_ns_ = monotonic_ns();
+      const std::span message(static_cast<const std::byte*>(in.data().data()), in.size());
+      if (const auto ack = take(message, link.socket().native_handle())) {
+        co_await ws.async_write(asio::buffer(&*ack, sizeof *ack), use_awaitable);
+      }
+      if (const auto command = desk_.take()) {
+        co_await ws.async_write(asio::buffer(&*command, sizeof *command), use_awaitable);
+      }
+    }
+  }
+
+  [[nodiscard]] std::string place() const { return address_.host_and_port() + ": "; }
+
+  /// One message of the server; what is to be answered.
+  std::optional<AckMessage> take(std::span<const std::byte> message, int socket) {
+    const LinkFigures figures = link_figures(socket);
+    switch (magic_of(message)) {
+      case kHelloMagic: {
+        const HelloMessage& hello = mirror_.hello(message, heard_ns_, figures.least_round_trip_ns);
+        // Behind an open connection the server waited for a run: joining begins with the run.
+        const std::int64_t waited_ns = heard_ns_ - opened_ns_ - figures.least_round_trip_ns;
+        if (greeted_ || waited_ns > kNsPerSecond / 2) since_ns_ = heard_ns_;
+        desk_.set_link((hello.flags & kMayCommand) != 0 ? CommandDesk::Link::open
+                                                        : CommandDesk::Link::read_only);
+        if (session_ != 0 && session_ != hello.session) say("a new run");
+        session_ = hello.session;
+        greeted_ = true;
+        return std::nullopt;
+      }
+      case kFrameMagic: {
+        const bool joined = mirror_.joined(), ended = mirror_.ended();
+        const AckMessage ack = mirror_.frame(message, heard_ns_, figures.least_round_trip_ns);
+        if (!joined && mirror_.joined()) tell_joined();
+        if (!ended && mirror_.ended()) say("the run has ended; waiting for the next");
+        waited_ += figures.out_of_order - std::exchange(waited_here_, figures.out_of_order);
+        return ack;
+      }
+      case kRecordsMagic:
+        mirror_.records(message);
+        return std::nullopt;
+      case kReplyMagic:
+        desk_.answer(parse_reply(message));
+        return std::nullopt;
+      default:
+        throw WireError("message: of no kind that is known here; use programs of one build");
+    }
+  }
+
+  void tell_joined() {
+    const double seconds = static_cast<double>(monotonic_ns() - since_ns_) / kNsPerSecond;
+    say(format("%s %s as %s in %.2f s", joins_++ == 0 ? "joined" : "joined again",
+               address_.host_and_port().c_str(), name_.c_str(), seconds));
+    last_reason_.clear();
+  }
+
+  /// Samples the age, and ends a connection that is silent or that nobody wants any more.
+  asio::awaitable<void> watch() {
+    asio::steady_timer timer(io_);
+    const std::int64_t began_ns = monotonic_ns();
+    for (;;) {
+      timer.expires_after(kWatchPeriod);
+      co_await timer.async_wait(use_awaitable);
+      const std::int64_t now_ns = monotonic_ns();
+      if (stop_) {
+        io_.stop();
+        co_return;
+      }
+      if (joins_ == 0 && wait_s_ && static_cast<double>(now_ns - began_ns) > *wait_s_ * 1e9) {
+        throw BridgeError(place() + (last_reason_.empty() ? "no picture" : last_reason_) +
+                          format("; gave up after %g s (--wait)", *wait_s_));
+      }
+      if (link_ != nullptr && connected_ && !greeted_ && now_ns - heard_ns_ > kSayWaitNs) {
+        lost(kNoRun);
+      }
+      if (link_ != nullptr && !connected_ &&
+          link_figures(link_->socket().native_handle()).received_bytes > kMaxWelcomeBytes) {
+        why_closed_ = kEndless;
+        ErrorCode ignored;
+        link_->socket().close(ignored);
+        continue;
+      }
+      const bool running = greeted_ && !mirror_.ended();
+      if (running && mirror_.joined()) age_.record(now_ns - mirror_.taken_ns());
+      if (link_ == nullptr || now_ns - heard_ns_ < (running ? kSilenceNs : kLongWaitNs)) continue;
+      why_closed_ =
+          connected_ && !greeted_
+              ? kNoRun
+              : "silent for " + std::to_string((now_ns - heard_ns_) / kNsPerSecond) + " s";
+      ErrorCode ignored;
+      link_->socket().close(ignored);
+    }
+  }
+
+  [[nodiscard]] static std::string last_error() {
+    try {
+      throw;
+    } catch (const boost::system::system_error& error) {
+      if (error.code() == beast::error::timeout) return "no answer";
+      if (error.code() == beast::http::error::body_limit) return kEndless;
+      return error.code().message();
+    } catch (const std::exception& error) {
+      return error.what();
+    }
+  }
+
+  asio::io_context io_{1};
+  asio::ssl::context tls_{asio::ssl::context::tlsv13_client};
+  BridgeAddress address_;
+  std::string name_;
+  std::optional<double> wait_s_;
+  ServerTrust trust_;
+  const std::atomic<bool>& stop_;
+  std::ostream& out_;
+  CommandDesk desk_;
+  Mirror mirror_;
+
+  beast::tcp_stream* link_ = nullptr;  // of the connection that lives
+  bool connected_ = false, greeted_ = false;
+  std::int64_t heard_ns_ = 0, opened_ns_ = 0, since_ns_ = 0;
+  std::string why_closed_, last_reason_;
+  std::uint64_t session_ = 0;  // of the run that was shown last
+  unsigned joins_ = 0;
+  std::uint32_t waited_here_ = 0;
+  std::uint64_t waited_ = 0;
+  Histogram age_;
+};
+
+}  // namespace
+
+int run_join(const JoinOptions& options, const std::atomic<bool>& stop, std::ostream& out) {
+  return Joiner(options, stop, out).run();
+}
+
+}  // namespace kerf::bridge

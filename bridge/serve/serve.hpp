@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <atomic>
+#include <filesystem>
+#include <string>
+
+#include "shared/segment/command.hpp"
+
+namespace kerf::bridge {
+
+/// `text` as a QR code for a terminal of any colours: black on white, two modules a character, four
+/// of white around it. A line that says why not where libqrencode was missing when kerf was built,
+/// or `text` is too long for a code.
+[[nodiscard]] std::string qr_code(const std::string& text);
+
+inline constexpr int kMostViewers = 32;
+
+/// `kerf-bridge serve`.
+struct ServeOptions {
+  std::string listen = "127.0.0.1:7400";  ///< HOST:PORT; port 0: one that is free
+  std::string name = kUsualName;          ///< of the controller
+  std::filesystem::path identity;         ///< folder of `make-identity`; empty: self-signed
+  std::filesystem::path token_file;       ///< who may look; empty: one token, made now
+  std::filesystem::path command_tokens;   ///< who may command; empty: nobody
+  int max_viewers = kMostViewers;
+  bool dedicated_link = false;
+  int openigtlink = 0;  ///< port for 3D Slicer, at the same host; 0: none
+  bool qr = false;      ///< also draws the first address off loopback as a QR code
+};
+
+/// Serves until `stop`. Prints the address with its token on stdout. Throws `BridgeError`, or what
+/// `IgtlOutput` does.
+int run_serve(const ServeOptions& options, const std::atomic<bool>& stop);
+
+}  // namespace kerf::bridge

@@ -1,0 +1,250 @@
+// SPDX-License-Identifier: Apache-2.0
+
+#include <algorithm>
+#include <chrono>
+#include <iostream>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include <boost/asio/co_spawn.hpp>
+#include <boost/asio/write.hpp>
+#include <boost/beast/core/detect_ssl.hpp>
+
+#include "bridge/page/page_files.hpp"
+#include "bridge/serve/server_impl.hpp"
+#include "shared/posix/monotonic_clock.hpp"
+#include "shared/text/text.hpp"
+
+namespace kerf::bridge {
+
+/// One answer to a request for a page.
+struct HttpReply {
+  int status = 200;
+  std::string_view content_type = "text/plain; charset=utf-8";
+  std::string_view body;
+  std::string cookie;  ///< value of Set-Cookie; empty: none
+  bool keep_alive = true;
+  bool head_only = false;  ///< the request was a HEAD
+};
+
+/// The bytes of it. All that a browser can be told to forbid is forbidden: scripts, styles and
+/// connections from elsewhere or inside of the HTML, frames around the page, a guess at the type.
+[[nodiscard]] std::string http_text(const HttpReply& reply);
+
+namespace {
+
+std::string_view reason(int status) noexcept {
+  switch (status) {
+    case 200:
+      return "OK";
+    case 400:
+      return "Bad Request";
+    case 401:
+      return "Unauthorized";
+    case 403:
+      return "Forbidden";
+    case 404:
+      return "Not Found";
+    case 405:
+      return "Method Not Allowed";
+    case 421:
+      return "Misdirected Request";
+    default:
+      return "Error";
+  }
+}
+
+constexpr std::string_view kHeaders =
+    "Cache-Control: no-store\r\n"
+    "Content-Security-Policy: default-src 'none'; script-src 'self'; style-src 'self'; "
+    "img-src 'self' data: blob:; connect-src 'self'; worker-src 'self'; base-uri 'none'; "
+    "form-action 'none'; frame-ancestors 'none'\r\n"
+    "Cross-Origin-Opener-Policy: same-origin\r\n"
+    "Cross-Origin-Resource-Policy: same-origin\r\n"
+    "Permissions-Policy: camera=(), microphone=(), geolocation=(), usb=(), serial=(), hid=()\r\n"
+    "Referrer-Policy: no-referrer\r\n"
+    "X-Content-Type-Options: nosniff\r\n"
+    "X-Frame-Options: DENY\r\n";
+
+}  // namespace
+
+std::string http_text(const HttpReply& reply) {
+  std::string text = "HTTP/1.1 " + std::to_string(reply.status) + " ";
+  text += reason(reply.status);
+  text += "\r\nContent-Type: ";
+  text += reply.content_type;
+  text += "\r\nContent-Length: " + std::to_string(reply.body.size()) + "\r\n";
+  text += kHeaders;
+  if (reply.status == 405) text += "Allow: GET, HEAD\r\n";
+  if (!reply.cookie.empty()) text += "Set-Cookie: " + reply.cookie + "\r\n";
+  text += reply.keep_alive ? "\r\n" : "Connection: close\r\n\r\n";
+  if (!reply.head_only) text += reply.body;
+  return text;
+}
+
+namespace {
+
+namespace http = beast::http;
+
+constexpr auto kReplyTime = std::chrono::seconds(30);  // 200 KB over 64 kbit/s
+constexpr std::uint32_t kMaxHeaderBytes = 8 * 1024;
+
+std::string_view text(beast::string_view view) {
+  return {view.data(), view.size()};
+}
+
+}  // namespace
+
+asio::awaitable<void> Server::Impl::connection(tcp::socket socket) {
+  auto ws = std::make_unique<WebSocket>(std::move(socket), tls_ ? &*tls_ : nullptr);
+  beast::flat_buffer in(kMaxHeaderBytes);
+  bool done = true;
+  if (tls_) co_await handshake(*ws, in, done);
+  if (done) co_await talk_http(std::move(ws), in);
+}
+
+asio::awaitable<void> Server::Impl::handshake(WebSocket& ws, beast::flat_buffer& in, bool& done) {
+  Link& link = ws.next_layer();
+  const HandshakePlace place(*this, link.next_layer());
+  ErrorCode error;
+  link.next_layer().expires_after(std::chrono::nanoseconds(setup_.handshake_ns));
+  done = co_await beast::async_detect_ssl(link.next_layer(), in, quiet(error));
+  if (error) co_return;
+  if (!done) {
+    const std::string reply = http_text({400, "text/plain; charset=utf-8",
+                                         "This port speaks TLS only: open it with https:// (a "
+                                         "page) or wss:// (kerf bridge join).\n",
+                                         "", false});
+    co_await asio::async_write(link.next_layer(), asio::buffer(reply), quiet(error));
+    co_return;
+  }
+  const std::size_t used =
+      co_await link.tls().async_handshake(asio::ssl::stream_base::server, in.data(), quiet(error));
+  in.consume(used);
+  done = !error;
+}
+
+/// A token of the address goes before the cookie, and the cookie before the pass: a browser that
+/// has been here takes nobody's pass away.
+Server::Impl::Shown Server::Impl::shown_by(const Request& request) const {
+  const Tokens& tokens = setup_.tokens;
+  const std::string_view asked = query_value(text(request.target()), "token");
+  if (const Right right = tokens.right_of(asked); right != Right::none) {
+    return {right, true, false, cookie_for(asked)};
+  }
+  const std::string_view kept = cookie_value(text(request[http::field::cookie]), cookie_name());
+  if (const Right right = tokens.right_of_cookie(kept); right != Right::none) {
+    return {right, true, false, {}};
+  }
+  if (!beast::websocket::is_upgrade(request) && pass_.is(asked)) {
+    return {tokens.right_of(tokens.first()), true, true, cookie_for(tokens.first())};
+  }
+  return {Right::none, !asked.empty() || !kept.empty(), false, {}};
+}
+
+std::string Server::Impl::page_text(const Request& request, const Shown& shown) {
+  HttpReply reply;
+  reply.keep_alive = request.keep_alive();
+  reply.head_only = request.method() == http::verb::head;
+  if (shown.right == Right::none) {
+    reply.status = 401;
+    reply.body = shown.secret
+                     ? "This address was opened before, or is of another start: open the one that "
+                       "kerf bridge printed last. Each is for one browser.\n"
+                     : "This picture needs a token: open the address that kerf bridge printed, "
+                       "with all of its ?token=...\n";
+    return http_text(reply);
+  }
+  if (!shown.cookie.empty() && !reply.head_only) {
+    reply.cookie = cookie_name() + "=" + shown.cookie + "; Path=/; HttpOnly; SameSite=Strict" +
+                   (tls_ ? "; Secure" : "");
+    if (shown.pass) {
+      pass_.renew();
+      if (setup_.on_pass) setup_.on_pass(pass_.token());
+    }
+  }
+  std::string_view name = path_of(text(request.target())).substr(1);
+  if (name.empty()) name = "index.html";
+  const auto files = page_files();
+  const auto file = std::find_if(files.begin(), files.end(),
+                                 [name](const PageFile& one) { return one.name == name; });
+  if (file == files.end()) {
+    reply.status = 404;
+    reply.body = "No such page.\n";
+  } else {
+    reply.content_type = file->content_type;
+    reply.body = file->bytes;
+  }
+  return http_text(reply);
+}
+
+void Server::Impl::say_at_most_once_a_second(const std::string& text) {
+  const std::int64_t now_ns = monotonic_ns();
+  if (now_ns - warned_ns_ < kNsPerSecond) return;
+  warned_ns_ = now_ns;
+  std::cerr << "kerf-bridge: " << escaped(text) << '\n';
+}
+
+asio::awaitable<void> Server::Impl::refuse(Link& link, int status, std::string_view why,
+                                           bool head_only) {
+  ErrorCode error;
+  const std::string reply =
+      http_text({status, "text/plain; charset=utf-8", why, "", false, head_only});
+  link.next_layer().expires_after(kReplyTime);
+  co_await asio::async_write(link, asio::buffer(reply), quiet(error));
+  link.next_layer().socket().shutdown(tcp::socket::shutdown_send, error);
+}
+
+asio::awaitable<void> Server::Impl::talk_http(std::unique_ptr<WebSocket> ws,
+                                              beast::flat_buffer& in) {
+  Link& link = ws->next_layer();
+  HandshakePlace place(*this, link.next_layer());
+  ErrorCode error;
+  for (bool more = true; more && !error;) {
+    http::request_parser<http::empty_body> parser;
+    parser.header_limit(kMaxHeaderBytes);
+    parser.body_limit(0);
+    link.next_layer().expires_after(std::chrono::nanoseconds(setup_.handshake_ns));
+    co_await http::async_read(link, in, parser, quiet(error));
+    if (error == http::error::end_of_stream || error == beast::error::timeout) co_return;
+    if (error) co_return co_await refuse(link, 400, "This is no request for a page.\n", false);
+    const Request& request = parser.get();
+    const std::string_view host = text(request[http::field::host]);
+    const bool head = request.method() == http::verb::head;
+    if (request.count(http::field::host) > 1 || request.count(http::field::origin) > 1) {
+      co_return co_await refuse(link, 400, "This names its host or its origin twice.\n", head);
+    }
+    if (!is_own_host(host_name(host), setup_.host_names)) {
+      co_return co_await refuse(link, 421, "Open this machine by its address or its own name.\n",
+                                head);
+    }
+    if ((request.method() != http::verb::get && !head) || !request.target().starts_with('/')) {
+      co_return co_await refuse(link, 405, "Only GET and HEAD are answered here.\n", head);
+    }
+    const bool upgrade = beast::websocket::is_upgrade(request);
+    if (upgrade && !is_own_origin(text(request[http::field::origin]), host, tls_.has_value())) {
+      co_return co_await refuse(link, 403, "A page from elsewhere may not look in here.\n", head);
+    }
+    const Shown shown = shown_by(request);
+    if (shown.right == Right::none && shown.secret) {
+      // The place is held meanwhile, so who guesses gets 32 answers a second at most.
+      place.is_guess = true;
+      say_at_most_once_a_second("a wrong token from " + place.from().to_string());
+      asio::steady_timer wait(io_, std::chrono::nanoseconds(setup_.wrong_token_ns));
+      co_await wait.async_wait(quiet(error));
+      place.is_guess = false;
+    }
+    if (upgrade && path_of(text(request.target())) == kBridgePath) {
+      const Request upgrade_request = parser.release();
+      co_return co_await view(std::move(ws), upgrade_request, shown.right, place);
+    }
+    const std::string reply = page_text(request, shown);
+    more = request.keep_alive();
+    link.next_layer().expires_after(kReplyTime);
+    co_await asio::async_write(link, asio::buffer(reply), quiet(error));
+  }
+  link.next_layer().socket().shutdown(tcp::socket::shutdown_send, error);
+}
+
+}  // namespace kerf::bridge

@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <deque>
+#include <list>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>  // before Boost 1.74's awaitable, which needs it
+
+#include <boost/asio/awaitable.hpp>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/ssl.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <boost/asio/thread_pool.hpp>
+#include <boost/beast/http.hpp>
+
+#include "bridge/net/link.hpp"
+#include "bridge/serve/server.hpp"
+#include "bridge/stream/stream.hpp"
+#include "shared/segment/connection.hpp"
+
+namespace kerf::bridge {
+
+/// One viewer: its socket, what it may do, and its stream while there is a run.
+struct Viewer {
+  Viewer(std::unique_ptr<WebSocket> socket, Right its_right)
+      : ws(std::move(socket)), wake(ws->get_executor()), right(its_right) {}
+
+  std::unique_ptr<WebSocket> ws;
+  asio::steady_timer wake;  ///< cancelled whenever there may be something to send
+  Right right;
+  std::unique_ptr<Stream> stream;
+  std::deque<ReplyMessage> replies;
+  std::int64_t heard_ns = 0;
+  std::int64_t measured_ns = 0;      ///< when the round trip was asked for
+  int may_say = 0;                   ///< messages that it may send before it is a flood
+  std::int64_t may_send_bytes = 0;   ///< on the wire, the same
+  std::uint64_t sent_bytes = 0;      ///< by it, when that was looked at
+  bool commanding = false;           ///< a command of it is with the controller
+  bool gone = false;                 ///< its socket has failed or is closed
+  std::optional<CloseCode> closing;  ///< it is to be told to go
+  std::int64_t close_by_ns = 0;      ///< and if it does not, the socket is closed
+
+  [[nodiscard]] int fd() { return ws->next_layer().next_layer().socket().native_handle(); }
+};
+
+using Request = beast::http::request<beast::http::empty_body>;
+
+/// One thread runs everything but what may wait for the controller, which `helper_` does.
+class Server::Impl {
+ public:
+  explicit Impl(ServerSetup setup);
+  ~Impl();
+  [[nodiscard]] std::uint16_t port() const { return acceptor_.local_endpoint().port(); }
+  [[nodiscard]] const std::string& pass() const { return pass_.token(); }
+  [[nodiscard]] std::string address() const {
+    return acceptor_.local_endpoint().address().to_string();
+  }
+  void run(const std::atomic<bool>& stop);
+
+ private:
+  using Void = asio::awaitable<void>;
+  class HandshakePlace;
+  /// What a request shows of what it may.
+  struct Shown {
+    Right right = Right::none;
+    bool secret = false;  ///< a token or a cookie, right or wrong
+    bool pass = false;    ///< it is by the pass that it may look
+    std::string cookie;   ///< for a browser to keep from now on
+  };
+
+  // server.cpp
+  Void accept_all();
+  [[nodiscard]] bool make_room(const asio::ip::address& newcomer);
+  Void clock(const std::atomic<bool>& stop);
+  void slot();
+  void watch_controller(std::int64_t now_ns);
+  void begin_run(std::unique_ptr<SegmentConnection> connection);
+  void say_once(const std::string& text);
+
+  // connection.cpp
+  Void connection(tcp::socket socket);
+  Void handshake(WebSocket& ws, beast::flat_buffer& in, bool& done);
+  Void talk_http(std::unique_ptr<WebSocket> ws, beast::flat_buffer& in);
+  Void refuse(Link& link, int status, std::string_view text, bool head_only);
+  void say_at_most_once_a_second(const std::string& text);
+  /// Of this port, since cookies are kept by host alone.
+  [[nodiscard]] std::string cookie_name() const { return "kerf" + std::to_string(port()); }
+  [[nodiscard]] Shown shown_by(const Request& request) const;
+  [[nodiscard]] std::string page_text(const Request& request, const Shown& shown);
+
+  // server_viewer.cpp
+  Void view(std::unique_ptr<WebSocket> ws, const Request& request, Right right,
+            HandshakePlace& place);
+  Void read_viewer(std::shared_ptr<Viewer> viewer);
+  Void write_viewer(std::shared_ptr<Viewer> viewer);
+  [[nodiscard]] bool obey(const std::shared_ptr<Viewer>& viewer,
+                          std::span<const std::byte> message);
+  void command(const std::shared_ptr<Viewer>& viewer, const CommandMessage& message);
+  static void answer(Viewer& viewer, std::uint32_t sequence, const Reply& reply);
+  void open_stream(Viewer& viewer);
+  void look_after(Viewer& viewer, std::int64_t now_ns);
+  static void drop(Viewer& viewer, CloseCode code);
+
+  ServerSetup setup_;
+  PagePass pass_;
+  // Used by what `io_` runs, to its end.
+  std::list<HandshakePlace*> handshakes_;  // the oldest first
+  asio::io_context io_{1};
+  std::optional<asio::ssl::context> tls_;
+  tcp::acceptor acceptor_;
+  asio::thread_pool helper_{1};
+
+  std::unique_ptr<SegmentConnection> connection_;
+  std::unique_ptr<RunSnapshot> snapshot_;
+  std::optional<SegmentConnection> command_link_;  // of `helper_` alone
+  bool connecting_ = false;
+  std::int64_t next_try_ns_ = 0, bbr_restarted_ns_ = 0, warned_ns_ = 0;
+  std::string said_;
+
+  std::list<std::shared_ptr<Viewer>> viewers_;
+};
+
+/// A connection that is not yet a viewer, while it holds one of the places that there are for such.
+/// Its stream outlives it.
+class Server::Impl::HandshakePlace {
+ public:
+  HandshakePlace(Impl& server, beast::tcp_stream& stream) : server_(server), stream_(stream) {
+    ErrorCode error;
+    from_ = stream.socket().remote_endpoint(error).address();
+    server_.handshakes_.push_back(this);
+  }
+  HandshakePlace(const HandshakePlace&) = delete;
+  HandshakePlace& operator=(const HandshakePlace&) = delete;
+  ~HandshakePlace() { release(); }
+  void release() { server_.handshakes_.remove(this); }
+  void evict() {
+    release();
+    stream_.close();  // what waits for it ends with an error
+  }
+  [[nodiscard]] const asio::ip::address& from() const { return from_; }
+
+  bool is_guess =
+      false;  ///< it waits for the answer to a wrong token, and keeps its place till then
+
+ private:
+  Impl& server_;
+  beast::tcp_stream& stream_;
+  asio::ip::address from_;
+};
+
+}  // namespace kerf::bridge

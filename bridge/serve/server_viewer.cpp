@@ -1,0 +1,223 @@
+// SPDX-License-Identifier: Apache-2.0
+
+#include <chrono>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include <boost/asio/co_spawn.hpp>
+#include <boost/asio/detached.hpp>
+#include <boost/asio/post.hpp>
+
+#include "bridge/net/tcp_socket.hpp"
+#include "bridge/serve/server_impl.hpp"
+#include "bridge/wire/parse.hpp"
+#include "shared/posix/monotonic_clock.hpp"
+
+namespace kerf::bridge {
+namespace {
+
+namespace websocket = beast::websocket;
+
+/// What a viewer may ask for at all: the undo of a stroke is the local user's.
+bool is_for_viewers(CommandKind kind) noexcept {
+  return kind == CommandKind::select_tool || kind == CommandKind::hold ||
+         kind == CommandKind::reset;
+}
+
+constexpr std::int64_t kGoodbyeNs = kNsPerSecond;
+constexpr std::int64_t kMeasureNs = kNsPerSecond / 4;
+constexpr int kMaySay = 64;  // beside one ack a frame: a second of commands or pings
+// On the wire: masked head of a WebSocket frame, what TLS 1.3 adds to a record.
+constexpr std::int64_t kMessageBytes = kMaxUpBytes + 14 + 22;
+// What may have come since the last look: the acks of a stalled link come at once. Fragments
+// without payload are no messages, so this alone bounds them.
+constexpr std::int64_t kMaySendBytes = 1 << 20;
+constexpr std::size_t kMaxReplies = 16;
+
+std::string_view words(CloseCode code) {
+  switch (code) {
+    case CloseCode::no_token:
+      return "no token, or a wrong one";
+    case CloseCode::too_slow:
+      return "no answer for 5 s";
+    case CloseCode::not_understood:
+      return "not understood";
+    case CloseCode::too_many:
+      return "too many viewers";
+  }
+  return "";
+}
+
+}  // namespace
+
+asio::awaitable<void> Server::Impl::view(std::unique_ptr<WebSocket> ws, const Request& request,
+                                         Right right, HandshakePlace& place) {
+  auto& tcp_stream = ws->next_layer().next_layer();
+  tcp_stream.expires_after(std::chrono::nanoseconds(setup_.handshake_ns));
+  ws->read_message_max(kMaxUpBytes);
+  ws->auto_fragment(false);
+  tune_socket(tcp_stream.socket().native_handle());
+  ErrorCode error;
+  co_await ws->async_accept(request, quiet(error));
+  if (error) co_return;
+  tcp_stream.expires_never();
+  ws->binary(true);
+  const auto viewer = std::make_shared<Viewer>(std::move(ws), right);
+  if (right == Right::none) {
+    drop(*viewer, CloseCode::no_token);
+  } else if (viewers_.size() >= setup_.max_viewers) {
+    drop(*viewer, CloseCode::too_many);
+  }
+  if (viewer->closing) {
+    viewer->ws->next_layer().next_layer().expires_after(std::chrono::nanoseconds(kGoodbyeNs));
+    co_await write_viewer(viewer);
+    place.release();  // before its stream ends
+    co_return;
+  }
+  place.release();
+  viewer->may_say = kMaySay;
+  viewer->may_send_bytes = kMaySendBytes;
+  viewer->sent_bytes = link_figures(viewer->fd()).received_bytes;
+  viewer->ws->control_callback([watched = viewer.get()](websocket::frame_type, beast::string_view) {
+    if (--watched->may_say < 0) drop(*watched, CloseCode::not_understood);
+  });
+  viewers_.push_back(viewer);
+  if (connection_) open_stream(*viewer);
+  asio::co_spawn(io_, read_viewer(viewer), asio::detached);
+  co_await write_viewer(viewer);
+  viewers_.remove(viewer);
+}
+
+void Server::Impl::open_stream(Viewer& viewer) {
+  if (!snapshot_) snapshot_ = std::make_unique<RunSnapshot>(connection_->reader());
+  viewer.stream =
+      std::make_unique<Stream>(*snapshot_, viewer.right == Right::command ? kMayCommand : 0);
+  viewer.heard_ns = monotonic_ns();
+  viewer.wake.cancel();
+}
+
+asio::awaitable<void> Server::Impl::write_viewer(std::shared_ptr<Viewer> viewer) {
+  ErrorCode error;
+  std::vector<std::byte> out;
+  while (!viewer->closing && !viewer->gone && !error) {
+    if (!viewer->replies.empty()) {
+      const ReplyMessage reply = viewer->replies.front();
+      viewer->replies.pop_front();
+      co_await viewer->ws->async_write(asio::buffer(&reply, sizeof reply), quiet(error));
+    } else if (viewer->stream && viewer->stream->next(monotonic_ns(), out)) {
+      ++viewer->may_say;
+      viewer->may_send_bytes += kMessageBytes;
+      co_await viewer->ws->async_write(asio::buffer(out), quiet(error));
+    } else {
+      viewer->wake.expires_at(asio::steady_timer::time_point::max());
+      ErrorCode woken;
+      co_await viewer->wake.async_wait(quiet(woken));
+    }
+  }
+  if (viewer->closing && !viewer->gone && !error) {
+    const websocket::close_reason reason(
+        static_cast<websocket::close_code>(*viewer->closing),
+        beast::string_view(words(*viewer->closing).data(), words(*viewer->closing).size()));
+    co_await viewer->ws->async_close(reason, quiet(error));
+  }
+  viewer->gone = true;
+  viewer->stream.reset();
+  viewer->ws->next_layer().next_layer().socket().close(error);
+}
+
+asio::awaitable<void> Server::Impl::read_viewer(std::shared_ptr<Viewer> viewer) {
+  ErrorCode error;
+  beast::flat_buffer in;
+  while (!error) {
+    in.clear();
+    co_await viewer->ws->async_read(in, quiet(error));
+    if (error || viewer->closing) continue;
+    const std::span message(static_cast<const std::byte*>(in.data().data()), in.data().size());
+    if (!viewer->ws->got_binary() || --viewer->may_say < 0 || !obey(viewer, message)) {
+      drop(*viewer, CloseCode::not_understood);
+    }
+    viewer->wake.cancel();
+  }
+  viewer->gone = true;
+  viewer->wake.cancel();
+}
+
+bool Server::Impl::obey(const std::shared_ptr<Viewer>& viewer, std::span<const std::byte> message) {
+  const auto up = parse_up(message);
+  if (!up) return false;
+  if (const auto* const wish = std::get_if<CommandMessage>(&*up)) {
+    command(viewer, *wish);
+    return true;
+  }
+  if (!viewer->stream) return true;  // of a run that has just ended
+  const std::int64_t now_ns = monotonic_ns();
+  viewer->heard_ns = now_ns;
+  if (now_ns - viewer->measured_ns >= kMeasureNs) {
+    viewer->measured_ns = now_ns;
+    viewer->stream->set_round_trip(link_figures(viewer->fd()).least_round_trip_ns);
+  }
+  return viewer->stream->acked(std::get<AckMessage>(*up), now_ns);
+}
+
+void Server::Impl::answer(Viewer& viewer, std::uint32_t sequence, const Reply& reply) {
+  if (viewer.replies.size() >= kMaxReplies) return;  // it does not read them
+  viewer.replies.push_back(
+      {kReplyMagic, sequence, static_cast<std::uint32_t>(reply.status), reply.index});
+  viewer.wake.cancel();
+}
+
+void Server::Impl::command(const std::shared_ptr<Viewer>& viewer, const CommandMessage& message) {
+  const std::uint32_t sequence = message.sequence;
+  const auto kind = static_cast<CommandKind>(message.kind);
+  if (viewer->right != Right::command || !is_for_viewers(kind)) {
+    return answer(*viewer, sequence, {ReplyStatus::refused, 0});
+  }
+  if (viewer->commanding) return answer(*viewer, sequence, {ReplyStatus::busy, 0});
+  viewer->commanding = true;
+  Command wish;
+  wish.kind = kind;
+  wish.argument = message.argument;
+  asio::post(helper_, [this, wish, sequence, from = std::weak_ptr(viewer)] {
+    Reply reply{ReplyStatus::busy, 0};
+    try {
+      if (!command_link_ || !command_link_->alive()) command_link_ = connect_segment(setup_.name);
+      reply = command_link_->send(wish);
+    } catch (const SegmentError&) {
+      command_link_.reset();  // no controller: the viewer may try again
+    }
+    asio::post(io_, [from, sequence, reply] {
+      const std::shared_ptr<Viewer> back = from.lock();
+      if (!back) return;
+      back->commanding = false;
+      answer(*back, sequence, reply);
+    });
+  });
+}
+
+void Server::Impl::look_after(Viewer& viewer, std::int64_t now_ns) {
+  viewer.may_say = std::max(viewer.may_say, std::min(viewer.may_say + 1, kMaySay));
+  if (!viewer.gone) {
+    const std::uint64_t sent = link_figures(viewer.fd()).received_bytes;
+    viewer.may_send_bytes -= static_cast<std::int64_t>(sent - viewer.sent_bytes);
+    viewer.sent_bytes = sent;
+    if (viewer.may_send_bytes < 0) drop(viewer, CloseCode::not_understood);
+    viewer.may_send_bytes = std::min(viewer.may_send_bytes + kMessageBytes, kMaySendBytes);
+  }
+  if (!viewer.stream || !viewer.stream->link().waits_for_ack()) viewer.heard_ns = now_ns;
+  if (!viewer.closing && now_ns - viewer.heard_ns > setup_.silence_ns)
+    drop(viewer, CloseCode::too_slow);
+  if (viewer.closing && !viewer.gone && now_ns > viewer.close_by_ns) {
+    ErrorCode error;
+    viewer.ws->next_layer().next_layer().socket().close(error);
+    viewer.gone = true;
+  }
+}
+
+void Server::Impl::drop(Viewer& viewer, CloseCode code) {
+  if (viewer.closing) return;
+  viewer.closing = code;
+  viewer.close_by_ns = monotonic_ns() + kGoodbyeNs;
+}
+
+}  // namespace kerf::bridge

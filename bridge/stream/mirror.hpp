@@ -1,0 +1,191 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <condition_variable>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "bridge/wire/messages.hpp"
+#include "bridge/wire/parse.hpp"
+#include "shared/segment/command.hpp"
+#include "shared/segment/connection.hpp"
+#include "shared/segment/replica_writer.hpp"
+
+namespace kerf::bridge {
+
+/// The other machine's CLOCK_MONOTONIC as the local one tells it; both count from their own start,
+/// so they differ by hours. One thread.
+///
+/// A message that is sent at s (theirs) and comes at c (ours) took w = c - s - offset >= 0. The
+/// least c - s so far is therefore the offset and the shortest way; half of the link's least round
+/// trip is taken for that way, as NTP does: an error of half the difference of the two directions
+/// stays. Two clocks drift apart, so the least one may grow by `kDriftPpm`; a link that queues from
+/// the first message on cannot be told from another offset for longer than that.
+class ClockOffset {
+ public:
+  static constexpr std::int64_t kDriftPpm = 100;  ///< of two quartz clocks, 50 each
+
+  /// `round_trip_ns`: the link's least one so far; 0: not known.
+  void sample(std::int64_t sent_ns, std::int64_t came_ns, std::int64_t round_trip_ns) noexcept {
+    const std::int64_t seen = bounded(came_ns) - bounded(sent_ns);
+    const std::int64_t passed =
+        std::clamp<std::int64_t>(bounded(came_ns) - last_ns_, 0, kLongestNs);
+    least_ns_ = known_ ? std::min(seen, least_ns_ + passed / 1'000'000 * kDriftPpm) : seen;
+    // The part of the millisecond that gave no drift yet counts next time.
+    last_ns_ = bounded(came_ns) - (known_ ? passed % 1'000'000 : 0);
+    if (round_trip_ns > 0) way_ns_ = std::min(way_ns_, bounded(round_trip_ns) / 2);
+    known_ = true;
+  }
+
+  /// Their time as ours; never below 0, where a time from before our start would wrap.
+  [[nodiscard]] std::int64_t local(std::int64_t their_ns) const noexcept {
+    const std::int64_t way = way_ns_ == std::numeric_limits<std::int64_t>::max() ? 0 : way_ns_;
+    return std::max<std::int64_t>(bounded(their_ns) + least_ns_ - way, 0);
+  }
+  [[nodiscard]] std::uint64_t local(std::uint64_t their_ns) const noexcept {
+    constexpr auto kMost = static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max());
+    return static_cast<std::uint64_t>(local(static_cast<std::int64_t>(std::min(their_ns, kMost))));
+  }
+
+ private:
+  static constexpr std::int64_t kLongestNs = std::int64_t{86'400} * 1'000'000'000;  // a day
+
+  /// A time of 73 years at most, so that sums of three stay in 64 bits.
+  [[nodiscard]] static constexpr std::int64_t bounded(std::int64_t ns) noexcept {
+    constexpr std::int64_t kMost = std::int64_t{1} << 61;
+    return std::clamp(ns, -kMost, kMost);
+  }
+
+  bool known_ = false;
+  std::int64_t least_ns_ = 0;
+  std::int64_t last_ns_ = 0;
+  std::int64_t way_ns_ = std::numeric_limits<std::int64_t>::max();
+};
+
+/// Where a command of a local reader waits for the other machine's answer. One at a time: the
+/// segment server's thread asks, the network's thread looks for it as often as something arrives,
+/// at least 60 times a second, sends it and brings the answer.
+class CommandDesk {
+ public:
+  /// What the link can do: no connection is a reason to try again, no right is not.
+  enum class Link : std::uint8_t { down, read_only, open };
+  /// An answer later than that is no answer; a local reader waits for 2 s.
+  static constexpr std::chrono::milliseconds kPatience{1500};
+
+  /// Waits for the answer, at most `kPatience`: then `busy`, though the command may still come.
+  [[nodiscard]] Reply ask(const Command& command) noexcept;
+
+  /// Network: what is to be sent, once.
+  [[nodiscard]] std::optional<CommandMessage> take();
+  void answer(const ReplyMessage& reply);
+  void set_link(Link link);
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable answered_;
+  Link link_ = Link::down;
+  std::uint32_t sequence_ = 0;  // of the last command
+  std::optional<CommandMessage> to_send_;
+  std::optional<Reply> reply_;  // to the last command
+};
+
+/// What arrived does not fit what is held: the way out is a new connection, which starts afresh
+/// while readers keep the picture that they have. One line.
+struct OutOfStep : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+/// The far end of a bridge without its network: messages in, a local segment out.
+///
+/// A run's first pass goes straight into a segment that nobody has yet; with its last frame the
+/// segment gets the name, and the one of an earlier run goes. Later passes wait in private memory
+/// and are published at once when they are whole, so readers see the state of one tick or the one
+/// before it, however slow the link is. Beyond the segment it holds 16 bytes a block and the pass
+/// under way.
+///
+/// One thread, but for `Answer`, which the segment server's thread calls.
+class Mirror {
+ public:
+  /// Throws `SegmentError` where `name` cannot be used or another controller has it. A segment of
+  /// more than `most_bytes` is refused.
+  Mirror(std::string name, std::uint64_t most_bytes, SegmentServer::Answer answer);
+  Mirror(const Mirror&) = delete;
+  Mirror& operator=(const Mirror&) = delete;
+  ~Mirror();
+
+  /// First message of a connection, or a new run's. All that is held of a stream is void. Throws
+  /// `WireError` where it does not hold, `SegmentError` where it is of another layout, too large or
+  /// there is no memory.
+  const HelloMessage& hello(std::span<const std::byte> message, std::int64_t now_ns,
+                            std::int64_t round_trip_ns);
+
+  /// Applies a frame; what it returns is to be sent back. Throws `WireError` or `OutOfStep`, and
+  /// `SegmentError` where the name was taken in the meantime.
+  AckMessage frame(std::span<const std::byte> message, std::int64_t now_ns,
+                   std::int64_t round_trip_ns);
+
+  /// Applies records; what is not above the last index is known already. Throws `WireError`.
+  void records(std::span<const std::byte> message);
+
+  /// True from the first whole pass of a connection until the next greeting.
+  [[nodiscard]] bool joined() const noexcept { return joined_; }
+  /// True where the controller of the run that is shown has gone.
+  [[nodiscard]] bool ended() const noexcept { return ended_; }
+  [[nodiscard]] std::uint64_t passes() const noexcept { return passes_; }  ///< published
+  /// When the newest published state was read from the other machine's segment, local clock; 0:
+  /// nothing is published.
+  [[nodiscard]] std::int64_t taken_ns() const noexcept { return taken_ns_; }
+
+ private:
+  struct LocalSegment;
+  struct Waiting {
+    std::uint32_t id;
+    std::uint64_t version;
+    std::size_t at;  // in the bytes of its frame
+  };
+  struct Part {  // what of one frame waits for the end of its pass
+    std::vector<Waiting> blocks;
+    std::vector<std::byte> bytes;
+  };
+
+  void take(const FrameParser::Block& block);
+  void put(std::uint32_t id, std::uint64_t version, std::span<const std::byte> bytes);
+  void publish(const FrameHead& head);
+
+  std::string name_;
+  std::uint64_t most_bytes_;
+  SegmentServer::Answer answer_;
+  ClockOffset clock_;
+
+  // The stream of this connection.
+  std::optional<ParsedHello> hello_;
+  std::unique_ptr<FrameParser> parser_;
+  std::vector<std::uint64_t> held_;  // version per block, 0: not yet
+  std::uint32_t blocks_held_ = 0;
+  std::uint64_t set_hash_ = 0;
+  std::uint64_t last_frame_ = 0;
+  std::vector<Part> waiting_;
+  std::size_t blocks_waiting_ = 0;
+  std::array<std::byte, kMaxRawBytes> scratch_{};
+
+  // What local readers have, and the segment that this connection fills: often the same one.
+  std::unique_ptr<LocalSegment> shown_;
+  std::unique_ptr<LocalSegment> next_;
+  bool joined_ = false;
+  bool ended_ = false;
+  std::uint64_t passes_ = 0;
+  std::int64_t taken_ns_ = 0;
+};
+
+}  // namespace kerf::bridge

@@ -1,0 +1,254 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "controller/device/device_driver.hpp"
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+
+#include "shared/wire/falcon.hpp"
+#include "shared/wire/omni.hpp"
+#include "shared/wire/woodenhaptics.hpp"
+
+namespace kerf {
+
+DeviceReport DeviceDriver::read() noexcept {
+  last_.fresh = false;
+  std::array<std::uint8_t, kMaxPacketBytes + 1> packet;  // one byte more, to detect a longer packet
+  for (int taken = 0; taken < kMaxDrain; ++taken) {
+    const std::size_t size = port_.receive(packet);
+    if (size == 0) break;
+    if (size <= kMaxPacketBytes && take(std::span(packet).first(size), last_)) {
+      last_.fresh = true;
+    } else {
+      ++refused_;
+    }
+  }
+  return last_;
+}
+
+void DeviceDriver::command(const ServoOutput& output) noexcept {
+  ServoOutput allowed = output;
+  if (released_.load(std::memory_order_relaxed)) allowed.motors_on = false;
+  if (!allowed.motors_on) allowed.motor_counts = {};
+  Packet packet;
+  const std::size_t size = compose(allowed, packet);
+  const bool lets_go = forcing_ && !allowed.motors_on;
+  if (lets_go) {
+    port_.send_now(std::span(packet).first(size));
+  } else {
+    port_.send(std::span(packet).first(size));
+  }
+  forcing_ = allowed.motors_on;
+  if (forcing_ && released_.load()) release();  // set meanwhile by another thread
+}
+
+bool DeviceDriver::release() const noexcept {
+  Packet packet;
+  const std::size_t size = compose_release(packet);
+  return port_.send_now(std::span(packet).first(size));
+}
+
+bool DeviceDriver::stay_released() noexcept {
+  released_.store(true);
+  return release();
+}
+
+bool DeviceDriver::release_for_good() noexcept {
+  released_.store(true);
+  Packet packet;
+  const std::size_t size = compose_release(packet);
+  return port_.send_last(std::span(packet).first(size));
+}
+
+// Falcon.
+
+bool FalconDriver::take(std::span<const std::uint8_t> packet, DeviceReport& report) noexcept {
+  const auto said = falcon::decode_report(packet);
+  if (!said) return false;
+  homed_ = std::ranges::all_of(said->homed, [](bool homed) { return homed; });
+  report.encoder = said->encoder;
+  report.button1 = (said->buttons & falcon::kButtonForward) != 0;
+  report.button2 = (said->buttons & falcon::kButtonPlus) != 0;
+  report.parked = (said->buttons & falcon::kButtonCentre) != 0;
+  report.homed = homed_;
+  ++report.counter;
+  return true;
+}
+
+std::size_t FalconDriver::compose(const ServoOutput& output, Packet& packet) noexcept {
+  const bool asks = output.phase == Phase::off || output.phase == Phase::calibrating;
+  const bool fault = output.phase == Phase::fault;
+  const auto bytes = encode(FalconCommand{.motor = output.motor_counts,
+                                          .homing = !homed_,
+                                          .green = !asks && !fault,
+                                          .blue = asks,
+                                          .red = fault});
+  std::ranges::copy(bytes, packet.begin());
+  return bytes.size();
+}
+
+std::size_t FalconDriver::compose_release(Packet& packet) const noexcept {
+  const auto bytes = encode(FalconCommand{});
+  std::ranges::copy(bytes, packet.begin());
+  return bytes.size();
+}
+
+// Omni.
+
+namespace {
+
+OmniCommand::Light light_of(Phase phase) noexcept {
+  switch (phase) {
+    case Phase::off:
+    case Phase::calibrating:
+      return OmniCommand::Light::slow_flash;
+    case Phase::fault:
+      return OmniCommand::Light::fast_flash;
+    case Phase::armed:
+    case Phase::ramping:
+    case Phase::active:
+      return OmniCommand::Light::steady;
+  }
+  return OmniCommand::Light::off;
+}
+
+// Packets in 20 ms of an 8 kHz stream, after which the force is off in any case: one more packet
+// costs nothing then.
+constexpr std::uint32_t kNear = 160;
+// Packets in 2 s of it, after which the controller gives the device up: more cannot be missing.
+constexpr std::uint32_t kMostMissing = 16'000;
+
+}  // namespace
+
+bool OmniDriver::is_newest(std::uint32_t counter) noexcept {
+  const std::uint32_t step = counter - newest_;
+  if (seen_) {
+    if (step == 0 || 0U - step <= kNear) return false;
+    if (step <= kNear) {
+      lost_ += step - 1;
+    } else {
+      const bool goes_on = far_ && counter - *far_ - 1 < kNear;
+      far_ = counter;
+      if (!goes_on) return false;
+      if (step <= kMostMissing) lost_ += step - 2;  // the refused one came
+    }
+  }
+  far_.reset();
+  seen_ = true;
+  newest_ = counter;
+  return true;
+}
+
+bool OmniDriver::take(std::span<const std::uint8_t> packet, DeviceReport& report) noexcept {
+  const auto said = decode_report(packet);
+  if (!said) return false;
+  if (!is_newest(said->counter)) return false;
+  report.encoder = said->encoder;
+  report.wiper_a = said->pot_a;
+  report.wiper_b = said->pot_b;
+  report.button1 = said->button1;
+  report.button2 = said->button2;
+  report.parked = said->docked;
+  report.counter = said->counter;
+  return true;
+}
+
+std::size_t OmniDriver::compose(const ServoOutput& output, Packet& packet) noexcept {
+  const auto bytes = encode(OmniCommand{.motor = output.motor_counts,
+                                        .motors_on = output.motors_on,
+                                        .light = light_of(output.phase)});
+  std::ranges::copy(bytes, packet.begin());
+  return bytes.size();
+}
+
+std::size_t OmniDriver::compose_release(Packet& packet) const noexcept {
+  const auto bytes = encode(OmniCommand{});
+  std::ranges::copy(bytes, packet.begin());
+  return bytes.size();
+}
+
+// WoodenHaptics.
+
+namespace {
+
+constexpr int kHomeCounts = 40;        // 10 mrad: a hand holds the pose as still as that
+constexpr int kFarFromHome = 20 * 40;  // 0.2 rad: not held by mistake
+
+bool near_home(const std::array<std::int16_t, 3>& counts, int within) noexcept {
+  for (std::size_t i = 0; i < 3; ++i) {
+    if (std::abs(counts[i] - wooden::kHomeCounts[i]) > within) return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+WoodenDriver::Counts WoodenDriver::turned(const Counts& counts) const noexcept {
+  Counts out;
+  // Wraps at 16 bits, like counts.
+  for (std::size_t i = 0; i < 3; ++i) out[i] = static_cast<std::int16_t>(sign_[i] * counts[i]);
+  return out;
+}
+
+bool WoodenDriver::take(std::span<const std::uint8_t> packet, DeviceReport& report) noexcept {
+  const auto said = wooden::decode_report(packet);
+  if (!said) return false;
+  packet_bytes_.store(packet.size(), std::memory_order_relaxed);
+  button_ = said->calibrate;
+  counts_ = said->encoder;
+  joints_ = turned({counts_[0], counts_[1], counts_[2]});
+  const bool in_pose = near_home(joints_, kHomeCounts);
+  if (button_) {
+    homed_ = homed_ && !near_home(joints_, kFarFromHome);
+  } else if (set_sent_ && in_pose) {
+    homed_ = at_home_ = true;
+    set_sent_ = false;
+  }
+  at_home_ = at_home_ && in_pose;
+  report.encoder = joints_;
+  report.button1 = wooden::wireless_button(said->encoder[3]);
+  report.parked = button_ || set_sent_ || at_home_;
+  report.homed = homed_;
+  ++report.counter;
+  return true;
+}
+
+std::size_t WoodenDriver::compose(const ServoOutput& output, Packet& packet) noexcept {
+  WoodenCommand command{.milliamps = turned(output.motor_counts), .set_encoders = {}};
+  if (button_) {
+    // The device also releases the button when its encoders are set.
+    auto& counts = command.set_encoders.emplace(counts_);
+    if (!homed_) {
+      counts = {};
+      std::ranges::copy(turned(wooden::kHomeCounts), counts.begin());
+      set_sent_ = true;
+    }
+  }
+  std::ranges::copy(encode(command), packet.begin());
+  return packet_bytes_.load(std::memory_order_relaxed);
+}
+
+std::size_t WoodenDriver::compose_release(Packet& packet) const noexcept {
+  std::ranges::copy(encode(WoodenCommand{}), packet.begin());
+  return packet_bytes_.load(std::memory_order_relaxed);
+}
+
+std::unique_ptr<DeviceDriver> make_driver(
+    Personality personality, PacketPort& port,
+    const std::optional<std::array<double, 3>>& encoder_sign) {
+  switch (personality) {
+    case Personality::falcon:
+      return std::make_unique<FalconDriver>(port);
+    case Personality::woodenhaptics: {
+      const auto sign = encoder_sign.value_or(std::array{1.0, 1.0, 1.0});
+      return std::make_unique<WoodenDriver>(
+          port, std::array{sign[0] < 0 ? -1 : 1, sign[1] < 0 ? -1 : 1, sign[2] < 0 ? -1 : 1});
+    }
+    case Personality::omni:
+      break;
+  }
+  return std::make_unique<OmniDriver>(port);
+}
+
+}  // namespace kerf

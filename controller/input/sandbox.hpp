@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <string>
+#include <string_view>
+
+// Foreign files are parsed in a child process without rights: both ends of the channel, and the
+// memory that they share.
+
+namespace kerf {
+
+/// Memory of an unnamed file, mapped for reading and writing; unmapped with the object. Load time.
+class SharedBytes {
+ public:
+  SharedBytes() = default;
+  /// Maps the first `size` bytes of `file`, which may be closed then; throws std::bad_alloc.
+  SharedBytes(int file, std::size_t size);
+  SharedBytes(SharedBytes&& other) noexcept;
+  SharedBytes& operator=(SharedBytes&& other) noexcept;
+  ~SharedBytes();
+
+  [[nodiscard]] std::span<std::byte> bytes() const noexcept { return bytes_; }
+  /// The memory is kept until the process ends.
+  std::span<std::byte> release() noexcept;
+
+ private:
+  std::span<std::byte> bytes_;
+};
+
+/// The messages of a reader, one packet each: this byte, then the content that the comment names.
+/// The parent answers an offer with the agreed size, once the memory has it.
+enum class SandboxWord : std::uint8_t {
+  at,         ///< the file that is read now
+  offer,      ///< a header
+  done,       ///< nothing; last
+  refused,    ///< one line; last
+  no_memory,  ///< nothing; last
+};
+inline constexpr std::size_t kLongestSandboxWord = 4096;  ///< bytes of a packet
+
+/// The end of the channel in the child: hands over what a reader of foreign bytes has read.
+class SandboxReader {
+ public:
+  SandboxReader(int channel, int memory) : channel_(channel), memory_(memory) {}
+
+  /// Names the file that is read now, one of several. The message of a crash names it.
+  void at(const std::string& place) { say(SandboxWord::at, place); }
+
+  /// Sends `header`, of less than kLongestSandboxWord bytes, and returns the memory that the parent
+  /// accepted for it, all zeros. Once. Does not return if the parent refuses.
+  [[nodiscard]] std::span<std::byte> offer(std::span<const std::byte> header);
+
+  /// Sends one packet; `text` is cut to its size. If that fails, the process ends.
+  void say(SandboxWord word, std::string_view text = {});
+
+ private:
+  int channel_, memory_;
+};
+
+inline constexpr int kReadCpuSeconds = 60, kMostReadCpuSeconds = 86400;
+
+/// One foreign file that is to be read.
+struct SandboxJob {
+  std::string place;  ///< begins every complaint: the file
+  std::string kind;   ///< the expected kind, for complaints: NRRD
+  /// Largest file that a reader holds as a whole before it knows the content.
+  std::uint64_t file_bytes = 0;
+  int cpu_s = kReadCpuSeconds;
+};
+
+/// Memory that every reader may take; most of it is for tables of the libraries.
+inline constexpr std::uint64_t kSandboxBytes = std::uint64_t{64} << 20;
+
+/// Runs `read` in a child process without rights (`drop_rights`), and returns the memory that it
+/// filled. The libraries that parse foreign files have faults that a broken or hostile file finds;
+/// the sandbox confines them.
+///
+/// `read` makes one offer. `accept` gets its header in the parent, and refuses it with a SceneError
+/// or returns the number of bytes to grant; it must trust no byte of it, nor the caller any byte of
+/// the memory. Both processes map the same pages, so nothing is copied; when this returns, the
+/// child has ended and no other process maps them. The child may take kSandboxBytes and two times
+/// `file_bytes` before the offer is accepted, then twice the accepted bytes more: the memory itself
+/// and a copy of a library.
+///
+/// After 2 s a progress bar is shown on stderr, if that is a terminal.
+///
+/// Throws SceneError, one line: the error that `read` or `accept` threw; a signal that ended the
+/// child (a crash); more memory or CPU time than allowed; `cpu_s` seconds without any work; an end
+/// that the process was asked for meanwhile (`stop_requested`). Load time; any thread.
+[[nodiscard]] SharedBytes read_in_sandbox(
+    const SandboxJob& job, const std::function<void(SandboxReader&)>& read,
+    const std::function<std::size_t(std::span<const std::byte>)>& accept);
+
+}  // namespace kerf

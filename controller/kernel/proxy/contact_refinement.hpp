@@ -1,0 +1,200 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+
+#include "controller/kernel/point_shell/point_sums.hpp"
+#include "controller/kernel/point_shell/point_table.hpp"
+#include "controller/kernel/proxy/closeup.hpp"
+#include "controller/kernel/proxy/constraint_set.hpp"
+#include "controller/kernel/proxy/contact_peak.hpp"
+#include "controller/kernel/proxy/contact_space.hpp"
+#include "controller/kernel/proxy/sample_reader.hpp"
+#include "shared/numeric/numbers.hpp"
+#include "shared/volume/voxel_grid.hpp"
+
+namespace kerf {
+
+/// The closer look at one volume near rest (docs/theory.md 3.5): at a ball's cap, or at another
+/// tool's close samples and a patch of the volume. It corrects the plane that the point
+/// shell tells. It lives within one query, with the tool's centre at `at`.
+template <class N>
+class CloserLook {
+ public:
+  using Real = typename N::Real;
+
+  CloserLook(const SampleReader<N>& reader, const ContactVolume<N>& volume, VoxelVec<Real> at,
+             const PointSums<N>& sums, const PointMeans<N>& means) noexcept
+      : reader_(reader),
+        points_(reader.points()),
+        volume_(volume),
+        at_(at),
+        sums_(sums),
+        means_(means) {}
+
+  /// Corrects `plane` where it is near enough to rest.
+  void correct(ConstraintPlane<N>& plane) const noexcept {
+    if (points_.table.round) {
+      plane.depth = depth_around(plane);
+    } else if (std::max(plane.depth, -plane.depth) < Real(kCloseDepth)) {
+      look_again(plane);
+    }
+  }
+
+ private:
+  /// Corrects the plane of a tool that is no ball: by the close samples around the peak, then by a
+  /// patch of the volume around the place that they find. The normal is that of the smoother one of
+  /// the two surfaces.
+  void look_again(ConstraintPlane<N>& plane) const noexcept {
+    if (points_.close.first == nullptr) return;
+    using Unit = typename N::Unit;
+    using Ratio = typename N::Ratio;
+    PointNumber<N> peak[3] = {};
+    peak_offset(sums_, fall_of(means_, false), peak);
+    const Closeup<N> seen = reader_.look_closely_at(volume_, at_, peak);
+    // Where the tool touches at two places the peak that two means tell may be at neither.
+    if (seen.height <= Ratio(0)) return;
+    const auto offset = turned_offset<N>(seen.offset, reader_.rows());
+    const ContactVec<Real> arm{multiply<Real>(offset.x, points_.reach),
+                               multiply<Real>(offset.y, points_.reach),
+                               multiply<Real>(offset.z, points_.reach)};
+    const VoxelVec<Real> middle = at_ + volume_.frame.voxel_from_contact * arm;
+    // The first patch lies askew, as its normal is that of the middle.
+    Patch<N> patch = patch_at(middle, plane.normal);
+    patch = patch_at(middle, direction<N>(-patch.gradient));
+    const auto& gradient = patch.gradient;
+    const auto facing = direction<N>(-gradient);
+    // Where the tool's own gradient is far less than the patch's, it touches faces that look
+    // elsewhere.
+    const Ratio steep = norm(gradient);
+    if (steep < Ratio(0.01)) return;
+    const Ratio along = -(multiply<Ratio>(means_.gradient.x, facing.x) +
+                          multiply<Ratio>(means_.gradient.y, facing.y) +
+                          multiply<Ratio>(means_.gradient.z, facing.z));
+    const Unit facing_share(std::clamp(along / steep, Ratio(0), Ratio(1)));
+    const Unit alike = Unit(1) - falling_share<N>(facing_share, kAlike, kUnlike);
+    // There the point shell's depth counts, but not so much less than the look's that a step from
+    // an allowed place would end beyond the middle of the thinnest wall (docs/theory.md 4.2). The
+    // look's is by the slope of the face that it saw: in the tool's own gradient the faces cancel.
+    const auto less = static_cast<Real>(1 - SweepRules::kStep - SweepRules::kWedged);
+    const Ratio own = peak_height(means_, false), highest = std::max(seen.height, means_.top),
+                slope = slope_along(means_, plane.normal, false);
+    plane.depth = std::max(depth_of<N>(own + multiply<Ratio>(alike, highest - own), slope),
+                           depth_of<N>(highest, std::max(slope, slope_of_face(steep))) - less);
+    const Unit counts = alike * narrowness<N>(sums_, means_.top);
+    plane.arm = plane.arm + part_of<N>(arm - plane.arm, counts);
+    const auto own_normal = direction<N>(-turned_offset<N>(seen.normal, reader_.rows()));
+    const auto smoother = between<N>(facing, own_normal, smoothness<N>(seen.spread, patch.spread));
+    plane.normal = between<N>(plane.normal, smoother, counts);
+  }
+
+  /// What a patch tells that is flattened along `normal`.
+  [[nodiscard]] Patch<N> patch_at(VoxelVec<Real> middle,
+                                  ContactVec<typename N::Unit> normal) const noexcept {
+    constexpr PointShell<N> kPatch{kPatchArrays<N>.table(), {}, Real(kPatchRadius), 15};
+    SpiralPlaces<N, kPatchSamples> memory;
+    const PointPlaces<N> places = memory.places();
+    const TurnRows<N> rows = flattened<N>(normal);
+    reader_.place(kPatch, rows, volume_.frame, places);
+    const PointSums<N> patch = reader_.sums_at(volume_.field, kPatch.table, places, middle);
+    if (patch.weight <= typename N::Sum(0)) return {};
+    return patch_of<N>(point_means<N>(patch, volume_.field.scale, volume_.frame, rows, false),
+                       normal);
+  }
+
+  /// A ball's depth by its cap around the middle of the contact, as far as the contact is sharp.
+  [[nodiscard]] Real depth_around(const ConstraintPlane<N>& plane) const noexcept {
+    using Ratio = typename N::Ratio;
+    using Unit = typename N::Unit;
+    const Ratio height = peak_height(means_, true), slope = slope_along(means_, plane.normal, true);
+    const Unit sharp = sharpness(sums_, points_.table.count, height, slope, points_.reach);
+    const auto out = direction<N>(means_.offset);
+    if (sharp <= Unit(0) || out == decltype(out){}) return plane.depth;
+    const PointMeans<N> cap = cap_means(out);
+    if (cap.density <= Ratio(0)) return plane.depth;
+    const Ratio summit = peak_height(cap, false);
+    return depth_of<N>(height + multiply<Ratio>(sharp, summit - height), slope) +
+           multiply<Real>(sharp, Real(kSummitAbove));
+  }
+
+  /// Means over a cap in the direction `out` from a ball's centre; 0 where it feels nothing.
+  [[nodiscard]] PointMeans<N> cap_means(ContactVec<typename N::Unit> out) const noexcept {
+    const Real half = multiply<Real>(points_.reach, typename N::Unit(0.5));
+    const Real radius = std::min(Real(kCapRadius), half);
+    const PointShell<N> cap{kCapArrays<N>.table(), {}, radius, 14};
+    SpiralPlaces<N, kCapSamples> memory;
+    const PointPlaces<N> places = memory.places();
+    const TurnRows<N> rows = cap_rows<N>(out, radius, points_.reach);
+    reader_.place(cap, rows, volume_.frame, places);
+    const VoxelVec<Real> top =
+        at_ + volume_.frame.voxel_from_contact * times<N>(out, points_.reach);
+    const PointSums<N> sums = reader_.sums_at(volume_.field, cap.table, places, top);
+    if (sums.weight <= typename N::Sum(0)) return {};
+    return point_means<N>(sums, volume_.field.scale, volume_.frame, rows, false);
+  }
+
+  const SampleReader<N>& reader_;
+  const PointShell<N>& points_;
+  const ContactVolume<N>& volume_;
+  VoxelVec<Real> at_;
+  const PointSums<N>& sums_;
+  const PointMeans<N>& means_;
+};
+
+/// A contact reads the density between air and the iso-surface alone: of a face that rises over two
+/// units a layer of 2 iso units. At an iso of 0.05 that is a tenth of a unit, where some five
+/// samples touch and a cell's gradient is that of the ramp's bend. Near 1 they read the bend at
+/// the ramp's other end. The surfaces of equal density of one face have the same normals, so
+/// normal and place are read where it is half dense (docs/theory.md 3.8).
+///
+/// Between these shares of full density the iso-surface is near enough to the middle: there the
+/// normal is as good, and nothing more is read. In teeth density goes on changing below the face,
+/// which makes the middle rough: with the look from 0.42 on the force steps by 3.5 instead of 0.9 %
+/// on the GE tooth of 8 bits, iso 0.34 (rows `cutting`).
+inline constexpr double kMidwayFrom = 0.32, kMidwayTo = 0.6;
+/// The middle is sought so far to each side, units. It is at most one unit below the iso-surface,
+/// and reads raise a surface of low iso by up to 0.6 more.
+inline constexpr double kMidwayFarthest = 1.6;
+inline constexpr int kMidwayLooks = 2;          ///< the second along the normal of the first,
+inline constexpr double kMidwayAlike = 0.9998;  ///< if it is turned by more than a degree; cosine
+
+[[nodiscard]] constexpr bool is_midway(const DensityScale& scale) noexcept {
+  const double full_over_two_iso = scale_factor<double>(scale);
+  return 2 * kMidwayFrom * full_over_two_iso < 1 && 2 * kMidwayTo * full_over_two_iso > 1;
+}
+
+/// The middle of a face's ramp.
+template <class N>
+struct RampMiddle {
+  typename N::Real below{};  ///< how far below the contact it is, units
+  Density level = 0;         ///< the density there; 0: there is no face
+};
+
+/// Seeks it from a contact on: where density is half of the highest one or 2.5 units below, where a
+/// wall of two units has its middle, or a thick one its full density though reads raised its
+/// surface. On a ramp of two units density rises by `half` per unit, so the first step finds it,
+/// but for the bend; shorter ones then bear steeper ramps too. `density(below)` is 0 to 1.
+template <class N, class DensityBelow>
+[[nodiscard]] constexpr RampMiddle<N> ramp_middle(const DensityBelow& density) noexcept {
+  using Real = typename N::Real;
+  using Unit = typename N::Unit;
+  const Real half = multiply<Real>(std::max(density(Real(1)), density(Real(2.5))), Unit(0.5));
+  if (half < Real(0.002)) return {};  // too few steps of density
+  Real below{}, level = density(below);
+  for (const double share : {1.0, 0.75, 0.75}) {
+    const Real missing = (half - level) / half;
+    below = std::clamp(below + multiply<Real>(missing, Unit(share)), Real(-kMidwayFarthest),
+                       Real(kMidwayFarthest));
+    level = density(below);
+  }
+  level = std::max(level, multiply<Real>(half, Unit(0.5)));
+  if constexpr (N::kIsFixed) {
+    return {below, static_cast<Density>(level.raw())};
+  } else {
+    return {below, static_cast<Density>(level * Real(kDensityMax))};
+  }
+}
+
+}  // namespace kerf

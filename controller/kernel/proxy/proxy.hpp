@@ -1,0 +1,281 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+
+#include "controller/kernel/proxy/proxy_sweep.hpp"
+
+namespace kerf {
+
+/// Whether the proxy has a place, and if not whether one is still looked for.
+enum class Placing : std::uint8_t { searching, placed, refused };
+
+/// Finds a place of the proxy (docs/theory.md 4.7). Of 26 directions each is tried one unit farther
+/// out once all were tried. With nothing free within kReach the tool is refused until its own goal
+/// is free.
+///
+/// A tool that takes another's place is sought around that place, not around the goal, and stays on
+/// its side of every wall: a direction in which the tool's centre came out of the solid, or began
+/// outside of it, ends where the centre would go into it again.
+///
+/// At most 14 queries a tick, and no more than the tick's work allows: the next tick goes on. Only
+/// the tool's surface is felt: what lies wholly inside of the tool does not count as solid here.
+template <class N>
+class StartSearch {
+  using Real = typename N::Real;
+  using Place = ContactVec<Real>;
+
+ public:
+  static constexpr std::int32_t kReach = 64;  ///< units
+
+  StartSearch() = default;
+  /// Around a place that a tool had.
+  explicit constexpr StartSearch(Place around) noexcept : around_(around), replaces_(true) {}
+  /// The same anew, for another tool.
+  [[nodiscard]] constexpr StartSearch again() const noexcept {
+    return replaces_ ? StartSearch(around_) : StartSearch();
+  }
+  [[nodiscard]] constexpr bool refused() const noexcept { return distance_ > kReach; }
+
+  template <ContactField<N> Field>
+  constexpr Placing tick(Field& field, const ProxyPose<N>& goal, ProxyPose<N>& pose) noexcept {
+    field.turn(goal.turn);
+    const Place middle = replaces_ && !refused() ? around_ : goal.centre;
+    if (is_free(field, middle, replaces_ ? SweepRules::kWedged : SweepRules::kTolerance)) {
+      pose = {middle, goal.turn};
+      return Placing::placed;
+    }
+    if (refused()) return Placing::refused;
+    for (int queries = 0; queries < kQueries && field.may_query();) {
+      if (direction_ == kDirections) {
+        direction_ = 0;
+        ++distance_;
+        if (refused()) return Placing::refused;
+      }
+      const int direction = direction_++;
+      const Place centre = middle + step(direction);
+      if (!leads_on(field, direction, middle, centre)) continue;
+      ++queries;
+      if (is_free(field, centre, SweepRules::kTolerance)) {
+        pose = {centre, goal.turn};
+        return Placing::placed;
+      }
+    }
+    return Placing::searching;
+  }
+
+ private:
+  static constexpr int kDirections = 27, kQueries = 13;
+
+  template <ContactField<N> Field>
+  [[nodiscard]] static constexpr bool is_free(Field& field, Place centre, double depth) noexcept {
+    const Contacts<N> felt = field.query(centre);
+    return !felt.buried && felt.depth <= static_cast<Real>(depth);
+  }
+  /// Whether this direction still leads out of the solid at `centre`, one unit after the last.
+  template <ContactField<N> Field>
+  [[nodiscard]] constexpr bool leads_on(const Field& field, int direction, Place middle,
+                                        Place centre) noexcept {
+    const std::uint32_t bit = 1U << direction;
+    if (direction == kDirections / 2 || (ended_ & bit) != 0) return false;  // the middle is none
+    if (distance_ == 1 && !field.is_solid(middle)) outside_ |= bit;
+    const bool solid = field.is_solid(centre);
+    if (solid && (outside_ & bit) != 0) ended_ |= bit;
+    if (!solid) outside_ |= bit;
+    return (ended_ & bit) == 0;
+  }
+  /// `distance_` along one of the 27 directions of a 3x3x3 cube, by number.
+  [[nodiscard]] constexpr Place step(int direction) const noexcept {
+    constexpr double kPerAxis[4] = {0, 1, 0.7071067811865476, 0.5773502691896258};
+    const int x = direction % 3 - 1, y = direction / 3 % 3 - 1, z = direction / 9 - 1;
+    const Real part = Real(distance_) * static_cast<Real>(kPerAxis[x * x + y * y + z * z]);
+    return {Real(x) * part, Real(y) * part, Real(z) * part};
+  }
+
+  Place around_{};
+  bool replaces_ = false;
+  std::int32_t distance_ = 1;
+  int direction_ = 0;                      ///< to be tried next at this distance
+  std::uint32_t outside_ = 0, ended_ = 0;  ///< by direction: the centre is, or met, as said above
+};
+
+/// What the swept contact needs of one tool and the scene; constant during a run.
+template <class N>
+struct ProxyPlan {
+  typename N::Unit friction{};   ///< Coulomb's coefficient, 0 to 1
+  typename N::Unit turn_step{};  ///< turn_step_of(reach); 0: round, or keeps the world's axes
+  /// How fast the spring may grow after a start inside of the solid: 0.1 N/ms over its stiffness.
+  typename N::Real ramp_per_tick{};
+};
+
+/// What one tick hands to the next. A fresh state looks for a place at the goal: it is made when
+/// the device is parked at rest, or has lost its home.
+template <class N>
+struct ProxyState {
+  ProxyPose<N> pose;
+  bool placed = false;
+  StartSearch<N> search;
+  bool ramping = false;
+  typename N::Real longest{};  ///< that the spring may be while it ramps, units
+  SweepMemory<N> memory;
+
+  /// Looks for a place around the one that it has: another tool took over, or the solid changed.
+  constexpr void place_anew() noexcept {
+    search = placed ? StartSearch<N>(pose.centre) : search.again();
+    placed = false;
+    memory = {};
+  }
+  /// The spring grows from 0 again: nothing was felt meanwhile.
+  constexpr void ramp() noexcept {
+    ramping = true;
+    longest = {};
+  }
+};
+
+/// The contact of one tick.
+template <class N>
+struct ProxyContact {
+  Placing placing = Placing::searching;
+  ProxyPose<N> pose;
+  ContactVec<typename N::Real> spring{};  ///< from goal to proxy, units: force over stiffness
+  /// Of what the head presses with, out of the solid; 0 in air.
+  ContactVec<typename N::Unit> normal{};
+  /// Of what the whole tool presses with, and what the head bears over that, at most 1: the same as
+  /// `normal`, and 1, without a shaft that presses.
+  ContactVec<typename N::Unit> press{};
+  typename N::Unit head_share{1};
+  /// What presses on the parts behind the head over the length of the spring, at most 1.
+  typename N::Unit behind_share{};
+  /// Torque about the tool's centre over the force's length, units.
+  ContactVec<typename N::Real> moment_arm{};
+  /// From the tool's centre to the middle of what the head presses on, units.
+  ContactVec<typename N::Real> head_arm{};
+  /// What holds the tool, and each plane's load over the length of the spring.
+  ConstraintSet<N> planes{};
+  std::array<typename N::Real, kMaxPlanes> part{};
+  std::int32_t queries = 0;
+  bool turned = true;  ///< the tool has the orientation of the goal
+};
+
+/// No tool gets deeper than this by moving: the solid has changed, and the tool starts anew.
+inline constexpr double kLostDepth = 1;  // units
+
+/// Sets the contact's normal and moment arm: the sum of what presses, and its moment over the
+/// length of the spring (docs/theory.md 5.3). Friction acts where the loads do.
+///
+/// The part of the spring beyond the loads and the friction cone is carried by planes that this
+/// tick did not meet (docs/theory.md 4.5). So a tool at rest always has a normal, since forces
+/// balance there. A tool that is still `moving` is not held. Such planes count as the head's: it
+/// cuts nothing but what it covers.
+template <class N>
+constexpr void add_loads(const Swept<N>& swept, typename N::Unit friction, bool moving,
+                         ProxyContact<N>& contact) noexcept {
+  using Real = typename N::Real;
+  const Real length = norm(contact.spring);
+  if (length < Real(1e-3)) return;
+  ContactVec<Real> pressed{}, behind{}, arm{}, head_arm{};
+  Real whole(0), load_behind(0);
+  for (std::size_t i = 0; i < swept.planes.count; ++i) whole = whole + swept.slide.load[i];
+  const bool loaded = whole >= Real(1e-3);
+  if (!loaded && moving) return;
+  if (!loaded && swept.planes.count > 0) arm = head_arm = swept.planes.plane[0].arm;
+  if (loaded) contact.planes = swept.planes;
+  for (std::size_t i = 0; loaded && i < swept.planes.count; ++i) {
+    const ConstraintPlane<N>& plane = swept.planes.plane[i];
+    const Real load = swept.slide.load[i];
+    pressed = pressed + times<N>(plane.normal, load);
+    if (plane.behind) {
+      behind = behind + times<N>(plane.normal, load);
+      load_behind = load_behind + load;
+    } else {
+      head_arm = head_arm + part_of<N>(plane.arm, share<N>(load, whole));
+    }
+    arm = arm + part_of<N>(plane.arm, share<N>(load, whole));
+    contact.part[i] = load / length;
+    contact.moment_arm = contact.moment_arm + moment<N>(plane.arm, plane.normal) * contact.part[i];
+  }
+  const ContactVec<Real> along_faces = contact.spring - pressed;
+  const Real rubbed = norm(along_faces);
+  const Real held = multiply<Real>(friction, norm(pressed));
+  if (rubbed > held && !moving)
+    pressed = pressed + part_of<N>(along_faces, share<N>(rubbed - held, rubbed));
+  // Beside a shaft that presses, less than the tolerance of a place is no press of the head.
+  const ContactVec<Real> head = pressed - behind;
+  const Real by_head = norm(head);
+  if (load_behind <= Real(0) || by_head >= Real(SweepRules::kTolerance)) {
+    contact.normal = direction_of<N>(head);
+  }
+  contact.moment_arm = contact.moment_arm + moment<N>(arm, direction_of<N>(along_faces)) *
+                                                (std::min(rubbed, length) / length);
+  contact.head_arm = head_arm;
+  contact.press = direction_of<N>(pressed);
+  if (load_behind <= Real(0)) return;
+  const Real on_head = whole - load_behind;
+  if (on_head > Real(1e-3)) contact.head_arm = head_arm * (whole / on_head);
+  contact.behind_share = share<N>(std::min(load_behind, length), length);
+  // Where shaft and head press against each other both bear more than the hand presses with.
+  const Real together = norm(pressed);
+  const bool presses = by_head >= Real(SweepRules::kTolerance);
+  if (!presses || by_head < together) {
+    contact.head_share = presses ? share<N>(by_head, together) : typename N::Unit(0);
+  }
+}
+
+/// One tick of the swept contact (docs/theory.md 4): the proxy follows `goal`, and the spring
+/// between them tells the force.
+///
+/// Servo thread; pure but for `state`. At most 32 queries, or 14 while a place is looked for.
+/// Before the proxy has a place there is no force. A goal that is not finite changes nothing and
+/// gives no force; a goal that is far is brought within kContactLimit.
+template <class N, ContactField<N> Field>
+constexpr ProxyContact<N> follow(const ProxyPlan<N>& plan, ProxyState<N>& state, Field& field,
+                                 ProxyPose<N> goal) noexcept {
+  using Real = typename N::Real;
+  ProxyContact<N> contact;
+  contact.pose = state.pose;
+  contact.placing = state.placed ? Placing::placed : Placing::searching;
+  if (!is_finite(goal.centre.x + goal.centre.y + goal.centre.z) ||
+      !is_finite(goal.turn.x + goal.turn.y + goal.turn.z + goal.turn.w)) {
+    return contact;
+  }
+  const auto clamped = [](Real at) {
+    return std::clamp(at, Real(-kContactLimit), Real(kContactLimit));
+  };
+  goal.centre = {clamped(goal.centre.x), clamped(goal.centre.y), clamped(goal.centre.z)};
+  if (!state.placed) {
+    contact.placing = state.search.tick(field, goal, state.pose);
+    state.placed = contact.placing == Placing::placed;
+    state.ramping = state.placed && !(state.pose == goal);
+    state.longest = Real(0);
+    contact.pose = state.placed ? state.pose : goal;
+    return contact;
+  }
+  const ProxyPose<N> last = state.pose;
+  const Swept<N> swept =
+      ProxySweep<N, Field>(field, state.pose, state.memory, plan.friction, plan.turn_step)
+          .tick(goal);
+  contact.pose = state.pose;
+  contact.queries = swept.queries;
+  contact.turned = swept.turned;
+  if (swept.buried || swept.depth > Real(kLostDepth)) {
+    state.pose = last;
+    state.place_anew();
+    contact.placing = Placing::searching;
+    contact.pose = goal;
+    return contact;
+  }
+  contact.spring = state.pose.centre - goal.centre;
+  // After a whole step the proxy may only lag because the tick's work was spent.
+  const bool moving = norm(state.pose.centre - last.centre) >= Real(SweepRules::kStep);
+  add_loads(swept, plan.friction, moving, contact);
+  if (state.ramping) {
+    state.longest = state.longest + plan.ramp_per_tick;
+    const Real length = norm(contact.spring);
+    state.ramping = length > state.longest;
+    if (state.ramping) contact.spring = part_of<N>(contact.spring, share<N>(state.longest, length));
+  }
+  return contact;
+}
+
+}  // namespace kerf

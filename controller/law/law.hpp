@@ -1,0 +1,235 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <concepts>
+#include <cstddef>
+#include <cstdint>
+#include <new>
+#include <span>
+#include <string_view>
+#include <type_traits>
+
+#include "shared/numeric/numbers.hpp"
+#include "shared/numeric/vec.hpp"
+
+namespace kerf {
+
+/// One named number of a law, which a scene may set: reading, the answer to every mistake,
+/// docs/scene-keys.md and the JSON in the segment come from it. Both ends are allowed values.
+struct LawSetting {
+  std::string_view name;  ///< with its unit, as `stiffness_n_per_mm`
+  std::string_view unit;  ///< as text; empty: a plain number
+  double lo = 0, hi = 0;
+  double by_default = 0;
+  std::string_view meaning;
+};
+inline constexpr std::size_t kMostLawSettings = 8;
+
+/// What a law is made from, at load: its settings, and what is constant of the loop.
+class LawSetup {
+ public:
+  constexpr LawSetup(double rate_hz, double tip_noise_mm, std::span<const LawSetting> settings,
+                     std::span<const double> values) noexcept
+      : rate_hz_(rate_hz), tip_noise_mm_(tip_noise_mm), settings_(settings), values_(values) {}
+
+  [[nodiscard]] constexpr double rate_hz() const noexcept { return rate_hz_; }
+  [[nodiscard]] constexpr double period_s() const noexcept { return 1 / rate_hz_; }
+  /// No encoder reading is farther from the true tip, at the device port.
+  [[nodiscard]] constexpr double tip_noise_mm() const noexcept { return tip_noise_mm_; }
+  /// The value of one of the law's settings. A name that the law does not list gives 0, and the law
+  /// is refused with it at load.
+  [[nodiscard]] constexpr double operator[](std::string_view name) const noexcept {
+    for (std::size_t i = 0; i < settings_.size(); ++i) {
+      if (settings_[i].name == name) return values_[i];
+    }
+    unknown_ = name;
+    return 0;
+  }
+  /// The last name that was asked for and is not listed; empty: none.
+  [[nodiscard]] constexpr std::string_view unknown() const noexcept { return unknown_; }
+
+ private:
+  double rate_hz_, tip_noise_mm_;
+  std::span<const LawSetting> settings_;
+  std::span<const double> values_;
+  mutable std::string_view unknown_{};
+};
+
+// How the servo holds a law whose type it does not know: its constants in the plan, what it
+// remembers in the servo's state, one function pointer. No heap, no virtual call, no exception.
+
+inline constexpr std::size_t kMostLawBytes = 1024;       ///< of a law's constants
+inline constexpr std::size_t kMostLawStateBytes = 4096;  ///< of its state
+
+/// What a law remembers between two ticks. Plain bytes in the servo's state, so a snapshot of that
+/// has them. A law begins anew with a fresh `State{}`.
+struct LawMemory {
+  alignas(std::max_align_t) std::array<std::byte, kMostLawStateBytes> bytes{};
+  bool begun = false;
+
+  constexpr void begin_anew() noexcept { begun = false; }
+};
+
+/// A class that can be a law of input `In` in the numbers of `Real`: constants made at load from a
+/// `LawSetup`, a `State` of bounded size, and one step, which is const.
+template <class Law, class In, class Real>
+concept LawOf =
+    std::is_trivially_copyable_v<Law> && sizeof(Law) <=
+        kMostLawBytes&& std::is_trivially_copyable_v<
+            typename Law::State>&& std::is_default_constructible_v<typename Law::State> &&
+    sizeof(typename Law::State) <=
+        kMostLawStateBytes&& std::is_constructible_v<Law, const LawSetup&>&& requires(
+            const Law& law, const In& in, typename Law::State& state) {
+  { law.step(in, state) }
+  noexcept->std::same_as<DeviceVec<Real>>;
+};
+
+/// A law as the servo runs it; constant during a run.
+template <class In, class Real>
+struct LawPlan {
+  using Step = DeviceVec<Real> (*)(const LawPlan& plan, LawMemory& memory, const In& in) noexcept;
+
+  Step step = nullptr;  ///< null: the scene names none
+  alignas(std::max_align_t) std::array<std::byte, kMostLawBytes> law{};
+
+  [[nodiscard]] constexpr bool given() const noexcept { return step != nullptr; }
+  /// Servo thread. Only where a law is given.
+  [[nodiscard]] DeviceVec<Real> operator()(LawMemory& memory, const In& in) const noexcept {
+    return step(*this, memory, in);
+  }
+};
+
+/// At load: the plan of one law with these settings.
+template <class Law, class In, class Real>
+requires LawOf<Law, In, Real>
+[[nodiscard]] LawPlan<In, Real> law_plan(const LawSetup& setup) {
+  using Plan = LawPlan<In, Real>;
+  using State = typename Law::State;
+  Plan plan;
+  ::new (static_cast<void*>(plan.law.data())) Law(setup);
+  plan.step = [](const Plan& of, LawMemory& memory, const In& in) noexcept -> DeviceVec<Real> {
+    if (!memory.begun) {
+      ::new (static_cast<void*>(memory.bytes.data())) State{};
+      memory.begun = true;
+    }
+    return std::launder(reinterpret_cast<const Law*>(of.law.data()))
+        ->step(in, *std::launder(reinterpret_cast<State*>(memory.bytes.data())));
+  };
+  return plan;
+}
+
+/// What a force law sees in one tick of the swept contact. In air the spring and the normal are 0.
+template <class N>
+struct ForceInput {
+  DeviceVec<typename N::Real> tip_mm;             ///< of the hand, at the device port
+  WorldVec<typename N::Real> scene_tip_mm;        ///< the same place in the scene
+  DeviceVec<typename N::Real> velocity_mm_per_s;  ///< at the device port, as estimated
+  /// From the hand to the proxy, which rests on the surface: where the coupling of
+  /// controller/law/virtual_coupling.hpp pulls the hand to.
+  DeviceVec<typename N::Real> spring_mm;
+  DeviceVec<typename N::Unit> normal;  ///< out of the solid, of all that the tool presses on
+};
+
+/// A force law gives the force on the hand in N, before any limit, in place of the coupling. It
+/// runs in each tick in which the hand is felt, and begins anew after each in which it was not.
+template <class N>
+using ForceLawPlan = LawPlan<ForceInput<N>, typename N::Real>;
+
+/// What a stabiliser sees in a tick with a report while the motors are on. All of it at the device
+/// port.
+template <class N>
+struct StabiliserInput {
+  DeviceVec<typename N::Real> wanted_n;  ///< force to send, after all limits
+  DeviceVec<typename N::Real> sent_n;    ///< what the last tick really sent
+  DeviceVec<typename N::Real> moved_mm;  ///< by the tip since the last report
+  std::uint32_t ticks = 1;               ///< since then
+  DeviceVec<typename N::Real> velocity_mm_per_s;
+  /// SUM -F_sent . dx up to this tip, in mJ (fixed: 32 fraction bits): what the loop took from the
+  /// hand; below 0 it has given more than it took.
+  typename N::Energy taken_mj{};
+  bool contact = false;  ///< the tool presses on something
+};
+
+/// A stabiliser gives the force to send in place of `wanted_n`. All limits of the force hold for it
+/// as for any other: what it adds is clamped and bounded in slope once more. Where it gives
+/// `wanted_n` itself no bit changes. It begins anew after each tick with the motors off or on hold.
+template <class N>
+using StabiliserPlan = LawPlan<StabiliserInput<N>, typename N::Real>;
+
+/// What a velocity estimator sees with each report that has a finite pose.
+template <class N>
+struct VelocityInput {
+  DeviceVec<typename N::Real> tip_mm;  ///< at the device port
+  std::uint32_t ticks = 1;  ///< since the last one, 1 to 1000: more where reports were missing
+  /// There was none, or the device was calibrated with it: the tip is at rest here since ever.
+  bool first = false;
+};
+
+/// A velocity estimator gives the velocity of the tip in mm/s. It stands for the tick and for those
+/// without a report that follow.
+template <class N>
+using VelocityEstimatorPlan = LawPlan<VelocityInput<N>, typename N::Real>;
+
+enum class LawKind : std::uint8_t { force, velocity, stabiliser };
+
+/// One law that a scene can name: all that is known of it before it is made. Static; once, and
+/// before the first scene is read, it enters the list of its program.
+struct LawRow {
+  LawKind kind;
+  std::string_view name;
+  std::string_view meaning;
+  std::span<const LawSetting> settings;
+  const LawRow* next = nullptr;  ///< of the list
+};
+
+/// The row of a kind whose input is `In<N>`: with what makes the plan, in each bundle of numbers.
+template <template <class> class In>
+struct LawRowOf : LawRow {
+  template <class N>
+  using Make = LawPlan<In<N>, typename N::Real> (*)(const LawSetup& setup);
+
+  Make<FixedNumbers> fixed;
+  Make<FloatNumbers> float32;
+  Make<DoubleNumbers> float64;
+};
+using ForceLawRow = LawRowOf<ForceInput>;
+using VelocityEstimatorRow = LawRowOf<VelocityInput>;
+using StabiliserRow = LawRowOf<StabiliserInput>;
+
+/// The row of a class template `Law<N>`, whose `kName`, `kMeaning` and `kSettings` are the same
+/// whatever N. `step` is compiled in all three.
+template <template <class> class Law, template <class> class In>
+[[nodiscard]] constexpr LawRowOf<In> law_row(LawKind kind) noexcept {
+  using Fixed = Law<FixedNumbers>;
+  static_assert(std::size(Fixed::kSettings) <= kMostLawSettings, "a law has too many settings");
+  return {{kind, Fixed::kName, Fixed::kMeaning, Fixed::kSettings},
+          &law_plan<Fixed, In<FixedNumbers>, FixedNumbers::Real>,
+          &law_plan<Law<FloatNumbers>, In<FloatNumbers>, FloatNumbers::Real>,
+          &law_plan<Law<DoubleNumbers>, In<DoubleNumbers>, DoubleNumbers::Real>};
+}
+
+/// Laws of the program's own files, the last registered first. Written before main alone.
+inline constinit const LawRow* first_own_law = nullptr;
+
+/// Enters a row into the list, at static initialisation.
+struct LawRegistration {
+  explicit LawRegistration(LawRow& row) noexcept {
+    row.next = first_own_law;
+    first_own_law = &row;
+  }
+};
+
+}  // namespace kerf
+
+// In a .cpp, at namespace scope, once: the class template `Law` can be named in a scene.
+#define KERF_REGISTER_LAW(Law, Row, In, kind)                                              \
+  namespace {                                                                              \
+  ::kerf::Row kerf_row_of_##Law = ::kerf::law_row<Law, ::kerf::In>(::kerf::LawKind::kind); \
+  const ::kerf::LawRegistration kerf_registration_of_##Law(kerf_row_of_##Law);             \
+  }
+#define KERF_REGISTER_FORCE_LAW(Law) KERF_REGISTER_LAW(Law, ForceLawRow, ForceInput, force)
+#define KERF_REGISTER_VELOCITY_ESTIMATOR(Law) \
+  KERF_REGISTER_LAW(Law, VelocityEstimatorRow, VelocityInput, velocity)
+#define KERF_REGISTER_STABILISER(Law) \
+  KERF_REGISTER_LAW(Law, StabiliserRow, StabiliserInput, stabiliser)

@@ -1,0 +1,375 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "controller/load/load_scene.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <iterator>
+#include <numbers>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "controller/input/load_error.hpp"
+#include "controller/load/loaded_scene.hpp"
+#include "controller/scene/scene_file.hpp"
+#include "controller/tool/inner_samples.hpp"
+#include "controller/tool/tool_mesh.hpp"
+#include "controller/tool/tool_shapes.hpp"
+#include "controller/volume/file/volume_image.hpp"
+#include "controller/volume/phantom.hpp"
+
+namespace kerf {
+namespace {
+
+void check_side(const ToolSpec& spec, double side_vox, const char* side, const char* way_out) {
+  if (side_vox <= kMaxToolSide) return;
+  refuse(spec.size_place, " makes a tool of " + short_text(side_vox) + " samples along " + side +
+                              ", above the limit of " + std::to_string(kMaxToolSide) + "; " +
+                              way_out);
+}
+
+/// The spindle turns about x = z = 0.
+void check_axis(const ToolSpec& spec, const ToolMesh& mesh) {
+  for (const auto& [axis, name] : {std::pair{std::size_t{0}, "x"}, {2, "z"}}) {
+    const auto [low, high] = std::ranges::minmax_element(
+        mesh.points_mm, {}, [i = axis](const ToolMesh::Point& p) { return p[i]; });
+    const double low_mm = (*low)[axis], high_mm = (*high)[axis];
+    if (low_mm < 0 && high_mm > 0) continue;
+    refuse(spec.size_place, std::string(" lies beside its axis, the file's y: ") + name +
+                                " goes from " + short_text(low_mm) + " to " + short_text(high_mm) +
+                                " mm; move the mesh so that the spindle's axis is at x = z = 0");
+  }
+}
+
+SceneTool load_shape(const ToolSpec& spec, const ToolSize& size, double voxel_mm) {
+  if (!size.size_vox && size.radius_mm < voxel_mm / 2) {
+    refuse(spec.size_place, " is below half a voxel (" + short_text(voxel_mm / 2) +
+                                "); use a larger radius or a finer volume");
+  }
+  if (size.size_vox && *size.size_vox * size.pitch_mm < voxel_mm * (1 - 1e-9)) {
+    refuse(spec.size_place, " makes a tool of " + short_text(*size.size_vox * size.pitch_mm) +
+                                " mm, below a voxel (" + short_text(voxel_mm) +
+                                "); use a larger one or a larger pitch_mm");
+  }
+  const double across_mm = 2 * size.radius_mm;
+  const bool long_tool = !size.size_vox && size.length_mm.value_or(default_length_mm(
+                                               spec.shape, size.radius_mm)) > across_mm;
+  check_side(spec, tool_side_vox(spec.shape, size), long_tool ? "its length" : "a side",
+             size.pitch_mm < voxel_mm ? "use a smaller tool or a coarser pitch"
+                                      : "use a smaller tool or a coarser volume");
+  return make_tool(spec.name, spec.shape, size);
+}
+
+SceneTool load_mesh(const ToolSpec& spec, double pitch_mm, double voxel_mm,
+                    const std::filesystem::path& folder, int cpu_s) {
+  const std::filesystem::path path = folder / spec.file;
+  ToolMesh mesh;
+  try {
+    mesh = join_triangles(read_stl(path, cpu_s), spec.scale, path.string());
+  } catch (const SceneError& error) {
+    refuse(spec.where, std::string(": ") + error.what());
+  }
+  check_axis(spec, mesh);
+  check_side(spec, mesh_side_vox(mesh, pitch_mm), "a side",
+             "use a smaller scale (mm per unit of the file) or a coarser volume");
+  SceneTool tool = make_mesh_tool(spec.name, std::move(mesh), pitch_mm);
+  if (tool.radius_mm < voxel_mm / 2) {
+    refuse(spec.size_place, " reaches less than half a voxel (" + short_text(voxel_mm / 2) +
+                                " mm) from its axis; use a larger scale or a finer volume");
+  }
+  if (tool.offsets.empty()) {
+    refuse(spec.size_place, " is so thin that no sample lies in it, they are " +
+                                short_text(pitch_mm) +
+                                " mm apart; give a smaller pitch_mm or a larger scale");
+  }
+  return tool;
+}
+
+/// Refuses a shaft that the head hides, and one thinner than a voxel.
+void check_shaft(const ToolSpec& spec, const SceneTool& tool, double voxel_mm) {
+  if (!spec.shaft.radius_mm) return;
+  if (*spec.shaft.length_mm <= tool.length_mm * (1 + 1e-9)) {
+    refuse(spec.shaft_place, " ends no farther than the head, which is " +
+                                 short_text(tool.length_mm) +
+                                 " mm long; it counts from the tool's tip, so use more");
+  }
+  if (*spec.shaft.radius_mm >= voxel_mm / 2) return;
+  refuse(spec.shaft_place, " is of a shaft thinner than a voxel (" + short_text(voxel_mm) +
+                               " mm); use a larger shaft_radius_mm or a finer volume");
+}
+
+}  // namespace
+
+TouchedVolumes touched_volumes(const std::vector<SceneVolume>& volumes) {
+  TouchedVolumes touched;
+  for (const SceneVolume& volume : volumes) {
+    if (!volume.solid) continue;
+    const VolumeImage& image = volume.image;
+    const std::array<std::int32_t, 3> extent = {image.grid.nx, image.grid.ny, image.grid.nz};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      touched.voxel_mm = std::min(touched.voxel_mm, image.spacing_mm[axis]);
+      touched.side_mm = std::max(touched.side_mm, image.spacing_mm[axis] * extent[axis]);
+    }
+  }
+  return touched;
+}
+
+SceneTool load_tool(const ToolSpec& spec, const TouchedVolumes& touched,
+                    const std::filesystem::path& folder, int cpu_s) {
+  ToolSize size = spec.size;
+  if (!spec.pitch_given) {
+    // Samples end inside of the surface by up to a pitch, and leave as large a part of that cell of
+    // the volume; if that is more than half, the tool rests on it and never cuts it
+    // (docs/theory.md 6.3).
+    const bool thin = !size.size_vox && size.radius_mm < touched.voxel_mm;
+    size.pitch_mm = thin && spec.shape != kMeshShape ? touched.voxel_mm / 2 : touched.voxel_mm;
+  }
+  if (size.pitch_mm > touched.voxel_mm * (1 + 1e-9)) {
+    refuse(spec.pitch_place, " is above the smallest voxel edge and leaves gaps; use at most " +
+                                 number_text(touched.voxel_mm));
+  }
+  SceneTool tool = spec.shape == kMeshShape
+                       ? load_mesh(spec, size.pitch_mm, touched.voxel_mm, folder, cpu_s)
+                       : load_shape(spec, size, touched.voxel_mm);
+  tool.turns = spec.turns;
+  check_shaft(spec, tool, touched.voxel_mm);
+  tool.shaft = tool_shaft(spec.shaft, tool.length_mm);
+  const double side_mm = std::max(2 * tool.radius_mm, tool.length_mm);
+  if (side_mm > touched.side_mm) {
+    refuse(spec.size_place, " makes a tool of " + short_text(side_mm) + " mm" +
+                                (tool.length_mm > 2 * tool.radius_mm ? " (its length)" : "") +
+                                ", larger than the volume (" + short_text(touched.side_mm) +
+                                " mm); use a smaller " +
+                                (spec.shape == kMeshShape ? "scale" : "tool"));
+  }
+  return tool;
+}
+
+namespace {
+
+constexpr double kPhantomVoxelMm = 0.125;  // of the default grid; other grids keep the tooth's size
+
+/// The voxel edge for which the sizes of tools were written, before --volume replaced the volume.
+double written_voxel_mm(const VolumeSpec& volume) {
+  if (volume.spacing_mm) {
+    return *std::min_element(volume.spacing_mm->begin(), volume.spacing_mm->end());
+  }
+  if (!volume.phantom_size) return kPhantomVoxelMm;
+  return kPhantomVoxelMm * PhantomSpec{}.grid.nx / volume.phantom_size->nx;
+}
+
+void check_overrides(const SceneOverrides& overrides) {
+  if (overrides.rate_hz && (*overrides.rate_hz < kMinRateHz || *overrides.rate_hz > kMaxRateHz)) {
+    refuse("--rate " + std::to_string(*overrides.rate_hz), " is out of range; use " +
+                                                               std::to_string(kMinRateHz) + " to " +
+                                                               std::to_string(kMaxRateHz));
+  }
+  if (overrides.window && !((*overrides.window)[0] < (*overrides.window)[1])) {
+    refuse("--window", " is empty; write low,high with low < high");
+  }
+  if (overrides.spacing_mm) check_spacing("--spacing", *overrides.spacing_mm);
+}
+
+void apply_overrides(const SceneOverrides& overrides, Scene& scene) {
+  check_overrides(overrides);
+  VolumeSpec& first = scene.volumes.front();
+  if (overrides.volume_file) {
+    VolumeSpec replaced;
+    replaced.where = "--volume";
+    replaced.file = overrides.volume_file->string();
+    replaced.name = overrides.volume_file->stem().string();
+    replaced.denoise = first.denoise;
+    replaced.crop = first.crop;
+    replaced.position_mm = first.position_mm;
+    replaced.orientation = first.orientation;
+    first = replaced;
+    scene.offset_given = false;
+  }
+  if (is_phantom(first) && (overrides.spacing_mm || overrides.window)) {
+    refuse(overrides.spacing_mm ? "--spacing" : "--window",
+           ": the phantom has its own; leave the option out, or give a --volume");
+  }
+  if (overrides.spacing_mm) first.spacing_mm = overrides.spacing_mm;
+  if (overrides.window) first.window = overrides.window;
+  if (overrides.phantom_size) {
+    for (VolumeSpec& volume : scene.volumes) {
+      if (is_phantom(volume)) volume.phantom_size = overrides.phantom_size;
+    }
+  }
+  scene.servo.rate_hz = overrides.rate_hz.value_or(scene.servo.rate_hz);
+  scene.servo.numeric = overrides.numeric.value_or(scene.servo.numeric);
+  scene.force.unchecked_gain = scene.force.unchecked_gain || overrides.unchecked_gain;
+  if (overrides.personality && *overrides.personality != scene.device.personality) {
+    scene.device.personality = *overrides.personality;
+    scene.device.torque_scale.reset();  // of another device's motors
+  }
+  if (overrides.torque_scale) scene.device.torque_scale = overrides.torque_scale;
+  if (scene.cut_in_one_tick) scene.cut.rate_per_s = scene.servo.rate_hz;
+}
+
+bool none_is_labelled(const LoadedScene& scene) {
+  return std::ranges::all_of(scene.volumes,
+                             [](const SceneVolume& volume) { return volume.image.labels.empty(); });
+}
+
+/// A surface of a material's own needs labels.
+void check_felt_materials(const LoadedScene& scene) {
+  if (!none_is_labelled(scene)) return;
+  for (const Material& material : scene.materials) {
+    if (!material.felt_iso) continue;
+    refuse(scene.path, ": material " + material.name +
+                           " has felt_iso = " + number_text(*material.felt_iso) +
+                           ", and no volume has labels to tell where it is; put them beside its "
+                           "file (NAME-labels.nrrd), or leave felt_iso out");
+  }
+}
+
+void add_proposed_materials(LoadedScene& scene) {
+  std::ranges::copy(scene.volumes.front().proposed, std::back_inserter(scene.materials));
+}
+
+/// Without labels enamel and pulp are unknown: only the materials of the scene stay, or, for a
+/// volume of
+/// --volume, the proposed ones.
+void leave_unlabelled_materials(bool of_command_line, LoadedScene& scene) {
+  const auto first = scene.materials.begin() + 1;
+  const auto left = std::remove_if(first, scene.materials.end(), [&](const Material& material) {
+    return of_command_line || !material.in_scene;
+  });
+  scene.materials.erase(left, scene.materials.end());
+  add_proposed_materials(scene);
+}
+
+/// Moves the materials' densities so that the surface at `from` comes to `to`; air and full density
+/// stay.
+void move_materials(double from, double to, std::vector<Material>& materials) {
+  for (Material& material : materials) {
+    material.iso = material.iso < from ? material.iso * to / from
+                                       : 1 - (1 - material.iso) * (1 - to) / (1 - from);
+  }
+}
+
+/// The press of the hand, 1 / scale of it in the scene, removes the same fraction of a tool `grown`
+/// times as large per second, and slows its spindle as much.
+void fit_cutting(double grown, double scale, LoadedScene& scene) {
+  scene.cut.machinability_mm3_per_s_n *= scale * grown * grown * grown;
+  scene.cut.threshold_n /= scale;
+  scene.spindle.stall_torque_n_mm *= grown / scale;
+  scene.spindle.inertia_g_mm2 *= grown / scale;  // runs up in the same time
+}
+
+/// Fits a scene to its first volume, as the header describes.
+void fit_to_volume(double written_mm, Scene& spec, LoadedScene& scene) {
+  const double grown = touched_volumes(scene.volumes).voxel_mm / written_mm;
+  for (ToolSpec& tool : spec.tools) {
+    tool.size.radius_mm *= grown;
+    tool.size.pitch_mm *= grown;
+    ShaftSize& shaft = tool.shaft;
+    for (auto* length_mm : {&tool.size.length_mm, &shaft.radius_mm, &shaft.length_mm,
+                            &shaft.handpiece_radius_mm, &shaft.handpiece_length_mm}) {
+      if (*length_mm) **length_mm *= grown;
+    }
+    tool.scale *= grown;
+  }
+  const WorldBox box = world_box(scene.volumes.front());
+  double scale = kMinWorkspaceScale;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    scale = std::max(scale, (box.hi_mm[axis] - box.lo_mm[axis]) / kWorkspaceMm[axis]);
+  }
+  if (scale > kMaxWorkspaceScale) {
+    refuse(scene.volume_specs.front().where,
+           ": the box needs a workspace scale of " + short_text(scale) + ", above the limit of " +
+               number_text(kMaxWorkspaceScale) + "; check its spacing");
+  }
+  scene.device.workspace_scale = scale;
+  fit_cutting(grown, scale, scene);
+}
+
+/// `first`: the image of the first volume, in place of its file.
+LoadedScene load_parsed(Scene spec, const std::filesystem::path& path,
+                        const SceneOverrides& overrides, VolumeImage* first) {
+  const double written_mm =
+      spec.device.fit ? kPhantomVoxelMm : written_voxel_mm(spec.volumes.front());
+  const std::optional<double> written_iso = spec.volumes.front().iso;
+  apply_overrides(overrides, spec);
+
+  LoadedScene scene;
+  static_cast<SceneSettings&>(scene) = spec;
+  scene.volume_specs = spec.volumes;
+  for (std::size_t i = 0; i < spec.volumes.size(); ++i) {
+    const bool from_command_line = i == 0 && overrides.volume_file;
+    const VolumeSource from{.folder = from_command_line ? "" : path.parent_path(),
+                            .unknown = from_command_line,
+                            .cpu_s = overrides.read_cpu_s,
+                            .image = i == 0 ? first : nullptr};
+    scene.volumes.push_back(load_volume(spec.volumes[i], from, scene.materials,
+                                        from_command_line ? written_iso : std::nullopt));
+  }
+  check_felt_materials(scene);
+  const bool fitted = overrides.volume_file.has_value() || spec.device.fit;
+  if (fitted) fit_to_volume(written_mm, spec, scene);
+  if (none_is_labelled(scene)) {
+    leave_unlabelled_materials(overrides.volume_file.has_value(), scene);
+  } else if (overrides.volume_file) {
+    if (written_iso && *written_iso > 0 && *written_iso < 1) {
+      move_materials(*written_iso, scene.volumes.front().iso / kDensityMax, scene.materials);
+    }
+    if (!scene.volumes.front().image.labels.empty()) add_proposed_materials(scene);
+  }
+  const TouchedVolumes touched = touched_volumes(scene.volumes);
+  for (const ToolSpec& tool : spec.tools) {
+    try {
+      scene.tools.push_back(load_tool(tool, touched, path.parent_path(), overrides.read_cpu_s));
+      scene.tool_specs.push_back(tool);
+      scene.tool_specs.back().size.pitch_mm = scene.tools.back().pitch_mm;
+      scene.tool_specs.back().size.radius_mm = scene.tools.back().radius_mm;
+    } catch (const SceneError&) {
+      // A spare tool may not fit the volume to which the scene was fitted.
+      if (!fitted || scene.tools.empty()) throw;
+    }
+  }
+
+  if (fitted) {
+    const double scale = scene.device.workspace_scale;
+    const double weaker =
+        kReferenceRadiusMm / (scale * scale * scene.tools[scene.active_tool].radius_mm);
+    scene.force.p0_n_per_mm2 *= weaker;
+    scene.cut.p1_n_per_mm2 *= weaker;
+  }
+  if (!spec.offset_given) {
+    scene.device.offset_mm = first_surface_from_above(*std::find_if(
+        scene.volumes.begin(), scene.volumes.end(), [](const SceneVolume& v) { return v.solid; }));
+  }
+  return scene;
+}
+
+}  // namespace
+
+LoadedScene load_scene(const std::filesystem::path& path, const SceneOverrides& overrides) {
+  return load_parsed(parse_scene_file(path, overrides.settings), path, overrides, nullptr);
+}
+
+LoadedScene load_scene(const std::filesystem::path& path, std::string_view text,
+                       VolumeImage first) {
+  return load_parsed(parse_scene(text, path), path, {}, &first);
+}
+
+double device_stiffness_n_per_mm(const LoadedScene& scene) {
+  if (scene.force.model == ForceModel::proxy) return scene.force.stiffness_n_per_mm;
+  const double scale = scene.device.workspace_scale;
+  return scale * scale * 2 * std::numbers::pi * scene.tools[scene.active_tool].radius_mm *
+         scene.force.p0_n_per_mm2;
+}
+
+double hand_unit_mm(const LoadedScene& scene) {
+  return scene.tools[scene.active_tool].radius_mm / scene.device.workspace_scale /
+         kReferenceRadiusMm;
+}
+
+}  // namespace kerf

@@ -1,0 +1,168 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "controller/loop/publisher.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <numeric>
+#include <utility>
+
+#include "shared/numeric/linear_algebra.hpp"
+#include "shared/numeric/numbers.hpp"
+#include "shared/segment/layout.hpp"
+
+namespace kerf {
+namespace {
+
+std::array<float, 3> floats(const std::array<double, 3>& v) noexcept {
+  return {static_cast<float>(v[0]), static_cast<float>(v[1]), static_cast<float>(v[2])};
+}
+
+void put(float (&out)[3], const std::array<double, 3>& v) noexcept {
+  std::ranges::copy(floats(v), out);
+}
+
+std::uint32_t flags_of(const DeviceReport& report, const ServoOutput& output) noexcept {
+  std::uint32_t flags = 0;
+  const auto set = [&](bool on, std::uint32_t bit) {
+    if (on) flags |= bit;
+  };
+  set(report.button1, kFlagButton1);
+  set(report.button2, kFlagButton2);
+  set(report.parked, kFlagParked);
+  set(output.contact, kFlagContact);
+  set(output.clamped, kFlagClamped);
+  set(output.stale, kFlagStaleInput);
+  set(output.fault != Fault::none, kFlagDeviceFault);
+  set(output.motors_on, kFlagMotorsOn);
+  set(output.started, kFlagStarted);
+  set(output.forbidden, kFlagForbidden);
+  set(output.refused, kFlagRefused);
+  set(output.shaft, kFlagShaft);
+  set(output.resetting, kFlagReset);
+  set(output.undoing, kFlagUndo);
+  set(output.undoable, kFlagUndoable);
+  return flags;
+}
+
+DirtyCause cause_of(const ServoOutput& output) noexcept {
+  if (output.resetting) return DirtyCause::reset;
+  return output.undoing ? DirtyCause::undo : DirtyCause::milling;
+}
+
+/// The pose, as far as it is known: before docking the joint angles have no zero, and what
+/// kinematics makes of them is no place. Velocities of the dive to the first known place are none.
+void put_pose(const ServoOutput& output, TickRecord& record) noexcept {
+  const bool known = output.phase != Phase::off && output.phase != Phase::calibrating;
+  if (known) {
+    std::ranges::copy(output.position_mm, record.position_mm);
+    std::ranges::transform(quaternion_of(output.rotation), record.orientation,
+                           [](double q) { return static_cast<float>(q); });
+  } else {
+    std::ranges::fill(record.position_mm, std::numeric_limits<double>::quiet_NaN());
+    std::ranges::fill(record.orientation, std::numeric_limits<float>::quiet_NaN());
+  }
+  if (known && output.started) {
+    put(record.velocity_mm_per_s, output.velocity_mm_per_s);
+  } else {
+    std::ranges::fill(record.velocity_mm_per_s, std::numeric_limits<float>::quiet_NaN());
+  }
+}
+
+void put_raw(const DeviceReport& report, TickRecord& record) noexcept {
+  for (std::size_t i = 0; i < 3; ++i) {
+    record.raw[kRawEncoder + i] = report.encoder[i];
+    record.raw[kRawPot + i] = report.wiper_a[i];
+    record.raw[kRawPot + 3 + i] = report.wiper_b[i];
+  }
+  record.raw[kRawStatus] = (report.button1 ? 1 : 0) | (report.button2 ? 2 : 0) |
+                           (report.parked ? 4 : 0) | (report.homed ? 0 : 8);
+  record.raw[kRawDeviceCounter] = static_cast<std::int32_t>(report.counter);
+}
+
+}  // namespace
+
+void Publisher::publish_volumes(const ServoOutput& output, TickRecord& record) noexcept {
+  VoxelBox first_box;
+  for (std::size_t v = 0; v < output.changed.size(); ++v) {
+    const VoxelBox& box = output.changed[v];
+    if (box.empty()) continue;
+    const std::span<const Density> density = servo_.density(v);
+    const std::uint64_t steps = output.removed_by_volume[v] + output.returned_by_volume[v];
+    const std::uint64_t hash =
+        segment_.publish_box(v, density, box, static_cast<std::uint32_t>(steps), cause_of(output));
+    removal_hash_ = fnv1a_step(removal_hash_, hash);
+    record.dirty_volumes |= 1U << v;
+    if (first_box.empty()) first_box = box;
+  }
+  const auto narrow = [](std::int32_t value) { return static_cast<std::uint16_t>(value); };
+  const std::array lo{narrow(first_box.lo.x), narrow(first_box.lo.y), narrow(first_box.lo.z)};
+  const std::array hi{narrow(first_box.hi.x), narrow(first_box.hi.y), narrow(first_box.hi.z)};
+  std::ranges::copy(lo, record.dirty_lo);
+  std::ranges::copy(hi, record.dirty_hi);
+}
+
+void Publisher::publish(Tick tick, const DeviceReport& report, const ServoOutput& output,
+                        std::uint32_t last_command, const TickTiming& timing) noexcept {
+  TickRecord record{};
+  if (std::exchange(held_, output.held) != output.held) {
+    segment_.set_lifecycle(output.held ? Lifecycle::hold : Lifecycle::run);
+  }
+  segment_.begin_tick(tick);
+  publish_volumes(output, record);
+
+  record.tick = tick;
+  record.start_ns = static_cast<std::uint64_t>(timing.start_ns);
+  record.period_error_ns = saturate_i32(timing.late_ns);
+  record.execution_ns = static_cast<std::uint32_t>(timing.compute_ns);
+  record.flags = flags_of(report, output);
+  record.missed_deadlines = static_cast<std::uint32_t>(timing.missed_deadlines);
+  std::ranges::copy(output.joint_counts, record.encoder_counts);
+  for (std::size_t i = 0; i < 3; ++i) {
+    record.encoder_counts[3 + i] =
+        static_cast<std::int32_t>(std::lround(output.gimbal_rad[i] * 1000));
+  }
+  put_pose(output, record);
+  put(record.commanded_force_n, output.force_n);
+  put(record.contact_force_n, output.contact_n);
+  put(record.modification_force_n, output.modification_n);
+  put(record.joint_torque_n_mm, output.torque_n_mm);
+  put(record.tip_torque_n_mm, output.tip_torque_n_mm);
+  put(record.proxy_offset_mm, output.proxy_offset_mm);
+  record.plane_count = output.plane_count;
+  for (std::size_t i = 0; i < output.plane_count; ++i) {
+    const PlaneLoad& plane = output.planes[i];
+    record.plane_load_n[i] = static_cast<float>(plane.load_n);
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      record.plane_normal[3 * i + axis] = static_cast<float>(plane.normal[axis]);
+      record.plane_arm_mm[3 * i + axis] = static_cast<float>(plane.arm_mm[axis]);
+    }
+  }
+  std::ranges::copy(output.motor_counts, record.dac_counts);
+  record.removed = static_cast<std::uint32_t>(std::accumulate(
+      output.returned_by_volume.begin(), output.returned_by_volume.end(), output.removed_steps));
+  record.port_energy_j = output.absorbed_mj / 1000.0;
+  record.port_minimum_j = output.port_minimum_mj / 1000.0;
+  for (std::size_t i = 0; i < kEnergySources; ++i) {
+    record.*kEnergyColumns[i] = output.energy_steps[i];
+  }
+  record.volume_hash = removal_hash_;
+  record.output_hash = output.output_hash;
+  record.lost_packets = static_cast<std::uint32_t>(timing.lost_packets);
+  record.refused_packets = static_cast<std::uint32_t>(timing.refused_packets);
+  record.phase = static_cast<std::uint16_t>(output.phase);
+  record.press_n = static_cast<float>(output.press_n);
+  record.last_command = last_command;
+  put_raw(report, record);
+  record.spindle_ratio = static_cast<float>(output.spindle_ratio);
+  record.spindle_load = static_cast<float>(output.spindle_load);
+  record.active_tool = output.active_tool;
+  record.fault = static_cast<std::uint32_t>(output.fault);
+  record.stale = output.stale ? 1 : 0;
+  record.penetration_mm = static_cast<float>(servo_.penetration_mm());
+  segment_.publish_state(record);
+  segment_.end_tick(static_cast<std::uint64_t>(timing.start_ns));
+}
+
+}  // namespace kerf

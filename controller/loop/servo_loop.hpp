@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <cstdint>
+#include <thread>
+
+#include "controller/device/device_driver.hpp"
+#include "controller/loop/publisher.hpp"
+#include "controller/loop/real_time.hpp"
+#include "controller/loop/run_record.hpp"
+#include "controller/loop/tick_source.hpp"
+#include "controller/loop/wait_state.hpp"
+#include "controller/servo/servo.hpp"
+#include "shared/segment/connection.hpp"
+
+// The loop around the servo step, and the watchdog that switches the motors off if the loop stands
+// still.
+
+namespace kerf {
+
+/// Why the loop ended; `unexpected_call` is a stop by `--guard`.
+enum class EndReason : std::uint8_t {
+  ticks_done,
+  stopped,
+  device_gone,
+  never_armed,
+  unexpected_call
+};
+
+struct LoopLimits {
+  std::uint64_t armed_ticks = UINT64_MAX;   ///< servo steps after arming
+  std::uint64_t gone_ticks = 2000;          ///< without a report: 2 s
+  std::uint64_t arming_ticks = UINT64_MAX;  ///< patience for the first docking
+};
+
+/// State that the loop shares with other threads.
+struct LoopSignals {
+  std::atomic<bool>& stop;                        ///< set by a signal
+  std::atomic<bool> stalled{false};               ///< the watchdog switched the motors off
+  std::atomic<std::uint64_t> heartbeat{0};        ///< ticks so far, for the watchdog
+  std::atomic<std::uint64_t> armed_ticks{0};      ///< for the progress bar
+  std::atomic<Waiting> waiting{Waiting::report};  ///< of the device, after the last tick
+};
+
+/// First step of a tick: the force begins anew if the servo has stood still, by its watchdog, or by
+/// the clock if the watchdog stood still too. Returns the name of the detector, or nullptr.
+inline const char* recover(LoopSignals& signals, bool stood_still, Servo& servo) noexcept {
+  const bool watchdog_tripped = signals.stalled.exchange(false, std::memory_order_relaxed);
+  if (!watchdog_tripped && !stood_still) return nullptr;
+  static_cast<void>(servo.apply({.kind = ServoCommand::Kind::fade_in}));
+  return watchdog_tripped ? "watchdog" : "stood_still";
+}
+
+/// Sends the output of a tick. If the tick itself was the stall, its output is dropped, and the
+/// next one fades in.
+inline void send_tick(const ServoOutput& output, const LoopSignals& signals,
+                      DeviceDriver& device) noexcept {
+  if (signals.stalled.load(std::memory_order_relaxed)) {
+    device.release();
+  } else {
+    device.command(output);
+  }
+}
+
+/// The loop around the servo step: time, device, step, device, publication, statistics. Runs on the
+/// calling thread until a limit is met or a stop is requested; the motors are off when it returns.
+EndReason run_servo(TickSource& clock, DeviceDriver& device, Servo& servo, Publisher& eyes,
+                    SegmentServer& commands, const LoopLimits& limits, LoopSignals& signals,
+                    RunRecord& record) noexcept;
+
+inline constexpr std::chrono::milliseconds kWatchdogPeriod{5};
+
+/// Checks from another thread that the servo still ticks. After a standstill of 20 ms the motors go
+/// off, once per stall; the loop fades the force in again when it continues.
+class Watchdog {
+ public:
+  Watchdog(const DeviceDriver& device, LoopSignals& signals) noexcept
+      : device_(device), signals_(signals) {}
+
+  /// Call once per `kWatchdogPeriod`.
+  void look(std::int64_t now_ns) noexcept {
+    const std::uint64_t heartbeat = signals_.heartbeat.load(std::memory_order_relaxed);
+    if (heartbeat != last_heartbeat_ || heartbeat == 0) {
+      last_heartbeat_ = heartbeat;
+      last_change_ns_ = now_ns;
+      tripped_ = false;
+      return;
+    }
+    if (tripped_ || now_ns - last_change_ns_ < kStandstillNs) return;
+    static_cast<void>(device_.release());
+    tripped_ = true;
+    ++trips_;
+    signals_.stalled.store(true, std::memory_order_relaxed);
+  }
+
+  [[nodiscard]] std::uint64_t trips() const noexcept { return trips_; }
+
+ private:
+  const DeviceDriver& device_;
+  LoopSignals& signals_;
+  std::uint64_t last_heartbeat_ = 0;
+  std::int64_t last_change_ns_ = 0;
+  bool tripped_ = false;
+  std::uint64_t trips_ = 0;
+};
+
+/// Starts the thread that checks once per `kWatchdogPeriod`, until the jthread ends: above the
+/// servo, so that the servo cannot block it, and on any core but the servo's, so that a load on
+/// that core does not stop the watchdog too. With one core, or without the rights, as well as
+/// possible.
+[[nodiscard]] std::jthread start_watchdog(Watchdog& watchdog, const RealTimeOptions& servo);
+
+}  // namespace kerf

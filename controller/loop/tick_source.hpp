@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <string>
+
+#include "controller/device/device_driver.hpp"
+#include "shared/posix/monotonic_clock.hpp"
+
+// Start of ticks: deadlines in real time, reports in lock-step, standstill and the gate of
+// `--until`.
+
+namespace kerf {
+
+/// Absolute deadlines on CLOCK_MONOTONIC: lateness never adds up. A deadline that is late by a
+/// whole period or more is skipped and counted, never caught up in a burst; one that is late by
+/// less is served late.
+class DeadlineClock {
+ public:
+  /// `spin_ns` of each period are spent spinning before the deadline, which removes the timer's
+  /// wake-up latency (about 15 us on a virtual machine) for that fraction of one core.
+  DeadlineClock(std::int64_t period_ns, std::int64_t spin_ns) noexcept
+      : period_ns_(period_ns), spin_ns_(spin_ns), deadline_ns_(monotonic_ns()) {}
+
+  /// Waits for the next deadline and returns the lateness of the wake-up. An interrupted sleep
+  /// continues.
+  std::int64_t wait_next() noexcept {
+    deadline_ns_ += period_ns_;
+    std::int64_t now = monotonic_ns();
+    if (now >= deadline_ns_ + period_ns_) {
+      const std::int64_t missed = (now - deadline_ns_) / period_ns_;
+      overruns_ += static_cast<std::uint64_t>(missed);
+      deadline_ns_ += missed * period_ns_;
+    }
+    sleep_until_ns(deadline_ns_ - spin_ns_);
+    do now = monotonic_ns();
+    while (now < deadline_ns_);
+    return now - deadline_ns_;
+  }
+
+  [[nodiscard]] std::uint64_t overruns() const noexcept { return overruns_; }
+
+ private:
+  std::int64_t period_ns_;
+  std::int64_t spin_ns_;
+  std::int64_t deadline_ns_;
+  std::uint64_t overruns_ = 0;
+};
+
+/// Gate of a lock-step run, whose ticks take no time: it waits for a process that must see certain
+/// ticks, so that pictures are spread over the run and show the same ticks each time. That process
+/// writes the last allowed tick into a FIFO, as u64 of this machine; the newest one counts. Virtual
+/// time only: it blocks.
+class TickLeash {
+ public:
+  /// Throws std::runtime_error with one line if `fifo` is none. `stop` outlives it.
+  TickLeash(const std::string& fifo, const std::atomic<bool>& stop);
+  ~TickLeash();
+  TickLeash(const TickLeash&) = delete;
+  TickLeash& operator=(const TickLeash&) = delete;
+
+  /// Returns once `tick` is allowed, or the loop has to stop. If the writer is gone, or writes
+  /// nothing for `kPatienceMs`, all later ticks pass.
+  void wait_for(std::uint64_t tick) noexcept;
+
+  static constexpr int kPatienceMs = 10'000;
+
+ private:
+  int fd_;
+  const std::atomic<bool>& stop_;
+  std::uint64_t allowed_ = 0;
+};
+
+/// A servo whose ticks begin so far apart has stood still: its last contact is outdated.
+inline constexpr std::int64_t kStandstillNs = 20'000'000;
+
+/// Detects a tick that began kStandstillNs or more after the last one. One thread.
+class StandstillWatch {
+ public:
+  /// Once per tick, at its start.
+  [[nodiscard]] bool stood_still(std::int64_t now_ns) noexcept {
+    const bool stood_still = began_ns_ > 0 && now_ns - began_ns_ >= kStandstillNs;
+    began_ns_ = now_ns;
+    return stood_still;
+  }
+
+ private:
+  std::int64_t began_ns_ = 0;  ///< the last tick; 0: there was none
+};
+
+/// Start of a tick: the clock, or in lock-step the next report of the device.
+class TickSource {
+ public:
+  virtual ~TickSource() = default;
+  /// Waits for the next tick and returns its lateness in ns.
+  virtual std::int64_t wait_next() noexcept = 0;
+  /// Deadlines that were skipped because a tick ran over.
+  [[nodiscard]] virtual std::uint64_t overruns() const noexcept = 0;
+  /// Whether this tick began kStandstillNs or more after the last one; false without a clock.
+  [[nodiscard]] virtual bool stood_still() const noexcept { return false; }
+};
+
+/// Real time: absolute deadlines.
+class RealTimeTicks final : public TickSource {
+ public:
+  RealTimeTicks(std::int64_t period_ns, std::int64_t spin_ns) noexcept
+      : clock_(period_ns, spin_ns) {}
+  std::int64_t wait_next() noexcept override {
+    const std::int64_t late_ns = clock_.wait_next();
+    stood_still_ = watch_.stood_still(monotonic_ns());
+    return late_ns;
+  }
+  [[nodiscard]] std::uint64_t overruns() const noexcept override { return clock_.overruns(); }
+  [[nodiscard]] bool stood_still() const noexcept override { return stood_still_; }
+
+ private:
+  DeadlineClock clock_;
+  StandstillWatch watch_;
+  bool stood_still_ = false;
+};
+
+/// Virtual time: one tick per report, as fast as both processes run. After a device has been silent
+/// for two seconds of real time, ticks pass without a report until the next one comes. With a
+/// leash, each tick first waits until the leash allows it.
+class LockStepTicks final : public TickSource {
+ public:
+  explicit LockStepTicks(DeviceDriver& device, TickLeash* leash = nullptr) noexcept
+      : device_(device), leash_(leash) {}
+  std::int64_t wait_next() noexcept override {
+    if (leash_ != nullptr) leash_->wait_for(++tick_);
+    silent_ = !device_.wait(silent_ ? 0 : kPatienceMs);
+    return 0;
+  }
+  [[nodiscard]] std::uint64_t overruns() const noexcept override { return 0; }
+
+ private:
+  static constexpr int kPatienceMs = 2000;
+  DeviceDriver& device_;
+  TickLeash* leash_;
+  std::uint64_t tick_ = 0;
+  bool silent_ = false;
+};
+
+}  // namespace kerf

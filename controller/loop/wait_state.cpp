@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "controller/loop/wait_state.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdio>
+
+#include "shared/text/text.hpp"
+
+namespace kerf {
+namespace {
+
+constexpr std::int64_t kPatienceNs = 1'000'000'000;
+constexpr std::size_t kKinds = 6;
+
+constexpr std::array<const char*, kKinds> kWaits{"",
+                                                 "waiting for the first report",
+                                                 "waiting until homed",
+                                                 "waiting until parked",
+                                                 "waiting until at rest",
+                                                 "waiting to be taken"};
+
+/// By personality; an Omni needs no homing.
+constexpr std::array<std::array<const char*, kKinds>, 3> kDeeds{
+    {{"", "unplug it and plug it in again", "", "rest the stylus in the inkwell",
+      "let go of the stylus in the inkwell", "take the stylus out of the inkwell"},
+     {"", "load its firmware (docs/devices.md), or unplug it and plug it in again",
+      "pull the grip all the way out, then push it in", "hold the grip's centre button, at rest",
+      "hold the grip still, its centre button held", "let go of the grip's centre button"},
+     {"", "unplug it and plug it in again", "hold the home pose, press its calibration button",
+      "hold the home pose, press its calibration button", "hold the home pose still",
+      "move the arm away from its home pose"}}};
+static_assert(static_cast<std::size_t>(Personality::omni) == 0 &&
+              static_cast<std::size_t>(Personality::falcon) == 1 &&
+              static_cast<std::size_t>(Personality::woodenhaptics) == 2);
+
+}  // namespace
+
+Waiting waiting_for(const DeviceReport& report, const ServoOutput& output) noexcept {
+  switch (output.phase) {
+    case Phase::off:
+      return Waiting::report;
+    case Phase::calibrating:
+    case Phase::fault:
+      if (!report.homed) return Waiting::homing;
+      return report.parked ? Waiting::rest : Waiting::parked;
+    case Phase::armed:
+      return Waiting::hand;
+    case Phase::ramping:
+    case Phase::active:
+      break;
+  }
+  return Waiting::nothing;
+}
+
+const char* deed_for(Personality personality, Waiting waiting) noexcept {
+  return kDeeds[static_cast<std::size_t>(personality)][static_cast<std::size_t>(waiting)];
+}
+
+std::string text_of(Personality personality, Waiting waiting) {
+  if (waiting == Waiting::nothing) return "";
+  return std::string(kWaits[static_cast<std::size_t>(waiting)]) + ": " +
+         deed_for(personality, waiting);
+}
+
+std::string text_before_device(const std::string& port) {
+  return "waiting for a device that answers at --port " + port;
+}
+
+void tell_stopped_early(const std::string& work) {
+  std::printf("kerf: stopped before there was a device; %s\n", escaped(work).c_str());
+}
+
+bool WaitTeller::look(Waiting now, std::int64_t now_ns, std::int64_t servo_ns) noexcept {
+  if (now == Waiting::nothing) told_ = 0;
+  if (now != last_) {
+    last_ = now;
+    since_ns_ = now_ns;
+    since_servo_ns_ = servo_ns;
+  }
+  const std::uint32_t bit = 1U << static_cast<unsigned>(now);
+  const std::int64_t waited_ns = std::min(now_ns - since_ns_, servo_ns - since_servo_ns_);
+  if (now == Waiting::nothing || waited_ns < kPatienceNs || (told_ & bit) != 0) return false;
+  told_ |= bit;
+  return true;
+}
+
+}  // namespace kerf

@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "controller/load/loaded_scene.hpp"
+
+// Whether a device can hold the contact of a scene: its stiffness and damping against the exact
+// boundary of a sampled wall (docs/theory.md 5.7), at the scene's rate, with the figures of its
+// device (controller/stability) and without a hand that damps it.
+//
+// The criterion is a swing that grows. It is soon wider than the 0.1 mm in which the coupling's
+// damper comes in, and than the steps of the encoder, so that the damper acts fully and the
+// velocity window is down to one interval: the backward difference of the exact loop. A swing
+// within both is a hum that friction stops. The paper's force has no damper, so only friction makes
+// it stable at all: its margin is that with friction, and it is never refused.
+//
+// A force law has the margin of its worst length. The low-pass of `difference`
+// counts, another estimator counts as a bare difference, and a stabiliser is left out.
+
+namespace kerf {
+
+/// Below this margin the user is warned: a device may have half of the damping of its figures.
+inline constexpr double kSafeMargin = 1.5;
+
+struct GainMargin {
+  double stiffness_n_per_mm = 0;  ///< at the device
+  double damping_ns_per_mm = 0;
+  double highest_n_per_mm = 0;                ///< stiffness at the boundary, without friction
+  double highest_with_friction_n_per_mm = 0;  ///< the same with it, from a push of 1 N
+  bool friction_decides = false;              ///< of the paper's force
+  double spring_mm = 0;  ///< of a force law: the length of these values; else 0
+
+  [[nodiscard]] double margin() const noexcept { return highest_n_per_mm / stiffness_n_per_mm; }
+  [[nodiscard]] double with_friction() const noexcept {
+    return highest_with_friction_n_per_mm / stiffness_n_per_mm;
+  }
+  /// The margin for the warning.
+  [[nodiscard]] double deciding() const noexcept {
+    return friction_decides ? with_friction() : margin();
+  }
+};
+
+enum class PlayFriction : std::uint8_t { where_it_decides, always };
+
+/// Friction is simulated, not computed: 20 ms at 1 kHz, eight times as long at 8 kHz. If it does
+/// not decide and the caller does not request it, its boundary stays 0.
+[[nodiscard]] GainMargin gain_margin(const LoadedScene& scene,
+                                     PlayFriction friction = PlayFriction::always);
+
+/// Lines of `--check` and `--explain`: loop, boundaries and margins, one `name=value` a line, and a
+/// note below kSafeMargin.
+[[nodiscard]] std::string gain_lines(const LoadedScene& scene, const GainMargin& margin);
+
+/// One line with the highest safe stiffness; empty above kSafeMargin.
+[[nodiscard]] std::string gain_warning(const LoadedScene& scene, const GainMargin& margin);
+
+/// Why the scene may move no device: unstable without friction, and `force.unchecked_gain` is not
+/// set. Empty if it may.
+[[nodiscard]] std::string gain_refusal(const LoadedScene& scene, const GainMargin& margin);
+
+/// Why a real device does not get these gains, stable or not: they are above the largest known safe
+/// values for it. Empty if it does.
+[[nodiscard]] std::string above_device(const LoadedScene& scene);
+
+}  // namespace kerf

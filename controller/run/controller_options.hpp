@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "controller/load/load_scene.hpp"
+#include "controller/loop/real_time.hpp"
+#include "shared/segment/command.hpp"
+
+namespace kerf {
+
+/// The command line of kerf-controller.
+struct ControllerOptions {
+  std::string scene;
+  SceneOverrides overrides;
+  std::string port;               ///< as open_port.hpp says
+  std::optional<double> seconds;  ///< servo time after arming; none: until stopped
+  double wait_s = 60;             ///< servo time for the device to be taken in hand
+  std::string name = kUsualName;
+  bool virtual_time = false;
+  std::string until;            ///< FIFO that says how far lock-step may go; empty: none
+  bool unchecked_gain = false;  ///< gains above the device's and beyond its stability
+  bool check = false;
+  bool explain = false;
+  bool probe = false;
+  bool guard = false;
+  bool progress = false;
+  RealTimeOptions real_time;
+  std::string report;         ///< JSON, empty: none
+  std::string final_volume;   ///< .nrrd of the first volume at the end, empty: none
+  std::string emulator_args;  ///< file for the demo script, empty: none
+};
+
+/// Parses; prints help or version, or one line for an error, and then returns the exit code.
+[[nodiscard]] std::optional<int> parse_options(int argc, const char* const* argv,
+                                               ControllerOptions& options);
+
+}  // namespace kerf

@@ -1,0 +1,410 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "controller/run/controller_run.hpp"
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <exception>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "controller/device/device_driver.hpp"
+#include "controller/law/registry/law_registry.hpp"
+#include "controller/loop/motor_guard.hpp"
+#include "controller/loop/publisher.hpp"
+#include "controller/loop/servo_loop.hpp"
+#include "controller/loop/wait_state.hpp"
+#include "controller/plan/compile.hpp"
+#include "controller/plan/gain_margin.hpp"
+#include "controller/run/controller_options.hpp"
+#include "controller/run/probe.hpp"
+#include "controller/run/run_report.hpp"
+#include "controller/run/run_start.hpp"
+#include "controller/run/scene_check.hpp"
+#include "controller/scene/scene.hpp"
+#include "controller/scene/scene_file.hpp"
+#include "controller/volume/file/volume_write.hpp"
+#include "shared/numeric/fnv1a.hpp"
+#include "shared/posix/atomic_file.hpp"
+#include "shared/posix/monotonic_clock.hpp"
+#include "shared/posix/program.hpp"
+#include "shared/posix/stop_signals.hpp"
+#include "shared/posix/threads.hpp"
+#include "shared/segment/connection.hpp"
+#include "shared/segment/writer.hpp"
+#include "shared/volume/checksum.hpp"
+#include "shared/volume/material.hpp"
+#include "shared/wire/personality.hpp"
+
+namespace kerf {
+namespace {
+
+/// Shared by the threads of a run.
+struct Run {
+  const ControllerOptions& options;
+  const std::string& port;  ///< that of `--port`, with `auto` resolved
+  Personality personality;
+  int rate_hz;
+  SegmentWriter& segment;
+  SegmentServer& server;
+  Servo& servo;
+  DeviceDriver& device;
+  std::atomic<bool>& stop;
+  RunReport& report;
+};
+
+constexpr std::chrono::milliseconds kLookPeriod{5};
+
+/// A looping thread cannot be ended: the program ends, as in a crash, and logs why. Readers keep
+/// all ticks before it.
+[[noreturn]] void end_looping_servo(const Run& run, std::uint64_t tick) {
+  static_cast<void>(run.device.release_for_good());
+  run.segment.set_lifecycle(Lifecycle::fault);
+  log_error("the step after tick " + std::to_string(tick) + " did not end in " +
+            std::to_string(EndlessStep::kMostSeconds) +
+            " s; motors off; give every loop of your law a bound that does not depend on its input "
+            "(the lab tries it: law NAME)");
+  constexpr std::chrono::milliseconds kBusCycles{2};  // as after a crash
+  std::this_thread::sleep_for(kBusCycles);
+  std::_Exit(1);
+}
+
+/// Main thread while the servo runs: draws the progress bar, logs what the device waits for, and
+/// checks for steps that do not end.
+void show_progress(const LoopSignals& signals, const std::atomic<bool>& ended, const Run& run,
+                   EndlessStep& step) {
+  const ControllerOptions& options = run.options;
+  const ProgressBar bar(options.progress);
+  WaitTeller teller;
+  while (!ended.load()) {
+    if (step.look()) end_looping_servo(run, signals.heartbeat.load(std::memory_order_relaxed));
+    const Waiting waiting = signals.waiting.load(std::memory_order_relaxed);
+    const std::string waits = text_of(run.personality, waiting);
+    const double servo_s =
+        static_cast<double>(signals.heartbeat.load(std::memory_order_relaxed)) / run.rate_hz;
+    if (teller.look(waiting, monotonic_ns(), static_cast<std::int64_t>(servo_s * kNsPerSecond))) {
+      bar.hide();
+      log_note(waits);
+    }
+    const double done_s = static_cast<double>(signals.armed_ticks.load()) / run.rate_hz;
+    char text[64];
+    std::snprintf(text, sizeof text, "%.1f s", done_s);
+    bar.show(options.seconds ? done_s / *options.seconds : 0, done_s > 0 ? text : waits);
+    for (int i = 0; i < 10 && !ended.load(); ++i) std::this_thread::sleep_for(kLookPeriod);
+  }
+}
+
+LoopLimits limits_of(const ControllerOptions& options, double rate_hz) {
+  LoopLimits limits;
+  if (options.seconds) {
+    limits.armed_ticks = static_cast<std::uint64_t>(std::llround(*options.seconds * rate_hz));
+  }
+  limits.gone_ticks = static_cast<std::uint64_t>(2 * rate_hz);
+  limits.arming_ticks = static_cast<std::uint64_t>(std::llround(options.wait_s * rate_hz));
+  return limits;
+}
+
+/// Warns of each missing right, or refuses under --strict.
+void accept_rights(const std::vector<MissingRight>& missing, bool strict) {
+  for (const MissingRight& right : missing) {
+    if (strict) {
+      throw std::runtime_error("--strict: no " + right.what + "; without it " + right.effect);
+    }
+    log_warning("no " + right.what + ": " + right.effect);
+  }
+}
+
+/// The servo thread from its first to its last tick. Throws for a missing right under --strict.
+EndReason serve(const Run& run, LoopSignals& signals, CallGuard* calls) {
+  const ControllerOptions& options = run.options;
+  if (!options.virtual_time) {
+    const auto missing = become_real_time(options.real_time);
+    accept_rights(missing, options.real_time.strict);
+    auto& all = run.report.missing_rights;
+    all.insert(all.end(), missing.begin(), missing.end());
+  }
+  Publisher eyes(run.segment, run.servo);
+  RealTimeTicks real_time(kNsPerSecond / run.rate_hz, options.real_time.spin_us * 1000);
+  std::optional<TickLeash> leash;
+  if (!options.until.empty()) leash.emplace(options.until, run.stop);
+  LockStepTicks lock_step(run.device, leash ? &*leash : nullptr);
+  TickSource& clock = options.virtual_time ? static_cast<TickSource&>(lock_step) : real_time;
+  if (calls != nullptr) calls->enter(run.port);
+  const EndReason end = run_servo(clock, run.device, run.servo, eyes, run.server,
+                                  limits_of(options, run.rate_hz), signals, run.report.record);
+  if (calls != nullptr) calls->leave();
+  return end;
+}
+
+/// The end after a check of the guard, which stops the loop in the same way as a signal.
+EndReason end_by(const CallGuard& calls, EndReason end, RunReport& report) {
+  report.unexpected_call = calls.unexpected();
+  if (report.unexpected_call.empty()) return end;
+  log_error("--guard: system call " + report.unexpected_call +
+            " on the servo thread; motors off; keep it out of the loop");
+  report.record.add_fault(report.record.armed_at_tick + report.record.ticks, "unexpected_call");
+  return EndReason::unexpected_call;
+}
+
+/// Runs servo, watchdog and progress bar until the run is over; the motors are off afterwards. Main
+/// thread. Throws the exception of the servo thread, for example for a missing right under
+/// --strict.
+EndReason run_threads(const Run& run) {
+  LoopSignals signals{run.stop};
+  Watchdog watchdog(run.device, signals);
+  std::atomic<bool> ended{false};
+  EndReason end = EndReason::stopped;
+  std::exception_ptr failure;
+  std::optional<CallGuard> calls;
+  {
+    MotorGuard guard(run.device);
+    if (run.options.guard) calls.emplace(run.device, run.stop);
+    // The watchdog first: if the system has no thread for one of the two, no servo runs without it.
+    std::jthread watching;
+    if (!run.options.virtual_time) {
+      watching = start_watchdog(watchdog, run.options.real_time);
+    }
+    std::jthread servo_thread([&] {
+      const HandlerStack handlers = guard.guard_stack();
+      try {
+        end = serve(run, signals, calls ? &*calls : nullptr);
+      } catch (...) {
+        failure = std::current_exception();
+      }
+      ended = true;
+    });
+    const StopSignalsElsewhere to_the_threads_above;
+    EndlessStep step(servo_thread.native_handle(), signals.heartbeat);
+    try {
+      show_progress(signals, ended, run, step);
+    } catch (...) {
+      run.stop = true;  // else the wait for the servo would not end
+      throw;
+    }
+  }
+  run.report.watchdog_trips = watchdog.trips();
+  run.report.waiting = text_of(run.personality, signals.waiting.load());
+  if (failure) std::rethrow_exception(failure);
+  return calls ? end_by(*calls, end, run.report) : end;
+}
+
+const char* text_of(EndReason end) {
+  switch (end) {
+    case EndReason::ticks_done:
+      return "finished";
+    case EndReason::stopped:
+      return "stopped";
+    case EndReason::device_gone:
+      return "the device went away";
+    case EndReason::unexpected_call:
+      return "the servo thread made an unexpected system call";
+    case EndReason::never_armed:
+      break;
+  }
+  return "the device was never taken in hand";
+}
+
+double removed_mm3(const LoadedScene& scene, const RunRecord& record) {
+  double mm3 = 0;
+  for (std::size_t v = 0; v < scene.volumes.size(); ++v) {
+    const auto& h = scene.volumes[v].image.spacing_mm;
+    mm3 += static_cast<double>(record.removed_steps[v]) / kDensityMax * h[0] * h[1] * h[2];
+  }
+  return mm3;
+}
+
+/// Whether a voxel of the material can be at the surface, or within. With labels every material
+/// can.
+bool is_felt(const LoadedScene& scene, const MaterialRule& rule, std::size_t material) {
+  return std::ranges::any_of(scene.volumes, [&](const SceneVolume& volume) {
+    if (!volume.image.labels.empty()) return true;
+    for (std::uint32_t density = volume.iso; density <= kDensityMax; ++density) {
+      if (rule.of(Label{0}, static_cast<Density>(density)) == material) return true;
+    }
+    return false;
+  });
+}
+
+/// Scores of each material of the scene, since the last reset.
+MaterialScores scores_of(const LoadedScene& scene, const CompiledScene& servo,
+                         const RunRecord& record) {
+  std::vector<double> isos;
+  for (const Material& material : scene.materials) isos.push_back(material.iso);
+  const MaterialRule rule(isos);
+  std::vector<double> removed(rule.count());
+  for (std::size_t v = 0; v < scene.volumes.size(); ++v) {
+    StepsByMaterial steps;
+    const VolumeImage& image = scene.volumes[v].image;
+    add_removed(rule, servo.first_density(v), servo.density(v), image.labels, steps);
+    const auto& h = image.spacing_mm;
+    for (std::size_t m = 0; m < steps.size(); ++m) {
+      removed[m] += static_cast<double>(steps[m]) / kDensityMax * h[0] * h[1] * h[2];
+    }
+  }
+  MaterialScores scores;
+  for (std::size_t m = 0; m < scene.materials.size(); ++m) {
+    if (m == 0 && removed[0] == 0) continue;  // "none": no voxel of it
+    const Material& material = scene.materials[m];
+    scores.push_back({material.name, removed[m], std::nullopt, is_felt(scene, rule, m)});
+    if (!material.forbidden) continue;
+    scores.back().forbidden_ms =
+        static_cast<double>(record.forbidden_ticks[m]) * 1000 / scene.servo.rate_hz;
+  }
+  return scores;
+}
+
+std::uint64_t hash_of_volumes(const LoadedScene& scene, const Servo& servo) {
+  std::uint64_t hash = kFnv1aBasis;
+  for (std::size_t v = 0; v < scene.volumes.size(); ++v) {
+    hash = fnv1a_step(hash, density_hash(servo.density(v)));
+  }
+  return hash;
+}
+
+/// Writes the volumes in their current state.
+void write_final(const ControllerOptions& options, const LoadedScene& scene, const Servo& servo) {
+  for (std::size_t v = 0; v < scene.volumes.size(); ++v) {
+    if (v > 0 && !scene.volumes[v].solid) continue;
+    VolumeImage image = scene.volumes[v].image;
+    const auto density = servo.density(v);
+    image.density.assign(density.begin(), density.end());
+    write_volume(image, final_path(options, scene, v));
+  }
+}
+
+/// Warns with the names of faulty laws: the fault has only their kind.
+void name_law_faults(const LoadedScene& scene, const EventList& faults) {
+  const std::array<std::pair<Fault, const LawChoice*>, 3> laws{
+      {{Fault::force_law, &scene.force.law},
+       {Fault::velocity_estimator, &scene.servo.velocity},
+       {Fault::stabiliser, &scene.force.stabiliser}}};
+  for (const EventList::Event& event : faults.kept()) {
+    for (const auto& [fault, law] : laws) {
+      if (event.name != std::string_view(fault_name(fault))) continue;
+      log_warning(std::string(kind_name(law->kind)) + " " + law->name +
+                  " gave something that is no finite number at tick " + std::to_string(event.tick) +
+                  ", and the motors went off; the lab tries it: law " + law->name);
+    }
+  }
+}
+
+RunReport new_report(const ControllerOptions& options) {
+  RunReport report;
+  report.end = text_of(EndReason::stopped);
+  report.scene = options.scene;
+  report.virtual_time = options.virtual_time;
+  report.guarded = options.guard;
+#ifdef KERF_SANITIZED
+  report.allocations_counted = false;
+#endif
+  return report;
+}
+
+/// `--check` and `--explain`.
+void look_at_scene(const ControllerOptions& options) {
+  PlannedScene planned = load_and_plan(options);
+  const LoadedScene& scene = planned.scene;
+  const SceneCosts& costs = planned.servo->costs();
+  if (options.explain) return explain_scene(options, planned.scene, *planned.servo);
+  check_hand_script(scene);
+  check_options(options, scene);
+  const GainMargin margin = gain_margin(scene);
+  print_scene(scene, costs, margin);
+  check_budget(options, scene, costs);
+  check_gains(options, scene, margin);
+}
+
+/// The run from the first packet of the device to the report.
+int run_with_device(const ControllerOptions& options, std::int64_t began_ns, RunStart& start,
+                    std::atomic<bool>& stop, RunReport& report) {
+  const LoadedScene& scene = start.planned.scene;
+  CompiledScene& servo = *start.planned.servo;
+  SegmentWriter& segment = start.segment;
+  const std::unique_ptr<DeviceDriver> driver =
+      make_driver(scene.device.personality, *start.port, scene.device.encoder_sign);
+  DeviceDriver& device = *driver;
+  device.start();
+  if (!options.virtual_time) {
+    report.missing_rights = lock_memory();
+    if (!segment.locked() && report.missing_rights.empty()) {
+      report.missing_rights.push_back({"locked segment", "page faults may delay a tick"});
+    }
+    accept_rights(report.missing_rights, options.real_time.strict);
+  }
+
+  segment.set_lifecycle(Lifecycle::run);
+  report.load_s = static_cast<double>(monotonic_ns() - began_ns) / 1e9;
+  const EndReason end =
+      run_threads({options, start.port_text, scene.device.personality, scene.servo.rate_hz, segment,
+                   start.server, servo, device, stop, report});
+  if (!options.virtual_time) unlock_memory();
+
+  const bool clean = end == EndReason::ticks_done || end == EndReason::stopped;
+  segment.set_lifecycle(clean ? Lifecycle::clean_end : Lifecycle::fault);
+  report.end = text_of(end);
+  name_law_faults(scene, report.record.faults);
+  report.removed_mm3 = removed_mm3(scene, report.record);
+  report.materials = scores_of(scene, servo, report.record);
+  report.workspace_scale = scene.device.workspace_scale;
+  report.tool = scene.tools[scene.active_tool].name;
+  report.tool_mm = 2 * scene.tools[scene.active_tool].radius_mm;
+  report.lost_packets = device.lost();
+  report.refused_packets = device.refused();
+  report.link = start.port->counters();
+  if (const std::int64_t first_ns = report.record.first_force_ns; first_ns > 0) {
+    report.start_to_force_ms = static_cast<double>(first_ns - began_ns) / 1e6;
+  }
+  report.volume_hash = hash_of_volumes(scene, servo);
+  std::fputs(summary(report).c_str(), stdout);
+  if (!options.report.empty()) write_new_file(options.report, report_json(report));
+  if (!options.final_volume.empty()) write_final(options, scene, servo);
+  return clean && report.record.faults.count == 0 ? 0 : 1;
+}
+
+/// Runs the controller from the scene to the report and returns the exit code: 0 on success, also
+/// if a signal ended it, even before there was a device; 1 if the device went away or was never
+/// docked, or a fault latched. Throws std::exception with one line for bad input or set-up.
+int run_controller(const ControllerOptions& options) {
+  const std::int64_t began_ns = monotonic_ns();
+  std::atomic<bool>& stop = catch_stop_and_pause_signals();
+  if (options.check || options.explain) {
+    look_at_scene(options);
+    return 0;
+  }
+  check_report(options);
+  RunReport report = new_report(options);
+  std::optional<RunStart> start;
+  try {
+    start.emplace(options, stop, report);
+  } catch (const std::exception&) {
+    if (!stop) throw;
+    tell_stopped_early(report.waiting);
+    if (!options.report.empty()) write_new_file(options.report, report_json(report));
+    return 0;
+  }
+  return run_with_device(options, began_ns, *start, stop, report);
+}
+
+}  // namespace
+
+int run_controller_program(int argc, char** argv) {
+  return run_program("kerf-controller", [&] {
+    ControllerOptions options;
+    const auto early = parse_options(argc, argv, options);
+    return early ? *early : options.probe ? run_probe(options) : run_controller(options);
+  });
+}
+
+}  // namespace kerf

@@ -1,0 +1,201 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "controller/run/run_report.hpp"
+
+#include "shared/text/json.hpp"
+#include "shared/text/text.hpp"
+
+namespace kerf {
+namespace {
+
+Json percentiles(const Histogram& histogram) {
+  return {{"p50", histogram.percentile_us(0.5)},
+          {"p99", histogram.percentile_us(0.99)},
+          {"p999", histogram.percentile_us(0.999)},
+          {"max", histogram.max_us()}};
+}
+
+Json by_source(const RunRecord& record) {
+  Json list = Json::Members{};
+  for (std::size_t i = 0; i < kEnergySources; ++i) {
+    list[std::string(kEnergySourceNames[i])] = record.energy_mj[i] / 1000.0;
+  }
+  return list;
+}
+
+/// The sources that did any work, in mJ.
+std::string energy_line(const RunRecord& record) {
+  std::string text = format("  energy     lowest %.3f mJ", record.port_minimum_mj);
+  for (std::size_t i = 0; i < kEnergySources; ++i) {
+    if (record.energy_mj[i] == 0) continue;
+    text += format(", %s %.3f", std::string(kEnergySourceNames[i]).c_str(), record.energy_mj[i]);
+  }
+  return text + "\n";
+}
+
+Json removed_of(const MaterialScores& materials) {
+  Json list = Json::Members{};
+  for (const MaterialScore& one : materials) list[one.name] = one.removed_mm3;
+  return list;
+}
+
+Json forbidden_of(const MaterialScores& materials) {
+  Json list = Json::Members{};
+  for (const MaterialScore& one : materials) {
+    if (one.forbidden_ms) list[one.name] = *one.forbidden_ms;
+  }
+  return list;
+}
+
+/// What was removed of which material, and how long what is forbidden was touched. What lies below
+/// the surface goes with what is cut, unfelt.
+std::string score_lines(const MaterialScores& materials) {
+  constexpr double kSeenMm3 = 0.0005;  // else the line would say 0.000
+  std::string removed, unfelt, touched;
+  for (const MaterialScore& one : materials) {
+    if (one.removed_mm3 >= kSeenMm3) {
+      std::string& list = one.felt ? removed : unfelt;
+      list += format("%s%s %.3f", list.empty() ? "" : ", ", one.name.c_str(), one.removed_mm3);
+    }
+    if (one.forbidden_ms.value_or(0) > 0) {
+      touched +=
+          format("%s%s %.0f ms", touched.empty() ? "" : ", ", one.name.c_str(), *one.forbidden_ms);
+    }
+  }
+  std::string text;
+  if (!removed.empty()) text += "  of these   " + removed + " mm3\n";
+  if (!unfelt.empty()) text += "  not felt   " + unfelt + " mm3, below the surface\n";
+  if (!touched.empty()) text += "  forbidden  touched: " + touched + "\n";
+  return text;
+}
+
+/// A scan is larger than the workspace: its tool, and what it removes, are so, too.
+std::string scale_line(const RunReport& report) {
+  if (report.workspace_scale <= 1) return {};
+  return format("  scale      1 mm of the hand is %.3g mm here, where tool %s is %.3g mm wide\n",
+                report.workspace_scale, report.tool.c_str(), report.tool_mm);
+}
+
+std::string line(const char* name, const Histogram& histogram) {
+  return format("  %-10s %9.1f %9.1f %9.1f %9.1f\n", name, histogram.percentile_us(0.5),
+                histogram.percentile_us(0.99), histogram.percentile_us(0.999), histogram.max_us());
+}
+
+Json list(const EventList& events) {
+  Json list = Json::List{};
+  for (const EventList::Event& event : events.kept()) {
+    list.push_back({{"tick", event.tick}, {"name", event.name}});
+  }
+  return list;
+}
+
+std::string lines(const char* kind, const EventList& events) {
+  std::string text;
+  for (const EventList::Event& event : events.kept()) {
+    text += format("  %-10s %s at tick %llu\n", kind, event.name,
+                   static_cast<unsigned long long>(event.tick));
+  }
+  return text;
+}
+
+}  // namespace
+
+std::string report_json(const RunReport& report) {
+  const RunRecord& r = report.record;
+  Json missing = Json::List{};
+  for (const MissingRight& right : report.missing_rights) {
+    missing.push_back({{"what", right.what}, {"effect", right.effect}});
+  }
+  Json link = Json::Members{};
+  for (const LinkCounter& counter : report.link) link[counter.name] = counter.value;
+  const Json json{
+      {"program", "kerf-controller"},
+      {"version", KERF_VERSION},
+      {"scene", report.scene},
+      {"config_hash", hex64(report.config_hash)},
+      {"device", report.device},
+      {"numeric", report.numeric},
+      {"rate_hz", report.rate_hz},
+      {"velocity_estimator", report.velocity_estimator},
+      {"virtual", report.virtual_time},
+      {"end", report.end},
+      {"waiting", report.waiting},
+      {"ticks", r.ticks},
+      {"armed_at_tick", r.armed_at_tick},
+      {"overruns", r.overruns},
+      {"stale_ticks", r.stale_ticks},
+      {"wake_us", percentiles(r.wake)},
+      {"compute_us", percentiles(r.compute)},
+      {"publish_us", percentiles(r.publish)},
+      {"allocations", r.allocations},
+      {"allocations_counted", report.allocations_counted},
+      {"minor_faults", r.faults_of_pages.minor},
+      {"major_faults", r.faults_of_pages.major},
+      {"guarded", report.guarded},
+      {"unexpected_call", report.unexpected_call},
+      {"contact_ticks", r.contact_ticks},
+      {"shaft_ticks", r.shaft_ticks},
+      {"peak_force_n", r.peak_force_n},
+      {"removed_mm3", report.removed_mm3},
+      {"removed_mm3_by_material", removed_of(report.materials)},
+      {"forbidden_ms", forbidden_of(report.materials)},
+      {"resets", r.resets},
+      {"undos", r.undos},
+      {"energy_j", r.absorbed_mj / 1000.0},
+      {"port_minimum_j", r.port_minimum_mj / 1000.0},
+      {"energy_by_source_j", by_source(r)},
+      {"faults", list(r.faults)},
+      {"fault_count", r.faults.count},
+      {"events", list(r.events)},
+      {"event_count", r.events.count},
+      {"watchdog_trips", report.watchdog_trips},
+      {"lost_packets", report.lost_packets},
+      {"refused_packets", report.refused_packets},
+      {"link", link},
+      {"missing_rights", missing},
+      {"load_s", report.load_s},
+      {"start_to_force_ms", report.start_to_force_ms},
+      {"volume_hash", hex64(report.volume_hash)},
+      {"output_hash", hex64(r.output_hash)},
+  };
+  return json.document();
+}
+
+std::string summary(const RunReport& report) {
+  const RunRecord& r = report.record;
+  std::string text;
+  text += format("kerf: %s, %llu ticks at %d Hz (%s, %s numbers)\n\n", report.end.c_str(),
+                 static_cast<unsigned long long>(r.ticks), report.rate_hz,
+                 report.virtual_time ? "virtual time" : "real time", report.numeric.c_str());
+  if (r.ticks == 0 && !report.waiting.empty()) {
+    text += format("  never in use; %s\n\n", escaped(report.waiting).c_str());
+  }
+  text += "  us              p50       p99     p99.9       max\n";
+  if (!report.virtual_time) text += line("wake-up", r.wake);
+  text += line("compute", r.compute);
+  text += line("publish", r.publish);
+  text += format("\n  contact    %llu ticks, peak force %.3f N, work of the hand %.3f mJ\n",
+                 static_cast<unsigned long long>(r.contact_ticks), r.peak_force_n, r.absorbed_mj);
+  text += energy_line(r);
+  if (r.shaft_ticks > 0) {
+    text += format("  shaft      %llu ticks\n", static_cast<unsigned long long>(r.shaft_ticks));
+  }
+  text += format("  removed    %.3f mm3", report.removed_mm3);
+  if (r.resets > 0) {
+    text += format(" since the last of %llu resets", static_cast<unsigned long long>(r.resets));
+  }
+  text += "\n" + score_lines(report.materials) + scale_line(report);
+  text += format("  losses     %llu stale ticks, %llu overruns, %llu packets lost\n",
+                 static_cast<unsigned long long>(r.stale_ticks),
+                 static_cast<unsigned long long>(r.overruns),
+                 static_cast<unsigned long long>(report.lost_packets));
+  text += format("  loop       %llu allocations%s, %lld minor and %lld major page faults\n",
+                 static_cast<unsigned long long>(r.allocations),
+                 report.allocations_counted ? "" : " (not counted under sanitizers)",
+                 static_cast<long long>(r.faults_of_pages.minor),
+                 static_cast<long long>(r.faults_of_pages.major));
+  text += format("  hashes     volume %s, output %s\n", hex64(report.volume_hash).c_str(),
+                 hex64(r.output_hash).c_str());
+  return text + lines("fault", r.faults) + lines("event", r.events);
+}
+
+}  // namespace kerf

@@ -1,0 +1,194 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "controller/run/run_start.hpp"
+
+#include <cstddef>
+#include <cstdint>
+#include <cstdio>
+#include <fstream>
+#include <limits>
+#include <optional>
+#include <stdexcept>
+#include <utility>
+
+#include "controller/device/open_port.hpp"
+#include "controller/input/load_error.hpp"
+#include "controller/load/load_scene.hpp"
+#include "controller/load/scene_json.hpp"
+#include "controller/loop/wait_state.hpp"
+#include "controller/plan/gain_margin.hpp"
+#include "controller/plan/work_budget.hpp"
+#include "controller/run/law_trial.hpp"
+#include "controller/run/scene_check.hpp"
+#include "shared/numeric/fnv1a.hpp"
+#include "shared/posix/atomic_file.hpp"
+#include "shared/segment/segment.hpp"
+#include "shared/text/text.hpp"
+
+namespace kerf {
+namespace {
+
+/// Bytes that programs can still take before the system runs out, by the estimate of the kernel
+/// (MemAvailable); empty if it has none.
+std::optional<std::uint64_t> available_memory() {
+  std::ifstream table("/proc/meminfo");
+  std::string name;
+  std::uint64_t kib = 0;
+  while (table >> name >> kib) {
+    if (name == "MemAvailable:") return kib << 10;
+    table.ignore(std::numeric_limits<std::streamsize>::max(), '\n');
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+SegmentSpec segment_spec(const LoadedScene& scene, const std::string& json, std::uint64_t hash) {
+  SegmentSpec spec;
+  spec.scene_json = json;
+  spec.config_hash = hash;
+  spec.tick_ns = static_cast<std::uint32_t>(1'000'000'000 / scene.servo.rate_hz);
+  spec.build_id = std::string("kerf-controller ") + KERF_VERSION;
+  spec.mirror_updates = scene.cut.model != CutModel::none;
+  for (const SceneVolume& volume : scene.volumes) {
+    SegmentVolumeSpec& v = spec.volumes.emplace_back();
+    v.grid = volume.image.grid;
+    v.spacing_mm = volume.image.spacing_mm;
+    v.origin_mm = volume.pose.position_mm;
+    for (std::size_t i = 0; i < 4; ++i) {
+      v.orientation[i] = static_cast<float>(volume.pose.orientation[i]);
+    }
+    v.iso = volume.iso;
+    v.density = volume.image.density;
+    v.labels = volume.image.labels;
+  }
+  return spec;
+}
+
+void check_memory(const LoadedScene& scene, const SceneCosts& costs, std::uint64_t segment_bytes) {
+  std::uint64_t bytes = segment_bytes;
+  for (const ArrayBytes& array : costs.arrays) bytes += array.taken ? 0 : array.bytes;
+  const auto free_bytes = available_memory();
+  if (free_bytes && bytes > *free_bytes) {
+    throw std::runtime_error(scene.path + ": needs " + std::to_string(bytes >> 20) + " MiB, and " +
+                             std::to_string(*free_bytes >> 20) +
+                             " MiB are free; crop or resample the volume with kerf-volume");
+  }
+}
+
+namespace {
+
+constexpr int kPortPatienceMs = 5000;
+
+void warn_of_gains(const ControllerOptions& options, const LoadedScene& scene) {
+  if (options.virtual_time) return;
+  const GainMargin margin = gain_margin(scene, PlayFriction::where_it_decides);
+  check_gains(options, scene, margin);
+  const std::string warning = gain_warning(scene, margin);
+  if (!warning.empty()) log_warning(warning);
+}
+
+void warn_of_motors(const LoadedScene& scene) {
+  if (scene.device.torque_scale) return;
+  const auto kind = static_cast<std::size_t>(scene.device.personality);
+  log_warning("device.torque_scale is not set for " + std::string(kPersonalityWords[kind]) +
+              ": the motors stay off; measure it, and write device.personality beside it");
+}
+
+/// Prints the choices for a volume without settings at once, not with the summary.
+void tell_proposal(const LoadedScene& scene) {
+  for (const SceneVolume& volume : scene.volumes) {
+    for (std::string choice : volume.proposal) {
+      choice.replace(choice.find('='), 1, " ");
+      std::fprintf(stderr, "kerf: %s: %s\n", escaped(volume.name).c_str(), escaped(choice).c_str());
+    }
+    if (volume.proposal.empty()) continue;
+    std::fprintf(stderr, "kerf: %s: ./kerf volume import %s writes a scene with other choices\n",
+                 escaped(volume.name).c_str(), escaped(volume.file).c_str());
+  }
+}
+
+void tell_of_scene(const LoadedScene& scene, RunReport& report) {
+  report.device = kPersonalityWords[static_cast<std::size_t>(scene.device.personality)];
+  report.numeric = word_of(scene.servo.numeric);
+  report.velocity_estimator = scene.servo.velocity.name;
+  report.rate_hz = scene.servo.rate_hz;
+}
+
+PlannedScene checked_scene(const ControllerOptions& options, RunReport& report) {
+  report.waiting = "loading " + options.scene;
+  PlannedScene planned = load_and_plan(options);
+  const LoadedScene& scene = planned.scene;
+  tell_of_scene(scene, report);
+  check_options(options, scene);
+  check_budget(options, scene, planned.servo->costs());
+  warn_of_gains(options, scene);
+  warn_of_motors(scene);
+  tell_proposal(scene);
+  end_if_asked(options.scene);
+  return planned;
+}
+
+SegmentWriter new_segment(const ControllerOptions& options, const PlannedScene& planned,
+                          RunReport& report) {
+  const LoadedScene& scene = planned.scene;
+  const std::string json = canonical_json(scene);
+  report.config_hash = fnv1a(json);
+  const SegmentSpec spec = segment_spec(scene, json, report.config_hash);
+  check_memory(scene, planned.servo->costs(), plan_segment(spec).header.total_bytes);
+  if (!options.emulator_args.empty()) write_new_file(options.emulator_args, hand_lines(scene));
+  return SegmentWriter::create(spec);
+}
+
+}  // namespace
+
+PlannedScene load_and_plan(const ControllerOptions& options) {
+  LoadedScene scene = load_scene(options.scene, options.overrides);
+  for (const std::string& line : try_own_laws(scene)) log_warning(line);
+  std::unique_ptr<CompiledScene> servo = plan_scene(scene);
+  end_if_asked(options.scene);
+  return {std::move(scene), std::move(servo)};
+}
+
+void check_options(const ControllerOptions& options, const LoadedScene& scene) {
+  if (static_cast<double>(options.real_time.spin_us) * scene.servo.rate_hz > 0.9e6) {
+    throw std::runtime_error("--spin-us " + std::to_string(options.real_time.spin_us) +
+                             " is more than 90 % of a tick at " +
+                             std::to_string(scene.servo.rate_hz) + " Hz; spin less");
+  }
+  static_cast<void>(segment_socket(options.name));
+  check_run_files(options, scene);
+}
+
+void check_budget(const ControllerOptions& options, const LoadedScene& scene,
+                  const SceneCosts& costs) {
+  const std::string refusal = options.virtual_time ? "" : over_budget(scene, costs);
+  if (!refusal.empty()) throw std::runtime_error(refusal);
+}
+
+void check_gains(const ControllerOptions& options, const LoadedScene& scene,
+                 const GainMargin& margin) {
+  const std::string refusal = refused_gains(options, scene, margin);
+  if (!refusal.empty()) throw std::runtime_error(refusal);
+}
+
+RunStart::RunStart(const ControllerOptions& options, const std::atomic<bool>& stop,
+                   RunReport& report)
+    : planned(checked_scene(options, report)),
+      segment(new_segment(options, planned, report)),
+      server(options.name, segment,
+             {.tools = static_cast<std::uint32_t>(planned.scene.tools.size())}),
+      port_text(resolve_port(options.port, planned.scene.device.personality)) {
+  LoadedScene& scene = planned.scene;
+  planned.servo->take(scene);
+  report.waiting = text_before_device(port_text);
+  try {
+    const LinkHello ours{scene.device.personality, options.virtual_time, scene.servo.rate_hz};
+    const LateNote waits(report.waiting);
+    port = open_port(port_text, ours, kPortPatienceMs, stop, io_thread_of(options.real_time));
+  } catch (...) {
+    if (stop) segment.set_lifecycle(Lifecycle::clean_end);
+    throw;
+  }
+}
+
+}  // namespace kerf

@@ -1,0 +1,319 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "controller/kernel/gradient.hpp"
+#include "controller/kernel/sampling.hpp"
+#include "controller/servo/servo_plan.hpp"
+#include "controller/servo/servo_state.hpp"
+#include "shared/numeric/vec.hpp"
+#include "shared/volume/brick_grid.hpp"
+
+// The volumes go back to their first content, a few bricks a tick and only those that were cut.
+// What is derived of a density follows: gradients, and what cutting still owes. Maps of free space
+// are those of the first content, which a cut leaves true. Servo thread; no heap.
+
+namespace kerf {
+
+/// The bricks of a volume in blocks of 4x4x4, one word each: 32 voxels per edge. Pure arithmetic.
+struct BrickBlocks {
+  static constexpr int kEdgeLog2 = 2;
+  static constexpr std::int32_t kEdge = 1 << kEdgeLog2;
+
+  BrickGrid bricks;
+  std::int32_t nx = 0, ny = 0, nz = 0;
+
+  [[nodiscard]] static constexpr BrickBlocks of(const VoxelGrid& grid) noexcept {
+    const BrickGrid bricks = BrickGrid::of(grid);
+    const auto blocks = [](std::int32_t n) { return (n + kEdge - 1) >> kEdgeLog2; };
+    return {bricks, blocks(bricks.bx), blocks(bricks.by), blocks(bricks.bz)};
+  }
+  [[nodiscard]] constexpr std::size_t count() const noexcept {
+    return VoxelGrid{nx, ny, nz}.voxel_count();
+  }
+  [[nodiscard]] constexpr std::size_t block(VoxelIndex brick) const noexcept {
+    return VoxelGrid{nx, ny, nz}.index(brick.x >> kEdgeLog2, brick.y >> kEdgeLog2,
+                                       brick.z >> kEdgeLog2);
+  }
+  [[nodiscard]] static constexpr int bit(VoxelIndex brick) noexcept {
+    constexpr std::int32_t kIn = kEdge - 1;
+    return (brick.z & kIn) << 2 * kEdgeLog2 | (brick.y & kIn) << kEdgeLog2 | (brick.x & kIn);
+  }
+  /// The brick of a bit of a block.
+  [[nodiscard]] constexpr std::uint32_t brick_id(std::size_t block, int bit) const noexcept {
+    const auto at = static_cast<std::int32_t>(block);
+    const VoxelIndex first{(at % nx) << kEdgeLog2, (at / nx % ny) << kEdgeLog2,
+                           (at / nx / ny) << kEdgeLog2};
+    constexpr std::int32_t kIn = kEdge - 1;
+    return bricks.id({first.x + (bit & kIn), first.y + (bit >> kEdgeLog2 & kIn),
+                      first.z + (bit >> 2 * kEdgeLog2)});
+  }
+};
+
+/// Notes that a box of a volume was cut. Bounded by the bricks of the tool's box.
+inline void mark_cut(const VoxelGrid& grid, const VoxelBox& cut,
+                     std::span<std::uint64_t> blocks) noexcept {
+  const BrickBlocks of = BrickBlocks::of(grid);
+  const VoxelBox touched = of.bricks.bricks_of(cut);
+  for (std::int32_t z = touched.lo.z; z < touched.hi.z; ++z) {
+    for (std::int32_t y = touched.lo.y; y < touched.hi.y; ++y) {
+      for (std::int32_t x = touched.lo.x; x < touched.hi.x; ++x) {
+        blocks[of.block({x, y, z})] |= std::uint64_t{1} << BrickBlocks::bit({x, y, z});
+      }
+    }
+  }
+}
+
+/// Blocks that a tick may look at for one that was cut: 8 KiB of words.
+inline constexpr int kBlocksPerTick = 1024;
+
+/// Bricks that a tick may restore; the mirror copies as many again. 64 take 20 us with cold caches,
+/// a fiftieth of a tick at 1 kHz, and 8 as much of one at 8 kHz. Where gradients are stored a brick
+/// takes 80 times as long: 25 us.
+[[nodiscard]] constexpr int bricks_per_tick(std::int32_t rate_hz, bool gradients) noexcept {
+  const int bricks = std::clamp(64 * 1000 / std::max(rate_hz, 1), 8, 64);
+  return gradients ? std::max(1, bricks / 32) : bricks;
+}
+
+/// Restores some bricks of one block, and clears their bits. Returns the box around them.
+template <class N>
+VoxelBox restore_bricks(const ServoPlan<N>& plan, const VoxelGrid& grid, std::size_t block,
+                        VolumeState<N>& volume, GradientScratch* scratch) noexcept {
+  const BrickBlocks of = BrickBlocks::of(grid);
+  VoxelBox restored;
+  int left = bricks_per_tick(plan.rate_hz, !volume.gradient.empty());
+  for (std::uint64_t& bits = volume.cut_blocks[block]; bits != 0 && left > 0; --left) {
+    const VoxelBox box = of.bricks.voxels(of.brick_id(block, std::countr_zero(bits)));
+    bits &= bits - 1;
+    const auto row = static_cast<std::size_t>(box.hi.x - box.lo.x);
+    for (std::int32_t z = box.lo.z; z < box.hi.z; ++z) {
+      for (std::int32_t y = box.lo.y; y < box.hi.y; ++y) {
+        const std::size_t at = grid.index(box.lo.x, y, z);
+        copy_row(&volume.density[at], &volume.first[at], row);
+      }
+    }
+    if (!volume.gradient.empty()) {
+      refresh_gradients<N>(plan.kernel, grid, volume.density, box, volume.gradient, *scratch);
+    }
+    restored = restored.united(box);
+  }
+  return restored;
+}
+
+/// What cutting still owes a volume is of matter that has come back. One value for each lane of the
+/// widest tool.
+template <class N>
+void forget_debts(ServoState<N>& state, std::size_t v) noexcept {
+  std::ranges::fill(state.volumes[v].carry, RemovalCarry<N>{});
+  state.force_cut.volume[v] = {};
+}
+
+/// The last matter has come back.
+template <class N>
+void end_restoring(ServoState<N>& state) noexcept {
+  state.force_cut.change_tool();  // it stands, and has cut nothing of what is there now
+  restart_fade(state.supervisor);
+}
+
+/// One tick of a reset that runs: some bricks of one block, told in `changed` by volume of the
+/// scene. The last tick of a reset ends it.
+template <class N>
+void restore_some(const ServoPlan<N>& plan, ServoState<N>& state,
+                  std::array<VoxelBox, kMaxVolumes>& changed) noexcept {
+  ResetState& reset = state.reset;
+  for (int looks = kBlocksPerTick; looks > 0; --looks) {
+    if (reset.volume == plan.volume_count) {
+      reset = {};
+      end_restoring(state);
+      return;
+    }
+    VolumeState<N>& volume = state.volumes[reset.volume];
+    if (reset.block == volume.cut_blocks.size()) {
+      forget_debts(state, reset.volume);
+      ++reset.volume;
+      reset.block = 0;
+    } else if (volume.cut_blocks[reset.block] == 0) {
+      ++reset.block;
+    } else {
+      const VolumePlan<N>& of = plan.volumes[reset.volume];
+      changed[of.scene_index] =
+          restore_bricks(plan, of.grid, reset.block, volume, state.gradient_scratch);
+      return;
+    }
+  }
+}
+
+// The last stroke can be undone: every brick is kept as it was before the stroke's first cut in it.
+// Who is about to cut says which bricks it may reach; what was kept so and then not cut belongs to
+// the stroke that begins next, since nothing changed it. Servo thread; no heap.
+
+/// Bricks of a pool that a stroke may take; the others are for what may be cut next.
+[[nodiscard]] constexpr std::size_t stroke_room(std::size_t pool) noexcept {
+  return pool - pool / 4;
+}
+
+/// Keeps the bricks around a tool at `centre_vox`, each once a stroke. Copies at most the bricks of
+/// the tool's box, of which the cut that follows weighs every voxel. Where the pool is full, the
+/// stroke cannot be undone.
+template <class N>
+void keep_bricks(const ServoPlan<N>& plan, ServoState<N>& state, std::size_t v,
+                 const VoxelVec<typename N::Real>& centre_vox) noexcept {
+  const VoxelGrid& grid = plan.volumes[v].grid;
+  const std::array<std::int32_t, 3>& reach = plan.tools[state.active_tool].in_volume[v].reach_vox;
+  StrokeState& stroke = state.stroke;
+  const auto whole = [](typename N::Real at) {
+    constexpr double kLimit = kPositionLimitVox;
+    const double plain = as_double(at);
+    if (!(plain > -kLimit && plain < kLimit)) return kPositionLimitVox;  // outside of every volume
+    return static_cast<std::int32_t>(plain + kLimit) - kPositionLimitVox;
+  };
+  const VoxelIndex at{whole(centre_vox.x), whole(centre_vox.y), whole(centre_vox.z)};
+  const BrickGrid bricks = BrickGrid::of(grid);
+  const VoxelBox around =
+      bricks.bricks_of({{at.x - reach[0], at.y - reach[1], at.z - reach[2]},
+                        {at.x + reach[0] + 1, at.y + reach[1] + 1, at.z + reach[2] + 1}});
+  for (std::int32_t z = around.lo.z; z < around.hi.z; ++z) {
+    for (std::int32_t y = around.lo.y; y < around.hi.y; ++y) {
+      for (std::int32_t x = around.lo.x; x < around.hi.x; ++x) {
+        const std::uint32_t id = bricks.id({x, y, z});
+        std::uint32_t& kept_in = stroke.kept_in[v][id];
+        if (kept_in == stroke.generation) continue;
+        const bool full = stroke.open ? stroke.end - stroke.begin >= stroke_room(stroke.pool.size())
+                                      : stroke.end - stroke.begin >= stroke.pool.size();
+        if (full) {
+          (stroke.open ? stroke.lost : stroke.next_lost) = true;
+          return;
+        }
+        KeptBrick& kept = stroke.pool[stroke.end++ % stroke.pool.size()];
+        kept_in = stroke.generation;
+        kept.volume = static_cast<std::uint32_t>(v);
+        kept.id = id;
+        const VoxelBox box = bricks.voxels(id);
+        const auto row = static_cast<std::size_t>(box.hi.x - box.lo.x);
+        std::size_t to = 0;
+        for (std::int32_t k = box.lo.z; k < box.hi.z; ++k) {
+          for (std::int32_t j = box.lo.y; j < box.hi.y; ++j, to += row) {
+            copy_row(&kept.density[to], &state.volumes[v].density[grid.index(box.lo.x, j, k)], row);
+          }
+        }
+      }
+    }
+  }
+}
+
+/// What is kept from now on belongs to the next stroke.
+inline void close_stroke(StrokeState& stroke) noexcept {
+  stroke.open = false;
+  stroke.next = stroke.end;
+  ++stroke.generation;
+}
+
+/// Forgets what was kept for the next stroke.
+inline void forget_next(StrokeState& stroke) noexcept {
+  stroke.end = stroke.next;
+  stroke.next_lost = false;
+  ++stroke.generation;
+}
+
+/// Forgets all: the volumes are about to change otherwise.
+inline void forget_strokes(StrokeState& stroke) noexcept {
+  close_stroke(stroke);
+  stroke.begin = stroke.end;
+  stroke.lost = stroke.next_lost = false;
+}
+
+/// At the end of a tick that did not restore: a cut begins a stroke or goes on with it, and a pause
+/// without contact ends it.
+inline void follow_stroke(std::uint32_t pause_ticks, bool cuts, bool touches,
+                          StrokeState& stroke) noexcept {
+  if (cuts && !stroke.open) {
+    stroke.open = true;
+    stroke.begin = stroke.next;
+    stroke.lost = stroke.next_lost;
+    stroke.next_lost = false;
+    stroke.quiet_ticks = 0;
+  }
+  if (!stroke.open) {
+    if (stroke.next_lost) forget_next(stroke);
+    return;
+  }
+  stroke.quiet_ticks = cuts || touches ? 0 : stroke.quiet_ticks + 1;
+  if (stroke.quiet_ticks >= pause_ticks) close_stroke(stroke);
+}
+
+/// Begins to undo the last stroke, also one that is not over. False where there is none, or it was
+/// too long.
+inline bool begin_undo(StrokeState& stroke) noexcept {
+  if (!stroke.can_undo()) return false;
+  if (stroke.open) {
+    close_stroke(stroke);
+  } else {
+    forget_next(stroke);
+  }
+  stroke.undoing = true;
+  return true;
+}
+
+/// Puts one brick back. Returns its box; adds what came back to `returned`.
+template <class N>
+VoxelBox put_back(const ServoPlan<N>& plan, const KeptBrick& kept, ServoState<N>& state,
+                  std::uint64_t& returned) noexcept {
+  const VoxelGrid& grid = plan.volumes[kept.volume].grid;
+  VolumeState<N>& volume = state.volumes[kept.volume];
+  const VoxelBox box = BrickGrid::of(grid).voxels(kept.id);
+  const auto row = static_cast<std::size_t>(box.hi.x - box.lo.x);
+  std::size_t from = 0;
+  for (std::int32_t z = box.lo.z; z < box.hi.z; ++z) {
+    for (std::int32_t y = box.lo.y; y < box.hi.y; ++y, from += row) {
+      Density* const to = &volume.density[grid.index(box.lo.x, y, z)];
+      for (std::size_t i = 0; i < row; ++i) {
+        returned += static_cast<std::uint64_t>(kept.density[from + i] - to[i]);
+      }
+      copy_row(to, &kept.density[from], row);
+    }
+  }
+  if (!volume.gradient.empty()) {
+    refresh_gradients<N>(plan.kernel, grid, volume.density, box, volume.gradient,
+                         *state.gradient_scratch);
+  }
+  return box;
+}
+
+/// One tick of an undo that runs: some bricks of one volume that lie close to each other, told in
+/// `out`. The last tick ends it.
+template <class N>
+void undo_some(const ServoPlan<N>& plan, ServoState<N>& state, ServoOutput& out) noexcept {
+  constexpr std::int32_t kWidest = BrickBlocks::kEdge * kBrickEdge;  // as a block of a reset
+  StrokeState& stroke = state.stroke;
+  if (stroke.begin == stroke.end) {
+    stroke.undoing = false;
+    for (std::size_t v = 0; v < plan.volume_count; ++v) forget_debts(state, v);
+    end_restoring(state);
+    return;
+  }
+  const auto last = [&]() -> const KeptBrick& {
+    return stroke.pool[(stroke.end - 1) % stroke.pool.size()];
+  };
+  const std::uint32_t v = last().volume;
+  const VolumePlan<N>& volume = plan.volumes[v];
+  const BrickGrid bricks = BrickGrid::of(volume.grid);
+  VoxelBox around;
+  for (int left = bricks_per_tick(plan.rate_hz, !state.volumes[v].gradient.empty());
+       left > 0 && stroke.begin != stroke.end && last().volume == v; --left) {
+    const VoxelBox with = around.united(bricks.voxels(last().id));
+    const VoxelIndex extent = with.extent();
+    if (std::max({extent.x, extent.y, extent.z}) > kWidest) break;
+    around = with;
+    put_back(plan, last(), state, out.returned_by_volume[volume.scene_index]);
+    stroke.next = --stroke.end;
+  }
+  out.changed[volume.scene_index] = around;
+}
+
+}  // namespace kerf

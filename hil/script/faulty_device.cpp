@@ -1,0 +1,282 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "hil/script/faulty_device.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include "hil/device/packet_device.hpp"
+#include "shared/wire/falcon.hpp"
+#include "shared/wire/omni.hpp"
+#include "shared/wire/woodenhaptics.hpp"
+
+namespace kerf {
+
+namespace {
+
+constexpr double kPushN = 0.05;
+constexpr int kPotNoiseMask = 31;
+
+/// The part of a device's report that a fault of a sensor can change, the same for all devices.
+struct Readings {
+  std::array<std::int16_t, 3> encoder{};
+  /// Docked (Omni), centre button (Falcon), calibration button (WoodenHaptics).
+  bool parked = false;
+  bool homed = true;                    ///< of the Falcon
+  std::array<std::uint16_t, 6> pots{};  ///< of the Omni's gimbal
+
+  friend bool operator==(const Readings&, const Readings&) noexcept = default;
+};
+
+Readings read(const OmniReport& report) noexcept {
+  Readings readings{.encoder = report.encoder, .parked = report.docked};
+  std::ranges::copy(report.pot_a, readings.pots.begin());
+  std::ranges::copy(report.pot_b, readings.pots.begin() + 3);
+  return readings;
+}
+
+Readings read(const FalconReport& report) noexcept {
+  return {.encoder = report.encoder,
+          .parked = (report.buttons & falcon::kButtonCentre) != 0,
+          .homed = std::ranges::all_of(report.homed, [](bool homed) { return homed; })};
+}
+
+Readings read(const WoodenReport& report) noexcept {
+  Readings readings{.parked = report.calibrate};
+  std::copy_n(report.encoder.begin(), 3, readings.encoder.begin());
+  return readings;
+}
+
+void write(const Readings& readings, OmniReport& report) noexcept {
+  report.encoder = readings.encoder;
+  report.docked = readings.parked;
+  std::copy_n(readings.pots.begin(), 3, report.pot_a.begin());
+  std::copy_n(readings.pots.begin() + 3, 3, report.pot_b.begin());
+}
+
+void write(const Readings& readings, FalconReport& report) noexcept {
+  report.encoder = readings.encoder;
+  const unsigned others = report.buttons & ~unsigned{falcon::kButtonCentre};
+  report.buttons =
+      static_cast<std::uint8_t>(others | (readings.parked ? unsigned{falcon::kButtonCentre} : 0U));
+  if (!readings.homed) report.homed = {};
+}
+
+void write(const Readings& readings, WoodenReport& report) noexcept {
+  std::ranges::copy(readings.encoder, report.encoder.begin());
+  report.calibrate = readings.parked;
+}
+
+/// Calls `use` with the report in `packet`, whatever its device.
+template <class Use>
+void with_report(std::span<const std::uint8_t> packet, const Use& use) noexcept {
+  if (const auto omni = decode_report(packet)) return use(*omni);
+  if (const auto falcon = falcon::decode_report(packet)) return use(*falcon);
+  if (const auto wooden = wooden::decode_report(packet)) return use(*wooden);
+}
+
+/// Empty if `packet` is no report of a device; its size shows the device.
+std::optional<Readings> readings_of(std::span<const std::uint8_t> packet) noexcept {
+  std::optional<Readings> readings;
+  with_report(packet, [&](const auto& report) { readings = read(report); });
+  return readings;
+}
+
+/// Puts `readings` into a packet that `readings_of` has read.
+void put_readings(const Readings& readings, std::span<std::uint8_t> packet) noexcept {
+  with_report(packet, [&](auto report) {
+    write(readings, report);
+    const auto bytes = encode(report);
+    std::copy_n(bytes.begin(), packet.size(), packet.begin());
+  });
+}
+
+std::int16_t wrapped(int count) {
+  return static_cast<std::int16_t>(static_cast<std::uint16_t>(count));
+}
+
+}  // namespace
+
+FaultyDevice::FaultyDevice(Emulator& device, const FaultScript& script)
+    : device_(device), random_(script.seed) {
+  if (script.clock == FaultClock::start) clock_ = 0;
+  for (const DeviceFault& fault : script.faults) {
+    const std::int64_t from = cycles_of(fault.at_s);
+    const double seconds = fault.kind == FaultKind::host_late ? fault.ms / 1000 : fault.for_s;
+    faults_.push_back(
+        {.fault = fault, .from = from, .to = from + std::max<std::int64_t>(cycles_of(seconds), 1)});
+  }
+}
+
+bool FaultyDevice::runs(const Running& running) const noexcept {
+  return clock_ && *clock_ >= running.from && *clock_ < running.to;
+}
+
+bool FaultyDevice::host_is_late() const noexcept {
+  return std::ranges::any_of(faults_, [&](const Running& running) {
+    return running.fault.kind == FaultKind::host_late && runs(running);
+  });
+}
+
+std::uint64_t FaultyDevice::met() const noexcept {
+  return static_cast<std::uint64_t>(
+      std::ranges::count_if(faults_, [](const Running& running) { return running.changed > 0; }));
+}
+
+std::vector<InjectedFault> FaultyDevice::injected() const {
+  std::vector<InjectedFault> list;
+  for (const Running& running : faults_) {
+    if (!running.begun) continue;
+    list.push_back(
+        {running.fault.kind, running.fault.of_commands, running.begun_at, running.changed});
+  }
+  return list;
+}
+
+bool FaultyDevice::hits(Running& running, bool of_commands) noexcept {
+  const DeviceFault& fault = running.fault;
+  if (fault.of_commands != of_commands || !runs(running)) return false;
+  const bool hit = running.packets++ % fault.every == 0;
+  running.changed += hit ? 1 : 0;
+  return hit;
+}
+
+bool FaultyDevice::send_on(std::span<const std::uint8_t> packet, bool of_commands,
+                           std::deque<Due>& in_flight) {
+  Due due{cycle_, Bytes(packet.begin(), packet.end())};
+  if (!of_commands) break_sensors(due.bytes);
+  bool twice = false;
+  for (Running& running : faults_) {
+    const DeviceFault& fault = running.fault;
+    const bool unplugged = fault.kind == FaultKind::unplug && runs(running);
+    const bool silent = fault.kind == FaultKind::silence && !of_commands && runs(running);
+    if (unplugged || silent) {
+      ++running.changed;
+      return false;
+    }
+    if (fault.kind > FaultKind::corrupt || !hits(running, of_commands)) continue;
+    switch (fault.kind) {
+      case FaultKind::lose:
+        return false;
+      case FaultKind::delay:
+        due.at = cycle_ + cycles_of(fault.ms / 1000);
+        break;
+      case FaultKind::duplicate:
+        twice = true;
+        break;
+      case FaultKind::reorder:
+        due.at = cycle_ + kCyclesPerUsbFrame + 1;  // any successor comes before that
+        break;
+      case FaultKind::truncate:
+        due.bytes.resize(random_() % due.bytes.size());
+        break;
+      case FaultKind::corrupt:
+        if (due.bytes.empty()) break;
+        due.bytes[random_() % due.bytes.size()] ^= static_cast<std::uint8_t>(1U << random_() % 8);
+        break;
+      default:
+        break;
+    }
+    if (due.bytes.empty()) return false;
+  }
+  if (twice) in_flight.push_back(due);
+  in_flight.push_back(std::move(due));
+  return true;
+}
+
+void FaultyDevice::break_sensors(Bytes& packet) {
+  auto readings = readings_of(packet);
+  if (!readings) return;
+  bool changed = false;
+  for (Running& running : faults_) {
+    const DeviceFault& fault = running.fault;
+    std::int16_t& count = readings->encoder[static_cast<std::size_t>(fault.axis)];
+    if (!runs(running)) {
+      running.stuck_at = count;
+      continue;
+    }
+    changed = true;
+    const Readings before = *readings;
+    switch (fault.kind) {
+      case FaultKind::stick:
+        count = running.stuck_at;
+        break;
+      case FaultKind::jump:
+        count = wrapped(count + fault.counts);
+        break;
+      case FaultKind::wander: {
+        const auto widest = static_cast<std::uint32_t>(std::abs(fault.counts));
+        running.off_by += static_cast<int>(random_() % (2 * widest + 1)) - static_cast<int>(widest);
+        count = wrapped(count + running.off_by);
+        break;
+      }
+      case FaultKind::park:
+        readings->parked = true;
+        break;
+      case FaultKind::chatter:
+        readings->parked = random_() % 2 == 0;
+        break;
+      case FaultKind::unhome:
+        readings->homed = false;
+        break;
+      case FaultKind::noise:
+        for (std::uint16_t& pot : readings->pots) {
+          pot = static_cast<std::uint16_t>(pot ^ (random_() & kPotNoiseMask));
+        }
+        break;
+      default:
+        break;
+    }
+    running.changed += *readings != before ? 1 : 0;
+  }
+  if (changed) put_readings(*readings, packet);
+}
+
+void FaultyDevice::receive(std::span<const std::uint8_t> packet) noexcept {
+  send_on(packet, true, commands_);
+}
+
+void FaultyDevice::step_clock() noexcept {
+  ++cycle_;
+  if (clock_) {
+    ++*clock_;
+  } else if (norm(device_.model().motor_force_n()) > kPushN) {
+    clock_ = 0;
+  }
+  for (Running& running : faults_) {
+    if (running.begun || !runs(running)) continue;
+    running.begun = true;
+    running.begun_at = cycle_;
+    running.changed = running.fault.kind == FaultKind::host_late ? 1 : 0;
+    ++begun_;
+  }
+}
+
+void FaultyDevice::advance(int cycles) noexcept {
+  for (int i = 0; i < cycles; ++i) {
+    for (auto due = commands_.begin(); due != commands_.end();) {
+      if (due->at > cycle_) {
+        ++due;
+        continue;
+      }
+      device_.receive(due->bytes);
+      due = commands_.erase(due);
+    }
+    device_.advance(1);
+    step_clock();
+  }
+}
+
+std::span<const std::uint8_t> FaultyDevice::next_packet() noexcept {
+  for (auto packet = device_.next_packet(); !packet.empty(); packet = device_.next_packet()) {
+    if (!send_on(packet, false, reports_)) ++withheld_;
+  }
+  const auto due = std::ranges::find_if(reports_, [&](const Due& d) { return d.at <= cycle_; });
+  if (due == reports_.end()) return {};
+  handed_out_ = std::move(due->bytes);
+  reports_.erase(due);
+  return handed_out_;
+}
+
+}  // namespace kerf

@@ -1,0 +1,199 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "lab/commands/cell_run.hpp"
+
+#include <chrono>
+#include <csignal>
+#include <map>
+#include <sstream>
+#include <thread>
+
+#include "hil/hil_error.hpp"
+#include "lab/run/child_process.hpp"
+#include "shared/text/json.hpp"
+#include "shared/text/text.hpp"
+
+namespace kerf::sweep {
+namespace {
+
+using Lines = std::map<std::string, std::string>;
+using Clock = std::chrono::steady_clock;
+
+constexpr auto kLook = std::chrono::milliseconds(2);
+constexpr auto kLongestRun = std::chrono::minutes(30);  // a run that is stuck must not stop all
+constexpr auto kGrace = std::chrono::seconds(5);        // the emulator ends with its client
+
+/// `name=value` of each line.
+Lines lines_of(const std::string& text) {
+  Lines lines;
+  std::istringstream in(text);
+  for (std::string line; std::getline(in, line);) {
+    const std::size_t equals = line.find('=');
+    if (equals != line.npos) lines[line.substr(0, equals)] = line.substr(equals + 1);
+  }
+  return lines;
+}
+
+/// The device of a run: the job's, or that of its settings.
+std::string device_of(const CellJob& job) {
+  if (!job.device.empty()) return job.device;
+  const std::string key = "device.personality=";
+  for (const std::string& setting : job.settings) {
+    if (setting.starts_with(key)) return setting.substr(key.size());
+  }
+  return "omni";
+}
+
+std::vector<std::string> emulator(const CellJob& job, std::vector<std::string> more) {
+  std::vector<std::string> line{program_beside("emulator"), "--personality", device_of(job)};
+  line.insert(line.end(), job.emulator_options.begin(), job.emulator_options.end());
+  line.insert(line.end(), more.begin(), more.end());
+  return line;
+}
+
+/// Waits for the end of `child`; its exit code, or empty if `stop` came first.
+std::optional<int> end_of(Child& child, const std::atomic<bool>& stop, Clock::duration patience) {
+  for (const auto end = Clock::now() + patience; Clock::now() < end;) {
+    if (stop) return std::nullopt;
+    if (const auto code = child.ended()) return code;
+    std::this_thread::sleep_for(kLook);
+  }
+  child.signal(SIGKILL);
+  while (!child.ended()) std::this_thread::sleep_for(kLook);
+  return child.ended();
+}
+
+/// One value of a report as the table has it.
+std::string cell_text(const Json& report, const std::string& name) {
+  if (!report.contains(name)) return "";
+  const Json& value = report.at(name);
+  if (value.is_text()) return value.get<std::string>();
+  return value.is_fraction() ? number_text(value.get<double>())
+                             : std::to_string(value.get<std::uint64_t>());
+}
+
+/// Packets and readings that the emulator's fault script changed.
+std::string changed_by_faults(const Json& report, const std::string& name) {
+  if (!report.contains(name)) return "";
+  std::uint64_t changed = 0;
+  for (const Json& fault : report.at(name)) {
+    changed += fault.at("changed").get<std::uint64_t>();
+  }
+  return std::to_string(changed);
+}
+
+struct Column {
+  const char* name;
+  bool of_emulator;
+  std::string (*text)(const Json& report, const std::string& name) = cell_text;
+};
+constexpr Column kColumns[] = {
+    {"ticks", false},
+    {"contact_ticks", false},
+    {"shaft_ticks", false},
+    {"stale_ticks", false},
+    {"lost_packets", false},
+    {"peak_force_n", false},
+    {"removed_mm3", false},
+    {"energy_j", false},
+    {"fault_count", false},
+    {"config_hash", false},
+    {"volume_hash", false},
+    {"output_hash", false},
+    {"peak_motor_force_n", true},
+    {"injected", true, changed_by_faults},
+};
+
+CellResult result_of(int exit, const std::filesystem::path& folder, const std::string& last_line) {
+  CellResult result{exit, {}, exit == 0 ? "" : last_line};
+  try {
+    const auto report = [&](const char* name) {
+      const std::string text = text_in(folder / name);
+      return text.empty() ? Json(Json::Members{}) : Json::parse(text);
+    };
+    const Json ours = report("report.json"), theirs = report("emulator.json");
+    for (const Column& column : kColumns) {
+      result.values.push_back(column.text(column.of_emulator ? theirs : ours, column.name));
+    }
+    if (exit == 1) {
+      result.message = cell_text(ours, "end");
+      for (const Json& fault : ours.at("faults")) result.message += "; " + cell_text(fault, "name");
+    }
+  } catch (const JsonError&) {
+    result.values.assign(std::size(kColumns), "");
+    if (result.message.empty()) result.message = "report.json: cannot be read; look at the disk";
+  }
+  if (exit != 0 && result.message.empty()) {
+    result.message = exit > 128 ? "ended by signal " + std::to_string(exit - 128)
+                                : "ended with exit code " + std::to_string(exit);
+  }
+  return result;
+}
+
+}  // namespace
+
+const std::vector<std::string>& result_columns() {
+  static const std::vector<std::string> names = [] {
+    std::vector<std::string> list;
+    for (const Column& column : kColumns) list.emplace_back(column.name);
+    return list;
+  }();
+  return names;
+}
+
+std::string emulator_refusal(const CellJob& job, const std::filesystem::path& folder,
+                             const std::atomic<bool>& stop) {
+  Child described(emulator(job, {"--describe"}), folder / "describe");
+  return end_of(described, stop, kGrace).value_or(0) == 0 ? "" : described.last_line();
+}
+
+std::optional<CellResult> run_cell(const CellJob& job, const std::filesystem::path& folder,
+                                   const std::atomic<bool>& stop) {
+  const auto at = [&](const char* name) { return (folder / name).string(); };
+  // The emulated motors are known; a scene says nothing of them, because a real device's are not.
+  Child described(emulator(job, {"--describe"}), folder / "describe");
+  const auto known = end_of(described, stop, kGrace);
+  if (!known) return std::nullopt;
+  if (*known != 0) return result_of(*known, folder, described.last_line());
+
+  std::vector<std::string> servo{program_beside("controller"), "--scene", job.scene};
+  for (const std::string& setting : job.settings) {
+    servo.emplace_back("--set");
+    servo.push_back(setting);
+  }
+  for (const std::string& word :
+       {std::string("--device"), device_of(job), std::string("--port"), "socket:" + at("device"),
+        std::string("--torque-scale"), lines_of(text_in(folder / "describe"))["torque_scale"],
+        std::string("--seconds"), number_text(job.seconds), std::string("--name"), job.name,
+        std::string("--virtual"), std::string("--emulator-args"), at("told"),
+        std::string("--report"), at("report.json")}) {
+    servo.push_back(word);
+  }
+  Child controller(servo, folder / "controller");
+  while (!std::filesystem::exists(folder / "told")) {
+    if (stop) return std::nullopt;
+    if (const auto code = controller.ended())
+      return result_of(*code, folder, controller.last_line());
+    std::this_thread::sleep_for(kLook);
+  }
+  Lines told = lines_of(text_in(folder / "told"));
+  Child device(emulator(job, {"--front", "socket", "--socket", at("device"), "--hand",
+                              told["hand_script"], "--unit-mm", told["hand_unit_mm"], "--lockstep",
+                              "--rate", told["rate_hz"], "--report", at("emulator.json")}),
+               folder / "emulator");
+  const auto end = Clock::now() + kLongestRun;
+  while (!controller.ended() && device.ended().value_or(0) == 0 && Clock::now() < end) {
+    if (stop) return std::nullopt;
+    std::this_thread::sleep_for(kLook);
+  }
+  if (!controller.ended()) {
+    const auto refused = device.ended();
+    controller.signal(SIGKILL);
+    return result_of(
+        refused.value_or(2), folder,
+        refused ? device.last_line() : "kerf-controller: no end after 30 minutes; killed");
+  }
+  if (!end_of(device, stop, kGrace)) return std::nullopt;
+  return result_of(*controller.ended(), folder, controller.last_line());
+}
+
+}  // namespace kerf::sweep

@@ -1,0 +1,167 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <memory>
+#include <ostream>
+#include <string>
+#include <vector>
+
+#include "lab/contact/comparison.hpp"
+#include "lab/contact/hands.hpp"
+#include "lab/contact/page.hpp"
+#include "lab/contact/rows.hpp"
+#include "lab/run/lab_command.hpp"
+#include "lab/run/lab_run.hpp"
+#include "record/force_plot.hpp"
+#include "shared/text/json.hpp"
+
+namespace kerf::extremes {
+namespace {
+
+/// The findings of a run: its rows, and the data of the page's pictures.
+struct Findings {
+  std::vector<Row> rows;
+  Comparison comparison;
+  std::vector<HandRun> hands;
+};
+
+struct Group {
+  const char* name;
+  void (*measure)(const Effort&, const RowSink&, Findings&);
+};
+template <void (*kMeasure)(const Effort&, const RowSink&)>
+void rows_only(const Effort& effort, const RowSink& add_row, Findings&) {
+  kMeasure(effort, add_row);
+}
+constexpr std::array<Group, 12> kGroups{{
+    {"walls", rows_only<measure_walls>},
+    {"air", rows_only<measure_air>},
+    {"rests", rows_only<measure_rests>},
+    {"slides", rows_only<measure_slides>},
+    {"shapes", rows_only<measure_shapes>},
+    {"edges", rows_only<measure_edge_slides>},
+    {"isos", rows_only<measure_isos>},
+    {"cutting", rows_only<measure_cutting>},
+    {"traps", rows_only<measure_traps>},
+    {"ticks", rows_only<measure_ticks>},
+    {"paper", [](const Effort& effort, const RowSink& add_row,
+                 Findings& findings) { findings.comparison = compare(effort, add_row); }},
+    {"hands", [](const Effort& effort, const RowSink& add_row,
+                 Findings& findings) { findings.hands = try_hands(effort, add_row); }},
+}};
+
+std::string limit_of(const std::optional<double>& limit) {
+  char text[32] = "-";
+  if (limit) std::snprintf(text, sizeof text, "%.4g", *limit);
+  return text;
+}
+
+std::string line_of(const Row& row) {
+  char text[192];
+  if (!row.skipped.empty()) {
+    std::snprintf(text, sizeof text, "%-8s %-52s skipped: %s", row.group.c_str(), row.name.c_str(),
+                  row.skipped.c_str());
+    return text;
+  }
+  std::snprintf(text, sizeof text, "%-8s %-52s %10.4g %-7s %8s %8s  %s", row.group.c_str(),
+                row.name.c_str(), row.value, row.unit.c_str(), limit_of(row.must).c_str(),
+                limit_of(row.aim).c_str(),
+                !row.must    ? ""
+                : row.pass() ? "pass"
+                             : "FAIL");
+  return text;
+}
+
+std::string json_of(const std::vector<Row>& rows) {
+  Json list = Json::List{};
+  for (const Row& row : rows) {
+    list.push_back({{"group", row.group},
+                    {"name", row.name},
+                    {"value", row.skipped.empty() ? Json(row.value) : nullptr},
+                    {"unit", row.unit},
+                    {"limit", row.must},
+                    {"aim", row.aim},
+                    {"pass", row.pass()}});
+  }
+  return Json{{"rows", list}}.document();
+}
+
+/// `kerf-lab extremes`: the swept contact against its limits, and beside the paper's force.
+class Command final : public LabCommand {
+ public:
+  explicit Command(Arguments& program);
+  [[nodiscard]] int run(std::ostream& out) const override;
+
+ private:
+  std::string report_, page_, data_;
+  std::vector<std::string> only_;
+  bool quick_ = false;
+  int core_ = -1, presses_ = 0, seed_ = 0;
+};
+
+Command::Command(Arguments& program)
+    : LabCommand(program, "extremes", "the swept contact against its limits, beside the paper's") {
+  std::vector<std::string> names;
+  for (const Group& group : kGroups) names.emplace_back(group.name);
+  Option only = app_.option("--only", only_, "only these groups of rows");
+  only.one_of(names).split_at_commas().shown_as("GROUP,...");
+  app_.flag("--quick", quick_, "a hundredth of the cases");
+  app_.option("--report", report_, "write the rows as JSON").shown_as("FILE");
+  app_.option("--page", page_,
+              "write all as a page (docs/contact.md), its plots in plots/ beside it")
+      .excludes(only)
+      .shown_as("FILE");
+  app_.option("--data", data_, "folder of real volumes (default: $KERF_DATA)")
+      .from_environment("KERF_DATA")
+      .shown_as("DIR");
+  app_.option("--presses", presses_, "of the search for traps (default: 24, 240 or 10,000)")
+      .within(1, 1000000);
+  app_.option("--seed", seed_, "first scene of the search for traps").within(0, 1000000);
+  app_.option("--cpu", core_, "core to run on (default: the last)").within(0, 1023);
+  app_.footer("Exit codes: 0 every limit is kept, 1 one is not, 2 bad input or set-up.");
+}
+
+int Command::run(std::ostream& out) const {
+  const LabOutput as_json("--report", report_, ".json");
+  const LabOutput as_page("--page", page_, ".md");
+  const std::string plot = page_plot("--page", page_, ".svg"),
+                    hands_plot = page_plot("--page", page_, ".hands.svg");
+  const LabOutput as_plot("--page", plot, ".svg");
+  const LabOutput as_hands_plot("--page", hands_plot, ".svg");
+  LabOutput::check_distinct({&as_json, &as_page, &as_plot, &as_hands_plot});
+  static_cast<void>(pin_lab(core_));
+  Effort effort = quick_ ? Effort::quick() : Effort{};
+  effort.data = data_;
+  if (!quick_ && only_ == std::vector<std::string>{"traps"}) effort.presses = 10000;
+  if (presses_ > 0) effort.presses = presses_;
+  effort.first_scene = static_cast<std::uint64_t>(seed_);
+  Findings findings;
+  out << "group    what                                                      value unit        "
+         "must "
+         "     aim\n";
+  const auto add_row = [&](Row row) {
+    out << line_of(row) << std::endl;
+    findings.rows.push_back(std::move(row));
+  };
+  for (const Group& group : kGroups) {
+    if (only_.empty() || std::ranges::find(only_, group.name) != only_.end()) {
+      group.measure(effort, add_row, findings);
+    }
+  }
+  as_json.write(json_of(findings.rows));
+  if (!page_.empty()) {
+    as_plot.write(gnuplot_svg(plot_of(findings.comparison)));
+    as_hands_plot.write(gnuplot_svg(plot_of(findings.hands)));
+    as_page.write(page(findings.rows, findings.comparison, page_link(page_, plot),
+                       page_link(page_, hands_plot)));
+  }
+  return std::ranges::all_of(findings.rows, &Row::pass) ? 0 : 1;
+}
+
+}  // namespace
+}  // namespace kerf::extremes
+
+std::unique_ptr<kerf::LabCommand> kerf::make_extremes_command(Arguments& program) {
+  return std::make_unique<extremes::Command>(program);
+}

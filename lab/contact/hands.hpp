@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "controller/load/loaded_scene.hpp"
+#include "hil/device/hand_script.hpp"
+#include "lab/contact/rows.hpp"
+
+namespace kerf::extremes {
+
+/// One tick of a hand with the motors on.
+struct HandTick {
+  double height_mm = 0;        ///< of the tip over the surface first met, in the scene
+  double proxy_height_mm = 0;  ///< of the tool as it is felt
+  std::array<double, 3> force_n{};
+  double removed_mm3 = 0;  ///< since the start
+  bool contact = false;
+  double compute_us = 0;  ///< of the servo step, ticks back to back
+};
+
+/// A scripted hand at an emulated Omni, its driver and the whole servo step in virtual time.
+struct HandRun {
+  std::string name;
+  double rate_hz = 1000;
+  std::vector<HandTick> ticks;
+  std::uint64_t faults = 0;  ///< ticks in which one was latched
+};
+
+/// `scene` is for an Omni; its torques are set to those of the emulated unit. The same arguments
+/// give the same run, but for its times; it has at least one tick. Throws HilError if the hand
+/// does not get to its script.
+[[nodiscard]] HandRun run_hand(LoadedScene scene, const HandScript& hand, double seconds);
+
+/// Force above a frequency, over the mean force, in windows of 128 ticks wholly in contact.
+struct Chatter {
+  double share = 0;  ///< of all windows together (Welch 1967); 0 if there is none
+  double worst = 0;  ///< of a single one
+  int windows = 0;
+};
+[[nodiscard]] Chatter chatter_of(const HandRun& run, double cutoff_hz);
+
+/// Force faster than a hand moves is chatter from here on.
+inline constexpr double kChatterHz = 150;
+
+/// scenes/NAME.toml with the phantom of this effort. Throws SceneError if it cannot be read.
+[[nodiscard]] LoadedScene shipped_scene(const std::string& name, const Effort& effort);
+/// The hand of scenes/hands/NAME.toml in it. Throws HilError if it cannot be read.
+[[nodiscard]] HandRun run_hand(const LoadedScene& scene, const std::string& name,
+                               const Effort& effort);
+
+/// Five hands at an emulated Omni, two of which cut: no chatter in the contact.
+[[nodiscard]] std::vector<HandRun> try_hands(const Effort& effort, const RowSink& add_row);
+
+}  // namespace kerf::extremes

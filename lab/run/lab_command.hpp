@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <iosfwd>
+#include <memory>
+
+#include "shared/text/command_line.hpp"
+
+namespace kerf {
+
+/// A subcommand of `kerf-lab`: its options and its run. It declares its options when it is made and
+/// lives as long as the program parses.
+class LabCommand {
+ public:
+  virtual ~LabCommand() = default;
+  LabCommand(const LabCommand&) = delete;
+  LabCommand& operator=(const LabCommand&) = delete;
+
+  /// After parsing.
+  [[nodiscard]] bool chosen() const { return app_.chosen(); }
+  /// Measures, prints each row to `out`, writes the files. Returns 1 if a check failed, 77 if this
+  /// machine forbids what the command needs, else 0; some commands document further codes. Throws
+  /// std::exception with one line.
+  [[nodiscard]] virtual int run(std::ostream& out) const = 0;
+
+ protected:
+  LabCommand(Arguments& program, const char* name, const char* about)
+      : app_(program.command(name, about)) {}
+
+  Arguments app_;
+};
+
+// One factory for each command; its class is private to its source file.
+[[nodiscard]] std::unique_ptr<LabCommand> make_accuracy_command(Arguments& program);
+[[nodiscard]] std::unique_ptr<LabCommand> make_bench_command(Arguments& program);
+[[nodiscard]] std::unique_ptr<LabCommand> make_bridge_command(Arguments& program);
+[[nodiscard]] std::unique_ptr<LabCommand> make_burs_command(Arguments& program);
+[[nodiscard]] std::unique_ptr<LabCommand> make_energy_command(Arguments& program);
+[[nodiscard]] std::unique_ptr<LabCommand> make_extremes_command(Arguments& program);
+[[nodiscard]] std::unique_ptr<LabCommand> make_faults_command(Arguments& program);
+[[nodiscard]] std::unique_ptr<LabCommand> make_law_command(Arguments& program);
+[[nodiscard]] std::unique_ptr<LabCommand> make_merge_command(Arguments& program);
+[[nodiscard]] std::unique_ptr<LabCommand> make_ranges_command(Arguments& program);
+[[nodiscard]] std::unique_ptr<LabCommand> make_sweep_command(Arguments& program);
+[[nodiscard]] std::unique_ptr<LabCommand> make_two_machines_command(Arguments& program);
+[[nodiscard]] std::unique_ptr<LabCommand> make_zwidth_command(Arguments& program);
+
+}  // namespace kerf

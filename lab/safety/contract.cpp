@@ -1,0 +1,339 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "lab/safety/contract.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdio>
+#include <cstdlib>
+
+#include "controller/servo/servo.hpp"
+
+namespace kerf::faults {
+namespace {
+
+// The contract: docs/safety.md.
+constexpr double kHoldMs = 5, kZeroMs = 20, kFadeInMs = 100, kOffMs = 2, kRestMs = 50;
+constexpr double kNotFiniteMs = 2;    // from the first tick without a finite pose
+constexpr double kStandstillMs = 20;  // a host that came back after that
+constexpr double kWatchdogMs = 25;
+constexpr double kThermalTimeMs = 10'000;
+constexpr int kRestCounts = 2;   // an encoder that jitters at an edge rests
+constexpr double kReportMs = 1;  // from one report to the next, of the slowest device
+constexpr double kCycleMs = 0.125;
+// A step of the converters is 0.4 to 5 mN at the tip, and the watch is on the outside of them.
+constexpr double kStepN = 0.01;
+constexpr double kDeviceShare = 1.03;  // the tip moves on while a command is under way
+constexpr double kSpeedShare = 1.02;   // encoders count whole steps: surely too fast from here on
+constexpr double kSpeedStepMm = 0.2;
+constexpr double kPushN = 0.05;
+// A force may have turned about as fast as it may rise; longer inward is no slew.
+constexpr double kTurnMs = 20;
+constexpr std::size_t kMaxListed = 4;
+
+/// From the start of a fault at the device until the motors must be off for `name`. A fault that
+/// the servo bears for a while begins for it with the report that first shows it, or is missing.
+double latest_latch_ms(const std::string& name, double tick_ms) {
+  if (name == fault_name(Fault::stale_input)) return kZeroMs + kReportMs + tick_ms;
+  if (name == fault_name(Fault::not_finite)) return kNotFiniteMs + kReportMs + tick_ms;
+  return kReportMs + tick_ms;
+}
+
+/// Returns true if an arm that reported `before` and reports `now` rests.
+bool is_near(const EncoderCounts& now, const EncoderCounts& before) {
+  return std::ranges::equal(now, before, [](std::int16_t a, std::int16_t b) {
+    const auto step = static_cast<std::int16_t>(static_cast<std::uint16_t>(int{a} - int{b}));
+    return std::abs(int{step}) <= kRestCounts;
+  });
+}
+
+/// How far `force` is from any part of `last` along its own direction, from none to all of it.
+double change_but_for_fall_n(DeviceVec<double> last, DeviceVec<double> force) {
+  const double square = dot(last, last);
+  const double share = square > 0 ? std::clamp(dot(force, last) / square, 0.0, 1.0) : 0.0;
+  return norm(force - last * share);
+}
+
+}  // namespace
+
+Contract::Contract(const LoadedScene& scene, bool trusted, Outcome& outcome)
+    : limits_(scene.limits),
+      tick_ms_(1000.0 / scene.servo.rate_hz),
+      trusted_(trusted),
+      outcome_(outcome),
+      wire_(scene.device.personality, scene.device.dock_rad),
+      outward_(scene) {}
+
+void Contract::fault_begins(double time_ms) noexcept {
+  if (outcome_.latched == fault_name(Fault::none)) begun_ms_ = time_ms;
+}
+
+void Contract::check(bool kept, double time_ms, const char* rule, double value, double limit) {
+  if (kept) return;
+  char line[128];
+  std::snprintf(line, sizeof line, "%s: %.3f, limit %.3f", rule, value, limit);
+  broken(time_ms, line);
+}
+
+void Contract::broken(double time_ms, const std::string& what) {
+  ++outcome_.violation_count;
+  if (outcome_.violations.size() >= kMaxListed) return;
+  char time[24];
+  std::snprintf(time, sizeof time, "%.4f s: ", time_ms / 1000);
+  outcome_.violations.emplace_back(time + what);
+}
+
+void Contract::reported(double time_ms, std::span<const std::uint8_t> packet) {
+  const auto told = wire_.report(packet);
+  if (!told) return;
+  told_ = *told;
+  fresh_ = true;
+  heard_ms_ = time_ms;
+}
+
+/// Parked, homed and no joint turning for 50 ms: calibrated, whatever was before. Counters that get
+/// their zero there may not creep away meanwhile.
+void Contract::follow_rest(double time_ms) {
+  const bool still = told_.parked && told_.homed && is_near(told_.count, rest_count_);
+  if (!still || !wire_.counts_from_rest()) rest_count_ = told_.count;
+  // Whole ticks at both ends, and the first report may be one of its periods old.
+  const double tolerance_ms = 2 * std::max(tick_ms_, kReportMs);
+  const bool goes_on = still && time_ms - told_at_ms_ < tolerance_ms;
+  told_at_ms_ = time_ms;
+  if (!still) rest_since_ms_ = -1;
+  if (still && rest_since_ms_ < 0) rest_since_ms_ = time_ms;
+  if (!goes_on) rest_without_gap_since_ms_ = time_ms;
+  const bool may_have_rested = still && time_ms - rest_since_ms_ >= kRestMs - tolerance_ms;
+  if (!may_have_rested) return;
+  calibrated_again_ = calibrated_again_ || outcome_.pushed;
+  calibrated_ = true;
+  if (!wire_.counts_from_rest()) return;
+  const bool has_rested = time_ms - rest_without_gap_since_ms_ >= kRestMs + tolerance_ms;
+  zero_is_known_ = has_rested || is_near(told_.count, wire_.dock_count());
+  zero_is_true_ = docked_;
+  if (has_rested) wire_.calibrated_at(told_.count);
+}
+
+void Contract::must_stay_off(const char* fault) {
+  off_ = Off::fault;
+  calibrated_ = false;
+  if (outcome_.latched == fault_name(Fault::none)) outcome_.latched = fault;
+}
+
+/// What the newest report means for the motors.
+void Contract::follow_report(double time_ms) {
+  follow_rest(time_ms);
+  const auto told_pose = wire_.pose(told_.count);
+  const std::optional<ArmPose> before = pose_;
+  const double since_ms = time_ms - pose_ms_;
+  moved_mm_ = {};
+  if (told_pose) {
+    if (before) moved_mm_ = told_pose->tip_mm - before->tip_mm;
+    pose_ = told_pose;
+    pose_ms_ = time_ms;
+    if (norm(moved_mm_) > outward_.reach_mm()) {
+      way_in_is_known_ = false;
+    } else if (!way_in_is_known_ && norm(last_.force_n) <= kPushN) {
+      way_in_is_known_ = outward_.is_free(pose_->tip_mm);
+    }
+    no_pose_since_ms_ = -1;
+  } else if (no_pose_since_ms_ < 0) {
+    no_pose_since_ms_ = time_ms;
+    had_no_pose_ = had_no_pose_ || off_ == Off::no_reason;
+  }
+  if (!told_.homed) {
+    off_ = Off::not_homed;
+    calibrated_ = false;
+    return;
+  }
+  if (told_.parked) {
+    if (calibrated_ || off_ == Off::no_reason) off_ = Off::parked;
+    return;
+  }
+  if (off_ == Off::parked) {
+    off_ = Off::no_reason;
+    calibrated_ = false;
+    may_push_since_ms_ = time_ms;
+  }
+  if (off_ != Off::no_reason) return;
+  if (before && told_pose && zero_is_known_) {
+    const double most_mm = limits_.speed_mm_per_s / 1000 * since_ms;
+    if (norm(moved_mm_) > most_mm * kSpeedShare + kSpeedStepMm) {
+      must_stay_off(fault_name(Fault::overspeed));
+    }
+  }
+}
+
+/// No report came in this tick, or none with a pose.
+void Contract::follow_silence(double time_ms) {
+  if (off_ != Off::no_reason) return;
+  constexpr double kRounding = 1e-6;
+  if (listened_ms_ - heard_ms_ > kZeroMs + kRounding) {
+    must_stay_off(fault_name(Fault::stale_input));
+  } else if (no_pose_since_ms_ >= 0 &&
+             time_ms - no_pose_since_ms_ > kNotFiniteMs + tick_ms_ + kRounding) {
+    must_stay_off(fault_name(Fault::not_finite));
+  }
+}
+
+/// A host that was silent for 20 ms begins at zero and fades in again; the packet that ends the
+/// silence may be the watchdog's packet, and then the next one is the host's own.
+void Contract::follow_stall(const Command& command) {
+  const bool stalled = command.time_ms - last_.time_ms >= kStandstillMs;
+  begins_anew_ = stalled || after_stall_;
+  if (begins_anew_) may_push_since_ms_ = std::max(may_push_since_ms_, command.time_ms);
+  after_stall_ = stalled && command.asked.off();
+}
+
+void Contract::commanded(double time_ms, std::span<const std::uint8_t> packet) {
+  const auto asked = wire_.command(packet);
+  if (!asked) return broken(time_ms, "a packet that the device cannot read");
+  if (fresh_) follow_report(time_ms);
+  follow_silence(time_ms);
+  Command command{.time_ms = time_ms,
+                  .tick_ms = std::min(time_ms - last_.time_ms, tick_ms_),
+                  .asked = *asked,
+                  .force_n = {}};
+  if (pose_) command.force_n = wire_.force_n(*pose_, asked->count);
+  // Where the arm is stretched out no force at the tip goes with its torques.
+  if (!std::isfinite(dot(command.force_n, command.force_n))) command.force_n = last_.force_n;
+  heat_until(time_ms);
+  follow_stall(command);
+  check_state(command);
+  if (pose_ && zero_is_known_) {
+    check_size(command);
+    check_change(command);
+    check_hold(command);
+    check_direction(command);
+  }
+  if (fresh_ || begins_anew_) held_n_ = command.force_n;
+  if (asked->off() && !last_.asked.off()) began_off_ms_ = time_ms;
+  if (norm(command.force_n) > kPushN) last_push_ms_ = time_ms;
+  last_ = command;
+  fresh_ = false;
+  silence_told_ = false;
+}
+
+void Contract::check_state(const Command& command) {
+  for (const std::int16_t count : command.asked.count) {
+    check(std::abs(int{count}) <= wire_.count_end(), command.time_ms, "a motor's counts",
+          std::abs(int{count}), wire_.count_end());
+  }
+  if (command.asked.off() || off_ == Off::no_reason) return;
+  constexpr std::array<const char*, 4> kWhy{"motors on before calibration",
+                                            "motors on while parked", "motors on without homing",
+                                            "motors on after a fault"};
+  broken(command.time_ms, kWhy[static_cast<std::size_t>(off_)]);
+}
+
+void Contract::check_size(const Command& command) {
+  const double now_n = norm(command.force_n), peak_n = limits_.force_n;
+  outcome_.peak_n = std::max(outcome_.peak_n, now_n);
+  check(now_n <= peak_n + kStepN, command.time_ms, "force in N", now_n, peak_n);
+
+  const double silent_ms = command.time_ms - heard_ms_;
+  const double left_n =
+      norm(held_n_) * std::clamp((kZeroMs - silent_ms) / (kZeroMs - kHoldMs), 0.0, 1.0);
+  check(fresh_ || now_n <= left_n + kStepN, command.time_ms, "force without reports in N", now_n,
+        left_n);
+
+  // Two ticks: the first one has its share already, and a stall may end one before.
+  const double faded_ms = command.time_ms - may_push_since_ms_ + 2 * tick_ms_;
+  const double most_n = peak_n * std::min(1.0, faded_ms / kFadeInMs);
+  check(now_n <= most_n + kStepN, command.time_ms, "force while fading in, in N", now_n, most_n);
+
+  const double rms_n = std::sqrt(heat_n2_);
+  outcome_.rms_n = std::max(outcome_.rms_n, rms_n);
+  const double bearable_n = std::min(limits_.continuous_force_n, peak_n);
+  check(rms_n <= bearable_n + kStepN, command.time_ms, "RMS over 10 s in N", rms_n, bearable_n);
+}
+
+void Contract::check_change(const Command& command) {
+  if (command.tick_ms <= 0) return;
+  // A hand that moves with the force is given energy by it. Across it, only what the force's steps
+  // hide may look so.
+  const bool leaves =
+      fresh_ && dot(last_.force_n, moved_mm_) > -kStepN * norm(moved_mm_) && norm(moved_mm_) > 0;
+  const bool may_fall = leaves || begins_anew_ || command.asked.off();
+  const double change = may_fall ? change_but_for_fall_n(last_.force_n, command.force_n)
+                                 : norm(command.force_n - last_.force_n);
+  const double most_n = limits_.slew_n_per_ms * command.tick_ms;
+  outcome_.steepest_n_per_ms = std::max(outcome_.steepest_n_per_ms, change / command.tick_ms);
+  check(change <= most_n + kStepN, command.time_ms, "change of the force in a tick, in N", change,
+        most_n);
+}
+
+/// What was sent after the last report, turned and weakened by nothing.
+void Contract::check_hold(const Command& command) {
+  const bool holds =
+      !fresh_ && !begins_anew_ && off_ == Off::no_reason && command.time_ms - heard_ms_ <= kHoldMs;
+  const double off_by_n = norm(command.force_n - held_n_);
+  check(!holds || off_by_n <= kStepN, command.time_ms, "change of a held force, in N", off_by_n,
+        kStepN);
+}
+
+void Contract::check_direction(const Command& command) {
+  const bool pushes = norm(command.force_n) > kPushN;
+  const auto out = pushes && way_in_is_known_ ? outward_.at(pose_->tip_mm) : std::nullopt;
+  const bool inward = out && dot(*out, command.force_n) < 0;
+  if (!inward) {
+    inward_since_ms_ = -1;
+    return;
+  }
+  if (inward_since_ms_ < 0) inward_since_ms_ = command.time_ms;
+  const double for_ms = command.time_ms - inward_since_ms_;
+  check(for_ms <= kTurnMs, command.time_ms, "ms in which the force points into the solid", for_ms,
+        kTurnMs);
+}
+
+void Contract::heat_until(double time_ms) {
+  const double share = -std::expm1((last_.time_ms - time_ms) / kThermalTimeMs);
+  heat_n2_ += (dot(last_.force_n, last_.force_n) - heat_n2_) * share;
+}
+
+void Contract::cycle(double time_ms, const DeviceMoment& device) {
+  docked_ = device.docked;
+  const double alone_ms = time_ms - last_.time_ms;
+  if (!last_.asked.off()) {
+    outcome_.longest_alone_ms = std::max(outcome_.longest_alone_ms, alone_ms);
+    if (alone_ms > kWatchdogMs + kCycleMs && !silence_told_) {
+      silence_told_ = true;
+      check(false, time_ms, "motors on, ms after the last packet", alone_ms, kWatchdogMs);
+    }
+  }
+  const double force_n = norm(device.motor_force_n);
+  outcome_.device_peak_n = std::max(outcome_.device_peak_n, force_n);
+  outcome_.pushed = outcome_.pushed || force_n > kPushN;
+  if (!trusted_ || !zero_is_known_ || !zero_is_true_) return;
+  const double limit_n = limits_.force_n * kDeviceShare + kStepN;
+  check(force_n <= limit_n, time_ms, "force of the motors in N", force_n, limit_n);
+  if (!last_.asked.off() || force_n < kStepN) return;
+  const double after_ms = time_ms - began_off_ms_;
+  outcome_.slowest_off_ms = std::max(outcome_.slowest_off_ms, after_ms);
+  check(after_ms <= kOffMs, time_ms, "force of the motors, ms after they went off", after_ms,
+        kOffMs);
+}
+
+void Contract::end(double time_ms, const std::string& latches, double faults_end_ms) {
+  outcome_.pushed_again = last_push_ms_ > faults_end_ms;
+  if (latches.empty()) return;
+  // Counts that lead to no pose may be told from a jump, or from numbers that are none.
+  const bool as_written =
+      outcome_.latched == latches || (had_no_pose_ && outcome_.latched != fault_name(Fault::none));
+  if (!as_written) {
+    broken(time_ms, "the reports amount to " + outcome_.latched + ", not " + latches);
+    return;
+  }
+  if (latches == fault_name(Fault::none)) {
+    const bool may_push = off_ == Off::no_reason && !calibrated_again_;
+    check(outcome_.pushed_again || !may_push, time_ms, "no force after the last fault, in N", 0,
+          kPushN);
+    return;
+  }
+  outcome_.latch_ms = std::max(0.0, began_off_ms_ - begun_ms_);
+  const double limit_ms = latest_latch_ms(outcome_.latched, tick_ms_);
+  check(last_.asked.off() && outcome_.latch_ms <= limit_ms, time_ms,
+        "ms until the motors were off for good", outcome_.latch_ms, limit_ms);
+}
+
+}  // namespace kerf::faults

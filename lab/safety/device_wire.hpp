@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <span>
+
+#include "hil/device/plant.hpp"
+#include "shared/numeric/vec.hpp"
+#include "shared/wire/personality.hpp"
+
+namespace kerf::faults {
+
+using EncoderCounts = std::array<std::int16_t, 3>;
+
+/// The content of a report, in the words of docs/safety.md.
+struct ToldReport {
+  EncoderCounts count{};
+  bool parked = false;
+  bool homed = true;
+};
+
+/// The motor command of a packet of the host.
+struct ToldCommand {
+  std::array<std::int16_t, 3> count{};
+  bool motors_on = false;
+
+  [[nodiscard]] bool off() const noexcept {
+    return !motors_on && count == std::array<std::int16_t, 3>{};
+  }
+};
+
+/// The packets of one emulated device as they go over the wire, read by the emulator's geometry:
+/// nothing of the controller's is used, so a wrong sign there cannot hide here. One thread.
+class DeviceWire {
+ public:
+  DeviceWire(Personality personality, const std::array<double, 3>& dock_rad);
+
+  /// Empty if it is no report of this device, or an Omni's that is not newer than the last one.
+  [[nodiscard]] std::optional<ToldReport> report(std::span<const std::uint8_t> packet);
+  /// Empty if it is no packet of a host.
+  [[nodiscard]] std::optional<ToldCommand> command(std::span<const std::uint8_t> packet);
+
+  /// Where encoders that count so from calibration put the arm; none: it has no such pose.
+  [[nodiscard]] std::optional<ArmPose> pose(const EncoderCounts& count) const;
+  /// What motors at `count` exert at the tip in that pose.
+  [[nodiscard]] DeviceVec<double> force_n(const ArmPose& pose,
+                                          const std::array<std::int16_t, 3>& count) const;
+  /// Motor counts lie within +- this.
+  [[nodiscard]] int count_end() const noexcept { return count_end_; }
+  /// Whether a calibration in a wrong pose moves every later one: encoders that count from it.
+  [[nodiscard]] bool counts_from_rest() const noexcept { return personality_ == Personality::omni; }
+  /// What such encoders tell at the dock, as the host must think since its last calibration.
+  [[nodiscard]] const EncoderCounts& dock_count() const noexcept { return dock_count_; }
+  void calibrated_at(const EncoderCounts& count) noexcept { dock_count_ = count; }
+
+ private:
+  [[nodiscard]] std::optional<ToldReport> wooden_report(std::span<const std::uint8_t> packet);
+
+  Personality personality_;
+  int count_end_ = 0;
+  EncoderCounts dock_count_{};
+  std::array<double, 3> zero_rad_{}, rad_per_count_{}, nmm_per_count_{};
+  std::optional<std::uint32_t> packet_number_;  ///< of the Omni's last report
+  std::optional<std::uint32_t> far_number_;     ///< of the last packet, if it was far from that
+  bool parked_ = false, encoders_set_ = false;  ///< WoodenHaptics
+};
+
+}  // namespace kerf::faults

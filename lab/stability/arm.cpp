@@ -1,0 +1,281 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "lab/stability/arm.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <memory>
+#include <numbers>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "controller/device/device_driver.hpp"
+#include "controller/load/load_scene.hpp"
+#include "controller/plan/compile.hpp"
+#include "controller/tool/tool_shapes.hpp"
+#include "hil/device/emulator.hpp"
+#include "hil/device/falcon.hpp"
+#include "hil/device/omni.hpp"
+#include "hil/device/packet_device.hpp"
+#include "hil/device/wooden.hpp"
+#include "hil/hil_error.hpp"
+#include "lab/rig/bench_scene.hpp"
+#include "lab/rig/direct_port.hpp"
+#include "lab/stability/one_axis.hpp"
+#include "shared/numeric/linear_algebra.hpp"
+
+namespace kerf::zwidth {
+namespace {
+
+constexpr double kRadiusMm = 1, kVoxelMm = 0.25;
+constexpr double kAwayMm = 3;  ///< the tool's middle above the flat, between two hits
+/// x and z at which two more walls meet the flat: away from the hand's way in, which comes from -z,
+/// and from the point at which friction stops a soft hand short.
+constexpr double kCornerMm = 4.25;
+
+/// The hand that pushes: the subject's, or a spring so soft that the device is as good as free.
+SampledHand pushing_hand(const Subject& subject) {
+  SampledHand hand = subject.loop.hand;
+  constexpr double kSoft = 0.2;
+  if (hand.stiffness_n_per_mm <= 0) hand.stiffness_n_per_mm = kSoft;
+  return hand;
+}
+
+template <class Params>
+Params with_plant(Params params, const Subject& subject) {
+  const SampledHand hand = pushing_hand(subject);
+  params.tip_mass_kg = subject.loop.mass_kg;
+  params.viscous_ns_per_mm = subject.loop.viscous_ns_per_mm;
+  params.coulomb_n = subject.loop.coulomb_n;
+  params.hand_mass_kg = hand.mass_kg;
+  params.hand_damping_ns_per_mm = hand.damping_ns_per_mm;
+  params.hand_stiffness_n_per_mm = hand.stiffness_n_per_mm;
+  params.output_delay_cycles = static_cast<int>(cycles_of(subject.loop.delay_s));
+  if (subject.mode_hz > 0) {
+    // A tenth of the tip's mass turns with the motors, at a lever of 0.13 m.
+    constexpr double kShare = 0.1, kLeverM = 0.13;
+    params.joint_inertia_kg_m2.fill(kShare * params.tip_mass_kg * kLeverM * kLeverM);
+    params.tip_mass_kg *= 1 - kShare;
+    params.mode_hz = subject.mode_hz;
+  }
+  return params;
+}
+
+Emulator emulator_of(const Subject& subject, const HandScript& hand) {
+  switch (subject.device) {
+    case Personality::falcon:
+      return {std::make_unique<FalconModel>(with_plant(FalconParams{}, subject)), hand};
+    case Personality::woodenhaptics:
+      return {std::make_unique<WoodenModel>(with_plant(WoodenParams{}, subject)), hand};
+    case Personality::omni:
+      break;
+  }
+  return {with_plant(OmniParams{}, subject), hand};
+}
+
+/// One way of meeting a wall; device mm, of the tool's middle. Judged along `normal`.
+struct ArmHit {
+  DeviceVec<double> from, to;
+  double mm_per_s;  ///< 0: gently
+  DeviceVec<double> normal{0, 1, 0};
+  double wall_mm = kRadiusMm;  ///< of the tool's middle along `normal` at the first contact
+};
+
+/// At a place that the seed shifts.
+std::array<ArmHit, kArmHits> hits_of(const Subject& subject, std::uint64_t seed) {
+  const double depth_mm =
+      (subject.push_n + subject.loop.coulomb_n) / pushing_hand(subject).stiffness_n_per_mm;
+  constexpr std::uint64_t kPlaces = 1000;
+  const double x_mm = static_cast<double>(seed * 7919 % kPlaces) / kPlaces;
+  const DeviceVec<double> above{x_mm, kAwayMm, 0}, pressed{x_mm, kRadiusMm - depth_mm, 0};
+  // A slide comes down by a sixth of its way; the hand is in full only at the end.
+  constexpr double kSlideMm = 3;
+  const DeviceVec<double> graze{x_mm - kSlideMm, kRadiusMm + kSlideMm / 6, 0};
+  const double third = 1 / std::sqrt(3.0), in_mm = kCornerMm - kRadiusMm;
+  const DeviceVec<double> out{-third, third, -third}, corner{in_mm, kRadiusMm, in_mm};
+  return {{{above, pressed, kHitsMmPerS[0]},
+           {above, pressed, kHitsMmPerS[1]},
+           {above, pressed, kHitsMmPerS[2]},
+           {graze, pressed, 50},
+           {corner + out * kAwayMm, corner - out * depth_mm, 50, out, dot(corner, out)}}};
+}
+
+/// Each hit from its start, a stay, and off again by the way it came; high over to the next. The
+/// reach ends high above the first, and the hand comes down so slowly that it does not swing.
+HandScript script_of(const Subject& subject, const std::array<ArmHit, kArmHits>& hits,
+                     double seconds) {
+  constexpr double kHighMm = 20, kPeriods = 3;
+  const double hand_rad_per_s = with_plant(PlantParams{}, subject).hand_rad_per_s();
+  HandScript script;
+  const auto first = hits.front().from;
+  script.start = {first.x, first.y + kHighMm, first.z};
+  script.steps.push_back(hand_move(first, kPeriods * 2 * std::numbers::pi / hand_rad_per_s));
+  HandStep wait, stay;
+  wait.seconds = 0.2;
+  stay.seconds = seconds + 0.3;
+  for (const ArmHit& hit : hits) {
+    script.steps.push_back(hand_move(hit.from, 0.2));
+    script.steps.push_back(wait);
+    constexpr double kGentlyS = 0.4;
+    HandStep down = hand_move(hit.to, kGentlyS);
+    if (hit.mm_per_s > 0) {
+      down.seconds = norm(hit.to - hit.from) / hit.mm_per_s;
+      down.ease = HandStep::Ease::linear;
+    }
+    script.steps.push_back(down);
+    script.steps.push_back(stay);
+    script.steps.push_back(hand_move(hit.from + hit.normal * kAwayMm, 0.2));
+  }
+  return script;
+}
+
+/// One device, its driver and a servo; a step is one tick.
+class Rig {
+ public:
+  Rig(LoadedScene scene, const Subject& subject, const HandScript& hand)
+      : servo_(compile(scene)),
+        emulator_(emulator_of(subject, hand)),
+        port_(emulator_),
+        driver_(make_driver(subject.device, port_)),
+        cycles_per_tick_(kCyclesPerSecond / scene.servo.rate_hz) {
+    driver_->start();
+  }
+  ServoOutput tick() {
+    for (int cycle = 0; cycle < cycles_per_tick_; ++cycle) port_.cycle();
+    const ServoOutput out = servo_->step(driver_->read());
+    driver_->command(out);
+    return out;
+  }
+  /// The mechanics. Their work is the motors' work on the tip, delay included: the servo books what
+  /// it asked for.
+  [[nodiscard]] const PlantState& plant() const { return emulator_.model().state(); }
+
+ private:
+  std::unique_ptr<CompiledScene> servo_;
+  Emulator emulator_;
+  DirectPort port_;
+  std::unique_ptr<DeviceDriver> driver_;
+  int cycles_per_tick_;
+};
+
+/// The verdict on a latched fault, or on a device that never comes free of the wall.
+constexpr Swing kLost{.swings = true, .active = true};
+
+/// One hit: nothing before the first contact; the verdict after `seconds`. Empty if the hand does
+/// not bring the device to the wall.
+std::optional<Swing> watch_hit(Rig& rig, const Subject& subject, const ArmHit& hit, double seconds,
+                               TickMeter& ticks, const SwingWatch& watch) {
+  const double rate_hz = 1 / subject.loop.period_s;
+  const std::int64_t count = std::llround(seconds * rate_hz);
+  constexpr double kPatienceS = 8;  // calibration, the way there, and a stay that chattered away
+  SwingMeter meter(count, subject.loop.quantum_mm, subject.push_n);
+  std::int64_t away = 0;
+  // Some steps of the encoders within a second: else friction holds it, and nothing is unstable.
+  constexpr double kRestMm = 0.1;
+  std::array<double, 3> from_mm{};
+  bool restless = false;
+  std::int64_t judged = 0;
+  const std::int64_t settled = std::llround(0.05 * rate_hz);
+  const std::int64_t patience = std::llround(kPatienceS * rate_hz);
+  for (std::int64_t tick = 0; judged < count; ++tick, ticks.tick()) {
+    if (tick - judged > patience) return restless ? std::optional(kLost) : std::nullopt;
+    const ServoOutput out = rig.tick();
+    if (out.fault != Fault::none) return kLost;
+    if (tick % std::llround(rate_hz) == 0) {
+      from_mm = out.position_mm;
+      restless = false;
+    }
+    restless = restless || vec3::length(vec3::operator-(out.position_mm, from_mm)) > kRestMm;
+    const bool free = out.motors_on && out.phase == Phase::active && !out.contact;
+    if (judged == 0 && away < settled) {
+      away = free ? away + 1 : 0;
+    } else if (judged > 0 || out.contact) {
+      const DeviceVec<double> tip_mm{out.position_mm[0], out.position_mm[1], out.position_mm[2]};
+      meter.take(dot(tip_mm, hit.normal), rig.plant().motor_work_mj);
+      if (watch) {
+        watch({dot(rig.plant().pose.tip_mm, hit.normal) - hit.wall_mm,
+               dot(rig.plant().velocity, hit.normal)});
+      }
+      ++judged;
+    }
+  }
+  return meter.swing();
+}
+
+/// The scene of one cell.
+LoadedScene cell_scene(const LoadedScene& scene, const Subject& subject,
+                       double stiffness_n_per_mm) {
+  LoadedScene own = scene;
+  own.force.stiffness_n_per_mm = stiffness_n_per_mm;
+  if (subject.law == Law::paper) {
+    own.force.p0_n_per_mm2 = 1;
+    own.force.p0_n_per_mm2 = stiffness_n_per_mm / device_stiffness_n_per_mm(own);
+  }
+  own.force.law = force_law_at(subject, stiffness_n_per_mm);
+  return own;
+}
+
+}  // namespace
+
+LoadedScene walls_scene(const Subject& subject) {
+  const int rate_hz = static_cast<int>(std::lround(1 / subject.loop.period_s));
+  if (kCyclesPerSecond % rate_hz != 0) {
+    throw HilError("--rate: " + std::to_string(rate_hz) +
+                   " does not divide 8000, the rate of the devices' mechanics; use such as 4000");
+  }
+  LoadedScene scene;
+  scene.path = "walls";
+  constexpr std::int32_t kEdge = 48;
+  const VoxelGrid grid{kEdge, kEdge, kEdge};
+  constexpr double kCorner = -kVoxelMm * (kEdge - 1) / 2;
+  SceneVolume& volume = scene.volumes.emplace_back();
+  volume.name = "solid";
+  volume.image.grid = grid;
+  volume.image.spacing_mm = {kVoxelMm, kVoxelMm, kVoxelMm};
+  volume.image.density = bench::densities(grid, [&](double x, double y, double z) {
+    constexpr double kMiddle = (kEdge - 1) / 2.0, kWall = kMiddle + kCornerMm / kVoxelMm;
+    return std::max({kMiddle - y, x - kWall, z - kWall});
+  });
+  volume.pose.position_mm = {kCorner, kCorner, kCorner};
+  scene.tools.push_back(make_tool("ball", "ball", {.pitch_mm = kVoxelMm, .radius_mm = kRadiusMm}));
+  scene.cut.model = CutModel::none;
+  scene.device.personality = subject.device;
+  scene.device.torque_scale = torque_scale_of(subject.device);
+  if (subject.law == Law::paper) scene.force.model = ForceModel::paper;
+  scene.force.damping_ns_per_mm = subject.damping_ns_per_mm;
+  scene.force.stabiliser = subject.stabiliser;
+  scene.limits.continuous_force_n = scene.limits.force_n;  // the motors stay cool
+  scene.servo.velocity = subject.estimator;
+  scene.servo.rate_hz = rate_hz;
+  scene.servo.numeric = subject.numeric;
+  return scene;
+}
+
+Swing hit_with_arm(const LoadedScene& scene, const Subject& subject, double stiffness_n_per_mm,
+                   double seconds, std::uint64_t seed, TickMeter& ticks) {
+  const std::array<ArmHit, kArmHits> hits = hits_of(subject, seed);
+  Rig rig(cell_scene(scene, subject, stiffness_n_per_mm), subject,
+          script_of(subject, hits, seconds));
+  Swing worst;
+  for (const ArmHit& hit : hits) {
+    const std::optional<Swing> seen = watch_hit(rig, subject, hit, seconds, ticks, {});
+    if (!seen && !worst.swings && !worst.active) throw NotMet();
+    worst.join(seen.value_or(kLost));
+    if (worst.swings && worst.active) break;
+  }
+  return worst;
+}
+
+void watch_arm(const LoadedScene& scene, const Subject& subject, double stiffness_n_per_mm,
+               double seconds, std::uint64_t seed, TickMeter& ticks,
+               const std::function<SwingWatch(std::size_t hit)>& begin) {
+  const std::array<ArmHit, kArmHits> hits = hits_of(subject, seed);
+  Rig rig(cell_scene(scene, subject, stiffness_n_per_mm), subject,
+          script_of(subject, hits, seconds));
+  for (std::size_t h = 0; h < hits.size(); ++h) {
+    if (!watch_hit(rig, subject, hits[h], seconds, ticks, begin(h))) return;
+  }
+}
+
+}  // namespace kerf::zwidth

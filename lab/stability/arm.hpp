@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+
+#include "controller/load/loaded_scene.hpp"
+#include "hil/hil_error.hpp"
+#include "lab/stability/axes.hpp"
+#include "lab/stability/limit_cycle.hpp"
+
+namespace kerf::zwidth {
+
+/// Ways in which the whole arm meets walls.
+inline constexpr std::size_t kArmHits = 5;
+
+/// A ball of 1 mm over a flat that meets two more walls in a corner, felt by the swept contact and
+/// not cut, for the subject's device. Throws HilError for a rate that does not divide that of the
+/// devices' mechanics.
+[[nodiscard]] LoadedScene walls_scene(const Subject& subject);
+
+/// Nothing was measured: within 8 s the hand did not bring the device to the wall, by too much
+/// friction, mass or damping.
+class NotMet : public HilError {
+ public:
+  NotMet()
+      : HilError(
+            "the hand did not bring the device to the wall within 8 s; give less friction, mass or "
+            "damping, or --hand firm") {}
+};
+
+/// The whole servo step, driver and emulated device in virtual time, on `walls_scene`: the hand
+/// pushes slowly, hits the flat at 50 and 200 mm/s, slides onto it at 50 mm/s, then hits the corner
+/// of three walls at 50 mm/s, and stays for `seconds` each time. A hit is judged along the normal,
+/// in the corner along the diagonal, from its first contact on, by the device's own encoders and
+/// the servo's own account of its work; the first that is bad by both rules ends the run.
+///
+/// The subject's delay counts in whole bus cycles of 125 us; encoder and limits are those of
+/// device and servo. Without a hand a spring of 0.2 N/mm pushes. Throws NotMet, or Interrupted.
+[[nodiscard]] Swing hit_with_arm(const LoadedScene& scene, const Subject& subject,
+                                 double stiffness_n_per_mm, double seconds, std::uint64_t seed,
+                                 TickMeter& ticks);
+
+/// The same hits one after the other, whatever they show, until the hand no longer brings the
+/// device to the wall: `begin` gives for each who is told of its ticks, by the device's true
+/// mechanics.
+void watch_arm(const LoadedScene& scene, const Subject& subject, double stiffness_n_per_mm,
+               double seconds, std::uint64_t seed, TickMeter& ticks,
+               const std::function<SwingWatch(std::size_t hit)>& begin);
+
+}  // namespace kerf::zwidth

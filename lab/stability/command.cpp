@@ -1,0 +1,490 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <iosfwd>
+#include <memory>
+#include <numeric>
+#include <ostream>
+#include <set>
+#include <stdexcept>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "controller/run/law_trial.hpp"
+#include "hil/hil_error.hpp"
+#include "lab/run/lab_command.hpp"
+#include "lab/run/lab_run.hpp"
+#include "lab/stability/arm.hpp"
+#include "lab/stability/axes.hpp"
+#include "lab/stability/map.hpp"
+#include "lab/stability/map_file.hpp"
+#include "lab/stability/map_picture.hpp"
+#include "lab/stability/page.hpp"
+#include "record/force_plot.hpp"
+#include "shared/posix/atomic_file.hpp"
+#include "shared/posix/program.hpp"
+#include "shared/posix/stop_signals.hpp"
+#include "shared/text/text.hpp"
+
+namespace kerf::zwidth {
+namespace {
+
+/// A picture that cannot be drawn is refused before hours of measuring. Throws HilError.
+void require_gnuplot() {
+  static_cast<void>(gnuplot_svg("set terminal svg\nplot 0\n"));
+}
+
+/// The files that a map is written to.
+struct OutputPaths {
+  std::string csv, json, plot;
+  void declare(Arguments& app);
+};
+
+/// The same, checked before the map is measured: none is one of the parts, which are read. Throws
+/// HilError, or FileError.
+class Outputs {
+ public:
+  Outputs(const OutputPaths& paths, const std::vector<std::string>& parts);
+  void write(const Part& part) const;
+
+ private:
+  bool draws_;
+  LabOutput csv_, json_, plot_;
+};
+
+void OutputPaths::declare(Arguments& app) {
+  app.option("--csv", csv, "write one row for each cell").shown_as("FILE");
+  app.option("--json", json, "write axes, boundaries and cells").shown_as("FILE");
+  app.option("--plot", plot, "draw the map beside the analytic limits (SVG)").shown_as("FILE");
+}
+
+Outputs::Outputs(const OutputPaths& paths, const std::vector<std::string>& parts)
+    : draws_(!paths.plot.empty()),
+      csv_("--csv", paths.csv, ".csv"),
+      json_("--json", paths.json, ".json"),
+      plot_("--plot", paths.plot, ".svg") {
+  check_outputs({parts.begin(), parts.end()}, {{"--csv", paths.csv, ".csv"},
+                                               {"--json", paths.json, ".json"},
+                                               {"--plot", paths.plot, ".svg"}});
+  if (draws_) require_gnuplot();
+}
+
+void Outputs::write(const Part& part) const {
+  csv_.write(csv_of(part));
+  json_.write(json_of(part));
+  if (draws_) plot_.write(gnuplot_svg(plot_of(part)));
+}
+
+std::string crossing_text(const Crossing& crossing) {
+  if (crossing.first_n_per_mm == Crossing::kNever) return "above all";
+  if (crossing.first_n_per_mm == 0) return "below all";
+  return format("%.4g", crossing.first_n_per_mm);
+}
+
+/// One line for each column: its values, and the stiffness at which it stops.
+void tell(const Part& part, std::ostream& out) {
+  const std::vector<Assignment> columns = part.spec.columns();
+  std::set<std::string> reasons;
+  std::size_t empty_count = 0;
+  const auto name_of = [&](std::size_t index) {
+    std::string name;
+    for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
+      if (part.spec.table[axis].size() < 2) continue;
+      name += std::string(name.empty() ? "" : " ") + axis_kinds()[axis].name + " " +
+              columns[index][axis];
+    }
+    return name;
+  };
+  std::size_t width = 40;
+  for (const auto& [index, column] : part.columns) {
+    width = std::max(width, name_of(index).size());
+  }
+  out << format("%-*s %10s %10s %10s %10s  re-entry\n", int(width), "column (N/mm)", "swings",
+                "energy", "exact", "passive");
+  for (const auto& [index, column] : part.columns) {
+    const Subject subject = subject_of(columns[index]);
+    if (column.cells.empty()) {
+      const std::string why = impossible(part.spec, subject);
+      ++empty_count;
+      reasons.insert(why.empty() ? NotMet().what() : why);
+      continue;
+    }
+    const Analytic analytic = analytic_of(subject);
+    out << format("%-*s %10s %10s %10.4g %10.4g", int(width), name_of(index).c_str(),
+                  crossing_text(column.swing).c_str(), crossing_text(column.energy).c_str(),
+                  analytic.exact, analytic.passive);
+    if (column.swing.re_entry_from_n_per_mm > 0) {
+      out << format("  %.4g to %.4g", column.swing.re_entry_from_n_per_mm,
+                    column.swing.re_entry_to_n_per_mm);
+    }
+    out << '\n';
+  }
+  if (empty_count > 0) {
+    out << empty_count << " of " << part.columns.size()
+        << " columns are left empty: " << *reasons.begin() << '\n';
+  }
+}
+
+/// `kerf-lab zwidth`: which stiffness and damping a device bears, measured, beside the theory.
+class Command final : public LabCommand {
+ public:
+  explicit Command(Arguments& program);
+  [[nodiscard]] int run(std::ostream& out) const override;
+
+ private:
+  [[nodiscard]] MapSpec spec() const;
+  static void try_laws(const MapSpec& map, std::ostream& out);
+  [[nodiscard]] Shard shard() const;
+  [[nodiscard]] int threads(std::size_t columns) const;
+  /// The columns of the shard that `kept` has not; false: interrupted.
+  [[nodiscard]] bool measure(const MapSpec& map, const Shard& shard, PartWriter& kept,
+                             std::ostream& out) const;
+  void write_page() const;
+
+  std::array<std::string, kAxisCount> axes_, option_names_;
+  std::string stiffness_, map_ = "damping,stiffness", shard_ = "1/1", part_, portraits_, page_;
+  std::vector<std::string> cells_;
+  OutputPaths paths_;
+  bool quick_ = false, arm_ = false;
+  double seconds_ = 0;
+  std::uint32_t seed_ = 1;
+  int jobs_ = 0;
+};
+
+Command::Command(Arguments& program)
+    : LabCommand(program, "zwidth",
+                 "which stiffness and damping a device bears, beside the theory") {
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    const AxisKind& kind = axis_kinds()[i];
+    std::string meaning = kind.meaning;
+    if (*kind.standard != 0) meaning += std::string(" [") + kind.standard + "]";
+    option_names_[i] = std::string("--") + kind.name;  // the option keeps only a pointer
+    app_.option(option_names_[i].c_str(), axes_[i], meaning)
+        .shown_as(*kind.unit != 0 ? kind.unit : "VALUE");
+  }
+  app_.option("--stiffness", stiffness_,
+              "of the wall, K: from:to:count, even in their ratio [0.05:50:40]")
+      .shown_as("N/mm");
+  app_.option("--map", map_, "the two axes of the picture").shown_as("X,Y").shows_default();
+  app_.flag("--quick", quick_, "a small map of both loops, in seconds");
+  app_.flag("--arm", arm_, "the whole servo step with an emulated device in place of one axis");
+  app_.option("--seconds", seconds_, "of each hit [3; 1 where quick]").within(0.1, 60);
+  app_.option("--seed", seed_, "shifts the encoders' steps against the wall; 0: an edge lies on it")
+      .shows_default();
+  app_.option("--jobs", jobs_, "threads [all cores]").within(1, 1024);
+  app_.option("--shard", shard_, "only part i of n, into --part").shown_as("i/n");
+  app_.option("--part", part_, "keep finished columns here, and go on from those that it has")
+      .shown_as("FILE");
+  paths_.declare(app_);
+  app_.option("--portraits", portraits_,
+              "draw position against speed of --cells, one curve for each hit (SVG)")
+      .shown_as("FILE");
+  app_.option("--cells", cells_, "for --portraits: stiffness:damping, as many as 12")
+      .split_at_commas()
+      .shown_as("K:B,...");
+  app_.option(
+          "--page", page_,
+          "measure and write docs/stability.md, its pictures in plots/ beside it; takes minutes")
+      .shown_as("FILE");
+  app_.footer(
+      "An axis takes one value, a list (0,1,2) or a range (0:3:4: from, to, count). Two are "
+      "mapped;\n"
+      "each combination of the others is a panel of the picture. docs/stability.md has examples.\n"
+      "Exit codes: 0 fine, 2 bad input or set-up; 130 interrupted, and --part has what is done.");
+}
+
+/// The program's own laws have a trial at both ends of the stiffness before a map runs them: one
+/// that loops would never end it. A law that gives no number, or allocates, is reported; the map
+/// bears both.
+void Command::try_laws(const MapSpec& map, std::ostream& out) {
+  std::set<std::string> tried, told;
+  for (const Assignment& values : map.columns()) {
+    std::string laws;
+    for (const AxisId axis :
+         {AxisId::law, AxisId::estimator, AxisId::stabiliser, AxisId::numeric}) {
+      laws += value_of(values, axis) + ' ';
+    }
+    if (!tried.insert(laws).second) continue;
+    const Subject subject = subject_of(values);
+    for (const double stiffness : {map.stiffness_n_per_mm.front(), map.stiffness_n_per_mm.back()}) {
+      LoadedScene scene;
+      scene.path = "zwidth";
+      scene.force.law = force_law_at(subject, stiffness);
+      scene.force.stabiliser = subject.stabiliser;
+      scene.servo.velocity = subject.estimator;
+      scene.servo.numeric = subject.numeric;
+      try {
+        for (const std::string& flaw : try_own_laws(scene)) {
+          if (told.insert(flaw).second) out << flaw << '\n';
+        }
+      } catch (const std::runtime_error& error) {
+        throw HilError(error.what());
+      }
+      if (subject.force_law.name.empty()) break;  // the others know no stiffness
+    }
+  }
+}
+
+/// A map has one column at least that can exist; those that cannot are left empty.
+void check_columns(const MapSpec& map) {
+  std::string why;
+  for (const Assignment& values : map.columns()) {
+    why = impossible(map, subject_of(values));
+    if (why.empty()) return;
+  }
+  throw HilError("no column of this map can exist: " + why);
+}
+
+MapSpec Command::spec() const {
+  MapSpec spec;
+  const std::size_t comma = map_.find(',');
+  if (comma == std::string::npos) {
+    throw HilError("--map: " + map_ + ": two axes make a map; give such as damping,stiffness");
+  }
+  spec.mapped = {axis_named("--map", map_.substr(0, comma)),
+                 axis_named("--map", map_.substr(comma + 1))};
+  if (spec.mapped[0] == spec.mapped[1]) {
+    throw HilError("--map: " + map_ + ": the same axis twice; give two");
+  }
+  std::array<std::string, kAxisCount> texts = axes_;
+  for (const AxisId axis : {AxisId::loop, AxisId::quantum, AxisId::limits}) {
+    if (!arm_ || texts[index_of(axis)].empty()) continue;
+    throw HilError(std::string("--") + axis_kinds()[index_of(axis)].name +
+                   ": device and servo have their own with --arm; leave one of the two out");
+  }
+  if (!arm_ && !axes_[index_of(AxisId::mode)].empty()) {
+    throw HilError("--mode: one axis is rigid; add --arm, or leave it out");
+  }
+  const auto standard = [&](AxisId axis, const char* text) {
+    std::string& value = texts[index_of(axis)];
+    if (value.empty()) value = text;
+  };
+  if (quick_ && !arm_) standard(AxisId::loop, "ideal,kerf");
+  if (std::ranges::find(spec.mapped, index_of(AxisId::damping)) != spec.mapped.end()) {
+    standard(AxisId::damping, quick_ ? "0:0.03:21" : "0:0.03:40");
+  }
+  for (std::size_t i = 0; i < kAxisCount; ++i) {
+    if (!texts[i].empty()) spec.table[i] = axis_values(static_cast<AxisId>(i), texts[i]);
+  }
+  for (const std::string& law : spec.table[index_of(AxisId::law)]) {
+    if (!arm_ && law == "paper") {
+      throw HilError("--law: paper is a force of the whole arm; add --arm, or leave it out");
+    }
+    if (law == "paper" && spec.table[index_of(AxisId::damping)] != AxisValues{"0"}) {
+      throw HilError("--law: paper has no damping; add --damping 0");
+    }
+    if (!arm_ || (law != "linear" && law != "two_sided")) continue;
+    throw HilError("--law: " + law + " is a wall of one axis alone; leave it or --arm out");
+  }
+  for (const std::size_t axis : spec.mapped) {
+    if (axis == kAxisCount || !spec.table[axis].empty()) continue;
+    throw HilError(std::string("--map: the axis ") + axis_kinds()[axis].name +
+                   " has no range; give --" + axis_kinds()[axis].name + " from:to:count or a list");
+  }
+  spec.stiffness_n_per_mm = stiffness_values(!stiffness_.empty() ? stiffness_
+                                             : quick_            ? "0.05:50:25"
+                                                                 : "0.05:50:40");
+  for (const Assignment& values : spec.columns()) {
+    const std::string estimator = value_of(values, AxisId::estimator);
+    if (value_of(values, AxisId::filter) == "0" || estimator == "difference") continue;
+    throw HilError(
+        "--filter: " + estimator +
+        (estimator.starts_with("difference/")
+             ? " sets its low-pass itself; leave one of the two out"
+             : " has no low-pass behind it; add --estimator difference, or leave it out"));
+  }
+  spec.arm = arm_;
+  spec.seconds = seconds_ > 0 ? seconds_ : quick_ ? 1 : 3;
+  spec.seed = seed_;
+  constexpr std::size_t kMostColumns = 100000;
+  std::size_t count = 1;
+  for (const AxisValues& values : spec.table) {
+    count *= std::max<std::size_t>(1, values.size());
+    if (count > kMostColumns)
+      throw HilError("--map: more than 100000 columns; give the axes fewer values");
+  }
+  return spec;
+}
+
+Shard Command::shard() const {
+  const std::size_t slash = shard_.find('/');
+  const auto index = number_in(shard_.substr(0, slash));
+  const auto count =
+      slash == std::string::npos ? std::nullopt : number_in(shard_.substr(slash + 1));
+  constexpr double kMost = 10000;
+  const auto whole = [](double value) {
+    return value == static_cast<double>(static_cast<int>(value));
+  };
+  if (!index || !count || !(*count >= 1) || *count > kMost || !(*index >= 1) || *index > *count ||
+      !whole(*index) || !whole(*count)) {
+    throw HilError("--shard: " + shard_ + " is no part of a whole; give such as 2/8");
+  }
+  if (*count > 1 && part_.empty()) {
+    throw HilError("--shard: " + shard_ + " needs a file for its part; give --part FILE");
+  }
+  return {static_cast<std::size_t>(*index), static_cast<std::size_t>(*count)};
+}
+
+int Command::threads(std::size_t columns) const {
+  const std::size_t cores = std::max(1U, std::thread::hardware_concurrency());
+  const std::size_t wanted = jobs_ > 0 ? static_cast<std::size_t>(jobs_) : cores;
+  return static_cast<int>(std::clamp<std::size_t>(columns, 1, wanted));
+}
+
+void Command::write_page() const {
+  require_gnuplot();
+  const LabOutput as_page("--page", page_, ".md");
+  const std::string devices = page_plot("--page", page_, ".devices.svg"),
+                    rates = page_plot("--page", page_, ".rates.svg");
+  const LabOutput as_devices("--page", devices, ".svg"), as_rates("--page", rates, ".svg");
+  const ProgressBar bar(true);
+  const Measure measure = [&](const MapSpec& spec, const std::string& what) {
+    Part part{spec, {}, {}};
+    std::vector<std::size_t> all(spec.columns().size());
+    std::iota(all.begin(), all.end(), std::size_t{0});
+    const auto done = [&](std::size_t index, Column column, std::uint64_t) {
+      part.columns[index] = std::move(column);
+      bar.show(static_cast<double>(part.columns.size()) / static_cast<double>(all.size()), what);
+    };
+    const std::atomic<bool> to_the_end{false};
+    measure_columns(spec, all, threads(all.size()), to_the_end, done);
+    return part;
+  };
+  const StabilityPage page =
+      stability_page(measure, page_link(page_, devices), page_link(page_, rates), quick_);
+  as_devices.write(gnuplot_svg(page.devices_plot));
+  as_rates.write(gnuplot_svg(page.rates_plot));
+  as_page.write(page.text);
+}
+
+bool Command::measure(const MapSpec& map, const Shard& shard, PartWriter& kept,
+                      std::ostream& out) const {
+  using Clock = std::chrono::steady_clock;
+  std::vector<std::size_t> wanted;
+  const std::size_t count = map.columns().size();
+  for (std::size_t i = 0; i < count; ++i) {
+    if (shard.has(i) && !kept.columns().contains(i)) wanted.push_back(i);
+  }
+  const int jobs = threads(wanted.size());
+  const std::atomic<bool>& stop = catch_stop_signals();
+  const ProgressBar bar(true);
+  const auto begun = Clock::now();
+  const auto seconds = [&] { return std::chrono::duration<double>(Clock::now() - begun).count(); };
+  std::uint64_t ticks = 0;
+  std::size_t done = 0;
+  bar.show(0, format("0 of %zu columns", wanted.size()));
+  const auto keep = [&](std::size_t index, Column column, std::uint64_t took) {
+    ticks += took;
+    kept.add(index, std::move(column));
+    ++done;
+    const auto of = static_cast<double>(wanted.size()), have = static_cast<double>(done);
+    bar.show(have / of, format("%zu of %zu columns, %.0f s left", done, wanted.size(),
+                               seconds() / have * (of - have)));
+  };
+  measure_columns(map, wanted, jobs, stop, keep);
+  bar.hide();
+  if (done < wanted.size()) {
+    out << "interrupted: " << done << " of " << wanted.size() << " columns measured"
+        << (part_.empty() ? "; nothing is kept without --part\n" : "; run it again to go on\n");
+    return false;
+  }
+  if (done > 0) {
+    out << format(
+        "%zu columns, %.3g servo steps in %.1f s on %d threads: %.3g steps per second and core\n",
+        done, static_cast<double>(ticks), seconds(), jobs,
+        static_cast<double>(ticks) / seconds() / jobs);
+  }
+  return true;
+}
+
+int Command::run(std::ostream& out) const {
+  const bool has_outputs =
+      !paths_.csv.empty() || !paths_.json.empty() || !paths_.plot.empty() || !part_.empty();
+  if ((!page_.empty() || !portraits_.empty()) && has_outputs) {
+    throw HilError(std::string(page_.empty() ? "--portraits" : "--page") +
+                   ": makes no map; leave --csv, --json, --plot and --part out, or run twice");
+  }
+  if (!page_.empty()) {
+    const bool chooses =
+        std::ranges::any_of(axes_, [](const std::string& a) { return !a.empty(); });
+    if (chooses || arm_ || !stiffness_.empty() || !portraits_.empty() || seconds_ > 0 ||
+        seed_ != 1 || !cells_.empty() || shard_ != "1/1") {
+      throw HilError("--page: its maps are its own; leave all but --quick and --jobs out");
+    }
+    write_page();
+    return 0;
+  }
+  if (!cells_.empty() && portraits_.empty()) {
+    throw HilError("--cells: are those of portraits; add --portraits FILE, or leave them out");
+  }
+  const MapSpec map = spec();
+  const Shard part = shard();
+  check_columns(map);
+  std::vector<std::string> kept_in;
+  if (!part_.empty()) kept_in.push_back(part_);
+  const Outputs outputs(paths_, kept_in);
+  try_laws(map, out);
+  if (!paths_.plot.empty()) check_panels(map);
+  if (!portraits_.empty()) {
+    if (!axes_[index_of(AxisId::damping)].empty() || !stiffness_.empty() || shard_ != "1/1") {
+      throw HilError(
+          "--portraits: --cells have the stiffness and the damping; leave --stiffness, --damping "
+          "and "
+          "--shard out");
+    }
+    require_gnuplot();
+    const LabOutput output("--portraits", portraits_, ".svg");
+    output.write(gnuplot_svg(portraits_of(map, cells_)));
+    return 0;
+  }
+  PartWriter kept(part_, map, part);
+  if (!measure(map, part, kept, out)) return 130;
+  kept.finish();
+  const Part whole{map, part, kept.columns()};
+  tell(whole, out);
+  outputs.write(whole);
+  return 0;
+}
+
+/// `kerf-lab merge`: the parts of a map's shards as one map.
+class MergeCommand final : public LabCommand {
+ public:
+  explicit MergeCommand(Arguments& program);
+  [[nodiscard]] int run(std::ostream& out) const override;
+
+ private:
+  std::vector<std::string> parts_;
+  OutputPaths paths_;
+};
+
+MergeCommand::MergeCommand(Arguments& program)
+    : LabCommand(program, "merge", "the parts of a map (zwidth --shard) as one map") {
+  app_.option("parts", parts_, "part files, one of each shard").required().shown_as("FILE...");
+  paths_.declare(app_);
+}
+
+int MergeCommand::run(std::ostream& out) const {
+  const Outputs outputs(paths_, parts_);
+  const Part whole = merge_parts(parts_);
+  if (!paths_.plot.empty()) check_panels(whole.spec);
+  tell(whole, out);
+  outputs.write(whole);
+  return 0;
+}
+
+}  // namespace
+}  // namespace kerf::zwidth
+
+std::unique_ptr<kerf::LabCommand> kerf::make_zwidth_command(Arguments& program) {
+  return std::make_unique<zwidth::Command>(program);
+}
+
+std::unique_ptr<kerf::LabCommand> kerf::make_merge_command(Arguments& program) {
+  return std::make_unique<zwidth::MergeCommand>(program);
+}

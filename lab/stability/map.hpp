@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <limits>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "lab/stability/axes.hpp"
+#include "lab/stability/limit_cycle.hpp"
+
+namespace kerf::zwidth {
+
+/// The specification of a map. Two runs with the same value give the same map, bit for bit.
+struct MapSpec {
+  std::array<std::size_t, 2> mapped{};  ///< axes of the picture, `kAxisCount`: stiffness
+  std::vector<double> stiffness_n_per_mm;
+  AxisTable table;
+  bool arm = false;    ///< the whole servo with an emulated device, else one axis
+  double seconds = 3;  ///< of each hit, at least
+  std::uint64_t seed = 1;
+
+  [[nodiscard]] std::vector<Assignment> columns() const { return combinations(table); }
+};
+
+/// The stiffness at which a column stops being fine, by one rule.
+struct Crossing {
+  static constexpr double kNever = std::numeric_limits<double>::infinity();
+  /// The first crossing, to 0.5 %; 0: not even the lowest stiffness is fine; kNever: all are.
+  double first_n_per_mm = kNever;
+  /// Cells above it that are fine again, their lowest and highest; 0: none.
+  double re_entry_from_n_per_mm = 0, re_entry_to_n_per_mm = 0;
+};
+
+/// One combination of the other axes, at all stiffnesses.
+struct Column {
+  std::vector<Swing> cells;  ///< empty: it cannot exist, or the hand never met the wall
+  Crossing swing, energy;
+};
+using Columns = std::map<std::size_t, Column>;
+
+/// How long a hit has to last, s, so that its thirds tell a swing that dies out: two periods of the
+/// spring and the mass each, and of the flight behind a delay; and if damping b takes the swing
+/// away, at the rate b/(2 m) without a wall and less and less up to the boundary, so long that the
+/// verdict's ratio puts the boundary within 1 % of b (S9 asks for 2). 0 for the latter if
+/// nothing damps: no boundary is near.
+[[nodiscard]] double needed_seconds(const Subject& subject, double stiffness_n_per_mm);
+
+/// The reason if a column cannot exist: its damping alone is beyond what any sampled wall may have,
+/// the emulated device cannot have its delay or rate, or a hit would last for more than ten
+/// minutes; else empty.
+[[nodiscard]] std::string impossible(const MapSpec& spec, const Subject& subject);
+
+/// The column of `values`. Throws Interrupted.
+[[nodiscard]] Column measure_column(const MapSpec& spec, const Assignment& values,
+                                    TickMeter& ticks);
+
+/// Called with each column as it comes, under a lock, and with the ticks that it took.
+using ColumnDone = std::function<void(std::size_t index, Column column, std::uint64_t ticks)>;
+
+/// Measures the columns of `wanted` on `jobs` threads, until all are done or `stop` is set: a
+/// column that is not done then is lost. An exception of a thread is thrown here. A step that does
+/// not end ends the program (`TickWatch`).
+void measure_columns(const MapSpec& spec, const std::vector<std::size_t>& wanted, int jobs,
+                     const std::atomic<bool>& stop, const ColumnDone& done);
+
+}  // namespace kerf::zwidth

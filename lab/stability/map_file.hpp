@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "lab/stability/map.hpp"
+
+/// A map as files: the parts of its shards while they grow, and the finished map as CSV and JSON.
+namespace kerf::zwidth {
+
+/// Part `index` of `count` of a map: the columns whose number leaves index - 1 when divided by
+/// count.
+struct Shard {
+  std::size_t index = 1, count = 1;
+
+  [[nodiscard]] bool has(std::size_t column) const { return column % count == index - 1; }
+};
+
+/// A hash of the program that runs, with every law linked into it: another build may move other
+/// bits.
+[[nodiscard]] const std::string& this_program();
+
+/// The content of a part file: one line of JSON for the map, one for each column.
+struct Part {
+  MapSpec spec;
+  Shard shard;
+  Columns columns;
+  std::string program = this_program();  ///< that measured it
+};
+
+/// The text of a part with its columns in order: the same for the same content.
+[[nodiscard]] std::string part_text(const Part& part);
+
+/// Reads a part file, of any program; a last line that is not whole (of a run that was killed) is
+/// left out. Throws HilError that names `path`.
+[[nodiscard]] Part read_part(const std::string& path);
+
+/// Whole maps from the parts of all shards. Throws HilError if they are not of one map and one
+/// program, or if a part or a column of one is missing or there twice.
+[[nodiscard]] Part merge_parts(const std::vector<std::string>& paths);
+
+/// A part file while its columns come: each is on the disk before the next one is reported. Columns
+/// of the same map by the same program that the file already has are kept.
+class PartWriter {
+ public:
+  /// With an empty path nothing is read or written. Throws HilError if the file has another map or
+  /// is another program's, if another run is at work on it, or if it cannot be written.
+  PartWriter(std::string path, const MapSpec& spec, const Shard& shard);
+  ~PartWriter();
+  PartWriter(const PartWriter&) = delete;
+  PartWriter& operator=(const PartWriter&) = delete;
+
+  [[nodiscard]] const Columns& columns() const { return part_.columns; }
+  void add(std::size_t index, Column column);
+  /// Puts the lines into order.
+  void finish();
+
+ private:
+  void write(const std::string& text);
+  [[noreturn]] void refuse(const std::string& why);
+
+  std::string path_;
+  Part part_;
+  int fd_ = -1;  ///< locked
+};
+
+/// The analytic boundaries of a column, N/mm; 0: none is stable, or the bound is about another loop
+/// (`quantum`: without delay and B). Of the linear loop, without the limits, and with the backward
+/// difference for every estimator.
+struct Analytic {
+  double exact, passive, quantum;
+};
+[[nodiscard]] Analytic analytic_of(const Subject& subject);
+
+/// One row for each cell: all axes, then its figures. A column that cannot exist has no rows.
+[[nodiscard]] std::string csv_of(const Part& part);
+
+/// The map: its axes, and for each column crossings, analytic boundaries and cells.
+[[nodiscard]] std::string json_of(const Part& part);
+
+}  // namespace kerf::zwidth

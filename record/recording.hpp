@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "record/recorder.hpp"
+#include "shared/numeric/energy_source.hpp"
+
+// A recording as its readers use it: manifest, summary, CSV.
+
+namespace kerf {
+
+inline constexpr std::string_view kTickLogName = "ticks.npy";
+inline constexpr std::string_view kManifestName = "manifest.json";
+inline constexpr std::string_view kSceneName = "scene.json";
+inline constexpr std::string_view kStillRunning = "running";
+
+/// Facts about a log beside its rows.
+struct Manifest {
+  std::uint32_t tick_ns = 0;
+  std::vector<double> voxel_mm3;  ///< per volume
+  std::string end_reason;
+  std::uint64_t lost_ticks = 0;  ///< by the recorder; 0 if that was killed
+  std::uint64_t missed_before_start = 0;
+  [[nodiscard]] bool complete() const { return end_reason != kStillRunning; }
+};
+
+/// The files of a recording, of which none may become an output beside it.
+[[nodiscard]] inline std::vector<std::filesystem::path> recording_files(
+    const std::filesystem::path& folder) {
+  return {folder / kTickLogName, folder / kManifestName, folder / kSceneName};
+}
+
+/// Writes manifest.json, whole or not at all.
+void write_manifest(const std::filesystem::path& folder, const SegmentInfo& info,
+                    const Recorder& recorder, std::uint64_t rows, std::string_view end_reason);
+
+/// Throws `RecordError` if it is missing or has no such values.
+[[nodiscard]] Manifest read_manifest(const std::filesystem::path& folder);
+
+/// The figures of one recording.
+struct RecordSummary {
+  std::uint64_t rows = 0;
+  std::uint64_t first_tick = 0;
+  std::uint64_t last_tick = 0;
+  double seconds = 0;
+  /// Published while recording, and in no row: by the sequence numbers of the rows, and after the
+  /// last row by the manifest.
+  std::uint64_t lost_ticks = 0;
+  std::uint64_t missed_before_start = 0;  ///< published and gone before the recorder came
+  std::uint64_t contact_ticks = 0;
+  std::uint64_t shaft_ticks = 0;  ///< shaft or handpiece touched
+  std::uint64_t stale_ticks = 0;
+  std::uint64_t faults = 0;  ///< changes of the fault code to another one than 0
+  std::uint32_t missed_deadlines = 0;
+  std::uint32_t lost_packets = 0;
+  std::uint32_t refused_packets = 0;
+  double peak_force_n = 0;
+  double deepest_mm = 0;
+  double removed_mm3 = 0;      ///< since the last reset
+  double port_energy_mj = 0;   ///< taken from the hand up to the last row
+  double port_minimum_mj = 0;  ///< its lowest value of the run: below 0 the loop gave energy
+  std::array<double, kEnergySources> energy_mj{};  ///< `port_energy_mj` by source
+  std::string end_reason;
+};
+
+/// Reads all of the recording in `folder`. Throws `RecordError`.
+[[nodiscard]] RecordSummary summarise(const std::filesystem::path& folder);
+
+/// Two columns for people.
+[[nodiscard]] std::string to_text(const RecordSummary& summary);
+
+/// The same figures as JSON.
+[[nodiscard]] std::string to_json(const RecordSummary& summary);
+
+/// Writes every row of the recording in `folder` as CSV, whole or not at all: one column per number
+/// (`position_mm_0` ...), floats in the shortest form that reads back to the same bits. Throws
+/// `RecordError`, or `FileError` if the file cannot be written.
+void export_csv(const std::filesystem::path& folder, const std::filesystem::path& csv);
+
+}  // namespace kerf

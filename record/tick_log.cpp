@@ -1,0 +1,180 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "record/tick_log.hpp"
+
+#include <algorithm>
+#include <cerrno>
+#include <charconv>
+#include <string_view>
+#include <system_error>
+#include <utility>
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include "shared/segment/layout_table.hpp"
+#include "shared/volume/checksum.hpp"
+
+namespace kerf {
+namespace {
+
+/// NumPy's name of a type text: "<f8", "|u1".
+[[nodiscard]] std::string numpy_type(std::string_view type) {
+  const std::uint32_t bytes = type_bytes(type);
+  return std::string(bytes == 1 ? "|" : "<") + type.front() + std::to_string(bytes);
+}
+
+/// Writes all of `bytes` at `offset`; 0 or the error.
+[[nodiscard]] int write_at(int fd, const void* data, std::size_t bytes, std::uint64_t offset) {
+  const auto* at = static_cast<const char*>(data);
+  while (bytes > 0) {
+    const ssize_t written = pwrite(fd, at, bytes, static_cast<off_t>(offset));
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0) return errno;
+    if (written == 0) return ENOSPC;
+    at += written;
+    offset += static_cast<std::uint64_t>(written);
+    bytes -= static_cast<std::size_t>(written);
+  }
+  return 0;
+}
+
+}  // namespace
+
+std::string tick_log_header(std::uint64_t rows) {
+  std::string columns;
+  for (const LayoutField& field : kLayoutTable) {
+    if (field.record != "TickRecord") continue;
+    columns += "('" + std::string(field.name) + "', '" + numpy_type(field.type) + "'";
+    if (field.count > 1) columns += ", (" + std::to_string(field.count) + ",)";
+    columns += "), ";
+  }
+  constexpr std::size_t kPreamble = 10;  // magic, version, length of the text
+  std::string header = "\x93NUMPY";
+  header += '\x01';
+  header += '\0';
+  constexpr std::size_t kText = kTickLogHeaderBytes - kPreamble;
+  header += static_cast<char>(kText & 0xff);
+  header += static_cast<char>(kText >> 8);
+  header += "{'descr': [" + columns + "], 'fortran_order': False, 'shape': (" +
+            std::to_string(rows) + ",), }";
+  header.resize(kTickLogHeaderBytes - 1, ' ');
+  return header + '\n';
+}
+
+TickLogWriter::TickLogWriter(std::filesystem::path path) : path_(std::move(path)) {
+  fd_ = open(path_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+  if (fd_ < 0 && errno == EEXIST) {
+    throw RecordError(path_.string() + ": holds a recording; choose another --out");
+  }
+  if (fd_ < 0) fail(errno);
+  buffer_.reserve(kBufferRows);
+  write_header();
+}
+
+TickLogWriter::~TickLogWriter() {
+  if (fd_ >= 0) close(fd_);
+}
+
+void TickLogWriter::append(const TickRecord& record) {
+  if (buffer_.size() == kBufferRows) flush();
+  buffer_.push_back(record);
+}
+
+void TickLogWriter::flush() {
+  const std::uint64_t offset = kTickLogHeaderBytes + written_ * sizeof(TickRecord);
+  const int error = write_at(fd_, buffer_.data(), buffer_.size() * sizeof(TickRecord), offset);
+  if (error != 0) fail(error);
+  written_ += buffer_.size();
+  buffer_.clear();
+}
+
+void TickLogWriter::sync() {
+  flush();
+  if (fdatasync(fd_) != 0) fail(errno);
+  write_header();
+  if (fdatasync(fd_) != 0) fail(errno);
+}
+
+void TickLogWriter::write_header() {
+  const std::string header = tick_log_header(written_);
+  const int error = write_at(fd_, header.data(), header.size(), 0);
+  if (error != 0) fail(error);
+}
+
+void TickLogWriter::fail(int error) {
+  if (fd_ >= 0) {
+    // Complete rows stay usable: cut the row that did not fit, count the others. The header is on a
+    // block that the file already has.
+    const auto whole = static_cast<off_t>(kTickLogHeaderBytes + written_ * sizeof(TickRecord));
+    const std::string header = tick_log_header(written_);
+    if (ftruncate(fd_, whole) == 0 && written_ > 0) {
+      static_cast<void>(write_at(fd_, header.data(), header.size(), 0));
+    }
+    buffer_.clear();
+  }
+  throw RecordError(path_.string() + ": cannot be written (" +
+                    std::generic_category().message(error) +
+                    "); make room or choose another --out");
+}
+
+namespace {
+
+/// The row count of `header`; throws if it is not `tick_log_header` of that count.
+[[nodiscard]] std::uint64_t rows_of(const std::string& header, const std::string& path) {
+  constexpr std::string_view kShape = "'shape': (";
+  const std::size_t at = header.find(kShape);
+  std::uint64_t rows = 0;
+  if (at != std::string::npos) {
+    const char* const digits = header.data() + at + kShape.size();
+    std::from_chars(digits, header.data() + header.size(), rows);
+  }
+  if (header != tick_log_header(rows)) {
+    throw RecordError(path + ": not a tick log of this version; record it again");
+  }
+  return rows;
+}
+
+}  // namespace
+
+TickLogReader::TickLogReader(std::filesystem::path path) : path_(std::move(path)) {
+  std::error_code fault;
+  const bool is_file =
+      std::filesystem::is_regular_file(path_, fault);  // a pipe would be waited for
+  if (is_file) file_.open(path_, std::ios::binary);
+  if (!file_.is_open()) {
+    throw RecordError(path_.string() + ": cannot be read; give the folder of a recording");
+  }
+  std::string header(kTickLogHeaderBytes, '\0');
+  file_.read(header.data(), static_cast<std::streamsize>(header.size()));
+  const std::uint64_t counted = rows_of(header, path_.string());
+  file_.clear();
+  file_.seekg(0, std::ios::end);
+  const auto bytes = static_cast<std::uint64_t>(file_.tellg());
+  rows_ = bytes < kTickLogHeaderBytes ? 0 : (bytes - kTickLogHeaderBytes) / sizeof(TickRecord);
+  if (rows_ < counted) {
+    throw RecordError(path_.string() + ": " + std::to_string(rows_) + " rows of " +
+                      std::to_string(counted) + "; the file was cut, copy it again");
+  }
+}
+
+void TickLogReader::for_each(const std::function<void(const TickRecord&)>& visit) {
+  constexpr std::size_t kChunkRows = 1024;
+  std::vector<TickRecord> chunk(kChunkRows);
+  file_.clear();
+  file_.seekg(kTickLogHeaderBytes);
+  for (std::uint64_t row = 0; row < rows_;) {
+    const auto count = static_cast<std::size_t>(std::min<std::uint64_t>(kChunkRows, rows_ - row));
+    file_.read(reinterpret_cast<char*>(chunk.data()),
+               static_cast<std::streamsize>(count * sizeof(TickRecord)));
+    if (!file_) throw RecordError(path_.string() + ": cannot be read; copy it again");
+    for (std::size_t i = 0; i < count; ++i, ++row) {
+      if (tick_record_crc(chunk[i]) != chunk[i].crc32c) {
+        throw RecordError(path_.string() + ": row " + std::to_string(row) +
+                          " has a wrong checksum; copy it again");
+      }
+      visit(chunk[i]);
+    }
+  }
+}
+
+}  // namespace kerf

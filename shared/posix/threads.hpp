@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <ctime>
+#include <system_error>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include <pthread.h>
+
+namespace kerf {
+
+/// Cores that this process may use, in order; a container may hold fewer than the machine has. By
+/// convention the servo and its device take the last one, the visualizer the others.
+[[nodiscard]] std::vector<int> allowed_cores();
+
+/// SCHED_FIFO `priority` for the calling thread. Returns 0 or the system's error number.
+[[nodiscard]] int set_fifo(int priority) noexcept;
+
+/// Keeps the calling thread on one core. Returns 0 or the system's error number.
+[[nodiscard]] int pin_to_core(int core) noexcept;
+
+/// Keeps the calling thread on the other cores that it may use. Returns 0 or the system's error
+/// number; EINVAL, and the thread stays where it is, when there is no other.
+[[nodiscard]] int leave_core(int core) noexcept;
+
+/// A thread that shares in a work; where the system has none left the work is done here, at once,
+/// and the thread that is returned is none.
+template <class Work>
+[[nodiscard]] std::jthread helper_thread(const Work& work) {
+  try {
+    return std::jthread(work);
+  } catch (const std::system_error&) {
+    work();
+    return {};
+  }
+}
+
+/// Tells, from another thread, that a step of a thread does not end: a loop in somebody's own law.
+/// It goes by the thread's own CPU time, so neither a wait nor a busy machine looks like one. Such
+/// a thread cannot be ended, only its program.
+class EndlessStep {
+ public:
+  static constexpr int kMostSeconds = 5;  ///< of CPU time for one step; the longest takes some ms
+
+  /// Of a living thread that counts its steps in `steps`.
+  EndlessStep(pthread_t thread, const std::atomic<std::uint64_t>& steps,
+              int most_seconds = kMostSeconds) noexcept
+      : steps_(steps), most_seconds_(most_seconds) {
+    known_ = pthread_getcpuclockid(thread, &clock_) == 0;
+  }
+
+  /// Now and then, from one thread. False where the thread has ended.
+  [[nodiscard]] bool look() noexcept {
+    timespec used{};
+    if (!known_ || clock_gettime(clock_, &used) != 0) return false;
+    const std::uint64_t steps = steps_.load(std::memory_order_relaxed);
+    if (steps != last_steps_ || !looked_) {
+      last_steps_ = steps;
+      since_ = used.tv_sec;
+      looked_ = true;
+    }
+    return used.tv_sec - since_ > most_seconds_;
+  }
+
+ private:
+  const std::atomic<std::uint64_t>& steps_;
+  int most_seconds_;
+  clockid_t clock_{};
+  bool known_ = false;
+  bool looked_ = false;
+  std::uint64_t last_steps_ = 0;
+  std::time_t since_ = 0;
+};
+
+}  // namespace kerf

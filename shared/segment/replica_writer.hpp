@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "shared/segment/layout.hpp"
+#include "shared/segment/segment.hpp"
+#include "shared/segment/seqlock.hpp"
+#include "shared/volume/brick_grid.hpp"
+
+namespace kerf {
+
+/// What never changes of a segment on another machine. Times are of the local CLOCK_MONOTONIC.
+struct MirrorSpec {
+  std::uint64_t session_id = 0;
+  std::uint64_t config_hash = 0;
+  std::uint64_t start_ns = 0;
+  std::uint32_t tick_ns = 0;
+  std::uint32_t scene_bytes = 0;
+  std::string build_id;                   ///< cut to 63 characters
+  std::vector<VolumeDescriptor> volumes;  ///< off_labels not 0: has labels; no other offset counts
+  std::uint64_t most_bytes = std::uint64_t{1} << 31;  ///< a larger segment is refused
+};
+
+/// The writer of a segment that repeats another machine's: same session, text, bricks, versions and
+/// records, so that every reader runs on it unchanged. Outside the servo; one thread.
+///
+/// The order is put_scene and put_labels (before a reader has the segment), then for each state of
+/// the volume begin_pass, put_brick (0 or more), end_pass. Readers see a pass whole or know that
+/// they do not. What arrives for a place that the segment has not is a `SegmentError`.
+class MirrorWriter {
+ public:
+  /// Checks `spec`, which may be hostile, before it asks for memory. Throws `SegmentError`.
+  [[nodiscard]] static MirrorWriter create(const MirrorSpec& spec);
+
+  /// The sealed memfd, for `SegmentServer`; owned by the writer.
+  [[nodiscard]] int fd() const noexcept { return memory_.fd(); }
+  [[nodiscard]] std::uint64_t session_id() const noexcept { return header_.session_id; }
+  [[nodiscard]] std::uint64_t total_bytes() const noexcept { return header_.total_bytes; }
+  [[nodiscard]] const std::vector<VolumeDescriptor>& volumes() const noexcept { return volumes_; }
+
+  void put_scene(std::uint64_t offset, std::span<const std::byte> text);
+  /// The labels of a brick, x fastest; those beyond the far faces are dropped.
+  void put_labels(std::size_t volume, std::uint32_t brick, std::span<const std::byte> labels);
+
+  /// From here on no reader takes the volumes for those of one tick.
+  void begin_pass(Tick tick) noexcept;
+  /// `version` is even and above the brick's last one; `densities` are 1024 bytes.
+  void put_brick(std::size_t volume, std::uint32_t brick, std::uint64_t version,
+                 std::span<const std::byte> densities);
+  /// The volumes are those of `tick`.
+  void end_pass(Tick tick) noexcept;
+
+  /// A record of the ring; `seq` and the checksum are filled in. An index that is not above the
+  /// last one is ignored, and those left out read as `ReadState::overrun`.
+  void put_record(std::uint64_t index, const TickRecord& record) noexcept;
+  void put_record(std::uint64_t index, const DirtyRecord& record) noexcept;
+
+  void beat(std::uint64_t heartbeat_ns) noexcept;
+  void set_lifecycle(Lifecycle lifecycle) noexcept;
+
+ private:
+  explicit MirrorWriter(SegmentMemory memory) noexcept : memory_(std::move(memory)) {}
+  [[nodiscard]] std::byte* at(std::uint64_t offset) const noexcept {
+    return memory_.bytes().data() + offset;
+  }
+  [[nodiscard]] BrickGrid bricks_of(std::size_t volume, std::uint32_t brick) const;
+
+  SegmentMemory memory_;
+  SegmentHeader header_{};  // as written
+  std::vector<VolumeDescriptor> volumes_;
+  RecordRing<TickRecord> ticks_;
+  RecordRing<DirtyRecord> boxes_;
+};
+
+}  // namespace kerf

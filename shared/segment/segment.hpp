@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <system_error>
+#include <vector>
+
+#include "shared/segment/layout.hpp"
+#include "shared/volume/brick_grid.hpp"
+
+namespace kerf {
+
+/// A segment that cannot be made, reached or trusted. One line: "place: value; way out".
+class SegmentError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// No controller of that name answers (yet): worth trying again, unlike every other SegmentError.
+class SegmentAbsent : public SegmentError {
+ public:
+  using SegmentError::SegmentError;
+};
+
+/// The text of an `errno`; unlike strerror, for any thread.
+[[nodiscard]] inline std::string system_message(int error) {
+  return std::generic_category().message(error);
+}
+
+/// One volume, as readers are to see it at tick 0.
+struct SegmentVolumeSpec {
+  VoxelGrid grid;  ///< each edge 1..65535
+  std::array<double, 3> spacing_mm{1, 1, 1};
+  std::array<double, 3> origin_mm{0, 0, 0};  ///< world position of the centre of voxel (0, 0, 0)
+  std::array<float, 4> orientation{0, 0, 0, 1};
+  std::uint32_t material = 0;
+  std::uint32_t iso = 32768;
+  std::span<const Density> density;  ///< copied by `create`
+  std::span<const Label> labels;     ///< empty, or one per voxel; copied by `create`
+};
+
+/// All that a segment is made from.
+struct SegmentSpec {
+  std::vector<SegmentVolumeSpec> volumes;  ///< 1..8
+  std::string scene_json;
+  std::uint64_t config_hash = 0;
+  std::uint32_t tick_ns = 1'000'000;
+  std::string build_id;        ///< cut to 63 characters
+  bool mirror_updates = true;  ///< false: nothing is cut, so no dirty ring and no brick updates
+};
+
+/// Where everything goes: the static header and the descriptors, filled except for the magic, the
+/// session, the start time and the content hashes.
+struct SegmentPlan {
+  SegmentHeader header{};
+  std::vector<VolumeDescriptor> volumes;
+};
+
+/// Checks `spec` and lays it out. Throws `SegmentError`.
+[[nodiscard]] SegmentPlan plan_segment(const SegmentSpec& spec);
+
+/// Cut to what the header holds.
+void set_build_id(SegmentHeader& header, std::string_view build_id);
+
+/// Fills what every segment has and all places, from the volumes' sizes (`off_labels` not 0: has
+/// labels), the scene's size and the slots of the dirty ring.
+void lay_out(SegmentPlan& plan);
+
+/// Checks a plan that is laid out, by the rules of `parse_segment`. Throws `SegmentError`.
+void check_plan(const SegmentPlan& plan);
+
+/// A memfd, mapped writable by its maker only, populated and locked where the limits allow.
+class SegmentMemory {
+ public:
+  /// Throws `SegmentError` where `bytes` are not to be had.
+  [[nodiscard]] static SegmentMemory create(std::uint64_t bytes);
+  SegmentMemory(SegmentMemory&& other) noexcept;
+  SegmentMemory& operator=(SegmentMemory&& other) noexcept;
+  ~SegmentMemory();
+
+  /// From here on nobody resizes it, and nobody else maps or writes it writable.
+  void seal();
+
+  [[nodiscard]] int fd() const noexcept { return fd_; }
+  [[nodiscard]] bool locked() const noexcept { return locked_; }
+  [[nodiscard]] std::span<std::byte> bytes() const noexcept { return bytes_; }
+
+ private:
+  SegmentMemory() = default;
+  int fd_ = -1;
+  bool locked_ = false;
+  std::span<std::byte> bytes_;
+};
+
+/// Random, never 0.
+[[nodiscard]] std::uint64_t random_session_id();
+
+}  // namespace kerf

@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+
+namespace kerf {
+
+/// The one protocol by which data crosses the segment: a seqlock in the form with fences (Boehm).
+///
+///     writer   version = odd (relaxed); fence(release); words (relaxed); version = even (release)
+///     reader   v = version (acquire); words (relaxed); fence(acquire); version (relaxed) == v?
+///
+/// Every shared word goes through `atomic_ref`, so there is no data race to begin with; the fences
+/// order data against version. ThreadSanitizer knows no fences: under KERF_TSAN each data word is a
+/// release store or an acquire load instead, which orders the same.
+namespace shared_words {
+
+static_assert(std::atomic_ref<std::uint64_t>::is_always_lock_free);
+static_assert(std::atomic_ref<std::uint32_t>::is_always_lock_free);
+
+#ifdef KERF_TSAN
+inline constexpr std::memory_order kDataStore = std::memory_order_release;
+inline constexpr std::memory_order kDataLoad = std::memory_order_acquire;
+inline void fence(std::memory_order) noexcept {}
+#else
+inline constexpr std::memory_order kDataStore = std::memory_order_relaxed;
+inline constexpr std::memory_order kDataLoad = std::memory_order_relaxed;
+inline void fence(std::memory_order order) noexcept {
+  std::atomic_thread_fence(order);
+}
+#endif
+
+/// The word at `at`, which is aligned and lies in the segment.
+template <class Word = std::uint64_t>
+[[nodiscard]] inline std::atomic_ref<Word> word(std::byte* at) noexcept {
+  return std::atomic_ref<Word>(*reinterpret_cast<Word*>(at));
+}
+
+/// Writer: from here until `close` the data under `version` is in motion.
+inline void open(std::byte* version, std::uint64_t odd) noexcept {
+  word(version).store(odd, std::memory_order_relaxed);
+  fence(std::memory_order_release);
+}
+inline void close(std::byte* version, std::uint64_t even) noexcept {
+  word(version).store(even, std::memory_order_release);
+}
+
+/// Writer: copies `bytes` (a multiple of 8) into the segment.
+inline void store(std::byte* to, const void* from, std::size_t bytes) noexcept {
+  const auto* source = static_cast<const std::byte*>(from);
+  for (std::size_t i = 0; i < bytes; i += 8) {
+    std::uint64_t value = 0;
+    std::memcpy(&value, source + i, 8);
+    word(to + i).store(value, kDataStore);
+  }
+}
+
+/// Reader: copies `bytes` (a multiple of 8) out of the segment; whole only if `unchanged` says so.
+inline void load(void* to, std::byte* from, std::size_t bytes) noexcept {
+  auto* target = static_cast<std::byte*>(to);
+  for (std::size_t i = 0; i < bytes; i += 8) {
+    const std::uint64_t value = word(from + i).load(kDataLoad);
+    std::memcpy(target + i, &value, 8);
+  }
+}
+
+/// Reader: true where nothing was written under `version` since it was loaded (acquire) as `seen`.
+[[nodiscard]] inline bool unchanged(std::byte* version, std::uint64_t seen) noexcept {
+  fence(std::memory_order_acquire);
+  return word(version).load(std::memory_order_relaxed) == seen;
+}
+
+}  // namespace shared_words
+
+/// The writer's side of a ring of records in the segment, with a private counter: the segment is
+/// never read back. Record i lies in slot i mod slots under the version 2 i + 2. One thread.
+template <class Record>
+struct RecordRing {
+  std::byte* slots = nullptr;
+  std::byte* head = nullptr;
+  std::uint64_t mask = 0;       ///< slots - 1
+  std::uint64_t published = 0;  ///< index of the next record
+
+  void push(const Record& record) noexcept {
+    std::byte* const slot = slots + (published & mask) * sizeof(Record);
+    shared_words::open(slot, 2 * published + 1);
+    shared_words::store(slot + 8, reinterpret_cast<const std::byte*>(&record) + 8,
+                        sizeof(Record) - 8);
+    shared_words::close(slot, 2 * published + 2);
+    shared_words::word(head).store(++published, std::memory_order_release);
+  }
+
+  /// Goes on at `index`, which grows: what lies between never comes. Their slots say so as if the
+  /// record of the next round were being written, which readers take for `ReadState::overrun`.
+  void skip_to(std::uint64_t index) noexcept {
+    if (index <= published) return;
+    const std::uint64_t round = mask + 1;
+    for (std::uint64_t i = std::max(published, index - std::min(index, round)); i < index; ++i) {
+      shared_words::open(slots + (i & mask) * sizeof(Record), 2 * (i + round) + 1);
+    }
+    published = index;
+  }
+};
+
+}  // namespace kerf

@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "shared/volume/voxel_grid.hpp"
+
+namespace kerf {
+
+/// Amounts of density by the index of their material; a full voxel is kDensityMax steps.
+using StepsByMaterial = std::vector<std::uint64_t>;
+
+/// Says which material a voxel is of. A label decides. Without one the voxel's first density does:
+/// it is of the densest material that this density reaches, or of the softest where it reaches
+/// none. So cutting changes no voxel's material. Pictures colour voxels by the same rule.
+class MaterialRule {
+ public:
+  /// Density, 0..1, from which each material shows; index 0 is "none", which no voxel reaches.
+  explicit MaterialRule(std::span<const double> isos)
+      : count_(std::max<std::size_t>(isos.size(), 1)) {
+    std::vector<std::pair<double, std::size_t>> order;
+    for (std::size_t m = 1; m < isos.size(); ++m) order.emplace_back(isos[m], m);
+    std::stable_sort(order.begin(), order.end(),
+                     [](const auto& a, const auto& b) { return a.first < b.first; });
+    for (const auto& [iso, material] : order) {
+      const double from = by_density_.empty() ? 0.0 : std::clamp(iso, 0.0, 1.0) * kDensityMax;
+      by_density_.emplace_back(from, material);
+    }
+  }
+
+  [[nodiscard]] std::size_t count() const noexcept { return count_; }
+
+  [[nodiscard]] std::size_t of(Label label, Density first) const noexcept {
+    if (label > 0 && label < count_) return label;
+    std::size_t material = 0;
+    for (const auto& [from, index] : by_density_) {
+      if (first >= from) material = index;
+    }
+    return material;
+  }
+
+ private:
+  std::size_t count_;
+  std::vector<std::pair<double, std::size_t>> by_density_;  ///< from the softest
+};
+
+/// Adds to `removed` what a volume lacks of its first content; `labels` may be empty.
+inline void add_removed(const MaterialRule& rule, std::span<const Density> first,
+                        std::span<const Density> now, std::span<const Label> labels,
+                        StepsByMaterial& removed) {
+  removed.resize(rule.count());
+  for (std::size_t i = 0; i < first.size(); ++i) {
+    if (now[i] >= first[i]) continue;
+    removed[rule.of(labels.empty() ? Label{0} : labels[i], first[i])] +=
+        static_cast<std::uint64_t>(first[i] - now[i]);
+  }
+}
+
+inline constexpr std::size_t kLabelColours = 14;
+
+/// Linear RGB of label `label`, from 1: Okabe and Ito's colours ("Color Universal Design", 2008),
+/// which differ for every kind of colour vision, the lightest first: what is cut first is seen
+/// best. After seven they come once more, darker; after 14 they repeat.
+[[nodiscard]] inline std::array<double, 3> label_colour(std::size_t label) {
+  constexpr std::array<std::array<double, 3>, 7> kScreen{{{86, 180, 233},   // sky blue
+                                                          {240, 228, 66},   // yellow
+                                                          {213, 94, 0},     // vermilion
+                                                          {0, 158, 115},    // bluish green
+                                                          {204, 121, 167},  // reddish purple
+                                                          {0, 114, 178},    // blue
+                                                          {230, 159, 0}}};  // orange
+  constexpr double kGamma = 2.2;
+  constexpr double kDarker = 0.18;  // no two of 14 are nearer then, for any kind of vision
+  const std::size_t at = (label - 1) % kLabelColours;
+  std::array<double, 3> colour{};
+  for (std::size_t i = 0; i < 3; ++i) {
+    colour[i] = std::pow(kScreen[at % kScreen.size()][i] / 255, kGamma) *
+                (at < kScreen.size() ? 1 : kDarker);
+  }
+  return colour;
+}
+
+}  // namespace kerf

@@ -1,0 +1,218 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <numbers>
+#include <optional>
+#include <span>
+#include <string>
+
+#include "shared/numeric/vec.hpp"
+#include "shared/wire/little_endian.hpp"
+#include "shared/wire/personality.hpp"
+
+namespace kerf {
+
+/// What one side of kerf's own links (SEQPACKET, UDP) is set up for. The controller says it before
+/// anything else, and the emulator answers with its own; what the device said before that answer is
+/// void. A host that is not kerf's says none, and is served as it is: no packet of a device or for
+/// one has this length. Real buses carry no hello.
+struct LinkHello {
+  Personality personality{};
+  bool lockstep = false;
+  int rate_hz = 1000;  ///< of the servo; of an emulator in real time, that of its looks at the host
+  friend bool operator==(const LinkHello&, const LinkHello&) noexcept = default;
+};
+
+inline constexpr std::size_t kHelloBytes = 20;
+using HelloBytes = std::array<std::uint8_t, kHelloBytes>;
+// The last byte is the version: another one's hello is none, and stays without an answer.
+inline constexpr std::array<std::uint8_t, 8> kHelloMagic{'k', 'e', 'r', 'f', 0, 'h', 'i', 1};
+
+[[nodiscard]] constexpr HelloBytes encode(const LinkHello& hello) noexcept {
+  HelloBytes bytes{};
+  std::copy(kHelloMagic.begin(), kHelloMagic.end(), bytes.begin());
+  bytes[8] = static_cast<std::uint8_t>(hello.personality);
+  bytes[9] = hello.lockstep ? 1 : 0;
+  wire::put_u32(bytes, 12, static_cast<std::uint32_t>(hello.rate_hz));
+  return bytes;
+}
+
+/// Nothing for any other packet.
+[[nodiscard]] constexpr std::optional<LinkHello> decode_hello(
+    std::span<const std::uint8_t> bytes) noexcept {
+  if (bytes.size() != kHelloBytes) return std::nullopt;
+  if (!std::equal(kHelloMagic.begin(), kHelloMagic.end(), bytes.begin())) return std::nullopt;
+  constexpr std::uint32_t kFastestHz = 8000;
+  const std::uint32_t rate_hz = wire::get_u32(bytes, 12);
+  if (bytes[8] >= kPersonalityWords.size() || bytes[9] > 1 || rate_hz > kFastestHz) {
+    return std::nullopt;
+  }
+  const LinkHello hello{static_cast<Personality>(bytes[8]), bytes[9] == 1,
+                        static_cast<int>(rate_hz)};
+  const HelloBytes same = encode(hello);
+  if (!std::equal(same.begin(), same.end(), bytes.begin())) return std::nullopt;
+  return hello;
+}
+
+/// Why the two cannot work together, and what to change, as both tell it; empty: they can. In real
+/// time each side keeps its own rate.
+[[nodiscard]] inline std::string discord(const LinkHello& controller, const LinkHello& emulator) {
+  const auto word = [](const LinkHello& hello) {
+    return std::string(kPersonalityWords[static_cast<std::size_t>(hello.personality)]);
+  };
+  const auto hz = [](const LinkHello& hello) { return std::to_string(hello.rate_hz); };
+  if (controller.personality != emulator.personality) {
+    return "the controller wants a device " + word(controller) + ", the emulator is " +
+           word(emulator) + "; start kerf-emulator with --personality " + word(controller) +
+           ", or kerf-controller with --device " + word(emulator);
+  }
+  if (controller.lockstep && !emulator.lockstep) {
+    return "the controller runs in lock-step, the emulator by its clock; start kerf-emulator with "
+           "--lockstep --rate " +
+           hz(controller) + ", or kerf-controller without --virtual";
+  }
+  if (emulator.lockstep && !controller.lockstep) {
+    return "the emulator runs in lock-step, the controller by its clock; start kerf-controller "
+           "with --virtual, or kerf-emulator without --lockstep";
+  }
+  if (controller.lockstep && controller.rate_hz != emulator.rate_hz) {
+    return "lock-step at " + hz(controller) + " Hz in the controller, at " + hz(emulator) +
+           " Hz in the emulator; start both with the same --rate";
+  }
+  return "";
+}
+
+/// All packets of a device in one tick of a lock-step run, in one datagram of kerf's own links:
+/// magic, then each packet behind a byte with its length. Without packets it says that nothing
+/// came, so that a fault that keeps packets back does not stop both sides.
+///
+/// Its first bytes are no packet's of any device that is known here.
+class Turn {
+ public:
+  static constexpr std::array<std::uint8_t, 8> kMagic{'k', 'e', 'r', 'f', 0, 't', 'n', 1};
+  /// The longest turn; more packets of one tick than 15 of the longest are no device's.
+  static constexpr std::size_t kMostBytes = 1024;
+
+  Turn() noexcept { std::copy(kMagic.begin(), kMagic.end(), bytes_.begin()); }
+
+  /// False: there is no room, or the packet is empty or longer than 255 bytes.
+  bool add(std::span<const std::uint8_t> packet) noexcept {
+    if (packet.empty() || packet.size() > 255 || size_ + 1 + packet.size() > kMostBytes)
+      return false;
+    bytes_[size_] = static_cast<std::uint8_t>(packet.size());
+    std::copy(packet.begin(), packet.end(),
+              bytes_.begin() + static_cast<std::ptrdiff_t>(size_ + 1));
+    size_ += 1 + packet.size();
+    return true;
+  }
+  [[nodiscard]] std::span<const std::uint8_t> bytes() const noexcept {
+    return std::span(bytes_).first(size_);
+  }
+
+  [[nodiscard]] static bool is_turn(std::span<const std::uint8_t> bytes) noexcept {
+    return bytes.size() >= kMagic.size() && std::equal(kMagic.begin(), kMagic.end(), bytes.begin());
+  }
+  /// The packet at the head of what follows the magic, which is taken off; empty at the end, or
+  /// where a length leads beyond it.
+  [[nodiscard]] static std::span<const std::uint8_t> next(
+      std::span<const std::uint8_t>& rest) noexcept {
+    if (rest.empty() || rest.size() - 1 < rest[0]) return {};
+    const auto packet = rest.subspan(1, rest[0]);
+    rest = rest.subspan(1 + packet.size());
+    return packet;
+  }
+
+ private:
+  std::array<std::uint8_t, kMostBytes> bytes_{};
+  std::size_t size_ = kMagic.size();
+};
+
+/// Where a user who leads the emulated hand wants it to be: what a window tells kerf-emulator
+/// (`--hand-socket`) in each of its frames, one wish a packet. Whole numbers, so that every packet
+/// of the right length names a place within the limits below; what the hand makes of it, and what
+/// it does when no wish comes any more, is `GuidedHand`'s.
+struct HandWish {
+  DeviceVec<double> tip_mm;                 ///< in steps of 1 um, each axis up to kMaxWishMm
+  std::array<double, 3> orientation_rad{};  ///< as of `HandGoal`, up to kMaxWishRad each
+  bool button1 = false, button2 = false;
+  bool park = false;  ///< go to the rest pose, stay there a moment, and come back
+  friend bool operator==(const HandWish&, const HandWish&) noexcept = default;
+};
+
+inline constexpr double kMaxWishMm = 500;  ///< from the device's origin: no arm of these is longer
+inline constexpr double kMaxWishRad = std::numbers::pi / 3;  ///< a wrist bends no further
+
+inline constexpr std::size_t kHandWishBytes = 36;
+using HandWishBytes = std::array<std::uint8_t, kHandWishBytes>;
+// The last byte is the version.
+inline constexpr std::array<std::uint8_t, 8> kHandWishMagic{'k', 'e', 'r', 'f', 0, 'h', 'w', 1};
+
+/// What the emulator says first to one that connects: the same version, and whether the hand is its
+/// to lead. One leads at a time; to another `taken` is said, and the connection closed.
+enum class HandGreeting : std::uint8_t { yours, taken };
+using HandGreetingBytes = std::array<std::uint8_t, 9>;
+
+[[nodiscard]] inline HandWishBytes encode(const HandWish& wish) noexcept {
+  constexpr double kSteps = 1e6;  // urad per rad; mm become um with a thousandth of it
+  const auto steps = [](double value, double most, double per_unit) {
+    const double within = value == value ? std::clamp(value, -most, most) : 0.0;
+    return static_cast<std::uint32_t>(static_cast<std::int32_t>(std::lround(within * per_unit)));
+  };
+  HandWishBytes bytes{};
+  std::copy(kHandWishMagic.begin(), kHandWishMagic.end(), bytes.begin());
+  const std::array<double, 3> tip{wish.tip_mm.x, wish.tip_mm.y, wish.tip_mm.z};
+  for (std::size_t i = 0; i < 3; ++i) {
+    wire::put_u32(bytes, 8 + 4 * i, steps(tip[i], kMaxWishMm, kSteps / 1000));
+    wire::put_u32(bytes, 20 + 4 * i, steps(wish.orientation_rad[i], kMaxWishRad, kSteps));
+  }
+  bytes[32] = static_cast<std::uint8_t>((wish.button1 ? 1 : 0) | (wish.button2 ? 2 : 0) |
+                                        (wish.park ? 4 : 0));
+  return bytes;
+}
+
+/// Nothing for what is no wish of this version. Numbers beyond the limits are taken as the limits.
+[[nodiscard]] inline std::optional<HandWish> decode_hand_wish(
+    std::span<const std::uint8_t> bytes) noexcept {
+  if (bytes.size() != kHandWishBytes ||
+      !std::equal(kHandWishMagic.begin(), kHandWishMagic.end(), bytes.begin()) || bytes[32] > 7) {
+    return std::nullopt;
+  }
+  const auto value = [&](std::size_t at, double most, double unit) {
+    const auto steps = static_cast<std::int32_t>(wire::get_u32(bytes, at));
+    return std::clamp(steps * unit, -most, most);
+  };
+  HandWish wish;
+  wish.tip_mm = {value(8, kMaxWishMm, 1e-3), value(12, kMaxWishMm, 1e-3),
+                 value(16, kMaxWishMm, 1e-3)};
+  for (std::size_t i = 0; i < 3; ++i) {
+    wish.orientation_rad[i] = value(20 + 4 * i, kMaxWishRad, 1e-6);
+  }
+  wish.button1 = (bytes[32] & 1) != 0;
+  wish.button2 = (bytes[32] & 2) != 0;
+  wish.park = (bytes[32] & 4) != 0;
+  return wish;
+}
+
+[[nodiscard]] inline HandGreetingBytes encode(HandGreeting greeting) noexcept {
+  HandGreetingBytes bytes{};
+  std::copy(kHandWishMagic.begin(), kHandWishMagic.end(), bytes.begin());
+  bytes[8] = static_cast<std::uint8_t>(greeting);
+  return bytes;
+}
+
+/// Nothing for another version's.
+[[nodiscard]] inline std::optional<HandGreeting> decode_hand_greeting(
+    std::span<const std::uint8_t> bytes) noexcept {
+  if (bytes.size() != HandGreetingBytes{}.size() ||
+      !std::equal(kHandWishMagic.begin(), kHandWishMagic.end(), bytes.begin()) || bytes[8] > 1) {
+    return std::nullopt;
+  }
+  return static_cast<HandGreeting>(bytes[8]);
+}
+
+}  // namespace kerf

@@ -1,0 +1,17 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+# slices.sh KERF_LAB: the day's part of the tests that only .ci/all runs as a whole: the fault matrix, random presses, and the
+# ends of scene keys. UTC; KERF_FAULT_DAY=20260131 repeats a day.
+set -euo pipefail
+lab=$1
+day=${KERF_FAULT_DAY:-$(date -u +%Y%m%d)}
+part() {
+  echo "slices: this part is repeated by: ./kerf lab $*"
+  "$lab" "$@"
+}
+devices=(omni falcon woodenhaptics)
+part faults --device "${devices[day % 3]}" --seed-base "$day" --seeds 1
+# Twenty presses a scene: two of the twenty scenes of the test `traps`.
+part extremes --only traps --presses 40 --seed "$((15580 + 2 * (day % 10)))"
+part ranges --combinations 10 --seed "$day"
+part ranges --combinations 0 --hours 0.01

@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <span>
+#include <string>
+#include <utility>
+
+#include <glm/glm.hpp>
+
+#include "shared/wire/emulator_link.hpp"
+#include "visualizer/gl/window.hpp"
+#include "visualizer/panels/overlay.hpp"
+#include "visualizer/scene/camera.hpp"
+#include "visualizer/scene/scene_view.hpp"
+
+namespace kerf {
+
+/// Where the hand wants to be, as the pointer says it.
+///
+/// The goal is a point of the world. It moves with the pointer in the plane through it that faces
+/// the eye, and along the ray from the eye with wheel, keys and sticks; while the left button is
+/// down it lies `kPressMm` deeper. It stands under the pointer, at the tool's own depth, when the
+/// pointer, its wheel or its button is first used, when the pointer comes from outside or from a
+/// panel, and again on `come`. A camera that turns or moves leaves it where it is. Lengths below
+/// are mm of the hand: of the world, times the scene's scale.
+class PointerHand {
+ public:
+  static constexpr double kWheelMm = 0.25;   ///< a notch
+  static constexpr double kPressMm = 3.0;    ///< at the emulated grip, 0.5 N/mm, up to 1.5 N
+  static constexpr double kHeldMmPerS = 20;  ///< keys and sticks
+  static constexpr double kHeldRadPerS = 0.8;
+  static constexpr double kMostAheadMm = 15;  ///< deeper than the tool: nobody winds back more
+
+  /// One frame that lasts `frame_s`. `over_panel`: the pointer is a panel's. `tool_mm`: where the
+  /// tool is seen.
+  void step(const WindowInput& input, bool over_panel, const View& view, PictureSize size,
+            const glm::dvec3& tool_mm, const DeviceFrame& device, double frame_s);
+  /// The goal goes back under the pointer.
+  void come() noexcept { under_pointer_ = false; }
+
+  /// Whether the user holds the hand: the pointer is over the window, or a gamepad came after it.
+  [[nodiscard]] bool leads() const noexcept { return leads_ && goal_mm_.has_value(); }
+  /// With what the left button adds; none before the pointer came.
+  [[nodiscard]] std::optional<glm::dvec3> goal_mm() const;
+  [[nodiscard]] HandWish wish(const DeviceFrame& device) const;
+
+ private:
+  std::optional<glm::dvec3> goal_mm_;
+  glm::dvec3 press_mm_{0.0};
+  glm::dvec2 tilt_rad_{0.0};
+  bool under_pointer_ = false;  ///< since the pointer came
+  bool leads_ = false, by_pad_ = false;
+};
+
+/// What a SpaceMouse of 3Dconnexion holds: six axes and the first button.
+///
+/// x points right, y to the user, z down; the rotations are right-handed about them. An axis says
+/// how far the cap is pushed, -1 to 1; the cap springs back, and then says 0.
+struct SpaceMouseState {
+  std::array<double, 3> push{}, turn{};
+  bool button = false;
+};
+
+/// Takes an input report as it comes from hidraw, its identity first; false, and `state` as it was,
+/// where it is none. There are two layouts, of numbers of 16 bits, the lower byte first:
+///
+///     1 x y z, 2 rx ry rz      7 bytes each
+///     1 x y z rx ry rz         13 bytes
+///     3 buttons                2 to 8 bytes, a bit for each
+///
+/// A number beyond +-350, which is where the cap ends, counts as that.
+bool take_report(std::span<const std::uint8_t> report, SpaceMouseState& state) noexcept;
+
+/// Adds what a SpaceMouse holds, where one is connected, to what keys and a gamepad hold: the cap
+/// moves and tilts the hand, its first button presses. Never waits. One thread.
+class SpaceMouse {
+ public:
+  /// Puts the next report into the bytes; its size, 0 where none has come, negative once the device
+  /// is gone.
+  using Read = std::function<int(std::span<std::uint8_t>)>;
+
+  /// The first one that is connected now; it is not looked for again.
+  SpaceMouse();
+  explicit SpaceMouse(Read read) : read_(std::move(read)) {}
+
+  /// Once a frame. What the user has to know, once: it cannot be opened, or was drawn out.
+  [[nodiscard]] std::optional<std::string> step(HeldControls& held);
+
+ private:
+  Read read_;  ///< none: no SpaceMouse
+  SpaceMouseState state_;
+  std::optional<std::string> problem_;
+};
+
+/// A window's end of the socket at which kerf-emulator lets its hand be led (`--hand-socket`).
+///
+/// It asks for the hand twice a second until it has it: an emulator may start later, start again,
+/// or have another window first. Never waits. One thread.
+class HandLink {
+ public:
+  using Clock = Notices::Clock;
+
+  /// Throws VisualizerError for a path that no socket can have.
+  explicit HandLink(std::string path);
+  HandLink(const HandLink&) = delete;
+  HandLink& operator=(const HandLink&) = delete;
+  ~HandLink();
+
+  /// Connects and listens; what the user has to know of it, each thing once.
+  [[nodiscard]] std::optional<Notice> step(Clock::time_point now);
+  [[nodiscard]] bool leads() const noexcept { return state_ == State::leads; }
+  /// The wish of this frame; nothing happens while the hand is not this window's.
+  void send(const HandWish& wish) noexcept;
+
+ private:
+  enum class State : std::uint8_t { absent, asked, leads, taken, stranger };
+
+  void connect() noexcept;
+  void leave() noexcept;
+  [[nodiscard]] State heard() noexcept;
+  [[nodiscard]] std::optional<Notice> turned(State state);
+
+  std::string path_;
+  int fd_ = -1;
+  State state_ = State::absent, told_ = State::asked;
+  std::optional<Clock::time_point> began_;
+  Clock::time_point next_try_{};
+};
+
+}  // namespace kerf

@@ -1,0 +1,150 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+
+#include "shared/volume/voxel_grid.hpp"
+#include "visualizer/scene/pixel_rect.hpp"
+
+namespace kerf {
+
+/// As many as the segment has descriptors for.
+inline constexpr int kMaxCastVolumes = static_cast<int>(kMaxVolumes);
+
+/// Edge of the square blocks of pixels that share one `CastBlock`.
+inline constexpr std::int32_t kCastBlock = 4;
+
+/// Edge of the cells by which rays pass over what shows nothing. With cells of 4 rays of blend take
+/// a sixth more samples, all of them in air, and with cells of 8 half as many again.
+inline constexpr std::int32_t kCastCellVox = 2;
+
+/// The rays of a block need only this stretch, as distance along the view axis; none of it where
+/// begin is beyond end.
+struct CastBlock {
+  float begin_mm, end_mm;
+};
+
+/// One volume as the cast kernels see it: plain pointers, because their files are compiled for
+/// instruction sets that other machines lack, and no inline function may be shared with them.
+///
+/// Places are in voxel edges, counted from the border of air: voxel v is at v + 1.
+struct CastVolumeJob {
+  const std::uint32_t* density = nullptr;   ///< `PairedRows`
+  const std::uint16_t* labels = nullptr;    ///< `PairedRows`, or none
+  const std::uint32_t* gradient = nullptr;  ///< `GradientRows`, for blend
+  const std::uint8_t* active = nullptr;     ///< of each macrocell: not 0 where it may show anything
+  const CastBlock* blocks = nullptr;        ///< `CellBlocks`: rows of the picture's blocks
+  std::int32_t row = 0, plane = 0;          ///< of density and labels, in entries
+  std::int32_t gradient_plane = 0;          ///< its rows are as long as the others
+  std::int32_t cell_row = 0, cell_plane = 0;
+  float last[3] = {};         ///< a hair before the far side of the border
+  float origin[3] = {};       ///< the eye
+  float from_eye[3][3] = {};  ///< [to][from]: mm of eye space to voxel edges
+  float edge_mm = 1.0F;       ///< the shortest: opacities of blend hold over it
+  /// 256 x linear RGB and, for blend, extinction: -log2 of the transparency over an edge.
+  const float* by_density = nullptr;
+  const float* by_label = nullptr;
+  float settled = 1.0F;             ///< from this density on `by_density` stays what it is
+  float empty = 0.0F, full = 1.0F;  ///< blend: densities where matter begins and where it is whole
+  float iso = 0.5F;                 ///< 0..1
+};
+
+/// A picture and the eye that sees it. Eye space: x right, y up, rays along -z, in mm.
+struct CastEye {
+  std::int32_t width = 0, height = 0;
+  float half_width_at_1mm = 0.25F, half_height_at_1mm = 0.25F;
+  float middle_right_at_1mm = 0.0F;  ///< `View::middle_right`
+  float near_mm = 1.0F, far_mm = 100.0F;
+  float depth_far = 0.0F, depth_slope = 0.0F;  ///< equation (1): depth_far - depth_slope / t
+  float shown[4] = {0.0F, 0.0F, 0.0F, 1.0F};   ///< clip plane, of `View`
+};
+
+/// The picture that the kernels fill. Rows from the bottom up, as GL has them.
+struct CastPixels {
+  std::uint32_t* rgba = nullptr;     ///< sRGB and opacity (not multiplied in), red in the low byte
+  float* depth = nullptr;            ///< window depth, equation (1); 1 where nothing was hit
+  float* normal = nullptr;           ///< or none: x, y, z in eye space where iso hit something
+  const float* end_depth = nullptr;  ///< or none: window depth at which rays of blend end
+};
+
+/// All that one picture needs.
+struct CastJob {
+  CastVolumeJob volumes[kMaxCastVolumes];
+  int volume_count = 0;
+  CastEye eye;
+  CastPixels pixels;
+  float step_vox = 0.75F;                                   ///< iso: along the ray
+  float step_mm = 0.1F;                                     ///< blend: along the view axis
+  float key_light[3] = {}, fill_light[3] = {}, up[3] = {};  ///< unit vectors in eye space
+};
+
+struct DirtyJob;
+
+/// The kernels of one instruction set. All sets give the same bits: every ray is computed by
+/// itself, with the same operations in the same order, whatever packet it travels in.
+struct CastKernels {
+  const char* name;
+  void (*iso)(const CastJob& job, const PixelRect& rect);
+  void (*blend)(const CastJob& job, const PixelRect& rect);
+  /// Whether a ray of `rect` crosses a dirty cell, or ends in one.
+  bool (*rays_touch)(const DirtyJob& job, const PixelRect& rect);
+  /// Whether the shading of a surface point in `rect` samples a dirty cell.
+  bool (*shading_touches)(const DirtyJob& job, const PixelRect& rect);
+};
+
+/// What this machine can run, the fastest first; ends with the scalar set and a null.
+[[nodiscard]] const CastKernels* const* cast_kernels() noexcept;
+
+extern const CastKernels kCastAvx512;
+extern const CastKernels kCastAvx512Gather;
+extern const CastKernels kCastAvx2;
+extern const CastKernels kCastScalar;
+
+/// The footprint of a ray: a voxel farther from the ray than this, on any axis, has no share in the
+/// ray's colour. In half voxel edges. It includes half an edge of slack, for rounding and because
+/// rays are tested at discrete places.
+struct RayFootprint {
+  int along = 0;   ///< before the ray's end
+  int at_end = 0;  ///< at the ray's end; 0: as before it. Else both are odd, or both even
+  /// The ray ends on a surface, whose shading samples the volume along the normal
+  /// (`kShadingTapsVox`).
+  bool taps_normal = false;
+};
+
+/// Marks of the cells of a `DirtyJob`.
+inline constexpr std::uint8_t kDirtyAlong = 1;  ///< a ray that crosses the cell may have changed
+inline constexpr std::uint8_t kDirtyAtEnd = 2;  ///< a ray that ends in the cell may have changed
+
+/// Where the shading of a surface point samples the volume, in voxel edges along its outward
+/// normal: on both sides for the material, and outside for ambient occlusion (iso.frag).
+inline constexpr float kShadingTapsVox[] = {-2.5F, -1.25F, 1.25F, 2.5F, 6.0F, 12.0F};
+inline constexpr float kLongestTapVox = 12.0F;
+
+/// Input of the kernels that test rays against the dirty cells of a volume (`DirtyCells`): plain
+/// pointers, as in `CastVolumeJob`. Places are in voxel edges from the lowest corner of the cells.
+struct DirtyJob {
+  CastEye eye;
+  float origin[3] = {};         ///< the eye
+  float from_eye[3][3] = {};    ///< [to][from]: mm of eye space to voxel edges
+  float step_vox = 0.9F;        ///< between two tests, along the longest axis of a ray
+  std::int32_t most_tests = 0;  ///< of one ray
+
+  const std::uint8_t* cells = nullptr;  ///< marks, x fastest; 4 bytes can be read at the last one
+  std::int32_t row = 0, plane = 0;
+  float size[3] = {};  ///< cells along each axis
+  float last[3] = {};  ///< the largest float below `size`
+
+  /// Window depth at which rays end, row by row, of the pixels of `window`; null: rays go on.
+  const float* depth = nullptr;
+  PixelRect window;
+
+  /// All of the volume, for surfaces whose shading samples it (`kShadingTapsVox`); else null.
+  const std::uint16_t* density = nullptr;
+  std::int32_t extent[3] = {};  ///< of the volume
+  float first_voxel[3] = {};    ///< place of voxel (0, 0, 0)
+  float centre_mm[3] = {};      ///< of the marked cells, in eye space
+  float half_mm[3][3] = {};     ///< half their edges, in eye space: [axis of the volume]
+  float edge_mm = 1.0F;         ///< of a voxel, the longest
+};
+
+}  // namespace kerf

@@ -1,0 +1,276 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "visualizer/cast/simd/packet_rays.hpp"
+#include "visualizer/cast/simd/packet_volume.hpp"
+
+// For the files that define `Simd` only: the translucent matter of one piece of a packet's rays,
+// how much of it there is and which colour it has, as in shaders/matter.frag.
+
+namespace kerf {
+namespace {
+
+constexpr float kInside = 0.62F;  // inside, light comes from everywhere
+
+/// p on the mean over a piece; 0 in lanes that are not on. The density runs straight between its
+/// ends, so the ramp is integrated exactly: sampled, a border thinner than the step would leave
+/// rings (pre-integration: Engel, Kraus and Ertl 2001).
+inline F presence_between(const CastVolumeJob& volume, F front, F back, M on) {
+  const F one = Simd::set(1.0F);
+  const F empty = Simd::set(volume.empty);
+  const F full = Simd::set(volume.full);
+  const M whole = Simd::but_not(on, Simd::less(Simd::min(front, back), full));
+  const F plain = Simd::select(whole, one, Simd::set(0.0F));
+  const M on_ramp = Simd::both(Simd::but_not(on, whole), Simd::less(empty, Simd::max(front, back)));
+  if (!Simd::any(on_ramp)) return plain;
+  const F per_ramp = Simd::set(1.0F / (volume.full - volume.empty));
+  const F half = Simd::set(0.5F);
+  const F x = (front - empty) * per_ramp;
+  const F y = (back - empty) * per_ramp;
+  const F ramp_x = clamped(x);
+  const F ramp_y = clamped(y);
+  const F integral =
+      half * (ramp_y * ramp_y - ramp_x * ramp_x) + (positive(y - one) - positive(x - one));
+  const F change = y - x;
+  const M steep = Simd::less(Simd::set(1e-4F), change * change);
+  return Simd::select(on_ramp, Simd::select(steep, integral / change, half * (ramp_x + ramp_y)),
+                      plain);
+}
+
+/// The matter in the middle of a piece, and its light.
+inline Matter matter_at(const CastJob& job, const CastVolumeJob& volume, Vec3 p, F density,
+                        const Gaze& gaze, M there, M noticeable) {
+  const F zero = Simd::set(0.0F);
+  const F full = Simd::set(volume.full);
+  M plain = there;
+  Matter matter{};
+  if (volume.labels != nullptr) {
+    const Labelled labelled = by_labels(volume, p, there);
+    matter = labelled.mean;
+    plain = Simd::but_not(there, Simd::less(zero, labelled.share));
+  }
+  const M fading = Simd::both(plain, Simd::less(density, full));
+  Vec3 gradient{};
+  if (Simd::any(Simd::either(noticeable, fading))) gradient = stored_gradient_at(volume, p);
+  const F size_2 = dot(gradient, gradient);
+  const M sloped = Simd::less(zero, size_2);
+  const F size = Simd::sqrt(size_2);
+  const F flat = Simd::set(0.02F);
+  if (Simd::any(plain)) {
+    const M steep = Simd::both(noticeable, Simd::less(flat, size));
+    // What is settled has the material of whatever is denser.
+    const M open = Simd::both(plain, Simd::less(density, Simd::set(volume.settled)));
+    const M at_border = Simd::both(open, Simd::either(fading, steep));
+    F deep = density;
+    if (Simd::any(at_border)) {
+      // A border has the material of what it belongs to, a voxel and a half up the gradient.
+      const F reach = Simd::select(sloped, Simd::set(1.5F) / size, zero);
+      const F inside = Simd::max(density, density_at(volume, p + reach * gradient));
+      deep = Simd::select(at_border, inside, density);
+    }
+    matter = select(plain, nearest_by_density(volume, deep), matter);
+  }
+  const Vec3 dim = Simd::set(kInside) * matter.rgb;
+  // Where the density hardly changes there is no surface to be lit.
+  const F x = clamped((size - flat) * Simd::set(1.0F / 0.08F));
+  const M lights = Simd::both(noticeable, Simd::less(zero, x));
+  if (!Simd::any(lights)) return {dim, matter.extinction};
+  const Vec3 unit = -normalized(transformed_back(volume.from_eye, gradient));
+  const Vec3 normal = select(Simd::less(dot(unit, gaze.to_eye), zero), -unit, unit);
+  const F surface = x * x * (Simd::set(3.0F) - Simd::set(2.0F) * x);
+  const Vec3 bright = mix(dim, lit(job, matter.rgb, normal, gaze, Simd::set(1.0F)), surface);
+  return {select(lights, bright, dim), matter.extinction};
+}
+
+}  // namespace
+
+// For the files that define `Simd` only: volumes as translucent matter, front to back, as in
+// shaders/blend.frag.
+//
+// One ray goes through all volumes together, so they mix where they intersect. It is cut into
+// pieces at whole multiples of the step along the view axis, whatever was skipped: skipping changes
+// the time, never the picture. Over a length s a sample of opacity a has 1 - (1 - a)^(p s / s0): p
+// says how much of the matter is there, s0 is a voxel edge.
+
+namespace {
+
+constexpr float kOpaque = 0.98F;                // what lies behind adds two hundredths at most
+constexpr float kNoticeable = 1.0F / 32;        // pieces below have no light of their own
+constexpr float kLeastExtinction = 0.0056684F;  // -log2(1 - 1/255): less is not seen
+constexpr float kNever = 1e9F;                  // steps
+
+/// The rays' way through one volume.
+struct Walk {
+  VolumeRays rays;
+  F exit_k;   ///< from this piece on the surroundings are not known
+  M visible;  ///< until then
+  F front;    ///< density where piece `front_k` begins
+  F front_k;
+};
+
+/// Looks around where a lane of `alive` leaves what it knows, and knows nothing else: a piece that
+/// begins in matter shows some. Returns the lanes that see something, or may.
+inline M look_around(const CastVolumeJob& volume, Walk& walk, M alive, F k, const CastJob& job) {
+  const M leaving = Simd::but_not(alive, Simd::less(k, walk.exit_k));
+  if (!Simd::any(leaving)) return walk.visible;
+  const F one = Simd::set(1.0F);
+  const F t = k * Simd::set(job.step_mm);
+  const M inside = Simd::both(leaving, Simd::less(t, walk.rays.end_mm));
+  walk.exit_k = Simd::select(Simd::but_not(leaving, inside), Simd::set(kNever), walk.exit_k);
+  walk.visible = Simd::either(Simd::but_not(walk.visible, leaving), inside);
+  const M in_matter =
+      Simd::both(Simd::equal(k, walk.front_k), Simd::less(Simd::set(volume.empty), walk.front));
+  if (!worth_a_look(Simd::but_not(inside, in_matter), alive)) return walk.visible;
+  const Surroundings around = surroundings_at(volume, walk.rays, t);
+  const F exit_k =
+      whole(Simd::min(around.exit_mm, walk.rays.end_mm) * Simd::set(1.0F / job.step_mm));
+  // A piece that begins in an empty cell and ends in the next one must be looked at.
+  const M blind = Simd::but_not(Simd::but_not(inside, around.visible), Simd::less(exit_k, k + one));
+  const F known_k = Simd::max(k, Simd::select(around.visible, exit_k, exit_k - one)) + one;
+  walk.exit_k = Simd::select(inside, known_k, walk.exit_k);
+  walk.visible = Simd::but_not(walk.visible, blind);
+  return walk.visible;
+}
+
+/// What is gathered along the rays.
+struct Gathered {
+  Vec3 rgb{};  ///< linear, times opacity
+  F clear;
+  F depth_mm;
+  M has_depth;
+};
+
+/// Colour times extinction per mm, and that extinction.
+struct Glow {
+  Vec3 rgb{};
+  F per_mm{};
+};
+
+/// Piece k of the rays.
+struct Piece {
+  F k, from_mm, to_mm;
+};
+
+inline void add_piece(const CastJob& job, const CastVolumeJob& volume, Walk& walk, M alive,
+                      const Piece& piece, const Gaze& gaze, Gathered& sum, Glow& glow) {
+  const F zero = Simd::set(0.0F);
+  const M on = Simd::both(alive, walk.visible);
+  if (!Simd::any(on)) return;
+  const auto [k, from_mm, to_mm] = piece;
+  const M unknown = Simd::but_not(on, Simd::equal(k, walk.front_k));
+  if (Simd::any(unknown)) {
+    const F density = density_at(volume, walk.rays.origin + from_mm * walk.rays.direction);
+    walk.front = Simd::select(unknown, density, walk.front);
+  }
+  const Vec3 p = walk.rays.origin + to_mm * walk.rays.direction;
+  const F back = density_at(volume, p);
+  const F front = walk.front;
+  walk.front = Simd::select(on, back, walk.front);
+  walk.front_k = Simd::select(on, k + Simd::set(1.0F), walk.front_k);
+  const F presence = presence_between(volume, front, back, on);
+  const M there = Simd::less(zero, presence);
+  if (!Simd::any(there)) return;
+  const M noticeable = Simd::both(there, Simd::less(Simd::set(kNoticeable), presence * sum.clear));
+  const F half = Simd::set(0.5F);
+  const Vec3 middle = walk.rays.origin + (half * (from_mm + to_mm)) * walk.rays.direction;
+  const Matter matter =
+      matter_at(job, volume, middle, half * (front + back), gaze, there, noticeable);
+  const F extinction = Simd::select(there, matter.extinction * presence, zero);
+  const F per_mm = extinction * Simd::set(1.0F / volume.edge_mm);
+  glow = {glow.rgb + per_mm * matter.rgb, glow.per_mm + per_mm};
+  // Two volumes may begin in one piece; later pieces are farther away.
+  const M seen = Simd::but_not(there, Simd::less(extinction, Simd::set(kLeastExtinction)));
+  const M first = Simd::both(seen, Simd::less(from_mm, sum.depth_mm));
+  if (!Simd::any(first)) return;
+  const F empty = Simd::set(volume.empty);
+  const F before =
+      Simd::select(Simd::less(front, empty), clamped((empty - front) / (back - front)), zero);
+  sum.depth_mm =
+      Simd::select(first, Simd::min(sum.depth_mm, mix(from_mm, to_mm, before)), sum.depth_mm);
+  sum.has_depth = Simd::either(sum.has_depth, first);
+}
+
+inline void put(const CastJob& job, const Packet& packet, const Gathered& sum) {
+  const F one = Simd::set(1.0F);
+  const F gathered = one - sum.clear;
+  const Vec3 rgb = (one / Simd::max(gathered, Simd::set(kSmall))) * sum.rgb;
+  const F opacity = Simd::min(gathered * Simd::set(1.0F / kOpaque), one);
+  const F depth = Simd::set(job.eye.depth_far) - Simd::set(job.eye.depth_slope) / sum.depth_mm;
+  put(packet, Simd::select(sum.has_depth, srgb_bytes(rgb, opacity), I{}), job.pixels.rgba);
+  put(packet, Simd::select(sum.has_depth, depth, one), job.pixels.depth);
+}
+
+inline void blend_packet(const CastJob& job, const Packet& packet) {
+  const F one = Simd::set(1.0F);
+  const F never = Simd::set(kNever);
+  const F step_mm = Simd::set(job.step_mm);
+  const Vec3 eye = eye_directions(job.eye, packet);
+  const F length_per_mm = Simd::sqrt(dot(eye, eye));
+  Shown part = shown_of(job.eye, eye);
+  if (job.pixels.end_depth != nullptr) {
+    const std::int64_t first = std::int64_t{packet.y} * packet.row + packet.x;
+    const F end_depth = taken(packet, job.pixels.end_depth + first, packet.row);
+    const F end_mm = Simd::set(job.eye.depth_slope) / (Simd::set(job.eye.depth_far) - end_depth);
+    part.end_mm = Simd::min(end_mm, part.end_mm);
+  }
+  Walk walks[kMaxCastVolumes];
+  F k = never;
+  F end_mm = Simd::set(0.0F);
+  for (int v = 0; v < job.volume_count; ++v) {
+    const CastVolumeJob& volume = job.volumes[v];
+    Walk& walk = walks[v];
+    walk.exit_k = never;
+    walk.visible = Simd::none();
+    walk.front_k = never;
+    walk.front = never;
+    if (!is_met(volume.blocks[packet.block])) continue;
+    walk.rays = rays_through(job, volume, volume.blocks[packet.block], part, eye);
+    const M meets = Simd::less(walk.rays.begin_mm, walk.rays.end_mm);
+    walk.exit_k = Simd::select(meets, whole(walk.rays.begin_mm / step_mm), never);
+    k = Simd::min(k, walk.exit_k);
+    end_mm = Simd::select(meets, Simd::max(end_mm, walk.rays.end_mm), end_mm);
+  }
+  Gathered sum;
+  sum.clear = one;
+  sum.depth_mm = never;
+  sum.has_depth = Simd::none();
+  M alive = Simd::both(drawn_lanes(packet), Simd::less(k * step_mm, end_mm));
+  const Gaze gaze = Simd::any(alive) ? gaze_along(job, eye) : Gaze{};
+  while (Simd::any(alive)) {
+    M seeing = Simd::none();
+    F soonest = never;
+    for (int v = 0; v < job.volume_count; ++v) {
+      seeing = Simd::either(seeing, look_around(job.volumes[v], walks[v], alive, k, job));
+      soonest = Simd::min(soonest, walks[v].exit_k);
+    }
+    const M skipping = Simd::but_not(alive, seeing);
+    if (Simd::any(skipping)) {
+      k = Simd::select(skipping, soonest, k);
+    } else {
+      const F from_mm = Simd::max(k * step_mm, part.begin_mm);
+      const F to_mm = Simd::min((k + one) * step_mm, part.end_mm);
+      Glow glow;
+      for (int v = 0; v < job.volume_count; ++v) {
+        add_piece(job, job.volumes[v], walks[v], alive, {k, from_mm, to_mm}, gaze, sum, glow);
+      }
+      if (Simd::any(Simd::less(Simd::set(0.0F), glow.per_mm))) {
+        const F extinction = glow.per_mm * (positive(to_mm - from_mm) * length_per_mm);
+        const F kept = exp2_of(-Simd::min(extinction, Simd::set(100.0F)));
+        const F colour = sum.clear * (one - kept) / Simd::max(glow.per_mm, Simd::set(1e-9F));
+        sum.rgb = sum.rgb + colour * glow.rgb;
+        sum.clear = sum.clear * kept;
+      }
+      k = k + one;
+      alive = Simd::both(alive, Simd::less(Simd::set(1.0F - kOpaque), sum.clear));
+    }
+    alive = Simd::both(alive, Simd::less(k * step_mm, end_mm));
+  }
+  put(job, packet, sum);
+}
+
+void cast_blend(const CastJob& job, const PixelRect& rect) {
+  for_packets(job.eye, rect, [&](const Packet& packet) { blend_packet(job, packet); });
+}
+
+}  // namespace
+}  // namespace kerf

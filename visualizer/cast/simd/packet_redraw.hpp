@@ -1,0 +1,207 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "visualizer/cast/cast_kernels.hpp"
+#include "visualizer/cast/simd/packet_rays.hpp"
+#include "visualizer/cast/simd/packet_volume.hpp"
+
+// For the files that define `Simd` only: tests packets of rays against the dirty cells of a volume.
+//
+// The colour of a ray can change in three ways: the ray crosses a cell marked `kDirtyAlong`, it
+// ends in a cell marked `kDirtyAtEnd`, or it ends on a surface whose shading samples a dirty cell.
+// A ray of which none is true keeps its colour, bit by bit.
+
+namespace kerf {
+namespace {
+
+inline F absolute(F a) {
+  return Simd::max(a, -a);
+}
+
+/// The places whose cell has `mark`. A place outside of the grid counts as its nearest cell.
+inline M marked(const DirtyJob& job, Vec3 p, std::uint8_t mark) {
+  const auto cell = [](F at, float last) {
+    return Simd::to_int(Simd::min(positive(at), Simd::set(last)));
+  };
+  const I at = cell(p.x, job.last[0]) + cell(p.y, job.last[1]) * job.row +
+               cell(p.z, job.last[2]) * job.plane;
+  return Simd::but_not(Simd::all(), Simd::equal(Simd::gather_bytes<1>(job.cells, at) & mark, I{}));
+}
+
+/// The distance of `p` from the grid on each axis; 0 inside.
+inline Vec3 outside_by(const DirtyJob& job, Vec3 p) {
+  const auto beside = [](F at, float size) {
+    return positive(Simd::max(-at, at - Simd::set(size)));
+  };
+  return {beside(p.x, job.size[0]), beside(p.y, job.size[1]), beside(p.z, job.size[2])};
+}
+
+/// Whether one of the lanes `points` lies in a cell with `mark`.
+inline bool any_marked(const DirtyJob& job, Vec3 p, M points, std::uint8_t mark) {
+  const Vec3 off = outside_by(job, p);
+  const M within = Simd::but_not(points, Simd::less(Simd::set(0.0F), dot(off, off)));
+  return Simd::any(within) && Simd::any(Simd::both(within, marked(job, p, mark)));
+}
+
+inline F longest_part(Vec3 a) {
+  return Simd::max(Simd::max(absolute(a.x), absolute(a.y)), absolute(a.z));
+}
+
+/// Whether a ray of the lanes `alive` crosses a cell marked `kDirtyAlong`.
+inline bool crosses_dirty_cell(const DirtyJob& job, const VolumeRays& rays, M alive) {
+  const F step_mm = Simd::set(job.step_vox) / longest_part(rays.direction);
+  // Half a step more: no place on a ray is farther than that from a test.
+  const F end_mm = rays.end_mm + Simd::set(0.5F) * step_mm;
+  alive = Simd::both(alive, Simd::less(rays.begin_mm, rays.end_mm));
+  for (std::int32_t test = 0; test < job.most_tests && Simd::any(alive); ++test) {
+    const F t = rays.begin_mm + Simd::set(static_cast<float>(test)) * step_mm;
+    const Vec3 p = rays.origin + t * rays.direction;
+    if (Simd::any(Simd::both(alive, marked(job, p, kDirtyAlong)))) return true;
+    alive = Simd::both(alive, Simd::less(t + step_mm, end_mm));
+  }
+  return Simd::any(alive);  // so far away that its steps are lost in rounding
+}
+
+/// `gradient_at` for a volume without a border of air around it. The value is right only in lanes
+/// that `is_inside` names.
+inline Vec3 plain_gradient_at(const DirtyJob& job, Vec3 voxel) {
+  const auto low = [](F at, std::int32_t extent) {
+    return Simd::to_int(
+        Simd::max(Simd::min(at, Simd::set(static_cast<float>(extent - 3))), Simd::set(1.0F)));
+  };
+  const I x = low(voxel.x, job.extent[0]);
+  const I y = low(voxel.y, job.extent[1]);
+  const I z = low(voxel.z, job.extent[2]);
+  const Vec3 share{voxel.x - Simd::to_float(x), voxel.y - Simd::to_float(y),
+                   voxel.z - Simd::to_float(z)};
+  const std::int32_t row = job.extent[0];
+  const std::int32_t plane = row * job.extent[1];
+  const I first = (x - 1) + (y - 1) * row + (z - 1) * plane;
+  // Of four planes, between the rows: at both sides in y, the sum and the rise along x.
+  F sums[4], rises_x[4], rises_y[4];
+  for (std::int32_t k = 0; k < 4; ++k) {
+    F sum[4], rise[4];
+    for (std::int32_t j = 0; j < 4; ++j) {
+      I low{}, high{};  // two densities each
+      Simd::gather_two<2>(job.density, first + (j * row + k * plane), low, high);
+      const auto between = [&](I pair) {
+        return mix(Simd::to_float(pair & 0xffff), Simd::to_float(pair >> 16 & 0xffff), share.x);
+      };
+      const F before = between(low);
+      const F behind = between(high);
+      sum[j] = before + behind;
+      rise[j] = behind - before;
+    }
+    const F before = mix(sum[0], sum[1], share.y);
+    const F behind = mix(sum[2], sum[3], share.y);
+    sums[k] = before + behind;
+    rises_y[k] = behind - before;
+    rises_x[k] = mix(rise[0], rise[1], share.y) + mix(rise[2], rise[3], share.y);
+  }
+  const auto both = [&](const F(&of)[4]) {
+    return mix(of[0], of[1], share.z) + mix(of[2], of[3], share.z);
+  };
+  return Simd::set(1.0F / 65535.0F) *
+         Vec3{both(rises_x), both(rises_y),
+              mix(sums[2], sums[3], share.z) - mix(sums[0], sums[1], share.z)};
+}
+
+/// The lanes in which all voxels that the gradient at `voxel` takes are in the volume.
+inline M is_inside(const DirtyJob& job, Vec3 voxel) {
+  const auto along = [](F at, std::int32_t extent) {
+    return Simd::but_not(Simd::less(at, Simd::set(static_cast<float>(extent - 2))),
+                         Simd::less(at, Simd::set(1.0F)));
+  };
+  return Simd::both(along(voxel.x, job.extent[0]),
+                    Simd::both(along(voxel.y, job.extent[1]), along(voxel.z, job.extent[2])));
+}
+
+/// Where the rays of a packet end, by the depth of the last picture.
+struct Ends {
+  M there;  ///< the rays that hit something
+  F t;      ///< mm along the view axis; far away for the others
+};
+
+inline Ends ends_of(const DirtyJob& job, const Packet& packet) {
+  const std::int32_t row = job.window.x1 - job.window.x0;
+  const std::int64_t first =
+      std::int64_t{packet.y - job.window.y0} * row + packet.x - job.window.x0;
+  const F depth = taken(packet, job.depth + first, row);
+  return {Simd::both(drawn_lanes(packet), Simd::less(depth, Simd::set(1.0F))),
+          Simd::set(job.eye.depth_slope) / (Simd::set(job.eye.depth_far) - depth)};
+}
+
+/// Whether a ray of the packet crosses a dirty cell or ends in one.
+inline bool packet_rays_touch(const DirtyJob& job, const Packet& packet) {
+  const Vec3 eye = eye_directions(job.eye, packet);
+  const Shown shown = shown_of(job.eye, eye);
+  VolumeRays rays;
+  rays.origin = vec3(job.origin);
+  rays.direction = transformed(job.from_eye, eye);
+  rays.begin_mm = shown.begin_mm;
+  rays.end_mm = shown.end_mm;
+  Ends ends{Simd::none(), shown.end_mm};
+  if (job.depth != nullptr) {
+    ends = ends_of(job, packet);
+    // A hit lies before the sample that found it: the ray took samples up to a step behind.
+    rays.end_mm = Simd::min(shown.end_mm, ends.t + Simd::set(1.0F) / longest_part(rays.direction));
+  }
+  clip_to(job.size, rays);
+  if (crosses_dirty_cell(job, rays, drawn_lanes(packet))) return true;
+  return any_marked(job, rays.origin + ends.t * rays.direction, ends.there, kDirtyAtEnd);
+}
+
+/// Whether the shading of a point at which a ray ends samples a dirty cell.
+inline bool packet_shading_touches(const DirtyJob& job, const Packet& packet) {
+  const Vec3 eye = eye_directions(job.eye, packet);
+  const Ends ends = ends_of(job, packet);
+  const Vec3 p = vec3(job.origin) + ends.t * transformed(job.from_eye, eye);
+  const Vec3 off = outside_by(job, p);
+  const F reach = Simd::set(kLongestTapVox);
+  M near = Simd::both(ends.there, Simd::less(dot(off, off), reach * reach));
+  if (!Simd::any(near)) return false;
+  // Normals are turned towards the eye, so samples lie before the point, or a little behind it.
+  // Both sides of the comparison have one factor, that of the ray.
+  const F length_2 = dot(eye, eye);
+  F nearest = dot(vec3(job.centre_mm), eye);
+  for (const auto& half : job.half_mm) nearest = nearest - absolute(dot(vec3(half), eye));
+  const F behind = Simd::set(-kShadingTapsVox[0] * job.edge_mm) * Simd::sqrt(length_2);
+  near = Simd::but_not(near, Simd::less(ends.t * length_2 + behind, nearest));
+  if (!Simd::any(near)) return false;
+
+  // A face in the clip plane has the plane's normal.
+  const F shown_from_mm = shown_of(job.eye, eye).begin_mm;
+  const M on_face = Simd::both(Simd::less(Simd::set(job.eye.near_mm), shown_from_mm),
+                               Simd::less(ends.t, Simd::set(1.0001F) * shown_from_mm));
+  const Vec3 voxel = p - vec3(job.first_voxel);
+  M known = Simd::but_not(Simd::both(near, is_inside(job, voxel)), on_face);
+  if (!Simd::any(known)) return true;
+  const Vec3 gradient = plain_gradient_at(job, voxel);
+  // A texture unit may filter with 8 bits of weight: on this steep a slope (of 4, from air to full
+  // density) the normal of a shader is off by less than 1/24, half a voxel at the farthest sample.
+  const F least_slope = Simd::set(0.5F);
+  known = Simd::but_not(known, Simd::less(dot(gradient, gradient), least_slope * least_slope));
+  if (Simd::any(Simd::but_not(near, known))) return true;
+  const Vec3 inward = facing_of(job.from_eye, gradient, -normalized(eye)).inward;
+  for (const float reach_vox : kShadingTapsVox) {
+    if (any_marked(job, p - Simd::set(reach_vox) * inward, known, kDirtyAlong)) return true;
+  }
+  return false;
+}
+
+bool cast_rays_touch(const DirtyJob& job, const PixelRect& rect) {
+  bool touch = false;
+  for_packets(job.eye, rect,
+              [&](const Packet& packet) { touch = touch || packet_rays_touch(job, packet); });
+  return touch;
+}
+
+bool cast_shading_touches(const DirtyJob& job, const PixelRect& rect) {
+  bool touch = false;
+  for_packets(job.eye, rect,
+              [&](const Packet& packet) { touch = touch || packet_shading_touches(job, packet); });
+  return touch;
+}
+
+}  // namespace
+}  // namespace kerf

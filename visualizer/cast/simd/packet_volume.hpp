@@ -1,0 +1,366 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "visualizer/cast/simd/packet_rays.hpp"
+
+// For the files that define `Simd` only: how a packet of rays samples a volume and passes over its
+// empty cells. Places are in voxel edges from the border (`CastVolumeJob`).
+
+namespace kerf {
+namespace {
+
+/// A cell of 2^3 voxels: the entry of its lowest one, and the place within it.
+struct CellPlace {
+  I at;
+  Vec3 share;
+};
+
+/// Beyond the border everything is as on it: air.
+inline Vec3 within(const CastVolumeJob& volume, Vec3 p) {
+  return {Simd::min(positive(p.x), Simd::set(volume.last[0])),
+          Simd::min(positive(p.y), Simd::set(volume.last[1])),
+          Simd::min(positive(p.z), Simd::set(volume.last[2]))};
+}
+
+inline CellPlace cell_place(const CastVolumeJob& volume, Vec3 p, std::int32_t plane) {
+  const Vec3 q = within(volume, p);
+  const I x = Simd::to_int(q.x);
+  const I y = Simd::to_int(q.y);
+  const I z = Simd::to_int(q.z);
+  return {x + y * volume.row + z * plane,
+          {q.x - Simd::to_float(x), q.y - Simd::to_float(y), q.z - Simd::to_float(z)}};
+}
+
+inline CellPlace cell_place(const CastVolumeJob& volume, Vec3 p) {
+  return cell_place(volume, p, volume.plane);
+}
+
+inline F mix(F a, F b, F share) {
+  return a + share * (b - a);
+}
+inline Vec3 mix(Vec3 a, Vec3 b, F share) {
+  return a + share * (b - a);
+}
+
+/// Trilinear, 0..1. Two loads of 64 bits bring all eight corners: `PairedRows`.
+inline F density_in(const CastVolumeJob& volume, const CellPlace& cell) {
+  const auto plane = [&](const std::uint32_t* entries) {
+    I left{};
+    I right{};
+    Simd::gather_two<4>(entries, cell.at, left, right);
+    const F low = mix(Simd::to_float(left & 0xffff), Simd::to_float(right & 0xffff), cell.share.x);
+    const F high = mix(Simd::to_float(Simd::high_half(left)),
+                       Simd::to_float(Simd::high_half(right)), cell.share.x);
+    return mix(low, high, cell.share.y);
+  };
+  return mix(plane(volume.density), plane(volume.density + volume.plane), cell.share.z) *
+         Simd::set(1.0F / 65535.0F);
+}
+
+inline F density_at(const CastVolumeJob& volume, Vec3 p) {
+  return density_in(volume, cell_place(volume, p));
+}
+
+/// The density gradient per voxel edge, from the eight corners of a cube around p: differences
+/// along one axis, means along the others (iso.frag). All corners have the same place within their
+/// cells.
+inline Vec3 gradient_at(const CastVolumeJob& volume, Vec3 p) {
+  const F one = Simd::set(1.0F);
+  const auto inner = [&](F x, float last) {  // the whole cube is inside the border
+    return Simd::max(Simd::min(x, Simd::set(last - 1.0F)), one);
+  };
+  const CellPlace middle = cell_place(
+      volume, {inner(p.x, volume.last[0]), inner(p.y, volume.last[1]), inner(p.z, volume.last[2])});
+  Vec3 sum{};
+  for (int corner = 0; corner < 8; ++corner) {
+    const int x = (corner & 1) != 0 ? 1 : -1;
+    const int y = (corner & 2) != 0 ? 1 : -1;
+    const int z = (corner & 4) != 0 ? 1 : -1;
+    const F density =
+        density_in(volume, {middle.at + (x + y * volume.row + z * volume.plane), middle.share});
+    sum.x = x > 0 ? sum.x + density : sum.x - density;
+    sum.y = y > 0 ? sum.y + density : sum.y - density;
+    sum.z = z > 0 ? sum.z + density : sum.z - density;
+  }
+  return Simd::set(0.125F) * sum;
+}
+
+/// The same from stored gradients, in 8 bits: a quarter of the loads.
+inline Vec3 stored_gradient_at(const CastVolumeJob& volume, Vec3 p) {
+  const CellPlace cell = cell_place(volume, p, volume.gradient_plane);
+  I corner[4][2];  // by y and z, by x
+  for (int i = 0; i < 4; ++i) {
+    const std::int32_t step = (i & 1) * volume.row + (i >> 1) * volume.gradient_plane;
+    Simd::gather_two<4>(volume.gradient + step, cell.at, corner[i][0], corner[i][1]);
+  }
+  const auto component = [&](int shift) {  // of bytes where they lie, times 2^shift
+    const std::int32_t byte = 0xff << shift;
+    F row[4];
+    for (int i = 0; i < 4; ++i) {
+      row[i] = mix(Simd::to_float(corner[i][0] & byte), Simd::to_float(corner[i][1] & byte),
+                   cell.share.x);
+    }
+    const F mean =
+        mix(mix(row[0], row[1], cell.share.y), mix(row[2], row[3], cell.share.y), cell.share.z);
+    const auto unit = static_cast<float>(1 << shift);
+    return (mean - Simd::set(128.0F * unit)) * Simd::set(0.5F / 127.0F / unit);
+  };
+  return {component(0), component(8), component(16)};
+}
+
+/// The part of each ray between the near, the far and the clip plane (ray.frag).
+struct Shown {
+  F begin_mm, end_mm;
+};
+
+inline Shown shown_of(const CastEye& from, Vec3 eye) {
+  const F zero = Simd::set(0.0F);
+  const F away = Simd::set(from.shown[3]);
+  const F slope = Simd::set(from.shown[0]) * eye.x + Simd::set(from.shown[1]) * eye.y +
+                  Simd::set(from.shown[2]) * eye.z;
+  const F cut = -away / slope;
+  const F near_mm = Simd::set(from.near_mm);
+  const F far_mm = Simd::set(from.far_mm);
+  const M hidden = Simd::both(
+      Simd::less(away, zero),
+      Simd::but_not(Simd::all(), Simd::either(Simd::less(slope, zero), Simd::less(zero, slope))));
+  const F end_mm = Simd::select(Simd::less(slope, zero), Simd::min(far_mm, cut), far_mm);
+  return {Simd::select(Simd::less(zero, slope), Simd::max(near_mm, cut), near_mm),
+          Simd::select(hidden, zero, end_mm)};
+}
+
+/// The rays of one packet through one volume, by their distance t along the view axis.
+struct VolumeRays {
+  Vec3 origin, direction;
+  Vec3 inverse;        ///< of the direction
+  F begin_mm, end_mm;  ///< in the volume's box; none where begin is beyond end
+  F step_mm, steps_per_mm;
+};
+
+inline bool is_met(const CastBlock& block) {
+  return block.begin_mm < block.end_mm;
+}
+
+/// Ends rays where they leave 0..size along one axis.
+inline void clip_to(float size, F origin, F& direction, F& inverse, F& begin_mm, F& end_mm) {
+  // A ray along a face never meets the next one, but its inverse stays a number.
+  const F least = Simd::set(1e-12F);
+  direction = Simd::select(Simd::less(direction * direction, least * least), least, direction);
+  inverse = Simd::set(1.0F) / direction;
+  const F a = -origin * inverse;
+  const F b = (Simd::set(size) - origin) * inverse;
+  begin_mm = Simd::max(begin_mm, Simd::min(a, b));
+  end_mm = Simd::min(end_mm, Simd::max(a, b));
+}
+
+/// The same along all axes.
+inline void clip_to(const float (&size)[3], VolumeRays& rays) {
+  clip_to(size[0], rays.origin.x, rays.direction.x, rays.inverse.x, rays.begin_mm, rays.end_mm);
+  clip_to(size[1], rays.origin.y, rays.direction.y, rays.inverse.y, rays.begin_mm, rays.end_mm);
+  clip_to(size[2], rays.origin.z, rays.direction.z, rays.inverse.z, rays.begin_mm, rays.end_mm);
+}
+
+inline VolumeRays rays_through(const CastJob& job, const CastVolumeJob& volume,
+                               const CastBlock& block, const Shown& shown, Vec3 eye) {
+  VolumeRays rays;
+  rays.origin = vec3(volume.origin);
+  rays.direction = transformed(volume.from_eye, eye);
+  const F edges_per_mm = Simd::sqrt(dot(rays.direction, rays.direction));
+  rays.step_mm = Simd::set(job.step_vox) / edges_per_mm;
+  rays.steps_per_mm = edges_per_mm / Simd::set(job.step_vox);
+  rays.begin_mm = Simd::max(Simd::set(block.begin_mm), shown.begin_mm);
+  rays.end_mm = Simd::min(Simd::set(block.end_mm), shown.end_mm);
+  clip_to(volume.last, rays);
+  rays.begin_mm = Simd::min(rays.begin_mm, rays.end_mm);
+  return rays;
+}
+
+/// What is around a sample: whether it can show anything, and up to where that holds.
+struct Surroundings {
+  M visible;
+  F exit_mm;
+};
+
+/// A look at the cells costs as much as a sample and serves only those lanes that do not know what
+/// is around them; a sample in an empty cell is wasted and never wrong. So a few lanes go on
+/// unknowing.
+inline bool worth_a_look(M unknowing, M alive) {
+  constexpr int kShare = 4;
+  return Simd::any(unknowing) && kShare * Simd::count(unknowing) >= Simd::count(alive);
+}
+
+inline Surroundings surroundings_at(const CastVolumeJob& volume, const VolumeRays& rays, F t) {
+  const Vec3 q = within(volume, rays.origin + t * rays.direction);
+  const F cells = Simd::set(1.0F / kCastCellVox);
+  const I x = Simd::to_int(q.x * cells);
+  const I y = Simd::to_int(q.y * cells);
+  const I z = Simd::to_int(q.z * cells);
+  const I active =
+      Simd::gather_bytes<1>(volume.active, x + y * volume.cell_row + z * volume.cell_plane) & 0xff;
+  const auto exit = [](I cell, F origin, F inverse) {
+    const F low = Simd::set(static_cast<float>(kCastCellVox)) * Simd::to_float(cell);
+    const F high = low + Simd::set(static_cast<float>(kCastCellVox));
+    return Simd::max((low - origin) * inverse, (high - origin) * inverse);
+  };
+  return {Simd::but_not(Simd::all(), Simd::equal(active, I{})),
+          Simd::min(Simd::min(exit(x, rays.origin.x, rays.inverse.x),
+                              exit(y, rays.origin.y, rays.inverse.y)),
+                    exit(z, rays.origin.z, rays.inverse.z))};
+}
+
+}  // namespace
+
+// For the files that define `Simd` only: the material and the light of a surface, as in
+// shaders/iso.frag, which says why each length is what it is.
+
+namespace {
+
+constexpr float kSmall = 1e-6F;  // a share that is nothing, and no zero to divide by
+
+/// Linear colour and extinction (`CastVolumeJob`).
+struct Matter {
+  Vec3 rgb;
+  F extinction;
+};
+
+inline Matter mix(Matter a, Matter b, F share) {
+  return {mix(a.rgb, b.rgb, share), mix(a.extinction, b.extinction, share)};
+}
+inline Matter select(M m, Matter yes, Matter no) {
+  return {select(m, yes.rgb, no.rgb), Simd::select(m, yes.extinction, no.extinction)};
+}
+
+/// An entry of 256 x 4.
+inline Matter entry_of(const float* table, I index) {
+  F entry[4];
+  Simd::gather_four(table, index << 2, entry);
+  return {{entry[0], entry[1], entry[2]}, entry[3]};
+}
+
+/// As a texture of 256 entries that is filtered and clamped to its edges.
+inline Matter by_density(const CastVolumeJob& volume, F density) {
+  const F at =
+      Simd::min(positive(density * Simd::set(256.0F) - Simd::set(0.5F)), Simd::set(254.9999F));
+  const I index = Simd::to_int(at);
+  return mix(entry_of(volume.by_density, index), entry_of(volume.by_density, index + 1),
+             at - Simd::to_float(index));
+}
+
+/// The nearest entry: half the loads, for means over many samples.
+inline Matter nearest_by_density(const CastVolumeJob& volume, F density) {
+  return entry_of(volume.by_density, Simd::to_int(density * Simd::set(255.0F) + Simd::set(0.5F)));
+}
+
+/// The mean of the labelled voxels around, and their share.
+struct Labelled {
+  Matter mean;
+  F share;
+};
+
+/// Labels around, blended so that their borders are smooth. Where all eight agree, which is nearly
+/// everywhere, that is one look-up; `needed` are the lanes whose result counts.
+inline Labelled by_labels(const CastVolumeJob& volume, Vec3 p, M needed) {
+  const CellPlace cell = cell_place(volume, p);
+  const F zero = Simd::set(0.0F);
+  const F one = Simd::set(1.0F);
+  const I labels[2] = {Simd::gather_bytes<2>(volume.labels, cell.at),
+                       Simd::gather_bytes<2>(volume.labels + volume.plane, cell.at)};
+  const I first = labels[0] & 0xff;
+  const M alike =
+      Simd::both(Simd::equal(labels[0], labels[1]), Simd::equal(labels[0], first * 0x01010101));
+  const Labelled same{entry_of(volume.by_label, first),
+                      Simd::select(Simd::equal(first, I{}), zero, one)};
+  if (!Simd::any(Simd::but_not(needed, alike))) return same;
+
+  Matter sum{};
+  F share{};
+  for (int corner = 0; corner < 8; ++corner) {
+    // Bytes of a gathered entry: (x, y), (x, y + 1), (x + 1, y), (x + 1, y + 1).
+    const int x = corner & 1;
+    const int y = corner >> 1 & 1;
+    const int z = corner >> 2;
+    const I label = labels[z] >> (16 * x + 8 * y) & 0xff;
+    const F wx = x != 0 ? cell.share.x : one - cell.share.x;
+    const F wy = y != 0 ? cell.share.y : one - cell.share.y;
+    const F wz = z != 0 ? cell.share.z : one - cell.share.z;
+    const F w = Simd::select(Simd::equal(label, I{}), zero, wx * wy * wz);
+    const Matter matter = entry_of(volume.by_label, label);
+    sum = {sum.rgb + w * matter.rgb, sum.extinction + w * matter.extinction};
+    share = share + w;
+  }
+  const F per_share = one / Simd::max(share, Simd::set(kSmall));
+  return {select(alike, same.mean, {per_share * sum.rgb, per_share * sum.extinction}),
+          Simd::select(alike, same.share, share)};
+}
+
+/// Which way an iso-surface faces.
+struct Facing {
+  Vec3 inward;  ///< one voxel edge long
+  Vec3 normal;  ///< eye space, towards the eye
+};
+
+inline Facing facing_of(const float (&voxel_from_eye)[3][3], Vec3 gradient, Vec3 to_eye) {
+  // A gradient in voxel edges goes to the eye's millimetres by the transposed Jacobian.
+  const Vec3 slope = transformed_back(voxel_from_eye, gradient);
+  const F zero = Simd::set(0.0F);
+  Vec3 normal = select(Simd::less(zero, dot(slope, slope)), -normalized(slope), to_eye);
+  const F facing = dot(normal, to_eye);
+  const Vec3 turned = normalized(normal - (Simd::set(1.02F) * facing) * to_eye);
+  normal = select(Simd::less(facing, zero), turned, normal);
+  return {normalized(transformed(voxel_from_eye, -normal)), normal};
+}
+
+/// A point of an iso-surface.
+struct SurfacePoint {
+  Vec3 place;  ///< voxel edges
+  Vec3 inward, normal;
+};
+
+inline SurfacePoint surface_point(const CastVolumeJob& volume, const VolumeRays& rays, F t,
+                                  Vec3 to_eye) {
+  const Vec3 p = rays.origin + t * rays.direction;
+  const Facing facing = facing_of(volume.from_eye, gradient_at(volume, p), to_eye);
+  return {p, facing.inward, facing.normal};
+}
+
+/// Below the surface, because the surface itself is half air; soft tissue on it coats it.
+inline Vec3 material_at(const CastVolumeJob& volume, const SurfacePoint& at, M needed) {
+  const F depth_vox = Simd::set(1.25F);
+  const F full_depth_vox = Simd::set(2.5F);
+  const F coat_density = Simd::set(0.14F);
+  const Vec3 below = at.place + depth_vox * at.inward;
+  Vec3 colour{};
+  M plain = needed;
+  if (volume.labels != nullptr) {
+    Labelled labelled = by_labels(volume, below, needed);
+    const Vec3 above = at.place - depth_vox * at.inward;
+    const M coated = Simd::both(needed, Simd::less(coat_density, density_at(volume, above)));
+    if (Simd::any(coated)) {
+      const Labelled coat = by_labels(volume, above, coated);
+      const F cover = Simd::select(coated, coat.share, Simd::set(0.0F));
+      const F share = labelled.share * (Simd::set(1.0F) - cover) + cover * cover;
+      labelled = {
+          mix(labelled.mean, coat.mean, cover * cover / Simd::max(share, Simd::set(kSmall))),
+          share};
+    }
+    colour = labelled.mean.rgb;
+    plain = Simd::but_not(needed, Simd::less(Simd::set(0.0F), labelled.share));
+    if (!Simd::any(plain)) return colour;
+  }
+  const F density = Simd::max(density_at(volume, below),
+                              density_at(volume, at.place + full_depth_vox * at.inward));
+  return select(plain, by_density(volume, density).rgb, colour);
+}
+
+/// 1 in the open, less where the neighbourhood along the normal is solid: cavities read as such.
+inline F openness_at(const CastVolumeJob& volume, const SurfacePoint& at) {
+  const F per_iso = Simd::set(1.0F / volume.iso);
+  const auto solid = [&](float reach_vox) {
+    return clamped(density_at(volume, at.place - Simd::set(reach_vox) * at.inward) * per_iso);
+  };
+  return Simd::set(1.0F) - (Simd::set(0.30F) * solid(2.5F) + Simd::set(0.30F) * solid(6.0F) +
+                            Simd::set(0.25F) * solid(12.0F));
+}
+
+}  // namespace
+}  // namespace kerf

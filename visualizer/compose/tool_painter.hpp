@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include <glm/glm.hpp>
+
+#include "shared/segment/layout.hpp"
+#include "visualizer/compose/tool_mesh.hpp"
+#include "visualizer/gl/program.hpp"
+#include "visualizer/gl/target.hpp"
+#include "visualizer/scene/camera.hpp"
+#include "visualizer/scene/pixel_rect.hpp"
+#include "visualizer/scene/scene_view.hpp"
+
+namespace kerf {
+
+/// A mesh in the memory of the GPU.
+class GpuMesh {
+ public:
+  explicit GpuMesh(const Mesh& mesh);
+  void draw() const;
+
+ private:
+  GlBuffer vertices_ = GlBuffer::create();
+  GlBuffer triangles_ = GlBuffer::create();
+  GlVertexArray array_ = GlVertexArray::create();
+  GLsizei indices_ = 0;
+};
+
+/// What a mesh is painted with.
+struct Paint {
+  glm::vec3 colour{0.55F, 0.56F, 0.58F};  ///< linear
+  bool metal = false;
+};
+
+/// Draws meshes over the volumes, with true depth (the paper's equation (1)).
+class MeshPainter {
+ public:
+  /// `world_from_mesh` may scale; hidden where something nearer is in `target`.
+  void draw(const GpuMesh& mesh, const glm::dmat4& world_from_mesh, const Paint& paint,
+            const View& view, const RenderTarget& target);
+
+  /// From `foot_mm` along `arrow_mm`. The part behind other things shines through faintly, so that
+  /// a force is seen in a deep cavity too.
+  void draw_arrow(const glm::dvec3& foot_mm, const glm::dvec3& arrow_mm, double thickness_mm,
+                  const Paint& paint, const View& view, const RenderTarget& target);
+
+ private:
+  void use_program(const glm::dmat4& world_from_mesh, const Paint& paint, float opacity,
+                   const View& view);
+
+  GlProgram plain_{{"mesh.vert", "mesh.frag", "lighting.frag"}, "#define KERF_METAL 0\n"};
+  GlProgram metal_{{"mesh.vert", "mesh.frag", "lighting.frag"}, "#define KERF_METAL 1\n"};
+  GpuMesh cylinder_{unit_cylinder()};
+  GpuMesh cone_{unit_cone()};
+};
+
+/// What the hand holds and feels at one moment.
+struct Hand {
+  glm::dvec3 tip_mm{0.0};
+  glm::dvec4 orientation{0.0, 0.0, 0.0, 1.0};  ///< quaternion x, y, z, w
+  std::uint32_t tool = 0;                      ///< none where the scene has fewer
+  glm::dvec3 force_n{0.0};
+  friend bool operator==(const Hand&, const Hand&) noexcept = default;
+  /// The same tool in the same place, whatever it feels.
+  [[nodiscard]] bool rests_at(const Hand& other) const noexcept {
+    return tip_mm == other.tip_mm && orientation == other.orientation && tool == other.tool;
+  }
+};
+
+/// The tip is the proxy's, where there is one: a tool that is held by the tooth's surface is drawn
+/// there, however deep the hand pushes. Nothing before docking, when its place is unknown.
+[[nodiscard]] std::optional<Hand> hand_of(const TickRecord& record);
+
+/// Draws the tool and the arrow of its force.
+class HandPainter {
+ public:
+  /// `scale_mm` is the size of what is looked at: lengths of the arrow follow it.
+  HandPainter(const SceneView& scene, double scale_mm);
+
+  void draw_tool(const Hand& hand, const View& view, const RenderTarget& target);
+  void draw_force(const Hand& hand, const View& view, const RenderTarget& target);
+  /// Rectangles of pixels that both may touch: several along each, which seldom stand upright.
+  [[nodiscard]] std::vector<PixelRect> bounds(const Hand& hand, const View& view,
+                                              PictureSize size) const;
+
+ private:
+  struct Tool {
+    GpuMesh mesh;
+    glm::dvec3 low_mm, high_mm;  ///< its box, in its own axes
+    double radius_mm;
+  };
+  struct Arrow {
+    glm::dvec3 foot_mm, shaft_mm;
+    double thickness_mm;
+  };
+  [[nodiscard]] Arrow arrow_of(const Hand& hand) const;
+
+  std::vector<Tool> tools_;
+  double scale_mm_;
+  MeshPainter painter_;
+};
+
+}  // namespace kerf

@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "visualizer/compose/picture_layers.hpp"
+#include "visualizer/panels/overlay.hpp"
+#include "visualizer/scene/appearance.hpp"
+#include "visualizer/scene/camera.hpp"
+#include "visualizer/scene/frame_report.hpp"
+#include "visualizer/scene/session.hpp"
+
+namespace kerf {
+
+/// What a call of `Picture::draw` did.
+struct Redrawn {
+  bool any = false;    ///< false: nothing had changed, nothing was drawn
+  double share = 0.0;  ///< of the picture's pixels: where volumes were drawn again
+};
+
+/// Everything that is seen of one session: backdrop, volumes, tool, force arrow, panel.
+///
+/// Made after the first `poll` of its session, which is uploaded whole; later only what changed.
+class Picture {
+ public:
+  Picture(const Session& session, const Look& look, double aspect);
+
+  /// Uploads the bricks that the last `poll` changed. Call once after each `poll`.
+  void update(const Session& session);
+
+  /// Draws the present state, for one eye or for two side by side, into `target`; its depth is not
+  /// used. `target` holds what the last call left there, and so do the layers of the picture: while
+  /// the camera rests only the part of the screen is drawn again where bricks changed or where the
+  /// tool was or is. The result is that of drawing everything.
+  Redrawn draw(const Session& session, const OverlayFigures& figures, const RenderTarget& target);
+  /// Draws the panels of the last `draw` over another target of its size, as that did.
+  void draw_panels(const RenderTarget& target);
+  /// The next `draw` draws everything.
+  void redraw_all() noexcept { eyes_.clear(); }
+
+  [[nodiscard]] const Look& look() const noexcept { return look_; }
+  /// From the next `draw` on. Another renderer or iso value uploads all volumes again, an opacity
+  /// only the materials. Throws VisualizerError where the renderer cannot show them; the look stays
+  /// then.
+  void set_look(const Session& session, const Look& look);
+  /// The scene with the iso values and opacities of the look.
+  [[nodiscard]] SceneView shown_scene() const;
+  /// Of all materials, their own or chosen.
+  [[nodiscard]] Opacities opacities() const;
+  /// For `OverlayFigures::controls`.
+  [[nodiscard]] LookControls controls() const;
+  /// See `Overlay::help_pages`.
+  [[nodiscard]] int help_pages() const noexcept { return overlay_.help_pages(); }
+  /// Of the scene's materials as they are drawn, with what was removed.
+  [[nodiscard]] std::vector<ScoreRow> score(const Session& session) const;
+  /// The mouse over the panels: see `Overlay::handle`.
+  bool handle(const Pointer& pointer, OverlayFigures& figures, PictureSize size);
+
+  /// A plane square to the gaze, through `point_mm`, or without one through the middle of all
+  /// volumes.
+  [[nodiscard]] ClipPlane facing_plane(const std::optional<glm::dvec3>& point_mm) const;
+  /// The plane moved by `mm` towards what it cuts off.
+  [[nodiscard]] ClipPlane moved(const ClipPlane& plane, double mm) const;
+
+  [[nodiscard]] OrbitCamera& camera() noexcept { return camera_; }
+  /// What one eye of a picture of `size` sees; of two, the one in their middle would.
+  [[nodiscard]] View middle_view(PictureSize size) const;
+  /// Of one eye in a picture of `size`.
+  [[nodiscard]] PictureSize eye_size(PictureSize size) const noexcept;
+  void reset_camera(double aspect);
+  [[nodiscard]] std::uint64_t bricks_uploaded() const noexcept { return bricks_uploaded_; }
+
+ private:
+  /// The same of another look.
+  [[nodiscard]] SceneView scene_in(const Look& look) const;
+  [[nodiscard]] std::unique_ptr<ScenePainter> painter_for(const Session& session, const Look& look);
+  /// Where the box of all volumes begins and ends along a direction, in mm.
+  [[nodiscard]] glm::dvec2 reach_along(const glm::dvec3& towards) const;
+  /// `View::shown` of the clip plane.
+  [[nodiscard]] glm::dvec4 shown_half() const;
+  /// Of each eye, from the left.
+  [[nodiscard]] std::vector<View> views(PictureSize size) const;
+
+  SceneView scene_;
+  Look look_;
+  std::uint64_t bricks_uploaded_ = 0;
+  std::unique_ptr<ScenePainter> painter_;  ///< making it counts bricks
+  OrbitCamera camera_;
+  glm::dvec3 low_mm_{0, 0, 0}, high_mm_{0, 0, 0};  ///< the box of all volumes
+  ScreenPasses passes_;
+  std::vector<EyeLayers> eyes_;  ///< empty: draw everything
+  Overlay overlay_;
+  OverlayFigures shown_figures_;
+  GLuint shown_in_ = 0;     ///< framebuffer, whose name may be given to a later one
+  PictureSize shown_size_;  ///< of all of it
+  PixelRect shown_panels_;  ///< of each eye
+};
+
+/// `Picture::draw`, complete when it returns, with its times and what it did in the report;
+/// takes the session's oldest removal for the latency.
+Redrawn draw_measured(Picture& picture, Session& session, const OverlayFigures& figures,
+                      const RenderTarget& target, FrameReport& report);
+
+/// The figures of the panel as the session stands; the caller adds what it alone knows.
+[[nodiscard]] OverlayFigures overlay_figures(const Session& session);
+
+}  // namespace kerf

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include <glm/glm.hpp>
+
+#include "visualizer/gl/target.hpp"
+#include "visualizer/scene/pixel_rect.hpp"
+#include "visualizer/surface/volume_samples.hpp"
+
+namespace kerf {
+
+/// The damage of a picture: the tiles that must be drawn again. A tile has 4x4 pixels, as the ray
+/// caster and a software GL shade them. Rows count from the bottom up, as GL has them.
+class StaleTiles {
+ public:
+  static constexpr int kEdge = 4;
+
+  explicit StaleTiles(PictureSize size);
+
+  /// The tiles that `pixels` touch, as a rectangle in tiles; clipped to the picture.
+  [[nodiscard]] PixelRect tiles_of(const PixelRect& pixels) const;
+  /// The pixels of `tiles`, clipped to the picture.
+  [[nodiscard]] PixelRect pixels_of(const PixelRect& tiles) const;
+
+  /// Marks every tile that `pixels` touch.
+  void mark(const PixelRect& pixels);
+  void mark(int x, int y) { marked_[at(x, y)] = 1; }
+  /// Marks what is marked in `other`, which has the same size.
+  void mark(const StaleTiles& other);
+  void clear();
+  [[nodiscard]] bool marked(int x, int y) const { return marked_[at(x, y)] != 0; }
+
+  /// Rectangles of pixels that do not overlap and cover the marked tiles. Each costs a draw call,
+  /// so a rectangle takes in a few clean tiles where that saves another rectangle.
+  [[nodiscard]] std::vector<PixelRect> rects() const;
+
+ private:
+  [[nodiscard]] std::size_t at(int x, int y) const {
+    return static_cast<std::size_t>(y * across_ + x);
+  }
+
+  PictureSize size_;
+  int across_, along_;
+  std::vector<std::uint8_t> marked_;
+};
+
+/// Marks the tiles in which one of `triangles` may cover the centre of a pixel. A triangle that
+/// came and one that went count alike. A tile stays clean where the depth of `kept`, the last
+/// picture, is everywhere nearer than the triangle. Marks a little more than needed, never less: a
+/// GPU rounds.
+void mark_triangles(StaleTiles& tiles, std::span<const FineTriangle> triangles,
+                    const glm::dmat4& clip_from_voxel, const RenderTarget& kept);
+
+}  // namespace kerf

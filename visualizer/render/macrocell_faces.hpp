@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "visualizer/cast/macrocells.hpp"
+#include "visualizer/gl/gl_objects.hpp"
+#include "visualizer/gl/program.hpp"
+#include "visualizer/gl/target.hpp"
+#include "visualizer/scene/camera.hpp"
+#include "visualizer/scene/scene_view.hpp"
+
+namespace kerf {
+
+/// `Macrocells::boundary_faces` in a list whose places change little when cells do, so that a copy
+/// of it elsewhere follows by a few pieces.
+class CellFaces {
+ public:
+  using Face = std::array<std::uint16_t, 4>;
+  /// Places first <= i < end.
+  struct Run {
+    std::size_t first, end;
+  };
+
+  explicit CellFaces(const Macrocells& cells);
+
+  /// Call after cells in `flipped` became active or inactive. Returns the places with another face
+  /// now, ascending; places from the list's size on are no more.
+  std::vector<Run> update(const Macrocells& cells, const VoxelBox& flipped);
+
+  [[nodiscard]] std::span<const Face> all() const noexcept { return faces_; }
+  /// The list of a grid is no longer: all walls of its cells. A bar of active cells has four of
+  /// five of them, and where active and empty cells take turns, nearly all are faces too.
+  [[nodiscard]] static std::size_t most(const VoxelGrid& grid) noexcept {
+    const auto [nx, ny, nz] = grid;
+    return 3 * grid.voxel_count() + VoxelGrid{nx, ny, 1}.voxel_count() +
+           VoxelGrid{nx, 1, nz}.voxel_count() + VoxelGrid{1, ny, nz}.voxel_count();
+  }
+  /// In cells, the smallest box that holds every active one.
+  [[nodiscard]] VoxelBox active_box() const;
+
+ private:
+  std::vector<Face> faces_;
+};
+
+/// The macrocells of one volume on the GPU: which are active, and the faces around those; whole
+/// once, then only what changed.
+class CellsOnGpu {
+ public:
+  /// Cells that hold a density of at least `threshold` are active.
+  CellsOnGpu(const VolumeView& volume, std::span<const Density> density, Density threshold);
+
+  /// Bricks `changed` of `density` (the whole volume) differ.
+  void update_bricks(std::span<const Density> density, std::span<const std::uint32_t> changed);
+
+  /// See `Renderer::place`.
+  void place(const glm::dmat4& world_from_voxel);
+
+  /// The texture: 1 in active cells.
+  void bind(GLuint unit) const { glBindTextureUnit(unit, active_.id()); }
+  /// Draws the faces around the active cells with the program in use; attribute 0 is a face.
+  void draw_faces() const;
+
+  [[nodiscard]] const glm::dmat4& world_from_cell() const noexcept { return world_from_cell_; }
+  /// In cells, the smallest box that holds every active one.
+  [[nodiscard]] const VoxelBox& active_box() const noexcept { return active_box_; }
+
+ private:
+  void upload_active(const VoxelBox& cells);
+  void upload_faces(std::span<const CellFaces::Run> runs);
+
+  BrickGrid bricks_;
+  glm::dmat4 world_from_cell_{1.0};
+  Macrocells cells_;
+  CellFaces faces_;
+  VoxelBox active_box_;
+  GlTexture3D active_ = GlTexture3D::create();
+  GlBuffer face_buffer_ = GlBuffer::create();
+  GlVertexArray face_array_ = GlVertexArray::create();
+};
+
+/// Per pixel, where its ray first meets an active macrocell of a volume, in mm along the view axis:
+/// drawn from the faces between active and empty cells. The far plane where it meets none, the near
+/// plane where it begins in one. One layer for each volume.
+class RayEntries {
+ public:
+  explicit RayEntries(int layers) : layers_(layers) {}
+
+  /// Draws `layer` within the bounds of `target`'s parts. Leaves its own framebuffer bound, the
+  /// depth test on and nothing culled.
+  void draw(int layer, const CellsOnGpu& cells, const View& view, const RenderTarget& target);
+  /// The layers as a texture array.
+  void bind(GLuint unit) const { glBindTextureUnit(unit, buffer_->entry_mm.id()); }
+
+ private:
+  struct Buffer {
+    Buffer(PictureSize size, int layers);
+    PictureSize size;
+    GlTexture2DArray entry_mm = GlTexture2DArray::create();
+    GlTexture2D depth = GlTexture2D::create();
+    GlFramebuffer framebuffer = GlFramebuffer::create();
+  };
+
+  int layers_;
+  GlProgram program_{"cell_faces.vert", "cell_faces.frag"};
+  std::optional<Buffer> buffer_;
+};
+
+}  // namespace kerf

@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include <glm/glm.hpp>
+
+#include "visualizer/scene/gradient.hpp"
+#include "visualizer/scene/scene_view.hpp"
+
+namespace kerf {
+
+/// Cuts the volumes open, square to an axis of the world or to any direction: what lies beyond is
+/// not drawn.
+struct ClipPlane {
+  static constexpr int kFree = 3;  ///< `axis` of any direction
+  bool on = false;
+  int axis = 2;                                  ///< 0 x, 1 y, 2 z: towards the first view
+  double at = 0.5;                               ///< 0..1 of the way through the box of all volumes
+  std::array<double, 3> towards{0.0, 0.0, 1.0};  ///< of kFree; length 1
+  friend bool operator==(const ClipPlane&, const ClipPlane&) noexcept = default;
+};
+
+/// Two eyes side by side; lengths in mm.
+struct Stereo {
+  bool on = false;
+  std::optional<double> eyes_mm{};         ///< none: `kEyesPerConvergence` of the next
+  std::optional<double> convergence_mm{};  ///< none: as far as what the camera turns about
+  friend bool operator==(const Stereo&, const Stereo&) noexcept = default;
+};
+
+/// Opacity over one voxel edge, 0..1, by the name of the material.
+using Opacities = std::map<std::string, double>;
+
+/// How the volumes are shown: what a user may change while they are looked at.
+struct Look {
+  std::string renderer = "iso";  ///< of all volumes, or of each: renderer.hpp
+  std::optional<double> iso{};   ///< of all volumes, 0..1 of full density; none: each its own
+  Opacities opacities{};         ///< of the others: their own
+  Gradient gradient = Gradient::corners;
+  ClipPlane clip{};
+  Stereo stereo{};
+  bool voxel_tool = false;    ///< the tool is a volume, not a mesh
+  bool colour_blind = false;  ///< materials in colours that any colour vision tells apart
+  friend bool operator==(const Look&, const Look&) noexcept = default;
+};
+
+inline constexpr int kPaletteWidth = 256;  ///< entries of a row
+
+/// Linear colours in two rows: by density (entry i is density i/255; adjoining materials blend over
+/// a narrow band, so that their border is smooth on a cut), then by label. Material 0 is "none" and
+/// colours nothing; without others everything is ivory. The fourth component is the opacity of the
+/// material over one voxel edge, for the translucent renderers: its own, or else the softer, the
+/// more opaque.
+using Palette = std::array<std::array<glm::vec4, kPaletteWidth>, 2>;
+[[nodiscard]] Palette make_palette(std::span<const MaterialView> materials);
+
+/// The opacity that a material without one of its own has.
+[[nodiscard]] double default_opacity(std::span<const MaterialView> materials, std::size_t index);
+
+/// What a voxel looks like in the translucent renderers; plain data, the same for all of them.
+///
+/// A sample of density d has the colour of its material (by label where it has one, else by
+/// density) and the opacity
+///
+///     1 - (1 - a)^(p * s / s0),   p = clamp((d - empty) / (full - empty), 0, 1)
+///
+/// over a length s, where a is the material's opacity over s0, one voxel edge (the shortest, where
+/// they differ). The exponent makes the picture independent of the step; p lets a border fade
+/// in, and material that is milled away fade out.
+struct TransferFunction {
+  /// Linear colour, and a in the fourth place: row 0 by density (entry i is density i/255), row 1
+  /// by label.
+  Palette materials{};
+  double empty = 0.0;  ///< density up to which nothing is seen
+  double full = 1.0;   ///< density from which the material is seen whole
+
+  /// p of a density.
+  [[nodiscard]] double presence(double density) const noexcept;
+  /// No voxel below this density is seen, though densities are rounded to 8 bits on the way.
+  [[nodiscard]] Density lowest_seen() const noexcept;
+};
+
+/// The least opacity over one voxel edge that counts as something: less makes no difference on a
+/// screen. The first sample that reaches it gives the depth of a pixel.
+inline constexpr double kLeastOpacity = 1.0 / 255.0;
+
+/// Made from materials: the softer, the more opaque, so that dentin shows under enamel and pulp
+/// in a cut. A volume with labels fades in up to its softest material; one without from `air` on,
+/// up to `iso`, because air and noise have densities too.
+[[nodiscard]] TransferFunction make_transfer_function(std::span<const MaterialView> materials,
+                                                      Density iso, bool has_labels,
+                                                      Density air = 0);
+/// That of one volume of a scene, whose air is what most of it has below the iso density.
+[[nodiscard]] TransferFunction make_transfer_function(const SceneView& scene, std::size_t volume,
+                                                      const VolumeContent& content);
+
+/// The median of the densities below `iso`, rounded down to 8 bits; 0 where there are none. A CT
+/// has its own value for air, far above the lowest one, as the paper's tooth: 0.3 of the highest.
+[[nodiscard]] Density air_level(std::span<const Density> density, Density iso);
+
+/// The transfer function as a user keeps it, in TOML:
+///
+///     [opacity]      # over one voxel edge, 0..1, by material; those left out keep their own
+///     enamel = 0.1
+///
+/// Every mistake is a VisualizerError of one line: `name`, line, value, way out.
+[[nodiscard]] Opacities parse_transfer(std::string_view text, const std::string& name);
+[[nodiscard]] Opacities read_transfer(const std::filesystem::path& file);
+
+/// Writes the opacities of all materials, whole or not at all. Throws FileError.
+void write_transfer(const std::filesystem::path& file, const Opacities& opacities);
+
+/// Throws VisualizerError for a material that the scene does not have.
+void check_materials(const Opacities& opacities, const SceneView& scene, const std::string& name);
+
+}  // namespace kerf

@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "shared/segment/connection.hpp"
+#include "shared/volume/material.hpp"
+#include "visualizer/scene/frame_report.hpp"
+#include "visualizer/scene/scene_view.hpp"
+
+namespace kerf {
+
+/// How much of each material has been removed, brick by brick: the most that a brick has held since
+/// this was made, less what it holds now. Matter that comes back is no longer counted, also where a
+/// reset brings back what was gone before. Memory: a byte for each voxel.
+class MaterialScore {
+ public:
+  MaterialScore(const SceneView& scene, std::span<const VolumeContent> contents);
+
+  /// Some bricks of a volume are others now. Costs their voxels.
+  void update(std::size_t volume, std::span<const Density> density,
+              std::span<const std::uint32_t> bricks);
+
+  /// By index of the scene's materials; 0 is matter of none.
+  [[nodiscard]] std::vector<double> removed_mm3() const;
+
+ private:
+  struct Volume {
+    BrickGrid bricks;
+    double step_mm3 = 0.0;               ///< of a step of density in a voxel
+    std::vector<Label> material;         ///< by voxel
+    std::vector<std::uint32_t> matter;   ///< steps by brick and material
+    std::vector<std::uint32_t> fullest;  ///< the most of them so far
+    std::vector<std::int64_t> removed;   ///< steps by material
+  };
+  /// Counts the matter of a brick anew; what it lacks of its fullest is removed.
+  void count(Volume& volume, std::span<const Density> density, std::uint32_t brick) const;
+
+  std::size_t materials_;
+  std::vector<Volume> volumes_;
+};
+
+/// One run of a controller as the eye follows it: a connection and private copies of the volumes.
+///
+/// State-based: `poll` brings everything up to the present however long ago the last one was, so
+/// late join, a slow picture and a restarted visualizer are one case. Never waits for the
+/// controller. One thread.
+class Session {
+ public:
+  /// Throws SegmentError where there is no controller of that name or it speaks another version.
+  explicit Session(std::string_view name);
+
+  /// Tries again until a controller of that name lets it in; throws the last reason once `wait` is
+  /// over.
+  [[nodiscard]] static Session attach(std::string_view name, std::chrono::duration<double> wait);
+
+  /// Copies the bricks that changed and reads the records that came since.
+  void poll();
+
+  [[nodiscard]] const SceneView& scene() const noexcept { return scene_; }
+  [[nodiscard]] std::vector<VolumeContent> contents() const;
+  /// Bricks of a volume that the last `poll` changed.
+  [[nodiscard]] const VolumeSnapshot& snapshot(std::size_t volume) const;
+
+  /// The newest record; none before the first tick.
+  [[nodiscard]] const std::optional<TickRecord>& latest() const noexcept { return latest_; }
+  /// Ticks since the device was armed; none before.
+  [[nodiscard]] std::optional<std::uint64_t> ticks_since_armed() const noexcept;
+  [[nodiscard]] std::optional<double> tick_rate_hz() const;
+  /// Since the session began or the volumes were reset.
+  [[nodiscard]] double removed_mm3() const noexcept { return removed_mm3_; }
+  /// The same by index of the scene's materials, but since this one joined.
+  [[nodiscard]] std::vector<double> removed_by_material_mm3() const { return score_.removed_mm3(); }
+  /// How long what may not be cut was pressed upon, since then too.
+  [[nodiscard]] double forbidden_ms() const noexcept;
+  /// Something had been cut before it joined, which `removed_by_material_mm3` lacks.
+  [[nodiscard]] bool cut_before() const noexcept { return cut_before_; }
+  [[nodiscard]] bool joined_late() const noexcept { return joined_late_; }
+  [[nodiscard]] std::optional<double> data_age_ms() const;
+  /// When the oldest of the ticks began that removed material whose bricks came with a `poll` since
+  /// the last call. None where no such tick; what was removed before the session began does not
+  /// count.
+  std::optional<std::chrono::steady_clock::time_point> take_oldest_removal();
+  [[nodiscard]] std::uint32_t tick_ns() const noexcept;
+  /// The servo's own time at the newest record: its ticks times their length. 0 before the first.
+  [[nodiscard]] double servo_s() const noexcept;
+  /// Since the tick of the newest record began; 0 before the first.
+  [[nodiscard]] double record_age_s() const noexcept;
+  /// From asking for the controller to the first complete volumes.
+  [[nodiscard]] double attach_ms() const noexcept { return attach_ms_; }
+
+  /// True once the controller has said that it ends, or has gone. Nothing changes after that: one
+  /// more `poll` has the final state.
+  [[nodiscard]] bool ended() const noexcept;
+  /// It said so, and it was no fault.
+  [[nodiscard]] bool ended_cleanly() const noexcept;
+
+  // False where the controller refuses, is busy or has gone.
+  bool select_tool(std::uint32_t index) { return send(CommandKind::select_tool, index); }
+  /// The volumes go back to their first content.
+  bool reset() { return send(CommandKind::reset, 0); }
+  /// They go back to what they were before the last stroke.
+  bool undo() { return send(CommandKind::undo, 0); }
+
+ private:
+  bool send(CommandKind kind, std::uint32_t argument);
+  [[nodiscard]] MaterialScore first_score();
+  void read_states();
+  void read_removals();
+  void note_arrivals();
+  [[nodiscard]] std::uint64_t began_ns(const DirtyRecord& removal) const;
+
+  Stopwatch began_;
+  SegmentConnection connection_;
+  SceneView scene_;
+  bool cut_before_;  ///< as told before the first look at the volumes
+  std::vector<VolumeSnapshot> snapshots_;
+  MaterialScore score_;
+  std::optional<TickRecord> latest_;
+  std::optional<Tick> armed_;
+  std::uint64_t next_state_ = 0;  ///< index of the first record not read yet
+  std::uint64_t next_removal_ = 0;
+  std::vector<DirtyRecord> on_the_way_;  ///< removals whose bricks no snapshot holds yet
+  std::optional<std::uint64_t> oldest_removal_ns_;
+  double removed_mm3_ = 0.0;
+  std::uint64_t forbidden_ticks_ = 0;
+  bool joined_late_ = false;
+  double attach_ms_ = 0.0;
+};
+
+}  // namespace kerf

@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: Apache-2.0
+
+#include "visualizer/surface/vertex_shading.hpp"
+
+#include <algorithm>
+
+namespace kerf {
+
+namespace {
+
+// The surface itself is half air, and a border is antialiased over two voxels.
+constexpr int kDepthQuarters = 5;       // 1.25 voxels below the surface
+constexpr int kFullDepthQuarters = 10;  // 2.5: past the border
+// Soft tissue that lies on the surface, too thin for iso, coats it until it is milled away.
+constexpr int kCoatDensity = static_cast<int>(0.14 * kDensityMax);
+
+struct Tap {
+  int quarters;  ///< of a voxel, outwards
+  float weight;
+};
+constexpr auto kTaps = std::to_array<Tap>({{10, 0.30F}, {24, 0.30F}, {48, 0.25F}});
+
+constexpr FinePoint stepped(FinePoint at, FinePoint inward, int quarters) {
+  return at + (inward * quarters >> 2);
+}
+
+}  // namespace
+
+SurfaceLook::SurfaceLook(const std::vector<MaterialView>& materials, Density iso)
+    : share_of_iso_(1.0F / static_cast<float>(iso)) {
+  const auto palette = make_palette(materials);
+  by_density_ = palette[0];
+  by_label_ = palette[1];
+  for (glm::vec4& colour : by_label_) colour.a = 1.0F;
+}
+
+glm::vec4 SurfaceLook::label_colour(const VolumeSamples& volume, FinePoint at) const {
+  const VoxelIndex v = VolumeSamples::voxel_below(at);
+  std::array<Label, 8> label{};
+  for (int c = 0; c < 8; ++c) {
+    label[static_cast<std::size_t>(c)] =
+        volume.label_at({v.x + (c & 1), v.y + (c >> 1 & 1), v.z + (c >> 2)});
+  }
+  if (std::all_of(label.begin(), label.end(), [&](Label one) { return one == label[0]; })) {
+    return label[0] == 0 ? glm::vec4(0.0F) : by_label_[label[0]];
+  }
+  const glm::vec3 share = glm::vec3(at & (kFinePerVoxel - 1)) / float{kFinePerVoxel};
+  glm::vec4 sum(0.0F);
+  for (unsigned c = 0; c < 8; ++c) {
+    if (label[c] == 0) continue;
+    const float weight = ((c & 1) != 0 ? share.x : 1.0F - share.x) *
+                         ((c & 2) != 0 ? share.y : 1.0F - share.y) *
+                         ((c & 4) != 0 ? share.z : 1.0F - share.z);
+    sum += weight * by_label_[label[c]];
+  }
+  return sum;
+}
+
+glm::vec3 SurfaceLook::density_colour(int density) const {
+  const float at = static_cast<float>(density) * static_cast<float>(kPaletteWidth - 1) /
+                   static_cast<float>(kDensityMax);
+  const auto low = std::min(static_cast<std::size_t>(at), std::size_t{kPaletteWidth - 2});
+  return glm::mix(by_density_[low], by_density_[low + 1], at - static_cast<float>(low));
+}
+
+glm::vec3 SurfaceLook::colour(const VolumeSamples& volume, FinePoint at, FinePoint inward) const {
+  const FinePoint below = stepped(at, inward, kDepthQuarters);
+  if (!volume.labels.empty()) {
+    glm::vec4 labelled = label_colour(volume, below);
+    const FinePoint above = stepped(at, inward, -kDepthQuarters);
+    if (volume.density_at(above) > kCoatDensity) {
+      const glm::vec4 coat = label_colour(volume, above);
+      labelled = glm::mix(labelled, coat, coat.a);
+    }
+    if (labelled.a > 0.0F) return glm::vec3(labelled) / labelled.a;
+  }
+  return density_colour(std::max(volume.density_at(below),
+                                 volume.density_at(stepped(at, inward, kFullDepthQuarters))));
+}
+
+float SurfaceLook::openness(const VolumeSamples& volume, FinePoint at, FinePoint inward) const {
+  float open = 1.0F;
+  for (const Tap& tap : kTaps) {
+    const auto density = static_cast<float>(volume.density_at(stepped(at, inward, -tap.quarters)));
+    open -= tap.weight * std::min(density * share_of_iso_, 1.0F);
+  }
+  return open;
+}
+
+bool SurfaceLook::openness_depends_on(const VoxelBox& box, FinePoint at, FinePoint inward) {
+  const VoxelBox cells{{box.lo.x - 1, box.lo.y - 1, box.lo.z - 1}, box.hi};
+  return std::any_of(kTaps.begin(), kTaps.end(), [&](const Tap& tap) {
+    return cells.contains(VolumeSamples::voxel_below(stepped(at, inward, -tap.quarters)));
+  });
+}
+
+}  // namespace kerf
