@@ -1,4 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
+# shellcheck shell=bash
 # Sourced by .ci/run and .ci/all: a timed stage, a build that takes warnings as errors, and the tests of each tier.
 
 # Real volumes, if they lie beside the checkout.

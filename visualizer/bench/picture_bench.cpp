@@ -50,7 +50,7 @@ std::vector<Density> ball(double noise) {
   return density;
 }
 
-double angle_deg(Gradient gradient, const std::vector<Density>& density) {
+double angle_deg(GradientFilter gradient, const std::vector<Density>& density) {
   SceneView scene;
   scene.gradient = gradient;
   VolumeView& volume = scene.volumes.emplace_back();
@@ -95,7 +95,7 @@ std::vector<GradientRow> measure_gradients() {
   const std::vector<Density> clean = ball(0.0), noisy = ball(kNoise);
   std::vector<GradientRow> rows;
   for (std::size_t i = 0; i < kGradientNames.size(); ++i) {
-    const auto gradient = static_cast<Gradient>(i);
+    const auto gradient = static_cast<GradientFilter>(i);
     rows.push_back({gradient, angle_deg(gradient, clean), angle_deg(gradient, noisy)});
   }
   return rows;
@@ -148,7 +148,7 @@ class Stage {
   }
 
  private:
-  static SceneView scene_of(const BenchTooth& tooth, Gradient gradient) {
+  static SceneView scene_of(const BenchTooth& tooth, GradientFilter gradient) {
     SceneView scene = tooth.scene();
     scene.gradient = gradient;
     return scene;
@@ -190,7 +190,7 @@ std::vector<PictureRow> subjects() {
       }
     }
   }
-  for (const Gradient gradient : {Gradient::central, Gradient::farid5}) {
+  for (const GradientFilter gradient : {GradientFilter::central, GradientFilter::farid5}) {
     rows.push_back({.renderer = "iso", .gradient = gradient, .volume = kBenchVolumes.back()});
   }
   return rows;

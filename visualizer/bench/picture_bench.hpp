@@ -25,7 +25,7 @@ namespace kerf {
 
 /// What one way to take the gradient does to the normals of `iso`.
 struct GradientRow {
-  Gradient gradient;
+  GradientFilter gradient;
   double angle_deg;        ///< root mean square, on a ball
   double noisy_angle_deg;  ///< the same with noise in the density
 };
@@ -39,7 +39,7 @@ struct GradientRow {
 /// What one kind of frame costs.
 struct PictureRow {
   std::string renderer;
-  Gradient gradient = Gradient::corners;
+  GradientFilter gradient = GradientFilter::corners;
   VoxelGrid volume;          ///< as the paper names it, before any crop
   int tool = 0;              ///< voxels across: a ball is cut before each frame; 0: none
   bool cropped = false;      ///< only the tooth's box

@@ -89,7 +89,7 @@ bool same_subject(const PictureRow& a, const PictureRow& b) {
 
 /// Of the paper's padded tooth, by what changes in it; none where that was not measured.
 const PictureRow* row_of(std::span<const PictureRow> rows, std::string_view renderer,
-                         Gradient gradient, int tool, bool partial) {
+                         GradientFilter gradient, int tool, bool partial) {
   constexpr int kLargeEdge = 256;
   const auto found = std::find_if(rows.begin(), rows.end(), [&](const PictureRow& row) {
     return row.renderer == renderer && row.gradient == gradient && row.volume.nx == kLargeEdge &&
@@ -119,7 +119,7 @@ std::string picture_table(std::span<const PictureRow> rows) {
       "| cpu ms: static | 16^3 | 16^3 partial | paper fps |\n"
       "|---|---|---:|---:|---:|---:|---:|---:|---:|---:|---|\n";
   for (auto first = rows.begin(); first != rows.end();) {
-    if (first->gradient != Gradient::corners) {  // for the other table
+    if (first->gradient != GradientFilter::corners) {  // for the other table
       ++first;
       continue;
     }
@@ -172,9 +172,9 @@ std::string picture_summary(const PictureFigures& figures) {
                         "| renderer | fps: static | 16^3 partial | cpu ms: static | 16^3 partial | "
                         "partial / full | paper fps |\n|---|---:|---:|---:|---:|---:|---|\n";
   for (const PictureRow& row : figures.rows) {
-    if (row_of(figures.rows, row.renderer, Gradient::corners, 0, false) != &row) continue;
-    const auto* partial = row_of(figures.rows, row.renderer, Gradient::corners, 16, true);
-    const auto* whole = row_of(figures.rows, row.renderer, Gradient::corners, 16, false);
+    if (row_of(figures.rows, row.renderer, GradientFilter::corners, 0, false) != &row) continue;
+    const auto* partial = row_of(figures.rows, row.renderer, GradientFilter::corners, 16, true);
+    const auto* whole = row_of(figures.rows, row.renderer, GradientFilter::corners, 16, false);
     if (partial == nullptr || whole == nullptr) continue;
     summary += "| " + row.renderer + " | " + figure(row.fps()) + " | " + figure(partial->fps()) +
                " | " + figure(row.cpu_ms) + " | " + figure(partial->cpu_ms) + " | 1/" +

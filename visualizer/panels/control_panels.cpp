@@ -112,7 +112,7 @@ void choose_gradient(Look& look) {
     }
     ImGui::EndCombo();
   }
-  look.gradient = static_cast<Gradient>(chosen);
+  look.gradient = static_cast<GradientFilter>(chosen);
 }
 
 /// Draws a tool that lies from `corner` to the right, its tip first, within a box of `size`.

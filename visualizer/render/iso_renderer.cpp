@@ -15,28 +15,28 @@ constexpr GLuint kEntryUnit = 4;  // after the textures of VolumeOnGpu
 constexpr GLuint kPaletteUnit = 5;
 
 /// What gradient.frag asks for.
-std::string_view define_of(Gradient gradient) {
+std::string_view define_of(GradientFilter gradient) {
   switch (gradient) {
-    case Gradient::central:
+    case GradientFilter::central:
       return "#define KERF_GRADIENT_CENTRAL\n";
-    case Gradient::farid5:
+    case GradientFilter::farid5:
       return "#define KERF_GRADIENT_FARID5\n";
-    case Gradient::corners:
+    case GradientFilter::corners:
       break;
   }
   return {};
 }
 
 constexpr TexelFormat kGradientTexel{GL_RGBA16_SNORM, GL_RGBA, GL_SHORT, GL_LINEAR};
-constexpr std::int32_t kGradientReach = gradient_reach(Gradient::farid5);
+constexpr std::int32_t kGradientReach = gradient_reach(GradientFilter::farid5);
 
 }  // namespace
 
 VolumeOnGpu::VolumeOnGpu(const VolumeView& volume, const VolumeContent& content,
-                         int max_texture_size, bool skip_empty, Gradient gradient)
+                         int max_texture_size, bool skip_empty, GradientFilter gradient)
     : solid_(volume, content, max_texture_size),
       cells_(volume, content.density, skip_empty ? volume.iso : Density{0}) {
-  if (gradient != Gradient::farid5) return;
+  if (gradient != GradientFilter::farid5) return;
   const VoxelGrid& grid = solid_.bricks().grid;
   gradient_.emplace(grid, kGradientTexel);
   for_each_layer(grid, [&](const VoxelBox& layer) { upload_gradient(content.density, layer); });
@@ -56,7 +56,7 @@ void VolumeOnGpu::update_bricks(std::span<const Density> density,
 }
 
 void VolumeOnGpu::upload_gradient(std::span<const Density> density, const VoxelBox& box) {
-  fill_gradients(Gradient::farid5, solid_.bricks().grid, density, box, gradients_);
+  fill_gradients(GradientFilter::farid5, solid_.bricks().grid, density, box, gradients_);
   texels_.clear();
   for (const glm::vec3& g : gradients_) {
     const auto part = [](float value) {
@@ -100,7 +100,7 @@ IsoRenderer::IsoRenderer(const SceneView& scene, std::span<const VolumeContent> 
 
 RayFootprint IsoRenderer::footprint() const noexcept {
   RayFootprint footprint = Renderer::footprint();
-  if (gradient_ != Gradient::corners) {
+  if (gradient_ != GradientFilter::corners) {
     // The kernels know where the normals of one gradient point; of others a tap may be anywhere,
     // and a density is interpolated between two voxels.
     footprint.at_end = static_cast<int>(2.0F * (kLongestTapVox + 1.0F)) + 1;

@@ -21,7 +21,7 @@ class VolumeOnGpu {
   /// `skip_empty` false takes every cell for active: the slow obvious picture, for comparison.
   /// Throws VisualizerError where the volume is beyond `max_texture_size`.
   VolumeOnGpu(const VolumeView& volume, const VolumeContent& content, int max_texture_size,
-              bool skip_empty, Gradient gradient = Gradient::corners);
+              bool skip_empty, GradientFilter gradient = GradientFilter::corners);
 
   /// Uploads bricks `changed` of `density` (the whole volume) and the cells they touch.
   void update_bricks(std::span<const Density> density, std::span<const std::uint32_t> changed);
@@ -75,7 +75,7 @@ class IsoRenderer final : public Renderer {
  private:
   void cast_rays(const VolumeOnGpu& volume, const View& view, const RenderTarget& target);
 
-  Gradient gradient_;
+  GradientFilter gradient_;
   GlProgram cast_program_;
   GlTexture2D palette_;
   std::vector<VolumeOnGpu> volumes_;

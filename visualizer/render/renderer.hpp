@@ -56,7 +56,7 @@ class Renderer {
       std::size_t /*volume*/) const {
     return {};
   }
-  /// Shades from the gradient that the scene names; else always from `Gradient::corners`.
+  /// Shades from the gradient that the scene names; else always from `GradientFilter::corners`.
   [[nodiscard]] virtual bool takes_gradient() const noexcept { return true; }
   /// Lets what lies behind a surface shine through, so that it must be drawn before.
   [[nodiscard]] virtual bool translucent() const noexcept { return false; }

@@ -36,7 +36,7 @@ std::string element(const char* array, std::size_t i) {
 }  // namespace
 
 TranslucentVolume::TranslucentVolume(const VolumeView& volume, const VolumeContent& content,
-                                     const TransferFunction& transfer, Gradient gradient,
+                                     const TransferFunction& transfer, GradientFilter gradient,
                                      int max_texture_size, bool skip_empty)
     : bricks_((check_extent(volume, max_texture_size), volume.bricks)),
       has_labels_(!content.labels.empty()),

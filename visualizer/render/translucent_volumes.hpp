@@ -21,7 +21,7 @@ namespace kerf {
 class TranslucentVolume {
  public:
   TranslucentVolume(const VolumeView& volume, const VolumeContent& content,
-                    const TransferFunction& transfer, Gradient gradient, int max_texture_size,
+                    const TransferFunction& transfer, GradientFilter gradient, int max_texture_size,
                     bool skip_empty);
 
   /// Uploads bricks `changed` of `density` (the whole volume), gradients around them included. The
@@ -53,7 +53,7 @@ class TranslucentVolume {
   BrickGrid bricks_;
   bool has_labels_;
   TransferFunction transfer_;
-  Gradient gradient_;
+  GradientFilter gradient_;
   glm::dmat4 world_from_texture_;
   double edge_mm_;
   VoxelTexture voxels_;

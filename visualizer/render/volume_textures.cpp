@@ -99,8 +99,9 @@ MaterialTexel texel_of(const glm::vec4& look) noexcept {
 
 }  // namespace
 
-void fill_gradient_texels(Gradient kind, const VoxelGrid& grid, std::span<const Density> density,
-                          const VoxelBox& box, std::vector<GradientTexel>& texels) {
+void fill_gradient_texels(GradientFilter kind, const VoxelGrid& grid,
+                          std::span<const Density> density, const VoxelBox& box,
+                          std::vector<GradientTexel>& texels) {
   std::vector<glm::vec3> gradients;
   fill_gradients(kind, grid, density, box, gradients);
   texels.clear();

@@ -75,8 +75,9 @@ struct GradientTexel {
 inline constexpr GradientTexel kAirTexel{128, 128, 128, 0};
 
 /// Fills `texels` for `box` out of a whole volume: `fill_gradients` and the densities.
-void fill_gradient_texels(Gradient kind, const VoxelGrid& grid, std::span<const Density> density,
-                          const VoxelBox& box, std::vector<GradientTexel>& texels);
+void fill_gradient_texels(GradientFilter kind, const VoxelGrid& grid,
+                          std::span<const Density> density, const VoxelBox& box,
+                          std::vector<GradientTexel>& texels);
 
 /// Linear colour of the material and its opacity over one voxel edge, 8 bits each.
 struct MaterialTexel {

@@ -37,9 +37,9 @@ Field padded(const VoxelGrid& grid, std::span<const Density> density, const Voxe
 }
 
 /// Taps along one axis, which becomes shorter by their reach at both ends.
-template <Gradient kKind, bool kSlope, int kAxis>
+template <GradientFilter kKind, bool kSlope, int kAxis>
 Field filtered(Field& from) {
-  constexpr GradientTaps kBoth = gradient_taps(kKind);
+  constexpr FilterTaps kBoth = gradient_taps(kKind);
   constexpr std::array<float, 5> kTaps = kSlope ? kBoth.slope : kBoth.smooth;
   constexpr int kReach = gradient_reach(kKind);
   constexpr std::size_t kMiddle = 2;
@@ -64,7 +64,7 @@ Field filtered(Field& from) {
   return to;
 }
 
-template <Gradient kKind>
+template <GradientFilter kKind>
 void fill(const VoxelGrid& grid, std::span<const Density> density, const VoxelBox& box,
           std::vector<glm::vec3>& gradients) {
   Field all = padded(grid, density, box.grown(gradient_reach(kKind)));
@@ -85,23 +85,23 @@ void fill(const VoxelGrid& grid, std::span<const Density> density, const VoxelBo
 
 }  // namespace
 
-Gradient gradient_named(std::string_view name) {
+GradientFilter gradient_named(std::string_view name) {
   const auto found = std::find(kGradientNames.begin(), kGradientNames.end(), name);
   if (found != kGradientNames.end()) {
-    return static_cast<Gradient>(found - kGradientNames.begin());
+    return static_cast<GradientFilter>(found - kGradientNames.begin());
   }
   throw VisualizerError("--gradient: " + std::string(name) + unknown_word(name, kGradientNames));
 }
 
-void fill_gradients(Gradient kind, const VoxelGrid& grid, std::span<const Density> density,
+void fill_gradients(GradientFilter kind, const VoxelGrid& grid, std::span<const Density> density,
                     const VoxelBox& box, std::vector<glm::vec3>& gradients) {
   switch (kind) {
-    case Gradient::central:
-      return fill<Gradient::central>(grid, density, box, gradients);
-    case Gradient::corners:
-      return fill<Gradient::corners>(grid, density, box, gradients);
-    case Gradient::farid5:
-      return fill<Gradient::farid5>(grid, density, box, gradients);
+    case GradientFilter::central:
+      return fill<GradientFilter::central>(grid, density, box, gradients);
+    case GradientFilter::corners:
+      return fill<GradientFilter::corners>(grid, density, box, gradients);
+    case GradientFilter::farid5:
+      return fill<GradientFilter::farid5>(grid, density, box, gradients);
   }
 }
 

@@ -342,10 +342,10 @@ std::uint16_t unit16(float share) {
   return static_cast<std::uint16_t>(std::clamp(share, 0.0F, 1.0F) * 65535.0F + 0.5F);
 }
 
-/// `Gradient::farid5` up to a factor: it looks farther than a neighbourhood.
+/// `GradientFilter::farid5` up to a factor: it looks farther than a neighbourhood.
 glm::vec3 wide_gradient(const VolumeSamples& volume, VoxelIndex at) {
-  constexpr GradientTaps kTaps = gradient_taps(Gradient::farid5);
-  constexpr int kReach = gradient_reach(Gradient::farid5);
+  constexpr FilterTaps kTaps = gradient_taps(GradientFilter::farid5);
+  constexpr int kReach = gradient_reach(GradientFilter::farid5);
   glm::vec3 sum(0.0F);
   for (int z = 0; z <= 2 * kReach; ++z) {
     for (int y = 0; y <= 2 * kReach; ++y) {
@@ -381,11 +381,11 @@ FinePoint inward_of(const SurfaceVertex& vertex, const glm::vec3& inverse_square
 /// Of a voxel `at`, whose density is `sample` of a neighbourhood; up to a factor.
 glm::vec3 gradient_of(const SurfaceSource& source, const Density* sample, VoxelIndex at) {
   switch (source.gradient) {
-    case Gradient::corners:
+    case GradientFilter::corners:
       return Neighbourhood::corner_gradient(sample);
-    case Gradient::central:
+    case GradientFilter::central:
       return Neighbourhood::central_gradient(sample);
-    case Gradient::farid5:
+    case GradientFilter::farid5:
       break;
   }
   return wide_gradient(source.volume, at);

@@ -89,7 +89,7 @@ struct SurfaceSource {
   /// is 1.
   glm::vec3 inverse_square_spacing{1.0F};
   const SurfaceLook* look = nullptr;
-  Gradient gradient = Gradient::corners;  ///< of the normals
+  GradientFilter gradient = GradientFilter::corners;  ///< of the normals
 };
 
 /// The dirty cells of a block's mesh: triangles in them came, went or changed colour.
@@ -142,7 +142,7 @@ class Neighbourhood {
   /// Sample (0, 0, 0) is the block's start; each part -1..9.
   [[nodiscard]] const Density* at(int x, int y, int z) const { return &density_[index(x, y, z)]; }
 
-  /// `Gradient::corners` of a sample 0..8, up to a factor.
+  /// `GradientFilter::corners` of a sample 0..8, up to a factor.
   [[nodiscard]] static glm::vec3 corner_gradient(const Density* at) {
     // Sum and difference along x of the four rows, then along y and z.
     std::array<int, 4> sum{};
@@ -155,7 +155,7 @@ class Neighbourhood {
     return glm::vec3(rise[0] + rise[1] + rise[2] + rise[3], sum[1] - sum[0] + sum[3] - sum[2],
                      sum[2] + sum[3] - sum[0] - sum[1]);
   }
-  /// `Gradient::central` of a sample 0..8, up to a factor.
+  /// `GradientFilter::central` of a sample 0..8, up to a factor.
   [[nodiscard]] static glm::vec3 central_gradient(const Density* at) {
     return glm::vec3(at[kStride[0]] - at[-kStride[0]], at[kStride[1]] - at[-kStride[1]],
                      at[kStride[2]] - at[-kStride[2]]);

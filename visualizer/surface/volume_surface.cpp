@@ -46,7 +46,7 @@ void for_each_in_parallel(std::int32_t count, const Work& work) {
 
 VolumeSurface::VolumeSurface(const VolumeView& volume, const std::vector<MaterialView>& materials,
                              std::span<const Density> density, std::span<const Label> labels,
-                             Gradient gradient)
+                             GradientFilter gradient)
     : bricks_(volume.bricks),
       blocks_(block_grid(volume.bricks.grid)),
       iso_(std::max(volume.iso, Density{1})),

@@ -23,7 +23,7 @@ class VolumeSurface {
   /// all.
   VolumeSurface(const VolumeView& volume, const std::vector<MaterialView>& materials,
                 std::span<const Density> density, std::span<const Label> labels,
-                Gradient gradient = Gradient::corners);
+                GradientFilter gradient = GradientFilter::corners);
 
   /// Follows a change of bricks `changed` (of the segment's brick grid); `density` is all of the
   /// volume. Returns the blocks whose mesh is another one now, ascending.
@@ -54,7 +54,7 @@ class VolumeSurface {
   Density iso_;
   glm::vec3 inverse_square_spacing_;
   SurfaceLook look_;
-  Gradient gradient_;
+  GradientFilter gradient_;
   std::vector<Density> density_;
   std::vector<Label> labels_;
   std::vector<BlockMesh> meshes_;

@@ -118,13 +118,11 @@ def drawing(file, begin):
 
 def wire(root, programs):
     omni, falcon = Source(root, "shared/wire/omni.hpp"), Source(root, "shared/wire/falcon.hpp")
-    wooden, hello = Source(root, "shared/wire/woodenhaptics.hpp"), Source(root, "shared/wire/emulator_link.hpp")
-    wish, turn = Source(root, "shared/wire/emulator_link.hpp"), Source(root, "shared/wire/emulator_link.hpp")
+    wooden, link = Source(root, "shared/wire/woodenhaptics.hpp"), Source(root, "shared/wire/emulator_link.hpp")
     bridge, command = Source(root, "bridge/wire/messages.hpp"), Source(root, "shared/segment/command.hpp")
-    plan, most_kib = Source(root, "bridge/wire/messages.hpp"), re.search(r"kMaxMessageBytes = (\d+) \* 1024", bridge.text)[1]
-    same("shared/wire", ["omni", "falcon", "wooden", "hello", "hand_wish", "turn"],
-         {re.sub("_(packet|constants|usb|framer)$", "", path.stem) for path in (root / "shared/wire").glob("*.hpp")}
-         - {"little_endian", "personality"})
+    most_kib = re.search(r"kMaxMessageBytes = (\d+) \* 1024", bridge.text)[1]
+    same("shared/wire", ["omni", "falcon", "woodenhaptics", "emulator_link"],
+         {path.stem for path in (root / "shared/wire").glob("*.hpp")} - {"little_endian", "personality"})
 
     def magic(file, name):
         marks = re.search(rf"{name}\{{([^}}]*)\}}", file.text)[1]
@@ -134,7 +132,8 @@ def wire(root, programs):
         rows = re.findall(r'(k\w+)Magic = magic\("(\w{4})"\)', bridge.text)
         structs = dict(zip([row[0] for row in rows], ["HelloMessage", "FrameHead", "RecordsHead", "ReplyMessage", "AckMessage",
                                                       "CommandMessage"]))
-        same(bridge.path, structs.values(), re.findall(r"^struct (\w+) \{", bridge.text, re.M))
+        # `BlockPlane` is part of the numbering of blocks, not of a message.
+        same(bridge.path, structs.values(), set(re.findall(r"^struct (\w+) \{", bridge.text, re.M)) - {"BlockPlane"})
         for kind, mark in rows:
             name, size = structs[kind], re.search(rf"sizeof\({structs[kind]}\) == (\d+)", bridge.text)[1]
             if not name.startswith(kind.removeprefix("k")) or bridge.struct(name)[1] != int(size):
@@ -172,14 +171,14 @@ hello; in lock-step all packets of one tick are one turn. A window that leads th
 
 | packet | byte | type | what |
 |---|---|---|---|
-| hello, {hello.number('kHelloBytes')} bytes | 0 | u8 x 8 | `{magic(hello, 'kHelloMagic')}`; the last one is the version |
+| hello, {link.number('kHelloBytes')} bytes | 0 | u8 x 8 | `{magic(link, 'kHelloMagic')}`; the last one is the version |
 | | 8 | u8 | device: 0 omni, 1 falcon, 2 woodenhaptics |
 | | 9 | u8 | 1: lock-step |
 | | 12 | u32 | rate of the servo in Hz |
-| turn, at most {turn.number('kMostBytes')} bytes | 0 | u8 x 8 | `{magic(turn, 'kMagic')}` |
+| turn, at most {link.number('kMostBytes')} bytes | 0 | u8 x 8 | `{magic(link, 'kMagic')}` |
 | | 8 | | each packet behind a u8 with its length; none: nothing came |
-| wish, {wish.number('kHandWishBytes')} bytes | 0 | u8 x 8 | `{magic(wish, 'kHandWishMagic')}` |
-| | 8 | i32 x 3 | place in um, in the device's frame, each up to {wish.number('kMaxWishMm'):g} mm |
+| wish, {link.number('kHandWishBytes')} bytes | 0 | u8 x 8 | `{magic(link, 'kHandWishMagic')}` |
+| | 8 | i32 x 3 | place in um, in the device's frame, each up to {link.number('kMaxWishMm'):g} mm |
 | | 20 | i32 x 3 | yaw, pitch, roll in urad, each up to 60 degrees |
 | | 32 | u8 | 1 button 1, 2 button 2, 4 park |
 | greeting, 9 bytes | 0 | u8 x 8 | that of the wish; the emulator says it first |
@@ -197,8 +196,8 @@ acknowledgement for each frame that it has applied, and commands. What follows a
   offsets are 0. Flag {bridge.number('kMayCommand')}: this viewer may send commands.
 * frame: u64 version for each block, u32 number for each block, then the blocks. Flags: {bridge.number('kPacked')} packed as one LZ4 block,
   {bridge.number('kLastOfPass')} last of a pass (the volumes are then those of `tick`), {bridge.number('kRunEnded')} the controller has gone.
-  Blocks are numbered: first the scene's text, {plan.number('kTextBlockBytes')} bytes each; then the bricks' densities, {plan.number('kDensityBlockBytes')} bytes each, of
-  one volume after the other; then the bricks' labels, {plan.number('kLabelBlockBytes')} bytes each.
+  Blocks are numbered: first the scene's text, {bridge.number('kTextBlockBytes')} bytes each; then the bricks' densities, {bridge.number('kDensityBlockBytes')} bytes each, of
+  one volume after the other; then the bricks' labels, {bridge.number('kLabelBlockBytes')} bytes each.
 * records: `count` records of `ring` 0 (ticks) or 1 (dirty) as they lie in the segment; number i has the index
   `first + i * stride`. Flag {bridge.number('kPacked')}: packed.
 * command: `kind` {', '.join(f'{value} `{word}` ({comment.removeprefix("argument: ")})' for word, value, comment in command.enumerators('CommandKind'))}.

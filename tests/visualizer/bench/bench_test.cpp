@@ -96,7 +96,7 @@ TEST_CASE("the bench's table has a line for each subject, beside the paper's fig
   CHECK(std::count(table.begin(), table.end(), '\n') == 4);
 
   const PictureFigures figures{.rows = rows,
-                               .gradients = {{Gradient::corners, 0.5, 1.25}},
+                               .gradients = {{GradientFilter::corners, 0.5, 1.25}},
                                .gl_renderer = "a driver",
                                .size = {512, 512},
                                .cores = 2};
@@ -153,7 +153,7 @@ TEST_CASE("on an antialiased ball the widest gradient has the least angle, with 
   const std::vector<GradientRow> rows = measure_gradients();
   REQUIRE(rows.size() == kGradientNames.size());
   const GradientRow& widest = rows.back();
-  CHECK(widest.gradient == Gradient::farid5);
+  CHECK(widest.gradient == GradientFilter::farid5);
   CHECK(widest.angle_deg < 0.3);
   CHECK(widest.noisy_angle_deg < 0.6);
   for (const GradientRow& row : rows) {

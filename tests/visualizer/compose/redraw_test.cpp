@@ -191,7 +191,7 @@ void check_parts(const Look& look, PictureSize size, int edits) {
   // One sees into the volume and the tool in it; of the other, what is hidden stays.
   const std::vector<std::string> kinds = renderer_of_each(look.renderer, 2);
   const bool opaque = std::none_of(kinds.begin(), kinds.end(), is_translucent);
-  const bool wide = look.stereo.on || look.voxel_tool || look.gradient != Gradient::corners;
+  const bool wide = look.stereo.on || look.voxel_tool || look.gradient != GradientFilter::corners;
   CHECK(redrawn / parts < (wide ? 0.6 : opaque ? 0.08 : 0.2));
 }
 
@@ -286,12 +286,12 @@ TEST_CASE("so it does after more changes than are told apart") {
 TEST_CASE("so it does with any gradient") {
   if (!have_gl()) return;
   const Place place;
-  for (const Gradient gradient : {Gradient::central, Gradient::farid5}) {
+  for (const GradientFilter gradient : {GradientFilter::central, GradientFilter::farid5}) {
     check_parts({.renderer = "iso", .gradient = gradient}, {96, 72}, kEdits / 4);
   }
   for (const char* kind : {"surface", "blend", "slices"}) {
     CAPTURE(std::string(kind));
-    check_parts({.renderer = kind, .gradient = Gradient::farid5}, {96, 72}, kEdits / 20);
+    check_parts({.renderer = kind, .gradient = GradientFilter::farid5}, {96, 72}, kEdits / 20);
   }
 }
 

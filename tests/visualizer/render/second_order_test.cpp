@@ -56,7 +56,7 @@ double depth_error_mm(const std::string& kind, const Distance& distance, double 
 }
 
 /// Length of the difference of unit normals, as the shaders of iso have them.
-double normal_error(Gradient gradient, const Distance& distance, double spacing_mm) {
+double normal_error(GradientFilter gradient, const Distance& distance, double spacing_mm) {
   const TestVolume volume = volume_of(distance, spacing_mm);
   const VolumeContent content = volume.content();
   SceneView scene = scene_of({&volume});
@@ -89,7 +89,8 @@ TEST_CASE("N12: the depth of a ball and a torus is of second order in the voxel"
 
 TEST_CASE("N12: the normals of iso are of second order in the voxel, from every gradient") {
   if (!have_gl()) return;
-  for (const Gradient gradient : {Gradient::central, Gradient::corners, Gradient::farid5}) {
+  for (const GradientFilter gradient :
+       {GradientFilter::central, GradientFilter::corners, GradientFilter::farid5}) {
     CAPTURE(static_cast<int>(gradient));
     for (const Distance& distance : {Distance(ball_distance), Distance(torus_distance)}) {
       const double coarse = normal_error(gradient, distance, 0.5);

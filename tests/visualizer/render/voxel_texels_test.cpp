@@ -27,7 +27,7 @@ TEST_CASE(
     }
   }
   std::vector<GradientTexel> texels;
-  fill_gradient_texels(Gradient::corners, grid, density, {{1, 1, 1}, {8, 7, 6}}, texels);
+  fill_gradient_texels(GradientFilter::corners, grid, density, {{1, 1, 1}, {8, 7, 6}}, texels);
   // A step over two edges counts as g = 1: 127 * 2 * 2000 / 65535 = 7.75, and so on.
   for (const GradientTexel& texel : texels) {
     CHECK(texel.x == 128 + 8);
@@ -44,12 +44,12 @@ TEST_CASE("a box alone gives the texels that the whole volume gives there") {
     const auto density = *rc::gen::container<std::vector<Density>>(grid.voxel_count(),
                                                                    rc::gen::arbitrary<Density>());
     std::vector<GradientTexel> whole;
-    fill_gradient_texels(Gradient::corners, grid, density, grid.box(), whole);
+    fill_gradient_texels(GradientFilter::corners, grid, density, grid.box(), whole);
     const VoxelIndex lo{*rc::gen::inRange(0, grid.nx), *rc::gen::inRange(0, grid.ny),
                         *rc::gen::inRange(0, grid.nz)};
     const VoxelBox box = VoxelBox{lo, {lo.x + 3, lo.y + 2, lo.z + 4}}.clipped(grid.box());
     std::vector<GradientTexel> part;
-    fill_gradient_texels(Gradient::corners, grid, density, box, part);
+    fill_gradient_texels(GradientFilter::corners, grid, density, box, part);
     std::size_t at = 0;
     for (int z = box.lo.z; z < box.hi.z; ++z) {
       for (int y = box.lo.y; y < box.hi.y; ++y) {
@@ -65,7 +65,7 @@ TEST_CASE("a box alone gives the texels that the whole volume gives there") {
 TEST_CASE("air is the air of the shell around a volume") {
   std::vector<GradientTexel> texels;
   const std::vector<Density> air(8, 0);
-  fill_gradient_texels(Gradient::corners, {2, 2, 2}, air, {{0, 0, 0}, {2, 2, 2}}, texels);
+  fill_gradient_texels(GradientFilter::corners, {2, 2, 2}, air, {{0, 0, 0}, {2, 2, 2}}, texels);
   for (const GradientTexel& texel : texels) CHECK(texel == kAirTexel);
 }
 

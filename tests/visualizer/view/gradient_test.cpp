@@ -14,7 +14,8 @@ using namespace kerf::test;
 
 namespace {
 
-constexpr Gradient kAll[]{Gradient::central, Gradient::corners, Gradient::farid5};
+constexpr GradientFilter kAll[]{GradientFilter::central, GradientFilter::corners,
+                                GradientFilter::farid5};
 
 std::vector<Density> random_density(const VoxelGrid& grid) {
   return *rc::gen::container<std::vector<Density>>(grid.voxel_count(),
@@ -22,9 +23,9 @@ std::vector<Density> random_density(const VoxelGrid& grid) {
 }
 
 /// As the taps say, voxel by voxel.
-glm::dvec3 plain_gradient(Gradient kind, const VoxelGrid& grid, const std::vector<Density>& density,
-                          VoxelIndex at) {
-  const GradientTaps taps = gradient_taps(kind);
+glm::dvec3 plain_gradient(GradientFilter kind, const VoxelGrid& grid,
+                          const std::vector<Density>& density, VoxelIndex at) {
+  const FilterTaps taps = gradient_taps(kind);
   glm::dvec3 sum(0.0);
   for (int z = 0; z < 5; ++z) {
     for (int y = 0; y < 5; ++y) {
@@ -54,7 +55,7 @@ TEST_CASE("every gradient of a linear field is that of the field, a step over tw
       }
     }
   }
-  for (const Gradient kind : kAll) {
+  for (const GradientFilter kind : kAll) {
     std::vector<glm::vec3> gradients;
     fill_gradients(kind, grid, density, {{2, 2, 2}, {7, 6, 5}}, gradients);
     for (const glm::vec3& g : gradients) {
@@ -69,8 +70,8 @@ TEST_CASE("a gradient is the sum of its taps, with air around, and has the same 
     const auto edge = rc::gen::inRange(1, 12);
     const VoxelGrid grid{*edge, *edge, *edge};
     const auto density = random_density(grid);
-    const Gradient kind =
-        *rc::gen::elementOf(std::vector<Gradient>(std::begin(kAll), std::end(kAll)));
+    const GradientFilter kind =
+        *rc::gen::elementOf(std::vector<GradientFilter>(std::begin(kAll), std::end(kAll)));
     std::vector<glm::vec3> whole;
     fill_gradients(kind, grid, density, grid.box(), whole);
     const VoxelIndex lo{*rc::gen::inRange(0, grid.nx), *rc::gen::inRange(0, grid.ny),
@@ -95,7 +96,7 @@ TEST_CASE("a gradient is the sum of its taps, with air around, and has the same 
 
 TEST_CASE("a gradient depends on no voxel beyond its reach") {
   constexpr VoxelGrid kGrid{9, 9, 9};
-  for (const Gradient kind : kAll) {
+  for (const GradientFilter kind : kAll) {
     std::vector<Density> density(kGrid.voxel_count());
     density[kGrid.index(4, 4, 4)] = 60'000;
     std::vector<glm::vec3> gradients;
@@ -114,7 +115,7 @@ TEST_CASE("from any gradient, taking the changed bricks equals a fresh start pix
   if (!have_gl()) return;
   for (const char* kind : {"iso", "surface", "blend"}) {
     CAPTURE(std::string(kind));
-    for (const Gradient gradient : {Gradient::central, Gradient::farid5}) {
+    for (const GradientFilter gradient : {GradientFilter::central, GradientFilter::farid5}) {
       check_updates([&](const SceneView& scene, std::span<const VolumeContent> contents) {
         SceneView with = scene;
         with.gradient = gradient;
@@ -125,7 +126,7 @@ TEST_CASE("from any gradient, taking the changed bricks equals a fresh start pix
 }
 
 TEST_CASE("an unknown gradient is refused, and the known are named") {
-  for (const Gradient kind : kAll) {
+  for (const GradientFilter kind : kAll) {
     CHECK(gradient_named(kGradientNames[static_cast<std::size_t>(kind)]) == kind);
   }
   CHECK_THROWS_WITH_AS(static_cast<void>(gradient_named("sobel")),
