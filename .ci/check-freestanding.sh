@@ -24,6 +24,6 @@ if [[ -n $needed ]]; then
 fi
 
 # The text of vector kernels is no header of its own: it needs the Simd or the lanes of its includer.
-grep -rLE '\b(Simd::|RowSums|weigh_lanes)|cover_loops\.hpp"' --include='*.hpp' --exclude-dir=registry controller/law controller/servo controller/kernel shared/numeric |
+grep -rLE '\b(Simd::|RowSums|weigh_lanes)' --include='*.hpp' --exclude-dir=registry controller/law controller/servo controller/kernel shared/numeric |
   sed 's/.*/#include "&"/' >"$folder/all.cpp"
 "$compiler" -std=c++20 -fsyntax-only -fno-exceptions -fno-rtti -I. "$folder/all.cpp"

@@ -62,13 +62,13 @@ fi
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 compiler="clang++-16 -std=c++20 -I. $(pkg-config --cflags epoxy imgui glfw3) $(printf -- '-isystem %s ' /usr/include/ITK-*)"
-compiler+=" -DBOOST_ASIO_HAS_CO_AWAIT -DBOOST_ASIO_HAS_STD_COROUTINE"  # as bridge/net/CMakeLists.txt
+compiler+=" -DBOOST_ASIO_HAS_CO_AWAIT -DBOOST_ASIO_HAS_STD_COROUTINE"  # as bridge/CMakeLists.txt
 awk 'BEGIN { print "#define KERF_VERSION \"\"" } NF { print "#include <" $1 ">" }' <<<"$needs" >"$work/standard.hpp"
 # Templates that it asks for are made here, not again for each header.
 $compiler -fpch-instantiate-templates -x c++-header "$work/standard.hpp" -o "$work/standard.pch"
 # Not compiled: parts of a kernel, whose including file says first which vectors they mean, and what
 # tests share, which CMake gives names of folders.
-parts='^tests/|^controller/kernel/sets/(.*_(vector|loops)|the_set)\.hpp$|^visualizer/cast/packet_'
+parts='^tests/|^controller/kernel/sets/(.*_(vector|loops)|set_table)\.hpp$|^visualizer/cast/simd/packet_'
 # Lines of headers, each of which includes all that stand before it and all that these include: what it sees there, it
 # would see alone. So one file shows all of a line.
 in_chains() {

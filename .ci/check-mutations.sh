@@ -119,8 +119,8 @@ while IFS='|' read -r files what edit; do
   done
   # First the tests that are nearer.
   tests=(test_kernel test_aligned)
-  [[ $files =~ aligned|sets|splat|exact ]] && tests=(test_aligned test_kernel)
-  [[ $files =~ open_groups ]] && tests=(test_point_shell)
+  [[ $files =~ overlap_methods|kernel_set|sets ]] && tests=(test_aligned test_kernel)
+  [[ $files =~ set_common ]] && tests+=(test_point_shell)
   if ! caught=$(caught_by "${tests[@]}"); then
     cat "$scratch/build.log"
     echo "check-mutations: '$what' does not compile; mend the list" >&2

@@ -34,7 +34,7 @@ float beginning_between(int v, float front, float back);
 vec4 matter_of(int v, vec4 voxel, vec3 p, vec3 to_eye);
 
 const float kCellVox = 8.0;
-const float kOpaque = 0.98;             // as in layer.frag
+const float kOpaque = 0.98;             // as in composite.frag
 const float kNever = 1e30;
 
 struct Line {

@@ -3,7 +3,7 @@
 // The surface of a volume: material and openness come with the vertices, light falls on each pixel.
 // Depth is that of the projection, which is equation (1): not written, so hidden pixels cost nothing.
 //
-// A mesh is a shell. Where the clip plane opens it, section.frag draws the face; its inner side shows
+// A mesh is a shell. Where the clip plane opens it, clip_cap.frag draws the face; its inner side shows
 // only in slits, thinner than a voxel, between the two, and is lit like the face.
 
 in vec3 v_eye_mm;

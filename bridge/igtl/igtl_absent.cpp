@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// In place of the others where libopenigtlink was not there when kerf was built.
+// In place of the others if libopenigtlink was missing when kerf was built.
 #include <stdexcept>
 
 #include "bridge/igtl/igtl_output.hpp"

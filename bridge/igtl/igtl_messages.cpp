@@ -31,7 +31,7 @@ std::string first_bytes(const std::string& name, std::size_t most) {
   return name.substr(0, end);
 }
 
-/// `name` with `ending`, cut so that it fits; with its number too where another has it.
+/// `name` with `ending`, cut so that it fits; with its number too if another has it.
 std::string not_taken(const std::string& name, std::size_t volume, const std::string& ending,
                       const std::vector<std::string>& taken) {
   const std::string out = first_bytes(name, kNameBytes - ending.size()) + ending;

@@ -13,7 +13,7 @@
 namespace kerf::bridge {
 
 /// OpenIGTLink's device name of each volume: its name in the scene, at most 20 bytes, each another;
-/// "volume 1" and so on where the scene's text does not tell.
+/// "volume 1" and so on if the scene's text has none.
 [[nodiscard]] std::vector<std::string> device_names(const SegmentInfo& segment);
 
 /// Of the labels of volumes of these names: "NAME labels", by the same rules.
@@ -35,7 +35,7 @@ using IgtlBytes = std::shared_ptr<const std::vector<std::byte>>;
 [[nodiscard]] IgtlBytes label_message(const std::string& device, const SegmentVolumeInfo& volume,
                                       std::span<const Label> linear);
 
-/// World from tool as TRANSFORM "Tool"; none where the pose is not known yet.
+/// World from tool as TRANSFORM "Tool"; none if the pose is not known yet.
 [[nodiscard]] std::optional<IgtlBytes> tool_message(const TickRecord& tick);
 
 /// The force that was sent to the hand as SENSOR "Force": x, y, z in newtons, along the same axes.

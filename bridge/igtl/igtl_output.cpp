@@ -30,6 +30,19 @@
 
 namespace kerf::bridge {
 
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using std::chrono::milliseconds;
+
+/// Of one call, so that a large image holds up no other client for long.
+constexpr std::size_t kBytesAtOnce = std::size_t{1} << 20;
+constexpr int kReadsAtOnce = 16;
+
+bool must_wait(int error) {
+  return error == EAGAIN || error == EWOULDBLOCK || error == EINTR;
+}
+
 /// One client: its socket, what waits for it, and what it does not have yet. Never blocks.
 ///
 /// At most one image waits, and as many messages of other kinds as the caller adds while none of
@@ -50,7 +63,7 @@ class IgtlClient {
   [[nodiscard]] bool waits(Kind kind) const noexcept;
   void add(IgtlBytes message, Kind kind);
 
-  /// Sends what the socket takes, and throws away what came. False where the client has gone, or
+  /// Sends what the socket takes, and throws away what came. False if the client has gone, or
   /// has taken nothing for `patience` while something waited.
   [[nodiscard]] bool serve(std::chrono::milliseconds patience);
 
@@ -62,7 +75,6 @@ class IgtlClient {
     IgtlBytes message;
     Kind kind;
   };
-  using Clock = std::chrono::steady_clock;
 
   [[nodiscard]] bool throw_away() const;
   [[nodiscard]] bool send_some();
@@ -72,18 +84,6 @@ class IgtlClient {
   std::size_t sent_ = 0;  ///< of the first message
   Clock::time_point last_progress_ = Clock::now();
 };
-
-namespace {
-
-/// Of one call, so that a large image holds up no other client for long.
-constexpr std::size_t kBytesAtOnce = std::size_t{1} << 20;
-constexpr int kReadsAtOnce = 16;
-
-bool must_wait(int error) {
-  return error == EAGAIN || error == EWOULDBLOCK || error == EINTR;
-}
-
-}  // namespace
 
 IgtlClient::~IgtlClient() {
   close(socket_);
@@ -129,11 +129,6 @@ bool IgtlClient::send_some() {
   }
   return true;
 }
-
-namespace {
-
-using Clock = std::chrono::steady_clock;
-using std::chrono::milliseconds;
 
 constexpr auto kPosePeriod = std::chrono::microseconds(1'000'000 / 60);
 constexpr auto kImagePeriod = milliseconds(50);
@@ -261,7 +256,7 @@ void IgtlOutput::State::follow() {
       if (run && is_due(next_poses, kPosePeriod)) send_poses();
       if (run && is_due(next_images, kImagePeriod)) send_images();
     } else {
-      run.reset();  // nobody looks: no memory, and no work
+      run.reset();  // no client: no memory, and no work
     }
     std::erase_if(clients, [&](const auto& client) { return !client->serve(options.patience); });
   }

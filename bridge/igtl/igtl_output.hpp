@@ -23,7 +23,7 @@ struct IgtlOptions {
 /// segment and sends to each client
 ///
 /// * each volume as IMAGE under its name, whole first, then the box of what changed, at most 20 Hz;
-/// * its labels, where it has some, as IMAGE "NAME labels" of 8 bits, once: they never change;
+/// * its labels, if it has any, as IMAGE "NAME labels" of 8 bits, once: they never change;
 /// * the tool's pose as TRANSFORM "Tool" and the force as SENSOR "Force" in newtons, at 60 Hz.
 ///
 /// All of it is in RAS, for kerf's world as LPS, which is what medical files are loaded in: x and y
@@ -34,7 +34,7 @@ class IgtlOutput {
  public:
   static constexpr std::size_t kMaxClients = 8;  ///< one more is let in and out
 
-  /// Throws std::runtime_error, one line, where it cannot listen or was built without OpenIGTLink.
+  /// Throws std::runtime_error, one line, if it cannot listen or was built without OpenIGTLink.
   explicit IgtlOutput(const IgtlOptions& options);
   ~IgtlOutput();
   IgtlOutput(const IgtlOutput&) = delete;

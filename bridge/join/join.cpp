@@ -31,24 +31,16 @@
 
 namespace kerf::bridge {
 
-/// Ends a connection that cannot get better by trying again, unless it once worked.
-struct Hopeless : BridgeError {
-  using BridgeError::BridgeError;
-};
-
-/// Leads `ws`, a fresh socket, from its first packet to a WebSocket that talks. Throws `Hopeless`,
-/// or what may be better the next time: `BridgeError` and Boost's system_error.
-asio::awaitable<void> dial(WebSocket& ws, const BridgeAddress& address, ServerTrust& trust);
-
-/// What the server said by closing, 4001 and so on, to who showed a token or none: throws as
-/// `dial`.
-[[noreturn]] void throw_closed(std::uint16_t code, bool had_token);
-
 namespace {
 
 namespace websocket = beast::websocket;
 using asio::use_awaitable;
 using namespace std::chrono_literals;
+
+/// Ends a connection that cannot get better by trying again, unless it once worked.
+struct Hopeless : BridgeError {
+  using BridgeError::BridgeError;
+};
 
 constexpr auto kConnectPatience = 1500ms;  // a lost SYN comes again after 1 s
 constexpr auto kGreetingPatience = 10s;    // TLS and HTTP over a slow link
@@ -61,7 +53,7 @@ constexpr auto kGreetingPatience = 10s;    // TLS and HTTP over a slow link
   throw boost::system::system_error(error);
 }
 
-/// True where something answered that is no HTTP, and not where it broke off.
+/// True if the answer is no HTTP, and not if it broke off.
 [[nodiscard]] bool is_no_http(const ErrorCode& error) {
   using Http = beast::http::error;
   return error == Http::bad_version || error == Http::bad_line_ending ||
@@ -83,8 +75,8 @@ constexpr auto kGreetingPatience = 10s;    // TLS and HTTP over a slow link
   throw Hopeless(answer);
 }
 
-}  // namespace
-
+/// Leads `ws`, a fresh socket, from its first packet to a WebSocket that talks. Throws `Hopeless`,
+/// or what may be better the next time: `BridgeError` and Boost's system_error.
 asio::awaitable<void> dial(WebSocket& ws, const BridgeAddress& address, ServerTrust& trust) {
   Link& link = ws.next_layer();
   beast::tcp_stream& tcp_stream = link.next_layer();
@@ -117,7 +109,9 @@ asio::awaitable<void> dial(WebSocket& ws, const BridgeAddress& address, ServerTr
   ws.binary(true);
 }
 
-void throw_closed(std::uint16_t code, bool had_token) {
+/// What the server means by closing, 4001 and so on, a viewer with a token or without: throws as
+/// `dial`.
+[[noreturn]] void throw_closed(std::uint16_t code, bool had_token) {
   switch (static_cast<CloseCode>(code)) {
     case CloseCode::no_token:
       if (!had_token) {
@@ -134,15 +128,9 @@ void throw_closed(std::uint16_t code, bool had_token) {
   throw BridgeError("closed the connection");
 }
 
-namespace {
-
-namespace websocket = beast::websocket;
-using asio::use_awaitable;
-using namespace std::chrono_literals;
-
 constexpr std::int64_t kSilenceNs = 2 * kNsPerSecond;    // of a run: it has a sign of life, 60 Hz
 constexpr std::int64_t kLongWaitNs = 10 * kNsPerSecond;  // for a run: the server has none
-constexpr std::int64_t kSayWaitNs = kNsPerSecond;        // before that is told
+constexpr std::int64_t kSayWaitNs = kNsPerSecond;        // before that is reported
 constexpr const char* kNoRun = "has no controller yet";
 constexpr const char* kEndless = "answers without end; is it a kerf-bridge serve?";
 constexpr auto kFirstPause = 50ms, kLongestPause = 800ms;  // between two tries
@@ -150,7 +138,7 @@ constexpr auto kWatchPeriod = 20ms;
 // Certificates and an HTTP head. Beast reads an answer that refuses to its end, however long.
 constexpr std::uint64_t kMaxWelcomeBytes = 256 * 1024;
 
-/// With the token of `--token-file`, where that is given.
+/// With the token of `--token-file`, if that is given.
 [[nodiscard]] BridgeAddress address_in(const JoinOptions& options) {
   BridgeAddress out = parse_address(options.address);
   if (options.token_file.empty()) return out;
@@ -212,7 +200,7 @@ class Joiner {
  private:
   void say(const std::string& line) { out_ << "kerf-bridge: " << line << std::endl; }
 
-  /// A reason is told once, not with every try.
+  /// A reason is printed once, not with every try.
   void lost(const std::string& reason) {
     if (std::exchange(last_reason_, reason) != reason) {
       say(place() + reason + "; trying again");
@@ -325,7 +313,7 @@ class Joiner {
     last_reason_.clear();
   }
 
-  /// Samples the age, and ends a connection that is silent or that nobody wants any more.
+  /// Samples the age, and ends a connection that is silent or no longer wanted.
   asio::awaitable<void> watch() {
     asio::steady_timer timer(io_);
     const std::int64_t began_ns = monotonic_ns();

@@ -16,15 +16,15 @@ struct JoinOptions {
   std::string name = "far";          ///< of the local segment
   std::filesystem::path ca;          ///< of the lab; or
   std::string fingerprint;           ///< SHA-256 of the server's certificate, in hex
-  std::filesystem::path token_file;  ///< its first token, where the address has none
+  std::filesystem::path token_file;  ///< its first token, if the address has none
   std::optional<double> wait_s;      ///< for the first picture; nothing: for ever
   std::uint64_t most_mib = 2048;     ///< a larger segment is refused
 };
 
 /// Keeps the local segment `name` equal to the far one until `stop`, through every loss of the link
 /// or of the other side. Tells on `out` what happens, a line each, and in the end how old the
-/// picture was. Throws `BridgeError`, `SegmentError` where it could never work: a wrong token, a
-/// certificate that nobody vouches for, a name in use; and where nothing came within `wait_s`.
+/// picture was. Throws `BridgeError`, `SegmentError` if it could never work: a wrong token, a
+/// certificate that no authority vouches for, a name in use; and if nothing came within `wait_s`.
 int run_join(const JoinOptions& options, const std::atomic<bool>& stop, std::ostream& out);
 
 }  // namespace kerf::bridge

@@ -36,7 +36,7 @@ std::string text_of(const sockaddr* address) {
   return text.data();
 }
 
-/// This machine's name; empty where it has none.
+/// This machine's name; empty if it has none.
 std::string machine_name() {
   std::array<char, 256> name{};
   return gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "";
@@ -121,7 +121,7 @@ constexpr std::size_t kLongest = 253;  // of a name in DNS; a token is shorter
   });
 }
 
-/// Takes `start` off `text` where it is there.
+/// Takes `start` off `text` if it is there.
 [[nodiscard]] bool take(std::string_view& text, std::string_view start) noexcept {
   if (!text.starts_with(start)) return false;
   text.remove_prefix(start.size());

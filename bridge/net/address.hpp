@@ -17,7 +17,7 @@ struct BridgeError : std::runtime_error {
 [[nodiscard]] bool is_address(const std::string& host) noexcept;
 
 /// Why `host` is neither a name that a certificate can have nor an address, with the way out; empty
-/// where it is one.
+/// if it is one.
 [[nodiscard]] std::string why_no_host(const std::string& host);
 
 /// Whether what is sent to `host` never leaves this machine, by its text alone.

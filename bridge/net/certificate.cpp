@@ -136,7 +136,7 @@ Certificate certificate_of(const std::string& pem) {
 }
 
 Key key_of(const std::string& pem) {
-  // A key behind a password is none: nobody is there to ask.
+  // A key behind a password counts as none: there is no user to ask.
   const auto no_password = [](char*, int, int, void*) { return -1; };
   return Key(PEM_read_bio_PrivateKey(reader_of(pem).get(), nullptr, no_password, nullptr));
 }
@@ -266,11 +266,11 @@ ServerTrust::ServerTrust(std::string host, const std::filesystem::path& ca,
   }
 }
 
-void ServerTrust::apply_to(ssl_ctx_st* context) {
+void ServerTrust::apply_to(SSL_CTX* context) {
   SSL_CTX_set_min_proto_version(context, TLS1_3_VERSION);
   SSL_CTX_set_verify(context, SSL_VERIFY_PEER, &ServerTrust::verify);
   if (ca_.empty()) return;
-  std::error_code fault;  // nobody may write into a pipe, which OpenSSL would wait for
+  std::error_code fault;  // a pipe may never be written to, and OpenSSL would wait for it
   if (!std::filesystem::is_regular_file(ca_, fault) ||
       SSL_CTX_load_verify_locations(context, ca_.c_str(), nullptr) != 1) {
     ERR_clear_error();
@@ -279,7 +279,7 @@ void ServerTrust::apply_to(ssl_ctx_st* context) {
   }
 }
 
-void ServerTrust::begin(ssl_st* connection) {
+void ServerTrust::begin(SSL* connection) {
   refusal_.clear();
   SSL_set_ex_data(connection, index_of_trust(), this);
   X509_VERIFY_PARAM* const rules = SSL_get0_param(connection);
@@ -291,14 +291,14 @@ void ServerTrust::begin(ssl_st* connection) {
   }
 }
 
-int ServerTrust::verify(int verified, x509_store_ctx_st* chain) {
+int ServerTrust::verify(int verified, X509_STORE_CTX* chain) {
   const auto* const connection = static_cast<const SSL*>(
       X509_STORE_CTX_get_ex_data(chain, SSL_get_ex_data_X509_STORE_CTX_idx()));
   auto* const trust = static_cast<ServerTrust*>(SSL_get_ex_data(connection, index_of_trust()));
   return trust->believe(verified != 0, chain) ? 1 : 0;
 }
 
-bool ServerTrust::believe(bool verified, x509_store_ctx_st* chain) {
+bool ServerTrust::believe(bool verified, X509_STORE_CTX* chain) {
   const int error = X509_STORE_CTX_get_error(chain);
   const X509* const certificate = X509_STORE_CTX_get0_cert(chain);  // the server's own
   const std::string seen = certificate == nullptr ? std::string() : fingerprint_of(certificate);
@@ -342,7 +342,7 @@ struct Authority {
   bool is_new = false;
 };
 
-/// The CA of the folder, made where there is none.
+/// The CA of the folder, made if there is none.
 Authority authority_in(const std::filesystem::path& folder) {
   const std::filesystem::path file = folder / "ca.pem", key_file = folder / "ca-key.pem";
   if (std::filesystem::exists(file) || std::filesystem::exists(key_file)) {

@@ -21,14 +21,14 @@ using Certificate = std::unique_ptr<X509, FreeOpenssl>;
 /// A new key on the curve P-256. Throws `BridgeError`, as all below.
 [[nodiscard]] Key new_key();
 
-/// What a new certificate says. It holds from a day ago on, since clocks differ.
+/// The content of a new certificate. It holds from a day ago on, since clocks differ.
 struct CertificateSpec {
   std::string name;                ///< common name
   std::vector<std::string> hosts;  ///< names and addresses of a server; empty: a CA
   int days = 825;
 };
 
-/// Throws where one is neither a name nor an address.
+/// Throws if one is neither a name nor an address.
 void require_hosts(const std::vector<std::string>& hosts);
 
 /// Of `key`, signed by `issuer` with `issuer_key`; nullptr: by itself.
@@ -37,16 +37,16 @@ void require_hosts(const std::vector<std::string>& hosts);
 
 [[nodiscard]] std::string pem_of(X509* certificate);
 [[nodiscard]] std::string pem_of(EVP_PKEY* key);
-/// nullptr where the text has none.
+/// nullptr if the text has none.
 [[nodiscard]] Certificate certificate_of(const std::string& pem);
 [[nodiscard]] Key key_of(const std::string& pem);
 
-/// SHA-256 of the certificate: hex in capitals, a colon between bytes. Empty where OpenSSL has no
+/// SHA-256 of the certificate: hex in capitals, a colon between bytes. Empty if OpenSSL has no
 /// memory; never throws `BridgeError`.
 [[nodiscard]] std::string fingerprint_of(const X509* certificate);
 /// Its DNS names.
 [[nodiscard]] std::vector<std::string> dns_names_of(X509* certificate);
-/// The day of its end, as OpenSSL tells it.
+/// The day of its end, as OpenSSL prints it.
 [[nodiscard]] std::string end_of(const X509* certificate);
 
 /// What a server shows and what it proves it with.
@@ -57,45 +57,37 @@ struct TlsKeys {
   std::vector<std::string> names;  ///< DNS names that it holds for
 };
 
-/// From a folder of `make-identity`. Throws `BridgeError` where a file is missing, open to others,
+/// From a folder of `make-identity`. Throws `BridgeError` if a file is missing, open to others,
 /// damaged, out of date or not its partner's.
 [[nodiscard]] TlsKeys load_tls_keys(const std::filesystem::path& folder);
 
-/// Made now, for `hosts` (names and addresses); nobody vouches for it.
+/// Made now, for `hosts` (names and addresses); no authority vouches for it.
 [[nodiscard]] TlsKeys self_signed_keys(const std::vector<std::string>& hosts);
 
-}  // namespace kerf::bridge
-
-struct ssl_st;  // OpenSSL's own names
-struct ssl_ctx_st;
-struct x509_store_ctx_st;
-
-namespace kerf::bridge {
-
 /// Why a viewer believes that the other side is the one it means: the lab's CA vouches for it, or
-/// its certificate is the one whose fingerprint was told. Without either nothing is believed, and
-/// the refusal tells the fingerprint seen. One connection at a time.
+/// its certificate is the one whose fingerprint was given. Without either nothing is believed, and
+/// the refusal names the fingerprint seen. One connection at a time.
 class ServerTrust {
  public:
-  /// Throws `BridgeError` where the CA cannot be read, the fingerprint is none, or both are given.
+  /// Throws `BridgeError` if the CA cannot be read, the fingerprint is none, or both are given.
   ServerTrust(std::string host, const std::filesystem::path& ca, const std::string& fingerprint);
   ServerTrust(const ServerTrust&) = delete;
   ServerTrust& operator=(const ServerTrust&) = delete;
 
   /// Once; must outlive `context`'s connections.
-  void apply_to(ssl_ctx_st* context);
+  void apply_to(SSL_CTX* context);
   /// Before each handshake.
-  void begin(ssl_st* connection);
+  void begin(SSL* connection);
   /// After a handshake that failed: one line; empty: the certificate was not the reason.
   [[nodiscard]] const std::string& refusal() const noexcept { return refusal_; }
 
  private:
-  [[nodiscard]] bool believe(bool verified, x509_store_ctx_st* chain);
-  [[nodiscard]] static int verify(int verified, x509_store_ctx_st* chain);
+  [[nodiscard]] bool believe(bool verified, X509_STORE_CTX* chain);
+  [[nodiscard]] static int verify(int verified, X509_STORE_CTX* chain);
 
   std::string host_;
   std::filesystem::path ca_;
-  std::string fingerprint_;  // empty: none was told
+  std::string fingerprint_;  // empty: none was given
   std::string refusal_;
 };
 
@@ -106,7 +98,7 @@ struct IdentityOptions {
   int days = 825;
 };
 
-/// Makes DIR/ca.pem, ca-key.pem (kept where they are there), cert.pem and key.pem, and tells what
+/// Makes DIR/ca.pem, ca-key.pem (kept if they exist), cert.pem and key.pem, and prints what
 /// they are. Throws `BridgeError`.
 int run_make_identity(const IdentityOptions& options);
 

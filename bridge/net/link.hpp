@@ -93,7 +93,7 @@ class Link {
   next_layer_type& next_layer() noexcept { return tcp_; }
   const next_layer_type& next_layer() const noexcept { return tcp_; }
   [[nodiscard]] bool is_tls() const noexcept { return tls_ != nullptr; }
-  /// For handshakes; only where `is_tls`.
+  /// For handshakes; only if `is_tls`.
   beast::ssl_stream<beast::tcp_stream&>& tls() noexcept { return *tls_; }
 
   template <class Buffers, class Handler>
@@ -125,7 +125,7 @@ class Link {
   std::unique_ptr<Tls> tls_;
 };
 
-// Where a WebSocket has said goodbye the connection is simply closed: its frames tell where the
+// If a WebSocket has said goodbye the connection is simply closed: its frames tell where the
 // talk ends, so TLS's own goodbye would add nothing but a wait.
 inline void teardown(beast::role_type, Link& link, ErrorCode& error) {
   link.next_layer().socket().close(error);

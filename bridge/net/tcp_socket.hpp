@@ -15,7 +15,7 @@ void tune_socket(int fd) noexcept;
 /// packets under way: fresher, and unfair to whoever shares the link.
 void restart_bbr(int fd) noexcept;
 
-/// Empty where BBR is to be had, else why not.
+/// Empty if BBR is to be had, else why not.
 [[nodiscard]] std::string why_no_bbr(int fd);
 
 /// What the kernel knows of a TCP connection. glibc's struct ends before these.
@@ -25,7 +25,7 @@ struct LinkFigures {
   std::uint64_t received_bytes = 0;      ///< that came in order, TLS and all
 };
 
-/// All 0 where the kernel does not tell.
+/// All 0 if the kernel does not report them.
 [[nodiscard]] LinkFigures link_figures(int socket) noexcept;
 
 }  // namespace kerf::bridge

@@ -20,7 +20,7 @@ enum class Right { none, look, command };
 /// Who may look and who may command. Tokens have 16 to 128 letters, digits, '-' and '_'.
 class Tokens {
  public:
-  /// One token a line; '#' starts a comment. Throws `BridgeError` where the file is not to be read,
+  /// One token a line; '#' starts a comment. Throws `BridgeError` if the file is not to be read,
   /// is open to others, or has no token or a bad one.
   void add_file(const std::filesystem::path& file, const char* option, Right right);
   void add(std::string_view token, Right right);
@@ -67,11 +67,11 @@ class PagePass {
   std::string token_ = new_token();
 };
 
-/// The value of `key` in `a=1&b=2`, of a target `/path?a=1&b=2`; empty where there is none.
+/// The value of `key` in `a=1&b=2`, of a target `/path?a=1&b=2`; empty if there is none.
 [[nodiscard]] std::string_view query_value(std::string_view target, std::string_view key) noexcept;
 /// The target without its query.
 [[nodiscard]] std::string_view path_of(std::string_view target) noexcept;
-/// The value of `name` in the text of a Cookie header; empty where there is none.
+/// The value of `name` in the text of a Cookie header; empty if there is none.
 [[nodiscard]] std::string_view cookie_value(std::string_view cookies,
                                             std::string_view name) noexcept;
 
@@ -82,7 +82,7 @@ class PagePass {
 /// stranger's name server can give another meaning, "localhost", or one of `names`.
 [[nodiscard]] bool is_own_host(std::string_view host, const std::vector<std::string>& names);
 
-/// Whether the page that opens a WebSocket came from here: none told (no browser), or scheme and
+/// Whether the page that opens a WebSocket came from here: none given (no browser), or scheme and
 /// host as the request has them.
 [[nodiscard]] bool is_own_origin(std::string_view origin, std::string_view host, bool tls);
 

@@ -10,7 +10,7 @@
 namespace kerf::bridge {
 
 /// `text` as a QR code for a terminal of any colours: black on white, two modules a character, four
-/// of white around it. A line that says why not where libqrencode was missing when kerf was built,
+/// of white around it. A line with the reason if libqrencode was missing when kerf was built,
 /// or `text` is too long for a code.
 [[nodiscard]] std::string qr_code(const std::string& text);
 
@@ -22,7 +22,7 @@ struct ServeOptions {
   std::string name = kUsualName;          ///< of the controller
   std::filesystem::path identity;         ///< folder of `make-identity`; empty: self-signed
   std::filesystem::path token_file;       ///< who may look; empty: one token, made now
-  std::filesystem::path command_tokens;   ///< who may command; empty: nobody
+  std::filesystem::path command_tokens;   ///< who may command; empty: no viewer
   int max_viewers = kMostViewers;
   bool dedicated_link = false;
   int openigtlink = 0;  ///< port for 3D Slicer, at the same host; 0: none

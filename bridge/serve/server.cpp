@@ -146,7 +146,7 @@ asio::ip::address_v6::bytes_type host_of(const asio::ip::address& address) {
 }  // namespace
 
 /// Where all places are taken, the oldest connection of the host that has most of them goes: who
-/// holds many and says nothing keeps nobody else out. One that waits for the answer to a wrong
+/// holds many and sends nothing keeps no other out. One that waits for the answer to a wrong
 /// token goes last, and never for another of its own host: who guesses gets an answer a second for
 /// each place of one host.
 bool Server::Impl::make_room(const asio::ip::address& newcomer) {

@@ -36,7 +36,7 @@ struct ServerSetup {
 /// those who may command, checked again by the controller.
 class Server {
  public:
-  /// Listens. Throws `BridgeError` where that is not to be had.
+  /// Listens. Throws `BridgeError` if that is not to be had.
   explicit Server(ServerSetup setup);
   ~Server();
   Server(const Server&) = delete;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-
+// A connection of the server before it is a viewer: TLS, and the pages over HTTP.
 #include <algorithm>
 #include <chrono>
 #include <iostream>
@@ -18,6 +18,13 @@
 
 namespace kerf::bridge {
 
+namespace {
+
+namespace http = beast::http;
+
+constexpr auto kReplyTime = std::chrono::seconds(30);  // 200 KB over 64 kbit/s
+constexpr std::uint32_t kMaxHeaderBytes = 8 * 1024;
+
 /// One answer to a request for a page.
 struct HttpReply {
   int status = 200;
@@ -27,12 +34,6 @@ struct HttpReply {
   bool keep_alive = true;
   bool head_only = false;  ///< the request was a HEAD
 };
-
-/// The bytes of it. All that a browser can be told to forbid is forbidden: scripts, styles and
-/// connections from elsewhere or inside of the HTML, frames around the page, a guess at the type.
-[[nodiscard]] std::string http_text(const HttpReply& reply);
-
-namespace {
 
 std::string_view reason(int status) noexcept {
   switch (status) {
@@ -67,8 +68,8 @@ constexpr std::string_view kHeaders =
     "X-Content-Type-Options: nosniff\r\n"
     "X-Frame-Options: DENY\r\n";
 
-}  // namespace
-
+/// The bytes of it. All that a header can make a browser forbid is forbidden: scripts, styles and
+/// connections from elsewhere or inside of the HTML, frames around the page, a guess at the type.
 std::string http_text(const HttpReply& reply) {
   std::string text = "HTTP/1.1 " + std::to_string(reply.status) + " ";
   text += reason(reply.status);
@@ -82,13 +83,6 @@ std::string http_text(const HttpReply& reply) {
   if (!reply.head_only) text += reply.body;
   return text;
 }
-
-namespace {
-
-namespace http = beast::http;
-
-constexpr auto kReplyTime = std::chrono::seconds(30);  // 200 KB over 64 kbit/s
-constexpr std::uint32_t kMaxHeaderBytes = 8 * 1024;
 
 std::string_view text(beast::string_view view) {
   return {view.data(), view.size()};
@@ -126,7 +120,7 @@ asio::awaitable<void> Server::Impl::handshake(WebSocket& ws, beast::flat_buffer&
 }
 
 /// A token of the address goes before the cookie, and the cookie before the pass: a browser that
-/// has been here takes nobody's pass away.
+/// has been here takes no other viewer's pass away.
 Server::Impl::Shown Server::Impl::shown_by(const Request& request) const {
   const Tokens& tokens = setup_.tokens;
   const std::string_view asked = query_value(text(request.target()), "token");

@@ -44,7 +44,7 @@ struct Viewer {
   std::uint64_t sent_bytes = 0;      ///< by it, when that was looked at
   bool commanding = false;           ///< a command of it is with the controller
   bool gone = false;                 ///< its socket has failed or is closed
-  std::optional<CloseCode> closing;  ///< it is to be told to go
+  std::optional<CloseCode> closing;  ///< it is to be closed with this code
   std::int64_t close_by_ns = 0;      ///< and if it does not, the socket is closed
 
   [[nodiscard]] int fd() { return ws->next_layer().next_layer().socket().native_handle(); }

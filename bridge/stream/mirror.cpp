@@ -9,6 +9,7 @@
 #include "bridge/wire/messages.hpp"
 #include "shared/segment/connection.hpp"
 #include "shared/segment/reader.hpp"
+#include "shared/segment/server.hpp"
 
 namespace kerf::bridge {
 
@@ -43,14 +44,14 @@ void CommandDesk::set_link(Link link) {
   const std::lock_guard lock(mutex_);
   link_ = link;
   if (link == Link::open) return;
-  reply_ = Reply{};  // nobody answers any more
+  reply_ = Reply{};  // no answer comes any more
   reply_->status = ReplyStatus::busy;
   answered_.notify_one();
 }
 
 namespace {
 
-/// True where both are the same run of the same scene: what is in its segment stays true.
+/// True if both are the same run of the same scene: what is in its segment stays true.
 [[nodiscard]] bool same_run(const ParsedHello& a, const ParsedHello& b) noexcept {
   return a.head.session == b.head.session && a.head.scene_bytes == b.head.scene_bytes &&
          a.volumes.size() == b.volumes.size() &&
@@ -97,7 +98,7 @@ struct Mirror::LocalSegment {
 Mirror::Mirror(std::string name, std::uint64_t most_bytes, SegmentServer::Answer answer)
     : name_(std::move(name)), most_bytes_(most_bytes), answer_(std::move(answer)) {
   static_cast<void>(segment_socket(name_));
-  const NameLock free_now(name_);  // says at the start that the name is taken
+  const NameLock free_now(name_);  // reports at the start that the name is taken
 }
 
 Mirror::~Mirror() = default;

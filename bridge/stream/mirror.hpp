@@ -19,19 +19,19 @@
 #include "bridge/wire/messages.hpp"
 #include "bridge/wire/parse.hpp"
 #include "shared/segment/command.hpp"
-#include "shared/segment/connection.hpp"
 #include "shared/segment/replica_writer.hpp"
+#include "shared/segment/server.hpp"
 
 namespace kerf::bridge {
 
-/// The other machine's CLOCK_MONOTONIC as the local one tells it; both count from their own start,
+/// The other machine's CLOCK_MONOTONIC in terms of the local one; both count from their own start,
 /// so they differ by hours. One thread.
 ///
 /// A message that is sent at s (theirs) and comes at c (ours) took w = c - s - offset >= 0. The
 /// least c - s so far is therefore the offset and the shortest way; half of the link's least round
 /// trip is taken for that way, as NTP does: an error of half the difference of the two directions
 /// stays. Two clocks drift apart, so the least one may grow by `kDriftPpm`; a link that queues from
-/// the first message on cannot be told from another offset for longer than that.
+/// the first message on cannot be distinguished from another offset for longer than that.
 class ClockOffset {
  public:
   static constexpr std::int64_t kDriftPpm = 100;  ///< of two quartz clocks, 50 each
@@ -108,7 +108,7 @@ struct OutOfStep : std::runtime_error {
 
 /// The far end of a bridge without its network: messages in, a local segment out.
 ///
-/// A run's first pass goes straight into a segment that nobody has yet; with its last frame the
+/// A run's first pass goes straight into a segment that no reader has yet; with its last frame the
 /// segment gets the name, and the one of an earlier run goes. Later passes wait in private memory
 /// and are published at once when they are whole, so readers see the state of one tick or the one
 /// before it, however slow the link is. Beyond the segment it holds 16 bytes a block and the pass
@@ -117,7 +117,7 @@ struct OutOfStep : std::runtime_error {
 /// One thread, but for `Answer`, which the segment server's thread calls.
 class Mirror {
  public:
-  /// Throws `SegmentError` where `name` cannot be used or another controller has it. A segment of
+  /// Throws `SegmentError` if `name` cannot be used or another controller has it. A segment of
   /// more than `most_bytes` is refused.
   Mirror(std::string name, std::uint64_t most_bytes, SegmentServer::Answer answer);
   Mirror(const Mirror&) = delete;
@@ -125,13 +125,13 @@ class Mirror {
   ~Mirror();
 
   /// First message of a connection, or a new run's. All that is held of a stream is void. Throws
-  /// `WireError` where it does not hold, `SegmentError` where it is of another layout, too large or
+  /// `WireError` if it does not hold, `SegmentError` if it is of another layout, too large or
   /// there is no memory.
   const HelloMessage& hello(std::span<const std::byte> message, std::int64_t now_ns,
                             std::int64_t round_trip_ns);
 
   /// Applies a frame; what it returns is to be sent back. Throws `WireError` or `OutOfStep`, and
-  /// `SegmentError` where the name was taken in the meantime.
+  /// `SegmentError` if the name was taken in the meantime.
   AckMessage frame(std::span<const std::byte> message, std::int64_t now_ns,
                    std::int64_t round_trip_ns);
 
@@ -140,7 +140,7 @@ class Mirror {
 
   /// True from the first whole pass of a connection until the next greeting.
   [[nodiscard]] bool joined() const noexcept { return joined_; }
-  /// True where the controller of the run that is shown has gone.
+  /// True if the controller of the run that is shown has gone.
   [[nodiscard]] bool ended() const noexcept { return ended_; }
   [[nodiscard]] std::uint64_t passes() const noexcept { return passes_; }  ///< published
   /// When the newest published state was read from the other machine's segment, local clock; 0:

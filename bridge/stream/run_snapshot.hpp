@@ -19,7 +19,7 @@ namespace kerf::bridge {
 /// A stream that is in the middle of a pass still needs bricks as they were when its pass began,
 /// while this copy goes on to the next tick for the others. So a stream pins what it has yet to
 /// send, and `update` keeps the old content of a pinned brick aside before it takes the new one. A
-/// pass is then exactly the volumes of its tick, though nobody holds a copy of his own: what is
+/// pass is then exactly the volumes of its tick, though no viewer has a copy of its own: what is
 /// kept aside is what changed during the pass, in the worst case a volume a stream.
 ///
 /// One thread.
@@ -32,7 +32,7 @@ class RunSnapshot {
   /// will never be completed, so what there is of it counts.
   void update(std::int64_t now_ns, bool writer_gone);
 
-  /// True where the last `update` found the volumes of one tick; only then a pass may begin.
+  /// True if the last `update` found the volumes of one tick; only then a pass may begin.
   [[nodiscard]] bool whole() const noexcept { return whole_; }
   [[nodiscard]] Tick tick() const noexcept { return tick_; }
   [[nodiscard]] std::int64_t taken_ns() const noexcept { return taken_ns_; }
@@ -85,7 +85,7 @@ class RunSnapshot {
   std::int64_t taken_ns_ = 0;
 };
 
-/// The static part of a run as the greeting has it: `off_labels` 1 where there are labels.
+/// The static part of a run as the greeting has it: `off_labels` 1 if there are labels.
 [[nodiscard]] std::vector<VolumeDescriptor> describe_volumes(const SegmentInfo& info);
 
 }  // namespace kerf::bridge

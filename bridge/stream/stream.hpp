@@ -24,7 +24,7 @@ namespace kerf::bridge {
 /// ack contains the sending time of its frame, and would let a queue grow that it then measures.
 ///
 /// Bytes, not frames: a packed frame is a quarter of a plain one, and a window of so many frames
-/// would be as much smaller, just where the link is what holds a pass up.
+/// would be as much smaller, just when the link is what holds a pass up.
 ///
 /// `now_ns` never falls. One thread.
 class LinkRate {
@@ -82,8 +82,8 @@ class RecordBatches {
   void plan(std::uint64_t records) noexcept;
   [[nodiscard]] bool waiting() const noexcept { return next_ < end_; }
 
-  /// The next message, packed where that pays on a link of `bytes_per_s`. False, and `out` is
-  /// empty, where the records were overwritten meanwhile.
+  /// The next message, packed if that pays on a link of `bytes_per_s`. False, and `out` is
+  /// empty, if the records were overwritten meanwhile.
   bool write(double bytes_per_s, std::vector<std::byte>& out);
 
   /// Raw bytes per packed one.
@@ -131,10 +131,10 @@ class Stream {
   /// Every `kSlotNs`, after that. `ended`: the controller has gone.
   void slot(std::int64_t now_ns, bool ended);
 
-  /// The next message, where there is one and the link has credit for it.
+  /// The next message, if there is one and the link has credit for it.
   bool next(std::int64_t now_ns, std::vector<std::byte>& out);
 
-  /// False where the viewer answers what it was never sent. An ack of another run is passed over.
+  /// False if the viewer answers what it was never sent. An ack of another run is passed over.
   [[nodiscard]] bool acked(const AckMessage& ack, std::int64_t now_ns);
 
   /// The kernel's least round trip.

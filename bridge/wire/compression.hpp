@@ -15,7 +15,7 @@ namespace kerf::bridge {
 /// its length.
 [[nodiscard]] std::size_t pack(std::span<const std::byte> raw, std::span<std::byte> out) noexcept;
 
-/// True where `packed` decodes to exactly as many bytes as `out` has. Safe for any bytes.
+/// True if `packed` decodes to exactly as many bytes as `out` has. Safe for any bytes.
 [[nodiscard]] bool unpack(std::span<const std::byte> packed, std::span<std::byte> out) noexcept;
 
 /// Whether it pays to pack what is sent next.
@@ -46,7 +46,7 @@ class PackChoice {
   std::uint32_t asked_ = 0;
 };
 
-/// Appends `raw` to `out`, packed where that pays on a link of `bytes_per_s` and makes it smaller.
+/// Appends `raw` to `out`, packed if that pays on a link of `bytes_per_s` and makes it smaller.
 /// Returns whether it did.
 bool append_payload(std::span<const std::byte> raw, double bytes_per_s, PackChoice& choice,
                     std::vector<std::byte>& out);

@@ -47,7 +47,7 @@ inline constexpr std::uint32_t kPacked = 1;      ///< of frames and records: one
 inline constexpr std::uint32_t kLastOfPass = 2;  ///< FrameHead::flags
 inline constexpr std::uint32_t kRunEnded = 4;    ///< FrameHead::flags: the controller has gone
 
-/// What is told when a connection is closed.
+/// Reason for which a connection is closed.
 enum class CloseCode : std::uint16_t {
   no_token = 4001,
   too_slow = 4002,
@@ -56,7 +56,7 @@ enum class CloseCode : std::uint16_t {
 };
 
 /// What never changes in a run; all that the viewer holds is void. `volume_count` descriptors of
-/// the segment follow, in which `off_labels` is 1 where there are labels and the other offsets are
+/// the segment follow, in which `off_labels` is 1 if there are labels and the other offsets are
 /// 0.
 struct HelloMessage {
   std::uint32_t magic;

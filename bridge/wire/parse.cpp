@@ -43,7 +43,7 @@ template <class Head>
   return head;
 }
 
-/// The payload of a message, decoded into `scratch` where it is packed.
+/// The payload of a message, decoded into `scratch` if it is packed.
 [[nodiscard]] Bytes decoded(Bytes payload, bool packed, std::size_t raw_bytes,
                             std::span<std::byte, kMaxRawBytes> scratch) {
   require(raw_bytes <= kMaxRawBytes, "raw_bytes", raw_bytes, "at most 16 KiB");

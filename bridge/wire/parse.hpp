@@ -70,10 +70,10 @@ struct ParsedRecords {
 /// Viewer's side. Throws `WireError`.
 [[nodiscard]] ReplyMessage parse_reply(std::span<const std::byte> message);
 
-/// First word of a message; 0 where it has none.
+/// First word of a message; 0 if it has none.
 [[nodiscard]] std::uint32_t magic_of(std::span<const std::byte> message) noexcept;
 
-/// Server's side: what a viewer said, or nothing where it is neither.
+/// Server's side: a viewer's message, or nothing if it is neither.
 [[nodiscard]] std::optional<std::variant<AckMessage, CommandMessage>> parse_up(
     std::span<const std::byte> message) noexcept;
 

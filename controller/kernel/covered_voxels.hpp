@@ -13,9 +13,12 @@
 #include "controller/kernel/overlap.hpp"
 #include "controller/kernel/surface_motion.hpp"
 
+// The voxels under the tool in one tick: their weights, the loads that they bear, and their
+// removal; as a list of voxels, and as groups of neighbours for the kernels of fixed point.
+
 namespace kerf {
 
-/// Indexed by label; without labels all is at 0.
+/// Indexed by label; without labels only entry 0 is used.
 template <class T>
 using ByMaterial = std::array<T, kMaxCutMaterials>;
 
@@ -42,15 +45,16 @@ struct CoveredVoxel {
   Covered weight;   ///< times speed
 };
 
-/// What there is of each material under the tool in one tick, and how the tool moves over it.
+/// Sums by material over the voxels under the tool, and the motion of the tool's surface there.
 template <class N>
 struct CoveredWeights {
   ByMaterial<CutWeight<N>> weight{};  ///< sums of the list's
-  ByMaterial<CutWeight<N>> load{};    ///< by which materials share a press: the weights, or `loads`
-  CutWeight<N> whole{};               ///< of what each load is a part
+  ByMaterial<CutWeight<N>>
+      load{};            ///< distribution of a press over materials: the weights, or `loads`
+  CutWeight<N> whole{};  ///< sum of all loads
   SurfaceDrag<N> drag;
 
-  /// All share the press by their weights.
+  /// Distributes the press by the weights.
   constexpr void share_by_weight() noexcept {
     load = weight;
     whole = {};
@@ -58,7 +62,8 @@ struct CoveredWeights {
   }
 };
 
-/// What the tool covers in one tick. The list is in the caller's memory, in z, y, x order.
+/// The voxels that the tool covers in one tick. The list is in the caller's memory, in z, y, x
+/// order.
 template <class N>
 struct CoveredVoxels : CoveredWeights<N> {
   std::span<CoveredVoxel<N>> list;
@@ -162,7 +167,7 @@ template <class N, class Overlap>
   return detail::CoverScan<N>(grid, density, labels, memory).run(overlap, frame);
 }
 
-// How a budget leaves the voxels that a tool covers (docs/theory.md 6.2).
+// Removal of a budget from the covered voxels (docs/theory.md 6.2).
 //
 // A voxel loses whole density steps. Fractions are rounded up or down by a phase that advances by
 // one irrational number from voxel to voxel and by another from tick to tick (powers of the plastic
@@ -173,10 +178,10 @@ inline constexpr std::uint16_t kPhaseByVoxel = 49471, kPhaseByTick = 37345;  // 
 struct TakenSteps {
   ByMaterial<std::uint64_t> steps{};
   VoxelBox changed;
-  bool full = false;  ///< some voxel had less to give than its part
+  bool full = false;  ///< a voxel had less left than its part
 };
 
-/// Weighs again what is still covered after a `take`.
+/// Weighs the voxels again after a `take`.
 template <class N>
 constexpr void weigh_again(CoveredVoxels<N>& covered) noexcept {
   covered.weight = {};
@@ -189,7 +194,7 @@ constexpr void weigh_again(CoveredVoxels<N>& covered) noexcept {
 namespace detail {
 
 /// Takes `wanted` steps, at most what is covered, from a voxel; returns how many whole ones left.
-/// Sets `full` where the voxel had less to give.
+/// Sets `full` if the voxel had less left.
 template <class N>
 constexpr Density take_from(CoveredVoxel<N>& voxel, typename BudgetPerWeight<N>::Steps wanted,
                             std::uint16_t tick_phase, Density& rho, bool& full) noexcept {
@@ -216,8 +221,8 @@ constexpr Density take_from(CoveredVoxel<N>& voxel, typename BudgetPerWeight<N>:
 
 }  // namespace detail
 
-/// Takes from each voxel its weight times the `price` of its material, in density steps; `phase` is
-/// that of this tick's rounding.
+/// Removes from each voxel its weight times the `price` of its material, in density steps; `phase`
+/// is that of the rounding in this tick.
 template <class N>
 constexpr TakenSteps take(CoveredVoxels<N>& covered, const ByMaterial<BudgetPerWeight<N>>& price,
                           std::uint16_t phase, std::span<Density> density) noexcept {
@@ -238,8 +243,8 @@ constexpr TakenSteps take(CoveredVoxels<N>& covered, const ByMaterial<BudgetPerW
   return taken;
 }
 
-/// What `CoveredVoxels` of fixed point says, as groups of neighbours for the kernels of an
-/// instruction set: the same bits. The list is in the caller's memory.
+/// `CoveredVoxels` of fixed point as groups of neighbours, for the kernels of an instruction set:
+/// the same bits. The list is in the caller's memory.
 struct CoveredGroups : CoveredWeights<FixedNumbers> {
   const KernelSet* kernels = nullptr;
   std::span<CoveredGroup> list;
@@ -309,14 +314,14 @@ inline void weigh_again(CoveredGroups& covered) noexcept {
   return taken;
 }
 
-// Which of the materials under the tool bear its press (docs/theory.md 6.2). A tool in its own bore
-// covers some of the wall all around, but rests on one side of it. A contact is a plane with the
-// normal n, out of the solid, through a point of the tool's surface. Voxel j stands h_j over it;
-// what lies at the contact is ahead(j) = 1 - h_j / w, where it is positive.
+// Loads: which of the materials under the tool bear its press (docs/theory.md 6.2). A tool in its
+// own bore covers voxels of the wall all around, but rests on one side of it. A contact is a plane
+// with the normal n, out of the solid, through a point of the tool's surface. Voxel j lies h_j
+// above it, and counts at the contact with ahead(j) = 1 - h_j / w if that is positive.
 //
-// On a bed of even stiffness the pressure goes with the part of the surface's normal along the
-// press. Of a ball that is ahead(j) with w = R. The flank, the end and the rim of another tool are
-// told by the plane itself: there w is one unit, half of the ramp of a face.
+// On a bed of even stiffness the pressure is proportional to the component of the surface normal
+// along the press. For a ball that is ahead(j) with w = R. For the flank, the end and the rim of
+// another tool w is one unit, half of the ramp of a face.
 
 /// A tool's rim radius over w, 1 of a ball; at most.
 inline constexpr double kSteepest = 64;
@@ -329,8 +334,8 @@ struct BearingPlane {
   typename N::Ratio steepness{};  ///< rim radius over w
 };
 
-/// ahead(j) as a linear form of the voxel's place. Fixed: 20 fraction bits; steps below 2^30,
-/// places below 2^13.
+/// ahead(j) as a linear form of the position of the voxel. Fixed: 20 fraction bits; steps below
+/// 2^30, positions below 2^13.
 template <class N>
 [[nodiscard]] constexpr AheadForm<typename N::Sum> ahead_form(
     VoxelVec<typename N::Real> centre_vox,
@@ -363,14 +368,14 @@ template <class N>
   return form;
 }
 
-/// All that the tool covers lies at the contact.
+/// The form that counts every covered voxel fully.
 template <class N>
 [[nodiscard]] constexpr AheadForm<typename N::Sum> ahead_everywhere() noexcept {
   return {N::kIsFixed ? typename N::Sum(1 << 20) : typename N::Sum(1), {}};
 }
 
-/// Sums of weights times `ahead`, at most 1, by material: what lies at a contact, and what of it
-/// reaches the iso. Softer matter bears nothing.
+/// Sums by material of weights times `ahead`, clamped to 0..1: of all voxels at a contact, and of
+/// those that reach the iso. Voxels below the iso bear no load.
 template <class N>
 struct CoveredLoads {
   ByMaterial<CutWeight<N>> ahead{}, bearing{};
@@ -402,7 +407,7 @@ template <class N>
   return found;
 }
 
-/// The same of groups, with the same bits.
+/// The same for groups, with the same bits.
 [[nodiscard]] inline CoveredLoads<FixedNumbers> loads(const CoveredGroups& covered,
                                                       const AheadForm<std::int64_t>& form,
                                                       std::span<const Density> density,

@@ -10,12 +10,16 @@
 #include "shared/numeric/numbers.hpp"
 #include "shared/volume/voxel_grid.hpp"
 
+// The inner loops of a tick in fixed point, one set per instruction set (`KernelSet`), and the
+// plain structs that they take. Code of an instruction set may include this file: it holds structs,
+// sizes and `always_inline` functions only.
+
 namespace kerf {
 
-/// Samples whose sum of exact gradients, 2^15 of them each, is sure to stay below 2^62.
+/// For so many samples the sum of exact gradients, times 2^15 each, stays below 2^62.
 inline constexpr std::size_t kNarrowSumSamples = 18'000;
 
-/// Bits that the finished sum of a tool with this many samples leaves out: none, or 16.
+/// Bits that are dropped from the finished sum of a tool with so many samples: none, or 16.
 [[nodiscard]] constexpr int sum_shift(std::size_t samples) noexcept {
   return samples <= kNarrowSumSamples ? 0 : 16;
 }
@@ -34,8 +38,8 @@ struct WideSum {
   }
 };
 
-/// Gradient taps whose slopes have no common factor: it is applied once, to the finished sum, which
-/// is then divided by 2^shift. Exact sums are before both.
+/// Gradient taps without the common factor of their slopes: the factor is applied once, to the
+/// finished sum, which is then divided by 2^shift. Exact sums are before both.
 struct ExactTaps {
   std::int32_t smooth[5];
   std::int32_t slope[5];
@@ -81,7 +85,7 @@ static_assert(kMaxPlaneVoxels <= (std::uint64_t{1} << 63) / 32768 / kMaxExactGra
 }
 
 /// Working memory of one tick, shared by all tools and volumes; any contents. Ratios, filter and
-/// live rows may be missing where nothing is milled.
+/// live rows may be missing if nothing is milled.
 struct BoxScratch {
   std::int16_t* box = nullptr;     ///< density - 32768 around the tool, as one stream
   std::int16_t* ratio = nullptr;   ///< minus the overlap ratio (2^15 = 1), rows of row_lanes + pad
@@ -109,8 +113,8 @@ struct BoxScratchSize {
           .live = rows};
 }
 
-// The method `aligned` (docs/theory.md 7.6): the tool's voxels lie on a lattice as fine as the
-// volume's and are not turned. Nothing but the density is stored, nothing is refreshed.
+// The method `aligned` (docs/theory.md 7.6): the tool's voxels lie on a lattice as fine as that of
+// the volume and are not rotated. Only the density is stored; a cut refreshes nothing.
 
 /// Fraction bits that contact sums keep.
 inline constexpr int kAlignedKeptBits = 8;
@@ -124,10 +128,11 @@ struct AlignedChunk {
   std::int32_t vector;  ///< entry of `AlignedTable::vectors` where its run begins
 };
 
-/// What the method `aligned` holds of one tool, for kernels of one vector width. Made at load time
-/// (controller/plan/tables/sample_tables.hpp), constant afterwards; points into the maker's memory.
+/// The tables of one tool for the method `aligned`, for kernels of one vector width. Made at load
+/// time (controller/plan/tables/sample_tables.hpp), constant afterwards; points into the maker's
+/// memory.
 ///
-/// A table entry has up to 18 bits and is kept as 512 hi + lo, both in 16 bits. A run is `lanes`
+/// A table entry has up to 18 bits, stored as 512 hi + lo, both in 16 bits. A run is `lanes`
 /// entries lo, then `lanes` entries hi; with `fused` axes x, y, z follow each other in one run.
 struct AlignedTable : TickBox {
   std::array<std::int16_t, 3> low{};  ///< lowest offset of a sample, half pitches
@@ -168,11 +173,11 @@ struct SamplePose {
 /// stays within 2^31, and 32-bit arithmetic gives the place that `sample_position` gives.
 inline constexpr std::int32_t kSampleReachVox = 1000;
 
-// The method `splat` (docs/theory.md 7.6): any pose of any shape, in scenes that cut. The sums
-// PHI_j of the samples' weights are all that the forces and the removal need of the tool. Nothing
-// but the density is stored, nothing is refreshed after a cut.
+// The method `splat` (docs/theory.md 7.6): any pose of any shape, in scenes that cut. Forces and
+// removal need only the sums PHI_j of the samples' weights. Only the density is stored; a cut
+// refreshes nothing.
 
-/// Samples per voxel that a sum can hold: 2^24 of weights of 2^15, so that 5 taps of it fit 32
+/// Most samples per voxel in a sum: 2^24 of weights of 2^15, so that 5 taps of it fit 32
 /// bits.
 inline constexpr double kMaxSplatDensity = 512.0;
 
@@ -209,7 +214,7 @@ struct SplatScratchSize {
 
 // Plain structs for the kernels that weigh and cut the voxels under a tool (docs/theory.md 6.2).
 
-/// Materials that a cut can tell apart; a label beyond counts as the last of them.
+/// Most materials of a cut; a larger label counts as the last of them.
 inline constexpr std::size_t kMaxCutMaterials = 64;
 
 /// Voxels of a group: neighbours along x.
@@ -227,8 +232,8 @@ struct CoveredGroup {
   bool mixed;
 };
 
-/// A row of overlap ratios and what weighing needs to know of its voxels. Arrays may be read to the
-/// end of the last group, labels only where the overlap is not 0.
+/// A row of overlap ratios with the data for weighing its voxels. Arrays may be read to the end of
+/// the last group, labels only of voxels whose overlap is not 0.
 struct CoverRow {
   const std::int16_t* ratio = nullptr;    ///< minus the overlap, 2^15 is 1; 0 outside of the volume
   const std::int16_t* density = nullptr;  ///< less 2^15
@@ -249,35 +254,35 @@ struct CoverSums {
   std::uint64_t covered, covered_number, weight, weight_speed;
 };
 
-/// How far a voxel lies at a contact of the tool, as a linear form of its place: 1 and more bear
-/// all, 0 and less nothing (covered_voxels.hpp).
+/// How much a voxel counts at a contact of the tool, as a linear form of its position: fully at 1
+/// and more, not at all at 0 and less (covered_voxels.hpp).
 template <class Sum>
 struct AheadForm {
   Sum origin;   ///< of voxel 0, 0, 0; fixed: 20 fraction bits, as have the steps
   Sum step[3];  ///< from a voxel to the next
 };
 
-/// How one tick's budget is taken: a voxel of material m loses weight * mantissa[m] 2^-shift[m]
-/// density steps, with 16 fraction bits; the shifts are 0..63.
+/// How the budget of one tick is spent: a voxel of material m loses weight * mantissa[m]
+/// 2^-shift[m] density steps, with 16 fraction bits; the shifts are 0..63.
 struct CoverSpend {
   std::uint32_t mantissa[kMaxCutMaterials], shift[kMaxCutMaterials];
   std::uint16_t phase;           ///< of the rounding
   std::uint16_t phase_by_voxel;  ///< it goes on by so much an entry
 };
 
-/// What a group lost.
+/// The loss of one group.
 struct TakenLanes {
   std::uint32_t steps[kCoverGroup];
   std::uint32_t sum;    ///< of the steps
   std::uint32_t lanes;  ///< bits: those that lost something
-  bool full;            ///< one had less to give than its part
+  bool full;            ///< a voxel had less left than its part
 };
 
-/// What all of them lost.
+/// The loss of all groups.
 struct CoverTaken {
   std::uint64_t steps[kMaxCutMaterials];  ///< by material
-  VoxelIndex lo, hi;                      ///< last one excluded; as they were where nothing left
-  bool full;                              ///< a voxel had less to give than its part
+  VoxelIndex lo, hi;                      ///< last one excluded; unchanged if nothing left
+  bool full;                              ///< a voxel had less left than its part
 };
 
 /// The part of a removal rate that a kernel needs: mantissa 2^-(15 + exponent).
@@ -286,7 +291,8 @@ struct CutRate {
   std::int32_t exponent;  ///< 0..32
 };
 
-/// What one cut took; `lo` and `hi` (last one included) are box entries, meaningless when 0 steps.
+/// The loss of one cut; `lo` and `hi` (last one included) are box entries, meaningless when 0
+/// steps.
 struct BoxCut {
   std::uint64_t density_steps;
   VoxelIndex lo, hi;
@@ -310,7 +316,7 @@ struct KernelSet {
   /// Overlap ratios of all rows where there is density, and the exact modification sum.
   void (*press)(const AlignedTable&, const std::int32_t (&weight)[8], const BoxScratch&,
                 std::int64_t (&sum)[3]) noexcept;
-  /// Takes from the volume what the ratios say; `carry` has row_lanes entries.
+  /// Removes density from the volume by the ratios; `carry` has row_lanes entries.
   BoxCut (*cut)(const TickBox&, const CutRate&, const VoxelGrid&, Density*, VoxelIndex origin,
                 const BoxScratch&, std::uint16_t* carry) noexcept;
   /// Contact of the method `gather`: `contact_sum` over a field of three 16-bit parts a voxel,
@@ -328,7 +334,8 @@ struct KernelSet {
   /// Where force cuts: the ratios of `press` and of `press_sums` alone.
   void (*cover)(const AlignedTable&, const std::int32_t (&weight)[8], const BoxScratch&) noexcept;
   void (*cover_sums)(const TickBox&, std::int32_t volume_ratio, const SplatScratch&) noexcept;
-  /// And what is done with them, by rows and then by groups of voxels (covered_voxels.hpp).
+  /// Weighing and cutting with these ratios, by rows and then by groups of voxels
+  /// (covered_voxels.hpp).
   std::int32_t (*weigh_row)(const CoverRow&, CoveredGroup* list, std::int32_t room, CoverSums&,
                             std::uint64_t* weight_by_material) noexcept;
   void (*weigh_again)(CoveredGroup* list, std::int32_t count,

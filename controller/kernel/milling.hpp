@@ -14,11 +14,12 @@
 #include "shared/numeric/numbers.hpp"
 #include "shared/volume/voxel_grid.hpp"
 
+// Milling by overlap: rate of removal, modification force, removal.
+
 namespace kerf {
 
-// 1 - exp(-x) for load time: from + - * / alone, so the last bit does not depend on a libm.
-
-/// For x >= 0 by its series; full double precision below 1/4.
+/// 1 - exp(-x) for x >= 0 by its series; full double precision below 1/4. For load time: from + - *
+/// / alone, so that the last bit does not depend on a libm.
 [[nodiscard]] constexpr double decay_small(double x) noexcept {
   double term = x, sum = 0;
   for (int n = 2; n < 16; ++n) {
@@ -28,7 +29,7 @@ namespace kerf {
   return sum;
 }
 
-/// For any x >= 0: within 1e-13.
+/// 1 - exp(-x) for any x >= 0, within 1e-13.
 [[nodiscard]] constexpr double decay(double x) noexcept {
   constexpr int kHalvings = 8;
   constexpr double kWhole = 42.0;  // exp(-x) is below 1e-18
@@ -38,7 +39,7 @@ namespace kerf {
   return part;
 }
 
-/// What one tick removes of a voxel with overlap c (docs/theory.md 7.5): the fraction c *
+/// The part of a voxel with overlap c that one tick removes (docs/theory.md 7.5): the fraction c *
 /// min(1, kT), or 1 - exp(-c kT) in the exact form, whose result after a given time does not depend
 /// on the rate.
 ///
@@ -69,7 +70,7 @@ template <class N>
 
 }  // namespace detail
 
-/// Above this exp(-kT) is below 1e-13 of a density step: more changes nothing.
+/// Above this exp(-kT) is below 1e-13 of a density step: a larger rate changes nothing.
 inline constexpr double kMaxRateTimesTick = 42.0;
 
 /// `k_times_t` is rate times tick; up to 2^-33, negative or NaN removes nothing. Load time.
@@ -163,7 +164,7 @@ using RemovalCarry = std::conditional_t<N::kIsFixed, std::uint16_t, typename N::
   return overlap_width + 4;
 }
 
-/// What one call of `remove` took away.
+/// The result of one call of `remove`.
 struct Removed {
   std::uint64_t density_steps = 0;  ///< SUM of the decrease: times V_voxel / 65535 is a volume
   VoxelBox changed;                 ///< tightest box around the voxels that lost density
@@ -171,7 +172,7 @@ struct Removed {
 
 namespace detail {
 
-/// Density steps that leave a voxel; `owed` takes what is less than a step. Never more than `rho`.
+/// Density steps that leave a voxel, never more than `rho`; fractions of a step go to `owed`.
 template <class N>
 [[nodiscard]] constexpr Density take(Density rho, typename N::Weight ratio,
                                      const RemovalRate<N>& rate, RemovalCarry<N>& owed) noexcept {
@@ -245,7 +246,7 @@ inline void bend_ratios(const TickBox& box, const BoxScratch& scratch,
 
 }  // namespace detail
 
-/// Takes from the volume what the ratios in the scratch say: `remove`. `carry` has at least
+/// Removes density from the volume by the ratios in the scratch: `remove`. `carry` has at least
 /// row_lanes entries.
 [[nodiscard]] inline Removed cut_box(const KernelSet& kernels, const TickBox& box,
                                      const BoxScratch& scratch, const VoxelGrid& grid,

@@ -12,10 +12,12 @@
 #include "controller/kernel/kernel_set.hpp"
 #include "controller/kernel/sampling.hpp"
 
+// How much of each voxel the tool covers, and the rows of these ratios.
+
 namespace kerf {
 
-/// How much of each voxel near the tool the tool covers, 0..kWeightOne: the paper's overlap ratio
-/// (docs/theory.md 7.3).
+/// The fraction of each voxel near the tool that the tool covers, 0..kWeightOne: the paper's
+/// overlap ratio (docs/theory.md 7.3).
 ///
 /// `memory` is the caller's, sized once with `overlap_capacity`; the rest is written by `overlap`.
 /// The box may stick out of the volume by one voxel; read through `row` inside `box` only.
@@ -129,14 +131,14 @@ constexpr VoxelBox overlap(const VoxelGrid& grid, std::span<const ToolOffset> of
 }
 
 /// The overlap ratios that `press` of the methods `aligned` and `splat` left in the scratch, until
-/// the next tick uses it; nothing where the tool is away from the volume.
+/// the next tick uses it; nothing if the tool is away from the volume.
 struct BoxOverlap {
   const TickBox* box = nullptr;
   BoxScratch scratch;
   VoxelIndex origin;  ///< low corner of the box
 };
 
-/// A row of it: the ratio of the voxel i behind the first along x, 0..kWeightOne.
+/// A row of it: the ratio of voxel i from the first on along x, 0..kWeightOne.
 struct StoredRow {
   const std::int16_t* ratio;    ///< negative
   const std::int16_t* density;  ///< less 2^15
@@ -147,8 +149,8 @@ struct StoredRow {
 };
 
 /// Calls `row(first, count, ratio)` for every row of the overlap inside the volume, in z, y order:
-/// `ratio(i)` is the ratio of the voxel i behind `first` along x, 0..kWeightOne. Rows without an
-/// overlap may be left out.
+/// `ratio(i)` is the ratio of voxel `first` + i along x, 0..kWeightOne. Rows without an overlap may
+/// be left out.
 template <class Row>
 constexpr void for_each_row(const VoxelGrid& /*grid*/, const BoxOverlap& overlap, Row&& row) {
   if (overlap.box == nullptr) return;
@@ -172,7 +174,7 @@ constexpr void for_each_row(const VoxelGrid& /*grid*/, const BoxOverlap& overlap
   }
 }
 
-/// The same of the ratios of `overlap`.
+/// The same for the ratios of `overlap`.
 template <class N, class Row>
 constexpr void for_each_row(const VoxelGrid& grid, const OverlapBox<N>& overlap, Row&& row) {
   const VoxelBox box = overlap.box.clipped(grid.box());

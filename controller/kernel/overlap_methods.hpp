@@ -13,13 +13,15 @@
 #include "controller/kernel/overlap.hpp"
 #include "controller/kernel/sampling.hpp"
 
+// One tick of each method that works by overlap: `gather`, `aligned`, `splat`.
+
 namespace kerf {
 
 /// SUM over tool samples i of SUM over the corners j of its cell of phi_ij grad_j: the interpolated
 /// gradients added up, in density steps per voxel times kWeightOne. The paper's contact force is
 /// minus this, scaled by p0 a^3 (docs/theory.md 7.1).
 ///
-/// A sample whose cell is not wholly inside the volume counts nothing. `field` holds one gradient
+/// A sample whose cell is not wholly inside the volume does not count. `field` holds one gradient
 /// per voxel. Fixed: nothing is rounded but the weights, so the order of samples does not matter;
 /// 2^30 per sample leaves room for 2^33 samples. Floating: samples in their order.
 template <class N>
@@ -49,8 +51,8 @@ template <class N>
   return sum;
 }
 
-/// The pose in plain integers, or none where no sample can be within a volume: kernels may then
-/// count on 32-bit places.
+/// The pose in plain integers, or none if no sample can be within a volume: so kernels may compute
+/// positions in 32 bits.
 struct NearPose {
   SamplePose pose{};
   bool near = false;
@@ -81,7 +83,7 @@ struct NearPose {
   return {sum[0], sum[1], sum[2]};
 }
 
-/// One tick of the method `aligned` on one volume: `contact` first, then `mill` of the same place.
+/// One tick of the method `aligned` on one volume: `contact` first, then `mill` at the same pose.
 ///
 /// Gives the bits of tests/kernel/definitions.hpp, overlap.hpp and milling.hpp, whatever the
 /// kernels. Work is bounded by the tool's box and does not depend on pose or content. Servo thread;
@@ -133,11 +135,11 @@ class AlignedTick {
     kernels_.press(table_, corner_weights().weight, scratch_, sum);
     return {sum[0], sum[1], sum[2]};
   }
-  /// The ratios alone.
+  /// Leaves the ratios alone.
   void cover() const noexcept {
     if (!outside_) kernels_.cover(table_, corner_weights().weight, scratch_);
   }
-  /// What `press` or `cover` left.
+  /// The ratios that `press` or `cover` left.
   [[nodiscard]] BoxOverlap overlap() const noexcept {
     return outside_ ? BoxOverlap{} : BoxOverlap{&table_, scratch_, origin_};
   }
@@ -148,7 +150,7 @@ class AlignedTick {
   };
 
   /// The modification sum, then the removal. `carry` has at least `table.row_lanes` entries; with
-  /// fewer nothing is cut or felt.
+  /// fewer it cuts nothing and returns no force.
   [[nodiscard]] Milled mill(const RemovalRate<FixedNumbers>& rate,
                             std::span<std::uint16_t> carry) const noexcept {
     Milled milled;
@@ -184,7 +186,7 @@ class AlignedTick {
 ///
 /// Gives the bits of tests/kernel/definitions.hpp, overlap.hpp and milling.hpp, whatever the
 /// kernels. Work is bounded by the samples and by the box that holds the tool in any orientation,
-/// for which `scratch` has room. Far from the volume nothing is done. Servo thread; no heap.
+/// for which `scratch` has room. Far from the volume it does nothing. Servo thread; no heap.
 class SplatTick {
  public:
   struct Felt {
@@ -192,7 +194,7 @@ class SplatTick {
     SumVec<FixedNumbers> modification;  ///< `exact_modification_sum`
   };
 
-  /// Places the samples.
+  /// Computes the positions of the samples.
   SplatTick(const KernelSet& kernels, const SampleTable& samples, const ExactTaps& taps,
             const SplatScratch& scratch, const VoxelGrid& grid, std::span<Density> density,
             const ToolPose<FixedNumbers>& pose) noexcept
@@ -223,7 +225,7 @@ class SplatTick {
     return {{contact[0], contact[1], contact[2]},
             {modification[0], modification[1], modification[2]}};
   }
-  /// The ratios alone.
+  /// Leaves the ratios alone.
   void cover(std::int32_t volume_ratio) const noexcept {
     if (near_) kernels_.cover_sums(box_, volume_ratio, scratch_);
   }
@@ -251,7 +253,7 @@ class SplatTick {
   bool near_ = false;
 };
 
-/// What one tick of the method `splat` feels and takes.
+/// Sums and removal of one tick of the method `splat`.
 struct SplatOutcome {
   SplatTick::Felt felt;
   Removed removed;

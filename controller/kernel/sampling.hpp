@@ -11,6 +11,9 @@
 #include "shared/numeric/vec.hpp"
 #include "shared/volume/voxel_grid.hpp"
 
+// Samples of a tool in a volume: their positions, the voxels around one, the extent of the tool
+// inside the solid.
+
 namespace kerf {
 
 /// Offset of a tool voxel from the tool centre in half pitches, so that even and odd grids are both
@@ -21,7 +24,7 @@ using ToolOffset = std::array<std::int16_t, 3>;
 template <class N>
 using SumVec = VoxelVec<typename N::Sum>;
 
-/// Where the tool is in one volume: sample i lies at `centre_vox + step * offset_i / 2`, since
+/// Pose of the tool in one volume: sample i lies at `centre_vox + step * offset_i / 2`, since
 /// offsets are in half pitches.
 ///
 /// `step[a][b]` is the displacement along voxel axis a for one pitch along tool axis b: rotation
@@ -36,7 +39,7 @@ struct ToolPose {
 /// limit is outside every volume.
 inline constexpr std::int32_t kPositionLimitVox = 1 << 14;
 
-/// Position of one tool sample. A place beyond the limit, or NaN, becomes the limit.
+/// Position of one tool sample. A position beyond the limit, or NaN, becomes the limit.
 ///
 /// Fixed: exact products, one rounding to Q15.16, half up. Floating: x, y, z products in this
 /// order.
@@ -78,7 +81,7 @@ template <class N>
   }
 }
 
-/// The cell of eight voxels around a position: its low corner, and how far in the position lies.
+/// The cell of eight voxels around a position: its low corner, and the position inside the cell.
 template <class N>
 struct Cell {
   VoxelIndex low;

@@ -8,16 +8,19 @@
 #include "shared/numeric/numbers.hpp"
 #include "shared/numeric/vec.hpp"
 
+// The motor of the tool, and the friction of the rotating tool on hand and spindle.
+
 namespace kerf {
 
-/// The motor that turns the tool (docs/theory.md 6.5): I d(omega)/dt = tau_motor - tau_load, with
+/// The motor of the tool (docs/theory.md 6.5): I d(omega)/dt = tau_motor - tau_load, with
 /// the straight line of a turbine, tau_motor = tau_stall (1 - omega / omega_free). Constant during
 /// a run; made by `spindle_plan`.
 template <class N>
 struct SpindlePlan {
   typename N::Unit free_ratio{};      ///< omega_free / omega_ref, below 2
   typename N::Real loads_per_n_mm{};  ///< 1 / tau_stall
-  typename N::Unit approach{};  ///< share of the difference to the resting speed made up in a tick
+  typename N::Unit
+      approach{};  ///< fraction of the difference to the steady speed made up in a tick
 };
 
 /// `free_ratio` 0..1.9, positive torque in N mm; `run_up_s` = I omega_free / tau_stall is the time
@@ -34,15 +37,15 @@ template <class N>
 template <class N>
 struct SpindleState {
   typename N::Unit ratio{};  ///< omega / omega_ref; 0 before it is switched on
-  typename N::Real
-      load{};  ///< torque over the stall torque, 0..kMaxSpindleLoad; from 1 on it stalls
+  /// Torque over the stall torque, 0..kMaxSpindleLoad; from 1 on the spindle stalls.
+  typename N::Real load{};
 };
 
 inline constexpr int kMaxSpindleLoad = 100;  ///< a larger load counts as that
 
-/// One tick under a torque >= 0. The speed goes to omega_free (1 - load), where motor and load
-/// agree, and stays at 0 when the load is more than the motor has: friction brakes, it does not
-/// turn back. Switched off, the spindle is braked as fast as it runs up.
+/// One tick under a torque >= 0. The speed approaches omega_free (1 - load), where motor and load
+/// balance, and stays at 0 if the load exceeds the stall torque: friction brakes, it never reverses
+/// the rotation. Switched off, the spindle stops as fast as it runs up.
 ///
 /// Fixed: the speed rests within 2^-31 / `approach` of where it should. Servo thread.
 template <class N>
@@ -56,12 +59,12 @@ constexpr void turn_spindle(const SpindlePlan<N>& plan, bool on, typename N::Rea
   state.ratio += (resting - state.ratio) * plan.approach;
 }
 
-/// What the turning tool's surface does to hand and spindle: F_t = mu F_n against omega x arm
+/// Friction of the rotating tool on hand and spindle: F_t = mu F_n against omega x arm
 /// (docs/theory.md 6.5). Made by `cutting_friction`.
 template <class N>
 struct FrictionPlan {
   typename N::Real coefficient{};  ///< F_t / F_n
-  typename N::Unit approach{};     ///< of the low-pass: share of the difference made up in a tick
+  typename N::Unit approach{};  ///< of the low-pass: fraction of the difference made up in a tick
 };
 
 /// Time constant of the low-pass, 32 Hz: slower than the steps that single voxels make, faster than
@@ -79,19 +82,19 @@ class CuttingFriction {
  public:
   using Real = typename N::Real;
 
-  /// A contact of `normal_force_n` whose surface moves as `drag` says.
+  /// A contact with `normal_force_n`, where the surface moves by `drag`.
   constexpr void add(const FrictionPlan<N>& plan, Real normal_force_n,
                      const SurfaceDrag<N>& drag) noexcept {
     const Real friction_n = plan.coefficient * normal_force_n;
     const Real x(drag.x), z(drag.z);
     const Real length = std::max(norm(Vec<Real, ToolSpace>{x, Real(0), z}), Real(1));
-    // Against the motion: what the tooth does to the tool.
+    // Against the motion: the force of the tooth on the tool.
     force_n_ = force_n_ - Vec<Real, ToolSpace>{x / length, Real(0), z / length} * friction_n;
     rims_n_ += friction_n * Real(drag.arm);
   }
 
   [[nodiscard]] constexpr Vec<Real, ToolSpace> force_n() const noexcept { return force_n_; }
-  /// About the tool's axis, to be carried by the spindle.
+  /// Torque about the axis of the tool, which the spindle carries.
   [[nodiscard]] constexpr Real torque_n_mm(Real rim_mm) const noexcept { return rims_n_ * rim_mm; }
 
  private:

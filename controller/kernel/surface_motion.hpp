@@ -12,16 +12,16 @@
 #include "shared/numeric/vec.hpp"
 #include "shared/volume/voxel_grid.hpp"
 
+// Speed and direction of the surface of a tool that rotates, at the voxels that it touches.
+
 namespace kerf {
 
-struct ToolSpace;  ///< mm in the tool's own frame: centre of the cutting head, shaft along +y
-
-/// Least speed of the tool's surface, of its rim's: abrasive grains at the pole of a ball still
-/// tear a little, and a flat end would otherwise never cut its middle (docs/theory.md 6.3).
+/// Least speed of the tool's surface over that of its rim: abrasive grains at the pole of a ball
+/// still cut a little, and a flat end would otherwise never cut its middle (docs/theory.md 6.3).
 inline constexpr double kSpeedFloor = 0.08;
 
-/// Square roots of 0, 1/1024 .. 1 as weights of fixed point in the low halves, what is added up to
-/// the next in the high ones: linear steps between.
+/// Square roots of 0, 1/1024 .. 1 as weights of fixed point in the low halves, the difference to
+/// the next root in the high halves, for linear interpolation.
 inline constexpr std::size_t kRootSteps = 1024;
 inline constexpr std::array<std::uint32_t, kRootSteps + 1> kSpeedRoots = [] {
   std::array<std::uint32_t, kRootSteps + 1> roots{};
@@ -32,12 +32,12 @@ inline constexpr std::array<std::uint32_t, kRootSteps + 1> kSpeedRoots = [] {
   return roots;
 }();
 
-/// Rim radii per voxel that a frame tells apart, 64 with 20 fraction bits: a thinner tool would be
-/// lost between two voxels anyway.
+/// Most rim radii per voxel of a frame, 64 with 20 fraction bits: a thinner tool would fit between
+/// two voxels.
 inline constexpr std::int64_t kSteepestStep = std::int64_t{64} << 20;
 
-/// Where voxels lie beside the spindle's axis, which is the tool's y, in rim radii: what speed the
-/// tool's surface has there, and in which direction it moves. Made once per tick, tool and volume.
+/// Positions of voxels beside the spindle's axis (the y of the tool), in rim radii, and with them
+/// the speed and direction of the tool's surface. Made once per tick, tool and volume.
 ///
 /// Fixed: places with 20 fraction bits from steps rounded once, so a place 100 voxels away is off
 /// by 1e-4 at most; speeds within 2e-4 of the rim's.
@@ -227,5 +227,4 @@ class DragSums {
 };
 
 }  // namespace detail
-
 }  // namespace kerf

@@ -13,10 +13,13 @@
 #include "shared/numeric/numbers.hpp"
 #include "shared/numeric/vec.hpp"
 
+// The interface of a law: its settings, its memory in the servo, the inputs of the three kinds, and
+// the registration under a name.
+
 namespace kerf {
 
-/// One named number of a law, which a scene may set: reading, the answer to every mistake,
-/// docs/scene-keys.md and the JSON in the segment come from it. Both ends are allowed values.
+/// One named number of a law, which a scene may set: the reader of scenes with its messages,
+/// docs/scene-keys.md and the JSON in the segment use it. Both ends are allowed values.
 struct LawSetting {
   std::string_view name;  ///< with its unit, as `stiffness_n_per_mm`
   std::string_view unit;  ///< as text; empty: a plain number
@@ -26,7 +29,7 @@ struct LawSetting {
 };
 inline constexpr std::size_t kMostLawSettings = 8;
 
-/// What a law is made from, at load: its settings, and what is constant of the loop.
+/// The arguments of a law's constructor, at load: its settings, and constants of the loop.
 class LawSetup {
  public:
   constexpr LawSetup(double rate_hz, double tip_noise_mm, std::span<const LawSetting> settings,
@@ -35,10 +38,10 @@ class LawSetup {
 
   [[nodiscard]] constexpr double rate_hz() const noexcept { return rate_hz_; }
   [[nodiscard]] constexpr double period_s() const noexcept { return 1 / rate_hz_; }
-  /// No encoder reading is farther from the true tip, at the device port.
+  /// Largest error of an encoder reading of the tip, at the device port.
   [[nodiscard]] constexpr double tip_noise_mm() const noexcept { return tip_noise_mm_; }
-  /// The value of one of the law's settings. A name that the law does not list gives 0, and the law
-  /// is refused with it at load.
+  /// The value of one of the law's settings. A name that the law does not list gives 0, and the
+  /// load fails with that name.
   [[nodiscard]] constexpr double operator[](std::string_view name) const noexcept {
     for (std::size_t i = 0; i < settings_.size(); ++i) {
       if (settings_[i].name == name) return values_[i];
@@ -46,7 +49,7 @@ class LawSetup {
     unknown_ = name;
     return 0;
   }
-  /// The last name that was asked for and is not listed; empty: none.
+  /// The last name that was read and is not listed; empty: none.
   [[nodiscard]] constexpr std::string_view unknown() const noexcept { return unknown_; }
 
  private:
@@ -56,14 +59,14 @@ class LawSetup {
   mutable std::string_view unknown_{};
 };
 
-// How the servo holds a law whose type it does not know: its constants in the plan, what it
-// remembers in the servo's state, one function pointer. No heap, no virtual call, no exception.
+// The servo does not know the type of a law: its constants lie in the plan, its memory in the
+// servo's state, and one function pointer calls it. No heap, no virtual call, no exception.
 
 inline constexpr std::size_t kMostLawBytes = 1024;       ///< of a law's constants
 inline constexpr std::size_t kMostLawStateBytes = 4096;  ///< of its state
 
-/// What a law remembers between two ticks. Plain bytes in the servo's state, so a snapshot of that
-/// has them. A law begins anew with a fresh `State{}`.
+/// The memory of a law between two ticks. Plain bytes in the servo's state, so a snapshot of the
+/// state contains them. `begin_anew` makes the next tick start with a fresh `State{}`.
 struct LawMemory {
   alignas(std::max_align_t) std::array<std::byte, kMostLawStateBytes> bytes{};
   bool begun = false;
@@ -90,11 +93,11 @@ template <class In, class Real>
 struct LawPlan {
   using Step = DeviceVec<Real> (*)(const LawPlan& plan, LawMemory& memory, const In& in) noexcept;
 
-  Step step = nullptr;  ///< null: the scene names none
+  Step step = nullptr;  ///< null: the scene has none
   alignas(std::max_align_t) std::array<std::byte, kMostLawBytes> law{};
 
   [[nodiscard]] constexpr bool given() const noexcept { return step != nullptr; }
-  /// Servo thread. Only where a law is given.
+  /// Servo thread. Only if a law is given.
   [[nodiscard]] DeviceVec<Real> operator()(LawMemory& memory, const In& in) const noexcept {
     return step(*this, memory, in);
   }
@@ -119,62 +122,61 @@ requires LawOf<Law, In, Real>
   return plan;
 }
 
-/// What a force law sees in one tick of the swept contact. In air the spring and the normal are 0.
+/// Input of a force law in one tick of the swept contact. In air the spring and the normal are 0.
 template <class N>
 struct ForceInput {
   DeviceVec<typename N::Real> tip_mm;             ///< of the hand, at the device port
-  WorldVec<typename N::Real> scene_tip_mm;        ///< the same place in the scene
+  WorldVec<typename N::Real> scene_tip_mm;        ///< the same position in the scene
   DeviceVec<typename N::Real> velocity_mm_per_s;  ///< at the device port, as estimated
-  /// From the hand to the proxy, which rests on the surface: where the coupling of
-  /// controller/law/virtual_coupling.hpp pulls the hand to.
+  /// From the hand to the proxy, which rests on the surface and to which the coupling of
+  /// controller/law/virtual_coupling.hpp pulls the hand.
   DeviceVec<typename N::Real> spring_mm;
   DeviceVec<typename N::Unit> normal;  ///< out of the solid, of all that the tool presses on
 };
 
-/// A force law gives the force on the hand in N, before any limit, in place of the coupling. It
-/// runs in each tick in which the hand is felt, and begins anew after each in which it was not.
+/// A force law returns the force on the hand in N, before any limit, in place of the coupling. It
+/// runs in each tick that may send a force, and begins anew after any other tick.
 template <class N>
 using ForceLawPlan = LawPlan<ForceInput<N>, typename N::Real>;
 
-/// What a stabiliser sees in a tick with a report while the motors are on. All of it at the device
-/// port.
+/// Input of a stabiliser in a tick with a report while the motors are on; at the device port.
 template <class N>
 struct StabiliserInput {
   DeviceVec<typename N::Real> wanted_n;  ///< force to send, after all limits
-  DeviceVec<typename N::Real> sent_n;    ///< what the last tick really sent
+  DeviceVec<typename N::Real> sent_n;    ///< force that the last tick sent
   DeviceVec<typename N::Real> moved_mm;  ///< by the tip since the last report
   std::uint32_t ticks = 1;               ///< since then
   DeviceVec<typename N::Real> velocity_mm_per_s;
-  /// SUM -F_sent . dx up to this tip, in mJ (fixed: 32 fraction bits): what the loop took from the
-  /// hand; below 0 it has given more than it took.
+  /// SUM -F_sent . dx up to this tip, in mJ (fixed: 32 fraction bits): energy that the loop took
+  /// from the hand; below 0 it has given more than it took.
   typename N::Energy taken_mj{};
   bool contact = false;  ///< the tool presses on something
 };
 
-/// A stabiliser gives the force to send in place of `wanted_n`. All limits of the force hold for it
-/// as for any other: what it adds is clamped and bounded in slope once more. Where it gives
-/// `wanted_n` itself no bit changes. It begins anew after each tick with the motors off or on hold.
+/// A stabiliser returns the force to send in place of `wanted_n`. All limits of the force apply to
+/// it again: peak and slope. If it returns `wanted_n` itself no bit changes. It begins anew after
+/// each tick with the motors off or on hold.
 template <class N>
 using StabiliserPlan = LawPlan<StabiliserInput<N>, typename N::Real>;
 
-/// What a velocity estimator sees with each report that has a finite pose.
+/// Input of a velocity estimator with each report that has a finite pose.
 template <class N>
 struct VelocityInput {
   DeviceVec<typename N::Real> tip_mm;  ///< at the device port
-  std::uint32_t ticks = 1;  ///< since the last one, 1 to 1000: more where reports were missing
-  /// There was none, or the device was calibrated with it: the tip is at rest here since ever.
+  std::uint32_t ticks = 1;  ///< since the last one, 1 to 1000: above 1 after missing reports
+  /// There was none, or the device was calibrated with it: the tip counts as at rest here before.
   bool first = false;
 };
 
-/// A velocity estimator gives the velocity of the tip in mm/s. It stands for the tick and for those
-/// without a report that follow.
+/// A velocity estimator returns the velocity of the tip in mm/s, for this tick and the following
+/// ones without a report.
 template <class N>
 using VelocityEstimatorPlan = LawPlan<VelocityInput<N>, typename N::Real>;
 
 enum class LawKind : std::uint8_t { force, velocity, stabiliser };
 
-/// One law that a scene can name: all that is known of it before it is made. Static; once, and
-/// before the first scene is read, it enters the list of its program.
+/// One law that a scene can name, with everything known before it is constructed. Static; it is
+/// registered once, before the first scene is read.
 struct LawRow {
   LawKind kind;
   std::string_view name;
@@ -183,7 +185,8 @@ struct LawRow {
   const LawRow* next = nullptr;  ///< of the list
 };
 
-/// The row of a kind whose input is `In<N>`: with what makes the plan, in each bundle of numbers.
+/// The row of a kind whose input is `In<N>`, with the functions that make the plan in each bundle
+/// of numbers.
 template <template <class> class In>
 struct LawRowOf : LawRow {
   template <class N>
@@ -197,8 +200,8 @@ using ForceLawRow = LawRowOf<ForceInput>;
 using VelocityEstimatorRow = LawRowOf<VelocityInput>;
 using StabiliserRow = LawRowOf<StabiliserInput>;
 
-/// The row of a class template `Law<N>`, whose `kName`, `kMeaning` and `kSettings` are the same
-/// whatever N. `step` is compiled in all three.
+/// The row of a class template `Law<N>`, whose `kName`, `kMeaning` and `kSettings` do not
+/// depend on N. `step` is compiled for all three.
 template <template <class> class Law, template <class> class In>
 [[nodiscard]] constexpr LawRowOf<In> law_row(LawKind kind) noexcept {
   using Fixed = Law<FixedNumbers>;
@@ -209,10 +212,10 @@ template <template <class> class Law, template <class> class In>
           &law_plan<Law<DoubleNumbers>, In<DoubleNumbers>, DoubleNumbers::Real>};
 }
 
-/// Laws of the program's own files, the last registered first. Written before main alone.
+/// Laws of the program's own files, the last registered first. Written only before main.
 inline constinit const LawRow* first_own_law = nullptr;
 
-/// Enters a row into the list, at static initialisation.
+/// Adds a row to the list, at static initialisation.
 struct LawRegistration {
   explicit LawRegistration(LawRow& row) noexcept {
     row.next = first_own_law;

@@ -8,23 +8,24 @@
 #include "controller/law/law.hpp"
 #include "shared/numeric/vec.hpp"
 
+// The stabilisers that scenes can name: `passivity` and `energy_bounding`.
+
 namespace kerf {
 
 /// The stabiliser `passivity`: the passivity controller in the time domain of Hannaford and Ryu
 /// (2002), at the port of the device (docs/theory.md 5.6).
 ///
-/// It keeps an account of what the loop took from the hand. Where that is below 0 it damps along
-/// the motion so much that the account is 0, if the hand goes on as it moved last:
+/// It keeps an account of the energy that the loop took from the hand. If the account is below 0 it
+/// damps along the motion so much that the account is 0 if the hand continues its last motion:
 ///
 ///   F -= a d,  a = min(deficit / d^2, m / T^2)
 ///
-/// d is the motion in a tick. The account takes the damping for done at once, so it never falls
-/// below 0 but for the bound of a; the port itself does, as the hand does not go on so. A surplus
-/// is forgotten in the air: what friction took there would hide later activity. A deficit is not,
-/// and is paid there as drag.
+/// d is the motion in a tick. The account books the damping at once, so it only falls below
+/// 0 by the bound of a; the port itself may, as the hand does not continue exactly so. In air a
+/// surplus is dropped: energy taken by friction there would hide later activity. A deficit is kept,
+/// and paid there as drag.
 ///
-/// It sees the force that was really sent: where limits cut its damping, that comes off the
-/// account.
+/// It uses the force that was really sent: damping that limits cut off is booked back.
 template <class N>
 class PassivityController {
  public:
@@ -42,7 +43,7 @@ class PassivityController {
   struct State {
     bool begun = false;
     Energy taken_mj{};           ///< by the port, up to the last report
-    Energy account_mj{};         ///< after the damping of the last tick, which counts as done
+    Energy account_mj{};         ///< with the damping of the last tick already booked
     Energy promised_mj{};        ///< by that damping
     Vector wanted_n, motion_mm;  ///< in the last tick: without damping; expected in the next
   };
@@ -64,7 +65,7 @@ class PassivityController {
   }
 
  private:
-  /// Takes over what the port did since the last report.
+  /// Books the energy at the port since the last report.
   static void book(const StabiliserInput<N>& in, State& state) noexcept {
     const Energy port_mj = difference_of_energy<N>(in.taken_mj, state.taken_mj);
     state.taken_mj = in.taken_mj;
@@ -72,7 +73,7 @@ class PassivityController {
       state.begun = true;
       return;
     }
-    // What counts as done, and what was really sent of it and would have been done by it.
+    // Undoes the promised damping, and books the one that was really sent.
     Energy correction = difference_of_energy<N>(port_mj, state.promised_mj);
     if (in.ticks == 1 && state.promised_mj != Energy(0)) {
       const Vector added_n = in.sent_n - state.wanted_n;
@@ -111,18 +112,18 @@ class PassivityController {
   Real most_n_per_mm_;
 };
 
-/// The stabiliser `energy_bounding`: no force is larger than what the next hold may give away
+/// The stabiliser `energy_bounding`: bounds the force by the energy that the next hold may give
 /// (docs/theory.md 5.6), after the idea of Kim and Ryu (2010).
 ///
 /// However the hand moves by d in the next tick, a force of F gives it F . d and the device's own
 /// damping b takes at least b d^2 / T, so together they give at most F^2 T / (4 b). With the budget
-/// E, what the hand put in and what b took of it,
+/// E, the energy from the hand plus that taken by b,
 ///
 ///   |F| <= sqrt(4 b E / T)
 ///
-/// keeps E from ever falling below 0, whatever makes the force. A spring is not touched up to
-/// K = 2 b / T, the passive limit of a sampled wall; a stiffer one is felt as that. In the air the
-/// budget is what b takes in one tick: what it took on the way there would hide later activity.
+/// keeps E from ever falling below 0, whatever makes the force. A spring is unchanged up to
+/// K = 2 b / T, the passive limit of a sampled wall; a stiffer one is reduced to that. In air the
+/// budget is the energy that b takes in one tick: earlier damping would hide later activity.
 template <class N>
 class EnergyBounding {
  public:
@@ -160,7 +161,8 @@ class EnergyBounding {
   }
 
  private:
-  /// What b takes. By the estimated velocity, as an encoder's steps are faster than the hand.
+  /// Energy taken by b. By the estimated velocity, as the steps of an encoder are faster than the
+  /// hand.
   [[nodiscard]] Energy damped(const StabiliserInput<N>& in) const noexcept {
     const auto force = [&](Real v) { return multiply<Real>(damping_ns_per_mm_, v); };
     const Vector v = in.velocity_mm_per_s;

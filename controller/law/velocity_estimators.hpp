@@ -11,15 +11,17 @@
 #include "shared/numeric/numbers.hpp"
 #include "shared/numeric/vec.hpp"
 
+// The velocity estimators that scenes can name: `foaw` and `difference`.
+
 namespace kerf {
 
-/// How `VelocityWindow` reads the tip; constant of a run.
+/// Constants of `VelocityWindow` in a run.
 template <class N>
 struct VelocityPlan {
   std::int32_t rate_hz = 1000;
   /// Ticks between the samples that are used: above 1 kHz a window still spans up to 16 ms.
   std::int32_t stride = 1;
-  typename N::Real noise_mm{};  ///< no encoder reading is farther from the true place
+  typename N::Real noise_mm{};  ///< largest error of an encoder reading
 };
 
 /// Velocity of the tip by first-order adaptive windowing (docs/theory.md 5.2): on each axis the
@@ -33,11 +35,11 @@ class VelocityWindow {
   static constexpr std::int32_t kIntervals = 16;
   static constexpr std::int32_t kMaxStride = 8;
 
-  /// At rest here since ever.
+  /// As if at rest here before.
   constexpr void start(DeviceVec<Real> tip_mm) noexcept { ring_.fill(tip_mm); }
 
-  /// Takes the tip `gap` ticks after the last one. What lies between was not reported: it is filled
-  /// in along the line, as if the hand had kept its speed. At most kRing + 1 places are written.
+  /// Adds the tip `gap` ticks after the last one. Missing positions between are interpolated, as if
+  /// the hand had kept its speed. Writes at most kRing + 1 positions.
   constexpr void take(DeviceVec<Real> tip_mm, std::uint32_t gap) noexcept {
     const std::int64_t ticks = std::max(gap, 1U);
     const DeviceVec<Real> from = ring_[static_cast<std::size_t>(newest_)];
@@ -123,8 +125,8 @@ class VelocityWindow {
   std::int32_t newest_ = 0;
 };
 
-/// The velocity estimator `difference`: the backward difference of the tip, and where its time
-/// constant tau is not 0 a first-order filter behind it, by the backward Euler rule:
+/// The velocity estimator `difference`: the backward difference of the tip and, if its time
+/// constant tau is not 0, a first-order filter after it, by the backward Euler rule:
 ///
 ///   v = y + (dx / T - y) T / (T + tau)
 ///

@@ -13,7 +13,7 @@
 #include "controller/loop/tick_source.hpp"
 #include "controller/loop/wait_state.hpp"
 #include "controller/servo/servo.hpp"
-#include "shared/segment/connection.hpp"
+#include "shared/segment/server.hpp"
 
 // The loop around the servo step, and the watchdog that switches the motors off if the loop stands
 // still.

@@ -42,7 +42,7 @@
 #include "shared/posix/program.hpp"
 #include "shared/posix/stop_signals.hpp"
 #include "shared/posix/threads.hpp"
-#include "shared/segment/connection.hpp"
+#include "shared/segment/server.hpp"
 #include "shared/segment/writer.hpp"
 #include "shared/volume/checksum.hpp"
 #include "shared/volume/material.hpp"

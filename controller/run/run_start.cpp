@@ -21,6 +21,7 @@
 #include "controller/run/scene_check.hpp"
 #include "shared/numeric/fnv1a.hpp"
 #include "shared/posix/atomic_file.hpp"
+#include "shared/segment/connection.hpp"
 #include "shared/segment/segment.hpp"
 #include "shared/text/text.hpp"
 

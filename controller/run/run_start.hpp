@@ -12,8 +12,8 @@
 #include "controller/plan/gain_margin.hpp"
 #include "controller/run/controller_options.hpp"
 #include "controller/run/run_report.hpp"
-#include "shared/segment/connection.hpp"
 #include "shared/segment/segment.hpp"
+#include "shared/segment/server.hpp"
 #include "shared/segment/writer.hpp"
 
 // The start of a run: scene, plan, segment and port, each checked.

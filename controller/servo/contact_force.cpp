@@ -25,7 +25,7 @@ DeviceVec<typename N::Real> at_device(const ContactPlan<N>& contact,
   return {mm(units.x), mm(units.y), mm(units.z)};
 }
 
-/// The contact of one tick, with a tool's own field: a tool without a shaft has no part of one.
+/// The contact of one tick, by the queries for a tool with or without a shaft.
 template <class N>
 ProxyContact<N> follow_tool(const ServoPlan<N>& plan, const SweptTool<N>& tool,
                             ContactState<N>& state, const ProxyPose<N>& goal,
@@ -48,7 +48,7 @@ ProxyContact<N> follow_tool(const ServoPlan<N>& plan, const SweptTool<N>& tool,
                            behind));
 }
 
-/// Tells the planes that bear a load of a force of `force_n`.
+/// Lists the planes that bear a load, for a force of `force_n`.
 template <class N>
 void tell_planes(const ContactPlan<N>& contact, const ProxyContact<N>& felt,
                  typename N::Real force_n, ToolContact<N>& tool) noexcept {
@@ -62,7 +62,7 @@ void tell_planes(const ContactPlan<N>& contact, const ProxyContact<N>& felt,
   }
 }
 
-/// Splits the force of the spring: what friction holds lies along the faces, across the press.
+/// Splits the force of the spring: friction is its part along the faces, across the press.
 template <class N>
 void split_spring(DeviceVec<typename N::Real> spring_n, const ProxyContact<N>& felt,
                   SweptForce<N>& out) noexcept {
@@ -98,12 +98,12 @@ SweptForce<N> feel_swept(const ServoPlan<N>& plan, ServoState<N>& state,
   SweptForce<N> out;
   const ProxyContact<N> felt = follow_tool(plan, tool, state.contact, goal, out.queried);
   const auto spring_mm = at_device(contact, felt.spring);
-  // The coupling is no law behind a pointer: the compiler joins it with what surrounds it.
+  // The coupling is no law behind a pointer, so that the compiler inlines it.
   out.force_n = plan.force_law.given()
                     ? plan.force_law(state.force_law, {state.tip_mm, tip_mm, velocity_mm_per_s,
                                                        spring_mm, relabel<DeviceSpace>(felt.press)})
                     : coupling_force(contact.coupling, spring_mm, velocity_mm_per_s);
-  // A law's force has no other part.
+  // The force of a law has no other part.
   const bool whole =
       plan.force_law.given() || contact.coupling.damping_ns_per_mm == typename N::Unit{};
   const auto spring_n =
@@ -128,14 +128,6 @@ SweptForce<N> feel_swept(const ServoPlan<N>& plan, ServoState<N>& state,
   out.torque_n_mm = at_device(contact, felt.moment_arm) * force_n;
   return out;
 }
-
-#define KERF_INSTANTIATE(N)                                                                 \
-  template SweptForce<N> feel_swept(const ServoPlan<N>&, ServoState<N>&, WorldVec<N::Real>, \
-                                    const Rotation<N>&, DeviceVec<N::Real>) noexcept;
-KERF_INSTANTIATE(FixedNumbers)
-KERF_INSTANTIATE(FloatNumbers)
-KERF_INSTANTIATE(DoubleNumbers)
-#undef KERF_INSTANTIATE
 
 template <class N>
 ToolForces<N> feel_and_cut(const ServoPlan<N>& plan, ServoState<N>& state,
@@ -175,6 +167,8 @@ ToolForces<N> feel_and_cut(const ServoPlan<N>& plan, ServoState<N>& state,
 }
 
 #define KERF_INSTANTIATE(N)                                                                   \
+  template SweptForce<N> feel_swept(const ServoPlan<N>&, ServoState<N>&, WorldVec<N::Real>,   \
+                                    const Rotation<N>&, DeviceVec<N::Real>) noexcept;         \
   template ToolForces<N> feel_and_cut(const ServoPlan<N>&, ServoState<N>&, WorldVec<N::Real>, \
                                       const Rotation<N>&, DeviceVec<N::Real>) noexcept;
 KERF_INSTANTIATE(FixedNumbers)

@@ -12,6 +12,8 @@
 #include "controller/servo/servo_plan.hpp"
 #include "controller/servo/servo_state.hpp"
 
+// The contact force of a tick, by the proxy or by overlap, and the pose of the tool on the solid.
+
 namespace kerf {
 
 /// A plane that the tool presses on, at the device port.
@@ -23,7 +25,7 @@ struct PressedPlane {
   bool behind = false;                   ///< on shaft or handpiece
 };
 
-/// The tool as it rests on the solid: at its proxy, not where the hand would have it.
+/// The tool as it rests on the solid: at its proxy, not at the position of the hand.
 template <class N>
 struct ToolContact {
   WorldVec<typename N::Real> centre_mm;
@@ -31,12 +33,12 @@ struct ToolContact {
   WorldVec<typename N::Unit> normal{};            ///< out of the solid, of the head; 0 in air
   WorldVec<typename N::Unit> press{};             ///< the same of the whole tool
   typename N::Unit head_share{1};                 ///< of the force along `press`
-  DeviceVec<typename N::Real> head_arm_mm{};      ///< from its centre to where the head presses
+  DeviceVec<typename N::Real> head_arm_mm{};      ///< from its centre to the load of the head
   std::array<PressedPlane<N>, kMaxPlanes> planes{};
   std::size_t plane_count = 0;
 };
 
-/// A place of the world in a volume.
+/// A position of the world in a volume.
 template <class N>
 [[nodiscard]] VoxelVec<typename N::Real> place_in(const VolumePlan<N>& volume,
                                                   WorldVec<typename N::Real> at_mm) noexcept {
@@ -44,7 +46,7 @@ template <class N>
 }
 
 /// Samples of the active tool in one volume. A tool that is round, or that does not turn, has the
-/// same samples whatever the stylus does.
+/// same samples in every orientation of the stylus.
 template <class N>
 [[nodiscard]] ToolPose<N> tool_pose(const VolumePlan<N>& volume, const ToolPlan<N>& tool,
                                     const ToolInVolume<N>& in_volume,
@@ -72,7 +74,7 @@ template <class N>
   return pose;
 }
 
-/// What the swept proxy gives the hand.
+/// The force of the swept proxy.
 template <class N>
 struct SweptForce {
   DeviceVec<typename N::Real> force_n;      ///< of the coupling, before any limit
@@ -81,38 +83,39 @@ struct SweptForce {
   WorldVec<typename N::Real> offset_mm;     ///< from the hand's tip to the proxy's
   DeviceVec<typename N::Real> torque_n_mm;  ///< of the contact about the tool's centre
   ToolContact<N> tool;
-  typename N::Real behind_n{};  ///< what presses on the shaft or the handpiece, at the device port
-  std::int64_t queried = 0;     ///< samples that it took, as sample_reader.hpp counts
+  typename N::Real behind_n{};  ///< load of shaft and handpiece, at the device port
+  std::int64_t queried = 0;     ///< samples read, as sample_reader.hpp counts
 };
 
-/// One tick: the proxy of the active tool follows the hand, coupling or law pull the hand to the
-/// proxy (docs/theory.md 4, 5.1). `rotation` turns the tool, unless it is a ball without a shaft or
-/// keeps the world's axes. Servo thread; at most 32 queries; writes `state.contact`, and
-/// `state.force_law` where the scene names a force law, whose force may not be finite.
+/// One tick: the proxy of the active tool follows the hand, and the coupling or a law pulls the
+/// hand to the proxy (docs/theory.md 4, 5.1). `rotation` turns the tool, unless it is a ball
+/// without a shaft or keeps the world's axes. Servo thread; at most 32 queries; writes
+/// `state.contact`, and `state.force_law` if the scene names a force law, whose force may not be
+/// finite.
 template <class N>
 [[nodiscard]] SweptForce<N> feel_swept(const ServoPlan<N>& plan, ServoState<N>& state,
                                        WorldVec<typename N::Real> tip_mm,
                                        const Rotation<N>& rotation,
                                        DeviceVec<typename N::Real> velocity_mm_per_s) noexcept;
 
-/// Contact and modification at the device port, before any limit, and what was cut because of this
-/// tick's pose. Where force cuts, the modification force is its friction, and the cut comes later.
+/// Contact and modification force at the device port, before any limit, and the removal by overlap
+/// at this pose. If force cuts, the modification force is its friction, and the cut comes later.
 template <class N>
 struct ToolForces {
   DeviceVec<typename N::Real> contact_n;
   DeviceVec<typename N::Real> modification_n;
   DeviceVec<typename N::Real> spring_n{}, friction_n{};  ///< of the contact: the rest is damping
   WorldVec<typename N::Real> proxy_offset_mm;            ///< from the tip; 0 without a proxy
-  DeviceVec<typename N::Real>
-      tip_torque_n_mm;                         ///< likewise; of both forces about the tool's centre
+  /// Likewise; of both forces about the tool's centre.
+  DeviceVec<typename N::Real> tip_torque_n_mm;
   ToolContact<N> tool;                         ///< likewise
-  typename N::Real behind_n{};                 ///< likewise: of it on the shaft or the handpiece
+  typename N::Real behind_n{};                 ///< likewise: of shaft and handpiece
   std::int64_t queried = 0;                    ///< likewise: samples, as sample_reader.hpp counts
   std::array<Removed, kMaxVolumes> removed{};  ///< by volume of the scene
 };
 
-/// Contact force of the active tool in all solid volumes as they are; then, where the plan cuts,
-/// the modification force from the same densities, and only then the removal.
+/// Contact force of the active tool in all solid volumes; then, if the plan cuts by overlap, the
+/// modification force from the same densities, and only then the removal.
 template <class N>
 [[nodiscard]] ToolForces<N> feel_and_cut(const ServoPlan<N>& plan, ServoState<N>& state,
                                          WorldVec<typename N::Real> tip_mm,

@@ -12,20 +12,20 @@
 #include "controller/servo/method_step.hpp"
 #include "controller/servo/volume_restore.hpp"
 
-// How the materials of all volumes share a tool's press (docs/theory.md 6.2). Servo thread; no
-// heap.
-
 namespace kerf {
+namespace {
 
-/// What the tool covers of all volumes. Each `load` is a part of one `whole`.
+// The distribution of a press over the materials of all volumes (docs/theory.md 6.2).
+
+/// The covered voxels of all volumes. Each `load` is a part of one `whole`.
 template <class N>
 struct CoveredVolumes {
   std::array<Covered<N>, kMaxVolumes> in{};
-  std::array<CutWeight<N>, kMaxVolumes> borne{};  ///< by what is in there, of the whole
+  std::array<CutWeight<N>, kMaxVolumes> borne{};  ///< load of each volume, of the whole
   CutWeight<N> whole{};
 };
 
-/// Shares of the loads of a tool's contacts, added up contact by contact.
+/// The load of each material, added up contact by contact.
 template <class N>
 class PressShares {
  public:
@@ -33,8 +33,8 @@ class PressShares {
               const CoveredVolumes<N>& covered) noexcept
       : plan_(plan), state_(state), covered_(covered) {}
 
-  /// A contact that bears `load_n`; `form_in(v)` is its form in volume v. Nothing where no voxel
-  /// that reaches the iso lies at it.
+  /// Adds a contact that bears `load_n`; `form_in(v)` is its form in volume v. Adds nothing if no
+  /// voxel that reaches the iso lies at it.
   template <class FormIn>
   void add(typename N::Real load_n, FormIn&& form_in) noexcept {
     std::array<CoveredLoads<N>, kMaxVolumes> at;
@@ -58,8 +58,8 @@ class PressShares {
 
   [[nodiscard]] bool some() const noexcept { return whole_ > 0; }
 
-  /// What bears shares the press. What bears nothing takes none of it, but must get out of the
-  /// tool's way: it leaves as if it had the part that it has of what lies at the contacts.
+  /// Distributes the press over the materials that bear a load. A material without load is removed
+  /// as if it had its part of the weights at the contacts, so that it does not block the tool.
   void give(CoveredVolumes<N>& covered) const noexcept {
     covered.whole = whole_;
     for (std::size_t v = 0; v < plan_.volume_count; ++v) {
@@ -96,8 +96,8 @@ class PressShares {
   CutWeight<N> whole_{};
 };
 
-/// What the tool bears on, at a place of its centre where it cuts: the head's planes or, where none
-/// of them meets what reaches the iso, all of that. Leaves all as it is where there is none.
+/// Finds the loads with the centre of the cut at `centre_mm`: at the head's planes or, if no voxel
+/// at them reaches the iso, over all covered voxels that do. Changes nothing if there are none.
 template <class N>
 void find_loads(const ServoPlan<N>& plan, const ServoState<N>& state,
                 WorldVec<typename N::Real> centre_mm, const ToolContact<N>& at,
@@ -126,8 +126,8 @@ void find_loads(const ServoPlan<N>& plan, const ServoState<N>& state,
   if (shares.some()) shares.give(covered);
 }
 
-/// Whether the press meets anything where the tool covers these voxels: what it can cut, or what
-/// reaches the iso and bears it. Softer matter that is forbidden does neither.
+/// Whether a covered voxel can be cut, or reaches the iso and bears a load. A softer one of a
+/// forbidden material does neither.
 template <class N>
 [[nodiscard]] bool meets_press(const ServoPlan<N>& plan, const ServoState<N>& state,
                                const CoveredVolumes<N>& covered) noexcept {
@@ -144,7 +144,7 @@ template <class N>
   return false;
 }
 
-/// Covers all volumes with the tool's centre at `centre_mm`, where it cuts.
+/// The covered voxels of all volumes with the centre of the cut at `centre_mm`.
 template <class N>
 [[nodiscard]] CoveredVolumes<N> cover_all(const ServoPlan<N>& plan, ServoState<N>& state,
                                           WorldVec<typename N::Real> centre_mm,
@@ -168,18 +168,16 @@ template <class N>
   return covered;
 }
 
-namespace {
-
-/// Axes of the spindle. A round tool has the same samples in every orientation, but turns about its
-/// shaft; one whose shaft is felt is turned as that is.
+/// Axes of the spindle. A round tool has the same samples in every orientation, but rotates about
+/// its shaft; if its shaft has contact, the orientation is that of the shaft.
 template <class N>
 const Rotation<N>& spindle_axes(const ToolPlan<N>& tool, const ServoState<N>& state,
                                 const ToolContact<N>& at) noexcept {
   return tool.round && tool.turns && !tool.swept.turned ? state.rotation : at.rotation;
 }
 
-/// Deals a press of `cut.press_n` out over the volumes, by the part of it that each bears, cuts
-/// them and returns the friction.
+/// Distributes a press of `cut.press_n` over the volumes by their loads, cuts them and returns the
+/// friction.
 template <class N>
 CuttingFriction<N> press_on_volumes(const ServoPlan<N>& plan, ServoState<N>& state,
                                     const ToolContact<N>& at, ForceCut<N>& cut) noexcept {

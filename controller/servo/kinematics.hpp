@@ -10,6 +10,8 @@
 #include "shared/numeric/vec.hpp"
 #include "shared/wire/omni.hpp"
 
+// From joint angles to the tip, its Jacobian and the orientation of the tool. No libm.
+
 namespace kerf {
 
 template <class N>
@@ -20,9 +22,9 @@ struct SineCosine {
 /// Sine and cosine by their Taylor series in nested form. No libm: its last bit differs between
 /// versions.
 ///
-/// Joints stay below 1.8 rad. What is beyond 2 rad comes back by half turns, pi each: a gimbal near
-/// its ends, and counts that jump or have no zero yet, up to the 8 rad where `Angle` ends. There
-/// the series would give a matrix that is no rotation, and a tool longer than its table says.
+/// Joints stay below 1.8 rad. Angles beyond 2 rad are reduced by half turns, pi each: a gimbal near
+/// its ends, and counts that jump or have no zero yet, up to the 8 rad where `Angle` ends. Without
+/// that the series would give a matrix that is no rotation, and stretch the tool.
 ///
 /// Truncation: 2^19/19! = 4.3e-12 and 2^18/18! = 4.1e-11; fixed point adds at most 3e-8, which is
 /// 4e-6 mm at an arm of 133 mm.
@@ -49,9 +51,7 @@ template <class N>
   return {typename N::Unit(flipped ? -sine : sine), typename N::Unit(flipped ? -cosine : cosine)};
 }
 
-struct ToolSpace;  ///< mm in the tool's own frame: centre of the cutting head, shaft along +y
-
-/// How the tool is turned: takes a direction of its own frame to the world.
+/// Orientation of the tool: takes a direction of its own frame to the world.
 template <class N>
 using Rotation = Transform<typename N::Unit, WorldSpace, ToolSpace>;
 
@@ -95,14 +95,16 @@ template <class N>
 template <class N>
 using JacobianTransposed = Transform<typename N::Real, JointSpace, DeviceSpace>;
 
-/// What forward kinematics give: the tip in device mm (x right, y up, z to the user) and J^T there.
+/// The tip in device mm (x right, y up, z to the user) and J^T there.
 template <class N>
 struct ForwardKinematics {
   DeviceVec<typename N::Real> tip_mm;
   JacobianTransposed<N> jacobian_t_mm;
 };
 
-/// A turret that carries a thigh and a forearm in one plane: the Omni and WoodenHaptics.
+// The serial arm: a turret that carries a thigh and a forearm in one plane. Omni and WoodenHaptics.
+
+/// Dimensions of a serial arm.
 template <class N>
 struct SerialArm {
   typename N::Real thigh_mm, forearm_mm;  ///< link lengths
@@ -150,7 +152,7 @@ template <class N>
   return pose;
 }
 
-/// Gimbal angles in rad from both wipers of each pot: gain * A / (A + B) + offset.
+/// Gimbal angles of an Omni in rad from both wipers of each pot: gain * A / (A + B) + offset.
 /// A pot that reads nothing (A + B = 0) counts as centred.
 template <class N>
 [[nodiscard]] constexpr std::array<typename N::Angle, 3> omni_gimbal(
@@ -173,9 +175,9 @@ template <class N>
   return angles;
 }
 
-/// Orientation of the tool in the world: Ry(-q1) Rx(-q3) Ry(-yaw) Rx(pitch) Ry(roll). Identity is
-/// a tool whose shaft points up. The gimbal's zero and signs follow the vendor's documents; they
-/// were never compared with hardware.
+/// Orientation of the tool of an Omni in the world: Ry(-q1) Rx(-q3) Ry(-yaw) Rx(pitch) Ry(roll).
+/// Identity is a tool whose shaft points up. The gimbal's zero and signs follow the vendor's
+/// documents; they have not been compared with hardware.
 template <class N>
 [[nodiscard]] constexpr Rotation<N> omni_orientation(
     const SerialJoints<N>& q, const std::array<typename N::Angle, 3>& gimbal) noexcept {
@@ -184,13 +186,14 @@ template <class N>
   return compose<N>(compose<N>(arm, wrist), rotation_y<N>(gimbal[2]));
 }
 
-/// Three legs around the z axis that carry one grip without turning it: the Falcon, in the form of
-/// Stamper's thesis. In the plane of a leg (u outward, w = z) the arm of length `crank_mm` turns by
-/// t from u; from its end, the knee, a parallelogram reaches the grip:
+// The delta arm: three legs around the z axis that carry one grip without turning it. Falcon.
+
+/// In the form of Stamper's thesis. In the plane of a leg (u outward, w = z) the arm of length
+/// `crank_mm` turns by t from u; from its end, the knee, a parallelogram reaches the grip:
 ///
 ///     knee = (hub + a cos t, a sin t)     D = |(u, w) - knee|     (D - h)^2 + (v + side)^2 = b^2
 ///
-/// with v across the plane, h the hinges' share of the way and b the parallelogram's length.
+/// with v across the plane, h the length of the hinges and b the parallelogram's length.
 template <class N>
 struct DeltaArm {
   using Real = typename N::Real;
@@ -221,8 +224,8 @@ template <class N>
   }
 }
 
-/// One leg at a place of the grip: the direction of its parallelogram, and by how much the
-/// parallelogram would be too long.
+/// One leg at a position of the grip: the direction of its parallelogram, and the error of its
+/// length.
 template <class N>
 struct Leg {
   DeviceVec<typename N::Unit> rod;
@@ -278,7 +281,7 @@ template <class N>
 }  // namespace delta
 
 /// Tip and Jacobian for three crank angles in rad, by Newton's method with a fixed number of steps.
-/// Angles that no grip can have give some finite place (fixed point) or NaN (floating point).
+/// Angles that no grip can have give any finite position (fixed point) or NaN (floating point).
 template <class N>
 [[nodiscard]] constexpr ForwardKinematics<N> delta_arm_pose(
     const DeltaArm<N>& arm, const std::array<typename N::Angle, 3>& angles) noexcept {

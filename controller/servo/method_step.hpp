@@ -10,9 +10,11 @@
 #include "controller/servo/servo_plan.hpp"
 #include "controller/servo/servo_state.hpp"
 
+// One tick of one volume by one of the methods.
+
 namespace kerf {
 
-/// The active tool in volume `v` of the plan, in one tick: what the step of a method is given.
+/// The active tool in volume `v` of the plan, in one tick: the argument of each step.
 template <class N>
 struct VolumeTick {
   const ServoPlan<N>& plan;
@@ -26,15 +28,15 @@ struct VolumeTick {
   [[nodiscard]] VolumeState<N>& memory() const noexcept { return state.volumes[v]; }
 };
 
-/// What one volume does to the tool, at the device port and along the gradient, so that the hand
-/// feels its negative; and what the tool cut of it.
+/// The forces of one volume at the device port, along the gradient: the hand gets the negative; and
+/// the removal in it.
 template <class N>
 struct VolumeForces {
   DeviceVec<typename N::Real> contact_n, modification_n;
   Removed removed;
 };
 
-/// Lists what a step's overlap covers, for a cut by force.
+/// Lists the voxels that the overlap of a step covers, for a cut by force.
 template <class N>
 struct CoverList {
   const VolumeTick<N>& at;
@@ -53,11 +55,11 @@ struct CoverList {
   }
 };
 
-/// The steps of the list. Each has a file of its own (as method_step.cpp), which defines the
-/// members and instantiates the class for the numbers that it serves. Servo thread; no heap.
+/// The steps of the methods; method_step.cpp instantiates each for the numbers that it serves.
+/// Servo thread; no heap.
 ///
-/// `feel_and_cut`: contact, where the paper's force is felt; then the modification force and the
-/// removal, where overlap cuts. `cover`: what the tool covers, for a cut by force.
+/// `feel_and_cut`: contact, unless the proxy gives it; then the modification force and the removal,
+/// if overlap cuts. `cover`: the covered voxels, for a cut by force.
 #define KERF_STEP(name, Step, serves)                                                    \
   template <class N>                                                                     \
   struct Step {                                                                          \
@@ -68,8 +70,7 @@ struct CoverList {
 KERF_METHODS(KERF_STEP)
 #undef KERF_STEP
 
-/// Calls `work` with the step of a method. The servo's only choice between them: whatever it does
-/// with a method it does through here.
+/// Calls `work` with the step of a method: the only switch over methods in the servo.
 template <class N, class Work>
 decltype(auto) by_method(Method method, Work&& work) noexcept {
   switch (method) {

@@ -14,9 +14,12 @@
 #include "controller/servo/supervisor.hpp"
 #include "shared/numeric/vec.hpp"
 
+// The first part of a tick: from a report to the tip and its velocity, and whether the motors may
+// be on.
+
 namespace kerf {
 
-/// Where the device is, from one good report.
+/// Pose of the device, from one good report.
 template <class N>
 struct DevicePose {
   ForwardKinematics<N> arm;
@@ -24,13 +27,13 @@ struct DevicePose {
   std::array<typename N::Angle, 3> gimbal{};  ///< yaw, pitch, roll
 };
 
-/// An encoder that jitters at an edge. A rest that gives the counters their zero lets none go
-/// farther than this from where it began; on a device that knows its zero, and that a hand holds
-/// still, none goes farther from one report to the next.
+/// Jitter of an encoder at an edge. During a rest that calibrates, no counter moves farther than
+/// this from its first value; on a device with absolute encoders, which a hand may hold still, none
+/// moves farther from one report to the next.
 inline constexpr std::int32_t kRestCounts = 2;
 
-/// One tick without a fresh report. Where the servo is faster than the device the last report still
-/// holds, and with it a rest, for as long as a force would be held.
+/// One tick without a fresh report. If the servo is faster than the device the last report remains
+/// valid, and with it a rest, for as long as a force would be held.
 inline void follow_silence(const SafetyTiming& timing, EncoderState& encoders) noexcept {
   encoders.silent_ticks += encoders.silent_ticks <= timing.hold_ticks ? 1U : 0U;
   const bool rests = encoders.rest_ticks > 0 && encoders.silent_ticks <= timing.hold_ticks;
@@ -66,7 +69,7 @@ inline bool follow_encoders(const DeviceReport& report, bool absolute, const Saf
   return true;
 }
 
-/// Takes a reading; `samples`, 1 to kMaxGimbalSamples, make up the sum.
+/// Adds a reading; `samples`, 1 to kMaxGimbalSamples, make up the sum.
 inline void follow_gimbal(const DeviceReport& report, std::size_t samples,
                           GimbalFilter& filter) noexcept {
   auto& oldest = filter.ring[filter.next];
@@ -79,8 +82,8 @@ inline void follow_gimbal(const DeviceReport& report, std::size_t samples,
   filter.next = (filter.next + 1) % samples;
 }
 
-/// Angle of `counts` encoder steps from home; at most 8 rad either way, where fixed saturates: what
-/// lies beyond is no joint of a device, and no tip of it may leave the range of floats.
+/// Angle of `counts` encoder steps from home, clamped to +-8 rad, where fixed saturates: no joint
+/// of a device goes farther, and the tip must stay within the range of floats.
 template <class N>
 [[nodiscard]] constexpr typename N::Angle joint_angle(const JointPlan<N>& joint,
                                                       std::int32_t counts) noexcept {
@@ -116,17 +119,14 @@ template <class N>
   return pose;
 }
 
-// The first half of the servo step: from a report to the tip, its velocity and whether the motors
-// may be on.
-
-/// How the tip moved since it was last known.
+/// Motion of the tip since it was last known.
 struct TipMotion {
   bool overspeed = false;  ///< faster than the limit
   bool leaves = false;     ///< with the force of the last tick
 };
 
-/// Takes the new tip over. The energy ledger books the motion at the mean of the forces that were
-/// sent meanwhile, as if it had been even.
+/// Updates the tip. The energy ledger books the motion at the mean of the forces that were sent
+/// meanwhile, as if it had been uniform.
 template <class N>
 TipMotion move_tip(const ServoPlan<N>& plan, ServoState<N>& state,
                    const DevicePose<N>& pose) noexcept {
@@ -153,7 +153,7 @@ TipMotion move_tip(const ServoPlan<N>& plan, ServoState<N>& state,
           dot(state.force_n, moved_mm) > Real(0)};
 }
 
-/// What the device reported in this tick.
+/// The result of `sense`.
 template <class N>
 struct Sensed {
   DevicePose<N> pose;
@@ -164,7 +164,7 @@ struct Sensed {
   DeviceVec<typename N::Real> velocity_mm_per_s;
 };
 
-/// Where the device is and whether that can be trusted; decides about the motors.
+/// Finds the pose of the device and checks it, and runs the supervisor.
 template <class N>
 [[nodiscard]] Sensed<N> sense(const ServoPlan<N>& plan, ServoState<N>& state,
                               const DeviceReport& report) noexcept {
@@ -180,7 +180,7 @@ template <class N>
   state.tip_ticks += state.tip_ticks < UINT32_MAX ? 1U : 0U;
   if (sensed.usable) {
     state.jacobian_t_mm = sensed.pose.arm.jacobian_t_mm;
-    // The device rests, maybe at another place than its counters told so far.
+    // The device rests, perhaps at another position than its counters showed so far.
     if (sensed.docked) state.velocity.begin_anew();
     const TipMotion motion = move_tip(plan, state, sensed.pose);
     seen.overspeed = motion.overspeed && !report.parked;

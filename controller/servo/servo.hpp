@@ -9,10 +9,12 @@
 #include "shared/numeric/energy_source.hpp"
 #include "shared/volume/voxel_grid.hpp"
 
+// The interface of the servo: report and command in, output out.
+
 namespace kerf {
 
-/// What the device said in this tick, as it came: counts, not angles. The only input of the servo
-/// step besides commands, and therefore what a replay needs.
+/// Report of the device in this tick: raw counts, not angles. The only input of the servo step
+/// besides commands, and so the input of a replay.
 ///
 /// `parked` is the sign that the hand is not at work: the stylus sits in the inkwell (Omni), the
 /// centre button of the grip is held (Falcon), the arm has not left the home pose since its
@@ -21,23 +23,23 @@ namespace kerf {
 struct DeviceReport {
   bool fresh = false;                      ///< false: nothing arrived since the last tick
   std::array<std::int16_t, 3> encoder{};   ///< counts, wrap at 16 bits
-  std::array<std::uint16_t, 3> wiper_a{};  ///< gimbal pots, both wipers; zero where there is none
+  std::array<std::uint16_t, 3> wiper_a{};  ///< gimbal pots, both wipers; zero without a gimbal
   std::array<std::uint16_t, 3> wiper_b{};
   bool button1 = false, button2 = false;  ///< pressed
   bool parked = false;
   bool homed = true;          ///< false: absolute encoders have no meaning yet
-  std::uint32_t counter = 0;  ///< packet counter of the device, or of the driver where it has none
+  std::uint32_t counter = 0;  ///< packet counter of the device, else of the driver
 };
 
-/// A change asked for by a person or a program; applied at a tick boundary.
+/// A command of a person or a program; applied at a tick boundary.
 struct ServoCommand {
   enum class Kind : std::uint32_t {
     none,
     select_tool,
     hold,
     fade_in,  ///< force starts again from 0: after a stall of the servo
-    reset,    ///< the volumes' first content, over some ticks; at once where nothing is cut
-    undo      ///< the volumes before the last stroke, likewise; refused where there is none
+    reset,    ///< the volumes' first content, over several ticks; at once if nothing is cut
+    undo      ///< the volumes before the last stroke, likewise; refused if there is none
   };
   Kind kind = Kind::none;
   std::uint32_t argument = 0;  ///< index of the tool; hold: 1 on, 0 off
@@ -45,7 +47,7 @@ struct ServoCommand {
 
 inline constexpr double kContactThresholdN = 0.01;  ///< a tick with more force is a contact tick
 
-/// Where the safety of the loop stands. Motors are on in `ramping` and `active` only. Values go
+/// Phase of the safety state machine. Motors are on in `ramping` and `active` only. Values go
 /// into logs: append only.
 enum class Phase : std::uint8_t {
   off,          ///< no report has come yet
@@ -62,7 +64,7 @@ enum class Fault : std::uint32_t {
   stale_input = 1,  ///< no report for 20 ms
   not_finite = 2,   ///< NaN after kinematics for more than 2 ms
   overspeed = 3,    ///< tip faster than the limit
-  // A law of the scene gave something that is no number:
+  // A law of the scene gave a value that is not finite:
   force_law = 4,
   velocity_estimator = 5,
   stabiliser = 6
@@ -96,7 +98,7 @@ struct PlaneLoad {
 };
 inline constexpr std::size_t kMaxPlaneLoads = 3;
 
-/// Everything one tick decided: motor counts for the device, the rest for the eyes and the log.
+/// The output of one tick: motor counts for the device, the rest for pictures and the log.
 ///
 /// Physical values are converted from the loop's numbers exactly; nothing here flows back.
 struct ServoOutput {
@@ -110,17 +112,17 @@ struct ServoOutput {
   bool contact = false;    ///< commanded force above 0.01 N
   bool forbidden = false;  ///< the tool presses on a forbidden material
   std::uint64_t forbidden_materials = 0;  ///< which: bit m is material m of the scene
-  bool refused = false;    ///< the tool finds no free place near the hand, and feels nothing
-  bool shaft = false;      ///< what presses on shaft or handpiece is above 0.01 N
-  bool held = false;       ///< by a command: no force and no cut
-  bool undoing = false;    ///< the last stroke is undone: likewise
-  bool undoable = false;   ///< it can be
-  bool resetting = false;  ///< volumes go back to their first content: what changed was not cut
+  bool refused = false;                   ///< no free position near the hand: no force
+  bool shaft = false;                     ///< load of shaft and handpiece above 0.01 N
+  bool held = false;                      ///< by a command: no force and no cut
+  bool undoing = false;                   ///< the last stroke is undone: likewise
+  bool undoable = false;                  ///< it can be
+  bool resetting = false;  ///< volumes go back to their first content: changes are no cuts
 
   std::array<std::int32_t, 3> joint_counts{};  ///< unwrapped since calibration
   std::array<double, 3> gimbal_rad{};          ///< yaw, pitch, roll
   std::array<double, 3> position_mm{};         ///< tip in the scene
-  std::array<double, 9> rotation{};            ///< world from the tool as felt, row-major
+  std::array<double, 9> rotation{};            ///< world from tool as of the contact, row-major
   std::array<double, 3> velocity_mm_per_s{};   ///< device port, as estimated
   std::array<double, 3> force_n{};             ///< sent to the hand, device port
   std::array<double, 3> contact_n{};           ///< part of it before limits, device port
@@ -150,7 +152,7 @@ struct ServoOutput {
 /// A compiled scene that can be stepped, whatever numbers it computes in.
 ///
 /// `compile` makes one. `step`, `apply` and `penetration_mm` belong to the servo thread and are the
-/// functions of servo_step.hpp; the rest is constant, or to be read while no step runs.
+/// functions of servo_step.hpp; the rest is constant, or may be read while no step runs.
 class Servo {
  public:
   virtual ~Servo() = default;

@@ -28,6 +28,8 @@
 #include "shared/volume/voxel_grid.hpp"
 #include "shared/wire/personality.hpp"
 
+// Everything constant of a run: the compiled scene as the loop reads it.
+
 namespace kerf {
 
 /// Turns an exact sum of weighted gradients (voxel axes; docs/theory.md 7) into a force at the
@@ -76,17 +78,15 @@ template <class N>
   }
 }
 
-}  // namespace kerf
-
 /// The methods: ways to compute contact and cut of one tool in one volume. A method is a line here,
-/// a step (as method_step.cpp) and a file for load time (as
-/// controller/plan/method/method_splat.cpp): two files, because the loop includes nothing that
+/// a step (method_step.cpp) and a part for load time (as
+/// controller/plan/method/method_splat.cpp): two places, because the loop includes nothing that
 /// allocates. All else comes from this list.
 ///
-/// A line: the name, the class of the step, and for which numbers `N` it serves. The order is that
-/// of preference: the first that serves is taken, and the last one serves always.
+/// A line: the name, the class of the step, and a condition on the numbers `N`. The order is that
+/// of preference: the first whose condition holds is taken; that of the last one always holds.
 #define KERF_METHODS(METHOD)                                                                \
-  /* The swept proxy feels, and nothing is cut. */                                          \
+  /* The swept proxy alone: no sums, and nothing is cut. */                                 \
   METHOD(surface, SurfaceStep, true)                                                        \
   /* A correlation of the density with one table (controller/kernel/kernel_set.hpp). */     \
   METHOD(aligned, AlignedStep, N::kIsFixed)                                                 \
@@ -95,14 +95,12 @@ template <class N>
   /* Stored gradients, weighted at every sample (controller/kernel/overlap_methods.hpp). */ \
   METHOD(gather, GatherStep, true)
 
-namespace kerf {
-
 #define KERF_ENUMERATOR(name, Step, serves) name,
 enum class Method : std::uint8_t { KERF_METHODS(KERF_ENUMERATOR) };
 #undef KERF_ENUMERATOR
 
-/// Radians per encoder count, finer than Angle, so that a whole turn of counts is exact to the last
-/// bit of it: in fixed point an integer with 40 fraction bits.
+/// Radians per encoder count, finer than Angle, so that a full rotation is exact to the last bit of
+/// Angle: in fixed point an integer with 40 fraction bits.
 template <class N>
 using AnglePerCount = std::conditional_t<N::kIsFixed, std::int64_t, double>;
 inline constexpr int kAnglePerCountBits = 40;
@@ -123,8 +121,8 @@ template <class N>
 struct DevicePlan {
   Personality personality = Personality::omni;
   std::array<JointPlan<N>, 3> joints{};
-  /// Encoders are absolute once the device is `homed`; else they count from the place where it was
-  /// parked at rest.
+  /// Encoders are absolute once the device is `homed`; else they count from the pose in which it
+  /// was parked at rest.
   bool absolute_encoders = false;
   SerialArm<N> serial{};  ///< of the Omni and WoodenHaptics
   DeltaArm<N> delta{};    ///< of the Falcon
@@ -135,10 +133,11 @@ struct DevicePlan {
   std::int32_t motor_count_end = 0;  ///< motor counts lie within +- this
 };
 
-/// Where contact space lies, and how the proxy's spring becomes a force; constant during a run.
+/// Contact space in the world, and the coupling that turns the proxy's spring into a force;
+/// constant during a run.
 template <class N>
 struct ContactPlan {
-  bool swept = false;                      ///< else the paper's sums are felt
+  bool swept = false;                      ///< else contact is the paper's sums
   WorldVec<typename N::Real> origin_mm;    ///< of contact space
   typename N::Ratio units_per_mm{};        ///< of the world
   typename N::Ratio device_mm_per_unit{};  ///< unit over workspace scale
@@ -146,7 +145,7 @@ struct ContactPlan {
   Coupling<N> coupling;
 };
 
-/// A tool's surface and how its proxy moves.
+/// The surface of a tool and the constants of its proxy.
 template <class N>
 struct SweptTool {
   PointShell<N> point_shell;  ///< of the head
@@ -155,21 +154,12 @@ struct SweptTool {
   ProxyPlan<N> proxy;
 };
 
-/// What one tick hands to the next; the memory of `volumes` belongs to the compiled scene.
-template <class N>
-struct ContactState {
-  using Volumes = std::array<ContactVolume<N>, kMaxVolumes>;  ///< by index of the plan's volumes
-  Volumes volumes{};
-  std::array<Volumes, kMostBehind> behind{};  ///< the same with places of the parts behind the head
-  ProxyState<N> proxy;
-};
-
 /// The tool cuts kCutAdvance inside of the surface that it rests on, so that its groove leaves it
-/// play (docs/theory.md 6.3); units of contact space. While it finds less than its force would cut
+/// play (docs/theory.md 6.3); units of contact space. While it covers less than its force would cut
 /// it reaches deeper, up to kDeepestAdvance, and then slowly back.
 ///
-/// It may find less because its inner samples end inside of its surface, by up to a pitch
-/// (SampleLattice::cover): its rims then rest on matter of which they cover little. A ball that is
+/// It may cover less because its inner samples end inside of its surface, by up to a pitch
+/// (SampleLattice::cover): its rims then rest on voxels that they cover little. A ball that is
 /// given by its radius has samples at its surface at six poles alone.
 inline constexpr double kCutAdvance = 0.25, kDeepestAdvance = 1;
 
@@ -178,7 +168,7 @@ template <class N>
 struct ForceCutPlan {
   bool on = false;
   typename N::Real threshold_n{};  ///< force in the scene that cuts nothing yet
-  typename N::Real deeper_step{};  ///< of the advance in a tick that finds too little, units
+  typename N::Real deeper_step{};  ///< of the advance in a tick that covers too little, units
   typename N::Real back_step{};    ///< of the advance in any other
   SpindlePlan<N> spindle;
   FrictionPlan<N> friction;
@@ -187,36 +177,19 @@ struct ForceCutPlan {
   std::array<CutBudget<N>, kMaxVolumes> voxel_share{};
 };
 
-/// What the tool covers: groups for the kernels of fixed point, voxel by voxel otherwise.
+/// The covered voxels: groups for the kernels of fixed point, voxel by voxel otherwise.
 template <class N>
 using Covered = std::conditional_t<N::kIsFixed, CoveredGroups, CoveredVoxels<N>>;
 template <class N>
 using CoveredEntry = typename decltype(Covered<N>::list)::value_type;
 
-/// The part that changes; the lists belong to the compiled scene.
-template <class N>
-struct ForceCutState {
-  typename N::Real advance{kCutAdvance};
-  SpindleState<N> spindle;
-  Vec<typename N::Real, ToolSpace> friction_n;  ///< felt in the next tick, force in the scene
-  std::array<PrestonState<N>, kMaxVolumes> volume{};
-  std::array<std::span<CoveredEntry<N>>, kMaxVolumes> list{};  ///< scratch of one tick
-
-  /// A new tool stands still and has cut nothing; what the materials are owed stays.
-  constexpr void change_tool() noexcept {
-    advance = typename N::Real(kCutAdvance);
-    spindle = {};
-    friction_n = {};
-  }
-};
-
-/// A solid volume as the loop sees it; constant during a run.
+/// A solid volume; constant during a run.
 template <class N>
 struct VolumePlan {
-  std::size_t scene_index = 0;  ///< place in the scene and in the segment
+  std::size_t scene_index = 0;  ///< index in the scene and in the segment
   VoxelGrid grid;
   Density iso = 0;
-  WorldVec<typename N::Real> position_mm;  ///< world place of voxel (0, 0, 0)
+  WorldVec<typename N::Real> position_mm;  ///< world position of voxel (0, 0, 0)
   Transform<typename N::Ratio, VoxelSpace, WorldSpace> voxel_from_world;  ///< voxels per mm
   /// Takes a unit normal of the world to mm per voxel along each voxel axis, over the largest
   /// spacing, so that its entries stay within 1.
@@ -224,7 +197,7 @@ struct VolumePlan {
   typename N::Real largest_spacing_mm{};
 };
 
-/// What one tool needs in one volume.
+/// Constants of one tool in one volume.
 template <class N>
 struct ToolInVolume {
   /// Voxels per pitch along the world's axes; times the tool's rotation it is the sample step.
@@ -232,14 +205,14 @@ struct ToolInVolume {
   /// The sample step of a tool that keeps its axes.
   std::array<std::array<typename N::Step, 3>, 3> unturned_step{};
   typename N::Step overlap_ratio{};  ///< a^3 / V_voxel
-  /// No voxel farther than this from that of the tool's centre is cut, by axis.
+  /// Reach of a cut around the voxel of the tool's centre, by axis.
   std::array<std::int32_t, 3> reach_vox{};
-  Method method = Method::gather;         ///< how contact and cut are computed here
+  Method method = Method::gather;         ///< of contact and cut
   const AlignedTable* aligned = nullptr;  ///< of the method `aligned`
   // Of the method's own sums:
   SumToForce<N> contact;  ///< F_c = -p0 a^3 SUM grad (docs/theory.md 7.1), times workspace scale
   SumToForce<N> modification;  ///< F_m = -p1 V_voxel SUM c grad (docs/theory.md 7.4), scaled alike
-  /// Where force cuts: from voxel edges to rim radii along the world's axes, for a `SpindleFrame`.
+  /// If force cuts: from voxel edges to rim radii along the world's axes, for a `SpindleFrame`.
   Transform<typename N::Ratio, WorldSpace, VoxelSpace> rims_from_voxel;
 };
 
@@ -252,8 +225,8 @@ struct ToolPlan {
   bool round = false;
   bool turns = true;              ///< with the stylus; else the tool keeps the world's axes
   typename N::Real rim_mm{};      ///< largest radius about the shaft
-  typename N::Ratio steepness{};  ///< of its contacts' bearing (covered_voxels.hpp)
-  SweptTool<N> swept;             ///< where the swept proxy is felt
+  typename N::Ratio steepness{};  ///< of its contacts' loads (covered_voxels.hpp)
+  SweptTool<N> swept;             ///< for the swept proxy
   std::array<ToolInVolume<N>, kMaxVolumes> in_volume{};  ///< by index of the plan's volumes
 };
 
@@ -267,7 +240,7 @@ struct ServoPlan {
 
   GradientKernel kernel = GradientKernel::farid;
   const ExactTaps* taps = nullptr;     ///< of the kernel, for the method `splat`
-  const KernelSet* kernels = nullptr;  ///< what this machine runs
+  const KernelSet* kernels = nullptr;  ///< of this machine
   ContactPlan<N> contact;
   bool cutting = false;  ///< by overlap, whatever the force
   RemovalRate<N> removal_rate;

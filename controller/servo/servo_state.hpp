@@ -9,6 +9,10 @@
 #include "controller/kernel/gradient.hpp"
 #include "controller/kernel/kernel_set.hpp"
 #include "controller/kernel/milling.hpp"
+#include "controller/kernel/preston.hpp"
+#include "controller/kernel/proxy/contact_query.hpp"
+#include "controller/kernel/proxy/proxy.hpp"
+#include "controller/kernel/spindle.hpp"
 #include "controller/law/law.hpp"
 #include "controller/servo/energy_ledger.hpp"
 #include "controller/servo/force_limits.hpp"
@@ -25,16 +29,42 @@ namespace kerf {
 template <class N>
 struct VolumeState {
   std::span<Density> density;
-  std::span<Gradient<N>> gradient;   ///< empty where no tool gathers
-  std::span<RemovalCarry<N>> carry;  ///< fractions of density steps still owed
-  std::span<const Density> first;    ///< content before the first cut; empty where nothing is cut
-  std::span<std::uint64_t> cut_blocks;  ///< what differs from it (volume_restore.hpp)
+  std::span<Gradient<N>> gradient;      ///< empty if no tool gathers
+  std::span<RemovalCarry<N>> carry;     ///< fractions of density steps still owed
+  std::span<const Density> first;       ///< content before the first cut; empty if nothing is cut
+  std::span<std::uint64_t> cut_blocks;  ///< bricks that differ from it (volume_restore.hpp)
 };
 
-/// How far a reset of the volumes has come (volume_restore.hpp).
+/// The state of the swept contact; the memory of `volumes` belongs to the compiled scene.
+template <class N>
+struct ContactState {
+  using Volumes = std::array<ContactVolume<N>, kMaxVolumes>;  ///< by index of the plan's volumes
+  Volumes volumes{};
+  std::array<Volumes, kMostBehind> behind{};  ///< the same with places of the parts behind the head
+  ProxyState<N> proxy;
+};
+
+/// The state of cutting by force; the lists belong to the compiled scene.
+template <class N>
+struct ForceCutState {
+  typename N::Real advance{kCutAdvance};
+  SpindleState<N> spindle;
+  Vec<typename N::Real, ToolSpace> friction_n;  ///< of the next tick, force in the scene
+  std::array<PrestonState<N>, kMaxVolumes> volume{};
+  std::array<std::span<CoveredEntry<N>>, kMaxVolumes> list{};  ///< scratch of one tick
+
+  /// A new tool stands still and has cut nothing; the budgets of the materials stay.
+  constexpr void change_tool() noexcept {
+    advance = typename N::Real(kCutAdvance);
+    spindle = {};
+    friction_n = {};
+  }
+};
+
+/// Progress of a reset of the volumes (volume_restore.hpp).
 struct ResetState {
   bool runs = false;
-  std::size_t volume = 0, block = 0;  ///< to be looked at next
+  std::size_t volume = 0, block = 0;  ///< the next one to check
 };
 
 /// A brick as it was before a stroke.
@@ -44,18 +74,19 @@ struct KeptBrick {
   std::array<Density, kBrickVoxels> density{};  ///< of its voxels that exist, x fastest
 };
 
-/// The last stroke, and what may belong to the next (volume_restore.hpp). `pool` is a ring; places
-/// in it only grow: begin .. next is the last stroke, next .. end waits for one.
+/// The last stroke, and bricks that may belong to the next (volume_restore.hpp). `pool` is a ring;
+/// indices in it only grow: begin .. next is the last stroke, next .. end waits for one.
 struct StrokeState {
-  std::span<KeptBrick> pool;                                  ///< empty where nothing is cut
-  std::array<std::span<std::uint32_t>, kMaxVolumes> kept_in;  ///< by brick: in which generation
+  std::span<KeptBrick> pool;  ///< empty if nothing is cut
+  std::array<std::span<std::uint32_t>, kMaxVolumes>
+      kept_in;  ///< by brick: the generation that kept it
   std::uint32_t generation = 1;
   std::uint64_t begin = 0, next = 0, end = 0;
-  bool open = false;       ///< it goes on, and reaches from begin to end
+  bool open = false;       ///< it continues, and is begin .. end
   bool lost = false;       ///< it is longer than the pool
   bool next_lost = false;  ///< likewise, if one begins in this tick
   bool undoing = false;
-  std::uint32_t quiet_ticks = 0;  ///< since it touched anything
+  std::uint32_t quiet_ticks = 0;  ///< since the last contact
   [[nodiscard]] constexpr bool can_undo() const noexcept {
     return !lost && !undoing && (open ? end : next) != begin;
   }
@@ -77,8 +108,8 @@ struct GimbalFilter {
   std::size_t next = 0;
 };
 
-/// Everything that one tick hands to the next. A run is a function of plan, first state, reports
-/// and commands; nothing else is remembered anywhere.
+/// Everything that changes from tick to tick. A run is a function of plan, first state, reports and
+/// commands; there is no other state.
 template <class N>
 struct ServoState {
   using Real = typename N::Real;
@@ -95,8 +126,8 @@ struct ServoState {
   EncoderState encoders;
   GimbalFilter gimbal;
   std::uint32_t active_tool = 0;
-  bool hold = false;  ///< asked by command: force 0, nothing is cut
-  ResetState reset;   ///< asked by command; a hold while it runs
+  bool hold = false;  ///< by command: force 0, nothing is cut
+  ResetState reset;   ///< by command; a hold while it runs
   StrokeState stroke;
   [[nodiscard]] constexpr bool undoes() const noexcept { return stroke.undoing; }
   [[nodiscard]] constexpr bool held() const noexcept { return hold || reset.runs || undoes(); }
@@ -105,7 +136,7 @@ struct ServoState {
   DeviceVec<Real> tip_mm;               ///< device port
   Rotation<N> rotation = identity_rotation<N>();
   bool tip_known = false;             ///< false before the first report
-  std::uint32_t tip_ticks = 0;        ///< since the tip was taken over
+  std::uint32_t tip_ticks = 0;        ///< since the last tip
   DeviceVec<Real> force_sum_n;        ///< sent in these ticks
   DeviceVec<Real> moved_mm;           ///< to this tip, from the last one
   std::uint32_t moved_ticks = 1;      ///< in so many ticks
@@ -114,7 +145,7 @@ struct ServoState {
   LawMemory force_law;
   LawMemory stabiliser;
 
-  DeviceVec<Real> contact_n;       ///< felt in the last tick, before limits
+  DeviceVec<Real> contact_n;       ///< of the last tick, before limits
   WorldVec<Real> proxy_offset_mm;  ///< in the last tick
   DeviceVec<Real> force_n;         ///< sent in the last tick
   DeviceVec<Real> held_force_n;    ///< sent with the last good report: faded when reports stop

@@ -20,16 +20,17 @@
 #include "shared/numeric/vec.hpp"
 
 namespace kerf {
+namespace {
 
-/// What the motors get: signed counts, and the share of the force that they can carry.
+/// Signed motor counts, and the fraction of the force that the motors can carry.
 template <class N>
 struct MotorCommand {
   std::array<std::int16_t, 3> counts{};
-  typename N::Unit share{};  ///< 1, or less where a motor is at the end of its range
+  typename N::Unit share{};  ///< 1, or less if a motor is at the end of its range
 };
 
-/// All three counts are scaled down together where one would leave the range, so that the direction
-/// of the force stays. Products are not rounded before that.
+/// Scales all three counts down together if one would leave the range, so that the direction of the
+/// force stays. Products are not rounded before that.
 template <class N>
 [[nodiscard]] MotorCommand<N> motor_command(const ServoPlan<N>& plan,
                                             JointVec<typename N::Real> torque_n_mm) noexcept {
@@ -70,7 +71,7 @@ template <class N>
   return command;
 }
 
-// What a tick tells the eyes and the log.
+// The output of a tick.
 
 template <class N>
 constexpr double energy_mj(typename N::Energy energy) noexcept {
@@ -81,7 +82,7 @@ constexpr double energy_mj(typename N::Energy energy) noexcept {
   }
 }
 
-/// For the record: in steps of 2^-32 mJ, rounded and saturated.
+/// For the log: in steps of 2^-32 mJ, rounded and saturated.
 template <class N>
 constexpr std::int64_t energy_steps(typename N::Energy energy) noexcept {
   if constexpr (N::kIsFixed) {
@@ -113,8 +114,7 @@ std::uint64_t hash_of(std::uint64_t hash, const ServoOutput& out,
   return fnv1a_step(hash, static_cast<std::uint64_t>(out.phase) << 1 | (out.motors_on ? 1U : 0U));
 }
 
-inline void tell_removed(const std::array<Removed, kMaxVolumes>& removed,
-                         ServoOutput& out) noexcept {
+void tell_removed(const std::array<Removed, kMaxVolumes>& removed, ServoOutput& out) noexcept {
   for (std::size_t v = 0; v < kMaxVolumes; ++v) {
     out.removed_by_volume[v] = removed[v].density_steps;
     out.removed_steps += removed[v].density_steps;
@@ -132,7 +132,7 @@ void tell_planes(const ToolContact<N>& tool, ServoOutput& out) noexcept {
   out.plane_count = static_cast<std::uint32_t>(tool.plane_count);
 }
 
-/// The rest of the output, for the eyes and the log.
+/// Fills the rest of the output, for pictures and the log, and extends its hash.
 template <class N>
 void tell(const ServoPlan<N>& plan, ServoState<N>& state, const Sensed<N>& sensed,
           ServoOutput& out) noexcept {
@@ -149,8 +149,8 @@ void tell(const ServoPlan<N>& plan, ServoState<N>& state, const Sensed<N>& sense
     out.gimbal_rad[i] = as_double(sensed.pose.gimbal[i]);
   }
   out.position_mm = as_doubles(sensed.tip_mm);
-  // Drawn as it is felt: a tool that does not turn keeps the world's axes, and a shaft that is held
-  // lags behind the stylus.
+  // The orientation of contact: a tool that does not turn keeps the world's axes, and a shaft that
+  // is held lags behind the stylus.
   const ToolPlan<N>& tool = plan.tools[state.active_tool];
   Rotation<N> rotation = tool.turns ? state.rotation : identity_rotation<N>();
   if (tool.swept.behind.count > 0 && proxy.placed) rotation = {rows_of(proxy.pose.turn)};
@@ -165,9 +165,7 @@ void tell(const ServoPlan<N>& plan, ServoState<N>& state, const Sensed<N>& sense
   out.output_hash = state.output_hash;
 }
 
-namespace {
-
-/// A force before its limits, and how the tool touches.
+/// A force before its limits, and the contact of the tool.
 template <class N>
 struct Wanted {
   DeviceVec<typename N::Real> force_n;
@@ -177,8 +175,8 @@ struct Wanted {
 };
 
 /// The proxy goes on following a hand that gets no force, so that it is on the same side of every
-/// wall when the force comes back, with a ramp. A device that rests parked, or has lost its home,
-/// begins anew.
+/// wall when the force comes back, with a ramp. For a device that rests parked, or has lost its
+/// home, the search starts again.
 template <class N>
 void follow_unfelt(const ServoPlan<N>& plan, ServoState<N>& state, const Sensed<N>& sensed,
                    ServoOutput& out) noexcept {
@@ -195,8 +193,8 @@ void follow_unfelt(const ServoPlan<N>& plan, ServoState<N>& state, const Sensed<
   state.contact.proxy.ramp();
 }
 
-/// The force that the tool feels, and the removal it makes there by overlap. Without a usable pose
-/// the force of the last good report is held and then faded, and nothing is cut.
+/// The force on the tool, and its removal by overlap. Without a usable pose the force of the last
+/// good report is held and then faded, and nothing is cut.
 template <class N>
 Wanted<N> wanted_force(const ServoPlan<N>& plan, ServoState<N>& state, const Sensed<N>& sensed,
                        ServoOutput& out) noexcept {
@@ -241,14 +239,14 @@ Wanted<N> wanted_force(const ServoPlan<N>& plan, ServoState<N>& state, const Sen
                             .friction = forces.friction_n,
                             .cutting = forces.modification_n};
   if (supervisor.phase != Phase::ramping) return {felt_n, forces.tool, parts};
-  // What is beyond the peak is never sent, so it must not hasten the fade.
+  // Force beyond the peak is never sent, so it must not shorten the fade.
   return {clamped(felt_n, plan.limits.peak_n) * share(supervisor.fade_ticks, timing.fade_in_ticks),
           forces.tool, parts};
 }
 
-/// The force to send: limited, and where the scene names a stabiliser what that makes of it,
-/// limited once more; its part is kept in `wanted`, and whether a limit acted. One that is no
-/// number latches a fault.
+/// Applies the limits, then the stabiliser if the scene has one, then the limits again. Stores the
+/// part of the stabiliser in `wanted`, and whether a limit acted. A force that is not finite
+/// latches a fault.
 template <class N>
 DeviceVec<typename N::Real> force_to_send(const ServoPlan<N>& plan, ServoState<N>& state,
                                           Wanted<N>& wanted, const Sensed<N>& sensed) noexcept {
@@ -275,7 +273,7 @@ DeviceVec<typename N::Real> force_to_send(const ServoPlan<N>& plan, ServoState<N
   }
   wanted.parts.stabiliser = steady_n - limited_n;
   if (!(steady_n == limited_n)) return limited(steady_n, state.thermal);
-  state.thermal = heated;  // limits round: what was not changed is not limited again
+  state.thermal = heated;  // limits round: an unchanged force is not limited again
   return limited_n;
 }
 
@@ -319,7 +317,7 @@ void book(ServoState<N>& state, const Wanted<N>& wanted, bool motors_on) noexcep
   state.ledger.send(parts);
 }
 
-/// What the force that was sent cuts. The spindle runs while the hand is held by the motors.
+/// Cuts by the force that was sent. The spindle runs while the motors hold the hand.
 template <class N>
 void cut(const ServoPlan<N>& plan, ServoState<N>& state, const ToolContact<N>& tool,
          ServoOutput& out) noexcept {
@@ -334,7 +332,7 @@ void cut(const ServoPlan<N>& plan, ServoState<N>& state, const ToolContact<N>& t
   tell_removed(done.removed, out);
 }
 
-/// Notes what was cut, or restores it while a reset or an undo runs: then nothing is cut.
+/// Marks what was cut, or restores it while a reset or an undo runs: then nothing is cut.
 template <class N>
 void follow_cuts(const ServoPlan<N>& plan, ServoState<N>& state, ServoOutput& out) noexcept {
   out.resetting = state.reset.runs;

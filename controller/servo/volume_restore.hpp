@@ -15,11 +15,13 @@
 #include "shared/numeric/vec.hpp"
 #include "shared/volume/brick_grid.hpp"
 
-// The volumes go back to their first content, a few bricks a tick and only those that were cut.
-// What is derived of a density follows: gradients, and what cutting still owes. Maps of free space
-// are those of the first content, which a cut leaves true. Servo thread; no heap.
+// Restores volumes: reset to the first content, and undo of the last stroke, a few bricks a tick.
+// Servo thread; no heap.
 
 namespace kerf {
+
+// Reset: restores only bricks that were cut, and what depends on density: gradients, and the carry
+// of cutting. Maps of free space are those of the first content, and stay valid after any cut.
 
 /// The bricks of a volume in blocks of 4x4x4, one word each: 32 voxels per edge. Pure arithmetic.
 struct BrickBlocks {
@@ -56,7 +58,7 @@ struct BrickBlocks {
   }
 };
 
-/// Notes that a box of a volume was cut. Bounded by the bricks of the tool's box.
+/// Marks that a box of a volume was cut. Bounded by the bricks of the tool's box.
 inline void mark_cut(const VoxelGrid& grid, const VoxelBox& cut,
                      std::span<std::uint64_t> blocks) noexcept {
   const BrickBlocks of = BrickBlocks::of(grid);
@@ -70,18 +72,18 @@ inline void mark_cut(const VoxelGrid& grid, const VoxelBox& cut,
   }
 }
 
-/// Blocks that a tick may look at for one that was cut: 8 KiB of words.
+/// Blocks that a tick may check for a cut: 8 KiB of words.
 inline constexpr int kBlocksPerTick = 1024;
 
 /// Bricks that a tick may restore; the mirror copies as many again. 64 take 20 us with cold caches,
-/// a fiftieth of a tick at 1 kHz, and 8 as much of one at 8 kHz. Where gradients are stored a brick
-/// takes 80 times as long: 25 us.
+/// a fiftieth of a tick at 1 kHz, and 8 take as much of one at 8 kHz. If gradients are stored a
+/// brick takes 80 times as long: 25 us.
 [[nodiscard]] constexpr int bricks_per_tick(std::int32_t rate_hz, bool gradients) noexcept {
   const int bricks = std::clamp(64 * 1000 / std::max(rate_hz, 1), 8, 64);
   return gradients ? std::max(1, bricks / 32) : bricks;
 }
 
-/// Restores some bricks of one block, and clears their bits. Returns the box around them.
+/// Restores bricks of one block, and clears their bits. Returns the box around them.
 template <class N>
 VoxelBox restore_bricks(const ServoPlan<N>& plan, const VoxelGrid& grid, std::size_t block,
                         VolumeState<N>& volume, GradientScratch* scratch) noexcept {
@@ -106,23 +108,22 @@ VoxelBox restore_bricks(const ServoPlan<N>& plan, const VoxelGrid& grid, std::si
   return restored;
 }
 
-/// What cutting still owes a volume is of matter that has come back. One value for each lane of the
-/// widest tool.
+/// Clears the carry of a restored volume: one value for each lane of the widest tool.
 template <class N>
 void forget_debts(ServoState<N>& state, std::size_t v) noexcept {
   std::ranges::fill(state.volumes[v].carry, RemovalCarry<N>{});
   state.force_cut.volume[v] = {};
 }
 
-/// The last matter has come back.
+/// Ends a reset or an undo.
 template <class N>
 void end_restoring(ServoState<N>& state) noexcept {
-  state.force_cut.change_tool();  // it stands, and has cut nothing of what is there now
+  state.force_cut.change_tool();  // it stands, and has cut nothing of the restored content
   restart_fade(state.supervisor);
 }
 
-/// One tick of a reset that runs: some bricks of one block, told in `changed` by volume of the
-/// scene. The last tick of a reset ends it.
+/// One tick of a reset that runs: bricks of one block; sets `changed` by volume of the scene. The
+/// last tick of a reset ends it.
 template <class N>
 void restore_some(const ServoPlan<N>& plan, ServoState<N>& state,
                   std::array<VoxelBox, kMaxVolumes>& changed) noexcept {
@@ -149,17 +150,17 @@ void restore_some(const ServoPlan<N>& plan, ServoState<N>& state,
   }
 }
 
-// The last stroke can be undone: every brick is kept as it was before the stroke's first cut in it.
-// Who is about to cut says which bricks it may reach; what was kept so and then not cut belongs to
-// the stroke that begins next, since nothing changed it. Servo thread; no heap.
+// Undo: every brick is saved before the first cut of the stroke in it. Each cut saves the bricks
+// that it may reach; a brick that was saved and then not cut belongs to the next stroke, since it
+// did not change.
 
-/// Bricks of a pool that a stroke may take; the others are for what may be cut next.
+/// Bricks of a pool that a stroke may take; the others are for the next cuts.
 [[nodiscard]] constexpr std::size_t stroke_room(std::size_t pool) noexcept {
   return pool - pool / 4;
 }
 
 /// Keeps the bricks around a tool at `centre_vox`, each once a stroke. Copies at most the bricks of
-/// the tool's box, of which the cut that follows weighs every voxel. Where the pool is full, the
+/// the tool's box, of which the cut that follows weighs every voxel. If the pool is full, the
 /// stroke cannot be undone.
 template <class N>
 void keep_bricks(const ServoPlan<N>& plan, ServoState<N>& state, std::size_t v,
@@ -207,29 +208,29 @@ void keep_bricks(const ServoPlan<N>& plan, ServoState<N>& state, std::size_t v,
   }
 }
 
-/// What is kept from now on belongs to the next stroke.
+/// Ends the stroke: bricks that are saved from now on belong to the next one.
 inline void close_stroke(StrokeState& stroke) noexcept {
   stroke.open = false;
   stroke.next = stroke.end;
   ++stroke.generation;
 }
 
-/// Forgets what was kept for the next stroke.
+/// Drops the bricks that were saved for the next stroke.
 inline void forget_next(StrokeState& stroke) noexcept {
   stroke.end = stroke.next;
   stroke.next_lost = false;
   ++stroke.generation;
 }
 
-/// Forgets all: the volumes are about to change otherwise.
+/// Drops all bricks, before the volumes change by a reset.
 inline void forget_strokes(StrokeState& stroke) noexcept {
   close_stroke(stroke);
   stroke.begin = stroke.end;
   stroke.lost = stroke.next_lost = false;
 }
 
-/// At the end of a tick that did not restore: a cut begins a stroke or goes on with it, and a pause
-/// without contact ends it.
+/// At the end of a tick without restoring: a cut begins or continues a stroke, and a pause without
+/// contact ends it.
 inline void follow_stroke(std::uint32_t pause_ticks, bool cuts, bool touches,
                           StrokeState& stroke) noexcept {
   if (cuts && !stroke.open) {
@@ -247,8 +248,8 @@ inline void follow_stroke(std::uint32_t pause_ticks, bool cuts, bool touches,
   if (stroke.quiet_ticks >= pause_ticks) close_stroke(stroke);
 }
 
-/// Begins to undo the last stroke, also one that is not over. False where there is none, or it was
-/// too long.
+/// Starts to undo the last stroke, even if it is not over. Returns false if there is none, or it
+/// was too long.
 inline bool begin_undo(StrokeState& stroke) noexcept {
   if (!stroke.can_undo()) return false;
   if (stroke.open) {
@@ -285,7 +286,7 @@ VoxelBox put_back(const ServoPlan<N>& plan, const KeptBrick& kept, ServoState<N>
   return box;
 }
 
-/// One tick of an undo that runs: some bricks of one volume that lie close to each other, told in
+/// One tick of an undo that runs: bricks of one volume that are close to each other; writes them to
 /// `out`. The last tick ends it.
 template <class N>
 void undo_some(const ServoPlan<N>& plan, ServoState<N>& state, ServoOutput& out) noexcept {

@@ -8,12 +8,15 @@
 
 #include "controller/stability/sampled_loop.hpp"
 
+// Exact simulation of one axis: device and hand under a held force, with Coulomb friction, encoder
+// and delay; and a hand that pushes on a wall.
+
 namespace kerf {
 
-/// The device and the hand of a loop (mass, viscous friction, hand; no Coulomb friction) while a
-/// force is held: how place (mm) and speed (mm per period) after a while follow from those before,
-/// `free`, and from 1 N, `driven`. Exact to the last digits: by the matrix exponential, without
-/// libm's.
+/// Response of device and hand of a loop (mass, viscous friction, hand; no Coulomb friction) while
+/// a force is held: position (mm) and speed (mm per period) after a while, from those before
+/// (`free`) and from 1 N (`driven`). Exact to the last digits: by the matrix exponential, without
+/// libm.
 struct HeldMass {
   std::array<std::array<double, 2>, 2> free{};
   std::array<double, 2> driven{};
@@ -25,9 +28,8 @@ struct HeldMass {
 /// One axis of a device with its hand, under a force that is held: exact, with Coulomb friction.
 ///
 /// While the tip keeps its direction friction is one more held force, so a stretch is one product
-/// with a 2 x 2 matrix. Where the tip turns round within a stretch the moment is found by halving,
-/// to 2^-30 of the stretch; there it sticks or goes back. No libm, so the same bits on every
-/// machine.
+/// with a 2 x 2 matrix. If the tip reverses within a stretch the moment is found by bisection, to
+/// 2^-30 of the stretch; there it sticks or goes back. No libm, so the same bits on every machine.
 class OneAxisPlant {
  public:
   /// A stretch is a part of the loop's period, in periods.
@@ -45,7 +47,7 @@ class OneAxisPlant {
   /// Held by friction through the whole of the last stretch.
   [[nodiscard]] bool stuck() const noexcept { return stuck_; }
 
-  /// The whole of stretch `s` under `force_n` of motor and hand, without the hand's spring.
+  /// Advances by stretch `s` under `force_n` of motor and hand, without the hand's spring.
   void advance(std::size_t s, double force_n) noexcept {
     const Levels& level = stretches_[s];
     if (coulomb_n_ == 0) {
@@ -81,7 +83,7 @@ class OneAxisPlant {
     speed_ = by.free[1][0] * tip_mm + by.free[1][1] * speed_ + by.driven[1] * force_n;
   }
 
-  /// To which side the tip goes on; false: friction holds it.
+  /// Sets the side to which the tip goes on; false if friction holds it.
   bool start(double force_n, double& side) const noexcept {
     if (speed_ != 0) {
       side = speed_ > 0 ? 1 : -1;
@@ -119,7 +121,7 @@ class OneAxisPlant {
   bool stuck_ = false;
 };
 
-/// One axis of a device and the hand that holds it as a host sees it, period by period: the plant
+/// One axis of a device and its hand as a host reads and drives it, period by period: the plant
 /// with the encoder and the delay of its `SampledLoop`. mm, N, s. Never allocates.
 class OneAxis {
  public:
@@ -132,7 +134,7 @@ class OneAxis {
         period_s_(loop.period_s),
         plant_(loop, part_, 1 - part_) {}
 
-  /// Before the first period.
+  /// Sets the position before the first period.
   void start(double place_mm, double mm_per_s = 0) noexcept {
     plant_.place(place_mm, mm_per_s * period_s_);
   }
@@ -143,17 +145,17 @@ class OneAxis {
   [[nodiscard]] bool stuck() const noexcept { return plant_.stuck(); }
   /// Of the motors, at the end of the last period.
   [[nodiscard]] double motor_n() const noexcept { return asked(whole_); }
-  /// The place as the encoder shows it: the quantum's lower end; exact without a quantum.
+  /// The position as the encoder shows it: the quantum's lower end; exact without a quantum.
   [[nodiscard]] double encoder_mm() const noexcept {
     if (!(quantum_mm_ > 0)) return place_mm();
     return std::floor((place_mm() + shift_mm_) / quantum_mm_) * quantum_mm_ - shift_mm_;
   }
-  /// Work of the motors on hand and device since the start, N mm = mJ, by the true motion. Rises
-  /// for good: the loop is active.
+  /// Work of the motors on hand and device since the start, N mm = mJ, by the true motion. If it
+  /// keeps rising the loop is active.
   [[nodiscard]] double motor_work_mj() const noexcept { return work_mj_; }
 
-  /// One period, at whose beginning the encoder was read: `force_n` of the motors comes of that
-  /// reading and acts after the delay; `push_n` is the hand's, from now on.
+  /// One period, at whose beginning the encoder was read: `force_n` of the motors is the answer to
+  /// that reading and acts after the delay; `push_n` is that of the hand, from now on.
   void tick(double force_n, double push_n) noexcept {
     head_ = (head_ + 1) % asked_n_.size();
     asked_n_[head_] = force_n;
@@ -162,7 +164,7 @@ class OneAxis {
   }
 
  private:
-  /// In periods; a part that is rounding alone is none.
+  /// In periods; a part from rounding alone is dropped.
   static double delay_of(const SampledLoop& loop) noexcept {
     const double periods = std::min(loop.delay_s / loop.period_s, kMaxDelayPeriods);
     const double whole = std::round(periods);
@@ -190,8 +192,8 @@ class OneAxis {
   double work_mj_ = 0;
 };
 
-/// The wall of a `SampledLoop`, at place 0 and solid above: F = -(K x + B v) of the encoder's place
-/// and its filtered backward difference, never a pull.
+/// The wall of a `SampledLoop`, at position 0 and solid above: F = -(K x + B v) of the encoder's
+/// position and its filtered backward difference, never a pull.
 class SampledWall {
  public:
   SampledWall(const SampledLoop& loop, double stiffness_n_per_mm, double damping_ns_per_mm) noexcept
@@ -200,7 +202,7 @@ class SampledWall {
         period_s_(loop.period_s),
         share_(loop.period_s / (loop.period_s + loop.velocity_filter_s)) {}
 
-  /// At rest at this place.
+  /// At rest at this position.
   void start(double encoder_mm) noexcept {
     last_mm_ = encoder_mm;
     speed_ = 0;
@@ -219,20 +221,20 @@ class SampledWall {
   double last_mm_ = 0, speed_ = 0;
 };
 
-/// A hand that comes to a wall and pushes on: from rest outside, with a constant force.
+/// A hand that reaches a wall and keeps pushing: from rest outside, with a constant force.
 struct WallPush {
   double from_mm = -0.1;
   double push_n = 0.5;  ///< on top of the device's Coulomb friction
   double seconds = 3;
 };
 
-/// What such a push showed, thirds of its time apart.
+/// Result of such a push, for each third of its time.
 struct WallSwing {
   std::array<double, 3> span_mm{};   ///< peak to peak
   std::array<double, 3> motor_mj{};  ///< work of the motors at the end of each third
   double quantum_mm = 0;
 
-  /// By the motion: the last third swings by more than three quanta and has not died down.
+  /// By the motion: the last third swings by more than three quanta and does not decay.
   [[nodiscard]] bool swings_on() const noexcept {
     constexpr double kNothingMm = 1e-6;  // of an encoder without a quantum
     constexpr double kDiedDown = 0.97;
@@ -246,8 +248,8 @@ struct WallSwing {
   }
 };
 
-/// Plays the push against any law: `force_n(encoder_mm)` once per period, towards negative places
-/// out of the wall. The loop's motion stops where it is far beyond any device (1 m).
+/// Simulates the push against any law: `force_n(encoder_mm)` once per period, towards negative
+/// positions out of the wall. Stops once the motion is far beyond any device (1 m).
 template <class Law>
 [[nodiscard]] WallSwing push_on_wall(const SampledLoop& loop, Law&& force_n,
                                      const WallPush& push = {}) {

@@ -17,7 +17,7 @@
 namespace kerf {
 namespace {
 
-/// What motion of the one angle w takes of damping (docs/theory.md 5.7), at z = e^jw.
+/// Damping that motion of the angle w needs (docs/theory.md 5.7), at z = e^jw.
 double viscosity_at(const SampledLoop& loop, double stiffness, double damping, double w) {
   const double lag = loop.velocity_filter_s / loop.period_s;
   const double delay = std::min(loop.delay_s / loop.period_s, kMaxDelayPeriods);
@@ -36,57 +36,6 @@ double viscosity_at(const SampledLoop& loop, double stiffness, double damping, d
 double short_delay_stiffness(const SampledLoop& loop, double damping_ns_per_mm) {
   return (loop.viscous_ns_per_mm + damping_ns_per_mm) / (loop.period_s / 2 + loop.delay_s);
 }
-
-}  // namespace
-
-double passive_viscosity(const SampledLoop& loop, double stiffness_n_per_mm,
-                         double damping_ns_per_mm) {
-  // The integrand has about one wave per tick of delay on half the circle; 64 points each.
-  const double waves = 4 + loop.delay_s / loop.period_s;
-  const int points = static_cast<int>(64 * std::min(waves, kMaxDelayPeriods));
-  const double step = std::numbers::pi / points;
-  const auto at = [&](double w) {
-    return viscosity_at(loop, stiffness_n_per_mm, damping_ns_per_mm, w);
-  };
-  double best = 0, best_w = 0;
-  for (int i = 0; i <= points; ++i) {
-    const double w = std::max(i * step, 1e-4 * step);
-    if (at(w) <= best) continue;
-    best = at(w);
-    best_w = w;
-  }
-  double low = std::max(best_w - step, 1e-4 * step);
-  double high = std::min(best_w + step, std::numbers::pi);
-  constexpr int kThirds = 60;
-  for (int i = 0; i < kThirds; ++i) {
-    const double a = low + (high - low) / 3, b = high - (high - low) / 3;
-    (at(a) < at(b) ? low : high) = at(a) < at(b) ? a : b;
-  }
-  return std::max(best, at((low + high) / 2));
-}
-
-double passive_stiffness(const SampledLoop& loop, double damping_ns_per_mm) {
-  const auto passive = [&](double stiffness) {
-    return passive_viscosity(loop, stiffness, damping_ns_per_mm) <= loop.viscous_ns_per_mm;
-  };
-  if (!passive(0)) return 0;
-  // At small w the stiffness asks for K (T/2 + td) or more, so no more than this is passive.
-  double low = 0, high = short_delay_stiffness(loop, damping_ns_per_mm);
-  constexpr int kBits = 50;
-  for (int i = 0; i < kBits; ++i) {
-    const double middle = (low + high) / 2;
-    (passive(middle) ? low : high) = middle;
-  }
-  return low;
-}
-
-double quantum_stiffness(const SampledLoop& loop) {
-  const double held = loop.quantum_mm > 0 ? 2 * loop.coulomb_n / loop.quantum_mm
-                                          : std::numeric_limits<double>::infinity();
-  return std::min(2 * loop.viscous_ns_per_mm / loop.period_s, held);
-}
-
-namespace {
 
 /// Gains between which a loop is stable, in the gain's unit.
 struct StableBand {
@@ -113,7 +62,7 @@ Polynomial sum(const Polynomial& a, const Polynomial& b, double gain) {
   return p;
 }
 
-/// Whether all roots lie inside the unit circle (Schur and Cohn): each step takes off one degree.
+/// Whether all roots lie inside the unit circle (Schur and Cohn): each step removes one degree.
 bool all_inside(Polynomial p) {
   while (p.size() > 1) {
     const double share = p.front() / p.back();
@@ -142,7 +91,7 @@ Polynomial numerator(const HeldMass& whole, const std::array<double, 2>& driven)
 
 Characteristic characteristic(const SampledLoop& loop) {
   const double delay = std::min(loop.delay_s / loop.period_s, kMaxDelayPeriods);
-  constexpr double kWhole = 1e-9;  // what a quotient of two decimals may miss a whole number by
+  constexpr double kWhole = 1e-9;  // error of a quotient of two decimals near a whole number
   double ticks = std::floor(delay + kWhole);
   const double part = delay - ticks > kWhole ? delay - ticks : 0;
 
@@ -192,7 +141,7 @@ double top_gain(const Polynomial& open, const Polynomial& gained) {
 }
 
 /// The gains g > 0 for which open + g gained has all roots inside, from the lowest up. The first
-/// band begins at 0 unless `open` alone is unstable; what follows are re-entries. Empty: never
+/// band begins at 0 unless `open` alone is unstable; later ones are re-entries. Empty: never
 /// stable.
 std::vector<StableBand> bands(const Polynomial& open, const Polynomial& gained) {
   constexpr double kLowest = 1e-9, kRatio = 1.02;
@@ -230,6 +179,54 @@ double first_end(const std::vector<StableBand>& found) {
 }
 
 }  // namespace
+
+double passive_viscosity(const SampledLoop& loop, double stiffness_n_per_mm,
+                         double damping_ns_per_mm) {
+  // The integrand has about one wave per tick of delay on half the circle; 64 points each.
+  const double waves = 4 + loop.delay_s / loop.period_s;
+  const int points = static_cast<int>(64 * std::min(waves, kMaxDelayPeriods));
+  const double step = std::numbers::pi / points;
+  const auto at = [&](double w) {
+    return viscosity_at(loop, stiffness_n_per_mm, damping_ns_per_mm, w);
+  };
+  double best = 0, best_w = 0;
+  for (int i = 0; i <= points; ++i) {
+    const double w = std::max(i * step, 1e-4 * step);
+    if (at(w) <= best) continue;
+    best = at(w);
+    best_w = w;
+  }
+  double low = std::max(best_w - step, 1e-4 * step);
+  double high = std::min(best_w + step, std::numbers::pi);
+  constexpr int kThirds = 60;
+  for (int i = 0; i < kThirds; ++i) {
+    const double a = low + (high - low) / 3, b = high - (high - low) / 3;
+    (at(a) < at(b) ? low : high) = at(a) < at(b) ? a : b;
+  }
+  return std::max(best, at((low + high) / 2));
+}
+
+double passive_stiffness(const SampledLoop& loop, double damping_ns_per_mm) {
+  const auto passive = [&](double stiffness) {
+    return passive_viscosity(loop, stiffness, damping_ns_per_mm) <= loop.viscous_ns_per_mm;
+  };
+  if (!passive(0)) return 0;
+  // At small w the stiffness needs a damping of K (T/2 + td) or more, so no more than this is
+  // passive.
+  double low = 0, high = short_delay_stiffness(loop, damping_ns_per_mm);
+  constexpr int kBits = 50;
+  for (int i = 0; i < kBits; ++i) {
+    const double middle = (low + high) / 2;
+    (passive(middle) ? low : high) = middle;
+  }
+  return low;
+}
+
+double quantum_stiffness(const SampledLoop& loop) {
+  const double held = loop.quantum_mm > 0 ? 2 * loop.coulomb_n / loop.quantum_mm
+                                          : std::numeric_limits<double>::infinity();
+  return std::min(2 * loop.viscous_ns_per_mm / loop.period_s, held);
+}
 
 bool is_stable(const SampledLoop& loop, double stiffness_n_per_mm, double damping_ns_per_mm) {
   const Characteristic c = characteristic(loop);

@@ -3,23 +3,25 @@
 
 #include "shared/wire/personality.hpp"
 
+// The model of one axis of a device on a virtual wall, and the figures of each device.
+
 namespace kerf {
 
-/// A hand that holds the device for good: its mass moves with the tip, its spring and damper go to
-/// the ground. All zero: nobody holds the device, which is the worst case for stability.
+/// A hand that never lets the device go: its mass moves with the tip, its spring and damper go to
+/// ground. All zero: no hand, which is the worst case for stability.
 struct SampledHand {
   double mass_kg = 0;
   double damping_ns_per_mm = 0;
   double stiffness_n_per_mm = 0;
 };
 
-/// One axis of a haptic device in contact with a virtual wall: a mass that feels, once per period,
+/// One axis of a haptic device in contact with a virtual wall: a mass that gets, once per period,
 /// the force F = -K x - B v of the tick before, held until the next one.
 ///
-/// Linear but for `coulomb_n` and `quantum_mm`: gain_limits.hpp leaves both out,
-/// gain_limits.hpp and one_axis.hpp count them. No structural mode: a bound of this model says
-/// nothing above the device's first resonance. Mass and period are positive, the rest is not
-/// negative; whoever reads a file has checked that.
+/// Linear except for `coulomb_n` and `quantum_mm`: the exact limits of gain_limits.hpp ignore both,
+/// `quantum_stiffness` and axis_simulation.hpp use them. No structural mode: a bound of this model
+/// does not hold above the device's first resonance. Mass and period are positive, the rest is not
+/// negative; the readers of files check that.
 struct SampledLoop {
   double mass_kg = 0.045;      ///< apparent, at the tip
   double viscous_ns_per_mm{};  ///< damping of the device itself, b
@@ -35,22 +37,22 @@ struct SampledLoop {
   double quantum_mm = 0;  ///< of the encoders, at the tip
 };
 
-/// Longer delays are taken as this one.
+/// Longer delays are clamped to this one.
 inline constexpr double kMaxDelayPeriods = 64;
 
-/// What a device is to the hand, at its tip, as far as sources say (docs/devices.md, "Gains"). No
-/// unit was measured: a row is for checks and maps, never a claim about a unit.
+/// Figures of a device at its tip, from published sources (docs/devices.md, "Gains"). No unit was
+/// measured: a row is for checks and maps, never a claim about a unit.
 struct DeviceFigures {
   double mass_kg;  ///< apparent
-  /// No source has one: the lowest that identifications of such arms suggest. Less of it is the
-  /// worse case.
+  /// No source has a value: the lowest that identifications of such arms suggest. Less damping is
+  /// the worse case.
   double viscous_ns_per_mm;
   double coulomb_n;   ///< back-drive friction
   double quantum_mm;  ///< of the encoders, at the tip
   /// From the reading of the encoders to the moment at which its force acts: bus and controller of
   /// the device. Assumed until measured: 2 ms, two frames of a bus of 1 kHz.
   double delay_s;
-  /// Up to here a real port takes gains without being asked twice.
+  /// Up to here a real port accepts gains without a confirmation.
   double highest_stiffness_n_per_mm;
   double highest_damping_ns_per_mm;
 };
@@ -67,8 +69,8 @@ struct DeviceFigures {
   return {0.2, 0.0002, 0.2, 0.118, 0.002, 1.0, 0.02};
 }
 
-/// The loop of that device at a rate, held by nobody: a light grip is the worst case, since the
-/// damping of a hand that holds on comes on top (docs/theory.md 5.7).
+/// The loop of that device at a rate, without a hand: a light grip is the worst case, since the
+/// damping of a firm hand comes on top (docs/theory.md 5.7).
 [[nodiscard]] constexpr SampledLoop light_loop(Personality personality, double rate_hz) noexcept {
   const DeviceFigures device = device_figures(personality);
   SampledLoop loop;

@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "shared/numeric/statistics.hpp"
-#include "shared/segment/connection.hpp"
 #include "shared/segment/reader.hpp"
+#include "shared/segment/server.hpp"
 #include "shared/segment/writer.hpp"
 
 /// A milled volume without a controller, and a reader of its copy on the far machine.

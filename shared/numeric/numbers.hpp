@@ -7,6 +7,8 @@
 #include <cstdint>
 #include <limits>
 
+// The numbers of the servo: saturating fixed point, and the three bundles of number types.
+
 namespace kerf {
 
 /// Narrows to 32 bits; a value outside the range becomes the nearest end of the range.
@@ -16,7 +18,7 @@ namespace kerf {
   return static_cast<std::int32_t>(wide < kMin ? kMin : wide > kMax ? kMax : wide);
 }
 
-/// Adds, and stays at the end of the range where the sum would leave it.
+/// Sum of two numbers; if it would leave the range, the nearest end of the range.
 [[nodiscard]] constexpr std::int64_t saturating_add(std::int64_t a, std::int64_t b) noexcept {
   constexpr std::int64_t kMin = std::numeric_limits<std::int64_t>::min();
   constexpr std::int64_t kMax = std::numeric_limits<std::int64_t>::max();
@@ -172,8 +174,8 @@ template <std::floating_point S>
   return x - x == S(0);
 }
 
-/// The number types a kernel is written in. One text serves all three bundles; `FixedNumbers` runs
-/// in the loop by default, `DoubleNumbers` is the truth in tests.
+/// The number types that a kernel computes with. One template serves all three bundles:
+/// `FixedNumbers` is the default in the loop, `DoubleNumbers` the reference in tests.
 ///
 ///   Real      mm, N, voxels             Unit      sines, rotation entries, |x| <= 1
 ///   Angle     radians, |x| < 8          Ratio     voxels per mm, |x| < 128

@@ -7,6 +7,8 @@
 
 #include "shared/numeric/numbers.hpp"
 
+// Vectors and matrices of the servo, tagged with their space; clamping, and the work of a force.
+
 namespace kerf {
 
 /// Three numbers in one space. Vectors of different spaces do not mix; a named transform converts.
@@ -30,6 +32,7 @@ struct WorldSpace;   ///< mm in the scene; x right, y up, z to the user
 struct DeviceSpace;  ///< mm at the device port: world scaled by 1 / workspace_scale
 struct VoxelSpace;   ///< voxel edges of one volume; (0, 0, 0) is the centre of the first voxel
 struct JointSpace;   ///< radians, or N mm, of the three actuated joints
+struct ToolSpace;    ///< mm in the frame of the tool: centre of the cutting head, shaft along +y
 
 template <class S>
 using WorldVec = Vec<S, WorldSpace>;
@@ -40,7 +43,7 @@ using VoxelVec = Vec<S, VoxelSpace>;
 template <class S>
 using JointVec = Vec<S, JointSpace>;
 
-/// The same three numbers read in another space: only for transforms, which say why.
+/// The same three numbers in another space: only for transforms, with the reason beside it.
 template <class ToSpace, class S, class Space>
 [[nodiscard]] constexpr Vec<S, ToSpace> relabel(Vec<S, Space> v) noexcept {
   return {v.x, v.y, v.z};
@@ -107,7 +110,8 @@ template <class S, class To, class From>
   return t;
 }
 
-/// Shortens `v` to at most `length`, keeping its direction. A shorter vector is returned as it is.
+/// Shortens `v` to at most `length` and keeps its direction. A shorter vector is returned
+/// unchanged.
 template <std::floating_point S, class Space>
 [[nodiscard]] inline Vec<S, Space> clamped(Vec<S, Space> v, S length) noexcept {
   const S current = norm(v);
@@ -126,8 +130,7 @@ template <int F, class Space>
   return {shortened(v.x), shortened(v.y), shortened(v.z)};
 }
 
-// The loop's numbers as doubles, for the output.
-
+/// A number of the loop as a double, for the output.
 template <class S>
 [[nodiscard]] constexpr double as_double(S value) noexcept {
   return static_cast<double>(value);

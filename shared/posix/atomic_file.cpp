@@ -19,6 +19,9 @@
 #include "shared/text/text.hpp"
 
 namespace kerf {
+
+namespace fs = std::filesystem;
+
 namespace {
 
 /// Where the kernel shows an open file, so that it can be given a name.
@@ -28,22 +31,71 @@ std::string open_file(int fd) {
 
 /// The descriptor that /dev/stdout and the like stand for; negative: none. What it leads to may be
 /// a file: with `>` it is.
-int own_descriptor(const std::filesystem::path& path) noexcept {
+int own_descriptor(const fs::path& path) noexcept {
   if (path == "/dev/stdout") return STDOUT_FILENO;
   if (path == "/dev/stderr") return STDERR_FILENO;
   return -1;
 }
 
-}  // namespace
+/// Of the files that kerf reads and writes.
+constexpr std::string_view kEndings[] = {
+    ".nrrd", ".nhdr", ".mha", ".mhd", ".nii", ".gz",  ".tif", ".tiff", ".dcm", ".raw", ".toml",
+    ".json", ".npy",  ".npz", ".csv", ".svg", ".png", ".md",  ".stl",  ".ply", ".y4m", ".pem"};
 
-bool is_stream(const std::filesystem::path& path) {
-  if (own_descriptor(path) >= 0) return true;
-  std::error_code ignored;
-  const auto status = std::filesystem::status(path, ignored);
-  return std::filesystem::is_fifo(status) || std::filesystem::is_character_file(status);
+std::string ending_of(const fs::path& path) {
+  std::string ending = path.extension().string();
+  std::ranges::transform(ending, ending.begin(), [](char c) {
+    return 'A' <= c && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  });
+  return ending;
 }
 
-int open_stream(const std::filesystem::path& path) noexcept {
+fs::path place_of(const fs::path& path) {
+  std::error_code fault;
+  const fs::path place = fs::weakly_canonical(fs::absolute(path), fault);
+  return fault ? path.lexically_normal() : place;
+}
+
+bool lies_in(const fs::path& path, const fs::path& folder) {
+  std::error_code fault;
+  if (!fs::is_directory(folder, fault)) return false;
+  const fs::path place = place_of(path);
+  const fs::path above = place_of(folder);
+  return std::ranges::mismatch(above, place).in1 == above.end();
+}
+
+void refuse_ending(const OutputFile& output) {
+  const std::string ending = ending_of(output.path);
+  if (ending == output.ending || std::ranges::find(kEndings, ending) == std::end(kEndings)) return;
+  const std::string way_out = output.ending.empty()
+                                  ? "; give a name without an ending"
+                                  : "; let it end in " + std::string(output.ending);
+  throw FileError(output.path.string() + ": " + std::string(output.option) + " writes no " +
+                  ending + way_out);
+}
+
+void refuse_input(const OutputFile& output, const fs::path& input) {
+  if (is_same_file(output.path, input)) {
+    throw FileError(output.path.string() +
+                    ": is a file of this run itself, which would be lost; give " +
+                    std::string(output.option) + " another name");
+  }
+  if (lies_in(output.path, input)) {
+    throw FileError(output.path.string() + ": would lie among the files of " + input.string() +
+                    ", which are read; name a place outside with " + std::string(output.option));
+  }
+}
+
+}  // namespace
+
+bool is_stream(const fs::path& path) {
+  if (own_descriptor(path) >= 0) return true;
+  std::error_code ignored;
+  const auto status = fs::status(path, ignored);
+  return fs::is_fifo(status) || fs::is_character_file(status);
+}
+
+int open_stream(const fs::path& path) noexcept {
   if (const int own = own_descriptor(path); own >= 0) return ::fcntl(own, F_DUPFD_CLOEXEC, 0);
   const int fd = ::open(path.c_str(), O_WRONLY | O_NONBLOCK | O_NOCTTY | O_CLOEXEC);
   if (fd < 0) return -1;
@@ -62,7 +114,7 @@ std::string not_written(int error) {
          way_out_of(error, "make room or choose another place");
 }
 
-NewFile::NewFile(const std::filesystem::path& path) : path_(path) {
+NewFile::NewFile(const fs::path& path) : path_(path) {
   if (is_stream(path)) {
     fd_ = open_stream(path);
     if (fd_ < 0) fail(errno);
@@ -75,11 +127,11 @@ NewFile::NewFile(const std::filesystem::path& path) : path_(path) {
     throw FileError(path.string() + why);
   }
   std::error_code error;
-  const auto there = std::filesystem::symlink_status(path, error);
-  if (there.type() == std::filesystem::file_type::none) fail(error.value());
-  if (std::filesystem::is_symlink(there)) fail(ELOOP);
-  if (std::filesystem::is_directory(there)) fail(EISDIR);
-  if (std::filesystem::exists(there) && !std::filesystem::is_regular_file(there)) fail(EOPNOTSUPP);
+  const auto there = fs::symlink_status(path, error);
+  if (there.type() == fs::file_type::none) fail(error.value());
+  if (fs::is_symlink(there)) fail(ELOOP);
+  if (fs::is_directory(there)) fail(EISDIR);
+  if (fs::exists(there) && !fs::is_regular_file(there)) fail(EOPNOTSUPP);
   constexpr mode_t kReadWriteAll = 0666;  // the user's mask takes away from this
   fd_ = ::open(folder.c_str(), O_TMPFILE | O_WRONLY | O_CLOEXEC, kReadWriteAll);
   nameless_ = fd_ >= 0 && ::access(open_file(fd_).c_str(), F_OK) == 0;
@@ -180,33 +232,33 @@ void NewFile::fail(int error) const {
   throw FileError(path_.string() + ": " + not_written(error));
 }
 
-void check_new_file(const std::filesystem::path& path) {
+void check_new_file(const fs::path& path) {
   // The reader of a pipe would take this for its end.
   if (is_stream(path) && ::access(path.c_str(), W_OK) == 0) return;
   const NewFile never_committed(path);
 }
 
-void check_new_folder(const std::filesystem::path& folder) {
-  std::filesystem::path there = folder;
-  while (!there.empty() && !std::filesystem::exists(std::filesystem::symlink_status(there))) {
+void check_new_folder(const fs::path& folder) {
+  fs::path there = folder;
+  while (!there.empty() && !fs::exists(fs::symlink_status(there))) {
     there = there.parent_path();
   }
   if (there.empty()) there = ".";
-  const bool is_folder = std::filesystem::is_directory(there);
+  const bool is_folder = fs::is_directory(there);
   if (is_folder && ::access(there.c_str(), W_OK | X_OK) == 0) return;
   const int error = is_folder ? errno : ENOTDIR;
   throw FileError(folder.string() + ": " + std::generic_category().message(error) +
                   "; name a folder that can be written");
 }
 
-void write_new_file(const std::filesystem::path& path, std::string_view bytes) {
+void write_new_file(const fs::path& path, std::string_view bytes) {
   NewFile file(path);
   file.write(bytes.data(), bytes.size());
   file.close();
   file.commit();
 }
 
-NewFile& NewFiles::add(const std::filesystem::path& path) {
+NewFile& NewFiles::add(const fs::path& path) {
   return files_.emplace_back(path).file;
 }
 
@@ -238,7 +290,7 @@ void NewFiles::commit() {
   }));
 }
 
-std::optional<std::filesystem::path> NewFiles::commit_if_new() {
+std::optional<fs::path> NewFiles::commit_if_new() {
   const Named* const there = commit_all([](NewFile& file) { return file.commit_if_new(); });
   return there == nullptr ? std::nullopt : std::optional(there->path);
 }
@@ -253,64 +305,9 @@ std::string with_part(std::string_view page, std::string_view name, std::string_
   return std::string(page.substr(0, first)) + part + std::string(page.substr(last + end.size()));
 }
 
-void write_page_part(const std::filesystem::path& file, std::string_view name,
-                     std::string_view text) {
+void write_page_part(const fs::path& file, std::string_view name, std::string_view text) {
   write_new_file(file, with_part(text_in(file), name, text));
 }
-
-namespace fs = std::filesystem;
-namespace {
-
-/// Of the files that kerf reads and writes.
-constexpr std::string_view kEndings[] = {
-    ".nrrd", ".nhdr", ".mha", ".mhd", ".nii", ".gz",  ".tif", ".tiff", ".dcm", ".raw", ".toml",
-    ".json", ".npy",  ".npz", ".csv", ".svg", ".png", ".md",  ".stl",  ".ply", ".y4m", ".pem"};
-
-std::string ending_of(const fs::path& path) {
-  std::string ending = path.extension().string();
-  std::ranges::transform(ending, ending.begin(), [](char c) {
-    return 'A' <= c && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  });
-  return ending;
-}
-
-fs::path place_of(const fs::path& path) {
-  std::error_code fault;
-  const fs::path place = fs::weakly_canonical(fs::absolute(path), fault);
-  return fault ? path.lexically_normal() : place;
-}
-
-bool lies_in(const fs::path& path, const fs::path& folder) {
-  std::error_code fault;
-  if (!fs::is_directory(folder, fault)) return false;
-  const fs::path place = place_of(path);
-  const fs::path above = place_of(folder);
-  return std::ranges::mismatch(above, place).in1 == above.end();
-}
-
-void refuse_ending(const OutputFile& output) {
-  const std::string ending = ending_of(output.path);
-  if (ending == output.ending || std::ranges::find(kEndings, ending) == std::end(kEndings)) return;
-  const std::string way_out = output.ending.empty()
-                                  ? "; give a name without an ending"
-                                  : "; let it end in " + std::string(output.ending);
-  throw FileError(output.path.string() + ": " + std::string(output.option) + " writes no " +
-                  ending + way_out);
-}
-
-void refuse_input(const OutputFile& output, const fs::path& input) {
-  if (is_same_file(output.path, input)) {
-    throw FileError(output.path.string() +
-                    ": is a file of this run itself, which would be lost; give " +
-                    std::string(output.option) + " another name");
-  }
-  if (lies_in(output.path, input)) {
-    throw FileError(output.path.string() + ": would lie among the files of " + input.string() +
-                    ", which are read; name a place outside with " + std::string(output.option));
-  }
-}
-
-}  // namespace
 
 bool is_same_file(const fs::path& a, const fs::path& b) {
   std::error_code fault;

@@ -5,23 +5,24 @@
 #include <iosfwd>
 #include <string>
 
+// Errors of the system and exceptions as one line each, with a remedy.
+
 namespace kerf {
 
-/// The way out of `error` of the system where there is one and only one: a limit of this machine or
-/// of this user (open files, memory), links in a circle; else `usual`, what helps against every
-/// other reason.
+/// The remedy for an errno that has exactly one: a limit of this machine or user (open files,
+/// memory), links in a circle; for any other errno, `usual`.
 [[nodiscard]] const char* way_out_of(int error, const char* usual) noexcept;
 
-/// In a handler, for the one place of each program that prints errors: what the exception in flight
-/// says, on one line. Those of the standard library, which know of no way out, get one.
+/// In a handler: the message of the current exception, on one line, with a remedy added to those of
+/// the standard library. For the one place of each program that prints errors.
 [[nodiscard]] std::string failure_text();
 
-/// Why what was told on `out`, the standard output, is not all there, on one line. Empty: it is, or
-/// its reader left early and has what it wanted.
+/// Why `out`, the standard output, was not written completely, on one line. Empty if it was, or if
+/// its reader closed it early.
 [[nodiscard]] std::string why_untold(std::ostream& out);
 
-/// What is told, after its name, of a place where nobody can say whether a file is there: a loop of
-/// links, a folder of somebody else's. Empty: something is there, or nothing is.
+/// The message, to follow its name, for a path whose existence cannot be determined: a loop of
+/// links, a folder without permission. Empty if it is known whether something is there.
 [[nodiscard]] std::string why_unreachable(const std::filesystem::path& path);
 
 }  // namespace kerf

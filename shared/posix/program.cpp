@@ -22,8 +22,8 @@
 namespace kerf {
 namespace {
 
-/// Started without a standard descriptor, a program would give its number to the next file, socket
-/// or segment, and what it tells would go there. Reading gives nothing, and writing is an error.
+/// A program started without a standard descriptor would give its number to the next file, socket
+/// or segment, and its messages would go there. Reading these gives nothing; writing is an error.
 void keep_standard_numbers() noexcept {
   for (const int number : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
     // The lowest free number is this one.

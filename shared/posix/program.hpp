@@ -8,36 +8,37 @@
 
 #include <unistd.h>
 
+// The frame of every program, and what programs print or look up about themselves.
+
 namespace kerf {
 
-/// The stack that a program asks for. What was measured needs 96 KiB at most (a CT that is read in
-/// the sandbox), and threads get as much as the first one; a law of the user's may need more.
+/// The smallest stack that a program accepts. Measured use is 96 KiB at most (a CT read in the
+/// sandbox), and each thread gets as much as the first one; a law of the user may need more.
 inline constexpr unsigned long long kLeastStackBytes = 1 << 20;
 
-/// What every `main` of kerf is: `work`, and around it
-/// - no file or socket that it opens becomes its standard input, output or error
-/// - files and sockets that it makes are 0600, folders 0700, whatever umask it was started with;
-///   they may be of patients
-/// - a file that `ulimit -f` does not let grow is an error of the write, not a signal
-/// - a stack of less than kLeastStackBytes is refused: it would end in a crash
-/// - what it throws is one line on standard error, after `program`, and exit code 2
-/// - where its standard output could not be written, so are a line and 2 instead of 0.
-/// Returns the exit code, else that of `work`.
+/// The body of every `main` of kerf: runs `work` and returns its exit code. Around it:
+/// - no file or socket that it opens becomes standard input, output or error;
+/// - its files and sockets get mode 0600, its folders 0700, whatever the umask was: they may hold
+///   data of patients;
+/// - a file that may not grow any more (`ulimit -f`) is an error of the write, not a signal;
+/// - a stack of less than kLeastStackBytes is refused, because it would end in a crash;
+/// - an exception becomes one line on standard error, after `program`, and exit code 2;
+/// - if standard output could not be written, a line on standard error, and 2 instead of 0.
 [[nodiscard]] int run_program(const char* program, const std::function<int()>& work);
 
-/// The processor's name as Linux tells it, or words that say that it tells none.
+/// The name of the processor as Linux reports it, or words for a processor without a name.
 [[nodiscard]] std::string processor_name();
 
 /// The day of a run, UTC: 2026-01-31.
 [[nodiscard]] std::string today();
 
-/// Where a file or folder lies that comes with kerf, such as `scenes/touch.toml`: as it is named
-/// where that exists, else beside the program or in a folder above it, at most six up; the name
-/// itself where it lies nowhere, so that who opens it can complain. Start-up only.
+/// Path of a file or folder that comes with kerf, such as `scenes/touch.toml`: `name` itself if it
+/// exists, else beside the program or in a folder above it, at most six up. If there is none,
+/// `name`, so that opening it fails with that name. Start-up only.
 [[nodiscard]] std::string shipped_file(const std::string& name);
 
-/// A progress bar on stderr where it is wanted and stderr is a terminal; else it shows nothing. It
-/// goes when this does.
+/// A progress bar on stderr; shows nothing unless it is wanted and stderr is a terminal. The
+/// destructor removes it.
 class ProgressBar {
  public:
   explicit ProgressBar(bool wanted) noexcept : shown_(wanted && isatty(STDERR_FILENO) == 1) {}
@@ -45,12 +46,12 @@ class ProgressBar {
   ProgressBar(const ProgressBar&) = delete;
   ProgressBar& operator=(const ProgressBar&) = delete;
 
-  /// Until it is shown again: for another line on stderr.
+  /// Removes the bar until the next `show`, so that another line can go to stderr.
   void hide() const noexcept {
     if (shown_) std::fputs("\r\033[K", stderr);
   }
 
-  /// `share` 0..1, or negative while waiting; `text` says what for.
+  /// `share` 0..1, or negative while waiting; `text` names the work.
   void show(double share, const std::string& text) const {
     if (!shown_) return;
     constexpr int kWidth = 40;

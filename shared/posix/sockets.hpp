@@ -7,25 +7,27 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+// Addresses for UDP, and the user behind a Unix socket.
+
 namespace kerf {
 
-/// Where something listens on UDP, as the sockets API wants it.
+/// A UDP address, as the sockets API takes it.
 struct UdpAddress {
   sockaddr_storage storage{};
   socklen_t bytes = 0;
-  std::string error;  ///< what is wrong with the text; empty: nothing is
+  std::string error;  ///< what is wrong with the text; empty: nothing
 
   [[nodiscard]] const sockaddr* get() const noexcept {
     return reinterpret_cast<const sockaddr*>(&storage);
   }
 };
 
-/// Of `[ADDRESS:]PORT`: a number or a name, IPv6 in brackets; this machine (127.0.0.1) where none
-/// is given. Asks the resolver, which for a name may take seconds.
+/// Parses `[ADDRESS:]PORT`: a number or a name, IPv6 in brackets; without an address this machine
+/// (127.0.0.1). Calls the resolver, which may take seconds for a name.
 [[nodiscard]] UdpAddress resolve_udp(const std::string& text);
 
-/// Who may use a Unix socket of ours: this user and root. Gives the user at the other end of `fd`
-/// where that is another one (or unknown: nobody, -1).
+/// Only this user and root may use our Unix sockets. Returns the user of the peer of `fd` if it is
+/// another one (-1 if unknown), else nothing.
 [[nodiscard]] inline std::optional<uid_t> stranger_at(int fd) noexcept {
   ucred peer{};
   socklen_t length = sizeof peer;

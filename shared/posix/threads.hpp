@@ -11,6 +11,8 @@
 
 #include <pthread.h>
 
+// Cores and priority of threads, worker threads, and a watchdog for a step that never ends.
+
 namespace kerf {
 
 /// Cores that this process may use, in order; a container may hold fewer than the machine has. By
@@ -27,8 +29,8 @@ namespace kerf {
 /// number; EINVAL, and the thread stays where it is, when there is no other.
 [[nodiscard]] int leave_core(int core) noexcept;
 
-/// A thread that shares in a work; where the system has none left the work is done here, at once,
-/// and the thread that is returned is none.
+/// Runs `work` in a thread of its own. If the system has no thread left, runs it here at once and
+/// returns an empty thread.
 template <class Work>
 [[nodiscard]] std::jthread helper_thread(const Work& work) {
   try {
@@ -39,21 +41,22 @@ template <class Work>
   }
 }
 
-/// Tells, from another thread, that a step of a thread does not end: a loop in somebody's own law.
-/// It goes by the thread's own CPU time, so neither a wait nor a busy machine looks like one. Such
-/// a thread cannot be ended, only its program.
+/// Detects, from another thread, a step that does not end, as an endless loop in a law of the user.
+/// It measures the CPU time of the watched thread, so neither waiting nor a busy machine counts.
+/// Such a thread cannot be ended, only its program.
 class EndlessStep {
  public:
   static constexpr int kMostSeconds = 5;  ///< of CPU time for one step; the longest takes some ms
 
-  /// Of a living thread that counts its steps in `steps`.
+  /// Watches a living thread that counts its steps in `steps`.
   EndlessStep(pthread_t thread, const std::atomic<std::uint64_t>& steps,
               int most_seconds = kMostSeconds) noexcept
       : steps_(steps), most_seconds_(most_seconds) {
     known_ = pthread_getcpuclockid(thread, &clock_) == 0;
   }
 
-  /// Now and then, from one thread. False where the thread has ended.
+  /// Call now and then, from one thread. True if the current step exceeds its time; false if the
+  /// thread has ended.
   [[nodiscard]] bool look() noexcept {
     timespec used{};
     if (!known_ || clock_gettime(clock_, &used) != 0) return false;

@@ -6,22 +6,23 @@
 #include <cstdint>
 #include <iterator>
 
+// Commands of a reader to the controller, and the answers.
+
 namespace kerf {
 
-/// Name of a controller's segment, and of the controller that a reader looks for, where nobody says
-/// another (`--name`).
+/// Default of `--name`: the name of a controller and its segment.
 inline constexpr const char* kUsualName = "kerf";
 
-/// What a reader may wish of the controller.
+/// Kinds of commands.
 enum class CommandKind : std::uint32_t {
   select_tool = 1,  ///< argument: index into the scene's tools
   hold = 2,         ///< argument: 1 stops cutting and force, 0 goes on
   reset = 3,        ///< argument: 0; the volumes go back to their first content
-  undo = 4,         ///< argument: 0; they go back to what they were before the last stroke
+  undo = 4,         ///< argument: 0; the volumes go back to their content before the last stroke
 };
 
-/// One wish of a reader to the controller: a fixed-size message over the socket, validated outside
-/// the servo, applied by the servo at a tick boundary, logged as an input.
+/// One command: a message of fixed size over the socket, validated outside the servo, applied by
+/// the servo at a tick boundary, logged as an input.
 struct Command {
   CommandKind kind = CommandKind::hold;
   std::uint32_t index = 0;  ///< set by the server: 1, 2, ... in order of acceptance
@@ -38,7 +39,7 @@ enum class ReplyStatus : std::uint32_t {
   refused = 2,   ///< unknown kind, argument out of range or value not finite
 };
 
-/// What the server answers at once.
+/// The immediate answer of the server.
 struct Reply {
   ReplyStatus status = ReplyStatus::refused;
   std::uint32_t index = 0;  ///< `Command::index`, as TickRecord::last_command will show it
@@ -47,12 +48,12 @@ static_assert(sizeof(Reply) == 8);
 
 inline constexpr std::uint32_t kCommandSlots = 64;
 
-/// What the scene lets a command name; checked before the queue.
+/// Limits of the arguments, by the scene; checked before the queue.
 struct CommandLimits {
   std::uint32_t tools = 1;
 };
 
-/// True where `command` may go to the servo.
+/// Whether `command` may go to the servo.
 [[nodiscard]] inline bool is_valid(const Command& command, const CommandLimits& limits) noexcept {
   if (!std::all_of(std::begin(command.value), std::end(command.value),
                    [](double v) { return std::isfinite(v); })) {

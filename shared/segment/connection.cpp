@@ -20,6 +20,7 @@
 
 #include "shared/posix/error_text.hpp"
 #include "shared/segment/layout.hpp"
+#include "shared/segment/server.hpp"
 
 namespace kerf {
 

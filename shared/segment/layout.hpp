@@ -12,18 +12,18 @@
 
 namespace kerf {
 
-/// The shared segment byte by byte: what the controller writes and every reader maps.
-///
-///     0                  SegmentHeader, one page; each hot word on its own 64-byte line
-///     off_volume_table   one VolumeDescriptor per volume
-///     off_scene          canonical scene, JSON text
-///     off_state          ring of TickRecord, slot = index mod state_slots
-///     off_dirty          ring of DirtyRecord, slot = index mod dirty_slots
-///     per volume         u64 version per brick | 512 densities per brick | labels (optional)
-///
-/// Little-endian, natural alignment, offsets instead of pointers. `layout_table.hpp` repeats every
-/// field as (name, offset, type); the table is checked against these structs and hashed into
-/// `kAbiHash`, so a program of another layout refuses the segment instead of misreading it.
+// The shared segment byte by byte: the controller writes it, every reader maps it.
+//
+//     0                  SegmentHeader, one page; each hot word on its own 64-byte line
+//     off_volume_table   one VolumeDescriptor per volume
+//     off_scene          canonical scene, JSON text
+//     off_state          ring of TickRecord, slot = index mod state_slots
+//     off_dirty          ring of DirtyRecord, slot = index mod dirty_slots
+//     per volume         u64 version per brick | 512 densities per brick | labels (optional)
+//
+// Little-endian, natural alignment, offsets instead of pointers. `layout_table.hpp` lists every
+// field as (name, offset, type); the table is checked against these structs and hashed into
+// `kAbiHash`, so a program of another layout refuses the segment instead of misreading it.
 
 static_assert(std::endian::native == std::endian::little,
               "the segment and the log are little-endian and written as they lie in memory; a "
@@ -205,14 +205,14 @@ enum class DirtyCause : std::uint16_t { milling = 0, load = 1, reset = 2, undo =
 struct DirtyRecord {
   std::uint64_t seq;
   std::uint64_t tick;
-  std::uint64_t time_ns;  ///< CLOCK_MONOTONIC of the tick before: the servo asks no clock for this
+  std::uint64_t time_ns;  ///< CLOCK_MONOTONIC of the tick before: the servo reads no clock for this
   std::uint16_t lo[3];
   std::uint16_t hi[3];    ///< half-open
   std::uint32_t removed;  ///< by an undo: given back
   std::uint16_t volume;
   std::uint16_t cause;
   std::uint32_t bricks;    ///< bricks the box touches
-  std::uint64_t box_hash;  ///< `box_hash` of the densities in the box; 0 where it is too large
+  std::uint64_t box_hash;  ///< `box_hash` of the densities in the box; 0 if it is too large
   std::uint64_t reserved0;
 };
 

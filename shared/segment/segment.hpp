@@ -14,6 +14,8 @@
 #include "shared/segment/layout.hpp"
 #include "shared/volume/brick_grid.hpp"
 
+// A segment before its writer: errors, what it is made from, the plan of its parts, its memory.
+
 namespace kerf {
 
 /// A segment that cannot be made, reached or trusted. One line: "place: value; way out".
@@ -22,18 +24,19 @@ class SegmentError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// No controller of that name answers (yet): worth trying again, unlike every other SegmentError.
+/// No controller of that name answers (yet): the caller may try again, unlike after any other
+/// SegmentError.
 class SegmentAbsent : public SegmentError {
  public:
   using SegmentError::SegmentError;
 };
 
-/// The text of an `errno`; unlike strerror, for any thread.
+/// Text of an `errno`; thread-safe, unlike strerror.
 [[nodiscard]] inline std::string system_message(int error) {
   return std::generic_category().message(error);
 }
 
-/// One volume, as readers are to see it at tick 0.
+/// One volume, as readers see it at tick 0.
 struct SegmentVolumeSpec {
   VoxelGrid grid;  ///< each edge 1..65535
   std::array<double, 3> spacing_mm{1, 1, 1};
@@ -45,17 +48,17 @@ struct SegmentVolumeSpec {
   std::span<const Label> labels;     ///< empty, or one per voxel; copied by `create`
 };
 
-/// All that a segment is made from.
+/// The content of a segment at tick 0.
 struct SegmentSpec {
   std::vector<SegmentVolumeSpec> volumes;  ///< 1..8
   std::string scene_json;
   std::uint64_t config_hash = 0;
   std::uint32_t tick_ns = 1'000'000;
   std::string build_id;        ///< cut to 63 characters
-  bool mirror_updates = true;  ///< false: nothing is cut, so no dirty ring and no brick updates
+  bool mirror_updates = true;  ///< false if nothing is cut: no dirty ring and no brick updates
 };
 
-/// Where everything goes: the static header and the descriptors, filled except for the magic, the
+/// Offsets of all parts: the static header and the descriptors, complete except for the magic, the
 /// session, the start time and the content hashes.
 struct SegmentPlan {
   SegmentHeader header{};
@@ -65,26 +68,26 @@ struct SegmentPlan {
 /// Checks `spec` and lays it out. Throws `SegmentError`.
 [[nodiscard]] SegmentPlan plan_segment(const SegmentSpec& spec);
 
-/// Cut to what the header holds.
+/// Cuts `build_id` to the room in the header.
 void set_build_id(SegmentHeader& header, std::string_view build_id);
 
-/// Fills what every segment has and all places, from the volumes' sizes (`off_labels` not 0: has
-/// labels), the scene's size and the slots of the dirty ring.
+/// Fills the constant fields and all offsets, from the sizes of the volumes (`off_labels` not 0:
+/// has labels), the size of the scene and the slots of the dirty ring.
 void lay_out(SegmentPlan& plan);
 
 /// Checks a plan that is laid out, by the rules of `parse_segment`. Throws `SegmentError`.
 void check_plan(const SegmentPlan& plan);
 
-/// A memfd, mapped writable by its maker only, populated and locked where the limits allow.
+/// A memfd, mapped writable only by this process, populated, and locked if the limits allow it.
 class SegmentMemory {
  public:
-  /// Throws `SegmentError` where `bytes` are not to be had.
+  /// Throws `SegmentError` if there is no memory for `bytes`.
   [[nodiscard]] static SegmentMemory create(std::uint64_t bytes);
   SegmentMemory(SegmentMemory&& other) noexcept;
   SegmentMemory& operator=(SegmentMemory&& other) noexcept;
   ~SegmentMemory();
 
-  /// From here on nobody resizes it, and nobody else maps or writes it writable.
+  /// From here on no process can resize it, and no other can map it writable or write it.
   void seal();
 
   [[nodiscard]] int fd() const noexcept { return fd_; }

@@ -40,7 +40,7 @@ template <class Word = std::uint64_t>
   return std::atomic_ref<Word>(*reinterpret_cast<Word*>(at));
 }
 
-/// Writer: from here until `close` the data under `version` is in motion.
+/// Writer: from here until `close` the data under `version` is not consistent.
 inline void open(std::byte* version, std::uint64_t odd) noexcept {
   word(version).store(odd, std::memory_order_relaxed);
   fence(std::memory_order_release);
@@ -59,7 +59,8 @@ inline void store(std::byte* to, const void* from, std::size_t bytes) noexcept {
   }
 }
 
-/// Reader: copies `bytes` (a multiple of 8) out of the segment; whole only if `unchanged` says so.
+/// Reader: copies `bytes` (a multiple of 8) out of the segment; consistent only if `unchanged`
+/// returns true after it.
 inline void load(void* to, std::byte* from, std::size_t bytes) noexcept {
   auto* target = static_cast<std::byte*>(to);
   for (std::size_t i = 0; i < bytes; i += 8) {
@@ -68,7 +69,7 @@ inline void load(void* to, std::byte* from, std::size_t bytes) noexcept {
   }
 }
 
-/// Reader: true where nothing was written under `version` since it was loaded (acquire) as `seen`.
+/// Reader: whether nothing was written under `version` since it was loaded (acquire) as `seen`.
 [[nodiscard]] inline bool unchanged(std::byte* version, std::uint64_t seen) noexcept {
   fence(std::memory_order_acquire);
   return word(version).load(std::memory_order_relaxed) == seen;
@@ -94,8 +95,8 @@ struct RecordRing {
     shared_words::word(head).store(++published, std::memory_order_release);
   }
 
-  /// Goes on at `index`, which grows: what lies between never comes. Their slots say so as if the
-  /// record of the next round were being written, which readers take for `ReadState::overrun`.
+  /// Continues at `index`, which grows; the records between are never written. Their slots get the
+  /// version of the next round being written, which readers report as `ReadState::overrun`.
   void skip_to(std::uint64_t index) noexcept {
     if (index <= published) return;
     const std::uint64_t round = mask + 1;

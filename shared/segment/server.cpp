@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
+#include "shared/segment/server.hpp"
+
 #include <algorithm>
 #include <array>
 #include <atomic>
@@ -30,6 +32,7 @@
 #include "shared/segment/layout_table.hpp"
 
 namespace kerf {
+namespace {
 
 /// A queue of `N` items between one thread that pushes and one that takes. Wait-free on both sides;
 /// a full queue refuses.
@@ -55,16 +58,14 @@ class SpscQueue {
   }
 
  private:
-  // Both sides count on for ever and wrap; the difference is the fill. A line each, so that the
-  // taker's line moves only when it takes.
+  // Both counters wrap; their difference is the fill. Each has its own cache line, so that the line
+  // of the taker changes only when it takes.
   alignas(64) std::atomic<std::uint32_t> head_{0};
   alignas(64) std::atomic<std::uint32_t> tail_{0};
   std::array<T, N> items_{};
 };
 
-namespace {
-
-/// The socket at `path` that readers ask; the path goes with it.
+/// The socket at `path` to which readers connect; the destructor removes the path.
 class Listener {
  public:
   explicit Listener(std::string path) : path_(std::move(path)) {
@@ -92,7 +93,7 @@ class Listener {
   OwnedFd fd_;
 };
 
-/// The memfd opened again, read-only: what a reader gets, so that it cannot even try to write.
+/// The memfd opened again, read-only, for readers: they cannot map it writable.
 [[nodiscard]] OwnedFd reopen_read_only(int memfd) {
   const std::string path = "/proc/self/fd/" + std::to_string(memfd);
   OwnedFd fd(open(path.c_str(), O_RDONLY | O_CLOEXEC));
@@ -103,7 +104,7 @@ class Listener {
   return fd;
 }
 
-/// What wakes the server's thread for its end.
+/// An event that ends the server's thread.
 [[nodiscard]] OwnedFd make_event() {
   OwnedFd fd(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK));
   if (fd.get() < 0) {
@@ -143,7 +144,7 @@ struct SegmentServer::State {
         hello{kSegmentMagic, kLayoutMajor, kLayoutMinor, kAbiHash, session_id},
         limits(command_limits),
         others(std::move(others_answer)) {
-    polled.reserve(2 + kMaxPeers);  // not in the thread, which has nobody to tell that it failed
+    polled.reserve(2 + kMaxPeers);  // not in the thread, which could not report that it failed
     peers.reserve(kMaxPeers);
     thread = std::thread([this] { serve(); });
   }
@@ -183,7 +184,8 @@ struct SegmentServer::State {
     if (send_hello(peer.get(), hello, segment.get())) peers.push_back(std::move(peer));
   }
 
-  /// One message of one peer; false where the peer has gone or does not take its answer.
+  /// Answers one message of one peer; returns false if the peer has gone or does not read its
+  /// answer.
   bool answer(int peer) noexcept {
     Command command;
     const ssize_t length = recv(peer, &command, sizeof command, MSG_DONTWAIT | MSG_TRUNC);
@@ -209,7 +211,7 @@ struct SegmentServer::State {
   OwnedFd stop;
   SegmentHello hello;
   CommandLimits limits;
-  Answer others;  // where the commands are not for `commands`
+  Answer others;  // if not empty, it gets the commands in place of the queue
   std::vector<pollfd> polled;
   std::vector<OwnedFd> peers;
   std::uint32_t accepted = 0;

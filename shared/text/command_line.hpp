@@ -7,35 +7,7 @@
 #include <string>
 #include <vector>
 
-namespace kerf {
-
-/// An option or an argument, as a person may write it.
-struct ManualOption {
-  std::vector<std::string> names;  ///< `--scene`, `-h`; of an argument by its place, its name alone
-  std::string value;               ///< the word that stands for it; empty: takes none
-  std::vector<std::string> choices;  ///< all that it may be; empty: anything
-  std::string meaning;
-};
-
-/// What a program takes, or one of its commands.
-struct ManualPart {
-  std::string name, about, footer;
-  std::vector<ManualOption> places, options;
-};
-
-struct Manual {
-  ManualPart program;
-  std::vector<ManualPart> commands;
-  std::string version;
-};
-
-/// As a page of section 1 for man.
-[[nodiscard]] std::string man_page(const Manual& manual);
-
-/// As a script for bash-completion: options, commands and choices; else files.
-[[nodiscard]] std::string bash_completion(const Manual& manual);
-
-}  // namespace kerf
+// Options of a program and its commands; its man page and completion.
 
 namespace CLI {  // NOLINT(readability-identifier-naming): the library's name
 class App;
@@ -44,12 +16,12 @@ class Option;
 
 namespace kerf {
 
-/// Arguments that nobody declared, or a value that an option cannot take: one line.
+/// An argument that is not declared, or a value that an option does not accept: one line.
 struct UsageError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// One declared option or flag. Small: a name for what the command line owns.
+/// One declared option or flag. Small: a handle to what the command line owns.
 class Option {
  public:
   explicit Option(CLI::Option* option) : option_(option) {}
@@ -70,7 +42,7 @@ class Option {
   Option& one_each();
   Option& needs(Option other);
   Option& excludes(Option other);
-  /// Taken from the environment where the arguments do not give it.
+  /// Taken from the environment if the arguments do not give it.
   Option& from_environment(const char* name);
 
   /// After parsing.
@@ -80,8 +52,8 @@ class Option {
   CLI::Option* option_;
 };
 
-/// A program or one of its commands: what it takes. Small: a name for what the command line owns.
-/// Variables are filled while parsing and must live until then.
+/// The arguments of a program or of one of its commands. Small: a handle to what the command line
+/// owns. Variables are filled while parsing and must live until then.
 class Arguments {
  public:
   /// `name` without dashes takes the argument of that place. `T`: int, std::int64_t,
@@ -114,12 +86,39 @@ class CommandLine : public Arguments {
   CommandLine(const CommandLine&) = delete;
   CommandLine& operator=(const CommandLine&) = delete;
 
-  /// False: help or version was asked for, and stands on `out`; or, for the build, which installs
-  /// them, by `--man` or `--completion` alone, the man page or the completion. Throws `UsageError`.
+  /// Returns false if the arguments ask for help or version, which are then on `out`; `--man` or
+  /// `--completion` alone, for the build, write the man page or the completion. Throws
+  /// `UsageError`.
   [[nodiscard]] bool parse(int argc, const char* const* argv, std::ostream& out);
 
  private:
   std::unique_ptr<CLI::App> owned_;
 };
+
+/// An option or an argument, as the manual lists it.
+struct ManualOption {
+  std::vector<std::string> names;    ///< `--scene`, `-h`; of a positional argument its name alone
+  std::string value;                 ///< placeholder of the value; empty: takes none
+  std::vector<std::string> choices;  ///< all allowed values; empty: any
+  std::string meaning;
+};
+
+/// Options and arguments of a program or of one of its commands.
+struct ManualPart {
+  std::string name, about, footer;
+  std::vector<ManualOption> places, options;
+};
+
+struct Manual {
+  ManualPart program;
+  std::vector<ManualPart> commands;
+  std::string version;
+};
+
+/// A page of section 1 for man.
+[[nodiscard]] std::string man_page(const Manual& manual);
+
+/// A script for bash-completion: options, commands and choices; else files.
+[[nodiscard]] std::string bash_completion(const Manual& manual);
 
 }  // namespace kerf

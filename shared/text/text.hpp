@@ -20,11 +20,12 @@
 #include <utility>
 #include <vector>
 
-// Words that a person may write, for the answers to a wrong one.
+// Numbers, hex, printf patterns, quoting, spelling suggestions, and the bytes of a file.
+
 namespace kerf {
 
-/// `text` as a terminal only shows it, on one line: control characters, which a path may hold,
-/// stand as in C, `\n` or `\x1b`. UTF-8 stays, but for its own control characters.
+/// `text` on one line and safe for a terminal: control characters, which a path may contain, are
+/// written as in C, `\n` or `\x1b`. Other UTF-8 stays.
 [[nodiscard]] inline std::string escaped(std::string_view text) {
   constexpr std::string_view kDigits = "0123456789abcdef";
   std::string shown;
@@ -43,13 +44,13 @@ namespace kerf {
   return shown;
 }
 
-/// The same, cut where it is too long to read: for what is quoted of a user's file.
+/// The same, cut after 400 bytes: for quotations from a file of the user.
 [[nodiscard]] inline std::string one_line(std::string_view text) {
   constexpr std::size_t kLongestLine = 400;
   return escaped(text.substr(0, kLongestLine));
 }
 
-/// Insertions, deletions and exchanges that turn one word into the other.
+/// Levenshtein distance of two words.
 [[nodiscard]] inline std::size_t edit_distance(std::string_view a, std::string_view b) {
   std::vector<std::size_t> row(b.size() + 1);
   std::iota(row.begin(), row.end(), std::size_t{0});
@@ -76,7 +77,7 @@ template <class Names>
 }
 
 /// The known name that `word` was probably meant to be: the same quantity in another unit
-/// (`radius_cm`, `radius` -> `radius_mm`), else the nearest in spelling; empty when none is near.
+/// (`radius_cm`, `radius` -> `radius_mm`), else the nearest in spelling; empty if none is near.
 [[nodiscard]] inline std::string_view nearest(std::string_view word,
                                               std::span<const std::string_view> known) {
   const auto quantity = [](std::string_view key) { return key.substr(0, key.find('_')); };
@@ -124,7 +125,7 @@ template <class Names>
   return {buffer.data(), end.ptr};
 }
 
-/// `value` above 0 in so many digits, and never more than it: what is told to be safe is.
+/// `value`, above 0, rounded down to so many digits: a limit that is printed as safe is safe.
 [[nodiscard]] inline std::string text_below(double value, int digits) {
   const double step = std::pow(10, std::floor(std::log10(value)) + 1 - digits);
   constexpr double kRounding = 1e-9;  // of a value that is a whole number of steps
@@ -142,16 +143,15 @@ template <class... Values>
   return text;
 }
 
-/// 16 hex digits, lower case: how hashes and identities are told.
+/// 16 hex digits, lower case, as hashes and identities are printed.
 [[nodiscard]] inline std::string hex64(std::uint64_t value) {
   std::string text(16, '0');
   for (std::size_t i = text.size(); i-- > 0; value >>= 4) text[i] = "0123456789abcdef"[value & 15];
   return text;
 }
 
-/// The bytes of a file; none where it cannot be read, or is a pipe or device, whose writer might
-/// never come. In blocks: a byte at a time, a program of 60 MB would take five seconds under a
-/// sanitizer.
+/// The bytes of a file; none if it cannot be read, or is a pipe or device, which might block. Reads
+/// in blocks: byte by byte, a file of 60 MB would take five seconds under a sanitizer.
 [[nodiscard]] inline std::string text_in(const std::filesystem::path& path) {
   std::error_code fault;
   if (!std::filesystem::is_regular_file(path, fault)) return {};

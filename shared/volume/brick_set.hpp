@@ -11,9 +11,9 @@
 
 namespace kerf {
 
-/// The bricks of one volume that wait to be copied: a bit each, taken round-robin by words of 64,
-/// so that with a budget of 64 or more no brick starves however much changes. Allocates only when
-/// made.
+/// The bricks of one volume that wait to be copied: one bit each, taken round-robin by words of 64,
+/// so that with a budget of 64 or more no brick starves, however much changes. Allocates only in
+/// the constructor.
 class DirtyBricks {
  public:
   explicit DirtyBricks(const BrickGrid& bricks) : bricks_(bricks), bits_(bricks.count() / 64 + 1) {}

@@ -15,6 +15,26 @@ namespace {
   return std::rotl((lane ^ word) * 0x9fb21c651e98df25, 29);
 }
 
+using CrcTable = std::array<std::array<std::uint32_t, 256>, 8>;
+
+// table[k][b]: effect of byte b followed by k zero bytes.
+constexpr CrcTable kCrcTable = [] {
+  constexpr std::uint32_t kPolynomial = 0x82f63b78;  // Castagnoli, reflected
+  CrcTable table{};
+  for (std::uint32_t byte = 0; byte < 256; ++byte) {
+    std::uint32_t crc = byte;
+    for (int bit = 0; bit < 8; ++bit) crc = crc >> 1 ^ ((crc & 1) != 0 ? kPolynomial : 0);
+    table[0][byte] = crc;
+  }
+  for (std::size_t k = 1; k < table.size(); ++k) {
+    for (std::size_t byte = 0; byte < 256; ++byte) {
+      const std::uint32_t before = table[k - 1][byte];
+      table[k][byte] = before >> 8 ^ table[0][before & 0xff];
+    }
+  }
+  return table;
+}();
+
 }  // namespace
 
 void DensityHasher::add_row(std::span<const Density> row) noexcept {
@@ -63,30 +83,6 @@ std::uint64_t box_hash(std::span<const Density> linear, const VoxelGrid& grid,
   }
   return hasher.value();
 }
-
-namespace {
-
-using CrcTable = std::array<std::array<std::uint32_t, 256>, 8>;
-
-// table[k][b]: effect of byte b followed by k zero bytes.
-constexpr CrcTable kCrcTable = [] {
-  constexpr std::uint32_t kPolynomial = 0x82f63b78;  // Castagnoli, reflected
-  CrcTable table{};
-  for (std::uint32_t byte = 0; byte < 256; ++byte) {
-    std::uint32_t crc = byte;
-    for (int bit = 0; bit < 8; ++bit) crc = crc >> 1 ^ ((crc & 1) != 0 ? kPolynomial : 0);
-    table[0][byte] = crc;
-  }
-  for (std::size_t k = 1; k < table.size(); ++k) {
-    for (std::size_t byte = 0; byte < 256; ++byte) {
-      const std::uint32_t before = table[k - 1][byte];
-      table[k][byte] = before >> 8 ^ table[0][before & 0xff];
-    }
-  }
-  return table;
-}();
-
-}  // namespace
 
 std::uint32_t crc32c(std::span<const std::byte> bytes) noexcept {
   std::uint32_t crc = 0xffffffff;

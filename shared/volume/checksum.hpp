@@ -11,8 +11,8 @@
 namespace kerf {
 
 /// 64-bit hash of rows of densities: four multiplicative lanes, so that the multiplier's latency is
-/// hidden. Tells contents apart; no protection against somebody who wants to collide. Same value on
-/// every machine, whatever its byte order.
+/// hidden. For comparing contents; it does not resist deliberate collisions. Same value on every
+/// machine, whatever its byte order.
 class DensityHasher {
  public:
   void add_row(std::span<const Density> row) noexcept;

@@ -17,9 +17,9 @@ namespace kerf {
 /// Amounts of density by the index of their material; a full voxel is kDensityMax steps.
 using StepsByMaterial = std::vector<std::uint64_t>;
 
-/// Says which material a voxel is of. A label decides. Without one the voxel's first density does:
-/// it is of the densest material that this density reaches, or of the softest where it reaches
-/// none. So cutting changes no voxel's material. Pictures colour voxels by the same rule.
+/// Returns the material of a voxel: that of its label; without a label, the densest material whose
+/// density the voxel had at the start, or the softest if it reached none. So cutting never changes
+/// the material of a voxel. Pictures colour voxels by the same rule.
 class MaterialRule {
  public:
   /// Density, 0..1, from which each material shows; index 0 is "none", which no voxel reaches.
@@ -51,7 +51,7 @@ class MaterialRule {
   std::vector<std::pair<double, std::size_t>> by_density_;  ///< from the softest
 };
 
-/// Adds to `removed` what a volume lacks of its first content; `labels` may be empty.
+/// Adds to `removed` the density that a volume has lost since the start; `labels` may be empty.
 inline void add_removed(const MaterialRule& rule, std::span<const Density> first,
                         std::span<const Density> now, std::span<const Label> labels,
                         StepsByMaterial& removed) {

@@ -15,22 +15,24 @@
 #include "shared/wire/little_endian.hpp"
 #include "shared/wire/personality.hpp"
 
+// Messages on kerf's own links to the emulator: hello, lock-step turn, and the target of its hand.
+
 namespace kerf {
 
-/// What one side of kerf's own links (SEQPACKET, UDP) is set up for. The controller says it before
-/// anything else, and the emulator answers with its own; what the device said before that answer is
-/// void. A host that is not kerf's says none, and is served as it is: no packet of a device or for
-/// one has this length. Real buses carry no hello.
+/// Setup of one side of kerf's own links (SEQPACKET, UDP). The controller sends it first, and the
+/// emulator answers with its own; packets of the device before that answer are void. A host other
+/// than kerf sends none and is served all the same: no packet of a device has this length. Real
+/// buses carry no hello.
 struct LinkHello {
   Personality personality{};
   bool lockstep = false;
-  int rate_hz = 1000;  ///< of the servo; of an emulator in real time, that of its looks at the host
+  int rate_hz = 1000;  ///< of the servo; of an emulator in real time, its polling rate
   friend bool operator==(const LinkHello&, const LinkHello&) noexcept = default;
 };
 
 inline constexpr std::size_t kHelloBytes = 20;
 using HelloBytes = std::array<std::uint8_t, kHelloBytes>;
-// The last byte is the version: another one's hello is none, and stays without an answer.
+// The last byte is the version: a hello of another version gets no answer.
 inline constexpr std::array<std::uint8_t, 8> kHelloMagic{'k', 'e', 'r', 'f', 0, 'h', 'i', 1};
 
 [[nodiscard]] constexpr HelloBytes encode(const LinkHello& hello) noexcept {
@@ -59,8 +61,8 @@ inline constexpr std::array<std::uint8_t, 8> kHelloMagic{'k', 'e', 'r', 'f', 0, 
   return hello;
 }
 
-/// Why the two cannot work together, and what to change, as both tell it; empty: they can. In real
-/// time each side keeps its own rate.
+/// Why the two cannot work together, and what to change, for the messages of both; empty if they
+/// can. In real time each side keeps its own rate.
 [[nodiscard]] inline std::string discord(const LinkHello& controller, const LinkHello& emulator) {
   const auto word = [](const LinkHello& hello) {
     return std::string(kPersonalityWords[static_cast<std::size_t>(hello.personality)]);
@@ -87,20 +89,20 @@ inline constexpr std::array<std::uint8_t, 8> kHelloMagic{'k', 'e', 'r', 'f', 0, 
   return "";
 }
 
-/// All packets of a device in one tick of a lock-step run, in one datagram of kerf's own links:
-/// magic, then each packet behind a byte with its length. Without packets it says that nothing
-/// came, so that a fault that keeps packets back does not stop both sides.
+/// All packets of a device in one tick of a lock-step run, as one datagram: the magic, then each
+/// packet after a byte with its length. A turn without packets keeps both sides running if a fault
+/// withholds packets.
 ///
-/// Its first bytes are no packet's of any device that is known here.
+/// No packet of a device supported here begins with the magic.
 class Turn {
  public:
   static constexpr std::array<std::uint8_t, 8> kMagic{'k', 'e', 'r', 'f', 0, 't', 'n', 1};
-  /// The longest turn; more packets of one tick than 15 of the longest are no device's.
+  /// The longest turn: room for 15 of the longest packets, more than a device sends in a tick.
   static constexpr std::size_t kMostBytes = 1024;
 
   Turn() noexcept { std::copy(kMagic.begin(), kMagic.end(), bytes_.begin()); }
 
-  /// False: there is no room, or the packet is empty or longer than 255 bytes.
+  /// Returns false if there is no room, or the packet is empty or longer than 255 bytes.
   bool add(std::span<const std::uint8_t> packet) noexcept {
     if (packet.empty() || packet.size() > 255 || size_ + 1 + packet.size() > kMostBytes)
       return false;
@@ -117,8 +119,8 @@ class Turn {
   [[nodiscard]] static bool is_turn(std::span<const std::uint8_t> bytes) noexcept {
     return bytes.size() >= kMagic.size() && std::equal(kMagic.begin(), kMagic.end(), bytes.begin());
   }
-  /// The packet at the head of what follows the magic, which is taken off; empty at the end, or
-  /// where a length leads beyond it.
+  /// Removes the first packet of `rest`, the bytes after the magic, and returns it; empty at the
+  /// end, or if a length leads beyond the end.
   [[nodiscard]] static std::span<const std::uint8_t> next(
       std::span<const std::uint8_t>& rest) noexcept {
     if (rest.empty() || rest.size() - 1 < rest[0]) return {};
@@ -132,10 +134,10 @@ class Turn {
   std::size_t size_ = kMagic.size();
 };
 
-/// Where a user who leads the emulated hand wants it to be: what a window tells kerf-emulator
-/// (`--hand-socket`) in each of its frames, one wish a packet. Whole numbers, so that every packet
-/// of the right length names a place within the limits below; what the hand makes of it, and what
-/// it does when no wish comes any more, is `GuidedHand`'s.
+/// Target of the emulated hand when a user leads it: a window sends one to kerf-emulator
+/// (`--hand-socket`) in each frame, one a packet. Whole numbers, so that every packet of the right
+/// length is a position within the limits below. `GuidedHand` decides how the hand follows it, and
+/// when targets stop.
 struct HandWish {
   DeviceVec<double> tip_mm;                 ///< in steps of 1 um, each axis up to kMaxWishMm
   std::array<double, 3> orientation_rad{};  ///< as of `HandGoal`, up to kMaxWishRad each
@@ -152,8 +154,8 @@ using HandWishBytes = std::array<std::uint8_t, kHandWishBytes>;
 // The last byte is the version.
 inline constexpr std::array<std::uint8_t, 8> kHandWishMagic{'k', 'e', 'r', 'f', 0, 'h', 'w', 1};
 
-/// What the emulator says first to one that connects: the same version, and whether the hand is its
-/// to lead. One leads at a time; to another `taken` is said, and the connection closed.
+/// The first message of the emulator to a client that connects: the version, and whether the client
+/// may lead the hand. One client leads at a time; another gets `taken`, and its connection closes.
 enum class HandGreeting : std::uint8_t { yours, taken };
 using HandGreetingBytes = std::array<std::uint8_t, 9>;
 
@@ -175,7 +177,7 @@ using HandGreetingBytes = std::array<std::uint8_t, 9>;
   return bytes;
 }
 
-/// Nothing for what is no wish of this version. Numbers beyond the limits are taken as the limits.
+/// Nothing for a packet of another kind or version. Numbers are clamped to the limits.
 [[nodiscard]] inline std::optional<HandWish> decode_hand_wish(
     std::span<const std::uint8_t> bytes) noexcept {
   if (bytes.size() != kHandWishBytes ||
@@ -205,7 +207,7 @@ using HandGreetingBytes = std::array<std::uint8_t, 9>;
   return bytes;
 }
 
-/// Nothing for another version's.
+/// Nothing for another version.
 [[nodiscard]] inline std::optional<HandGreeting> decode_hand_greeting(
     std::span<const std::uint8_t> bytes) noexcept {
   if (bytes.size() != HandGreetingBytes{}.size() ||

@@ -9,7 +9,9 @@
 #include <optional>
 #include <span>
 
-/// What is known of the Novint Falcon in numbers: geometry, encoders, motors.
+// The Novint Falcon: geometry and motors, packets, framing of the serial stream, start over USB.
+
+/// Geometry, encoders and motors.
 ///
 /// mm, rad and counts. Frame of the device: x right, y up, z to the user; its origin lies on the
 /// axis of the three legs, kOriginDepthMm in front of the plane of their hips. The letters are
@@ -68,8 +70,7 @@ inline constexpr std::size_t kPacketBytes = 16;  ///< both ways
 
 }  // namespace kerf::falcon
 
-/// The two packets of the Novint Falcon's firmware, byte by byte, for both ends: 16 printable
-/// bytes.
+/// The two packets of the firmware, byte by byte, for host and device: 16 printable bytes each.
 ///
 ///      0  '<'
 ///      1  3 x 4 nibbles of signed 16-bit numbers, low nibble first, each + 'A'
@@ -79,12 +80,11 @@ inline constexpr std::size_t kPacketBytes = 16;  ///< both ways
 ///     14  'A'          spare
 ///     15  '>'
 ///
-/// Host and device take turns: one answer to each packet of the host. Any thread; nothing
-/// allocates, blocks or throws.
+/// The device sends one report for each command of the host. Any thread; nothing allocates, blocks
+/// or throws.
 namespace kerf {
 
-/// What the device says. Counts as they came; before its axis is homed a count has no meaning, and
-/// it jumps when it becomes homed.
+/// Device to host. Raw counts; a count has no meaning before its axis is homed, and jumps then.
 struct FalconReport {
   std::array<std::int16_t, 3> encoder{};
   std::uint8_t buttons = 0;  ///< falcon::kButton...; the upper four bits stay zero
@@ -93,11 +93,11 @@ struct FalconReport {
   friend constexpr bool operator==(const FalconReport&, const FalconReport&) noexcept = default;
 };
 
-/// What the host asks for.
+/// Host to device.
 struct FalconCommand {
   /// Motor torques in counts, +-falcon::kMotorCountMax; encoding saturates.
   std::array<std::int16_t, 3> motor{};
-  bool homing = false;  ///< must stand in every packet until all axes are homed
+  bool homing = false;  ///< must be set in every packet until all axes are homed
   bool green = false;
   bool blue = false;
   bool red = false;
@@ -150,7 +150,7 @@ struct Unpacked {
 };
 
 /// Nothing unless these are 16 bytes from '<' to '>' with twelve nibbles and an info of at most
-/// `max_info`. The spare byte is not looked at.
+/// `max_info`. The spare byte is ignored.
 [[nodiscard]] constexpr std::optional<Unpacked> unpack(std::span<const std::uint8_t> bytes,
                                                        unsigned max_info) noexcept {
   if (bytes.size() != kPacketBytes || bytes[0] != kBegin || bytes[15] != kEnd) return std::nullopt;
@@ -221,11 +221,11 @@ struct Unpacked {
 
 namespace kerf::falcon {
 
-/// Finds packets, '<' to '>', in a serial stream that comes in pieces of any size. For both ends;
-/// one thread; nothing allocates.
+/// Finds packets, '<' to '>', in a serial stream that comes in pieces of any size. For host and
+/// device; one thread; no allocation.
 class Framer {
  public:
-  /// True when this byte ends a packet, which `packet` then shows until the next call.
+  /// True if this byte ends a packet; `packet` then returns it until the next call.
   [[nodiscard]] bool take(std::uint8_t byte) noexcept {
     if (byte == kBegin) {  // never inside a packet, whose bytes are 'A' and above
       strays_ += size_;
@@ -251,14 +251,14 @@ class Framer {
   std::uint64_t strays_ = 0;
 };
 
-/// How the Novint Falcon is reached and started over USB: an FTDI FT232R (full speed) in front of a
-/// signal processor whose firmware the host sends after every power-up.
-///
-/// Start: purge, kBoot settings, RTS low, DTR low then high, send kBootHello, expect
-/// kBootHelloReply (up to kBootTries answers, some with a leading zero), DTR low, kUploadDivisor,
-/// send kUploadBegin and expect it back, then the firmware in chunks of kUploadChunk bytes, each
-/// byte echoed; then the settings of kRun. Source: libnifalcon. The firmware itself is not part of
-/// this project.
+// USB: an FTDI FT232R (full speed) in front of a signal processor, to which the host sends the
+// firmware after every power-up.
+//
+// Start: purge, kBoot settings, RTS low, DTR low then high, send kBootHello, expect
+// kBootHelloReply (up to kBootTries answers, some with a leading zero), DTR low, kUploadDivisor,
+// send kUploadBegin and expect it back, then the firmware in chunks of kUploadChunk bytes, each
+// byte echoed; then the settings of kRun. Source: libnifalcon. The firmware itself is not part of
+// this project.
 
 inline constexpr std::uint16_t kVendorId = 0x0403;
 inline constexpr std::uint16_t kProductId = 0xCB48;
@@ -293,7 +293,7 @@ inline constexpr std::uint16_t kUploadDivisor = 0x15;  ///< about 140 kbaud
 inline constexpr std::uint16_t kRunLatencyMs = 1;
 inline constexpr std::uint16_t kRunDivisor = 2;  ///< 1.5 Mbaud
 
-// The boot loader's words.
+// Messages of the boot loader.
 inline constexpr std::array<std::uint8_t, 3> kBootHello{0x0A, 0x43, 0x0D};
 inline constexpr std::array<std::uint8_t, 4> kBootHelloReply{0x0A, 0x44, 0x2C, 0x0D};
 inline constexpr int kBootTries = 100;

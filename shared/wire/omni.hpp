@@ -10,7 +10,9 @@
 
 #include "shared/wire/little_endian.hpp"
 
-/// What is known of the PHANTOM Omni in numbers: scales, link lengths, the inkwell pose.
+// The PHANTOM Omni: geometry and scales, packets.
+
+/// Link lengths, scales and the pose in the inkwell.
 ///
 /// mm, rad and counts. Frame of the device: x right, y up, z to the user; the point is the gimbal
 /// centre. Joints are absolute: q1 turret, q2 thigh, q3 forearm against the base (its motor and its
@@ -18,8 +20,8 @@
 ///
 ///     x = -sin q1 r      y = L1 sin q2 - L2 cos q3 + Cy      z = cos q1 r - Cz
 ///
-/// Link offsets and the inkwell pose differ between units: they are defaults for a configuration,
-/// not truths about one device.
+/// Link offsets and the pose in the inkwell differ between units: these are defaults of a
+/// configuration.
 namespace kerf::omni {
 
 inline constexpr double kPi = 3.14159265358979323846;
@@ -27,11 +29,10 @@ inline constexpr double kPi = 3.14159265358979323846;
 inline constexpr std::uint32_t kVendorOui = 0x000B99;  ///< SensAble, in the configuration ROM
 
 // Links.
-inline constexpr double kUpperLinkMm = 133.35;  ///< L1
-inline constexpr double kForearmMm = 133.35;    ///< L2
-inline constexpr double kOriginHeightMm =
-    23.35;  ///< Cy: the frame lies this far below the shoulder
-inline constexpr double kOriginDepthMm = 168.35;  ///< Cz: and this far in front of it
+inline constexpr double kUpperLinkMm = 133.35;    ///< L1
+inline constexpr double kForearmMm = 133.35;      ///< L2
+inline constexpr double kOriginHeightMm = 23.35;  ///< Cy: the frame is this far below the shoulder
+inline constexpr double kOriginDepthMm = 168.35;  ///< Cz: and in front of it
 inline constexpr std::array<double, 3> kDockRad{0.0, 0.23, -0.37};  ///< q in the inkwell
 
 // Joint encoders: q_i = dock_i + sign_i * kRadPerCount * (count_i - count in the inkwell).
@@ -57,7 +58,7 @@ inline constexpr int kBusCyclesPerSecond = 8000;
 
 }  // namespace kerf::omni
 
-/// The two isochronous packets of the PHANTOM Omni, byte by byte, for both ends.
+/// The two isochronous packets, byte by byte, for host and device.
 ///
 ///     host -> device, 16 bytes            device -> host, 44 bytes
 ///      0  u16 x3  motors, 0x7FF = none     0  u16 x2  0x0000, 0x001E
@@ -74,7 +75,7 @@ inline constexpr int kBusCyclesPerSecond = 8000;
 /// listed have no known meaning: written as zero, ignored when read.
 namespace kerf {
 
-/// What the device says. Counts as they came: no calibration, no filter.
+/// Device to host. Raw counts: no calibration, no filter.
 struct OmniReport {
   std::array<std::int16_t, 3> encoder{};
   std::array<std::uint16_t, 3> pot_a{};  ///< yaw, pitch, roll
@@ -87,7 +88,7 @@ struct OmniReport {
   friend constexpr bool operator==(const OmniReport&, const OmniReport&) noexcept = default;
 };
 
-/// What the host asks for.
+/// Host to device.
 struct OmniCommand {
   enum class Light : std::uint8_t { off = 0, slow_flash = 1, fast_flash = 2, steady = 3 };
 
@@ -114,7 +115,7 @@ inline constexpr std::uint8_t kButton1Up = 0x01;
 inline constexpr std::uint8_t kButton2Up = 0x02;
 inline constexpr std::uint8_t kUndocked = 0x04;
 
-// Words that were the same in every trace.
+// Words with the same value in every trace.
 inline constexpr std::uint16_t kReportMark = 0x001E;
 inline constexpr std::uint16_t kReportFlags = 0x1007;
 inline constexpr std::uint16_t kReportFw = 0x5746;

@@ -11,7 +11,9 @@
 
 #include "shared/wire/little_endian.hpp"
 
-/// What is known of the WoodenHaptics arm (open hardware) in numbers: links, capstans, motors, USB.
+// WoodenHaptics, the arm of open hardware: geometry and motors, USB, HID reports.
+
+/// Links, capstans, motors and USB.
 ///
 /// mm, rad and counts. Frame of the device: x right, y up, z to the user (the makers' y, z, x).
 /// Angles are absolute: A turns the arm about the vertical, to the right; B leans the upper link
@@ -21,7 +23,7 @@
 ///     x = sin A r      y = Ln + Lb cos B - Lc cos C - Cy      z = cos A r - Cz
 ///
 /// The same structure as the Omni's, with A = -q1, B = pi/2 - q2, C = q3. Source: the makers'
-/// haptikfabriken API; their figures are for one build of plans that anybody may change.
+/// haptikfabriken API; their figures are those of one build of plans that builders may change.
 namespace kerf::wooden {
 
 inline constexpr double kPi = std::numbers::pi;
@@ -52,7 +54,7 @@ inline constexpr int kAmplifierMilliamps = 3000;  ///< at full duty of the firmw
 /// The makers' limit.
 inline constexpr double kMaxForceN = 5.0;
 
-/// Without a report of the host for so long the firmware switches the amplifiers off.
+/// After so long without a report of the host the firmware switches the amplifiers off.
 inline constexpr double kWatchdogS = 0.5;
 
 // USB. mbed firmware: 14 bytes both ways; Teensy raw HID: 64 bytes both ways, the first 14 used.
@@ -64,25 +66,25 @@ inline constexpr std::uint16_t kUsagePage = 0xFFAB;
 inline constexpr std::uint16_t kUsage = 0x0200;
 inline constexpr std::size_t kPacketBytes = 14;
 inline constexpr std::size_t kLongPacketBytes = 64;
-/// Of the only report each way; hidraw wants it before the packet on writing, and gives none back.
+/// Of the only report each way; hidraw takes it before the packet on writing, and returns none.
 inline constexpr std::uint8_t kReportId = 0;
 
 }  // namespace kerf::wooden
 
-/// The two HID reports of the WoodenHaptics arm, byte by byte, for both ends: seven little-endian
-/// i16, in 14 bytes or at the beginning of 64.
+/// The two HID reports, byte by byte, for host and device: seven little-endian i16, in 14 bytes or
+/// at the beginning of 64.
 ///
 ///     device -> host                       host -> device
 ///      0  encoders a, b, c                  0  motor currents a, b, c in mA
 ///      6  encoders d, e, f (a gimbal)       6  0 = currents, 1 = set the encoders
 ///     12  1 = calibration button            8  0, or new counts of a, b, c; those of d, e, f
-///                                              then stand in place of the currents
+///                                              then take the place of the currents
 ///
 /// The number of the report, wooden::kReportId, is no part of these bytes. Any thread; nothing
 /// allocates, blocks or throws.
 namespace kerf {
 
-/// What the device says. Counts as they came, 16 bits of what the firmware counts.
+/// Device to host. Raw counts, the low 16 bits of those in the firmware.
 struct WoodenReport {
   std::array<std::int16_t, 6> encoder{};
   bool calibrate = false;  ///< the button was pressed; stays until the encoders are set
@@ -90,10 +92,10 @@ struct WoodenReport {
   friend constexpr bool operator==(const WoodenReport&, const WoodenReport&) noexcept = default;
 };
 
-/// What the host asks for.
+/// Host to device.
 struct WoodenCommand {
-  /// +-wooden::kMaxMilliamps; encoding saturates. Ignored where the encoders are set: the motors
-  /// get no current then.
+  /// +-wooden::kMaxMilliamps; encoding saturates. Ignored if the encoders are set: the motors get
+  /// no current then.
   std::array<std::int16_t, 3> milliamps{};
   std::optional<std::array<std::int16_t, 6>> set_encoders;
 
@@ -122,8 +124,8 @@ inline constexpr int kButtonCounts = 10000;
   return encoder_d > kButtonCounts / 2;
 }
 
-/// Device side. Nothing unless these are the 14 or 64 bytes of a command; what comes after the
-/// first 14 is not looked at.
+/// Device side. Nothing unless these are the 14 or 64 bytes of a command; bytes after the first 14
+/// are ignored.
 [[nodiscard]] constexpr std::optional<WoodenCommand> decode_command(
     std::span<const std::uint8_t> bytes) noexcept {
   if (!is_packet_size(bytes.size())) return std::nullopt;

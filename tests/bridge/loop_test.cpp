@@ -15,6 +15,7 @@
 #include "bridge/stream/run_snapshot.hpp"
 #include "bridge/stream/stream.hpp"
 #include "bridge/wire/parse.hpp"
+#include "shared/segment/connection.hpp"
 #include "shared/segment/reader.hpp"
 #include "shared/segment/writer.hpp"
 #include "shared/volume/checksum.hpp"

@@ -10,6 +10,7 @@
 
 #include <doctest/doctest.h>
 
+#include "shared/segment/connection.hpp"
 #include "tests/bridge/sender.hpp"
 #include "tests/segment/test_folder.hpp"
 

@@ -14,7 +14,7 @@
 #include <unistd.h>
 
 #include "bridge/serve/server.hpp"
-#include "shared/segment/connection.hpp"
+#include "shared/segment/server.hpp"
 #include "tests/bridge/far_side.hpp"
 #include "tests/bridge/raw_client.hpp"
 #include "tests/segment/segment_support.hpp"

@@ -159,7 +159,7 @@ def is_small_and_breaks_no_rule(case):
 
 
 def decodes_lz4_and_refuses_what_is_none(case):
-    results = case.page.evaluate("""import('./lz4.js').then(({unpack}) => {
+    results = case.page.evaluate("""import('./wire.js').then(({unpack}) => {
       const of = (bytes, length) => {
         const out = new Uint8Array(length);
         try { unpack(new Uint8Array(bytes), out); return String.fromCharCode(...out); } catch { return null; }

@@ -6,7 +6,7 @@ import subprocess
 from case import text_of
 
 # Two bricks side by side, sent in two passes of two frames, and once more after a new connection.
-PASSES = '''Promise.all([import('./held.js'), import('./constants.js')]).then(([{Held, mixed}, {kLastOfPass}]) => {
+PASSES = '''Promise.all([import('./brick_store.js'), import('./constants.js')]).then(([{Held, mixed}, {kLastOfPass}]) => {
   const session = 7n;
   const hello = {session, sceneBytes: 0, volumes: [{nx: 16, ny: 8, nz: 8, brick_count: 2, log2_brick: 3,
     bits_per_voxel: 16, off_labels: 0n}]};

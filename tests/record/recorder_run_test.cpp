@@ -9,6 +9,7 @@
 
 #include "record/recorder.hpp"
 #include "record/tick_log.hpp"
+#include "shared/segment/server.hpp"
 #include "tests/json.hpp"
 #include "tests/record/record_support.hpp"
 

@@ -14,6 +14,7 @@
 #include <unistd.h>
 
 #include "shared/segment/connection.hpp"
+#include "shared/segment/server.hpp"
 #include "shared/volume/checksum.hpp"
 #include "tests/segment/segment_support.hpp"
 #include "tests/segment/test_folder.hpp"

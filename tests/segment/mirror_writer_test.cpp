@@ -17,6 +17,7 @@
 #include "shared/segment/connection.hpp"
 #include "shared/segment/reader.hpp"
 #include "shared/segment/replica_writer.hpp"
+#include "shared/segment/server.hpp"
 #include "shared/volume/checksum.hpp"
 #include "tests/segment/segment_support.hpp"
 #include "tests/segment/test_folder.hpp"

@@ -37,7 +37,7 @@ void PointerHand::step(const WindowInput& input, bool over_panel, const View& vi
   by_pad_ = held.by_pad || (by_pad_ && !input.hovers);
   leads_ = input.hovers || by_pad_;
   const SeenPoint tool = seen_at(view, size, tool_mm);
-  if (tool.depth_mm <= 0.0) return;  // nobody leads what is behind him
+  if (tool.depth_mm <= 0.0) return;  // a tool behind the eye is not led
   const bool acts = input.free_right != 0.0 || input.free_up != 0.0 || input.wheel != 0.0 ||
                     input.pointer.down || held.deeper != 0.0;
   if (!goal_mm_ && ((points && acts) || held.by_pad)) goal_mm_ = tool_mm;

@@ -20,7 +20,7 @@
 
 namespace kerf {
 
-/// Where the hand wants to be, as the pointer says it.
+/// The pose that the pointer asks the hand to take.
 ///
 /// The goal is a point of the world. It moves with the pointer in the plane through it that faces
 /// the eye, and along the ray from the eye with wheel, keys and sticks; while the left button is
@@ -34,7 +34,8 @@ class PointerHand {
   static constexpr double kPressMm = 3.0;    ///< at the emulated grip, 0.5 N/mm, up to 1.5 N
   static constexpr double kHeldMmPerS = 20;  ///< keys and sticks
   static constexpr double kHeldRadPerS = 0.8;
-  static constexpr double kMostAheadMm = 15;  ///< deeper than the tool: nobody winds back more
+  static constexpr double kMostAheadMm =
+      15;  ///< deeper than the tool: more would be tedious to wind back
 
   /// One frame that lasts `frame_s`. `over_panel`: the pointer is a panel's. `tool_mm`: where the
   /// tool is seen.
@@ -59,15 +60,15 @@ class PointerHand {
 
 /// What a SpaceMouse of 3Dconnexion holds: six axes and the first button.
 ///
-/// x points right, y to the user, z down; the rotations are right-handed about them. An axis says
-/// how far the cap is pushed, -1 to 1; the cap springs back, and then says 0.
+/// x points right, y to the user, z down; the rotations are right-handed about them. An axis gives
+/// how far the cap is pushed, -1 to 1; the cap springs back, and then gives 0.
 struct SpaceMouseState {
   std::array<double, 3> push{}, turn{};
   bool button = false;
 };
 
 /// Takes an input report as it comes from hidraw, its identity first; false, and `state` as it was,
-/// where it is none. There are two layouts, of numbers of 16 bits, the lower byte first:
+/// if it is none. There are two layouts, of numbers of 16 bits, the lower byte first:
 ///
 ///     1 x y z, 2 rx ry rz      7 bytes each
 ///     1 x y z rx ry rz         13 bytes
@@ -76,11 +77,11 @@ struct SpaceMouseState {
 /// A number beyond +-350, which is where the cap ends, counts as that.
 bool take_report(std::span<const std::uint8_t> report, SpaceMouseState& state) noexcept;
 
-/// Adds what a SpaceMouse holds, where one is connected, to what keys and a gamepad hold: the cap
+/// Adds what a SpaceMouse holds, if one is connected, to what keys and a gamepad hold: the cap
 /// moves and tilts the hand, its first button presses. Never waits. One thread.
 class SpaceMouse {
  public:
-  /// Puts the next report into the bytes; its size, 0 where none has come, negative once the device
+  /// Puts the next report into the bytes; its size, 0 if none has come, negative once the device
   /// is gone.
   using Read = std::function<int(std::span<std::uint8_t>)>;
 

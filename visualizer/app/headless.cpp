@@ -36,39 +36,6 @@
 
 namespace kerf {
 
-/// Leads a controller in lock-step from picture to picture: says into its FIFO (`--until`) how far
-/// it may go. Never waits: a controller that does not listen yet is told again.
-class TickLead {
- public:
-  explicit TickLead(std::string fifo) noexcept;
-  ~TickLead();
-  TickLead(const TickLead&) = delete;
-  TickLead& operator=(const TickLead&) = delete;
-
-  /// Ticks up to this one may run. Call it as often as the picture is looked at.
-  void allow(std::uint64_t tick) noexcept;
-
- private:
-  std::string fifo_;
-  int fd_ = -1;
-  std::uint64_t told_ = 0;
-};
-
-TickLead::TickLead(std::string fifo) noexcept : fifo_(std::move(fifo)) {
-  make_signals_of_writes_errors();
-}
-
-TickLead::~TickLead() {
-  if (fd_ >= 0) close(fd_);
-}
-
-void TickLead::allow(std::uint64_t tick) noexcept {
-  // ENXIO while nobody reads.
-  if (fd_ < 0) fd_ = open(fifo_.c_str(), O_WRONLY | O_NONBLOCK | O_CLOEXEC);
-  if (fd_ < 0 || tick <= told_) return;
-  if (write(fd_, &tick, sizeof tick) == sizeof tick) told_ = tick;
-}
-
 namespace {
 
 constexpr PictureSize kTile{320, 320};
@@ -192,6 +159,33 @@ namespace {
 constexpr auto kIdle = std::chrono::milliseconds(2);  // two ticks: a picture is at most that late
 constexpr auto kShort = std::chrono::microseconds(100);  // where the next tick is due
 constexpr double kMsPerS = 1e3;
+
+/// Leads a controller in lock-step from picture to picture: writes into its FIFO (`--until`) how
+/// far it may go. Never waits: a controller that does not read yet is written to again.
+class TickLead {
+ public:
+  explicit TickLead(std::string fifo) noexcept : fifo_(std::move(fifo)) {
+    make_signals_of_writes_errors();
+  }
+  ~TickLead() {
+    if (fd_ >= 0) close(fd_);
+  }
+  TickLead(const TickLead&) = delete;
+  TickLead& operator=(const TickLead&) = delete;
+
+  /// Ticks up to this one may run. Call it as often as the picture is looked at.
+  void allow(std::uint64_t tick) noexcept {
+    // ENXIO while there is no reader.
+    if (fd_ < 0) fd_ = open(fifo_.c_str(), O_WRONLY | O_NONBLOCK | O_CLOEXEC);
+    if (fd_ < 0 || tick <= told_) return;
+    if (write(fd_, &tick, sizeof tick) == sizeof tick) told_ = tick;
+  }
+
+ private:
+  std::string fifo_;
+  int fd_ = -1;
+  std::uint64_t told_ = 0;
+};
 
 std::filesystem::path frame_file(const std::filesystem::path& folder, std::uint32_t number) {
   std::array<char, 32> name{};

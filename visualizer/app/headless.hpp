@@ -12,7 +12,7 @@
 
 namespace kerf {
 
-/// Ticks of `tick_ns` between pictures that are spread over `seconds`; without them, or where there
+/// Ticks of `tick_ns` between pictures that are spread over `seconds`; without them, or if there
 /// is to be no picture, a second. At least 1.
 [[nodiscard]] constexpr std::uint64_t ticks_between(std::uint32_t frames,
                                                     std::optional<double> seconds,
@@ -56,7 +56,7 @@ class FrameSchedule {
 };
 
 /// Writes a PNG with one moment of a session, volumes and tool, as every renderer draws it, each
-/// with its name. Needs a current GL context. Throws FileError, and VisualizerError where a
+/// with its name. Needs a current GL context. Throws FileError, and VisualizerError if a
 /// renderer cannot show the volumes.
 void write_contact_sheet(const std::filesystem::path& file, const SceneView& scene,
                          std::span<const VolumeContent> contents, const std::optional<Hand>& hand);

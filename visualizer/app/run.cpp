@@ -24,7 +24,7 @@
 #include "visualizer/scene/frame_report.hpp"
 #include "visualizer/scene/session.hpp"
 #include "visualizer/scene/visualizer_error.hpp"
-#include "visualizer/sound/sound_link.hpp"
+#include "visualizer/sound/sound_player.hpp"
 #include "visualizer/sound/spindle_sound.hpp"
 #include "visualizer/surface/mesh_file.hpp"
 
@@ -103,7 +103,7 @@ class WindowSound {
   explicit WindowSound(bool mute) : mute_(mute) {}
 
   /// After each frame. The one line about a missing device goes to the terminal; who asks for sound
-  /// by the key is told in the picture too.
+  /// by the key is reported in the picture too.
   void step(const WindowInput& input, WindowRun& run, Clock::time_point now) {
     const auto toggles = std::count(input.keys.begin(), input.keys.end(), 'a');
     if (toggles % 2 != 0) {

@@ -9,11 +9,11 @@
 namespace kerf {
 
 /// Binds this process to the cores `cpus`. Where that is empty, binds it to all cores that it may
-/// use but the last one, which is the servo's; to the only one where there is one. Call before any
+/// use but the last one, which is the servo's; to the only one if there is one. Call before any
 /// other thread exists. Sets LP_NUM_THREADS, the number of threads of a software GL, unless it is
 /// set.
 ///
-/// Returns the cores taken. Throws VisualizerError where one of `cpus` is not to be had.
+/// Returns the cores taken. Throws VisualizerError if one of `cpus` is not to be had.
 std::vector<int> place_process(std::span<const int> cpus);
 
 /// Refuses now what could not be written later, or would cost another file. Throws FileError, or
@@ -25,8 +25,8 @@ class Session;
 /// The session that the options name, whose materials those of --transfer are.
 [[nodiscard]] Session attach(const VisualizerOptions& options);
 
-/// 0 where the controller still runs or ended cleanly, 1 where it went away without a word, which
-/// is told on stderr, or where a video is cut short.
+/// 0 if the controller still runs or ended cleanly, 1 if it went away without a word, which
+/// is reported on stderr, or if a video is cut short.
 [[nodiscard]] int exit_code(const Session& session, bool video_is_cut);
 
 /// Follows one run of a controller and writes frame-0001.png and so on into `options.out`; the last
@@ -40,7 +40,7 @@ class Session;
 
 /// Times every renderer on a volume of its own, without a controller: a table on stdout, all
 /// figures as JSON in `options.report`, a page in `options.page`, the short of it as a part of
-/// `options.summary`. Returns 1 where it was stopped.
+/// `options.summary`. Returns 1 if it was stopped.
 /// Throws VisualizerError or FileError for bad set-up.
 [[nodiscard]] int run_bench(const VisualizerOptions& options);
 

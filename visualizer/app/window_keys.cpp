@@ -21,7 +21,7 @@
 namespace kerf {
 namespace {
 
-/// kerf-0001 and so on in `folder`, which is made where it is missing.
+/// kerf-0001 and so on in `folder`, which is made if it is missing.
 std::filesystem::path unused_file(const std::filesystem::path& folder, const char* ending) {
   make_folder(folder);
   for (int i = 1;; ++i) {

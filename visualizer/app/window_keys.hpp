@@ -15,14 +15,14 @@
 namespace kerf {
 
 /// Gives the picture another look. Where its renderer cannot show these volumes, the picture keeps
-/// its look and a notice says why.
+/// its look and a notice gives the reason.
 void change_look(Picture& picture, const Session& session, const Look& look, Notices& notices,
                  Notices::Clock::time_point now);
 
-/// What a user is told who asks for tool `index`, counted from 0, of a scene that has `tools`.
+/// Message to a user who asks for tool `index`, counted from 0, of a scene that has `tools`.
 [[nodiscard]] std::string no_such_tool(std::size_t index, std::size_t tools);
 
-/// Asks the controller for a tool, counted from 0; what came of it, where that was nothing.
+/// Asks the controller for a tool, counted from 0; a message if nothing came of it.
 void take_tool(std::size_t index, Session& session, Notices& notices,
                Notices::Clock::time_point now);
 
@@ -54,8 +54,8 @@ struct WindowKeys {
   void switch_panel(bool& panel, bool& other);
 };
 
-// What keys of the window write: each says where it went, or why it did not. A full disk must not
-// end a session at the screen. New files are kerf-0001 and so on in --out.
+// What keys of the window write: each returns where it was written, or why it was not. A full disk
+// must not end a session at the screen. New files are kerf-0001 and so on in --out.
 
 [[nodiscard]] Notice take_screenshot(const VisualizerOptions& options, const RenderTarget& target);
 
@@ -66,7 +66,7 @@ struct WindowKeys {
 /// Where --transfer read them, or in a new file.
 [[nodiscard]] Notice write_opacities(const VisualizerOptions& options, const Picture& picture);
 
-/// Where --export says, or in a new file.
+/// To the file of --export, or to a new one.
 [[nodiscard]] Notice export_mesh(const VisualizerOptions& options, const Session& session);
 
 }  // namespace kerf

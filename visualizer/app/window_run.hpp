@@ -84,11 +84,11 @@ class WindowRun {
 
  private:
   [[nodiscard]] OverlayFigures figures_at(Clock::time_point now);
-  /// Opens or leaves the list of scenes, where somebody waits for a choice.
+  /// Opens or leaves the list of scenes, if a program waits for a choice.
   void toggle_list(Clock::time_point now);
   /// What the mouse chose of it: another folder, or what the window ends with.
   void choose(const OpenPanel& panel, Clock::time_point now);
-  /// None while nobody knows where the tip is.
+  /// None while the position of the tip is unknown.
   [[nodiscard]] std::optional<SliceViews> slices_at_tip();
   /// What the user wants of hand and camera; the mark of the hand goes into the figures.
   void follow(const WindowInput& input, OverlayFigures& figures, PictureSize size,

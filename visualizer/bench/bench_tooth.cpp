@@ -43,7 +43,7 @@ double distance_to(const Ellipsoid& part, glm::dvec3 at) {
   return slope < kMiddle ? -1.0 : f * (f - 1.0) / slope;
 }
 
-/// Blends the two where they are within `kSmoothing` of one another.
+/// Blends the two if they are within `kSmoothing` of one another.
 double smooth_min(double a, double b) {
   const double near = std::max(kSmoothing - std::abs(a - b), 0.0);
   return std::min(a, b) - near * near / (4.0 * kSmoothing);

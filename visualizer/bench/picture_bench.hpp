@@ -52,7 +52,7 @@ struct PictureRow {
 
 /// Times the volumes of every renderer (no tool, no panel) in a picture of `size`, camera at rest:
 /// the paper's volumes and tools, padded and cropped; and `iso` with every gradient. Needs a
-/// current GL context. `progress` is told what comes next, and how many of how many kinds of frame
+/// current GL context. `progress` receives what comes next, and how many of how many kinds of frame
 /// are done.
 [[nodiscard]] std::vector<PictureRow> measure_pictures(
     PictureSize size,

@@ -87,7 +87,7 @@ bool same_subject(const PictureRow& a, const PictureRow& b) {
          a.cropped == b.cropped;
 }
 
-/// Of the paper's padded tooth, by what changes in it; none where that was not measured.
+/// Of the paper's padded tooth, by what changes in it; none if that was not measured.
 const PictureRow* row_of(std::span<const PictureRow> rows, std::string_view renderer,
                          GradientFilter gradient, int tool, bool partial) {
   constexpr int kLargeEdge = 256;

@@ -18,7 +18,7 @@ inline constexpr std::int32_t kCastBlock = 4;
 /// a sixth more samples, all of them in air, and with cells of 8 half as many again.
 inline constexpr std::int32_t kCastCellVox = 2;
 
-/// The rays of a block need only this stretch, as distance along the view axis; none of it where
+/// The rays of a block need only this stretch, as distance along the view axis; none of it if
 /// begin is beyond end.
 struct CastBlock {
   float begin_mm, end_mm;
@@ -32,7 +32,7 @@ struct CastVolumeJob {
   const std::uint32_t* density = nullptr;   ///< `PairedRows`
   const std::uint16_t* labels = nullptr;    ///< `PairedRows`, or none
   const std::uint32_t* gradient = nullptr;  ///< `GradientRows`, for blend
-  const std::uint8_t* active = nullptr;     ///< of each macrocell: not 0 where it may show anything
+  const std::uint8_t* active = nullptr;     ///< of each macrocell: not 0 if it may show anything
   const CastBlock* blocks = nullptr;        ///< `CellBlocks`: rows of the picture's blocks
   std::int32_t row = 0, plane = 0;          ///< of density and labels, in entries
   std::int32_t gradient_plane = 0;          ///< its rows are as long as the others
@@ -62,7 +62,7 @@ struct CastEye {
 /// The picture that the kernels fill. Rows from the bottom up, as GL has them.
 struct CastPixels {
   std::uint32_t* rgba = nullptr;     ///< sRGB and opacity (not multiplied in), red in the low byte
-  float* depth = nullptr;            ///< window depth, equation (1); 1 where nothing was hit
+  float* depth = nullptr;            ///< window depth, equation (1); 1 if nothing was hit
   float* normal = nullptr;           ///< or none: x, y, z in eye space where iso hit something
   const float* end_depth = nullptr;  ///< or none: window depth at which rays of blend end
 };

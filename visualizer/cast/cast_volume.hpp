@@ -131,7 +131,7 @@ class CastVolume {
   void set_materials(const Palette& materials);
 
   [[nodiscard]] double edge_mm() const { return shortest_edge_mm(world_from_voxel_); }
-  /// A box around all that can be seen of it; nothing can where there is none.
+  /// A box around all that can be seen of it; nothing can if there is none.
   [[nodiscard]] std::optional<BoxCorners> body() const;
   /// For a part of a picture of `width` x `height`; good until the next call of anything.
   [[nodiscard]] CastVolumeJob job(const View& view, std::int32_t width, std::int32_t height,

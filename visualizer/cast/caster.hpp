@@ -44,8 +44,8 @@ class TilePool {
 /// What the ray caster draws into. Rows from the bottom up, as GL has them.
 struct CastPicture {
   std::int32_t width = 0, height = 0;
-  std::vector<std::uint32_t> rgba;  ///< as `CastPixels::rgba`; 0 where nothing is
-  std::vector<float> depth;         ///< window depth; 1 where nothing is (blend: too little)
+  std::vector<std::uint32_t> rgba;  ///< as `CastPixels::rgba`; 0 if nothing is
+  std::vector<float> depth;         ///< window depth; 1 if nothing is (blend: too little)
 
   [[nodiscard]] PixelRect whole() const noexcept { return {0, 0, width, height}; }
   /// Its pixels are not kept.
@@ -84,7 +84,7 @@ class Caster {
   void set_materials(const Palette& materials);
 
   /// Draws `parts` of the picture; the rest of it stays. Rays of blend end at `end_depth` (window
-  /// depth, one per pixel of the picture) where it is given. `normals` (three floats per pixel, or
+  /// depth, one per pixel of the picture) if it is given. `normals` (three floats per pixel, or
   /// none) are those of iso in eye space, for measurements.
   void draw(const View& view, std::span<const PixelRect> parts, CastPicture& picture,
             std::span<const float> end_depth = {}, std::span<float> normals = {});

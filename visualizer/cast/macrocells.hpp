@@ -33,7 +33,7 @@ class Macrocells {
                          std::span<const Density> density);
 
   [[nodiscard]] const VoxelGrid& grid() const noexcept { return grid_; }
-  /// 1 where a sample may reach iso.
+  /// 1 if a sample may reach iso.
   [[nodiscard]] std::span<const std::uint8_t> active() const noexcept { return active_; }
 
   /// Faces between an active cell and an inactive one or the outside, `{x, y, z, face}` with face
@@ -57,7 +57,7 @@ class Macrocells {
 
 /// Where the rays of each block of pixels can meet the active cells of a volume: the picture of the
 /// cells, coarse and on the safe side. Rays of a block without cells cost nothing, the others begin
-/// and end near what they may see; what lies between is told by the cells themselves.
+/// and end near what they may see; between the two, the cells themselves are read.
 class CellBlocks {
  public:
   using Cell = std::array<std::uint16_t, 3>;

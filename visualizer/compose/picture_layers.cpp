@@ -162,8 +162,6 @@ void ScenePainter::forget_changes() {
 
 namespace {
 
-using Layer = ScenePainter::Layer;
-
 bool has_moved(const std::optional<Hand>& from, const std::optional<Hand>& to) {
   return from && to ? !from->rests_at(*to) : from.has_value() != to.has_value();
 }

@@ -18,13 +18,13 @@ namespace kerf {
 
 /// The volumes of a scene, each drawn by the renderer that was chosen for it. Those with the same
 /// choice share one, which lets them mix where they intersect; across renderers the depth that all
-/// of them write and test tells what is before what. See `Renderer` for what the calls do.
+/// of them write and test decides what is before what. See `Renderer` for what the calls do.
 class VolumeRenderers {
  public:
   /// Opaque volumes lie under what moves among them, translucent ones over it.
   enum class Layer : std::uint8_t { opaque, translucent };
 
-  /// `kinds` has one for each volume. Throws VisualizerError where one cannot show its volumes.
+  /// `kinds` has one for each volume. Throws VisualizerError if one cannot show its volumes.
   VolumeRenderers(std::span<const std::string> kinds, const SceneView& scene,
                   std::span<const VolumeContent> contents);
 
@@ -70,8 +70,8 @@ class ScenePainter {
  public:
   using Layer = VolumeRenderers::Layer;
 
-  /// `renderers` is a choice: renderer.hpp. Throws VisualizerError where that does not fit
-  /// the scene, or a renderer cannot show its volumes.
+  /// `renderers` is a choice: renderer.hpp. Throws VisualizerError if that does not fit the scene,
+  /// or a renderer cannot show its volumes.
   ScenePainter(const std::string& renderers, const SceneView& scene,
                std::span<const VolumeContent> contents);
 
@@ -136,7 +136,7 @@ class ScreenPasses {
 
  private:
   GlProgram backdrop_{"screen.vert", "backdrop.frag"};
-  GlProgram smooth_{"screen.vert", "smooth.frag"};
+  GlProgram smooth_{"screen.vert", "antialias.frag"};
 };
 
 /// The picture of one eye as it grows, kept from frame to frame: backdrop and opaque volumes, over

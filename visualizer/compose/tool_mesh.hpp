@@ -36,7 +36,7 @@ using ProfilePoint = std::array<double, 2>;
 [[nodiscard]] Mesh shaded(const Facets& facets);
 
 /// What a bur is made of: the head by its profile (mm), and what is felt behind it; else a shank
-/// along +y, thinner than the head, that begins inside it. Neither where the head has no extent. A
+/// along +y, thinner than the head, that begins inside it. Neither if the head has no extent. A
 /// head that is a mesh has no outline.
 using Outlines = std::vector<std::vector<ProfilePoint>>;
 [[nodiscard]] Outlines tool_outlines(const ToolView& tool);

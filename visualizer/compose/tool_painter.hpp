@@ -39,7 +39,7 @@ struct Paint {
 /// Draws meshes over the volumes, with true depth (the paper's equation (1)).
 class MeshPainter {
  public:
-  /// `world_from_mesh` may scale; hidden where something nearer is in `target`.
+  /// `world_from_mesh` may scale; hidden behind anything nearer that is in `target`.
   void draw(const GpuMesh& mesh, const glm::dmat4& world_from_mesh, const Paint& paint,
             const View& view, const RenderTarget& target);
 
@@ -62,7 +62,7 @@ class MeshPainter {
 struct Hand {
   glm::dvec3 tip_mm{0.0};
   glm::dvec4 orientation{0.0, 0.0, 0.0, 1.0};  ///< quaternion x, y, z, w
-  std::uint32_t tool = 0;                      ///< none where the scene has fewer
+  std::uint32_t tool = 0;                      ///< none if the scene has fewer
   glm::dvec3 force_n{0.0};
   friend bool operator==(const Hand&, const Hand&) noexcept = default;
   /// The same tool in the same place, whatever it feels.
@@ -71,7 +71,7 @@ struct Hand {
   }
 };
 
-/// The tip is the proxy's, where there is one: a tool that is held by the tooth's surface is drawn
+/// The tip is the proxy's, if there is one: a tool that is held by the tooth's surface is drawn
 /// there, however deep the hand pushes. Nothing before docking, when its place is unknown.
 [[nodiscard]] std::optional<Hand> hand_of(const TickRecord& record);
 

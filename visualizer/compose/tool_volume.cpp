@@ -62,7 +62,7 @@ struct HalfSpace {
 };
 
 /// What holds all points within `reach` of a triangle and few others: its plane and its edges moved
-/// out; all points where it is hardly more than a line, which says little of its plane.
+/// out; all points if it is hardly more than a line, which hardly defines its plane.
 std::array<HalfSpace, 5> around(const Corners& t, double reach) {
   constexpr double kSlack = 1e-6;  // edges of the grid: more than rounding
   constexpr double kLeastShare = 1e-6;

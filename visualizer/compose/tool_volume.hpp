@@ -31,21 +31,21 @@ struct GridPlaces {
 ///
 /// The density falls over two voxels across the tool's surface and is one half on it. One grid has
 /// room for every tool of the scene: another tool means other voxels. A voxel is as large as one of
-/// the main volume, or larger where a tool would be longer than 512 voxels.
+/// the main volume, or larger if a tool would be longer than 512 voxels.
 class ToolVolume {
  public:
-  /// Throws VisualizerError where the scene has no tool with an extent, or no room for a material.
+  /// Throws VisualizerError if the scene has no tool with an extent, or no room for a material.
   explicit ToolVolume(const SceneView& scene);
 
   /// The scene with this volume as its last and with its material; the others keep their looks.
   [[nodiscard]] SceneView added_to(const SceneView& scene) const;
   [[nodiscard]] VolumeContent content() const { return {density_, labels_}; }
 
-  /// Writes the voxels of tool `tool`; air where the scene has no such tool. False where they are
-  /// the voxels already.
+  /// Writes the voxels of tool `tool`; air if the scene has no such tool. False if they are the
+  /// voxels already.
   bool take(std::uint32_t tool);
   [[nodiscard]] glm::dmat4 world_from_voxel(const Hand& hand) const;
-  /// A box in the world around the voxels of the hand's tool; none where the tool has none.
+  /// A box in the world around the voxels of the hand's tool; none if the tool has none.
   [[nodiscard]] std::optional<BoxCorners> corners(const Hand& hand) const;
   /// The ids of all bricks of the volume.
   [[nodiscard]] std::vector<std::uint32_t> bricks() const;

@@ -43,7 +43,7 @@ namespace {
 /// A context on a display of EGL, without a surface.
 class EglContext final : public GlContext {
  public:
-  /// Null where the platform gives no 4.5 core context.
+  /// Null if the platform gives no 4.5 core context.
   static std::unique_ptr<EglContext> make(EGLenum platform, void* native, ContextKind kind);
   ~EglContext() override;
 
@@ -131,7 +131,7 @@ void GLAPIENTRY on_gl_message(GLenum, GLenum type, GLuint, GLenum severity, GLsi
   }
 }
 
-/// The best of what EGL offers, current; null where it offers nothing.
+/// The best of what EGL offers, current; null if it offers nothing.
 std::unique_ptr<EglContext> best_egl_context() {
   const char* const client = eglQueryString(EGL_NO_DISPLAY, EGL_EXTENSIONS);
   std::unique_ptr<EglContext> best;

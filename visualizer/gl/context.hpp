@@ -12,7 +12,7 @@ enum class ContextKind : std::uint8_t { egl_surfaceless, egl_device, window };
 
 [[nodiscard]] const char* to_string(ContextKind kind) noexcept;
 
-/// What the driver says of itself; asks the current context.
+/// The driver's own description; reads the current context.
 struct GlDriver {
   std::string renderer;  ///< GL_RENDERER
   std::string version;   ///< GL_VERSION
@@ -37,17 +37,17 @@ class GlContext {
 
 /// A context that needs no screen.
 ///
-/// EGL surfaceless comes first; where that is a software GL, an EGL device that is hardware is
-/// preferred; any EGL device is next; a hidden window, where there is a screen after all, is the
+/// EGL surfaceless comes first; if that is a software GL, an EGL device that is hardware is
+/// preferred; any EGL device is next; a hidden window, if there is a screen after all, is the
 /// last resort. Throws VisualizerError when none works.
 [[nodiscard]] std::unique_ptr<GlContext> make_headless_context();
 
-/// Throws VisualizerError where the driver has lost the current context, say because it had to
+/// Throws VisualizerError if the driver has lost the current context, say because it had to
 /// reset the GPU: nothing that the context holds can be drawn any more.
 void throw_if_context_is_lost();
 
-/// Gets what GL says of an error, of undefined behaviour, or of anything of high severity, on the
-/// thread of the call that did it and before that returns.
+/// Gets GL's message about an error, of undefined behaviour, or of anything of high severity, on
+/// the thread of the call that did it and before that returns.
 using GlFaultHandler = void (*)(const std::string& text);
 /// Contexts made from now on are debug contexts that tell `handler`; none: ordinary ones again. For
 /// tests: it slows every call.

@@ -4,14 +4,14 @@
 # before what uses it, so prototypes go; a uniform that several files declare stays once.
 # cmake -DOUTPUT=FILE -DSHADERS=FOLDER -P web_shaders.cmake
 cmake_minimum_required(VERSION 3.25)
-set(iso screen.vert lighting.frag depth.frag ray.frag solid.frag gradient.frag iso.frag)
-set(blend screen.vert lighting.frag depth.frag ray.frag matter.frag blend.frag)
-set(layer screen.vert lighting.frag layer.frag)
+set(iso screen.vert lighting.frag ray.frag volume_sample.frag gradient.frag iso.frag)
+set(blend screen.vert lighting.frag ray.frag translucent_sample.frag blend.frag)
+set(layer screen.vert lighting.frag composite.frag)
 set(cell_faces cell_faces.vert cell_faces.frag)
 set(mesh mesh.vert lighting.frag mesh.frag)
 set(backdrop screen.vert backdrop.frag)
-set(smooth screen.vert smooth.frag)
-set(shown screen.vert shown.frag)
+set(smooth screen.vert antialias.frag)
+set(shown screen.vert present.frag)
 
 # A browser's default precision is too coarse for a depth, and there is none for these samplers.
 set(head "#version 300 es\nprecision highp float;\nprecision highp int;\n")

@@ -41,7 +41,7 @@ void outlive_the_screen() {
       display, [](Display*, void*) { g_screen_is_gone = true; }, nullptr);
 }
 
-/// A lower-case letter or a digit: what is printed on the key, or, where that is another sign (of
+/// A lower-case letter or a digit: what is printed on the key, or, if that is another sign (of
 /// other scripts, or the upper row of a French keyboard), what an American one has in its place. 0
 /// for any other key.
 char letter_of(int key, int scancode) {
@@ -138,7 +138,7 @@ Window::Window(PictureSize size, Visibility visibility) {
 }
 
 Window::~Window() {
-  if (g_screen_is_gone) return;  // there is nobody to give anything back to
+  if (g_screen_is_gone) return;  // no screen is left to give anything back to
   glfwDestroyWindow(handle_);
   glfwTerminate();
 }

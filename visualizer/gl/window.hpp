@@ -50,7 +50,7 @@ class Window final : public GlContext {
   /// Whether the environment names a screen.
   [[nodiscard]] static bool has_screen();
 
-  /// Throws VisualizerError where the screen gives no window or no 4.5 core context.
+  /// Throws VisualizerError if the screen gives no window or no 4.5 core context.
   Window(PictureSize size, Visibility visibility);
   ~Window() override;
 
@@ -58,9 +58,9 @@ class Window final : public GlContext {
   /// In pixels; a side is 0 while the window is minimised.
   [[nodiscard]] PictureSize size() const;
   void set_title(const std::string& title);
-  /// Asks the screen for another size, which `size` tells once the screen has given it.
+  /// Asks the screen for another size, which `size` returns once the screen has given it.
   void resize(PictureSize size);
-  /// Shows `target`, which has the window's size; waits for the screen's refresh where it can.
+  /// Shows `target`, which has the window's size; waits for the screen's refresh if it can.
   void present(const RenderTarget& target);
   /// Whether the pointer is seen over it.
   void show_pointer(bool shown);

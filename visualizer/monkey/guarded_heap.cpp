@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The monkey's heap. Who writes outside of a block, or into one that was freed, is stopped there
 // and then: kerf, a driver, code that a driver made a moment ago. Sanitizers see only what was
-// compiled for them. A large block ends where a page begins that nobody may touch, and is such
+// compiled for them. A large block ends where a page begins that may not be touched, and is such
 // pages itself once it is freed. A small one lies between marks, which are looked at when it is
 // freed, and again before its memory goes back.
 #ifndef KERF_SANITIZED
@@ -35,7 +35,7 @@ constexpr std::size_t kLarge = 512;
 /// A process has 65,530 mappings, a block in use takes three: beyond this many they count as small.
 constexpr std::size_t kMostLarge = 12'000;
 constexpr std::size_t kLargest = std::size_t{1} << 46;
-/// Freed ones that nobody gets yet.
+/// Freed ones that are not given out yet.
 constexpr std::size_t kKeptLarge = 8'000, kKeptSmall = 100'000;
 constexpr std::size_t kMarkBytes = 32;
 constexpr std::byte kMark{0xa5}, kFresh{0xcc}, kGone{0xdb};

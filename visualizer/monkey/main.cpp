@@ -56,7 +56,7 @@ void write(const fs::path& file, const kerf::MonkeyPicture& picture) {
   if (picture.size.width > 0) kerf::write_png(file, picture.size, picture.rgb);
 }
 
-/// True where all went well; else says what did not, and writes both pictures.
+/// True if all went well; else prints what did not, and writes both pictures.
 bool play(kerf::GlContext& context, std::uint32_t seed, const fs::path& files,
           const MonkeyOptions& options, Monkey::Count& count) {
   auto* const window = options.window ? dynamic_cast<kerf::Window*>(&context) : nullptr;

@@ -51,7 +51,7 @@ std::string look_text(const Look& look) {
          std::string(name_of(look.gradient));
 }
 
-/// "N pixels, within (x, y) to (x, y)", from the upper left corner; empty where they are equal.
+/// "N pixels, within (x, y) to (x, y)", from the upper left corner; empty if they are equal.
 std::string difference_of(const MonkeyPicture& a, const MonkeyPicture& b) {
   if (a.rgb == b.rgb && a.size == b.size) return {};
   if (a.size != b.size) return "a size of " + size_text(a.size) + " and not " + size_text(b.size);

@@ -51,7 +51,7 @@ class Monkey {
   Monkey(const GlContext& context, const Habits& habits);
 
   /// One event: what happened before a frame, and frames until all of it is shown. Throws
-  /// VisualizerError where the window shows something else than the fresh picture.
+  /// VisualizerError if the window shows something else than the fresh picture.
   void act();
   /// What `act` does next, or did last.
   [[nodiscard]] const std::string& event() const noexcept { return event_; }

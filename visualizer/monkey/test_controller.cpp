@@ -15,7 +15,7 @@ constexpr const char* kMaterials = R"(
   "materials": [{"name": "none", "iso": 0, "colour": [0, 0, 0]},
                 {"name": "dentin", "iso": 0.3, "colour": [0.8, 0.7, 0.5]},
                 {"name": "enamel", "iso": 0.7, "colour": [0.9, 0.9, 0.85]}])";
-constexpr std::uint32_t kIso = 25'000;
+constexpr std::uint32_t kIsoDensity = 25'000;
 constexpr double kVoxelMm = 0.5;
 constexpr std::uint64_t kMonkeyTickNs = 1'000'000;
 
@@ -60,7 +60,7 @@ MonkeyController::MonkeyController(const std::string& name, Dice& dice)
     shown.spacing_mm = {kVoxelMm, kVoxelMm, dice.once_in(3) ? 2.0 * kVoxelMm : kVoxelMm};
     for (double& at : shown.origin_mm) at = dice.between(-12.0, -4.0);
     if (dice.once_in(2)) shown.orientation = {0.0F, 0.0F, 0.3826834F, 0.9238795F};
-    shown.iso = kIso;
+    shown.iso = kIsoDensity;
     shown.density = volume.density;
     if (dice.once_in(3)) {
       volume.labels.resize(volume.density.size());

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "shared/segment/connection.hpp"
+#include "shared/segment/server.hpp"
 #include "shared/segment/writer.hpp"
 
 namespace kerf {
@@ -39,7 +39,7 @@ class Dice {
 };
 
 /// A controller in this process without a servo, for a window to follow: one to three small volumes
-/// of any extents, nine tools. Its ticks come only where it is told to, so that a run is the same
+/// of any extents, nine tools. Its ticks come only on request, so that a run is the same
 /// each time.
 class MonkeyController {
  public:

@@ -20,7 +20,7 @@ struct FolderList {
     bool is_folder = false;
     friend bool operator==(const Entry&, const Entry&) noexcept = default;
   };
-  static constexpr std::size_t kMost = 2000;  ///< more are left out, and `note` says so
+  static constexpr std::size_t kMost = 2000;  ///< more are left out, and `note` reports it
 
   std::filesystem::path folder;
   std::vector<Entry> entries;  ///< the folder above, folders, files
@@ -31,7 +31,7 @@ struct FolderList {
 /// Throws nothing: a folder that cannot be read has only the one above, and a note.
 [[nodiscard]] FolderList list_folder(const std::filesystem::path& folder);
 
-/// Why `file` is neither a scene nor a volume, as one line; empty where it seems to be one.
+/// Why `file` is neither a scene nor a volume, as one line; empty if it seems to be one.
 [[nodiscard]] std::string why_not_open(const std::filesystem::path& file);
 
 /// A tool in the list: its size and name, and its picture.
@@ -44,7 +44,7 @@ struct ToolChoice {
 /// What the controls show, and the look that they change.
 struct LookControls {
   Look look;
-  double own_iso = 0.5;                ///< of the main volume, 0..1: where the look has none
+  double own_iso = 0.5;                ///< of the main volume, 0..1: if the look has none
   std::vector<ToolChoice> tools{};     ///< one alone is no choice
   std::size_t tool = 0;                ///< in the hand, or asked for
   std::vector<std::string> volumes{};  ///< their names

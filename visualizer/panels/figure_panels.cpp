@@ -17,7 +17,7 @@ namespace kerf {
 
 namespace {
 
-/// Those of the hand first, where one is led.
+/// Those of the hand first, if one is led.
 std::vector<KeyHelp> keys_of(bool leads_hand) {
   std::vector<KeyHelp> keys;
   if (leads_hand) keys.assign(kHandKeys.begin(), kHandKeys.end());
@@ -159,7 +159,7 @@ int draw_key_help(ImVec2 size, bool leads_hand, int page, float most_area) {
 
 namespace {
 
-// Okabe and Ito's colours: told apart with any kind of colour vision.
+// Okabe and Ito's colours: any kind of colour vision distinguishes them.
 const ImVec4 kCalm{0.34F, 0.71F, 0.91F, 1.0F};
 const ImVec4 kStrong{0.90F, 0.62F, 0.00F, 1.0F};
 const ImVec4 kLimit{0.84F, 0.37F, 0.00F, 1.0F};

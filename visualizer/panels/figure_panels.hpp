@@ -57,7 +57,7 @@ void panel_row(const char* label, const char* format, Value value,
   ImGui::TextColored(colour, format, value);
 }
 
-/// Force, tool, score and rates, with the plots where there are any: upper left corner. Returns its
+/// Force, tool, score and rates, with the plots if there are any: upper left corner. Returns its
 /// size.
 ImVec2 draw_figures(const OverlayFigures& figures);
 
@@ -69,7 +69,7 @@ float draw_slices(const SliceViews& slices, ImTextureID texture, ImVec2 size);
 /// A list in the upper left corner from which the mouse chooses.
 void draw_open_panel(OpenPanel& panel, ImVec2 size, float most_area);
 
-/// At the foot of the picture, beside the controls, which end at `controls_x`; at its top where the
+/// At the foot of the picture, beside the controls, which end at `controls_x`; at its top if the
 /// picture is too narrow for both. The controls stay where they are under the mouse; no panel lies
 /// over the banner.
 float draw_banner(const std::string& text, bool alarm, ImVec2 size, float controls_x);

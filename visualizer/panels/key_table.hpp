@@ -42,7 +42,7 @@ inline constexpr auto kKeys = std::to_array<KeyHelp>({
 /// Rows at its begin that the mouse does alone.
 inline constexpr std::size_t kMouseKeys = 3;
 
-/// What changes where the pointer leads the emulated hand (--hand-socket).
+/// What changes when the pointer leads the emulated hand (--hand-socket).
 inline constexpr auto kHandKeys = std::to_array<KeyHelp>({
     {"pointer", "leads the hand: see the ring"},
     {"left button", "press"},

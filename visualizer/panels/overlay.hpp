@@ -71,7 +71,7 @@ struct SpindleFigures {
   friend bool operator==(const SpindleFigures&, const SpindleFigures&) noexcept = default;
 };
 
-/// What the panel in the corner says.
+/// The figures of the panel in the corner.
 struct OverlayFigures {
   double force_n = 0.0;
   double full_force_n = 3.3;  ///< end of the bar
@@ -88,10 +88,10 @@ struct OverlayFigures {
   std::optional<double> data_age_ms;
   std::optional<std::uint64_t> filmed_frames;  ///< written so far; none: no video
   std::string banner;                          ///< shown large; empty: there is nothing to say
-  bool alarm = false;                          ///< it says that something is wrong
+  bool alarm = false;                          ///< the banner reports a fault
   int help = 0;                                ///< shows this page of the keys, and no panel
   bool leads_hand = false;                     ///< with those that lead the hand
-  std::optional<HandMark> hand;                ///< none: nobody leads it
+  std::optional<HandMark> hand;                ///< none: it is not led
   bool hidden = false;                         ///< shows nothing but the banner: for films
   std::vector<ForcePlot::Point> plot;    ///< force and depth over time, in place of score and rates
   std::optional<SliceViews> slices;      ///< in place of plot and rates
@@ -105,8 +105,8 @@ struct OverlayFigures {
   friend bool operator==(const OverlayFigures&, const OverlayFigures&) noexcept = default;
 };
 
-/// The panels over the picture, by Dear ImGui, which is told where the mouse is: it needs no
-/// window. One at a time, on the thread of the GL context.
+/// The panels over the picture, by Dear ImGui, which is given the position of the mouse: it needs
+/// no window. One at a time, on the thread of the GL context.
 ///
 /// Together they cover at most a quarter of a picture of 640x480 or more: what a full panel has no
 /// room for is scrolled to or, of the keys, on a page of its own. A menu that is open comes on top.
@@ -147,8 +147,8 @@ struct Notice {
   bool problem = false;
 };
 
-/// Tells the user of a window: on the terminal at once, and in the picture for a while, because the
-/// terminal may be out of sight.
+/// Shows notices to the user of a window: on the terminal at once, and in the picture for a while,
+/// because the terminal may be out of sight.
 class Notices {
  public:
   using Clock = std::chrono::steady_clock;

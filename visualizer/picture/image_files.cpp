@@ -58,7 +58,7 @@ int opened(const std::string& path) {
   std::signal(SIGPIPE, SIG_IGN);  // a closed pipe is an error of `write`
   if (path == "-") {
     const int fd = dup(STDOUT_FILENO);
-    dup2(STDERR_FILENO, STDOUT_FILENO);  // where words for the user would end up in the video
+    dup2(STDERR_FILENO, STDOUT_FILENO);  // messages for the user would end up in the video
     return fd;
   }
   constexpr int kNew = O_WRONLY | O_CREAT | O_TRUNC | O_NOFOLLOW | O_CLOEXEC;

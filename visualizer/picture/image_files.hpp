@@ -17,7 +17,7 @@ namespace kerf {
 void write_png(const std::filesystem::path& path, PictureSize size,
                std::span<const std::uint8_t> rgb);
 
-/// Makes the folder, and its parents, where it is missing. Throws VisualizerError.
+/// Makes the folder, and its parents, if it is missing. Throws VisualizerError.
 void make_folder(const std::filesystem::path& folder);
 
 /// A picture as video has it: brightness for each pixel, then two planes of colour differences with
@@ -43,8 +43,8 @@ class VideoFile {
   static constexpr int kPatienceMs = 2000;
 
   /// Replaces a file that is there; a link is refused. The process ignores SIGPIPE from now on.
-  /// With
-  /// "-" its standard output is the video's, and what else is written there goes to standard error.
+  /// With "-" its standard output is the video's, and what else is written there goes to standard
+  /// error.
   VideoFile(std::string path, PictureSize size, int frames_per_s);
 
   /// `yuv` as from `fill_yuv420`.
@@ -82,7 +82,7 @@ class Film {
   [[nodiscard]] double due_in_s(double servo_s) const noexcept;
   [[nodiscard]] bool due(double servo_s) const noexcept { return due_in_s(servo_s) <= 0.0; }
   /// `target` shows the state of `servo_s`, which begins anew with another controller. Throws
-  /// FileError, also where the size is another one.
+  /// FileError, also if the size is another one.
   void add(const RenderTarget& target, double servo_s);
 
   [[nodiscard]] const VideoFile& file() const noexcept { return file_; }
@@ -97,7 +97,7 @@ class Film {
   std::vector<std::uint8_t> yuv_;
 };
 
-/// Adds `target` to the film, where there is one. A film that fails ends, and the reason is
+/// Adds `target` to the film, if there is one. A film that fails ends, and the reason is
 /// returned; the picture goes on.
 [[nodiscard]] std::optional<std::string> add_frame(std::optional<Film>& film,
                                                    const RenderTarget& target, double servo_s);

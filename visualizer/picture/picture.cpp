@@ -242,7 +242,7 @@ Redrawn Picture::draw(const Session& session, const OverlayFigures& figures,
                                  [](const EyeLayers::Stale& one) { return one.stage.empty(); });
   if (rests && same_target && panel == shown_figures_) return {};
 
-  if (!same_target) clear(target);  // an odd column is nobody's
+  if (!same_target) clear(target);  // an odd column belongs to neither eye
   const PixelRect panels = overlay_.prepare(panel, size);
   double redrawn = 0.0;
   for (std::size_t eye = 0; eye < eyes_.size(); ++eye) {

@@ -43,7 +43,7 @@ class Picture {
 
   [[nodiscard]] const Look& look() const noexcept { return look_; }
   /// From the next `draw` on. Another renderer or iso value uploads all volumes again, an opacity
-  /// only the materials. Throws VisualizerError where the renderer cannot show them; the look stays
+  /// only the materials. Throws VisualizerError if the renderer cannot show them; the look stays
   /// then.
   void set_look(const Session& session, const Look& look);
   /// The scene with the iso values and opacities of the look.

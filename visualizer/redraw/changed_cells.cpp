@@ -146,7 +146,7 @@ void put_density(DirtyJob& job, const DirtyCells& cells, const VolumeView& volum
   job.edge_mm = static_cast<float>(edge_mm);
 }
 
-/// Marks those of `within` that are not yet and of which `is_stale` says so.
+/// Marks those of `within` that are not marked yet and for which `is_stale` holds.
 template <class IsStale>
 void mark_where(StaleTiles& tiles, const PixelRect& within, const IsStale& is_stale) {
   for (int y = within.y0; y < within.y1; ++y) {

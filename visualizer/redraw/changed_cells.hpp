@@ -17,8 +17,8 @@ namespace kerf {
 /// A grid of marks around the dirty voxels of a volume: the dirty voxels, dilated by the footprint
 /// of a ray. A ray that crosses no marked cell has the same colour as before.
 ///
-/// A cell is as large as a voxel. Its centre is a voxel where the footprint is odd, and a corner
-/// between voxels where it is even.
+/// A cell is as large as a voxel. Its centre is a voxel if the footprint is odd, and a corner
+/// between voxels if it is even.
 class DirtyCells {
  public:
   /// `voxels`: at least one box, none of them empty.
@@ -40,7 +40,7 @@ class DirtyCells {
   std::vector<std::uint8_t> marks_;
 };
 
-/// Collects the dirty voxels and triangles of one volume, and tells which tiles of its last picture
+/// Collects the dirty voxels and triangles of one volume, and marks which tiles of its last picture
 /// they make stale. All other tiles would be drawn with the same bits again.
 ///
 /// Call `add` after each update of the renderer, `mark` before a picture, `clear` after it.

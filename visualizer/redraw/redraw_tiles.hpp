@@ -35,7 +35,7 @@ class StaleTiles {
   [[nodiscard]] bool marked(int x, int y) const { return marked_[at(x, y)] != 0; }
 
   /// Rectangles of pixels that do not overlap and cover the marked tiles. Each costs a draw call,
-  /// so a rectangle takes in a few clean tiles where that saves another rectangle.
+  /// so a rectangle takes in a few clean tiles if that saves another rectangle.
   [[nodiscard]] std::vector<PixelRect> rects() const;
 
  private:
@@ -49,7 +49,7 @@ class StaleTiles {
 };
 
 /// Marks the tiles in which one of `triangles` may cover the centre of a pixel. A triangle that
-/// came and one that went count alike. A tile stays clean where the depth of `kept`, the last
+/// came and one that went count alike. A tile stays clean if the depth of `kept`, the last
 /// picture, is everywhere nearer than the triangle. Marks a little more than needed, never less: a
 /// GPU rounds.
 void mark_triangles(StaleTiles& tiles, std::span<const FineTriangle> triangles,

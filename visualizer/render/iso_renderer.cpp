@@ -82,8 +82,8 @@ void VolumeOnGpu::bind(const GlProgram& program, const View& view) const {
 IsoRenderer::IsoRenderer(const SceneView& scene, std::span<const VolumeContent> contents,
                          Options options)
     : gradient_(scene.gradient),
-      cast_program_({"screen.vert", "iso.frag", "solid.frag", "gradient.frag", "ray.frag",
-                     options.light, "depth.frag"},
+      cast_program_({"screen.vert", "iso.frag", "volume_sample.frag", "gradient.frag", "ray.frag",
+                     options.light},
                     define_of(scene.gradient)),
       palette_(palette_texture(scene.materials)) {
   const int limit = query_gl_driver().max_texture_size_3d;

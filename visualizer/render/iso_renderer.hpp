@@ -14,12 +14,12 @@
 
 namespace kerf {
 
-/// One volume for `iso`: what it is made of, its macrocells, and the gradient where it spans too
+/// One volume for `iso`: what it is made of, its macrocells, and the gradient if it spans too
 /// many voxels for a shader: 8 bytes a voxel. Uploaded whole once, then by changed bricks.
 class VolumeOnGpu {
  public:
   /// `skip_empty` false takes every cell for active: the slow obvious picture, for comparison.
-  /// Throws VisualizerError where the volume is beyond `max_texture_size`.
+  /// Throws VisualizerError if the volume is beyond `max_texture_size`.
   VolumeOnGpu(const VolumeView& volume, const VolumeContent& content, int max_texture_size,
               bool skip_empty, GradientFilter gradient = GradientFilter::corners);
 

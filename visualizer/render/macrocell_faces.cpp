@@ -150,7 +150,7 @@ void RayEntries::draw(int layer, const CellsOnGpu& cells, const View& view,
                glm::mat4(view.clip_from_eye() * view.eye_from_world * cells.world_from_cell()));
   program_.set("u_near_mm", static_cast<float>(view.near_mm));
   program_.use();
-  // Faces before the near plane count too: they say where a ray is inside.
+  // Faces before the near plane count too: they mark where a ray is inside.
   glEnable(GL_DEPTH_CLAMP);
   cells.draw_faces();
   glDisable(GL_DEPTH_CLAMP);

@@ -85,8 +85,8 @@ class CellsOnGpu {
 };
 
 /// Per pixel, where its ray first meets an active macrocell of a volume, in mm along the view axis:
-/// drawn from the faces between active and empty cells. The far plane where it meets none, the near
-/// plane where it begins in one. One layer for each volume.
+/// drawn from the faces between active and empty cells. The far plane if it meets none, the near
+/// plane if it begins in one. One layer for each volume.
 class RayEntries {
  public:
   explicit RayEntries(int layers) : layers_(layers) {}

@@ -55,8 +55,8 @@ const Kind& find_kind(std::string_view name) {
 // A density is interpolated between two voxels (1 edge), a surface has its gradient from a cube two
 // voxels wide (2).
 constexpr RayFootprint kSurfaceFootprint{.along = 3, .at_end = 5, .taps_normal = true};
-// A sample within takes its material from 1.5 edges up the gradient (matter.frag), or its gradient
-// from five voxels along each axis (3).
+// A sample within takes its material from 1.5 edges up the gradient (translucent_sample.frag), or
+// its gradient from five voxels along each axis (3).
 constexpr RayFootprint kMatterFootprint{.along = 6}, kWideMatterFootprint{.along = 7};
 
 }  // namespace

@@ -35,8 +35,8 @@ class Renderer {
   virtual void set_opacities(std::span<const MaterialView> /*materials*/,
                              std::span<const VolumeContent> /*contents*/) {}
   /// Views have a clip plane from now on, or none any more. Renderers that hold no voxels cut no
-  /// faces without being told; what they hold for that costs memory, and each update a little.
-  /// `contents` is all of the volumes. Throws VisualizerError where the driver cannot hold them.
+  /// faces without this call; what they hold for that costs memory, and each update a little.
+  /// `contents` is all of the volumes. Throws VisualizerError if the driver cannot hold them.
   virtual void set_cut_open(bool /*open*/, std::span<const VolumeContent> /*contents*/) {}
   /// While camera or objects move, a renderer may draw more coarsely; at rest it is exact.
   virtual void set_moving(bool /*moving*/) {}

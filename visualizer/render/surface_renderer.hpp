@@ -18,7 +18,7 @@ namespace kerf {
 /// materials: each pixel whose ray enters the plane in what is solid.
 class SectionFaces {
  public:
-  /// Throws VisualizerError where the driver takes no textures of this size.
+  /// Throws VisualizerError if the driver takes no textures of this size.
   SectionFaces(const SceneView& scene, std::span<const VolumeContent> contents);
 
   [[nodiscard]] std::span<SolidOnGpu> volumes() noexcept { return volumes_; }
@@ -26,8 +26,8 @@ class SectionFaces {
   void draw(const View& view, const RenderTarget& target) const;
 
  private:
-  GlProgram program_{"screen.vert", "section.frag",  "solid.frag",
-                     "ray.frag",    "lighting.frag", "depth.frag"};
+  GlProgram program_{"screen.vert", "clip_cap.frag", "volume_sample.frag", "ray.frag",
+                     "lighting.frag"};
   GlTexture2D palette_;
   std::vector<SolidOnGpu> volumes_;
 };

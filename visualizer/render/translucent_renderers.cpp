@@ -16,7 +16,7 @@ BlendRenderer::BlendRenderer(const SceneView& scene, std::span<const VolumeConte
     : volumes_(scene, contents, options.skip_empty),
       entries_(static_cast<int>(scene.volumes.size())),
       cast_program_(
-          {"screen.vert", "blend.frag", "matter.frag", "ray.frag", "lighting.frag", "depth.frag"},
+          {"screen.vert", "blend.frag", "translucent_sample.frag", "ray.frag", "lighting.frag"},
           volumes_.defines()) {
   volumes_.set_constants(cast_program_);
   cast_program_.set("u_entry_mm", static_cast<int>(volumes_.free_unit()));
@@ -62,7 +62,7 @@ BoxCorners active_corners(const CellsOnGpu& cells, const View& view, double marg
 SlicesRenderer::Sliced::Sliced(const SceneView& scene, const VolumeContent& content)
     : volume(scene, {&content, 1}, true),
       program(
-          {"slices.vert", "slices.frag", "matter.frag", "ray.frag", "lighting.frag", "depth.frag"},
+          {"slices.vert", "slices.frag", "translucent_sample.frag", "ray.frag", "lighting.frag"},
           volume.defines()) {
   volume.set_constants(program);
   program.set("u_opaque_depth", static_cast<int>(volume.free_unit()));

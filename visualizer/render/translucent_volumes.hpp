@@ -17,7 +17,7 @@
 namespace kerf {
 
 /// One volume for the renderers that look into it: gradient and density in one texture, materials
-/// in a second where there are labels, and the cells that hold something to see.
+/// in a second if there are labels, and the cells that hold something to see.
 class TranslucentVolume {
  public:
   TranslucentVolume(const VolumeView& volume, const VolumeContent& content,
@@ -34,7 +34,7 @@ class TranslucentVolume {
   /// Three units from `unit` on: voxels, materials, active cells.
   void bind_textures(GLuint unit) const;
 
-  /// Uploads the materials again where there are labels.
+  /// Uploads the materials again if there are labels.
   void set_materials(const Palette& materials, const VolumeContent& content);
 
   [[nodiscard]] bool has_labels() const noexcept { return has_labels_; }
@@ -58,18 +58,18 @@ class TranslucentVolume {
   double edge_mm_;
   VoxelTexture voxels_;
   VoxelTexture materials_;
-  std::optional<MaterialTexels> material_texels_;  ///< where there are labels
+  std::optional<MaterialTexels> material_texels_;  ///< if there are labels
   CellsOnGpu cells_;
   std::vector<GradientTexel> upload_buffer_;
 };
 
-/// All volumes of a scene as matter.frag sees them.
+/// All volumes of a scene as translucent_sample.frag sees them.
 class TranslucentVolumes {
  public:
   static constexpr GLuint kUnitsPerVolume = 3;
 
-  /// `skip_empty` false takes every cell for active, for comparison. Throws VisualizerError where a
-  /// volume is beyond the driver's limits, or where there are more volumes than it has texture
+  /// `skip_empty` false takes every cell for active, for comparison. Throws VisualizerError if a
+  /// volume is beyond the driver's limits, or if there are more volumes than it has texture
   /// units for.
   TranslucentVolumes(const SceneView& scene, std::span<const VolumeContent> contents,
                      bool skip_empty);
@@ -121,7 +121,7 @@ class TranslucentLayer {
     GlFramebuffer framebuffer = GlFramebuffer::create();
   };
 
-  GlProgram program_{"screen.vert", "layer.frag", "lighting.frag"};
+  GlProgram program_{"screen.vert", "composite.frag", "lighting.frag"};
   std::optional<Buffer> buffer_;
 };
 

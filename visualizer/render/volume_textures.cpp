@@ -134,7 +134,7 @@ bool MaterialTexels::any_label(const VoxelBox& box) const {
   return false;
 }
 
-/// The mean of the labelled voxels around `at`, the nearer the heavier; none where there are none.
+/// The mean of the labelled voxels around `at`, the nearer the heavier; none if there are none.
 std::optional<glm::vec4> MaterialTexels::mean_around(VoxelIndex at) const {
   const VoxelBox box =
       VoxelBox{at, {at.x + 1, at.y + 1, at.z + 1}}.grown(kMaterialReach).clipped(grid_.box());

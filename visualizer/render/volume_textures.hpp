@@ -61,7 +61,7 @@ void for_each_layer(const VoxelGrid& grid, const Take& take) {
 [[nodiscard]] glm::dmat4 world_from_texture(const glm::dmat4& world_from_voxel,
                                             const VoxelGrid& grid);
 
-/// Throws VisualizerError where the volume with its border is beyond `max_texture_size`.
+/// Throws VisualizerError if the volume with its border is beyond `max_texture_size`.
 void check_extent(const VolumeView& volume, int max_texture_size);
 
 /// What the translucent renderers read at every sample, ready to be filtered: the gradient of the
@@ -114,11 +114,11 @@ class MaterialTexels {
   std::array<MaterialTexel, kPaletteWidth> by_density_{}, by_label_{};
 };
 
-/// Density and labels of one volume as textures: what solid.frag reads. Uploaded whole
+/// Density and labels of one volume as textures: what volume_sample.frag reads. Uploaded whole
 /// once, then by changed bricks.
 class SolidOnGpu {
  public:
-  /// Throws VisualizerError where the volume is beyond `max_texture_size`.
+  /// Throws VisualizerError if the volume is beyond `max_texture_size`.
   SolidOnGpu(const VolumeView& volume, const VolumeContent& content, int max_texture_size);
 
   /// Uploads bricks `changed` of `density` (the whole volume).
@@ -127,7 +127,7 @@ class SolidOnGpu {
   /// See `Renderer::place`.
   void place(const glm::dmat4& world_from_voxel);
 
-  /// Names the units of density (0), labels (1) and `palette` to a program with solid.frag.
+  /// Names the units of density (0), labels (1) and `palette` to a program with volume_sample.frag.
   static void set_units(const GlProgram& program, int palette);
   /// Binds the two textures, and sets what such a program must know of the volume in this view.
   void bind(const GlProgram& program, const View& view) const;
@@ -146,7 +146,7 @@ class SolidOnGpu {
   VoxelTexture labels_;
 };
 
-/// The palette that solid.frag reads, of these materials.
+/// The palette that volume_sample.frag reads, of these materials.
 [[nodiscard]] GlTexture2D palette_texture(std::span<const MaterialView> materials);
 
 }  // namespace kerf

@@ -48,7 +48,7 @@ struct Look {
   ClipPlane clip{};
   Stereo stereo{};
   bool voxel_tool = false;    ///< the tool is a volume, not a mesh
-  bool colour_blind = false;  ///< materials in colours that any colour vision tells apart
+  bool colour_blind = false;  ///< materials in colours that any colour vision distinguishes
   friend bool operator==(const Look&, const Look&) noexcept = default;
 };
 
@@ -67,12 +67,12 @@ using Palette = std::array<std::array<glm::vec4, kPaletteWidth>, 2>;
 
 /// What a voxel looks like in the translucent renderers; plain data, the same for all of them.
 ///
-/// A sample of density d has the colour of its material (by label where it has one, else by
+/// A sample of density d has the colour of its material (by label if it has one, else by
 /// density) and the opacity
 ///
 ///     1 - (1 - a)^(p * s / s0),   p = clamp((d - empty) / (full - empty), 0, 1)
 ///
-/// over a length s, where a is the material's opacity over s0, one voxel edge (the shortest, where
+/// over a length s, where a is the material's opacity over s0, one voxel edge (the shortest, if
 /// they differ). The exponent makes the picture independent of the step; p lets a border fade
 /// in, and material that is milled away fade out.
 struct TransferFunction {
@@ -102,7 +102,7 @@ inline constexpr double kLeastOpacity = 1.0 / 255.0;
 [[nodiscard]] TransferFunction make_transfer_function(const SceneView& scene, std::size_t volume,
                                                       const VolumeContent& content);
 
-/// The median of the densities below `iso`, rounded down to 8 bits; 0 where there are none. A CT
+/// The median of the densities below `iso`, rounded down to 8 bits; 0 if there are none. A CT
 /// has its own value for air, far above the lowest one, as the paper's tooth: 0.3 of the highest.
 [[nodiscard]] Density air_level(std::span<const Density> density, Density iso);
 

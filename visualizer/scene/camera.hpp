@@ -99,7 +99,7 @@ struct SeenPoint {
 /// And back.
 [[nodiscard]] glm::dvec3 world_at(const View& view, PictureSize size, const SeenPoint& seen);
 
-/// Pixels of a picture that what lies within the hull of `corners` can cover; all of them where a
+/// Pixels of a picture that what lies within the hull of `corners` can cover; all of them if a
 /// corner is not in front of the near plane.
 [[nodiscard]] PixelRect screen_bounds(std::span<const glm::dvec3> corners, const View& view,
                                       PictureSize size);

@@ -10,7 +10,7 @@
 namespace kerf {
 
 /// Wall and processor time of one stretch of work. Processor time is summed over all threads of the
-/// process: the steady figure where a software GL draws on several cores that others use too.
+/// process: the steady figure if a software GL draws on several cores that others use too.
 class Stopwatch {
  public:
   Stopwatch();
@@ -37,7 +37,7 @@ struct FrameReport {
   std::uint64_t rest_frames = 0;
   std::vector<double> cpu_ms{};
   std::vector<double> wall_ms{};
-  std::vector<double> redrawn{};  ///< share of the picture whose volumes were drawn again
+  std::vector<double> redrawn{};  ///< fraction of the picture whose volumes were drawn again
 
   /// From the oldest tick that removed material which a frame was the first to show, to the end of
   /// drawing that frame; of frames that showed none, nothing.

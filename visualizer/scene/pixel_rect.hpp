@@ -15,7 +15,7 @@ struct PictureSize {
   friend constexpr bool operator==(PictureSize, PictureSize) noexcept = default;
 };
 
-/// A part of a picture in pixels, half-open, first row at the bottom as GL counts; empty where any
+/// A part of a picture in pixels, half-open, first row at the bottom as GL counts; empty if any
 /// extent is not positive.
 struct PixelRect {
   int x0 = 0, y0 = 0, x1 = 0, y1 = 0;

@@ -67,11 +67,11 @@ struct MaterialView {
   double iso = 0.0;
   glm::dvec3 colour{0.9, 0.87, 0.8};  ///< linear RGB
   std::optional<double> opacity{};    ///< over one voxel edge, 0..1; none: by its hardness
-  bool forbidden = false;             ///< never cut, and told when it is pressed
+  bool forbidden = false;             ///< never cut, and reported when it is pressed
 };
 
 /// Gives each material but "none" its colour of material.hpp, which any kind of colour vision
-/// tells apart.
+/// distinguishes.
 void take_okabe_ito(std::span<MaterialView> materials);
 
 /// Where the device's own space lies in the world: world = offset + scale * device.
@@ -99,13 +99,13 @@ struct SceneView {
 [[nodiscard]] glm::dmat4 rigid(const glm::dvec3& position_mm, const glm::dvec4& quaternion_xyzw);
 
 /// Geometry from the segment's descriptors, names, tools and materials from its scene text. Throws
-/// VisualizerError where the text is not what this version writes.
+/// VisualizerError if the text is not what this version writes.
 [[nodiscard]] SceneView scene_view(const SegmentInfo& segment);
 
 /// A tool seen from the side, as rows from its tip upwards: height, left and right end, in mm.
 using Silhouette = std::vector<std::array<double, 3>>;
 
-/// Of the head, and where a shaft is felt of as much of that as the head is long. Empty where the
+/// Of the head, and, if a shaft is felt, of as much of that as the head is long. Empty if the
 /// tool has no extent.
 [[nodiscard]] Silhouette silhouette_of(const ToolView& tool);
 

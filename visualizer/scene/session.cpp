@@ -169,7 +169,7 @@ void Session::read_removals() {
       continue;
     }
     if (record.volume >= scene_.volumes.size()) continue;
-    // Over all volumes, though a record tells of one: nothing is cut while a reset runs.
+    // Over all volumes, though a record names one: nothing is cut while a reset runs.
     if (record.cause == static_cast<std::uint16_t>(DirtyCause::reset)) removed_mm3_ = 0;
     const double mm3 = record.removed / kDensityMax * voxel_mm3(scene_.volumes[record.volume]);
     if (record.cause == static_cast<std::uint16_t>(DirtyCause::undo)) {
@@ -181,7 +181,7 @@ void Session::read_removals() {
   }
 }
 
-// The record itself carries the end of the tick before; that of the tick's state, where it is still
+// The record itself carries the end of the tick before; that of the tick's state, if it is still
 // there, its start.
 std::uint64_t Session::began_ns(const DirtyRecord& removal) const {
   const SegmentReader& reader = connection_.reader();
@@ -280,7 +280,7 @@ bool Session::send(CommandKind kind, std::uint32_t argument) {
     const Command command{.kind = kind, .index = 0, .argument = argument};
     return connection_.send(command).status == ReplyStatus::accepted;
   } catch (const SegmentError&) {
-    return false;  // it has gone; the picture says so
+    return false;  // it has gone; the picture reports it
   }
 }
 

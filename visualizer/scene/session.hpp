@@ -16,7 +16,7 @@
 namespace kerf {
 
 /// How much of each material has been removed, brick by brick: the most that a brick has held since
-/// this was made, less what it holds now. Matter that comes back is no longer counted, also where a
+/// this was made, less what it holds now. Matter that comes back is no longer counted, also if a
 /// reset brings back what was gone before. Memory: a byte for each voxel.
 class MaterialScore {
  public:
@@ -52,7 +52,7 @@ class MaterialScore {
 /// controller. One thread.
 class Session {
  public:
-  /// Throws SegmentError where there is no controller of that name or it speaks another version.
+  /// Throws SegmentError if there is no controller of that name or it speaks another version.
   explicit Session(std::string_view name);
 
   /// Tries again until a controller of that name lets it in; throws the last reason once `wait` is
@@ -83,7 +83,7 @@ class Session {
   [[nodiscard]] bool joined_late() const noexcept { return joined_late_; }
   [[nodiscard]] std::optional<double> data_age_ms() const;
   /// When the oldest of the ticks began that removed material whose bricks came with a `poll` since
-  /// the last call. None where no such tick; what was removed before the session began does not
+  /// the last call. None if no such tick; what was removed before the session began does not
   /// count.
   std::optional<std::chrono::steady_clock::time_point> take_oldest_removal();
   [[nodiscard]] std::uint32_t tick_ns() const noexcept;
@@ -100,7 +100,7 @@ class Session {
   /// It said so, and it was no fault.
   [[nodiscard]] bool ended_cleanly() const noexcept;
 
-  // False where the controller refuses, is busy or has gone.
+  // False if the controller refuses, is busy or has gone.
   bool select_tool(std::uint32_t index) { return send(CommandKind::select_tool, index); }
   /// The volumes go back to their first content.
   bool reset() { return send(CommandKind::reset, 0); }
@@ -118,7 +118,7 @@ class Session {
   Stopwatch began_;
   SegmentConnection connection_;
   SceneView scene_;
-  bool cut_before_;  ///< as told before the first look at the volumes
+  bool cut_before_;  ///< as reported before the first read of the volumes
   std::vector<VolumeSnapshot> snapshots_;
   MaterialScore score_;
   std::optional<TickRecord> latest_;

@@ -65,7 +65,7 @@ constexpr Loop lines_of(unsigned solid) {
   return next;
 }
 
-/// Fills points `first`..`last` of a loop with triangles; false where every way needs a side on a
+/// Fills points `first`..`last` of a loop with triangles; false if every way needs a side on a
 /// face.
 constexpr bool fill(const Loop& loop, std::size_t first, std::size_t last, CubeCase& out) {
   if (last - first < 2) return true;
@@ -121,6 +121,57 @@ std::span<const CubeTriangle> cube_triangles(unsigned solid) noexcept {
 }
 
 namespace {
+
+/// The densities of a block and one voxel around it, in one place and with air outside the volume,
+/// so that what reads them needs no test for the border.
+class Neighbourhood {
+ public:
+  static constexpr int kSamples = kBlockEdge + 1;  ///< a side of a block: both ends of its cells
+  static constexpr std::array<int, 3> kStride{1, 16, 16 * (kSamples + 2)};  ///< by axis
+
+  Neighbourhood(const VolumeSamples& volume, VoxelIndex start) {
+    constexpr int kEdge = kSamples + 2;
+    const VoxelIndex lo{start.x - 1, start.y - 1, start.z - 1};
+    const VoxelBox in =
+        VoxelBox{lo, {lo.x + kEdge, lo.y + kEdge, lo.z + kEdge}}.clipped(volume.grid.box());
+    const auto bytes = static_cast<std::size_t>(in.hi.x - in.lo.x) * sizeof(Density);
+    for (std::int32_t z = in.lo.z; z < in.hi.z; ++z) {
+      for (std::int32_t y = in.lo.y; y < in.hi.y; ++y) {
+        std::memcpy(&density_[index(in.lo.x - start.x, y - start.y, z - start.z)],
+                    &volume.density[volume.grid.index(in.lo.x, y, z)], bytes);
+      }
+    }
+  }
+
+  /// Sample (0, 0, 0) is the block's start; each part -1..9.
+  [[nodiscard]] const Density* at(int x, int y, int z) const { return &density_[index(x, y, z)]; }
+
+  /// `GradientFilter::corners` of a sample 0..8, up to a factor.
+  [[nodiscard]] static glm::vec3 corner_gradient(const Density* at) {
+    // Sum and difference along x of the four rows, then along y and z.
+    std::array<int, 4> sum{};
+    std::array<int, 4> rise{};
+    for (int row = 0; row < 4; ++row) {
+      const Density* middle = at + ((row & 1) * 2 - 1) * kStride[1] + ((row & 2) - 1) * kStride[2];
+      sum[static_cast<std::size_t>(row)] = middle[1] + middle[-1];
+      rise[static_cast<std::size_t>(row)] = middle[1] - middle[-1];
+    }
+    return glm::vec3(rise[0] + rise[1] + rise[2] + rise[3], sum[1] - sum[0] + sum[3] - sum[2],
+                     sum[2] + sum[3] - sum[0] - sum[1]);
+  }
+  /// `GradientFilter::central` of a sample 0..8, up to a factor.
+  [[nodiscard]] static glm::vec3 central_gradient(const Density* at) {
+    return glm::vec3(at[kStride[0]] - at[-kStride[0]], at[kStride[1]] - at[-kStride[1]],
+                     at[kStride[2]] - at[-kStride[2]]);
+  }
+
+ private:
+  static constexpr std::size_t index(int x, int y, int z) {
+    return static_cast<std::size_t>((z + 1) * kStride[2] + (y + 1) * kStride[1] + x + 1);
+  }
+
+  std::array<Density, static_cast<std::size_t>(kStride[2]) * (kSamples + 2)> density_{};
+};
 
 constexpr unsigned kSamples = Neighbourhood::kSamples;
 
@@ -262,6 +313,107 @@ unsigned place_in_order(const SurfaceVertex& vertex) {
   return ((voxel(2) * kSamples + voxel(1)) * 3 + axis) * kSamples + voxel(0);
 }
 
+constexpr float kNormalLength = 32767.0F;
+
+/// To the nearest; for |value| < 2^15.
+int rounded(float value) {
+  return static_cast<int>(value + 32768.5F) - 32768;
+}
+
+std::uint16_t unit16(float share) {
+  return static_cast<std::uint16_t>(std::clamp(share, 0.0F, 1.0F) * 65535.0F + 0.5F);
+}
+
+/// `GradientFilter::farid5` up to a factor: it looks farther than a neighbourhood.
+glm::vec3 wide_gradient(const VolumeSamples& volume, VoxelIndex at) {
+  constexpr FilterTaps kTaps = gradient_taps(GradientFilter::farid5);
+  constexpr int kReach = gradient_reach(GradientFilter::farid5);
+  glm::vec3 sum(0.0F);
+  for (int z = 0; z <= 2 * kReach; ++z) {
+    for (int y = 0; y <= 2 * kReach; ++y) {
+      float slope = 0.0F, smooth = 0.0F;
+      for (int x = 0; x <= 2 * kReach; ++x) {
+        const auto i = static_cast<std::size_t>(x);
+        const float density =
+            volume.density_at(VoxelIndex{at.x + x - kReach, at.y + y - kReach, at.z + z - kReach});
+        slope += kTaps.slope[i] * density;
+        smooth += kTaps.smooth[i] * density;
+      }
+      const auto j = static_cast<std::size_t>(y), k = static_cast<std::size_t>(z);
+      sum += glm::vec3(kTaps.smooth[j] * kTaps.smooth[k] * slope,
+                       kTaps.slope[j] * kTaps.smooth[k] * smooth,
+                       kTaps.smooth[j] * kTaps.slope[k] * smooth);
+    }
+  }
+  return sum;
+}
+
+/// From what the vertex holds, not from what it was made of: to do it again gives the same bits.
+FinePoint inward_of(const SurfaceVertex& vertex, const glm::vec3& inverse_square_spacing) {
+  glm::vec3 along(vertex.normal[0], vertex.normal[1], vertex.normal[2]);
+  float length = kNormalLength;
+  if (inverse_square_spacing != glm::vec3(1.0F)) {
+    along *= inverse_square_spacing;
+    length = std::sqrt(glm::dot(along, along));
+  }
+  const glm::vec3 step = along * (-float{kFinePerVoxel} / length);
+  return {rounded(step.x), rounded(step.y), rounded(step.z)};
+}
+
+/// Of a voxel `at`, whose density is `sample` of a neighbourhood; up to a factor.
+glm::vec3 gradient_of(const SurfaceSource& source, const Density* sample, VoxelIndex at) {
+  switch (source.gradient) {
+    case GradientFilter::corners:
+      return Neighbourhood::corner_gradient(sample);
+    case GradientFilter::central:
+      return Neighbourhood::central_gradient(sample);
+    case GradientFilter::farid5:
+      break;
+  }
+  return wide_gradient(source.volume, at);
+}
+
+/// Computes normal, colour and openness of a vertex from its position and the volume. The vertex
+/// belongs to the block that starts at `start`; `near` is that block's neighbourhood. Pure.
+void dress(SurfaceVertex& vertex, const SurfaceSource& source, VoxelIndex start,
+           const Neighbourhood& near) {
+  std::array<int, 3> from{};
+  std::size_t axis = 0;  // along which its cube edge runs
+  int along = 0;
+  for (std::size_t i = 0; i < 3; ++i) {
+    from[i] = vertex.position[i] >> kFineLog2;
+    const int rest = vertex.position[i] & (kFinePerVoxel - 1);
+    if (rest != 0) {
+      axis = i;
+      along = rest;
+    }
+  }
+  const Density* low = near.at(from[0], from[1], from[2]);
+  const Density* high = low + Neighbourhood::kStride[axis];
+  VoxelIndex end{start.x + from[0], start.y + from[1], start.z + from[2]};
+  const glm::vec3 low_slope = gradient_of(source, low, end);
+  (axis == 0 ? end.x : axis == 1 ? end.y : end.z) += 1;
+  const glm::vec3 high_slope = gradient_of(source, high, end);
+  const glm::vec3 slope =
+      glm::mix(low_slope, high_slope, static_cast<float>(along) / float{kFinePerVoxel});
+  const float length = std::sqrt(glm::dot(slope, slope));
+  glm::vec3 outward(0.0F);
+  if (length > 0.0F) {
+    outward = slope * (-1.0F / length);
+  } else {  // a lone voxel looks the same on all sides
+    outward[static_cast<int>(axis)] = *high > *low ? -1.0F : 1.0F;
+  }
+  for (int i = 0; i < 3; ++i) {
+    vertex.normal[static_cast<std::size_t>(i)] =
+        static_cast<std::int16_t>(rounded(outward[i] * kNormalLength));
+  }
+  const FinePoint at = fine_place(vertex, start);
+  const FinePoint inward = inward_of(vertex, source.inverse_square_spacing);
+  const glm::vec3 colour = source.look->colour(source.volume, at, inward);
+  vertex.colour = {unit16(colour.r), unit16(colour.g), unit16(colour.b)};
+  vertex.openness = unit16(source.look->openness(source.volume, at, inward));
+}
+
 }  // namespace
 
 void DirtyMeshCells::add(const SurfaceVertex& vertex) noexcept {
@@ -327,109 +479,6 @@ BlockMesh extract_block(const SurfaceSource& source, VoxelIndex block) {
   BlockMesh mesh = Extraction(near, source.iso).run();
   for (SurfaceVertex& vertex : mesh.vertices) dress(vertex, source, start, near);
   return mesh;
-}
-
-namespace {
-
-constexpr float kNormalLength = 32767.0F;
-
-/// To the nearest; for |value| < 2^15.
-int rounded(float value) {
-  return static_cast<int>(value + 32768.5F) - 32768;
-}
-
-std::uint16_t unit16(float share) {
-  return static_cast<std::uint16_t>(std::clamp(share, 0.0F, 1.0F) * 65535.0F + 0.5F);
-}
-
-/// `GradientFilter::farid5` up to a factor: it looks farther than a neighbourhood.
-glm::vec3 wide_gradient(const VolumeSamples& volume, VoxelIndex at) {
-  constexpr FilterTaps kTaps = gradient_taps(GradientFilter::farid5);
-  constexpr int kReach = gradient_reach(GradientFilter::farid5);
-  glm::vec3 sum(0.0F);
-  for (int z = 0; z <= 2 * kReach; ++z) {
-    for (int y = 0; y <= 2 * kReach; ++y) {
-      float slope = 0.0F, smooth = 0.0F;
-      for (int x = 0; x <= 2 * kReach; ++x) {
-        const auto i = static_cast<std::size_t>(x);
-        const float density =
-            volume.density_at(VoxelIndex{at.x + x - kReach, at.y + y - kReach, at.z + z - kReach});
-        slope += kTaps.slope[i] * density;
-        smooth += kTaps.smooth[i] * density;
-      }
-      const auto j = static_cast<std::size_t>(y), k = static_cast<std::size_t>(z);
-      sum += glm::vec3(kTaps.smooth[j] * kTaps.smooth[k] * slope,
-                       kTaps.slope[j] * kTaps.smooth[k] * smooth,
-                       kTaps.smooth[j] * kTaps.slope[k] * smooth);
-    }
-  }
-  return sum;
-}
-
-/// From what the vertex holds, not from what it was made of: to do it again gives the same bits.
-FinePoint inward_of(const SurfaceVertex& vertex, const glm::vec3& inverse_square_spacing) {
-  glm::vec3 along(vertex.normal[0], vertex.normal[1], vertex.normal[2]);
-  float length = kNormalLength;
-  if (inverse_square_spacing != glm::vec3(1.0F)) {
-    along *= inverse_square_spacing;
-    length = std::sqrt(glm::dot(along, along));
-  }
-  const glm::vec3 step = along * (-float{kFinePerVoxel} / length);
-  return {rounded(step.x), rounded(step.y), rounded(step.z)};
-}
-
-/// Of a voxel `at`, whose density is `sample` of a neighbourhood; up to a factor.
-glm::vec3 gradient_of(const SurfaceSource& source, const Density* sample, VoxelIndex at) {
-  switch (source.gradient) {
-    case GradientFilter::corners:
-      return Neighbourhood::corner_gradient(sample);
-    case GradientFilter::central:
-      return Neighbourhood::central_gradient(sample);
-    case GradientFilter::farid5:
-      break;
-  }
-  return wide_gradient(source.volume, at);
-}
-
-}  // namespace
-
-void dress(SurfaceVertex& vertex, const SurfaceSource& source, VoxelIndex start,
-           const Neighbourhood& near) {
-  std::array<int, 3> from{};
-  std::size_t axis = 0;  // along which its cube edge runs
-  int along = 0;
-  for (std::size_t i = 0; i < 3; ++i) {
-    from[i] = vertex.position[i] >> kFineLog2;
-    const int rest = vertex.position[i] & (kFinePerVoxel - 1);
-    if (rest != 0) {
-      axis = i;
-      along = rest;
-    }
-  }
-  const Density* low = near.at(from[0], from[1], from[2]);
-  const Density* high = low + Neighbourhood::kStride[axis];
-  VoxelIndex end{start.x + from[0], start.y + from[1], start.z + from[2]};
-  const glm::vec3 low_slope = gradient_of(source, low, end);
-  (axis == 0 ? end.x : axis == 1 ? end.y : end.z) += 1;
-  const glm::vec3 high_slope = gradient_of(source, high, end);
-  const glm::vec3 slope =
-      glm::mix(low_slope, high_slope, static_cast<float>(along) / float{kFinePerVoxel});
-  const float length = std::sqrt(glm::dot(slope, slope));
-  glm::vec3 outward(0.0F);
-  if (length > 0.0F) {
-    outward = slope * (-1.0F / length);
-  } else {  // a lone voxel looks the same on all sides
-    outward[static_cast<int>(axis)] = *high > *low ? -1.0F : 1.0F;
-  }
-  for (int i = 0; i < 3; ++i) {
-    vertex.normal[static_cast<std::size_t>(i)] =
-        static_cast<std::int16_t>(rounded(outward[i] * kNormalLength));
-  }
-  const FinePoint at = fine_place(vertex, start);
-  const FinePoint inward = inward_of(vertex, source.inverse_square_spacing);
-  const glm::vec3 colour = source.look->colour(source.volume, at, inward);
-  vertex.colour = {unit16(colour.r), unit16(colour.g), unit16(colour.b)};
-  vertex.openness = unit16(source.look->openness(source.volume, at, inward));
 }
 
 DirtyMeshCells update_look(const SurfaceSource& source, VoxelIndex block, const VoxelBox& changed,

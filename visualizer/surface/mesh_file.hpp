@@ -29,8 +29,8 @@ struct ClosedMesh {
   void append(const VolumeSurface& surface, const glm::dmat4& world_from_voxel);
 };
 
-/// Writes the iso-surfaces of the solid volumes (of the first volume where none is solid), in mm in
-/// the world, as STL or PLY by the name's ending. Each is closed; where volumes overlap so do they.
+/// Writes the iso-surfaces of the solid volumes (of the first volume if none is solid), in mm in
+/// the world, as STL or PLY by the name's ending. Each is closed; if volumes overlap, so do they.
 /// Whole or not at all; with nothing left to show, a valid file without triangles. Needs no GL.
 /// Throws VisualizerError or FileError.
 void export_surface(const std::filesystem::path& file, const SceneView& scene,

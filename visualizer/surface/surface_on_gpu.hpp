@@ -82,7 +82,7 @@ class FrustumCulling {
 
   enum class Visible : std::uint8_t { nothing, some, all };
   /// `nothing`: the block is outside of all parts, or turns its back to the eye. `all`: it lies
-  /// within one part. `some`: neither can be told.
+  /// within one part. `some`: neither is certain.
   [[nodiscard]] Visible visible(const BlockBounds& block) const;
 
   /// Squared distance in voxel edges from the eye to the middle of the block, to sort blocks from
@@ -106,7 +106,7 @@ class FrustumCulling {
 /// A GL buffer that keeps its content when it grows.
 class GrowingBuffer {
  public:
-  /// Room for `bytes`; true where the buffer is another one now.
+  /// Room for `bytes`; true if the buffer is another one now.
   bool reserve(std::size_t bytes);
   void write(std::size_t offset, std::size_t bytes, const void* data) const;
   [[nodiscard]] GLuint id() const noexcept { return buffer_.id(); }
@@ -119,8 +119,8 @@ class GrowingBuffer {
 /// The meshes of one volume in the memory of the GPU: all vertices in one buffer, all triangles in
 /// another, drawn by one call.
 ///
-/// Of a block that is only partly visible the visible triangles are picked and
-/// uploaded at each draw: to pick one costs far less than to draw it in software.
+/// Of a block that is only partly visible, the visible triangles are picked and uploaded at each
+/// draw: to pick one costs far less than to draw it in software.
 class SurfaceOnGpu {
  public:
   explicit SurfaceOnGpu(const VolumeSurface& surface);

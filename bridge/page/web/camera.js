@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a picture is seen through: the lens, the first view and the limits of visualizer/view/camera.
+// What a picture is seen through: the lens, the first view and the limits of visualizer/scene/camera.
 import {kEyesPerConvergence, kFarthest, kHalfHeightRad, kHomePitchRad, kHomeYawRad, kMargin,
   kMaxPitchRad, kNearest, kNearPlane, kZoomStep} from './constants.js';
 import {affineInverse, clamp, cross, dot, length, subtract, times, transform} from './math.js';

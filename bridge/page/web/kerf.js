@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // The page: the bridge's news go to the stage and the panel, the user's wishes to both and back.
 import {CommandKind, kLastOfPass, kMayCommand, kRunEnded, records, ReplyStatus} from './constants.js';
-import {handOf} from './hand.js';
-import {listen} from './input.js';
 import {Link} from './link.js';
-import {LookControls} from './look.js';
-import {bannerOf, isStale, Plot, showBanner, showFigures} from './panel.js';
+import {bannerOf, isStale, LookControls, Plot, showBanner, showFigures} from './panel.js';
 import {materialOf, sceneView} from './scene.js';
-import {Stage} from './stage.js';
+import {listen, Stage} from './stage.js';
+import {handOf} from './tool.js';
 import {recordAt} from './wire.js';
 
 const kFiguresMs = 200;

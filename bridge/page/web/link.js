@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The talk with the bridge: joins, acknowledges what it applied, joins again after silence.
+import {Held} from './brick_store.js';
 import {CloseCode} from './constants.js';
-import {Held} from './held.js';
 import {ack, command, read} from './wire.js';
 
 const kSilenceMs = 3000;     // a bridge that is there sends sixty signs of life a second

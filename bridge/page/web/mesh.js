@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Tool and arrow as triangles with normals, as visualizer/compose/mesh makes them.
+// Tool and arrow as triangles with normals, as visualizer/compose/tool_mesh makes them.
 import {kCreaseDegrees, kNeckPerRadius, kNeckRadii, kShankPerRadius, kShankFromRadii,
   kShankToRadii, kSides} from './constants.js';
 import {add, cross, dot, length, normalized, subtract} from './math.js';

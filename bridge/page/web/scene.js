@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What does not change in a run, as visualizer/view/scene_view makes it of descriptors and text.
+// What does not change in a run, as visualizer/scene/scene_view makes it of descriptors and text.
 import {boxCorners, length, rigid, scaled, subtract, determinant, column} from './math.js';
 
 const kFull = 65535;

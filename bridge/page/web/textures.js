@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Volumes on the GPU: uploaded by boxes of changed bricks.
 import {bind, texture} from './gl.js';
-import {Macrocells} from './cells.js';
-import {gradientTexels, MaterialTexels, transferFunction} from './matter.js';
 import {scaled, translated} from './math.js';
+import {gradientTexels, MaterialTexels, transferFunction} from './transfer_function.js';
+import {Macrocells} from './volume.js';
 
 /** A texel for each voxel inside a border of air one voxel thick. */
 class VoxelTexture {
@@ -133,7 +133,7 @@ class VolumeOnGpu {
   }
 }
 
-/** Density, as two bytes a texel, low and high, and labels: what solid.frag reads. */
+/** Density, as two bytes a texel, low and high, and labels: what volume_sample.frag reads. */
 export class SolidOnGpu extends VolumeOnGpu {
   constructor(gl, view) {
     super(gl, view, view.iso);

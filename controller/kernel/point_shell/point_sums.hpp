@@ -8,10 +8,13 @@
 #include "controller/kernel/point_shell/point_table.hpp"
 #include "shared/volume/voxel_grid.hpp"
 
+// Sums over the samples of a point shell, and power sums over close samples: the definitions, whose
+// bits every instruction set has.
+
 namespace kerf {
 
-/// What one sample reads: the density of contact, 0..1 (fixed: 0..32767), and its gradient along
-/// the voxel axes. The gradient of fixed is that of the volume's densities over 2, before
+/// The reading of one sample: the density of contact, 0..1 (fixed: 0..32767), and its gradient
+/// along the voxel axes. The gradient of fixed is that of the volume's densities over 2, before
 /// `DensityScale`.
 template <class N>
 struct PointSample {
@@ -19,7 +22,7 @@ struct PointSample {
   PointNumber<N> gradient[3] = {};
 };
 
-/// A sample below 1/16 weighs nothing: it is noise, and w has no bits left for it.
+/// A sample below 1/16 has weight 0: it is noise, and w has no bits left for it.
 template <class N>
 inline constexpr PointNumber<N> kFaintest = N::kIsFixed ? PointNumber<N>(2048)
                                                         : PointNumber<N>(0.0625);
@@ -35,8 +38,8 @@ template <class N>
   }
 }
 
-/// Reads the volume at a place in voxels (fixed: Q15.16), trilinear (docs/theory.md 2.2). Reads
-/// nothing where one of the eight voxels would be outside: volumes end in air. A density that is
+/// Reads the volume at a position in voxels (fixed: Q15.16), trilinear (docs/theory.md 2.2).
+/// Returns 0 if one of the eight voxels would be outside: volumes end in air. A density that is
 /// clipped at 1 has no gradient.
 ///
 /// Fixed keeps 15 bits of density and rounds at each of the three blends: within 2.5 steps of the
@@ -187,7 +190,7 @@ constexpr void read_points(const PointPlaces<N>& places, std::int32_t count,
   }
 }
 
-/// Whether the volume is free around a group: its samples would read air.
+/// Whether the volume is free around a group, so that its samples would read air.
 template <class N>
 [[nodiscard]] constexpr bool is_free(const PointTable<N>& table, const PointPlaces<N>& places,
                                      const PointNumber<N> (&centre)[3], const DensityField& field,
@@ -201,7 +204,7 @@ template <class N>
   return field.free.at(middle[0], middle[1], middle[2]) >= table.needed[group];
 }
 
-/// The sums of one query. Leaves out groups around which the volume is free: they would read air.
+/// The sums of one query. Skips groups in free space.
 /// `centre` of the tool is in voxels (fixed: Q15.16).
 template <class N>
 [[nodiscard]] constexpr PointSums<N> point_sums(const PointTable<N>& table,
@@ -225,7 +228,7 @@ template <class N>
   return sums;
 }
 
-/// The close samples of one look, in whole groups. What fills up the last has density 0.
+/// The close samples of one closeup, in whole groups. Padding in the last group has density 0.
 template <class N>
 struct CloseLook {
   std::int32_t count = 0;
@@ -233,7 +236,7 @@ struct CloseLook {
   const PointNumber<N>* normal[3] = {};
   PointNumber<N> middle[3] = {}, radius{};  ///< of the look, as the offsets
   const PointNumber<N>* density = nullptr;
-  PointNumber<N>* window = nullptr;  ///< memory for how much each counts
+  PointNumber<N>* window = nullptr;  ///< memory for the window of each
 };
 
 /// Sums over samples, weighted with a power p of t, their density over the highest (docs/theory.md
@@ -247,8 +250,8 @@ struct NormalSums {
   typename N::Sum weight{}, normal[3]{};  ///< SUM t^p, SUM t^p normal
 };
 
-/// What a closeup (closeup.hpp) sums over its samples. Where every sample is faint only
-/// `top` is set.
+/// The sums of a closeup (closeup.hpp) over its samples. If every sample is faint only `top` is
+/// set.
 template <class N>
 struct CloseSums {
   static constexpr int kLowPower = 32, kHighPower = 64;  ///< of height and place
@@ -259,7 +262,7 @@ struct CloseSums {
   PowerSums<N> low, high;
 };
 
-/// a b of shares, 0 to 1; fixed: Q15.
+/// Product of two fractions, 0 to 1; fixed: Q15.
 template <class N>
 [[nodiscard]] constexpr PointNumber<N> share_product(PointNumber<N> a, PointNumber<N> b) noexcept {
   if constexpr (N::kIsFixed) {
@@ -269,8 +272,8 @@ template <class N>
   }
 }
 
-/// How much a sample at `offset` counts: (1 - d^2/R^2)^2 at the distance d from the middle of the
-/// look, 0 from its radius R on. So samples come and go without a jump as the look moves on
+/// Window of sample i: (1 - d^2/R^2)^2 at the distance d from the middle of the closeup, 0 from its
+/// radius R on. So samples enter and leave without a jump as the closeup moves
 /// (docs/theory.md 3.5). `over_radius`: 2^30 over the radius; of floating point 1 over it.
 template <class N>
 [[nodiscard]] constexpr PointNumber<N> close_window(const CloseLook<N>& look,
@@ -288,13 +291,12 @@ template <class N>
   rest = std::max(rest, Number(0));
   return share_product<N>(rest, rest);
 }
-/// See there.
 template <class N>
 [[nodiscard]] constexpr PointNumber<N> over_radius(const CloseLook<N>& look) noexcept {
   return (N::kIsFixed ? PointNumber<N>(1 << 30) : PointNumber<N>(1)) / look.radius;
 }
 
-/// Sums over the samples of a look. The definition: every set has these bits.
+/// Sums over the samples of a closeup. The definition: every set has these bits.
 template <class N>
 [[nodiscard]] constexpr CloseSums<N> close_sums(const CloseLook<N>& look) noexcept {
   using Number = PointNumber<N>;
@@ -329,7 +331,7 @@ template <class N>
     }
   };
   for (std::int32_t i = 0; i < look.count; ++i) {
-    if (!(look.window[i] > Number(0))) continue;  // it may be higher than the highest that counts
+    if (!(look.window[i] > Number(0))) continue;  // it may be higher than the highest of the window
     const Number t = share(look.density[i]);
     Number power = t;
     for (int p = 1; p < CloseSums<N>::kNormalPower; p *= 2) power = share_product<N>(power, power);

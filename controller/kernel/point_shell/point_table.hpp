@@ -6,6 +6,9 @@
 #include "shared/numeric/numbers.hpp"
 #include "shared/volume/voxel_grid.hpp"
 
+// The point shell of a tool, the density field that it reads, and the map of free space around the
+// solid. Plain structs, for kernels of every instruction set.
+
 namespace kerf {
 
 /// Voxels along the edge of a brick of the free-space map: a byte for eight voxels.
@@ -14,29 +17,30 @@ inline constexpr std::int32_t kFreeBrick = 2;
 inline constexpr std::int32_t kFreeSteps = 4;
 inline constexpr std::int32_t kFreeFarthest = 254;  ///< the longest distance, steps
 
-/// A sample bears something only where a voxel at most so far from it along each axis reaches the
+/// A sample bears a load only if a voxel at most so far from it along each axis reaches the
 /// iso: the reach of a closeup, and its cell (docs/theory.md 3.2).
 inline constexpr std::int32_t kIsoNear = 3;
-/// The same from where a sample reads that voxel, steps of the map: (kIsoNear - 1) sqrt 3.
+/// The same as distance from the position that reads this voxel, steps of the map:
+/// (kIsoNear - 1) sqrt 3.
 inline constexpr std::int32_t kIsoNearSteps = 14;
 static_assert(kIsoNearSteps * kIsoNearSteps >=
               3 * (kIsoNear - 1) * (kIsoNear - 1) * kFreeSteps * kFreeSteps);
 
-/// Where a volume has nothing that contact could feel (docs/theory.md 2.3). Each brick of voxels
+/// The map of free space of a volume (docs/theory.md 2.3). Each brick of voxels
 /// has the Euclidean distance, in steps of 1/4 voxel rounded down, from its nearest point to the
-/// nearest one where a sample would read a voxel that contact counts (r >= 1/16), or that to a
-/// voxel of the iso less kIsoNearSteps where this is farther; at most `kFreeFarthest`. A voxel is
+/// nearest position where a sample reads a voxel that contact counts (r >= 1/16), or the distance
+/// to a voxel of the iso less kIsoNearSteps if that is farther; at most `kFreeFarthest`. A voxel is
 /// read less than one edge away from it on every axis.
 ///
 /// Made at load (controller/plan/tables/free_brick_map.hpp). Cutting only takes density away, so
-/// the map is a lower bound for ever and needs no update. Points into the maker's memory.
+/// the map stays a lower bound and needs no update. Points into the maker's memory.
 struct FreeBricks {
   VoxelGrid grid;                          ///< of bricks
   const std::uint8_t* distance = nullptr;  ///< none: nothing is known to be free
 
   /// Distance of the brick that holds a voxel's cell; outside of the volume, where nothing is read,
-  /// that of the nearest brick in it, or the way to it if that is longer. Always inlined: the code
-  /// of an instruction set may not end where other machines find it.
+  /// that of the nearest brick, or the distance to that brick if it is longer. Always inlined: the
+  /// linker must not share code of an instruction set with other files.
   [[nodiscard, gnu::always_inline]] inline std::int32_t at(std::int32_t x, std::int32_t y,
                                                            std::int32_t z) const noexcept {
     if (distance == nullptr) return 0;
@@ -47,7 +51,7 @@ struct FreeBricks {
                     larger(over_xy, beyond(z, grid.nz)));
   }
 
-  /// The nearest of so many bricks along an axis.
+  /// The number of the nearest brick along an axis of so many bricks.
   [[nodiscard, gnu::always_inline]] static inline std::int32_t within(
       std::int32_t brick, std::int32_t bricks) noexcept {
     const std::int32_t below = brick < bricks ? brick : bricks - 1;
@@ -58,7 +62,7 @@ struct FreeBricks {
       std::int32_t cell, std::int32_t bricks) noexcept {
     return larger(-cell - 1, cell - bricks * kFreeBrick + 1);
   }
-  /// What a brick says, or the way of so many voxels to it.
+  /// The distance of a brick, or the distance of so many voxels to it if that is longer.
   [[nodiscard, gnu::always_inline]] static inline std::int32_t at_least(
       std::int32_t inside, std::int32_t voxels) noexcept {
     const std::int32_t outside = kFreeSteps * voxels;
@@ -70,8 +74,8 @@ struct FreeBricks {
   }
 };
 
-/// Distance that the brick of a sphere's centre needs so that nothing in the sphere reads a voxel
-/// with such density. One more than any brick has where the sphere is too large for the map.
+/// Distance that the brick of a sphere's centre needs so that no position in the sphere reads such
+/// a voxel. If the sphere is too large for the map, one more than any brick has.
 [[nodiscard]] constexpr std::uint8_t free_steps_for(double radius_vox) noexcept {
   if (radius_vox * kFreeSteps > kFreeFarthest) return kFreeFarthest + 1;
   const auto steps = static_cast<std::uint8_t>(radius_vox * kFreeSteps);
@@ -79,9 +83,9 @@ struct FreeBricks {
 }
 
 // The point shell: samples on the surface of a tool, at which contact reads the density
-// (docs/theory.md 3.1). Plain structs, which kernels of every instruction set take.
+// (docs/theory.md 3.1).
 
-/// A number of these kernels. In fixed it is a plain integer; its format is said where it stands.
+/// A number of these kernels. In fixed it is a plain integer, whose format stands beside each use.
 template <class N>
 using PointNumber = typename N::Weight;
 
@@ -115,18 +119,19 @@ struct PointStep {
   std::int32_t shift = 1;
 };
 
-/// Offset of what is no sample: beyond every volume, wherever the tool is near one; voxels.
+/// Offset of padding: beyond every volume, wherever the tool is near one; voxels.
 inline constexpr std::int32_t kNoSampleVox = 1 << 14;
 
-/// A turned tool in the voxels of one volume; Q15.16. Arrays are as long as the table's.
+/// The samples of a rotated tool in the voxels of one volume; Q15.16. Arrays are as long as the
+/// table's.
 template <class N>
 struct PointPlaces {
   PointNumber<N>* offset_vox[3] = {};  ///< of the samples from the centre
   PointNumber<N>* middle[3] = {};      ///< of the groups
 };
 
-/// Place of a sample or a group: `centre` + `offset`. In fixed it stays at the end of 32 bits where
-/// it would lie beyond, outside of every volume.
+/// Position of a sample or a group: `centre` + `offset`. In fixed it saturates, outside of every
+/// volume.
 template <class N>
 [[nodiscard]] constexpr PointNumber<N> place_at(PointNumber<N> centre,
                                                 PointNumber<N> offset) noexcept {
@@ -165,7 +170,7 @@ struct DensityField {
   VoxelGrid grid;
   const Density* density = nullptr;
   DensityScale scale;
-  FreeBricks free{};  ///< of all that bears something (plan/tables/free_brick_map.hpp)
+  FreeBricks free{};  ///< of this volume (plan/tables/free_brick_map.hpp)
 };
 
 /// Sums over the samples of one query (docs/theory.md 3.2, 3.3). r is the density of contact and w
@@ -173,9 +178,9 @@ struct DensityField {
 ///
 ///   w_g  of gradients: w; for balls 3 w - w / r, half the derivative of their peak at the iso,
 ///        times SUM w
-///   w_x  of offsets: w; for balls w r. Where density begins trilinear reads are raised, in bands
-///        where the normal is near an axis of the voxels, and with w they would tilt a ball's
-///        normal
+///   w_x  of offsets: w; for balls w r. Trilinear reads are too high where density
+///        begins, in bands where the normal is near an axis of the voxels; with w that would tilt
+///        the normal of a ball
 ///
 /// In fixed r is Q15, weights are Q24, gradients are in the volume's densities over 2, offsets in
 /// Q0.15. All sums are exact, |sum| < 2^53, so no order and no instruction set matters.
@@ -190,18 +195,18 @@ struct PointSums {
   typename N::Sum high_offset[3] = {};
   PointNumber<N> top{};         ///< the largest r
   std::int32_t top_sample = 0;  ///< the last sample that has it
-  std::int32_t read = 0;        ///< samples that were looked at, by whole groups
+  std::int32_t read = 0;        ///< samples that were read, by whole groups
 };
 
-/// A closeup looks so far around a contact, units. With 2 the force of a cylinder over a sharp edge
+/// Radius of a closeup around a contact, units. With 2 the force of a cylinder over a sharp edge
 /// steps by 9 % of its mean, not 4 (rows `edges`).
 inline constexpr std::int32_t kCloseRadius = 3;
 inline constexpr double kClosePitch = 0.35;      ///< units between them
 inline constexpr std::int32_t kMostClose = 448;  ///< that a closeup reads; some 330 on a flat
 inline constexpr std::int32_t kMostInCell = 32;
 
-/// A tool's surface in close samples: the rim or the point of a tool on a sharp edge touches in
-/// less than the spacing of the point shell's own samples.
+/// The surface of a tool in close samples: the rim or the point of a tool on a sharp edge touches
+/// in less than the spacing of the samples of the point shell.
 ///
 /// Sorted by cells of one unit, x fastest. Made at load
 /// (controller/plan/tables/point_shell_table.hpp); points into the maker's memory. A ball has none.

@@ -13,10 +13,13 @@
 #include "controller/kernel/proxy/contact_space.hpp"
 #include "shared/numeric/numbers.hpp"
 
+// Closer samples around a contact: the close samples of a tool, the cap of a ball, and a patch of
+// the volume (docs/theory.md 3.5).
+
 namespace kerf {
 
-/// A tool that is no ball gets a closer look at its contact while it is at most so deep, or so
-/// high. At an edge the point shell's own samples find the tool up to 0.4 units higher than it is.
+/// The contact of a tool that is no ball is refined while it is at most so deep, or so high. At an
+/// edge the samples of the point shell report the tool up to 0.4 units higher than it is.
 inline constexpr double kCloseDepth = 0.4;  ///< units
 
 /// The close samples around a contact: offsets and normals in the tool's axes, offsets in voxels,
@@ -31,8 +34,8 @@ struct CloseSamples {
   PointNumber<N> middle[3] = {}, radius{};
   std::int32_t count = 0;
 
-  /// Takes the samples of the cells within kCloseRadius of the offset `around`; of too many,
-  /// kMostClose spread evenly.
+  /// Copies the samples of the cells within kCloseRadius of the offset `around`; of too many,
+  /// kMostClose of them, evenly spread.
   constexpr void take(const CloseTable<N>& table, const PointNumber<N> (&around)[3]) noexcept {
     constexpr std::int32_t kFine = 16;  // steps of a cell
     using Number = PointNumber<N>;
@@ -90,8 +93,8 @@ struct CloseSamples {
       seen += more;
     });
   }
-  /// The samples in whole groups. What fills up the last group is no sample: `fade`, once all
-  /// densities are read, lets it weigh nothing.
+  /// The samples in whole groups. After all densities are read `fade` gives the padding of the last
+  /// group the weight 0.
   [[nodiscard]] constexpr PointTable<N> table() noexcept {
     PointTable<N> table;
     table.count = (count + kPointGroup - 1) / kPointGroup * kPointGroup;
@@ -118,18 +121,19 @@ struct CloseSamples {
   }
 };
 
-/// What a closeup tells of the peak of density.
+/// The peak of density that a closeup finds.
 template <class N>
 struct Closeup {
-  typename N::Ratio height{};     ///< 0 where nothing is felt
+  typename N::Ratio height{};     ///< 0 if there is no density
   typename N::Ratio offset[3]{};  ///< from the tool's centre to the peak, over the reach; its axes
   typename N::Ratio normal[3]{};  ///< of the tool at the peak, outward; its axes, length near 1
   typename N::Ratio spread{};     ///< of the tool's normals there: 1 - (mean normal)^2
 };
 
-/// Roughly where the peak is, as an offset in the tool's axes, from the point shell's sums. Beside
-/// a rim or a point density falls to one side only, so the mean places with powers 6 and 8 are off
-/// by shares of 1 / (7 + e) and 1 / (9 + e); the two extrapolate to the peak (docs/theory.md 3.5).
+/// The approximate position of the peak, as an offset in the tool's axes, from the sums of the
+/// point shell. Beside a rim or a point density falls to one side only, so the mean positions with
+/// powers 6 and 8 are off by fractions of 1 / (7 + e) and 1 / (9 + e); the two extrapolate to the
+/// peak (docs/theory.md 3.5).
 template <class N>
 constexpr void peak_offset(const PointSums<N>& sums, typename N::Ratio e,
                            PointNumber<N> (&offset)[3]) noexcept {
@@ -150,8 +154,8 @@ constexpr void peak_offset(const PointSums<N>& sums, typename N::Ratio e,
 }
 
 /// The peak of density over a tool's surface, from the sums over its close samples: two means, with
-/// powers 32 and 64, tell e and the summit (docs/theory.md 3.5); where it is, as in peak_offset;
-/// and the mean normal with power 16 is the tool's there.
+/// powers 32 and 64, give e and the summit (docs/theory.md 3.5); its position follows as in
+/// peak_offset; and the mean normal with power 16 is that of the tool there.
 template <class N>
 [[nodiscard]] constexpr Closeup<N> peak_of(const CloseSums<N>& sums) noexcept {
   using Ratio = typename N::Ratio;
@@ -185,8 +189,8 @@ template <class N>
   return found;
 }
 
-/// A small point shell whose samples follow Fibonacci's spiral about the axis y: the caps and
-/// patches of closer looks (docs/theory.md 3.5). It is laid out anew for each look.
+/// A small point shell whose samples follow Fibonacci's spiral about the axis y, for caps and
+/// patches (docs/theory.md 3.5). It is transformed anew for each use.
 template <class N, std::size_t kCount>
 struct SpiralArrays {
   static constexpr std::size_t kGroups = kCount / kPointGroup;
@@ -200,8 +204,8 @@ struct SpiralArrays {
   struct Place {
     double across, along;
   };
-  /// `place_of(i)`: how far sample i is from the axis, and where along it. No offset is longer than
-  /// `longest` units.
+  /// `place_of(i)`: distance of sample i from the axis, and its position along the axis. No offset
+  /// is longer than `longest` units.
   template <class PlaceOf>
   constexpr SpiralArrays(double longest, PlaceOf place_of) noexcept : reach(longest) {
     // Of the golden angle, pi (3 - sqrt(5)).
@@ -235,7 +239,7 @@ struct SpiralArrays {
   }
 };
 
-/// Memory of the places of a spiral.
+/// Memory for the positions of a spiral.
 template <class N, std::size_t kCount>
 struct SpiralPlaces {
   std::array<std::array<PointNumber<N>, kCount>, 3> offset_vox;
@@ -248,10 +252,10 @@ struct SpiralPlaces {
 };
 
 /// The cap: more samples on a ball around its contact, 0.2 units apart, for its height on a sharp
-/// edge (docs/theory.md 3.5): by peak_height as of any shape, and a little more, since no sample is
-/// at the summit. By the highest sample the force would step by 14 %, not 3, as the ball slides.
+/// edge (docs/theory.md 3.5): peak_height, and a little more, since no sample is at the summit.
+/// With the highest sample instead the force would step by 14 %, not 3, as the ball slides.
 inline constexpr std::size_t kCapSamples = 8 * kPointGroup;
-inline constexpr double kCapRadius = 1.25;   ///< units; half the ball's where that is less
+inline constexpr double kCapRadius = 1.25;   ///< units; at most half of the ball's radius
 inline constexpr double kSummitAbove = 0.1;  ///< units: the summit is so far above its samples
 
 /// Samples (x, x^2 + z^2, z) over the unit disc, each for the same area.
@@ -278,13 +282,13 @@ template <class N>
            {-(sign * out.x), fall * out.z, -out.y}}};
 }
 
-/// How far the cap counts, 0..1, by the area in touch over that on a flat (docs/theory.md 3.5).
-/// With half of it or more it is no edge: a body of radius 8 or larger, a flat or a crease. With
-/// 0.35 or less it is one. (A body of radius 6 has 0.43, edges of 90 degrees 0.15 to 0.4.)
+/// Weight of the cap, 0..1, by the area in touch over that on a flat (docs/theory.md 3.5). From
+/// half of it on there is no edge: a body of radius 8 or larger, a flat or a crease. Up to 0.35
+/// there is one. (A body of radius 6 has 0.43, edges of 90 degrees 0.15 to 0.4.)
 ///
-/// Coarse where contact is faint: in fixed point the mean weight has steps of 2^-24. At a height of
+/// Coarse if contact is faint: in fixed point the mean weight has steps of 2^-24. At a height of
 /// 0.08 on a flat (slope 0.5, reach 8) it is 1.4 steps, so the cap counts wholly or not at all.
-/// There the hand feels 0.01 N in the default scene.
+/// The force is 0.01 N then in the default scene.
 template <class N>
 [[nodiscard]] constexpr typename N::Unit sharpness(const PointSums<N>& sums, std::int32_t count,
                                                    typename N::Ratio height,
@@ -301,24 +305,23 @@ template <class N>
 /// A patch: samples of the volume around a contact, for the normal of a tool that is no ball
 /// (docs/theory.md 3.5).
 ///
-/// The tool's own samples do not tell it. Beside a rim or a point they lie on one side, where a
+/// The samples of the tool do not give it: beside a rim or a point they lie on one side, where a
 /// curved face has another normal. The samples of a patch lie on a sphere that is flattened along
 /// the normal known so far, so they follow it without a jump.
 ///
-/// With a radius of 1.5 units the noise of a scan turns the normal by 2.0 degrees, not 1.4 (rows
+/// With a radius of 1.5 units the noise of a scan rotates the normal by 2.0 degrees, not 1.4 (rows
 /// `sliding on CT with noise, angle`); offsets hold no 2 units in Q15.
 inline constexpr std::size_t kPatchSamples = 2 * kPointGroup;
 inline constexpr double kPatchRadius = 1.9;
 
-/// Where the tool touches two faces that look in different directions, as the walls of a slot, the
-/// mean gradient of its own samples along the patch's normal is shorter than the patch's. As it
-/// falls from kAlike to kUnlike of that, the point shell's plane, which leads between the two,
-/// takes over.
+/// If the tool touches two faces with different normals, as the walls of a slot, the mean gradient
+/// of its own samples along the patch's normal is shorter than that of the patch. As it falls from
+/// kAlike to kUnlike of that, the plane of the point shell, which lies between the two, takes over.
 inline constexpr double kAlike = 0.85, kUnlike = 0.65;
 
-/// While up to so many of a tool's own samples touch, counted by weight, the patch tells the normal
-/// and the place of the contact. From twice as many on their own mean does: of so many samples no
-/// voxel's noise turns it by more than a third of a degree.
+/// While up to so many of a tool's own samples touch, counted by weight, the patch gives the normal
+/// and the position of the contact. From twice as many on their own mean does: noise of a voxel
+/// rotates the mean of so many samples by a third of a degree at most.
 inline constexpr double kNarrow = 32;
 
 /// Points of the unit sphere. The reach has a little to spare for roundings.
@@ -329,19 +332,19 @@ inline constexpr SpiralArrays<N, kPatchSamples> kPatchArrays(kPatchRadius + 0.1,
       static_cast<double>(square_root(Q30(1 - y * y))), y};
 });
 
-/// What a patch tells of the solid.
+/// Gradient and roughness of the solid in a patch.
 template <class N>
 struct Patch {
-  ContactVec<typename N::Ratio> gradient{};  ///< the mean; 0 where nothing is felt
+  ContactVec<typename N::Ratio> gradient{};  ///< the mean; 0 if there is no density
   typename N::Ratio spread{};                ///< of its normals, see below; 0 to 1
 };
 
 /// From the means over a patch that is flattened along `normal`.
 ///
-/// Across the normal the gradient g follows from where the samples' mean place is, not from their
-/// own gradients: those jump at the borders of cells, densities do not. Places have the variance
-/// R^2 / 3 along each axis of the patch, and weights r^6 grow by 6 g / r a unit: the mean place is
-/// 2 R^2 g / r (docs/theory.md 3.5).
+/// Across the normal the gradient g follows from the mean position of the samples, not from their
+/// own gradients: those jump at the borders of cells, densities do not. Positions have the variance
+/// R^2 / 3 along each axis of the patch, and weights r^6 grow by 6 g / r a unit: the mean position
+/// is 2 R^2 g / r (docs/theory.md 3.5).
 ///
 /// The spread of normals, 1 - (mean normal)^2, comes from that of heights, which is free of the
 /// voxels' noise in gradients: over a disc of radius a on a ball of curvature k heights have the
@@ -365,10 +368,10 @@ template <class N>
   return patch;
 }
 
-/// How far the tool's own normal is told, not the patch's: where two surfaces touch, each has the
-/// normal of the other, and the smoother one tells it best. Place errors turn a normal by about
-/// the root of its surface's spread; squares of the spreads let a rim, whose own normal is none,
-/// tell nothing. Below kFlat, 1.8 degrees, both are flat, and the patch tells it.
+/// Weight of the tool's own normal against that of the patch: two surfaces in touch have one
+/// normal, and the smoother one gives it best. Position errors rotate a normal by about the root of
+/// the spread of its surface; with squares of the spreads a rim, which has no normal of its own,
+/// gets no weight. Below kFlat, 1.8 degrees, both are flat, and the patch gives the normal.
 inline constexpr double kFlat = 0.001;
 template <class N>
 [[nodiscard]] constexpr typename N::Unit smoothness(typename N::Ratio tool,
@@ -378,7 +381,7 @@ template <class N>
   return typename N::Unit(rough / (rough + tool * tool + static_cast<Ratio>(kFlat * kFlat)));
 }
 
-/// 1 - n n^T: takes away what lies along a unit vector.
+/// 1 - n n^T: removes the component along a unit vector.
 template <class N>
 [[nodiscard]] constexpr TurnRows<N> flattened(ContactVec<typename N::Unit> n) noexcept {
   using Unit = typename N::Unit;

@@ -12,9 +12,12 @@
 #include "shared/numeric/numbers.hpp"
 #include "shared/numeric/vec.hpp"
 
+// Constraint planes, the nearest position that they allow, and an estimate of the solid's
+// curvature.
+
 namespace kerf {
 
-/// Most planes that hold the tool at one place: a face, a crease, a corner.
+/// Most planes that hold the tool at one position: a face, a crease, a corner.
 inline constexpr std::size_t kMaxPlanes = 3;
 
 /// A contact allows the centre, now at q, to be at any x with `dot(normal, x - q) >= depth`
@@ -24,7 +27,7 @@ struct ConstraintPlane {
   ContactVec<typename N::Unit> normal{};  ///< out of the solid, length 1
   typename N::Real depth{};               ///< units; above 0: the tool is in too deep
   ContactVec<typename N::Real> arm{};     ///< from the tool's centre to the contact, units
-  bool behind = false;                    ///< met by what is behind the head (contact_query.hpp)
+  bool behind = false;                    ///< met by shaft or handpiece (contact_query.hpp)
 
   friend constexpr bool operator==(const ConstraintPlane&,
                                    const ConstraintPlane&) noexcept = default;
@@ -34,10 +37,10 @@ struct ConstraintPlane {
 /// normals. Below it they nearly lie on one line, or three in one plane.
 inline constexpr double kLeastDeterminant = 1e-3;
 
-/// Planes of two volumes that say the same, as of a face that both share: their normals lie within
-/// 1.8 degrees, so that no loads of the two can be told apart, and the deeper one alone holds the
-/// tool. Two would take a place of three and, as they cannot be solved for together, let the third
-/// be left out.
+/// Whether planes of two volumes are one, as of a face that both share: their normals lie
+/// within 1.8 degrees, so that their loads cannot be separated, and the deeper one alone holds the
+/// tool. Both would take two of three slots and, as they cannot be solved for together, displace
+/// the third.
 template <class N>
 [[nodiscard]] constexpr bool are_one_face(ContactVec<typename N::Unit> a,
                                           ContactVec<typename N::Unit> b) noexcept {
@@ -46,26 +49,26 @@ template <class N>
   return cosine > Unit(0) && Unit(1) - cosine * cosine < Unit(kLeastDeterminant);
 }
 
-/// What one collision query finds: `count` planes, the deepest first.
+/// The result of one collision query: `count` planes, the deepest first.
 template <class N>
 struct Contacts {
-  typename N::Real depth{-1};  ///< the largest of the planes' depths; -1 where nothing is near
+  typename N::Real depth{-1};  ///< the largest of the planes' depths; -1 if nothing is near
   std::int32_t count = 0;
   std::array<ConstraintPlane<N>, kMaxPlanes> plane{};
-  bool buried = false;  ///< full density all round, or not looked at: no normal, no plane
+  bool buried = false;  ///< full density all round, or not queried: no normal, no plane
 
   friend constexpr bool operator==(const Contacts&, const Contacts&) noexcept = default;
 };
 
-/// Adds a plane where it belongs by its depth. Of planes of one face, of the head or behind it, and
-/// of more than kMaxPlanes, the deepest stay.
+/// Inserts a plane by its depth. Of planes of one face, met by the same part, and of more than
+/// kMaxPlanes the deepest stay.
 template <class N>
 constexpr void insert(Contacts<N>& felt, const ConstraintPlane<N>& plane) noexcept {
   const auto count = static_cast<std::size_t>(felt.count);
   const auto says_the_same = [&](const ConstraintPlane<N>& other) {
     return other.behind == plane.behind && are_one_face<N>(other.normal, plane.normal);
   };
-  std::size_t slot = 0;  // that the plane takes, in place of one that says the same or is shallow
+  std::size_t slot = 0;  // for the plane, in place of one of the same face or a shallower one
   while (slot < count && !says_the_same(felt.plane[slot])) ++slot;
   if (slot == kMaxPlanes) --slot;
   if (slot < count && felt.plane[slot].depth >= plane.depth) return;
@@ -76,23 +79,23 @@ constexpr void insert(Contacts<N>& felt, const ConstraintPlane<N>& plane) noexce
   felt.plane[slot] = plane;
 }
 
-/// The planes that hold the tool. Their depths count from where its centre is now.
+/// The planes that hold the tool. Depths are relative to the current position of its centre.
 template <class N>
 struct ConstraintSet {
   std::size_t count = 0;
   std::array<ConstraintPlane<N>, kMaxPlanes> plane{};
 };
 
-/// Where a tool goes that is asked to move: `move` = displacement + SUM load_i normal_i.
+/// The allowed part of a displacement: `move` = displacement + SUM load_i normal_i.
 template <class N>
 struct Slide {
   ContactVec<typename N::Real> move{};
-  std::array<typename N::Real, kMaxPlanes> load{};  ///< how hard each plane is pressed, units
+  std::array<typename N::Real, kMaxPlanes> load{};  ///< of each plane, units
 };
 
 /// The loads of two or three planes that are all touched, by Cramer's rule. For each plane i SUM_j
 /// c_ij load_j = need_i: c_ij is the product of two normals (c_ii = 1), need_i how far plane i
-/// wants the tool out. False where the normals nearly lie on one line or in one plane: a
+/// has to move the tool out. False if the normals nearly lie on one line or in one plane: a
 /// determinant below kLeastDeterminant.
 template <class N>
 class Loads {
@@ -146,10 +149,10 @@ class Loads {
   }
 };
 
-/// The place nearest to `displacement` that all planes allow (docs/theory.md 4.3). Where planes
-/// leave no place, as two walls of a slot without play, the oldest one is left out: it stands last.
+/// The position nearest to `displacement` that all planes allow (docs/theory.md 4.3). If they allow
+/// none, as two walls of a slot without play, the oldest one is left out: it stands last.
 ///
-/// |displacement| <= 16384 units. At most 8 + 4 + 2 sets. Fixed: within 4 steps of each plane where
+/// |displacement| <= 16384 units. At most 8 + 4 + 2 sets. Fixed: within 4 steps of each plane if
 /// the displacement is some units long.
 template <class N>
 [[nodiscard]] constexpr Slide<N> nearest(const ConstraintSet<N>& planes,
@@ -192,10 +195,10 @@ template <class N>
   return {displacement};
 }
 
-/// Two planes whose normals are nearer than this are one face, seen from two places. On a bump they
-/// would feign a crease; in a hollow the curvature estimate describes the surface between them
-/// better. (With 15 degrees a tool in a slot with a play of 0.1 units would rest at two places, up
-/// to 0.05 units apart.) A face that the head meets and one that is met behind it are two.
+/// Two planes whose normals are closer than this are one face, met at two positions. On a bump they
+/// would act as a crease; in a hollow the curvature estimate describes the surface between them
+/// better. (With 15 degrees a tool in a slot with a play of 0.1 units would rest at two positions,
+/// up to 0.05 units apart.) A plane of the head and one of the shaft are always two.
 inline constexpr double kFalseCreaseCosine = 0.7071067811865476;  // 45 degrees
 
 template <class N>
@@ -216,8 +219,8 @@ template <class N>
   return {static_cast<std::size_t>(felt.count), felt.plane};
 }
 
-/// Adds `older` planes while there is room; their depths count from a place `moved` before this
-/// one. Takes those that are unlike all others and not more than half a unit away.
+/// Adds `older` planes while there is room; their depths are relative to a position `moved` before
+/// this one. Takes those that are unlike all others and at most half a unit away.
 template <class N>
 constexpr void keep(ConstraintSet<N>& constraints, const ConstraintSet<N>& older,
                     ContactVec<typename N::Real> moved) noexcept {
@@ -230,8 +233,8 @@ constexpr void keep(ConstraintSet<N>& constraints, const ConstraintSet<N>& older
   }
 }
 
-/// Learns from a place that turned out too deep, `displacement` ahead: adds those of its planes
-/// that hold the tool already where it is, to 0.02 units. Returns whether there was one.
+/// Adds the planes of a position that turned out too deep, `displacement` ahead, that also hold the
+/// tool at its current position, to 0.02 units. Returns whether there was one.
 template <class N>
 [[nodiscard]] constexpr bool learn(ConstraintSet<N>& constraints, const Contacts<N>& seen,
                                    ContactVec<typename N::Real> displacement) noexcept {
@@ -249,9 +252,9 @@ template <class N>
   return constraints.count > before;
 }
 
-/// How the solid curves around a tool in a bowl or a slot hardly wider than itself. The places that
-/// its centre may take form a hollow; over a step `moved` the normal turns by (across . moved) /
-/// radius along `across`. Radius 0: no bowl, or not known.
+/// Curvature of the solid around a tool in a bowl or a slot hardly wider than itself. The positions
+/// that its centre may take form a hollow; over a step `moved` the normal turns by (across . moved)
+/// / radius along `across`. Radius 0: no bowl, or unknown.
 template <class N>
 struct Curve {
   ContactVec<typename N::Unit> across{};
@@ -264,8 +267,8 @@ struct Curve {
 /// (docs/theory.md 4.4; Nocedal and Wright 2006, section 6.2).
 ///
 /// Without it a slot with a play of a tenth of a unit turns a step of the hand of 0.01 into a swing
-/// of 0.2. What a wandering hand has milled is a bowl along both directions of the plane, so two
-/// curves are kept.
+/// of 0.2. A wandering hand mills a bowl along both directions of the plane, so two curves are
+/// kept.
 template <class N>
 class CurvatureEstimate {
   using Real = typename N::Real;
@@ -274,11 +277,11 @@ class CurvatureEstimate {
   using Turn = ContactVec<Unit>;  ///< of a normal: far less than a unit
 
  public:
-  /// Learns from the deepest planes of two places, the second `moved` from the first. Unlike planes
-  /// are two walls, or one is the head's and one the shaft's: all is forgotten. Normals that part
-  /// are a bump: its steps only fall short, and stay as they are.
+  /// Learns from the deepest planes of two positions, the second `moved` from the first. Unlike
+  /// planes are two walls, or one is met by the head and one by the shaft: all is forgotten.
+  /// Normals that diverge are a bump: its steps only fall short, and are not eased.
   constexpr void learn(const Contacts<N>& before, const Contacts<N>& after, Place moved) noexcept {
-    constexpr double kTelling = 0.01;  // units: over less noise turns a normal as much
+    constexpr double kTelling = 0.01;  // units: over less, noise rotates a normal as much
     if (before.count == 0 || after.count == 0) return forget();
     if (before.plane[0].behind != after.plane[0].behind) return forget();
     const auto& from = before.plane[0].normal;
@@ -297,7 +300,7 @@ class CurvatureEstimate {
     last_ = whole;
   }
 
-  /// At the end of a tick: forgets what the noise of normals may have feigned. Else it would
+  /// At the end of a tick: forgets a curvature that may be noise of the normals. Else it would
   /// shorten steps until none is tried, and nothing new is learned.
   constexpr void forget_noise() noexcept {
     if (turn_ < Unit(kNoise)) forget();
@@ -321,10 +324,10 @@ class CurvatureEstimate {
   }
 
  private:
-  /// What noise turns a normal by, as a deviation, in the noisiest scan that no filter smooths
-  /// (docs/theory.md 4.4). If smaller turns were remembered, too, the force of a ball would step by
-  /// 27 % over a sharp edge, not by 2 (rows `edges`). With 0.03 a ball bores 1.06 % more beside its
-  /// shaft than without one (tests/servo/shaft_test.cpp).
+  /// Rotation of a normal by noise, as a deviation, in the noisiest scan without a filter
+  /// (docs/theory.md 4.4). If smaller rotations were remembered, too, the force of a ball would
+  /// step by 27 % over a sharp edge, not by 2 (rows `edges`). With 0.03 a ball bores 1.06 % more
+  /// beside its shaft than without one (tests/servo/shaft_test.cpp).
   static constexpr double kNoise = 0.02;  ///< rad
   static constexpr double kSkew =
       0.3;  ///< least cosine to the step at which the rest of a turn counts

@@ -19,21 +19,23 @@
 #include "controller/kernel/proxy/contact_space.hpp"
 #include "controller/kernel/proxy/sample_reader.hpp"
 
+// Collision queries of a tool: of its head alone, and of a head with shaft and handpiece.
+
 namespace kerf {
 
 /// Collision queries of one tool against the solid volumes of a scene: the ContactField of the
 /// sweep.
 ///
 /// Call `turn` first, then any number of queries with this orientation; a tool that does not turn
-/// needs it once. A query reads the samples of the point shell in every volume, but for those in
-/// free space. Near rest it takes a closer look (docs/theory.md 3.5): at a ball's cap, or at
-/// another tool's close samples and a patch of the volume. In fixed all kernels give the same bits.
-/// Servo thread; no heap.
+/// needs it once. A query reads the samples of the point shell in every volume, except for those in
+/// free space. Near rest it adds a closer look (docs/theory.md 3.5): at the cap of a ball, or at
+/// the close samples of another tool and a patch of the volume. In fixed all kernels give the same
+/// bits. Servo thread; no heap.
 ///
-/// A tick's work is counted in samples (`query_work`), since a query among noise or soft tissue
-/// costs twice what one at a face does. Once the budget of `begin_tick` is spent, queries answer
-/// `buried` without a look, and a sweep stays at its last place. The first query after a turn is
-/// always answered.
+/// The work of a tick is counted in samples (`query_work`), since a query among noise or soft
+/// tissue costs twice that of one at a face. Once the budget of `begin_tick` is spent, queries
+/// return `buried` without reading, and a sweep stays at its last position. The first query after a
+/// turn is always answered.
 template <class N>
 class ContactQuery {
  public:
@@ -57,7 +59,7 @@ class ContactQuery {
     }
   }
 
-  /// Begins the budget of one tick. Before the first call nothing is counted.
+  /// Starts the budget of one tick. Before the first call there is no limit.
   void begin_tick() noexcept {
     reader_.set_left(work_.budget());
     nearest_ = 0;
@@ -67,16 +69,16 @@ class ContactQuery {
   /// See ContactField.
   [[nodiscard]] bool half_spent() const noexcept { return left() <= work_.budget() / 2; }
   [[nodiscard]] bool may_query() const noexcept { return left() >= work_.query + work_.closer; }
-  /// Work that is left of the tick. Parts of one tool hand one account on (`ToolQuery`).
+  /// Work that is left of the tick. The parts of one tool share one account (`ToolQuery`).
   [[nodiscard]] std::int64_t left() const noexcept { return reader_.left(); }
   void set_left(std::int64_t left) noexcept { reader_.set_left(left); }
-  /// Work of the tick for free ways that led nowhere; the same account.
+  /// Work of the tick for fruitless marches through free space; the same account.
   [[nodiscard]] std::int64_t wasted() const noexcept { return wasted_; }
   void set_wasted(std::int64_t wasted) noexcept { wasted_ = wasted; }
   /// Work since `begin_tick`, in the samples of `work`.
   [[nodiscard]] std::int64_t spent() const noexcept { return work_.budget() - left(); }
 
-  /// What the tool feels with its centre at `q`: at most one plane a volume, the deepest three. Of
+  /// Contacts of the tool with its centre at `q`: at most one plane a volume, the deepest three. Of
   /// volumes that share a face the deepest plane counts.
   [[nodiscard]] Contacts<N> query(ContactVec<Real> q) const noexcept {
     Contacts<N> felt;
@@ -85,8 +87,8 @@ class ContactQuery {
     return felt.buried ? felt : look(q, closer);
   }
 
-  /// Whether the work is left for a look at `q` with closer looks. What is near is counted where
-  /// there is none for the costliest one.
+  /// Whether enough work is left for a query at `q` with closer looks. If there is not enough for
+  /// the costliest one, counts the samples that are near.
   [[nodiscard]] bool may_look_closely(ContactVec<Real> q) const noexcept {
     if (may_query()) return true;
     std::int64_t cost = work_.closer;
@@ -96,7 +98,7 @@ class ContactQuery {
     return left() >= cost;
   }
 
-  /// The same, with closer looks or without, whatever the tick's work allows.
+  /// The same, with closer looks or without, whatever the budget allows.
   [[nodiscard]] Contacts<N> look(ContactVec<Real> q, bool closer) const noexcept {
     Contacts<N> felt;
     turned_ = false;
@@ -115,14 +117,14 @@ class ContactQuery {
     });
   }
 
-  /// How far along `move` the centre may go from `q` and feel nothing: a lower bound. The tool goes
-  /// as one sphere about its centre, which is all of a ball, and then by the spheres of its groups.
-  /// One more query is left. What groups have looked at in vain is bounded by
+  /// Lower bound of the distance along `move` that the centre may go from `q` without contact.
+  /// Tests the tool as one sphere about its centre, which is enough for a ball, then the spheres of
+  /// its groups. Leaves the work for one more query. Fruitless work of groups is bounded by
   /// `QueryWork::most_wasted`.
   [[nodiscard]] Real free_distance(ContactVec<Real> q, ContactVec<Real> move) const noexcept {
     return free_distance(q, move, left() - work_.query - work_.closer, work_.most_wasted());
   }
-  /// The same by `work` at most, and by groups up to this much in vain.
+  /// The same with at most `work`, and at most `most_wasted` of it fruitless.
   [[nodiscard]] Real free_distance(ContactVec<Real> q, ContactVec<Real> move, std::int64_t work,
                                    std::int64_t most_wasted) const noexcept {
     const Real length = norm(move);
@@ -162,7 +164,7 @@ class ContactQuery {
  private:
   using Reader = SampleReader<N>;
 
-  /// Adds this volume's plane, after a closer look where it is near rest; the deepest stand first.
+  /// Adds the plane of this volume, after a closer look if it is near rest; the deepest come first.
   void feel(const ContactVolume<N>& volume, ContactVec<Real> q, bool closer,
             Contacts<N>& felt) const noexcept {
     const VoxelVec<Real> at = Reader::place_of(volume, q);
@@ -174,7 +176,7 @@ class ContactQuery {
     const PointSums<N> sums = reader_.sums_at(volume.field, points_.table, volume.places, at);
     if (sums.weight <= typename N::Sum(0)) return;
     ConstraintPlane<N> plane = plane_at(volume, at, sums, closer);
-    const bool soft = sums.top < Reader::kIsoDensity;  // what is softer than the iso bears nothing
+    const bool soft = sums.top < Reader::kIsoDensity;  // below the iso it bears no load
     if (soft && !reader_.iso_is_near(volume, at, sums.top_sample)) return;
     if (closer) look_midway(volume, q, plane);
     const bool same_all_round = plane.normal == ContactVec<typename N::Unit>{};
@@ -187,7 +189,7 @@ class ContactQuery {
     insert(felt, plane);
   }
 
-  /// The plane of these sums, after a closer look where it is near rest.
+  /// The plane of these sums, after a closer look if it is near rest.
   [[nodiscard]] ConstraintPlane<N> plane_at(const ContactVolume<N>& volume, VoxelVec<Real> at,
                                             const PointSums<N>& sums, bool closer) const noexcept {
     const bool round = points_.table.round;
@@ -198,7 +200,7 @@ class ContactQuery {
     return plane;
   }
 
-  /// Normal and place of a contact whose iso is near an end of its face's ramp, from the ramp's
+  /// Normal and position of a contact whose iso is near an end of its face's ramp, from the ramp's
   /// middle (contact_refinement.hpp). The depth stays that of the iso.
   void look_midway(const ContactVolume<N>& volume, ContactVec<Real> q,
                    ConstraintPlane<N>& plane) const noexcept {
@@ -231,30 +233,30 @@ class ContactQuery {
   std::span<const ContactVolume<N>> volumes_;
   QueryWork work_;
   mutable bool turned_ = false;       ///< and not queried since
-  mutable std::int32_t nearest_ = 0;  ///< group that stopped the last free way
+  mutable std::int32_t nearest_ = 0;  ///< group that stopped the last march
   mutable std::int64_t wasted_ = 0;
 };
 
-/// Most parts behind a head: the shaft, and the handpiece behind it.
+/// Most parts behind a head: shaft and handpiece.
 inline constexpr std::size_t kMostBehind = 2;
 
-/// A part of a tool behind its head: it is felt and cuts nothing. It has a point shell of its own
-/// about its own middle, so the head keeps the accuracy that its own reach gives it, and each has a
-/// plane of its own.
+/// A part of a tool behind its head: it has contact and cuts nothing. It has a point shell of its
+/// own about its own middle, so that the head keeps the accuracy of its own reach, and planes of
+/// its own.
 template <class N>
 struct PartBehind {
   PointShell<N> point_shell;
   typename N::Real up{};  ///< from the tool's centre to the part's, along the shaft, units
 };
 
-/// All parts of one tool behind its head; none of a tool without a shaft.
+/// All parts of one tool behind its head; none without a shaft.
 template <class N>
 struct PartsBehind {
   std::size_t count = 0;
   std::array<PartBehind<N>, kMostBehind> part{};
 };
 
-/// What the queries of a whole tool cost.
+/// Cost of the queries of a whole tool.
 template <class N>
 [[nodiscard]] constexpr QueryWork query_work(const PointShell<N>& head,
                                              const PartsBehind<N>& behind,
@@ -268,21 +270,21 @@ template <class N>
 
 /// Collision queries of a tool with a shaft: the ContactField of the sweep (docs/theory.md 3.7).
 ///
-/// A query is one of each part at the same pose; what they feel is put together as planes of
-/// several volumes are: the deepest three stay. Planes of the parts behind are marked. One budget
-/// serves all. A query begins where the work is left that the last one took, and answers `buried`
-/// once a part has more near it than is left; the first after a turn is answered without closer
-/// looks then. The tool turns, whatever its head; a ball's samples stay as they are, so it feels
+/// A query is one of each part at the same pose; their planes are merged like those of several
+/// volumes: the deepest three stay. Planes of the parts behind are marked. One budget serves all
+/// parts. A query begins only if the work of the last one is left, and returns `buried` if a part
+/// has more samples near it than is left; the first one after a turn is answered without closer
+/// looks then. The tool rotates, whatever its head; the samples of a ball stay, so its contact is
 /// the same as without a shaft. Servo thread; no heap.
 template <class N>
 class ToolQuery {
   using Real = typename N::Real;
 
  public:
-  /// The volumes that a part is felt in: the same for all, each with places of its own.
+  /// The volumes of a part: the same for all parts, each with positions of its own.
   using Volumes = std::span<const ContactVolume<N>>;
 
-  /// `behind` has a part at least.
+  /// `behind` has at least one part.
   ToolQuery(const KernelSet& kernels, const PointShell<N>& head, Volumes volumes,
             const PartsBehind<N>& behind,
             const std::array<Volumes, kMostBehind>& volumes_behind) noexcept
@@ -319,7 +321,7 @@ class ToolQuery {
   }
   [[nodiscard]] const QueryWork& work() const noexcept { return work_; }
   [[nodiscard]] bool half_spent() const noexcept { return left_ <= work_.budget() / 2; }
-  /// No less than the last query took, and what the head's costliest one takes.
+  /// Whether the work of the last query is left, and that of the costliest one of the head.
   [[nodiscard]] bool may_query() const noexcept {
     return left_ >= std::max(last_, head_.work().query + head_.work().closer);
   }
@@ -374,10 +376,10 @@ class ToolQuery {
   struct Part {
     ContactQuery<N> query;
     Real up{};
-    ContactVec<Real> from_head{};  ///< `up` along the shaft as it is turned
+    ContactVec<Real> from_head{};  ///< `up` along the rotated shaft
   };
 
-  /// Lets a part work on the account of the whole tool.
+  /// Runs `work` of a part on the account of the whole tool.
   template <class Work>
   void on_account(ContactQuery<N>& part, Work&& work) noexcept {
     part.set_left(left_);
@@ -398,8 +400,8 @@ class ToolQuery {
   std::optional<Part> handpiece_;
   QueryWork work_;
   std::int64_t left_ = 0;    ///< of the tick's samples
-  std::int64_t last_ = 0;    ///< of them that the last query took; the most: it was given up
-  std::int64_t wasted_ = 0;  ///< of them for free ways that led nowhere
+  std::int64_t last_ = 0;    ///< work of the last query; the maximum: it was given up
+  std::int64_t wasted_ = 0;  ///< for fruitless marches through free space
   bool turned_ = false;      ///< and not queried since
 };
 

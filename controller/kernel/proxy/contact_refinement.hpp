@@ -15,11 +15,14 @@
 #include "shared/numeric/numbers.hpp"
 #include "shared/volume/voxel_grid.hpp"
 
+// Corrects the plane of a contact near rest: by a closer look, and from the middle of a face's
+// ramp.
+
 namespace kerf {
 
-/// The closer look at one volume near rest (docs/theory.md 3.5): at a ball's cap, or at another
-/// tool's close samples and a patch of the volume. It corrects the plane that the point
-/// shell tells. It lives within one query, with the tool's centre at `at`.
+/// The closer look at one volume near rest (docs/theory.md 3.5): at the cap of a ball, or at the
+/// close samples of another tool and a patch of the volume. It corrects the plane from the point
+/// shell. It lives within one query, with the tool's centre at `at`.
 template <class N>
 class CloserLook {
  public:
@@ -34,7 +37,7 @@ class CloserLook {
         sums_(sums),
         means_(means) {}
 
-  /// Corrects `plane` where it is near enough to rest.
+  /// Corrects `plane` if it is near enough to rest.
   void correct(ConstraintPlane<N>& plane) const noexcept {
     if (points_.table.round) {
       plane.depth = depth_around(plane);
@@ -45,8 +48,8 @@ class CloserLook {
 
  private:
   /// Corrects the plane of a tool that is no ball: by the close samples around the peak, then by a
-  /// patch of the volume around the place that they find. The normal is that of the smoother one of
-  /// the two surfaces.
+  /// patch of the volume around the position that they find. The normal is that of the smoother one
+  /// of the two surfaces.
   void look_again(ConstraintPlane<N>& plane) const noexcept {
     if (points_.close.first == nullptr) return;
     using Unit = typename N::Unit;
@@ -54,20 +57,20 @@ class CloserLook {
     PointNumber<N> peak[3] = {};
     peak_offset(sums_, fall_of(means_, false), peak);
     const Closeup<N> seen = reader_.look_closely_at(volume_, at_, peak);
-    // Where the tool touches at two places the peak that two means tell may be at neither.
+    // If the tool touches at two positions the peak from two means may be at neither.
     if (seen.height <= Ratio(0)) return;
     const auto offset = turned_offset<N>(seen.offset, reader_.rows());
     const ContactVec<Real> arm{multiply<Real>(offset.x, points_.reach),
                                multiply<Real>(offset.y, points_.reach),
                                multiply<Real>(offset.z, points_.reach)};
     const VoxelVec<Real> middle = at_ + volume_.frame.voxel_from_contact * arm;
-    // The first patch lies askew, as its normal is that of the middle.
+    // The first patch is inclined, as its normal is that of the middle.
     Patch<N> patch = patch_at(middle, plane.normal);
     patch = patch_at(middle, direction<N>(-patch.gradient));
     const auto& gradient = patch.gradient;
     const auto facing = direction<N>(-gradient);
-    // Where the tool's own gradient is far less than the patch's, it touches faces that look
-    // elsewhere.
+    // If the tool's own gradient is far less than that of the patch, it touches faces with other
+    // normals.
     const Ratio steep = norm(gradient);
     if (steep < Ratio(0.01)) return;
     const Ratio along = -(multiply<Ratio>(means_.gradient.x, facing.x) +
@@ -75,9 +78,10 @@ class CloserLook {
                           multiply<Ratio>(means_.gradient.z, facing.z));
     const Unit facing_share(std::clamp(along / steep, Ratio(0), Ratio(1)));
     const Unit alike = Unit(1) - falling_share<N>(facing_share, kAlike, kUnlike);
-    // There the point shell's depth counts, but not so much less than the look's that a step from
-    // an allowed place would end beyond the middle of the thinnest wall (docs/theory.md 4.2). The
-    // look's is by the slope of the face that it saw: in the tool's own gradient the faces cancel.
+    // Then the depth of the point shell counts, but not so much less than that of the closer look
+    // that a step from an allowed position would end beyond the middle of the thinnest wall
+    // (docs/theory.md 4.2). The closer look uses the slope of its face: in the tool's own gradient
+    // the faces cancel.
     const auto less = static_cast<Real>(1 - SweepRules::kStep - SweepRules::kWedged);
     const Ratio own = peak_height(means_, false), highest = std::max(seen.height, means_.top),
                 slope = slope_along(means_, plane.normal, false);
@@ -90,7 +94,7 @@ class CloserLook {
     plane.normal = between<N>(plane.normal, smoother, counts);
   }
 
-  /// What a patch tells that is flattened along `normal`.
+  /// The patch around `middle`, flattened along `normal`.
   [[nodiscard]] Patch<N> patch_at(VoxelVec<Real> middle,
                                   ContactVec<typename N::Unit> normal) const noexcept {
     constexpr PointShell<N> kPatch{kPatchArrays<N>.table(), {}, Real(kPatchRadius), 15};
@@ -104,7 +108,8 @@ class CloserLook {
                        normal);
   }
 
-  /// A ball's depth by its cap around the middle of the contact, as far as the contact is sharp.
+  /// Depth of a ball by its cap around the middle of the contact, weighted by the sharpness of the
+  /// contact.
   [[nodiscard]] Real depth_around(const ConstraintPlane<N>& plane) const noexcept {
     using Ratio = typename N::Ratio;
     using Unit = typename N::Unit;
@@ -119,7 +124,7 @@ class CloserLook {
            multiply<Real>(sharp, Real(kSummitAbove));
   }
 
-  /// Means over a cap in the direction `out` from a ball's centre; 0 where it feels nothing.
+  /// Means over a cap in the direction `out` from a ball's centre; 0 if there is no density.
   [[nodiscard]] PointMeans<N> cap_means(ContactVec<typename N::Unit> out) const noexcept {
     const Real half = multiply<Real>(points_.reach, typename N::Unit(0.5));
     const Real radius = std::min(Real(kCapRadius), half);
@@ -143,22 +148,22 @@ class CloserLook {
   const PointMeans<N>& means_;
 };
 
-/// A contact reads the density between air and the iso-surface alone: of a face that rises over two
-/// units a layer of 2 iso units. At an iso of 0.05 that is a tenth of a unit, where some five
-/// samples touch and a cell's gradient is that of the ramp's bend. Near 1 they read the bend at
-/// the ramp's other end. The surfaces of equal density of one face have the same normals, so
-/// normal and place are read where it is half dense (docs/theory.md 3.8).
+/// A contact reads only the density between air and the iso-surface: of a face that rises over two
+/// units a layer of 2 iso units. At an iso of 0.05 that is a tenth of a unit, where about five
+/// samples touch and the gradient of a cell is that of the ramp's bend. Near 1 they read the bend
+/// at the other end of the ramp. The surfaces of equal density of one face have the same normals,
+/// so normal and position are read at half density (docs/theory.md 3.8).
 ///
-/// Between these shares of full density the iso-surface is near enough to the middle: there the
-/// normal is as good, and nothing more is read. In teeth density goes on changing below the face,
-/// which makes the middle rough: with the look from 0.42 on the force steps by 3.5 instead of 0.9 %
-/// on the GE tooth of 8 bits, iso 0.34 (rows `cutting`).
+/// Between these fractions of full density the iso-surface is near enough to the middle: the normal
+/// is as good there, and nothing more is read. In teeth density goes on changing below the face,
+/// which makes the middle rough: with a limit of 0.42 the force steps by 3.5 instead of 0.9 % on
+/// the GE tooth of 8 bits, iso 0.34 (rows `cutting`).
 inline constexpr double kMidwayFrom = 0.32, kMidwayTo = 0.6;
-/// The middle is sought so far to each side, units. It is at most one unit below the iso-surface,
-/// and reads raise a surface of low iso by up to 0.6 more.
+/// Range of the search for the middle to each side, units. It is at most one unit below the
+/// iso-surface, and reads raise a surface of low iso by up to 0.6 more.
 inline constexpr double kMidwayFarthest = 1.6;
 inline constexpr int kMidwayLooks = 2;          ///< the second along the normal of the first,
-inline constexpr double kMidwayAlike = 0.9998;  ///< if it is turned by more than a degree; cosine
+inline constexpr double kMidwayAlike = 0.9998;  ///< if it is rotated by more than a degree; cosine
 
 [[nodiscard]] constexpr bool is_midway(const DensityScale& scale) noexcept {
   const double full_over_two_iso = scale_factor<double>(scale);
@@ -168,14 +173,15 @@ inline constexpr double kMidwayAlike = 0.9998;  ///< if it is turned by more tha
 /// The middle of a face's ramp.
 template <class N>
 struct RampMiddle {
-  typename N::Real below{};  ///< how far below the contact it is, units
-  Density level = 0;         ///< the density there; 0: there is no face
+  typename N::Real below{};  ///< its distance below the contact, units
+  Density level = 0;         ///< the density there; 0: no face
 };
 
-/// Seeks it from a contact on: where density is half of the highest one or 2.5 units below, where a
-/// wall of two units has its middle, or a thick one its full density though reads raised its
+/// Searches from a contact on for half of the highest density at 1 and 2.5 units below: there a
+/// wall of two units has its middle, and a thick one its full density, although reads raise its
 /// surface. On a ramp of two units density rises by `half` per unit, so the first step finds it,
-/// but for the bend; shorter ones then bear steeper ramps too. `density(below)` is 0 to 1.
+/// except for the bend; the shorter steps after it also suit steeper ramps. `density(below)` is 0
+/// to 1.
 template <class N, class DensityBelow>
 [[nodiscard]] constexpr RampMiddle<N> ramp_middle(const DensityBelow& density) noexcept {
   using Real = typename N::Real;

@@ -7,17 +7,20 @@
 #include "shared/numeric/numbers.hpp"
 #include "shared/numeric/vec.hpp"
 
+// Contact space: its vectors and their products, and orientations as unit quaternions.
+
 namespace kerf {
 
-/// Where the swept contact is solved: axes and origin of the world; one unit is the edge of the
-/// finest voxel of all solid volumes (docs/theory.md 1.2). docs/contact.md calls it a voxel.
+/// The space in which the swept contact is solved: axes and origin of the world; one unit is the
+/// edge of the finest voxel of all solid volumes (docs/theory.md 1.2). docs/contact.md calls it a
+/// voxel.
 struct ContactSpace;
 
 template <class S>
 using ContactVec = Vec<S, ContactSpace>;
 
-/// No centre of a tool and no goal lies farther out on any axis, in units. So a displacement stays
-/// within 16384, where the products below have room.
+/// Limit of a tool's centre and of its goal on each axis, units. So a displacement stays within
+/// 16384, where the products below have room.
 inline constexpr std::int32_t kContactLimit = 8192;
 
 /// The part of `v` along a normal. Fixed: each product is below 2^60, so that three fit; one
@@ -65,7 +68,7 @@ template <class N>
   }
 }
 
-/// length / turn, turn > 0: the radius of an arc. Fixed: rounds toward 0, saturates.
+/// length / turn, `turn` > 0 an angle: the radius of an arc. Fixed: rounds toward 0, saturates.
 template <class N>
 [[nodiscard]] constexpr typename N::Real quotient(typename N::Real length,
                                                   typename N::Unit turn) noexcept {
@@ -78,7 +81,7 @@ template <class N>
   }
 }
 
-/// The direction of a vector; 0 where it is shorter than 1e-4, some steps of Q15.16.
+/// The direction of a vector; 0 if it is shorter than 1e-4, some steps of Q15.16.
 template <class N>
 [[nodiscard]] constexpr ContactVec<typename N::Unit> direction_of(
     ContactVec<typename N::Real> v) noexcept {
@@ -88,7 +91,7 @@ template <class N>
   return {share<N>(v.x, length), share<N>(v.y, length), share<N>(v.z, length)};
 }
 
-/// The direction of a small turn; 0 below 1e-6.
+/// The direction of a small rotation; 0 below 1e-6.
 template <class N>
 [[nodiscard]] constexpr ContactVec<typename N::Unit> direction_of_turn(
     ContactVec<typename N::Unit> v) noexcept {
@@ -154,8 +157,9 @@ template <class N>
            {twice(xz - wy), twice(yz + wx), Unit(1) - twice(xx + yy)}}};
 }
 
-/// The turn of a rotation matrix, by the largest of the four components (Shepperd 1978), which is
-/// at least 1/2: no division by little. A matrix that is none gives some quaternion, and no fault.
+/// The quaternion of a rotation matrix, by the largest of the four components (Shepperd 1978),
+/// which is at least 1/2: no division by a small number. Any other matrix gives any quaternion, no
+/// fault.
 template <class N>
 [[nodiscard]] constexpr ToolTurn<N> turn_of(const TurnRows<N>& rows) noexcept {
   using Unit = typename N::Unit;

@@ -6,21 +6,24 @@
 
 #include "controller/kernel/proxy/proxy_sweep.hpp"
 
+// The proxy: search for a free start, its state from tick to tick, and the contact of one tick.
+
 namespace kerf {
 
-/// Whether the proxy has a place, and if not whether one is still looked for.
+/// Whether the proxy has a position, and if not whether one is still searched for.
 enum class Placing : std::uint8_t { searching, placed, refused };
 
-/// Finds a place of the proxy (docs/theory.md 4.7). Of 26 directions each is tried one unit farther
-/// out once all were tried. With nothing free within kReach the tool is refused until its own goal
-/// is free.
+/// Searches a free position for the proxy (docs/theory.md 4.7): in 26 directions, one unit farther
+/// out after all were tried. If nothing is free within kReach the tool is refused until its own
+/// goal is free.
 ///
-/// A tool that takes another's place is sought around that place, not around the goal, and stays on
-/// its side of every wall: a direction in which the tool's centre came out of the solid, or began
-/// outside of it, ends where the centre would go into it again.
+/// For a tool that replaces another the search is around the old position, not around the goal, and
+/// stays on its side of every wall: a direction in which the tool's centre left the solid, or began
+/// outside of it, ends where the centre would enter the solid again.
 ///
-/// At most 14 queries a tick, and no more than the tick's work allows: the next tick goes on. Only
-/// the tool's surface is felt: what lies wholly inside of the tool does not count as solid here.
+/// At most 14 queries a tick, and no more than the budget of the tick allows: the next tick
+/// continues. Only the surface of the tool is tested: solid wholly inside of the tool does not
+/// count.
 template <class N>
 class StartSearch {
   using Real = typename N::Real;
@@ -30,9 +33,9 @@ class StartSearch {
   static constexpr std::int32_t kReach = 64;  ///< units
 
   StartSearch() = default;
-  /// Around a place that a tool had.
+  /// Searches around the position of a former tool.
   explicit constexpr StartSearch(Place around) noexcept : around_(around), replaces_(true) {}
-  /// The same anew, for another tool.
+  /// The same search from its start, for another tool.
   [[nodiscard]] constexpr StartSearch again() const noexcept {
     return replaces_ ? StartSearch(around_) : StartSearch();
   }
@@ -78,7 +81,8 @@ class StartSearch {
   [[nodiscard]] constexpr bool leads_on(const Field& field, int direction, Place middle,
                                         Place centre) noexcept {
     const std::uint32_t bit = 1U << direction;
-    if (direction == kDirections / 2 || (ended_ & bit) != 0) return false;  // the middle is none
+    if (direction == kDirections / 2 || (ended_ & bit) != 0)
+      return false;  // the middle is no direction
     if (distance_ == 1 && !field.is_solid(middle)) outside_ |= bit;
     const bool solid = field.is_solid(centre);
     if (solid && (outside_ & bit) != 0) ended_ |= bit;
@@ -96,37 +100,38 @@ class StartSearch {
   Place around_{};
   bool replaces_ = false;
   std::int32_t distance_ = 1;
-  int direction_ = 0;                      ///< to be tried next at this distance
-  std::uint32_t outside_ = 0, ended_ = 0;  ///< by direction: the centre is, or met, as said above
+  int direction_ = 0;  ///< to be tried next at this distance
+  std::uint32_t outside_ = 0,
+                ended_ = 0;  ///< by direction: the centre left the solid, or met it again
 };
 
-/// What the swept contact needs of one tool and the scene; constant during a run.
+/// Constants of the swept contact of one tool; constant during a run.
 template <class N>
 struct ProxyPlan {
   typename N::Unit friction{};   ///< Coulomb's coefficient, 0 to 1
   typename N::Unit turn_step{};  ///< turn_step_of(reach); 0: round, or keeps the world's axes
-  /// How fast the spring may grow after a start inside of the solid: 0.1 N/ms over its stiffness.
+  /// Growth of the spring per tick after a start inside of the solid: 0.1 N/ms over its stiffness.
   typename N::Real ramp_per_tick{};
 };
 
-/// What one tick hands to the next. A fresh state looks for a place at the goal: it is made when
-/// the device is parked at rest, or has lost its home.
+/// The state from tick to tick. A fresh state searches a position at the goal: it is made when the
+/// device is parked at rest, or has lost its home.
 template <class N>
 struct ProxyState {
   ProxyPose<N> pose;
   bool placed = false;
   StartSearch<N> search;
   bool ramping = false;
-  typename N::Real longest{};  ///< that the spring may be while it ramps, units
+  typename N::Real longest{};  ///< limit of the spring while it ramps, units
   SweepMemory<N> memory;
 
-  /// Looks for a place around the one that it has: another tool took over, or the solid changed.
+  /// Searches a position around the current one: another tool took over, or the solid changed.
   constexpr void place_anew() noexcept {
     search = placed ? StartSearch<N>(pose.centre) : search.again();
     placed = false;
     memory = {};
   }
-  /// The spring grows from 0 again: nothing was felt meanwhile.
+  /// The spring grows from 0 again, after ticks without force.
   constexpr void ramp() noexcept {
     ramping = true;
     longest = {};
@@ -139,35 +144,36 @@ struct ProxyContact {
   Placing placing = Placing::searching;
   ProxyPose<N> pose;
   ContactVec<typename N::Real> spring{};  ///< from goal to proxy, units: force over stiffness
-  /// Of what the head presses with, out of the solid; 0 in air.
+  /// Of the press of the head, out of the solid; 0 in air.
   ContactVec<typename N::Unit> normal{};
-  /// Of what the whole tool presses with, and what the head bears over that, at most 1: the same as
-  /// `normal`, and 1, without a shaft that presses.
+  /// Of the press of the whole tool, and the load of the head over it, at most 1: the same as
+  /// `normal`, and 1, unless the shaft presses.
   ContactVec<typename N::Unit> press{};
   typename N::Unit head_share{1};
-  /// What presses on the parts behind the head over the length of the spring, at most 1.
+  /// Load of shaft and handpiece over the length of the spring, at most 1.
   typename N::Unit behind_share{};
   /// Torque about the tool's centre over the force's length, units.
   ContactVec<typename N::Real> moment_arm{};
-  /// From the tool's centre to the middle of what the head presses on, units.
+  /// From the tool's centre to the middle of the head's loads, units.
   ContactVec<typename N::Real> head_arm{};
-  /// What holds the tool, and each plane's load over the length of the spring.
+  /// The planes that hold the tool, and the load of each over the length of the spring.
   ConstraintSet<N> planes{};
   std::array<typename N::Real, kMaxPlanes> part{};
   std::int32_t queries = 0;
   bool turned = true;  ///< the tool has the orientation of the goal
 };
 
-/// No tool gets deeper than this by moving: the solid has changed, and the tool starts anew.
+/// No tool gets deeper than this by moving: beyond it the solid has changed, and the search starts
+/// again.
 inline constexpr double kLostDepth = 1;  // units
 
-/// Sets the contact's normal and moment arm: the sum of what presses, and its moment over the
-/// length of the spring (docs/theory.md 5.3). Friction acts where the loads do.
+/// Sets normal and moment arm of the contact: the sum of the loads, and its moment over the length
+/// of the spring (docs/theory.md 5.3). Friction acts at the points of the loads.
 ///
 /// The part of the spring beyond the loads and the friction cone is carried by planes that this
 /// tick did not meet (docs/theory.md 4.5). So a tool at rest always has a normal, since forces
 /// balance there. A tool that is still `moving` is not held. Such planes count as the head's: it
-/// cuts nothing but what it covers.
+/// cuts only the voxels that it covers.
 template <class N>
 constexpr void add_loads(const Swept<N>& swept, typename N::Unit friction, bool moving,
                          ProxyContact<N>& contact) noexcept {
@@ -200,7 +206,7 @@ constexpr void add_loads(const Swept<N>& swept, typename N::Unit friction, bool 
   const Real held = multiply<Real>(friction, norm(pressed));
   if (rubbed > held && !moving)
     pressed = pressed + part_of<N>(along_faces, share<N>(rubbed - held, rubbed));
-  // Beside a shaft that presses, less than the tolerance of a place is no press of the head.
+  // If the shaft presses, less than the tolerance of a position is no press of the head.
   const ContactVec<Real> head = pressed - behind;
   const Real by_head = norm(head);
   if (load_behind <= Real(0) || by_head >= Real(SweepRules::kTolerance)) {
@@ -214,7 +220,7 @@ constexpr void add_loads(const Swept<N>& swept, typename N::Unit friction, bool 
   const Real on_head = whole - load_behind;
   if (on_head > Real(1e-3)) contact.head_arm = head_arm * (whole / on_head);
   contact.behind_share = share<N>(std::min(load_behind, length), length);
-  // Where shaft and head press against each other both bear more than the hand presses with.
+  // If shaft and head press against each other, both bear more than the press of the hand.
   const Real together = norm(pressed);
   const bool presses = by_head >= Real(SweepRules::kTolerance);
   if (!presses || by_head < together) {
@@ -223,11 +229,11 @@ constexpr void add_loads(const Swept<N>& swept, typename N::Unit friction, bool 
 }
 
 /// One tick of the swept contact (docs/theory.md 4): the proxy follows `goal`, and the spring
-/// between them tells the force.
+/// between them gives the force.
 ///
-/// Servo thread; pure but for `state`. At most 32 queries, or 14 while a place is looked for.
-/// Before the proxy has a place there is no force. A goal that is not finite changes nothing and
-/// gives no force; a goal that is far is brought within kContactLimit.
+/// Servo thread; pure except for `state`. At most 32 queries, or 14 during the search. Before the
+/// proxy has a position there is no force. A goal that is not finite changes nothing and gives no
+/// force; a far goal is clamped to kContactLimit.
 template <class N, ContactField<N> Field>
 constexpr ProxyContact<N> follow(const ProxyPlan<N>& plan, ProxyState<N>& state, Field& field,
                                  ProxyPose<N> goal) noexcept {

@@ -14,33 +14,35 @@
 #include "controller/kernel/proxy/proxy_sweep.hpp"
 #include "shared/numeric/numbers.hpp"
 
+// Reads the samples of a tool in volumes and counts the work, which a tick has a budget for.
+
 namespace kerf {
 
-/// What the queries of one tool cost in all volumes together, counted in samples that are read. It
+/// Cost of the queries of one tool in all volumes together, counted in samples that are read. It
 /// bounds a tick (`ContactQuery::begin_tick`, docs/theory.md 4.8), and a scene is planned with it.
 struct QueryWork {
-  /// What a tick may read, 2.5 to 4 ns each, as the machine has it: 38 to 60 us. A head of very
-  /// many samples may make kLeastQueries alone.
+  /// Budget of a tick, 2.5 to 4 ns each, depending on the machine: 38 to 60 us. A head of very many
+  /// samples gets the budget of kLeastQueries.
   static constexpr std::int64_t kTickSamples = 15000;
   static constexpr std::int64_t kLeastQueries = 12;
-  static constexpr std::int64_t kLookSamples = 128;  ///< what a look costs besides those it reads
-  static constexpr std::int64_t kCloseSamples = 2;   ///< what one of a closeup costs
+  static constexpr std::int64_t kLookSamples = 128;  ///< fixed cost of reading a shell
+  static constexpr std::int64_t kCloseSamples = 2;   ///< cost of one sample of a closeup
 
-  /// What a look for a free way costs: each waits for what the last one found.
+  /// Cost of one step in the free-space map: each waits for the result of the last one.
   static constexpr std::int64_t kFreeLook = 12;
-  /// What it costs to see whether a group is in free space. Without it the costliest tick of an
+  /// Cost of finding whether a group is in free space. Without it the costliest tick of an
   /// inverted cone with a handpiece takes 98 us, not 66 (rows `ticks`).
   static constexpr std::int64_t kGroupLook = 2;
-  /// What it costs to see whether any voxel near a sample reaches the iso.
+  /// Cost of finding whether a voxel near a sample reaches the iso.
   static constexpr std::int64_t kNearLook = 27;
 
   std::int64_t query = 0;   ///< one query at most: all samples in every volume
   std::int64_t closer = 0;  ///< its closer looks at most
-  std::int64_t turn = 0;    ///< to place all samples anew
-  std::int64_t head = 0;    ///< query and turn of the head alone; 0: there is nothing behind it
-  std::int64_t near = 0;    ///< of a query, which begins whether or not the tick has so much left
+  std::int64_t turn = 0;    ///< to transform all samples
+  std::int64_t head = 0;    ///< query and turn of the head alone; 0: no shaft
+  std::int64_t near = 0;    ///< extra of a query, not part of the budget that it needs to begin
 
-  /// Of a head, or of it and a part behind, and one more part. `closer` is that of the head and one
+  /// Work of a head, or of head and shaft, plus one more part. `closer` covers the head and one
   /// part: a query needs no more to begin.
   [[nodiscard]] friend constexpr QueryWork operator+(const QueryWork& a,
                                                      const QueryWork& b) noexcept {
@@ -48,14 +50,15 @@ struct QueryWork {
     return {a.query + b.query, more ? a.closer : a.closer + b.closer, a.turn + b.turn,
             more ? a.head : a.query + a.turn, a.near + b.near};
   }
-  /// Of a tick. No query goes beyond it but the first after a turn, which then has no closer look.
+  /// Budget of a tick. Only the first query after a turn may exceed it, and then has no closer
+  /// look.
   [[nodiscard]] constexpr std::int64_t budget() const noexcept {
     return std::max(kTickSamples, kLeastQueries * (head > 0 ? head : query + turn));
   }
-  /// Once so much of it went into free ways that led nowhere, no group looks for one.
+  /// Limit of the work for fruitless marches through free space; beyond it no group tries one.
   [[nodiscard]] constexpr std::int64_t most_wasted() const noexcept { return budget() / 8; }
-  /// No tick of a sweep reads more: the budget, and one query after the turns, whose last ones may
-  /// reach into the move's half. A tool of few samples runs out of queries before.
+  /// Upper bound of a tick of a sweep: the budget, and one query after the turns, whose last ones
+  /// may reach into the half of the move. A tool of few samples runs out of queries first.
   [[nodiscard]] constexpr std::int64_t most() const noexcept {
     const std::int64_t after = 8 * (query + closer) > budget() ? turn + query : 0;
     return std::min(budget() + after + 2 * near, SweepRules::kMaxQueries * (query + closer + near) +
@@ -63,8 +66,8 @@ struct QueryWork {
   }
 };
 
-/// The work of a tool with this point shell. Its closer looks are a ball's cap (closeup.hpp), or a
-/// closeup (closeup.hpp) and two patches (closeup.hpp) of another shape.
+/// The work of a tool with this point shell. Its closer looks are the cap of a ball, or a closeup
+/// and two patches of another shape (closeup.hpp).
 template <class N>
 [[nodiscard]] constexpr QueryWork query_work(const PointTable<N>& point_shell,
                                              std::size_t volumes) noexcept {
@@ -80,7 +83,7 @@ template <class N>
           .near = times * Work::kNearLook};
 }
 
-/// A tool as contact sees it: its point shell and, of a shape that is no ball, close samples.
+/// The surface of a tool for contact: its point shell and, unless it is a ball, close samples.
 template <class N>
 struct PointShell {
   PointTable<N> table;
@@ -89,7 +92,8 @@ struct PointShell {
   std::int32_t step_bits = 0;  ///< fraction bits of PointStep's rows: reach 2^step_bits < 2^16
 };
 
-/// One solid volume, and memory for the tool's places in it, which belongs to the servo.
+/// One solid volume, and memory for the positions of the tool's samples in it, which belongs to the
+/// servo.
 template <class N>
 struct ContactVolume {
   DensityField field;
@@ -112,10 +116,10 @@ class SampleReader {
 
   [[nodiscard]] const PointShell<N>& points() const noexcept { return points_; }
   [[nodiscard]] const TurnRows<N>& rows() const noexcept { return rows_; }
-  /// Orients the tool from now on; `place` its samples in each volume then.
+  /// Sets the orientation of the tool; call `place` for each volume after it.
   void turn(const TurnRows<N>& rows) noexcept { rows_ = rows; }
 
-  /// Work that is left of the tick; without end before the first `set_left`.
+  /// Work that is left of the tick; unlimited before the first `set_left`.
   [[nodiscard]] std::int64_t left() const noexcept { return left_; }
   void set_left(std::int64_t left) noexcept { left_ = left; }
   void spend(std::int64_t work) const noexcept { left_ -= work; }
@@ -128,13 +132,13 @@ class SampleReader {
       return x;
     }
   }
-  /// A place in voxels of a volume.
+  /// A position of contact space in voxels of a volume.
   [[nodiscard]] static VoxelVec<Real> place_of(const ContactVolume<N>& volume,
                                                ContactVec<Real> q) noexcept {
     return volume.frame.voxel_from_contact * q + volume.frame.origin_vox;
   }
 
-  /// Places samples in a volume, turned by `rows`.
+  /// Transforms samples to voxels of a volume, rotated by `rows`.
   void place(const PointShell<N>& points, const TurnRows<N>& rows, const ContactFrame<N>& frame,
              const PointPlaces<N>& places) const noexcept {
     const PointStep<N> step = step_of(points, rows, frame);
@@ -145,7 +149,7 @@ class SampleReader {
     }
   }
 
-  /// What samples at `places` feel about the place `at`.
+  /// Sums over the samples at `places` around the position `at`.
   [[nodiscard]] PointSums<N> sums_at(const DensityField& field, const PointTable<N>& table,
                                      const PointPlaces<N>& places,
                                      VoxelVec<Real> at) const noexcept {
@@ -160,8 +164,8 @@ class SampleReader {
     return sums;
   }
 
-  /// How many samples a look at the whole tool about the place `at` reads: those of all groups that
-  /// are not in free space.
+  /// Number of samples that a query of the whole tool at `at` reads: those of all groups that are
+  /// not in free space.
   [[nodiscard]] std::int64_t samples_near(const ContactVolume<N>& volume,
                                           VoxelVec<Real> at) const noexcept {
     const PointNumber<N> centre[3] = {number_of(at.x), number_of(at.y), number_of(at.z)};
@@ -196,7 +200,7 @@ class SampleReader {
     return peak_of(sums);
   }
 
-  /// Whether a voxel near a sample reaches the iso: where none does, no summit between the samples
+  /// Whether a voxel near a sample reaches the iso: if none does, no summit between the samples
   /// does (docs/theory.md 3.2).
   [[nodiscard]] bool iso_is_near(const ContactVolume<N>& volume, VoxelVec<Real> at,
                                  std::int32_t sample) const noexcept {
@@ -223,7 +227,7 @@ class SampleReader {
     return false;
   }
 
-  /// A volume's own density at a place, 0 to 1.
+  /// Density of a volume, not scaled by its iso, at a position; 0 to 1.
   [[nodiscard]] static Real density_at(const ContactVolume<N>& volume,
                                        ContactVec<Real> place) noexcept {
     DensityField plain = volume.field;

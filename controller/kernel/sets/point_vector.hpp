@@ -8,9 +8,9 @@
 #include "controller/kernel/sets/box_vector.hpp"
 #include "controller/kernel/sets/set_common.hpp"
 
-// Sums of a point shell for AVX2 and AVX-512, in the bits of point_sums.hpp; `Simd` as in
-// box_vector.hpp. Each sample fills a 32-bit lane. While densities are blended, its two halves hold
-// voxels x and x + 1.
+// Sums of a point shell and of close samples for AVX2 and AVX-512, in the bits of point_sums.hpp;
+// `Simd` as in box_vector.hpp. Each sample fills a 32-bit lane. While densities are blended, its
+// two halves hold voxels x and x + 1.
 
 namespace kerf {
 namespace {
@@ -334,14 +334,7 @@ void read_point_samples(const PointPlaces<FixedNumbers>& places, std::int32_t co
   }
 }
 
-}  // namespace
-
-// Sums of close samples for AVX2 and AVX-512, in the bits of point_sums.hpp; `Simd` as in
-// box_vector.hpp. Each sample fills a 32-bit lane.
-
-namespace {
-
-/// Of 64-bit entries.
+/// Sums over close samples, of 64-bit entries.
 struct PowerVectors {
   V weight = Simd::zero(), density = Simd::zero();
   V offset[3] = {Simd::zero(), Simd::zero(), Simd::zero()};

@@ -9,9 +9,9 @@
 #include "controller/kernel/sets/set_common.hpp"
 #include "shared/volume/voxel_grid.hpp"
 
-// A point shell's sums and densities, and the contact of the method `gather`, as the plain loops
-// that define them: for sets that need no instruction that other machines lack. Internal linkage,
-// for the reason given at KernelSet.
+// Plain loops, which define the bits, for sets without vectors of their own: sums and densities of
+// a point shell, contact of the method `gather`, weights and losses of covered voxels. Internal
+// linkage, for the reason given at KernelSet.
 
 namespace kerf {
 namespace {
@@ -58,16 +58,11 @@ void gather(const SampleTable& samples, const SamplePose& pose, const VoxelGrid&
   }
 }
 
-}  // namespace
+// Weight and loss of a group of voxels under the tool (docs/theory.md 6.2). cover_vector.hpp has
+// the same bits.
 
-// What a group of voxels under the tool weighs and loses (docs/theory.md 6.2), as plain loops: the
-// definition. cover_vector.hpp has the same bits. Internal linkage, for the reason given at
-// KernelSet.
-
-namespace {
-
-/// Place of voxel `number` along one axis beside the spindle, clamped to one rim radius (2^20) to
-/// each side: beyond it the speed is the rim's. No product leaves 2^42.
+/// Position of voxel `number` along one axis beside the spindle, clamped to one rim radius (2^20)
+/// to each side: beyond it the speed is the rim's. No product leaves 2^42.
 [[gnu::always_inline]] inline std::int64_t place_beside(std::int64_t first, std::int64_t step,
                                                         std::int64_t number) noexcept {
   constexpr std::int64_t kRim = 1 << 20;
@@ -90,7 +85,7 @@ namespace {
 }
 
 /// Weighs the next group of the row from voxel `lane` on; `lane` moves up to where the group
-/// begins. `sums` are over the group, by number in it. False, and nothing is set, where the tool
+/// begins. `sums` are over the group, by number in it. Returns false, and sets nothing, if the tool
 /// covers none of the kCoverGroup voxels from `lane` on.
 [[gnu::always_inline]] inline bool weigh_lanes(const CoverRow& row, std::int32_t& lane,
                                                CoveredGroup& group, CoverSums& sums) noexcept {

@@ -5,14 +5,16 @@
 #include <cstdint>
 #include <cstring>
 
+#if defined(KERF_X86_KERNELS)
 #include <immintrin.h>
+#endif
 
 #include "controller/kernel/kernel_set.hpp"
 #include "controller/kernel/point_shell/point_table.hpp"
 
-// Places and weights of samples as loops that a compiler turns into vectors. Included by the
-// translation units of the instruction sets only; all of it has internal linkage, for the reason
-// given at KernelSet.
+// Loops and helpers of several instruction sets, mostly loops that a compiler turns into vectors.
+// Included by the translation units of the instruction sets only; all of it has internal linkage,
+// for the reason given at KernelSet.
 
 namespace kerf {
 namespace {
@@ -53,13 +55,7 @@ struct SampleCells {
   }
 }
 
-}  // namespace
-
-// Places of a point shell as loops that a compiler turns into vectors, one text for every
-// instruction set; internal linkage, for the reason given at KernelSet.
-
-namespace {
-
+/// Transforms offsets of a point shell to voxels.
 [[gnu::always_inline]] inline void place_offsets(const std::int32_t* const (&offset)[3],
                                                  const PointStep<FixedNumbers>& step,
                                                  std::int32_t count,
@@ -75,6 +71,7 @@ namespace {
   }
 }
 
+/// `place_points` of every instruction set.
 void place_point_samples(const PointTable<FixedNumbers>& table, const PointStep<FixedNumbers>& step,
                          const PointPlaces<FixedNumbers>& places) noexcept {
   place_offsets(table.offset, step, table.count, places.offset_vox);
@@ -84,22 +81,15 @@ void place_point_samples(const PointTable<FixedNumbers>& table, const PointStep<
   }
 }
 
-}  // namespace
-
-// Which groups of a point shell have something to read, as loops that a compiler turns into
-// vectors; internal linkage, for the reason given at KernelSet.
-
-namespace {
-
 /// The groups of a point shell that are not in free space, in order.
 struct OpenGroups {
   std::int32_t count = 0;
   std::int32_t group[kMaxShellPoints / kPointGroup];
 };
 
-/// Those from `begin` to `end`, as `FreeBricks::at` tells: brick by brick in vectors, and then
-/// without a branch that waits for the map. `kInside`: all are known to be in the volume. What goes
-/// round beyond 2^15 voxels is outside before and after.
+/// Lists those from `begin` to `end` by `FreeBricks::at`: the bricks in vectors, and then without a
+/// branch that waits for the map. `kInside`: all are known to be in the volume. A position that
+/// wraps beyond 2^15 voxels is outside before and after.
 template <bool kInside>
 void find_open(const PointTable<FixedNumbers>& table, const PointPlaces<FixedNumbers>& places,
                const std::int32_t (&centre)[3], const FreeBricks& free, std::int32_t begin,
@@ -135,12 +125,6 @@ void find_open(const PointTable<FixedNumbers>& table, const PointPlaces<FixedNum
   }
 }
 
-}  // namespace
-
-// Internal linkage, for the reason given at KernelSet.
-
-namespace {
-
 /// Voxel of the row at which a group of kCoverGroup begins. Bit i of `lanes`, not 0, says whether
 /// the tool covers voxel `lane` + i. The group begins at the first covered voxel; near the end of
 /// the row it begins earlier, never before `lane`, so that it reaches no farther beyond the end
@@ -152,40 +136,28 @@ namespace {
   return first < end ? first : end;
 }
 
-}  // namespace
-
-// For instruction sets that cannot store a vector in part. Internal linkage, for the reason given
-// at KernelSet.
-
-namespace {
-
-/// density[begin + i] -= loss_i, as a whole vector: the entries that lose nothing, beyond the
-/// tool's box or in the next row, are written back as they are. Near the ends of the volume's
-/// memory, `count` densities, one by one: where bit i of `lost` is set.
-template <class Simd>
+/// density[begin + i] -= loss_i, for instruction sets without masked stores: entries without a
+/// loss, beyond the tool's box or in the next row, are written back unchanged. Near the ends of the
+/// volume's memory, `count` densities, one by one: those whose bit i of `lost` is set.
+template <class Vector>
 [[gnu::always_inline]] inline void write_whole(std::uint16_t* density, std::ptrdiff_t begin,
-                                               std::ptrdiff_t count, typename Simd::V loss,
+                                               std::ptrdiff_t count, typename Vector::V loss,
                                                std::uint32_t lost) noexcept {
-  if (begin >= 0 && begin + Simd::kLanes <= count) {
-    Simd::store(density + begin, Simd::sub16(Simd::load(density + begin), loss));
+  if (begin >= 0 && begin + Vector::kLanes <= count) {
+    Vector::store(density + begin, Vector::sub16(Vector::load(density + begin), loss));
     return;
   }
-  alignas(sizeof(loss)) std::uint16_t entry[Simd::kLanes];
-  Simd::store(entry, loss);
+  alignas(sizeof(loss)) std::uint16_t entry[Vector::kLanes];
+  Vector::store(entry, loss);
   for (; lost != 0; lost &= lost - 1) {
     const int i = __builtin_ctz(lost);
     density[begin + i] = static_cast<std::uint16_t>(density[begin + i] - entry[i]);
   }
 }
 
-}  // namespace
-
-// Pairs of densities from anywhere, for AVX2 and AVX-512, by single loads: a gather takes twice as
-// long on Zen 4. Internal linkage, for the reason given at KernelSet.
-
-namespace {
-
-/// The densities i and i + 1 of each of four indices i, the first in the low half.
+#if defined(KERF_X86_KERNELS)
+/// The densities i and i + 1 of each of four indices i, the first in the low half. For AVX2 and
+/// AVX-512, by single loads: a gather takes twice as long on Zen 4.
 [[gnu::always_inline]] inline __m128i load_four_pairs(const std::uint16_t* density,
                                                       const std::uint32_t* index) noexcept {
   const auto pair = [&](int lane) {
@@ -195,6 +167,7 @@ namespace {
   };
   return _mm_setr_epi32(pair(0), pair(1), pair(2), pair(3));
 }
+#endif
 
 }  // namespace
 }  // namespace kerf

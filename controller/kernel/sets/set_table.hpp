@@ -7,10 +7,10 @@
 #include "controller/kernel/kernel_set.hpp"
 #include "controller/kernel/sets/splat_loops.hpp"
 
-// Weighing and cutting what a tool covers, with the bits of `covered_voxels` and of the list's
-// `take`: one text for every instruction set, as loops that a compiler turns into vectors. Included
-// after the set's `weigh_lanes` and `take_lanes`; internal linkage, for the reason given at
-// KernelSet.
+// The end of every set: weighing and cutting of the covered voxels, with the bits of
+// `covered_voxels` and of the list's `take`, as loops that a compiler turns into vectors; and the
+// KernelSet itself. Included after all else of a set, also its `weigh_lanes` and `take_lanes`;
+// internal linkage, for the reason given at KernelSet.
 
 namespace kerf {
 namespace {
@@ -84,8 +84,8 @@ namespace {
   for (std::int32_t i = 0; i < kCoverGroup; ++i) by_material[group.material[i]] += weight[i];
 }
 
-/// Lists the groups of a row that the tool covers some of, at most `room`, and adds their weights.
-/// Returns their number.
+/// Lists the groups of a row with a covered voxel, at most `room`, and adds their weights. Returns
+/// their number.
 std::int32_t weigh_row(const CoverRow& row, CoveredGroup* list, std::int32_t room, CoverSums& sums,
                        std::uint64_t* by_material) noexcept {
   sums = {};
@@ -109,7 +109,7 @@ std::int32_t weigh_row(const CoverRow& row, CoveredGroup* list, std::int32_t roo
   return listed;
 }
 
-/// Weights of what is still covered; adds them up.
+/// Computes the weights of what is still covered, and adds them up.
 void weigh_again(CoveredGroup* list, std::int32_t count, std::uint64_t* by_material) noexcept {
   for (CoveredGroup* group = list; group != list + count; ++group) {
     std::uint64_t sum = 0;
@@ -122,7 +122,7 @@ void weigh_again(CoveredGroup* list, std::int32_t count, std::uint64_t* by_mater
   }
 }
 
-/// Densities of a group in a volume of `entries`; false where it is not all in there: no lane
+/// Densities of a group in a volume of `entries`; false if not all lanes are inside: no lane
 /// outside is covered.
 [[gnu::always_inline]] inline bool read_group(const CoveredGroup& group,
                                               const std::uint16_t* density, std::int64_t entries,
@@ -138,7 +138,8 @@ void weigh_again(CoveredGroup* list, std::int32_t count, std::uint64_t* by_mater
   return false;
 }
 
-/// Adds up what the materials of `count` groups have at a contact, and what of that reaches `iso`.
+/// Adds up the loads of `count` groups at a contact by material, of all voxels and of those that
+/// reach `iso`.
 void add_loads(const AheadForm<std::int64_t>& form, const CoveredGroup* list, std::int32_t count,
                const std::uint16_t* density, std::int64_t entries, std::uint16_t iso,
                std::uint64_t* ahead_of, std::uint64_t* bearing_of) noexcept {
@@ -182,7 +183,7 @@ void take_steps(const CoverSpend& spend, CoveredGroup* list, std::int32_t count,
     } else {
       taken.steps[group->material[0]] += lost.sum;
     }
-    if (whole) {  // what loses nothing is written back as it is
+    if (whole) {  // lanes without a loss are written back unchanged
       std::memcpy(density + at, rho, sizeof rho);
     } else {
       for (std::uint32_t left = lost.lanes; left != 0; left &= left - 1) {
@@ -202,13 +203,7 @@ void take_steps(const CoverSpend& spend, CoveredGroup* list, std::int32_t count,
   }
 }
 
-}  // namespace
-
-// The end of every set: its own functions and those that are one text for all, as a KernelSet.
-// Included after all others; internal linkage, for the reason given at KernelSet.
-
-namespace {
-
+/// The functions of this set and those that are the same for all sets.
 constexpr KernelSet the_set(const char* name, bool can_fuse) noexcept {
   return {name,
           kLanes,

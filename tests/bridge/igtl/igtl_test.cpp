@@ -25,7 +25,7 @@
 #include "bridge/igtl/igtl_messages.hpp"
 #include "bridge/igtl/igtl_output.hpp"
 #include "shared/numeric/linear_algebra.hpp"
-#include "shared/segment/connection.hpp"
+#include "shared/segment/server.hpp"
 #include "shared/volume/checksum.hpp"
 #include "tests/segment/segment_support.hpp"
 #include "tests/segment/test_folder.hpp"

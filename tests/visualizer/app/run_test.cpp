@@ -23,7 +23,7 @@
 
 #include "shared/posix/atomic_file.hpp"
 #include "shared/posix/threads.hpp"
-#include "shared/segment/connection.hpp"
+#include "shared/segment/server.hpp"
 #include "tests/json.hpp"
 #include "tests/visualizer/render/rgb_picture.hpp"
 #include "visualizer/gl/context.hpp"

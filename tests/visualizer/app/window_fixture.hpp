@@ -9,7 +9,7 @@
 
 #include <unistd.h>
 
-#include "shared/segment/connection.hpp"
+#include "shared/segment/server.hpp"
 #include "shared/segment/writer.hpp"
 #include "tests/json.hpp"
 #include "tests/visualizer/render/rgb_picture.hpp"

@@ -12,7 +12,7 @@
 #include <doctest/doctest.h>
 #include <unistd.h>
 
-#include "shared/segment/connection.hpp"
+#include "shared/segment/server.hpp"
 #include "shared/segment/writer.hpp"
 #include "tests/visualizer/gl/gl_fixture.hpp"
 #include "visualizer/picture/picture.hpp"

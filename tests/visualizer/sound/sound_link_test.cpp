@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "visualizer/sound/sound_link.hpp"
-
 #include <chrono>
 #include <cstdint>
 #include <cstdlib>
@@ -14,6 +12,8 @@
 
 #include <doctest/doctest.h>
 #include <unistd.h>
+
+#include "visualizer/sound/sound_player.hpp"
 
 using namespace kerf;
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-
+// AVX2: packets of 4x4 rays, each value in two registers.
 #include <cstdint>
 
 #include <immintrin.h>
@@ -7,11 +7,10 @@
 #include "visualizer/cast/cast_kernels.hpp"
 #include "visualizer/cast/simd/lane_loads.hpp"
 
-// For the AVX2 file: lanes of 4x2 rays.
-
 namespace kerf {
 namespace {
 
+/// Lanes of 4x2 rays.
 struct Avx2 {
   using F = __m256;
   using I = std::int32_t __attribute__((vector_size(32)));
@@ -97,15 +96,9 @@ struct Avx2 {
   }
 };
 
-}  // namespace
-
-// For the files that define `Simd` only: two packets of rays as one.
-
-namespace {
-
 /// A `Simd` whose lanes are those of `Half` twice, one packet above the other. Each operation is
 /// two that do not wait for one another: while a load, division or root of one packet is under way,
-/// the other computes. Only where all of it is inlined: else the pairs travel through memory.
+/// the other computes. Only if all of it is inlined: else the pairs travel through memory.
 template <class Half>
 struct Twice {
   struct F {
@@ -197,12 +190,6 @@ struct Twice {
     for (int i = 0; i < 4; ++i) out[i] = {low[i], high[i]};
   }
 };
-
-}  // namespace
-
-// AVX2: packets of 4x4 rays, each value in two registers.
-
-namespace {
 
 using Simd = Twice<Avx2>;
 

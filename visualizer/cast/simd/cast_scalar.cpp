@@ -30,7 +30,7 @@ struct Simd {
   static F from_bits(I a) noexcept { return __builtin_bit_cast(F, a); }
   static I high_half(I a) noexcept { return a >> 16 & 0xffff; }
   static F sqrt(F a) noexcept { return __builtin_sqrtf(a); }
-  /// b where a is not a number, here and in `max`.
+  /// b if a is not a number, here and in `max`.
   static F min(F a, F b) noexcept { return a < b ? a : b; }
   static F max(F a, F b) noexcept { return a > b ? a : b; }
 

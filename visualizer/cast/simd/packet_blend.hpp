@@ -4,8 +4,13 @@
 #include "visualizer/cast/simd/packet_rays.hpp"
 #include "visualizer/cast/simd/packet_volume.hpp"
 
-// For the files that define `Simd` only: the translucent matter of one piece of a packet's rays,
-// how much of it there is and which colour it has, as in shaders/matter.frag.
+// For the files that define `Simd` only: volumes as translucent matter, front to back, as in
+// shaders/blend.frag.
+//
+// One ray goes through all volumes together, so they mix where they intersect. It is cut into
+// pieces at whole multiples of the step along the view axis, whatever was skipped: skipping changes
+// the time, never the picture. Over a length s a sample of opacity a has 1 - (1 - a)^(p s / s0): p
+// says how much of the matter is there, s0 is a voxel edge.
 
 namespace kerf {
 namespace {
@@ -81,18 +86,6 @@ inline Matter matter_at(const CastJob& job, const CastVolumeJob& volume, Vec3 p,
   const Vec3 bright = mix(dim, lit(job, matter.rgb, normal, gaze, Simd::set(1.0F)), surface);
   return {select(lights, bright, dim), matter.extinction};
 }
-
-}  // namespace
-
-// For the files that define `Simd` only: volumes as translucent matter, front to back, as in
-// shaders/blend.frag.
-//
-// One ray goes through all volumes together, so they mix where they intersect. It is cut into
-// pieces at whole multiples of the step along the view axis, whatever was skipped: skipping changes
-// the time, never the picture. Over a length s a sample of opacity a has 1 - (1 - a)^(p s / s0): p
-// says how much of the matter is there, s0 is a voxel edge.
-
-namespace {
 
 constexpr float kOpaque = 0.98F;                // what lies behind adds two hundredths at most
 constexpr float kNoticeable = 1.0F / 32;        // pieces below have no light of their own

@@ -3,7 +3,7 @@
 
 #include "visualizer/cast/cast_kernels.hpp"
 
-// For the files that define `Simd` only: vectors, powers and colours of a packet of rays.
+// For the files that define `Simd` only: vectors, powers, colours and pixels of a packet of rays.
 //
 // The text of `lit` and `srgb` follows shaders/lighting.frag, so that all renderers look alike. No
 // library function and no fused multiply-add: each operation rounds as IEEE 754 says, in every set.
@@ -141,12 +141,6 @@ inline Vec3 lit(const CastJob& job, Vec3 albedo, Vec3 normal, const Gaze& gaze, 
   const Vec3 light = openness * ambient + share * diffuse;
   return {albedo.x * light.x + shine, albedo.y * light.y + shine, albedo.z * light.z + shine};
 }
-
-}  // namespace
-
-// For the files that define `Simd` only: the pixels of a packet of rays.
-
-namespace {
 
 /// A packet's lowest left pixel; lanes beyond the rectangle or the block are not drawn.
 struct Packet {

@@ -4,7 +4,8 @@
 #include "visualizer/cast/simd/packet_rays.hpp"
 
 // For the files that define `Simd` only: how a packet of rays samples a volume and passes over its
-// empty cells. Places are in voxel edges from the border (`CastVolumeJob`).
+// empty cells, and the material and the light of a surface, as in shaders/iso.frag, which gives the
+// reason for each length. Positions are in voxel edges from the border (`CastVolumeJob`).
 
 namespace kerf {
 namespace {
@@ -133,7 +134,7 @@ inline Shown shown_of(const CastEye& from, Vec3 eye) {
 struct VolumeRays {
   Vec3 origin, direction;
   Vec3 inverse;        ///< of the direction
-  F begin_mm, end_mm;  ///< in the volume's box; none where begin is beyond end
+  F begin_mm, end_mm;  ///< in the volume's box; none if begin is beyond end
   F step_mm, steps_per_mm;
 };
 
@@ -207,13 +208,6 @@ inline Surroundings surroundings_at(const CastVolumeJob& volume, const VolumeRay
                               exit(y, rays.origin.y, rays.inverse.y)),
                     exit(z, rays.origin.z, rays.inverse.z))};
 }
-
-}  // namespace
-
-// For the files that define `Simd` only: the material and the light of a surface, as in
-// shaders/iso.frag, which says why each length is what it is.
-
-namespace {
 
 constexpr float kSmall = 1e-6F;  // a share that is nothing, and no zero to divide by
 

@@ -16,7 +16,7 @@ namespace kerf {
 class SoundLink {
  public:
   /// Before any other thread exists: the process is a copy of this one. Where the system has none
-  /// left, `heard` says so.
+  /// left, `heard` reports it.
   SoundLink();
   SoundLink(const SoundLink&) = delete;
   SoundLink& operator=(const SoundLink&) = delete;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What voxels look like: palette, transfer function and texels of visualizer/view/transfer_function
-// and visualizer/texture/voxel_texels.
+// What voxels look like: palette, transfer function and texels of visualizer/scene/appearance and
+// visualizer/render/volume_textures.
 import {kEmptyShare, kHalfBand, kHardestOpacity, kHighestAir, kIvory, kLeastOpacity, kMaterialReach,
   kPaletteWidth, kSoftestOpacity, kWholeSoftest} from './constants.js';
 import {clamp, mix} from './math.js';

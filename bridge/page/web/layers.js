@@ -2,17 +2,36 @@
 // The picture of a scene for one or two eyes: backdrop, volumes, tool, force arrow, in the order and
 // with the layers of visualizer/compose.
 import {clippedRect, grownRect, isEmptyRect, screenBounds, unitedRect} from './camera.js';
-import {BlendCaster, Entries, IsoCaster, kUnitsPerVolume} from './casters.js';
 import {kLongestTapVox, kPaletteWidth} from './constants.js';
-import {Eye} from './eye.js';
-import {bind, cover, Program, requireNoError, texture} from './gl.js';
-import {toolBounds} from './hand.js';
-import {HandPainter} from './hand_painter.js';
-import {palette} from './matter.js';
+import {bind, cover, Program, requireNoError, Target, texture} from './gl.js';
 import {boxCorners} from './math.js';
+import {BlendCaster, Entries, IsoCaster, kUnitsPerVolume} from './renderers.js';
 import {SolidOnGpu, TranslucentOnGpu} from './textures.js';
+import {HandPainter, toolBounds} from './tool.js';
+import {palette} from './transfer_function.js';
 
 const kSmoothingReach = 3;  // pixels
+
+/** The layers of one eye, kept from frame to frame. */
+export class Eye {
+  /** `blended`: how many volumes are looked into. */
+  constructor(gl, width, height, blended) {
+    this.gl = gl;
+    this.all = {x0: 0, y0: 0, x1: width, y1: height};
+    this.opaque = new Target(gl, width, height, [gl.RGBA8]);
+    this.stage = new Target(gl, width, height, [gl.RGBA8]);
+    this.smooth = new Target(gl, width, height, [gl.RGBA8], false);
+    this.layers = Math.max(blended, 1);
+    this.entry = texture(gl, gl.TEXTURE_2D_ARRAY, gl.R32F, gl.NEAREST, [width, height, this.layers]);
+    this.entries = new Target(gl, width, height, []);
+    // Linear light, which a sum of hundreds of faint samples needs, and depth.
+    this.gathered = blended > 0 ? new Target(gl, width, height, [gl.RGBA16F, gl.R32F], false) : null;
+  }
+  free() {
+    this.gl.deleteTexture(this.entry);
+    for (const one of [this.opaque, this.stage, this.smooth, this.entries, this.gathered]) one?.free();
+  }
+}
 
 export class Painter {
   /** Makes room for all of a scene. `kindOf(volume)`: iso or blend. Throws why there can be no picture. */

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-#include "visualizer/sound/sound_link.hpp"
+#include "visualizer/sound/sound_player.hpp"
 
 #include <algorithm>
 #include <array>
@@ -28,18 +28,13 @@
 
 namespace kerf {
 
-/// What a window tells its player, as one packet.
+namespace {
+
+/// What a window sends to its player, as one packet.
 struct SoundMessage {
   ToolSound sound;
   bool mute = false;
 };
-
-/// A process of its own plays what comes through `socket`, until the other end is closed: it
-/// returns no earlier, and is to end then. The device is opened at the first message that is not
-/// mute. Where there is none, or it goes, one packet of text says so, and nothing is played.
-void play_sound(int socket);
-
-namespace {
 
 constexpr std::size_t kBlock = 480;  // 10 ms: what is heard is that new, and what waits before it,
 constexpr std::size_t kBlocks = 4;   // 40 ms: a busy machine may wake this process that late
@@ -47,7 +42,7 @@ constexpr std::size_t kBlocks = 4;   // 40 ms: a busy machine may wake this proc
 /// Blocks of samples, one after the other.
 class AudioOut {
  public:
-  /// None where there is no device. OpenAL's own "No Output" is none.
+  /// None if there is no device. OpenAL's own "No Output" is none.
   static std::unique_ptr<AudioOut> open() {
     auto out = std::unique_ptr<AudioOut>(new AudioOut);
     if (out->device_ == nullptr) return nullptr;
@@ -111,7 +106,7 @@ class AudioOut {
   std::size_t queued_ = 0;
 };
 
-/// The newest message that came within `wait_ms`; the one before where none did. None once the
+/// The newest message that came within `wait_ms`; the one before if none did. None once the
 /// other end is closed.
 std::optional<SoundMessage> newest(int socket, int wait_ms, SoundMessage last) {
   pollfd waits{socket, POLLIN, 0};
@@ -129,8 +124,9 @@ void tell(int socket, std::string_view text) {
   send(socket, text.data(), text.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
 }
 
-}  // namespace
-
+/// A process of its own plays what comes through `socket`, until the other end is closed: it
+/// returns no earlier, and is to end then. The device is opened at the first message that is not
+/// mute. If there is none, or it goes, one packet of text reports it, and nothing is played.
 void play_sound(int socket) {
   constexpr int kHalfBlockMs = 5, kForEver = -1;
   std::unique_ptr<AudioOut> out;
@@ -151,8 +147,6 @@ void play_sound(int socket) {
     }
   }
 }
-
-namespace {
 
 /// The copy of this process: it plays, and never comes back.
 [[noreturn]] void play(int socket) noexcept {

@@ -1,14 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
 // Volumes cast ray by ray: where rays enter them, surfaces, and looks inside, as the renderers of
 // visualizer/render.
-import {clipFromEye} from './camera.js';
+import {clipFromEye, shownInEye} from './camera.js';
 import {kBlendStepVox, kIsoStepVox} from './constants.js';
-import {viewUniforms} from './eye.js';
 import {bind, cover, Program} from './gl.js';
-import {leastExtinction} from './matter.js';
-import {affineInverse, multiply} from './math.js';
+import {affineInverse, multiply, turn} from './math.js';
+import {leastExtinction} from './transfer_function.js';
 
 export const kUnitsPerVolume = 3;  // texture units of a volume that is looked into
+
+/** What both ray casters read of a view. */
+function viewUniforms(view) {
+  return {u_half_size_at_1mm: [view.tanHalfHeight * view.aspect, view.tanHalfHeight],
+    u_middle_at_1mm: [view.middleRight, 0], u_near_mm: view.near, u_far_mm: view.far,
+    u_shown_eye: shownInEye(view), u_up_eye: turn(view.eyeFromWorld, [0, 1, 0])};
+}
 
 /** Per pixel, where its ray first meets an active cell. */
 export class Entries {
