@@ -50,9 +50,6 @@ build_strictly() {
     cmake --build --preset "$1" ${2:+--target} "${@:2}"
 }
 
-# only_all: the tests that .ci/tiers.txt leaves to .ci/all, as a pattern of ctest.
-only_all() { echo "^($(sed -n 's/^all *\([a-z_]*\).*/\1/p' .ci/tiers.txt | paste -sd '|'))\$"; }
-
 # tests NAMES OPTION...: release tests by ctest's options. Tests of NAMES skip themselves if this machine lacks something;
 # here they must run.
 tests() {
