@@ -55,7 +55,7 @@ controller/kernel/sets/gather_vector.hpp | samples beyond the last count | s/\(i
 controller/kernel/sets/splat_loops.hpp | rounding of a scaled overlap | s/ \+ \(1 << 19\)\) >> 20/) >> 20/
 controller/kernel/sets/splat_loops.hpp | air is felt | s/density == INT16_MIN \? 0 : covered/covered/
 controller/kernel/sets/splat_loops.hpp | what lies beyond a full voxel is lost | s/sums\[x\] - covered : sums/0 : sums/
-controller/kernel/sets/set_common.hpp | the way from outside is forgotten | s/FreeBricks::at_least\(distance, outside\[i\]\)/distance/
+controller/kernel/sets/set_common.hpp | the way from outside is forgotten | s/FreeSpaceMap::at_least\(distance, outside\[i\]\)/distance/
 controller/kernel/sets/set_common.hpp | border: the volume is a brick longer | s/beyond\(place >> 16, n\)/beyond(place >> 16, n + 1)/
 controller/kernel/sets/set_common.hpp | the brick of one group | s/ >> kToBrick;/ >> (kToBrick + (i == 3));/
 controller/kernel/overlap_methods.hpp | the box lies one voxel off | s/low\.y - kGradientReach/low.y - 1/

@@ -60,7 +60,7 @@ class Recorder {
 
 /// Options of kerf-recorder.
 struct RecorderOptions {
-  std::string name = kUsualName;
+  std::string name = kDefaultName;
   std::filesystem::path out;
   double wait_s = 10;  ///< for the controller to appear
   bool strict = false;

@@ -54,7 +54,7 @@ void write_manifest(const std::filesystem::path& folder, const SegmentInfo& info
 
 Manifest read_manifest(const std::filesystem::path& folder) {
   const std::filesystem::path path = folder / kManifestName;
-  if (const std::string why = why_unreachable(path); !why.empty()) {
+  if (const std::string why = access_error(path); !why.empty()) {
     throw RecordError(path.string() + why);
   }
   std::error_code fault;
@@ -211,7 +211,7 @@ void for_each_number(Visit visit) {
 
 void export_csv(const std::filesystem::path& folder, const std::filesystem::path& csv) {
   check_outputs(recording_files(folder), {{"--csv", csv, ".csv"}});
-  NewFile file(csv);
+  AtomicFile file(csv);
   TickLogReader log(folder / kTickLogName);
   std::string line;
   const auto end_line = [&] {

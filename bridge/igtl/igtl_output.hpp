@@ -12,9 +12,9 @@ namespace kerf::bridge {
 
 /// Where OpenIGTLink goes out.
 struct IgtlOptions {
-  std::string host = "127.0.0.1";  ///< address of this machine to listen on
-  std::uint16_t port = 18944;      ///< 0: one that is free
-  std::string name = kUsualName;   ///< of the controller
+  std::string host = "127.0.0.1";   ///< address of this machine to listen on
+  std::uint16_t port = 18944;       ///< 0: one that is free
+  std::string name = kDefaultName;  ///< of the controller
   /// A client that takes nothing for so long is dropped.
   std::chrono::milliseconds patience{5000};
 };

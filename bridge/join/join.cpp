@@ -45,7 +45,7 @@ struct Hopeless : BridgeError {
 constexpr auto kConnectPatience = 1500ms;  // a lost SYN comes again after 1 s
 constexpr auto kGreetingPatience = 10s;    // TLS and HTTP over a slow link
 
-[[noreturn]] void throw_no_trust(const ServerTrust& trust, const ErrorCode& error) {
+[[noreturn]] void throw_no_trust(const CertificateCheck& trust, const ErrorCode& error) {
   if (const std::string reason = trust.refusal(); !reason.empty()) throw Hopeless(reason);
   if (error.category() == asio::error::get_ssl_category()) {
     throw Hopeless("no TLS 1.3 there; is it a kerf-bridge serve, and off loopback?");
@@ -77,7 +77,7 @@ constexpr auto kGreetingPatience = 10s;    // TLS and HTTP over a slow link
 
 /// Leads `ws`, a fresh socket, from its first packet to a WebSocket that talks. Throws `Hopeless`,
 /// or what may be better the next time: `BridgeError` and Boost's system_error.
-asio::awaitable<void> dial(WebSocket& ws, const BridgeAddress& address, ServerTrust& trust) {
+asio::awaitable<void> dial(WebSocket& ws, const BridgeAddress& address, CertificateCheck& trust) {
   Link& link = ws.next_layer();
   beast::tcp_stream& tcp_stream = link.next_layer();
   tcp::resolver resolver(ws.get_executor());
@@ -184,7 +184,7 @@ class Joiner {
         asio::co_spawn(io_, stay_joined(), ended);
       }
     }
-    desk_.set_link(CommandDesk::Link::down);
+    desk_.set_link(RemoteCommand::Link::down);
     if (failure) std::rethrow_exception(failure);
     if (age_.count() != 0) {
       say(format(
@@ -225,7 +225,7 @@ class Joiner {
       } catch (const std::exception&) {
         lost(why_closed_.empty() ? last_error() : why_closed_);
       }
-      desk_.set_link(CommandDesk::Link::down);
+      desk_.set_link(RemoteCommand::Link::down);
       if (joins_ != joins_before) pause = kFirstPause;
       asio::steady_timer timer(io_, pause);
       co_await timer.async_wait(use_awaitable);
@@ -280,8 +280,8 @@ class Joiner {
         // Behind an open connection the server waited for a run: joining begins with the run.
         const std::int64_t waited_ns = heard_ns_ - opened_ns_ - figures.least_round_trip_ns;
         if (greeted_ || waited_ns > kNsPerSecond / 2) since_ns_ = heard_ns_;
-        desk_.set_link((hello.flags & kMayCommand) != 0 ? CommandDesk::Link::open
-                                                        : CommandDesk::Link::read_only);
+        desk_.set_link((hello.flags & kMayCommand) != 0 ? RemoteCommand::Link::open
+                                                        : RemoteCommand::Link::read_only);
         if (session_ != 0 && session_ != hello.session) say("a new run");
         session_ = hello.session;
         greeted_ = true;
@@ -368,10 +368,10 @@ class Joiner {
   BridgeAddress address_;
   std::string name_;
   std::optional<double> wait_s_;
-  ServerTrust trust_;
+  CertificateCheck trust_;
   const std::atomic<bool>& stop_;
   std::ostream& out_;
-  CommandDesk desk_;
+  RemoteCommand desk_;
   Mirror mirror_;
 
   beast::tcp_stream* link_ = nullptr;  // of the connection that lives

@@ -255,8 +255,8 @@ namespace {
 
 }  // namespace
 
-ServerTrust::ServerTrust(std::string host, const std::filesystem::path& ca,
-                         const std::string& fingerprint)
+CertificateCheck::CertificateCheck(std::string host, const std::filesystem::path& ca,
+                                   const std::string& fingerprint)
     : host_(std::move(host)), ca_(ca) {
   if (fingerprint.empty()) return;
   fingerprint_ = fingerprint_in(fingerprint);
@@ -266,9 +266,9 @@ ServerTrust::ServerTrust(std::string host, const std::filesystem::path& ca,
   }
 }
 
-void ServerTrust::apply_to(SSL_CTX* context) {
+void CertificateCheck::apply_to(SSL_CTX* context) {
   SSL_CTX_set_min_proto_version(context, TLS1_3_VERSION);
-  SSL_CTX_set_verify(context, SSL_VERIFY_PEER, &ServerTrust::verify);
+  SSL_CTX_set_verify(context, SSL_VERIFY_PEER, &CertificateCheck::verify);
   if (ca_.empty()) return;
   std::error_code fault;  // a pipe may never be written to, and OpenSSL would wait for it
   if (!std::filesystem::is_regular_file(ca_, fault) ||
@@ -279,7 +279,7 @@ void ServerTrust::apply_to(SSL_CTX* context) {
   }
 }
 
-void ServerTrust::begin(SSL* connection) {
+void CertificateCheck::begin(SSL* connection) {
   refusal_.clear();
   SSL_set_ex_data(connection, index_of_trust(), this);
   X509_VERIFY_PARAM* const rules = SSL_get0_param(connection);
@@ -291,14 +291,14 @@ void ServerTrust::begin(SSL* connection) {
   }
 }
 
-int ServerTrust::verify(int verified, X509_STORE_CTX* chain) {
+int CertificateCheck::verify(int verified, X509_STORE_CTX* chain) {
   const auto* const connection = static_cast<const SSL*>(
       X509_STORE_CTX_get_ex_data(chain, SSL_get_ex_data_X509_STORE_CTX_idx()));
-  auto* const trust = static_cast<ServerTrust*>(SSL_get_ex_data(connection, index_of_trust()));
+  auto* const trust = static_cast<CertificateCheck*>(SSL_get_ex_data(connection, index_of_trust()));
   return trust->believe(verified != 0, chain) ? 1 : 0;
 }
 
-bool ServerTrust::believe(bool verified, X509_STORE_CTX* chain) {
+bool CertificateCheck::believe(bool verified, X509_STORE_CTX* chain) {
   const int error = X509_STORE_CTX_get_error(chain);
   const X509* const certificate = X509_STORE_CTX_get0_cert(chain);  // the server's own
   const std::string seen = certificate == nullptr ? std::string() : fingerprint_of(certificate);

@@ -67,12 +67,13 @@ struct TlsKeys {
 /// Why a viewer believes that the other side is the one it means: the lab's CA vouches for it, or
 /// its certificate is the one whose fingerprint was given. Without either nothing is believed, and
 /// the refusal names the fingerprint seen. One connection at a time.
-class ServerTrust {
+class CertificateCheck {
  public:
   /// Throws `BridgeError` if the CA cannot be read, the fingerprint is none, or both are given.
-  ServerTrust(std::string host, const std::filesystem::path& ca, const std::string& fingerprint);
-  ServerTrust(const ServerTrust&) = delete;
-  ServerTrust& operator=(const ServerTrust&) = delete;
+  CertificateCheck(std::string host, const std::filesystem::path& ca,
+                   const std::string& fingerprint);
+  CertificateCheck(const CertificateCheck&) = delete;
+  CertificateCheck& operator=(const CertificateCheck&) = delete;
 
   /// Once; must outlive `context`'s connections.
   void apply_to(SSL_CTX* context);

@@ -157,7 +157,7 @@ std::string cookie_for(std::string_view token) {
   return hex(digest_of("kerf page " + std::string(token)));
 }
 
-bool PagePass::is(std::string_view token) const noexcept {
+bool OneTimeToken::is(std::string_view token) const noexcept {
   return same_digest(digest_of(token), digest_of(token_));
 }
 

@@ -56,7 +56,7 @@ class Tokens {
 [[nodiscard]] std::string cookie_for(std::string_view token);
 
 /// A token that opens the page for one browser. Taken, it is another one.
-class PagePass {
+class OneTimeToken {
  public:
   [[nodiscard]] const std::string& token() const noexcept { return token_; }
   /// Takes as long whatever `token` is.

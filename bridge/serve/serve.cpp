@@ -192,7 +192,7 @@ int run_serve(const ServeOptions& options, const std::atomic<bool>& stop) {
   }
   print_addresses(setup, port, server.pass(), options.qr);
   // Who has no address has no picture.
-  if (const std::string why = why_untold(std::cout); !why.empty()) throw BridgeError(why);
+  if (const std::string why = stdout_error(std::cout); !why.empty()) throw BridgeError(why);
   server.run(stop);
   return 0;
 }

@@ -19,7 +19,7 @@ inline constexpr int kMostViewers = 32;
 /// `kerf-bridge serve`.
 struct ServeOptions {
   std::string listen = "127.0.0.1:7400";  ///< HOST:PORT; port 0: one that is free
-  std::string name = kUsualName;          ///< of the controller
+  std::string name = kDefaultName;        ///< of the controller
   std::filesystem::path identity;         ///< folder of `make-identity`; empty: self-signed
   std::filesystem::path token_file;       ///< who may look; empty: one token, made now
   std::filesystem::path command_tokens;   ///< who may command; empty: no viewer

@@ -72,7 +72,7 @@ tcp::acceptor listen_at(asio::io_context& io, const ServerSetup& setup) {
   if (error == boost::system::errc::address_not_available) {
     way = "give an address of this machine (ip address)";
   }
-  throw BridgeError(place + error.message() + "; " + way_out_of(error.value(), way));
+  throw BridgeError(place + error.message() + "; " + remedy_for(error.value(), way));
 }
 
 asio::ssl::context make_tls(const TlsKeys& keys) {
@@ -152,17 +152,17 @@ asio::ip::address_v6::bytes_type host_of(const asio::ip::address& address) {
 bool Server::Impl::make_room(const asio::ip::address& newcomer) {
   const auto held_by = [&](const asio::ip::address& address) {
     return std::ranges::count(handshakes_, host_of(address),
-                              [](const HandshakePlace* one) { return host_of(one->from()); });
+                              [](const HandshakeSlot* one) { return host_of(one->from()); });
   };
   const bool of_one = held_by(newcomer) >= kMaxHandshakesOfOne;
   if (!of_one && handshakes_.size() < kMaxHandshakes) return true;
-  HandshakePlace* oldest = nullptr;
-  const auto goes_before = [&](const HandshakePlace* one) {
+  HandshakeSlot* oldest = nullptr;
+  const auto goes_before = [&](const HandshakeSlot* one) {
     if (oldest == nullptr) return true;
     if (one->is_guess != oldest->is_guess) return oldest->is_guess;
     return held_by(one->from()) > held_by(oldest->from());
   };
-  for (HandshakePlace* one : handshakes_) {
+  for (HandshakeSlot* one : handshakes_) {
     if (of_one && (one->is_guess || host_of(one->from()) != host_of(newcomer))) continue;
     if (goes_before(one)) oldest = one;
   }

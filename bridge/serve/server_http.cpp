@@ -100,7 +100,7 @@ asio::awaitable<void> Server::Impl::connection(tcp::socket socket) {
 
 asio::awaitable<void> Server::Impl::handshake(WebSocket& ws, beast::flat_buffer& in, bool& done) {
   Link& link = ws.next_layer();
-  const HandshakePlace place(*this, link.next_layer());
+  const HandshakeSlot place(*this, link.next_layer());
   ErrorCode error;
   link.next_layer().expires_after(std::chrono::nanoseconds(setup_.handshake_ns));
   done = co_await beast::async_detect_ssl(link.next_layer(), in, quiet(error));
@@ -193,7 +193,7 @@ asio::awaitable<void> Server::Impl::refuse(Link& link, int status, std::string_v
 asio::awaitable<void> Server::Impl::talk_http(std::unique_ptr<WebSocket> ws,
                                               beast::flat_buffer& in) {
   Link& link = ws->next_layer();
-  HandshakePlace place(*this, link.next_layer());
+  HandshakeSlot place(*this, link.next_layer());
   ErrorCode error;
   for (bool more = true; more && !error;) {
     http::request_parser<http::empty_body> parser;

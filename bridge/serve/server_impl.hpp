@@ -66,7 +66,7 @@ class Server::Impl {
 
  private:
   using Void = asio::awaitable<void>;
-  class HandshakePlace;
+  class HandshakeSlot;
   /// What a request shows of what it may.
   struct Shown {
     Right right = Right::none;
@@ -97,7 +97,7 @@ class Server::Impl {
 
   // server_viewer.cpp
   Void view(std::unique_ptr<WebSocket> ws, const Request& request, Right right,
-            HandshakePlace& place);
+            HandshakeSlot& place);
   Void read_viewer(std::shared_ptr<Viewer> viewer);
   Void write_viewer(std::shared_ptr<Viewer> viewer);
   [[nodiscard]] bool obey(const std::shared_ptr<Viewer>& viewer,
@@ -109,9 +109,9 @@ class Server::Impl {
   static void drop(Viewer& viewer, CloseCode code);
 
   ServerSetup setup_;
-  PagePass pass_;
+  OneTimeToken pass_;
   // Used by what `io_` runs, to its end.
-  std::list<HandshakePlace*> handshakes_;  // the oldest first
+  std::list<HandshakeSlot*> handshakes_;  // the oldest first
   asio::io_context io_{1};
   std::optional<asio::ssl::context> tls_;
   tcp::acceptor acceptor_;
@@ -129,16 +129,16 @@ class Server::Impl {
 
 /// A connection that is not yet a viewer, while it holds one of the places that there are for such.
 /// Its stream outlives it.
-class Server::Impl::HandshakePlace {
+class Server::Impl::HandshakeSlot {
  public:
-  HandshakePlace(Impl& server, beast::tcp_stream& stream) : server_(server), stream_(stream) {
+  HandshakeSlot(Impl& server, beast::tcp_stream& stream) : server_(server), stream_(stream) {
     ErrorCode error;
     from_ = stream.socket().remote_endpoint(error).address();
     server_.handshakes_.push_back(this);
   }
-  HandshakePlace(const HandshakePlace&) = delete;
-  HandshakePlace& operator=(const HandshakePlace&) = delete;
-  ~HandshakePlace() { release(); }
+  HandshakeSlot(const HandshakeSlot&) = delete;
+  HandshakeSlot& operator=(const HandshakeSlot&) = delete;
+  ~HandshakeSlot() { release(); }
   void release() { server_.handshakes_.remove(this); }
   void evict() {
     release();

@@ -52,7 +52,7 @@ std::string_view words(CloseCode code) {
 }  // namespace
 
 asio::awaitable<void> Server::Impl::view(std::unique_ptr<WebSocket> ws, const Request& request,
-                                         Right right, HandshakePlace& place) {
+                                         Right right, HandshakeSlot& place) {
   auto& tcp_stream = ws->next_layer().next_layer();
   tcp_stream.expires_after(std::chrono::nanoseconds(setup_.handshake_ns));
   ws->read_message_max(kMaxUpBytes);

@@ -13,7 +13,7 @@
 
 namespace kerf::bridge {
 
-Reply CommandDesk::ask(const Command& command) noexcept {
+Reply RemoteCommand::ask(const Command& command) noexcept {
   std::unique_lock lock(mutex_);
   if (link_ != Link::open) {
     return {link_ == Link::down ? ReplyStatus::busy : ReplyStatus::refused, 0};
@@ -26,12 +26,12 @@ Reply CommandDesk::ask(const Command& command) noexcept {
   return reply_.value_or(Reply{ReplyStatus::busy, 0});
 }
 
-std::optional<CommandMessage> CommandDesk::take() {
+std::optional<CommandMessage> RemoteCommand::take() {
   const std::lock_guard lock(mutex_);
   return std::exchange(to_send_, std::nullopt);
 }
 
-void CommandDesk::answer(const ReplyMessage& reply) {
+void RemoteCommand::answer(const ReplyMessage& reply) {
   const std::lock_guard lock(mutex_);
   if (reply.sequence != sequence_) return;  // to one that was given up
   const bool known = reply.status <= static_cast<std::uint32_t>(ReplyStatus::refused);
@@ -40,7 +40,7 @@ void CommandDesk::answer(const ReplyMessage& reply) {
   answered_.notify_one();
 }
 
-void CommandDesk::set_link(Link link) {
+void RemoteCommand::set_link(Link link) {
   const std::lock_guard lock(mutex_);
   link_ = link;
   if (link == Link::open) return;
@@ -82,7 +82,7 @@ template <class Record>
 
 /// A segment of this machine and what is in it.
 struct Mirror::LocalSegment {
-  LocalSegment(ParsedHello run, MirrorWriter made)
+  LocalSegment(ParsedHello run, ReplicaWriter made)
       : hello(std::move(run)),
         plan(hello.head.scene_bytes, hello.volumes),
         writer(std::move(made)),
@@ -90,7 +90,7 @@ struct Mirror::LocalSegment {
 
   ParsedHello hello;
   BlockPlan plan;
-  MirrorWriter writer;
+  ReplicaWriter writer;
   std::vector<std::uint64_t> versions;  // per block, as written
   std::optional<SegmentServer> server;  // while readers can find it
 };
@@ -113,7 +113,7 @@ const HelloMessage& Mirror::hello(std::span<const std::byte> message, std::int64
   if (shown || (next_ && !same_run(next_->hello, hello))) next_.reset();
   if (!shown && !next_) {
     next_ = std::make_unique<LocalSegment>(
-        hello, MirrorWriter::create(spec_of(hello, clock_, most_bytes_)));
+        hello, ReplicaWriter::create(spec_of(hello, clock_, most_bytes_)));
   }
   parser_ = std::make_unique<FrameParser>(hello);
   held_.assign(parser_->plan().count(), 0);
@@ -128,17 +128,17 @@ const HelloMessage& Mirror::hello(std::span<const std::byte> message, std::int64
 
 AckMessage Mirror::frame(std::span<const std::byte> message, std::int64_t now_ns,
                          std::int64_t round_trip_ns) {
-  if (!parser_) throw OutOfStep("frame: came before the greeting");
+  if (!parser_) throw StreamOutOfSync("frame: came before the greeting");
   const FrameHead head = parser_->parse(message);
   clock_.sample(head.sent_ns, now_ns, round_trip_ns);
   if (head.frame != last_frame_ + 1) {
-    throw OutOfStep("frame: " + std::to_string(head.frame) + " came after " +
-                    std::to_string(last_frame_));
+    throw StreamOutOfSync("frame: " + std::to_string(head.frame) + " came after " +
+                          std::to_string(last_frame_));
   }
   last_frame_ = head.frame;
   if (!next_ && !parser_->blocks().empty()) waiting_.emplace_back();
   for (const FrameParser::Block& block : parser_->blocks()) take(block);
-  if (set_hash_ != head.set_hash) throw OutOfStep("frame: the set hash is another");
+  if (set_hash_ != head.set_hash) throw StreamOutOfSync("frame: the set hash is another");
   (next_ ? next_ : shown_)
       ->writer.beat(
           clock_.local(static_cast<std::uint64_t>(std::max<std::int64_t>(head.heartbeat_ns, 0))));
@@ -149,7 +149,7 @@ AckMessage Mirror::frame(std::span<const std::byte> message, std::int64_t now_ns
 void Mirror::take(const FrameParser::Block& block) {
   std::uint64_t& held = held_[block.id];
   if (block.version <= held) {
-    throw OutOfStep("frame: block " + std::to_string(block.id) + " is not newer than before");
+    throw StreamOutOfSync("frame: block " + std::to_string(block.id) + " is not newer than before");
   }
   set_hash_ = with_block(set_hash_, block.id, held, block.version, hello_->head.session);
   if (held == 0) ++blocks_held_;
@@ -157,7 +157,7 @@ void Mirror::take(const FrameParser::Block& block) {
   LocalSegment& segment = next_ ? *next_ : *shown_;
   if (segment.versions[block.id] == block.version) return;  // from an earlier connection
   if (next_) return put(block.id, block.version, block.bytes);
-  if (++blocks_waiting_ > held_.size()) throw OutOfStep("frame: the pass never ends");
+  if (++blocks_waiting_ > held_.size()) throw StreamOutOfSync("frame: the pass never ends");
   Part& part = waiting_.back();
   part.blocks.push_back({block.id, block.version, part.bytes.size()});
   part.bytes.insert(part.bytes.end(), block.bytes.begin(), block.bytes.end());
@@ -186,10 +186,10 @@ void Mirror::put(std::uint32_t id, std::uint64_t version, std::span<const std::b
 
 void Mirror::publish(const FrameHead& head) {
   if (blocks_held_ != held_.size()) {
-    throw OutOfStep("frame: the pass ends with " + std::to_string(blocks_held_) + " of " +
-                    std::to_string(held_.size()) + " blocks");
+    throw StreamOutOfSync("frame: the pass ends with " + std::to_string(blocks_held_) + " of " +
+                          std::to_string(held_.size()) + " blocks");
   }
-  MirrorWriter& writer = (next_ ? next_ : shown_)->writer;
+  ReplicaWriter& writer = (next_ ? next_ : shown_)->writer;
   if (!waiting_.empty()) writer.begin_pass(head.tick);
   for (const Part& part : waiting_) {
     for (const Waiting& block : part.blocks) {
@@ -219,9 +219,9 @@ void Mirror::publish(const FrameHead& head) {
 }
 
 void Mirror::records(std::span<const std::byte> message) {
-  if (!hello_) throw OutOfStep("records: came before the greeting");
+  if (!hello_) throw StreamOutOfSync("records: came before the greeting");
   const ParsedRecords in = parse_records(message, hello_->head.session, scratch_);
-  MirrorWriter& writer = (next_ ? next_ : shown_)->writer;
+  ReplicaWriter& writer = (next_ ? next_ : shown_)->writer;
   for (std::uint32_t i = 0; i < in.head.count; ++i) {
     const std::uint64_t index = in.head.first + std::uint64_t{i} * in.head.stride;
     if (static_cast<Ring>(in.head.ring) == Ring::ticks) {

@@ -76,7 +76,7 @@ class ClockOffset {
 /// Where a command of a local reader waits for the other machine's answer. One at a time: the
 /// segment server's thread asks, the network's thread looks for it as often as something arrives,
 /// at least 60 times a second, sends it and brings the answer.
-class CommandDesk {
+class RemoteCommand {
  public:
   /// What the link can do: no connection is a reason to try again, no right is not.
   enum class Link : std::uint8_t { down, read_only, open };
@@ -102,7 +102,7 @@ class CommandDesk {
 
 /// What arrived does not fit what is held: the way out is a new connection, which starts afresh
 /// while readers keep the picture that they have. One line.
-struct OutOfStep : std::runtime_error {
+struct StreamOutOfSync : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
@@ -130,8 +130,8 @@ class Mirror {
   const HelloMessage& hello(std::span<const std::byte> message, std::int64_t now_ns,
                             std::int64_t round_trip_ns);
 
-  /// Applies a frame; what it returns is to be sent back. Throws `WireError` or `OutOfStep`, and
-  /// `SegmentError` if the name was taken in the meantime.
+  /// Applies a frame; what it returns is to be sent back. Throws `WireError` or `StreamOutOfSync`,
+  /// and `SegmentError` if the name was taken in the meantime.
   AckMessage frame(std::span<const std::byte> message, std::int64_t now_ns,
                    std::int64_t round_trip_ns);
 

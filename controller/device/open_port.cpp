@@ -126,7 +126,7 @@ std::unique_ptr<PacketPort> emulator(const std::string& text, const Request& req
     port = std::make_unique<SocketPort>(where, request.patience_ms, request.stop);
   }
   agree(*port, "--port " + text, request.ours, is_udp, request.patience_ms, request.stop);
-  if (request.ours.lockstep) return std::make_unique<TurnPort>(std::move(port));
+  if (request.ours.lockstep) return std::make_unique<LockStepPort>(std::move(port));
   return port;
 }
 

@@ -20,7 +20,7 @@ namespace kerf {
 ///
 /// The only exception of the loading code. `main` adds the program's name, prints the line and
 /// returns 2.
-class SceneError : public std::runtime_error {
+class LoadError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
@@ -52,16 +52,16 @@ inline constexpr std::size_t kLongestText = 256;  // bytes of a name or a path
   return !text.empty() && text.size() <= kLongestText && one_line(text) == text;
 }
 
-/// Throws SceneError `place: what`, on one line.
+/// Throws LoadError `place: what`, on one line.
 [[noreturn]] inline void refuse(std::string_view place, std::string_view what) {
-  throw SceneError(one_line(std::string(place) + std::string(what)));
+  throw LoadError(one_line(std::string(place) + std::string(what)));
 }
 
-/// For long work of load time: throws SceneError if a signal asked the program to end. `place`:
+/// For long work of load time: throws LoadError if a signal asked the program to end. `place`:
 /// the subject of the work, mostly a file.
 inline void end_if_asked(const std::string& place) {
   if (!stop_requested()) return;
-  throw SceneError(place + ": reading it was stopped by a signal; start again");
+  throw LoadError(place + ": reading it was stopped by a signal; start again");
 }
 
 }  // namespace kerf

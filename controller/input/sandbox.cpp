@@ -107,7 +107,7 @@ std::uint64_t memory_before_offer(const SandboxJob& job) {
     reader.say(SandboxWord::done);
   } catch (const std::bad_alloc&) {
     reader.say(SandboxWord::no_memory);
-  } catch (const SceneError& error) {
+  } catch (const LoadError& error) {
     reader.say(SandboxWord::refused, error.what());
   } catch (const std::exception& error) {
     reader.say(SandboxWord::refused, job.place + ": " + error.what());
@@ -156,7 +156,7 @@ class Child {
   }
 
  private:
-  [[noreturn]] void refuse(const std::string& text) const { throw SceneError(place_ + text); }
+  [[noreturn]] void refuse(const std::string& text) const { throw LoadError(place_ + text); }
 
   [[noreturn]] void no_process() const {
     refuse(": no process to read it in (" + std::generic_category().message(errno) +
@@ -194,7 +194,7 @@ class Child {
       case SandboxWord::done:
         return true;
       case SandboxWord::refused:
-        throw SceneError(text);
+        throw LoadError(text);
       case SandboxWord::no_memory:
         no_memory();
     }
@@ -209,7 +209,7 @@ class Child {
       const int error = errno;
       refuse(": no " + std::to_string((size >> 20) + 1) + " MiB of memory for it (" +
              std::generic_category().message(error) + "); " +
-             way_out_of(error, "crop or resample it first"));
+             remedy_for(error, "crop or resample it first"));
     }
     size_ = size;
     raise_memory(pid_, 2 * size);

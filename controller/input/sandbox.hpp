@@ -79,7 +79,7 @@ inline constexpr std::uint64_t kSandboxBytes = std::uint64_t{64} << 20;
 /// filled. The libraries that parse foreign files have faults that a broken or hostile file finds;
 /// the sandbox confines them.
 ///
-/// `read` makes one offer. `accept` gets its header in the parent, and refuses it with a SceneError
+/// `read` makes one offer. `accept` gets its header in the parent, and refuses it with a LoadError
 /// or returns the number of bytes to grant; it must trust no byte of it, nor the caller any byte of
 /// the memory. Both processes map the same pages, so nothing is copied; when this returns, the
 /// child has ended and no other process maps them. The child may take kSandboxBytes and two times
@@ -88,7 +88,7 @@ inline constexpr std::uint64_t kSandboxBytes = std::uint64_t{64} << 20;
 ///
 /// After 2 s a progress bar is shown on stderr, if that is a terminal.
 ///
-/// Throws SceneError, one line: the error that `read` or `accept` threw; a signal that ended the
+/// Throws LoadError, one line: the error that `read` or `accept` threw; a signal that ended the
 /// child (a crash); more memory or CPU time than allowed; `cpu_s` seconds without any work; an end
 /// that the process was asked for meanwhile (`stop_requested`). Load time; any thread.
 [[nodiscard]] SharedBytes read_in_sandbox(

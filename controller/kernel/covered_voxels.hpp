@@ -328,7 +328,7 @@ inline constexpr double kSteepest = 64;
 
 /// A contact of a tool, seen from its centre.
 template <class N>
-struct BearingPlane {
+struct LoadPlane {
   WorldVec<typename N::Unit> normal{};
   typename N::Ratio height{};     ///< of its point along the normal, in rim radii: -1 of a ball
   typename N::Ratio steepness{};  ///< rim radius over w
@@ -340,7 +340,7 @@ template <class N>
 [[nodiscard]] constexpr AheadForm<typename N::Sum> ahead_form(
     VoxelVec<typename N::Real> centre_vox,
     const Transform<typename N::Ratio, WorldSpace, VoxelSpace>& rims_from_voxel,
-    const BearingPlane<N>& plane) noexcept {
+    const LoadPlane<N>& plane) noexcept {
   using Sum = typename N::Sum;
   using Ratio = typename N::Ratio;
   const auto press = [&](typename N::Unit part) { return -(plane.steepness * Ratio(part)); };

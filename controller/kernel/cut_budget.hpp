@@ -94,7 +94,7 @@ template <class N>
 /// part / whole for 0 <= part <= whole, whole > 0. Fixed: 30 fraction bits, within 2^-30, cut off
 /// below; equal numbers give exactly 1.
 template <class N>
-[[nodiscard]] constexpr auto share_of(CutWeight<N> part, CutWeight<N> whole) noexcept {
+[[nodiscard]] constexpr auto fraction_of(CutWeight<N> part, CutWeight<N> whole) noexcept {
   if constexpr (N::kIsFixed) {
     const int spare = std::max(0, static_cast<int>(std::bit_width(whole)) - 33);
     return static_cast<std::int64_t>(((part >> spare) << 30) / (whole >> spare));
@@ -107,7 +107,7 @@ template <class N>
 template <class N>
 [[nodiscard]] constexpr typename N::Unit unit_share_of(CutWeight<N> part,
                                                        CutWeight<N> whole) noexcept {
-  const auto share = share_of<N>(part, whole);
+  const auto share = fraction_of<N>(part, whole);
   if constexpr (N::kIsFixed) {
     return N::Unit::from_raw(static_cast<std::int32_t>(share));
   } else {
@@ -115,7 +115,7 @@ template <class N>
   }
 }
 
-/// budget times a `share_of`; fixed: rounded down.
+/// budget times a `fraction_of`; fixed: rounded down.
 template <class N>
 [[nodiscard]] constexpr CutBudget<N> portion(CutBudget<N> budget, CutBudget<N> share) noexcept {
   if constexpr (N::kIsFixed) {  // 2^52 times 2^30 in two halves

@@ -346,17 +346,18 @@ struct KernelSet {
                     std::uint64_t* bearing) noexcept;
   void (*take_steps)(const CoverSpend&, CoveredGroup* list, std::int32_t count, Density*,
                      std::int64_t entries, CoverTaken&) noexcept;
-  /// The swept contact: `place_points`, `point_sums` and `read_points` of a tool's surface samples.
-  void (*place_points)(const PointTable<FixedNumbers>&, const PointStep<FixedNumbers>&,
-                       const PointPlaces<FixedNumbers>&) noexcept;
-  void (*sum_points)(const PointTable<FixedNumbers>&, const PointPlaces<FixedNumbers>&,
+  /// The swept contact: `transform_points`, `point_sums` and `read_points` of a tool's surface
+  /// samples.
+  void (*transform_points)(const PointTable<FixedNumbers>&, const PointStep<FixedNumbers>&,
+                           const PointPositions<FixedNumbers>&) noexcept;
+  void (*sum_points)(const PointTable<FixedNumbers>&, const PointPositions<FixedNumbers>&,
                      const std::int32_t (&centre)[3], const DensityField&,
                      PointSums<FixedNumbers>&) noexcept;
-  void (*read_points)(const PointPlaces<FixedNumbers>&, std::int32_t count,
+  void (*read_points)(const PointPositions<FixedNumbers>&, std::int32_t count,
                       const std::int32_t (&centre)[3], const DensityField&,
                       std::int32_t* density) noexcept;
   /// `close_sums`.
-  void (*sum_close)(const CloseLook<FixedNumbers>&, CloseSums<FixedNumbers>&) noexcept;
+  void (*sum_close)(const CloseSampleView<FixedNumbers>&, CloseSums<FixedNumbers>&) noexcept;
 };
 
 /// Gradients beyond the last voxel of a field.

@@ -58,7 +58,7 @@ class PrestonTick {
   constexpr void cut(Sum drive, PrestonOutcome<N>& out) noexcept {
     each_material([&](std::size_t m) {
       const auto fed = portion<N>(budget_of(plan_.rate[m], drive),
-                                  share_of<N>(covered_.load[m], covered_.whole));
+                                  fraction_of<N>(covered_.load[m], covered_.whole));
       if (!(fed > 0)) return;
       fed_[m] = true;
       budget_[m] = fed + state_.carry[m] / kCarryTicks;

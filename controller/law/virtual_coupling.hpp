@@ -12,7 +12,7 @@ namespace kerf {
 /// The virtual coupling between hand and proxy at the device port (docs/theory.md 5.1): the only
 /// stiff element of the loop, since the proxy has no mass.
 template <class N>
-struct Coupling {
+struct VirtualCoupling {
   typename N::Ratio stiffness_n_per_mm{};
   typename N::Unit damping_ns_per_mm{};
 };
@@ -28,8 +28,8 @@ inline constexpr double kFullDampingMm = 0.1;
 ///
 /// Fixed: saturates at the ends of the range; a spring shorter than 2^-16 mm gives nothing.
 template <class N>
-[[nodiscard]] constexpr DeviceVec<typename N::Real> coupling_force(
-    const Coupling<N>& coupling, DeviceVec<typename N::Real> spring_mm,
+[[nodiscard]] constexpr DeviceVec<typename N::Real> virtual_coupling_force(
+    const VirtualCoupling<N>& coupling, DeviceVec<typename N::Real> spring_mm,
     DeviceVec<typename N::Real> velocity_mm_per_s) noexcept {
   using Real = typename N::Real;
   using Unit = typename N::Unit;

@@ -72,7 +72,7 @@ SceneTool load_mesh(const ToolSpec& spec, double pitch_mm, double voxel_mm,
   ToolMesh mesh;
   try {
     mesh = join_triangles(read_stl(path, cpu_s), spec.scale, path.string());
-  } catch (const SceneError& error) {
+  } catch (const LoadError& error) {
     refuse(spec.where, std::string(": ") + error.what());
   }
   check_axis(spec, mesh);
@@ -106,8 +106,8 @@ void check_shaft(const ToolSpec& spec, const SceneTool& tool, double voxel_mm) {
 
 }  // namespace
 
-TouchedVolumes touched_volumes(const std::vector<SceneVolume>& volumes) {
-  TouchedVolumes touched;
+SolidExtent touched_volumes(const std::vector<SceneVolume>& volumes) {
+  SolidExtent touched;
   for (const SceneVolume& volume : volumes) {
     if (!volume.solid) continue;
     const VolumeImage& image = volume.image;
@@ -120,7 +120,7 @@ TouchedVolumes touched_volumes(const std::vector<SceneVolume>& volumes) {
   return touched;
 }
 
-SceneTool load_tool(const ToolSpec& spec, const TouchedVolumes& touched,
+SceneTool load_tool(const ToolSpec& spec, const SolidExtent& touched,
                     const std::filesystem::path& folder, int cpu_s) {
   ToolSize size = spec.size;
   if (!spec.pitch_given) {
@@ -322,14 +322,14 @@ LoadedScene load_parsed(Scene spec, const std::filesystem::path& path,
     }
     if (!scene.volumes.front().image.labels.empty()) add_proposed_materials(scene);
   }
-  const TouchedVolumes touched = touched_volumes(scene.volumes);
+  const SolidExtent touched = touched_volumes(scene.volumes);
   for (const ToolSpec& tool : spec.tools) {
     try {
       scene.tools.push_back(load_tool(tool, touched, path.parent_path(), overrides.read_cpu_s));
       scene.tool_specs.push_back(tool);
       scene.tool_specs.back().size.pitch_mm = scene.tools.back().pitch_mm;
       scene.tool_specs.back().size.radius_mm = scene.tools.back().radius_mm;
-    } catch (const SceneError&) {
+    } catch (const LoadError&) {
       // A spare tool may not fit the volume to which the scene was fitted.
       if (!fitted || scene.tools.empty()) throw;
     }

@@ -19,7 +19,7 @@ namespace kerf {
 /// Settings of a scene that the command line may replace. Spacing and window belong to the first
 /// volume.
 struct SceneOverrides {
-  std::vector<SceneSetting> settings{};                 ///< --set table.key=VALUE
+  std::vector<KeyOverride> settings{};                  ///< --set table.key=VALUE
   std::optional<std::filesystem::path> volume_file{};   ///< --volume, "phantom" or a path
   std::optional<std::array<double, 3>> spacing_mm{};    ///< --spacing a[,b,c]
   std::optional<std::array<double, 2>> window{};        ///< --window lo,hi
@@ -37,7 +37,7 @@ inline constexpr double kReferenceRadiusMm = 1.0;
 /// The part of the device's workspace that a volume of `--volume` fills, x y z in mm.
 inline constexpr std::array<double, 3> kWorkspaceMm = {100.0, 80.0, 60.0};
 
-/// Reads the scene file and all files that it names, and checks it as a whole. Throws SceneError
+/// Reads the scene file and all files that it names, and checks it as a whole. Throws LoadError
 /// with one line for the user. Load time only; takes a second or two for the default phantom.
 ///
 /// Volumes are windowed to u16 (whole range of the source unless given), smoothed if the scene or
@@ -97,7 +97,7 @@ struct VolumeSource {
 };
 
 /// One volume after loading; the scene has these `materials`. `felt_at`: the iso for which their
-/// `felt_iso` was written; if empty, that of the volume. Throws SceneError. Load time.
+/// `felt_iso` was written; if empty, that of the volume. Throws LoadError. Load time.
 [[nodiscard]] SceneVolume load_volume(const VolumeSpec& spec, const VolumeSource& from,
                                       std::vector<Material> materials,
                                       std::optional<double> felt_at);
@@ -116,15 +116,15 @@ inline constexpr int kMaterialEdgeVoxels = 3;
 void scale_to_felt_iso(const std::vector<Material>& materials, Density iso, VolumeImage& image);
 
 /// Extent of the solid volumes, which limits the sizes of tools.
-struct TouchedVolumes {
+struct SolidExtent {
   double voxel_mm = std::numeric_limits<double>::infinity();  ///< smallest edge
   double side_mm = 0;                                         ///< longest side of a box
 };
-[[nodiscard]] TouchedVolumes touched_volumes(const std::vector<SceneVolume>& volumes);
+[[nodiscard]] SolidExtent touched_volumes(const std::vector<SceneVolume>& volumes);
 
-/// The samples of one tool, or those of its mesh from a file in `folder`. Throws SceneError if it
+/// The samples of one tool, or those of its mesh from a file in `folder`. Throws LoadError if it
 /// does not fit the volumes. Load time.
-[[nodiscard]] SceneTool load_tool(const ToolSpec& spec, const TouchedVolumes& touched,
+[[nodiscard]] SceneTool load_tool(const ToolSpec& spec, const SolidExtent& touched,
                                   const std::filesystem::path& folder, int cpu_s = kReadCpuSeconds);
 
 }  // namespace kerf

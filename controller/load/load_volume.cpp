@@ -101,8 +101,8 @@ void check_labels(const VolumeImage& image, std::size_t materials) {
   Label highest = 0;
   for (const Label label : image.labels) highest = std::max(highest, label);  // many at a time
   if (image.labels.empty() || highest < materials) return;
-  throw SceneError("label " + std::to_string(highest) + " stands for no material, the last is " +
-                   std::to_string(materials - 1) + "; add a [[material]] for it");
+  throw LoadError("label " + std::to_string(highest) + " stands for no material, the last is " +
+                  std::to_string(materials - 1) + "; add a [[material]] for it");
 }
 
 static_assert(kMostDenoise == kMostPasses);
@@ -111,13 +111,13 @@ static_assert(kMostDenoise == kMostPasses);
 void refuse_steps(Denoise passes, const VolumeImage& image) {
   const std::string begin = "denoise: " + std::to_string(static_cast<int>(passes));
   if (is_label_map(image.grid, image.density)) {
-    throw SceneError(begin + " for a label map, whose steps are no noise; leave it out");
+    throw LoadError(begin + " for a label map, whose steps are no noise; leave it out");
   }
   const std::size_t levels = levels_of(image.density);
   if (levels >= kLeastLevels) return;
-  throw SceneError(begin + " for a file of " + std::to_string(levels) +
-                   " levels; noise can be told from " + std::to_string(kLeastLevels) +
-                   " on, leave it out");
+  throw LoadError(begin + " for a file of " + std::to_string(levels) +
+                  " levels; noise can be told from " + std::to_string(kLeastLevels) +
+                  " on, leave it out");
 }
 
 /// Finds the noise of a volume, and makes the passes against it that the scene requests.
@@ -200,7 +200,7 @@ SceneVolume load_volume(const VolumeSpec& spec, const VolumeSource& from,
                              : enclosed_in_air(std::move(volume.image), volume.iso);
     if (spec.crop && !volume.proposal.empty()) fade_to_air(volume.image);
     volume.enclosed = !spec.crop && !(volume.image.grid == whole);
-  } catch (const SceneError& error) {
+  } catch (const LoadError& error) {
     refuse(spec.where, std::string(": ") + error.what());
   }
   volume.pose = place_volume(volume.image,

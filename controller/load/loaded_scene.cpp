@@ -166,9 +166,9 @@ Point3 first_surface_from_above(const SceneVolume& volume) {
   if (const auto hit = descend(density, top, box.lo_mm[1], step_mm, volume.iso)) return *hit;
   const auto voxel = nearest_solid_voxel(volume, density, top);
   if (!voxel) {
-    throw SceneError(volume.name +
-                     ": no voxel reaches the iso density, there is no surface to "
-                     "touch; lower iso or check the window");
+    throw LoadError(volume.name +
+                    ": no voxel reaches the iso density, there is no surface to "
+                    "touch; lower iso or check the window");
   }
   const Point3 above = {(*voxel)[0], box.hi_mm[1], (*voxel)[2]};
   // The voxel itself is solid; rounding of the way back through the pose must not hide it.

@@ -70,7 +70,7 @@ struct WorldBox {
 /// is trilinear, outside it is 0.
 ///
 /// The point is exact to 1/100 of the smallest voxel edge, and walls thinner than a quarter of that
-/// edge may be missed on the first line. Throws SceneError when no voxel reaches iso.
+/// edge may be missed on the first line. Throws LoadError when no voxel reaches iso.
 [[nodiscard]] Point3 first_surface_from_above(const SceneVolume& volume);
 
 }  // namespace kerf

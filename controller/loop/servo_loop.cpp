@@ -28,9 +28,9 @@ ServoCommand servo_command(const Command& command) noexcept {
 }
 
 /// Statistics of the armed ticks; counts from before arming are subtracted.
-class Bookkeeper {
+class RunStatistics {
  public:
-  Bookkeeper(RunRecord& record, const TickSource& clock) noexcept
+  RunStatistics(RunRecord& record, const TickSource& clock) noexcept
       : record_(record), clock_(clock) {}
 
   void count(Tick tick, const ServoOutput& output, const TickTiming& timing, std::int64_t sent_ns,
@@ -121,7 +121,7 @@ EndReason run_servo(TickSource& clock, DeviceDriver& device, Servo& servo, Publi
   std::uint32_t last_command = 0;
   std::uint64_t silent_ticks = 0;
   const CountedAllocations counted;
-  Bookkeeper books(record, clock);
+  RunStatistics books(record, clock);
   books.start();
 
   for (Tick tick = 1; !signals.stop.load(std::memory_order_relaxed); ++tick) {
@@ -174,7 +174,7 @@ std::jthread start_watchdog(Watchdog& watchdog, const RealTimeOptions& servo) {
   return std::jthread([&watchdog, above = io_thread_of(servo)](const std::stop_token& stop) {
     // Linux keeps a part of each core for ordinary threads (docs/devices.md): if another program
     // uses up the rest, all real-time threads of that core stand still together.
-    static_cast<void>(leave_core(above.core));
+    static_cast<void>(avoid_core(above.core));
     static_cast<void>(set_fifo(above.priority));
     while (!stop.stop_requested()) {
       watchdog.look(monotonic_ns());

@@ -16,7 +16,7 @@ constexpr int kLookMs = 100;  // period of the checks for a stop request
 
 }  // namespace
 
-TickLeash::TickLeash(const std::string& fifo, const std::atomic<bool>& stop)
+TickGate::TickGate(const std::string& fifo, const std::atomic<bool>& stop)
     : fd_(open(fifo.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC)), stop_(stop) {
   struct stat status {};
   if (fd_ >= 0 && fstat(fd_, &status) == 0 && S_ISFIFO(status.st_mode)) return;
@@ -24,11 +24,11 @@ TickLeash::TickLeash(const std::string& fifo, const std::atomic<bool>& stop)
   throw std::runtime_error("--until " + fifo + ": no FIFO; make one with mkfifo");
 }
 
-TickLeash::~TickLeash() {
+TickGate::~TickGate() {
   close(fd_);
 }
 
-void TickLeash::wait_for(std::uint64_t tick) noexcept {
+void TickGate::wait_for(std::uint64_t tick) noexcept {
   for (int waited_ms = 0; tick > allowed_ && waited_ms < kPatienceMs;) {
     if (stop_.load(std::memory_order_relaxed)) return;
     pollfd fifo{fd_, POLLIN, 0};

@@ -52,13 +52,13 @@ class DeadlineClock {
 /// ticks, so that pictures are spread over the run and show the same ticks each time. That process
 /// writes the last allowed tick into a FIFO, as u64 of this machine; the newest one counts. Virtual
 /// time only: it blocks.
-class TickLeash {
+class TickGate {
  public:
   /// Throws std::runtime_error with one line if `fifo` is none. `stop` outlives it.
-  TickLeash(const std::string& fifo, const std::atomic<bool>& stop);
-  ~TickLeash();
-  TickLeash(const TickLeash&) = delete;
-  TickLeash& operator=(const TickLeash&) = delete;
+  TickGate(const std::string& fifo, const std::atomic<bool>& stop);
+  ~TickGate();
+  TickGate(const TickGate&) = delete;
+  TickGate& operator=(const TickGate&) = delete;
 
   /// Returns once `tick` is allowed, or the loop has to stop. If the writer is gone, or writes
   /// nothing for `kPatienceMs`, all later ticks pass.
@@ -125,7 +125,7 @@ class RealTimeTicks final : public TickSource {
 /// leash, each tick first waits until the leash allows it.
 class LockStepTicks final : public TickSource {
  public:
-  explicit LockStepTicks(DeviceDriver& device, TickLeash* leash = nullptr) noexcept
+  explicit LockStepTicks(DeviceDriver& device, TickGate* leash = nullptr) noexcept
       : device_(device), leash_(leash) {}
   std::int64_t wait_next() noexcept override {
     if (leash_ != nullptr) leash_->wait_for(++tick_);
@@ -137,7 +137,7 @@ class LockStepTicks final : public TickSource {
  private:
   static constexpr int kPatienceMs = 2000;
   DeviceDriver& device_;
-  TickLeash* leash_;
+  TickGate* leash_;
   std::uint64_t tick_ = 0;
   bool silent_ = false;
 };

@@ -54,14 +54,14 @@ Waiting waiting_for(const DeviceReport& report, const ServoOutput& output) noexc
   return Waiting::nothing;
 }
 
-const char* deed_for(Personality personality, Waiting waiting) noexcept {
+const char* action_for(Personality personality, Waiting waiting) noexcept {
   return kDeeds[static_cast<std::size_t>(personality)][static_cast<std::size_t>(waiting)];
 }
 
 std::string text_of(Personality personality, Waiting waiting) {
   if (waiting == Waiting::nothing) return "";
   return std::string(kWaits[static_cast<std::size_t>(waiting)]) + ": " +
-         deed_for(personality, waiting);
+         action_for(personality, waiting);
 }
 
 std::string text_before_device(const std::string& port) {
@@ -72,7 +72,7 @@ void tell_stopped_early(const std::string& work) {
   std::printf("kerf: stopped before there was a device; %s\n", escaped(work).c_str());
 }
 
-bool WaitTeller::look(Waiting now, std::int64_t now_ns, std::int64_t servo_ns) noexcept {
+bool WaitNotice::look(Waiting now, std::int64_t now_ns, std::int64_t servo_ns) noexcept {
   if (now == Waiting::nothing) told_ = 0;
   if (now != last_) {
     last_ = now;

@@ -71,7 +71,7 @@ enum class Waiting : std::uint8_t {
 [[nodiscard]] Waiting waiting_for(const DeviceReport& report, const ServoOutput& output) noexcept;
 
 /// The action of the user, such as "rest the stylus in the inkwell"; empty for `nothing`.
-[[nodiscard]] const char* deed_for(Personality personality, Waiting waiting) noexcept;
+[[nodiscard]] const char* action_for(Personality personality, Waiting waiting) noexcept;
 
 /// Both on one line, such as "waiting until parked: rest the stylus in the inkwell".
 [[nodiscard]] std::string text_of(Personality personality, Waiting waiting);
@@ -85,7 +85,7 @@ void tell_stopped_early(const std::string& work);
 /// Decides when a wait is worth a line: after a second, by the clock and in ticks, and each kind
 /// once until the force comes on. In lock-step, ticks may wait for pictures or for a busy machine,
 /// which no user can change. One thread.
-class WaitTeller {
+class WaitNotice {
  public:
   /// Call several times a second. Returns whether to report `now`. `servo_ns`: ticks so far, as
   /// time.

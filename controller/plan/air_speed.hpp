@@ -105,8 +105,8 @@ template <class N>
   const auto times = static_cast<std::int64_t>(volumes);
   std::int64_t query = 0, beyond = 0;
   const auto add = [&](const PointTable<N>& table) {
-    query +=
-        times * (QueryWork::kLookSamples + 3 * QueryWork::kFreeLook) + most_read_beside_wall(table);
+    query += times * (QueryWork::kQueryOverhead + 3 * QueryWork::kFreeLook) +
+             most_read_beside_wall(table);
     if (table.round && table.needed_whole <= kFreeFarthest) return;  // as one sphere
     beyond = std::max(beyond, times * 2 * QueryWork::kFreeLook * table.groups);
   };
@@ -114,10 +114,10 @@ template <class N>
   for (std::size_t i = 0; i < tool.behind.count; ++i) {
     add(tool.behind.part[i].point_shell.table);
   }
-  const double step_rad = 2 * double(tool.proxy.turn_step);
+  const double step_rad = 2 * double(tool.proxy.rotation_step);
   const std::int64_t turns =
       step_rad > 0 ? std::clamp<std::int64_t>(std::int64_t(std::ceil(turn_rad / step_rad)), 1,
-                                              SweepRules::kMaxTurnQueries)
+                                              SweepRules::kMaxRotationQueries)
                    : 0;
   const std::int64_t left =
       work.budget() - (beyond > 0 ? work.most_wasted() + beyond : 0) -

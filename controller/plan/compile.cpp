@@ -64,7 +64,8 @@ class CompiledSceneOf final : public CompiledScene {
   [[nodiscard]] TickTime time_tick(std::size_t tick) override {
     const TickCost& cost = costs_.ticks[tick];
     const WorstTick worst =
-        WorstDrive<N>(plan_, state_, tick / plan_.volume_count, tick % plan_.volume_count).time();
+        WorstCaseDriver<N>(plan_, state_, tick / plan_.volume_count, tick % plan_.volume_count)
+            .time();
     return {worst.median_us, worst.p99_us,
             tick_stages(*cost.choice.method, cost.shape, worst.box, worst.queried, worst.covered)};
   }
@@ -148,9 +149,9 @@ class CompiledSceneOf final : public CompiledScene {
 
 std::unique_ptr<CompiledScene> plan_scene(const LoadedScene& scene, const KernelSet& kernels) {
   if (scene.cut.model == CutModel::preston && scene.force.model != ForceModel::proxy) {
-    throw SceneError(scene.path +
-                     ": cut.model = \"preston\" needs the normal force of a proxy; set force.model "
-                     "= \"proxy\", or cut.model = \"overlap\"");
+    throw LoadError(scene.path +
+                    ": cut.model = \"preston\" needs the normal force of a proxy; set force.model "
+                    "= \"proxy\", or cut.model = \"overlap\"");
   }
   switch (scene.servo.numeric) {
     case NumericKind::fixed:

@@ -87,7 +87,7 @@ class CompiledScene : public Servo {
 };
 
 /// Plans, tables and costs of a checked scene; no array of the size of a volume is made. Throws
-/// SceneError for a scene that the loop cannot hold: no solid volume, a voxel or a step outside the
+/// LoadError for a scene that the loop cannot hold: no solid volume, a voxel or a step outside the
 /// number formats.
 ///
 /// `kernels` run the loop: the fastest of this machine unless a test gives others.

@@ -74,7 +74,7 @@ std::string device_word(const LoadedScene& scene) {
 }
 
 SampledLoop loop_of(const LoadedScene& scene) {
-  SampledLoop loop = light_loop(scene.device.personality, scene.servo.rate_hz);
+  SampledLoop loop = unheld_loop(scene.device.personality, scene.servo.rate_hz);
   const LawChoice& estimator = scene.servo.velocity;
   if (estimator.name == Difference<DoubleNumbers>::kName && !estimator.settings.empty()) {
     loop.velocity_filter_s = estimator.settings.front().second / 1000;  // its only one
@@ -215,7 +215,7 @@ std::string gain_warning(const LoadedScene& scene, const GainMargin& margin) {
          way_out(scene, margin);
 }
 
-std::string gain_refusal(const LoadedScene& scene, const GainMargin& margin) {
+std::string gain_error(const LoadedScene& scene, const GainMargin& margin) {
   if (scene.force.unchecked_gain || margin.friction_decides || margin.margin() >= 1) return {};
   if (has_law(scene)) {
     return scene.path + ": " + law_words(scene, margin) +
@@ -235,7 +235,7 @@ std::string gain_refusal(const LoadedScene& scene, const GainMargin& margin) {
          way_out(scene, margin) + ", or set force.unchecked_gain = true";
 }
 
-std::string above_device(const LoadedScene& scene) {
+std::string device_limit_error(const LoadedScene& scene) {
   if (scene.force.model == ForceModel::paper) return {};
   const DeviceFigures device = device_figures(scene.device.personality);
   const auto refused = [&](const std::string& what, double value, double most) {

@@ -58,10 +58,10 @@ enum class PlayFriction : std::uint8_t { where_it_decides, always };
 
 /// Why the scene may move no device: unstable without friction, and `force.unchecked_gain` is not
 /// set. Empty if it may.
-[[nodiscard]] std::string gain_refusal(const LoadedScene& scene, const GainMargin& margin);
+[[nodiscard]] std::string gain_error(const LoadedScene& scene, const GainMargin& margin);
 
 /// Why a real device does not get these gains, stable or not: they are above the largest known safe
 /// values for it. Empty if it does.
-[[nodiscard]] std::string above_device(const LoadedScene& scene);
+[[nodiscard]] std::string device_limit_error(const LoadedScene& scene);
 
 }  // namespace kerf

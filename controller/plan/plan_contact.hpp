@@ -25,10 +25,10 @@ void check_spacing(const LoadedScene& scene, const SceneVolume& volume) {
   const auto& h = volume.image.spacing_mm;
   const double smallest = std::min({h[0], h[1], h[2]});
   if (!N::kIsFixed || smallest >= kSmallestMm) return;
-  throw SceneError(scene.path + ": volume " + volume.name + ": spacing_mm " +
-                   std::to_string(smallest) +
-                   " is below the 0.008 of fixed-point numbers; resample it, or set "
-                   "servo.numeric = \"double\"");
+  throw LoadError(scene.path + ": volume " + volume.name + ": spacing_mm " +
+                  std::to_string(smallest) +
+                  " is below the 0.008 of fixed-point numbers; resample it, or set "
+                  "servo.numeric = \"double\"");
 }
 
 /// Position of one solid volume, and the transforms into it.
@@ -51,7 +51,7 @@ template <class N>
   return plan;
 }
 
-/// The solid volumes of the scene, in its order. Throws SceneError if there is none, or one whose
+/// The solid volumes of the scene, in its order. Throws LoadError if there is none, or one whose
 /// voxels the loop's numbers cannot hold.
 template <class N>
 void plan_volumes(const LoadedScene& scene, ServoPlan<N>& plan) {
@@ -61,8 +61,7 @@ void plan_volumes(const LoadedScene& scene, ServoPlan<N>& plan) {
     plan.volumes[plan.volume_count++] = plan_volume<N>(scene.volumes[i], i);
   }
   if (plan.volume_count == 0) {
-    throw SceneError(scene.path +
-                     ": no [[volume]] is solid; set solid = true for the one to touch");
+    throw LoadError(scene.path + ": no [[volume]] is solid; set solid = true for the one to touch");
   }
 }
 
@@ -95,7 +94,7 @@ inline std::array<double, 3> middle_mm(const SceneVolume& volume) {
 }  // namespace contact_parts
 
 /// Contact space and coupling. The origin is the middle of the first solid volume. Throws
-/// SceneError for a volume so far from it that the proxy could not reach it.
+/// LoadError for a volume so far from it that the proxy could not reach it.
 template <class N>
 void plan_contact(const LoadedScene& scene, ServoPlan<N>& plan) {
   using Real = typename N::Real;
@@ -110,9 +109,9 @@ void plan_contact(const LoadedScene& scene, ServoPlan<N>& plan) {
     const auto middle = contact_parts::middle_mm(volume);
     for (std::size_t i = 0; i < 3; ++i) {
       if (std::abs(middle[i] - first[i]) < kContactLimit / 2 * unit_mm) continue;
-      throw SceneError(scene.path + ": volume " + volume.name +
-                       " lies more than 4096 of the finest voxels from the first; bring them "
-                       "together or set force.model = \"paper\"");
+      throw LoadError(scene.path + ": volume " + volume.name +
+                      " lies more than 4096 of the finest voxels from the first; bring them "
+                      "together or set force.model = \"paper\"");
     }
   }
   contact.origin_mm = rounded<WorldVec<Real>, Real>(first);
@@ -152,11 +151,11 @@ void plan_proxy(const LoadedScene& scene, const SceneTool& tool, SweptTool<N>& s
   swept.turned = tool.turns && (!tool.round || swept.behind.count > 0);
   double reach = std::max(1.0, static_cast<double>(swept.point_shell.reach));
   for (std::size_t i = 0; i < swept.behind.count; ++i) {
-    const PartBehind<N>& part = swept.behind.part[i];
+    const ShaftPart<N>& part = swept.behind.part[i];
     reach = std::max(reach, static_cast<double>(part.up + part.point_shell.reach));
   }
   swept.proxy = {.friction = typename N::Unit(scene.force.friction),
-                 .turn_step = typename N::Unit(swept.turned ? turn_step_of(reach) : 0.0),
+                 .rotation_step = typename N::Unit(swept.turned ? rotation_step_of(reach) : 0.0),
                  // At least a step of fixed point, else the ramp would never end.
                  .ramp_per_tick = typename N::Real(std::max(
                      kRampNPerMs * 1000 / scene.servo.rate_hz / n_per_unit, std::ldexp(1.0, -16)))};

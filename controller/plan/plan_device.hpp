@@ -166,7 +166,7 @@ void plan_limits(const LoadedScene& scene, ServoPlan<N>& plan) {
                  .rest_ticks = at_least(50)};
 }
 
-/// The laws that a scene names. Throws SceneError for one that this program does not know.
+/// The laws that a scene names. Throws LoadError for one that this program does not know.
 template <class N>
 void plan_laws(const LoadedScene& scene, ServoPlan<N>& plan) {
   const LawLoop loop{.rate_hz = double(scene.servo.rate_hz),
@@ -176,7 +176,7 @@ void plan_laws(const LoadedScene& scene, ServoPlan<N>& plan) {
     try {
       into = plan_law<In, N>(choice, loop);
     } catch (const LawError& error) {
-      throw SceneError(scene.path + ": " + key + " \"" + choice.name + '"' + error.what());
+      throw LoadError(scene.path + ": " + key + " \"" + choice.name + '"' + error.what());
     }
   };
   law.template operator()<ForceInput>(scene.force.law, "force.law", plan.force_law);

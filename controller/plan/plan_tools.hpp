@@ -49,7 +49,7 @@ template <class N>
   return rounded<typename N::Ratio, WorldSpace, VoxelSpace>(m);
 }
 
-/// For a `BearingPlane`.
+/// For a `LoadPlane`.
 template <class N>
 [[nodiscard]] typename N::Ratio bearing_steepness(const SceneTool& tool,
                                                   const ContactPlan<N>& contact) {

@@ -115,10 +115,10 @@ class ContactMemory {
   }
 
   /// The same for the parts behind the tool's head.
-  PartsBehind<N> hold_parts_behind(const LoadedScene& scene, const SceneTool& tool) {
+  ShaftParts<N> hold_parts_behind(const LoadedScene& scene, const SceneTool& tool) {
     const double unit_mm = contact_unit_mm(scene);
-    PartsBehind<N> behind;
-    for (const ToolPart& part : parts_behind(tool)) {
+    ShaftParts<N> behind;
+    for (const ToolPart& part : shaft_parts(tool)) {
       const auto samples = named(scene, [&] { return part_samples(tool, part, unit_mm); });
       auto& places = places_behind_[behind.count];
       places.resize(places_.size());
@@ -145,7 +145,7 @@ class ContactMemory {
             std::span<const Density> density, ContactState<N>& state) {
     const MappedField& field = fields_.emplace_back(volume.image.grid, density, volume.iso);
     state.volumes[v] = {field.field(), contact_frame<N>(scene, volume), places_[v].places()};
-    for (std::size_t part = 0; part < kMostBehind; ++part) {
+    for (std::size_t part = 0; part < kMaxShaftParts; ++part) {
       state.behind[part][v] = state.volumes[v];
       if (v < places_behind_[part].size()) {
         state.behind[part][v].places = places_behind_[part][v].places();
@@ -172,29 +172,31 @@ class ContactMemory {
   static auto named(const LoadedScene& scene, const auto& make) {
     try {
       return make();
-    } catch (const SceneError& error) {
-      throw SceneError(scene.path + ": " + error.what());
+    } catch (const LoadError& error) {
+      throw LoadError(scene.path + ": " + error.what());
     }
   }
 
   PointShell<N> hold(const std::string& name, double unit_mm, PartSamples mm, bool round,
-                     std::vector<PlaceMemory<N>>& places) {
+                     std::vector<TransformedShell<N>>& places) {
     for (auto& at : mm.samples) {
       for (double& x : at) x /= unit_mm;
     }
     for (SurfaceSample& sample : mm.close) {
       for (double& x : sample.at) x /= unit_mm;
     }
-    const auto& held = tools_.emplace_back(name, ToolPoints<N>(mm.samples, round, mm.close)).second;
-    for (PlaceMemory<N>& in_volume : places) in_volume.hold(held.point_shell());
+    const auto& held =
+        tools_.emplace_back(name, PointShellTable<N>(mm.samples, round, mm.close)).second;
+    for (TransformedShell<N>& in_volume : places) in_volume.hold(held.point_shell());
     return held.point_shell();
   }
 
-  std::vector<std::pair<std::string, ToolPoints<N>>> tools_;
+  std::vector<std::pair<std::string, PointShellTable<N>>> tools_;
   std::vector<std::string> names_;  ///< by volume of the plan
   std::vector<std::size_t> map_bytes_;
-  std::vector<PlaceMemory<N>> places_;
-  std::array<std::vector<PlaceMemory<N>>, kMostBehind> places_behind_;  ///< if a tool has a part
+  std::vector<TransformedShell<N>> places_;
+  std::array<std::vector<TransformedShell<N>>, kMaxShaftParts>
+      places_behind_;  ///< if a tool has a part
   std::vector<MappedField> fields_;
 };
 
@@ -209,7 +211,7 @@ class ForceCutMemory {
       volumes_.push_back({in.volume.name, in.volume.image.labels.size(), 0, {}, {}});
     }
     std::size_t& length = volumes_[v].length;
-    length = std::max(length, most_listed(in, nullptr));
+    length = std::max(length, max_cover_entries(in, nullptr));
   }
 
   /// Allocates; points plan and state at it.

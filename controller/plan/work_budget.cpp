@@ -23,11 +23,11 @@ double work_us(const SceneCosts& costs, std::size_t tool) {
 }
 
 double work_budget_us(const LoadedScene& scene) {
-  return kBudgetShare * 1e6 / scene.servo.rate_hz;
+  return kBudgetRatio * 1e6 / scene.servo.rate_hz;
 }
 
 int highest_rate_hz(double work_us) {
-  const double rate_hz = std::min(kBudgetShare * 1e6 / work_us, double{kMaxRateHz});
+  const double rate_hz = std::min(kBudgetRatio * 1e6 / work_us, double{kMaxRateHz});
   return rate_hz < kMinRateHz ? 0 : static_cast<int>(rate_hz);
 }
 
@@ -38,7 +38,7 @@ std::size_t costliest_tool(const SceneCosts& costs) {
   return std::max_element(costs.ticks.begin(), costs.ticks.end(), cheaper)->tool;
 }
 
-std::string over_budget(const LoadedScene& scene, const SceneCosts& costs) {
+std::string budget_error(const LoadedScene& scene, const SceneCosts& costs) {
   const double budget_us = work_budget_us(scene);
   const std::size_t tool = costliest_tool(costs);
   const double sum_us = work_us(costs, tool);

@@ -14,7 +14,7 @@ namespace kerf {
 
 /// Half of a tick: a machine half as fast as the reference still ends its ticks in time, and on the
 /// reference the other half is left for the device, the publication and other work of the core.
-inline constexpr double kBudgetShare = 0.5;
+inline constexpr double kBudgetRatio = 0.5;
 
 /// Work of one tick of a tool in all volumes: us on the reference machine.
 [[nodiscard]] double work_us(const SceneCosts& costs, std::size_t tool);
@@ -31,6 +31,6 @@ inline constexpr double kBudgetShare = 0.5;
 
 /// Why the scene is refused: the costliest tool, its costliest stage and the highest rate that
 /// fits, on one line with the way out. Empty if every tool fits.
-[[nodiscard]] std::string over_budget(const LoadedScene& scene, const SceneCosts& costs);
+[[nodiscard]] std::string budget_error(const LoadedScene& scene, const SceneCosts& costs);
 
 }  // namespace kerf

@@ -35,9 +35,9 @@ template <class N>
 /// The centre of a tool of this reach where the most density lies within it: there hardly anything
 /// is air and every stage does most of its work. Of several such places the one nearest to the
 /// volume's middle: past the border nothing is read.
-[[nodiscard]] inline VoxelIndex densest_place(const VoxelGrid& grid,
-                                              std::span<const Density> density,
-                                              const VoxelBox& reach) {
+[[nodiscard]] inline VoxelIndex densest_position(const VoxelGrid& grid,
+                                                 std::span<const Density> density,
+                                                 const VoxelBox& reach) {
   constexpr std::int32_t kPlaces = 12, kTrials = 8;  // along each axis
   const auto along = [](std::int32_t lo, std::int32_t hi, std::int32_t i, std::int32_t n) {
     return lo + (hi - lo) * (2 * i + 1) / (2 * n);
@@ -77,7 +77,7 @@ template <class N>
   return {{{{U(a), U(b), U(c)}, {U(-a), U(b), U(c)}, {U(0), U(b), U(-2 * c)}}}};
 }
 
-/// A tick as `WorstDrive` met it.
+/// A tick as `WorstCaseDriver` met it.
 struct WorstTick {
   double median_us = 0, p99_us = 0;
   VoxelIndex box;             ///< that held the tool's cells, in low corners
@@ -91,12 +91,12 @@ struct WorstTick {
 /// to and fro around that place in every tick, and turns, so that the sweep needs many queries.
 /// Each tick covers all volumes. Takes 250 ticks.
 template <class N>
-class WorstDrive {
+class WorstCaseDriver {
   using Real = typename N::Real;
   using Place = WorldVec<Real>;
 
  public:
-  WorstDrive(const ServoPlan<N>& plan, ServoState<N>& state, std::size_t t, std::size_t v)
+  WorstCaseDriver(const ServoPlan<N>& plan, ServoState<N>& state, std::size_t t, std::size_t v)
       : plan_(std::make_unique<ServoPlan<N>>(plan)), state_(state), v_(v) {
     constexpr double kFraction = 1.0 / 4096;
     plan_->removal_rate = removal_rate<N>(kFraction, plan.removal_rate.bent);
@@ -107,7 +107,7 @@ class WorstDrive {
     const VoxelBox reach = reach_of<N>(
         tool.offsets, tool_pose(volume, tool, tool.in_volume[v], volume.position_mm, kWidest));
     size_ = reach.extent();
-    dense_ = densest_place(volume.grid, state.volumes[v].density, reach);
+    dense_ = densest_position(volume.grid, state.volumes[v].density, reach);
     if (tool.turns && !tool.round) at_.rotation = kWidest;
     at_.centre_mm = world({dense_.x + 0.0, dense_.y + 0.3, dense_.z + 0.4});
     at_.normal = at_.press = {{}, typename N::Unit(1), {}};
@@ -130,7 +130,7 @@ class WorstDrive {
 
   WorstTick time_from(const std::array<double, 3>& outside_vox) {
     state_.contact.proxy = {};
-    static_cast<void>(feel_and_cut(*plan_, state_, world(outside_vox), kWidest, {}));
+    static_cast<void>(contact_and_cut(*plan_, state_, world(outside_vox), kWidest, {}));
     return time_here(kTicks / 2);
   }
 
@@ -144,7 +144,7 @@ class WorstDrive {
       const Place tip_mm = hand(i);
       const Rotation<N> turn = i % 2 == 0 ? kWidest : identity_rotation<N>();
       const auto began = std::chrono::steady_clock::now();
-      const ToolForces<N> forces = feel_and_cut(*plan_, state_, tip_mm, turn, {});
+      const ToolForces<N> forces = contact_and_cut(*plan_, state_, tip_mm, turn, {});
       if (plan_->force_cut.on) {
         static_cast<void>(cut_by_sent_force(*plan_, state_, at_, press_n, true));
       }

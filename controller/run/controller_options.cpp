@@ -185,10 +185,9 @@ std::string wrong_with(const ControllerOptions& options, const Raw& raw) {
 
 void override_scene(const Raw& raw, SceneOverrides& scene) {
   for (const std::string& text : raw.settings) {
-    const SceneSetting setting = parse_setting(text);
-    if (std::ranges::find(scene.settings, setting.key, &SceneSetting::key) !=
-        scene.settings.end()) {
-      throw SceneError("--set " + text + ": the key stands there already; give it once");
+    const KeyOverride setting = parse_setting(text);
+    if (std::ranges::find(scene.settings, setting.key, &KeyOverride::key) != scene.settings.end()) {
+      throw LoadError("--set " + text + ": the key stands there already; give it once");
     }
     scene.settings.push_back(setting);
   }

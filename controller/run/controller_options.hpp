@@ -17,7 +17,7 @@ struct ControllerOptions {
   std::string port;               ///< as open_port.hpp says
   std::optional<double> seconds;  ///< servo time after arming; none: until stopped
   double wait_s = 60;             ///< servo time for the device to be taken in hand
-  std::string name = kUsualName;
+  std::string name = kDefaultName;
   bool virtual_time = false;
   std::string until;            ///< FIFO that says how far lock-step may go; empty: none
   bool unchecked_gain = false;  ///< gains above the device's and beyond its stability

@@ -73,7 +73,7 @@ constexpr std::chrono::milliseconds kLookPeriod{5};
   static_cast<void>(run.device.release_for_good());
   run.segment.set_lifecycle(Lifecycle::fault);
   log_error("the step after tick " + std::to_string(tick) + " did not end in " +
-            std::to_string(EndlessStep::kMostSeconds) +
+            std::to_string(StepWatchdog::kMostSeconds) +
             " s; motors off; give every loop of your law a bound that does not depend on its input "
             "(the lab tries it: law NAME)");
   constexpr std::chrono::milliseconds kBusCycles{2};  // as after a crash
@@ -84,10 +84,10 @@ constexpr std::chrono::milliseconds kLookPeriod{5};
 /// Main thread while the servo runs: draws the progress bar, logs what the device waits for, and
 /// checks for steps that do not end.
 void show_progress(const LoopSignals& signals, const std::atomic<bool>& ended, const Run& run,
-                   EndlessStep& step) {
+                   StepWatchdog& step) {
   const ControllerOptions& options = run.options;
   const ProgressBar bar(options.progress);
-  WaitTeller teller;
+  WaitNotice teller;
   while (!ended.load()) {
     if (step.look()) end_looping_servo(run, signals.heartbeat.load(std::memory_order_relaxed));
     const Waiting waiting = signals.waiting.load(std::memory_order_relaxed);
@@ -137,7 +137,7 @@ EndReason serve(const Run& run, LoopSignals& signals, CallGuard* calls) {
   }
   Publisher eyes(run.segment, run.servo);
   RealTimeTicks real_time(kNsPerSecond / run.rate_hz, options.real_time.spin_us * 1000);
-  std::optional<TickLeash> leash;
+  std::optional<TickGate> leash;
   if (!options.until.empty()) leash.emplace(options.until, run.stop);
   LockStepTicks lock_step(run.device, leash ? &*leash : nullptr);
   TickSource& clock = options.virtual_time ? static_cast<TickSource&>(lock_step) : real_time;
@@ -185,8 +185,8 @@ EndReason run_threads(const Run& run) {
       }
       ended = true;
     });
-    const StopSignalsElsewhere to_the_threads_above;
-    EndlessStep step(servo_thread.native_handle(), signals.heartbeat);
+    const BlockStopSignals to_the_threads_above;
+    StepWatchdog step(servo_thread.native_handle(), signals.heartbeat);
     try {
       show_progress(signals, ended, run, step);
     } catch (...) {

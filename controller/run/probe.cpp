@@ -107,10 +107,10 @@ DeviceSettings device_of(const ControllerOptions& options) {
 
 /// Adds the next steps of a start that the device itself still needs.
 void add_lacks_of_device(const DeviceSettings& device, const ProbeView::Seen& seen,
-                         std::vector<Lack>& lacks) {
+                         std::vector<SetupProblem>& lacks) {
   const std::string name = word_of(device.personality);
   const auto lacks_deed = [&](const char* what, Waiting waiting) {
-    lacks.push_back({name + what, deed_for(device.personality, waiting)});
+    lacks.push_back({name + what, action_for(device.personality, waiting)});
   };
   if (seen.reports == 0) {
     lacks_deed(": not one report", Waiting::report);
@@ -176,14 +176,14 @@ void watch(DeviceDriver& driver, const PacketPort& port, ProbeView& view, std::u
   live.end();
 }
 
-Json json_of(const std::vector<Lack>& lacks) {
+Json json_of(const std::vector<SetupProblem>& lacks) {
   Json list = Json::List{};
-  for (const Lack& lack : lacks) list.push_back({{"what", lack.what}, {"cure", lack.cure}});
+  for (const SetupProblem& lack : lacks) list.push_back({{"what", lack.what}, {"cure", lack.cure}});
   return list;
 }
 
-void print(const std::vector<Lack>& lacks) {
-  for (const Lack& lack : lacks) {
+void print(const std::vector<SetupProblem>& lacks) {
+  for (const SetupProblem& lack : lacks) {
     std::printf("missing  %s\n         %s\n", lack.what.c_str(), lack.cure.c_str());
   }
 }
@@ -296,7 +296,7 @@ int run_probe(const ControllerOptions& options) {
                          : UINT64_MAX;
   watch(*driver, *port, view, ticks, rate_hz, stop);
 
-  std::vector<Lack> lacks;
+  std::vector<SetupProblem> lacks;
   add_lacks_of_device(device, view.seen(), lacks);
   const auto rights = lacks_of_rights();
   lacks.insert(lacks.end(), rights.begin(), rights.end());

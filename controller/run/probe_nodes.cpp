@@ -184,9 +184,9 @@ bool may_lock(std::size_t bytes) {
 
 }  // namespace
 
-std::vector<Lack> lacks_of_nodes(std::optional<Personality> which,
-                                 std::span<const DeviceNode> nodes, const fs::path& root) {
-  std::vector<Lack> lacks;
+std::vector<SetupProblem> lacks_of_nodes(std::optional<Personality> which,
+                                         std::span<const DeviceNode> nodes, const fs::path& root) {
+  std::vector<SetupProblem> lacks;
   bool found = false;
   for (const DeviceNode& node : nodes) {
     if (which && node.personality != *which) continue;
@@ -207,8 +207,8 @@ std::vector<Lack> lacks_of_nodes(std::optional<Personality> which,
   return lacks;
 }
 
-std::vector<Lack> lacks_of_rights() {
-  std::vector<Lack> lacks;
+std::vector<SetupProblem> lacks_of_rights() {
+  std::vector<SetupProblem> lacks;
   const int priority = RealTimeOptions{}.priority;
   if (const int error = fifo_error(priority); error != 0) {
     lacks.push_back({"SCHED_FIFO " + std::to_string(priority) + ": " +

@@ -25,19 +25,19 @@ struct DeviceNode {
 [[nodiscard]] std::vector<DeviceNode> list_device_nodes(const std::filesystem::path& root = "/");
 
 /// One thing that a device or the servo lacks on this machine, and the command that provides it.
-struct Lack {
+struct SetupProblem {
   std::string what;
   std::string cure;
 };
 
 /// What keeps this user from a device: no node, or no right to it. `which`: only this kind, and its
 /// absence is a lack; if empty, rights to the connected ones. `root` as above.
-[[nodiscard]] std::vector<Lack> lacks_of_nodes(std::optional<Personality> which,
-                                               std::span<const DeviceNode> nodes,
-                                               const std::filesystem::path& root = "/");
+[[nodiscard]] std::vector<SetupProblem> lacks_of_nodes(std::optional<Personality> which,
+                                                       std::span<const DeviceNode> nodes,
+                                                       const std::filesystem::path& root = "/");
 
 /// What the servo thread lacks: real-time priority, locked memory. Tries both on threads and limits
 /// of this process, and restores them.
-[[nodiscard]] std::vector<Lack> lacks_of_rights();
+[[nodiscard]] std::vector<SetupProblem> lacks_of_rights();
 
 }  // namespace kerf

@@ -162,7 +162,7 @@ void check_options(const ControllerOptions& options, const LoadedScene& scene) {
 
 void check_budget(const ControllerOptions& options, const LoadedScene& scene,
                   const SceneCosts& costs) {
-  const std::string refusal = options.virtual_time ? "" : over_budget(scene, costs);
+  const std::string refusal = options.virtual_time ? "" : budget_error(scene, costs);
   if (!refusal.empty()) throw std::runtime_error(refusal);
 }
 

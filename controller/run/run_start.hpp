@@ -35,7 +35,7 @@ struct PlannedScene {
 };
 
 /// Loads and plans the scene of the options; warns of own laws that fail their trial. Throws
-/// SceneError, also if a signal requests the end meanwhile.
+/// LoadError, also if a signal requests the end meanwhile.
 [[nodiscard]] PlannedScene load_and_plan(const ControllerOptions& options);
 
 /// Refuses impossible options, also those that matter only at the end of a run.

@@ -44,7 +44,7 @@ struct ToolWork {
   double us = 0;  ///< over all volumes
 };
 
-std::vector<ToolWork> works_of(const Explanation& explanation) {
+std::vector<ToolWork> works_of(const CostReport& explanation) {
   std::vector<ToolWork> works;
   for (const ExplainedTick& tick : explanation.ticks) {
     if (works.empty() || works.back().tool != tick.tool) works.push_back({tick.tool, 0});
@@ -82,7 +82,7 @@ std::string tick_text(const ExplainedTick& tick, double factor) {
          format("%14.2f%10.2f\n", tick.time.median_us, tick.time.p99_us);
 }
 
-std::string budget_text(const Explanation& e) {
+std::string budget_text(const CostReport& e) {
   std::string text = "\nbudget: work of one tool in all volumes, at most " +
                      format("%.1f us: half a tick at %d Hz\n", e.budget_us, e.rate_hz);
   for (const ToolWork& work : works_of(e)) {
@@ -118,18 +118,18 @@ std::vector<ArrayBytes> segment_arrays(const SegmentPlan& plan, const LoadedScen
   return arrays;
 }
 
-Explanation explain(const LoadedScene& scene, CompiledScene& servo, const SegmentPlan& segment) {
+CostReport explain(const LoadedScene& scene, CompiledScene& servo, const SegmentPlan& segment) {
   const SceneCosts& costs = servo.costs();
-  Explanation explanation{.scene = scene.path,
-                          .numeric = std::string(word_of(scene.servo.numeric)),
-                          .cut = std::string(word_of(scene.cut.model)),
-                          .machine = processor_name(),
-                          .rate_hz = scene.servo.rate_hz,
-                          .budget_us = work_budget_us(scene),
-                          .ticks = {},
-                          .arrays = costs.arrays,
-                          .gain = gain_margin(scene),
-                          .gain_lines = {}};
+  CostReport explanation{.scene = scene.path,
+                         .numeric = std::string(word_of(scene.servo.numeric)),
+                         .cut = std::string(word_of(scene.cut.model)),
+                         .machine = processor_name(),
+                         .rate_hz = scene.servo.rate_hz,
+                         .budget_us = work_budget_us(scene),
+                         .ticks = {},
+                         .arrays = costs.arrays,
+                         .gain = gain_margin(scene),
+                         .gain_lines = {}};
   explanation.gain_lines = gain_lines(scene, explanation.gain);
   for (ArrayBytes& array : segment_arrays(segment, scene))
     explanation.arrays.push_back(std::move(array));
@@ -146,7 +146,7 @@ Explanation explain(const LoadedScene& scene, CompiledScene& servo, const Segmen
   return explanation;
 }
 
-std::string explanation_text(const Explanation& e) {
+std::string explanation_text(const CostReport& e) {
   std::string text = e.scene + ": " + std::to_string(e.rate_hz) + " Hz, " + e.numeric +
                      " numbers, cut " + e.cut + "\n\n";
   text += format("  %-14s%12s%12s%12s%14s%14s%10s\n", "", "at most", "work us", "timed",
@@ -164,7 +164,7 @@ std::string explanation_text(const Explanation& e) {
   return text;
 }
 
-std::string explanation_json(const Explanation& e) {
+std::string explanation_json(const CostReport& e) {
   const auto figures = [&](Json json, const auto& most, const auto& timed) {
     json["operations"] = operations(most);
     json["work_us"] = work_us(most);
@@ -372,8 +372,8 @@ void check_run_files(const ControllerOptions& options, const LoadedScene& scene)
 std::string refused_gains(const ControllerOptions& options, const LoadedScene& scene,
                           const GainMargin& margin) {
   if (options.virtual_time) return "";
-  const std::string above = options.unchecked_gain ? "" : above_device(scene);
-  return above.empty() ? gain_refusal(scene, margin) : above;
+  const std::string above = options.unchecked_gain ? "" : device_limit_error(scene);
+  return above.empty() ? gain_error(scene, margin) : above;
 }
 
 void explain_scene(const ControllerOptions& options, LoadedScene& scene, CompiledScene& servo) {
@@ -383,10 +383,10 @@ void explain_scene(const ControllerOptions& options, LoadedScene& scene, Compile
   const SegmentPlan segment = plan_segment(segment_spec(scene, canonical_json(scene), 0));
   check_memory(scene, servo.costs(), 0);
   servo.take(scene);
-  const Explanation explanation = explain(scene, servo, segment);
+  const CostReport explanation = explain(scene, servo, segment);
   std::fputs(explanation_text(explanation).c_str(), stdout);
   if (!options.report.empty()) write_new_file(options.report, explanation_json(explanation));
-  std::string refusal = over_budget(scene, servo.costs());
+  std::string refusal = budget_error(scene, servo.costs());
   if (refusal.empty()) refusal = refused_gains(options, scene, explanation.gain);
   if (!refusal.empty()) throw std::runtime_error(refusal);
 }

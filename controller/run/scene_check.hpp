@@ -24,7 +24,7 @@ struct ExplainedTick {
 };
 
 /// The figures of `--explain`.
-struct Explanation {
+struct CostReport {
   std::string scene, numeric, cut, machine;
   /// Time here over work on the reference machine, of all timed ticks. The work of a stage
   /// times this predicts its time here.
@@ -43,14 +43,14 @@ struct Explanation {
 
 /// Times every tool in every volume of a scene that `servo` has taken; see
 /// `CompiledScene::time_tick`.
-[[nodiscard]] Explanation explain(const LoadedScene& scene, CompiledScene& servo,
-                                  const SegmentPlan& segment);
+[[nodiscard]] CostReport explain(const LoadedScene& scene, CompiledScene& servo,
+                                 const SegmentPlan& segment);
 
 /// For a person.
-[[nodiscard]] std::string explanation_text(const Explanation& explanation);
+[[nodiscard]] std::string explanation_text(const CostReport& explanation);
 
 /// The same figures as JSON; ends with a newline.
-[[nodiscard]] std::string explanation_json(const Explanation& explanation);
+[[nodiscard]] std::string explanation_json(const CostReport& explanation);
 
 /// The lines that the demo script passes to the emulator.
 [[nodiscard]] std::string hand_lines(const LoadedScene& scene);
@@ -67,11 +67,11 @@ struct Explanation {
                                                const LoadedScene& scene, std::size_t v);
 
 /// Refuses a report that could not be written, or would replace a file of the scene. Called first,
-/// since a run that is stopped early writes it too. Throws FileError or SceneError.
+/// since a run that is stopped early writes it too. Throws FileError or LoadError.
 void check_report(const ControllerOptions& options);
 
 /// Refuses output files that could not be written at the end, or would replace a file of the scene.
-/// Throws FileError or SceneError.
+/// Throws FileError or LoadError.
 void check_run_files(const ControllerOptions& options, const LoadedScene& scene);
 
 /// Why this scene may not run: gains above the largest of its device (unless `--unchecked-gain`),

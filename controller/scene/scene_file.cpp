@@ -37,7 +37,7 @@ TomlValue value_of(const std::string& text) {
 }
 
 /// The value; a text if TOML cannot read it. Line 0: it is in no file.
-TomlNode value_node(const SceneSetting& setting) {
+TomlNode value_node(const KeyOverride& setting) {
   TomlNode node;
   try {
     node = parse_toml("v = " + setting.value).entries.at(0);
@@ -62,7 +62,7 @@ TomlNode& entry_of(TomlNode& table, std::string_view key) {
 
 }  // namespace
 
-SceneSetting parse_setting(std::string_view text, SceneKeys keys) {
+KeyOverride parse_setting(std::string_view text, SceneKeys keys) {
   const std::size_t equals = text.find('=');
   const std::string place = "--set " + one_line(text);
   if (equals == text.npos || equals == 0 || equals + 1 == text.size() || one_line(text) != text) {
@@ -81,8 +81,8 @@ SceneSetting parse_setting(std::string_view text, SceneKeys keys) {
   return {std::string(key), std::string(text.substr(equals + 1))};
 }
 
-void put_settings(std::span<const SceneSetting> settings, TomlNode& root) {
-  for (const SceneSetting& setting : settings) {
+void override_keys(std::span<const KeyOverride> settings, TomlNode& root) {
+  for (const KeyOverride& setting : settings) {
     const std::size_t dot = setting.key.find('.'), last = setting.key.rfind('.');
     const std::string table = setting.key.substr(0, dot), key = setting.key.substr(last + 1);
     const auto put = [&](TomlNode& into) {
@@ -108,7 +108,7 @@ void put_settings(std::span<const SceneSetting> settings, TomlNode& root) {
 namespace {
 
 // Rules between keys, which no single row of the table can hold, and values that follow from
-// others. `table` has been read into the value beside it. Each throws SceneError.
+// others. `table` has been read into the value beside it. Each throws LoadError.
 
 std::string stem_of(const std::string& file) {
   return std::filesystem::path(file).stem().string();
@@ -382,10 +382,10 @@ Scene read_scene(const TomlNode& root, const std::filesystem::path& path, SceneK
 }  // namespace
 
 Scene parse_scene(std::string_view text, const std::filesystem::path& path, SceneKeys keys,
-                  std::span<const SceneSetting> settings) {
+                  std::span<const KeyOverride> settings) {
   try {
     TomlNode root = parse_toml(text);
-    put_settings(settings, root);
+    override_keys(settings, root);
     spell_out_burs(root, path.string());
     return read_scene(root, path, keys);
   } catch (const TomlError& error) {
@@ -394,10 +394,10 @@ Scene parse_scene(std::string_view text, const std::filesystem::path& path, Scen
   }
 }
 
-Scene parse_scene_file(const std::filesystem::path& path, std::span<const SceneSetting> settings) {
+Scene parse_scene_file(const std::filesystem::path& path, std::span<const KeyOverride> settings) {
   constexpr std::uintmax_t kLargestFile = std::uintmax_t{1} << 20;
   std::error_code fault;
-  if (const std::string why = why_unreachable(path); !why.empty()) refuse(path.string(), why);
+  if (const std::string why = access_error(path); !why.empty()) refuse(path.string(), why);
   if (!exists(symlink_status(path, fault))) {
     refuse(path.string(), ": no such scene file; name one, for example scenes/phantom.toml");
   }
@@ -412,7 +412,7 @@ Scene parse_scene_file(const std::filesystem::path& path, std::span<const SceneS
   if (!file) {
     const int error = errno;
     refuse(path.string(), ": " + std::generic_category().message(error) + "; " +
-                              way_out_of(error, "check its permissions"));
+                              remedy_for(error, "check its permissions"));
   }
   std::string text;
   try {
@@ -428,7 +428,7 @@ void check_hand_script(const SceneSettings& scene) {
   if (scene.hand_script.empty() || std::filesystem::is_regular_file(scene.hand_script, fault)) {
     return;
   }
-  if (const std::string why = why_unreachable(scene.hand_script); !why.empty()) {
+  if (const std::string why = access_error(scene.hand_script); !why.empty()) {
     refuse(scene.hand_place, why);
   }
   refuse(scene.hand_place,

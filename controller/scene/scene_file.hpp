@@ -15,30 +15,30 @@
 namespace kerf {
 
 /// A key of a scene that replaces the value of the file: `table.key=VALUE` on a command line.
-struct SceneSetting {
+struct KeyOverride {
   std::string key;    ///< `table.key`
   std::string value;  ///< as TOML writes it; text needs no quotes
 };
 
-/// Reads `table.key=VALUE`; throws SceneError for another form or a key that no scene has.
-[[nodiscard]] SceneSetting parse_setting(std::string_view text, SceneKeys keys = scene_keys());
+/// Reads `table.key=VALUE`; throws LoadError for another form or a key that no scene has.
+[[nodiscard]] KeyOverride parse_setting(std::string_view text, SceneKeys keys = scene_keys());
 
 /// Replaces the values of the file by the settings, in order; every `[[table]]` of the file gets
-/// the value of its key. The values are checked with the scene. Throws SceneError.
-void put_settings(std::span<const SceneSetting> settings, TomlNode& root);
+/// the value of its key. The values are checked with the scene. Throws LoadError.
+void override_keys(std::span<const KeyOverride> settings, TomlNode& root);
 
 /// Reads TOML text. `settings` replace values of it. No file is opened: `path` appears in messages
-/// and in the scene, and the script of the hand is relative to its folder. Throws SceneError, one
+/// and in the scene, and the script of the hand is relative to its folder. Throws LoadError, one
 /// line with the line number, for anything that is not a valid scene. Any thread; load time only.
 [[nodiscard]] Scene parse_scene(std::string_view text, const std::filesystem::path& path,
                                 SceneKeys keys = scene_keys(),
-                                std::span<const SceneSetting> settings = {});
+                                std::span<const KeyOverride> settings = {});
 
 /// Reads a scene file of at most 1 MiB.
 [[nodiscard]] Scene parse_scene_file(const std::filesystem::path& path,
-                                     std::span<const SceneSetting> settings = {});
+                                     std::span<const KeyOverride> settings = {});
 
-/// Throws SceneError if the scene names a hand script that is no file. Loading a scene does not
+/// Throws LoadError if the scene names a hand script that is no file. Loading a scene does not
 /// check this, since only an emulated hand needs the script.
 void check_hand_script(const SceneSettings& scene);
 

@@ -55,7 +55,7 @@ inline constexpr double kShankOutMm = 8;
 
 /// Gives each [[tool]] with a `bur = "001 014"` (head and size) the keys of that bur: shape,
 /// radius_mm, shaft_radius_mm, shaft_length_mm and a name, unless the table has its own. Throws
-/// SceneError for an unknown bur, and if the table names a shape or a size beside it.
+/// LoadError for an unknown bur, and if the table names a shape or a size beside it.
 void spell_out_burs(TomlNode& root, const std::string& file);
 
 }  // namespace kerf

@@ -10,7 +10,7 @@
 
 namespace kerf {
 
-/// One table of a scene file beside its rows of the table of keys. Each fault throws SceneError,
+/// One table of a scene file beside its rows of the table of keys. Each fault throws LoadError,
 /// one line: `file:line: table.key = value is ..; way out`.
 ///
 /// Refers to the parsed file and to the rows, which must outlive it. Load time only.
@@ -43,7 +43,7 @@ class SceneTable {
   std::vector<SceneKey> keys_;
 };
 
-/// Throws SceneError for the first name in the file that no row has, and for a table of another
+/// Throws LoadError for the first name in the file that no row has, and for a table of another
 /// form than in the table of keys: with line and column, with similar keys of the same table and
 /// with the same name in other tables. Load time.
 void check_names(const TomlNode& root, const std::string& file, SceneKeys keys);

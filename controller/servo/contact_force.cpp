@@ -42,7 +42,7 @@ ProxyContact<N> follow_tool(const ServoPlan<N>& plan, const SweptTool<N>& tool,
   if (tool.behind.count == 0) {
     return with(ContactQuery<N>(*plan.kernels, tool.point_shell, in_volumes(state.volumes)));
   }
-  std::array<std::span<const ContactVolume<N>>, kMostBehind> behind;
+  std::array<std::span<const ContactVolume<N>>, kMaxShaftParts> behind;
   std::ranges::transform(state.behind, behind.begin(), in_volumes);
   return with(ToolQuery<N>(*plan.kernels, tool.point_shell, in_volumes(state.volumes), tool.behind,
                            behind));
@@ -50,8 +50,8 @@ ProxyContact<N> follow_tool(const ServoPlan<N>& plan, const SweptTool<N>& tool,
 
 /// Lists the planes that bear a load, for a force of `force_n`.
 template <class N>
-void tell_planes(const ContactPlan<N>& contact, const ProxyContact<N>& felt,
-                 typename N::Real force_n, ToolContact<N>& tool) noexcept {
+void write_planes(const ContactPlan<N>& contact, const ProxyContact<N>& felt,
+                  typename N::Real force_n, ToolContact<N>& tool) noexcept {
   using Real = typename N::Real;
   for (std::size_t i = 0; i < felt.planes.count; ++i) {
     if (felt.part[i] <= Real(0)) continue;
@@ -80,9 +80,9 @@ void split_spring(DeviceVec<typename N::Real> spring_n, const ProxyContact<N>& f
 }  // namespace
 
 template <class N>
-SweptForce<N> feel_swept(const ServoPlan<N>& plan, ServoState<N>& state,
-                         WorldVec<typename N::Real> tip_mm, const Rotation<N>& rotation,
-                         DeviceVec<typename N::Real> velocity_mm_per_s) noexcept {
+SweptForce<N> proxy_force(const ServoPlan<N>& plan, ServoState<N>& state,
+                          WorldVec<typename N::Real> tip_mm, const Rotation<N>& rotation,
+                          DeviceVec<typename N::Real> velocity_mm_per_s) noexcept {
   using Real = typename N::Real;
   const ContactPlan<N>& contact = plan.contact;
   const SweptTool<N>& tool = plan.tools[state.active_tool].swept;
@@ -93,7 +93,7 @@ SweptForce<N> feel_swept(const ServoPlan<N>& plan, ServoState<N>& state,
 
   ProxyPose<N> goal;
   goal.centre = scaled(relabel<ContactSpace>(tip_mm - contact.origin_mm), contact.units_per_mm);
-  if (tool.turned) goal.turn = turn_of<N>(rotation.row);
+  if (tool.turned) goal.turn = orientation_of<N>(rotation.row);
 
   SweptForce<N> out;
   const ProxyContact<N> felt = follow_tool(plan, tool, state.contact, goal, out.queried);
@@ -102,13 +102,13 @@ SweptForce<N> feel_swept(const ServoPlan<N>& plan, ServoState<N>& state,
   out.force_n = plan.force_law.given()
                     ? plan.force_law(state.force_law, {state.tip_mm, tip_mm, velocity_mm_per_s,
                                                        spring_mm, relabel<DeviceSpace>(felt.press)})
-                    : coupling_force(contact.coupling, spring_mm, velocity_mm_per_s);
+                    : virtual_coupling_force(contact.coupling, spring_mm, velocity_mm_per_s);
   // The force of a law has no other part.
   const bool whole =
       plan.force_law.given() || contact.coupling.damping_ns_per_mm == typename N::Unit{};
   const auto spring_n =
       whole ? out.force_n
-            : coupling_force<N>({contact.coupling.stiffness_n_per_mm, {}}, spring_mm, {});
+            : virtual_coupling_force<N>({contact.coupling.stiffness_n_per_mm, {}}, spring_mm, {});
   if (tool.proxy.friction == typename N::Unit{}) {
     out.spring_n = spring_n;
   } else {
@@ -120,30 +120,30 @@ SweptForce<N> feel_swept(const ServoPlan<N>& plan, ServoState<N>& state,
   if (tool.turned) out.tool.rotation = {rows_of(felt.pose.turn)};
   out.tool.normal = relabel<WorldSpace>(felt.normal);
   out.tool.press = relabel<WorldSpace>(felt.press);
-  out.tool.head_share = felt.head_share;
+  out.tool.head_fraction = felt.head_fraction;
   const Real force_n = norm(out.force_n);
   out.tool.head_arm_mm = at_device(contact, felt.head_arm);
-  tell_planes(contact, felt, force_n, out.tool);
-  out.behind_n = multiply<Real>(felt.behind_share, force_n);
+  write_planes(contact, felt, force_n, out.tool);
+  out.shaft_force_n = multiply<Real>(felt.shaft_fraction, force_n);
   out.torque_n_mm = at_device(contact, felt.moment_arm) * force_n;
   return out;
 }
 
 template <class N>
-ToolForces<N> feel_and_cut(const ServoPlan<N>& plan, ServoState<N>& state,
-                           WorldVec<typename N::Real> tip_mm, const Rotation<N>& rotation,
-                           DeviceVec<typename N::Real> velocity_mm_per_s) noexcept {
+ToolForces<N> contact_and_cut(const ServoPlan<N>& plan, ServoState<N>& state,
+                              WorldVec<typename N::Real> tip_mm, const Rotation<N>& rotation,
+                              DeviceVec<typename N::Real> velocity_mm_per_s) noexcept {
   const ToolPlan<N>& tool = plan.tools[state.active_tool];
   ToolForces<N> forces;
   if (plan.contact.swept) {
-    const SweptForce<N> felt = feel_swept(plan, state, tip_mm, rotation, velocity_mm_per_s);
+    const SweptForce<N> felt = proxy_force(plan, state, tip_mm, rotation, velocity_mm_per_s);
     forces.contact_n = felt.force_n;
     forces.spring_n = felt.spring_n;
     forces.friction_n = felt.friction_n;
     forces.proxy_offset_mm = felt.offset_mm;
     forces.tip_torque_n_mm = felt.torque_n_mm;
     forces.tool = felt.tool;
-    forces.behind_n = felt.behind_n;
+    forces.shaft_force_n = felt.shaft_force_n;
     forces.queried = felt.queried;
     if (plan.force_cut.on) {
       forces.modification_n = felt_friction(plan, state, felt.tool);
@@ -157,7 +157,7 @@ ToolForces<N> feel_and_cut(const ServoPlan<N>& plan, ServoState<N>& state,
                            tool_pose(plan.volumes[v], tool, tool.in_volume[v], tip_mm, rotation)};
     if (plan.cutting) keep_bricks(plan, state, v, at.pose.centre_vox);
     const VolumeForces<N> in_volume =
-        by_method<N>(tool.in_volume[v].method, [&](auto step) { return step.feel_and_cut(at); });
+        by_method<N>(tool.in_volume[v].method, [&](auto step) { return step.contact_and_cut(at); });
     forces.contact_n = forces.contact_n - in_volume.contact_n;
     forces.modification_n = forces.modification_n - in_volume.modification_n;
     forces.removed[plan.volumes[v].scene_index] = in_volume.removed;
@@ -166,11 +166,11 @@ ToolForces<N> feel_and_cut(const ServoPlan<N>& plan, ServoState<N>& state,
   return forces;
 }
 
-#define KERF_INSTANTIATE(N)                                                                   \
-  template SweptForce<N> feel_swept(const ServoPlan<N>&, ServoState<N>&, WorldVec<N::Real>,   \
-                                    const Rotation<N>&, DeviceVec<N::Real>) noexcept;         \
-  template ToolForces<N> feel_and_cut(const ServoPlan<N>&, ServoState<N>&, WorldVec<N::Real>, \
-                                      const Rotation<N>&, DeviceVec<N::Real>) noexcept;
+#define KERF_INSTANTIATE(N)                                                                      \
+  template SweptForce<N> proxy_force(const ServoPlan<N>&, ServoState<N>&, WorldVec<N::Real>,     \
+                                     const Rotation<N>&, DeviceVec<N::Real>) noexcept;           \
+  template ToolForces<N> contact_and_cut(const ServoPlan<N>&, ServoState<N>&, WorldVec<N::Real>, \
+                                         const Rotation<N>&, DeviceVec<N::Real>) noexcept;
 KERF_INSTANTIATE(FixedNumbers)
 KERF_INSTANTIATE(FloatNumbers)
 KERF_INSTANTIATE(DoubleNumbers)

@@ -32,7 +32,7 @@ struct ToolContact {
   Rotation<N> rotation = identity_rotation<N>();  ///< of its samples
   WorldVec<typename N::Unit> normal{};            ///< out of the solid, of the head; 0 in air
   WorldVec<typename N::Unit> press{};             ///< the same of the whole tool
-  typename N::Unit head_share{1};                 ///< of the force along `press`
+  typename N::Unit head_fraction{1};              ///< of the force along `press`
   DeviceVec<typename N::Real> head_arm_mm{};      ///< from its centre to the load of the head
   std::array<PressedPlane<N>, kMaxPlanes> planes{};
   std::size_t plane_count = 0;
@@ -40,8 +40,8 @@ struct ToolContact {
 
 /// A position of the world in a volume.
 template <class N>
-[[nodiscard]] VoxelVec<typename N::Real> place_in(const VolumePlan<N>& volume,
-                                                  WorldVec<typename N::Real> at_mm) noexcept {
+[[nodiscard]] VoxelVec<typename N::Real> voxel_position(const VolumePlan<N>& volume,
+                                                        WorldVec<typename N::Real> at_mm) noexcept {
   return volume.voxel_from_world * (at_mm - volume.position_mm);
 }
 
@@ -53,7 +53,7 @@ template <class N>
                                     WorldVec<typename N::Real> tip_mm,
                                     const Rotation<N>& rotation) noexcept {
   ToolPose<N> pose;
-  pose.centre_vox = place_in(volume, tip_mm);
+  pose.centre_vox = voxel_position(volume, tip_mm);
   pose.step = in_volume.unturned_step;
   if (tool.round || !tool.turns) return pose;
   for (std::size_t i = 0; i < 3; ++i) {
@@ -83,8 +83,8 @@ struct SweptForce {
   WorldVec<typename N::Real> offset_mm;     ///< from the hand's tip to the proxy's
   DeviceVec<typename N::Real> torque_n_mm;  ///< of the contact about the tool's centre
   ToolContact<N> tool;
-  typename N::Real behind_n{};  ///< load of shaft and handpiece, at the device port
-  std::int64_t queried = 0;     ///< samples read, as sample_reader.hpp counts
+  typename N::Real shaft_force_n{};  ///< load of shaft and handpiece, at the device port
+  std::int64_t queried = 0;          ///< samples read, as sample_reader.hpp counts
 };
 
 /// One tick: the proxy of the active tool follows the hand, and the coupling or a law pulls the
@@ -93,10 +93,10 @@ struct SweptForce {
 /// `state.contact`, and `state.force_law` if the scene names a force law, whose force may not be
 /// finite.
 template <class N>
-[[nodiscard]] SweptForce<N> feel_swept(const ServoPlan<N>& plan, ServoState<N>& state,
-                                       WorldVec<typename N::Real> tip_mm,
-                                       const Rotation<N>& rotation,
-                                       DeviceVec<typename N::Real> velocity_mm_per_s) noexcept;
+[[nodiscard]] SweptForce<N> proxy_force(const ServoPlan<N>& plan, ServoState<N>& state,
+                                        WorldVec<typename N::Real> tip_mm,
+                                        const Rotation<N>& rotation,
+                                        DeviceVec<typename N::Real> velocity_mm_per_s) noexcept;
 
 /// Contact and modification force at the device port, before any limit, and the removal by overlap
 /// at this pose. If force cuts, the modification force is its friction, and the cut comes later.
@@ -109,7 +109,7 @@ struct ToolForces {
   /// Likewise; of both forces about the tool's centre.
   DeviceVec<typename N::Real> tip_torque_n_mm;
   ToolContact<N> tool;                         ///< likewise
-  typename N::Real behind_n{};                 ///< likewise: of shaft and handpiece
+  typename N::Real shaft_force_n{};            ///< likewise: of shaft and handpiece
   std::int64_t queried = 0;                    ///< likewise: samples, as sample_reader.hpp counts
   std::array<Removed, kMaxVolumes> removed{};  ///< by volume of the scene
 };
@@ -117,9 +117,9 @@ struct ToolForces {
 /// Contact force of the active tool in all solid volumes; then, if the plan cuts by overlap, the
 /// modification force from the same densities, and only then the removal.
 template <class N>
-[[nodiscard]] ToolForces<N> feel_and_cut(const ServoPlan<N>& plan, ServoState<N>& state,
-                                         WorldVec<typename N::Real> tip_mm,
-                                         const Rotation<N>& rotation,
-                                         DeviceVec<typename N::Real> velocity_mm_per_s) noexcept;
+[[nodiscard]] ToolForces<N> contact_and_cut(const ServoPlan<N>& plan, ServoState<N>& state,
+                                            WorldVec<typename N::Real> tip_mm,
+                                            const Rotation<N>& rotation,
+                                            DeviceVec<typename N::Real> velocity_mm_per_s) noexcept;
 
 }  // namespace kerf

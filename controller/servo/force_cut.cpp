@@ -27,10 +27,10 @@ struct CoveredVolumes {
 
 /// The load of each material, added up contact by contact.
 template <class N>
-class PressShares {
+class LoadDistribution {
  public:
-  PressShares(const ServoPlan<N>& plan, const ServoState<N>& state,
-              const CoveredVolumes<N>& covered) noexcept
+  LoadDistribution(const ServoPlan<N>& plan, const ServoState<N>& state,
+                   const CoveredVolumes<N>& covered) noexcept
       : plan_(plan), state_(state), covered_(covered) {}
 
   /// Adds a contact that bears `load_n`; `form_in(v)` is its form in volume v. Adds nothing if no
@@ -82,10 +82,10 @@ class PressShares {
   [[nodiscard]] static CutWeight<N> portion_of(typename N::Real load_n, CutWeight<N> part,
                                                CutWeight<N> whole) noexcept {
     if constexpr (N::kIsFixed) {
-      return static_cast<CutWeight<N>>(share_of<N>(part, whole)) *
+      return static_cast<CutWeight<N>>(fraction_of<N>(part, whole)) *
              static_cast<CutWeight<N>>(load_n.raw());
     } else {
-      return share_of<N>(part, whole) * load_n;
+      return fraction_of<N>(part, whole) * load_n;
     }
   }
 
@@ -105,19 +105,18 @@ void find_loads(const ServoPlan<N>& plan, const ServoState<N>& state,
   using Real = typename N::Real;
   using Ratio = typename N::Ratio;
   const ToolPlan<N>& tool = plan.tools[state.active_tool];
-  PressShares<N> shares(plan, state, covered);
+  LoadDistribution<N> shares(plan, state, covered);
   for (std::size_t i = 0; i < at.plane_count; ++i) {
     const PressedPlane<N>& plane = at.planes[i];
     if (plane.behind) continue;
     const Real arm_mm =
         along<N>(relabel<ContactSpace>(plane.normal), relabel<ContactSpace>(plane.arm_mm)) *
         plan.workspace_scale;
-    const BearingPlane<N> bears{relabel<WorldSpace>(plane.normal),
-                                tool.round ? Ratio(-1) : Ratio(arm_mm / tool.rim_mm),
-                                tool.steepness};
+    const LoadPlane<N> bears{relabel<WorldSpace>(plane.normal),
+                             tool.round ? Ratio(-1) : Ratio(arm_mm / tool.rim_mm), tool.steepness};
     shares.add(plane.load_n, [&](std::size_t v) {
-      return ahead_form<N>(place_in(plan.volumes[v], centre_mm), tool.in_volume[v].rims_from_voxel,
-                           bears);
+      return ahead_form<N>(voxel_position(plan.volumes[v], centre_mm),
+                           tool.in_volume[v].rims_from_voxel, bears);
     });
   }
   if (!shares.some()) {
@@ -155,7 +154,7 @@ template <class N>
     covered.in[v] = cover(plan, state, v, centre_mm, at);
     for (const CutWeight<N> weight : covered.in[v].weight) materials += weight > 0 ? 1 : 0;
   }
-  const PressShares<N> by_weight(plan, state, covered);
+  const LoadDistribution<N> by_weight(plan, state, covered);
   for (std::size_t v = 0; v < plan.volume_count; ++v) {
     covered.borne[v] = by_weight.in_largest_voxels(covered.in[v].whole, v);
     covered.whole += covered.borne[v];
@@ -199,7 +198,7 @@ CuttingFriction<N> press_on_volumes(const ServoPlan<N>& plan, ServoState<N>& sta
     cut.forbidden |= touched_forbidden(volume, covered.in[v]);
     const Real press_n =
         multiply<Real>(unit_share_of<N>(covered.borne[v], covered.whole), cut.press_n);
-    if (drive > 0) keep_bricks(plan, state, v, place_in(plan.volumes[v], centre_mm));
+    if (drive > 0) keep_bricks(plan, state, v, voxel_position(plan.volumes[v], centre_mm));
     const SurfaceDrag<N>& drag = covered.in[v].drag;
     friction.add(rules.friction, press_n, tool.round ? ball_drag<N>(normal, drag.arm) : drag);
     const PrestonOutcome<N> out = cut_by_force(volume, drive, state.volumes[v].density,
@@ -246,7 +245,7 @@ ForceCut<N> cut_by_sent_force(const ServoPlan<N>& plan, ServoState<N>& state,
   ForceCutState<N>& memory = state.force_cut;
   ForceCut<N> cut;
   const Real along_n = along<N>(relabel<ContactSpace>(at.press), relabel<ContactSpace>(sent_n));
-  cut.press_n = std::max(Real(0), multiply<Real>(at.head_share, along_n) / plan.workspace_scale);
+  cut.press_n = std::max(Real(0), multiply<Real>(at.head_fraction, along_n) / plan.workspace_scale);
   CuttingFriction<N> friction;
   if (cut.press_n > Real(0)) friction = press_on_volumes(plan, state, at, cut);
   const bool turns = rules.spindle.free_ratio > typename N::Unit{};

@@ -50,7 +50,7 @@ void cut(const VolumeTick<N>& at, std::span<const Gradient<N>> gradient,
 }  // namespace
 
 template <class N>
-VolumeForces<N> AlignedStep<N>::feel_and_cut(const VolumeTick<N>& at) noexcept {
+VolumeForces<N> AlignedStep<N>::contact_and_cut(const VolumeTick<N>& at) noexcept {
   const AlignedTick tick = aligned_tick(at);
   VolumeForces<N> forces;
   if (!at.plan.contact.swept) {
@@ -74,7 +74,7 @@ template struct AlignedStep<FixedNumbers>;
 
 /// Fixed point gathers only if nothing is cut.
 template <class N>
-VolumeForces<N> GatherStep<N>::feel_and_cut(const VolumeTick<N>& at) noexcept {
+VolumeForces<N> GatherStep<N>::contact_and_cut(const VolumeTick<N>& at) noexcept {
   const std::span<const Gradient<N>> gradient = at.memory().gradient;
   const ToolInVolume<N>& in_volume = at.in_volume();
   VolumeForces<N> forces;
@@ -109,7 +109,7 @@ template struct GatherStep<DoubleNumbers>;
 /// Both of the paper's forces from the same sums, then the removal. Only for scenes that cut by
 /// overlap.
 template <class N>
-VolumeForces<N> SplatStep<N>::feel_and_cut(const VolumeTick<N>& at) noexcept {
+VolumeForces<N> SplatStep<N>::contact_and_cut(const VolumeTick<N>& at) noexcept {
   const ToolInVolume<N>& in_volume = at.in_volume();
   const SplatTick tick = splat_tick(at);
   const SplatTick::Felt felt = tick.press(in_volume.overlap_ratio);
@@ -132,7 +132,7 @@ Covered<N> SplatStep<N>::cover(const VolumeTick<N>& at, const CoverList<N>& list
 template struct SplatStep<FixedNumbers>;
 
 template <class N>
-VolumeForces<N> SurfaceStep<N>::feel_and_cut(const VolumeTick<N>& /*at*/) noexcept {
+VolumeForces<N> SurfaceStep<N>::contact_and_cut(const VolumeTick<N>& /*at*/) noexcept {
   return {};
 }
 

@@ -58,14 +58,14 @@ struct CoverList {
 /// The steps of the methods; method_step.cpp instantiates each for the numbers that it serves.
 /// Servo thread; no heap.
 ///
-/// `feel_and_cut`: contact, unless the proxy gives it; then the modification force and the removal,
-/// if overlap cuts. `cover`: the covered voxels, for a cut by force.
-#define KERF_STEP(name, Step, serves)                                                    \
-  template <class N>                                                                     \
-  struct Step {                                                                          \
-    [[nodiscard]] static VolumeForces<N> feel_and_cut(const VolumeTick<N>& at) noexcept; \
-    [[nodiscard]] static Covered<N> cover(const VolumeTick<N>& at,                       \
-                                          const CoverList<N>& list) noexcept;            \
+/// `contact_and_cut`: contact, unless the proxy gives it; then the modification force and the
+/// removal, if overlap cuts. `cover`: the covered voxels, for a cut by force.
+#define KERF_STEP(name, Step, serves)                                                       \
+  template <class N>                                                                        \
+  struct Step {                                                                             \
+    [[nodiscard]] static VolumeForces<N> contact_and_cut(const VolumeTick<N>& at) noexcept; \
+    [[nodiscard]] static Covered<N> cover(const VolumeTick<N>& at,                          \
+                                          const CoverList<N>& list) noexcept;               \
   };
 KERF_METHODS(KERF_STEP)
 #undef KERF_STEP

@@ -142,14 +142,14 @@ struct ContactPlan {
   typename N::Ratio units_per_mm{};        ///< of the world
   typename N::Ratio device_mm_per_unit{};  ///< unit over workspace scale
   typename N::Ratio mm_per_unit{};         ///< of the world
-  Coupling<N> coupling;
+  VirtualCoupling<N> coupling;
 };
 
 /// The surface of a tool and the constants of its proxy.
 template <class N>
 struct SweptTool {
   PointShell<N> point_shell;  ///< of the head
-  PartsBehind<N> behind;
+  ShaftParts<N> behind;
   bool turned = false;  ///< by the stylus; else it keeps the world's axes, or is a ball alone
   ProxyPlan<N> proxy;
 };
@@ -173,7 +173,7 @@ struct ForceCutPlan {
   SpindlePlan<N> spindle;
   FrictionPlan<N> friction;
   std::array<PrestonPlan<N>, kMaxVolumes> volume{};
-  /// Size of a voxel over that of the largest, as a `share_of`.
+  /// Size of a voxel over that of the largest, as a `fraction_of`.
   std::array<CutBudget<N>, kMaxVolumes> voxel_share{};
 };
 

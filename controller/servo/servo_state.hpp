@@ -40,7 +40,8 @@ template <class N>
 struct ContactState {
   using Volumes = std::array<ContactVolume<N>, kMaxVolumes>;  ///< by index of the plan's volumes
   Volumes volumes{};
-  std::array<Volumes, kMostBehind> behind{};  ///< the same with places of the parts behind the head
+  std::array<Volumes, kMaxShaftParts>
+      behind{};  ///< the same with places of the parts behind the head
   ProxyState<N> proxy;
 };
 

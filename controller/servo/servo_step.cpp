@@ -123,7 +123,7 @@ void tell_removed(const std::array<Removed, kMaxVolumes>& removed, ServoOutput& 
 }
 
 template <class N>
-void tell_planes(const ToolContact<N>& tool, ServoOutput& out) noexcept {
+void write_planes(const ToolContact<N>& tool, ServoOutput& out) noexcept {
   static_assert(kMaxPlaneLoads == kMaxPlanes);
   for (std::size_t i = 0; i < tool.plane_count; ++i) {
     const PressedPlane<N>& plane = tool.planes[i];
@@ -167,7 +167,7 @@ void tell(const ServoPlan<N>& plan, ServoState<N>& state, const Sensed<N>& sense
 
 /// A force before its limits, and the contact of the tool.
 template <class N>
-struct Wanted {
+struct ForceRequest {
   DeviceVec<typename N::Real> force_n;
   ToolContact<N> tool;
   ForceParts<N> parts{};  ///< of the force before fading in
@@ -178,8 +178,8 @@ struct Wanted {
 /// wall when the force comes back, with a ramp. For a device that rests parked, or has lost its
 /// home, the search starts again.
 template <class N>
-void follow_unfelt(const ServoPlan<N>& plan, ServoState<N>& state, const Sensed<N>& sensed,
-                   ServoOutput& out) noexcept {
+void track_without_force(const ServoPlan<N>& plan, ServoState<N>& state, const Sensed<N>& sensed,
+                         ServoOutput& out) noexcept {
   if (!plan.contact.swept) return;
   const Phase phase = state.supervisor.phase;
   const bool begins = phase == Phase::off || phase == Phase::calibrating || sensed.docked;
@@ -188,7 +188,7 @@ void follow_unfelt(const ServoPlan<N>& plan, ServoState<N>& state, const Sensed<
     return;
   }
   out.samples_read =
-      feel_swept(plan, state, sensed.tip_mm, state.rotation, sensed.velocity_mm_per_s).queried;
+      proxy_force(plan, state, sensed.tip_mm, state.rotation, sensed.velocity_mm_per_s).queried;
   state.force_law.begin_anew();
   state.contact.proxy.ramp();
 }
@@ -196,8 +196,8 @@ void follow_unfelt(const ServoPlan<N>& plan, ServoState<N>& state, const Sensed<
 /// The force on the tool, and its removal by overlap. Without a usable pose the force of the last
 /// good report is held and then faded, and nothing is cut.
 template <class N>
-Wanted<N> wanted_force(const ServoPlan<N>& plan, ServoState<N>& state, const Sensed<N>& sensed,
-                       ServoOutput& out) noexcept {
+ForceRequest<N> wanted_force(const ServoPlan<N>& plan, ServoState<N>& state,
+                             const Sensed<N>& sensed, ServoOutput& out) noexcept {
   using Real = typename N::Real;
   Supervisor& supervisor = state.supervisor;
   const SafetyTiming& timing = plan.timing;
@@ -207,17 +207,17 @@ Wanted<N> wanted_force(const ServoPlan<N>& plan, ServoState<N>& state, const Sen
   state.contact_n = {};
   state.proxy_offset_mm = {};
   if (sensed.usable && (!supervisor.motors_on() || state.held())) {
-    follow_unfelt(plan, state, sensed, out);
+    track_without_force(plan, state, sensed, out);
     return {};
   }
   if (!supervisor.motors_on()) return {};
   if (!sensed.usable) {
-    return {state.held_force_n * share(stale_share(timing, supervisor.stale_ticks),
+    return {state.held_force_n * share(stale_fraction(timing, supervisor.stale_ticks),
                                        timing.zero_ticks - timing.hold_ticks),
             {}};
   }
   const ToolForces<N> forces =
-      feel_and_cut(plan, state, sensed.tip_mm, state.rotation, sensed.velocity_mm_per_s);
+      contact_and_cut(plan, state, sensed.tip_mm, state.rotation, sensed.velocity_mm_per_s);
   if (plan.force_law.given() && !all_finite(forces.contact_n)) {
     latch(Fault::force_law, supervisor);
     return {};
@@ -227,9 +227,9 @@ Wanted<N> wanted_force(const ServoPlan<N>& plan, ServoState<N>& state, const Sen
   out.samples_read = forces.queried;
   out.proxy_offset_mm = as_doubles(forces.proxy_offset_mm);
   out.tip_torque_n_mm = as_doubles(forces.tip_torque_n_mm);
-  tell_planes(forces.tool, out);
+  write_planes(forces.tool, out);
   out.contact_n = as_doubles(forces.contact_n);
-  out.shaft = forces.behind_n > Real(kContactThresholdN);
+  out.shaft = forces.shaft_force_n > Real(kContactThresholdN);
   out.modification_n = as_doubles(forces.modification_n);
   tell_removed(forces.removed, out);
   const DeviceVec<Real> felt_n = forces.contact_n + forces.modification_n;
@@ -249,7 +249,8 @@ Wanted<N> wanted_force(const ServoPlan<N>& plan, ServoState<N>& state, const Sen
 /// latches a fault.
 template <class N>
 DeviceVec<typename N::Real> force_to_send(const ServoPlan<N>& plan, ServoState<N>& state,
-                                          Wanted<N>& wanted, const Sensed<N>& sensed) noexcept {
+                                          ForceRequest<N>& wanted,
+                                          const Sensed<N>& sensed) noexcept {
   using Real = typename N::Real;
   const auto limited = [&](DeviceVec<Real> force_n, ThermalState<N>& thermal) {
     const auto limited_n =
@@ -279,7 +280,7 @@ DeviceVec<typename N::Real> force_to_send(const ServoPlan<N>& plan, ServoState<N
 
 /// Limits the force and turns it into motor counts. Switching off is exempt from the slew limit.
 template <class N>
-void drive(const ServoPlan<N>& plan, ServoState<N>& state, Wanted<N>& wanted,
+void drive(const ServoPlan<N>& plan, ServoState<N>& state, ForceRequest<N>& wanted,
            const Sensed<N>& sensed, ServoOutput& out) noexcept {
   using Real = typename N::Real;
   if (state.supervisor.motors_on() && !all_finite(wanted.force_n)) {
@@ -309,7 +310,7 @@ void drive(const ServoPlan<N>& plan, ServoState<N>& state, Wanted<N>& wanted,
 /// With a usable report: splits the work since the last one, and keeps the parts of the force that
 /// was sent.
 template <class N>
-void book(ServoState<N>& state, const Wanted<N>& wanted, bool motors_on) noexcept {
+void book(ServoState<N>& state, const ForceRequest<N>& wanted, bool motors_on) noexcept {
   ForceParts<N> parts = wanted.parts;
   state.ledger.split(parts);
   if (!motors_on) return state.ledger.send({});
@@ -356,7 +357,7 @@ ServoOutput servo_step(const ServoPlan<N>& plan, ServoState<N>& state,
                        const DeviceReport& report) noexcept {
   ServoOutput out;
   const Sensed<N> sensed = sense(plan, state, report);
-  Wanted<N> wanted = wanted_force(plan, state, sensed, out);
+  ForceRequest<N> wanted = wanted_force(plan, state, sensed, out);
   drive(plan, state, wanted, sensed, out);
   state.force_sum_n = state.force_sum_n + state.force_n;
   if (sensed.usable) book(state, wanted, out.motors_on);
@@ -401,7 +402,7 @@ bool apply_command(const ServoPlan<N>& plan, ServoState<N>& state,
       if (command.argument >= plan.tool_count) return false;
       if (command.argument == state.active_tool) return true;
       state.active_tool = command.argument;
-      state.contact.proxy.place_anew();  // the new tool may not fit where the old one was
+      state.contact.proxy.search_again();  // the new tool may not fit where the old one was
       state.force_cut.change_tool();
       return true;
     case ServoCommand::Kind::fade_in:

@@ -107,8 +107,8 @@ constexpr void restart_fade(Supervisor& s) noexcept {
 
 /// Share of the held force that is left after `stale_ticks` without a report, as numerator over
 /// `zero_ticks - hold_ticks`: all of it up to hold_ticks, none from zero_ticks on.
-[[nodiscard]] constexpr std::uint32_t stale_share(const SafetyTiming& timing,
-                                                  std::uint32_t stale_ticks) noexcept {
+[[nodiscard]] constexpr std::uint32_t stale_fraction(const SafetyTiming& timing,
+                                                     std::uint32_t stale_ticks) noexcept {
   if (stale_ticks <= timing.hold_ticks) return timing.zero_ticks - timing.hold_ticks;
   return stale_ticks >= timing.zero_ticks ? 0 : timing.zero_ticks - stale_ticks;
 }

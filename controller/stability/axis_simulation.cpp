@@ -6,7 +6,7 @@
 
 namespace kerf {
 
-HeldMass held_mass(const SampledLoop& loop, double periods) {
+HoldResponse held_mass(const SampledLoop& loop, double periods) {
   constexpr double kMmPerM = 1000;
   const double per_n = kMmPerM * loop.period_s * loop.period_s / (loop.mass_kg + loop.hand.mass_kg);
   const double spring = loop.hand.stiffness_n_per_mm * per_n;

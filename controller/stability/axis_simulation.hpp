@@ -17,13 +17,13 @@ namespace kerf {
 /// a force is held: position (mm) and speed (mm per period) after a while, from those before
 /// (`free`) and from 1 N (`driven`). Exact to the last digits: by the matrix exponential, without
 /// libm.
-struct HeldMass {
+struct HoldResponse {
   std::array<std::array<double, 2>, 2> free{};
   std::array<double, 2> driven{};
 };
 
 /// After `periods` >= 0 of the loop.
-[[nodiscard]] HeldMass held_mass(const SampledLoop& loop, double periods);
+[[nodiscard]] HoldResponse held_mass(const SampledLoop& loop, double periods);
 
 /// One axis of a device with its hand, under a force that is held: exact, with Coulomb friction.
 ///
@@ -67,7 +67,7 @@ class OneAxisPlant {
 
  private:
   static constexpr std::size_t kHalvings = 30;
-  using Levels = std::array<HeldMass, kHalvings + 1>;  ///< of a stretch over 2^level
+  using Levels = std::array<HoldResponse, kHalvings + 1>;  ///< of a stretch over 2^level
 
   static Levels levels(const SampledLoop& loop, double periods) {
     Levels out;
@@ -77,7 +77,7 @@ class OneAxisPlant {
     return out;
   }
 
-  void take(const HeldMass& by, double force_n) noexcept {
+  void take(const HoldResponse& by, double force_n) noexcept {
     const double tip_mm = tip_mm_;
     tip_mm_ = by.free[0][0] * tip_mm + by.free[0][1] * speed_ + by.driven[0] * force_n;
     speed_ = by.free[1][0] * tip_mm + by.free[1][1] * speed_ + by.driven[1] * force_n;
@@ -123,10 +123,10 @@ class OneAxisPlant {
 
 /// One axis of a device and its hand as a host reads and drives it, period by period: the plant
 /// with the encoder and the delay of its `SampledLoop`. mm, N, s. Never allocates.
-class OneAxis {
+class AxisSimulation {
  public:
   /// The encoder's steps lie `shift_mm` before the multiples of its quantum.
-  explicit OneAxis(const SampledLoop& loop, double shift_mm = 0)
+  explicit AxisSimulation(const SampledLoop& loop, double shift_mm = 0)
       : whole_(whole_of(loop)),
         part_(delay_of(loop) - static_cast<double>(whole_)),
         quantum_mm_(loop.quantum_mm),
@@ -222,7 +222,7 @@ class SampledWall {
 };
 
 /// A hand that reaches a wall and keeps pushing: from rest outside, with a constant force.
-struct WallPush {
+struct WallContactTest {
   double from_mm = -0.1;
   double push_n = 0.5;  ///< on top of the device's Coulomb friction
   double seconds = 3;
@@ -252,9 +252,9 @@ struct WallSwing {
 /// positions out of the wall. Stops once the motion is far beyond any device (1 m).
 template <class Law>
 [[nodiscard]] WallSwing push_on_wall(const SampledLoop& loop, Law&& force_n,
-                                     const WallPush& push = {}) {
+                                     const WallContactTest& push = {}) {
   constexpr double kLostMm = 1000;
-  OneAxis axis(loop);
+  AxisSimulation axis(loop);
   axis.start(push.from_mm);
   WallSwing swing;
   swing.quantum_mm = loop.quantum_mm;
@@ -276,7 +276,8 @@ template <class Law>
 
 /// The same against the sampled wall.
 [[nodiscard]] inline WallSwing push_on_wall(const SampledLoop& loop, double stiffness_n_per_mm,
-                                            double damping_ns_per_mm, const WallPush& push = {}) {
+                                            double damping_ns_per_mm,
+                                            const WallContactTest& push = {}) {
   SampledWall wall(loop, stiffness_n_per_mm, damping_ns_per_mm);
   wall.start(push.from_mm);
   return push_on_wall(

@@ -85,7 +85,7 @@ struct Characteristic {
 };
 
 /// (z I - free)^-1 driven, first row, over the plant's own polynomial.
-Polynomial numerator(const HeldMass& whole, const std::array<double, 2>& driven) {
+Polynomial numerator(const HoldResponse& whole, const std::array<double, 2>& driven) {
   return {whole.free[0][1] * driven[1] - whole.free[1][1] * driven[0], driven[0]};
 }
 
@@ -95,9 +95,9 @@ Characteristic characteristic(const SampledLoop& loop) {
   double ticks = std::floor(delay + kWhole);
   const double part = delay - ticks > kWhole ? delay - ticks : 0;
 
-  const HeldMass whole = held_mass(loop, 1);
+  const HoldResponse whole = held_mass(loop, 1);
   // The force of the tick before acts for `part` of a period, then the new one.
-  const HeldMass before = held_mass(loop, part), after = held_mass(loop, 1 - part);
+  const HoldResponse before = held_mass(loop, part), after = held_mass(loop, 1 - part);
   const auto& [a, b] = after.free;
   const std::array<double, 2> old{a[0] * before.driven[0] + a[1] * before.driven[1],
                                   b[0] * before.driven[0] + b[1] * before.driven[1]};

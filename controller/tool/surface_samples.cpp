@@ -157,7 +157,7 @@ void check_count(const SceneTool& tool, double count, double unit_mm) {
        << " samples of its surface, of which contact "
        << "reads at most " << kMaxSurfaceSamples
        << " in time; use a smaller tool or coarser voxels than " << unit_mm << " mm";
-  throw SceneError(line.str());
+  throw LoadError(line.str());
 }
 
 }  // namespace
@@ -179,7 +179,7 @@ std::vector<Point> surface_samples(const SceneTool& tool, double unit_mm) {
 
 PartSamples part_samples(const SceneTool& tool, const ToolPart& part, double unit_mm) {
   const auto refuse_part = [&](const std::string& fault) {
-    throw SceneError("tool '" + tool.name + "': its " + part.name + fault);
+    throw LoadError("tool '" + tool.name + "': its " + part.name + fault);
   };
   double reach_mm = 0;
   Profile profile = part.profile;

@@ -57,7 +57,7 @@ inline constexpr double kMostReach = 1024;
 /// it 0.07 too low. A point gets a sample of its own: a sum over a few rings cannot show how far it
 /// reaches.
 ///
-/// Throws SceneError above kMaxSurfaceSamples.
+/// Throws LoadError above kMaxSurfaceSamples.
 [[nodiscard]] std::vector<std::array<double, 3>> surface_samples(const SceneTool& tool,
                                                                  double unit_mm);
 
@@ -66,7 +66,7 @@ inline constexpr double kMostReach = 1024;
 [[nodiscard]] std::vector<SurfaceSample> close_samples(const SceneTool& tool, double unit_mm);
 
 /// Both for a part behind the head of `tool`, in mm from the middle of the part.
-/// Throws SceneError for a part that is too large or too long for its unit. Load time.
+/// Throws LoadError for a part that is too large or too long for its unit. Load time.
 struct PartSamples {
   std::vector<std::array<double, 3>> samples;
   std::vector<SurfaceSample> close;

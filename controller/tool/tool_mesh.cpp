@@ -385,7 +385,7 @@ std::vector<LooseTriangle> read_stl(const std::filesystem::path& path, int cpu_s
   if (std::filesystem::is_directory(path, fault)) {
     refuse(path.string(), ": is a folder; name an STL file in it");
   }
-  if (const std::string why = why_unreachable(path); !why.empty()) refuse(path.string(), why);
+  if (const std::string why = access_error(path); !why.empty()) refuse(path.string(), why);
   if (!std::filesystem::exists(path, fault)) {
     refuse(path.string(), ": no such STL file; name one, relative to the scene's folder");
   }

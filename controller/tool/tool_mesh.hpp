@@ -42,7 +42,7 @@ using LooseTriangle = std::array<std::array<float, 3>, 3>;
 /// begins a complaint. Triangles with two equal corners are left out. An inside-out mesh is
 /// turned outward, and so is each part of it, joined by edges, that is no hollow in another.
 ///
-/// Throws SceneError for coordinates beyond kLargestMeshMm, for an edge without a partner, for
+/// Throws LoadError for coordinates beyond kLargestMeshMm, for an edge without a partner, for
 /// neighbours of opposite orientation, and if no volume is enclosed. Load time.
 [[nodiscard]] ToolMesh join_triangles(std::span<const LooseTriangle> triangles, double scale,
                                       const std::string& place);
@@ -58,7 +58,7 @@ inline constexpr std::uintmax_t kMaxStlBytes = std::uintmax_t{512} * kMaxMeshTri
 /// whose size is that of its binary count is binary, with any first word; any other without a zero
 /// byte is text.
 ///
-/// `place` begins a complaint. Throws SceneError with the line or the number of bytes for any other
+/// `place` begins a complaint. Throws LoadError with the line or the number of bytes for any other
 /// file, or one above kMaxMeshTriangles. Any thread; load time.
 [[nodiscard]] std::vector<LooseTriangle> parse_stl(std::string_view bytes,
                                                    const std::string& place);

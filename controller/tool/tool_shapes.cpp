@@ -202,7 +202,7 @@ ToolShaft tool_shaft(const ShaftSize& size, double head_length_mm) {
   return shaft;
 }
 
-std::vector<ToolPart> parts_behind(const SceneTool& tool) {
+std::vector<ToolPart> shaft_parts(const SceneTool& tool) {
   const ToolShaft& shaft = tool.shaft;
   std::vector<ToolPart> parts;
   if (!(shaft.radius_mm > 0)) return parts;
@@ -228,7 +228,7 @@ std::vector<ToolPart> parts_behind(const SceneTool& tool) {
 
 std::vector<std::array<double, 2>> shaft_profile(const SceneTool& tool) {
   Profile outline;
-  for (const ToolPart& part : parts_behind(tool)) {
+  for (const ToolPart& part : shaft_parts(tool)) {
     for (const auto& point : part.profile) {
       if (outline.empty() || outline.back() != point) outline.push_back(point);
     }

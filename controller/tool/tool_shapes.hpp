@@ -82,7 +82,7 @@ struct ToolPart {
 /// Shaft and handpiece, if there are any. The shaft begins where the head becomes narrower than it,
 /// or with a face of its own behind a head that is nowhere as wide; one behind a mesh always has
 /// that face. Hidden faces are left out.
-[[nodiscard]] std::vector<ToolPart> parts_behind(const SceneTool& tool);
+[[nodiscard]] std::vector<ToolPart> shaft_parts(const SceneTool& tool);
 
 /// Their common outline from the begin of the shaft, {y, radius} in mm; both ends are flat.
 [[nodiscard]] std::vector<std::array<double, 2>> shaft_profile(const SceneTool& tool);

@@ -63,7 +63,7 @@ VolumeImage crop_to_solid(const VolumeImage& image, Density iso, std::int32_t gu
     std::ostringstream text;
     text << "iso: " << iso / kDensityMax
          << " leaves nothing solid in the volume; use a lower `iso` or another `window`";
-    throw SceneError(text.str());
+    throw LoadError(text.str());
   }
   return crop(image, box.grown(guard));
 }

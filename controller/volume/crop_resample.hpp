@@ -14,7 +14,7 @@ namespace kerf {
 inline constexpr std::int32_t kGuardVoxels = 3;
 
 /// The part of `image` inside `box`, density and labels; the origin moves along, so every voxel
-/// keeps its position. Outside of the image the box has air. Throws SceneError for an empty box or
+/// keeps its position. Outside of the image the box has air. Throws LoadError for an empty box or
 /// one above the limits of volume_image.hpp.
 [[nodiscard]] VolumeImage crop(const VolumeImage& image, const VoxelBox& box);
 
@@ -23,7 +23,7 @@ inline constexpr std::int32_t kGuardVoxels = 3;
 [[nodiscard]] VolumeImage enclosed_in_air(VolumeImage image, Density least);
 
 /// Crops to the tightest box around the voxels of at least `iso`, plus `guard` voxels on each side.
-/// Throws SceneError if no voxel is solid.
+/// Throws LoadError if no voxel is solid.
 [[nodiscard]] VolumeImage crop_to_solid(const VolumeImage& image, Density iso,
                                         std::int32_t guard = kGuardVoxels);
 
@@ -38,7 +38,7 @@ void fade_to_air(VolumeImage& image);
 /// The outer face of the first voxel stays in place; only new voxels that lie whole inside the old
 /// extent are made (at least one). A density ramp is kept exactly by refinement and by whole
 /// ratios, else within an eighth of an old voxel's step; each is rounded once, at the end. Throws
-/// SceneError for a spacing that is not positive or a result above the limits.
+/// LoadError for a spacing that is not positive or a result above the limits.
 [[nodiscard]] VolumeImage resample(const VolumeImage& image,
                                    const std::array<double, 3>& spacing_mm);
 

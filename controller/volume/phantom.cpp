@@ -60,7 +60,7 @@ class Sampler {
   void sample_on_threads(const VoxelBox& box, int cuts) {
     if (cuts == 0) return sample(box, {});
     const Halves half(box);
-    const std::jthread other = helper_thread([&] { sample_on_threads(half.low, cuts - 1); });
+    const std::jthread other = start_worker([&] { sample_on_threads(half.low, cuts - 1); });
     sample_on_threads(half.high, cuts - 1);
   }
 

@@ -43,7 +43,7 @@ inline constexpr Density kPhantomCaries =
 /// widens at the dentin, as occlusal caries does; a millimetre of dentin is left
 /// above the pulp. The plain solids have no labels, and a density that changes over two voxels.
 ///
-/// Uses + - * / and square roots only, so every machine makes the same bits. Throws SceneError for
+/// Uses + - * / and square roots only, so every machine makes the same bits. Throws LoadError for
 /// a grid above the limits of `read_volume` or a spacing that is not positive.
 [[nodiscard]] VolumeImage make_phantom(const PhantomSpec& spec = {});
 

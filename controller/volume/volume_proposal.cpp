@@ -300,7 +300,7 @@ ProposedVolume propose_volume(VolumeImage image, Window range, const ProposalWis
       text << "iso: " << (all ? "everything" : "nothing") << " reaches " << proposal.iso
            << "; the values of the file go from " << range.lo << " to " << range.hi
            << ", give --iso between them";
-      throw SceneError(text.str());
+      throw LoadError(text.str());
     }
     const BodyMask body(image, skin);
     take_away(solid, parts_to_keep(solid, body, wishes.keep_all), body, iso,
@@ -314,12 +314,12 @@ ProposedVolume propose_volume(VolumeImage image, Window range, const ProposalWis
     if (!wishes.window) {
       text << "iso: " << proposal.iso << " parts nothing from what is around it; the values of the "
            << "file go from " << range.lo << " to " << range.hi << ", give --iso between them";
-      throw SceneError(text.str());
+      throw LoadError(text.str());
     }
     text << "window: " << proposal.window.lo << " .. " << proposal.window.hi
          << " does not hold the surface at " << proposal.iso
          << "; give --window lo,hi around it, or another --iso";
-    throw SceneError(text.str());
+    throw LoadError(text.str());
   }
   change_window(range, proposal.window, image);
   proposal.materials = materials_of(proposal);
@@ -364,10 +364,10 @@ bool take_label_map(const SourceVolume& source, VolumeImage& image, const std::s
   if (seen.count() < 3 || !is_label_map(image.grid, image.density)) return false;
   if (source.max >= kMaxMaterials) {
     const std::string last = std::to_string(std::lround(source.max));
-    throw SceneError(place + "label " + last + " is above " + std::to_string(kMaxMaterials - 1) +
-                     ", the last that a scene has a material for; number the labels anew, or take "
-                     "them as a scan with --window 0," +
-                     last);
+    throw LoadError(place + "label " + last + " is above " + std::to_string(kMaxMaterials - 1) +
+                    ", the last that a scene has a material for; number the labels anew, or take "
+                    "them as a scan with --window 0," +
+                    last);
   }
   image.labels.resize(image.density.size());
   for (std::size_t i = 0; i < image.density.size(); ++i) {

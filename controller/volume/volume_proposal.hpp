@@ -94,7 +94,7 @@ inline constexpr std::uint64_t kLeastPart = 27;
 ///   down the scale would lose its steps.
 ///
 /// `image`: `range`, all values of the file, as densities; it is changed in place. Throws
-/// SceneError if no voxel reaches the iso, or the window is empty. Load time.
+/// LoadError if no voxel reaches the iso, or the window is empty. Load time.
 [[nodiscard]] ProposedVolume propose_volume(VolumeImage image, Window range,
                                             const ProposalWishes& wishes = {});
 
@@ -106,7 +106,7 @@ struct ProposalLine {
 
 /// If a file holds only labels, turns `image`, its densities, into a solid of them, each label at
 /// full density, and returns true. Labels are whole numbers up to 255 of which 0 and at least two
-/// others occur, in blocks with nothing between them, as no scan has them. Throws SceneError, which
+/// others occur, in blocks with nothing between them, as no scan has them. Throws LoadError, which
 /// begins with `place`, if a label is higher than the number of materials of a scene. Load time.
 [[nodiscard]] bool take_label_map(const SourceVolume& source, VolumeImage& image,
                                   const std::string& place);

@@ -57,7 +57,7 @@ VolumeImage apply_window(const SourceVolume& source, Window window) {
     } else {
       text << ", give `window = [lo, hi]` in the scene or `--window lo,hi` with lo < hi";
     }
-    throw SceneError(text.str());
+    throw LoadError(text.str());
   }
   VolumeImage image;
   static_cast<VolumeFrame&>(image) = source;

@@ -37,7 +37,7 @@ struct Window {
 /// The whole range of the file: nothing is clamped.
 [[nodiscard]] Window range_window(const SourceVolume& source) noexcept;
 
-/// Rounds to the nearest density. Throws SceneError unless lo < hi and both are finite.
+/// Rounds to the nearest density. Throws LoadError unless lo < hi and both are finite.
 [[nodiscard]] VolumeImage apply_window(const SourceVolume& source, Window window);
 
 /// Otsu's threshold (IEEE Trans. SMC 9, 1979) over 4096 bins: the density that splits the voxels

@@ -85,16 +85,16 @@ damping_ns_per_mm = 0.002
 machinability_mm3_per_s_n = 4  # tuned: to see a cavity within seconds
 )";
 
-/// Reads that text as the controller will, as `scene`, and throws SceneError if it is no scene of
+/// Reads that text as the controller will, as `scene`, and throws LoadError if it is no scene of
 /// `volume`.
 void check_imported_scene(const std::string& text, const std::filesystem::path& scene,
                           const std::filesystem::path& volume) {
   const std::string name = volume.filename().string();
   const bool plain = std::ranges::none_of(name, is_control);
   if (plain && parse_scene(text, scene).volumes.front().file == name) return;
-  throw SceneError(volume.string() +
-                   ": a scene cannot name this file (its name has control characters, or is no "
-                   "UTF-8); give another with --out");
+  throw LoadError(volume.string() +
+                  ": a scene cannot name this file (its name has control characters, or is no "
+                  "UTF-8); give another with --out");
 }
 
 /// The text of a scene (TOML) with this volume alone, fitted to any device as --volume fits it.
@@ -152,7 +152,7 @@ void refuse_stretched(const std::string& path, const VolumeFrame& frame) {
   text << path << ": spacing " << s[0] << " x " << s[1] << " x " << s[2]
        << " mm has a side of more than " << kMostStretched
        << " times another; give the true voxel size with --spacing x,y,z (mm), or resample it";
-  throw SceneError(text.str());
+  throw LoadError(text.str());
 }
 
 /// The longest side, in the shortest edges of a voxel: the largest size of a tool.
@@ -263,7 +263,7 @@ ProposalWishes ImportCommand::wishes() const {
   if (!iso_.empty()) {
     wishes.iso = number_in(iso_);
     if (!wishes.iso)
-      throw SceneError("--iso: '" + iso_ + "' is not a number; give a value of the file");
+      throw LoadError("--iso: '" + iso_ + "' is not a number; give a value of the file");
   }
   return wishes;
 }
@@ -271,11 +271,11 @@ ProposalWishes ImportCommand::wishes() const {
 void ImportCommand::run(std::ostream& out) const {
   std::error_code fault;
   if (!series_.empty() && fs::is_regular_file(path_, fault)) {
-    throw SceneError("--series: " + path_ + " is one file; leave it out, or name the folder");
+    throw LoadError("--series: " + path_ + " is one file; leave it out, or name the folder");
   }
   if (!dims_.empty() && fs::is_directory(path_, fault)) {
-    throw SceneError("--dims: " + path_ +
-                     " is a folder; name one file without a header, or leave it out");
+    throw LoadError("--dims: " + path_ +
+                    " is a folder; name one file without a header, or leave it out");
   }
   const Files to = files();
   const ReadOptions options = read_options();
@@ -339,8 +339,8 @@ void ImportCommand::run(std::ostream& out) const {
 
 void ImportCommand::refuse_odd(const std::string& odd) const {
   if (odd.empty() || !spacing_.empty()) return;
-  throw SceneError(path_ + ": spacing " + odd +
-                   "; give the true voxel size with --spacing x,y,z (mm)");
+  throw LoadError(path_ + ": spacing " + odd +
+                  "; give the true voxel size with --spacing x,y,z (mm)");
 }
 
 void ImportCommand::refuse_beside_labels() const {
@@ -350,18 +350,18 @@ void ImportCommand::refuse_beside_labels() const {
                                                 {"--keep-all", keep_all_}};
   for (const auto& [option, is_given] : given) {
     if (!is_given) continue;
-    throw SceneError(std::string(option) + ": the labels beside " + path_ +
-                     " tell what is solid; leave it out");
+    throw LoadError(std::string(option) + ": the labels beside " + path_ +
+                    " tell what is solid; leave it out");
   }
 }
 
 void ImportCommand::write(VolumeImage image, ImportedScene scene, const std::string& preview,
                           const Files& to) const {
   scene.longest_vox = longest_vox(image);
-  NewFiles files;
+  AtomicFiles files;
   add_volume(image, to.volume, packed_ ? VolumeEncoding::gzip : VolumeEncoding::raw, files);
   const auto add = [&](const fs::path& path, const std::string& bytes) {
-    NewFile& file = files.add(path);
+    AtomicFile& file = files.add(path);
     file.write(bytes.data(), bytes.size());
     file.close();
   };

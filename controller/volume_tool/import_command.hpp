@@ -24,7 +24,7 @@ class ImportCommand {
   ImportCommand& operator=(const ImportCommand&) = delete;
 
   [[nodiscard]] bool chosen() const { return command_.chosen(); }
-  /// Throws SceneError, one line, with nothing written.
+  /// Throws LoadError, one line, with nothing written.
   void run(std::ostream& out) const;
 
  private:

@@ -37,7 +37,7 @@ std::vector<double> numbers(const std::string& option, const std::string& text, 
   std::istringstream parts(text + separator);
   for (std::string part; std::getline(parts, part, separator);) {
     const auto value = number_in(part);
-    if (!value) throw SceneError(option + ": '" + part + "' is not a number; see --help");
+    if (!value) throw LoadError(option + ": '" + part + "' is not a number; see --help");
     values.push_back(*value);
   }
   return values;
@@ -49,17 +49,17 @@ std::array<double, 3> spacing_from(const std::string& text) {
   const std::vector<double> s = numbers("--spacing", text, ',');
   if (s.size() == 1) return {s[0], s[0], s[0]};
   if (s.size() == 3) return {s[0], s[1], s[2]};
-  throw SceneError("--spacing: " + text + " has " + std::to_string(s.size()) +
-                   " numbers; give one, or three as x,y,z (mm)");
+  throw LoadError("--spacing: " + text + " has " + std::to_string(s.size()) +
+                  " numbers; give one, or three as x,y,z (mm)");
 }
 
 Window window_from(const std::string& text) {
   const std::vector<double> w = numbers("--window", text, ',');
   if (w.size() != 2) {
-    throw SceneError("--window: " + text + " is not a range; give lo,hi in values of the file");
+    throw LoadError("--window: " + text + " is not a range; give lo,hi in values of the file");
   }
   if (!(w[0] < w[1])) {
-    throw SceneError("--window: " + text + " is empty; give lo,hi with lo < hi");
+    throw LoadError("--window: " + text + " is empty; give lo,hi with lo < hi");
   }
   return {w[0], w[1]};
 }
@@ -68,8 +68,7 @@ VoxelGrid grid_from(const std::string& option, const std::string& text) {
   const std::vector<double> n = numbers(option, text, 'x');
   const auto whole = [](double v) { return v >= 1.0 && v <= 1e6 && v == std::floor(v); };
   if (n.size() != 3 || !std::all_of(n.begin(), n.end(), whole)) {
-    throw SceneError(option + ": " + text +
-                     " is not a size; give three counts such as 256x256x161");
+    throw LoadError(option + ": " + text + " is not a size; give three counts such as 256x256x161");
   }
   return {static_cast<std::int32_t>(n[0]), static_cast<std::int32_t>(n[1]),
           static_cast<std::int32_t>(n[2])};
@@ -86,8 +85,8 @@ std::vector<std::filesystem::path> files_read(const std::filesystem::path& volum
 namespace {
 
 [[noreturn]] void refuse_there(const std::filesystem::path& path) {
-  throw SceneError(path.string() +
-                   ": is there already; take another name, or --force to replace it");
+  throw LoadError(path.string() +
+                  ": is there already; take another name, or --force to replace it");
 }
 
 }  // namespace
@@ -97,7 +96,7 @@ void refuse_replacing(const std::filesystem::path& path, bool force) {
   if (!force && exists(symlink_status(path, fault))) refuse_there(path);
 }
 
-void commit(NewFiles& files, bool force) {
+void commit(AtomicFiles& files, bool force) {
   if (force) return files.commit();
   if (const auto there = files.commit_if_new()) refuse_there(*there);
 }
@@ -268,7 +267,7 @@ struct Target {
     refuse_replacing(labels, force);
   }
   void write(const VolumeImage& image, std::ostream& out) const {
-    NewFiles files;
+    AtomicFiles files;
     add_volume(image, file, raw ? VolumeEncoding::raw : VolumeEncoding::gzip, files);
     commit(files, force);
     if (image.labels.empty()) remove_labels(file);

@@ -18,7 +18,7 @@ namespace kerf {
 /// after one line on `err` for bad input. Never throws.
 int run_volume_tool(int argc, const char* const* argv, std::ostream& out, std::ostream& err);
 
-/// The texts of options as values. Each throws SceneError, one line that names the option.
+/// The texts of options as values. Each throws LoadError, one line that names the option.
 [[nodiscard]] std::array<double, 3> spacing_from(const std::string& text);  ///< "0.2" or "1,1,2"
 [[nodiscard]] Window window_from(const std::string& text);                  ///< "-200,1500"
 /// "256x256x161"
@@ -32,6 +32,6 @@ int run_volume_tool(int argc, const char* const* argv, std::ostream& out, std::o
 void refuse_replacing(const std::filesystem::path& path, bool force);
 
 /// Gives the files their names; refuses one that exists by now, unless `force`.
-void commit(NewFiles& files, bool force);
+void commit(AtomicFiles& files, bool force);
 
 }  // namespace kerf

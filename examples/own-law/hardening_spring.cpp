@@ -25,8 +25,8 @@ class HardeningSpring {
 
   [[nodiscard]] kerf::DeviceVec<Real> step(const kerf::ForceInput<N>& in, State&) const noexcept {
     const Real d = norm(in.spring_mm);
-    const kerf::Coupling<N> now{k_ + Ratio(h_ * d * d), b_};
-    return kerf::coupling_force(now, in.spring_mm, in.velocity_mm_per_s);
+    const kerf::VirtualCoupling<N> now{k_ + Ratio(h_ * d * d), b_};
+    return kerf::virtual_coupling_force(now, in.spring_mm, in.velocity_mm_per_s);
   }
 
  private:

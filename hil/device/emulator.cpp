@@ -29,7 +29,7 @@ void Emulator::guide_hand() noexcept {
   if (settled || waited_enough) hand_->leave();
 }
 
-void Emulator::wish(const HandWish& wish) noexcept {
+void Emulator::wish(const HandTarget& wish) noexcept {
   if (led_) led_->wish(wish);
 }
 

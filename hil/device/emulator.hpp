@@ -58,7 +58,7 @@ class Emulator final : public PacketDevice {
   [[nodiscard]] bool can_be_led() const noexcept { return hand_ && hand_->ended(); }
   /// A user's target for the hand; `forsake`: the user is gone. See `GuidedHand`. While a script
   /// runs, the hand keeps to it and follows the user afterwards.
-  void wish(const HandWish& wish) noexcept;
+  void wish(const HandTarget& wish) noexcept;
   void forsake() noexcept;
 
   [[nodiscard]] const EmulatorStats& stats() const noexcept { return stats_; }

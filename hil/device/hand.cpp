@@ -31,7 +31,7 @@ double ReachCurve::least_seconds(double hand_rad_per_s) const noexcept {
   constexpr int kSteps = 512;
   constexpr double kRate = kSteps;
   const auto place = [this](int step) {
-    return at(least_jerk(std::clamp(step / kRate, 0.0, 1.0)));
+    return at(minimum_jerk(std::clamp(step / kRate, 0.0, 1.0)));
   };
   double speed = 0, acceleration = 0, jerk = 0;
   for (int step = 0; step <= kSteps; ++step) {
@@ -116,7 +116,7 @@ DeviceVec<double> HandMotion::position(const Leg& leg, double progress) const no
       constexpr double kQuarters = 4.0;
       const double radius =
           step.size[0] *
-          least_jerk(std::min({1.0, kQuarters * progress, kQuarters * (1 - progress)}));
+          minimum_jerk(std::min({1.0, kQuarters * progress, kQuarters * (1 - progress)}));
       return from_mm_ + sunk +
              DeviceVec<double>{radius * std::cos(turn * step.turns), 0,
                                radius * std::sin(turn * step.turns)};
@@ -158,7 +158,7 @@ HandGoal HandMotion::next() noexcept {
   const Leg& leg = legs_[leg_];
   ++cycle_;
   const double t = static_cast<double>(cycle_) / static_cast<double>(leg.cycles);
-  const double progress = leg.step.ease == HandStep::Ease::smooth ? least_jerk(t) : t;
+  const double progress = leg.step.ease == HandStep::Ease::smooth ? minimum_jerk(t) : t;
   goal.target_mm = position(leg, progress);
   goal.button1 = leg.step.button == 1;
   goal.button2 = leg.step.button == 2;
@@ -179,7 +179,7 @@ GuidedHand::GuidedHand(double stiffness_n_per_mm, const HandRoute& route,
   std::reverse_copy(way.points_mm.begin(), way.points_mm.end(), way_back_mm_.begin());
 }
 
-void GuidedHand::wish(const HandWish& wish) noexcept {
+void GuidedHand::wish(const HandTarget& wish) noexcept {
   wish_ = wish;
   if (wish.park && !parking_) parking_ = 0;
   since_wish_ = 0;

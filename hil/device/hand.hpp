@@ -17,7 +17,7 @@
 namespace kerf {
 
 /// Position along a rest-to-rest motion of least jerk (Flash and Hogan 1985); t and result 0..1.
-[[nodiscard]] constexpr double least_jerk(double t) noexcept {
+[[nodiscard]] constexpr double minimum_jerk(double t) noexcept {
   return t * t * t * (10 + t * (-15 + 6 * t));
 }
 
@@ -124,7 +124,7 @@ class GuidedHand {
   GuidedHand(double stiffness_n_per_mm, const HandRoute& route,
              DeviceVec<double> start_mm) noexcept;
 
-  void wish(const HandWish& wish) noexcept;
+  void wish(const HandTarget& wish) noexcept;
   void forsake() noexcept;
 
   /// The goal of the next bus cycle, while the tip is at `tip_mm`. `start` is the goal at which its
@@ -141,7 +141,7 @@ class GuidedHand {
   [[nodiscard]] DeviceVec<double> retreat(DeviceVec<double> start_mm) const noexcept;
 
   double max_pull_mm_;
-  std::optional<HandWish> wish_;
+  std::optional<HandTarget> wish_;
   std::optional<HandGoal> goal_;              ///< empty: still at its start
   std::int64_t since_wish_ = 0;               ///< bus cycles
   std::optional<DeviceVec<double>> held_mm_;  ///< the tip, once the wishes stopped

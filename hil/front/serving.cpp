@@ -135,10 +135,10 @@ std::string make_real_time(int priority, int cpu) {
          "rtprio limit, or say --priority 0";
 }
 
-HelloLink::HelloLink(PacketLink& client, const LinkHello& own)
+HandshakeLink::HandshakeLink(PacketLink& client, const LinkHello& own)
     : PacketLink(client.descriptor()), client_(client), own_(own) {}
 
-std::span<const std::uint8_t> HelloLink::take(std::span<std::uint8_t> buffer) noexcept {
+std::span<const std::uint8_t> HandshakeLink::take(std::span<std::uint8_t> buffer) noexcept {
   const auto packet = client_.take(buffer);
   closed_ = client_.closed();
   if (packet.empty() || !greets_) return packet;
@@ -155,7 +155,7 @@ std::span<const std::uint8_t> HelloLink::take(std::span<std::uint8_t> buffer) no
   return {};
 }
 
-PacketLink::Sent HelloLink::send(std::span<const std::uint8_t> packet) noexcept {
+PacketLink::Sent HandshakeLink::send(std::span<const std::uint8_t> packet) noexcept {
   if (greets_) last_.assign(packet.begin(), packet.end());
   const Sent sent = client_.send(packet);
   closed_ = closed_ || client_.closed();

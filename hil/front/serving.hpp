@@ -132,10 +132,10 @@ void serve_kernel(KernelDevice& device, const std::function<bool()>& goes_on, Hi
 /// answered, since UDP may lose an answer, and the device's last packet is sent again after it, so
 /// that a lock-step session begins with its first report. A hello that does not fit is answered
 /// too, and closes the link. A client without a hello is served all the same.
-class HelloLink final : public PacketLink {
+class HandshakeLink final : public PacketLink {
  public:
   /// `client` outlives it.
-  HelloLink(PacketLink& client, const LinkHello& own);
+  HandshakeLink(PacketLink& client, const LinkHello& own);
 
   [[nodiscard]] std::span<const std::uint8_t> take(
       std::span<std::uint8_t> buffer) noexcept override;

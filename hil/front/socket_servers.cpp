@@ -94,7 +94,7 @@ int bind_to(const std::string& where) {
   if (fd >= 0 && bind(fd, address.get(), address.bytes) == 0) return fd;
   const int cause = errno;
   if (fd >= 0) close(fd);
-  refuse(where, std::generic_category().message(cause) + "; " + way_out_of(cause, kUseAnother));
+  refuse(where, std::generic_category().message(cause) + "; " + remedy_for(cause, kUseAnother));
 }
 
 }  // namespace
@@ -142,7 +142,7 @@ SeqpacketServer::SeqpacketServer(std::string path, const char* option)
   if (fd_ >= 0) close(fd_);
   if (bound) unlink(unborn.c_str());
   throw HilError(std::string(option_) + ": " + path_ + ": " + std::strerror(error) + "; " +
-                 way_out_of(error, "choose a path in a folder that you may write"));
+                 remedy_for(error, "choose a path in a folder that you may write"));
 }
 
 SeqpacketServer::~SeqpacketServer() {
@@ -157,7 +157,7 @@ std::optional<SeqpacketLink> SeqpacketServer::accept(const std::atomic<bool>& st
     if (auto link = accept_waiting()) return link;
     if (errno == EMFILE || errno == ENFILE) {  // the client goes on waiting
       throw HilError(std::string(option_) + ": " + path_ + ": " + std::strerror(errno) + "; " +
-                     way_out_of(errno, ""));
+                     remedy_for(errno, ""));
     }
   }
   return std::nullopt;
@@ -168,7 +168,7 @@ std::optional<SeqpacketLink> SeqpacketServer::accept_waiting() noexcept {
   const int client = accept4(fd_, nullptr, nullptr, SOCK_CLOEXEC);
   if (client < 0) return std::nullopt;
   SeqpacketLink link(client);
-  const std::optional<uid_t> stranger = stranger_at(client);
+  const std::optional<uid_t> stranger = other_user_at(client);
   if (!stranger) return link;
   std::cerr << "kerf-emulator: " << option_ << ": " << one_line(path_) << ": a client of user "
             << *stranger << " was refused; be user " << geteuid() << " or root" << std::endl;

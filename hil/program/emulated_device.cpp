@@ -70,7 +70,7 @@ void HandServer::lead(Emulator& emulator, int cycles) noexcept {
   }
   if (!window_) return;
   std::array<std::uint8_t, kHandWishBytes + 1> buffer;  // a longer packet is seen to be wrong
-  std::optional<HandWish> newest;
+  std::optional<HandTarget> newest;
   for (int taken = 0; taken < kMaxWishesPerLook; ++taken) {
     const auto packet = window_->take(buffer);
     if (packet.empty()) break;

@@ -19,7 +19,7 @@
 /// that leads the hand.
 namespace kerf {
 
-/// The socket at which a window leads the hand: packets of `HandWish`.
+/// The socket at which a window leads the hand: packets of `HandTarget`.
 ///
 /// Once the hand is at its start, one window at a time is accepted; a second one gets `taken` and
 /// is closed, and one of another user is refused. A packet that is no wish is dropped and counted.

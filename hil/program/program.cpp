@@ -100,7 +100,7 @@ void serve_clients(const EmulatorOptions& o, Server& server, const std::string& 
     auto client = server.accept(limits.stop, limits.left_ns(stats.cycles));
     if (!client) break;
     device.renew();
-    HelloLink link(*client, hello_of(o));
+    HandshakeLink link(*client, hello_of(o));
     if (o.lockstep) {
       const bool speaks_first = o.personality == Personality::omni;
       serve_lockstep(link, device,

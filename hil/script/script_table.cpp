@@ -122,14 +122,14 @@ TomlNode parse_script(std::string_view text, const std::string& place) {
 std::string read_script(const std::filesystem::path& file, const std::string& example) {
   const std::string place = file.string();
   std::error_code error;
-  if (const std::string why = why_unreachable(file); !why.empty()) throw HilError(place + why);
+  if (const std::string why = access_error(file); !why.empty()) throw HilError(place + why);
   if (!std::filesystem::is_regular_file(file, error)) {
     throw HilError(place + ": not a file; name one such as " + example);
   }
   std::ifstream in(file, std::ios::binary);
   if (!in) {
     throw HilError(place + ": " + std::generic_category().message(errno) + "; " +
-                   way_out_of(errno, "check its rights"));
+                   remedy_for(errno, "check its rights"));
   }
   std::string text(kMaxBytes + 1, '\0');
   in.read(text.data(), static_cast<std::streamsize>(text.size()));

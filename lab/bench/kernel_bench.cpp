@@ -188,7 +188,7 @@ class Bench {
                        std::size_t bytes) {
       std::vector<Density> volume = density;
       PrestonState<Numbers> state;
-      std::vector<CoveredGroup> list(most_groups(table));
+      std::vector<CoveredGroup> list(max_cover_groups(table));
       row("fixed", set.name, bytes + list.size() * sizeof list[0], [&](int i) {
         const auto pose = pose_of(ticks.place(i), kUnturned);
         const AlignedTick tick(set, table, scratch, kGrid, volume, pose);
@@ -208,7 +208,7 @@ class Bench {
 
   [[nodiscard]] Matrix turn(int i) const {
     if (!ticks_->turned) return kUnturned;
-    return turn_of(0.3 + 2 * std::numbers::pi * i / ticks_->count, 0.2);
+    return orientation_of(0.3 + 2 * std::numbers::pi * i / ticks_->count, 0.2);
   }
 
   template <class Run>

@@ -169,7 +169,7 @@ struct Solid {
   explicit Solid(std::vector<Density> voxels)
       : density(std::move(voxels)), map(kGrid, density, 1) {}
 
-  [[nodiscard]] ContactVolume<FixedNumbers> seen_by(PlaceMemory<FixedNumbers>& memory) const {
+  [[nodiscard]] ContactVolume<FixedNumbers> seen_by(TransformedShell<FixedNumbers>& memory) const {
     ContactVolume<FixedNumbers> volume;
     volume.field = {kGrid, density.data(), density_scale(32768), map.bricks()};
     for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -194,8 +194,8 @@ class QueryBench {
   void tool(const std::string& name, const char* shape, double radius, double length) {
     const SceneTool tool =
         make_tool(name, shape, {.pitch_mm = 1, .radius_mm = radius, .length_mm = length});
-    const ToolPoints<FixedNumbers> samples(surface_samples(tool, 1), tool.round,
-                                           close_samples(tool, 1));
+    const PointShellTable<FixedNumbers> samples(surface_samples(tool, 1), tool.round,
+                                                close_samples(tool, 1));
     const auto slide = [](int i) { return around(kGrid, 16, i, kTicks); };
     const auto at_depth = [](double z) {
       return [z](int i) -> Place { return {24 + 0.05 * i, 128.3, z}; };
@@ -211,8 +211,8 @@ class QueryBench {
 
  private:
   template <class PlaceAt>
-  void queries(const std::string& name, const ToolPoints<FixedNumbers>& samples, const Solid& solid,
-               PlaceAt&& place) {
+  void queries(const std::string& name, const PointShellTable<FixedNumbers>& samples,
+               const Solid& solid, PlaceAt&& place) {
     rows(name, samples, solid, [&](const ContactQuery<FixedNumbers>& query, int i) {
       use(query.query(unit_place(place(i))).depth.raw());
     });
@@ -220,10 +220,10 @@ class QueryBench {
 
   /// One row for each instruction set, the plainest first.
   template <class Tick>
-  void rows(const std::string& name, const ToolPoints<FixedNumbers>& samples, const Solid& solid,
-            Tick&& tick) {
+  void rows(const std::string& name, const PointShellTable<FixedNumbers>& samples,
+            const Solid& solid, Tick&& tick) {
     const PointShell<FixedNumbers> point_shell = samples.point_shell();
-    PlaceMemory<FixedNumbers> memory;
+    TransformedShell<FixedNumbers> memory;
     memory.hold(point_shell);
     const ContactVolume<FixedNumbers> volume = solid.seen_by(memory);
     std::vector<const KernelSet*> sets;

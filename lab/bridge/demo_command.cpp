@@ -240,7 +240,7 @@ int DemoCommand::run(std::ostream& out) const {
   const WorkFolder folder;
   const std::string pictures = out_.empty() ? (folder.path() / "pictures").string() : out_;
   Demo demo({.loss = loss_percent_ / 100, .delay_ms = delay_ms_, .mbit = mbit_}, folder.path());
-  demo.start_controller(shipped_file(scene_), seconds_);
+  demo.start_controller(find_data_file(scene_), seconds_);
   demo.start_picture(size_, pictures, seconds_);
   demo.start_hand();
   const int code = demo.wait_for_end();

@@ -37,7 +37,7 @@ constexpr std::uint64_t kRow = 25, kRows = 20, kLayers = 4;  // the 2000 bricks 
   return out;
 }
 
-constexpr std::int64_t kLookNs = 2'000'000;
+constexpr std::int64_t kPollNs = 2'000'000;
 
 /// Polls `holds` until it does, or `patience` is over.
 template <class Condition>
@@ -204,7 +204,7 @@ Histogram FarViewer::take_ages() {
 
 void FarViewer::run() {
   std::optional<SegmentConnection> connection;
-  for (std::int64_t at_ns = monotonic_ns(); !stop_; at_ns += kLookNs) {
+  for (std::int64_t at_ns = monotonic_ns(); !stop_; at_ns += kPollNs) {
     sleep_until_ns(at_ns);
     try {  // the last state stays until there is a newer one
       if (!connection || !connection->alive()) connection = connect_segment(name_);

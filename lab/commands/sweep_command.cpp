@@ -123,13 +123,13 @@ Scene first_scene(const SweepRequest& request) {
   std::exception_ptr first_refusal;
   constexpr std::size_t kLooks = 1000;
   for (std::size_t run = 0; run < std::min(runs_of(request.axes), kLooks); ++run) {
-    std::vector<SceneSetting> settings;
+    std::vector<KeyOverride> settings;
     for (const std::string& text : request.job(run, "").settings) {
       settings.push_back(parse_setting(text));
     }
     try {
       return parse_scene_file(request.scene, settings);
-    } catch (const SceneError&) {
+    } catch (const LoadError&) {
       if (!first_refusal) first_refusal = std::current_exception();
     }
   }
@@ -161,7 +161,7 @@ class Crew {
       std::vector<std::jthread> threads;
       for (std::size_t i = 0; i < jobs; ++i) {
         threads.emplace_back([this] {
-          const StopSignalsElsewhere to_main;
+          const BlockStopSignals to_main;
           run_all();
         });
       }
@@ -273,7 +273,7 @@ int Command::run(std::ostream& out) const {
   if (device_is_axis && !device_.empty()) {
     throw HilError("--device: --set device.personality says it; leave one of the two out");
   }
-  const SweepRequest request{std::filesystem::absolute(shipped_file(scene_)).string(),
+  const SweepRequest request{std::filesystem::absolute(find_data_file(scene_)).string(),
                              device_is_axis    ? ""
                              : device_.empty() ? "omni"
                                                : device_,

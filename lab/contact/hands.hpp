@@ -46,7 +46,7 @@ struct Chatter {
 /// Force faster than a hand moves is chatter from here on.
 inline constexpr double kChatterHz = 150;
 
-/// scenes/NAME.toml with the phantom of this effort. Throws SceneError if it cannot be read.
+/// scenes/NAME.toml with the phantom of this effort. Throws LoadError if it cannot be read.
 [[nodiscard]] LoadedScene shipped_scene(const std::string& name, const Effort& effort);
 /// The hand of scenes/hands/NAME.toml in it. Throws HilError if it cannot be read.
 [[nodiscard]] HandRun run_hand(const LoadedScene& scene, const std::string& name,

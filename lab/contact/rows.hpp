@@ -87,7 +87,7 @@ struct EdgedTool {
 [[nodiscard]] std::array<EdgedTool, 3> edged_tools();
 
 /// The fluted bur of scenes/fluted_bur.toml, 4 mm long and 0.8 mm in radius, on a grid of this
-/// pitch; by default in voxels of 0.125 mm. Throws SceneError if its file cannot be read.
+/// pitch; by default in voxels of 0.125 mm. Throws LoadError if its file cannot be read.
 [[nodiscard]] SceneTool shipped_bur(double units_per_mm = 8, double pitch = 1);
 
 }  // namespace kerf::extremes

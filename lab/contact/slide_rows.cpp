@@ -98,7 +98,7 @@ class Slide {
   }
   /// Adds the figures of the tool.
   void feel(const Body& body, Figures& figures) const {
-    const ToolTurn<N> turn = axes_.turn<N>();
+    const Orientation<N> turn = axes_.turn<N>();
     constexpr double kHigh = 20;  // the tool turns first
     GuidedTool<N> guided(tool_, body, path_.front().hand(-kHigh));
     for (int i = 0; i < 100 && !(guided.pose().turn == turn); ++i) {

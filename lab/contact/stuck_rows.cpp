@@ -235,7 +235,7 @@ void add_tools(bool bur, Dice& dice, LoadedScene& scene) {
 /// pits, shells, plates, and a block that ends at the volume's border; half of it with a soft
 /// material, that no cut may touch in half of those. Of 24 scenes in a row 12 run in fixed point at
 /// 1 kHz, the others at 250 Hz, at 8 kHz, in double or in float. Half of the tools have a shaft,
-/// some a handpiece; one scene of four has the fluted bur of scenes/burs. Throws SceneError if
+/// some a handpiece; one scene of four has the fluted bur of scenes/burs. Throws LoadError if
 /// that cannot be read.
 TrapScene trap_scene(std::uint64_t number) {
   Dice dice(number);

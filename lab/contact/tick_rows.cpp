@@ -35,7 +35,7 @@ template <class Rig>
 class Stopwatch {
  public:
   explicit Stopwatch(Rig& rig)
-      : rig_(rig), plan_{.turn_step = rig.turn_step(), .ramp_per_tick = N::Real(1)} {}
+      : rig_(rig), plan_{.rotation_step = rig.rotation_step(), .ramp_per_tick = N::Real(1)} {}
 
   /// Fastest of some runs; the state after them.
   ProxyState<N> time(Tick& tick, int runs) {
@@ -75,7 +75,7 @@ void find_with(Rig& rig, const Trap& trap, int ticks, WorstTick& worst) {
   std::vector<Tick> tried;
   ProxyState<N> state;
   Point hand = trap.middle;
-  ToolTurn<N> turn;
+  Orientation<N> turn;
   for (int i = 0; i < ticks; ++i) {
     const bool far = i % 16 == 15;  // beyond the volume, and back
     hand = hand + std::pow(10.0, dice.uniform(0, 2)) * dice.direction();

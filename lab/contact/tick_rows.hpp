@@ -23,7 +23,7 @@ struct Trap {
 
 /// Solids that cost a query or a sweep much: flat, sharp, hollow, hardly wider than the tool,
 /// noisy, and tissue with contact everywhere and solid nowhere; and the tooth of a CT, if `data`
-/// has it. Throws SceneError if that cannot be read.
+/// has it. Throws LoadError if that cannot be read.
 [[nodiscard]] std::vector<Trap> worst_traps(const std::filesystem::path& data);
 
 /// The costliest tick that was found.

@@ -32,7 +32,7 @@ using Place = DeviceVec<double>;
 /// Writes the reports one after the other.
 class Writer {
  public:
-  Writer(const LoadedScene& scene, HardHand& out)
+  Writer(const LoadedScene& scene, StressInput& out)
       : hand_(scene.device), rate_hz_(scene.servo.rate_hz), out_(out) {
     const double scale = scene.device.workspace_scale;
     const double voxel_mm = touched_volumes(scene.volumes).voxel_mm;
@@ -147,7 +147,7 @@ class Writer {
 
   CountHand hand_;
   double rate_hz_;
-  HardHand& out_;
+  StressInput& out_;
   Place top_, deep_, aside_, place_;
   CountHand::Counts dock_{}, at_{};
 };
@@ -207,13 +207,13 @@ std::optional<Loaded> load(const KeyTexts& texts, NumericKind numeric,
     auto scene = std::make_unique<LoadedScene>(load_scene(file, {.numeric = numeric}));
     auto servo = plan_scene(*scene);
     return Loaded{std::move(scene), std::move(servo)};
-  } catch (const SceneError& error) {
+  } catch (const LoadError& error) {
     outcome.refused = true;
     outcome.refusal = error.what();
     if (!is_one_clear_line(outcome.refusal))
       outcome.violations.push_back({"line", outcome.refusal});
   } catch (const std::exception& error) {
-    outcome.violations.push_back({"line", std::string("no SceneError: ") + error.what()});
+    outcome.violations.push_back({"line", std::string("no LoadError: ") + error.what()});
   }
   return std::nullopt;
 }
@@ -240,15 +240,15 @@ struct End {
 };
 
 /// The end after the reports from `from` on.
-std::uint64_t play(CompiledScene& servo, const HardHand& hand, std::size_t from,
+std::uint64_t play(CompiledScene& servo, const StressInput& hand, std::size_t from,
                    std::size_t volumes) {
   ServoOutput out;
   for (std::size_t i = from; i < hand.reports.size(); ++i) out = servo.step(hand.reports[i]);
   return hash_of(servo, volumes, out);
 }
 
-End play_watched(CompiledScene& servo, const HardHand& hand, const LoadedScene& scene, Rules& rules,
-                 Outcome& outcome) {
+End play_watched(CompiledScene& servo, const StressInput& hand, const LoadedScene& scene,
+                 Rules& rules, Outcome& outcome) {
   End end;
   ServoOutput out;
   const bool motors = scene.device.torque_scale.has_value();
@@ -277,8 +277,8 @@ End play_watched(CompiledScene& servo, const HardHand& hand, const LoadedScene& 
 
 }  // namespace
 
-HardHand hard_hand(const LoadedScene& scene) {
-  HardHand out;
+StressInput hard_hand(const LoadedScene& scene) {
+  StressInput out;
   Writer writer(scene, out);
   writer.arm();
   writer.press();
@@ -322,7 +322,7 @@ Outcome run_combination(const KeyTexts& texts, NumericKind numeric,
   if (!loaded) return outcome;
   LoadedScene& scene = *loaded->scene;
   CompiledScene& servo = *loaded->servo;
-  const HardHand hand = hard_hand(scene);
+  const StressInput hand = hard_hand(scene);
   LoadedScene twin = scene;
   servo.take(scene);
   const auto other = compile(twin);

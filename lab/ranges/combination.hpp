@@ -24,7 +24,7 @@ struct Mark {
 /// The hardest input of one scene: reports that park, leave, press, slide and turn, are lost, come
 /// twice, jump, are nonsense, stop, and recover from all of that by parking, twice. Ends in a
 /// press.
-struct HardHand {
+struct StressInput {
   std::vector<DeviceReport> reports;
   std::vector<Mark> marks;
   std::size_t recovered = 0;  ///< tick after the last disturbance at which it is armed again
@@ -32,7 +32,7 @@ struct HardHand {
 
 /// `scene` has volumes. About 0.75 s at its rate. The start lies above the solid at the device's
 /// origin; the press goes three voxels into it, or as deep as the speed limit allows.
-[[nodiscard]] HardHand hard_hand(const LoadedScene& scene);
+[[nodiscard]] StressInput hard_hand(const LoadedScene& scene);
 
 /// The files that scenes of a run name, in a folder that goes with this: a half space of 32^3
 /// voxels of 0.25 mm with air above it, labelled enamel over dentin, and the mesh of a bur.

@@ -143,7 +143,7 @@ void tell_pairs(const PairRows& pairs, Teller& teller) {
 KeyTexts texts_of(const std::vector<std::string>& settings) {
   KeyTexts texts;
   for (const std::string& text : settings) {
-    SceneSetting setting = parse_setting(text);
+    KeyOverride setting = parse_setting(text);
     texts[setting.key] = setting.value;
   }
   return texts;

@@ -119,7 +119,7 @@ std::string measure_stiffness(const Effort& effort, const std::vector<KeyRow>& k
   for (const NumericKind numeric : effort.numerics) {
     LoadedScene scene = scene_of(numeric, ForceModel::paper, {0.25, 0.25, 0.25}, solid_half);
     scene.force.p0_n_per_mm2 = 0;
-    const HardHand hand = hard_hand(scene);
+    const StressInput hand = hard_hand(scene);
     const auto servo = compile(scene);
     for (const DeviceReport& report : hand.reports) {
       if (servo->step(report).force_n == std::array<double, 3>{}) continue;
@@ -147,7 +147,7 @@ std::string measure_voxel_sizes(const Effort& effort, const std::vector<KeyRow>&
       LoadedScene scene = scene_of(numeric, ForceModel::proxy, mm, solid_half);
       const double scale = scene.device.workspace_scale, stiffness = scene.force.stiffness_n_per_mm;
       const double radius_mm = scene.tools[0].radius_mm;
-      const HardHand hand = hard_hand(scene);
+      const StressInput hand = hard_hand(scene);
       const auto servo = compile(scene);
       ServoOutput out;
       for (const DeviceReport& report : hand.reports) out = servo->step(report);
@@ -184,7 +184,7 @@ std::string measure_fields(const Effort& effort, const std::vector<KeyRow>&, Fou
     for (const ForceModel model : {ForceModel::paper, ForceModel::proxy}) {
       for (const Field& field : all) {
         LoadedScene scene = scene_of(numeric, model, {0.25, 0.25, 0.25}, field.share);
-        const HardHand hand = hard_hand(scene);
+        const StressInput hand = hard_hand(scene);
         const auto servo = compile(scene);
         Rules rules(scene, kAnyWork);
         double most_n = 0;
@@ -225,7 +225,7 @@ std::string measure_denormals(const Effort&, const std::vector<KeyRow>&, Found& 
   LoadedScene scene =
       scene_of(NumericKind::float32, ForceModel::proxy, {0.25, 0.25, 0.25}, solid_half);
   scene.servo.rate_hz = 250;
-  const HardHand hand = hard_hand(scene);
+  const StressInput hand = hard_hand(scene);
   const auto servo = compile(scene);
   for (const DeviceReport& report : hand.reports) static_cast<void>(servo->step(report));
   // Up, out of the solid: the motors stay on, without force.

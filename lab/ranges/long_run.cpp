@@ -85,7 +85,7 @@ LoadedScene long_scene(NumericKind numeric, const SceneFolder& folder) {
 
 /// The end after ticks `from` to `to`.
 std::uint64_t play(
-    CompiledScene& servo, const HardHand& hand, std::uint64_t from, std::uint64_t to,
+    CompiledScene& servo, const StressInput& hand, std::uint64_t from, std::uint64_t to,
     std::size_t volumes,
     const std::function<void(std::uint64_t tick, const DeviceReport&, const ServoOutput&)>& look) {
   ServoOutput out;
@@ -125,7 +125,7 @@ LongRun run_long(NumericKind numeric, std::uint64_t ticks,
   const SceneFolder folder;
   LoadedScene scene = long_scene(numeric, folder);
   LoadedScene twin = scene;
-  const HardHand hand = hard_hand(scene);
+  const StressInput hand = hard_hand(scene);
   const auto servo = compile(scene), other = compile(twin);
   const std::size_t volumes = scene.volumes.size();
   Watch watch(scene, most_samples(servo->costs(), scene), hand.reports.size());

@@ -72,7 +72,7 @@ enum class Shape { ball, cube };
   return offsets;
 }
 
-[[nodiscard]] inline Matrix turn_of(double yaw, double pitch) {
+[[nodiscard]] inline Matrix orientation_of(double yaw, double pitch) {
   const double a = std::cos(yaw), b = std::sin(yaw), c = std::cos(pitch), d = std::sin(pitch);
   return {{{a * c, -b, a * d}, {b * c, a, b * d}, {-d, 0, c}}};
 }

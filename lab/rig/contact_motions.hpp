@@ -43,7 +43,7 @@ struct Flown {
 template <class N>
 void fly(const SampledTool& tool, const AirWall& wall, const AirFlight& flight, int ticks,
          Dice& dice, Flown& flown) {
-  ToolTurn<N> turn = dice.turn<N>(dice.uniform(0, 3));
+  Orientation<N> turn = dice.turn<N>(dice.uniform(0, 3));
   const auto rows = rows_of(turn);
   double below = 0, reach = 0;
   for (const Point& sample : tool.samples) {
@@ -215,7 +215,7 @@ template <class N>
     const auto covered = [](double d) { return std::clamp(0.5 - d / 2, 0.0, 1.0); };
     return covered((height + aside) * std::sqrt(0.5)) * covered((height - aside) * std::sqrt(0.5));
   });
-  const ToolTurn<N> turn = axes.turn<N>();
+  const Orientation<N> turn = axes.turn<N>();
   const auto hand_of = [&](const Hand& hand, double depth) {
     return hand.centre - depth * hand.normal;
   };
@@ -287,7 +287,7 @@ struct ShakenTool {
   }
   /// Its reach down along `up` from its centre.
   template <class N>
-  [[nodiscard]] double reach_below(const ToolTurn<N>& turn, Point up) const {
+  [[nodiscard]] double reach_below(const Orientation<N>& turn, Point up) const {
     if (round) return radius;
     const auto rows = rows_of(turn);
     Point in_tool{};  // `up` along the tool's axes
@@ -330,7 +330,7 @@ void shake(double thickness, const ShakenTool& tool, const SampledTool& made, in
     return thickness > 40 ? height : std::abs(height + thickness / 2) - thickness / 2;
   });
   Point hand = frame.at(0, tool.reach() + 3, 0);
-  ToolTurn<N> turn;
+  Orientation<N> turn;
   GuidedTool<N> guided(made, wall, hand, 0, iso);
   for (int i = 0; i < ticks; ++i) {
     hand = hand + std::pow(10.0, dice.uniform(0, 2)) * dice.direction();

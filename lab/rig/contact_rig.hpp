@@ -66,18 +66,18 @@ class ContactRig {
   /// The query of a sweep.
   [[nodiscard]] ContactQuery<N>& field() { return *query_; }
   [[nodiscard]] const ContactQuery<N>& field() const { return *query_; }
-  /// Half the sine of a turn that a sweep may make at once: see `turn_step_of`.
-  [[nodiscard]] typename N::Unit turn_step() const {
+  /// Half the sine of a turn that a sweep may make at once: see `rotation_step_of`.
+  [[nodiscard]] typename N::Unit rotation_step() const {
     const double reach = std::max(1.0, static_cast<double>(points_.reach));
-    return typename N::Unit(points_.table.round ? 0 : turn_step_of(reach));
+    return typename N::Unit(points_.table.round ? 0 : rotation_step_of(reach));
   }
 
  private:
   const KernelSet& kernels_;
-  ToolPoints<N> tool_;
+  PointShellTable<N> tool_;
   PointShell<N> points_;
   std::deque<MappedField> fields_;
-  std::deque<PlaceMemory<N>> memories_;
+  std::deque<TransformedShell<N>> memories_;
   std::vector<ContactVolume<N>> volumes_;
   std::optional<ContactQuery<N>> query_;
 };
@@ -90,14 +90,14 @@ class GuidedTool {
              Density iso = kIso);
 
   /// The spring from the hand to the proxy: the force over the stiffness.
-  Point tick(Point hand, const ToolTurn<N>& turn = {});
+  Point tick(Point hand, const Orientation<N>& turn = {});
 
   /// Moves the proxy to a free position.
   void start(Point at) { pose_.centre = place_of<N>(at); }
 
   [[nodiscard]] Point proxy() const { return point_of<N>(pose_.centre); }
   [[nodiscard]] const ProxyPose<N>& pose() const { return pose_; }
-  [[nodiscard]] const Swept<N>& swept() const { return swept_; }
+  [[nodiscard]] const SweepResult<N>& swept() const { return swept_; }
   [[nodiscard]] std::int32_t most_queries() const { return most_queries_; }
 
  private:
@@ -105,7 +105,7 @@ class GuidedTool {
   ProxyPose<N> pose_;
   SweepMemory<N> memory_;
   typename N::Unit friction_;
-  Swept<N> swept_;
+  SweepResult<N> swept_;
   std::int32_t most_queries_ = 0;
 };
 
@@ -143,14 +143,14 @@ class ShaftRig {
     shells_.emplace_back(head.samples, head.round, head.close);
     head_ = shells_.back().point_shell();
     double reach = double(head_.reach);
-    for (const ToolPart& part : parts_behind(tool)) {
+    for (const ToolPart& part : shaft_parts(tool)) {
       const PartSamples samples = part_samples(tool, part, 1);
       shells_.emplace_back(samples.samples, false, samples.close);
       behind_.part[behind_.count++] = {shells_.back().point_shell(),
                                        typename N::Real(part.middle_mm)};
       reach = std::max(reach, part.middle_mm + double(shells_.back().point_shell().reach));
     }
-    turn_step_ = turn_step_of(reach);
+    rotation_step_ = rotation_step_of(reach);
     for (const Body* body : bodies) {
       fields_.emplace_back(body->grid, body->density, iso);
       for (std::size_t i = 0; i <= behind_.count; ++i) {
@@ -170,34 +170,34 @@ class ShaftRig {
   ProxyContact<N> follow(const ProxyPlan<N>& plan, ProxyState<N>& state, const ProxyPose<N>& goal) {
     return kerf::follow<N>(plan, state, *field_, goal);
   }
-  ProxyContact<N> tick(Point hand, const ToolTurn<N>& turn = {}) {
+  ProxyContact<N> tick(Point hand, const Orientation<N>& turn = {}) {
     field_->begin_tick();
-    return follow({.turn_step = turn_step(), .ramp_per_tick = typename N::Real(1)}, state_,
+    return follow({.rotation_step = rotation_step(), .ramp_per_tick = typename N::Real(1)}, state_,
                   {place_of<N>(hand), turn});
   }
   /// The last of so many ticks along a line.
-  ProxyContact<N> lead(Point from, Point to, int ticks, const ToolTurn<N>& turn = {}) {
+  ProxyContact<N> lead(Point from, Point to, int ticks, const Orientation<N>& turn = {}) {
     ProxyContact<N> contact;
     for (int i = 1; i <= ticks; ++i) {
       contact = tick(from + (double(i) / ticks) * (to - from), turn);
     }
     return contact;
   }
-  /// Half the sine of a turn that a sweep may make at once: see `turn_step_of`.
-  [[nodiscard]] typename N::Unit turn_step() const { return typename N::Unit(turn_step_); }
+  /// Half the sine of a turn that a sweep may make at once: see `rotation_step_of`.
+  [[nodiscard]] typename N::Unit rotation_step() const { return typename N::Unit(rotation_step_); }
   [[nodiscard]] ToolQuery<N>& field() { return *field_; }
   [[nodiscard]] Point proxy() const { return point_of<N>(state_.pose.centre); }
   [[nodiscard]] const ProxyState<N>& state() const { return state_; }
 
  private:
-  std::deque<ToolPoints<N>> shells_;
+  std::deque<PointShellTable<N>> shells_;
   PointShell<N> head_;
-  PartsBehind<N> behind_;
+  ShaftParts<N> behind_;
   std::deque<MappedField> fields_;
-  std::deque<PlaceMemory<N>> places_;
-  std::array<std::vector<ContactVolume<N>>, 1 + kMostBehind> volumes_;
+  std::deque<TransformedShell<N>> places_;
+  std::array<std::vector<ContactVolume<N>>, 1 + kMaxShaftParts> volumes_;
   std::optional<ToolQuery<N>> field_;
-  double turn_step_ = 0;
+  double rotation_step_ = 0;
   ProxyState<N> state_;
 };
 
@@ -205,7 +205,7 @@ class ShaftRig {
 /// units above `at`, along `up`, to one unit below.
 template <class N>
 [[nodiscard]] Point rest_of(const SampledTool& tool, const Body& body, Point at, Point up,
-                            const ToolTurn<N>& turn = {}, double off = 1.5, Density iso = kIso) {
+                            const Orientation<N>& turn = {}, double off = 1.5, Density iso = kIso) {
   GuidedTool<N> guided(tool, body, at + off * up, 0, iso);
   constexpr int kTicks = 20;
   for (int i = 0; i <= kTicks; ++i) guided.tick(at + (off - (off + 1) * i / kTicks) * up, turn);

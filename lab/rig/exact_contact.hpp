@@ -155,7 +155,7 @@ class ShaftTouch {
         places.push_back({place, std::max<double>(volume_.iso, density_at(place))});
       }
     };
-    for (const ToolPart& part : parts_behind(tool)) {
+    for (const ToolPart& part : shaft_parts(tool)) {
       for (std::size_t i = 1; i < part.profile.size(); ++i) {
         const auto [y0, r0] = part.profile[i - 1];
         const auto [y1, r1] = part.profile[i];

@@ -65,7 +65,7 @@ class Dice {
   Point across(Point n) { return unit(cross(n, direction())); }
   /// About a random axis.
   template <class N>
-  ToolTurn<N> turn(double angle_rad) {
+  Orientation<N> turn(double angle_rad) {
     using Unit = typename N::Unit;
     const Point axis = std::sin(angle_rad / 2) * direction();
     return {Unit(axis[0]), Unit(axis[1]), Unit(axis[2]), Unit(std::cos(angle_rad / 2))};
@@ -151,11 +151,11 @@ struct Axes {
   Point x, y, z;
 
   template <class N>
-  [[nodiscard]] ToolTurn<N> turn() const {
+  [[nodiscard]] Orientation<N> turn() const {
     using Unit = typename N::Unit;
-    TurnRows<N> rows;
+    RotationRows<N> rows;
     for (std::size_t i = 0; i < 3; ++i) rows[i] = {Unit(x[i]), Unit(y[i]), Unit(z[i])};
-    return turn_of<N>(rows);
+    return orientation_of<N>(rows);
   }
   [[nodiscard]] Point to_tool(Point world) const {
     return {dot(x, world), dot(y, world), dot(z, world)};

@@ -308,8 +308,8 @@ std::vector<int> Command::rates() const {
 }
 
 std::vector<Cell> Command::cells() const {
-  const std::string place = shipped_file(scene_);
-  HandScript hand = read_hand_script(shipped_file(hand_));
+  const std::string place = find_data_file(scene_);
+  HandScript hand = read_hand_script(find_data_file(hand_));
   std::vector<Cell> cells;
   for (const std::string& device : devices_) {
     SceneOverrides overrides;
@@ -334,7 +334,7 @@ std::vector<Cell> Command::cells() const {
 
 int Command::run(std::ostream& out) const {
   const LabOutput report("--report", report_, ".json");
-  auto scripts = scripts_in(shipped_file(scripts_));
+  auto scripts = scripts_in(find_data_file(scripts_));
   if (random_ != 0) scripts.push_back({"at random", std::nullopt});
   const std::vector<Cell> all = cells();
   struct Job {

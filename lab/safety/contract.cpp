@@ -56,7 +56,7 @@ double change_but_for_fall_n(DeviceVec<double> last, DeviceVec<double> force) {
 
 }  // namespace
 
-Contract::Contract(const LoadedScene& scene, bool trusted, Outcome& outcome)
+SafetyMonitor::SafetyMonitor(const LoadedScene& scene, bool trusted, Outcome& outcome)
     : limits_(scene.limits),
       tick_ms_(1000.0 / scene.servo.rate_hz),
       trusted_(trusted),
@@ -64,18 +64,18 @@ Contract::Contract(const LoadedScene& scene, bool trusted, Outcome& outcome)
       wire_(scene.device.personality, scene.device.dock_rad),
       outward_(scene) {}
 
-void Contract::fault_begins(double time_ms) noexcept {
+void SafetyMonitor::fault_begins(double time_ms) noexcept {
   if (outcome_.latched == fault_name(Fault::none)) begun_ms_ = time_ms;
 }
 
-void Contract::check(bool kept, double time_ms, const char* rule, double value, double limit) {
+void SafetyMonitor::check(bool kept, double time_ms, const char* rule, double value, double limit) {
   if (kept) return;
   char line[128];
   std::snprintf(line, sizeof line, "%s: %.3f, limit %.3f", rule, value, limit);
   broken(time_ms, line);
 }
 
-void Contract::broken(double time_ms, const std::string& what) {
+void SafetyMonitor::broken(double time_ms, const std::string& what) {
   ++outcome_.violation_count;
   if (outcome_.violations.size() >= kMaxListed) return;
   char time[24];
@@ -83,7 +83,7 @@ void Contract::broken(double time_ms, const std::string& what) {
   outcome_.violations.emplace_back(time + what);
 }
 
-void Contract::reported(double time_ms, std::span<const std::uint8_t> packet) {
+void SafetyMonitor::reported(double time_ms, std::span<const std::uint8_t> packet) {
   const auto told = wire_.report(packet);
   if (!told) return;
   told_ = *told;
@@ -93,7 +93,7 @@ void Contract::reported(double time_ms, std::span<const std::uint8_t> packet) {
 
 /// Parked, homed and no joint turning for 50 ms: calibrated, whatever was before. Counters that get
 /// their zero there may not creep away meanwhile.
-void Contract::follow_rest(double time_ms) {
+void SafetyMonitor::follow_rest(double time_ms) {
   const bool still = told_.parked && told_.homed && is_near(told_.count, rest_count_);
   if (!still || !wire_.counts_from_rest()) rest_count_ = told_.count;
   // Whole ticks at both ends, and the first report may be one of its periods old.
@@ -114,14 +114,14 @@ void Contract::follow_rest(double time_ms) {
   if (has_rested) wire_.calibrated_at(told_.count);
 }
 
-void Contract::must_stay_off(const char* fault) {
+void SafetyMonitor::must_stay_off(const char* fault) {
   off_ = Off::fault;
   calibrated_ = false;
   if (outcome_.latched == fault_name(Fault::none)) outcome_.latched = fault;
 }
 
 /// What the newest report means for the motors.
-void Contract::follow_report(double time_ms) {
+void SafetyMonitor::follow_report(double time_ms) {
   follow_rest(time_ms);
   const auto told_pose = wire_.pose(told_.count);
   const std::optional<ArmPose> before = pose_;
@@ -165,7 +165,7 @@ void Contract::follow_report(double time_ms) {
 }
 
 /// No report came in this tick, or none with a pose.
-void Contract::follow_silence(double time_ms) {
+void SafetyMonitor::follow_silence(double time_ms) {
   if (off_ != Off::no_reason) return;
   constexpr double kRounding = 1e-6;
   if (listened_ms_ - heard_ms_ > kZeroMs + kRounding) {
@@ -178,14 +178,14 @@ void Contract::follow_silence(double time_ms) {
 
 /// A host that was silent for 20 ms begins at zero and fades in again; the packet that ends the
 /// silence may be the watchdog's packet, and then the next one is the host's own.
-void Contract::follow_stall(const Command& command) {
+void SafetyMonitor::follow_stall(const Command& command) {
   const bool stalled = command.time_ms - last_.time_ms >= kStandstillMs;
   begins_anew_ = stalled || after_stall_;
   if (begins_anew_) may_push_since_ms_ = std::max(may_push_since_ms_, command.time_ms);
   after_stall_ = stalled && command.asked.off();
 }
 
-void Contract::commanded(double time_ms, std::span<const std::uint8_t> packet) {
+void SafetyMonitor::commanded(double time_ms, std::span<const std::uint8_t> packet) {
   const auto asked = wire_.command(packet);
   if (!asked) return broken(time_ms, "a packet that the device cannot read");
   if (fresh_) follow_report(time_ms);
@@ -214,7 +214,7 @@ void Contract::commanded(double time_ms, std::span<const std::uint8_t> packet) {
   silence_told_ = false;
 }
 
-void Contract::check_state(const Command& command) {
+void SafetyMonitor::check_state(const Command& command) {
   for (const std::int16_t count : command.asked.count) {
     check(std::abs(int{count}) <= wire_.count_end(), command.time_ms, "a motor's counts",
           std::abs(int{count}), wire_.count_end());
@@ -226,7 +226,7 @@ void Contract::check_state(const Command& command) {
   broken(command.time_ms, kWhy[static_cast<std::size_t>(off_)]);
 }
 
-void Contract::check_size(const Command& command) {
+void SafetyMonitor::check_size(const Command& command) {
   const double now_n = norm(command.force_n), peak_n = limits_.force_n;
   outcome_.peak_n = std::max(outcome_.peak_n, now_n);
   check(now_n <= peak_n + kStepN, command.time_ms, "force in N", now_n, peak_n);
@@ -248,7 +248,7 @@ void Contract::check_size(const Command& command) {
   check(rms_n <= bearable_n + kStepN, command.time_ms, "RMS over 10 s in N", rms_n, bearable_n);
 }
 
-void Contract::check_change(const Command& command) {
+void SafetyMonitor::check_change(const Command& command) {
   if (command.tick_ms <= 0) return;
   // A hand that moves with the force is given energy by it. Across it, only what the force's steps
   // hide may look so.
@@ -264,7 +264,7 @@ void Contract::check_change(const Command& command) {
 }
 
 /// What was sent after the last report, turned and weakened by nothing.
-void Contract::check_hold(const Command& command) {
+void SafetyMonitor::check_hold(const Command& command) {
   const bool holds =
       !fresh_ && !begins_anew_ && off_ == Off::no_reason && command.time_ms - heard_ms_ <= kHoldMs;
   const double off_by_n = norm(command.force_n - held_n_);
@@ -272,7 +272,7 @@ void Contract::check_hold(const Command& command) {
         kStepN);
 }
 
-void Contract::check_direction(const Command& command) {
+void SafetyMonitor::check_direction(const Command& command) {
   const bool pushes = norm(command.force_n) > kPushN;
   const auto out = pushes && way_in_is_known_ ? outward_.at(pose_->tip_mm) : std::nullopt;
   const bool inward = out && dot(*out, command.force_n) < 0;
@@ -286,12 +286,12 @@ void Contract::check_direction(const Command& command) {
         kTurnMs);
 }
 
-void Contract::heat_until(double time_ms) {
+void SafetyMonitor::heat_until(double time_ms) {
   const double share = -std::expm1((last_.time_ms - time_ms) / kThermalTimeMs);
   heat_n2_ += (dot(last_.force_n, last_.force_n) - heat_n2_) * share;
 }
 
-void Contract::cycle(double time_ms, const DeviceMoment& device) {
+void SafetyMonitor::cycle(double time_ms, const DeviceMoment& device) {
   docked_ = device.docked;
   const double alone_ms = time_ms - last_.time_ms;
   if (!last_.asked.off()) {
@@ -314,7 +314,7 @@ void Contract::cycle(double time_ms, const DeviceMoment& device) {
         kOffMs);
 }
 
-void Contract::end(double time_ms, const std::string& latches, double faults_end_ms) {
+void SafetyMonitor::end(double time_ms, const std::string& latches, double faults_end_ms) {
   outcome_.pushed_again = last_push_ms_ > faults_end_ms;
   if (latches.empty()) return;
   // Counts that lead to no pose may be told from a jump, or from numbers that are none.

@@ -25,11 +25,11 @@ struct DeviceMoment {
 /// they go over the host's end of the wire, reads them by the emulator's geometry, and has the
 /// emulator's clock; it knows nothing of the servo's own state. Times in ms of that clock;
 /// they never go back. One thread.
-class Contract {
+class SafetyMonitor {
  public:
   /// `trusted`: neither sensors nor commands are broken on the way, so the motors' true force must
   /// follow the commands. `scene` and `outcome` outlive it.
-  Contract(const LoadedScene& scene, bool trusted, Outcome& outcome);
+  SafetyMonitor(const LoadedScene& scene, bool trusted, Outcome& outcome);
 
   /// The host has asked for packets of the device.
   void listened(double time_ms) noexcept { listened_ms_ = time_ms; }
@@ -50,7 +50,7 @@ class Contract {
   struct Command {
     double time_ms = 0;
     double tick_ms = 0;  ///< since the last one, no longer than a tick
-    ToldCommand asked;
+    ObservedCommand asked;
     DeviceVec<double> force_n;
   };
 
@@ -73,9 +73,9 @@ class Contract {
   bool trusted_;
   Outcome& outcome_;
   DeviceWire wire_;
-  Outward outward_;
+  OutwardNormal outward_;
 
-  ToldReport told_;               ///< the newest report
+  ObservedReport told_;           ///< the newest report
   bool fresh_ = false;            ///< it came since the last command
   double heard_ms_ = 0;           ///< when
   double listened_ms_ = 0;        ///< the host last asked for one

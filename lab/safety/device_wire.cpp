@@ -58,13 +58,13 @@ DeviceWire::DeviceWire(Personality personality, const std::array<double, 3>& doc
   }
 }
 
-std::optional<ToldReport> DeviceWire::report(std::span<const std::uint8_t> packet) {
+std::optional<ObservedReport> DeviceWire::report(std::span<const std::uint8_t> packet) {
   if (personality_ == Personality::woodenhaptics) return wooden_report(packet);
   if (personality_ == Personality::falcon) {
     const auto said = falcon::decode_report(packet);
     if (!said) return std::nullopt;
-    return ToldReport{said->encoder, (said->buttons & falcon::kButtonCentre) != 0,
-                      std::ranges::all_of(said->homed, [](bool homed) { return homed; })};
+    return ObservedReport{said->encoder, (said->buttons & falcon::kButtonCentre) != 0,
+                          std::ranges::all_of(said->homed, [](bool homed) { return homed; })};
   }
   const auto said = decode_report(packet);
   if (!said) return std::nullopt;
@@ -83,13 +83,13 @@ std::optional<ToldReport> DeviceWire::report(std::span<const std::uint8_t> packe
   }
   packet_number_ = said->counter;
   far_number_.reset();
-  return ToldReport{said->encoder, said->docked, true};
+  return ObservedReport{said->encoder, said->docked, true};
 }
 
-std::optional<ToldReport> DeviceWire::wooden_report(std::span<const std::uint8_t> packet) {
+std::optional<ObservedReport> DeviceWire::wooden_report(std::span<const std::uint8_t> packet) {
   const auto said = wooden::decode_report(packet);
   if (!said) return std::nullopt;
-  ToldReport told;
+  ObservedReport told;
   bool in_pose = true;
   for (std::size_t i = 0; i < 3; ++i) {
     told.count[i] = said->encoder[i];
@@ -106,28 +106,28 @@ std::optional<ToldReport> DeviceWire::wooden_report(std::span<const std::uint8_t
   return told;
 }
 
-std::optional<ToldCommand> DeviceWire::command(std::span<const std::uint8_t> packet) {
+std::optional<ObservedCommand> DeviceWire::command(std::span<const std::uint8_t> packet) {
   switch (personality_) {
     case Personality::falcon: {
       const auto asked = falcon::decode_command(packet);
       if (!asked) return std::nullopt;
-      return ToldCommand{asked->motor, counts_are_set(asked->motor)};
+      return ObservedCommand{asked->motor, counts_are_set(asked->motor)};
     }
     case Personality::woodenhaptics: {
       const auto asked = wooden::decode_command(packet);
       if (!asked) return std::nullopt;
       if (asked->set_encoders) {
         encoders_set_ = true;
-        return ToldCommand{};
+        return ObservedCommand{};
       }
-      return ToldCommand{asked->milliamps, counts_are_set(asked->milliamps)};
+      return ObservedCommand{asked->milliamps, counts_are_set(asked->milliamps)};
     }
     case Personality::omni:
       break;
   }
   const auto asked = decode_command(packet);
   if (!asked) return std::nullopt;
-  return ToldCommand{asked->motor, asked->motors_on};
+  return ObservedCommand{asked->motor, asked->motors_on};
 }
 
 std::optional<ArmPose> DeviceWire::pose(const EncoderCounts& count) const {

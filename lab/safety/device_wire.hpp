@@ -15,14 +15,14 @@ namespace kerf::faults {
 using EncoderCounts = std::array<std::int16_t, 3>;
 
 /// The content of a report, in the words of docs/safety.md.
-struct ToldReport {
+struct ObservedReport {
   EncoderCounts count{};
   bool parked = false;
   bool homed = true;
 };
 
 /// The motor command of a packet of the host.
-struct ToldCommand {
+struct ObservedCommand {
   std::array<std::int16_t, 3> count{};
   bool motors_on = false;
 
@@ -38,9 +38,9 @@ class DeviceWire {
   DeviceWire(Personality personality, const std::array<double, 3>& dock_rad);
 
   /// Empty if it is no report of this device, or an Omni's that is not newer than the last one.
-  [[nodiscard]] std::optional<ToldReport> report(std::span<const std::uint8_t> packet);
+  [[nodiscard]] std::optional<ObservedReport> report(std::span<const std::uint8_t> packet);
   /// Empty if it is no packet of a host.
-  [[nodiscard]] std::optional<ToldCommand> command(std::span<const std::uint8_t> packet);
+  [[nodiscard]] std::optional<ObservedCommand> command(std::span<const std::uint8_t> packet);
 
   /// Where encoders that count so from calibration put the arm; none: it has no such pose.
   [[nodiscard]] std::optional<ArmPose> pose(const EncoderCounts& count) const;
@@ -56,7 +56,7 @@ class DeviceWire {
   void calibrated_at(const EncoderCounts& count) noexcept { dock_count_ = count; }
 
  private:
-  [[nodiscard]] std::optional<ToldReport> wooden_report(std::span<const std::uint8_t> packet);
+  [[nodiscard]] std::optional<ObservedReport> wooden_report(std::span<const std::uint8_t> packet);
 
   Personality personality_;
   int count_end_ = 0;

@@ -30,7 +30,7 @@ namespace {
 /// `port`, `contract` and `time_ms` outlive it.
 class WatchedPort final : public PacketPort {
  public:
-  WatchedPort(PacketPort& port, Contract& contract, const double& time_ms) noexcept
+  WatchedPort(PacketPort& port, SafetyMonitor& contract, const double& time_ms) noexcept
       : port_(port), contract_(contract), time_ms_(time_ms) {}
 
   std::size_t receive(std::span<std::uint8_t> out) noexcept override {
@@ -48,7 +48,7 @@ class WatchedPort final : public PacketPort {
 
  private:
   PacketPort& port_;
-  Contract& contract_;
+  SafetyMonitor& contract_;
   const double& time_ms_;
 };
 
@@ -176,7 +176,7 @@ Outcome run_faults(const Subject& subject, const FaultScript& as_written) {
 
   Outcome outcome;
   const bool trusted = std::ranges::none_of(script.faults, misleads);
-  Contract contract(subject.scene, trusted, outcome);
+  SafetyMonitor contract(subject.scene, trusted, outcome);
   double time_ms = 0;
   WatchedPort port(wire, contract, time_ms);
   VirtualShell shell(scene, *servo, port);

@@ -14,7 +14,7 @@ using vec3::operator+;
 using vec3::operator-;
 using vec3::operator*;
 
-Outward::Outward(const LoadedScene& scene) : scene_(scene) {
+OutwardNormal::OutwardNormal(const LoadedScene& scene) : scene_(scene) {
   const SceneTool& tool = scene.tools[scene.active_tool];
   if (scene.volumes.size() != 1 || tool.shape != "ball" || scene.cut.model != CutModel::none) {
     return;
@@ -25,7 +25,7 @@ Outward::Outward(const LoadedScene& scene) : scene_(scene) {
   radius_mm_ = tool.radius_mm + std::max({spacing[0], spacing[1], spacing[2]});
 }
 
-Outward::Covered Outward::covered(DeviceVec<double> tip_mm) const {
+OutwardNormal::Covered OutwardNormal::covered(DeviceVec<double> tip_mm) const {
   Covered covered;
   if (volume_ == nullptr) return covered;
   const auto& device = scene_.device;
@@ -66,7 +66,7 @@ Outward::Covered Outward::covered(DeviceVec<double> tip_mm) const {
   return covered;
 }
 
-std::optional<DeviceVec<double>> Outward::at(DeviceVec<double> tip_mm) const {
+std::optional<DeviceVec<double>> OutwardNormal::at(DeviceVec<double> tip_mm) const {
   const auto [sum, voxels] = covered(tip_mm);
   constexpr double kOwnMiddle = 0.1;  // of the radius: the way out is unknown
   if (voxels == 0 || vec3::length(sum) < kOwnMiddle * radius_mm_ * voxels) return std::nullopt;

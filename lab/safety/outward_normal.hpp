@@ -12,9 +12,9 @@ namespace kerf::faults {
 /// The direction out of the solid, from the voxels alone: from the middle of the voxels that a ball
 /// of the tool's radius covers, to the ball's own middle. For a scene of one volume that nothing is
 /// cut from, felt with a ball. `scene` outlives it.
-class Outward {
+class OutwardNormal {
  public:
-  explicit Outward(const LoadedScene& scene);
+  explicit OutwardNormal(const LoadedScene& scene);
 
   /// Of length 1, at a tip of the device; empty if the ball covers nothing, or its own middle, or
   /// if the scene is another one.

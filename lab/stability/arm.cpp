@@ -160,16 +160,16 @@ class Rig {
 };
 
 /// The verdict on a latched fault, or on a device that never comes free of the wall.
-constexpr Swing kLost{.swings = true, .active = true};
+constexpr LimitCycle kLost{.swings = true, .active = true};
 
 /// One hit: nothing before the first contact; the verdict after `seconds`. Empty if the hand does
 /// not bring the device to the wall.
-std::optional<Swing> watch_hit(Rig& rig, const Subject& subject, const ArmHit& hit, double seconds,
-                               TickMeter& ticks, const SwingWatch& watch) {
+std::optional<LimitCycle> watch_hit(Rig& rig, const Subject& subject, const ArmHit& hit,
+                                    double seconds, StepCounter& ticks, const SwingWatch& watch) {
   const double rate_hz = 1 / subject.loop.period_s;
   const std::int64_t count = std::llround(seconds * rate_hz);
   constexpr double kPatienceS = 8;  // calibration, the way there, and a stay that chattered away
-  SwingMeter meter(count, subject.loop.quantum_mm, subject.push_n);
+  LimitCycleDetector meter(count, subject.loop.quantum_mm, subject.push_n);
   std::int64_t away = 0;
   // Some steps of the encoders within a second: else friction holds it, and nothing is unstable.
   constexpr double kRestMm = 0.1;
@@ -252,14 +252,14 @@ LoadedScene walls_scene(const Subject& subject) {
   return scene;
 }
 
-Swing hit_with_arm(const LoadedScene& scene, const Subject& subject, double stiffness_n_per_mm,
-                   double seconds, std::uint64_t seed, TickMeter& ticks) {
+LimitCycle hit_with_arm(const LoadedScene& scene, const Subject& subject, double stiffness_n_per_mm,
+                        double seconds, std::uint64_t seed, StepCounter& ticks) {
   const std::array<ArmHit, kArmHits> hits = hits_of(subject, seed);
   Rig rig(cell_scene(scene, subject, stiffness_n_per_mm), subject,
           script_of(subject, hits, seconds));
-  Swing worst;
+  LimitCycle worst;
   for (const ArmHit& hit : hits) {
-    const std::optional<Swing> seen = watch_hit(rig, subject, hit, seconds, ticks, {});
+    const std::optional<LimitCycle> seen = watch_hit(rig, subject, hit, seconds, ticks, {});
     if (!seen && !worst.swings && !worst.active) throw NotMet();
     worst.join(seen.value_or(kLost));
     if (worst.swings && worst.active) break;
@@ -268,7 +268,7 @@ Swing hit_with_arm(const LoadedScene& scene, const Subject& subject, double stif
 }
 
 void watch_arm(const LoadedScene& scene, const Subject& subject, double stiffness_n_per_mm,
-               double seconds, std::uint64_t seed, TickMeter& ticks,
+               double seconds, std::uint64_t seed, StepCounter& ticks,
                const std::function<SwingWatch(std::size_t hit)>& begin) {
   const std::array<ArmHit, kArmHits> hits = hits_of(subject, seed);
   Rig rig(cell_scene(scene, subject, stiffness_n_per_mm), subject,

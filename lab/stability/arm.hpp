@@ -38,15 +38,15 @@ class NotMet : public HilError {
 ///
 /// The subject's delay counts in whole bus cycles of 125 us; encoder and limits are those of
 /// device and servo. Without a hand a spring of 0.2 N/mm pushes. Throws NotMet, or Interrupted.
-[[nodiscard]] Swing hit_with_arm(const LoadedScene& scene, const Subject& subject,
-                                 double stiffness_n_per_mm, double seconds, std::uint64_t seed,
-                                 TickMeter& ticks);
+[[nodiscard]] LimitCycle hit_with_arm(const LoadedScene& scene, const Subject& subject,
+                                      double stiffness_n_per_mm, double seconds, std::uint64_t seed,
+                                      StepCounter& ticks);
 
 /// The same hits one after the other, whatever they show, until the hand no longer brings the
 /// device to the wall: `begin` gives for each who is told of its ticks, by the device's true
 /// mechanics.
 void watch_arm(const LoadedScene& scene, const Subject& subject, double stiffness_n_per_mm,
-               double seconds, std::uint64_t seed, TickMeter& ticks,
+               double seconds, std::uint64_t seed, StepCounter& ticks,
                const std::function<SwingWatch(std::size_t hit)>& begin);
 
 }  // namespace kerf::zwidth

@@ -81,8 +81,8 @@ void Outputs::write(const Part& part) const {
   if (draws_) plot_.write(gnuplot_svg(plot_of(part)));
 }
 
-std::string crossing_text(const Crossing& crossing) {
-  if (crossing.first_n_per_mm == Crossing::kNever) return "above all";
+std::string crossing_text(const StabilityBoundary& crossing) {
+  if (crossing.first_n_per_mm == StabilityBoundary::kNever) return "above all";
   if (crossing.first_n_per_mm == 0) return "below all";
   return format("%.4g", crossing.first_n_per_mm);
 }

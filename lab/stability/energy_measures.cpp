@@ -177,11 +177,11 @@ std::int64_t whole(typename N::Energy energy) {
 template <class N>
 double ledger_ns(const std::vector<Tick<N>>& ticks) {
   EnergyLedger<N> ledger;
-  const Coupling<N> spring{typename N::Ratio(0.4F), {}};
+  const VirtualCoupling<N> spring{typename N::Ratio(0.4F), {}};
   const double ns = fastest_ns([&] {
     for (const Tick<N>& tick : ticks) {
       ledger.move(tick.force_n, tick.moved_mm, 1);
-      const auto spring_n = coupling_force(spring, tick.spring_mm, {});
+      const auto spring_n = virtual_coupling_force(spring, tick.spring_mm, {});
       const ForceParts<N> parts{.felt = true,
                                 .spring = spring_n,
                                 .damping = tick.force_n - spring_n,

@@ -34,16 +34,16 @@ void TickWatch::look() {
     std::fprintf(stderr,
                  "kerf-lab: %s: a step did not end in %d s; give every loop of your law a bound "
                  "that does not depend on its input; a --part keeps the columns that it has\n",
-                 measured.what.c_str(), EndlessStep::kMostSeconds);
+                 measured.what.c_str(), StepWatchdog::kMostSeconds);
     std::_Exit(2);
   }
 }
 
-TickWatch::Watched::Watched(TickWatch& watch, const TickMeter& ticks, std::string what)
+TickWatch::Watched::Watched(TickWatch& watch, const StepCounter& ticks, std::string what)
     : watch_(watch) {
   const std::scoped_lock hold(watch.lock_);
   place_ = watch.measured_.insert(watch.measured_.end(),
-                                  {EndlessStep(pthread_self(), ticks.ticks()), std::move(what)});
+                                  {StepWatchdog(pthread_self(), ticks.ticks()), std::move(what)});
 }
 
 TickWatch::Watched::~Watched() {

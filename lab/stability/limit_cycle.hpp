@@ -20,7 +20,7 @@
 namespace kerf::zwidth {
 
 /// The verdict on a run, by two rules.
-struct Swing {
+struct LimitCycle {
   /// The tip's travel in the last third is above three encoder steps, and at least 0.97 of that in
   /// the middle third: it does not die out.
   bool swings = false;
@@ -32,7 +32,7 @@ struct Swing {
   double port_minimum_mj = 0;  ///< lowest energy of the device port in a run that begins at 0
 
   /// The worse of two runs.
-  void join(const Swing& other) noexcept {
+  void join(const LimitCycle& other) noexcept {
     swings = swings || other.swings;
     active = active || other.active;
     travel_mm = std::max(travel_mm, other.travel_mm);
@@ -50,11 +50,11 @@ struct SwingTick {
 using SwingWatch = std::function<void(const SwingTick&)>;
 
 /// Follows one run of a known number of ticks.
-class SwingMeter {
+class LimitCycleDetector {
  public:
   static constexpr double kGoesOn = 0.97;  ///< travel of a third over that of the one before
 
-  SwingMeter(std::int64_t ticks, double step_mm, double push_n) noexcept
+  LimitCycleDetector(std::int64_t ticks, double step_mm, double push_n) noexcept
       : ticks_(ticks), least_mm_(std::max(3 * step_mm, kLeastMm)), least_mj_(least_mm_ * push_n) {}
 
   /// Once per tick: position of the tip, and energy given by the motors since the start (N mm).
@@ -70,12 +70,12 @@ class SwingMeter {
   }
 
   /// Of a run that has come to rest before its end.
-  [[nodiscard]] Swing rest() const noexcept { return {.port_minimum_mj = port_minimum_mj_}; }
+  [[nodiscard]] LimitCycle rest() const noexcept { return {.port_minimum_mj = port_minimum_mj_}; }
 
-  [[nodiscard]] Swing swing() const noexcept {
+  [[nodiscard]] LimitCycle swing() const noexcept {
     const double before = travel(thirds_[1]), last = travel(thirds_[2]);
     const double gave = thirds_[1].given_mj - thirds_[0].given_mj;
-    Swing swing = rest();
+    LimitCycle swing = rest();
     swing.travel_mm = last;
     swing.given_mj = thirds_[2].given_mj - thirds_[1].given_mj;
     swing.swings = last > least_mm_ && last >= kGoesOn * before;
@@ -108,10 +108,10 @@ struct Interrupted {};
 
 /// Ticks that a column took, and the request to end it half-way. Each thread has its own; others
 /// may read the count.
-class TickMeter {
+class StepCounter {
  public:
-  TickMeter() = default;
-  explicit TickMeter(const std::atomic<bool>& stop) : stop_(&stop) {}
+  StepCounter() = default;
+  explicit StepCounter(const std::atomic<bool>& stop) : stop_(&stop) {}
 
   /// Once per tick. Throws Interrupted within some milliseconds of the request.
   void tick() {
@@ -133,7 +133,7 @@ class TickMeter {
 /// thread cannot be ended: the program reports the law, and ends with 2.
 class TickWatch {
   struct Measured {
-    EndlessStep step;
+    StepWatchdog step;
     std::string what;
   };
 
@@ -144,7 +144,7 @@ class TickWatch {
   /// While it lives, the thread that made it is watched.
   class Watched {
    public:
-    Watched(TickWatch& watch, const TickMeter& ticks, std::string what);
+    Watched(TickWatch& watch, const StepCounter& ticks, std::string what);
     ~Watched();
     Watched(const Watched&) = delete;
     Watched& operator=(const Watched&) = delete;

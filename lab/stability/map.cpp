@@ -27,21 +27,21 @@ namespace {
 /// All cells of one column, each measured once.
 class ColumnRun {
  public:
-  ColumnRun(const MapSpec& spec, const Subject& subject, TickMeter& ticks)
+  ColumnRun(const MapSpec& spec, const Subject& subject, StepCounter& ticks)
       : spec_(spec), subject_(subject), ticks_(ticks) {
     if (spec.arm) scene_ = walls_scene(subject);
   }
 
-  const Swing& at(double stiffness) {
+  const LimitCycle& at(double stiffness) {
     const auto [place, is_new] = known_.try_emplace(stiffness);
     if (is_new) place->second = measure(stiffness);
     return place->second;
   }
 
-  Crossing crossing(bool Swing::*rule) {
+  StabilityBoundary crossing(bool LimitCycle::*rule) {
     const std::vector<double>& grid = spec_.stiffness_n_per_mm;
     const auto bad = [&](double stiffness) { return at(stiffness).*rule; };
-    Crossing found;
+    StabilityBoundary found;
     std::size_t first = 0;
     while (first < grid.size() && !bad(grid[first])) ++first;
     if (first == grid.size()) return found;
@@ -68,12 +68,12 @@ class ColumnRun {
  private:
   /// Until one hit has shown the worst by both rules. The same places in all columns, so that two
   /// columns differ by their values alone, whatever else the map has.
-  Swing measure(double stiffness) {
+  LimitCycle measure(double stiffness) {
     const double seconds = std::max(spec_.seconds, needed_seconds(subject_, stiffness));
     if (spec_.arm) {
       return hit_with_arm(scene_, subject_, stiffness, seconds, spec_.seed, ticks_);
     }
-    Swing worst;
+    LimitCycle worst;
     for (std::size_t hit = 0; hit < kHitsMmPerS.size(); ++hit) {
       const std::uint64_t seed = spec_.seed == 0 ? 0 : (spec_.seed << 32) + hit;
       worst.join(hit_one_axis(subject_, stiffness, kHitsMmPerS[hit], seconds, seed, ticks_));
@@ -84,9 +84,9 @@ class ColumnRun {
 
   const MapSpec& spec_;
   Subject subject_;
-  TickMeter& ticks_;
+  StepCounter& ticks_;
   LoadedScene scene_;  ///< of the whole arm
-  std::map<double, Swing> known_;
+  std::map<double, LimitCycle> known_;
 };
 
 constexpr double kLongestS = 600;  // of a hit: a column of one axis is then some minutes
@@ -104,7 +104,7 @@ double needed_seconds(const Subject& subject, double stiffness_n_per_mm) {
   constexpr double kOfDecay = 0.01;
   const double rate_per_s = ns_per_m / (2 * mass_kg);
   const double slow_s =
-      rate_per_s > 0 ? -std::log(SwingMeter::kGoesOn) / (kOfDecay * rate_per_s) : 0;
+      rate_per_s > 0 ? -std::log(LimitCycleDetector::kGoesOn) / (kOfDecay * rate_per_s) : 0;
   // Let go with the most force for all of the delay, the tip flies until the push has taken the
   // same impulse back.
   const double delay_s = subject.loop.delay_s + subject.loop.period_s;
@@ -143,7 +143,7 @@ std::string impossible(const MapSpec& spec, const Subject& subject) {
                 subject.damping_ns_per_mm, most);
 }
 
-Column measure_column(const MapSpec& spec, const Assignment& values, TickMeter& ticks) {
+Column measure_column(const MapSpec& spec, const Assignment& values, StepCounter& ticks) {
   const Subject subject = subject_of(values);
   Column column;
   if (!impossible(spec, subject).empty()) return column;
@@ -152,8 +152,8 @@ Column measure_column(const MapSpec& spec, const Assignment& values, TickMeter& 
     for (const double stiffness : spec.stiffness_n_per_mm) {
       column.cells.push_back(run.at(stiffness));
     }
-    column.swing = run.crossing(&Swing::swings);
-    column.energy = run.crossing(&Swing::active);
+    column.swing = run.crossing(&LimitCycle::swings);
+    column.energy = run.crossing(&LimitCycle::active);
   } catch (const NotMet&) {
     return {};
   } catch (const LawError& error) {
@@ -172,7 +172,7 @@ void measure_columns(const MapSpec& spec, const std::vector<std::size_t>& wanted
   const auto work = [&] {
     try {
       for (std::size_t i = next++; i < wanted.size() && !stop; i = next++) {
-        TickMeter ticks(stop);
+        StepCounter ticks(stop);
         const TickWatch::Watched watched(watch, ticks, laws_of(columns[wanted[i]]));
         Column column = measure_column(spec, columns[wanted[i]], ticks);
         const std::scoped_lock hold(lock);

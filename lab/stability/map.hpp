@@ -29,7 +29,7 @@ struct MapSpec {
 };
 
 /// The stiffness at which a column stops being fine, by one rule.
-struct Crossing {
+struct StabilityBoundary {
   static constexpr double kNever = std::numeric_limits<double>::infinity();
   /// The first crossing, to 0.5 %; 0: not even the lowest stiffness is fine; kNever: all are.
   double first_n_per_mm = kNever;
@@ -39,8 +39,8 @@ struct Crossing {
 
 /// One combination of the other axes, at all stiffnesses.
 struct Column {
-  std::vector<Swing> cells;  ///< empty: it cannot exist, or the hand never met the wall
-  Crossing swing, energy;
+  std::vector<LimitCycle> cells;  ///< empty: it cannot exist, or the hand never met the wall
+  StabilityBoundary swing, energy;
 };
 using Columns = std::map<std::size_t, Column>;
 
@@ -58,7 +58,7 @@ using Columns = std::map<std::size_t, Column>;
 
 /// The column of `values`. Throws Interrupted.
 [[nodiscard]] Column measure_column(const MapSpec& spec, const Assignment& values,
-                                    TickMeter& ticks);
+                                    StepCounter& ticks);
 
 /// Called with each column as it comes, under a lock, and with the ticks that it took.
 using ColumnDone = std::function<void(std::size_t index, Column column, std::uint64_t ticks)>;

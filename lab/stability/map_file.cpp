@@ -26,14 +26,14 @@ namespace {
 
 constexpr int kFormat = 2;  ///< of a part file
 
-Json json_of(const Crossing& crossing) {
+Json json_of(const StabilityBoundary& crossing) {
   return Json{
       {"first", crossing.first_n_per_mm},  // null: never
       {"re_entry", Json::List{crossing.re_entry_from_n_per_mm, crossing.re_entry_to_n_per_mm}}};
 }
 
-Crossing crossing_in(const Json& json) {
-  Crossing crossing;
+StabilityBoundary crossing_in(const Json& json) {
+  StabilityBoundary crossing;
   if (!json.at("first").is_null()) crossing.first_n_per_mm = json.at("first").get<double>();
   crossing.re_entry_from_n_per_mm = json.at("re_entry").at(0).get<double>();
   crossing.re_entry_to_n_per_mm = json.at("re_entry").at(1).get<double>();
@@ -42,7 +42,7 @@ Crossing crossing_in(const Json& json) {
 
 std::string line_of(std::size_t index, const Column& column) {
   Json cells = Json::List{};
-  for (const Swing& cell : column.cells) {
+  for (const LimitCycle& cell : column.cells) {
     cells.push_back(
         Json::List{cell.swings, cell.active, cell.travel_mm, cell.given_mj, cell.port_minimum_mj});
   }
@@ -162,8 +162,8 @@ std::string gap_of(const Part& part, std::size_t column_count) {
          " columns; run its shard " + shard_text(part.shard) + " again, it resumes";
 }
 
-Json crossing_json(const Crossing& crossing) {
-  const bool all = crossing.first_n_per_mm == Crossing::kNever;
+Json crossing_json(const StabilityBoundary& crossing) {
+  const bool all = crossing.first_n_per_mm == StabilityBoundary::kNever;
   return Json{{"first_n_per_mm", crossing.first_n_per_mm},  // null where all cells are fine
               {"all_fine", all},
               {"re_entry_from_n_per_mm", crossing.re_entry_from_n_per_mm},
@@ -366,7 +366,7 @@ std::string csv_of(const Part& part) {
     std::string head;
     each_axis([&](AxisId axis, const AxisKind&) { head += value_of(columns[index], axis) + ","; });
     for (std::size_t i = 0; i < column.cells.size(); ++i) {
-      const Swing& cell = column.cells[i];
+      const LimitCycle& cell = column.cells[i];
       text += head + number_text(part.spec.stiffness_n_per_mm[i]) + (cell.swings ? ",1" : ",0") +
               (cell.active ? ",1," : ",0,") + number_text(cell.travel_mm) + "," +
               number_text(cell.given_mj) + "," + number_text(cell.port_minimum_mj) + "\n";
@@ -388,7 +388,7 @@ std::string json_of(const Part& part) {
       axes[column_name(kind)] = value_of(values, axis);
     });
     Json cells = Json::List{};
-    for (const Swing& cell : column.cells) {
+    for (const LimitCycle& cell : column.cells) {
       cells.push_back({{"swings", cell.swings},
                        {"active", cell.active},
                        {"travel_mm", cell.travel_mm},

@@ -70,7 +70,8 @@ class OneAxisWall {
 
   DeviceVec<Real> wanted(Real tip_mm) noexcept {
     const Real spring_mm = Real(0) - tip_mm;
-    if (law_ == Law::coupling) return coupling_force(coupling_, along(spring_mm), velocity_);
+    if (law_ == Law::coupling)
+      return virtual_coupling_force(coupling_, along(spring_mm), velocity_);
     if (law_ == Law::own) {
       using Unit = typename N::Unit;
       return force_plan_(force_memory_, {along(tip_mm),
@@ -103,7 +104,7 @@ class OneAxisWall {
 
   Law law_;
   bool limits_on_;
-  Coupling<N> coupling_;
+  VirtualCoupling<N> coupling_;
   Real last_mm_;
   VelocityEstimatorPlan<N> velocity_plan_;
   ForceLawPlan<N> force_plan_;
@@ -125,8 +126,8 @@ double shift_of(std::uint64_t seed) {
 }
 
 /// A run that cannot go on.
-Swing lost(const SwingMeter& meter, double travel_mm = 0, double given_mj = 0) {
-  Swing swing = meter.rest();
+LimitCycle lost(const LimitCycleDetector& meter, double travel_mm = 0, double given_mj = 0) {
+  LimitCycle swing = meter.rest();
   swing.swings = swing.active = true;
   swing.travel_mm = travel_mm;
   swing.given_mj = given_mj;
@@ -134,11 +135,11 @@ Swing lost(const SwingMeter& meter, double travel_mm = 0, double given_mj = 0) {
 }
 
 template <class N>
-Swing hit(const Subject& subject, double stiffness, double hit_mm_per_s, double seconds,
-          std::uint64_t seed, TickMeter& ticks, const SwingWatch& watch) {
+LimitCycle hit(const Subject& subject, double stiffness, double hit_mm_per_s, double seconds,
+               std::uint64_t seed, StepCounter& ticks, const SwingWatch& watch) {
   const SampledLoop& loop = subject.loop;
   const double push_n = loop.coulomb_n + subject.push_n;
-  OneAxis axis(loop, shift_of(seed) * loop.quantum_mm);
+  AxisSimulation axis(loop, shift_of(seed) * loop.quantum_mm);
   axis.start(kStartMm, -hit_mm_per_s);
   OneAxisWall<N> wall(subject, stiffness, axis.encoder_mm());
 
@@ -148,7 +149,7 @@ Swing hit(const Subject& subject, double stiffness, double hit_mm_per_s, double 
                                static_cast<std::int64_t>(kMaxDelayPeriods) +
                                VelocityWindow<N>::kIntervals * VelocityWindow<N>::kMaxStride;
   constexpr double kFarMm = 1e4;  // no motion comes back from there
-  SwingMeter meter(count, loop.quantum_mm, push_n);
+  LimitCycleDetector meter(count, loop.quantum_mm, push_n);
   std::int64_t still = 0;
   for (std::int64_t tick = 0; tick < count; ++tick, ticks.tick()) {
     const double asked_n = wall.force(axis.encoder_mm());
@@ -165,8 +166,9 @@ Swing hit(const Subject& subject, double stiffness, double hit_mm_per_s, double 
 
 }  // namespace
 
-Swing hit_one_axis(const Subject& subject, double stiffness_n_per_mm, double hit_mm_per_s,
-                   double seconds, std::uint64_t seed, TickMeter& ticks, const SwingWatch& watch) {
+LimitCycle hit_one_axis(const Subject& subject, double stiffness_n_per_mm, double hit_mm_per_s,
+                        double seconds, std::uint64_t seed, StepCounter& ticks,
+                        const SwingWatch& watch) {
   switch (subject.numeric) {
     case NumericKind::float32:
       return hit<FloatNumbers>(subject, stiffness_n_per_mm, hit_mm_per_s, seconds, seed, ticks,

@@ -75,7 +75,7 @@ class Thinning {
 };
 
 Curves curves_of_axis(const MapSpec& spec, const Subject& subject, double stiffness,
-                      TickMeter& ticks) {
+                      StepCounter& ticks) {
   Curves curves;
   for (const double speed : kHitsMmPerS) {
     Curve& curve = curves.emplace_back();
@@ -86,7 +86,7 @@ Curves curves_of_axis(const MapSpec& spec, const Subject& subject, double stiffn
 }
 
 Curves curves_of_arm(const MapSpec& spec, const Subject& subject, double stiffness,
-                     TickMeter& ticks) {
+                     StepCounter& ticks) {
   Curves curves(kArmHits);
   watch_arm(walls_scene(subject), subject, stiffness, spec.seconds, spec.seed, ticks,
             [&](std::size_t hit) {
@@ -247,7 +247,7 @@ MapSpec map_of(bool quick, int across, int down) {
 
 /// A first crossing; the ends are those of all maps of the page.
 std::string first_text(double n_per_mm) {
-  if (n_per_mm == Crossing::kNever) return "> 50";
+  if (n_per_mm == StabilityBoundary::kNever) return "> 50";
   return n_per_mm > 0 ? page_number(n_per_mm) : "< 0.05";
 }
 
@@ -276,7 +276,7 @@ Column column_of(const Measure& measure, const Assignment& values, bool arm, boo
 double least_of_seeds(const Measure& measure, const Assignment& values, bool arm, bool quick) {
   constexpr std::uint64_t kSeeds = 3;
   constexpr int kFine = 160;  // steps of 4 %: an island that is narrower is passed over
-  double least = Crossing::kNever;
+  double least = StabilityBoundary::kNever;
   for (std::uint64_t seed = 1; seed <= (quick ? 1 : kSeeds); ++seed) {
     least = std::min(least, first_of(column_of(measure, values, arm, quick, seed, kFine)));
   }
@@ -474,7 +474,7 @@ std::string portraits_of(const MapSpec& spec, const std::vector<std::string>& ce
   TickWatch watch(no_results);
   for (const auto& [stiffness, damping] : places) {
     subject.damping_ns_per_mm = damping;
-    TickMeter ticks;
+    StepCounter ticks;
     const TickWatch::Watched watched(watch, ticks, laws_of(spec.columns().front()));
     const Curves curves = spec.arm ? curves_of_arm(spec, subject, stiffness, ticks)
                                    : curves_of_axis(spec, subject, stiffness, ticks);

@@ -111,10 +111,10 @@ std::string not_written(int error) {
   if (error == EPIPE) return "its reader left before the end; let it read on";
   if (error == ENXIO) return "nobody reads this pipe; start the reader first";
   return "cannot be written (" + std::generic_category().message(error) + "); " +
-         way_out_of(error, "make room or choose another place");
+         remedy_for(error, "make room or choose another place");
 }
 
-NewFile::NewFile(const fs::path& path) : path_(path) {
+AtomicFile::AtomicFile(const fs::path& path) : path_(path) {
   if (is_stream(path)) {
     fd_ = open_stream(path);
     if (fd_ < 0) fail(errno);
@@ -123,7 +123,7 @@ NewFile::NewFile(const fs::path& path) : path_(path) {
     return;
   }
   const auto folder = path.has_parent_path() ? path.parent_path() : ".";
-  if (const std::string why = why_unreachable(folder); !why.empty()) {
+  if (const std::string why = access_error(folder); !why.empty()) {
     throw FileError(path.string() + why);
   }
   std::error_code error;
@@ -144,7 +144,7 @@ NewFile::NewFile(const fs::path& path) : path_(path) {
 }
 
 template <class Take>
-void NewFile::take_name(Take take) {
+void AtomicFile::take_name(Take take) {
   constexpr int kMaxTries = 100;             // names that others have taken
   constexpr std::size_t kLongestStem = 200;  // of 255 bytes that a name may have
   const std::string stem = path_.filename().string().substr(0, kLongestStem) + ".new-" +
@@ -160,13 +160,13 @@ void NewFile::take_name(Take take) {
   fail(errno);
 }
 
-NewFile::~NewFile() {
+AtomicFile::~AtomicFile() {
   if (fd_ >= 0) ::close(fd_);
   const bool waits = state_ == State::pending || state_ == State::swapped;
   if (waits && !temporary_.empty()) ::unlink(temporary_.c_str());
 }
 
-void NewFile::write(const void* data, std::size_t size) {
+void AtomicFile::write(const void* data, std::size_t size) {
   const char* at = static_cast<const char*>(data);
   while (size > 0) {
     const ssize_t written = ::write(fd_, at, size);
@@ -177,7 +177,7 @@ void NewFile::write(const void* data, std::size_t size) {
   }
 }
 
-void NewFile::close() {
+void AtomicFile::close() {
   const bool stored = ::fsync(fd_) == 0 || errno == EINVAL || errno == EROFS;  // pipes cannot
   const int error = errno;
   if (stored && nameless_) return;  // open until it has a name
@@ -185,14 +185,14 @@ void NewFile::close() {
   if (!stored) fail(error);
 }
 
-void NewFile::take_temporary_name() {
+void AtomicFile::take_temporary_name() {
   if (!nameless_ || !temporary_.empty()) return;
   take_name([&](const char* name) {
     return ::linkat(AT_FDCWD, open_file(fd_).c_str(), AT_FDCWD, name, AT_SYMLINK_FOLLOW) == 0;
   });
 }
 
-void NewFile::commit() {
+void AtomicFile::commit() {
   take_temporary_name();
   if (temporary_.empty()) return;
   const char* const from = temporary_.c_str();
@@ -205,7 +205,7 @@ void NewFile::commit() {
   state_ = is_new ? State::created : State::replaced;
 }
 
-bool NewFile::commit_if_new() {
+bool AtomicFile::commit_if_new() {
   take_temporary_name();
   if (temporary_.empty()) return true;
   const char* const from = temporary_.c_str();
@@ -221,21 +221,21 @@ bool NewFile::commit_if_new() {
   return true;
 }
 
-void NewFile::take_back() noexcept {
+void AtomicFile::roll_back() noexcept {
   if (state_ == State::created) ::unlink(path_.c_str());
   if (state_ == State::swapped) {
     ::renameat2(AT_FDCWD, temporary_.c_str(), AT_FDCWD, path_.c_str(), RENAME_EXCHANGE);
   }
 }
 
-void NewFile::fail(int error) const {
+void AtomicFile::fail(int error) const {
   throw FileError(path_.string() + ": " + not_written(error));
 }
 
 void check_new_file(const fs::path& path) {
   // The reader of a pipe would take this for its end.
   if (is_stream(path) && ::access(path.c_str(), W_OK) == 0) return;
-  const NewFile never_committed(path);
+  const AtomicFile never_committed(path);
 }
 
 void check_new_folder(const fs::path& folder) {
@@ -252,46 +252,46 @@ void check_new_folder(const fs::path& folder) {
 }
 
 void write_new_file(const fs::path& path, std::string_view bytes) {
-  NewFile file(path);
+  AtomicFile file(path);
   file.write(bytes.data(), bytes.size());
   file.close();
   file.commit();
 }
 
-NewFile& NewFiles::add(const fs::path& path) {
+AtomicFile& AtomicFiles::add(const fs::path& path) {
   return files_.emplace_back(path).file;
 }
 
 template <class Commit>
-const NewFiles::Named* NewFiles::commit_all(Commit commit) {
+const AtomicFiles::Named* AtomicFiles::commit_all(Commit commit) {
   for (Named& named : files_) named.file.take_temporary_name();
   std::size_t done = 0;
-  const auto take_back = [&] {
-    while (done > 0) files_[--done].file.take_back();
+  const auto roll_back = [&] {
+    while (done > 0) files_[--done].file.roll_back();
   };
   try {
     for (; done < files_.size(); ++done) {
       const Named& named = files_[done];
       if (commit(files_[done].file)) continue;
-      take_back();
+      roll_back();
       return &named;
     }
   } catch (const FileError&) {
-    take_back();
+    roll_back();
     throw;
   }
   return nullptr;
 }
 
-void NewFiles::commit() {
-  static_cast<void>(commit_all([](NewFile& file) {
+void AtomicFiles::commit() {
+  static_cast<void>(commit_all([](AtomicFile& file) {
     file.commit();
     return true;
   }));
 }
 
-std::optional<fs::path> NewFiles::commit_if_new() {
-  const Named* const there = commit_all([](NewFile& file) { return file.commit_if_new(); });
+std::optional<fs::path> AtomicFiles::commit_if_new() {
+  const Named* const there = commit_all([](AtomicFile& file) { return file.commit_if_new(); });
   return there == nullptr ? std::nullopt : std::optional(there->path);
 }
 

@@ -40,12 +40,12 @@ class FileError : public std::runtime_error {
 /// directly.
 ///
 /// Every failure (no folder, no right, disk full) is a FileError that names the final path.
-class NewFile {
+class AtomicFile {
  public:
-  explicit NewFile(const std::filesystem::path& path);
-  ~NewFile();
-  NewFile(const NewFile&) = delete;
-  NewFile& operator=(const NewFile&) = delete;
+  explicit AtomicFile(const std::filesystem::path& path);
+  ~AtomicFile();
+  AtomicFile(const AtomicFile&) = delete;
+  AtomicFile& operator=(const AtomicFile&) = delete;
 
   void write(const void* data, std::size_t size);
   /// Ends writing, on the disk. Some file systems report a full disk only here.
@@ -58,7 +58,7 @@ class NewFile {
   [[nodiscard]] bool commit_if_new();
   /// After either: restores the old state. A file system that cannot swap two names keeps the new
   /// file if it replaced an old one.
-  void take_back() noexcept;
+  void roll_back() noexcept;
 
  private:
   /// Sets `temporary_` to the first free name that `take` could take.
@@ -74,7 +74,7 @@ class NewFile {
   State state_ = State::pending;
 };
 
-/// Throws now what a NewFile at `path` would throw later, except for a pipe without a reader;
+/// Throws now what a AtomicFile at `path` would throw later, except for a pipe without a reader;
 /// leaves nothing behind. For long runs.
 void check_new_file(const std::filesystem::path& path);
 
@@ -89,10 +89,10 @@ void write_new_file(const std::filesystem::path& path, std::string_view bytes);
 /// the old or the new one, and the other may be left beside it as NAME.new-PID-N.
 ///
 /// Throws FileError; then the old files stay, and so does every file of another process.
-class NewFiles {
+class AtomicFiles {
  public:
   /// The caller writes and closes the file.
-  [[nodiscard]] NewFile& add(const std::filesystem::path& path);
+  [[nodiscard]] AtomicFile& add(const std::filesystem::path& path);
   /// Replaces the old files.
   void commit();
   /// Replaces nothing: if one of the names exists, even since a moment ago, returns it, and no file
@@ -103,7 +103,7 @@ class NewFiles {
   struct Named {
     explicit Named(const std::filesystem::path& at) : path(at), file(at) {}
     std::filesystem::path path;
-    NewFile file;
+    AtomicFile file;
   };
   /// Returns the first file that `commit` refused, after undoing the others; null if all succeeded.
   template <class Commit>
@@ -134,7 +134,7 @@ struct OutputFile {
 [[nodiscard]] bool is_same_file(const std::filesystem::path& a, const std::filesystem::path& b);
 
 /// The check of every program before its work. Throws FileError if an output
-/// - cannot be written as a NewFile,
+/// - cannot be written as a AtomicFile,
 /// - has the ending of another kind of file (a volume, a scene, a recording): most likely a slip,
 ///   which would overwrite that file,
 /// - is one of `inputs`, by whatever name, or lies in a folder that is one of them,

@@ -25,7 +25,7 @@ bool reader_left() noexcept {
 
 }  // namespace
 
-const char* way_out_of(int error, const char* usual) noexcept {
+const char* remedy_for(int error, const char* usual) noexcept {
   switch (error) {
     case EMFILE:
       return "raise ulimit -n";
@@ -49,7 +49,7 @@ std::string failure_text() {
     return "memory: none is left; take a smaller volume, free memory, or raise ulimit -v";
   } catch (const std::filesystem::filesystem_error& error) {
     return escaped(error.path1().string()) + ": " + error.code().message() + "; " +
-           way_out_of(error.code().value(), "check the path and its rights");
+           remedy_for(error.code().value(), "check the path and its rights");
   } catch (const std::ios_base::failure& error) {
     return "a file: " + error.code().message() + "; check its disk, or copy it again";
   } catch (const std::system_error& error) {  // of the library itself: no thread
@@ -59,7 +59,7 @@ std::string failure_text() {
   }
 }
 
-std::string why_untold(std::ostream& out) {
+std::string stdout_error(std::ostream& out) {
   errno = 0;
   if (out.flush() || reader_left()) return {};
   int error = errno;
@@ -67,14 +67,14 @@ std::string why_untold(std::ostream& out) {
   if (error == 0 && ::write(STDOUT_FILENO, "\n", 1) < 0) error = errno;
   const std::string reason =
       error != 0 ? std::generic_category().message(error) : "cannot be written";
-  return "standard output: " + reason + "; " + way_out_of(error, "make room, or send it elsewhere");
+  return "standard output: " + reason + "; " + remedy_for(error, "make room, or send it elsewhere");
 }
 
-std::string why_unreachable(const std::filesystem::path& path) {
+std::string access_error(const std::filesystem::path& path) {
   std::error_code fault;
   if (status(path, fault).type() != std::filesystem::file_type::none) return {};
   return ": cannot be reached (" + fault.message() + "); " +
-         way_out_of(fault.value(), "check the permissions of its folders");
+         remedy_for(fault.value(), "check the permissions of its folders");
 }
 
 }  // namespace kerf

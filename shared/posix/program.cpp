@@ -48,7 +48,7 @@ int run_program(const char* program, const std::function<int()>& work) {
   try {
     check_stack();
     const int code = work();
-    const std::string why = why_untold(std::cout);
+    const std::string why = stdout_error(std::cout);
     if (why.empty()) return code;
     std::cerr << program << ": " << why << '\n';
     return code == 0 ? 2 : code;
@@ -76,7 +76,7 @@ std::string today() {
   return text;
 }
 
-std::string shipped_file(const std::string& name) {
+std::string find_data_file(const std::string& name) {
   namespace fs = std::filesystem;
   std::error_code error;
   if (name.empty() || fs::exists(name, error)) return name;

@@ -35,7 +35,7 @@ inline constexpr unsigned long long kLeastStackBytes = 1 << 20;
 /// Path of a file or folder that comes with kerf, such as `scenes/touch.toml`: `name` itself if it
 /// exists, else beside the program or in a folder above it, at most six up. If there is none,
 /// `name`, so that opening it fails with that name. Start-up only.
-[[nodiscard]] std::string shipped_file(const std::string& name);
+[[nodiscard]] std::string find_data_file(const std::string& name);
 
 /// A progress bar on stderr; shows nothing unless it is wanted and stderr is a terminal. The
 /// destructor removes it.

@@ -28,7 +28,7 @@ struct UdpAddress {
 
 /// Only this user and root may use our Unix sockets. Returns the user of the peer of `fd` if it is
 /// another one (-1 if unknown), else nothing.
-[[nodiscard]] inline std::optional<uid_t> stranger_at(int fd) noexcept {
+[[nodiscard]] inline std::optional<uid_t> other_user_at(int fd) noexcept {
   ucred peer{};
   socklen_t length = sizeof peer;
   if (getsockopt(fd, SOL_SOCKET, SO_PEERCRED, &peer, &length) != 0) return static_cast<uid_t>(-1);

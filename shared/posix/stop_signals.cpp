@@ -77,18 +77,18 @@ void at_stop_signal(void (*act)() noexcept) noexcept {
   first_act.store(act);
 }
 
-StopSignalsElsewhere::StopSignalsElsewhere() noexcept {
+BlockStopSignals::BlockStopSignals() noexcept {
   sigset_t asking = asking_signals();
   for (const int signal : {SIGQUIT, SIGABRT})
     sigaddset(&asking, signal);  // abort() unblocks its own
   pthread_sigmask(SIG_BLOCK, &asking, &before_);
 }
 
-StopSignalsElsewhere::~StopSignalsElsewhere() {
+BlockStopSignals::~BlockStopSignals() {
   pthread_sigmask(SIG_SETMASK, &before_, nullptr);
 }
 
-void leave_signals_to_others() noexcept {
+void block_signals() noexcept {
   sigset_t all;
   sigfillset(&all);
   for (const int crash : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGSYS, SIGTRAP}) sigdelset(&all, crash);

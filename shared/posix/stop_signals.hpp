@@ -43,12 +43,12 @@ void at_stop_signal(void (*act)() noexcept) noexcept;
 /// While one of these lives the calling thread leaves signals that ask for the end, and QUIT and
 /// ABRT from outside, to the others, so that those with a right to real time hear of them on a busy
 /// machine too. The other crashes belong to the thread that met them.
-class StopSignalsElsewhere {
+class BlockStopSignals {
  public:
-  StopSignalsElsewhere() noexcept;
-  ~StopSignalsElsewhere();
-  StopSignalsElsewhere(const StopSignalsElsewhere&) = delete;
-  StopSignalsElsewhere& operator=(const StopSignalsElsewhere&) = delete;
+  BlockStopSignals() noexcept;
+  ~BlockStopSignals();
+  BlockStopSignals(const BlockStopSignals&) = delete;
+  BlockStopSignals& operator=(const BlockStopSignals&) = delete;
 
  private:
   sigset_t before_;
@@ -56,7 +56,7 @@ class StopSignalsElsewhere {
 
 /// First thing in a thread whose system calls no signal may cut short: from now on it hears of
 /// crashes alone.
-void leave_signals_to_others() noexcept;
+void block_signals() noexcept;
 
 /// Those of the second kind, for whoever has something to do before they take their course.
 [[nodiscard]] std::span<const int> crash_signals() noexcept;

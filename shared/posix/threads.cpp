@@ -35,7 +35,7 @@ int pin_to_core(int core) noexcept {
   return pthread_setaffinity_np(pthread_self(), sizeof set, &set);
 }
 
-int leave_core(int core) noexcept {
+int avoid_core(int core) noexcept {
   if (core < 0 || core >= CPU_SETSIZE) return EINVAL;
   cpu_set_t set;
   CPU_ZERO(&set);

@@ -27,12 +27,12 @@ namespace kerf {
 
 /// Keeps the calling thread on the other cores that it may use. Returns 0 or the system's error
 /// number; EINVAL, and the thread stays where it is, when there is no other.
-[[nodiscard]] int leave_core(int core) noexcept;
+[[nodiscard]] int avoid_core(int core) noexcept;
 
 /// Runs `work` in a thread of its own. If the system has no thread left, runs it here at once and
 /// returns an empty thread.
 template <class Work>
-[[nodiscard]] std::jthread helper_thread(const Work& work) {
+[[nodiscard]] std::jthread start_worker(const Work& work) {
   try {
     return std::jthread(work);
   } catch (const std::system_error&) {
@@ -44,13 +44,13 @@ template <class Work>
 /// Detects, from another thread, a step that does not end, as an endless loop in a law of the user.
 /// It measures the CPU time of the watched thread, so neither waiting nor a busy machine counts.
 /// Such a thread cannot be ended, only its program.
-class EndlessStep {
+class StepWatchdog {
  public:
   static constexpr int kMostSeconds = 5;  ///< of CPU time for one step; the longest takes some ms
 
   /// Watches a living thread that counts its steps in `steps`.
-  EndlessStep(pthread_t thread, const std::atomic<std::uint64_t>& steps,
-              int most_seconds = kMostSeconds) noexcept
+  StepWatchdog(pthread_t thread, const std::atomic<std::uint64_t>& steps,
+               int most_seconds = kMostSeconds) noexcept
       : steps_(steps), most_seconds_(most_seconds) {
     known_ = pthread_getcpuclockid(thread, &clock_) == 0;
   }

@@ -11,7 +11,7 @@
 namespace kerf {
 
 /// Default of `--name`: the name of a controller and its segment.
-inline constexpr const char* kUsualName = "kerf";
+inline constexpr const char* kDefaultName = "kerf";
 
 /// Kinds of commands.
 enum class CommandKind : std::uint32_t {

@@ -77,7 +77,7 @@ NameLock::NameLock(std::string_view name)
     file_ = OwnedFd(open(path_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0600));
     if (file_.get() < 0) {
       throw SegmentError(path_ + ": " + system_message(errno) + "; " +
-                         way_out_of(errno, "make the folder writable"));
+                         remedy_for(errno, "make the folder writable"));
     }
     if (flock(file_.get(), LOCK_EX | LOCK_NB) != 0) {
       std::array<char, 24> holder{};
@@ -183,7 +183,7 @@ SegmentConnection connect_segment(std::string_view name) {
   OwnedFd link(socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0));
   if (link.get() < 0) {
     throw SegmentError("--name " + std::string(name) + ": " + system_message(errno) + "; " +
-                       way_out_of(errno, "end other programs"));
+                       remedy_for(errno, "end other programs"));
   }
   if (connect(link.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
     throw SegmentAbsent("--name " + std::string(name) + ": " + system_message(errno) + " (" + path +

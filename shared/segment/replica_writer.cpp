@@ -25,7 +25,7 @@ void require_place(bool holds, const char* what, std::uint64_t value) {
 
 }  // namespace
 
-MirrorWriter MirrorWriter::create(const MirrorSpec& spec) {
+ReplicaWriter ReplicaWriter::create(const MirrorSpec& spec) {
   SegmentPlan plan;
   plan.header.session_id = spec.session_id;
   plan.header.config_hash = spec.config_hash;
@@ -42,7 +42,7 @@ MirrorWriter MirrorWriter::create(const MirrorSpec& spec) {
                        " MiB is above " + std::to_string(spec.most_bytes >> 20) +
                        " MiB; allow more or crop the volume");
   }
-  MirrorWriter out(SegmentMemory::create(plan.header.total_bytes));
+  ReplicaWriter out(SegmentMemory::create(plan.header.total_bytes));
   out.header_ = plan.header;
   out.volumes_ = std::move(plan.volumes);
   out.header_.epoch = writing_version(0);
@@ -60,21 +60,21 @@ MirrorWriter MirrorWriter::create(const MirrorSpec& spec) {
   return out;
 }
 
-BrickGrid MirrorWriter::bricks_of(std::size_t volume, std::uint32_t brick) const {
+BrickGrid ReplicaWriter::bricks_of(std::size_t volume, std::uint32_t brick) const {
   require_place(volume < volumes_.size(), "volume", volume);
   const VolumeDescriptor& descriptor = volumes_[volume];
   require_place(brick < descriptor.brick_count, "brick", brick);
   return BrickGrid::of({descriptor.nx, descriptor.ny, descriptor.nz});
 }
 
-void MirrorWriter::put_scene(std::uint64_t offset, std::span<const std::byte> text) {
+void ReplicaWriter::put_scene(std::uint64_t offset, std::span<const std::byte> text) {
   require_place(offset <= header_.scene_bytes && text.size() <= header_.scene_bytes - offset,
                 "scene text at", offset);
   std::copy(text.begin(), text.end(), at(header_.off_scene + offset));
 }
 
-void MirrorWriter::put_labels(std::size_t volume, std::uint32_t brick,
-                              std::span<const std::byte> labels) {
+void ReplicaWriter::put_labels(std::size_t volume, std::uint32_t brick,
+                               std::span<const std::byte> labels) {
   const BrickGrid bricks = bricks_of(volume, brick);
   const std::uint64_t first = volumes_[volume].off_labels;
   require_place(first != 0 && labels.size() == kBrickVoxels * sizeof(Label), "labels of brick",
@@ -90,12 +90,12 @@ void MirrorWriter::put_labels(std::size_t volume, std::uint32_t brick,
   }
 }
 
-void MirrorWriter::begin_pass(Tick tick) noexcept {
+void ReplicaWriter::begin_pass(Tick tick) noexcept {
   words::open(at(offsetof(SegmentHeader, epoch)), writing_version(tick));
 }
 
-void MirrorWriter::put_brick(std::size_t volume, std::uint32_t brick, std::uint64_t version,
-                             std::span<const std::byte> densities) {
+void ReplicaWriter::put_brick(std::size_t volume, std::uint32_t brick, std::uint64_t version,
+                              std::span<const std::byte> densities) {
   static_cast<void>(bricks_of(volume, brick));
   constexpr std::size_t kBytes = kBrickVoxels * sizeof(Density);
   require_place(densities.size() == kBytes && version % 2 == 0 && version != 0, "brick's version",
@@ -107,11 +107,11 @@ void MirrorWriter::put_brick(std::size_t volume, std::uint32_t brick, std::uint6
   words::close(word, version);
 }
 
-void MirrorWriter::end_pass(Tick tick) noexcept {
+void ReplicaWriter::end_pass(Tick tick) noexcept {
   words::close(at(offsetof(SegmentHeader, epoch)), stable_version(tick));
 }
 
-void MirrorWriter::put_record(std::uint64_t index, const TickRecord& record) noexcept {
+void ReplicaWriter::put_record(std::uint64_t index, const TickRecord& record) noexcept {
   if (index < ticks_.published) return;
   TickRecord out = record;
   out.crc32c = tick_record_crc(out);
@@ -119,18 +119,18 @@ void MirrorWriter::put_record(std::uint64_t index, const TickRecord& record) noe
   ticks_.push(out);
 }
 
-void MirrorWriter::put_record(std::uint64_t index, const DirtyRecord& record) noexcept {
+void ReplicaWriter::put_record(std::uint64_t index, const DirtyRecord& record) noexcept {
   if (index < boxes_.published) return;
   boxes_.skip_to(index);
   boxes_.push(record);
 }
 
-void MirrorWriter::beat(std::uint64_t heartbeat_ns) noexcept {
+void ReplicaWriter::beat(std::uint64_t heartbeat_ns) noexcept {
   words::word(at(offsetof(SegmentHeader, heartbeat_ns)))
       .store(heartbeat_ns, std::memory_order_relaxed);
 }
 
-void MirrorWriter::set_lifecycle(Lifecycle lifecycle) noexcept {
+void ReplicaWriter::set_lifecycle(Lifecycle lifecycle) noexcept {
   words::word<std::uint32_t>(at(offsetof(SegmentHeader, lifecycle)))
       .store(static_cast<std::uint32_t>(lifecycle), std::memory_order_release);
 }

@@ -33,10 +33,10 @@ struct MirrorSpec {
 /// The order is put_scene and put_labels (before a reader has the segment), then for each state of
 /// the volume begin_pass, put_brick (0 or more), end_pass. Readers see a pass whole or know that
 /// they do not. What arrives for a place that the segment has not is a `SegmentError`.
-class MirrorWriter {
+class ReplicaWriter {
  public:
   /// Checks `spec`, which may be hostile, before it asks for memory. Throws `SegmentError`.
-  [[nodiscard]] static MirrorWriter create(const MirrorSpec& spec);
+  [[nodiscard]] static ReplicaWriter create(const MirrorSpec& spec);
 
   /// The sealed memfd, for `SegmentServer`; owned by the writer.
   [[nodiscard]] int fd() const noexcept { return memory_.fd(); }
@@ -65,7 +65,7 @@ class MirrorWriter {
   void set_lifecycle(Lifecycle lifecycle) noexcept;
 
  private:
-  explicit MirrorWriter(SegmentMemory memory) noexcept : memory_(std::move(memory)) {}
+  explicit ReplicaWriter(SegmentMemory memory) noexcept : memory_(std::move(memory)) {}
   [[nodiscard]] std::byte* at(std::uint64_t offset) const noexcept {
     return memory_.bytes().data() + offset;
   }

@@ -139,7 +139,7 @@ SegmentMemory SegmentMemory::create(std::uint64_t bytes) {
   const auto fail = [bytes](const char* call) {
     return SegmentError("segment: " + std::string(call) + " of " + std::to_string(bytes >> 20) +
                         " MiB: " + system_message(errno) + "; " +
-                        way_out_of(errno, "crop the volume or free shared memory"));
+                        remedy_for(errno, "crop the volume or free shared memory"));
   };
   SegmentMemory memory;
   memory.fd_ = memfd_create("kerf-segment", MFD_CLOEXEC | MFD_ALLOW_SEALING);

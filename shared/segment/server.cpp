@@ -79,7 +79,7 @@ class Listener {
         bind(fd_.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0 ||
         listen(fd_.get(), SOMAXCONN) != 0) {
       throw SegmentError(path_ + ": " + system_message(errno) + "; " +
-                         way_out_of(errno, "make the folder writable"));
+                         remedy_for(errno, "make the folder writable"));
     }
   }
   ~Listener() { unlink(path_.c_str()); }
@@ -99,7 +99,7 @@ class Listener {
   OwnedFd fd(open(path.c_str(), O_RDONLY | O_CLOEXEC));
   if (fd.get() < 0) {
     throw SegmentError(path + ": " + system_message(errno) + "; " +
-                       way_out_of(errno, "mount /proc"));
+                       remedy_for(errno, "mount /proc"));
   }
   return fd;
 }
@@ -109,7 +109,7 @@ class Listener {
   OwnedFd fd(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK));
   if (fd.get() < 0) {
     throw SegmentError("eventfd: " + system_message(errno) + "; " +
-                       way_out_of(errno, "end other programs"));
+                       remedy_for(errno, "end other programs"));
   }
   return fd;
 }
@@ -157,7 +157,7 @@ struct SegmentServer::State {
   State& operator=(const State&) = delete;
 
   void serve() noexcept {
-    leave_signals_to_others();
+    block_signals();
     const sched_param normal{};
     pthread_setschedparam(pthread_self(), SCHED_OTHER, &normal);
     for (;;) {
@@ -180,7 +180,7 @@ struct SegmentServer::State {
     if (peer.get() < 0 && (errno == EMFILE || errno == ENFILE)) {
       usleep(10'000);  // the caller still waits in the queue: do not spin until a file is free
     }
-    if (peer.get() < 0 || peers.size() >= kMaxPeers || stranger_at(peer.get())) return;
+    if (peer.get() < 0 || peers.size() >= kMaxPeers || other_user_at(peer.get())) return;
     if (send_hello(peer.get(), hello, segment.get())) peers.push_back(std::move(peer));
   }
 

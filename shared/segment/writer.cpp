@@ -25,7 +25,7 @@ struct MirroredVolume {
   std::byte* versions = nullptr;
   std::byte* content = nullptr;
   std::span<const Density> linear;
-  DirtyBricks dirty;
+  BrickSet dirty;
 
   /// Copies the rows of brick `id` that `changed` touches. Whole rows of 8, because a word of the
   /// segment holds four voxels and a row lies in one cache line or two.
@@ -96,7 +96,7 @@ SegmentWriter SegmentWriter::create(const SegmentSpec& spec) {
                               .versions = base + descriptor.off_versions,
                               .content = base + descriptor.off_bricks,
                               .linear = source.density,
-                              .dirty = DirtyBricks(spec.mirror_updates ? bricks : BrickGrid{})});
+                              .dirty = BrickSet(spec.mirror_updates ? bricks : BrickGrid{})});
     for (std::uint32_t id = 0; id < bricks.count(); ++id)
       state->volumes.back().copy(id, source.grid.box(), 0);
     state->volumes.back().linear = {};  // the source may go after `create`

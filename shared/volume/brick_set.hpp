@@ -14,9 +14,9 @@ namespace kerf {
 /// The bricks of one volume that wait to be copied: one bit each, taken round-robin by words of 64,
 /// so that with a budget of 64 or more no brick starves, however much changes. Allocates only in
 /// the constructor.
-class DirtyBricks {
+class BrickSet {
  public:
-  explicit DirtyBricks(const BrickGrid& bricks) : bricks_(bricks), bits_(bricks.count() / 64 + 1) {}
+  explicit BrickSet(const BrickGrid& bricks) : bricks_(bricks), bits_(bricks.count() / 64 + 1) {}
 
   [[nodiscard]] std::uint32_t waiting() const noexcept { return waiting_; }
 

@@ -138,12 +138,12 @@ class Turn {
 /// (`--hand-socket`) in each frame, one a packet. Whole numbers, so that every packet of the right
 /// length is a position within the limits below. `GuidedHand` decides how the hand follows it, and
 /// when targets stop.
-struct HandWish {
+struct HandTarget {
   DeviceVec<double> tip_mm;                 ///< in steps of 1 um, each axis up to kMaxWishMm
   std::array<double, 3> orientation_rad{};  ///< as of `HandGoal`, up to kMaxWishRad each
   bool button1 = false, button2 = false;
   bool park = false;  ///< go to the rest pose, stay there a moment, and come back
-  friend bool operator==(const HandWish&, const HandWish&) noexcept = default;
+  friend bool operator==(const HandTarget&, const HandTarget&) noexcept = default;
 };
 
 inline constexpr double kMaxWishMm = 500;  ///< from the device's origin: no arm of these is longer
@@ -159,7 +159,7 @@ inline constexpr std::array<std::uint8_t, 8> kHandWishMagic{'k', 'e', 'r', 'f', 
 enum class HandGreeting : std::uint8_t { yours, taken };
 using HandGreetingBytes = std::array<std::uint8_t, 9>;
 
-[[nodiscard]] inline HandWishBytes encode(const HandWish& wish) noexcept {
+[[nodiscard]] inline HandWishBytes encode(const HandTarget& wish) noexcept {
   constexpr double kSteps = 1e6;  // urad per rad; mm become um with a thousandth of it
   const auto steps = [](double value, double most, double per_unit) {
     const double within = value == value ? std::clamp(value, -most, most) : 0.0;
@@ -178,7 +178,7 @@ using HandGreetingBytes = std::array<std::uint8_t, 9>;
 }
 
 /// Nothing for a packet of another kind or version. Numbers are clamped to the limits.
-[[nodiscard]] inline std::optional<HandWish> decode_hand_wish(
+[[nodiscard]] inline std::optional<HandTarget> decode_hand_wish(
     std::span<const std::uint8_t> bytes) noexcept {
   if (bytes.size() != kHandWishBytes ||
       !std::equal(kHandWishMagic.begin(), kHandWishMagic.end(), bytes.begin()) || bytes[32] > 7) {
@@ -188,7 +188,7 @@ using HandGreetingBytes = std::array<std::uint8_t, 9>;
     const auto steps = static_cast<std::int32_t>(wire::get_u32(bytes, at));
     return std::clamp(steps * unit, -most, most);
   };
-  HandWish wish;
+  HandTarget wish;
   wish.tip_mm = {value(8, kMaxWishMm, 1e-3), value(12, kMaxWishMm, 1e-3),
                  value(16, kMaxWishMm, 1e-3)};
   for (std::size_t i = 0; i < 3; ++i) {

@@ -71,11 +71,11 @@ TEST_CASE("an address that is none is refused in one line that keeps the token t
 
 TEST_CASE("a fingerprint is 64 hex digits, with colons or without, and excludes a CA") {
   const std::string plain(64, 'a');
-  CHECK_NOTHROW(ServerTrust("host", "", ""));
-  CHECK_NOTHROW(ServerTrust("host", "", plain));
-  CHECK_NOTHROW(ServerTrust("host", "", "AB:cd:" + plain.substr(4)));
-  CHECK_THROWS_AS(ServerTrust("host", "", plain.substr(1)), BridgeError);
-  CHECK_THROWS_AS(ServerTrust("host", "", plain + "0"), BridgeError);
-  CHECK_THROWS_AS(ServerTrust("host", "", plain.substr(1) + "g"), BridgeError);
-  CHECK_THROWS_AS(ServerTrust("host", "ca.pem", plain), BridgeError);
+  CHECK_NOTHROW(CertificateCheck("host", "", ""));
+  CHECK_NOTHROW(CertificateCheck("host", "", plain));
+  CHECK_NOTHROW(CertificateCheck("host", "", "AB:cd:" + plain.substr(4)));
+  CHECK_THROWS_AS(CertificateCheck("host", "", plain.substr(1)), BridgeError);
+  CHECK_THROWS_AS(CertificateCheck("host", "", plain + "0"), BridgeError);
+  CHECK_THROWS_AS(CertificateCheck("host", "", plain.substr(1) + "g"), BridgeError);
+  CHECK_THROWS_AS(CertificateCheck("host", "ca.pem", plain), BridgeError);
 }

@@ -131,14 +131,14 @@ TEST_CASE("what does not fit is refused, and the picture stays until a whole pas
   };
   refused([](FarEnd& far, Sender& sender) {
     sender.set_hash += 1;
-    CHECK_THROWS_AS(far.apply(sender.frame_of({{3, 20}}, 9, kLastOfPass)), OutOfStep);
+    CHECK_THROWS_AS(far.apply(sender.frame_of({{3, 20}}, 9, kLastOfPass)), StreamOutOfSync);
   });
   refused([](FarEnd& far, Sender& sender) {
     static_cast<void>(sender.frame_of({{3, 20}}, 9, 0));  // lost
-    CHECK_THROWS_AS(far.apply(sender.frame_of({{4, 20}}, 9, kLastOfPass)), OutOfStep);
+    CHECK_THROWS_AS(far.apply(sender.frame_of({{4, 20}}, 9, kLastOfPass)), StreamOutOfSync);
   });
   refused([](FarEnd& far, Sender& sender) {
-    CHECK_THROWS_AS(far.apply(sender.frame_of({{2, 20}}, 9, 0)), OutOfStep);  // again
+    CHECK_THROWS_AS(far.apply(sender.frame_of({{2, 20}}, 9, 0)), StreamOutOfSync);  // again
   });
   refused([](FarEnd& far, Sender&) {
     Sender foreign(8);
@@ -154,7 +154,7 @@ TEST_CASE("what does not fit is refused, and the picture stays until a whole pas
             far.apply(sender.frame_of({{2, version}}, 9, 0));
           }
         }(),
-        OutOfStep);  // a pass without end would fill the memory
+        StreamOutOfSync);  // a pass without end would fill the memory
   });
 }
 
@@ -162,11 +162,11 @@ TEST_CASE("a first pass with a hole is no picture, though its hash is right") {
   FarEnd far;
   Sender sender(7);
   far.greet(sender);
-  CHECK_THROWS_AS(far.apply(sender.frame_of({}, 3, kLastOfPass)), OutOfStep);
+  CHECK_THROWS_AS(far.apply(sender.frame_of({}, 3, kLastOfPass)), StreamOutOfSync);
   CHECK(!seen());
   CHECK_THROWS_AS(Mirror("else", kEnough, refuse).frame(sender.frame_of({}, 3, 0), 0, 0),
-                  OutOfStep);
-  CHECK_THROWS_AS(Mirror("else", kEnough, refuse).records(sender.record(0, 0)), OutOfStep);
+                  StreamOutOfSync);
+  CHECK_THROWS_AS(Mirror("else", kEnough, refuse).records(sender.record(0, 0)), StreamOutOfSync);
 }
 
 TEST_CASE("a join that is cut off goes on where nothing has to come twice, and still checks all") {
@@ -295,7 +295,7 @@ TEST_CASE("a name that is taken, another layout and a segment too large are told
 }
 
 TEST_CASE("a local reader's command gets the far side's answer, or is told that there is none") {
-  CommandDesk desk;
+  RemoteCommand desk;
   std::atomic<bool> done{false};
   std::atomic<std::uint32_t> kind{0};
   std::thread far([&] {
@@ -306,13 +306,13 @@ TEST_CASE("a local reader's command gets the far side's answer, or is told that 
       if (sent->argument == 1) desk.answer({kReplyMagic, sent->sequence - 1, 0, 4});  // late
       if (sent->argument <= 1) desk.answer({kReplyMagic, sent->sequence, 0, 9});
       if (sent->argument == 2) desk.answer({kReplyMagic, sent->sequence, 77, 0});
-      if (sent->argument == 3) desk.set_link(CommandDesk::Link::down);
+      if (sent->argument == 3) desk.set_link(RemoteCommand::Link::down);
     }
   });
   CHECK(desk.ask({}).status == ReplyStatus::busy);  // no connection: try again
-  desk.set_link(CommandDesk::Link::read_only);
+  desk.set_link(RemoteCommand::Link::read_only);
   CHECK(desk.ask({}).status == ReplyStatus::refused);
-  desk.set_link(CommandDesk::Link::open);
+  desk.set_link(RemoteCommand::Link::open);
   for (const std::uint32_t argument : {0U, 1U}) {
     const Reply reply = desk.ask({.kind = CommandKind::select_tool, .argument = argument});
     CHECK(reply.status == ReplyStatus::accepted);

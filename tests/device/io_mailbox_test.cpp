@@ -35,7 +35,7 @@ bool is_whole(const Bytes& bytes) {
 }  // namespace
 
 TEST_CASE("an inbox gives packets in their order and tells when it is full") {
-  kerf::Inbox inbox;
+  kerf::SpscRing inbox;
   Bytes out{};
   CHECK(inbox.take(out) == 0);
   int put = 0;
@@ -49,7 +49,7 @@ TEST_CASE("an inbox gives packets in their order and tells when it is full") {
 }
 
 TEST_CASE("a packet longer than the reader's room is cut, and its size told") {
-  kerf::Inbox inbox;
+  kerf::SpscRing inbox;
   CHECK(inbox.put(packet(1, 2)));
   std::array<std::uint8_t, 4> little{};
   CHECK(inbox.take(little) == 16);
@@ -57,7 +57,7 @@ TEST_CASE("a packet longer than the reader's room is cut, and its size told") {
 }
 
 TEST_CASE("an outbox gives the newest packet, and what is older is void") {
-  kerf::Outbox outbox;
+  kerf::LatestCommand outbox;
   Bytes out{};
   CHECK(outbox.take(out) == 0);
   for (const int waiting : {1, 3, 8}) {
@@ -73,7 +73,7 @@ TEST_CASE("an outbox gives the newest packet, and what is older is void") {
 }
 
 TEST_CASE("a reader that was held up for 50 ticks sends nothing of these but the last") {
-  kerf::Outbox outbox;
+  kerf::LatestCommand outbox;
   Bytes out{};
   for (std::uint8_t tick = 0; tick < 50; ++tick) CHECK(outbox.put(packet(1, tick)));
   CHECK(outbox.take(out) == 16);
@@ -83,7 +83,7 @@ TEST_CASE("a reader that was held up for 50 ticks sends nothing of these but the
 
 TEST_CASE("packets of several threads reach the reader whole, each thread's in its order") {
   constexpr int kSenders = 3, kEach = 20'000;
-  kerf::Outbox outbox;
+  kerf::LatestCommand outbox;
   std::atomic<int> sending{kSenders};
   std::vector<std::thread> senders;
   for (int sender = 0; sender < kSenders; ++sender) {

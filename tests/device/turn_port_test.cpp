@@ -17,12 +17,12 @@ using Bytes = std::vector<std::uint8_t>;
 
 struct Line {
   kerf::test::FakePort* end = nullptr;
-  std::unique_ptr<kerf::TurnPort> port;
+  std::unique_ptr<kerf::LockStepPort> port;
 
   Line() {
     auto fake = std::make_unique<kerf::test::FakePort>();
     end = fake.get();
-    port = std::make_unique<kerf::TurnPort>(std::move(fake));
+    port = std::make_unique<kerf::LockStepPort>(std::move(fake));
   }
   Bytes take() const {
     std::array<std::uint8_t, 64> out{};
@@ -31,7 +31,7 @@ struct Line {
   }
 };
 
-Bytes turn_of(const std::vector<Bytes>& packets) {
+Bytes orientation_of(const std::vector<Bytes>& packets) {
   Turn turn;
   for (const Bytes& packet : packets) REQUIRE(turn.add(packet));
   return {turn.bytes().begin(), turn.bytes().end()};
@@ -41,9 +41,9 @@ Bytes turn_of(const std::vector<Bytes>& packets) {
 
 TEST_CASE("the packets of a turn come one by one, those of the next only after a wait") {
   const Line line;
-  line.end->push(turn_of({{1, 2, 3}, {4}}));
-  line.end->push(turn_of({}));
-  line.end->push(turn_of({{5, 6}}));
+  line.end->push(orientation_of({{1, 2, 3}, {4}}));
+  line.end->push(orientation_of({}));
+  line.end->push(orientation_of({{5, 6}}));
   CHECK(line.port->wait(0));
   CHECK(line.take() == Bytes{1, 2, 3});
   CHECK(line.take() == Bytes{4});
@@ -66,7 +66,7 @@ TEST_CASE("what comes without a turn passes as it is") {
 
 TEST_CASE("a broken turn gives what is whole of it and reads nothing beyond") {
   const Line line;
-  Bytes cut = turn_of({{1, 2}, {3, 4, 5}});
+  Bytes cut = orientation_of({{1, 2}, {3, 4, 5}});
   cut.pop_back();
   line.end->push(cut);
   CHECK(line.port->wait(0));

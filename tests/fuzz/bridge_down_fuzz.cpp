@@ -50,7 +50,7 @@ void allowed_to_refuse(Act act) {
   try {
     act();
   } catch (const WireError&) {
-  } catch (const OutOfStep&) {
+  } catch (const StreamOutOfSync&) {
   } catch (const SegmentError&) {
   }
 }

@@ -84,7 +84,7 @@ std::string read_it(const fs::path& path) {
     } else {
       static_cast<void>(kerf::read_volume(path, {.cpu_s = kCpuSeconds}));
     }
-  } catch (const kerf::SceneError& error) {
+  } catch (const kerf::LoadError& error) {
     const std::string message = error.what();
     const bool ended = message.find(" ended without a word") != message.npos;
     const std::string found = ended ? errors.text() : "";

@@ -178,9 +178,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   try {
     servo = kerf::plan_scene(scene);
     // As the controller refuses it, before any memory of its volumes is taken.
-    if (!kerf::over_budget(scene, servo->costs()).empty()) return 0;
+    if (!kerf::budget_error(scene, servo->costs()).empty()) return 0;
     servo->take(scene);
-  } catch (const kerf::SceneError&) {
+  } catch (const kerf::LoadError&) {
     return 0;
   }
   kerf::FakeArm arm;

@@ -10,7 +10,7 @@
 
 /// The file, and what is made of a mesh that passes.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  kerf::fuzz::must_read_or_explain<kerf::SceneError>(data, size, [](std::string_view bytes) {
+  kerf::fuzz::must_read_or_explain<kerf::LoadError>(data, size, [](std::string_view bytes) {
     kerf::ToolMesh mesh = kerf::join_triangles(kerf::parse_stl(bytes, "bur.stl"), 1, "bur.stl");
     static_cast<void>(kerf::mesh_surface_samples(mesh, 64));
     if (kerf::mesh_side_vox(mesh, 0.25) <= kerf::kMaxToolSide) {

@@ -13,7 +13,7 @@ namespace {
 using kerf::DeviceVec;
 using kerf::GuidedHand;
 using kerf::HandGoal;
-using kerf::HandWish;
+using kerf::HandTarget;
 
 constexpr double kStiffness = 0.5;  // N/mm
 
@@ -42,7 +42,7 @@ double follow(GuidedHand& hand, DeviceVec<double>& tip_mm, double seconds) {
 }
 
 /// The same of a user who goes on wishing.
-void lead(GuidedHand& hand, DeviceVec<double>& tip_mm, const HandWish& wish, double seconds) {
+void lead(GuidedHand& hand, DeviceVec<double>& tip_mm, const HandTarget& wish, double seconds) {
   for (int frames = static_cast<int>(seconds * 50); frames > 0; --frames) {
     hand.wish(wish);
     follow(hand, tip_mm, 0.02);
@@ -111,16 +111,16 @@ TEST_CASE("without wishes it presses no more, then withdraws to its start: strai
 }
 
 TEST_CASE("a wish survives its packet, within its limits; whatever else comes is none") {
-  const HandWish wish{.tip_mm = {1.5, -2.25, 499},
-                      .orientation_rad = {0.5, -0.25, 0},
-                      .button2 = true,
-                      .park = true};
+  const HandTarget wish{.tip_mm = {1.5, -2.25, 499},
+                        .orientation_rad = {0.5, -0.25, 0},
+                        .button2 = true,
+                        .park = true};
   const auto bytes = encode(wish);
   CHECK(kerf::decode_hand_wish(bytes) == wish);
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const double huge = std::numeric_limits<double>::infinity();
   const auto odd = kerf::decode_hand_wish(
-      encode(HandWish{.tip_mm = {nan, huge, -huge}, .orientation_rad = {nan, 9, -9}}));
+      encode(HandTarget{.tip_mm = {nan, huge, -huge}, .orientation_rad = {nan, 9, -9}}));
   REQUIRE(odd);
   CHECK(odd->tip_mm == DeviceVec<double>{0, kerf::kMaxWishMm, -kerf::kMaxWishMm});
   CHECK(odd->orientation_rad[1] == doctest::Approx(kerf::kMaxWishRad));

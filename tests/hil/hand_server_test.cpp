@@ -17,7 +17,7 @@
 namespace {
 
 using kerf::HandGreeting;
-using kerf::HandWish;
+using kerf::HandTarget;
 
 constexpr int kLook = kerf::kCyclesPerSecond / 20;
 
@@ -73,7 +73,7 @@ TEST_CASE("one window leads the hand; a second is told, and may once the first h
   const FakeWindow second(path.text());
   server.lead(emulator, kLook);
   CHECK(second.greeting() == HandGreeting::taken);
-  first->send(encode(HandWish{}));
+  first->send(encode(HandTarget{}));
   server.lead(emulator, 1);
   CHECK(server.wishes() == 1);
   first.reset();
@@ -90,7 +90,7 @@ TEST_CASE("what is no wish is dropped and counted, and a flood is taken in parts
   kerf::Emulator& emulator = hand.emulator;
   const FakeWindow window(path.text());
   server.lead(emulator, kLook);
-  const auto wish = encode(HandWish{});
+  const auto wish = encode(HandTarget{});
   std::array<std::uint8_t, 200> noise{};
   window.send(noise);
   window.send(std::span(wish).first(20));

@@ -18,7 +18,7 @@
 
 namespace {
 
-using kerf::HelloLink;
+using kerf::HandshakeLink;
 using kerf::LinkHello;
 using kerf::Personality;
 using Sent = kerf::PacketLink::Sent;
@@ -54,7 +54,7 @@ class FakeClient final : public kerf::PacketLink {
 
 struct Meeting {
   FakeClient client;
-  HelloLink link{client, kOwn};
+  HandshakeLink link{client, kOwn};
   std::array<std::uint8_t, 65> buffer{};
 };
 

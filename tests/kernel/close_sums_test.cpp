@@ -64,7 +64,7 @@ Point place(const Samples& samples, std::size_t k, double reach) {
           samples.offset[2][k] * reach / 32768};
 }
 
-std::unique_ptr<Samples> taken(const CloseCells<FixedNumbers>& cells, double reach,
+std::unique_ptr<Samples> taken(const DenseSamples<FixedNumbers>& cells, double reach,
                                const Point& at) {
   auto samples = std::make_unique<Samples>();
   std::int32_t offset[3] = {};
@@ -184,7 +184,7 @@ TEST_CASE("a closer look takes all samples around a place, and of too many a par
   for (const double pitch : {0.5, kClosePitch, 0.2, 0.1}) {
     const auto surface = plate(8, thin, pitch);
     const double reach = reach_of(surface);
-    const CloseCells<FixedNumbers> cells(surface, reach);
+    const DenseSamples<FixedNumbers> cells(surface, reach);
     for (const Point& at : {Point{0.2, 0.1, 0}, Point{8, 8, 0}, Point{-8, 3, 0}}) {
       const auto samples = taken(cells, reach, at);
       CAPTURE(pitch);
@@ -203,7 +203,7 @@ TEST_CASE("a closer look takes all samples around a place, and of too many a par
   // Few enough: all within kCloseRadius, and of the others those of cells that it reaches.
   const auto surface = plate(8, thin, 0.5);
   const double reach = reach_of(surface);
-  const CloseCells<FixedNumbers> cells(surface, reach);
+  const DenseSamples<FixedNumbers> cells(surface, reach);
   const Point at{1.3, -2.2, 0};
   const auto samples = taken(cells, reach, at);
   const auto within = std::ranges::count_if(surface, [&](const SurfaceSample& sample) {
@@ -230,7 +230,7 @@ TEST_CASE("what a closeup tells moves on with the look, without a jump") {
   // goes from one to the other.
   const auto surface = plate(10, 8, kClosePitch);
   const double reach = reach_of(surface);
-  const CloseCells<FixedNumbers> cells(surface, reach);
+  const DenseSamples<FixedNumbers> cells(surface, reach);
   const auto height_at = [&](double x) {
     const auto samples = taken(cells, reach, {x, 0, 4});
     const PointTable<FixedNumbers> table = samples->table();

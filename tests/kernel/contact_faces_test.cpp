@@ -110,7 +110,7 @@ TEST_CASE("no group of samples has its middle outside of the tool's reach") {
   // Levers beyond it would leave 31 bits on the way to places.
   for (double radius = 0.5; radius < 31; radius *= 1.007) {
     const SampledTool ball(tool_of_units("ball", radius, 2 * radius));
-    const ToolPoints<FixedNumbers> tool(ball.samples, true);
+    const PointShellTable<FixedNumbers> tool(ball.samples, true);
     const PointTable<FixedNumbers> table = tool.point_shell().table;
     double farthest = 0;
     for (std::int32_t group = 0; group < table.groups; ++group) {

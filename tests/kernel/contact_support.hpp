@@ -13,12 +13,12 @@ namespace kerf::test {
 using namespace extremes;
 
 template <class N>
-ToolTurn<N> tool_turn(const std::array<Point, 3>& rotation) {
-  TurnRows<N> rows;
+Orientation<N> tool_turn(const std::array<Point, 3>& rotation) {
+  RotationRows<N> rows;
   for (std::size_t i = 0; i < 3; ++i) {
     for (std::size_t j = 0; j < 3; ++j) rows[i][j] = typename N::Unit(rotation[i][j]);
   }
-  return turn_of<N>(rows);
+  return orientation_of<N>(rows);
 }
 
 /// Rows of the rotation that takes the tool's y axis to `axis`.

@@ -297,7 +297,7 @@ TEST_CASE_TEMPLATE("no tick of a sweep spends more than a scene is planned with"
                               dice.turn<N>(dice.uniform(0, 3))};
       rig.field().begin_tick();
       SweepMemory<N> memory;
-      ProxySweep<N, ContactQuery<N>>(rig.field(), pose, memory, {}, rig.turn_step()).tick(goal);
+      ProxySweep<N, ContactQuery<N>>(rig.field(), pose, memory, {}, rig.rotation_step()).tick(goal);
       most = std::max(most, rig.field().spent());
     }
     CHECK(most <= work.most());

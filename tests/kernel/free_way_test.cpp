@@ -64,9 +64,9 @@ TEST_CASE_TEMPLATE(
       if (k == 1) move[0] = move[2] = 0;
       if (k == 2) move = {};
       const double radius = dice.uniform(0, 6), size = std::max(1.0, length(move));
-      const FreeBricks bricks = map.bricks();
-      const FreeWay<N> way(bricks, {number<N>(move[0]), number<N>(move[1]), number<N>(move[2])},
-                           number<N>(size + 0.001));
+      const FreeSpaceMap bricks = map.bricks();
+      const FreePath<N> way(bricks, {number<N>(move[0]), number<N>(move[1]), number<N>(move[2])},
+                            number<N>(size + 0.001));
       const PointNumber<N> start[3] = {number<N>(from[0]), number<N>(from[1]), number<N>(from[2])};
       constexpr std::int64_t kMost = 10000;
       std::int64_t left = kMost;
@@ -102,9 +102,9 @@ TEST_CASE_TEMPLATE(
   CHECK(whole > cases(400));
   CHECK(none > cases(400) / 40);
   CHECK(part > cases(400) / 8);
-  const FreeBricks unknown;
+  const FreeSpaceMap unknown;
   std::int64_t left = 5;
-  const FreeWay<N> way(unknown, {number<N>(1), number<N>(1), number<N>(1)}, number<N>(2));
+  const FreePath<N> way(unknown, {number<N>(1), number<N>(1), number<N>(1)}, number<N>(2));
   CHECK(way.free_up_to({number<N>(5), number<N>(5), number<N>(5)}, 1, 0, kWholeMove<N>, left) == 0);
 }
 
@@ -113,8 +113,8 @@ TEST_CASE_TEMPLATE("from outside no way is free for a sphere that the map cannot
   std::vector<Density> density(kGrid.voxel_count(), 0);
   density[kGrid.index(25, 20, 22)] = 9;
   const FreeBrickMap map(kGrid, density, 9);
-  const FreeBricks bricks = map.bricks();
-  const FreeWay<N> way(bricks, {number<N>(0), number<N>(0), number<N>(-10)}, number<N>(10.001));
+  const FreeSpaceMap bricks = map.bricks();
+  const FreePath<N> way(bricks, {number<N>(0), number<N>(0), number<N>(-10)}, number<N>(10.001));
   // 70 voxels above the volume: 92 from where the voxel is read.
   const PointNumber<N> start[3] = {number<N>(25), number<N>(20), number<N>(115)};
   for (const double radius : {40.0, 63.0, 64.0, 90.0, 91.9, 92.1, 200.0}) {

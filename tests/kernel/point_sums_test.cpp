@@ -33,11 +33,11 @@ bool same(const Sums& a, const Sums& b) {
 }
 
 /// Some samples of a sphere, the last group not full.
-ToolPoints<FixedNumbers> some_shell(int count, double radius, bool round) {
+PointShellTable<FixedNumbers> some_shell(int count, double radius, bool round) {
   Dice dice(static_cast<std::uint32_t>(count));
   std::vector<Point> samples;
   for (int i = 0; i < count; ++i) samples.push_back(radius * dice.direction());
-  return ToolPoints<FixedNumbers>(samples, round);
+  return PointShellTable<FixedNumbers>(samples, round);
 }
 
 /// Any densities, or walls of them between air.
@@ -82,9 +82,9 @@ TEST_CASE("every instruction set sums a point point_shell to the bit, wherever i
       const TestVolume volume = hard_field(grid, kind, dice);
       for (const int count : {1, 16, 47, 96}) {
         const bool round = count % 2 == 0;
-        const ToolPoints<FixedNumbers> tool = some_shell(count, count == 1 ? 0.5 : 4.5, round);
+        const PointShellTable<FixedNumbers> tool = some_shell(count, count == 1 ? 0.5 : 4.5, round);
         const PointShell<FixedNumbers> point_shell = tool.point_shell();
-        PlaceMemory<FixedNumbers> memory, truth_memory;
+        TransformedShell<FixedNumbers> memory, truth_memory;
         memory.hold(point_shell);
         truth_memory.hold(point_shell);
         const std::int32_t whole = count / kPointGroup * kPointGroup;  // groups to be read
@@ -96,7 +96,7 @@ TEST_CASE("every instruction set sums a point point_shell to the bit, wherever i
         field.free = map.bricks();
         for (int i = 0; i < cases(1250); ++i) {
           const PointStep<FixedNumbers> step = any_step(point_shell, dice);
-          place_points<FixedNumbers>(point_shell.table, step, truth_memory.places());
+          transform_points<FixedNumbers>(point_shell.table, step, truth_memory.places());
           const double out = i % 3 == 0 ? 7 : -1;  // across the border, or inside
           const Q16 at[3] = {Q16(dice.uniform(-out, grid.nx + out)),
                              Q16(dice.uniform(-out, grid.ny + out)),
@@ -113,7 +113,7 @@ TEST_CASE("every instruction set sums a point point_shell to the bit, wherever i
           felt += truth.weight != 0 ? 1 : 0;
           skipped += kind == 4 && truth.weight == 0 ? 1 : 0;
           for (auto set = kernel_sets(); *set != nullptr; ++set) {
-            (*set)->place_points(point_shell.table, step, memory.places());
+            (*set)->transform_points(point_shell.table, step, memory.places());
             Sums sums;
             sums.weight = sums.square = sums.high = sums.top = -1;  // left over from before
             (*set)->sum_points(point_shell.table, memory.places(), centre, field, sums);
@@ -137,7 +137,7 @@ TEST_CASE("every instruction set sums a point point_shell to the bit, wherever i
 }
 
 TEST_CASE("the largest point point_shell deep in the densest volume stays within the sums' range") {
-  const ToolPoints<FixedNumbers> tool = some_shell(kMaxShellPoints, 60, false);
+  const PointShellTable<FixedNumbers> tool = some_shell(kMaxShellPoints, 60, false);
   const PointShell<FixedNumbers> point_shell = tool.point_shell();
   // Full density in every second voxel of x: the steepest gradient and, at its voxels, r = 1.
   const VoxelGrid grid{130, 130, 130};
@@ -146,7 +146,7 @@ TEST_CASE("the largest point point_shell deep in the densest volume stays within
       return striped && x % 2 == 0 ? 0 : 65535;
     });
     for (auto set = kernel_sets(); *set != nullptr; ++set) {
-      PlaceMemory<FixedNumbers> memory;
+      TransformedShell<FixedNumbers> memory;
       memory.hold(point_shell);
       PointStep<FixedNumbers> step;
       step.shift = point_shell.step_bits - 1;
@@ -154,7 +154,7 @@ TEST_CASE("the largest point point_shell deep in the densest volume stays within
         step.row[axis][axis] = static_cast<std::int32_t>(
             std::lround(std::ldexp(double(point_shell.reach), point_shell.step_bits)));
       }
-      (*set)->place_points(point_shell.table, step, memory.places());
+      (*set)->transform_points(point_shell.table, step, memory.places());
       const std::int32_t centre[3] = {65 << 16, 65 << 16, 65 << 16};
       const DensityField field{grid, volume.density.data(), density_scale(32768), {}};
       Sums sums;
@@ -170,15 +170,15 @@ TEST_CASE("the largest point point_shell deep in the densest volume stays within
 }
 
 TEST_CASE("a volume without a cell is not felt") {
-  const ToolPoints<FixedNumbers> tool = some_shell(40, 3, true);
+  const PointShellTable<FixedNumbers> tool = some_shell(40, 3, true);
   const PointShell<FixedNumbers> point_shell = tool.point_shell();
   for (const VoxelGrid grid : {VoxelGrid{1, 5, 5}, {5, 1, 5}, {5, 5, 1}}) {
     const TestVolume volume = filled(grid, 65535);
     for (auto set = kernel_sets(); *set != nullptr; ++set) {
-      PlaceMemory<FixedNumbers> memory;
+      TransformedShell<FixedNumbers> memory;
       memory.hold(point_shell);
       Dice dice(1);
-      (*set)->place_points(point_shell.table, any_step(point_shell, dice), memory.places());
+      (*set)->transform_points(point_shell.table, any_step(point_shell, dice), memory.places());
       const std::int32_t centre[3] = {0, 2 << 16, 2 << 16};
       Sums sums;
       (*set)->sum_points(point_shell.table, memory.places(), centre,
@@ -189,7 +189,7 @@ TEST_CASE("a volume without a cell is not felt") {
 }
 
 TEST_CASE("beside a volume that is solid to its border nothing is read") {
-  const ToolPoints<FixedNumbers> tool = some_shell(512, 6, false);
+  const PointShellTable<FixedNumbers> tool = some_shell(512, 6, false);
   const PointShell<FixedNumbers> point_shell = tool.point_shell();
   const VoxelGrid grid{21, 20, 20};
   const TestVolume volume = filled(grid, 65535);
@@ -197,9 +197,9 @@ TEST_CASE("beside a volume that is solid to its border nothing is read") {
   const DensityField field{grid, volume.density.data(), density_scale(32768), map.bricks()};
   Dice dice(6);
   for (auto set = kernel_sets(); *set != nullptr; ++set) {
-    PlaceMemory<FixedNumbers> memory;
+    TransformedShell<FixedNumbers> memory;
     memory.hold(point_shell);
-    (*set)->place_points(point_shell.table, any_step(point_shell, dice), memory.places());
+    (*set)->transform_points(point_shell.table, any_step(point_shell, dice), memory.places());
     // The sphere about a group of any samples is no wider than the tool.
     for (const int from_border : {-8, 0, 20, 60, 300, 6000}) {
       CAPTURE(from_border);
@@ -214,17 +214,17 @@ TEST_CASE("beside a volume that is solid to its border nothing is read") {
 }
 
 TEST_CASE("at the end of the places that there are nothing is felt and nothing read") {
-  const ToolPoints<FixedNumbers> tool = some_shell(40, 3, true);
+  const PointShellTable<FixedNumbers> tool = some_shell(40, 3, true);
   const PointShell<FixedNumbers> point_shell = tool.point_shell();
   const TestVolume volume = filled({9, 9, 9}, 65535);
   constexpr std::int32_t kEnd = std::numeric_limits<std::int32_t>::max();
   for (const std::int32_t x : {kEnd, kEnd - 65536, kEnd - point_shell.table.reach, -kEnd}) {
     CAPTURE(x);
     for (auto set = kernel_sets(); *set != nullptr; ++set) {
-      PlaceMemory<FixedNumbers> memory;
+      TransformedShell<FixedNumbers> memory;
       memory.hold(point_shell);
       Dice dice(1);
-      (*set)->place_points(point_shell.table, any_step(point_shell, dice), memory.places());
+      (*set)->transform_points(point_shell.table, any_step(point_shell, dice), memory.places());
       const std::int32_t centre[3] = {x, x, x};
       Sums sums;
       (*set)->sum_points(point_shell.table, memory.places(), centre,

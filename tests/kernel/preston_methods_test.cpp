@@ -177,9 +177,9 @@ TEST_CASE("what materials bear of a press is the same in groups, on every instru
       for (auto& row : rims.row) {
         for (auto& entry : row) entry = N::Ratio(i % 4 == 0 ? 60 * part(random) : 0.2);
       }
-      const BearingPlane<N> plane{{N::Unit(part(random)), N::Unit(part(random)), N::Unit(0.1)},
-                                  N::Ratio(i % 2 == 0 ? -1 : 20 * part(random)),
-                                  N::Ratio(i % 3 == 0 ? 16 : 1)};
+      const LoadPlane<N> plane{{N::Unit(part(random)), N::Unit(part(random)), N::Unit(0.1)},
+                               N::Ratio(i % 2 == 0 ? -1 : 20 * part(random)),
+                               N::Ratio(i % 3 == 0 ? 16 : 1)};
       const AheadForm<N::Sum> form = ahead_form<N>(at, rims, plane);
       constexpr Density kIso = 30000;
       overlap<N>(grid, tool, pose, N::kStepOne, cutter.overlap);

@@ -16,10 +16,10 @@
 
 using kerf::OmniCommand;
 using kerf::OmniReport;
-using kerf::faults::Contract;
 using kerf::faults::DeviceMoment;
 using kerf::faults::DeviceWire;
 using kerf::faults::Outcome;
+using kerf::faults::SafetyMonitor;
 
 namespace {
 
@@ -35,7 +35,7 @@ kerf::LoadedScene omni_scene() {
 struct Watched {
   kerf::LoadedScene scene = omni_scene();
   Outcome outcome;
-  Contract contract{scene, true, outcome};
+  SafetyMonitor contract{scene, true, outcome};
   DeviceWire wire{scene.device.personality, scene.device.dock_rad};
   double ms = 0;
   std::uint32_t packets = 0;
@@ -292,7 +292,7 @@ TEST_CASE("the contract accepts the fault that the script says, in time") {
 TEST_CASE("a force into the solid is seen, whatever the motors' signs are") {
   // A Falcon above a half-space that fills y < 0: +y is the way out.
   const kerf::LoadedScene scene = kerf::test::half_space_scene();
-  const kerf::faults::Outward outward(scene);
+  const kerf::faults::OutwardNormal outward(scene);
   const double radius_mm = scene.tools[scene.active_tool].radius_mm;
   const auto out = outward.at({0, radius_mm / 2, 0});
   REQUIRE(out);

@@ -220,7 +220,7 @@ TEST_CASE_TEMPLATE_DEFINE("a servo goes on from another's state with the same bi
                           restore_id) {
   const auto numeric = static_cast<NumericKind>(N::value);
   LoadedScene scene = plain_scene(numeric), twin = scene;
-  const HardHand hand = hard_hand(scene);
+  const StressInput hand = hard_hand(scene);
   const auto servo = compile(scene), other = compile(twin);
   const std::size_t half = hand.reports.size() / 2 + 37;
   ServoOutput a, b;

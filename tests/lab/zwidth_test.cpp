@@ -66,8 +66,8 @@ Subject ideal(double delay_periods) {
 }
 
 bool swings(const Subject& subject, double stiffness, bool by_energy = false) {
-  TickMeter ticks;
-  const Swing swing = hit_one_axis(subject, stiffness, 0, 3, 0, ticks);
+  StepCounter ticks;
+  const LimitCycle swing = hit_one_axis(subject, stiffness, 0, 3, 0, ticks);
   return by_energy ? swing.active : swing.swings;
 }
 
@@ -114,7 +114,7 @@ Column column_of(const std::string& stiffness, double seconds,
   spec.seconds = seconds;
   Assignment values;
   for (const auto& [axis, value] : given) values[index_of(axis)] = value;
-  TickMeter ticks;
+  StepCounter ticks;
   return measure_column(spec, values, ticks);
 }
 
@@ -194,11 +194,11 @@ TEST_CASE("the whole arm comes to rest on a soft wall and swings on a hard one")
     subject.numeric = numeric;
     subject.loop.delay_s = 0;
     const LoadedScene scene = walls_scene(subject);
-    TickMeter ticks;
-    const Swing soft = hit_with_arm(scene, subject, 0.3, 0.3, 1, ticks);
+    StepCounter ticks;
+    const LimitCycle soft = hit_with_arm(scene, subject, 0.3, 0.3, 1, ticks);
     CHECK_FALSE(soft.swings);
     CHECK_FALSE(soft.active);
-    const Swing hard = hit_with_arm(scene, subject, 40, 0.3, 1, ticks);
+    const LimitCycle hard = hit_with_arm(scene, subject, 40, 0.3, 1, ticks);
     CHECK(hard.swings);
     CHECK(hard.active);
     CHECK(ticks.ticks() > 1000);
@@ -415,7 +415,7 @@ TEST_CASE("a column tells its first crossing and what comes to rest above it apa
   CHECK(std::abs(column.swing.first_n_per_mm / exact - 1) < 0.01);
   CHECK(std::abs(column.energy.first_n_per_mm / exact - 1) < 0.01);
   CHECK(column.swing.re_entry_from_n_per_mm == 0);
-  CHECK(column_over("0.1,1").swing.first_n_per_mm == Crossing::kNever);
+  CHECK(column_over("0.1,1").swing.first_n_per_mm == StabilityBoundary::kNever);
   CHECK(column_over("30,50").swing.first_n_per_mm == 0);
 }
 
@@ -467,7 +467,7 @@ TEST_CASE("each cell tells the lowest energy of its port, which the passivity co
                       {AxisId::stabiliser, stabiliser}})
         .cells;
   };
-  const std::vector<Swing> off = cells("none"), on = cells("passivity/mass_kg=10");
+  const std::vector<LimitCycle> off = cells("none"), on = cells("passivity/mass_kg=10");
   REQUIRE(off.size() == on.size());
   for (std::size_t i = 0; i < on.size(); ++i) {
     CAPTURE(i);
@@ -486,7 +486,7 @@ TEST_CASE("the paper's force has its map, with the whole arm") {
   subject.loop.delay_s = 0;
   const LoadedScene scene = walls_scene(subject);
   CHECK(scene.force.model == ForceModel::paper);
-  TickMeter ticks;
+  StepCounter ticks;
   CHECK_FALSE(hit_with_arm(scene, subject, 0.5, 0.5, 1, ticks).swings);
   CHECK(hit_with_arm(scene, subject, 60, 0.5, 1, ticks).swings);
 }
@@ -495,8 +495,8 @@ TEST_CASE("behind a delay the arm's port gives what its motors did, not what the
   Assignment values;
   values[index_of(AxisId::delay)] = "8";
   const Subject subject = subject_of(values);
-  TickMeter ticks;
-  const Swing swing = hit_with_arm(walls_scene(subject), subject, 0.5, 0.5, 1, ticks);
+  StepCounter ticks;
+  const LimitCycle swing = hit_with_arm(walls_scene(subject), subject, 0.5, 0.5, 1, ticks);
   CHECK(swing.swings);
   CHECK(swing.active);
   CHECK(swing.port_minimum_mj < -50);
@@ -509,7 +509,7 @@ TEST_CASE("every hit of a whole arm begins at the wall, whatever the device") {
     values[index_of(AxisId::damping)] = "0.003";
     const Subject subject = subject_of(values);
     std::vector<std::vector<SwingTick>> curves(kArmHits);
-    TickMeter ticks;
+    StepCounter ticks;
     watch_arm(walls_scene(subject), subject, 0.5, 0.3, 1, ticks, [&](std::size_t hit) {
       return [&curve = curves[hit]](const SwingTick& tick) { curve.push_back(tick); };
     });
@@ -571,7 +571,7 @@ TEST_CASE("a part belongs to one run at a time, and a hit ends with the word") {
   { const PartWriter again(path, spec, {}); }  // it ended
 
   const std::atomic<bool> stop{true};
-  TickMeter ticks(stop);
+  StepCounter ticks(stop);
   CHECK_THROWS_AS(static_cast<void>(hit_one_axis(subject_of({}), 100, 200, 60, 1, ticks)),
                   Interrupted);
   CHECK(ticks.ticks() < 2000);

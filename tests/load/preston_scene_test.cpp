@@ -179,7 +179,7 @@ TEST_CASE_TEMPLATE("the tables cut a block: each material at its rate, at the sa
     volume.image.density.assign(8000, 65535);
     auto plan = plan_preston<N>(scene, volume);
     plan.labels = volume.image.labels;
-    std::vector<CoveredVoxel<N>> memory(most_covered(tool, volume));
+    std::vector<CoveredVoxel<N>> memory(max_covered_voxels(tool, volume));
     const std::size_t capacity = overlap_capacity(tool.size_vox, tool.pitch_mm, {0.1, 0.2, 0.25});
     std::vector<typename N::Weight> ratios(capacity);
     OverlapBox<N> box{ratios, {}, 0};

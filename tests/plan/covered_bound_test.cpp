@@ -43,8 +43,8 @@ TEST_CASE("a tool covers no more voxels than it is said to, in any pose and any 
     }
     SceneTool turned = tool;
     turned.round = false;
-    CHECK(most <= most_covered(turned, block));
-    CHECK(most > most_covered(turned, block) / 5);  // the cone fills a third of its cylinder
+    CHECK(most <= max_covered_voxels(turned, block));
+    CHECK(most > max_covered_voxels(turned, block) / 5);  // the cone fills a third of its cylinder
   }
 }
 
@@ -76,8 +76,8 @@ TEST_CASE("a tool covers no more groups than it is said to, in any pose") {
           most,
           covered_groups(kScalarSet, block.image.grid, {}, tick.overlap(), {}, list).list.size());
     }
-    CHECK(most <= most_groups(tool, block));
-    CHECK(most > most_groups(tool, block) / 5);
+    CHECK(most <= max_cover_groups(tool, block));
+    CHECK(most > max_cover_groups(tool, block) / 5);
   }
 }
 
@@ -96,7 +96,7 @@ TEST_CASE("of a tool on the lattice the covered groups are counted") {
                            block.image.density, pose);
     tick.cover();
     const auto covered = covered_groups(kScalarSet, block.image.grid, {}, tick.overlap(), {}, list);
-    CHECK(covered.list.size() == most_groups(aligned.table()));
-    CHECK(covered.list.size() <= most_groups(tool, block));
+    CHECK(covered.list.size() == max_cover_groups(aligned.table()));
+    CHECK(covered.list.size() <= max_cover_groups(tool, block));
   }
 }

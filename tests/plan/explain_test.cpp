@@ -56,7 +56,7 @@ TEST_CASE("one factor, fitted to a scene's ticks, makes their work add up to wha
   scene.cut.model = CutModel::preston;
   scene.tools.push_back(test::ball(10));
   const auto servo = compile(scene);
-  const Explanation explanation = explain(scene, *servo, segment_of(true, false));
+  const CostReport explanation = explain(scene, *servo, segment_of(true, false));
   REQUIRE(explanation.ticks.size() == 2);
   CHECK(explanation.machine_factor > 0);
   double predicted_us = 0, measured_us = 0;
@@ -71,7 +71,7 @@ TEST_CASE("one factor, fitted to a scene's ticks, makes their work add up to wha
 }
 
 TEST_CASE("an explanation is told in text and JSON with the same figures") {
-  Explanation explanation;
+  CostReport explanation;
   explanation.scene = "scenes/x.toml";
   explanation.numeric = "fixed";
   explanation.cut = "none";

@@ -43,7 +43,7 @@ TEST_CASE("bricks tell how far the nearest voxel with density is read") {
         solid.push_back(at);
       }
       const FreeBrickMap map(grid, density, 100);
-      const FreeBricks bricks = map.bricks();
+      const FreeSpaceMap bricks = map.bricks();
       CHECK(map.bytes() == bricks.grid.voxel_count());
       for (std::int32_t z = 0; z < grid.nz; ++z) {
         for (std::int32_t y = 0; y < grid.ny; ++y) {
@@ -62,7 +62,7 @@ TEST_CASE("bricks tell how far the nearest voxel with density is read") {
       CHECK(bricks.at(-100, 1, 1000) == kFreeFarthest);
     }
   }
-  CHECK(FreeBricks{}.at(1, 2, 3) == 0);
+  CHECK(FreeSpaceMap{}.at(1, 2, 3) == 0);
 }
 
 TEST_CASE("a volume is free where nothing is read, or nothing near a voxel of the iso") {

@@ -91,8 +91,8 @@ TEST_CASE("every scene of the project is held with a safe margin at its own rate
       scene.device.personality = device;
       const GainMargin margin = linear(scene);
       CHECK(gain_warning(scene, margin) == "");
-      CHECK(gain_refusal(scene, margin) == "");
-      CHECK(above_device(scene) == "");
+      CHECK(gain_error(scene, margin) == "");
+      CHECK(device_limit_error(scene) == "");
     }
   }
   CHECK(count >= 12);
@@ -116,7 +116,7 @@ TEST_CASE("at 250 Hz the default coupling is warned of, and what the warning say
   CHECK(is_line(warning));
   CHECK(warning.find("margin of 1.14") != std::string::npos);
   CHECK(warning.find("use at most 0.304 in force.stiffness_n_per_mm") != std::string::npos);
-  CHECK(gain_refusal(scene, linear(scene)) == "");
+  CHECK(gain_error(scene, linear(scene)) == "");
   scene.force.stiffness_n_per_mm = 0.304;
   CHECK(gain_warning(scene, linear(scene)) == "");
 }
@@ -145,27 +145,27 @@ TEST_CASE("on every device and at every rate, what a warning tells to use is not
 TEST_CASE("an unstable coupling is refused unless it is asked for") {
   LoadedScene scene = scene_of(0.9, 0.002, 1000);
   CHECK(linear(scene).margin() < 1);
-  const std::string refusal = gain_refusal(scene, linear(scene));
+  const std::string refusal = gain_error(scene, linear(scene));
   CHECK(is_line(refusal));
   CHECK(refusal.find("mine.toml: force.stiffness_n_per_mm = 0.9") == 0);
   CHECK(refusal.find("use at most 0.55") != std::string::npos);
   CHECK(refusal.find("force.unchecked_gain = true") != std::string::npos);
   scene.force.unchecked_gain = true;
-  CHECK(gain_refusal(scene, linear(scene)) == "");
+  CHECK(gain_error(scene, linear(scene)) == "");
   CHECK(gain_warning(scene, linear(scene)).find("it is unstable") != std::string::npos);
   // On both sides of the boundary.
   const double highest = linear(scene).highest_n_per_mm;
   scene.force.unchecked_gain = false;
   scene.force.stiffness_n_per_mm = highest * 0.999;
-  CHECK(gain_refusal(scene, linear(scene)) == "");
+  CHECK(gain_error(scene, linear(scene)) == "");
   scene.force.stiffness_n_per_mm = highest * 1.001;
-  CHECK(gain_refusal(scene, linear(scene)) != "");
+  CHECK(gain_error(scene, linear(scene)) != "");
 }
 
 TEST_CASE("a damping that no stiffness bears is named with its own bound") {
   const LoadedScene scene = scene_of(0.4, 0.03, 1000);  // the Omni's boundary lies at 0.0243
   CHECK(linear(scene).highest_n_per_mm == 0);
-  const std::string refusal = gain_refusal(scene, linear(scene));
+  const std::string refusal = gain_error(scene, linear(scene));
   CHECK(is_line(refusal));
   CHECK(refusal.find("margin 0.00; use at most 0.0161 in force.damping_ns_per_mm") !=
         std::string::npos);
@@ -173,20 +173,21 @@ TEST_CASE("a damping that no stiffness bears is named with its own bound") {
 
 TEST_CASE("a real device takes no more than is known of it, each its own") {
   LoadedScene scene = scene_of(0.75, 0.002, 1000);
-  CHECK(above_device(scene).find("mine.toml: force.stiffness_n_per_mm = 0.75 is above 0.7, ") == 0);
-  CHECK(is_line(above_device(scene)));
+  CHECK(device_limit_error(scene).find(
+            "mine.toml: force.stiffness_n_per_mm = 0.75 is above 0.7, ") == 0);
+  CHECK(is_line(device_limit_error(scene)));
   scene.device.personality = Personality::falcon;
-  CHECK(above_device(scene) == "");
+  CHECK(device_limit_error(scene) == "");
   scene.force.stiffness_n_per_mm = 0.7;
   scene.device.personality = Personality::omni;
-  CHECK(above_device(scene) == "");
+  CHECK(device_limit_error(scene) == "");
   scene.force.damping_ns_per_mm = 0.006;
-  CHECK(above_device(scene).find("force.damping_ns_per_mm = 0.006 is above 0.005") !=
+  CHECK(device_limit_error(scene).find("force.damping_ns_per_mm = 0.006 is above 0.005") !=
         std::string::npos);
   scene.force.unchecked_gain = true;  // a scene alone does not lift it
-  CHECK(above_device(scene) != "");
+  CHECK(device_limit_error(scene) != "");
   scene.force.model = ForceModel::paper;  // has no coupling
-  CHECK(above_device(scene) == "");
+  CHECK(device_limit_error(scene) == "");
 }
 
 TEST_CASE("the paper's force is judged with friction, which alone holds it, and never refused") {
@@ -200,7 +201,7 @@ TEST_CASE("the paper's force is judged with friction, which alone holds it, and 
   scene.force.p0_n_per_mm2 = 1;
   margin = linear(scene);
   CHECK(margin.with_friction() < 1);
-  CHECK(gain_refusal(scene, margin) == "");
+  CHECK(gain_error(scene, margin) == "");
   CHECK(is_line(gain_warning(scene, margin)));
   CHECK(gain_warning(scene, margin).find("lower force.p0_n_per_mm2 to ") != std::string::npos);
   scene.force.p0_n_per_mm2 = 0;  // nothing is felt
@@ -226,7 +227,7 @@ TEST_CASE("the ends of what a scene may say give numbers and one line each") {
         const GainMargin margin = linear(scene);
         CHECK(margin.margin() >= 0);
         CHECK(margin.margin() < std::numeric_limits<double>::infinity());
-        CHECK((margin.margin() < 1) == is_line(gain_refusal(scene, margin)));
+        CHECK((margin.margin() < 1) == is_line(gain_error(scene, margin)));
         CHECK((margin.margin() < kSafeMargin) == is_line(gain_warning(scene, margin)));
       }
     }
@@ -244,17 +245,17 @@ TEST_CASE("a force law has the margin of its worst slope, up to the largest forc
   CHECK(margin.spring_mm == doctest::Approx(3.0).epsilon(0.03));
   CHECK(margin.stiffness_n_per_mm == doctest::Approx(2.9).epsilon(0.03));
   CHECK(margin.margin() == doctest::Approx(0.8262 / margin.stiffness_n_per_mm).epsilon(0.01));
-  const std::string refusal = gain_refusal(hard, margin);
+  const std::string refusal = gain_error(hard, margin);
   CHECK(is_line(refusal));
   CHECK(refusal.find("mine.toml: force.law hardening at a spring of ") == 0);
   CHECK(refusal.find("let it rise by at most 0.55 N/mm") != std::string::npos);
-  CHECK(is_line(above_device(hard)));
-  CHECK(above_device(hard).find("force.law hardening: its steepest stiffness_n_per_mm = ") !=
+  CHECK(is_line(device_limit_error(hard)));
+  CHECK(device_limit_error(hard).find("force.law hardening: its steepest stiffness_n_per_mm = ") !=
         std::string::npos);
   CHECK(gain_lines(hard, margin).find("steepest=force.law hardening at a spring of ") !=
         std::string::npos);
-  CHECK(above_device(with_law(0.4, 0, 0.002)) == "");
-  CHECK(gain_refusal(with_law(0.4, 0, 0.03), linear(with_law(0.4, 0, 0.03)))
+  CHECK(device_limit_error(with_law(0.4, 0, 0.002)) == "");
+  CHECK(gain_error(with_law(0.4, 0, 0.03), linear(with_law(0.4, 0, 0.03)))
             .find("let it damp by at most 0.0161 N s/mm") != std::string::npos);
   const LoadedScene falling = with_law(-1, 0, 0.002);  // never holds a hand
   CHECK(gain_warning(falling, gain_margin(falling)) == "");
@@ -267,7 +268,7 @@ TEST_CASE("a filter of the velocity costs margin, and what is not counted is tol
   scene.servo.velocity = {LawKind::velocity, "difference", {}};
   CHECK(linear(scene).margin() == bare);
   scene.servo.velocity.settings = {{"tau_ms", 5}};
-  SampledLoop loop = light_loop(Personality::omni, 1000);
+  SampledLoop loop = unheld_loop(Personality::omni, 1000);
   loop.velocity_filter_s = 0.005;
   CHECK(linear(scene).margin() < 0.9 * bare);
   CHECK(linear(scene).highest_n_per_mm == highest_stiffness(loop, 0.002));

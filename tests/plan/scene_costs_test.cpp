@@ -332,7 +332,7 @@ TEST_CASE("a tool is timed where it has most density around it, wherever its cen
   // Only the lower half along y is full, and the tool lies wholly above its centre.
   const SceneVolume half = volume_of(64, kVoxelMm, [](double, double y, double) { return y; });
   const VoxelIndex at =
-      densest_place(half.image.grid, half.image.density, {{-3, 4, -3}, {4, 20, 4}});
+      densest_position(half.image.grid, half.image.density, {{-3, 4, -3}, {4, 20, 4}});
   const auto full = [&](std::int32_t y) {
     return half.image.grid.contains({at.x, y, at.z}) &&
            half.image.density[half.image.grid.index(at.x, y, at.z)] != 0;
@@ -348,7 +348,7 @@ TEST_CASE("a scene above the budget is refused on one line, and fits at a lower 
   scene.tools.push_back(shape("cylinder", 2, 4));
   scene.tools.back().name = "stub";
   scene.servo.rate_hz = 8000;
-  const std::string line = over_budget(scene, plan_scene(scene)->costs());
+  const std::string line = budget_error(scene, plan_scene(scene)->costs());
   CHECK(line.find("scenes/x.toml: tool stub: up to ") == 0);
   CHECK(line.find(" by the method splat/") != std::string::npos);
   CHECK(line.find(" us of work a tick, most of it press (") != std::string::npos);
@@ -360,28 +360,28 @@ TEST_CASE("a scene above the budget is refused on one line, and fits at a lower 
                   "lattice") != std::string::npos);
   CHECK(line.find('\n') == std::string::npos);
   scene.servo.rate_hz = highest_hz;
-  CHECK(over_budget(scene, plan_scene(scene)->costs()).empty());
+  CHECK(budget_error(scene, plan_scene(scene)->costs()).empty());
   scene.servo.rate_hz = highest_hz + 1;
-  CHECK_FALSE(over_budget(scene, plan_scene(scene)->costs()).empty());
+  CHECK_FALSE(budget_error(scene, plan_scene(scene)->costs()).empty());
   // Of several the costliest decides, wherever it stands; the others are named.
   scene.servo.rate_hz = 8000;
   scene.tools.push_back(shape("cylinder", 2.5, 5));
   scene.tools.back().name = "stump";
-  const std::string two = over_budget(scene, plan_scene(scene)->costs());
+  const std::string two = budget_error(scene, plan_scene(scene)->costs());
   CHECK(two.find("scenes/x.toml: tool stump: ") == 0);
   CHECK(two.find(" a smaller tool (too dear as well: stub), or a round") != std::string::npos);
   scene.tools.pop_back();
   scene.tools.pop_back();
-  CHECK(over_budget(scene, plan_scene(scene)->costs()).empty());
+  CHECK(budget_error(scene, plan_scene(scene)->costs()).empty());
   // What fits one volume need not fit two: the refusal names both.
   scene.tools.push_back(shape("cylinder", 0.5, 2));
   const double alone_us = work_us(plan_scene(scene)->costs(), 1);
-  scene.servo.rate_hz = static_cast<int>(1e6 * kBudgetShare / (1.5 * alone_us));
-  CHECK(over_budget(scene, plan_scene(scene)->costs()).empty());
+  scene.servo.rate_hz = static_cast<int>(1e6 * kBudgetRatio / (1.5 * alone_us));
+  CHECK(budget_error(scene, plan_scene(scene)->costs()).empty());
   scene.volumes.push_back(scene.volumes.front());
   scene.volumes.back().name = "other";
   const SceneCosts both = plan_scene(scene)->costs();
-  const std::string why = over_budget(scene, both);
+  const std::string why = budget_error(scene, both);
   CHECK(why.find(" in test ") != std::string::npos);
   CHECK(why.find(", in other ") != std::string::npos);
   CHECK(work_us(both, 1) == doctest::Approx(2 * alone_us));
@@ -389,7 +389,7 @@ TEST_CASE("a scene above the budget is refused on one line, and fits at a lower 
   scene.tools.pop_back();
   scene.tools.push_back(shape("cylinder", 0.5, 1));
   scene.servo.rate_hz = 250;
-  CHECK(over_budget(scene, plan_scene(scene)->costs()).empty());
+  CHECK(budget_error(scene, plan_scene(scene)->costs()).empty());
 }
 
 TEST_CASE(
@@ -398,7 +398,7 @@ TEST_CASE(
   scene.path = "scenes/x.toml";
   scene.tools = {shape("wheel", 2, 1)};
   scene.servo.rate_hz = 8000;
-  const auto refusal = [&] { return over_budget(scene, plan_scene(scene)->costs()); };
+  const auto refusal = [&] { return budget_error(scene, plan_scene(scene)->costs()); };
   CHECK(refusal().find(" most of it queries (") != std::string::npos);
   CHECK(refusal().ends_with(" or lower, or a smaller tool"));
   scene.servo.numeric = NumericKind::float64;

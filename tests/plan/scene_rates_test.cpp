@@ -76,7 +76,7 @@ TEST_CASE(
       for (const double khz : {0.5, 1.0, 2.0, 4.0, 8.0}) {
         CAPTURE(khz);
         scene.servo.rate_hz = static_cast<int>(1000 * khz);
-        CHECK(over_budget(scene, servo->costs()).empty() == (khz <= promised->second));
+        CHECK(budget_error(scene, servo->costs()).empty() == (khz <= promised->second));
       }
     }
   }

@@ -15,7 +15,7 @@ bool seems_endless(const Work& work, int looks) {
   std::jthread thread([&](const std::stop_token& stop) {
     while (!stop.stop_requested()) work(steps);
   });
-  kerf::EndlessStep step(thread.native_handle(), steps, 1);
+  kerf::StepWatchdog step(thread.native_handle(), steps, 1);
   for (int i = 0; i < looks; ++i) {
     if (step.look()) return true;
     std::this_thread::sleep_for(std::chrono::milliseconds(50));

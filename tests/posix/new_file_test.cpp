@@ -20,8 +20,8 @@
 #include "shared/posix/atomic_file.hpp"
 
 namespace fs = std::filesystem;
+using kerf::AtomicFile;
 using kerf::FileError;
-using kerf::NewFile;
 using kerf::write_new_file;
 
 namespace {
@@ -137,7 +137,7 @@ TEST_CASE("nothing is left of a file whose writer is killed half-way") {
   const pid_t child = fork();
   REQUIRE(child >= 0);
   if (child == 0) {
-    kerf::NewFile file(folder / "a");
+    kerf::AtomicFile file(folder / "a");
     file.write("half", 4);
     raise(SIGKILL);
   }
@@ -173,20 +173,20 @@ TEST_CASE("what holds no bytes is written to as it stands, by a link too") {
 
 TEST_CASE("files that belong together appear together or not at all") {
   const Folder folder;
-  const auto add = [](kerf::NewFiles& files, const fs::path& path, const char* text) {
-    kerf::NewFile& file = files.add(path);
+  const auto add = [](kerf::AtomicFiles& files, const fs::path& path, const char* text) {
+    kerf::AtomicFile& file = files.add(path);
     file.write(text, 3);
     file.close();
   };
   {
-    kerf::NewFiles files;
+    kerf::AtomicFiles files;
     add(files, folder / "a", "new");
     CHECK_THROWS_AS(add(files, folder / "none/b", "new"), FileError);
   }
   CHECK(folder.count() == 0);
   write_new_file(folder / "b", "old");
   {
-    kerf::NewFiles files;
+    kerf::AtomicFiles files;
     add(files, folder / "a", "new");
     add(files, folder / "b", "new");
     const auto there = files.commit_if_new();
@@ -196,7 +196,7 @@ TEST_CASE("files that belong together appear together or not at all") {
   CHECK(folder.count() == 1);
   CHECK(text_of(folder / "b") == "old");
   {
-    kerf::NewFiles files;
+    kerf::AtomicFiles files;
     add(files, folder / "a", "new");
     add(files, folder / "b", "new");
     files.commit();
@@ -208,8 +208,8 @@ TEST_CASE("files that belong together appear together or not at all") {
 
 namespace {
 
-void add_new(kerf::NewFiles& files, const fs::path& path) {
-  NewFile& file = files.add(path);
+void add_new(kerf::AtomicFiles& files, const fs::path& path) {
+  AtomicFile& file = files.add(path);
   file.write("new", 3);
   file.close();
 }
@@ -251,7 +251,7 @@ TEST_CASE("a commit that is killed at any system call leaves each file old or ne
     write_new_file(folder / "a", "old");
     write_new_file(folder / "b", "old");
     const int end = child_until(last, [&] {
-      kerf::NewFiles files;
+      kerf::AtomicFiles files;
       add_new(files, folder / "a");
       add_new(files, folder / "b");
       files.commit();
@@ -281,7 +281,7 @@ TEST_CASE("files that cannot all be replaced stay as they were") {
   write_new_file(folder / "a", "old");
   {
     fs::create_directory(folder / "gone");
-    kerf::NewFiles files;
+    kerf::AtomicFiles files;
     add_new(files, folder / "a");
     add_new(files, folder / "gone/b");
     if (!fs::remove(folder / "gone")) return;  // the file system gave it a name at once
@@ -302,7 +302,7 @@ TEST_CASE("files that cannot all be replaced stay as they were") {
   if (child == 0) {
     if (setuid(nobody) != 0) _exit(2);
     const std::string line = refusal_of([&] {
-      kerf::NewFiles files;
+      kerf::AtomicFiles files;
       add_new(files, folder / "a");
       add_new(files, folder / "new");
       add_new(files, folder / "b");
@@ -320,8 +320,8 @@ TEST_CASE("files that cannot all be replaced stay as they were") {
 
 TEST_CASE("of two that make a new file at once one gets it, a link counts as there") {
   const Folder folder;
-  NewFile one(folder / "a"), two(folder / "a"), three(folder / "link");
-  for (NewFile* file : {&one, &two, &three}) {
+  AtomicFile one(folder / "a"), two(folder / "a"), three(folder / "link");
+  for (AtomicFile* file : {&one, &two, &three}) {
     file->write("own", 3);
     file->close();
   }

@@ -9,7 +9,7 @@
 #include "shared/posix/error_text.hpp"
 
 namespace fs = std::filesystem;
-using kerf::why_unreachable;
+using kerf::access_error;
 
 TEST_CASE("links in a circle are told as such, where a file is read and where one is written") {
   std::string pattern = (fs::temp_directory_path() / "kerf-loop-XXXXXX").string();
@@ -22,12 +22,12 @@ TEST_CASE("links in a circle are told as such, where a file is read and where on
   const std::string why =
       ": cannot be reached (Too many levels of symbolic links); mend its links, which lead to "
       "themselves";
-  CHECK(why_unreachable(folder / "itself") == why);
-  CHECK(why_unreachable(folder / "here/scene.toml") == why);
-  CHECK(why_unreachable(folder) == "");
-  CHECK(why_unreachable(folder / "nothing") == "");
-  CHECK(why_unreachable(folder / "nothing/below") == "");
-  CHECK(why_unreachable(folder / "dangling") == "");
+  CHECK(access_error(folder / "itself") == why);
+  CHECK(access_error(folder / "here/scene.toml") == why);
+  CHECK(access_error(folder) == "");
+  CHECK(access_error(folder / "nothing") == "");
+  CHECK(access_error(folder / "nothing/below") == "");
+  CHECK(access_error(folder / "dangling") == "");
   const fs::path report = folder / "here/report.json";
   CHECK_THROWS_WITH_AS(kerf::check_new_file(report), (report.string() + why).c_str(),
                        kerf::FileError);

@@ -39,7 +39,7 @@ class ServedSocket final : public ServedFront {
       : server_(place), thread_([this, personality, &device] {
           hurry();
           while (auto client = server_.accept(stop_)) {
-            HelloLink link(*client, {personality, false, 4000});
+            HandshakeLink link(*client, {personality, false, 4000});
             serve_real_time(link, device, 2, {0, stop_}, stats_);
           }
         }) {

@@ -97,11 +97,12 @@ TEST_CASE_TEMPLATE("the speed that a scene is told to be free of drag up to is s
   const auto walls = tilted_walls();
   for (const SceneTool& made : kTools) {
     const SampledTool tool(made);
-    const ToolPoints<N> points(tool.samples, tool.round, tool.close);
+    const PointShellTable<N> points(tool.samples, tool.round, tool.close);
     SweptTool<N> swept;
     swept.point_shell = points.point_shell();
     if (!tool.round) {
-      swept.proxy.turn_step = typename N::Unit(turn_step_of(double(swept.point_shell.reach)));
+      swept.proxy.rotation_step =
+          typename N::Unit(rotation_step_of(double(swept.point_shell.reach)));
     }
     CAPTURE(made.name);
     CAPTURE(made.radius_mm);

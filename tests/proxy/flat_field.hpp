@@ -36,7 +36,7 @@ class FlatField {
     const double free = dot(up_, point_of<N>(at) + turned_arm()) - 1;
     return typename N::Real(std::max(0.0, free));
   }
-  void turn(const ToolTurn<N>& turn) { turn_ = turn; }
+  void turn(const Orientation<N>& turn) { turn_ = turn; }
 
  private:
   [[nodiscard]] Point turned_arm() const {
@@ -49,7 +49,7 @@ class FlatField {
   }
 
   Point up_, arm_;
-  ToolTurn<N> turn_;
+  Orientation<N> turn_;
 };
 
 }  // namespace kerf::test

@@ -29,7 +29,7 @@ Body block_with(Hollow hollow, double radius, double middle) {
 }
 
 template <class N>
-ToolTurn<N> about(std::size_t axis, double angle_rad) {
+Orientation<N> about(std::size_t axis, double angle_rad) {
   using Unit = typename N::Unit;
   Unit half[3] = {};
   half[axis] = Unit(std::sin(angle_rad / 2));

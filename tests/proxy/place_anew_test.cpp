@@ -14,7 +14,7 @@ namespace {
 
 template <class N>
 ProxyPlan<N> plan() {
-  return {.turn_step = {}, .ramp_per_tick = typename N::Real(1)};
+  return {.rotation_step = {}, .ramp_per_tick = typename N::Real(1)};
 }
 
 /// The state of a proxy that is sought anew around `at`, 600 ticks later; the hand is at `hand`.
@@ -23,7 +23,7 @@ ProxyState<N> placed_anew(ContactRig<N>& rig, Point at, Point hand) {
   ProxyState<N> state;
   state.pose.centre = place_of<N>(at);
   state.placed = true;
-  state.place_anew();
+  state.search_again();
   for (int tick = 0; tick < 600; ++tick) {
     rig.field().begin_tick();
     rig.follow(plan<N>(), state, {place_of<N>(hand), {}});
@@ -110,7 +110,7 @@ struct OneWayField {
   [[nodiscard]] bool is_solid(ContactVec<Real>) const { return true; }
   [[nodiscard]] bool half_spent() const { return false; }
   [[nodiscard]] bool may_query() const { return left > 0; }
-  void turn(const ToolTurn<N>&) { left = 5; }
+  void turn(const Orientation<N>&) { left = 5; }
 
   Point way_out;
   int left = 0;
@@ -128,7 +128,7 @@ TEST_CASE_TEMPLATE("each of the 26 directions is looked at, however few queries 
     StartSearch<N> search;
     ProxyPose<N> pose;
     int ticks = 0;
-    while (search.tick(field, {}, pose) == Placing::searching) ++ticks;
+    while (search.tick(field, {}, pose) == ProxyStatus::searching) ++ticks;
     CHECK(ticks <= 26);  // of 4 directions each
     CHECK(length(point_of<N>(pose.centre) - field.way_out) < 0.01);
   }

@@ -18,9 +18,9 @@ constexpr Point kUp{0, 1, 0};
 const SceneTool kBall = tool_of_units("ball", kRadius, 2 * kRadius);
 
 template <class N>
-ProxyPlan<N> plan(double friction = 0, double turn_step = 0) {
+ProxyPlan<N> plan(double friction = 0, double rotation_step = 0) {
   using Unit = typename N::Unit;
-  return {Unit(friction), Unit(turn_step), typename N::Real(0.25)};
+  return {Unit(friction), Unit(rotation_step), typename N::Real(0.25)};
 }
 
 /// A block whose top is at height 30, seven voxels from the other ends of its volume.
@@ -45,7 +45,7 @@ struct CountedField {
                                  ContactVec<typename N::Real> move) const {
     return field.free_distance(q, move);
   }
-  void turn(const ToolTurn<N>& turn) { field.turn(turn); }
+  void turn(const Orientation<N>& turn) { field.turn(turn); }
 
   ContactQuery<N>& field;
   int queries = 0;
@@ -63,7 +63,8 @@ TEST_CASE_TEMPLATE("a contact tells spring, normal and no torque of a ball", N, 
   const TestVolume volume = block();
   ContactRig<N> rig(kBall, volume);
   ProxyState<N> state;
-  CHECK(follow(plan<N>(), state, rig.field(), pose_of<N>({30, 40, 30})).placing == Placing::placed);
+  CHECK(follow(plan<N>(), state, rig.field(), pose_of<N>({30, 40, 30})).placing ==
+        ProxyStatus::placed);
   ProxyContact<N> contact;
   for (double y = 40; y > 35; y -= 0.5) {
     contact = follow(plan<N>(), state, rig.field(), pose_of<N>({30, y, 30}));
@@ -114,7 +115,7 @@ TEST_CASE_TEMPLATE("a tool that lags is pressed by what it slides on, not by its
 TEST_CASE_TEMPLATE("a turn that would sink the tool lifts it", N, FixedNumbers, DoubleNumbers) {
   FlatField<N> field(kUp, {6, 0, 0});  // a finger along x, 6 units long
   ProxyState<N> state;
-  const auto turning = plan<N>(0, turn_step_of(6));
+  const auto turning = plan<N>(0, rotation_step_of(6));
   follow(turning, state, field, pose_of<N>({0, 0.5, 0}));
   ProxyPose<N> goal = pose_of<N>({0, 0.5, 0});
   double lifted = 0.5;
@@ -138,9 +139,9 @@ TEST_CASE_TEMPLATE("a tool with no room to turn keeps its orientation, and follo
       blurred({70, 70, 70}, [](Point p) { return 6 - std::hypot(p[0] - 35, p[2] - 35); });
   ContactRig<N> rig(tool_of_units("cylinder", 5, 16), volume);
   ProxyState<N> state;
-  const auto turning = plan<N>(0, turn_step_of(9.5));
+  const auto turning = plan<N>(0, rotation_step_of(9.5));
   ProxyPose<N> goal = pose_of<N>({35, 35, 35});
-  REQUIRE(follow(turning, state, rig.field(), goal).placing == Placing::placed);
+  REQUIRE(follow(turning, state, rig.field(), goal).placing == ProxyStatus::placed);
   const double half = 0.5;  // a radian about z
   goal.turn = {{}, {}, typename N::Unit(std::sin(half)), typename N::Unit(std::cos(half))};
   ProxyContact<N> contact;
@@ -169,8 +170,8 @@ TEST_CASE_TEMPLATE("a start inside of the solid ends outside, by a force that gr
     CHECK(field.queries <= SweepRules::kMaxQueries);
     const double now = length(point_of<N>(contact.spring));
     CHECK(now <= felt + 0.25 + 1e-3);
-    CHECK((contact.placing == Placing::placed || now == 0));
-    searched += contact.placing == Placing::placed ? 0 : 1;
+    CHECK((contact.placing == ProxyStatus::placed || now == 0));
+    searched += contact.placing == ProxyStatus::placed ? 0 : 1;
     felt = now;
   }
   CHECK(searched >= 28);  // two ticks a unit
@@ -185,9 +186,9 @@ TEST_CASE_TEMPLATE("a start with nothing free near is refused, until the hand is
   ProxyState<N> state;
   ProxyContact<N> contact;
   for (int i = 0; i < 150; ++i) contact = follow(plan<N>(), state, field, pose_of<N>({0, -200, 0}));
-  CHECK(contact.placing == Placing::refused);
+  CHECK(contact.placing == ProxyStatus::refused);
   CHECK(length(point_of<N>(contact.spring)) == 0);
-  CHECK(follow(plan<N>(), state, field, pose_of<N>({0, 3, 0})).placing == Placing::placed);
+  CHECK(follow(plan<N>(), state, field, pose_of<N>({0, 3, 0})).placing == ProxyStatus::placed);
   const auto back = follow(plan<N>(), state, field, pose_of<N>({0, -2, 0}));
   CHECK(point_of<N>(back.spring)[1] == doctest::Approx(2).epsilon(0.01));  // and no ramp
 }
@@ -200,7 +201,7 @@ TEST_CASE_TEMPLATE("a volume that fills up around the tool starts the search aga
   std::fill(volume.density.begin(), volume.density.end(), Density{0});
   ProxyState<N> state;
   const auto goal = pose_of<N>({30, 31, 30});
-  CHECK(follow(plan<N>(), state, rig.field(), goal).placing == Placing::placed);
+  CHECK(follow(plan<N>(), state, rig.field(), goal).placing == ProxyStatus::placed);
   std::copy(full.density.begin(), full.density.end(), volume.density.begin());
   double felt = 0;
   ProxyContact<N> contact;
@@ -210,7 +211,7 @@ TEST_CASE_TEMPLATE("a volume that fills up around the tool starts the search aga
     CHECK(now <= felt + 0.25 + 1e-3);
     felt = now;
   }
-  CHECK(contact.placing == Placing::placed);
+  CHECK(contact.placing == ProxyStatus::placed);
   CHECK(felt == doctest::Approx(7).epsilon(0.03));
 }
 

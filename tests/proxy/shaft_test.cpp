@@ -34,7 +34,7 @@ Point point_from(ContactVec<Unit> v) {
 }
 
 template <class N>
-ToolTurn<N> leaning(double angle_rad) {  // about z: the shaft leans to -x
+Orientation<N> leaning(double angle_rad) {  // about z: the shaft leans to -x
   return {typename N::Unit(0), typename N::Unit(0), typename N::Unit(std::sin(angle_rad / 2)),
           typename N::Unit(std::cos(angle_rad / 2))};
 }
@@ -50,14 +50,14 @@ TEST_CASE_TEMPLATE("a shaft at an edge stops the tool while its head is in air, 
     rig.lead({60, 28, 32}, {36, 28, 32}, 100);
     const ProxyContact<N> air = rig.tick({36, 28, 32});
     CHECK(air.spring == decltype(air.spring){});
-    CHECK(air.behind_share == typename N::Unit(0));
+    CHECK(air.shaft_fraction == typename N::Unit(0));
     rig.lead({36, 28, 32}, {25, 28, 32}, 50);
     const ProxyContact<N> held = rig.tick({25, 28, 32});
     // The shaft's flank is at x = 30, so the axis 3 units from it; the ledge's middle is 19 above
     // the tool's centre.
     CHECK(rig.proxy()[0] == doctest::Approx(33).epsilon(0.002));
     CHECK(rig.proxy()[1] == doctest::Approx(28).epsilon(0.002));
-    CHECK(double(held.behind_share) == doctest::Approx(1).epsilon(0.001));
+    CHECK(double(held.shaft_fraction) == doctest::Approx(1).epsilon(0.001));
     CHECK(held.normal == decltype(held.normal){});  // the head presses on nothing
     CHECK(double(held.moment_arm.z) == doctest::Approx(-19).epsilon(0.02));
     CHECK(std::abs(double(held.moment_arm.y)) < 0.2);
@@ -85,16 +85,16 @@ TEST_CASE_TEMPLATE("a head feels the same bits as without its shaft while that i
                           dice.uniform(-0.3, 0.3)};
       const ProxyContact<N> felt = with.tick(hand);
       without.field().begin_tick();
-      const ProxyContact<N> alone =
-          without.follow({.turn_step = without.turn_step(), .ramp_per_tick = typename N::Real(1)},
-                         state, {place_of<N>(hand), {}});
+      const ProxyContact<N> alone = without.follow(
+          {.rotation_step = without.rotation_step(), .ramp_per_tick = typename N::Real(1)}, state,
+          {place_of<N>(hand), {}});
       REQUIRE(felt.pose == alone.pose);
       REQUIRE(felt.spring == alone.spring);
       REQUIRE(felt.normal == alone.normal);
       REQUIRE(felt.moment_arm == alone.moment_arm);
       REQUIRE(felt.queries == alone.queries);
-      REQUIRE(felt.head_share == typename N::Unit(1));
-      REQUIRE(felt.behind_share == typename N::Unit(0));
+      REQUIRE(felt.head_fraction == typename N::Unit(1));
+      REQUIRE(felt.shaft_fraction == typename N::Unit(0));
     }
   }
 }
@@ -111,7 +111,7 @@ TEST_CASE_TEMPLATE("a ball on a floor feels the same while its shaft turns above
     const ProxyContact<N> felt = rig.tick(hand, leaning<N>(0.8 * std::sin(0.005 * tick)));
     REQUIRE(felt.turned);
     REQUIRE(length(point_of<N>(felt.spring) - rest) < 0.015);
-    REQUIRE(felt.behind_share == typename N::Unit(0));
+    REQUIRE(felt.shaft_fraction == typename N::Unit(0));
   }
 }
 
@@ -124,8 +124,8 @@ TEST_CASE_TEMPLATE("on a floor and a ledge of two volumes head and shaft each be
   CHECK(rig.proxy()[0] == doctest::Approx(33).epsilon(0.002));
   CHECK(rig.proxy()[1] == doctest::Approx(25).epsilon(0.002));
   // 4 units to the side and 3 up.
-  CHECK(double(held.behind_share) == doctest::Approx(0.8).epsilon(0.01));
-  CHECK(double(held.head_share) == doctest::Approx(0.6).epsilon(0.01));
+  CHECK(double(held.shaft_fraction) == doctest::Approx(0.8).epsilon(0.01));
+  CHECK(double(held.head_fraction) == doctest::Approx(0.6).epsilon(0.01));
   CHECK(double(held.normal.y) == doctest::Approx(1).epsilon(0.001));
   // The ball's part has no moment; the ledge is 22 above.
   CHECK(double(held.moment_arm.z) == doctest::Approx(-22 * 0.8).epsilon(0.02));
@@ -145,8 +145,8 @@ TEST_CASE_TEMPLATE("where head and shaft press alike, in part, the head's part i
   // The spring (4, 3) is 3 sqrt 2 along (1, 1) / sqrt 2 and 1 along (1, 0).
   CHECK(double(held.normal.x) == doctest::Approx(std::sqrt(0.5)).epsilon(0.005));
   CHECK(double(held.normal.y) == doctest::Approx(std::sqrt(0.5)).epsilon(0.005));
-  CHECK(double(held.behind_share) == doctest::Approx(1.0 / 5).epsilon(0.05));
-  CHECK(double(held.head_share) == doctest::Approx(std::sqrt(18.0) / 5).epsilon(0.01));
+  CHECK(double(held.shaft_fraction) == doctest::Approx(1.0 / 5).epsilon(0.05));
+  CHECK(double(held.head_fraction) == doctest::Approx(std::sqrt(18.0) / 5).epsilon(0.01));
 }
 
 TEST_CASE_TEMPLATE("a head bears its part where its face stands across the force", N, FixedNumbers,
@@ -164,7 +164,7 @@ TEST_CASE_TEMPLATE("a head bears its part where its face stands across the force
   const ProxyContact<N> held = rig.tick(hand);
   CHECK(length(rig.proxy() - Point{33, 25, 32}) < 0.1);
   const double force = dot(point_of<N>(held.spring), point_from(held.press));
-  CHECK(force * double(held.head_share) == doctest::Approx(2).epsilon(0.03));
+  CHECK(force * double(held.head_fraction) == doctest::Approx(2).epsilon(0.03));
   CHECK(dot(point_from(held.normal), face) == doctest::Approx(1).epsilon(0.001));
 }
 
@@ -175,8 +175,8 @@ TEST_CASE_TEMPLATE("a shaft as wide as its head lies beside it on a wall, neithe
   rig.lead({50, 28, 32}, {33, 28, 32}, 60);
   const ProxyContact<N> held = rig.tick({33, 28, 32});
   CHECK(rig.proxy()[0] == doctest::Approx(35).epsilon(0.002));
-  const double head = double(held.normal.x) * double(held.head_share);
-  CHECK(head + double(held.behind_share) == doctest::Approx(1).epsilon(0.02));
+  const double head = double(held.normal.x) * double(held.head_fraction);
+  CHECK(head + double(held.shaft_fraction) == doctest::Approx(1).epsilon(0.02));
   // It slides along the wall freely.
   rig.lead({33, 28, 32}, {33, 31, 35}, 30);
   CHECK(rig.proxy()[1] == doctest::Approx(31).epsilon(0.002));
@@ -192,7 +192,7 @@ TEST_CASE_TEMPLATE("in the bore that a ball has cut its shaft has play, and lean
   rig.tick({40, 72, 32});
   for (int tick = 0; tick <= 520; ++tick) {
     const ProxyContact<N> held = rig.tick({40, 72 - 0.1 * tick, 32});
-    REQUIRE(held.behind_share == typename N::Unit(0));
+    REQUIRE(held.shaft_fraction == typename N::Unit(0));
     REQUIRE(length(point_of<N>(held.spring)) < 0.05);
   }
   const Point bottom{40, 40, 32};
@@ -202,7 +202,7 @@ TEST_CASE_TEMPLATE("in the bore that a ball has cut its shaft has play, and lean
   ProxyContact<N> held;
   for (int tick = 0; tick < 100; ++tick) held = rig.tick(bottom, leaning<N>(0.8 * rim_rad));
   CHECK(held.turned);
-  CHECK(held.behind_share == typename N::Unit(0));
+  CHECK(held.shaft_fraction == typename N::Unit(0));
   for (int tick = 0; tick < 100; ++tick) held = rig.tick(bottom, leaning<N>(2 * rim_rad));
   CHECK_FALSE(held.turned);
   const double leant_rad = 2 * std::asin(double(held.pose.turn.z));
@@ -221,7 +221,7 @@ TEST_CASE_TEMPLATE("a handpiece that meets the rim of a pit ends the descent", N
   rig.lead({40, 62, 32}, {40, 15, 32}, 300);
   const ProxyContact<N> held = rig.tick({40, 15, 32});
   CHECK(rig.proxy()[1] == doctest::Approx(25).epsilon(0.004));  // its face is 25 above the centre
-  CHECK(double(held.behind_share) == doctest::Approx(1).epsilon(0.01));
+  CHECK(double(held.shaft_fraction) == doctest::Approx(1).epsilon(0.01));
   CHECK(held.normal == decltype(held.normal){});
 }
 
@@ -264,7 +264,7 @@ TEST_CASE_TEMPLATE("askew in a hole with a play of half a unit a shaft sinks int
   const Body body = blurred(kGrid, plate);
   const SceneTool tool = tool_with("ball", 3, 6, {.radius_mm = 3, .length_mm = 50});
   ShaftRig<N> rig(tool, {&body});
-  const ToolPart part = parts_behind(tool)[0];
+  const ToolPart part = shaft_parts(tool)[0];
   const PartSamples surface = part_samples(tool, part, 1);
   rig.lead({40, 70, 32}, {40, 20, 32}, 500);
   Dice dice(5);
@@ -273,7 +273,7 @@ TEST_CASE_TEMPLATE("askew in a hole with a play of half a unit a shaft sinks int
     const double lean_rad = 0.25 * std::sin(0.02 * tick);
     const Point hand{40 + dice.uniform(-2, 2), 20, 32 + dice.uniform(-2, 2)};
     const ProxyContact<N> held = rig.tick(hand, leaning<N>(lean_rad));
-    const TurnRows<N> rows = rows_of(held.pose.turn);
+    const RotationRows<N> rows = rows_of(held.pose.turn);
     most_lean = std::max(most_lean, std::abs(2 * std::asin(double(held.pose.turn.z))));
     for (const Point& at : surface.samples) {
       Point in_world = rig.proxy();

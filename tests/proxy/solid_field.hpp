@@ -37,7 +37,7 @@ class SolidField {
                                                ContactVec<typename N::Real>) const {
     return typename N::Real(std::max(0.0, nearest_(point_of<N>(at)).first - radius_ - 1));
   }
-  void turn(const ToolTurn<N>&) const {}
+  void turn(const Orientation<N>&) const {}
 
  private:
   double radius_;

@@ -26,7 +26,7 @@ class CountedBowl {
   void begin_tick() { left_ = queries_; }
   Contacts<N> query(ContactVec<typename N::Real> at) {
     Contacts<N> felt;
-    felt.buried = (left_ <= 0 && !unseen_) || (holds_turns && !(turn_ == ToolTurn<N>{}));
+    felt.buried = (left_ <= 0 && !unseen_) || (holds_turns && !(turn_ == Orientation<N>{}));
     unseen_ = false;
     --left_;
     return felt.buried ? felt : bowl_.query(at);
@@ -38,7 +38,7 @@ class CountedBowl {
                                                ContactVec<typename N::Real> move) const {
     return bowl_.free_distance(at, move);
   }
-  void turn(const ToolTurn<N>& turn) {
+  void turn(const Orientation<N>& turn) {
     turn_ = turn;
     unseen_ = true;
   }
@@ -52,20 +52,20 @@ class CountedBowl {
 
   int queries_, left_ = 0;
   bool unseen_ = false;
-  ToolTurn<N> turn_{};
+  Orientation<N> turn_{};
   SolidField<N, decltype(&height_in_bowl)> bowl_{0, &height_in_bowl};
 };
 
 /// Leads the point from the bowl's bottom to under `goal` outside of it, and says where it is.
 template <class N>
 struct Led {
-  explicit Led(int queries, double turn_step = 0) : field(queries) {
-    plan.turn_step = typename N::Unit(turn_step);
+  explicit Led(int queries, double rotation_step = 0) : field(queries) {
+    plan.rotation_step = typename N::Unit(rotation_step);
     plan.ramp_per_tick = typename N::Real(1);
     state.pose.centre = place_of<N>({0, -kBowl, 0});
     state.placed = true;
   }
-  ProxyContact<N> tick(Point goal, const ToolTurn<N>& turn = {}) {
+  ProxyContact<N> tick(Point goal, const Orientation<N>& turn = {}) {
     field.begin_tick();
     return follow(plan, state, field, {place_of<N>(goal), turn});
   }
@@ -80,7 +80,7 @@ struct Led {
 /// way is asked for.
 template <class N>
 struct Cage {
-  void turn(const ToolTurn<N>&) {}
+  void turn(const Orientation<N>&) {}
   [[nodiscard]] Contacts<N> query(ContactVec<typename N::Real> at) const {
     Contacts<N> felt;
     if (at == ContactVec<typename N::Real>{}) return felt;
@@ -117,11 +117,11 @@ TEST_CASE_TEMPLATE("a tick of two queries still finds along a bowl", N, FixedNum
 
 TEST_CASE_TEMPLATE("a turn that the solid refuses does not stop the move", N, FixedNumbers,
                    DoubleNumbers) {
-  const ToolTurn<N> askew{typename N::Unit(0), typename N::Unit(0), typename N::Unit(0.6),
-                          typename N::Unit(0.8)};
+  const Orientation<N> askew{typename N::Unit(0), typename N::Unit(0), typename N::Unit(0.6),
+                             typename N::Unit(0.8)};
   for (const int queries : {3, 4, 5, 8}) {
     CAPTURE(queries);
-    Led<N> led(queries, turn_step_of(3));
+    Led<N> led(queries, rotation_step_of(3));
     led.field.holds_turns = true;
     for (int tick = 0; tick < 800; ++tick) CHECK_FALSE(led.tick(12 * kSide, askew).turned);
     CHECK(length(led.at() - kBowl * kSide) < 0.06);

@@ -14,8 +14,8 @@ namespace {
 constexpr double kPi = std::numbers::pi;
 
 template <class N>
-double angle_between(const ToolTurn<N>& a, const ToolTurn<N>& b) {
-  const ToolTurn<N> rest = compose(a, inverse(b));
+double angle_between(const Orientation<N>& a, const Orientation<N>& b) {
+  const Orientation<N> rest = compose(a, inverse(b));
   const double sine = length({double(rest.x), double(rest.y), double(rest.z)});
   return 2 * std::atan2(sine, std::abs(double(rest.w)));
 }
@@ -30,13 +30,13 @@ TEST_CASE_TEMPLATE("a turn and its matrix are the same rotation, at any angle", 
   Dice dice(3);
   for (int i = 0; i < 2000; ++i) {
     const auto turn = dice.turn<N>(i < 20 ? kPi : dice.uniform(0, 2 * kPi));
-    CHECK(angle_between(turn_of<N>(rows_of(turn)), turn) < kFine<N>);
+    CHECK(angle_between(orientation_of<N>(rows_of(turn)), turn) < kFine<N>);
   }
 }
 
 TEST_CASE("a quarter about z takes x to y") {
   const double half = std::sqrt(0.5);
-  const auto rows = rows_of(ToolTurn<DoubleNumbers>{0, 0, half, half});
+  const auto rows = rows_of(Orientation<DoubleNumbers>{0, 0, half, half});
   CHECK(rows[1][0] == doctest::Approx(1));
   CHECK(rows[0][1] == doctest::Approx(-1));
   CHECK(rows[2][2] == doctest::Approx(1));
@@ -51,7 +51,7 @@ TEST_CASE_TEMPLATE("a tool turns the short way by its step, and arrives", N, Fix
     const auto goal = dice.turn<N>(dice.uniform(0, kPi));
     double rest = angle_between(goal, now);
     for (int k = 0; k < 40 && !(now == goal); ++k) {
-      const auto next = turned_towards(now, goal, typename N::Unit(half_sine));
+      const auto next = rotate_towards(now, goal, typename N::Unit(half_sine));
       CHECK(angle_between(next, now) < step + kFine<N>);
       if (!(next == goal)) CHECK(angle_between(goal, next) == doctest::Approx(rest - step));
       now = next;
@@ -65,7 +65,7 @@ TEST_CASE_TEMPLATE("a turn keeps its length through a million products", N, Fixe
                    FloatNumbers, DoubleNumbers) {
   Dice dice(5);
   const auto little = dice.turn<N>(0.37);
-  ToolTurn<N> turn;
+  Orientation<N> turn;
   for (int i = 0; i < 1'000'000; ++i) turn = compose(little, turn);
   const double square = double(turn.x) * double(turn.x) + double(turn.y) * double(turn.y) +
                         double(turn.z) * double(turn.z) + double(turn.w) * double(turn.w);

@@ -83,7 +83,7 @@ TEST_CASE("of another machine's run a recorder takes what came, and counts what 
   spec.session_id = 1;
   spec.tick_ns = 1'000'000;
   spec.volumes = {volume};
-  MirrorWriter mirror = MirrorWriter::create(spec);
+  ReplicaWriter mirror = ReplicaWriter::create(spec);
   const auto come = [&mirror](std::uint64_t index) {
     mirror.put_record(index, made_up_tick(index + 1, 1000));
   };

@@ -473,7 +473,7 @@ TEST_CASE("a bur of ISO 6360 stands for shape, radius, neck and name, and its ta
     CHECK(begins(refused("bur = \"001 014\"\n" + std::string(also) + "\n"),
                  "scenes/x.toml:4: tool.bur = \"001 014\" contradicts"));
   }
-  const kerf::SceneSetting setting{"tool.bur", "\"001 999\""};
+  const kerf::KeyOverride setting{"tool.bur", "\"001 999\""};
   CHECK(begins(kerf::test::error_of([&] {
                  static_cast<void>(kerf::parse_scene("[[volume]]\nfile = \"phantom\"\n[[tool]]\n",
                                                      "scenes/x.toml", kerf::scene_keys(),
@@ -485,11 +485,11 @@ TEST_CASE("a bur of ISO 6360 stands for shape, radius, neck and name, and its ta
 }
 
 TEST_CASE("a file that an option names stands in no line, and its place says so") {
-  const auto scene = [](std::span<const kerf::SceneSetting> settings) {
+  const auto scene = [](std::span<const kerf::KeyOverride> settings) {
     return kerf::parse_scene("[[volume]]\nfile = \"phantom\"\n[[tool]]\nbur = \"001 014\"\n",
                              "scenes/x.toml", kerf::scene_keys(), settings);
   };
-  const kerf::SceneSetting setting{"volume.file", "\"/x.nrrd\""};
+  const kerf::KeyOverride setting{"volume.file", "\"/x.nrrd\""};
   CHECK(scene({}).volumes[0].where == "scenes/x.toml:2");
   CHECK(scene({&setting, 1}).volumes[0].where == "scenes/x.toml: --set");
 }

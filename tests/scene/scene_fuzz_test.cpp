@@ -46,7 +46,7 @@ std::string mutated(std::string text) {
   return text;
 }
 
-/// Either a result or a SceneError with one line; anything else escapes and fails the test.
+/// Either a result or a LoadError with one line; anything else escapes and fails the test.
 template <class Action>
 void must_work_or_explain(Action&& action) {
   const std::string error = kerf::test::error_of(action);

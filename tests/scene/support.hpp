@@ -62,12 +62,12 @@ inline std::vector<Density> block(VoxelGrid grid, VoxelBox box, Density inside) 
   return values;
 }
 
-/// The message of the SceneError that `action` throws; empty when it throws none.
+/// The message of the LoadError that `action` throws; empty when it throws none.
 template <class Action>
 std::string error_of(Action&& action) {
   try {
     action();
-  } catch (const SceneError& error) {
+  } catch (const LoadError& error) {
     return error.what();
   }
   return {};

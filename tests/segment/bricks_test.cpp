@@ -46,7 +46,7 @@ TEST_CASE("marked bricks are taken once each, within the budget, whatever the or
   CHECK(rc::check([] {
     const auto edge = [] { return *rc::gen::inRange(1, 80); };
     const BrickGrid bricks = BrickGrid::of({edge(), edge(), edge()});
-    DirtyBricks dirty(bricks);
+    BrickSet dirty(bricks);
     std::set<std::uint32_t> expected;
     const int steps = *rc::gen::inRange(1, 20);
     for (int step = 0; step < steps; ++step) {
@@ -75,7 +75,7 @@ TEST_CASE("marked bricks are taken once each, within the budget, whatever the or
 
 TEST_CASE("no brick starves while others change in every tick") {
   const BrickGrid bricks = BrickGrid::of({8 * 256, 8, 8});
-  DirtyBricks dirty(bricks);
+  BrickSet dirty(bricks);
   dirty.mark({{8 * 255, 0, 0}, {8 * 256, 8, 8}});
   bool reached = false;
   for (int tick = 0; tick < 4 && !reached; ++tick) {

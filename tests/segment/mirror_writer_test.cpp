@@ -55,7 +55,7 @@ struct Remote {
     return out;
   }
   /// Everything but the rings, in one pass.
-  void copy_to(MirrorWriter& mirror) const {
+  void copy_to(ReplicaWriter& mirror) const {
     mirror.put_scene(0, std::span(bytes).subspan(header.off_scene, header.scene_bytes));
     mirror.begin_pass(tick_of_version(header.epoch));
     for (std::size_t v = 0; v < volumes.size(); ++v) {
@@ -103,7 +103,7 @@ TEST_CASE("a mirror has all that the other machine's segment has") {
   cut_and_publish(writer, tooth, 7, {{3, 3, 3}, {12, 9, 90}});
   const Remote remote(writer);
 
-  MirrorWriter mirror = MirrorWriter::create(remote.spec());
+  ReplicaWriter mirror = ReplicaWriter::create(remote.spec());
   remote.copy_to(mirror);
   for (std::uint32_t id = 0; id < remote.volumes[0].brick_count; ++id) {
     mirror.put_labels(0, id, labels_of(tooth, id));
@@ -136,7 +136,7 @@ TEST_CASE("a mirror of the same plan has the same bytes") {
   SegmentWriter writer = SegmentWriter::create(spec_of(volume));
   cut_and_publish(writer, volume, 1, {{0, 0, 0}, {30, 3, 9}});
   const Remote remote(writer);
-  MirrorWriter mirror = MirrorWriter::create(remote.spec());
+  ReplicaWriter mirror = ReplicaWriter::create(remote.spec());
   remote.copy_to(mirror);
   const SegmentReader theirs = SegmentReader::map(writer.fd());
   TickRecord record;
@@ -156,7 +156,7 @@ TEST_CASE("a mirror of the same plan has the same bytes") {
 TEST_CASE("readers of a mirror know that a pass is not whole") {
   NoiseVolume volume({24, 8, 8});
   SegmentWriter writer = SegmentWriter::create(spec_of(volume));
-  MirrorWriter mirror = MirrorWriter::create(Remote(writer).spec());
+  ReplicaWriter mirror = ReplicaWriter::create(Remote(writer).spec());
   const SegmentReader reader = SegmentReader::map(mirror.fd());
   VolumeSnapshot snapshot;
   reader.update(0, snapshot);
@@ -190,7 +190,7 @@ TEST_CASE("a reader beside passes that never rest takes only whole ones for cons
   NoiseVolume volume({16, 16, 16});
   SegmentWriter writer = SegmentWriter::create(spec_of(volume));
   const Remote remote(writer);
-  MirrorWriter mirror = MirrorWriter::create(remote.spec());
+  ReplicaWriter mirror = ReplicaWriter::create(remote.spec());
   remote.copy_to(mirror);
   // In the pass of tick t every voxel of every brick is t.
   std::atomic<bool> done{false};
@@ -225,7 +225,7 @@ TEST_CASE("a reader beside passes that never rest takes only whole ones for cons
 TEST_CASE("records keep their indices, and what never came reads as lost") {
   const NoiseVolume volume({8, 8, 8});
   const SegmentWriter writer = SegmentWriter::create(spec_of(volume));
-  MirrorWriter mirror = MirrorWriter::create(Remote(writer).spec());
+  ReplicaWriter mirror = ReplicaWriter::create(Remote(writer).spec());
   const SegmentReader reader = SegmentReader::map(mirror.fd());
   CHECK(!reader.latest());
   TickRecord record{};
@@ -267,7 +267,7 @@ TEST_CASE("a mirror refuses a plan or a place that cannot be") {
   const NoiseVolume volume({9, 8, 8});
   const SegmentWriter writer = SegmentWriter::create(spec_of(volume));
   const Remote remote(writer);
-  MirrorWriter mirror = MirrorWriter::create(remote.spec());
+  ReplicaWriter mirror = ReplicaWriter::create(remote.spec());
   const auto brick = remote.brick(0, 0);
   CHECK_THROWS_AS(mirror.put_brick(1, 0, 2, brick), SegmentError);
   CHECK_THROWS_AS(mirror.put_brick(0, 2, 2, brick), SegmentError);
@@ -281,7 +281,7 @@ TEST_CASE("a mirror refuses a plan or a place that cannot be") {
   const auto refused = [&remote](auto change) {
     MirrorSpec spec = remote.spec();
     change(spec);
-    CHECK_THROWS_AS(static_cast<void>(MirrorWriter::create(spec)), SegmentError);
+    CHECK_THROWS_AS(static_cast<void>(ReplicaWriter::create(spec)), SegmentError);
   };
   refused([](MirrorSpec& s) { s.volumes.clear(); });
   refused([](MirrorSpec& s) { s.volumes.resize(9, s.volumes[0]); });
@@ -300,7 +300,7 @@ TEST_CASE("a mirror is handed over like a segment, and somebody else answers its
   const NoiseVolume volume({8, 8, 8});
   const SegmentWriter writer = SegmentWriter::create(spec_of(volume));
   const Remote remote(writer);
-  MirrorWriter mirror = MirrorWriter::create(remote.spec());
+  ReplicaWriter mirror = ReplicaWriter::create(remote.spec());
   remote.copy_to(mirror);
   SegmentServer server("far", mirror.fd(), mirror.session_id(), [](const Command& command) {
     return command.argument == 3 ? Reply{ReplyStatus::accepted, 42} : Reply{ReplyStatus::busy, 0};

@@ -159,7 +159,7 @@ TEST_CASE("a tool that no sum of fixed-point numbers can hold is refused with a 
   const auto refusal = [](const LoadedScene& scene) -> std::string {
     try {
       static_cast<void>(method_of(scene, scene.tools[0], scene.volumes[0]));
-    } catch (const SceneError& error) {
+    } catch (const LoadError& error) {
       return error.what();
     }
     return {};

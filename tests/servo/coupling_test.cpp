@@ -10,16 +10,17 @@
 #include "controller/scene/scene.hpp"
 #include "controller/servo/servo_plan.hpp"
 
-using kerf::coupling_force;
 using kerf::DeviceVec;
 using kerf::DoubleNumbers;
 using kerf::FixedNumbers;
 using kerf::FloatNumbers;
+using kerf::virtual_coupling_force;
 
 namespace {
 
 template <class N>
-kerf::Coupling<N> coupling(double stiffness_n_per_mm = 0.4, double damping_ns_per_mm = 0.002) {
+kerf::VirtualCoupling<N> coupling(double stiffness_n_per_mm = 0.4,
+                                  double damping_ns_per_mm = 0.002) {
   return {typename N::Ratio(stiffness_n_per_mm), typename N::Unit(damping_ns_per_mm)};
 }
 
@@ -33,7 +34,7 @@ DeviceVec<typename N::Real> vec(double x, double y, double z) {
 
 TEST_CASE_TEMPLATE("at rest the coupling is a spring", N, FixedNumbers, FloatNumbers,
                    DoubleNumbers) {
-  const auto force = coupling_force(coupling<N>(), vec<N>(0.5, -1, 0.25), vec<N>(0, 0, 0));
+  const auto force = virtual_coupling_force(coupling<N>(), vec<N>(0.5, -1, 0.25), vec<N>(0, 0, 0));
   CHECK(double(force.x) == doctest::Approx(0.2).epsilon(1e-3));
   CHECK(double(force.y) == doctest::Approx(-0.4).epsilon(1e-3));
   CHECK(double(force.z) == doctest::Approx(0.1).epsilon(1e-3));
@@ -41,21 +42,23 @@ TEST_CASE_TEMPLATE("at rest the coupling is a spring", N, FixedNumbers, FloatNum
 
 TEST_CASE_TEMPLATE("only motion along the spring is damped", N, FixedNumbers, DoubleNumbers) {
   const auto spring = vec<N>(0, 1, 0);
-  CHECK(double(coupling_force(coupling<N>(), spring, vec<N>(300, 0, -500)).y) ==
+  CHECK(double(virtual_coupling_force(coupling<N>(), spring, vec<N>(300, 0, -500)).y) ==
         doctest::Approx(0.4).epsilon(1e-3));
-  CHECK(double(coupling_force(coupling<N>(), spring, vec<N>(0, -50, 0)).y) ==
+  CHECK(double(virtual_coupling_force(coupling<N>(), spring, vec<N>(0, -50, 0)).y) ==
         doctest::Approx(0.5).epsilon(1e-3));
-  CHECK(double(coupling_force(coupling<N>(), spring, vec<N>(0, 50, 0)).y) ==
+  CHECK(double(virtual_coupling_force(coupling<N>(), spring, vec<N>(0, 50, 0)).y) ==
         doctest::Approx(0.3).epsilon(1e-3));
 }
 
 TEST_CASE_TEMPLATE("a hand that leaves fast is let go, never pulled", N, FixedNumbers,
                    DoubleNumbers) {
-  CHECK(coupling_force(coupling<N>(), vec<N>(0, 1, 0), vec<N>(0, 1000, 0)) == vec<N>(0, 0, 0));
+  CHECK(virtual_coupling_force(coupling<N>(), vec<N>(0, 1, 0), vec<N>(0, 1000, 0)) ==
+        vec<N>(0, 0, 0));
 }
 
 TEST_CASE_TEMPLATE("a hand that arrives fast feels no blow", N, FixedNumbers, DoubleNumbers) {
-  const auto touch = coupling_force(coupling<N>(), vec<N>(0, 0.001, 0), vec<N>(0, -1000, 0));
+  const auto touch =
+      virtual_coupling_force(coupling<N>(), vec<N>(0, 0.001, 0), vec<N>(0, -1000, 0));
   CHECK(double(touch.y) > 0.0);
   CHECK(double(touch.y) < 0.03);
 }
@@ -75,8 +78,8 @@ TEST_CASE_TEMPLATE("both ends of what a scene may say give a force in the spring
           CAPTURE(damping);
           CAPTURE(spring);
           CAPTURE(velocity);
-          const auto force = coupling_force(gains, vec<N>(spring, spring, -spring),
-                                            vec<N>(velocity, -velocity, velocity));
+          const auto force = virtual_coupling_force(gains, vec<N>(spring, spring, -spring),
+                                                    vec<N>(velocity, -velocity, velocity));
           for (const Real component : {force.x, force.y, force.z}) {
             CHECK(std::isfinite(double(component)));
           }
@@ -88,8 +91,8 @@ TEST_CASE_TEMPLATE("both ends of what a scene may say give a force in the spring
     }
   }
   // Fixed: stays at the end of its range, where double goes on.
-  const auto most = coupling_force(coupling<N>(kerf::kMaxStiffnessNPerMm, 0), vec<N>(0, kFar, 0),
-                                   vec<N>(0, 0, 0));
+  const auto most = virtual_coupling_force(coupling<N>(kerf::kMaxStiffnessNPerMm, 0),
+                                           vec<N>(0, kFar, 0), vec<N>(0, 0, 0));
   if constexpr (N::kIsFixed) {
     CHECK(double(most.y) == doctest::Approx(32768).epsilon(1e-4));
   } else {
@@ -107,8 +110,9 @@ TEST_CASE("fixed follows double, and no input makes it point the wrong way") {
     const auto exact = [](DeviceVec<Q16> v) {
       return DeviceVec<double>{double(v.x), double(v.y), double(v.z)};
     };
-    const auto fixed = exact(coupling_force(coupling<FixedNumbers>(), at(0), at(3)));
-    const auto truth = coupling_force(coupling<DoubleNumbers>(), exact(at(0)), exact(at(3)));
+    const auto fixed = exact(virtual_coupling_force(coupling<FixedNumbers>(), at(0), at(3)));
+    const auto truth =
+        virtual_coupling_force(coupling<DoubleNumbers>(), exact(at(0)), exact(at(3)));
     RC_ASSERT(kerf::dot(fixed, exact(at(0))) >= 0.0);
     if (kerf::norm(exact(at(0))) < 0.05) return;  // short springs have coarse directions
     if (kerf::norm(exact(at(0))) > 3000 || kerf::norm(exact(at(3))) > 10'000) return;

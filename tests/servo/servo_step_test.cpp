@@ -149,7 +149,7 @@ TEST_CASE("voxels too fine for fixed point are refused, not felt wrongly") {
   LoadedScene scene = paper_scene(16);
   scene.volumes[0].image.spacing_mm = {0.004, 0.004, 0.004};
   CHECK_THROWS_WITH_AS(static_cast<void>(kerf::compile(scene)), doctest::Contains("resample"),
-                       kerf::SceneError);
+                       kerf::LoadError);
 }
 
 TEST_CASE("the tool changes at a tick boundary, to a known index only") {

@@ -112,10 +112,10 @@ TEST_CASE("missing reports: tolerated for less than 20 ms, then a latched fault"
 }
 
 TEST_CASE("the held force is whole up to 5 ms and gone at 20 ms, falling in between") {
-  CHECK(kerf::stale_share(kTiming, 5) == kTiming.zero_ticks - kTiming.hold_ticks);
-  CHECK(kerf::stale_share(kTiming, 20) == 0);
+  CHECK(kerf::stale_fraction(kTiming, 5) == kTiming.zero_ticks - kTiming.hold_ticks);
+  CHECK(kerf::stale_fraction(kTiming, 20) == 0);
   for (std::uint32_t t = 5; t < 20; ++t) {
-    CHECK(kerf::stale_share(kTiming, t + 1) < kerf::stale_share(kTiming, t));
+    CHECK(kerf::stale_fraction(kTiming, t + 1) < kerf::stale_fraction(kTiming, t));
   }
 }
 

@@ -41,9 +41,9 @@ TEST_CASE("what a program says at its end is one line with a way out") {
 }
 
 TEST_CASE("a limit of the machine has its own way out, anything else the usual one") {
-  CHECK(kerf::way_out_of(EMFILE, "knock") == std::string("raise ulimit -n"));
-  CHECK(kerf::way_out_of(EFBIG, "knock") == std::string("raise ulimit -f"));
-  CHECK(kerf::way_out_of(ENOMEM, "knock") == std::string("free memory, or raise ulimit -v"));
-  CHECK(kerf::way_out_of(ENOENT, "knock") == std::string("knock"));
-  CHECK(kerf::way_out_of(EAGAIN, "knock") == std::string("knock"));  // a full queue, of a socket
+  CHECK(kerf::remedy_for(EMFILE, "knock") == std::string("raise ulimit -n"));
+  CHECK(kerf::remedy_for(EFBIG, "knock") == std::string("raise ulimit -f"));
+  CHECK(kerf::remedy_for(ENOMEM, "knock") == std::string("free memory, or raise ulimit -v"));
+  CHECK(kerf::remedy_for(ENOENT, "knock") == std::string("knock"));
+  CHECK(kerf::remedy_for(EAGAIN, "knock") == std::string("knock"));  // a full queue, of a socket
 }

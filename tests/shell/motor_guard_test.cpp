@@ -241,7 +241,7 @@ TEST_CASE("a signal that is blocked from the start asks all the same") {
     const pid_t child = fork();
     REQUIRE(child >= 0);
     if (child == 0) {
-      const kerf::StopSignalsElsewhere blocked;
+      const kerf::BlockStopSignals blocked;
       const std::atomic<bool>& stop = kerf::catch_stop_signals();
       std::raise(signal);
       _exit(stop ? 1 : 0);

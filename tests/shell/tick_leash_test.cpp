@@ -15,7 +15,7 @@
 #include "controller/loop/tick_source.hpp"
 #include "tests/programs/process.hpp"
 
-using kerf::TickLeash;
+using kerf::TickGate;
 using kerf::test::TemporaryFolder;
 
 TEST_CASE(
@@ -24,7 +24,7 @@ TEST_CASE(
   const std::string fifo = (folder / "lead").string();
   REQUIRE(mkfifo(fifo.c_str(), 0600) == 0);
   const std::atomic<bool> stop{false};
-  TickLeash leash(fifo, stop);
+  TickGate leash(fifo, stop);
   const int writer = open(fifo.c_str(), O_WRONLY);
   REQUIRE(writer >= 0);
   const auto allow = [&](std::uint64_t tick) {
@@ -57,7 +57,7 @@ TEST_CASE("a leash gives way to the wish to stop, and is a FIFO or refused") {
   const std::string fifo = (folder / "lead").string();
   REQUIRE(mkfifo(fifo.c_str(), 0600) == 0);
   std::atomic<bool> stop{false};
-  TickLeash leash(fifo, stop);
+  TickGate leash(fifo, stop);
   auto waiting = std::async(std::launch::async, [&] { leash.wait_for(1); });
   CHECK(waiting.wait_for(std::chrono::milliseconds(50)) == std::future_status::timeout);
   stop = true;
@@ -65,7 +65,7 @@ TEST_CASE("a leash gives way to the wish to stop, and is a FIFO or refused") {
 
   std::ofstream(folder / "file") << "12345678";
   for (const std::string& wrong : {(folder / "file").string(), (folder / "none").string()}) {
-    CHECK_THROWS_WITH_AS(TickLeash(wrong, stop),
+    CHECK_THROWS_WITH_AS(TickGate(wrong, stop),
                          ("--until " + wrong + ": no FIFO; make one with mkfifo").c_str(),
                          std::runtime_error);
   }

@@ -49,7 +49,7 @@ TEST_CASE("each device says what its user does") {
 }
 
 TEST_CASE("a wait of a second is told, each kind once until the force comes on") {
-  kerf::WaitTeller teller;
+  kerf::WaitNotice teller;
   std::vector<std::string> told;
   std::int64_t now_ns = 0, servo_ns = 0;
   const auto wait = [&](Waiting waiting, int ms) {
@@ -76,7 +76,7 @@ TEST_CASE("a wait of a second is told, each kind once until the force comes on")
 }
 
 TEST_CASE("while no tick comes in lock-step nothing is told: it is the machine that is busy") {
-  kerf::WaitTeller teller;
+  kerf::WaitNotice teller;
   for (std::int64_t now_ns = 0; now_ns < 60'000 * kMs; now_ns += 50 * kMs) {
     CHECK_FALSE(teller.look(Waiting::report, now_ns, 0));
   }

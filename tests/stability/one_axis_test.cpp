@@ -129,7 +129,7 @@ TEST_CASE("S12: more damping of the device makes the region larger, a higher rat
        {Personality::omni, Personality::falcon, Personality::woodenhaptics}) {
     double at_rate = 0;
     for (const double rate_hz : {250.0, 500.0, 1000.0, 2000.0, 4000.0, 8000.0}) {
-      SampledLoop loop = light_loop(device, rate_hz);
+      SampledLoop loop = unheld_loop(device, rate_hz);
       const double highest = highest_stiffness(loop, 0.002);
       CHECK(highest > at_rate);
       at_rate = highest;
@@ -175,7 +175,7 @@ TEST_CASE("S13: each sample of delay costs stiffness, with friction and without"
 
 TEST_CASE("S17: one difference knows velocity in quanta of D/T alone") {
   SampledLoop loop = omni(0.2, 0.05, 0.055);
-  OneAxis axis(loop);
+  AxisSimulation axis(loop);
   axis.start(0.0123);
   double last_mm = axis.encoder_mm();
   int moved = 0;
@@ -203,7 +203,7 @@ TEST_CASE("a wall that swings gives the energy that friction takes, a quiet one 
 TEST_CASE("without a force the axis coasts as its equation says, whatever the delay") {
   SampledLoop loop = omni(2, 0, 0, 1.3);
   loop.hand = {0.1, 0.001, 0.2};
-  OneAxis axis(loop);
+  AxisSimulation axis(loop);
   axis.start(1);
   for (int tick = 0; tick < 100; ++tick) axis.tick(0, 0);
   // m x'' + b x' + k x = 0 from x = 1 at rest, after 0.1 s.

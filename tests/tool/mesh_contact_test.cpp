@@ -28,11 +28,11 @@ Rests rest_on_flats(const SceneTool& shape, const SceneTool& mesh) {
   for (int k = 0; k < 8; ++k) {
     const Frame frame(dice, {19, 19, 19});
     const Point axis = dice.direction(), across = dice.across(axis), third = cross(across, axis);
-    TurnRows<N> rows;
+    RotationRows<N> rows;
     for (std::size_t i = 0; i < 3; ++i) {
       rows[i] = {N::Unit(across[i]), N::Unit(axis[i]), N::Unit(third[i])};
     }
-    const ToolTurn<N> turn = turn_of<N>(rows);
+    const Orientation<N> turn = orientation_of<N>(rows);
     double support = 0;
     for (const Point& p : mesh.mesh.points_mm) {
       const Point at = p[0] * across + p[1] * axis + p[2] * third;

@@ -181,10 +181,10 @@ TEST_CASE("a small mesh gets more samples, and one of too many is refused") {
   CHECK(surface_samples(mesh_of_units("t", prism(1, 4, 12)), 1).size() ==
         doctest::Approx(kMinSurfaceSamples).epsilon(0.02));
   const SceneTool large = mesh_of_units("large", prism(25, 60, 24));
-  CHECK_THROWS_AS(static_cast<void>(surface_samples(large, 1)), SceneError);
+  CHECK_THROWS_AS(static_cast<void>(surface_samples(large, 1)), LoadError);
   // Nothing but rims.
   const SceneTool thread = mesh_of_units("thread", prism(5e-5, 60, 4));
-  CHECK_THROWS_AS(static_cast<void>(surface_samples(thread, 1)), SceneError);
+  CHECK_THROWS_AS(static_cast<void>(surface_samples(thread, 1)), LoadError);
 }
 
 TEST_CASE("a scene loads a mesh from beside its file, and tells what is wrong with one") {

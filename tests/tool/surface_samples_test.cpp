@@ -111,5 +111,5 @@ TEST_CASE("small tools get finer samples, large ones are refused in one line") {
       static_cast<void>(surface_samples(large, 0.5)),
       "tool 'tool': 31921 samples of its surface, of which contact reads at most 8000 in time; use "
       "a smaller tool or coarser voxels than 0.5 mm",
-      SceneError);
+      LoadError);
 }

@@ -34,7 +34,7 @@ double area_of(const ToolPart& part) {
 
 TEST_CASE("a tool without a shaft has no part behind its head") {
   const SceneTool tool = tool_of("ball", 8, 16, {});
-  CHECK(parts_behind(tool).empty());
+  CHECK(shaft_parts(tool).empty());
   CHECK(shaft_profile(tool).empty());
 }
 
@@ -51,7 +51,7 @@ TEST_CASE("a shaft begins where the head becomes narrower than it, and counts fr
                         {"wheel", 10, 6, 3, 3}}) {
     CAPTURE(std::string(c.shape));
     const auto parts =
-        parts_behind(tool_of(c.shape, c.radius, c.length, {.radius_mm = c.shaft, .length_mm = 60}));
+        shaft_parts(tool_of(c.shape, c.radius, c.length, {.radius_mm = c.shaft, .length_mm = 60}));
     REQUIRE(parts.size() == 1);
     CHECK(parts[0].profile.front()[0] == doctest::Approx(c.begins).epsilon(0.001));
     CHECK(parts[0].profile.back()[0] == doctest::Approx(60 - c.length / 2));
@@ -63,7 +63,7 @@ TEST_CASE("a shaft begins where the head becomes narrower than it, and counts fr
 TEST_CASE("behind a mesh the shaft has a face of its own") {
   SceneTool tool = tool_of("cylinder", 6, 20, {.radius_mm = 4, .length_mm = 60});
   tool.mesh.triangles.push_back({0, 1, 2});  // its shape is no longer known
-  const auto parts = parts_behind(tool);
+  const auto parts = shaft_parts(tool);
   REQUIRE(parts.size() == 1);
   CHECK(parts[0].profile[0] == std::array<double, 2>{10, 0});
   CHECK(parts[0].profile[1] == std::array<double, 2>{10, 4});
@@ -73,7 +73,7 @@ TEST_CASE("samples of both parts lie on their surface, evenly, and none on what 
   const SceneTool tool = tool_of(
       "ball", 8, 16,
       {.radius_mm = 4, .length_mm = 48, .handpiece_radius_mm = 20, .handpiece_length_mm = {}});
-  const auto parts = parts_behind(tool);
+  const auto parts = shaft_parts(tool);
   REQUIRE(parts.size() == 2);
   CHECK(shaft_profile(tool).size() == 5);  // of two cylinders, the common corner once
   for (const ToolPart& part : parts) {
@@ -99,9 +99,8 @@ TEST_CASE("a part that is too large or too long is refused in one line with its 
   const auto error_of = [](const ShaftSize& shaft) {
     const SceneTool tool = tool_of("ball", 8, 16, shaft);
     try {
-      for (const ToolPart& part : parts_behind(tool))
-        static_cast<void>(part_samples(tool, part, 1));
-    } catch (const SceneError& error) {
+      for (const ToolPart& part : shaft_parts(tool)) static_cast<void>(part_samples(tool, part, 1));
+    } catch (const LoadError& error) {
       return std::string(error.what());
     }
     return std::string();

@@ -66,7 +66,7 @@ std::string read_as_named(const std::filesystem::path& path) {
   if (path.extension() != ".stl") return refusal(path);
   try {
     static_cast<void>(read_stl(path));
-  } catch (const SceneError& error) {
+  } catch (const LoadError& error) {
     return error.what();
   }
   return "no error";

@@ -119,12 +119,12 @@ TEST_CASE("nothing solid, an empty box and a box above the limit are refused in 
   try {
     static_cast<void>(crop_to_solid(image, 32768));
     FAIL("accepted");
-  } catch (const SceneError& error) {
+  } catch (const LoadError& error) {
     CHECK(is_one_line(error.what()));
     CHECK(std::string(error.what()).find("nothing solid") != std::string::npos);
   }
-  CHECK_THROWS_AS(static_cast<void>(crop(image, VoxelBox{{2, 0, 0}, {2, 4, 4}})), SceneError);
-  CHECK_THROWS_AS(static_cast<void>(crop(image, VoxelBox{{0, 0, 0}, {2000, 4, 4}})), SceneError);
+  CHECK_THROWS_AS(static_cast<void>(crop(image, VoxelBox{{2, 0, 0}, {2, 4, 4}})), LoadError);
+  CHECK_THROWS_AS(static_cast<void>(crop(image, VoxelBox{{0, 0, 0}, {2000, 4, 4}})), LoadError);
 }
 
 TEST_CASE(

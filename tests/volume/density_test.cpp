@@ -58,12 +58,12 @@ TEST_CASE("a window without width is refused, and a uniform file is named as the
   std::vector<float> fives{5, 5, 5};
   const SourceVolume uniform = source(fives);
   CHECK_THROWS_WITH_AS(static_cast<void>(apply_window(uniform, range_window(uniform))),
-                       doctest::Contains("nothing to see"), SceneError);
+                       doctest::Contains("nothing to see"), LoadError);
   for (const Window bad :
        {Window{2, 1}, Window{1, 1}, Window{0, std::numeric_limits<double>::infinity()},
         Window{std::numeric_limits<double>::quiet_NaN(), 1}}) {
     std::vector<float> values{0, 1};
-    CHECK_THROWS_AS(static_cast<void>(apply_window(source(values), bad)), SceneError);
+    CHECK_THROWS_AS(static_cast<void>(apply_window(source(values), bad)), LoadError);
   }
 }
 

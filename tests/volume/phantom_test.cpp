@@ -276,10 +276,10 @@ TEST_CASE("the phantom is the same bits on every machine") {
 }
 
 TEST_CASE("a phantom without voxels, above the limits or of no spacing is refused") {
-  CHECK_THROWS_AS(static_cast<void>(make_phantom({.grid = {0, 10, 10}})), SceneError);
-  CHECK_THROWS_AS(static_cast<void>(make_phantom({.grid = {2000, 10, 10}})), SceneError);
+  CHECK_THROWS_AS(static_cast<void>(make_phantom({.grid = {0, 10, 10}})), LoadError);
+  CHECK_THROWS_AS(static_cast<void>(make_phantom({.grid = {2000, 10, 10}})), LoadError);
   CHECK_THROWS_AS(static_cast<void>(make_phantom({.grid = {10, 10, 10}, .spacing_mm = -1})),
-                  SceneError);
+                  LoadError);
 }
 
 TEST_CASE(

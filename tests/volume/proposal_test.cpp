@@ -146,7 +146,7 @@ TEST_CASE("a wish goes before what is proposed, and one that cannot be is refuse
   const auto refused = [&](const ProposalWishes& wishes) {
     try {
       static_cast<void>(propose(values, wishes));
-    } catch (const SceneError& error) {
+    } catch (const LoadError& error) {
       CHECK(test::is_one_line(error.what()));
       return true;
     }
@@ -160,7 +160,7 @@ TEST_CASE("a wish goes before what is proposed, and one that cannot be is refuse
   CHECK_THROWS_WITH_AS(static_cast<void>(propose(blob, {.iso = -5})),
                        "iso: everything reaches -5; the values of the file go from 10 to 100, give "
                        "--iso between them",
-                       SceneError);
+                       LoadError);
 }
 
 TEST_CASE("values that no CT has are not taken for its scale") {

@@ -111,8 +111,8 @@ TEST_CASE("labels take the nearest voxel and are never mixed") {
 
 TEST_CASE("a spacing that is not positive or gives too many voxels is refused") {
   const VolumeImage image = air({4, 4, 4});
-  CHECK_THROWS_AS(static_cast<void>(resample(image, {1, 0, 1})), SceneError);
-  CHECK_THROWS_AS(static_cast<void>(resample(image, {1, -1, 1})), SceneError);
-  CHECK_THROWS_AS(static_cast<void>(resample(image, {1, std::nan(""), 1})), SceneError);
-  CHECK_THROWS_AS(static_cast<void>(resample(image, {1e-6, 1, 1})), SceneError);
+  CHECK_THROWS_AS(static_cast<void>(resample(image, {1, 0, 1})), LoadError);
+  CHECK_THROWS_AS(static_cast<void>(resample(image, {1, -1, 1})), LoadError);
+  CHECK_THROWS_AS(static_cast<void>(resample(image, {1, std::nan(""), 1})), LoadError);
+  CHECK_THROWS_AS(static_cast<void>(resample(image, {1e-6, 1, 1})), LoadError);
 }

@@ -47,7 +47,7 @@ std::size_t any(std::span<const std::byte>) {
 std::string answer(const Reader& read, const SandboxJob& to_do = job()) {
   try {
     static_cast<void>(read_in_sandbox(to_do, read, any));
-  } catch (const SceneError& error) {
+  } catch (const LoadError& error) {
     CHECK(waitpid(-1, nullptr, WNOHANG) == -1);  // no child is left, not even a dead one
     return error.what();
   }
@@ -95,7 +95,7 @@ TEST_CASE("a reader hands over a header and memory; both sides see the same byte
       [](SandboxReader& sandbox) {
         const std::string told = "three words here";
         const std::span<std::byte> given = sandbox.offer(std::as_bytes(std::span(told)));
-        if (given.size() != 5000 || given[4999] != std::byte{0}) throw SceneError("not 5000 zeros");
+        if (given.size() != 5000 || given[4999] != std::byte{0}) throw LoadError("not 5000 zeros");
         for (std::size_t i = 0; i < given.size(); ++i) given[i] = static_cast<std::byte>(i);
       },
       [&](std::span<const std::byte> bytes) {
@@ -113,9 +113,8 @@ TEST_CASE("a reader hands over a header and memory; both sides see the same byte
 
 TEST_CASE("however a reader ends, it is one line, and nothing of it stays") {
   const int files = open_files();
-  check_ends([](SandboxReader&) { throw SceneError("a.vol: bad; mend it"); },
-             "a.vol: bad; mend it");
-  check_ends([](SandboxReader&) { throw SceneError("two\nlines: \x1b[31m; x"); },
+  check_ends([](SandboxReader&) { throw LoadError("a.vol: bad; mend it"); }, "a.vol: bad; mend it");
+  check_ends([](SandboxReader&) { throw LoadError("two\nlines: \x1b[31m; x"); },
              R"(two\nlines: \x1b[31m)");
   check_ends([](SandboxReader&) { ::_exit(0); }, "the reader of VOL ended without a word");
   check_ends([](SandboxReader&) { ::_exit(7); }, "the reader of VOL ended without a word");
@@ -264,7 +263,7 @@ TEST_CASE("a reader cannot grow the memory that it was given") {
       [](SandboxReader& s) {
         std::byte* end = s.offer({}).data() + 4096;
         void* more = ::mmap(end, 4096, PROT_READ | PROT_WRITE, MAP_SHARED, kSandboxMemory, 4096);
-        if (more == MAP_FAILED) throw SceneError("not mapped: x; y");
+        if (more == MAP_FAILED) throw LoadError("not mapped: x; y");
         *static_cast<volatile char*>(more) = 1;  // beyond the end of the file
       },
       "ended with SIG");
@@ -291,9 +290,9 @@ TEST_CASE("a refusal of this side ends the reader") {
   CHECK_THROWS_WITH_AS(
       static_cast<void>(read_in_sandbox(job(), offers,
                                         [](std::span<const std::byte>) -> std::size_t {
-                                          throw SceneError("too large; crop it");
+                                          throw LoadError("too large; crop it");
                                         })),
-      "too large; crop it", SceneError);
+      "too large; crop it", LoadError);
   CHECK(waitpid(-1, nullptr, WNOHANG) == -1);
 }
 

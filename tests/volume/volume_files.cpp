@@ -142,7 +142,7 @@ std::string dicom(const DicomSpec& spec) {
 std::string refusal(const fs::path& path, const ReadOptions& options) {
   try {
     static_cast<void>(read_volume(path, options));
-  } catch (const SceneError& error) {
+  } catch (const LoadError& error) {
     return error.what();
   }
   return "no error";

@@ -99,7 +99,7 @@ struct DicomSpec {
 /// One CT slice, explicit little-endian.
 [[nodiscard]] std::string dicom(const DicomSpec& spec);
 
-/// The message of the SceneError that reading throws; "no error" without one.
+/// The message of the LoadError that reading throws; "no error" without one.
 [[nodiscard]] std::string refusal(const std::filesystem::path& path,
                                   const ReadOptions& options = {});
 

@@ -99,7 +99,7 @@ TEST_CASE("labels lie beside the volume, and those of an earlier volume go away"
   CHECK(labels_path("dir/tooth.nrrd") == "dir/tooth-labels.nrrd");
   CHECK_THROWS_WITH_AS(
       check_volume_path("tooth-labels.nrrd"),
-      "tooth-labels.nrrd: is the name of the labels of tooth.nrrd; give another one", SceneError);
+      "tooth-labels.nrrd: is the name of the labels of tooth.nrrd; give another one", LoadError);
   VolumeImage image = noise(kSmall);
   image.labels.assign(60, 2);
   write_volume(image, folder / "tooth.nrrd");
@@ -117,7 +117,7 @@ TEST_CASE("labels that do not fit the volume beside them are refused") {
   write_volume(image, folder / "tooth.nrrd");
   VolumeImage other = air(kSmall);
   CHECK_THROWS_WITH_AS(read_labels_beside(folder / "tooth.nrrd", other),
-                       doctest::Contains("labels do not fit"), SceneError);
+                       doctest::Contains("labels do not fit"), LoadError);
 }
 
 TEST_CASE("a full disk leaves the old volume as it was and nothing else") {
@@ -146,14 +146,14 @@ TEST_CASE("a folder that is not there and a name of another kind are refused") {
   CHECK_THROWS_WITH_AS(write_volume(noise(kSmall), folder / "none/a.nrrd"),
                        doctest::Contains("cannot be written"), FileError);
   CHECK_THROWS_WITH_AS(write_volume(noise(kSmall), folder / "a.nii"),
-                       doctest::Contains(".nrrd only"), SceneError);
+                       doctest::Contains(".nrrd only"), LoadError);
   CHECK(files_in(folder) == 0);
 }
 
 TEST_CASE("a new file that is not committed never appears") {
   const TempFolder folder;
   {
-    NewFile file(folder / "a.txt");
+    AtomicFile file(folder / "a.txt");
     file.write("half", 4);
   }
   CHECK(files_in(folder) == 0);

@@ -72,7 +72,7 @@ std::optional<glm::dvec3> PointerHand::goal_mm() const {
   return *goal_mm_ + press_mm_;
 }
 
-HandWish PointerHand::wish(const DeviceFrame& device) const {
+HandTarget PointerHand::wish(const DeviceFrame& device) const {
   const glm::dvec3 at = (goal_mm().value_or(device.offset_mm) - device.offset_mm) / device.scale;
   return {.tip_mm = {at.x, at.y, at.z}, .orientation_rad = {tilt_rad_.x, tilt_rad_.y, 0.0}};
 }
@@ -278,7 +278,7 @@ std::optional<Notice> HandLink::step(Clock::time_point now) {
   return news && state_ != told_ ? turned(state_) : std::nullopt;
 }
 
-void HandLink::send(const HandWish& wish) noexcept {
+void HandLink::send(const HandTarget& wish) noexcept {
   if (!leads()) return;
   const HandWishBytes bytes = encode(wish);
   // A full socket is one whose emulator stands still: it takes the newest wish once it goes on.

@@ -15,8 +15,8 @@ namespace kerf {
 
 /// The command line of kerf-visualizer.
 struct VisualizerOptions {
-  std::string name = kUsualName;  ///< of the controller
-  Look look;                      ///< at first; its opacities are those of `transfer`
+  std::string name = kDefaultName;  ///< of the controller
+  ViewSettings look;                ///< at first; its opacities are those of `transfer`
   PictureSize size{800, 600};
   std::optional<double> panel_scale;  ///< of the panels' letters; none: the display's density
   bool headless = false;

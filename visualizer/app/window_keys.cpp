@@ -88,8 +88,8 @@ std::string no_such_tool(std::size_t index, std::size_t tools) {
          "; press 1" + last;
 }
 
-void change_look(Picture& picture, const Session& session, const Look& look, Notices& notices,
-                 Notices::Clock::time_point now) {
+void change_look(Picture& picture, const Session& session, const ViewSettings& look,
+                 Notices& notices, Notices::Clock::time_point now) {
   try {
     picture.set_look(session, look);
   } catch (const VisualizerError& problem) {
@@ -119,7 +119,7 @@ void WindowKeys::switch_panel(bool& panel, bool& other) {
 bool WindowKeys::apply(const WindowInput& input, Session& session, Picture& picture, double aspect,
                        Notices& notices, Notices::Clock::time_point now) {
   bool quit = input.close;
-  Look look = picture.look();
+  ViewSettings look = picture.look();
   const std::vector<VolumeView>& volumes = session.scene().volumes;
   if (one > volumes.size()) one = 0;  // another controller may show fewer
   for (const char key : input.keys) {

@@ -16,8 +16,8 @@ namespace kerf {
 
 /// Gives the picture another look. Where its renderer cannot show these volumes, the picture keeps
 /// its look and a notice gives the reason.
-void change_look(Picture& picture, const Session& session, const Look& look, Notices& notices,
-                 Notices::Clock::time_point now);
+void change_look(Picture& picture, const Session& session, const ViewSettings& look,
+                 Notices& notices, Notices::Clock::time_point now);
 
 /// Message to a user who asks for tool `index`, counted from 0, of a scene that has `tools`.
 [[nodiscard]] std::string no_such_tool(std::size_t index, std::size_t tools);

@@ -56,7 +56,7 @@ void FollowedSession::attach_again(double aspect, Clock::time_point now) {
     return;  // not there yet
   }
   earlier_bricks_ += picture_->bricks_uploaded();
-  Look look = picture_->look();
+  ViewSettings look = picture_->look();
   if (session_.scene().volumes.size() != volumes) {
     look.renderer = renderer_of_each(look.renderer, volumes).front();
   }
@@ -210,7 +210,7 @@ void WindowRun::lead_hand(const WindowInput& input, bool over_panel, OverlayFigu
              std::min(frame_s, kLongestFrameS));
   time_the_tool(input, held->tip_mm, now);
   if (!hand_.leads()) return;
-  HandWish wish = hand_.wish(scene.device);
+  HandTarget wish = hand_.wish(scene.device);
   wish.park = std::exchange(keys_.park, false);
   hand_link_->send(wish);
   const SeenPoint goal = seen_at(view, eye, *hand_.goal_mm());

@@ -163,7 +163,7 @@ class Stage {
     if (change.partial) {
       StaleVolume stale;
       stale.add(*renderer_, 0, cut.differs);
-      StaleTiles tiles(target_.size());
+      RedrawTiles tiles(target_.size());
       stale.mark(tiles, *renderer_, tooth_.view(), tooth_.density(), view_, target_);
       target_.restrict_to(tiles.rects());
     }

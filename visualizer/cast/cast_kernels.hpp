@@ -33,7 +33,7 @@ struct CastVolumeJob {
   const std::uint16_t* labels = nullptr;    ///< `PairedRows`, or none
   const std::uint32_t* gradient = nullptr;  ///< `GradientRows`, for blend
   const std::uint8_t* active = nullptr;     ///< of each macrocell: not 0 if it may show anything
-  const CastBlock* blocks = nullptr;        ///< `CellBlocks`: rows of the picture's blocks
+  const CastBlock* blocks = nullptr;        ///< `MacrocellDepthRange`: rows of the picture's blocks
   std::int32_t row = 0, plane = 0;          ///< of density and labels, in entries
   std::int32_t gradient_plane = 0;          ///< its rows are as long as the others
   std::int32_t cell_row = 0, cell_plane = 0;
@@ -78,7 +78,7 @@ struct CastJob {
   float key_light[3] = {}, fill_light[3] = {}, up[3] = {};  ///< unit vectors in eye space
 };
 
-struct DirtyJob;
+struct RedrawJob;
 
 /// The kernels of one instruction set. All sets give the same bits: every ray is computed by
 /// itself, with the same operations in the same order, whatever packet it travels in.
@@ -87,9 +87,9 @@ struct CastKernels {
   void (*iso)(const CastJob& job, const PixelRect& rect);
   void (*blend)(const CastJob& job, const PixelRect& rect);
   /// Whether a ray of `rect` crosses a dirty cell, or ends in one.
-  bool (*rays_touch)(const DirtyJob& job, const PixelRect& rect);
+  bool (*rays_touch)(const RedrawJob& job, const PixelRect& rect);
   /// Whether the shading of a surface point in `rect` samples a dirty cell.
-  bool (*shading_touches)(const DirtyJob& job, const PixelRect& rect);
+  bool (*shading_touches)(const RedrawJob& job, const PixelRect& rect);
 };
 
 /// What this machine can run, the fastest first; ends with the scalar set and a null.
@@ -111,7 +111,7 @@ struct RayFootprint {
   bool taps_normal = false;
 };
 
-/// Marks of the cells of a `DirtyJob`.
+/// Marks of the cells of a `RedrawJob`.
 inline constexpr std::uint8_t kDirtyAlong = 1;  ///< a ray that crosses the cell may have changed
 inline constexpr std::uint8_t kDirtyAtEnd = 2;  ///< a ray that ends in the cell may have changed
 
@@ -120,9 +120,9 @@ inline constexpr std::uint8_t kDirtyAtEnd = 2;  ///< a ray that ends in the cell
 inline constexpr float kShadingTapsVox[] = {-2.5F, -1.25F, 1.25F, 2.5F, 6.0F, 12.0F};
 inline constexpr float kLongestTapVox = 12.0F;
 
-/// Input of the kernels that test rays against the dirty cells of a volume (`DirtyCells`): plain
+/// Input of the kernels that test rays against the dirty cells of a volume (`ChangedCells`): plain
 /// pointers, as in `CastVolumeJob`. Places are in voxel edges from the lowest corner of the cells.
-struct DirtyJob {
+struct RedrawJob {
   CastEye eye;
   float origin[3] = {};         ///< the eye
   float from_eye[3][3] = {};    ///< [to][from]: mm of eye space to voxel edges

@@ -159,7 +159,7 @@ void CastVolume::take_cells(const VoxelBox& cells) {
     }
   }
   const VoxelBox near = cells.grown(1).clipped(grid.box());
-  std::erase_if(outer_cells_, [&](const CellBlocks::Cell& cell) {
+  std::erase_if(outer_cells_, [&](const MacrocellDepthRange::Cell& cell) {
     return near.contains({cell[0], cell[1], cell[2]});
   });
   const auto first = static_cast<std::ptrdiff_t>(outer_cells_.size());

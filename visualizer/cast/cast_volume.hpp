@@ -153,10 +153,10 @@ class CastVolume {
   std::optional<PairedRows<Label, std::uint16_t>> labels_;
   std::optional<GradientRows> gradient_;  ///< blend only
   Macrocells cells_;
-  std::vector<std::uint8_t> active_;           ///< of the cells, and room to load four at the last
-  std::vector<CellBlocks::Cell> outer_cells_;  ///< active, with a face to an empty one
-  VoxelBox body_;                              ///< around them
-  CellBlocks blocks_;
+  std::vector<std::uint8_t> active_;  ///< of the cells, and room to load four at the last
+  std::vector<MacrocellDepthRange::Cell> outer_cells_;  ///< active, with a face to an empty one
+  VoxelBox body_;                                       ///< around them
+  MacrocellDepthRange blocks_;
 };
 
 }  // namespace kerf

@@ -101,7 +101,7 @@ std::array<glm::dvec4, 4> sides_of(const PixelRect& blocks, const glm::dmat4x3& 
   return sides;
 }
 
-bool is_beside(const CellBlocks::Cell& cell, const std::array<glm::dvec4, 4>& sides) {
+bool is_beside(const MacrocellDepthRange::Cell& cell, const std::array<glm::dvec4, 4>& sides) {
   return std::any_of(sides.begin(), sides.end(), [&](const glm::dvec4& side) {
     return cell[0] * side.x + cell[1] * side.y + cell[2] * side.z + side.w > 0.0;
   });
@@ -109,9 +109,9 @@ bool is_beside(const CellBlocks::Cell& cell, const std::array<glm::dvec4, 4>& si
 
 }  // namespace
 
-void CellBlocks::draw(std::span<const Cell> cells, bool begin_inside,
-                      const glm::dmat4& world_from_cell, const View& view, std::int32_t width,
-                      std::int32_t height, const PixelRect& part) {
+void MacrocellDepthRange::draw(std::span<const Cell> cells, bool begin_inside,
+                               const glm::dmat4& world_from_cell, const View& view,
+                               std::int32_t width, std::int32_t height, const PixelRect& part) {
   const auto up = [](std::int32_t pixels) { return (pixels + kCastBlock - 1) / kCastBlock; };
   across_ = up(width);
   blocks_.resize(static_cast<std::size_t>(across_) * static_cast<std::size_t>(up(height)));
@@ -156,7 +156,8 @@ void CellBlocks::draw(std::span<const Cell> cells, bool begin_inside,
   }
 }
 
-void CellBlocks::cover(const glm::dvec2& low, const glm::dvec2& high, const CastBlock& range) {
+void MacrocellDepthRange::cover(const glm::dvec2& low, const glm::dvec2& high,
+                                const CastBlock& range) {
   const auto block = [](double pixel, std::int32_t first, std::int32_t end) {
     return static_cast<std::int32_t>(
         std::clamp(std::floor(pixel / kCastBlock), first - 1.0, static_cast<double>(end)));

@@ -58,7 +58,7 @@ class Macrocells {
 /// Where the rays of each block of pixels can meet the active cells of a volume: the picture of the
 /// cells, coarse and on the safe side. Rays of a block without cells cost nothing, the others begin
 /// and end near what they may see; between the two, the cells themselves are read.
-class CellBlocks {
+class MacrocellDepthRange {
  public:
   using Cell = std::array<std::uint16_t, 3>;
 

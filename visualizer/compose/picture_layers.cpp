@@ -147,7 +147,7 @@ std::vector<PixelRect> ScenePainter::bounds(const Hand& hand, const View& view,
   return bounds;
 }
 
-void ScenePainter::mark_volumes(Layer layer, StaleTiles& tiles,
+void ScenePainter::mark_volumes(Layer layer, RedrawTiles& tiles,
                                 std::span<const VolumeContent> contents, const View& view,
                                 const RenderTarget& kept) const {
   for (std::size_t v = 0; v < volumes_.size(); ++v) {
@@ -168,21 +168,21 @@ bool has_moved(const std::optional<Hand>& from, const std::optional<Hand>& to) {
 
 }  // namespace
 
-EyeLayers::Stale EyeLayers::stale(const View& view, const std::optional<Hand>& hand,
-                                  const ScenePainter& painter,
-                                  std::span<const VolumeContent> contents) const {
+PictureLayers::Stale PictureLayers::stale(const View& view, const std::optional<Hand>& hand,
+                                          const ScenePainter& painter,
+                                          std::span<const VolumeContent> contents) const {
   const PixelRect all = stage_.all();
   const bool turned = shown_ && shown_->view != view;
   const Moment now{view, turned || (shown_ && has_moved(shown_->hand, hand)), hand};
   if (!shown_ || turned) return {now, {all}, {all}};
-  StaleTiles of_hand(stage_.size());
+  RedrawTiles of_hand(stage_.size());
   if (hand != shown_->hand) {
     for (const auto& one : {hand, shown_->hand}) {
       if (!one) continue;
       for (const PixelRect& part : painter.bounds(*one, view, stage_.size())) of_hand.mark(part);
     }
   }
-  StaleTiles tiles(stage_.size());
+  RedrawTiles tiles(stage_.size());
   painter.mark_volumes(Layer::opaque, tiles, contents, view, opaque_);
   if (painter.hand_is_opaque_volume()) tiles.mark(of_hand);
   const std::vector<PixelRect> opaque = tiles.rects();
@@ -192,8 +192,8 @@ EyeLayers::Stale EyeLayers::stale(const View& view, const std::optional<Hand>& h
   return {now, opaque, tiles.rects()};
 }
 
-std::vector<PixelRect> EyeLayers::draw(const Stale& stale, ScenePainter& painter,
-                                       ScreenPasses& passes) {
+std::vector<PixelRect> PictureLayers::draw(const Stale& stale, ScenePainter& painter,
+                                           ScreenPasses& passes) {
   shown_ = stale.now;
   if (stale.stage.empty()) return {};
   painter.renderers().set_moving(stale.now.moving);
@@ -214,14 +214,14 @@ std::vector<PixelRect> EyeLayers::draw(const Stale& stale, ScenePainter& painter
   return smoothed;
 }
 
-void EyeLayers::draw_opaque(const Stale& stale, ScenePainter& painter, ScreenPasses& passes) {
+void PictureLayers::draw_opaque(const Stale& stale, ScenePainter& painter, ScreenPasses& passes) {
   if (stale.opaque.empty()) return;
   opaque_.restrict_to(stale.opaque);
   passes.draw_backdrop(opaque_);
   painter.draw_volumes(Layer::opaque, stale.now.view, opaque_);
 }
 
-void EyeLayers::draw_stage(const Stale& stale, ScenePainter& painter) {
+void PictureLayers::draw_stage(const Stale& stale, ScenePainter& painter) {
   stage_.restrict_to(stale.stage);
   for (const PixelRect& part : stale.stage) stage_.copy(opaque_, part);
   const auto& [view, moving, hand] = stale.now;

@@ -107,7 +107,7 @@ class ScenePainter {
 
   /// Marks what changed in the volumes of a layer since `forget_changes`. `contents` are all of
   /// them as they are now; `kept` holds the opaque ones as they were drawn before, and no other.
-  void mark_volumes(Layer layer, StaleTiles& tiles, std::span<const VolumeContent> contents,
+  void mark_volumes(Layer layer, RedrawTiles& tiles, std::span<const VolumeContent> contents,
                     const View& view, const RenderTarget& kept) const;
   void forget_changes();
 
@@ -142,7 +142,7 @@ class ScreenPasses {
 /// The picture of one eye as it grows, kept from frame to frame: backdrop and opaque volumes, over
 /// them the hand and what is translucent, and all that with smoothed edges. So a hand that moves
 /// over opaque volumes costs no volume.
-class EyeLayers {
+class PictureLayers {
  public:
   /// What a picture shows beside the volumes.
   struct Moment {
@@ -156,7 +156,7 @@ class EyeLayers {
     std::vector<PixelRect> opaque, stage;
   };
 
-  explicit EyeLayers(PictureSize size)
+  explicit PictureLayers(PictureSize size)
       : opaque_(size), stage_(size), smooth_(size), coarse_(size) {}
 
   /// What shows `view` and `hand` and the volumes, which are now `contents`.
@@ -176,7 +176,7 @@ class EyeLayers {
   RenderTarget opaque_;
   RenderTarget stage_;  ///< with everything
   RenderTarget smooth_;
-  StaleTiles coarse_;  ///< of the stage, drawn while something moved: drawn again once it rests
+  RedrawTiles coarse_;  ///< of the stage, drawn while something moved: drawn again once it rests
   std::optional<Moment> shown_{};  ///< none: nothing yet
 };
 

@@ -45,7 +45,7 @@ std::string size_text(PictureSize size) {
   return std::to_string(size.width) + "x" + std::to_string(size.height);
 }
 
-std::string look_text(const Look& look) {
+std::string look_text(const ViewSettings& look) {
   return look.renderer + (look.clip.on ? ", cut open" : "") + (look.stereo.on ? ", stereo" : "") +
          (look.voxel_tool ? ", voxel tool" : "") + ", gradient " +
          std::string(name_of(look.gradient));

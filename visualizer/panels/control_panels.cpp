@@ -104,7 +104,7 @@ constexpr ImGuiSliderFlags kDragOnly = ImGuiSliderFlags_NoInput | ImGuiSliderFla
 
 constexpr std::size_t kMostLetters = 12;  // letters
 
-void choose_gradient(Look& look) {
+void choose_gradient(ViewSettings& look) {
   auto chosen = static_cast<std::size_t>(look.gradient);
   if (ImGui::BeginCombo("gradient", kGradientNames[chosen].data())) {
     for (std::size_t i = 0; i < kGradientNames.size(); ++i) {
@@ -186,7 +186,7 @@ void choose_renderers(LookControls& controls) {
 }
 
 void choose_opacities(LookControls& controls) {
-  Look& look = controls.look;
+  ViewSettings& look = controls.look;
   ImGui::TextColored(kLabelColour, "opacity of a voxel");
   ImGui::SameLine();
   controls.write = ImGui::SmallButton("write");
@@ -200,7 +200,7 @@ void choose_opacities(LookControls& controls) {
   }
 }
 
-void choose_clip_plane(Look& look) {
+void choose_clip_plane(ViewSettings& look) {
   ImGui::Checkbox("clip", &look.clip.on);
   if (look.clip.on) {
     constexpr std::array kAxes{"x", "y", "z", "free"};
@@ -216,11 +216,11 @@ void choose_clip_plane(Look& look) {
 
 }  // namespace
 
-float LookPanel::least_high() {
+float SettingsPanel::least_high() {
   return 48.0F * unit_px();
 }
 
-float LookPanel::draw(LookControls& controls, float height, float most_high, float most_area) {
+float SettingsPanel::draw(LookControls& controls, float height, float most_high, float most_area) {
   const float gap = panel_gap();
   const float wide = wide_ > 0.0F ? wide_ : 215.0F * unit_px();
   const float high = std::max(std::min(most_area / wide, most_high), least_high());
@@ -228,7 +228,7 @@ float LookPanel::draw(LookControls& controls, float height, float most_high, flo
   ImGui::SetNextWindowSizeConstraints(ImVec2(0.0F, 0.0F),
                                       ImVec2(std::numeric_limits<float>::max(), high));
   ImGui::Begin("look", nullptr, kTouched);
-  Look& look = controls.look;
+  ViewSettings& look = controls.look;
   ImGui::PushItemWidth(130.0F * unit_px());
   choose_tool(controls);
   choose_renderers(controls);
@@ -246,8 +246,8 @@ float LookPanel::draw(LookControls& controls, float height, float most_high, flo
   return end_x;
 }
 
-void LookPanel::choose_iso(LookControls& controls) {
-  Look& look = controls.look;
+void SettingsPanel::choose_iso(LookControls& controls) {
+  ViewSettings& look = controls.look;
   float iso = dragged_iso_.value_or(static_cast<float>(look.iso.value_or(controls.own_iso)));
   if (ImGui::SliderFloat("iso", &iso, 0.02F, 0.98F, "%.2f", kDragOnly)) dragged_iso_ = iso;
   if (ImGui::IsItemDeactivated() && dragged_iso_) {

@@ -43,7 +43,7 @@ struct ToolChoice {
 
 /// What the controls show, and the look that they change.
 struct LookControls {
-  Look look;
+  ViewSettings look;
   double own_iso = 0.5;                ///< of the main volume, 0..1: if the look has none
   std::vector<ToolChoice> tools{};     ///< one alone is no choice
   std::size_t tool = 0;                ///< in the hand, or asked for
@@ -58,7 +58,7 @@ struct LookControls {
 
 /// The controls of tool and look, which the mouse moves: the tool in the hand, renderers, gradient,
 /// iso value, opacities, clip plane, stereo, voxel tool. Lower left corner.
-class LookPanel {
+class SettingsPanel {
  public:
   /// Between ImGui::NewFrame and ImGui::Render. Takes the mouse's changes over into `controls`.
   /// Returns the x at which the panel ends, in pixels, in a picture `height` pixels high. Where the

@@ -164,7 +164,7 @@ void Overlay::lay_out(OverlayFigures& figures, PictureSize size) {
       const auto texture = static_cast<std::intptr_t>(slices_->id());
       room -= draw_slices(*figures.slices, reinterpret_cast<ImTextureID>(texture), all);
     }
-    if (figures.controls && below >= LookPanel::least_high()) {
+    if (figures.controls && below >= SettingsPanel::least_high()) {
       controls_x = look_panel_.draw(*figures.controls, all.y, below, room);
     }
   }

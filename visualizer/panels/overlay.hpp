@@ -134,7 +134,7 @@ class Overlay {
   void lay_out(OverlayFigures& figures, PictureSize size);
   void show(const SliceViews& slices);
 
-  LookPanel look_panel_;
+  SettingsPanel look_panel_;
   float letters_ = 0.0F;  ///< height of those that are loaded, in pixels
   int help_pages_ = 1;
   std::optional<SliceViews> uploaded_;

@@ -63,7 +63,7 @@ std::string state_words(const TickRecord& record) {
 
 }  // namespace
 
-Picture::Picture(const Session& session, const Look& look, double aspect)
+Picture::Picture(const Session& session, const ViewSettings& look, double aspect)
     : scene_(session.scene()), look_(look), painter_(painter_for(session, look)) {
   const std::vector<glm::dvec3> corners = scene_.corners();
   low_mm_ = high_mm_ = corners.front();
@@ -78,7 +78,7 @@ SceneView Picture::shown_scene() const {
   return scene_in(look_);
 }
 
-SceneView Picture::scene_in(const Look& look) const {
+SceneView Picture::scene_in(const ViewSettings& look) const {
   SceneView scene = scene_;
   scene.gradient = look.gradient;
   scene.voxel_tool = look.voxel_tool;
@@ -93,14 +93,15 @@ SceneView Picture::scene_in(const Look& look) const {
   return scene;
 }
 
-std::unique_ptr<ScenePainter> Picture::painter_for(const Session& session, const Look& look) {
+std::unique_ptr<ScenePainter> Picture::painter_for(const Session& session,
+                                                   const ViewSettings& look) {
   auto painter = std::make_unique<ScenePainter>(look.renderer, scene_in(look), session.contents());
   if (look.clip.on) painter->set_cut_open(true, session.contents());
   for (const VolumeView& volume : scene_.volumes) bricks_uploaded_ += volume.bricks.count();
   return painter;
 }
 
-void Picture::set_look(const Session& session, const Look& look) {
+void Picture::set_look(const Session& session, const ViewSettings& look) {
   if (look == look_) return;
   if (look.renderer != look_.renderer || look.iso != look_.iso || look.gradient != look_.gradient ||
       look.voxel_tool != look_.voxel_tool || look.colour_blind != look_.colour_blind) {
@@ -231,7 +232,7 @@ Redrawn Picture::draw(const Session& session, const OverlayFigures& figures,
     shown_in_ = 0;
   }
   const std::vector<VolumeContent> contents = session.contents();
-  std::vector<EyeLayers::Stale> stale;
+  std::vector<PictureLayers::Stale> stale;
   for (std::size_t eye = 0; eye < views.size(); ++eye) {
     stale.push_back(eyes_[eye].stale(views[eye], hand, *painter_, contents));
   }
@@ -239,7 +240,7 @@ Redrawn Picture::draw(const Session& session, const OverlayFigures& figures,
   const OverlayFigures panel = figures.rounded();
   const bool same_target = target.framebuffer() == shown_in_ && target.size() == shown_size_;
   const bool rests = std::all_of(stale.begin(), stale.end(),
-                                 [](const EyeLayers::Stale& one) { return one.stage.empty(); });
+                                 [](const PictureLayers::Stale& one) { return one.stage.empty(); });
   if (rests && same_target && panel == shown_figures_) return {};
 
   if (!same_target) clear(target);  // an odd column belongs to neither eye

@@ -26,7 +26,7 @@ struct Redrawn {
 /// Made after the first `poll` of its session, which is uploaded whole; later only what changed.
 class Picture {
  public:
-  Picture(const Session& session, const Look& look, double aspect);
+  Picture(const Session& session, const ViewSettings& look, double aspect);
 
   /// Uploads the bricks that the last `poll` changed. Call once after each `poll`.
   void update(const Session& session);
@@ -41,11 +41,11 @@ class Picture {
   /// The next `draw` draws everything.
   void redraw_all() noexcept { eyes_.clear(); }
 
-  [[nodiscard]] const Look& look() const noexcept { return look_; }
+  [[nodiscard]] const ViewSettings& look() const noexcept { return look_; }
   /// From the next `draw` on. Another renderer or iso value uploads all volumes again, an opacity
   /// only the materials. Throws VisualizerError if the renderer cannot show them; the look stays
   /// then.
-  void set_look(const Session& session, const Look& look);
+  void set_look(const Session& session, const ViewSettings& look);
   /// The scene with the iso values and opacities of the look.
   [[nodiscard]] SceneView shown_scene() const;
   /// Of all materials, their own or chosen.
@@ -75,8 +75,9 @@ class Picture {
 
  private:
   /// The same of another look.
-  [[nodiscard]] SceneView scene_in(const Look& look) const;
-  [[nodiscard]] std::unique_ptr<ScenePainter> painter_for(const Session& session, const Look& look);
+  [[nodiscard]] SceneView scene_in(const ViewSettings& look) const;
+  [[nodiscard]] std::unique_ptr<ScenePainter> painter_for(const Session& session,
+                                                          const ViewSettings& look);
   /// Where the box of all volumes begins and ends along a direction, in mm.
   [[nodiscard]] glm::dvec2 reach_along(const glm::dvec3& towards) const;
   /// `View::shown` of the clip plane.
@@ -85,13 +86,13 @@ class Picture {
   [[nodiscard]] std::vector<View> views(PictureSize size) const;
 
   SceneView scene_;
-  Look look_;
+  ViewSettings look_;
   std::uint64_t bricks_uploaded_ = 0;
   std::unique_ptr<ScenePainter> painter_;  ///< making it counts bricks
   OrbitCamera camera_;
   glm::dvec3 low_mm_{0, 0, 0}, high_mm_{0, 0, 0};  ///< the box of all volumes
   ScreenPasses passes_;
-  std::vector<EyeLayers> eyes_;  ///< empty: draw everything
+  std::vector<PictureLayers> eyes_;  ///< empty: draw everything
   Overlay overlay_;
   OverlayFigures shown_figures_;
   GLuint shown_in_ = 0;     ///< framebuffer, whose name may be given to a later one

@@ -15,7 +15,7 @@
 
 namespace kerf {
 
-DirtyCells::DirtyCells(std::span<const VoxelBox> voxels, const RayFootprint& footprint)
+ChangedCells::ChangedCells(std::span<const VoxelBox> voxels, const RayFootprint& footprint)
     : reach_(std::max(footprint.along, footprint.at_end)) {
   VoxelBox all;
   for (const VoxelBox& box : voxels) all = all.united(box);
@@ -30,11 +30,11 @@ DirtyCells::DirtyCells(std::span<const VoxelBox> voxels, const RayFootprint& foo
   for (const VoxelBox& box : voxels) mark(box, footprint.along, kDirtyAlong | kDirtyAtEnd);
 }
 
-glm::dvec3 DirtyCells::high() const noexcept {
+glm::dvec3 ChangedCells::high() const noexcept {
   return low_ + glm::dvec3(grid_.nx, grid_.ny, grid_.nz);
 }
 
-void DirtyCells::mark(const VoxelBox& voxels, int reach, std::uint8_t marks) {
+void ChangedCells::mark(const VoxelBox& voxels, int reach, std::uint8_t marks) {
   if (reach == 0) return;
   const int inset = (reach_ - reach) / 2;
   const VoxelIndex lo{voxels.lo.x - first_.x + inset, voxels.lo.y - first_.y + inset,
@@ -47,7 +47,7 @@ void DirtyCells::mark(const VoxelBox& voxels, int reach, std::uint8_t marks) {
   }
 }
 
-void DirtyCells::put(DirtyJob& job) const {
+void ChangedCells::put(RedrawJob& job) const {
   job.cells = marks_.data();
   job.row = grid_.nx;
   job.plane = grid_.nx * grid_.ny;
@@ -113,12 +113,12 @@ std::vector<std::vector<VoxelBox>> clusters_of(std::span<const VoxelBox> boxes) 
 }
 
 /// The dirty cells of a volume, as one view sees them.
-DirtyJob dirty_job(const DirtyCells& cells, const VolumeView& volume, const View& view,
-                   PictureSize size) {
+RedrawJob dirty_job(const ChangedCells& cells, const VolumeView& volume, const View& view,
+                    PictureSize size) {
   const glm::dmat4 eye_from_cell =
       view.eye_from_world * glm::translate(volume.world_from_voxel, cells.low());
   const glm::dmat4 cell_from_eye = glm::affineInverse(eye_from_cell);
-  DirtyJob job;
+  RedrawJob job;
   job.eye = cast_eye(view, size.width, size.height);
   put(job.origin, glm::dvec3(cell_from_eye[3]));
   put(job.from_eye, glm::dmat3(cell_from_eye));
@@ -127,7 +127,7 @@ DirtyJob dirty_job(const DirtyCells& cells, const VolumeView& volume, const View
 }
 
 /// Adds the volume itself, for surfaces whose shading samples it.
-void put_density(DirtyJob& job, const DirtyCells& cells, const VolumeView& volume,
+void put_density(RedrawJob& job, const ChangedCells& cells, const VolumeView& volume,
                  std::span<const Density> density, const View& view) {
   const VoxelGrid& grid = volume.bricks.grid;
   job.density = density.data();
@@ -148,7 +148,7 @@ void put_density(DirtyJob& job, const DirtyCells& cells, const VolumeView& volum
 
 /// Marks those of `within` that are not marked yet and for which `is_stale` holds.
 template <class IsStale>
-void mark_where(StaleTiles& tiles, const PixelRect& within, const IsStale& is_stale) {
+void mark_where(RedrawTiles& tiles, const PixelRect& within, const IsStale& is_stale) {
   for (int y = within.y0; y < within.y1; ++y) {
     for (int x = within.x0; x < within.x1; ++x) {
       if (!tiles.marked(x, y) && is_stale(tiles.pixels_of({x, y, x + 1, y + 1}))) tiles.mark(x, y);
@@ -173,7 +173,7 @@ void StaleVolume::clear() {
   triangles_.clear();
 }
 
-void StaleVolume::mark(StaleTiles& tiles, const Renderer& renderer, const VolumeView& volume,
+void StaleVolume::mark(RedrawTiles& tiles, const Renderer& renderer, const VolumeView& volume,
                        std::span<const Density> density, const View& view,
                        const RenderTarget& kept) const {
   if (!triangles_.empty()) {
@@ -195,11 +195,11 @@ void StaleVolume::mark(StaleTiles& tiles, const Renderer& renderer, const Volume
       tiles.mark(pixels_around({lo.x, lo.y, lo.z}, {hi.x, hi.y, hi.z}, around_vox));
       continue;
     }
-    const DirtyCells cells(together, footprint);
+    const ChangedCells cells(together, footprint);
     const PixelRect passing = tiles.tiles_of(pixels_around(cells.low(), cells.high(), 0.0));
     const PixelRect all = tiles.tiles_of(pixels_around(cells.low(), cells.high(), taps_vox));
     if (all.empty()) continue;
-    DirtyJob job = dirty_job(cells, volume, view, kept.size());
+    RedrawJob job = dirty_job(cells, volume, view, kept.size());
     std::vector<float> depth;
     if (!renderer.translucent()) {
       job.window = tiles.pixels_of(all);

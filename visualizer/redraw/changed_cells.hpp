@@ -19,16 +19,16 @@ namespace kerf {
 ///
 /// A cell is as large as a voxel. Its centre is a voxel if the footprint is odd, and a corner
 /// between voxels if it is even.
-class DirtyCells {
+class ChangedCells {
  public:
   /// `voxels`: at least one box, none of them empty.
-  DirtyCells(std::span<const VoxelBox> voxels, const RayFootprint& footprint);
+  ChangedCells(std::span<const VoxelBox> voxels, const RayFootprint& footprint);
 
   /// The lowest and the highest corner of the grid, in voxel coordinates.
   [[nodiscard]] const glm::dvec3& low() const noexcept { return low_; }
   [[nodiscard]] glm::dvec3 high() const noexcept;
   /// Puts the grid into a job, which points into this object.
-  void put(DirtyJob& job) const;
+  void put(RedrawJob& job) const;
 
  private:
   void mark(const VoxelBox& voxels, int reach, std::uint8_t marks);
@@ -53,7 +53,7 @@ class StaleVolume {
 
   /// Marks the stale tiles of `kept`, the last picture of the opaque volumes with its depth.
   /// `density` is all of the volume, as it is now.
-  void mark(StaleTiles& tiles, const Renderer& renderer, const VolumeView& volume,
+  void mark(RedrawTiles& tiles, const Renderer& renderer, const VolumeView& volume,
             std::span<const Density> density, const View& view, const RenderTarget& kept) const;
 
  private:

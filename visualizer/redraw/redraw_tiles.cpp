@@ -10,36 +10,36 @@
 
 namespace kerf {
 
-StaleTiles::StaleTiles(PictureSize size)
+RedrawTiles::RedrawTiles(PictureSize size)
     : size_(size),
       across_((size.width + kEdge - 1) / kEdge),
       along_((size.height + kEdge - 1) / kEdge),
       marked_(static_cast<std::size_t>(across_) * static_cast<std::size_t>(along_)) {}
 
-PixelRect StaleTiles::tiles_of(const PixelRect& pixels) const {
+PixelRect RedrawTiles::tiles_of(const PixelRect& pixels) const {
   const PixelRect in = pixels.clipped({0, 0, size_.width, size_.height});
   if (in.empty()) return {};
   return {in.x0 / kEdge, in.y0 / kEdge, (in.x1 - 1) / kEdge + 1, (in.y1 - 1) / kEdge + 1};
 }
 
-PixelRect StaleTiles::pixels_of(const PixelRect& tiles) const {
+PixelRect RedrawTiles::pixels_of(const PixelRect& tiles) const {
   return PixelRect{tiles.x0 * kEdge, tiles.y0 * kEdge, tiles.x1 * kEdge, tiles.y1 * kEdge}.clipped(
       {0, 0, size_.width, size_.height});
 }
 
-void StaleTiles::mark(const PixelRect& pixels) {
+void RedrawTiles::mark(const PixelRect& pixels) {
   const PixelRect tiles = tiles_of(pixels);
   for (int y = tiles.y0; y < tiles.y1; ++y) {
     for (int x = tiles.x0; x < tiles.x1; ++x) mark(x, y);
   }
 }
 
-void StaleTiles::mark(const StaleTiles& other) {
+void RedrawTiles::mark(const RedrawTiles& other) {
   std::transform(marked_.begin(), marked_.end(), other.marked_.begin(), marked_.begin(),
                  std::bit_or<>());
 }
 
-void StaleTiles::clear() {
+void RedrawTiles::clear() {
   std::fill(marked_.begin(), marked_.end(), std::uint8_t{0});
 }
 
@@ -66,7 +66,7 @@ bool takes_in(Open& row, const Open& below) {
 
 }  // namespace
 
-std::vector<PixelRect> StaleTiles::rects() const {
+std::vector<PixelRect> RedrawTiles::rects() const {
   std::vector<PixelRect> done;
   std::vector<Open> open;
   for (int y = 0; y <= along_; ++y) {
@@ -161,7 +161,7 @@ class WindowFromFine {
 
 }  // namespace
 
-void mark_triangles(StaleTiles& tiles, std::span<const FineTriangle> triangles,
+void mark_triangles(RedrawTiles& tiles, std::span<const FineTriangle> triangles,
                     const glm::dmat4& clip_from_voxel, const RenderTarget& kept) {
   const WindowFromFine window_from_fine(clip_from_voxel, kept.all());
   std::vector<Shown> shown;

@@ -15,11 +15,11 @@ namespace kerf {
 
 /// The damage of a picture: the tiles that must be drawn again. A tile has 4x4 pixels, as the ray
 /// caster and a software GL shade them. Rows count from the bottom up, as GL has them.
-class StaleTiles {
+class RedrawTiles {
  public:
   static constexpr int kEdge = 4;
 
-  explicit StaleTiles(PictureSize size);
+  explicit RedrawTiles(PictureSize size);
 
   /// The tiles that `pixels` touch, as a rectangle in tiles; clipped to the picture.
   [[nodiscard]] PixelRect tiles_of(const PixelRect& pixels) const;
@@ -30,7 +30,7 @@ class StaleTiles {
   void mark(const PixelRect& pixels);
   void mark(int x, int y) { marked_[at(x, y)] = 1; }
   /// Marks what is marked in `other`, which has the same size.
-  void mark(const StaleTiles& other);
+  void mark(const RedrawTiles& other);
   void clear();
   [[nodiscard]] bool marked(int x, int y) const { return marked_[at(x, y)] != 0; }
 
@@ -52,7 +52,7 @@ class StaleTiles {
 /// came and one that went count alike. A tile stays clean if the depth of `kept`, the last
 /// picture, is everywhere nearer than the triangle. Marks a little more than needed, never less: a
 /// GPU rounds.
-void mark_triangles(StaleTiles& tiles, std::span<const FineTriangle> triangles,
+void mark_triangles(RedrawTiles& tiles, std::span<const FineTriangle> triangles,
                     const glm::dmat4& clip_from_voxel, const RenderTarget& kept);
 
 }  // namespace kerf

@@ -35,7 +35,7 @@ std::vector<PixelRect> parts_of(const SolidOnGpu& volume, const View& view,
 
 }  // namespace
 
-SectionFaces::SectionFaces(const SceneView& scene, std::span<const VolumeContent> contents)
+ClipCaps::ClipCaps(const SceneView& scene, std::span<const VolumeContent> contents)
     : palette_(palette_texture(scene.materials)) {
   const int limit = query_gl_driver().max_texture_size_3d;
   volumes_.reserve(scene.volumes.size());
@@ -45,7 +45,7 @@ SectionFaces::SectionFaces(const SceneView& scene, std::span<const VolumeContent
   SolidOnGpu::set_units(program_, static_cast<int>(kColoursUnit));
 }
 
-void SectionFaces::draw(const View& view, const RenderTarget& target) const {
+void ClipCaps::draw(const View& view, const RenderTarget& target) const {
   target.bind();
   glEnable(GL_DEPTH_TEST);
   glDepthFunc(GL_LESS);

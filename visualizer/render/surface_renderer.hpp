@@ -16,10 +16,10 @@ namespace kerf {
 
 /// The faces that a clip plane cuts into volumes whose surfaces are meshes, in the colours of their
 /// materials: each pixel whose ray enters the plane in what is solid.
-class SectionFaces {
+class ClipCaps {
  public:
   /// Throws VisualizerError if the driver takes no textures of this size.
-  SectionFaces(const SceneView& scene, std::span<const VolumeContent> contents);
+  ClipCaps(const SceneView& scene, std::span<const VolumeContent> contents);
 
   [[nodiscard]] std::span<SolidOnGpu> volumes() noexcept { return volumes_; }
   /// Draws over what is in `target`, under its depth test.
@@ -64,7 +64,7 @@ class SurfaceRenderer final : public Renderer {
   SceneView scene_;  ///< its volumes where they are now
   GlProgram program_{"surface.vert", "surface.frag", "lighting.frag"};
   std::vector<Volume> volumes_;
-  std::optional<SectionFaces> faces_;  ///< while volumes are cut open
+  std::optional<ClipCaps> faces_;  ///< while volumes are cut open
 };
 
 }  // namespace kerf

@@ -177,7 +177,7 @@ Opacities read_transfer(const std::filesystem::path& file) {
   if (std::filesystem::is_directory(file, fault)) {
     throw VisualizerError(file.string() + ": is a folder; name a file in it");
   }
-  if (const std::string why = why_unreachable(file); !why.empty()) {
+  if (const std::string why = access_error(file); !why.empty()) {
     throw VisualizerError(file.string() + why);
   }
   if (!std::filesystem::is_regular_file(file, fault)) {

@@ -40,7 +40,7 @@ struct Stereo {
 using Opacities = std::map<std::string, double>;
 
 /// How the volumes are shown: what a user may change while they are looked at.
-struct Look {
+struct ViewSettings {
   std::string renderer = "iso";  ///< of all volumes, or of each: renderer.hpp
   std::optional<double> iso{};   ///< of all volumes, 0..1 of full density; none: each its own
   Opacities opacities{};         ///< of the others: their own
@@ -49,7 +49,7 @@ struct Look {
   Stereo stereo{};
   bool voxel_tool = false;    ///< the tool is a volume, not a mesh
   bool colour_blind = false;  ///< materials in colours that any colour vision distinguishes
-  friend bool operator==(const Look&, const Look&) noexcept = default;
+  friend bool operator==(const ViewSettings&, const ViewSettings&) noexcept = default;
 };
 
 inline constexpr int kPaletteWidth = 256;  ///< entries of a row

@@ -484,8 +484,8 @@ BlockMesh extract_block(const SurfaceSource& source, VoxelIndex block) {
 DirtyMeshCells update_look(const SurfaceSource& source, VoxelIndex block, const VoxelBox& changed,
                            BlockMesh& mesh) {
   const VoxelIndex start = block_start(block);
-  const VoxelBox colours = changed.grown(SurfaceLook::kColourReachVox);
-  const VoxelBox all = changed.grown(SurfaceLook::kOpennessReachVox);
+  const VoxelBox colours = changed.grown(VertexShading::kColourReachVox);
+  const VoxelBox all = changed.grown(VertexShading::kOpennessReachVox);
   std::optional<Neighbourhood> near;
   DirtyMeshCells cells;
   for (SurfaceVertex& vertex : mesh.vertices) {
@@ -498,7 +498,7 @@ DirtyMeshCells update_look(const SurfaceSource& source, VoxelIndex block, const 
       dress(vertex, source, start, *near);
     } else {
       const FinePoint inward = inward_of(vertex, source.inverse_square_spacing);
-      if (!SurfaceLook::openness_depends_on(changed, at, inward)) continue;
+      if (!VertexShading::openness_depends_on(changed, at, inward)) continue;
       vertex.openness = unit16(source.look->openness(source.volume, at, inward));
     }
     if (vertex != before) cells.add(vertex);

@@ -87,7 +87,7 @@ struct SurfaceSource {
   /// Turns a normal into the direction inwards if voxel edges are unequal; the largest part
   /// is 1.
   glm::vec3 inverse_square_spacing{1.0F};
-  const SurfaceLook* look = nullptr;
+  const VertexShading* look = nullptr;
   GradientFilter gradient = GradientFilter::corners;  ///< of the normals
 };
 
@@ -110,7 +110,7 @@ class DirtyMeshCells {
 [[nodiscard]] DirtyMeshCells difference(const BlockMesh& before, const BlockMesh& now);
 
 /// A pure function of the volume; any thread. Positions and triangles depend on the block's own
-/// voxels, the rest of a vertex on the voxels around it: see SurfaceLook.
+/// voxels, the rest of a vertex on the voxels around it: see VertexShading.
 ///
 /// A vertex stands where the density, linear along its cube edge, passes iso - 1/2 (in steps of
 /// Density), to the nearest 1/4096 voxel and never on a voxel: no two vertices of a volume meet,

@@ -26,7 +26,7 @@ constexpr FinePoint stepped(FinePoint at, FinePoint inward, int quarters) {
 
 }  // namespace
 
-SurfaceLook::SurfaceLook(const std::vector<MaterialView>& materials, Density iso)
+VertexShading::VertexShading(const std::vector<MaterialView>& materials, Density iso)
     : share_of_iso_(1.0F / static_cast<float>(iso)) {
   const auto palette = make_palette(materials);
   by_density_ = palette[0];
@@ -34,7 +34,7 @@ SurfaceLook::SurfaceLook(const std::vector<MaterialView>& materials, Density iso
   for (glm::vec4& colour : by_label_) colour.a = 1.0F;
 }
 
-glm::vec4 SurfaceLook::label_colour(const VolumeSamples& volume, FinePoint at) const {
+glm::vec4 VertexShading::label_colour(const VolumeSamples& volume, FinePoint at) const {
   const VoxelIndex v = VolumeSamples::voxel_below(at);
   std::array<Label, 8> label{};
   for (int c = 0; c < 8; ++c) {
@@ -56,14 +56,14 @@ glm::vec4 SurfaceLook::label_colour(const VolumeSamples& volume, FinePoint at) c
   return sum;
 }
 
-glm::vec3 SurfaceLook::density_colour(int density) const {
+glm::vec3 VertexShading::density_colour(int density) const {
   const float at = static_cast<float>(density) * static_cast<float>(kPaletteWidth - 1) /
                    static_cast<float>(kDensityMax);
   const auto low = std::min(static_cast<std::size_t>(at), std::size_t{kPaletteWidth - 2});
   return glm::mix(by_density_[low], by_density_[low + 1], at - static_cast<float>(low));
 }
 
-glm::vec3 SurfaceLook::colour(const VolumeSamples& volume, FinePoint at, FinePoint inward) const {
+glm::vec3 VertexShading::colour(const VolumeSamples& volume, FinePoint at, FinePoint inward) const {
   const FinePoint below = stepped(at, inward, kDepthQuarters);
   if (!volume.labels.empty()) {
     glm::vec4 labelled = label_colour(volume, below);
@@ -78,7 +78,7 @@ glm::vec3 SurfaceLook::colour(const VolumeSamples& volume, FinePoint at, FinePoi
                                  volume.density_at(stepped(at, inward, kFullDepthQuarters))));
 }
 
-float SurfaceLook::openness(const VolumeSamples& volume, FinePoint at, FinePoint inward) const {
+float VertexShading::openness(const VolumeSamples& volume, FinePoint at, FinePoint inward) const {
   float open = 1.0F;
   for (const Tap& tap : kTaps) {
     const auto density = static_cast<float>(volume.density_at(stepped(at, inward, -tap.quarters)));
@@ -87,7 +87,7 @@ float SurfaceLook::openness(const VolumeSamples& volume, FinePoint at, FinePoint
   return open;
 }
 
-bool SurfaceLook::openness_depends_on(const VoxelBox& box, FinePoint at, FinePoint inward) {
+bool VertexShading::openness_depends_on(const VoxelBox& box, FinePoint at, FinePoint inward) {
   const VoxelBox cells{{box.lo.x - 1, box.lo.y - 1, box.lo.z - 1}, box.hi};
   return std::any_of(kTaps.begin(), kTaps.end(), [&](const Tap& tap) {
     return cells.contains(VolumeSamples::voxel_below(stepped(at, inward, -tap.quarters)));

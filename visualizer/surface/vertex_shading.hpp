@@ -13,13 +13,13 @@ namespace kerf {
 /// same that `iso` draws in each pixel (shaders/iso.frag). Light is added later, by the shader.
 ///
 /// `inward` is the step of one voxel edge from the surface into the solid, along the normal.
-class SurfaceLook {
+class VertexShading {
  public:
   /// A voxel farther from a point than this has no influence on its colour, or its openness.
   static constexpr int kColourReachVox = 4;
   static constexpr int kOpennessReachVox = 13;
 
-  SurfaceLook(const std::vector<MaterialView>& materials, Density iso);
+  VertexShading(const std::vector<MaterialView>& materials, Density iso);
 
   /// Linear colour of the material below the surface, each part 0..1.
   [[nodiscard]] glm::vec3 colour(const VolumeSamples& volume, FinePoint at, FinePoint inward) const;

@@ -38,7 +38,7 @@ void for_each_in_parallel(std::int32_t count, const Work& work) {
     for (std::int32_t i = next++; i < count; i = next++) work(i);
   };
   std::vector<std::jthread> helpers(allowed_cores().size() - 1);
-  for (std::jthread& helper : helpers) helper = helper_thread(take);
+  for (std::jthread& helper : helpers) helper = start_worker(take);
   take();
 }
 
@@ -112,7 +112,7 @@ std::span<const std::uint32_t> VolumeSurface::update(std::span<const Density> de
     if (box.empty()) continue;
     all = all.united(box);
     mark(blocks_on(box), Work::mesh);
-    mark(blocks_on(box.grown(SurfaceLook::kOpennessReachVox)), Work::look);
+    mark(blocks_on(box.grown(VertexShading::kOpennessReachVox)), Work::look);
   }
   std::sort(marked_.begin(), marked_.end());
   different_.clear();

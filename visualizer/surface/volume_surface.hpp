@@ -53,7 +53,7 @@ class VolumeSurface {
   VoxelGrid blocks_;
   Density iso_;
   glm::vec3 inverse_square_spacing_;
-  SurfaceLook look_;
+  VertexShading look_;
   GradientFilter gradient_;
   std::vector<Density> density_;
   std::vector<Label> labels_;

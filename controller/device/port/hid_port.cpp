@@ -78,7 +78,7 @@ std::optional<std::size_t> identify(const std::string& where, const std::string&
     refuse(where, node + " cannot be opened (" + std::generic_category().message(errno) + ")" +
                       (errno == EACCES
                            ? kGiveRight
-                           : std::string("; ") + way_out_of(errno, "name the node of the arm")));
+                           : std::string("; ") + remedy_for(errno, "name the node of the arm")));
   }
   hidraw_devinfo about{};
   const bool known = ioctl(fd, HIDIOCGRAWINFO, &about) >= 0;
@@ -169,7 +169,7 @@ bool HidPort::send_last(std::span<const std::uint8_t> packet) noexcept {
 }
 
 void HidPort::read_reports() noexcept {
-  leave_signals_to_others();  // a call that one cut short would look like a device that is gone
+  block_signals();  // a call that one cut short would look like a device that is gone
   become(io_);
   std::array<std::uint8_t, MailboxPacket::kMaxBytes> report{};
   while (!stop_ && !closed()) {
@@ -181,7 +181,7 @@ void HidPort::read_reports() noexcept {
 }
 
 void HidPort::write_commands() noexcept {
-  leave_signals_to_others();
+  block_signals();
   writer_id_ = gettid();
   become(io_);
   while (!stop_ || !outbox_.empty()) {

@@ -60,8 +60,8 @@ class HidPort final : public PacketPort {
   hid_device_* device_ = nullptr;
   std::size_t packet_bytes_ = 0;     ///< of this firmware; shorter packets are filled up
   std::atomic<bool> closed_{false};  ///< written by whoever meets the end first
-  Inbox inbox_;
-  Outbox outbox_;
+  SpscRing inbox_;
+  LatestCommand outbox_;
   sem_t raised_{};                                       ///< once per packet, and once to stop
   std::atomic<std::uint64_t> packets_{0}, overflow_{0};  ///< as UsbLinkStats
   std::atomic<std::uint64_t> commands_{0};               ///< packets that the kernel has sent

@@ -79,7 +79,7 @@ struct MailboxPacket {
 };
 
 /// Reports: one writer, one reader, oldest first. Wait-free.
-class Inbox {
+class SpscRing {
  public:
   /// The writer. False if the reader is kPlaces behind: the packet is lost then.
   bool put(std::span<const std::uint8_t> packet) noexcept {
@@ -108,13 +108,13 @@ class Inbox {
     while (empty() && !closed.load(std::memory_order_relaxed)) {
       const std::int64_t now_ns = monotonic_ns();
       if (now_ns >= until_ns) return false;
-      sleep_until_ns(std::min(until_ns, now_ns + kLookNs));
+      sleep_until_ns(std::min(until_ns, now_ns + kPollNs));
     }
     return !empty();
   }
 
  private:
-  static constexpr std::int64_t kLookNs = 50'000;
+  static constexpr std::int64_t kPollNs = 50'000;
   static constexpr std::size_t kPlaces = 64;
   std::array<MailboxPacket, kPlaces> places_{};
   std::atomic<std::size_t> begin_{0}, end_{0};
@@ -123,7 +123,7 @@ class Inbox {
 /// The next command: any thread and any signal handler writes, one reader takes the newest, and
 /// older ones are dropped: a delayed reader sends no outdated command. Each packet has a slot of
 /// its own, so a writer that a crash stopped in the middle of one does not block the others.
-class Outbox {
+class LatestCommand {
  public:
   /// False if other threads hold all slots.
   bool put(std::span<const std::uint8_t> packet) noexcept {

@@ -49,7 +49,7 @@ SocketPort::SocketPort(const std::filesystem::path& path, int patience_ms,
       const std::string start = "start kerf-emulator --front socket --socket " + text;
       throw std::runtime_error("--port socket:" + text + ": no device answers (" +
                                std::generic_category().message(error) + "); " +
-                               way_out_of(error, start.c_str()));
+                               remedy_for(error, start.c_str()));
     }
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
   }

@@ -63,9 +63,9 @@ class UdpPort final : public SocketPort {
 /// A port to an emulator in lock-step: splits the packets of one turn (`Turn`). After the last
 /// one there is none until `wait` has received the next turn, so the speed of the emulator changes
 /// nothing. A packet without a turn passes unchanged.
-class TurnPort final : public PacketPort {
+class LockStepPort final : public PacketPort {
  public:
-  explicit TurnPort(std::unique_ptr<PacketPort> port) : port_(std::move(port)) {}
+  explicit LockStepPort(std::unique_ptr<PacketPort> port) : port_(std::move(port)) {}
 
   [[nodiscard]] std::size_t receive(std::span<std::uint8_t> out) noexcept override {
     if (!in_turn_) {

@@ -30,7 +30,7 @@ constexpr const char* kGiveRight =
 
 // The I/O thread runs above the servo on its core: a packet comes first, and costs some
 // microseconds.
-constexpr std::int64_t kLookNs = 50'000;
+constexpr std::int64_t kPollNs = 50'000;
 constexpr std::int64_t kReplyNs = 2'000'000;   // later the servo sends no answer
 constexpr std::int64_t kEventsNs = 2'000'000;  // a working chip ends a transfer each ms
 constexpr std::int64_t kCloseNs = 500'000'000;
@@ -138,7 +138,7 @@ bool UsbFalcon::open_node(const std::string& path) {
     refuse_usb(path, "cannot be opened (" + std::generic_category().message(errno) + ")" +
                          (errno == EACCES ? kGiveRight
                                           : std::string("; ") +
-                                                way_out_of(errno, "name the node of a Falcon")));
+                                                remedy_for(errno, "name the node of a Falcon")));
   }
   const int error = libusb_wrap_sys_device(context_, static_cast<std::intptr_t>(fd_), &handle_);
   if (error != 0) {
@@ -296,7 +296,7 @@ std::vector<LinkCounter> UsbPort::counters() const {
 }
 
 void UsbPort::run() noexcept {
-  leave_signals_to_others();
+  block_signals();
   thread_id_ = gettid();
   become(io_);
   for (Transfer& read : reads_) submit(read);
@@ -304,7 +304,7 @@ void UsbPort::run() noexcept {
     send_waiting();
     const std::int64_t now_ns = monotonic_ns();
     if (turns_.ours(now_ns) && now_ns < reply_due_ns_) {
-      sleep_until_ns(now_ns + kLookNs);
+      sleep_until_ns(now_ns + kPollNs);
     } else {
       handle_events(kEventsNs);
       repair();

@@ -139,8 +139,8 @@ class UsbPort final : public PacketPort {
   void handle_events(std::int64_t ns) noexcept;
 
   std::unique_ptr<UsbFalcon> device_;
-  Inbox inbox_;
-  Outbox outbox_;
+  SpscRing inbox_;
+  LatestCommand outbox_;
   std::atomic<bool> closed_{false}, stop_{false};
   std::atomic<bool> hurry_{false};  ///< send the waiting command out of turn
   std::atomic<int> thread_id_{0};

@@ -25,7 +25,7 @@ inline constexpr MoveShare<N> kWholeMove = N::kIsFixed ? std::int64_t{1} << 30 :
 /// voxels takes at most |x|/2 + |y|/2 + |z|/2 + 4 looks. A border is passed by 2^-14 voxels, which
 /// the sphere's radius must have room for.
 template <class N>
-class FreeWay {
+class FreePath {
   using S = PointNumber<N>;
   using Share = MoveShare<N>;
   /// Fixed: voxels in Q15.16 with room for products.
@@ -33,7 +33,7 @@ class FreeWay {
 
  public:
   /// `voxels`: the move, at most 2^14 long; `length`: no shorter, above 0 (fixed: both Q15.16).
-  FreeWay(const FreeBricks& free, const S (&voxels)[3], S length) noexcept : free_(free) {
+  FreePath(const FreeSpaceMap& free, const S (&voxels)[3], S length) noexcept : free_(free) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
       move_[axis] = voxels[axis];
       const Wide size = std::max(move_[axis], -move_[axis]);
@@ -68,7 +68,7 @@ class FreeWay {
       }
       const std::int32_t free = distance(place) - needed;
       if (free < 0) return share;
-      Share onward = share_of(free);
+      Share onward = fraction_of(free);
       // No brick is left later than by the steps across it.
       if (free < 2 * kFreeBrick * kFreeSteps) onward = std::max(onward, leaving(place));
       if (!(share + onward > share)) return share;  // as little as a float cannot tell
@@ -78,7 +78,9 @@ class FreeWay {
   }
 
   /// Share of the move in which no place goes by more than so many steps of the map.
-  [[nodiscard]] Share share_of(std::int32_t steps) const noexcept { return step_ * Share(steps); }
+  [[nodiscard]] Share fraction_of(std::int32_t steps) const noexcept {
+    return step_ * Share(steps);
+  }
 
  private:
   /// So far beyond its border a brick is left: 2^-14 voxels.
@@ -117,7 +119,7 @@ class FreeWay {
     return soonest;
   }
 
-  const FreeBricks& free_;
+  const FreeSpaceMap& free_;
   Wide move_[3] = {};
   Share inverse_[3] = {};  ///< share of the move that is one voxel along an axis
   Share step_{};           ///< that is one step of the map
@@ -136,9 +138,9 @@ inline constexpr std::int32_t kLooseGroup = 3 * kFreeSteps;
 /// long.
 template <class N>
 [[nodiscard]] MoveShare<N> free_share_of_groups(const PointTable<N>& table,
-                                                const PointPlaces<N>& places,
+                                                const PointPositions<N>& places,
                                                 const PointNumber<N> (&centre)[3],
-                                                const FreeWay<N>& way, MoveShare<N> share,
+                                                const FreePath<N>& way, MoveShare<N> share,
                                                 MoveShare<N> most, std::int32_t& nearest,
                                                 std::int64_t& looks) noexcept {
   using Share = MoveShare<N>;
@@ -150,7 +152,7 @@ template <class N>
         needed, from, to, looks);
   };
   const std::int32_t first = nearest;
-  const Share least = way.share_of(kFreeSteps);
+  const Share least = way.fraction_of(kFreeSteps);
   Share ahead = 4 * least;
   for (bool stopped = false; !stopped && share < most; ahead *= 2) {
     const Share to = std::min(share + ahead, most);

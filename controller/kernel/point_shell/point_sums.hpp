@@ -160,8 +160,8 @@ template <class N>
 }
 
 template <class N>
-constexpr void place_points(const PointTable<N>& table, const PointStep<N>& step,
-                            const PointPlaces<N>& places) noexcept {
+constexpr void transform_points(const PointTable<N>& table, const PointStep<N>& step,
+                                const PointPositions<N>& places) noexcept {
   const auto place = [&step](const auto& from, const auto& to, std::int32_t count) {
     for (std::int32_t i = 0; i < count; ++i) {
       const PointNumber<N> offset[3] = {from[0][i], from[1][i], from[2][i]};
@@ -179,7 +179,7 @@ constexpr void place_points(const PointTable<N>& table, const PointStep<N>& step
 
 /// The densities of `count` samples, a multiple of kPointGroup.
 template <class N>
-constexpr void read_points(const PointPlaces<N>& places, std::int32_t count,
+constexpr void read_points(const PointPositions<N>& places, std::int32_t count,
                            const PointNumber<N> (&centre)[3], const DensityField& field,
                            PointNumber<N>* density) noexcept {
   for (std::int32_t i = 0; i < count; ++i) {
@@ -192,7 +192,7 @@ constexpr void read_points(const PointPlaces<N>& places, std::int32_t count,
 
 /// Whether the volume is free around a group, so that its samples would read air.
 template <class N>
-[[nodiscard]] constexpr bool is_free(const PointTable<N>& table, const PointPlaces<N>& places,
+[[nodiscard]] constexpr bool is_free(const PointTable<N>& table, const PointPositions<N>& places,
                                      const PointNumber<N> (&centre)[3], const DensityField& field,
                                      std::int32_t group) noexcept {
   std::int32_t middle[3] = {};
@@ -208,7 +208,7 @@ template <class N>
 /// `centre` of the tool is in voxels (fixed: Q15.16).
 template <class N>
 [[nodiscard]] constexpr PointSums<N> point_sums(const PointTable<N>& table,
-                                                const PointPlaces<N>& places,
+                                                const PointPositions<N>& places,
                                                 const PointNumber<N> (&centre)[3],
                                                 const DensityField& field) noexcept {
   PointSums<N> sums;
@@ -230,7 +230,7 @@ template <class N>
 
 /// The close samples of one closeup, in whole groups. Padding in the last group has density 0.
 template <class N>
-struct CloseLook {
+struct CloseSampleView {
   std::int32_t count = 0;
   const PointNumber<N>* offset[3] = {};  ///< as in CloseTable
   const PointNumber<N>* normal[3] = {};
@@ -276,7 +276,7 @@ template <class N>
 /// radius R on. So samples enter and leave without a jump as the closeup moves
 /// (docs/theory.md 3.5). `over_radius`: 2^30 over the radius; of floating point 1 over it.
 template <class N>
-[[nodiscard]] constexpr PointNumber<N> close_window(const CloseLook<N>& look,
+[[nodiscard]] constexpr PointNumber<N> close_window(const CloseSampleView<N>& look,
                                                     PointNumber<N> over_radius,
                                                     std::int32_t i) noexcept {
   using Number = PointNumber<N>;
@@ -292,13 +292,13 @@ template <class N>
   return share_product<N>(rest, rest);
 }
 template <class N>
-[[nodiscard]] constexpr PointNumber<N> over_radius(const CloseLook<N>& look) noexcept {
+[[nodiscard]] constexpr PointNumber<N> over_radius(const CloseSampleView<N>& look) noexcept {
   return (N::kIsFixed ? PointNumber<N>(1 << 30) : PointNumber<N>(1)) / look.radius;
 }
 
 /// Sums over the samples of a closeup. The definition: every set has these bits.
 template <class N>
-[[nodiscard]] constexpr CloseSums<N> close_sums(const CloseLook<N>& look) noexcept {
+[[nodiscard]] constexpr CloseSums<N> close_sums(const CloseSampleView<N>& look) noexcept {
   using Number = PointNumber<N>;
   CloseSums<N> sums;
   const Number over = over_radius(look);

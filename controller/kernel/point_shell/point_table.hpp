@@ -34,7 +34,7 @@ static_assert(kIsoNearSteps * kIsoNearSteps >=
 ///
 /// Made at load (controller/plan/tables/free_brick_map.hpp). Cutting only takes density away, so
 /// the map stays a lower bound and needs no update. Points into the maker's memory.
-struct FreeBricks {
+struct FreeSpaceMap {
   VoxelGrid grid;                          ///< of bricks
   const std::uint8_t* distance = nullptr;  ///< none: nothing is known to be free
 
@@ -125,7 +125,7 @@ inline constexpr std::int32_t kNoSampleVox = 1 << 14;
 /// The samples of a rotated tool in the voxels of one volume; Q15.16. Arrays are as long as the
 /// table's.
 template <class N>
-struct PointPlaces {
+struct PointPositions {
   PointNumber<N>* offset_vox[3] = {};  ///< of the samples from the centre
   PointNumber<N>* middle[3] = {};      ///< of the groups
 };
@@ -170,7 +170,7 @@ struct DensityField {
   VoxelGrid grid;
   const Density* density = nullptr;
   DensityScale scale;
-  FreeBricks free{};  ///< of this volume (plan/tables/free_brick_map.hpp)
+  FreeSpaceMap free{};  ///< of this volume (plan/tables/free_brick_map.hpp)
 };
 
 /// Sums over the samples of one query (docs/theory.md 3.2, 3.3). r is the density of contact and w

@@ -105,9 +105,9 @@ struct CloseSamples {
     }
     return table;
   }
-  [[nodiscard]] constexpr CloseLook<N> fade(const PointTable<N>& table) noexcept {
+  [[nodiscard]] constexpr CloseSampleView<N> fade(const PointTable<N>& table) noexcept {
     std::fill(density.begin() + count, density.begin() + table.count, PointNumber<N>(0));
-    CloseLook<N> look{
+    CloseSampleView<N> look{
         .count = table.count, .radius = radius, .density = density.data(), .window = window.data()};
     for (std::size_t axis = 0; axis < 3; ++axis) {
       look.offset[axis] = offset[axis].data();
@@ -116,7 +116,7 @@ struct CloseSamples {
     }
     return look;
   }
-  [[nodiscard]] constexpr PointPlaces<N> places() noexcept {
+  [[nodiscard]] constexpr PointPositions<N> places() noexcept {
     return {{offset_vox[0].data(), offset_vox[1].data(), offset_vox[2].data()}, {}};
   }
 };
@@ -245,7 +245,7 @@ struct SpiralPlaces {
   std::array<std::array<PointNumber<N>, kCount>, 3> offset_vox;
   std::array<std::array<PointNumber<N>, SpiralArrays<N, kCount>::kGroups>, 3> middle;
 
-  [[nodiscard]] PointPlaces<N> places() noexcept {
+  [[nodiscard]] PointPositions<N> places() noexcept {
     return {{offset_vox[0].data(), offset_vox[1].data(), offset_vox[2].data()},
             {middle[0].data(), middle[1].data(), middle[2].data()}};
   }
@@ -270,9 +270,9 @@ inline constexpr SpiralArrays<N, kCapSamples> kCapArrays(kCapRadius + 0.1, [](st
 /// columns, over the radius, are two axes across (Duff et al. 2017) and between them how the ball
 /// falls from its tangent plane: by radius^2 / (2 reach) at the rim.
 template <class N>
-[[nodiscard]] constexpr TurnRows<N> cap_rows(ContactVec<typename N::Unit> out,
-                                             typename N::Real radius,
-                                             typename N::Real reach) noexcept {
+[[nodiscard]] constexpr RotationRows<N> cap_rows(ContactVec<typename N::Unit> out,
+                                                 typename N::Real radius,
+                                                 typename N::Real reach) noexcept {
   using Unit = typename N::Unit;
   const Unit one(1), sign(out.z < Unit(0) ? -1 : 1);
   const Unit a = -(one / (sign + out.z)), b = out.x * out.y * a;
@@ -299,7 +299,7 @@ template <class N>
   const Ratio touching =
       multiply<Ratio>(mean_of<N>(sums.weight, static_cast<typename N::Sum>(count), 0), reach);
   const Ratio area = Ratio(10) * slope * touching / (square * square * height);
-  return falling_share<N>(typename N::Unit(std::min(area, Ratio(1))), 0.5, 0.35);
+  return falling_ramp<N>(typename N::Unit(std::min(area, Ratio(1))), 0.5, 0.35);
 }
 
 /// A patch: samples of the volume around a contact, for the normal of a tool that is no ball
@@ -383,7 +383,7 @@ template <class N>
 
 /// 1 - n n^T: removes the component along a unit vector.
 template <class N>
-[[nodiscard]] constexpr TurnRows<N> flattened(ContactVec<typename N::Unit> n) noexcept {
+[[nodiscard]] constexpr RotationRows<N> flattened(ContactVec<typename N::Unit> n) noexcept {
   using Unit = typename N::Unit;
   const Unit one(1);
   return {{{one - n.x * n.x, -(n.x * n.y), -(n.x * n.z)},
@@ -407,7 +407,7 @@ template <class N>
     of_wide *= weight;
   }
   const Ratio width = std::min(mean_of<N>(sums.weight, of_wide, 24), Ratio(1));
-  return falling_share<N>(Unit(width), 1, 0.5);
+  return falling_ramp<N>(Unit(width), 1, 0.5);
 }
 
 }  // namespace kerf

@@ -48,7 +48,7 @@ template <class N>
 /// Turns an offset from the tool's axes to those of the world.
 template <class N>
 [[nodiscard]] constexpr ContactVec<typename N::Ratio> turned_offset(
-    const typename N::Ratio (&offset)[3], const TurnRows<N>& turn) noexcept {
+    const typename N::Ratio (&offset)[3], const RotationRows<N>& turn) noexcept {
   using Ratio = typename N::Ratio;
   const auto turned = [&](const std::array<typename N::Unit, 3>& row) {
     return multiply<Ratio>(row[0], offset[0]) + multiply<Ratio>(row[1], offset[1]) +
@@ -62,7 +62,8 @@ template <class N>
 [[nodiscard]] constexpr PointMeans<N> point_means(const PointSums<N>& sums,
                                                   const DensityScale& scale,
                                                   const ContactFrame<N>& frame,
-                                                  const TurnRows<N>& turn, bool round) noexcept {
+                                                  const RotationRows<N>& turn,
+                                                  bool round) noexcept {
   using Ratio = typename N::Ratio;
   PointMeans<N> means;
   means.density = mean_of<N>(sums.density, sums.weight, 9);
@@ -153,8 +154,8 @@ template <class Ratio>
 
 /// 0 where `value` is `from` or above, 1 where it is `to` or below, linear between; `to` < `from`.
 template <class N>
-[[nodiscard]] constexpr typename N::Unit falling_share(typename N::Unit value, double from,
-                                                       double to) noexcept {
+[[nodiscard]] constexpr typename N::Unit falling_ramp(typename N::Unit value, double from,
+                                                      double to) noexcept {
   using Unit = typename N::Unit;
   const auto top = static_cast<Unit>(from), bottom = static_cast<Unit>(to);
   return (top - std::clamp(value, bottom, top)) / (top - bottom);
@@ -184,8 +185,8 @@ template <class N>
   using Ratio = typename N::Ratio;
   if (downhill == ContactVec<Unit>{}) return downhill;
   const ContactVec<Unit> offset = direction<N>(-means.offset);
-  const Unit cancelled = falling_share<N>(Unit(std::min(norm(means.offset), Ratio(1))), 0.85, 0.7);
-  const Unit share = cancelled * falling_share<N>(dot(offset, downhill), 0.9397, 0.6428);
+  const Unit cancelled = falling_ramp<N>(Unit(std::min(norm(means.offset), Ratio(1))), 0.85, 0.7);
+  const Unit share = cancelled * falling_ramp<N>(dot(offset, downhill), 0.9397, 0.6428);
   return share <= Unit{} ? offset : between<N>(offset, downhill, share);
 }
 

@@ -50,7 +50,7 @@ class ContactQuery {
         work_(query_work(points.table, volumes.size())) {}
 
   /// Orients the tool in all queries from now on.
-  void turn(const ToolTurn<N>& turn) noexcept {
+  void turn(const Orientation<N>& turn) noexcept {
     reader_.turn(rows_of(turn));
     turned_ = true;
     reader_.spend(work_.turn);
@@ -89,11 +89,11 @@ class ContactQuery {
 
   /// Whether enough work is left for a query at `q` with closer looks. If there is not enough for
   /// the costliest one, counts the samples that are near.
-  [[nodiscard]] bool may_look_closely(ContactVec<Real> q) const noexcept {
+  [[nodiscard]] bool may_refine(ContactVec<Real> q) const noexcept {
     if (may_query()) return true;
     std::int64_t cost = work_.closer;
     for (const ContactVolume<N>& volume : volumes_) {
-      cost += QueryWork::kLookSamples + reader_.samples_near(volume, Reader::place_of(volume, q));
+      cost += QueryWork::kQueryOverhead + reader_.samples_near(volume, Reader::place_of(volume, q));
     }
     return left() >= cost;
   }
@@ -138,7 +138,7 @@ class ContactQuery {
       const VoxelVec<Real> at = Reader::place_of(volume, q),
                            by = volume.frame.voxel_from_contact * move;
       // No edge of a voxel is shorter than a unit.
-      const FreeWay<N> way(
+      const FreePath<N> way(
           volume.field.free,
           {Reader::number_of(by.x), Reader::number_of(by.y), Reader::number_of(by.z)},
           Reader::number_of(length));
@@ -178,7 +178,7 @@ class ContactQuery {
     ConstraintPlane<N> plane = plane_at(volume, at, sums, closer);
     const bool soft = sums.top < Reader::kIsoDensity;  // below the iso it bears no load
     if (soft && !reader_.iso_is_near(volume, at, sums.top_sample)) return;
-    if (closer) look_midway(volume, q, plane);
+    if (closer) refine_at_mid_ramp(volume, q, plane);
     const bool same_all_round = plane.normal == ContactVec<typename N::Unit>{};
     if (same_all_round && soft) return;
     if (same_all_round) {
@@ -196,14 +196,14 @@ class ContactQuery {
     const auto means =
         point_means<N>(sums, volume.field.scale, volume.frame, reader_.rows(), round);
     ConstraintPlane<N> plane = plane_of<N>(means, points_.reach, round);
-    if (closer) CloserLook<N>(reader_, volume, at, sums, means).correct(plane);
+    if (closer) ContactRefinement<N>(reader_, volume, at, sums, means).correct(plane);
     return plane;
   }
 
   /// Normal and position of a contact whose iso is near an end of its face's ramp, from the ramp's
   /// middle (contact_refinement.hpp). The depth stays that of the iso.
-  void look_midway(const ContactVolume<N>& volume, ContactVec<Real> q,
-                   ConstraintPlane<N>& plane) const noexcept {
+  void refine_at_mid_ramp(const ContactVolume<N>& volume, ContactVec<Real> q,
+                          ConstraintPlane<N>& plane) const noexcept {
     using Unit = typename N::Unit;
     if (is_midway(volume.field.scale)) return;
     ContactVolume<N> seen = volume;
@@ -238,28 +238,27 @@ class ContactQuery {
 };
 
 /// Most parts behind a head: shaft and handpiece.
-inline constexpr std::size_t kMostBehind = 2;
+inline constexpr std::size_t kMaxShaftParts = 2;
 
 /// A part of a tool behind its head: it has contact and cuts nothing. It has a point shell of its
 /// own about its own middle, so that the head keeps the accuracy of its own reach, and planes of
 /// its own.
 template <class N>
-struct PartBehind {
+struct ShaftPart {
   PointShell<N> point_shell;
   typename N::Real up{};  ///< from the tool's centre to the part's, along the shaft, units
 };
 
 /// All parts of one tool behind its head; none without a shaft.
 template <class N>
-struct PartsBehind {
+struct ShaftParts {
   std::size_t count = 0;
-  std::array<PartBehind<N>, kMostBehind> part{};
+  std::array<ShaftPart<N>, kMaxShaftParts> part{};
 };
 
 /// Cost of the queries of a whole tool.
 template <class N>
-[[nodiscard]] constexpr QueryWork query_work(const PointShell<N>& head,
-                                             const PartsBehind<N>& behind,
+[[nodiscard]] constexpr QueryWork query_work(const PointShell<N>& head, const ShaftParts<N>& behind,
                                              std::size_t volumes) noexcept {
   QueryWork work = query_work(head.table, volumes);
   for (std::size_t i = 0; i < behind.count; ++i) {
@@ -286,8 +285,8 @@ class ToolQuery {
 
   /// `behind` has at least one part.
   ToolQuery(const KernelSet& kernels, const PointShell<N>& head, Volumes volumes,
-            const PartsBehind<N>& behind,
-            const std::array<Volumes, kMostBehind>& volumes_behind) noexcept
+            const ShaftParts<N>& behind,
+            const std::array<Volumes, kMaxShaftParts>& volumes_behind) noexcept
       : round_(head.table.round),
         head_(kernels, head, volumes),
         shaft_{{kernels, behind.part[0].point_shell, volumes_behind[0]}, behind.part[0].up},
@@ -300,11 +299,11 @@ class ToolQuery {
     begin_tick();
   }
 
-  void turn(const ToolTurn<N>& turn) noexcept {
+  void turn(const Orientation<N>& turn) noexcept {
     if (!round_) {
       on_account(head_, [&](ContactQuery<N>& head) { head.turn(turn); });
     }
-    const TurnRows<N> rows = rows_of(turn);
+    const RotationRows<N> rows = rows_of(turn);
     each_behind([&](Part& part) {
       on_account(part.query, [&](ContactQuery<N>& query) { query.turn(turn); });
       part.from_head = times<N>({rows[0][1], rows[1][1], rows[2][1]}, part.up);
@@ -340,7 +339,7 @@ class ToolQuery {
       Contacts<N> seen;
       on_account(part.query, [&](const ContactQuery<N>& query) {
         const ContactVec<Real> at = q + part.from_head;
-        short_of_work = closer && (short_of_work || !query.may_look_closely(at));
+        short_of_work = closer && (short_of_work || !query.may_refine(at));
         seen.buried = short_of_work && !answered;
         if (!seen.buried) seen = query.look(at, closer && !short_of_work);
       });

@@ -24,12 +24,13 @@ namespace kerf {
 /// close samples of another tool and a patch of the volume. It corrects the plane from the point
 /// shell. It lives within one query, with the tool's centre at `at`.
 template <class N>
-class CloserLook {
+class ContactRefinement {
  public:
   using Real = typename N::Real;
 
-  CloserLook(const SampleReader<N>& reader, const ContactVolume<N>& volume, VoxelVec<Real> at,
-             const PointSums<N>& sums, const PointMeans<N>& means) noexcept
+  ContactRefinement(const SampleReader<N>& reader, const ContactVolume<N>& volume,
+                    VoxelVec<Real> at, const PointSums<N>& sums,
+                    const PointMeans<N>& means) noexcept
       : reader_(reader),
         points_(reader.points()),
         volume_(volume),
@@ -42,7 +43,7 @@ class CloserLook {
     if (points_.table.round) {
       plane.depth = depth_around(plane);
     } else if (std::max(plane.depth, -plane.depth) < Real(kCloseDepth)) {
-      look_again(plane);
+      refine_shape(plane);
     }
   }
 
@@ -50,7 +51,7 @@ class CloserLook {
   /// Corrects the plane of a tool that is no ball: by the close samples around the peak, then by a
   /// patch of the volume around the position that they find. The normal is that of the smoother one
   /// of the two surfaces.
-  void look_again(ConstraintPlane<N>& plane) const noexcept {
+  void refine_shape(ConstraintPlane<N>& plane) const noexcept {
     if (points_.close.first == nullptr) return;
     using Unit = typename N::Unit;
     using Ratio = typename N::Ratio;
@@ -77,7 +78,7 @@ class CloserLook {
                           multiply<Ratio>(means_.gradient.y, facing.y) +
                           multiply<Ratio>(means_.gradient.z, facing.z));
     const Unit facing_share(std::clamp(along / steep, Ratio(0), Ratio(1)));
-    const Unit alike = Unit(1) - falling_share<N>(facing_share, kAlike, kUnlike);
+    const Unit alike = Unit(1) - falling_ramp<N>(facing_share, kAlike, kUnlike);
     // Then the depth of the point shell counts, but not so much less than that of the closer look
     // that a step from an allowed position would end beyond the middle of the thinnest wall
     // (docs/theory.md 4.2). The closer look uses the slope of its face: in the tool's own gradient
@@ -99,8 +100,8 @@ class CloserLook {
                                   ContactVec<typename N::Unit> normal) const noexcept {
     constexpr PointShell<N> kPatch{kPatchArrays<N>.table(), {}, Real(kPatchRadius), 15};
     SpiralPlaces<N, kPatchSamples> memory;
-    const PointPlaces<N> places = memory.places();
-    const TurnRows<N> rows = flattened<N>(normal);
+    const PointPositions<N> places = memory.places();
+    const RotationRows<N> rows = flattened<N>(normal);
     reader_.place(kPatch, rows, volume_.frame, places);
     const PointSums<N> patch = reader_.sums_at(volume_.field, kPatch.table, places, middle);
     if (patch.weight <= typename N::Sum(0)) return {};
@@ -130,8 +131,8 @@ class CloserLook {
     const Real radius = std::min(Real(kCapRadius), half);
     const PointShell<N> cap{kCapArrays<N>.table(), {}, radius, 14};
     SpiralPlaces<N, kCapSamples> memory;
-    const PointPlaces<N> places = memory.places();
-    const TurnRows<N> rows = cap_rows<N>(out, radius, points_.reach);
+    const PointPositions<N> places = memory.places();
+    const RotationRows<N> rows = cap_rows<N>(out, radius, points_.reach);
     reader_.place(cap, rows, volume_.frame, places);
     const VoxelVec<Real> top =
         at_ + volume_.frame.voxel_from_contact * times<N>(out, points_.reach);

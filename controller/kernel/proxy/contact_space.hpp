@@ -116,37 +116,38 @@ template <class N>
 
 /// Orientation of a tool, from its own axes to those of the world: a unit quaternion.
 template <class N>
-struct ToolTurn {
+struct Orientation {
   typename N::Unit x{}, y{}, z{}, w{1};
 
-  friend constexpr bool operator==(const ToolTurn&, const ToolTurn&) noexcept = default;
+  friend constexpr bool operator==(const Orientation&, const Orientation&) noexcept = default;
 };
 
 /// Rows of a rotation matrix.
 template <class N>
-using TurnRows = std::array<std::array<typename N::Unit, 3>, 3>;
+using RotationRows = std::array<std::array<typename N::Unit, 3>, 3>;
 
 /// First `b`, then `a`. Fixed: four roundings a component; a step of Newton's method keeps the
 /// length at 1, whatever the number of products.
 template <class N>
-[[nodiscard]] constexpr ToolTurn<N> compose(const ToolTurn<N>& a, const ToolTurn<N>& b) noexcept {
+[[nodiscard]] constexpr Orientation<N> compose(const Orientation<N>& a,
+                                               const Orientation<N>& b) noexcept {
   using Unit = typename N::Unit;
-  const ToolTurn<N> c{a.w * b.x + a.x * b.w + (a.y * b.z - a.z * b.y),
-                      a.w * b.y + a.y * b.w + (a.z * b.x - a.x * b.z),
-                      a.w * b.z + a.z * b.w + (a.x * b.y - a.y * b.x),
-                      a.w * b.w - a.x * b.x - (a.y * b.y + a.z * b.z)};
+  const Orientation<N> c{a.w * b.x + a.x * b.w + (a.y * b.z - a.z * b.y),
+                         a.w * b.y + a.y * b.w + (a.z * b.x - a.x * b.z),
+                         a.w * b.z + a.z * b.w + (a.x * b.y - a.y * b.x),
+                         a.w * b.w - a.x * b.x - (a.y * b.y + a.z * b.z)};
   const Unit square = c.x * c.x + c.y * c.y + c.z * c.z + c.w * c.w;
   const Unit scale = Unit(1.5) - Unit(0.5) * square;
   return {scale * c.x, scale * c.y, scale * c.z, scale * c.w};
 }
 
 template <class N>
-[[nodiscard]] constexpr ToolTurn<N> inverse(const ToolTurn<N>& turn) noexcept {
+[[nodiscard]] constexpr Orientation<N> inverse(const Orientation<N>& turn) noexcept {
   return {-turn.x, -turn.y, -turn.z, turn.w};
 }
 
 template <class N>
-[[nodiscard]] constexpr TurnRows<N> rows_of(const ToolTurn<N>& t) noexcept {
+[[nodiscard]] constexpr RotationRows<N> rows_of(const Orientation<N>& t) noexcept {
   using Unit = typename N::Unit;
   const auto twice = [](Unit a) { return a + a; };
   const Unit xx = t.x * t.x, yy = t.y * t.y, zz = t.z * t.z;
@@ -161,7 +162,7 @@ template <class N>
 /// which is at least 1/2: no division by a small number. Any other matrix gives any quaternion, no
 /// fault.
 template <class N>
-[[nodiscard]] constexpr ToolTurn<N> turn_of(const TurnRows<N>& rows) noexcept {
+[[nodiscard]] constexpr Orientation<N> orientation_of(const RotationRows<N>& rows) noexcept {
   using Unit = typename N::Unit;
   constexpr Unit kQuarter(0.25);
   const auto at = [&](std::size_t i, std::size_t j) { return kQuarter * rows[i][j]; };
@@ -190,25 +191,26 @@ template <class N>
 
 /// Sine of half the angle between two orientations; 0 to 1.
 template <class N>
-[[nodiscard]] constexpr typename N::Unit half_sine_between(const ToolTurn<N>& a,
-                                                           const ToolTurn<N>& b) noexcept {
-  const ToolTurn<N> rest = compose(a, inverse(b));
+[[nodiscard]] constexpr typename N::Unit half_sine_between(const Orientation<N>& a,
+                                                           const Orientation<N>& b) noexcept {
+  const Orientation<N> rest = compose(a, inverse(b));
   return norm(ContactVec<typename N::Unit>{rest.x, rest.y, rest.z});
 }
 
 /// From `now` along the shorter arc towards `goal`, by at most twice the angle whose sine is
 /// `half_sine` (0 to 1/2). Arrives exactly.
 template <class N>
-[[nodiscard]] constexpr ToolTurn<N> turned_towards(const ToolTurn<N>& now, const ToolTurn<N>& goal,
-                                                   typename N::Unit half_sine) noexcept {
+[[nodiscard]] constexpr Orientation<N> rotate_towards(const Orientation<N>& now,
+                                                      const Orientation<N>& goal,
+                                                      typename N::Unit half_sine) noexcept {
   using Unit = typename N::Unit;
-  const ToolTurn<N> rest = compose(goal, inverse(now));
+  const Orientation<N> rest = compose(goal, inverse(now));
   const ContactVec<Unit> axis{rest.x, rest.y, rest.z};
   const Unit length = norm(axis);
   if (length <= half_sine) return goal;
   const Unit share = (rest.w < Unit(0) ? -half_sine : half_sine) / length;
-  const ToolTurn<N> step{share * rest.x, share * rest.y, share * rest.z,
-                         square_root(Unit(1) - half_sine * half_sine)};
+  const Orientation<N> step{share * rest.x, share * rest.y, share * rest.z,
+                            square_root(Unit(1) - half_sine * half_sine)};
   return compose(step, now);
 }
 

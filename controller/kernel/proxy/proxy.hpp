@@ -11,7 +11,7 @@
 namespace kerf {
 
 /// Whether the proxy has a position, and if not whether one is still searched for.
-enum class Placing : std::uint8_t { searching, placed, refused };
+enum class ProxyStatus : std::uint8_t { searching, placed, refused };
 
 /// Searches a free position for the proxy (docs/theory.md 4.7): in 26 directions, one unit farther
 /// out after all were tried. If nothing is free within kReach the tool is refused until its own
@@ -42,19 +42,19 @@ class StartSearch {
   [[nodiscard]] constexpr bool refused() const noexcept { return distance_ > kReach; }
 
   template <ContactField<N> Field>
-  constexpr Placing tick(Field& field, const ProxyPose<N>& goal, ProxyPose<N>& pose) noexcept {
+  constexpr ProxyStatus tick(Field& field, const ProxyPose<N>& goal, ProxyPose<N>& pose) noexcept {
     field.turn(goal.turn);
     const Place middle = replaces_ && !refused() ? around_ : goal.centre;
     if (is_free(field, middle, replaces_ ? SweepRules::kWedged : SweepRules::kTolerance)) {
       pose = {middle, goal.turn};
-      return Placing::placed;
+      return ProxyStatus::placed;
     }
-    if (refused()) return Placing::refused;
+    if (refused()) return ProxyStatus::refused;
     for (int queries = 0; queries < kQueries && field.may_query();) {
       if (direction_ == kDirections) {
         direction_ = 0;
         ++distance_;
-        if (refused()) return Placing::refused;
+        if (refused()) return ProxyStatus::refused;
       }
       const int direction = direction_++;
       const Place centre = middle + step(direction);
@@ -62,10 +62,10 @@ class StartSearch {
       ++queries;
       if (is_free(field, centre, SweepRules::kTolerance)) {
         pose = {centre, goal.turn};
-        return Placing::placed;
+        return ProxyStatus::placed;
       }
     }
-    return Placing::searching;
+    return ProxyStatus::searching;
   }
 
  private:
@@ -108,8 +108,9 @@ class StartSearch {
 /// Constants of the swept contact of one tool; constant during a run.
 template <class N>
 struct ProxyPlan {
-  typename N::Unit friction{};   ///< Coulomb's coefficient, 0 to 1
-  typename N::Unit turn_step{};  ///< turn_step_of(reach); 0: round, or keeps the world's axes
+  typename N::Unit friction{};  ///< Coulomb's coefficient, 0 to 1
+  typename N::Unit
+      rotation_step{};  ///< rotation_step_of(reach); 0: round, or keeps the world's axes
   /// Growth of the spring per tick after a start inside of the solid: 0.1 N/ms over its stiffness.
   typename N::Real ramp_per_tick{};
 };
@@ -126,7 +127,7 @@ struct ProxyState {
   SweepMemory<N> memory;
 
   /// Searches a position around the current one: another tool took over, or the solid changed.
-  constexpr void place_anew() noexcept {
+  constexpr void search_again() noexcept {
     search = placed ? StartSearch<N>(pose.centre) : search.again();
     placed = false;
     memory = {};
@@ -141,7 +142,7 @@ struct ProxyState {
 /// The contact of one tick.
 template <class N>
 struct ProxyContact {
-  Placing placing = Placing::searching;
+  ProxyStatus placing = ProxyStatus::searching;
   ProxyPose<N> pose;
   ContactVec<typename N::Real> spring{};  ///< from goal to proxy, units: force over stiffness
   /// Of the press of the head, out of the solid; 0 in air.
@@ -149,9 +150,9 @@ struct ProxyContact {
   /// Of the press of the whole tool, and the load of the head over it, at most 1: the same as
   /// `normal`, and 1, unless the shaft presses.
   ContactVec<typename N::Unit> press{};
-  typename N::Unit head_share{1};
+  typename N::Unit head_fraction{1};
   /// Load of shaft and handpiece over the length of the spring, at most 1.
-  typename N::Unit behind_share{};
+  typename N::Unit shaft_fraction{};
   /// Torque about the tool's centre over the force's length, units.
   ContactVec<typename N::Real> moment_arm{};
   /// From the tool's centre to the middle of the head's loads, units.
@@ -175,7 +176,7 @@ inline constexpr double kLostDepth = 1;  // units
 /// balance there. A tool that is still `moving` is not held. Such planes count as the head's: it
 /// cuts only the voxels that it covers.
 template <class N>
-constexpr void add_loads(const Swept<N>& swept, typename N::Unit friction, bool moving,
+constexpr void add_loads(const SweepResult<N>& swept, typename N::Unit friction, bool moving,
                          ProxyContact<N>& contact) noexcept {
   using Real = typename N::Real;
   const Real length = norm(contact.spring);
@@ -219,12 +220,12 @@ constexpr void add_loads(const Swept<N>& swept, typename N::Unit friction, bool 
   if (load_behind <= Real(0)) return;
   const Real on_head = whole - load_behind;
   if (on_head > Real(1e-3)) contact.head_arm = head_arm * (whole / on_head);
-  contact.behind_share = share<N>(std::min(load_behind, length), length);
+  contact.shaft_fraction = share<N>(std::min(load_behind, length), length);
   // If shaft and head press against each other, both bear more than the press of the hand.
   const Real together = norm(pressed);
   const bool presses = by_head >= Real(SweepRules::kTolerance);
   if (!presses || by_head < together) {
-    contact.head_share = presses ? share<N>(by_head, together) : typename N::Unit(0);
+    contact.head_fraction = presses ? share<N>(by_head, together) : typename N::Unit(0);
   }
 }
 
@@ -240,7 +241,7 @@ constexpr ProxyContact<N> follow(const ProxyPlan<N>& plan, ProxyState<N>& state,
   using Real = typename N::Real;
   ProxyContact<N> contact;
   contact.pose = state.pose;
-  contact.placing = state.placed ? Placing::placed : Placing::searching;
+  contact.placing = state.placed ? ProxyStatus::placed : ProxyStatus::searching;
   if (!is_finite(goal.centre.x + goal.centre.y + goal.centre.z) ||
       !is_finite(goal.turn.x + goal.turn.y + goal.turn.z + goal.turn.w)) {
     return contact;
@@ -251,23 +252,23 @@ constexpr ProxyContact<N> follow(const ProxyPlan<N>& plan, ProxyState<N>& state,
   goal.centre = {clamped(goal.centre.x), clamped(goal.centre.y), clamped(goal.centre.z)};
   if (!state.placed) {
     contact.placing = state.search.tick(field, goal, state.pose);
-    state.placed = contact.placing == Placing::placed;
+    state.placed = contact.placing == ProxyStatus::placed;
     state.ramping = state.placed && !(state.pose == goal);
     state.longest = Real(0);
     contact.pose = state.placed ? state.pose : goal;
     return contact;
   }
   const ProxyPose<N> last = state.pose;
-  const Swept<N> swept =
-      ProxySweep<N, Field>(field, state.pose, state.memory, plan.friction, plan.turn_step)
+  const SweepResult<N> swept =
+      ProxySweep<N, Field>(field, state.pose, state.memory, plan.friction, plan.rotation_step)
           .tick(goal);
   contact.pose = state.pose;
   contact.queries = swept.queries;
   contact.turned = swept.turned;
   if (swept.buried || swept.depth > Real(kLostDepth)) {
     state.pose = last;
-    state.place_anew();
-    contact.placing = Placing::searching;
+    state.search_again();
+    contact.placing = ProxyStatus::searching;
     contact.pose = goal;
     return contact;
   }

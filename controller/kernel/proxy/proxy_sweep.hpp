@@ -20,7 +20,7 @@ namespace kerf {
 ///   half_spent()      half of the tick's work is spent: the rest is the move's
 ///   may_query()       the tick's work allows another query
 template <class F, class N>
-concept ContactField = requires(F field, ContactVec<typename N::Real> q, ToolTurn<N> turn) {
+concept ContactField = requires(F field, ContactVec<typename N::Real> q, Orientation<N> turn) {
   { field.query(q) } -> std::convertible_to<Contacts<N>>;
   { field.free_distance(q, q) } -> std::convertible_to<typename N::Real>;
   field.turn(turn);
@@ -33,7 +33,7 @@ concept ContactField = requires(F field, ContactVec<typename N::Real> q, ToolTur
 struct SweepRules {
   static constexpr std::int32_t kMaxQueries = 32;
   /// No turn begins once so many queries are made, pushes included; the rest is the move's.
-  static constexpr std::int32_t kMaxTurnQueries = 12;
+  static constexpr std::int32_t kMaxRotationQueries = 12;
   static constexpr double kTolerance = 0.01;  ///< a place this deep is allowed
   /// The same of a turn. It leaves the move some play: else an inverted cone with a shaft stops
   /// between plates (rows `traps`, --seed 15590).
@@ -68,7 +68,7 @@ struct SweepRules {
 
 /// Sine of half the largest turn theta of one step (docs/theory.md 4.6): a sample `reach` units
 /// from the centre, reach >= 1, moves by kStep at most, as theta / 2 <= 1.0472 sin(theta / 2).
-[[nodiscard]] constexpr double turn_step_of(double reach) noexcept {
+[[nodiscard]] constexpr double rotation_step_of(double reach) noexcept {
   return SweepRules::kStep / (2 * 1.0472 * reach);
 }
 
@@ -76,14 +76,14 @@ struct SweepRules {
 template <class N>
 struct ProxyPose {
   ContactVec<typename N::Real> centre{};
-  ToolTurn<N> turn{};
+  Orientation<N> turn{};
 
   friend constexpr bool operator==(const ProxyPose&, const ProxyPose&) noexcept = default;
 };
 
 /// What one tick of the sweep found.
 template <class N>
-struct Swept {
+struct SweepResult {
   ConstraintSet<N> planes;  ///< that hold the proxy; depths from its centre
   Slide<N> slide;           ///< of the displacement to the goal; loads in units
   std::int32_t queries = 0;
@@ -125,13 +125,17 @@ class ProxySweep {
   using Place = ContactVec<Real>;
 
  public:
-  /// `friction`: Coulomb's coefficient, 0 to 1. `turn_step`: turn_step_of(reach), or 0 for a tool
-  /// that does not turn or is round. `memory`: what the last tick left in it, or new.
+  /// `friction`: Coulomb's coefficient, 0 to 1. `rotation_step`: rotation_step_of(reach), or 0 for
+  /// a tool that does not turn or is round. `memory`: what the last tick left in it, or new.
   constexpr ProxySweep(Field& field, ProxyPose<N>& pose, SweepMemory<N>& memory, Unit friction,
-                       Unit turn_step) noexcept
-      : field_(field), pose_(pose), memory_(memory), friction_(friction), turn_step_(turn_step) {}
+                       Unit rotation_step) noexcept
+      : field_(field),
+        pose_(pose),
+        memory_(memory),
+        friction_(friction),
+        rotation_step_(rotation_step) {}
 
-  constexpr Swept<N> tick(const ProxyPose<N>& goal) noexcept {
+  constexpr SweepResult<N> tick(const ProxyPose<N>& goal) noexcept {
     here_ = turn_to(goal.turn);
     held_by_ = constraints_of(here_);
     const Slide<N> slide = move_to(goal.centre);
@@ -229,24 +233,24 @@ class ProxySweep {
 
   /// How far a turn to `next` may push the tool: as far as it moves the tool's own samples, which
   /// is what a wall can ask. A wedge of two walls asks for more: it would lift the tool out.
-  [[nodiscard]] constexpr Real longest_push(const ToolTurn<N>& next) const noexcept {
-    const Unit of_step = std::min(half_sine_between(next, pose_.turn) / turn_step_, Unit(1));
+  [[nodiscard]] constexpr Real longest_push(const Orientation<N>& next) const noexcept {
+    const Unit of_step = std::min(half_sine_between(next, pose_.turn) / rotation_step_, Unit(1));
     return multiply<Real>(Real(SweepRules::kStep), of_step) + Real(SweepRules::kTolerance);
   }
 
   /// Turns towards `goal` while places are found that allow it, and says what the tool feels then.
-  constexpr Contacts<N> turn_to(const ToolTurn<N>& goal) noexcept {
-    if (turn_step_ <= Unit(0)) {
+  constexpr Contacts<N> turn_to(const Orientation<N>& goal) noexcept {
+    if (rotation_step_ <= Unit(0)) {
       pose_.turn = goal;
       field_.turn(goal);
       return look(pose_.centre);
     }
-    Unit step = turn_step_;
+    Unit step = rotation_step_;
     bool known = false;
     const bool goes_on = first_step() < Unit(1);  // with the last tick's move
-    while (!goes_on && !(pose_.turn == goal) && queries_ < SweepRules::kMaxTurnQueries &&
+    while (!goes_on && !(pose_.turn == goal) && queries_ < SweepRules::kMaxRotationQueries &&
            !field_.half_spent()) {
-      const ToolTurn<N> next = turned_towards(pose_.turn, goal, step);
+      const Orientation<N> next = rotate_towards(pose_.turn, goal, step);
       field_.turn(next);
       const Trial trial = attempt(Trying::turn, pose_.centre, {}, {});
       if (trial.allowed && norm(trial.centre - pose_.centre) <= longest_push(next)) {
@@ -254,10 +258,10 @@ class ProxySweep {
         memory_.curvature = {};
         here_ = trial.felt;
         known = true;
-        step = turn_step_;
+        step = rotation_step_;
       } else {
         step = step * Unit(SweepRules::kShrink);
-        if (step < turn_step_ * Unit(SweepRules::kShortest)) break;
+        if (step < rotation_step_ * Unit(SweepRules::kShortest)) break;
       }
     }
     field_.turn(pose_.turn);
@@ -339,7 +343,7 @@ class ProxySweep {
   ProxyPose<N>& pose_;
   SweepMemory<N>& memory_;
   Unit friction_;
-  Unit turn_step_;
+  Unit rotation_step_;
   Contacts<N> here_{};
   ConstraintSet<N> held_by_{};
   std::int32_t queries_ = 0;

@@ -25,8 +25,8 @@ struct QueryWork {
   /// samples gets the budget of kLeastQueries.
   static constexpr std::int64_t kTickSamples = 15000;
   static constexpr std::int64_t kLeastQueries = 12;
-  static constexpr std::int64_t kLookSamples = 128;  ///< fixed cost of reading a shell
-  static constexpr std::int64_t kCloseSamples = 2;   ///< cost of one sample of a closeup
+  static constexpr std::int64_t kQueryOverhead = 128;  ///< fixed cost of reading a shell
+  static constexpr std::int64_t kCloseSamples = 2;     ///< cost of one sample of a closeup
 
   /// Cost of one step in the free-space map: each waits for the result of the last one.
   static constexpr std::int64_t kFreeLook = 12;
@@ -62,7 +62,7 @@ struct QueryWork {
   [[nodiscard]] constexpr std::int64_t most() const noexcept {
     const std::int64_t after = 8 * (query + closer) > budget() ? turn + query : 0;
     return std::min(budget() + after + 2 * near, SweepRules::kMaxQueries * (query + closer + near) +
-                                                     (SweepRules::kMaxTurnQueries + 1) * turn);
+                                                     (SweepRules::kMaxRotationQueries + 1) * turn);
   }
 };
 
@@ -72,10 +72,10 @@ template <class N>
 [[nodiscard]] constexpr QueryWork query_work(const PointTable<N>& point_shell,
                                              std::size_t volumes) noexcept {
   using Work = QueryWork;
-  const std::int64_t cap = Work::kLookSamples + kCapSamples;
-  const std::int64_t closeup = Work::kLookSamples + Work::kCloseSamples * kMostClose;
-  const std::int64_t patch = Work::kLookSamples + kPatchSamples;
-  const std::int64_t query = std::int64_t{point_shell.groups} * kPointGroup + Work::kLookSamples;
+  const std::int64_t cap = Work::kQueryOverhead + kCapSamples;
+  const std::int64_t closeup = Work::kQueryOverhead + Work::kCloseSamples * kMostClose;
+  const std::int64_t patch = Work::kQueryOverhead + kPatchSamples;
+  const std::int64_t query = std::int64_t{point_shell.groups} * kPointGroup + Work::kQueryOverhead;
   const auto times = static_cast<std::int64_t>(volumes);
   return {.query = times * query,
           .closer = times * (point_shell.round ? cap : closeup + 2 * patch),
@@ -98,7 +98,7 @@ template <class N>
 struct ContactVolume {
   DensityField field;
   ContactFrame<N> frame;
-  PointPlaces<N> places;
+  PointPositions<N> places;
 };
 
 /// Reads samples of one tool in solid volumes, and counts what it reads: the work that is left of a
@@ -115,9 +115,9 @@ class SampleReader {
       : kernels_(kernels), points_(points) {}
 
   [[nodiscard]] const PointShell<N>& points() const noexcept { return points_; }
-  [[nodiscard]] const TurnRows<N>& rows() const noexcept { return rows_; }
+  [[nodiscard]] const RotationRows<N>& rows() const noexcept { return rows_; }
   /// Sets the orientation of the tool; call `place` for each volume after it.
-  void turn(const TurnRows<N>& rows) noexcept { rows_ = rows; }
+  void turn(const RotationRows<N>& rows) noexcept { rows_ = rows; }
 
   /// Work that is left of the tick; unlimited before the first `set_left`.
   [[nodiscard]] std::int64_t left() const noexcept { return left_; }
@@ -139,19 +139,19 @@ class SampleReader {
   }
 
   /// Transforms samples to voxels of a volume, rotated by `rows`.
-  void place(const PointShell<N>& points, const TurnRows<N>& rows, const ContactFrame<N>& frame,
-             const PointPlaces<N>& places) const noexcept {
+  void place(const PointShell<N>& points, const RotationRows<N>& rows, const ContactFrame<N>& frame,
+             const PointPositions<N>& places) const noexcept {
     const PointStep<N> step = step_of(points, rows, frame);
     if constexpr (N::kIsFixed) {
-      kernels_.place_points(points.table, step, places);
+      kernels_.transform_points(points.table, step, places);
     } else {
-      place_points(points.table, step, places);
+      transform_points(points.table, step, places);
     }
   }
 
   /// Sums over the samples at `places` around the position `at`.
   [[nodiscard]] PointSums<N> sums_at(const DensityField& field, const PointTable<N>& table,
-                                     const PointPlaces<N>& places,
+                                     const PointPositions<N>& places,
                                      VoxelVec<Real> at) const noexcept {
     const PointNumber<N> centre[3] = {number_of(at.x), number_of(at.y), number_of(at.z)};
     PointSums<N> sums;
@@ -160,7 +160,7 @@ class SampleReader {
     } else {
       sums = point_sums<N>(table, places, centre, field);
     }
-    left_ -= QueryWork::kLookSamples + sums.read;
+    left_ -= QueryWork::kQueryOverhead + sums.read;
     return sums;
   }
 
@@ -183,20 +183,20 @@ class SampleReader {
     CloseSamples<N> samples;
     samples.take(points_.close, offset);
     const PointTable<N> table = samples.table();
-    const PointPlaces<N> places = samples.places();
+    const PointPositions<N> places = samples.places();
     const PointStep<N> step = step_of(points_, rows_, volume.frame);
     const PointNumber<N> centre[3] = {number_of(at.x), number_of(at.y), number_of(at.z)};
     CloseSums<N> sums;
     if constexpr (N::kIsFixed) {
-      kernels_.place_points(table, step, places);
+      kernels_.transform_points(table, step, places);
       kernels_.read_points(places, table.count, centre, volume.field, samples.density.data());
       kernels_.sum_close(samples.fade(table), sums);
     } else {
-      place_points(table, step, places);
+      transform_points(table, step, places);
       read_points<N>(places, table.count, centre, volume.field, samples.density.data());
       sums = close_sums<N>(samples.fade(table));
     }
-    left_ -= QueryWork::kLookSamples + QueryWork::kCloseSamples * table.count;
+    left_ -= QueryWork::kQueryOverhead + QueryWork::kCloseSamples * table.count;
     return peak_of(sums);
   }
 
@@ -244,7 +244,8 @@ class SampleReader {
 
  private:
   /// The matrix that takes a tool's offsets to voxels; `rows` turns them to the world's axes.
-  [[nodiscard]] static PointStep<N> step_of(const PointShell<N>& points, const TurnRows<N>& rows,
+  [[nodiscard]] static PointStep<N> step_of(const PointShell<N>& points,
+                                            const RotationRows<N>& rows,
                                             const ContactFrame<N>& frame) noexcept {
     PointStep<N> step;
     step.shift = 15 + points.step_bits - 16;  // from offsets times rows to Q15.16
@@ -270,7 +271,7 @@ class SampleReader {
 
   const KernelSet& kernels_;
   const PointShell<N>& points_;
-  TurnRows<N> rows_{};
+  RotationRows<N> rows_{};
   mutable std::int64_t left_ = std::numeric_limits<std::int64_t>::max();
 };
 

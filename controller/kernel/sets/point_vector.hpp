@@ -82,7 +82,7 @@ struct PointBlock {
 
 /// `kInside`: all are known to be in the volume.
 template <bool kInside>
-[[gnu::always_inline]] inline PointCells point_cells(const PointPlaces<FixedNumbers>& places,
+[[gnu::always_inline]] inline PointCells point_cells(const PointPositions<FixedNumbers>& places,
                                                      const std::int32_t (&centre)[3],
                                                      const VoxelGrid& grid,
                                                      std::int32_t first) noexcept {
@@ -205,7 +205,7 @@ template <bool kRound, bool kInside>
 
 template <bool kRound, bool kInside>
 [[gnu::always_inline]] inline void add_block(const PointTable<FixedNumbers>& table,
-                                             const PointPlaces<FixedNumbers>& places,
+                                             const PointPositions<FixedNumbers>& places,
                                              const std::int32_t (&centre)[3],
                                              const DensityField& field, PointBlock& block,
                                              PointVectors& sums) noexcept {
@@ -225,7 +225,7 @@ template <bool kRound, bool kInside>
 /// Groups from `begin` to `end`, but those in free space.
 template <bool kRound, bool kInside>
 [[gnu::always_inline]] inline void add_groups(const PointTable<FixedNumbers>& table,
-                                              const PointPlaces<FixedNumbers>& places,
+                                              const PointPositions<FixedNumbers>& places,
                                               const std::int32_t (&centre)[3],
                                               const DensityField& field, std::int32_t begin,
                                               std::int32_t end, PointVectors& sums) noexcept {
@@ -266,7 +266,7 @@ inline std::int32_t highest32(V entries) noexcept {
 /// care.
 template <bool kRound, bool kInside>
 [[gnu::always_inline]] inline void sum_points_by(const PointTable<FixedNumbers>& table,
-                                                 const PointPlaces<FixedNumbers>& places,
+                                                 const PointPositions<FixedNumbers>& places,
                                                  const std::int32_t (&centre)[3],
                                                  const DensityField& field,
                                                  PointSums<FixedNumbers>& out) noexcept {
@@ -295,7 +295,7 @@ template <bool kRound, bool kInside>
 }
 
 void sum_point_samples(const PointTable<FixedNumbers>& table,
-                       const PointPlaces<FixedNumbers>& places, const std::int32_t (&centre)[3],
+                       const PointPositions<FixedNumbers>& places, const std::int32_t (&centre)[3],
                        const DensityField& field, PointSums<FixedNumbers>& sums) noexcept {
   const std::int32_t size[3] = {field.grid.nx, field.grid.ny, field.grid.nz};
   bool has_cells = true, inside = true;
@@ -315,7 +315,7 @@ void sum_point_samples(const PointTable<FixedNumbers>& table,
   }
 }
 
-void read_point_samples(const PointPlaces<FixedNumbers>& places, std::int32_t count,
+void read_point_samples(const PointPositions<FixedNumbers>& places, std::int32_t count,
                         const std::int32_t (&centre)[3], const DensityField& field,
                         std::int32_t* density) noexcept {
   const VoxelGrid& grid = field.grid;
@@ -368,7 +368,7 @@ struct NormalVectors {
   }
 };
 
-void sum_close_samples(const CloseLook<FixedNumbers>& look,
+void sum_close_samples(const CloseSampleView<FixedNumbers>& look,
                        CloseSums<FixedNumbers>& sums) noexcept {
   sums = {};
   V top = Simd::zero();

@@ -17,18 +17,18 @@ namespace kerf {
 namespace {
 
 void sum_point_samples(const PointTable<FixedNumbers>& table,
-                       const PointPlaces<FixedNumbers>& places, const std::int32_t (&centre)[3],
+                       const PointPositions<FixedNumbers>& places, const std::int32_t (&centre)[3],
                        const DensityField& field, PointSums<FixedNumbers>& sums) noexcept {
   sums = point_sums<FixedNumbers>(table, places, centre, field);
 }
 
-void read_point_samples(const PointPlaces<FixedNumbers>& places, std::int32_t count,
+void read_point_samples(const PointPositions<FixedNumbers>& places, std::int32_t count,
                         const std::int32_t (&centre)[3], const DensityField& field,
                         std::int32_t* density) noexcept {
   read_points<FixedNumbers>(places, count, centre, field, density);
 }
 
-void sum_close_samples(const CloseLook<FixedNumbers>& look,
+void sum_close_samples(const CloseSampleView<FixedNumbers>& look,
                        CloseSums<FixedNumbers>& sums) noexcept {
   sums = close_sums<FixedNumbers>(look);
 }

@@ -71,9 +71,9 @@ struct SampleCells {
   }
 }
 
-/// `place_points` of every instruction set.
+/// `transform_points` of every instruction set.
 void place_point_samples(const PointTable<FixedNumbers>& table, const PointStep<FixedNumbers>& step,
-                         const PointPlaces<FixedNumbers>& places) noexcept {
+                         const PointPositions<FixedNumbers>& places) noexcept {
   place_offsets(table.offset, step, table.count, places.offset_vox);
   place_offsets(table.middle, step, table.groups, places.middle);
   for (std::int32_t i = table.count; i < table.groups * kPointGroup; ++i) {
@@ -87,12 +87,12 @@ struct OpenGroups {
   std::int32_t group[kMaxShellPoints / kPointGroup];
 };
 
-/// Lists those from `begin` to `end` by `FreeBricks::at`: the bricks in vectors, and then without a
-/// branch that waits for the map. `kInside`: all are known to be in the volume. A position that
+/// Lists those from `begin` to `end` by `FreeSpaceMap::at`: the bricks in vectors, and then without
+/// a branch that waits for the map. `kInside`: all are known to be in the volume. A position that
 /// wraps beyond 2^15 voxels is outside before and after.
 template <bool kInside>
-void find_open(const PointTable<FixedNumbers>& table, const PointPlaces<FixedNumbers>& places,
-               const std::int32_t (&centre)[3], const FreeBricks& free, std::int32_t begin,
+void find_open(const PointTable<FixedNumbers>& table, const PointPositions<FixedNumbers>& places,
+               const std::int32_t (&centre)[3], const FreeSpaceMap& free, std::int32_t begin,
                std::int32_t end, OpenGroups& open) noexcept {
   constexpr int kToBrick = 17;  // from Q15.16
   static_assert(kFreeBrick << 16 == 1 << kToBrick);
@@ -107,8 +107,8 @@ void find_open(const PointTable<FixedNumbers>& table, const PointPlaces<FixedNum
       const auto place = static_cast<std::int32_t>(at + static_cast<std::uint32_t>(middle[i]));
       std::int32_t along = place >> kToBrick;
       if constexpr (!kInside) {
-        outside[i] = FreeBricks::larger(outside[i], FreeBricks::beyond(place >> 16, n));
-        along = FreeBricks::within(along, n);
+        outside[i] = FreeSpaceMap::larger(outside[i], FreeSpaceMap::beyond(place >> 16, n));
+        along = FreeSpaceMap::within(along, n);
       }
       brick[i] = brick[i] * n + along;
     }
@@ -118,7 +118,7 @@ void find_open(const PointTable<FixedNumbers>& table, const PointPlaces<FixedNum
     std::int32_t distance = 0;
     if (free.distance != nullptr) {
       distance = free.distance[brick[i]];
-      if constexpr (!kInside) distance = FreeBricks::at_least(distance, outside[i]);
+      if constexpr (!kInside) distance = FreeSpaceMap::at_least(distance, outside[i]);
     }
     open.group[open.count] = i;
     open.count += distance < table.needed[i] ? 1 : 0;

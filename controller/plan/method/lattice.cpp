@@ -16,9 +16,9 @@ Matrix unturned_steps(const SceneTool& tool, const SceneVolume& volume) {
                      {a / h[0], a / h[1], a / h[2]});
 }
 
-std::optional<LatticeTurn> lattice_turn(const SceneTool& tool, const SceneVolume& volume) {
+std::optional<AxisPermutation> axis_permutation(const SceneTool& tool, const SceneVolume& volume) {
   const Matrix steps = unturned_steps(tool, volume);
-  LatticeTurn turn{};
+  AxisPermutation turn{};
   for (std::size_t i = 0; i < 3; ++i) {
     for (std::size_t j = 0; j < 3; ++j) {
       const std::int32_t step = step_of<FixedNumbers>(steps[i][j]);
@@ -32,7 +32,7 @@ std::optional<LatticeTurn> lattice_turn(const SceneTool& tool, const SceneVolume
   return turn;
 }
 
-std::vector<ToolOffset> turned(std::span<const ToolOffset> offsets, const LatticeTurn& turn) {
+std::vector<ToolOffset> turned(std::span<const ToolOffset> offsets, const AxisPermutation& turn) {
   std::vector<ToolOffset> result;
   result.reserve(offsets.size());
   for (const ToolOffset& offset : offsets) {

@@ -65,16 +65,16 @@ template <class N>
 [[nodiscard]] Matrix unturned_steps(const SceneTool& tool, const SceneVolume& volume);
 
 /// The tool's axes in the volume: each along one of its axes, forward (1) or backward (-1).
-using LatticeTurn = std::array<std::array<std::int16_t, 3>, 3>;
+using AxisPermutation = std::array<std::array<std::int16_t, 3>, 3>;
 
 /// The permutation between the lattice of a tool that does not turn and that of the volume, if the
 /// two are equal to the last bit of fixed-point numbers: pitch and voxel edges equal, axes
 /// parallel.
-[[nodiscard]] std::optional<LatticeTurn> lattice_turn(const SceneTool& tool,
-                                                      const SceneVolume& volume);
+[[nodiscard]] std::optional<AxisPermutation> axis_permutation(const SceneTool& tool,
+                                                              const SceneVolume& volume);
 
 /// The samples along the axes of the volume.
 [[nodiscard]] std::vector<ToolOffset> turned(std::span<const ToolOffset> offsets,
-                                             const LatticeTurn& turn);
+                                             const AxisPermutation& turn);
 
 }  // namespace kerf

@@ -10,11 +10,11 @@ namespace kerf {
 namespace {
 
 //                      avx512   avx2  neon  scalar
-constexpr Prices kCopy{0.08, 0.08, 0.2, 1.1};
-constexpr Prices kContact{0.005, 0.012, 0.03, 0.06};
-constexpr Prices kMill{0.011, 0.021, 0.06, 0.27};
-constexpr Prices kCover{0.011, 0.025, 0.06, 0.35};
-constexpr Prices kBend{0.8, 0.8, 1.6, 0.8};
+constexpr UnitCosts kCopy{0.08, 0.08, 0.2, 1.1};
+constexpr UnitCosts kContact{0.005, 0.012, 0.03, 0.06};
+constexpr UnitCosts kMill{0.011, 0.021, 0.06, 0.27};
+constexpr UnitCosts kCover{0.011, 0.025, 0.06, 0.35};
+constexpr UnitCosts kBend{0.8, 0.8, 1.6, 0.8};
 
 constexpr std::uint64_t kMasks = kCellCorners;  ///< of an entry of ratios
 
@@ -51,7 +51,7 @@ class AlignedMethod final : public ToolMethod {
 
   const AlignedTable* hold(const ToolCase& in, std::size_t v, MethodMemory& memory) const override {
     const AlignedTable& table =
-        memory.hold_table(in.tool, lattice_turn(in.tool, in.volume).value(), in.kernels);
+        memory.hold_table(in.tool, axis_permutation(in.tool, in.volume).value(), in.kernels);
     const CutModel cut = in.scene.cut.model;
     memory.scratch.tick().hold(table.size, cut != CutModel::none);
     if (cut != CutModel::none && cut != CutModel::preston) {
@@ -79,7 +79,7 @@ class AlignedMethod final : public ToolMethod {
   [[nodiscard]] std::vector<StageCost> stages(const TickShape& shape, VoxelIndex) const override {
     const AlignedTable& table = *shape.table;
     std::vector<StageCost> stages;
-    const auto add = [&](const char* stage, std::uint64_t operations, const Prices& prices) {
+    const auto add = [&](const char* stage, std::uint64_t operations, const UnitCosts& prices) {
       stages.push_back(priced(stage, operations, prices, shape.runs_it));
     };
     add("copy", voxels_of(table.box), kCopy);

@@ -9,12 +9,12 @@ namespace kerf {
 namespace {
 
 //                         avx512  avx2  neon  scalar  float  double
-constexpr Prices kContact{0.2, 0.3, 1, 3, 1.4, 2};
-constexpr Prices kOverlap{0, 0, 0, 0, 0.9, 1.1};
-constexpr Prices kModification{0, 0, 0, 0, 0.5, 0.5};
-constexpr Prices kRemoval{0, 0, 0, 0, 3, 3};
-constexpr Prices kBentRemoval{0, 0, 0, 0, 4.3, 4.3};
-constexpr Prices kRefresh{0, 0, 0, 0, 9, 9};
+constexpr UnitCosts kContact{0.2, 0.3, 1, 3, 1.4, 2};
+constexpr UnitCosts kOverlap{0, 0, 0, 0, 0.9, 1.1};
+constexpr UnitCosts kModification{0, 0, 0, 0, 0.5, 0.5};
+constexpr UnitCosts kRemoval{0, 0, 0, 0, 3, 3};
+constexpr UnitCosts kBentRemoval{0, 0, 0, 0, 4.3, 4.3};
+constexpr UnitCosts kRefresh{0, 0, 0, 0, 9, 9};
 
 /// Any tool: stored gradients, interpolated at every sample. Fixed point gathers only where nothing
 /// is cut; float and double always.
@@ -70,7 +70,7 @@ class GatherMethod final : public ToolMethod {
                         std::min(size.z + more, grid.nz + beyond)});
     };
     std::vector<StageCost> stages;
-    const auto add = [&](const char* stage, std::uint64_t operations, const Prices& prices) {
+    const auto add = [&](const char* stage, std::uint64_t operations, const UnitCosts& prices) {
       stages.push_back(priced(stage, operations, prices, shape.runs_it));
     };
     if (!shape.swept) add("contact", kCellCorners * shape.samples, kContact);

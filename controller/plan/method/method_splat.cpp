@@ -9,13 +9,13 @@ namespace kerf {
 namespace {
 
 //                      avx512   avx2  neon  scalar
-constexpr Prices kPlace{0.06, 0.08, 0.5, 0.5};
-constexpr Prices kCopy{0.08, 0.08, 0.2, 1.1};
-constexpr Prices kSplat{0.3, 0.3, 0.6, 0.75};
-constexpr Prices kPress{0.16, 0.2, 0.6, 1.5};
-constexpr Prices kCover{0.11, 0.13, 0.3, 0.57};
-constexpr Prices kBend{1.1, 1.1, 2.2, 1.1};
-constexpr Prices kCut{0.11, 0.25, 0.4, 1.5};
+constexpr UnitCosts kPlace{0.06, 0.08, 0.5, 0.5};
+constexpr UnitCosts kCopy{0.08, 0.08, 0.2, 1.1};
+constexpr UnitCosts kSplat{0.3, 0.3, 0.6, 0.75};
+constexpr UnitCosts kPress{0.16, 0.2, 0.6, 1.5};
+constexpr UnitCosts kCover{0.11, 0.13, 0.3, 0.57};
+constexpr UnitCosts kBend{1.1, 1.1, 2.2, 1.1};
+constexpr UnitCosts kCut{0.11, 0.25, 0.4, 1.5};
 
 /// Any tool in fixed point that cuts: every sample's weights are added up in the volume.
 class SplatMethod final : public ToolMethod {
@@ -64,7 +64,7 @@ class SplatMethod final : public ToolMethod {
     const TickBox box = tick_box(size, kExactFarid, shape.samples);
     const std::uint64_t entries = count(box.row_lanes) * rows_of(size);
     std::vector<StageCost> stages;
-    const auto add = [&](const char* stage, std::uint64_t operations, const Prices& prices) {
+    const auto add = [&](const char* stage, std::uint64_t operations, const UnitCosts& prices) {
       stages.push_back(priced(stage, operations, prices, shape.runs_it));
     };
     add("place", kPlaceOperations * shape.samples, kPlace);

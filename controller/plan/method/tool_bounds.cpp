@@ -178,7 +178,7 @@ std::vector<VoxelIndex> box_sizes(const SceneTool& tool, const SceneVolume& volu
   return sizes;
 }
 
-std::size_t most_covered(const SceneTool& tool, const SceneVolume& volume) {
+std::size_t max_covered_voxels(const SceneTool& tool, const SceneVolume& volume) {
   std::size_t by_box = 0;
   for (const VoxelIndex& size : box_sizes(tool, volume)) {
     by_box = std::max(by_box, VoxelGrid{size.x + 1, size.y + 1, size.z + 1}.voxel_count());
@@ -188,7 +188,7 @@ std::size_t most_covered(const SceneTool& tool, const SceneVolume& volume) {
   return std::min(by_box, static_cast<std::size_t>(by_hull));
 }
 
-std::size_t most_groups(const SceneTool& tool, const SceneVolume& volume) {
+std::size_t max_cover_groups(const SceneTool& tool, const SceneVolume& volume) {
   std::size_t by_box = 0;
   for (const VoxelIndex& size : box_sizes(tool, volume)) {
     const std::int32_t in_row = size.x / kCoverGroup + 1;
@@ -205,7 +205,7 @@ std::size_t most_groups(const SceneTool& tool, const SceneVolume& volume) {
   return std::min(by_box, static_cast<std::size_t>(by_rows));
 }
 
-std::size_t most_groups(const AlignedTable& table) {
+std::size_t max_cover_groups(const AlignedTable& table) {
   constexpr std::int32_t kFirst = 2;  // lane of the first voxel
   const std::int32_t last_begin = table.size.x + 1 - kCoverGroup;
   std::size_t groups = 0;

@@ -32,7 +32,7 @@ namespace kerf {
 /// V(K) + b SUM A_i + b^2 SUM w_i + b^3, A_i and w_i its shadow and its width along the axes, at
 /// their largest for any direction of K's axis. The box around the tool is another bound; the
 /// smaller one counts.
-[[nodiscard]] std::size_t most_covered(const SceneTool& tool, const SceneVolume& volume);
+[[nodiscard]] std::size_t max_covered_voxels(const SceneTool& tool, const SceneVolume& volume);
 
 /// Most groups of kCoverGroup neighbours that contain those voxels. From the table of a tool of the
 /// method `aligned`, whose samples have one position within their cells, exact if they lie on no
@@ -41,7 +41,7 @@ namespace kerf {
 /// Groups begin at a covered voxel, so a row that spans w voxels has (w + 15) / 16 at most. The
 /// shadow of the grown hull along x bounds the number of rows, and the hull itself the sum of their
 /// spans, as it is convex. The largest sum of both for one direction of K's axis counts.
-[[nodiscard]] std::size_t most_groups(const SceneTool& tool, const SceneVolume& volume);
-[[nodiscard]] std::size_t most_groups(const AlignedTable& table);
+[[nodiscard]] std::size_t max_cover_groups(const SceneTool& tool, const SceneVolume& volume);
+[[nodiscard]] std::size_t max_cover_groups(const AlignedTable& table);
 
 }  // namespace kerf

@@ -21,7 +21,7 @@
 namespace kerf {
 namespace {
 
-double price_ns(const Prices& prices, std::string_view runs_it) noexcept {
+double price_ns(const UnitCosts& prices, std::string_view runs_it) noexcept {
   if (runs_it == "avx512") return prices.avx512;
   if (runs_it == "avx2") return prices.avx2;
   if (runs_it == "neon") return prices.neon;
@@ -42,7 +42,7 @@ double work_us(const std::vector<StageCost>& stages) noexcept {
   return us;
 }
 
-StageCost priced(const char* stage, std::uint64_t operations, const Prices& prices,
+StageCost priced(const char* stage, std::uint64_t operations, const UnitCosts& prices,
                  std::string_view runs_it) {
   const double ns = price_ns(prices, runs_it);
   if (!(ns > 0)) {
@@ -61,7 +61,7 @@ void add_force_stages(std::uint64_t covered, std::string_view runs_it,
   stages.push_back(priced("spend", covered, {9, 12, 65, 36, 4, 4}, runs_it));
 }
 
-const AlignedTable& MethodMemory::hold_table(const SceneTool& tool, const LatticeTurn& turn,
+const AlignedTable& MethodMemory::hold_table(const SceneTool& tool, const AxisPermutation& turn,
                                              const KernelSet& kernels) {
   if (tables_.empty() || tables_.back().tool != &tool || turn_ != turn) {
     turn_ = turn;
@@ -96,9 +96,9 @@ namespace {
 
 void check(const ToolCase& in, double is, double most, const char* what, const char* way_out) {
   if (is <= most) return;
-  throw SceneError(in.scene.path + ": tool " + in.tool.name + " in volume " + in.volume.name +
-                   ": up to " + number_text(std::floor(is)) + what + ", and " + number_text(most) +
-                   " are the end; " + way_out + ", or set servo.numeric = \"double\"");
+  throw LoadError(in.scene.path + ": tool " + in.tool.name + " in volume " + in.volume.name +
+                  ": up to " + number_text(std::floor(is)) + what + ", and " + number_text(most) +
+                  " are the end; " + way_out + ", or set servo.numeric = \"double\"");
 }
 
 }  // namespace
@@ -108,7 +108,8 @@ std::string why_not_aligned(const ToolCase& in) {
     return std::string(word_of(in.scene.servo.numeric)) + " numbers";
   }
   if (!in.tool.round && in.tool.turns) return "it turns and is not round";
-  if (!lattice_turn(in.tool, in.volume)) return "its samples do not lie on the volume's lattice";
+  if (!axis_permutation(in.tool, in.volume))
+    return "its samples do not lie on the volume's lattice";
   if (!can_align(in.tool.offsets)) return "its samples are no lattice of at most 64 a side";
   return {};
 }
@@ -186,10 +187,10 @@ TickShape tick_shape(const ToolCase& in, const AlignedTable* table) {
           .table = table};
 }
 
-std::size_t most_listed(const ToolCase& in, const AlignedTable* table) {
-  if (table != nullptr) return most_groups(*table);
+std::size_t max_cover_entries(const ToolCase& in, const AlignedTable* table) {
+  if (table != nullptr) return max_cover_groups(*table);
   const bool fixed = in.scene.servo.numeric == NumericKind::fixed;
-  return fixed ? most_groups(in.tool, in.volume) : most_covered(in.tool, in.volume);
+  return fixed ? max_cover_groups(in.tool, in.volume) : max_covered_voxels(in.tool, in.volume);
 }
 
 std::vector<StageCost> tick_stages(const ToolMethod& method, const TickShape& shape, VoxelIndex box,
@@ -202,7 +203,8 @@ std::vector<StageCost> tick_stages(const ToolMethod& method, const TickShape& sh
 
 std::vector<StageCost> most_stages(const ToolMethod& method, const TickShape& shape,
                                    const ToolCase& in, std::uint64_t queried) {
-  const std::size_t covered = shape.cut == CutModel::preston ? most_listed(in, shape.table) : 0;
+  const std::size_t covered =
+      shape.cut == CutModel::preston ? max_cover_entries(in, shape.table) : 0;
   std::vector<StageCost> most;
   for (const VoxelIndex& box : box_sizes(in.tool, in.volume)) {
     std::vector<StageCost> stages = tick_stages(method, shape, box, queried, covered);

@@ -40,14 +40,14 @@ struct StageCost {
 /// ns of one operation on the reference machine, a core of 2024 at 4.4 GHz, by kernel set or
 /// number type; rounded up from the costliest of many tools. 0 if a stage does not exist. NEON was
 /// never measured on hardware: guesses, for slower cores.
-struct Prices {
+struct UnitCosts {
   double avx512, avx2, neon, scalar;
   double float32 = 0, float64 = 0;
 };
 
 /// A stage with the price of `runs_it`, the name of a kernel set or a word of NumericKind. Throws
 /// std::logic_error if it has no price.
-[[nodiscard]] StageCost priced(const char* stage, std::uint64_t operations, const Prices& prices,
+[[nodiscard]] StageCost priced(const char* stage, std::uint64_t operations, const UnitCosts& prices,
                                std::string_view runs_it);
 
 /// The queries of the swept proxy: samples that are read, and work that counts like them. They cost
@@ -78,7 +78,7 @@ class MethodMemory {
 
   /// The tool's table for this permutation, at a fixed address; a tool with the same permutation in
   /// its next volume gets the same.
-  const AlignedTable& hold_table(const SceneTool& tool, const LatticeTurn& turn,
+  const AlignedTable& hold_table(const SceneTool& tool, const AxisPermutation& turn,
                                  const KernelSet& kernels);
   /// The tool's samples for fixed point in any pose, the same for all its volumes.
   void hold_samples(const SceneTool& tool, SampleOrder order);
@@ -98,7 +98,7 @@ class MethodMemory {
   };
 
   GradientKernel kernel_;
-  LatticeTurn turn_{};  ///< of the last table
+  AxisPermutation turn_{};  ///< of the last table
   std::vector<OfTool<std::unique_ptr<AlignedTool>>> tables_;
   std::vector<OfTool<SampleTool>> samples_;
 };
@@ -160,7 +160,7 @@ class ToolMethod {
   const char* advice;
 
   /// Why it serves; empty if it does not. The scene alone decides, never the machine. Throws
-  /// SceneError for a tool that its integers cannot hold.
+  /// LoadError for a tool that its integers cannot hold.
   [[nodiscard]] virtual std::optional<std::string> serves(const ToolCase& in) const = 0;
 
   /// Reserves in `memory` what its step needs in volume `v` of the plan; returns the table of the
@@ -199,7 +199,7 @@ struct MethodChoice {
   std::string why;  ///< one reason for a person
 };
 
-/// The first method of the list that serves. Throws SceneError for a tool that no method of
+/// The first method of the list that serves. Throws LoadError for a tool that no method of
 /// fixed-point numbers can hold. Load time.
 [[nodiscard]] MethodChoice choose_method(const ToolCase& in);
 
@@ -208,7 +208,7 @@ struct MethodChoice {
 
 /// Entries of the list of a cut by force, at most: groups of voxels for kernels, else voxels.
 /// Closer if the method `aligned` has its table.
-[[nodiscard]] std::size_t most_listed(const ToolCase& in, const AlignedTable* table);
+[[nodiscard]] std::size_t max_cover_entries(const ToolCase& in, const AlignedTable* table);
 
 /// All stages of a tick in the order in which they run: queries of the proxy, if there is one, the
 /// stages of the method, and the cut by force, if there is one.
@@ -230,7 +230,7 @@ struct MethodChoice {
 inline constexpr const char* kAdviceToAlign = "a round or unturned tool on the volume's lattice";
 
 /// The bounds that keep fixed-point sums within their integers: distance of samples from the tool's
-/// centre, and how many are in a voxel or a plane. Throw SceneError.
+/// centre, and how many are in a voxel or a plane. Throw LoadError.
 void check_reach(const ToolCase& in);
 void check_splat(const ToolCase& in);
 

@@ -10,14 +10,14 @@
 
 namespace kerf {
 
-/// Owner of a volume's FreeBricks. Load time; moving it keeps the map valid.
+/// Owner of a volume's FreeSpaceMap. Load time; moving it keeps the map valid.
 class FreeBrickMap {
  public:
   /// A voxel counts when its density reaches `faintest`, below which contact feels nothing. While
   /// the map is made it takes half a byte more for each voxel.
   FreeBrickMap(const VoxelGrid& grid, std::span<const Density> density, Density faintest);
 
-  [[nodiscard]] FreeBricks bricks() const noexcept { return {grid_, distance_.data()}; }
+  [[nodiscard]] FreeSpaceMap bricks() const noexcept { return {grid_, distance_.data()}; }
   [[nodiscard]] std::size_t bytes() const noexcept { return distance_.size(); }
 
   /// Makes every distance at least that of `other`, a map of the same grid, less `steps`.

@@ -56,7 +56,7 @@ double reach_of(std::span<const Point> samples, std::span<const SurfaceSample> c
 }  // namespace
 
 template <class N>
-CloseCells<N>::CloseCells(std::span<const SurfaceSample> samples_units, double reach) {
+DenseSamples<N>::DenseSamples(std::span<const SurfaceSample> samples_units, double reach) {
   if (samples_units.empty()) return;
   using Vector = std::array<PointNumber<N>, 3>;
   struct Close {
@@ -106,7 +106,7 @@ CloseCells<N>::CloseCells(std::span<const SurfaceSample> samples_units, double r
 }
 
 template <class N>
-CloseTable<N> CloseCells<N>::table() const noexcept {
+CloseTable<N> DenseSamples<N>::table() const noexcept {
   CloseTable<N> table;
   if (first_.empty()) return table;
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -121,13 +121,13 @@ CloseTable<N> CloseCells<N>::table() const noexcept {
 }
 
 template <class N>
-std::size_t CloseCells<N>::bytes() const noexcept {
+std::size_t DenseSamples<N>::bytes() const noexcept {
   return 6 * offset_[0].size() * sizeof(PointNumber<N>) + first_.size() * sizeof(std::int32_t);
 }
 
 template <class N>
-ToolPoints<N>::ToolPoints(std::span<const Point> samples_units, bool round,
-                          std::span<const SurfaceSample> close_units)
+PointShellTable<N>::PointShellTable(std::span<const Point> samples_units, bool round,
+                                    std::span<const SurfaceSample> close_units)
     : count_(samples_units.size()),
       reach_(reach_of(samples_units, close_units)),
       round_(round),
@@ -157,7 +157,7 @@ ToolPoints<N>::ToolPoints(std::span<const Point> samples_units, bool round,
 }
 
 template <class N>
-PointShell<N> ToolPoints<N>::point_shell() const noexcept {
+PointShell<N> PointShellTable<N>::point_shell() const noexcept {
   PointShell<N> point_shell;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     point_shell.table.offset[axis] = offset_[axis].data();
@@ -181,13 +181,13 @@ PointShell<N> ToolPoints<N>::point_shell() const noexcept {
 }
 
 template <class N>
-std::size_t ToolPoints<N>::bytes() const noexcept {
+std::size_t PointShellTable<N>::bytes() const noexcept {
   return 3 * (offset_[0].size() + middle_[0].size()) * sizeof(PointNumber<N>) + needed_.size() +
          close_.bytes();
 }
 
 template <class N>
-void PlaceMemory<N>::hold(const PointShell<N>& point_shell) {
+void TransformedShell<N>::hold(const PointShell<N>& point_shell) {
   const auto groups = static_cast<std::size_t>(point_shell.table.groups);
   for (std::size_t axis = 0; axis < 3; ++axis) {
     offset_vox_[axis].resize(std::max(offset_vox_[axis].size(), groups * kGroup));
@@ -196,24 +196,24 @@ void PlaceMemory<N>::hold(const PointShell<N>& point_shell) {
 }
 
 template <class N>
-PointPlaces<N> PlaceMemory<N>::places() noexcept {
+PointPositions<N> TransformedShell<N>::places() noexcept {
   return {{offset_vox_[0].data(), offset_vox_[1].data(), offset_vox_[2].data()},
           {middle_[0].data(), middle_[1].data(), middle_[2].data()}};
 }
 
 template <class N>
-std::size_t PlaceMemory<N>::bytes() const noexcept {
+std::size_t TransformedShell<N>::bytes() const noexcept {
   return 3 * (offset_vox_[0].size() + middle_[0].size()) * sizeof(PointNumber<N>);
 }
 
-template class CloseCells<FixedNumbers>;
-template class CloseCells<FloatNumbers>;
-template class CloseCells<DoubleNumbers>;
-template class ToolPoints<FixedNumbers>;
-template class ToolPoints<FloatNumbers>;
-template class ToolPoints<DoubleNumbers>;
-template class PlaceMemory<FixedNumbers>;
-template class PlaceMemory<FloatNumbers>;
-template class PlaceMemory<DoubleNumbers>;
+template class DenseSamples<FixedNumbers>;
+template class DenseSamples<FloatNumbers>;
+template class DenseSamples<DoubleNumbers>;
+template class PointShellTable<FixedNumbers>;
+template class PointShellTable<FloatNumbers>;
+template class PointShellTable<DoubleNumbers>;
+template class TransformedShell<FixedNumbers>;
+template class TransformedShell<FloatNumbers>;
+template class TransformedShell<DoubleNumbers>;
 
 }  // namespace kerf

@@ -30,11 +30,11 @@ template <class N>
 /// Owner of a tool's close samples, sorted by cells. Load time; moving it keeps the table valid. In
 /// FixedNumbers, FloatNumbers and DoubleNumbers.
 template <class N>
-class CloseCells {
+class DenseSamples {
  public:
   /// `samples_units`: from the tool's centre, none farther than `reach`; contact units. A cell with
   /// more than kMostInCell keeps so many, evenly chosen. Without samples there is no table.
-  CloseCells(std::span<const SurfaceSample> samples_units, double reach);
+  DenseSamples(std::span<const SurfaceSample> samples_units, double reach);
 
   [[nodiscard]] CloseTable<N> table() const noexcept;
   [[nodiscard]] std::size_t bytes() const noexcept;
@@ -50,13 +50,13 @@ class CloseCells {
 /// Owner of one tool's point shell for the swept contact. Load time; moving it keeps the shell
 /// valid. In FixedNumbers, FloatNumbers and DoubleNumbers.
 template <class N>
-class ToolPoints {
+class PointShellTable {
  public:
   /// `samples_units`: from the tool's centre, in contact units; they are sorted into compact
   /// groups. `round`: they are those of a ball. `close_units`: the close samples of another shape;
   /// without them there is no closer look at its contacts.
-  ToolPoints(std::span<const std::array<double, 3>> samples_units, bool round,
-             std::span<const SurfaceSample> close_units = {});
+  PointShellTable(std::span<const std::array<double, 3>> samples_units, bool round,
+                  std::span<const SurfaceSample> close_units = {});
 
   [[nodiscard]] PointShell<N> point_shell() const noexcept;
   [[nodiscard]] std::size_t bytes() const noexcept;
@@ -71,16 +71,16 @@ class ToolPoints {
   std::size_t count_;
   double reach_;
   bool round_;
-  CloseCells<N> close_;
+  DenseSamples<N> close_;
 };
 
 /// Memory for the transformed shell of the widest of several tools in one volume.
 template <class N>
-class PlaceMemory {
+class TransformedShell {
  public:
   void hold(const PointShell<N>& point_shell);
 
-  [[nodiscard]] PointPlaces<N> places() noexcept;
+  [[nodiscard]] PointPositions<N> places() noexcept;
   [[nodiscard]] std::size_t bytes() const noexcept;
 
  private:

@@ -89,7 +89,7 @@ Nifti read_header(const fs::path& path, gzFile file) {
       }
     }
   }
-  throw SceneError(path.string() + ": no NIfTI header; is it another format, or cut off?");
+  throw LoadError(path.string() + ": no NIfTI header; is it another format, or cut off?");
 }
 
 /// The types that hold one number or a colour; the reader judges colours. Others make the library
@@ -114,9 +114,9 @@ void check_type(const fs::path& path, const Nifti& h) {
     return type.code == h.datatype && type.bits == h.bits;
   });
   if (known) return;
-  throw SceneError(path.string() + ": type " + std::to_string(h.datatype) + " of " +
-                   std::to_string(h.bits) +
-                   " bits per voxel; save it as integers of 8..32 bits or as floats");
+  throw LoadError(path.string() + ": type " + std::to_string(h.datatype) + " of " +
+                  std::to_string(h.bits) +
+                  " bits per voxel; save it as integers of 8..32 bits or as floats");
 }
 
 template <class T>
@@ -161,20 +161,19 @@ void walk_data(const fs::path& path, gzFile file, const Nifti& h, std::uint64_t 
 
 VolumeHeader read_nifti_header(const fs::path& path) {
   const GzFile file(gzopen(path.c_str(), "rb"));
-  if (!file) throw SceneError(path.string() + ": cannot be opened; check its permissions");
+  if (!file) throw LoadError(path.string() + ": cannot be opened; check its permissions");
   const Nifti h = read_header(path, file.get());
   if (h.dim[0] != 3 && !(h.dim[0] > 3 && h.dim[0] <= 7)) {
-    throw SceneError(path.string() + ": " + std::to_string(h.dim[0]) +
-                     " axes; kerf needs a volume of three");
+    throw LoadError(path.string() + ": " + std::to_string(h.dim[0]) +
+                    " axes; kerf needs a volume of three");
   }
   check_grid(path.string(), h.dim[1], h.dim[2], h.dim[3]);
   std::uint64_t expected = static_cast<std::uint64_t>(h.dim[1] * h.dim[2] * h.dim[3]);
   for (std::int64_t axis = 4; axis <= h.dim[0]; ++axis) {
     if (h.dim[static_cast<std::size_t>(axis)] > 1) {
-      throw SceneError(path.string() + ": " +
-                       std::to_string(h.dim[static_cast<std::size_t>(axis)]) +
-                       " volumes along axis " + std::to_string(axis) +
-                       "; save one of them to a file of its own");
+      throw LoadError(path.string() + ": " + std::to_string(h.dim[static_cast<std::size_t>(axis)]) +
+                      " volumes along axis " + std::to_string(axis) +
+                      "; save one of them to a file of its own");
     }
   }
   check_type(path, h);
@@ -202,7 +201,7 @@ class TiffFile {
     const std::uint64_t version = known ? number(2, 2) : 0;
     constexpr std::uint64_t kClassic = 42, kBig = 43;
     if (version != kClassic && version != kBig) {
-      throw SceneError(path.string() + ": no TIFF header; is it another format?");
+      throw LoadError(path.string() + ": no TIFF header; is it another format?");
     }
     wide_ = version == kBig;
   }
@@ -221,8 +220,8 @@ class TiffFile {
     in_.seekg(static_cast<std::streamoff>(std::min<std::uint64_t>(at, INT64_MAX)));
     in_.read(reinterpret_cast<char*>(raw.data()), static_cast<std::streamsize>(bytes));
     if (!in_) {
-      throw SceneError(path_.string() +
-                       ": a page begins behind its end; the file is cut off, copy " + "it again");
+      throw LoadError(path_.string() +
+                      ": a page begins behind its end; the file is cut off, copy " + "it again");
     }
     if (big_endian_) std::reverse(raw.begin(), raw.begin() + static_cast<std::ptrdiff_t>(bytes));
     std::uint64_t value = 0;

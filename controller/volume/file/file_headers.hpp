@@ -38,7 +38,7 @@ struct VolumeHeader {
 /// In lower case, ASCII only: for comparing keys of headers and ends of file names.
 [[nodiscard]] std::string lower(std::string text);
 
-/// Each reads one header, checks sizes against the limits, and throws SceneError for faults
+/// Each reads one header, checks sizes against the limits, and throws LoadError for faults
 /// that it finds: no header, bad sizes, zero spacing, no data file.
 [[nodiscard]] VolumeHeader read_nrrd_header(const std::filesystem::path& path);
 [[nodiscard]] VolumeHeader read_meta_header(const std::filesystem::path& path);

@@ -90,21 +90,21 @@ void refuse_broken_rescale(const fs::path& file, const itk::GDCMImageIO& io) {
     if (!text || trimmed(*text).empty()) continue;
     const auto value = number_in(trimmed(*text).substr(trimmed(*text).starts_with('+') ? 1 : 0));
     if (value && (*value != 0 || tag == std::string_view("0028|1052"))) continue;
-    throw SceneError(file.string() + ": " + name + " " + one_line(trimmed(*text)) +
-                     " makes no values; correct the file, or export it again");
+    throw LoadError(file.string() + ": " + name + " " + one_line(trimmed(*text)) +
+                    " makes no values; correct the file, or export it again");
   }
 }
 
 }  // namespace
 
-void read_dicom_file(const fs::path& path, const Offer& offer) {
+void read_dicom_file(const fs::path& path, const MemoryRequest& offer) {
   const auto io = itk::GDCMImageIO::New();
   VolumeHeader header;
   {
     const Quiet quiet;
     if (open_image(path, *io)[2] == 1) {
-      throw SceneError(path.string() +
-                       ": one slice; name the folder that holds the whole DICOM series");
+      throw LoadError(path.string() +
+                      ": one slice; name the folder that holds the whole DICOM series");
     }
     refuse_broken_rescale(path, *io);
     header.has_spacing = names_spacing(*io) && names_slice_distance(*io);
@@ -117,7 +117,7 @@ namespace {
 /// One image of a folder, as its header has it.
 struct Image {
   fs::path file;
-  VolumeClaim claim;
+  UntrustedHeader claim;
 };
 
 /// Images of one series.
@@ -177,9 +177,9 @@ std::size_t chosen_series(const fs::path& folder, const std::vector<Series>& all
   for (std::size_t i = 0; i < all.size(); ++i) {
     list += (i == 0 ? " " : ", ") + std::to_string(i + 1) + " " + text_of(all[i]);
   }
-  throw SceneError(folder.string() + ": " + std::to_string(all.size()) + " DICOM series" +
-                   (wanted.empty() ? "" : ", and --series " + wanted + " is not one of them") +
-                   "; choose one with ./kerf volume import --series:" + list);
+  throw LoadError(folder.string() + ": " + std::to_string(all.size()) + " DICOM series" +
+                  (wanted.empty() ? "" : ", and --series " + wanted + " is not one of them") +
+                  "; choose one with ./kerf volume import --series:" + list);
 }
 
 /// One slice of a DICOM series and its depth along the normal.
@@ -206,11 +206,11 @@ struct Slice {
   text << folder.string() << ": " << *oddest << " mm before slice "
        << slices[slice].file.filename().string() << " where " << usual
        << " mm is usual; add the missing slices or remove doubled ones";
-  throw SceneError(text.str());
+  throw LoadError(text.str());
 }
 
 /// The common distance along `normal`, mm, of two slices or more in the order of their depths.
-/// Refuses gaps and a slanted stack: throws SceneError with `folder` as the place.
+/// Refuses gaps and a slanted stack: throws LoadError with `folder` as the place.
 double slice_distance(const fs::path& folder, const std::vector<Slice>& slices, const Vec& normal) {
   const double step =
       (slices.back().depth_mm - slices.front().depth_mm) / static_cast<double>(slices.size() - 1);
@@ -221,9 +221,9 @@ double slice_distance(const fs::path& folder, const std::vector<Slice>& slices, 
     const Vec aside = apart - depth * normal;
     if (std::abs(depth - step) > slack_mm) refuse_uneven(folder, slices);
     if (length(aside) > slack_mm) {
-      throw SceneError(folder.string() +
-                       ": its axes are not at right angles (tilted gantry); resample it to a "
-                       "straight grid first");
+      throw LoadError(folder.string() +
+                      ": its axes are not at right angles (tilted gantry); resample it to a "
+                      "straight grid first");
     }
   }
   return step;
@@ -236,7 +236,7 @@ constexpr ValueKind common_kind(ValueKind a, ValueKind b) noexcept {
 
 /// The images as one stack: their common properties, and their order in space.
 struct Stack {
-  VolumeClaim claim;
+  UntrustedHeader claim;
   std::vector<Slice> slices;
 };
 
@@ -246,7 +246,7 @@ Stack stack_of(const fs::path& folder, const std::vector<Image>& images) {
   const Vec x = first.claim.axes[0], y = first.claim.axes[1];
   const Vec normal = cross(x, y);
   for (const Image& image : images) {
-    const VolumeClaim& own = image.claim;
+    const UntrustedHeader& own = image.claim;
     // What no tag names is a guess, and differs from one time to the next.
     const bool same_spacing =
         own.has_spacing == first.claim.has_spacing &&
@@ -254,8 +254,8 @@ Stack stack_of(const fs::path& folder, const std::vector<Image>& images) {
                                   own.spacing_mm[1] == first.claim.spacing_mm[1]));
     if (own.size != first.claim.size || own.size[2] != 1 || own.axes[0] != x || own.axes[1] != y ||
         !same_spacing) {
-      throw SceneError(image.file.string() + ": its size, spacing or direction differs from " +
-                       first.file.filename().string() + "; keep one stack of slices per folder");
+      throw LoadError(image.file.string() + ": its size, spacing or direction differs from " +
+                      first.file.filename().string() + "; keep one stack of slices per folder");
     }
     stack.claim.kind = common_kind(stack.claim.kind, own.kind);
     stack.slices.push_back({image.file, own.origin_mm, dot(own.origin_mm, normal)});
@@ -273,13 +273,14 @@ Stack stack_of(const fs::path& folder, const std::vector<Image>& images) {
 }  // namespace
 
 void read_dicom_series(const fs::path& folder, const std::vector<fs::path>& beside,
-                       const std::string& wanted, SandboxReader& sandbox, const Offer& offer) {
+                       const std::string& wanted, SandboxReader& sandbox,
+                       const MemoryRequest& offer) {
   const Quiet quiet;
   const std::vector<Series> all = all_series(beside, sandbox, quiet);
   sandbox.at(folder.string());
   if (all.empty()) {
-    throw SceneError(folder.string() +
-                     ": no DICOM series in this folder; name a volume file or another folder");
+    throw LoadError(folder.string() +
+                    ": no DICOM series in this folder; name a volume file or another folder");
   }
   const std::size_t chosen = chosen_series(folder, all, wanted);
   const std::vector<Image>& images = all[chosen].images;

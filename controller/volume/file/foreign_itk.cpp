@@ -67,17 +67,17 @@ void Quiet::refuse_if_missing(const std::filesystem::path& path) const {
   if (text.find("not read completely") != std::string::npos ||
       text.find("Incomplete Pixel Data") != std::string::npos ||
       text.find("Uncompress failed") != std::string::npos) {
-    throw SceneError(path.string() + ": voxels are missing or broken; copy the file again");
+    throw LoadError(path.string() + ": voxels are missing or broken; copy the file again");
   }
 }
 
 void refuse_unreadable(const fs::path& path, const std::string& reason) {
   std::error_code fault;
   if (fs::file_size(path, fault) == 0 && !fault) {
-    throw SceneError(path.string() + ": is empty; copy the file again");
+    throw LoadError(path.string() + ": is empty; copy the file again");
   }
-  throw SceneError(path.string() + ": cannot be read (" + last_line(reason) +
-                   "); check that the file is whole and of the kind its name says");
+  throw LoadError(path.string() + ": cannot be read (" + last_line(reason) +
+                  "); check that the file is whole and of the kind its name says");
 }
 
 std::array<std::int64_t, 3> open_image(const fs::path& path, ImageIo& io, unsigned axes) {
@@ -87,15 +87,15 @@ std::array<std::int64_t, 3> open_image(const fs::path& path, ImageIo& io, unsign
   bool fits = there >= axes;
   for (unsigned i = axes; i < there; ++i) fits = fits && io.GetDimensions(i) == 1;
   if (!fits) {
-    throw SceneError(path.string() + ": " + std::to_string(there) +
-                     (axes == 3
-                          ? " axes; kerf needs a volume of three"
-                          : " axes; a stack is one picture in each file, name this file alone"));
+    throw LoadError(path.string() + ": " + std::to_string(there) +
+                    (axes == 3
+                         ? " axes; kerf needs a volume of three"
+                         : " axes; a stack is one picture in each file, name this file alone"));
   }
   if (io.GetNumberOfComponents() != 1 || io.GetPixelType() != ImageIo::SCALAR) {
-    throw SceneError(path.string() + ": " + std::to_string(io.GetNumberOfComponents()) +
-                     " values per voxel (" + ImageIo::GetPixelTypeAsString(io.GetPixelType()) +
-                     "); save it as one grey value per voxel");
+    throw LoadError(path.string() + ": " + std::to_string(io.GetNumberOfComponents()) +
+                    " values per voxel (" + ImageIo::GetPixelTypeAsString(io.GetPixelType()) +
+                    "); save it as one grey value per voxel");
   }
   return {static_cast<std::int64_t>(io.GetDimensions(0)),
           static_cast<std::int64_t>(io.GetDimensions(1)),
@@ -114,8 +114,8 @@ VoxelType type_of(const fs::path& path, const ImageIo& io) {
   const auto found =
       std::ranges::find(kTypes, io.GetComponentType(), [](const auto& row) { return row.first; });
   if (found != std::end(kTypes)) return found->second;
-  throw SceneError(path.string() + ": " + ImageIo::GetComponentTypeAsString(io.GetComponentType()) +
-                   " voxels; save it as integers of 8..32 bits or as floats");
+  throw LoadError(path.string() + ": " + ImageIo::GetComponentTypeAsString(io.GetComponentType()) +
+                  " voxels; save it as integers of 8..32 bits or as floats");
 }
 
 void read_voxels(const fs::path& path, ImageIo& io, std::span<std::byte> bytes) {
@@ -128,9 +128,9 @@ void read_voxels(const fs::path& path, ImageIo& io, std::span<std::byte> bytes) 
   guarded(path, [&] { io.Read(bytes.data()); });
 }
 
-VolumeClaim claim_of(const fs::path& path, const ImageIo& io,
-                     const std::array<std::int64_t, 3>& size, bool has_spacing) {
-  VolumeClaim claim;
+UntrustedHeader claim_of(const fs::path& path, const ImageIo& io,
+                         const std::array<std::int64_t, 3>& size, bool has_spacing) {
+  UntrustedHeader claim;
   claim.size = size;
   claim.voxel_bytes = static_cast<std::uint32_t>(io.GetComponentSize());
   claim.kind = kind_of(type_of(path, io));
@@ -156,14 +156,14 @@ void read_all_voxels(const fs::path& path, ImageIo& io, std::span<std::byte> byt
         {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
   };
   if (hash_over(std::byte{0xff}) == hash_over(std::byte{0})) return;
-  throw SceneError(path.string() +
-                   ": voxels are missing in its data; copy it again, with all of its data files");
+  throw LoadError(path.string() +
+                  ": voxels are missing in its data; copy it again, with all of its data files");
 }
 
 }  // namespace
 
 void read_one_file(const fs::path& path, ImageIo& io, const VolumeHeader& header,
-                   const Offer& offer) {
+                   const MemoryRequest& offer) {
   const Quiet quiet;
   const std::array<std::int64_t, 3> size = open_image(path, io);
   check_grid(path.string(), size[0], size[1], size[2]);
@@ -171,7 +171,7 @@ void read_one_file(const fs::path& path, ImageIo& io, const VolumeHeader& header
   if (header.data_bytes_at_most < bytes) {
     refuse_truncated(header.data_file, header.data_bytes_at_most, bytes);
   }
-  const VolumeClaim claim = claim_of(path, io, size, header.has_spacing);
+  const UntrustedHeader claim = claim_of(path, io, size, header.has_spacing);
   const std::span<std::byte> memory = offer(claim);
   // The file's own voxels fill the end of the memory, their values then its begin.
   const std::span<std::byte> own = memory.last(bytes);
@@ -184,22 +184,22 @@ void read_one_file(const fs::path& path, ImageIo& io, const VolumeHeader& header
   convert_values(type_of(path, io), own, claim.kind, memory);
 }
 
-void read_raw(const fs::path& path, const RawLayout& layout, const Offer& offer) {
+void read_raw(const fs::path& path, const RawLayout& layout, const MemoryRequest& offer) {
   const std::uint64_t each = bytes_of(layout.type);
   const std::uint64_t wanted = layout.grid.voxel_count() * each;
   const std::uint64_t size = fs::file_size(path);
   const std::uint64_t held = size - std::min(size, layout.skip);
   if (held < wanted) {
-    throw SceneError(path.string() + ": " + std::to_string(held) +
-                     " bytes of voxels, and --dims, " + "--type ask for " + std::to_string(wanted) +
-                     "; correct them (and --skip), or copy the file again");
+    throw LoadError(path.string() + ": " + std::to_string(held) + " bytes of voxels, and --dims, " +
+                    "--type ask for " + std::to_string(wanted) +
+                    "; correct them (and --skip), or copy the file again");
   }
   if (held > wanted) {
-    throw SceneError(path.string() + ": " + std::to_string(held - wanted) +
-                     " bytes more than --dims and --type ask for; correct them, or skip a header " +
-                     "with --skip " + std::to_string(size - wanted));
+    throw LoadError(path.string() + ": " + std::to_string(held - wanted) +
+                    " bytes more than --dims and --type ask for; correct them, or skip a header " +
+                    "with --skip " + std::to_string(size - wanted));
   }
-  VolumeClaim claim;
+  UntrustedHeader claim;
   claim.size = {layout.grid.nx, layout.grid.ny, layout.grid.nz};
   claim.voxel_bytes = static_cast<std::uint32_t>(each);
   claim.kind = kerf::kind_of(layout.type);
@@ -225,7 +225,7 @@ void read_foreign_volume(const std::filesystem::path& path, VolumeKind kind,
                          const std::vector<std::filesystem::path>& folder,
                          const std::string& series, SandboxReader& sandbox) {
   itk::Object::GlobalWarningDisplayOff();  // its warnings are of cases that are refused or harmless
-  const Offer offer = [&](const VolumeClaim& claim) {
+  const MemoryRequest offer = [&](const UntrustedHeader& claim) {
     return sandbox.offer(std::as_bytes(std::span(&claim, 1)));
   };
   switch (kind) {

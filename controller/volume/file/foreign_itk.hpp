@@ -58,7 +58,7 @@ class Quiet {
   Quiet& operator=(const Quiet&) = delete;
 
   /// MetaIO and GDCM only print that voxels are missing or cannot be unpacked, and go on: throws
-  /// SceneError for them. The kept output is that of all files read so far.
+  /// LoadError for them. The kept output is that of all files read so far.
   void refuse_if_missing(const std::filesystem::path& path) const;
 
  private:
@@ -78,7 +78,7 @@ auto guarded(const std::filesystem::path& path, Step&& step) {
     refuse_unreadable(path, error.GetDescription());
   } catch (const std::bad_alloc&) {
     throw;  // the sandbox reports the limit
-  } catch (const SceneError&) {
+  } catch (const LoadError&) {
     throw;
   } catch (const std::exception& error) {
     refuse_unreadable(path, error.what());
@@ -97,20 +97,20 @@ auto guarded(const std::filesystem::path& path, Step&& step) {
 void read_voxels(const std::filesystem::path& path, ImageIo& io, std::span<std::byte> bytes);
 
 /// The claim of the opened file. `kind` is that of its own type.
-[[nodiscard]] VolumeClaim claim_of(const std::filesystem::path& path, const ImageIo& io,
-                                   const std::array<std::int64_t, 3>& size, bool has_spacing);
+[[nodiscard]] UntrustedHeader claim_of(const std::filesystem::path& path, const ImageIo& io,
+                                       const std::array<std::int64_t, 3>& size, bool has_spacing);
 
 /// One file that holds a whole volume.
 void read_one_file(const std::filesystem::path& path, ImageIo& io, const VolumeHeader& header,
-                   const Offer& offer);
+                   const MemoryRequest& offer);
 
-void read_dicom_file(const std::filesystem::path& path, const Offer& offer);
+void read_dicom_file(const std::filesystem::path& path, const MemoryRequest& offer);
 void read_dicom_series(const std::filesystem::path& folder,
                        const std::vector<std::filesystem::path>& beside, const std::string& series,
-                       SandboxReader& sandbox, const Offer& offer);
+                       SandboxReader& sandbox, const MemoryRequest& offer);
 /// Pictures of one size in the order of the numbers in their names.
 void read_slice_stack(const std::filesystem::path& folder,
                       const std::vector<std::filesystem::path>& beside, VolumeKind kind,
-                      SandboxReader& sandbox, const Offer& offer);
+                      SandboxReader& sandbox, const MemoryRequest& offer);
 
 }  // namespace kerf::volume

@@ -56,8 +56,8 @@ std::string usual_text(const std::vector<SliceName>& names) {
 }
 
 [[noreturn]] void refuse_stranger(const fs::path& file, const fs::path& slice) {
-  throw SceneError(file.string() + ": is no slice of the stack of " + slice.filename().string() +
-                   "; keep one stack of slices, and no other picture, in a folder");
+  throw LoadError(file.string() + ": is no slice of the stack of " + slice.filename().string() +
+                  "; keep one stack of slices, and no other picture, in a folder");
 }
 
 /// The last group that differs between names of one text, which have one or more.
@@ -74,7 +74,7 @@ std::int64_t number_of(const fs::path& file, const std::string& digits) {
   std::int64_t number = 0;
   const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), number);
   if (error == std::errc{} && end == digits.data() + digits.size()) return number;
-  throw SceneError(file.string() + ": " + digits + " is no number of a slice; renumber the stack");
+  throw LoadError(file.string() + ": " + digits + " is no number of a slice; renumber the stack");
 }
 
 /// The step between most slices, the smallest of equally many.
@@ -97,15 +97,15 @@ std::string renumbered(const fs::path& file, const std::string& digits, std::int
 /// counts the slices; its steps are even, of 1 or more. `files`: in the order of their numbers, two
 /// or more.
 ///
-/// Throws SceneError that names the slice.
+/// Throws LoadError that names the slice.
 void check_slice_names(std::span<const fs::path> files) {
   std::vector<SliceName> names(files.begin(), files.end());
   const std::string usual = usual_text(names);
   const auto own =
       static_cast<std::size_t>(std::ranges::find(names, usual, &SliceName::text) - names.begin());
   if (names[own].groups.empty()) {
-    throw SceneError(files[own].string() +
-                     ": has no number in its name; number the slices of the stack");
+    throw LoadError(files[own].string() +
+                    ": has no number in its name; number the slices of the stack");
   }
   for (std::size_t i = 0; i < files.size(); ++i) {
     if (names[i].text != usual) refuse_stranger(files[i], files[own]);
@@ -125,16 +125,16 @@ void check_slice_names(std::span<const fs::path> files) {
     const std::string before = files[i - 1].filename().string();
     const std::int64_t apart = numbers[i] - numbers[i - 1];
     if (apart == 0) {
-      throw SceneError(files[i].string() + ": has the same number as " + before +
-                       "; keep one of them");
+      throw LoadError(files[i].string() + ": has the same number as " + before +
+                      "; keep one of them");
     }
     if (apart == step) continue;
     const std::string missing =
         renumbered(files[i - 1], names[i - 1].groups[group], numbers[i - 1] + step);
-    throw SceneError(files[i].string() + ": follows " + before + ", " +
-                     (apart > step ? missing + " is missing; add it, or"
-                                   : "where steps of " + std::to_string(step) + " are usual;") +
-                     " number the slices in even steps");
+    throw LoadError(files[i].string() + ": follows " + before + ", " +
+                    (apart > step ? missing + " is missing; add it, or"
+                                  : "where steps of " + std::to_string(step) + " are usual;") +
+                    " number the slices in even steps");
   }
 }
 
@@ -146,8 +146,8 @@ std::vector<fs::path> pictures_among(const std::vector<fs::path>& files, VolumeK
     const bool png = end == ".png", tiff = end == ".tif" || end == ".tiff";
     if (!png && !tiff) continue;
     if (png != (kind == VolumeKind::png_stack)) {
-      throw SceneError(file.string() + (png ? ": a PNG among TIFF" : ": a TIFF among PNG") +
-                       " slices; keep one stack of slices per folder");
+      throw LoadError(file.string() + (png ? ": a PNG among TIFF" : ": a TIFF among PNG") +
+                      " slices; keep one stack of slices per folder");
     }
     pictures.push_back(file);
   }
@@ -157,11 +157,11 @@ std::vector<fs::path> pictures_among(const std::vector<fs::path>& files, VolumeK
 }  // namespace
 
 void read_slice_stack(const fs::path& folder, const std::vector<fs::path>& beside, VolumeKind kind,
-                      SandboxReader& sandbox, const Offer& offer) {
+                      SandboxReader& sandbox, const MemoryRequest& offer) {
   const Quiet quiet;
   const std::vector<fs::path> files = pictures_among(beside, kind);
   if (files.size() < 2) {
-    throw SceneError(folder.string() + ": one picture; name a folder that holds all slices");
+    throw LoadError(folder.string() + ": one picture; name a folder that holds all slices");
   }
   check_slice_names(files);
   // A new reader for each file: a used one of TIFF reports the first file again.
@@ -169,7 +169,7 @@ void read_slice_stack(const fs::path& folder, const std::vector<fs::path>& besid
     return kind == VolumeKind::png_stack ? ImageIo::Pointer(itk::PNGImageIO::New())
                                          : ImageIo::Pointer(itk::TIFFImageIO::New());
   };
-  VolumeClaim claim;
+  UntrustedHeader claim;
   VoxelType type{};
   const auto word = [](VoxelType of) {
     return std::string(kVoxelTypeWords[static_cast<std::size_t>(of)]);
@@ -184,16 +184,16 @@ void read_slice_stack(const fs::path& folder, const std::vector<fs::path>& besid
       claim.kind = kind_of(own);
       type = own;
     } else if (size[0] != claim.size[0] || size[1] != claim.size[1]) {
-      throw SceneError(file.string() + ": " + std::to_string(size[0]) + " x " +
-                       std::to_string(size[1]) + " pixels, and " +
-                       files.front().filename().string() + " has " + std::to_string(claim.size[0]) +
-                       " x " + std::to_string(claim.size[1]) +
-                       "; keep one stack of slices per folder");
+      throw LoadError(file.string() + ": " + std::to_string(size[0]) + " x " +
+                      std::to_string(size[1]) + " pixels, and " +
+                      files.front().filename().string() + " has " + std::to_string(claim.size[0]) +
+                      " x " + std::to_string(claim.size[1]) +
+                      "; keep one stack of slices per folder");
     }
     if (own != type) {
-      throw SceneError(file.string() + ": values of " + word(own) + ", and " +
-                       files.front().filename().string() + " has " + word(type) +
-                       "; save all slices with values of one type");
+      throw LoadError(file.string() + ": values of " + word(own) + ", and " +
+                      files.front().filename().string() + " has " + word(type) +
+                      "; save all slices with values of one type");
     }
   }
   claim.voxel_bytes = static_cast<std::uint32_t>(bytes_of(claim.kind));

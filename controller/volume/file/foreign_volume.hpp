@@ -30,7 +30,7 @@ enum class VolumeKind : std::uint8_t {
 };
 
 /// The header of a volume as it comes out of the sandbox: plain bytes, none of them trusted.
-struct VolumeClaim {
+struct UntrustedHeader {
   std::array<std::int64_t, 3> size{};
   std::uint32_t voxel_bytes = 0;  ///< of the requested memory, at least those of a value
   ValueKind kind = ValueKind::float32;
@@ -41,18 +41,19 @@ struct VolumeClaim {
 };
 
 /// Hands over the claim and returns the memory for it.
-using Offer = std::function<std::span<std::byte>(const VolumeClaim&)>;
+using MemoryRequest = std::function<std::span<std::byte>(const UntrustedHeader&)>;
 
-/// In the sandbox: parses the file or folder with the libraries, offers a VolumeClaim and fills the
-/// memory with a value for each voxel, x fastest, from its begin. The rest of the memory is left
-/// over from the voxels as the file has them. `folder` holds the files of a folder, for slices;
-/// other files may be among them. `series`: which of several, by its number or a part of its name.
-/// Throws SceneError, or std::bad_alloc.
+/// In the sandbox: parses the file or folder with the libraries, offers a UntrustedHeader and fills
+/// the memory with a value for each voxel, x fastest, from its begin. The rest of the memory is
+/// left over from the voxels as the file has them. `folder` holds the files of a folder, for
+/// slices; other files may be among them. `series`: which of several, by its number or a part of
+/// its name. Throws LoadError, or std::bad_alloc.
 void read_foreign_volume(const std::filesystem::path& path, VolumeKind kind,
                          const std::vector<std::filesystem::path>& folder,
                          const std::string& series, SandboxReader& sandbox);
 
-/// In the sandbox. Throws SceneError for a file whose size is not that of the layout.
-void read_raw(const std::filesystem::path& path, const RawLayout& layout, const Offer& offer);
+/// In the sandbox. Throws LoadError for a file whose size is not that of the layout.
+void read_raw(const std::filesystem::path& path, const RawLayout& layout,
+              const MemoryRequest& offer);
 
 }  // namespace kerf::volume

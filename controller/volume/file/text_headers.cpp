@@ -103,8 +103,8 @@ struct Fields {
   void check(const char* key, const Fits& fits, const std::string& wanted) const {
     const auto field = all.find(key);
     if (field == all.end() || fits(field->second)) return;
-    throw SceneError(path.string() + ": " + key + ": " + one_line(field->second.substr(0, 80)) +
-                     " is not " + wanted + "; correct the header");
+    throw LoadError(path.string() + ": " + key + ": " + one_line(field->second.substr(0, 80)) +
+                    " is not " + wanted + "; correct the header");
   }
 
   /// The number of axes in `key`, and as many numbers in `sizes`.
@@ -123,7 +123,7 @@ struct Fields {
 };
 
 // Both checks refuse fields that the reading libraries would refuse with messages of their own, or
-// misread: a SceneError with the field, its text and the expected value. Missing fields are not
+// misread: a LoadError with the field, its text and the expected value. Missing fields are not
 // checked.
 
 void check_nrrd_fields(const fs::path& path, const HeaderFields& all) {
@@ -134,8 +134,7 @@ void check_nrrd_fields(const fs::path& path, const HeaderFields& all) {
   fields.check("type", is_type, "a type of numbers, such as uint16 or float");
   const auto encoding = all.find("encoding");
   if (encoding != all.end() && among("bz2|bzip2", lower(encoding->second))) {
-    throw SceneError(path.string() +
-                     ": encoding: bzip2 cannot be unpacked; save it as gzip or raw");
+    throw LoadError(path.string() + ": encoding: bzip2 cannot be unpacked; save it as gzip or raw");
   }
   fields.check("encoding", is_encoding, "one of raw, text, hex, gzip");
   const auto all_are_numbers = [](const auto& t) { return all_numbers<double>(words_of(t)); };
@@ -254,9 +253,9 @@ void locate_data(VolumeHeader& header, const fs::path& path, const fs::path& dat
   std::error_code error;
   const std::uint64_t size = fs::file_size(data, error);
   if (error) {
-    throw SceneError(path.string() + ": data file " + shown(data.filename().string()) +
-                     " cannot be read (" + error.message() +
-                     "); put it beside the header or correct the header");
+    throw LoadError(path.string() + ": data file " + shown(data.filename().string()) +
+                    " cannot be read (" + error.message() +
+                    "); put it beside the header or correct the header");
   }
   const std::uint64_t held = size - std::min(size, offset);
   header.data_file = shown(data.string());
@@ -272,9 +271,9 @@ void check_units(const fs::path& path, const TextHeader& text) {
     std::istringstream words(text.get(key));
     for (std::string word; words >> std::quoted(word);) {
       if (std::ranges::find(kOthers, lower(word)) == kOthers.end()) continue;
-      throw SceneError(path.string() + ": " + key + ": " + word +
-                       " where kerf reads mm; write the header's lengths in mm, or remove the line "
-                       "and give the spacing in the scene or with `--spacing`");
+      throw LoadError(path.string() + ": " + key + ": " + word +
+                      " where kerf reads mm; write the header's lengths in mm, or remove the line "
+                      "and give the spacing in the scene or with `--spacing`");
     }
   }
 }
@@ -295,7 +294,7 @@ void check_gzip(const fs::path& data, std::uint64_t offset) {
   int fault = Z_OK;
   gzerror(file.get(), &fault);
   if (fault != Z_DATA_ERROR) return;
-  throw SceneError(shown(data.string()) + ": its packed voxels are broken; copy the file again");
+  throw LoadError(shown(data.string()) + ": its packed voxels are broken; copy the file again");
 }
 
 }  // namespace
@@ -310,31 +309,30 @@ VolumeHeader read_nrrd_header(const fs::path& path) {
   const std::string sizes = text.get("sizes");
   const bool is_nrrd = text.first.starts_with("NRRD");
   if (!is_nrrd || sizes.empty()) {
-    throw SceneError(path.string() + ": no NRRD header (" +
-                     (is_nrrd ? "`sizes` is missing" : "its first line is not NRRD0004") +
-                     "); is it another format?");
+    throw LoadError(path.string() + ": no NRRD header (" +
+                    (is_nrrd ? "`sizes` is missing" : "its first line is not NRRD0004") +
+                    "); is it another format?");
   }
   const bool names_files = lower(text.get("data file")).starts_with("list");  // a line for each
   if (!text.stray.empty() && !names_files) {
-    throw SceneError(path.string() + ": the header's line '" + shown(text.stray) +
-                     "' is no 'field: value'; correct the header");
+    throw LoadError(path.string() + ": the header's line '" + shown(text.stray) +
+                    "' is no 'field: value'; correct the header");
   }
   check_nrrd_fields(path, text.fields);
   check_sizes(path, sizes);
   check_units(path, text);
   for (const char* const needed : {"dimension", "type", "encoding"}) {
     if (text.get(needed).empty())
-      throw SceneError(path.string() + ": " + needed + ": is missing; correct the header");
+      throw LoadError(path.string() + ": " + needed + ": is missing; correct the header");
   }
   VolumeHeader header;
   const std::vector<double> spacings = numbers(text.get("spacings"));
   const std::vector<double> directions = numbers(text.get("space directions"));
   header.has_spacing = spacings.size() >= 3 || directions.size() >= 9;
   if (std::find(spacings.begin(), spacings.end(), 0.0) != spacings.end()) {
-    throw SceneError(
-        path.string() + ": spacings: " + shown(text.get("spacings")) +
-        " holds a zero; correct the header, or remove the line and give the spacing in "
-        "the scene or with `--spacing`");
+    throw LoadError(path.string() + ": spacings: " + shown(text.get("spacings")) +
+                    " holds a zero; correct the header, or remove the line and give the spacing in "
+                    "the scene or with `--spacing`");
   }
   std::string data = text.get("data file");
   if (data.empty()) data = text.get("datafile");
@@ -358,9 +356,9 @@ VolumeHeader read_meta_header(const fs::path& path) {
   const std::string sizes = text.get("dimsize");
   const std::string data = text.get("elementdatafile");
   if (sizes.empty() || data.empty()) {
-    throw SceneError(path.string() +
-                     ": no MetaImage header (`DimSize` or `ElementDataFile` is missing); is it "
-                     "another format?");
+    throw LoadError(path.string() +
+                    ": no MetaImage header (`DimSize` or `ElementDataFile` is missing); is it "
+                    "another format?");
   }
   check_meta_fields(path, text.fields);
   check_sizes(path, sizes);
@@ -385,14 +383,14 @@ void refuse_not_finite(const fs::path& path, std::uint64_t count, std::uint64_t 
   text << path.string() << ": " << count << (count == 1 ? " voxel is" : " voxels are")
        << " NaN or infinite, the first at (" << first_index % nx << ", " << first_index / nx % ny
        << ", " << first_index / nx / ny << "); replace them with the value of air";
-  throw SceneError(text.str());
+  throw LoadError(text.str());
 }
 
 void refuse_truncated(const std::string& file, std::uint64_t held, std::uint64_t expected) {
   std::ostringstream text;
   text << file << ": " << held << " of " << expected
        << " bytes of voxels; the file is cut off, copy it again";
-  throw SceneError(text.str());
+  throw LoadError(text.str());
 }
 
 }  // namespace kerf

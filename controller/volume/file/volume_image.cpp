@@ -15,13 +15,13 @@ void check_grid(const std::string& place, std::int64_t nx, std::int64_t ny, std:
   std::ostringstream size;
   size << place << ": " << nx << " x " << ny << " x " << nz;
   if (nx <= 0 || ny <= 0 || nz <= 0) {
-    throw SceneError(size.str() + " voxels is empty; every extent must be at least 1");
+    throw LoadError(size.str() + " voxels is empty; every extent must be at least 1");
   }
   const bool long_axis = nx > kMaxVoxelsPerAxis || ny > kMaxVoxelsPerAxis || nz > kMaxVoxelsPerAxis;
   if (long_axis || nx * ny * nz > kMaxVoxels) {
     size << " voxels is above the limit of " << kMaxVoxelsPerAxis << " per axis and "
          << (kMaxVoxels >> 20) << " Mi in all; " << way_out;
-    throw SceneError(size.str());
+    throw LoadError(size.str());
   }
 }
 
@@ -35,7 +35,7 @@ void check_spacing(const std::string& place, const std::array<double, 3>& spacin
         << place << ": " << spacing_mm[0] << " " << spacing_mm[1] << " " << spacing_mm[2]
         << " mm is not a voxel size; give three positive numbers of mm with `spacing_mm = [..]` in "
            "the scene or `--spacing`";
-    throw SceneError(text.str());
+    throw LoadError(text.str());
   }
 }
 

@@ -30,19 +30,19 @@ namespace kerf {
 namespace fs = std::filesystem;
 namespace {
 
-using volume::VolumeClaim, volume::VolumeKind;
+using volume::UntrustedHeader, volume::VolumeKind;
 
 [[noreturn]] void refuse_raw(const fs::path& path) {
   for (const char* header : {".mhd", ".nhdr"}) {
     const fs::path beside = fs::path(path).replace_extension(header);
     if (fs::exists(beside)) {
-      throw SceneError(path.string() + ": voxels without a header; name its header " +
-                       beside.filename().string() + " instead");
+      throw LoadError(path.string() + ": voxels without a header; name its header " +
+                      beside.filename().string() + " instead");
     }
   }
-  throw SceneError(path.string() + ": " + std::to_string(fs::file_size(path)) +
-                   " bytes without a header; ./kerf volume import takes it with --dims NXxNYxNZ "
-                   "--type uint16 --spacing x,y,z");
+  throw LoadError(path.string() + ": " + std::to_string(fs::file_size(path)) +
+                  " bytes without a header; ./kerf volume import takes it with --dims NXxNYxNZ "
+                  "--type uint16 --spacing x,y,z");
 }
 
 struct Kind {
@@ -64,21 +64,21 @@ Kind kind_of_folder(const std::vector<fs::path>& files) {
 
 Kind kind_of(const fs::path& path, const std::vector<fs::path>& folder, bool raw) {
   std::error_code fault;
-  if (const std::string why = why_unreachable(path); !why.empty()) {
-    throw SceneError(path.string() + why);
+  if (const std::string why = access_error(path); !why.empty()) {
+    throw LoadError(path.string() + why);
   }
   const fs::file_status status = fs::status(path, fault);
   if (!fs::exists(status)) {
-    throw SceneError(path.string() + ": no such file or folder; check the path");
+    throw LoadError(path.string() + ": no such file or folder; check the path");
   }
   if (fs::is_directory(status)) return kind_of_folder(folder);
   if (!fs::is_regular_file(status)) {
-    throw SceneError(path.string() +
-                     ": a pipe, socket or device; copy what it gives to a file, and name that");
+    throw LoadError(path.string() +
+                    ": a pipe, socket or device; copy what it gives to a file, and name that");
   }
   if (::access(path.c_str(), R_OK) != 0) {
-    throw SceneError(path.string() + ": cannot be read (" + std::generic_category().message(errno) +
-                     "); check its permissions");
+    throw LoadError(path.string() + ": cannot be read (" + std::generic_category().message(errno) +
+                    "); check its permissions");
   }
   if (raw) return {VolumeKind::raw, "raw voxels"};
   const std::string name = lower(path.filename().string());
@@ -92,10 +92,10 @@ Kind kind_of(const fs::path& path, const std::vector<fs::path>& folder, bool raw
     if (name.ends_with(end)) return kind;
   }
   if (name.ends_with(".raw")) refuse_raw(path);
-  throw SceneError(path.string() +
-                   ": not a kind of volume that kerf reads; use .nrrd .nhdr .mha .mhd .nii .nii.gz "
-                   ".tif .dcm, a folder of DICOM, PNG or TIFF slices, or --dims of kerf volume "
-                   "import");
+  throw LoadError(path.string() +
+                  ": not a kind of volume that kerf reads; use .nrrd .nhdr .mha .mhd .nii .nii.gz "
+                  ".tif .dcm, a folder of DICOM, PNG or TIFF slices, or --dims of kerf volume "
+                  "import");
 }
 
 /// Runs of digits count as numbers: slice2 comes before slice10.
@@ -139,13 +139,13 @@ std::vector<fs::path> files_in(const fs::path& path) {
     if (hidden || name == "DICOMDIR" || !entry->is_regular_file(gone)) continue;
     (entry.depth() == 0 ? files : below).push_back(entry->path());
     if (files.size() + below.size() > kMostFiles) {
-      throw SceneError(path.string() + ": more than " + std::to_string(kMostFiles) +
-                       " files; name the folder that holds the slices");
+      throw LoadError(path.string() + ": more than " + std::to_string(kMostFiles) +
+                      " files; name the folder that holds the slices");
     }
   }
   if (fault && files.empty()) {
-    throw SceneError(path.string() + ": cannot be listed (" + fault.message() +
-                     "); check its permissions");
+    throw LoadError(path.string() + ": cannot be listed (" + fault.message() +
+                    "); check its permissions");
   }
   if (files.empty()) files = std::move(below);
   std::ranges::sort(files, in_natural_order, [](const fs::path& file) { return file.string(); });
@@ -164,7 +164,7 @@ std::uint64_t largest_bytes(const std::vector<fs::path>& files) {
 }
 
 // The steps that fill a SourceVolume, whatever library read the file. Each checks its part and
-// throws SceneError with `path` as the place.
+// throws LoadError with `path` as the place.
 
 using Axis = vec3::Vec;
 using vec3::cross, vec3::dot, vec3::unit;
@@ -187,9 +187,9 @@ void set_spacing(const fs::path& path, const ReadOptions& options, bool in_file,
   } else if (in_file) {
     volume.spacing_mm = from_file;
   } else if (!options.allow_missing_spacing) {
-    throw SceneError(path.string() +
-                     ": spacing is not in the file; add `spacing_mm = [x, y, z]` to the scene or "
-                     "`--spacing x,y,z` (mm)");
+    throw LoadError(path.string() +
+                    ": spacing is not in the file; add `spacing_mm = [x, y, z]` to the scene or "
+                    "`--spacing x,y,z` (mm)");
   }
   check_spacing(path.string(), volume.spacing_mm);
 }
@@ -199,8 +199,8 @@ void set_origin(const fs::path& path, const std::array<double, 3>& origin_mm,
                 SourceVolume& volume) {
   for (const double o : origin_mm) {
     if (std::isfinite(o)) continue;
-    throw SceneError(path.string() +
-                     ": its origin is not a number of mm; correct the header, or leave it out");
+    throw LoadError(path.string() +
+                    ": its origin is not a number of mm; correct the header, or leave it out");
   }
   volume.origin_mm = origin_mm;
 }
@@ -251,8 +251,8 @@ void set_frame(const fs::path& path, Axis x, Axis y, Axis z, SourceVolume& volum
       std::max({std::abs(dot(x, y)), std::abs(dot(y, z)), std::abs(dot(z, x)),
                 std::abs(dot(x, x) - 1.0), std::abs(dot(y, y) - 1.0), std::abs(dot(z, z) - 1.0)});
   if (!(skew < kSkew)) {
-    throw SceneError(path.string() +
-                     ": its axes are not at right angles; resample it to a straight grid first");
+    throw LoadError(path.string() +
+                    ": its axes are not at right angles; resample it to a straight grid first");
   }
   x = unit(x);
   y = unit(y - dot(x, y) * x);
@@ -273,7 +273,7 @@ void set_frame(const fs::path& path, Axis x, Axis y, Axis z, SourceVolume& volum
 }
 
 /// Checks the header that the sandbox reports; returns the bytes of memory for it.
-std::size_t accept(const fs::path& path, const ReadOptions& options, const VolumeClaim& claim,
+std::size_t accept(const fs::path& path, const ReadOptions& options, const UntrustedHeader& claim,
                    SourceVolume& source) {
   set_grid(path, claim.size, source);
   set_spacing(path, options, claim.has_spacing != 0, claim.spacing_mm, source);
@@ -283,7 +283,7 @@ std::size_t accept(const fs::path& path, const ReadOptions& options, const Volum
 }
 
 /// On one line of a terminal.
-std::string note_of(const VolumeClaim& claim) {
+std::string note_of(const UntrustedHeader& claim) {
   return escaped(std::string(claim.note.begin(), std::ranges::find(claim.note, '\0')));
 }
 
@@ -293,13 +293,13 @@ SourceVolume read_volume(const fs::path& path, const ReadOptions& options) {
   const std::vector<fs::path> folder = files_in(path);
   const Kind kind = kind_of(path, folder, options.raw.has_value());
   SourceVolume source;
-  VolumeClaim claim;
+  UntrustedHeader claim;
   SharedBytes memory = read_in_sandbox(
       {path.string(), kind.name, largest_bytes(folder.empty() ? std::vector{path} : folder),
        options.cpu_s},
       [&](SandboxReader& sandbox) {
         if (kind.kind == VolumeKind::raw) {
-          return volume::read_raw(path, *options.raw, [&](const VolumeClaim& raw) {
+          return volume::read_raw(path, *options.raw, [&](const UntrustedHeader& raw) {
             return sandbox.offer(std::as_bytes(std::span(&raw, 1)));
           });
         }
@@ -307,7 +307,7 @@ SourceVolume read_volume(const fs::path& path, const ReadOptions& options) {
       },
       [&](std::span<const std::byte> header) {
         if (header.size() != sizeof claim) {
-          throw SceneError(path.string() + ": its reader says nothing of its size; copy it again");
+          throw LoadError(path.string() + ": its reader says nothing of its size; copy it again");
         }
         std::memcpy(&claim, header.data(), sizeof claim);
         if (claim.kind > ValueKind::uint16) claim.kind = ValueKind::float32;
@@ -331,8 +331,8 @@ void read_labels_beside(const fs::path& volume_path, VolumeImage& image, int cpu
   const bool fits = source.grid == image.grid && source.min >= 0.0 &&
                     source.max <= std::numeric_limits<Label>::max();
   if (!fits) {
-    throw SceneError(path.string() + ": labels do not fit " + volume_path.filename().string() +
-                     " (same size, values 0..255); remove or rename them");
+    throw LoadError(path.string() + ": labels do not fit " + volume_path.filename().string() +
+                    " (same size, values 0..255); remove or rename them");
   }
   image.labels.resize(source.values.size());
   source.values.visit([&](auto values) {

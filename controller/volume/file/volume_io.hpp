@@ -41,14 +41,14 @@ struct ReadOptions {
 /// Parsed in a sandbox (controller/input/sandbox.hpp), where a broken file does no harm; its header
 /// is checked here.
 ///
-/// Throws SceneError, one line, for anything that is not a whole, finite, scalar volume of three
+/// Throws LoadError, one line, for anything that is not a whole, finite, scalar volume of three
 /// axes with right angles between them, of known spacing and within the limits of
 /// volume_image.hpp (checked before memory is taken). Load time.
 [[nodiscard]] SourceVolume read_volume(const std::filesystem::path& path,
                                        const ReadOptions& options = {});
 
 /// Takes the labels from the file that `write_volume` puts beside a volume, if there is one.
-/// Throws SceneError when it does not fit the image.
+/// Throws LoadError when it does not fit the image.
 void read_labels_beside(const std::filesystem::path& volume_path, VolumeImage& image,
                         int cpu_s = kReadCpuSeconds);
 

@@ -21,7 +21,7 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "the header says little-endian");
 
-void write_gzip(NewFile& file, const void* data, std::size_t size) {
+void write_gzip(AtomicFile& file, const void* data, std::size_t size) {
   constexpr int kLevel = 4;             // near the best size for volumes, at twice the speed
   constexpr int kGzipWindow = 15 + 16;  // largest window, gzip framing
   constexpr int kMemory = 8;            // zlib's default
@@ -89,7 +89,7 @@ std::string nrrd_header(const VolumeImage& image, std::string_view type, VolumeE
 }
 
 template <class T>
-void write_voxels(NewFile& file, const VolumeImage& image, const std::vector<T>& voxels,
+void write_voxels(AtomicFile& file, const VolumeImage& image, const std::vector<T>& voxels,
                   std::string_view type, VolumeEncoding encoding) {
   const std::string header = nrrd_header(image, type, encoding);
   file.write(header.data(), header.size());
@@ -106,7 +106,7 @@ constexpr std::string_view kLabelsEnd = "-labels";
 
 void check_extension(const fs::path& path) {
   if (path.extension() != ".nrrd") {
-    throw SceneError(path.string() + ": kerf writes .nrrd only; give a name that ends in .nrrd");
+    throw LoadError(path.string() + ": kerf writes .nrrd only; give a name that ends in .nrrd");
   }
 }
 
@@ -122,14 +122,14 @@ void check_volume_path(const fs::path& path) {
   const std::string stem = path.stem().string();
   if (stem.ends_with(kLabelsEnd)) {
     const std::string of = stem.substr(0, stem.size() - kLabelsEnd.size());
-    throw SceneError(path.string() + ": is the name of the labels of " + of +
-                     ".nrrd; give another one");
+    throw LoadError(path.string() + ": is the name of the labels of " + of +
+                    ".nrrd; give another one");
   }
   check_new_file(path);
 }
 
 void add_volume(const VolumeImage& image, const fs::path& path, VolumeEncoding encoding,
-                NewFiles& files) {
+                AtomicFiles& files) {
   check_extension(path);
   write_voxels(files.add(path), image, image.density, "uint16", encoding);
   if (image.labels.empty()) return;
@@ -137,7 +137,7 @@ void add_volume(const VolumeImage& image, const fs::path& path, VolumeEncoding e
 }
 
 void write_volume(const VolumeImage& image, const fs::path& path, VolumeEncoding encoding) {
-  NewFiles files;
+  AtomicFiles files;
   add_volume(image, path, encoding, files);
   files.commit();
   if (image.labels.empty()) remove_labels(path);

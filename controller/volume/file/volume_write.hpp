@@ -19,13 +19,13 @@ enum class VolumeEncoding : std::uint8_t { gzip, raw };
 /// left there by an earlier volume of this name is removed.
 ///
 /// Both are written under temporary names first, so a full disk leaves the old files as they were.
-/// Throws SceneError.
+/// Throws LoadError.
 void write_volume(const VolumeImage& image, const std::filesystem::path& path,
                   VolumeEncoding encoding = VolumeEncoding::gzip);
 
 /// The same as a part of `files`, which are not committed yet.
 void add_volume(const VolumeImage& image, const std::filesystem::path& path,
-                VolumeEncoding encoding, NewFiles& files);
+                VolumeEncoding encoding, AtomicFiles& files);
 
 /// Labels that an earlier volume of this name left.
 void remove_labels(const std::filesystem::path& volume_path);

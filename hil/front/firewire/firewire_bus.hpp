@@ -18,7 +18,7 @@ namespace kerf {
 
 /// Actions of later bus cycles: answers on their way, time-outs, scripted faults. Actions of one
 /// cycle run in the order in which they were entered.
-class Agenda {
+class EventSchedule {
  public:
   static constexpr std::int64_t kNever = std::numeric_limits<std::int64_t>::max();
 
@@ -124,7 +124,7 @@ class FirewireBus {
   [[nodiscard]] const FirewireStats& stats() const noexcept { return stats_; }
   /// The next cycle in which something is due that a client may wait for.
   [[nodiscard]] std::int64_t next_due() const noexcept { return agenda_.next(); }
-  /// The same with interrupts and the script; `Agenda::kNever` if none.
+  /// The same with interrupts and the script; `EventSchedule::kNever` if none.
   [[nodiscard]] std::int64_t next_event() const noexcept;
 
  private:
@@ -142,8 +142,8 @@ class FirewireBus {
   OmniRegisters registers_;
   IsoResources resources_;
   std::uint64_t foreign_channels_ = 0;
-  Agenda agenda_;
-  Agenda script_;
+  EventSchedule agenda_;
+  EventSchedule script_;
   std::vector<IsoContext*> contexts_;
   std::int64_t cycle_ = kFirstCycle;
   std::int64_t reset_cycle_ = 0;

@@ -43,17 +43,17 @@ FirewireClient::~FirewireClient() {
   }
 }
 
-FuseAnswer FirewireClient::ioctl(const FuseIoctl& call) {
-  if (gone_) return FuseAnswer::fail(ENODEV);
+FuseReply FirewireClient::ioctl(const FuseIoctl& call) {
+  if (gone_) return FuseReply::fail(ENODEV);
   // As the kernel: direction and size of the number are the client's business.
   if (_IOC_TYPE(call.command) != '#' || _IOC_NR(call.command) > kLargestNumber ||
       _IOC_SIZE(call.command) > kLargestArgument) {
-    return FuseAnswer::fail(ENOTTY);
+    return FuseReply::fail(ENOTTY);
   }
   argument_.fill(0);
   std::copy_n(call.input.begin(), std::min(call.input.size(), argument_.size()), argument_.begin());
   const int result = handle(call);
-  if (result < 0) return FuseAnswer::fail(-result);
+  if (result < 0) return FuseReply::fail(-result);
   const std::size_t out = std::min(call.output_bytes, argument_.size());
   return {.result = result, .bytes = std::span(argument_).first(out)};
 }

@@ -34,7 +34,7 @@ class FirewireClient : public std::enable_shared_from_this<FirewireClient> {
   FirewireClient(const FirewireClient&) = delete;
   FirewireClient& operator=(const FirewireClient&) = delete;
 
-  [[nodiscard]] FuseAnswer ioctl(const FuseIoctl& call);
+  [[nodiscard]] FuseReply ioctl(const FuseIoctl& call);
 
   [[nodiscard]] EventQueue& events() noexcept { return events_; }
   [[nodiscard]] const std::optional<IsoContext>& context() const noexcept { return context_; }

@@ -25,7 +25,7 @@ void FirewireNode::release(FuseOpen open) {
   deliver();
 }
 
-FuseAnswer FirewireNode::take(Open& open, std::size_t size) {
+FuseReply FirewireNode::take(Open& open, std::size_t size) {
   EventQueue& events = open.client->events();
   taken_ = events.pop();
   if (events.empty()) open.announced = false;
@@ -34,21 +34,21 @@ FuseAnswer FirewireNode::take(Open& open, std::size_t size) {
 }
 
 /// The kernel knows no O_NONBLOCK here: a read without an event sleeps.
-std::optional<FuseAnswer> FirewireNode::read(FuseOpen id, FuseRequest request,
-                                             std::uint64_t /*offset*/, std::size_t size) {
+std::optional<FuseReply> FirewireNode::read(FuseOpen id, FuseRequest request,
+                                            std::uint64_t /*offset*/, std::size_t size) {
   bus_.catch_up();
   deliver();
   Open& open = opens_.at(id);
   if (open.client->events().empty()) sleep_on(open);
   if (!open.client->events().empty()) return take(open, size);
-  if (open.client->gone()) return FuseAnswer::fail(ENODEV);
+  if (open.client->gone()) return FuseReply::fail(ENODEV);
   open.parked.push_back({request, size});
   return std::nullopt;
 }
 
-std::optional<FuseAnswer> FirewireNode::ioctl(FuseOpen id, const FuseIoctl& call) {
+std::optional<FuseReply> FirewireNode::ioctl(FuseOpen id, const FuseIoctl& call) {
   bus_.catch_up();
-  const FuseAnswer answer = opens_.at(id).client->ioctl(call);
+  const FuseReply answer = opens_.at(id).client->ioctl(call);
   deliver();
   return answer;
 }
@@ -72,7 +72,7 @@ std::uint32_t FirewireNode::poll(FuseOpen id, bool sleeps) {
 void FirewireNode::sleep_on(Open& open) {
   if (!bus_.clock().is_lock_step()) return;
   while (open.client->events().empty() && !open.client->gone() &&
-         bus_.next_due() != Agenda::kNever) {
+         bus_.next_due() != EventSchedule::kNever) {
     bus_.pass(std::max<std::int64_t>(bus_.next_due() - bus_.cycle(), 1));
   }
 }
@@ -82,13 +82,13 @@ void FirewireNode::interrupted(FuseRequest request) {
     const auto found = std::ranges::find(open.parked, request, &ParkedRead::request);
     if (found == open.parked.end()) continue;
     open.parked.erase(found);
-    return replies_->answer(request, FuseAnswer::fail(EINTR));
+    return replies_->answer(request, FuseReply::fail(EINTR));
   }
 }
 
 std::int64_t FirewireNode::next_wake_ns() const noexcept {
   const std::int64_t next = bus_.next_event();
-  if (bus_.clock().is_lock_step() || next == Agenda::kNever) return Agenda::kNever;
+  if (bus_.clock().is_lock_step() || next == EventSchedule::kNever) return EventSchedule::kNever;
   return bus_.clock().begin_ns(next);
 }
 
@@ -106,7 +106,7 @@ void FirewireNode::deliver() {
       const ParkedRead parked = open.parked.front();
       open.parked.pop_front();
       replies_->answer(parked.request,
-                       events.empty() ? FuseAnswer::fail(ENODEV) : take(open, parked.size));
+                       events.empty() ? FuseReply::fail(ENODEV) : take(open, parked.size));
     }
     if (!open.announced && (!events.empty() || open.client->gone())) {
       open.announced = true;

@@ -33,9 +33,9 @@ class FirewireNode final : public FuseNode, private FirewireBus::Listener {
   /// An open of the host's own node on this bus (`FirewireHostNode`).
   void open_host(FuseOpen open) { add(open, kHostNodeId); }
   void release(FuseOpen open) override;
-  std::optional<FuseAnswer> read(FuseOpen open, FuseRequest request, std::uint64_t offset,
-                                 std::size_t size) override;
-  std::optional<FuseAnswer> ioctl(FuseOpen open, const FuseIoctl& call) override;
+  std::optional<FuseReply> read(FuseOpen open, FuseRequest request, std::uint64_t offset,
+                                std::size_t size) override;
+  std::optional<FuseReply> ioctl(FuseOpen open, const FuseIoctl& call) override;
   std::uint32_t poll(FuseOpen open, bool sleeps) override;
   void interrupted(FuseRequest request) override;
   [[nodiscard]] std::int64_t next_wake_ns() const noexcept override;
@@ -70,7 +70,7 @@ class FirewireNode final : public FuseNode, private FirewireBus::Listener {
   void add(FuseOpen open, std::uint32_t node);
   void tell_bus_reset(std::uint32_t node);
   void sleep_on(Open& open);
-  [[nodiscard]] FuseAnswer take(Open& open, std::size_t size);
+  [[nodiscard]] FuseReply take(Open& open, std::size_t size);
   void deliver();
 
   FirewireBus bus_;
@@ -93,11 +93,11 @@ class FirewireHostNode final : public FuseNode {
   [[nodiscard]] bool present() const noexcept override { return true; }
   void open(FuseOpen open) override { device_.open_host(open); }
   void release(FuseOpen open) override { device_.release(open); }
-  std::optional<FuseAnswer> read(FuseOpen open, FuseRequest request, std::uint64_t offset,
-                                 std::size_t size) override {
+  std::optional<FuseReply> read(FuseOpen open, FuseRequest request, std::uint64_t offset,
+                                std::size_t size) override {
     return device_.read(open, request, offset, size);
   }
-  std::optional<FuseAnswer> ioctl(FuseOpen open, const FuseIoctl& call) override {
+  std::optional<FuseReply> ioctl(FuseOpen open, const FuseIoctl& call) override {
     return device_.ioctl(open, call);
   }
   std::uint32_t poll(FuseOpen open, bool sleeps) override { return device_.poll(open, sleeps); }

@@ -46,7 +46,7 @@ FuseChannel::FuseChannel(std::string folder) : folder_(std::move(folder)) {
   if (fd_ < 0) {
     const int error = errno;
     throw HilError("--front fuse: /dev/fuse cannot be opened (" + reason() + "); " +
-                   way_out_of(error, "run as root, or use --front socket"));
+                   remedy_for(error, "run as root, or use --front socket"));
   }
   const std::string options = "fd=" + std::to_string(fd_) +
                               ",rootmode=40000,user_id=" + std::to_string(getuid()) +

@@ -223,12 +223,12 @@ void FuseMount::interrupt(const FuseMessage& request) {
 }
 
 void FuseMount::settle(const FuseMessage& request, Kind kind, FuseNode& node,
-                       const std::optional<FuseAnswer>& answer) {
+                       const std::optional<FuseReply>& answer) {
   if (answer) return respond(request.id(), kind, *answer);
   parked_[request.id()] = {kind, &node};
 }
 
-void FuseMount::answer(FuseRequest request, const FuseAnswer& answer) noexcept {
+void FuseMount::answer(FuseRequest request, const FuseReply& answer) noexcept {
   const auto found = parked_.find(request);
   if (found == parked_.end()) return;
   const Kind kind = found->second.kind;
@@ -244,7 +244,7 @@ void FuseMount::wake_pollers(FuseOpen open) noexcept {
   channel_.notify(FUSE_NOTIFY_POLL, fuse_bytes(out));
 }
 
-void FuseMount::respond(FuseRequest id, Kind kind, const FuseAnswer& answer) noexcept {
+void FuseMount::respond(FuseRequest id, Kind kind, const FuseReply& answer) noexcept {
   if (answer.error != 0) return channel_.reply(id, answer.error);
   switch (kind) {
     case Kind::read:

@@ -31,7 +31,7 @@ class FuseMount final : public FuseReplies {
   /// another process unmounts.
   void serve(const std::function<bool()>& goes_on);
 
-  void answer(FuseRequest request, const FuseAnswer& answer) noexcept override;
+  void answer(FuseRequest request, const FuseReply& answer) noexcept override;
   void wake_pollers(FuseOpen open) noexcept override;
 
   /// Lateness of the calls of `FuseNode::wake`.
@@ -64,8 +64,8 @@ class FuseMount final : public FuseReplies {
 
   /// Answers now, or keeps the request until `answer`.
   void settle(const FuseMessage& request, Kind kind, FuseNode& node,
-              const std::optional<FuseAnswer>& answer);
-  void respond(FuseRequest id, Kind kind, const FuseAnswer& answer) noexcept;
+              const std::optional<FuseReply>& answer);
+  void respond(FuseRequest id, Kind kind, const FuseReply& answer) noexcept;
   [[nodiscard]] FuseNode* node_of(FuseOpen open) const noexcept;
 
   FuseChannel channel_;

@@ -15,12 +15,12 @@ using FuseOpen = std::uint64_t;     ///< names one open of a node, never used tw
 using FuseRequest = std::uint64_t;  ///< names a call of a client until it is answered
 
 /// The answer to a call: an errno, or bytes and a result of 0 and above.
-struct FuseAnswer {
+struct FuseReply {
   int error = 0;            ///< 0 or a positive errno; the rest is ignored then
   std::int32_t result = 0;  ///< of ioctl()
   std::span<const std::uint8_t> bytes{};
 
-  static FuseAnswer fail(int error) noexcept { return {.error = error}; }
+  static FuseReply fail(int error) noexcept { return {.error = error}; }
 };
 
 /// One ioctl() of a client as it came: nothing in it can be trusted.
@@ -37,7 +37,7 @@ struct FuseIoctl {
 class FuseReplies {
  public:
   virtual ~FuseReplies() = default;
-  virtual void answer(FuseRequest request, const FuseAnswer& answer) noexcept = 0;
+  virtual void answer(FuseRequest request, const FuseReply& answer) noexcept = 0;
   virtual void wake_pollers(FuseOpen open) noexcept = 0;
 };
 
@@ -61,13 +61,13 @@ class FuseNode {
   virtual void open(FuseOpen open) = 0;
   virtual void release(FuseOpen open) = 0;
   /// `offset` grows from read to read if the node is seekable, else it is 0.
-  virtual std::optional<FuseAnswer> read(FuseOpen open, FuseRequest request, std::uint64_t offset,
-                                         std::size_t size) = 0;
-  virtual std::optional<FuseAnswer> write(FuseOpen /*open*/, FuseRequest /*request*/,
-                                          std::span<const std::uint8_t> /*bytes*/) {
-    return FuseAnswer::fail(EINVAL);  // the kernel's own node has no write()
+  virtual std::optional<FuseReply> read(FuseOpen open, FuseRequest request, std::uint64_t offset,
+                                        std::size_t size) = 0;
+  virtual std::optional<FuseReply> write(FuseOpen /*open*/, FuseRequest /*request*/,
+                                         std::span<const std::uint8_t> /*bytes*/) {
+    return FuseReply::fail(EINVAL);  // the kernel's own node has no write()
   }
-  virtual std::optional<FuseAnswer> ioctl(FuseOpen open, const FuseIoctl& call) = 0;
+  virtual std::optional<FuseReply> ioctl(FuseOpen open, const FuseIoctl& call) = 0;
   /// POLLIN and others that hold now. `sleeps`: the caller waits for a change.
   virtual std::uint32_t poll(FuseOpen open, bool sleeps) = 0;
   /// A signal met the client of a parked call: answer it now, with EINTR.

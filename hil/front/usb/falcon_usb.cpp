@@ -185,7 +185,7 @@ std::span<const std::uint8_t> FtdiFalcon::next_in() {
   return packet_;
 }
 
-void FalconPlug::catch_up(UsbHost& host) {
+void FalconUsb::catch_up(UsbHost& host) {
   chip_.catch_up([&] { return present_ && halt_ == Halt::none && host.room(); },
                  [&](std::span<const std::uint8_t> packet) {
                    const std::size_t room = *host.room();
@@ -199,19 +199,19 @@ void FalconPlug::catch_up(UsbHost& host) {
   }
 }
 
-std::optional<std::vector<std::uint8_t>> FalconPlug::control(const UsbSetup& setup) {
+std::optional<std::vector<std::uint8_t>> FalconUsb::control(const UsbSetup& setup) {
   if (setup.type == kToEndpoint && setup.request == kClearFeature && !clear_halt(setup.index)) {
     return std::nullopt;
   }
   return chip_.control(setup);
 }
 
-bool FalconPlug::clear_halt(unsigned endpoint) noexcept {
+bool FalconUsb::clear_halt(unsigned endpoint) noexcept {
   if (endpoint == falcon::kEndpointIn) halt_ = Halt::none;
   return endpoint == falcon::kEndpointIn || endpoint == falcon::kEndpointOut;
 }
 
-void FalconPlug::strike(UsbFault fault, UsbHost& host) {
+void FalconUsb::strike(UsbFault fault, UsbHost& host) {
   switch (fault) {
     case UsbFault::stall:
       if (halt_ == Halt::none) halt_ = Halt::unreported;

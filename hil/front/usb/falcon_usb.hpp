@@ -119,7 +119,7 @@ class FtdiFalcon {
   std::uint64_t reports_ = 0, lost_ = 0;
 };
 
-/// The host's side of a plug, as `FalconPlug` needs it.
+/// The host's side of a plug, as `FalconUsb` needs it.
 class UsbHost {
  public:
   virtual ~UsbHost() = default;
@@ -133,10 +133,10 @@ class UsbHost {
 /// An emulated Falcon at the end of a USB cable: its chip, its halted endpoint, and the faults of a
 /// script. Requests of a host differ between fronts; the device's behaviour is the same, here. One
 /// thread.
-class FalconPlug {
+class FalconUsb {
  public:
-  FalconPlug(const FtdiFalcon::Settings& settings, std::vector<ScriptedUsbFault> script,
-             PacketDevice& device)
+  FalconUsb(const FtdiFalcon::Settings& settings, std::vector<ScriptedUsbFault> script,
+            PacketDevice& device)
       : chip_(settings, device), script_(std::move(script)) {}
 
   /// To the present: reads are completed, faults strike.

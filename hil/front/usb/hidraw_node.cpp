@@ -25,7 +25,7 @@ void HidrawNode::open(FuseOpen open) {
   opens_[open];
 }
 
-FuseAnswer HidrawNode::take(Open& open, std::size_t size) {
+FuseReply HidrawNode::take(Open& open, std::size_t size) {
   taken_ = std::move(open.waiting.front());
   open.waiting.pop_front();
   if (open.waiting.empty()) open.announced = false;
@@ -33,30 +33,30 @@ FuseAnswer HidrawNode::take(Open& open, std::size_t size) {
 }
 
 /// O_NONBLOCK does not reach a FUSE server, so a read of nothing sleeps: hidapi polls before.
-std::optional<FuseAnswer> HidrawNode::read(FuseOpen id, FuseRequest request,
-                                           std::uint64_t /*offset*/, std::size_t size) {
+std::optional<FuseReply> HidrawNode::read(FuseOpen id, FuseRequest request,
+                                          std::uint64_t /*offset*/, std::size_t size) {
   arm_.catch_up(*this);
   deliver();
   Open& open = opens_.at(id);
   if (!open.waiting.empty()) return take(open, size);
-  if (open.gone) return FuseAnswer::fail(EIO);
+  if (open.gone) return FuseReply::fail(EIO);
   open.parked.push_back({request, size});
   return std::nullopt;
 }
 
-std::optional<FuseAnswer> HidrawNode::write(FuseOpen id, FuseRequest request,
-                                            std::span<const std::uint8_t> bytes) {
+std::optional<FuseReply> HidrawNode::write(FuseOpen id, FuseRequest request,
+                                           std::span<const std::uint8_t> bytes) {
   arm_.catch_up(*this);
   deliver();
-  if (opens_.at(id).gone) return FuseAnswer::fail(ENODEV);
-  if (bytes.size() < 2 || bytes.size() > kMostReportBytes) return FuseAnswer::fail(EINVAL);
+  if (opens_.at(id).gone) return FuseReply::fail(ENODEV);
+  if (bytes.size() < 2 || bytes.size() > kMostReportBytes) return FuseReply::fail(EINVAL);
   used_ = true;
   if (arm_.deaf()) {
     opens_.at(id).writes.push_back({request, {bytes.begin(), bytes.end()}});
     return std::nullopt;
   }
   arm_.out(bytes);
-  return FuseAnswer{.result = static_cast<std::int32_t>(bytes.size())};
+  return FuseReply{.result = static_cast<std::int32_t>(bytes.size())};
 }
 
 void HidrawNode::take_writes(Open& open) {
@@ -64,7 +64,7 @@ void HidrawNode::take_writes(Open& open) {
     const ParkedWrite write = std::move(open.writes.front());
     open.writes.pop_front();
     if (open.gone) {
-      replies_->answer(write.request, FuseAnswer::fail(ENODEV));
+      replies_->answer(write.request, FuseReply::fail(ENODEV));
       continue;
     }
     arm_.out(write.report);
@@ -73,18 +73,18 @@ void HidrawNode::take_writes(Open& open) {
   }
 }
 
-std::optional<FuseAnswer> HidrawNode::ioctl(FuseOpen id, const FuseIoctl& call) {
-  if (opens_.at(id).gone) return FuseAnswer::fail(ENODEV);
+std::optional<FuseReply> HidrawNode::ioctl(FuseOpen id, const FuseIoctl& call) {
+  if (opens_.at(id).gone) return FuseReply::fail(ENODEV);
   const auto say = [this](const auto& value) {
     const auto bytes = fuse_bytes(value);
     answer_.assign(bytes.begin(), bytes.end());
-    return FuseAnswer{.bytes = answer_};
+    return FuseReply{.bytes = answer_};
   };
   const auto say_text = [&](std::string_view text) {
     answer_.assign(text.begin(), text.end());
     answer_.push_back(0);
     answer_.resize(std::min(answer_.size(), call.output_bytes));
-    return FuseAnswer{.result = static_cast<std::int32_t>(answer_.size()), .bytes = answer_};
+    return FuseReply{.result = static_cast<std::int32_t>(answer_.size()), .bytes = answer_};
   };
   const auto descriptor = arm_.report_descriptor();
   if (call.command == HIDIOCGRDESCSIZE) return say(static_cast<std::int32_t>(descriptor.size()));
@@ -98,7 +98,7 @@ std::optional<FuseAnswer> HidrawNode::ioctl(FuseOpen id, const FuseIoctl& call) 
     return say(hidraw_devinfo{BUS_USB, static_cast<std::int16_t>(arm_.vendor_id()),
                               static_cast<std::int16_t>(arm_.product_id())});
   }
-  if (_IOC_TYPE(call.command) != 'H') return FuseAnswer::fail(EINVAL);
+  if (_IOC_TYPE(call.command) != 'H') return FuseReply::fail(EINVAL);
   switch (_IOC_NR(call.command)) {
     case _IOC_NR(HIDIOCGRAWNAME(0)):
       return say_text(WoodenHid::name());
@@ -108,9 +108,9 @@ std::optional<FuseAnswer> HidrawNode::ioctl(FuseOpen id, const FuseIoctl& call) 
       return say_text(arm_.serial());
     case _IOC_NR(HIDIOCGFEATURE(0)):
     case _IOC_NR(HIDIOCSFEATURE(0)):
-      return FuseAnswer::fail(EPIPE);  // the firmware stalls them
+      return FuseReply::fail(EPIPE);  // the firmware stalls them
     default:
-      return FuseAnswer::fail(ENOTTY);
+      return FuseReply::fail(ENOTTY);
   }
 }
 
@@ -132,7 +132,7 @@ void HidrawNode::interrupted(FuseRequest request) {
   for (auto& [id, open] : opens_) {
     const auto is_it = [request](const auto& parked) { return parked.request == request; };
     if (std::erase_if(open.parked, is_it) + std::erase_if(open.writes, is_it) == 0) continue;
-    return replies_->answer(request, FuseAnswer::fail(EINTR));
+    return replies_->answer(request, FuseReply::fail(EINTR));
   }
 }
 
@@ -172,7 +172,7 @@ void HidrawNode::deliver() {
       const ParkedRead parked = open.parked.front();
       open.parked.pop_front();
       replies_->answer(parked.request,
-                       open.waiting.empty() ? FuseAnswer::fail(EIO) : take(open, parked.size));
+                       open.waiting.empty() ? FuseReply::fail(EIO) : take(open, parked.size));
     }
     if (!open.announced && (!open.waiting.empty() || open.gone)) {
       open.announced = true;

@@ -25,12 +25,12 @@ class HidrawNode final : public FuseNode, private HidHost {
   [[nodiscard]] bool present() const noexcept override { return arm_.present(); }
   void open(FuseOpen open) override;
   void release(FuseOpen open) override { opens_.erase(open); }
-  std::optional<FuseAnswer> read(FuseOpen open, FuseRequest request, std::uint64_t offset,
-                                 std::size_t size) override;
+  std::optional<FuseReply> read(FuseOpen open, FuseRequest request, std::uint64_t offset,
+                                std::size_t size) override;
   /// The number of the report, 0, and its bytes. Sleeps until the device has taken it.
-  std::optional<FuseAnswer> write(FuseOpen open, FuseRequest request,
-                                  std::span<const std::uint8_t> bytes) override;
-  std::optional<FuseAnswer> ioctl(FuseOpen open, const FuseIoctl& call) override;
+  std::optional<FuseReply> write(FuseOpen open, FuseRequest request,
+                                 std::span<const std::uint8_t> bytes) override;
+  std::optional<FuseReply> ioctl(FuseOpen open, const FuseIoctl& call) override;
   std::uint32_t poll(FuseOpen open, bool sleeps) override;
   void interrupted(FuseRequest request) override;
   [[nodiscard]] std::int64_t next_wake_ns() const noexcept override;
@@ -63,7 +63,7 @@ class HidrawNode final : public FuseNode, private HidHost {
     bool gone = false;
   };
 
-  [[nodiscard]] FuseAnswer take(Open& open, std::size_t size);
+  [[nodiscard]] FuseReply take(Open& open, std::size_t size);
   void hear(std::span<const std::uint8_t> report) override;
   void plugged(bool in) override;
   void deliver();

@@ -48,23 +48,23 @@ void UsbfsNode::release(FuseOpen open) {
   opens_.erase(open);
 }
 
-std::optional<FuseAnswer> UsbfsNode::read(FuseOpen open, FuseRequest /*request*/,
-                                          std::uint64_t offset, std::size_t size) {
-  if (opens_.at(open).gone) return FuseAnswer::fail(ENODEV);
+std::optional<FuseReply> UsbfsNode::read(FuseOpen open, FuseRequest /*request*/,
+                                         std::uint64_t offset, std::size_t size) {
+  if (opens_.at(open).gone) return FuseReply::fail(ENODEV);
   const auto all = FtdiFalcon::descriptors();
   const auto rest = all.subspan(std::min<std::size_t>(offset, all.size()));
-  return FuseAnswer{.bytes = rest.first(std::min(size, rest.size()))};
+  return FuseReply{.bytes = rest.first(std::min(size, rest.size()))};
 }
 
-std::optional<FuseAnswer> UsbfsNode::ioctl(FuseOpen id, const FuseIoctl& call) {
+std::optional<FuseReply> UsbfsNode::ioctl(FuseOpen id, const FuseIoctl& call) {
   catch_up();
   Open& open = opens_.at(id);
   const auto answer = [this](int result) {
     deliver();
-    return result < 0 ? FuseAnswer::fail(-result) : FuseAnswer{.result = result};
+    return result < 0 ? FuseReply::fail(-result) : FuseReply{.result = result};
   };
   if (call.command == USBDEVFS_REAPURBNDELAY) return answer(reap(open, call));
-  if (open.gone) return FuseAnswer::fail(ENODEV);
+  if (open.gone) return FuseReply::fail(ENODEV);
   switch (call.command) {
     case USBDEVFS_SUBMITURB:
       return answer(submit(open, id, call));
@@ -91,7 +91,7 @@ std::optional<FuseAnswer> UsbfsNode::ioctl(FuseOpen id, const FuseIoctl& call) {
     case USBDEVFS_CONNECTINFO:
       return answer(connect_info(call));
     case USBDEVFS_GET_CAPABILITIES:
-      return FuseAnswer{.bytes = fuse_bytes(kCapabilities)};
+      return FuseReply{.bytes = fuse_bytes(kCapabilities)};
     default:
       return answer(-ENOTTY);
   }
@@ -102,14 +102,14 @@ int UsbfsNode::connect_info(const FuseIoctl& call) {
   return write_caller(call.thread, call.argument, fuse_bytes(info)) ? 0 : -EFAULT;
 }
 
-FuseAnswer UsbfsNode::control(const FuseIoctl& call) {
+FuseReply UsbfsNode::control(const FuseIoctl& call) {
   const auto request = fuse_body<usbdevfs_ctrltransfer>(call.input);
-  if (!request) return FuseAnswer::fail(EINVAL);
+  if (!request) return FuseReply::fail(EINVAL);
   const auto said = plug_.control({request->bRequestType, request->bRequest, request->wValue,
                                    request->wIndex, request->wLength});
-  if (!said) return FuseAnswer::fail(EPIPE);
+  if (!said) return FuseReply::fail(EPIPE);
   if (!said->empty() && !write_caller(call.thread, address_of(request->data), *said)) {
-    return FuseAnswer::fail(EFAULT);
+    return FuseReply::fail(EFAULT);
   }
   return {.result = static_cast<std::int32_t>(said->size())};
 }

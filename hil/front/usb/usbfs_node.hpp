@@ -31,9 +31,9 @@ class UsbfsNode final : public FuseNode, private UsbHost {
   void open(FuseOpen open) override;
   void release(FuseOpen open) override;
   /// The descriptors.
-  std::optional<FuseAnswer> read(FuseOpen open, FuseRequest request, std::uint64_t offset,
-                                 std::size_t size) override;
-  std::optional<FuseAnswer> ioctl(FuseOpen open, const FuseIoctl& call) override;
+  std::optional<FuseReply> read(FuseOpen open, FuseRequest request, std::uint64_t offset,
+                                std::size_t size) override;
+  std::optional<FuseReply> ioctl(FuseOpen open, const FuseIoctl& call) override;
   std::uint32_t poll(FuseOpen open, bool sleeps) override;
   [[nodiscard]] std::int64_t next_wake_ns() const noexcept override;
   void wake() override;
@@ -77,7 +77,7 @@ class UsbfsNode final : public FuseNode, private UsbHost {
   int claim(FuseOpen id, const FuseIoctl& call);
   int give_up_interface(FuseOpen id);
   int clear_halt(const FuseIoctl& call);
-  FuseAnswer control(const FuseIoctl& call);
+  FuseReply control(const FuseIoctl& call);
   int connect_info(const FuseIoctl& call);
 
   static void finish(Open& open, Urb urb, int status);
@@ -91,7 +91,7 @@ class UsbfsNode final : public FuseNode, private UsbHost {
   void take_writes(Open& open);
   void deliver();
 
-  FalconPlug plug_;
+  FalconUsb plug_;
   std::map<FuseOpen, Open> opens_;
   std::optional<FuseOpen> claimed_by_;
   bool used_ = false;

@@ -85,7 +85,7 @@ class UsbipFalcon final : public KernelDevice, private UsbHost {
   void lose_host() noexcept;
   void unplug() noexcept;
 
-  FalconPlug plug_;
+  FalconUsb plug_;
   PlugIn plug_in_;
   int fd_;
   bool left_ = false;

@@ -76,7 +76,7 @@ class WatchedDevice final : public kerf::PacketDevice {
   std::mutex mutex_;
   double time_ms_ = 0;
   kerf::faults::Outcome outcome_;
-  kerf::faults::Contract contract_;
+  kerf::faults::SafetyMonitor contract_;
 };
 
 /// The host's end of a bus.

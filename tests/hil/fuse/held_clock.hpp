@@ -24,7 +24,7 @@ class HeldClock final : public UsbClock {
     if (!held_ns_) return ns + behind_ns_;
     if (ns <= *held_ns_) return 0;
     reached_ns_ = held_ns_;
-    return monotonic_ns() + kLookNs;
+    return monotonic_ns() + kPollNs;
   }
   void hold() {
     const std::scoped_lock lock(mutex_);
@@ -38,7 +38,7 @@ class HeldClock final : public UsbClock {
       *held_ns_ += ns;
     }
     const std::int64_t until_ns = monotonic_ns() + kNsPerSecond;
-    while (!is_reached() && monotonic_ns() < until_ns) sleep_until_ns(monotonic_ns() + kLookNs / 2);
+    while (!is_reached() && monotonic_ns() < until_ns) sleep_until_ns(monotonic_ns() + kPollNs / 2);
   }
   /// It goes on as the machine's clock does, from where it stands.
   void let_go() {
@@ -48,7 +48,7 @@ class HeldClock final : public UsbClock {
   }
 
  private:
-  static constexpr std::int64_t kLookNs = 50'000;
+  static constexpr std::int64_t kPollNs = 50'000;
 
   /// The device has asked for what is later.
   [[nodiscard]] bool is_reached() const {

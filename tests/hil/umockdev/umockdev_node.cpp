@@ -29,7 +29,7 @@ std::uint64_t argument_of(UMockdevIoctlClient* client) {
   return argument;
 }
 
-void end(UMockdevIoctlClient* client, const FuseAnswer& answer) {
+void end(UMockdevIoctlClient* client, const FuseReply& answer) {
   umockdev_ioctl_client_complete(client, answer.error == 0 ? answer.result : -1, answer.error);
   g_object_unref(client);
 }
@@ -72,7 +72,7 @@ UmockdevNode::~UmockdevNode() {
 void UmockdevNode::stop() {
   g_source_destroy(frames_);
   g_signal_handlers_disconnect_by_data(base_, this);
-  for (UMockdevIoctlClient* const client : waiting_) end(client, FuseAnswer::fail(ENODEV));
+  for (UMockdevIoctlClient* const client : waiting_) end(client, FuseReply::fail(ENODEV));
   stopped_.set_value();
 }
 
@@ -94,7 +94,7 @@ void UmockdevNode::take(UMockdevIoctlClient* client) {
     node_.open(++last_open_);
   }
   g_object_ref(client);
-  const FuseAnswer answer = ask(client);
+  const FuseReply answer = ask(client);
   if (answer.error == EAGAIN) {
     waiting_.push_back(client);
   } else {
@@ -115,19 +115,19 @@ void UmockdevNode::frame() {
   for (UMockdevIoctlClient* const client : std::exchange(waiting_, {})) end(client, ask(client));
 }
 
-FuseAnswer UmockdevNode::ask(UMockdevIoctlClient* client) {
+FuseReply UmockdevNode::ask(UMockdevIoctlClient* client) {
   const auto command = static_cast<std::uint32_t>(umockdev_ioctl_client_get_request(client));
   FuseIoctl call{.thread = getpid(), .command = command, .argument = argument_of(client)};
   std::vector<std::uint8_t> input((_IOC_DIR(command) & _IOC_WRITE) ? _IOC_SIZE(command) : 0);
   if (read_caller(call.thread, call.argument, input) != input.size()) {
-    return FuseAnswer::fail(EFAULT);
+    return FuseReply::fail(EFAULT);
   }
   call.input = input;
   if (_IOC_DIR(command) & _IOC_READ) call.output_bytes = _IOC_SIZE(command);
-  const FuseAnswer answer = node_.ioctl(opens_.at(client), call).value_or(FuseAnswer::fail(ENOTTY));
+  const FuseReply answer = node_.ioctl(opens_.at(client), call).value_or(FuseReply::fail(ENOTTY));
   const auto output = answer.bytes.first(std::min(answer.bytes.size(), call.output_bytes));
   const bool told = output.empty() || write_caller(call.thread, call.argument, output);
-  return told ? answer : FuseAnswer::fail(EFAULT);
+  return told ? answer : FuseReply::fail(EFAULT);
 }
 
 }  // namespace kerf::test

@@ -36,10 +36,10 @@ class UmockdevNode final : private FuseReplies {
   void close(UMockdevIoctlClient* client);
   void frame();
   void stop();
-  [[nodiscard]] FuseAnswer ask(UMockdevIoctlClient* client);
+  [[nodiscard]] FuseReply ask(UMockdevIoctlClient* client);
 
   // Nothing parks an ioctl for longer than a frame, and nobody sleeps in poll().
-  void answer(FuseRequest /*request*/, const FuseAnswer& /*answer*/) noexcept override {}
+  void answer(FuseRequest /*request*/, const FuseReply& /*answer*/) noexcept override {}
   void wake_pollers(FuseOpen /*open*/) noexcept override {}
 
   FuseNode& node_;

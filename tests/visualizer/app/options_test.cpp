@@ -57,7 +57,7 @@ TEST_CASE("a size that is none is refused with the limits") {
 TEST_CASE("the gradient and a tool of voxels are part of the first look") {
   CHECK(parse({})->look.gradient == GradientFilter::corners);
   CHECK_FALSE(parse({})->look.voxel_tool);
-  const Look look = parse({"--gradient", "farid5", "--voxel-tool"})->look;
+  const ViewSettings look = parse({"--gradient", "farid5", "--voxel-tool"})->look;
   CHECK(look.gradient == GradientFilter::farid5);
   CHECK(look.voxel_tool);
   CHECK_THROWS_WITH_AS(parse({"--gradient", "sobel"}),

@@ -67,7 +67,7 @@ TEST_CASE("nobody leads before the pointer moves; then the goal is under it, at 
   CHECK(bench.hand.leads());
   CHECK(near(bench.goal().pixel, {120, 80}));
   CHECK(bench.goal().depth_mm == doctest::Approx(bench.tool().depth_mm));
-  const HandWish wish = bench.hand.wish(bench.device);
+  const HandTarget wish = bench.hand.wish(bench.device);
   const glm::dvec3 goal = *bench.hand.goal_mm();
   CHECK(wish.tip_mm.x == doctest::Approx((goal.x - 1.0) / 2.0));
   CHECK(wish.tip_mm.z == doctest::Approx((goal.z - 3.0) / 2.0));

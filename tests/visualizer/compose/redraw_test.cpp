@@ -139,7 +139,7 @@ struct Place {
 
 /// Changes volumes, hand and camera at random, and compares each part that was drawn again with
 /// drawing everything.
-void check_parts(const Look& look, PictureSize size, int edits) {
+void check_parts(const ViewSettings& look, PictureSize size, int edits) {
   std::mt19937 random(3);
   const auto below = [&](int n) { return static_cast<int>(random() % static_cast<unsigned>(n)); };
   Controller controller;
@@ -315,10 +315,11 @@ TEST_CASE("a changed look shows the picture of one that had it from the start") 
     static_cast<void>(picture.draw(session, {}, target));
     return target.read_rgb();
   };
-  Look clipped{.renderer = "iso"};
+  ViewSettings clipped{.renderer = "iso"};
   clipped.clip = {.on = true, .axis = 0, .at = 0.4};
-  for (const Look& look : {Look{.renderer = "blend"}, Look{.renderer = "surface,blend"},
-                           Look{.renderer = "iso", .iso = 0.7}, clipped}) {
+  for (const ViewSettings& look :
+       {ViewSettings{.renderer = "blend"}, ViewSettings{.renderer = "surface,blend"},
+        ViewSettings{.renderer = "iso", .iso = 0.7}, clipped}) {
     std::vector<std::uint8_t> changed;
     {
       Picture picture(session, {.renderer = "iso"}, 4.0 / 3.0);

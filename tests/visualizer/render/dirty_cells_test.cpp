@@ -63,10 +63,10 @@ struct LoadedScene {
   }
 };
 
-DirtyJob job_of(const LoadedScene& scene, const DirtyCells& cells) {
+RedrawJob job_of(const LoadedScene& scene, const ChangedCells& cells) {
   const glm::dmat4 eye_from_cell = glm::translate(scene.view.eye_from_world, cells.low());
   const glm::dmat4 cell_from_eye = glm::inverse(eye_from_cell);
-  DirtyJob job;
+  RedrawJob job;
   job.eye = cast_eye(scene.view, kSize.width, kSize.height);
   put(job.origin, glm::dvec3(cell_from_eye[3]));
   put(job.from_eye, glm::dmat3(cell_from_eye));
@@ -107,8 +107,8 @@ TEST_CASE("a ray that passes a changed voxel before it ends is found, one far of
   int met = 0, passed_by = 0;
   for (int round = 0; round < 20; ++round) {
     const std::vector<VoxelBox> boxes{random_box(random), random_box(random)};
-    const DirtyCells cells(boxes, kReach);
-    const DirtyJob job = job_of(scene, cells);
+    const ChangedCells cells(boxes, kReach);
+    const RedrawJob job = job_of(scene, cells);
     for (int i = 0; i < 500; ++i) {
       const int x = static_cast<int>(random() % kSize.width);
       const int y = static_cast<int>(random() % kSize.height);
@@ -142,8 +142,8 @@ TEST_CASE("every instruction set finds the rays that one at a time finds") {
   int met = 0, felt = 0;
   for (int round = 0; round < 20; ++round) {
     const std::vector<VoxelBox> boxes{random_box(random), random_box(random)};
-    const DirtyCells cells(boxes, kReach);
-    const DirtyJob job = job_of(scene, cells);
+    const ChangedCells cells(boxes, kReach);
+    const RedrawJob job = job_of(scene, cells);
     for (int y = 0; y < kSize.height; y += 4) {
       for (int x = 0; x < kSize.width; x += 4) {
         const PixelRect tile =

@@ -11,7 +11,7 @@ using namespace kerf;
 
 namespace {
 
-BoxCorners turned_box(double angle, glm::dvec3 axis, glm::dvec3 half_mm, double eye_mm) {
+BoxCorners rotated_bounds(double angle, glm::dvec3 axis, glm::dvec3 half_mm, double eye_mm) {
   const glm::dmat4 pose = glm::rotate(glm::translate(glm::dmat4(1.0), glm::dvec3(0, 0, -eye_mm)),
                                       angle, glm::normalize(axis));
   BoxCorners corners;
@@ -37,7 +37,7 @@ double area(const std::vector<glm::dvec2>& polygon) {
 }  // namespace
 
 TEST_CASE("a box that faces the eye is cut in its rectangle, and not at all before and behind") {
-  const BoxCorners box = turned_box(0.0, {0, 0, 1}, {2, 3, 4}, 20.0);
+  const BoxCorners box = rotated_bounds(0.0, {0, 0, 1}, {2, 3, 4}, 20.0);
   CHECK(cut_box(box, 20.0).size() == 4);
   CHECK(area(cut_box(box, 20.0)) == doctest::Approx(24.0));
   CHECK(cut_box(box, 15.9).empty());
@@ -45,7 +45,8 @@ TEST_CASE("a box that faces the eye is cut in its rectangle, and not at all befo
 }
 
 TEST_CASE("a cube cut across its diagonal gives a hexagon") {
-  const BoxCorners cube = turned_box(std::acos(1.0 / std::sqrt(3.0)), {1, -1, 0}, {1, 1, 1}, 10.0);
+  const BoxCorners cube =
+      rotated_bounds(std::acos(1.0 / std::sqrt(3.0)), {1, -1, 0}, {1, 1, 1}, 10.0);
   const auto hexagon = cut_box(cube, 10.0);
   CHECK(hexagon.size() == 6);
   CHECK(area(hexagon) == doctest::Approx(3.0 * std::sqrt(3.0)));  // edge sqrt(2)
@@ -55,7 +56,7 @@ TEST_CASE("the areas of all cuts add up to the volume of the box") {
   CHECK(rc::check([] {
     const auto number = rc::gen::inRange(1, 200);
     const glm::dvec3 half(*number * 0.02, *number * 0.02, *number * 0.02);
-    const BoxCorners box = turned_box(*number * 0.03, {*number, *number, *number}, half, 30.0);
+    const BoxCorners box = rotated_bounds(*number * 0.03, {*number, *number, *number}, half, 30.0);
     constexpr double kStep = 0.01;
     double sum = 0.0;
     for (double eye_mm = 20.0; eye_mm < 40.0; eye_mm += kStep) {

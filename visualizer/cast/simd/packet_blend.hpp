@@ -44,7 +44,7 @@ inline F presence_between(const CastVolumeJob& volume, F front, F back, M on) {
 
 /// The matter in the middle of a piece, and its light.
 inline Matter matter_at(const CastJob& job, const CastVolumeJob& volume, Vec3 p, F density,
-                        const Gaze& gaze, M there, M noticeable) {
+                        const ViewVectors& gaze, M there, M noticeable) {
   const F zero = Simd::set(0.0F);
   const F full = Simd::set(volume.full);
   M plain = there;
@@ -145,7 +145,7 @@ struct Piece {
 };
 
 inline void add_piece(const CastJob& job, const CastVolumeJob& volume, Walk& walk, M alive,
-                      const Piece& piece, const Gaze& gaze, Gathered& sum, Glow& glow) {
+                      const Piece& piece, const ViewVectors& gaze, Gathered& sum, Glow& glow) {
   const F zero = Simd::set(0.0F);
   const M on = Simd::both(alive, walk.visible);
   if (!Simd::any(on)) return;
@@ -228,7 +228,7 @@ inline void blend_packet(const CastJob& job, const Packet& packet) {
   sum.depth_mm = never;
   sum.has_depth = Simd::none();
   M alive = Simd::both(drawn_lanes(packet), Simd::less(k * step_mm, end_mm));
-  const Gaze gaze = Simd::any(alive) ? gaze_along(job, eye) : Gaze{};
+  const ViewVectors gaze = Simd::any(alive) ? gaze_along(job, eye) : ViewVectors{};
   while (Simd::any(alive)) {
     M seeing = Simd::none();
     F soonest = never;

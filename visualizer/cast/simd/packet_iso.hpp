@@ -126,7 +126,7 @@ inline void iso_packet(const CastJob& job, const Packet& packet) {
     put(packet, Simd::set(1.0F), job.pixels.depth);
     return;
   }
-  const Gaze gaze = gaze_along(job, eye);
+  const ViewVectors gaze = gaze_along(job, eye);
   Vec3 colour{};
   Vec3 normal{};
   for (int v = 0; v < job.volume_count; ++v) {

@@ -109,19 +109,19 @@ inline F to_the_24th(F a) {
 }
 
 /// Unit vectors of a ray, the same for all that it meets.
-struct Gaze {
+struct ViewVectors {
   Vec3 to_eye;
   Vec3 key_half, fill_half;  ///< half-way to a light: normals that mirror it into the eye
 };
 
-inline Gaze gaze_along(const CastJob& job, Vec3 eye) {
+inline ViewVectors gaze_along(const CastJob& job, Vec3 eye) {
   const Vec3 to_eye = -normalized(eye);
   return {to_eye, normalized(vec3(job.key_light) + to_eye),
           normalized(vec3(job.fill_light) + to_eye)};
 }
 
 /// lighting.frag: two lights of a photographer that go with the eye, and a sky that stays.
-inline Vec3 lit(const CastJob& job, Vec3 albedo, Vec3 normal, const Gaze& gaze, F openness) {
+inline Vec3 lit(const CastJob& job, Vec3 albedo, Vec3 normal, const ViewVectors& gaze, F openness) {
   const F one = Simd::set(1.0F);
   const F half = Simd::set(0.5F);
   const F skyward = half + half * dot(normal, vec3(job.up));

@@ -19,7 +19,7 @@ inline F absolute(F a) {
 }
 
 /// The places whose cell has `mark`. A place outside of the grid counts as its nearest cell.
-inline M marked(const DirtyJob& job, Vec3 p, std::uint8_t mark) {
+inline M marked(const RedrawJob& job, Vec3 p, std::uint8_t mark) {
   const auto cell = [](F at, float last) {
     return Simd::to_int(Simd::min(positive(at), Simd::set(last)));
   };
@@ -29,7 +29,7 @@ inline M marked(const DirtyJob& job, Vec3 p, std::uint8_t mark) {
 }
 
 /// The distance of `p` from the grid on each axis; 0 inside.
-inline Vec3 outside_by(const DirtyJob& job, Vec3 p) {
+inline Vec3 outside_by(const RedrawJob& job, Vec3 p) {
   const auto beside = [](F at, float size) {
     return positive(Simd::max(-at, at - Simd::set(size)));
   };
@@ -37,7 +37,7 @@ inline Vec3 outside_by(const DirtyJob& job, Vec3 p) {
 }
 
 /// Whether one of the lanes `points` lies in a cell with `mark`.
-inline bool any_marked(const DirtyJob& job, Vec3 p, M points, std::uint8_t mark) {
+inline bool any_marked(const RedrawJob& job, Vec3 p, M points, std::uint8_t mark) {
   const Vec3 off = outside_by(job, p);
   const M within = Simd::but_not(points, Simd::less(Simd::set(0.0F), dot(off, off)));
   return Simd::any(within) && Simd::any(Simd::both(within, marked(job, p, mark)));
@@ -48,7 +48,7 @@ inline F longest_part(Vec3 a) {
 }
 
 /// Whether a ray of the lanes `alive` crosses a cell marked `kDirtyAlong`.
-inline bool crosses_dirty_cell(const DirtyJob& job, const VolumeRays& rays, M alive) {
+inline bool crosses_dirty_cell(const RedrawJob& job, const VolumeRays& rays, M alive) {
   const F step_mm = Simd::set(job.step_vox) / longest_part(rays.direction);
   // Half a step more: no place on a ray is farther than that from a test.
   const F end_mm = rays.end_mm + Simd::set(0.5F) * step_mm;
@@ -64,7 +64,7 @@ inline bool crosses_dirty_cell(const DirtyJob& job, const VolumeRays& rays, M al
 
 /// `gradient_at` for a volume without a border of air around it. The value is right only in lanes
 /// that `is_inside` names.
-inline Vec3 plain_gradient_at(const DirtyJob& job, Vec3 voxel) {
+inline Vec3 plain_gradient_at(const RedrawJob& job, Vec3 voxel) {
   const auto low = [](F at, std::int32_t extent) {
     return Simd::to_int(
         Simd::max(Simd::min(at, Simd::set(static_cast<float>(extent - 3))), Simd::set(1.0F)));
@@ -107,7 +107,7 @@ inline Vec3 plain_gradient_at(const DirtyJob& job, Vec3 voxel) {
 }
 
 /// The lanes in which all voxels that the gradient at `voxel` takes are in the volume.
-inline M is_inside(const DirtyJob& job, Vec3 voxel) {
+inline M is_inside(const RedrawJob& job, Vec3 voxel) {
   const auto along = [](F at, std::int32_t extent) {
     return Simd::but_not(Simd::less(at, Simd::set(static_cast<float>(extent - 2))),
                          Simd::less(at, Simd::set(1.0F)));
@@ -122,7 +122,7 @@ struct Ends {
   F t;      ///< mm along the view axis; far away for the others
 };
 
-inline Ends ends_of(const DirtyJob& job, const Packet& packet) {
+inline Ends ends_of(const RedrawJob& job, const Packet& packet) {
   const std::int32_t row = job.window.x1 - job.window.x0;
   const std::int64_t first =
       std::int64_t{packet.y - job.window.y0} * row + packet.x - job.window.x0;
@@ -132,7 +132,7 @@ inline Ends ends_of(const DirtyJob& job, const Packet& packet) {
 }
 
 /// Whether a ray of the packet crosses a dirty cell or ends in one.
-inline bool packet_rays_touch(const DirtyJob& job, const Packet& packet) {
+inline bool packet_rays_touch(const RedrawJob& job, const Packet& packet) {
   const Vec3 eye = eye_directions(job.eye, packet);
   const Shown shown = shown_of(job.eye, eye);
   VolumeRays rays;
@@ -152,7 +152,7 @@ inline bool packet_rays_touch(const DirtyJob& job, const Packet& packet) {
 }
 
 /// Whether the shading of a point at which a ray ends samples a dirty cell.
-inline bool packet_shading_touches(const DirtyJob& job, const Packet& packet) {
+inline bool packet_shading_touches(const RedrawJob& job, const Packet& packet) {
   const Vec3 eye = eye_directions(job.eye, packet);
   const Ends ends = ends_of(job, packet);
   const Vec3 p = vec3(job.origin) + ends.t * transformed(job.from_eye, eye);
@@ -189,14 +189,14 @@ inline bool packet_shading_touches(const DirtyJob& job, const Packet& packet) {
   return false;
 }
 
-bool cast_rays_touch(const DirtyJob& job, const PixelRect& rect) {
+bool cast_rays_touch(const RedrawJob& job, const PixelRect& rect) {
   bool touch = false;
   for_packets(job.eye, rect,
               [&](const Packet& packet) { touch = touch || packet_rays_touch(job, packet); });
   return touch;
 }
 
-bool cast_shading_touches(const DirtyJob& job, const PixelRect& rect) {
+bool cast_shading_touches(const RedrawJob& job, const PixelRect& rect) {
   bool touch = false;
   for_packets(job.eye, rect,
               [&](const Packet& packet) { touch = touch || packet_shading_touches(job, packet); });

@@ -11,7 +11,7 @@ namespace kerf {
 namespace {
 
 /// A cell of 2^3 voxels: the entry of its lowest one, and the place within it.
-struct CellPlace {
+struct CellSample {
   I at;
   Vec3 share;
 };
@@ -23,7 +23,7 @@ inline Vec3 within(const CastVolumeJob& volume, Vec3 p) {
           Simd::min(positive(p.z), Simd::set(volume.last[2]))};
 }
 
-inline CellPlace cell_place(const CastVolumeJob& volume, Vec3 p, std::int32_t plane) {
+inline CellSample cell_place(const CastVolumeJob& volume, Vec3 p, std::int32_t plane) {
   const Vec3 q = within(volume, p);
   const I x = Simd::to_int(q.x);
   const I y = Simd::to_int(q.y);
@@ -32,7 +32,7 @@ inline CellPlace cell_place(const CastVolumeJob& volume, Vec3 p, std::int32_t pl
           {q.x - Simd::to_float(x), q.y - Simd::to_float(y), q.z - Simd::to_float(z)}};
 }
 
-inline CellPlace cell_place(const CastVolumeJob& volume, Vec3 p) {
+inline CellSample cell_place(const CastVolumeJob& volume, Vec3 p) {
   return cell_place(volume, p, volume.plane);
 }
 
@@ -44,7 +44,7 @@ inline Vec3 mix(Vec3 a, Vec3 b, F share) {
 }
 
 /// Trilinear, 0..1. Two loads of 64 bits bring all eight corners: `PairedRows`.
-inline F density_in(const CastVolumeJob& volume, const CellPlace& cell) {
+inline F density_in(const CastVolumeJob& volume, const CellSample& cell) {
   const auto plane = [&](const std::uint32_t* entries) {
     I left{};
     I right{};
@@ -70,7 +70,7 @@ inline Vec3 gradient_at(const CastVolumeJob& volume, Vec3 p) {
   const auto inner = [&](F x, float last) {  // the whole cube is inside the border
     return Simd::max(Simd::min(x, Simd::set(last - 1.0F)), one);
   };
-  const CellPlace middle = cell_place(
+  const CellSample middle = cell_place(
       volume, {inner(p.x, volume.last[0]), inner(p.y, volume.last[1]), inner(p.z, volume.last[2])});
   Vec3 sum{};
   for (int corner = 0; corner < 8; ++corner) {
@@ -88,7 +88,7 @@ inline Vec3 gradient_at(const CastVolumeJob& volume, Vec3 p) {
 
 /// The same from stored gradients, in 8 bits: a quarter of the loads.
 inline Vec3 stored_gradient_at(const CastVolumeJob& volume, Vec3 p) {
-  const CellPlace cell = cell_place(volume, p, volume.gradient_plane);
+  const CellSample cell = cell_place(volume, p, volume.gradient_plane);
   I corner[4][2];  // by y and z, by x
   for (int i = 0; i < 4; ++i) {
     const std::int32_t step = (i & 1) * volume.row + (i >> 1) * volume.gradient_plane;
@@ -254,7 +254,7 @@ struct Labelled {
 /// Labels around, blended so that their borders are smooth. Where all eight agree, which is nearly
 /// everywhere, that is one look-up; `needed` are the lanes whose result counts.
 inline Labelled by_labels(const CastVolumeJob& volume, Vec3 p, M needed) {
-  const CellPlace cell = cell_place(volume, p);
+  const CellSample cell = cell_place(volume, p);
   const F zero = Simd::set(0.0F);
   const F one = Simd::set(1.0F);
   const I labels[2] = {Simd::gather_bytes<2>(volume.labels, cell.at),
