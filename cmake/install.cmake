@@ -71,6 +71,7 @@ install(CODE "file(CREATE_LINK ../${share}/kerf
   \"\$ENV{DESTDIR}\${CMAKE_INSTALL_PREFIX}/${CMAKE_INSTALL_BINDIR}/kerf\" SYMBOLIC)")
 install(DIRECTORY scenes DESTINATION ${share} PATTERN "ct.*" EXCLUDE)  # who has a CT keeps it
 install(DIRECTORY hil/faults DESTINATION ${share}/hil)
+install(DIRECTORY lab/report DESTINATION ${share}/lab PATTERN __pycache__ EXCLUDE)
 install(DIRECTORY docs/ DESTINATION ${CMAKE_INSTALL_DOCDIR} PATTERN .site EXCLUDE)  # the make of the site
 install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR} RENAME copyright)
 install(FILES controller/device/60-kerf.rules DESTINATION lib/udev/rules.d)

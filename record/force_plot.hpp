@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-// Plots by gnuplot, and the forces of a recording as such a plot.
+// The forces of a recording as a plot.
 
 namespace kerf {
 
@@ -15,12 +15,10 @@ namespace kerf {
 /// penetration in mm with removed volume in mm^3, and the work of the hand in mJ with its sources.
 /// At most 4000 points per curve, every peak kept.
 ///
-/// Runs gnuplot. The file appears whole or not at all. Throws `RecordError`.
+/// The file appears whole or not at all. Throws `RecordError`, `ReportError` or `FileError`.
 void plot_forces(const std::filesystem::path& folder, const std::filesystem::path& svg);
 
 /// The picture that gnuplot draws on its standard output for a script with `set terminal svg`.
-/// Writes no file. Throws `RecordError` without gnuplot, without memory, or for an incomplete
-/// picture.
 [[nodiscard]] std::string gnuplot_svg(const std::string& script);
 
 /// A curve of at most `max_points` points that keeps every peak: the smallest and the largest of

@@ -76,10 +76,9 @@ std::string today() {
   return text;
 }
 
-std::string find_data_file(const std::string& name) {
+std::string find_beside_program(const std::string& name) {
   namespace fs = std::filesystem;
   std::error_code error;
-  if (name.empty() || fs::exists(name, error)) return name;
   constexpr int kMostUp = 6;
   fs::path folder = fs::read_symlink("/proc/self/exe", error).parent_path();
   for (int up = 0; up <= kMostUp && !folder.empty(); ++up) {
@@ -89,7 +88,14 @@ std::string find_data_file(const std::string& name) {
     if (folder == folder.root_path()) break;
     folder = folder.parent_path();
   }
-  return name;
+  return {};
+}
+
+std::string find_data_file(const std::string& name) {
+  std::error_code error;
+  if (name.empty() || std::filesystem::exists(name, error)) return name;
+  const std::string found = find_beside_program(name);
+  return found.empty() ? name : found;
 }
 
 }  // namespace kerf

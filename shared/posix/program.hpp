@@ -37,6 +37,9 @@ inline constexpr unsigned long long kLeastStackBytes = 1 << 20;
 /// `name`, so that opening it fails with that name. Start-up only.
 [[nodiscard]] std::string find_data_file(const std::string& name);
 
+/// The same without the current folder, for files that a program runs; empty if there is none.
+[[nodiscard]] std::string find_beside_program(const std::string& name);
+
 /// A progress bar on stderr; shows nothing unless it is wanted and stderr is a terminal. The
 /// destructor removes it.
 class ProgressBar {

@@ -65,7 +65,7 @@ done
 package=$(echo "$home"/packages/kerf_*.deb)
 dpkg-deb -c "$package" | awk '{ print $6 }' >"$home/files"
 for file in bin/kerf bin/kerf-controller share/man/man1/kerf-controller.1 share/kerf/scenes/phantom.toml \
-  share/doc/kerf/tutorial.md share/bash-completion/completions/kerf-lab lib/udev/rules.d/60-kerf.rules; do
+  share/kerf/lab/report/__main__.py share/doc/kerf/tutorial.md share/bash-completion/completions/kerf-lab lib/udev/rules.d/60-kerf.rules; do
   grep -qxF "./usr/$file" "$home/files" || fail "$package: lacks /usr/$file"
 done
 ! grep -qE '\.(hpp|a)$' "$home/files" || fail "$package: has what belongs into kerf-dev"

@@ -6,6 +6,7 @@
 #include "record/force_plot.hpp"
 #include "record/recording.hpp"
 #include "shared/posix/atomic_file.hpp"
+#include "shared/posix/report_tool.hpp"
 #include "tests/json.hpp"
 #include "tests/record/record_support.hpp"
 
@@ -159,8 +160,10 @@ TEST_CASE("a pipe or a device in the place of a recording's file is refused, not
 }
 
 TEST_CASE("the plot is an SVG with its panels and every curve that is not zero") {
-  if (std::system("gnuplot --version >/dev/null 2>&1") != 0) {
-    MESSAGE("skipped: gnuplot is not installed");
+  try {
+    check_can_plot();
+  } catch (const ReportError& lack) {
+    MESSAGE("skipped: ", lack.what());
     return;
   }
   const TestFolder folder;

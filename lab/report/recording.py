@@ -1,0 +1,48 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The plot of a recording (`kerf record plot`, forces.svg of a demo). JSON:
+
+    end_s                       end of the time axis
+    curves, sources             lists of {name, s, values}: times in s with the values there. Curves are contact,
+                                modification and commanded (N), penetration (mm), removed (mm3) and port (mJ); sources
+                                are those of energy that did any work (mJ)"""
+import figure as fig
+
+SOURCES = {"spring": fig.BLUE, "damping": fig.GREEN, "friction": fig.RED, "cutting": fig.PINK, "limits": fig.YELLOW,
+           "hold": fig.GREY, "leak": fig.SKY, "stabiliser": fig.BROWN}
+
+
+def forces(data):
+    curves = {curve["name"]: curve for curve in data["curves"]}
+    picture, ((force,), (depth,), (work,)) = fig.new_figure(960, 920, rows=3, left=80, right=80, top=40, down=50, bottom=50)
+
+    def draw(axes, name, colour, label, width=1.5):
+        return axes.plot(curves[name]["s"], curves[name]["values"], color=colour, label=label, linewidth=width)[0]
+
+    # The commanded force lies broad under the contact force that it mostly follows.
+    draw(force, "commanded", fig.ORANGE, "commanded", 3.2)
+    draw(force, "contact", fig.BLUE, "contact")
+    draw(force, "modification", fig.GREEN, "modification")
+    force.set_ylabel("force (N)")
+    lines = [draw(depth, "penetration", fig.BLUE, "penetration")]
+    depth.set_ylabel("penetration (mm)")
+    removed = depth.twinx()
+    removed.spines["right"].set_visible(True)
+    lines.append(draw(removed, "removed", fig.RED, "removed volume", 1.8))
+    removed.set_ylabel("removed (mm³)")
+    for axes in (force, depth, removed):
+        low, high = axes.dataLim.intervaly
+        axes.set_ylim(min(0, low), max(high, 0.01) * 1.05)
+    work.axhline(0, color=fig.FRAME, linewidth=0.8)
+    draw(work, "port", fig.ORANGE, "all", 3.2)
+    for source in data["sources"]:
+        work.plot(source["s"], source["values"], label=source["name"], color=SOURCES.get(source["name"], fig.BLACK))
+    work.set_ylabel("work of the hand (mJ)")
+    work.set_xlabel("time (s)")
+    for axes, handles in ((force, None), (depth, lines), (work, None)):
+        axes.set_xlim(0, data["end_s"])
+        axes.grid(True)
+        handles = handles or axes.get_legend_handles_labels()[0]
+        axes.legend(handles=handles, loc="lower left", bbox_to_anchor=(-0.01, 0.99), ncol=len(handles), columnspacing=1.6)
+    force.tick_params(labelbottom=False)
+    depth.tick_params(labelbottom=False)
+    return fig.svg(picture)
