@@ -12,7 +12,7 @@
 
 #include "shared/segment/connection.hpp"
 #include "tests/json.hpp"
-#include "tests/programs/process.hpp"
+#include "tests/support/process.hpp"
 
 namespace kerf::test {
 

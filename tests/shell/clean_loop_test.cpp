@@ -24,8 +24,8 @@
 #include "controller/plan/compile.hpp"
 #include "controller/run/run_start.hpp"
 #include "shared/segment/segment.hpp"
-#include "tests/programs/process.hpp"
 #include "tests/shell/system_call_count.hpp"
+#include "tests/support/process.hpp"
 
 #ifndef KERF_SANITIZED  // sanitizers allocate and call for themselves
 

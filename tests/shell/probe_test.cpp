@@ -9,7 +9,7 @@
 #include <unistd.h>
 
 #include "controller/run/probe_nodes.hpp"
-#include "tests/programs/process.hpp"
+#include "tests/support/process.hpp"
 
 namespace {
 

@@ -14,7 +14,7 @@
 #include <sys/syscall.h>
 #include <unistd.h>
 
-#include "tests/programs/process.hpp"
+#include "tests/support/process.hpp"
 
 namespace kerf::test {
 

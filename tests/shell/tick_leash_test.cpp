@@ -13,7 +13,7 @@
 #include <unistd.h>
 
 #include "controller/loop/tick_source.hpp"
-#include "tests/programs/process.hpp"
+#include "tests/support/process.hpp"
 
 using kerf::TickGate;
 using kerf::test::TemporaryFolder;

@@ -11,7 +11,7 @@
 #include <doctest/doctest.h>
 
 #include "tests/hil/guest/guest_log.hpp"
-#include "tests/programs/process.hpp"
+#include "tests/support/process.hpp"
 
 namespace {
 

@@ -5,7 +5,7 @@
 
 #include <doctest/doctest.h>
 
-#include "tests/programs/process.hpp"
+#include "tests/support/process.hpp"
 #include "tests/visualizer/render/golden_picture.hpp"
 #include "tests/visualizer/render/teeth.hpp"
 #include "visualizer/app/headless.hpp"

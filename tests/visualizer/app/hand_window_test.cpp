@@ -11,7 +11,7 @@
 #include <doctest/doctest.h>
 
 #include "tests/json.hpp"
-#include "tests/programs/process.hpp"
+#include "tests/support/process.hpp"
 #include "tests/visualizer/app/window_fixture.hpp"
 #include "visualizer/scene/session.hpp"
 

@@ -11,7 +11,7 @@
 #include <epoxy/gl.h>
 
 #include "tests/json.hpp"
-#include "tests/programs/process.hpp"
+#include "tests/support/process.hpp"
 #include "tests/visualizer/app/window_fixture.hpp"
 #include "visualizer/app/run.hpp"
 #include "visualizer/gl/window.hpp"
