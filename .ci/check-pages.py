@@ -21,7 +21,7 @@ PAGES = {
     "docs/contact.md": ("./kerf lab extremes --page docs/contact.md", ["lab/contact/*", *RIG]),
     "docs/energy.md": ("./kerf lab energy --page docs/energy.md", ["lab/stability/energy_*"]),
     "docs/stability.md": ("./kerf lab zwidth --page docs/stability.md",
-                          ["lab/stability/*", "!lab/stability/energy_*", "controller/stability/*"]),
+                          ["lab/stability/*", "!lab/stability/energy_*", "controller/stability/*", "lab/report/stability*"]),
     "docs/performance.md": ("./kerf bench kernels --page docs/performance.md", ["lab/bench/*", *RIG]),
     "docs/pictures.md": ("./kerf bench pictures --page docs/pictures.md", ["visualizer/bench/*"]),
     "docs/second-machine.md": ("./kerf bench bridge --page docs/second-machine.md", ["lab/bridge/*"]),

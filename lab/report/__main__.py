@@ -18,6 +18,9 @@ from text import BadInput
 # Subject and kind: the function KIND of the module SUBJECT, and whether it draws.
 KINDS = {
     ("recording", "forces"): True,
+    ("stability", "measure"): False, ("stability", "page"): False, ("stability", "devices"): True,
+    ("stability", "rates"): True,
+    ("stability_map", "map"): True, ("stability_map", "portraits"): True,
 }
 DEBIAN = "/usr/bin/python3"  # it has Debian's matplotlib, if another Python comes first in PATH
 

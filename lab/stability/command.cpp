@@ -5,9 +5,9 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <iosfwd>
 #include <memory>
-#include <numeric>
 #include <ostream>
 #include <set>
 #include <stdexcept>
@@ -24,21 +24,16 @@
 #include "lab/stability/axes.hpp"
 #include "lab/stability/map.hpp"
 #include "lab/stability/map_file.hpp"
-#include "lab/stability/map_picture.hpp"
-#include "lab/stability/page.hpp"
-#include "record/force_plot.hpp"
+#include "lab/stability/portraits.hpp"
 #include "shared/posix/atomic_file.hpp"
 #include "shared/posix/program.hpp"
+#include "shared/posix/report_tool.hpp"
 #include "shared/posix/stop_signals.hpp"
+#include "shared/text/json.hpp"
 #include "shared/text/text.hpp"
 
 namespace kerf::zwidth {
 namespace {
-
-/// A picture that cannot be drawn is refused before hours of measuring. Throws HilError.
-void require_gnuplot() {
-  static_cast<void>(gnuplot_svg("set terminal svg\nplot 0\n"));
-}
 
 /// The files that a map is written to.
 struct OutputPaths {
@@ -72,13 +67,13 @@ Outputs::Outputs(const OutputPaths& paths, const std::vector<std::string>& parts
   check_outputs({parts.begin(), parts.end()}, {{"--csv", paths.csv, ".csv"},
                                                {"--json", paths.json, ".json"},
                                                {"--plot", paths.plot, ".svg"}});
-  if (draws_) require_gnuplot();
+  if (draws_) check_can_plot();
 }
 
 void Outputs::write(const Part& part) const {
   csv_.write(csv_of(part));
   json_.write(json_of(part));
-  if (draws_) plot_.write(gnuplot_svg(plot_of(part)));
+  if (draws_) plot_.write(make_report({"stability_map", "map"}, json_of(part)));
 }
 
 std::string crossing_text(const StabilityBoundary& crossing) {
@@ -231,6 +226,20 @@ void Command::try_laws(const MapSpec& map, std::ostream& out) {
   }
 }
 
+/// Throws HilError for a map of more panels than a plot holds.
+void check_panels(const MapSpec& spec) {
+  constexpr std::size_t kMostPanels = 12;
+  std::size_t panels = 1;
+  for (std::size_t axis = 0; axis < kAxisCount; ++axis) {
+    if (std::ranges::find(spec.mapped, axis) != spec.mapped.end()) continue;
+    panels *= std::max<std::size_t>(1, spec.table[axis].size());
+  }
+  if (panels <= kMostPanels) return;
+  throw HilError("--plot: " + std::to_string(panels) + " panels, and a picture holds " +
+                 std::to_string(kMostPanels) +
+                 "; give the axes that are not mapped fewer values, or leave --plot out");
+}
+
 /// A map has one column at least that can exist; those that cannot are left empty.
 void check_columns(const MapSpec& map) {
   std::string why;
@@ -338,29 +347,21 @@ int Command::threads(std::size_t columns) const {
 }
 
 void Command::write_page() const {
-  require_gnuplot();
+  check_can_plot();
   const LabOutput as_page("--page", page_, ".md");
   const std::string devices = page_plot("--page", page_, ".devices.svg"),
                     rates = page_plot("--page", page_, ".rates.svg");
   const LabOutput as_devices("--page", devices, ".svg"), as_rates("--page", rates, ".svg");
-  const ProgressBar bar(true);
-  const Measure measure = [&](const MapSpec& spec, const std::string& what) {
-    Part part{spec, {}, {}};
-    std::vector<std::size_t> all(spec.columns().size());
-    std::iota(all.begin(), all.end(), std::size_t{0});
-    const auto done = [&](std::size_t index, Column column, std::uint64_t) {
-      part.columns[index] = std::move(column);
-      bar.show(static_cast<double>(part.columns.size()) / static_cast<double>(all.size()), what);
-    };
-    const std::atomic<bool> to_the_end{false};
-    measure_columns(spec, all, threads(all.size()), to_the_end, done);
-    return part;
-  };
-  const StabilityPage page =
-      stability_page(measure, page_link(page_, devices), page_link(page_, rates), quick_);
-  as_devices.write(gnuplot_svg(page.devices_plot));
-  as_rates.write(gnuplot_svg(page.rates_plot));
-  as_page.write(page.text);
+  const Json order{{"program", std::filesystem::read_symlink("/proc/self/exe").string()},
+                   {"quick", quick_},
+                   {"jobs", jobs_},
+                   {"provenance", lab_provenance()}};
+  const std::string measured =
+      make_report({"stability", "measure"}, order.canonical(), ReportErrors::shown);
+  as_devices.write(make_report({"stability", "devices"}, measured));
+  as_rates.write(make_report({"stability", "rates"}, measured));
+  as_page.write(make_report(
+      {"stability", "page", page_link(page_, devices), page_link(page_, rates)}, measured));
 }
 
 bool Command::measure(const MapSpec& map, const Shard& shard, PartWriter& kept,
@@ -438,9 +439,9 @@ int Command::run(std::ostream& out) const {
           "and "
           "--shard out");
     }
-    require_gnuplot();
+    check_can_plot();
     const LabOutput output("--portraits", portraits_, ".svg");
-    output.write(gnuplot_svg(portraits_of(map, cells_)));
+    output.write(make_report({"stability_map", "portraits"}, portraits_of(map, cells_)));
     return 0;
   }
   PartWriter kept(part_, map, part);

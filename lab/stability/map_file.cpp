@@ -375,6 +375,13 @@ std::string csv_of(const Part& part) {
   return text;
 }
 
+Json axes_json(const Assignment& values) {
+  Json axes = Json::Members{};
+  each_axis(
+      [&](AxisId axis, const AxisKind& kind) { axes[column_name(kind)] = value_of(values, axis); });
+  return axes;
+}
+
 std::string json_of(const Part& part) {
   const std::vector<Assignment> assignments = part.spec.columns();
   Json columns = Json::List{};
@@ -383,10 +390,6 @@ std::string json_of(const Part& part) {
     const Subject subject = subject_of(values);
     const Analytic analytic = analytic_of(subject);
     const std::string why = impossible(part.spec, subject);
-    Json axes = Json::Members{};
-    each_axis([&](AxisId axis, const AxisKind& kind) {
-      axes[column_name(kind)] = value_of(values, axis);
-    });
     Json cells = Json::List{};
     for (const LimitCycle& cell : column.cells) {
       cells.push_back({{"swings", cell.swings},
@@ -395,7 +398,7 @@ std::string json_of(const Part& part) {
                        {"given_mj", cell.given_mj},
                        {"port_minimum_mj", cell.port_minimum_mj}});
     }
-    columns.push_back({{"axes", std::move(axes)},
+    columns.push_back({{"axes", axes_json(values)},
                        {"impossible", why.empty() ? Json(nullptr) : Json(why)},
                        {"by_travel", crossing_json(column.swing)},
                        {"by_energy", crossing_json(column.energy)},
@@ -405,13 +408,21 @@ std::string json_of(const Part& part) {
                          {"quantum_n_per_mm", analytic.quantum}}},
                        {"cells", std::move(cells)}});
   }
+  Json varied = Json::List{};
+  each_axis([&](AxisId axis, const AxisKind& kind) {
+    if (part.spec.table[index_of(axis)].size() > 1) varied.push_back(kind.name);
+  });
   Json mapped = Json::List{};
   for (const std::size_t axis : part.spec.mapped) {
     mapped.push_back(axis == kAxisCount ? "stiffness" : axis_kinds()[axis].name);
   }
-  return Json{{"version", KERF_VERSION},      {"seed", part.spec.seed},
-              {"seconds", part.spec.seconds}, {"whole_arm", part.spec.arm},
-              {"mapped", std::move(mapped)},  {"stiffness_n_per_mm", part.spec.stiffness_n_per_mm},
+  return Json{{"version", KERF_VERSION},
+              {"seed", part.spec.seed},
+              {"seconds", part.spec.seconds},
+              {"whole_arm", part.spec.arm},
+              {"mapped", std::move(mapped)},
+              {"varied", std::move(varied)},
+              {"stiffness_n_per_mm", part.spec.stiffness_n_per_mm},
               {"columns", std::move(columns)}}
       .document();
 }

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "lab/stability/map.hpp"
+#include "shared/text/json.hpp"
 
 /// A map as files: the parts of its shards while they grow, and the finished map as CSV and JSON.
 namespace kerf::zwidth {
@@ -76,6 +77,9 @@ struct Analytic {
 
 /// One row for each cell: all axes, then its figures. A column that cannot exist has no rows.
 [[nodiscard]] std::string csv_of(const Part& part);
+
+/// The value of each axis, by its name with the unit.
+[[nodiscard]] Json axes_json(const Assignment& values);
 
 /// The map: its axes, and for each column crossings, analytic boundaries and cells.
 [[nodiscard]] std::string json_of(const Part& part);

@@ -89,7 +89,8 @@ class MemoryFile {
 
 }  // namespace
 
-std::string make_report(const std::vector<std::string>& words, std::string_view json) {
+std::string make_report(const std::vector<std::string>& words, std::string_view json,
+                        ReportErrors errors) {
   const std::string tool = find_beside_program("lab/report/__main__.py");
   if (tool.empty()) {
     throw ReportError("lab/report: not found beside this program; install kerf again");
@@ -102,8 +103,12 @@ std::string make_report(const std::vector<std::string>& words, std::string_view 
   const MemoryFile out;
   const MemoryFile err;
   in.write(json);
-  const int code = run_python(std::move(arguments), in.fd(), out.fd(), err.fd());
+  const int code = run_python(std::move(arguments), in.fd(), out.fd(),
+                              errors == ReportErrors::shown ? STDERR_FILENO : err.fd());
   constexpr int kRefused = 2;  // the last line is for the user
+  if (code != 0 && errors == ReportErrors::shown) {
+    throw ReportError("lab/report: " + words[0] + " " + words[1] + " failed (above)");
+  }
   if (code == kRefused) throw ReportError(last_line(err.text()));
   if (code != 0) {
     throw ReportError("lab/report: exit " + std::to_string(code) + " (" + last_line(err.text()) +

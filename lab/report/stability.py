@@ -1,0 +1,311 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The page of stability (docs/stability.md), from maps that it lets `kerf-lab zwidth` measure.
+
+measure reads {program, quick, jobs, provenance}: the path of kerf-lab, whether few cells and short hits are enough, its
+--jobs (0: all cores), and day and machine of the run. It returns the JSON that page, devices and rates read:
+
+    provenance
+    devices, rates              maps as `kerf lab zwidth --json` writes them (stability_map.py)
+    table                       rows {device, delay, damping, exact, axis, held, arm}: texts, then the lowest K of each
+    stabilisers                 rows {device, delay, lowest: {STABILISER: [one axis, whole arm]}}
+    knobs                       rows {name, unit, value, standard, swings, active, exact, re_entry}
+    numbers                     rows {numeric, cells, others, columns, factor}"""
+import json
+import math
+import subprocess
+import tempfile
+
+import text
+from stability_map import AXES, NEVER
+
+ABOUT = """\
+# Stability
+
+Made by `./kerf lab zwidth --page docs/stability.md`; every figure comes from one run, nothing is typed by hand. The
+same seed gives the same bytes on any number of cores. docs/theory.md 5.7 derives the analytic limits, 5.1 the force
+of the wall.
+
+The Z-width of a device is the range of stiffness K that it can render, from free air to the stiffest stable wall. A
+sampled wall adds a little energy in every tick; damping of device, wall and hand removes it. Above some K more is added
+than removed, and the tip oscillates.
+
+Each cell of a map is a device at a flat wall, without a hand unless stated. The runs of a cell start 0.1 mm before the
+wall, at rest, at 50 and at 200 mm/s, and push with the Coulomb friction plus 0.5 N.
+
+* Split each run in thirds. A cell *swings* if the last third's travel exceeds three encoder steps and 97 % of the middle
+  third's.
+* A cell is *active* if the wall's work goes on rising by as much.
+* *First* is the lowest K of a column that swings or is active, to 0.5 %, between two cells of the grid. A finer grid may
+  find a narrower unstable island below. Stable cells above it are reported apart, because a hand cannot reach them.
+* There is no thermal limit: weaker motors would end an oscillation.
+* A run lasts longer than asked if mass and damping make a decay too slow to see in thirds.
+
+The boundary depends on the phase of the encoder steps relative to the wall, with friction by up to a factor of two. The
+seed sets this phase, equal in every column, so that two columns differ by their axes alone. Another `--seed` shows how
+far the boundary moves.
+
+*One axis* runs the servo's own coupling, velocity estimator, stabilisers and force limits, as the same templates and in
+the loop's numbers, with exact mechanics. *Whole arm* (`--arm`) runs the servo step with the emulated device, its driver
+and its packets in virtual time; it also slides onto the flat and hits the corner of three walls. The mechanics are
+plausible values, not those of a unit: for your device, give `--mass`, `--viscous`, `--friction` and `--quantum`.
+
+"""
+
+DEVICES = """\
+The lowest K in N/mm that swings or is active, at two dampings B: the default, and the one with the highest K on the
+device's map.
+
+* *Linear, exact* is the boundary without friction and encoder steps.
+* The firm hand has 0.1 kg, 0.005 N s/mm, 0.5 N/mm. In *whole arm* a spring of 0.2 N/mm pushes.
+* Each measured K is the minimum of three seeds: on one axis 160 stiffnesses from 0.05 to 50 N/mm, runs of 2 s; with the
+  whole arm 14 stiffnesses, runs of 1 s.
+* *Recommended K* is the minimum of the row over 1.5. The margin covers unstable islands narrower than a step of the map:
+  one lies at 0.82 of a first crossing (Omni, no delay, B 0.002).
+* The delay of a real device is not known; assume two periods until you measure it.
+* Take no more damping than the map shows as stable: beyond its maximum the lag of the velocity and the encoder steps
+  drive the oscillation.
+
+These are the emulator's devices. The check of a scene (docs/devices.md, "Gains") is stricter: less viscous damping,
+0.0002 N s/mm, and a delay of 2 ms at every rate, because it applies to units that nobody has measured.
+
+"""
+
+STABILISERS = """
+## Stabilisers
+
+The same with B = 0.002 N s/mm and a stabiliser that has the device's mass and damping: one axis / whole arm, one seed,
+40 and 14 stiffnesses. docs/energy.md has the effect on the hand. `passivity` books a force in the tick that commands
+it. With a delay the force acts later, and the port may give far more energy than is booked: `port_minimum_mj` of `--csv`
+has the lowest energy of the port in each cell. A run that swings and is active ends its cell.
+
+"""
+
+RATES = """\
+Without friction the boundary grows in proportion to the rate; measured, it grows less. Encoder steps are the same at
+every rate. The velocity window spans up to 16 ms at every rate, so its lag is more periods of a fast loop, which
+tolerates less damping than the linear boundary predicts. In grey columns the damping is unstable without any wall.
+
+"""
+
+KNOBS = """\
+## The effect of each parameter
+
+An Omni with B = 0.002 N s/mm and a delay of one period; one parameter changes at a time, the default is bold, K in N/mm.
+The linear boundary includes mass, both dampings, delay, rate, hand and filter. *Re-entry* is the lowest stable K above
+the first crossing. One seed, 40 stiffnesses from 0.05 to 50 N/mm, runs of 2 s; a finer map finds more islands.
+
+"""
+
+NUMBERS = """
+They differ where a run is chaotic, which is near every boundary of a loop with friction and encoder steps: a difference
+of 2^-16 mm or N moves an encoder step to another tick, and with it the rest position of the tip. No number type is better
+in general.
+
+"""
+
+HOW = """\
+## Maps of your own
+
+    ./kerf lab zwidth --quick --plot zwidth.svg                   # the theory's loop and kerf's side by side
+    ./kerf lab zwidth --rate 4000 --delay 0.5 --csv map.csv       # any axis takes a value, a list or a range
+    ./kerf lab zwidth --map delay,quantum --delay 0:3:13 --quantum 0:0.2:11 --plot k.svg # the highest K as a colour
+    ./kerf lab zwidth --portraits portrait.svg --cells 1:0.002,10:0.002                  # position against speed; --arm too
+    ./kerf lab zwidth --arm --delay 0 --stiffness 0.1:50:40 --plot arm.svg               # the whole servo step; minutes
+    ./kerf lab zwidth --stabiliser none,passivity,energy_bounding --plot s.svg           # one panel for each
+
+`--law`, `--estimator` and `--stabiliser` also take the laws that a program of yours registers (docs/own-law.md).
+
+A map larger than one machine is cut into shards. Each keeps its finished columns in a part file and goes on from there
+when it is started again; `merge` refuses parts of other seeds, programs or axes, and names what is missing. With GNU
+parallel, and as a job array of Slurm (`examples/cluster/zwidth.sbatch`):
+
+    parallel ./kerf lab zwidth --rate 250,500,1000,2000 --jobs 1 --shard {}/8 --part zwidth-{}.part ::: {1..8}
+    ./kerf lab merge zwidth-*.part --plot zwidth.svg --csv zwidth.csv --json zwidth.json
+
+"""
+
+NAMES = {"omni": "Omni", "falcon": "Falcon", "woodenhaptics": "WoodenHaptics"}
+MARGIN = 1.5
+SEEDS = 3
+
+# Axis, its values, and options that they need. In bold: the standard.
+KNOBS_MEASURED = [
+    ("rate", "250,500,1000,2000,4000,8000"), ("delay", "0,0.5,1,2,3"), ("damping", "0,0.001,0.002,0.005,0.01,0.02"),
+    ("friction", "0,0.05,0.1,0.26"), ("quantum", "0,0.01,0.055,0.2"), ("viscous", "0,0.0002,0.0005,0.002"),
+    ("mass", "0.02,0.045,0.2"), ("hand", "none,light,firm"), ("estimator", "foaw,difference"),
+    ("filter", "0,1,5", "--estimator", "difference"), ("law", "coupling,linear,two_sided"),
+    ("stabiliser", "none,passivity,energy_bounding"), ("limits", "on,off"), ("numeric", "fixed,float,double")]
+
+
+def crossing(boundary):
+    first = boundary["first_n_per_mm"]
+    return NEVER if first is None else first
+
+
+def lowest(column):
+    """The lower first crossing of both rules; 0 if the column has no cells."""
+    return min(crossing(column["by_travel"]), crossing(column["by_energy"])) if column["cells"] else 0
+
+
+def exact_of(column):
+    exact = column["analytic"]["exact_n_per_mm"]
+    return NEVER if exact is None else exact
+
+
+def value(column, axis):
+    return column["axes"][AXES[axis][0]]
+
+
+class Maps:
+    """Measures maps with kerf-lab."""
+
+    def __init__(self, order):
+        self.program, self.quick, self.jobs = order["program"], order["quick"], order["jobs"]
+
+    def measure(self, axes, stiffnesses, seconds=2, more=()):
+        quick = self.quick
+        with tempfile.TemporaryDirectory() as folder:
+            words = [self.program, "zwidth", *more, "--json", f"{folder}/map.json",
+                     "--stiffness", f"0.05:50:{6 if quick else stiffnesses}", "--seconds", str(0.3 if quick else seconds)]
+            for axis, values in axes.items():
+                words += [f"--{axis}", values]
+            if self.jobs:
+                words += ["--jobs", str(self.jobs)]
+            if subprocess.run(words, stdout=subprocess.DEVNULL, check=False).returncode != 0:
+                raise text.BadInput(f"kerf-lab: {' '.join(words[1:])}: failed (above)")
+            with open(f"{folder}/map.json", encoding="utf-8") as file:
+                return json.load(file)
+
+    def lowest_of_seeds(self, axes, arm):
+        """The lowest crossing of each column of these axes, over several phases of the encoder steps."""
+        least = {}
+        for seed in range(1, (1 if self.quick else SEEDS) + 1):
+            found = self.measure(axes, 14 if arm else 160, 1 if arm else 2, ["--seed", str(seed), *(["--arm"] if arm else [])])
+            for column in found["columns"]:
+                key = value(column, "device"), value(column, "delay"), value(column, "hand")
+                least[key] = min(least.get(key, NEVER), lowest(column))
+        return least
+
+
+def measure(order):
+    maps, quick = Maps(order), order["quick"]
+    devices = maps.measure({"device": ",".join(NAMES), "damping": "0:0.03:3" if quick else "0:0.03:31"}, 36)
+    rates = maps.measure({"rate": "250,500,1000,2000,4000,8000", "damping": "0:0.03:3" if quick else "0:0.03:21"}, 30, 1)
+    return json.dumps({"provenance": order["provenance"], "devices": devices, "rates": rates,
+                       "table": measure_devices(maps, devices), "stabilisers": measure_stabilisers(maps),
+                       "knobs": measure_knobs(maps, devices), "numbers": measure_numbers(maps)})
+
+
+def measure_devices(maps, devices):
+    """At the default damping, and at that of the highest K on the device's map."""
+    delays = "1" if maps.quick else "0,1,2"
+    rows = []
+    for device in NAMES:
+        of_device = [column for column in devices["columns"] if value(column, "device") == device]
+        best = value(max(of_device, key=lambda column: min(lowest(column), exact_of(column))), "damping")
+        for damping in [best] if maps.quick else ["0.002", best]:
+            axes = {"device": device, "delay": delays, "damping": damping}
+            exact = {value(column, "delay"): exact_of(column) for column in maps.measure(axes, 2)["columns"]}
+            axis = maps.lowest_of_seeds({**axes, "hand": "none,firm"}, False)
+            arm = maps.lowest_of_seeds(axes, True)
+            rows += [{"device": NAMES[device], "delay": delay, "damping": damping, "exact": exact[delay],
+                      "axis": axis[device, delay, "none"], "held": axis[device, delay, "firm"],
+                      "arm": arm[device, delay, "none"]} for delay in delays.split(",")]
+    return rows
+
+
+def measure_stabilisers(maps):
+    axes = {"device": ",".join(NAMES), "delay": "1" if maps.quick else "0,1,2", "damping": "0.002",
+            "stabiliser": "none" if maps.quick else "none,passivity,energy_bounding"}
+    rows = {}
+    for found in (maps.measure(axes, 40), maps.measure(axes, 14, 1, ["--arm"])):
+        for column in found["columns"]:
+            row = rows.setdefault((value(column, "device"), value(column, "delay")), {})
+            row.setdefault(value(column, "stabiliser"), []).append(lowest(column))
+    return [{"device": NAMES[device], "delay": delay, "lowest": row} for (device, delay), row in rows.items()]
+
+
+def measure_knobs(maps, devices):
+    standard = {**devices["columns"][0]["axes"], AXES["damping"][0]: "0.002"}  # the Omni's
+    rows = []
+    for axis, values, *more in KNOBS_MEASURED:
+        for column in maps.measure({"damping": "0.002", axis: values}, 40, 2, more)["columns"]:
+            rows.append({"name": axis, "unit": AXES[axis][1], "value": value(column, axis),
+                         "standard": value(column, axis) == standard[AXES[axis][0]],
+                         "swings": crossing(column["by_travel"]), "active": crossing(column["by_energy"]),
+                         "exact": exact_of(column), "re_entry": column["by_travel"]["re_entry_from_n_per_mm"]})
+    return rows
+
+
+def measure_numbers(maps):
+    """Cells with another verdict than in double."""
+    found = maps.measure({"numeric": "fixed,float,double", "damping": "0:0.03:3" if maps.quick else "0:0.03:20"}, 30)
+    columns = {(value(column, "numeric"), value(column, "damping")): column for column in found["columns"]}
+    rows = []
+    for numeric in ("fixed", "float"):
+        row = {"numeric": numeric, "cells": 0, "others": 0, "columns": 0, "factor": 1}
+        for (kind, damping), column in columns.items():
+            if kind != numeric or not column["cells"]:
+                continue
+            truth = columns["double", damping]
+            row["cells"] += len(column["cells"])
+            row["others"] += sum(a["swings"] != b["swings"] for a, b in zip(column["cells"], truth["cells"]))
+            x, y = crossing(column["by_travel"]), crossing(truth["by_travel"])
+            if 0 < x < NEVER and 0 < y < NEVER:
+                row["columns"] += x != y
+                row["factor"] = max(row["factor"], x / y, y / x)
+        rows.append(row)
+    return rows
+
+
+def first(n_per_mm):
+    """A first crossing; the ends are those of all maps of the page."""
+    return "> 50" if n_per_mm == NEVER else text.figure(n_per_mm) if n_per_mm > 0 else "< 0.05"
+
+
+def below(number, digits):
+    """Rounded down to so many digits: a limit that is printed as safe is safe."""
+    step = 10.0 ** (math.floor(math.log10(number)) + 1 - digits)
+    return f"{math.floor(number / step + 1e-9) * step:.{digits}g}"
+
+
+def recommended(row):
+    least = min(row["axis"], row["held"], row["arm"], row["exact"])
+    return f"**{below(least / MARGIN, 2) if least > 0 else 'none'}**"
+
+
+def page(data, devices, rates):
+    kinds = list(text.rows_of(data, "stabilisers")[0]["lowest"])
+    return (ABOUT + f"## Devices\n\n![Maps of three devices]({devices})\n\n" + DEVICES
+            + text.table(["device", ">delay, periods", ">B, N s/mm", ">linear, exact", ">one axis", ">with a firm hand",
+                          ">whole arm", ">recommended K"],
+                         [[row["device"], row["delay"], row["damping"], text.figure(row["exact"]), first(row["axis"]),
+                           first(row["held"]), first(row["arm"]), recommended(row)] for row in text.rows_of(data, "table")])
+            + STABILISERS
+            + text.table(["device", ">delay, periods", *(f">{kind}" for kind in kinds)],
+                         [[row["device"], row["delay"], *(" / ".join(map(first, row["lowest"][kind])) for kind in kinds)]
+                          for row in data["stabilisers"]])
+            + f"\n## Rates\n\n![Maps of six rates]({rates})\n\n" + RATES + KNOBS
+            + text.table(["knob", ">value", ">swings from", ">active from", ">linear, exact", ">re-entry"],
+                         [[", ".join(filter(None, (row["name"], row["unit"]))),
+                           f"**{row['value']}**" if row["standard"] else row["value"], first(row["swings"]),
+                           first(row["active"]), text.figure(row["exact"]),
+                           text.figure(row["re_entry"]) if row["re_entry"] > 0 else "-"] for row in data["knobs"]])
+            + "\n## Fixed point, float and double\n\n"
+            + "".join(f"* {row['numeric']}: {row['others']} of {row['cells']} cells have another verdict than in double; the "
+                      f"first crossing differs in {row['columns']} columns, at most by a\n  factor of {row['factor']:.3g}.\n"
+                      for row in data["numbers"])
+            + NUMBERS + HOW + data["provenance"] + "\n")
+
+
+def devices(data):
+    return draw_map(data["devices"])
+
+
+def rates(data):
+    return draw_map(data["rates"])
+
+
+def draw_map(data):
+    import stability_map  # needs matplotlib
+    return stability_map.map(data)
