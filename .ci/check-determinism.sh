@@ -7,7 +7,7 @@
 set -euo pipefail
 cd "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/.."
 folder=build/determinism
-row='%-22s %-20s %-7s %-5s %-7s %-16s %-16s %-16s %-16s %7s\n'
+row='%-22s %-20s %-7s %-5s %-7s %-16s %-16s %-16s %7s\n'
 
 # check PROCESSOR COMPILER FLAGS: builds, runs, prints the rows of the table; false if any differs.
 check() {
@@ -34,20 +34,19 @@ check() {
   fi
   local status=0
   result=$("${run[@]}" "$name/bin/test_golden") || status=$?
-  # golden SCENE NUMBERS KERNELS HASH VOLUME_HASH SECONDS; float and double do not depend on the
-  # kernels.
+  # golden SCENE NUMBERS KERNELS HASH VOLUME_HASH SECONDS; double does not depend on the kernels.
   awk -v compiler="$compiler" -v flags="$flags" -v processor="$processor" -v row="$row" '
     $1 != "golden" { next }
     $3 == "fixed" { line[++rows] = $0; next }
-    { other[$2, $3] = $5; other_seconds[$2] += $7 }
+    { other[$2] = $5; other_seconds[$2] += $7 }
     END {
       for (i = 1; i <= rows; ++i) {
         split(line[i], field)
         scene = field[2]
         printf row, compiler, flags, processor, scene, field[4], field[5], field[6],
-          other[scene, "float"], other[scene, "double"],
+          other[scene],
           sprintf("%.1f", field[7] + other_seconds[scene])
-        other[scene, "float"] = other[scene, "double"] = "same run"
+        other[scene] = "same run"
         other_seconds[scene] = 0
       }
     }' <<<"$result"
@@ -86,7 +85,7 @@ list() {
 
 mkdir -p "$folder"
 # shellcheck disable=SC2059
-printf "$row" compiler flags machine scene kernels fixed 'its volume' float double seconds
+printf "$row" compiler flags machine scene kernels fixed 'its volume' double seconds
 failed=0 running=0
 collect() {
   wait -n || failed=$((failed + 1))

@@ -193,7 +193,6 @@ struct LawRowOf : LawRow {
   using Make = LawPlan<In<N>, typename N::Real> (*)(const LawSetup& setup);
 
   Make<FixedNumbers> fixed;
-  Make<FloatNumbers> float32;
   Make<DoubleNumbers> float64;
 };
 using ForceLawRow = LawRowOf<ForceInput>;
@@ -201,14 +200,13 @@ using VelocityEstimatorRow = LawRowOf<VelocityInput>;
 using StabiliserRow = LawRowOf<StabiliserInput>;
 
 /// The row of a class template `Law<N>`, whose `kName`, `kMeaning` and `kSettings` do not
-/// depend on N. `step` is compiled for all three.
+/// depend on N. `step` is compiled for both.
 template <template <class> class Law, template <class> class In>
 [[nodiscard]] constexpr LawRowOf<In> law_row(LawKind kind) noexcept {
   using Fixed = Law<FixedNumbers>;
   static_assert(std::size(Fixed::kSettings) <= kMostLawSettings, "a law has too many settings");
   return {{kind, Fixed::kName, Fixed::kMeaning, Fixed::kSettings},
           &law_plan<Fixed, In<FixedNumbers>, FixedNumbers::Real>,
-          &law_plan<Law<FloatNumbers>, In<FloatNumbers>, FloatNumbers::Real>,
           &law_plan<Law<DoubleNumbers>, In<DoubleNumbers>, DoubleNumbers::Real>};
 }
 

@@ -153,13 +153,8 @@ std::unique_ptr<CompiledScene> plan_scene(const LoadedScene& scene, const Kernel
                     ": cut.model = \"preston\" needs the normal force of a proxy; set force.model "
                     "= \"proxy\", or cut.model = \"overlap\"");
   }
-  switch (scene.servo.numeric) {
-    case NumericKind::fixed:
-      return std::make_unique<CompiledSceneOf<FixedNumbers>>(scene, kernels);
-    case NumericKind::float32:
-      return std::make_unique<CompiledSceneOf<FloatNumbers>>(scene, kernels);
-    case NumericKind::float64:
-      break;
+  if (scene.servo.numeric == NumericKind::fixed) {
+    return std::make_unique<CompiledSceneOf<FixedNumbers>>(scene, kernels);
   }
   return std::make_unique<CompiledSceneOf<DoubleNumbers>>(scene, kernels);
 }

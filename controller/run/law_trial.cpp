@@ -299,7 +299,7 @@ bool is_own(const LawChoice& choice) {
 std::vector<LawTrial> try_law(const LawRow& row) {
   // A loop that is easy to hold: it does not decide about the law.
   const LawJob job{choices_of(row), 20'000, {1000, 0.05}};
-  return {try_in<FixedNumbers>(job), try_in<FloatNumbers>(job), try_in<DoubleNumbers>(job)};
+  return {try_in<FixedNumbers>(job), try_in<DoubleNumbers>(job)};
 }
 
 std::vector<std::string> try_own_laws(const LoadedScene& scene) {
@@ -312,9 +312,7 @@ std::vector<std::string> try_own_laws(const LoadedScene& scene) {
         2'000,
         {double(scene.servo.rate_hz), device_parts::tip_noise_mm(scene.device.personality)}};
     const LawTrial trial = scene.servo.numeric == NumericKind::fixed ? try_in<FixedNumbers>(job)
-                           : scene.servo.numeric == NumericKind::float32
-                               ? try_in<FloatNumbers>(job)
-                               : try_in<DoubleNumbers>(job);
+                                                                     : try_in<DoubleNumbers>(job);
     if (trial.flaw == LawFlaw::none || trial.flaw == LawFlaw::unlisted) continue;
     const std::string line = scene.path + ": " + std::string(kind_name(choice->kind)) + " " +
                              choice->name + " " + trial.fault;

@@ -22,7 +22,7 @@ enum class LawFlaw : std::uint8_t {
 
 /// How one law behaved in one kind of numbers.
 struct LawTrial {
-  std::string numbers;      ///< fixed, float, double
+  std::string numbers;      ///< fixed, double
   std::uint64_t steps = 0;  ///< that it took
   double step_ns = 0;       ///< the mean of them
   LawFlaw flaw = LawFlaw::none;

@@ -101,7 +101,7 @@ struct Material {
 };
 
 /// The numbers of the loop.
-enum class NumericKind : std::uint8_t { fixed, float32, float64 };
+enum class NumericKind : std::uint8_t { fixed, float64 };
 enum class ForceModel : std::uint8_t {
   paper,  ///< sum of gradients over the samples of the tool
   proxy   ///< swept contact of the tool surface, coupled to the hand
@@ -236,7 +236,7 @@ struct Scene : SceneSettings {
 inline constexpr std::array<std::string_view, 2> kForceModelWords = {"paper", "proxy"};
 inline constexpr std::array<std::string_view, 4> kCutModelWords = {"none", "overlap",
                                                                    "overlap_exact", "preston"};
-inline constexpr std::array<std::string_view, 3> kNumericWords = {"fixed", "float", "double"};
+inline constexpr std::array<std::string_view, 2> kNumericWords = {"fixed", "double"};
 inline constexpr std::array<std::string_view, 3> kGradientWords = {"central", "sobel5", "farid"};
 
 [[nodiscard]] constexpr std::string_view word_of(ForceModel model) {

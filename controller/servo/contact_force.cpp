@@ -172,7 +172,6 @@ ToolForces<N> contact_and_cut(const ServoPlan<N>& plan, ServoState<N>& state,
   template ToolForces<N> contact_and_cut(const ServoPlan<N>&, ServoState<N>&, WorldVec<N::Real>, \
                                          const Rotation<N>&, DeviceVec<N::Real>) noexcept;
 KERF_INSTANTIATE(FixedNumbers)
-KERF_INSTANTIATE(FloatNumbers)
 KERF_INSTANTIATE(DoubleNumbers)
 #undef KERF_INSTANTIATE
 

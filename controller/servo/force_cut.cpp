@@ -265,7 +265,6 @@ ForceCut<N> cut_by_sent_force(const ServoPlan<N>& plan, ServoState<N>& state,
                                          const ToolContact<N>&, DeviceVec<N::Real>,              \
                                          bool) noexcept;
 KERF_INSTANTIATE(FixedNumbers)
-KERF_INSTANTIATE(FloatNumbers)
 KERF_INSTANTIATE(DoubleNumbers)
 #undef KERF_INSTANTIATE
 

@@ -103,7 +103,6 @@ Covered<N> GatherStep<N>::cover(const VolumeTick<N>& at, const CoverList<N>& lis
 }
 
 template struct GatherStep<FixedNumbers>;
-template struct GatherStep<FloatNumbers>;
 template struct GatherStep<DoubleNumbers>;
 
 /// Both of the paper's forces from the same sums, then the removal. Only for scenes that cut by
@@ -143,7 +142,6 @@ Covered<N> SurfaceStep<N>::cover(const VolumeTick<N>& /*at*/,
 }
 
 template struct SurfaceStep<FixedNumbers>;
-template struct SurfaceStep<FloatNumbers>;
 template struct SurfaceStep<DoubleNumbers>;
 
 }  // namespace kerf

@@ -432,7 +432,6 @@ bool apply_command(const ServoPlan<N>& plan, ServoState<N>& state,
   template double penetration_mm<N>(const ServoPlan<N>&, const ServoState<N>&) noexcept; \
   template bool apply_command<N>(const ServoPlan<N>&, ServoState<N>&, const ServoCommand&) noexcept;
 KERF_INSTANTIATE(FixedNumbers)
-KERF_INSTANTIATE(FloatNumbers)
 KERF_INSTANTIATE(DoubleNumbers)
 #undef KERF_INSTANTIATE
 

@@ -176,10 +176,6 @@ Spread interpolation_error(Arithmetic arithmetic) {
       case Arithmetic::q15:
         spread.add(interpolated<FixedNumbers>(corner, w) - truth);
         break;
-      case Arithmetic::float32:
-        spread.add(interpolated<FloatNumbers>(corner, {float(t.x), float(t.y), float(t.z)}) -
-                   truth);
-        break;
       case Arithmetic::float64:
         break;
     }

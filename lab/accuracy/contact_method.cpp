@@ -172,8 +172,6 @@ std::unique_ptr<ContactMethod> contact_method(const ContactChoice& choice,
       return fixed(CoarseLerp<8>{});
     case Arithmetic::q12:
       return fixed(CoarseLerp<12>{});
-    case Arithmetic::float32:
-      return from_field<FloatNumbers>(choice, volume, tool, Gather<FloatNumbers>{});
     case Arithmetic::float64:
       return from_field<DoubleNumbers>(choice, volume, tool, Gather<DoubleNumbers>{});
     case Arithmetic::q15:

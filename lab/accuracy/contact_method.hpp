@@ -23,7 +23,6 @@ enum class Arithmetic : std::uint8_t {
   q8,       ///< trilinear weights of 8 bits: less than kerf keeps
   q12,      ///< of 12 bits
   q15,      ///< of 15 bits: the servo's
-  float32,  ///< the servo's float
   float64,  ///< the servo's double, the truth of the others
 };
 enum class Interpolation : std::uint8_t { nearest, trilinear, quadratic, cubic };
@@ -35,7 +34,7 @@ enum class Storage : std::uint8_t {
 };
 
 /// One way to compute the contact force. In fixed point the servo's methods `gather`, `aligned` and
-/// `splat` run with their kernels, float32 and float64 are the servo's templates; all else is plain
+/// `splat` run with their kernels, float64 is the servo's template; all else is plain
 /// text of the lab: the interpolations in double, the coarse weights through the servo's own lerp.
 struct ContactChoice {
   Arithmetic arithmetic = Arithmetic::q15;

@@ -29,7 +29,6 @@ std::vector<Variant> variants() {
       {"arithmetic", "Q8", {.arithmetic = q8}, true},
       {"arithmetic", "Q12", {.arithmetic = q12}, true},
       {"arithmetic", "Q15", {}, true},
-      {"arithmetic", "float", {.arithmetic = float32}, true},
       {"arithmetic", "double", {.arithmetic = float64}},
       {"pitch", "2", {.pitch_vox = 2}},
       {"pitch", "1", {}},

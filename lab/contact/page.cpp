@@ -91,7 +91,7 @@ enamel, at the worst of nine places. `GE tooth` is a real tooth by CT, below `--
 shaft, some with a handpiece, turned anyhow, with 0.1 to 1 N for 5 s, from any side and with a tremor of 0.1 mm: into a
 flat, a crown, layers, rubble, pits, shells, plates, or a block that ends at the volume's border. Half of these have
 soft matter in them, which may not be cut in half of those; machinability is 1, 4 or 8 times that of enamel. Of 24
-scenes 18 run in fixed point at 1 kHz and 250 Hz, the others at 8 kHz, in double and in float. Wherever force presses
+scenes 18 run in fixed point at 1 kHz and 250 Hz, the others at 8 kHz and in double. Wherever force presses
 with more than the threshold, matter must leave. A shaft may bear what its own cylinders, where they touch, can balance
 by any forces along their normals; the rest is the head's. What is all softer than the iso must bear nothing. 240
 presses; 10,000 with `--only traps`; `--seed` names the first scene.)"},

@@ -97,7 +97,7 @@ std::uint64_t play(
   return hash_of(servo, volumes, out);
 }
 
-void judge(const LoadedScene& scene, std::uint64_t gone, Watch& watch) {
+void judge(std::uint64_t gone, Watch& watch) {
   LongRun& run = watch.run();
   const auto broken = [&](bool held, const char* rule, std::string what) {
     if (!held) watch.rules().broken(rule, std::move(what));
@@ -108,12 +108,8 @@ void judge(const LoadedScene& scene, std::uint64_t gone, Watch& watch) {
   broken(run.ramps == 0 || run.shortest_ramp == run.longest_ramp, "clock",
          "the force fades in over " + std::to_string(run.shortest_ramp) + " to " +
              std::to_string(run.longest_ramp) + " ticks");
-  // Fixed and double book exactly, and the sum here is of doubles; a place in float has a step of
-  // 2^-23, so each tick may be off by the force times that.
-  const double a_tick = scene.servo.numeric == NumericKind::float32
-                            ? scene.limits.force_n * 64 * std::ldexp(1.0, -22)
-                            : 1e-13;
-  const double most_mj = 1e-6 + a_tick * static_cast<double>(run.ticks);
+  // The ledger is exact in both number types; the sum here is of doubles.
+  const double most_mj = 1e-6 + 1e-13 * static_cast<double>(run.ticks);
   broken(run.ledger_off_mj <= most_mj, "ledger",
          "off by " + std::to_string(run.ledger_off_mj) + " mJ");
 }
@@ -147,7 +143,7 @@ LongRun run_long(NumericKind numeric, std::uint64_t ticks,
   LongRun& run = watch.run();
   run.largest_carry = std::max(middle->largest_carry(), servo->keep()->largest_carry());
   run.ticks_per_s = static_cast<double>(ticks) / took.count();
-  judge(scene, before - sum_of(*servo, volumes), watch);
+  judge(before - sum_of(*servo, volumes), watch);
   run.violations = watch.rules().violations();
   return run;
 }

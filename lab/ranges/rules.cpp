@@ -68,11 +68,9 @@ Rules::Rules(const LoadedScene& scene, std::uint64_t most_samples)
   const auto& offset = scene.device.offset_mm;
   const double farthest =
       std::max({std::abs(offset[0]), std::abs(offset[1]), std::abs(offset[2])}) + 500 * scale_;
-  const bool is_float = scene.servo.numeric == NumericKind::float32;
-  const double step = is_float ? std::ldexp(1.0, -23) : std::ldexp(1.0, -50);
+  const double step = std::ldexp(1.0, -50);
   const double fixed_step = scene.servo.numeric == NumericKind::fixed ? std::ldexp(1.0, -15) : 0;
   place_error_mm_ = 2 * (fixed_step + farthest * step) / scale_ + 500 * step;
-  energy_error_ = is_float ? 1e-6 : 1e-9;  // of the whole ledger, a tick
 }
 
 void Rules::broken(const char* rule, std::string what) {
@@ -106,8 +104,8 @@ void Rules::look_at_motion(const DeviceReport& report, const ServoOutput& out, d
     broken("overspeed", format("%.6g mm in a tick, above %.6g, and motors on", way_mm, allowed_mm));
   }
   const double booked_mj = std::abs(out.absorbed_mj - last_mj_);
-  const double most_mj = largest_gap_n_ * (way_mm + place_error_mm_) * 1.001 +
-                         energy_error_ * (std::abs(last_mj_) + 1) + 1e-9;
+  const double most_mj =
+      largest_gap_n_ * (way_mm + place_error_mm_) * 1.001 + 1e-9 * (std::abs(last_mj_) + 2);
   if (!(booked_mj <= most_mj))
     broken("energy", format("%.9g mJ booked, at most %.9g", booked_mj, most_mj));
 }

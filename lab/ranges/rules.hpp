@@ -50,7 +50,7 @@ class Rules {
   void look_at_force(const ServoOutput& out, bool leaves);
   void look_at_motion(const DeviceReport& report, const ServoOutput& out, double way_mm);
 
-  double force_n_, slew_n_, limit_mm_, scale_, place_error_mm_, energy_error_;
+  double force_n_, slew_n_, limit_mm_, scale_, place_error_mm_;
   std::uint64_t most_samples_;
   bool legs_;
   int motor_end_;

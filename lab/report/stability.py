@@ -134,7 +134,7 @@ KNOBS_MEASURED = [
     ("friction", "0,0.05,0.1,0.26"), ("quantum", "0,0.01,0.055,0.2"), ("viscous", "0,0.0002,0.0005,0.002"),
     ("mass", "0.02,0.045,0.2"), ("hand", "none,light,firm"), ("estimator", "foaw,difference"),
     ("filter", "0,1,5", "--estimator", "difference"), ("law", "coupling,linear,two_sided"),
-    ("stabiliser", "none,passivity,energy_bounding"), ("limits", "on,off"), ("numeric", "fixed,float,double")]
+    ("stabiliser", "none,passivity,energy_bounding"), ("limits", "on,off"), ("numeric", "fixed,double")]
 
 
 def crossing(boundary):
@@ -239,10 +239,10 @@ def measure_knobs(maps, devices):
 
 def measure_numbers(maps):
     """Cells with another verdict than in double."""
-    found = maps.measure({"numeric": "fixed,float,double", "damping": "0:0.03:3" if maps.quick else "0:0.03:20"}, 30)
+    found = maps.measure({"numeric": "fixed,double", "damping": "0:0.03:3" if maps.quick else "0:0.03:20"}, 30)
     columns = {(value(column, "numeric"), value(column, "damping")): column for column in found["columns"]}
     rows = []
-    for numeric in ("fixed", "float"):
+    for numeric in ("fixed",):
         row = {"numeric": numeric, "cells": 0, "others": 0, "columns": 0, "factor": 1}
         for (kind, damping), column in columns.items():
             if kind != numeric or not column["cells"]:
@@ -291,7 +291,7 @@ def page(data, devices, rates):
                            f"**{row['value']}**" if row["standard"] else row["value"], first(row["swings"]),
                            first(row["active"]), text.figure(row["exact"]),
                            text.figure(row["re_entry"]) if row["re_entry"] > 0 else "-"] for row in data["knobs"]])
-            + "\n## Fixed point, float and double\n\n"
+            + "\n## Fixed point and double\n\n"
             + "".join(f"* {row['numeric']}: {row['others']} of {row['cells']} cells have another verdict than in double; the "
                       f"first crossing differs in {row['columns']} columns, at most by a\n  factor of {row['factor']:.3g}.\n"
                       for row in data["numbers"])

@@ -31,7 +31,6 @@ ProxyContact<N> ContactRig<N>::follow(const ProxyPlan<N>& plan, ProxyState<N>& s
 }
 
 template class ContactRig<FixedNumbers>;
-template class ContactRig<FloatNumbers>;
 template class ContactRig<DoubleNumbers>;
 
 template <class N>

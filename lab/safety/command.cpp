@@ -205,8 +205,8 @@ Json Summary::json() const {
 }
 
 constexpr std::array<int, 5> kAllRatesHz{250, 1000, 2000, 4000, 8000};
-const std::vector<std::string> kModelWords{"paper", "proxy"};              // as in ForceModel
-const std::vector<std::string> kNumericWords{"fixed", "float", "double"};  // as in NumericKind
+const std::vector<std::string> kModelWords{"paper", "proxy"};     // as in ForceModel
+const std::vector<std::string> kNumericWords{"fixed", "double"};  // as in NumericKind
 
 std::vector<NamedScript> scripts_in(const std::string& place) {
   std::vector<NamedScript> scripts;
@@ -274,7 +274,7 @@ Command::Command(Arguments& program)
       .one_of(kModelWords)
       .split_at_commas()
       .shown_as("NAME,... [proxy]");
-  app_.option("--numeric", numerics_, "numbers of the loop: fixed, float, double")
+  app_.option("--numeric", numerics_, "numbers of the loop: fixed, double")
       .one_of(kNumericWords)
       .split_at_commas()
       .shown_as("NAME,... [fixed]");

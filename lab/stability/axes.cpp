@@ -38,7 +38,7 @@ constexpr std::array<AxisKind, kAxisCount> kKinds{{
     {"hand", "", "none", 0, 0, "",
      "that holds the device: none, light, firm or KG/NS_PER_MM/N_PER_MM"},
     {"mode", "Hz", "0", 0, 4000, "", "structural mode, of the whole arm alone (--arm)"},
-    {"numeric", "", "", 0, 0, "fixed float double", "numbers of the wall"},
+    {"numeric", "", "", 0, 0, "fixed double", "number type of the wall"},
     {"law", "", "", 0, 0, "",
      "force of the wall: coupling (kerf's), linear (never pulls), two_sided, paper (--arm: K sets "
      "its "

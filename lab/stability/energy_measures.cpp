@@ -265,7 +265,6 @@ std::vector<LoopWork> closed_loops() {
                                Model{"proxy, friction 0.3", ForceModel::proxy, 0.3, 0.1},
                                Model{"paper", ForceModel::paper, 0, 5e-3}};
   constexpr std::array kNumbers{std::pair{NumericKind::fixed, "fixed"},
-                                std::pair{NumericKind::float32, "float"},
                                 std::pair{NumericKind::float64, "double"}};
   std::vector<LoopWork> all;
   for (const Model& model : kModels) {
@@ -287,7 +286,6 @@ std::vector<LoopWork> closed_loops() {
 std::vector<TickCostRow> ledger_costs() {
   std::vector<TickCostRow> rows;
   add_rows<FixedNumbers>(rows);
-  add_rows<FloatNumbers>(rows);
   add_rows<DoubleNumbers>(rows);
   return rows;
 }

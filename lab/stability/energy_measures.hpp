@@ -12,7 +12,7 @@ namespace kerf::energy {
 /// Work of the hand around closed paths on a static ball, by the servo's own ledger.
 struct LoopWork {
   std::string model;    ///< proxy, proxy with friction, paper
-  std::string numeric;  ///< fixed, float, double
+  std::string numeric;  ///< fixed, double
   /// |SUM dW| / SUM |dW| of the contact force as if never sampled: 0 for a force with a potential.
   double share = 0;
   double friction_mj = 0;  ///< a loop; taken from the hand

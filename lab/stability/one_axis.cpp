@@ -169,17 +169,11 @@ LimitCycle hit(const Subject& subject, double stiffness, double hit_mm_per_s, do
 LimitCycle hit_one_axis(const Subject& subject, double stiffness_n_per_mm, double hit_mm_per_s,
                         double seconds, std::uint64_t seed, StepCounter& ticks,
                         const SwingWatch& watch) {
-  switch (subject.numeric) {
-    case NumericKind::float32:
-      return hit<FloatNumbers>(subject, stiffness_n_per_mm, hit_mm_per_s, seconds, seed, ticks,
-                               watch);
-    case NumericKind::float64:
-      return hit<DoubleNumbers>(subject, stiffness_n_per_mm, hit_mm_per_s, seconds, seed, ticks,
-                                watch);
-    case NumericKind::fixed:
-      break;
-  }
-  return hit<FixedNumbers>(subject, stiffness_n_per_mm, hit_mm_per_s, seconds, seed, ticks, watch);
+  return subject.numeric == NumericKind::fixed
+             ? hit<FixedNumbers>(subject, stiffness_n_per_mm, hit_mm_per_s, seconds, seed, ticks,
+                                 watch)
+             : hit<DoubleNumbers>(subject, stiffness_n_per_mm, hit_mm_per_s, seconds, seed, ticks,
+                                  watch);
 }
 
 }  // namespace kerf::zwidth

@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <limits>
 
-// The numbers of the servo: saturating fixed point, and the three bundles of number types.
+// The numbers of the servo: saturating fixed point, and the two bundles of number types.
 
 namespace kerf {
 
@@ -174,7 +174,7 @@ template <std::floating_point S>
   return x - x == S(0);
 }
 
-/// The number types that a kernel computes with. One template serves all three bundles:
+/// The number types that a kernel computes with. One template serves both bundles:
 /// `FixedNumbers` is the default in the loop, `DoubleNumbers` the reference in tests.
 ///
 ///   Real      mm, N, voxels             Unit      sines, rotation entries, |x| <= 1
@@ -201,25 +201,22 @@ struct FixedNumbers {
   static constexpr Sample kSampleOne = 1 << 8;
 };
 
-template <std::floating_point S>
-struct FloatingNumbers {
-  static constexpr const char* kName = sizeof(S) == 4 ? "float" : "double";
+struct DoubleNumbers {
+  static constexpr const char* kName = "double";
   static constexpr bool kIsFixed = false;
-  using Real = S;
-  using Unit = S;
-  using Angle = S;
-  using Ratio = S;
-  using Step = S;
-  using Gradient = S;
-  using Weight = S;
-  using Sample = S;
-  using Sum = S;
-  using Energy = S;
-  static constexpr Weight kWeightOne = S(1);
-  static constexpr Step kStepOne = S(1);
-  static constexpr Sample kSampleOne = S(1);
+  using Real = double;
+  using Unit = double;
+  using Angle = double;
+  using Ratio = double;
+  using Step = double;
+  using Gradient = double;
+  using Weight = double;
+  using Sample = double;
+  using Sum = double;
+  using Energy = double;
+  static constexpr Weight kWeightOne = 1;
+  static constexpr Step kStepOne = 1;
+  static constexpr Sample kSampleOne = 1;
 };
-using FloatNumbers = FloatingNumbers<float>;
-using DoubleNumbers = FloatingNumbers<double>;
 
 }  // namespace kerf

@@ -116,8 +116,7 @@ bool make_scene(Bytes& in, kerf::LoadedScene& scene) {
   scene.force.model = in.one_of({ForceModel::proxy, ForceModel::proxy, ForceModel::paper});
   scene.force.friction = in.one_of({0.0, 0.5});
   scene.cut.model = in.one_of({CutModel::none, CutModel::preston, CutModel::overlap_exact});
-  scene.servo.numeric = in.one_of(
-      {NumericKind::fixed, NumericKind::fixed, NumericKind::float32, NumericKind::float64});
+  scene.servo.numeric = in.one_of({NumericKind::fixed, NumericKind::fixed, NumericKind::float64});
   scene.servo.rate_hz = in.one_of({1000, 250, 2000});
   return true;
 }

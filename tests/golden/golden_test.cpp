@@ -61,12 +61,8 @@ TEST_CASE("20 s of milling in fixed point end in the known bits on every instruc
   }
 }
 
-TEST_CASE("20 s of milling in float and double end in the known bits") {
+TEST_CASE("20 s of milling in double end in the known bits") {
   const KernelSet& unused = **kernel_sets();
-  const GoldenRun in_float = printed_run(GoldenScene::mill, NumericKind::float32, unused);
-  CHECK(in_float.hash == "d53befaba30e7482");
-  CHECK(in_float.volume_hash == "0f56cf84df38d579");
-  check_rich(in_float);
   const GoldenRun in_double = printed_run(GoldenScene::mill, NumericKind::float64, unused);
   CHECK(in_double.hash == "e1926550d3e9a5fd");
   CHECK(in_double.volume_hash == "a83c05782744d479");
@@ -82,11 +78,8 @@ TEST_CASE("3 s of feeling in fixed point end in the known bits on every instruct
   }
 }
 
-TEST_CASE("3 s of feeling in float and double end in the known bits") {
+TEST_CASE("3 s of feeling in double end in the known bits") {
   const KernelSet& unused = **kernel_sets();
-  const GoldenRun in_float = printed_run(GoldenScene::feel, NumericKind::float32, unused);
-  CHECK(in_float.hash == "ab7de43d532affad");
-  check_felt(in_float);
   const GoldenRun in_double = printed_run(GoldenScene::feel, NumericKind::float64, unused);
   CHECK(in_double.hash == "a04461e2d118c546");
   check_felt(in_double);

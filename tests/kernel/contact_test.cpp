@@ -105,7 +105,7 @@ TEST_CASE("samples count when their cell is inside the volume and not otherwise"
 }
 
 TEST_CASE_TEMPLATE("a tool far outside, at the range ends or nowhere feels nothing", N,
-                   FixedNumbers, FloatNumbers, DoubleNumbers) {
+                   FixedNumbers, DoubleNumbers) {
   const TestVolume volume = random_volume({9, 8, 7}, 2);
   const auto field = gradients<N>(GradientKernel::farid, volume);
   const auto tool = odd_ball(3);

@@ -44,7 +44,7 @@ PointNumber<N> number(double x) {
 TEST_CASE_TEMPLATE(
     "a sphere meets nothing on its free way, ends where something is, and looks as "
     "often as it enters bricks",
-    N, FixedNumbers, FloatNumbers, DoubleNumbers) {
+    N, FixedNumbers, DoubleNumbers) {
   Dice dice(3);
   int whole = 0, none = 0, part = 0;
   for (int i = 0; i < cases(400); ++i) {
@@ -109,7 +109,7 @@ TEST_CASE_TEMPLATE(
 }
 
 TEST_CASE_TEMPLATE("from outside no way is free for a sphere that the map cannot tell", N,
-                   FixedNumbers, FloatNumbers, DoubleNumbers) {
+                   FixedNumbers, DoubleNumbers) {
   std::vector<Density> density(kGrid.voxel_count(), 0);
   density[kGrid.index(25, 20, 22)] = 9;
   const FreeBrickMap map(kGrid, density, 9);

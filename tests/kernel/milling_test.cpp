@@ -118,7 +118,7 @@ TEST_CASE_TEMPLATE("a straight sweep removes the capsule, and off the lattice ha
 }
 
 TEST_CASE_TEMPLATE("the forces of a tick come from the volume before its cut", N, FixedNumbers,
-                   FloatNumbers, DoubleNumbers) {
+                   DoubleNumbers) {
   const auto tool = odd_ball(4);
   const auto pose = turned_pose<N>({30.2, 12.1, 14.2}, {0.2, 0.1, -0.3, 0.9});
   LoadedScene<N> gentle(flat()), greedy(flat());

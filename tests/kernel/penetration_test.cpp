@@ -18,7 +18,7 @@ VoxelVec<typename N::Unit> direction(double x, double y, double z) {
 }  // namespace
 
 TEST_CASE_TEMPLATE("a ball in a flat is as deep as it is sunk, within a pitch", N, FixedNumbers,
-                   FloatNumbers, DoubleNumbers) {
+                   DoubleNumbers) {
   const TestVolume volume = solid({40, 40, 40}, [](double, double, double z) { return z - 20.0; });
   for (const double pitch : {1.0, 0.5, 0.25}) {
     const auto ball = odd_ball(static_cast<int>(6 / pitch));
@@ -33,7 +33,7 @@ TEST_CASE_TEMPLATE("a ball in a flat is as deep as it is sunk, within a pitch", 
 }
 
 TEST_CASE_TEMPLATE("depth is measured along the normal, in its units and whatever its sign", N,
-                   FixedNumbers, FloatNumbers, DoubleNumbers) {
+                   FixedNumbers, DoubleNumbers) {
   const TestVolume volume = filled({40, 40, 40}, 65535);
   const auto ball = odd_ball(5);
   const auto extent = [&](VoxelVec<typename N::Unit> normal) {
@@ -48,7 +48,7 @@ TEST_CASE_TEMPLATE("depth is measured along the normal, in its units and whateve
 }
 
 TEST_CASE_TEMPLATE("no depth in air, outside the volume or without samples", N, FixedNumbers,
-                   FloatNumbers, DoubleNumbers) {
+                   DoubleNumbers) {
   const TestVolume volume = solid({40, 40, 40}, [](double, double, double z) { return z - 20.0; });
   const auto ball = odd_ball(3);
   const auto felt = [&](std::span<const ToolOffset> tool, double z) {

@@ -41,7 +41,7 @@ TEST_CASE("the decay needs no libm and is as good") {
 }
 
 TEST_CASE_TEMPLATE("the spindle runs up, slows down under load and stalls", N, FixedNumbers,
-                   FloatNumbers, DoubleNumbers) {
+                   DoubleNumbers) {
   for (const int rate_hz : {250, 1000, 8000}) {
     const auto ratio = [&](double seconds, double torque_n_mm) {
       return double(after<N>(seconds, torque_n_mm, {}, 1, rate_hz).ratio);

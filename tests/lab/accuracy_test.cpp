@@ -115,7 +115,6 @@ TEST_CASE("every way to compute the force but the nearest voxel feels the same f
       ContactChoice{.arithmetic = q8},
       ContactChoice{.arithmetic = q12},
       ContactChoice{},
-      ContactChoice{.arithmetic = float32},
       ContactChoice{.arithmetic = float64},
       ContactChoice{.kernel = GradientKernel::central},
       ContactChoice{.kernel = GradientKernel::sobel5},
@@ -164,7 +163,6 @@ TEST_CASE("N5: interpolation errors are those of the formats' table") {
   CHECK(interpolation_error(Arithmetic::q12).worst() == doctest::Approx(11.8).epsilon(0.2));
   CHECK(interpolation_error(Arithmetic::q8).rms() == doctest::Approx(35).epsilon(0.05));
   CHECK(interpolation_error(Arithmetic::q8).worst() == doctest::Approx(139).epsilon(0.2));
-  CHECK(interpolation_error(Arithmetic::float32).worst() < 0.01);
 }
 
 TEST_CASE("F5: a closed loop on a ball makes no more work than the kernel's bound, as a rule") {

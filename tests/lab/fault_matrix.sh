@@ -6,10 +6,10 @@
 set -euo pipefail
 lab=$1 seeds=$2
 day=${KERF_FAULT_DAY:-$(date -u +%Y%m%d)}
-rates=(250 2000 4000 8000 500) models=(proxy paper) numerics=(float fixed double)
+rates=(250 2000 4000 8000 500) models=(proxy paper) numerics=(fixed double)
 rate=${rates[day % 5]}
 most=$((seeds * 1000 / rate))
-rotating=(faults --rate "$rate" --model "${models[day % 2]}" --numeric "${numerics[day % 3]}"
+rotating=(faults --rate "$rate" --model "${models[day % 2]}" --numeric "${numerics[day / 2 % 2]}"
   --seed-base "$day" --seeds "$((most > 0 ? most : 1))")
 echo "fault_matrix: today's part is repeated by: ./kerf lab ${rotating[*]}"
 "$lab" faults --seeds "$seeds"

@@ -16,12 +16,12 @@ kerf::LoadedScene falcon_scene(int rate_hz = 1000) {
   kerf::LoadedScene scene = kerf::test::half_space_scene();
   scene.device.personality = Personality::falcon;
   scene.device.torque_scale = kerf::FalconParams().torque_scale();
-  scene.servo.numeric = kerf::NumericKind::float32;
+  scene.servo.numeric = kerf::NumericKind::float64;
   scene.servo.rate_hz = rate_hz;
   return scene;
 }
 
-/// A Falcon whose hand comes down on a half-space and presses on; a servo in float.
+/// A Falcon whose hand comes down on a half-space and presses on; a servo in double.
 kerf::faults::Outcome pressing_falcon(const DeviceFault& fault, const char* latches = "not_finite",
                                       int rate_hz = 1000) {
   const kerf::LoadedScene scene = falcon_scene(rate_hz);

@@ -241,21 +241,19 @@ struct OfKind {
   static constexpr NumericKind value = kNumeric;
 };
 using FixedKind = OfKind<NumericKind::fixed>;
-using FloatKind = OfKind<NumericKind::float32>;
 using DoubleKind = OfKind<NumericKind::float64>;
-TEST_CASE_TEMPLATE_INVOKE(restore_id, FixedKind, FloatKind, DoubleKind);
+TEST_CASE_TEMPLATE_INVOKE(restore_id, FixedKind, DoubleKind);
 
 TEST_CASE("a state of another scene is refused") {
-  LoadedScene fixed = plain_scene(), floats = plain_scene(NumericKind::float32),
+  LoadedScene fixed = plain_scene(), doubles = plain_scene(NumericKind::float64),
               small = plain_scene(NumericKind::fixed, {{"volume.crop", "false"}});
-  const auto servo = compile(fixed), other = compile(floats), third = compile(small);
+  const auto servo = compile(fixed), other = compile(doubles), third = compile(small);
   CHECK_THROWS_AS(other->restore(*servo->keep()), std::invalid_argument);
   CHECK_THROWS_AS(third->restore(*servo->keep()), std::invalid_argument);
 }
 
 TEST_CASE("a run in two halves ends alike, and cuts, fades in and books as it should") {
-  for (const NumericKind numeric :
-       {NumericKind::fixed, NumericKind::float32, NumericKind::float64}) {
+  for (const NumericKind numeric : {NumericKind::fixed, NumericKind::float64}) {
     const LongRun run = run_long(numeric, 3001, [](double) {});
     for (const Violation& violation : run.violations)
       FAIL_CHECK(violation.rule << ": " << violation.what);

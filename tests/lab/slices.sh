@@ -9,11 +9,11 @@ part() {
   echo "slices: this part is repeated by: ./kerf lab $*"
   "$lab" "$@"
 }
-devices=(omni falcon woodenhaptics) rates=(250 500 2000 4000 8000) models=(proxy paper) numerics=(float fixed double)
+devices=(omni falcon woodenhaptics) rates=(250 500 2000 4000 8000) models=(proxy paper) numerics=(fixed double)
 # One of the eight seeds of the test `fault_matrix` at 1 kHz, then its part that goes with the date, for one device.
 part faults --seeds 1 --seed-base "$((1 + day % 8))"
 part faults --seeds 1 --seed-base "$day" --device "${devices[day / 3 % 3]}" --rate "${rates[day % 5]}" \
-  --model "${models[day % 2]}" --numeric "${numerics[day % 3]}"
+  --model "${models[day % 2]}" --numeric "${numerics[day / 2 % 2]}"
 # Twenty presses a scene: two of the twenty scenes of the test `traps`.
 part extremes --only traps --presses 40 --seed "$((15580 + 2 * (day % 10)))"
 part ranges --combinations 10 --seed "$day"

@@ -115,7 +115,7 @@ TEST_CASE("where a scene lies does not change its identity, anything in it does"
       [](auto& s) { s.cut.model = kerf::CutModel::none; },
       [](auto& s) { s.limits.slew_n_per_ms = 0.4; },
       [](auto& s) { s.servo.rate_hz = 2000; },
-      [](auto& s) { s.servo.numeric = kerf::NumericKind::float32; },
+      [](auto& s) { s.servo.numeric = kerf::NumericKind::float64; },
   };
   for (std::size_t i = 0; i < changes.size(); ++i) {
     CAPTURE(i);

@@ -293,13 +293,13 @@ TEST_CASE("options of the command line change the scene") {
       block_scene(folder, 0.5, kBall + "[cut]\nmodel = \"overlap\"\nrate_per_s = \"1/T\"\n");
   kerf::SceneOverrides overrides;
   overrides.rate_hz = 4000;
-  overrides.numeric = kerf::NumericKind::float32;
+  overrides.numeric = kerf::NumericKind::float64;
   overrides.spacing_mm = {0.2, 0.3, 0.4};
   overrides.window = {0, 2000};
   const kerf::LoadedScene scene = kerf::load_scene(path, overrides);
   CHECK(scene.servo.rate_hz == 4000);
   CHECK(scene.cut.rate_per_s == 4000);  // the paper's step follows the rate
-  CHECK(scene.servo.numeric == kerf::NumericKind::float32);
+  CHECK(scene.servo.numeric == kerf::NumericKind::float64);
   CHECK(scene.volumes.at(0).image.spacing_mm == std::array<double, 3>{0.2, 0.3, 0.4});
   const auto& density = scene.volumes.at(0).image.density;
   CHECK(*std::max_element(density.begin(), density.end()) == 32768);  // 1000 of 2000

@@ -281,18 +281,17 @@ TEST_CASE("every stage of every method has a price, on machines of all kinds") {
       };
       CHECK(work(splat_method(), name) > 0);
       if (cut == CutModel::none) CHECK(work(gather_method(), name) > 0);  // fixed point
-      CHECK(work(gather_method(), "float") > 0);
       CHECK(work(gather_method(), "double") > 0);
     }
   }
-  for (const char* name : {"avx512", "avx2", "neon", "scalar", "float", "double"}) {
+  for (const char* name : {"avx512", "avx2", "neon", "scalar", "double"}) {
     CHECK(work_us(query_stage(1, name)) > 0);
   }
   CHECK_THROWS_AS(static_cast<void>(query_stage(1, "abacus")), std::logic_error);
 }
 
 TEST_CASE("the servo's own tick is timed, and does there no more than it is said to") {
-  for (const auto numeric : {NumericKind::fixed, NumericKind::float32, NumericKind::float64}) {
+  for (const auto numeric : {NumericKind::fixed, NumericKind::float64}) {
     for (const auto force : {ForceModel::paper, ForceModel::proxy}) {
       for (const auto cut :
            {CutModel::none, CutModel::overlap, CutModel::overlap_exact, CutModel::preston}) {

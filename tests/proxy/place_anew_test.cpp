@@ -37,7 +37,7 @@ const Point kMiddle{32, 32, 32};
 }  // namespace
 
 TEST_CASE_TEMPLATE("in a cavity with a play of 0.1 units a tool stays, wherever the hand is", N,
-                   FixedNumbers, FloatNumbers, DoubleNumbers) {
+                   FixedNumbers, DoubleNumbers) {
   const SampledTool ball = tool_of_units("ball", kRadius, 2 * kRadius);
   const Body body =
       blurred({65, 65, 65}, [&](Point p) { return kRadius + 0.1 - length(p - kMiddle); });

@@ -62,7 +62,7 @@ TEST_CASE_TEMPLATE("a tool turns the short way by its step, and arrives", N, Fix
 }
 
 TEST_CASE_TEMPLATE("a turn keeps its length through a million products", N, FixedNumbers,
-                   FloatNumbers, DoubleNumbers) {
+                   DoubleNumbers) {
   Dice dice(5);
   const auto little = dice.turn<N>(0.37);
   Orientation<N> turn;

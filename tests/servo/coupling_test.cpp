@@ -13,7 +13,6 @@
 using kerf::DeviceVec;
 using kerf::DoubleNumbers;
 using kerf::FixedNumbers;
-using kerf::FloatNumbers;
 using kerf::virtual_coupling_force;
 
 namespace {
@@ -32,8 +31,7 @@ DeviceVec<typename N::Real> vec(double x, double y, double z) {
 
 }  // namespace
 
-TEST_CASE_TEMPLATE("at rest the coupling is a spring", N, FixedNumbers, FloatNumbers,
-                   DoubleNumbers) {
+TEST_CASE_TEMPLATE("at rest the coupling is a spring", N, FixedNumbers, DoubleNumbers) {
   const auto force = virtual_coupling_force(coupling<N>(), vec<N>(0.5, -1, 0.25), vec<N>(0, 0, 0));
   CHECK(double(force.x) == doctest::Approx(0.2).epsilon(1e-3));
   CHECK(double(force.y) == doctest::Approx(-0.4).epsilon(1e-3));
@@ -64,7 +62,7 @@ TEST_CASE_TEMPLATE("a hand that arrives fast feels no blow", N, FixedNumbers, Do
 }
 
 TEST_CASE_TEMPLATE("both ends of what a scene may say give a force in the spring's direction", N,
-                   FixedNumbers, FloatNumbers, DoubleNumbers) {
+                   FixedNumbers, DoubleNumbers) {
   using Real = typename N::Real;
   constexpr double kFar = 32767;
   for (const double stiffness : {kerf::kMinStiffnessNPerMm, 1.0, kerf::kMaxStiffnessNPerMm}) {

@@ -19,7 +19,6 @@ inline constexpr std::array kCutKinds{
     CutKind{"preston, double", NumericKind::float64, CutModel::preston},
     CutKind{"paper, fixed, aligned", NumericKind::fixed, CutModel::overlap},
     CutKind{"paper, fixed, splat", NumericKind::fixed, CutModel::overlap, false},
-    CutKind{"paper, float, gradients", NumericKind::float32, CutModel::overlap},
     CutKind{"paper, double, gradients", NumericKind::float64, CutModel::overlap}};
 
 /// Solid below y = 0, in 40^3 voxels: the far bricks of a block are missing.

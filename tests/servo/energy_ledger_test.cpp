@@ -98,9 +98,6 @@ TEST_CASE("the sources sum up to the energy of the port: in fixed to the last bi
     CHECK(std::abs(std::accumulate(parts.begin(), parts.end(), 0.0) - truth.total_mj()) <
           1e-12 * largest);
     if (!gaps) CHECK(std::abs(mj(truth, EnergySource::hold)) < 1e-12);
-
-    const auto single = random_run<FloatNumbers>(1'000, gaps);
-    CHECK(mj<FloatNumbers>(single.total_mj()) == doctest::Approx(truth.total_mj()).epsilon(1e-3));
   }
 }
 
@@ -122,8 +119,7 @@ TEST_CASE_TEMPLATE("a spring gives back what it stored, and the hold leaks K dx^
   CHECK(mj<N>(half_way.lowest_mj()) == 0);
 }
 
-TEST_CASE_TEMPLATE("the leak is a damper of -K T / 2", N, FixedNumbers, FloatNumbers,
-                   DoubleNumbers) {
+TEST_CASE_TEMPLATE("the leak is a damper of -K T / 2", N, FixedNumbers, DoubleNumbers) {
   constexpr double kStiffness = 0.8, kPeriodS = 1e-3, kAmplitudeMm = 2, kRadPerS = 40;
   const auto at = [](int i) {  // always inside of the wall
     return -3 + kAmplitudeMm * std::sin(kRadPerS * kPeriodS * i);

@@ -9,7 +9,6 @@
 using kerf::DeviceVec;
 using kerf::DoubleNumbers;
 using kerf::FixedNumbers;
-using kerf::FloatNumbers;
 
 namespace {
 
@@ -27,8 +26,7 @@ double length(V v) {
 
 }  // namespace
 
-TEST_CASE_TEMPLATE("a clamped force keeps its direction", N, FixedNumbers, FloatNumbers,
-                   DoubleNumbers) {
+TEST_CASE_TEMPLATE("a clamped force keeps its direction", N, FixedNumbers, DoubleNumbers) {
   using Real = typename N::Real;
   const auto v = kerf::clamped(DeviceVec<Real>{Real(30.0), Real(-40.0), Real(0.0)}, Real(3.3));
   CHECK(length(v) == doctest::Approx(3.3).epsilon(1e-4));
@@ -36,7 +34,7 @@ TEST_CASE_TEMPLATE("a clamped force keeps its direction", N, FixedNumbers, Float
 }
 
 TEST_CASE_TEMPLATE("a force that is cut down keeps its direction, by peak, slew and heat", N,
-                   FixedNumbers, FloatNumbers, DoubleNumbers) {
+                   FixedNumbers, DoubleNumbers) {
   using Real = typename N::Real;
   const DeviceVec<Real> wanted{Real(6.0), Real(-3.0), Real(2.0)};  // 7 N
   kerf::ThermalState<N> thermal;
@@ -66,7 +64,7 @@ TEST_CASE("whatever is wanted, peak and slew hold, also from the ends of the num
 }
 
 TEST_CASE_TEMPLATE("a peak held for long settles at the continuous force", N, FixedNumbers,
-                   FloatNumbers, DoubleNumbers) {
+                   DoubleNumbers) {
   using Real = typename N::Real;
   kerf::ThermalState<N> thermal;
   DeviceVec<Real> sent{};
@@ -101,7 +99,7 @@ TEST_CASE("one more peak is there after a rest") {
 
 TEST_CASE_TEMPLATE(
     "a force falls at once while the hand leaves with it, and never grows or turns faster", N,
-    FixedNumbers, FloatNumbers, DoubleNumbers) {
+    FixedNumbers, DoubleNumbers) {
   using Real = typename N::Real;
   auto limits = omni_limits<N>();
   limits.slew_n_per_tick = Real(0.01);

@@ -16,7 +16,6 @@
 using kerf::DeviceVec;
 using kerf::DoubleNumbers;
 using kerf::FixedNumbers;
-using kerf::FloatNumbers;
 
 namespace {
 
@@ -48,7 +47,7 @@ double worst(const DeviceVec<typename N::Real>& a, const DeviceVec<double>& b) {
 }  // namespace
 
 TEST_CASE_TEMPLATE("sine and cosine agree with the library over all that an angle can be", N,
-                   FixedNumbers, FloatNumbers, DoubleNumbers) {
+                   FixedNumbers, DoubleNumbers) {
   for (int i = -8000; i <= 8000; ++i) {
     const auto angle = typename N::Angle(i / 1000.0);
     const double x = double(angle);
@@ -62,7 +61,7 @@ TEST_CASE_TEMPLATE("sine and cosine agree with the library over all that an angl
 }
 
 TEST_CASE_TEMPLATE("the tip agrees with the emulator's own kinematics", N, FixedNumbers,
-                   FloatNumbers, DoubleNumbers) {
+                   DoubleNumbers) {
   // A step of Q15.16 is 1.5e-5 mm; three roundings and the angle's add up to less than 2e-4.
   const double tolerance_mm = sizeof(typename N::Real) == 8 ? 1e-6 : 2e-4;
   const kerf::OmniArm arm;
@@ -73,7 +72,7 @@ TEST_CASE_TEMPLATE("the tip agrees with the emulator's own kinematics", N, Fixed
 }
 
 TEST_CASE_TEMPLATE("torques push the tip with the commanded force, by the emulator's Jacobian", N,
-                   FixedNumbers, FloatNumbers, DoubleNumbers) {
+                   FixedNumbers, DoubleNumbers) {
   const kerf::OmniArm arm;
   CHECK(rc::check([&] {
     const auto q = random_joints();
@@ -92,7 +91,7 @@ TEST_CASE_TEMPLATE("torques push the tip with the commanded force, by the emulat
 }
 
 TEST_CASE_TEMPLATE("orientations stay rotations, whatever counters and pots read", N, FixedNumbers,
-                   FloatNumbers, DoubleNumbers) {
+                   DoubleNumbers) {
   const auto plan = std::make_unique<kerf::ServoPlan<N>>();
   kerf::plan_device<N>({}, *plan);
   CHECK(rc::check([&] {

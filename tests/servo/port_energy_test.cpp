@@ -20,7 +20,7 @@ using extremes::Miller;
 
 namespace {
 
-constexpr std::array kEveryNumber{NumericKind::fixed, NumericKind::float32, NumericKind::float64};
+constexpr std::array kEveryNumber{NumericKind::fixed, NumericKind::float64};
 
 double mj(const ServoOutput& out, EnergySource source) {
   return energy_mj_of_steps(out.energy_steps[static_cast<std::size_t>(source)]);
@@ -101,7 +101,7 @@ TEST_CASE("pressing, rubbing and leaving: each source has its own account, and a
     CHECK(std::abs(mj(left, EnergySource::spring)) < 0.02 * stored_mj(scene, pressed));
     CHECK(left.port_minimum_mj <= left.absorbed_mj);
     CHECK(energy_mj_of_steps(sum_of_steps(left)) ==
-          doctest::Approx(left.absorbed_mj).epsilon(numeric == NumericKind::float32 ? 1e-4 : 1e-8));
+          doctest::Approx(left.absorbed_mj).epsilon(1e-8));
     if (numeric == NumericKind::fixed) {
       CHECK(energy_mj_of_steps(sum_of_steps(left)) == left.absorbed_mj);
     }
@@ -191,8 +191,7 @@ TEST_CASE("a flat of 4 N/mm throws the hand, and either stabiliser holds it; the
       CHECK(on.swing_mm < off.swing_mm);
       CHECK(mj(on.last, EnergySource::stabiliser) != 0);
       CHECK(energy_mj_of_steps(sum_of_steps(on.last)) ==
-            doctest::Approx(on.last.absorbed_mj)
-                .epsilon(numeric == NumericKind::float32 ? 1e-3 : 1e-8));
+            doctest::Approx(on.last.absorbed_mj).epsilon(1e-8));
       MESSAGE(name << ": port minimum " << on.last.port_minimum_mj << " mJ, swing " << on.swing_mm
                    << " mm, peak " << on.peak_n << " N; off " << off.last.port_minimum_mj << " mJ, "
                    << off.swing_mm << " mm");

@@ -27,8 +27,7 @@ double theory_n(double p_mm) {
 }  // namespace
 
 TEST_CASE("a ball in a half-space pushes straight out with the theory's force") {
-  for (const NumericKind numeric :
-       {NumericKind::fixed, NumericKind::float32, NumericKind::float64}) {
+  for (const NumericKind numeric : {NumericKind::fixed, NumericKind::float64}) {
     LoadedScene scene = paper_scene();
     scene.servo.numeric = numeric;
     ArmedServo armed(scene);

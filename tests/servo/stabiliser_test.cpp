@@ -69,7 +69,7 @@ constexpr PortLoop kHardWall{};
 TEST_CASE_TEMPLATE(
     "S15: a wall far beyond the limit diverges, and is bounded by the passivity "
     "controller",
-    N, FixedNumbers, FloatNumbers, DoubleNumbers) {
+    N, FixedNumbers, DoubleNumbers) {
   const PortLoopRun off = run_port_loop<N>(kHardWall, NoStabiliser<N>{});
   CHECK(off.farthest_mm() > 100);
   CHECK(off.port_minimum_mj < -100);
@@ -121,7 +121,7 @@ TEST_CASE_TEMPLATE("with the controller, its bound off, no cell of a sweep books
 }
 
 TEST_CASE_TEMPLATE("energy bounding leaves a passive wall as it is, to the last bit", N,
-                   FixedNumbers, FloatNumbers, DoubleNumbers) {
+                   FixedNumbers, DoubleNumbers) {
   PortLoop soft = kHardWall;
   soft.stiffness_n_per_mm = 0.2;  // half of 2 b / T
   const PortLoopRun off = run_port_loop<N>(soft, NoStabiliser<N>{});
@@ -129,7 +129,7 @@ TEST_CASE_TEMPLATE("energy bounding leaves a passive wall as it is, to the last 
 }
 
 TEST_CASE_TEMPLATE("energy bounding never gives more than hand and device put in", N, FixedNumbers,
-                   FloatNumbers, DoubleNumbers) {
+                   DoubleNumbers) {
   for (const double stiffness : {0.4, 1.0, 4.0, 20.0}) {
     for (const bool limits : {false, true}) {
       CAPTURE(stiffness);
@@ -148,7 +148,7 @@ TEST_CASE_TEMPLATE("energy bounding never gives more than hand and device put in
 }
 
 TEST_CASE_TEMPLATE("at the ends of every range passivity only brakes, and within its bound", N,
-                   FixedNumbers, FloatNumbers, DoubleNumbers) {
+                   FixedNumbers, DoubleNumbers) {
   for (const double mass_kg : {0.001, 0.045, 10.0}) {
     for (const double rate_hz : {250.0, 8000.0}) {
       CAPTURE(mass_kg);
@@ -183,7 +183,7 @@ TEST_CASE_TEMPLATE("at the ends of every range passivity only brakes, and within
 }
 
 TEST_CASE_TEMPLATE("at the ends of every range energy bounding only shortens the force", N,
-                   FixedNumbers, FloatNumbers, DoubleNumbers) {
+                   FixedNumbers, DoubleNumbers) {
   for (const double damping : {1e-6, 0.0002, 0.1}) {
     for (const double rate_hz : {250.0, 8000.0}) {
       CAPTURE(damping);

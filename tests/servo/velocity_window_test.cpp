@@ -12,7 +12,6 @@
 using kerf::DeviceVec;
 using kerf::DoubleNumbers;
 using kerf::FixedNumbers;
-using kerf::FloatNumbers;
 
 namespace {
 
@@ -57,7 +56,7 @@ Errors errors(int rate_hz, double velocity_mm_per_s) {
 }  // namespace
 
 TEST_CASE_TEMPLATE("S18: encoder steps of 0.055 mm at 1 kHz leave less than 0.6 mm/s", N,
-                   FixedNumbers, FloatNumbers, DoubleNumbers) {
+                   FixedNumbers, DoubleNumbers) {
   CHECK(errors<N>(1000, 10).rms <= 0.6);
   CHECK(errors<N>(1000, 200).rms <= 0.4);
   CHECK(errors<N>(1000, 0.5).rms <= 1.5);
@@ -112,7 +111,7 @@ TEST_CASE("whatever the places, the velocity is theirs within the range, and fix
 }
 
 TEST_CASE_TEMPLATE("missing reports leave a steady hand its velocity", N, FixedNumbers,
-                   FloatNumbers, DoubleNumbers) {
+                   DoubleNumbers) {
   using Real = typename N::Real;
   for (const int rate_hz : {250, 1000, 8000}) {
     for (const std::uint32_t gap : {2U, 5U, 20U, 400U}) {  // the last is longer than the window

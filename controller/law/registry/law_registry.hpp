@@ -63,8 +63,6 @@ template <template <class> class In, class N>
   const auto make = [&] {
     if constexpr (std::is_same_v<N, FixedNumbers>)
       return known.fixed;
-    else if constexpr (std::is_same_v<N, FloatNumbers>)
-      return known.float32;
     else
       return known.float64;
   }();

@@ -9,12 +9,12 @@ namespace kerf {
 namespace {
 
 //                         avx512  avx2  neon  scalar  float  double
-constexpr UnitCosts kContact{0.2, 0.3, 1, 3, 1.4, 2};
-constexpr UnitCosts kOverlap{0, 0, 0, 0, 0.9, 1.1};
-constexpr UnitCosts kModification{0, 0, 0, 0, 0.5, 0.5};
-constexpr UnitCosts kRemoval{0, 0, 0, 0, 3, 3};
-constexpr UnitCosts kBentRemoval{0, 0, 0, 0, 4.3, 4.3};
-constexpr UnitCosts kRefresh{0, 0, 0, 0, 9, 9};
+constexpr UnitCosts kContact{0.2, 0.3, 1, 3, 2};
+constexpr UnitCosts kOverlap{0, 0, 0, 0, 1.1};
+constexpr UnitCosts kModification{0, 0, 0, 0, 0.5};
+constexpr UnitCosts kRemoval{0, 0, 0, 0, 3};
+constexpr UnitCosts kBentRemoval{0, 0, 0, 0, 4.3};
+constexpr UnitCosts kRefresh{0, 0, 0, 0, 9};
 
 /// Any tool: stored gradients, interpolated at every sample. Fixed point gathers only where nothing
 /// is cut; float and double always.

@@ -26,7 +26,6 @@ double price_ns(const UnitCosts& prices, std::string_view runs_it) noexcept {
   if (runs_it == "avx2") return prices.avx2;
   if (runs_it == "neon") return prices.neon;
   if (runs_it == "scalar") return prices.scalar;
-  if (runs_it == "float") return prices.float32;
   return runs_it == "double" ? prices.float64 : 0;
 }
 
@@ -52,13 +51,13 @@ StageCost priced(const char* stage, std::uint64_t operations, const UnitCosts& p
 }
 
 StageCost query_stage(std::uint64_t samples, std::string_view runs_it) {
-  return priced("queries", samples, {2.4, 2.6, 9, 18, 19, 18}, runs_it);
+  return priced("queries", samples, {2.4, 2.6, 9, 18, 18}, runs_it);
 }
 
 void add_force_stages(std::uint64_t covered, std::string_view runs_it,
                       std::vector<StageCost>& stages) {
-  stages.push_back(priced("list", covered, {32, 42, 130, 80, 8, 8}, runs_it));
-  stages.push_back(priced("spend", covered, {9, 12, 65, 36, 4, 4}, runs_it));
+  stages.push_back(priced("list", covered, {32, 42, 130, 80, 8}, runs_it));
+  stages.push_back(priced("spend", covered, {9, 12, 65, 36, 4}, runs_it));
 }
 
 const AlignedTable& MethodMemory::hold_table(const SceneTool& tool, const AxisPermutation& turn,

@@ -42,7 +42,7 @@ struct StageCost {
 /// never measured on hardware: guesses, for slower cores.
 struct UnitCosts {
   double avx512, avx2, neon, scalar;
-  double float32 = 0, float64 = 0;
+  double float64 = 0;
 };
 
 /// A stage with the price of `runs_it`, the name of a kernel set or a word of NumericKind. Throws
@@ -56,7 +56,7 @@ struct UnitCosts {
 [[nodiscard]] StageCost query_stage(std::uint64_t samples, std::string_view runs_it);
 
 /// The stages of cutting by force, `list` and `spend`, the same beside every method: groups of
-/// voxels (in float and double: voxels) that the tool covers (tool_bounds.hpp), read with their
+/// voxels (in double: voxels) that the tool covers (tool_bounds.hpp), read with their
 /// weights; and the same, from which the budget is taken, twice if the fullest have not enough.
 void add_force_stages(std::uint64_t covered, std::string_view runs_it,
                       std::vector<StageCost>& stages);
@@ -140,7 +140,7 @@ struct TickShape {
   VoxelGrid grid{};
   CutModel cut = CutModel::none;
   bool swept = false;        ///< the contact is that of the proxy, so a method has no `contact`
-  std::string_view runs_it;  ///< name of the kernels, or "float" or "double"
+  std::string_view runs_it;  ///< name of the kernels, or "double"
   const AlignedTable* table = nullptr;  ///< of the method `aligned`
 };
 

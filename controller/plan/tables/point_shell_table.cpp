@@ -207,13 +207,10 @@ std::size_t TransformedShell<N>::bytes() const noexcept {
 }
 
 template class DenseSamples<FixedNumbers>;
-template class DenseSamples<FloatNumbers>;
 template class DenseSamples<DoubleNumbers>;
 template class PointShellTable<FixedNumbers>;
-template class PointShellTable<FloatNumbers>;
 template class PointShellTable<DoubleNumbers>;
 template class TransformedShell<FixedNumbers>;
-template class TransformedShell<FloatNumbers>;
 template class TransformedShell<DoubleNumbers>;
 
 }  // namespace kerf

@@ -28,7 +28,7 @@ template <class N>
 }
 
 /// Owner of a tool's close samples, sorted by cells. Load time; moving it keeps the table valid. In
-/// FixedNumbers, FloatNumbers and DoubleNumbers.
+/// FixedNumbers and DoubleNumbers.
 template <class N>
 class DenseSamples {
  public:
@@ -48,7 +48,7 @@ class DenseSamples {
 };
 
 /// Owner of one tool's point shell for the swept contact. Load time; moving it keeps the shell
-/// valid. In FixedNumbers, FloatNumbers and DoubleNumbers.
+/// valid. In FixedNumbers and DoubleNumbers.
 template <class N>
 class PointShellTable {
  public:
