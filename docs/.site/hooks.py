@@ -1,15 +1,28 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A hook of mkdocs: makes the site work from a folder, without a server, and leaves out what no page uses.
+"""Hooks of mkdocs. The first page of the site is README, with its links seen from docs/.
 
-A browser loads no JSON from a folder, so the search of mkdocs finds nothing there. The index becomes a script, and
-search.js beside this file searches it."""
+The site works from a folder, without a server, and omits what no page uses. A browser loads no JSON from a folder, so the
+search of mkdocs finds nothing there. The index becomes a script, and search.js beside this file searches it."""
 import json
 import pathlib
 import re
+import tempfile
+
+from mkdocs.structure.files import File
 
 HERE = pathlib.Path(__file__).parent
 # Formats of the one font for browsers that are older than ten years.
 OLD_FONTS = (".eot", ".svg", ".ttf", ".otf", ".woff")
+
+
+def on_files(files, config):
+    readme = (pathlib.Path(config["docs_dir"]).parent / "README.md").read_text(encoding="utf-8")
+    page = re.sub(r"\]\(docs/", "](", readme)
+    page = re.sub(r"\[(`[^`\]]+`)\]\([A-Z]+\.md\)", r"\1", page)  # a file that is no page of the site
+    folder = tempfile.mkdtemp()  # mkdocs reads it when it builds
+    pathlib.Path(folder, "index.md").write_text(page, encoding="utf-8")
+    files.append(File("index.md", folder, config["site_dir"], config["use_directory_urls"]))
+    return files
 
 
 def on_post_build(config):
