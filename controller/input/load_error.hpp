@@ -16,7 +16,7 @@
 
 namespace kerf {
 
-/// A fault of a scene, a volume or a tool, as one line: `place: value; way out`.
+/// A fault of a scene, a volume or a tool, as one line: `place: value; remedy`.
 ///
 /// The only exception of the loading code. `main` adds the program's name, prints the line and
 /// returns 2.

@@ -50,20 +50,20 @@ constexpr std::initializer_list<int> kHarmless{
     SCMP_SYS(exit_group)};
 
 #ifdef KERF_SANITIZED
-// The checks of our own code try addresses by a pipe, and tell on stderr what they find.
+// The sanitizers of our own code test addresses with a pipe and report on stderr.
 constexpr std::initializer_list<int> kOfChecks{SCMP_SYS(pipe), SCMP_SYS(pipe2),
                                                SCMP_SYS(sigaltstack), SCMP_SYS(sched_yield)};
 #else
 constexpr std::initializer_list<int> kOfChecks{};
 #endif
 
-/// A call that is allowed where one argument, masked, has one value.
+/// A call that is allowed only if one argument, masked, has one value.
 struct Conditional {
   int call;
   scmp_arg_cmp when;
 };
 
-/// What only some arguments make harmless.
+/// Calls that are harmless with some arguments only.
 auto conditional_calls() {
   constexpr scmp_datum_t kWrites = O_ACCMODE | O_CREAT | O_TRUNC;
   constexpr auto kOperation = static_cast<std::uint32_t>(~FUTEX_PRIVATE_FLAG);
@@ -77,7 +77,7 @@ auto conditional_calls() {
                     Conditional{SCMP_SYS(mmap), masked(2, PROT_EXEC, 0)},
                     Conditional{SCMP_SYS(mprotect), masked(2, PROT_EXEC, 0)},
                     Conditional{SCMP_SYS(futex), masked(1, kOperation, FUTEX_WAKE)},
-                    Conditional{SCMP_SYS(tgkill), equal(0, getpid())},  // what abort() does
+                    Conditional{SCMP_SYS(tgkill), equal(0, getpid())},  // abort() calls it
 #ifdef KERF_SANITIZED
                     Conditional{SCMP_SYS(write), equal(0, STDERR_FILENO)},
                     Conditional{SCMP_SYS(write), {0, SCMP_CMP_GT, kSandboxMemory, 0}},

@@ -17,8 +17,8 @@ struct VirtualCoupling {
   typename N::Unit damping_ns_per_mm{};
 };
 
-/// The damper grows with the spring (Hunt and Crossley 1975) and is full where it is this long: a
-/// hand that arrives fast feels no blow.
+/// The damper grows with the spring (Hunt and Crossley 1975) and is full at this length, so that a
+/// fast first contact causes no force step.
 inline constexpr double kFullDampingMm = 0.1;
 
 /// F = u max(0, K delta - B min(1, delta / kFullDampingMm) v . u). `spring_mm` leads from the hand

@@ -32,7 +32,7 @@ struct SceneOverrides {
   int read_cpu_s = kReadCpuSeconds;                     ///< --read-seconds, of each file
 };
 
-/// The tool of the default scene, at scale 1; `--volume` scales any other to the same feel.
+/// The tool of the default scene, at scale 1; `--volume` scales it for any other volume.
 inline constexpr double kReferenceRadiusMm = 1.0;
 /// The part of the device's workspace that a volume of `--volume` fills, x y z in mm.
 inline constexpr std::array<double, 3> kWorkspaceMm = {100.0, 80.0, 60.0};

@@ -50,7 +50,7 @@ struct LoadedScene : SceneSettings {
 using Point3 = vec3::Vec;  ///< mm
 
 /// World from source when a scene gives no orientation: the source's z axis points up (world y), so
-/// that a scan of a standing patient stands: (x, y, z) -> (x, z, -y).
+/// that a scan of an upright patient is upright: (x, y, z) -> (x, z, -y).
 inline constexpr Matrix3 kSourceStanding = {1, 0, 0, 0, 0, 1, 0, -1, 0};
 
 /// Pose of a volume whose box has its middle at `middle_mm` in the world, rotated by `orientation`

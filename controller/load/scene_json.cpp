@@ -74,7 +74,7 @@ Json json_of(const TomlValue& value) {
   return std::visit(convert, value);
 }
 
-/// The keys of a table that their rows and the scene's models tell to readers; null where none is.
+/// The keys of a table that go to readers, by their rows and the scene's models; null if none does.
 Json table_json(std::string_view table, SceneParts& parts, SceneKeys keys) {
   Json object;
   SceneParts defaults;

@@ -10,8 +10,8 @@ namespace kerf {
 
 /// The scene as readers of the segment and of recordings get it: JSON text on one line, keys
 /// sorted, numbers as a short text that reads back equal. The same scene gives the same text
-/// on every machine, so its path is left out and a volume's `file` stands as the scene wrote it;
-/// fnv1a of it is the identity of all that decides what a run does.
+/// on every machine, so its path is left out and a volume's `file` is the text of the scene. Its
+/// fnv1a hash identifies everything that determines a run.
 ///
 ///   volumes    [{name, file, iso (u16), solid, spacing_mm, grid, pose {position_mm, orientation},
 ///              density_hash}]

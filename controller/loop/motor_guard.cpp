@@ -28,7 +28,7 @@ namespace {
 std::atomic<DeviceDriver*> driven{nullptr};  // for signal handlers, which can only reach globals
 static_assert(std::atomic<DeviceDriver*>::is_always_lock_free);
 
-/// The way out may take some ticks, and the force must end before.
+/// An orderly end may take some ticks, and the force must end before.
 void on_stop() noexcept {
   if (DeviceDriver* device = driven.load()) device->stay_released();
 }

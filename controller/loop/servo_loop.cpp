@@ -173,7 +173,7 @@ EndReason run_servo(TickSource& clock, DeviceDriver& device, Servo& servo, Publi
 std::jthread start_watchdog(Watchdog& watchdog, const RealTimeOptions& servo) {
   return std::jthread([&watchdog, above = io_thread_of(servo)](const std::stop_token& stop) {
     // Linux keeps a part of each core for ordinary threads (docs/devices.md): if another program
-    // uses up the rest, all real-time threads of that core stand still together.
+    // uses up the rest, all real-time threads of that core stop together.
     static_cast<void>(avoid_core(above.core));
     static_cast<void>(set_fifo(above.priority));
     while (!stop.stop_requested()) {

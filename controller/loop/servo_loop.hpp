@@ -15,8 +15,7 @@
 #include "controller/servo/servo.hpp"
 #include "shared/segment/server.hpp"
 
-// The loop around the servo step, and the watchdog that switches the motors off if the loop stands
-// still.
+// The loop around the servo step, and the watchdog that switches the motors off if the loop stops.
 
 namespace kerf {
 
@@ -44,8 +43,8 @@ struct LoopSignals {
   std::atomic<Waiting> waiting{Waiting::report};  ///< of the device, after the last tick
 };
 
-/// First step of a tick: the force begins anew if the servo has stood still, by its watchdog, or by
-/// the clock if the watchdog stood still too. Returns the name of the detector, or nullptr.
+/// First step of a tick: restarts the force if the servo was stopped, detected by its watchdog, or
+/// by the clock if the watchdog was stopped too. Returns the name of the detector, or nullptr.
 inline const char* recover(LoopSignals& signals, bool stood_still, Servo& servo) noexcept {
   const bool watchdog_tripped = signals.stalled.exchange(false, std::memory_order_relaxed);
   if (!watchdog_tripped && !stood_still) return nullptr;

@@ -16,9 +16,9 @@
 
 namespace kerf {
 
-// Up to which speed a scene is free of drag in air (docs/theory.md 4.2): at any distance from a
-// flat wall, as long as no sample of the tool reads density that contact counts. In a cavity hardly
-// wider than the tool more samples are near matter, and it may be less.
+// The hand speed up to which a scene has no drag in air (docs/theory.md 4.2): at any distance from
+// a flat wall, if no sample of the tool reads density that contact counts. In a cavity hardly wider
+// than the tool more samples are near the solid, and the speed may be lower.
 
 /// No hand turns a tool faster: five turns a second.
 inline constexpr double kFastestTurnRadPerS = 30;
@@ -51,9 +51,9 @@ inline constexpr double kFastestTurnRadPerS = 30;
 
 /// Samples that a query reads at most beside a flat wall, the wall in the worst direction. It lies
 /// across a diagonal of the bricks: there the map knows least. A group is left out once the lowest
-/// corner of the brick that holds its middle is farther above all matter than what the group needs,
+/// corner of the brick that holds its middle is farther above the solid than what the group needs,
 /// by the diagonal of the cells in which a voxel is read and a step of the map. Tried with the tool
-/// at several places in a brick.
+/// at several positions in a brick.
 template <class N>
 [[nodiscard]] std::int64_t most_read_beside_wall(const PointTable<N>& table) {
   constexpr double kUnknown = std::numbers::sqrt3 + 1.0 / kFreeSteps;

@@ -34,7 +34,7 @@ struct LawSlope {
 ///
 /// A small swing about a press is that of the wall with these two slopes (linearisation), so the
 /// law has a margin of stability at each length. The slopes are quotients over an encoder step,
-/// since the loop has no finer input, and over 10 mm/s. A law with memory starts anew at each
+/// since the loop has no finer input, and over 10 mm/s. A law with memory starts again at each
 /// length, one that depends on the position is taken at the device's origin. In double; a result
 /// that is no number gives no slope there. Load time; the law has passed its trial (law_trial.hpp).
 std::vector<LawSlope> law_slopes(const LoadedScene& scene) {
@@ -139,7 +139,7 @@ double with_friction(const SampledLoop& loop, double damping, double linear_n_pe
   return stable;
 }
 
-/// Begin of a way out.
+/// Begin of a remedy.
 std::string gain_key(const LoadedScene& scene) {
   return scene.force.model == ForceModel::paper ? "force.p0_n_per_mm2" : "force.stiffness_n_per_mm";
 }
@@ -150,7 +150,7 @@ std::string law_words(const LoadedScene& scene, const GainMargin& margin) {
                 margin.spring_mm);
 }
 
-/// The way out of too high a damping, or of too high a stiffness.
+/// The remedy for too high a damping, or too high a stiffness.
 std::string way_out(const LoadedScene& scene, const GainMargin& margin) {
   if (margin.highest_n_per_mm <= 0) {
     const double most = highest_damping(loop_of(scene)) / kSafeMargin;

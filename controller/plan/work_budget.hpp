@@ -30,7 +30,7 @@ inline constexpr double kBudgetRatio = 0.5;
 [[nodiscard]] std::size_t costliest_tool(const SceneCosts& costs);
 
 /// Why the scene is refused: the costliest tool, its costliest stage and the highest rate that
-/// fits, on one line with the way out. Empty if every tool fits.
+/// fits, on one line with the remedy. Empty if every tool fits.
 [[nodiscard]] std::string budget_error(const LoadedScene& scene, const SceneCosts& costs);
 
 }  // namespace kerf

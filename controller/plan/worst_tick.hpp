@@ -33,8 +33,8 @@ template <class N>
 }
 
 /// The centre of a tool of this reach where the most density lies within it: there hardly anything
-/// is air and every stage does most of its work. Of several such places the one nearest to the
-/// volume's middle: past the border nothing is read.
+/// is air and every stage does most of its work. Of several such positions, the one nearest to the
+/// volume's middle, because no voxel is read past the border.
 [[nodiscard]] inline VoxelIndex densest_position(const VoxelGrid& grid,
                                                  std::span<const Density> density,
                                                  const VoxelBox& reach) {
@@ -82,13 +82,13 @@ struct WorstTick {
   double median_us = 0, p99_us = 0;
   VoxelIndex box;             ///< that held the tool's cells, in low corners
   std::uint64_t queried = 0;  ///< samples that its queries read, the median
-  std::uint64_t covered = 0;  ///< what the last cut by force covered
+  std::uint64_t covered = 0;  ///< voxels that the last cut by force covered
 };
 
-/// Drives tool `t` through the functions of the servo step that feel and cut, at about the highest
-/// cost that a hand can cause: the tool cuts where volume `v` is densest, turned as unfavourably as
-/// it can be and so slowly that it stays surrounded; where the swept proxy is felt, the hand jumps
-/// to and fro around that place in every tick, and turns, so that the sweep needs many queries.
+/// Drives tool `t` through the contact and cutting functions of the servo step, at about the
+/// highest cost that a hand can cause. The tool cuts at the densest position of volume `v`, in the
+/// least favourable orientation, and so slowly that it stays surrounded. With the swept proxy, the
+/// hand jumps around that position in every tick and rotates, so that the sweep needs many queries.
 /// Each tick covers all volumes. Takes 250 ticks.
 template <class N>
 class WorstCaseDriver {

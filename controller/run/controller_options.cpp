@@ -25,7 +25,7 @@ constexpr const char* kExitCodes =
     "\nExit codes: 0 fine, 1 ran and met a fault, 2 bad input or set-up.\n"
     "Try it without hardware: ./kerf demo";
 
-/// One, or three numbers: one stands for all three.
+/// One or three numbers; one is used for all three.
 std::array<double, 3> three_of(const std::vector<double>& values) {
   if (values.size() == 1) return {values[0], values[0], values[0]};
   return {values[0], values[1], values[2]};
@@ -41,7 +41,7 @@ std::ptrdiff_t index_of(const std::array<std::string_view, N>& words, const std:
   return std::ranges::find(words, word) - words.begin();
 }
 
-/// Values of options that belong to the scene, as they are written; empty where they are not given.
+/// Values of options that belong to the scene, as they are written; empty if not given.
 struct Raw {
   std::vector<double> spacing_mm, window, torque_scale;
   int rate_hz = 0;
@@ -50,7 +50,7 @@ struct Raw {
   bool scene_keys = false;
 };
 
-/// What is touched, held and run.
+/// Scene, device and run.
 void declare_scene_options(Arguments& app, ControllerOptions& options, Raw& raw) {
   app.option("--scene", options.scene, "scene file (TOML)").shown_as("FILE");
   app.option("--set", raw.settings, "another value of a key of the scene; may be given often")
@@ -148,7 +148,7 @@ void declare_run_options(Arguments& app, ControllerOptions& options, Raw& raw) {
       .shown_as("FILE");
 }
 
-/// What is wrong with the options together; empty: nothing.
+/// The conflict between options, as text; empty if there is none.
 std::string wrong_with(const ControllerOptions& options, const Raw& raw) {
   if (raw.spacing_mm.size() == 2) {
     return "--spacing has 2 numbers; give one for all axes, or three";

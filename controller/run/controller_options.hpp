@@ -14,12 +14,12 @@ namespace kerf {
 struct ControllerOptions {
   std::string scene;
   SceneOverrides overrides;
-  std::string port;               ///< as open_port.hpp says
+  std::string port;               ///< as in open_port.hpp
   std::optional<double> seconds;  ///< servo time after arming; none: until stopped
   double wait_s = 60;             ///< servo time for the device to be taken in hand
   std::string name = kDefaultName;
   bool virtual_time = false;
-  std::string until;            ///< FIFO that says how far lock-step may go; empty: none
+  std::string until;            ///< FIFO with the tick up to which lock-step may go; empty: none
   bool unchecked_gain = false;  ///< gains above the device's and beyond its stability
   bool check = false;
   bool explain = false;

@@ -26,7 +26,7 @@ struct LawTrial {
   std::uint64_t steps = 0;  ///< that it took
   double step_ns = 0;       ///< the mean of them
   LawFlaw flaw = LawFlaw::none;
-  std::string fault;  ///< empty if none; else one line: fault, settings and input; way out
+  std::string fault;  ///< empty if none; else one line: fault, settings and input; remedy
 };
 
 /// Tries a law in a process of its own: its settings at their defaults, and each and all of them at

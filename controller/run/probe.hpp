@@ -12,7 +12,7 @@
 #include "controller/servo/supervisor.hpp"
 #include "shared/numeric/numbers.hpp"
 
-// `--probe`: the first look at a device.
+// `--probe`: shows a device with its motors off.
 
 namespace kerf {
 
@@ -53,7 +53,7 @@ class ProbeView {
   Seen seen_;
 };
 
-/// `kerf-controller --probe`: the first look at a device, with its motors off throughout.
+/// `kerf-controller --probe`: shows the reports of a device, with its motors always off.
 ///
 /// With a port: opens it, prints the reports of the device once a second (on a terminal: one line,
 /// ten times a second), until `seconds` or a signal; then lists what is missing and writes the

@@ -30,8 +30,8 @@ struct SetupProblem {
   std::string cure;
 };
 
-/// What keeps this user from a device: no node, or no right to it. `which`: only this kind, and its
-/// absence is a lack; if empty, rights to the connected ones. `root` as above.
+/// What this user lacks for a device: a node, or the right to open it. `which`: only this kind,
+/// which must be connected; if empty, all connected devices. `root` as above.
 [[nodiscard]] std::vector<SetupProblem> lacks_of_nodes(std::optional<Personality> which,
                                                        std::span<const DeviceNode> nodes,
                                                        const std::filesystem::path& root = "/");

@@ -46,8 +46,8 @@ Json forbidden_of(const MaterialScores& materials) {
   return list;
 }
 
-/// What was removed of which material, and how long what is forbidden was touched. What lies below
-/// the surface goes with what is cut, unfelt.
+/// Removed volume by material, and the time in contact with forbidden material. Removal below the
+/// surface belongs to the material that was cut and gives no force.
 std::string score_lines(const MaterialScores& materials) {
   constexpr double kSeenMm3 = 0.0005;  // else the line would say 0.000
   std::string removed, unfelt, touched;

@@ -25,7 +25,7 @@ using MaterialScores = std::vector<MaterialScore>;
 struct RunReport {
   RunRecord record;
   std::string end;      ///< why the run ended
-  std::string waiting;  ///< what the run waited for at the end; may be empty
+  std::string waiting;  ///< the event that the run waited for at its end; may be empty
   std::string scene;
   std::string device;
   std::string numeric;

@@ -38,7 +38,7 @@ struct PlannedScene {
 /// LoadError, also if a signal requests the end meanwhile.
 [[nodiscard]] PlannedScene load_and_plan(const ControllerOptions& options);
 
-/// Refuses impossible options, also those that matter only at the end of a run.
+/// Refuses impossible options, also those that are used only at the end of a run.
 void check_options(const ControllerOptions& options, const LoadedScene& scene);
 
 /// Refuses work above a tick's budget. In lock-step the device waits: there is no deadline.

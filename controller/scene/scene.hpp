@@ -58,10 +58,10 @@ struct ToolSize {
   std::optional<std::int32_t> size_vox{};  ///< the head fills a cube of so many pitches
 };
 
-/// The parts behind the head in the scene, which are felt and never cut. Cylinders about
-/// the tool's axis; a handpiece begins where the shaft ends.
+/// Shaft and handpiece of the scene: they make contact and never cut. Cylinders about the tool's
+/// axis; a handpiece begins at the end of the shaft.
 struct ShaftSize {
-  std::optional<double> radius_mm{};  ///< if empty, no shaft is felt
+  std::optional<double> radius_mm{};  ///< if empty, there is no shaft
   std::optional<double> length_mm{};  ///< from the tool's tip to the shaft's end, head included
   std::optional<double> handpiece_radius_mm{};  ///< if empty, there is none
   std::optional<double> handpiece_length_mm{};  ///< if empty, its radius

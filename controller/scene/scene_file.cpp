@@ -51,7 +51,7 @@ TomlNode value_node(const KeyOverride& setting) {
   return node;
 }
 
-/// The entry of that key, new where there is none.
+/// The entry of that key; a new one if there is none.
 TomlNode& entry_of(TomlNode& table, std::string_view key) {
   const auto found = std::ranges::find(table.entries, key, &TomlNode::key);
   if (found != table.entries.end()) return *found;
@@ -280,7 +280,7 @@ struct SceneTables {
   const std::string file;
   SceneKeys keys;
 
-  /// `[name]`; an empty table where the file has none.
+  /// `[name]`; an empty table if the file has none.
   [[nodiscard]] SceneTable once(std::string_view name) const {
     static const TomlNode nothing;
     const TomlNode* node = root.find(name);
@@ -328,7 +328,7 @@ void read_lists(const SceneTables& tables, SceneParts& parts) {
   for (const SceneTable& table : tables.all("material")) {
     table.read(parts);
     add_named(table, parts.material, given, "write one [[material]] with the keys of both");
-    // Now that the name is known: what is known of it, and above that what the table says.
+    // Now that the name is known: its preset, and then the keys of the table.
     Material& material = material_named(table, parts.material.name, scene.materials);
     parts.material = material;
     table.read(parts);

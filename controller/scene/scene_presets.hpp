@@ -47,7 +47,7 @@ inline constexpr std::array<BurHead, 7> kBurHeads{{{"001", "round", "ball", 50},
 inline constexpr int kSmallestBur = 5;  ///< diameter in tenths of a mm
 
 /// Behind the head comes the neck of a friction-grip shank, which is 1.6 mm thick and 19 mm long
-/// from the tip (ISO 1797, type 3), of which some 8 mm stand out of the handpiece. It is thinner
+/// from the tip (ISO 1797, type 3), of which some 8 mm protrude from the handpiece. It is thinner
 /// than the head it turns, so that it clears the cavity.
 inline constexpr double kNeckOfHead = 0.6;
 inline constexpr double kShankRadiusMm = 0.8;

@@ -11,7 +11,7 @@
 namespace kerf {
 
 /// One table of a scene file beside its rows of the table of keys. Each fault throws LoadError,
-/// one line: `file:line: table.key = value is ..; way out`.
+/// one line: `file:line: table.key = value is ..; remedy`.
 ///
 /// Refers to the parsed file and to the rows, which must outlive it. Load time only.
 class SceneTable {

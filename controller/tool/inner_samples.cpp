@@ -179,7 +179,7 @@ class Columns {
   void pass(const std::array<Seen, 3>& t, Nudge nudge) {
     const std::int64_t turn =
         (t[1].x - t[0].x) * (t[2].z - t[0].z) - (t[1].z - t[0].z) * (t[2].x - t[0].x);
-    if (turn == 0) return;  // it stands upright
+    if (turn == 0) return;  // its axis is vertical
     const auto [xa, xb] = std::minmax({t[0].x, t[1].x, t[2].x});
     const auto [za, zb] = std::minmax({t[0].z, t[1].z, t[2].z});
     const auto [x_first, x_end] = columns(xa, xb);

@@ -25,7 +25,7 @@ using vec3::operator+, vec3::operator-, vec3::operator*;
 
 // Rims and points.
 
-// Between two samples a pitch apart an edge of angle t stands 1/2 tan(t / 2) pitches above both.
+// Between two samples a pitch apart an edge of angle t rises 1/2 tan(t / 2) pitches above both.
 // That may be 0.04 units, the depth of a wedged tool (SweepRules::kWedged) less the tolerance.
 // The same holds for a row of samples along a rim that bends.
 const double kSharp = 2 * std::atan(2 * 0.04);

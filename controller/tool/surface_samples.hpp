@@ -8,7 +8,7 @@
 
 #include "controller/tool/tool_shapes.hpp"
 
-// The surface samples of any tool, for contact, and the dense ones for a closer look.
+// The surface samples of any tool, for contact, and the dense ones that refine a contact.
 
 namespace kerf {
 
@@ -37,8 +37,8 @@ inline constexpr int kMinSurfaceSamples = 512;
 inline constexpr int kMaxSurfaceSamples = 8000;
 
 /// Most samples of a part behind the head. One that would have more gets a wider pitch, up to
-/// kWidestPartPitch. Closer looks find its contacts as exactly as those of a head; but a point or a
-/// loose piece of material that is narrower than the pitch may be missed.
+/// kWidestPartPitch. The dense samples find its contacts as exactly as those of a head, but a point
+/// or a loose piece of material that is narrower than the pitch may be missed.
 inline constexpr int kMostPartSamples = 2048;
 inline constexpr double kWidestPartPitch = 4;
 
@@ -61,8 +61,8 @@ inline constexpr double kMostReach = 1024;
 [[nodiscard]] std::vector<std::array<double, 3>> surface_samples(const SceneTool& tool,
                                                                  double unit_mm);
 
-/// Samples kClosePitch units apart of a tool that is no ball, in the same way, for a closer look at
-/// a contact. None for a ball. Load time.
+/// Samples kClosePitch units apart of a tool that is not a ball, made in the same way, to refine a
+/// contact. None for a ball. Load time.
 [[nodiscard]] std::vector<SurfaceSample> close_samples(const SceneTool& tool, double unit_mm);
 
 /// Both for a part behind the head of `tool`, in mm from the middle of the part.

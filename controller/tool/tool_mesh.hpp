@@ -39,7 +39,7 @@ struct ToolMesh {
 using LooseTriangle = std::array<std::array<float, 3>, 3>;
 
 /// Joins triangles at corners of equal coordinates. `scale` is mm per unit of theirs; `place`
-/// begins a complaint. Triangles with two equal corners are left out. An inside-out mesh is
+/// begins each message. Triangles with two equal corners are left out. An inside-out mesh is
 /// turned outward, and so is each part of it, joined by edges, that is no hollow in another.
 ///
 /// Throws LoadError for coordinates beyond kLargestMeshMm, for an edge without a partner, for

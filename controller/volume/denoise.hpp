@@ -51,8 +51,8 @@ inline constexpr std::size_t kLeastNoisy = 2000;
 /// Number of different densities, at most `kLeastLevels`.
 [[nodiscard]] std::size_t levels_of(std::span<const Density> density);
 
-/// Whether density only steps, as the numbers of labels do: along x, where it changes from one side
-/// of a voxel to the other, fewer than one voxel in ten has a density of its own.
+/// Whether the density only steps, as label numbers do: of the voxels whose two neighbours along x
+/// differ, fewer than one in ten has a third density.
 [[nodiscard]] bool is_label_map(const VoxelGrid& grid, std::span<const Density> density);
 
 /// The noise of the solid voxels: the median magnitude of a second difference along all three axes,

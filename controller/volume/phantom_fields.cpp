@@ -14,8 +14,8 @@
 namespace kerf::phantom {
 namespace {
 
-/// Minimum with the edge rounded where the arguments differ by less than `k`; as steep as they are.
-/// Where they differ by more it is the smaller one, bit by bit, whatever the other is.
+/// Minimum with a rounded edge if the arguments differ by less than `k`, with a slope not above
+/// theirs. If they differ by more, it is the smaller one, bit by bit.
 double smooth_min(double a, double b, double k) noexcept {
   const double h = std::max(k - std::abs(a - b), 0.0);
   return std::min(a, b) - h * h / (4.0 * k);
@@ -203,7 +203,7 @@ double stem_bottom(Point p) noexcept {
 /// The crown, the neck and the stem.
 double stem_field(Point p, const Level& level) noexcept {
   constexpr double kEdge = 0.9;
-  // The enamel stands out a little where it begins.
+  // The enamel bulges slightly at its margin.
   const double step = 0.14 * ramp(0.0, 0.9, above_neck(p));
   const double side = crown_side(p, level) - step;
   const bool top_is_far = side >= p.z - kLowestOcclusal + kEdge;
@@ -284,7 +284,7 @@ double enamel_mm(Point p) noexcept {
 }
 
 bool is_bare(Point p) noexcept {
-  constexpr double kFarMm = 0.1;  // farther than `distance` looks, however steep the line is
+  constexpr double kFarMm = 0.1;  // beyond the range of `distance` for every slope of the line
   return above_neck(p) < -kFarMm;
 }
 

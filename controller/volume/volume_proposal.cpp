@@ -36,8 +36,8 @@ constexpr double kBoneEndsHu = 1500;
 constexpr double kSoftEndsHu = 120;
 /// Fewer voxels at the top are outliers, which would pull a threshold.
 constexpr double kOutliers = 1e-4;
-/// A denser class is another material where it stands so much higher above air than what it is
-/// parted from: noise of 10 % of one material gives 1.17.
+/// A denser class is another material if its density above air is larger than its neighbour's by
+/// this factor: noise of 10 % within one material gives 1.17.
 constexpr double kLeastContrast = 1.2;
 /// Of the faces of the denser class, those with air near by. Enamel on dentine shows one of its two
 /// sides: 0.55 to 0.6 in the two CT teeth; bone in the CT hand 0.05.

@@ -59,7 +59,7 @@ struct ProposedMaterial {
 
 /// Proposed settings for a scan of which nothing is known; values of the file.
 struct VolumeProposal {
-  SurfaceChoice surface;  ///< by the histogram, whatever the wishes
+  SurfaceChoice surface;  ///< by the histogram, without the user's settings
   double iso = 0;
   Window window;               ///< becomes density 0 and 1
   VoxelBox solid;              ///< of the kept voxels of at least iso

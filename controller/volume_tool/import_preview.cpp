@@ -184,7 +184,7 @@ class Field {
   const VolumeImage& image_;
 };
 
-/// What is drawn of a volume, and how; both colours are of a voxel.
+/// The drawn part of a volume and its colours, both of a voxel.
 struct Drawn {
   const VolumeImage& image;
   Density iso;     ///< the surface

@@ -15,10 +15,10 @@ enum class EnergySource : std::uint8_t {
   damping,    ///< injected with the spring
   friction,   ///< of the tool on the solid: the part of the spring along the faces
   cutting,    ///< reaction of the removal, friction of the cutter
-  limits,     ///< what peak, thermal, slew and motor limits changed
+  limits,     ///< changes by peak, thermal, slew and motor limits
   hold,       ///< fading in; and what a gap in the reports changed, held or faded
   leak,       ///< spring and friction are held for a tick and not followed: K T/2 of damping less
-  stabiliser  ///< what the stabiliser of the scene added
+  stabiliser  ///< the work that the stabiliser of the scene added
 };
 inline constexpr std::size_t kEnergySources = 8;
 

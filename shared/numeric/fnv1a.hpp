@@ -6,8 +6,8 @@
 
 namespace kerf {
 
-/// FNV-1a, 64 bits (Fowler, Noll and Vo). Tells contents apart, and is no protection against
-/// somebody who wants to collide. The same on every machine, whatever its byte order.
+/// FNV-1a, 64 bits (Fowler, Noll and Vo). Distinguishes contents; not safe against collisions made
+/// on purpose. The same on every machine, with either byte order.
 inline constexpr std::uint64_t kFnv1aBasis = 0xcbf29ce484222325;
 
 /// One step with a byte, as the standard has it, or with a whole word: eight times fewer steps, and

@@ -6,9 +6,9 @@
 #include <cmath>
 #include <cstddef>
 
-/// Vectors in double where no space has to be kept apart: volumes and meshes at load, measurements.
-/// The servo's vectors are those of `vec.hpp`. The operators of an array have to be named where
-/// they are used: `using vec3::operator-;`.
+/// Vectors in double without a space type: for volumes and meshes at load time, and measurements.
+/// The servo's vectors are in `vec.hpp`. Array operators need a using-declaration in each user:
+/// `using vec3::operator-;`.
 namespace kerf::vec3 {
 
 using Vec = std::array<double, 3>;

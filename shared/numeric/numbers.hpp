@@ -37,7 +37,7 @@ namespace kerf {
   std::uint64_t root = 0;
   const int top = (63 - std::countl_zero(value | 1)) & ~1;
   for (std::uint64_t bit = std::uint64_t{1} << top; bit != 0; bit >>= 2) {
-    // All ones where the bit fits: a branch here is mispredicted half of the time.
+    // All ones if the bit fits; a branch here would be mispredicted half of the time.
     const std::uint64_t fits = value >= root + bit ? ~std::uint64_t{0} : 0;
     value -= (root + bit) & fits;
     root = (root >> 1) + (bit & fits);

@@ -24,13 +24,13 @@ namespace fs = std::filesystem;
 
 namespace {
 
-/// Where the kernel shows an open file, so that it can be given a name.
+/// The path in /proc of an open file, by which it can be linked to a name.
 std::string open_file(int fd) {
   return "/proc/self/fd/" + std::to_string(fd);
 }
 
-/// The descriptor that /dev/stdout and the like stand for; negative: none. What it leads to may be
-/// a file: with `>` it is.
+/// The descriptor behind /dev/stdout and similar paths; negative if none. It may lead to a file (as
+/// with `>`).
 int own_descriptor(const fs::path& path) noexcept {
   if (path == "/dev/stdout") return STDOUT_FILENO;
   if (path == "/dev/stderr") return STDERR_FILENO;

@@ -14,7 +14,7 @@
 
 namespace kerf {
 
-/// A file that cannot be written; the message is one line: path, reason, way out.
+/// A file that cannot be written; the message is one line: path, reason, remedy.
 class FileError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;

@@ -9,7 +9,7 @@ namespace kerf {
 inline constexpr std::int64_t kNsPerSecond = 1'000'000'000;
 
 /// CLOCK_MONOTONIC in ns: the time of deadlines, records and heartbeats. Any thread; no system call
-/// where the kernel offers the clock in user space.
+/// if the kernel offers the clock in user space.
 [[nodiscard]] inline std::int64_t monotonic_ns() noexcept {
   timespec now{};
   clock_gettime(CLOCK_MONOTONIC, &now);

@@ -8,7 +8,7 @@
 
 #include <unistd.h>
 
-// The frame of every program, and what programs print or look up about themselves.
+// The frame of every program: main, version, and the files that it finds beside itself.
 
 namespace kerf {
 

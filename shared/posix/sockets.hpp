@@ -15,7 +15,7 @@ namespace kerf {
 struct UdpAddress {
   sockaddr_storage storage{};
   socklen_t bytes = 0;
-  std::string error;  ///< what is wrong with the text; empty: nothing
+  std::string error;  ///< the problem with the text; empty if there is none
 
   [[nodiscard]] const sockaddr* get() const noexcept {
     return reinterpret_cast<const sockaddr*>(&storage);

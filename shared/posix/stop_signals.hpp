@@ -7,16 +7,16 @@
 
 namespace kerf {
 
-// The signals that end a process by default, and what every program of kerf makes of them:
+// The signals that end a process by default, and how every program of kerf handles them:
 //
 //   ask for an end in order   INT, TERM, HUP, ALRM, USR1, USR2, VTALRM, PROF, IO, PWR, STKFLT, XCPU
 //                             and all real-time signals
-//   crash                     SEGV, BUS, FPE, ILL, ABRT, SYS, TRAP, and QUIT, the way out of a
-//                             program that no longer looks at the others
+//   crash                     SEGV, BUS, FPE, ILL, ABRT, SYS, TRAP, and QUIT, which ends a program
+//                             that no longer reacts to the others
 //   become errors of a write  PIPE, XFSZ
 //   out of reach              KILL; and STOP, which ends nothing
 //
-// Two that the C library keeps for itself, 32 and 33, do what it makes of them.
+// 32 and 33 belong to the C library.
 
 /// From now on the first kind only asks, and the signals of writes become errors. Returns what is
 /// true once an end was asked for. One that is ignored already (nohup) stays so, but INT and TERM.
@@ -58,7 +58,7 @@ class BlockStopSignals {
 /// crashes alone.
 void block_signals() noexcept;
 
-/// Those of the second kind, for whoever has something to do before they take their course.
+/// The signals of the second kind, for code that must act before their default action.
 [[nodiscard]] std::span<const int> crash_signals() noexcept;
 
 }  // namespace kerf

@@ -26,7 +26,7 @@ namespace kerf {
 [[nodiscard]] int pin_to_core(int core) noexcept;
 
 /// Keeps the calling thread on the other cores that it may use. Returns 0 or the system's error
-/// number; EINVAL, and the thread stays where it is, when there is no other.
+/// number; if there is no other core, EINVAL, and the thread keeps its cores.
 [[nodiscard]] int avoid_core(int core) noexcept;
 
 /// Runs `work` in a thread of its own. If the system has no thread left, runs it here at once and

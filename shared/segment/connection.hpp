@@ -8,8 +8,8 @@
 #include "shared/segment/command.hpp"
 #include "shared/segment/reader.hpp"
 
-// Where the socket of a controller lies, and the end of a reader. The rest is shared with the
-// server.
+// The path of a controller's socket, and the reader's end of the connection. The rest is in common
+// with the server.
 
 namespace kerf {
 

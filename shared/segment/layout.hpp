@@ -43,7 +43,7 @@ inline constexpr std::uint32_t kDirtySlots = 4096;
 inline constexpr std::uint64_t kMaxSceneBytes = std::uint64_t{1} << 26;  // a reader copies it whole
 inline constexpr std::uint32_t kMaxBricks = 1U << 21;  // of one volume: 1024^3 voxels, 2 GiB
 
-/// Where the run stands. Anything from `clean_end` on is final.
+/// State of the run. Every value from `clean_end` on is final.
 enum class Lifecycle : std::uint32_t { init = 0, run = 1, hold = 2, clean_end = 3, fault = 4 };
 
 /// A version word, of a brick or of the whole publication: odd while tick `t` is being written,
@@ -113,8 +113,8 @@ struct VolumeDescriptor {
   std::uint64_t off_labels;  ///< 0: none; else u8 per voxel, linear, x fastest, never changes
 };
 
-/// What one servo tick read, felt and sent. World mm for the tip; forces in N at the device port.
-/// `record/log_columns.cpp` tells each field's unit, meaning and when it is valid (docs/log.md).
+/// Input, contact and output of one servo tick. World mm for the tip; forces in N at the device
+/// port. `record/log_columns.cpp` has each field's unit, meaning and validity (docs/log.md).
 struct TickRecord {
   std::uint64_t seq;  ///< filled by the writer: 2 * index + 1 while writing, + 2 when valid
   std::uint64_t tick;

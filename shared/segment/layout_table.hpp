@@ -53,7 +53,7 @@ template <class T>
   return 0;
 }
 
-// The stated numbers are the contract; what the compiler made of the struct stands beside them, so
+// The stated numbers are the contract; the compiler's numbers are beside them, so
 // that the assertions below can compare. Only a macro reaches offsetof by name.
 // clang-format off
 #define KERF_FIELD(RECORD, NAME, OFFSET, TYPE, COUNT)                                  \
@@ -181,8 +181,7 @@ inline constexpr std::array kLayoutTable = {
 };
 #undef KERF_FIELD
 
-/// True where the stated rows of `record` are what the compiler made, without holes, `bytes` in
-/// all.
+/// True if the stated rows of `record` match the compiler's layout, without holes, `bytes` in all.
 [[nodiscard]] constexpr bool layout_matches(std::string_view record, std::size_t bytes) noexcept {
   std::uint32_t next = 0;
   for (const LayoutField& field : kLayoutTable) {

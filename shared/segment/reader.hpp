@@ -43,17 +43,17 @@ struct SegmentInfo {
   std::uint32_t state_slots = 0, dirty_slots = 0;
 };
 
-/// Throws `SegmentError`, naming both versions or both hashes, where the other side was built from
-/// another layout.
+/// Throws `SegmentError` with both versions or both hashes if the controller was built with another
+/// layout.
 void require_same_layout(std::uint32_t major, std::uint32_t minor, std::uint64_t abi_hash);
 
 /// Checks `segment`, which may be hostile, and copies its static part. Reads each byte once, never
 /// trusts a sum of offsets, allocates at most what lies in the segment. Throws `SegmentError`.
 [[nodiscard]] SegmentInfo parse_segment(std::span<std::byte> segment);
 
-/// What a reader holds of one volume between frames.
+/// A reader's copy of one volume between frames.
 struct VolumeSnapshot {
-  std::uint64_t session_id = 0;         ///< another segment's snapshot starts anew
+  std::uint64_t session_id = 0;         ///< a snapshot of another segment is copied again in full
   std::vector<Density> density;         ///< linear, x fastest
   std::vector<std::uint64_t> versions;  ///< per brick, as seen; 0: never
   std::vector<std::uint32_t> changed;   ///< brick ids changed by the last `update`, ascending
@@ -78,8 +78,8 @@ enum class ReadState : std::uint8_t {
 /// readers may map one segment.
 class SegmentReader {
  public:
-  /// Maps `fd` (not taken over). Throws `SegmentError` where it is not sealed against shrinking, or
-  /// where the header does not hold; an ABI mismatch names both hashes, another version both.
+  /// Maps `fd`, which the caller keeps. Throws `SegmentError` if it is not sealed against shrinking
+  /// or its header is invalid; the message has both hashes of an ABI mismatch, or both versions.
   [[nodiscard]] static SegmentReader map(int fd);
 
   SegmentReader(SegmentReader&&) noexcept;
@@ -94,11 +94,11 @@ class SegmentReader {
   /// Records published so far: indices state_head() - state_slots .. state_head() - 1 are readable.
   [[nodiscard]] std::uint64_t state_head() const noexcept;
   [[nodiscard]] std::uint64_t dirty_head() const noexcept;
-  /// `out` changes only where the answer is `ok`.
+  /// `out` changes only if the result is `ok`.
   [[nodiscard]] ReadState state_at(std::uint64_t index, TickRecord& out) const noexcept;
   [[nodiscard]] ReadState dirty_at(std::uint64_t index, DirtyRecord& out) const noexcept;
 
-  /// Labels of a volume, x fastest; empty where it has none. Lives as long as the reader.
+  /// Labels of a volume, x fastest; empty if it has none. Lives as long as the reader.
   [[nodiscard]] std::span<const Label> labels(std::size_t volume) const noexcept;
 
   [[nodiscard]] std::uint64_t heartbeat_ns() const noexcept;
@@ -106,25 +106,26 @@ class SegmentReader {
 
   /// Copies the bricks whose version differs from `snapshot`; a fresh snapshot gets everything. At
   /// most 4 passes over the versions and 64 tries a brick; a brick that stays busy keeps its old
-  /// copy. Where it ends `consistent`, the density is exactly the volume of `tick`.
+  /// copy. If the result is `consistent`, the density is exactly the volume of `tick`.
   void update(std::size_t volume, VolumeSnapshot& snapshot) const;
 
   // For a reader that keeps bricks instead, of several volumes at one tick. Between `epoch` and
-  // `unchanged_since` it reads what changed; where both are even and equal, it holds that tick.
+  // `unchanged_since` it reads what changed; if both are even and equal, its bricks are of that
+  // tick.
 
   /// Version word of the whole publication.
   [[nodiscard]] std::uint64_t epoch() const noexcept;
-  /// True where nothing was published since `epoch` gave `seen`.
+  /// True if nothing was published since `epoch` returned `seen`.
   [[nodiscard]] bool unchanged_since(std::uint64_t seen) const noexcept;
   /// Appends the bricks of `volume` whose version is not the one in `seen`, which has all of them.
   void changed_bricks(std::size_t volume, std::span<const std::uint64_t> seen,
                       std::vector<std::uint32_t>& ids) const;
-  /// Copies a brick, x fastest, zeros beyond the far faces. Returns its version, or 0 where the
-  /// writer was busy with it in all of 64 tries: `out` then holds anything.
+  /// Copies a brick, x fastest, zeros beyond the far faces. Returns its version, or 0 if the
+  /// writer was busy with it in all of 64 tries; `out` is then undefined.
   [[nodiscard]] std::uint64_t read_brick(std::size_t volume, std::uint32_t id,
                                          std::span<Density, kBrickVoxels> out) const noexcept;
-  /// What was read so far counts as memory of this process, though it is the controller's: from now
-  /// on only what is read again does.
+  /// Mapped pages that were read count as memory of this process, although they belong to the
+  /// controller. Drops them; from now on only pages that are read again count.
   void forget_pages() const noexcept;
 
  private:

@@ -15,7 +15,7 @@
 
 namespace kerf {
 
-/// What never changes of a segment on another machine. Times are of the local CLOCK_MONOTONIC.
+/// The constant part of a segment on another machine. Times are of the local CLOCK_MONOTONIC.
 struct MirrorSpec {
   std::uint64_t session_id = 0;
   std::uint64_t config_hash = 0;
@@ -32,7 +32,7 @@ struct MirrorSpec {
 ///
 /// The order is put_scene and put_labels (before a reader has the segment), then for each state of
 /// the volume begin_pass, put_brick (0 or more), end_pass. Readers see a pass whole or know that
-/// they do not. What arrives for a place that the segment has not is a `SegmentError`.
+/// they do not. Data for a brick or record that the segment does not have is a `SegmentError`.
 class ReplicaWriter {
  public:
   /// Checks `spec`, which may be hostile, before it asks for memory. Throws `SegmentError`.

@@ -18,7 +18,7 @@
 
 namespace kerf {
 
-/// A segment that cannot be made, reached or trusted. One line: "place: value; way out".
+/// A segment that cannot be made, reached or trusted. One line: "place: value; remedy".
 class SegmentError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;

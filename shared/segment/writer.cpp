@@ -19,7 +19,7 @@ namespace {
 
 namespace words = shared_words;
 
-/// The servo's side of one volume: where its bricks go, and which of them wait.
+/// The servo's side of one volume: the destination of its bricks, and those that wait.
 struct MirroredVolume {
   BrickGrid bricks;
   std::byte* versions = nullptr;

@@ -26,8 +26,8 @@ inline constexpr std::uint32_t kMaxBricksPerTick = 512;
 /// order in a tick is begin_tick, publish_box (0 or more), publish_state, end_tick.
 class SegmentWriter {
  public:
-  /// Throws `SegmentError` where a volume is empty, too large or does not match its spans, or where
-  /// the memory is not to be had.
+  /// Throws `SegmentError` if a volume is empty, too large or does not match its spans, or if
+  /// memory cannot be allocated.
   [[nodiscard]] static SegmentWriter create(const SegmentSpec& spec);
 
   SegmentWriter(SegmentWriter&&) noexcept;
@@ -38,7 +38,7 @@ class SegmentWriter {
   [[nodiscard]] int fd() const noexcept;
   [[nodiscard]] std::uint64_t session_id() const noexcept;
   [[nodiscard]] std::uint64_t total_bytes() const noexcept;
-  /// False where the lock limit is below `total_bytes()`: a page fault can then hit the servo.
+  /// False if the lock limit is below `total_bytes()`: the servo can then meet a page fault.
   [[nodiscard]] bool locked() const noexcept;
 
   /// *Servo.* Ticks grow and start at 1; a tick that does not grow counts as the last one plus 1.
@@ -46,7 +46,7 @@ class SegmentWriter {
 
   /// *Servo.* `linear` is the whole volume, x fastest; it is read in `end_tick`, and in later ones
   /// while bricks wait, so it outlives the writer. Records the box in the dirty ring.
-  /// Returns the hash of the densities in the box, as the record has it; 0 where it is too large.
+  /// Returns the hash of the densities in the box, as the record has it; 0 if it is too large.
   std::uint64_t publish_box(std::size_t volume, std::span<const Density> linear,
                             const VoxelBox& changed, std::uint32_t removed,
                             DirtyCause cause = DirtyCause::milling) noexcept;

@@ -26,7 +26,7 @@ class Option {
  public:
   explicit Option(CLI::Option* option) : option_(option) {}
 
-  /// The word that stands for the value in --help.
+  /// The word for the value in --help.
   Option& shown_as(const char* word);
   /// Shows in --help what the variable holds now.
   Option& shows_default();

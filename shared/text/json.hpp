@@ -36,9 +36,9 @@ concept JsonList = !JsonText<T> && !std::same_as<T, Json> && requires(const T& l
   list.end();
 };
 
-/// A value of JSON, for reports and for what programs tell each other.
+/// A JSON value, for reports and for messages between programs.
 ///
-/// Made from numbers, text, truth values, `nullptr`, `std::optional` (null where it is empty),
+/// Made from numbers, text, truth values, `nullptr`, `std::optional` (null if it is empty),
 /// lists of these, and objects as `{{"name", value}, ...}`, which keep their order. A number that
 /// is not finite is written as null, bytes that are not UTF-8 as U+FFFD. Every reader throws
 /// `JsonError`.
@@ -71,7 +71,7 @@ class Json {
 
   /// Adds to a list; null becomes one.
   void push_back(Json value);
-  /// The member of that name, added where there is none; null becomes an object.
+  /// The member of that name, added if there is none; null becomes an object.
   Json& operator[](std::string_view key);
 
   [[nodiscard]] bool contains(std::string_view key) const;

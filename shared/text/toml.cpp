@@ -65,13 +65,13 @@ TomlNode node_of(const toml::node& from) {
   return to;
 }
 
-/// `problem; way out` of text that is no TOML. May hold control characters of the text.
+/// `problem; remedy` for text that is not TOML. May hold control characters of the text.
 std::string problem_of(const toml::parse_error& error) {
   std::string problem(error.description());
   if (problem.starts_with("Error while parsing ")) problem.erase(0, problem.find(": ") + 2);
   const auto says = [&](const char* what) { return problem.find(what) != problem.npos; };
   if (says("redefine existing")) return problem + "; leave one of the two out";
-  // The library's words for these tell nothing of the way out; a number stands in quotes there.
+  // The library's words for these contain no remedy; a number is quoted in them.
   for (const char* range : {"' could not be interpreted as a value", "' is not representable"}) {
     if (!says(range)) continue;
     return problem.substr(1, problem.find(range) - 1) + " is out of the range of numbers; " +

@@ -32,19 +32,19 @@ struct TomlNode {
   std::string key;  ///< empty for the whole file and for an entry of an array
   std::size_t key_line = 0, key_column = 0;
   std::size_t line = 0;  ///< where the value begins
-  std::string shown;     ///< the value as messages repeat it: on one line, cut where it is long
+  std::string shown;     ///< the value for messages: on one line, shortened if it is long
   Form form = Form::table;
   TomlValue value;                ///< of Form::value
   std::vector<TomlNode> entries;  ///< of an array or a table, in the order of the file
 
-  /// What lies below a table at `key` or `key.key`; null where nothing does.
+  /// The value below a table at `key` or `key.key`; null if there is none.
   [[nodiscard]] const TomlNode* find(std::string_view path) const;
-  /// A whole number or a real one; nothing where the value is none.
+  /// A whole or real number; empty if the value is neither.
   [[nodiscard]] std::optional<double> number() const;
 };
 
-/// Text that is no TOML: `problem; way out`, and where the parser stopped. May hold control
-/// characters of the text.
+/// Text that is not TOML: `problem; remedy`, and the position at which the parser stopped. May hold
+/// control characters of the text.
 struct TomlError : std::runtime_error {
   TomlError(const std::string& what, std::size_t at_line, std::size_t at_column)
       : std::runtime_error(what), line(at_line), column(at_column) {}

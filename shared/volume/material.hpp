@@ -66,8 +66,8 @@ inline void add_removed(const MaterialRule& rule, std::span<const Density> first
 inline constexpr std::size_t kLabelColours = 14;
 
 /// Linear RGB of label `label`, from 1: Okabe and Ito's colours ("Color Universal Design", 2008),
-/// which differ for every kind of colour vision, the lightest first: what is cut first is seen
-/// best. After seven they come once more, darker; after 14 they repeat.
+/// which differ for every kind of colour vision, the lightest first, because
+/// the first label is usually cut first. After seven they come again, darker; after 14 they repeat.
 [[nodiscard]] inline std::array<double, 3> label_colour(std::size_t label) {
   constexpr std::array<std::array<double, 3>, 7> kScreen{{{86, 180, 233},   // sky blue
                                                           {240, 228, 66},   // yellow

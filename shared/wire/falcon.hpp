@@ -280,7 +280,7 @@ enum class FtdiRequest : std::uint8_t {
 inline constexpr std::uint16_t kFtdiReset = 0;
 inline constexpr std::uint16_t kFtdiPurgeRx = 1;
 inline constexpr std::uint16_t kFtdiPurgeTx = 2;
-inline constexpr std::uint16_t kFtdiDtrLow = 0x0100;  // the upper byte says which line is meant
+inline constexpr std::uint16_t kFtdiDtrLow = 0x0100;  // the upper byte selects the line
 inline constexpr std::uint16_t kFtdiDtrHigh = 0x0101;
 inline constexpr std::uint16_t kFtdiRtsLow = 0x0200;
 inline constexpr std::uint16_t kFtdiNoFlowControl = 0;

@@ -19,7 +19,7 @@ std::uint32_t big_endian(std::span<const std::uint8_t> bytes) noexcept {
          static_cast<std::uint32_t>(bytes[2]) << 8 | bytes[3];
 }
 
-/// A count of cycles as stamps tell it, 0..63999.
+/// A count of cycles as time stamps have it, 0..63999.
 std::int32_t wrapped(std::int64_t cycles) noexcept {
   return static_cast<std::int32_t>((cycles % 64'000 + 64'000) % 64'000);
 }
@@ -112,7 +112,7 @@ FirewireReceiver::Packet FirewireReceiver::next() noexcept {
   const auto one = headers_.first(kHeaderBytes);
   headers_ = headers_.subspan(kHeaderBytes);
   newest_cycle_ = cycle_of_stamp(big_endian(one.subspan(4)));
-  // A shorter packet leaves old bytes behind it, a longer one is cut: its length tells.
+  // A shorter packet leaves old bytes behind it, a longer one is cut: its length field shows which.
   const std::size_t size = big_endian(one) >> 16;
   const auto bytes = one.subspan(8);
   return {.size = std::max<std::size_t>(size, 1),
@@ -153,7 +153,7 @@ bool FirewireTransmitter::send(FirewireFile& file, std::span<const std::uint8_t>
   std::memcpy(&entries[1], packet.data(), packet.size());
   std::fill_n(&entries[1 + kPacketQuadlets], skips, FW_CDEV_ISO_SKIP);
   const std::size_t quadlets = 1 + kPacketQuadlets + static_cast<std::size_t>(skips);
-  // A count of 0: descriptor memory is full, and no errno says so.
+  // A count of 0: descriptor memory is full; the kernel sets no errno for this.
   return queue_entries(file, entries.data(), quadlets * sizeof entries[0]) > 0;
 }
 
@@ -174,7 +174,7 @@ void FirewireTransmitter::delay(std::int32_t lead) noexcept {
 int FirewireTransmitter::wanted_skips(std::int32_t now, int period) noexcept {
   if (now < 0) return period - 1;
   const auto entries = static_cast<std::int64_t>(entries_.load(std::memory_order_relaxed));
-  delay(wrapped(now + 1 - entries));  // where the queue is dry, the next entry goes out next
+  delay(wrapped(now + 1 - entries));  // if the queue is empty, the next entry goes out next
   const std::int32_t turn = wrapped(lead_.load(std::memory_order_relaxed) + entries);
   const std::int32_t depth = cycles_between(now, turn) - 1;
   return std::clamp(kMargin + period - depth - 1, 0, period + kMargin);

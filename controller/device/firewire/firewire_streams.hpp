@@ -16,15 +16,15 @@ namespace kerf {
   return static_cast<std::int32_t>((stamp >> 13 & 7) * 8000 + (stamp & 0x1FFF) % 8000);
 }
 
-/// Cycles from `from` to `to`, -32000..31999: stamps say nothing beyond four seconds.
+/// Cycles from `from` to `to`, -32000..31999: time stamps repeat after eight seconds.
 [[nodiscard]] constexpr std::int32_t cycles_between(std::int32_t from, std::int32_t to) noexcept {
   return ((to - from) % 64000 + 96000) % 64000 - 32000;
 }
 
 /// The device's packets, without a mapped buffer: a payload comes inside the events.
 ///
-/// 64 packets deep (8 ms at 8 kHz). The kernel looks at what has come on `flush`, and where entries
-/// say so, which is a safety net against a servo that does not ask. Servo thread only.
+/// 64 packets deep (8 ms at 8 kHz). The kernel processes received packets on `flush`, and at marked
+/// entries in case the servo does not flush. Servo thread only.
 class FirewireReceiver {
  public:
   /// Creates the context on a freshly opened file. 0 or a negative errno. The stream begins with
@@ -67,7 +67,7 @@ class FirewireReceiver {
 ///
 /// By default one entry per packet and an empty queue in between: the packet goes out in the next
 /// cycle. With `fill`, skipped cycles follow it up to the next packet, and the depth of the queue
-/// is told by time stamps, never by the host's clock.
+/// follows from time stamps, never from the host's clock.
 class FirewireTransmitter {
  public:
   /// `first` goes out at once: a stream cannot start empty. 0 or a negative errno.
@@ -78,7 +78,7 @@ class FirewireTransmitter {
   /// Any thread, any signal handler: one system call. `skips` cycles after the packet stay empty.
   bool send(FirewireFile& file, std::span<const std::uint8_t> packet, int skips = 0) noexcept;
 
-  /// Servo thread. What the kernel tells of sent packets; unread it would pile up in there.
+  /// Servo thread. Reads the kernel's events about sent packets, which would otherwise pile up.
   void take(std::span<const std::uint8_t> event) noexcept;
   [[nodiscard]] bool due() const noexcept {
     return entries_.load(std::memory_order_relaxed) - drained_at_ >= kInterruptEvery;

@@ -17,7 +17,8 @@ class FalconLine {
   virtual ~FalconLine() = default;
   virtual void control(falcon::FtdiRequest request, std::uint16_t value) = 0;
   virtual void write(std::span<const std::uint8_t> bytes) = 0;
-  /// What has come in, without the status bytes; waits at most `milliseconds` for the first byte.
+  /// Returns the received bytes without the status bytes; waits at most `milliseconds` for the
+  /// first byte.
   virtual std::size_t read(std::span<std::uint8_t> out, int milliseconds) = 0;
 };
 

@@ -24,7 +24,7 @@
 namespace kerf {
 namespace {
 
-constexpr int kReadMs = 20;  // then the end is looked for
+constexpr int kReadMs = 20;  // then the thread checks whether it must end
 constexpr int kLastPacketMs = 20;
 constexpr SoughtDevice kSought{.name = "WoodenHaptics arm (1234:0006 or 16c0:0486)",
                                .port = "hid",
@@ -70,7 +70,7 @@ std::vector<Found> list_arms() {
   return all;
 }
 
-/// The node's firmware, as the kernel tells it. Nothing when there is no node.
+/// The node's firmware by the ids that the kernel reports. Empty if there is no node.
 std::optional<std::size_t> identify(const std::string& where, const std::string& node) {
   const int fd = ::open(node.c_str(), O_RDWR | O_CLOEXEC);
   if (fd < 0 && errno == ENOENT) return std::nullopt;
@@ -164,12 +164,12 @@ bool HidPort::send(std::span<const std::uint8_t> packet) noexcept {
 }
 
 bool HidPort::send_last(std::span<const std::uint8_t> packet) noexcept {
-  if (gettid() == writer_id_) return false;  // nobody is left to send it
+  if (gettid() == writer_id_) return false;  // no thread is left to send it
   return outbox_.send_and_wait([&] { return send(packet); }, kLastPacketMs);
 }
 
 void HidPort::read_reports() noexcept {
-  block_signals();  // a call that one cut short would look like a device that is gone
+  block_signals();  // an interrupted call would look like a device that is gone
   become(io_);
   std::array<std::uint8_t, MailboxPacket::kMaxBytes> report{};
   while (!stop_ && !closed()) {

@@ -23,7 +23,7 @@ namespace kerf {
 /// (Teensy), report number 0.
 ///
 /// hidapi allocates the text of a failure, and the kernel's write() to a hidraw node sleeps until
-/// the transfer has ended: up to a frame, and 5 s where the device takes nothing. So one thread
+/// the transfer has ended: up to a frame, and 5 s if the device takes nothing. So one thread
 /// reads and another writes, always the newest packet. The servo touches only their mailboxes and,
 /// in `send`, a semaphore, which any thread and any signal handler may raise. A device that is
 /// unplugged closes the port.
@@ -59,7 +59,7 @@ class HidPort final : public PacketPort {
   IoThread io_;  ///< of both threads
   hid_device_* device_ = nullptr;
   std::size_t packet_bytes_ = 0;     ///< of this firmware; shorter packets are filled up
-  std::atomic<bool> closed_{false};  ///< written by whoever meets the end first
+  std::atomic<bool> closed_{false};  ///< set by the first thread that sees the end
   SpscRing inbox_;
   LatestCommand outbox_;
   sem_t raised_{};                                       ///< once per packet, and once to stop

@@ -16,11 +16,11 @@ struct LinkCounter {
   std::uint64_t value = 0;
 };
 
-/// The narrow place where a bus ends and a driver begins: whole packets in, whole packets out.
+/// The interface between a bus and a driver: whole packets in, whole packets out.
 ///
-/// What stands behind it (a socket to an emulator, FireWire, USB, HID) is invisible to the
-/// driver. Never blocks, never allocates, never throws, but where said. Servo thread only, but for
-/// the ways to send and `closed`, which any thread and any signal handler may call.
+/// The driver does not see which bus it is (a socket to an emulator, FireWire, USB, HID). Never
+/// blocks, allocates or throws unless a method states it. Servo thread only, except the methods
+/// that send and `closed`, which any thread and any signal handler may call.
 class PacketPort {
  public:
   virtual ~PacketPort() = default;
@@ -46,19 +46,19 @@ class PacketPort {
   /// time.
   [[nodiscard]] virtual bool wait(int milliseconds) noexcept = 0;
 
-  /// What the link has been through; for reports, when no servo runs. Allocates.
+  /// Counters of the link, for reports, while no servo runs. Allocates.
   [[nodiscard]] virtual std::vector<LinkCounter> counters() const { return {}; }
 };
 
-/// What a port looks for.
+/// The device that a port searches for.
 struct SoughtDevice {
   std::string_view name;
   std::string_view port;       ///< word of `--port`
   std::string_view emulation;  ///< options of ./kerf demo that emulate it
 };
 
-/// The one text of all ports for a device that is not there, without its place: of the node that
-/// was named, or of any device, where a serial number was named of that one.
+/// The text of all ports for a device that is not there: of the named node, of the device with the
+/// named serial number, or of any device.
 [[nodiscard]] inline std::string absent_node(const SoughtDevice& sought) {
   return "no such node; --port " + std::string(sought.port) + " finds the device by itself";
 }

@@ -22,7 +22,7 @@ struct LawChoice {
   friend bool operator==(const LawChoice&, const LawChoice&) = default;
 };
 
-/// A choice that cannot be made: one line ` what; way out`, to stand behind a place.
+/// A choice that cannot be made: one line ` problem; remedy`, to be put after its location.
 struct LawError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
@@ -37,7 +37,7 @@ struct LawError : std::runtime_error {
 /// Throws LawError with the known names for one that is unknown.
 [[nodiscard]] const LawRow& find_law(LawKind kind, std::string_view name);
 
-/// What is wrong with a value of a setting, as it stands behind `setting = value`; empty: nothing.
+/// The problem with a value of a setting, as text after `setting = value`; empty if there is none.
 [[nodiscard]] std::string setting_problem(const LawRow& row, std::string_view setting,
                                           double value);
 
@@ -45,7 +45,7 @@ struct LawError : std::runtime_error {
 /// does not have and for a value out of its range.
 [[nodiscard]] std::vector<double> law_values(const LawRow& row, const LawChoice& choice);
 
-/// What is constant of the loop that a law will run in.
+/// The constants of the loop that a law will run in.
 struct LawLoop {
   double rate_hz = 1000;
   double tip_noise_mm = 0;  ///< no encoder reading is farther from the true tip, at the device port

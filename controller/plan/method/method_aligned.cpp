@@ -71,11 +71,11 @@ class AlignedMethod final : public ToolMethod {
   /// contact  multiply-adds of the correlation: table entries x 2 halves x 8 corners, by chunks
   /// mill     multiply-adds of masks, filters and products, and removals; rows as whole vectors
   ///          of 32
-  /// cover    instead of `mill` where force cuts: ratios of all rows, as whole vectors of 32:
+  /// cover    instead of `mill` if force cuts: ratios of all rows, as whole vectors of 32:
   ///          multiply-adds of masks, 8 an entry
   /// bend     look-ups of `overlap_exact`: voxels that the tool covers
-  /// Reached in every tick in which the box meets the volume; `mill` and `bend` where no row of it
-  /// is air. The tool does not turn: the box is always the table's.
+  /// Reached in every tick in which the box meets the volume; `mill` and `bend` if no row of it is
+  /// air. The tool does not turn: the box is always the table's.
   [[nodiscard]] std::vector<StageCost> stages(const TickShape& shape, VoxelIndex) const override {
     const AlignedTable& table = *shape.table;
     std::vector<StageCost> stages;

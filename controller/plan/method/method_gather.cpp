@@ -16,8 +16,8 @@ constexpr UnitCosts kRemoval{0, 0, 0, 0, 3};
 constexpr UnitCosts kBentRemoval{0, 0, 0, 0, 4.3};
 constexpr UnitCosts kRefresh{0, 0, 0, 0, 9};
 
-/// Any tool: stored gradients, interpolated at every sample. Fixed point gathers only where nothing
-/// is cut; float and double always.
+/// Any tool: stored gradients, interpolated at every sample. Fixed point gathers only if the scene
+/// does not cut; double always.
 class GatherMethod final : public ToolMethod {
  public:
   constexpr GatherMethod() noexcept : ToolMethod(Method::gather, "gather", kAdviceToAlign) {}
@@ -58,8 +58,8 @@ class GatherMethod final : public ToolMethod {
   /// modification  voxels of that box
   /// removal       voxels of that box; `bent removal` with the look-ups of `overlap_exact`
   /// refresh       voxels of the box grown by the gradient's reach
-  /// Of what sticks out of the volume only `overlap` sees one voxel at each end. Where force cuts
-  /// nothing follows `overlap`.
+  /// Outside of the volume only `overlap` reads one voxel at each end. If force cuts, `overlap` is
+  /// the last stage.
   [[nodiscard]] std::vector<StageCost> stages(const TickShape& shape,
                                               VoxelIndex size) const override {
     constexpr std::uint64_t kSpread = 2 * kPlaceOperations + 2 * kCellCorners;

@@ -56,8 +56,8 @@ class SplatMethod final : public ToolMethod {
   ///        of 32, and all count as touched by the tool
   /// bend   look-ups of `overlap_exact`: voxels of the rows
   /// cut    entries of the rows
-  /// cover  instead of the last three where force cuts: entries, which are scaled
-  /// What sticks out of the volume is worked on as air.
+  /// cover  instead of the last three if force cuts: entries, which are scaled
+  /// Voxels outside of the volume count as air.
   [[nodiscard]] std::vector<StageCost> stages(const TickShape& shape,
                                               VoxelIndex size) const override {
     constexpr std::uint64_t kSplit = 3, kFilter = 5;

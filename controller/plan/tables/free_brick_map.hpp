@@ -13,7 +13,7 @@ namespace kerf {
 /// Owner of a volume's FreeSpaceMap. Load time; moving it keeps the map valid.
 class FreeBrickMap {
  public:
-  /// A voxel counts when its density reaches `faintest`, below which contact feels nothing. While
+  /// A voxel counts when its density reaches `faintest`, below which there is no contact. While
   /// the map is made it takes half a byte more for each voxel.
   FreeBrickMap(const VoxelGrid& grid, std::span<const Density> density, Density faintest);
 
@@ -28,9 +28,10 @@ class FreeBrickMap {
   std::vector<std::uint8_t> distance_;
 };
 
-/// A volume as contact reads it, with its map (docs/theory.md 2.3) of where no sample reads density
-/// that counts, or none is so near to a voxel of the iso that it bears. Load time; the density,
-/// which the caller keeps, may lose but not gain. Moving it keeps the field valid.
+/// A volume as contact reads it, with its free-space map (docs/theory.md 2.3): the distance within
+/// which no sample reads density that counts, or is near enough to an iso voxel for a force. Load
+/// time; the density, which the caller keeps, may lose but not gain. Moving it keeps the field
+/// valid.
 class MappedField {
  public:
   MappedField(const VoxelGrid& grid, std::span<const Density> density, Density iso);

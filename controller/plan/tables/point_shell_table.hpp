@@ -54,7 +54,7 @@ class PointShellTable {
  public:
   /// `samples_units`: from the tool's centre, in contact units; they are sorted into compact
   /// groups. `round`: they are those of a ball. `close_units`: the close samples of another shape;
-  /// without them there is no closer look at its contacts.
+  /// without them its contacts are not refined.
   PointShellTable(std::span<const std::array<double, 3>> samples_units, bool round,
                   std::span<const SurfaceSample> close_units = {});
 

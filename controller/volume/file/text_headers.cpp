@@ -282,7 +282,7 @@ void check_units(const fs::path& path, const TextHeader& text) {
 /// needs, and so accepts a broken stream that became longer.
 void check_gzip(const fs::path& data, std::uint64_t offset) {
   const int fd = ::open(data.c_str(), O_RDONLY | O_CLOEXEC);
-  if (fd < 0) return;  // NrrdIO says so
+  if (fd < 0) return;  // NrrdIO reports it
   ::lseek(fd, static_cast<off_t>(offset), SEEK_SET);
   const volume::GzFile file(gzdopen(fd, "rb"));
   if (!file) throw std::bad_alloc();

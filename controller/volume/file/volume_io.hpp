@@ -19,7 +19,7 @@ namespace kerf {
 /// The frame is LPS for the medical formats, the file's own if it names none. A mirrored file is
 /// read with its last axis reversed, so the picture is the same and the axes are right-handed.
 struct SourceVolume : VolumeFrame {
-  bool has_spacing = true;  ///< false: neither the file nor the options name one; 1 mm stands in
+  bool has_spacing = true;  ///< false: neither file nor options have one; 1 mm is used
   VoxelValues values;       ///< in `memory`
   std::string note;         ///< the choice among several, or empty
   double min = 0, max = 0;
@@ -28,7 +28,7 @@ struct SourceVolume : VolumeFrame {
 
 struct ReadOptions {
   std::optional<std::array<double, 3>> spacing_mm;  ///< replaces that of the file
-  bool allow_missing_spacing = false;               ///< for a first look; see `has_spacing`
+  bool allow_missing_spacing = false;               ///< for a preview; see `has_spacing`
   int cpu_s = kReadCpuSeconds;                      ///< CPU time that parsing may take
   std::string series{};            ///< of several in a folder: its number or a part of its name
   std::optional<RawLayout> raw{};  ///< of a file without a header

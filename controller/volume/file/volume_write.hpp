@@ -15,8 +15,8 @@ enum class VolumeEncoding : std::uint8_t { gzip, raw };
 /// Where the labels of a volume file lie: `tooth.nrrd` -> `tooth-labels.nrrd`.
 [[nodiscard]] std::filesystem::path labels_path(const std::filesystem::path& volume_path);
 
-/// Writes a .nrrd of 16 bits and, where the image has labels, their file beside it; a label file
-/// left there by an earlier volume of this name is removed.
+/// Writes a .nrrd of 16 bits and, if the image has labels, their file beside it. Removes a label
+/// file that an earlier volume of this name left there.
 ///
 /// Both are written under temporary names first, so a full disk leaves the old files as they were.
 /// Throws LoadError.
