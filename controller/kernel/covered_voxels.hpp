@@ -103,7 +103,7 @@ class CoverScan {
     return std::min(labels_[at], static_cast<Label>(kMaxCutMaterials - 1));
   }
 
-  // What a row needs is in locals, which stay in registers while the list is written.
+  // The values of a row are in locals, which stay in registers while the list is written.
   template <class Ratio>
   constexpr typename DragSums<N>::Row add_row(VoxelIndex first, std::int32_t count, Ratio ratio,
                                               Place place, Place step) noexcept {
@@ -116,7 +116,7 @@ class CoverScan {
     Label material = 0;
     for (std::int32_t i = 0; i < count; ++i, place = place + step) {
       const auto r = ratio(i);
-      if (!(r > 0)) continue;  // a row may begin before the volume, where there is no ratio
+      if (!(r > 0)) continue;  // a row may begin outside of the volume, without a ratio
       const std::size_t at = row + static_cast<std::size_t>(i);
       const Density rho = density[at];
       if (rho == 0 || voxel == end) continue;

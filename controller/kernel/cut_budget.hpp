@@ -10,11 +10,11 @@
 
 namespace kerf {
 
-// What a force may remove in a tick, and how that is dealt out. A voxel at full density holds 65535
-// density steps of material.
+// The removal budget of a force in one tick, and its distribution. A voxel at full density holds
+// 65535 density steps of material.
 
 /// Density steps that may leave; fixed: 24 fraction bits, below 2^53, so that the force of a
-/// resting hand at 8 kHz is still told apart from a millionth more.
+/// resting hand at 8 kHz still differs from a millionth more.
 template <class N>
 using CutBudget = typename N::Sum;
 
@@ -62,7 +62,7 @@ template <class N>
   }
 }
 
-/// What drives the cut: (F_n - F_0) omega / omega_ref in newtons, 0 below the threshold. Fixed: 24
+/// The drive of the cut: (F_n - F_0) omega / omega_ref in newtons, 0 below the threshold. Fixed: 24
 /// fraction bits, at most 128 N.
 template <class N>
 [[nodiscard]] constexpr typename N::Sum cut_drive(typename N::Real normal_force_n,
@@ -126,10 +126,10 @@ template <class N>
   }
 }
 
-/// A budget by weight: what a voxel of weight w loses is w times budget over the sum of weights.
+/// A budget by weight: a voxel of weight w loses w times budget over the sum of weights.
 ///
-/// Fixed: mantissa 2^-shift with 31 bits or more, cut off below; what that leaves over is seen in
-/// the balance of the tick, so nothing is lost.
+/// Fixed: mantissa 2^-shift with 31 bits or more, truncated; the balance of the tick contains the
+/// remainder, so nothing is lost.
 template <class N>
 class BudgetPerWeight {
  public:

@@ -4,7 +4,7 @@
 namespace kerf {
 namespace {
 
-// The fastest first; what a machine can run is a tail of this list.
+// The fastest first; the sets of a machine are a tail of this list.
 constexpr const KernelSet* kSets[] = {
 #if defined(KERF_X86_KERNELS)
     &kAvx512Set, &kAvx2Set,

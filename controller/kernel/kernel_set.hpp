@@ -125,7 +125,7 @@ inline constexpr std::int32_t kMaxAlignedEdge = 64;
 /// A run of table entries that meets the box at `box_at` and the seven other corners' offsets.
 struct AlignedChunk {
   std::int32_t box_at;  ///< entry of the box, as one stream
-  std::int32_t vector;  ///< entry of `AlignedTable::vectors` where its run begins
+  std::int32_t vector;  ///< first entry of its run in `AlignedTable::vectors`
 };
 
 /// The tables of one tool for the method `aligned`, for kernels of one vector width. Made at load
@@ -313,7 +313,7 @@ struct KernelSet {
   /// Exact sums by axis and corner 4 k + 2 j + i.
   void (*correlate)(const AlignedTable&, const std::int16_t* box,
                     std::int64_t (&sum)[3][8]) noexcept;
-  /// Overlap ratios of all rows where there is density, and the exact modification sum.
+  /// Overlap ratios of all rows with density, and the exact modification sum.
   void (*press)(const AlignedTable&, const std::int32_t (&weight)[8], const BoxScratch&,
                 std::int64_t (&sum)[3]) noexcept;
   /// Removes density from the volume by the ratios; `carry` has row_lanes entries.

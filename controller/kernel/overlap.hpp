@@ -155,7 +155,7 @@ template <class Row>
 constexpr void for_each_row(const VoxelGrid& /*grid*/, const BoxOverlap& overlap, Row&& row) {
   if (overlap.box == nullptr) return;
   const TickBox& box = *overlap.box;
-  // Ratios are kept only where there is density, so never outside the volume.
+  // Ratios are kept only for voxels with density, so never outside the volume.
   constexpr std::int32_t kBefore = kGradientReach;
   StoredRow stored{overlap.scratch.ratio + kRatioRowPad + kBefore, nullptr};
   const std::uint8_t* live = overlap.scratch.live;

@@ -12,10 +12,10 @@
 
 namespace kerf {
 
-// Cutting that follows force: Preston's law, shared among the voxels under the tool by what it
-// covers of them (o_j) times the speed of its surface there (v_j): docs/theory.md 6.2. What cannot
-// be cut carries its part of the force and stays. Over several volumes the sum of o v goes through
-// all of them: `CoveredWeights::whole`.
+// Cutting by force: Preston's law, distributed over the voxels under the tool by the covered
+// fraction of each (o_j) times the speed of the tool's surface there (v_j): docs/theory.md 6.2.
+// Material that cannot be cut carries its part of the force and stays. With several volumes the sum
+// of o v is over all of them: `CoveredWeights::whole`.
 
 /// How force cuts one volume; constant during a run. Indexed by label; without labels all is at 0.
 template <class N>
@@ -25,7 +25,7 @@ struct PrestonPlan {
   std::span<const Label> labels;  ///< one per voxel, or empty
 };
 
-/// What a volume's cut hands to the next tick.
+/// State of a volume's cut for the next tick.
 template <class N>
 struct PrestonState {
   /// Budget not yet spent, by material: at most one full voxel either way.
@@ -64,7 +64,7 @@ class PrestonTick {
       budget_[m] = fed + state_.carry[m] / kCarryTicks;
       state_.carry[m] += fed;
     });
-    // What the fullest voxels cannot give is asked of the others once; the rest waits.
+    // The others take once what voxels at their limit cannot lose; the rest waits.
     if (spend(out.removed)) {
       weigh_again(covered_);
       spend(out.removed);
@@ -115,7 +115,7 @@ class PrestonTick {
 
 }  // namespace detail
 
-/// Which forbidden materials the tool touches where it covers these voxels: bit m is material m.
+/// The forbidden materials among the covered voxels: bit m is material m.
 template <class N>
 [[nodiscard]] constexpr std::uint64_t touched_forbidden(const PrestonPlan<N>& plan,
                                                         const CoveredWeights<N>& covered) noexcept {
@@ -137,14 +137,14 @@ template <class N>
   return false;
 }
 
-/// Takes from one volume what `drive` cuts in one tick of the voxels that the tool covers, where it
-/// is after its advance into the surface (servo_plan.hpp); their list, `CoveredVoxels<N>` or
-/// `CoveredGroups`, is used up.
+/// Removes from one volume the material that `drive` cuts in one tick, from the voxels that the
+/// tool covers after its advance into the surface (servo_plan.hpp). Consumes their list,
+/// `CoveredVoxels<N>` or `CoveredGroups`.
 ///
 /// Removed steps, carry and `lost` add up to the budgets of all ticks: in fixed exactly, each
-/// budget within a millionth. No voxel loses more than the part that the tool covers; what the
-/// fullest cannot give is dealt out to the others once, and the rest waits in the carry. Without
-/// drive nothing changes. Work is bounded by the list. Servo thread; no heap.
+/// budget within a millionth. No voxel loses more than the part that the tool covers; an excess
+/// goes to the others once, and the rest waits in the carry. Without drive nothing changes. Work is
+/// bounded by the list. Servo thread; no heap.
 template <class N, class Covered>
 constexpr PrestonOutcome<N> cut_by_force(const PrestonPlan<N>& plan, typename N::Sum drive,
                                          std::span<Density> density, PrestonState<N>& state,

@@ -43,11 +43,11 @@ struct SpindleState {
 
 inline constexpr int kMaxSpindleLoad = 100;  ///< a larger load counts as that
 
-/// One tick under a torque >= 0. The speed approaches omega_free (1 - load), where motor and load
-/// balance, and stays at 0 if the load exceeds the stall torque: friction brakes, it never reverses
-/// the rotation. Switched off, the spindle stops as fast as it runs up.
+/// One tick under a torque >= 0. The speed approaches omega_free (1 - load), the equilibrium of
+/// motor and load, and stays at 0 if the load exceeds the stall torque: friction brakes and never
+/// reverses the rotation. Switched off, the spindle stops as fast as it runs up.
 ///
-/// Fixed: the speed rests within 2^-31 / `approach` of where it should. Servo thread.
+/// Fixed: the speed settles within 2^-31 / `approach` of the equilibrium. Servo thread.
 template <class N>
 constexpr void turn_spindle(const SpindlePlan<N>& plan, bool on, typename N::Real torque_n_mm,
                             SpindleState<N>& state) noexcept {
@@ -82,7 +82,7 @@ class CuttingFriction {
  public:
   using Real = typename N::Real;
 
-  /// A contact with `normal_force_n`, where the surface moves by `drag`.
+  /// A contact with `normal_force_n`, at which the surface moves by `drag`.
   constexpr void add(const FrictionPlan<N>& plan, Real normal_force_n,
                      const SurfaceDrag<N>& drag) noexcept {
     const Real friction_n = plan.coefficient * normal_force_n;

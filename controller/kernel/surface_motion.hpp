@@ -146,16 +146,16 @@ class SpindleFrame {
 /// clockwise as seen from the shaft, which lies along +y.
 template <class N>
 struct SurfaceDrag {
-  /// Direction along the tool's x and z: shorter than 1 where the contact lies around the axis,
-  /// longer (below 2) where a tool of few voxels covers some beyond its rim.
+  /// Direction along the tool's x and z: shorter than 1 if the contact lies around the axis, longer
+  /// (below 2) if a tool of few voxels covers some beyond its rim.
   typename N::Unit x{}, z{};
   typename N::Unit arm{};  ///< distance from the axis over the rim radius, kSpeedFloor to 1
 };
 
 /// The drag of a ball. `normal`: direction of the load, out of the solid. `arm`: mean distance of
-/// the contact from the axis, over the rim radius. Whatever places bear it, SUM load_i arm_i is -R
-/// times the load, so omega x arm is known without them. Most of what a ball covers of its own bore
-/// bears nothing, and changes sides where the ball moves by a tenth of a voxel.
+/// the contact from the axis, over the rim radius. For any distribution of the load, SUM load_i
+/// arm_i is -R times the load, so omega x arm is known without it. Most voxels that a ball covers
+/// in its own bore carry no load, and they change sides when the ball moves by a tenth of a voxel.
 template <class N>
 [[nodiscard]] constexpr SurfaceDrag<N> ball_drag(Vec<typename N::Unit, ToolSpace> normal,
                                                  typename N::Unit arm) noexcept {

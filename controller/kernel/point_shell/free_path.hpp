@@ -16,18 +16,18 @@ using MoveShare = std::conditional_t<N::kIsFixed, std::int64_t, PointNumber<N>>;
 template <class N>
 inline constexpr MoveShare<N> kWholeMove = N::kIsFixed ? std::int64_t{1} << 30 : 1;
 
-/// How far spheres may go along one straight move in one volume and have nothing to read
+/// The fraction of one straight move in one volume along which spheres are free
 /// (docs/theory.md 2.3).
 ///
-/// A sphere of radius r is free everywhere in a brick whose distance d is at least r. From a place
-/// in it the sphere may go to where its centre leaves the brick, and also by d - r in any
-/// direction: the farther of both, and there the next brick is looked at. So a way of (x, y, z)
-/// voxels takes at most |x|/2 + |y|/2 + |z|/2 + 4 looks. A border is passed by 2^-14 voxels, which
-/// the sphere's radius must have room for.
+/// A sphere of radius r is free everywhere in a brick whose distance d is at least r. From a point
+/// in it the sphere may move until its centre leaves the brick, or by d - r in any direction,
+/// whichever is farther; then the next brick is queried. A move of (x, y, z) voxels therefore takes
+/// at most |x|/2 + |y|/2 + |z|/2 + 4 queries of the map. Each border is passed by 2^-14 voxels, for
+/// which the sphere's radius must have room.
 template <class N>
 class FreePath {
   using S = PointNumber<N>;
-  using Share = MoveShare<N>;
+  using Fraction = MoveShare<N>;
   /// Fixed: voxels in Q15.16 with room for products.
   using Wide = std::conditional_t<N::kIsFixed, std::int64_t, S>;
 
@@ -50,132 +50,133 @@ class FreePath {
     }
   }
 
-  /// Up to which share of the move, at most `to`, a sphere is free that is so from its start to
-  /// `from`; its centre begins at `start` (fixed: Q15.16) and `needed` is `free_steps_for` its
-  /// radius. Counts its looks down, and ends where none is left.
-  [[nodiscard]] Share free_up_to(const S (&start)[3], std::int32_t needed, Share from, Share to,
-                                 std::int64_t& looks) const noexcept {
-    Share share = from;
-    while (share < to && looks > 0) {
-      --looks;
-      Wide place[3];
+  /// The fraction of the move, at most `to`, up to which a sphere is free that is free up to
+  /// `from`. Its centre begins at `start` (fixed: Q15.16) and `needed` is `free_steps_for` its
+  /// radius. Counts the remaining map queries down, and ends when none is left.
+  [[nodiscard]] Fraction free_up_to(const S (&start)[3], std::int32_t needed, Fraction from,
+                                    Fraction to, std::int64_t& queries) const noexcept {
+    Fraction fraction = from;
+    while (fraction < to && queries > 0) {
+      --queries;
+      Wide position[3];
       for (std::size_t axis = 0; axis < 3; ++axis) {
         if constexpr (N::kIsFixed) {
-          place[axis] = start[axis] + (move_[axis] * share >> 30);
+          position[axis] = start[axis] + (move_[axis] * fraction >> 30);
         } else {
-          place[axis] = start[axis] + move_[axis] * share;
+          position[axis] = start[axis] + move_[axis] * fraction;
         }
       }
-      const std::int32_t free = distance(place) - needed;
-      if (free < 0) return share;
-      Share onward = fraction_of(free);
+      const std::int32_t free = distance(position) - needed;
+      if (free < 0) return fraction;
+      Fraction onward = fraction_of(free);
       // No brick is left later than by the steps across it.
-      if (free < 2 * kFreeBrick * kFreeSteps) onward = std::max(onward, leaving(place));
-      if (!(share + onward > share)) return share;  // as little as a float cannot tell
-      share += onward;
+      if (free < 2 * kFreeBrick * kFreeSteps) onward = std::max(onward, leaving(position));
+      if (!(fraction + onward > fraction))
+        return fraction;  // below the resolution of the number type
+      fraction += onward;
     }
-    return std::min(share, to);
+    return std::min(fraction, to);
   }
 
-  /// Share of the move in which no place goes by more than so many steps of the map.
-  [[nodiscard]] Share fraction_of(std::int32_t steps) const noexcept {
-    return step_ * Share(steps);
+  /// Fraction of the move in which no point moves by more than so many steps of the map.
+  [[nodiscard]] Fraction fraction_of(std::int32_t steps) const noexcept {
+    return step_ * Fraction(steps);
   }
 
  private:
   /// So far beyond its border a brick is left: 2^-14 voxels.
   static constexpr auto kPast = N::kIsFixed ? Wide(4) : Wide(0x1p-14);
 
-  [[nodiscard]] static std::int32_t voxel_of(Wide place) noexcept {
+  [[nodiscard]] static std::int32_t voxel_of(Wide position) noexcept {
     if constexpr (N::kIsFixed) {
-      return static_cast<std::int32_t>(place >> 16);
+      return static_cast<std::int32_t>(position >> 16);
     } else {
-      const auto voxel = static_cast<std::int32_t>(place);
-      return Wide(voxel) > place ? voxel - 1 : voxel;
+      const auto voxel = static_cast<std::int32_t>(position);
+      return Wide(voxel) > position ? voxel - 1 : voxel;
     }
   }
 
-  /// Of the brick that holds a place.
-  [[nodiscard]] std::int32_t distance(const Wide (&place)[3]) const noexcept {
-    return free_.at(voxel_of(place[0]), voxel_of(place[1]), voxel_of(place[2]));
+  /// Of the brick that holds a position.
+  [[nodiscard]] std::int32_t distance(const Wide (&position)[3]) const noexcept {
+    return free_.at(voxel_of(position[0]), voxel_of(position[1]), voxel_of(position[2]));
   }
 
-  /// Share of the move to where its line leaves the brick of `place`.
-  [[nodiscard]] Share leaving(const Wide (&place)[3]) const noexcept {
+  /// Fraction of the move at which its line leaves the brick of `position`.
+  [[nodiscard]] Fraction leaving(const Wide (&position)[3]) const noexcept {
     const Wide edge = N::kIsFixed ? Wide{kFreeBrick} * 65536 : Wide{kFreeBrick};
-    Share soonest = kWholeMove<N>;
+    Fraction soonest = kWholeMove<N>;
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      Share share{};
+      Fraction fraction{};
       if constexpr (N::kIsFixed) {
-        const std::int64_t in = place[axis] & (edge - 1);
-        share = ((move_[axis] < 0 ? in : edge - in) + kPast) * inverse_[axis] >> 16;
+        const std::int64_t in = position[axis] & (edge - 1);
+        fraction = ((move_[axis] < 0 ? in : edge - in) + kPast) * inverse_[axis] >> 16;
       } else {
-        const std::int32_t voxel = voxel_of(place[axis]);
-        const S in = place[axis] - S(voxel - (voxel & (kFreeBrick - 1)));
-        share = ((move_[axis] < 0 ? in : edge - in) + kPast) * inverse_[axis];
+        const std::int32_t voxel = voxel_of(position[axis]);
+        const S in = position[axis] - S(voxel - (voxel & (kFreeBrick - 1)));
+        fraction = ((move_[axis] < 0 ? in : edge - in) + kPast) * inverse_[axis];
       }
-      soonest = std::min(soonest, share);
+      soonest = std::min(soonest, fraction);
     }
     return soonest;
   }
 
   const FreeSpaceMap& free_;
   Wide move_[3] = {};
-  Share inverse_[3] = {};  ///< share of the move that is one voxel along an axis
-  Share step_{};           ///< that is one step of the map
+  Fraction inverse_[3] = {};  ///< fraction of the move that is one voxel along an axis
+  Fraction step_{};           ///< that is one step of the map
 };
 
-/// A group of samples a unit apart is a patch of 4 by 4, whose sphere is less than 3 units wide;
-/// one that needs more lies along a rim or is a remainder. Where its sphere is not free its samples
-/// may be, one by one.
+/// A group of samples a unit apart is a patch of 4 by 4, whose sphere is less than 3 units wide; a
+/// wider one lies along a rim or is a remainder. If the sphere of a group is not free, some of its
+/// samples may still be.
 inline constexpr std::int32_t kLooseGroup = 3 * kFreeSteps;
 
-/// Up to which share of a move, at most `most`, the groups of a tool read nothing that read nothing
-/// up to `share`; `centre`: of the tool at the start. They go side by side, each time twice as far:
-/// so where one meets something soon the others have not gone far, and what is known once no look
-/// is left is kept. It begins with the group `nearest`, and leaves there the one that stopped it:
-/// most likely it will again. Less than a voxel is worth nothing, as a step of the sweep is as
-/// long.
+/// The fraction of a move, at most `most`, up to which all groups of a tool are free that are free
+/// up to `fraction`; `centre`: of the tool at the start. Advances all groups in lock-step with
+/// doubling step length, so that an early hit bounds the work spent on the others, and the result
+/// so far holds when no map query is left. Begins with the group `nearest`, and stores the group
+/// that stopped it there, because it will probably stop the next move too. A result below one voxel
+/// is useless, since a step of the sweep is as long.
 template <class N>
 [[nodiscard]] MoveShare<N> free_share_of_groups(const PointTable<N>& table,
-                                                const PointPositions<N>& places,
+                                                const PointPositions<N>& positions,
                                                 const PointNumber<N> (&centre)[3],
-                                                const FreePath<N>& way, MoveShare<N> share,
+                                                const FreePath<N>& way, MoveShare<N> fraction,
                                                 MoveShare<N> most, std::int32_t& nearest,
-                                                std::int64_t& looks) noexcept {
-  using Share = MoveShare<N>;
+                                                std::int64_t& queries) noexcept {
+  using Fraction = MoveShare<N>;
   const auto go = [&](const PointNumber<N>* const(&offset)[3], std::int32_t i, std::int32_t needed,
-                      Share from, Share to) {
+                      Fraction from, Fraction to) {
     return way.free_up_to(
         {place_at<N>(centre[0], offset[0][i]), place_at<N>(centre[1], offset[1][i]),
          place_at<N>(centre[2], offset[2][i])},
-        needed, from, to, looks);
+        needed, from, to, queries);
   };
   const std::int32_t first = nearest;
-  const Share least = way.fraction_of(kFreeSteps);
-  Share ahead = 4 * least;
-  for (bool stopped = false; !stopped && share < most; ahead *= 2) {
-    const Share to = std::min(share + ahead, most);
-    Share end = to;
-    for (std::int32_t k = 0; k < table.groups && end > std::max(share, least); ++k) {
+  const Fraction least = way.fraction_of(kFreeSteps);
+  Fraction ahead = 4 * least;
+  for (bool stopped = false; !stopped && fraction < most; ahead *= 2) {
+    const Fraction to = std::min(fraction + ahead, most);
+    Fraction end = to;
+    for (std::int32_t k = 0; k < table.groups && end > std::max(fraction, least); ++k) {
       const std::int32_t group = (first + k) % table.groups;
-      Share free = go(places.middle, group, table.needed[group], share, end);
+      Fraction free = go(positions.middle, group, table.needed[group], fraction, end);
       if (free < end && table.needed[group] > kLooseGroup) {
-        const Share from = free;
+        const Fraction from = free;
         free = end;
         const std::int32_t after = std::min((group + 1) * kPointGroup, table.count);
-        for (std::int32_t i = group * kPointGroup; i < after && free > share; ++i) {
-          free = go(places.offset_vox, i, table.needed_sample, from, free);
+        for (std::int32_t i = group * kPointGroup; i < after && free > fraction; ++i) {
+          free = go(positions.offset_vox, i, table.needed_sample, from, free);
         }
       }
       if (free < end) nearest = group;
       end = free;
     }
-    if (looks == 0 || end <= least) return share;
+    if (queries == 0 || end <= least) return fraction;
     stopped = end < to;
-    share = end;
+    fraction = end;
   }
-  return share;
+  return fraction;
 }
 
 }  // namespace kerf

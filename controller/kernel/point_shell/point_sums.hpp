@@ -234,7 +234,7 @@ struct CloseSampleView {
   std::int32_t count = 0;
   const PointNumber<N>* offset[3] = {};  ///< as in CloseTable
   const PointNumber<N>* normal[3] = {};
-  PointNumber<N> middle[3] = {}, radius{};  ///< of the look, as the offsets
+  PointNumber<N> middle[3] = {}, radius{};  ///< of the query, in the units of the offsets
   const PointNumber<N>* density = nullptr;
   PointNumber<N>* window = nullptr;  ///< memory for the window of each
 };

@@ -38,9 +38,9 @@ struct FreeSpaceMap {
   VoxelGrid grid;                          ///< of bricks
   const std::uint8_t* distance = nullptr;  ///< none: nothing is known to be free
 
-  /// Distance of the brick that holds a voxel's cell; outside of the volume, where nothing is read,
-  /// that of the nearest brick, or the distance to that brick if it is longer. Always inlined: the
-  /// linker must not share code of an instruction set with other files.
+  /// Distance of the brick that holds a voxel's cell. Outside of the volume no voxel is read:
+  /// there, the distance of the nearest brick, or the distance to that brick if it is longer.
+  /// Always inlined: the linker must not share code of an instruction set with other files.
   [[nodiscard, gnu::always_inline]] inline std::int32_t at(std::int32_t x, std::int32_t y,
                                                            std::int32_t z) const noexcept {
     if (distance == nullptr) return 0;
@@ -85,7 +85,7 @@ struct FreeSpaceMap {
 // The point shell: samples on the surface of a tool, at which contact reads the density
 // (docs/theory.md 3.1).
 
-/// A number of these kernels. In fixed it is a plain integer, whose format stands beside each use.
+/// A number of these kernels. In fixed it is a plain integer; each use states its format.
 template <class N>
 using PointNumber = typename N::Weight;
 
@@ -178,9 +178,10 @@ struct DensityField {
 ///
 ///   w_g  of gradients: w; for balls 3 w - w / r, half the derivative of their peak at the iso,
 ///        times SUM w
-///   w_x  of offsets: w; for balls w r. Trilinear reads are too high where density
-///        begins, in bands where the normal is near an axis of the voxels; with w that would tilt
-///        the normal of a ball
+///   w_x  of offsets: w; for balls w r. Trilinear values are too high at the edge of the density,
+///   in
+///        bands with a normal near an axis of the voxels; with w this would tilt the normal of a
+///        ball
 ///
 /// In fixed r is Q15, weights are Q24, gradients are in the volume's densities over 2, offsets in
 /// Q0.15. All sums are exact, |sum| < 2^53, so no order and no instruction set matters.
@@ -216,7 +217,7 @@ struct CloseTable {
   const PointNumber<N>* normal[3] = {};  ///< of the tool's surface, outward; Q0.15, 0 on rims
   const std::int32_t* first = nullptr;   ///< sample of each cell, then the end; null: none
   std::int32_t cells[3] = {};            ///< along the axes
-  PointNumber<N> low[3] = {};            ///< offset where the first cell begins
+  PointNumber<N> low[3] = {};            ///< offset of the first cell's lower corner
   PointNumber<N> edge{};                 ///< of a cell: a unit over the reach
 };
 

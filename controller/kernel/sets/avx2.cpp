@@ -141,7 +141,7 @@ struct Simd {
     return part[0] + part[1] + part[2] + part[3];
   }
 
-  /// `rho` is of no use: the box cannot tell the entries beyond it.
+  /// Does not use `rho`: the box does not mark the entries beyond it.
   static void write_loss(std::uint16_t* density, std::ptrdiff_t begin, std::ptrdiff_t count,
                          V /*rho*/, V loss, std::uint32_t lost) noexcept {
     write_whole<Simd>(density, begin, count, loss, lost);

@@ -6,9 +6,9 @@
 
 #include "controller/kernel/kernel_set.hpp"
 
-// What the methods `aligned` and `splat` do with their box of voxels, one text for AVX2, AVX-512
-// and NEON. Included only by their translation units, each of which defines `Simd`: a vector type V
-// and its operations. All of it has internal linkage, for the reason given at KernelSet.
+// The box of voxels of the methods `aligned` and `splat`: one text for AVX2, AVX-512 and NEON.
+// Included only by their translation units, each of which defines `Simd`: a vector type V and its
+// operations. All of it has internal linkage, for the reason given at KernelSet.
 
 namespace kerf {
 namespace {
@@ -204,7 +204,7 @@ struct RowSums {
   }
 }
 
-/// What leaves each voxel of a vector: (rho * (c m >> 15) * 2^-exponent + owed) >> 16 with 32-bit
+/// Removal from each voxel of a vector: (rho * (c m >> 15) * 2^-exponent + owed) >> 16 with 32-bit
 /// intermediates held as two 16-bit halves. `owed` keeps the low half.
 [[gnu::always_inline]] inline V taken(V rho, V ratio, V mantissa, std::int32_t exponent,
                                       V& owed) noexcept {

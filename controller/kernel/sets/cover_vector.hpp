@@ -7,7 +7,7 @@
 #include "controller/kernel/sets/box_vector.hpp"
 #include "controller/kernel/sets/set_common.hpp"
 
-// What a group of voxels under the tool weighs and loses, for AVX2 and AVX-512, in the bits of
+// Weight and loss of a group of voxels under the tool, for AVX2 and AVX-512, bit-equal to
 // scalar_loops.hpp. `Simd` as in box_vector.hpp.
 
 namespace kerf {
@@ -20,7 +20,7 @@ class PlacesBeside {
   /// `lane`: of the first; steps are at most kSteepestStep.
   [[gnu::always_inline]] PlacesBeside(std::int64_t first, std::int64_t step,
                                       std::int32_t lane) noexcept {
-    // All lanes lie beyond the rim where the first is so far off: 32 bits then hold them.
+    // If the first lane is this far away, all lanes are beyond the rim; 32 bits then hold them.
     const std::int64_t reach = kRim + kCoverGroup * (step < 0 ? -step : step);
     const std::int64_t at = first + lane * step;
     const std::int64_t above = at < -reach ? -reach : at;
@@ -112,7 +112,7 @@ constexpr std::int32_t kWide = kLanes / 2, kParts = kCoverGroup / kWide;  ///< o
 }
 
 /// min(weight price, 2 covered) of every other lane, the entries of 64 bits. `over` gets a sign
-/// where the first is more.
+/// if the first is larger.
 [[gnu::always_inline]] inline V part_of_even(V weight, V mantissa, V shift, V covered,
                                              V& over) noexcept {
   const V wanted = Simd::srl64(Simd::multiply_even_unsigned(weight, mantissa), shift);

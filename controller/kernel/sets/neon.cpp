@@ -70,7 +70,7 @@ struct Simd {
   static V widened(V a) noexcept { return from(vpaddlq_s32(as32(a))); }
   static std::int64_t sum64(V a) noexcept { return vaddvq_s64(as64(a)); }
 
-  /// `rho` is of no use: the box cannot tell the entries beyond it.
+  /// Does not use `rho`: the box does not mark the entries beyond it.
   static void write_loss(std::uint16_t* density, std::ptrdiff_t begin, std::ptrdiff_t count,
                          V /*rho*/, V loss, std::uint32_t lost) noexcept {
     write_whole<Simd>(density, begin, count, loss, lost);

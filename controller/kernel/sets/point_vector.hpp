@@ -62,7 +62,7 @@ inline constexpr PointSums<FixedNumbers> kFullSample = [] {
   return Simd::sra32<15>(Simd::sub32(Simd::set32(1 << 14), Simd::multiply_pairs(pair, weights)));
 }
 
-/// Where the cells of some samples are.
+/// Cells of some samples: their corners in the volume.
 struct PointCells {
   alignas(64) std::uint32_t voxel[kPointLanes];  ///< index of the low corner, 0 outside
   V inside;   ///< all ones inside; not set where all are known to be
@@ -70,7 +70,7 @@ struct PointCells {
 };
 
 /// Vectors of samples that take each step together. A sample's steps wait for each other, some 150
-/// cycles in all, and no core looks far enough ahead to begin the next one meanwhile.
+/// cycles in all, and no core reorders far enough to begin the next one meanwhile.
 struct PointBlock {
   static constexpr std::int32_t kMost = 16;
 
@@ -145,7 +145,7 @@ template <bool kRound, bool kInside>
   const V near_z = blend16(c00, c10, cell.y), far_z = blend16(c01, c11, cell.y);
   const V at = blend16(near_z, far_z, cell.z);
   const V scaled = scaled_density<kInside>(at, cell, scale);
-  // Only where the density is not clipped it has a gradient.
+  // Only density that is not clipped has a gradient.
   const V open = Simd::sra32<31>(Simd::sub32(scaled, Simd::set32(32768)));
   const V sample = Simd::add32(Simd::count32(), Simd::set32(first));
   if (!Simd::any(open)) {  // deep inside
@@ -262,8 +262,8 @@ inline std::int32_t highest32(V entries) noexcept {
   return highest;
 }
 
-/// `kInside`: the whole tool is. What fills the last group up is not, so that one is read with
-/// care.
+/// `kInside`: the whole tool is. The padding of the last group is not, so that group is read with
+/// checks.
 template <bool kRound, bool kInside>
 [[gnu::always_inline]] inline void sum_points_by(const PointTable<FixedNumbers>& table,
                                                  const PointPositions<FixedNumbers>& places,

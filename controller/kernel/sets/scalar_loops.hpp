@@ -84,8 +84,8 @@ void gather(const SampleTable& samples, const SamplePose& pose, const VoxelGrid&
   return lanes;
 }
 
-/// Weighs the next group of the row from voxel `lane` on; `lane` moves up to where the group
-/// begins. `sums` are over the group, by number in it. Returns false, and sets nothing, if the tool
+/// Weighs the next group of the row from voxel `lane` on; `lane` moves to the begin of the
+/// group. `sums` are over the group, by number in it. Returns false, and sets nothing, if the tool
 /// covers none of the kCoverGroup voxels from `lane` on.
 [[gnu::always_inline]] inline bool weigh_lanes(const CoverRow& row, std::int32_t& lane,
                                                CoveredGroup& group, CoverSums& sums) noexcept {

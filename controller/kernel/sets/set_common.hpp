@@ -125,7 +125,7 @@ void find_open(const PointTable<FixedNumbers>& table, const PointPositions<Fixed
   }
 }
 
-/// Voxel of the row at which a group of kCoverGroup begins. Bit i of `lanes`, not 0, says whether
+/// Voxel of the row at which a group of kCoverGroup begins. Bit i of `lanes`, not 0, is set if
 /// the tool covers voxel `lane` + i. The group begins at the first covered voxel; near the end of
 /// the row it begins earlier, never before `lane`, so that it reaches no farther beyond the end
 /// than one from `lane` on would.

@@ -93,8 +93,8 @@ template <bool kUnit>
   return density == INT16_MIN ? 0 : covered;
 }
 
-/// What one row of sums is split into: minus the overlap ratio where there is density, and minus
-/// what contact feels beyond that, 15 bits at a time. Bit 0 says that ratios are left, 1 and 2 that
+/// The parts of one row of sums: minus the overlap ratio if there is density, and minus the contact
+/// sum beyond that, 15 bits at a time. Bit 0 is set if any ratio is left, bits 1 and 2 if any of
 /// the rest is.
 template <bool kUnit>
 [[gnu::always_inline]] inline std::uint32_t split_row(const std::int32_t* sums,
