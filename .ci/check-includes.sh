@@ -25,7 +25,7 @@ hil hil/device hil/front hil/front/fuse hil/front/firewire hil/front/usb hil/scr
 lab/run lab/rig lab/accuracy lab/bench lab/stability lab/contact lab/safety lab/ranges lab/commands lab/bridge lab
 
 visualizer/scene visualizer/sound visualizer/gl visualizer/cast visualizer/cast/simd visualizer/surface
-visualizer/render visualizer/redraw visualizer/compose visualizer/panels visualizer/picture visualizer/app visualizer/bench visualizer/monkey
+visualizer/redraw visualizer/render visualizer/compose visualizer/panels visualizer/picture visualizer/app visualizer/bench visualizer/monkey
 
 bridge/wire bridge/stream bridge/igtl bridge/page bridge/net bridge/join bridge/serve bridge
 '

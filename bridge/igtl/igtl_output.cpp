@@ -207,7 +207,7 @@ struct Run {
     for (std::size_t v = 0; v < snapshots.size(); ++v) {
       if (!fits_an_image(volume(v).grid)) continue;
       reader().update(v, snapshots[v]);
-      for (const VoxelBox& box : snapshots[v].differs) changed[v] = changed[v].united(box);
+      changed[v] = snapshots[v].changed.bounds(volume(v).bricks);
     }
     return changed;
   }

@@ -1,12 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "shared/segment/reader.hpp"
 
-#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cerrno>
 #include <cstring>
-#include <iterator>
 #include <utility>
 
 #include <fcntl.h>
@@ -38,32 +36,21 @@ using Brick = std::array<Density, kBrickVoxels>;
   return 0;
 }
 
-/// Adds boxes around the voxels that are others now to `differs`.
-void place_brick(const Brick& brick, const VoxelBox& box, const VoxelGrid& grid,
-                 std::span<Density> linear, std::vector<VoxelBox>& differs) {
+/// Copies a brick into the volume `linear`; returns which voxels have another density since.
+VoxelMask place_brick(const Brick& brick, const VoxelBox& box, const VoxelGrid& grid,
+                      std::span<Density> linear) {
+  VoxelMask changed{};
   const std::int32_t width = box.hi.x - box.lo.x;
-  constexpr std::int32_t kParts = kBrickEdge / kDiffersEdge;
-  std::array<VoxelBox, std::size_t{kParts} * kParts * kParts> parts;
   for (std::int32_t z = box.lo.z; z < box.hi.z; ++z) {
     for (std::int32_t y = box.lo.y; y < box.hi.y; ++y) {
       Density* const to = linear.data() + grid.index(box.lo.x, y, z);
       const Density* const from = brick.data() + brick_row(y - box.lo.y, z - box.lo.z) * kBrickEdge;
-      for (std::int32_t begin = 0; begin < width; begin += kDiffersEdge) {
-        std::int32_t first = begin, end = std::min(begin + kDiffersEdge, width);
-        while (first < end && to[first] == from[first]) ++first;
-        if (first == end) continue;
-        while (to[end - 1] == from[end - 1]) --end;
-        const std::int32_t part =
-            ((z - box.lo.z) / kDiffersEdge * kParts + (y - box.lo.y) / kDiffersEdge) * kParts +
-            begin / kDiffersEdge;
-        VoxelBox& around = parts[static_cast<std::size_t>(part)];
-        around = around.united({{box.lo.x + first, y, z}, {box.lo.x + end, y + 1, z + 1}});
-      }
+      changed[static_cast<std::size_t>(z - box.lo.z)] |= differing(to, from, width)
+                                                         << 8 * (y - box.lo.y);
       copy_row(to, from, static_cast<std::size_t>(width));
     }
   }
-  std::copy_if(parts.begin(), parts.end(), std::back_inserter(differs),
-               [](const VoxelBox& around) { return !around.empty(); });
+  return changed;
 }
 
 }  // namespace
@@ -195,9 +182,9 @@ bool SegmentReader::copy_changed(const SegmentVolumeInfo& volume, VolumeSnapshot
       continue;
     }
     if (whole == snapshot.versions[id]) continue;
-    place_brick(brick, volume.bricks.voxels(id), volume.grid, snapshot.density, snapshot.differs);
+    snapshot.changed.add(
+        {id, place_brick(brick, volume.bricks.voxels(id), volume.grid, snapshot.density)});
     snapshot.versions[id] = whole;
-    snapshot.changed.push_back(id);
   }
   return all;
 }
@@ -205,7 +192,6 @@ bool SegmentReader::copy_changed(const SegmentVolumeInfo& volume, VolumeSnapshot
 void SegmentReader::update(std::size_t volume, VolumeSnapshot& snapshot) const {
   const SegmentVolumeInfo& info = info_.volumes.at(volume);
   snapshot.changed.clear();
-  snapshot.differs.clear();
   snapshot.consistent = false;
   if (snapshot.session_id != info_.session_id || snapshot.versions.size() != info.bricks.count() ||
       snapshot.density.size() != info.grid.voxel_count()) {
@@ -219,9 +205,6 @@ void SegmentReader::update(std::size_t volume, VolumeSnapshot& snapshot) const {
     snapshot.consistent = all && before % 2 == 0 && unchanged_since(before);
     if (snapshot.consistent) snapshot.tick = tick_of_version(before);
   }
-  std::sort(snapshot.changed.begin(), snapshot.changed.end());
-  snapshot.changed.erase(std::unique(snapshot.changed.begin(), snapshot.changed.end()),
-                         snapshot.changed.end());
 }
 
 std::uint64_t SegmentReader::epoch() const noexcept {

@@ -11,7 +11,7 @@
 
 #include "shared/segment/layout.hpp"
 #include "shared/segment/segment.hpp"
-#include "shared/volume/brick_grid.hpp"
+#include "shared/volume/changed_bricks.hpp"
 
 namespace kerf {
 
@@ -56,15 +56,10 @@ struct VolumeSnapshot {
   std::uint64_t session_id = 0;         ///< a snapshot of another segment is copied again in full
   std::vector<Density> density;         ///< linear, x fastest
   std::vector<std::uint64_t> versions;  ///< per brick, as seen; 0: never
-  std::vector<std::uint32_t> changed;   ///< brick ids changed by the last `update`, ascending
-  std::vector<VoxelBox> differs;        ///< around the voxels in them that are others: see below
-  Tick tick = 0;                        ///< where consistent: `density` is exactly this tick's
+  ChangedBricks changed;                ///< bricks that the last `update` copied
+  Tick tick = 0;                        ///< if consistent: `density` is exactly this tick's
   bool consistent = false;
 };
-
-/// `VolumeSnapshot::differs` has the smallest box for each 2^3 voxels of a brick, so that together
-/// they follow the shape of a cut; none is empty.
-inline constexpr std::int32_t kDiffersEdge = 2;
 
 enum class ReadState : std::uint8_t {
   ok,

@@ -11,7 +11,7 @@
 #include "shared/posix/monotonic_clock.hpp"
 #include "shared/segment/segment.hpp"
 #include "shared/segment/seqlock.hpp"
-#include "shared/volume/brick_set.hpp"
+#include "shared/volume/changed_bricks.hpp"
 #include "shared/volume/checksum.hpp"
 
 namespace kerf {

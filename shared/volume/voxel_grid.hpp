@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 
 namespace kerf {
 
@@ -45,8 +46,22 @@ struct VoxelBox {
     return {{std::min(lo.x, other.lo.x), std::min(lo.y, other.lo.y), std::min(lo.z, other.lo.z)},
             {std::max(hi.x, other.hi.x), std::max(hi.y, other.hi.y), std::max(hi.z, other.hi.z)}};
   }
+  /// Smallest box that holds `voxel` too.
+  [[nodiscard]] constexpr VoxelBox with(VoxelIndex voxel) const noexcept {
+    return united({voxel, {voxel.x + 1, voxel.y + 1, voxel.z + 1}});
+  }
+  [[nodiscard]] constexpr VoxelBox moved(VoxelIndex by) const noexcept {
+    return {{lo.x + by.x, lo.y + by.y, lo.z + by.z}, {hi.x + by.x, hi.y + by.y, hi.z + by.z}};
+  }
   friend constexpr bool operator==(const VoxelBox&, const VoxelBox&) noexcept = default;
 };
+
+/// The smallest box that holds all of `boxes`.
+[[nodiscard]] constexpr VoxelBox united(std::span<const VoxelBox> boxes) noexcept {
+  VoxelBox all;
+  for (const VoxelBox& box : boxes) all = all.united(box);
+  return all;
+}
 
 /// Extent of a volume; x runs fastest in memory. Voxel (i, j, k) is a centre.
 struct VoxelGrid {

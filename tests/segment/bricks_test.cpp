@@ -5,7 +5,7 @@
 #include <doctest/doctest.h>
 #include <rapidcheck.h>
 
-#include "shared/volume/brick_set.hpp"
+#include "shared/volume/changed_bricks.hpp"
 
 using namespace kerf;
 
@@ -83,4 +83,48 @@ TEST_CASE("no brick starves while others change in every tick") {
     dirty.take(64, [&](std::uint32_t id, const VoxelBox&) { reached |= id == 255; });
   }
   CHECK(reached);
+}
+
+TEST_CASE("changed bricks hold exactly the voxels that differ, in boxes within a cell of 2^3") {
+  CHECK(rc::check([] {
+    const auto edge = [] { return *rc::gen::inRange(1, 20); };
+    const VoxelGrid grid{edge(), edge(), edge()};
+    const BrickGrid bricks = BrickGrid::of(grid);
+    std::vector<Density> first(grid.voxel_count()), now;
+    ChangedBricks all;
+    std::set<std::size_t> differ;
+    VoxelBox around;
+    for (int step = 0; step < 3; ++step) {  // merged into one
+      now = first;
+      const auto voxels =
+          *rc::gen::container<std::set<std::size_t>>(rc::gen::inRange<std::size_t>(0, now.size()));
+      for (const std::size_t i : voxels) ++now[i];
+      differ.insert(voxels.begin(), voxels.end());
+      all.add(changed_between(bricks, first, now));
+    }
+    std::size_t in_masks = 0, outside = differ.size();
+    for (const ChangedBrick& brick : all) {
+      for (const std::uint64_t layer : brick.voxels) {
+        in_masks += static_cast<std::size_t>(std::popcount(layer));
+      }
+    }
+    all.for_each_box(bricks, [&](const VoxelBox& box) {
+      around = around.united(box);
+      RC_ASSERT(box.lo.x / 2 == (box.hi.x - 1) / 2);
+      RC_ASSERT(box.lo.y / 2 == (box.hi.y - 1) / 2);
+      RC_ASSERT(box.lo.z / 2 == (box.hi.z - 1) / 2);
+      for_each_voxel(box,
+                     [&](int x, int y, int z) { outside -= differ.count(grid.index(x, y, z)); });
+      VoxelBox smallest;
+      for_each_voxel(box, [&](int x, int y, int z) {
+        if (differ.count(grid.index(x, y, z)) != 0) smallest = smallest.with({x, y, z});
+      });
+      RC_ASSERT(smallest == box);
+    });
+    RC_ASSERT(in_masks == differ.size());
+    RC_ASSERT(outside == 0U);
+    RC_ASSERT(all.bounds(bricks) == around);
+    RC_ASSERT(std::is_sorted(all.begin(), all.end(),
+                             [](const auto& a, const auto& b) { return a.id < b.id; }));
+  }));
 }

@@ -48,7 +48,7 @@ TEST_CASE("SIGKILL of the writer at any moment leaves readers bounded and never 
     CHECK(record->tick == reader.state_head());
     stopped_in_tick += snapshot.consistent ? 0 : 1;
     const BrickGrid& bricks = reader.info().volumes[0].bricks;
-    for (const std::uint32_t id : snapshot.changed) {
+    for (const auto& [id, voxels] : snapshot.changed) {
       const auto expected = static_cast<Density>(tick_of_version(snapshot.versions[id]));
       const VoxelBox box = bricks.voxels(id);
       bool whole = true;

@@ -70,7 +70,7 @@ TEST_CASE("a reader that chases a writer flat out never keeps a torn brick or re
   while (Clock::now() < end) {
     const std::vector<std::uint64_t> before = snapshot.versions;
     reader.update(0, snapshot);
-    for (const std::uint32_t id : snapshot.changed) {
+    for (const auto& [id, voxels] : snapshot.changed) {
       const auto expected = static_cast<Density>(tick_of_version(snapshot.versions[id]));
       const VoxelBox box = bricks.voxels(id);
       bool whole = before.empty() || snapshot.versions[id] > before[id];

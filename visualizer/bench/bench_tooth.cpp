@@ -72,7 +72,7 @@ VoxelBox body_of(const VoxelGrid& grid, const std::vector<Density>& density) {
   VoxelBox body;
   for_each_voxel(grid.box(), [&](int x, int y, int z) {
     if (density[grid.index(x, y, z)] == 0) return;
-    body = body.united({{x, y, z}, {x + 1, y + 1, z + 1}});
+    body = body.with({x, y, z});
   });
   return body.grown(1).clipped(grid.box());
 }
@@ -118,43 +118,30 @@ BenchTooth::BenchTooth(const VoxelGrid& padded, bool cropped) {
                       {"enamel", 0.5 * (kDentin + kEnamel), {0.93, 0.91, 0.85}}};
 }
 
-BenchCut BenchTooth::cut(int diameter) {
+ChangedBricks BenchTooth::cut(int diameter) {
   const BrickGrid& bricks = view().bricks;
-  const VoxelGrid& grid = bricks.grid;
   const VoxelIndex centre = next_place();
-  const double radius = 0.5 * diameter;
-  const VoxelBox box = VoxelBox{centre, {centre.x + 1, centre.y + 1, centre.z + 1}}
-                           .grown(diameter / 2)
-                           .clipped(grid.box());
-  BenchCut cut;
+  const VoxelBox box = VoxelBox{}.with(centre).grown(diameter / 2).clipped(bricks.grid.box());
+  ChangedBricks cut;
   for_each_voxel(bricks.bricks_of(box), [&](int x, int y, int z) {
-    cut.bricks.push_back(bricks.id({x, y, z}));
-    take_ball(bricks.voxels(cut.bricks.back()), centre, radius, cut.differs);
+    cut.add(take_ball(bricks.id({x, y, z}), centre, 0.5 * diameter));
   });
   return cut;
 }
 
-/// Within a brick; adds boxes around the voxels that it changed to `differs`.
-void BenchTooth::take_ball(const VoxelBox& brick, VoxelIndex centre, double radius,
-                           std::vector<VoxelBox>& differs) {
-  constexpr int kParts = kBrickEdge / kDiffersEdge;
-  for (int part = 0; part < kParts * kParts * kParts; ++part) {
-    const VoxelIndex lo{brick.lo.x + part % kParts * kDiffersEdge,
-                        brick.lo.y + part / kParts % kParts * kDiffersEdge,
-                        brick.lo.z + part / kParts / kParts * kDiffersEdge};
-    const VoxelBox box =
-        VoxelBox{lo, {lo.x + kDiffersEdge, lo.y + kDiffersEdge, lo.z + kDiffersEdge}}.clipped(
-            brick);
-    VoxelBox around;
-    for_each_voxel(box, [&](int x, int y, int z) {
-      const glm::dvec3 off(x - centre.x, y - centre.y, z - centre.z);
-      Density& at = density_[view().bricks.grid.index(x, y, z)];
-      if (glm::length(off) > radius || at == 0) return;
-      at = 0;
-      around = around.united({{x, y, z}, {x + 1, y + 1, z + 1}});
-    });
-    if (!around.empty()) differs.push_back(around);
-  }
+/// Within a brick.
+ChangedBrick BenchTooth::take_ball(std::uint32_t brick, VoxelIndex centre, double radius) {
+  ChangedBrick changed{brick};
+  const VoxelBox box = view().bricks.voxels(brick);
+  for_each_voxel(box, [&](int x, int y, int z) {
+    const glm::dvec3 off(x - centre.x, y - centre.y, z - centre.z);
+    Density& at = density_[view().bricks.grid.index(x, y, z)];
+    if (glm::length(off) > radius || at == 0) return;
+    at = 0;
+    changed.voxels[static_cast<std::size_t>(z - box.lo.z)] |=
+        std::uint64_t{1} << (kBrickEdge * (y - box.lo.y) + x - box.lo.x);
+  });
+  return changed;
 }
 
 /// To and fro across the crown, a row lower each time; from there in to what is left of the tooth.

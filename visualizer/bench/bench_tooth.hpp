@@ -4,15 +4,10 @@
 #include <cstdint>
 #include <vector>
 
+#include "shared/volume/changed_bricks.hpp"
 #include "visualizer/scene/scene_view.hpp"
 
 namespace kerf {
-
-/// What a cut changed, as a snapshot of the segment has it.
-struct BenchCut {
-  std::vector<std::uint32_t> bricks;  ///< touched, ascending
-  std::vector<VoxelBox> differs;      ///< `VolumeSnapshot::differs`
-};
 
 /// A synthetic molar for timing pictures: a crown with four cusps, two roots, enamel denser than
 /// dentin. It is as high as the grid, and fills the same share of it as the paper's padded tooth.
@@ -30,12 +25,11 @@ class BenchTooth {
 
   /// Takes away a ball of `diameter` voxels at the next place on the crown's side that the camera
   /// sees. A dozen places lie apart; after many a small tooth is bored through.
-  BenchCut cut(int diameter);
+  ChangedBricks cut(int diameter);
 
  private:
   [[nodiscard]] VoxelIndex next_place();
-  void take_ball(const VoxelBox& brick, VoxelIndex centre, double radius,
-                 std::vector<VoxelBox>& differs);
+  [[nodiscard]] ChangedBrick take_ball(std::uint32_t brick, VoxelIndex centre, double radius);
 
   SceneView scene_;
   BoxCorners looked_at_{};

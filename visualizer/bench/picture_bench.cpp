@@ -155,18 +155,17 @@ class Stage {
   }
 
   Stopwatch frame(const Change& change) {
-    BenchCut cut;
+    ChangedBricks cut;
     if (change.tool > 0) cut = tooth_.cut(change.tool);
     Stopwatch watch;
-    if (!cut.bricks.empty()) renderer_->update(0, tooth_.density(), cut.bricks);
+    if (!cut.empty()) renderer_->update(0, tooth_.density(), cut);
     target_.restrict_to(target_.all());
     if (change.partial) {
-      StaleVolume stale;
-      stale.add(*renderer_, 0, cut.differs);
       RedrawTiles tiles(target_.size());
-      stale.mark(tiles, *renderer_, tooth_.view(), tooth_.density(), view_, target_);
+      renderer_->mark_redraw(0, {tooth_.view(), tooth_.density(), view_, target_}, tiles);
       target_.restrict_to(tiles.rects());
     }
+    renderer_->forget_changes();
     target_.bind();
     target_.for_parts([] { glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT); });
     renderer_->draw(view_, target_);

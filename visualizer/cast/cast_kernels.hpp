@@ -86,9 +86,9 @@ struct CastKernels {
   const char* name;
   void (*iso)(const CastJob& job, const PixelRect& rect);
   void (*blend)(const CastJob& job, const PixelRect& rect);
-  /// Whether a ray of `rect` crosses a dirty cell, or ends in one.
+  /// Whether a ray of `rect` crosses a changed cell, or ends in one.
   bool (*rays_touch)(const RedrawJob& job, const PixelRect& rect);
-  /// Whether the shading of a surface point in `rect` samples a dirty cell.
+  /// Whether the shading of a surface point in `rect` samples a changed cell.
   bool (*shading_touches)(const RedrawJob& job, const PixelRect& rect);
 };
 
@@ -112,16 +112,17 @@ struct RayFootprint {
 };
 
 /// Marks of the cells of a `RedrawJob`.
-inline constexpr std::uint8_t kDirtyAlong = 1;  ///< a ray that crosses the cell may have changed
-inline constexpr std::uint8_t kDirtyAtEnd = 2;  ///< a ray that ends in the cell may have changed
+inline constexpr std::uint8_t kChangedAlong = 1;  ///< a ray that crosses the cell may have changed
+inline constexpr std::uint8_t kChangedAtEnd = 2;  ///< a ray that ends in the cell may have changed
 
 /// Where the shading of a surface point samples the volume, in voxel edges along its outward
 /// normal: on both sides for the material, and outside for ambient occlusion (iso.frag).
 inline constexpr float kShadingTapsVox[] = {-2.5F, -1.25F, 1.25F, 2.5F, 6.0F, 12.0F};
 inline constexpr float kLongestTapVox = 12.0F;
 
-/// Input of the kernels that test rays against the dirty cells of a volume (`ChangedCells`): plain
-/// pointers, as in `CastVolumeJob`. Places are in voxel edges from the lowest corner of the cells.
+/// Input of the kernels that test rays against the changed cells of a volume (`ChangedCells`):
+/// plain pointers, as in `CastVolumeJob`. Places are in voxel edges from the lowest corner of the
+/// cells.
 struct RedrawJob {
   CastEye eye;
   float origin[3] = {};         ///< the eye

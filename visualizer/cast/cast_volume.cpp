@@ -138,11 +138,10 @@ std::optional<BoxCorners> CastVolume::body() const {
   return box_corners(voxel(body_.lo), voxel(body_.hi), world_from_voxel_);
 }
 
-void CastVolume::update_bricks(std::span<const Density> density,
-                               std::span<const std::uint32_t> changed) {
-  for (const std::uint32_t id : changed) density_.copy(bricks_.voxels(id), density);
+void CastVolume::update_bricks(std::span<const Density> density, const ChangedBricks& changed) {
+  for (const ChangedBrick& brick : changed) density_.copy(bricks_.voxels(brick.id), density);
   if (gradient_) {
-    for (const std::uint32_t id : changed) gradient_->update(bricks_.voxels(id), density_);
+    for (const ChangedBrick& brick : changed) gradient_->update(bricks_.voxels(brick.id), density_);
   }
   const VoxelBox flipped = cells_.update_bricks(bricks_, changed, density);
   if (!flipped.empty()) take_cells(flipped);
@@ -168,9 +167,7 @@ void CastVolume::take_cells(const VoxelBox& cells) {
   outer_cells_.erase(std::unique(outer_cells_.begin() + first, outer_cells_.end()),
                      outer_cells_.end());
   body_ = {};
-  for (const auto& [x, y, z] : outer_cells_) {
-    body_ = body_.united({{x, y, z}, {x + 1, y + 1, z + 1}});
-  }
+  for (const auto& [x, y, z] : outer_cells_) body_ = body_.with({x, y, z});
 }
 
 bool CastVolume::near_plane_is_inside(const View& view, const glm::dmat4& world_from_cell) const {

@@ -122,10 +122,10 @@ class CastVolume {
   CastVolume(const VolumeView& volume, const CastContent& content, CastMode mode);
 
   /// Takes bricks `changed` of `density` (the whole volume) and the cells they touch.
-  void update_bricks(std::span<const Density> density, std::span<const std::uint32_t> changed);
+  void update_bricks(std::span<const Density> density, const ChangedBricks& changed);
 
-  /// See `Caster::place`.
-  void place(const glm::dmat4& world_from_voxel) { world_from_voxel_ = world_from_voxel; }
+  /// See `Caster::set_transform`.
+  void set_transform(const glm::dmat4& world_from_voxel) { world_from_voxel_ = world_from_voxel; }
 
   /// Other colours and opacities.
   void set_materials(const Palette& materials);

@@ -39,7 +39,7 @@ Caster::Caster(const SceneView& scene, std::span<const CastContent> contents,
 }
 
 void Caster::update(std::size_t volume, std::span<const Density> density,
-                    std::span<const std::uint32_t> changed) {
+                    const ChangedBricks& changed) {
   volumes_[volume].update_bricks(density, changed);
 }
 

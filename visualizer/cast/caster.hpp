@@ -69,13 +69,12 @@ class Caster {
   /// Throws VisualizerError.
   Caster(const SceneView& scene, std::span<const CastContent> contents, const Options& options);
 
-  /// Bricks `changed` of a volume are not what they were; `density` is all of it.
-  void update(std::size_t volume, std::span<const Density> density,
-              std::span<const std::uint32_t> changed);
+  /// `density` is all of the volume.
+  void update(std::size_t volume, std::span<const Density> density, const ChangedBricks& changed);
 
-  /// A volume lies elsewhere now; its voxels keep their edges.
-  void place(std::size_t volume, const glm::dmat4& world_from_voxel) {
-    volumes_[volume].place(world_from_voxel);
+  /// Moves a volume; its voxels keep their edges.
+  void set_transform(std::size_t volume, const glm::dmat4& world_from_voxel) {
+    volumes_[volume].set_transform(world_from_voxel);
   }
 
   /// What each picture shows is in one of these boxes.

@@ -37,13 +37,13 @@ bool Macrocells::update_cell(VoxelIndex cell, std::span<const Density> density) 
   return active_[at] != before;
 }
 
-VoxelBox Macrocells::update_bricks(const BrickGrid& bricks, std::span<const std::uint32_t> changed,
+VoxelBox Macrocells::update_bricks(const BrickGrid& bricks, const ChangedBricks& changed,
                                    std::span<const Density> density) {
   const std::int32_t per_brick = kBrickEdge / edge_;
   // Samples of a cell reach a voxel beyond it, so that bricks side by side share cells: each once.
   std::vector<std::size_t> touched;
-  for (const std::uint32_t id : changed) {
-    const VoxelIndex at = bricks.brick(id);
+  for (const ChangedBrick& brick : changed) {
+    const VoxelIndex at = bricks.brick(brick.id);
     const auto beyond = [&](std::int32_t brick) { return (brick + 1) * per_brick + 1; };
     const VoxelBox cells = VoxelBox{
         {at.x * per_brick, at.y * per_brick, at.z * per_brick},
@@ -57,8 +57,7 @@ VoxelBox Macrocells::update_bricks(const BrickGrid& bricks, std::span<const std:
   for (const std::size_t cell : touched) {
     const auto i = static_cast<std::int32_t>(cell);
     const VoxelIndex at{i % grid_.nx, i / grid_.nx % grid_.ny, i / grid_.nx / grid_.ny};
-    if (!update_cell(at, density)) continue;
-    flipped = flipped.united({at, {at.x + 1, at.y + 1, at.z + 1}});
+    if (update_cell(at, density)) flipped = flipped.with(at);
   }
   return flipped;
 }

@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "shared/volume/brick_grid.hpp"
+#include "shared/volume/changed_bricks.hpp"
 #include "visualizer/cast/cast_kernels.hpp"
 #include "visualizer/scene/camera.hpp"
 
@@ -27,9 +27,9 @@ class Macrocells {
   Macrocells(VoxelGrid volume, std::span<const Density> density, Density iso,
              std::int32_t edge = kEdge);
 
-  /// Recomputes the cells that bricks `changed` touch. Returns the smallest box around the cells
-  /// that became active or inactive.
-  VoxelBox update_bricks(const BrickGrid& bricks, std::span<const std::uint32_t> changed,
+  /// Computes again the cells that touch bricks of `changed`. Returns the smallest box around the
+  /// cells that became active or inactive.
+  VoxelBox update_bricks(const BrickGrid& bricks, const ChangedBricks& changed,
                          std::span<const Density> density);
 
   [[nodiscard]] const VoxelGrid& grid() const noexcept { return grid_; }

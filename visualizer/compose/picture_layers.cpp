@@ -11,7 +11,7 @@ namespace kerf {
 
 namespace {
 
-using Layer = VolumeRenderers::Layer;
+using Layer = ScenePainter::Layer;
 
 Layer layer_of(const Renderer& renderer) {
   return renderer.translucent() ? Layer::translucent : Layer::opaque;
@@ -26,8 +26,13 @@ std::vector<T> picked(std::span<const T> all, std::span<const std::size_t> which
 
 }  // namespace
 
-VolumeRenderers::VolumeRenderers(std::span<const std::string> kinds, const SceneView& scene,
-                                 std::span<const VolumeContent> contents) {
+ScenePainter::ScenePainter(const std::string& choice, const SceneView& scene,
+                           std::span<const VolumeContent> contents)
+    : volumes_(scene.volumes),
+      tool_(scene.voxel_tool ? std::optional<ToolVolume>(scene) : std::nullopt),
+      hand_(scene, scene.main_volume().radius_mm()) {
+  std::vector<std::string> kinds = renderer_of_each(choice, volumes_.size());
+  if (tool_) kinds.push_back(kinds.front());
   std::vector<std::string> group_kinds;
   for (const std::string& kind : kinds) {
     const auto found = std::find(group_kinds.begin(), group_kinds.end(), kind);
@@ -36,75 +41,18 @@ VolumeRenderers::VolumeRenderers(std::span<const std::string> kinds, const Scene
       group_kinds.push_back(kind);
       groups_.emplace_back();
     }
-    groups_[group].volumes.push_back(places_.size());
-    places_.push_back({group, groups_[group].volumes.size() - 1});
+    groups_[group].volumes.push_back(indices_.size());
+    indices_.push_back({group, groups_[group].volumes.size() - 1});
   }
+  const SceneView whole = tool_ ? tool_->added_to(scene) : scene;
+  const std::vector<VolumeContent> all = with_tool(contents);
   for (std::size_t g = 0; g < groups_.size(); ++g) {
     Group& group = groups_[g];
-    SceneView part = scene;
-    part.volumes = picked(std::span<const VolumeView>(scene.volumes), group.volumes);
-    group.renderer = make_renderer(group_kinds[g], part, picked(contents, group.volumes));
+    SceneView part = whole;
+    part.volumes = picked(std::span<const VolumeView>(whole.volumes), group.volumes);
+    group.renderer = make_renderer(group_kinds[g], part,
+                                   picked(std::span<const VolumeContent>(all), group.volumes));
   }
-}
-
-void VolumeRenderers::set_opacities(std::span<const MaterialView> materials,
-                                    std::span<const VolumeContent> contents) {
-  for (const Group& group : groups_) {
-    group.renderer->set_opacities(materials, picked(contents, group.volumes));
-  }
-}
-
-void VolumeRenderers::set_cut_open(bool open, std::span<const VolumeContent> contents) {
-  for (const Group& group : groups_) {
-    group.renderer->set_cut_open(open, picked(contents, group.volumes));
-  }
-}
-
-void VolumeRenderers::set_moving(bool moving) {
-  for (const Group& group : groups_) group.renderer->set_moving(moving);
-}
-
-void VolumeRenderers::draw(Layer layer, const View& view, const RenderTarget& target) {
-  for (const Group& group : groups_) {
-    if (kerf::layer_of(*group.renderer) != layer) continue;
-    target.bind();
-    group.renderer->draw(view, target);
-  }
-}
-
-bool VolumeRenderers::any(Layer layer) const {
-  return std::any_of(groups_.begin(), groups_.end(),
-                     [&](const Group& group) { return kerf::layer_of(*group.renderer) == layer; });
-}
-
-bool VolumeRenderers::any(Trait trait) const {
-  return std::any_of(groups_.begin(), groups_.end(),
-                     [&](const Group& group) { return (*group.renderer.*trait)(); });
-}
-
-Layer VolumeRenderers::layer_of(std::size_t volume) const {
-  return kerf::layer_of(of(volume).renderer);
-}
-
-VolumeRenderers::Drawn VolumeRenderers::of(std::size_t volume) const {
-  const auto& [group, index] = places_[volume];
-  return {*groups_[group].renderer, index};
-}
-
-ScenePainter::ScenePainter(const std::string& renderers, const SceneView& scene,
-                           std::span<const VolumeContent> contents)
-    : volumes_(scene.volumes),
-      tool_(scene.voxel_tool ? std::optional<ToolVolume>(scene) : std::nullopt),
-      renderers_(made(renderers, scene, contents)),
-      stale_(scene.volumes.size()),
-      hand_(scene, scene.main_volume().radius_mm()) {}
-
-VolumeRenderers ScenePainter::made(const std::string& renderers, const SceneView& scene,
-                                   std::span<const VolumeContent> contents) const {
-  std::vector<std::string> kinds = renderer_of_each(renderers, volumes_.size());
-  if (!tool_) return {kinds, scene, contents};
-  kinds.push_back(kinds.front());
-  return {kinds, tool_->added_to(scene), with_tool(contents)};
 }
 
 std::vector<VolumeContent> ScenePainter::with_tool(std::span<const VolumeContent> contents) const {
@@ -114,29 +62,63 @@ std::vector<VolumeContent> ScenePainter::with_tool(std::span<const VolumeContent
 }
 
 void ScenePainter::set_opacities(const SceneView& scene, std::span<const VolumeContent> contents) {
-  renderers_.set_opacities(tool_ ? tool_->added_to(scene).materials : scene.materials,
-                           with_tool(contents));
+  const std::vector<VolumeContent> all = with_tool(contents);
+  const auto materials = tool_ ? tool_->added_to(scene).materials : scene.materials;
+  for (const Group& group : groups_) {
+    group.renderer->set_opacities(materials,
+                                  picked(std::span<const VolumeContent>(all), group.volumes));
+  }
 }
 
 void ScenePainter::set_cut_open(bool open, std::span<const VolumeContent> contents) {
-  renderers_.set_cut_open(open, with_tool(contents));
+  const std::vector<VolumeContent> all = with_tool(contents);
+  for (const Group& group : groups_) {
+    group.renderer->set_cut_open(open, picked(std::span<const VolumeContent>(all), group.volumes));
+  }
+}
+
+void ScenePainter::set_moving(bool moving) {
+  for (const Group& group : groups_) group.renderer->set_moving(moving);
 }
 
 void ScenePainter::update(std::size_t volume, const VolumeSnapshot& snapshot) {
-  const auto [renderer, index] = renderers_.of(volume);
-  renderer.update(index, snapshot.density, snapshot.changed);
-  stale_[volume].add(renderer, index, snapshot.differs);
+  renderer_of(volume).update(indices_[volume].index, snapshot.density, snapshot.changed);
 }
 
 void ScenePainter::hold(const Hand& hand) {
   if (!tool_) return;
-  const auto [renderer, last] = renderers_.of(volumes_.size());
-  if (tool_->take(hand.tool)) renderer.update(last, tool_->content().density, tool_->bricks());
-  renderer.place(last, tool_->world_from_voxel(hand));
+  Renderer& renderer = renderer_of(volumes_.size());
+  const std::size_t index = indices_.back().index;
+  if (const ChangedBricks changed = tool_->take(hand.tool); !changed.empty()) {
+    renderer.update(index, tool_->content().density, changed);
+  }
+  renderer.set_transform(index, tool_->world_from_voxel(hand));
+}
+
+void ScenePainter::draw_volumes(Layer layer, const View& view, const RenderTarget& target) {
+  for (const Group& group : groups_) {
+    if (layer_of(*group.renderer) != layer) continue;
+    target.bind();
+    group.renderer->draw(view, target);
+  }
 }
 
 void ScenePainter::draw_tool(const Hand& hand, const View& view, const RenderTarget& target) {
   if (!tool_) hand_.draw_tool(hand, view, target);
+}
+
+bool ScenePainter::any(Layer layer) const {
+  return std::any_of(groups_.begin(), groups_.end(),
+                     [&](const Group& group) { return layer_of(*group.renderer) == layer; });
+}
+
+bool ScenePainter::any(bool (Renderer::*property)() const noexcept) const {
+  return std::any_of(groups_.begin(), groups_.end(),
+                     [&](const Group& group) { return (*group.renderer.*property)(); });
+}
+
+bool ScenePainter::hand_is_opaque_volume() const {
+  return tool_ && layer_of(renderer_of(volumes_.size())) == Layer::opaque;
 }
 
 std::vector<PixelRect> ScenePainter::bounds(const Hand& hand, const View& view,
@@ -147,17 +129,18 @@ std::vector<PixelRect> ScenePainter::bounds(const Hand& hand, const View& view,
   return bounds;
 }
 
-void ScenePainter::mark_volumes(Layer layer, RedrawTiles& tiles,
-                                std::span<const VolumeContent> contents, const View& view,
-                                const RenderTarget& kept) const {
+void ScenePainter::mark_redraw(Layer layer, RedrawTiles& tiles,
+                               std::span<const VolumeContent> contents, const View& view,
+                               const RenderTarget& kept) const {
   for (std::size_t v = 0; v < volumes_.size(); ++v) {
-    if (renderers_.layer_of(v) != layer) continue;
-    stale_[v].mark(tiles, renderers_.of(v).renderer, volumes_[v], contents[v].density, view, kept);
+    const Renderer& renderer = renderer_of(v);
+    if (layer_of(renderer) != layer) continue;
+    renderer.mark_redraw(indices_[v].index, {volumes_[v], contents[v].density, view, kept}, tiles);
   }
 }
 
 void ScenePainter::forget_changes() {
-  for (StaleVolume& volume : stale_) volume.clear();
+  for (const Group& group : groups_) group.renderer->forget_changes();
 }
 
 namespace {
@@ -168,74 +151,75 @@ bool has_moved(const std::optional<Hand>& from, const std::optional<Hand>& to) {
 
 }  // namespace
 
-PictureLayers::Stale PictureLayers::stale(const View& view, const std::optional<Hand>& hand,
-                                          const ScenePainter& painter,
-                                          std::span<const VolumeContent> contents) const {
-  const PixelRect all = stage_.all();
-  const bool turned = shown_ && shown_->view != view;
-  const Moment now{view, turned || (shown_ && has_moved(shown_->hand, hand)), hand};
-  if (!shown_ || turned) return {now, {all}, {all}};
-  RedrawTiles of_hand(stage_.size());
+PictureLayers::Redraw PictureLayers::redraw(const View& view, const std::optional<Hand>& hand,
+                                            const ScenePainter& painter,
+                                            std::span<const VolumeContent> contents) const {
+  const PixelRect all = composite_.all();
+  const bool view_changed = shown_ && shown_->view != view;
+  const FrameState now{view, view_changed || (shown_ && has_moved(shown_->hand, hand)), hand};
+  if (!shown_ || view_changed) return {now, {all}, {all}};
+  RedrawTiles of_hand(composite_.size());
   if (hand != shown_->hand) {
     for (const auto& one : {hand, shown_->hand}) {
       if (!one) continue;
-      for (const PixelRect& part : painter.bounds(*one, view, stage_.size())) of_hand.mark(part);
+      for (const PixelRect& part : painter.bounds(*one, view, composite_.size()))
+        of_hand.mark(part);
     }
   }
-  RedrawTiles tiles(stage_.size());
-  painter.mark_volumes(Layer::opaque, tiles, contents, view, opaque_);
+  RedrawTiles tiles(composite_.size());
+  painter.mark_redraw(Layer::opaque, tiles, contents, view, opaque_);
   if (painter.hand_is_opaque_volume()) tiles.mark(of_hand);
   const std::vector<PixelRect> opaque = tiles.rects();
-  painter.mark_volumes(Layer::translucent, tiles, contents, view, opaque_);
+  painter.mark_redraw(Layer::translucent, tiles, contents, view, opaque_);
   tiles.mark(of_hand);
   if (!now.moving) tiles.mark(coarse_);
   return {now, opaque, tiles.rects()};
 }
 
-std::vector<PixelRect> PictureLayers::draw(const Stale& stale, ScenePainter& painter,
+std::vector<PixelRect> PictureLayers::draw(const Redraw& redraw, ScenePainter& painter,
                                            ScreenPasses& passes) {
-  shown_ = stale.now;
-  if (stale.stage.empty()) return {};
-  painter.renderers().set_moving(stale.now.moving);
-  if (!stale.now.moving) {
+  shown_ = redraw.now;
+  if (redraw.composite.empty()) return {};
+  painter.set_moving(redraw.now.moving);
+  if (!redraw.now.moving) {
     coarse_.clear();
-  } else if (painter.renderers().any(&Renderer::coarse_while_moving)) {
-    for (const PixelRect& part : stale.stage) coarse_.mark(part);
+  } else if (painter.any(&Renderer::coarse_while_moving)) {
+    for (const PixelRect& part : redraw.composite) coarse_.mark(part);
   }
-  if (stale.now.hand) painter.hold(*stale.now.hand);
-  draw_opaque(stale, painter, passes);
-  draw_stage(stale, painter);
+  if (redraw.now.hand) painter.hold(*redraw.now.hand);
+  draw_opaque(redraw, painter, passes);
+  draw_composite(redraw, painter);
   std::vector<PixelRect> smoothed;
-  for (const PixelRect& part : stale.stage) {
+  for (const PixelRect& part : redraw.composite) {
     smoothed.push_back(part.grown(ScreenPasses::kSmoothingReach));
   }
   smooth_.restrict_to(smoothed);
-  passes.smooth_edges(stage_, smooth_);
+  passes.smooth_edges(composite_, smooth_);
   return smoothed;
 }
 
-void PictureLayers::draw_opaque(const Stale& stale, ScenePainter& painter, ScreenPasses& passes) {
-  if (stale.opaque.empty()) return;
-  opaque_.restrict_to(stale.opaque);
+void PictureLayers::draw_opaque(const Redraw& redraw, ScenePainter& painter, ScreenPasses& passes) {
+  if (redraw.opaque.empty()) return;
+  opaque_.restrict_to(redraw.opaque);
   passes.draw_backdrop(opaque_);
-  painter.draw_volumes(Layer::opaque, stale.now.view, opaque_);
+  painter.draw_volumes(Layer::opaque, redraw.now.view, opaque_);
 }
 
-void PictureLayers::draw_stage(const Stale& stale, ScenePainter& painter) {
-  stage_.restrict_to(stale.stage);
-  for (const PixelRect& part : stale.stage) stage_.copy(opaque_, part);
-  const auto& [view, moving, hand] = stale.now;
+void PictureLayers::draw_composite(const Redraw& redraw, ScenePainter& painter) {
+  composite_.restrict_to(redraw.composite);
+  for (const PixelRect& part : redraw.composite) composite_.copy(opaque_, part);
+  const auto& [view, moving, hand] = redraw.now;
   std::vector<PixelRect> of_hand;  // a mesh costs its vertices for each part
   if (hand) {
-    of_hand = clipped(stale.stage, united(painter.bounds(*hand, view, stage_.size())));
-    stage_.restrict_to(of_hand);
-    painter.draw_tool(*hand, view, stage_);
+    of_hand = clipped(redraw.composite, united(painter.bounds(*hand, view, composite_.size())));
+    composite_.restrict_to(of_hand);
+    painter.draw_tool(*hand, view, composite_);
   }
-  stage_.restrict_to(stale.stage);
-  painter.draw_volumes(Layer::translucent, view, stage_);
+  composite_.restrict_to(redraw.composite);
+  painter.draw_volumes(Layer::translucent, view, composite_);
   if (!hand) return;
-  stage_.restrict_to(of_hand);
-  painter.draw_force(*hand, view, stage_);
+  composite_.restrict_to(of_hand);
+  painter.draw_force(*hand, view, composite_);
 }
 
 void ScreenPasses::draw_backdrop(const RenderTarget& target) {

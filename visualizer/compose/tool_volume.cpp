@@ -7,7 +7,6 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <numeric>
 
 #include <glm/gtc/matrix_transform.hpp>
 
@@ -273,12 +272,13 @@ SceneView ToolVolume::added_to(const SceneView& scene) const {
   return with;
 }
 
-bool ToolVolume::take(std::uint32_t tool) {
-  if (held_ == tool) return false;
+ChangedBricks ToolVolume::take(std::uint32_t tool) {
+  if (held_ == tool) return {};
   held_ = tool;
+  const std::vector<Density> before = density_;
   std::fill(density_.begin(), density_.end(), Density{0});
   if (tool < tools_.size()) fill(tools_[tool]);
-  return true;
+  return changed_between(BrickGrid::of(grid_), before, density_);
 }
 
 /// Distances to what is swept are worked out on half a plane through the axis, twice as fine as the
@@ -323,12 +323,6 @@ std::optional<BoxCorners> ToolVolume::corners(const Hand& hand) const {
   const glm::dvec3 low(-radius_mm, extent.low_mm - margin_mm, -radius_mm);
   const glm::dvec3 high(radius_mm, extent.high_mm + margin_mm, radius_mm);
   return box_corners(low, high, rigid(hand.tip_mm, hand.orientation));
-}
-
-std::vector<std::uint32_t> ToolVolume::bricks() const {
-  std::vector<std::uint32_t> all(BrickGrid::of(grid_).count());
-  std::iota(all.begin(), all.end(), 0U);
-  return all;
 }
 
 }  // namespace kerf

@@ -8,7 +8,7 @@
 
 #include <glm/glm.hpp>
 
-#include "shared/volume/voxel_grid.hpp"
+#include "shared/volume/changed_bricks.hpp"
 #include "visualizer/compose/tool_mesh.hpp"
 #include "visualizer/compose/tool_painter.hpp"
 #include "visualizer/scene/scene_view.hpp"
@@ -41,14 +41,11 @@ class ToolVolume {
   [[nodiscard]] SceneView added_to(const SceneView& scene) const;
   [[nodiscard]] VolumeContent content() const { return {density_, labels_}; }
 
-  /// Writes the voxels of tool `tool`; air if the scene has no such tool. False if they are the
-  /// voxels already.
-  bool take(std::uint32_t tool);
+  /// Writes the voxels of tool `tool`; air if the scene has no such tool. Returns which changed.
+  ChangedBricks take(std::uint32_t tool);
   [[nodiscard]] glm::dmat4 world_from_voxel(const Hand& hand) const;
   /// A box in the world around the voxels of the hand's tool; none if the tool has none.
   [[nodiscard]] std::optional<BoxCorners> corners(const Hand& hand) const;
-  /// The ids of all bricks of the volume.
-  [[nodiscard]] std::vector<std::uint32_t> bricks() const;
 
  private:
   /// A box about the axis of the tool.

@@ -119,9 +119,9 @@ void Picture::set_look(const Session& session, const ViewSettings& look) {
 LookControls Picture::controls() const {
   LookControls controls{.look = look_, .own_iso = scene_.main_volume().iso / kDensityMax};
   for (const VolumeView& volume : scene_.volumes) controls.volumes.push_back(volume.name);
-  controls.takes_gradient = painter_->renderers().any(&Renderer::takes_gradient);
-  controls.has_iso = painter_->renderers().any(ScenePainter::Layer::opaque);
-  if (painter_->renderers().any(ScenePainter::Layer::translucent)) {
+  controls.takes_gradient = painter_->any(&Renderer::takes_gradient);
+  controls.has_iso = painter_->any(ScenePainter::Layer::opaque);
+  if (painter_->any(ScenePainter::Layer::translucent)) {
     controls.opacities = opacities();
   }
   return controls;
@@ -232,22 +232,22 @@ Redrawn Picture::draw(const Session& session, const OverlayFigures& figures,
     shown_in_ = 0;
   }
   const std::vector<VolumeContent> contents = session.contents();
-  std::vector<PictureLayers::Stale> stale;
+  std::vector<PictureLayers::Redraw> redraws;
   for (std::size_t eye = 0; eye < views.size(); ++eye) {
-    stale.push_back(eyes_[eye].stale(views[eye], hand, *painter_, contents));
+    redraws.push_back(eyes_[eye].redraw(views[eye], hand, *painter_, contents));
   }
   painter_->forget_changes();
   const OverlayFigures panel = figures.rounded();
   const bool same_target = target.framebuffer() == shown_in_ && target.size() == shown_size_;
-  const bool rests = std::all_of(stale.begin(), stale.end(),
-                                 [](const PictureLayers::Stale& one) { return one.stage.empty(); });
+  const bool rests = std::all_of(redraws.begin(), redraws.end(),
+                                 [](const auto& one) { return one.composite.empty(); });
   if (rests && same_target && panel == shown_figures_) return {};
 
   if (!same_target) clear(target);  // an odd column belongs to neither eye
   const PixelRect panels = overlay_.prepare(panel, size);
   double redrawn = 0.0;
   for (std::size_t eye = 0; eye < eyes_.size(); ++eye) {
-    std::vector<PixelRect> others = eyes_[eye].draw(stale[eye], *painter_, passes_);
+    std::vector<PixelRect> others = eyes_[eye].draw(redraws[eye], *painter_, passes_);
     const RenderTarget& seen = eyes_[eye].seen();
     if (same_target) {
       others.push_back(panels.united(shown_panels_));  // they let the picture shine through
@@ -257,8 +257,9 @@ Redrawn Picture::draw(const Session& session, const OverlayFigures& figures,
     for (const PixelRect& part : others) {
       target.copy_colour(seen, part, static_cast<int>(eye) * size.width);
     }
-    const bool translucent = painter_->renderers().any(ScenePainter::Layer::translucent);
-    const std::vector<PixelRect>& volumes = translucent ? stale[eye].stage : stale[eye].opaque;
+    const bool translucent = painter_->any(ScenePainter::Layer::translucent);
+    const std::vector<PixelRect>& volumes =
+        translucent ? redraws[eye].composite : redraws[eye].opaque;
     for (const PixelRect& part : volumes) redrawn += part.area();
   }
   overlay_.draw(target, static_cast<int>(eyes_.size()));

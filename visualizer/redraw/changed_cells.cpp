@@ -3,22 +3,19 @@
 #include "visualizer/redraw/changed_cells.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include <glm/gtc/matrix_inverse.hpp>
 #include <glm/gtc/matrix_transform.hpp>
 
 #include "visualizer/cast/cast_volume.hpp"
-#include "visualizer/redraw/redraw_tiles.hpp"
 #include "visualizer/scene/camera.hpp"
 
 namespace kerf {
 
 ChangedCells::ChangedCells(std::span<const VoxelBox> voxels, const RayFootprint& footprint)
     : reach_(std::max(footprint.along, footprint.at_end)) {
-  VoxelBox all;
-  for (const VoxelBox& box : voxels) all = all.united(box);
+  const VoxelBox all = united(voxels);
   first_ = all.lo;
   low_ = glm::dvec3(first_.x, first_.y, first_.z) - 0.5 * reach_;
   const VoxelIndex extent = all.extent();
@@ -26,8 +23,8 @@ ChangedCells::ChangedCells(std::span<const VoxelBox> voxels, const RayFootprint&
   grid_ = {extent.x + more, extent.y + more, extent.z + more};
   marks_.resize(grid_.voxel_count() + sizeof(std::uint32_t));
   // The nearer ones last: they lie within the others.
-  for (const VoxelBox& box : voxels) mark(box, footprint.at_end, kDirtyAtEnd);
-  for (const VoxelBox& box : voxels) mark(box, footprint.along, kDirtyAlong | kDirtyAtEnd);
+  for (const VoxelBox& box : voxels) mark(box, footprint.at_end, kChangedAtEnd);
+  for (const VoxelBox& box : voxels) mark(box, footprint.along, kChangedAlong | kChangedAtEnd);
 }
 
 glm::dvec3 ChangedCells::high() const noexcept {
@@ -62,46 +59,23 @@ void ChangedCells::put(RedrawJob& job) const {
 
 namespace {
 
-constexpr std::size_t kMostBoxes = 8192;       // some cuts between two pictures; more count as one
-constexpr std::size_t kMostTriangles = 32768;  // likewise
-// Voxels around boxes that are looked at together: a cut. Between boxes far apart is only air, and
-// in a larger one little to be left out.
-constexpr std::size_t kMostTogether = 64 * 64 * 64;
-
-VoxelBox united(std::span<const VoxelBox> boxes) {
-  VoxelBox all;
-  for (const VoxelBox& box : boxes) all = all.united(box);
-  return all;
-}
-
-void add_to(std::vector<VoxelBox>& boxes, std::span<const VoxelBox> more) {
-  boxes.insert(boxes.end(), more.begin(), more.end());
-  if (boxes.size() > kMostBoxes) boxes = {united(boxes)};
-}
-
-VoxelBox voxels_around(std::span<const FineTriangle> triangles) {
-  VoxelBox all;
-  for (const FineTriangle& triangle : triangles) {
-    for (const FinePoint& corner : triangle) {
-      const VoxelIndex v = VolumeSamples::voxel_below(corner);
-      all = all.united({v, {v.x + 2, v.y + 2, v.z + 2}});
-    }
-  }
-  return all;
-}
+constexpr std::size_t kMaxBoxes = 8192;  // a few cuts between two pictures; more count as one box
+// Voxels around the boxes that are tested together: those of a cut. Between boxes farther apart
+// lies only air, and a larger cluster leaves out little.
+constexpr std::size_t kMaxClusterVoxels = 64 * 64 * 64;
 
 std::size_t voxels_in(const VoxelBox& box) {
   const VoxelIndex extent = box.extent();
   return VoxelGrid{extent.x, extent.y, extent.z}.voxel_count();
 }
 
-/// Boxes that lie together.
+/// Groups of boxes that lie close together.
 std::vector<std::vector<VoxelBox>> clusters_of(std::span<const VoxelBox> boxes) {
   std::vector<std::vector<VoxelBox>> clusters;
   std::vector<VoxelBox> around;
   for (const VoxelBox& box : boxes) {
     std::size_t at = 0;
-    while (at < around.size() && voxels_in(around[at].united(box)) > kMostTogether) ++at;
+    while (at < around.size() && voxels_in(around[at].united(box)) > kMaxClusterVoxels) ++at;
     if (at == around.size()) {
       around.emplace_back();
       clusters.emplace_back();
@@ -112,14 +86,14 @@ std::vector<std::vector<VoxelBox>> clusters_of(std::span<const VoxelBox> boxes) 
   return clusters;
 }
 
-/// The dirty cells of a volume, as one view sees them.
-RedrawJob dirty_job(const ChangedCells& cells, const VolumeView& volume, const View& view,
-                    PictureSize size) {
+/// The changed cells of a volume, as one view sees them.
+RedrawJob redraw_job(const ChangedCells& cells, const KeptPicture& kept) {
   const glm::dmat4 eye_from_cell =
-      view.eye_from_world * glm::translate(volume.world_from_voxel, cells.low());
+      kept.view.eye_from_world * glm::translate(kept.volume.world_from_voxel, cells.low());
   const glm::dmat4 cell_from_eye = glm::affineInverse(eye_from_cell);
+  const PictureSize size = kept.target.size();
   RedrawJob job;
-  job.eye = cast_eye(view, size.width, size.height);
+  job.eye = cast_eye(kept.view, size.width, size.height);
   put(job.origin, glm::dvec3(cell_from_eye[3]));
   put(job.from_eye, glm::dmat3(cell_from_eye));
   cells.put(job);
@@ -127,15 +101,14 @@ RedrawJob dirty_job(const ChangedCells& cells, const VolumeView& volume, const V
 }
 
 /// Adds the volume itself, for surfaces whose shading samples it.
-void put_density(RedrawJob& job, const ChangedCells& cells, const VolumeView& volume,
-                 std::span<const Density> density, const View& view) {
-  const VoxelGrid& grid = volume.bricks.grid;
-  job.density = density.data();
+void put_density(RedrawJob& job, const ChangedCells& cells, const KeptPicture& kept) {
+  const VoxelGrid& grid = kept.volume.bricks.grid;
+  job.density = kept.density.data();
   job.extent[0] = grid.nx;
   job.extent[1] = grid.ny;
   job.extent[2] = grid.nz;
   put(job.first_voxel, -cells.low());
-  const glm::dmat4 eye_from_voxel = view.eye_from_world * volume.world_from_voxel;
+  const glm::dmat4 eye_from_voxel = kept.view.eye_from_world * kept.volume.world_from_voxel;
   const glm::dvec3 half = 0.5 * (cells.high() - cells.low());
   put(job.centre_mm, glm::dvec3(eye_from_voxel * glm::dvec4(cells.low() + half, 1.0)));
   double edge_mm = 0.0;
@@ -146,51 +119,31 @@ void put_density(RedrawJob& job, const ChangedCells& cells, const VolumeView& vo
   job.edge_mm = static_cast<float>(edge_mm);
 }
 
-/// Marks those of `within` that are not marked yet and for which `is_stale` holds.
-template <class IsStale>
-void mark_where(RedrawTiles& tiles, const PixelRect& within, const IsStale& is_stale) {
+/// Marks the tiles of `within` that are not marked yet and for which `changes` holds.
+template <class Changes>
+void mark_if(RedrawTiles& tiles, const PixelRect& within, const Changes& changes) {
   for (int y = within.y0; y < within.y1; ++y) {
     for (int x = within.x0; x < within.x1; ++x) {
-      if (!tiles.marked(x, y) && is_stale(tiles.pixels_of({x, y, x + 1, y + 1}))) tiles.mark(x, y);
+      if (!tiles.marked(x, y) && changes(tiles.pixels_of({x, y, x + 1, y + 1}))) tiles.mark(x, y);
     }
   }
 }
 
 }  // namespace
 
-void StaleVolume::add(const Renderer& renderer, std::size_t index,
-                      std::span<const VoxelBox> differs) {
-  add_to(changed_, renderer.dirty_voxels(index, differs));
-  const auto triangles = renderer.dirty_triangles(index);
-  triangles_.insert(triangles_.end(), triangles.begin(), triangles.end());
-  if (triangles_.size() <= kMostTriangles) return;
-  add_to(changed_, std::array{voxels_around(triangles_)});
-  triangles_.clear();
-}
-
-void StaleVolume::clear() {
-  changed_.clear();
-  triangles_.clear();
-}
-
-void StaleVolume::mark(RedrawTiles& tiles, const Renderer& renderer, const VolumeView& volume,
-                       std::span<const Density> density, const View& view,
-                       const RenderTarget& kept) const {
-  if (!triangles_.empty()) {
-    const glm::dmat4 clip_from_voxel =
-        view.clip_from_eye() * view.eye_from_world * volume.world_from_voxel;
-    mark_triangles(tiles, triangles_, clip_from_voxel, kept);
-  }
-  const RayFootprint footprint = renderer.footprint();
+void mark_rays(std::span<const VoxelBox> changed, const RayFootprint& footprint, bool end_at_kept,
+               const KeptPicture& kept, RedrawTiles& tiles) {
+  const VoxelBox all_changed = united(changed);
+  if (changed.size() > kMaxBoxes) changed = {&all_changed, 1};
   const CastKernels& kernels = *cast_kernels()[0];
   const double taps_vox = footprint.taps_normal ? kLongestTapVox : 0.0;
   // The pixels whose rays may pass a box in voxel coordinates, or `vox` beside it.
   const auto pixels_around = [&](const glm::dvec3& low, const glm::dvec3& high, double vox) {
-    return screen_bounds(box_corners(low - vox, high + vox, volume.world_from_voxel), view,
-                         kept.size());
+    return screen_bounds(box_corners(low - vox, high + vox, kept.volume.world_from_voxel),
+                         kept.view, kept.target.size());
   };
-  for (const std::vector<VoxelBox>& together : clusters_of(changed_)) {
-    if (const auto& [lo, hi] = together.front(); voxels_in({lo, hi}) > kMostTogether) {
+  for (const std::vector<VoxelBox>& together : clusters_of(changed)) {
+    if (const auto& [lo, hi] = together.front(); voxels_in({lo, hi}) > kMaxClusterVoxels) {
       const double around_vox = 0.5 * std::max(footprint.along, footprint.at_end) + taps_vox;
       tiles.mark(pixels_around({lo.x, lo.y, lo.z}, {hi.x, hi.y, hi.z}, around_vox));
       continue;
@@ -199,19 +152,17 @@ void StaleVolume::mark(RedrawTiles& tiles, const Renderer& renderer, const Volum
     const PixelRect passing = tiles.tiles_of(pixels_around(cells.low(), cells.high(), 0.0));
     const PixelRect all = tiles.tiles_of(pixels_around(cells.low(), cells.high(), taps_vox));
     if (all.empty()) continue;
-    RedrawJob job = dirty_job(cells, volume, view, kept.size());
+    RedrawJob job = redraw_job(cells, kept);
     std::vector<float> depth;
-    if (!renderer.translucent()) {
+    if (end_at_kept) {
       job.window = tiles.pixels_of(all);
-      depth = kept.read_depth(job.window);
+      depth = kept.target.read_depth(job.window);
       job.depth = depth.data();
     }
-    mark_where(tiles, passing,
-               [&](const PixelRect& tile) { return kernels.rays_touch(job, tile); });
+    mark_if(tiles, passing, [&](const PixelRect& tile) { return kernels.rays_touch(job, tile); });
     if (!footprint.taps_normal) continue;
-    put_density(job, cells, volume, density, view);
-    mark_where(tiles, all,
-               [&](const PixelRect& tile) { return kernels.shading_touches(job, tile); });
+    put_density(job, cells, kept);
+    mark_if(tiles, all, [&](const PixelRect& tile) { return kernels.shading_touches(job, tile); });
   }
 }
 

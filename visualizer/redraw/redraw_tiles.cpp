@@ -161,9 +161,12 @@ class WindowFromFine {
 
 }  // namespace
 
-void mark_triangles(RedrawTiles& tiles, std::span<const FineTriangle> triangles,
-                    const glm::dmat4& clip_from_voxel, const RenderTarget& kept) {
-  const WindowFromFine window_from_fine(clip_from_voxel, kept.all());
+void mark_triangles(std::span<const FineTriangle> triangles, const KeptPicture& kept,
+                    RedrawTiles& tiles) {
+  if (triangles.empty()) return;
+  const glm::dmat4 clip_from_voxel =
+      kept.view.clip_from_eye() * kept.view.eye_from_world * kept.volume.world_from_voxel;
+  const WindowFromFine window_from_fine(clip_from_voxel, kept.target.all());
   std::vector<Shown> shown;
   shown.reserve(triangles.size());
   PixelRect window;
@@ -172,7 +175,7 @@ void mark_triangles(RedrawTiles& tiles, std::span<const FineTriangle> triangles,
     window = window.united(shown.back().pixels);
   }
   if (window.empty()) return;
-  const std::vector<float> depth = kept.read_depth(window);
+  const std::vector<float> depth = kept.target.read_depth(window);
   const auto hidden = [&](const Shown& one, const PixelRect& pixels) {
     for (int y = pixels.y0; y < pixels.y1; ++y) {
       const auto first =

@@ -5,10 +5,10 @@
 #include <span>
 #include <vector>
 
-#include <glm/glm.hpp>
-
 #include "visualizer/gl/target.hpp"
+#include "visualizer/scene/camera.hpp"
 #include "visualizer/scene/pixel_rect.hpp"
+#include "visualizer/scene/scene_view.hpp"
 #include "visualizer/surface/volume_samples.hpp"
 
 namespace kerf {
@@ -48,11 +48,18 @@ class RedrawTiles {
   std::vector<std::uint8_t> marked_;
 };
 
-/// Marks the tiles in which one of `triangles` may cover the centre of a pixel. A triangle that
-/// came and one that went count alike. A tile stays clean if the depth of `kept`, the last
-/// picture, is everywhere nearer than the triangle. Marks a little more than needed, never less: a
-/// GPU rounds.
-void mark_triangles(RedrawTiles& tiles, std::span<const FineTriangle> triangles,
-                    const glm::dmat4& clip_from_voxel, const RenderTarget& kept);
+/// The last picture, and one of its volumes as it is now: the input of a redraw.
+struct KeptPicture {
+  const VolumeView& volume;
+  std::span<const Density> density;  ///< all of the volume
+  const View& view;                  ///< of the last picture and of the next
+  const RenderTarget& target;        ///< opaque volumes of the last picture, with their depth
+};
+
+/// Marks the tiles in which one of `triangles`, old or new, may cover the centre of a pixel. A tile
+/// stays as it is if the depth of `kept` is everywhere nearer than the triangle. Marks a little
+/// more than needed, never less: a GPU rounds.
+void mark_triangles(std::span<const FineTriangle> triangles, const KeptPicture& kept,
+                    RedrawTiles& tiles);
 
 }  // namespace kerf

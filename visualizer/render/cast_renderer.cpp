@@ -34,7 +34,9 @@ std::size_t first_pixel(const PixelRect& rect, std::int32_t width) {
 
 CastRenderer::CastRenderer(const SceneView& scene, std::span<const VolumeContent> contents,
                            CastMode mode)
-    : mode_(mode), caster_(scene, cast_contents(scene, contents), cast_options(mode)) {
+    : Renderer(scene.volumes.size()),
+      mode_(mode),
+      caster_(scene, cast_contents(scene, contents), cast_options(mode)) {
   program_.set("u_colour", 0);
   program_.set("u_depth", 1);
 }

@@ -19,12 +19,8 @@ class CastRenderer final : public Renderer {
  public:
   CastRenderer(const SceneView& scene, std::span<const VolumeContent> contents, CastMode mode);
 
-  void update(std::size_t volume, std::span<const Density> density,
-              std::span<const std::uint32_t> changed) override {
-    caster_.update(volume, density, changed);
-  }
-  void place(std::size_t volume, const glm::dmat4& world_from_voxel) override {
-    caster_.place(volume, world_from_voxel);
+  void set_transform(std::size_t volume, const glm::dmat4& world_from_voxel) override {
+    caster_.set_transform(volume, world_from_voxel);
   }
   void set_opacities(std::span<const MaterialView> materials,
                      std::span<const VolumeContent> contents) override;
@@ -33,6 +29,10 @@ class CastRenderer final : public Renderer {
   [[nodiscard]] bool translucent() const noexcept override { return mode_ == CastMode::blend; }
 
  private:
+  void upload(std::size_t volume, std::span<const Density> density,
+              const ChangedBricks& changed) override {
+    caster_.update(volume, density, changed);
+  }
   /// The picture on both sides.
   struct Frame {
     explicit Frame(PictureSize size);

@@ -42,13 +42,12 @@ VolumeOnGpu::VolumeOnGpu(const VolumeView& volume, const VolumeContent& content,
   for_each_layer(grid, [&](const VoxelBox& layer) { upload_gradient(content.density, layer); });
 }
 
-void VolumeOnGpu::update_bricks(std::span<const Density> density,
-                                std::span<const std::uint32_t> changed) {
+void VolumeOnGpu::update_bricks(std::span<const Density> density, const ChangedBricks& changed) {
   solid_.update_bricks(density, changed);
   if (gradient_) {
     const BrickGrid& bricks = solid_.bricks();
-    for (const std::uint32_t id : changed) {
-      const VoxelBox around = bricks.voxels(id).grown(kGradientReach);
+    for (const ChangedBrick& brick : changed) {
+      const VoxelBox around = bricks.voxels(brick.id).grown(kGradientReach);
       upload_gradient(density, around.clipped(bricks.grid.box()));
     }
   }
@@ -68,9 +67,9 @@ void VolumeOnGpu::upload_gradient(std::span<const Density> density, const VoxelB
   gradient_->upload(texels_.data(), box);
 }
 
-void VolumeOnGpu::place(const glm::dmat4& world_from_voxel) {
-  solid_.place(world_from_voxel);
-  cells_.place(world_from_voxel);
+void VolumeOnGpu::set_transform(const glm::dmat4& world_from_voxel) {
+  solid_.set_transform(world_from_voxel);
+  cells_.set_transform(world_from_voxel);
 }
 
 void VolumeOnGpu::bind(const GlProgram& program, const View& view) const {
@@ -81,7 +80,8 @@ void VolumeOnGpu::bind(const GlProgram& program, const View& view) const {
 
 IsoRenderer::IsoRenderer(const SceneView& scene, std::span<const VolumeContent> contents,
                          Options options)
-    : gradient_(scene.gradient),
+    : Renderer(scene.volumes.size()),
+      gradient_(scene.gradient),
       cast_program_({"screen.vert", "iso.frag", "volume_sample.frag", "gradient.frag", "ray.frag",
                      options.light},
                     define_of(scene.gradient)),

@@ -24,10 +24,10 @@ class VolumeOnGpu {
               bool skip_empty, GradientFilter gradient = GradientFilter::corners);
 
   /// Uploads bricks `changed` of `density` (the whole volume) and the cells they touch.
-  void update_bricks(std::span<const Density> density, std::span<const std::uint32_t> changed);
+  void update_bricks(std::span<const Density> density, const ChangedBricks& changed);
 
-  /// See `Renderer::place`.
-  void place(const glm::dmat4& world_from_voxel);
+  /// See `Renderer::set_transform`.
+  void set_transform(const glm::dmat4& world_from_voxel);
 
   /// Binds what `SolidOnGpu` binds, active cells on unit 2 and the gradient on 3.
   void bind(const GlProgram& program, const View& view) const;
@@ -62,17 +62,17 @@ class IsoRenderer final : public Renderer {
       : IsoRenderer(scene, contents, Options{}) {}
   IsoRenderer(const SceneView& scene, std::span<const VolumeContent> contents, Options options);
 
-  void update(std::size_t volume, std::span<const Density> density,
-              std::span<const std::uint32_t> changed) override {
-    volumes_[volume].update_bricks(density, changed);
-  }
-  void place(std::size_t volume, const glm::dmat4& world_from_voxel) override {
-    volumes_[volume].place(world_from_voxel);
+  void set_transform(std::size_t volume, const glm::dmat4& world_from_voxel) override {
+    volumes_[volume].set_transform(world_from_voxel);
   }
   void draw(const View& view, const RenderTarget& target) override;
   [[nodiscard]] RayFootprint footprint() const noexcept override;
 
  private:
+  void upload(std::size_t volume, std::span<const Density> density,
+              const ChangedBricks& changed) override {
+    volumes_[volume].update_bricks(density, changed);
+  }
   void cast_rays(const VolumeOnGpu& volume, const View& view, const RenderTarget& target);
 
   GradientFilter gradient_;

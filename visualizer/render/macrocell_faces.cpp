@@ -50,17 +50,14 @@ std::vector<CellFaces::Run> CellFaces::update(const Macrocells& cells, const Vox
 
 VoxelBox CellFaces::active_box() const {
   VoxelBox box;
-  for (const Face& face : faces_) {
-    const auto [x, y, z] = cell_of(face);
-    box = box.united({{x, y, z}, {x + 1, y + 1, z + 1}});
-  }
+  for (const Face& face : faces_) box = box.with(cell_of(face));
   return box;
 }
 
 CellsOnGpu::CellsOnGpu(const VolumeView& volume, std::span<const Density> density,
                        Density threshold)
     : bricks_(volume.bricks), cells_(volume.bricks.grid, density, threshold), faces_(cells_) {
-  place(volume.world_from_voxel);
+  set_transform(volume.world_from_voxel);
   const VoxelGrid& n = cells_.grid();
   glTextureStorage3D(active_.id(), 1, GL_R8UI, n.nx, n.ny, n.nz);
   read_nearest(active_.id());
@@ -75,15 +72,14 @@ CellsOnGpu::CellsOnGpu(const VolumeView& volume, std::span<const Density> densit
   upload_faces(std::array{CellFaces::Run{0, faces_.all().size()}});
 }
 
-void CellsOnGpu::update_bricks(std::span<const Density> density,
-                               std::span<const std::uint32_t> changed) {
+void CellsOnGpu::update_bricks(std::span<const Density> density, const ChangedBricks& changed) {
   const VoxelBox flipped = cells_.update_bricks(bricks_, changed, density);
   if (flipped.empty()) return;
   upload_active(flipped);
   upload_faces(faces_.update(cells_, flipped));
 }
 
-void CellsOnGpu::place(const glm::dmat4& world_from_voxel) {
+void CellsOnGpu::set_transform(const glm::dmat4& world_from_voxel) {
   // Cell i begins at voxel 8i - 1.
   world_from_cell_ =
       glm::scale(glm::translate(world_from_voxel, glm::dvec3(-1.0)), glm::dvec3(Macrocells::kEdge));

@@ -56,10 +56,10 @@ class CellsOnGpu {
   CellsOnGpu(const VolumeView& volume, std::span<const Density> density, Density threshold);
 
   /// Bricks `changed` of `density` (the whole volume) differ.
-  void update_bricks(std::span<const Density> density, std::span<const std::uint32_t> changed);
+  void update_bricks(std::span<const Density> density, const ChangedBricks& changed);
 
-  /// See `Renderer::place`.
-  void place(const glm::dmat4& world_from_voxel);
+  /// See `Renderer::set_transform`.
+  void set_transform(const glm::dmat4& world_from_voxel);
 
   /// The texture: 1 in active cells.
   void bind(GLuint unit) const { glBindTextureUnit(unit, active_.id()); }

@@ -61,9 +61,15 @@ constexpr RayFootprint kMatterFootprint{.along = 6}, kWideMatterFootprint{.along
 
 }  // namespace
 
-std::vector<VoxelBox> Renderer::dirty_voxels(std::size_t /*volume*/,
-                                             std::span<const VoxelBox> differs) const {
-  return {differs.begin(), differs.end()};
+void Renderer::mark_redraw(std::size_t volume, const KeptPicture& kept, RedrawTiles& tiles) const {
+  std::vector<VoxelBox> boxes;
+  changed_[volume].for_each_box(kept.volume.bricks,
+                                [&](const VoxelBox& box) { boxes.push_back(box); });
+  mark_rays(boxes, footprint(), !translucent(), kept, tiles);
+}
+
+void Renderer::forget_changes() {
+  for (ChangedBricks& volume : changed_) volume.clear();
 }
 
 RayFootprint Renderer::footprint() const noexcept {

@@ -9,11 +9,11 @@
 #include <string_view>
 #include <vector>
 
-#include "visualizer/cast/cast_kernels.hpp"
+#include "shared/volume/changed_bricks.hpp"
 #include "visualizer/gl/target.hpp"
+#include "visualizer/redraw/changed_cells.hpp"
 #include "visualizer/scene/camera.hpp"
 #include "visualizer/scene/scene_view.hpp"
-#include "visualizer/surface/volume_samples.hpp"
 
 namespace kerf {
 
@@ -23,13 +23,22 @@ namespace kerf {
 /// Lives and is called on the thread whose GL context is current.
 class Renderer {
  public:
+  explicit Renderer(std::size_t volumes) : changed_(volumes) {}
+  Renderer(const Renderer&) = delete;
+  Renderer& operator=(const Renderer&) = delete;
   virtual ~Renderer() = default;
 
-  /// Brick ids `changed` of a volume differ from what was drawn last; `density` is all of it.
-  virtual void update(std::size_t volume, std::span<const Density> density,
-                      std::span<const std::uint32_t> changed) = 0;
-  /// A volume lies elsewhere now; its voxels keep their edges.
-  virtual void place(std::size_t volume, const glm::dmat4& world_from_voxel) = 0;
+  /// Follows the changes of a volume; `density` is all of it. Keeps them until `forget_changes`.
+  void update(std::size_t volume, std::span<const Density> density, const ChangedBricks& changed) {
+    changed_[volume].add(changed);
+    upload(volume, density, changed);
+  }
+  /// Marks the tiles of the last picture whose pixels may be different now: those whose rays meet
+  /// changed cells.
+  virtual void mark_redraw(std::size_t volume, const KeptPicture& kept, RedrawTiles& tiles) const;
+  virtual void forget_changes();
+  /// Moves a volume; its voxels keep their edges.
+  virtual void set_transform(std::size_t volume, const glm::dmat4& world_from_voxel) = 0;
   /// The materials have other opacities, and are else what they were. Renderers of iso-surfaces
   /// show none. `contents` is all of the volumes.
   virtual void set_opacities(std::span<const MaterialView> /*materials*/,
@@ -45,21 +54,18 @@ class Renderer {
   /// Draws over what is in `target`, under its depth test, within its part. Opaque things come
   /// first: some renderers look through.
   virtual void draw(const View& view, const RenderTarget& target) = 0;
-  /// The dirty region of a volume after its last `update`, which changed densities in `differs`: a
-  /// ray whose footprint meets none of these boxes keeps its colour.
-  [[nodiscard]] virtual std::vector<VoxelBox> dirty_voxels(std::size_t volume,
-                                                           std::span<const VoxelBox> differs) const;
+  /// A ray whose footprint holds no changed voxel keeps its colour.
   [[nodiscard]] virtual RayFootprint footprint() const noexcept;
-  /// The same for a renderer that draws a mesh: the triangles that came, went or changed colour. A
-  /// ray that hits none of them keeps its colour.
-  [[nodiscard]] virtual std::span<const FineTriangle> dirty_triangles(
-      std::size_t /*volume*/) const {
-    return {};
-  }
   /// Shades from the gradient that the scene names; else always from `GradientFilter::corners`.
   [[nodiscard]] virtual bool takes_gradient() const noexcept { return true; }
   /// Lets what lies behind a surface shine through, so that it must be drawn before.
   [[nodiscard]] virtual bool translucent() const noexcept { return false; }
+
+ private:
+  virtual void upload(std::size_t volume, std::span<const Density> density,
+                      const ChangedBricks& changed) = 0;
+
+  std::vector<ChangedBricks> changed_;  ///< by volume
 };
 
 /// `kind` as on the command line; throws VisualizerError for an unknown one and names the known.

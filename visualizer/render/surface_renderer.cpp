@@ -25,6 +25,20 @@ std::vector<FrustumCulling::Part> drawn_parts(const RenderTarget& target) {
 
 constexpr GLuint kColoursUnit = 2;  // after the textures of SolidOnGpu
 
+constexpr std::size_t kMaxTriangles = 32768;  // a few cuts between two pictures; more become a box
+
+/// The smallest box of voxels between which all corners lie.
+VoxelBox voxels_around(std::span<const FineTriangle> triangles) {
+  VoxelBox all;
+  for (const FineTriangle& triangle : triangles) {
+    for (const FinePoint& corner : triangle) {
+      const VoxelIndex v = VolumeSamples::voxel_below(corner);
+      all = all.united({v, {v.x + 2, v.y + 2, v.z + 2}});
+    }
+  }
+  return all;
+}
+
 /// The parts of the target in which a volume may show.
 std::vector<PixelRect> parts_of(const SolidOnGpu& volume, const View& view,
                                 const RenderTarget& target) {
@@ -59,7 +73,7 @@ void ClipCaps::draw(const View& view, const RenderTarget& target) const {
 }
 
 SurfaceRenderer::SurfaceRenderer(const SceneView& scene, std::span<const VolumeContent> contents)
-    : scene_(scene) {
+    : Renderer(scene.volumes.size()), scene_(scene) {
   volumes_.reserve(scene.volumes.size());
   for (std::size_t i = 0; i < scene.volumes.size(); ++i) {
     const VolumeView& view = scene.volumes[i];
@@ -70,16 +84,22 @@ SurfaceRenderer::SurfaceRenderer(const SceneView& scene, std::span<const VolumeC
   }
 }
 
-void SurfaceRenderer::update(std::size_t volume, std::span<const Density> density,
-                             std::span<const std::uint32_t> changed) {
+void SurfaceRenderer::upload(std::size_t volume, std::span<const Density> density,
+                             const ChangedBricks& changed) {
   Volume& of = volumes_[volume];
   of.gpu.update(of.surface, of.surface.update(density, changed));
+  const auto triangles = of.surface.changed_triangles();
+  of.changed.insert(of.changed.end(), triangles.begin(), triangles.end());
+  if (of.changed.size() > kMaxTriangles) {
+    of.changed_box = of.changed_box.united(voxels_around(of.changed));
+    of.changed.clear();
+  }
   if (faces_) faces_->volumes()[volume].update_bricks(density, changed);
 }
 
-void SurfaceRenderer::place(std::size_t volume, const glm::dmat4& world_from_voxel) {
+void SurfaceRenderer::set_transform(std::size_t volume, const glm::dmat4& world_from_voxel) {
   scene_.volumes[volume].world_from_voxel = world_from_voxel;
-  if (faces_) faces_->volumes()[volume].place(world_from_voxel);
+  if (faces_) faces_->volumes()[volume].set_transform(world_from_voxel);
 }
 
 void SurfaceRenderer::set_cut_open(bool open, std::span<const VolumeContent> contents) {
@@ -87,10 +107,20 @@ void SurfaceRenderer::set_cut_open(bool open, std::span<const VolumeContent> con
   if (open) faces_.emplace(scene_, contents);
 }
 
-std::vector<VoxelBox> SurfaceRenderer::dirty_voxels(std::size_t volume,
-                                                    std::span<const VoxelBox> differs) const {
-  if (!faces_) return {};
-  return Renderer::dirty_voxels(volume, differs);
+void SurfaceRenderer::mark_redraw(std::size_t volume, const KeptPicture& kept,
+                                  RedrawTiles& tiles) const {
+  const Volume& of = volumes_[volume];
+  mark_triangles(of.changed, kept, tiles);
+  if (!of.changed_box.empty()) mark_rays({&of.changed_box, 1}, footprint(), true, kept, tiles);
+  if (faces_) Renderer::mark_redraw(volume, kept, tiles);
+}
+
+void SurfaceRenderer::forget_changes() {
+  Renderer::forget_changes();
+  for (Volume& volume : volumes_) {
+    volume.changed.clear();
+    volume.changed_box = {};
+  }
 }
 
 void SurfaceRenderer::draw(const View& view, const RenderTarget& target) {

@@ -43,23 +43,23 @@ class SurfaceRenderer final : public Renderer {
  public:
   SurfaceRenderer(const SceneView& scene, std::span<const VolumeContent> contents);
 
-  void update(std::size_t volume, std::span<const Density> density,
-              std::span<const std::uint32_t> changed) override;
-  void place(std::size_t volume, const glm::dmat4& world_from_voxel) override;
+  void set_transform(std::size_t volume, const glm::dmat4& world_from_voxel) override;
   void set_cut_open(bool open, std::span<const VolumeContent> contents) override;
   void draw(const View& view, const RenderTarget& target) override;
-  /// Triangles tell, but of the faces in the plane.
-  [[nodiscard]] std::vector<VoxelBox> dirty_voxels(
-      std::size_t volume, std::span<const VoxelBox> differs) const override;
-  [[nodiscard]] std::span<const FineTriangle> dirty_triangles(std::size_t volume) const override {
-    return volumes_[volume].surface.dirty_triangles();
-  }
+  /// By the triangles that changed; while volumes are cut open, by changed cells too.
+  void mark_redraw(std::size_t volume, const KeptPicture& kept, RedrawTiles& tiles) const override;
+  void forget_changes() override;
 
  private:
   struct Volume {
     VolumeSurface surface;
     SurfaceOnGpu gpu;
+    std::vector<FineTriangle> changed{};  ///< since `forget_changes`, before and after
+    VoxelBox changed_box{};               ///< around those that were too many for a list
   };
+
+  void upload(std::size_t volume, std::span<const Density> density,
+              const ChangedBricks& changed) override;
 
   SceneView scene_;  ///< its volumes where they are now
   GlProgram program_{"surface.vert", "surface.frag", "lighting.frag"};

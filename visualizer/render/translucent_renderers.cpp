@@ -13,7 +13,8 @@ namespace kerf {
 
 BlendRenderer::BlendRenderer(const SceneView& scene, std::span<const VolumeContent> contents,
                              Options options)
-    : volumes_(scene, contents, options.skip_empty),
+    : Renderer(scene.volumes.size()),
+      volumes_(scene, contents, options.skip_empty),
       entries_(static_cast<int>(scene.volumes.size())),
       cast_program_(
           {"screen.vert", "blend.frag", "translucent_sample.frag", "ray.frag", "lighting.frag"},
@@ -70,7 +71,7 @@ SlicesRenderer::Sliced::Sliced(const SceneView& scene, const VolumeContent& cont
 
 SlicesRenderer::SlicesRenderer(const SceneView& scene, std::span<const VolumeContent> contents,
                                Options options)
-    : options_(options) {
+    : Renderer(scene.volumes.size()), options_(options) {
   for (std::size_t v = 0; v < scene.volumes.size(); ++v) {
     volumes_.push_back(std::make_unique<Sliced>(with_volume(scene, v), contents[v]));
     const double edge_mm = volumes_.back()->volume.edge_mm();
@@ -81,13 +82,13 @@ SlicesRenderer::SlicesRenderer(const SceneView& scene, std::span<const VolumeCon
   glVertexArrayAttribFormat(array_.id(), 0, 3, GL_FLOAT, GL_FALSE, 0);
 }
 
-void SlicesRenderer::update(std::size_t volume, std::span<const Density> density,
-                            std::span<const std::uint32_t> changed) {
+void SlicesRenderer::upload(std::size_t volume, std::span<const Density> density,
+                            const ChangedBricks& changed) {
   volumes_[volume]->volume.volumes().front().update_bricks(density, changed);
 }
 
-void SlicesRenderer::place(std::size_t volume, const glm::dmat4& world_from_voxel) {
-  volumes_[volume]->volume.volumes().front().place(world_from_voxel);
+void SlicesRenderer::set_transform(std::size_t volume, const glm::dmat4& world_from_voxel) {
+  volumes_[volume]->volume.volumes().front().set_transform(world_from_voxel);
 }
 
 void SlicesRenderer::set_opacities(std::span<const MaterialView> materials,

@@ -28,12 +28,8 @@ class BlendRenderer final : public Renderer {
       : BlendRenderer(scene, contents, Options{}) {}
   BlendRenderer(const SceneView& scene, std::span<const VolumeContent> contents, Options options);
 
-  void update(std::size_t volume, std::span<const Density> density,
-              std::span<const std::uint32_t> changed) override {
-    volumes_.volumes()[volume].update_bricks(density, changed);
-  }
-  void place(std::size_t volume, const glm::dmat4& world_from_voxel) override {
-    volumes_.volumes()[volume].place(world_from_voxel);
+  void set_transform(std::size_t volume, const glm::dmat4& world_from_voxel) override {
+    volumes_.volumes()[volume].set_transform(world_from_voxel);
   }
   void set_opacities(std::span<const MaterialView> materials,
                      std::span<const VolumeContent> contents) override {
@@ -43,6 +39,11 @@ class BlendRenderer final : public Renderer {
   [[nodiscard]] bool translucent() const noexcept override { return true; }
 
  private:
+  void upload(std::size_t volume, std::span<const Density> density,
+              const ChangedBricks& changed) override {
+    volumes_.volumes()[volume].update_bricks(density, changed);
+  }
+
   TranslucentVolumes volumes_;
   RayEntries entries_;
   GlProgram cast_program_;
@@ -70,9 +71,7 @@ class SlicesRenderer final : public Renderer {
       : SlicesRenderer(scene, contents, Options{}) {}
   SlicesRenderer(const SceneView& scene, std::span<const VolumeContent> contents, Options options);
 
-  void update(std::size_t volume, std::span<const Density> density,
-              std::span<const std::uint32_t> changed) override;
-  void place(std::size_t volume, const glm::dmat4& world_from_voxel) override;
+  void set_transform(std::size_t volume, const glm::dmat4& world_from_voxel) override;
   void set_moving(bool moving) override { moving_ = moving; }
   [[nodiscard]] bool coarse_while_moving() const noexcept override { return true; }
   void set_opacities(std::span<const MaterialView> materials,
@@ -81,6 +80,8 @@ class SlicesRenderer final : public Renderer {
   [[nodiscard]] bool translucent() const noexcept override { return true; }
 
  private:
+  void upload(std::size_t volume, std::span<const Density> density,
+              const ChangedBricks& changed) override;
   /// One volume with a program of its own: shaders index textures by constants.
   struct Sliced {
     Sliced(const SceneView& scene, const VolumeContent& content);

@@ -64,20 +64,20 @@ void TranslucentVolume::upload(std::span<const Density> density, const VoxelBox&
 }
 
 void TranslucentVolume::update_bricks(std::span<const Density> density,
-                                      std::span<const std::uint32_t> changed) {
-  for (const std::uint32_t id : changed) {
-    const VoxelBox around = bricks_.voxels(id).grown(gradient_reach(gradient_));
-    upload(density, around.clipped(bricks_.grid.box()));
+                                      const ChangedBricks& changed) {
+  for (const ChangedBrick& one : changed) {
+    const VoxelBox brick = bricks_.voxels(one.id);
+    upload(density, brick.grown(gradient_reach(gradient_)).clipped(bricks_.grid.box()));
     if (!material_texels_) continue;
-    const VoxelBox brick = bricks_.voxels(id);  // what has no label has the material of its density
+    // A voxel without a label has the material of its density.
     materials_.upload(material_texels_->of(brick, density).data(), brick);
   }
   cells_.update_bricks(density, changed);
 }
 
-void TranslucentVolume::place(const glm::dmat4& world_from_voxel) {
+void TranslucentVolume::set_transform(const glm::dmat4& world_from_voxel) {
   world_from_texture_ = kerf::world_from_texture(world_from_voxel, bricks_.grid);
-  cells_.place(world_from_voxel);
+  cells_.set_transform(world_from_voxel);
 }
 
 void TranslucentVolume::bind_textures(GLuint unit) const {

@@ -26,10 +26,10 @@ class TranslucentVolume {
 
   /// Uploads bricks `changed` of `density` (the whole volume), gradients around them included. The
   /// labels are those of the last `set_materials`.
-  void update_bricks(std::span<const Density> density, std::span<const std::uint32_t> changed);
+  void update_bricks(std::span<const Density> density, const ChangedBricks& changed);
 
-  /// See `Renderer::place`.
-  void place(const glm::dmat4& world_from_voxel);
+  /// See `Renderer::set_transform`.
+  void set_transform(const glm::dmat4& world_from_voxel);
 
   /// Three units from `unit` on: voxels, materials, active cells.
   void bind_textures(GLuint unit) const;

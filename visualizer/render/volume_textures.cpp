@@ -207,12 +207,13 @@ SolidOnGpu::SolidOnGpu(const VolumeView& volume, const VolumeContent& content, i
   if (has_labels_) labels_.upload_from(content.labels.data(), whole);
 }
 
-void SolidOnGpu::update_bricks(std::span<const Density> density,
-                               std::span<const std::uint32_t> changed) {
-  for (const std::uint32_t id : changed) density_.upload_from(density.data(), bricks_.voxels(id));
+void SolidOnGpu::update_bricks(std::span<const Density> density, const ChangedBricks& changed) {
+  for (const ChangedBrick& brick : changed) {
+    density_.upload_from(density.data(), bricks_.voxels(brick.id));
+  }
 }
 
-void SolidOnGpu::place(const glm::dmat4& world_from_voxel) {
+void SolidOnGpu::set_transform(const glm::dmat4& world_from_voxel) {
   world_from_texture_ = kerf::world_from_texture(world_from_voxel, bricks_.grid);
 }
 

@@ -122,10 +122,10 @@ class SolidOnGpu {
   SolidOnGpu(const VolumeView& volume, const VolumeContent& content, int max_texture_size);
 
   /// Uploads bricks `changed` of `density` (the whole volume).
-  void update_bricks(std::span<const Density> density, std::span<const std::uint32_t> changed);
+  void update_bricks(std::span<const Density> density, const ChangedBricks& changed);
 
-  /// See `Renderer::place`.
-  void place(const glm::dmat4& world_from_voxel);
+  /// See `Renderer::set_transform`.
+  void set_transform(const glm::dmat4& world_from_voxel);
 
   /// Names the units of density (0), labels (1) and `palette` to a program with volume_sample.frag.
   static void set_units(const GlProgram& program, int palette);

@@ -45,8 +45,8 @@ MaterialScore::MaterialScore(const SceneView& scene, std::span<const VolumeConte
 }
 
 void MaterialScore::update(std::size_t volume, std::span<const Density> density,
-                           std::span<const std::uint32_t> bricks) {
-  for (const std::uint32_t brick : bricks) count(volumes_[volume], density, brick);
+                           const ChangedBricks& changed) {
+  for (const ChangedBrick& brick : changed) count(volumes_[volume], density, brick.id);
 }
 
 void MaterialScore::count(Volume& volume, std::span<const Density> density,

@@ -22,9 +22,8 @@ class MaterialScore {
  public:
   MaterialScore(const SceneView& scene, std::span<const VolumeContent> contents);
 
-  /// Some bricks of a volume are others now. Costs their voxels.
-  void update(std::size_t volume, std::span<const Density> density,
-              std::span<const std::uint32_t> bricks);
+  /// Counts the changed bricks of a volume again; `density` is all of it.
+  void update(std::size_t volume, std::span<const Density> density, const ChangedBricks& changed);
 
   /// By index of the scene's materials; 0 is matter of none.
   [[nodiscard]] std::vector<double> removed_mm3() const;

@@ -416,7 +416,7 @@ void dress(SurfaceVertex& vertex, const SurfaceSource& source, VoxelIndex start,
 
 }  // namespace
 
-void DirtyMeshCells::add(const SurfaceVertex& vertex) noexcept {
+void ChangedMeshCells::add(const SurfaceVertex& vertex) noexcept {
   // By axis the first and the last cell; along the edge both are the same.
   std::array<unsigned, 3> first{}, last{};
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -430,12 +430,12 @@ void DirtyMeshCells::add(const SurfaceVertex& vertex) noexcept {
   }
 }
 
-bool DirtyMeshCells::any() const noexcept {
-  return rows_ != DirtyMeshCells{}.rows_;
+bool ChangedMeshCells::any() const noexcept {
+  return rows_ != ChangedMeshCells{}.rows_;
 }
 
-void DirtyMeshCells::append_triangles(const BlockMesh& mesh, VoxelIndex block,
-                                      std::vector<FineTriangle>& to) const {
+void ChangedMeshCells::append_triangles(const BlockMesh& mesh, VoxelIndex block,
+                                        std::vector<FineTriangle>& to) const {
   if (!any()) return;
   const VoxelIndex start = block_start(block);
   for (const BlockTriangle& triangle : mesh.triangles) {
@@ -452,8 +452,8 @@ void DirtyMeshCells::append_triangles(const BlockMesh& mesh, VoxelIndex block,
   }
 }
 
-DirtyMeshCells difference(const BlockMesh& before, const BlockMesh& now) {
-  DirtyMeshCells cells;
+ChangedMeshCells difference(const BlockMesh& before, const BlockMesh& now) {
+  ChangedMeshCells cells;
   if (before == now) return cells;
   // Vertices come and go; those of both have the same order.
   auto old = before.vertices.begin();
@@ -481,13 +481,13 @@ BlockMesh extract_block(const SurfaceSource& source, VoxelIndex block) {
   return mesh;
 }
 
-DirtyMeshCells update_look(const SurfaceSource& source, VoxelIndex block, const VoxelBox& changed,
-                           BlockMesh& mesh) {
+ChangedMeshCells update_look(const SurfaceSource& source, VoxelIndex block, const VoxelBox& changed,
+                             BlockMesh& mesh) {
   const VoxelIndex start = block_start(block);
   const VoxelBox colours = changed.grown(VertexShading::kColourReachVox);
   const VoxelBox all = changed.grown(VertexShading::kOpennessReachVox);
   std::optional<Neighbourhood> near;
-  DirtyMeshCells cells;
+  ChangedMeshCells cells;
   for (SurfaceVertex& vertex : mesh.vertices) {
     const SurfaceVertex before = vertex;
     const FinePoint at = fine_place(vertex, start);

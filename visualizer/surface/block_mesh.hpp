@@ -91,8 +91,8 @@ struct SurfaceSource {
   GradientFilter gradient = GradientFilter::corners;  ///< of the normals
 };
 
-/// The dirty cells of a block's mesh: triangles in them came, went or changed colour.
-class DirtyMeshCells {
+/// The changed cells of a block's mesh: triangles in them came, went or changed colour.
+class ChangedMeshCells {
  public:
   /// The cells around the edge that this vertex stands on.
   void add(const SurfaceVertex& vertex) noexcept;
@@ -107,7 +107,7 @@ class DirtyMeshCells {
 };
 
 /// The cells in which two meshes of one block differ.
-[[nodiscard]] DirtyMeshCells difference(const BlockMesh& before, const BlockMesh& now);
+[[nodiscard]] ChangedMeshCells difference(const BlockMesh& before, const BlockMesh& now);
 
 /// A pure function of the volume; any thread. Positions and triangles depend on the block's own
 /// voxels, the rest of a vertex on the voxels around it: see VertexShading.
@@ -120,7 +120,7 @@ class DirtyMeshCells {
 /// Brings the mesh of a block up to date after a change of densities in `changed` that touches none
 /// of the block's own voxels: positions stay, and the vertices that depend on `changed` are
 /// computed again. The result is that of `extract_block`. Returns the cells whose colours changed.
-DirtyMeshCells update_look(const SurfaceSource& source, VoxelIndex block, const VoxelBox& changed,
-                           BlockMesh& mesh);
+ChangedMeshCells update_look(const SurfaceSource& source, VoxelIndex block, const VoxelBox& changed,
+                             BlockMesh& mesh);
 
 }  // namespace kerf

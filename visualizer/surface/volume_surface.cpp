@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <cstring>
 #include <thread>
 #include <utility>
 
@@ -53,11 +52,10 @@ VolumeSurface::VolumeSurface(const VolumeView& volume, const std::vector<Materia
       inverse_square_spacing_(inverse_square_spacing(volume.world_from_voxel)),
       look_(materials, iso_),
       gradient_(gradient),
-      density_(density.begin(), density.end()),
       labels_(labels.begin(), labels.end()),
       meshes_(blocks_.voxel_count()),
       work_(blocks_.voxel_count(), Work::none) {
-  const SurfaceSource from = source();
+  const SurfaceSource from = source(density);
   for_each_in_parallel(blocks_.nz, [&](std::int32_t z) {
     for (std::int32_t y = 0; y < blocks_.ny; ++y) {
       for (std::int32_t x = 0; x < blocks_.nx; ++x) {
@@ -67,32 +65,13 @@ VolumeSurface::VolumeSurface(const VolumeView& volume, const std::vector<Materia
   });
 }
 
-SurfaceSource VolumeSurface::source() const {
-  return {{bricks_.grid, density_, labels_}, iso_, inverse_square_spacing_, &look_, gradient_};
+SurfaceSource VolumeSurface::source(std::span<const Density> density) const {
+  return {{bricks_.grid, density, labels_}, iso_, inverse_square_spacing_, &look_, gradient_};
 }
 
 VoxelIndex VolumeSurface::block(std::uint32_t id) const noexcept {
   const auto i = static_cast<std::int32_t>(id);
   return {i % blocks_.nx, i / blocks_.nx % blocks_.ny, i / blocks_.nx / blocks_.ny};
-}
-
-VoxelBox VolumeSurface::follow(std::span<const Density> density, const VoxelBox& box) {
-  VoxelBox differs;
-  for (std::int32_t z = box.lo.z; z < box.hi.z; ++z) {
-    for (std::int32_t y = box.lo.y; y < box.hi.y; ++y) {
-      const std::size_t row = bricks_.grid.index(0, y, z);
-      const auto bytes = static_cast<std::size_t>(box.hi.x - box.lo.x) * sizeof(Density);
-      const std::size_t first = row + static_cast<std::size_t>(box.lo.x);
-      if (std::memcmp(&density_[first], &density[first], bytes) == 0) continue;
-      for (std::int32_t x = box.lo.x; x < box.hi.x; ++x) {
-        const std::size_t at = row + static_cast<std::size_t>(x);
-        if (density_[at] == density[at]) continue;
-        density_[at] = density[at];
-        differs = differs.united({{x, y, z}, {x + 1, y + 1, z + 1}});
-      }
-    }
-  }
-  return differs;
 }
 
 void VolumeSurface::mark(const VoxelBox& blocks, Work work) {
@@ -105,10 +84,10 @@ void VolumeSurface::mark(const VoxelBox& blocks, Work work) {
 }
 
 std::span<const std::uint32_t> VolumeSurface::update(std::span<const Density> density,
-                                                     std::span<const std::uint32_t> changed) {
+                                                     const ChangedBricks& changed) {
   VoxelBox all;
-  for (const std::uint32_t id : changed) {
-    const VoxelBox box = follow(density, bricks_.voxels(id));
+  for (const ChangedBrick& brick : changed) {
+    const VoxelBox box = ChangedBricks::bounds(brick, bricks_);
     if (box.empty()) continue;
     all = all.united(box);
     mark(blocks_on(box), Work::mesh);
@@ -116,23 +95,23 @@ std::span<const std::uint32_t> VolumeSurface::update(std::span<const Density> de
   }
   std::sort(marked_.begin(), marked_.end());
   different_.clear();
-  dirty_triangles_.clear();
-  const SurfaceSource from = source();
+  changed_triangles_.clear();
+  const SurfaceSource from = source(density);
   for (const std::uint32_t id : marked_) {
     BlockMesh& mesh = meshes_[id];
     const Work work = std::exchange(work_[id], Work::none);
     if (work == Work::look && mesh.vertices.empty()) continue;
-    DirtyMeshCells cells;
+    ChangedMeshCells cells;
     if (work == Work::look) {
       cells = update_look(from, block(id), all, mesh);
     } else {
       BlockMesh now = extract_block(from, block(id));
       cells = difference(mesh, now);
-      cells.append_triangles(mesh, block(id), dirty_triangles_);
+      cells.append_triangles(mesh, block(id), changed_triangles_);
       mesh = std::move(now);
     }
     if (!cells.any()) continue;
-    cells.append_triangles(mesh, block(id), dirty_triangles_);
+    cells.append_triangles(mesh, block(id), changed_triangles_);
     different_.push_back(id);
   }
   marked_.clear();

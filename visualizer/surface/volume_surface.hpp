@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "shared/volume/brick_grid.hpp"
+#include "shared/volume/changed_bricks.hpp"
 #include "visualizer/scene/scene_view.hpp"
 #include "visualizer/surface/block_mesh.hpp"
 
@@ -18,22 +18,20 @@ namespace kerf {
 /// No GL. One thread calls; the first extraction uses the cores that the process may use.
 class VolumeSurface {
  public:
-  /// `density` and `labels` (empty, or one per voxel) cover the volume. Both are copied; the
-  /// density so that an update knows which voxels of a changed brick are others: far fewer than
-  /// all.
+  /// `density` and `labels` (empty, or one per voxel) cover the volume. The labels are copied.
   VolumeSurface(const VolumeView& volume, const std::vector<MaterialView>& materials,
                 std::span<const Density> density, std::span<const Label> labels,
                 GradientFilter gradient = GradientFilter::corners);
 
-  /// Follows a change of bricks `changed` (of the segment's brick grid); `density` is all of the
-  /// volume. Returns the blocks whose mesh is another one now, ascending.
+  /// Follows a change; `density` is all of the volume as it is now. `changed` must hold every voxel
+  /// that changed since the last call. Returns the blocks whose mesh changed, ascending.
   std::span<const std::uint32_t> update(std::span<const Density> density,
-                                        std::span<const std::uint32_t> changed);
+                                        const ChangedBricks& changed);
 
-  /// What the last `update` took away, made, or gave another look: all triangles of the cells in
-  /// which there is any, as they were and as they are.
-  [[nodiscard]] std::span<const FineTriangle> dirty_triangles() const noexcept {
-    return dirty_triangles_;
+  /// Triangles that the last `update` removed, added or coloured anew: all of the cells that have
+  /// at least one of these, as they were and as they are.
+  [[nodiscard]] std::span<const FineTriangle> changed_triangles() const noexcept {
+    return changed_triangles_;
   }
 
   [[nodiscard]] const VoxelGrid& blocks() const noexcept { return blocks_; }
@@ -44,9 +42,7 @@ class VolumeSurface {
  private:
   enum class Work : std::uint8_t { none, look, mesh };
 
-  [[nodiscard]] SurfaceSource source() const;
-  /// Takes over what differs in `box` and returns the smallest box around it.
-  VoxelBox follow(std::span<const Density> density, const VoxelBox& box);
+  [[nodiscard]] SurfaceSource source(std::span<const Density> density) const;
   void mark(const VoxelBox& blocks, Work work);
 
   BrickGrid bricks_;
@@ -55,13 +51,12 @@ class VolumeSurface {
   glm::vec3 inverse_square_spacing_;
   VertexShading look_;
   GradientFilter gradient_;
-  std::vector<Density> density_;
   std::vector<Label> labels_;
   std::vector<BlockMesh> meshes_;
   std::vector<Work> work_;                ///< by block; all none between calls
   std::vector<std::uint32_t> marked_;     ///< blocks with work
-  std::vector<std::uint32_t> different_;  ///< what the last update returned
-  std::vector<FineTriangle> dirty_triangles_;
+  std::vector<std::uint32_t> different_;  ///< the result of the last update
+  std::vector<FineTriangle> changed_triangles_;
 };
 
 }  // namespace kerf

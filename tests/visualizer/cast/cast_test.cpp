@@ -219,7 +219,7 @@ TEST_CASE("after random cuts, taking the changed bricks equals a fresh start pix
     for (int cut = 0; cut < 40; ++cut) {
       // Grows back in every third cut: cells become active again too.
       const VoxelBox box = fill_random_box(volume, cut % 3 == 2 ? 60000 : 0, random);
-      edited.update(0, volume.density, bricks_in(volume.view.bricks, box));
+      edited.update(0, volume.density, changed_in(volume.view.bricks, box));
       Caster fresh = caster_of({&volume}, options);
       const CastPicture a = cast(edited, view).picture;
       const CastPicture b = cast(fresh, view).picture;

@@ -9,8 +9,10 @@
 #include <rapidcheck.h>
 
 #include "shared/volume/brick_grid.hpp"
+#include "tests/visualizer/gl/gl_fixture.hpp"
 
 using namespace kerf;
+using namespace kerf::test;
 
 namespace {
 
@@ -84,7 +86,8 @@ TEST_CASE("cells kept up by changed bricks equal cells made anew") {
       }
     }
     const std::vector<std::uint8_t> before(kept.active().begin(), kept.active().end());
-    const VoxelBox flipped = kept.update_bricks(bricks, {&id, 1}, density);
+    const VoxelBox flipped =
+        kept.update_bricks(bricks, changed_in(bricks, bricks.voxels(id)), density);
     const Macrocells made(grid, density, iso, edge);
     RC_ASSERT(std::ranges::equal(kept.active(), made.active()));
     VoxelBox others;

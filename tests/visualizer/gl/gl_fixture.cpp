@@ -51,15 +51,19 @@ glm::dmat4 centred(VoxelGrid grid, glm::dvec3 spacing_mm, glm::dvec3 centre_mm) 
                         -middle);
 }
 
-std::vector<std::uint32_t> bricks_in(const BrickGrid& grid, const VoxelBox& box) {
-  std::vector<std::uint32_t> ids;
-  const VoxelBox bricks = grid.bricks_of(box);
-  for (int z = bricks.lo.z; z < bricks.hi.z; ++z) {
-    for (int y = bricks.lo.y; y < bricks.hi.y; ++y) {
-      for (int x = bricks.lo.x; x < bricks.hi.x; ++x) ids.push_back(grid.id({x, y, z}));
-    }
+ChangedBricks changed_in(const BrickGrid& grid, const VoxelBox& box) {
+  ChangedBricks changed;
+  for (std::uint32_t id = 0; id < grid.count(); ++id) {
+    ChangedBrick brick{id};
+    const VoxelBox all = grid.voxels(id), part = all.clipped(box);
+    if (part.empty()) continue;
+    for_each_voxel(part, [&](int x, int y, int z) {
+      brick.voxels[static_cast<std::size_t>(z - all.lo.z)] |=
+          std::uint64_t{1} << (kBrickEdge * (y - all.lo.y) + x - all.lo.x);
+    });
+    changed.add(brick);
   }
-  return ids;
+  return changed;
 }
 
 VoxelBox fill_random_box(TestVolume& volume, Density density, std::mt19937& random) {

@@ -44,8 +44,8 @@ struct PixelRay {
 };
 [[nodiscard]] PixelRay pixel_ray(const View& view, PictureSize size, int x, int y);
 
-/// Bricks that a box of voxels touches.
-[[nodiscard]] std::vector<std::uint32_t> bricks_in(const BrickGrid& grid, const VoxelBox& box);
+/// A change of every voxel in a box.
+[[nodiscard]] ChangedBricks changed_in(const BrickGrid& grid, const VoxelBox& box);
 
 /// Sets a small box of voxels anywhere in the volume to `density`; returns the box.
 VoxelBox fill_random_box(TestVolume& volume, Density density, std::mt19937& random);

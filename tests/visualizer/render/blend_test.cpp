@@ -141,7 +141,7 @@ TEST_CASE("what has no label shows the material of its density after a cut too")
   const VolumeContent content{volume.density, labels};
   BlendRenderer edited(scene, {&content, 1});
   for (Density& density : volume.density) density = static_cast<Density>(density / 2);
-  edited.update(0, volume.density, bricks_in(volume.view.bricks, grid.box()));
+  edited.update(0, volume.density, changed_in(volume.view.bricks, grid.box()));
   BlendRenderer fresh(scene, {&content, 1});
   const View view = look_at({0, 0, 30}, {}, 20, 40);
   const RenderTarget target(kTestSize);

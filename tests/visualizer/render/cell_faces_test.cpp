@@ -4,9 +4,11 @@
 #include <doctest/doctest.h>
 #include <rapidcheck.h>
 
+#include "tests/visualizer/gl/gl_fixture.hpp"
 #include "visualizer/render/macrocell_faces.hpp"
 
 using namespace kerf;
+using namespace kerf::test;
 
 namespace {
 
@@ -43,7 +45,8 @@ TEST_CASE(
     for (int i = 0; i < 8; ++i) {
       const std::uint32_t id = *any_brick;
       fill(id, *rc::gen::element(Density{0}, kIso));
-      const VoxelBox flipped = cells.update_bricks(bricks, {&id, 1}, density);
+      const VoxelBox flipped =
+          cells.update_bricks(bricks, changed_in(bricks, bricks.voxels(id)), density);
       if (flipped.empty()) continue;
       const auto runs = faces.update(cells, flipped);
       copy.resize(faces.all().size());

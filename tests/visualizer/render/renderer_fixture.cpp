@@ -123,7 +123,7 @@ void check_updates(const MakeRenderer& make) {
   for (int cut = 0; cut < 12; ++cut) {
     // Grows back in every third cut: cells become active again too.
     const VoxelBox box = fill_random_box(volume, cut % 3 == 2 ? 60000 : 0, random);
-    edited->update(0, volume.density, bricks_in(volume.view.bricks, box));
+    edited->update(0, volume.density, changed_in(volume.view.bricks, box));
     content = volume.content();
     const auto fresh = make(scene, {&content, 1});
     last = draw(*edited, view, target);

@@ -84,7 +84,7 @@ TEST_CASE("iso, surface and cast show the same face in the clip plane, also afte
           for (int x = cut.lo.x; x < cut.hi.x; ++x) volume.density[grid.index(x, y, z)] = 0;
         }
       }
-      const auto changed = bricks_in(volume.view.bricks, cut);
+      const auto changed = changed_in(volume.view.bricks, cut);
       for (const auto& renderer : renderers) renderer->update(0, volume.density, changed);
     }
     const Drawn iso = draw(*renderers[0], view, target);

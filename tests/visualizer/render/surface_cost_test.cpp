@@ -80,10 +80,7 @@ TEST_CASE("cost of a mesh: the whole tooth, and again after cuts of 16^3" * doct
     VoxelIndex at{96 + static_cast<int>(random() % 60), 101 + static_cast<int>(random() % 50), 160};
     while (at.z > 8 && density[grid.index(at.x, at.y, at.z)] < view.iso) --at.z;
     const VoxelBox box = VoxelBox{at, {at.x + 1, at.y + 1, at.z + 1}}.grown(8).clipped(grid.box());
-    std::vector<std::uint32_t> changed;
-    for (std::uint32_t id = 0; id < view.bricks.count(); ++id) {
-      if (!view.bricks.voxels(id).clipped(box).empty()) changed.push_back(id);
-    }
+    const ChangedBricks changed = changed_in(view.bricks, box);
     for (const bool back : {false, true}) {
       for (int z = box.lo.z; z < box.hi.z; ++z) {
         for (int y = box.lo.y; y < box.hi.y; ++y) {

@@ -134,22 +134,11 @@ TEST_CASE("surface: after random cuts the picture equals that of a fresh upload,
         cut == 23
             ? grid.box()
             : VoxelBox{at, {at.x + 1, at.y + 1, at.z + 1}}.grown(2 + pick(6)).clipped(grid.box());
-    std::vector<std::uint32_t> changed;
-    for (std::uint32_t id = 0; id < volume.view.bricks.count(); ++id) {
-      const VoxelBox part = volume.view.bricks.voxels(id).clipped(box);
-      if (part.empty()) continue;
-      changed.push_back(id);
-      for (int z = part.lo.z; z < part.hi.z; ++z) {
-        for (int y = part.lo.y; y < part.hi.y; ++y) {
-          for (int x = part.lo.x; x < part.hi.x; ++x) {
-            // Noise in every third cut: many more triangles than before.
-            volume.density[grid.index(x, y, z)] =
-                static_cast<Density>(cut % 3 == 1 ? pick(65536) : 0);
-          }
-        }
-      }
-    }
-    edited.update(0, volume.density, changed);
+    for_each_voxel(box, [&](int x, int y, int z) {
+      // Noise in every third cut: many more triangles than before.
+      volume.density[grid.index(x, y, z)] = static_cast<Density>(cut % 3 == 1 ? pick(65536) : 0);
+    });
+    edited.update(0, volume.density, changed_in(volume.view.bricks, box));
     content = volume.content();
     SurfaceRenderer fresh(scene, {&content, 1});
     const Drawn a = draw(edited, view, target);
@@ -242,16 +231,21 @@ TEST_CASE("surface and iso draw the same picture") {
   }
 }
 
-TEST_CASE("a surface tells of changed voxels while a plane cuts it open, else of triangles alone") {
+TEST_CASE("surface redraws by changed cells while a plane cuts it open, else by triangles alone") {
   if (!have_gl()) return;
   const VoxelGrid grid{24, 24, 24};
   const TestVolume volume(grid, centred(grid, glm::dvec3(0.25)), ball({}, 2.0, 0.5));
   const VolumeContent content = volume.content();
   const auto renderer = make_renderer("surface", scene_of({&volume}), {&content, 1});
-  const std::vector<VoxelBox> differs{{{8, 8, 8}, {12, 13, 14}}};
-  CHECK(renderer->dirty_voxels(0, differs).empty());
-  renderer->set_cut_open(true, {&content, 1});
-  CHECK(renderer->dirty_voxels(0, differs) == differs);
-  renderer->set_cut_open(false, {&content, 1});
-  CHECK(renderer->dirty_voxels(0, differs).empty());
+  const RenderTarget target(kSize);
+  const View view = look_at({0, 0, 20}, {}, 10, 30);
+  static_cast<void>(draw(*renderer, view, target));
+  // Brought without another density: no triangle changes.
+  renderer->update(0, volume.density, changed_in(volume.view.bricks, {{8, 8, 8}, {12, 13, 14}}));
+  for (const bool open : {false, true, false}) {
+    renderer->set_cut_open(open, {&content, 1});
+    RedrawTiles tiles(kSize);
+    renderer->mark_redraw(0, {volume.view, volume.density, view, target}, tiles);
+    CHECK(tiles.rects().empty() == !open);
+  }
 }

@@ -35,7 +35,7 @@ VolumeContent Tooth::content() const {
   return {image.density, labelled ? std::span<const Label>(image.labels) : std::span<Label>()};
 }
 
-std::vector<std::uint32_t> Tooth::drill() {
+ChangedBricks Tooth::drill() {
   const VoxelGrid& grid = image.grid;
   const double radius_vox = 0.05 * grid.nx;
   for (int z = grid.nz * 3 / 8; z < grid.nz; ++z) {
@@ -47,7 +47,7 @@ std::vector<std::uint32_t> Tooth::drill() {
       }
     }
   }
-  return bricks_in(scene.volumes[0].bricks, grid.box());
+  return changed_in(scene.volumes[0].bricks, grid.box());
 }
 
 Tooth phantom(VoxelGrid grid, bool labelled) {

@@ -18,7 +18,7 @@ struct Tooth {
   Tooth(VolumeImage of, double iso, bool with_labels);
   [[nodiscard]] VolumeContent content() const;
   /// Opens the crown down to the pulp; returns the bricks that may have changed.
-  std::vector<std::uint32_t> drill();
+  ChangedBricks drill();
 };
 
 /// The made tooth, 32 x 32 x 20 mm with the air around it.

@@ -19,8 +19,7 @@ namespace {
 
 /// Applies `change(density, world mm)` to the voxels of a box and returns their bricks.
 template <typename Change>
-std::vector<std::uint32_t> edit(TestVolume& volume, VoxelIndex centre, int reach,
-                                const Change& change) {
+ChangedBricks edit(TestVolume& volume, VoxelIndex centre, int reach, const Change& change) {
   const VoxelGrid& grid = volume.view.bricks.grid;
   const VoxelBox box =
       VoxelBox{centre, {centre.x + 1, centre.y + 1, centre.z + 1}}.grown(reach).clipped(grid.box());
@@ -33,12 +32,11 @@ std::vector<std::uint32_t> edit(TestVolume& volume, VoxelIndex centre, int reach
       }
     }
   }
-  return bricks_in(volume.view.bricks, box);
+  return changed_in(volume.view.bricks, box);
 }
 
 /// Removes a ball, antialiased over `ramp_mm`.
-std::vector<std::uint32_t> cut(TestVolume& volume, glm::dvec3 centre_mm, double radius_mm,
-                               double ramp_mm) {
+ChangedBricks cut(TestVolume& volume, glm::dvec3 centre_mm, double radius_mm, double ramp_mm) {
   const glm::dvec3 voxel(glm::inverse(volume.view.world_from_voxel) * glm::dvec4(centre_mm, 1));
   const double edge_mm = glm::length(glm::dvec3(volume.view.world_from_voxel[0]));
   const auto left =
@@ -166,10 +164,10 @@ TEST_CASE("after rough edits an update equals a fresh mesh, coloured by labels o
         really.push_back(id);
         for (const auto& [one, other] : {std::pair(&before[id], &surface.meshes()[id]),
                                          std::pair(&surface.meshes()[id], &before[id])}) {
-          triangles_untold += untold(*one, *other, surface.block(id), surface.dirty_triangles());
+          triangles_untold += untold(*one, *other, surface.block(id), surface.changed_triangles());
         }
       }
-      triangles_told = std::max(triangles_told, surface.dirty_triangles().size());
+      triangles_told = std::max(triangles_told, surface.changed_triangles().size());
       told_wrong += std::equal(told.begin(), told.end(), really.begin(), really.end()) ? 0 : 1;
     }
     CHECK(wrong == 0);

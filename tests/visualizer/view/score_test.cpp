@@ -31,10 +31,10 @@ SceneView scene_of(std::vector<MaterialView> materials) {
 const std::vector<MaterialView> kTooth{
     {"none", 0.0}, {"enamel", 0.8, {1, 1, 1}}, {"dentin", 0.4, {0, 1, 0}}};
 
-std::vector<std::uint32_t> all_bricks(const SceneView& scene) {
-  std::vector<std::uint32_t> ids(scene.volumes[0].bricks.count());
-  for (std::uint32_t id = 0; id < ids.size(); ++id) ids[id] = id;
-  return ids;
+ChangedBricks all_bricks(const SceneView& scene) {
+  ChangedBricks all;
+  for (std::uint32_t id = 0; id < scene.volumes[0].bricks.count(); ++id) all.add(ChangedBrick{id});
+  return all;
 }
 
 }  // namespace

@@ -5,11 +5,12 @@
 #include "visualizer/cast/simd/packet_rays.hpp"
 #include "visualizer/cast/simd/packet_volume.hpp"
 
-// For the files that define `Simd` only: tests packets of rays against the dirty cells of a volume.
+// For the files that define `Simd` only: tests packets of rays against the changed cells of a
+// volume.
 //
-// The colour of a ray can change in three ways: the ray crosses a cell marked `kDirtyAlong`, it
-// ends in a cell marked `kDirtyAtEnd`, or it ends on a surface whose shading samples a dirty cell.
-// A ray of which none is true keeps its colour, bit by bit.
+// The colour of a ray can change in three ways: the ray crosses a cell marked `kChangedAlong`, it
+// ends in a cell marked `kChangedAtEnd`, or it ends on a surface whose shading samples a changed
+// cell. A ray of which none is true keeps its colour, bit by bit.
 
 namespace kerf {
 namespace {
@@ -47,8 +48,8 @@ inline F longest_part(Vec3 a) {
   return Simd::max(Simd::max(absolute(a.x), absolute(a.y)), absolute(a.z));
 }
 
-/// Whether a ray of the lanes `alive` crosses a cell marked `kDirtyAlong`.
-inline bool crosses_dirty_cell(const RedrawJob& job, const VolumeRays& rays, M alive) {
+/// Whether a ray of the lanes `alive` crosses a cell marked `kChangedAlong`.
+inline bool crosses_changed_cell(const RedrawJob& job, const VolumeRays& rays, M alive) {
   const F step_mm = Simd::set(job.step_vox) / longest_part(rays.direction);
   // Half a step more: no place on a ray is farther than that from a test.
   const F end_mm = rays.end_mm + Simd::set(0.5F) * step_mm;
@@ -56,7 +57,7 @@ inline bool crosses_dirty_cell(const RedrawJob& job, const VolumeRays& rays, M a
   for (std::int32_t test = 0; test < job.most_tests && Simd::any(alive); ++test) {
     const F t = rays.begin_mm + Simd::set(static_cast<float>(test)) * step_mm;
     const Vec3 p = rays.origin + t * rays.direction;
-    if (Simd::any(Simd::both(alive, marked(job, p, kDirtyAlong)))) return true;
+    if (Simd::any(Simd::both(alive, marked(job, p, kChangedAlong)))) return true;
     alive = Simd::both(alive, Simd::less(t + step_mm, end_mm));
   }
   return Simd::any(alive);  // so far away that its steps are lost in rounding
@@ -131,7 +132,7 @@ inline Ends ends_of(const RedrawJob& job, const Packet& packet) {
           Simd::set(job.eye.depth_slope) / (Simd::set(job.eye.depth_far) - depth)};
 }
 
-/// Whether a ray of the packet crosses a dirty cell or ends in one.
+/// Whether a ray of the packet crosses a changed cell or ends in one.
 inline bool packet_rays_touch(const RedrawJob& job, const Packet& packet) {
   const Vec3 eye = eye_directions(job.eye, packet);
   const Shown shown = shown_of(job.eye, eye);
@@ -147,11 +148,11 @@ inline bool packet_rays_touch(const RedrawJob& job, const Packet& packet) {
     rays.end_mm = Simd::min(shown.end_mm, ends.t + Simd::set(1.0F) / longest_part(rays.direction));
   }
   clip_to(job.size, rays);
-  if (crosses_dirty_cell(job, rays, drawn_lanes(packet))) return true;
-  return any_marked(job, rays.origin + ends.t * rays.direction, ends.there, kDirtyAtEnd);
+  if (crosses_changed_cell(job, rays, drawn_lanes(packet))) return true;
+  return any_marked(job, rays.origin + ends.t * rays.direction, ends.there, kChangedAtEnd);
 }
 
-/// Whether the shading of a point at which a ray ends samples a dirty cell.
+/// Whether the shading of a point at which a ray ends samples a changed cell.
 inline bool packet_shading_touches(const RedrawJob& job, const Packet& packet) {
   const Vec3 eye = eye_directions(job.eye, packet);
   const Ends ends = ends_of(job, packet);
@@ -184,7 +185,7 @@ inline bool packet_shading_touches(const RedrawJob& job, const Packet& packet) {
   if (Simd::any(Simd::but_not(near, known))) return true;
   const Vec3 inward = facing_of(job.from_eye, gradient, -normalized(eye)).inward;
   for (const float reach_vox : kShadingTapsVox) {
-    if (any_marked(job, p - Simd::set(reach_vox) * inward, known, kDirtyAlong)) return true;
+    if (any_marked(job, p - Simd::set(reach_vox) * inward, known, kChangedAlong)) return true;
   }
   return false;
 }

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Which rays a change in a volume can reach, without any GL.
+#include "visualizer/redraw/changed_cells.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <random>
@@ -10,7 +12,6 @@
 
 #include "tests/visualizer/gl/gl_fixture.hpp"
 #include "visualizer/cast/cast_volume.hpp"
-#include "visualizer/redraw/changed_cells.hpp"
 
 using namespace kerf;
 using namespace kerf::test;
