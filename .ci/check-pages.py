@@ -17,13 +17,13 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 RIG = ["lab/rig/*"]
 # Page, the command that makes it, the sources of its rows and texts.
 PAGES = {
-    "docs/accuracy.md": ("./kerf lab accuracy --page docs/accuracy.md", ["lab/accuracy/*", *RIG]),
-    "docs/contact.md": ("./kerf lab extremes --page docs/contact.md", ["lab/contact/*", *RIG]),
+    "docs/accuracy.md": ("./kerf lab accuracy --page docs/accuracy.md", ["lab/accuracy/*", "lab/report/accuracy.py", *RIG]),
+    "docs/contact.md": ("./kerf lab extremes --page docs/contact.md", ["lab/contact/*", "lab/report/contact.py", *RIG]),
     "docs/energy.md": ("./kerf lab energy --page docs/energy.md", ["lab/stability/energy_*"]),
     "docs/stability.md": ("./kerf lab zwidth --page docs/stability.md",
                           ["lab/stability/*", "!lab/stability/energy_*", "controller/stability/*", "lab/report/stability*"]),
-    "docs/performance.md": ("./kerf bench kernels --page docs/performance.md", ["lab/bench/*", *RIG]),
-    "docs/pictures.md": ("./kerf bench pictures --page docs/pictures.md", ["visualizer/bench/*"]),
+    "docs/performance.md": ("./kerf bench kernels --page docs/performance.md", ["lab/bench/*", "lab/report/kernels.py", *RIG]),
+    "docs/pictures.md": ("./kerf bench pictures --page docs/pictures.md", ["visualizer/bench/*", "lab/report/pictures.py"]),
     "docs/second-machine.md": ("./kerf bench bridge --page docs/second-machine.md", ["lab/bridge/*"]),
 }
 STAMP = re.compile(r"\n*<!-- made by: (.*); sources: ([0-9a-f]{16}) -->\n*\Z")

@@ -4,7 +4,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
-#include <string>
 #include <vector>
 
 // The forces of a recording as a plot.
@@ -17,9 +16,6 @@ namespace kerf {
 ///
 /// The file appears whole or not at all. Throws `RecordError`, `ReportError` or `FileError`.
 void plot_forces(const std::filesystem::path& folder, const std::filesystem::path& svg);
-
-/// The picture that gnuplot draws on its standard output for a script with `set terminal svg`.
-[[nodiscard]] std::string gnuplot_svg(const std::string& script);
 
 /// A curve of at most `max_points` points that keeps every peak: the smallest and the largest of
 /// each stretch of samples, in their order. If all samples fit, all stay.

@@ -5,12 +5,11 @@
 #include <string>
 #include <vector>
 
-#include "lab/accuracy/page.hpp"
 #include "lab/accuracy/study.hpp"
 #include "lab/run/lab_command.hpp"
 #include "lab/run/lab_run.hpp"
-#include "record/force_plot.hpp"
 #include "shared/posix/program.hpp"
+#include "shared/posix/report_tool.hpp"
 
 namespace kerf::accuracy {
 namespace {
@@ -57,6 +56,7 @@ int Command::run(std::ostream& out) const {
   const std::string plot = plot_.empty() ? page_plot("--page", page_, ".svg") : plot_;
   const LabOutput as_plot("--plot", plot, ".svg");
   LabOutput::check_distinct({&as_json, &as_csv, &as_page, &as_plot});
+  if (!plot.empty()) check_can_plot();
   const int core = pin_lab(core_);
   std::vector<Entry> entries;
   {
@@ -65,10 +65,13 @@ int Command::run(std::ostream& out) const {
   }
   out << kHead;
   for (const Entry& entry : entries) out << line_of(entry) << '\n';
-  as_json.write(json(entries, core));
+  const std::string report = json(entries, core);
+  as_json.write(report);
   as_csv.write(csv(entries));
-  if (!page_.empty()) as_page.write(page(entries, page_link(page_, plot)));
-  if (!plot.empty()) as_plot.write(gnuplot_svg(plot_script(entries)));
+  if (!page_.empty()) {
+    as_page.write(make_report({"accuracy", "page", page_link(page_, plot)}, report));
+  }
+  if (!plot.empty()) as_plot.write(make_report({"accuracy", "plot"}, report));
   return 0;
 }
 

@@ -206,11 +206,14 @@ std::string csv(const std::vector<Entry>& entries) {
 std::string json(const std::vector<Entry>& entries, int core) {
   Json report;
   report["core"] = core;
+  report["provenance"] = lab_provenance();
   report["rows"] = Json::List{};
   for (const Entry& entry : entries) {
     for (const Figure& figure : entry.figures) {
       report["rows"].push_back({{"knob", entry.knob},
                                 {"value", entry.value},
+                                {"standard", entry.standard},
+                                {"plain", entry.plain},
                                 {"shape", figure.shape},
                                 {"metric", figure.metric},
                                 {"figure", figure.figure},

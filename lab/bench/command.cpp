@@ -9,6 +9,7 @@
 #include "lab/bench/kernel_bench.hpp"
 #include "lab/run/lab_command.hpp"
 #include "lab/run/lab_run.hpp"
+#include "shared/posix/report_tool.hpp"
 #include "shared/text/json.hpp"
 
 namespace kerf {
@@ -48,6 +49,7 @@ Json json_of(const std::vector<KernelRow>& rows) {
                                      const std::vector<KernelRow>& layout, int core) {
   Json report;
   report["core"] = core;
+  report["provenance"] = lab_provenance();
   report["rows"] = json_of(rows);
   report["queries"] = json_of(queries);
   report["layout"] = json_of(layout);
@@ -89,8 +91,9 @@ int BenchCommand::run(std::ostream& out) const {
     const auto rows = bench_kernels(add_row);
     const auto queries = bench_queries(add_row);
     const auto layout = bench_layout(add_row);
-    as_json.write(json_of(rows, queries, layout, core));
-    as_page.write_part("kernels", performance_page(rows, queries, layout));
+    const std::string report = json_of(rows, queries, layout, core);
+    as_json.write(report);
+    if (!page_.empty()) as_page.write_part("kernels", make_report({"kernels", "page"}, report));
     return 0;
   }
 }

@@ -38,10 +38,4 @@ struct KernelRow {
 [[nodiscard]] std::vector<KernelRow> bench_queries(
     const std::function<void(const KernelRow&)>& add_row);
 
-/// The part of `docs/performance.md` on kernels: the figures of one run with the machine, the
-/// compiler, the day and the command that made them. Markdown.
-[[nodiscard]] std::string performance_page(const std::vector<KernelRow>& rows,
-                                           const std::vector<KernelRow>& queries,
-                                           const std::vector<KernelRow>& layout);
-
 }  // namespace kerf

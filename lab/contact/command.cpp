@@ -1,19 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <array>
+#include <cstddef>
 #include <cstdio>
+#include <functional>
 #include <memory>
 #include <ostream>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "lab/contact/comparison.hpp"
 #include "lab/contact/hands.hpp"
-#include "lab/contact/page.hpp"
 #include "lab/contact/rows.hpp"
+#include "lab/rig/geometry.hpp"
 #include "lab/run/lab_command.hpp"
 #include "lab/run/lab_run.hpp"
-#include "record/force_plot.hpp"
+#include "shared/posix/report_tool.hpp"
 #include "shared/text/json.hpp"
 
 namespace kerf::extremes {
@@ -73,7 +76,7 @@ std::string line_of(const Row& row) {
   return text;
 }
 
-std::string json_of(const std::vector<Row>& rows) {
+Json json_of(const std::vector<Row>& rows) {
   Json list = Json::List{};
   for (const Row& row : rows) {
     list.push_back({{"group", row.group},
@@ -82,9 +85,85 @@ std::string json_of(const std::vector<Row>& rows) {
                     {"unit", row.unit},
                     {"limit", row.must},
                     {"aim", row.aim},
-                    {"pass", row.pass()}});
+                    {"pass", row.pass()},
+                    {"skipped", row.skipped}});
   }
-  return Json{{"rows", list}}.document();
+  return list;
+}
+
+/// One list for each of these values of the rows.
+template <class Rows, class... Values>
+Json lists_of(const Rows& rows, const std::pair<const char*, Values>&... values) {
+  Json lists = Json::Members{};
+  const auto add = [&](const char* name, const auto& value) {
+    Json list = Json::List{};
+    for (const auto& row : rows) list.push_back(value(row));
+    lists[name] = std::move(list);
+  };
+  (add(values.first, values.second), ...);
+  return lists;
+}
+
+Json json_of(const Comparison& comparison) {
+  Json walls = Json::List{};
+  for (const Wall& wall : comparison.walls) {
+    walls.push_back(
+        {{"name", wall.name},
+         {"paper_most_n", wall.paper_most_n},
+         {"paper_unfelt_mm", wall.paper_unfelt_mm},
+         {"presses", lists_of(wall.presses, std::pair("depth_mm", std::mem_fn(&Press::depth_mm)),
+                              std::pair("paper_n", std::mem_fn(&Press::paper_n)),
+                              std::pair("proxy_n", std::mem_fn(&Press::proxy_n)))},
+         {"losses", lists_of(wall.losses, std::pair("rate_hz", std::mem_fn(&Loss::rate_hz)),
+                             std::pair("paper_mm_per_s", std::mem_fn(&Loss::paper_mm_per_s)),
+                             std::pair("proxy_mm_per_s", std::mem_fn(&Loss::proxy_mm_per_s)))}});
+  }
+  const Slide& slide = comparison.slide;
+  return {
+      {"walls", std::move(walls)},
+      {"slide",
+       {{"paper_step", slide.paper_step},
+        {"proxy_step", slide.proxy_step},
+        {"paper_degrees", slide.paper_degrees},
+        {"proxy_degrees", slide.proxy_degrees},
+        {"ticks", lists_of(slide.ticks, std::pair("travel_mm", std::mem_fn(&SlideTick::travel_mm)),
+                           std::pair("paper", std::mem_fn(&SlideTick::paper)),
+                           std::pair("proxy", std::mem_fn(&SlideTick::proxy)))}}}};
+}
+
+/// From shortly before the first contact on.
+Json json_of(const HandRun& run) {
+  constexpr std::size_t kEvery = 32;  // ticks: finer is not visible
+  constexpr double kBeforeS = 0.3;
+  const auto first = std::ranges::find_if(run.ticks, &HandTick::contact) - run.ticks.begin();
+  const double begin = std::max(0.0, static_cast<double>(first) - kBeforeS * run.rate_hz);
+  std::vector<std::size_t> shown;
+  for (auto i = static_cast<std::size_t>(begin); i < run.ticks.size(); i += kEvery) {
+    shown.push_back(i);
+  }
+  const auto of = [&](const auto& value) {
+    return [&run, value](std::size_t i) { return value(run.ticks[i]); };
+  };
+  Json lists = lists_of(
+      shown, std::pair("s", [&](std::size_t i) { return static_cast<double>(i) / run.rate_hz; }),
+      std::pair("height_mm", of(std::mem_fn(&HandTick::height_mm))),
+      std::pair("proxy_height_mm", of(std::mem_fn(&HandTick::proxy_height_mm))),
+      std::pair("force_n", of([](const HandTick& tick) { return length(tick.force_n); })),
+      std::pair("removed_mm3", of(std::mem_fn(&HandTick::removed_mm3))));
+  return {{"name", run.name}, {"ticks", std::move(lists)}};
+}
+
+/// lab/report/contact.py has its form.
+std::string json_of(const Findings& findings) {
+  Json hands = Json::List{};
+  for (const HandRun& run : findings.hands) hands.push_back(json_of(run));
+  return Json{
+      {"provenance", lab_provenance()},
+      {"rows", json_of(findings.rows)},
+      {"comparison",
+       findings.comparison.slide.ticks.empty() ? Json(nullptr) : json_of(findings.comparison)},
+      {"hands", std::move(hands)}}
+      .document();
 }
 
 /// `kerf-lab extremes`: the swept contact against its limits, and beside the paper's force.
@@ -130,6 +209,7 @@ int Command::run(std::ostream& out) const {
   const LabOutput as_plot("--page", plot, ".svg");
   const LabOutput as_hands_plot("--page", hands_plot, ".svg");
   LabOutput::check_distinct({&as_json, &as_page, &as_plot, &as_hands_plot});
+  if (!page_.empty()) check_can_plot();
   static_cast<void>(pin_lab(core_));
   Effort effort = quick_ ? Effort::quick() : Effort{};
   effort.data = data_;
@@ -149,12 +229,13 @@ int Command::run(std::ostream& out) const {
       group.measure(effort, add_row, findings);
     }
   }
-  as_json.write(json_of(findings.rows));
+  const std::string report = json_of(findings);
+  as_json.write(report);
   if (!page_.empty()) {
-    as_plot.write(gnuplot_svg(plot_of(findings.comparison)));
-    as_hands_plot.write(gnuplot_svg(plot_of(findings.hands)));
-    as_page.write(page(findings.rows, findings.comparison, page_link(page_, plot),
-                       page_link(page_, hands_plot)));
+    as_plot.write(make_report({"contact", "plot"}, report));
+    as_hands_plot.write(make_report({"contact", "hands"}, report));
+    as_page.write(make_report(
+        {"contact", "page", page_link(page_, plot), page_link(page_, hands_plot)}, report));
   }
   return std::ranges::all_of(findings.rows, &Row::pass) ? 0 : 1;
 }

@@ -18,6 +18,11 @@ from text import BadInput
 # Subject and kind: the function KIND of the module SUBJECT, and whether it draws.
 KINDS = {
     ("recording", "forces"): True,
+    ("burs", "sheet"): True,
+    ("kernels", "page"): False,
+    ("pictures", "page"): False, ("pictures", "summary"): False, ("pictures", "tables"): False,
+    ("accuracy", "page"): False, ("accuracy", "plot"): True,
+    ("contact", "page"): False, ("contact", "plot"): True, ("contact", "hands"): True,
     ("stability", "measure"): False, ("stability", "page"): False, ("stability", "devices"): True,
     ("stability", "rates"): True,
     ("stability_map", "map"): True, ("stability_map", "portraits"): True,
@@ -45,7 +50,8 @@ def run(words):
         need_matplotlib()
     name = f"lab/report: {words[0]} {words[1]}"
     try:
-        return getattr(importlib.import_module(words[0]), words[1])(json.load(sys.stdin), *words[2:])
+        data = json.load(sys.stdin)
+        return getattr(importlib.import_module(words[0]), words[1])(data, *words[2:])
     except json.JSONDecodeError as error:
         raise BadInput(f"{name}: no JSON ({error}); give the JSON of its command") from None
     except KeyError as error:

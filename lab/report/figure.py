@@ -4,6 +4,7 @@ import io
 
 import matplotlib
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter, NullLocator
 
 # Colours of Okabe and Ito, which differ for every kind of colour vision.
 BLACK, ORANGE, SKY, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"
@@ -36,6 +37,21 @@ def new_figure(width, height, rows=1, columns=1, **spacing):
     axes = [[figure.add_axes(((left + i * (wide + across)) / width, 1 - (top + tall + k * (tall + down)) / height,
                               wide / width, tall / height)) for i in range(columns)] for k in range(rows)]
     return figure, axes
+
+
+def log_axis(axes, axis, low, high, digits=(1,)):
+    """A logarithmic axis "x" or "y" with plain numbers at these digits of each decade."""
+    getattr(axes, f"set_{axis}scale")("log")
+    ticks(getattr(axes, f"{axis}axis"), digits)
+    getattr(axes, f"set_{axis}lim")(low, high)
+
+
+def ticks(axis, digits):
+    axis.set_major_locator(LogLocator(subs=digits, numticks=30))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    if len(digits) > 1:
+        axis.set_minor_locator(NullLocator())
+    axis.set_minor_formatter(NullFormatter())
 
 
 def svg(figure):

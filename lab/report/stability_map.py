@@ -60,11 +60,10 @@ class Scale:
     def apply(self, axes, axis):
         getattr(axes, f"set_{axis}label")(self.label)
         if self.log:
-            from matplotlib.ticker import FuncFormatter, NullFormatter
-            getattr(axes, f"set_{axis}scale")("log")
-            getattr(axes, f"{axis}axis").set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-            getattr(axes, f"{axis}axis").set_minor_formatter(NullFormatter())
-        getattr(axes, f"set_{axis}lim")(self.edges[0], self.edges[-1])
+            import figure as fig
+            fig.log_axis(axes, axis, self.edges[0], self.edges[-1])
+        else:
+            getattr(axes, f"set_{axis}lim")(self.edges[0], self.edges[-1])
         if self.texts:
             getattr(axes, f"set_{axis}ticks")(self.places, self.texts)
 
@@ -196,7 +195,6 @@ def draw_heights(picture, axes, columns, x, y, keys, stiffness):
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import LinearSegmentedColormap, LogNorm
     from matplotlib.patches import Rectangle
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
     import figure as fig
     low, high = stiffness[0], stiffness[-1] if stiffness[-1] > stiffness[0] else 1.1 * stiffness[0]
     colours = LinearSegmentedColormap.from_list("stiffness", [SWINGS, ACTIVE, "#8CC8B0"])
@@ -215,9 +213,7 @@ def draw_heights(picture, axes, columns, x, y, keys, stiffness):
     width = picture.get_figwidth() * 96
     bar_axes = picture.add_axes((box.x1 + 20 / width, box.y0, 14 / width, box.height))
     bar = picture.colorbar(ScalarMappable(norm, colours), cax=bar_axes)
-    bar.ax.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
-    bar.ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    bar.ax.yaxis.set_minor_formatter(NullFormatter())
+    fig.ticks(bar.ax.yaxis, (1, 2, 5))
     bar.set_label("highest stiffness, by the stricter rule (N/mm)")
 
 

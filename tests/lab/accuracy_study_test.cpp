@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is made of the measurements: the study, its page and its plot.
+// The study, which lab/report makes a page and a plot of.
 #include <algorithm>
 #include <array>
 #include <cstddef>
@@ -8,7 +8,6 @@
 
 #include <doctest/doctest.h>
 
-#include "lab/accuracy/page.hpp"
 #include "lab/accuracy/study.hpp"
 
 using namespace kerf::accuracy;
@@ -85,53 +84,10 @@ TEST_CASE("all is the worst of the shapes, and times grow to their largest") {
   }
 }
 
-TEST_CASE(
-    "the page tells its command, has a row for each choice and no empty figure in a sentence") {
-  const std::string text = page(small_study(), "accuracy.svg");
-  CHECK(text.find("./kerf lab accuracy --page docs/accuracy.md") != std::string::npos);
-  CHECK(text.find("](accuracy.svg)") != std::string::npos);
-  for (const Entry& e : small_study()) {
-    const std::string name = e.standard ? "**" + e.value + "**" : e.value;
-    CHECK(text.find("\n| " + name + " | ") != std::string::npos);
-  }
-  for (const char* gap : {"  us", " at  ", "rms ()", " is  ", "nan", "inf"}) {
-    CHECK(text.find(gap) == std::string::npos);
-  }
-}
-
-TEST_CASE("times of the lab's own text stand in brackets, and no others") {
-  const std::string text = page(small_study(), "accuracy.svg");
-  for (const Entry& e : small_study()) {
-    const std::string name = e.standard ? "**" + e.value + "**" : e.value;
-    const bool of_lab = count_of("\n| " + name + " | (", text) > 0;
-    CHECK(of_lab == e.plain);
-  }
+TEST_CASE("what is timed by plain loops of the lab is marked, and nothing else") {
   for (const char* plain : {"Q8", "Q12"}) CHECK(entry("arithmetic", plain).plain);
   CHECK_FALSE(entry("arithmetic", "double").plain);
   CHECK(entry("storage", "spline 3").plain);
   CHECK(entry("interpolation", "nearest").plain);
   CHECK_FALSE(entry("storage", "aligned 0.0625 mm").plain);
-}
-
-TEST_CASE("the plot's front leaves out what another choice beats in time and error") {
-  const auto choice = [](const char* value, double us, double error) {
-    return Entry{
-        "kernel", value, false, {.p50_ns = us * 1e3}, {{"all", "loop_tool_rms", error, ""}}};
-  };
-  const std::string script =
-      plot_script({choice("slow", 20, 1e-5), choice("fast", 1, 1e-3), choice("beaten", 10, 2e-3),
-                   choice("hardly better", 15, 0.995e-3)});
-  CHECK(script.find("$front << EOD\n1 0.001\n20 1e-05\nEOD\n") != std::string::npos);
-  for (const char* label : {"slow", "fast", "beaten"}) {
-    CHECK(count_of("set label '" + std::string(label) + "'", script) == 1);
-  }
-}
-
-TEST_CASE("labels cover neither each other nor marks, and stay in the panel") {
-  LabelPlaces places(200, 60);
-  places.keep_mark_free(100, 30);
-  CHECK(places.place("first", 100, 30)->align == std::string("left"));
-  CHECK(places.place("second", 100, 30)->align == std::string("right"));
-  CHECK(places.place("third", 100, 30)->y > 30);
-  CHECK_FALSE(places.place(std::string(40, 'x'), 100, 30));  // wider than the panel
 }

@@ -9,7 +9,6 @@
 
 #include <doctest/doctest.h>
 
-#include "lab/bench/kernel_bench.hpp"
 #include "lab/run/lab_run.hpp"
 
 namespace {
@@ -115,22 +114,6 @@ TEST_CASE(
   CHECK(answer.complained.starts_with("kerf-lab: --page " + page + ": its plots have no folder"));
   CHECK(std::ranges::count(answer.complained, '\n') == 1);
   std::filesystem::remove_all(folder);
-}
-
-TEST_CASE("the page says where its figures come from, and holds one line for each") {
-  const kerf::KernelRow row{.name = "contact/ball16/any",
-                            .numeric = "fixed",
-                            .isa = "avx2",
-                            .p50_ns = 2000,
-                            .p99_ns = 2500,
-                            .baseline_p50_ns = 30'000,
-                            .bytes = 1234};
-  const std::string page = kerf::performance_page({row}, {row}, {row});
-  CHECK(page.find("./kerf bench kernels --page docs/performance.md") != std::string::npos);
-  const std::string line = "| contact/ball16/any | fixed | avx2 | 2.00 | 2.50 | 15 | 1234 |\n";
-  std::size_t lines = 0;
-  for (auto at = page.find(line); at != std::string::npos; at = page.find(line, at + 1)) ++lines;
-  CHECK(lines == 3);
 }
 
 TEST_CASE("faults runs from any folder, and names what it plays") {

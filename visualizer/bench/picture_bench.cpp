@@ -12,10 +12,12 @@
 
 #include "shared/numeric/statistics.hpp"
 #include "shared/posix/atomic_file.hpp"
+#include "shared/posix/program.hpp"
+#include "shared/posix/report_tool.hpp"
 #include "shared/posix/stop_signals.hpp"
+#include "shared/text/json.hpp"
 #include "visualizer/app/run.hpp"
 #include "visualizer/bench/bench_tooth.hpp"
-#include "visualizer/bench/picture_page.hpp"
 #include "visualizer/gl/context.hpp"
 #include "visualizer/redraw/changed_cells.hpp"
 #include "visualizer/render/iso_renderer.hpp"
@@ -195,6 +197,11 @@ std::vector<PictureRow> subjects() {
   return rows;
 }
 
+/// 256x256x161.
+std::string grid_name(const VoxelGrid& grid) {
+  return std::to_string(grid.nx) + "x" + std::to_string(grid.ny) + "x" + std::to_string(grid.nz);
+}
+
 }  // namespace
 
 std::vector<PictureRow> measure_pictures(
@@ -218,6 +225,38 @@ std::vector<PictureRow> measure_pictures(
   return rows;
 }
 
+std::string picture_report(const PictureFigures& figures) {
+  Json rows = Json::List{};
+  for (const PictureRow& row : figures.rows) {
+    rows.push_back({{"renderer", row.renderer},
+                    {"gradient", name_of(row.gradient)},
+                    {"volume", grid_name(row.volume)},
+                    {"tool", row.tool},
+                    {"modifying", row.tool > 0},
+                    {"cropped", row.cropped},
+                    {"partial", row.partial},
+                    {"fps", row.fps()},
+                    {"cpu_ms", row.cpu_ms},
+                    {"wall_ms_p50", row.wall_ms_p50},
+                    {"wall_ms_p99", row.wall_ms_p99}});
+  }
+  Json gradients = Json::List{};
+  for (const GradientRow& row : figures.gradients) {
+    gradients.push_back({{"gradient", name_of(row.gradient)},
+                         {"angle_deg", row.angle_deg},
+                         {"noisy_angle_deg", row.noisy_angle_deg}});
+  }
+  const Json report{{"day", today()},
+                    {"gl_renderer", figures.gl_renderer},
+                    {"processor", processor_name()},
+                    {"cores", figures.cores},
+                    {"width", figures.size.width},
+                    {"height", figures.size.height},
+                    {"rows", std::move(rows)},
+                    {"gradients", std::move(gradients)}};
+  return report.document();
+}
+
 int run_bench(const VisualizerOptions& options) {
   // A wrong name costs nothing; a run that is stopped leaves nothing behind.
   check_files(options);
@@ -237,11 +276,14 @@ int run_bench(const VisualizerOptions& options) {
     std::fputs("kerf-visualizer: --bench: stopped; no figures are written\n", stderr);
     return 1;
   }
-  if (options.report) write_new_file(*options.report, picture_report(figures));
-  if (options.page) write_new_file(*options.page, picture_page(figures));
-  if (options.summary) write_page_part(*options.summary, "pictures", picture_summary(figures));
-  std::printf("%s\n%s\n%s", figures.gl_renderer.c_str(), picture_table(figures.rows).c_str(),
-              gradient_table(figures).c_str());
+  const std::string report = picture_report(figures);
+  if (options.report) write_new_file(*options.report, report);
+  if (options.page) write_new_file(*options.page, make_report({"pictures", "page"}, report));
+  if (options.summary) {
+    write_page_part(*options.summary, "pictures", make_report({"pictures", "summary"}, report));
+  }
+  std::printf("%s\n%s", figures.gl_renderer.c_str(),
+              make_report({"pictures", "tables"}, report).c_str());
   return 0;
 }
 

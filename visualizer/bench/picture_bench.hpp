@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <string>
@@ -57,5 +58,16 @@ struct PictureRow {
 [[nodiscard]] std::vector<PictureRow> measure_pictures(
     PictureSize size,
     const std::function<void(const std::string& next, int done, int all)>& progress);
+
+/// What a run of the bench measured, and the machine.
+struct PictureFigures {
+  std::vector<PictureRow> rows;
+  std::vector<GradientRow> gradients;
+  std::string gl_renderer;
+  PictureSize size;
+  std::size_t cores = 0;
+};
+/// As JSON (lab/report/pictures.py has its form).
+[[nodiscard]] std::string picture_report(const PictureFigures& figures);
 
 }  // namespace kerf

@@ -7,7 +7,7 @@
 #include "tests/json.hpp"
 #include "tests/visualizer/gl/gl_fixture.hpp"
 #include "visualizer/bench/bench_tooth.hpp"
-#include "visualizer/bench/picture_page.hpp"
+#include "visualizer/bench/picture_bench.hpp"
 
 using namespace kerf;
 
@@ -53,7 +53,7 @@ TEST_CASE("each cut takes material away, within the bricks that it names") {
   }
 }
 
-TEST_CASE("the bench's table has a line for each subject, beside the paper's figure") {
+TEST_CASE("the bench's report has a row for each kind of frame") {
   const VoxelGrid large{256, 256, 161};
   const auto row = [&](const char* renderer, int tool, bool partial, double wall_ms) {
     return PictureRow{.renderer = renderer,
@@ -66,14 +66,6 @@ TEST_CASE("the bench's table has a line for each subject, beside the paper's fig
   };
   const std::vector<PictureRow> rows{row("iso", 0, false, 50.0), row("iso", 16, true, 4.0),
                                      row("cast", 0, false, 8.0)};
-  const std::string table = picture_table(rows);
-  CHECK(table.find(
-            "| iso | 256x256x161 | 20.0 | - | - | - | 250 | 100 | - | 8.0 | GPU iso 6 / 6 |") !=
-        std::string::npos);
-  CHECK(table.find("| cast | 256x256x161 | 125 | - | - | - | - | 16.0 | - | - | - |") !=
-        std::string::npos);
-  CHECK(std::count(table.begin(), table.end(), '\n') == 4);
-
   const PictureFigures figures{.rows = rows,
                                .gradients = {{GradientFilter::corners, 0.5, 1.25}},
                                .gl_renderer = "a driver",
@@ -88,33 +80,6 @@ TEST_CASE("the bench's table has a line for each subject, beside the paper's fig
   CHECK(report["rows"][1]["partial"] == true);
   CHECK(report["rows"][1]["fps"].get<double>() == doctest::Approx(250.0));
   CHECK(report["gradients"][0]["noisy_angle_deg"] == 1.25);
-  const std::string page = picture_page(figures);
-  CHECK(page.find("gl: a driver") != std::string::npos);
-  CHECK(page.find("| corners | 0.50 | 1.25 | 100 | - | 8.0 |") != std::string::npos);
-}
-
-TEST_CASE("the bench's summary has a line for each renderer on the paper's padded tooth") {
-  const auto row = [&](int edge, bool cropped, int tool, bool partial, double cpu_ms) {
-    return PictureRow{.renderer = "cast",
-                      .volume = {edge, edge, edge},
-                      .tool = tool,
-                      .cropped = cropped,
-                      .partial = partial,
-                      .cpu_ms = cpu_ms,
-                      .wall_ms_p50 = cpu_ms};
-  };
-  const PictureFigures figures{
-      .rows = {row(128, false, 0, false, 1.0), row(256, false, 0, false, 8.0),
-               row(256, false, 16, false, 9.0), row(256, false, 16, true, 0.5),
-               row(256, true, 0, false, 3.0)},
-      .gradients = {},
-      .gl_renderer = "a driver",
-      .size = {512, 512}};
-  const std::string summary = picture_summary(figures);
-  CHECK(summary.find("| cast | 125 | 2000 | 8.0 | 0.5 | 1/18.0 | - |\n") != std::string::npos);
-  CHECK(summary.find("gl: a driver") != std::string::npos);
-  CHECK(summary.find("docs/pictures.md") != std::string::npos);
-  CHECK(summary.find("| cast |", summary.find("| cast |") + 1) == std::string::npos);
 }
 
 TEST_CASE("each program replaces its own part of a page and leaves the others") {

@@ -1,13 +1,12 @@
-// SPDX-License-Identifier: Apache-2.0
-#include <cstdio>
+# SPDX-License-Identifier: Apache-2.0
+"""The part of docs/performance.md on kernels. JSON of `kerf bench kernels --report`:
 
-#include "lab/bench/kernel_bench.hpp"
-#include "lab/run/lab_run.hpp"
+    provenance                  day, machine and compiler of the run
+    rows, queries, layout       rows {name, numeric, isa, ns_p50, ns_p99, ratio, bytes}"""
+import text
 
-namespace kerf {
-namespace {
-
-constexpr const char* kAbout = R"(# Performance
+ABOUT = """\
+# Performance
 
 Made by `./kerf bench kernels --page docs/performance.md`; every figure comes from one run, nothing is
 typed by hand. Machines are noisy: compare the ratios, which divide two figures of the same run.
@@ -20,9 +19,9 @@ which give the same bits on each: the method `aligned` for unturned tools, and f
 (`any`) the method `gather` for contact and `splat` for milling. `bytes` is what the tick needs beyond
 two bytes a voxel.
 
-)";
+"""
 
-constexpr const char* kAboutQueries = R"(
+QUERIES = """
 ## A query of the swept contact
 
 What a tool feels at one place, read at samples of its surface: a ball of radius 8 voxels (805 samples)
@@ -30,9 +29,9 @@ and a cylinder of radius 5 and length 16 (658). `slide` dips 2 voxels into a bal
 lies half in a flat solid, `immersed` wholly. `turn` places the samples anew. A tick takes 2 or 3
 queries while it slides and at most 32. The ratio divides the plain loop, which is `scalar`.
 
-)";
+"""
 
-constexpr const char* kAboutLayout = R"(
+LAYOUT = """
 ## Where the volume lies
 
 The servo keeps its volume linear, x fastest. The copy of a tool's box out of 8x8x8 bricks is the other
@@ -40,28 +39,15 @@ choice: the first rows compare the two, warm and with 96 MB swept through the ca
 the ratio divides the linear copy. Then one tool in volumes of three sizes; the ratio divides the
 smallest.
 
-)";
+"""
 
-std::string table_of(const std::vector<KernelRow>& rows) {
-  std::string page = "| tick | numbers | kernel | p50 us | p99 us | ratio | bytes |\n";
-  page += "|---|---|---|---:|---:|---:|---:|\n";
-  for (const KernelRow& row : rows) {
-    char line[192];
-    std::snprintf(line, sizeof line, "| %s | %s | %s | %.2f | %.2f | %.3g | %zu |\n",
-                  row.name.c_str(), row.numeric.c_str(), row.isa.c_str(), row.p50_ns / 1e3,
-                  row.p99_ns / 1e3, row.ratio(), row.bytes);
-    page += line;
-  }
-  return page;
-}
 
-}  // namespace
+def table_of(rows):
+    return text.table(["tick", "numbers", "kernel", ">p50 us", ">p99 us", ">ratio", ">bytes"],
+                      [[row["name"], row["numeric"], row["isa"], f"{row['ns_p50'] / 1e3:.2f}", f"{row['ns_p99'] / 1e3:.2f}",
+                        f"{row['ratio']:.3g}", str(row["bytes"])] for row in rows])
 
-std::string performance_page(const std::vector<KernelRow>& rows,
-                             const std::vector<KernelRow>& queries,
-                             const std::vector<KernelRow>& layout) {
-  return kAbout + lab_provenance() + "\n\n" + table_of(rows) + kAboutQueries + table_of(queries) +
-         kAboutLayout + table_of(layout);
-}
 
-}  // namespace kerf
+def page(data):
+    return (ABOUT + data["provenance"] + "\n\n" + table_of(text.rows_of(data)) + QUERIES + table_of(data["queries"]) + LAYOUT
+            + table_of(data["layout"]))

@@ -1,0 +1,137 @@
+# SPDX-License-Identifier: Apache-2.0
+"""docs/pictures.md, the part of docs/performance.md on pictures, and the tables of both for the terminal. JSON of `kerf bench
+pictures --report`:
+
+    day, processor, gl_renderer, cores, width, height       of the run
+    rows                        {renderer, gradient, volume, tool, cropped, partial, fps, cpu_ms}: volume as 256x256x161, tool
+                                voxels across, 0: none
+    gradients                   {gradient, angle_deg, noisy_angle_deg}"""
+import text
+
+ABOUT = """\
+# Pictures
+
+Made by `./kerf bench pictures --page docs/pictures.md`; every figure comes from one run, nothing is
+typed by hand but the paper's. Machines are noisy: compare figures of the same run.
+
+What a frame costs: the renderer's update and the volumes, without tool and panel; the camera rests.
+The volume is a made-up molar (`visualizer/bench/bench_tooth.cpp`) that fills of its grid about what the
+paper's padded tooth does, and fills the picture; `cropped` leaves out the air around it, the picture
+is the same. `static` draws all of the picture, `10^3` and `16^3` all of it after a ball of so many
+voxels was cut, `partial` only what that cut can have changed, as the visualizer does while the camera
+rests. Frames per second (fps) divide the median wall time; cpu ms are the median, summed over the
+threads. Each figure has 3 to 10 frames.
+
+`paper` is the frame rate that the paper gives for its technique of the same kind, static / while
+milling, on its own hardware and graphics card: it says what was usual then, not what this machine
+would reach. Where `gl` below is a software GL, `iso`, `blend`, `surface` and `slices` say nothing of a
+graphics card.
+
+"""
+
+GRADIENTS = """
+## Gradients
+
+What `--gradient` does to `iso` on the padded 256x256x161 volume, and the angle, root mean square,
+between its normals and the true ones on a ball of 28 voxels radius whose border is antialiased over
+two, without noise and with 1.5 % of full density. `central` and `corners` are worked out for each
+pixel from 6 and 8 samples; `farid5`, 5x5x5 voxels, is stored for each voxel in 8 bytes and worked out
+again around a cut. The partial picture of `iso` is the least with `corners`: with the others every
+pixel within 13 voxels of a cut is drawn again. `surface`, `blend` and `slices` take the same gradients
+at their voxels; `cast` and `cast-blend` always `corners`.
+
+"""
+
+SUMMARY = """\
+## Pictures
+
+Of `docs/pictures.md`, which has all volumes and tools and says how: the padded tooth of 256x256x161
+voxels, at rest and after a ball of 16 voxels was cut, by
+`./kerf bench pictures --page docs/pictures.md --summary docs/performance.md`.
+
+"""
+
+# The paper's table of frame rates at 512x512, static / while milling: technique, then 128^3 and 256^3, each padded and cropped.
+PAPER = {
+    "iso": ("GPU iso", ("13 / 13", "40 / 39"), ("6 / 6", "21 / 21")),
+    "blend": ("GPU volume", ("4 / 4", "10 / 10"), ("1 / 1", "5 / 5")),
+    "surface": ("CPU iso", ("133", "-"), ("35 / 29, 22 (10^3, 16^3)", "-")),
+    "slices": ("CPU volume", ("6 / 6", "21 / 21"), ("2 / 2", "8 / 5")),
+}
+
+
+def figure(value):
+    return "-" if value is None else f"{value:.1f}" if value < 100 else f"{value:.0f}"
+
+
+def paper_rate(row):
+    if row["renderer"] not in PAPER:
+        return "-"
+    technique, small, large = PAPER[row["renderer"]]
+    return f"{technique} {(small if row['volume'].startswith('128x') else large)[row['cropped']]}"
+
+
+def find(rows, key, tool, partial, **wanted):
+    """The value of the row of this tool; None if it was not measured."""
+    for row in rows:
+        if row["tool"] == tool and row["partial"] == partial and all(row[name] == value for name, value in wanted.items()):
+            return row[key]
+    return None
+
+
+def padded_tooth(rows):
+    return [row for row in rows if row["volume"].startswith("256x") and not row["cropped"]]
+
+
+def picture_table(data):
+    subjects = {}
+    for row in text.rows_of(data):
+        if row["gradient"] == "corners":  # the others are of the other table
+            subjects.setdefault((row["renderer"], row["volume"], row["cropped"]), []).append(row)
+    lines = []
+    for (renderer, volume, cropped), rows in subjects.items():
+        cells = [("fps", 0, False), ("fps", 10, False), ("fps", 16, False), ("fps", 10, True), ("fps", 16, True),
+                 ("cpu_ms", 0, False), ("cpu_ms", 16, False), ("cpu_ms", 16, True)]
+        lines.append([renderer, volume + (" cropped" if cropped else ""), *(figure(find(rows, *cell)) for cell in cells),
+                      paper_rate(rows[0])])
+    return text.table(["renderer", "volume", ">fps: static", ">10^3", ">16^3", ">10^3 partial", ">16^3 partial",
+                       ">cpu ms: static", ">16^3", ">16^3 partial", "paper fps"], lines)
+
+
+def gradient_table(data):
+    rows = padded_tooth(data["rows"])
+
+    def cpu(gradient, tool, partial):
+        return figure(find(rows, "cpu_ms", tool, partial, renderer="iso", gradient=gradient))
+
+    return text.table(["gradient", ">angle, degrees", ">with noise", ">cpu ms: static", ">16^3", ">16^3 partial"],
+                      [[row["gradient"], f"{row['angle_deg']:.2f}", f"{row['noisy_angle_deg']:.2f}",
+                        cpu(row["gradient"], 0, False), cpu(row["gradient"], 16, False), cpu(row["gradient"], 16, True)]
+                       for row in data["gradients"]])
+
+
+def machine(data):
+    return (f"{data['day']}, {data['processor']}, {data['cores']} core(s) used, {data['width']}x{data['height']} pixels, "
+            f"gl: {data['gl_renderer']}.\n\n")
+
+
+def page(data):
+    return ABOUT + machine(data) + picture_table(data) + GRADIENTS + gradient_table(data)
+
+
+def tables(data):
+    return picture_table(data) + "\n" + gradient_table(data)
+
+
+def summary(data):
+    """The padded tooth by every renderer."""
+    rows = [row for row in padded_tooth(text.rows_of(data)) if row["gradient"] == "corners"]
+    lines = []
+    for row in rows:
+        fps, cpu, whole = (find(rows, key, 16, partial, renderer=row["renderer"])
+                           for key, partial in (("fps", True), ("cpu_ms", True), ("cpu_ms", False)))
+        if row["tool"] == 0 and not row["partial"] and fps is not None and whole is not None:
+            lines.append([row["renderer"], figure(row["fps"]), figure(fps), figure(row["cpu_ms"]), figure(cpu),
+                          f"1/{figure(whole / cpu)}", paper_rate(row)])
+    return SUMMARY + machine(data) + text.table(["renderer", ">fps: static", ">16^3 partial", ">cpu ms: static", ">16^3 partial",
+                                                 ">partial / full", "paper fps"], lines)
