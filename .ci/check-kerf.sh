@@ -533,7 +533,7 @@ expect 'the option of the doctor' offers '--demo' doctor ''
 expect 'each option once' offers '--help --jobs --out --seconds --set' sweep --
 expect 'those of a test' offers '--junit --preset -R' test -
 expect 'those of a demo' offers '--scene --seconds --serve --set --sheet --size --spacing --stereo' demo --s
-expect 'what the bridge can do' offers '--help join make-identity serve' bridge ''
+expect 'what the bridge can do' offers '--help join serve' bridge ''
 expect 'and the lab' offers 'law' lab la
 expect 'nothing of what has no options' offers '' docs ''
 expect 'nor of a heading that is none of a command' offers '' Environment ''

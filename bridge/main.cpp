@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <cstddef>
 #include <iostream>
+#include <span>
+#include <string_view>
 
 #include "bridge/join/join.hpp"
-#include "bridge/net/certificate.hpp"
+#include "bridge/net/address.hpp"
 #include "bridge/serve/serve.hpp"
 #include "shared/posix/program.hpp"
 #include "shared/posix/stop_signals.hpp"
@@ -13,13 +16,26 @@ namespace {
 using namespace kerf;
 using namespace kerf::bridge;
 
+/// The program's own certificate.
+template <class Options>
+void add_certificate(Arguments& command, Options& options, const char* meaning) {
+  Option certificate = command.option("--cert", options.certificate, meaning).shown_as("FILE");
+  Option key = command.option("--key", options.key, "PEM file: its key, without a password");
+  certificate.needs(key);
+  key.shown_as("FILE").needs(certificate);
+}
+
 Arguments add_serve(CommandLine& app, ServeOptions& options) {
   Arguments serve =
       app.command("serve", "Shows a running kerf-controller to browsers and to join.");
   serve.option("--listen", options.listen, "HOST:PORT; off loopback TLS 1.3, always")
       .shows_default();
   serve.option("--name", options.name, "name of the controller").shows_default();
-  serve.option("--identity", options.identity, "folder of make-identity; else self-signed");
+  add_certificate(serve, options, "PEM file: certificate, then those above it; else self-signed");
+  serve
+      .option("--client-ca", options.client_ca,
+              "PEM file: lets in viewers alone whose certificate it signed")
+      .shown_as("FILE");
   serve.option("--token-file", options.token_file,
                "who may look, as often as they like: one token a line");
   serve.option("--allow-commands", options.command_tokens, "who may command too: one token a line");
@@ -36,15 +52,17 @@ Arguments add_serve(CommandLine& app, ServeOptions& options) {
   return serve;
 }
 
-Arguments add_join(CommandLine& app, JoinOptions& options) {
+void add_join(CommandLine& app, JoinOptions& options) {
   Arguments join = app.command("join", "Repeats a far controller's segment here, for all readers.");
   join.option("address", options.address, "what serve prints: wss://HOST:PORT/?token=TOKEN")
       .required();
   join.option("--name", options.name, "of the segment here, as readers ask for it").shows_default();
-  join.option("--ca", options.ca, "ca.pem of the lab that vouches for the server").shown_as("FILE");
+  join.option("--ca", options.ca, "PEM file: CA that signed the server's certificate")
+      .shown_as("FILE");
   join.option("--fingerprint", options.fingerprint,
-              "of the server's certificate, as serve or make-identity prints it")
+              "of the server's certificate, as serve prints it")
       .shown_as("SHA256");
+  add_certificate(join, options, "PEM file: certificate, if serve has --client-ca");
   join.option("--token-file", options.token_file,
               "the token, if not in the address, where other users see it")
       .shown_as("FILE");
@@ -54,31 +72,31 @@ Arguments add_join(CommandLine& app, JoinOptions& options) {
   join.option("--most-mib", options.most_mib, "a larger segment is refused")
       .within(1, 65536)
       .shows_default();
-  return join;
 }
 
-void add_make_identity(CommandLine& app, IdentityOptions& options) {
-  Arguments make =
-      app.command("make-identity", "Makes a lab's CA, and a certificate of a machine.");
-  make.option("folder", options.folder, "where they go").required();
-  make.option("--host", options.hosts, "name or address of the machine; may be given often")
-      .one_each();
-  make.option("--days", options.days, "that the certificate holds").within(1, 3650).shows_default();
+/// What earlier versions had, with its successor.
+void refuse_former(std::span<const char* const> words) {
+  if (words.size() > 1 && std::string_view(words[1]) == "make-identity") {
+    throw BridgeError("make-identity is gone; make PEM files with openssl: docs/second-machine.md");
+  }
+  for (const std::string_view word : words) {
+    if (word == "--identity" || word.starts_with("--identity=")) {
+      throw BridgeError("--identity is gone; give --cert FOLDER/cert.pem --key FOLDER/key.pem");
+    }
+  }
 }
 
 int run(int argc, char** argv) {
+  refuse_former({argv, static_cast<std::size_t>(argc)});
   ServeOptions serve_options;
   JoinOptions join_options;
-  IdentityOptions identity_options;
   CommandLine app("Carries the picture of a kerf-controller to other machines.", "kerf-bridge",
                   KERF_VERSION);
   const Arguments serve = add_serve(app, serve_options);
-  const Arguments join = add_join(app, join_options);
-  add_make_identity(app, identity_options);
+  add_join(app, join_options);
   if (!app.parse(argc, argv, std::cout)) return 0;
   if (serve.chosen()) return run_serve(serve_options, catch_stop_signals());
-  if (join.chosen()) return run_join(join_options, catch_stop_signals(), std::cout);
-  return run_make_identity(identity_options);
+  return run_join(join_options, catch_stop_signals(), std::cout);
 }
 
 }  // namespace

@@ -19,7 +19,7 @@ set(CPACK_DEBIAN_KERF_PACKAGE_NAME kerf)
 set(CPACK_DEBIAN_KERF_PACKAGE_SHLIBDEPS ON)
 # What is no linked library: OpenGL is looked for at run time, lab/report draws forces.svg, and ./kerf calls umount.
 set(CPACK_DEBIAN_KERF_PACKAGE_DEPENDS "libegl1, libgl1, libgl1-mesa-dri, python3-matplotlib, mount")
-set(CPACK_DEBIAN_KERF_PACKAGE_RECOMMENDS "udev, bash-completion")
+set(CPACK_DEBIAN_KERF_PACKAGE_RECOMMENDS "udev, bash-completion, openssl")
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_NAME kerf-dev)
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS
   "kerf (= ${PROJECT_VERSION}), cmake, g++, pkg-config, libinsighttoolkit5-dev, zlib1g-dev, libusb-1.0-0-dev, libhidapi-dev, libseccomp-dev")

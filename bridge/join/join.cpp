@@ -16,6 +16,8 @@
 #include <boost/asio/awaitable.hpp>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/steady_timer.hpp>
+#include <openssl/err.h>
+#include <openssl/ssl.h>
 
 #include "bridge/net/address.hpp"
 #include "bridge/net/certificate.hpp"
@@ -45,8 +47,8 @@ struct Hopeless : BridgeError {
 constexpr auto kConnectPatience = 1500ms;  // a lost SYN comes again after 1 s
 constexpr auto kGreetingPatience = 10s;    // TLS and HTTP over a slow link
 
-[[noreturn]] void throw_no_trust(const CertificateCheck& trust, const ErrorCode& error) {
-  if (const std::string reason = trust.refusal(); !reason.empty()) throw Hopeless(reason);
+[[noreturn]] void throw_no_tls(const CertificateCheck& check, const ErrorCode& error) {
+  if (const std::string reason = check.refusal(); !reason.empty()) throw Hopeless(reason);
   if (error.category() == asio::error::get_ssl_category()) {
     throw Hopeless("no TLS 1.3 there; is it a kerf-bridge serve, and off loopback?");
   }
@@ -61,7 +63,21 @@ constexpr auto kGreetingPatience = 10s;    // TLS and HTTP over a slow link
          error == Http::bad_value;
 }
 
+/// The server refuses the client's certificate in TLS 1.3 after the handshake, by an alert.
+void throw_no_certificate(const ErrorCode& error) {
+  if (error.category() != asio::error::get_ssl_category()) return;
+  const int alert =
+      ERR_GET_REASON(static_cast<unsigned long>(error.value())) - SSL_AD_REASON_OFFSET;
+  if (alert == SSL_AD_CERTIFICATE_REQUIRED) {
+    throw Hopeless("asks for a certificate that its --client-ca has signed; give --cert and --key");
+  }
+  if (alert < SSL_AD_BAD_CERTIFICATE || alert > SSL_AD_UNKNOWN_CA) return;
+  throw Hopeless("refuses the certificate of --cert (" + error.message() +
+                 "); give one that its --client-ca has signed");
+}
+
 [[noreturn]] void throw_no_welcome(const ErrorCode& error, unsigned status) {
+  throw_no_certificate(error);
   if (is_no_http(error)) throw Hopeless("speaks no HTTP; take the port of a kerf-bridge serve");
   if (error != websocket::error::upgrade_declined) throw boost::system::system_error(error);
   if (status == 400) throw Hopeless("takes no unencrypted viewers; take wss://");
@@ -77,7 +93,7 @@ constexpr auto kGreetingPatience = 10s;    // TLS and HTTP over a slow link
 
 /// Leads `ws`, a fresh socket, from its first packet to a WebSocket that talks. Throws `Hopeless`,
 /// or what may be better the next time: `BridgeError` and Boost's system_error.
-asio::awaitable<void> dial(WebSocket& ws, const BridgeAddress& address, CertificateCheck& trust) {
+asio::awaitable<void> dial(WebSocket& ws, const BridgeAddress& address, CertificateCheck& check) {
   Link& link = ws.next_layer();
   beast::tcp_stream& tcp_stream = link.next_layer();
   tcp::resolver resolver(ws.get_executor());
@@ -95,9 +111,9 @@ asio::awaitable<void> dial(WebSocket& ws, const BridgeAddress& address, Certific
   tcp_stream.expires_after(kGreetingPatience);
   ErrorCode error;
   if (link.is_tls()) {
-    trust.begin(link.tls().native_handle());
+    check.begin(link.tls().native_handle());
     co_await link.tls().async_handshake(asio::ssl::stream_base::client, quiet(error));
-    if (error) throw_no_trust(trust, error);
+    if (error) throw_no_tls(check, error);
   }
   ws.read_message_max(kMaxMessageBytes);
   const std::string target =
@@ -150,19 +166,29 @@ constexpr std::uint64_t kMaxWelcomeBytes = 256 * 1024;
   return out;
 }
 
+/// With the certificate of `--cert`, if that is given; empty for an address without TLS.
+[[nodiscard]] Tls tls_of(const JoinOptions& options, bool secure, CertificateCheck& check) {
+  Tls tls = new_tls();
+  if (!secure) return tls;
+  check.apply_to(tls.get());
+  if (!options.certificate.empty()) {
+    show_certificate(tls.get(), options.certificate, options.key);
+  }
+  return tls;
+}
+
 class Joiner {
  public:
   Joiner(const JoinOptions& options, const std::atomic<bool>& stop, std::ostream& out)
       : address_(address_in(options)),
         name_(options.name),
         wait_s_(options.wait_s),
-        trust_(address_.host, options.ca, options.fingerprint),
+        check_(address_.host, options.ca, options.fingerprint),
+        tls_(context_of(tls_of(options, address_.secure, check_))),
         stop_(stop),
         out_(out),
         mirror_(options.name, options.most_mib << 20,
-                [this](const Command& command) { return desk_.ask(command); }) {
-    if (address_.secure) trust_.apply_to(tls_.native_handle());
-  }
+                [this](const Command& command) { return desk_.ask(command); }) {}
 
   int run() {
     std::exception_ptr failure;
@@ -245,7 +271,7 @@ class Joiner {
       explicit Watched(Joiner& j, beast::tcp_stream& watched) : joiner(j) { j.link_ = &watched; }
       ~Watched() { joiner.link_ = nullptr; }
     } const watched(*this, link);
-    co_await dial(ws, address_, trust_);
+    co_await dial(ws, address_, check_);
     connected_ = true;
     opened_ns_ = heard_ns_ = monotonic_ns();
     beast::flat_buffer in;
@@ -364,11 +390,11 @@ class Joiner {
   }
 
   asio::io_context io_{1};
-  asio::ssl::context tls_{asio::ssl::context::tlsv13_client};
   BridgeAddress address_;
   std::string name_;
   std::optional<double> wait_s_;
-  CertificateCheck trust_;
+  CertificateCheck check_;
+  asio::ssl::context tls_;
   const std::atomic<bool>& stop_;
   std::ostream& out_;
   RemoteCommand desk_;

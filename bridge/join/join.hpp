@@ -12,13 +12,15 @@ namespace kerf::bridge {
 
 /// `kerf-bridge join`.
 struct JoinOptions {
-  std::string address;               ///< what `serve` prints: wss://HOST:PORT/?token=TOKEN
-  std::string name = "far";          ///< of the local segment
-  std::filesystem::path ca;          ///< of the lab; or
-  std::string fingerprint;           ///< SHA-256 of the server's certificate, in hex
-  std::filesystem::path token_file;  ///< its first token, if the address has none
-  std::optional<double> wait_s;      ///< for the first picture; nothing: for ever
-  std::uint64_t most_mib = 2048;     ///< a larger segment is refused
+  std::string address;                ///< what `serve` prints: wss://HOST:PORT/?token=TOKEN
+  std::string name = "far";           ///< of the local segment
+  std::filesystem::path ca;           ///< PEM file: who may sign the server's certificate; or
+  std::string fingerprint;            ///< SHA-256 of the server's certificate, in hex
+  std::filesystem::path certificate;  ///< PEM file of this viewer, if the server asks for it
+  std::filesystem::path key;          ///< its key, PEM
+  std::filesystem::path token_file;   ///< its first token, if the address has none
+  std::optional<double> wait_s;       ///< for the first picture; nothing: for ever
+  std::uint64_t most_mib = 2048;      ///< a larger segment is refused
 };
 
 /// Keeps the local segment `name` equal to the far one until `stop`, through every loss of the link

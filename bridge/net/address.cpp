@@ -19,7 +19,15 @@
 namespace kerf::bridge {
 namespace {
 
-constexpr std::size_t kLongestName = 253, kLongestLabel = 63;  // RFC 1035
+constexpr std::size_t kLongest = 253;  // of a name in DNS; a token is shorter
+
+/// Letters, digits and `others` alone.
+[[nodiscard]] bool plain(std::string_view text, std::string_view others) noexcept {
+  return std::all_of(text.begin(), text.end(), [others](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
+           others.find(c) != std::string_view::npos;
+  });
+}
 
 /// Empty for what is neither IPv4 nor an IPv6 address that is reached without naming an interface.
 std::string text_of(const sockaddr* address) {
@@ -42,45 +50,24 @@ std::string machine_name() {
   return gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "";
 }
 
+/// A name of DNS (RFC 1035), which a certificate can have.
+bool is_dns_name(std::string_view name) noexcept {
+  if (name.size() > kLongest) return false;
+  for (;;) {
+    const std::string_view label = name.substr(0, name.find('.'));
+    if (label.empty() || label.size() > 63 || !plain(label, "-_")) return false;
+    if (label.front() == '-' || label.back() == '-') return false;
+    if (label.size() == name.size()) return true;
+    name.remove_prefix(label.size() + 1);
+  }
+}
+
 }  // namespace
 
 bool is_address(const std::string& host) noexcept {
   in6_addr address{};
   return inet_pton(AF_INET, host.c_str(), &address) == 1 ||
          inet_pton(AF_INET6, host.c_str(), &address) == 1;
-}
-
-std::string why_no_host(const std::string& host) {
-  if (is_address(host)) return {};
-  if (host.empty()) return "is empty; give a name or an address";
-  if (host.size() > kLongestName) return "is longer than 253 characters; give a name of DNS";
-  if (host.find('*') != std::string::npos) return "is a wildcard; name each machine";
-  if (host.front() == '[') return "an IPv6 address stands without brackets here";
-  if (host.find("://") != std::string::npos) return "is a URL; give the host alone";
-  const std::size_t strange =
-      host.find_first_not_of("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-_.");
-  if (strange != std::string::npos && host[strange] == ':') {
-    return "is no IPv6 address, and a port does not belong here; give the host alone";
-  }
-  if (strange != std::string::npos) {
-    return "is no name and no address; give letters, digits, - and ., or an address";
-  }
-  std::string_view rest = host;
-  for (bool more = true; more;) {
-    const std::size_t dot = rest.find('.');
-    const std::string_view label = rest.substr(0, dot);
-    if (label.empty()) return "has nothing before or after a dot; give a name or an address";
-    if (label.size() > kLongestLabel) return "has a part longer than 63 characters; DNS has none";
-    if (label.front() == '-' || label.back() == '-')
-      return "has a - at an end of a part; DNS has none";
-    more = dot != rest.npos;
-    if (more) rest.remove_prefix(dot + 1);
-    // A browser takes what ends in a number for an IPv4 address.
-    if (!more && label.find_first_not_of("0123456789") == label.npos) {
-      return "is no IPv4 address; give four numbers from 0 to 255";
-    }
-  }
-  return {};
 }
 
 bool is_loopback(std::string_view host) noexcept {
@@ -102,7 +89,7 @@ std::vector<std::string> own_addresses() {
 
 std::vector<std::string> own_hosts() {
   std::vector<std::string> out;
-  if (const std::string name = machine_name(); why_no_host(name + ".local").empty()) {
+  if (const std::string name = machine_name(); is_dns_name(name + ".local")) {
     out = {name, name + ".local"};
   }
   out.emplace_back("localhost");
@@ -111,15 +98,6 @@ std::vector<std::string> own_hosts() {
 }
 
 namespace {
-
-constexpr std::size_t kLongest = 253;  // of a name in DNS; a token is shorter
-
-[[nodiscard]] bool plain(std::string_view text, std::string_view others) noexcept {
-  return std::all_of(text.begin(), text.end(), [others](char c) {
-    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
-           others.find(c) != std::string_view::npos;
-  });
-}
 
 /// Takes `start` off `text` if it is there.
 [[nodiscard]] bool take(std::string_view& text, std::string_view start) noexcept {

@@ -16,10 +16,6 @@ struct BridgeError : std::runtime_error {
 /// Whether `host` is an address, IPv4 or IPv6 without brackets, not a name.
 [[nodiscard]] bool is_address(const std::string& host) noexcept;
 
-/// Why `host` is neither a name that a certificate can have nor an address, with the way out; empty
-/// if it is one.
-[[nodiscard]] std::string why_no_host(const std::string& host);
-
 /// Whether what is sent to `host` never leaves this machine, by its text alone.
 [[nodiscard]] bool is_loopback(std::string_view host) noexcept;
 

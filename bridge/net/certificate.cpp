@@ -2,162 +2,193 @@
 
 #include "bridge/net/certificate.hpp"
 
-#include <algorithm>
 #include <array>
+#include <cerrno>
 #include <cstddef>
 #include <cstdint>
-#include <filesystem>
-#include <iostream>
-#include <string_view>
+#include <cstring>
 #include <system_error>
 #include <utility>
 
-#include <openssl/bio.h>
+#include <openssl/crypto.h>
 #include <openssl/err.h>
+#include <openssl/evp.h>
 #include <openssl/pem.h>
 #include <openssl/rand.h>
 #include <openssl/ssl.h>
 #include <openssl/x509.h>
 #include <openssl/x509v3.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include "bridge/net/address.hpp"
-#include "shared/posix/atomic_file.hpp"
-#include "shared/text/text.hpp"
 
 namespace kerf::bridge {
 namespace {
 
-constexpr long kDayS = 24L * 60 * 60;
-constexpr std::size_t kShown = 80;  // of a host in a message
+constexpr const char* kHelp = "docs/second-machine.md has the lines of openssl";
 
-struct FreeBio {
-  void operator()(BIO* bio) const noexcept { BIO_free(bio); }
-};
-using Bio = std::unique_ptr<BIO, FreeBio>;
-
-void require(bool done, const char* what) {
-  if (!done) throw BridgeError(std::string("certificate: ") + what + " failed; try again");
+void require(bool done, const char* step) {
+  if (!done) throw BridgeError(std::string("certificate: ") + step + " failed; try again");
 }
 
-std::string text_of(const Bio& bio) {
+/// `--cert FILE: `, after a check that OpenSSL can read the file: it would wait for a pipe that no
+/// program writes to.
+std::string readable(const char* option, const std::filesystem::path& file) {
+  const std::string place = std::string(option) + " " + file.string() + ": ";
+  if (access(file.c_str(), R_OK) != 0) {
+    throw BridgeError(place + std::strerror(errno) + "; name a PEM file");
+  }
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(file, error)) {
+    throw BridgeError(
+        place +
+        (std::filesystem::is_directory(file, error) ? "is a folder" : "is no regular file") +
+        "; name a PEM file");
+  }
+  return place;
+}
+
+/// In capitals, a colon between bytes; at most a digest.
+std::string hex_of(const unsigned char* bytes, std::size_t count) {
+  std::array<char, 3 * EVP_MAX_MD_SIZE> text{};
+  OPENSSL_buf2hexstr_ex(text.data(), text.size(), nullptr, bytes, static_cast<long>(count), ':');
+  return text.data();
+}
+
+/// OpenSSL's first reason since the last call.
+std::string openssl_reason() {
+  const char* const reason = ERR_reason_error_string(ERR_peek_error());
+  ERR_clear_error();
+  return reason == nullptr ? "no reason given" : reason;
+}
+
+std::string text_of(const ASN1_TIME* time) {
+  const std::unique_ptr<BIO, decltype(&BIO_free)> bio(BIO_new(BIO_s_mem()), &BIO_free);
+  ASN1_TIME_print(bio.get(), time);
   char* text = nullptr;
   const long bytes = BIO_get_mem_data(bio.get(), &text);
   return {text, static_cast<std::size_t>(bytes)};
 }
 
-Bio reader_of(const std::string& text) {
-  return Bio(BIO_new_mem_buf(text.data(), static_cast<int>(text.size())));
-}
-
-void add_extension(X509* certificate, X509* issuer, int kind, const std::string& value) {
-  X509V3_CTX context;
-  X509V3_set_ctx_nodb(&context);
-  X509V3_set_ctx(&context, issuer, certificate, nullptr, nullptr, 0);
-  X509_EXTENSION* const extension = X509V3_EXT_conf_nid(nullptr, &context, kind, value.c_str());
-  require(extension != nullptr, "an extension");
-  const int added = X509_add_ext(certificate, extension, -1);
-  X509_EXTENSION_free(extension);
-  require(added == 1, "an extension");
-}
-
-void say_what_for(X509* certificate, X509* issuer, const CertificateSpec& spec) {
-  const bool ca = spec.hosts.empty();
-  add_extension(certificate, issuer, NID_basic_constraints,
-                ca ? "critical,CA:TRUE,pathlen:0" : "critical,CA:FALSE");
-  add_extension(certificate, issuer, NID_key_usage,
-                ca ? "critical,keyCertSign,cRLSign" : "critical,digitalSignature");
-  add_extension(certificate, issuer, NID_subject_key_identifier, "hash");
-  if (ca) return;
-  add_extension(certificate, issuer, NID_ext_key_usage, "serverAuth");
-  require_hosts(spec.hosts);
-  std::string hosts;
-  for (const std::string& host : spec.hosts) {
-    hosts += (hosts.empty() ? "" : ",") + std::string(is_address(host) ? "IP:" : "DNS:") + host;
-  }
-  add_extension(certificate, issuer, NID_subject_alt_name, hosts);
+/// Trusts the certificates of a PEM file, at least one.
+void load_ca(SSL_CTX* tls, const char* option, const std::filesystem::path& file) {
+  const std::string place = readable(option, file);
+  if (SSL_CTX_load_verify_file(tls, file.c_str()) == 1) return;
+  throw BridgeError(place + "no certificate in PEM form (" + openssl_reason() + "); " + kHelp);
 }
 
 }  // namespace
 
-void require_hosts(const std::vector<std::string>& hosts) {
-  for (const std::string& host : hosts) {
-    if (const std::string why = why_no_host(host); !why.empty()) {
-      throw BridgeError(one_line("--host " + host.substr(0, kShown) + ": " + why));
-    }
+Tls new_tls() {
+  Tls tls(SSL_CTX_new(TLS_method()), &SSL_CTX_free);
+  require(tls != nullptr, "TLS");
+  SSL_CTX_set_min_proto_version(tls.get(), TLS1_3_VERSION);
+  // No early data, and no tickets: a viewer that comes again shows what it has again.
+  SSL_CTX_set_num_tickets(tls.get(), 0);
+  return tls;
+}
+
+void show_certificate(SSL_CTX* tls, const std::filesystem::path& certificate,
+                      const std::filesystem::path& key) {
+  const std::string place = readable("--cert", certificate);
+  const std::string key_place = readable("--key", key);
+  struct stat status {};
+  if (stat(key.c_str(), &status) == 0 && (status.st_mode & (S_IRWXG | S_IRWXO)) != 0) {
+    throw BridgeError(key_place + "is open to other users; chmod 600 it");
+  }
+  ERR_clear_error();
+  if (SSL_CTX_use_certificate_chain_file(tls, certificate.c_str()) != 1) {
+    throw BridgeError(place + "no certificate in PEM form (" + openssl_reason() + "); " + kHelp);
+  }
+  // No user is there who could type a password.
+  SSL_CTX_set_default_passwd_cb(tls, [](char*, int, int, void*) { return -1; });
+  const std::unique_ptr<BIO, decltype(&BIO_free)> file(BIO_new_file(key.c_str(), "r"), &BIO_free);
+  const std::unique_ptr<EVP_PKEY, decltype(&EVP_PKEY_free)> own(
+      PEM_read_bio_PrivateKey(file.get(), nullptr, SSL_CTX_get_default_passwd_cb(tls), nullptr),
+      &EVP_PKEY_free);
+  if (own == nullptr) {
+    ERR_clear_error();
+    throw BridgeError(key_place +
+                      "no private key in PEM form, or one with a password; openssl pkey "
+                      "-in FILE -out FILE writes one without");
+  }
+  X509* const shown = SSL_CTX_get0_certificate(tls);
+  if (X509_check_private_key(shown, own.get()) != 1) {
+    ERR_clear_error();
+    throw BridgeError(key_place + "is not the key of the first certificate in " +
+                      certificate.string() + "; give the two files that were made together");
+  }
+  require(SSL_CTX_use_PrivateKey(tls, own.get()) == 1, "taking its key");
+  if (X509_cmp_current_time(X509_get0_notAfter(shown)) < 0) {
+    throw BridgeError(place + "the certificate ended on " + text_of(X509_get0_notAfter(shown)) +
+                      "; make another: " + kHelp);
+  }
+  if (X509_cmp_current_time(X509_get0_notBefore(shown)) > 0) {
+    throw BridgeError(place + "the certificate holds from " + text_of(X509_get0_notBefore(shown)) +
+                      " on; is the clock right?");
   }
 }
 
-Key new_key() {
-  Key key(EVP_EC_gen("P-256"));
-  require(key != nullptr, "a new key");
-  return key;
-}
-
-Certificate new_certificate(const CertificateSpec& spec, EVP_PKEY* key, X509* issuer,
-                            EVP_PKEY* issuer_key) {
-  Certificate out(X509_new());
-  require(out != nullptr && X509_set_version(out.get(), X509_VERSION_3) == 1, "a new one");
+void show_self_signed(SSL_CTX* tls, const std::vector<std::string>& hosts) {
+  constexpr long kDayS = 24L * 60 * 60;
+  const std::unique_ptr<EVP_PKEY, decltype(&EVP_PKEY_free)> key(EVP_EC_gen("P-256"),
+                                                                &EVP_PKEY_free);
+  const std::unique_ptr<X509, decltype(&X509_free)> own(X509_new(), &X509_free);
   std::uint64_t serial = 0;
-  require(RAND_bytes(reinterpret_cast<unsigned char*>(&serial), sizeof serial) == 1, "a number");
-  ASN1_INTEGER_set_uint64(X509_get_serialNumber(out.get()), serial >> 1 | 1);  // positive
-  X509_gmtime_adj(X509_getm_notBefore(out.get()), -kDayS);
-  X509_gmtime_adj(X509_getm_notAfter(out.get()), spec.days * kDayS);
-  X509_NAME* const subject = X509_get_subject_name(out.get());
-  require(X509_NAME_add_entry_by_txt(subject, "CN", MBSTRING_UTF8,
-                                     reinterpret_cast<const unsigned char*>(spec.name.c_str()), -1,
-                                     -1, 0) == 1,
-          "its name");
-  X509* const above = issuer == nullptr ? out.get() : issuer;
-  require(X509_set_issuer_name(out.get(), X509_get_subject_name(above)) == 1 &&
-              X509_set_pubkey(out.get(), key) == 1,
-          "its key");
-  say_what_for(out.get(), above, spec);
-  require(X509_sign(out.get(), issuer_key == nullptr ? key : issuer_key, EVP_sha256()) != 0,
+  require(key != nullptr && own != nullptr && X509_set_version(own.get(), X509_VERSION_3) == 1 &&
+              RAND_bytes(reinterpret_cast<unsigned char*>(&serial), sizeof serial) == 1,
+          "a new key");
+  ASN1_INTEGER_set_uint64(X509_get_serialNumber(own.get()), serial >> 1 | 1);  // positive
+  X509_gmtime_adj(X509_getm_notBefore(own.get()), -kDayS);                     // clocks differ
+  X509_gmtime_adj(X509_getm_notAfter(own.get()), 825 * kDayS);
+  X509_NAME* const name = X509_get_subject_name(own.get());
+  X509_NAME_add_entry_by_txt(name, "CN", MBSTRING_UTF8,
+                             reinterpret_cast<const unsigned char*>("kerf bridge"), -1, -1, 0);
+  X509_set_issuer_name(own.get(), name);
+  X509_set_pubkey(own.get(), key.get());
+  std::string names;
+  for (const std::string& host : hosts) {
+    names += (names.empty() ? "" : ",") + std::string(is_address(host) ? "IP:" : "DNS:") + host;
+  }
+  const std::pair<int, const char*> extensions[] = {{NID_basic_constraints, "critical,CA:FALSE"},
+                                                    {NID_key_usage, "critical,digitalSignature"},
+                                                    {NID_ext_key_usage, "serverAuth"},
+                                                    {NID_subject_alt_name, names.c_str()}};
+  for (const auto& [kind, value] : extensions) {
+    const std::unique_ptr<X509_EXTENSION, decltype(&X509_EXTENSION_free)> extension(
+        X509V3_EXT_conf_nid(nullptr, nullptr, kind, value), &X509_EXTENSION_free);
+    require(extension != nullptr && X509_add_ext(own.get(), extension.get(), -1) == 1,
+            "an extension");
+  }
+  require(X509_sign(own.get(), key.get(), EVP_sha256()) != 0 &&
+              SSL_CTX_use_certificate(tls, own.get()) == 1 &&
+              SSL_CTX_use_PrivateKey(tls, key.get()) == 1,
           "the signature");
-  return out;
 }
 
-std::string pem_of(X509* certificate) {
-  const Bio bio(BIO_new(BIO_s_mem()));
-  require(PEM_write_bio_X509(bio.get(), certificate) == 1, "writing");
-  return text_of(bio);
-}
-
-std::string pem_of(EVP_PKEY* key) {
-  const Bio bio(BIO_new(BIO_s_secmem()));
-  require(PEM_write_bio_PrivateKey(bio.get(), key, nullptr, nullptr, 0, nullptr, nullptr) == 1,
-          "writing its key");
-  return text_of(bio);
-}
-
-Certificate certificate_of(const std::string& pem) {
-  return Certificate(PEM_read_bio_X509(reader_of(pem).get(), nullptr, nullptr, nullptr));
-}
-
-Key key_of(const std::string& pem) {
-  // A key behind a password counts as none: there is no user to ask.
-  const auto no_password = [](char*, int, int, void*) { return -1; };
-  return Key(PEM_read_bio_PrivateKey(reader_of(pem).get(), nullptr, no_password, nullptr));
+void require_client_certificate(SSL_CTX* tls, const std::filesystem::path& ca) {
+  load_ca(tls, "--client-ca", ca);
+  // Their names are sent, so that a browser offers the certificate that fits.
+  SSL_CTX_set_client_CA_list(tls, SSL_load_client_CA_file(ca.c_str()));
+  SSL_CTX_set_verify(tls, SSL_VERIFY_PEER | SSL_VERIFY_FAIL_IF_NO_PEER_CERT, nullptr);
 }
 
 std::string fingerprint_of(const X509* certificate) {
   std::array<unsigned char, EVP_MAX_MD_SIZE> digest;
   unsigned bytes = 0;
   if (X509_digest(certificate, EVP_sha256(), digest.data(), &bytes) != 1) return {};
-  std::string text;
-  for (unsigned i = 0; i < bytes; ++i) {
-    if (i != 0) text += ':';
-    text += "0123456789ABCDEF"[digest[i] >> 4];
-    text += "0123456789ABCDEF"[digest[i] & 15];
-  }
-  return text;
+  return hex_of(digest.data(), bytes);
 }
 
-std::vector<std::string> dns_names_of(X509* certificate) {
+std::string fingerprint_of(const SSL_CTX* tls) {
+  return fingerprint_of(SSL_CTX_get0_certificate(tls));
+}
+
+std::vector<std::string> dns_names_of(const SSL_CTX* tls) {
   std::vector<std::string> out;
   auto* const names = static_cast<GENERAL_NAMES*>(
-      X509_get_ext_d2i(certificate, NID_subject_alt_name, nullptr, nullptr));
+      X509_get_ext_d2i(SSL_CTX_get0_certificate(tls), NID_subject_alt_name, nullptr, nullptr));
   for (int i = 0; i < sk_GENERAL_NAME_num(names); ++i) {
     const GENERAL_NAME* const name = sk_GENERAL_NAME_value(names, i);
     if (name->type != GEN_DNS) continue;
@@ -169,119 +200,44 @@ std::vector<std::string> dns_names_of(X509* certificate) {
   return out;
 }
 
-std::string end_of(const X509* certificate) {
-  const Bio bio(BIO_new(BIO_s_mem()));
-  ASN1_TIME_print(bio.get(), X509_get0_notAfter(certificate));
-  return text_of(bio);
-}
-
-namespace {
-
-constexpr const char* kMake = "make one: kerf bridge make-identity ";
-
-std::string text_of_file(const std::filesystem::path& file, const std::filesystem::path& folder) {
-  std::string text = text_in(file);
-  if (text.empty()) {
-    throw BridgeError("--identity " + folder.string() + ": " + file.filename().string() +
-                      " is missing, empty or not to be read; " + kMake + folder.string());
-  }
-  return text;
-}
-
-}  // namespace
-
-TlsKeys load_tls_keys(const std::filesystem::path& folder) {
-  const auto refuse = [&folder](const std::string& why) {
-    return BridgeError("--identity " + folder.string() + ": " + why + "; " + kMake +
-                       folder.string());
-  };
-  TlsKeys out{
-      text_of_file(folder / "cert.pem", folder), text_of_file(folder / "key.pem", folder), "", {}};
-  struct stat status {};
-  if (stat((folder / "key.pem").c_str(), &status) == 0 &&
-      (status.st_mode & (S_IRWXG | S_IRWXO)) != 0) {
-    throw BridgeError("--identity " + folder.string() +
-                      ": key.pem is open to other users; chmod 600 it");
-  }
-  const Certificate certificate = certificate_of(out.chain_pem);
-  if (!certificate) throw refuse("cert.pem is no certificate");
-  const Key key = key_of(out.key_pem);
-  if (!key) throw refuse("key.pem is no private key without a password");
-  if (X509_check_private_key(certificate.get(), key.get()) != 1) {
-    throw refuse("key.pem is not that of cert.pem");
-  }
-  if (X509_cmp_current_time(X509_get0_notAfter(certificate.get())) < 0) {
-    throw refuse("the certificate ended on " + end_of(certificate.get()));
-  }
-  if (X509_cmp_current_time(X509_get0_notBefore(certificate.get())) > 0) {
-    throw refuse("the certificate holds from a later day on; is the clock right?");
-  }
-  out.fingerprint = fingerprint_of(certificate.get());
-  out.names = dns_names_of(certificate.get());
-  return out;
-}
-
-TlsKeys self_signed_keys(const std::vector<std::string>& hosts) {
-  const Key key = new_key();
-  CertificateSpec spec;
-  spec.name = "kerf bridge";
-  spec.hosts = hosts;
-  const Certificate certificate = new_certificate(spec, key.get(), nullptr, nullptr);
-  return {pem_of(certificate.get()), pem_of(key.get()), fingerprint_of(certificate.get()),
-          dns_names_of(certificate.get())};
-}
-
 namespace {
 
 /// 64 hex digits, with or without colons, as `fingerprint_of` has them; empty for anything else.
-[[nodiscard]] std::string fingerprint_in(std::string_view text) {
-  std::string out;
-  std::size_t digits = 0;
-  for (const char c : text) {
-    if (c == ':') continue;
-    const std::size_t value = std::string_view("0123456789abcdef0123456789ABCDEF").find(c);
-    if (value == std::string_view::npos) return {};
-    if (digits != 0 && digits % 2 == 0) out += ':';
-    out += "0123456789ABCDEF"[value & 15];
-    ++digits;
-  }
-  return digits == 64 ? out : std::string();
+[[nodiscard]] std::string fingerprint_in(const std::string& text) {
+  std::array<unsigned char, 32> digest;
+  std::size_t bytes = 0;
+  const bool is_hex =
+      OPENSSL_hexstr2buf_ex(digest.data(), digest.size(), &bytes, text.c_str(), ':') == 1;
+  ERR_clear_error();
+  return is_hex && bytes == digest.size() ? hex_of(digest.data(), bytes) : std::string();
 }
 
-[[nodiscard]] int index_of_trust() {
+[[nodiscard]] int index_of_check() {
   static const int index = SSL_get_ex_new_index(0, nullptr, nullptr, nullptr, nullptr);
   return index;
 }
 
 }  // namespace
 
-CertificateCheck::CertificateCheck(std::string host, const std::filesystem::path& ca,
+CertificateCheck::CertificateCheck(std::string host, std::filesystem::path ca,
                                    const std::string& fingerprint)
-    : host_(std::move(host)), ca_(ca) {
+    : host_(std::move(host)), ca_(std::move(ca)) {
   if (fingerprint.empty()) return;
   fingerprint_ = fingerprint_in(fingerprint);
-  if (!ca.empty()) throw BridgeError("--fingerprint: with --ca; take one of them");
+  if (!ca_.empty()) throw BridgeError("--fingerprint: with --ca; take one of them");
   if (fingerprint_.empty()) {
     throw BridgeError("--fingerprint: no 64 hex digits; take the SHA-256 that serve prints");
   }
 }
 
-void CertificateCheck::apply_to(SSL_CTX* context) {
-  SSL_CTX_set_min_proto_version(context, TLS1_3_VERSION);
-  SSL_CTX_set_verify(context, SSL_VERIFY_PEER, &CertificateCheck::verify);
-  if (ca_.empty()) return;
-  std::error_code fault;  // a pipe may never be written to, and OpenSSL would wait for it
-  if (!std::filesystem::is_regular_file(ca_, fault) ||
-      SSL_CTX_load_verify_locations(context, ca_.c_str(), nullptr) != 1) {
-    ERR_clear_error();
-    throw BridgeError("--ca " + ca_.string() +
-                      ": no certificate to be read; take ca.pem of make-identity");
-  }
+void CertificateCheck::apply_to(SSL_CTX* tls) {
+  SSL_CTX_set_verify(tls, SSL_VERIFY_PEER, &CertificateCheck::verify);
+  if (!ca_.empty()) load_ca(tls, "--ca", ca_);
 }
 
 void CertificateCheck::begin(SSL* connection) {
   refusal_.clear();
-  SSL_set_ex_data(connection, index_of_trust(), this);
+  SSL_set_ex_data(connection, index_of_check(), this);
   X509_VERIFY_PARAM* const rules = SSL_get0_param(connection);
   if (is_address(host_)) {
     X509_VERIFY_PARAM_set1_ip_asc(rules, host_.c_str());
@@ -294,11 +250,11 @@ void CertificateCheck::begin(SSL* connection) {
 int CertificateCheck::verify(int verified, X509_STORE_CTX* chain) {
   const auto* const connection = static_cast<const SSL*>(
       X509_STORE_CTX_get_ex_data(chain, SSL_get_ex_data_X509_STORE_CTX_idx()));
-  auto* const trust = static_cast<CertificateCheck*>(SSL_get_ex_data(connection, index_of_trust()));
-  return trust->believe(verified != 0, chain) ? 1 : 0;
+  auto* const check = static_cast<CertificateCheck*>(SSL_get_ex_data(connection, index_of_check()));
+  return check->accepts(verified != 0, chain) ? 1 : 0;
 }
 
-bool CertificateCheck::believe(bool verified, X509_STORE_CTX* chain) {
+bool CertificateCheck::accepts(bool verified, X509_STORE_CTX* chain) {
   const int error = X509_STORE_CTX_get_error(chain);
   const X509* const certificate = X509_STORE_CTX_get0_cert(chain);  // the server's own
   const std::string seen = certificate == nullptr ? std::string() : fingerprint_of(certificate);
@@ -306,11 +262,9 @@ bool CertificateCheck::believe(bool verified, X509_STORE_CTX* chain) {
     refusal_ = "its certificate cannot be read; make another";
     return false;
   }
-  const bool in_time =
-      error != X509_V_ERR_CERT_HAS_EXPIRED && error != X509_V_ERR_CERT_NOT_YET_VALID;
-  if (!in_time) {
+  if (error == X509_V_ERR_CERT_HAS_EXPIRED || error == X509_V_ERR_CERT_NOT_YET_VALID) {
     refusal_ = std::string("its certificate: ") + X509_verify_cert_error_string(error) +
-               "; set the clock, or make-identity there again";
+               "; set the clock, or make another there";
     return false;
   }
   if (!fingerprint_.empty()) {
@@ -326,88 +280,8 @@ bool CertificateCheck::believe(bool verified, X509_STORE_CTX* chain) {
     return false;
   }
   refusal_ =
-      "nobody vouches for its certificate; where serve or make-identity prints the same, add "
-      "--fingerprint " +
-      seen;
+      "nobody vouches for its certificate; if serve prints the same, add --fingerprint " + seen;
   return false;
-}
-
-namespace {
-
-constexpr int kCaDays = 3650;
-
-struct Authority {
-  Certificate certificate;
-  Key key;
-  bool is_new = false;
-};
-
-/// The CA of the folder, made if there is none.
-Authority authority_in(const std::filesystem::path& folder) {
-  const std::filesystem::path file = folder / "ca.pem", key_file = folder / "ca-key.pem";
-  if (std::filesystem::exists(file) || std::filesystem::exists(key_file)) {
-    Authority out{certificate_of(text_in(file)), key_of(text_in(key_file))};
-    if (!out.certificate || !out.key ||
-        X509_check_private_key(out.certificate.get(), out.key.get()) != 1) {
-      throw BridgeError(folder.string() +
-                        ": ca.pem and ca-key.pem are no CA and its key; take another folder");
-    }
-    if (X509_cmp_current_time(X509_get0_notAfter(out.certificate.get())) < 0) {
-      throw BridgeError(folder.string() + ": the CA ended on " + end_of(out.certificate.get()) +
-                        "; take another folder");
-    }
-    return out;
-  }
-  Authority out{nullptr, new_key(), true};
-  CertificateSpec spec;
-  spec.name = "kerf lab CA";
-  spec.days = kCaDays;
-  out.certificate = new_certificate(spec, out.key.get(), nullptr, nullptr);
-  return out;
-}
-
-}  // namespace
-
-int run_make_identity(const IdentityOptions& options) {
-  require_hosts(options.hosts);  // before anything is made
-  for (auto host = options.hosts.begin(); host != options.hosts.end(); ++host) {
-    if (std::find(options.hosts.begin(), host, *host) == host) continue;
-    throw BridgeError(one_line("--host " + *host + ": stands there twice; name each host once"));
-  }
-  const std::filesystem::path& folder = options.folder;
-  std::error_code error;
-  std::filesystem::create_directories(folder, error);
-  if (error) {
-    throw BridgeError(folder.string() + ": " + error.message() + "; choose another folder");
-  }
-  const Authority authority = authority_in(folder);
-  CertificateSpec spec;
-  spec.hosts = options.hosts.empty() ? own_hosts() : options.hosts;
-  spec.name = spec.hosts.front().substr(0, 64);  // X.509's most
-  spec.days = options.days;
-  const Key key = new_key();
-  const Certificate certificate =
-      new_certificate(spec, key.get(), authority.certificate.get(), authority.key.get());
-  const Certificate replaced = certificate_of(text_in(folder / "cert.pem"));
-  // The program's umask makes them 0600.
-  if (authority.is_new) {
-    write_new_file(folder / "ca-key.pem", pem_of(authority.key.get()));
-    write_new_file(folder / "ca.pem", pem_of(authority.certificate.get()));
-  }
-  write_new_file(folder / "key.pem", pem_of(key.get()));
-  write_new_file(folder / "cert.pem",
-                 pem_of(certificate.get()) + pem_of(authority.certificate.get()));
-  std::cout << escaped(folder.string()) << ": certificate for";
-  for (const std::string& host : spec.hosts) std::cout << ' ' << host;
-  std::cout << ", until " << end_of(certificate.get()) << '\n';
-  std::cout << "SHA-256 " << fingerprint_of(certificate.get()) << '\n'
-            << (authority.is_new ? "a new CA: " : "by the CA: ")
-            << "give ca.pem to browsers and to "
-            << "kerf bridge join; ca-key.pem stays here\n";
-  if (replaced) {
-    std::cout << "the one before, " << fingerprint_of(replaced.get()) << ", is replaced\n";
-  }
-  return 0;
 }
 
 }  // namespace kerf::bridge

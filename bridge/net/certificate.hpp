@@ -6,84 +6,57 @@
 #include <string>
 #include <vector>
 
-#include <openssl/evp.h>
-#include <openssl/x509.h>
+#include <openssl/types.h>
 
 namespace kerf::bridge {
 
-struct FreeOpenssl {
-  void operator()(EVP_PKEY* key) const noexcept { EVP_PKEY_free(key); }
-  void operator()(X509* certificate) const noexcept { X509_free(certificate); }
-};
-using Key = std::unique_ptr<EVP_PKEY, FreeOpenssl>;
-using Certificate = std::unique_ptr<X509, FreeOpenssl>;
+/// TLS 1.3 of one end of a connection: its own certificate, and what it demands of the other's.
+/// The functions below fill it once, before the first connection, and throw `BridgeError`.
+using Tls = std::shared_ptr<SSL_CTX>;
 
-/// A new key on the curve P-256. Throws `BridgeError`, as all below.
-[[nodiscard]] Key new_key();
+/// Without a certificate; verifies none.
+[[nodiscard]] Tls new_tls();
 
-/// The content of a new certificate. It holds from a day ago on, since clocks differ.
-struct CertificateSpec {
-  std::string name;                ///< common name
-  std::vector<std::string> hosts;  ///< names and addresses of a server; empty: a CA
-  int days = 825;
-};
+/// Shows the first certificate of `certificate`, with those after it as its chain up to a CA, and
+/// proves it with `key`. Both are PEM files: options `--cert` and `--key` of serve and join.
+/// Refuses a key that is open to other users, has a password or belongs to another certificate, and
+/// a certificate that has ended or not begun.
+void show_certificate(SSL_CTX* tls, const std::filesystem::path& certificate,
+                      const std::filesystem::path& key);
 
-/// Throws if one is neither a name nor an address.
-void require_hosts(const std::vector<std::string>& hosts);
+/// Shows a certificate made now for `hosts` (names and addresses), which no CA has signed.
+void show_self_signed(SSL_CTX* tls, const std::vector<std::string>& hosts);
 
-/// Of `key`, signed by `issuer` with `issuer_key`; nullptr: by itself.
-[[nodiscard]] Certificate new_certificate(const CertificateSpec& spec, EVP_PKEY* key, X509* issuer,
-                                          EVP_PKEY* issuer_key);
+/// Lets no client in without a certificate that a CA of this PEM file has signed (`--client-ca`).
+void require_client_certificate(SSL_CTX* tls, const std::filesystem::path& ca);
 
-[[nodiscard]] std::string pem_of(X509* certificate);
-[[nodiscard]] std::string pem_of(EVP_PKEY* key);
-/// nullptr if the text has none.
-[[nodiscard]] Certificate certificate_of(const std::string& pem);
-[[nodiscard]] Key key_of(const std::string& pem);
-
-/// SHA-256 of the certificate: hex in capitals, a colon between bytes. Empty if OpenSSL has no
+/// SHA-256 of a certificate: hex in capitals, a colon between bytes. Empty if OpenSSL has no
 /// memory; never throws `BridgeError`.
 [[nodiscard]] std::string fingerprint_of(const X509* certificate);
-/// Its DNS names.
-[[nodiscard]] std::vector<std::string> dns_names_of(X509* certificate);
-/// The day of its end, as OpenSSL prints it.
-[[nodiscard]] std::string end_of(const X509* certificate);
+/// Of the certificate that `tls` shows.
+[[nodiscard]] std::string fingerprint_of(const SSL_CTX* tls);
+/// The DNS names of the certificate that `tls` shows.
+[[nodiscard]] std::vector<std::string> dns_names_of(const SSL_CTX* tls);
 
-/// What a server shows and what it proves it with.
-struct TlsKeys {
-  std::string chain_pem;  ///< its certificate, then those above it
-  std::string key_pem;
-  std::string fingerprint;         ///< SHA-256 of the certificate, hex with colons
-  std::vector<std::string> names;  ///< DNS names that it holds for
-};
-
-/// From a folder of `make-identity`. Throws `BridgeError` if a file is missing, open to others,
-/// damaged, out of date or not its partner's.
-[[nodiscard]] TlsKeys load_tls_keys(const std::filesystem::path& folder);
-
-/// Made now, for `hosts` (names and addresses); no authority vouches for it.
-[[nodiscard]] TlsKeys self_signed_keys(const std::vector<std::string>& hosts);
-
-/// Why a viewer believes that the other side is the one it means: the lab's CA vouches for it, or
-/// its certificate is the one whose fingerprint was given. Without either nothing is believed, and
-/// the refusal names the fingerprint seen. One connection at a time.
+/// What join demands of the server's certificate: a CA of the file `ca` has signed it for this
+/// host, or it has the fingerprint that was given. Without either it is refused, and the refusal
+/// names the fingerprint seen. One connection at a time.
 class CertificateCheck {
  public:
-  /// Throws `BridgeError` if the CA cannot be read, the fingerprint is none, or both are given.
-  CertificateCheck(std::string host, const std::filesystem::path& ca,
-                   const std::string& fingerprint);
+  /// Throws `BridgeError` if the fingerprint is none, or both are given.
+  CertificateCheck(std::string host, std::filesystem::path ca, const std::string& fingerprint);
   CertificateCheck(const CertificateCheck&) = delete;
   CertificateCheck& operator=(const CertificateCheck&) = delete;
 
-  /// Once; must outlive `context`'s connections.
-  void apply_to(SSL_CTX* context);
+  /// Once; must outlive the connections of `tls`. Throws `BridgeError` if the CA cannot be read.
+  void apply_to(SSL_CTX* tls);
   /// Before each handshake.
   void begin(SSL* connection);
   /// After a handshake that failed: one line; empty: the certificate was not the reason.
   [[nodiscard]] const std::string& refusal() const noexcept { return refusal_; }
 
  private:
-  [[nodiscard]] bool believe(bool verified, X509_STORE_CTX* chain);
+  [[nodiscard]] bool accepts(bool verified, X509_STORE_CTX* chain);
   [[nodiscard]] static int verify(int verified, X509_STORE_CTX* chain);
 
   std::string host_;
@@ -91,16 +64,5 @@ class CertificateCheck {
   std::string fingerprint_;  // empty: none was given
   std::string refusal_;
 };
-
-/// `kerf-bridge make-identity`.
-struct IdentityOptions {
-  std::filesystem::path folder;
-  std::vector<std::string> hosts;  ///< names and addresses of the machine; empty: this one's
-  int days = 825;
-};
-
-/// Makes DIR/ca.pem, ca-key.pem (kept if they exist), cert.pem and key.pem, and prints what
-/// they are. Throws `BridgeError`.
-int run_make_identity(const IdentityOptions& options);
 
 }  // namespace kerf::bridge

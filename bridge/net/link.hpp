@@ -16,6 +16,8 @@
 #include <boost/beast/ssl.hpp>
 #include <boost/beast/websocket.hpp>
 
+#include "bridge/net/certificate.hpp"
+
 namespace kerf::bridge {
 
 namespace asio = boost::asio;
@@ -137,11 +139,17 @@ void async_teardown(beast::role_type, Link& link, Handler&& handler) {
   asio::post(link.get_executor(), beast::bind_handler(std::forward<Handler>(handler), ErrorCode{}));
 }
 
+/// Boost's view of `tls`, which both own.
+inline asio::ssl::context context_of(const Tls& tls) {
+  SSL_CTX_up_ref(tls.get());
+  return asio::ssl::context(tls.get());
+}
+
 /// Awaits an operation; its failure goes to `error` instead of an exception.
 inline auto quiet(ErrorCode& error) {
   return asio::redirect_error(asio::use_awaitable, error);
 }
 
-using WebSocket = beast::websocket::stream<Link>;
+using WebSocket = beast::websocket::stream<Link, false>;  // false: no compression of its own
 
 }  // namespace kerf::bridge

@@ -109,6 +109,19 @@ HostPort parse_listen(const std::string& text) {
   return out;
 }
 
+/// Empty on loopback, unless a file asks for TLS there too.
+[[nodiscard]] Tls tls_of(const ServeOptions& options, const std::string& host) {
+  if (is_loopback(host) && options.certificate.empty() && options.client_ca.empty()) return nullptr;
+  Tls tls = new_tls();
+  if (options.certificate.empty()) {
+    show_self_signed(tls.get(), own_hosts());
+  } else {
+    show_certificate(tls.get(), options.certificate, options.key);
+  }
+  if (!options.client_ca.empty()) require_client_certificate(tls.get(), options.client_ca);
+  return tls;
+}
+
 /// Of the page or of join, at `host`.
 [[nodiscard]] std::string address_of(const char* scheme, bool tls, const std::string& host,
                                      std::uint16_t port, const std::string& token) {
@@ -121,7 +134,7 @@ HostPort parse_listen(const std::string& text) {
 void print_pages(const ServerSetup& setup, std::uint16_t port, const std::string& pass, bool qr) {
   std::string for_others;
   for (const std::string& host : reached_at(setup.host)) {
-    const std::string address = address_of("http", setup.tls.has_value(), host, port, pass);
+    const std::string address = address_of("http", setup.tls != nullptr, host, port, pass);
     if (for_others.empty() && !is_loopback(host)) for_others = address;
     std::cout << address << '\n';
   }
@@ -132,7 +145,7 @@ void print_addresses(const ServerSetup& setup, std::uint16_t port, const std::st
                      bool qr) {
   std::cout << "for kerf bridge join, as often as it is shown\n";
   for (const std::string& host : reached_at(setup.host)) {
-    std::cout << address_of("ws", setup.tls.has_value(), host, port, setup.tokens.first()) << '\n';
+    std::cout << address_of("ws", setup.tls != nullptr, host, port, setup.tokens.first()) << '\n';
   }
   if (setup.tokens.may_command()) {
     std::cout << "with a token of --allow-commands in its place a viewer may command, too\n";
@@ -162,14 +175,11 @@ int run_serve(const ServeOptions& options, const std::atomic<bool>& stop) {
   }
   setup.host_names = own_hosts();
   setup.host_names.push_back(at.host);
-  if (!options.identity.empty()) {
-    setup.tls = load_tls_keys(options.identity);
-  } else if (!is_loopback(at.host)) {
-    setup.tls = self_signed_keys(own_hosts());
-  }
+  setup.tls = tls_of(options, at.host);
   if (setup.tls) {
-    setup.host_names.insert(setup.host_names.end(), setup.tls->names.begin(),
-                            setup.tls->names.end());
+    for (std::string& name : dns_names_of(setup.tls.get())) {
+      setup.host_names.push_back(std::move(name));
+    }
   }
   std::uint16_t port = 0;
   setup.on_pass = [&setup, &port, qr = options.qr](const std::string& pass) {
@@ -187,8 +197,9 @@ int run_serve(const ServeOptions& options, const std::atomic<bool>& stop) {
     std::cout << "OpenIGTLink, for whoever reaches it, "
               << options.listen.substr(0, options.listen.rfind(':')) << ':' << slicer_port << '\n';
   }
-  if (setup.tls && options.identity.empty()) {
-    std::cout << "certificate, self-signed, SHA-256 " << setup.tls->fingerprint << '\n';
+  if (setup.tls) {
+    std::cout << "certificate" << (options.certificate.empty() ? ", self-signed," : "")
+              << " SHA-256 " << fingerprint_of(setup.tls.get()) << '\n';
   }
   print_addresses(setup, port, server.pass(), options.qr);
   // Who has no address has no picture.

@@ -20,7 +20,9 @@ inline constexpr int kMostViewers = 32;
 struct ServeOptions {
   std::string listen = "127.0.0.1:7400";  ///< HOST:PORT; port 0: one that is free
   std::string name = kDefaultName;        ///< of the controller
-  std::filesystem::path identity;         ///< folder of `make-identity`; empty: self-signed
+  std::filesystem::path certificate;      ///< PEM file; empty: self-signed off loopback
+  std::filesystem::path key;              ///< of the certificate, PEM
+  std::filesystem::path client_ca;        ///< PEM file: who may sign viewers' certificates; or none
   std::filesystem::path token_file;       ///< who may look; empty: one token, made now
   std::filesystem::path command_tokens;   ///< who may command; empty: no viewer
   int max_viewers = kMostViewers;

@@ -8,11 +8,9 @@
 #include <iostream>
 #include <utility>
 
-#include <boost/asio/buffer.hpp>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/detached.hpp>
 #include <boost/asio/post.hpp>
-#include <openssl/ssl.h>
 
 #include "bridge/net/address.hpp"
 #include "bridge/net/tcp_socket.hpp"
@@ -75,22 +73,12 @@ tcp::acceptor listen_at(asio::io_context& io, const ServerSetup& setup) {
   throw BridgeError(place + error.message() + "; " + remedy_for(error.value(), way));
 }
 
-asio::ssl::context make_tls(const TlsKeys& keys) {
-  asio::ssl::context tls(asio::ssl::context::tls_server);
-  SSL_CTX_set_min_proto_version(tls.native_handle(), TLS1_3_VERSION);
-  // No early data, and no tickets: a viewer that comes again shows what it has again.
-  SSL_CTX_set_num_tickets(tls.native_handle(), 0);
-  tls.use_certificate_chain(asio::buffer(keys.chain_pem));
-  tls.use_private_key(asio::buffer(keys.key_pem), asio::ssl::context::pem);
-  return tls;
-}
-
 }  // namespace
 
 Server::Impl::Impl(ServerSetup setup)
     : setup_(std::move(setup)), acceptor_(listen_at(io_, setup_)) {
   static_cast<void>(segment_socket(setup_.name));  // a name that cannot be is not worth a wait
-  if (setup_.tls) tls_.emplace(make_tls(*setup_.tls));
+  if (setup_.tls) tls_.emplace(context_of(setup_.tls));
   const std::string why = why_no_bbr(acceptor_.native_handle());
   if (!why.empty()) {
     std::cerr << "kerf-bridge: no BBR: " << why << "; over links that lose packets it is slow\n";

@@ -6,7 +6,6 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -21,7 +20,7 @@ struct ServerSetup {
   std::uint16_t port = 7400;       ///< 0: one that is free
   std::string name;                ///< of the controller
   Tokens tokens;
-  std::optional<TlsKeys> tls;           ///< nothing: plain, on loopback only
+  Tls tls;                              ///< empty: plain, on loopback only
   std::vector<std::string> host_names;  ///< by which browsers may call it, beside addresses
   std::size_t max_viewers = 32;
   bool dedicated_link = false;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A connection of the server before it is a viewer: TLS, and the pages over HTTP.
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <iostream>
 #include <string>
@@ -117,6 +118,12 @@ asio::awaitable<void> Server::Impl::handshake(WebSocket& ws, beast::flat_buffer&
       co_await link.tls().async_handshake(asio::ssl::stream_base::server, in.data(), quiet(error));
   in.consume(used);
   done = !error;
+  if (done) co_return;
+  // A client without the certificate that is asked for has sent its request already. It is read, so
+  // that the alert reaches the client before a reset does.
+  std::array<char, kMaxHeaderBytes> unread;
+  link.next_layer().socket().shutdown(tcp::socket::shutdown_send, error);
+  co_await link.next_layer().async_read_some(asio::buffer(unread), quiet(error));
 }
 
 /// A token of the address goes before the cookie, and the cookie before the pass: a browser that

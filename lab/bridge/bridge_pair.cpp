@@ -56,16 +56,19 @@ WorkFolder::~WorkFolder() {
 BridgeFiles::BridgeFiles(std::filesystem::path in)
     : folder(std::move(in)),
       program(sweep::program_beside("bridge")),
-      ca(folder / "identity" / "ca.pem"),
-      identity(folder / "identity"),
+      certificate(folder / "cert.pem"),
+      key(folder / "key.pem"),
       token_file(folder / "tokens"),
       token(hex64(random_session_id()) + hex64(random_session_id())) {
   std::ofstream(token_file) << token << '\n';
   using std::filesystem::perms;
   std::filesystem::permissions(token_file, perms::owner_read | perms::owner_write);
-  sweep::Child make({program, "make-identity", identity, "--host", TwoNetworks::kNearAddress},
-                    folder / "make-identity.log");
-  run_to_end(make, "make-identity");
+  sweep::Child make(
+      {"openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "group:P-256", "-noenc", "-subj",
+       "/CN=near", "-addext", std::string("subjectAltName=IP:") + TwoNetworks::kNearAddress,
+       "-keyout", key, "-out", certificate},
+      folder / "openssl.log");
+  run_to_end(make, "openssl");
 }
 
 BridgePair::BridgePair(const TwoNetworks& networks, const BridgeFiles& files, bool dedicated_link)
@@ -78,7 +81,8 @@ void BridgePair::start_serve() {
       files_.program, "serve",
       "--listen",     std::string(TwoNetworks::kNearAddress) + ":" + kPort,
       "--name",       kNearName,
-      "--identity",   files_.identity,
+      "--cert",       files_.certificate,
+      "--key",        files_.key,
       "--token-file", files_.token_file};
   if (dedicated_link_) arguments.emplace_back("--dedicated-link");
   serve_ = networks_.start(TwoNetworks::Side::near, arguments, files_.folder / "serve.log");
@@ -97,7 +101,7 @@ std::unique_ptr<sweep::Child> BridgePair::join(const std::string& name) const {
   return networks_.start(
       TwoNetworks::Side::far,
       {files_.program, "join", std::string("wss://") + TwoNetworks::kNearAddress + ":" + kPort,
-       "--token-file", files_.token_file, "--ca", files_.ca, "--name", name},
+       "--token-file", files_.token_file, "--ca", files_.certificate, "--name", name},
       files_.folder / (name + ".log"));
 }
 

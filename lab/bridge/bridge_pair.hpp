@@ -27,10 +27,10 @@ class WorkFolder {
   std::filesystem::path path_;
 };
 
-/// What the bridges of a lab need once: identity and token, made by the program itself.
+/// What the bridges of a measurement need: a certificate, made with openssl, and a token.
 struct BridgeFiles {
   explicit BridgeFiles(std::filesystem::path folder);  ///< throws `HilError`
-  std::filesystem::path folder, program, ca, identity, token_file;
+  std::filesystem::path folder, program, certificate, key, token_file;
   std::string token;
 };
 

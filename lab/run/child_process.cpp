@@ -22,7 +22,8 @@ namespace kerf::sweep {
 
 Child::Child(const std::vector<std::string>& arguments, std::filesystem::path output)
     : output_(std::move(output)) {
-  if (access(arguments[0].c_str(), X_OK) != 0) {
+  const bool is_path = arguments[0].find('/') != std::string::npos;  // else found by $PATH
+  if (is_path && access(arguments[0].c_str(), X_OK) != 0) {
     throw HilError(arguments[0] + ": cannot be started (" + std::generic_category().message(errno) +
                    "); build it, or install all of kerf");
   }

@@ -5,8 +5,6 @@
 
 #include <doctest/doctest.h>
 
-#include "bridge/net/certificate.hpp"
-
 using namespace kerf::bridge;
 
 TEST_CASE("an address is taken as serve prints it and as a browser shows it") {
@@ -67,15 +65,4 @@ TEST_CASE("an address that is none is refused in one line that keeps the token t
     }
   }
   CHECK_THROWS_AS(static_cast<void>(parse_address("wss://" + std::string(300, 'a'))), BridgeError);
-}
-
-TEST_CASE("a fingerprint is 64 hex digits, with colons or without, and excludes a CA") {
-  const std::string plain(64, 'a');
-  CHECK_NOTHROW(CertificateCheck("host", "", ""));
-  CHECK_NOTHROW(CertificateCheck("host", "", plain));
-  CHECK_NOTHROW(CertificateCheck("host", "", "AB:cd:" + plain.substr(4)));
-  CHECK_THROWS_AS(CertificateCheck("host", "", plain.substr(1)), BridgeError);
-  CHECK_THROWS_AS(CertificateCheck("host", "", plain + "0"), BridgeError);
-  CHECK_THROWS_AS(CertificateCheck("host", "", plain.substr(1) + "g"), BridgeError);
-  CHECK_THROWS_AS(CertificateCheck("host", "ca.pem", plain), BridgeError);
 }

@@ -12,7 +12,7 @@
 #include "tests/segment/test_folder.hpp"
 
 using kerf::bridge::qr_code;
-using kerf::test::TestFolder;
+using kerf::test::ScratchFolder;
 
 namespace {
 
@@ -75,7 +75,7 @@ TEST_CASE("a decoder reads the address back") {
     MESSAGE("skipped: zbarimg is missing; apt-get install zbar-tools");
     return;
   }
-  const TestFolder folder;
+  const ScratchFolder folder;
   constexpr std::size_t kPixels = 4;  // of a module's edge
   for (const std::string address :
        {"https://10.0.0.1:7400/?token=0123456789abcdef",

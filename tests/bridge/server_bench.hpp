@@ -4,45 +4,26 @@
 #include <atomic>
 #include <chrono>
 #include <cstdint>
-#include <cstdlib>
-#include <filesystem>
 #include <memory>
 #include <string>
 #include <thread>
 #include <utility>
-
-#include <unistd.h>
 
 #include "bridge/serve/server.hpp"
 #include "shared/segment/server.hpp"
 #include "tests/bridge/far_side.hpp"
 #include "tests/bridge/raw_client.hpp"
 #include "tests/segment/segment_support.hpp"
+#include "tests/segment/test_folder.hpp"
 
 namespace kerf::test {
 
 inline const std::string kLook = "look-0123456789abcdef";
 inline const std::string kCommand = "command-0123456789abcdef";
 
-/// A folder of its own, gone with it.
-struct TestFolder {
-  TestFolder() {
-    std::string text = "/tmp/kerf-bridge-test.XXXXXX";
-    path = mkdtemp(text.data());
-  }
-  ~TestFolder() {
-    std::error_code error;
-    std::filesystem::remove_all(path, error);
-  }
-  TestFolder(const TestFolder&) = delete;
-  TestFolder& operator=(const TestFolder&) = delete;
-  std::filesystem::path path;
-};
-
 /// Sockets of this process's controllers go into a folder of its own.
 inline void use_own_sockets() {
   static const TestFolder folder;
-  setenv("XDG_RUNTIME_DIR", folder.path.c_str(), 1);
 }
 
 /// A controller of a small volume that does nothing by itself.

@@ -384,7 +384,7 @@ TEST_CASE("a port that is taken and an address of nobody are told in one line") 
   CHECK(has(why(setup), "TLS only"));
   setup.host = "0x7f.1";  // as a machine's own name that stands for loopback
   CHECK(has(why(setup), "is 127.0.0.1, which no other machine reaches"));
-  setup.tls = self_signed_keys({"localhost"});
+  setup.tls = new_tls();
   CHECK(has(why(setup), "is 127.0.0.1, which no other machine reaches"));
   setup.host = "192.0.2.1";
   CHECK(has(why(setup), "give an address of this machine"));

@@ -1,67 +1,79 @@
 // SPDX-License-Identifier: Apache-2.0
-// What `join` says of servers that are no kerf-bridge serve, or of another build.
-#include <array>
+// What `join` reports of servers that are no kerf-bridge serve, or of another build.
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <string>
 #include <thread>
-#include <utility>
 
-#include <boost/asio/ip/tcp.hpp>
-#include <boost/beast/core/flat_buffer.hpp>
-#include <boost/beast/websocket.hpp>
 #include <doctest/doctest.h>
+#include <openssl/evp.h>
+#include <openssl/sha.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
 #include "bridge/wire/messages.hpp"
 #include "tests/bridge/join_words.hpp"
+#include "tests/bridge/local_port.hpp"
 
 using namespace kerf::bridge;
 using namespace kerf::test;
 
 namespace {
 
-namespace asio = boost::asio;
-namespace beast = boost::beast;
-using boost::asio::ip::tcp;
+/// The head that opens a WebSocket for a client's request (RFC 6455), and `message` in one frame.
+std::string websocket_answer(const std::string& request, const std::string& message) {
+  const std::string name = "Sec-WebSocket-Key: ";
+  const std::size_t at = request.find(name) + name.size();
+  const std::string key =
+      request.substr(at, request.find("\r\n", at) - at) + "258EAFA5-E914-47DA-95CA-C5AB0DC85B11";
+  unsigned char digest[SHA_DIGEST_LENGTH], text[64];
+  SHA1(reinterpret_cast<const unsigned char*>(key.data()), key.size(), digest);
+  EVP_EncodeBlock(text, digest, SHA_DIGEST_LENGTH);
+  std::string frame = "\x82";  // binary; its length has one byte or two more
+  if (message.size() >= 126) {
+    frame += '\x7e';
+    frame += static_cast<char>(message.size() >> 8);
+  }
+  frame += static_cast<char>(message.size() & 255);
+  return "HTTP/1.1 101 Switching Protocols\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
+         "Sec-WebSocket-Accept: " +
+         std::string(reinterpret_cast<const char*>(text)) + "\r\n\r\n" + frame + message;
+}
 
-/// Answers the first who comes, with text as it is or with a message over a WebSocket, and waits
-/// until he goes. Its end waits for that too.
+/// Answers the first client, with text as it is or with a message over a WebSocket, and waits until
+/// it goes. The destructor waits for that too.
 class WrongServer {
  public:
   enum class Kind { text, message };
 
-  WrongServer(Kind kind, std::string answer) : answer_(std::move(answer)) {
-    thread_ = std::thread([this, kind] { kind == Kind::text ? say_text() : say_message(); });
+  WrongServer(Kind kind, const std::string& answer) {
+    listen(port_.fd(), 1);
+    thread_ = std::thread([this, kind, answer] {
+      const int fd = accept4(port_.fd(), nullptr, nullptr, SOCK_CLOEXEC);
+      char part[4096];
+      std::string request;
+      const auto receive = [&] {
+        const ssize_t bytes = recv(fd, part, sizeof part, 0);
+        if (bytes > 0) request.append(part, static_cast<std::size_t>(bytes));
+        return bytes > 0;
+      };
+      while (request.find("\r\n\r\n") == std::string::npos && receive()) {
+      }
+      const std::string bytes = kind == Kind::text ? answer : websocket_answer(request, answer);
+      send(fd, bytes.data(), bytes.size(), MSG_NOSIGNAL);
+      while (receive()) {
+      }
+      close(fd);
+    });
   }
   ~WrongServer() { thread_.join(); }
   WrongServer(const WrongServer&) = delete;
   WrongServer& operator=(const WrongServer&) = delete;
-
-  [[nodiscard]] std::string place() const {
-    return "127.0.0.1:" + std::to_string(acceptor_.local_endpoint().port());
-  }
+  [[nodiscard]] std::string place() const { return port_.place(); }
 
  private:
-  void say_text() {
-    tcp::socket socket = acceptor_.accept();
-    std::array<char, 4096> heard;
-    boost::system::error_code error;
-    socket.read_some(asio::buffer(heard), error);
-    asio::write(socket, asio::buffer(answer_), error);
-    while (!error) socket.read_some(asio::buffer(heard), error);
-  }
-  void say_message() {
-    beast::websocket::stream<tcp::socket> ws(acceptor_.accept());
-    boost::system::error_code error;
-    ws.accept(error);
-    ws.binary(true);
-    if (!error) ws.write(asio::buffer(answer_), error);
-    for (beast::flat_buffer heard; !error; heard.clear()) ws.read(heard, error);
-  }
-
-  asio::io_context io_;
-  tcp::acceptor acceptor_{io_, {asio::ip::address_v4::loopback(), 0}};
-  std::string answer_;
+  LocalPort port_;
   std::thread thread_;
 };
 

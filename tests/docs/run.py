@@ -32,7 +32,7 @@ NOT_HERE = {
     "needs a second terminal or machine": [
         "./kerf emulator", "./kerf controller --scene scenes/touch.toml --torque-scale",
         "./kerf controller --scene scenes/phantom.toml --port socket", "./kerf controller --name tooth",
-        "./kerf bridge serve", "./kerf bridge join", "scp "],
+        "./kerf bridge serve", "./kerf bridge join"],
     "runs in the test own_law": ["own-law.md: "],
     "runs in the tests packages and reader": ["./kerf package", "packages.md: cmake", "pip install ./python"],
     "needs a CT that does not come with kerf; the test examples_scenes brings it": [

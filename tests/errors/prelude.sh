@@ -25,6 +25,12 @@ PY
 # hand LINE...: hand.toml
 hand() { printf '%s\n' "$@" >hand.toml; }
 
+# certificate NAME: NAME.pem for 127.0.0.1, signed by itself, and NAME-key.pem
+certificate() {
+  openssl req -x509 -newkey ec -pkeyopt group:P-256 -noenc -subj "/CN=$1" -addext subjectAltName=IP:127.0.0.1 \
+    -keyout "$1-key.pem" -out "$1.pem" 2>/dev/null
+}
+
 # start NAME SECONDS: a controller at work, with an emulator.
 start() {
   kerf-emulator --socket socket --hand scenes/hands/touch.toml >/dev/null 2>&1 &

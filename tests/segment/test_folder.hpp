@@ -8,26 +8,29 @@
 
 namespace kerf::test {
 
-/// A folder for one test, removed with it; also the runtime folder of the sockets made in it.
-class TestFolder {
+/// A folder for one test, removed with it.
+class ScratchFolder {
  public:
-  TestFolder() {
+  ScratchFolder() {
     char path[] = "/tmp/kerf-test-XXXXXX";
     REQUIRE(mkdtemp(path) != nullptr);
     path_ = path;
-    setenv("XDG_RUNTIME_DIR", path, 1);
   }
-  ~TestFolder() {
-    unsetenv("XDG_RUNTIME_DIR");
-    std::filesystem::remove_all(path_);
-  }
-  TestFolder(const TestFolder&) = delete;
-  TestFolder& operator=(const TestFolder&) = delete;
+  ~ScratchFolder() { std::filesystem::remove_all(path_); }
+  ScratchFolder(const ScratchFolder&) = delete;
+  ScratchFolder& operator=(const ScratchFolder&) = delete;
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
   [[nodiscard]] std::filesystem::path operator/(const char* name) const { return path_ / name; }
 
  private:
   std::filesystem::path path_;
+};
+
+/// Also the runtime folder of the sockets that are made while it lives.
+class TestFolder : public ScratchFolder {
+ public:
+  TestFolder() { setenv("XDG_RUNTIME_DIR", path().c_str(), 1); }
+  ~TestFolder() { unsetenv("XDG_RUNTIME_DIR"); }
 };
 
 }  // namespace kerf::test
