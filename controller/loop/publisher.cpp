@@ -132,12 +132,10 @@ void Publisher::publish(Tick tick, const DeviceReport& report, const ServoOutput
   put(record.proxy_offset_mm, output.proxy_offset_mm);
   record.plane_count = output.plane_count;
   for (std::size_t i = 0; i < output.plane_count; ++i) {
-    const PlaneLoad& plane = output.planes[i];
+    const PlaneLoad<DoubleNumbers>& plane = output.planes[i];
     record.plane_load_n[i] = static_cast<float>(plane.load_n);
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      record.plane_normal[3 * i + axis] = static_cast<float>(plane.normal[axis]);
-      record.plane_arm_mm[3 * i + axis] = static_cast<float>(plane.arm_mm[axis]);
-    }
+    std::ranges::copy(floats(as_doubles(plane.normal)), record.plane_normal + 3 * i);
+    std::ranges::copy(floats(as_doubles(plane.arm_mm)), record.plane_arm_mm + 3 * i);
   }
   std::ranges::copy(output.motor_counts, record.dac_counts);
   record.removed = static_cast<std::uint32_t>(std::accumulate(

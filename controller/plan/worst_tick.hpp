@@ -144,13 +144,13 @@ class WorstCaseDriver {
       const Place tip_mm = hand(i);
       const Rotation<N> turn = i % 2 == 0 ? kWidest : identity_rotation<N>();
       const auto began = std::chrono::steady_clock::now();
-      const ToolForces<N> forces = contact_and_cut(*plan_, state_, tip_mm, turn, {});
+      const ContactResult<N> contact = contact_and_cut(*plan_, state_, tip_mm, turn, {});
       if (plan_->force_cut.on) {
         static_cast<void>(cut_by_sent_force(*plan_, state_, at_, press_n, true));
       }
       const auto ended = std::chrono::steady_clock::now();
       us.push_back(std::chrono::duration<double, std::micro>(ended - began).count());
-      queried.push_back(forces.queried);
+      queried.push_back(contact.samples_read);
     }
     std::sort(us.begin(), us.end());
     std::sort(queried.begin(), queried.end());
@@ -193,7 +193,7 @@ class WorstCaseDriver {
   ServoState<N>& state_;
   std::size_t v_;
   VoxelIndex size_, dense_;
-  ToolContact<N> at_;
+  ContactResult<N> at_;
 };
 
 }  // namespace kerf

@@ -29,15 +29,15 @@ DeviceVec<typename N::Real> at_device(const ContactPlan<N>& contact,
 template <class N>
 ProxyContact<N> follow_tool(const ServoPlan<N>& plan, const SweptTool<N>& tool,
                             ContactState<N>& state, const ProxyPose<N>& goal,
-                            std::int64_t& queried) noexcept {
+                            std::int64_t& samples_read) noexcept {
   const auto in_volumes = [&](const auto& volumes) {
     return std::span(volumes).first(plan.volume_count);
   };
   const auto with = [&](auto&& field) {
     field.begin_tick();
-    const ProxyContact<N> felt = follow<N>(tool.proxy, state.proxy, field, goal);
-    queried = field.spent();
-    return felt;
+    const ProxyContact<N> contact = follow<N>(tool.proxy, state.proxy, field, goal);
+    samples_read = field.spent();
+    return contact;
   };
   if (tool.behind.count == 0) {
     return with(ContactQuery<N>(*plan.kernels, tool.point_shell, in_volumes(state.volumes)));
@@ -50,25 +50,26 @@ ProxyContact<N> follow_tool(const ServoPlan<N>& plan, const SweptTool<N>& tool,
 
 /// Lists the planes that bear a load, for a force of `force_n`.
 template <class N>
-void write_planes(const ContactPlan<N>& contact, const ProxyContact<N>& felt,
-                  typename N::Real force_n, ToolContact<N>& tool) noexcept {
+void list_planes(const ContactPlan<N>& contact, const ProxyContact<N>& proxy,
+                 typename N::Real force_n, ContactResult<N>& out) noexcept {
   using Real = typename N::Real;
-  for (std::size_t i = 0; i < felt.planes.count; ++i) {
-    if (felt.part[i] <= Real(0)) continue;
-    const ConstraintPlane<N>& plane = felt.planes.plane[i];
-    tool.planes[tool.plane_count++] = {relabel<DeviceSpace>(plane.normal),
-                                       at_device(contact, plane.arm), felt.part[i] * force_n,
-                                       plane.behind};
+  static_assert(kMaxPlaneLoads == kMaxPlanes);
+  for (std::size_t i = 0; i < proxy.planes.count; ++i) {
+    if (proxy.part[i] <= Real(0)) continue;
+    const ConstraintPlane<N>& plane = proxy.planes.plane[i];
+    out.planes[out.plane_count++] = {relabel<DeviceSpace>(plane.normal),
+                                     at_device(contact, plane.arm), proxy.part[i] * force_n,
+                                     plane.behind};
   }
 }
 
 /// Splits the force of the spring: friction is its part along the faces, across the press.
 template <class N>
-void split_spring(DeviceVec<typename N::Real> spring_n, const ProxyContact<N>& felt,
-                  SweptForce<N>& out) noexcept {
+void split_spring(DeviceVec<typename N::Real> spring_n, const ProxyContact<N>& proxy,
+                  ContactResult<N>& out) noexcept {
   using Real = typename N::Real;
   out.spring_n = spring_n;
-  const auto press = relabel<DeviceSpace>(felt.press);
+  const auto press = relabel<DeviceSpace>(proxy.press);
   const Real pressed_n = multiply<Real>(press.x, spring_n.x) + multiply<Real>(press.y, spring_n.y) +
                          multiply<Real>(press.z, spring_n.z);
   if (!(pressed_n > Real(0))) return;
@@ -80,9 +81,9 @@ void split_spring(DeviceVec<typename N::Real> spring_n, const ProxyContact<N>& f
 }  // namespace
 
 template <class N>
-SweptForce<N> proxy_force(const ServoPlan<N>& plan, ServoState<N>& state,
-                          WorldVec<typename N::Real> tip_mm, const Rotation<N>& rotation,
-                          DeviceVec<typename N::Real> velocity_mm_per_s) noexcept {
+ContactResult<N> proxy_force(const ServoPlan<N>& plan, ServoState<N>& state,
+                             WorldVec<typename N::Real> tip_mm, const Rotation<N>& rotation,
+                             DeviceVec<typename N::Real> velocity_mm_per_s) noexcept {
   using Real = typename N::Real;
   const ContactPlan<N>& contact = plan.contact;
   const SweptTool<N>& tool = plan.tools[state.active_tool].swept;
@@ -95,62 +96,55 @@ SweptForce<N> proxy_force(const ServoPlan<N>& plan, ServoState<N>& state,
   goal.centre = scaled(relabel<ContactSpace>(tip_mm - contact.origin_mm), contact.units_per_mm);
   if (tool.turned) goal.turn = orientation_of<N>(rotation.row);
 
-  SweptForce<N> out;
-  const ProxyContact<N> felt = follow_tool(plan, tool, state.contact, goal, out.queried);
-  const auto spring_mm = at_device(contact, felt.spring);
+  ContactResult<N> out;
+  const ProxyContact<N> proxy = follow_tool(plan, tool, state.contact, goal, out.samples_read);
+  const auto spring_mm = at_device(contact, proxy.spring);
   // The coupling is no law behind a pointer, so that the compiler inlines it.
-  out.force_n = plan.force_law.given()
-                    ? plan.force_law(state.force_law, {state.tip_mm, tip_mm, velocity_mm_per_s,
-                                                       spring_mm, relabel<DeviceSpace>(felt.press)})
-                    : virtual_coupling_force(contact.coupling, spring_mm, velocity_mm_per_s);
+  out.contact_n =
+      plan.force_law.given()
+          ? plan.force_law(state.force_law, {state.tip_mm, tip_mm, velocity_mm_per_s, spring_mm,
+                                             relabel<DeviceSpace>(proxy.press)})
+          : virtual_coupling_force(contact.coupling, spring_mm, velocity_mm_per_s);
   // The force of a law has no other part.
   const bool whole =
       plan.force_law.given() || contact.coupling.damping_ns_per_mm == typename N::Unit{};
   const auto spring_n =
-      whole ? out.force_n
+      whole ? out.contact_n
             : virtual_coupling_force<N>({contact.coupling.stiffness_n_per_mm, {}}, spring_mm, {});
   if (tool.proxy.friction == typename N::Unit{}) {
     out.spring_n = spring_n;
   } else {
-    split_spring(spring_n, felt, out);
+    split_spring(spring_n, proxy, out);
   }
-  out.offset_mm = relabel<WorldSpace>(scaled(felt.pose.centre - goal.centre, contact.mm_per_unit));
-  out.tool.centre_mm =
-      contact.origin_mm + relabel<WorldSpace>(scaled(felt.pose.centre, contact.mm_per_unit));
-  if (tool.turned) out.tool.rotation = {rows_of(felt.pose.turn)};
-  out.tool.normal = relabel<WorldSpace>(felt.normal);
-  out.tool.press = relabel<WorldSpace>(felt.press);
-  out.tool.head_fraction = felt.head_fraction;
-  const Real force_n = norm(out.force_n);
-  out.tool.head_arm_mm = at_device(contact, felt.head_arm);
-  write_planes(contact, felt, force_n, out.tool);
-  out.shaft_force_n = multiply<Real>(felt.shaft_fraction, force_n);
-  out.torque_n_mm = at_device(contact, felt.moment_arm) * force_n;
+  const Real force_n = norm(out.contact_n);
+  out.proxy_offset_mm =
+      relabel<WorldSpace>(scaled(proxy.pose.centre - goal.centre, contact.mm_per_unit));
+  out.tip_torque_n_mm = at_device(contact, proxy.moment_arm) * force_n;
+  out.shaft_force_n = multiply<Real>(proxy.shaft_fraction, force_n);
+  out.centre_mm =
+      contact.origin_mm + relabel<WorldSpace>(scaled(proxy.pose.centre, contact.mm_per_unit));
+  if (tool.turned) out.rotation = {rows_of(proxy.pose.turn)};
+  out.normal = relabel<WorldSpace>(proxy.normal);
+  out.press = relabel<WorldSpace>(proxy.press);
+  out.head_fraction = proxy.head_fraction;
+  out.head_arm_mm = at_device(contact, proxy.head_arm);
+  list_planes(contact, proxy, force_n, out);
   return out;
 }
 
 template <class N>
-ToolForces<N> contact_and_cut(const ServoPlan<N>& plan, ServoState<N>& state,
-                              WorldVec<typename N::Real> tip_mm, const Rotation<N>& rotation,
-                              DeviceVec<typename N::Real> velocity_mm_per_s) noexcept {
+ContactResult<N> contact_and_cut(const ServoPlan<N>& plan, ServoState<N>& state,
+                                 WorldVec<typename N::Real> tip_mm, const Rotation<N>& rotation,
+                                 DeviceVec<typename N::Real> velocity_mm_per_s) noexcept {
   const ToolPlan<N>& tool = plan.tools[state.active_tool];
-  ToolForces<N> forces;
+  ContactResult<N> out;
   if (plan.contact.swept) {
-    const SweptForce<N> felt = proxy_force(plan, state, tip_mm, rotation, velocity_mm_per_s);
-    forces.contact_n = felt.force_n;
-    forces.spring_n = felt.spring_n;
-    forces.friction_n = felt.friction_n;
-    forces.proxy_offset_mm = felt.offset_mm;
-    forces.tip_torque_n_mm = felt.torque_n_mm;
-    forces.tool = felt.tool;
-    forces.shaft_force_n = felt.shaft_force_n;
-    forces.queried = felt.queried;
+    out = proxy_force(plan, state, tip_mm, rotation, velocity_mm_per_s);
     if (plan.force_cut.on) {
-      forces.modification_n = felt_friction(plan, state, felt.tool);
-      forces.tip_torque_n_mm =
-          forces.tip_torque_n_mm + cross(felt.tool.head_arm_mm, forces.modification_n);
+      out.modification_n = friction_of_last_cut(plan, state, out);
+      out.tip_torque_n_mm = out.tip_torque_n_mm + cross(out.head_arm_mm, out.modification_n);
     }
-    if (!plan.cutting) return forces;
+    if (!plan.cutting) return out;
   }
   for (std::size_t v = 0; v < plan.volume_count; ++v) {
     const VolumeTick<N> at{plan, state, v,
@@ -158,19 +152,20 @@ ToolForces<N> contact_and_cut(const ServoPlan<N>& plan, ServoState<N>& state,
     if (plan.cutting) keep_bricks(plan, state, v, at.pose.centre_vox);
     const VolumeForces<N> in_volume =
         by_method<N>(tool.in_volume[v].method, [&](auto step) { return step.contact_and_cut(at); });
-    forces.contact_n = forces.contact_n - in_volume.contact_n;
-    forces.modification_n = forces.modification_n - in_volume.modification_n;
-    forces.removed[plan.volumes[v].scene_index] = in_volume.removed;
+    out.contact_n = out.contact_n - in_volume.contact_n;
+    out.modification_n = out.modification_n - in_volume.modification_n;
+    out.removed[plan.volumes[v].scene_index] = in_volume.removed;
   }
-  if (!plan.contact.swept) forces.spring_n = forces.contact_n;
-  return forces;
+  if (!plan.contact.swept) out.spring_n = out.contact_n;
+  return out;
 }
 
-#define KERF_INSTANTIATE(N)                                                                      \
-  template SweptForce<N> proxy_force(const ServoPlan<N>&, ServoState<N>&, WorldVec<N::Real>,     \
-                                     const Rotation<N>&, DeviceVec<N::Real>) noexcept;           \
-  template ToolForces<N> contact_and_cut(const ServoPlan<N>&, ServoState<N>&, WorldVec<N::Real>, \
-                                         const Rotation<N>&, DeviceVec<N::Real>) noexcept;
+#define KERF_INSTANTIATE(N)                                                                     \
+  template ContactResult<N> proxy_force(const ServoPlan<N>&, ServoState<N>&, WorldVec<N::Real>, \
+                                        const Rotation<N>&, DeviceVec<N::Real>) noexcept;       \
+  template ContactResult<N> contact_and_cut(const ServoPlan<N>&, ServoState<N>&,                \
+                                            WorldVec<N::Real>, const Rotation<N>&,              \
+                                            DeviceVec<N::Real>) noexcept;
 KERF_INSTANTIATE(FixedNumbers)
 KERF_INSTANTIATE(DoubleNumbers)
 #undef KERF_INSTANTIATE

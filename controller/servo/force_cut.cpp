@@ -100,15 +100,15 @@ class LoadDistribution {
 /// at them reaches the iso, over all covered voxels that do. Changes nothing if there are none.
 template <class N>
 void find_loads(const ServoPlan<N>& plan, const ServoState<N>& state,
-                WorldVec<typename N::Real> centre_mm, const ToolContact<N>& at,
+                WorldVec<typename N::Real> centre_mm, const ContactResult<N>& at,
                 CoveredVolumes<N>& covered) noexcept {
   using Real = typename N::Real;
   using Ratio = typename N::Ratio;
   const ToolPlan<N>& tool = plan.tools[state.active_tool];
   LoadDistribution<N> shares(plan, state, covered);
   for (std::size_t i = 0; i < at.plane_count; ++i) {
-    const PressedPlane<N>& plane = at.planes[i];
-    if (plane.behind) continue;
+    const PlaneLoad<N>& plane = at.planes[i];
+    if (plane.on_shaft) continue;
     const Real arm_mm =
         along<N>(relabel<ContactSpace>(plane.normal), relabel<ContactSpace>(plane.arm_mm)) *
         plan.workspace_scale;
@@ -147,7 +147,7 @@ template <class N>
 template <class N>
 [[nodiscard]] CoveredVolumes<N> cover_all(const ServoPlan<N>& plan, ServoState<N>& state,
                                           WorldVec<typename N::Real> centre_mm,
-                                          const ToolContact<N>& at) noexcept {
+                                          const ContactResult<N>& at) noexcept {
   CoveredVolumes<N> covered;
   std::size_t materials = 0;
   for (std::size_t v = 0; v < plan.volume_count; ++v) {
@@ -171,7 +171,7 @@ template <class N>
 /// its shaft; if its shaft has contact, the orientation is that of the shaft.
 template <class N>
 const Rotation<N>& spindle_axes(const ToolPlan<N>& tool, const ServoState<N>& state,
-                                const ToolContact<N>& at) noexcept {
+                                const ContactResult<N>& at) noexcept {
   return tool.round && tool.turns && !tool.swept.turned ? state.rotation : at.rotation;
 }
 
@@ -179,7 +179,7 @@ const Rotation<N>& spindle_axes(const ToolPlan<N>& tool, const ServoState<N>& st
 /// friction.
 template <class N>
 CuttingFriction<N> press_on_volumes(const ServoPlan<N>& plan, ServoState<N>& state,
-                                    const ToolContact<N>& at, ForceCut<N>& cut) noexcept {
+                                    const ContactResult<N>& at, ForceCut<N>& cut) noexcept {
   using Real = typename N::Real;
   const ForceCutPlan<N>& rules = plan.force_cut;
   const Real advance_mm = multiply<Real>(plan.contact.mm_per_unit, state.force_cut.advance);
@@ -215,15 +215,16 @@ CuttingFriction<N> press_on_volumes(const ServoPlan<N>& plan, ServoState<N>& sta
 }  // namespace
 
 template <class N>
-DeviceVec<typename N::Real> felt_friction(const ServoPlan<N>& plan, const ServoState<N>& state,
-                                          const ToolContact<N>& at) noexcept {
+DeviceVec<typename N::Real> friction_of_last_cut(const ServoPlan<N>& plan,
+                                                 const ServoState<N>& state,
+                                                 const ContactResult<N>& at) noexcept {
   const Rotation<N>& axes = spindle_axes(plan.tools[state.active_tool], state, at);
   return relabel<DeviceSpace>(axes * state.force_cut.friction_n) * plan.workspace_scale;
 }
 
 template <class N>
 Covered<N> cover(const ServoPlan<N>& plan, ServoState<N>& state, std::size_t v,
-                 WorldVec<typename N::Real> centre_mm, const ToolContact<N>& at) noexcept {
+                 WorldVec<typename N::Real> centre_mm, const ContactResult<N>& at) noexcept {
   const VolumePlan<N>& volume = plan.volumes[v];
   const ToolPlan<N>& tool = plan.tools[state.active_tool];
   const ToolInVolume<N>& in_volume = tool.in_volume[v];
@@ -238,7 +239,7 @@ Covered<N> cover(const ServoPlan<N>& plan, ServoState<N>& state, std::size_t v,
 
 template <class N>
 ForceCut<N> cut_by_sent_force(const ServoPlan<N>& plan, ServoState<N>& state,
-                              const ToolContact<N>& at, DeviceVec<typename N::Real> sent_n,
+                              const ContactResult<N>& at, DeviceVec<typename N::Real> sent_n,
                               bool runs) noexcept {
   using Real = typename N::Real;
   const ForceCutPlan<N>& rules = plan.force_cut;
@@ -257,12 +258,12 @@ ForceCut<N> cut_by_sent_force(const ServoPlan<N>& plan, ServoState<N>& state,
 }
 
 #define KERF_INSTANTIATE(N)                                                                      \
-  template DeviceVec<N::Real> felt_friction(const ServoPlan<N>&, const ServoState<N>&,           \
-                                            const ToolContact<N>&) noexcept;                     \
+  template DeviceVec<N::Real> friction_of_last_cut(const ServoPlan<N>&, const ServoState<N>&,    \
+                                                   const ContactResult<N>&) noexcept;            \
   template Covered<N> cover(const ServoPlan<N>&, ServoState<N>&, std::size_t, WorldVec<N::Real>, \
-                            const ToolContact<N>&) noexcept;                                     \
+                            const ContactResult<N>&) noexcept;                                   \
   template ForceCut<N> cut_by_sent_force(const ServoPlan<N>&, ServoState<N>&,                    \
-                                         const ToolContact<N>&, DeviceVec<N::Real>,              \
+                                         const ContactResult<N>&, DeviceVec<N::Real>,            \
                                          bool) noexcept;
 KERF_INSTANTIATE(FixedNumbers)
 KERF_INSTANTIATE(DoubleNumbers)

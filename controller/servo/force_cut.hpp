@@ -24,15 +24,15 @@ struct ForceCut {
 /// Friction of the last cut at the device port, for the tool as it is held now. By
 /// x_scene = s x_device power is kept: F_device = s F_scene.
 template <class N>
-[[nodiscard]] DeviceVec<typename N::Real> felt_friction(const ServoPlan<N>& plan,
-                                                        const ServoState<N>& state,
-                                                        const ToolContact<N>& at) noexcept;
+[[nodiscard]] DeviceVec<typename N::Real> friction_of_last_cut(const ServoPlan<N>& plan,
+                                                               const ServoState<N>& state,
+                                                               const ContactResult<N>& at) noexcept;
 
 /// Voxels of volume `v` under the tool at `centre_mm`.
 template <class N>
 [[nodiscard]] Covered<N> cover(const ServoPlan<N>& plan, ServoState<N>& state, std::size_t v,
                                WorldVec<typename N::Real> centre_mm,
-                               const ToolContact<N>& at) noexcept;
+                               const ContactResult<N>& at) noexcept;
 
 /// One tick of the spindle, and of what it cuts where the tool touches. `sent_n` is the force that
 /// the hand feels; the head's share of its normal part, over the workspace scale, presses in the
@@ -44,7 +44,7 @@ template <class N>
 /// Servo thread; no heap. Work: the tool's box in each volume, and the voxels in it.
 template <class N>
 [[nodiscard]] ForceCut<N> cut_by_sent_force(const ServoPlan<N>& plan, ServoState<N>& state,
-                                            const ToolContact<N>& at,
+                                            const ContactResult<N>& at,
                                             DeviceVec<typename N::Real> sent_n, bool runs) noexcept;
 
 }  // namespace kerf

@@ -7,6 +7,8 @@
 #include <span>
 
 #include "shared/numeric/energy_source.hpp"
+#include "shared/numeric/numbers.hpp"
+#include "shared/numeric/vec.hpp"
 #include "shared/volume/voxel_grid.hpp"
 
 // The interface of the servo: report and command in, output out.
@@ -90,11 +92,13 @@ enum class Fault : std::uint32_t {
   return "unknown";
 }
 
-/// A plane that the tool presses on, at the device port.
+/// A plane that the tool presses on, with its load; at the device port.
+template <class N>
 struct PlaneLoad {
-  std::array<double, 3> normal{};  ///< out of the solid
-  std::array<double, 3> arm_mm{};  ///< from the tool's centre to the contact
-  double load_n = 0;               ///< along the normal, before any limit
+  DeviceVec<typename N::Unit> normal{};  ///< out of the solid
+  DeviceVec<typename N::Real> arm_mm{};  ///< from the tool's centre to the contact
+  typename N::Real load_n{};             ///< along the normal, before any limit
+  bool on_shaft = false;                 ///< on shaft or handpiece
 };
 inline constexpr std::size_t kMaxPlaneLoads = 3;
 
@@ -130,7 +134,7 @@ struct ServoOutput {
   std::array<double, 3> torque_n_mm{};         ///< motor torques
   std::array<double, 3> proxy_offset_mm{};     ///< from the tip to the proxy's, in the scene
   std::array<double, 3> tip_torque_n_mm{};     ///< of contact and cutting about the tip
-  std::array<PlaneLoad, kMaxPlaneLoads> planes{};
+  std::array<PlaneLoad<DoubleNumbers>, kMaxPlaneLoads> planes{};
   std::uint32_t plane_count = 0;  ///< of the planes that hold the tool
   double absorbed_mj = 0;         ///< SUM -F_sent . dx of the run; + = taken from the hand
   double port_minimum_mj = 0;     ///< lowest value of it so far

@@ -26,7 +26,7 @@ namespace {
 template <class N>
 struct MotorCommand {
   std::array<std::int16_t, 3> counts{};
-  typename N::Unit share{};  ///< 1, or less if a motor is at the end of its range
+  typename N::Unit scale{};  ///< 1, or less if a motor is at the end of its range
 };
 
 /// Scales all three counts down together if one would leave the range, so that the direction of the
@@ -46,10 +46,10 @@ template <class N>
       largest = std::max(largest, wide[i] < 0 ? -wide[i] : wide[i]);
     }
     // end / largest with 30 fraction bits. No product exceeds end, 13 bits, with 12 + 30 more.
-    const std::int64_t share = (end << (30 + 20)) / (largest >> (kBits - 20));
-    command.share = N::Unit::from_raw(static_cast<std::int32_t>(share));
+    const std::int64_t scale = (end << (30 + 20)) / (largest >> (kBits - 20));
+    command.scale = N::Unit::from_raw(static_cast<std::int32_t>(scale));
     for (std::size_t i = 0; i < 3; ++i) {
-      command.counts[i] = static_cast<std::int16_t>(round_shift((wide[i] >> 20) * share, 12 + 30));
+      command.counts[i] = static_cast<std::int16_t>(round_shift((wide[i] >> 20) * scale, 12 + 30));
     }
   } else {
     using Real = typename N::Real;
@@ -60,12 +60,12 @@ template <class N>
       wide[i] = torque[i] * plan.device.joints[i].counts_per_n_mm;
       largest = std::max(largest, wide[i] < 0 ? -wide[i] : wide[i]);
     }
-    command.share = end / largest;
+    command.scale = end / largest;
     for (std::size_t i = 0; i < 3; ++i) {
       // Half up, as in fixed: the offset keeps the argument of the cast positive.
       constexpr int kOffset = 8192;
       command.counts[i] = static_cast<std::int16_t>(
-          static_cast<int>(wide[i] * command.share + Real(kOffset) + Real(0.5)) - kOffset);
+          static_cast<int>(wide[i] * command.scale + Real(kOffset) + Real(0.5)) - kOffset);
     }
   }
   return command;
@@ -114,7 +114,7 @@ std::uint64_t hash_of(std::uint64_t hash, const ServoOutput& out,
   return fnv1a_step(hash, static_cast<std::uint64_t>(out.phase) << 1 | (out.motors_on ? 1U : 0U));
 }
 
-void tell_removed(const std::array<Removed, kMaxVolumes>& removed, ServoOutput& out) noexcept {
+void add_removed(const std::array<Removed, kMaxVolumes>& removed, ServoOutput& out) noexcept {
   for (std::size_t v = 0; v < kMaxVolumes; ++v) {
     out.removed_by_volume[v] = removed[v].density_steps;
     out.removed_steps += removed[v].density_steps;
@@ -122,20 +122,27 @@ void tell_removed(const std::array<Removed, kMaxVolumes>& removed, ServoOutput& 
   }
 }
 
+/// Writes the contact of the tick.
 template <class N>
-void write_planes(const ToolContact<N>& tool, ServoOutput& out) noexcept {
-  static_assert(kMaxPlaneLoads == kMaxPlanes);
-  for (std::size_t i = 0; i < tool.plane_count; ++i) {
-    const PressedPlane<N>& plane = tool.planes[i];
-    out.planes[i] = {as_doubles(plane.normal), as_doubles(plane.arm_mm), as_double(plane.load_n)};
+void write_contact(const ContactResult<N>& contact, ServoOutput& out) noexcept {
+  out.samples_read = contact.samples_read;
+  out.proxy_offset_mm = as_doubles(contact.proxy_offset_mm);
+  out.tip_torque_n_mm = as_doubles(contact.tip_torque_n_mm);
+  out.contact_n = as_doubles(contact.contact_n);
+  out.modification_n = as_doubles(contact.modification_n);
+  out.shaft = contact.shaft_force_n > typename N::Real(kContactThresholdN);
+  for (std::size_t i = 0; i < contact.plane_count; ++i) {
+    const PlaneLoad<N>& plane = contact.planes[i];
+    out.planes[i] = {to_double(plane.normal), to_double(plane.arm_mm), as_double(plane.load_n),
+                     plane.on_shaft};
   }
-  out.plane_count = static_cast<std::uint32_t>(tool.plane_count);
+  out.plane_count = static_cast<std::uint32_t>(contact.plane_count);
 }
 
-/// Fills the rest of the output, for pictures and the log, and extends its hash.
+/// Writes the rest of the output, for pictures and the log, and extends its hash.
 template <class N>
-void tell(const ServoPlan<N>& plan, ServoState<N>& state, const Sensed<N>& sensed,
-          ServoOutput& out) noexcept {
+void write_output(const ServoPlan<N>& plan, ServoState<N>& state, const Sensed<N>& sensed,
+                  ServoOutput& out) noexcept {
   using Real = typename N::Real;
   out.phase = state.supervisor.phase;
   out.fault = state.supervisor.fault;
@@ -165,83 +172,71 @@ void tell(const ServoPlan<N>& plan, ServoState<N>& state, const Sensed<N>& sense
   out.output_hash = state.output_hash;
 }
 
-/// A force before its limits, and the contact of the tool.
+/// A force before its limits.
 template <class N>
 struct ForceRequest {
   DeviceVec<typename N::Real> force_n;
-  ToolContact<N> tool;
   ForceParts<N> parts{};  ///< of the force before fading in
   bool limited = false;   ///< by peak, slew or heat
 };
 
-/// The proxy goes on following a hand that gets no force, so that it is on the same side of every
-/// wall when the force comes back, with a ramp. For a device that rests parked, or has lost its
-/// home, the search starts again.
+/// The proxy follows a hand that gets no force, so that it is on the same side of every wall when
+/// the force comes back, with a ramp. For a device that rests parked, or has lost its home, the
+/// search starts again. Returns the number of samples that were read.
 template <class N>
-void track_without_force(const ServoPlan<N>& plan, ServoState<N>& state, const Sensed<N>& sensed,
-                         ServoOutput& out) noexcept {
-  if (!plan.contact.swept) return;
+std::int64_t track_without_force(const ServoPlan<N>& plan, ServoState<N>& state,
+                                 const Sensed<N>& sensed) noexcept {
+  if (!plan.contact.swept) return 0;
   const Phase phase = state.supervisor.phase;
   const bool begins = phase == Phase::off || phase == Phase::calibrating || sensed.docked;
   if (begins) {
     state.contact.proxy = {};
-    return;
+    return 0;
   }
-  out.samples_read =
-      proxy_force(plan, state, sensed.tip_mm, state.rotation, sensed.velocity_mm_per_s).queried;
+  const ContactResult<N> contact =
+      proxy_force(plan, state, sensed.tip_mm, state.rotation, sensed.velocity_mm_per_s);
   state.force_law.begin_anew();
   state.contact.proxy.ramp();
+  return contact.samples_read;
 }
 
 /// The force on the tool, and its removal by overlap. Without a usable pose the force of the last
-/// good report is held and then faded, and nothing is cut.
+/// good report is held and then faded, and nothing is cut. `contact` stays the default if the hand
+/// gets no force, apart from the samples that were read, and if the force law failed.
 template <class N>
 ForceRequest<N> wanted_force(const ServoPlan<N>& plan, ServoState<N>& state,
-                             const Sensed<N>& sensed, ServoOutput& out) noexcept {
+                             const Sensed<N>& sensed, ContactResult<N>& contact) noexcept {
   using Real = typename N::Real;
   Supervisor& supervisor = state.supervisor;
   const SafetyTiming& timing = plan.timing;
-  const auto share = [](std::uint32_t part, std::uint32_t whole) {
+  const auto ratio = [](std::uint32_t part, std::uint32_t whole) {
     return Real(double(part)) / Real(double(whole));
   };
-  state.contact_n = {};
-  state.proxy_offset_mm = {};
   if (sensed.usable && (!supervisor.motors_on() || state.held())) {
-    track_without_force(plan, state, sensed, out);
+    contact.samples_read = track_without_force(plan, state, sensed);
     return {};
   }
   if (!supervisor.motors_on()) return {};
   if (!sensed.usable) {
-    return {state.held_force_n * share(stale_fraction(timing, supervisor.stale_ticks),
-                                       timing.zero_ticks - timing.hold_ticks),
-            {}};
+    return {state.held_force_n * ratio(stale_fraction(timing, supervisor.stale_ticks),
+                                       timing.zero_ticks - timing.hold_ticks)};
   }
-  const ToolForces<N> forces =
-      contact_and_cut(plan, state, sensed.tip_mm, state.rotation, sensed.velocity_mm_per_s);
-  if (plan.force_law.given() && !all_finite(forces.contact_n)) {
+  contact = contact_and_cut(plan, state, sensed.tip_mm, state.rotation, sensed.velocity_mm_per_s);
+  if (plan.force_law.given() && !all_finite(contact.contact_n)) {
     latch(Fault::force_law, supervisor);
+    contact = {};
     return {};
   }
-  state.contact_n = forces.contact_n;
-  state.proxy_offset_mm = forces.proxy_offset_mm;
-  out.samples_read = forces.queried;
-  out.proxy_offset_mm = as_doubles(forces.proxy_offset_mm);
-  out.tip_torque_n_mm = as_doubles(forces.tip_torque_n_mm);
-  write_planes(forces.tool, out);
-  out.contact_n = as_doubles(forces.contact_n);
-  out.shaft = forces.shaft_force_n > Real(kContactThresholdN);
-  out.modification_n = as_doubles(forces.modification_n);
-  tell_removed(forces.removed, out);
-  const DeviceVec<Real> felt_n = forces.contact_n + forces.modification_n;
+  const DeviceVec<Real> tool_n = contact.contact_n + contact.modification_n;
   const ForceParts<N> parts{.felt = true,
-                            .spring = forces.spring_n,
-                            .damping = forces.contact_n - forces.spring_n - forces.friction_n,
-                            .friction = forces.friction_n,
-                            .cutting = forces.modification_n};
-  if (supervisor.phase != Phase::ramping) return {felt_n, forces.tool, parts};
+                            .spring = contact.spring_n,
+                            .damping = contact.contact_n - contact.spring_n - contact.friction_n,
+                            .friction = contact.friction_n,
+                            .cutting = contact.modification_n};
+  if (supervisor.phase != Phase::ramping) return {tool_n, parts};
   // Force beyond the peak is never sent, so it must not shorten the fade.
-  return {clamped(felt_n, plan.limits.peak_n) * share(supervisor.fade_ticks, timing.fade_in_ticks),
-          forces.tool, parts};
+  return {clamped(tool_n, plan.limits.peak_n) * ratio(supervisor.fade_ticks, timing.fade_in_ticks),
+          parts};
 }
 
 /// Applies the limits, then the stabiliser if the scene has one, then the limits again. Stores the
@@ -299,10 +294,10 @@ void drive(const ServoPlan<N>& plan, ServoState<N>& state, ForceRequest<N>& want
   }
   const MotorCommand<N> motors = motor_command(plan, state.jacobian_t_mm * limited_n);
   out.motor_counts = motors.counts;
-  state.force_n = {multiply<Real>(motors.share, limited_n.x),
-                   multiply<Real>(motors.share, limited_n.y),
-                   multiply<Real>(motors.share, limited_n.z)};
-  out.clamped = wanted.limited || motors.share < typename N::Unit(1);
+  state.force_n = {multiply<Real>(motors.scale, limited_n.x),
+                   multiply<Real>(motors.scale, limited_n.y),
+                   multiply<Real>(motors.scale, limited_n.z)};
+  out.clamped = wanted.limited || motors.scale < typename N::Unit(1);
   const JointVec<Real> torque_n_mm = state.jacobian_t_mm * state.force_n;
   out.torque_n_mm = {as_double(torque_n_mm.x), as_double(torque_n_mm.y), as_double(torque_n_mm.z)};
 }
@@ -320,17 +315,17 @@ void book(ServoState<N>& state, const ForceRequest<N>& wanted, bool motors_on) n
 
 /// Cuts by the force that was sent. The spindle runs while the motors hold the hand.
 template <class N>
-void cut(const ServoPlan<N>& plan, ServoState<N>& state, const ToolContact<N>& tool,
+void cut(const ServoPlan<N>& plan, ServoState<N>& state, const ContactResult<N>& contact,
          ServoOutput& out) noexcept {
   if (!plan.force_cut.on) return;
   out.spindle_ratio = as_double(state.force_cut.spindle.ratio);
   const bool runs = state.supervisor.motors_on() && !state.held();
-  const ForceCut<N> done = cut_by_sent_force(plan, state, tool, state.force_n, runs);
+  const ForceCut<N> done = cut_by_sent_force(plan, state, contact, state.force_n, runs);
   out.press_n = as_double(done.press_n);
   out.spindle_load = as_double(state.force_cut.spindle.load);
   out.forbidden_materials = done.forbidden;
   out.forbidden = done.forbidden != 0;
-  tell_removed(done.removed, out);
+  add_removed(done.removed, out);
 }
 
 /// Marks what was cut, or restores it while a reset or an undo runs: then nothing is cut.
@@ -357,15 +352,20 @@ ServoOutput servo_step(const ServoPlan<N>& plan, ServoState<N>& state,
                        const DeviceReport& report) noexcept {
   ServoOutput out;
   const Sensed<N> sensed = sense(plan, state, report);
-  ForceRequest<N> wanted = wanted_force(plan, state, sensed, out);
+  ContactResult<N> contact;
+  ForceRequest<N> wanted = wanted_force(plan, state, sensed, contact);
+  state.contact_n = contact.contact_n;
+  state.proxy_offset_mm = contact.proxy_offset_mm;
   drive(plan, state, wanted, sensed, out);
   state.force_sum_n = state.force_sum_n + state.force_n;
   if (sensed.usable) book(state, wanted, out.motors_on);
-  cut(plan, state, wanted.tool, out);
+  write_contact(contact, out);
+  add_removed(contact.removed, out);
+  cut(plan, state, contact, out);
   follow_cuts(plan, state, out);
   if (sensed.usable) state.held_force_n = state.force_n;
   out.stale = !report.fresh;
-  tell(plan, state, sensed, out);
+  write_output(plan, state, sensed, out);
   return out;
 }
 

@@ -28,8 +28,8 @@ const char* not_finite(const ServoOutput& out) {
   const auto finite = [](std::span<const double> values) {
     return std::ranges::all_of(values, [](double x) { return std::isfinite(x); });
   };
-  for (const PlaneLoad& plane : out.planes) {
-    if (!finite(plane.normal) || !finite(plane.arm_mm) || !std::isfinite(plane.load_n)) {
+  for (const PlaneLoad<DoubleNumbers>& plane : out.planes) {
+    if (!all_finite(plane.normal) || !all_finite(plane.arm_mm) || !std::isfinite(plane.load_n)) {
       return "a plane";
     }
   }

@@ -142,6 +142,11 @@ template <class S, class Space>
 }
 
 template <class S, class Space>
+[[nodiscard]] constexpr Vec<double, Space> to_double(Vec<S, Space> v) noexcept {
+  return {as_double(v.x), as_double(v.y), as_double(v.z)};
+}
+
+template <class S, class Space>
 [[nodiscard]] bool all_finite(Vec<S, Space> v) noexcept {
   return is_finite(v.x) && is_finite(v.y) && is_finite(v.z);
 }
