@@ -74,9 +74,9 @@ struct LawMemory {
   constexpr void begin_anew() noexcept { begun = false; }
 };
 
-/// A class that can be a law of input `In` in the numbers of `Real`: constants made at load from a
-/// `LawSetup`, a `State` of bounded size, and one step, which is const.
-template <class Law, class In, class Real>
+/// A class that can be a law of input `In`: constants made at load from a `LawSetup`, a `State` of
+/// bounded size, and one step, which is const and returns `In::Output`.
+template <class Law, class In>
 concept LawOf =
     std::is_trivially_copyable_v<Law> && sizeof(Law) <=
         kMostLawBytes&& std::is_trivially_copyable_v<
@@ -85,33 +85,34 @@ concept LawOf =
         kMostLawStateBytes&& std::is_constructible_v<Law, const LawSetup&>&& requires(
             const Law& law, const In& in, typename Law::State& state) {
   { law.step(in, state) }
-  noexcept->std::same_as<DeviceVec<Real>>;
+  noexcept->std::convertible_to<typename In::Output>;
 };
 
 /// A law as the servo runs it; constant during a run.
-template <class In, class Real>
+template <class In>
 struct LawPlan {
-  using Step = DeviceVec<Real> (*)(const LawPlan& plan, LawMemory& memory, const In& in) noexcept;
+  using Output = typename In::Output;
+  using Step = Output (*)(const LawPlan& plan, LawMemory& memory, const In& in) noexcept;
 
   Step step = nullptr;  ///< null: the scene has none
   alignas(std::max_align_t) std::array<std::byte, kMostLawBytes> law{};
 
   [[nodiscard]] constexpr bool given() const noexcept { return step != nullptr; }
   /// Servo thread. Only if a law is given.
-  [[nodiscard]] DeviceVec<Real> operator()(LawMemory& memory, const In& in) const noexcept {
+  [[nodiscard]] Output operator()(LawMemory& memory, const In& in) const noexcept {
     return step(*this, memory, in);
   }
 };
 
 /// At load: the plan of one law with these settings.
-template <class Law, class In, class Real>
-requires LawOf<Law, In, Real>
-[[nodiscard]] LawPlan<In, Real> law_plan(const LawSetup& setup) {
-  using Plan = LawPlan<In, Real>;
+template <class Law, class In>
+requires LawOf<Law, In>
+[[nodiscard]] LawPlan<In> law_plan(const LawSetup& setup) {
+  using Plan = LawPlan<In>;
   using State = typename Law::State;
   Plan plan;
   ::new (static_cast<void*>(plan.law.data())) Law(setup);
-  plan.step = [](const Plan& of, LawMemory& memory, const In& in) noexcept -> DeviceVec<Real> {
+  plan.step = [](const Plan& of, LawMemory& memory, const In& in) noexcept -> typename In::Output {
     if (!memory.begun) {
       ::new (static_cast<void*>(memory.bytes.data())) State{};
       memory.begun = true;
@@ -122,26 +123,42 @@ requires LawOf<Law, In, Real>
   return plan;
 }
 
+/// The force of a force law on the hand in N, and the part of it that a spring stores and returns:
+/// all of it, unless the law gives another. The energy ledger books the rest as damping.
+template <class Real>
+struct LawForce : DeviceVec<Real> {
+  DeviceVec<Real> spring_n;
+
+  constexpr LawForce(DeviceVec<Real> force_n) noexcept  // NOLINT: a law may return its force alone
+      : LawForce(force_n, force_n) {}
+  constexpr LawForce(DeviceVec<Real> force_n, DeviceVec<Real> of_spring_n) noexcept
+      : DeviceVec<Real>(force_n), spring_n(of_spring_n) {}
+};
+
 /// Input of a force law in one tick of the swept contact. In air the spring and the normal are 0.
 template <class N>
 struct ForceInput {
+  using Output = LawForce<typename N::Real>;
+
   DeviceVec<typename N::Real> tip_mm;             ///< of the hand, at the device port
   WorldVec<typename N::Real> scene_tip_mm;        ///< the same position in the scene
   DeviceVec<typename N::Real> velocity_mm_per_s;  ///< at the device port, as estimated
-  /// From the hand to the proxy, which rests on the surface and to which the coupling of
-  /// controller/law/virtual_coupling.hpp pulls the hand.
+  /// From the hand to the proxy, which rests on the surface.
   DeviceVec<typename N::Real> spring_mm;
   DeviceVec<typename N::Unit> normal;  ///< out of the solid, of all that the tool presses on
 };
 
-/// A force law returns the force on the hand in N, before any limit, in place of the coupling. It
-/// runs in each tick that may send a force, and begins anew after any other tick.
+/// A force law returns the force on the hand, before any limit; that of a scene that names none is
+/// the virtual coupling (virtual_coupling.hpp). It runs in each tick that may send a force, and
+/// begins anew after any other tick.
 template <class N>
-using ForceLawPlan = LawPlan<ForceInput<N>, typename N::Real>;
+using ForceLawPlan = LawPlan<ForceInput<N>>;
 
 /// Input of a stabiliser in a tick with a report while the motors are on; at the device port.
 template <class N>
 struct StabiliserInput {
+  using Output = DeviceVec<typename N::Real>;
+
   DeviceVec<typename N::Real> wanted_n;  ///< force to send, after all limits
   DeviceVec<typename N::Real> sent_n;    ///< force that the last tick sent
   DeviceVec<typename N::Real> moved_mm;  ///< by the tip since the last report
@@ -157,11 +174,13 @@ struct StabiliserInput {
 /// it again: peak and slope. If it returns `wanted_n` itself no bit changes. It begins anew after
 /// each tick with the motors off or on hold.
 template <class N>
-using StabiliserPlan = LawPlan<StabiliserInput<N>, typename N::Real>;
+using StabiliserPlan = LawPlan<StabiliserInput<N>>;
 
 /// Input of a velocity estimator with each report that has a finite pose.
 template <class N>
 struct VelocityInput {
+  using Output = DeviceVec<typename N::Real>;
+
   DeviceVec<typename N::Real> tip_mm;  ///< at the device port
   std::uint32_t ticks = 1;  ///< since the last one, 1 to 1000: above 1 after missing reports
   /// There was none, or the device was calibrated with it: the tip counts as at rest here before.
@@ -171,7 +190,7 @@ struct VelocityInput {
 /// A velocity estimator returns the velocity of the tip in mm/s, for this tick and the following
 /// ones without a report.
 template <class N>
-using VelocityEstimatorPlan = LawPlan<VelocityInput<N>, typename N::Real>;
+using VelocityEstimatorPlan = LawPlan<VelocityInput<N>>;
 
 enum class LawKind : std::uint8_t { force, velocity, stabiliser };
 
@@ -190,7 +209,7 @@ struct LawRow {
 template <template <class> class In>
 struct LawRowOf : LawRow {
   template <class N>
-  using Make = LawPlan<In<N>, typename N::Real> (*)(const LawSetup& setup);
+  using Make = LawPlan<In<N>> (*)(const LawSetup& setup);
 
   Make<FixedNumbers> fixed;
   Make<DoubleNumbers> float64;
@@ -206,8 +225,8 @@ template <template <class> class Law, template <class> class In>
   using Fixed = Law<FixedNumbers>;
   static_assert(std::size(Fixed::kSettings) <= kMostLawSettings, "a law has too many settings");
   return {{kind, Fixed::kName, Fixed::kMeaning, Fixed::kSettings},
-          &law_plan<Fixed, In<FixedNumbers>, FixedNumbers::Real>,
-          &law_plan<Law<DoubleNumbers>, In<DoubleNumbers>, DoubleNumbers::Real>};
+          &law_plan<Fixed, In<FixedNumbers>>,
+          &law_plan<Law<DoubleNumbers>, In<DoubleNumbers>>};
 }
 
 /// Laws of the program's own files, the last registered first. Written only before main.

@@ -2,8 +2,10 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cstdint>
 
+#include "controller/law/law.hpp"
 #include "shared/numeric/numbers.hpp"
 #include "shared/numeric/vec.hpp"
 
@@ -58,5 +60,36 @@ template <class N>
   };
   return {component(spring_mm.x), component(spring_mm.y), component(spring_mm.z)};
 }
+
+/// The virtual coupling as a force law. Its spring stores what it gives without the damper. The
+/// keys of a scene have ranges of their own.
+template <class N>
+class CouplingLaw {
+  using Real = typename N::Real;
+  using Unit = typename N::Unit;
+
+ public:
+  static constexpr const char* kName = "coupling";
+  static constexpr const char* kMeaning = "a spring, and a damper that grows with it";
+  static constexpr std::array<LawSetting, 2> kSettings{{
+      {"stiffness_n_per_mm", "N/mm", 0, 1e6, 0.4, "K"},
+      {"damping_ns_per_mm", "N s/mm", 0, 1e6, 0.002, "B, along the spring"},
+  }};
+  struct State {};
+
+  explicit CouplingLaw(const LawSetup& setup) noexcept
+      : coupling_{typename N::Ratio(setup["stiffness_n_per_mm"]),
+                  Unit(setup["damping_ns_per_mm"])} {}
+
+  [[nodiscard]] LawForce<Real> step(const ForceInput<N>& in, State& /*none*/) const noexcept {
+    const auto force_n = virtual_coupling_force(coupling_, in.spring_mm, in.velocity_mm_per_s);
+    if (coupling_.damping_ns_per_mm == Unit{}) return force_n;
+    return {force_n,
+            virtual_coupling_force<N>({coupling_.stiffness_n_per_mm, {}}, in.spring_mm, {})};
+  }
+
+ private:
+  VirtualCoupling<N> coupling_;
+};
 
 }  // namespace kerf

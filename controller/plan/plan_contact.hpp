@@ -93,7 +93,7 @@ inline std::array<double, 3> middle_mm(const SceneVolume& volume) {
 
 }  // namespace contact_parts
 
-/// Contact space and coupling. The origin is the middle of the first solid volume. Throws
+/// Contact space. The origin is the middle of the first solid volume. Throws
 /// LoadError for a volume so far from it that the proxy could not reach it.
 template <class N>
 void plan_contact(const LoadedScene& scene, ServoPlan<N>& plan) {
@@ -118,8 +118,6 @@ void plan_contact(const LoadedScene& scene, ServoPlan<N>& plan) {
   contact.units_per_mm = Ratio(1 / unit_mm);
   contact.mm_per_unit = Ratio(unit_mm);
   contact.device_mm_per_unit = Ratio(unit_mm / scene.device.workspace_scale);
-  contact.coupling = {Ratio(scene.force.stiffness_n_per_mm),
-                      typename N::Unit(scene.force.damping_ns_per_mm)};
 }
 
 /// Frame of a volume in contact space.

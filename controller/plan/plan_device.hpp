@@ -166,20 +166,29 @@ void plan_limits(const LoadedScene& scene, ServoPlan<N>& plan) {
                  .rest_ticks = at_least(50)};
 }
 
-/// The laws that a scene names. Throws LoadError for one that this program does not know.
+/// The force law of a scene: the one that it names, or the coupling with the scene's own keys.
+[[nodiscard]] inline LawChoice force_law_of(const ForceSettings& force) {
+  if (!force.law.name.empty()) return force.law;
+  return {LawKind::force,
+          "",
+          {{"stiffness_n_per_mm", force.stiffness_n_per_mm},
+           {"damping_ns_per_mm", force.damping_ns_per_mm}}};
+}
+
+/// The laws of a scene. Throws LoadError for one that this program does not know.
 template <class N>
 void plan_laws(const LoadedScene& scene, ServoPlan<N>& plan) {
   const LawLoop loop{.rate_hz = double(scene.servo.rate_hz),
                      .tip_noise_mm = device_parts::tip_noise_mm(scene.device.personality)};
   const auto law = [&]<template <class> class In>(const LawChoice& choice, const char* key,
-                                                  LawPlan<In<N>, typename N::Real>& into) {
+                                                  LawPlan<In<N>>& into) {
     try {
       into = plan_law<In, N>(choice, loop);
     } catch (const LawError& error) {
       throw LoadError(scene.path + ": " + key + " \"" + choice.name + '"' + error.what());
     }
   };
-  law.template operator()<ForceInput>(scene.force.law, "force.law", plan.force_law);
+  law.template operator()<ForceInput>(force_law_of(scene.force), "force.law", plan.force_law);
   law.template operator()<VelocityInput>(scene.servo.velocity, "servo.velocity", plan.velocity);
   law.template operator()<StabiliserInput>(scene.force.stabiliser, "force.stabiliser",
                                            plan.stabiliser);

@@ -157,8 +157,8 @@ std::vector<LawChoice> choices_of(const LawRow& row) {
   return choices;
 }
 
-template <class In, class Real>
-LawFlaw run_steps(const LawPlan<In, Real>& plan, int steps, LawProgress& progress) {
+template <class In>
+LawFlaw run_steps(const LawPlan<In>& plan, int steps, LawProgress& progress) {
   LawInputs inputs;
   const auto memory = std::make_unique<LawMemory>();
   In in;
@@ -169,7 +169,10 @@ LawFlaw run_steps(const LawPlan<In, Real>& plan, int steps, LawProgress& progres
     if constexpr (requires { in.first; }) in.first = !memory->begun;
     const auto out = plan(*memory, in);
     ++progress.steps;
-    if (!is_finite(out.x) || !is_finite(out.y) || !is_finite(out.z)) return LawFlaw::no_number;
+    if (!all_finite(out)) return LawFlaw::no_number;
+    if constexpr (requires { out.spring_n; }) {
+      if (!all_finite(out.spring_n)) return LawFlaw::no_number;
+    }
     if (CountedAllocations::total() != allocations) return LawFlaw::allocates;
   }
   return LawFlaw::none;

@@ -99,22 +99,14 @@ ContactResult<N> proxy_force(const ServoPlan<N>& plan, ServoState<N>& state,
   ContactResult<N> out;
   const ProxyContact<N> proxy = follow_tool(plan, tool, state.contact, goal, out.samples_read);
   const auto spring_mm = at_device(contact, proxy.spring);
-  // The coupling is no law behind a pointer, so that the compiler inlines it.
-  out.contact_n =
-      plan.force_law.given()
-          ? plan.force_law(state.force_law, {state.tip_mm, tip_mm, velocity_mm_per_s, spring_mm,
-                                             relabel<DeviceSpace>(proxy.press)})
-          : virtual_coupling_force(contact.coupling, spring_mm, velocity_mm_per_s);
-  // The force of a law has no other part.
-  const bool whole =
-      plan.force_law.given() || contact.coupling.damping_ns_per_mm == typename N::Unit{};
-  const auto spring_n =
-      whole ? out.contact_n
-            : virtual_coupling_force<N>({contact.coupling.stiffness_n_per_mm, {}}, spring_mm, {});
+  const LawForce<Real> force = plan.force_law(
+      state.force_law,
+      {state.tip_mm, tip_mm, velocity_mm_per_s, spring_mm, relabel<DeviceSpace>(proxy.press)});
+  out.contact_n = force;
   if (tool.proxy.friction == typename N::Unit{}) {
-    out.spring_n = spring_n;
+    out.spring_n = force.spring_n;
   } else {
-    split_spring(spring_n, proxy, out);
+    split_spring(force.spring_n, proxy, out);
   }
   const Real force_n = norm(out.contact_n);
   out.proxy_offset_mm =

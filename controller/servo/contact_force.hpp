@@ -84,11 +84,10 @@ template <class N>
   return pose;
 }
 
-/// One tick: the proxy of the active tool follows the hand, and the coupling or a law pulls the
-/// hand to the proxy (docs/theory.md 4, 5.1). `rotation` turns the tool, unless it is a ball
-/// without a shaft or keeps the world's axes. Servo thread; at most 32 queries; writes
-/// `state.contact`, and `state.force_law` if the scene names a force law, whose force may not be
-/// finite.
+/// One tick: the proxy of the active tool follows the hand, and the force law pulls the hand to the
+/// proxy (docs/theory.md 4, 5.1). `rotation` turns the tool, unless it is a ball without a shaft or
+/// keeps the world's axes. Servo thread; at most 32 queries; writes `state.contact` and
+/// `state.force_law`. The force of a law may not be finite.
 template <class N>
 [[nodiscard]] ContactResult<N> proxy_force(const ServoPlan<N>& plan, ServoState<N>& state,
                                            WorldVec<typename N::Real> tip_mm,

@@ -19,7 +19,6 @@
 #include "controller/kernel/sampling.hpp"
 #include "controller/kernel/spindle.hpp"
 #include "controller/law/law.hpp"
-#include "controller/law/virtual_coupling.hpp"
 #include "controller/servo/force_limits.hpp"
 #include "controller/servo/kinematics.hpp"
 #include "controller/servo/supervisor.hpp"
@@ -133,8 +132,7 @@ struct DevicePlan {
   std::int32_t motor_count_end = 0;  ///< motor counts lie within +- this
 };
 
-/// Contact space in the world, and the coupling that turns the proxy's spring into a force;
-/// constant during a run.
+/// Contact space in the world; constant during a run.
 template <class N>
 struct ContactPlan {
   bool swept = false;                      ///< else contact is the paper's sums
@@ -142,7 +140,6 @@ struct ContactPlan {
   typename N::Ratio units_per_mm{};        ///< of the world
   typename N::Ratio device_mm_per_unit{};  ///< unit over workspace scale
   typename N::Ratio mm_per_unit{};         ///< of the world
-  VirtualCoupling<N> coupling;
 };
 
 /// The surface of a tool and the constants of its proxy.
@@ -251,7 +248,7 @@ struct ServoPlan {
   WorldVec<typename N::Real> offset_mm;
 
   VelocityEstimatorPlan<N> velocity;  ///< always one
-  ForceLawPlan<N> force_law;          ///< in place of `contact.coupling`; or none
+  ForceLawPlan<N> force_law;          ///< always one; of the swept contact
   StabiliserPlan<N> stabiliser;       ///< or none
 
   ForceLimits<N> limits;

@@ -222,7 +222,7 @@ ForceRequest<N> wanted_force(const ServoPlan<N>& plan, ServoState<N>& state,
                                        timing.zero_ticks - timing.hold_ticks)};
   }
   contact = contact_and_cut(plan, state, sensed.tip_mm, state.rotation, sensed.velocity_mm_per_s);
-  if (plan.force_law.given() && !all_finite(contact.contact_n)) {
+  if (plan.contact.swept && !(all_finite(contact.contact_n) && all_finite(contact.spring_n))) {
     latch(Fault::force_law, supervisor);
     contact = {};
     return {};

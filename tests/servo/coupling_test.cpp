@@ -7,8 +7,8 @@
 #include <doctest/doctest.h>
 #include <rapidcheck.h>
 
+#include "controller/law/virtual_coupling.hpp"
 #include "controller/scene/scene.hpp"
-#include "controller/servo/servo_plan.hpp"
 
 using kerf::DeviceVec;
 using kerf::DoubleNumbers;

@@ -5,18 +5,21 @@
 
 #include "controller/law/stabilisers.hpp"
 #include "controller/law/velocity_estimators.hpp"
+#include "controller/law/virtual_coupling.hpp"
 #include "shared/text/text.hpp"
 
 namespace kerf {
 namespace {
 
 // The laws that kerf brings. A new one is a header in controller/law and a row here.
+constexpr ForceLawRow kCoupling = law_row<CouplingLaw, ForceInput>(LawKind::force);
 constexpr VelocityEstimatorRow kFoaw = law_row<Foaw, VelocityInput>(LawKind::velocity);
 constexpr VelocityEstimatorRow kDifference = law_row<Difference, VelocityInput>(LawKind::velocity);
 constexpr StabiliserRow kPassivity =
     law_row<PassivityController, StabiliserInput>(LawKind::stabiliser);
 constexpr StabiliserRow kEnergyBounding =
     law_row<EnergyBounding, StabiliserInput>(LawKind::stabiliser);
+// Those that a scene can name.
 constexpr const LawRow* kOurs[] = {&kFoaw, &kDifference, &kPassivity, &kEnergyBounding};
 
 std::vector<std::string_view> names_of(const std::vector<const LawRow*>& rows) {
@@ -50,6 +53,10 @@ std::vector<const LawRow*> known_laws(LawKind kind) {
                              " \"" + std::string((*twice)->name) + "\"; give one another kName");
   }
   return rows;
+}
+
+const LawRow* default_law(LawKind kind) noexcept {
+  return kind == LawKind::force ? &kCoupling : nullptr;
 }
 
 const LawRow& find_law(LawKind kind, std::string_view name) {

@@ -16,7 +16,7 @@ namespace kerf {
 /// A law by its name, and those of its settings that differ from their defaults, in any order.
 struct LawChoice {
   LawKind kind = LawKind::force;
-  std::string name;  ///< empty: none
+  std::string name;  ///< empty: the default of its kind
   std::vector<std::pair<std::string, double>> settings;
 
   friend bool operator==(const LawChoice&, const LawChoice&) = default;
@@ -30,9 +30,13 @@ struct LawError : std::runtime_error {
 /// `force law`, `velocity estimator`, `stabiliser`.
 [[nodiscard]] std::string_view kind_name(LawKind kind) noexcept;
 
-/// All laws of a kind that this program knows, by name: ours, and those of its own files. Throws
-/// std::runtime_error, a whole line, where two have the same name.
+/// All laws of a kind that a scene can name, by name: ours, and those of its own files. Throws
+/// std::runtime_error, a whole line, if two have the same name.
 [[nodiscard]] std::vector<const LawRow*> known_laws(LawKind kind);
+
+/// The law of a choice without a name: of a force law the virtual coupling, else null. A scene sets
+/// its numbers by the keys force.stiffness_n_per_mm and force.damping_ns_per_mm.
+[[nodiscard]] const LawRow* default_law(LawKind kind) noexcept;
 
 /// Throws LawError with the known names for one that is unknown.
 [[nodiscard]] const LawRow& find_law(LawKind kind, std::string_view name);
@@ -51,15 +55,16 @@ struct LawLoop {
   double tip_noise_mm = 0;  ///< no encoder reading is farther from the true tip, at the device port
 };
 
-/// The plan of a choice, in the numbers of `N`; of none, an empty plan. Throws LawError.
+/// The plan of a choice, in the numbers of `N`; empty if it has no name and its kind no default.
+/// Throws LawError.
 template <template <class> class In, class N>
-[[nodiscard]] LawPlan<In<N>, typename N::Real> plan_law(const LawChoice& choice,
-                                                        const LawLoop& loop) {
-  if (choice.name.empty()) return {};
-  const LawRow& row = find_law(choice.kind, choice.name);
-  const auto& known = static_cast<const LawRowOf<In>&>(row);
-  const std::vector<double> values = law_values(row, choice);
-  const LawSetup setup(loop.rate_hz, loop.tip_noise_mm, row.settings, values);
+[[nodiscard]] LawPlan<In<N>> plan_law(const LawChoice& choice, const LawLoop& loop) {
+  const LawRow* row =
+      choice.name.empty() ? default_law(choice.kind) : &find_law(choice.kind, choice.name);
+  if (row == nullptr) return {};
+  const auto& known = static_cast<const LawRowOf<In>&>(*row);
+  const std::vector<double> values = law_values(*row, choice);
+  const LawSetup setup(loop.rate_hz, loop.tip_noise_mm, row->settings, values);
   const auto make = [&] {
     if constexpr (std::is_same_v<N, FixedNumbers>)
       return known.fixed;
