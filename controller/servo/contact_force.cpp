@@ -25,7 +25,7 @@ DeviceVec<typename N::Real> at_device(const ContactPlan<N>& contact,
   return {mm(units.x), mm(units.y), mm(units.z)};
 }
 
-/// The contact of one tick, by the queries for a tool with or without a shaft.
+/// The contact of one tick.
 template <class N>
 ProxyContact<N> follow_tool(const ServoPlan<N>& plan, const SweptTool<N>& tool,
                             ContactState<N>& state, const ProxyPose<N>& goal,
@@ -33,19 +33,14 @@ ProxyContact<N> follow_tool(const ServoPlan<N>& plan, const SweptTool<N>& tool,
   const auto in_volumes = [&](const auto& volumes) {
     return std::span(volumes).first(plan.volume_count);
   };
-  const auto with = [&](auto&& field) {
-    field.begin_tick();
-    const ProxyContact<N> contact = follow<N>(tool.proxy, state.proxy, field, goal);
-    samples_read = field.spent();
-    return contact;
-  };
-  if (tool.behind.count == 0) {
-    return with(ContactQuery<N>(*plan.kernels, tool.point_shell, in_volumes(state.volumes)));
-  }
-  std::array<std::span<const ContactVolume<N>>, kMaxShaftParts> behind;
-  std::ranges::transform(state.behind, behind.begin(), in_volumes);
-  return with(ToolQuery<N>(*plan.kernels, tool.point_shell, in_volumes(state.volumes), tool.behind,
-                           behind));
+  std::array<std::span<const ContactVolume<N>>, kMaxShaftParts> shaft_volumes;
+  std::ranges::transform(state.behind, shaft_volumes.begin(), in_volumes);
+  ContactQuery<N> field(*plan.kernels, tool.point_shell, in_volumes(state.volumes), tool.behind,
+                        shaft_volumes);
+  field.begin_tick();
+  const ProxyContact<N> contact = follow<N>(tool.proxy, state.proxy, field, goal);
+  samples_read = field.spent();
+  return contact;
 }
 
 /// Lists the planes that bear a load, for a force of `force_n`.

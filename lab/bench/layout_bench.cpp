@@ -213,7 +213,7 @@ class QueryBench {
   template <class PlaceAt>
   void queries(const std::string& name, const PointShellTable<FixedNumbers>& samples,
                const Solid& solid, PlaceAt&& place) {
-    rows(name, samples, solid, [&](const ContactQuery<FixedNumbers>& query, int i) {
+    rows(name, samples, solid, [&](ContactQuery<FixedNumbers>& query, int i) {
       use(query.query(unit_place(place(i))).depth.raw());
     });
   }

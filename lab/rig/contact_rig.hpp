@@ -65,7 +65,6 @@ class ContactRig {
 
   /// The query of a sweep.
   [[nodiscard]] ContactQuery<N>& field() { return *query_; }
-  [[nodiscard]] const ContactQuery<N>& field() const { return *query_; }
   /// Half the sine of a turn that a sweep may make at once: see `rotation_step_of`.
   [[nodiscard]] typename N::Unit rotation_step() const {
     const double reach = std::max(1.0, static_cast<double>(points_.reach));
@@ -185,7 +184,7 @@ class ShaftRig {
   }
   /// Half the sine of a turn that a sweep may make at once: see `rotation_step_of`.
   [[nodiscard]] typename N::Unit rotation_step() const { return typename N::Unit(rotation_step_); }
-  [[nodiscard]] ToolQuery<N>& field() { return *field_; }
+  [[nodiscard]] ContactQuery<N>& field() { return *field_; }
   [[nodiscard]] Point proxy() const { return point_of<N>(state_.pose.centre); }
   [[nodiscard]] const ProxyState<N>& state() const { return state_; }
 
@@ -196,7 +195,7 @@ class ShaftRig {
   std::deque<MappedField> fields_;
   std::deque<TransformedShell<N>> places_;
   std::array<std::vector<ContactVolume<N>>, 1 + kMaxShaftParts> volumes_;
-  std::optional<ToolQuery<N>> field_;
+  std::optional<ContactQuery<N>> field_;
   double rotation_step_ = 0;
   ProxyState<N> state_;
 };

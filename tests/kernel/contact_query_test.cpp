@@ -66,7 +66,7 @@ Rest rest_on(const Solid& body_under, int places) {
     const Point p = centre - body_under.rest * n;
     const TestVolume volume =
         blurred({28, 28, 28}, [&](const Point& x) { return body_under.distance(n, b, x - p); });
-    const QueryRig<N> rig(ball, volume);
+    QueryRig<N> rig(ball, volume);
     const double offset = rig.rest(centre, n);
     found.mean += offset / places;
     found.lowest = std::min(found.lowest, offset);
@@ -124,7 +124,7 @@ TEST_CASE_TEMPLATE("sliding over a ball of 40 the height is steady and the norma
     const Point middle = Point{15.2, 15.4, 15.7} - (40 + kRadius) * n;
     const TestVolume volume =
         blurred({32, 32, 32}, [&](const Point& x) { return length(x - middle) - 40; });
-    const QueryRig<N> rig(ball, volume);
+    QueryRig<N> rig(ball, volume);
     double sum = 0, squares = 0, worst_deg = 0;
     constexpr int kSteps = 60;
     for (int i = 0; i < kSteps; ++i) {
@@ -157,8 +157,8 @@ TEST_CASE("fixed point feels what double feels, on noise as well") {
       const TestVolume volume = blurred({32, 32, 32}, [&](const Point& x) {
         return dot(n, x - centre) + support - 0.3 + dice.uniform(-noise, noise);
       });
-      const QueryRig<FixedNumbers> fixed(tool, volume);
-      const QueryRig<DoubleNumbers> real(tool, volume);
+      QueryRig<FixedNumbers> fixed(tool, volume);
+      QueryRig<DoubleNumbers> real(tool, volume);
       const Contacts<FixedNumbers> a = fixed.at(centre);
       const Contacts<DoubleNumbers> b = real.at(centre);
       REQUIRE(a.count == b.count);

@@ -34,13 +34,13 @@ class QueryRig : public ContactRig<N> {
   using ContactRig<N>::ContactRig;
 
   void turn(const std::array<Point, 3>& rotation) { this->field().turn(tool_turn<N>(rotation)); }
-  [[nodiscard]] Contacts<N> at(const Point& q) const { return this->field().query(place_of<N>(q)); }
-  [[nodiscard]] double free_distance(const Point& q, const Point& move) const {
+  [[nodiscard]] Contacts<N> at(const Point& q) { return this->field().query(place_of<N>(q)); }
+  [[nodiscard]] double free_distance(const Point& q, const Point& move) {
     return double(this->field().free_distance(place_of<N>(q), place_of<N>(move)));
   }
 
   /// How far beyond `q` along `n` the tool rests: its depth is 0 there. Within +-`range`.
-  [[nodiscard]] double rest(const Point& q, const Point& n, double range = 1) const {
+  [[nodiscard]] double rest(const Point& q, const Point& n, double range = 1) {
     double inner = -range, outer = range;
     for (int step = 0; step < 16; ++step) {
       const double middle = (inner + outer) / 2;

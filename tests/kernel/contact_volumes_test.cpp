@@ -123,7 +123,7 @@ TEST_CASE_TEMPLATE("a tool deep in the solid is buried and has no plane", N, Fix
                    DoubleNumbers) {
   const TestVolume volume = blurred({40, 40, 60}, [](const Point& x) { return x[2] - 50; });
   for (const SceneTool& tool : {kBall, tool_of_units("cone", 6, 18)}) {
-    const QueryRig<N> rig(tool, volume);
+    QueryRig<N> rig(tool, volume);
     const Contacts<N> felt = rig.at({20, 20, 20});
     CHECK(felt.buried);
     CHECK(felt.count == 0);
@@ -134,7 +134,7 @@ TEST_CASE_TEMPLATE("a tool deep in the solid is buried and has no plane", N, Fix
 
 TEST_CASE_TEMPLATE("far from every volume nothing is felt", N, FixedNumbers, DoubleNumbers) {
   const TestVolume volume = filled({12, 12, 12}, 65535);
-  const QueryRig<N> rig(kBall, volume);
+  QueryRig<N> rig(kBall, volume);
   for (const double far : {-8192.0, -30.0, 30.0, 8192.0}) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
       Point q{6, 6, 6};

@@ -19,74 +19,57 @@
 #include "controller/kernel/proxy/contact_space.hpp"
 #include "controller/kernel/proxy/sample_reader.hpp"
 
-// Collision queries of a tool: of its head alone, and of a head with shaft and handpiece.
+// Collision queries of a tool: of one part of it, and of a head with its shaft and handpiece, if it
+// has them.
 
 namespace kerf {
 
-/// Collision queries of one tool against the solid volumes of a scene: the ContactField of the
-/// sweep.
+/// Collision queries of one part of a tool against the solid volumes of a scene.
 ///
-/// Call `turn` first, then any number of queries with this orientation; a tool that does not turn
-/// needs it once. A query reads the samples of the point shell in every volume, except for those in
-/// free space. Near rest it adds a closer look (docs/theory.md 3.5): at the cap of a ball, or at
-/// the close samples of another tool and a patch of the volume. In fixed all kernels give the same
+/// Call `turn` before the first query; any number of queries with this orientation may follow. A
+/// query reads the samples of the point shell in every volume, except for those in free space. With
+/// `refined` it adds a closer look near rest (docs/theory.md 3.5): at the cap of a ball, or at the
+/// close samples of another part and a patch of the volume. In fixed all kernels give the same
 /// bits. Servo thread; no heap.
-///
-/// The work of a tick is counted in samples (`query_work`), since a query among noise or soft
-/// tissue costs twice that of one at a face. Once the budget of `begin_tick` is spent, queries
-/// return `buried` without reading, and a sweep stays at its last position. The first query after a
-/// turn is always answered.
 template <class N>
-class ContactQuery {
+class PartQuery {
  public:
   using Real = typename N::Real;
 
-  /// `kernels` serve fixed point alone.
-  ContactQuery(const KernelSet& kernels, const PointShell<N>& points,
-               std::span<const ContactVolume<N>> volumes) noexcept
+  /// `kernels` serve fixed point alone. The caller keeps all other arguments.
+  PartQuery(const KernelSet& kernels, const PointShell<N>& points,
+            std::span<const ContactVolume<N>> volumes, QueryBudget& budget) noexcept
       : points_(points),
-        reader_(kernels, points),
+        reader_(kernels, points, budget),
         volumes_(volumes),
         work_(query_work(points.table, volumes.size())) {}
 
-  /// Orients the tool in all queries from now on.
+  /// Orients the part in all queries from now on.
   void turn(const Orientation<N>& turn) noexcept {
     reader_.turn(rows_of(turn));
-    turned_ = true;
-    reader_.spend(work_.turn);
+    budget().spend(work_.turn);
     for (const ContactVolume<N>& volume : volumes_) {
       reader_.place(points_, reader_.rows(), volume.frame, volume.places);
     }
   }
 
-  /// Starts the budget of one tick. Before the first call there is no limit.
-  void begin_tick() noexcept {
-    reader_.set_left(work_.budget());
-    nearest_ = 0;
-    wasted_ = 0;
-  }
+  /// Starts a tick; the budget has its own call.
+  void begin_tick() noexcept { nearest_ = 0; }
   [[nodiscard]] const QueryWork& work() const noexcept { return work_; }
-  /// See ContactField.
-  [[nodiscard]] bool half_spent() const noexcept { return left() <= work_.budget() / 2; }
-  [[nodiscard]] bool may_query() const noexcept { return left() >= work_.query + work_.closer; }
-  /// Work that is left of the tick. The parts of one tool share one account (`ToolQuery`).
-  [[nodiscard]] std::int64_t left() const noexcept { return reader_.left(); }
-  void set_left(std::int64_t left) noexcept { reader_.set_left(left); }
-  /// Work of the tick for fruitless marches through free space; the same account.
-  [[nodiscard]] std::int64_t wasted() const noexcept { return wasted_; }
-  void set_wasted(std::int64_t wasted) noexcept { wasted_ = wasted; }
-  /// Work since `begin_tick`, in the samples of `work`.
-  [[nodiscard]] std::int64_t spent() const noexcept { return work_.budget() - left(); }
 
-  /// Contacts of the tool with its centre at `q`: at most one plane a volume, the deepest three. Of
-  /// volumes that share a face the deepest plane counts.
-  [[nodiscard]] Contacts<N> query(ContactVec<Real> q) const noexcept {
-    Contacts<N> felt;
-    const bool closer = may_query();
-    felt.buried = !closer && !turned_;
-    return felt.buried ? felt : look(q, closer);
+  /// Contacts of the part with its centre at `q`, whatever the budget: at most one plane a volume,
+  /// the deepest three. Of volumes that share a face the deepest plane counts.
+  [[nodiscard]] Contacts<N> query(ContactVec<Real> q, bool refined) const noexcept {
+    Contacts<N> contacts;
+    for (const ContactVolume<N>& volume : volumes_) add_plane(volume, q, refined, contacts);
+    if (contacts.count > 0) contacts.depth = std::max(contacts.depth, contacts.plane[0].depth);
+    return contacts;
   }
 
+  /// Whether enough work is left for the costliest query.
+  [[nodiscard]] bool may_query() const noexcept {
+    return budget().left() >= work_.query + work_.closer;
+  }
   /// Whether enough work is left for a query at `q` with closer looks. If there is not enough for
   /// the costliest one, counts the samples that are near.
   [[nodiscard]] bool may_refine(ContactVec<Real> q) const noexcept {
@@ -95,16 +78,7 @@ class ContactQuery {
     for (const ContactVolume<N>& volume : volumes_) {
       cost += QueryWork::kQueryOverhead + reader_.samples_near(volume, Reader::place_of(volume, q));
     }
-    return left() >= cost;
-  }
-
-  /// The same, with closer looks or without, whatever the budget allows.
-  [[nodiscard]] Contacts<N> look(ContactVec<Real> q, bool closer) const noexcept {
-    Contacts<N> felt;
-    turned_ = false;
-    for (const ContactVolume<N>& volume : volumes_) feel(volume, q, closer, felt);
-    if (felt.count > 0) felt.depth = std::max(felt.depth, felt.plane[0].depth);
-    return felt;
+    return budget().left() >= cost;
   }
 
   /// Whether a volume's density at `q` reaches its iso.
@@ -118,15 +92,10 @@ class ContactQuery {
   }
 
   /// Lower bound of the distance along `move` that the centre may go from `q` without contact.
-  /// Tests the tool as one sphere about its centre, which is enough for a ball, then the spheres of
-  /// its groups. Leaves the work for one more query. Fruitless work of groups is bounded by
-  /// `QueryWork::most_wasted`.
-  [[nodiscard]] Real free_distance(ContactVec<Real> q, ContactVec<Real> move) const noexcept {
-    return free_distance(q, move, left() - work_.query - work_.closer, work_.most_wasted());
-  }
-  /// The same with at most `work`, and at most `most_wasted` of it fruitless.
+  /// Tests the part as one sphere about its centre, which is enough for a ball, then the spheres of
+  /// its groups. Spends at most `work`; no group is tested once `most_fruitless` is spent in vain.
   [[nodiscard]] Real free_distance(ContactVec<Real> q, ContactVec<Real> move, std::int64_t work,
-                                   std::int64_t most_wasted) const noexcept {
+                                   std::int64_t most_fruitless) const noexcept {
     const Real length = norm(move);
     if (!(length > Real(SweepRules::kStep))) return Real(0);
     const PointTable<N>& table = points_.table;
@@ -146,7 +115,7 @@ class ContactQuery {
                                         Reader::number_of(at.z)};
       const MoveShare<N> most = share;
       share = way.free_up_to(centre, table.needed_whole, 0, most, looks);
-      if (as_one || wasted_ >= most_wasted) continue;
+      if (as_one || budget().fruitless() >= most_fruitless) continue;
       share = free_share_of_groups(table, volume.places, centre, way, share, most, nearest_, looks);
     }
     Real free{};
@@ -156,17 +125,19 @@ class ContactQuery {
       free = length * share;
     }
     const std::int64_t looked = QueryWork::kFreeLook * (spare - looks);
-    reader_.spend(looked);
-    if (free <= Real(SweepRules::kStep)) wasted_ += looked;
+    budget().spend(looked);
+    if (free <= Real(SweepRules::kStep)) budget().add_fruitless(looked);
     return free;
   }
 
  private:
   using Reader = SampleReader<N>;
 
+  [[nodiscard]] QueryBudget& budget() const noexcept { return reader_.budget(); }
+
   /// Adds the plane of this volume, after a closer look if it is near rest; the deepest come first.
-  void feel(const ContactVolume<N>& volume, ContactVec<Real> q, bool closer,
-            Contacts<N>& felt) const noexcept {
+  void add_plane(const ContactVolume<N>& volume, ContactVec<Real> q, bool refined,
+                 Contacts<N>& contacts) const noexcept {
     const VoxelVec<Real> at = Reader::place_of(volume, q);
     const Real margin = points_.reach + Real(1);
     const auto near = [&](Real x, std::int32_t n) { return x > -margin && x < Real(n) + margin; };
@@ -175,28 +146,28 @@ class ContactQuery {
 
     const PointSums<N> sums = reader_.sums_at(volume.field, points_.table, volume.places, at);
     if (sums.weight <= typename N::Sum(0)) return;
-    ConstraintPlane<N> plane = plane_at(volume, at, sums, closer);
+    ConstraintPlane<N> plane = plane_at(volume, at, sums, refined);
     const bool soft = sums.top < Reader::kIsoDensity;  // below the iso it bears no load
     if (soft && !reader_.iso_is_near(volume, at, sums.top_sample)) return;
-    if (closer) refine_at_mid_ramp(volume, q, plane);
+    if (refined) refine_at_mid_ramp(volume, q, plane);
     const bool same_all_round = plane.normal == ContactVec<typename N::Unit>{};
     if (same_all_round && soft) return;
     if (same_all_round) {
-      felt.buried = true;
-      felt.depth = std::max(felt.depth, plane.depth);
+      contacts.buried = true;
+      contacts.depth = std::max(contacts.depth, plane.depth);
       return;
     }
-    insert(felt, plane);
+    insert(contacts, plane);
   }
 
   /// The plane of these sums, after a closer look if it is near rest.
   [[nodiscard]] ConstraintPlane<N> plane_at(const ContactVolume<N>& volume, VoxelVec<Real> at,
-                                            const PointSums<N>& sums, bool closer) const noexcept {
+                                            const PointSums<N>& sums, bool refined) const noexcept {
     const bool round = points_.table.round;
     const auto means =
         point_means<N>(sums, volume.field.scale, volume.frame, reader_.rows(), round);
     ConstraintPlane<N> plane = plane_of<N>(means, points_.reach, round);
-    if (closer) ContactRefinement<N>(reader_, volume, at, sums, means).correct(plane);
+    if (refined) ContactRefinement<N>(reader_, volume, at, sums, means).correct(plane);
     return plane;
   }
 
@@ -211,7 +182,7 @@ class ContactQuery {
       if (plane.normal == ContactVec<Unit>{} || !may_query()) return;
       const auto arm = points_.table.round ? times<N>(-plane.normal, points_.reach) : plane.arm;
       const auto middle = ramp_middle<N>([&](Real below) {
-        reader_.spend(QueryWork::kFreeLook);
+        budget().spend(QueryWork::kFreeLook);
         return Reader::density_at(volume, q + arm - times<N>(plane.normal, below));
       });
       if (middle.level == 0 || !may_query()) return;
@@ -232,9 +203,7 @@ class ContactQuery {
   Reader reader_;
   std::span<const ContactVolume<N>> volumes_;
   QueryWork work_;
-  mutable bool turned_ = false;       ///< and not queried since
   mutable std::int32_t nearest_ = 0;  ///< group that stopped the last march
-  mutable std::int64_t wasted_ = 0;
 };
 
 /// Most parts behind a head: shaft and handpiece.
@@ -267,141 +236,142 @@ template <class N>
   return work;
 }
 
-/// Collision queries of a tool with a shaft: the ContactField of the sweep (docs/theory.md 3.7).
+/// Collision queries of a tool, with a shaft or without: the ContactField of the sweep
+/// (docs/theory.md 3.7).
 ///
 /// A query is one of each part at the same pose; their planes are merged like those of several
-/// volumes: the deepest three stay. Planes of the parts behind are marked. One budget serves all
-/// parts. A query begins only if the work of the last one is left, and returns `buried` if a part
-/// has more samples near it than is left; the first one after a turn is answered without closer
-/// looks then. The tool rotates, whatever its head; the samples of a ball stay, so its contact is
-/// the same as without a shaft. Servo thread; no heap.
+/// volumes: the deepest three stay. Planes of shaft and handpiece are marked. A tool with a shaft
+/// rotates, whatever its head; the samples of a ball stay, so its contact is the same as without.
+///
+/// The work of a tick is counted in samples (`query_work`), since a query among noise or soft
+/// tissue costs twice that of one at a face. One budget serves all parts. Once it is spent, queries
+/// return `buried` without reading, and a sweep stays at its last position. With a shaft a query
+/// begins only if the work of the last one is left, and returns `buried` if a part has more samples
+/// near it than is left. The first query after a turn is always answered, then without closer
+/// looks. Servo thread; no heap.
 template <class N>
-class ToolQuery {
+class ContactQuery {
   using Real = typename N::Real;
 
  public:
   /// The volumes of a part: the same for all parts, each with positions of its own.
   using Volumes = std::span<const ContactVolume<N>>;
 
-  /// `behind` has at least one part.
-  ToolQuery(const KernelSet& kernels, const PointShell<N>& head, Volumes volumes,
-            const ShaftParts<N>& behind,
-            const std::array<Volumes, kMaxShaftParts>& volumes_behind) noexcept
-      : round_(head.table.round),
-        head_(kernels, head, volumes),
-        shaft_{{kernels, behind.part[0].point_shell, volumes_behind[0]}, behind.part[0].up},
-        work_(query_work(head, behind, volumes.size())) {
-    if (behind.count > 1) {
-      handpiece_.emplace(
-          Part{{kernels, behind.part[1].point_shell, volumes_behind[1]}, behind.part[1].up});
+  /// `kernels` serve fixed point alone. The caller keeps all other arguments.
+  ContactQuery(const KernelSet& kernels, const PointShell<N>& head, Volumes volumes,
+               const ShaftParts<N>& shaft = {},
+               const std::array<Volumes, kMaxShaftParts>& shaft_volumes = {}) noexcept
+      : work_(query_work(head, shaft, volumes.size())),
+        budget_(work_.budget()),
+        head_(kernels, head, volumes, budget_),
+        shaft_parts_(shaft.count),
+        head_turns_(shaft.count == 0 || !head.table.round) {
+    for (std::size_t i = 0; i < shaft_parts_; ++i) {
+      const ShaftPart<N>& part = shaft.part[i];
+      part_[i].emplace(Part{
+          {kernels, part.point_shell, shaft_volumes[i], budget_}, part.up, ContactVec<Real>{}});
     }
-    if (round_) head_.turn({});
-    begin_tick();
+    if (!head_turns_) head_.turn({});
   }
+  ContactQuery(const ContactQuery&) = delete;  // its parts point to its budget
+  ContactQuery& operator=(const ContactQuery&) = delete;
 
+  /// Orients the tool in all queries from now on; once for a tool that does not turn.
   void turn(const Orientation<N>& turn) noexcept {
-    if (!round_) {
-      on_account(head_, [&](ContactQuery<N>& head) { head.turn(turn); });
-    }
+    if (head_turns_) head_.turn(turn);
     const RotationRows<N> rows = rows_of(turn);
-    each_behind([&](Part& part) {
-      on_account(part.query, [&](ContactQuery<N>& query) { query.turn(turn); });
+    each_shaft_part([&](Part& part) {
+      part.query.turn(turn);
       part.from_head = times<N>({rows[0][1], rows[1][1], rows[2][1]}, part.up);
     });
     turned_ = true;
   }
 
+  /// Starts the budget of one tick. Before the first call there is no limit.
   void begin_tick() noexcept {
-    left_ = work_.budget();
-    wasted_ = 0;
+    budget_.begin_tick();
     last_ = 0;
     head_.begin_tick();
-    each_behind([](Part& part) { part.query.begin_tick(); });
+    each_shaft_part([](Part& part) { part.query.begin_tick(); });
   }
   [[nodiscard]] const QueryWork& work() const noexcept { return work_; }
-  [[nodiscard]] bool half_spent() const noexcept { return left_ <= work_.budget() / 2; }
-  /// Whether the work of the last query is left, and that of the costliest one of the head.
+  /// Work since `begin_tick`, in the samples of `work`.
+  [[nodiscard]] std::int64_t spent() const noexcept { return budget_.spent(); }
+  /// See ContactField.
+  [[nodiscard]] bool half_spent() const noexcept { return budget_.half_spent(); }
+  /// Whether the work of the costliest query of the head is left, and with a shaft that of the last
+  /// query.
   [[nodiscard]] bool may_query() const noexcept {
-    return left_ >= std::max(last_, head_.work().query + head_.work().closer);
+    return head_.may_query() && budget_.left() >= last_;
   }
-  [[nodiscard]] std::int64_t spent() const noexcept { return work_.budget() - left_; }
 
+  /// Contacts of the tool with the centre of its head at `q`.
   [[nodiscard]] Contacts<N> query(ContactVec<Real> q) noexcept {
-    Contacts<N> felt;
-    const bool closer = may_query(), answered = turned_;
-    felt.buried = !closer && !answered;
-    if (felt.buried) return felt;
+    Contacts<N> contacts;
+    const bool refined = may_query(), answered = turned_;
+    contacts.buried = !refined && !answered;
+    if (contacts.buried) return contacts;
     turned_ = false;
-    const std::int64_t before = left_;
+    const std::int64_t before = budget_.left();
+    contacts = head_.query(q, refined);
+    if (shaft_parts_ == 0) return contacts;
     bool short_of_work = false;  // for closer looks at all parts
-    on_account(head_, [&](const ContactQuery<N>& head) { felt = head.look(q, closer); });
-    each_behind([&](Part& part) {
-      Contacts<N> seen;
-      on_account(part.query, [&](const ContactQuery<N>& query) {
-        const ContactVec<Real> at = q + part.from_head;
-        short_of_work = closer && (short_of_work || !query.may_refine(at));
-        seen.buried = short_of_work && !answered;
-        if (!seen.buried) seen = query.look(at, closer && !short_of_work);
-      });
-      for (std::size_t i = 0; i < static_cast<std::size_t>(seen.count); ++i) {
-        ConstraintPlane<N> plane = seen.plane[i];
+    each_shaft_part([&](Part& part) {
+      const ContactVec<Real> at = q + part.from_head;
+      short_of_work = refined && (short_of_work || !part.query.may_refine(at));
+      Contacts<N> of_part;
+      of_part.buried = short_of_work && !answered;
+      if (!of_part.buried) of_part = part.query.query(at, refined && !short_of_work);
+      for (std::size_t i = 0; i < static_cast<std::size_t>(of_part.count); ++i) {
+        ConstraintPlane<N> plane = of_part.plane[i];
         plane.arm = plane.arm + part.from_head;
         plane.behind = true;
-        insert(felt, plane);
+        insert(contacts, plane);
       }
-      felt.buried = felt.buried || seen.buried;
-      felt.depth = std::max(felt.depth, seen.depth);
+      contacts.buried = contacts.buried || of_part.buried;
+      contacts.depth = std::max(contacts.depth, of_part.depth);
     });
-    last_ = short_of_work && !answered ? std::numeric_limits<std::int64_t>::max() : before - left_;
-    return felt;
+    last_ = short_of_work && !answered ? std::numeric_limits<std::int64_t>::max()
+                                       : before - budget_.left();
+    return contacts;
   }
 
+  /// Whether a volume's density at `q` reaches its iso.
   [[nodiscard]] bool is_solid(ContactVec<Real> q) const noexcept { return head_.is_solid(q); }
 
+  /// Lower bound of the distance along `move` that the tool may go from `q` without contact. Leaves
+  /// the work for one more query.
   [[nodiscard]] Real free_distance(ContactVec<Real> q, ContactVec<Real> move) noexcept {
     Real free = norm(move);
-    const auto look = [&](ContactQuery<N>& part, ContactVec<Real> at) {
-      const std::int64_t work = left_ - work_.query - work_.closer;
-      on_account(part, [&](const ContactQuery<N>& query) {
-        free = std::min(free, query.free_distance(at, move, work, work_.most_wasted()));
-      });
+    const auto shorten = [&](const PartQuery<N>& part, ContactVec<Real> at) {
+      const std::int64_t work = budget_.left() - work_.query - work_.closer;
+      free = std::min(free, part.free_distance(at, move, work, work_.most_wasted()));
     };
-    look(head_, q);
-    each_behind([&](Part& part) { look(part.query, q + part.from_head); });
+    shorten(head_, q);
+    each_shaft_part([&](Part& part) { shorten(part.query, q + part.from_head); });
     return free;
   }
 
  private:
   struct Part {
-    ContactQuery<N> query;
+    PartQuery<N> query;
     Real up{};
     ContactVec<Real> from_head{};  ///< `up` along the rotated shaft
   };
 
-  /// Runs `work` of a part on the account of the whole tool.
-  template <class Work>
-  void on_account(ContactQuery<N>& part, Work&& work) noexcept {
-    part.set_left(left_);
-    part.set_wasted(wasted_);
-    work(part);
-    left_ = part.left();
-    wasted_ = part.wasted();
-  }
   template <class Visit>
-  void each_behind(Visit visit) noexcept {
-    visit(shaft_);
-    if (handpiece_) visit(*handpiece_);
+  void each_shaft_part(Visit visit) noexcept {
+    for (std::size_t i = 0; i < shaft_parts_; ++i) visit(*part_[i]);
   }
 
-  bool round_;
-  ContactQuery<N> head_;
-  Part shaft_;
-  std::optional<Part> handpiece_;
   QueryWork work_;
-  std::int64_t left_ = 0;    ///< of the tick's samples
-  std::int64_t last_ = 0;    ///< work of the last query; the maximum: it was given up
-  std::int64_t wasted_ = 0;  ///< for fruitless marches through free space
-  bool turned_ = false;      ///< and not queried since
+  QueryBudget budget_;
+  PartQuery<N> head_;
+  std::size_t shaft_parts_;
+  std::array<std::optional<Part>, kMaxShaftParts> part_;
+  bool head_turns_;
+  std::int64_t last_ = 0;  ///< work of the last query with a shaft; the maximum: it was given up
+  bool turned_ = false;    ///< and not queried since
 };
 
 }  // namespace kerf

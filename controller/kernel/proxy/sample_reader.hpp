@@ -19,7 +19,7 @@
 namespace kerf {
 
 /// Cost of the queries of one tool in all volumes together, counted in samples that are read. It
-/// bounds a tick (`ContactQuery::begin_tick`, docs/theory.md 4.8), and a scene is planned with it.
+/// bounds a tick (`QueryBudget`, docs/theory.md 4.8), and a scene is planned with it.
 struct QueryWork {
   /// Budget of a tick, 2.5 to 4 ns each, depending on the machine: 38 to 60 us. A head of very many
   /// samples gets the budget of kLeastQueries.
@@ -83,6 +83,31 @@ template <class N>
           .near = times * Work::kNearLook};
 }
 
+/// Work that is left of a tick, in the samples of `QueryWork`; all parts of a tool spend it. Before
+/// the first `begin_tick` there is no limit. Servo thread.
+class QueryBudget {
+ public:
+  explicit constexpr QueryBudget(std::int64_t whole) noexcept : whole_(whole) {}
+
+  constexpr void begin_tick() noexcept {
+    left_ = whole_;
+    fruitless_ = 0;
+  }
+  constexpr void spend(std::int64_t work) noexcept { left_ -= work; }
+  /// Counts work that was spent on a march through free space which found no way.
+  constexpr void add_fruitless(std::int64_t work) noexcept { fruitless_ += work; }
+
+  [[nodiscard]] constexpr std::int64_t left() const noexcept { return left_; }
+  [[nodiscard]] constexpr std::int64_t spent() const noexcept { return whole_ - left_; }
+  [[nodiscard]] constexpr bool half_spent() const noexcept { return left_ <= whole_ / 2; }
+  [[nodiscard]] constexpr std::int64_t fruitless() const noexcept { return fruitless_; }
+
+ private:
+  std::int64_t whole_;
+  std::int64_t left_ = std::numeric_limits<std::int64_t>::max();
+  std::int64_t fruitless_ = 0;
+};
+
 /// The surface of a tool for contact: its point shell and, unless it is a ball, close samples.
 template <class N>
 struct PointShell {
@@ -101,9 +126,8 @@ struct ContactVolume {
   PointPositions<N> places;
 };
 
-/// Reads samples of one tool in solid volumes, and counts what it reads: the work that is left of a
-/// tick, in the samples of `QueryWork`. In fixed all kernels give the same bits. Servo thread; no
-/// heap.
+/// Reads samples of one part of a tool in solid volumes, and spends the budget of the tick for it.
+/// In fixed all kernels give the same bits. Servo thread; no heap.
 template <class N>
 class SampleReader {
  public:
@@ -111,18 +135,16 @@ class SampleReader {
   static constexpr auto kIsoDensity = N::kIsFixed ? PointNumber<N>(1 << 14) : PointNumber<N>(0.5);
 
   /// `kernels` serve fixed point alone.
-  constexpr SampleReader(const KernelSet& kernels, const PointShell<N>& points) noexcept
-      : kernels_(kernels), points_(points) {}
+  constexpr SampleReader(const KernelSet& kernels, const PointShell<N>& points,
+                         QueryBudget& budget) noexcept
+      : kernels_(kernels), points_(points), budget_(budget) {}
 
   [[nodiscard]] const PointShell<N>& points() const noexcept { return points_; }
   [[nodiscard]] const RotationRows<N>& rows() const noexcept { return rows_; }
   /// Sets the orientation of the tool; call `place` for each volume after it.
   void turn(const RotationRows<N>& rows) noexcept { rows_ = rows; }
 
-  /// Work that is left of the tick; unlimited before the first `set_left`.
-  [[nodiscard]] std::int64_t left() const noexcept { return left_; }
-  void set_left(std::int64_t left) noexcept { left_ = left; }
-  void spend(std::int64_t work) const noexcept { left_ -= work; }
+  [[nodiscard]] QueryBudget& budget() const noexcept { return budget_; }
 
   /// A number as point tables have it.
   [[nodiscard]] static PointNumber<N> number_of(Real x) noexcept {
@@ -160,7 +182,7 @@ class SampleReader {
     } else {
       sums = point_sums<N>(table, places, centre, field);
     }
-    left_ -= QueryWork::kQueryOverhead + sums.read;
+    budget_.spend(QueryWork::kQueryOverhead + sums.read);
     return sums;
   }
 
@@ -169,7 +191,7 @@ class SampleReader {
   [[nodiscard]] std::int64_t samples_near(const ContactVolume<N>& volume,
                                           VoxelVec<Real> at) const noexcept {
     const PointNumber<N> centre[3] = {number_of(at.x), number_of(at.y), number_of(at.z)};
-    left_ -= QueryWork::kGroupLook * points_.table.groups;
+    budget_.spend(QueryWork::kGroupLook * points_.table.groups);
     std::int64_t near = 0;
     for (std::int32_t group = 0; group < points_.table.groups; ++group) {
       if (!is_free(points_.table, volume.places, centre, volume.field, group)) near += kPointGroup;
@@ -196,7 +218,7 @@ class SampleReader {
       read_points<N>(places, table.count, centre, volume.field, samples.density.data());
       sums = close_sums<N>(samples.fade(table));
     }
-    left_ -= QueryWork::kQueryOverhead + QueryWork::kCloseSamples * table.count;
+    budget_.spend(QueryWork::kQueryOverhead + QueryWork::kCloseSamples * table.count);
     return peak_of(sums);
   }
 
@@ -204,7 +226,7 @@ class SampleReader {
   /// does (docs/theory.md 3.2).
   [[nodiscard]] bool iso_is_near(const ContactVolume<N>& volume, VoxelVec<Real> at,
                                  std::int32_t sample) const noexcept {
-    left_ -= QueryWork::kNearLook;  // a sample has eight voxels
+    budget_.spend(QueryWork::kNearLook);  // a sample has eight voxels
     const VoxelGrid& grid = volume.field.grid;
     const PointNumber<N> centre[3] = {number_of(at.x), number_of(at.y), number_of(at.z)};
     const std::int32_t end[3] = {grid.nx, grid.ny, grid.nz};
@@ -272,7 +294,7 @@ class SampleReader {
   const KernelSet& kernels_;
   const PointShell<N>& points_;
   RotationRows<N> rows_{};
-  mutable std::int64_t left_ = std::numeric_limits<std::int64_t>::max();
+  QueryBudget& budget_;
 };
 
 }  // namespace kerf
