@@ -17,7 +17,7 @@ set(CPACK_DEB_COMPONENT_INSTALL ON)
 set(CPACK_COMPONENTS_ALL kerf development)
 set(CPACK_DEBIAN_KERF_PACKAGE_NAME kerf)
 set(CPACK_DEBIAN_KERF_PACKAGE_SHLIBDEPS ON)
-# What is no linked library: OpenGL is looked for at run time, lab/report draws forces.svg, and ./kerf calls umount.
+# What is no linked library: OpenGL is looked for at run time, lab/report draws forces.svg, and demo/ calls umount.
 set(CPACK_DEBIAN_KERF_PACKAGE_DEPENDS "libegl1, libgl1, libgl1-mesa-dri, python3-matplotlib, mount")
 set(CPACK_DEBIAN_KERF_PACKAGE_RECOMMENDS "udev, bash-completion, openssl")
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_NAME kerf-dev)

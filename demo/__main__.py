@@ -1,0 +1,332 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`./kerf demo`: an emulated hand mills a tooth, from device bytes to pictures. This runs controller, emulator, recorder,
+visualizer and bridge together, and keeps their results.
+
+    python3 demo FOLDER_OF_PROGRAMS PATH_OF_KERF [OPTION...]
+
+Exit codes: 0 fine; 1 ran, and a check failed or a program crashed; 2 bad input or set-up; 130, 143 stopped by a signal."""
+import os
+import pathlib
+import re
+import signal
+import subprocess
+import sys
+import time
+
+import options as demo_options
+from options import BUSES, Refusal
+from out_folder import OutFolder
+from processes import END, Processes, complain, crashed, exit_code, say, terminate
+
+FRAMES = 12
+PATIENCE_S = 3  # a short run waits so long for its pictures to begin
+
+
+class Demo:
+    def __init__(self, programs, kerf, options):
+        self.programs, self.kerf, self.options = programs, kerf, options
+        self.root = os.path.dirname(kerf)
+        self.scene = options.scene or os.path.join(self.root, "scenes", "phantom.toml")
+        self.out = self.processes = None
+        self.controller = self.emulator = self.recorder = self.window = self.pictures = self.bridge = None
+        self.code_of_signal = None
+        self.finishing = False  # the results are being kept: a signal is too late
+
+    # -- signals
+
+    def watch_signals(self):
+        for number in [signal.SIGINT, *END]:
+            if signal.getsignal(number) is not signal.SIG_IGN:
+                signal.signal(number, self.on_signal)
+
+    def on_signal(self, number, _frame):
+        """The controller switches the motors off and reports, and the others follow it. The second signal, or one before
+        there is a hand, ends everything at once."""
+        if self.finishing:
+            return
+        if self.code_of_signal is not None:
+            sys.exit(self.code_of_signal)
+        self.code_of_signal = 130 if number == signal.SIGINT else 143
+        if self.emulator is None:
+            sys.exit(self.code_of_signal)
+        terminate(self.controller)
+
+    # -- the parts of a demo
+
+    def run(self):
+        """Returns the exit code."""
+        demo_options.check(self.options)
+        if self.options.out:
+            self.out = OutFolder(self.options.out)
+            self.out.check()
+        self.build()
+        os.umask(0o077)  # as the programs' own files
+        self.watch_signals()
+        try:
+            return self.run_programs()
+        finally:
+            for number in [signal.SIGINT, *END]:
+                signal.signal(number, signal.SIG_IGN)
+            if self.processes:
+                self.processes.end()
+            if self.out:
+                self.out.close()
+
+    def build(self):
+        names = ["controller", "emulator", "visualizer", "recorder", "record"] + ["bridge"] * self.options.serve
+        code = subprocess.run([self.kerf, "_programs", *names], check=False).returncode
+        if code:
+            sys.exit(code if code > 0 else 128 - code)
+        if self.options.serve and not os.access(os.path.join(self.programs, "kerf-bridge"), os.X_OK):
+            raise Refusal("--serve: kerf-bridge was not built, for want of a library; try ./kerf setup")
+
+    def run_programs(self):
+        options = self.options
+        if self.out:
+            self.out.open(float(options.seconds))
+            self.results, keep_open = self.out.results, (self.out.lock,)
+        else:
+            self.results, keep_open = None, ()
+        shown = (self.results or "\0", options.out or "its folder")
+        self.processes = Processes(self.programs, shown, keep_open)
+        if not self.results:
+            self.results = self.processes.path("results")
+            os.mkdir(self.results)
+            self.processes.shown = (self.results, "its folder")
+        self.name = f"demo-{os.getpid()}"
+        self.find_meeting_point()
+        if options.serve:
+            self.start_bridge()
+        self.start_controller()
+        if self.told.exists():
+            self.start_others()
+        failed, cut = self.watch()
+        return self.finish(failed, cut)
+
+    def find_meeting_point(self):
+        """`meet` exists once the emulator is ready; `ask` and `offer` are the options of controller and emulator for it."""
+        options, processes = self.options, self.processes
+        self.meet = processes.path("device")
+        self.ask, self.offer = ["--port", "socket:" + self.meet], ["--front", "socket", "--socket", self.meet]
+        if options.port != "socket":
+            bus = processes.path("bus")
+            os.mkdir(bus)
+            self.meet = os.path.join(bus, BUSES[options.device][1])
+            self.ask, self.offer = ["--port", f"{options.port}:{self.meet}"], ["--front", "fuse", "--mount", bus]
+        if options.port == "usb":  # the emulated Falcon accepts any bytes as its firmware
+            firmware = pathlib.Path(processes.path("firmware"))
+            firmware.write_bytes(pathlib.Path(self.kerf).read_bytes()[:1000])
+            self.ask = ["--port", f"usb:{self.meet},firmware={firmware}"]
+        # The emulated motors are known; a scene has no torque scale, because a real device's is unknown.
+        described = subprocess.run([os.path.join(self.programs, "kerf-emulator"), "--personality", options.device, "--describe"],
+                                   stdout=subprocess.PIPE, text=True, check=False)
+        if described.returncode:
+            sys.exit(1 if crashed("emulator", exit_code(described)) else 2)
+        self.ask += ["--torque-scale", described.stdout.strip().removeprefix("torque_scale=")]
+
+    def start_bridge(self):
+        """Before its controller. Each browser gets an address of its own, so `tail` prints those to come, too."""
+        processes = self.processes
+        qr = ["--qr"] if sys.stdout.isatty() else []
+        self.bridge = processes.start("bridge", ["serve", "--name", self.name, "--listen", self.options.listen or "127.0.0.1:0", *qr],
+                                      out="bridge.said", log="bridge.log")
+        said = pathlib.Path(processes.path("bridge.said"))
+        while self.bridge.poll() is None and "token=" not in said.read_text(errors="replace"):
+            time.sleep(0.05)
+        if self.bridge.poll() is not None:
+            code = processes.conclude("bridge", self.bridge, 0)
+            if code:
+                sys.exit(code)
+        processes.popen(["tail", "-n", "+1", "-f", f"--pid={self.bridge.pid}", str(said)])
+
+    def start_controller(self):
+        """It loads the scene and writes what the emulator has to know."""
+        options, processes = self.options, self.processes
+        self.told = pathlib.Path(processes.path("emulator-args"))
+        self.lead = []
+        until = []
+        if options.virtual and (options.headless or options.out):  # else it is over before a picture
+            os.mkfifo(processes.path("lead"))
+            until, self.lead = ["--until", processes.path("lead")], ["--lead", processes.path("lead")]
+        self.controller = processes.start("controller", [
+            "--scene", self.scene, *options.volume, "--device", options.device, *self.ask, "--seconds", options.seconds,
+            *(["--rate", options.rate] if options.rate else []), "--name", self.name,
+            *(["--virtual"] if options.virtual else []), *until, *(["--progress"] if sys.stdout.isatty() else []),
+            "--emulator-args", self.told, "--report", os.path.join(self.results, "report.json"),
+            "--final", os.path.join(self.results, "final.nrrd")], out="summary")
+        while not self.told.exists() and self.controller.poll() is None:
+            time.sleep(0.005)
+
+    def start_others(self):
+        options, processes = self.options, self.processes
+        told = dict(line.split("=", 1) for line in self.told.read_text().splitlines() if "=" in line)
+        rate_hz = int(told.get("rate_hz", 1000))
+        self.recorder = processes.start("recorder", ["--name", self.name, "--out", os.path.join(self.results, "log")],
+                                        out="recorder.log", log="recorder.log")
+        hand = self.hand(told)
+        self.start_pictures(rate_hz)
+        if options.virtual or options.record or int(options.seconds.split(".")[0]) < PATIENCE_S:
+            # A longer run goes on while they begin: the hand takes half a second to the tooth.
+            for process, shows in ((self.window, "window-shows"), (self.pictures, "painter-shows")):
+                self.wait_until_shown(process, shows)
+        pace = []
+        if options.virtual:
+            pace = ["--lockstep", "--rate", rate_hz]
+        elif options.port == "socket" and rate_hz > 2000:
+            pace = ["--packet-cycles", 8000 // rate_hz]  # else it checks for the host 2000 times a second
+        self.emulator = processes.start("emulator", [
+            "--personality", options.device, *self.offer, *hand, "--unit-mm", told.get("hand_unit_mm", ""), *pace,
+            "--report", os.path.join(self.results, "emulator.json")], out="emulator.log", log="emulator.log")
+        while not os.path.exists(self.meet) and self.emulator.poll() is None:
+            time.sleep(0.02)
+        if not os.path.exists(self.meet):  # it refused something, or a very short run is over
+            code = processes.conclude("emulator", self.emulator, 0)
+            if code:
+                sys.exit(code)
+            self.emulator = None
+
+    def hand(self, told):
+        if self.options.mouse:
+            return ["--hand-socket", self.processes.path("hand")]
+        if self.options.hand:
+            return ["--hand", self.options.hand]
+        script = told.get("hand_script", "")
+        if script and not os.path.isfile(script):
+            raise Refusal(f"--scene {self.scene}: its hand.script, {script}, is no file; copy the script there, or give --hand FILE")
+        return ["--hand", script or os.path.join(self.root, "scenes", "hands", "cut_cavity.toml")]
+
+    def start_pictures(self, rate_hz):
+        """A window, and pictures without one; one of them makes the video."""
+        options, processes = self.options, self.processes
+        common = ["--name", self.name, "--size", options.size, *options.look]
+        record = ["--record", options.record] if options.record else []
+        if not options.headless:
+            led = ["--hand-socket", processes.path("hand")] if options.mouse else []
+            keys_out = ["--out", self.results] if self.out else []  # else the window's keys write to the current folder
+            self.window = processes.start("visualizer", [
+                *common, *record, *led, *keys_out, "--attached", processes.path("window-shows"),
+                "--choice", processes.path("choice"), "--open-in", os.path.dirname(self.scene) or "."],
+                out="window.log", log="window.log")
+            record = []
+        if options.headless or self.out:
+            every = int(float(options.seconds) * rate_hz / FRAMES) or 1
+            self.pictures = processes.start("visualizer", [
+                *common[:2], "--headless", "--frames", FRAMES, *common[2:], *record,
+                *(["--sheet", options.sheet] if options.sheet else []), *self.lead, "--every-ticks", every, "--out", self.results,
+                "--attached", processes.path("painter-shows"), "--report", os.path.join(self.results, "visualizer.json")],
+                out="visualizer.log", log="visualizer.log")
+
+    def wait_until_shown(self, process, name):
+        end = time.monotonic() + PATIENCE_S
+        while (process is not None and not os.path.exists(self.processes.path(name)) and process.poll() is None
+               and self.controller.poll() is None and time.monotonic() < end):
+            time.sleep(0.02)
+
+    def watch(self):
+        """Until the controller ends. A program that cannot go on (a full disk, say) ends the demo; so does a window that is
+        closed while it is the hand, or in which another scene was chosen. Returns the exit code of what failed, and whether
+        the run was cut short with its window."""
+        processes, failed, cut = self.processes, 0, False
+        while self.controller.poll() is None:
+            time.sleep(0.1)
+            if failed:
+                continue
+            if self.recorder is not None and self.recorder.poll() is not None:
+                failed = processes.conclude("recorder", self.recorder, 0)
+                self.recorder = None
+            if self.pictures is not None and self.pictures.poll() is not None:
+                failed = processes.conclude("visualizer", self.pictures, 0) or failed
+                self.pictures = None
+            leads = self.options.mouse or os.path.exists(processes.path("choice"))
+            if self.window is not None and leads and self.window.poll() is not None:
+                failed = processes.conclude("window", self.window, 0) or failed
+                if failed and os.path.exists(processes.path("window-shows")):  # its screen is gone: keep the results so far
+                    complain("kerf: demo: the hand went with its window; this run ends here")
+                    failed, cut = 0, True
+                self.window = None
+                terminate(self.controller)
+            if failed:
+                if self.out:
+                    self.out.empty_results()
+                terminate(self.controller)
+        return failed, cut
+
+    def finish(self, failed, cut):
+        options, processes = self.options, self.processes
+        code = exit_code(self.controller)
+        if failed:
+            return failed
+        # It has reported why it could not begin, and the others only wait for it.
+        if code == 2 and self.code_of_signal is None:
+            if self.emulator is not None and self.emulator.poll() is not None:
+                processes.conclude("emulator", self.emulator, 0)
+            return 2
+        self.print_summary()
+        terminate(self.window)
+        for name, process, seconds in (("window", self.window, 10), ("recorder", self.recorder, 10),
+                                       ("visualizer", self.pictures, 60), ("emulator", self.emulator, 5)):
+            if process is not None:
+                worst = processes.conclude(name, process, seconds)
+                failed = (1 if worst and name == "window" else worst) or failed
+        terminate(self.bridge)
+        if self.bridge is not None:
+            failed = processes.conclude("bridge", self.bridge, 5) or failed
+        if self.code_of_signal is None and crashed("controller", code):
+            code = 1
+        code = code or failed or int(cut)
+        self.finishing = True
+        code = self.keep(code)
+        choice = pathlib.Path(processes.path("choice"))
+        if choice.exists() and self.code_of_signal is None and code == 0:
+            self.next_demo(choice.read_text().rstrip("\n"))
+        return code if self.code_of_signal is None else self.code_of_signal
+
+    def print_summary(self):
+        try:
+            say(pathlib.Path(self.processes.path("summary")).read_text(errors="replace").rstrip("\n"))
+        except OSError:
+            pass
+
+    def keep(self, code):
+        """Draws the plot and publishes the results. Returns the exit code."""
+        options, processes = self.options, self.processes
+        if self.out and code != 2 and os.path.exists(os.path.join(self.results, "report.json")):
+            plot = processes.start("record", ["plot", os.path.join(self.results, "log"), "--out", os.path.join(self.results, "forces.svg")],
+                                   out="record.log", log="record.log")
+            if processes.conclude("record", plot, 30):
+                code = 1
+            line, in_place = self.out.publish()
+            if in_place:
+                say(line)
+            else:
+                complain(line)
+                code = 1
+        elif not self.out and not options.record and not options.sheet and options.headless and code == 0:
+            say("kept nothing: --out DIR keeps pictures, plot, report and log")
+        return code
+
+    def next_demo(self, path):
+        """Another demo replaces this one, with the scene or volume that the window chose."""
+        self.processes.end()
+        if self.out:
+            self.out.close()
+        say(f"kerf: demo: {path}")
+        for number in [signal.SIGINT, *END]:
+            if signal.getsignal(number) is not signal.SIG_IGN:
+                signal.signal(number, signal.SIG_DFL)
+        what = "--scene" if path.endswith(".toml") else "--volume"
+        os.execv(self.kerf, [self.kerf, "demo", what, path, *self.options.again])
+
+
+def main():
+    programs, kerf, *words = sys.argv[1:]
+    try:
+        return Demo(programs, kerf, demo_options.parse(words)).run()
+    except Refusal as refusal:
+        complain("kerf: demo: " + re.sub(r"[\x00-\x1f\x7f]", "?", str(refusal)))
+        return 2
+    except KeyboardInterrupt:  # while it builds
+        return 130
+
+
+sys.exit(main())

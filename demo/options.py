@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The options of `./kerf demo`: `./kerf --help` has their meaning."""
+import dataclasses
+import os
+import re
+
+BUSES = {"omni": ("fw", "fw1"), "falcon": ("usb", "usb"), "woodenhaptics": ("hid", "hidraw0")}  # word of --port, its node
+FLAGS = ("--headless", "--serve", "--stereo", "--voxel-tool", "--mute", "--colour-blind", "--virtual")
+OF_SCENE = ("--scene", "--volume", "--spacing", "--window", "--set")
+WITH_VALUE = OF_SCENE + ("--hand", "--seconds", "--rate", "--out", "--size", "--renderer", "--gradient", "--panel-scale",
+                         "--device", "--port", "--sheet", "--transfer", "--record", "--listen")
+
+
+class Refusal(Exception):
+    """Bad input or set-up: `place: value; remedy`. Ends the demo with exit code 2."""
+
+
+@dataclasses.dataclass
+class Options:
+    scene: str = ""
+    volume: list = dataclasses.field(default_factory=list)  # --volume, --spacing, --window and --set, for the controller
+    look: list = dataclasses.field(default_factory=list)  # for the visualizer
+    again: list = dataclasses.field(default_factory=list)  # all but the scene: for the next demo of the same window
+    hand: str = ""
+    seconds: str = ""
+    rate: str = ""
+    out: str = ""
+    size: str = "640x480"
+    device: str = "omni"
+    port: str = "socket"
+    listen: str = ""
+    sheet: str = ""
+    record: str = ""
+    headless: bool = False
+    serve: bool = False
+    virtual: bool = False
+
+    @property
+    def mouse(self):
+        return self.hand == "mouse"
+
+
+def parse(words):
+    """Options from the command line. Throws Refusal at the first word that is wrong."""
+    options, given = Options(), set()
+    words = list(words)
+    while words:
+        name = words.pop(0)
+        if name in FLAGS:
+            options.again.append(name)
+            if name in ("--headless", "--serve", "--virtual"):
+                setattr(options, name[2:], True)
+            else:
+                options.look.append(name)
+            continue
+        if name not in WITH_VALUE:
+            raise Refusal(f"{name}: unknown; see ./kerf --help")
+        if not words or not words[0] or words[0].startswith("--"):
+            raise Refusal(f"{name}: no value; see ./kerf --help")
+        if name in given and name != "--set":
+            raise Refusal(f"{name}: stands there twice; give it once")
+        given.add(name)
+        value = words.pop(0)
+        if name not in ("--scene", "--volume", "--spacing", "--window"):
+            options.again += [name, value]
+        if name in ("--renderer", "--gradient", "--transfer", "--panel-scale"):
+            options.look += [name, value]
+        elif name in OF_SCENE and name != "--scene":
+            options.volume += [name, value]
+        else:
+            setattr(options, name[2:], value)
+    options.headless = options.headless or bool(options.sheet)
+    return options
+
+
+def has_display():
+    return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+
+
+def check(options):
+    """Completes the options by defaults, and throws Refusal for values and combinations that cannot be."""
+    if options.record == "-":
+        raise Refusal("--record -: the demo itself writes to the standard output; name a file or a pipe")
+    if options.listen and not options.serve:
+        raise Refusal(f"--listen {options.listen}: nothing listens without --serve; give both")
+    if options.mouse:
+        if options.virtual:
+            raise Refusal("--hand mouse: nobody is as fast as --virtual; leave one of them out")
+        if options.headless:
+            raise Refusal("--hand mouse: --headless and --sheet have no window to point at; leave one of them out")
+        if not has_display():
+            raise Refusal("--hand mouse: no display; set DISPLAY, or leave it out: a script is the hand then")
+    options.seconds = options.seconds or ("600" if options.mouse else "60" if options.serve else "10")
+    if not re.fullmatch(r"[0-9]{1,6}(\.[0-9]+)?", options.seconds) or not re.search("[1-9]", options.seconds):
+        raise Refusal(f"--seconds {options.seconds}: not a positive number of seconds; take 10")
+    size = re.fullmatch(r"([1-9][0-9]{0,4})x([1-9][0-9]{0,4})", options.size)
+    if not size or int(size[1]) > 8192 or int(size[2]) > 8192:
+        raise Refusal(f"--size {options.size}: not WIDTHxHEIGHT in pixels, 1 to 8192 each; take 640x480")
+    if options.device not in BUSES:
+        raise Refusal(f"--device {options.device}: unknown; take omni, falcon or woodenhaptics")
+    bus = BUSES[options.device][0]
+    if options.port not in ("socket", bus):
+        raise Refusal(f"--port {options.port}: not for --device {options.device}; take socket or {bus}")
+    if options.virtual and options.port not in ("socket", "fw"):
+        raise Refusal("--virtual: a USB bus keeps its own time; take --port socket")
+    if not options.headless and not has_display():
+        options.headless = True
+        options.out = options.out or "kerf-demo"  # a user without a display finds the pictures there

@@ -1,0 +1,160 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The parts of `./kerf demo`: options, the folder of --out, processes. .ci/check-kerf.sh runs whole demos.
+
+    demo_test.py ROOT"""
+import os
+import pathlib
+import signal
+import sys
+import tempfile
+import time
+import unittest
+import unittest.mock
+
+sys.path.insert(0, str(pathlib.Path(sys.argv.pop(1), "demo").resolve()))
+import options
+import out_folder
+import processes
+
+
+def checked(*words, display=""):
+    with unittest.mock.patch.dict(os.environ, {"DISPLAY": display, "WAYLAND_DISPLAY": ""}):
+        found = options.parse(words)
+        options.check(found)
+    return found
+
+
+class TestOptions(unittest.TestCase):
+    def test_what_cannot_be_is_refused_by_name(self):
+        for words, place in [(["--fast"], "--fast"), (["--seconds"], "--seconds"), (["--out", ""], "--out"),
+                             (["--out", "--headless"], "--out"), (["--seconds", "1", "--seconds", "2"], "--seconds"),
+                             (["--seconds", "0.0"], "--seconds 0.0"), (["--seconds", "1e3"], "--seconds"),
+                             (["--seconds", "1234567"], "--seconds"), (["--size", "big"], "--size big"),
+                             (["--size", "8193x10"], "--size"), (["--size", "0x480"], "--size"), (["--device", "pen"], "--device"),
+                             (["--port", "usb"], "--port usb"), (["--device", "falcon", "--port", "usb", "--virtual"], "--virtual"),
+                             (["--listen", "0.0.0.0:1"], "--listen"), (["--record", "-"], "--record"),
+                             (["--hand", "mouse"], "--hand mouse"), (["--hand", "mouse", "--virtual"], "--hand mouse"),
+                             (["--hand", "mouse", "--sheet", "s.png"], "--hand mouse")]:
+            with self.subTest(words), self.assertRaises(options.Refusal) as refused:
+                checked(*words)
+            self.assertTrue(str(refused.exception).startswith(place), refused.exception)
+            self.assertNotIn("\n", str(refused.exception))
+
+    def test_defaults(self):
+        self.assertEqual((checked().seconds, checked().out, checked().headless), ("10", "kerf-demo", True))
+        self.assertEqual(checked("--serve").seconds, "60")
+        self.assertEqual(checked("--hand", "mouse", display=":0").seconds, "600")
+        self.assertFalse(checked(display=":0").headless)
+        self.assertEqual(checked("--headless").out, "")
+        self.assertEqual(checked("--size", "8192x1", "--seconds", "999999.5").size, "8192x1")
+
+    def test_the_next_demo_gets_all_but_the_scene(self):
+        found = checked("--scene", "a.toml", "--volume", "b.nrrd", "--set", "x=1", "--set", "y=2", "--stereo", "--rate", "500")
+        self.assertEqual(found.again, ["--set", "x=1", "--set", "y=2", "--stereo", "--rate", "500"])
+        self.assertEqual(found.volume, ["--volume", "b.nrrd", "--set", "x=1", "--set", "y=2"])
+
+
+class TestOutFolder(unittest.TestCase):
+    def setUp(self):
+        temporary = tempfile.TemporaryDirectory()
+        self.addCleanup(temporary.cleanup)
+        self.root = pathlib.Path(temporary.name)
+        self.out = self.root / "new" / "out"
+
+    def demo(self, names=("report.json", "log/ticks.npy", "frame-0001.png"), meanwhile=()):
+        folder = out_folder.OutFolder(str(self.out))
+        folder.check()
+        folder.open(1)
+        for base, files in ((folder.results, names), (folder.place, meanwhile)):
+            for name in files:
+                path = pathlib.Path(base, name)
+                path.parent.mkdir(parents=True, exist_ok=True)
+                path.write_text("some")
+        said, in_place = folder.publish()
+        folder.close()
+        return said, in_place
+
+    def held(self):
+        return sorted(str(path.relative_to(self.out)) for path in self.out.rglob("*") if ".kerf-demo" not in path.parts)
+
+    def test_a_demo_replaces_the_last_one(self):
+        self.assertTrue(self.demo()[1])
+        said, in_place = self.demo(("report.json", "final.nrrd"))
+        self.assertTrue(in_place)
+        self.assertEqual(said, f"kept in {self.out}: final.nrrd report.json, 0 frames")
+        self.assertEqual(self.held(), ["final.nrrd", "report.json"])
+
+    def test_files_of_others_are_refused_and_stay(self):
+        self.demo()
+        for name, text in (("mine", "x"), ("log/note", "x"), ("report.json", "changed")):
+            (self.out / name).write_text(text)
+            with self.subTest(name), self.assertRaisesRegex(options.Refusal, f"holds {name}, which no demo wrote"):
+                self.demo()
+            self.assertEqual((self.out / name).read_text(), text)
+            (self.out / name).unlink()
+
+    def test_what_comes_meanwhile_stays_beside_the_results(self):
+        said, in_place = self.demo(meanwhile=["log/mine"])
+        self.assertFalse(in_place)
+        self.assertIn("log is in the way", said)
+        self.assertEqual((self.out / "log" / "mine").read_text(), "some")
+        self.assertTrue(list(self.out.glob("demo-??????/report.json")))
+
+    def test_two_at_once(self):
+        first = out_folder.OutFolder(str(self.out))
+        first.open(1)
+        second = out_folder.OutFolder(str(self.out))
+        with self.assertRaisesRegex(options.Refusal, "another demo is at work"):
+            second.open(1)
+        second.close()
+        self.assertTrue(os.path.isdir(first.results))
+        first.close()
+        self.assertFalse(self.out.parent.exists())
+
+    def test_no_room_and_no_name(self):
+        folder = out_folder.OutFolder(str(self.out))
+        self.addCleanup(folder.close)
+        with self.assertRaisesRegex(options.Refusal, "MiB free and"):
+            folder.open(1e12)
+        with self.assertRaisesRegex(options.Refusal, "control character"):
+            out_folder.OutFolder("a\nb")
+        with self.assertRaisesRegex(options.Refusal, "cannot be created"):
+            out_folder.OutFolder("/dev/null/x").open(1)
+
+
+class TestProcesses(unittest.TestCase):
+    def setUp(self):
+        temporary = tempfile.TemporaryDirectory()
+        self.addCleanup(temporary.cleanup)
+        self.folder = pathlib.Path(temporary.name)
+        self.programs = processes.Processes(str(self.folder), ("/secret", "out"))
+        self.addCleanup(self.programs.end)
+        self.said = []
+        patch = unittest.mock.patch.object(processes, "complain", self.said.append)
+        patch.start()
+        self.addCleanup(patch.stop)
+
+    def start(self, script):
+        (self.folder / "kerf-x").write_text("#!/bin/sh\n" + script)
+        (self.folder / "kerf-x").chmod(0o755)
+        return self.programs.start("x", [], out="x.log", log="x.log")
+
+    def test_ends(self):
+        for script, code, said in [("exit 0", 0, []), ("echo a; echo /secret/b >&2; exit 2", 2, ["out/b"]),
+                                   ("exit 1", 1, ["kerf: demo: x: ended without a word"]),
+                                   ("kill -SEGV $$", 1, ["kerf: demo: x: ended by signal 11"]),
+                                   ("exit 7", 1, ["kerf: demo: x: ended with exit code 7"])]:
+            self.said.clear()
+            self.assertEqual(self.programs.conclude("x", self.start(script), 10), code)
+            self.assertEqual(self.said, said)
+
+    def test_none_survives(self):
+        stuck = self.start("trap '' TERM; echo on; while :; do sleep 0.1; done")
+        while not os.path.getsize(self.programs.path("x.log")):
+            time.sleep(0.01)
+        self.programs.end()
+        self.assertEqual(stuck.returncode, -signal.SIGKILL)
+        self.assertFalse(os.path.exists(self.programs.run))
+
+
+unittest.main()
