@@ -31,7 +31,7 @@ vec4 voxel_at(int v, vec3 p);
 float presence_between(int v, float front, float back);
 bool is_seen(float extinction);
 float beginning_between(int v, float front, float back);
-vec4 matter_of(int v, vec4 voxel, vec3 p, vec3 to_eye);
+vec4 material_of(int v, vec4 voxel, vec3 p, vec3 to_eye);
 
 const float kCellVox = 8.0;
 const float kOpaque = 0.98;             // as in composite.frag
@@ -144,9 +144,9 @@ void main() {
         voxel[v] = voxel_at(v, at(line[v], to_mm));                                         \
         float presence = presence_between(v, front.a, voxel[v].a);                          \
         vec3 middle = at(line[v], 0.5 * (from_mm + to_mm));                                 \
-        vec4 matter = matter_of(v, 0.5 * (front + voxel[v]), middle, to_eye);               \
-        float extinction = presence * matter.a;                                             \
-        here += extinction / u_edge_mm[v] * vec4(matter.rgb, 1.0);                          \
+        vec4 material = material_of(v, 0.5 * (front + voxel[v]), middle, to_eye);           \
+        float extinction = presence * material.a;                                           \
+        here += extinction / u_edge_mm[v] * vec4(material.rgb, 1.0);                        \
         float begins_mm = mix(from_mm, to_mm, beginning_between(v, front.a, voxel[v].a));   \
         if (is_seen(extinction)) depth_mm = min(depth_mm, begins_mm);                       \
       }

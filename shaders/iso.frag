@@ -16,14 +16,14 @@ uniform vec3 u_texels;             // extent of the volume's textures
 uniform vec3 u_up_eye;             // world up
 uniform float u_near_mm;
 uniform float u_far_mm;
-uniform vec4 u_shown_eye;          // clip plane
+uniform vec4 u_clip_plane_eye;     // clip plane
 uniform float u_iso;
 uniform float u_step_vox;          // along the ray
 
 vec3 eye_direction_at(vec2 ndc);
 vec2 shown_mm(vec3 eye_direction);
 vec2 box_mm(vec3 origin, vec3 inverse_direction, vec3 lo, vec3 hi);
-vec3 lit(vec3 albedo, vec3 normal, vec3 to_eye, vec3 up_eye, float openness);
+vec3 lit(vec3 albedo, vec3 normal, vec3 to_eye, vec3 up_eye, float ao_factor);
 vec3 srgb(vec3 linear);
 float window_depth(float eye_mm, float near_mm, float far_mm);
 vec3 gradient_at(vec3 texture_point);
@@ -56,7 +56,7 @@ float refined_mm(vec3 origin, vec3 direction, float below_mm, float above_mm, fl
 }
 
 // 1 in the open, less where the neighbourhood along the normal is solid: cavities read as such.
-float openness_at(vec3 p, vec3 inward_texture) {
+float ao_factor_at(vec3 p, vec3 inward_texture) {
   const vec3 kReachVox = vec3(2.5, 6.0, 12.0);
   const vec3 kWeight = vec3(0.30, 0.30, 0.25);
   vec3 solid = vec3(density_at(p - kReachVox.x * inward_texture),
@@ -124,12 +124,12 @@ void main() {
   vec3 inward = mat3(u_texture_from_eye) * -normal;
   inward /= length(inward * u_texels);  // one voxel edge
   if (on_face) {
-    normal = -u_shown_eye.xyz;
+    normal = -u_clip_plane_eye.xyz;
     inward = vec3(0.0);  // no border: it shows what lies in the plane
   }
 
-  float openness = on_face ? 1.0 : openness_at(p, inward);
-  vec3 colour = lit(material_at(p, inward), normal, to_eye, u_up_eye, openness);
+  float ao_factor = on_face ? 1.0 : ao_factor_at(p, inward);
+  vec3 colour = lit(material_at(p, inward), normal, to_eye, u_up_eye, ao_factor);
   o_colour = vec4(srgb(colour), 1.0);
   gl_FragDepth = window_depth(t, u_near_mm, u_far_mm);
 }

@@ -4,7 +4,7 @@
 // shader that declares the functions it uses.
 
 // Two lights of a photographer that go with the eye, and a sky that stays with the world.
-vec3 lit(vec3 albedo, vec3 normal, vec3 to_eye, vec3 up_eye, float openness) {
+vec3 lit(vec3 albedo, vec3 normal, vec3 to_eye, vec3 up_eye, float ao_factor) {
   const vec3 kKey = normalize(vec3(-0.45, 0.75, 0.70));
   const vec3 kFill = normalize(vec3(0.80, 0.05, 0.45));
   vec3 ambient = mix(vec3(0.16, 0.145, 0.13), vec3(0.32, 0.34, 0.37),
@@ -15,8 +15,8 @@ vec3 lit(vec3 albedo, vec3 normal, vec3 to_eye, vec3 up_eye, float openness) {
                  vec3(0.75, 0.85, 1.00) * (0.16 * max(dot(normal, kFill), 0.0));
   float shine = pow(max(dot(normal, normalize(kKey + to_eye)), 0.0), 48.0) * 0.22 +
                 pow(max(dot(normal, normalize(kFill + to_eye)), 0.0), 24.0) * 0.04;
-  return albedo * (ambient * openness + diffuse * mix(0.35, 1.0, openness)) +
-         vec3(shine * openness);
+  return albedo * (ambient * ao_factor + diffuse * mix(0.35, 1.0, ao_factor)) +
+         vec3(shine * ao_factor);
 }
 
 vec3 srgb(vec3 linear) {

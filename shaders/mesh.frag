@@ -12,7 +12,7 @@ uniform vec3 u_colour;     // linear
 uniform float u_opacity;   // 0..1
 uniform vec3 u_up_eye;     // world up
 
-vec3 lit(vec3 albedo, vec3 normal, vec3 to_eye, vec3 up_eye, float openness);
+vec3 lit(vec3 albedo, vec3 normal, vec3 to_eye, vec3 up_eye, float ao_factor);
 vec3 srgb(vec3 linear);
 
 // A photographer's tent: bright above, two strip lights, a dark floor.

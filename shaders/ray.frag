@@ -7,7 +7,7 @@ uniform vec2 u_half_size_at_1mm;  // half the picture, 1 mm from the eye
 uniform vec2 u_middle_at_1mm;     // the picture's middle, from the view axis
 uniform float u_near_mm;
 uniform float u_far_mm;
-uniform vec4 u_shown_eye;  // clip plane: shown where dot(this, (p, 1)) >= 0, p in eye mm
+uniform vec4 u_clip_plane_eye;  // clip plane: shown where dot(this, (p, 1)) >= 0, p in eye mm
 
 // Where the ray of a pixel is 1 mm from the eye.
 vec3 eye_direction_at(vec2 ndc) { return vec3(u_middle_at_1mm + ndc * u_half_size_at_1mm, -1.0); }
@@ -15,11 +15,11 @@ vec3 eye_direction_at(vec2 ndc) { return vec3(u_middle_at_1mm + ndc * u_half_siz
 // The part of a ray between the near, the far and the clip plane: t from x to y.
 vec2 shown_mm(vec3 eye_direction) {
   vec2 shown = vec2(u_near_mm, u_far_mm);
-  float slope = dot(u_shown_eye.xyz, eye_direction);
-  float cut = -u_shown_eye.w / slope;
+  float slope = dot(u_clip_plane_eye.xyz, eye_direction);
+  float cut = -u_clip_plane_eye.w / slope;
   if (slope > 0.0) shown.x = max(shown.x, cut);
   if (slope < 0.0) shown.y = min(shown.y, cut);
-  if (slope == 0.0 && u_shown_eye.w < 0.0) shown.y = 0.0;
+  if (slope == 0.0 && u_clip_plane_eye.w < 0.0) shown.y = 0.0;
   return shown;
 }
 

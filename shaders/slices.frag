@@ -21,7 +21,7 @@ vec4 voxel_at(int v, vec3 p);
 float presence_between(int v, float front, float back);
 bool is_seen(float extinction);
 float beginning_between(int v, float front, float back);
-vec4 matter_of(int v, vec4 voxel, vec3 p, vec3 to_eye);
+vec4 material_of(int v, vec4 voxel, vec3 p, vec3 to_eye);
 
 void main() {
   // Of the pixel, not interpolated: slices are cut to what there is in a volume, and a change in one
@@ -41,10 +41,10 @@ void main() {
   if (from_mm >= to_mm || presence <= 0.0) discard;
 
   vec3 middle = origin + 0.5 * (from_mm + to_mm) * direction;
-  vec4 matter = matter_of(0, 0.5 * (front + back), middle, -normalize(eye_direction));
-  float extinction = presence * matter.a;
+  vec4 material = material_of(0, 0.5 * (front + back), middle, -normalize(eye_direction));
+  float extinction = presence * material.a;
   float length_edges = (to_mm - from_mm) * length(eye_direction) / u_edge_mm[0];
-  o_colour = (1.0 - exp2(-extinction * length_edges)) * vec4(matter.rgb, 1.0);
+  o_colour = (1.0 - exp2(-extinction * length_edges)) * vec4(material.rgb, 1.0);
   float depth_mm = mix(from_mm, to_mm, beginning_between(0, front.a, back.a));
   o_depth = is_seen(extinction) ? window_depth(depth_mm, u_near_mm, u_far_mm) : 1.0;
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #version 450 core
-// The surface of a volume: material and openness come with the vertices, light falls on each pixel.
+// The surface of a volume: colour and ambient occlusion come with the
+// vertices, light is computed for each pixel.
 // Depth is that of the projection, which is equation (1): not written, so hidden pixels cost nothing.
 //
 // A mesh is a shell. Where the clip plane opens it, clip_cap.frag draws the face; its inner side shows
@@ -8,25 +9,25 @@
 
 in vec3 v_eye_mm;
 in vec3 v_normal;
-in vec4 v_look;
+in vec4 v_shading;
 layout(location = 0) out vec4 o_colour;
 
 uniform vec3 u_up_eye;     // world up
-uniform vec4 u_shown_eye;  // clip plane
+uniform vec4 u_clip_plane_eye;  // clip plane
 
-vec3 lit(vec3 albedo, vec3 normal, vec3 to_eye, vec3 up_eye, float openness);
+vec3 lit(vec3 albedo, vec3 normal, vec3 to_eye, vec3 up_eye, float ao_factor);
 vec3 srgb(vec3 linear);
 
 void main() {
   vec3 to_eye = -normalize(v_eye_mm);
   vec3 normal = normalize(v_normal);
-  float openness = v_look.a;
+  float ao_factor = v_shading.a;
   if (!gl_FrontFacing) {
-    normal = -u_shown_eye.xyz;
-    openness = 1.0;
+    normal = -u_clip_plane_eye.xyz;
+    ao_factor = 1.0;
   } else if (dot(normal, to_eye) < 0.0) {
     // What is seen faces the eye, whatever the gradient says at a silhouette.
     normal = normalize(normal - 1.02 * dot(normal, to_eye) * to_eye);
   }
-  o_colour = vec4(srgb(lit(v_look.rgb, normal, to_eye, u_up_eye, openness)), 1.0);
+  o_colour = vec4(srgb(lit(v_shading.rgb, normal, to_eye, u_up_eye, ao_factor)), 1.0);
 }

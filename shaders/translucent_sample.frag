@@ -16,7 +16,7 @@ uniform vec3 u_up_eye;                       // world up
 
 const bool kHasLabels[KERF_VOLUMES] = KERF_HAS_LABELS;
 
-vec3 lit(vec3 albedo, vec3 normal, vec3 to_eye, vec3 up_eye, float openness);
+vec3 lit(vec3 albedo, vec3 normal, vec3 to_eye, vec3 up_eye, float ao_factor);
 
 // Gradient and density.
 vec4 voxel_at(int v, vec3 p) {
@@ -64,7 +64,7 @@ bool is_seen(float extinction) { return extinction >= u_least_extinction; }
 
 // Linear colour, lit, of what is at p, and -log2 of the transparency over one edge of it: times a
 // presence and a length in voxel edges that is exact, (1 - a)^(p s / s0) = 2^(-p s / s0 * this).
-vec4 matter_of(int v, vec4 voxel, vec3 p, vec3 to_eye) {
+vec4 material_of(int v, vec4 voxel, vec3 p, vec3 to_eye) {
   vec3 gradient = (voxel.rgb * 255.0 - 128.0) / 127.0;
   vec4 material = kHasLabels[v] ? material_by_label(v, p)
                                 : material_by_density(v, p, gradient, voxel.a);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #version 450 core
-// What a volume with an iso-surface is made of at a place.
+// The material of a volume with an iso-surface at a point.
 
 uniform sampler3D u_density;   // 0..1, inside a border of air one voxel thick
 uniform usampler3D u_label;    // the same extent; 0 = none
@@ -18,17 +18,17 @@ float density_of(vec4 texel) { return texel.r; }
 
 float density_at(vec3 texture_point) { return density_of(texture(u_density, texture_point)); }
 
-// Colour of the labels around, blended so that their borders are smooth, times the share (alpha) of
+// Colour of the labels around, blended so that their borders are smooth, times the fraction (alpha) of
 // voxels that have one.
 vec4 label_colour_at(vec3 texture_point) {
   vec3 texel = texture_point * u_texels - 0.5;
   ivec3 low = ivec3(floor(texel));
-  vec3 share = texel - vec3(low);
+  vec3 fraction = texel - vec3(low);
   vec4 sum = vec4(0.0);
   for (int corner = 0; corner < 8; ++corner) {
     ivec3 side = ivec3(corner & 1, corner >> 1 & 1, corner >> 2);
     uint label = texelFetch(u_label, low + side, 0).r;
-    vec3 weight = mix(1.0 - share, share, vec3(side));
+    vec3 weight = mix(1.0 - fraction, fraction, vec3(side));
     float w = label != 0u ? weight.x * weight.y * weight.z : 0.0;
     sum += w * vec4(texelFetch(u_palette, ivec2(label, 1), 0).rgb, 1.0);
   }

@@ -272,7 +272,7 @@ int run_headless(const VisualizerOptions& options) {
   }
   const auto context = make_headless_context();
   const GlDriver driver = query_gl_driver();
-  FrameReport report{.renderer = options.look.renderer,
+  FrameReport report{.renderer = options.settings.renderer,
                      .gl_renderer = driver.renderer,
                      .context = to_string(context->kind()),
                      .width = options.size.width,
@@ -282,7 +282,7 @@ int run_headless(const VisualizerOptions& options) {
   report.attach_ms = session.attach_ms();
   const Stopwatch since_attached;
   const double aspect = static_cast<double>(options.size.width) / options.size.height;
-  Picture picture(session, options.look, aspect);
+  Picture picture(session, options.settings, aspect);
   FrameTaker taker(picture, options, report);
   taker.draw(session);  // not kept: the driver compiles shaders at their first use
   if (options.attached) write_new_file(*options.attached, "");

@@ -36,9 +36,9 @@ std::string footer() {
   return text.str();
 }
 
-/// What pictures look like at first; `gradient` by its name.
+/// The view settings at first; `gradient` by its name.
 void declare_look(Arguments& app, VisualizerOptions& o, std::string& gradient) {
-  app.option("--renderer", o.look.renderer,
+  app.option("--renderer", o.settings.renderer,
              "how volumes are drawn: " + listed(renderer_kinds()) +
                  "; with commas one for each volume, such as surface,blend")
       .shown_as("KIND[,KIND...]")
@@ -52,21 +52,21 @@ void declare_look(Arguments& app, VisualizerOptions& o, std::string& gradient) {
              "opacity of each material, TOML, for blend, slices and cast-blend; in the window w "
              "writes it")
       .shown_as("FILE");
-  app.flag("--voxel-tool", o.look.voxel_tool,
+  app.flag("--voxel-tool", o.settings.voxel_tool,
            "the tool as a volume of voxels, which the renderer draws as it does the others and "
            "the clip plane cuts too");
-  app.flag("--colour-blind", o.look.colour_blind,
+  app.flag("--colour-blind", o.settings.colour_blind,
            "materials in Okabe and Ito's colours, which any colour vision tells apart; in the "
            "window y");
   app.option("--panel-scale", o.panel_scale,
              "size of the panels, as far as the picture has room for it (default: the display's, "
              "headless 1)")
       .within(1.0, 8.0);
-  app.flag("--stereo", o.look.stereo.on, "two eyes side by side, each in half the width");
-  app.option("--eyes", o.look.stereo.eyes_mm,
+  app.flag("--stereo", o.settings.stereo.on, "two eyes side by side, each in half the width");
+  app.option("--eyes", o.settings.stereo.eyes_mm,
              "stereo: mm between the eyes; negative: crossed (default: 1/30 of --convergence)")
       .within(-1e3, 1e3);
-  app.option("--convergence", o.look.stereo.convergence_mm,
+  app.option("--convergence", o.settings.stereo.convergence_mm,
              "stereo: mm to what lies in the screen (default: to where the camera looks)")
       .within(1.0, 1e6);
 }
@@ -153,7 +153,7 @@ PictureSize parse_size(const std::string& text) {
 std::optional<VisualizerOptions> parse_options(int argc, const char* const* argv) {
   VisualizerOptions options;
   std::string size = "800x600";
-  std::string gradient(name_of(options.look.gradient));
+  std::string gradient(name_of(options.settings.gradient));
   CommandLine app("Shows what a kerf-controller feels and mills, in a window or as PNG pictures.",
                   "kerf-visualizer", "kerf-visualizer " KERF_VERSION);
   app.footer(footer());
@@ -192,9 +192,9 @@ std::optional<VisualizerOptions> parse_options(int argc, const char* const* argv
                           " has no pointer that could lead a hand; give one of the two");
   }
   options.size = parse_size(size);
-  check_renderers(options.look.renderer);
-  options.look.gradient = gradient_named(gradient);
-  if (options.transfer) options.look.opacities = read_transfer(*options.transfer);
+  check_renderers(options.settings.renderer);
+  options.settings.gradient = gradient_named(gradient);
+  if (options.transfer) options.settings.opacities = read_transfer(*options.transfer);
   return options;
 }
 

@@ -16,7 +16,7 @@ namespace kerf {
 /// The command line of kerf-visualizer.
 struct VisualizerOptions {
   std::string name = kDefaultName;  ///< of the controller
-  ViewSettings look;                ///< at first; its opacities are those of `transfer`
+  ViewSettings settings;            ///< at first; its opacities are those of `transfer`
   PictureSize size{800, 600};
   std::optional<double> panel_scale;  ///< of the panels' letters; none: the display's density
   bool headless = false;

@@ -33,7 +33,7 @@ namespace kerf {
 Session attach(const VisualizerOptions& options) {
   Session session = Session::attach(options.name, std::chrono::duration<double>(options.wait_s));
   if (options.transfer) {
-    check_materials(options.look.opacities, session.scene(), options.transfer->string());
+    check_materials(options.settings.opacities, session.scene(), options.transfer->string());
   }
   return session;
 }

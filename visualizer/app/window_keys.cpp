@@ -88,10 +88,10 @@ std::string no_such_tool(std::size_t index, std::size_t tools) {
          "; press 1" + last;
 }
 
-void change_look(Picture& picture, const Session& session, const ViewSettings& look,
+void change_view(Picture& picture, const Session& session, const ViewSettings& settings,
                  Notices& notices, Notices::Clock::time_point now) {
   try {
-    picture.set_look(session, look);
+    picture.set_view(session, settings);
   } catch (const VisualizerError& problem) {
     notices.say({problem.what(), true}, now);
   }
@@ -119,7 +119,7 @@ void WindowKeys::switch_panel(bool& panel, bool& other) {
 bool WindowKeys::apply(const WindowInput& input, Session& session, Picture& picture, double aspect,
                        Notices& notices, Notices::Clock::time_point now) {
   bool quit = input.close;
-  ViewSettings look = picture.look();
+  ViewSettings settings = picture.settings();
   const std::vector<VolumeView>& volumes = session.scene().volumes;
   if (one > volumes.size()) one = 0;  // another controller may show fewer
   for (const char key : input.keys) {
@@ -137,8 +137,8 @@ bool WindowKeys::apply(const WindowInput& input, Session& session, Picture& pict
     if (key == 'l') switch_panel(slices, plot);
     if (key == 'p') switch_panel(plot, slices);
     if (key == 'v') {
-      look.renderer = one > 0 ? next_renderer(look.renderer, volumes.size(), one - 1)
-                              : next_renderer(look.renderer);
+      settings.renderer = one > 0 ? next_renderer(settings.renderer, volumes.size(), one - 1)
+                                  : next_renderer(settings.renderer);
     }
     if (key == 'b') {
       one = (one + 1) % (volumes.size() + 1);
@@ -149,18 +149,18 @@ bool WindowKeys::apply(const WindowInput& input, Session& session, Picture& pict
     if (key == 'k') park = true;
     if (key == 'z') undo_stroke(session, notices, now);
     if (key == 'u') undo_all(undo_asked, session, notices, now);
-    if (key == 'c') look.clip.on = !look.clip.on;
-    if (key == 'x') look.clip = picture.facing_plane(tip_of(session));
-    if (key == 'y') look.colour_blind = !look.colour_blind;
-    if (key == 't') look.stereo.on = !look.stereo.on;
+    if (key == 'c') settings.clip.on = !settings.clip.on;
+    if (key == 'x') settings.clip = picture.facing_plane(tip_of(session));
+    if (key == 'y') settings.colour_blind = !settings.colour_blind;
+    if (key == 't') settings.stereo.on = !settings.stereo.on;
     if (key >= '1' && key <= '9') {
       take_tool(static_cast<std::size_t>(key - '1'), session, notices, now);
     }
   }
-  if (look.clip.on && input.plane != 0.0) {
-    look.clip = picture.moved(look.clip, -kMmPerNotch * input.plane);
+  if (settings.clip.on && input.plane != 0.0) {
+    settings.clip = picture.moved(settings.clip, -kMmPerNotch * input.plane);
   }
-  change_look(picture, session, look, notices, now);
+  change_view(picture, session, settings, notices, now);
   return quit;
 }
 

@@ -14,9 +14,9 @@
 
 namespace kerf {
 
-/// Gives the picture another look. Where its renderer cannot show these volumes, the picture keeps
-/// its look and a notice gives the reason.
-void change_look(Picture& picture, const Session& session, const ViewSettings& look,
+/// Gives the picture other settings. If their renderer cannot show these volumes, the picture keeps
+/// its own and a notice gives the reason.
+void change_view(Picture& picture, const Session& session, const ViewSettings& settings,
                  Notices& notices, Notices::Clock::time_point now);
 
 /// Message to a user who asks for tool `index`, counted from 0, of a scene that has `tools`.
@@ -44,8 +44,8 @@ struct WindowKeys {
   std::size_t one = 0;  ///< volume that v is for, counted from 1; 0: all
   std::optional<Notices::Clock::time_point> undo_asked{};  ///< u once: the second one is meant
 
-  /// Takes the keys of `input`: the camera and the look of `picture`, and the tool, follow at once.
-  /// True when the user wants to leave.
+  /// Takes the keys of `input`: the camera and the settings of `picture`, and the tool, follow at
+  /// once. True when the user wants to leave.
   bool apply(const WindowInput& input, Session& session, Picture& picture, double aspect,
              Notices& notices, Notices::Clock::time_point now);
 

@@ -39,7 +39,7 @@ void move_camera_around(OrbitCamera& camera, const glm::dvec3& goal_mm, const Wi
 FollowedSession::FollowedSession(const VisualizerOptions& options, Session first, double aspect)
     : options_(options),
       session_(std::move(first)),
-      picture_(std::in_place, session_, options.look, aspect) {}
+      picture_(std::in_place, session_, options.settings, aspect) {}
 
 void FollowedSession::update(double aspect, Clock::time_point now) {
   if (session_.ended() && now >= next_attach_) attach_again(aspect, now);
@@ -56,12 +56,12 @@ void FollowedSession::attach_again(double aspect, Clock::time_point now) {
     return;  // not there yet
   }
   earlier_bricks_ += picture_->bricks_uploaded();
-  ViewSettings look = picture_->look();
+  ViewSettings settings = picture_->settings();
   if (session_.scene().volumes.size() != volumes) {
-    look.renderer = renderer_of_each(look.renderer, volumes).front();
+    settings.renderer = renderer_of_each(settings.renderer, volumes).front();
   }
   picture_.reset();  // before the new one: one overlay at a time
-  picture_.emplace(session_, look, aspect);
+  picture_.emplace(session_, settings, aspect);
 }
 
 WindowRun::WindowRun(const VisualizerOptions& options, Session first, const GlContext& context,
@@ -69,7 +69,7 @@ WindowRun::WindowRun(const VisualizerOptions& options, Session first, const GlCo
     : options_(options),
       since_attached_(since_attached),
       record_from_start_(options.record.has_value()),
-      report_{.renderer = options.look.renderer,
+      report_{.renderer = options.settings.renderer,
               .gl_renderer = query_gl_driver().renderer,
               .context = to_string(context.kind()),
               .attach_ms = first.attach_ms()},
@@ -106,7 +106,7 @@ WindowRun::Frame WindowRun::step(const WindowInput& input, PictureSize size,
 }
 
 int WindowRun::end() {
-  report_.renderer = picture().look().renderer;
+  report_.renderer = picture().settings().renderer;
   report_.bricks_uploaded = followed_.bricks_uploaded();
   report_.clean_end = session().ended_cleanly();
   if (options_.report) report_.write(*options_.report);
@@ -252,7 +252,7 @@ Redrawn WindowRun::draw(PictureSize size, const WindowInput& input, Clock::time_
     take_tool(figures.controls->tool, session(), notices_, now);
     figures.controls->tool = held;  // until the controller has changed it
   }
-  change_look(picture(), session(), figures.controls->look, notices_, now);
+  change_view(picture(), session(), figures.controls->settings, notices_, now);
   if (std::exchange(keys_.write, false) || std::exchange(figures.controls->write, false)) {
     notices_.say(write_opacities(options_, picture()), now);
   }

@@ -23,7 +23,7 @@
 namespace kerf {
 
 /// The session in a window and its picture. A controller that is started again under the same name
-/// takes the place of the one that ended; the look stays.
+/// replaces the one that ended; the view settings stay.
 class FollowedSession {
  public:
   using Clock = std::chrono::steady_clock;

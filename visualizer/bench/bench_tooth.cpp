@@ -13,7 +13,7 @@ namespace kerf {
 
 namespace {
 
-// Lengths are shares of the tooth's height; the root tips are at z = 0, x is its width.
+// Lengths are fractions of the tooth's height; the root tips are at z = 0, x is its width.
 constexpr double kHeightMm = 22.4;
 constexpr double kEnamel = 0.9, kDentin = 0.6, kIso = 0.3;
 constexpr double kEnamelThickness = 0.045, kEnamelFrom = 0.55;
@@ -93,8 +93,8 @@ BenchTooth::BenchTooth(const VoxelGrid& padded, bool cropped) {
   const glm::dvec3 middle = 0.5 * glm::dvec3(grid.nx - 1, grid.ny - 1, 0);
   density_.reserve(grid.voxel_count());
   for_each_voxel(grid.box(), [&](int x, int y, int z) {
-    const double share = density_at((glm::dvec3(x, y, z) - middle) * edge, edge);
-    density_.push_back(static_cast<Density>(std::lround(share * kDensityMax)));
+    const double fraction = density_at((glm::dvec3(x, y, z) - middle) * edge, edge);
+    density_.push_back(static_cast<Density>(std::lround(fraction * kDensityMax)));
   });
   // The crown is up in the world, and the side of low y faces the camera.
   const double edge_mm = edge * kHeightMm;
@@ -120,7 +120,7 @@ BenchTooth::BenchTooth(const VoxelGrid& padded, bool cropped) {
 
 ChangedBricks BenchTooth::cut(int diameter) {
   const BrickGrid& bricks = view().bricks;
-  const VoxelIndex centre = next_place();
+  const VoxelIndex centre = next_centre();
   const VoxelBox box = VoxelBox{}.with(centre).grown(diameter / 2).clipped(bricks.grid.box());
   ChangedBricks cut;
   for_each_voxel(bricks.bricks_of(box), [&](int x, int y, int z) {
@@ -145,21 +145,22 @@ ChangedBrick BenchTooth::take_ball(std::uint32_t brick, VoxelIndex centre, doubl
 }
 
 /// To and fro across the crown, a row lower each time; from there in to what is left of the tooth.
-VoxelIndex BenchTooth::next_place() {
-  constexpr int kPlacesAcross = 12, kRows = 6;
+VoxelIndex BenchTooth::next_centre() {
+  constexpr int kCutsAcross = 12, kRows = 6;
   constexpr int kStride = 5;  // not beside the last cut, which would be deepened
   constexpr double kWidth = 0.36, kTop = 0.82, kRowStep = 0.045;
   const VoxelGrid& grid = view().bricks.grid;
   const int row = cuts_ % kRows;
-  const int across = kStride * cuts_ % kPlacesAcross;
+  const int across = kStride * cuts_ % kCutsAcross;
   ++cuts_;
-  const double x = kWidth * ((across + 0.5) / kPlacesAcross - 0.5);
-  VoxelIndex place{grid.nx / 2 + static_cast<int>(std::lround(x * grid.nz)), 0,
-                   static_cast<int>(std::lround((kTop - kRowStep * row) * grid.nz))};
-  while (place.y < grid.ny - 1 && density_[grid.index(place.x, place.y, place.z)] < view().iso) {
-    ++place.y;
+  const double x = kWidth * ((across + 0.5) / kCutsAcross - 0.5);
+  VoxelIndex centre{grid.nx / 2 + static_cast<int>(std::lround(x * grid.nz)), 0,
+                    static_cast<int>(std::lround((kTop - kRowStep * row) * grid.nz))};
+  while (centre.y < grid.ny - 1 &&
+         density_[grid.index(centre.x, centre.y, centre.z)] < view().iso) {
+    ++centre.y;
   }
-  return place;
+  return centre;
 }
 
 }  // namespace kerf

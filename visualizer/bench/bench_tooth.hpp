@@ -10,7 +10,8 @@
 namespace kerf {
 
 /// A synthetic molar for timing pictures: a crown with four cusps, two roots, enamel denser than
-/// dentin. It is as high as the grid, and fills the same share of it as the paper's padded tooth.
+/// dentin. It is as high as the grid, and fills the same fraction of it as the paper's padded
+/// tooth.
 class BenchTooth {
  public:
   /// `cropped`: without the air around; the voxels are the same.
@@ -23,12 +24,12 @@ class BenchTooth {
   [[nodiscard]] const std::vector<Density>& density() const noexcept { return density_; }
   [[nodiscard]] VolumeContent content() const { return {density_, {}}; }
 
-  /// Takes away a ball of `diameter` voxels at the next place on the crown's side that the camera
-  /// sees. A dozen places lie apart; after many a small tooth is bored through.
+  /// Takes away a ball of `diameter` voxels at the next point on the crown's side that the camera
+  /// sees. A dozen points lie apart; after many a small tooth is bored through.
   ChangedBricks cut(int diameter);
 
  private:
-  [[nodiscard]] VoxelIndex next_place();
+  [[nodiscard]] VoxelIndex next_centre();
   [[nodiscard]] ChangedBrick take_ball(std::uint32_t brick, VoxelIndex centre, double radius);
 
   SceneView scene_;

@@ -46,8 +46,9 @@ std::vector<Density> ball(double noise) {
     for (int k = 0; k < 12 && noise > 0.0; ++k) {
       normal += static_cast<double>(random()) * 0x1p-32 - 0.5;
     }
-    const double share = std::clamp(0.5 - 0.5 * distance, 0.0, 1.0) + noise * normal;
-    density.push_back(static_cast<Density>(std::lround(std::clamp(share, 0.0, 1.0) * kDensityMax)));
+    const double fraction = std::clamp(0.5 - 0.5 * distance, 0.0, 1.0) + noise * normal;
+    density.push_back(
+        static_cast<Density>(std::lround(std::clamp(fraction, 0.0, 1.0) * kDensityMax)));
   }
   return density;
 }

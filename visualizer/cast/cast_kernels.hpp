@@ -27,7 +27,7 @@ struct CastBlock {
 /// One volume as the cast kernels see it: plain pointers, because their files are compiled for
 /// instruction sets that other machines lack, and no inline function may be shared with them.
 ///
-/// Places are in voxel edges, counted from the border of air: voxel v is at v + 1.
+/// Positions are in voxel edges, counted from the border of air: voxel v is at v + 1.
 struct CastVolumeJob {
   const std::uint32_t* density = nullptr;   ///< `PairedRows`
   const std::uint16_t* labels = nullptr;    ///< `PairedRows`, or none
@@ -45,7 +45,7 @@ struct CastVolumeJob {
   const float* by_density = nullptr;
   const float* by_label = nullptr;
   float settled = 1.0F;             ///< from this density on `by_density` stays what it is
-  float empty = 0.0F, full = 1.0F;  ///< blend: densities where matter begins and where it is whole
+  float empty = 0.0F, full = 1.0F;  ///< blend: densities of presence 0 and 1
   float iso = 0.5F;                 ///< 0..1
 };
 
@@ -55,8 +55,8 @@ struct CastEye {
   float half_width_at_1mm = 0.25F, half_height_at_1mm = 0.25F;
   float middle_right_at_1mm = 0.0F;  ///< `View::middle_right`
   float near_mm = 1.0F, far_mm = 100.0F;
-  float depth_far = 0.0F, depth_slope = 0.0F;  ///< equation (1): depth_far - depth_slope / t
-  float shown[4] = {0.0F, 0.0F, 0.0F, 1.0F};   ///< clip plane, of `View`
+  float depth_far = 0.0F, depth_slope = 0.0F;      ///< equation (1): depth_far - depth_slope / t
+  float clip_plane[4] = {0.0F, 0.0F, 0.0F, 1.0F};  ///< clip plane, of `View`
 };
 
 /// The picture that the kernels fill. Rows from the bottom up, as GL has them.
@@ -100,9 +100,9 @@ extern const CastKernels kCastAvx512Gather;
 extern const CastKernels kCastAvx2;
 extern const CastKernels kCastScalar;
 
-/// The footprint of a ray: a voxel farther from the ray than this, on any axis, has no share in the
+/// The footprint of a ray: a voxel farther from the ray than this, on any axis, has no part in the
 /// ray's colour. In half voxel edges. It includes half an edge of slack, for rounding and because
-/// rays are tested at discrete places.
+/// rays are tested at discrete points.
 struct RayFootprint {
   int along = 0;   ///< before the ray's end
   int at_end = 0;  ///< at the ray's end; 0: as before it. Else both are odd, or both even
@@ -121,8 +121,8 @@ inline constexpr float kShadingTapsVox[] = {-2.5F, -1.25F, 1.25F, 2.5F, 6.0F, 12
 inline constexpr float kLongestTapVox = 12.0F;
 
 /// Input of the kernels that test rays against the changed cells of a volume (`ChangedCells`):
-/// plain pointers, as in `CastVolumeJob`. Places are in voxel edges from the lowest corner of the
-/// cells.
+/// plain pointers, as in `CastVolumeJob`. Positions are in voxel edges from the lowest corner of
+/// the cells.
 struct RedrawJob {
   CastEye eye;
   float origin[3] = {};         ///< the eye
@@ -142,7 +142,7 @@ struct RedrawJob {
   /// All of the volume, for surfaces whose shading samples it (`kShadingTapsVox`); else null.
   const std::uint16_t* density = nullptr;
   std::int32_t extent[3] = {};  ///< of the volume
-  float first_voxel[3] = {};    ///< place of voxel (0, 0, 0)
+  float first_voxel[3] = {};    ///< position of voxel (0, 0, 0)
   float centre_mm[3] = {};      ///< of the marked cells, in eye space
   float half_mm[3][3] = {};     ///< half their edges, in eye space: [axis of the volume]
   float edge_mm = 1.0F;         ///< of a voxel, the longest

@@ -83,9 +83,9 @@ constexpr float kMost = 0.996F;  // opacity: 1 has no finite extinction
 constexpr double kBorder = 1.0;  // voxels of air around the volume: voxel v is at v + 1
 
 /// Samples below show nothing.
-Density least_visible(CastMode mode, const VolumeView& volume, const TransferFunction& matter) {
+Density least_visible(CastMode mode, const VolumeView& volume, const TransferFunction& transfer) {
   if (mode == CastMode::iso) return volume.iso;
-  return static_cast<Density>(std::max(1.0, std::floor(matter.empty * kDensityMax)));
+  return static_cast<Density>(std::max(1.0, std::floor(transfer.empty * kDensityMax)));
 }
 
 VoxelGrid checked(const VolumeView& volume) {
@@ -104,12 +104,12 @@ VoxelGrid checked(const VolumeView& volume) {
 CastVolume::CastVolume(const VolumeView& volume, const CastContent& content, CastMode mode)
     : bricks_(volume.bricks),
       world_from_voxel_(volume.world_from_voxel),
-      matter_(content.matter),
+      transfer_(content.transfer),
       iso_(static_cast<float>(volume.iso / kDensityMax)),
       density_(checked(volume)),
-      cells_(volume.bricks.grid, content.density, least_visible(mode, volume, content.matter),
+      cells_(volume.bricks.grid, content.density, least_visible(mode, volume, content.transfer),
              kCastCellVox) {
-  set_materials(content.matter.materials);
+  set_materials(content.transfer.materials);
   active_.resize(cells_.active().size() + sizeof(std::uint32_t));
   take_cells(cells_.grid().box());
   density_.copy(bricks_.grid.box(), content.density);
@@ -120,11 +120,11 @@ CastVolume::CastVolume(const VolumeView& volume, const CastContent& content, Cas
 }
 
 void CastVolume::set_materials(const Palette& materials) {
-  matter_.materials = materials;
-  for (auto& row : matter_.materials) {
+  transfer_.materials = materials;
+  for (auto& row : transfer_.materials) {
     for (glm::vec4& material : row) material.w = -std::log2(1.0F - std::min(material.w, kMost));
   }
-  const auto& by_density = matter_.materials[0];
+  const auto& by_density = transfer_.materials[0];
   std::size_t first = by_density.size() - 1;
   while (first > 0 && by_density[first - 1] == by_density.back()) --first;
   settled_ = static_cast<float>(first) / static_cast<float>(by_density.size() - 1);
@@ -209,7 +209,7 @@ CastVolumeJob CastVolume::job(const View& view, std::int32_t width, std::int32_t
   const glm::dmat4 world_from_cell = glm::scale(world_from_border, glm::dvec3(kCastCellVox));
   blocks_.draw(outer_cells_, near_plane_is_inside(view, world_from_cell), world_from_cell, view,
                width, height, part);
-  const glm::dmat4 place_from_eye = glm::affineInverse(view.eye_from_world * world_from_border);
+  const glm::dmat4 voxel_from_eye = glm::affineInverse(view.eye_from_world * world_from_border);
   const VoxelGrid& grid = bricks_.grid;
   const glm::ivec3 extent(grid.nx, grid.ny, grid.nz);
   CastVolumeJob job;
@@ -223,19 +223,19 @@ CastVolumeJob CastVolume::job(const View& view, std::int32_t width, std::int32_t
   job.plane = density_.plane();
   job.cell_row = cells_.grid().nx;
   job.cell_plane = cells_.grid().nx * cells_.grid().ny;
-  job.by_density = &matter_.materials[0][0].x;
-  job.by_label = &matter_.materials[1][0].x;
+  job.by_density = &transfer_.materials[0][0].x;
+  job.by_label = &transfer_.materials[1][0].x;
   job.settled = settled_;
-  job.empty = static_cast<float>(matter_.empty);
-  job.full = static_cast<float>(matter_.full);
+  job.empty = static_cast<float>(transfer_.empty);
+  job.full = static_cast<float>(transfer_.full);
   job.edge_mm = static_cast<float>(edge_mm());
   job.iso = iso_;
   for (int to = 0; to < 3; ++to) {
     // The last cell of voxels ends at extent + 1; its far side belongs to no cell.
     job.last[to] = std::nextafter(static_cast<float>(extent[to] + 1), 0.0F);
   }
-  put(job.origin, glm::dvec3(place_from_eye[3]));
-  put(job.from_eye, glm::dmat3(place_from_eye));
+  put(job.origin, glm::dvec3(voxel_from_eye[3]));
+  put(job.from_eye, glm::dmat3(voxel_from_eye));
   return job;
 }
 
@@ -253,8 +253,9 @@ CastEye cast_eye(const View& view, std::int32_t width, std::int32_t height) {
   eye.depth_far = static_cast<float>(view.far_mm / span_mm);
   eye.depth_slope = static_cast<float>(view.far_mm * view.near_mm / span_mm);
   // A plane goes over by the transposed inverse.
-  const glm::dvec4 shown = glm::transpose(glm::affineInverse(view.eye_from_world)) * view.shown;
-  for (int i = 0; i < 4; ++i) eye.shown[i] = static_cast<float>(shown[i]);
+  const glm::dvec4 plane =
+      glm::transpose(glm::affineInverse(view.eye_from_world)) * view.clip_plane;
+  for (int i = 0; i < 4; ++i) eye.clip_plane[i] = static_cast<float>(plane[i]);
   return eye;
 }
 

@@ -112,7 +112,7 @@ enum class CastMode : std::uint8_t { iso, blend };
 struct CastContent {
   std::span<const Density> density;
   std::span<const Label> labels;  ///< empty, or one per voxel
-  TransferFunction matter;
+  TransferFunction transfer;
 };
 
 /// A volume as the ray caster keeps it; whole once, then bricks only.
@@ -146,9 +146,9 @@ class CastVolume {
 
   BrickGrid bricks_;
   glm::dmat4 world_from_voxel_;
-  TransferFunction matter_;  ///< extinction in place of opacity
-  float settled_ = 1.0F;     ///< `CastVolumeJob::settled`
-  float iso_;                ///< 0..1
+  TransferFunction transfer_;  ///< extinction in place of opacity
+  float settled_ = 1.0F;       ///< `CastVolumeJob::settled`
+  float iso_;                  ///< 0..1
   PairedRows<Density, std::uint32_t> density_;
   std::optional<PairedRows<Label, std::uint16_t>> labels_;
   std::optional<GradientRows> gradient_;  ///< blend only

@@ -19,11 +19,11 @@ namespace {
 
 using Corners = std::array<glm::dvec3, 3>;  // in edges of the grid, from its first point
 
-Corners corners_of(const Facets& facets, std::size_t triangle, const GridPlaces& places) {
+Corners corners_of(const Facets& facets, std::size_t triangle, const GridPoints& points) {
   Corners corners;
   for (std::size_t k = 0; k < 3; ++k) {
     const auto& p = facets.points_mm[facets.triangles[triangle][k]];
-    corners[k] = (glm::dvec3(p[0], p[1], p[2]) - places.first_mm) / places.edge_mm;
+    corners[k] = (glm::dvec3(p[0], p[1], p[2]) - points.first_mm) / points.edge_mm;
   }
   return corners;
 }
@@ -31,8 +31,9 @@ Corners corners_of(const Facets& facets, std::size_t triangle, const GridPlaces&
 double distance_to_edge(const glm::dvec3& at, const glm::dvec3& a, const glm::dvec3& b) {
   const glm::dvec3 along = b - a;
   const double square = glm::dot(along, along);
-  const double share = square > 0.0 ? std::clamp(glm::dot(at - a, along) / square, 0.0, 1.0) : 0.0;
-  return glm::length(at - a - share * along);
+  const double fraction =
+      square > 0.0 ? std::clamp(glm::dot(at - a, along) / square, 0.0, 1.0) : 0.0;
+  return glm::length(at - a - fraction * along);
 }
 
 double distance_to(const Corners& t, const glm::dvec3& at) {
@@ -64,7 +65,7 @@ struct HalfSpace {
 /// out; all points if it is hardly more than a line, which hardly defines its plane.
 std::array<HalfSpace, 5> around(const Corners& t, double reach) {
   constexpr double kSlack = 1e-6;  // edges of the grid: more than rounding
-  constexpr double kLeastShare = 1e-6;
+  constexpr double kLeastFraction = 1e-6;
   std::array<HalfSpace, 5> sides{};
   const glm::dvec3 across = glm::cross(t[1] - t[0], t[2] - t[0]);
   const double size = glm::length(across);
@@ -73,7 +74,7 @@ std::array<HalfSpace, 5> around(const Corners& t, double reach) {
     const glm::dvec3 edge = t[(k + 1) % 3] - t[k];
     longest_2 = std::max(longest_2, glm::dot(edge, edge));
   }
-  if (!(size > kLeastShare * longest_2)) return sides;
+  if (!(size > kLeastFraction * longest_2)) return sides;
   const glm::dvec3 normal = across / size;
   const auto side = [&](const glm::dvec3& out, const glm::dvec3& through) {
     return HalfSpace{out, glm::dot(out, through) + reach + kSlack};
@@ -144,17 +145,17 @@ void wind(const Corners& t, const VoxelGrid& grid, std::vector<std::int32_t>& st
 
 }  // namespace
 
-std::vector<float> facet_distances(const Facets& facets, const GridPlaces& places,
+std::vector<float> facet_distances(const Facets& facets, const GridPoints& points,
                                    double reach_mm) {
-  const VoxelGrid& grid = places.grid;
-  const double reach = reach_mm / places.edge_mm;
+  const VoxelGrid& grid = points.grid;
+  const double reach = reach_mm / points.edge_mm;
   std::vector<float> distance(grid.voxel_count(), static_cast<float>(reach_mm));
   std::vector<std::int32_t> winding(distance.size());  // steps of it, from above to below
   for (std::size_t i = 0; i < facets.triangles.size(); ++i) {
-    const Corners t = corners_of(facets, i, places);
+    const Corners t = corners_of(facets, i, points);
     for_points_near(t, reach, grid, [&](std::int32_t x, std::int32_t y, std::int32_t z) {
       float& nearest = distance[grid.index(x, y, z)];
-      const double own = distance_to(t, glm::dvec3(x, y, z)) * places.edge_mm;
+      const double own = distance_to(t, glm::dvec3(x, y, z)) * points.edge_mm;
       nearest = std::min(nearest, static_cast<float>(own));
     });
     wind(t, grid, winding);
@@ -181,8 +182,9 @@ constexpr glm::dvec3 kToolColour{0.60, 0.60, 0.61};
 double distance_to_wall(const ProfilePoint& a, const ProfilePoint& b, const glm::dvec2& at) {
   const glm::dvec2 from(a[0], a[1]), along = glm::dvec2(b[0], b[1]) - from;
   const double square = glm::dot(along, along);
-  const double share = square > 0.0 ? std::clamp(glm::dot(at - from, along) / square, 0.0, 1.0) : 0;
-  return glm::length(at - from - share * along);
+  const double fraction =
+      square > 0.0 ? std::clamp(glm::dot(at - from, along) / square, 0.0, 1.0) : 0;
+  return glm::length(at - from - fraction * along);
 }
 
 /// Whether the line from `at` away from the axis crosses this wall.
@@ -303,8 +305,8 @@ void ToolVolume::fill(const Parts& parts) {
             std::lerp(to_surface[low], to_surface[low + 1], at - static_cast<double>(low));
         const std::size_t voxel = grid_.index(x, y, z);
         const double distance_mm = std::min(swept_mm, static_cast<double>(to_facets[voxel]));
-        const double share = std::clamp(0.5 - 0.5 * distance_mm / ramp_mm, 0.0, 1.0);
-        density_[voxel] = static_cast<Density>(std::lround(share * kDensityMax));
+        const double fraction = std::clamp(0.5 - 0.5 * distance_mm / ramp_mm, 0.0, 1.0);
+        density_[voxel] = static_cast<Density>(std::lround(fraction * kDensityMax));
       }
     }
   }

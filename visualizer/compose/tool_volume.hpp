@@ -15,8 +15,8 @@
 
 namespace kerf {
 
-/// Where the points of a cubic grid stand beside a body.
-struct GridPlaces {
+/// Positions of the points of a cubic grid.
+struct GridPoints {
   VoxelGrid grid;
   glm::dvec3 first_mm;
   double edge_mm;
@@ -24,7 +24,7 @@ struct GridPlaces {
 
 /// Signed distance of every point to the surface of a closed mesh, mm, negative inside; +-reach_mm
 /// where it is more. Inside is where the mesh winds around a point. x fastest.
-[[nodiscard]] std::vector<float> facet_distances(const Facets& facets, const GridPlaces& places,
+[[nodiscard]] std::vector<float> facet_distances(const Facets& facets, const GridPoints& points,
                                                  double reach_mm);
 
 /// The tool in the hand as a volume of voxels: a volume of the scene like any other, which moves.
@@ -37,7 +37,8 @@ class ToolVolume {
   /// Throws VisualizerError if the scene has no tool with an extent, or no room for a material.
   explicit ToolVolume(const SceneView& scene);
 
-  /// The scene with this volume as its last and with its material; the others keep their looks.
+  /// The scene with this volume as its last and with its material; the others keep their colours
+  /// and opacities.
   [[nodiscard]] SceneView added_to(const SceneView& scene) const;
   [[nodiscard]] VolumeContent content() const { return {density_, labels_}; }
 

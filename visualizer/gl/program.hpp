@@ -47,7 +47,7 @@ class GlProgram {
 };
 
 /// What ray.frag and the light need to know of a view: u_half_size_at_1mm, u_middle_at_1mm,
-/// u_near_mm, u_far_mm, u_shown_eye, u_up_eye.
+/// u_near_mm, u_far_mm, u_clip_plane_eye, u_up_eye.
 void set_view(const GlProgram& program, const View& view);
 
 }  // namespace kerf

@@ -45,10 +45,10 @@ std::string size_text(PictureSize size) {
   return std::to_string(size.width) + "x" + std::to_string(size.height);
 }
 
-std::string look_text(const ViewSettings& look) {
-  return look.renderer + (look.clip.on ? ", cut open" : "") + (look.stereo.on ? ", stereo" : "") +
-         (look.voxel_tool ? ", voxel tool" : "") + ", gradient " +
-         std::string(name_of(look.gradient));
+std::string settings_text(const ViewSettings& settings) {
+  return settings.renderer + (settings.clip.on ? ", cut open" : "") +
+         (settings.stereo.on ? ", stereo" : "") + (settings.voxel_tool ? ", voxel tool" : "") +
+         ", gradient " + std::string(name_of(settings.gradient));
 }
 
 /// "N pixels, within (x, y) to (x, y)", from the upper left corner; empty if they are equal.
@@ -88,10 +88,10 @@ Monkey::Monkey(const GlContext& context, const Habits& habits)
   options_.size = size_;
   options_.out = habits.folder;
   const auto kinds = renderer_kinds();
-  options_.look.renderer = dice_.one_of(std::span<const std::string_view>(kinds));
+  options_.settings.renderer = dice_.one_of(std::span<const std::string_view>(kinds));
   controller_ = std::make_unique<MonkeyController>(kMonkeyName, dice_);
   run_.emplace(options_, Session(kMonkeyName), context);
-  event_ = "begin with " + options_.look.renderer;
+  event_ = "begin with " + options_.settings.renderer;
 }
 
 void Monkey::act() {
@@ -166,7 +166,7 @@ void Monkey::use_mouse(WindowInput& input) {
       return say("zoom");
     default:
       input.wheel += dice_.below(7) - 3;
-      if (dice_.once_in(20)) input.wheel *= 20.0;  // into the matter, or far away
+      if (dice_.once_in(20)) input.wheel *= 20.0;  // into a volume, or far away
       return say("wheel");
   }
 }
@@ -219,7 +219,7 @@ void Monkey::restart_controller() {
     controller_->end(dice_.once_in(2) ? Lifecycle::clean_end : Lifecycle::fault);
     say("end");
   }
-  if (dice_.once_in(3)) return;  // it stays for others to look at
+  if (dice_.once_in(3)) return;  // it stays in the list
   controller_.reset();
   controller_ = std::make_unique<MonkeyController>(kMonkeyName, dice_);
   now_ += std::chrono::seconds(dice_.below(2));  // the window looks for it now and then
@@ -243,7 +243,7 @@ void Monkey::frame(const WindowInput& input) {
 
 /// What moves may be drawn coarsely, and a button goes up in a frame of its own.
 void Monkey::rest() {
-  constexpr int kMost = 6;  // a release, the look it changes, the tool's rest
+  constexpr int kMost = 6;  // a release, the setting it changes, the tool's rest
   frame({});
   for (int frames = 0; frames < kMost && !rests_; ++frames) frame({});
   if (!rests_) {
@@ -263,7 +263,7 @@ void Monkey::compare() {
   frame({});
   const bool kept = shown_.rgb == expected_.rgb;
   shown_ = wrong;
-  throw VisualizerError(look_text(run_->picture().look()) + " at " + size_text(size_) +
+  throw VisualizerError(settings_text(run_->picture().settings()) + " at " + size_text(size_) +
                         " shows another picture than one drawn anew: " + differs + "; all of it " +
                         (kept ? "drawn again is right" : "drawn again stays wrong"));
 }
@@ -275,7 +275,7 @@ MonkeyPicture Monkey::drawn_anew() {
   const Session& session = other ? *other : run_->session();
   {
     const OtherPanels panels;
-    Picture picture(session, run_->picture().look(), 1.0);
+    Picture picture(session, run_->picture().settings(), 1.0);
     picture.camera() = run_->picture().camera();
     OverlayFigures no_panels;
     no_panels.hidden = true;

@@ -50,7 +50,7 @@ class MonkeyController {
 
   /// The hand is elsewhere and feels something else; also takes the tool that was asked for.
   void move(Dice& dice);
-  /// Takes matter away, or puts some there, in a box anywhere; several of them in one tick.
+  /// Removes or adds material in a box anywhere; several boxes in one tick.
   void cut(Dice& dice);
   /// All bricks of a volume at once: more than a tick publishes.
   void refill(Dice& dice);

@@ -104,15 +104,15 @@ constexpr ImGuiSliderFlags kDragOnly = ImGuiSliderFlags_NoInput | ImGuiSliderFla
 
 constexpr std::size_t kMostLetters = 12;  // letters
 
-void choose_gradient(ViewSettings& look) {
-  auto chosen = static_cast<std::size_t>(look.gradient);
+void choose_gradient(ViewSettings& settings) {
+  auto chosen = static_cast<std::size_t>(settings.gradient);
   if (ImGui::BeginCombo("gradient", kGradientNames[chosen].data())) {
     for (std::size_t i = 0; i < kGradientNames.size(); ++i) {
       if (ImGui::Selectable(kGradientNames[i].data(), i == chosen)) chosen = i;
     }
     ImGui::EndCombo();
   }
-  look.gradient = static_cast<GradientFilter>(chosen);
+  settings.gradient = static_cast<GradientFilter>(chosen);
 }
 
 /// Draws a tool that lies from `corner` to the right, its tip first, within a box of `size`.
@@ -142,7 +142,7 @@ void draw_side(const Silhouette& side, ImVec2 corner, ImVec2 size) {
 constexpr float kSideWide = 38.0F, kSideHigh = 13.0F;
 
 /// The picture of the one in the hand stands in place of a label.
-void choose_tool(LookControls& controls) {
+void choose_tool(ViewControls& controls) {
   if (controls.tools.size() < 2 || controls.tool >= controls.tools.size()) return;
   const std::size_t held = controls.tool;
   const ImVec2 picture{kSideWide * unit_px(), kSideHigh * unit_px()};
@@ -166,9 +166,9 @@ void choose_tool(LookControls& controls) {
 }
 
 /// One for each volume.
-void choose_renderers(LookControls& controls) {
+void choose_renderers(ViewControls& controls) {
   const std::size_t count = controls.volumes.size();
-  const std::vector<std::string> now = renderer_of_each(controls.look.renderer, count);
+  const std::vector<std::string> now = renderer_of_each(controls.settings.renderer, count);
   for (std::size_t v = 0; v < count; ++v) {
     ImGui::PushID(static_cast<int>(v));
     const std::string label =
@@ -177,7 +177,7 @@ void choose_renderers(LookControls& controls) {
       for (const std::string_view kind : renderer_kinds()) {
         const std::string name(kind);
         if (!ImGui::Selectable(name.c_str(), now[v] == name)) continue;
-        controls.look.renderer = with_renderer(controls.look.renderer, count, v, name);
+        controls.settings.renderer = with_renderer(controls.settings.renderer, count, v, name);
       }
       ImGui::EndCombo();
     }
@@ -185,8 +185,8 @@ void choose_renderers(LookControls& controls) {
   }
 }
 
-void choose_opacities(LookControls& controls) {
-  ViewSettings& look = controls.look;
+void choose_opacities(ViewControls& controls) {
+  ViewSettings& settings = controls.settings;
   ImGui::TextColored(kLabelColour, "opacity of a voxel");
   ImGui::SameLine();
   controls.write = ImGui::SmallButton("write");
@@ -195,22 +195,22 @@ void choose_opacities(LookControls& controls) {
     const std::string label = shortened(material, kMostLetters) + "##" + material;
     if (ImGui::SliderFloat(label.c_str(), &value, 0.0F, 1.0F, "%.3f",
                            kDragOnly | ImGuiSliderFlags_Logarithmic)) {
-      look.opacities[material] = rounded_to(0.001, static_cast<double>(value));
+      settings.opacities[material] = rounded_to(0.001, static_cast<double>(value));
     }
   }
 }
 
-void choose_clip_plane(ViewSettings& look) {
-  ImGui::Checkbox("clip", &look.clip.on);
-  if (look.clip.on) {
+void choose_clip_plane(ViewSettings& settings) {
+  ImGui::Checkbox("clip", &settings.clip.on);
+  if (settings.clip.on) {
     constexpr std::array kAxes{"x", "y", "z", "free"};
-    const int choices = look.clip.axis == ClipPlane::kFree ? 4 : 3;  // x turns it freely
+    const int choices = settings.clip.axis == ClipPlane::kFree ? 4 : 3;  // x turns it freely
     for (int axis = 0; axis < choices; ++axis) {
       ImGui::SameLine();
-      ImGui::RadioButton(kAxes[static_cast<std::size_t>(axis)], &look.clip.axis, axis);
+      ImGui::RadioButton(kAxes[static_cast<std::size_t>(axis)], &settings.clip.axis, axis);
     }
-    auto at = static_cast<float>(look.clip.at);
-    if (ImGui::SliderFloat("plane", &at, 0.0F, 1.0F, "%.2f", kDragOnly)) look.clip.at = at;
+    auto at = static_cast<float>(settings.clip.at);
+    if (ImGui::SliderFloat("plane", &at, 0.0F, 1.0F, "%.2f", kDragOnly)) settings.clip.at = at;
   }
 }
 
@@ -220,7 +220,7 @@ float SettingsPanel::least_high() {
   return 48.0F * unit_px();
 }
 
-float SettingsPanel::draw(LookControls& controls, float height, float most_high, float most_area) {
+float SettingsPanel::draw(ViewControls& controls, float height, float most_high, float most_area) {
   const float gap = panel_gap();
   const float wide = wide_ > 0.0F ? wide_ : 215.0F * unit_px();
   const float high = std::max(std::min(most_area / wide, most_high), least_high());
@@ -228,17 +228,17 @@ float SettingsPanel::draw(LookControls& controls, float height, float most_high,
   ImGui::SetNextWindowSizeConstraints(ImVec2(0.0F, 0.0F),
                                       ImVec2(std::numeric_limits<float>::max(), high));
   ImGui::Begin("look", nullptr, kTouched);
-  ViewSettings& look = controls.look;
+  ViewSettings& settings = controls.settings;
   ImGui::PushItemWidth(130.0F * unit_px());
   choose_tool(controls);
   choose_renderers(controls);
-  if (controls.takes_gradient) choose_gradient(look);
+  if (controls.takes_gradient) choose_gradient(settings);
   if (controls.has_iso) choose_iso(controls);
   if (!controls.opacities.empty()) choose_opacities(controls);
-  choose_clip_plane(look);
-  ImGui::Checkbox("stereo", &look.stereo.on);
+  choose_clip_plane(settings);
+  ImGui::Checkbox("stereo", &settings.stereo.on);
   ImGui::SameLine();
-  ImGui::Checkbox("voxel tool", &look.voxel_tool);
+  ImGui::Checkbox("voxel tool", &settings.voxel_tool);
   ImGui::PopItemWidth();
   wide_ = ImGui::GetWindowWidth();
   const float end_x = ImGui::GetWindowPos().x + wide_;
@@ -246,12 +246,12 @@ float SettingsPanel::draw(LookControls& controls, float height, float most_high,
   return end_x;
 }
 
-void SettingsPanel::choose_iso(LookControls& controls) {
-  ViewSettings& look = controls.look;
-  float iso = dragged_iso_.value_or(static_cast<float>(look.iso.value_or(controls.own_iso)));
+void SettingsPanel::choose_iso(ViewControls& controls) {
+  ViewSettings& settings = controls.settings;
+  float iso = dragged_iso_.value_or(static_cast<float>(settings.iso.value_or(controls.own_iso)));
   if (ImGui::SliderFloat("iso", &iso, 0.02F, 0.98F, "%.2f", kDragOnly)) dragged_iso_ = iso;
   if (ImGui::IsItemDeactivated() && dragged_iso_) {
-    look.iso = *dragged_iso_;
+    settings.iso = *dragged_iso_;
     dragged_iso_.reset();
   }
 }

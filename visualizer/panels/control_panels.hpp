@@ -41,34 +41,34 @@ struct ToolChoice {
   friend bool operator==(const ToolChoice&, const ToolChoice&) noexcept = default;
 };
 
-/// What the controls show, and the look that they change.
-struct LookControls {
-  ViewSettings look;
-  double own_iso = 0.5;                ///< of the main volume, 0..1: if the look has none
+/// Input and output of the controls: the settings that they show and change.
+struct ViewControls {
+  ViewSettings settings;
+  double own_iso = 0.5;                ///< of the main volume, 0..1: if the settings have none
   std::vector<ToolChoice> tools{};     ///< one alone is no choice
   std::size_t tool = 0;                ///< in the hand, or asked for
   std::vector<std::string> volumes{};  ///< their names
   bool has_iso = false;                ///< a volume shows its iso-surface
-  bool takes_gradient = false;         ///< a renderer shades by the look's
+  bool takes_gradient = false;         ///< a renderer shades by that of the settings
   Opacities opacities{};               ///< of all materials, as they are; empty: not shown
   bool write = false;                  ///< the user asks for a file with them
   std::optional<Pointer> over{};       ///< the mouse, while it is over them
-  friend bool operator==(const LookControls&, const LookControls&) noexcept = default;
+  friend bool operator==(const ViewControls&, const ViewControls&) noexcept = default;
 };
 
-/// The controls of tool and look, which the mouse moves: the tool in the hand, renderers, gradient,
+/// The controls that the mouse moves: the tool in the hand, renderers, gradient,
 /// iso value, opacities, clip plane, stereo, voxel tool. Lower left corner.
 class SettingsPanel {
  public:
   /// Between ImGui::NewFrame and ImGui::Render. Takes the mouse's changes over into `controls`.
   /// Returns the x at which the panel ends, in pixels, in a picture `height` pixels high. Where the
   /// controls need more than `most_high` pixels or `most_area` square pixels, the panel scrolls.
-  float draw(LookControls& controls, float height, float most_high, float most_area);
+  float draw(ViewControls& controls, float height, float most_high, float most_area);
   /// Of a panel that is of use.
   [[nodiscard]] static float least_high();
 
  private:
-  void choose_iso(LookControls& controls);
+  void choose_iso(ViewControls& controls);
 
   float wide_ = 0.0F;                 ///< when it was drawn last
   std::optional<float> dragged_iso_;  ///< taken over when the drag ends: all is drawn anew then

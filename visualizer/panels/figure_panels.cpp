@@ -96,7 +96,7 @@ float draw_banner(const std::string& text, bool alarm, ImVec2 size, float contro
   return whole.x * whole.y;
 }
 
-void draw_hand_mark(const HandMark& mark, double force_share) {
+void draw_hand_mark(const HandMark& mark, double force_fraction) {
   const float least_radius = 4.0F * unit_px(), most_radius = 60.0F * unit_px();
   const float wide = 1.8F * unit_px(), dot = 2.0F * unit_px();
   constexpr double kLeastDepthMm = 0.1;
@@ -117,7 +117,7 @@ void draw_hand_mark(const HandMark& mark, double force_share) {
                    std::min(goal.y - radius, tool.y) - 8.0F * unit_px()};
   const ImVec2 high{std::max(at.x + words.x, tool.x) + 3.0F * unit_px(),
                     std::max(goal.y + radius, tool.y) + 8.0F * unit_px()};
-  const ImU32 colour = ImGui::GetColorU32(force_colour(force_share));
+  const ImU32 colour = ImGui::GetColorU32(force_colour(force_fraction));
   ImDrawList& to = *ImGui::GetBackgroundDrawList();
   to.PushClipRect({std::max(low.x, 0.0F), low.y}, high);  // left of it may be another eye's
   to.AddLine(tool, goal, colour, wide);
@@ -173,9 +173,9 @@ constexpr std::size_t kMostMaterials = 4, kFewMaterials = 3, kSpindleRows = 2, k
                       kMostName = 12;
 
 void force_bar(const OverlayFigures& figures) {
-  const double share = std::clamp(figures.force_n / figures.full_force_n, 0.0, 1.0);
-  ImGui::PushStyleColor(ImGuiCol_PlotHistogram, force_colour(share));
-  ImGui::ProgressBar(static_cast<float>(share), ImVec2(kWide * unit_px(), 7.0F * unit_px()), "");
+  const double fraction = std::clamp(figures.force_n / figures.full_force_n, 0.0, 1.0);
+  ImGui::PushStyleColor(ImGuiCol_PlotHistogram, force_colour(fraction));
+  ImGui::ProgressBar(static_cast<float>(fraction), ImVec2(kWide * unit_px(), 7.0F * unit_px()), "");
   ImGui::PopStyleColor();
 }
 
@@ -235,10 +235,10 @@ void material_rows(const OverlayFigures& figures) {
 
 }  // namespace
 
-const ImVec4& force_colour(double share) {
+const ImVec4& force_colour(double fraction) {
   constexpr double kStrongFrom = 0.5;
   constexpr double kLimitFrom = 0.9;
-  return share < kStrongFrom ? kCalm : share < kLimitFrom ? kStrong : kLimit;
+  return fraction < kStrongFrom ? kCalm : fraction < kLimitFrom ? kStrong : kLimit;
 }
 
 ImVec2 draw_figures(const OverlayFigures& figures) {

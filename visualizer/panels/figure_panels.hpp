@@ -11,8 +11,8 @@
 namespace kerf {
 
 // The panels of the overlay that only show something. Each is called between ImGui::NewFrame and
-// ImGui::Render; sizes and places are in pixels, from the upper left corner. Those that return an
-// area return that of what they cover, in square pixels.
+// ImGui::Render; sizes and positions are in pixels, from the upper left corner. Those that return
+// an area return that of what they cover, in square pixels.
 
 /// Words of the panels: a label, and its value.
 inline const ImVec4 kLabelColour{0.66F, 0.69F, 0.73F, 1.0F};
@@ -79,10 +79,10 @@ float draw_banner(const std::string& text, bool alarm, ImVec2 size, float contro
 int draw_key_help(ImVec2 size, bool leads_hand, int page, float most_area);
 
 /// A ring where the hand wants to be, a line to the tool that it pulls, and how much deeper that
-/// is; behind all panels. The colour is that of the force's share of the bar.
-void draw_hand_mark(const HandMark& mark, double force_share);
+/// is; behind all panels. The colour shows the force as a fraction of the bar.
+void draw_hand_mark(const HandMark& mark, double force_fraction);
 
-/// Of a share of the full force.
-[[nodiscard]] const ImVec4& force_colour(double share);
+/// By the fraction of the full force.
+[[nodiscard]] const ImVec4& force_colour(double fraction);
 
 }  // namespace kerf

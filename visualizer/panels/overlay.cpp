@@ -165,7 +165,7 @@ void Overlay::lay_out(OverlayFigures& figures, PictureSize size) {
       room -= draw_slices(*figures.slices, reinterpret_cast<ImTextureID>(texture), all);
     }
     if (figures.controls && below >= SettingsPanel::least_high()) {
-      controls_x = look_panel_.draw(*figures.controls, all.y, below, room);
+      controls_x = settings_panel_.draw(*figures.controls, all.y, below, room);
     }
   }
   if (figures.hand) draw_hand_mark(*figures.hand, figures.force_n / figures.full_force_n);

@@ -95,7 +95,7 @@ struct OverlayFigures {
   bool hidden = false;                         ///< shows nothing but the banner: for films
   std::vector<ForcePlot::Point> plot;    ///< force and depth over time, in place of score and rates
   std::optional<SliceViews> slices;      ///< in place of plot and rates
-  std::optional<LookControls> controls;  ///< in a window
+  std::optional<ViewControls> controls;  ///< in a window
   std::optional<OpenPanel> open;         ///< in place of all panels
   /// Of the letters, over those for 96 dots per inch; as far as the picture has room.
   double scale = 1.0;
@@ -134,7 +134,7 @@ class Overlay {
   void lay_out(OverlayFigures& figures, PictureSize size);
   void show(const SliceViews& slices);
 
-  SettingsPanel look_panel_;
+  SettingsPanel settings_panel_;
   float letters_ = 0.0F;  ///< height of those that are loaded, in pixels
   int help_pages_ = 1;
   std::optional<SliceViews> uploaded_;

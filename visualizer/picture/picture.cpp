@@ -63,8 +63,8 @@ std::string state_words(const TickRecord& record) {
 
 }  // namespace
 
-Picture::Picture(const Session& session, const ViewSettings& look, double aspect)
-    : scene_(session.scene()), look_(look), painter_(painter_for(session, look)) {
+Picture::Picture(const Session& session, const ViewSettings& settings, double aspect)
+    : scene_(session.scene()), settings_(settings), painter_(painter_for(session, settings)) {
   const std::vector<glm::dvec3> corners = scene_.corners();
   low_mm_ = high_mm_ = corners.front();
   for (const glm::dvec3& corner : corners) {
@@ -75,49 +75,52 @@ Picture::Picture(const Session& session, const ViewSettings& look, double aspect
 }
 
 SceneView Picture::shown_scene() const {
-  return scene_in(look_);
+  return scene_in(settings_);
 }
 
-SceneView Picture::scene_in(const ViewSettings& look) const {
+SceneView Picture::scene_in(const ViewSettings& settings) const {
   SceneView scene = scene_;
-  scene.gradient = look.gradient;
-  scene.voxel_tool = look.voxel_tool;
+  scene.gradient = settings.gradient;
+  scene.voxel_tool = settings.voxel_tool;
   for (VolumeView& volume : scene.volumes) {
-    if (look.iso) volume.iso = static_cast<Density>(std::lround(*look.iso * kDensityMax));
+    if (settings.iso) volume.iso = static_cast<Density>(std::lround(*settings.iso * kDensityMax));
   }
-  if (look.colour_blind) take_okabe_ito(scene.materials);
+  if (settings.colour_blind) take_okabe_ito(scene.materials);
   for (MaterialView& material : scene.materials) {
-    const auto chosen = look.opacities.find(material.name);
-    if (chosen != look.opacities.end()) material.opacity = chosen->second;
+    const auto chosen = settings.opacities.find(material.name);
+    if (chosen != settings.opacities.end()) material.opacity = chosen->second;
   }
   return scene;
 }
 
 std::unique_ptr<ScenePainter> Picture::painter_for(const Session& session,
-                                                   const ViewSettings& look) {
-  auto painter = std::make_unique<ScenePainter>(look.renderer, scene_in(look), session.contents());
-  if (look.clip.on) painter->set_cut_open(true, session.contents());
+                                                   const ViewSettings& settings) {
+  auto painter =
+      std::make_unique<ScenePainter>(settings.renderer, scene_in(settings), session.contents());
+  if (settings.clip.on) painter->set_cut_open(true, session.contents());
   for (const VolumeView& volume : scene_.volumes) bricks_uploaded_ += volume.bricks.count();
   return painter;
 }
 
-void Picture::set_look(const Session& session, const ViewSettings& look) {
-  if (look == look_) return;
-  if (look.renderer != look_.renderer || look.iso != look_.iso || look.gradient != look_.gradient ||
-      look.voxel_tool != look_.voxel_tool || look.colour_blind != look_.colour_blind) {
-    painter_ = painter_for(session, look);
+void Picture::set_view(const Session& session, const ViewSettings& settings) {
+  if (settings == settings_) return;
+  if (settings.renderer != settings_.renderer || settings.iso != settings_.iso ||
+      settings.gradient != settings_.gradient || settings.voxel_tool != settings_.voxel_tool ||
+      settings.colour_blind != settings_.colour_blind) {
+    painter_ = painter_for(session, settings);
   } else {
-    if (look.clip.on != look_.clip.on) painter_->set_cut_open(look.clip.on, session.contents());
-    if (look.opacities != look_.opacities) {
-      painter_->set_opacities(scene_in(look), session.contents());
+    if (settings.clip.on != settings_.clip.on)
+      painter_->set_cut_open(settings.clip.on, session.contents());
+    if (settings.opacities != settings_.opacities) {
+      painter_->set_opacities(scene_in(settings), session.contents());
     }
   }
-  look_ = look;
+  settings_ = settings;
   redraw_all();
 }
 
-LookControls Picture::controls() const {
-  LookControls controls{.look = look_, .own_iso = scene_.main_volume().iso / kDensityMax};
+ViewControls Picture::controls() const {
+  ViewControls controls{.settings = settings_, .own_iso = scene_.main_volume().iso / kDensityMax};
   for (const VolumeView& volume : scene_.volumes) controls.volumes.push_back(volume.name);
   controls.takes_gradient = painter_->any(&Renderer::takes_gradient);
   controls.has_iso = painter_->any(ScenePainter::Layer::opaque);
@@ -128,7 +131,7 @@ LookControls Picture::controls() const {
 }
 
 std::vector<ScoreRow> Picture::score(const Session& session) const {
-  const std::vector<MaterialView> materials = scene_in(look_).materials;
+  const std::vector<MaterialView> materials = scene_in(settings_).materials;
   const std::vector<double> removed = session.removed_by_material_mm3();
   std::vector<ScoreRow> rows;
   const auto srgb = [](double linear) {
@@ -144,7 +147,7 @@ std::vector<ScoreRow> Picture::score(const Session& session) const {
 
 Opacities Picture::opacities() const {
   Opacities opacities;
-  const std::vector<MaterialView> materials = scene_in(look_).materials;
+  const std::vector<MaterialView> materials = scene_in(settings_).materials;
   for (std::size_t m = 1; m < materials.size(); ++m) {
     opacities[materials[m].name] = materials[m].opacity.value_or(default_opacity(materials, m));
   }
@@ -179,16 +182,16 @@ ClipPlane Picture::moved(const ClipPlane& plane, double mm) const {
   return moved;
 }
 
-glm::dvec4 Picture::shown_half() const {
-  const ClipPlane& clip = look_.clip;
-  if (!clip.on) return View{}.shown;
+glm::dvec4 Picture::clip_plane() const {
+  const ClipPlane& clip = settings_.clip;
+  if (!clip.on) return View{}.clip_plane;
   const glm::dvec3 towards = direction_of(clip);
   const glm::dvec2 reach = reach_along(towards);
   return {-towards, glm::mix(reach.x, reach.y, clip.at)};
 }
 
 void Picture::reset_camera(double aspect) {
-  camera_.frame(scene_.corners(), look_.stereo.on ? 0.5 * aspect : aspect);
+  camera_.frame(scene_.corners(), settings_.stereo.on ? 0.5 * aspect : aspect);
 }
 
 void Picture::update(const Session& session) {
@@ -201,14 +204,14 @@ void Picture::update(const Session& session) {
 View Picture::middle_view(PictureSize size) const {
   const double reach_mm = camera_.radius_mm() + kToolRoom * scene_.main_volume().radius_mm();
   View view = camera_.view(static_cast<double>(eye_size(size).width) / size.height, reach_mm);
-  view.shown = shown_half();
+  view.clip_plane = clip_plane();
   return view;
 }
 
 std::vector<View> Picture::views(PictureSize size) const {
   const View view = middle_view(size);
   if (eye_size(size) == size) return {view};
-  const Stereo& stereo = look_.stereo;
+  const Stereo& stereo = settings_.stereo;
   const double convergence_mm = stereo.convergence_mm.value_or(camera_.distance_mm());
   const double eyes_mm = stereo.eyes_mm.value_or(kEyesPerConvergence * convergence_mm);
   const auto both = eye_views(view, {eyes_mm, convergence_mm});
@@ -216,7 +219,7 @@ std::vector<View> Picture::views(PictureSize size) const {
 }
 
 PictureSize Picture::eye_size(PictureSize size) const noexcept {
-  const bool fits_two = look_.stereo.on && size.width > 1;
+  const bool fits_two = settings_.stereo.on && size.width > 1;
   return {fits_two ? size.width / 2 : size.width, size.height};
 }
 
@@ -297,8 +300,8 @@ Redrawn draw_measured(Picture& picture, Session& session, const OverlayFigures& 
   throw_if_context_is_lost();
   report.wall_ms.push_back(watch.wall_ms());
   report.cpu_ms.push_back(watch.cpu_ms());
-  report.redrawn.push_back(redrawn.share);
-  if (removal && redrawn.share > 0.0) {
+  report.redrawn.push_back(redrawn.fraction);
+  if (removal && redrawn.fraction > 0.0) {
     const auto since = std::chrono::steady_clock::now() - *removal;
     report.latency_ms.push_back(std::chrono::duration<double, std::milli>(since).count());
   }

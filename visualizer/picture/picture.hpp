@@ -17,8 +17,8 @@ namespace kerf {
 
 /// What a call of `Picture::draw` did.
 struct Redrawn {
-  bool any = false;    ///< false: nothing had changed, nothing was drawn
-  double share = 0.0;  ///< of the picture's pixels: where volumes were drawn again
+  bool any = false;       ///< false: nothing had changed, nothing was drawn
+  double fraction = 0.0;  ///< of the picture's pixels in which volumes were drawn again
 };
 
 /// Everything that is seen of one session: backdrop, volumes, tool, force arrow, panel.
@@ -26,7 +26,7 @@ struct Redrawn {
 /// Made after the first `poll` of its session, which is uploaded whole; later only what changed.
 class Picture {
  public:
-  Picture(const Session& session, const ViewSettings& look, double aspect);
+  Picture(const Session& session, const ViewSettings& settings, double aspect);
 
   /// Uploads the bricks that the last `poll` changed. Call once after each `poll`.
   void update(const Session& session);
@@ -41,17 +41,17 @@ class Picture {
   /// The next `draw` draws everything.
   void redraw_all() noexcept { eyes_.clear(); }
 
-  [[nodiscard]] const ViewSettings& look() const noexcept { return look_; }
+  [[nodiscard]] const ViewSettings& settings() const noexcept { return settings_; }
   /// From the next `draw` on. Another renderer or iso value uploads all volumes again, an opacity
-  /// only the materials. Throws VisualizerError if the renderer cannot show them; the look stays
-  /// then.
-  void set_look(const Session& session, const ViewSettings& look);
-  /// The scene with the iso values and opacities of the look.
+  /// only the materials. Throws VisualizerError if the renderer cannot show them, and
+  /// changes nothing then.
+  void set_view(const Session& session, const ViewSettings& settings);
+  /// The scene with the iso values and opacities of the settings.
   [[nodiscard]] SceneView shown_scene() const;
   /// Of all materials, their own or chosen.
   [[nodiscard]] Opacities opacities() const;
   /// For `OverlayFigures::controls`.
-  [[nodiscard]] LookControls controls() const;
+  [[nodiscard]] ViewControls controls() const;
   /// See `Overlay::help_pages`.
   [[nodiscard]] int help_pages() const noexcept { return overlay_.help_pages(); }
   /// Of the scene's materials as they are drawn, with what was removed.
@@ -74,19 +74,19 @@ class Picture {
   [[nodiscard]] std::uint64_t bricks_uploaded() const noexcept { return bricks_uploaded_; }
 
  private:
-  /// The same of another look.
-  [[nodiscard]] SceneView scene_in(const ViewSettings& look) const;
+  /// The same of other settings.
+  [[nodiscard]] SceneView scene_in(const ViewSettings& settings) const;
   [[nodiscard]] std::unique_ptr<ScenePainter> painter_for(const Session& session,
-                                                          const ViewSettings& look);
+                                                          const ViewSettings& settings);
   /// Where the box of all volumes begins and ends along a direction, in mm.
   [[nodiscard]] glm::dvec2 reach_along(const glm::dvec3& towards) const;
-  /// `View::shown` of the clip plane.
-  [[nodiscard]] glm::dvec4 shown_half() const;
+  /// For `View::clip_plane`.
+  [[nodiscard]] glm::dvec4 clip_plane() const;
   /// Of each eye, from the left.
   [[nodiscard]] std::vector<View> views(PictureSize size) const;
 
   SceneView scene_;
-  ViewSettings look_;
+  ViewSettings settings_;
   std::uint64_t bricks_uploaded_ = 0;
   std::unique_ptr<ScenePainter> painter_;  ///< making it counts bricks
   OrbitCamera camera_;

@@ -112,7 +112,7 @@ Four larger(Four a, Four b) {
   return a < b ? b : a;
 }
 
-/// From fine places to pixels and window depth, times w.
+/// From fine points to pixels and window depth, times w.
 class WindowFromFine {
  public:
   WindowFromFine(const glm::dmat4& clip_from_voxel, const PixelRect& all) : all_(all) {

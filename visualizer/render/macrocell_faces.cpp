@@ -13,11 +13,11 @@ VoxelIndex cell_of(const CellFaces::Face& face) {
   return {face[0], face[1], face[2]};
 }
 
-std::vector<CellFaces::Run> runs_of(const std::vector<std::size_t>& places) {
+std::vector<CellFaces::Run> runs_of(const std::vector<std::size_t>& slots) {
   std::vector<CellFaces::Run> runs;
-  for (const std::size_t place : places) {
-    if (runs.empty() || runs.back().end != place) runs.push_back({place, place});
-    runs.back().end = place + 1;
+  for (const std::size_t slot : slots) {
+    if (runs.empty() || runs.back().end != slot) runs.push_back({slot, slot});
+    runs.back().end = slot + 1;
   }
   return runs;
 }
@@ -29,23 +29,24 @@ CellFaces::CellFaces(const Macrocells& cells) : faces_(cells.boundary_faces()) {
 std::vector<CellFaces::Run> CellFaces::update(const Macrocells& cells, const VoxelBox& flipped) {
   const VoxelBox near = flipped.grown(1).clipped(cells.grid().box());
   const std::vector<Face> fresh = cells.boundary_faces(near);
-  std::vector<std::size_t> places;
+  std::vector<std::size_t> slots;
   for (std::size_t i = 0; i < faces_.size(); ++i) {
-    if (near.contains(cell_of(faces_[i]))) places.push_back(i);
+    if (near.contains(cell_of(faces_[i]))) slots.push_back(i);
   }
-  // Those that come take the places of those that go, and more at the end.
-  for (std::size_t more = places.size(); more < fresh.size(); ++more) {
-    places.push_back(faces_.size());
+  // New faces take the slots of the old ones, and more slots at the end.
+  for (std::size_t more = slots.size(); more < fresh.size(); ++more) {
+    slots.push_back(faces_.size());
     faces_.emplace_back();
   }
-  for (std::size_t i = 0; i < fresh.size(); ++i) faces_[places[i]] = fresh[i];
-  // A place that is left takes the last face, so the highest comes first: the last is none of them.
-  for (std::size_t left = places.size(); left > fresh.size(); --left) {
-    faces_[places[left - 1]] = faces_.back();
+  for (std::size_t i = 0; i < fresh.size(); ++i) faces_[slots[i]] = fresh[i];
+  // A slot that is left takes the last face. The highest is filled first, so the last face is in
+  // none of them.
+  for (std::size_t left = slots.size(); left > fresh.size(); --left) {
+    faces_[slots[left - 1]] = faces_.back();
     faces_.pop_back();
   }
-  while (!places.empty() && places.back() >= faces_.size()) places.pop_back();
-  return runs_of(places);
+  while (!slots.empty() && slots.back() >= faces_.size()) slots.pop_back();
+  return runs_of(slots);
 }
 
 VoxelBox CellFaces::active_box() const {

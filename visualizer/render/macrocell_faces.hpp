@@ -17,20 +17,20 @@
 
 namespace kerf {
 
-/// `Macrocells::boundary_faces` in a list whose places change little when cells do, so that a copy
+/// `Macrocells::boundary_faces` in a list that changes little when cells do, so that a copy
 /// of it elsewhere follows by a few pieces.
 class CellFaces {
  public:
   using Face = std::array<std::uint16_t, 4>;
-  /// Places first <= i < end.
+  /// Slots first <= i < end.
   struct Run {
     std::size_t first, end;
   };
 
   explicit CellFaces(const Macrocells& cells);
 
-  /// Call after cells in `flipped` became active or inactive. Returns the places with another face
-  /// now, ascending; places from the list's size on are no more.
+  /// Call after cells in `flipped` became active or inactive. Returns the slots whose face
+  /// changed, ascending; slots from the list's size on are gone.
   std::vector<Run> update(const Macrocells& cells, const VoxelBox& flipped);
 
   [[nodiscard]] std::span<const Face> all() const noexcept { return faces_; }

@@ -57,7 +57,7 @@ const Kind& find_kind(std::string_view name) {
 constexpr RayFootprint kSurfaceFootprint{.along = 3, .at_end = 5, .taps_normal = true};
 // A sample within takes its material from 1.5 edges up the gradient (translucent_sample.frag), or
 // its gradient from five voxels along each axis (3).
-constexpr RayFootprint kMatterFootprint{.along = 6}, kWideMatterFootprint{.along = 7};
+constexpr RayFootprint kTranslucentFootprint{.along = 6}, kWideTranslucentFootprint{.along = 7};
 
 }  // namespace
 
@@ -74,7 +74,7 @@ void Renderer::forget_changes() {
 
 RayFootprint Renderer::footprint() const noexcept {
   if (!translucent()) return kSurfaceFootprint;
-  return takes_gradient() ? kWideMatterFootprint : kMatterFootprint;
+  return takes_gradient() ? kWideTranslucentFootprint : kTranslucentFootprint;
 }
 
 std::unique_ptr<Renderer> make_renderer(std::string_view kind, const SceneView& scene,

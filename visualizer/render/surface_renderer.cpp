@@ -127,7 +127,7 @@ void SurfaceRenderer::draw(const View& view, const RenderTarget& target) {
   target.bind();
   glEnable(GL_DEPTH_TEST);
   glDepthFunc(GL_LESS);
-  const bool opened = view.shown != View{}.shown;
+  const bool opened = view.clip_plane != View{}.clip_plane;
   (opened ? glDisable : glEnable)(GL_CULL_FACE);
   if (opened) glEnable(GL_CLIP_DISTANCE0);
   glDisable(GL_BLEND);

@@ -92,8 +92,8 @@ std::uint8_t unit_byte(double value) noexcept {
   return static_cast<std::uint8_t>(std::lround(std::clamp(value, 0.0, 1.0) * 255.0));
 }
 
-MaterialTexel texel_of(const glm::vec4& look) noexcept {
-  const glm::dvec4 v(look);
+MaterialTexel texel_of(const glm::vec4& material) noexcept {
+  const glm::dvec4 v(material);
   return {unit_byte(v.r), unit_byte(v.g), unit_byte(v.b), unit_byte(v.a)};
 }
 
@@ -116,7 +116,7 @@ void fill_gradient_texels(GradientFilter kind, const VoxelGrid& grid,
 
 MaterialTexels::MaterialTexels(const VoxelGrid& grid, std::span<const Label> labels,
                                const Palette& palette)
-    : grid_(grid), labels_(labels), label_looks_(palette[1]) {
+    : grid_(grid), labels_(labels), label_materials_(palette[1]) {
   for (std::size_t i = 0; i < kPaletteWidth; ++i) {
     by_density_[i] = texel_of(palette[0][i]);
     by_label_[i] = texel_of(palette[1][i]);
@@ -145,7 +145,7 @@ std::optional<glm::vec4> MaterialTexels::mean_around(VoxelIndex at) const {
     if (label == 0) return;
     const glm::ivec3 d(x - at.x, y - at.y, z - at.z);
     const float weight = 1.0F / static_cast<float>(d.x * d.x + d.y * d.y + d.z * d.z);
-    sum += weight * label_looks_[label];
+    sum += weight * label_materials_[label];
     weights += weight;
   });
   if (weights == 0.0F) return std::nullopt;

@@ -110,7 +110,7 @@ class MaterialTexels {
 
   VoxelGrid grid_;
   std::span<const Label> labels_;
-  std::array<glm::vec4, kPaletteWidth> label_looks_;
+  std::array<glm::vec4, kPaletteWidth> label_materials_;
   std::array<MaterialTexel, kPaletteWidth> by_density_{}, by_label_{};
 };
 

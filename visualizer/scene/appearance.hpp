@@ -76,8 +76,8 @@ using Palette = std::array<std::array<glm::vec4, kPaletteWidth>, 2>;
 /// they differ). The exponent makes the picture independent of the step; p lets a border fade
 /// in, and material that is milled away fade out.
 struct TransferFunction {
-  /// Linear colour, and a in the fourth place: row 0 by density (entry i is density i/255), row 1
-  /// by label.
+  /// Linear colour, and a as the fourth component: row 0 by density (entry i is density i/255), row
+  /// 1 by label.
   Palette materials{};
   double empty = 0.0;  ///< density up to which nothing is seen
   double full = 1.0;   ///< density from which the material is seen whole

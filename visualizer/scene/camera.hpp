@@ -46,9 +46,9 @@ struct View {
   double middle_right = 0.0;
   double near_mm = 1.0;
   double far_mm = 100.0;
-  /// Clip plane: of volumes only points with dot(shown, (x, y, z, 1)) >= 0 are drawn, in world mm;
-  /// the normal has length 1. As it stands, everything is shown.
-  glm::dvec4 shown{0.0, 0.0, 0.0, 1.0};
+  /// Of volumes only points with dot(clip_plane, (x, y, z, 1)) >= 0 are drawn, in world mm; the
+  /// normal has length 1. By default everything is drawn.
+  glm::dvec4 clip_plane{0.0, 0.0, 0.0, 1.0};
 
   [[nodiscard]] glm::dmat4 clip_from_eye() const;
   friend bool operator==(const View&, const View&) = default;

@@ -23,7 +23,7 @@ struct Section {
 constexpr std::array<Section, 3> kSections{
     {{0, 2, 1, 1.0, 1.0}, {0, 1, 2, 1.0, -1.0}, {2, 1, 0, -1.0, -1.0}}};
 
-/// Colours of one volume: matter as bright as it is dense.
+/// Colours of one volume: materials as bright as they are dense.
 class VolumeSampler {
  public:
   VolumeSampler(const VolumeView& volume, const VolumeContent& content, const Palette& palette)

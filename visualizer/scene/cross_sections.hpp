@@ -16,7 +16,7 @@ namespace kerf {
 /// from above, from in front, from the side. One scale for all of them.
 struct SliceViews {
   int side = 0;  ///< of each picture, in pixels
-  /// Where the point is in each: to the right and down, in shares of `side`; it may lie outside.
+  /// Where the point is in each: to the right and down, in fractions of `side`; it may lie outside.
   std::array<std::array<double, 2>, 3> tip{};
   std::vector<std::uint8_t> rgb{};  ///< one picture below the other
   friend bool operator==(const SliceViews&, const SliceViews&) noexcept = default;

@@ -209,8 +209,8 @@ Silhouette rows_of(const Facets& facets) {
         const auto& a = facets.points_mm[triangle[corner]];
         const auto& b = facets.points_mm[triangle[(corner + 1) % 3]];
         if (std::min(a[1], b[1]) > y || std::max(a[1], b[1]) < y) continue;
-        const double share = b[1] != a[1] ? (y - a[1]) / (b[1] - a[1]) : 0.0;
-        const double x = a[0] + (b[0] - a[0]) * share;
+        const double fraction = b[1] != a[1] ? (y - a[1]) / (b[1] - a[1]) : 0.0;
+        const double x = a[0] + (b[0] - a[0]) * fraction;
         row = {y, std::min(row[1], x), std::max(row[2], x)};
       }
     }

@@ -80,7 +80,7 @@ struct DeviceFrame {
   double scale = 1.0;
 };
 
-/// Everything about a session that does not change while it runs, as a look shows it.
+/// Everything about a session that does not change while it runs, with the view settings applied.
 struct SceneView {
   std::vector<VolumeView> volumes;
   std::vector<ToolView> tools;

@@ -21,7 +21,7 @@ MaterialRule rule_of(const SceneView& scene) {
 
 }  // namespace
 
-MaterialScore::MaterialScore(const SceneView& scene, std::span<const VolumeContent> contents)
+RemovedVolume::RemovedVolume(const SceneView& scene, std::span<const VolumeContent> contents)
     : materials_(rule_of(scene).count()) {
   const MaterialRule rule = rule_of(scene);
   for (std::size_t v = 0; v < scene.volumes.size(); ++v) {
@@ -35,8 +35,8 @@ MaterialScore::MaterialScore(const SceneView& scene, std::span<const VolumeConte
       const Label label = labels.empty() ? Label{0} : labels[i];
       volume.material[i] = static_cast<Label>(rule.of(label, density[i]));
     }
-    volume.matter.resize(volume.bricks.count() * materials_);
-    volume.fullest.resize(volume.matter.size());
+    volume.held.resize(volume.bricks.count() * materials_);
+    volume.fullest.resize(volume.held.size());
     volume.removed.resize(materials_);
     for (std::uint32_t brick = 0; brick < volume.bricks.count(); ++brick) {
       count(volume, density, brick);
@@ -44,32 +44,32 @@ MaterialScore::MaterialScore(const SceneView& scene, std::span<const VolumeConte
   }
 }
 
-void MaterialScore::update(std::size_t volume, std::span<const Density> density,
+void RemovedVolume::update(std::size_t volume, std::span<const Density> density,
                            const ChangedBricks& changed) {
   for (const ChangedBrick& brick : changed) count(volumes_[volume], density, brick.id);
 }
 
-void MaterialScore::count(Volume& volume, std::span<const Density> density,
+void RemovedVolume::count(Volume& volume, std::span<const Density> density,
                           std::uint32_t brick) const {
-  std::uint32_t* const matter = &volume.matter[brick * materials_];
+  std::uint32_t* const held = &volume.held[brick * materials_];
   std::uint32_t* const fullest = &volume.fullest[brick * materials_];
-  for (std::size_t m = 0; m < materials_; ++m) volume.removed[m] -= fullest[m] - matter[m];
-  std::fill_n(matter, materials_, 0U);
+  for (std::size_t m = 0; m < materials_; ++m) volume.removed[m] -= fullest[m] - held[m];
+  std::fill_n(held, materials_, 0U);
   const VoxelBox box = volume.bricks.voxels(brick);
   for (std::int32_t z = box.lo.z; z < box.hi.z; ++z) {
     for (std::int32_t y = box.lo.y; y < box.hi.y; ++y) {
       const std::size_t row = volume.bricks.grid.index(box.lo.x, y, z);
       const auto wide = static_cast<std::size_t>(box.hi.x - box.lo.x);
-      for (std::size_t i = row; i < row + wide; ++i) matter[volume.material[i]] += density[i];
+      for (std::size_t i = row; i < row + wide; ++i) held[volume.material[i]] += density[i];
     }
   }
   for (std::size_t m = 0; m < materials_; ++m) {
-    fullest[m] = std::max(fullest[m], matter[m]);
-    volume.removed[m] += fullest[m] - matter[m];
+    fullest[m] = std::max(fullest[m], held[m]);
+    volume.removed[m] += fullest[m] - held[m];
   }
 }
 
-std::vector<double> MaterialScore::removed_mm3() const {
+std::vector<double> RemovedVolume::removed_mm3() const {
   std::vector<double> sums(materials_);
   for (const Volume& volume : volumes_) {
     for (std::size_t m = 0; m < materials_; ++m) {
@@ -103,7 +103,7 @@ Session::Session(std::string_view name)
       scene_(scene_view(connection_.reader().info())),
       cut_before_(connection_.reader().dirty_head() != 0),
       snapshots_(scene_.volumes.size()),
-      score_(first_score()) {
+      removed_volume_(removed_since_now()) {
   poll();
   on_the_way_.clear();
   oldest_removal_ns_.reset();
@@ -122,7 +122,7 @@ Session Session::attach(std::string_view name, std::chrono::duration<double> wai
   }
 }
 
-MaterialScore Session::first_score() {
+RemovedVolume Session::removed_since_now() {
   for (std::size_t v = 0; v < snapshots_.size(); ++v) {
     connection_.reader().update(v, snapshots_[v]);
   }
@@ -134,7 +134,7 @@ void Session::poll() {
   read_removals();
   for (std::size_t v = 0; v < snapshots_.size(); ++v) {
     connection_.reader().update(v, snapshots_[v]);
-    score_.update(v, snapshots_[v].density, snapshots_[v].changed);
+    removed_volume_.update(v, snapshots_[v].density, snapshots_[v].changed);
   }
   note_arrivals();
 }

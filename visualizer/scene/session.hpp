@@ -16,16 +16,16 @@
 namespace kerf {
 
 /// How much of each material has been removed, brick by brick: the most that a brick has held since
-/// this was made, less what it holds now. Matter that comes back is no longer counted, also if a
-/// reset brings back what was gone before. Memory: a byte for each voxel.
-class MaterialScore {
+/// this was made, less what it holds now. Material that comes back is no longer counted, also if a
+/// reset restores what had been removed before. Memory: a byte for each voxel.
+class RemovedVolume {
  public:
-  MaterialScore(const SceneView& scene, std::span<const VolumeContent> contents);
+  RemovedVolume(const SceneView& scene, std::span<const VolumeContent> contents);
 
   /// Counts the changed bricks of a volume again; `density` is all of it.
   void update(std::size_t volume, std::span<const Density> density, const ChangedBricks& changed);
 
-  /// By index of the scene's materials; 0 is matter of none.
+  /// By index of the scene's materials; 0: of no material.
   [[nodiscard]] std::vector<double> removed_mm3() const;
 
  private:
@@ -33,11 +33,11 @@ class MaterialScore {
     BrickGrid bricks;
     double step_mm3 = 0.0;               ///< of a step of density in a voxel
     std::vector<Label> material;         ///< by voxel
-    std::vector<std::uint32_t> matter;   ///< steps by brick and material
+    std::vector<std::uint32_t> held;     ///< steps by brick and material
     std::vector<std::uint32_t> fullest;  ///< the most of them so far
     std::vector<std::int64_t> removed;   ///< steps by material
   };
-  /// Counts the matter of a brick anew; what it lacks of its fullest is removed.
+  /// Counts the materials of a brick again; the difference to its fullest state is removed.
   void count(Volume& volume, std::span<const Density> density, std::uint32_t brick) const;
 
   std::size_t materials_;
@@ -74,7 +74,9 @@ class Session {
   /// Since the session began or the volumes were reset.
   [[nodiscard]] double removed_mm3() const noexcept { return removed_mm3_; }
   /// The same by index of the scene's materials, but since this one joined.
-  [[nodiscard]] std::vector<double> removed_by_material_mm3() const { return score_.removed_mm3(); }
+  [[nodiscard]] std::vector<double> removed_by_material_mm3() const {
+    return removed_volume_.removed_mm3();
+  }
   /// How long what may not be cut was pressed upon, since then too.
   [[nodiscard]] double forbidden_ms() const noexcept;
   /// Something had been cut before it joined, which `removed_by_material_mm3` lacks.
@@ -108,7 +110,7 @@ class Session {
 
  private:
   bool send(CommandKind kind, std::uint32_t argument);
-  [[nodiscard]] MaterialScore first_score();
+  [[nodiscard]] RemovedVolume removed_since_now();
   void read_states();
   void read_removals();
   void note_arrivals();
@@ -119,7 +121,7 @@ class Session {
   SceneView scene_;
   bool cut_before_;  ///< as reported before the first read of the volumes
   std::vector<VolumeSnapshot> snapshots_;
-  MaterialScore score_;
+  RemovedVolume removed_volume_;
   std::optional<TickRecord> latest_;
   std::optional<Tick> armed_;
   std::uint64_t next_state_ = 0;  ///< index of the first record not read yet

@@ -320,8 +320,8 @@ int rounded(float value) {
   return static_cast<int>(value + 32768.5F) - 32768;
 }
 
-std::uint16_t unit16(float share) {
-  return static_cast<std::uint16_t>(std::clamp(share, 0.0F, 1.0F) * 65535.0F + 0.5F);
+std::uint16_t unit16(float fraction) {
+  return static_cast<std::uint16_t>(std::clamp(fraction, 0.0F, 1.0F) * 65535.0F + 0.5F);
 }
 
 /// `GradientFilter::farid5` up to a factor: it looks farther than a neighbourhood.
@@ -373,8 +373,8 @@ glm::vec3 gradient_of(const SurfaceSource& source, const Density* sample, VoxelI
   return wide_gradient(source.volume, at);
 }
 
-/// Computes normal, colour and openness of a vertex from its position and the volume. The vertex
-/// belongs to the block that starts at `start`; `near` is that block's neighbourhood. Pure.
+/// Computes normal, colour and ambient occlusion of a vertex from its position and the volume. The
+/// vertex belongs to the block that starts at `start`; `near` is that block's neighbourhood. Pure.
 void dress(SurfaceVertex& vertex, const SurfaceSource& source, VoxelIndex start,
            const Neighbourhood& near) {
   std::array<int, 3> from{};
@@ -409,9 +409,9 @@ void dress(SurfaceVertex& vertex, const SurfaceSource& source, VoxelIndex start,
   }
   const FinePoint at = fine_place(vertex, start);
   const FinePoint inward = inward_of(vertex, source.inverse_square_spacing);
-  const glm::vec3 colour = source.look->colour(source.volume, at, inward);
+  const glm::vec3 colour = source.shading->colour(source.volume, at, inward);
   vertex.colour = {unit16(colour.r), unit16(colour.g), unit16(colour.b)};
-  vertex.openness = unit16(source.look->openness(source.volume, at, inward));
+  vertex.ao_factor = unit16(source.shading->ao_factor(source.volume, at, inward));
 }
 
 }  // namespace
@@ -481,11 +481,11 @@ BlockMesh extract_block(const SurfaceSource& source, VoxelIndex block) {
   return mesh;
 }
 
-ChangedMeshCells update_look(const SurfaceSource& source, VoxelIndex block, const VoxelBox& changed,
-                             BlockMesh& mesh) {
+ChangedMeshCells update_shading(const SurfaceSource& source, VoxelIndex block,
+                                const VoxelBox& changed, BlockMesh& mesh) {
   const VoxelIndex start = block_start(block);
   const VoxelBox colours = changed.grown(VertexShading::kColourReachVox);
-  const VoxelBox all = changed.grown(VertexShading::kOpennessReachVox);
+  const VoxelBox all = changed.grown(VertexShading::kAoReachVox);
   std::optional<Neighbourhood> near;
   ChangedMeshCells cells;
   for (SurfaceVertex& vertex : mesh.vertices) {
@@ -498,8 +498,8 @@ ChangedMeshCells update_look(const SurfaceSource& source, VoxelIndex block, cons
       dress(vertex, source, start, *near);
     } else {
       const FinePoint inward = inward_of(vertex, source.inverse_square_spacing);
-      if (!VertexShading::openness_depends_on(changed, at, inward)) continue;
-      vertex.openness = unit16(source.look->openness(source.volume, at, inward));
+      if (!VertexShading::ao_depends_on(changed, at, inward)) continue;
+      vertex.ao_factor = unit16(source.shading->ao_factor(source.volume, at, inward));
     }
     if (vertex != before) cells.add(vertex);
   }

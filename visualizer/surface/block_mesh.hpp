@@ -56,7 +56,7 @@ struct SurfaceVertex {
   std::array<std::uint16_t, 3> position{};  ///< 1/4096 voxel from `block_start`
   std::array<std::int16_t, 3> normal{};     ///< outward, of length 32767 in voxel coordinates
   std::array<std::uint16_t, 3> colour{};    ///< linear, 65535 = 1
-  std::uint16_t openness = 0;               ///< 65535 = 1
+  std::uint16_t ao_factor = 0;              ///< 65535 = 1
   friend bool operator==(const SurfaceVertex&, const SurfaceVertex&) = default;
 };
 
@@ -87,7 +87,7 @@ struct SurfaceSource {
   /// Turns a normal into the direction inwards if voxel edges are unequal; the largest part
   /// is 1.
   glm::vec3 inverse_square_spacing{1.0F};
-  const VertexShading* look = nullptr;
+  const VertexShading* shading = nullptr;
   GradientFilter gradient = GradientFilter::corners;  ///< of the normals
 };
 
@@ -120,7 +120,7 @@ class ChangedMeshCells {
 /// Brings the mesh of a block up to date after a change of densities in `changed` that touches none
 /// of the block's own voxels: positions stay, and the vertices that depend on `changed` are
 /// computed again. The result is that of `extract_block`. Returns the cells whose colours changed.
-ChangedMeshCells update_look(const SurfaceSource& source, VoxelIndex block, const VoxelBox& changed,
-                             BlockMesh& mesh);
+ChangedMeshCells update_shading(const SurfaceSource& source, VoxelIndex block,
+                                const VoxelBox& changed, BlockMesh& mesh);
 
 }  // namespace kerf

@@ -175,11 +175,11 @@ void FrustumCulling::append_visible(const BlockMesh& mesh, const BlockBounds& bo
 
 BlockBounds bounds_of(const BlockMesh& mesh, VoxelIndex block) {
   if (mesh.vertices.empty()) return {};
-  const auto place = [&](std::uint16_t vertex) {
+  const auto position = [&](std::uint16_t vertex) {
     const auto& at = mesh.vertices[vertex].position;
     return glm::vec3(at[0], at[1], at[2]);
   };
-  glm::vec3 low = place(0), high = low;
+  glm::vec3 low = position(0), high = low;
   for (const SurfaceVertex& vertex : mesh.vertices) {
     const glm::vec3 at(vertex.position[0], vertex.position[1], vertex.position[2]);
     low = glm::min(low, at);
@@ -187,7 +187,8 @@ BlockBounds bounds_of(const BlockMesh& mesh, VoxelIndex block) {
   }
   glm::vec3 normal_low(1.0F), normal_high(-1.0F);
   for (const auto& [a, b, c] : mesh.triangles) {
-    const glm::vec3 normal = glm::normalize(glm::cross(place(b) - place(a), place(c) - place(a)));
+    const glm::vec3 normal =
+        glm::normalize(glm::cross(position(b) - position(a), position(c) - position(a)));
     normal_low = glm::min(normal_low, normal);
     normal_high = glm::max(normal_high, normal);
   }
@@ -247,7 +248,7 @@ SurfaceOnGpu::SurfaceOnGpu(const VolumeSurface& surface) : parts_(surface.meshes
   describe(array_.id(), 0, 3, GL_UNSIGNED_SHORT, GL_FALSE, offsetof(SurfaceVertex, position),
            kVertexBinding);
   describe(array_.id(), 1, 3, GL_SHORT, GL_TRUE, offsetof(SurfaceVertex, normal), kVertexBinding);
-  static_assert(offsetof(SurfaceVertex, openness) ==
+  static_assert(offsetof(SurfaceVertex, ao_factor) ==
                 offsetof(SurfaceVertex, colour) + 3 * sizeof(std::uint16_t));
   describe(array_.id(), 2, 4, GL_UNSIGNED_SHORT, GL_TRUE, offsetof(SurfaceVertex, colour),
            kVertexBinding);
@@ -298,7 +299,7 @@ void SurfaceOnGpu::grow() {
   }
 }
 
-void SurfaceOnGpu::look_from(const VolumeSurface& surface, const FrustumCulling& culling) {
+void SurfaceOnGpu::find_visible(const VolumeSurface& surface, const FrustumCulling& culling) {
   seen_.clear();
   for (const std::uint32_t id : filled_) {
     const FrustumCulling::Visible shown = culling.visible(parts_[id].bounds);
@@ -306,12 +307,13 @@ void SurfaceOnGpu::look_from(const VolumeSurface& surface, const FrustumCulling&
     seen_.push_back(
         {culling.distance_2(surface.block(id)), id, shown == FrustumCulling::Visible::all});
   }
-  // What is hidden by then costs no light. The places of blocks never change, nor does their order.
+  // What is hidden by then costs no light. The positions of blocks never change, nor does their
+  // order.
   std::sort(seen_.begin(), seen_.end());
 }
 
 void SurfaceOnGpu::draw(const VolumeSurface& surface, const FrustumCulling& culling) {
-  look_from(surface, culling);
+  find_visible(surface, culling);
   commands_.clear();
   picked_.clear();
   of_picked_.clear();

@@ -152,7 +152,7 @@ class SurfaceOnGpu {
     auto operator<=>(const Seen&) const = default;
   };
 
-  void look_from(const VolumeSurface& surface, const FrustumCulling& culling);
+  void find_visible(const VolumeSurface& surface, const FrustumCulling& culling);
   /// Room for all that the pools hold.
   void grow();
   /// And lets the commands of `of_picked_` read from there.

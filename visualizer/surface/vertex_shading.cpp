@@ -44,13 +44,13 @@ glm::vec4 VertexShading::label_colour(const VolumeSamples& volume, FinePoint at)
   if (std::all_of(label.begin(), label.end(), [&](Label one) { return one == label[0]; })) {
     return label[0] == 0 ? glm::vec4(0.0F) : by_label_[label[0]];
   }
-  const glm::vec3 share = glm::vec3(at & (kFinePerVoxel - 1)) / float{kFinePerVoxel};
+  const glm::vec3 fraction = glm::vec3(at & (kFinePerVoxel - 1)) / float{kFinePerVoxel};
   glm::vec4 sum(0.0F);
   for (unsigned c = 0; c < 8; ++c) {
     if (label[c] == 0) continue;
-    const float weight = ((c & 1) != 0 ? share.x : 1.0F - share.x) *
-                         ((c & 2) != 0 ? share.y : 1.0F - share.y) *
-                         ((c & 4) != 0 ? share.z : 1.0F - share.z);
+    const float weight = ((c & 1) != 0 ? fraction.x : 1.0F - fraction.x) *
+                         ((c & 2) != 0 ? fraction.y : 1.0F - fraction.y) *
+                         ((c & 4) != 0 ? fraction.z : 1.0F - fraction.z);
     sum += weight * by_label_[label[c]];
   }
   return sum;
@@ -78,7 +78,7 @@ glm::vec3 VertexShading::colour(const VolumeSamples& volume, FinePoint at, FineP
                                  volume.density_at(stepped(at, inward, kFullDepthQuarters))));
 }
 
-float VertexShading::openness(const VolumeSamples& volume, FinePoint at, FinePoint inward) const {
+float VertexShading::ao_factor(const VolumeSamples& volume, FinePoint at, FinePoint inward) const {
   float open = 1.0F;
   for (const Tap& tap : kTaps) {
     const auto density = static_cast<float>(volume.density_at(stepped(at, inward, -tap.quarters)));
@@ -87,7 +87,7 @@ float VertexShading::openness(const VolumeSamples& volume, FinePoint at, FinePoi
   return open;
 }
 
-bool VertexShading::openness_depends_on(const VoxelBox& box, FinePoint at, FinePoint inward) {
+bool VertexShading::ao_depends_on(const VoxelBox& box, FinePoint at, FinePoint inward) {
   const VoxelBox cells{{box.lo.x - 1, box.lo.y - 1, box.lo.z - 1}, box.hi};
   return std::any_of(kTaps.begin(), kTaps.end(), [&](const Tap& tap) {
     return cells.contains(VolumeSamples::voxel_below(stepped(at, inward, -tap.quarters)));

@@ -15,19 +15,18 @@ namespace kerf {
 /// `inward` is the step of one voxel edge from the surface into the solid, along the normal.
 class VertexShading {
  public:
-  /// A voxel farther from a point than this has no influence on its colour, or its openness.
+  /// A voxel farther from a point than this has no influence on its shading.
   static constexpr int kColourReachVox = 4;
-  static constexpr int kOpennessReachVox = 13;
+  static constexpr int kAoReachVox = 13;
 
   VertexShading(const std::vector<MaterialView>& materials, Density iso);
 
   /// Linear colour of the material below the surface, each part 0..1.
   [[nodiscard]] glm::vec3 colour(const VolumeSamples& volume, FinePoint at, FinePoint inward) const;
   /// 1 in the open, less where the neighbourhood along the normal is solid.
-  [[nodiscard]] float openness(const VolumeSamples& volume, FinePoint at, FinePoint inward) const;
-  /// Whether `openness` there depends on a voxel in `box`.
-  [[nodiscard]] static bool openness_depends_on(const VoxelBox& box, FinePoint at,
-                                                FinePoint inward);
+  [[nodiscard]] float ao_factor(const VolumeSamples& volume, FinePoint at, FinePoint inward) const;
+  /// Whether `ao_factor` there depends on a voxel in `box`.
+  [[nodiscard]] static bool ao_depends_on(const VoxelBox& box, FinePoint at, FinePoint inward);
 
  private:
   [[nodiscard]] glm::vec4 label_colour(const VolumeSamples& volume, FinePoint at) const;

@@ -10,8 +10,8 @@
 
 namespace kerf {
 
-/// A place in a volume: voxel coordinates in steps of 1/4096. Whole numbers, so that two bricks
-/// that meet compute the same place on every machine.
+/// A point in a volume: voxel coordinates in steps of 1/4096. Whole numbers, so that two bricks
+/// that meet compute the same point on every machine.
 using FinePoint = glm::ivec3;
 /// Its corners.
 using FineTriangle = std::array<FinePoint, 3>;
@@ -52,10 +52,13 @@ struct VolumeSamples {
  private:
   template <typename Corner>
   [[nodiscard]] static int blend(FinePoint p, const Corner& corner) noexcept {
-    const glm::ivec3 share = p & (kFinePerVoxel - 1);
+    const glm::ivec3 fraction = p & (kFinePerVoxel - 1);
     const auto lerp = [](int a, int b, int t) { return a + ((b - a) * t >> kFineLog2); };
-    const auto row = [&](int y, int z) { return lerp(corner(0, y, z), corner(1, y, z), share.x); };
-    return lerp(lerp(row(0, 0), row(1, 0), share.y), lerp(row(0, 1), row(1, 1), share.y), share.z);
+    const auto row = [&](int y, int z) {
+      return lerp(corner(0, y, z), corner(1, y, z), fraction.x);
+    };
+    return lerp(lerp(row(0, 0), row(1, 0), fraction.y), lerp(row(0, 1), row(1, 1), fraction.y),
+                fraction.z);
   }
 };
 

@@ -50,7 +50,7 @@ VolumeSurface::VolumeSurface(const VolumeView& volume, const std::vector<Materia
       blocks_(block_grid(volume.bricks.grid)),
       iso_(std::max(volume.iso, Density{1})),
       inverse_square_spacing_(inverse_square_spacing(volume.world_from_voxel)),
-      look_(materials, iso_),
+      shading_(materials, iso_),
       gradient_(gradient),
       labels_(labels.begin(), labels.end()),
       meshes_(blocks_.voxel_count()),
@@ -66,7 +66,7 @@ VolumeSurface::VolumeSurface(const VolumeView& volume, const std::vector<Materia
 }
 
 SurfaceSource VolumeSurface::source(std::span<const Density> density) const {
-  return {{bricks_.grid, density, labels_}, iso_, inverse_square_spacing_, &look_, gradient_};
+  return {{bricks_.grid, density, labels_}, iso_, inverse_square_spacing_, &shading_, gradient_};
 }
 
 VoxelIndex VolumeSurface::block(std::uint32_t id) const noexcept {
@@ -91,7 +91,7 @@ std::span<const std::uint32_t> VolumeSurface::update(std::span<const Density> de
     if (box.empty()) continue;
     all = all.united(box);
     mark(blocks_on(box), Work::mesh);
-    mark(blocks_on(box.grown(VertexShading::kOpennessReachVox)), Work::look);
+    mark(blocks_on(box.grown(VertexShading::kAoReachVox)), Work::shading);
   }
   std::sort(marked_.begin(), marked_.end());
   different_.clear();
@@ -100,10 +100,10 @@ std::span<const std::uint32_t> VolumeSurface::update(std::span<const Density> de
   for (const std::uint32_t id : marked_) {
     BlockMesh& mesh = meshes_[id];
     const Work work = std::exchange(work_[id], Work::none);
-    if (work == Work::look && mesh.vertices.empty()) continue;
+    if (work == Work::shading && mesh.vertices.empty()) continue;
     ChangedMeshCells cells;
-    if (work == Work::look) {
-      cells = update_look(from, block(id), all, mesh);
+    if (work == Work::shading) {
+      cells = update_shading(from, block(id), all, mesh);
     } else {
       BlockMesh now = extract_block(from, block(id));
       cells = difference(mesh, now);

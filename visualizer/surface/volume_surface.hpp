@@ -40,7 +40,7 @@ class VolumeSurface {
   [[nodiscard]] const std::vector<BlockMesh>& meshes() const noexcept { return meshes_; }
 
  private:
-  enum class Work : std::uint8_t { none, look, mesh };
+  enum class Work : std::uint8_t { none, shading, mesh };
 
   [[nodiscard]] SurfaceSource source(std::span<const Density> density) const;
   void mark(const VoxelBox& blocks, Work work);
@@ -49,7 +49,7 @@ class VolumeSurface {
   VoxelGrid blocks_;
   Density iso_;
   glm::vec3 inverse_square_spacing_;
-  VertexShading look_;
+  VertexShading shading_;
   GradientFilter gradient_;
   std::vector<Label> labels_;
   std::vector<BlockMesh> meshes_;

@@ -13,7 +13,7 @@ export const kUnitsPerVolume = 3;  // texture units of a volume that is looked i
 function viewUniforms(view) {
   return {u_half_size_at_1mm: [view.tanHalfHeight * view.aspect, view.tanHalfHeight],
     u_middle_at_1mm: [view.middleRight, 0], u_near_mm: view.near, u_far_mm: view.far,
-    u_shown_eye: shownInEye(view), u_up_eye: turn(view.eyeFromWorld, [0, 1, 0])};
+    u_clip_plane_eye: shownInEye(view), u_up_eye: turn(view.eyeFromWorld, [0, 1, 0])};
 }
 
 /** Per pixel, where its ray first meets an active cell. */

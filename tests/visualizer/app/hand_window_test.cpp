@@ -49,10 +49,10 @@ struct Bench {
                                                 "0.342,0.342,0.342", "--port", "socket:" + port,
                                                 "--name", "test", "--report", report.string()},
                        screen.folder / "controller.log");
-    window.emplace(look(), screen.folder / "window.log");
+    window.emplace(arguments(), screen.folder / "window.log");
     REQUIRE(said(*window, "the hand is yours"));
   }
-  std::vector<std::string> look() const {
+  std::vector<std::string> arguments() const {
     return {kPrograms + "/kerf-visualizer",
             "--name",
             "test",
@@ -117,7 +117,7 @@ TEST_CASE("pointer events cut where the tooth is, and nowhere else") {
 TEST_CASE("windows and emulators come and go, and each is told") {
   if (!have("Xvfb") || !have("xdotool")) return;
   Bench bench;
-  Process second(bench.look(), bench.screen.folder / "second.log");
+  Process second(bench.arguments(), bench.screen.folder / "second.log");
   CHECK(Bench::said(second, "another window leads it"));
   bench.window.reset();
   CHECK(Bench::said(second, "the hand is yours"));

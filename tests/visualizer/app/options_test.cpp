@@ -55,11 +55,11 @@ TEST_CASE("a size that is none is refused with the limits") {
 }
 
 TEST_CASE("the gradient and a tool of voxels are part of the first look") {
-  CHECK(parse({})->look.gradient == GradientFilter::corners);
-  CHECK_FALSE(parse({})->look.voxel_tool);
-  const ViewSettings look = parse({"--gradient", "farid5", "--voxel-tool"})->look;
-  CHECK(look.gradient == GradientFilter::farid5);
-  CHECK(look.voxel_tool);
+  CHECK(parse({})->settings.gradient == GradientFilter::corners);
+  CHECK_FALSE(parse({})->settings.voxel_tool);
+  const ViewSettings settings = parse({"--gradient", "farid5", "--voxel-tool"})->settings;
+  CHECK(settings.gradient == GradientFilter::farid5);
+  CHECK(settings.voxel_tool);
   CHECK_THROWS_WITH_AS(parse({"--gradient", "sobel"}),
                        "--gradient: sobel is unknown; known: central, corners, farid5",
                        VisualizerError);
@@ -75,7 +75,7 @@ TEST_CASE("an unknown renderer is refused and the known ones are named") {
 }
 
 TEST_CASE("each volume may have a renderer of its own, and one kind of them looks into volumes") {
-  CHECK(parse({"--renderer", "surface,blend"})->look.renderer == "surface,blend");
+  CHECK(parse({"--renderer", "surface,blend"})->settings.renderer == "surface,blend");
   CHECK_THROWS_WITH_AS(parse({"--renderer", "surface,"}),
                        doctest::Contains("--renderer:  is unknown; known: iso"), VisualizerError);
   CHECK_THROWS_WITH_AS(parse({"--renderer", "blend,iso,slices"}),

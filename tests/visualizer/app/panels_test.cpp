@@ -36,14 +36,14 @@ OverlayFigures crowded() {
   figures.frame_rate_hz = 60.0;
   figures.data_age_ms = 1.0;
   figures.filmed_frames = 1234;
-  LookControls& controls = figures.controls.emplace();
+  ViewControls& controls = figures.controls.emplace();
   const Silhouette side{{0.0, -0.2, 0.2}, {1.0, -1.0, 1.0}, {4.0, -0.5, 0.5}};
   for (int tool = 0; tool < 16; ++tool) {
     controls.tools.push_back({"1.6 mm tool " + std::to_string(tool), side});
   }
   for (int v = 0; v < 8; ++v) controls.volumes.push_back("volume " + std::to_string(v));
   controls.has_iso = controls.takes_gradient = true;
-  controls.look.clip.on = true;
+  controls.settings.clip.on = true;
   for (int m = 0; m < 31; ++m) controls.opacities["material " + std::to_string(m)] = 0.5;
   return figures;
 }
@@ -111,9 +111,9 @@ TEST_CASE("panels cover at most a quarter of a window, and not its middle, whate
         if (slices) figures.slices = grey_slices(static_cast<int>(56 * scale));
         if (plot) figures.plot = some_plot();
         std::vector<std::uint8_t> picture;
-        const double share = covered(overlay, figures, size, &picture);
-        CHECK(share < 0.25);
-        CHECK(share > 0.1);  // it shows them
+        const double fraction = covered(overlay, figures, size, &picture);
+        CHECK(fraction < 0.25);
+        CHECK(fraction > 0.1);  // it shows them
         CHECK(middle_is_free(picture, size));
       }
     }
@@ -175,9 +175,9 @@ TEST_CASE("each page of the keys covers at most a quarter, and all keys have the
     std::vector<std::vector<std::uint8_t>> seen;
     for (; figures.help <= pages; ++figures.help) {
       CAPTURE(figures.help);
-      const double share = covered(overlay, figures, kPlain, &seen.emplace_back());
-      CHECK(share < 0.25);
-      CHECK(share > 0.1);
+      const double fraction = covered(overlay, figures, kPlain, &seen.emplace_back());
+      CHECK(fraction < 0.25);
+      CHECK(fraction > 0.1);
       if (seen.size() > 1) CHECK(seen[seen.size() - 1] != seen[seen.size() - 2]);
     }
   }

@@ -274,7 +274,7 @@ TEST_CASE("every renderer draws a session") {
     const std::string renderer(kind);
     CAPTURE(renderer);
     VisualizerOptions options = place.options();
-    options.look.renderer = renderer;
+    options.settings.renderer = renderer;
     options.out = place.path / renderer;
     CHECK(run_headless(options) == 0);
     pictures.push_back(contents(options.out / "frame-0001.png"));
@@ -282,7 +282,7 @@ TEST_CASE("every renderer draws a session") {
   }
   CHECK(pictures[0] != pictures[1]);
   VisualizerOptions options = place.options();
-  options.look.renderer = "surface,blend";
+  options.settings.renderer = "surface,blend";
   CHECK_THROWS_WITH_AS(static_cast<void>(run_headless(options)),
                        doctest::Contains("surface,blend is for 2 volumes, and the scene has 1"),
                        VisualizerError);
@@ -322,7 +322,7 @@ TEST_CASE("a headless run exports the final surface, drawn by the surface render
   const Place place;
   Miller miller;
   VisualizerOptions options = place.options();
-  options.look.renderer = "surface";
+  options.settings.renderer = "surface";
   options.mesh = place.path / "block.stl";
   auto code = std::async(std::launch::async, [&] { return run_headless(options); });
   miller.run_to(51);
@@ -350,7 +350,7 @@ TEST_CASE("a sheet at the end of a headless run shows the opacities of --transfe
     VisualizerOptions options = place.options();
     options.sheet = place.path / "sheet.png";
     options.transfer = "named in messages only";
-    options.look.opacities = {{"bone", opacity}};
+    options.settings.opacities = {{"bone", opacity}};
     CHECK(run_headless(options) == 0);
     sheets.push_back(contents(*options.sheet));
     CHECK(sheets.back().substr(1, 3) == "PNG");

@@ -228,7 +228,7 @@ void User::begin_video() {
   wait_for(out_ / "kerf-0001.y4m");
 }
 
-std::vector<std::uint8_t> User::look() {
+std::vector<std::uint8_t> User::picture() {
   return middle_of(whole());
 }
 

@@ -72,7 +72,7 @@ class User {
   /// The window with its panels.
   RgbPicture whole();
   /// The middle of it, where no panel is.
-  std::vector<std::uint8_t> look();
+  std::vector<std::uint8_t> picture();
   /// The same as it stands on the screen, whose upper left corner the window is in.
   std::vector<std::uint8_t> look_at_screen();
 

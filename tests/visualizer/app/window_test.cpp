@@ -44,39 +44,39 @@ TEST_CASE("keys and mouse work the window") {
   if (!have("Xvfb") || !have("xdotool")) return;
   const Screen screen;
   User user(screen.folder);
-  const auto first = user.look();
-  CHECK(user.look() == first);
+  const auto first = user.picture();
+  CHECK(user.picture() == first);
 
   SUBCASE("v takes the next renderer") {
     act("key v");
-    CHECK(user.look() != first);
+    CHECK(user.picture() != first);
     CHECK(user.quit() == 0);
     CHECK(user.report()["renderer"] == "blend");
   }
   SUBCASE("c cuts the volumes open and closes them again") {
     act("key c");
-    CHECK(user.look() != first);
+    CHECK(user.picture() != first);
     act("key c");
-    CHECK(user.look() == first);
+    CHECK(user.picture() == first);
     CHECK(user.quit() == 0);
   }
   SUBCASE("a drag turns, r turns back, the wheel zooms") {
     act("mousedown 1 mousemove 360 200 sleep 0.2 mouseup 1");
-    CHECK(user.look() != first);
+    CHECK(user.picture() != first);
     act("key r");
-    CHECK(user.look() == first);
+    CHECK(user.picture() == first);
     act("click 4");
-    CHECK(user.look() != first);
+    CHECK(user.picture() != first);
     CHECK(user.quit() == 0);
   }
   SUBCASE("a drag with shift, or with the middle button, moves") {
     act("keydown shift mousedown 1 mousemove 340 200 sleep 0.2 mouseup 1 keyup shift");
-    const auto shifted = user.look();
+    const auto shifted = user.picture();
     CHECK(shifted != first);
     act("key r mousemove 300 180");
-    CHECK(user.look() == first);
+    CHECK(user.picture() == first);
     act("mousedown 2 mousemove 340 200 sleep 0.2 mouseup 2");
-    CHECK(user.look() == shifted);
+    CHECK(user.picture() == shifted);
     CHECK(user.quit() == 0);
   }
   SUBCASE("a digit asks the controller for that tool, where there is one") {
@@ -105,32 +105,32 @@ TEST_CASE("keys and mouse work the window") {
     CHECK(user.controller().undos() == 0);
     user.controller().offer_undo();
     user.controller().tick();
-    static_cast<void>(user.look());  // after a picture the window knows of it
+    static_cast<void>(user.picture());  // after a picture the window knows of it
     act("key z");
     CHECK(user.controller().undos() == 1);
     CHECK(user.quit() == 0);
   }
   SUBCASE("y shows materials in other colours, and their own again") {
     act("key y");
-    CHECK(user.look() != first);
+    CHECK(user.picture() != first);
     act("key y");
-    CHECK(user.look() == first);
+    CHECK(user.picture() == first);
     CHECK(user.quit() == 0);
   }
   SUBCASE("x cuts the volumes open square to the gaze, and the wheel with shift moves the plane") {
     act("key c");
-    const auto along_z = user.look();
+    const auto along_z = user.picture();
     act("key x");
-    const auto facing = user.look();
+    const auto facing = user.picture();
     CHECK(facing != along_z);
     CHECK(facing != first);
     act("keydown shift click 5 click 5 click 5 click 5 keyup shift");
-    const auto nearer = user.look();
+    const auto nearer = user.picture();
     CHECK(nearer != facing);
     act("keydown shift click 4 click 4 click 4 click 4 keyup shift");
-    CHECK(user.look() == facing);
+    CHECK(user.picture() == facing);
     act("key c");
-    CHECK(user.look() == first);
+    CHECK(user.picture() == first);
     CHECK(user.quit() == 0);
   }
   SUBCASE("l shows three slices through the tip, and hides them") {
@@ -167,22 +167,22 @@ TEST_CASE("keys and mouse work the window") {
   SUBCASE("a drag that begins on the controls does not turn") {
     act("mousemove 190 330 sleep 0.2 mousedown 1 sleep 0.2 mousemove 300 100 sleep 0.2 mouseup 1 "
         "mousemove 300 180");
-    const auto after = user.look();
+    const auto after = user.picture();
     CHECK(user.quit() == 0);
     CHECK(after == first);
   }
   SUBCASE("t shows two eyes side by side, and one again") {
     act("key t");
-    CHECK(user.look() != first);
+    CHECK(user.picture() != first);
     act("key t");
-    CHECK(user.look() == first);
+    CHECK(user.picture() == first);
     CHECK(user.quit() == 0);
   }
   SUBCASE("a slider changes an opacity while it is dragged, and w writes it") {
     act("key v");
-    const auto blended = user.look();
+    const auto blended = user.picture();
     act("mousemove 131 284 sleep 0.2 mousedown 1 sleep 0.2 mousemove 60 284 sleep 0.2");
-    CHECK(user.look() != blended);
+    CHECK(user.picture() != blended);
     act("mouseup 1 mousemove 300 180 key w");
     CHECK(user.quit() == 0);
     const Opacities written = read_transfer(user.out() / "kerf-0001.toml");
@@ -201,7 +201,7 @@ TEST_CASE("keys and mouse work the window") {
   }
   SUBCASE("every panel may be shown") {
     act("key p key l key h sleep 0.2 key p key p key h key h key h");
-    CHECK(user.look() == first);
+    CHECK(user.picture() == first);
     CHECK(user.quit() == 0);
   }
   const std::string window = "search --name 'kerf: test' ";
@@ -209,7 +209,7 @@ TEST_CASE("keys and mouse work the window") {
     for (const char* size : {"1 1", "0 0", "1 360", "480 1"}) act(window + "windowsize " + size);
     act(window + "windowsize 480 360");
     act("mousemove 300 180");
-    CHECK(user.look() == first);
+    CHECK(user.picture() == first);
     CHECK(user.look_at_screen() == first);
     CHECK(user.quit() == 0);
   }
@@ -217,7 +217,7 @@ TEST_CASE("keys and mouse work the window") {
     CHECK(user.look_at_screen() == first);
     for (const char* size : {"360 270", "600 450"}) {
       act(window + "windowsize " + size);
-      const auto seen = user.look();
+      const auto seen = user.picture();
       CHECK(seen.size() != first.size());
       CHECK(user.look_at_screen() == seen);
     }
@@ -229,9 +229,9 @@ TEST_CASE("keys and mouse work the window") {
       act(window + "windowmap");
     }
     act("mousemove 300 180");
-    CHECK(user.look() == first);
+    CHECK(user.picture() == first);
     act("key v");
-    CHECK(user.look() != first);
+    CHECK(user.picture() != first);
     CHECK(user.quit() == 0);
   }
 }
@@ -245,7 +245,7 @@ TEST_CASE("o lists scenes; a file that is none is told, a scene ends the window 
   };
   const std::string none = "60 78", one = "60 95";  // below the folder above
   // After a picture the window has done what it was asked.
-  const auto done = [&user] { static_cast<void>(user.look()); };
+  const auto done = [&user] { static_cast<void>(user.picture()); };
   act("key o");
   done();
   click(none);
@@ -279,15 +279,15 @@ TEST_CASE("each of two volumes takes its own renderer, by keys and by its list")
   if (!have("Xvfb") || !have("xdotool")) return;
   const Screen screen;
   User user(screen.folder, 2);
-  const auto first = user.look();
+  const auto first = user.picture();
   SUBCASE("b says which one v is for, and then that it is for all again") {
     act("key b key b key v");  // the second
-    const auto mixed = user.look();
+    const auto mixed = user.picture();
     CHECK(mixed != first);
     act("key b key v key v key v key v key v key v");
-    CHECK(user.look() == first);
+    CHECK(user.picture() == first);
     act("key b key b key v");
-    CHECK(user.look() == mixed);
+    CHECK(user.picture() == mixed);
     CHECK(user.quit() == 0);
     CHECK(user.report()["renderer"] == "iso,blend");
   }
@@ -298,7 +298,7 @@ TEST_CASE("each of two volumes takes its own renderer, by keys and by its list")
     click("90 238");  // the second one's,
     click("45 145");  // and in it blend
     act("mousemove 300 180");
-    CHECK(user.look() != first);
+    CHECK(user.picture() != first);
     CHECK(user.quit() == 0);
     CHECK(user.report()["renderer"] == "iso,blend");
   }

@@ -35,7 +35,7 @@ Cast cast(Caster& caster, const View& view) {
 }
 
 /// Translucent: a tenth and a third of opacity over a voxel edge.
-TransferFunction matter(std::span<const MaterialView> materials = {}) {
+TransferFunction transfer(std::span<const MaterialView> materials = {}) {
   TransferFunction made{.materials = make_palette(materials), .empty = 0.2, .full = 0.5};
   for (glm::vec4& material : made.materials[0]) material.w = 0.1F;
   for (glm::vec4& material : made.materials[1]) material.w = 0.33F;
@@ -48,7 +48,7 @@ Caster caster_of(std::initializer_list<const TestVolume*> volumes,
   std::vector<CastContent> contents;
   for (const TestVolume* volume : volumes) {
     scene.volumes.push_back(volume->view);
-    contents.push_back({volume->density, {}, matter()});
+    contents.push_back({volume->density, {}, transfer()});
   }
   return {scene, contents, options};
 }
@@ -153,8 +153,9 @@ TEST_CASE("every instruction set gives the bits of one ray at a time") {
   scene.volumes = {a.volume.view, b.volume.view};
   scene.materials = {
       {"none", 0.0, {}}, {"one", 0.3, {0.8, 0.6, 0.3}}, {"two", 0.7, {0.3, 0.6, 0.8}}};
-  const std::array<CastContent, 2> contents{{{a.volume.density, a.labels, matter(scene.materials)},
-                                             {b.volume.density, {}, matter(scene.materials)}}};
+  const std::array<CastContent, 2> contents{
+      {{a.volume.density, a.labels, transfer(scene.materials)},
+       {b.volume.density, {}, transfer(scene.materials)}}};
   for (const CastMode mode : {CastMode::iso, CastMode::blend}) {
     Caster::Options options = blending();
     options.mode = mode;
@@ -272,14 +273,14 @@ TEST_CASE("a clip plane cuts a face into a ball, and takes away what is before i
   const VoxelGrid grid{40, 40, 40};
   const TestVolume volume(grid, centred(grid, glm::dvec3(0.25)), ball({}, 4.0, 0.5));
   View view = look_at({0, 0, 30}, {}, 15, 45);
-  view.shown = {0, 0, -1, 1.5};  // z <= 1.5 mm
+  view.clip_plane = {0, 0, -1, 1.5};  // z <= 1.5 mm
   Caster caster = caster_of({&volume});
   const Cast drawn = cast(caster, view);
   const std::size_t middle = drawn.picture.depth.size() / 2;
   CHECK(eye_distance_mm(static_cast<double>(drawn.picture.depth[middle]), view) ==
         doctest::Approx(28.5).epsilon(1e-5));
   CHECK(drawn.normals[3 * middle + 2] == doctest::Approx(1.0));
-  view.shown = {0, 0, -1, -4.5};
+  view.clip_plane = {0, 0, -1, -4.5};
   const Cast nothing = cast(caster, view);
   CHECK(*std::ranges::min_element(nothing.picture.depth) == 1.0F);
 }
@@ -311,7 +312,7 @@ TEST_CASE(
   constexpr double kEdgeMm = 0.25;
   constexpr double kEyeMm = 30.0;
   const TestVolume block(grid, centred(grid, glm::dvec3(kEdgeMm)), [](glm::dvec3) { return 1.0; });
-  // Beyond the last centres the density falls to nothing over an edge, of which `matter` shows
+  // Beyond the last centres the density falls to nothing over an edge, of which `transfer` shows
   // 0.65.
   constexpr double kHalfMm = 19.5 * kEdgeMm + 0.65 * kEdgeMm;
   constexpr double kSafeMm = 4.5;  // from the axis: no ray passes a side

@@ -55,23 +55,23 @@ TEST_CASE(
                               glm::normalize(glm::dvec3(1, 2, -1))),
                   0.5, glm::dvec3(0, 1, 0));
   const glm::dmat4 box_from_world = glm::inverse(world_from_box);
-  const GridPlaces places{{61, 47, 53}, glm::dvec3(-14.2, -11.0, -12.1), 0.47};
+  const GridPoints points{{61, 47, 53}, glm::dvec3(-14.2, -11.0, -12.1), 0.47};
   for (const int strips : {1, 3, 40}) {
     for (const double reach_mm : {0.3, 0.9, 2.5}) {
       CAPTURE(strips);
       CAPTURE(reach_mm);
-      const auto distances = facet_distances(box_mesh(world_from_box, strips), places, reach_mm);
+      const auto distances = facet_distances(box_mesh(world_from_box, strips), points, reach_mm);
       double worst = 0.0;
       int near = 0;
       int inside = 0;
-      for (int z = 0; z < places.grid.nz; ++z) {
-        for (int y = 0; y < places.grid.ny; ++y) {
-          for (int x = 0; x < places.grid.nx; ++x) {
-            const glm::dvec3 world = places.first_mm + places.edge_mm * glm::dvec3(x, y, z);
+      for (int z = 0; z < points.grid.nz; ++z) {
+        for (int y = 0; y < points.grid.ny; ++y) {
+          for (int x = 0; x < points.grid.nx; ++x) {
+            const glm::dvec3 world = points.first_mm + points.edge_mm * glm::dvec3(x, y, z);
             const double exact =
                 std::clamp(box_distance(glm::dvec3(box_from_world * glm::dvec4(world, 1.0))),
                            -reach_mm, reach_mm);
-            const auto own = static_cast<double>(distances[places.grid.index(x, y, z)]);
+            const auto own = static_cast<double>(distances[points.grid.index(x, y, z)]);
             worst = std::max(worst, std::abs(own - exact));
             near += std::abs(exact) < reach_mm ? 1 : 0;
             inside += exact < 0.0 ? 1 : 0;

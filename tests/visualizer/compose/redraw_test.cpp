@@ -139,17 +139,18 @@ struct Place {
 
 /// Changes volumes, hand and camera at random, and compares each part that was drawn again with
 /// drawing everything.
-void check_parts(const ViewSettings& look, PictureSize size, int edits) {
+void check_parts(const ViewSettings& settings, PictureSize size, int edits) {
   std::mt19937 random(3);
   const auto below = [&](int n) { return static_cast<int>(random() % static_cast<unsigned>(n)); };
   Controller controller;
   Session session("redraw");
   session.poll();
-  Picture picture(session, look, 4.0 / 3.0);
+  Picture picture(session, settings, 4.0 / 3.0);
   const RenderTarget target(size);
   const OverlayFigures figures;
   static_cast<void>(picture.draw(session, figures, target));
-  const bool coarse = look.renderer.find("slices") != std::string::npos;  // while something moves
+  const bool coarse =
+      settings.renderer.find("slices") != std::string::npos;  // while something moves
   double redrawn = 0;
   int parts = 0;
   for (int edit = 0; edit < edits; ++edit) {
@@ -175,11 +176,11 @@ void check_parts(const ViewSettings& look, PictureSize size, int edits) {
     }
     const auto seen = target.read_rgb();
     if (edit % 10 != 9) {
-      redrawn += part.share;
+      redrawn += part.fraction;
       ++parts;
     }
     picture.redraw_all();
-    CHECK(picture.draw(session, figures, target).share == 1.0);
+    CHECK(picture.draw(session, figures, target).fraction == 1.0);
     const bool same = seen == target.read_rgb();
     CAPTURE(edit);
     REQUIRE(same);
@@ -189,9 +190,10 @@ void check_parts(const ViewSettings& look, PictureSize size, int edits) {
     CHECK_FALSE(picture.draw(session, figures, target).any);
   }
   // One sees into the volume and the tool in it; of the other, what is hidden stays.
-  const std::vector<std::string> kinds = renderer_of_each(look.renderer, 2);
+  const std::vector<std::string> kinds = renderer_of_each(settings.renderer, 2);
   const bool opaque = std::none_of(kinds.begin(), kinds.end(), is_translucent);
-  const bool wide = look.stereo.on || look.voxel_tool || look.gradient != GradientFilter::corners;
+  const bool wide =
+      settings.stereo.on || settings.voxel_tool || settings.gradient != GradientFilter::corners;
   CHECK(redrawn / parts < (wide ? 0.6 : opaque ? 0.08 : 0.2));
 }
 
@@ -237,9 +239,9 @@ TEST_CASE("slices are fewer around a tool that moves, and all of them once it re
     for (const double x_mm : {-2.0, 0.0, 2.0}) {
       controller.move({.tip_mm = {x_mm, 6.0, 4.0}});
       session.poll();
-      const double share = picture.draw(session, {}, target).share;
-      CHECK(share > 0.0);
-      CHECK(share < 0.5);
+      const double fraction = picture.draw(session, {}, target).fraction;
+      CHECK(fraction > 0.0);
+      CHECK(fraction < 0.5);
       moving = target.read_rgb();
     }
     // A force that changes is no motion.
@@ -317,20 +319,20 @@ TEST_CASE("a changed look shows the picture of one that had it from the start") 
   };
   ViewSettings clipped{.renderer = "iso"};
   clipped.clip = {.on = true, .axis = 0, .at = 0.4};
-  for (const ViewSettings& look :
+  for (const ViewSettings& settings :
        {ViewSettings{.renderer = "blend"}, ViewSettings{.renderer = "surface,blend"},
         ViewSettings{.renderer = "iso", .iso = 0.7}, clipped}) {
     std::vector<std::uint8_t> changed;
     {
       Picture picture(session, {.renderer = "iso"}, 4.0 / 3.0);
       const auto before = drawn(picture);
-      picture.set_look(session, look);
+      picture.set_view(session, settings);
       changed = drawn(picture);
       CHECK(changed != before);
-      CHECK_THROWS_AS(picture.set_look(session, {.renderer = "voxels"}), VisualizerError);
-      CHECK(picture.look() == look);
+      CHECK_THROWS_AS(picture.set_view(session, {.renderer = "voxels"}), VisualizerError);
+      CHECK(picture.settings() == settings);
     }
-    Picture fresh(session, look, 4.0 / 3.0);
+    Picture fresh(session, settings, 4.0 / 3.0);
     const bool same = drawn(fresh) == changed;
     CHECK(same);
   }

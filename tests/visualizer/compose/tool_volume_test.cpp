@@ -79,11 +79,11 @@ TEST_CASE("a tool of voxels is half dense on its surface, and fades over two vox
       for (int x = 0; x < grid.nx; ++x) {
         const glm::dvec3 at(view.world_from_voxel * glm::dvec4(x, y, z, 1.0));
         if (at.y > 0.5 * kRadiusMm) continue;  // without the neck
-        const double share =
+        const double fraction =
             std::clamp(0.5 - (glm::length(at) - kRadiusMm) / (2.0 * edge_mm), 0.0, 1.0);
         const double is = tool.content().density[grid.index(x, y, z)] / kDensityMax;
-        worst = std::max(worst, std::abs(is - share));
-        ramp += share > 0.0 && share < 1.0 ? 1 : 0;
+        worst = std::max(worst, std::abs(is - fraction));
+        ramp += fraction > 0.0 && fraction < 1.0 ? 1 : 0;
       }
     }
   }

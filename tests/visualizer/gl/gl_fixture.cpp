@@ -34,8 +34,8 @@ TestVolume::TestVolume(VoxelGrid grid, const glm::dmat4& world_from_voxel,
     for (int y = 0; y < grid.ny; ++y) {
       for (int x = 0; x < grid.nx; ++x) {
         const glm::dvec3 at(world_from_voxel * glm::dvec4(x, y, z, 1));
-        const double share = std::clamp(density_at_mm(at), 0.0, 1.0);
-        density.push_back(static_cast<Density>(std::lround(share * kDensityMax)));
+        const double fraction = std::clamp(density_at_mm(at), 0.0, 1.0);
+        density.push_back(static_cast<Density>(std::lround(fraction * kDensityMax)));
       }
     }
   }

@@ -35,8 +35,8 @@ struct LoadedScene {
         for (int x = 0; x < kGrid.nx; ++x) {
           const double outside = glm::length(glm::dvec3(x - 20, y - 18, z - 16)) - 12.0;
           const double hollow = 7.0 - glm::length(glm::dvec3(x - 27, y - 23, z - 22));
-          const double share = std::clamp(0.5 - 0.5 * std::max(outside, hollow), 0.0, 1.0);
-          density.push_back(static_cast<Density>(share * kDensityMax));
+          const double fraction = std::clamp(0.5 - 0.5 * std::max(outside, hollow), 0.0, 1.0);
+          density.push_back(static_cast<Density>(fraction * kDensityMax));
         }
       }
     }

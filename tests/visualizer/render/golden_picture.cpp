@@ -49,9 +49,9 @@ RgbPicture with_depth(const Drawn& drawn, const View& view, PictureSize size) {
                        drawn.rgb.begin() + 3 * (row + size.width));
     for (int x = 0; x < size.width; ++x) {
       const float depth = drawn.depth[static_cast<std::size_t>(row + x)];
-      const double share = (eye_distance_mm(static_cast<double>(depth), view) - view.near_mm) /
-                           (view.far_mm - view.near_mm);
-      const auto grey = static_cast<std::uint8_t>(std::lround(kFarthest * share));
+      const double fraction = (eye_distance_mm(static_cast<double>(depth), view) - view.near_mm) /
+                              (view.far_mm - view.near_mm);
+      const auto grey = static_cast<std::uint8_t>(std::lround(kFarthest * fraction));
       picture.rgb.insert(picture.rgb.end(), 3, depth < 1.0F ? grey : kNothing);
     }
   }

@@ -112,8 +112,8 @@ double TwoBodies::transparency(std::size_t v, const PixelRay& ray, double from_m
   constexpr double kStepMm = 0.02;
   double edges = 0.0;
   for (double at_mm = from_mm; at_mm < to_mm; at_mm += kStepMm) {
-    const double share = share_at(bodies[v](ray.origin_mm + at_mm * ray.direction));
-    edges += look.presence(share) * kStepMm * glm::length(ray.direction) / edge_mm;
+    const double fraction = share_at(bodies[v](ray.origin_mm + at_mm * ray.direction));
+    edges += look.presence(fraction) * kStepMm * glm::length(ray.direction) / edge_mm;
   }
   return std::pow(1.0 - opacity, edges);
 }

@@ -22,7 +22,7 @@ TEST_CASE("the clip plane leaves a face where it cuts through solid, and nothing
   const TestVolume volume(grid, centred(grid, glm::dvec3(0.25)), ball({}, 3.5, 0.5));
   const VolumeContent content = volume.content();
   View view = look_at({0, 0, 30}, {}, 20, 40);
-  view.shown = {0, 0, -1, 1.03};  // z <= 1.03 mm
+  view.clip_plane = {0, 0, -1, 1.03};  // z <= 1.03 mm
   for (const std::string_view kind : renderer_kinds()) {
     CAPTURE(std::string(kind));
     const auto renderer = make_renderer(kind, scene_of({&volume}), {&content, 1});
@@ -45,7 +45,7 @@ TEST_CASE("what lies behind the clip plane is not seen from before it, however n
                           [](glm::dvec3 at) { return at.z < -0.3 ? 1.0 : 0.0; });
   const VolumeContent content = volume.content();
   View view = look_at({3, 2, 30}, {}, 20, 40);
-  view.shown = {0, 0, 1, 0};  // z >= 0
+  view.clip_plane = {0, 0, 1, 0};  // z >= 0
   for (const std::string_view kind : renderer_kinds()) {
     CAPTURE(std::string(kind));
     const auto renderer = make_renderer(kind, scene_of({&volume}), {&content, 1});
@@ -69,7 +69,7 @@ TEST_CASE("iso, surface and cast show the same face in the clip plane, also afte
       {"none", 0.0, {0, 0, 0}}, {"dentin", 0.4, {0.8, 0.2, 0.1}}, {"enamel", 0.8, {0.2, 0.3, 0.9}}};
   const VolumeContent content = volume.content();
   View view = look_at({9, 12, 30}, {}, 20, 45);
-  view.shown = {0.0, -0.6, -0.8, 0.3};
+  view.clip_plane = {0.0, -0.6, -0.8, 0.3};
   const RenderTarget target(kTestSize);
   std::vector<std::unique_ptr<Renderer>> renderers;
   for (const char* kind : {"iso", "surface", "cast"}) {
@@ -97,7 +97,7 @@ TEST_CASE("iso, surface and cast show the same face in the clip plane, also afte
           const PixelRay ray = pixel_ray(view, kTestSize, x, y);
           const auto eye_mm = eye_distance_mm(static_cast<double>(iso.depth[at]), view);
           const glm::dvec4 hit(ray.origin_mm + eye_mm * ray.direction, 1.0);
-          if (std::abs(glm::dot(view.shown, hit)) > 1e-3) continue;
+          if (std::abs(glm::dot(view.clip_plane, hit)) > 1e-3) continue;
           ++face;
           bool equal = std::abs(drawn.depth[at] - iso.depth[at]) < 1e-6F;
           for (std::size_t c = 3 * at; c < 3 * at + 3; ++c) {
@@ -130,10 +130,10 @@ TEST_CASE("a face in the clip plane has the colour of what lies in it, not behin
     const auto renderer = make_renderer(kind, scene, {&content, 1});
     renderer->set_cut_open(true, {&content, 1});
     const std::size_t middle = 3 * pixel_at(48, 48);
-    view.shown = {0, 0, -1, 1.125};  // through the last red voxels
+    view.clip_plane = {0, 0, -1, 1.125};  // through the last red voxels
     const Drawn red = draw(*renderer, view, RenderTarget(kTestSize));
     CHECK(red.rgb[middle] > 2 * red.rgb[middle + 2]);
-    view.shown = {0, 0, -1, 0.875};
+    view.clip_plane = {0, 0, -1, 0.875};
     const Drawn blue = draw(*renderer, view, RenderTarget(kTestSize));
     CHECK(blue.rgb[middle + 2] > 2 * blue.rgb[middle]);
   }
@@ -152,9 +152,9 @@ TEST_CASE("a plane beyond a volume hides it whole, one on its near side nothing"
     const Drawn whole = draw(*renderer, all, target);
     renderer->set_cut_open(true, {&content, 1});
     View view = all;
-    view.shown = {1, 0, 0, 4.0};
+    view.clip_plane = {1, 0, 0, 4.0};
     CHECK(draw(*renderer, view, target).rgb == whole.rgb);
-    view.shown = {1, 0, 0, -4.0};
+    view.clip_plane = {1, 0, 0, -4.0};
     for (const float depth : draw(*renderer, view, target).depth) CHECK(depth == 1.0F);
   }
 }

@@ -167,8 +167,8 @@ TEST_CASE("a torus has no Euler number, and area and volume by Pappus") {
 }
 
 TEST_CASE("empty, full and single-voxel volumes") {
-  const auto filled = [](VoxelGrid grid, double share) {
-    return TestVolume(grid, glm::dmat4(1.0), [=](glm::dvec3) { return share; });
+  const auto filled = [](VoxelGrid grid, double fraction) {
+    return TestVolume(grid, glm::dmat4(1.0), [=](glm::dvec3) { return fraction; });
   };
   CHECK(closed(filled({20, 9, 8}, 0.0)).triangles.empty());
   // Full up to its border: a box that ends half a voxel beyond the last centres.
@@ -233,9 +233,9 @@ TEST_CASE("a vertex has the colour of the label below it, and is darker in a cav
                      1));
       if (at.z < -0.75) CHECK(vertex.colour == std::array<std::uint16_t, 3>{65535, 0, 0});
       if (at.z > 0.75) CHECK(vertex.colour == std::array<std::uint16_t, 3>{0, 65535, 0});
-      if (at.y < -4.0) open = std::max(open, vertex.openness / 65535.0);
+      if (at.y < -4.0) open = std::max(open, vertex.ao_factor / 65535.0);
       if (std::hypot(at.x, at.z) < 0.7 && std::abs(at.y - 1.0) < 0.5) {
-        deep = std::min(deep, vertex.openness / 65535.0);
+        deep = std::min(deep, vertex.ao_factor / 65535.0);
       }
     }
   }

@@ -46,8 +46,8 @@ ChangedBricks cut(TestVolume& volume, glm::dvec3 centre_mm, double radius_mm, do
                static_cast<int>(std::lround(voxel.z))},
               static_cast<int>((radius_mm + ramp_mm) / edge_mm) + 1,
               [&](Density before, glm::dvec3 at) {
-                const double share = std::clamp(left(at), 0.0, 1.0);
-                return std::min(before, static_cast<Density>(std::lround(share * kDensityMax)));
+                const double fraction = std::clamp(left(at), 0.0, 1.0);
+                return std::min(before, static_cast<Density>(std::lround(fraction * kDensityMax)));
               });
 }
 
@@ -56,7 +56,7 @@ glm::dvec3 random_direction(std::mt19937& random) {
   return glm::normalize(glm::dvec3(part(random), part(random), part(random)));
 }
 
-/// Triangles of a mesh of `block` that another one of it does not have, with the same look, and
+/// Triangles of a mesh of `block` that another one of it does not have, with the same vertices, and
 /// that are not among `told`.
 int untold(const BlockMesh& mesh, const BlockMesh& other, VoxelIndex block,
            std::span<const FineTriangle> told) {

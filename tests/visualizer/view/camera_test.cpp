@@ -33,8 +33,8 @@ TEST_CASE("equation (1) is the depth of the projection matrix at every distance"
     View view;
     view.near_mm = *rc::gen::inRange(1, 10'000) * 1e-3;
     view.far_mm = view.near_mm * (1.0 + *rc::gen::inRange(1, 10'000) * 1e-2);
-    const double share = *rc::gen::inRange(0, 1001) * 1e-3;
-    const double eye_mm = view.near_mm + share * (view.far_mm - view.near_mm);
+    const double fraction = *rc::gen::inRange(0, 1001) * 1e-3;
+    const double eye_mm = view.near_mm + fraction * (view.far_mm - view.near_mm);
     const glm::dvec4 clip = view.clip_from_eye() * glm::dvec4(0.3, -0.2, -eye_mm, 1.0);
     const double depth = window_depth(eye_mm, view.near_mm, view.far_mm);
     RC_ASSERT(std::abs(depth - 0.5 * (clip.z / clip.w + 1.0)) < 1e-9);

@@ -49,19 +49,19 @@ TEST_CASE("the score counts by label, or else by the density that a voxel had at
     density[hard] = 60'000;
     density[soft] = 30'000;
     if (labelled) labels[hard] = 1;
-    MaterialScore score(scene, std::vector<VolumeContent>{{density, labels}});
-    CHECK(score.removed_mm3() == std::vector<double>{0, 0, 0});
+    RemovedVolume removed_volume(scene, std::vector<VolumeContent>{{density, labels}});
+    CHECK(removed_volume.removed_mm3() == std::vector<double>{0, 0, 0});
     density[hard] = 20'000;  // as dense as dentin, and enamel still
     density[soft] = 0;
-    score.update(0, density, all_bricks(scene));
-    const auto removed = score.removed_mm3();
+    removed_volume.update(0, density, all_bricks(scene));
+    const auto removed = removed_volume.removed_mm3();
     CHECK(removed[0] == 0);
     CHECK(removed[1] == doctest::Approx(40'000 / kDensityMax * kVoxelMm3));
     CHECK(removed[2] == doctest::Approx(30'000 / kDensityMax * kVoxelMm3));
     density[hard] = 60'000;
     density[soft] = 30'000;
-    score.update(0, density, all_bricks(scene));
-    CHECK(score.removed_mm3() == std::vector<double>{0, 0, 0});
+    removed_volume.update(0, density, all_bricks(scene));
+    CHECK(removed_volume.removed_mm3() == std::vector<double>{0, 0, 0});
   }
 }
 
@@ -71,15 +71,15 @@ TEST_CASE("a score that joined late counts nothing for what a reset gives back")
   const std::vector<Label> labels(kGrid.voxel_count(), 1);
   const std::size_t cut_before = kGrid.index(3, 4, 5), cut_now = kGrid.index(19, 9, 8);
   density[cut_now] = 60'000;
-  MaterialScore score(scene, std::vector<VolumeContent>{{density, labels}});
+  RemovedVolume removed_volume(scene, std::vector<VolumeContent>{{density, labels}});
   density[cut_before] = 60'000;
-  score.update(0, density, all_bricks(scene));
-  CHECK(score.removed_mm3() == std::vector<double>{0, 0, 0});
+  removed_volume.update(0, density, all_bricks(scene));
+  CHECK(removed_volume.removed_mm3() == std::vector<double>{0, 0, 0});
   for (const std::size_t at : {cut_before, cut_now}) {
     density[at] = 0;
-    score.update(0, density, all_bricks(scene));
+    removed_volume.update(0, density, all_bricks(scene));
   }
-  CHECK(score.removed_mm3()[1] == doctest::Approx(2 * 60'000 / kDensityMax * kVoxelMm3));
+  CHECK(removed_volume.removed_mm3()[1] == doctest::Approx(2 * 60'000 / kDensityMax * kVoxelMm3));
 }
 
 TEST_CASE("three sections show what lies in their planes through the tip, and where that is") {

@@ -4,13 +4,13 @@
 #include "visualizer/cast/simd/packet_rays.hpp"
 #include "visualizer/cast/simd/packet_volume.hpp"
 
-// For the files that define `Simd` only: volumes as translucent matter, front to back, as in
+// For the files that define `Simd` only: translucent volumes, front to back, as in
 // shaders/blend.frag.
 //
 // One ray goes through all volumes together, so they mix where they intersect. It is cut into
 // pieces at whole multiples of the step along the view axis, whatever was skipped: skipping changes
 // the time, never the picture. Over a length s a sample of opacity a has 1 - (1 - a)^(p s / s0): p
-// says how much of the matter is there, s0 is a voxel edge.
+// says how much of the material is there, s0 is a voxel edge.
 
 namespace kerf {
 namespace {
@@ -42,17 +42,17 @@ inline F presence_between(const CastVolumeJob& volume, F front, F back, M on) {
                       plain);
 }
 
-/// The matter in the middle of a piece, and its light.
-inline Matter matter_at(const CastJob& job, const CastVolumeJob& volume, Vec3 p, F density,
-                        const ViewVectors& gaze, M there, M noticeable) {
+/// The material in the middle of a piece, lit.
+inline Material lit_material(const CastJob& job, const CastVolumeJob& volume, Vec3 p, F density,
+                             const ViewVectors& gaze, M there, M noticeable) {
   const F zero = Simd::set(0.0F);
   const F full = Simd::set(volume.full);
   M plain = there;
-  Matter matter{};
+  Material material{};
   if (volume.labels != nullptr) {
     const Labelled labelled = by_labels(volume, p, there);
-    matter = labelled.mean;
-    plain = Simd::but_not(there, Simd::less(zero, labelled.share));
+    material = labelled.mean;
+    plain = Simd::but_not(there, Simd::less(zero, labelled.fraction));
   }
   const M fading = Simd::both(plain, Simd::less(density, full));
   Vec3 gradient{};
@@ -73,18 +73,18 @@ inline Matter matter_at(const CastJob& job, const CastVolumeJob& volume, Vec3 p,
       const F inside = Simd::max(density, density_at(volume, p + reach * gradient));
       deep = Simd::select(at_border, inside, density);
     }
-    matter = select(plain, nearest_by_density(volume, deep), matter);
+    material = select(plain, nearest_by_density(volume, deep), material);
   }
-  const Vec3 dim = Simd::set(kInside) * matter.rgb;
+  const Vec3 dim = Simd::set(kInside) * material.rgb;
   // Where the density hardly changes there is no surface to be lit.
   const F x = clamped((size - flat) * Simd::set(1.0F / 0.08F));
   const M lights = Simd::both(noticeable, Simd::less(zero, x));
-  if (!Simd::any(lights)) return {dim, matter.extinction};
+  if (!Simd::any(lights)) return {dim, material.extinction};
   const Vec3 unit = -normalized(transformed_back(volume.from_eye, gradient));
   const Vec3 normal = select(Simd::less(dot(unit, gaze.to_eye), zero), -unit, unit);
   const F surface = x * x * (Simd::set(3.0F) - Simd::set(2.0F) * x);
-  const Vec3 bright = mix(dim, lit(job, matter.rgb, normal, gaze, Simd::set(1.0F)), surface);
-  return {select(lights, bright, dim), matter.extinction};
+  const Vec3 bright = mix(dim, lit(job, material.rgb, normal, gaze, Simd::set(1.0F)), surface);
+  return {select(lights, bright, dim), material.extinction};
 }
 
 constexpr float kOpaque = 0.98F;                // what lies behind adds two hundredths at most
@@ -102,8 +102,8 @@ struct Walk {
 };
 
 /// Looks around where a lane of `alive` leaves what it knows, and knows nothing else: a piece that
-/// begins in matter shows some. Returns the lanes that see something, or may.
-inline M look_around(const CastVolumeJob& volume, Walk& walk, M alive, F k, const CastJob& job) {
+/// begins inside a volume shows it. Returns the lanes that see something, or may.
+inline M check_cells(const CastVolumeJob& volume, Walk& walk, M alive, F k, const CastJob& job) {
   const M leaving = Simd::but_not(alive, Simd::less(k, walk.exit_k));
   if (!Simd::any(leaving)) return walk.visible;
   const F one = Simd::set(1.0F);
@@ -111,9 +111,9 @@ inline M look_around(const CastVolumeJob& volume, Walk& walk, M alive, F k, cons
   const M inside = Simd::both(leaving, Simd::less(t, walk.rays.end_mm));
   walk.exit_k = Simd::select(Simd::but_not(leaving, inside), Simd::set(kNever), walk.exit_k);
   walk.visible = Simd::either(Simd::but_not(walk.visible, leaving), inside);
-  const M in_matter =
+  const M in_volume =
       Simd::both(Simd::equal(k, walk.front_k), Simd::less(Simd::set(volume.empty), walk.front));
-  if (!worth_a_look(Simd::but_not(inside, in_matter), alive)) return walk.visible;
+  if (!cells_are_worth_reading(Simd::but_not(inside, in_volume), alive)) return walk.visible;
   const Surroundings around = surroundings_at(volume, walk.rays, t);
   const F exit_k =
       whole(Simd::min(around.exit_mm, walk.rays.end_mm) * Simd::set(1.0F / job.step_mm));
@@ -166,11 +166,11 @@ inline void add_piece(const CastJob& job, const CastVolumeJob& volume, Walk& wal
   const M noticeable = Simd::both(there, Simd::less(Simd::set(kNoticeable), presence * sum.clear));
   const F half = Simd::set(0.5F);
   const Vec3 middle = walk.rays.origin + (half * (from_mm + to_mm)) * walk.rays.direction;
-  const Matter matter =
-      matter_at(job, volume, middle, half * (front + back), gaze, there, noticeable);
-  const F extinction = Simd::select(there, matter.extinction * presence, zero);
+  const Material material =
+      lit_material(job, volume, middle, half * (front + back), gaze, there, noticeable);
+  const F extinction = Simd::select(there, material.extinction * presence, zero);
   const F per_mm = extinction * Simd::set(1.0F / volume.edge_mm);
-  glow = {glow.rgb + per_mm * matter.rgb, glow.per_mm + per_mm};
+  glow = {glow.rgb + per_mm * material.rgb, glow.per_mm + per_mm};
   // Two volumes may begin in one piece; later pieces are farther away.
   const M seen = Simd::but_not(there, Simd::less(extinction, Simd::set(kLeastExtinction)));
   const M first = Simd::both(seen, Simd::less(from_mm, sum.depth_mm));
@@ -233,7 +233,7 @@ inline void blend_packet(const CastJob& job, const Packet& packet) {
     M seeing = Simd::none();
     F soonest = never;
     for (int v = 0; v < job.volume_count; ++v) {
-      seeing = Simd::either(seeing, look_around(job.volumes[v], walks[v], alive, k, job));
+      seeing = Simd::either(seeing, check_cells(job.volumes[v], walks[v], alive, k, job));
       soonest = Simd::min(soonest, walks[v].exit_k);
     }
     const M skipping = Simd::but_not(alive, seeing);

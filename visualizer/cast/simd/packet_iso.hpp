@@ -41,7 +41,7 @@ inline Hit first_sample(const CastVolumeJob& volume, const VolumeRays& rays, F s
   alive = Simd::both(alive, Simd::less(k * rays.step_mm, rays.end_mm));
   while (Simd::any(alive)) {
     const M leaving = Simd::but_not(alive, Simd::less(k, exit_k));
-    if (worth_a_look(leaving, alive)) {
+    if (cells_are_worth_reading(leaving, alive)) {
       const Surroundings around = surroundings_at(volume, rays, k * rays.step_mm);
       const F next = Simd::max(
           k + one, whole(Simd::min(around.exit_mm, rays.end_mm) * rays.steps_per_mm) + one);
@@ -133,17 +133,17 @@ inline void iso_packet(const CastJob& job, const Packet& packet) {
     if (!Simd::any(found[v])) continue;
     const CastVolumeJob& volume = job.volumes[v];
     SurfacePoint at = surface_point(volume, rays[v], nearest_mm, gaze.to_eye);
-    F openness = openness_at(volume, at);
+    F ao_factor = ao_factor_at(volume, at);
     const M on_face = Simd::both(begins[v], Simd::less(Simd::set(job.eye.near_mm), part.begin_mm));
     if (Simd::any(on_face)) {
-      const Vec3 face = -Vec3{Simd::set(job.eye.shown[0]), Simd::set(job.eye.shown[1]),
-                              Simd::set(job.eye.shown[2])};
+      const Vec3 face = -Vec3{Simd::set(job.eye.clip_plane[0]), Simd::set(job.eye.clip_plane[1]),
+                              Simd::set(job.eye.clip_plane[2])};
       at.normal = select(on_face, face, at.normal);
       at.inward = select(on_face, Vec3{}, at.inward);  // no border: it shows what lies in the plane
-      openness = Simd::select(on_face, Simd::set(1.0F), openness);
+      ao_factor = Simd::select(on_face, Simd::set(1.0F), ao_factor);
     }
     const Vec3 albedo = material_at(volume, at, found[v]);
-    const Vec3 shown = lit(job, albedo, at.normal, gaze, openness);
+    const Vec3 shown = lit(job, albedo, at.normal, gaze, ao_factor);
     colour = select(found[v], shown, colour);
     normal = select(found[v], at.normal, normal);
   }

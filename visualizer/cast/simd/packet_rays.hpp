@@ -92,8 +92,8 @@ inline F srgb_of(F linear) {
   return Simd::select(Simd::less(c, linear_end), Simd::set(12.92F) * c,
                       Simd::set(1.055F) * power - Simd::set(0.055F));
 }
-inline I byte_of(F share) {
-  return Simd::to_int(share * Simd::set(255.0F) + Simd::set(0.5F));
+inline I byte_of(F fraction) {
+  return Simd::to_int(fraction * Simd::set(255.0F) + Simd::set(0.5F));
 }
 /// As `CastPixels::rgba`.
 inline I srgb_bytes(Vec3 linear, F opacity) {
@@ -121,7 +121,8 @@ inline ViewVectors gaze_along(const CastJob& job, Vec3 eye) {
 }
 
 /// lighting.frag: two lights of a photographer that go with the eye, and a sky that stays.
-inline Vec3 lit(const CastJob& job, Vec3 albedo, Vec3 normal, const ViewVectors& gaze, F openness) {
+inline Vec3 lit(const CastJob& job, Vec3 albedo, Vec3 normal, const ViewVectors& gaze,
+                F ao_factor) {
   const F one = Simd::set(1.0F);
   const F half = Simd::set(0.5F);
   const F skyward = half + half * dot(normal, vec3(job.up));
@@ -136,9 +137,9 @@ inline Vec3 lit(const CastJob& job, Vec3 albedo, Vec3 normal, const ViewVectors&
   const F key_shine = to_the_24th(positive(dot(normal, gaze.key_half)));
   const F fill_shine = to_the_24th(positive(dot(normal, gaze.fill_half)));
   const F shine =
-      openness * (Simd::set(0.22F) * key_shine * key_shine + Simd::set(0.04F) * fill_shine);
-  const F share = Simd::set(0.35F) + openness * Simd::set(0.65F);
-  const Vec3 light = openness * ambient + share * diffuse;
+      ao_factor * (Simd::set(0.22F) * key_shine * key_shine + Simd::set(0.04F) * fill_shine);
+  const F fraction = Simd::set(0.35F) + ao_factor * Simd::set(0.65F);
+  const Vec3 light = ao_factor * ambient + fraction * diffuse;
   return {albedo.x * light.x + shine, albedo.y * light.y + shine, albedo.z * light.z + shine};
 }
 
@@ -175,13 +176,13 @@ inline M drawn_lanes(const Packet& packet) {
 
 /// From the eye to the pixels' centres, 1 mm along the view axis.
 inline Vec3 eye_directions(const CastEye& eye, const Packet& packet) {
-  const auto place = [](F lane, std::int32_t first, std::int32_t size) {
+  const auto position = [](F lane, std::int32_t first, std::int32_t size) {
     const F centre = lane + Simd::set(static_cast<float>(first) + 0.5F);
     return centre * Simd::set(2.0F / static_cast<float>(size)) - Simd::set(1.0F);
   };
-  return {place(Simd::lane_x(), packet.x, eye.width) * Simd::set(eye.half_width_at_1mm) +
+  return {position(Simd::lane_x(), packet.x, eye.width) * Simd::set(eye.half_width_at_1mm) +
               Simd::set(eye.middle_right_at_1mm),
-          place(Simd::lane_y(), packet.y, eye.height) * Simd::set(eye.half_height_at_1mm),
+          position(Simd::lane_y(), packet.y, eye.height) * Simd::set(eye.half_height_at_1mm),
           Simd::set(-1.0F)};
 }
 

@@ -19,7 +19,7 @@ inline F absolute(F a) {
   return Simd::max(a, -a);
 }
 
-/// The places whose cell has `mark`. A place outside of the grid counts as its nearest cell.
+/// The points whose cell has `mark`. A point outside the grid counts as its nearest cell.
 inline M marked(const RedrawJob& job, Vec3 p, std::uint8_t mark) {
   const auto cell = [](F at, float last) {
     return Simd::to_int(Simd::min(positive(at), Simd::set(last)));
@@ -51,7 +51,7 @@ inline F longest_part(Vec3 a) {
 /// Whether a ray of the lanes `alive` crosses a cell marked `kChangedAlong`.
 inline bool crosses_changed_cell(const RedrawJob& job, const VolumeRays& rays, M alive) {
   const F step_mm = Simd::set(job.step_vox) / longest_part(rays.direction);
-  // Half a step more: no place on a ray is farther than that from a test.
+  // Half a step more: no point on a ray is farther than that from a test.
   const F end_mm = rays.end_mm + Simd::set(0.5F) * step_mm;
   alive = Simd::both(alive, Simd::less(rays.begin_mm, rays.end_mm));
   for (std::int32_t test = 0; test < job.most_tests && Simd::any(alive); ++test) {
@@ -73,8 +73,8 @@ inline Vec3 plain_gradient_at(const RedrawJob& job, Vec3 voxel) {
   const I x = low(voxel.x, job.extent[0]);
   const I y = low(voxel.y, job.extent[1]);
   const I z = low(voxel.z, job.extent[2]);
-  const Vec3 share{voxel.x - Simd::to_float(x), voxel.y - Simd::to_float(y),
-                   voxel.z - Simd::to_float(z)};
+  const Vec3 fraction{voxel.x - Simd::to_float(x), voxel.y - Simd::to_float(y),
+                      voxel.z - Simd::to_float(z)};
   const std::int32_t row = job.extent[0];
   const std::int32_t plane = row * job.extent[1];
   const I first = (x - 1) + (y - 1) * row + (z - 1) * plane;
@@ -86,25 +86,25 @@ inline Vec3 plain_gradient_at(const RedrawJob& job, Vec3 voxel) {
       I low{}, high{};  // two densities each
       Simd::gather_two<2>(job.density, first + (j * row + k * plane), low, high);
       const auto between = [&](I pair) {
-        return mix(Simd::to_float(pair & 0xffff), Simd::to_float(pair >> 16 & 0xffff), share.x);
+        return mix(Simd::to_float(pair & 0xffff), Simd::to_float(pair >> 16 & 0xffff), fraction.x);
       };
       const F before = between(low);
       const F behind = between(high);
       sum[j] = before + behind;
       rise[j] = behind - before;
     }
-    const F before = mix(sum[0], sum[1], share.y);
-    const F behind = mix(sum[2], sum[3], share.y);
+    const F before = mix(sum[0], sum[1], fraction.y);
+    const F behind = mix(sum[2], sum[3], fraction.y);
     sums[k] = before + behind;
     rises_y[k] = behind - before;
-    rises_x[k] = mix(rise[0], rise[1], share.y) + mix(rise[2], rise[3], share.y);
+    rises_x[k] = mix(rise[0], rise[1], fraction.y) + mix(rise[2], rise[3], fraction.y);
   }
   const auto both = [&](const F(&of)[4]) {
-    return mix(of[0], of[1], share.z) + mix(of[2], of[3], share.z);
+    return mix(of[0], of[1], fraction.z) + mix(of[2], of[3], fraction.z);
   };
   return Simd::set(1.0F / 65535.0F) *
          Vec3{both(rises_x), both(rises_y),
-              mix(sums[2], sums[3], share.z) - mix(sums[0], sums[1], share.z)};
+              mix(sums[2], sums[3], fraction.z) - mix(sums[0], sums[1], fraction.z)};
 }
 
 /// The lanes in which all voxels that the gradient at `voxel` takes are in the volume.

@@ -10,10 +10,10 @@
 namespace kerf {
 namespace {
 
-/// A cell of 2^3 voxels: the entry of its lowest one, and the place within it.
+/// A cell of 2^3 voxels: the entry of its lowest one, and the position within it.
 struct CellSample {
   I at;
-  Vec3 share;
+  Vec3 fraction;
 };
 
 /// Beyond the border everything is as on it: air.
@@ -36,11 +36,11 @@ inline CellSample cell_place(const CastVolumeJob& volume, Vec3 p) {
   return cell_place(volume, p, volume.plane);
 }
 
-inline F mix(F a, F b, F share) {
-  return a + share * (b - a);
+inline F mix(F a, F b, F fraction) {
+  return a + fraction * (b - a);
 }
-inline Vec3 mix(Vec3 a, Vec3 b, F share) {
-  return a + share * (b - a);
+inline Vec3 mix(Vec3 a, Vec3 b, F fraction) {
+  return a + fraction * (b - a);
 }
 
 /// Trilinear, 0..1. Two loads of 64 bits bring all eight corners: `PairedRows`.
@@ -49,12 +49,13 @@ inline F density_in(const CastVolumeJob& volume, const CellSample& cell) {
     I left{};
     I right{};
     Simd::gather_two<4>(entries, cell.at, left, right);
-    const F low = mix(Simd::to_float(left & 0xffff), Simd::to_float(right & 0xffff), cell.share.x);
+    const F low =
+        mix(Simd::to_float(left & 0xffff), Simd::to_float(right & 0xffff), cell.fraction.x);
     const F high = mix(Simd::to_float(Simd::high_half(left)),
-                       Simd::to_float(Simd::high_half(right)), cell.share.x);
-    return mix(low, high, cell.share.y);
+                       Simd::to_float(Simd::high_half(right)), cell.fraction.x);
+    return mix(low, high, cell.fraction.y);
   };
-  return mix(plane(volume.density), plane(volume.density + volume.plane), cell.share.z) *
+  return mix(plane(volume.density), plane(volume.density + volume.plane), cell.fraction.z) *
          Simd::set(1.0F / 65535.0F);
 }
 
@@ -63,8 +64,8 @@ inline F density_at(const CastVolumeJob& volume, Vec3 p) {
 }
 
 /// The density gradient per voxel edge, from the eight corners of a cube around p: differences
-/// along one axis, means along the others (iso.frag). All corners have the same place within their
-/// cells.
+/// along one axis, means along the others (iso.frag). All corners have the same position within
+/// their cells.
 inline Vec3 gradient_at(const CastVolumeJob& volume, Vec3 p) {
   const F one = Simd::set(1.0F);
   const auto inner = [&](F x, float last) {  // the whole cube is inside the border
@@ -78,7 +79,7 @@ inline Vec3 gradient_at(const CastVolumeJob& volume, Vec3 p) {
     const int y = (corner & 2) != 0 ? 1 : -1;
     const int z = (corner & 4) != 0 ? 1 : -1;
     const F density =
-        density_in(volume, {middle.at + (x + y * volume.row + z * volume.plane), middle.share});
+        density_in(volume, {middle.at + (x + y * volume.row + z * volume.plane), middle.fraction});
     sum.x = x > 0 ? sum.x + density : sum.x - density;
     sum.y = y > 0 ? sum.y + density : sum.y - density;
     sum.z = z > 0 ? sum.z + density : sum.z - density;
@@ -99,10 +100,10 @@ inline Vec3 stored_gradient_at(const CastVolumeJob& volume, Vec3 p) {
     F row[4];
     for (int i = 0; i < 4; ++i) {
       row[i] = mix(Simd::to_float(corner[i][0] & byte), Simd::to_float(corner[i][1] & byte),
-                   cell.share.x);
+                   cell.fraction.x);
     }
-    const F mean =
-        mix(mix(row[0], row[1], cell.share.y), mix(row[2], row[3], cell.share.y), cell.share.z);
+    const F mean = mix(mix(row[0], row[1], cell.fraction.y), mix(row[2], row[3], cell.fraction.y),
+                       cell.fraction.z);
     const auto unit = static_cast<float>(1 << shift);
     return (mean - Simd::set(128.0F * unit)) * Simd::set(0.5F / 127.0F / unit);
   };
@@ -116,9 +117,9 @@ struct Shown {
 
 inline Shown shown_of(const CastEye& from, Vec3 eye) {
   const F zero = Simd::set(0.0F);
-  const F away = Simd::set(from.shown[3]);
-  const F slope = Simd::set(from.shown[0]) * eye.x + Simd::set(from.shown[1]) * eye.y +
-                  Simd::set(from.shown[2]) * eye.z;
+  const F away = Simd::set(from.clip_plane[3]);
+  const F slope = Simd::set(from.clip_plane[0]) * eye.x + Simd::set(from.clip_plane[1]) * eye.y +
+                  Simd::set(from.clip_plane[2]) * eye.z;
   const F cut = -away / slope;
   const F near_mm = Simd::set(from.near_mm);
   const F far_mm = Simd::set(from.far_mm);
@@ -182,12 +183,12 @@ struct Surroundings {
   F exit_mm;
 };
 
-/// A look at the cells costs as much as a sample and serves only those lanes that do not know what
+/// To read the cells costs as much as a sample and serves only those lanes that do not know what
 /// is around them; a sample in an empty cell is wasted and never wrong. So a few lanes go on
 /// unknowing.
-inline bool worth_a_look(M unknowing, M alive) {
-  constexpr int kShare = 4;
-  return Simd::any(unknowing) && kShare * Simd::count(unknowing) >= Simd::count(alive);
+inline bool cells_are_worth_reading(M unknowing, M alive) {
+  constexpr int kOneIn = 4;
+  return Simd::any(unknowing) && kOneIn * Simd::count(unknowing) >= Simd::count(alive);
 }
 
 inline Surroundings surroundings_at(const CastVolumeJob& volume, const VolumeRays& rays, F t) {
@@ -209,30 +210,30 @@ inline Surroundings surroundings_at(const CastVolumeJob& volume, const VolumeRay
                     exit(z, rays.origin.z, rays.inverse.z))};
 }
 
-constexpr float kSmall = 1e-6F;  // a share that is nothing, and no zero to divide by
+constexpr float kSmall = 1e-6F;  // counts as none, and is no zero to divide by
 
 /// Linear colour and extinction (`CastVolumeJob`).
-struct Matter {
+struct Material {
   Vec3 rgb;
   F extinction;
 };
 
-inline Matter mix(Matter a, Matter b, F share) {
-  return {mix(a.rgb, b.rgb, share), mix(a.extinction, b.extinction, share)};
+inline Material mix(Material a, Material b, F fraction) {
+  return {mix(a.rgb, b.rgb, fraction), mix(a.extinction, b.extinction, fraction)};
 }
-inline Matter select(M m, Matter yes, Matter no) {
+inline Material select(M m, Material yes, Material no) {
   return {select(m, yes.rgb, no.rgb), Simd::select(m, yes.extinction, no.extinction)};
 }
 
 /// An entry of 256 x 4.
-inline Matter entry_of(const float* table, I index) {
+inline Material entry_of(const float* table, I index) {
   F entry[4];
   Simd::gather_four(table, index << 2, entry);
   return {{entry[0], entry[1], entry[2]}, entry[3]};
 }
 
 /// As a texture of 256 entries that is filtered and clamped to its edges.
-inline Matter by_density(const CastVolumeJob& volume, F density) {
+inline Material by_density(const CastVolumeJob& volume, F density) {
   const F at =
       Simd::min(positive(density * Simd::set(256.0F) - Simd::set(0.5F)), Simd::set(254.9999F));
   const I index = Simd::to_int(at);
@@ -241,14 +242,14 @@ inline Matter by_density(const CastVolumeJob& volume, F density) {
 }
 
 /// The nearest entry: half the loads, for means over many samples.
-inline Matter nearest_by_density(const CastVolumeJob& volume, F density) {
+inline Material nearest_by_density(const CastVolumeJob& volume, F density) {
   return entry_of(volume.by_density, Simd::to_int(density * Simd::set(255.0F) + Simd::set(0.5F)));
 }
 
-/// The mean of the labelled voxels around, and their share.
+/// The mean of the labelled voxels around, and the fraction of these voxels.
 struct Labelled {
-  Matter mean;
-  F share;
+  Material mean;
+  F fraction;
 };
 
 /// Labels around, blended so that their borders are smooth. Where all eight agree, which is nearly
@@ -266,25 +267,25 @@ inline Labelled by_labels(const CastVolumeJob& volume, Vec3 p, M needed) {
                       Simd::select(Simd::equal(first, I{}), zero, one)};
   if (!Simd::any(Simd::but_not(needed, alike))) return same;
 
-  Matter sum{};
-  F share{};
+  Material sum{};
+  F fraction{};
   for (int corner = 0; corner < 8; ++corner) {
     // Bytes of a gathered entry: (x, y), (x, y + 1), (x + 1, y), (x + 1, y + 1).
     const int x = corner & 1;
     const int y = corner >> 1 & 1;
     const int z = corner >> 2;
     const I label = labels[z] >> (16 * x + 8 * y) & 0xff;
-    const F wx = x != 0 ? cell.share.x : one - cell.share.x;
-    const F wy = y != 0 ? cell.share.y : one - cell.share.y;
-    const F wz = z != 0 ? cell.share.z : one - cell.share.z;
+    const F wx = x != 0 ? cell.fraction.x : one - cell.fraction.x;
+    const F wy = y != 0 ? cell.fraction.y : one - cell.fraction.y;
+    const F wz = z != 0 ? cell.fraction.z : one - cell.fraction.z;
     const F w = Simd::select(Simd::equal(label, I{}), zero, wx * wy * wz);
-    const Matter matter = entry_of(volume.by_label, label);
-    sum = {sum.rgb + w * matter.rgb, sum.extinction + w * matter.extinction};
-    share = share + w;
+    const Material material = entry_of(volume.by_label, label);
+    sum = {sum.rgb + w * material.rgb, sum.extinction + w * material.extinction};
+    fraction = fraction + w;
   }
-  const F per_share = one / Simd::max(share, Simd::set(kSmall));
-  return {select(alike, same.mean, {per_share * sum.rgb, per_share * sum.extinction}),
-          Simd::select(alike, same.share, share)};
+  const F per_fraction = one / Simd::max(fraction, Simd::set(kSmall));
+  return {select(alike, same.mean, {per_fraction * sum.rgb, per_fraction * sum.extinction}),
+          Simd::select(alike, same.fraction, fraction)};
 }
 
 /// Which way an iso-surface faces.
@@ -306,7 +307,7 @@ inline Facing facing_of(const float (&voxel_from_eye)[3][3], Vec3 gradient, Vec3
 
 /// A point of an iso-surface.
 struct SurfacePoint {
-  Vec3 place;  ///< voxel edges
+  Vec3 position;  ///< voxel edges
   Vec3 inward, normal;
 };
 
@@ -322,35 +323,35 @@ inline Vec3 material_at(const CastVolumeJob& volume, const SurfacePoint& at, M n
   const F depth_vox = Simd::set(1.25F);
   const F full_depth_vox = Simd::set(2.5F);
   const F coat_density = Simd::set(0.14F);
-  const Vec3 below = at.place + depth_vox * at.inward;
+  const Vec3 below = at.position + depth_vox * at.inward;
   Vec3 colour{};
   M plain = needed;
   if (volume.labels != nullptr) {
     Labelled labelled = by_labels(volume, below, needed);
-    const Vec3 above = at.place - depth_vox * at.inward;
+    const Vec3 above = at.position - depth_vox * at.inward;
     const M coated = Simd::both(needed, Simd::less(coat_density, density_at(volume, above)));
     if (Simd::any(coated)) {
       const Labelled coat = by_labels(volume, above, coated);
-      const F cover = Simd::select(coated, coat.share, Simd::set(0.0F));
-      const F share = labelled.share * (Simd::set(1.0F) - cover) + cover * cover;
+      const F cover = Simd::select(coated, coat.fraction, Simd::set(0.0F));
+      const F fraction = labelled.fraction * (Simd::set(1.0F) - cover) + cover * cover;
       labelled = {
-          mix(labelled.mean, coat.mean, cover * cover / Simd::max(share, Simd::set(kSmall))),
-          share};
+          mix(labelled.mean, coat.mean, cover * cover / Simd::max(fraction, Simd::set(kSmall))),
+          fraction};
     }
     colour = labelled.mean.rgb;
-    plain = Simd::but_not(needed, Simd::less(Simd::set(0.0F), labelled.share));
+    plain = Simd::but_not(needed, Simd::less(Simd::set(0.0F), labelled.fraction));
     if (!Simd::any(plain)) return colour;
   }
   const F density = Simd::max(density_at(volume, below),
-                              density_at(volume, at.place + full_depth_vox * at.inward));
+                              density_at(volume, at.position + full_depth_vox * at.inward));
   return select(plain, by_density(volume, density).rgb, colour);
 }
 
 /// 1 in the open, less where the neighbourhood along the normal is solid: cavities read as such.
-inline F openness_at(const CastVolumeJob& volume, const SurfacePoint& at) {
+inline F ao_factor_at(const CastVolumeJob& volume, const SurfacePoint& at) {
   const F per_iso = Simd::set(1.0F / volume.iso);
   const auto solid = [&](float reach_vox) {
-    return clamped(density_at(volume, at.place - Simd::set(reach_vox) * at.inward) * per_iso);
+    return clamped(density_at(volume, at.position - Simd::set(reach_vox) * at.inward) * per_iso);
   };
   return Simd::set(1.0F) - (Simd::set(0.30F) * solid(2.5F) + Simd::set(0.30F) * solid(6.0F) +
                             Simd::set(0.25F) * solid(12.0F));
