@@ -2,8 +2,6 @@
 // Exported meshes are read back as another program would.
 #include <cstring>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <map>
 #include <sstream>
 #include <string>
@@ -11,9 +9,9 @@
 
 #include <doctest/doctest.h>
 #include <glm/gtc/matrix_transform.hpp>
-#include <unistd.h>
 
 #include "shared/posix/atomic_file.hpp"
+#include "tests/support/temporary_folder.hpp"
 #include "tests/visualizer/gl/gl_fixture.hpp"
 #include "tests/visualizer/surface/mesh_checks.hpp"
 #include "visualizer/scene/visualizer_error.hpp"
@@ -24,14 +22,6 @@ using namespace kerf::test;
 namespace fs = std::filesystem;
 
 namespace {
-
-struct Folder {
-  fs::path path = fs::temp_directory_path() / ("kerf-export-" + std::to_string(::getpid()));
-  Folder() { fs::create_directories(path); }
-  ~Folder() { fs::remove_all(path); }
-  Folder(const Folder&) = delete;
-  Folder& operator=(const Folder&) = delete;
-};
 
 /// Two balls side by side, the second one turned, and a body that is not solid.
 struct LoadedScene {
@@ -55,11 +45,6 @@ struct LoadedScene {
     return {ghost.content(), left.content(), right.content()};
   }
 };
-
-std::string bytes_of(const fs::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(stream), {}};
-}
 
 template <typename T>
 T take(const std::string& bytes, std::size_t& at) {
@@ -139,11 +124,11 @@ ClosedMesh read_ply(const std::string& bytes) {
 }  // namespace
 
 TEST_CASE("an exported STL is closed, in world mm, and holds the solid volumes alone") {
-  const Folder folder;
+  const TemporaryFolder folder;
   const LoadedScene scene;
-  const fs::path file = folder.path / "two.stl";
+  const fs::path file = folder / "two.stl";
   export_surface(file, scene.view, scene.contents());
-  const std::string bytes = bytes_of(file);
+  const std::string bytes = text_of(file);
   CHECK(bytes.substr(0, 5) != "solid");  // such a file would be taken for text
   const ClosedMesh mesh = read_stl(bytes);
   CHECK(open_sides(mesh.triangles) == 0);
@@ -162,12 +147,12 @@ TEST_CASE("an exported STL is closed, in world mm, and holds the solid volumes a
 }
 
 TEST_CASE("an exported PLY has the same mesh, with outward normals and sRGB colours") {
-  const Folder folder;
+  const TemporaryFolder folder;
   const LoadedScene scene;
-  export_surface(folder.path / "two.stl", scene.view, scene.contents());
-  export_surface(folder.path / "two.ply", scene.view, scene.contents());
-  const ClosedMesh stl = read_stl(bytes_of(folder.path / "two.stl"));
-  const ClosedMesh ply = read_ply(bytes_of(folder.path / "two.ply"));
+  export_surface(folder / "two.stl", scene.view, scene.contents());
+  export_surface(folder / "two.ply", scene.view, scene.contents());
+  const ClosedMesh stl = read_stl(text_of(folder / "two.stl"));
+  const ClosedMesh ply = read_ply(text_of(folder / "two.ply"));
   CHECK(open_sides(ply.triangles) == 0);
   CHECK(ply.vertices.size() == stl.vertices.size());
   CHECK(ply.triangles.size() == stl.triangles.size());
@@ -187,25 +172,25 @@ TEST_CASE("an exported PLY has the same mesh, with outward normals and sRGB colo
 TEST_CASE(
     "with nothing solid left the files are valid and empty; with no solid volume the first "
     "one is written") {
-  const Folder folder;
+  const TemporaryFolder folder;
   LoadedScene scene;
   std::fill(scene.left.density.begin(), scene.left.density.end(), Density{0});
   std::fill(scene.right.density.begin(), scene.right.density.end(), Density{0});
-  export_surface(folder.path / "none.stl", scene.view, scene.contents());
-  export_surface(folder.path / "none.ply", scene.view, scene.contents());
-  CHECK(bytes_of(folder.path / "none.stl").size() == 84);
-  CHECK(read_ply(bytes_of(folder.path / "none.ply")).vertices.empty());
+  export_surface(folder / "none.stl", scene.view, scene.contents());
+  export_surface(folder / "none.ply", scene.view, scene.contents());
+  CHECK(text_of(folder / "none.stl").size() == 84);
+  CHECK(read_ply(text_of(folder / "none.ply")).vertices.empty());
   for (VolumeView& volume : scene.view.volumes) volume.solid = false;
-  export_surface(folder.path / "ghost.stl", scene.view, scene.contents());
-  CHECK(euler_number(read_stl(bytes_of(folder.path / "ghost.stl"))) == 2);
+  export_surface(folder / "ghost.stl", scene.view, scene.contents());
+  CHECK(euler_number(read_stl(text_of(folder / "ghost.stl"))) == 2);
 }
 
 TEST_CASE("an export that cannot work is refused in one line, and leaves no file") {
-  const Folder folder;
+  const TemporaryFolder folder;
   const LoadedScene scene;
   for (const char* name : {"mesh.obj", "mesh", "stl", ".stl"}) {
     CAPTURE(name);
-    const fs::path file = folder.path / name;
+    const fs::path file = folder / name;
     CHECK_THROWS_WITH_AS(
         check_export(file),
         ("--export: " + file.string() + ": the name says no format; let it end in .stl or .ply")
@@ -213,7 +198,7 @@ TEST_CASE("an export that cannot work is refused in one line, and leaves no file
         VisualizerError);
     CHECK_THROWS_AS(export_surface(file, scene.view, scene.contents()), VisualizerError);
   }
-  CHECK_THROWS_AS(check_export(folder.path / "nowhere" / "mesh.stl"), FileError);
-  check_export(folder.path / "mesh.ply");
-  CHECK(fs::is_empty(folder.path));
+  CHECK_THROWS_AS(check_export(folder / "nowhere/mesh.stl"), FileError);
+  check_export(folder / "mesh.ply");
+  CHECK(folder.count() == 0);
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The window on a screen of its own (Xvfb), worked with real key and mouse events (xdotool).
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <string>
@@ -38,6 +38,10 @@ std::vector<std::uint8_t> right_edge(const RgbPicture& picture) {
   return edge;
 }
 
+void click(const std::string& at) {
+  act("mousemove " + at + " sleep 0.2 mousedown 1 sleep 0.2 mouseup 1");
+}
+
 }  // namespace
 
 TEST_CASE("keys and mouse work the window") {
@@ -53,11 +57,15 @@ TEST_CASE("keys and mouse work the window") {
     CHECK(user.quit() == 0);
     CHECK(user.report()["renderer"] == "blend");
   }
-  SUBCASE("c cuts the volumes open and closes them again") {
-    act("key c");
-    CHECK(user.picture() != first);
-    act("key c");
-    CHECK(user.picture() == first);
+  SUBCASE(
+      "c cuts the volumes open, y changes colours, t shows two eyes; once more, and it is undone") {
+    for (const std::string key : {"c", "y", "t"}) {
+      CAPTURE(key);
+      act("key " + key);
+      CHECK(user.picture() != first);
+      act("key " + key);
+      CHECK(user.picture() == first);
+    }
     CHECK(user.quit() == 0);
   }
   SUBCASE("a drag turns, r turns back, the wheel zooms") {
@@ -85,22 +93,16 @@ TEST_CASE("keys and mouse work the window") {
     CHECK(user.quit() == 0);
   }
   SUBCASE("the list of tools asks for the one that is taken from it") {
-    const auto click = [](const std::string& at) {
-      act("mousemove " + at + " sleep 0.2 mousedown 1 sleep 0.2 mouseup 1");
-    };
     click("90 216");
     click("60 255");  // the second one
     CHECK(user.controller().asked_tools() == std::vector<std::uint64_t>{1});
     CHECK(user.quit() == 0);
   }
-  SUBCASE("u undoes all cuts when it is pressed twice, and not once") {
+  SUBCASE("u undoes all cuts when it is pressed twice; z the last stroke, if there is one") {
     act("key u");
     CHECK(user.controller().resets() == 0);
     act("key u");
     CHECK(user.controller().resets() == 1);
-    CHECK(user.quit() == 0);
-  }
-  SUBCASE("z undoes the last stroke where there is one") {
     act("key z");
     CHECK(user.controller().undos() == 0);
     user.controller().offer_undo();
@@ -108,13 +110,6 @@ TEST_CASE("keys and mouse work the window") {
     static_cast<void>(user.picture());  // after a picture the window knows of it
     act("key z");
     CHECK(user.controller().undos() == 1);
-    CHECK(user.quit() == 0);
-  }
-  SUBCASE("y shows materials in other colours, and their own again") {
-    act("key y");
-    CHECK(user.picture() != first);
-    act("key y");
-    CHECK(user.picture() == first);
     CHECK(user.quit() == 0);
   }
   SUBCASE("x cuts the volumes open square to the gaze, and the wheel with shift moves the plane") {
@@ -170,13 +165,6 @@ TEST_CASE("keys and mouse work the window") {
     const auto after = user.picture();
     CHECK(user.quit() == 0);
     CHECK(after == first);
-  }
-  SUBCASE("t shows two eyes side by side, and one again") {
-    act("key t");
-    CHECK(user.picture() != first);
-    act("key t");
-    CHECK(user.picture() == first);
-    CHECK(user.quit() == 0);
   }
   SUBCASE("a slider changes an opacity while it is dragged, and w writes it") {
     act("key v");
@@ -240,9 +228,6 @@ TEST_CASE("o lists scenes; a file that is none is told, a scene ends the window 
   if (!have("Xvfb") || !have("xdotool")) return;
   const Screen screen;
   User user(screen.folder);
-  const auto click = [](const std::string& at) {
-    act("mousemove " + at + " sleep 0.2 mousedown 1 sleep 0.2 mouseup 1");
-  };
   const std::string none = "60 78", one = "60 95";  // below the folder above
   // After a picture the window has done what it was asked.
   const auto done = [&user] { static_cast<void>(user.picture()); };
@@ -266,7 +251,7 @@ TEST_CASE("nothing covers a warning, whatever else is shown and in a small windo
   User user(screen.folder);
   constexpr int kMostOfIt = 5'000;  // of the ground of "stale: no news from the servo"
   CHECK(warning_pixels(user.whole()) > kMostOfIt);
-  act("mousemove 100 310 sleep 0.2 mousedown 1 sleep 0.2 mouseup 1");  // the controls, to the front
+  click("100 310");  // the controls, to the front
   CHECK(warning_pixels(user.whole()) > kMostOfIt);
   act("key h");
   CHECK(warning_pixels(user.whole()) > kMostOfIt);
@@ -292,9 +277,6 @@ TEST_CASE("each of two volumes takes its own renderer, by keys and by its list")
     CHECK(user.report()["renderer"] == "iso,blend");
   }
   SUBCASE("its list in the panel") {
-    const auto click = [](const std::string& at) {
-      act("mousemove " + at + " sleep 0.2 mousedown 1 sleep 0.2 mouseup 1");
-    };
     click("90 238");  // the second one's,
     click("45 145");  // and in it blend
     act("mousemove 300 180");
@@ -329,5 +311,17 @@ TEST_CASE("the exit code of a window tells how the controller ended, and a video
     act("search --name 'kerf: test' windowsize 400 300");
     CHECK(user.whole().size == PictureSize{400, 300});
     CHECK(user.quit() == 0);
+  }
+}
+
+TEST_CASE("whatever a user does in a window, nothing is written beside a block") {
+  if (!have("Xvfb")) return;
+  const Screen screen;
+  const std::string out = (screen.folder / "out").string();
+  for (const char* sizes : {"", "--large "}) {  // 800x600 and 1100x760
+    CAPTURE(sizes);
+    CHECK(std::system((KERF_TEST_BIN "/kerf-visualizer-monkey --window --seed 1 --events 15 " +
+                       (sizes + ("--seconds 0 --out " + out)))
+                          .c_str()) == 0);
   }
 }

@@ -11,6 +11,7 @@
 
 #include "tests/visualizer/gl/gl_fixture.hpp"
 #include "tests/visualizer/render/exact_body.hpp"
+#include "tests/visualizer/render/renderer_fixture.hpp"
 #include "visualizer/cast/caster.hpp"
 #include "visualizer/scene/visualizer_error.hpp"
 
@@ -98,26 +99,12 @@ Errors errors_at(const Distance& distance, double spacing_mm) {
   return errors;
 }
 
-/// A heap of balls: silhouettes, gaps and self-occlusion; two labels and some without.
+/// A heap of balls with two labels, and some voxels without one.
 struct Heap {
-  explicit Heap(unsigned seed) : volume(make(seed)) {
+  explicit Heap(unsigned seed) : volume(heap_of_balls(seed)) {
     for (std::size_t i = 0; i < volume.density.size(); ++i) {
       labels.push_back(static_cast<Label>(volume.density[i] == 0 ? 0 : i / 700 % 3));
     }
-  }
-  static TestVolume make(unsigned seed) {
-    const VoxelGrid grid{61, 44, 37};
-    std::mt19937 random(seed);
-    std::uniform_real_distribution<double> place(-4.0, 4.0);
-    std::vector<glm::dvec3> centres(25);
-    for (glm::dvec3& centre : centres) {
-      for (int axis = 0; axis < 3; ++axis) centre[axis] = place(random);
-    }
-    return {grid, centred(grid, {0.2, 0.25, 0.22}), [&](glm::dvec3 at) {
-              double most = 0.0;
-              for (const glm::dvec3& c : centres) most = std::max(most, ball(c, 0.8, 0.6)(at));
-              return most;
-            }};
   }
   TestVolume volume;
   std::vector<Label> labels;
@@ -206,83 +193,6 @@ TEST_CASE("a rectangle has the pixels of the whole picture and touches no other"
       CHECK(wrong == 0);
     }
   }
-}
-
-TEST_CASE("after random cuts, taking the changed bricks equals a fresh start pixel by pixel") {
-  for (const CastMode mode : {CastMode::iso, CastMode::blend}) {
-    const VoxelGrid grid{43, 37, 50};
-    TestVolume volume(grid, centred(grid, glm::dvec3(0.25)), ball({}, 4.4, 0.5));
-    Caster::Options options = blending();
-    options.mode = mode;
-    Caster edited = caster_of({&volume}, options);
-    const View view = look_at({9, 14, 17}, {}, 15, 35);
-    std::mt19937 random(11);
-    for (int cut = 0; cut < 40; ++cut) {
-      // Grows back in every third cut: cells become active again too.
-      const VoxelBox box = fill_random_box(volume, cut % 3 == 2 ? 60000 : 0, random);
-      edited.update(0, volume.density, changed_in(volume.view.bricks, box));
-      Caster fresh = caster_of({&volume}, options);
-      const CastPicture a = cast(edited, view).picture;
-      const CastPicture b = cast(fresh, view).picture;
-      CHECK(a.rgba == b.rgba);
-      CHECK(a.depth == b.depth);
-    }
-  }
-}
-
-TEST_CASE("of two intersecting volumes the analytically nearer surface is seen") {
-  const VoxelGrid grid{60, 60, 60};
-  const glm::dvec3 left{-1.5, 0, 0};
-  const glm::dvec3 right{1.5, 0, 0.4};
-  const TestVolume a(grid, centred(grid, glm::dvec3(0.15), left), ball(left, 3.0, 0.4));
-  const TestVolume b(grid, centred(grid, glm::dvec3(0.15), right), ball(right, 3.0, 0.4));
-  Caster ab = caster_of({&a, &b});
-  Caster ba = caster_of({&b, &a});
-  int compared = 0;
-  double worst_mm = 0.0;
-  for (int turn = 0; compared < 10'000; ++turn) {
-    const double angle = 0.61 * turn;
-    const View view = look_at({25 * std::sin(angle), 6, 25 * std::cos(angle)}, {}, 15, 40);
-    const CastPicture drawn = cast(ab, view).picture;
-    CHECK(drawn.depth == cast(ba, view).picture.depth);
-    const auto exact = [&](const PixelRay& ray, double radius_mm) {
-      return exact_mm(
-          [&](glm::dvec3 at) {
-            return std::min(glm::length(at - left), glm::length(at - right)) - radius_mm;
-          },
-          ray);
-    };
-    for (int y = 0; y < kSize.height; ++y) {
-      for (int x = 0; x < kSize.width; ++x) {
-        const PixelRay ray = pixel_ray(view, kSize, x, y);
-        const auto inner = exact(ray, 2.9);
-        const auto nearest = exact(ray, 3.0);
-        // Not at the rims: there a tenth of a voxel decides.
-        if (!inner || !nearest || *inner - *nearest > 0.2) continue;
-        const auto at = static_cast<std::size_t>((kSize.height - 1 - y) * kSize.width + x);
-        const double seen_mm = eye_distance_mm(static_cast<double>(drawn.depth[at]), view);
-        worst_mm = std::max(worst_mm, std::abs(seen_mm - *nearest));
-        ++compared;
-      }
-    }
-  }
-  CHECK(worst_mm < 0.25 * 0.15);
-}
-
-TEST_CASE("a clip plane cuts a face into a ball, and takes away what is before it") {
-  const VoxelGrid grid{40, 40, 40};
-  const TestVolume volume(grid, centred(grid, glm::dvec3(0.25)), ball({}, 4.0, 0.5));
-  View view = look_at({0, 0, 30}, {}, 15, 45);
-  view.clip_plane = {0, 0, -1, 1.5};  // z <= 1.5 mm
-  Caster caster = caster_of({&volume});
-  const Cast drawn = cast(caster, view);
-  const std::size_t middle = drawn.picture.depth.size() / 2;
-  CHECK(eye_distance_mm(static_cast<double>(drawn.picture.depth[middle]), view) ==
-        doctest::Approx(28.5).epsilon(1e-5));
-  CHECK(drawn.normals[3 * middle + 2] == doctest::Approx(1.0));
-  view.clip_plane = {0, 0, -1, -4.5};
-  const Cast nothing = cast(caster, view);
-  CHECK(*std::ranges::min_element(nothing.picture.depth) == 1.0F);
 }
 
 TEST_CASE("the opacity of blend hardly depends on the step") {

@@ -2,18 +2,16 @@
 // Partial redraw: the same pixels as drawing everything, for every renderer.
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
-#include <filesystem>
 #include <optional>
 #include <random>
 #include <string>
 #include <vector>
 
 #include <doctest/doctest.h>
-#include <unistd.h>
 
 #include "shared/segment/server.hpp"
 #include "shared/segment/writer.hpp"
+#include "tests/support/temporary_folder.hpp"
 #include "tests/visualizer/gl/gl_fixture.hpp"
 #include "visualizer/picture/picture.hpp"
 #include "visualizer/render/renderer.hpp"
@@ -22,7 +20,6 @@
 
 using namespace kerf;
 using namespace kerf::test;
-namespace fs = std::filesystem;
 
 namespace {
 
@@ -49,16 +46,12 @@ class Controller {
     std::vector<Density>& density = density_[v];
     std::uint32_t removed = 0;
     const VoxelBox inside = box.clipped(grid.box());
-    for (int z = inside.lo.z; z < inside.hi.z; ++z) {
-      for (int y = inside.lo.y; y < inside.hi.y; ++y) {
-        for (int x = inside.lo.x; x < inside.hi.x; ++x) {
-          Density& at = density[grid.index(x, y, z)];
-          const auto now = static_cast<Density>(at * left);
-          removed += static_cast<std::uint32_t>(at - now);
-          at = now;
-        }
-      }
-    }
+    for_each_voxel(inside, [&](int x, int y, int z) {
+      Density& at = density[grid.index(x, y, z)];
+      const auto now = static_cast<Density>(at * left);
+      removed += static_cast<std::uint32_t>(at - now);
+      at = now;
+    });
     if (!inside.empty()) writer_.publish_box(v, density, inside, removed);
     end();
   }
@@ -79,16 +72,12 @@ class Controller {
     for (std::size_t v = 0; v < 2; ++v) {
       const VoxelGrid& grid = writer_grid(v);
       std::vector<Density>& density = density_[v];
-      for (int z = 0; z < grid.nz; ++z) {
-        for (int y = 0; y < grid.ny; ++y) {
-          for (int x = 0; x < grid.nx; ++x) {
-            // A comb, whose teeth darken each other over gaps of ten voxels.
-            const bool gap = y > 6 && x % 16 >= 6;
-            const bool border = x < 2 || y < 2 || z < 2 || x > grid.nx - 3 || z > grid.nz - 3;
-            density.push_back(gap || border ? Density{0} : Density(y > 20 ? 65535 : 39'000));
-          }
-        }
-      }
+      for_each_voxel(grid.box(), [&](int x, int y, int z) {
+        // A comb, whose teeth darken each other over gaps of ten voxels.
+        const bool gap = y > 6 && x % 16 >= 6;
+        const bool border = x < 2 || y < 2 || z < 2 || x > grid.nx - 3 || z > grid.nz - 3;
+        density.push_back(gap || border ? Density{0} : Density(y > 20 ? 65535 : 39'000));
+      });
       SegmentVolumeSpec& volume = spec.volumes.emplace_back();
       volume.grid = grid;
       volume.spacing_mm = {0.5, 0.5, v == 0 ? 0.5 : 0.7};
@@ -126,16 +115,6 @@ constexpr int kEdits = 40;
 #else
 constexpr int kEdits = 200;
 #endif
-
-/// A private folder for the controller's socket.
-struct Place {
-  fs::path path = fs::temp_directory_path() / ("kerf-redraw-" + std::to_string(::getpid()));
-  Place() {
-    fs::create_directories(path);
-    setenv("XDG_RUNTIME_DIR", path.c_str(), 1);
-  }
-  ~Place() { fs::remove_all(path); }
-};
 
 /// Changes volumes, hand and camera at random, and compares each part that was drawn again with
 /// drawing everything.
@@ -201,7 +180,7 @@ void check_parts(const ViewSettings& settings, PictureSize size, int edits) {
 
 TEST_CASE("after any change the part that is drawn again makes the picture of drawing everything") {
   if (!have_gl()) return;
-  const Place place;
+  const RuntimeFolder folder;
   for (const std::string_view kind : renderer_kinds()) {
     CAPTURE(std::string(kind));
     // What software GL draws slowly is small: to draw everything is most of the time.
@@ -217,7 +196,7 @@ TEST_CASE("after any change the part that is drawn again makes the picture of dr
 
 TEST_CASE("so it does where each volume has a renderer of its own") {
   if (!have_gl()) return;
-  const Place place;
+  const RuntimeFolder folder;
   for (const char* choice : {"surface,blend", "cast-blend,iso", "slices,cast", "cast,surface"}) {
     CAPTURE(choice);
     check_parts({.renderer = choice}, {96, 72}, kEdits / 4);
@@ -227,7 +206,7 @@ TEST_CASE("so it does where each volume has a renderer of its own") {
 
 TEST_CASE("slices are fewer around a tool that moves, and all of them once it rests") {
   if (!have_gl()) return;
-  const Place place;
+  const RuntimeFolder folder;
   for (const bool voxel_tool : {false, true}) {
     Controller controller;
     Session session("redraw");
@@ -259,7 +238,7 @@ TEST_CASE("slices are fewer around a tool that moves, and all of them once it re
 
 TEST_CASE("so it does after more changes than are told apart") {
   if (!have_gl()) return;
-  const Place place;
+  const RuntimeFolder folder;
   for (const char* kind : {"surface", "cast"}) {
     CAPTURE(std::string(kind));
     std::mt19937 random(3);
@@ -287,7 +266,7 @@ TEST_CASE("so it does after more changes than are told apart") {
 
 TEST_CASE("so it does with any gradient") {
   if (!have_gl()) return;
-  const Place place;
+  const RuntimeFolder folder;
   for (const GradientFilter gradient : {GradientFilter::central, GradientFilter::farid5}) {
     check_parts({.renderer = "iso", .gradient = gradient}, {96, 72}, kEdits / 4);
   }
@@ -299,7 +278,7 @@ TEST_CASE("so it does with any gradient") {
 
 TEST_CASE("so it does with a tool of voxels") {
   if (!have_gl()) return;
-  const Place place;
+  const RuntimeFolder folder;
   for (const std::string_view kind : renderer_kinds()) {
     CAPTURE(std::string(kind));
     check_parts({.renderer = std::string(kind), .voxel_tool = true}, {96, 72}, kEdits / 10);
@@ -308,7 +287,7 @@ TEST_CASE("so it does with a tool of voxels") {
 
 TEST_CASE("a changed look shows the picture of one that had it from the start") {
   if (!have_gl()) return;
-  const Place place;
+  const RuntimeFolder folder;
   Controller controller;
   Session session("redraw");
   session.poll();
@@ -340,7 +319,7 @@ TEST_CASE("a changed look shows the picture of one that had it from the start") 
 
 TEST_CASE("the first view shows every volume, in the middle of the picture") {
   if (!have_gl()) return;
-  const Place place;
+  const RuntimeFolder folder;
   Controller controller;
   Session session("redraw");
   session.poll();
@@ -362,7 +341,7 @@ TEST_CASE("the first view shows every volume, in the middle of the picture") {
 
 TEST_CASE("a target made anew in the place of another, a column narrower, is drawn whole") {
   if (!have_gl()) return;
-  const Place place;
+  const RuntimeFolder folder;
   Controller controller;
   Session session("redraw");
   session.poll();
@@ -380,7 +359,7 @@ TEST_CASE("a target made anew in the place of another, a column narrower, is dra
 
 TEST_CASE("a banner wider than the picture of an eye ends where that ends") {
   if (!have_gl()) return;
-  const Place place;
+  const RuntimeFolder folder;
   Controller controller;
   Session session("redraw");
   session.poll();

@@ -30,15 +30,11 @@ TestVolume::TestVolume(VoxelGrid grid, const glm::dmat4& world_from_voxel,
   view.bricks = BrickGrid::of(grid);
   view.world_from_voxel = world_from_voxel;
   density.reserve(grid.voxel_count());
-  for (int z = 0; z < grid.nz; ++z) {
-    for (int y = 0; y < grid.ny; ++y) {
-      for (int x = 0; x < grid.nx; ++x) {
-        const glm::dvec3 at(world_from_voxel * glm::dvec4(x, y, z, 1));
-        const double fraction = std::clamp(density_at_mm(at), 0.0, 1.0);
-        density.push_back(static_cast<Density>(std::lround(fraction * kDensityMax)));
-      }
-    }
-  }
+  for_each_voxel(grid.box(), [&](int x, int y, int z) {
+    const glm::dvec3 at(world_from_voxel * glm::dvec4(x, y, z, 1));
+    const double fraction = std::clamp(density_at_mm(at), 0.0, 1.0);
+    density.push_back(static_cast<Density>(std::lround(fraction * kDensityMax)));
+  });
 }
 
 std::function<double(glm::dvec3)> ball(glm::dvec3 centre_mm, double radius_mm, double ramp_mm) {

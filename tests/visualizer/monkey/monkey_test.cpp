@@ -1,15 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "visualizer/monkey/monkey.hpp"
 
-#include <cstdlib>
 #include <filesystem>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include <doctest/doctest.h>
-#include <unistd.h>
 
+#include "tests/support/temporary_folder.hpp"
 #include "visualizer/scene/visualizer_error.hpp"
 
 using namespace kerf;
@@ -23,19 +22,6 @@ constexpr std::uint64_t kEvents = 15;
 constexpr std::uint64_t kEvents = 60;
 #endif
 
-/// A private folder for sockets and for what keys write.
-struct MonkeyPlace {
-  fs::path path = fs::temp_directory_path() / ("kerf-monkey-test-" + std::to_string(::getpid()));
-  MonkeyPlace() {
-    fs::create_directories(path);
-    fs::permissions(path, fs::perms::owner_all);
-    setenv("XDG_RUNTIME_DIR", path.c_str(), 1);
-  }
-  ~MonkeyPlace() { fs::remove_all(path); }
-  MonkeyPlace(const MonkeyPlace&) = delete;
-  MonkeyPlace& operator=(const MonkeyPlace&) = delete;
-};
-
 std::unique_ptr<GlContext> context_or_none() {
   try {
     return make_headless_context();
@@ -48,12 +34,12 @@ std::unique_ptr<GlContext> context_or_none() {
 }  // namespace
 
 TEST_CASE("whatever a monkey does, the window shows what a picture drawn anew shows") {
-  const MonkeyPlace place;
+  const test::RuntimeFolder folder;
   const auto context = context_or_none();
   if (!context) return;
   for (const std::uint32_t seed : {1U, 2U}) {
     CAPTURE(seed);
-    Monkey monkey(*context, {.seed = seed, .folder = place.path / "files"});
+    Monkey monkey(*context, {.seed = seed, .folder = folder / "files"});
     while (monkey.count().events < kEvents) {
       try {
         monkey.act();
@@ -66,14 +52,14 @@ TEST_CASE("whatever a monkey does, the window shows what a picture drawn anew sh
 }
 
 TEST_CASE("a monkey with the same seed does the same, and sees the same") {
-  const MonkeyPlace place;
+  const test::RuntimeFolder folder;
   const auto context = context_or_none();
   if (!context) return;
   std::vector<std::string> events[2];
   std::vector<std::uint8_t> seen[2];
   for (int run = 0; run < 2; ++run) {
-    fs::remove_all(place.path / "files");  // their names are told in the picture
-    Monkey monkey(*context, {.seed = 3, .folder = place.path / "files"});
+    fs::remove_all(folder / "files");  // their names are told in the picture
+    Monkey monkey(*context, {.seed = 3, .folder = folder / "files"});
     for (int event = 0; event < 10; ++event) {
       monkey.act();
       events[run].push_back(monkey.event());

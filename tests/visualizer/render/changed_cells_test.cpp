@@ -30,16 +30,12 @@ struct LoadedScene {
   View view = look_at({50, 38, 40}, {20, 18, 16}, 20, 90);
 
   LoadedScene() {
-    for (int z = 0; z < kGrid.nz; ++z) {
-      for (int y = 0; y < kGrid.ny; ++y) {
-        for (int x = 0; x < kGrid.nx; ++x) {
-          const double outside = glm::length(glm::dvec3(x - 20, y - 18, z - 16)) - 12.0;
-          const double hollow = 7.0 - glm::length(glm::dvec3(x - 27, y - 23, z - 22));
-          const double fraction = std::clamp(0.5 - 0.5 * std::max(outside, hollow), 0.0, 1.0);
-          density.push_back(static_cast<Density>(fraction * kDensityMax));
-        }
-      }
-    }
+    for_each_voxel(kGrid.box(), [&](int x, int y, int z) {
+      const double outside = glm::length(glm::dvec3(x - 20, y - 18, z - 16)) - 12.0;
+      const double hollow = 7.0 - glm::length(glm::dvec3(x - 27, y - 23, z - 22));
+      const double fraction = std::clamp(0.5 - 0.5 * std::max(outside, hollow), 0.0, 1.0);
+      density.push_back(static_cast<Density>(fraction * kDensityMax));
+    });
     view.aspect = static_cast<double>(kSize.width) / kSize.height;
     for (int y = 0; y < kSize.height; ++y) {
       for (int x = 0; x < kSize.width; ++x) {

@@ -22,17 +22,14 @@ template <class SquareAt>
 double root_mean_square(const Distance& distance, const SquareAt& square_at) {
   double sum = 0.0;
   int hits = 0;
-  for (int y = 0; y < kTestSize.height; ++y) {
-    for (int x = 0; x < kTestSize.width; ++x) {
-      const PixelRay ray = pixel_ray(kView, kTestSize, x, y);
-      const auto exact = exact_mm(distance, ray);
-      if (!exact) continue;
-      const glm::dvec3 normal = slope_of(distance, ray.origin_mm + *exact * ray.direction);
-      if (-glm::dot(normal, glm::normalize(ray.direction)) < kLeastFacing) continue;
-      sum += square_at(pixel_at(x, y), *exact, normal);
-      ++hits;
-    }
-  }
+  for_each_pixel(kView, [&](std::size_t at, const PixelRay& ray) {
+    const auto exact = exact_mm(distance, ray);
+    if (!exact) return;
+    const glm::dvec3 normal = slope_of(distance, ray.origin_mm + *exact * ray.direction);
+    if (-glm::dot(normal, glm::normalize(ray.direction)) < kLeastFacing) return;
+    sum += square_at(at, *exact, normal);
+    ++hits;
+  });
   CHECK(hits > 500);
   return std::sqrt(sum / hits);
 }

@@ -19,13 +19,9 @@ TEST_CASE(
     "the gradient of a linear field is the same everywhere inside, and right to half a step") {
   const VoxelGrid grid{9, 8, 7};
   std::vector<Density> density;
-  for (int z = 0; z < grid.nz; ++z) {
-    for (int y = 0; y < grid.ny; ++y) {
-      for (int x = 0; x < grid.nx; ++x) {
-        density.push_back(static_cast<Density>(30000 + 2000 * x - 1500 * y + 500 * z));
-      }
-    }
-  }
+  for_each_voxel(grid.box(), [&](int x, int y, int z) {
+    density.push_back(static_cast<Density>(30000 + 2000 * x - 1500 * y + 500 * z));
+  });
   std::vector<GradientTexel> texels;
   fill_gradient_texels(GradientFilter::corners, grid, density, {{1, 1, 1}, {8, 7, 6}}, texels);
   // A step over two edges counts as g = 1: 127 * 2 * 2000 / 65535 = 7.75, and so on.
@@ -51,13 +47,8 @@ TEST_CASE("a box alone gives the texels that the whole volume gives there") {
     std::vector<GradientTexel> part;
     fill_gradient_texels(GradientFilter::corners, grid, density, box, part);
     std::size_t at = 0;
-    for (int z = box.lo.z; z < box.hi.z; ++z) {
-      for (int y = box.lo.y; y < box.hi.y; ++y) {
-        for (int x = box.lo.x; x < box.hi.x; ++x) {
-          RC_ASSERT(part[at++] == whole[grid.index(x, y, z)]);
-        }
-      }
-    }
+    for_each_voxel(
+        box, [&](int x, int y, int z) { RC_ASSERT(part[at++] == whole[grid.index(x, y, z)]); });
     RC_ASSERT(at == part.size());
   }));
 }

@@ -23,15 +23,10 @@ ChangedBricks edit(TestVolume& volume, VoxelIndex centre, int reach, const Chang
   const VoxelGrid& grid = volume.view.bricks.grid;
   const VoxelBox box =
       VoxelBox{centre, {centre.x + 1, centre.y + 1, centre.z + 1}}.grown(reach).clipped(grid.box());
-  for (int z = box.lo.z; z < box.hi.z; ++z) {
-    for (int y = box.lo.y; y < box.hi.y; ++y) {
-      for (int x = box.lo.x; x < box.hi.x; ++x) {
-        Density& density = volume.density[grid.index(x, y, z)];
-        density =
-            change(density, glm::dvec3(volume.view.world_from_voxel * glm::dvec4(x, y, z, 1)));
-      }
-    }
-  }
+  for_each_voxel(box, [&](int x, int y, int z) {
+    Density& density = volume.density[grid.index(x, y, z)];
+    density = change(density, glm::dvec3(volume.view.world_from_voxel * glm::dvec4(x, y, z, 1)));
+  });
   return changed_in(volume.view.bricks, box);
 }
 

@@ -1,4 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
+// Pictures and videos as files.
+#include "visualizer/picture/image_files.hpp"
+
 #include <array>
 #include <cmath>
 #include <csignal>
@@ -16,20 +19,70 @@
 #include <unistd.h>
 
 #include "shared/posix/atomic_file.hpp"
+#include "tests/support/temporary_folder.hpp"
 #include "tests/visualizer/gl/gl_fixture.hpp"
-#include "visualizer/picture/image_files.hpp"
+#include "tests/visualizer/render/rgb_picture.hpp"
+#include "visualizer/scene/visualizer_error.hpp"
 
 using namespace kerf;
 using namespace kerf::test;
 namespace fs = std::filesystem;
 
+namespace fs = std::filesystem;
+
 namespace {
 
-struct Place {
-  fs::path path = fs::temp_directory_path() / ("kerf-video-" + std::to_string(::getpid()));
-  Place() { fs::create_directories(path); }
-  ~Place() { fs::remove_all(path); }
+/// A disk with room for `bytes` more per file, as far as this process can tell.
+struct SmallDisk {
+  rlimit before{};
+  explicit SmallDisk(rlim_t bytes) {
+    std::signal(SIGXFSZ, SIG_IGN);
+    getrlimit(RLIMIT_FSIZE, &before);
+    const rlimit small{bytes, before.rlim_max};
+    setrlimit(RLIMIT_FSIZE, &small);
+  }
+  ~SmallDisk() { setrlimit(RLIMIT_FSIZE, &before); }
+  SmallDisk(const SmallDisk&) = delete;
+  SmallDisk& operator=(const SmallDisk&) = delete;
 };
+
+}  // namespace
+
+TEST_CASE("a PNG holds exactly the pixels that were written") {
+  const TemporaryFolder folder;
+  CHECK(rc::check([&] {
+    const PictureSize size{*rc::gen::inRange(1, 40), *rc::gen::inRange(1, 40)};
+    const auto count = static_cast<std::size_t>(size.width * size.height * 3);
+    const auto rgb =
+        *rc::gen::container<std::vector<std::uint8_t>>(count, rc::gen::arbitrary<std::uint8_t>());
+    write_png(folder / "a.png", size, rgb);
+    const RgbPicture found = read_png(folder / "a.png").value();
+    RC_ASSERT(found.rgb == rgb);
+    RC_ASSERT(found.size == size);
+  }));
+}
+
+TEST_CASE("a disk that fills up leaves the old file and nothing else, and one line says so") {
+  const TemporaryFolder folder;
+  const fs::path file = folder / "report.json";
+  write_new_file(file, "oooooooooo");
+  {
+    const SmallDisk disk(100);
+    CHECK_THROWS_AS(write_new_file(file, std::string(500, 'n')), FileError);
+  }
+  CHECK(text_of(file) == "oooooooooo");
+  CHECK(folder.count() == 1);
+}
+
+TEST_CASE("a place that cannot be written is named") {
+  CHECK_THROWS_WITH_AS(write_new_file("/nonexistent/a.png", "x"),
+                       doctest::Contains("/nonexistent/a.png: cannot be written"), FileError);
+  CHECK_THROWS_AS(make_folder("/dev/null/folder"), VisualizerError);
+}
+
+namespace fs = std::filesystem;
+
+namespace {
 
 using Bytes = std::vector<std::uint8_t>;
 
@@ -119,10 +172,10 @@ TEST_CASE("colour differences are those of the mean of their square, also at an 
 
 TEST_CASE("a video plays in true time whenever pictures come") {
   if (!have_gl()) return;
-  const Place place;
+  const TemporaryFolder folder;
   const PictureSize size{5, 3};
   const RenderTarget target(size);
-  const fs::path file = place.path / "a.y4m";
+  const fs::path file = folder / "a.y4m";
   {
     Film film(file.string(), size, 60);
     const auto at = [&](double servo_s, float brightness) {
@@ -147,8 +200,8 @@ TEST_CASE("a video plays in true time whenever pictures come") {
 
 TEST_CASE("a picture of another size ends the video, and the picture goes on") {
   if (!have_gl()) return;
-  const Place place;
-  const fs::path file = place.path / "a.y4m";
+  const TemporaryFolder folder;
+  const fs::path file = folder / "a.y4m";
   std::optional<Film> film(std::in_place, file.string(), PictureSize{4, 4}, 30);
   CHECK_FALSE(add_frame(film, RenderTarget({4, 4}), 0.0));
   CHECK(film);
@@ -161,41 +214,38 @@ TEST_CASE("a picture of another size ends the video, and the picture goes on") {
 }
 
 TEST_CASE("a full disk leaves whole frames and says so in one line") {
-  const Place place;
+  const TemporaryFolder folder;
   const PictureSize size{64, 64};
   const Bytes frame(64 * 64 * 3 / 2, 100);
-  const fs::path file = place.path / "a.y4m";
-  rlimit before{};
-  getrlimit(RLIMIT_FSIZE, &before);
-  const auto on_too_large = std::signal(SIGXFSZ, SIG_IGN);
-  const rlimit small{20'000, before.rlim_max};
-  setrlimit(RLIMIT_FSIZE, &small);
-  const std::string problem = problem_of([&] {
-    VideoFile video(file.string(), size, 60);
-    while (true) video.write_frame(frame);
-  });
-  setrlimit(RLIMIT_FSIZE, &before);
-  std::signal(SIGXFSZ, on_too_large);
+  const fs::path file = folder / "a.y4m";
+  std::string problem;
+  {
+    const SmallDisk disk(20'000);
+    problem = problem_of([&] {
+      VideoFile video(file.string(), size, 60);
+      while (true) video.write_frame(frame);
+    });
+  }
   CHECK(problem == "video " + file.string() +
                        ": File too large; name a place with room (3 frames are written)");
   CHECK(read_back(file, size).frames.size() == 3);
   CHECK(problem_of([&] { VideoFile("/dev/full", size, 60); }).find("No space left") !=
         std::string::npos);
   CHECK(problem_of([&] {
-          VideoFile((place.path / "none" / "a.y4m").string(), size, 60);
+          VideoFile((folder / "none/a.y4m").string(), size, 60);
         }).find("choose another place") != std::string::npos);
-  const std::string link = (place.path / "link.y4m").string();
-  std::filesystem::create_symlink(place.path / "another's", link);
+  const std::string link = (folder / "link.y4m").string();
+  std::filesystem::create_symlink(folder / "another's", link);
   CHECK(problem_of([&] { VideoFile(link, size, 60); }).find("is a link; name a file itself") !=
         std::string::npos);
-  CHECK_FALSE(std::filesystem::exists(place.path / "another's"));
+  CHECK_FALSE(std::filesystem::exists(folder / "another's"));
 }
 
 TEST_CASE("a reader that is not there, goes away or takes nothing is told in one line") {
-  const Place place;
+  const TemporaryFolder folder;
   const PictureSize size{256, 256};
   const Bytes frame(256 * 256 * 3 / 2, 100);
-  const std::string pipe = (place.path / "pipe").string();
+  const std::string pipe = (folder / "pipe").string();
   REQUIRE(mkfifo(pipe.c_str(), 0600) == 0);
   CHECK(problem_of([&] { VideoFile(pipe, size, 60); }).find("start the reader first") !=
         std::string::npos);

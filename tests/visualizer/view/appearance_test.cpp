@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Opacities that a user chose: their file, and the pictures that show them.
+// Colours and opacities: palette, transfer function, its file, and the pictures that show them.
+#include "visualizer/scene/appearance.hpp"
+
 #include <array>
 #include <filesystem>
 #include <fstream>
@@ -12,7 +14,7 @@
 
 #include "tests/visualizer/gl/gl_fixture.hpp"
 #include "tests/visualizer/render/renderer_fixture.hpp"
-#include "visualizer/scene/appearance.hpp"
+#include "visualizer/render/volume_textures.hpp"
 #include "visualizer/scene/visualizer_error.hpp"
 
 using namespace kerf;
@@ -25,6 +27,95 @@ const std::vector<MaterialView> kTooth{{"none", 0.0, {0, 0, 0}},
                                        {"enamel", 0.81, {1, 1, 1}},
                                        {"dentin", 0.45, {0, 1, 0}},
                                        {"pulp", 0.14, {1, 0, 0}}};
+
+}  // namespace
+
+TEST_CASE("air is not seen, what the materials are made of is, and between the two is a ramp") {
+  for (const bool labels : {false, true}) {
+    const TransferFunction made = make_transfer_function(kTooth, 29491, labels);
+    CHECK(made.presence(0.0) == 0.0);
+    CHECK(made.presence(1.0) == 1.0);
+    CHECK(made.presence(0.5 * (made.empty + made.full)) == doctest::Approx(0.5));
+    CHECK(made.presence(29491 / kDensityMax) == doctest::Approx(1.0).epsilon(1e-4));
+  }
+  // Pulp lies below the iso density of a tooth, and is seen where it has a label.
+  CHECK(make_transfer_function(kTooth, 29491, true).presence(0.28) == doctest::Approx(1.0));
+}
+
+TEST_CASE("a CT whose air is far from black is seen through its air, not as a block") {
+  constexpr Density kAir = 19'700, kNoise = 900, kIso = 32'000;
+  std::vector<Density> density(3000, kAir);
+  for (std::size_t i = 0; i < density.size(); i += 3) density[i] = kAir - kNoise;
+  for (std::size_t i = 1; i < density.size(); i += 3) density[i] = kAir + kNoise;
+  for (std::size_t i = 0; i < density.size(); i += 4) density[i] = 50'000;
+  const Density air = air_level(density, kIso);
+  CHECK(air <= kAir);
+  CHECK(air > kAir - 256);
+  const TransferFunction made = make_transfer_function(kTooth, kIso, false, air);
+  CHECK(made.presence((kAir + kNoise) / kDensityMax) == 0.0);
+  CHECK(made.presence(kIso / kDensityMax) == doctest::Approx(1.0));
+  CHECK(make_transfer_function(kTooth, kIso, false).presence(kAir / kDensityMax) > 0.3);
+}
+
+TEST_CASE("air is 0 where nothing is below iso, and leaves a ramp where all is just below") {
+  const std::vector<Density> full(100, 65535);
+  CHECK(air_level(full, 30'000) == 0);
+  CHECK(air_level({}, 30'000) == 0);
+  const std::vector<Density> grey(100, 29'999);
+  const TransferFunction made = make_transfer_function({}, 30'000, false, air_level(grey, 30'000));
+  CHECK(made.full - made.empty > 0.1 * made.full);
+}
+
+TEST_CASE("the softer a material, the more opaque: hard enamel shows what is below") {
+  const Palette look = make_transfer_function(kTooth, 29491, true).materials;
+  CHECK(look[1][1].a < look[1][2].a);
+  CHECK(look[1][2].a < look[1][3].a);
+  CHECK(look[0][255].a == look[1][1].a);
+  CHECK(look[0][0].a == look[1][3].a);
+  CHECK(look[1][0].a == 0.0F);  // no material
+}
+
+TEST_CASE("no density below the lowest that is seen is seen after it was rounded to 8 bits") {
+  CHECK(rc::check([] {
+    const auto iso = *rc::gen::inRange<Density>(1, 65535);
+    const TransferFunction made = make_transfer_function({}, iso, false);
+    const auto density = *rc::gen::inRange<Density>(0, 65535);
+    std::vector<GradientTexel> texel;
+    const std::vector<Density> volume{density};
+    fill_gradient_texels(GradientFilter::corners, {1, 1, 1}, volume, {{0, 0, 0}, {1, 1, 1}}, texel);
+    if (density < made.lowest_seen()) RC_ASSERT(made.presence(texel[0].density / 255.0) == 0.0);
+  }));
+}
+
+TEST_CASE("a density takes the colour of the densest material it reaches, a label its own") {
+  const std::vector<MaterialView> materials{{"none", 0.0, {0, 0, 0}},
+                                            {"enamel", 0.8, {1, 1, 1}},
+                                            {"dentin", 0.4, {0, 1, 0}},
+                                            {"pulp", 0.1, {1, 0, 0}}};
+  const auto palette = make_palette(materials);
+  const auto by_density = [&](double density) {
+    return glm::vec3(palette[0][static_cast<std::size_t>(density * 255.0 + 0.5)]);
+  };
+  CHECK(by_density(0.0) == glm::vec3(1, 0, 0));
+  CHECK(by_density(0.2) == glm::vec3(1, 0, 0));
+  CHECK(by_density(0.6) == glm::vec3(0, 1, 0));
+  CHECK(by_density(1.0) == glm::vec3(1, 1, 1));
+  const glm::vec3 border = by_density(0.4);
+  CHECK(border.x == doctest::Approx(0.5).epsilon(0.2));  // half pulp, half dentin
+  CHECK(glm::vec3(palette[1][2]) == glm::vec3(0, 1, 0));
+}
+
+TEST_CASE("without materials everything has one colour that is seen") {
+  const auto palette = make_palette({});
+  for (const auto& row : palette) {
+    for (const glm::vec4& colour : row) CHECK(colour == palette[0][0]);
+  }
+  CHECK(palette[0][0].g > 0.3F);
+}
+
+namespace fs = std::filesystem;
+
+namespace {
 
 std::string refusal_of(std::string_view text) {
   try {

@@ -1,10 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
+// Notices, rates and the plot of the panels.
+#include <chrono>
+
 #include <doctest/doctest.h>
 
 #include "visualizer/app/window_keys.hpp"
 #include "visualizer/panels/overlay.hpp"
 
 using namespace kerf;
+using namespace std::chrono_literals;
 
 namespace {
 
@@ -63,4 +67,57 @@ TEST_CASE("a panel that is asked for brings the hidden ones back") {
 TEST_CASE("a tool that a scene lacks is told with the keys that it has") {
   CHECK(no_such_tool(6, 3) == "tool 7: the scene has 3; press 1 to 3");
   CHECK(no_such_tool(1, 1) == "tool 2: the scene has 1; press 1");
+}
+
+TEST_CASE("the plot holds the last five seconds, and each record once") {
+  ForcePlot plot;
+  TickRecord record{};
+  for (int i = 1; i <= 800; ++i) {
+    record.start_ns = static_cast<std::uint64_t>(i) * 10'000'000;
+    record.commanded_force_n[0] = 0.3F;
+    record.commanded_force_n[1] = 0.4F;
+    record.penetration_mm = static_cast<float>(i);
+    plot.add(record);
+    plot.add(record);
+  }
+  REQUIRE(plot.points().size() == 501);
+  CHECK(plot.points().front().time_ns == 3'000'000'000);
+  CHECK(plot.points().front().penetration_mm == 300.0F);
+  CHECK(plot.points().back().penetration_mm == 800.0F);
+  CHECK(plot.points().back().force_n == doctest::Approx(0.5));
+
+  record.start_ns = 1;  // of the past
+  plot.add(record);
+  CHECK(plot.points().size() == 501);
+
+  record.start_ns = 60'000'000'000;  // after a long pause
+  plot.add(record);
+  CHECK(plot.points().size() == 1);
+}
+
+TEST_CASE("rates and age change four times a second, whatever comes in each frame") {
+  ShownRates rates;
+  OverlayFigures before;
+  int changes = 0;
+  for (int frame = 0; frame < 100; ++frame) {  // two seconds
+    OverlayFigures figures;
+    figures.tick_rate_hz = 1000.0 + frame;
+    figures.data_age_ms = 0.1 * frame;
+    rates.show(figures, ShownRates::Clock::time_point(frame * 20ms));
+    if (frame > 0 && figures != before) ++changes;
+    before = figures;
+  }
+  CHECK(changes == 7);  // 0.26 s, 0.52 s ... 1.82 s
+  REQUIRE(before.frame_rate_hz);
+  CHECK(*before.frame_rate_hz == doctest::Approx(50.0));
+}
+
+TEST_CASE("the age of data that come no more goes with its next change") {
+  ShownRates rates;
+  OverlayFigures figures;
+  figures.data_age_ms = 3.0;
+  rates.show(figures, ShownRates::Clock::time_point(1s));
+  figures.data_age_ms.reset();
+  rates.show(figures, ShownRates::Clock::time_point(1s + ShownRates::kHold));
+  CHECK_FALSE(figures.data_age_ms);
 }

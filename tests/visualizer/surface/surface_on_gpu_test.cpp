@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which triangles of a block are drawn through parts of the picture.
+// Which triangles of a block are drawn through parts of the picture; ranges of a buffer.
+#include "visualizer/surface/surface_on_gpu.hpp"
+
 #include <algorithm>
+#include <array>
+#include <random>
 
 #include <doctest/doctest.h>
 
 #include "tests/visualizer/surface/mesh_checks.hpp"
-#include "visualizer/surface/surface_on_gpu.hpp"
 
 using namespace kerf;
 using namespace kerf::test;
@@ -62,4 +65,29 @@ TEST_CASE("of a block those triangles are picked that touch a part of the pictur
   CHECK(picked > 100);
   CHECK(missed == 0);
   CHECK(picked_for_nothing == 0);
+}
+
+using kerf::RangePool;
+
+TEST_CASE("ranges hold what they were asked for, never overlap, and are used again") {
+  RangePool pool;
+  std::array<RangePool::Range, 40> ranges{};
+  std::array<std::uint32_t, 40> counts{};
+  std::mt19937 random(2);
+  int wrong = 0;
+  std::uint32_t size_half_way = 0;
+  for (int step = 0; step < 4000; ++step) {
+    const std::size_t i = random() % ranges.size();
+    counts[i] = static_cast<std::uint32_t>(random() % 4 == 0 ? 0 : random() % 1900);
+    ranges[i] = pool.fit(ranges[i], counts[i]);
+    for (std::size_t j = 0; j < ranges.size(); ++j) {
+      const RangePool::Range& a = ranges[i];
+      const RangePool::Range& b = ranges[j];
+      wrong += b.capacity < counts[j] || b.first + b.capacity > pool.size() ? 1 : 0;
+      wrong += i != j && a.first < b.first + b.capacity && b.first < a.first + a.capacity ? 1 : 0;
+    }
+    if (step == 2000) size_half_way = pool.size();
+  }
+  CHECK(wrong == 0);
+  CHECK(pool.size() < 1.2 * size_half_way);  // what comes and goes takes no new room
 }

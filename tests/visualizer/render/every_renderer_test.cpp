@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-// What every renderer leaves out on demand: what the clip plane takes, what is outside a rectangle.
+// Rules that hold for every renderer: clip plane, part of a target, changed bricks, air.
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <memory>
+#include <random>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include <doctest/doctest.h>
 
-#include "tests/visualizer/gl/gl_fixture.hpp"
 #include "tests/visualizer/render/renderer_fixture.hpp"
 
 using namespace kerf;
@@ -28,10 +28,9 @@ TEST_CASE("the clip plane leaves a face where it cuts through solid, and nothing
     const auto renderer = make_renderer(kind, scene_of({&volume}), {&content, 1});
     renderer->set_cut_open(true, {&content, 1});
     const Drawn drawn = draw(*renderer, view, RenderTarget(kTestSize));
-    const std::size_t middle = pixel_at(48, 48);
-    CHECK(eye_distance_mm(static_cast<double>(drawn.depth[middle]), view) ==
+    CHECK(eye_distance_mm(static_cast<double>(drawn.depth[kMiddle]), view) ==
           doctest::Approx(28.97).epsilon(1e-5));
-    CHECK(drawn.rgb[3 * middle] > 60);  // lit
+    CHECK(drawn.rgb[3 * kMiddle] > 60);  // lit
     for (const float depth : drawn.depth) {
       CHECK(eye_distance_mm(static_cast<double>(depth), view) > 28.969);
     }
@@ -79,11 +78,7 @@ TEST_CASE("iso, surface and cast show the same face in the clip plane, also afte
   const VoxelBox cut{{20, 14, 14}, {31, 22, 30}};
   for (const bool after : {false, true}) {
     if (after) {
-      for (int z = cut.lo.z; z < cut.hi.z; ++z) {
-        for (int y = cut.lo.y; y < cut.hi.y; ++y) {
-          for (int x = cut.lo.x; x < cut.hi.x; ++x) volume.density[grid.index(x, y, z)] = 0;
-        }
-      }
+      for_each_voxel(cut, [&](int x, int y, int z) { volume.density[grid.index(x, y, z)] = 0; });
       const auto changed = changed_in(volume.view.bricks, cut);
       for (const auto& renderer : renderers) renderer->update(0, volume.density, changed);
     }
@@ -91,21 +86,17 @@ TEST_CASE("iso, surface and cast show the same face in the clip plane, also afte
     for (std::size_t other : {1U, 2U}) {
       const Drawn drawn = draw(*renderers[other], view, target);
       int face = 0, same = 0;
-      for (int y = 0; y < kTestSize.height; ++y) {
-        for (int x = 0; x < kTestSize.width; ++x) {
-          const std::size_t at = pixel_at(x, y);
-          const PixelRay ray = pixel_ray(view, kTestSize, x, y);
-          const auto eye_mm = eye_distance_mm(static_cast<double>(iso.depth[at]), view);
-          const glm::dvec4 hit(ray.origin_mm + eye_mm * ray.direction, 1.0);
-          if (std::abs(glm::dot(view.clip_plane, hit)) > 1e-3) continue;
-          ++face;
-          bool equal = std::abs(drawn.depth[at] - iso.depth[at]) < 1e-6F;
-          for (std::size_t c = 3 * at; c < 3 * at + 3; ++c) {
-            equal = equal && std::abs(drawn.rgb[c] - iso.rgb[c]) <= 3;
-          }
-          if (equal) ++same;
+      for_each_pixel(view, [&](std::size_t at, const PixelRay& ray) {
+        const auto eye_mm = eye_distance_mm(static_cast<double>(iso.depth[at]), view);
+        const glm::dvec4 hit(ray.origin_mm + eye_mm * ray.direction, 1.0);
+        if (std::abs(glm::dot(view.clip_plane, hit)) > 1e-3) return;
+        ++face;
+        bool equal = std::abs(drawn.depth[at] - iso.depth[at]) < 1e-6F;
+        for (std::size_t c = 3 * at; c < 3 * at + 3; ++c) {
+          equal = equal && std::abs(drawn.rgb[c] - iso.rgb[c]) <= 3;
         }
-      }
+        same += equal ? 1 : 0;
+      });
       CAPTURE(after);
       CAPTURE(other);
       CHECK(face > 1000);
@@ -129,7 +120,7 @@ TEST_CASE("a face in the clip plane has the colour of what lies in it, not behin
     CAPTURE(std::string(kind));
     const auto renderer = make_renderer(kind, scene, {&content, 1});
     renderer->set_cut_open(true, {&content, 1});
-    const std::size_t middle = 3 * pixel_at(48, 48);
+    const std::size_t middle = 3 * kMiddle;
     view.clip_plane = {0, 0, -1, 1.125};  // through the last red voxels
     const Drawn red = draw(*renderer, view, RenderTarget(kTestSize));
     CHECK(red.rgb[middle] > 2 * red.rgb[middle + 2]);
@@ -159,36 +150,93 @@ TEST_CASE("a plane beyond a volume hides it whole, one on its near side nothing"
   }
 }
 
-TEST_CASE(
-    "within a part of the target the pixels are those of the whole picture, the others stay") {
+TEST_CASE("within a part of the target the pixels are those of the whole, the others stay") {
   if (!have_gl()) return;
   const TestVolume volume = heap_of_balls();
   const VolumeContent content = volume.content();
   const View view = look_at({14, 9, 20}, {}, 10, 40);
   RenderTarget target(kTestSize);
-  constexpr int kLeft = 31, kBottom = 22, kWide = 37, kHigh = 41;
+  std::mt19937 random(3);
+  const auto pick = [&](int n) { return std::uniform_int_distribution<int>(0, n - 1)(random); };
   for (const std::string_view kind : renderer_kinds()) {
     CAPTURE(std::string(kind));
     const auto renderer = make_renderer(kind, scene_of({&volume}), {&content, 1});
     const Drawn whole = draw(*renderer, view, target);
-    target.bind();
-    glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
-    target.restrict_to({kLeft, kBottom, kLeft + kWide, kBottom + kHigh});
-    renderer->draw(view, target);
-    target.restrict_to(target.all());
-    const auto rgb = target.read_rgb();
-    const auto depth = target.read_depth();
-    int wrong = 0;
-    for (int y = 0; y < kTestSize.height; ++y) {
-      for (int x = 0; x < kTestSize.width; ++x) {
-        const int up = kTestSize.height - 1 - y;
-        const bool inside =
-            x >= kLeft && x < kLeft + kWide && up >= kBottom && up < kBottom + kHigh;
-        const std::size_t at = pixel_at(x, y);
-        wrong += depth[at] != (inside ? whole.depth[at] : 1.0F) ? 1 : 0;
-        wrong += rgb[3 * at] != (inside ? whole.rgb[3 * at] : 0) ? 1 : 0;
+    for (int round = 0; round < 8; ++round) {
+      const PixelRect at{pick(96), pick(96), 0, 0};
+      const PixelRect part = PixelRect{at.x0, at.y0, at.x0 + 1 + pick(60), at.y0 + 1 + pick(60)};
+      target.bind();
+      glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
+      target.restrict_to(part.clipped(target.all()));
+      renderer->draw(view, target);
+      target.restrict_to(target.all());
+      const auto rgb = target.read_rgb();
+      const auto depth = target.read_depth();
+      int wrong = 0;
+      for (std::size_t i = 0; i < depth.size(); ++i) {
+        const int x = static_cast<int>(i) % kTestSize.width;
+        const int up = kTestSize.height - 1 - static_cast<int>(i) / kTestSize.width;
+        const bool inside = x >= part.x0 && x < part.x1 && up >= part.y0 && up < part.y1;
+        wrong += depth[i] != (inside ? whole.depth[i] : 1.0F) ? 1 : 0;
+        wrong += rgb[3 * i] != (inside ? whole.rgb[3 * i] : 0) ? 1 : 0;
+      }
+      CHECK(wrong == 0);
+    }
+  }
+}
+
+TEST_CASE("after random cuts, the changed bricks make the picture of a renderer made anew") {
+  if (!have_gl()) return;
+  const VoxelGrid grid{43, 37, 50};
+  const RenderTarget target(kTestSize);
+  const View view = look_at({9, 14, 17}, {}, 15, 35);
+  for (const std::string_view kind : renderer_kinds()) {
+    CAPTURE(std::string(kind));
+    for (const GradientFilter gradient :
+         {GradientFilter::corners, GradientFilter::central, GradientFilter::farid5}) {
+      TestVolume volume(grid, centred(grid, glm::dvec3(0.25)), ball({}, 4.4, 0.5));
+      SceneView scene = scene_of({&volume});
+      scene.gradient = gradient;
+      const VolumeContent content = volume.content();
+      const auto edited = make_renderer(kind, scene, {&content, 1});
+      if (gradient != GradientFilter::corners && !edited->takes_gradient()) continue;
+      std::mt19937 random(11);
+      for (int cut = 0; cut < 13; ++cut) {
+        // Noise makes many surfaces; what grows back makes cells active again; the last takes all.
+        VoxelBox box = grid.box();
+        if (cut < 12) box = fill_random_box(volume, cut % 3 == 2 ? 60000 : 0, random);
+        for_each_voxel(box, [&](int x, int y, int z) {
+          Density& density = volume.density[grid.index(x, y, z)];
+          if (cut % 3 == 1) density = static_cast<Density>(random());
+          if (cut == 12) density = 0;
+        });
+        edited->update(0, volume.density, changed_in(volume.view.bricks, box));
+        const Drawn last = draw(*edited, view, target);
+        const Drawn anew = draw(*make_renderer(kind, scene, {&content, 1}), view, target);
+        CHECK(last.rgb == anew.rgb);
+        CHECK(last.depth == anew.depth);
+        const bool shows = *std::min_element(last.depth.begin(), last.depth.end()) < 1.0F;
+        CHECK(shows == (cut < 12));
       }
     }
-    CHECK(wrong == 0);
+  }
+}
+
+TEST_CASE("surface redraws by changed cells while a plane cuts it open, else by triangles alone") {
+  if (!have_gl()) return;
+  const VoxelGrid grid{24, 24, 24};
+  const TestVolume volume(grid, centred(grid, glm::dvec3(0.25)), ball({}, 2.0, 0.5));
+  const VolumeContent content = volume.content();
+  const auto renderer = make_renderer("surface", scene_of({&volume}), {&content, 1});
+  const RenderTarget target(kTestSize);
+  const View view = look_at({0, 0, 20}, {}, 10, 30);
+  static_cast<void>(draw(*renderer, view, target));
+  // Brought without another density: no triangle changes.
+  renderer->update(0, volume.density, changed_in(volume.view.bricks, {{8, 8, 8}, {12, 13, 14}}));
+  for (const bool open : {false, true, false}) {
+    renderer->set_cut_open(open, {&content, 1});
+    RedrawTiles tiles(kTestSize);
+    renderer->mark_redraw(0, {volume.view, volume.density, view, target}, tiles);
+    CHECK(tiles.rects().empty() == !open);
   }
 }
