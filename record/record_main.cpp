@@ -40,7 +40,10 @@ int run_record(int argc, char** argv) {
     std::cout << to_text(summary);
     if (!report.empty()) write_new_file(report, to_json(summary));
   }
-  if (plot.chosen()) plot_forces(folder, svg);
+  if (plot.chosen()) {
+    plot_forces(folder, svg);
+    if (!is_stream(svg)) std::cout << svg.string() << ": written\n";
+  }
   if (table.chosen()) export_csv(folder, csv);
   return 0;
 }

@@ -68,10 +68,10 @@ int Command::run(std::ostream& out) const {
   const std::string report = json(entries, core);
   as_json.write(report);
   as_csv.write(csv(entries));
+  as_plot.write_report({"accuracy", "plot"}, report, out);
   if (!page_.empty()) {
-    as_page.write(make_report({"accuracy", "page", page_link(page_, plot)}, report));
+    as_page.write_report({"accuracy", "page", page_link(page_, plot)}, report, out);
   }
-  if (!plot.empty()) as_plot.write(make_report({"accuracy", "plot"}, report));
   return 0;
 }
 

@@ -93,7 +93,10 @@ int BenchCommand::run(std::ostream& out) const {
     const auto layout = bench_layout(add_row);
     const std::string report = json_of(rows, queries, layout, core);
     as_json.write(report);
-    if (!page_.empty()) as_page.write_part("kernels", make_report({"kernels", "page"}, report));
+    if (!page_.empty()) {
+      as_page.write_part("kernels", make_report({"kernels", "page"}, report));
+      out << page_ << ": written\n";
+    }
     return 0;
   }
 }

@@ -67,7 +67,10 @@ int Command::run(std::ostream& out) const {
     out << format("%.3s  %-14s %-14s %03d to %03d\n", head.number.data(), head.name.data(),
                   head.shape.data(), kSmallestBur, head.largest);
   }
-  if (!svg_.empty()) write_new_file(svg_, make_report({"burs", "sheet"}, sheet_json()));
+  if (!svg_.empty()) {
+    write_new_file(svg_, make_report({"burs", "sheet"}, sheet_json()));
+    if (!is_stream(svg_)) out << svg_ << ": written\n";
+  }
   return 0;
 }
 

@@ -232,10 +232,10 @@ int Command::run(std::ostream& out) const {
   const std::string report = json_of(findings);
   as_json.write(report);
   if (!page_.empty()) {
-    as_plot.write(make_report({"contact", "plot"}, report));
-    as_hands_plot.write(make_report({"contact", "hands"}, report));
-    as_page.write(make_report(
-        {"contact", "page", page_link(page_, plot), page_link(page_, hands_plot)}, report));
+    as_plot.write_report({"contact", "plot"}, report, out);
+    as_hands_plot.write_report({"contact", "hands"}, report, out);
+    as_page.write_report({"contact", "page", page_link(page_, plot), page_link(page_, hands_plot)},
+                         report, out);
   }
   return std::ranges::all_of(findings.rows, &Row::pass) ? 0 : 1;
 }

@@ -20,6 +20,7 @@ KINDS = {
     ("recording", "forces"): True,
     ("burs", "sheet"): True,
     ("kernels", "page"): False,
+    ("energy", "page"): False, ("energy", "tables"): False,
     ("pictures", "page"): False, ("pictures", "summary"): False, ("pictures", "tables"): False,
     ("accuracy", "page"): False, ("accuracy", "plot"): True,
     ("contact", "page"): False, ("contact", "plot"): True, ("contact", "hands"): True,

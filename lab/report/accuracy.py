@@ -18,15 +18,15 @@ shape; `--report` writes the same as JSON.
 
 One setting of the paper's contact force (docs/theory.md 7.1) is changed at a time. The others stay at the standard,
 in bold: Q15 weights, tool pitch = voxel, `farid` gradients stored as int16, trilinear, voxels of 0.125 mm in 128^3. A
-ball of 0.625 mm radius touches six shapes, at 100 places each and at depths up to its radius: a plane at 100 tilts, a
+ball of 0.625 mm radius touches six shapes, at 100 positions each and at depths up to its radius: a plane at 100 tilts, a
 ball, a torus, a plate as thin as two voxels, a groove of 90 degrees, a ball of enamel around dentin.
 
 Truth is the shape itself with sharp faces: F = -p0 SURFINT rho n dA over the tool's surface, exact to 1e-4.
-Forces are shares of full scale, p0 pi R^2. `rms` and `max` are over all shapes unless said.
+Forces are fractions of full scale, p0 pi R^2. `rms` and `max` are over all shapes unless stated.
 
 * `direction`: the angle to the force of theory, where that has a tenth of full scale.
 * `loop`: |SUM dW| / SUM |dW| around tilted circles of 0.375 mm, of one sample or of the whole tool. It is the work that
-  a static tooth gives or takes on a closed path, and should be nothing.
+  a static tooth gives or takes on a closed path, and should be 0.
 * `us p50`, `p99`: times of one tick of the tool without milling. Where the servo has fast kernels they run: Q15 in the
   methods `gather`, `aligned` and `splat`. Double is the servo's template. Times in brackets are of plain
   loops of the lab (Q8, Q12, splines, other interpolations): compare them with no other time.
@@ -39,7 +39,7 @@ REMOVAL = """\
 Not measured here; `tests/kernel/milling_test.cpp` bounds it. One stamp of a ball of five voxels' radius removes
 the ball's volume to 1 %, and a straight sweep of ten voxels' radius that stays on the voxels' lattice its capsule.
 Off the lattice no sweep is that exact: voxels at its rim are partly covered by many stamps in a row, and by the
-paper's overlap rule each stamp takes its share of what is left. A groove then has a radius that is up to about
+paper's overlap rule each stamp takes its fraction of the rest. A groove then has a radius that is up to about
 half a voxel larger than the tool's, at steps of a quarter to a whole voxel: the coarser the voxels, the more.
 """
 
@@ -76,27 +76,27 @@ coarser weights through its lerp.""",
     ("pitch", """\
 ## Pitch of the tool's samples
 
-In voxel edges. A sample stands for the cube around it, so a coarse ball has not the ball's volume.""",
+In voxel edges. A sample represents the cube around it, so a coarse ball does not have the ball's volume.""",
      [SAMPLES, THEORY, THEORY_MAX, DIRECTION, TOOL_LOOP, STEP]),
     ("kernel", """\
 ## Gradient kernel
 
-`normal` is the gradient at the voxels on the ball's face against the true normal; `noise` what remains
-of white noise of deviation one.""",
+`normal` is the angle between the gradient at the voxels on the ball's face and the exact normal; `noise` is the standard
+deviation that remains of white noise of deviation 1.""",
      [NORMAL, NORMAL_MAX, NOISE, SAMPLE_LOOP, TOOL_LOOP, THEORY]),
     ("storage", """\
 ## What is stored beside the density
 
 Int16 gradients are the servo's method `gather`, `aligned` its method for round tools, `splat` that for any
 tool in scenes that cut (its time holds the modification force, too). `spline 2` and `spline 3` are the
-exact derivative of the density's quadratic and cubic B-spline: their accuracy is the reference, their
-time is not. The last row has voxels half as wide: compare it with that of `gather` in "Voxel edge".""",
+exact derivative of the density's quadratic and cubic B-spline: a reference for the accuracy, not for the
+time. The last row has voxels half as wide: compare it with that of `gather` in "Voxel edge".""",
      [SAMPLES, MEMORY, DOUBLE, DOUBLE_MAX, THEORY, DIRECTION, SAMPLE_LOOP, TOOL_LOOP]),
     ("interpolation", """\
 ## Interpolation of the stored gradient
 
-Trilinear is the servo's; the others are B-splines of degree 0, 2 and 3 in plain double. `step`: what
-0.01 voxel along the face changes, in thousandths of full scale.""",
+Trilinear is the servo's; the others are B-splines of degree 0, 2 and 3 in plain double. `step`: the
+change of the force over 0.01 voxel along the face, in thousandths of full scale.""",
      [STEP, DIRECTION, SAMPLE_LOOP, TOOL_LOOP, THEORY, NOISE]),
     ("voxel", """\
 ## Voxel edge

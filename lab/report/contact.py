@@ -17,11 +17,11 @@ ABOUT = """\
 
 Made by `./kerf lab extremes --page docs/contact.md`; every figure comes from one run, nothing is typed by
 hand. A run repeats bit for bit, but for the times of ticks. `--report` writes the rows as JSON, `--only` measures
-some groups of them. The command exits with 1 where a limit is not kept.
+some groups of them. The command exits with 1 if a limit is not kept.
 
 The swept proxy (`[force] model = "proxy"`) keeps the whole tool out of the solid, and a spring pulls the hand to
 it. The paper's force (`"paper"`) is the sum of the density's gradients inside of the tool. docs/theory.md derives
-both. They are measured as the servo runs them: in fixed point, by the fastest kernels of this machine. Unless said,
+both. They are measured as the servo runs them: in fixed point, by the fastest kernels of this machine. Unless stated,
 a voxel is 0.1 mm, a tick 1 ms, the tool a ball of 16 voxels, and a face is a ramp of density over two voxels.
 docs/validation.md lists what is tested in fixed point and in double.
 
@@ -52,53 +52,53 @@ from tick to tick, and stays within %s and %s degrees of the normal.
 GROUPS = [
     ("walls", "Walls", """\
 A hand makes random steps of 0.1 to 10 m/s at a tilted wall. The cylinder and the bur of `scenes/fluted_bur.toml` are
-also turned at random. There is no supervisor."""),
+also rotated at random. There is no supervisor."""),
     ("air", "In air", """\
-A tool is led to and fro along tilted walls, so near and so fast that the hand goes 5 to 80 voxels in a
-tick. `--check` tells the speed up to which a scene is free of drag at any distance (docs/theory.md 4.2)."""),
+A tool moves to and fro along tilted walls, so near and so fast that the hand moves 5 to 80 voxels in a
+tick. `--check` prints the speed up to which a scene is free of drag at any distance (docs/theory.md 4.2)."""),
     ("rests", "Where a ball comes to rest", """\
 Offsets from the ideal solid at random tilts. On edges from the volume's own iso-surface, since trilinear density
-holds no sharp edge."""),
+has no sharp edge."""),
     ("slides", "Slides", """\
-The step is the change of the force from tick to tick over its mean. The turning of the normal alone makes 1.04 % at
+The step is the change of the force from tick to tick over its mean. The rotation of the normal alone makes 1.04 % at
 R 40 and 4.5 % at R 14; there the limit is 0.08 N or twice the mean. `CT` has edges blurred by a deviation of one voxel,
 and noise of 2 %."""),
     ("shapes", "Tools that are no balls", """\
 At rest on flats of any tilt and on sharp edges of 90 degrees, the edges against the volume's own iso-surface; and
 sliding at 50 mm/s over a ball of R 40, 2 voxels deep. Limits are 1.5 times those of the ball.
 
-On CT with noise a rim or a point touches in one place, where the noise of one voxel makes waves of the surface itself;
+On CT with noise a rim or a point touches at one position, where the noise of one voxel makes waves of the surface itself;
 a ball's height and normal are means of some fifty samples. A scene smooths such a volume when it loads it
 (`denoise = "auto"`, docs/theory.md 2.4), and so do the rows with limits; `denoise off` is the same without. `exact
 contact` shows the surface that was not smoothed: height and normal of the iso-surface where the tool's close samples
-touch it at the ideal place, the normal over half a voxel. A contact without any mean would feel this."""),
+touch it at the ideal position, the normal over half a voxel. A contact that averages over no samples would have these
+errors."""),
     ("edges", "Along and over sharp edges", """\
 A ball, and a cylinder whose side lies on the edge, two voxels deep on a sharp convex edge of 90 degrees at 0.05
-voxels a tick. The density is the solid's share of a cube of two voxels, as a scan has it. A ramp of the distance from
+voxels a tick. The density is the solid's fraction of a cube of two voxels, as in a scan. A ramp of the distance from
 the solid has a ridge that voxels do not hold: its trilinear iso-surface is a row of bumps about a voxel apart, and from
-bump to bump the place nearest to the hand itself jumps."""),
+bump to bump the position nearest to the hand jumps."""),
     ("isos", "Low and high iso", """\
-Tools at rest on flats of any tilt and on balls of R 14, where the iso is a share of full density other than the
-half. The angle between force and normal may be 1.5 times that at an iso of 0.45."""),
+Tools at rest on flats of any tilt and on balls of R 14, with an iso that is not half of full density. The angle between force and normal may be 1.5 times that at an iso of 0.45."""),
     ("cutting", "Cutting by force", """\
-The whole servo with `[cut] model = "preston"` and a ball of radius 1 mm. It is led by hand over a flat; pressed on it
-with a force that goes up to 1.2 N and back, however far the flat gives way; and sunk into a crown at the rate of
-enamel, at the worst of nine places. `GE tooth` is a real tooth by CT, below `--data` or `$KERF_DATA`."""),
+The whole servo with `[cut] model = "preston"` and a ball of radius 1 mm. A hand moves it over a flat; presses it on
+the flat with a force that rises to 1.2 N and falls again, however far the flat gives way; and lowers it into a crown at
+the rate of enamel, at the worst of nine positions. `GE tooth` is a real tooth by CT, below `--data` or `$KERF_DATA`."""),
     ("traps", "Traps", """\
 A random search in the whole servo: a hand presses a tool of 0.4 to 1 mm or the fluted bur, half of them with a
-shaft, some with a handpiece, turned anyhow, with 0.1 to 1 N for 5 s, from any side and with a tremor of 0.1 mm: into a
+shaft, some with a handpiece, in any orientation, with 0.1 to 1 N for 5 s, from any side and with a tremor of 0.1 mm: into a
 flat, a crown, layers, rubble, pits, shells, plates, or a block that ends at the volume's border. Half of these have
 soft matter in them, which may not be cut in half of those; machinability is 1, 4 or 8 times that of enamel. Of 24
-scenes 18 run in fixed point at 1 kHz and 250 Hz, the others at 8 kHz and in double. Wherever force presses
-with more than the threshold, matter must leave. A shaft may bear what its own cylinders, where they touch, can balance
-by any forces along their normals; the rest is the head's. What is all softer than the iso must bear nothing. 240
+scenes 18 run in fixed point at 1 kHz and 250 Hz, the others at 8 kHz and in double. If the force is
+above the threshold, volume must be removed. A shaft may carry the load that forces along the normals of its touching
+cylinders can balance; the head carries the rest. A solid that is softer than the iso everywhere must carry no load. 240
 presses; 10,000 with `--only traps`; `--seed` names the first scene."""),
     ("ticks", "Ticks", """\
 On 256 x 256 x 161 voxels. The costliest tick of each tool is searched among thousands: at flat, sharp, hollow and
-noisy solids, in a slot with a play of 0.1 voxels, in tissue just below the iso and, where its data are, at the GE
+noisy solids, in a slot with a play of 0.1 voxels, in tissue just below the iso and, if its data are present, at the GE
 tooth; with goals near and far, and from the start search. The ticks that took longest are repeated from the same
-state, and the fastest repetition counts. The row says where the tick was found. Times are of the machine named
-above; where another is slower, so is the paper's tick beside them."""),
+state, and the fastest repetition counts. The row names the solid at which the tick was found. Times are of the machine
+named above; on a slower one the paper's tick beside them is slower too."""),
     ("hands", "Hands", """\
 An emulated Omni, its driver and the whole servo in virtual time, with `scenes/touch.toml`; `groove` and `cut_cavity`
 have `[cut] model = "preston"`. Force above 150 Hz is the rms over windows of 0.128 s that are wholly in contact. One

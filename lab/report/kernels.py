@@ -11,33 +11,34 @@ ABOUT = """\
 Made by `./kerf bench kernels --page docs/performance.md`; every figure comes from one run, nothing is
 typed by hand. Machines are noisy: compare the ratios, which divide two figures of the same run.
 
-One tick of the servo's kernels on 256 x 256 x 161 voxels, the worst place of each kind, nothing kept
-from tick to tick. `paper` is the paper's own form at -O2: an array of structures with the stored float
-gradient, and a dense 5x5x5 refresh of what a cut changed; ratios divide its time. `reference` is the
-plain fixed-point text with stored gradients. `scalar`, `avx2` and `avx512` are the servo's kernels,
-which give the same bits on each: the method `aligned` for unturned tools, and for tools in any pose
-(`any`) the method `gather` for contact and `splat` for milling. `bytes` is what the tick needs beyond
-two bytes a voxel.
+One tick of the servo's kernels on 256 x 256 x 161 voxels, at the costliest position of each kind; no result is
+kept from tick to tick.
+
+* `paper` is the paper's own form at -O2: an array of structures with the stored float gradient, and a dense 5x5x5
+  refresh of the voxels that a cut changed. Ratios divide its time.
+* `reference` is the plain fixed-point code with stored gradients.
+* `scalar`, `avx2` and `avx512` are the servo's kernels, which all give the same bits: the method `aligned` for tools
+  that are not rotated, and for tools in any pose (`any`) the method `gather` for contact and `splat` for milling.
+* `bytes` is the memory of the tick beyond two bytes a voxel.
 
 """
 
 QUERIES = """
 ## A query of the swept contact
 
-What a tool feels at one place, read at samples of its surface: a ball of radius 8 voxels (805 samples)
-and a cylinder of radius 5 and length 16 (658). `slide` dips 2 voxels into a ball of radius 40, `half`
-lies half in a flat solid, `immersed` wholly. `turn` places the samples anew. A tick takes 2 or 3
-queries while it slides and at most 32. The ratio divides the plain loop, which is `scalar`.
+The contact of a tool at one position, from samples of its surface: a ball of radius 8 voxels (805 samples)
+and a cylinder of radius 5 and length 16 (658). `slide` is 2 voxels deep in a ball of radius 40, `half` is half inside
+a flat solid, `immersed` is wholly inside. `turn` rotates the samples. A tick takes 2 or 3 queries while it slides and at
+most 32. The ratio divides the plain loop, which is `scalar`.
 
 """
 
 LAYOUT = """
-## Where the volume lies
+## Layout of the volume
 
-The servo keeps its volume linear, x fastest. The copy of a tool's box out of 8x8x8 bricks is the other
-choice: the first rows compare the two, warm and with 96 MB swept through the caches before each tick;
-the ratio divides the linear copy. Then one tool in volumes of three sizes; the ratio divides the
-smallest.
+The servo stores its volume linearly, x fastest. The alternative is bricks of 8x8x8 voxels. The first rows compare
+copies of a tool's box out of both, with warm caches and after 96 MB went through the caches before each tick; the ratio
+divides the linear copy. The others are one tool in volumes of three sizes; the ratio divides the smallest.
 
 """
 

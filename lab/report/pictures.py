@@ -14,31 +14,31 @@ ABOUT = """\
 Made by `./kerf bench pictures --page docs/pictures.md`; every figure comes from one run, nothing is
 typed by hand but the paper's. Machines are noisy: compare figures of the same run.
 
-What a frame costs: the renderer's update and the volumes, without tool and panel; the camera rests.
-The volume is a made-up molar (`visualizer/bench/bench_tooth.cpp`) that fills of its grid about what the
-paper's padded tooth does, and fills the picture; `cropped` leaves out the air around it, the picture
-is the same. `static` draws all of the picture, `10^3` and `16^3` all of it after a ball of so many
-voxels was cut, `partial` only what that cut can have changed, as the visualizer does while the camera
-rests. Frames per second (fps) divide the median wall time; cpu ms are the median, summed over the
-threads. Each figure has 3 to 10 frames.
+The time of a frame: update of the renderer and drawing of the volumes, without tool and panel, with a camera at rest.
+The volume is a synthetic molar (`visualizer/bench/bench_tooth.cpp`). It fills about the same fraction of its grid as the
+paper's padded tooth, and it fills the picture.
 
-`paper` is the frame rate that the paper gives for its technique of the same kind, static / while
-milling, on its own hardware and graphics card: it says what was usual then, not what this machine
-would reach. Where `gl` below is a software GL, `iso`, `blend`, `surface` and `slices` say nothing of a
-graphics card.
+* `cropped`: the grid without the air around the tooth; the picture is the same.
+* `static`: the whole picture is drawn.
+* `10^3`, `16^3`: the whole picture is drawn after a ball of so many voxels was cut.
+* `partial`: only the pixels that this cut can have changed are drawn, as the visualizer does while the camera rests.
+* `fps`: one over the median wall time; `cpu ms`: the median, summed over the threads. Each figure has 3 to 10 frames.
+* `paper`: the frame rate that the paper reports for its technique of the same kind, static / while milling, on its own
+  hardware. It does not predict the rate of this machine.
+
+If `gl` below is a software OpenGL, the figures of `iso`, `blend`, `surface` and `slices` do not hold for a graphics card.
 
 """
 
 GRADIENTS = """
 ## Gradients
 
-What `--gradient` does to `iso` on the padded 256x256x161 volume, and the angle, root mean square,
-between its normals and the true ones on a ball of 28 voxels radius whose border is antialiased over
-two, without noise and with 1.5 % of full density. `central` and `corners` are worked out for each
-pixel from 6 and 8 samples; `farid5`, 5x5x5 voxels, is stored for each voxel in 8 bytes and worked out
-again around a cut. The partial picture of `iso` is the least with `corners`: with the others every
-pixel within 13 voxels of a cut is drawn again. `surface`, `blend` and `slices` take the same gradients
-at their voxels; `cast` and `cast-blend` always `corners`.
+The cost of `--gradient` for `iso` on the padded 256x256x161 volume, and the root mean square angle between its normals
+and the exact ones on a ball of 28 voxels radius whose border is antialiased over two voxels, without noise and with noise
+of 1.5 % of full density. `central` and `corners` are computed for each pixel from 6 and 8 samples. `farid5`, 5x5x5 voxels,
+is stored in 8 bytes a voxel and computed again around a cut. The partial picture of `iso` is smallest with `corners`: with
+the others every pixel within 13 voxels of a cut is drawn again. `surface`, `blend` and `slices` use the same gradients at
+their voxels; `cast` and `cast-blend` always use `corners`.
 
 """
 

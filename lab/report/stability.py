@@ -12,6 +12,7 @@ measure reads {program, quick, jobs, provenance}: the path of kerf-lab, whether 
     numbers                     rows {numeric, cells, others, columns, factor}"""
 import json
 import math
+import os
 import subprocess
 import tempfile
 
@@ -161,9 +162,12 @@ class Maps:
 
     def __init__(self, order):
         self.program, self.quick, self.jobs = order["program"], order["quick"], order["jobs"]
+        self.parent = os.getppid()
 
     def measure(self, axes, stiffnesses, seconds=2, more=()):
         quick = self.quick
+        if os.getppid() != self.parent:  # the command was ended
+            raise text.BadInput("kerf-lab: ended; no page is made")
         with tempfile.TemporaryDirectory() as folder:
             words = [self.program, "zwidth", *more, "--json", f"{folder}/map.json",
                      "--stiffness", f"0.05:50:{6 if quick else stiffnesses}", "--seconds", str(0.3 if quick else seconds)]

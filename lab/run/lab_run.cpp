@@ -3,12 +3,14 @@
 
 #include <cstdio>
 #include <filesystem>
+#include <ostream>
 #include <utility>
 #include <vector>
 
 #include "hil/hil_error.hpp"
 #include "shared/posix/atomic_file.hpp"
 #include "shared/posix/program.hpp"
+#include "shared/posix/report_tool.hpp"
 #include "shared/posix/threads.hpp"
 
 namespace kerf {
@@ -78,6 +80,13 @@ LabOutput::LabOutput(const char* option, std::string path, const char* ending)
 
 void LabOutput::write(const std::string& text) const {
   if (!path_.empty()) guarded(option_, [&] { write_new_file(path_, text); });
+}
+
+void LabOutput::write_report(const std::vector<std::string>& words, const std::string& json,
+                             std::ostream& out) const {
+  if (path_.empty()) return;
+  write(make_report(words, json));
+  if (!is_stream(path_)) out << path_ << ": written\n";
 }
 
 void LabOutput::write_part(const char* name, const std::string& text) const {

@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <initializer_list>
+#include <iosfwd>
 #include <string>
 #include <vector>
 
@@ -60,6 +61,9 @@ class LabOutput {
  public:
   LabOutput(const char* option, std::string path, const char* ending);
   void write(const std::string& text) const;
+  /// The page or plot that `make_report` makes of `json`; prints the path of the file to `out`.
+  void write_report(const std::vector<std::string>& words, const std::string& json,
+                    std::ostream& out) const;
   /// The same as one part of a page that others write to, too: see `write_page_part`.
   void write_part(const char* name, const std::string& text) const;
 

@@ -46,10 +46,9 @@ struct OutputPaths {
 class Outputs {
  public:
   Outputs(const OutputPaths& paths, const std::vector<std::string>& parts);
-  void write(const Part& part) const;
+  void write(const Part& part, std::ostream& out) const;
 
  private:
-  bool draws_;
   LabOutput csv_, json_, plot_;
 };
 
@@ -60,20 +59,20 @@ void OutputPaths::declare(Arguments& app) {
 }
 
 Outputs::Outputs(const OutputPaths& paths, const std::vector<std::string>& parts)
-    : draws_(!paths.plot.empty()),
-      csv_("--csv", paths.csv, ".csv"),
+    : csv_("--csv", paths.csv, ".csv"),
       json_("--json", paths.json, ".json"),
       plot_("--plot", paths.plot, ".svg") {
   check_outputs({parts.begin(), parts.end()}, {{"--csv", paths.csv, ".csv"},
                                                {"--json", paths.json, ".json"},
                                                {"--plot", paths.plot, ".svg"}});
-  if (draws_) check_can_plot();
+  if (!paths.plot.empty()) check_can_plot();
 }
 
-void Outputs::write(const Part& part) const {
+void Outputs::write(const Part& part, std::ostream& out) const {
   csv_.write(csv_of(part));
-  json_.write(json_of(part));
-  if (draws_) plot_.write(make_report({"stability_map", "map"}, json_of(part)));
+  const std::string json = json_of(part);
+  json_.write(json);
+  plot_.write_report({"stability_map", "map"}, json, out);
 }
 
 std::string crossing_text(const StabilityBoundary& crossing) {
@@ -140,7 +139,7 @@ class Command final : public LabCommand {
   /// The columns of the shard that `kept` has not; false: interrupted.
   [[nodiscard]] bool measure(const MapSpec& map, const Shard& shard, PartWriter& kept,
                              std::ostream& out) const;
-  void write_page() const;
+  void write_page(std::ostream& out) const;
 
   std::array<std::string, kAxisCount> axes_, option_names_;
   std::string stiffness_, map_ = "damping,stiffness", shard_ = "1/1", part_, portraits_, page_;
@@ -346,7 +345,7 @@ int Command::threads(std::size_t columns) const {
   return static_cast<int>(std::clamp<std::size_t>(columns, 1, wanted));
 }
 
-void Command::write_page() const {
+void Command::write_page(std::ostream& out) const {
   check_can_plot();
   const LabOutput as_page("--page", page_, ".md");
   const std::string devices = page_plot("--page", page_, ".devices.svg"),
@@ -358,10 +357,10 @@ void Command::write_page() const {
                    {"provenance", lab_provenance()}};
   const std::string measured =
       make_report({"stability", "measure"}, order.canonical(), ReportErrors::shown);
-  as_devices.write(make_report({"stability", "devices"}, measured));
-  as_rates.write(make_report({"stability", "rates"}, measured));
-  as_page.write(make_report(
-      {"stability", "page", page_link(page_, devices), page_link(page_, rates)}, measured));
+  as_devices.write_report({"stability", "devices"}, measured, out);
+  as_rates.write_report({"stability", "rates"}, measured, out);
+  as_page.write_report({"stability", "page", page_link(page_, devices), page_link(page_, rates)},
+                       measured, out);
 }
 
 bool Command::measure(const MapSpec& map, const Shard& shard, PartWriter& kept,
@@ -418,7 +417,7 @@ int Command::run(std::ostream& out) const {
         seed_ != 1 || !cells_.empty() || shard_ != "1/1") {
       throw HilError("--page: its maps are its own; leave all but --quick and --jobs out");
     }
-    write_page();
+    write_page(out);
     return 0;
   }
   if (!cells_.empty() && portraits_.empty()) {
@@ -441,7 +440,7 @@ int Command::run(std::ostream& out) const {
     }
     check_can_plot();
     const LabOutput output("--portraits", portraits_, ".svg");
-    output.write(make_report({"stability_map", "portraits"}, portraits_of(map, cells_)));
+    output.write_report({"stability_map", "portraits"}, portraits_of(map, cells_), out);
     return 0;
   }
   PartWriter kept(part_, map, part);
@@ -449,7 +448,7 @@ int Command::run(std::ostream& out) const {
   kept.finish();
   const Part whole{map, part, kept.columns()};
   tell(whole, out);
-  outputs.write(whole);
+  outputs.write(whole, out);
   return 0;
 }
 
@@ -475,7 +474,7 @@ int MergeCommand::run(std::ostream& out) const {
   const Part whole = merge_parts(parts_);
   if (!paths_.plot.empty()) check_panels(whole.spec);
   tell(whole, out);
-  outputs.write(whole);
+  outputs.write(whole, out);
   return 0;
 }
 

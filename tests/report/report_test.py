@@ -66,6 +66,13 @@ KERNEL = {"name": "contact/ball16/any", "numeric": "fixed", "isa": "avx2", "ns_p
 KERNELS = {"provenance": "a day, a machine.", "rows": [KERNEL], "queries": [KERNEL], "layout": [KERNEL]}
 
 
+ENERGY = {"provenance": "a day, a machine.", "cost": [{"name": "ledger", "numeric": "fixed", "ns": 123.4}],
+          "loops": [{"model": "paper", "numeric": "fixed", "share": 0.0012, "most_share": 0.01, "friction_mj": 0.5,
+                     "leak_mj": -0.001}],
+          "feel": [{"hand": "bare", "stiffness_n_per_mm": 2, "stabiliser": "none", "peak_n": 1.5, "delay_ms": 30,
+                    "depth_mm": 0.5, "swing_mm": 0.01, "drag_n": 0, "port_minimum_mj": -0.1}]}
+
+
 def picture(renderer, tool, partial, wall_ms):
     return {"renderer": renderer, "gradient": "corners", "volume": "256x256x161", "tool": tool, "cropped": False,
             "partial": partial, "fps": 1000 / wall_ms, "cpu_ms": 2 * wall_ms}
@@ -126,6 +133,9 @@ BURS = {"out_mm": 8, "heads": [{"number": "001", "name": "round", "sizes": [
 PAGES = [
     (("kernels", "page"), KERNELS, [], ["| contact/ball16/any | fixed | avx2 | 2.00 | 2.50 | 15 | 1234 |\n",
                                         "./kerf bench kernels --page docs/performance.md", "a day, a machine."], "rows"),
+    (("energy", "page"), ENERGY, [], ["| paper | fixed | 0.0012 | 0.01 | 0.5000 | -0.00100 |", "| ledger | fixed | 123 |",
+                                      "| bare | 2 | none | 1.50 | 30 | 0.50 | 0.010 | 0.00 | -0.100 |"], "loops"),
+    (("energy", "tables"), ENERGY, [], ["## The time they take"], "loops"),
     (("pictures", "page"), PICTURES, [], ["| iso | 256x256x161 | 20.0 | - | 25.0 | - | 250 | 100 | 80.0 | 8.0 | GPU iso 6 / 6 |",
                                           "| corners | 0.50 | 1.25 | 100 | 80.0 | 8.0 |", "gl: a driver"], "rows"),
     (("pictures", "tables"), PICTURES, [], ["| cast | 256x256x161 | 125 | - | - | - | - | 16.0 | - | - | - |"], "rows"),

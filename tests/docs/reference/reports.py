@@ -160,7 +160,9 @@ def page(root, programs):
     return f"""# Reports
 
 JSON, one object a file. A file is written whole at the end, or not at all. Numbers have the unit that their name ends
-in; hashes are sixteen hexadecimal digits. `./kerf lab` writes the figures of its tables, with `--report` of each command.
+in; hashes are sixteen hexadecimal digits. `./kerf lab` writes the figures of its tables, with `--report` of
+each command: the head of each module of `lab/report` lists its keys, and `python3 lab/report` makes the page or the plot
+of such a file again (`lab/report/__main__.py`).
 
 {chr(10).join(parts)}
 ## Sources of energy

@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The page of energy (docs/energy.md), and its tables for the terminal. JSON of `kerf lab energy --report`:
+
+    provenance                  day, machine and compiler of the run
+    loops                       {model, numeric, share, most_share, friction_mj, leak_mj}
+    feel                        {hand, stiffness_n_per_mm, stabiliser, peak_n, delay_ms, depth_mm, swing_mm, drag_n, port_minimum_mj}
+    cost                        {name, numeric, ns}"""
+import text
+
+HEAD = """\
+# Energy at the device port
+
+Work at the device port by the servo's own energy ledger (docs/theory.md 5.5), and the cost of the stabilisers
+(docs/theory.md 5.6). Positive energy flows from the hand into the loop. `./kerf lab energy --page docs/energy.md` writes this page.
+
+"""
+
+LOOPS = """\
+## Closed paths on a static ball
+
+A ball of 1 mm radius, at a penetration of 0.6 mm in a ball of 3 mm, moves twice along each of six tilted circles of
+0.375 mm. The figures are of the second lap.
+
+* `ratio`: |SUM dW| / SUM |dW| of the contact force without sample and hold, on the worst circle. A force with a potential
+  has 0: a closed path gives no energy.
+* `friction`: mean work of a lap that friction takes from the hand.
+* `leak`: mean work of a lap that sample and hold takes; it is negative, so the loop gives this energy to the hand.
+
+"""
+
+FEEL = """
+## The effect of a stabiliser on the hand
+
+A hand pushes with 1 N from 0.1 mm above a wall and releases after 2 s. Fixed point, 1 kHz, encoder steps of 0.055 mm,
+the limits of an Omni, no virtual damping.
+
+* `hand`: `bare` is the device alone, 0.045 kg and 0.2 N s/m; `gripped` is with a hand, 0.145 kg and 3.2 N s/m. The
+  stabilisers have the device's figures only.
+* `delay`: from first contact to half of the push (3000: never).
+* `depth`, `swing`: mean penetration and its peak-to-peak value in the last half second of the push.
+* `drag`: largest force in air after the release.
+* `minimum`: lowest energy of the port. The correction of `passivity` comes one tick late. With a hand that damps the
+  device anyway, a stiff wall may give a lower minimum than without a stabiliser.
+
+"""
+
+COST = """
+## The time they take
+
+Time added to a tick in contact, in one run. Limit for ledger, observer and split of the spring: 1000 ns.
+
+"""
+
+
+def tables(data):
+    return (LOOPS
+            + text.table(["model", "numbers", "ratio", "at most", "friction mJ", "leak mJ"],
+                         [[row["model"], row["numeric"], f"{row['share']:.2g}", f"{row['most_share']:.2g}",
+                           f"{row['friction_mj']:.4f}", f"{row['leak_mj']:.5f}"] for row in text.rows_of(data, "loops")])
+            + FEEL
+            + text.table(["hand", "K N/mm", "stabiliser", "peak N", "delay ms", "depth mm", "swing mm", "drag N", "minimum mJ"],
+                         [[row["hand"], f"{row['stiffness_n_per_mm']:g}", row["stabiliser"], f"{row['peak_n']:.2f}",
+                           f"{row['delay_ms']:.0f}", f"{row['depth_mm']:.2f}", f"{row['swing_mm']:.3f}",
+                           f"{row['drag_n']:.2f}", f"{row['port_minimum_mj']:.3f}"] for row in data["feel"]])
+            + COST
+            + text.table(["what", "numbers", "ns a tick"],
+                         [[row["name"], row["numeric"], f"{row['ns']:.0f}"] for row in data["cost"]]))
+
+
+def page(data):
+    return HEAD + tables(data) + "\n" + data["provenance"] + "\n"
