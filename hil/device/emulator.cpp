@@ -29,12 +29,12 @@ void Emulator::guide_hand() noexcept {
   if (settled || waited_enough) hand_->leave();
 }
 
-void Emulator::wish(const HandTarget& wish) noexcept {
-  if (led_) led_->wish(wish);
+void Emulator::set_target(const HandTarget& target) noexcept {
+  if (led_) led_->set_target(target);
 }
 
-void Emulator::forsake() noexcept {
-  if (led_) led_->forsake();
+void Emulator::release() noexcept {
+  if (led_) led_->release();
 }
 
 HandGoal Emulator::next_goal() noexcept {
@@ -45,7 +45,7 @@ HandGoal Emulator::next_goal() noexcept {
   }
   if (!hand_->left()) guide_hand();
   const HandGoal goal = hand_->next();
-  return led_ && can_be_led() ? led_->next(goal, model_->tip_mm()) : goal;
+  return led_ && accepts_target() ? led_->next(goal, model_->tip_mm()) : goal;
 }
 
 void Emulator::advance(int cycles) noexcept {

@@ -35,7 +35,7 @@ struct EmulatorStats {
 /// presses the button of WoodenHaptics), and plays its script 50 ms later. A host that does not
 /// begin to calibrate gets 2 s from its first packet, then the script begins. Without a host the
 /// hand waits for ever. Without a script the arm stays in its pose. Once the script has ended, a
-/// user may lead the hand (`wish`). One thread; allocates only when constructed.
+/// user may lead the hand (`set_target`). One thread; allocates only when constructed.
 class Emulator final : public PacketDevice {
  public:
   template <std::derived_from<DeviceModel> Model>
@@ -55,11 +55,11 @@ class Emulator final : public PacketDevice {
   [[nodiscard]] std::span<const std::uint8_t> next_packet() noexcept override;
 
   /// Returns true if a user may lead the hand: its script has ended.
-  [[nodiscard]] bool can_be_led() const noexcept { return hand_ && hand_->ended(); }
-  /// A user's target for the hand; `forsake`: the user is gone. See `GuidedHand`. While a script
+  [[nodiscard]] bool accepts_target() const noexcept { return hand_ && hand_->ended(); }
+  /// A user's target for the hand; `release`: the user is gone. See `GuidedHand`. While a script
   /// runs, the hand keeps to it and follows the user afterwards.
-  void wish(const HandTarget& wish) noexcept;
-  void forsake() noexcept;
+  void set_target(const HandTarget& target) noexcept;
+  void release() noexcept;
 
   [[nodiscard]] const EmulatorStats& stats() const noexcept { return stats_; }
   [[nodiscard]] const DeviceModel& model() const noexcept { return *model_; }

@@ -179,24 +179,24 @@ GuidedHand::GuidedHand(double stiffness_n_per_mm, const HandRoute& route,
   std::reverse_copy(way.points_mm.begin(), way.points_mm.end(), way_back_mm_.begin());
 }
 
-void GuidedHand::wish(const HandTarget& wish) noexcept {
-  wish_ = wish;
-  if (wish.park && !parking_) parking_ = 0;
-  since_wish_ = 0;
+void GuidedHand::set_target(const HandTarget& target) noexcept {
+  target_ = target;
+  if (target.park && !parking_) parking_ = 0;
+  since_target_ = 0;
   held_mm_.reset();
 }
 
 void GuidedHand::restart() noexcept {
-  wish_.reset();
+  target_.reset();
   goal_.reset();
   held_mm_.reset();
   parking_.reset();
-  since_wish_ = 0;
+  since_target_ = 0;
   parked_for_ = 0;
 }
 
-void GuidedHand::forsake() noexcept {
-  since_wish_ = std::max(since_wish_, cycles_of(kStaleS));
+void GuidedHand::release() noexcept {
+  since_target_ = std::max(since_target_, cycles_of(kStaleS));
 }
 
 DeviceVec<double> GuidedHand::retreat(DeviceVec<double> start_mm) const noexcept {
@@ -217,27 +217,27 @@ DeviceVec<double> GuidedHand::aim(bool stale, bool withdraws, DeviceVec<double> 
     return way_back_mm_[std::min(*parking_, way_back_mm_.size() - 1)];
   }
   if (withdraws) return retreat(start_mm);
-  return stale ? *held_mm_ : wish_->tip_mm;
+  return stale ? *held_mm_ : target_->tip_mm;
 }
 
 HandGoal GuidedHand::next(const HandGoal& start, DeviceVec<double> tip_mm) noexcept {
-  if (!wish_) return start;
+  if (!target_) return start;
   if (!goal_) goal_ = start;
-  const bool stale = since_wish_ >= cycles_of(kStaleS);
+  const bool stale = since_target_ >= cycles_of(kStaleS);
   if (stale && !held_mm_) held_mm_ = tip_mm;
-  const bool withdraws = since_wish_ >= cycles_of(kStaleS + kPatienceS);
-  if (!withdraws) ++since_wish_;
+  const bool withdraws = since_target_ >= cycles_of(kStaleS + kPatienceS);
+  if (!withdraws) ++since_target_;
   const DeviceVec<double> aim_mm = aim(stale, withdraws, start.target_mm);
   const double speed = parking_ ? kParkMmPerS : withdraws ? kWithdrawMmPerS : kMaxSpeedMmPerS;
   const DeviceVec<double> step = at_most(speed * kCycleS, (aim_mm - goal_->target_mm) * kShare);
   goal_->target_mm = tip_mm + at_most(max_pull_mm_, goal_->target_mm + step - tip_mm);
   for (std::size_t i = 0; i < 3; ++i) {
-    const double turn = (wish_->orientation_rad[i] - goal_->orientation_rad[i]) * kShare;
+    const double turn = (target_->orientation_rad[i] - goal_->orientation_rad[i]) * kShare;
     constexpr double kMost = kMaxTurnRadPerS * kCycleS;
     goal_->orientation_rad[i] += std::clamp(turn, -kMost, kMost);
   }
-  goal_->button1 = !stale && wish_->button1;
-  goal_->button2 = !stale && wish_->button2;
+  goal_->button1 = !stale && target_->button1;
+  goal_->button2 = !stale && target_->button2;
   goal_->in_inkwell = parking_ == way_back_mm_.size();
   if (goal_->in_inkwell) ++parked_for_;
   return *goal_;

@@ -16,13 +16,13 @@
 /// reach of both.
 namespace kerf {
 
-/// Position along a rest-to-rest motion of least jerk (Flash and Hogan 1985); t and result 0..1.
+/// Position along a rest-to-rest motion of minimum jerk (Flash and Hogan 1985); t and result 0..1.
 [[nodiscard]] constexpr double minimum_jerk(double t) noexcept {
   return t * t * t * (10 + t * (-15 + 6 * t));
 }
 
 /// The path of a hand from its position to the start of its script: one cubic Bezier curve, device
-/// mm, passed with least jerk. Its points are the hand's position, one above it, one beside the
+/// mm, passed with minimum jerk. Its points are the hand's position, one above it, one beside the
 /// workpiece, and the start; without a detour they lie on a line.
 struct ReachCurve {
   /// A quick reach of the arm, at its fastest.
@@ -97,15 +97,15 @@ class HandMotion {
   std::array<double, 3> from_orientation_rad_{};
 };
 
-/// A hand that follows a user's target (a wish).
+/// A hand that follows a user's target.
 ///
-/// Its goal follows the newest wish as a hand can: with the lag of its bandwidth, no faster than
-/// its strokes, and it pulls at its grip with at most `kMaxPullN`. Without a wish for `kStaleS` (a
-/// window that hangs), or after `forsake` (a window that is gone), it holds the tip at its position
-/// and presses no more; `kPatienceS` later it withdraws to its start, straight up first. The next
-/// wish takes it from its position. A wish to park makes it take the device's path back to the rest
-/// pose, whatever later wishes are, and stay there for `kParkedS`. In bus cycles, without a clock.
-/// One thread; never allocates.
+/// Its goal follows the newest target as a hand can: with the lag of its bandwidth, no faster than
+/// its strokes, and it pulls at its grip with at most `kMaxPullN`. Without a target for `kStaleS`
+/// (a window that hangs), or after `release` (a window that is gone), it holds the tip at its
+/// position and presses no more; `kPatienceS` later it withdraws to its start, straight up first.
+/// The next target moves it from its position. A target with `park` makes it take the device's path
+/// back to the rest pose, whatever later targets are, and stay there for `kParkedS`. In bus cycles,
+/// without a clock. One thread; never allocates.
 class GuidedHand {
  public:
   /// Voluntary motion reaches some 8 Hz: a first-order lag with that corner.
@@ -124,8 +124,9 @@ class GuidedHand {
   GuidedHand(double stiffness_n_per_mm, const HandRoute& route,
              DeviceVec<double> start_mm) noexcept;
 
-  void wish(const HandTarget& wish) noexcept;
-  void forsake() noexcept;
+  void set_target(const HandTarget& target) noexcept;
+  /// The user is gone: the target is stale from now on.
+  void release() noexcept;
 
   /// The goal of the next bus cycle, while the tip is at `tip_mm`. `start` is the goal at which its
   /// path to the workpiece has ended.
@@ -141,10 +142,10 @@ class GuidedHand {
   [[nodiscard]] DeviceVec<double> retreat(DeviceVec<double> start_mm) const noexcept;
 
   double max_pull_mm_;
-  std::optional<HandTarget> wish_;
+  std::optional<HandTarget> target_;
   std::optional<HandGoal> goal_;              ///< empty: still at its start
-  std::int64_t since_wish_ = 0;               ///< bus cycles
-  std::optional<DeviceVec<double>> held_mm_;  ///< the tip, once the wishes stopped
+  std::int64_t since_target_ = 0;             ///< bus cycles
+  std::optional<DeviceVec<double>> held_mm_;  ///< the tip, once no target came
   std::array<DeviceVec<double>, 4> way_back_mm_;
   std::optional<std::size_t> parking_;  ///< at which of these points; their number: at rest
   std::int64_t parked_for_ = 0;         ///< bus cycles

@@ -22,7 +22,7 @@ struct HandStep {
     zigzag   ///< around here: `turns` strokes of width `size[0]` (x) while z covers `size[1]`
   };
   enum class Ease : std::uint8_t {
-    smooth,  ///< least jerk: starts and ends at rest
+    smooth,  ///< minimum jerk: starts and ends at rest
     linear   ///< constant speed
   };
 

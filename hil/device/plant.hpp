@@ -106,7 +106,7 @@ inline void MotorChain::begin_cycle() noexcept {
 
 /// The joints of one moment.
 struct JointReadings {
-  JointVec<double> encoder_rad;  ///< as the encoders see them
+  JointVec<double> encoder_rad;  ///< as the encoders measure them
   JointVec<double> link_rad;
 };
 
@@ -126,8 +126,8 @@ class ReportedJoints {
   }
 
   /// The value to report; `now` if there is no delay.
-  [[nodiscard]] JointVec<double> old_or(JointVec<double> JointReadings::*which,
-                                        JointVec<double> now) const noexcept {
+  [[nodiscard]] JointVec<double> delayed_or(JointVec<double> JointReadings::*which,
+                                            JointVec<double> now) const noexcept {
     return delay_ == 0 ? now : ring_[(head_ + ring_.size() - delay_) % ring_.size()].*which;
   }
 
@@ -151,10 +151,11 @@ class Rotors {
   [[nodiscard]] JointVec<double> drive(JointVec<double> motor_nmm, JointVec<double> link_rad,
                                        JointVec<double> link_rates) noexcept;
 
-  /// Tip velocity after rigid rotors have taken their share of the momentum.
+  /// Tip velocity after it has exchanged momentum with rigid rotors.
   template <class Arm>
-  [[nodiscard]] DeviceVec<double> share(const Arm& arm, const ArmPose& pose, double mass_kg,
-                                        DeviceVec<double> velocity) const noexcept {
+  [[nodiscard]] DeviceVec<double> exchange_momentum(const Arm& arm, const ArmPose& pose,
+                                                    double mass_kg,
+                                                    DeviceVec<double> velocity) const noexcept {
     if (!rigid()) return velocity;
     Transform<double, DeviceSpace, DeviceSpace> mass;
     const auto column = [&](DeviceVec<double> unit) {
@@ -170,8 +171,8 @@ class Rotors {
     if (rigid()) rates_ = arm.joint_rates(pose, velocity);
   }
 
-  /// The angles that the encoders see.
-  [[nodiscard]] JointVec<double> seen_rad(JointVec<double> link_rad) const noexcept {
+  /// The angles that the encoders measure: of the motors.
+  [[nodiscard]] JointVec<double> motor_rad(JointVec<double> link_rad) const noexcept {
     return flexible() ? angle_rad_ : link_rad;
   }
   [[nodiscard]] bool flexible() const noexcept { return angular_hz_ > 0; }
@@ -264,11 +265,11 @@ class ArmPlant {
   [[nodiscard]] const ArmPose& rest() const noexcept { return rest_; }
   /// Joint angles as a report of this moment gives them: of the encoders ...
   [[nodiscard]] JointVec<double> encoder_rad() const noexcept {
-    return reported_.old_or(&JointReadings::encoder_rad, rotors_.seen_rad(state_.pose.q));
+    return reported_.delayed_or(&JointReadings::encoder_rad, rotors_.motor_rad(state_.pose.q));
   }
   /// ... and of the links.
   [[nodiscard]] JointVec<double> link_rad() const noexcept {
-    return reported_.old_or(&JointReadings::link_rad, state_.pose.q);
+    return reported_.delayed_or(&JointReadings::link_rad, state_.pose.q);
   }
 
   /// One bus cycle.
@@ -288,7 +289,7 @@ class ArmPlant {
       }
     }
     target_mm_ = goal;
-    reported_.take({rotors_.seen_rad(state_.pose.q), state_.pose.q});
+    reported_.take({rotors_.motor_rad(state_.pose.q), state_.pose.q});
   }
 
  private:
@@ -314,7 +315,7 @@ class ArmPlant {
     const DeviceVec<double> hand_n =
         (target_mm - tip_mm) * hand_stiffness_ + target_velocity * hand_damping_;
     velocity = mass_.kick(velocity, state_.motor_force_n + hand_n);
-    velocity = rotors_.share(arm_, middle, mass_kg_, velocity);
+    velocity = rotors_.exchange_momentum(arm_, middle, mass_kg_, velocity);
     tip_mm = tip_mm + velocity * (kStepS / 2);
     state_.motor_work_mj += dot(state_.motor_force_n, tip_mm - from_mm);
     state_.pose.q = arm_.joints_rad(tip_mm);

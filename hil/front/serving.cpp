@@ -95,7 +95,7 @@ void serve_lockstep(PacketLink& client, PacketDevice& device, const LockStepTurn
     if (turns.says_nothing_came) return send_turn(client, device, stats);
     send(client, device, stats);
   };
-  if (turns.speaks_first || !turns.says_nothing_came) say();
+  if (turns.device_first || !turns.says_nothing_came) say();
   while (!client.closed() && !limits.reached(stats.cycles)) {
     const auto packet = client.wait(buffer, kStopCheckMs);
     if (packet.empty()) continue;

@@ -96,7 +96,7 @@ struct LockStepTurns {
   /// All packets of a tick go as one turn (`Turn`), an empty one if nothing is due: for devices
   /// whose packets a fault may keep back or double. Only kerf's own controller reads turns.
   bool says_nothing_came = false;
-  bool speaks_first = true;  ///< the device, before any packet of the host
+  bool device_first = true;  ///< the device, before any packet of the host
 };
 
 /// Serves one client in lock-step: one packet at once (of a device that speaks first), then for

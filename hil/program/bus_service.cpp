@@ -49,9 +49,8 @@ void serve_node(BusService& service, FuseMount& folder, const std::string& mount
 
 void serve_fuse(BusService& service, const std::string& mount, const FirewireSettings& omni) {
   FirewireNode node(omni, service.device);
-  FirewireHostNode host(node);
   FuseMount folder(mount);
-  folder.add("fw0", host);
+  folder.add("fw0", node, FirewireNode::kHostFile);
   serve_node(service, folder, mount, "omni", "fw1", node,
              [&] { return node.bus().cycle() - kFirstCycle; });
   service.stats.sent = node.bus().stats().reports;

@@ -17,8 +17,8 @@
 namespace kerf {
 namespace {
 
-constexpr std::int64_t kLookCycles = kCyclesPerSecond / 20;  // for another window: each 50 ms
-constexpr int kMaxWishesPerLook = 16;  // a flooding window cannot hold the device
+constexpr std::int64_t kAcceptCycles = kCyclesPerSecond / 20;  // for another window: each 50 ms
+constexpr int kMaxTargetsPerWake = 16;  // a flooding window cannot hold the device
 
 std::optional<HandScript> hand_of(const EmulatorOptions& o) {
   if (o.hand.empty() && o.hand_socket.empty()) return std::nullopt;
@@ -54,7 +54,7 @@ Params plant_of(const EmulatorOptions& o, const PlantValues& of_script) {
 
 }  // namespace
 
-void HandServer::look_for_windows() noexcept {
+void HandServer::accept_window() noexcept {
   auto newcomer = server_.accept_waiting();
   if (!newcomer) return;
   const bool taken = window_.has_value();
@@ -63,25 +63,25 @@ void HandServer::look_for_windows() noexcept {
 }
 
 void HandServer::lead(Emulator& emulator, int cycles) noexcept {
-  since_look_ += cycles;
-  if (since_look_ >= kLookCycles && emulator.can_be_led()) {
-    since_look_ = 0;
-    look_for_windows();
+  since_accept_ += cycles;
+  if (since_accept_ >= kAcceptCycles && emulator.accepts_target()) {
+    since_accept_ = 0;
+    accept_window();
   }
   if (!window_) return;
-  std::array<std::uint8_t, kHandWishBytes + 1> buffer;  // a longer packet is seen to be wrong
+  std::array<std::uint8_t, kHandTargetBytes + 1> buffer;  // a longer packet is seen to be wrong
   std::optional<HandTarget> newest;
-  for (int taken = 0; taken < kMaxWishesPerLook; ++taken) {
+  for (int taken = 0; taken < kMaxTargetsPerWake; ++taken) {
     const auto packet = window_->take(buffer);
     if (packet.empty()) break;
-    const auto wish = decode_hand_wish(packet);
-    ++(wish ? wishes_ : refused_);
-    if (wish) newest = wish;
+    const auto target = decode_hand_target(packet);
+    ++(target ? targets_ : refused_);
+    if (target) newest = target;
   }
-  if (newest) emulator.wish(*newest);
+  if (newest) emulator.set_target(*newest);
   if (!window_->closed()) return;
   window_.reset();
-  emulator.forsake();
+  emulator.release();
 }
 
 std::unique_ptr<DeviceModel> make_device(const EmulatorOptions& o, const PlantValues& of_script) {

@@ -22,27 +22,27 @@ namespace kerf {
 /// The socket at which a window leads the hand: packets of `HandTarget`.
 ///
 /// Once the hand is at its start, one window at a time is accepted; a second one gets `taken` and
-/// is closed, and one of another user is refused. A packet that is no wish is dropped and counted.
-/// Never waits. One thread.
+/// is closed, and one of another user is refused. A packet that is no target is dropped and
+/// counted. Never waits. One thread.
 class HandServer {
  public:
   /// Throws `HilError`; see SeqpacketServer.
   explicit HandServer(const std::string& path) : server_(path, "--hand-socket") {}
 
-  /// Passes the newest wish to the emulator's hand, and `forsake` if the window has gone. Call
+  /// Passes the newest target to the emulator's hand, and `release` if the window has gone. Call
   /// between two polls of the host; `cycles` bus cycles have passed since the last call.
   void lead(Emulator& emulator, int cycles) noexcept;
 
-  [[nodiscard]] std::uint64_t wishes() const noexcept { return wishes_; }
+  [[nodiscard]] std::uint64_t targets() const noexcept { return targets_; }
   [[nodiscard]] std::uint64_t refused() const noexcept { return refused_; }
 
  private:
-  void look_for_windows() noexcept;
+  void accept_window() noexcept;
 
   SeqpacketServer server_;
   std::optional<SeqpacketLink> window_;
-  std::int64_t since_look_ = 0;  ///< bus cycles
-  std::uint64_t wishes_ = 0, refused_ = 0;
+  std::int64_t since_accept_ = 0;  ///< bus cycles
+  std::uint64_t targets_ = 0, refused_ = 0;
 };
 
 /// The device model of the options; plant parameters that they leave out come from the hand script.

@@ -174,7 +174,7 @@ constexpr FaultWord<BusFault> kBusFaultWords[] = {
     {"back", BusFault::back},
 };
 constexpr FaultWord<UsbFault> kUsbFaultWords[] = {
-    {"stall", UsbFault::stall},   {"split", UsbFault::split}, {"deaf", UsbFault::deaf},
+    {"stall", UsbFault::stall},   {"split", UsbFault::split}, {"deaf", UsbFault::nak},
     {"vanish", UsbFault::vanish}, {"back", UsbFault::back},
 };
 

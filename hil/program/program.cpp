@@ -73,7 +73,7 @@ void write_run_report(const std::string& file, const EmulatedDevice& device,
   report["undocked_at_s"] = stats.undocked_at ? Json(seconds_of(*stats.undocked_at)) : nullptr;
   report["final_tip_mm"] = std::array{tip.x, tip.y, tip.z};
   if (device.leader()) {
-    report["wishes"] = device.leader()->wishes();
+    report["wishes"] = device.leader()->targets();
     report["wishes_refused"] = device.leader()->refused();
   }
   report["report_hash"] = hex64(stats.report_hash);
@@ -102,11 +102,11 @@ void serve_clients(const EmulatorOptions& o, Server& server, const std::string& 
     device.renew();
     HandshakeLink link(*client, hello_of(o));
     if (o.lockstep) {
-      const bool speaks_first = o.personality == Personality::omni;
+      const bool device_first = o.personality == Personality::omni;
       serve_lockstep(link, device,
                      {.tick_cycles = kCyclesPerSecond / o.rate_hz,
                       .says_nothing_came = !o.fault.empty(),
-                      .speaks_first = speaks_first},
+                      .device_first = device_first},
                      limits, stats);
     } else {
       serve_real_time(link, device, o.packet_cycles, limits, stats);

@@ -139,70 +139,72 @@ class Turn {
 /// length is a position within the limits below. `GuidedHand` decides how the hand follows it, and
 /// when targets stop.
 struct HandTarget {
-  DeviceVec<double> tip_mm;                 ///< in steps of 1 um, each axis up to kMaxWishMm
-  std::array<double, 3> orientation_rad{};  ///< as of `HandGoal`, up to kMaxWishRad each
+  DeviceVec<double> tip_mm;                 ///< in steps of 1 um, each axis up to kMaxTargetMm
+  std::array<double, 3> orientation_rad{};  ///< as of `HandGoal`, up to kMaxTargetRad each
   bool button1 = false, button2 = false;
   bool park = false;  ///< go to the rest pose, stay there a moment, and come back
   friend bool operator==(const HandTarget&, const HandTarget&) noexcept = default;
 };
 
-inline constexpr double kMaxWishMm = 500;  ///< from the device's origin: no arm of these is longer
-inline constexpr double kMaxWishRad = std::numbers::pi / 3;  ///< a wrist bends no further
+inline constexpr double kMaxTargetMm =
+    500;  ///< from the device's origin: no arm of these is longer
+inline constexpr double kMaxTargetRad = std::numbers::pi / 3;  ///< a wrist bends no further
 
-inline constexpr std::size_t kHandWishBytes = 36;
-using HandWishBytes = std::array<std::uint8_t, kHandWishBytes>;
+inline constexpr std::size_t kHandTargetBytes = 36;
+using HandTargetBytes = std::array<std::uint8_t, kHandTargetBytes>;
 // The last byte is the version.
-inline constexpr std::array<std::uint8_t, 8> kHandWishMagic{'k', 'e', 'r', 'f', 0, 'h', 'w', 1};
+inline constexpr std::array<std::uint8_t, 8> kHandTargetMagic{'k', 'e', 'r', 'f', 0, 'h', 'w', 1};
 
 /// The first message of the emulator to a client that connects: the version, and whether the client
 /// may lead the hand. One client leads at a time; another gets `taken`, and its connection closes.
 enum class HandGreeting : std::uint8_t { yours, taken };
 using HandGreetingBytes = std::array<std::uint8_t, 9>;
 
-[[nodiscard]] inline HandWishBytes encode(const HandTarget& wish) noexcept {
+[[nodiscard]] inline HandTargetBytes encode(const HandTarget& target) noexcept {
   constexpr double kSteps = 1e6;  // urad per rad; mm become um with a thousandth of it
   const auto steps = [](double value, double most, double per_unit) {
     const double within = value == value ? std::clamp(value, -most, most) : 0.0;
     return static_cast<std::uint32_t>(static_cast<std::int32_t>(std::lround(within * per_unit)));
   };
-  HandWishBytes bytes{};
-  std::copy(kHandWishMagic.begin(), kHandWishMagic.end(), bytes.begin());
-  const std::array<double, 3> tip{wish.tip_mm.x, wish.tip_mm.y, wish.tip_mm.z};
+  HandTargetBytes bytes{};
+  std::copy(kHandTargetMagic.begin(), kHandTargetMagic.end(), bytes.begin());
+  const std::array<double, 3> tip{target.tip_mm.x, target.tip_mm.y, target.tip_mm.z};
   for (std::size_t i = 0; i < 3; ++i) {
-    wire::put_u32(bytes, 8 + 4 * i, steps(tip[i], kMaxWishMm, kSteps / 1000));
-    wire::put_u32(bytes, 20 + 4 * i, steps(wish.orientation_rad[i], kMaxWishRad, kSteps));
+    wire::put_u32(bytes, 8 + 4 * i, steps(tip[i], kMaxTargetMm, kSteps / 1000));
+    wire::put_u32(bytes, 20 + 4 * i, steps(target.orientation_rad[i], kMaxTargetRad, kSteps));
   }
-  bytes[32] = static_cast<std::uint8_t>((wish.button1 ? 1 : 0) | (wish.button2 ? 2 : 0) |
-                                        (wish.park ? 4 : 0));
+  bytes[32] = static_cast<std::uint8_t>((target.button1 ? 1 : 0) | (target.button2 ? 2 : 0) |
+                                        (target.park ? 4 : 0));
   return bytes;
 }
 
 /// Nothing for a packet of another kind or version. Numbers are clamped to the limits.
-[[nodiscard]] inline std::optional<HandTarget> decode_hand_wish(
+[[nodiscard]] inline std::optional<HandTarget> decode_hand_target(
     std::span<const std::uint8_t> bytes) noexcept {
-  if (bytes.size() != kHandWishBytes ||
-      !std::equal(kHandWishMagic.begin(), kHandWishMagic.end(), bytes.begin()) || bytes[32] > 7) {
+  if (bytes.size() != kHandTargetBytes ||
+      !std::equal(kHandTargetMagic.begin(), kHandTargetMagic.end(), bytes.begin()) ||
+      bytes[32] > 7) {
     return std::nullopt;
   }
   const auto value = [&](std::size_t at, double most, double unit) {
     const auto steps = static_cast<std::int32_t>(wire::get_u32(bytes, at));
     return std::clamp(steps * unit, -most, most);
   };
-  HandTarget wish;
-  wish.tip_mm = {value(8, kMaxWishMm, 1e-3), value(12, kMaxWishMm, 1e-3),
-                 value(16, kMaxWishMm, 1e-3)};
+  HandTarget target;
+  target.tip_mm = {value(8, kMaxTargetMm, 1e-3), value(12, kMaxTargetMm, 1e-3),
+                   value(16, kMaxTargetMm, 1e-3)};
   for (std::size_t i = 0; i < 3; ++i) {
-    wish.orientation_rad[i] = value(20 + 4 * i, kMaxWishRad, 1e-6);
+    target.orientation_rad[i] = value(20 + 4 * i, kMaxTargetRad, 1e-6);
   }
-  wish.button1 = (bytes[32] & 1) != 0;
-  wish.button2 = (bytes[32] & 2) != 0;
-  wish.park = (bytes[32] & 4) != 0;
-  return wish;
+  target.button1 = (bytes[32] & 1) != 0;
+  target.button2 = (bytes[32] & 2) != 0;
+  target.park = (bytes[32] & 4) != 0;
+  return target;
 }
 
 [[nodiscard]] inline HandGreetingBytes encode(HandGreeting greeting) noexcept {
   HandGreetingBytes bytes{};
-  std::copy(kHandWishMagic.begin(), kHandWishMagic.end(), bytes.begin());
+  std::copy(kHandTargetMagic.begin(), kHandTargetMagic.end(), bytes.begin());
   bytes[8] = static_cast<std::uint8_t>(greeting);
   return bytes;
 }
@@ -211,7 +213,8 @@ using HandGreetingBytes = std::array<std::uint8_t, 9>;
 [[nodiscard]] inline std::optional<HandGreeting> decode_hand_greeting(
     std::span<const std::uint8_t> bytes) noexcept {
   if (bytes.size() != HandGreetingBytes{}.size() ||
-      !std::equal(kHandWishMagic.begin(), kHandWishMagic.end(), bytes.begin()) || bytes[8] > 1) {
+      !std::equal(kHandTargetMagic.begin(), kHandTargetMagic.end(), bytes.begin()) ||
+      bytes[8] > 1) {
     return std::nullopt;
   }
   return static_cast<HandGreeting>(bytes[8]);

@@ -64,7 +64,7 @@ void PointerHand::step(const WindowInput& input, bool over_panel, const View& vi
   const glm::dvec3 eye_mm(glm::inverse(view.eye_from_world)[3]);
   press_mm_ = presses ? glm::normalize(*goal_mm_ - eye_mm) * (kPressMm * scale) : glm::dvec3(0.0);
   const glm::dvec2 turned = glm::dvec2(held.tilt_right, held.tilt_up) * (kHeldRadPerS * frame_s);
-  tilt_rad_ = glm::clamp(tilt_rad_ + turned, -kMaxWishRad, kMaxWishRad);
+  tilt_rad_ = glm::clamp(tilt_rad_ + turned, -kMaxTargetRad, kMaxTargetRad);
 }
 
 std::optional<glm::dvec3> PointerHand::goal_mm() const {
@@ -72,7 +72,7 @@ std::optional<glm::dvec3> PointerHand::goal_mm() const {
   return *goal_mm_ + press_mm_;
 }
 
-HandTarget PointerHand::wish(const DeviceFrame& device) const {
+HandTarget PointerHand::target(const DeviceFrame& device) const {
   const glm::dvec3 at = (goal_mm().value_or(device.offset_mm) - device.offset_mm) / device.scale;
   return {.tip_mm = {at.x, at.y, at.z}, .orientation_rad = {tilt_rad_.x, tilt_rad_.y, 0.0}};
 }
@@ -278,10 +278,10 @@ std::optional<Notice> HandLink::step(Clock::time_point now) {
   return news && state_ != told_ ? turned(state_) : std::nullopt;
 }
 
-void HandLink::send(const HandTarget& wish) noexcept {
+void HandLink::send(const HandTarget& target) noexcept {
   if (!leads()) return;
-  const HandWishBytes bytes = encode(wish);
-  // A full socket is one whose emulator stands still: it takes the newest wish once it goes on.
+  const HandTargetBytes bytes = encode(target);
+  // A full socket is one whose emulator stands still: it takes the newest target once it goes on.
   static_cast<void>(::send(fd_, bytes.data(), bytes.size(), MSG_DONTWAIT | MSG_NOSIGNAL));
 }
 

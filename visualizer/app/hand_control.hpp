@@ -48,7 +48,7 @@ class PointerHand {
   [[nodiscard]] bool leads() const noexcept { return leads_ && goal_mm_.has_value(); }
   /// With what the left button adds; none before the pointer came.
   [[nodiscard]] std::optional<glm::dvec3> goal_mm() const;
-  [[nodiscard]] HandTarget wish(const DeviceFrame& device) const;
+  [[nodiscard]] HandTarget target(const DeviceFrame& device) const;
 
  private:
   std::optional<glm::dvec3> goal_mm_;
@@ -115,8 +115,8 @@ class HandLink {
   /// Connects and listens; what the user has to know of it, each thing once.
   [[nodiscard]] std::optional<Notice> step(Clock::time_point now);
   [[nodiscard]] bool leads() const noexcept { return state_ == State::leads; }
-  /// The wish of this frame; nothing happens while the hand is not this window's.
-  void send(const HandTarget& wish) noexcept;
+  /// The target of this frame; nothing happens while the hand is not this window's.
+  void send(const HandTarget& target) noexcept;
 
  private:
   enum class State : std::uint8_t { absent, asked, leads, taken, stranger };

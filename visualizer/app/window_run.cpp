@@ -210,9 +210,9 @@ void WindowRun::lead_hand(const WindowInput& input, bool over_panel, OverlayFigu
              std::min(frame_s, kLongestFrameS));
   time_the_tool(input, held->tip_mm, now);
   if (!hand_.leads()) return;
-  HandTarget wish = hand_.wish(scene.device);
-  wish.park = std::exchange(keys_.park, false);
-  hand_link_->send(wish);
+  HandTarget target = hand_.target(scene.device);
+  target.park = std::exchange(keys_.park, false);
+  hand_link_->send(target);
   const SeenPoint goal = seen_at(view, eye, *hand_.goal_mm());
   const SeenPoint tool = seen_at(view, eye, held->tip_mm);
   const double away_mm = glm::length(*hand_.goal_mm() - held->tip_mm) / scene.device.scale;

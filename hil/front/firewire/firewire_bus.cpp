@@ -21,7 +21,7 @@ FirewireBus::FirewireBus(const FirewireSettings& settings, PacketDevice& device,
       listener_(listener),
       registers_(settings.packed_serial) {
   for (const ScriptedFault& entry : settings_.script) {
-    script_.at(kFirstCycle + entry.cycle, [this, entry] { strike(entry.fault); });
+    script_.at(kFirstCycle + entry.cycle, [this, entry] { apply_fault(entry.fault); });
   }
 }
 
@@ -41,7 +41,7 @@ void FirewireBus::run_to(std::int64_t cycle) {
 
 void FirewireBus::begin_cycle() {
   script_.run(cycle_);
-  agenda_.run(cycle_);
+  schedule_.run(cycle_);
   for (IsoContext* context : contexts_) {
     if (!context->settings().transmits) continue;
     const auto packet = context->transmit(cycle_);
@@ -80,7 +80,7 @@ void FirewireBus::carry(std::span<const std::uint8_t> packet) {
   }
 }
 
-void FirewireBus::strike(BusFault fault) {
+void FirewireBus::apply_fault(BusFault fault) {
   switch (fault) {
     case BusFault::reset:
     case BusFault::device_reset:
@@ -129,7 +129,7 @@ void FirewireBus::come_back() {
 }
 
 std::int64_t FirewireBus::next_event() const noexcept {
-  std::int64_t next = std::min(agenda_.next(), script_.next());
+  std::int64_t next = std::min(schedule_.next(), script_.next());
   for (const IsoContext* context : contexts_) {
     const std::int64_t packets = context->until_interrupt();
     if (packets == 0) continue;

@@ -40,9 +40,9 @@ class EventSchedule {
 /// A fault of a bus.
 enum class BusFault : std::uint8_t {
   reset,         ///< another node resets the bus
-  device_reset,  ///< the device itself does: clients hear of it half a second later
+  device_reset,  ///< the device itself does: clients get the event half a second later
   steal,         ///< a reset in which another node takes the lowest channel that is in use
-  vanish,        ///< the device is gone; clients hear of it after two seconds
+  vanish,        ///< the device is gone; clients get the event after two seconds
   back,          ///< the device is there again
 };
 
@@ -101,7 +101,7 @@ class FirewireBus {
   void pass(std::int64_t cycles);
   /// In `cycles` cycles from now.
   void later(std::int64_t cycles, std::function<void()> action) {
-    agenda_.at(cycle_ + cycles, std::move(action));
+    schedule_.at(cycle_ + cycles, std::move(action));
   }
   void reset(BusFault kind);
 
@@ -123,7 +123,7 @@ class FirewireBus {
   [[nodiscard]] IsoResources& resources() noexcept { return resources_; }
   [[nodiscard]] const FirewireStats& stats() const noexcept { return stats_; }
   /// The next cycle in which something is due that a client may wait for.
-  [[nodiscard]] std::int64_t next_due() const noexcept { return agenda_.next(); }
+  [[nodiscard]] std::int64_t next_due() const noexcept { return schedule_.next(); }
   /// The same with interrupts and the script; `EventSchedule::kNever` if none.
   [[nodiscard]] std::int64_t next_event() const noexcept;
 
@@ -132,7 +132,7 @@ class FirewireBus {
   void begin_cycle();
   void finish_cycle();
   void carry(std::span<const std::uint8_t> packet);
-  void strike(BusFault fault);
+  void apply_fault(BusFault fault);
   void vanish();
   void come_back();
 
@@ -142,7 +142,7 @@ class FirewireBus {
   OmniRegisters registers_;
   IsoResources resources_;
   std::uint64_t foreign_channels_ = 0;
-  EventSchedule agenda_;
+  EventSchedule schedule_;
   EventSchedule script_;
   std::vector<IsoContext*> contexts_;
   std::int64_t cycle_ = kFirstCycle;

@@ -103,7 +103,7 @@ fw_cdev_event_bus_reset FirewireClient::bus_reset_event() const noexcept {
   return event;
 }
 
-void FirewireClient::tell_bus_reset() {
+void FirewireClient::queue_bus_reset() {
   if (linked_ && !gone_) events_.push(bus_reset_event());
 }
 

@@ -43,7 +43,7 @@ class FirewireClient : public std::enable_shared_from_this<FirewireClient> {
   /// another client.
   void reclaim_resources();
   /// Queues a BUS_RESET event if GET_INFO was called before.
-  void tell_bus_reset();
+  void queue_bus_reset();
   /// The lowest isochronous channel that it holds; -1 if none.
   [[nodiscard]] std::int32_t lowest_channel() const noexcept;
   [[nodiscard]] std::uint32_t node() const noexcept { return node_; }

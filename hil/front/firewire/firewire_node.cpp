@@ -8,17 +8,18 @@
 
 namespace kerf {
 
-void FirewireNode::add(FuseOpen open, std::uint32_t node) {
+void FirewireNode::open(FileHandle open, int file) {
+  const std::uint32_t node = file == kHostFile ? kHostNodeId : kOmniNodeId;
   opens_[open].client = std::make_shared<FirewireClient>(bus_, node);
 }
 
-void FirewireNode::release(FuseOpen open) {
+void FirewireNode::release(FileHandle open) {
   bus_.catch_up();
   const auto found = opens_.find(open);
   if (found == opens_.end()) return;
   const FirewireClient& client = *found->second.client;
   if (client.context()) {
-    streamed_ = true;
+    used_ = true;
     double_starts_ += client.context()->double_starts();
   }
   opens_.erase(found);
@@ -34,7 +35,7 @@ FuseReply FirewireNode::take(Open& open, std::size_t size) {
 }
 
 /// The kernel knows no O_NONBLOCK here: a read without an event sleeps.
-std::optional<FuseReply> FirewireNode::read(FuseOpen id, FuseRequest request,
+std::optional<FuseReply> FirewireNode::read(FileHandle id, FuseRequest request,
                                             std::uint64_t /*offset*/, std::size_t size) {
   bus_.catch_up();
   deliver();
@@ -46,14 +47,14 @@ std::optional<FuseReply> FirewireNode::read(FuseOpen id, FuseRequest request,
   return std::nullopt;
 }
 
-std::optional<FuseReply> FirewireNode::ioctl(FuseOpen id, const FuseIoctl& call) {
+std::optional<FuseReply> FirewireNode::ioctl(FileHandle id, const FuseIoctl& call) {
   bus_.catch_up();
   const FuseReply answer = opens_.at(id).client->ioctl(call);
   deliver();
   return answer;
 }
 
-std::uint32_t FirewireNode::poll(FuseOpen id, bool sleeps) {
+std::uint32_t FirewireNode::poll(FileHandle id, bool sleeps) {
   bus_.catch_up();
   Open& open = opens_.at(id);
   if (sleeps && open.client->events().empty()) sleep_on(open);
@@ -77,15 +78,6 @@ void FirewireNode::sleep_on(Open& open) {
   }
 }
 
-void FirewireNode::interrupted(FuseRequest request) {
-  for (auto& [id, open] : opens_) {
-    const auto found = std::ranges::find(open.parked, request, &ParkedRead::request);
-    if (found == open.parked.end()) continue;
-    open.parked.erase(found);
-    return replies_->answer(request, FuseReply::fail(EINTR));
-  }
-}
-
 std::int64_t FirewireNode::next_wake_ns() const noexcept {
   const std::int64_t next = bus_.next_event();
   if (bus_.clock().is_lock_step() || next == EventSchedule::kNever) return EventSchedule::kNever;
@@ -102,28 +94,23 @@ void FirewireNode::deliver() {
   for (auto& [id, open] : opens_) {
     EventQueue& events = open.client->events();
     high_water_ = std::max(high_water_, events.high_water());
-    while (!open.parked.empty() && (!events.empty() || open.client->gone())) {
-      const ParkedRead parked = open.parked.front();
-      open.parked.pop_front();
-      replies_->answer(parked.request,
-                       events.empty() ? FuseReply::fail(ENODEV) : take(open, parked.size));
-    }
-    if (!open.announced && (!events.empty() || open.client->gone())) {
-      open.announced = true;
-      replies_->wake_pollers(id);
-    }
+    deliver_to(
+        id, open, [&] { return !events.empty() || open.client->gone(); },
+        [&](std::size_t size) {
+          return events.empty() ? FuseReply::fail(ENODEV) : take(open, size);
+        });
   }
 }
 
 void FirewireNode::bus_was_reset(std::int64_t event_delay) {
   for (auto& [id, open] : opens_) open.client->reclaim_resources();
-  if (event_delay == 0) return tell_bus_reset(kOmniNodeId);
-  bus_.later(event_delay, [this] { tell_bus_reset(kOmniNodeId); });
+  if (event_delay == 0) return queue_bus_reset(kOmniNodeId);
+  bus_.later(event_delay, [this] { queue_bus_reset(kOmniNodeId); });
 }
 
-void FirewireNode::tell_bus_reset(std::uint32_t node) {
+void FirewireNode::queue_bus_reset(std::uint32_t node) {
   for (auto& [id, open] : opens_) {
-    if (open.client->node() == node) open.client->tell_bus_reset();
+    if (open.client->node() == node) open.client->queue_bus_reset();
   }
 }
 

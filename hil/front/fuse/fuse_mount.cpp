@@ -32,8 +32,8 @@ fuse_attr attributes(std::uint64_t inode) noexcept {
 
 }  // namespace
 
-void FuseMount::add(std::string name, FuseNode& node) {
-  nodes_.push_back({std::move(name), &node});
+void FuseMount::add(std::string name, FuseNode& node, int file) {
+  nodes_.push_back({std::move(name), &node, file});
   node.attach(*this);
 }
 
@@ -120,7 +120,7 @@ void FuseMount::look_up(const FuseMessage& request) noexcept {
   const auto* text = reinterpret_cast<const char*>(request.body.data());
   const std::string_view name(text, strnlen(text, request.body.size()));
   for (std::size_t i = 0; i < nodes_.size(); ++i) {
-    if (nodes_[i].name != name || !nodes_[i].node->present()) continue;
+    if (nodes_[i].name != name || !nodes_[i].node->present(nodes_[i].file)) continue;
     fuse_entry_out out{};
     out.nodeid = kFirstInode + i;
     out.attr = attributes(out.nodeid);
@@ -134,7 +134,7 @@ void FuseMount::list(const FuseMessage& request) {
   if (!in) return channel_.reply(request.id(), EINVAL);
   std::vector<std::uint8_t> out;
   for (std::size_t i = in->offset; i < nodes_.size(); ++i) {
-    if (!nodes_[i].node->present()) continue;
+    if (!nodes_[i].node->present(nodes_[i].file)) continue;
     fuse_dirent entry{};
     entry.ino = kFirstInode + i;
     entry.off = i + 1;
@@ -152,13 +152,14 @@ void FuseMount::list(const FuseMessage& request) {
 
 void FuseMount::open(const FuseMessage& request) {
   const std::uint64_t i = request.header.nodeid - kFirstInode;
-  if (i >= nodes_.size() || !nodes_[i].node->present()) return channel_.reply(request.id(), ENOENT);
+  if (i >= nodes_.size() || !nodes_[i].node->present(nodes_[i].file))
+    return channel_.reply(request.id(), ENOENT);
   fuse_open_out out{};
   out.fh = ++last_open_;
   out.open_flags = FOPEN_DIRECT_IO;
   if (!nodes_[i].node->seekable()) out.open_flags |= FOPEN_NONSEEKABLE | FOPEN_STREAM;
   opens_[out.fh] = nodes_[i].node;
-  nodes_[i].node->open(out.fh);
+  nodes_[i].node->open(out.fh, nodes_[i].file);
   channel_.reply_with(request.id(), out);
 }
 
@@ -176,7 +177,8 @@ void FuseMount::read(const FuseMessage& request) {
   const auto in = fuse_body<fuse_read_in>(request.body);
   FuseNode* node = in ? node_of(in->fh) : nullptr;
   if (!node) return channel_.reply(request.id(), EBADF);
-  settle(request, Kind::read, *node, node->read(in->fh, request.id(), in->offset, in->size));
+  reply_or_defer(request, Kind::read, *node,
+                 node->read(in->fh, request.id(), in->offset, in->size));
 }
 
 void FuseMount::write(const FuseMessage& request) {
@@ -185,7 +187,7 @@ void FuseMount::write(const FuseMessage& request) {
   if (!node) return channel_.reply(request.id(), EBADF);
   const auto data = request.body.subspan(sizeof *in);
   const auto bytes = data.first(std::min<std::size_t>(data.size(), in->size));
-  settle(request, Kind::write, *node, node->write(in->fh, request.id(), bytes));
+  reply_or_defer(request, Kind::write, *node, node->write(in->fh, request.id(), bytes));
 }
 
 void FuseMount::ioctl(const FuseMessage& request) {
@@ -199,7 +201,7 @@ void FuseMount::ioctl(const FuseMessage& request) {
                        .argument = in->arg,
                        .input = data.first(std::min<std::size_t>(data.size(), in->in_size)),
                        .output_bytes = in->out_size};
-  settle(request, Kind::ioctl, *node, node->ioctl(in->fh, call));
+  reply_or_defer(request, Kind::ioctl, *node, node->ioctl(in->fh, call));
 }
 
 void FuseMount::poll(const FuseMessage& request) {
@@ -222,8 +224,8 @@ void FuseMount::interrupt(const FuseMessage& request) {
   }
 }
 
-void FuseMount::settle(const FuseMessage& request, Kind kind, FuseNode& node,
-                       const std::optional<FuseReply>& answer) {
+void FuseMount::reply_or_defer(const FuseMessage& request, Kind kind, FuseNode& node,
+                               const std::optional<FuseReply>& answer) {
   if (answer) return respond(request.id(), kind, *answer);
   parked_[request.id()] = {kind, &node};
 }
@@ -236,7 +238,7 @@ void FuseMount::answer(FuseRequest request, const FuseReply& answer) noexcept {
   respond(request, kind, answer);
 }
 
-void FuseMount::wake_pollers(FuseOpen open) noexcept {
+void FuseMount::wake_pollers(FileHandle open) noexcept {
   const auto found = pollers_.find(open);
   if (found == pollers_.end()) return;
   const fuse_notify_poll_wakeup_out out{found->second};
@@ -262,7 +264,7 @@ void FuseMount::respond(FuseRequest id, Kind kind, const FuseReply& answer) noex
   }
 }
 
-FuseNode* FuseMount::node_of(FuseOpen open) const noexcept {
+FuseNode* FuseMount::node_of(FileHandle open) const noexcept {
   const auto found = opens_.find(open);
   return found == opens_.end() ? nullptr : found->second;
 }

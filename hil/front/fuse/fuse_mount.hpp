@@ -24,15 +24,15 @@ class FuseMount final : public FuseReplies {
   /// Throws `HilError` if /dev/fuse or the right to mount is missing, or `folder` is no folder.
   explicit FuseMount(std::string folder) : channel_(std::move(folder)) {}
 
-  /// Before `serve`. The node outlives the mount.
-  void add(std::string name, FuseNode& node);
+  /// Before `serve`. The node outlives the mount. `file` tells the names of one node apart.
+  void add(std::string name, FuseNode& node, int file = 0);
 
   /// Serves while `goes_on`, which is asked between requests and at least every 100 ms, or until
   /// another process unmounts.
   void serve(const std::function<bool()>& goes_on);
 
   void answer(FuseRequest request, const FuseReply& answer) noexcept override;
-  void wake_pollers(FuseOpen open) noexcept override;
+  void wake_pollers(FileHandle open) noexcept override;
 
   /// Lateness of the calls of `FuseNode::wake`.
   [[nodiscard]] const Histogram& lateness() const noexcept { return lateness_; }
@@ -42,6 +42,7 @@ class FuseMount final : public FuseReplies {
   struct Named {
     std::string name;
     FuseNode* node;
+    int file;
   };
   enum class Kind : std::uint8_t { read, write, ioctl };
   struct Parked {
@@ -63,16 +64,16 @@ class FuseMount final : public FuseReplies {
   void interrupt(const FuseMessage& request);
 
   /// Answers now, or keeps the request until `answer`.
-  void settle(const FuseMessage& request, Kind kind, FuseNode& node,
-              const std::optional<FuseReply>& answer);
+  void reply_or_defer(const FuseMessage& request, Kind kind, FuseNode& node,
+                      const std::optional<FuseReply>& answer);
   void respond(FuseRequest id, Kind kind, const FuseReply& answer) noexcept;
-  [[nodiscard]] FuseNode* node_of(FuseOpen open) const noexcept;
+  [[nodiscard]] FuseNode* node_of(FileHandle open) const noexcept;
 
   FuseChannel channel_;
   std::vector<Named> nodes_;
-  FuseOpen last_open_ = 0;
-  std::map<FuseOpen, FuseNode*> opens_;
-  std::map<FuseOpen, std::uint64_t>
+  FileHandle last_open_ = 0;
+  std::map<FileHandle, FuseNode*> opens_;
+  std::map<FileHandle, std::uint64_t>
       pollers_;  ///< the kernel's name of an open that sleeps in poll()
   std::map<FuseRequest, Parked> parked_;
   std::uint64_t requests_ = 0;

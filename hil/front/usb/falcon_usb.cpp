@@ -158,7 +158,7 @@ void FtdiFalcon::out(std::span<const std::uint8_t> bytes) {
   }
 }
 
-void FtdiFalcon::hear(std::span<const std::uint8_t> packet) {
+void FtdiFalcon::on_packet(std::span<const std::uint8_t> packet) {
   if (!loader_.running()) return;
   if (line_.size() + packet.size() > kFifoBytes) {
     ++lost_;
@@ -192,7 +192,7 @@ void FalconUsb::catch_up(UsbHost& host) {
                    const auto part = packet.first(std::min(packet.size(), room));
                    host.complete_read(packet.size() <= room ? 0 : -EOVERFLOW, part);
                  });
-  script_.run(chip_.time().cycle(), [&](UsbFault fault) { strike(fault, host); });
+  script_.run(chip_.time().cycle(), [&](UsbFault fault) { apply_fault(fault, host); });
   if (halt_ == Halt::unreported && present_ && host.room()) {
     halt_ = Halt::reported;
     host.complete_read(-EPIPE, {});
@@ -211,15 +211,15 @@ bool FalconUsb::clear_halt(unsigned endpoint) noexcept {
   return endpoint == falcon::kEndpointIn || endpoint == falcon::kEndpointOut;
 }
 
-void FalconUsb::strike(UsbFault fault, UsbHost& host) {
+void FalconUsb::apply_fault(UsbFault fault, UsbHost& host) {
   switch (fault) {
     case UsbFault::stall:
       if (halt_ == Halt::none) halt_ = Halt::unreported;
       return;
     case UsbFault::split:
       return chip_.slow_down(kUsbFaultFrames);
-    case UsbFault::deaf:
-      deaf_until_ = chip_.time().cycle() + kUsbFaultFrames * kCyclesPerUsbFrame;
+    case UsbFault::nak:
+      nak_until_ = chip_.time().cycle() + kUsbFaultFrames * kCyclesPerUsbFrame;
       return;
     case UsbFault::vanish:
     case UsbFault::back:

@@ -81,7 +81,7 @@ class FtdiFalcon {
   template <class Wants, class In>
   void catch_up(Wants wants, In in) {
     time_.catch_up(
-        device_, [this](std::span<const std::uint8_t> packet) { hear(packet); },
+        device_, [this](std::span<const std::uint8_t> packet) { on_packet(packet); },
         [&] {
           ++quiet_frames_;
           if (due() && wants()) in(next_in());
@@ -100,7 +100,7 @@ class FtdiFalcon {
   static constexpr std::size_t kFifoBytes = 256;  ///< towards the host, FT232R data sheet
   static constexpr std::size_t kSplitBytes = 9;
 
-  void hear(std::span<const std::uint8_t> packet);
+  void on_packet(std::span<const std::uint8_t> packet);
   [[nodiscard]] bool due() const noexcept;
   [[nodiscard]] std::span<const std::uint8_t> next_in();
   [[nodiscard]] std::optional<std::vector<std::uint8_t>> standard(const UsbSetup& setup) const;
@@ -139,7 +139,7 @@ class FalconUsb {
             PacketDevice& device)
       : chip_(settings, device), script_(std::move(script)) {}
 
-  /// To the present: reads are completed, faults strike.
+  /// To the present: reads are completed, faults are applied.
   void catch_up(UsbHost& host);
   /// As `FtdiFalcon::control`, and frees a halted endpoint if the request asks for it.
   [[nodiscard]] std::optional<std::vector<std::uint8_t>> control(const UsbSetup& setup);
@@ -147,7 +147,7 @@ class FalconUsb {
   bool clear_halt(unsigned endpoint) noexcept;
   void out(std::span<const std::uint8_t> bytes) { chip_.out(bytes); }
   /// It takes nothing now.
-  [[nodiscard]] bool deaf() const noexcept { return chip_.time().cycle() < deaf_until_; }
+  [[nodiscard]] bool naks() const noexcept { return chip_.time().cycle() < nak_until_; }
 
   [[nodiscard]] bool present() const noexcept { return present_; }
   [[nodiscard]] const FtdiFalcon& chip() const noexcept { return chip_; }
@@ -155,13 +155,13 @@ class FalconUsb {
  private:
   /// Of the endpoint that is read: the first read that meets it ends with -EPIPE, later ones wait.
   enum class Halt { none, unreported, reported };
-  void strike(UsbFault fault, UsbHost& host);
+  void apply_fault(UsbFault fault, UsbHost& host);
 
   FtdiFalcon chip_;
   UsbFaultScript script_;
   bool present_ = true;
   Halt halt_ = Halt::none;
-  std::int64_t deaf_until_ = 0;
+  std::int64_t nak_until_ = 0;
 };
 
 }  // namespace kerf

@@ -20,7 +20,7 @@ constexpr std::size_t kMostReportBytes = 16384;  // HID_MAX_BUFFER_SIZE
 
 }  // namespace
 
-void HidrawNode::open(FuseOpen open) {
+void HidrawNode::open(FileHandle open, int /*file*/) {
   arm_.catch_up(*this);
   opens_[open];
 }
@@ -33,7 +33,7 @@ FuseReply HidrawNode::take(Open& open, std::size_t size) {
 }
 
 /// O_NONBLOCK does not reach a FUSE server, so a read of nothing sleeps: hidapi polls before.
-std::optional<FuseReply> HidrawNode::read(FuseOpen id, FuseRequest request,
+std::optional<FuseReply> HidrawNode::read(FileHandle id, FuseRequest request,
                                           std::uint64_t /*offset*/, std::size_t size) {
   arm_.catch_up(*this);
   deliver();
@@ -44,14 +44,14 @@ std::optional<FuseReply> HidrawNode::read(FuseOpen id, FuseRequest request,
   return std::nullopt;
 }
 
-std::optional<FuseReply> HidrawNode::write(FuseOpen id, FuseRequest request,
+std::optional<FuseReply> HidrawNode::write(FileHandle id, FuseRequest request,
                                            std::span<const std::uint8_t> bytes) {
   arm_.catch_up(*this);
   deliver();
   if (opens_.at(id).gone) return FuseReply::fail(ENODEV);
   if (bytes.size() < 2 || bytes.size() > kMostReportBytes) return FuseReply::fail(EINVAL);
   used_ = true;
-  if (arm_.deaf()) {
+  if (arm_.naks()) {
     opens_.at(id).writes.push_back({request, {bytes.begin(), bytes.end()}});
     return std::nullopt;
   }
@@ -60,8 +60,8 @@ std::optional<FuseReply> HidrawNode::write(FuseOpen id, FuseRequest request,
 }
 
 void HidrawNode::take_writes(Open& open) {
-  while (!open.writes.empty() && (open.gone || !arm_.deaf())) {
-    const ParkedWrite write = std::move(open.writes.front());
+  while (!open.writes.empty() && (open.gone || !arm_.naks())) {
+    const Open::ParkedWrite write = std::move(open.writes.front());
     open.writes.pop_front();
     if (open.gone) {
       replies_->answer(write.request, FuseReply::fail(ENODEV));
@@ -73,7 +73,7 @@ void HidrawNode::take_writes(Open& open) {
   }
 }
 
-std::optional<FuseReply> HidrawNode::ioctl(FuseOpen id, const FuseIoctl& call) {
+std::optional<FuseReply> HidrawNode::ioctl(FileHandle id, const FuseIoctl& call) {
   if (opens_.at(id).gone) return FuseReply::fail(ENODEV);
   const auto say = [this](const auto& value) {
     const auto bytes = fuse_bytes(value);
@@ -114,7 +114,7 @@ std::optional<FuseReply> HidrawNode::ioctl(FuseOpen id, const FuseIoctl& call) {
   }
 }
 
-std::uint32_t HidrawNode::poll(FuseOpen id, bool /*sleeps*/) {
+std::uint32_t HidrawNode::poll(FileHandle id, bool /*sleeps*/) {
   arm_.catch_up(*this);
   Open& open = opens_.at(id);
   deliver();
@@ -130,10 +130,14 @@ std::uint32_t HidrawNode::poll(FuseOpen id, bool /*sleeps*/) {
 
 void HidrawNode::interrupted(FuseRequest request) {
   for (auto& [id, open] : opens_) {
-    const auto is_it = [request](const auto& parked) { return parked.request == request; };
-    if (std::erase_if(open.parked, is_it) + std::erase_if(open.writes, is_it) == 0) continue;
-    return replies_->answer(request, FuseReply::fail(EINTR));
+    const auto is_it = [request](const Open::ParkedWrite& write) {
+      return write.request == request;
+    };
+    if (std::erase_if(open.writes, is_it) > 0) {
+      return replies_->answer(request, FuseReply::fail(EINTR));
+    }
   }
+  OpenFilesNode::interrupted(request);
 }
 
 std::int64_t HidrawNode::next_wake_ns() const noexcept {
@@ -145,7 +149,7 @@ void HidrawNode::wake() {
   deliver();
 }
 
-void HidrawNode::hear(std::span<const std::uint8_t> report) {
+void HidrawNode::on_report(std::span<const std::uint8_t> report) {
   for (auto& [id, open] : opens_) {
     if (open.gone) continue;
     if (open.waiting.size() < kWaitingReports) {
@@ -157,27 +161,22 @@ void HidrawNode::hear(std::span<const std::uint8_t> report) {
 }
 
 void HidrawNode::plugged(bool in) {
-  if (in) return;  // whoever had it open finds it gone all the same
+  if (in) return;  // an open from before stays gone
   for (auto& [id, open] : opens_) {
     open.gone = true;
     open.announced = false;
   }
 }
 
-/// Answers reads that wait for a report, and wakes those who poll for one.
+/// Answers reads that wait for a report, and wakes clients that poll for one.
 void HidrawNode::deliver() {
   for (auto& [id, open] : opens_) {
     take_writes(open);
-    while (!open.parked.empty() && (!open.waiting.empty() || open.gone)) {
-      const ParkedRead parked = open.parked.front();
-      open.parked.pop_front();
-      replies_->answer(parked.request,
-                       open.waiting.empty() ? FuseReply::fail(EIO) : take(open, parked.size));
-    }
-    if (!open.announced && (!open.waiting.empty() || open.gone)) {
-      open.announced = true;
-      replies_->wake_pollers(id);
-    }
+    deliver_to(
+        id, open, [&] { return !open.waiting.empty() || open.gone; },
+        [&](std::size_t size) {
+          return open.waiting.empty() ? FuseReply::fail(EIO) : take(open, size);
+        });
   }
 }
 

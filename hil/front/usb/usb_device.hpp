@@ -22,14 +22,14 @@ class UsbClock {
   /// In ns; never goes back.
   [[nodiscard]] virtual std::int64_t now_ns() const noexcept = 0;
   /// The CLOCK_MONOTONIC time at which to check whether this clock has reached `ns`.
-  [[nodiscard]] virtual std::int64_t look_ns(std::int64_t ns) const noexcept = 0;
+  [[nodiscard]] virtual std::int64_t wake_ns(std::int64_t ns) const noexcept = 0;
 };
 
 /// The machine's clock.
 class MachineClock final : public UsbClock {
  public:
   [[nodiscard]] std::int64_t now_ns() const noexcept override { return monotonic_ns(); }
-  [[nodiscard]] std::int64_t look_ns(std::int64_t ns) const noexcept override { return ns; }
+  [[nodiscard]] std::int64_t wake_ns(std::int64_t ns) const noexcept override { return ns; }
 };
 inline const MachineClock kMachineClock;
 
@@ -39,16 +39,16 @@ class UsbTime {
  public:
   explicit UsbTime(const UsbClock& clock) noexcept : clock_(clock), began_ns_(clock.now_ns()) {}
 
-  /// Advances `device` to the present; `hear(packet)` for each of its packets, `frame()` at the end
-  /// of the cycle that begins each frame.
-  template <class Hear, class Frame>
-  void catch_up(PacketDevice& device, Hear hear, Frame frame) {
+  /// Advances `device` to the present; `on_packet(packet)` for each of its packets, `frame()` at
+  /// the end of the cycle that begins each frame.
+  template <class OnPacket, class Frame>
+  void catch_up(PacketDevice& device, OnPacket on_packet, Frame frame) {
     const std::int64_t now = (clock_.now_ns() - began_ns_) / kNsPerCycle;
     while (cycle_ < now) {
       ++cycle_;
       device.advance(1);
       for (auto packet = device.next_packet(); !packet.empty(); packet = device.next_packet()) {
-        hear(packet);
+        on_packet(packet);
       }
       if (cycle_ % kCyclesPerUsbFrame == 0) frame();
     }
@@ -58,7 +58,7 @@ class UsbTime {
   /// The time to check for the next frame, CLOCK_MONOTONIC.
   [[nodiscard]] std::int64_t next_frame_ns() const noexcept {
     const std::int64_t frame = cycle_ / kCyclesPerUsbFrame + 1;
-    return clock_.look_ns(began_ns_ + frame * kCyclesPerUsbFrame * kNsPerCycle);
+    return clock_.wake_ns(began_ns_ + frame * kCyclesPerUsbFrame * kNsPerCycle);
   }
 
  private:
@@ -72,7 +72,7 @@ class UsbTime {
 enum class UsbFault : std::uint8_t {
   stall,   ///< the endpoint that is read halts until the host clears it (Falcon)
   split,   ///< for 0.1 s the serial line is slow: packets come in pieces (Falcon)
-  deaf,    ///< for 0.1 s it takes nothing: writes of the host have to wait (FUSE nodes)
+  nak,     ///< for 0.1 s it takes nothing (NAK): writes of the host have to wait (FUSE nodes)
   vanish,  ///< unplugged
   back,    ///< plugged in again, without power having been lost
 };
@@ -92,10 +92,10 @@ class UsbFaultScript {
  public:
   explicit UsbFaultScript(std::vector<ScriptedUsbFault> faults) : faults_(std::move(faults)) {}
 
-  /// `strike(fault)` for each that is due in `cycle` or before it and has not struck yet.
-  template <class Strike>
-  void run(std::int64_t cycle, Strike strike) {
-    while (next_ < faults_.size() && is_due(faults_[next_], cycle)) strike(faults_[next_++].fault);
+  /// Calls `apply(fault)` for each fault that is due in `cycle` or before and was not applied yet.
+  template <class Apply>
+  void run(std::int64_t cycle, Apply apply) {
+    while (next_ < faults_.size() && is_due(faults_[next_], cycle)) apply(faults_[next_++].fault);
   }
 
  private:

@@ -38,17 +38,17 @@ constexpr std::int32_t kLongestTransfer = 4096;
 
 }  // namespace
 
-void UsbfsNode::open(FuseOpen open) {
+void UsbfsNode::open(FileHandle open, int /*file*/) {
   catch_up();
   opens_[open];
 }
 
-void UsbfsNode::release(FuseOpen open) {
+void UsbfsNode::release(FileHandle open) {
   if (claimed_by_ == open) claimed_by_.reset();
-  opens_.erase(open);
+  OpenFilesNode::release(open);
 }
 
-std::optional<FuseReply> UsbfsNode::read(FuseOpen open, FuseRequest /*request*/,
+std::optional<FuseReply> UsbfsNode::read(FileHandle open, FuseRequest /*request*/,
                                          std::uint64_t offset, std::size_t size) {
   if (opens_.at(open).gone) return FuseReply::fail(ENODEV);
   const auto all = FtdiFalcon::descriptors();
@@ -56,7 +56,7 @@ std::optional<FuseReply> UsbfsNode::read(FuseOpen open, FuseRequest /*request*/,
   return FuseReply{.bytes = rest.first(std::min(size, rest.size()))};
 }
 
-std::optional<FuseReply> UsbfsNode::ioctl(FuseOpen id, const FuseIoctl& call) {
+std::optional<FuseReply> UsbfsNode::ioctl(FileHandle id, const FuseIoctl& call) {
   catch_up();
   Open& open = opens_.at(id);
   const auto answer = [this](int result) {
@@ -105,8 +105,8 @@ int UsbfsNode::connect_info(const FuseIoctl& call) {
 FuseReply UsbfsNode::control(const FuseIoctl& call) {
   const auto request = fuse_body<usbdevfs_ctrltransfer>(call.input);
   if (!request) return FuseReply::fail(EINVAL);
-  const auto said = plug_.control({request->bRequestType, request->bRequest, request->wValue,
-                                   request->wIndex, request->wLength});
+  const auto said = falcon_.control({request->bRequestType, request->bRequest, request->wValue,
+                                     request->wIndex, request->wLength});
   if (!said) return FuseReply::fail(EPIPE);
   if (!said->empty() && !write_caller(call.thread, address_of(request->data), *said)) {
     return FuseReply::fail(EFAULT);
@@ -114,7 +114,7 @@ FuseReply UsbfsNode::control(const FuseIoctl& call) {
   return {.result = static_cast<std::int32_t>(said->size())};
 }
 
-int UsbfsNode::claim(FuseOpen id, const FuseIoctl& call) {
+int UsbfsNode::claim(FileHandle id, const FuseIoctl& call) {
   const auto interface = argument<std::uint32_t>(call);  // the first word of either structure
   if (!interface) return -EFAULT;
   if (*interface != 0) return -ENOENT;
@@ -123,7 +123,7 @@ int UsbfsNode::claim(FuseOpen id, const FuseIoctl& call) {
   return 0;
 }
 
-int UsbfsNode::give_up_interface(FuseOpen id) {
+int UsbfsNode::give_up_interface(FileHandle id) {
   if (claimed_by_ != id) return -EINVAL;
   claimed_by_.reset();
   end_transfers(opens_.at(id), -ENOENT);
@@ -134,10 +134,10 @@ int UsbfsNode::clear_halt(const FuseIoctl& call) {
   const auto endpoint = argument<std::uint32_t>(call);
   if (!endpoint) return -EFAULT;
   if (*endpoint == falcon::kEndpointIn && reader()) ++rash_clears_;
-  return plug_.clear_halt(*endpoint) ? 0 : -ENOENT;
+  return falcon_.clear_halt(*endpoint) ? 0 : -ENOENT;
 }
 
-std::uint32_t UsbfsNode::poll(FuseOpen id, bool /*sleeps*/) {
+std::uint32_t UsbfsNode::poll(FileHandle id, bool /*sleeps*/) {
   catch_up();
   Open& open = opens_.at(id);
   deliver();
@@ -161,12 +161,12 @@ void UsbfsNode::wake() {
 }
 
 void UsbfsNode::catch_up() {
-  plug_.catch_up(*this);
+  falcon_.catch_up(*this);
   for (auto& [id, open] : opens_) take_writes(open);
 }
 
 void UsbfsNode::plugged(bool in) {
-  if (in) return;  // an open from before finds it gone all the same
+  if (in) return;  // an open from before stays gone
   claimed_by_.reset();
   for (auto& [id, open] : opens_) {
     open.gone = true;
@@ -177,9 +177,9 @@ void UsbfsNode::plugged(bool in) {
 
 void UsbfsNode::deliver() {
   for (auto& [id, open] : opens_) {
-    if (open.announced || (open.done.empty() && !open.gone)) continue;
-    open.announced = true;
-    replies_->wake_pollers(id);
+    deliver_to(
+        id, open, [&] { return !open.done.empty() || open.gone; },
+        [](std::size_t) { return FuseReply{}; });  // no read sleeps here
   }
 }
 
@@ -200,7 +200,7 @@ std::optional<UsbfsNode::Urb> UsbfsNode::read_urb(const FuseIoctl& call) noexcep
   return urb;
 }
 
-int UsbfsNode::submit(Open& open, FuseOpen id, const FuseIoctl& call) {
+int UsbfsNode::submit(Open& open, FileHandle id, const FuseIoctl& call) {
   auto urb = read_urb(call);
   if (!urb) return -EFAULT;
   if (urb->buffer_bytes < 0 || urb->buffer_bytes > kLongestTransfer) return -EINVAL;
@@ -209,7 +209,7 @@ int UsbfsNode::submit(Open& open, FuseOpen id, const FuseIoctl& call) {
   }
   if (urb->type != USBDEVFS_URB_TYPE_BULK) return -EINVAL;
   if (claimed_by_ && claimed_by_ != id) return -EBUSY;
-  claimed_by_ = id;  // the kernel claims for those who forgot, and warns
+  claimed_by_ = id;  // the kernel claims for a client that did not, and warns
   return submit_bulk(open, std::move(*urb), call.thread);
 }
 
@@ -217,7 +217,7 @@ int UsbfsNode::submit_control(Open& open, Urb urb, pid_t thread) {
   std::array<std::uint8_t, UsbSetup::kBytes> setup{};
   if (urb.buffer_bytes < static_cast<int>(UsbSetup::kBytes)) return -EINVAL;
   if (read_caller(thread, urb.buffer, setup) != setup.size()) return -EFAULT;
-  auto said = plug_.control(setup_of(setup));
+  auto said = falcon_.control(setup_of(setup));
   if (said) urb.data = std::move(*said);
   urb.data_offset = UsbSetup::kBytes;
   urb.actual_bytes = static_cast<int>(urb.data.size());
@@ -240,10 +240,10 @@ int UsbfsNode::submit_bulk(Open& open, Urb urb, pid_t thread) {
 }
 
 void UsbfsNode::take_writes(Open& open) {
-  while (!plug_.deaf() && !open.writes.empty()) {
+  while (!falcon_.naks() && !open.writes.empty()) {
     Urb urb = std::move(open.writes.front());
     open.writes.pop_front();
-    plug_.out(urb.data);
+    falcon_.out(urb.data);
     urb.data.clear();  // nothing comes back
     urb.actual_bytes = urb.buffer_bytes;
     finish(open, std::move(urb), 0);

@@ -3,7 +3,6 @@
 
 #include <cstdint>
 #include <deque>
-#include <map>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -13,41 +12,8 @@
 
 namespace kerf {
 
-/// The device node of an emulated Falcon on USB (`/dev/bus/usb/BBB/DDD`, linux/usbdevice_fs.h):
-/// what libusb cannot tell from the kernel's usbfs. Errors are those of the kernel's devio.c (6.1).
-///
-/// A read completes when the device has a packet, at most once per 1 ms frame; a write and a
-/// control request at once. Not modelled, ENOTTY: blocking REAPURB and BULK, isochronous transfers,
-/// streams, mmap(), suspending. One transfer is one packet, which is enough for buffers of 64
-/// bytes.
-class UsbfsNode final : public FuseNode, private UsbHost {
- public:
-  UsbfsNode(const FtdiFalcon::Settings& settings, std::vector<ScriptedUsbFault> script,
-            PacketDevice& device)
-      : plug_(settings, std::move(script), device) {}
-
-  [[nodiscard]] bool present() const noexcept override { return plug_.present(); }
-  [[nodiscard]] bool seekable() const noexcept override { return true; }
-  void open(FuseOpen open) override;
-  void release(FuseOpen open) override;
-  /// The descriptors.
-  std::optional<FuseReply> read(FuseOpen open, FuseRequest request, std::uint64_t offset,
-                                std::size_t size) override;
-  std::optional<FuseReply> ioctl(FuseOpen open, const FuseIoctl& call) override;
-  std::uint32_t poll(FuseOpen open, bool sleeps) override;
-  [[nodiscard]] std::int64_t next_wake_ns() const noexcept override;
-  void wake() override;
-
-  /// A client had transfers, and the node is open no more.
-  [[nodiscard]] bool left() const noexcept { return used_ && !in_use(); }
-  /// Somebody has it open.
-  [[nodiscard]] bool in_use() const noexcept { return !opens_.empty(); }
-  /// Times that an endpoint was freed while reads waited there, which the kernel does not allow
-  /// (usb_clear_halt): their fate is up to its controller.
-  [[nodiscard]] int rash_clears() const noexcept { return rash_clears_; }
-  [[nodiscard]] const FtdiFalcon& chip() const noexcept { return plug_.chip(); }
-
- private:
+/// An open of a usbfs node.
+struct UsbfsOpen : OpenFile {
   /// A transfer of a client: its structure, the address of that in the client's memory, and the
   /// data that are copied there when the client reaps it.
   struct Urb {
@@ -61,21 +27,53 @@ class UsbfsNode final : public FuseNode, private UsbHost {
     std::vector<std::uint8_t> data;
     std::size_t data_offset = 0;
   };
-  struct Open {
-    std::deque<Urb> reads, writes, done;
-    bool announced = false;  ///< pollers know of the finished transfers
-    bool gone = false;       ///< the device was unplugged: nothing works any more
-  };
+  std::deque<Urb> reads, writes, done;
+  bool gone = false;  ///< the device was unplugged: nothing works any more
+};
+
+/// The device node of an emulated Falcon on USB (`/dev/bus/usb/BBB/DDD`, linux/usbdevice_fs.h): to
+/// libusb it is like the kernel's usbfs. Errors are those of the kernel's devio.c (6.1).
+///
+/// A read completes when the device has a packet, at most once per 1 ms frame; a write and a
+/// control request at once. Not modelled, ENOTTY: blocking REAPURB and BULK, isochronous transfers,
+/// streams, mmap(), suspending. One transfer is one packet, which is enough for buffers of 64
+/// bytes.
+class UsbfsNode final : public OpenFilesNode<UsbfsOpen>, private UsbHost {
+ public:
+  UsbfsNode(const FtdiFalcon::Settings& settings, std::vector<ScriptedUsbFault> script,
+            PacketDevice& device)
+      : falcon_(settings, std::move(script), device) {}
+
+  [[nodiscard]] bool present(int /*file*/) const noexcept override { return falcon_.present(); }
+  [[nodiscard]] bool seekable() const noexcept override { return true; }
+  void open(FileHandle open, int file) override;
+  void release(FileHandle open) override;
+  /// The descriptors.
+  std::optional<FuseReply> read(FileHandle open, FuseRequest request, std::uint64_t offset,
+                                std::size_t size) override;
+  std::optional<FuseReply> ioctl(FileHandle open, const FuseIoctl& call) override;
+  std::uint32_t poll(FileHandle open, bool sleeps) override;
+  [[nodiscard]] std::int64_t next_wake_ns() const noexcept override;
+  void wake() override;
+
+  /// Times that an endpoint was freed while reads waited there, which the kernel does not allow
+  /// (usb_clear_halt): their fate is up to its controller.
+  [[nodiscard]] int rash_clears() const noexcept { return rash_clears_; }
+  [[nodiscard]] const FtdiFalcon& chip() const noexcept { return falcon_.chip(); }
+
+ private:
+  using Open = UsbfsOpen;
+  using Urb = Open::Urb;
 
   [[nodiscard]] static std::optional<Urb> read_urb(const FuseIoctl& call) noexcept;
   // Each returns the ioctl's result, or a negative errno.
-  int submit(Open& open, FuseOpen id, const FuseIoctl& call);
+  int submit(Open& open, FileHandle id, const FuseIoctl& call);
   int submit_control(Open& open, Urb urb, pid_t thread);
   int submit_bulk(Open& open, Urb urb, pid_t thread);
   int reap(Open& open, const FuseIoctl& call);
   int discard(Open& open, std::uint64_t address);
-  int claim(FuseOpen id, const FuseIoctl& call);
-  int give_up_interface(FuseOpen id);
+  int claim(FileHandle id, const FuseIoctl& call);
+  int give_up_interface(FileHandle id);
   int clear_halt(const FuseIoctl& call);
   FuseReply control(const FuseIoctl& call);
   int connect_info(const FuseIoctl& call);
@@ -91,10 +89,8 @@ class UsbfsNode final : public FuseNode, private UsbHost {
   void take_writes(Open& open);
   void deliver();
 
-  FalconUsb plug_;
-  std::map<FuseOpen, Open> opens_;
-  std::optional<FuseOpen> claimed_by_;
-  bool used_ = false;
+  FalconUsb falcon_;
+  std::optional<FileHandle> claimed_by_;
   int rash_clears_ = 0;
 };
 

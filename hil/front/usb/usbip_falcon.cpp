@@ -107,7 +107,7 @@ void UsbipFalcon::answer() {
   if (size < 0 && (errno == EAGAIN || errno == EINTR)) return;
   if (size <= 0) return lose_host();
   heard_.insert(heard_.end(), buffer.begin(), buffer.begin() + size);
-  plug_.catch_up(*this);
+  falcon_.catch_up(*this);
   while (take_message()) {
   }
 }
@@ -138,7 +138,7 @@ void UsbipFalcon::serve(const usbip::Request& request, std::span<const std::uint
     if (reads_.size() == kMostReads) return say(usbip::submitted(request.sequence, -ENOMEM, 0));
     reads_.push_back({request.sequence, request.bytes});
   } else if (!request.to_host && request.endpoint == (falcon::kEndpointOut & kEndpointNumber)) {
-    plug_.out(bytes);
+    falcon_.out(bytes);
     say(usbip::submitted(request.sequence, 0, request.bytes));
   } else {
     say(usbip::submitted(request.sequence, -EPIPE, 0));
@@ -146,7 +146,7 @@ void UsbipFalcon::serve(const usbip::Request& request, std::span<const std::uint
 }
 
 void UsbipFalcon::submit_control(const usbip::Request& request) {
-  const auto said = plug_.control(setup_of(request.setup));
+  const auto said = falcon_.control(setup_of(request.setup));
   if (!said) return say(usbip::submitted(request.sequence, -EPIPE, 0));
   const auto bytes = std::span(*said).first(std::min<std::size_t>(said->size(), request.bytes));
   say(usbip::submitted(request.sequence, 0, static_cast<std::uint32_t>(bytes.size())), bytes);

@@ -51,7 +51,9 @@ class UsbipFalcon final : public KernelDevice, private UsbHost {
   using PlugIn = std::function<int()>;
   UsbipFalcon(const FtdiFalcon::Settings& settings, std::vector<ScriptedUsbFault> script,
               PacketDevice& device, PlugIn plug_in)
-      : plug_(settings, std::move(script), device), plug_in_(std::move(plug_in)), fd_(plug_in_()) {}
+      : falcon_(settings, std::move(script), device),
+        plug_in_(std::move(plug_in)),
+        fd_(plug_in_()) {}
   UsbipFalcon(const UsbipFalcon&) = delete;
   UsbipFalcon& operator=(const UsbipFalcon&) = delete;
   ~UsbipFalcon() override { unplug(); }
@@ -61,11 +63,11 @@ class UsbipFalcon final : public KernelDevice, private UsbHost {
   [[nodiscard]] std::int64_t next_wake_ns() const noexcept override {
     return chip().time().next_frame_ns();
   }
-  void wake() override { plug_.catch_up(*this); }
+  void wake() override { falcon_.catch_up(*this); }
 
   /// The host has closed the connection: the device cannot be plugged in again.
   [[nodiscard]] bool left() const noexcept { return left_; }
-  [[nodiscard]] const FtdiFalcon& chip() const noexcept { return plug_.chip(); }
+  [[nodiscard]] const FtdiFalcon& chip() const noexcept { return falcon_.chip(); }
 
  private:
   struct Read {
@@ -85,7 +87,7 @@ class UsbipFalcon final : public KernelDevice, private UsbHost {
   void lose_host() noexcept;
   void unplug() noexcept;
 
-  FalconUsb plug_;
+  FalconUsb falcon_;
   PlugIn plug_in_;
   int fd_;
   bool left_ = false;

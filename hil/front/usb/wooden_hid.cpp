@@ -53,12 +53,12 @@ void WoodenHid::catch_up(HidHost& host) {
       device_,
       [&](std::span<const std::uint8_t> packet) {
         ++reports_;
-        if (present_) host.hear(packet);
+        if (present_) host.on_report(packet);
       },
       [] {});
   script_.run(time_.cycle(), [&](UsbFault fault) {
-    if (fault == UsbFault::deaf) {
-      deaf_until_ = time_.cycle() + kUsbFaultFrames * kCyclesPerUsbFrame;
+    if (fault == UsbFault::nak) {
+      nak_until_ = time_.cycle() + kUsbFaultFrames * kCyclesPerUsbFrame;
     }
     if (fault != UsbFault::vanish && fault != UsbFault::back) return;
     present_ = fault == UsbFault::back;
@@ -136,7 +136,7 @@ void UhidArm::answer() {
   }
 }
 
-void UhidArm::hear(std::span<const std::uint8_t> report) {
+void UhidArm::on_report(std::span<const std::uint8_t> report) {
   if (!open_) return;
   uhid_event event{};
   event.type = UHID_INPUT2;

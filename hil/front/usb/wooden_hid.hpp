@@ -20,7 +20,7 @@ namespace kerf {
 class HidHost {
  public:
   virtual ~HidHost() = default;
-  virtual void hear(std::span<const std::uint8_t> report) = 0;
+  virtual void on_report(std::span<const std::uint8_t> report) = 0;
   virtual void plugged(bool in) = 0;
 };
 
@@ -57,7 +57,7 @@ class WoodenHid {
   void out(std::span<const std::uint8_t> report) noexcept;
 
   /// It takes nothing now.
-  [[nodiscard]] bool deaf() const noexcept { return time_.cycle() < deaf_until_; }
+  [[nodiscard]] bool naks() const noexcept { return time_.cycle() < nak_until_; }
   [[nodiscard]] bool present() const noexcept { return present_; }
   [[nodiscard]] const UsbTime& time() const noexcept { return time_; }
   /// Reports of the device, heard or not.
@@ -70,7 +70,7 @@ class WoodenHid {
   UsbFaultScript script_;
   UsbTime time_;
   bool present_ = true;
-  std::int64_t deaf_until_ = 0;
+  std::int64_t nak_until_ = 0;
   std::uint64_t reports_ = 0;
 };
 
@@ -98,7 +98,7 @@ class UhidArm final : public KernelDevice, private HidHost {
   [[nodiscard]] std::uint64_t lost() const noexcept { return lost_; }
 
  private:
-  void hear(std::span<const std::uint8_t> report) override;
+  void on_report(std::span<const std::uint8_t> report) override;
   void plugged(bool in) override;
   void create();
 

@@ -167,7 +167,7 @@ HID reports, 14 bytes or the first 14 of 64, seven i16:
 ## kerf's own links
 
 Between controller and emulator, on a socket or over UDP, each device packet is one packet. Before them each side says
-hello; in lock-step all packets of one tick are one turn. A window that leads the hand sends wishes.
+hello; in lock-step all packets of one tick are one turn. A window that leads the hand sends targets.
 
 | packet | byte | type | what |
 |---|---|---|---|
@@ -177,11 +177,11 @@ hello; in lock-step all packets of one tick are one turn. A window that leads th
 | | 12 | u32 | rate of the servo in Hz |
 | turn, at most {link.number('kMostBytes')} bytes | 0 | u8 x 8 | `{magic(link, 'kMagic')}` |
 | | 8 | | each packet behind a u8 with its length; none: nothing came |
-| wish, {link.number('kHandWishBytes')} bytes | 0 | u8 x 8 | `{magic(link, 'kHandWishMagic')}` |
-| | 8 | i32 x 3 | place in um, in the device's frame, each up to {link.number('kMaxWishMm'):g} mm |
+| target, {link.number('kHandTargetBytes')} bytes | 0 | u8 x 8 | `{magic(link, 'kHandTargetMagic')}` |
+| | 8 | i32 x 3 | place in um, in the device's frame, each up to {link.number('kMaxTargetMm'):g} mm |
 | | 20 | i32 x 3 | yaw, pitch, roll in urad, each up to 60 degrees |
 | | 32 | u8 | 1 button 1, 2 button 2, 4 park |
-| greeting, 9 bytes | 0 | u8 x 8 | that of the wish; the emulator says it first |
+| greeting, 9 bytes | 0 | u8 x 8 | that of the target; the emulator says it first |
 | | 8 | u8 | 0: the hand is yours; 1: it is taken, and the connection is closed |
 
 ## Bridge

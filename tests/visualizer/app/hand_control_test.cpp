@@ -71,10 +71,10 @@ TEST_CASE("nobody leads before the pointer moves; then the goal is under it, at 
   CHECK(bench.hand.leads());
   CHECK(near(bench.goal().pixel, {120, 80}));
   CHECK(bench.goal().depth_mm == doctest::Approx(bench.tool().depth_mm));
-  const HandTarget wish = bench.hand.wish(bench.device);
+  const HandTarget target = bench.hand.target(bench.device);
   const glm::dvec3 goal = *bench.hand.goal_mm();
-  CHECK(wish.tip_mm.x == doctest::Approx((goal.x - 1.0) / 2.0));
-  CHECK(wish.tip_mm.z == doctest::Approx((goal.z - 3.0) / 2.0));
+  CHECK(target.tip_mm.x == doctest::Approx((goal.x - 1.0) / 2.0));
+  CHECK(target.tip_mm.z == doctest::Approx((goal.z - 3.0) / 2.0));
 }
 
 TEST_CASE("who turns the wheel or presses before the pointer moved leads too") {
@@ -175,7 +175,7 @@ TEST_CASE("sticks move the goal by their time, without a pointer, and keys tilt 
   WindowInput tilt = at(100, 100);
   tilt.held.tilt_right = 1.0;
   for (int i = 0; i < 1000; ++i) bench.frame(tilt);
-  CHECK(bench.hand.wish(bench.device).orientation_rad[0] == doctest::Approx(kMaxWishRad));
+  CHECK(bench.hand.target(bench.device).orientation_rad[0] == doctest::Approx(kMaxTargetRad));
 }
 
 TEST_CASE("a tool behind the eye is nobody's to lead") {
