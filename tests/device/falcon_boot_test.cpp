@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <deque>
 #include <numeric>
-#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
@@ -13,8 +12,11 @@
 
 #include "hil/front/usb/falcon_usb.hpp"
 #include "shared/wire/falcon.hpp"
+#include "tests/support/errors.hpp"
 
 using kerf::falcon::FtdiRequest;
+using kerf::test::error_of;
+using kerf::test::has;
 
 namespace {
 
@@ -34,8 +36,8 @@ class Wire final : public kerf::FalconLine {
     longest_write = std::max(longest_write, bytes.size());
     for (const std::uint8_t byte : bytes) {
       if (!loader.running()) {
-        if (!deaf) loader.take(byte, line_);
-      } else if (framer_.take(byte) && !mute) {
+        if (loader_answers) loader.take(byte, line_);
+      } else if (framer_.take(byte) && firmware_answers) {
         const auto answer = encode(kerf::FalconReport{});
         line_.insert(line_.end(), answer.begin(), answer.end());
       }
@@ -51,8 +53,8 @@ class Wire final : public kerf::FalconLine {
   kerf::FalconBootLoader loader;
   std::vector<std::pair<FtdiRequest, std::uint16_t>> settings;
   std::size_t longest_write = 0;
-  bool deaf = false;  ///< the boot loader hears nothing
-  bool mute = false;  ///< the firmware says nothing
+  bool loader_answers = true;
+  bool firmware_answers = true;
 
  private:
   std::size_t piece_;
@@ -86,36 +88,30 @@ TEST_CASE("falcon boot: the loader is greeted, takes every byte, and the firmwar
   }
 }
 
-TEST_CASE("falcon boot: what goes wrong is told in one line with its place") {
-  const auto error_of = [](Wire& wire, std::span<const std::uint8_t> bytes) -> std::string {
-    try {
-      kerf::start_falcon(wire, bytes);
-    } catch (const std::runtime_error& error) {
-      CHECK(std::string(error.what()).find('\n') == std::string::npos);
-      return error.what();
-    }
-    return "";
+TEST_CASE("falcon boot: an error is one line with its position") {
+  const auto error_with = [](Wire& wire, std::span<const std::uint8_t> bytes) {
+    const std::string error = error_of([&] { kerf::start_falcon(wire, bytes); });
+    CHECK_FALSE(has(error, "\n"));
+    return error;
   };
   Wire none(false);
-  CHECK(error_of(none, {}).find("has no firmware since it was powered up") != std::string::npos);
-
+  CHECK(has(error_with(none, {}), "has no firmware since it was powered up"));
   for (const std::int64_t at : {0, 61, 62, 999}) {
     Wire wrong(false, at);
-    const std::string error = error_of(wrong, firmware());
-    CHECK(error.find("firmware: byte " + std::to_string(at) + " was ") == 0);
+    CHECK(error_with(wrong, firmware())
+              .starts_with("firmware: byte " + std::to_string(at) + " was "));
   }
-  Wire deaf(false);
-  deaf.deaf = true;
-  CHECK(error_of(deaf, firmware()).find("the boot loader does not answer; ") == 0);
+  Wire silent(false);
+  silent.loader_answers = false;
+  CHECK(error_with(silent, firmware()).starts_with("the boot loader does not answer; "));
   Wire mute(false);
-  mute.mute = true;
-  CHECK(error_of(mute, firmware()).find("the firmware was taken and does not answer") == 0);
-
-  CHECK_THROWS_WITH_AS(static_cast<void>(kerf::read_firmware("/nowhere/at/all")),
-                       doctest::Contains("firmware /nowhere/at/all: No such file"),
-                       std::runtime_error);
-  CHECK_THROWS_WITH_AS(static_cast<void>(kerf::read_firmware("/dev/null")),
-                       doctest::Contains("is no regular file; name the file"), std::runtime_error);
+  mute.firmware_answers = false;
+  CHECK(error_with(mute, firmware()).starts_with("the firmware was taken and does not answer"));
+  const auto read_error = [](const char* file) {
+    return error_of([&] { static_cast<void>(kerf::read_firmware(file)); });
+  };
+  CHECK(has(read_error("/nowhere/at/all"), "firmware /nowhere/at/all: No such file"));
+  CHECK(has(read_error("/dev/null"), "is no regular file; name the file"));
 }
 
 TEST_CASE("falcon boot: the loader answers each greeting, and starts anew only when it is called") {

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// The mailboxes between the servo and a port's thread, and the turns of host and device on USB.
 #include "controller/device/port/io_mailbox.hpp"
 
 #include <algorithm>
@@ -11,11 +12,13 @@
 
 #include <doctest/doctest.h>
 
+using kerf::Turns;
+
 namespace {
 
 using Bytes = std::array<std::uint8_t, kerf::MailboxPacket::kMaxBytes>;
 
-/// A packet that says who sent it and its number, again and again to its end.
+/// A packet that repeats its sender and its number to its end.
 std::array<std::uint8_t, 16> packet(std::uint8_t sender, int number) {
   std::array<std::uint8_t, 16> bytes{};
   for (std::size_t i = 0; i < bytes.size(); i += 4) {
@@ -34,7 +37,7 @@ bool is_whole(const Bytes& bytes) {
 
 }  // namespace
 
-TEST_CASE("an inbox gives packets in their order and tells when it is full") {
+TEST_CASE("an inbox gives packets in their order and reports that it is full") {
   kerf::SpscRing inbox;
   Bytes out{};
   CHECK(inbox.take(out) == 0);
@@ -46,13 +49,9 @@ TEST_CASE("an inbox gives packets in their order and tells when it is full") {
     CHECK(out[1] == i);
   }
   CHECK(inbox.empty());
-}
-
-TEST_CASE("a packet longer than the reader's room is cut, and its size told") {
-  kerf::SpscRing inbox;
   CHECK(inbox.put(packet(1, 2)));
   std::array<std::uint8_t, 4> little{};
-  CHECK(inbox.take(little) == 16);
+  CHECK(inbox.take(little) == 16);  // cut to the room, and its size reported
   CHECK(little[1] == 2);
 }
 
@@ -60,7 +59,7 @@ TEST_CASE("an outbox gives the newest packet, and what is older is void") {
   kerf::LatestCommand outbox;
   Bytes out{};
   CHECK(outbox.take(out) == 0);
-  for (const int waiting : {1, 3, 8}) {
+  for (const int waiting : {1, 3, 50}) {
     for (int i = 0; i < waiting; ++i) {
       CHECK(outbox.put(packet(1, static_cast<std::uint8_t>(i))));
     }
@@ -70,15 +69,6 @@ TEST_CASE("an outbox gives the newest packet, and what is older is void") {
     CHECK(outbox.empty());
     CHECK(outbox.take(out) == 0);
   }
-}
-
-TEST_CASE("a reader that was held up for 50 ticks sends nothing of these but the last") {
-  kerf::LatestCommand outbox;
-  Bytes out{};
-  for (std::uint8_t tick = 0; tick < 50; ++tick) CHECK(outbox.put(packet(1, tick)));
-  CHECK(outbox.take(out) == 16);
-  CHECK(out[1] == 49);
-  CHECK(outbox.take(out) == 0);
 }
 
 TEST_CASE("packets of several threads reach the reader whole, each thread's in its order") {
@@ -111,4 +101,38 @@ TEST_CASE("packets of several threads reach the reader whole, each thread's in i
   CHECK(torn == 0);
   CHECK(out_of_order == 0);
   CHECK(std::ranges::max(last) == kEach - 1);  // the very last packet has come
+}
+
+TEST_CASE("turns: the host begins, and goes on with each answer") {
+  Turns turns;
+  for (std::int64_t now_ns = 1'000; now_ns < 10'000; now_ns += 1'000) {
+    CHECK(turns.ours(now_ns));
+    turns.sent(now_ns);
+    CHECK_FALSE(turns.ours(now_ns));
+    turns.answered();
+  }
+}
+
+TEST_CASE("turns: a lost answer costs one turn") {
+  Turns turns;
+  turns.sent(0);
+  CHECK_FALSE(turns.ours(Turns::kPatienceNs - 1));
+  CHECK(turns.ours(Turns::kPatienceNs));
+  turns.sent(Turns::kPatienceNs);
+  CHECK_FALSE(turns.ours(Turns::kPatienceNs));
+  turns.answered();
+  CHECK(turns.ours(Turns::kPatienceNs));
+}
+
+TEST_CASE("turns: a command out of turn is waited for as well") {
+  Turns turns;
+  turns.sent(0);
+  turns.sent(1);
+  turns.answered();
+  CHECK_FALSE(turns.ours(2));
+  turns.answered();
+  CHECK(turns.ours(2));
+  turns.answered();  // of a turn that was given up
+  turns.sent(3);
+  CHECK_FALSE(turns.ours(4));
 }

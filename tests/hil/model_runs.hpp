@@ -2,10 +2,16 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
+#include <cstdint>
+#include <optional>
 
 #include <rapidcheck.h>
 
 #include "hil/device/device_model.hpp"
+#include "hil/device/falcon.hpp"
+#include "hil/device/omni.hpp"
+#include "hil/device/wooden.hpp"
 
 namespace kerf::test {
 
@@ -23,7 +29,18 @@ inline void run(DeviceModel& model, const HandGoal& goal, int cycles) {
   for (int i = 0; i < cycles; ++i) model.step(goal);
 }
 
-/// Any place in a ball around the origin.
+/// A command with the motors on.
+inline void push(OmniModel& model, std::array<std::int16_t, 3> counts) {
+  model.command({counts, true, OmniCommand::Light::steady});
+}
+inline void push(FalconModel& model, std::array<std::int16_t, 3> counts) {
+  model.command({counts, false, true, false, false});
+}
+inline void push(WoodenModel& model, std::array<std::int16_t, 3> milliamps) {
+  model.command({milliamps, std::nullopt});
+}
+
+/// Any position in a ball around the origin.
 inline DeviceVec<double> any_in_ball(double radius_mm) {
   const auto part = [] { return *rc::gen::inRange(-1000, 1001) * 1e-3; };
   const DeviceVec<double> in_cube{part(), part(), part()};

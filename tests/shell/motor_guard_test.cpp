@@ -21,10 +21,16 @@
 #include "shared/posix/monotonic_clock.hpp"
 #include "shared/posix/stop_signals.hpp"
 #include "shared/wire/omni.hpp"
+#include "tests/support/child.hpp"
 
 namespace {
 
-/// A port over a socket pair, so that a dying child can still be heard.
+using kerf::test::end_in_child;
+using kerf::test::end_of;
+using kerf::test::kKilledBySignal;
+using kerf::test::start_child;
+
+/// A port over a socket pair, so that packets of a child that ends still come.
 class PairPort final : public kerf::PacketPort {
  public:
   explicit PairPort(int fd) : fd_(fd) {}
@@ -47,13 +53,7 @@ class PairPort final : public kerf::PacketPort {
 struct Ending {
   kerf::OmniCommand last;  ///< command that it sent
   double off_ms = -1;      ///< from the begin of its way out to the packet that let go for good
-  int status = 0;          ///< of waitpid
-  [[nodiscard]] bool was_ended_by(int signal) const {
-    return WIFSIGNALED(status) && WTERMSIG(status) == signal;
-  }
-  [[nodiscard]] bool exited_with(int code) const {
-    return WIFEXITED(status) && WEXITSTATUS(status) == code;
-  }
+  int code = -1;           ///< of `end_of`
 };
 
 /// When something happened, on a page that parent and child share.
@@ -74,34 +74,30 @@ class SharedTime {
   std::int64_t* ns_;
 };
 
-/// Runs `way_out(stop, port)` in a child that commands torque; it ends with code 0 afterwards, or 2
-/// after an exception.
+kerf::ServoOutput pushing() {
+  kerf::ServoOutput output;
+  output.motor_counts = {500, 500, 500};
+  output.motors_on = true;
+  return output;
+}
+
+/// Runs `way_out(stop, port)` in a child that commands torque.
 template <class WayOut>
 Ending ending_by(WayOut way_out) {
   std::array<int, 2> ends{};
   REQUIRE(socketpair(AF_UNIX, SOCK_SEQPACKET, 0, ends.data()) == 0);
   SharedTime began;
-  const pid_t child = fork();
-  REQUIRE(child >= 0);
-  if (child == 0) {
+  const pid_t child = start_child([&] {
     close(ends[0]);
     PairPort port(ends[1]);
     kerf::OmniDriver driver(port);
     std::atomic<bool>& stop = kerf::catch_stop_and_pause_signals();
-    try {
-      kerf::MotorGuard guard(driver);
-      const kerf::HandlerStack handlers = guard.guard_stack();
-      kerf::ServoOutput output;
-      output.motor_counts = {500, 500, 500};
-      output.motors_on = true;
-      driver.command(output);
-      began.set();
-      way_out(stop, port);
-    } catch (const std::exception&) {
-      _exit(2);
-    }
-    _exit(0);
-  }
+    kerf::MotorGuard guard(driver);
+    const kerf::HandlerStack handlers = guard.guard_stack();
+    driver.command(pushing());
+    began.set();
+    way_out(stop, port);
+  });
   close(ends[1]);
   Ending ending;
   std::array<std::uint8_t, 64> packet{};
@@ -116,20 +112,17 @@ Ending ending_by(WayOut way_out) {
   }
   CHECK(packets >= 2);
   close(ends[0]);
-  waitpid(child, &ending.status, 0);
+  ending.code = end_of(child);
   ending.off_ms = static_cast<double>(off_ns - began.get()) / 1e6;
   return ending;
 }
 
-/// Whether the kernel ends a process by this signal that has not said otherwise: asked of a child.
+/// Returns true if the kernel ends a process by this signal unless it is caught: tried by a child.
 bool ends_by_default(int signal) {
-  const pid_t child = fork();
-  REQUIRE(child >= 0);
-  if (child == 0) {
+  const pid_t child = start_child([signal] {
     std::signal(signal, SIG_DFL);
     std::raise(signal);
-    _exit(0);
-  }
+  });
   int status = 0;
   waitpid(child, &status, WUNTRACED);
   if (WIFSTOPPED(status)) {
@@ -161,7 +154,7 @@ TEST_CASE("motors are off after return and exception") {
   CHECK(ending_by([](auto&, auto&) {}).last == kNeutral);
   const Ending thrown = ending_by([](auto&, auto&) { throw std::runtime_error("edge"); });
   CHECK(thrown.last == kNeutral);
-  CHECK(thrown.exited_with(2));
+  CHECK(thrown.code == kerf::test::kThrown);
 }
 
 TEST_CASE("every signal that ends a process by default switches the motors off first") {
@@ -183,7 +176,7 @@ TEST_CASE("every signal that ends a process by default switches the motors off f
       std::this_thread::sleep_for(std::chrono::milliseconds(5));
     });
     CHECK(ending.last == kNeutral);
-    CHECK((is_crash(signal) ? ending.was_ended_by(signal) : ending.exited_with(0)));
+    CHECK((is_crash(signal) ? ending.code == kKilledBySignal + signal : ending.code == 0));
     if (ending.off_ms > slowest_ms) {
       slowest_ms = ending.off_ms;
       slowest = signal;
@@ -197,11 +190,8 @@ TEST_CASE("what a tick commands after the signal is neutral") {
   REQUIRE(socketpair(AF_UNIX, SOCK_SEQPACKET, 0, ends.data()) == 0);
   PairPort port(ends[0]);
   kerf::OmniDriver driver(port);
-  kerf::ServoOutput output;
-  output.motor_counts = {500, 500, 500};
-  output.motors_on = true;
   CHECK(driver.stay_released());
-  driver.command(output);
+  driver.command(pushing());
   std::array<std::uint8_t, 64> packet{};
   for (ssize_t size = 0; (size = recv(ends[1], packet.data(), packet.size(), MSG_DONTWAIT)) > 0;) {
     const auto command =
@@ -215,56 +205,33 @@ TEST_CASE("what a tick commands after the signal is neutral") {
 }
 
 TEST_CASE("signals of a write end nothing, and those that pause a program end it") {
-  for (const int signal : {SIGPIPE, SIGXFSZ}) {
+  for (const int signal : {SIGPIPE, SIGXFSZ, SIGTSTP, SIGTTIN, SIGTTOU}) {
     CAPTURE(signal);
-    const Ending ending = ending_by([signal](std::atomic<bool>& stop, const PairPort&) {
+    const bool pauses = signal != SIGPIPE && signal != SIGXFSZ;
+    const Ending ending = ending_by([=](std::atomic<bool>& stop, const PairPort&) {
       std::raise(signal);
-      if (stop) _exit(3);
+      if (stop != pauses) _exit(3);
     });
-    CHECK(ending.exited_with(0));
-    CHECK(ending.last == kNeutral);
-  }
-  for (const int signal : {SIGTSTP, SIGTTIN, SIGTTOU}) {
-    CAPTURE(signal);
-    const Ending ending = ending_by([signal](std::atomic<bool>& stop, const PairPort&) {
-      std::raise(signal);
-      if (!stop) _exit(3);
-    });
-    CHECK(ending.exited_with(0));
+    CHECK(ending.code == 0);
     CHECK(ending.last == kNeutral);
   }
 }
 
-TEST_CASE("a signal that is blocked from the start asks all the same") {
+TEST_CASE("a signal that is blocked from the start stops too, an ignored one only as INT or TERM") {
   for (const int signal : {SIGHUP, SIGUSR1, SIGALRM, SIGRTMIN, SIGINT, SIGTERM}) {
     CAPTURE(signal);
-    const pid_t child = fork();
-    REQUIRE(child >= 0);
-    if (child == 0) {
-      const kerf::BlockStopSignals blocked;
+    const auto is_caught = [signal] {
       const std::atomic<bool>& stop = kerf::catch_stop_signals();
       std::raise(signal);
-      _exit(stop ? 1 : 0);
-    }
-    int status = 0;
-    waitpid(child, &status, 0);
-    CHECK(WEXITSTATUS(status) == 1);
-  }
-}
-
-TEST_CASE("a signal that is ignored from the start stays so, but INT and TERM") {
-  for (const int signal : {SIGHUP, SIGUSR1, SIGALRM, SIGRTMIN, SIGINT, SIGTERM}) {
-    CAPTURE(signal);
-    const pid_t child = fork();
-    REQUIRE(child >= 0);
-    if (child == 0) {
-      std::signal(signal, SIG_IGN);
-      const std::atomic<bool>& stop = kerf::catch_stop_signals();
-      std::raise(signal);
-      _exit(stop ? 1 : 0);
-    }
-    int status = 0;
-    waitpid(child, &status, 0);
-    CHECK(WEXITSTATUS(status) == (signal == SIGINT || signal == SIGTERM ? 1 : 0));
+      return stop ? 1 : 0;
+    };
+    CHECK(end_in_child([&] {
+            const kerf::BlockStopSignals blocked;
+            return is_caught();
+          }) == 1);
+    CHECK(end_in_child([&] {
+            std::signal(signal, SIG_IGN);
+            return is_caught();
+          }) == (signal == SIGINT || signal == SIGTERM ? 1 : 0));
   }
 }

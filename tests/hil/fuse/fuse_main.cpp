@@ -6,6 +6,7 @@
 #include <chrono>
 #include <csignal>
 #include <cstdio>
+#include <filesystem>
 #include <fstream>
 #include <string>
 #include <thread>
@@ -15,9 +16,10 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "hil/front/fuse/fuse_mount.hpp"
 #include "hil/hil_error.hpp"
-#include "tests/hil/fuse/mounted_node.hpp"
 #include "tests/hil/fuse/spread.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 namespace {
 
@@ -30,7 +32,7 @@ constexpr int kStepMs = 20;
 
 int run_tests(int argc, char** argv) {
   try {
-    const kerf::test::TempFolder folder;
+    const kerf::test::TemporaryFolder folder;
     const kerf::FuseMount probe(folder.path());
   } catch (const kerf::HilError& error) {
     std::printf("skipped: %s\n", error.what());
@@ -58,7 +60,7 @@ bool is_ending(pid_t child) {
   return (flags & kExiting) != 0;
 }
 
-/// Where somebody asked for long measurements, ctest is not there to wait.
+/// Long measurements, by KERF_TIMING_SECONDS, are not started by ctest.
 int longest_ms() {
   return kLongestMs + kTimedCases * (kerf::test::timing_ticks() - kerf::test::kTimingTicks);
 }
@@ -88,7 +90,7 @@ int watch(pid_t child, const std::filesystem::path& folder) {
 
 /// Skips with its reason, exit code 77, where nothing can be mounted.
 int main(int argc, char** argv) {
-  const std::string folder = kerf::test::TempFolder().path();
+  const std::string folder = kerf::test::TemporaryFolder().path();
   std::filesystem::create_directory(folder);
   setenv("TMPDIR", folder.c_str(), 1);
   const pid_t child = fork();

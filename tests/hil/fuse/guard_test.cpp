@@ -9,7 +9,7 @@
 #include <unistd.h>
 
 #include "controller/loop/motor_guard.hpp"
-#include "tests/hil/fuse/usb_session.hpp"
+#include "tests/hil/fuse/bus_session.hpp"
 
 namespace {
 
@@ -18,8 +18,8 @@ using kerf::Personality;
 using kerf::UsbFault;
 using kerf::test::kGoOn;
 
-/// Guarded ticks of a driver on the bus at `text`, until it is gone or for a while; the name of the
-/// call that was trapped, empty for none. `seeded`: the loop makes a call that no bus needs.
+/// Guarded ticks of a driver on the bus at `text`, until it is gone, at most 2000. Returns the name
+/// of the call that was trapped, empty if none. `seeded`: the loop makes a call that no bus needs.
 /// FireWire is in lock-step here, and needs no clock.
 std::string unexpected_call(Personality personality, const std::string& text, bool seeded = false) {
   const bool lockstep = personality == Personality::omni;
@@ -53,23 +53,23 @@ TEST_CASE("the guard lets each bus make its calls, also when channels are lost o
     kerf::FirewireSettings settings;
     settings.script = {{8 * 100, BusFault::steal}};
     const kerf::test::MountedNode omni(settings);
-    CHECK(unexpected_call(Personality::omni, "fw:" + omni.path()) == "");
+    CHECK(unexpected_call(Personality::omni, omni.port()) == "");
   }
   {
     const kerf::test::MountedFalcon falcon({.firmware_runs = true}, {{1000, UsbFault::vanish}});
-    CHECK(unexpected_call(Personality::falcon, "usb:" + falcon.path()) == "");
+    CHECK(unexpected_call(Personality::falcon, falcon.port()) == "");
   }
   {
     const kerf::test::MountedArm arm({.script = {{1000, UsbFault::vanish}}});
-    CHECK(unexpected_call(Personality::woodenhaptics, "hid:" + arm.path()) == "");
+    CHECK(unexpected_call(Personality::woodenhaptics, arm.port()) == "");
   }
 }
 
 TEST_CASE("the guard ends a loop that makes another call, on each bus") {
   const kerf::test::MountedNode omni;
-  CHECK(unexpected_call(Personality::omni, "fw:" + omni.path(), true) == "getppid");
+  CHECK(unexpected_call(Personality::omni, omni.port(), true) == "getppid");
   const kerf::test::MountedFalcon falcon;
-  CHECK(unexpected_call(Personality::falcon, "usb:" + falcon.path(), true) == "getppid");
+  CHECK(unexpected_call(Personality::falcon, falcon.port(), true) == "getppid");
   const kerf::test::MountedArm arm;
-  CHECK(unexpected_call(Personality::woodenhaptics, "hid:" + arm.path(), true) == "getppid");
+  CHECK(unexpected_call(Personality::woodenhaptics, arm.port(), true) == "getppid");
 }

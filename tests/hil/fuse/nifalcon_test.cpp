@@ -15,7 +15,7 @@
 #include <unistd.h>
 
 #include "tests/hil/clients/nifalcon_client.hpp"
-#include "tests/hil/fuse/usb_session.hpp"
+#include "tests/hil/fuse/bus_session.hpp"
 
 using kerf::test::MountedFalcon;
 using kerf::test::NifalconClient;

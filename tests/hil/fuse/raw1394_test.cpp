@@ -32,13 +32,13 @@ namespace {
 
 constexpr std::uint32_t kOmni = 0xFFC0, kHost = 0xFFC1;
 
-/// A bus with both of its nodes, in real time: who waits by epoll does not take a bus in lock-step
-/// to the answer, as who waits by poll() does.
+/// A bus with both of its nodes, in real time: epoll does not take a bus in lock-step to the
+/// answer, as poll() does.
 class MountedBus {
  public:
   explicit MountedBus(std::vector<kerf::ScriptedFault> script = {})
       : omni_({.clock = kerf::BusClock::real_time(), .script = std::move(script)}, arm_) {
-    mount_.add("fw0", host_);
+    mount_.add("fw0", omni_, kerf::FirewireNode::kHostFile);
     mount_.add("fw1", omni_);
     thread_ = std::thread([this] { mount_.serve([this] { return !stop_; }); });
   }
@@ -48,21 +48,20 @@ class MountedBus {
   }
   MountedBus(const MountedBus&) = delete;
   MountedBus& operator=(const MountedBus&) = delete;
-  [[nodiscard]] const std::string& folder() const noexcept { return folder_.path(); }
+  [[nodiscard]] std::string folder() const { return folder_.path(); }
   [[nodiscard]] std::string host() const { return folder() + "/fw0"; }
   [[nodiscard]] std::string omni() const { return folder() + "/fw1"; }
 
  private:
-  kerf::test::TempFolder folder_;
+  kerf::test::TemporaryFolder folder_;
   kerf::Emulator arm_{kerf::OmniParams{}, {}};
   kerf::FirewireNode omni_;
-  kerf::FirewireHostNode host_{omni_};
   kerf::FuseMount mount_{folder_.path()};
   std::atomic<bool> stop_{false};
   std::thread thread_;
 };
 
-const std::atomic<bool> kGoOn{false};
+using kerf::test::kGoOn;
 
 }  // namespace
 

@@ -10,8 +10,8 @@
 #include "controller/device/port/usb_port.hpp"
 #include "shared/wire/falcon.hpp"
 #include "shared/wire/woodenhaptics.hpp"
+#include "tests/hil/fuse/bus_session.hpp"
 #include "tests/hil/fuse/private_sysfs.hpp"
-#include "tests/hil/fuse/usb_session.hpp"
 
 using kerf::HidPort;
 using kerf::UsbPort;

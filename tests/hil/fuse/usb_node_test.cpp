@@ -19,7 +19,7 @@
 
 #include "shared/wire/falcon.hpp"
 #include "shared/wire/woodenhaptics.hpp"
-#include "tests/hil/fuse/usb_session.hpp"
+#include "tests/hil/fuse/bus_session.hpp"
 
 using kerf::UsbFault;
 using kerf::test::MountedArm;

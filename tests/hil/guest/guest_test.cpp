@@ -1,21 +1,121 @@
 // SPDX-License-Identifier: Apache-2.0
 // Two runs of the guest (hil/guest): emulator below, a real kernel's USB and HID stack between, the
-// controller with libusb and hidapi above. Time is virtual there, so bounds on time are no guesses
-// about this machine.
+// controller with libusb and hidapi above. Time is virtual there, so bounds on time are exact.
+#define DOCTEST_CONFIG_IMPLEMENT
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <optional>
 #include <sstream>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include <doctest/doctest.h>
 
-#include "tests/hil/guest/guest_log.hpp"
 #include "tests/json.hpp"
-
-using kerf::test::first_run;
-using kerf::test::second_run;
+#include "tests/support/process.hpp"
 
 namespace {
+
+/// What a guest printed (hil/guest/init): a line begins with the device that it is about.
+class GuestLog {
+ public:
+  explicit GuestLog(std::string text) : text_(std::move(text)) {
+    std::istringstream in(text_);
+    for (std::string line; std::getline(in, line);) {
+      if (!line.empty() && line.back() == '\r') line.pop_back();  // the terminal's
+      lines_.push_back(line);
+    }
+  }
+
+  [[nodiscard]] const std::string& text() const noexcept { return text_; }
+  [[nodiscard]] const std::vector<std::string>& lines() const noexcept { return lines_; }
+
+  /// The rests of the lines that begin with `words`.
+  [[nodiscard]] std::vector<std::string> after(const std::string& words) const {
+    std::vector<std::string> rests;
+    for (const std::string& line : lines_) {
+      if (line.starts_with(words + ' ')) rests.push_back(line.substr(words.size() + 1));
+    }
+    return rests;
+  }
+  /// The only such rest; empty if there is none or more than one.
+  [[nodiscard]] std::string only(const std::string& words) const {
+    const auto rests = after(words);
+    return rests.size() == 1 ? rests.front() : std::string();
+  }
+  /// The JSON report of a program; null if it is not there or is no JSON.
+  [[nodiscard]] kerf::test::ReadJson report(const std::string& device,
+                                            const std::string& program) const {
+    std::string text;
+    for (const std::string& line : after(device + ' ' + program + " report")) text += line;
+    try {
+      return kerf::test::read_json(text);
+    } catch (const kerf::JsonError&) {
+      return {};
+    }
+  }
+
+ private:
+  std::string text_;
+  std::vector<std::string> lines_;
+};
+
+constexpr int kSkipped = 77;
+const std::filesystem::path kFolder = KERF_GUEST_FOLDER;
+
+std::array<std::optional<GuestLog>, 2> logs;
+
+/// One run of hil/guest/guest.sh with its own output.
+struct Guest {
+  explicit Guest(const std::string& name, std::vector<std::string> words)
+      : output(kFolder / (name + ".txt")), process(arguments(std::move(words)), output) {}
+
+  static std::vector<std::string> arguments(std::vector<std::string> words) {
+    words.insert(words.begin(), KERF_GUEST);
+    return words;
+  }
+  /// Its exit code; if not 0, its output is printed.
+  int wait() {
+    const int code = process.wait();
+    if (code != 0) std::printf("%s", process.output().c_str());
+    return code;
+  }
+
+  std::filesystem::path output;
+  kerf::test::Process process;
+};
+
+/// Makes the image and boots it twice, side by side.
+int run_guests() {
+  std::filesystem::create_directories(kFolder);
+  if (const int code = Guest("image", {"image", KERF_GUEST_BIN, kFolder}).wait(); code != 0) {
+    return code;
+  }
+  const std::array<std::filesystem::path, 2> files{kFolder / "first.log", kFolder / "second.log"};
+  std::array<std::unique_ptr<Guest>, 2> guests;
+  for (std::size_t i = 0; i < guests.size(); ++i) {
+    guests[i] =
+        std::make_unique<Guest>("boot", std::vector<std::string>{"boot", kFolder, files[i]});
+  }
+  for (const auto& guest : guests) {
+    if (const int code = guest->wait(); code != 0) return code;
+  }
+  for (std::size_t i = 0; i < files.size(); ++i) logs[i].emplace(kerf::test::text_of(files[i]));
+  return 0;
+}
+
+/// The logs of two runs of the same guest.
+const GuestLog& first_run() {
+  return *logs[0];
+}
+const GuestLog& second_run() {
+  return *logs[1];
+}
 
 constexpr const char* kDevices[] = {"falcon", "woodenhaptics"};
 
@@ -165,4 +265,14 @@ TEST_CASE(
   CHECK(said("raw1394 resets") == "1");
   CHECK(said("raw1394 after reset left") == "4915 ffffffff");
   CHECK(said("raw1394 emulator exit") == "0");
+}
+
+/// Skips with its reason, exit code 77, if QEMU, busybox or the kernel's package is missing.
+int main(int argc, char** argv) {
+  if (const int code = run_guests(); code != 0) {
+    if (code != kSkipped) std::printf("hil/guest/guest.sh: exit code %d\n", code);
+    return code;
+  }
+  doctest::Context context(argc, argv);
+  return context.run();
 }

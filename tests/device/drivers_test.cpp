@@ -1,0 +1,312 @@
+// SPDX-License-Identifier: Apache-2.0
+// The three drivers above a bus in memory.
+#include <array>
+#include <cstdint>
+
+#include <doctest/doctest.h>
+
+#include "controller/device/device_driver.hpp"
+#include "shared/wire/falcon.hpp"
+#include "shared/wire/omni.hpp"
+#include "shared/wire/woodenhaptics.hpp"
+#include "tests/device/fake_port.hpp"
+
+using kerf::FalconCommand;
+using kerf::FalconReport;
+using kerf::OmniCommand;
+using kerf::WoodenCommand;
+using kerf::WoodenReport;
+namespace wooden = kerf::wooden;
+
+namespace {
+
+using Counts = std::array<std::int16_t, 3>;
+using Encoders = std::array<std::int16_t, 6>;
+constexpr std::array<bool, 3> kHomed{true, true, true};
+constexpr Encoders kHome{0, 0, 6000, 0, 0, 0};
+
+template <class Driver>
+struct Bench {
+  template <class... Arguments>
+  explicit Bench(const Arguments&... arguments) : driver(port, arguments...) {}
+
+  void push(std::uint32_t counter, std::int16_t encoder = 0) {
+    port.push(kerf::encode(kerf::OmniReport{.encoder = {encoder, 0, 0}, .counter = counter}));
+  }
+  kerf::DeviceReport receive(const FalconReport& report) {
+    port.push(kerf::encode(report));
+    return driver.read();
+  }
+  kerf::DeviceReport read(Counts encoder, bool button = false,
+                          std::size_t bytes = wooden::kPacketBytes) {
+    const auto packet = kerf::encode(
+        WoodenReport{.encoder = {encoder[0], encoder[1], encoder[2]}, .calibrate = button});
+    port.push(std::span(packet).first(bytes));
+    return driver.read();
+  }
+  /// As after a press of the button in the home pose that the device has received.
+  void home() {
+    static_cast<void>(read({0, 0, 0}, true));
+    driver.command({});
+    REQUIRE(read({0, 0, 6000}).homed);
+  }
+  [[nodiscard]] const std::vector<std::uint8_t>& last() const {
+    REQUIRE_FALSE(port.sent.empty());
+    return port.sent.back();
+  }
+  [[nodiscard]] OmniCommand omni() const { return kerf::decode_command(last()).value(); }
+  [[nodiscard]] FalconCommand falcon() const {
+    return kerf::falcon::decode_command(last()).value();
+  }
+  [[nodiscard]] WoodenCommand arm() const { return wooden::decode_command(last()).value(); }
+  /// The encoder values that the next command sets.
+  [[nodiscard]] Encoders encoders_set() {
+    driver.command({});
+    return arm().set_encoders.value();
+  }
+
+  kerf::test::FakePort port;
+  Driver driver;
+};
+using Omni = Bench<kerf::OmniDriver>;
+using Falcon = Bench<kerf::FalconDriver>;
+using Wooden = Bench<kerf::WoodenDriver>;
+
+kerf::ServoOutput forcing(Counts counts) {
+  kerf::ServoOutput output;
+  output.motor_counts = counts;
+  output.motors_on = true;
+  output.phase = kerf::Phase::active;
+  return output;
+}
+
+}  // namespace
+
+TEST_CASE("omni: the newest of several waiting reports counts, and none is not fresh") {
+  Omni omni;
+  CHECK_FALSE(omni.driver.read().fresh);
+  for (const std::uint32_t counter : {1U, 2U, 3U}) {
+    omni.push(counter, static_cast<std::int16_t>(10 * counter));
+  }
+  const auto report = omni.driver.read();
+  CHECK(report.fresh);
+  CHECK(report.encoder[0] == 30);
+  CHECK(omni.driver.lost() == 0);
+  CHECK_FALSE(omni.driver.read().fresh);
+}
+
+TEST_CASE("omni: losses are counted by the device's counter, a long gap when its end is believed") {
+  struct {
+    std::vector<std::uint32_t> counters;
+    std::uint64_t lost;
+  } const cases[] = {
+      {{0xfffffffe, 3}, 4},                       // over its wrap: 0xffffffff, 0, 1, 2
+      {{1, 5002, 5003}, 5000},                    //
+      {{1, 1'005'003, 1'005'004}, 0},             // no device is away for so long
+      {{0x80000000, 1, 2}, 0},                    // it counts anew
+      {{500, 501, 502 ^ 1U << 8, 503, 504}, 1},   // a wrong bit: 502 is not known
+      {{500, 501, 502 ^ 1U << 20, 503, 504}, 1},  //
+      {{500, 501, 502 ^ 1U << 31, 503, 504}, 1},
+  };
+  for (const auto& [counters, lost] : cases) {
+    CAPTURE(counters[1]);
+    Omni omni;
+    for (const std::uint32_t counter : counters) {
+      omni.push(counter, static_cast<std::int16_t>(counter % 1000));
+    }
+    CHECK(omni.driver.read().encoder[0] == counters.back() % 1000);
+    CHECK(omni.driver.lost() == lost);
+  }
+}
+
+TEST_CASE("omni: a device that counts anew is believed at its second packet") {
+  Omni omni;
+  omni.push(0x80000000, 10);
+  omni.push(1, 20);
+  CHECK(omni.driver.read().encoder[0] == 10);
+  omni.push(2, 30);
+  CHECK(omni.driver.read().encoder[0] == 30);
+}
+
+TEST_CASE("omni: an old or repeated packet does not move the tip back") {
+  Omni omni;
+  omni.push(10, 100);
+  omni.push(9, 90);
+  omni.push(10, 91);
+  CHECK(omni.driver.read().encoder[0] == 100);
+  CHECK(omni.driver.refused() == 2);
+  CHECK(omni.driver.lost() == 0);
+}
+
+TEST_CASE("truncated and overlong packets are refused, not read as reports") {
+  Omni omni;
+  for (const std::size_t bytes : {43U, 45U, 1500U}) omni.port.incoming.emplace_back(bytes);
+  CHECK_FALSE(omni.driver.read().fresh);
+  CHECK(omni.driver.refused() == 3);
+  Falcon falcon;
+  auto bytes = kerf::encode(FalconReport{.homed = kHomed});
+  falcon.port.push(std::span(bytes).first(15));
+  bytes[15] = 'x';
+  falcon.port.push(bytes);
+  CHECK_FALSE(falcon.driver.read().fresh);
+  CHECK(falcon.driver.refused() == 2);
+}
+
+TEST_CASE("a flood of packets is bounded work") {
+  Omni omni;
+  for (std::uint32_t counter = 1; counter <= 1000; ++counter) omni.push(counter);
+  CHECK(omni.driver.read().fresh);
+  CHECK(omni.port.receive_calls <= 64);
+}
+
+TEST_CASE("omni: commands carry counts, motors and light; release is neutral with motors off") {
+  Omni omni;
+  omni.driver.command(forcing({100, -200, 300}));
+  CHECK(omni.omni() == OmniCommand{{100, -200, 300}, true, OmniCommand::Light::steady});
+  omni.driver.release();
+  CHECK(omni.omni() == OmniCommand{});
+  CHECK(omni.port.sent.size() == 2);
+}
+
+TEST_CASE("falcon and wooden: the host begins, with the motors off") {
+  Falcon falcon;
+  falcon.driver.start();
+  CHECK(falcon.port.sent.size() == 1);
+  CHECK(falcon.falcon() == FalconCommand{});
+  Wooden arm;
+  arm.driver.start();
+  CHECK(arm.arm() == WoodenCommand{});
+}
+
+TEST_CASE("falcon: every tick leaves a command; what switches the motors off goes out of turn") {
+  Falcon falcon;
+  falcon.driver.start();
+  CHECK(falcon.port.sent_now == 1);
+  falcon.driver.command(forcing({1000, -1000, 4095}));
+  falcon.driver.command(forcing({1000, -1000, 4095}));
+  CHECK(falcon.port.sent.size() == 3);
+  CHECK(falcon.port.sent_now == 1);
+  falcon.driver.command({});
+  CHECK(falcon.port.sent_now == 2);
+  CHECK(falcon.falcon().motor == Counts{});
+  falcon.driver.command({});
+  CHECK(falcon.port.sent.size() == 5);
+  CHECK(falcon.port.sent_now == 2);
+}
+
+TEST_CASE("falcon: released for good, every later command is neutral, also one under way") {
+  for (const bool under_way : {false, true}) {
+    CAPTURE(under_way);
+    Falcon falcon;
+    if (under_way) {
+      falcon.port.before_send = [&] {
+        falcon.port.before_send = nullptr;
+        CHECK(falcon.driver.release_for_good());
+      };
+    } else {
+      CHECK(falcon.driver.release_for_good());
+      static_cast<void>(falcon.receive({.homed = kHomed}));
+    }
+    falcon.driver.command(forcing({1000, -1000, 4095}));
+    CHECK(falcon.falcon().motor == Counts{});
+    if (under_way) CHECK(falcon.port.sent.size() == 3);
+  }
+}
+
+TEST_CASE("falcon: reports carry counts, buttons and homing of all three axes") {
+  Falcon falcon;
+  const auto report = falcon.receive(
+      {.encoder = {512, -3, -512}, .buttons = kerf::falcon::kButtonCentre, .homed = kHomed});
+  CHECK(report.encoder == Counts{512, -3, -512});
+  CHECK(report.parked);
+  CHECK(report.homed);
+  const auto later =
+      falcon.receive({.buttons = kerf::falcon::kButtonForward, .homed = {true, false, true}});
+  CHECK(later.button1);
+  CHECK_FALSE(later.parked);
+  CHECK_FALSE(later.homed);
+  CHECK(later.counter == report.counter + 1);
+}
+
+TEST_CASE("falcon: requests homing until it is homed; lights show the phase") {
+  Falcon falcon;
+  falcon.driver.command({});
+  CHECK(falcon.falcon().homing);
+  CHECK(falcon.falcon().blue);
+  static_cast<void>(falcon.receive({.homed = kHomed}));
+  falcon.driver.command(forcing({1000, -1000, 4095}));
+  CHECK(falcon.falcon() == FalconCommand{.motor = {1000, -1000, 4095}, .green = true});
+  static_cast<void>(falcon.receive({.homed = kHomed}));
+  kerf::ServoOutput fault;
+  fault.phase = kerf::Phase::fault;
+  falcon.driver.command(fault);
+  CHECK(falcon.falcon() == FalconCommand{.red = true});
+}
+
+TEST_CASE("wooden: the button sets the encoders; the arm is parked until it leaves the pose") {
+  Wooden arm;
+  CHECK_FALSE(arm.read({123, -45, 678}).homed);  // counts since power-up mean nothing
+  CHECK(arm.read({123, -45, 678}, true).parked);
+  CHECK(arm.encoders_set() == kHome);
+  CHECK_FALSE(arm.read({124, -45, 678}, true).homed);  // the device has not received it yet
+  arm.driver.command({});
+  const auto at_home = arm.read({1, 0, 5999});
+  CHECK(at_home.homed);
+  CHECK(at_home.parked);
+  arm.driver.command(forcing({500, -500, 0}));
+  CHECK(arm.arm() == WoodenCommand{.milliamps = {500, -500, 0}, .set_encoders = {}});
+  CHECK_FALSE(arm.read({300, 0, 5999}).parked);
+  const auto through = arm.read({0, 0, 6000});  // the pose again: that does not park
+  CHECK_FALSE(through.parked);
+  CHECK(through.homed);
+}
+
+TEST_CASE("wooden: the button in use parks, and keeps the encoders as they are") {
+  Wooden arm;
+  arm.home();
+  CHECK_FALSE(arm.read({400, 1000, 5000}).parked);
+  const auto pressed = arm.read({400, 1000, 5000}, true);
+  CHECK(pressed.parked);
+  CHECK(pressed.homed);
+  CHECK(arm.encoders_set() == Encoders{400, 1000, 5000, 0, 0, 0});
+  const auto released = arm.read({400, 1000, 5000});
+  CHECK_FALSE(released.parked);
+  CHECK(released.homed);
+}
+
+TEST_CASE("wooden: an encoder of the other sign is turned with its motor and its home") {
+  Wooden arm(std::array{1, -1, -1});
+  static_cast<void>(arm.read({30, -40, 50}, true));
+  CHECK(arm.encoders_set() == Encoders{0, 0, -6000, 0, 0, 0});
+  CHECK(arm.read({0, 0, -6000}).homed);
+  CHECK(arm.read({400, 1000, -32768}).encoder == Counts{400, -1000, -32768});  // wraps
+  arm.driver.command(forcing({500, -500, 0}));
+  CHECK(arm.arm().milliamps == Counts{500, 500, 0});
+  static_cast<void>(arm.read({400, 1000, -5000}, true));  // in use counts are kept as they came
+  CHECK(arm.encoders_set() == Encoders{400, 1000, -5000, 0, 0, 0});
+}
+
+TEST_CASE(
+    "wooden: near home the button calibrates again, and other counts afterwards are no home") {
+  Wooden arm;
+  arm.home();
+  CHECK_FALSE(arm.read({30, 200, 6100}, true).homed);  // slipped: home reads like this now
+  CHECK(arm.encoders_set() == kHome);
+  Wooden stubborn;
+  static_cast<void>(stubborn.read({10, 20, 30}, true));
+  stubborn.driver.command({});
+  CHECK_FALSE(stubborn.read({10, 20, 30}).homed);  // the firmware set nothing
+}
+
+TEST_CASE("wooden: packets are as long as the device's own") {
+  Wooden arm;
+  arm.driver.command({});
+  CHECK(arm.last().size() == wooden::kPacketBytes);
+  CHECK(arm.read({0, 0, 0}, false, wooden::kLongPacketBytes).fresh);
+  arm.driver.command({});
+  CHECK(arm.last().size() == wooden::kLongPacketBytes);
+  arm.port.incoming.emplace_back(13);
+  arm.port.incoming.emplace_back(65);
+  CHECK_FALSE(arm.driver.read().fresh);
+  CHECK(arm.driver.refused() == 2);
+}
