@@ -12,7 +12,7 @@
 #include "hil/device/plant_params.hpp"
 #include "shared/numeric/vec.hpp"
 
-/// The mechanics that all emulated arms share: motors with lag and delay, rotors, tip mass, the
+/// The mechanics of all emulated arms: motors with lag and delay, rotors, tip mass, the
 /// hand's spring and end stops, in fixed steps and without a clock. `ArmPlant` puts them together.
 namespace kerf {
 
@@ -60,7 +60,7 @@ class MotorChain {
  public:
   explicit MotorChain(const PlantParams& params) noexcept;
 
-  /// Torques that a packet of the host asks for, N mm; they act from the next cycle on.
+  /// Torques that a packet of the host commands, N mm; they act from the next cycle on.
   void command(JointVec<double> torque_nmm) noexcept;
   /// One bus cycle begins.
   void begin_cycle() noexcept;
@@ -140,7 +140,7 @@ class ReportedJoints {
 /// The inertia that turns with the motors, in joint space: none, rigid with the links, or on a
 /// spring (a structural mode, which the encoders see from the motor's side).
 ///
-/// Rigid rotors and tip share their momentum once per step, (m + K' I K) v = m v' + K' I w, with K
+/// Rigid rotors and tip exchange momentum once per step, (m + K' I K) v = m v' + K' I w, with K
 /// the joint rates by the tip's velocity and w the rotors' rates before: to first order this holds
 /// the forces that come from K changing with the pose, and it never adds energy. One thread.
 class Rotors {
@@ -193,7 +193,7 @@ class Rotors {
 /// A point mass with viscous and Coulomb friction over one fixed time step.
 ///
 /// Viscous friction is exact for a force that is constant over the step. Coulomb friction takes the
-/// speed down by what it can take in one step and never turns it round, so a mass at rest stays
+/// speed down by as much as it can in one step and never reverses it, so a mass at rest stays
 /// exactly at rest below the limit, and the terminal speed is (F - Fc) / b (the stick band of
 /// Karnopp's model, with the width that follows from the step). Kick between two half drifts, and
 /// the motion is of second order and keeps energy.

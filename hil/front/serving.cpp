@@ -91,18 +91,18 @@ void serve_real_time(PacketLink& client, PacketDevice& device, int packet_cycles
 void serve_lockstep(PacketLink& client, PacketDevice& device, const LockStepTurns& turns,
                     const ServeLimits& limits, FrontStats& stats) {
   Buffer buffer;
-  const auto say = [&] {
-    if (turns.says_nothing_came) return send_turn(client, device, stats);
+  const auto send_tick = [&] {
+    if (turns.empty_turns) return send_turn(client, device, stats);
     send(client, device, stats);
   };
-  if (turns.device_first || !turns.says_nothing_came) say();
+  if (turns.device_first || !turns.empty_turns) send_tick();
   while (!client.closed() && !limits.reached(stats.cycles)) {
     const auto packet = client.wait(buffer, kStopCheckMs);
     if (packet.empty()) continue;
     device.receive(packet);
     device.advance(turns.tick_cycles);
     stats.cycles += turns.tick_cycles;
-    say();
+    send_tick();
   }
 }
 

@@ -95,11 +95,11 @@ struct LockStepTurns {
   int tick_cycles = 8;  ///< bus cycles of a tick
   /// All packets of a tick go as one turn (`Turn`), an empty one if nothing is due: for devices
   /// whose packets a fault may keep back or double. Only kerf's own controller reads turns.
-  bool says_nothing_came = false;
-  bool device_first = true;  ///< the device, before any packet of the host
+  bool empty_turns = false;
+  bool device_first = true;  ///< its packets go before any packet of the host
 };
 
-/// Serves one client in lock-step: one packet at once (of a device that speaks first), then for
+/// Serves one client in lock-step: one packet at once (of a device that goes first), then for
 /// every packet of the host one tick and the packets that are due then. No clock: the same host
 /// sees the same bytes.
 void serve_lockstep(PacketLink& client, PacketDevice& device, const LockStepTurns& turns,
@@ -119,7 +119,7 @@ class KernelDevice {
   virtual void wake() = 0;
 };
 
-/// Serves while `goes_on`, which is asked between two steps and at least every 100 ms. `lateness`
+/// Serves while `goes_on`, which is called between two steps and at least every 100 ms. `lateness`
 /// records the lateness of each `wake`.
 void serve_kernel(KernelDevice& device, const std::function<bool()>& goes_on, Histogram& lateness);
 

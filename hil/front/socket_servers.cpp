@@ -211,7 +211,7 @@ std::uint16_t UdpServer::port() const noexcept {
   sockaddr_storage own{};
   socklen_t bytes = sizeof own;
   if (getsockname(fd_, generic(own), &bytes) != 0) return 0;
-  // The port stands at the same place in both families.
+  // The port has the same offset in both families.
   return ntohs(reinterpret_cast<const sockaddr_in&>(own).sin_port);
 }
 
@@ -223,7 +223,7 @@ std::optional<UdpLink> UdpServer::accept(const std::atomic<bool>& stop, std::int
     const ssize_t size =
         recvfrom(fd_, &first, 1, MSG_DONTWAIT | MSG_PEEK, generic(host), &host_bytes);
     if (size < 0) continue;
-    // An empty datagram only says hello; anything else is the first packet.
+    // An empty datagram only begins the session; another one is the first packet.
     if (size == 0) static_cast<void>(recv(fd_, &first, 1, MSG_DONTWAIT));
     return UdpLink(fd_, host, host_bytes);
   }

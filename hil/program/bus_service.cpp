@@ -54,7 +54,7 @@ void serve_fuse(BusService& service, const std::string& mount, const FirewireSet
   serve_node(service, folder, mount, "omni", "fw1", node,
              [&] { return node.bus().cycle() - kFirstCycle; });
   service.stats.sent = node.bus().stats().reports;
-  service.stats.dropped = node.bus().stats().unheard;
+  service.stats.dropped = node.bus().stats().undelivered;
 }
 
 void serve_fuse(BusService& service, const std::string& mount, const FtdiFalcon::Settings& falcon,

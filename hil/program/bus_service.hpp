@@ -44,8 +44,8 @@ void serve_fuse(BusService& service, const std::string& mount, const FtdiFalcon:
 void serve_fuse(BusService& service, const std::string& mount, const WoodenHid::Settings& wooden);
 
 /// `--front usbip`: the Falcon at a virtual USB port of this machine's kernel. It stays until it is
-/// stopped or its time is over, because USB/IP does not tell when a program lets go. Throws
-/// `HilError` if the kernel cannot.
+/// stopped or its time is over, because USB/IP does not report that a program closes the device.
+/// Throws `HilError` if the kernel cannot.
 void serve_usbip(BusService& service, const FtdiFalcon::Settings& falcon,
                  std::vector<ScriptedUsbFault> script);
 

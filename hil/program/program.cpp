@@ -105,7 +105,7 @@ void serve_clients(const EmulatorOptions& o, Server& server, const std::string& 
       const bool device_first = o.personality == Personality::omni;
       serve_lockstep(link, device,
                      {.tick_cycles = kCyclesPerSecond / o.rate_hz,
-                      .says_nothing_came = !o.fault.empty(),
+                      .empty_turns = !o.fault.empty(),
                       .device_first = device_first},
                      limits, stats);
     } else {

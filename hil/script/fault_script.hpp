@@ -74,9 +74,9 @@ struct FaultScript {
 ///     clock = "push"         # begins when the motors first push; or "start": with the emulator
 ///     latches = "none"       # demanded by kerf-lab faults: a word of kLatchWords; if missing,
 ///     nothing seconds = 4            # how long kerf-lab faults plays it
-///     [[fault]]              # at least one, unless seconds says how long all goes well
-///     kind = "lose"          # a word of kFaultWords
-///     packets = "reports"    # or "commands"; of lose, delay, duplicate, reorder, truncate,
+///     [[fault]]              # at least one, unless `seconds` gives the length of a run without
+///     faults kind = "lose"          # a word of kFaultWords packets = "reports"    # or
+///     "commands"; of lose, delay, duplicate, reorder, truncate,
 ///                            # corrupt
 ///     at_s = 0.5
 ///     for_s = 0.1            # none: once

@@ -119,15 +119,6 @@ TEST_CASE("omni: losses are counted by the device's counter, a long gap when its
   }
 }
 
-TEST_CASE("omni: a device that counts anew is believed at its second packet") {
-  Omni omni;
-  omni.push(0x80000000, 10);
-  omni.push(1, 20);
-  CHECK(omni.driver.read().encoder[0] == 10);
-  omni.push(2, 30);
-  CHECK(omni.driver.read().encoder[0] == 30);
-}
-
 TEST_CASE("omni: an old or repeated packet does not move the tip back") {
   Omni omni;
   omni.push(10, 100);

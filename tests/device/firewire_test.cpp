@@ -21,7 +21,7 @@ using kerf::parse_firewire_port;
 using kerf::test::error_of;
 using kerf::test::has;
 
-TEST_CASE("--port fw takes a place and options in any order after it") {
+TEST_CASE("--port fw takes a node or serial and options in any order after it") {
   CHECK(parse_firewire_port("").where == "");
   CHECK(parse_firewire_port(":/dev/fw1").where == "/dev/fw1");
   CHECK(parse_firewire_port(":50626300006").where == "50626300006");
@@ -37,7 +37,7 @@ TEST_CASE("--port fw takes a place and options in any order after it") {
             "'fast' is not known"));
 }
 
-TEST_CASE("the serial number is unpacked as printed, whatever bit 0 says") {
+TEST_CASE("the serial number is unpacked as printed, whatever bit 0 is") {
   CHECK(kerf::firewire_serial(0x82B6'980C) == "50626300006");
   CHECK(kerf::firewire_serial(0x82B6'980D) == "50626300006");
   CHECK(kerf::firewire_serial(0x83A6'D80E) == "70427300007");
@@ -73,7 +73,7 @@ namespace {
 
 constexpr int kPeriod = 8;
 
-/// A controller that sends one entry a cycle and tells of them 64 at a time, as the kernel does.
+/// A controller that sends one entry a cycle and reports them 64 at a time, as the kernel does.
 /// The file of the transmitter is closed: only its bookkeeping is at work.
 struct Engine {
   /// One tick at cycle `now`: returns in how many cycles its packet goes out.

@@ -55,7 +55,7 @@ TEST_CASE("an inbox gives packets in their order and reports that it is full") {
   CHECK(little[1] == 2);
 }
 
-TEST_CASE("an outbox gives the newest packet, and what is older is void") {
+TEST_CASE("an outbox gives the newest packet, and older ones are void") {
   kerf::LatestCommand outbox;
   Bytes out{};
   CHECK(outbox.take(out) == 0);
@@ -88,7 +88,7 @@ TEST_CASE("packets of several threads reach the reader whole, each thread's in i
   int torn = 0, out_of_order = 0;
   Bytes out{};
   for (bool more = true; more;) {
-    more = sending > 0;  // before the last look
+    more = sending > 0;  // before the last read
     while (outbox.take(out) > 0) {
       if (!is_whole(out)) ++torn;
       int& before = last[out[0]];

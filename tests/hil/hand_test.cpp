@@ -92,7 +92,7 @@ TEST_CASE("a smooth move is half way at half time, a linear one everywhere in pr
   CHECK(norm(after(motion, kSecond / 4).target_mm - DeviceVec<double>{2, 0, 8}) < 1e-9);
 }
 
-TEST_CASE("patterns stay in their size, end where they began, and sink as told") {
+TEST_CASE("patterns stay in their size, end at their start, and sink by their depth") {
   auto motion = motion_of(
       "start_mm = [0, 4, 0]\n"
       "[[step]]\ncircle_mm = 2\nturns = 3\nseconds = 1\nsink_mm = 1\n"
@@ -129,24 +129,6 @@ TEST_CASE("the unit scales every length of the script and none of the way out") 
   CHECK(norm(motion.next().target_mm - kDock) < 0.01);
   CHECK(norm(reach(motion).target_mm - DeviceVec<double>{3, 6, 0}) < 1e-9);
   CHECK(norm(after(motion, kSecond).target_mm - DeviceVec<double>{0, -3, 0}) < 1e-9);
-}
-
-TEST_CASE("a hand that rests again after its script has ended can calibrate and leave anew") {
-  kerf::HandRoute route = from_dock();
-  route.calibration = {kerf::hand_move(kDock + DeviceVec<double>{0, 5, 0}, 0.1),
-                       kerf::hand_move(kDock, 0.1)};
-  HandMotion motion(kerf::parse_hand_script("start_mm = [1, 4, 2]\n[[step]]\nhold = 1", "test"),
-                    route);
-  motion.leave();
-  static_cast<void>(after(motion, 3 * kSecond));
-  REQUIRE(motion.ended());
-  motion.rest();
-  motion.calibrate();
-  CHECK(norm(after(motion, kSecond / 10).target_mm - (kDock + DeviceVec<double>{0, 5, 0})) < 1e-9);
-  CHECK(norm(after(motion, kSecond / 10).target_mm - kDock) < 1e-9);
-  motion.leave();
-  static_cast<void>(after(motion, 3 * kSecond));
-  CHECK(motion.ended());
 }
 
 TEST_CASE("the repeated block comes again to the cycle, and the orientation is kept") {
@@ -241,7 +223,7 @@ double follow(GuidedHand& hand, DeviceVec<double>& tip_mm, double seconds) {
   return fastest;
 }
 
-/// The same of a user who goes on sending.
+/// The same of a user that sends its target 50 times a second.
 void lead(GuidedHand& hand, DeviceVec<double>& tip_mm, const HandTarget& target, double seconds) {
   for (int frames = static_cast<int>(seconds * 50); frames > 0; --frames) {
     hand.set_target(target);
@@ -334,7 +316,7 @@ TEST_CASE("a target is decoded as it was encoded, within its limits; other bytes
   CHECK_FALSE(kerf::decode_hand_target(other));
 }
 
-TEST_CASE("an emulated hand goes its way to the start, and only then where it is led") {
+TEST_CASE("an emulated hand moves to its start, and only then to the target") {
   kerf::Emulator emulator(kerf::OmniParams{}, kerf::HandScript{});
   const kerf::OmniCommand on{.motors_on = true};
   const auto run = [&](double seconds) {
@@ -353,7 +335,8 @@ TEST_CASE("an emulated hand goes its way to the start, and only then where it is
   CHECK(norm(emulator.model().tip_mm() - DeviceVec<double>{10, 8, -5}) < 0.5);
 }
 
-TEST_CASE("asked to park it rests in the inkwell, whatever comes meanwhile, and comes back") {
+TEST_CASE(
+    "a hand that parks rests in the inkwell, whatever targets come meanwhile, and comes back") {
   kerf::Emulator emulator(kerf::OmniParams{}, kerf::HandScript{});
   const DeviceVec<double> target{4, -3, 2};
   int docked = 0;

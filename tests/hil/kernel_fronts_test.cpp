@@ -33,7 +33,7 @@
 
 namespace {
 
-/// Lets the device serve for so long, and then until it has done what was due by then: if the
+/// Lets the device serve for so long, and then until nothing is due of that time: if the
 /// machine stood still meanwhile, it has not served at all yet.
 void serve_for(kerf::KernelDevice& device, int milliseconds) {
   const std::int64_t until_ns = kerf::monotonic_ns() + std::int64_t{milliseconds} * 1'000'000;
@@ -79,7 +79,7 @@ class Kernel {
     std::ranges::copy(report, event->u.output.data);
     say(*event);
   }
-  /// Lets the arm serve for so long, and takes what it said.
+  /// Lets the arm serve for so long, and takes its events.
   std::vector<Event> hear(int milliseconds) {
     serve_for(arm_, milliseconds);
     std::vector<Event> all;
@@ -153,7 +153,7 @@ TEST_CASE("uhid: reports go while the node is open, from the first command on") 
   CHECK(kernel.arm().left());
 }
 
-TEST_CASE("uhid: feature reports are stalled under the number that they were asked with") {
+TEST_CASE("uhid: feature reports are stalled under the number of their request") {
   Kernel kernel;
   kernel.hear(2);
   const auto asks = std::make_unique<uhid_event>();

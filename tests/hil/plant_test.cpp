@@ -202,28 +202,6 @@ TEST_CASE("the hand gives way by force over stiffness") {
   CHECK(norm((model.tip_mm() - target) * 0.5 - model.motor_force_n()) < 1e-6);
 }
 
-TEST_CASE("friction holds the tip against a pull below its limit") {
-  OmniParams params;
-  params.coulomb_n = 0.2;
-  OmniModel model(params);
-  run(model, at({0, 5, 0}), kSecond);
-  const auto rest = model.tip_mm();
-  CHECK(norm(model.velocity_mm_per_s()) == 0);
-  CHECK(norm(rest - DeviceVec<double>{0, 5, 0}) * 0.5 <= 0.2);
-  // Pull the other way with 0.19 N at most: not a bit.
-  const auto direction = rest - DeviceVec<double>{0, 5, 0};
-  const double pull_mm = 0.19 / 0.5;
-  const auto pulled = rest + direction * (pull_mm / std::max(norm(direction), 1e-9));
-  // Slowly, because the hand's damper pulls too.
-  for (int i = 0; i <= kSecond; ++i) {
-    model.step(at(DeviceVec<double>{0, 5, 0} +
-                  (pulled - DeviceVec<double>{0, 5, 0}) * (static_cast<double>(i) / kSecond)));
-  }
-  CHECK(model.tip_mm() == rest);
-  run(model, at(rest + DeviceVec<double>{0, 0, 2}), kSecond);
-  CHECK(model.tip_mm().z > rest.z + 1);
-}
-
 TEST_CASE("output delay counts bus cycles and the current loop is a first-order lag") {
   OmniParams params;
   params.output_delay_cycles = 3;
@@ -247,20 +225,20 @@ TEST_CASE("input delay counts bus cycles: a report has older encoder values") {
   OmniParams params;
   params.input_delay_cycles = 5;
   OmniModel delayed(params), prompt;
-  std::vector<std::array<std::uint16_t, 3>> told, was;
+  std::vector<std::array<std::uint16_t, 3>> reported, was;
   for (int cycle = 0; cycle < 400; ++cycle) {
     for (OmniModel* model : {&delayed, &prompt}) {
       model->step(at({0, 5 + 0.05 * cycle, 0}));
       const auto& encoder = model->next_report().encoder;
-      auto& list = model == &delayed ? told : was;
+      auto& list = model == &delayed ? reported : was;
       list.push_back({static_cast<std::uint16_t>(encoder[0]),
                       static_cast<std::uint16_t>(encoder[1]),
                       static_cast<std::uint16_t>(encoder[2])});
     }
   }
   CHECK(was.front() != was.back());
-  for (std::size_t i = 5; i < told.size(); ++i) CHECK(told[i] == was[i - 5]);
-  for (std::size_t i = 0; i < 5; ++i) CHECK(told[i] == told[0]);
+  for (std::size_t i = 5; i < reported.size(); ++i) CHECK(reported[i] == was[i - 5]);
+  for (std::size_t i = 0; i < 5; ++i) CHECK(reported[i] == reported[0]);
 }
 
 TEST_CASE("rigid rotors add J^-T I J^-1 to the tip's mass") {

@@ -130,17 +130,13 @@ TEST_CASE("errors of a script name the file, the line and the way out, in one li
   };
   const Bad of_hands[] = {
       {"speed = 3\n[[step]]\nhold = 1", "1: speed: unknown key"},
-      {"[[step]]\nhold = 1\nsecond = 2", "3: step.second: unknown key"},
       {"[[step]]\nhold = 'long'", "2: step.hold: not a number"},
       {"[[step]]\n\nhold = 0", "3: step.hold = 0 is out of range"},
-      {"[[step]]\nhold = nan", "2: step.hold = nan is out of range"},
-      {"[[step]]\nmove_mm = [1, 2]", "2: step.move_mm: a list of 2"},
       {"[[step]]\nmove_mm = [1, 2, 2000]", "2: step.move_mm = 2000 is out"},
       {"[[step]]\nmove_mm = [1, 2, inf]", "2: step.move_mm = inf is out"},
       {"[[step]]\nhold = 1\nease = 'bouncy'", "3: step.ease: unknown value"},
       {"[[step]]\nhold = 1\nbutton = 3", "3: step.button = 3 is out of range"},
       {"[[step]]\nhold = 1\nrepeat = 1", "3: step.repeat: not a truth value"},
-      {"[[step]]\nseconds = 1", "1: step: has 0 motions"},
       {"[[step]]\nhold = 1\ncircle_mm = 2", "1: step: has 2 motions"},
       {"[[step]]\nhold = 1\nturns = 2", "1: step: turns or sink_mm"},
       {"unit_mm = 0\n[[step]]\nhold = 1", "1: unit_mm = 0 is out of range"},
@@ -204,7 +200,7 @@ TEST_CASE("the scripts of the project are read, and random ones differ by seed")
 
 namespace {
 
-/// An Omni whose motors push, so that the faults' clock runs, and that is asked once a cycle.
+/// An Omni whose motors push, so that the faults' clock runs, whose packet is read once a cycle.
 struct Bench {
   explicit Bench(const DeviceFault& fault)
       : emulator(kerf::OmniParams{}, std::nullopt), device(emulator, {{fault}, 1}) {

@@ -177,7 +177,7 @@ TEST_CASE("a server takes over a stale socket, refuses a live one, and removes i
   const TemporaryFolder folder;
   const std::string path = folder / "socket";
   {
-    // A listener that died without cleaning up: the file stays, nobody listens.
+    // A listener that ended without cleaning up: the file stays, no process listens.
     sockaddr_un address{};
     address.sun_family = AF_UNIX;
     std::strncpy(address.sun_path, path.c_str(), sizeof address.sun_path - 1);

@@ -8,11 +8,12 @@
 #include <string>
 #include <thread>
 
+#include "hil/front/firewire/firewire_node.hpp"
 #include "hil/front/serving.hpp"
 #include "hil/front/socket_servers.hpp"
 #include "hil/front/usb/hidraw_node.hpp"
 #include "hil/front/usb/usbfs_node.hpp"
-#include "tests/hil/fuse/mounted_node.hpp"
+#include "tests/hil/fuse/served_node.hpp"
 #include "tests/programs/watched_device.hpp"
 
 namespace kerf::test {

@@ -2,16 +2,25 @@
 // The real servo loop on the socket port, beside an emulator: no allocation, no page fault, no
 // system call beyond clock and port. Each proof also meets the fault that it must catch.
 #include <atomic>
+#include <cerrno>
 #include <cstddef>
+#include <cstdint>
 #include <exception>
+#include <filesystem>
+#include <fstream>
 #include <memory>
 #include <new>
 #include <optional>
+#include <string>
+#include <system_error>
 #include <thread>
 
 #include <doctest/doctest.h>
 #include <linux/futex.h>
+#include <linux/perf_event.h>
+#include <sys/ioctl.h>
 #include <sys/mman.h>
+#include <sys/mount.h>
 #include <sys/syscall.h>
 #include <unistd.h>
 
@@ -24,7 +33,6 @@
 #include "controller/plan/compile.hpp"
 #include "controller/run/run_start.hpp"
 #include "shared/segment/segment.hpp"
-#include "tests/shell/system_call_count.hpp"
 #include "tests/support/process.hpp"
 
 #ifndef KERF_SANITIZED  // sanitizers allocate and call for themselves
@@ -34,9 +42,64 @@ namespace {
 using kerf::test::Process;
 using kerf::test::TemporaryFolder;
 
+/// Number of the kernel's tracepoint raw_syscalls:sys_enter; 0 if it cannot be read. If no
+/// tracefs is mounted, one is for a moment.
+std::uint64_t tracepoint_of_calls() {
+  const auto read = [](const std::filesystem::path& root) {
+    std::uint64_t id = 0;
+    std::ifstream(root / "events/raw_syscalls/sys_enter/id") >> id;
+    return id;
+  };
+  for (const char* root : {"/sys/kernel/tracing", "/sys/kernel/debug/tracing"}) {
+    if (const auto id = read(root)) return id;
+  }
+  const TemporaryFolder folder;
+  if (mount("none", folder.path().c_str(), "tracefs", MS_RDONLY, nullptr) != 0) return 0;
+  const auto id = read(folder.path());
+  umount(folder.path().c_str());
+  return id;
+}
+
+/// Counts the system calls of the thread that makes one of these, exactly.
+class SystemCallCount {
+ public:
+  SystemCallCount() {
+    perf_event_attr event{};
+    event.size = sizeof event;
+    event.type = PERF_TYPE_TRACEPOINT;
+    event.config = tracepoint_of_calls();
+    event.disabled = 1;
+    if (event.config == 0) {
+      why_not_ = "no tracefs";
+      return;
+    }
+    fd_ = static_cast<int>(syscall(SYS_perf_event_open, &event, 0, -1, -1, 0));
+    if (fd_ < 0) why_not_ = std::generic_category().message(errno);
+  }
+  ~SystemCallCount() {
+    if (fd_ >= 0) close(fd_);
+  }
+  SystemCallCount(const SystemCallCount&) = delete;
+  SystemCallCount& operator=(const SystemCallCount&) = delete;
+
+  /// Empty if it counts.
+  [[nodiscard]] const std::string& why_not() const { return why_not_; }
+  void start() const { ioctl(fd_, PERF_EVENT_IOC_ENABLE, 0); }
+  /// The calls since `start`, the one that stops it included.
+  [[nodiscard]] std::uint64_t stop() const {
+    ioctl(fd_, PERF_EVENT_IOC_DISABLE, 0);
+    std::uint64_t count = 0;
+    return ::read(fd_, &count, sizeof count) == sizeof count ? count : 0;
+  }
+
+ private:
+  int fd_ = -1;
+  std::string why_not_;
+};
+
 enum class Seed { none, allocation, page, call, wake, lock };
 
-/// The socket port; while it takes a packet it does what a clean loop must not, `kSeeds` times.
+/// The socket port; while it takes a packet it breaks a rule of a clean loop, `kSeeds` times.
 class SeededPort final : public kerf::PacketPort {
  public:
   static constexpr std::size_t kSeeds = 20;
@@ -147,7 +210,7 @@ Outcome run_loop(Seed seed, bool guarded = false) {
       static_cast<void>(kerf::become_real_time({}));
       kerf::Publisher eyes(segment, *servo);
       kerf::RealTimeTicks clock(1'000'000, 0);
-      const kerf::test::SystemCallCount counter;
+      const SystemCallCount counter;
       outcome.uncounted = counter.why_not();
       const std::uint64_t before = port.receives + port.sends;
       if (calls)
@@ -160,7 +223,7 @@ Outcome run_loop(Seed seed, bool guarded = false) {
         calls->leave();
       else
         outcome.calls = counter.stop();
-      // A sleep and a look at the port per tick; three looks at the page faults, and the stop.
+      // A sleep and a read of the port per tick; three reads of the page faults, and the stop.
       const std::uint64_t ticks = signals.heartbeat;
       outcome.expected_calls = ticks + port.receives + port.sends - before + 3 + 1;
     }).join();

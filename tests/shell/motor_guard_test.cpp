@@ -185,7 +185,7 @@ TEST_CASE("every signal that ends a process by default switches the motors off f
   MESSAGE("motors off " << slowest_ms << " ms after the signal at most, by signal " << slowest);
 }
 
-TEST_CASE("what a tick commands after the signal is neutral") {
+TEST_CASE("commands of a tick after the signal are neutral") {
   std::array<int, 2> ends{};
   REQUIRE(socketpair(AF_UNIX, SOCK_SEQPACKET, 0, ends.data()) == 0);
   PairPort port(ends[0]);

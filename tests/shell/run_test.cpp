@@ -54,7 +54,7 @@ TEST_CASE("what a device waits for follows from its phase and its report") {
   CHECK(waiting_in(Phase::active, in_hand) == Waiting::nothing);
 }
 
-TEST_CASE("each device says what its user does") {
+TEST_CASE("each device has its own words for what its user does") {
   CHECK(text_of(Personality::omni, Waiting::parked) ==
         "waiting until parked: rest the stylus in the inkwell");
   CHECK(text_of(Personality::falcon, Waiting::homing) ==
@@ -64,7 +64,7 @@ TEST_CASE("each device says what its user does") {
   CHECK(text_of(Personality::omni, Waiting::nothing).empty());
 }
 
-TEST_CASE("a wait of a second is told, each kind once until the force comes on") {
+TEST_CASE("a wait of a second is reported, each kind once until the force comes on") {
   WaitNotice teller;
   std::vector<std::string> told;
   std::int64_t now_ns = 0, servo_ns = 0;
@@ -91,7 +91,7 @@ TEST_CASE("a wait of a second is told, each kind once until the force comes on")
   CHECK(told.size() == 3);
 }
 
-TEST_CASE("while no tick comes in lock-step nothing is told: it is the machine that is busy") {
+TEST_CASE("while no tick comes in lock-step nothing is reported: the machine is busy") {
   WaitNotice teller;
   for (std::int64_t now_ns = 0; now_ns < 60'000 * kMs; now_ns += 50 * kMs) {
     CHECK_FALSE(teller.look(Waiting::report, now_ns, 0));
@@ -126,7 +126,7 @@ TEST_CASE("the report has every promised key, hashes as 16 hex digits") {
 }
 
 TEST_CASE(
-    "report and summary tell what was removed of each material, and touches of forbidden ones") {
+    "report and summary have the volume removed of each material, and touches of forbidden ones") {
   RunReport report;
   report.materials = {{"enamel", 2.1, {}}, {"dentin", 0.0001, {}}, {"pulp", 0.0, 121.0}};
   const auto json = kerf::test::read_json(report_json(report));
@@ -155,7 +155,7 @@ TEST_CASE("an event is no fault, and more of them than fit hide none") {
   CHECK(text.find("fault      watchdog") == std::string::npos);
 }
 
-TEST_CASE("what was removed below the surface is told apart, with the scale of a scan") {
+TEST_CASE("a volume removed below the surface has a line of its own, with the scale of a scan") {
   RunReport report;
   report.removed_mm3 = 55252.953;
   report.materials = {{"soft tissue", 44295.239, {}, false}, {"bone", 10957.714}};
@@ -170,7 +170,8 @@ TEST_CASE("what was removed below the surface is told apart, with the scale of a
         std::string::npos);
 }
 
-TEST_CASE("a scene tells up to which speed no tool is dragged in air, and warns of hands beyond") {
+TEST_CASE(
+    "a scene reports up to which speed no tool is dragged in air, and warns of hands beyond") {
   LoadedScene scene;
   scene.tools = {make_tool("ball 1 mm", "ball", {.pitch_mm = 0.1, .radius_mm = 0.5}),
                  make_tool("fissure", "cylinder", {.pitch_mm = 0.1, .radius_mm = 0.5})};
@@ -184,7 +185,7 @@ TEST_CASE("a scene tells up to which speed no tool is dragged in air, and warns 
         "hand faster than 0.34 m/s; a higher rate or larger voxels raise that\n");
 }
 
-TEST_CASE("a volume that ends in a density that contact counts is told") {
+TEST_CASE("a volume that ends in a density that contact counts is reported") {
   SceneVolume volume;
   volume.name = "scan";
   volume.image.grid = {5, 4, 3};
@@ -290,7 +291,7 @@ TEST_CASE("devices are found by vendor and product, on each bus, and no others")
   CHECK(nodes[3].path == (root / "dev/hidraw2").string());
 }
 
-TEST_CASE("what lacks is told with its cure: bus, device, rule, group") {
+TEST_CASE("a lack is reported with its cure: bus, device, rule, group") {
   const FakeRoot root;
   const auto lack = [&](const std::vector<DeviceNode>& nodes) {
     const auto lacks = lacks_of_nodes(Personality::omni, nodes, root.path());
@@ -355,7 +356,7 @@ std::string failure_of(const Exception& exception) {
 
 }  // namespace
 
-TEST_CASE("what a program says at its end is one line with a way out") {
+TEST_CASE("a failure is one line with a way out") {
   CHECK(failure_of(std::runtime_error("scene.toml: value; way\nout")) ==
         "scene.toml: value; way\\nout");
   CHECK(failure_of(std::bad_alloc())

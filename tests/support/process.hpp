@@ -83,7 +83,7 @@ class Process {
     if (!code_) take_end(0);
     return *code_;
   }
-  /// Whether it has ended by then; `wait` tells how.
+  /// Returns true if it has ended by then; `wait` returns how.
   [[nodiscard]] bool ends_within(std::chrono::milliseconds patience) {
     const auto end = std::chrono::steady_clock::now() + patience;
     while (!code_ && !take_end(WNOHANG) && std::chrono::steady_clock::now() < end) {

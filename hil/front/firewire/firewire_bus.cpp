@@ -62,7 +62,7 @@ void FirewireBus::begin_cycle() {
 
 void FirewireBus::finish_cycle() {
   if (cycle_ % settings_.packet_cycles != 0) return;
-  // Its counter runs whether it is heard or not.
+  // Its counter runs if its packets are received or not.
   for (auto packet = device_.next_packet(); !packet.empty(); packet = device_.next_packet()) {
     if (present_ && registers_.streams()) carry(packet);
   }
@@ -76,7 +76,7 @@ void FirewireBus::carry(std::span<const std::uint8_t> packet) {
     }
     const std::uint64_t missed = context->missed();
     context->receive(kOmniTag, packet, cycle_);
-    ++(context->missed() == missed ? stats_.reports : stats_.unheard);
+    ++(context->missed() == missed ? stats_.reports : stats_.undelivered);
   }
 }
 

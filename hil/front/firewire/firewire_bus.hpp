@@ -61,21 +61,21 @@ struct FirewireSettings {
   /// enable bit.
   bool reset_stops_stream = false;
   std::uint32_t packed_serial = 0x82B6'980C;
-  int abi_version = 5;  ///< of the kernel's interface: Linux 6.1; newer ones say more
+  int abi_version = 5;  ///< of the kernel's interface: Linux 6.1; newer ones have more
   std::vector<ScriptedFault> script;
 };
 
 /// Counts of a run.
 struct FirewireStats {
-  std::uint64_t commands = 0;  ///< packets of the host that reached the device
-  std::uint64_t reports = 0;   ///< packets of the device that reached an open
-  std::uint64_t unheard = 0;   ///< packets of the device that no descriptor waited for
+  std::uint64_t commands = 0;     ///< packets of the host that reached the device
+  std::uint64_t reports = 0;      ///< packets of the device that reached an open
+  std::uint64_t undelivered = 0;  ///< packets of the device that no descriptor waited for
   /// FNV-1a over every packet of the host and the cycle in which it went out.
   std::uint64_t command_hash = kFnv1aBasis;
 };
 
 /// The bus and the device on it, cycle by cycle: the senders of its channels, generations,
-/// resources, faults. Advances only when asked to catch up with its clock. One thread.
+/// resources, faults. Advances only in `catch_up`. One thread.
 class FirewireBus {
  public:
   /// Called for events that concern every client.

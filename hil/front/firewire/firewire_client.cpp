@@ -21,7 +21,7 @@ constexpr unsigned kLargestNumber = 0x18;  // of an ioctl
 constexpr int kMaxRequests = 64;  // transaction labels of a controller
 
 // A transaction on the bus, an allocation (two of them), and the second in which a reset leaves
-// resources to those who had them.
+// resources to the clients that had them.
 constexpr std::int64_t kRequestCycles = 2;
 constexpr std::int64_t kAllocationCycles = 4;
 constexpr std::int64_t kRetryCycles = kBusCyclesPerSecond / 3;
@@ -291,8 +291,8 @@ void FirewireClient::try_allocation(std::uint32_t handle) {
   resource.channel = bus_.resources().allocate(resource.channels, resource.bandwidth);
   const Resource settled = resource;
   if (settled.channel < 0) resources_.erase(found);
-  tell_resource(FW_CDEV_EVENT_ISO_RESOURCE_ALLOCATED, handle, settled, settled.channel,
-                settled.channel < 0 ? 0 : settled.bandwidth);
+  queue_resource_event(FW_CDEV_EVENT_ISO_RESOURCE_ALLOCATED, handle, settled, settled.channel,
+                       settled.channel < 0 ? 0 : settled.bandwidth);
 }
 
 int FirewireClient::deallocate() {
@@ -306,8 +306,8 @@ int FirewireClient::deallocate() {
   }
   bus_.later(kAllocationCycles, [weak = weak_from_this(), handle = request.handle, resource] {
     if (const auto client = weak.lock()) {
-      client->tell_resource(FW_CDEV_EVENT_ISO_RESOURCE_DEALLOCATED, handle, resource,
-                            resource.channel, resource.bandwidth);
+      client->queue_resource_event(FW_CDEV_EVENT_ISO_RESOURCE_DEALLOCATED, handle, resource,
+                                   resource.channel, resource.bandwidth);
     }
   });
   return 0;
@@ -323,13 +323,13 @@ void FirewireClient::reclaim_resources() {
       continue;
     }
     it = resources_.erase(it);
-    tell_resource(FW_CDEV_EVENT_ISO_RESOURCE_DEALLOCATED, handle, resource, -EBUSY, 0);
+    queue_resource_event(FW_CDEV_EVENT_ISO_RESOURCE_DEALLOCATED, handle, resource, -EBUSY, 0);
   }
 }
 
-void FirewireClient::tell_resource(std::uint32_t type, std::uint32_t handle,
-                                   const Resource& resource, std::int32_t channel,
-                                   std::int32_t bandwidth) {
+void FirewireClient::queue_resource_event(std::uint32_t type, std::uint32_t handle,
+                                          const Resource& resource, std::int32_t channel,
+                                          std::int32_t bandwidth) {
   fw_cdev_event_iso_resource event{};
   event.closure = resource.closure;
   event.type = type;

@@ -80,8 +80,8 @@ class FirewireClient : public std::enable_shared_from_this<FirewireClient> {
   void ask_device(std::uint32_t tcode, std::uint64_t offset, std::uint64_t closure,
                   std::vector<std::uint8_t> data);
   void try_allocation(std::uint32_t handle);
-  void tell_resource(std::uint32_t type, std::uint32_t handle, const Resource& resource,
-                     std::int32_t channel, std::int32_t bandwidth);
+  void queue_resource_event(std::uint32_t type, std::uint32_t handle, const Resource& resource,
+                            std::int32_t channel, std::int32_t bandwidth);
   template <class T>
   [[nodiscard]] T argument() const noexcept;
   template <class T>

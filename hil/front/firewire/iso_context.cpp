@@ -51,7 +51,7 @@ IsoContext::Queued IsoContext::queue(std::span<const std::uint8_t> entries, bool
       return queued;
     }
     const bool skips = settings_.transmits && (control & FW_CDEV_ISO_SKIP) != 0;
-    // A payload lives in memory that only mmap() could share.
+    // A payload would need memory of mmap().
     if (payload_bytes(control) > 0 || (skips && header_bytes(control) > 0)) {
       queued.error = EINVAL;
       return queued;

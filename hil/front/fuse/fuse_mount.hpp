@@ -24,10 +24,10 @@ class FuseMount final : public FuseReplies {
   /// Throws `HilError` if /dev/fuse or the right to mount is missing, or `folder` is no folder.
   explicit FuseMount(std::string folder) : channel_(std::move(folder)) {}
 
-  /// Before `serve`. The node outlives the mount. `file` tells the names of one node apart.
+  /// Before `serve`. The node outlives the mount. `file` is the number of this name for the node.
   void add(std::string name, FuseNode& node, int file = 0);
 
-  /// Serves while `goes_on`, which is asked between requests and at least every 100 ms, or until
+  /// Serves while `goes_on`, which is called between requests and at least every 100 ms, or until
   /// another process unmounts.
   void serve(const std::function<bool()>& goes_on);
 

@@ -31,8 +31,8 @@ struct FuseIoctl {
   pid_t thread = 0;            ///< of the caller, whose memory pointers point into
   std::uint32_t command = 0;   ///< the whole number: direction, size, type, nr (linux/ioctl.h)
   std::uint64_t argument = 0;  ///< as passed: a user address, or a plain number
-  std::span<const std::uint8_t> input{};  ///< bytes that `command` says go in
-  std::size_t output_bytes = 0;           ///< room that `command` says comes back
+  std::span<const std::uint8_t> input{};  ///< as many bytes as `command` passes in
+  std::size_t output_bytes = 0;           ///< room for the bytes that `command` returns
 };
 
 /// The way for a node to answer calls that it left open, and to wake clients that sleep in poll().

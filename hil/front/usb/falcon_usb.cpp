@@ -71,7 +71,7 @@ void FalconBootLoader::take(std::uint8_t byte, std::deque<std::uint8_t>& line) {
         line.push_back(byte);
         return;
       }
-      return hear_greeting(byte, line);
+      return on_greeting(byte, line);
     case State::loading:
       line.push_back(stored_++ == wrong_echo_at_ ? static_cast<std::uint8_t>(byte ^ 1) : byte);
       return;
@@ -79,7 +79,7 @@ void FalconBootLoader::take(std::uint8_t byte, std::deque<std::uint8_t>& line) {
 }
 
 /// Answered as often as it comes: hosts repeat it if a read that was under way took the answer.
-void FalconBootLoader::hear_greeting(std::uint8_t byte, std::deque<std::uint8_t>& line) {
+void FalconBootLoader::on_greeting(std::uint8_t byte, std::deque<std::uint8_t>& line) {
   if (divisor_ != falcon::kBootDivisor || byte != falcon::kBootHello[greeted_]) {
     greeted_ = 0;
     return;

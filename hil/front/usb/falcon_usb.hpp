@@ -40,7 +40,7 @@ class FalconBootLoader {
  private:
   enum class State : std::uint8_t { asleep, greeting, waiting, loading, running };
 
-  void hear_greeting(std::uint8_t byte, std::deque<std::uint8_t>& line);
+  void on_greeting(std::uint8_t byte, std::deque<std::uint8_t>& line);
 
   State state_;
   std::int64_t wrong_echo_at_;

@@ -12,7 +12,7 @@
 #include "hil/device/packet_device.hpp"
 #include "shared/posix/monotonic_clock.hpp"
 
-/// The parts that emulated USB devices share: time, faults, control requests, bytes of descriptors.
+/// Common parts of emulated USB devices: time, faults, control requests, bytes of descriptors.
 namespace kerf {
 
 /// The clock of an emulated USB device. Any thread.

@@ -106,7 +106,7 @@ void UsbipFalcon::answer() {
   const ssize_t size = recv(fd_, buffer.data(), buffer.size(), MSG_DONTWAIT);
   if (size < 0 && (errno == EAGAIN || errno == EINTR)) return;
   if (size <= 0) return lose_host();
-  heard_.insert(heard_.end(), buffer.begin(), buffer.begin() + size);
+  received_.insert(received_.end(), buffer.begin(), buffer.begin() + size);
   falcon_.catch_up(*this);
   while (take_message()) {
   }
@@ -114,18 +114,18 @@ void UsbipFalcon::answer() {
 
 /// Serves the first of the received messages; returns false if it is not whole yet.
 bool UsbipFalcon::take_message() {
-  if (heard_.size() < usbip::kHeaderBytes) return false;
-  const auto request = usbip::decode(std::span(heard_).first<usbip::kHeaderBytes>());
+  if (received_.size() < usbip::kHeaderBytes) return false;
+  const auto request = usbip::decode(std::span(received_).first<usbip::kHeaderBytes>());
   if (request.bytes > kLongestUsbipTransfer) {
     lose_host();
     return false;
   }
   const std::size_t payload = request.to_host ? 0 : request.bytes;
-  if (heard_.size() < usbip::kHeaderBytes + payload) return false;
-  serve(request, std::span(heard_).subspan(usbip::kHeaderBytes, payload));
+  if (received_.size() < usbip::kHeaderBytes + payload) return false;
+  serve(request, std::span(received_).subspan(usbip::kHeaderBytes, payload));
   if (fd_ < 0) return false;
-  heard_.erase(heard_.begin(),
-               heard_.begin() + static_cast<std::ptrdiff_t>(usbip::kHeaderBytes + payload));
+  received_.erase(received_.begin(),
+                  received_.begin() + static_cast<std::ptrdiff_t>(usbip::kHeaderBytes + payload));
   return true;
 }
 
@@ -196,7 +196,7 @@ void UsbipFalcon::lose_host() noexcept {
 void UsbipFalcon::unplug() noexcept {
   if (fd_ >= 0) close(fd_);
   fd_ = -1;
-  heard_.clear();
+  received_.clear();
   reads_.clear();
 }
 

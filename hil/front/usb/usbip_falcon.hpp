@@ -40,7 +40,7 @@ struct Request {
 
 namespace kerf {
 
-/// An emulated Falcon that speaks USB/IP: behind `vhci_hcd` the kernel's own USB stack takes it for
+/// An emulated Falcon on USB/IP: behind `vhci_hcd` the kernel's own USB stack takes it for
 /// a device at one of its ports.
 ///
 /// A read completes when the device has a packet, at most once per 1 ms frame; a write and a
@@ -91,12 +91,12 @@ class UsbipFalcon final : public KernelDevice, private UsbHost {
   PlugIn plug_in_;
   int fd_;
   bool left_ = false;
-  std::vector<std::uint8_t> heard_;  ///< whole messages and the first part of one
+  std::vector<std::uint8_t> received_;  ///< whole messages and the first part of one
   std::deque<Read> reads_;
 };
 
 /// Plugs a full-speed device into a free port of the kernel's virtual USB host controller (module
-/// vhci-hcd) and returns the device's end of the cable, a stream socket that speaks USB/IP. The
+/// vhci-hcd) and returns the device's end of the cable, a stream socket on USB/IP. The
 /// caller closes it, which unplugs the device. Throws `HilError` if the module, the right (root) or
 /// a free port is missing.
 [[nodiscard]] int plug_into_vhci();

@@ -60,7 +60,7 @@ class WoodenHid {
   [[nodiscard]] bool naks() const noexcept { return time_.cycle() < nak_until_; }
   [[nodiscard]] bool present() const noexcept { return present_; }
   [[nodiscard]] const UsbTime& time() const noexcept { return time_; }
-  /// Reports of the device, heard or not.
+  /// Reports of the device, received or not.
   [[nodiscard]] std::uint64_t reports() const noexcept { return reports_; }
 
  private:

@@ -92,7 +92,7 @@ void NifalconClient::turn_to_boot_loader() {
   control(FtdiRequest::modem, falcon::kFtdiDtrHigh);
 }
 
-// ---- what is waited for ----
+// ---- calls that wait ----
 
 std::size_t NifalconClient::write(std::span<const std::uint8_t> bytes) {
   int sent = 0;
@@ -150,7 +150,7 @@ std::string NifalconClient::load(std::span<const std::uint8_t> firmware) {
   return {};
 }
 
-// ---- what is under way ----
+// ---- the read under way ----
 
 void NifalconClient::handle_events() {
   timeval patience{.tv_sec = 0, .tv_usec = 100};
@@ -173,7 +173,7 @@ void NifalconClient::read_ended(libusb_transfer* transfer) {
   client.size_ = client.came_ ? static_cast<std::size_t>(transfer->actual_length) - 2 : 0;
 }
 
-/// One runIOLoop(): a packet that came is read, a question is put where none is out.
+/// One runIOLoop(): a packet that came is read, a question is sent if none is out.
 std::optional<FalconReport> NifalconClient::look(const FalconCommand& command) {
   handle_events();
   std::optional<FalconReport> report;

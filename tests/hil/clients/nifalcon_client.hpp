@@ -33,7 +33,7 @@ class NifalconClient {
 
   /// isFirmwareLoaded(): ten questions, each with a hundred looks for an answer.
   [[nodiscard]] bool firmware_answers();
-  /// One loadFirmware(); says what failed, nothing when it worked.
+  /// One loadFirmware(); returns the call that failed, empty if it worked.
   [[nodiscard]] std::string load(std::span<const std::uint8_t> firmware);
   /// runIOLoop() until a report has come, at most so many times (of 0.1 ms and more).
   [[nodiscard]] std::optional<FalconReport> exchange(const FalconCommand& command,
@@ -63,7 +63,7 @@ class NifalconClient {
   std::array<std::uint8_t, falcon::kFtdiPacketBytes> in_{};  ///< of the read under way
   std::array<std::uint8_t, 512> packet_{};                   ///< of reads that are waited for
   bool reading_ = false;
-  bool came_ = false;     ///< it has ended with a packet, which nobody has looked at
+  bool came_ = false;     ///< it has ended with a packet, which was not read yet
   std::size_t size_ = 0;  ///< of the line's bytes in it
   bool asked_ = false;    ///< a question is out
 };

@@ -19,7 +19,7 @@
 namespace kerf::test {
 namespace {
 
-constexpr std::uint32_t kInterfaceVersion = 3;  // older than what our own driver asks for
+constexpr std::uint32_t kInterfaceVersion = 3;  // older than that of our own driver
 constexpr std::uint32_t kMostBandwidth = 4915;
 constexpr int kPatienceMs = 1000;
 

@@ -17,7 +17,7 @@ namespace kerf::test {
 /// swapping it. One thread.
 class Raw1394Client {
  public:
-  /// Opens all of `folder` that is a FireWire node. Throws std::runtime_error where no node is the
+  /// Opens all of `folder` that is a FireWire node. Throws std::runtime_error if no node is the
   /// local one.
   explicit Raw1394Client(const std::string& folder);
   ~Raw1394Client();
@@ -50,7 +50,7 @@ class Raw1394Client {
   [[nodiscard]] bool take_channel(unsigned channel);
   [[nodiscard]] bool free_channel(unsigned channel);
 
-  /// Asks for a reset, and waits until the local node has told of it.
+  /// Resets the bus, and waits for the event of the local node.
   [[nodiscard]] bool reset_bus();
 
   static constexpr std::uint64_t kCsr = 0xFFFF'F000'0000;

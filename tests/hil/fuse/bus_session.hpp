@@ -62,7 +62,7 @@ struct Course {
   int ticks = 0, fresh = 0, contact = 0, motors = 0;
   int faults = 0;             ///< ticks with one
   int longest_gap = 0;        ///< ticks without a report
-  int stale_with_motors = 0;  ///< ticks beyond 20 without a report and motors still asked for
+  int stale_with_motors = 0;  ///< ticks beyond 20 without a report and motors still commanded
   int gap_at_end = 0;
   std::uint64_t allocations = 0;  ///< by reads
 };
@@ -102,7 +102,7 @@ class ServoSession {
     ServoOutput output;
     std::uint64_t allocations = 0;
   };
-  /// A millisecond of the device, then what a servo does in a tick.
+  /// A millisecond of the device, then a tick of the servo.
   Tick tick() {
     if (!clock_) return step();
     clock_->pass(kNsPerSecond / 1000);

@@ -21,7 +21,7 @@ inline constexpr std::uint32_t kSkip = FW_CDEV_ISO_SKIP;
 inline constexpr std::uint32_t kSixteen = FW_CDEV_ISO_HEADER_LENGTH(16U);
 inline constexpr std::uint64_t kControl = 0x1087;
 
-/// Nodes in lock-step where a flush of a received stream lets 8 cycles pass, or a second.
+/// Nodes in lock-step: a flush of a received stream lets 8 cycles pass, or a second.
 struct Bench {
   explicit Bench(FirewireSettings settings = {}) : mounted(settings), client(mounted.path()) {}
 
@@ -41,7 +41,7 @@ struct Bench {
     opened->start(tags);
     return *opened;
   }
-  /// Lets `flushes` steps pass: by a stream of its own, on a channel where nothing comes.
+  /// Lets `flushes` steps pass: by a stream of its own, on a channel without packets.
   void pass(int flushes) {
     if (!watch) {
       watch = std::make_unique<PlainClient>(mounted.path());

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Conformance of the node with the kernel's firewire-cdev, by plain system calls: channels and
-// bandwidth, and what bus resets and a lost device do.
+// bandwidth, bus resets, a lost device.
 #include <array>
 #include <cerrno>
 #include <cstdint>
@@ -161,6 +161,6 @@ const Check kChecks[] = {
 
 }  // namespace
 
-TEST_CASE("resources, resets and loss are told as by the kernel's firewire-cdev") {
+TEST_CASE("resources, resets and loss are reported as by the kernel's firewire-cdev") {
   kerf::test::run(kChecks);
 }

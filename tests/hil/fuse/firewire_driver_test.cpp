@@ -52,7 +52,7 @@ TEST_CASE("the driver finds the device, reads every packet and commands each tic
 
   const auto& node = session.mounted().node();
   CHECK(node.bus().stats().commands >= kTicks);
-  CHECK(node.bus().stats().unheard == 0);
+  CHECK(node.bus().stats().undelivered == 0);
   CHECK(node.double_starts() == 0);
   CHECK(node.events_high_water() <= 4);  // it reads the events that it causes
   CHECK(session.mounted().emulator().stats().refused == 0);

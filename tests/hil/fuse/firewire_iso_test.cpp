@@ -227,7 +227,7 @@ TEST_CASE("streams run as with the kernel's firewire-cdev") {
   kerf::test::run(kChecks);
 }
 
-TEST_CASE("a device hears what comes on its channel with tag 0, once it streams") {
+TEST_CASE("a device receives packets of its channel with tag 0, once it streams") {
   struct : kerf::PacketDevice {
     void receive(std::span<const std::uint8_t> /*packet*/) noexcept override { ++heard; }
     void advance(int /*cycles*/) noexcept override {}

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Conformance of the node with the kernel's firewire-cdev, by plain system calls: what any file
-// has, requests, time.
+// Conformance of the node with the kernel's firewire-cdev, by plain system calls: calls
+// of any file, requests, time.
 #include <array>
 #include <cerrno>
 #include <csignal>
@@ -187,7 +187,7 @@ TEST_CASE("nonsense from a client never ends the server") {
       argument[4] = static_cast<std::uint32_t>(next() % 17);
       argument[5] = 0;
     }
-    if (number == 0x05) continue;  // a million resets tell nothing new
+    if (number == 0x05) continue;  // a million resets show nothing new
     const auto command = _IOC(_IOC_READ | _IOC_WRITE, '#', number, 40);
     static_cast<void>(ioctl(next() % 2 ? other.fd() : bench.client.fd(), command, argument.data()));
     while (other.ready() != 0) static_cast<void>(other.event(0, next() % 100 + 1));

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// In real time: how old is what the servo reads, and how long from a packet to the command that it
-// caused. Figures of the machine at hand; only medians are checked. KERF_TIMING_SECONDS makes it
-// longer than 2 s.
+// In real time: the age of the newest packet when the servo reads it, and the time from a packet to
+// the command that it caused. Figures of the machine at hand; only medians are checked.
+// KERF_TIMING_SECONDS makes it longer than 2 s.
 #include <atomic>
 #include <cstdint>
 #include <string>
@@ -108,7 +108,7 @@ Figures measure(bool fill, double drift_ppm) {
 
 }  // namespace
 
-TEST_CASE("a tick reads what is at most two cycles old, and is heard within a few") {
+TEST_CASE("a tick reads packets of the last two cycles, and its command arrives within a few") {
   struct {
     const char* name;
     bool fill;

@@ -26,7 +26,7 @@ namespace {
 constexpr int kSkipped = 77;
 constexpr int kFailed = 1;
 constexpr int kLongestMs = 110'000;  // less than ctest grants
-constexpr int kTimedCases = 4;       // as many as one program has, each as long as was asked for
+constexpr int kTimedRuns = 5;        // in one program, each as long as KERF_TIMING_SECONDS
 constexpr int kExitMs = 2'000;
 constexpr int kStepMs = 20;
 
@@ -62,10 +62,10 @@ bool is_ending(pid_t child) {
 
 /// Long measurements, by KERF_TIMING_SECONDS, are not started by ctest.
 int longest_ms() {
-  return kLongestMs + kTimedCases * (kerf::test::timing_ticks() - kerf::test::kTimingTicks);
+  return kLongestMs + kTimedRuns * (kerf::test::timing_ticks() - kerf::test::kTimingTicks);
 }
 
-/// Waits for the end of `child`, whose mounts lie in `folder`. Returns what it has returned.
+/// Waits for the end of `child`, whose mounts lie in `folder`. Returns its exit code.
 int watch(pid_t child, const std::filesystem::path& folder) {
   const int limit_ms = longest_ms() / kStepMs * kStepMs;
   int status = 0;
@@ -88,7 +88,7 @@ int watch(pid_t child, const std::filesystem::path& folder) {
 
 }  // namespace
 
-/// Skips with its reason, exit code 77, where nothing can be mounted.
+/// Skips with its reason, exit code 77, if nothing can be mounted.
 int main(int argc, char** argv) {
   const std::string folder = kerf::test::TemporaryFolder().path();
   std::filesystem::create_directory(folder);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// --guard above real buses: what the servo thread calls there is allowed, and nothing else.
+// --guard above real buses: the calls of the servo thread there are allowed, and no other.
 #include <atomic>
 #include <memory>
 #include <string>

@@ -9,7 +9,6 @@
 #include <mutex>
 #include <optional>
 #include <string>
-#include <thread>
 #include <utility>
 #include <vector>
 
@@ -17,54 +16,16 @@
 #include "hil/device/falcon.hpp"
 #include "hil/device/wooden.hpp"
 #include "hil/front/firewire/firewire_node.hpp"
-#include "hil/front/fuse/fuse_mount.hpp"
 #include "hil/front/serving.hpp"
 #include "hil/front/usb/hidraw_node.hpp"
 #include "hil/front/usb/usb_device.hpp"
 #include "hil/front/usb/usbfs_node.hpp"
 #include "hil/script/hand_script_file.hpp"
 #include "shared/posix/monotonic_clock.hpp"
-#include "tests/support/temporary_folder.hpp"
+#include "tests/hil/fuse/served_node.hpp"
 
 /// The three emulated devices as nodes on FUSE.
 namespace kerf::test {
-
-/// A node in a folder of its own, served by a thread while this lives.
-template <class Node>
-class ServedNode {
- public:
-  /// `prepare` runs first on the server's thread; the rest makes the node.
-  template <class... Arguments>
-  ServedNode(const char* name, std::function<void()> prepare, Arguments&&... arguments)
-      : name_(name), node_(std::forward<Arguments>(arguments)...), mount_(folder_.path()) {
-    mount_.add(name_, node_);
-    thread_ = std::thread([this, prepare = std::move(prepare)] {
-      if (prepare) prepare();
-      mount_.serve([this] { return !stop_; });
-    });
-  }
-  ~ServedNode() { stop(); }
-  ServedNode(const ServedNode&) = delete;
-  ServedNode& operator=(const ServedNode&) = delete;
-
-  /// Ends the server; what it has seen may be read from then on.
-  void stop() {
-    stop_ = true;
-    if (thread_.joinable()) thread_.join();
-  }
-  [[nodiscard]] std::string folder() const { return folder_.path(); }
-  [[nodiscard]] std::string path() const { return folder_ / name_; }
-  [[nodiscard]] const Node& node() const noexcept { return node_; }
-  [[nodiscard]] const FuseMount& mount() const noexcept { return mount_; }
-
- private:
-  std::string name_;
-  TemporaryFolder folder_;
-  Node node_;
-  FuseMount mount_;
-  std::atomic<bool> stop_{false};
-  std::thread thread_;
-};
 
 /// A device on FireWire.
 class MountedDevice : public ServedNode<FirewireNode> {
@@ -123,7 +84,7 @@ class HeldClock final : public UsbClock {
     const std::int64_t until_ns = monotonic_ns() + kNsPerSecond;
     while (!is_reached() && monotonic_ns() < until_ns) sleep_until_ns(monotonic_ns() + kPollNs / 2);
   }
-  /// It goes on as the machine's clock does, from where it stands.
+  /// It goes on with the machine's clock, from its present time.
   void let_go() {
     const std::scoped_lock lock(mutex_);
     behind_ns_ = monotonic_ns() - present_ns();
@@ -156,7 +117,7 @@ inline std::vector<ScriptedUsbFault> at_ms(std::vector<ScriptedUsbFault> script)
   return script;
 }
 
-/// The server's thread, where there is the right to it: before the servo, on its core.
+/// The server's thread, if the process may: with a higher priority than the servo, on its core.
 inline void become_device() {
   static_cast<void>(make_real_time(82, -1));
 }

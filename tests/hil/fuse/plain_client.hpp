@@ -20,7 +20,7 @@
 
 namespace kerf::test {
 
-/// One open of a node and nothing but system calls: what a test says is what the node gets.
+/// One open of a node and nothing but system calls, passed on as a test makes them.
 class PlainClient {
  public:
   explicit PlainClient(const std::string& path, bool linked = true)

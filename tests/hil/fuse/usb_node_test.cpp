@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The two nodes against what the kernel's usbfs and hidraw say, by system calls alone.
+// The two nodes against the kernel's usbfs and hidraw, by system calls alone, and as libnifalcon
+// uses them.
 #include <array>
 #include <atomic>
 #include <cerrno>
@@ -19,13 +20,17 @@
 
 #include "shared/wire/falcon.hpp"
 #include "shared/wire/woodenhaptics.hpp"
-#include "tests/hil/fuse/bus_session.hpp"
+#include "tests/hil/clients/nifalcon_client.hpp"
+#include "tests/hil/fuse/mounted_node.hpp"
 
 using kerf::UsbFault;
 using kerf::test::MountedArm;
 using kerf::test::MountedFalcon;
+using kerf::test::NifalconClient;
 
 namespace {
+
+constexpr auto kLatency = static_cast<std::uint8_t>(kerf::falcon::FtdiRequest::latency);
 
 /// One open of a node.
 class Client {
@@ -40,6 +45,14 @@ class Client {
   int call(unsigned long command, T argument) const {
     const int result = ioctl(fd_, command, argument);
     return result < 0 ? -errno : result;
+  }
+  /// A request to the Falcon's chip.
+  [[nodiscard]] int control(std::uint8_t request, std::uint16_t value) const {
+    usbdevfs_ctrltransfer transfer{};
+    transfer.bRequestType = kerf::falcon::kFtdiRequestType;
+    transfer.bRequest = request;
+    transfer.wValue = value;
+    return call(USBDEVFS_CONTROL, &transfer);
   }
   [[nodiscard]] int ready(short events, int milliseconds) const {
     pollfd watched{fd_, events, 0};
@@ -67,7 +80,7 @@ void fill(usbdevfs_urb& urb, std::uint8_t endpoint, std::span<std::uint8_t> buff
 
 }  // namespace
 
-TEST_CASE("usbfs: descriptors are read from an offset, and say what the device is") {
+TEST_CASE("usbfs: descriptors are read from an offset, and have the ids of the device") {
   const MountedFalcon falcon;
   const Client client(falcon.path());
   std::array<std::uint8_t, 100> bytes{};
@@ -82,7 +95,7 @@ TEST_CASE("usbfs: descriptors are read from an offset, and say what the device i
   CHECK(write(client.fd(), bytes.data(), 1) == -1);
 }
 
-TEST_CASE("usbfs: an interface has one owner, and what is not there is refused") {
+TEST_CASE("usbfs: an interface has one owner, and unknown ones are refused") {
   const MountedFalcon falcon;
   const Client first(falcon.path()), second(falcon.path());
   unsigned interface = 0, none = 1;
@@ -121,11 +134,7 @@ TEST_CASE("usbfs: a read waits for the device, a discarded one comes back, none 
   CHECK(client.reap() == &read_urb);
   CHECK(kerf::monotonic_ns() - begin_ns > 10'000'000);
 
-  usbdevfs_ctrltransfer latency{};
-  latency.bRequestType = kerf::falcon::kFtdiRequestType;
-  latency.bRequest = static_cast<std::uint8_t>(kerf::falcon::FtdiRequest::latency);
-  latency.wValue = 255;  // ms: nothing comes meanwhile
-  CHECK(client.call(USBDEVFS_CONTROL, &latency) == 0);
+  CHECK(client.control(kLatency, 255) == 0);  // ms: nothing comes meanwhile
   CHECK(client.call(USBDEVFS_SUBMITURB, &read_urb) == 0);
   CHECK(client.call(USBDEVFS_DISCARDURB, &read_urb) == 0);
   CHECK(client.reap() == &read_urb);
@@ -143,13 +152,8 @@ TEST_CASE("usbfs: a read waits for the device, a discarded one comes back, none 
 TEST_CASE("usbfs: one exchange per frame, two bytes of status before the answer") {
   const MountedFalcon falcon({.firmware_runs = true}, {}, std::nullopt);
   const Client client(falcon.path());
-  usbdevfs_ctrltransfer latency{};
-  latency.bRequestType = kerf::falcon::kFtdiRequestType;
-  latency.bRequest = static_cast<std::uint8_t>(kerf::falcon::FtdiRequest::latency);
-  latency.wValue = 1;
-  CHECK(client.call(USBDEVFS_CONTROL, &latency) == 0);
-  latency.bRequest = 77;
-  CHECK(client.call(USBDEVFS_CONTROL, &latency) == -EPIPE);
+  CHECK(client.control(kLatency, 1) == 0);
+  CHECK(client.control(77, 1) == -EPIPE);
   std::array<std::uint8_t, 64> in{};
   auto command = encode(kerf::FalconCommand{});
   int answers = 0;
@@ -171,7 +175,7 @@ TEST_CASE("usbfs: one exchange per frame, two bytes of status before the answer"
   CHECK(kerf::monotonic_ns() - begin_ns >= 98'000'000);
 }
 
-TEST_CASE("usbfs: after unplugging what was pending comes back, then everything is ENODEV") {
+TEST_CASE("usbfs: after unplugging, pending transfers come back, then everything is ENODEV") {
   std::atomic<bool> waits{false};
   const MountedFalcon falcon({.firmware_runs = true},
                              {{100, UsbFault::stall}, {0, UsbFault::vanish, &waits}}, std::nullopt);
@@ -197,7 +201,7 @@ TEST_CASE("usbfs: after unplugging what was pending comes back, then everything 
   CHECK(open(falcon.path().c_str(), O_RDWR) == -1);
 }
 
-TEST_CASE("hidraw: who it is, its descriptor, one report per read, from the first write on") {
+TEST_CASE("hidraw: its ids, its descriptor, one report per read, from the first write on") {
   for (const std::size_t bytes : {std::size_t{14}, std::size_t{64}}) {
     const MountedArm arm({.packet_bytes = bytes, .serial = "S1"}, std::nullopt);
     const Client client(arm.path());
@@ -230,7 +234,7 @@ TEST_CASE("hidraw: who it is, its descriptor, one report per read, from the firs
   }
 }
 
-TEST_CASE("hidraw: unplugged, it gives what waits and then EIO; nothing can be written") {
+TEST_CASE("hidraw: unplugged, it gives the waiting reports and then EIO; a write fails") {
   std::atomic<bool> streams{false};
   const MountedArm arm({.script = {{0, UsbFault::vanish, &streams}}}, std::nullopt);
   const Client client(arm.path());
@@ -247,4 +251,84 @@ TEST_CASE("hidraw: unplugged, it gives what waits and then EIO; nothing can be w
   CHECK(write(client.fd(), report.data(), report.size()) == -1);
   CHECK(errno == ENODEV);
   CHECK(open(arm.path().c_str(), O_RDWR) == -1);
+}
+
+// ---- a foreign host of the Falcon: requests in another order than our own driver, open reads ----
+
+namespace {
+
+std::vector<std::uint8_t> firmware_of(std::size_t bytes) {
+  std::vector<std::uint8_t> firmware(bytes);
+  for (std::size_t i = 0; i < bytes; ++i) firmware[i] = static_cast<std::uint8_t>(i * 7 + i / 256);
+  return firmware;
+}
+
+}  // namespace
+
+TEST_CASE("nifalcon: firmware is checked for, loaded once above a read that waits, and answers") {
+  // Whole chunks, one with a rest, and one byte.
+  for (const std::size_t bytes : {std::size_t{620}, std::size_t{1000}, std::size_t{1}}) {
+    CAPTURE(bytes);
+    MountedFalcon falcon({.firmware_runs = false}, {}, std::nullopt);
+    {
+      const Client node(falcon.path());
+      NifalconClient client(node.fd());
+      CHECK_FALSE(client.firmware_answers());
+      CHECK(client.reads());
+      CHECK(client.load(firmware_of(bytes)) == "");
+      CHECK(client.firmware_answers());
+      CHECK(client.firmware_answers());  // again, with the read of the first time under way
+      for (int i = 0; i < 50; ++i) {
+        const auto report = client.exchange({.homing = true, .blue = true});
+        REQUIRE(report);
+        CHECK(report->buttons == 0);
+      }
+      CHECK(client.reads());
+    }
+    falcon.stop();
+    CHECK(falcon.node().chip().firmware_bytes() == static_cast<std::int64_t>(bytes));
+    CHECK(falcon.node().chip().lost() == 0);
+    CHECK(falcon.node().rash_clears() == 0);
+    CHECK(falcon.emulator().stats().refused == 0);
+  }
+}
+
+TEST_CASE("nifalcon: a host that loads without asking starts a running Falcon anew") {
+  const MountedFalcon falcon({.firmware_runs = true}, {}, std::nullopt);
+  const Client node(falcon.path());
+  NifalconClient client(node.fd());
+  CHECK(client.firmware_answers());
+  CHECK(client.load(firmware_of(200)) == "");
+  CHECK(client.load(firmware_of(100)) == "");
+  CHECK(client.firmware_answers());
+}
+
+TEST_CASE(
+    "nifalcon: closed with a read under way, the next host is in step from its first question") {
+  const MountedFalcon falcon({.firmware_runs = true}, {}, std::nullopt);
+  for (int host = 0; host < 5; ++host) {
+    CAPTURE(host);
+    const Client node(falcon.path());
+    NifalconClient client(node.fd());
+    CHECK(client.firmware_answers());
+    CHECK(client.reads());
+  }
+}
+
+TEST_CASE(
+    "nifalcon: a host that gives the interface up leaves no reads that take packets of another") {
+  const MountedFalcon falcon({.firmware_runs = true}, {}, std::nullopt);
+  const Client leaving(falcon.path()), coming(falcon.path());
+  unsigned interface = 0;
+  std::array<std::uint8_t, 64> buffer{};
+  usbdevfs_urb read;
+  fill(read, kerf::falcon::kEndpointIn, buffer);
+  REQUIRE(leaving.control(kLatency, 255) == 0);  // ms: nothing comes by itself
+  REQUIRE(leaving.call(USBDEVFS_CLAIMINTERFACE, &interface) == 0);
+  REQUIRE(leaving.call(USBDEVFS_SUBMITURB, &read) == 0);
+  REQUIRE(leaving.call(USBDEVFS_RELEASEINTERFACE, &interface) == 0);
+  CHECK(leaving.reap() == &read);
+  CHECK(read.status == -ENOENT);
+  NifalconClient client(coming.fd());
+  CHECK(client.firmware_answers());
 }
