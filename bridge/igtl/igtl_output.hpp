@@ -10,7 +10,7 @@
 
 namespace kerf::bridge {
 
-/// Where OpenIGTLink goes out.
+/// The settings of the OpenIGTLink server.
 struct IgtlOptions {
   std::string host = "127.0.0.1";   ///< address of this machine to listen on
   std::uint16_t port = 18944;       ///< 0: one that is free

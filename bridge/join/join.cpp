@@ -36,13 +36,17 @@ namespace kerf::bridge {
 namespace {
 
 namespace websocket = beast::websocket;
-using asio::use_awaitable;
 using namespace std::chrono_literals;
 
-/// Ends a connection that cannot get better by trying again, unless it once worked.
+/// Another try cannot help: ends the program, unless a connection has worked before.
 struct Hopeless : BridgeError {
   using BridgeError::BridgeError;
 };
+
+// Every operation ends in an error code: with exceptions beside it all of Beast is compiled twice.
+void throw_if(const ErrorCode& error) {
+  if (error) throw boost::system::system_error(error);
+}
 
 constexpr auto kConnectPatience = 1500ms;  // a lost SYN comes again after 1 s
 constexpr auto kGreetingPatience = 10s;    // TLS and HTTP over a slow link
@@ -55,7 +59,7 @@ constexpr auto kGreetingPatience = 10s;    // TLS and HTTP over a slow link
   throw boost::system::system_error(error);
 }
 
-/// True if the answer is no HTTP, and not if it broke off.
+/// True if the answer is not HTTP; false if the connection broke.
 [[nodiscard]] bool is_no_http(const ErrorCode& error) {
   using Http = beast::http::error;
   return error == Http::bad_version || error == Http::bad_line_ending ||
@@ -86,19 +90,21 @@ void throw_no_certificate(const ErrorCode& error) {
     throw Hopeless("does not know itself by this name; take the address it prints");
   }
   const std::string answer = "answers " + std::to_string(status) + "; is it a kerf-bridge serve?";
-  // Those of a gateway whose server is not up yet, or has too much to do: that may change.
+  // A gateway whose server is not up yet, or is overloaded: that may change.
   if (status >= 500 || status == 429) throw BridgeError(answer);
   throw Hopeless(answer);
 }
 
-/// Leads `ws`, a fresh socket, from its first packet to a WebSocket that talks. Throws `Hopeless`,
-/// or what may be better the next time: `BridgeError` and Boost's system_error.
+/// Connects a new `ws`: TCP, TLS and the WebSocket's handshake. Throws `Hopeless`, or `BridgeError`
+/// and Boost's system_error if another try may help.
 asio::awaitable<void> dial(WebSocket& ws, const BridgeAddress& address, CertificateCheck& check) {
   Link& link = ws.next_layer();
   beast::tcp_stream& tcp_stream = link.next_layer();
   tcp::resolver resolver(ws.get_executor());
-  const auto places = co_await resolver.async_resolve(address.host, address.port, use_awaitable);
-  if (!link.is_tls()) {  // whatever a name stands for here
+  ErrorCode error;
+  const auto places = co_await resolver.async_resolve(address.host, address.port, quiet(error));
+  throw_if(error);
+  if (!link.is_tls()) {  // a name may resolve to any address
     for (const auto& place : places) {
       if (place.endpoint().address().is_loopback()) continue;
       throw Hopeless("is " + place.endpoint().address().to_string() +
@@ -106,10 +112,10 @@ asio::awaitable<void> dial(WebSocket& ws, const BridgeAddress& address, Certific
     }
   }
   tcp_stream.expires_after(kConnectPatience);
-  co_await tcp_stream.async_connect(places, use_awaitable);
+  co_await tcp_stream.async_connect(places, quiet(error));
+  throw_if(error);
   tcp_stream.socket().set_option(tcp::no_delay(true));
   tcp_stream.expires_after(kGreetingPatience);
-  ErrorCode error;
   if (link.is_tls()) {
     check.begin(link.tls().native_handle());
     co_await link.tls().async_handshake(asio::ssl::stream_base::client, quiet(error));
@@ -125,8 +131,7 @@ asio::awaitable<void> dial(WebSocket& ws, const BridgeAddress& address, Certific
   ws.binary(true);
 }
 
-/// What the server means by closing, 4001 and so on, a viewer with a token or without: throws as
-/// `dial`.
+/// Throws the reason of a server's close code, 4001 and so on, as `dial` does.
 [[noreturn]] void throw_closed(std::uint16_t code, bool had_token) {
   switch (static_cast<CloseCode>(code)) {
     case CloseCode::no_token:
@@ -144,14 +149,14 @@ asio::awaitable<void> dial(WebSocket& ws, const BridgeAddress& address, Certific
   throw BridgeError("closed the connection");
 }
 
-constexpr std::int64_t kSilenceNs = 2 * kNsPerSecond;    // of a run: it has a sign of life, 60 Hz
+constexpr std::int64_t kSilenceNs = 2 * kNsPerSecond;    // of a run, which sends at 60 Hz
 constexpr std::int64_t kLongWaitNs = 10 * kNsPerSecond;  // for a run: the server has none
 constexpr std::int64_t kSayWaitNs = kNsPerSecond;        // before that is reported
 constexpr const char* kNoRun = "has no controller yet";
 constexpr const char* kEndless = "answers without end; is it a kerf-bridge serve?";
 constexpr auto kFirstPause = 50ms, kLongestPause = 800ms;  // between two tries
 constexpr auto kWatchPeriod = 20ms;
-// Certificates and an HTTP head. Beast reads an answer that refuses to its end, however long.
+// Certificates and an HTTP head. Beast reads the body of a refusal to its end, however long.
 constexpr std::uint64_t kMaxWelcomeBytes = 256 * 1024;
 
 /// With the token of `--token-file`, if that is given.
@@ -188,7 +193,7 @@ class Joiner {
         stop_(stop),
         out_(out),
         mirror_(options.name, options.most_mib << 20,
-                [this](const Command& command) { return desk_.ask(command); }) {}
+                [this](const Command& command) { return remote_.request(command); }) {}
 
   int run() {
     std::exception_ptr failure;
@@ -203,14 +208,14 @@ class Joiner {
         io_.run();
         over = true;
       } catch (const std::bad_alloc&) {
-        // Beast makes room for whatever an answer promises. The attempt has ended with its handler.
+        // Beast allocates whatever length an answer announces. The attempt ended with its handler.
         if (link_ == nullptr || connected_) throw;
         lost(kEndless);
         link_ = nullptr;
         asio::co_spawn(io_, stay_joined(), ended);
       }
     }
-    desk_.set_link(RemoteCommand::Link::down);
+    remote_.set_link(RemoteCommand::Link::down);
     if (failure) std::rethrow_exception(failure);
     if (age_.count() != 0) {
       say(format(
@@ -242,7 +247,7 @@ class Joiner {
       } catch (const Hopeless& error) {
         if (joins_ == 0) throw BridgeError(place() + error.what());
         lost(error.what());
-      } catch (const WireError& error) {  // another try would hear the same
+      } catch (const WireError& error) {  // another try would receive the same
         if (joins_ == 0) throw BridgeError(place() + error.what());
         lost(error.what());
       } catch (const SegmentError&) {
@@ -251,14 +256,15 @@ class Joiner {
       } catch (const std::exception&) {
         lost(why_closed_.empty() ? last_error() : why_closed_);
       }
-      desk_.set_link(RemoteCommand::Link::down);
+      remote_.set_link(RemoteCommand::Link::down);
       if (joins_ != joins_before) pause = kFirstPause;
       asio::steady_timer timer(io_, pause);
-      co_await timer.async_wait(use_awaitable);
+      ErrorCode ignored;
+      co_await timer.async_wait(quiet(ignored));
     }
   }
 
-  /// One connection, from its first packet to whatever ends it, which it throws.
+  /// One connection to its end; throws the reason of the end.
   asio::awaitable<void> follow(WebSocket ws) {
     why_closed_.clear();
     greeted_ = false;
@@ -266,7 +272,7 @@ class Joiner {
     connected_ = false;
     heard_ns_ = monotonic_ns();
     beast::tcp_stream& link = ws.next_layer().next_layer();
-    struct Watched {  // the watch may close it while it lives
+    struct Watched {  // `watch` may close it meanwhile
       Joiner& joiner;
       explicit Watched(Joiner& j, beast::tcp_stream& watched) : joiner(j) { j.link_ = &watched; }
       ~Watched() { joiner.link_ = nullptr; }
@@ -279,35 +285,37 @@ class Joiner {
       in.clear();
       ErrorCode error;
       co_await ws.async_read(in, quiet(error));
-      // A reason that came counts, however the connection ended after it.
+      // A close reason counts, however the connection ended after it.
       const std::uint16_t reason = ws.reason().code;
       if (error && reason != websocket::close_code::none)
         throw_closed(reason, !address_.token.empty());
-      if (error) throw boost::system::system_error(error);
+      throw_if(error);
       heard_ns_ = monotonic_ns();
       const std::span message(static_cast<const std::byte*>(in.data().data()), in.size());
       if (const auto ack = take(message, link.socket().native_handle())) {
-        co_await ws.async_write(asio::buffer(&*ack, sizeof *ack), use_awaitable);
+        co_await ws.async_write(asio::buffer(&*ack, sizeof *ack), quiet(error));
+        throw_if(error);
       }
-      if (const auto command = desk_.take()) {
-        co_await ws.async_write(asio::buffer(&*command, sizeof *command), use_awaitable);
+      if (const auto command = remote_.take()) {
+        co_await ws.async_write(asio::buffer(&*command, sizeof *command), quiet(error));
+        throw_if(error);
       }
     }
   }
 
   [[nodiscard]] std::string place() const { return address_.host_and_port() + ": "; }
 
-  /// One message of the server; what is to be answered.
+  /// Handles one message of the server. Returns the ack to send, if any.
   std::optional<AckMessage> take(std::span<const std::byte> message, int socket) {
     const LinkFigures figures = link_figures(socket);
     switch (magic_of(message)) {
       case kHelloMagic: {
         const HelloMessage& hello = mirror_.hello(message, heard_ns_, figures.least_round_trip_ns);
-        // Behind an open connection the server waited for a run: joining begins with the run.
+        // The server was waiting for a run: the time of joining begins with the run.
         const std::int64_t waited_ns = heard_ns_ - opened_ns_ - figures.least_round_trip_ns;
         if (greeted_ || waited_ns > kNsPerSecond / 2) since_ns_ = heard_ns_;
-        desk_.set_link((hello.flags & kMayCommand) != 0 ? RemoteCommand::Link::open
-                                                        : RemoteCommand::Link::read_only);
+        remote_.set_link((hello.flags & kMayCommand) != 0 ? RemoteCommand::Link::open
+                                                          : RemoteCommand::Link::read_only);
         if (session_ != 0 && session_ != hello.session) say("a new run");
         session_ = hello.session;
         greeted_ = true;
@@ -316,7 +324,7 @@ class Joiner {
       case kFrameMagic: {
         const bool joined = mirror_.joined(), ended = mirror_.ended();
         const AckMessage ack = mirror_.frame(message, heard_ns_, figures.least_round_trip_ns);
-        if (!joined && mirror_.joined()) tell_joined();
+        if (!joined && mirror_.joined()) report_joined();
         if (!ended && mirror_.ended()) say("the run has ended; waiting for the next");
         waited_ += figures.out_of_order - std::exchange(waited_here_, figures.out_of_order);
         return ack;
@@ -325,27 +333,28 @@ class Joiner {
         mirror_.records(message);
         return std::nullopt;
       case kReplyMagic:
-        desk_.answer(parse_reply(message));
+        remote_.answer(parse_reply(message));
         return std::nullopt;
       default:
         throw WireError("message: of no kind that is known here; use programs of one build");
     }
   }
 
-  void tell_joined() {
+  void report_joined() {
     const double seconds = static_cast<double>(monotonic_ns() - since_ns_) / kNsPerSecond;
     say(format("%s %s as %s in %.2f s", joins_++ == 0 ? "joined" : "joined again",
                address_.host_and_port().c_str(), name_.c_str(), seconds));
     last_reason_.clear();
   }
 
-  /// Samples the age, and ends a connection that is silent or no longer wanted.
+  /// Samples the age of the picture, and closes a connection that is silent or not wanted.
   asio::awaitable<void> watch() {
     asio::steady_timer timer(io_);
     const std::int64_t began_ns = monotonic_ns();
     for (;;) {
       timer.expires_after(kWatchPeriod);
-      co_await timer.async_wait(use_awaitable);
+      ErrorCode ignored;
+      co_await timer.async_wait(quiet(ignored));
       const std::int64_t now_ns = monotonic_ns();
       if (stop_) {
         io_.stop();
@@ -361,7 +370,6 @@ class Joiner {
       if (link_ != nullptr && !connected_ &&
           link_figures(link_->socket().native_handle()).received_bytes > kMaxWelcomeBytes) {
         why_closed_ = kEndless;
-        ErrorCode ignored;
         link_->socket().close(ignored);
         continue;
       }
@@ -372,7 +380,6 @@ class Joiner {
           connected_ && !greeted_
               ? kNoRun
               : "silent for " + std::to_string((now_ns - heard_ns_) / kNsPerSecond) + " s";
-      ErrorCode ignored;
       link_->socket().close(ignored);
     }
   }
@@ -397,10 +404,10 @@ class Joiner {
   asio::ssl::context tls_;
   const std::atomic<bool>& stop_;
   std::ostream& out_;
-  RemoteCommand desk_;
+  RemoteCommand remote_;
   Mirror mirror_;
 
-  beast::tcp_stream* link_ = nullptr;  // of the connection that lives
+  beast::tcp_stream* link_ = nullptr;  // of the open connection
   bool connected_ = false, greeted_ = false;
   std::int64_t heard_ns_ = 0, opened_ns_ = 0, since_ns_ = 0;
   std::string why_closed_, last_reason_;

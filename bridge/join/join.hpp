@@ -14,7 +14,7 @@ namespace kerf::bridge {
 struct JoinOptions {
   std::string address;                ///< what `serve` prints: wss://HOST:PORT/?token=TOKEN
   std::string name = "far";           ///< of the local segment
-  std::filesystem::path ca;           ///< PEM file: who may sign the server's certificate; or
+  std::filesystem::path ca;           ///< PEM file: CAs of the server's certificate; or
   std::string fingerprint;            ///< SHA-256 of the server's certificate, in hex
   std::filesystem::path certificate;  ///< PEM file of this viewer, if the server asks for it
   std::filesystem::path key;          ///< its key, PEM
@@ -23,10 +23,10 @@ struct JoinOptions {
   std::uint64_t most_mib = 2048;      ///< a larger segment is refused
 };
 
-/// Keeps the local segment `name` equal to the far one until `stop`, through every loss of the link
-/// or of the other side. Tells on `out` what happens, a line each, and in the end how old the
-/// picture was. Throws `BridgeError`, `SegmentError` if it could never work: a wrong token, a
-/// certificate that no authority vouches for, a name in use; and if nothing came within `wait_s`.
+/// Keeps the local segment `name` equal to the far one until `stop`; after each loss of the
+/// connection it connects again. Reports on `out` each change, one line each, and at the end the
+/// age of the picture. Throws `BridgeError` or `SegmentError` if another try cannot help (a wrong
+/// token, a certificate that is refused, a name in use), and if nothing came within `wait_s`.
 int run_join(const JoinOptions& options, const std::atomic<bool>& stop, std::ostream& out);
 
 }  // namespace kerf::bridge

@@ -25,9 +25,8 @@ namespace beast = boost::beast;
 using tcp = asio::ip::tcp;
 using ErrorCode = boost::system::error_code;
 
-/// What waits for the end of one read or write, whatever its type: TCP and TLS are compiled for
-/// this one alone, and not anew for every operation of Beast that stands on a link. A file that
-/// sees Beast takes a third of the time so.
+/// The handler of one read or write, with its type erased: TCP and TLS are compiled for this type
+/// alone, not for each operation of Beast on a link. That saves two thirds of the compile time.
 class LinkHandler {
  public:
   using executor_type = asio::any_io_executor;
@@ -59,7 +58,7 @@ class LinkHandler {
   std::unique_ptr<Any> held_;
 };
 
-/// The first few of a sequence of buffers: a link reads and writes some of them, never all at once.
+/// The first buffers of a sequence, at most eight. A read or write may be shorter than asked for.
 template <class Buffer>
 class LinkBuffers {
  public:
@@ -79,8 +78,8 @@ class LinkBuffers {
   std::size_t count_ = 0;
 };
 
-/// A TCP connection, plain or under TLS: chosen at run time, so that what is built on it is
-/// compiled once. An AsyncStream of Beast; its timeouts are those of `next_layer`.
+/// A TCP connection, plain or with TLS. The choice is made at run time, so that Beast is compiled
+/// for one type. An AsyncStream of Beast; its timeouts are those of `next_layer`.
 class Link {
  public:
   using next_layer_type = beast::tcp_stream;
@@ -127,8 +126,8 @@ class Link {
   std::unique_ptr<Tls> tls_;
 };
 
-// If a WebSocket has said goodbye the connection is simply closed: its frames tell where the
-// talk ends, so TLS's own goodbye would add nothing but a wait.
+// After the closing frame of a WebSocket the connection is closed at once, without TLS's own close
+// message: that frame marks the end already.
 inline void teardown(beast::role_type, Link& link, ErrorCode& error) {
   link.next_layer().socket().close(error);
 }
@@ -145,7 +144,7 @@ inline asio::ssl::context context_of(const Tls& tls) {
   return asio::ssl::context(tls.get());
 }
 
-/// Awaits an operation; its failure goes to `error` instead of an exception.
+/// Completion token: awaits an operation, and stores its failure in `error` without an exception.
 inline auto quiet(ErrorCode& error) {
   return asio::redirect_error(asio::use_awaitable, error);
 }

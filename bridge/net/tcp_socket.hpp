@@ -6,19 +6,19 @@
 
 namespace kerf::bridge {
 
-/// What a viewer's socket is set to: no waiting for more to send, few unsent bytes, so that none
-/// grows stale, a look whether the peer is still there, and BBR, which bears loss. The size of the
-/// send buffer is the kernel's business: a small one makes joins over lossy links slow.
+/// Sets the options of a viewer's socket: no delay for small messages, few unsent bytes, so that
+/// data is new when it leaves, keepalive, and BBR, which works on links with loss. The kernel
+/// chooses the size of the send buffer: a small one makes joins over links with loss slow.
 void tune_socket(int fd) noexcept;
 
-/// A new BBR in place of the old one, which would soon go and probe for the round trip with four
-/// packets under way: fresher, and unfair to whoever shares the link.
+/// Restarts BBR before it probes for the round trip, with four packets under way: the picture is
+/// fresher, and other users of the link get less.
 void restart_bbr(int fd) noexcept;
 
-/// Empty if BBR is to be had, else why not.
+/// Empty if the kernel has BBR and allows it, else the reason.
 [[nodiscard]] std::string why_no_bbr(int fd);
 
-/// What the kernel knows of a TCP connection. glibc's struct ends before these.
+/// The kernel's figures of a TCP connection that glibc's struct does not have.
 struct LinkFigures {
   std::int64_t least_round_trip_ns = 0;  ///< 0: not known yet
   std::uint32_t out_of_order = 0;        ///< packets that waited for a lost one before them

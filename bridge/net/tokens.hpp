@@ -14,7 +14,7 @@ namespace kerf::bridge {
 using Digest = std::array<unsigned char, 32>;
 [[nodiscard]] Digest digest_of(std::string_view text) noexcept;
 
-/// What a token lets its holder do.
+/// What the holder of a token may do.
 enum class Right { none, look, command };
 
 /// Who may look and who may command. Tokens have 16 to 128 letters, digits, '-' and '_'.
@@ -25,16 +25,16 @@ class Tokens {
   void add_file(const std::filesystem::path& file, const char* option, Right right);
   void add(std::string_view token, Right right);
 
-  /// Takes as long whatever `token` is: digests are compared, all of them, to their end.
+  /// In constant time: compares the digests of all tokens, each to its end.
   [[nodiscard]] Right right_of(std::string_view token) const noexcept;
-  /// The same for what `cookie_for` made of a token.
+  /// The same for a value of `cookie_for`.
   [[nodiscard]] Right right_of_cookie(std::string_view cookie) const noexcept;
 
   [[nodiscard]] bool may_command() const noexcept {
     return std::ranges::any_of(entries_,
                                [](const Entry& one) { return one.right == Right::command; });
   }
-  /// Of the first that may look or command, for the printed address.
+  /// The first token, for the printed address.
   [[nodiscard]] const std::string& first() const noexcept { return first_; }
 
  private:
@@ -51,15 +51,15 @@ class Tokens {
 /// 128 random bits in hex.
 [[nodiscard]] std::string new_token();
 
-/// What a browser keeps in place of a token: the same after a restart, and the token cannot be had
-/// from it.
+/// The cookie that a browser keeps instead of a token: the same after a restart, and the token
+/// cannot be computed from it.
 [[nodiscard]] std::string cookie_for(std::string_view token);
 
-/// A token that opens the page for one browser. Taken, it is another one.
+/// A token that opens the page in one browser; after its use `renew` makes another one.
 class OneTimeToken {
  public:
   [[nodiscard]] const std::string& token() const noexcept { return token_; }
-  /// Takes as long whatever `token` is.
+  /// In constant time.
   [[nodiscard]] bool is(std::string_view token) const noexcept;
   void renew() { token_ = new_token(); }
 
@@ -78,12 +78,12 @@ class OneTimeToken {
 /// A Host header without its port, and IPv6 without its brackets.
 [[nodiscard]] std::string_view host_name(std::string_view host) noexcept;
 
-/// Whether a browser that names `host` (without port) meant this server: an address, which no
-/// stranger's name server can give another meaning, "localhost", or one of `names`.
+/// Whether `host`, without port, is a name of this server: an address, "localhost" or one of
+/// `names`. Any other name could come from a foreign page whose name server returns our address.
 [[nodiscard]] bool is_own_host(std::string_view host, const std::vector<std::string>& names);
 
-/// Whether the page that opens a WebSocket came from here: none given (no browser), or scheme and
-/// host as the request has them.
+/// Whether the page that opens a WebSocket was loaded from here: the origin is empty (no browser),
+/// or has the scheme and host of the request.
 [[nodiscard]] bool is_own_origin(std::string_view origin, std::string_view host, bool tls);
 
 }  // namespace kerf::bridge

@@ -31,7 +31,7 @@ namespace kerf::bridge {
 #ifdef KERF_QRENCODE
 namespace {
 
-constexpr int kMargin = 4;  // that the standard asks for
+constexpr int kMargin = 4;  // required by the standard
 constexpr const char* kBlackOnWhite = "\033[30;107m";
 constexpr const char* kUsual = "\033[0m\n";
 
@@ -99,7 +99,7 @@ HostPort parse_listen(const std::string& text) {
   return out;
 }
 
-/// Where others reach what listens at `host`: itself, or each address of this machine.
+/// The addresses of a server that listens at `host`: `host`, or all of this machine.
 [[nodiscard]] std::vector<std::string> reached_at(const std::string& host) {
   if (host != "0.0.0.0" && host != "::") return {host};
   std::vector<std::string> out = own_addresses();
@@ -122,7 +122,7 @@ HostPort parse_listen(const std::string& text) {
   return tls;
 }
 
-/// Of the page or of join, at `host`.
+/// The address of the page or of join, at `host`.
 [[nodiscard]] std::string address_of(const char* scheme, bool tls, const std::string& host,
                                      std::uint16_t port, const std::string& token) {
   const bool v6 = host.find(':') != std::string::npos;
@@ -130,18 +130,19 @@ HostPort parse_listen(const std::string& text) {
          std::to_string(port) + "/?token=" + token;
 }
 
-/// For one browser. The QR code is for one of another machine.
-void print_pages(const ServerSetup& setup, std::uint16_t port, const std::string& pass, bool qr) {
+/// The page's address for one browser. The QR code is for a browser of another machine.
+void print_pages(const ServerSetup& setup, std::uint16_t port, const std::string& page_token,
+                 bool qr) {
   std::string for_others;
   for (const std::string& host : reached_at(setup.host)) {
-    const std::string address = address_of("http", setup.tls != nullptr, host, port, pass);
+    const std::string address = address_of("http", setup.tls != nullptr, host, port, page_token);
     if (for_others.empty() && !is_loopback(host)) for_others = address;
     std::cout << address << '\n';
   }
   if (qr && !for_others.empty()) std::cout << qr_code(for_others);
 }
 
-void print_addresses(const ServerSetup& setup, std::uint16_t port, const std::string& pass,
+void print_addresses(const ServerSetup& setup, std::uint16_t port, const std::string& page_token,
                      bool qr) {
   std::cout << "for kerf bridge join, as often as it is shown\n";
   for (const std::string& host : reached_at(setup.host)) {
@@ -151,7 +152,7 @@ void print_addresses(const ServerSetup& setup, std::uint16_t port, const std::st
     std::cout << "with a token of --allow-commands in its place a viewer may command, too\n";
   }
   std::cout << "for one browser; the next one gets an address of its own\n";
-  print_pages(setup, port, pass, qr);
+  print_pages(setup, port, page_token, qr);
 }
 
 }  // namespace
@@ -182,9 +183,9 @@ int run_serve(const ServeOptions& options, const std::atomic<bool>& stop) {
     }
   }
   std::uint16_t port = 0;
-  setup.on_pass = [&setup, &port, qr = options.qr](const std::string& pass) {
+  setup.on_page_token = [&setup, &port, qr = options.qr](const std::string& token) {
     std::cout << "for the next browser\n";
-    print_pages(setup, port, pass, qr);
+    print_pages(setup, port, token, qr);
     std::cout.flush();
   };
   Server server(setup);
@@ -201,8 +202,8 @@ int run_serve(const ServeOptions& options, const std::atomic<bool>& stop) {
     std::cout << "certificate" << (options.certificate.empty() ? ", self-signed," : "")
               << " SHA-256 " << fingerprint_of(setup.tls.get()) << '\n';
   }
-  print_addresses(setup, port, server.pass(), options.qr);
-  // Who has no address has no picture.
+  print_addresses(setup, port, server.page_token(), options.qr);
+  // Without its addresses a server is of no use.
   if (const std::string why = stdout_error(std::cout); !why.empty()) throw BridgeError(why);
   server.run(stop);
   return 0;

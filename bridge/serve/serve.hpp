@@ -9,9 +9,9 @@
 
 namespace kerf::bridge {
 
-/// `text` as a QR code for a terminal of any colours: black on white, two modules a character, four
-/// of white around it. A line with the reason if libqrencode was missing when kerf was built,
-/// or `text` is too long for a code.
+/// `text` as a QR code for a terminal of any colours: black on white, two modules per character, a
+/// margin of four. One line with the reason if libqrencode was missing when kerf was built, or if
+/// `text` is too long.
 [[nodiscard]] std::string qr_code(const std::string& text);
 
 inline constexpr int kMostViewers = 32;
@@ -22,9 +22,9 @@ struct ServeOptions {
   std::string name = kDefaultName;        ///< of the controller
   std::filesystem::path certificate;      ///< PEM file; empty: self-signed off loopback
   std::filesystem::path key;              ///< of the certificate, PEM
-  std::filesystem::path client_ca;        ///< PEM file: who may sign viewers' certificates; or none
-  std::filesystem::path token_file;       ///< who may look; empty: one token, made now
-  std::filesystem::path command_tokens;   ///< who may command; empty: no viewer
+  std::filesystem::path client_ca;   ///< PEM file: CAs of viewers' certificates; empty: none needed
+  std::filesystem::path token_file;  ///< tokens of viewers; empty: one token, made now
+  std::filesystem::path command_tokens;  ///< tokens of viewers that may command; empty: none
   int max_viewers = kMostViewers;
   bool dedicated_link = false;
   int openigtlink = 0;  ///< port for 3D Slicer, at the same host; 0: none

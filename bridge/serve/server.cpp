@@ -22,8 +22,8 @@
 namespace kerf::bridge {
 namespace {
 
-// Connections that are no viewers yet: room for a browser's six in several windows, and a bound for
-// those who come to keep others out.
+// Connections that are no viewers yet: room for several windows of a browser, six each, and a bound
+// for one that opens connections to keep others out.
 constexpr std::size_t kMaxHandshakes = 128;
 constexpr std::ptrdiff_t kMaxHandshakesOfOne = 32;
 constexpr std::int64_t kRetryNs = kNsPerSecond / 10;
@@ -37,7 +37,7 @@ tcp::endpoint resolve(asio::io_context& io, const std::string& host, std::uint16
   if (error || found.empty()) {
     throw BridgeError(place + error.message() + "; give an address of this machine (ip address)");
   }
-  // A machine's own name may stand for loopback too.
+  // A machine's own name may also resolve to loopback.
   const auto outside = std::find_if(found.begin(), found.end(), [](const auto& one) {
     return !one.endpoint().address().is_loopback();
   });
@@ -77,7 +77,7 @@ tcp::acceptor listen_at(asio::io_context& io, const ServerSetup& setup) {
 
 Server::Impl::Impl(ServerSetup setup)
     : setup_(std::move(setup)), acceptor_(listen_at(io_, setup_)) {
-  static_cast<void>(segment_socket(setup_.name));  // a name that cannot be is not worth a wait
+  static_cast<void>(segment_socket(setup_.name));  // refuses a name that cannot exist
   if (setup_.tls) tls_.emplace(context_of(setup_.tls));
   const std::string why = why_no_bbr(acceptor_.native_handle());
   if (!why.empty()) {
@@ -87,7 +87,7 @@ Server::Impl::Impl(ServerSetup setup)
 
 Server::Impl::~Impl() {
   helper_.join();
-  // Viewers live as long as `io_` does, longer than what their streams look at.
+  // Viewers live as long as `io_`, longer than the snapshot that their streams read.
   for (const std::shared_ptr<Viewer>& viewer : viewers_) viewer->stream.reset();
 }
 
@@ -105,7 +105,7 @@ asio::awaitable<void> Server::Impl::accept_all() {
   for (;;) {
     ErrorCode error;
     tcp::socket socket = co_await acceptor_.async_accept(quiet(error));
-    if (error) {  // no descriptor is left, or the peer was gone already
+    if (error) {  // no descriptor is left, or the peer has closed already
       pause.expires_after(std::chrono::milliseconds(50));
       co_await pause.async_wait(quiet(error));
       continue;
@@ -118,8 +118,8 @@ asio::awaitable<void> Server::Impl::accept_all() {
 
 namespace {
 
-/// Who counts as one: an IPv4 address, or the 64 bits of an IPv6 network, of which one machine has
-/// as many addresses as it likes.
+/// What counts as one host: an IPv4 address, or the first 64 bits of an IPv6 address, since one
+/// machine may use all addresses of such a network.
 asio::ip::address_v6::bytes_type host_of(const asio::ip::address& address) {
   asio::ip::address_v6::bytes_type bytes{};
   if (address.is_v4())
@@ -133,10 +133,10 @@ asio::ip::address_v6::bytes_type host_of(const asio::ip::address& address) {
 
 }  // namespace
 
-/// Where all places are taken, the oldest connection of the host that has most of them goes: who
-/// holds many and sends nothing keeps no other out. One that waits for the answer to a wrong
-/// token goes last, and never for another of its own host: who guesses gets an answer a second for
-/// each place of one host.
+/// If all slots are taken, the oldest connection of the host with most of them is closed, so a host
+/// that opens many and sends nothing keeps no other out. A connection that waits for the answer to
+/// a wrong token is closed last, and never for another one of its own host: so each slot of a host
+/// tries one token per second at most.
 bool Server::Impl::make_room(const asio::ip::address& newcomer) {
   const auto held_by = [&](const asio::ip::address& address) {
     return std::ranges::count(handshakes_, host_of(address),
@@ -170,12 +170,12 @@ asio::awaitable<void> Server::Impl::clock(const std::atomic<bool>& stop) {
     timer.expires_at(at);
     ErrorCode error;
     co_await timer.async_wait(quiet(error));
-    slot();
+    on_clock();
   }
   io_.stop();
 }
 
-void Server::Impl::slot() {
+void Server::Impl::on_clock() {
   const std::int64_t now_ns = monotonic_ns();
   watch_controller(now_ns);
   const bool restart = setup_.dedicated_link && now_ns - bbr_restarted_ns_ >= kBbrRestartNs;
@@ -188,7 +188,7 @@ void Server::Impl::slot() {
       viewer->stream->slot(now_ns, ended);
     }
     if (restart && !viewer->gone) restart_bbr(viewer->fd());
-    look_after(*viewer, now_ns);
+    update_viewer(*viewer, now_ns);
     viewer->wake.cancel();
   }
 }
@@ -242,8 +242,8 @@ std::uint16_t Server::port() const noexcept {
 std::string Server::address() const {
   return impl_->address();
 }
-const std::string& Server::pass() const noexcept {
-  return impl_->pass();
+const std::string& Server::page_token() const noexcept {
+  return impl_->page_token();
 }
 void Server::run(const std::atomic<bool>& stop) {
   impl_->run(stop);

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A connection of the server before it is a viewer: TLS, and the pages over HTTP.
+// Connections of the server that are not yet viewers: TLS, and the pages over HTTP.
 #include <algorithm>
-#include <array>
 #include <chrono>
 #include <iostream>
 #include <string>
@@ -10,7 +9,6 @@
 
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/write.hpp>
-#include <boost/beast/core/detect_ssl.hpp>
 
 #include "bridge/page/page_files.hpp"
 #include "bridge/serve/server_impl.hpp"
@@ -69,8 +67,8 @@ constexpr std::string_view kHeaders =
     "X-Content-Type-Options: nosniff\r\n"
     "X-Frame-Options: DENY\r\n";
 
-/// The bytes of it. All that a header can make a browser forbid is forbidden: scripts, styles and
-/// connections from elsewhere or inside of the HTML, frames around the page, a guess at the type.
+/// The bytes of a reply. Its headers forbid all that the page does not need: scripts, styles and
+/// connections of other hosts or inside of the HTML, frames around the page, guessing of its type.
 std::string http_text(const HttpReply& reply) {
   std::string text = "HTTP/1.1 " + std::to_string(reply.status) + " ";
   text += reason(reply.status);
@@ -101,17 +99,20 @@ asio::awaitable<void> Server::Impl::connection(tcp::socket socket) {
 
 asio::awaitable<void> Server::Impl::handshake(WebSocket& ws, beast::flat_buffer& in, bool& done) {
   Link& link = ws.next_layer();
-  const HandshakeSlot place(*this, link.next_layer());
+  const HandshakeSlot slot(*this, link.next_layer());
   ErrorCode error;
+  done = false;
   link.next_layer().expires_after(std::chrono::nanoseconds(setup_.handshake_ns));
-  done = co_await beast::async_detect_ssl(link.next_layer(), in, quiet(error));
+  in.commit(co_await link.next_layer().async_read_some(in.prepare(kMaxHeaderBytes), quiet(error)));
   if (error) co_return;
+  constexpr char kTlsHandshake = 22;  // the first byte of every client's first message
+  done = *static_cast<const char*>(in.data().data()) == kTlsHandshake;
   if (!done) {
     const std::string reply = http_text({400, "text/plain; charset=utf-8",
                                          "This port speaks TLS only: open it with https:// (a "
                                          "page) or wss:// (kerf bridge join).\n",
                                          "", false});
-    co_await asio::async_write(link.next_layer(), asio::buffer(reply), quiet(error));
+    link.next_layer().socket().send(asio::buffer(reply), 0, error);  // an empty queue has room
     co_return;
   }
   const std::size_t used =
@@ -121,14 +122,14 @@ asio::awaitable<void> Server::Impl::handshake(WebSocket& ws, beast::flat_buffer&
   if (done) co_return;
   // A client without the certificate that is asked for has sent its request already. It is read, so
   // that the alert reaches the client before a reset does.
-  std::array<char, kMaxHeaderBytes> unread;
+  in.clear();
   link.next_layer().socket().shutdown(tcp::socket::shutdown_send, error);
-  co_await link.next_layer().async_read_some(asio::buffer(unread), quiet(error));
+  co_await link.next_layer().async_read_some(in.prepare(kMaxHeaderBytes), quiet(error));
 }
 
-/// A token of the address goes before the cookie, and the cookie before the pass: a browser that
-/// has been here takes no other viewer's pass away.
-Server::Impl::Shown Server::Impl::shown_by(const Request& request) const {
+/// First the token of the address, then the cookie, then the one-time token: a browser that has a
+/// cookie does not use up the one-time token.
+Server::Impl::Credentials Server::Impl::credentials_of(const Request& request) const {
   const Tokens& tokens = setup_.tokens;
   const std::string_view asked = query_value(text(request.target()), "token");
   if (const Right right = tokens.right_of(asked); right != Right::none) {
@@ -138,13 +139,13 @@ Server::Impl::Shown Server::Impl::shown_by(const Request& request) const {
   if (const Right right = tokens.right_of_cookie(kept); right != Right::none) {
     return {right, true, false, {}};
   }
-  if (!beast::websocket::is_upgrade(request) && pass_.is(asked)) {
+  if (!beast::websocket::is_upgrade(request) && page_token_.is(asked)) {
     return {tokens.right_of(tokens.first()), true, true, cookie_for(tokens.first())};
   }
   return {Right::none, !asked.empty() || !kept.empty(), false, {}};
 }
 
-std::string Server::Impl::page_text(const Request& request, const Shown& shown) {
+std::string Server::Impl::page_text(const Request& request, const Credentials& shown) {
   HttpReply reply;
   reply.keep_alive = request.keep_alive();
   reply.head_only = request.method() == http::verb::head;
@@ -160,9 +161,9 @@ std::string Server::Impl::page_text(const Request& request, const Shown& shown) 
   if (!shown.cookie.empty() && !reply.head_only) {
     reply.cookie = cookie_name() + "=" + shown.cookie + "; Path=/; HttpOnly; SameSite=Strict" +
                    (tls_ ? "; Secure" : "");
-    if (shown.pass) {
-      pass_.renew();
-      if (setup_.on_pass) setup_.on_pass(pass_.token());
+    if (shown.one_time) {
+      page_token_.renew();
+      if (setup_.on_page_token) setup_.on_page_token(page_token_.token());
     }
   }
   std::string_view name = path_of(text(request.target())).substr(1);
@@ -200,7 +201,7 @@ asio::awaitable<void> Server::Impl::refuse(Link& link, int status, std::string_v
 asio::awaitable<void> Server::Impl::talk_http(std::unique_ptr<WebSocket> ws,
                                               beast::flat_buffer& in) {
   Link& link = ws->next_layer();
-  HandshakeSlot place(*this, link.next_layer());
+  HandshakeSlot slot(*this, link.next_layer());
   ErrorCode error;
   for (bool more = true; more && !error;) {
     http::request_parser<http::empty_body> parser;
@@ -227,18 +228,18 @@ asio::awaitable<void> Server::Impl::talk_http(std::unique_ptr<WebSocket> ws,
     if (upgrade && !is_own_origin(text(request[http::field::origin]), host, tls_.has_value())) {
       co_return co_await refuse(link, 403, "A page from elsewhere may not look in here.\n", head);
     }
-    const Shown shown = shown_by(request);
+    const Credentials shown = credentials_of(request);
     if (shown.right == Right::none && shown.secret) {
-      // The place is held meanwhile, so who guesses gets 32 answers a second at most.
-      place.is_guess = true;
-      say_at_most_once_a_second("a wrong token from " + place.from().to_string());
+      // It keeps its slot meanwhile, so one host tries 32 tokens per second at most.
+      slot.is_guess = true;
+      say_at_most_once_a_second("a wrong token from " + slot.from().to_string());
       asio::steady_timer wait(io_, std::chrono::nanoseconds(setup_.wrong_token_ns));
       co_await wait.async_wait(quiet(error));
-      place.is_guess = false;
+      slot.is_guess = false;
     }
     if (upgrade && path_of(text(request.target())) == kBridgePath) {
       const Request upgrade_request = parser.release();
-      co_return co_await view(std::move(ws), upgrade_request, shown.right, place);
+      co_return co_await view(std::move(ws), upgrade_request, shown.right, slot);
     }
     const std::string reply = page_text(request, shown);
     more = request.keep_alive();

@@ -38,27 +38,27 @@ struct Viewer {
   std::unique_ptr<Stream> stream;
   std::deque<ReplyMessage> replies;
   std::int64_t heard_ns = 0;
-  std::int64_t measured_ns = 0;      ///< when the round trip was asked for
-  int may_say = 0;                   ///< messages that it may send before it is a flood
-  std::int64_t may_send_bytes = 0;   ///< on the wire, the same
-  std::uint64_t sent_bytes = 0;      ///< by it, when that was looked at
-  bool commanding = false;           ///< a command of it is with the controller
+  std::int64_t measured_ns = 0;      ///< when the round trip was read
+  int message_credit = 0;            ///< messages that it may still send
+  std::int64_t byte_credit = 0;      ///< bytes that it may still send, with TLS
+  std::uint64_t received_bytes = 0;  ///< from it, when `byte_credit` was updated
+  bool commanding = false;           ///< the controller has a command of it
   bool gone = false;                 ///< its socket has failed or is closed
   std::optional<CloseCode> closing;  ///< it is to be closed with this code
-  std::int64_t close_by_ns = 0;      ///< and if it does not, the socket is closed
+  std::int64_t close_by_ns = 0;      ///< then the socket is closed
 
   [[nodiscard]] int fd() { return ws->next_layer().next_layer().socket().native_handle(); }
 };
 
 using Request = beast::http::request<beast::http::empty_body>;
 
-/// One thread runs everything but what may wait for the controller, which `helper_` does.
+/// One thread runs all of it, except calls that may wait for the controller: `helper_` runs those.
 class Server::Impl {
  public:
   explicit Impl(ServerSetup setup);
   ~Impl();
   [[nodiscard]] std::uint16_t port() const { return acceptor_.local_endpoint().port(); }
-  [[nodiscard]] const std::string& pass() const { return pass_.token(); }
+  [[nodiscard]] const std::string& page_token() const { return page_token_.token(); }
   [[nodiscard]] std::string address() const {
     return acceptor_.local_endpoint().address().to_string();
   }
@@ -67,50 +67,50 @@ class Server::Impl {
  private:
   using Void = asio::awaitable<void>;
   class HandshakeSlot;
-  /// What a request shows of what it may.
-  struct Shown {
+  /// The rights of a request, and where they come from.
+  struct Credentials {
     Right right = Right::none;
-    bool secret = false;  ///< a token or a cookie, right or wrong
-    bool pass = false;    ///< it is by the pass that it may look
-    std::string cookie;   ///< for a browser to keep from now on
+    bool secret = false;    ///< it has a token or a cookie, right or wrong
+    bool one_time = false;  ///< its right is that of the one-time token
+    std::string cookie;     ///< for the browser to keep; empty: none
   };
 
   // server.cpp
   Void accept_all();
   [[nodiscard]] bool make_room(const asio::ip::address& newcomer);
   Void clock(const std::atomic<bool>& stop);
-  void slot();
+  void on_clock();
   void watch_controller(std::int64_t now_ns);
   void begin_run(std::unique_ptr<SegmentConnection> connection);
   void say_once(const std::string& text);
 
-  // connection.cpp
+  // server_http.cpp
   Void connection(tcp::socket socket);
   Void handshake(WebSocket& ws, beast::flat_buffer& in, bool& done);
   Void talk_http(std::unique_ptr<WebSocket> ws, beast::flat_buffer& in);
   Void refuse(Link& link, int status, std::string_view text, bool head_only);
   void say_at_most_once_a_second(const std::string& text);
-  /// Of this port, since cookies are kept by host alone.
+  /// With the port, since browsers keep cookies by host alone.
   [[nodiscard]] std::string cookie_name() const { return "kerf" + std::to_string(port()); }
-  [[nodiscard]] Shown shown_by(const Request& request) const;
-  [[nodiscard]] std::string page_text(const Request& request, const Shown& shown);
+  [[nodiscard]] Credentials credentials_of(const Request& request) const;
+  [[nodiscard]] std::string page_text(const Request& request, const Credentials& shown);
 
   // server_viewer.cpp
   Void view(std::unique_ptr<WebSocket> ws, const Request& request, Right right,
-            HandshakeSlot& place);
+            HandshakeSlot& slot);
   Void read_viewer(std::shared_ptr<Viewer> viewer);
   Void write_viewer(std::shared_ptr<Viewer> viewer);
-  [[nodiscard]] bool obey(const std::shared_ptr<Viewer>& viewer,
-                          std::span<const std::byte> message);
+  [[nodiscard]] bool handle_message(const std::shared_ptr<Viewer>& viewer,
+                                    std::span<const std::byte> message);
   void command(const std::shared_ptr<Viewer>& viewer, const CommandMessage& message);
   static void answer(Viewer& viewer, std::uint32_t sequence, const Reply& reply);
   void open_stream(Viewer& viewer);
-  void look_after(Viewer& viewer, std::int64_t now_ns);
+  void update_viewer(Viewer& viewer, std::int64_t now_ns);
   static void drop(Viewer& viewer, CloseCode code);
 
   ServerSetup setup_;
-  OneTimeToken pass_;
-  // Used by what `io_` runs, to its end.
+  OneTimeToken page_token_;
+  // Used by coroutines of `io_`, so it must outlive it.
   std::list<HandshakeSlot*> handshakes_;  // the oldest first
   asio::io_context io_{1};
   std::optional<asio::ssl::context> tls_;
@@ -127,8 +127,7 @@ class Server::Impl {
   std::list<std::shared_ptr<Viewer>> viewers_;
 };
 
-/// A connection that is not yet a viewer, while it holds one of the places that there are for such.
-/// Its stream outlives it.
+/// One of the limited slots for connections that are not yet viewers. The stream outlives it.
 class Server::Impl::HandshakeSlot {
  public:
   HandshakeSlot(Impl& server, beast::tcp_stream& stream) : server_(server), stream_(stream) {
@@ -142,12 +141,11 @@ class Server::Impl::HandshakeSlot {
   void release() { server_.handshakes_.remove(this); }
   void evict() {
     release();
-    stream_.close();  // what waits for it ends with an error
+    stream_.close();  // its coroutine ends with an error
   }
   [[nodiscard]] const asio::ip::address& from() const { return from_; }
 
-  bool is_guess =
-      false;  ///< it waits for the answer to a wrong token, and keeps its place till then
+  bool is_guess = false;  ///< it waits for the answer to a wrong token
 
  private:
   Impl& server_;

@@ -19,7 +19,7 @@ namespace {
 
 namespace websocket = beast::websocket;
 
-/// What a viewer may ask for at all: the undo of a stroke is the local user's.
+/// Commands of viewers. Only the local user may undo a stroke.
 bool is_for_viewers(CommandKind kind) noexcept {
   return kind == CommandKind::select_tool || kind == CommandKind::hold ||
          kind == CommandKind::reset;
@@ -27,12 +27,12 @@ bool is_for_viewers(CommandKind kind) noexcept {
 
 constexpr std::int64_t kGoodbyeNs = kNsPerSecond;
 constexpr std::int64_t kMeasureNs = kNsPerSecond / 4;
-constexpr int kMaySay = 64;  // beside one ack a frame: a second of commands or pings
-// On the wire: masked head of a WebSocket frame, what TLS 1.3 adds to a record.
+constexpr int kMessageCredit = 64;  // beside one ack per frame: a second of commands or pings
+// With the masked head of a WebSocket frame and the bytes that TLS 1.3 adds to a record.
 constexpr std::int64_t kMessageBytes = kMaxUpBytes + 14 + 22;
-// What may have come since the last look: the acks of a stalled link come at once. Fragments
-// without payload are no messages, so this alone bounds them.
-constexpr std::int64_t kMaySendBytes = 1 << 20;
+// After a stall of the link all acks come at once. Fragments without payload are no messages, so
+// only this limit bounds them.
+constexpr std::int64_t kByteCredit = 1 << 20;
 constexpr std::size_t kMaxReplies = 16;
 
 std::string_view words(CloseCode code) {
@@ -52,7 +52,7 @@ std::string_view words(CloseCode code) {
 }  // namespace
 
 asio::awaitable<void> Server::Impl::view(std::unique_ptr<WebSocket> ws, const Request& request,
-                                         Right right, HandshakeSlot& place) {
+                                         Right right, HandshakeSlot& slot) {
   auto& tcp_stream = ws->next_layer().next_layer();
   tcp_stream.expires_after(std::chrono::nanoseconds(setup_.handshake_ns));
   ws->read_message_max(kMaxUpBytes);
@@ -72,15 +72,15 @@ asio::awaitable<void> Server::Impl::view(std::unique_ptr<WebSocket> ws, const Re
   if (viewer->closing) {
     viewer->ws->next_layer().next_layer().expires_after(std::chrono::nanoseconds(kGoodbyeNs));
     co_await write_viewer(viewer);
-    place.release();  // before its stream ends
+    slot.release();  // before its stream ends
     co_return;
   }
-  place.release();
-  viewer->may_say = kMaySay;
-  viewer->may_send_bytes = kMaySendBytes;
-  viewer->sent_bytes = link_figures(viewer->fd()).received_bytes;
+  slot.release();
+  viewer->message_credit = kMessageCredit;
+  viewer->byte_credit = kByteCredit;
+  viewer->received_bytes = link_figures(viewer->fd()).received_bytes;
   viewer->ws->control_callback([watched = viewer.get()](websocket::frame_type, beast::string_view) {
-    if (--watched->may_say < 0) drop(*watched, CloseCode::not_understood);
+    if (--watched->message_credit < 0) drop(*watched, CloseCode::not_understood);
   });
   viewers_.push_back(viewer);
   if (connection_) open_stream(*viewer);
@@ -106,9 +106,9 @@ asio::awaitable<void> Server::Impl::write_viewer(std::shared_ptr<Viewer> viewer)
       viewer->replies.pop_front();
       co_await viewer->ws->async_write(asio::buffer(&reply, sizeof reply), quiet(error));
     } else if (viewer->stream && viewer->stream->next(monotonic_ns(), out)) {
-      ++viewer->may_say;
-      viewer->may_send_bytes += kMessageBytes;
-      co_await viewer->ws->async_write(asio::buffer(out), quiet(error));
+      ++viewer->message_credit;
+      viewer->byte_credit += kMessageBytes;
+      co_await viewer->ws->async_write(asio::buffer(std::as_const(out)), quiet(error));
     } else {
       viewer->wake.expires_at(asio::steady_timer::time_point::max());
       ErrorCode woken;
@@ -134,7 +134,8 @@ asio::awaitable<void> Server::Impl::read_viewer(std::shared_ptr<Viewer> viewer) 
     co_await viewer->ws->async_read(in, quiet(error));
     if (error || viewer->closing) continue;
     const std::span message(static_cast<const std::byte*>(in.data().data()), in.data().size());
-    if (!viewer->ws->got_binary() || --viewer->may_say < 0 || !obey(viewer, message)) {
+    if (!viewer->ws->got_binary() || --viewer->message_credit < 0 ||
+        !handle_message(viewer, message)) {
       drop(*viewer, CloseCode::not_understood);
     }
     viewer->wake.cancel();
@@ -143,14 +144,15 @@ asio::awaitable<void> Server::Impl::read_viewer(std::shared_ptr<Viewer> viewer) 
   viewer->wake.cancel();
 }
 
-bool Server::Impl::obey(const std::shared_ptr<Viewer>& viewer, std::span<const std::byte> message) {
+bool Server::Impl::handle_message(const std::shared_ptr<Viewer>& viewer,
+                                  std::span<const std::byte> message) {
   const auto up = parse_up(message);
   if (!up) return false;
   if (const auto* const wish = std::get_if<CommandMessage>(&*up)) {
     command(viewer, *wish);
     return true;
   }
-  if (!viewer->stream) return true;  // of a run that has just ended
+  if (!viewer->stream) return true;  // the run has just ended
   const std::int64_t now_ns = monotonic_ns();
   viewer->heard_ns = now_ns;
   if (now_ns - viewer->measured_ns >= kMeasureNs) {
@@ -161,7 +163,7 @@ bool Server::Impl::obey(const std::shared_ptr<Viewer>& viewer, std::span<const s
 }
 
 void Server::Impl::answer(Viewer& viewer, std::uint32_t sequence, const Reply& reply) {
-  if (viewer.replies.size() >= kMaxReplies) return;  // it does not read them
+  if (viewer.replies.size() >= kMaxReplies) return;  // the viewer does not read them
   viewer.replies.push_back(
       {kReplyMagic, sequence, static_cast<std::uint32_t>(reply.status), reply.index});
   viewer.wake.cancel();
@@ -184,7 +186,7 @@ void Server::Impl::command(const std::shared_ptr<Viewer>& viewer, const CommandM
       if (!command_link_ || !command_link_->alive()) command_link_ = connect_segment(setup_.name);
       reply = command_link_->send(wish);
     } catch (const SegmentError&) {
-      command_link_.reset();  // no controller: the viewer may try again
+      command_link_.reset();  // without a controller the answer is busy
     }
     asio::post(io_, [from, sequence, reply] {
       const std::shared_ptr<Viewer> back = from.lock();
@@ -195,14 +197,15 @@ void Server::Impl::command(const std::shared_ptr<Viewer>& viewer, const CommandM
   });
 }
 
-void Server::Impl::look_after(Viewer& viewer, std::int64_t now_ns) {
-  viewer.may_say = std::max(viewer.may_say, std::min(viewer.may_say + 1, kMaySay));
+void Server::Impl::update_viewer(Viewer& viewer, std::int64_t now_ns) {
+  viewer.message_credit =
+      std::max(viewer.message_credit, std::min(viewer.message_credit + 1, kMessageCredit));
   if (!viewer.gone) {
-    const std::uint64_t sent = link_figures(viewer.fd()).received_bytes;
-    viewer.may_send_bytes -= static_cast<std::int64_t>(sent - viewer.sent_bytes);
-    viewer.sent_bytes = sent;
-    if (viewer.may_send_bytes < 0) drop(viewer, CloseCode::not_understood);
-    viewer.may_send_bytes = std::min(viewer.may_send_bytes + kMessageBytes, kMaySendBytes);
+    const std::uint64_t received = link_figures(viewer.fd()).received_bytes;
+    viewer.byte_credit -= static_cast<std::int64_t>(received - viewer.received_bytes);
+    viewer.received_bytes = received;
+    if (viewer.byte_credit < 0) drop(viewer, CloseCode::not_understood);
+    viewer.byte_credit = std::min(viewer.byte_credit + kMessageBytes, kByteCredit);
   }
   if (!viewer.stream || !viewer.stream->link().waits_for_ack()) viewer.heard_ns = now_ns;
   if (!viewer.closing && now_ns - viewer.heard_ns > setup_.silence_ns)

@@ -13,7 +13,7 @@
 
 namespace kerf::bridge {
 
-Reply RemoteCommand::ask(const Command& command) noexcept {
+Reply RemoteCommand::request(const Command& command) noexcept {
   std::unique_lock lock(mutex_);
   if (link_ != Link::open) {
     return {link_ == Link::down ? ReplyStatus::busy : ReplyStatus::refused, 0};
@@ -33,7 +33,7 @@ std::optional<CommandMessage> RemoteCommand::take() {
 
 void RemoteCommand::answer(const ReplyMessage& reply) {
   const std::lock_guard lock(mutex_);
-  if (reply.sequence != sequence_) return;  // to one that was given up
+  if (reply.sequence != sequence_) return;  // `request` no longer waits for it
   const bool known = reply.status <= static_cast<std::uint32_t>(ReplyStatus::refused);
   reply_ =
       Reply{known ? static_cast<ReplyStatus>(reply.status) : ReplyStatus::refused, reply.index};

@@ -24,14 +24,13 @@
 
 namespace kerf::bridge {
 
-/// The other machine's CLOCK_MONOTONIC in terms of the local one; both count from their own start,
-/// so they differ by hours. One thread.
+/// Converts the other machine's CLOCK_MONOTONIC to the local one. Each counts from its own start,
+/// so they may differ by hours. One thread.
 ///
-/// A message that is sent at s (theirs) and comes at c (ours) took w = c - s - offset >= 0. The
-/// least c - s so far is therefore the offset and the shortest way; half of the link's least round
-/// trip is taken for that way, as NTP does: an error of half the difference of the two directions
-/// stays. Two clocks drift apart, so the least one may grow by `kDriftPpm`; a link that queues from
-/// the first message on cannot be distinguished from another offset for longer than that.
+/// A message that is sent at s (their clock) and arrives at c (ours) took w = c - s - offset >= 0,
+/// so the least c - s is the offset plus the shortest delay. As in NTP, that delay is estimated as
+/// half of the link's least round trip; the error is half the difference of the two directions.
+/// Clocks drift, so the least c - s may grow by `kDriftPpm`.
 class ClockOffset {
  public:
   static constexpr std::int64_t kDriftPpm = 100;  ///< of two quartz clocks, 50 each
@@ -42,13 +41,13 @@ class ClockOffset {
     const std::int64_t passed =
         std::clamp<std::int64_t>(bounded(came_ns) - last_ns_, 0, kLongestNs);
     least_ns_ = known_ ? std::min(seen, least_ns_ + passed / 1'000'000 * kDriftPpm) : seen;
-    // The part of the millisecond that gave no drift yet counts next time.
+    // The remainder of the division counts next time.
     last_ns_ = bounded(came_ns) - (known_ ? passed % 1'000'000 : 0);
     if (round_trip_ns > 0) way_ns_ = std::min(way_ns_, bounded(round_trip_ns) / 2);
     known_ = true;
   }
 
-  /// Their time as ours; never below 0, where a time from before our start would wrap.
+  /// Their time on our clock; never below 0, since a time before our start would wrap.
   [[nodiscard]] std::int64_t local(std::int64_t their_ns) const noexcept {
     const std::int64_t way = way_ns_ == std::numeric_limits<std::int64_t>::max() ? 0 : way_ns_;
     return std::max<std::int64_t>(bounded(their_ns) + least_ns_ - way, 0);
@@ -73,20 +72,21 @@ class ClockOffset {
   std::int64_t way_ns_ = std::numeric_limits<std::int64_t>::max();
 };
 
-/// Where a command of a local reader waits for the other machine's answer. One at a time: the
-/// segment server's thread asks, the network's thread looks for it as often as something arrives,
-/// at least 60 times a second, sends it and brings the answer.
+/// One command of a local reader on its way to the other machine and back. The segment server's
+/// thread calls `request`; the network's thread calls `take` with each message that arrives, at
+/// least 60 times a second, sends the command, and calls `answer`.
 class RemoteCommand {
  public:
-  /// What the link can do: no connection is a reason to try again, no right is not.
+  /// Without a connection the answer is `busy`, without the right it is `refused`.
   enum class Link : std::uint8_t { down, read_only, open };
-  /// An answer later than that is no answer; a local reader waits for 2 s.
+  /// A later answer is ignored; a local reader waits for 2 s.
   static constexpr std::chrono::milliseconds kPatience{1500};
 
-  /// Waits for the answer, at most `kPatience`: then `busy`, though the command may still come.
-  [[nodiscard]] Reply ask(const Command& command) noexcept;
+  /// Waits for the answer, at most `kPatience`; then returns `busy`, though the command may still
+  /// reach the controller.
+  [[nodiscard]] Reply request(const Command& command) noexcept;
 
-  /// Network: what is to be sent, once.
+  /// Network thread: the command to send, once.
   [[nodiscard]] std::optional<CommandMessage> take();
   void answer(const ReplyMessage& reply);
   void set_link(Link link);
@@ -100,13 +100,13 @@ class RemoteCommand {
   std::optional<Reply> reply_;  // to the last command
 };
 
-/// What arrived does not fit what is held: the way out is a new connection, which starts afresh
-/// while readers keep the picture that they have. One line.
+/// A message does not fit the state of this viewer. A new connection helps: it starts from nothing,
+/// and readers keep their picture meanwhile. One line.
 struct StreamOutOfSync : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// The far end of a bridge without its network: messages in, a local segment out.
+/// The receiving end of a bridge without its network: messages in, a local segment out.
 ///
 /// A run's first pass goes straight into a segment that no reader has yet; with its last frame the
 /// segment gets the name, and the one of an earlier run goes. Later passes wait in private memory

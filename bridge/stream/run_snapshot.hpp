@@ -16,11 +16,11 @@ namespace kerf::bridge {
 
 /// The volumes of a run at one tick, one copy for the streams of all viewers.
 ///
-/// A stream that is in the middle of a pass still needs bricks as they were when its pass began,
-/// while this copy goes on to the next tick for the others. So a stream pins what it has yet to
-/// send, and `update` keeps the old content of a pinned brick aside before it takes the new one. A
-/// pass is then exactly the volumes of its tick, though no viewer has a copy of its own: what is
-/// kept aside is what changed during the pass, in the worst case a volume a stream.
+/// A stream in the middle of a pass needs the bricks as they were when the pass began, while this
+/// copy advances to the next tick for the others. So a stream pins the blocks that it has yet to
+/// send, and `update` keeps the old content of a pinned brick before it reads the new one. A pass
+/// is then exactly the volumes of its tick. Memory: the bricks that changed during a pass, in the
+/// worst case one volume per stream.
 ///
 /// One thread.
 class RunSnapshot {

@@ -159,13 +159,13 @@ bool Stream::next(std::int64_t now_ns, std::vector<std::byte>& out) {
     write_hello(now_ns, out);
     return true;
   }
-  for (int i = 0; i < kTurns; ++i) {
-    const int turn = (turn_ + i) % kTurns;
-    const bool sent = turn == 0   ? next_records(ticks_, out)
-                      : turn == 1 ? next_records(dirty_, out)
-                                  : next_frame(now_ns, out);
+  for (int i = 0; i < kSources; ++i) {
+    const int source = (next_source_ + i) % kSources;
+    const bool sent = source == 0   ? next_records(ticks_, out)
+                      : source == 1 ? next_records(dirty_, out)
+                                    : next_frame(now_ns, out);
     if (!sent) continue;
-    turn_ = (turn + 1) % kTurns;
+    next_source_ = (source + 1) % kSources;
     return true;
   }
   return false;

@@ -71,7 +71,7 @@ class LinkRate {
 };
 
 /// The records of one ring, in messages of at most `kMaxRawBytes`, from the newest at the start on.
-/// Where the link cannot bear all of them every n-th goes, and always the newest.
+/// If the link is too slow for all of them, every n-th is sent, and always the newest.
 class RecordBatches {
  public:
   /// The reader outlives this.
@@ -101,11 +101,11 @@ class RecordBatches {
   std::vector<std::byte> raw_;
 };
 
-/// How often a pass may begin and records go out.
+/// Interval at which a pass may begin and records are sent.
 inline constexpr std::int64_t kSlotNs = 16'666'667;
 
-/// All that one viewer of one run is sent: the greeting, then passes in frames, and records. No
-/// network here: the caller asks for the next message whenever it can send one.
+/// The messages to one viewer of one run: the greeting, then passes in frames, and records. Without
+/// a network: the caller takes the next message whenever it can send one.
 ///
 /// Volumes and records share the link. While a pass is under way the link is what holds it up, and
 /// records take at most `kRecordShare` of what it delivers; else they take what they need.
@@ -162,10 +162,9 @@ class Stream {
   std::uint32_t flags_;
   std::uint64_t session_;
   bool greeted_ = false, ended_ = false, pass_due_ = false, opened_ = false;
-  // Ticks, dirty boxes, a frame: by turns, so that none keeps the others from a link that is slower
-  // than it alone.
-  static constexpr int kTurns = 3;
-  int turn_ = 0;
+  // Ticks, dirty boxes and frames in round-robin order, so that none of them can fill a slow link.
+  static constexpr int kSources = 3;
+  int next_source_ = 0;
 
   std::vector<std::uint64_t> held_;     // version by block, 0: none
   std::vector<std::uint32_t> waiting_;  // for the next pass

@@ -18,11 +18,11 @@ namespace kerf::bridge {
 /// True if `packed` decodes to exactly as many bytes as `out` has. Safe for any bytes.
 [[nodiscard]] bool unpack(std::span<const std::byte> packed, std::span<std::byte> out) noexcept;
 
-/// Whether it pays to pack what is sent next.
+/// Decides whether the next message is packed.
 ///
 /// n bytes take n / rate on the link, and packed n / speed + n / (ratio rate): packing is faster
-/// where rate < speed (1 - 1 / ratio). Speed and ratio are those seen lately; so that they follow
-/// the content, every 32nd message is packed in any case.
+/// if rate < speed (1 - 1 / ratio). Speed and ratio are averages of recent messages; every 32nd
+/// message is packed in any case, so that they follow the content.
 class PackChoice {
  public:
   /// `bytes_per_s`: what the link delivers; 0: unknown, taken for slow.
@@ -33,14 +33,14 @@ class PackChoice {
   /// `raw` bytes became `packed` ones within `ns`.
   void saw(std::size_t raw, std::size_t packed, std::int64_t ns) noexcept {
     const auto bytes = static_cast<double>(raw);
-    ratio_ += kShare * (bytes / static_cast<double>(packed) - ratio_);
-    ns_per_byte_ += kShare * (static_cast<double>(ns) / bytes - ns_per_byte_);
+    ratio_ += kNewestWeight * (bytes / static_cast<double>(packed) - ratio_);
+    ns_per_byte_ += kNewestWeight * (static_cast<double>(ns) / bytes - ns_per_byte_);
   }
   /// Raw bytes per packed one.
   [[nodiscard]] double ratio() const noexcept { return ratio_; }
 
  private:
-  static constexpr double kShare = 0.1;  // of the newest in the average
+  static constexpr double kNewestWeight = 0.1;  // of the newest in the average
 
   double ratio_ = 2, ns_per_byte_ = 2;  // LZ4 on densities, 500 MB/s
   std::uint32_t asked_ = 0;

@@ -10,7 +10,7 @@
 
 namespace kerf::bridge {
 
-/// The talk of a bridge and its viewer, version 1, byte by byte.
+/// The protocol of a bridge and its viewer, version 1, byte by byte.
 ///
 ///     server to viewer   HelloMessage (first, and again for a new run), FrameHead + blocks,
 ///                        RecordsHead + records, ReplyMessage
@@ -19,9 +19,9 @@ namespace kerf::bridge {
 /// Each is one binary WebSocket message of at most `kMaxMessageBytes`, little-endian, naturally
 /// aligned. Times are CLOCK_MONOTONIC of the server's machine, in ns.
 ///
-/// A *pass* is what changed between two snapshots of the segment, cut into *frames*. At the last
-/// frame of a pass a viewer whose set hash is the frame's holds exactly the volumes of `tick`. An
-/// empty pass is the sign of life.
+/// A *pass* holds the changes between two snapshots of the segment, in one or more *frames*. After
+/// the last frame of a pass, a viewer with the set hash of that frame holds exactly the volumes of
+/// `tick`. If nothing changed, the pass is one empty frame: the sign of life.
 
 inline constexpr std::uint32_t kProtocol = 1;
 inline constexpr std::size_t kMaxMessageBytes = 20 * 1024;  ///< server to viewer
@@ -55,9 +55,8 @@ enum class CloseCode : std::uint16_t {
   too_many = 4004,
 };
 
-/// What never changes in a run; all that the viewer holds is void. `volume_count` descriptors of
-/// the segment follow, in which `off_labels` is 1 if there are labels and the other offsets are
-/// 0.
+/// The constants of a run; the viewer discards all that it holds. `volume_count` descriptors of the
+/// segment follow; in them `off_labels` is 1 if there are labels, and the other offsets are 0.
 struct HelloMessage {
   std::uint32_t magic;
   std::uint32_t protocol;
@@ -100,7 +99,7 @@ inline constexpr std::size_t kBlockEntryBytes = sizeof(std::uint64_t) + sizeof(s
 enum class Ring : std::uint32_t { ticks = 0, dirty = 1 };
 
 /// Then the payload: `count` records of the ring as they lie in the segment. Record i has the index
-/// `first + i * stride`; what is left out a slow link could not bear. The newest always comes.
+/// `first + i * stride`. On a slow link the stride is above 1; the newest record is always sent.
 struct RecordsHead {
   std::uint32_t magic;
   std::uint32_t flags;

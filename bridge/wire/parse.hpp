@@ -17,12 +17,12 @@ namespace kerf::bridge {
 // Checked parsers for both directions. The bytes may be hostile: each count is bounded before it is
 // used, and what is allocated does not depend on them beyond `kMaxMessageBytes`.
 
-/// A message that does not hold; one line: what, value, what was expected.
+/// A message is not valid; one line: field, value, what was expected.
 struct WireError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// What a server said first.
+/// The first message of a server.
 struct ParsedHello {
   HelloMessage head{};  ///< `build_id` is zero-terminated
   std::vector<VolumeDescriptor> volumes;

@@ -46,7 +46,7 @@ TEST_CASE("join tells at once what keeps it from a picture, and gives up where i
 TEST_CASE("join takes its token from a file that nobody else reads") {
   const TestController controller;
   const TestBridge bridge;
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   JoinOptions options;
   options.name = "join-test";
   options.address = "ws://127.0.0.1:" + std::to_string(bridge.port());

@@ -20,12 +20,12 @@
 #include "shared/segment/writer.hpp"
 #include "shared/volume/checksum.hpp"
 #include "tests/segment/segment_support.hpp"
-#include "tests/segment/test_folder.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 using namespace kerf;
 using namespace kerf::bridge;
 using kerf::test::NoiseVolume;
-using kerf::test::TestFolder;
+using kerf::test::RuntimeFolder;
 
 namespace {
 
@@ -128,7 +128,7 @@ FarPicture far_picture(const SegmentReader& reader) {
 }  // namespace
 
 TEST_CASE("at every moment the far segment is the near one's of one tick, however slow the link") {
-  const TestFolder folder;
+  const RuntimeFolder folder;
   NearEnd near;
   Mirror mirror("far", kEnough, [](const Command&) { return Reply{}; });
   std::optional<SegmentConnection> far;
@@ -161,7 +161,7 @@ TEST_CASE("at every moment the far segment is the near one's of one tick, howeve
 }
 
 TEST_CASE("connections that are cut at any moment end in the same volume") {
-  const TestFolder folder;
+  const RuntimeFolder folder;
   NearEnd near;
   Mirror mirror("far", kEnough, [](const Command&) { return Reply{}; });
   std::optional<SegmentConnection> far;
@@ -186,7 +186,7 @@ TEST_CASE("connections that are cut at any moment end in the same volume") {
 }
 
 TEST_CASE("the end of a run arrives with its last volume") {
-  const TestFolder folder;
+  const RuntimeFolder folder;
   NearEnd near;
   Mirror mirror("far", kEnough, [](const Command&) { return Reply{}; });
   for (int i = 0; i < 50; ++i) {

@@ -12,13 +12,13 @@
 
 #include "shared/segment/connection.hpp"
 #include "tests/bridge/sender.hpp"
-#include "tests/segment/test_folder.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 using namespace kerf;
 using namespace kerf::bridge;
 using kerf::bridge::test::Message;
 using kerf::bridge::test::Sender;
-using kerf::test::TestFolder;
+using kerf::test::RuntimeFolder;
 
 namespace {
 
@@ -30,7 +30,7 @@ Reply refuse(const Command&) {
 }
 
 struct FarEnd {
-  TestFolder folder;
+  RuntimeFolder folder;
   Mirror mirror{"far", kEnough, refuse};
   std::int64_t now_ns = 50 * kHourNs;
 
@@ -309,18 +309,18 @@ TEST_CASE("a local reader's command gets the far side's answer, or is told that 
       if (sent->argument == 3) desk.set_link(RemoteCommand::Link::down);
     }
   });
-  CHECK(desk.ask({}).status == ReplyStatus::busy);  // no connection: try again
+  CHECK(desk.request({}).status == ReplyStatus::busy);  // no connection: try again
   desk.set_link(RemoteCommand::Link::read_only);
-  CHECK(desk.ask({}).status == ReplyStatus::refused);
+  CHECK(desk.request({}).status == ReplyStatus::refused);
   desk.set_link(RemoteCommand::Link::open);
   for (const std::uint32_t argument : {0U, 1U}) {
-    const Reply reply = desk.ask({.kind = CommandKind::select_tool, .argument = argument});
+    const Reply reply = desk.request({.kind = CommandKind::select_tool, .argument = argument});
     CHECK(reply.status == ReplyStatus::accepted);
     CHECK(reply.index == 9);
     CHECK(kind == static_cast<std::uint32_t>(CommandKind::select_tool));
   }
-  CHECK(desk.ask({.argument = 2}).status == ReplyStatus::refused);
-  CHECK(desk.ask({.argument = 3}).status == ReplyStatus::busy);  // lost while it waited
+  CHECK(desk.request({.argument = 2}).status == ReplyStatus::refused);
+  CHECK(desk.request({.argument = 3}).status == ReplyStatus::busy);  // lost while it waited
   CHECK(!desk.take());
   done = true;
   far.join();

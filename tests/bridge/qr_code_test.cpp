@@ -9,10 +9,10 @@
 #include <qrencode.h>
 
 #include "bridge/serve/serve.hpp"
-#include "tests/segment/test_folder.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 using kerf::bridge::qr_code;
-using kerf::test::ScratchFolder;
+using kerf::test::TemporaryFolder;
 
 namespace {
 
@@ -75,7 +75,7 @@ TEST_CASE("a decoder reads the address back") {
     MESSAGE("skipped: zbarimg is missing; apt-get install zbar-tools");
     return;
   }
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   constexpr std::size_t kPixels = 4;  // of a module's edge
   for (const std::string address :
        {"https://10.0.0.1:7400/?token=0123456789abcdef",

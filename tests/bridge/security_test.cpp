@@ -7,7 +7,7 @@
 
 #include "bridge/net/address.hpp"
 #include "bridge/net/tokens.hpp"
-#include "tests/segment/test_folder.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 using namespace kerf;
 using namespace kerf::bridge;
@@ -39,7 +39,7 @@ bool has(const std::string& text, const std::string& part) {
 }  // namespace
 
 TEST_CASE("tokens come from files that nobody else reads") {
-  const ScratchFolder folder;
+  const TemporaryFolder folder;
   const fs::path file = folder / "tokens";
   const auto add = [&file] {
     return refusal([&] {

@@ -14,7 +14,7 @@
 #include "tests/bridge/far_side.hpp"
 #include "tests/bridge/raw_client.hpp"
 #include "tests/segment/segment_support.hpp"
-#include "tests/segment/test_folder.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 namespace kerf::test {
 
@@ -23,7 +23,7 @@ inline const std::string kCommand = "command-0123456789abcdef";
 
 /// Sockets of this process's controllers go into a folder of its own.
 inline void use_own_sockets() {
-  static const TestFolder folder;
+  static const RuntimeFolder folder;
 }
 
 /// A controller of a small volume that does nothing by itself.

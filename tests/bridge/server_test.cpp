@@ -100,9 +100,9 @@ TEST_CASE("the printed address opens the page for one browser, and the next one 
   const TestController controller;
   ServerSetup setup;
   std::vector<std::string> passes;
-  setup.on_pass = [&passes](const std::string& pass) { passes.push_back(pass); };
+  setup.on_page_token = [&passes](const std::string& pass) { passes.push_back(pass); };
   const TestBridge bridge(setup);
-  const std::string first = bridge.server.pass();
+  const std::string first = bridge.server.page_token();
   const auto open = [&](const std::string& token, const std::string& head = "",
                         const std::string& method = "GET") {
     return RawClient(bridge.port()).ask("/?token=" + token, head, method);

@@ -38,7 +38,7 @@ struct Lab {
         std::to_string(days) + " -out " + name + ".pem");
   }
   [[nodiscard]] std::filesystem::path operator/(const char* name) const { return folder / name; }
-  ScratchFolder folder;
+  TemporaryFolder folder;
 };
 
 /// Without the checks that refuse a certificate out of date.

@@ -15,19 +15,15 @@
 #include "bridge/wire/compression.hpp"
 #include "bridge/wire/messages.hpp"
 #include "bridge/wire/parse.hpp"
+#include "tests/bridge/sender.hpp"
 
 using namespace kerf;
 using namespace kerf::bridge;
 
 namespace {
 
-using Message = std::vector<std::byte>;
-
-template <class T>
-void append(Message& message, const T& value) {
-  const auto* const at = reinterpret_cast<const std::byte*>(&value);
-  message.insert(message.end(), at, at + sizeof value);
-}
+using bridge::test::append;
+using bridge::test::Message;
 
 /// 20 x 9 x 5 voxels: 3 x 2 x 1 bricks.
 VolumeDescriptor small_volume(std::uint64_t labels) {

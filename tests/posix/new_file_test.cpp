@@ -3,10 +3,8 @@
 #include <array>
 #include <csignal>
 #include <cstddef>
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <string>
 
 #include <doctest/doctest.h>
@@ -18,34 +16,16 @@
 #include <unistd.h>
 
 #include "shared/posix/atomic_file.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 namespace fs = std::filesystem;
 using kerf::AtomicFile;
 using kerf::FileError;
 using kerf::write_new_file;
+using kerf::test::TemporaryFolder;
+using kerf::test::text_of;
 
 namespace {
-
-struct Folder {
-  Folder() {
-    std::string pattern = (fs::temp_directory_path() / "kerf-new-XXXXXX").string();
-    REQUIRE(mkdtemp(pattern.data()) != nullptr);
-    path = pattern;
-  }
-  ~Folder() { fs::remove_all(path); }
-  Folder(const Folder&) = delete;
-  Folder& operator=(const Folder&) = delete;
-  [[nodiscard]] fs::path operator/(const char* name) const { return path / name; }
-  [[nodiscard]] auto count() const {
-    return std::distance(fs::directory_iterator(path), fs::directory_iterator());
-  }
-  fs::path path;
-};
-
-std::string text_of(const fs::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(stream), {}};
-}
 
 /// The one line with which `call` is refused; empty: it is not.
 template <class Call>
@@ -58,10 +38,16 @@ std::string refusal_of(const Call& call) {
   return "";
 }
 
+void add_new(kerf::AtomicFiles& files, const fs::path& path) {
+  AtomicFile& file = files.add(path);
+  file.write("new", 3);
+  file.close();
+}
+
 }  // namespace
 
 TEST_CASE("a link or a file that waits under a temporary name is left alone") {
-  const Folder folder;
+  const TemporaryFolder folder;
   write_new_file(folder / "victim", "precious");
   const std::string temporary =
       (folder / "report.json").string() + ".new-" + std::to_string(getpid());
@@ -77,7 +63,7 @@ TEST_CASE("a link or a file that waits under a temporary name is left alone") {
 }
 
 TEST_CASE("a link in the place of the file is refused, wherever it leads") {
-  const Folder folder;
+  const TemporaryFolder folder;
   write_new_file(folder / "victim", "precious");
   fs::create_symlink(folder / "victim", folder / "link");
   fs::create_symlink(folder / "unborn", folder / "dangling");
@@ -95,8 +81,8 @@ TEST_CASE("a link in the place of the file is refused, wherever it leads") {
 }
 
 TEST_CASE("a folder in the place of the file is refused, and a new file has the user's rights") {
-  const Folder folder;
-  CHECK(refusal_of([&] { kerf::check_new_file(folder.path); }).find("cannot be written") !=
+  const TemporaryFolder folder;
+  CHECK(refusal_of([&] { kerf::check_new_file(folder.path()); }).find("cannot be written") !=
         std::string::npos);
   const mode_t before = umask(027);
   write_new_file(folder / "a", "x");
@@ -113,7 +99,7 @@ TEST_CASE("a folder in the place of the file is refused, and a new file has the 
 }
 
 TEST_CASE("a name that is too long, or below a file, is refused before anything is written") {
-  const Folder folder;
+  const TemporaryFolder folder;
   write_new_file(folder / "file", "x");
   for (const std::string& name :
        {std::string(256, 'x'), std::string("file/below"), std::string("no/where")}) {
@@ -126,10 +112,10 @@ TEST_CASE("a name that is too long, or below a file, is refused before anything 
 }
 
 TEST_CASE("nothing is left of a file whose writer is killed half-way") {
-  const Folder folder;
-  const int nameless = open(folder.path.c_str(), O_TMPFILE | O_WRONLY | O_CLOEXEC, 0600);
+  const TemporaryFolder folder;
+  const int nameless = open(folder.path().c_str(), O_TMPFILE | O_WRONLY | O_CLOEXEC, 0600);
   if (nameless < 0) {
-    MESSAGE("skipped: the file system of " << folder.path << " has no nameless files");
+    MESSAGE("skipped: the file system of " << folder.path() << " has no nameless files");
     return;
   }
   close(nameless);
@@ -149,7 +135,7 @@ TEST_CASE("nothing is left of a file whose writer is killed half-way") {
 }
 
 TEST_CASE("what holds no bytes is written to as it stands, by a link too") {
-  const Folder folder;
+  const TemporaryFolder folder;
   fs::create_symlink("/dev/null", folder / "nothing");
   CHECK_NOTHROW(kerf::check_new_file(folder / "nothing"));
   CHECK_NOTHROW(write_new_file(folder / "nothing", "{}"));
@@ -172,23 +158,18 @@ TEST_CASE("what holds no bytes is written to as it stands, by a link too") {
 }
 
 TEST_CASE("files that belong together appear together or not at all") {
-  const Folder folder;
-  const auto add = [](kerf::AtomicFiles& files, const fs::path& path, const char* text) {
-    kerf::AtomicFile& file = files.add(path);
-    file.write(text, 3);
-    file.close();
-  };
+  const TemporaryFolder folder;
   {
     kerf::AtomicFiles files;
-    add(files, folder / "a", "new");
-    CHECK_THROWS_AS(add(files, folder / "none/b", "new"), FileError);
+    add_new(files, folder / "a");
+    CHECK_THROWS_AS(add_new(files, folder / "none/b"), FileError);
   }
   CHECK(folder.count() == 0);
   write_new_file(folder / "b", "old");
   {
     kerf::AtomicFiles files;
-    add(files, folder / "a", "new");
-    add(files, folder / "b", "new");
+    add_new(files, folder / "a");
+    add_new(files, folder / "b");
     const auto there = files.commit_if_new();
     REQUIRE(there);
     CHECK(*there == folder / "b");
@@ -197,8 +178,8 @@ TEST_CASE("files that belong together appear together or not at all") {
   CHECK(text_of(folder / "b") == "old");
   {
     kerf::AtomicFiles files;
-    add(files, folder / "a", "new");
-    add(files, folder / "b", "new");
+    add_new(files, folder / "a");
+    add_new(files, folder / "b");
     files.commit();
   }
   CHECK(text_of(folder / "a") == "new");
@@ -207,12 +188,6 @@ TEST_CASE("files that belong together appear together or not at all") {
 }
 
 namespace {
-
-void add_new(kerf::AtomicFiles& files, const fs::path& path) {
-  AtomicFile& file = files.add(path);
-  file.write("new", 3);
-  file.close();
-}
 
 /// The exit status of a child process that makes `call`; -1: it was killed when its system call
 /// number `last` had returned. Each one stops twice, after the first stop of all; the child stands
@@ -247,7 +222,7 @@ TEST_CASE("a commit that is killed at any system call leaves each file old or ne
   for (int last = 1;; ++last) {
     CAPTURE(last);
     REQUIRE(last < 1000);
-    const Folder folder;
+    const TemporaryFolder folder;
     write_new_file(folder / "a", "old");
     write_new_file(folder / "b", "old");
     const int end = child_until(last, [&] {
@@ -261,7 +236,7 @@ TEST_CASE("a commit that is killed at any system call leaves each file old or ne
     CHECK((b == "old" || b == "new"));
     kept += b == "old" ? 1 : 0;
     half += a == b ? 0 : 1;
-    for (const auto& entry : fs::directory_iterator(folder.path)) {
+    for (const auto& entry : fs::directory_iterator(folder.path())) {
       const std::string name = entry.path().filename();
       CHECK((name == "a" || name == "b" || name.substr(1).starts_with(".new-")));
     }
@@ -277,7 +252,7 @@ TEST_CASE("a commit that is killed at any system call leaves each file old or ne
 }
 
 TEST_CASE("files that cannot all be replaced stay as they were") {
-  const Folder folder;
+  const TemporaryFolder folder;
   write_new_file(folder / "a", "old");
   {
     fs::create_directory(folder / "gone");
@@ -296,7 +271,7 @@ TEST_CASE("files that cannot all be replaced stay as they were") {
   write_new_file(folder / "b", "root's");
   const uid_t nobody = 65534;
   REQUIRE(chown((folder / "a").c_str(), nobody, nobody) == 0);
-  fs::permissions(folder.path, fs::perms::all | fs::perms::sticky_bit);
+  fs::permissions(folder.path(), fs::perms::all | fs::perms::sticky_bit);
   const pid_t child = fork();
   REQUIRE(child >= 0);
   if (child == 0) {
@@ -319,7 +294,7 @@ TEST_CASE("files that cannot all be replaced stay as they were") {
 }
 
 TEST_CASE("of two that make a new file at once one gets it, a link counts as there") {
-  const Folder folder;
+  const TemporaryFolder folder;
   AtomicFile one(folder / "a"), two(folder / "a"), three(folder / "link");
   for (AtomicFile* file : {&one, &two, &three}) {
     file->write("own", 3);
@@ -333,7 +308,7 @@ TEST_CASE("of two that make a new file at once one gets it, a link counts as the
 }
 
 TEST_CASE("standard output is written to as it stands, also where it is a file that is added to") {
-  const Folder folder;
+  const TemporaryFolder folder;
   std::ofstream(folder / "out") << "before ";
   const pid_t child = fork();
   REQUIRE(child >= 0);

@@ -1,35 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 // What a run writes never takes the place of what it reads, nor of another kind of file.
-#include <cstdlib>
 #include <filesystem>
-#include <fstream>
 #include <string>
 #include <vector>
 
 #include <doctest/doctest.h>
 
 #include "shared/posix/atomic_file.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 namespace fs = std::filesystem;
+using kerf::test::TemporaryFolder;
 
 namespace {
-
-struct Folder {
-  Folder() {
-    std::string pattern = (fs::temp_directory_path() / "kerf-run-XXXXXX").string();
-    REQUIRE(mkdtemp(pattern.data()) != nullptr);
-    path = pattern;
-  }
-  ~Folder() { fs::remove_all(path); }
-  Folder(const Folder&) = delete;
-  Folder& operator=(const Folder&) = delete;
-  /// A file of a few bytes.
-  [[nodiscard]] fs::path file(const char* name) const {
-    std::ofstream(path / name) << "bytes";
-    return path / name;
-  }
-  fs::path path;
-};
 
 /// The one line with which outputs are refused, without the folder; empty: they are not.
 std::string refusal(const std::vector<fs::path>& inputs,
@@ -49,43 +32,40 @@ bool has(const std::string& text, const std::string& part) {
 }  // namespace
 
 TEST_CASE("an output that is an input is refused by whatever name") {
-  const Folder folder;
-  const fs::path input = folder.file("a");
+  const TemporaryFolder folder;
+  const fs::path input = folder.write("a", "bytes");
   const std::string line =
       ": is a file of this run itself, which would be lost; give --report another name";
-  fs::create_hard_link(input, folder.path / "hard");
-  fs::create_symlink(folder.path, folder.path / "here");
+  fs::create_hard_link(input, folder / "hard");
+  fs::create_symlink(folder.path(), folder / "here");
   for (const char* name : {"a", "./a", "here/a", "hard", "here/./a"}) {
-    const fs::path output = folder.path / name;
+    const fs::path output = folder / name;
     CAPTURE(output);
     CHECK(
         refusal({"", input}, {{"--report", output, ".json"}}).starts_with(output.string() + line));
   }
-  CHECK(refusal({input}, {{"--report", folder.path / "b", ".json"}}).empty());
+  CHECK(refusal({input}, {{"--report", folder / "b", ".json"}}).empty());
   CHECK(fs::file_size(input) == 5);
 
-  const fs::path nowhere = folder.path / "later";  // an input that the run itself makes
+  const fs::path nowhere = folder / "later";  // an input that the run itself makes
   CHECK(has(refusal({nowhere}, {{"--report", nowhere, ".json"}}), line));
 }
 
 TEST_CASE("an output in a folder that is read is refused") {
-  const Folder folder;
-  fs::create_directory(folder.path / "slices");
-  fs::create_directory(folder.path / "slices-2");
+  const TemporaryFolder folder;
+  fs::create_directory(folder / "slices");
+  fs::create_directory(folder / "slices-2");
   const std::string line = "which are read; name a place outside with --out";
-  CHECK(has(refusal({folder.path / "slices"}, {{"--out", folder.path / "slices/a.nrrd", ".nrrd"}}),
-            line));
-  CHECK(has(refusal({folder.path / "slices/"}, {{"--out", folder.path / "slices/a.nrrd", ".nrrd"}}),
-            line));
-  CHECK(refusal({folder.path / "slices"}, {{"--out", folder.path / "slices-2/a.nrrd", ".nrrd"}})
-            .empty());
-  CHECK(refusal({folder.path / "slices"}, {{"--out", folder.path / "a.nrrd", ".nrrd"}}).empty());
+  CHECK(has(refusal({folder / "slices"}, {{"--out", folder / "slices/a.nrrd", ".nrrd"}}), line));
+  CHECK(has(refusal({folder / "slices/"}, {{"--out", folder / "slices/a.nrrd", ".nrrd"}}), line));
+  CHECK(refusal({folder / "slices"}, {{"--out", folder / "slices-2/a.nrrd", ".nrrd"}}).empty());
+  CHECK(refusal({folder / "slices"}, {{"--out", folder / "a.nrrd", ".nrrd"}}).empty());
 }
 
 TEST_CASE("an output whose name ends as another kind of file does is refused") {
-  const Folder folder;
+  const TemporaryFolder folder;
   const auto told = [&](const char* name, std::string_view ending) {
-    return refusal({}, {{"--report", folder.path / name, ending}});
+    return refusal({}, {{"--report", folder / name, ending}});
   };
   CHECK(has(told("ct.nrrd", ".json"), "ct.nrrd: --report writes no .nrrd; let it end in .json"));
   CHECK(has(told("CT.NRRD", ".json"), "writes no .nrrd"));
@@ -98,13 +78,13 @@ TEST_CASE("an output whose name ends as another kind of file does is refused") {
 }
 
 TEST_CASE("two outputs of a run are two files") {
-  const Folder folder;
-  const fs::path one = folder.path / "one";
-  CHECK(has(refusal({}, {{"--sheet", one, ".png"}, {"--report", folder.path / "./one", ".json"}}),
+  const TemporaryFolder folder;
+  const fs::path one = folder / "one";
+  CHECK(has(refusal({}, {{"--sheet", one, ".png"}, {"--report", folder / "./one", ".json"}}),
             "--sheet writes there, too; give each a file of its own"));
   CHECK(refusal({}, {{"--sheet", one, ".png"}, {"--report", "", ".json"}}).empty());
   CHECK(refusal({"/dev/null"}, {{"--a", "/dev/null", ".png"}, {"--b", "/dev/null", {}}}).empty());
-  CHECK(fs::is_empty(folder.path));
+  CHECK(fs::is_empty(folder.path()));
 }
 
 TEST_CASE("a dash is no standard output, and is told so") {

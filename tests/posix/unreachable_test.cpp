@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <cstdlib>
 #include <filesystem>
 #include <string>
 
@@ -7,14 +6,13 @@
 
 #include "shared/posix/atomic_file.hpp"
 #include "shared/posix/error_text.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 namespace fs = std::filesystem;
 using kerf::access_error;
 
 TEST_CASE("links in a circle are told as such, where a file is read and where one is written") {
-  std::string pattern = (fs::temp_directory_path() / "kerf-loop-XXXXXX").string();
-  REQUIRE(mkdtemp(pattern.data()) != nullptr);
-  const fs::path folder = pattern;
+  const kerf::test::TemporaryFolder folder;
   fs::create_symlink("itself", folder / "itself");
   fs::create_symlink("there", folder / "here");
   fs::create_symlink("here", folder / "there");
@@ -24,12 +22,11 @@ TEST_CASE("links in a circle are told as such, where a file is read and where on
       "themselves";
   CHECK(access_error(folder / "itself") == why);
   CHECK(access_error(folder / "here/scene.toml") == why);
-  CHECK(access_error(folder) == "");
+  CHECK(access_error(folder.path()) == "");
   CHECK(access_error(folder / "nothing") == "");
   CHECK(access_error(folder / "nothing/below") == "");
   CHECK(access_error(folder / "dangling") == "");
   const fs::path report = folder / "here/report.json";
   CHECK_THROWS_WITH_AS(kerf::check_new_file(report), (report.string() + why).c_str(),
                        kerf::FileError);
-  fs::remove_all(folder);
 }

@@ -11,7 +11,7 @@
 #include "shared/numeric/energy_source.hpp"
 #include "shared/segment/connection.hpp"
 #include "tests/segment/segment_support.hpp"
-#include "tests/segment/test_folder.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 namespace kerf::test {
 

@@ -18,7 +18,7 @@ using namespace kerf::test;
 
 namespace {
 
-RecorderOptions options_for(const TestFolder& folder) {
+RecorderOptions options_for(const RuntimeFolder& folder) {
   RecorderOptions options;
   options.name = "demo";
   options.out = folder / "log";
@@ -38,7 +38,7 @@ std::uint64_t contiguous_rows(const std::filesystem::path& path) {
 }  // namespace
 
 TEST_CASE("a session is recorded whole and says how it ended") {
-  const TestFolder folder;
+  const RuntimeFolder folder;
   const NoiseVolume volume({8, 8, 8});
   SegmentWriter writer = SegmentWriter::create(spec_of(volume));
   const SegmentServer server("demo", writer);
@@ -65,7 +65,7 @@ TEST_CASE("a session is recorded whole and says how it ended") {
 }
 
 TEST_CASE("SIGKILL of the controller loses none of its published ticks") {
-  const TestFolder folder;
+  const RuntimeFolder folder;
   std::array<int, 2> last{};  // the child tells the last tick that it published
   REQUIRE(pipe(last.data()) == 0);
   const pid_t child = fork();
@@ -100,7 +100,7 @@ TEST_CASE("SIGKILL of the controller loses none of its published ticks") {
 }
 
 TEST_CASE("a recorder without a controller waits as long as it was told, then says what to start") {
-  const TestFolder folder;
+  const RuntimeFolder folder;
   RecorderOptions options = options_for(folder);
   options.wait_s = 0.1;
   const std::atomic<bool> stop{false};

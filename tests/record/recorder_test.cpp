@@ -15,7 +15,7 @@ struct Bench {
   void publish(std::uint64_t count) {
     for (std::uint64_t i = 0; i < count; ++i) publish_tick(writer, made_up_tick(++tick, 1000));
   }
-  TestFolder folder;
+  RuntimeFolder folder;
   NoiseVolume volume{{8, 8, 8}};
   SegmentWriter writer;
   SegmentReader reader;
@@ -90,7 +90,7 @@ TEST_CASE("of another machine's run a recorder takes what came, and counts what 
   come(2000);  // joined long after the start, though the ring has room for more
   come(2001);
   const SegmentReader reader = SegmentReader::map(mirror.fd());
-  const TestFolder folder;
+  const RuntimeFolder folder;
   TickLogWriter log(folder / "ticks.npy");
   Recorder recorder(reader, log);
   CHECK(recorder.missed_before_start() == 2000);

@@ -50,7 +50,7 @@ TEST_CASE("the log header is a NPY 1.0 header of fixed size that names each colu
 }
 
 TEST_CASE("rows come back as they were written, and lie behind the header byte for byte") {
-  const TestFolder folder;
+  const RuntimeFolder folder;
   write_rows(folder / "ticks.npy", 1500);
   TickLogReader reader(folder / "ticks.npy");
   REQUIRE(reader.rows() == 1500);
@@ -65,7 +65,7 @@ TEST_CASE("rows come back as they were written, and lie behind the header byte f
 
 TEST_CASE(
     "rows behind the count of the header are read too: a killed recorder loses none of them") {
-  const TestFolder folder;
+  const RuntimeFolder folder;
   TickLogWriter log(folder / "ticks.npy");
   for (std::uint64_t i = 0; i < 10; ++i) log.append(row(i));
   log.sync();
@@ -76,7 +76,7 @@ TEST_CASE(
 }
 
 TEST_CASE("a recording is never overwritten") {
-  const TestFolder folder;
+  const RuntimeFolder folder;
   write_rows(folder / "ticks.npy", 3);
   CHECK(error_of([&] { TickLogWriter again(folder / "ticks.npy"); }).find("holds a recording") !=
         std::string::npos);
@@ -84,7 +84,7 @@ TEST_CASE("a recording is never overwritten") {
 }
 
 TEST_CASE("a log that is cut, changed, foreign or missing is refused in one line") {
-  const TestFolder folder;
+  const RuntimeFolder folder;
   const std::filesystem::path path = folder / "ticks.npy";
   const auto read = [&] { TickLogReader(path).for_each([](const TickRecord&) {}); };
   CHECK(error_of(read).find("cannot be read") != std::string::npos);
@@ -107,7 +107,7 @@ TEST_CASE("a log that is cut, changed, foreign or missing is refused in one line
 }
 
 TEST_CASE("a full disk is one line, and the rows that fit stay readable") {
-  const TestFolder folder;
+  const RuntimeFolder folder;
   const pid_t child = fork();
   REQUIRE(child >= 0);
   if (child == 0) {

@@ -37,7 +37,7 @@ void record(const std::filesystem::path& folder, Tick ticks) {
 }  // namespace
 
 TEST_CASE("the summary counts what was recorded") {
-  const TestFolder folder;
+  const RuntimeFolder folder;
   record(folder / "log", 1000);
   const RecordSummary summary = summarise(folder / "log");
   CHECK(summary.rows == 1000);
@@ -59,7 +59,7 @@ TEST_CASE("the summary counts what was recorded") {
 }
 
 TEST_CASE("a gap in the sequence shows in the summary without the manifest's help") {
-  const TestFolder folder;
+  const RuntimeFolder folder;
   record(folder / "log", 100);
   TickLogReader all(folder / "log/ticks.npy");
   std::filesystem::create_directories(folder / "cut");
@@ -73,7 +73,7 @@ TEST_CASE("a gap in the sequence shows in the summary without the manifest's hel
 }
 
 TEST_CASE("info and the manifest agree on losses, before the first row and behind the last too") {
-  const TestFolder folder;
+  const RuntimeFolder folder;
   const NoiseVolume volume({8, 8, 8});
   SegmentWriter writer = SegmentWriter::create(spec_of(volume));
   const SegmentReader reader = SegmentReader::map(writer.fd());
@@ -102,7 +102,7 @@ TEST_CASE("info and the manifest agree on losses, before the first row and behin
 }
 
 TEST_CASE("the CSV has a line per tick and reads back to the same numbers") {
-  const TestFolder folder;
+  const RuntimeFolder folder;
   record(folder / "log", 50);
   export_csv(folder / "log", folder / "ticks.csv");
   std::istringstream text(file_text(folder / "ticks.csv"));
@@ -128,7 +128,7 @@ TEST_CASE("the CSV has a line per tick and reads back to the same numbers") {
 }
 
 TEST_CASE("views of a folder that is no recording are refused and leave no file") {
-  const TestFolder folder;
+  const RuntimeFolder folder;
   std::filesystem::create_directories(folder / "empty");
   CHECK(error_of([&] { static_cast<void>(summarise(folder / "empty")); }).find("manifest.json") !=
         std::string::npos);
@@ -144,7 +144,7 @@ TEST_CASE("views of a folder that is no recording are refused and leave no file"
 }
 
 TEST_CASE("a pipe or a device in the place of a recording's file is refused, not waited for") {
-  const TestFolder folder;
+  const RuntimeFolder folder;
   record(folder / "log", 100);
   for (const char* const name : {"manifest.json", "ticks.npy"}) {
     CAPTURE(name);
@@ -166,7 +166,7 @@ TEST_CASE("the plot is an SVG with its panels and every curve that is not zero")
     MESSAGE("skipped: ", lack.what());
     return;
   }
-  const TestFolder folder;
+  const RuntimeFolder folder;
   record(folder / "log", 10'000);
   plot_forces(folder / "log", folder / "forces.svg");
   const std::string svg = file_text(folder / "forces.svg");
@@ -195,7 +195,7 @@ TEST_CASE("the plot is an SVG with its panels and every curve that is not zero")
 }
 
 TEST_CASE("a plot and a table leave the recording that they are made from") {
-  const TestFolder folder;
+  const RuntimeFolder folder;
   record(folder / "log", 100);
   for (const char* const name : {"ticks.npy", "manifest.json"}) {
     CAPTURE(name);
@@ -210,7 +210,7 @@ TEST_CASE("a plot and a table leave the recording that they are made from") {
 }
 
 TEST_CASE("a place that cannot be written is told before anything is drawn") {
-  const TestFolder folder;
+  const RuntimeFolder folder;
   CHECK_THROWS_WITH_AS(plot_forces(folder / "no recording", folder / "none/a.svg"),
                        doctest::Contains("none/a.svg: cannot be written"), FileError);
   CHECK_THROWS_WITH_AS(export_csv(folder / "no recording", folder / "none/a.csv"),

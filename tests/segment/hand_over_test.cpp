@@ -17,7 +17,7 @@
 #include "shared/segment/server.hpp"
 #include "shared/volume/checksum.hpp"
 #include "tests/segment/segment_support.hpp"
-#include "tests/segment/test_folder.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 using namespace kerf;
 using namespace kerf::test;
@@ -57,7 +57,7 @@ Command select(std::uint32_t tool) {
 }  // namespace
 
 TEST_CASE("another process gets the whole volume through the socket, and cannot write it") {
-  const TestFolder folder;
+  const RuntimeFolder folder;
   NoiseVolume volume({40, 33, 17});
   const std::uint64_t expected = density_hash(volume.density);
   std::array<int, 2> ready{};
@@ -80,7 +80,7 @@ TEST_CASE("another process gets the whole volume through the socket, and cannot 
 }
 
 TEST_CASE("the descriptor that a reader gets is read-only") {
-  const TestFolder folder;
+  const RuntimeFolder folder;
   const NoiseVolume volume({8, 8, 8});
   const SegmentWriter writer = SegmentWriter::create(spec_of(volume));
   const SegmentServer server("demo", writer);
@@ -107,7 +107,7 @@ TEST_CASE("the descriptor that a reader gets is read-only") {
 }
 
 TEST_CASE("a second controller of the same name is refused in one line, another name is not") {
-  const TestFolder folder;
+  const RuntimeFolder folder;
   const NoiseVolume volume({8, 8, 8});
   const SegmentWriter writer = SegmentWriter::create(spec_of(volume));
   {
@@ -128,7 +128,7 @@ TEST_CASE("a second controller of the same name is refused in one line, another 
 }
 
 TEST_CASE("the socket that a killed controller left is replaced") {
-  const TestFolder folder;
+  const RuntimeFolder folder;
   const NoiseVolume volume({8, 8, 8});
   std::array<int, 2> ready{};
   REQUIRE(pipe(ready.data()) == 0);
@@ -159,7 +159,7 @@ TEST_CASE("the socket that a killed controller left is replaced") {
 }
 
 TEST_CASE("commands arrive in order; the 65th that nobody takes gets BUSY, later ones do not") {
-  const TestFolder folder;
+  const RuntimeFolder folder;
   const NoiseVolume volume({8, 8, 8});
   const SegmentWriter writer = SegmentWriter::create(spec_of(volume));
   SegmentServer server("demo", writer, CommandLimits{.tools = 100});
@@ -186,7 +186,7 @@ TEST_CASE("commands arrive in order; the 65th that nobody takes gets BUSY, later
 }
 
 TEST_CASE("commands outside the limits are refused before they reach the servo") {
-  const TestFolder folder;
+  const RuntimeFolder folder;
   const NoiseVolume volume({8, 8, 8});
   const SegmentWriter writer = SegmentWriter::create(spec_of(volume));
   SegmentServer server("demo", writer, CommandLimits{.tools = 2});
@@ -212,7 +212,7 @@ TEST_CASE("commands outside the limits are refused before they reach the servo")
 }
 
 TEST_CASE("one reader too many is refused and the others stay") {
-  const TestFolder folder;
+  const RuntimeFolder folder;
   const NoiseVolume volume({8, 8, 8});
   const SegmentWriter writer = SegmentWriter::create(spec_of(volume));
   const SegmentServer server("demo", writer);
@@ -226,7 +226,7 @@ TEST_CASE("one reader too many is refused and the others stay") {
 }
 
 TEST_CASE("names that would leave the folder and folders open to others are refused") {
-  const TestFolder folder;
+  const RuntimeFolder folder;
   for (const char* const name : {"", "..", ".x", "a/b", "a b", "x\n"}) {
     CAPTURE(name);
     CHECK_THROWS_AS(static_cast<void>(segment_socket(name)), SegmentError);
@@ -239,7 +239,7 @@ TEST_CASE("names that would leave the folder and folders open to others are refu
 }
 
 TEST_CASE("connecting where nobody listens says what to start") {
-  const TestFolder folder;
+  const RuntimeFolder folder;
   CHECK_THROWS_WITH_AS(static_cast<void>(connect_segment("demo")),
                        doctest::Contains("start kerf-controller"), SegmentError);
 }

@@ -20,7 +20,7 @@
 #include "shared/segment/server.hpp"
 #include "shared/volume/checksum.hpp"
 #include "tests/segment/segment_support.hpp"
-#include "tests/segment/test_folder.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 using namespace kerf;
 using namespace kerf::test;
@@ -297,7 +297,7 @@ TEST_CASE("a mirror refuses a plan or a place that cannot be") {
 }
 
 TEST_CASE("a mirror is handed over like a segment, and somebody else answers its commands") {
-  const TestFolder folder;
+  const RuntimeFolder folder;
   const NoiseVolume volume({8, 8, 8});
   const SegmentWriter writer = SegmentWriter::create(spec_of(volume));
   const Remote remote(writer);

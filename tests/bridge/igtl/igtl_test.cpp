@@ -28,8 +28,8 @@
 #include "shared/segment/server.hpp"
 #include "shared/volume/checksum.hpp"
 #include "tests/segment/segment_support.hpp"
-#include "tests/segment/test_folder.hpp"
 #include "tests/servo/support.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 using namespace kerf;
 using namespace kerf::bridge;
@@ -215,7 +215,7 @@ bool near(const Place& a, const Place& b) {
 }  // namespace
 
 TEST_CASE("volumes, tool and force lie in RAS as they lie in the scene") {
-  const TestFolder folder;
+  const RuntimeFolder folder;
   NoiseVolume first({12, 9, 7}), second({8, 8, 8}, 2);
   SegmentSpec spec = spec_of(first);
   spec.volumes.push_back(second.spec());
@@ -250,7 +250,7 @@ TEST_CASE("volumes, tool and force lie in RAS as they lie in the scene") {
 }
 
 TEST_CASE("labels come once a client and a run, beside their volume and where it lies") {
-  const TestFolder folder;
+  const RuntimeFolder folder;
   NoiseVolume tooth({12, 9, 7}), bare({8, 8, 8}, 2);
   for (std::size_t i = 0; i < tooth.density.size(); ++i) {
     tooth.labels.push_back(static_cast<Label>(i * 7 % 256));
@@ -291,7 +291,7 @@ TEST_CASE("labels come once a client and a run, beside their volume and where it
 }
 
 TEST_CASE("an unknown pose is not sent, and the force is") {
-  const TestFolder folder;
+  const RuntimeFolder folder;
   const NoiseVolume volume({8, 8, 8});
   SegmentWriter writer = SegmentWriter::create(spec_of(volume));
   const SegmentServer server("igtl", writer);
@@ -304,7 +304,7 @@ TEST_CASE("an unknown pose is not sent, and the force is") {
 }
 
 TEST_CASE("a client rebuilds what is milled and what is reset, from parts, equal by hash") {
-  const TestFolder folder;
+  const RuntimeFolder folder;
   LoadedScene scene = half_space_scene(64);
   scene.cut.model = CutModel::preston;
   scene.cut.machinability_mm3_per_s_n = 8;
@@ -348,7 +348,7 @@ TEST_CASE("a client rebuilds what is milled and what is reset, from parts, equal
 }
 
 TEST_CASE("a client that reads nothing is dropped, and one that chatters is not heard") {
-  const TestFolder folder;
+  const RuntimeFolder folder;
   const NoiseVolume volume({208, 208, 208});  // more than sockets hold
   SegmentWriter writer = SegmentWriter::create(spec_of(volume));
   const SegmentServer server("igtl", writer);
@@ -371,7 +371,7 @@ TEST_CASE("a client that reads nothing is dropped, and one that chatters is not 
 }
 
 TEST_CASE("one client too many is let out again") {
-  const TestFolder folder;
+  const RuntimeFolder folder;
   const NoiseVolume volume({8, 8, 8});
   SegmentWriter writer = SegmentWriter::create(spec_of(volume));
   const SegmentServer server("igtl", writer);
@@ -394,7 +394,7 @@ TEST_CASE("one client too many is let out again") {
 }
 
 TEST_CASE("a controller may come late, go, and come again with other volumes") {
-  const TestFolder folder;
+  const RuntimeFolder folder;
   const IgtlOutput output(options_for("igtl"));
   Client client(output.port());
   for (const std::int32_t edge : {8, 16, 8}) {
@@ -408,7 +408,7 @@ TEST_CASE("a controller may come late, go, and come again with other volumes") {
 }
 
 TEST_CASE("the port is free again at once, and one in use is one line") {
-  const TestFolder folder;
+  const RuntimeFolder folder;
   const NoiseVolume volume({8, 8, 8});
   SegmentWriter writer = SegmentWriter::create(spec_of(volume));
   const SegmentServer server("igtl", writer);
