@@ -17,6 +17,7 @@ A mutation that names an object breaks the release build: that object alone is c
 linked before the libraries that hold the right one. One that names none is made in a copy of the tree and built there."""
 import argparse
 import concurrent.futures
+import contextlib
 import dataclasses
 import hashlib
 import os
@@ -24,6 +25,7 @@ import pathlib
 import platform
 import re
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -33,6 +35,9 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 TABLE = ".ci/mutations.txt"
 BUILD = ROOT / "build/release"
 LISTS = ("safety", "kernels", "includes", "contact")
+
+
+RUNNING = set()  # processes, which end with this one
 
 
 class Wrong(Exception):
@@ -107,15 +112,21 @@ def run(command, log, cwd=ROOT, timeout=None):
     with open(log, "wb") as out:
         process = subprocess.Popen(command, cwd=cwd, shell=isinstance(command, str), stdin=subprocess.DEVNULL, stdout=out,
                                    stderr=subprocess.STDOUT, start_new_session=True)
+        RUNNING.add(process)
         try:
             code = process.wait(timeout)
         except subprocess.TimeoutExpired:
             code = 124
         finally:
-            if process.poll() is None:
-                os.killpg(process.pid, 9)
-                process.wait()
+            end(process)
+            RUNNING.discard(process)
     return code, pathlib.Path(log).read_text(errors="replace")
+
+
+def end(process):
+    if process.poll() is None:
+        os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
 
 
 def output_of(*command):
@@ -312,6 +323,20 @@ class TreeCopy:
         return None
 
 
+@contextlib.contextmanager
+def ending(pool):
+    """If this program is stopped, no process of it goes on."""
+    try:
+        yield pool
+    except BaseException:
+        pool.shutdown(wait=False, cancel_futures=True)
+        for process in list(RUNNING):
+            end(process)
+        raise
+    finally:
+        pool.shutdown()
+
+
 def judge(name, mutations, jobs, again):
     """Tries mutations of one list; returns how many survived."""
     sources = hashlib.sha256()
@@ -322,7 +347,7 @@ def judge(name, mutations, jobs, again):
     if again:
         shutil.rmtree(done, ignore_errors=True)
     done.mkdir(parents=True, exist_ok=True)
-    survived = []
+    survived, wrong = [], []
 
     def tell(mutation, caught):
         if not caught:
@@ -333,9 +358,8 @@ def judge(name, mutations, jobs, again):
         if (done / mutation.key()).exists():
             tell(mutation, (done / mutation.key()).read_text())
     left = [m for m in mutations if not (done / m.key()).exists()]
-    with tempfile.TemporaryDirectory(prefix="kerf-mutate.") as name_of, \
-            concurrent.futures.ThreadPoolExecutor(jobs) as pool:
-        folder = pathlib.Path(name_of)
+    with tempfile.TemporaryDirectory(prefix="kerf-mutate.") as folder, ending(concurrent.futures.ThreadPoolExecutor(jobs)) as pool:
+        folder = pathlib.Path(folder)
         for kind in (ReleaseObjects, TreeCopy):
             mine = [m for m in left if bool(m.object) == (kind is ReleaseObjects)]
             if not mine:
@@ -344,14 +368,16 @@ def judge(name, mutations, jobs, again):
             for _ in pool.map(trial.as_it_is, sorted({m.catcher.split(": ")[0] for m in mine})):
                 pass
             futures = {pool.submit(trial.caught_by, m): m for m in mine}
-            try:
-                for future in concurrent.futures.as_completed(futures):
+            for future in concurrent.futures.as_completed(futures):
+                try:
                     caught = (future.result() or "").splitlines()
-                    (done / futures[future].key()).write_text(caught[0] if caught else "")
-                    tell(futures[future], caught and caught[0])
-            except BaseException:
-                pool.shutdown(cancel_futures=True)
-                raise
+                except Wrong as error:
+                    wrong.append(str(error))
+                    continue
+                (done / futures[future].key()).write_text(caught[0] if caught else "")
+                tell(futures[future], caught and caught[0])
+    if wrong:
+        raise Wrong("\nmutate: ".join(sorted(wrong)))
     print(f"mutate: {name}: {len(mutations)} mutations, {len(survived)} survived")
     return len(survived)
 
@@ -380,6 +406,7 @@ def main():
 
 
 if __name__ == "__main__":
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
     try:
         sys.exit(main())
     except Wrong as wrong:
