@@ -5,6 +5,7 @@
 import os
 import pathlib
 import signal
+import subprocess
 import sys
 import tempfile
 import time
@@ -93,6 +94,38 @@ class TestOutFolder(unittest.TestCase):
             self.assertEqual((self.out / name).read_text(), text)
             (self.out / name).unlink()
 
+    def test_however_it_is_named(self):
+        self.addCleanup(os.chdir, os.getcwd())
+        os.chdir(self.root)
+        (self.root / "linked").mkdir()
+        (self.root / "link").symlink_to("linked")
+        for name in ("plain/", f"{self.root}/absolute/", "run[1]", "a path/with spaces", "-x/y", "a/../b//", "link", "back\\slash*"):
+            self.out = name
+            for _ in range(2):
+                said, in_place = self.demo()
+                self.assertEqual((said, in_place), (f"kept in {name}: log report.json, 1 frame", True))
+                self.assertEqual(sorted(os.listdir(os.path.realpath(name))), [".kerf-demo", "frame-0001.png", "log", "report.json"])
+        self.assertEqual(os.readlink("link"), "linked")
+        (self.root / "ring").symlink_to("ring")
+        with self.assertRaisesRegex(options.Refusal, "--out ring: cannot be created"):
+            out_folder.OutFolder("ring").open(1)
+
+    def test_a_file_is_never_touched_whatever_its_name_is(self):
+        for name in ("log/thesis.txt", "final-patient-7.nrrd", "kerf-0001.png", "report.json", ".kerf-demo", ".partial-mine"):
+            self.out = self.root / name.replace("/", "-")
+            (self.out / name).parent.mkdir(parents=True)
+            (self.out / name).write_text("mine")
+            with self.subTest(name), self.assertRaisesRegex(options.Refusal, "which no demo wrote"):
+                self.demo()
+            self.assertEqual((self.out / name).read_text(), "mine")
+
+    def test_the_list_of_what_it_left_has_the_form_of_find(self):
+        self.demo()
+        listed = (self.out / ".kerf-demo" / "files").read_text().splitlines()
+        found = subprocess.run(["find", self.out, "-mindepth", "1", "-name", ".kerf-demo", "-prune", "-o", "-type", "d", "-printf",
+                                r"d - - %P\n", "-o", "-printf", r"%y %s %T@ %P\n"], capture_output=True, text=True, check=True)
+        self.assertEqual(sorted(listed), sorted(found.stdout.splitlines()))
+
     def test_what_comes_meanwhile_stays_beside_the_results(self):
         said, in_place = self.demo(meanwhile=["log/mine"])
         self.assertFalse(in_place)
@@ -155,6 +188,23 @@ class TestProcesses(unittest.TestCase):
         self.programs.end()
         self.assertEqual(stuck.returncode, -signal.SIGKILL)
         self.assertFalse(os.path.exists(self.programs.run))
+
+    def test_none_survives_a_demo_that_is_killed(self):
+        (self.folder / "kerf-x").write_text(f"#!/bin/sh\necho $$ >{self.folder}/pid\nwhile :; do sleep 0.05; done\n")
+        (self.folder / "kerf-x").chmod(0o755)
+        demo = subprocess.Popen([sys.executable, "-B", "-c", "import sys, time\n"
+                                 f"sys.path.insert(0, {sys.path[0]!r})\nimport processes\n"
+                                 f"processes.Processes({str(self.folder)!r}, ('a', 'b')).start('x', [])\ntime.sleep(60)"],
+                                env={**os.environ, "TMPDIR": str(self.folder)})
+        pid = self.folder / "pid"
+        while not pid.exists() or not pid.read_text().endswith("\n"):
+            time.sleep(0.02)
+        demo.kill()
+        demo.wait()
+        deadline = time.monotonic() + 20
+        while os.path.exists(f"/proc/{pid.read_text().strip()}") and time.monotonic() < deadline:
+            time.sleep(0.02)
+        self.assertFalse(os.path.exists(f"/proc/{pid.read_text().strip()}"))
 
 
 unittest.main()
