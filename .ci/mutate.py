@@ -172,13 +172,18 @@ class ReleaseObjects:
         code, text = run(["ninja", "-C", str(BUILD), *targets], folder / "build.log")
         if code:
             raise Wrong(f"{BUILD}: does not build: {first_error(text)}")
-        self.readers = {}  # file: the objects that read it
+        self.reads = {}  # object: the files of the tree that it reads
         for line in output_of("ninja", "-C", str(BUILD), "-t", "deps").splitlines():
             if line and not line.startswith(" "):
-                made = line.split(":")[0]
+                files = self.reads.setdefault(line.split(":")[0], set())
             elif line:
-                file = os.path.relpath(BUILD / line.strip(), ROOT)
-                self.readers.setdefault(file, []).append(made)
+                files.add(os.path.relpath(BUILD / line.strip(), ROOT))
+
+    def object_of(self, mutation, file):
+        """The object by its name, or by a source file that is joined with others in it; that of a library before a test's."""
+        readers = sorted((o for o, files in self.reads.items() if file in files), key=lambda o: (o.startswith("tests/"), o))
+        joined = [o for o in readers if any(f.endswith(".cpp") and re.search(mutation.object, f) for f in self.reads[o])]
+        return next((o for o in [*(o for o in readers if re.search(mutation.object, o)), *joined]), None)
 
     @staticmethod
     def target(catcher):
@@ -213,9 +218,9 @@ class ReleaseObjects:
             changed = here / "over" / file
             changed.parent.mkdir(parents=True)
             changed.write_text(content)
-            made = next((o for o in self.readers.get(file, []) if re.search(mutation.object, o)), None)
+            made = self.object_of(mutation, file)
             if not made:
-                raise Wrong(f"{mutation.name}: no object of the build reads {file}; correct {TABLE}")
+                raise Wrong(f"{mutation.name}: no object {mutation.object} of the build reads {file}; correct {TABLE}")
             for command in (self.compile(file, made, here), self.link(self.target(mutation.catcher), made, here)):
                 code, text = run(command, here / "build.log", cwd=BUILD)
                 if code:
@@ -240,14 +245,11 @@ class ReleaseObjects:
 
     @staticmethod
     def link(target, made, here):
-        """The target's own command with the changed object for the right one, or before all others: of what a header
+        """The target's own command without the right object, and with the changed one before all others: of what a header
         defines in several objects, tests among them, the first one counts."""
         commands = output_of("ninja", "-C", str(BUILD), "-t", "commands", f"bin/{target}").splitlines()
         command = [c for c in commands if re.search(f" -o bin/{target}( |$)", c)][-1]
-        if f" {made} " in command:
-            command = command.replace(f" {made} ", f" {here}/changed.o ", 1)
-        else:
-            command = re.sub(r"( \S+\.o)(?= )", lambda m: f" {here}/changed.o{m[1]}", command, count=1)
+        command = re.sub(r"(?= \S+\.o )", lambda _: f" {here}/changed.o", command, count=1).replace(f" {made} ", " ", 1)
         return command.replace(f" -o bin/{target}", f" -o {here}/program", 1)
 
 
