@@ -35,9 +35,9 @@ using ProfilePoint = std::array<double, 2>;
 /// A closed mesh with normals. Edges sharper than 40 degrees stay sharp.
 [[nodiscard]] Mesh shaded(const Facets& facets);
 
-/// What a bur is made of: the head by its profile (mm), and what is felt behind it; else a shank
-/// along +y, thinner than the head, that begins inside it. Neither if the head has no extent. A
-/// head that is a mesh has no outline.
+/// What a bur is made of: the head by its profile (mm), and the shaft behind it if the servo loads
+/// that; else a shank along +y, thinner than the head, that begins inside it. Neither if the head
+/// has no extent. A head that is a mesh has no outline.
 using Outlines = std::vector<std::vector<ProfilePoint>>;
 [[nodiscard]] Outlines tool_outlines(const ToolView& tool);
 /// All of it as a mesh.

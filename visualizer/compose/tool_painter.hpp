@@ -58,14 +58,14 @@ class MeshPainter {
   GpuMesh cone_{unit_cone()};
 };
 
-/// What the hand holds and feels at one moment.
+/// Tool, pose and force of the hand at one tick.
 struct Hand {
   glm::dvec3 tip_mm{0.0};
   glm::dvec4 orientation{0.0, 0.0, 0.0, 1.0};  ///< quaternion x, y, z, w
   std::uint32_t tool = 0;                      ///< none if the scene has fewer
   glm::dvec3 force_n{0.0};
   friend bool operator==(const Hand&, const Hand&) noexcept = default;
-  /// The same tool in the same place, whatever it feels.
+  /// The same tool in the same pose, whatever its force.
   [[nodiscard]] bool rests_at(const Hand& other) const noexcept {
     return tip_mm == other.tip_mm && orientation == other.orientation && tool == other.tool;
   }

@@ -92,7 +92,7 @@ bool EglContext::create() {
   if (eglChooseConfig(display_, kConfig.data(), &config, 1, &found) != EGL_TRUE || found == 0) {
     return false;
   }
-  // Not every driver can tell that it lost a context.
+  // Not every driver can report that it lost a context.
   for (const bool tells_of_loss : {true, false}) {
     std::vector<EGLint> attributes{
         EGL_CONTEXT_MAJOR_VERSION,       4,

@@ -49,8 +49,8 @@ void throw_if_context_is_lost();
 /// Gets GL's message about an error, of undefined behaviour, or of anything of high severity, on
 /// the thread of the call that did it and before that returns.
 using GlFaultHandler = void (*)(const std::string& text);
-/// Contexts made from now on are debug contexts that tell `handler`; none: ordinary ones again. For
-/// tests: it slows every call.
+/// Contexts made from now on are debug contexts that report to `handler`; none: ordinary ones
+/// again. For tests: it slows every call.
 void report_gl_faults(GlFaultHandler handler) noexcept;
 [[nodiscard]] bool gl_faults_are_reported() noexcept;
 

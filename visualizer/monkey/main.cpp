@@ -128,7 +128,7 @@ int main(int argc, char** argv) {
     app.flag("--trace", options.trace, "tell each event");
     app.footer("Exit codes: 0 fine, 1 a picture was wrong, 2 bad input or set-up.");
     if (!app.parse(argc, argv, std::cout)) return 0;
-    if (std::freopen("/dev/null", "w", stdout) == nullptr) return 2;  // what keys tell the user
+    if (std::freopen("/dev/null", "w", stdout) == nullptr) return 2;  // the messages of keys
     kerf::catch_stop_signals();
     return run(options);
   });

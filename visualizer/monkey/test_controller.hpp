@@ -48,7 +48,7 @@ class MonkeyController {
   /// Volumes as the dice fall. Throws SegmentError.
   MonkeyController(const std::string& name, Dice& dice);
 
-  /// The hand is elsewhere and feels something else; also takes the tool that was asked for.
+  /// Moves the hand and changes its force; also takes the tool that was asked for.
   void move(Dice& dice);
   /// Removes or adds material in a box anywhere; several boxes in one tick.
   void cut(Dice& dice);

@@ -6,7 +6,7 @@
 
 namespace kerf {
 
-/// What the user may do in the window, as `--help` and the overlay tell it.
+/// Keys of the window and their meanings, for `--help` and the overlay.
 struct KeyHelp {
   const char* key;
   const char* meaning;

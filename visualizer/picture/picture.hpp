@@ -59,7 +59,7 @@ class Picture {
   /// The mouse over the panels: see `Overlay::handle`.
   bool handle(const Pointer& pointer, OverlayFigures& figures, PictureSize size);
 
-  /// A plane square to the gaze, through `point_mm`, or without one through the middle of all
+  /// A plane square to the view axis, through `point_mm`, or without one through the middle of all
   /// volumes.
   [[nodiscard]] ClipPlane facing_plane(const std::optional<glm::dvec3>& point_mm) const;
   /// The plane moved by `mm` towards what it cuts off.

@@ -94,17 +94,17 @@ void SurfaceRenderer::upload(std::size_t volume, std::span<const Density> densit
     of.changed_box = of.changed_box.united(voxels_around(of.changed));
     of.changed.clear();
   }
-  if (faces_) faces_->volumes()[volume].update_bricks(density, changed);
+  if (caps_) caps_->volumes()[volume].update_bricks(density, changed);
 }
 
 void SurfaceRenderer::set_transform(std::size_t volume, const glm::dmat4& world_from_voxel) {
   scene_.volumes[volume].world_from_voxel = world_from_voxel;
-  if (faces_) faces_->volumes()[volume].set_transform(world_from_voxel);
+  if (caps_) caps_->volumes()[volume].set_transform(world_from_voxel);
 }
 
 void SurfaceRenderer::set_cut_open(bool open, std::span<const VolumeContent> contents) {
-  faces_.reset();
-  if (open) faces_.emplace(scene_, contents);
+  caps_.reset();
+  if (open) caps_.emplace(scene_, contents);
 }
 
 void SurfaceRenderer::mark_redraw(std::size_t volume, const KeptPicture& kept,
@@ -112,7 +112,7 @@ void SurfaceRenderer::mark_redraw(std::size_t volume, const KeptPicture& kept,
   const Volume& of = volumes_[volume];
   mark_triangles(of.changed, kept, tiles);
   if (!of.changed_box.empty()) mark_rays({&of.changed_box, 1}, footprint(), true, kept, tiles);
-  if (faces_) Renderer::mark_redraw(volume, kept, tiles);
+  if (caps_) Renderer::mark_redraw(volume, kept, tiles);
 }
 
 void SurfaceRenderer::forget_changes() {
@@ -148,7 +148,7 @@ void SurfaceRenderer::draw(const View& view, const RenderTarget& target) {
   }
   glDisable(GL_CULL_FACE);
   glDisable(GL_CLIP_DISTANCE0);
-  if (opened && faces_) faces_->draw(view, target);
+  if (opened && caps_) caps_->draw(view, target);
 }
 
 }  // namespace kerf

@@ -64,7 +64,7 @@ class SurfaceRenderer final : public Renderer {
   SceneView scene_;  ///< its volumes where they are now
   GlProgram program_{"surface.vert", "surface.frag", "lighting.frag"};
   std::vector<Volume> volumes_;
-  std::optional<ClipCaps> faces_;  ///< while volumes are cut open
+  std::optional<ClipCaps> caps_;  ///< while volumes are cut open
 };
 
 }  // namespace kerf

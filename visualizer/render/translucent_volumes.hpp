@@ -78,7 +78,7 @@ class TranslucentVolumes {
   void set_opacities(std::span<const MaterialView> materials,
                      std::span<const VolumeContent> contents);
 
-  /// Lines that tell the shaders which volumes there are: KERF_VOLUMES, KERF_EACH_VOLUME(f),
+  /// Definitions for the shaders of the volumes that there are: KERF_VOLUMES, KERF_EACH_VOLUME(f),
   /// KERF_HAS_LABELS.
   [[nodiscard]] std::string defines() const;
   /// The first texture unit that is free beside those of the volumes.

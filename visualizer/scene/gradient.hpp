@@ -17,7 +17,7 @@ namespace kerf {
 enum class GradientFilter : std::uint8_t {
   central,  ///< the difference over two voxel edges along each axis: sharp and rough
   corners,  ///< the same, of means over two voxel edges along the others: calms steps of a cut
-  farid5,   ///< from 5x5x5 voxels, as the servo feels: the calmest, blurs over four edges
+  farid5,   ///< from 5x5x5 voxels, as the servo does: the calmest, blurs over four edges
 };
 
 /// All of them, as on the command line, in the order of the enumeration.

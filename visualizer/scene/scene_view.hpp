@@ -55,7 +55,8 @@ struct ToolView {
   std::string name;
   std::vector<std::array<double, 2>> profile_mm;  ///< (y, radius), from the tip upwards
   double radius_mm = 0.0;                         ///< of the cutting head, at its widest
-  /// The same of shaft and handpiece as they are felt; empty: they are not, and one is made up.
+  /// The same of shaft and handpiece if the servo loads them; empty if not: the picture makes one
+  /// up.
   std::vector<std::array<double, 2>> shaft_mm{};
   Facets facets{};  ///< instead of a profile
 };
@@ -105,8 +106,8 @@ struct SceneView {
 /// A tool seen from the side, as rows from its tip upwards: height, left and right end, in mm.
 using Silhouette = std::vector<std::array<double, 3>>;
 
-/// Of the head, and, if a shaft is felt, of as much of that as the head is long. Empty if the
-/// tool has no extent.
+/// Of the head, and, if the servo loads the shaft, of as much of that as the head is long. Empty if
+/// the tool has no extent.
 [[nodiscard]] Silhouette silhouette_of(const ToolView& tool);
 
 }  // namespace kerf

@@ -24,7 +24,7 @@ struct ToolSound {
 class SpindleVoice {
  public:
   static constexpr double kSamplesPerS = 48'000;
-  /// Chosen: carbide burs have 6 to 8 blades as a rule, and a scene does not tell.
+  /// Chosen: carbide burs have 6 to 8 blades as a rule, and a scene does not name the number.
   static constexpr int kBlades = 8;
   static constexpr double kGlideS = 0.01;  ///< a frame of the window, rounded down
   /// A tone fades between these, so that none comes near to half of `kSamplesPerS`, beyond which

@@ -2,12 +2,10 @@
 #include "visualizer/surface/volume_surface.hpp"
 
 #include <algorithm>
-#include <atomic>
-#include <thread>
 #include <utility>
 
-#include "shared/posix/threads.hpp"
 #include "shared/volume/voxel_grid.hpp"
+#include "visualizer/cast/caster.hpp"
 #include "visualizer/surface/block_mesh.hpp"
 
 namespace kerf {
@@ -29,18 +27,6 @@ glm::vec3 inverse_square_spacing(const glm::dmat4& world_from_voxel) {
   return inverse / std::max({inverse.x, inverse.y, inverse.z});
 }
 
-/// Calls `work` for 0..count-1, each once, in any order, on all cores of this process.
-template <typename Work>
-void for_each_in_parallel(std::int32_t count, const Work& work) {
-  std::atomic<std::int32_t> next = 0;
-  const auto take = [&] {
-    for (std::int32_t i = next++; i < count; i = next++) work(i);
-  };
-  std::vector<std::jthread> helpers(allowed_cores().size() - 1);
-  for (std::jthread& helper : helpers) helper = start_worker(take);
-  take();
-}
-
 }  // namespace
 
 VolumeSurface::VolumeSurface(const VolumeView& volume, const std::vector<MaterialView>& materials,
@@ -56,7 +42,8 @@ VolumeSurface::VolumeSurface(const VolumeView& volume, const std::vector<Materia
       meshes_(blocks_.voxel_count()),
       work_(blocks_.voxel_count(), Work::none) {
   const SurfaceSource from = source(density);
-  for_each_in_parallel(blocks_.nz, [&](std::int32_t z) {
+  TilePool().run(static_cast<std::uint32_t>(blocks_.nz), [&](std::uint32_t layer) {
+    const auto z = static_cast<std::int32_t>(layer);
     for (std::int32_t y = 0; y < blocks_.ny; ++y) {
       for (std::int32_t x = 0; x < blocks_.nx; ++x) {
         meshes_[blocks_.index(x, y, z)] = extract_block(from, {x, y, z});

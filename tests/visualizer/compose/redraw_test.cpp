@@ -116,18 +116,33 @@ constexpr int kEdits = 40;
 constexpr int kEdits = 200;
 #endif
 
+/// A run, polled once.
+struct Run {
+  RuntimeFolder folder;
+  Controller controller;
+  Session session{"redraw"};
+  Run() { session.poll(); }
+};
+
+/// Whether `target`, which was drawn in parts, has the pixels of the whole picture.
+bool equals_whole(Picture& picture, const Run& run, const RenderTarget& target,
+                  const OverlayFigures& figures = {}) {
+  const auto seen = target.read_rgb();
+  picture.redraw_all();
+  CHECK(picture.draw(run.session, figures, target).fraction == 1.0);
+  return seen == target.read_rgb();
+}
+
 /// Changes volumes, hand and camera at random, and compares each part that was drawn again with
 /// drawing everything.
 void check_parts(const ViewSettings& settings, PictureSize size, int edits) {
   std::mt19937 random(3);
   const auto below = [&](int n) { return static_cast<int>(random() % static_cast<unsigned>(n)); };
-  Controller controller;
-  Session session("redraw");
-  session.poll();
-  Picture picture(session, settings, 4.0 / 3.0);
+  Run run;
+  Picture picture(run.session, settings, 4.0 / 3.0);
   const RenderTarget target(size);
   const OverlayFigures figures;
-  static_cast<void>(picture.draw(session, figures, target));
+  static_cast<void>(picture.draw(run.session, figures, target));
   const bool coarse =
       settings.renderer.find("slices") != std::string::npos;  // while something moves
   double redrawn = 0;
@@ -136,37 +151,33 @@ void check_parts(const ViewSettings& settings, PictureSize size, int edits) {
     if (edit % 3 != 2) {
       const VoxelIndex at{below(36), below(40), below(26)};
       const int edge = 1 + below(9);
-      controller.cut(static_cast<std::size_t>(below(2)),
-                     {at, {at.x + edge, at.y + edge, at.z + edge}}, 0.25 * below(3));
+      run.controller.cut(static_cast<std::size_t>(below(2)),
+                         {at, {at.x + edge, at.y + edge, at.z + edge}}, 0.25 * below(3));
     }
     if (edit % 4 == 3) {
       Hand hand;
       hand.tip_mm = {below(20) - 10.0, below(16) - 6.0, below(12) - 4.0};
       hand.tool = static_cast<std::uint32_t>(below(2));
       if (below(2) == 0) hand.force_n = {0.1 * below(20), 0.3, -0.2};
-      controller.move(hand);
+      run.controller.move(hand);
     }
     if (edit % 10 == 9) picture.camera().orbit(0.05, 0.01);
-    session.poll();
-    picture.update(session);
-    const Redrawn part = picture.draw(session, figures, target);
+    run.session.poll();
+    picture.update(run.session);
+    const Redrawn part = picture.draw(run.session, figures, target);
     if (edit % 10 == 9 || edit % 4 == 3) {  // comes to rest
-      CHECK(picture.draw(session, figures, target).any == coarse);
+      CHECK(picture.draw(run.session, figures, target).any == coarse);
     }
-    const auto seen = target.read_rgb();
     if (edit % 10 != 9) {
       redrawn += part.fraction;
       ++parts;
     }
-    picture.redraw_all();
-    CHECK(picture.draw(session, figures, target).fraction == 1.0);
-    const bool same = seen == target.read_rgb();
     CAPTURE(edit);
-    REQUIRE(same);
+    REQUIRE(equals_whole(picture, run, target, figures));
     // At rest nothing is drawn.
-    session.poll();
-    picture.update(session);
-    CHECK_FALSE(picture.draw(session, figures, target).any);
+    run.session.poll();
+    picture.update(run.session);
+    CHECK_FALSE(picture.draw(run.session, figures, target).any);
   }
   // One sees into the volume and the tool in it; of the other, what is hidden stays.
   const std::vector<std::string> kinds = renderer_of_each(settings.renderer, 2);
@@ -180,7 +191,6 @@ void check_parts(const ViewSettings& settings, PictureSize size, int edits) {
 
 TEST_CASE("after any change the part that is drawn again makes the picture of drawing everything") {
   if (!have_gl()) return;
-  const RuntimeFolder folder;
   for (const std::string_view kind : renderer_kinds()) {
     CAPTURE(std::string(kind));
     // What software GL draws slowly is small: to draw everything is most of the time.
@@ -196,7 +206,6 @@ TEST_CASE("after any change the part that is drawn again makes the picture of dr
 
 TEST_CASE("so it does where each volume has a renderer of its own") {
   if (!have_gl()) return;
-  const RuntimeFolder folder;
   for (const char* choice : {"surface,blend", "cast-blend,iso", "slices,cast", "cast,surface"}) {
     CAPTURE(choice);
     check_parts({.renderer = choice}, {96, 72}, kEdits / 4);
@@ -206,67 +215,55 @@ TEST_CASE("so it does where each volume has a renderer of its own") {
 
 TEST_CASE("slices are fewer around a tool that moves, and all of them once it rests") {
   if (!have_gl()) return;
-  const RuntimeFolder folder;
   for (const bool voxel_tool : {false, true}) {
-    Controller controller;
-    Session session("redraw");
-    session.poll();
-    Picture picture(session, {.renderer = "slices", .voxel_tool = voxel_tool}, 4.0 / 3.0);
+    Run run;
+    Picture picture(run.session, {.renderer = "slices", .voxel_tool = voxel_tool}, 4.0 / 3.0);
     const RenderTarget target({160, 120});
-    static_cast<void>(picture.draw(session, {}, target));
+    static_cast<void>(picture.draw(run.session, {}, target));
     std::vector<std::uint8_t> moving;
     for (const double x_mm : {-2.0, 0.0, 2.0}) {
-      controller.move({.tip_mm = {x_mm, 6.0, 4.0}});
-      session.poll();
-      const double fraction = picture.draw(session, {}, target).fraction;
+      run.controller.move({.tip_mm = {x_mm, 6.0, 4.0}});
+      run.session.poll();
+      const double fraction = picture.draw(run.session, {}, target).fraction;
       CHECK(fraction > 0.0);
       CHECK(fraction < 0.5);
       moving = target.read_rgb();
     }
     // A force that changes is no motion.
-    controller.move({.tip_mm = {2.0, 6.0, 4.0}, .force_n = {0.0, 0.01, 0.0}});
-    session.poll();
-    CHECK(picture.draw(session, {}, target).any);
+    run.controller.move({.tip_mm = {2.0, 6.0, 4.0}, .force_n = {0.0, 0.01, 0.0}});
+    run.session.poll();
+    CHECK(picture.draw(run.session, {}, target).any);
     const auto rest = target.read_rgb();
     CHECK(rest != moving);
-    CHECK_FALSE(picture.draw(session, {}, target).any);
-    picture.redraw_all();
-    static_cast<void>(picture.draw(session, {}, target));
-    CHECK(rest == target.read_rgb());
+    CHECK_FALSE(picture.draw(run.session, {}, target).any);
+    CHECK(equals_whole(picture, run, target));
   }
 }
 
 TEST_CASE("so it does after more changes than are told apart") {
   if (!have_gl()) return;
-  const RuntimeFolder folder;
   for (const char* kind : {"surface", "cast"}) {
     CAPTURE(std::string(kind));
     std::mt19937 random(3);
     const auto below = [&](int n) { return static_cast<int>(random() % static_cast<unsigned>(n)); };
-    Controller controller;
-    Session session("redraw");
-    session.poll();
-    Picture picture(session, {.renderer = kind}, 4.0 / 3.0);
+    Run run;
+    Picture picture(run.session, {.renderer = kind}, 4.0 / 3.0);
     const RenderTarget target({96, 72});
-    static_cast<void>(picture.draw(session, {}, target));
+    static_cast<void>(picture.draw(run.session, {}, target));
     for (int cut = 0; cut < 400; ++cut) {
       const VoxelIndex at{below(40), below(40), below(28)};
-      controller.cut(static_cast<std::size_t>(below(2)), {at, {at.x + 9, at.y + 9, at.z + 9}}, 0.9);
-      session.poll();
-      picture.update(session);
+      run.controller.cut(static_cast<std::size_t>(below(2)), {at, {at.x + 9, at.y + 9, at.z + 9}},
+                         0.9);
+      run.session.poll();
+      picture.update(run.session);
     }
-    static_cast<void>(picture.draw(session, {}, target));
-    const auto seen = target.read_rgb();
-    picture.redraw_all();
-    static_cast<void>(picture.draw(session, {}, target));
-    const bool same = seen == target.read_rgb();
-    CHECK(same);
+    static_cast<void>(picture.draw(run.session, {}, target));
+    CHECK(equals_whole(picture, run, target));
   }
 }
 
 TEST_CASE("so it does with any gradient") {
   if (!have_gl()) return;
-  const RuntimeFolder folder;
   for (const GradientFilter gradient : {GradientFilter::central, GradientFilter::farid5}) {
     check_parts({.renderer = "iso", .gradient = gradient}, {96, 72}, kEdits / 4);
   }
@@ -278,7 +275,6 @@ TEST_CASE("so it does with any gradient") {
 
 TEST_CASE("so it does with a tool of voxels") {
   if (!have_gl()) return;
-  const RuntimeFolder folder;
   for (const std::string_view kind : renderer_kinds()) {
     CAPTURE(std::string(kind));
     check_parts({.renderer = std::string(kind), .voxel_tool = true}, {96, 72}, kEdits / 10);
@@ -287,13 +283,10 @@ TEST_CASE("so it does with a tool of voxels") {
 
 TEST_CASE("a changed look shows the picture of one that had it from the start") {
   if (!have_gl()) return;
-  const RuntimeFolder folder;
-  Controller controller;
-  Session session("redraw");
-  session.poll();
+  Run run;
   const RenderTarget target({160, 120});
   const auto drawn = [&](Picture& picture) {
-    static_cast<void>(picture.draw(session, {}, target));
+    static_cast<void>(picture.draw(run.session, {}, target));
     return target.read_rgb();
   };
   ViewSettings clipped{.renderer = "iso"};
@@ -303,15 +296,15 @@ TEST_CASE("a changed look shows the picture of one that had it from the start") 
         ViewSettings{.renderer = "iso", .iso = 0.7}, clipped}) {
     std::vector<std::uint8_t> changed;
     {
-      Picture picture(session, {.renderer = "iso"}, 4.0 / 3.0);
+      Picture picture(run.session, {.renderer = "iso"}, 4.0 / 3.0);
       const auto before = drawn(picture);
-      picture.set_view(session, settings);
+      picture.set_view(run.session, settings);
       changed = drawn(picture);
       CHECK(changed != before);
-      CHECK_THROWS_AS(picture.set_view(session, {.renderer = "voxels"}), VisualizerError);
+      CHECK_THROWS_AS(picture.set_view(run.session, {.renderer = "voxels"}), VisualizerError);
       CHECK(picture.settings() == settings);
     }
-    Picture fresh(session, settings, 4.0 / 3.0);
+    Picture fresh(run.session, settings, 4.0 / 3.0);
     const bool same = drawn(fresh) == changed;
     CHECK(same);
   }
@@ -319,13 +312,10 @@ TEST_CASE("a changed look shows the picture of one that had it from the start") 
 
 TEST_CASE("the first view shows every volume, in the middle of the picture") {
   if (!have_gl()) return;
-  const RuntimeFolder folder;
-  Controller controller;
-  Session session("redraw");
-  session.poll();
-  Picture picture(session, {.renderer = "iso"}, 1.0);
+  Run run;
+  Picture picture(run.session, {.renderer = "iso"}, 1.0);
   const View view = picture.camera().view(1.0, picture.camera().radius_mm());
-  for (const VolumeView& volume : session.scene().volumes) {
+  for (const VolumeView& volume : run.session.scene().volumes) {
     const BoxCorners box = volume.corners();
     // A box's corners may lie outside, where there is hardly ever anything; its faces do not.
     const glm::dvec3 middle = 0.5 * (box.front() + box.back());
@@ -341,40 +331,30 @@ TEST_CASE("the first view shows every volume, in the middle of the picture") {
 
 TEST_CASE("a target made anew in the place of another, a column narrower, is drawn whole") {
   if (!have_gl()) return;
-  const RuntimeFolder folder;
-  Controller controller;
-  Session session("redraw");
-  session.poll();
-  Picture picture(session, {.renderer = "iso", .stereo = {.on = true}}, 4.0 / 3.0);
+  Run run;
+  Picture picture(run.session, {.renderer = "iso", .stereo = {.on = true}}, 4.0 / 3.0);
   std::optional<RenderTarget> target(std::in_place, PictureSize{161, 80});
-  static_cast<void>(picture.draw(session, {}, *target));
+  static_cast<void>(picture.draw(run.session, {}, *target));
   target.emplace(PictureSize{160, 80});
-  static_cast<void>(picture.draw(session, {}, *target));
-  const auto seen = target->read_rgb();
-  picture.redraw_all();
-  static_cast<void>(picture.draw(session, {}, *target));
-  const bool same = seen == target->read_rgb();
-  CHECK(same);
+  static_cast<void>(picture.draw(run.session, {}, *target));
+  CHECK(equals_whole(picture, run, *target));
 }
 
 TEST_CASE("a banner wider than the picture of an eye ends where that ends") {
   if (!have_gl()) return;
-  const RuntimeFolder folder;
-  Controller controller;
-  Session session("redraw");
-  session.poll();
+  Run run;
   constexpr PictureSize kOdd{97, 73};  // an eye has 48 columns, a banner at least 60
-  Picture picture(session, {.renderer = "iso", .stereo = {.on = true}}, 4.0 / 3.0);
+  Picture picture(run.session, {.renderer = "iso", .stereo = {.on = true}}, 4.0 / 3.0);
   const RenderTarget target(kOdd), anew(kOdd);
   OverlayFigures figures;
   figures.banner = "stale: no news from the servo";
   for (const double force_n : {0.0, 1.0, 2.0}) {
     figures.force_n = force_n;
-    CHECK(picture.draw(session, figures, target).any);
+    CHECK(picture.draw(run.session, figures, target).any);
   }
   const auto seen = target.read_rgb();
   picture.redraw_all();
-  static_cast<void>(picture.draw(session, figures, anew));
+  static_cast<void>(picture.draw(run.session, figures, anew));
   const bool same = seen == anew.read_rgb();
   CHECK(same);
   int lit = 0;  // of the odd column, which is nobody's

@@ -44,7 +44,7 @@ inline F presence_between(const CastVolumeJob& volume, F front, F back, M on) {
 
 /// The material in the middle of a piece, lit.
 inline Material lit_material(const CastJob& job, const CastVolumeJob& volume, Vec3 p, F density,
-                             const ViewVectors& gaze, M there, M noticeable) {
+                             const ViewVectors& vectors, M there, M noticeable) {
   const F zero = Simd::set(0.0F);
   const F full = Simd::set(volume.full);
   M plain = there;
@@ -81,9 +81,9 @@ inline Material lit_material(const CastJob& job, const CastVolumeJob& volume, Ve
   const M lights = Simd::both(noticeable, Simd::less(zero, x));
   if (!Simd::any(lights)) return {dim, material.extinction};
   const Vec3 unit = -normalized(transformed_back(volume.from_eye, gradient));
-  const Vec3 normal = select(Simd::less(dot(unit, gaze.to_eye), zero), -unit, unit);
+  const Vec3 normal = select(Simd::less(dot(unit, vectors.to_eye), zero), -unit, unit);
   const F surface = x * x * (Simd::set(3.0F) - Simd::set(2.0F) * x);
-  const Vec3 bright = mix(dim, lit(job, material.rgb, normal, gaze, Simd::set(1.0F)), surface);
+  const Vec3 bright = mix(dim, lit(job, material.rgb, normal, vectors, Simd::set(1.0F)), surface);
   return {select(lights, bright, dim), material.extinction};
 }
 
@@ -145,7 +145,7 @@ struct Piece {
 };
 
 inline void add_piece(const CastJob& job, const CastVolumeJob& volume, Walk& walk, M alive,
-                      const Piece& piece, const ViewVectors& gaze, Gathered& sum, Glow& glow) {
+                      const Piece& piece, const ViewVectors& vectors, Gathered& sum, Glow& glow) {
   const F zero = Simd::set(0.0F);
   const M on = Simd::both(alive, walk.visible);
   if (!Simd::any(on)) return;
@@ -167,7 +167,7 @@ inline void add_piece(const CastJob& job, const CastVolumeJob& volume, Walk& wal
   const F half = Simd::set(0.5F);
   const Vec3 middle = walk.rays.origin + (half * (from_mm + to_mm)) * walk.rays.direction;
   const Material material =
-      lit_material(job, volume, middle, half * (front + back), gaze, there, noticeable);
+      lit_material(job, volume, middle, half * (front + back), vectors, there, noticeable);
   const F extinction = Simd::select(there, material.extinction * presence, zero);
   const F per_mm = extinction * Simd::set(1.0F / volume.edge_mm);
   glow = {glow.rgb + per_mm * material.rgb, glow.per_mm + per_mm};
@@ -228,7 +228,7 @@ inline void blend_packet(const CastJob& job, const Packet& packet) {
   sum.depth_mm = never;
   sum.has_depth = Simd::none();
   M alive = Simd::both(drawn_lanes(packet), Simd::less(k * step_mm, end_mm));
-  const ViewVectors gaze = Simd::any(alive) ? gaze_along(job, eye) : ViewVectors{};
+  const ViewVectors vectors = Simd::any(alive) ? view_vectors_along(job, eye) : ViewVectors{};
   while (Simd::any(alive)) {
     M seeing = Simd::none();
     F soonest = never;
@@ -244,7 +244,7 @@ inline void blend_packet(const CastJob& job, const Packet& packet) {
       const F to_mm = Simd::min((k + one) * step_mm, part.end_mm);
       Glow glow;
       for (int v = 0; v < job.volume_count; ++v) {
-        add_piece(job, job.volumes[v], walks[v], alive, {k, from_mm, to_mm}, gaze, sum, glow);
+        add_piece(job, job.volumes[v], walks[v], alive, {k, from_mm, to_mm}, vectors, sum, glow);
       }
       if (Simd::any(Simd::less(Simd::set(0.0F), glow.per_mm))) {
         const F extinction = glow.per_mm * (positive(to_mm - from_mm) * length_per_mm);

@@ -126,13 +126,13 @@ inline void iso_packet(const CastJob& job, const Packet& packet) {
     put(packet, Simd::set(1.0F), job.pixels.depth);
     return;
   }
-  const ViewVectors gaze = gaze_along(job, eye);
+  const ViewVectors vectors = view_vectors_along(job, eye);
   Vec3 colour{};
   Vec3 normal{};
   for (int v = 0; v < job.volume_count; ++v) {
     if (!Simd::any(found[v])) continue;
     const CastVolumeJob& volume = job.volumes[v];
-    SurfacePoint at = surface_point(volume, rays[v], nearest_mm, gaze.to_eye);
+    SurfacePoint at = surface_point(volume, rays[v], nearest_mm, vectors.to_eye);
     F ao_factor = ao_factor_at(volume, at);
     const M on_face = Simd::both(begins[v], Simd::less(Simd::set(job.eye.near_mm), part.begin_mm));
     if (Simd::any(on_face)) {
@@ -143,7 +143,7 @@ inline void iso_packet(const CastJob& job, const Packet& packet) {
       ao_factor = Simd::select(on_face, Simd::set(1.0F), ao_factor);
     }
     const Vec3 albedo = material_at(volume, at, found[v]);
-    const Vec3 shown = lit(job, albedo, at.normal, gaze, ao_factor);
+    const Vec3 shown = lit(job, albedo, at.normal, vectors, ao_factor);
     colour = select(found[v], shown, colour);
     normal = select(found[v], at.normal, normal);
   }

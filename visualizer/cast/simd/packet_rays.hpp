@@ -114,14 +114,14 @@ struct ViewVectors {
   Vec3 key_half, fill_half;  ///< half-way to a light: normals that mirror it into the eye
 };
 
-inline ViewVectors gaze_along(const CastJob& job, Vec3 eye) {
+inline ViewVectors view_vectors_along(const CastJob& job, Vec3 eye) {
   const Vec3 to_eye = -normalized(eye);
   return {to_eye, normalized(vec3(job.key_light) + to_eye),
           normalized(vec3(job.fill_light) + to_eye)};
 }
 
 /// lighting.frag: two lights of a photographer that go with the eye, and a sky that stays.
-inline Vec3 lit(const CastJob& job, Vec3 albedo, Vec3 normal, const ViewVectors& gaze,
+inline Vec3 lit(const CastJob& job, Vec3 albedo, Vec3 normal, const ViewVectors& vectors,
                 F ao_factor) {
   const F one = Simd::set(1.0F);
   const F half = Simd::set(0.5F);
@@ -134,8 +134,8 @@ inline Vec3 lit(const CastJob& job, Vec3 albedo, Vec3 normal, const ViewVectors&
   const F fill = Simd::set(0.16F) * positive(dot(normal, vec3(job.fill_light)));
   const Vec3 diffuse = key * Vec3{one, Simd::set(0.97F), Simd::set(0.92F)} +
                        fill * Vec3{Simd::set(0.75F), Simd::set(0.85F), one};
-  const F key_shine = to_the_24th(positive(dot(normal, gaze.key_half)));
-  const F fill_shine = to_the_24th(positive(dot(normal, gaze.fill_half)));
+  const F key_shine = to_the_24th(positive(dot(normal, vectors.key_half)));
+  const F fill_shine = to_the_24th(positive(dot(normal, vectors.fill_half)));
   const F shine =
       ao_factor * (Simd::set(0.22F) * key_shine * key_shine + Simd::set(0.04F) * fill_shine);
   const F fraction = Simd::set(0.35F) + ao_factor * Simd::set(0.65F);
