@@ -6,7 +6,6 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <string>
 #include <string_view>
 
@@ -19,6 +18,7 @@
 #include "controller/input/sandbox.hpp"
 #include "controller/tool/tool_mesh.hpp"
 #include "controller/volume/file/volume_io.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 /// Files of one kind, KERF_FUZZ_END, through the sandbox: whatever they do to the library that
 /// reads them, they are a volume or one line, and take little memory. Mutations are blind, since
@@ -31,23 +31,6 @@ constexpr std::string_view kEnd = KERF_FUZZ_END;
 // The libraries' own, what the address checks keep of it, and inputs of a few kilobytes.
 constexpr long kMostKib = 256 << 10;
 constexpr int kCpuSeconds = 1;
-
-class Folder {
- public:
-  Folder() {
-    std::string name = (fs::temp_directory_path() / "kerf-fuzz-XXXXXX").string();
-    if (mkdtemp(name.data()) == nullptr) std::abort();
-    path = name;
-  }
-  ~Folder() {
-    std::error_code ignored;
-    fs::remove_all(path, ignored);
-  }
-  Folder(const Folder&) = delete;
-  Folder& operator=(const Folder&) = delete;
-
-  fs::path path;
-};
 
 /// What the child's address checks say goes to a file meanwhile; they end it where memory is short,
 /// which is no fault: elsewhere that is an exception.
@@ -66,10 +49,7 @@ class Errors {
   Errors(const Errors&) = delete;
   Errors& operator=(const Errors&) = delete;
 
-  [[nodiscard]] std::string text() const {
-    std::ifstream in(file_);
-    return {std::istreambuf_iterator<char>(in), {}};
-  }
+  [[nodiscard]] std::string text() const { return kerf::test::text_of(file_); }
 
  private:
   fs::path file_;
@@ -102,11 +82,11 @@ void demand(bool holds, const char* what, const std::string& message) {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  static const Folder folder;
+  static const kerf::test::TemporaryFolder folder;
   const std::string_view bytes(reinterpret_cast<const char*>(data), size);
   const bool packed = kEnd == ".nii" && bytes.starts_with("\x1f\x8b");
   const bool slices = kEnd == ".png";  // two of them in a folder
-  const fs::path place = slices ? folder.path / "slices" : folder.path;
+  const fs::path place = slices ? folder / "slices" : folder.path();
   fs::create_directory(place);
   const fs::path path = place / ("a" + std::string(kEnd) + (packed ? ".gz" : ""));
   std::ofstream(path, std::ios::binary) << bytes;

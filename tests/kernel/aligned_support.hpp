@@ -5,16 +5,43 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <random>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "controller/kernel/overlap_methods.hpp"
 #include "controller/plan/tables/sample_tables.hpp"
-#include "tests/kernel/exact_field.hpp"
+#include "tests/kernel/definitions.hpp"
+#include "tests/kernel/support.hpp"
 
-/// Volumes, tools and the two ways to compute one tick of the method `aligned`.
 namespace kerf::test {
+
+/// `gradient_exact` of any voxel of a volume as it is now, made when it is first asked for: a tool
+/// meets few of them. Zero where the volume does not reach.
+class ExactField {
+ public:
+  ExactField(const ExactTaps& taps, TestVolume volume)
+      : taps_(taps),
+        volume_(std::move(volume)),
+        grid_{volume_.grid.nx + 4, volume_.grid.ny + 4, volume_.grid.nz + 4},
+        values_(grid_.voxel_count()) {}
+
+  SumVec<FixedNumbers> operator()(VoxelIndex v) const {
+    const VoxelIndex at{v.x + 2, v.y + 2, v.z + 2};
+    if (!grid_.contains(at)) return {};
+    auto& value = values_[grid_.index(at.x, at.y, at.z)];
+    if (!value) value = gradient_exact(taps_, volume_.grid, volume_.density, v);
+    return *value;
+  }
+
+ private:
+  const ExactTaps& taps_;
+  TestVolume volume_;
+  VoxelGrid grid_;
+  mutable std::vector<std::optional<SumVec<FixedNumbers>>> values_;
+};
 
 /// About half the voxels of a box: full of holes, and not centred.
 inline std::vector<ToolOffset> ragged_tool(int nx, int ny, int nz, std::uint32_t seed) {
@@ -64,7 +91,7 @@ inline TestVolume hard_volume(VoxelGrid grid, int fill, std::uint32_t seed) {
 
 /// A centre with these raw Q15.16 coordinates.
 inline ToolPose<FixedNumbers> pose_of(std::array<std::int32_t, 3> raw) {
-  ToolPose<FixedNumbers> pose = pose_at<FixedNumbers>({0, 0, 0});
+  ToolPose<FixedNumbers> pose = pose_at({0, 0, 0});
   pose.centre_vox = {Q16::from_raw(raw[0]), Q16::from_raw(raw[1]), Q16::from_raw(raw[2])};
   return pose;
 }
@@ -132,7 +159,7 @@ inline AlignedOutcome outcome_by_definition(const ExactTaps& taps, const TestVol
                                             OverlapBox<FixedNumbers>& scratch) {
   AlignedOutcome out{{}, {}, {}, volume.density, carry};
   out.contact = aligned_contact_sum(taps, field, tool, pose);
-  overlap<FixedNumbers>(volume.grid, tool, pose, FixedNumbers::kStepOne, scratch);
+  overlap(volume.grid, tool, pose, FixedNumbers::kStepOne, scratch);
   out.modification =
       exact_modification_sum(field, volume.grid, volume.density, scratch, tool.size());
   out.removed = remove<FixedNumbers>(volume.grid, out.density, scratch, rate, out.carry);

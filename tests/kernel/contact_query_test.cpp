@@ -2,13 +2,23 @@
 // Where tools rest on bodies of known shape, and what they feel there. Edges over two voxels.
 #include "controller/kernel/proxy/contact_query.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include <doctest/doctest.h>
 
+#include "controller/kernel/point_shell/free_path.hpp"
+#include "controller/plan/tables/free_brick_map.hpp"
+#include "lab/rig/geometry.hpp"
+#include "lab/rig/tool_meshes.hpp"
+#include "tests/case_count.hpp"
 #include "tests/kernel/contact_support.hpp"
 
 using namespace kerf;
@@ -243,5 +253,226 @@ TEST_CASE_TEMPLATE("every shape rests on planes whatever its pose", N, FixedNumb
     }
     CAPTURE(std::string(c.shape));
     CHECK(std::abs(mean) < 0.04);
+  }
+}
+
+// Tools that touch with a flat face: normal and place of the contact.
+
+namespace {
+
+constexpr double kThin = 2;
+
+/// A square plate, thin along an axis.
+SceneTool blade(std::size_t axis) {
+  std::vector<LooseTriangle> triangles = prism(11.3, kThin, 4);
+  for (LooseTriangle& triangle : triangles) {
+    for (auto& corner : triangle) std::swap(corner[1], corner[axis]);
+  }
+  return mesh_of_units("blade", triangles);
+}
+
+/// Axes of a tool whose face `sign` across `axis` looks along -up.
+Axes facing(std::size_t axis, double sign, const Point& up, Dice& dice) {
+  Point along[3];
+  along[axis] = -sign * up;
+  along[(axis + 1) % 3] = dice.across(up);
+  along[(axis + 2) % 3] = cross(along[axis], along[(axis + 1) % 3]);
+  return {along[0], along[1], along[2]};
+}
+
+}  // namespace
+
+TEST_CASE_TEMPLATE("either face of a thin tool touches a bump where it is, with its normal", N,
+                   FixedNumbers, DoubleNumbers) {
+  constexpr double kBump = 40;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const SampledTool tool(blade(axis));
+    for (const double sign : {-1.0, 1.0}) {
+      Dice dice(3);
+      const Point up = dice.direction(), top{20, 20, 20};
+      const TestVolume bump =
+          blurred({40, 40, 40}, [&](Point p) { return length(p - top + kBump * up) - kBump; });
+      ContactRig<N> rig(tool, bump);
+      const Axes axes = facing(axis, sign, up, dice);
+      rig.field().turn(axes.turn<N>());
+      double turned = 0, beside = 0;
+      for (int i = 0; i < 60; ++i) {
+        Point touching{};
+        touching[axis] = sign * kThin / 2;
+        touching[(axis + 1) % 3] = dice.uniform(-4, 4);
+        touching[(axis + 2) % 3] = dice.uniform(-4, 4);
+        const Point centre = top - axes.to_world(touching) + dice.uniform(-0.05, 0.05) * up;
+        const Contacts<N> felt = rig.field().query(place_of<N>(centre));
+        REQUIRE(felt.count == 1);
+        turned = std::max(turned, degrees_between(normal_of(felt.plane[0]), up));
+        beside = std::max(beside, length(axes.to_tool(point_of<N>(felt.plane[0].arm)) - touching));
+      }
+      CAPTURE(axis);
+      CAPTURE(sign);
+      CHECK(turned < 0.5);
+      CHECK(beside < 0.3);
+    }
+  }
+}
+
+TEST_CASE_TEMPLATE("a face that lies on a flat is held in its middle, on noise too", N,
+                   FixedNumbers, DoubleNumbers) {
+  for (const SceneTool& block :
+       {mesh_of_units("block", prism(11.3, 16, 4)), tool_of_units("cylinder", 8, 16)}) {
+    const SampledTool tool(block);
+    for (const double noise : {0.0, 0.02}) {
+      Dice dice(3);
+      const Point up = dice.direction(), top{30, 30, 30};
+      const TestVolume flat = body_of({60, 60, 60}, [&](Point p) {
+        return 0.5 - dot(p - top, up) / 2 + std::sqrt(3) * dice.uniform(-noise, noise);
+      });
+      ContactRig<N> rig(tool, flat);
+      const Axes axes = facing(1, -1, up, dice);
+      rig.field().turn(axes.turn<N>());
+      double turned = 0, beside = 0, steps = 0;
+      Point last{};
+      for (int i = 0; i < 200; ++i) {
+        const Contacts<N> felt = rig.field().query(place_of<N>(top + 8.0 * up + 0.01 * i * axes.x));
+        REQUIRE(felt.count == 1);
+        const Point arm = axes.to_tool(point_of<N>(felt.plane[0].arm));
+        turned = std::max(turned, degrees_between(normal_of(felt.plane[0]), up));
+        beside = std::max(beside, length(arm - Point{0, -8, 0}));
+        if (i > 0) steps = std::max(steps, length(arm - last));
+        last = arm;
+      }
+      CAPTURE(noise);
+      CHECK(turned < (noise > 0 ? 0.5 : 0.2));
+      CHECK(beside < (noise > 0 ? 0.3 : 0.1));
+      CHECK(steps < 0.01);
+    }
+  }
+}
+
+TEST_CASE("no group of samples has its middle outside of the tool's reach") {
+  // Levers beyond it would leave 31 bits on the way to places.
+  for (double radius = 0.5; radius < 31; radius *= 1.007) {
+    const SampledTool ball(tool_of_units("ball", radius, 2 * radius));
+    const PointShellTable<FixedNumbers> tool(ball.samples, true);
+    const PointTable<FixedNumbers> table = tool.point_shell().table;
+    double farthest = 0;
+    for (std::int32_t group = 0; group < table.groups; ++group) {
+      farthest = std::max(farthest, std::hypot(table.middle[0][group], table.middle[1][group],
+                                               table.middle[2][group]));
+    }
+    CAPTURE(radius);
+    CHECK(farthest <= 32768 + 1);
+  }
+}
+
+namespace {
+
+constexpr VoxelGrid kGrid{50, 40, 45};
+
+/// How far the sphere of `radius` about `p` is from where a voxel of `hot` is read: around it, but
+/// for what is beyond the outermost voxels.
+double gap(const std::vector<Point>& hot, const Point& p, double radius) {
+  const double last[3] = {kGrid.nx - 1.0, kGrid.ny - 1.0, kGrid.nz - 1.0};
+  double nearest = 1e9;
+  for (const Point& v : hot) {
+    Point out{};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const double low = std::max(v[axis] - 1, 0.0), high = std::min(v[axis] + 1, last[axis]);
+      out[axis] = std::max({0.0, low - p[axis], p[axis] - high});
+    }
+    nearest = std::min(nearest, length(out));
+  }
+  return nearest - radius;
+}
+
+template <class N>
+PointNumber<N> number(double x) {
+  return static_cast<PointNumber<N>>(N::kIsFixed ? std::round(x * 65536) : x);
+}
+
+}  // namespace
+
+TEST_CASE_TEMPLATE(
+    "a sphere meets nothing on its free way, ends where something is, and looks as "
+    "often as it enters bricks",
+    N, FixedNumbers, DoubleNumbers) {
+  Dice dice(3);
+  int whole = 0, none = 0, part = 0;
+  for (int i = 0; i < cases(400); ++i) {
+    std::vector<Density> density(kGrid.voxel_count(), 0);
+    std::vector<Point> hot;
+    for (int k = 0; k < i % 7 * 5; ++k) {
+      const Point v{std::floor(dice.uniform(0, 50)), std::floor(dice.uniform(0, 40)),
+                    std::floor(dice.uniform(0, 45))};
+      density[kGrid.index(int(v[0]), int(v[1]), int(v[2]))] = 9;
+      hot.push_back(v);
+    }
+    const FreeBrickMap map(kGrid, density, 9);
+    for (int k = 0; k < 10; ++k) {
+      // Inside, outside, across; along an axis, not at all and far.
+      const Point from{dice.uniform(-20, 70), dice.uniform(-20, 60), dice.uniform(-20, 65)};
+      Point move = (k == 0 ? 2000 : dice.uniform(1, 90)) * dice.direction();
+      if (k == 1) move[0] = move[2] = 0;
+      if (k == 2) move = {};
+      const double radius = dice.uniform(0, 6), size = std::max(1.0, length(move));
+      const FreeSpaceMap bricks = map.bricks();
+      const FreePath<N> way(bricks, {number<N>(move[0]), number<N>(move[1]), number<N>(move[2])},
+                            number<N>(size + 0.001));
+      const PointNumber<N> start[3] = {number<N>(from[0]), number<N>(from[1]), number<N>(from[2])};
+      constexpr std::int64_t kMost = 10000;
+      std::int64_t left = kMost;
+      const auto all = kWholeMove<N>;
+      const auto end = way.free_up_to(start, free_steps_for(radius + 0.001), 0, all, left);
+      const double share = double(end) / double(all);
+      CHECK(share <= 1);
+      const double enters = (std::abs(move[0]) + std::abs(move[1]) + std::abs(move[2])) / 2 + 4;
+      CHECK(double(kMost - left) <= enters);
+      for (int at = 0; at <= 100; ++at) {
+        const double found = gap(hot, from + at / 100.0 * share * move, radius);
+        if (end > 0 && found < 0) REQUIRE(found >= 0);
+      }
+      // It stops for a brick, which is a box of two voxels, in steps of a quarter; a voxel at the
+      // border is not read beyond it.
+      const Point stop = from + share * move;
+      const auto inside = [&](std::size_t axis, int n) {
+        return stop[axis] >= 0 && stop[axis] <= n;
+      };
+      if (share < 1 && inside(0, 50) && inside(1, 40) && inside(2, 45)) {
+        CHECK(gap(hot, stop, radius) < std::sqrt(12.0) + std::sqrt(3.0) + 0.26);
+      }
+      ++(share >= 1 ? whole : share <= 0 ? none : part);
+      if (end <= 0) continue;
+      // The same in two parts, and without enough looks.
+      std::int64_t few = 1, more = kMost;
+      const auto half = way.free_up_to(start, free_steps_for(radius + 0.001), 0, end / 2, more);
+      CHECK(half == end / 2);
+      CHECK(way.free_up_to(start, free_steps_for(radius + 0.001), 0, end, few) <= end);
+      CHECK(few == 0);
+    }
+  }
+  CHECK(whole > cases(400));
+  CHECK(none > cases(400) / 40);
+  CHECK(part > cases(400) / 8);
+  const FreeSpaceMap unknown;
+  std::int64_t left = 5;
+  const FreePath<N> way(unknown, {number<N>(1), number<N>(1), number<N>(1)}, number<N>(2));
+  CHECK(way.free_up_to({number<N>(5), number<N>(5), number<N>(5)}, 1, 0, kWholeMove<N>, left) == 0);
+}
+
+TEST_CASE_TEMPLATE("from outside no way is free for a sphere that the map cannot tell", N,
+                   FixedNumbers, DoubleNumbers) {
+  std::vector<Density> density(kGrid.voxel_count(), 0);
+  density[kGrid.index(25, 20, 22)] = 9;
+  const FreeBrickMap map(kGrid, density, 9);
+  const FreeSpaceMap bricks = map.bricks();
+  const FreePath<N> way(bricks, {number<N>(0), number<N>(0), number<N>(-10)}, number<N>(10.001));
+  // 70 voxels above the volume: 92 from where the voxel is read.
+  const PointNumber<N> start[3] = {number<N>(25), number<N>(20), number<N>(115)};
+  for (const double radius : {40.0, 63.0, 64.0, 90.0, 91.9, 92.1, 200.0}) {
+    CAPTURE(radius);
+    std::int64_t left = 100;
+    const auto free = way.free_up_to(start, free_steps_for(radius), 0, kWholeMove<N>, left);
+    const double voxels = 10 * double(free) / double(kWholeMove<N>);
+    CHECK(voxels <= std::max(0.0, 92 - radius));
+    if (radius < 60) CHECK(voxels == doctest::Approx(10));
   }
 }

@@ -6,9 +6,10 @@
 #include <random>
 
 #include <doctest/doctest.h>
-#include <rapidcheck.h>
 
 #include "tests/kernel/support.hpp"
+#include "tests/support/property.hpp"
+#include "tests/support/voxels.hpp"
 
 using namespace kerf;
 using namespace kerf::test;
@@ -39,43 +40,45 @@ double ratio_of(const OverlapBox<N>& box, VoxelIndex v) {
 TEST_CASE("one tool voxel on a voxel covers it whole; half-way it covers both by half") {
   const VoxelGrid grid{9, 9, 9};
   const std::vector<ToolOffset> tool = {{0, 0, 0}};
-  Cutter<FixedNumbers> cutter(8);
-  const auto on = overlap<FixedNumbers>(grid, tool, pose_at<FixedNumbers>({4, 4, 4}),
-                                        FixedNumbers::kStepOne, cutter.overlap);
+  Cutter<> cutter(8);
+  const auto on = overlap(grid, tool, pose_at({4, 4, 4}), FixedNumbers::kStepOne, cutter.overlap);
   CHECK(on == VoxelBox{{4, 4, 4}, {6, 6, 6}});
   CHECK(ratio_of(cutter.overlap, {4, 4, 4}) == 1.0);
   CHECK(ratio_of(cutter.overlap, {5, 4, 4}) == 0.0);
-  overlap<FixedNumbers>(grid, tool, pose_at<FixedNumbers>({4.5, 4, 4}), FixedNumbers::kStepOne,
-                        cutter.overlap);
+  overlap(grid, tool, pose_at({4.5, 4, 4}), FixedNumbers::kStepOne, cutter.overlap);
   CHECK(ratio_of(cutter.overlap, {4, 4, 4}) == 0.5);
   CHECK(ratio_of(cutter.overlap, {5, 4, 4}) == 0.5);
 }
 
 TEST_CASE("the inside of an unturned tool of the volume's pitch is covered whole at any offset") {
-  CHECK(rc::check([](std::uint16_t x, std::uint16_t y, std::uint16_t z) {
+  CHECK(property([] {
+    const auto x = any<std::uint16_t>();
+    const auto y = any<std::uint16_t>();
+    const auto z = any<std::uint16_t>();
     const VoxelGrid grid{40, 40, 40};
-    ToolPose<FixedNumbers> pose = pose_at<FixedNumbers>({20, 20, 20});
+    ToolPose<FixedNumbers> pose = pose_at({20, 20, 20});
     pose.centre_vox =
         pose.centre_vox + VoxelVec<Q16>{Q16::from_raw(x), Q16::from_raw(y), Q16::from_raw(z)};
     const auto tool = paper_ball(10);
-    Cutter<FixedNumbers> cutter(16);
-    overlap<FixedNumbers>(grid, tool, pose, FixedNumbers::kStepOne, cutter.overlap);
+    Cutter<> cutter(16);
+    overlap(grid, tool, pose, FixedNumbers::kStepOne, cutter.overlap);
     std::int64_t total = 0;
     for (const auto w : cutter.overlap.memory.first(11 * 11 * 11)) {
-      RC_ASSERT(w >= 0);
-      RC_ASSERT(w <= FixedNumbers::kWeightOne);
+      HOLDS(w >= 0);
+      HOLDS(w <= FixedNumbers::kWeightOne);
       total += w;
     }
     // Nothing is clipped, so every tool voxel's weight is there.
-    RC_ASSERT(total == std::int64_t{FixedNumbers::kWeightOne} * 552);
-    RC_ASSERT(ratio_of(cutter.overlap, {20, 20, 20}) == 1.0);
-    RC_ASSERT(ratio_of(cutter.overlap, {21, 21, 21}) == 1.0);
+    HOLDS(total == std::int64_t{FixedNumbers::kWeightOne} * 552);
+    HOLDS(ratio_of(cutter.overlap, {20, 20, 20}) == 1.0);
+    HOLDS(ratio_of(cutter.overlap, {21, 21, 21}) == 1.0);
   }));
 }
 
 TEST_CASE_TEMPLATE("overlap is the clamped sum of trilinear weights, inside and across the border",
                    N, FixedNumbers, DoubleNumbers) {
-  CHECK(rc::check([](std::uint32_t seed) {
+  CHECK(property([] {
+    const auto seed = any<std::uint32_t>();
     std::mt19937 random(seed);
     const auto within = [&](double low, double high) {
       return std::uniform_real_distribution<double>(low, high)(random);
@@ -91,16 +94,12 @@ TEST_CASE_TEMPLATE("overlap is the clamped sum of trilinear weights, inside and 
     Cutter<N> cutter(24);
     const VoxelBox box = overlap<N>(grid, tool, turned_pose<N>(centre, q, pitch),
                                     step_from<N>(volume_ratio), cutter.overlap);
-    RC_ASSERT(box.empty() || box == cutter.overlap.box.clipped(grid.box()));
+    HOLDS(box.empty() || box == cutter.overlap.box.clipped(grid.box()));
     const auto exact = turned_pose<DoubleNumbers>(centre, q, pitch);
-    for (std::int32_t z = 0; z < grid.nz; ++z) {
-      for (std::int32_t y = 0; y < grid.ny; ++y) {
-        for (std::int32_t x = 0; x < grid.nx; ++x) {
-          const double expected = obvious_ratio(tool, exact, volume_ratio, {x, y, z});
-          // Q15 weights of some 40 samples, poses of 2^-17, steps of 2^-21 on 6 half pitches.
-          RC_ASSERT(std::abs(ratio_of(cutter.overlap, {x, y, z}) - expected) < 2e-3);
-        }
-      }
+    for (const auto& [x, y, z] : voxels(grid)) {
+      const double expected = obvious_ratio(tool, exact, volume_ratio, {x, y, z});
+      // Q15 weights of some 40 samples, poses of 2^-17, steps of 2^-21 on 6 half pitches.
+      HOLDS(std::abs(ratio_of(cutter.overlap, {x, y, z}) - expected) < 2e-3);
     }
   }));
 }
@@ -109,14 +108,14 @@ TEST_CASE_TEMPLATE("overlap is the clamped sum of trilinear weights, inside and 
 TEST_CASE("the order of the samples does not change a fixed overlap") {
   const VoxelGrid grid{30, 30, 30};
   auto tool = paper_ball(10);
-  const auto pose = turned_pose<FixedNumbers>({14.3, 15.2, 13.9}, {0.3, -0.2, 0.5, 0.8});
-  Cutter<FixedNumbers> first(24), other(24);
-  overlap<FixedNumbers>(grid, tool, pose, FixedNumbers::kStepOne, first.overlap);
+  const auto pose = turned_pose({14.3, 15.2, 13.9}, {0.3, -0.2, 0.5, 0.8});
+  Cutter<> first(24), other(24);
+  overlap(grid, tool, pose, FixedNumbers::kStepOne, first.overlap);
   std::mt19937 random(7);
   bool same = true;
   for (int n = 0; n < 1000; ++n) {
     std::shuffle(tool.begin(), tool.end(), random);
-    overlap<FixedNumbers>(grid, tool, pose, FixedNumbers::kStepOne, other.overlap);
+    overlap(grid, tool, pose, FixedNumbers::kStepOne, other.overlap);
     same = same && other.overlap.box == first.overlap.box && other.memory == first.memory;
   }
   CHECK(same);
@@ -125,17 +124,17 @@ TEST_CASE("the order of the samples does not change a fixed overlap") {
 TEST_CASE("more samples in one voxel than a weight can count still cover it just whole") {
   const VoxelGrid grid{9, 9, 9};
   const std::vector<ToolOffset> crowd(70000, ToolOffset{});
-  Cutter<FixedNumbers> cutter(8);
+  Cutter<> cutter(8);
   for (const std::int32_t volume_ratio : {FixedNumbers::kStepOne, 1 << 10, 1 << 30}) {
-    overlap<FixedNumbers>(grid, crowd, pose_at<FixedNumbers>({4, 4, 4}), volume_ratio,
-                          cutter.overlap);
+    overlap(grid, crowd, pose_at({4, 4, 4}), volume_ratio, cutter.overlap);
     CHECK(ratio_of(cutter.overlap, {4, 4, 4}) == 1.0);
     CHECK(ratio_of(cutter.overlap, {5, 4, 4}) == 0.0);
   }
 }
 
 TEST_CASE("the memory sized for a tool is enough in any orientation, at any pitch and spacing") {
-  CHECK(rc::check([](std::uint32_t seed) {
+  CHECK(property([] {
+    const auto seed = any<std::uint32_t>();
     std::mt19937 random(seed);
     const auto within = [&](double low, double high) {
       return std::uniform_real_distribution<double>(low, high)(random);
@@ -152,8 +151,8 @@ TEST_CASE("the memory sized for a tool is enough in any orientation, at any pitc
     }
     const double pitch = within(0.05, 0.5);
     const std::array<double, 3> spacing{within(0.05, 0.5), within(0.05, 0.5), within(0.05, 0.5)};
-    auto pose = turned_pose<FixedNumbers>({200.0 + within(0, 1), 200.0 + within(0, 1), 200.5},
-                                          {within(-1, 1), within(-1, 1), within(-1, 1), 1.1});
+    auto pose = turned_pose({200.0 + within(0, 1), 200.0 + within(0, 1), 200.5},
+                            {within(-1, 1), within(-1, 1), within(-1, 1), 1.1});
     for (std::size_t a = 0; a < 3; ++a) {
       for (auto& step : pose.step[a]) {
         step = static_cast<std::int32_t>(std::lround(step * pitch / spacing[a]));
@@ -161,10 +160,8 @@ TEST_CASE("the memory sized for a tool is enough in any orientation, at any pitc
     }
     std::vector<std::int32_t> memory(overlap_capacity(size, pitch, spacing));
     OverlapBox<FixedNumbers> box{memory, {}, 0};
-    RC_ASSERT(!overlap<FixedNumbers>({400, 400, 400}, corners, pose, FixedNumbers::kStepOne, box)
-                   .empty());
-    RC_ASSERT(static_cast<std::size_t>(box.box.extent().x) <=
-              overlap_width(size, pitch, spacing[0]));
+    HOLDS(!overlap({400, 400, 400}, corners, pose, FixedNumbers::kStepOne, box).empty());
+    HOLDS(static_cast<std::size_t>(box.box.extent().x) <= overlap_width(size, pitch, spacing[0]));
   }));
 }
 
@@ -174,16 +171,12 @@ TEST_CASE("a box too large for its memory, a far tool and an empty one cover not
   std::vector<std::int32_t> memory(11 * 11 * 11 - 1);
   OverlapBox<FixedNumbers> box{memory, {}, 0};
   const auto covers = [&](std::array<double, 3> centre) {
-    return !overlap<FixedNumbers>(grid, tool, pose_at<FixedNumbers>(centre), FixedNumbers::kStepOne,
-                                  box)
-                .empty();
+    return !overlap(grid, tool, pose_at(centre), FixedNumbers::kStepOne, box).empty();
   };
   CHECK_FALSE(covers({15.3, 15.3, 15.3}));
   CHECK(box.box.empty());
   CHECK(covers({1, 15.3, 15.3}));
   for (const double far : {-30.0, 60.0, 1e9, -1e9}) CHECK_FALSE(covers({15, far, 15}));
   CHECK(box.box.empty());
-  CHECK(overlap<FixedNumbers>(grid, {}, pose_at<FixedNumbers>({15, 15, 15}), FixedNumbers::kStepOne,
-                              box)
-            .empty());
+  CHECK(overlap(grid, {}, pose_at({15, 15, 15}), FixedNumbers::kStepOne, box).empty());
 }

@@ -40,7 +40,7 @@ double steps_of(CutBudget<N> budget) {
 /// The tool's y axis, and so the spindle's, along an axis of the volume.
 enum class Axis { x, y, z };
 
-template <class N>
+template <class N = FixedNumbers>
 SpindleFrame<N> frame_at(std::array<double, 3> centre_vox, double rim_vox, Axis axis = Axis::y) {
   using Real = typename N::Real;
   using Unit = typename N::Unit;
@@ -60,7 +60,7 @@ struct Pressed : PrestonOutcome<N> {
 };
 
 /// One unturned tool of the volume's pitch on one volume.
-template <class N>
+template <class N = FixedNumbers>
 struct PrestonRig {
   PrestonRig(TestVolume start, std::vector<ToolOffset> offsets, double rim, Scale of = {})
       : volume(std::move(start)),

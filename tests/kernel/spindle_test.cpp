@@ -74,7 +74,7 @@ TEST_CASE("the surface's speed is the distance from the axis, down to the floor"
     const std::array<double, 3> centre{within(20, 60), within(20, 60), within(20, 60)};
     const double rim = within(2, 12);
     const Axis axis = static_cast<Axis>(n % 3);
-    const auto frame = frame_at<FixedNumbers>(centre, rim, axis);
+    const auto frame = frame_at(centre, rim, axis);
     const VoxelIndex first{static_cast<std::int32_t>(centre[0]) - 14,
                            static_cast<std::int32_t>(centre[1] + within(-14, 14)),
                            static_cast<std::int32_t>(centre[2] + within(-14, 14))};
@@ -89,7 +89,7 @@ TEST_CASE("the surface's speed is the distance from the axis, down to the floor"
     worst = std::max(worst, std::abs(speed - std::clamp(distance, kSpeedFloor, 1.0)));
   }
   CHECK(worst < 2e-4);
-  const auto at_pole = frame_at<FixedNumbers>({20, 20, 20}, 8).at({20, 3, 20});
+  const auto at_pole = frame_at({20, 20, 20}, 8).at({20, 3, 20});
   CHECK(std::abs(double(SpindleFrame<FixedNumbers>::speed(at_pole)) / 32768 - 0.08) < 1e-4);
 }
 

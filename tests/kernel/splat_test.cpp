@@ -13,7 +13,6 @@
 #include "tests/case_count.hpp"
 #include "tests/kernel/aligned_support.hpp"
 #include "tests/kernel/definitions.hpp"
-#include "tests/kernel/hash.hpp"
 
 using namespace kerf;
 using namespace kerf::test;
@@ -51,7 +50,7 @@ AlignedOutcome by_definition(const SplatRig& rig, const TestVolume& volume, cons
                              OverlapBox<FixedNumbers>& scratch) {
   AlignedOutcome out{{}, {}, {}, volume.density, carry};
   out.contact = splat_contact_sum(field, rig.tool, pose);
-  overlap<FixedNumbers>(volume.grid, rig.tool, pose, volume_ratio, scratch);
+  overlap(volume.grid, rig.tool, pose, volume_ratio, scratch);
   out.modification =
       exact_modification_sum(field, volume.grid, volume.density, scratch, rig.tool.size());
   out.removed = remove<FixedNumbers>(volume.grid, out.density, scratch, rate, out.carry);
@@ -80,7 +79,7 @@ TEST_CASE("splatting gives the bits of the definition for any tool in any pose")
   };
   for (const Named& tool : tools) {
     SplatRig rig(tool.offsets, tool.width);
-    Cutter<FixedNumbers> cutter(tool.width + 2);
+    Cutter<> cutter(tool.width + 2);
     int felt = 0, cut_away = 0;
     for (int fill = 0; fill < kFills; ++fill) {
       // Rows longer than the widest vector, then a volume smaller than the tool.
@@ -92,13 +91,12 @@ TEST_CASE("splatting gives the bits of the definition for any tool in any pose")
       const ExactField field(taps, volume);
       for (int i = 0; i < cases(tool.cases); ++i) {
         const double out = i % 3 == 0 ? 5 : -2;
-        const auto pose = turned_pose<FixedNumbers>(
+        const auto pose = turned_pose(
             {within(-out, grid.nx + out), within(-out, grid.ny + out), within(-out, grid.nz + out)},
             {within(-1, 1), within(-1, 1), within(-1, 1), i % 5 == 0 ? 0.0 : within(-1, 1)},
             tool.pitch);
         const std::int32_t volume_ratio =
-            i % 2 == 0 ? FixedNumbers::kStepOne
-                       : step_from<FixedNumbers>(tool.pitch * tool.pitch * tool.pitch);
+            i % 2 == 0 ? FixedNumbers::kStepOne : step_from(tool.pitch * tool.pitch * tool.pitch);
         const auto rate = removal_rate<FixedNumbers>(within(0, 1.3), i % 7 == 0);
         std::vector<std::uint16_t> carry(tool.width + 36);
         for (auto& owed : carry) owed = static_cast<std::uint16_t>(random());
@@ -129,7 +127,7 @@ TEST_CASE("an unturned tool of the voxels' pitch cuts the same by splatting and 
   const auto rate = removal_rate<FixedNumbers>(0.3, false);
   const std::vector<std::uint16_t> carry(64, 777);
   for (const double x : {-2.0, 12.25, 30.7, 47.9}) {
-    const auto pose = pose_at<FixedNumbers>({x, 11.3, 9.8});
+    const auto pose = pose_at({x, 11.3, 9.8});
     for (AlignedRig& aligned : rigs_for(offsets)) {
       const AlignedOutcome a = aligned.run(volume, pose, rate, carry);
       const AlignedOutcome b = rig.run(aligned.kernels(), kExactFarid, volume, pose,
@@ -147,42 +145,13 @@ TEST_CASE("an unturned tool of the voxels' pitch cuts the same by splatting and 
   }
 }
 
-TEST_CASE("a scripted turn through noise ends in the known hash on every instruction set") {
-  SplatRig rig(box_tool(7, 4, 9), 17);
-  const auto rate = removal_rate<FixedNumbers>(0.125, true);
-  for (auto set = kernel_sets(); *set != nullptr; ++set) {
-    std::uint32_t noise = 1;
-    TestVolume volume = made_of({60, 26, 24}, [&](auto, auto, std::int32_t z) {
-      noise = noise * 1664525u + 1013904223u;
-      return static_cast<Density>(z < 14 ? 60000 + (noise >> 20) : noise >> 26);
-    });
-    std::vector<std::uint16_t> carry(64);
-    Hash hash;
-    for (int tick = 0; tick < 120; ++tick) {
-      // Rational quaternions and positions: no libm decides about a bit.
-      const auto pose = turned_pose<FixedNumbers>(
-          {tick * 0.5625 - 6, 12 + tick * 0.03125, 15 - tick * 0.0625}, {1, 2, tick * 0.125, 3});
-      AlignedOutcome out =
-          rig.run(**set, kExactFarid, volume, pose, FixedNumbers::kStepOne, rate, carry);
-      hash.add(out.contact);
-      hash.add(out.modification);
-      hash.add(out.removed.density_steps);
-      volume.density = std::move(out.density);
-      carry = std::move(out.carry);
-    }
-    for (const Density rho : volume.density) hash.add(std::uint64_t{rho});
-    CAPTURE(std::string((*set)->name));
-    CHECK(hash.hex() == "a69d2e952cf7447e");
-  }
-}
-
 TEST_CASE("splatting far outside, or with too few lanes to carry, does nothing") {
   SplatRig rig(box_tool(3, 3, 3), 8);
   const TestVolume volume = filled({20, 20, 20}, 65535);
   const auto rate = removal_rate<FixedNumbers>(1.0, false);
   constexpr std::int32_t kFar = 0x7fffffff;
   const auto at = [](std::int32_t x, std::int32_t y, std::int32_t z) {
-    auto pose = pose_at<FixedNumbers>({0, 0, 0});
+    auto pose = pose_at({0, 0, 0});
     pose.centre_vox = {Q16::from_raw(x), Q16::from_raw(y), Q16::from_raw(z)};
     return pose;
   };
@@ -225,5 +194,118 @@ TEST_CASE("what the tallest box loses is counted in full") {
         (*set)->cut(box, {32768, 0}, grid, density.data(), {4, 4, 4}, scratch, carry.data());
     CAPTURE(std::string((*set)->name));
     CHECK(cut.density_steps == std::uint64_t{65535} * 21 * static_cast<std::uint64_t>(rows));
+  }
+}
+
+// Contact of the method `gather`: every instruction set against `contact_sum`, bit for bit.
+
+namespace {
+
+using Field = std::vector<Gradient<FixedNumbers>>;
+
+/// Gradients of any kind, up to the ends of what a kernel may store.
+Field hard_field(const VoxelGrid& grid, int kind, std::mt19937& random) {
+  Field field(grid.voxel_count() + kFieldPad);
+  const auto value = [&](std::int16_t end) -> std::int16_t {
+    switch (kind) {
+      case 0:
+        return end;
+      case 1:
+        return static_cast<std::int16_t>(-end);
+      case 2:
+        return (random() & 1) != 0 ? end : static_cast<std::int16_t>(-end);
+      case 3:
+        return static_cast<std::int16_t>(static_cast<std::int32_t>(random() % 65535) - 32767);
+      default:
+        return random() % 17 == 0 ? end : std::int16_t{0};
+    }
+  };
+  for (auto& g : field) g = {value(32767), value(25482), value(32767)};
+  return field;
+}
+
+/// Equal on every instruction set? Tells how many of the cases felt anything.
+int felt_alike(const VoxelGrid& grid, const Field& field, std::span<const ToolOffset> tool,
+               const SampleTable& samples, const ToolPose<FixedNumbers>& pose) {
+  const std::span<const Gradient<FixedNumbers>> voxels(field.data(), grid.voxel_count());
+  const auto truth = contact_sum<FixedNumbers>(grid, voxels, tool, pose);
+  for (auto set = kernel_sets(); *set != nullptr; ++set) {
+    const bool same = gathered_contact(**set, samples, grid, voxels, pose) == truth;
+    if (!same) {
+      INFO(std::string((*set)->name), ", ", tool.size(), " samples");
+      REQUIRE(same);
+    }
+  }
+  return truth == SumVec<FixedNumbers>{} ? 0 : 1;
+}
+
+}  // namespace
+
+TEST_CASE("gathering gives the bits of the plain loop for any tool in any pose") {
+  struct Named {
+    std::vector<ToolOffset> offsets;
+    double pitch;
+    int cases;  ///< per field: 10^5 in all
+  };
+  const std::array<Named, 6> tools{{{box_tool(1, 1, 1), 1, 10'000},
+                                    {box_tool(3, 5, 1), 1, 8'000},
+                                    {ragged_tool(5, 4, 6, 1), 0.7, 5'000},
+                                    {box_tool(4, 4, 4), 6.1, 1'500},
+                                    {paper_ball(8), 0.25, 450},
+                                    {box_tool(16, 16, 16), 1, 50}}};
+  std::mt19937 random(11);
+  const auto within = [&](double from, double to) {
+    return from + (to - from) * (static_cast<double>(random()) / 4294967296.0);
+  };
+  for (const Named& tool : tools) {
+    int felt = 0;
+    for (const VoxelGrid grid : {VoxelGrid{33, 20, 18}, {2, 2, 2}, {9, 40, 3}, {40, 5, 24}}) {
+      for (int kind = 0; kind < 5; kind += grid.nx == 33 ? 1 : 4) {
+        const Field field = hard_field(grid, kind, random);
+        const SampleTool samples(tool.offsets,
+                                 kind % 2 == 0 ? SampleOrder::as_given : SampleOrder::scattered);
+        for (int i = 0; i < cases(tool.cases / 2); ++i) {
+          const double out = i % 3 == 0 ? 6 : -1;  // across the border, or inside
+          auto pose = turned_pose(
+              {within(-out, grid.nx + out), within(-out, grid.ny + out),
+               within(-out, grid.nz + out)},
+              {within(-1, 1), within(-1, 1), within(-1, 1), i % 5 == 0 ? 0.0 : within(-1, 1)},
+              tool.pitch);
+          if (i % 4 == 1) pose.centre_vox.x = Q16::from_raw(pose.centre_vox.x.raw() | 0xffff);
+          if (i % 4 == 2) pose.centre_vox.y = Q16::from_raw(pose.centre_vox.y.raw() & ~0xffff);
+          felt += felt_alike(grid, field, tool.offsets, samples.table(), pose);
+        }
+      }
+    }
+    CHECK(felt > cases(tool.cases / 2));
+  }
+}
+
+TEST_CASE("a sum of more samples than 32 bits can hold is widened in time") {
+  const auto tool = box_tool(64, 64, 40);  // 163 840 samples, all at the largest gradient
+  const VoxelGrid grid{70, 70, 46};
+  std::mt19937 random(1);
+  const SampleTool samples(tool, SampleOrder::as_given);
+  for (const int kind : {0, 1}) {
+    const Field field = hard_field(grid, kind, random);
+    CHECK(felt_alike(grid, field, tool, samples.table(), pose_at({35.3, 34.9, 22.6})) == 1);
+  }
+}
+
+TEST_CASE("a volume without a single cell is not felt, and a place beyond all volumes neither") {
+  const auto tool = box_tool(2, 2, 2);
+  const SampleTool samples(tool, SampleOrder::as_given);
+  std::mt19937 random(1);
+  for (const VoxelGrid grid : {VoxelGrid{1, 5, 5}, {5, 1, 5}, {5, 5, 1}}) {
+    const Field field = hard_field(grid, 0, random);
+    CHECK(felt_alike(grid, field, tool, samples.table(), pose_at({0.5, 2, 2})) == 0);
+  }
+  const VoxelGrid grid{5, 5, 5};
+  const Field field = hard_field(grid, 0, random);
+  constexpr std::int32_t kFar = 0x7fffffff;
+  for (const auto& at : {std::array{kFar, 0, 0}, {0, -kFar - 1, 0}, {2 << 16, 2 << 16, kFar}}) {
+    auto pose = pose_at({0, 0, 0});
+    pose.centre_vox = {Q16::from_raw(at[0]), Q16::from_raw(at[1]), Q16::from_raw(at[2])};
+    CHECK(felt_alike(grid, field, tool, samples.table(), pose) == 0);
   }
 }

@@ -47,7 +47,7 @@ inline std::uint64_t total_density(const TestVolume& volume) {
   return total;
 }
 
-template <class N>
+template <class N = FixedNumbers>
 std::vector<Gradient<N>> gradients(GradientKernel kernel, const TestVolume& volume) {
   std::vector<Gradient<N>> field(volume.grid.voxel_count());
   GradientScratch scratch;
@@ -100,7 +100,7 @@ inline std::vector<ToolOffset> paper_ball(int size) {
   return offsets;
 }
 
-template <class N>
+template <class N = FixedNumbers>
 typename N::Step step_from(double voxels) {
   if constexpr (N::kIsFixed) {
     return static_cast<typename N::Step>(std::lround(voxels * N::kStepOne));
@@ -109,7 +109,7 @@ typename N::Step step_from(double voxels) {
   }
 }
 
-template <class N>
+template <class N = FixedNumbers>
 ToolPose<N> pose_at(std::array<double, 3> centre_vox, double pitch_vox = 1.0) {
   using Real = typename N::Real;
   ToolPose<N> pose;
@@ -119,7 +119,7 @@ ToolPose<N> pose_at(std::array<double, 3> centre_vox, double pitch_vox = 1.0) {
 }
 
 /// Turned by the quaternion (x, y, z, w), any length but zero.
-template <class N>
+template <class N = FixedNumbers>
 ToolPose<N> turned_pose(std::array<double, 3> centre_vox, std::array<double, 4> q,
                         double pitch_vox = 1.0) {
   ToolPose<N> pose = pose_at<N>(centre_vox);
@@ -146,7 +146,7 @@ std::array<double, 3> contact_gradient(const TestVolume& volume, std::span<const
 }
 
 /// A tool's cutting memory: overlap box, removal carry.
-template <class N>
+template <class N = FixedNumbers>
 struct Cutter {
   explicit Cutter(std::size_t width = 64)
       : memory(width * width * width), carry(removal_lanes(width)), overlap{memory, {}, 0} {}

@@ -17,6 +17,7 @@
 #include "tests/scene/support.hpp"
 
 using namespace kerf;
+using namespace kerf::test;
 
 namespace {
 
@@ -97,35 +98,17 @@ TEST_CASE("the paper's force comes with the paper's cut, unless another is writt
   CHECK(parse(kOverlap).force.model == ForceModel::proxy);
 }
 
-TEST_CASE("a key of another model of force or cutting is refused") {
-  CHECK(error_after("[force]\np0_n_per_mm2 = 0.1\n") ==
-        "x.toml:7: force.p0_n_per_mm2 = 0.1 is of the model paper; leave it out, or set model = "
-        "\"paper\"");
-  CHECK(error_after("[force]\nmodel = \"paper\"\nstiffness_n_per_mm = 0.1\n") ==
-        "x.toml:8: force.stiffness_n_per_mm = 0.1 is of the model proxy; leave it out, or set "
-        "model = \"proxy\"");
-  CHECK(error_after(kOverlap + "friction = 0.4\n") ==
-        "x.toml:8: cut.friction = 0.4 is of the model preston; leave it out, or set model = "
-        "\"preston\"");
-  CHECK(error_after("[cut]\nrate_per_s = 8\n") ==
-        "x.toml:7: cut.rate_per_s = 8 is of the model overlap; leave it out, or set model = "
-        "\"overlap\"");
-  CHECK(error_after(kOverlap + "[spindle]\nspeed_krpm = 100\n") ==
-        "x.toml:9: spindle.speed_krpm = 100 turns nothing: only cut.model = \"preston\" has a "
-        "spindle; leave it out");
-  CHECK(error_after(kOverlap + "[[material]]\nname = \"pulp\"\nforbidden = true\n") ==
-        "x.toml: material pulp is forbidden, and this cut.model cuts everything; set model = "
-        "\"preston\", or leave forbidden out");
-  CHECK(error_after("[spindle]\nspeed_krpm = -1\n")
-            .rfind("x.toml:7: spindle.speed_krpm = -1 is ", 0) == 0);
-}
-
-TEST_CASE("cutting by force without a proxy is refused") {
+TEST_CASE("what cutting by force needs and its scene lacks is refused") {
+  CHECK(error_after(kOverlap + "[spindle]\nspeed_krpm = 100\n")
+            .starts_with("x.toml:9: spindle.speed_krpm = 100 turns nothing: "));
+  CHECK(
+      error_after(kOverlap + "[[material]]\nname = \"pulp\"\nforbidden = true\n")
+          .starts_with("x.toml: material pulp is forbidden, and this cut.model cuts everything; "));
   LoadedScene scene = block_scene();
   scene.force.model = ForceModel::paper;
-  CHECK(test::error_of([&] { static_cast<void>(plan_scene(scene)); }) ==
-        "block.toml: cut.model = \"preston\" needs the normal force of a proxy; set force.model = "
-        "\"proxy\", or cut.model = \"overlap\"");
+  CHECK(test::error_of([&] {
+          static_cast<void>(plan_scene(scene));
+        }).starts_with("block.toml: cut.model = \"preston\" needs the normal force of a proxy; "));
 }
 
 TEST_CASE("the scene's identity holds what its model of cutting uses, and nothing else") {

@@ -14,27 +14,28 @@
 #include "tests/json.hpp"
 #include "tests/scene/support.hpp"
 
+using namespace kerf;
+using namespace kerf::test;
+
 namespace {
 
-using kerf::test::read_json;
-using kerf::test::ReadJson;
-using List = kerf::Json::List;
+using List = Json::List;
 
-kerf::LoadedScene small_scene() {
-  kerf::LoadedScene scene;
+LoadedScene small_scene() {
+  LoadedScene scene;
   scene.path = "/somewhere/scene.toml";
-  scene.materials = kerf::default_materials();
-  kerf::SceneVolume volume;
+  scene.materials = default_materials();
+  SceneVolume volume;
   volume.name = "block";
   volume.file = "block.nrrd";
   volume.image.grid = {4, 5, 6};
   volume.image.spacing_mm = {0.1, 0.2, 1.0 / 3};
-  volume.image.density = kerf::test::block({4, 5, 6}, {{1, 1, 1}, {3, 3, 3}}, 50000);
+  volume.image.density = block({4, 5, 6}, {{1, 1, 1}, {3, 3, 3}}, 50000);
   volume.iso = 30000;
   volume.pose.position_mm = {1, 2, 3};
   scene.volumes.push_back(volume);
-  scene.tools.push_back(kerf::make_tool("bur", "ball", {.size_vox = 4}));
-  scene.tools.push_back(kerf::make_tool("disc", "wheel", {.pitch_mm = 0.1, .radius_mm = 0.5}));
+  scene.tools.push_back(make_tool("bur", "ball", {.size_vox = 4}));
+  scene.tools.push_back(make_tool("disc", "wheel", {.pitch_mm = 0.1, .radius_mm = 0.5}));
   scene.active_tool = 1;
   scene.device.torque_scale = {0.342, 0.342, 0.342};
   return scene;
@@ -43,7 +44,7 @@ kerf::LoadedScene small_scene() {
 }  // namespace
 
 TEST_CASE("the scene's JSON holds what a reader of the segment needs") {
-  const ReadJson root = read_json(kerf::canonical_json(small_scene()));
+  const ReadJson root = read_json(canonical_json(small_scene()));
   const ReadJson volume = root["volumes"][0];
   CHECK(volume["name"] == "block");
   CHECK(volume["file"] == "block.nrrd");
@@ -54,7 +55,7 @@ TEST_CASE("the scene's JSON holds what a reader of the segment needs") {
   CHECK(volume["pose"]["position_mm"] == ReadJson(List{1.0, 2.0, 3.0}));
   CHECK(volume["pose"]["orientation"] == ReadJson(List{0.0, 0.0, 0.0, 1.0}));
 
-  const kerf::LoadedScene scene = small_scene();
+  const LoadedScene scene = small_scene();
   const ReadJson tool = root["tools"][0];
   CHECK(tool["round"] == true);
   CHECK(tool["turns"] == true);
@@ -77,28 +78,28 @@ TEST_CASE("the scene's JSON holds what a reader of the segment needs") {
 }
 
 TEST_CASE("the JSON is canonical: one line, sorted keys, and the same after a round trip") {
-  const std::string text = kerf::canonical_json(small_scene());
-  CHECK(text == kerf::canonical_json(small_scene()));
+  const std::string text = canonical_json(small_scene());
+  CHECK(text == canonical_json(small_scene()));
   CHECK(text.find('\n') == std::string::npos);
   CHECK(read_json(text).canonical() == text);
-  CHECK(std::ranges::is_sorted(read_json(text).members(), {}, &kerf::Json::Member::key));
+  CHECK(std::ranges::is_sorted(read_json(text).members(), {}, &Json::Member::key));
   CHECK(text.rfind("{\"active_tool\":1,\"cut\":{\"friction\":", 0) == 0);
 }
 
 TEST_CASE("a title is told, and changes nothing for the scenes without one") {
-  kerf::LoadedScene scene = small_scene();
-  CHECK_FALSE(read_json(kerf::canonical_json(scene)).contains("scene"));
+  LoadedScene scene = small_scene();
+  CHECK_FALSE(read_json(canonical_json(scene)).contains("scene"));
   scene.title = "a block";
-  CHECK(read_json(kerf::canonical_json(scene))["scene"]["title"] == "a block");
+  CHECK(read_json(canonical_json(scene))["scene"]["title"] == "a block");
 }
 
 TEST_CASE("where a scene lies does not change its identity, anything in it does") {
-  const std::string text = kerf::canonical_json(small_scene());
-  kerf::LoadedScene moved = small_scene();
+  const std::string text = canonical_json(small_scene());
+  LoadedScene moved = small_scene();
   moved.path = "/elsewhere/scene.toml";
-  CHECK(kerf::canonical_json(moved) == text);
+  CHECK(canonical_json(moved) == text);
 
-  const std::vector<std::function<void(kerf::LoadedScene&)>> changes = {
+  const std::vector<std::function<void(LoadedScene&)>> changes = {
       [](auto& s) { ++s.volumes[0].image.density[7]; },
       [](auto& s) { s.volumes[0].image.density[7] = 256; },
       [](auto& s) { s.volumes[0].image.labels.assign(120, 1); },
@@ -112,27 +113,27 @@ TEST_CASE("where a scene lies does not change its identity, anything in it does"
       [](auto& s) { s.device.torque_scale.reset(); },
       [](auto& s) { s.device.dock_rad[1] = 0.2; },
       [](auto& s) { s.force.stiffness_n_per_mm = 0.3; },
-      [](auto& s) { s.cut.model = kerf::CutModel::none; },
+      [](auto& s) { s.cut.model = CutModel::none; },
       [](auto& s) { s.limits.slew_n_per_ms = 0.4; },
       [](auto& s) { s.servo.rate_hz = 2000; },
-      [](auto& s) { s.servo.numeric = kerf::NumericKind::float64; },
+      [](auto& s) { s.servo.numeric = NumericKind::float64; },
   };
   for (std::size_t i = 0; i < changes.size(); ++i) {
     CAPTURE(i);
-    kerf::LoadedScene changed = small_scene();
+    LoadedScene changed = small_scene();
     changes[i](changed);
-    CHECK(kerf::canonical_json(changed) != text);
+    CHECK(canonical_json(changed) != text);
   }
 }
 
 TEST_CASE("the hash is FNV-1a") {
-  CHECK(kerf::fnv1a("") == 0xcbf29ce484222325);
-  CHECK(kerf::fnv1a("a") == 0xaf63dc4c8601ec8c);
-  CHECK(kerf::fnv1a("foobar") == 0x85944171f73967e8);
+  CHECK(fnv1a("") == 0xcbf29ce484222325);
+  CHECK(fnv1a("a") == 0xaf63dc4c8601ec8c);
+  CHECK(fnv1a("foobar") == 0x85944171f73967e8);
 }
 
 TEST_CASE("a path that is not UTF-8 does not break the JSON") {
-  kerf::LoadedScene scene = small_scene();
+  LoadedScene scene = small_scene();
   scene.volumes[0].file = "caf\xe9.nrrd";
-  CHECK(read_json(kerf::canonical_json(scene))["volumes"][0]["file"] == "caf\uFFFD.nrrd");
+  CHECK(read_json(canonical_json(scene))["volumes"][0]["file"] == "caf\uFFFD.nrrd");
 }

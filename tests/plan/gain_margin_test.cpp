@@ -13,15 +13,17 @@
 #include "controller/stability/gain_limits.hpp"
 #include "controller/stability/sampled_loop.hpp"
 #include "tests/servo/support.hpp"
+#include "tests/support/errors.hpp"
 
 using namespace kerf;
+using namespace kerf::test;
 
 namespace {
 
 LoadedScene scene_of(double stiffness, double damping, int rate_hz) {
-  LoadedScene scene = test::half_space_scene(8);
+  LoadedScene scene = half_space_scene(8);
   scene.path = "mine.toml";
-  scene.tools.push_back(test::ball(8));
+  scene.tools.push_back(ball(8));
   scene.force.stiffness_n_per_mm = stiffness;
   scene.force.damping_ns_per_mm = damping;
   scene.servo.rate_hz = rate_hz;
@@ -105,25 +107,25 @@ TEST_CASE("the default coupling has the margin of the reference: 2.1, 4.1 with f
   CHECK(margin.margin() == doctest::Approx(2.07).epsilon(0.01));
   CHECK(margin.with_friction() == doctest::Approx(4.1).epsilon(0.1));
   const std::string lines = gain_lines(scene, margin);
-  CHECK(lines.find("stability_margin=2.07\n") != std::string::npos);
+  CHECK(has(lines, "stability_margin=2.07\n"));
   CHECK(lines.find("note=") == std::string::npos);
-  CHECK(lines.find("omni at 1000 Hz: 0.045 kg") != std::string::npos);
+  CHECK(has(lines, "omni at 1000 Hz: 0.045 kg"));
 }
 
 TEST_CASE("at 250 Hz the default coupling is warned of, and what the warning says helps") {
   LoadedScene scene = scene_of(0.4, 0.002, 250);
   const std::string warning = gain_warning(scene, linear(scene));
   CHECK(is_line(warning));
-  CHECK(warning.find("margin of 1.14") != std::string::npos);
-  CHECK(warning.find("use at most 0.304 in force.stiffness_n_per_mm") != std::string::npos);
+  CHECK(has(warning, "margin of 1.14"));
+  CHECK(has(warning, "use at most 0.304 in force.stiffness_n_per_mm"));
   CHECK(gain_error(scene, linear(scene)) == "");
   scene.force.stiffness_n_per_mm = 0.304;
   CHECK(gain_warning(scene, linear(scene)) == "");
 }
 
 TEST_CASE("on every device and at every rate, what a warning tells to use is not warned of again") {
-  for (const kerf::Personality personality :
-       {kerf::Personality::omni, kerf::Personality::falcon, kerf::Personality::woodenhaptics}) {
+  for (const Personality personality :
+       {Personality::omni, Personality::falcon, Personality::woodenhaptics}) {
     for (const int rate_hz : {250, 500, 1000, 2000, 4000, 8000}) {
       CAPTURE(static_cast<int>(personality));
       CAPTURE(rate_hz);
@@ -148,8 +150,8 @@ TEST_CASE("an unstable coupling is refused unless it is asked for") {
   const std::string refusal = gain_error(scene, linear(scene));
   CHECK(is_line(refusal));
   CHECK(refusal.find("mine.toml: force.stiffness_n_per_mm = 0.9") == 0);
-  CHECK(refusal.find("use at most 0.55") != std::string::npos);
-  CHECK(refusal.find("force.unchecked_gain = true") != std::string::npos);
+  CHECK(has(refusal, "use at most 0.55"));
+  CHECK(has(refusal, "force.unchecked_gain = true"));
   scene.force.unchecked_gain = true;
   CHECK(gain_error(scene, linear(scene)) == "");
   CHECK(gain_warning(scene, linear(scene)).find("it is unstable") != std::string::npos);
@@ -167,8 +169,7 @@ TEST_CASE("a damping that no stiffness bears is named with its own bound") {
   CHECK(linear(scene).highest_n_per_mm == 0);
   const std::string refusal = gain_error(scene, linear(scene));
   CHECK(is_line(refusal));
-  CHECK(refusal.find("margin 0.00; use at most 0.0161 in force.damping_ns_per_mm") !=
-        std::string::npos);
+  CHECK(has(refusal, "margin 0.00; use at most 0.0161 in force.damping_ns_per_mm"));
 }
 
 TEST_CASE("a real device takes no more than is known of it, each its own") {
@@ -182,8 +183,7 @@ TEST_CASE("a real device takes no more than is known of it, each its own") {
   scene.device.personality = Personality::omni;
   CHECK(device_limit_error(scene) == "");
   scene.force.damping_ns_per_mm = 0.006;
-  CHECK(device_limit_error(scene).find("force.damping_ns_per_mm = 0.006 is above 0.005") !=
-        std::string::npos);
+  CHECK(has(device_limit_error(scene), "force.damping_ns_per_mm = 0.006 is above 0.005"));
   scene.force.unchecked_gain = true;  // a scene alone does not lift it
   CHECK(device_limit_error(scene) != "");
   scene.force.model = ForceModel::paper;  // has no coupling
@@ -203,7 +203,7 @@ TEST_CASE("the paper's force is judged with friction, which alone holds it, and 
   CHECK(margin.with_friction() < 1);
   CHECK(gain_error(scene, margin) == "");
   CHECK(is_line(gain_warning(scene, margin)));
-  CHECK(gain_warning(scene, margin).find("lower force.p0_n_per_mm2 to ") != std::string::npos);
+  CHECK(has(gain_warning(scene, margin), "lower force.p0_n_per_mm2 to "));
   scene.force.p0_n_per_mm2 = 0;  // nothing is felt
   CHECK(gain_warning(scene, linear(scene)) == "");
 }
@@ -248,12 +248,10 @@ TEST_CASE("a force law has the margin of its worst slope, up to the largest forc
   const std::string refusal = gain_error(hard, margin);
   CHECK(is_line(refusal));
   CHECK(refusal.find("mine.toml: force.law hardening at a spring of ") == 0);
-  CHECK(refusal.find("let it rise by at most 0.55 N/mm") != std::string::npos);
+  CHECK(has(refusal, "let it rise by at most 0.55 N/mm"));
   CHECK(is_line(device_limit_error(hard)));
-  CHECK(device_limit_error(hard).find("force.law hardening: its steepest stiffness_n_per_mm = ") !=
-        std::string::npos);
-  CHECK(gain_lines(hard, margin).find("steepest=force.law hardening at a spring of ") !=
-        std::string::npos);
+  CHECK(has(device_limit_error(hard), "force.law hardening: its steepest stiffness_n_per_mm = "));
+  CHECK(has(gain_lines(hard, margin), "steepest=force.law hardening at a spring of "));
   CHECK(device_limit_error(with_law(0.4, 0, 0.002)) == "");
   CHECK(gain_error(with_law(0.4, 0, 0.03), linear(with_law(0.4, 0, 0.03)))
             .find("let it damp by at most 0.0161 N s/mm") != std::string::npos);

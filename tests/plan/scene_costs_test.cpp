@@ -20,6 +20,7 @@
 #include "controller/plan/worst_tick.hpp"
 #include "controller/scene/scene_file.hpp"
 #include "tests/plan/costs_support.hpp"
+#include "tests/support/errors.hpp"
 
 using namespace kerf;
 using namespace kerf::test;
@@ -349,14 +350,14 @@ TEST_CASE("a scene above the budget is refused on one line, and fits at a lower 
   scene.servo.rate_hz = 8000;
   const std::string line = budget_error(scene, plan_scene(scene)->costs());
   CHECK(line.find("scenes/x.toml: tool stub: up to ") == 0);
-  CHECK(line.find(" by the method splat/") != std::string::npos);
+  CHECK(has(line, " by the method splat/"));
   CHECK(line.find(" us of work a tick, most of it press (") != std::string::npos);
   const double stub_us = work_us(plan_scene(scene)->costs(), 1);
   const int highest_hz = highest_rate_hz(stub_us);
-  CHECK(line.find(", above the 62.5 us that are half a tick at 8000 Hz; use --rate " +
-                  std::to_string(highest_hz) +
-                  " or lower, a smaller tool, or a round or unturned tool on the volume's "
-                  "lattice") != std::string::npos);
+  CHECK(has(line, ", above the 62.5 us that are half a tick at 8000 Hz; use --rate " +
+                      std::to_string(highest_hz) +
+                      " or lower, a smaller tool, or a round or unturned tool on the volume's "
+                      "lattice"));
   CHECK(line.find('\n') == std::string::npos);
   scene.servo.rate_hz = highest_hz;
   CHECK(budget_error(scene, plan_scene(scene)->costs()).empty());
@@ -368,7 +369,7 @@ TEST_CASE("a scene above the budget is refused on one line, and fits at a lower 
   scene.tools.back().name = "stump";
   const std::string two = budget_error(scene, plan_scene(scene)->costs());
   CHECK(two.find("scenes/x.toml: tool stump: ") == 0);
-  CHECK(two.find(" a smaller tool (too dear as well: stub), or a round") != std::string::npos);
+  CHECK(has(two, " a smaller tool (too dear as well: stub), or a round"));
   scene.tools.pop_back();
   scene.tools.pop_back();
   CHECK(budget_error(scene, plan_scene(scene)->costs()).empty());
@@ -381,8 +382,8 @@ TEST_CASE("a scene above the budget is refused on one line, and fits at a lower 
   scene.volumes.back().name = "other";
   const SceneCosts both = plan_scene(scene)->costs();
   const std::string why = budget_error(scene, both);
-  CHECK(why.find(" in test ") != std::string::npos);
-  CHECK(why.find(", in other ") != std::string::npos);
+  CHECK(has(why, " in test "));
+  CHECK(has(why, ", in other "));
   CHECK(work_us(both, 1) == doctest::Approx(2 * alone_us));
   scene.volumes.pop_back();
   scene.tools.pop_back();

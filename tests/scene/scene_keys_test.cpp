@@ -26,8 +26,7 @@
 #include "tests/scene/support.hpp"
 
 using namespace kerf;
-using test::scene_for;
-using test::SceneLines;
+using namespace kerf::test;
 
 namespace {
 
@@ -181,8 +180,8 @@ void must_answer(const std::string& error, const SceneLines& lines, const SceneK
   CHECK(error.rfind("x.toml:" + std::to_string(lines.line_of(key.name)) + ": " +
                         std::string(key.name) + " = ",
                     0) == 0);
-  CHECK(error.find(says) != std::string::npos);
-  CHECK(error.find("; ") != std::string::npos);
+  CHECK(has(error, says));
+  CHECK(has(error, "; "));
   CHECK(error.find('\n') == std::string::npos);
 }
 
@@ -296,8 +295,8 @@ TEST_CASE("every row: a key with any one letter wrong is answered with the key")
       CAPTURE(error);
       CHECK(error.rfind("x.toml:" + std::to_string(lines.line_of(slip)) + ":", 0) == 0);
       const std::string unit = key.unit.empty() ? "" : " (in " + std::string(key.unit) + ")";
-      CHECK(error.find(slip + " is not a known key; did you mean " + std::string(key.name) + unit +
-                       "?") != std::string::npos);
+      CHECK(has(error,
+                slip + " is not a known key; did you mean " + std::string(key.name) + unit + "?"));
     }
   }
 }
@@ -312,12 +311,12 @@ TEST_CASE("every row: a key in another table is told where it belongs") {
       const std::string error =
           error_of(scene_for(key).set("material.name", "\"wax\"").set(misplaced, "1").text());
       CAPTURE(error);
-      CHECK(error.find(misplaced + " is not a known key; did you mean ") != std::string::npos);
-      CHECK(error.find(key.name) != std::string::npos);
+      CHECK(has(error, misplaced + " is not a known key; did you mean "));
+      CHECK(has(error, std::string(key.name)));
     }
     const std::string bare = error_of(name + " = 1\n" + scene_for(key).text());
     CHECK(bare.find("x.toml:1:1: " + name + " is not a known key; did you mean ") == 0);
-    CHECK(bare.find(key.name) != std::string::npos);
+    CHECK(has(bare, std::string(key.name)));
   }
 }
 
@@ -333,7 +332,7 @@ TEST_CASE("every row: a key that stands twice is one line with line and column")
     const std::string error = error_of(doubled);
     CAPTURE(error);
     CHECK(error.rfind("x.toml:" + std::to_string(lines.line_of(key.name) + 1) + ":", 0) == 0);
-    CHECK(error.find("; leave one of the two out") != std::string::npos);
+    CHECK(has(error, "; leave one of the two out"));
     CHECK(error.find('\n') == std::string::npos);
   }
 }
@@ -357,14 +356,13 @@ TEST_CASE("the settings in effect: of the models that the scene has, in the tabl
   CHECK(text.rfind("volume.name=\"phantom\"\nvolume.file=\"phantom\"\nvolume.shape="
                    "\"molar\"\nvolume.iso=\"otsu\"\n",
                    0) == 0);
-  CHECK(text.find("\nforce.model=\"paper\"\nforce.p0_n_per_mm2=0.06\ncut.model=\"overlap\"\n") !=
-        std::string::npos);
+  CHECK(has(text, "\nforce.model=\"paper\"\nforce.p0_n_per_mm2=0.06\ncut.model=\"overlap\"\n"));
   CHECK(text.find("stiffness_n_per_mm") == std::string::npos);
   CHECK(text.find("spindle.") == std::string::npos);
 }
 
 TEST_CASE("a quoted name with a dot is no key") {
-  CHECK(error_of("\"force.friction\" = 0.5\n").find("is not a known key") != std::string::npos);
+  CHECK(has(error_of("\"force.friction\" = 0.5\n"), "is not a known key"));
   CHECK(error_of("[[volume]]\nfile = \"a\"\n\"pose.position_mm\" = [1, 2, 3]\n")
             .find("is not a known key") != std::string::npos);
 }
@@ -400,8 +398,7 @@ TEST_CASE("docs/scene-keys.md is what the table says") {
   const LawRow* own = std::exchange(first_own_law, nullptr);
   CHECK((page == scene_keys_page()));
   first_own_law = own;
-  CHECK(scene_keys_page().find("`law = { name = \"nothing\" }`: gives no force.\n") !=
-        std::string::npos);
+  CHECK(has(scene_keys_page(), "`law = { name = \"nothing\" }`: gives no force.\n"));
   const VoxelGrid grid = PhantomSpec{}.grid;
   const double sides[] = {double(grid.nx), double(grid.ny), double(grid.nz)};
   const auto size = std::ranges::find(scene_keys(), "volume.size", &SceneKey::name);
@@ -423,21 +420,22 @@ TEST_CASE("a new row alone brings a key: it is read, checked, told, printed and 
       std::string::npos);
   const Scene scene = parse_scene(lines.text(keys), "x.toml", keys);
   CHECK(grip_n == 2.5);
-  CHECK(settings_text(scene, keys).find("\nlimits.grip_n=2.5\n") != std::string::npos);
+  CHECK(has(settings_text(scene, keys), "\nlimits.grip_n=2.5\n"));
   LoadedScene loaded;
-  CHECK(canonical_json(loaded, keys).find("\"grip_n\":2.5,") != std::string::npos);
-  CHECK(scene_keys_page(keys).find("| `grip_n` | N | 0.5 to 9 | 2.5 | how hard the hand holds; "
-                                   "only with force.model = \"proxy\" |\n") != std::string::npos);
+  CHECK(has(canonical_json(loaded, keys), "\"grip_n\":2.5,"));
+  CHECK(has(scene_keys_page(keys),
+            "| `grip_n` | N | 0.5 to 9 | 2.5 | how hard the hand holds; "
+            "only with force.model = \"proxy\" |\n"));
 
   const auto answer = [&](const std::string& key, const std::string& value) {
     return error_of(scene_for(keys.back()).set(key, value).text(keys), keys);
   };
-  CHECK(answer("limits.grip_n", "10").find("limits.grip_n = 10 is out of range; use 0.5 to 9") !=
-        std::string::npos);
-  CHECK(answer("limits.grip", "1").find("did you mean limits.grip_n (in N)?") != std::string::npos);
-  CHECK(answer("cut.grip_n", "1").find("did you mean limits.grip_n (in N)?") != std::string::npos);
+  CHECK(has(answer("limits.grip_n", "10"), "limits.grip_n = 10 is out of range; use 0.5 to 9"));
+  CHECK(has(answer("limits.grip", "1"), "did you mean limits.grip_n (in N)?"));
+  CHECK(has(answer("cut.grip_n", "1"), "did you mean limits.grip_n (in N)?"));
   const std::string paper =
       error_of(scene_for(keys.back(), false).set("limits.grip_n", "1").text(keys), keys);
-  CHECK(paper.find("limits.grip_n = 1 is of the model proxy; leave it out, or set model = "
-                   "\"proxy\"") != std::string::npos);
+  CHECK(has(paper,
+            "limits.grip_n = 1 is of the model proxy; leave it out, or set model = "
+            "\"proxy\""));
 }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Phantoms whose tissue is known: what is proposed must find it.
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <random>
@@ -8,10 +9,13 @@
 #include <doctest/doctest.h>
 
 #include "controller/input/load_error.hpp"
+#include "controller/volume/connected_parts.hpp"
 #include "controller/volume/volume_proposal.hpp"
+#include "tests/support/voxels.hpp"
 #include "tests/volume/volume_files.hpp"
 
 using namespace kerf;
+using namespace kerf::test;
 
 namespace {
 
@@ -28,17 +32,13 @@ std::vector<float> scanned(const Tissue& tissue, double noise) {
   std::mt19937 random(3);
   std::normal_distribution<double> normal(0, 1);
   std::vector<float> values;
-  for (std::int32_t z = 0; z < kEdge; ++z) {
-    for (std::int32_t y = 0; y < kEdge; ++y) {
-      for (std::int32_t x = 0; x < kEdge; ++x) {
-        double sum = 0;
-        for (int k = 0; k < 8; ++k) {
-          sum += tissue(x - 31.75 + 0.5 * (k & 1), y - 31.75 + 0.5 * (k >> 1 & 1),
-                        z - 31.75 + 0.5 * (k >> 2));
-        }
-        values.push_back(static_cast<float>(sum / 8 + noise * normal(random)));
-      }
+  for (const auto& [x, y, z] : voxels(VoxelBox{{0, 0, 0}, {kEdge, kEdge, kEdge}})) {
+    double sum = 0;
+    for (int k = 0; k < 8; ++k) {
+      sum += tissue(x - 31.75 + 0.5 * (k & 1), y - 31.75 + 0.5 * (k >> 1 & 1),
+                    z - 31.75 + 0.5 * (k >> 2));
     }
+    values.push_back(static_cast<float>(sum / 8 + noise * normal(random)));
   }
   return values;
 }
@@ -147,7 +147,7 @@ TEST_CASE("a wish goes before what is proposed, and one that cannot be is refuse
     try {
       static_cast<void>(propose(values, wishes));
     } catch (const LoadError& error) {
-      CHECK(test::is_one_line(error.what()));
+      CHECK(is_one_line(error.what()));
       return true;
     }
     return false;
@@ -202,4 +202,72 @@ TEST_CASE("a voxel size that makes no sense is told") {
   CHECK(odd_spacing(frame, {{0, 0, 0}, {88, 78, 16}}, true).empty());
   frame.spacing_mm = {0.1, 0.1, 50};
   CHECK_FALSE(odd_spacing(frame, {{0, 0, 0}, {88, 78, 16}}, true).empty());
+}
+
+namespace {
+
+/// Sizes of the parts by walking from voxel to voxel: the obvious way.
+std::vector<std::uint64_t> walked(const VoxelGrid& grid, std::vector<Density> density) {
+  std::vector<std::uint64_t> sizes;
+  for (const auto& [x, y, z] : voxels(grid)) {
+    std::vector<VoxelIndex> open{{x, y, z}};
+    std::uint64_t size = 0;
+    while (!open.empty()) {
+      const VoxelIndex v = open.back();
+      open.pop_back();
+      if (!grid.contains(v) || density[grid.index(v.x, v.y, v.z)] == 0) continue;
+      density[grid.index(v.x, v.y, v.z)] = 0;
+      ++size;
+      for (const VoxelIndex& d :
+           {VoxelIndex{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}}) {
+        open.push_back({v.x + d.x, v.y + d.y, v.z + d.z});
+      }
+    }
+    if (size > 0) sizes.push_back(size);
+  }
+  std::ranges::sort(sizes, std::greater<>());
+  return sizes;
+}
+
+}  // namespace
+
+TEST_CASE("parts by runs are those of a walk from voxel to voxel") {
+  std::mt19937 random(7);
+  for (const int percent : {1, 20, 31, 50, 90, 100}) {
+    const VoxelGrid grid{17, 9, 11};
+    std::vector<Density> density(grid.voxel_count());
+    for (Density& d : density) d = random() % 100 < static_cast<unsigned>(percent) ? 1 : 0;
+    const SolidParts parts(grid, density, 1);
+    std::vector<std::uint64_t> sizes;
+    for (const SolidPart& part : parts.parts()) sizes.push_back(part.voxels);
+    CAPTURE(percent);
+    CHECK(sizes == walked(grid, density));
+    std::uint64_t in_runs = 0;
+    for (const SolidRun& run : parts.runs()) {
+      in_runs += static_cast<std::uint64_t>(run.x1 - run.x0);
+      const VoxelBox& box = parts.parts()[run.part].box;
+      CHECK(box.contains({run.x0, run.y, run.z}));
+      CHECK(box.contains({run.x1 - 1, run.y, run.z}));
+    }
+    CHECK(in_runs == static_cast<std::uint64_t>(std::ranges::count(density, 1)));
+  }
+  CHECK(SolidParts({4, 4, 4}, std::vector<Density>(64), 1).parts().empty());
+}
+
+TEST_CASE("a body's mask holds the body and not the couch that touches it") {
+  VolumeImage image = air({96, 96, 96});
+  const auto fill = [&](std::int32_t x, std::int32_t y, std::int32_t z) {
+    image.density[image.grid.index(x, y, z)] = 1000;
+  };
+  for (const auto& [x, y, z] : voxels(VoxelBox{{0, 0, 0}, {96, 96, 96}})) {
+    const bool body = (x - 48) * (x - 48) + (y - 40) * (y - 40) <= 30 * 30;
+    const bool couch = y >= 70 && y < 72;
+    if (body || couch) fill(x, y, z);
+  }
+  const BodyMask mask(image, 500);
+  CHECK(mask.contains(48, 40, 48));
+  CHECK(mask.contains(48, 10, 0));  // its skin
+  CHECK(mask.contains(18, 40, 95));
+  CHECK_FALSE(mask.contains(5, 70, 48));
+  CHECK_FALSE(mask.contains(90, 71, 48));
 }

@@ -52,14 +52,6 @@ TEST_CASE("the 16-bit CT tooth: big-endian, detached, and Otsu parts dentin from
   CHECK(part.grid == VoxelGrid{89 + 6, 78 + 6, 156 + 6});
 }
 
-TEST_CASE("the same tooth takes a spacing from the options") {
-  const auto path = data("ge_tooth_16bit/tooth.nhdr");
-  if (!path) return;
-  ReadOptions options;
-  options.spacing_mm = {0.125, 0.125, 0.125};
-  CHECK(read_volume(*path, options).spacing_mm == *options.spacing_mm);
-}
-
 TEST_CASE("the 8-bit CT tooth: MetaImage") {
   const auto path = data("ge_tooth_8bit/tooth.mhd");
   if (!path) return;
@@ -107,10 +99,4 @@ TEST_CASE("the noise of the real scans, and the passes that it takes") {
     CHECK(passes_for(noise) == scan.passes);
     CHECK_FALSE(is_label_map(image.grid, image.density));
   }
-}
-
-TEST_CASE("the tar of slices of the hand is refused with the kinds that are read") {
-  const auto path = data("ct_hand/hand_lowres.tar");
-  if (!path) return;
-  CHECK(kerf::test::refusal(*path).find("not a kind of volume") != std::string::npos);
 }

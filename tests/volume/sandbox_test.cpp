@@ -57,7 +57,7 @@ std::string answer(const Reader& read, const SandboxJob& to_do = job()) {
 void check_ends(const Reader& read, const std::string& how) {
   const std::string message = answer(read);
   CAPTURE(message);
-  CHECK(message.find(how) != std::string::npos);
+  CHECK(has(message, how));
   CHECK(is_one_line(message));
 }
 
@@ -165,7 +165,7 @@ TEST_CASE("a signal that a terminal sends to all does not end a reader") {
 }
 
 TEST_CASE("a reader can write no file, reach nobody, start nothing and signal no other") {
-  const TempFolder folder;
+  const TemporaryFolder folder;
   const std::string file = folder.write("there", "as it was").string();
   const std::string other = (folder / "new").string();
   const pid_t parent = ::getpid();
@@ -207,7 +207,7 @@ TEST_CASE("a reader can write no file, reach nobody, start nothing and signal no
   });
   denied([&] { return ::ftruncate(kSandboxMemory, 1 << 30); });
   denied([&] { return ::write(kSandboxMemory, "x", 1); });
-  CHECK(read_bytes(file) == "as it was");
+  CHECK(text_of(file) == "as it was");
   CHECK_FALSE(std::filesystem::exists(other));
   // What it is for.
   CHECK(error_of_call([&] { return ::open(file.c_str(), O_RDONLY); }) == 0);

@@ -74,7 +74,7 @@ std::string slice(int z, std::endian order = std::endian::little) {
 }
 
 /// Five files whose numbers have no leading zeros: 8 .. 12.
-void write_stack(const TempFolder& folder, const std::string& end,
+void write_stack(const TemporaryFolder& folder, const std::string& end,
                  const std::function<std::string(int)>& bytes) {
   for (int z = 0; z < 5; ++z) folder.write("slice" + std::to_string(8 + z) + end, bytes(z));
 }
@@ -84,7 +84,7 @@ const ReadOptions kSpaced{.spacing_mm = std::array<double, 3>{0.5, 0.5, 2}};
 }  // namespace
 
 TEST_CASE("a folder of grey pictures is a volume, in the order of the numbers in their names") {
-  const TempFolder folder;
+  const TemporaryFolder folder;
   SUBCASE("PNG of 8 bits") {
     write_stack(folder, ".png", [](int z) { return png(3, 4, 8, kGrey, slice<std::uint8_t>(z)); });
   }
@@ -104,7 +104,7 @@ TEST_CASE("a folder of grey pictures is a volume, in the order of the numbers in
 }
 
 TEST_CASE("a TIFF of several pages is a volume") {
-  const TempFolder folder;
+  const TemporaryFolder folder;
   std::vector<std::string> pages;
   for (int z = 0; z < 5; ++z) pages.push_back(slice<std::uint8_t>(z));
   const SourceVolume v = read_volume(folder.write("a.tiff", tiff(3, 4, 8, pages)), kSpaced);
@@ -113,7 +113,7 @@ TEST_CASE("a TIFF of several pages is a volume") {
 }
 
 TEST_CASE("a TIFF that is cut off is refused, wherever it is") {
-  const TempFolder folder;
+  const TemporaryFolder folder;
   std::vector<std::string> pages;
   for (int z = 0; z < 5; ++z) pages.push_back(slice<std::uint8_t>(z));
   const std::string whole = tiff(3, 4, 8, pages);
@@ -129,7 +129,7 @@ TEST_CASE("a TIFF that is cut off is refused, wherever it is") {
 }
 
 TEST_CASE("values of 16 bits come whole from the largest and the smallest") {
-  const TempFolder folder;
+  const TemporaryFolder folder;
   for (int z = 0; z < 2; ++z) {
     folder.write(
         "s" + std::to_string(z) + ".png",
@@ -141,49 +141,54 @@ TEST_CASE("values of 16 bits come whole from the largest and the smallest") {
 }
 
 TEST_CASE("pictures that are no stack are refused in one line") {
-  const TempFolder folder;
-  const auto refused = [&](const std::string& what) {
+  const auto grey = [](int z) { return png(3, 4, 8, kGrey, slice<std::uint8_t>(z)); };
+  const auto refused = [](const std::string& end, const std::function<std::string(int)>& bytes,
+                          const std::string& what) {
+    const TemporaryFolder folder;
+    write_stack(folder, end, bytes);
     const std::string message = refusal(folder.path(), kSpaced);
     CAPTURE(message);
     CHECK(is_one_line(message));
-    CHECK(message.find(what) != std::string::npos);
+    CHECK(has(message, what));
   };
-  const auto grey = [](int z) { return png(3, 4, 8, kGrey, slice<std::uint8_t>(z)); };
-  SUBCASE("colour and transparency") {
-    write_stack(folder, ".png",
-                [](int) { return png(3, 4, 8, kRgba, std::string(std::size_t{4} * 12, 'x')); });
-    refused("slice8.png: 4 values per voxel");
-  }
-  SUBCASE("mixed sizes") {
-    write_stack(folder, ".png", [&](int z) {
-      return z == 3 ? png(4, 3, 8, kGrey, slice<std::uint8_t>(z)) : grey(z);
-    });
-    refused("slice11.png: 4 x 3 pixels, and slice8.png has 3 x 4");
-  }
-  SUBCASE("one picture") {
-    folder.write("a.png", grey(0));
-    refused("one picture");
-  }
-  SUBCASE("a picture is cut off") {
-    write_stack(folder, ".png", [&](int z) { return z == 2 ? grey(z).substr(0, 50) : grey(z); });
-    refused("slice10.png");
-  }
-  SUBCASE("a picture is none") {
-    write_stack(folder, ".png", [&](int z) { return z == 2 ? "no picture" : grey(z); });
-    refused("slice10.png");
-  }
-  SUBCASE("a page too many") {
-    write_stack(folder, ".tif", [](int z) {
-      return tiff(3, 4, 8, {slice<std::uint8_t>(z), slice<std::uint8_t>(z)});
-    });
-    refused("slice8.tif");
-  }
+  refused(
+      ".png", [](int) { return png(3, 4, 8, kRgba, std::string(std::size_t{4} * 12, 'x')); },
+      "slice8.png: 4 values per voxel");
+  refused(
+      ".png", [&](int z) { return z == 3 ? png(4, 3, 8, kGrey, slice<std::uint8_t>(z)) : grey(z); },
+      "slice11.png: 4 x 3 pixels, and slice8.png has 3 x 4");
+  refused(
+      ".png", [&](int z) { return z == 2 ? grey(z).substr(0, 50) : grey(z); }, "slice10.png");
+  refused(
+      ".png", [&](int z) { return z == 2 ? "no picture" : grey(z); }, "slice10.png");
+  refused(
+      ".tif",
+      [](int z) {
+        return tiff(3, 4, 8, {slice<std::uint8_t>(z), slice<std::uint8_t>(z)});
+      },
+      "slice8.tif");
+  refused(
+      ".png",
+      [&](int z) {
+        return z == 3 ? png(3, 4, 16, kGrey, slice<std::uint16_t>(z, std::endian::big)) : grey(z);
+      },
+      "slice11.png: values of uint16, and slice8");
+  refused(
+      ".tif",
+      [](int z) {
+        return z == 3 ? tiff(3, 4, 16, {slice<std::uint16_t>(z)})
+                      : tiff(3, 4, 8, {slice<std::uint8_t>(z)});
+      },
+      "slice11.tif: values of uint16, and slice8");
+  const TemporaryFolder folder;
+  folder.write("a.png", grey(0));
+  CHECK(has(refusal(folder.path(), kSpaced), "one picture"));
 }
 
 TEST_CASE("a stack that is not whole, or not one, is refused by the slice") {
   const auto grey = [](int z) { return png(3, 4, 8, kGrey, slice<std::uint8_t>(z % 5)); };
   const auto refused = [&](const std::vector<std::string>& names) {
-    const TempFolder folder;
+    const TemporaryFolder folder;
     int z = 0;
     for (const std::string& name : names) {
       folder.write(name,
@@ -203,47 +208,23 @@ TEST_CASE("a stack that is not whole, or not one, is refused by the slice") {
   CHECK(refused({"s1.png", "s2.png", "s4.png", "s6.png", "s8.png"})
             .starts_with("s2.png: follows s1.png, where steps of 2 are usual;"));
   CHECK(refused({"s0.png", "s5.png", "s10.png", "s15.png"}) == whole);
-  CHECK(refused({"s0.png", "s5.png", "s15.png", "s20.png"}).find("s10.png is missing") !=
-        std::string::npos);
-  CHECK(refused({"s1.png", "s01.png", "s2.png", "s3.png"}).find("has the same number as s") !=
-        std::string::npos);
-  CHECK(refused({"s1.png", "s1.PNG"}).find("has the same number as s1.") != std::string::npos);
+  CHECK(has(refused({"s0.png", "s5.png", "s15.png", "s20.png"}), "s10.png is missing"));
+  CHECK(has(refused({"s1.png", "s01.png", "s2.png", "s3.png"}), "has the same number as s"));
+  CHECK(has(refused({"s1.png", "s1.PNG"}), "has the same number as s1."));
   CHECK(refused({"a1.png", "a2.png", "b1.png", "b2.png"})
             .starts_with("b1.png: is no slice of the stack of a1.png; keep one stack"));
   CHECK(refused({"t1_z1.png", "t1_z2.png", "t2_z1.png", "t2_z2.png"})
             .starts_with("t2_z1.png: is no slice of the stack of t1_z1.png"));
   CHECK(refused({"cover.png", "s1.png", "s2.png"}).starts_with("cover.png: is no slice"));
   CHECK(refused({"s1.png", "s2.png", "s3.png", "s4.tif"}).starts_with("s4.tif: a TIFF among PNG"));
-  CHECK(refused({"s1.png", "s99999999999999999999.png"}).find("is no number of a slice") !=
-        std::string::npos);
+  CHECK(has(refused({"s1.png", "s99999999999999999999.png"}), "is no number of a slice"));
   CHECK(refused({"scan2_s1_8bit.png", "scan2_s2_8bit.png", "scan2_s3_8bit.png"}) == whole);
   CHECK(refused({"left.png", "right.png"}).starts_with("left.png: has no number in its name"));
   CHECK(refused({"s1.png", "s2.png", "._s1.png", ".hidden.png"}) == whole);
 }
 
-TEST_CASE("slices of two types of values are refused") {
-  const TempFolder folder;
-  SUBCASE("PNG") {
-    write_stack(folder, ".png", [](int z) {
-      return z == 3 ? png(3, 4, 16, kGrey, slice<std::uint16_t>(z, std::endian::big))
-                    : png(3, 4, 8, kGrey, slice<std::uint8_t>(z));
-    });
-  }
-  SUBCASE("TIFF") {
-    write_stack(folder, ".tif", [](int z) {
-      return z == 3 ? tiff(3, 4, 16, {slice<std::uint16_t>(z)})
-                    : tiff(3, 4, 8, {slice<std::uint8_t>(z)});
-    });
-  }
-  const std::string message = refusal(folder.path(), kSpaced);
-  CAPTURE(message);
-  CHECK(is_one_line(message));
-  CHECK(message.find("slice11") != std::string::npos);
-  CHECK(message.find("values of uint16, and slice8") != std::string::npos);
-}
-
 TEST_CASE("a file without a header is what its layout says") {
-  const TempFolder folder;
+  const TemporaryFolder folder;
   const auto read = [&](const std::string& bytes, const RawLayout& layout) {
     ReadOptions options = kSpaced;
     options.raw = layout;
@@ -262,7 +243,7 @@ TEST_CASE("a file without a header is what its layout says") {
 }
 
 TEST_CASE("a file without a header is refused where its size is not that of the layout") {
-  const TempFolder folder;
+  const TemporaryFolder folder;
   const auto path = folder.write("voxels.raw", bytes_of(counting<std::uint16_t>()));
   const auto refused = [&](const RawLayout& layout) {
     ReadOptions options = kSpaced;
@@ -272,9 +253,8 @@ TEST_CASE("a file without a header is refused where its size is not that of the 
     CHECK(is_one_line(message));
     return message;
   };
-  CHECK(refused({{3, 4, 6}, VoxelType::uint16}).find("120 bytes of voxels") != std::string::npos);
-  CHECK(refused({{3, 4, 4}, VoxelType::uint16}).find("--skip 24") != std::string::npos);
-  CHECK(refused({kSmall, VoxelType::uint16, false, 200}).find("0 bytes of voxels") !=
-        std::string::npos);
+  CHECK(has(refused({{3, 4, 6}, VoxelType::uint16}), "120 bytes of voxels"));
+  CHECK(has(refused({{3, 4, 4}, VoxelType::uint16}), "--skip 24"));
+  CHECK(has(refused({kSmall, VoxelType::uint16, false, 200}), "0 bytes of voxels"));
   CHECK(refused({{1024, 1024, 1024}, VoxelType::float64}) != "no error");
 }

@@ -13,31 +13,13 @@
 
 #include "controller/volume/file/volume_image.hpp"
 #include "controller/volume/file/volume_io.hpp"
+#include "tests/support/errors.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 /// Small volume files written by hand, byte by byte, so that the readers are checked against the
 /// formats' descriptions and not against another writer of the same library.
 namespace kerf::test {
 
-/// A fresh folder that goes away with the object.
-class TempFolder {
- public:
-  TempFolder();
-  ~TempFolder();
-  TempFolder(const TempFolder&) = delete;
-  TempFolder& operator=(const TempFolder&) = delete;
-
-  [[nodiscard]] std::filesystem::path operator/(const std::string& name) const {
-    return path_ / name;
-  }
-  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
-  /// Writes `bytes` to `name` and gives its path.
-  std::filesystem::path write(const std::string& name, const std::string& bytes) const;
-
- private:
-  std::filesystem::path path_;
-};
-
-[[nodiscard]] std::string read_bytes(const std::filesystem::path& path);
 [[nodiscard]] std::string gzipped(const std::string& bytes);
 
 /// The bytes of one number in either byte order.

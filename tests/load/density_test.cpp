@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/volume/denoise.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -13,11 +11,15 @@
 
 #include "controller/load/load_scene.hpp"
 #include "controller/load/scene_json.hpp"
+#include "controller/scene/scene_presets.hpp"
 #include "controller/volume/crop_resample.hpp"
+#include "controller/volume/denoise.hpp"
 #include "controller/volume/windowing.hpp"
 #include "tests/scene/support.hpp"
+#include "tests/support/voxels.hpp"
 
 using namespace kerf;
+using namespace kerf::test;
 
 namespace {
 
@@ -29,30 +31,25 @@ std::vector<Density> ball(double noise, double shift = 0) {
   std::mt19937 random(5);
   std::normal_distribution<double> normal;
   std::vector<Density> values;
-  for (std::int32_t z = 0; z < kGrid.nz; ++z) {
-    for (std::int32_t y = 0; y < kGrid.ny; ++y) {
-      for (std::int32_t x = 0; x < kGrid.nx; ++x) {
-        const double far = std::hypot(x - 19.5 - shift, y - 19.5, z - 19.5) - 14;
-        const double share =
-            0.1 + 0.4 * std::erfc(far / std::sqrt(2)) + 0.8 * noise * normal(random);
-        values.push_back(static_cast<Density>(std::clamp(60000 * share, 0.0, 65535.0)));
-      }
-    }
+  for (const auto& [x, y, z] : voxels(kGrid)) {
+    const double far = std::hypot(x - 19.5 - shift, y - 19.5, z - 19.5) - 14;
+    const double share = 0.1 + 0.4 * std::erfc(far / std::sqrt(2)) + 0.8 * noise * normal(random);
+    values.push_back(static_cast<Density>(std::clamp(60000 * share, 0.0, 65535.0)));
   }
   return values;
 }
 
 /// A scene with that file and the lines of its volume.
-std::filesystem::path scene_of(const test::TempFolder& folder, const std::vector<Density>& values,
+std::filesystem::path scene_of(const TemporaryFolder& folder, const std::vector<Density>& values,
                                const std::string& lines) {
-  static_cast<void>(folder.write("scan.nrrd", test::nrrd(kGrid, {0.1, 0.1, 0.1}, values)));
+  static_cast<void>(folder.write("scan.nrrd", nrrd(kGrid, {0.1, 0.1, 0.1}, values)));
   return folder.write(
       "scene.toml",
       "[[volume]]\nfile = \"scan.nrrd\"\nwindow = [0, 65535]\niso = 0.458\n" + lines + kTool);
 }
 
 SceneVolume load(const std::vector<Density>& values, const std::string& lines) {
-  const test::TempFolder folder;
+  const TemporaryFolder folder;
   return load_scene(scene_of(folder, values, lines)).volumes.at(0);
 }
 
@@ -98,7 +95,7 @@ TEST_CASE("a noisy scan is smoothed as its noise asks; off, and a count, do as t
 
 TEST_CASE("a clean scan keeps its bits under auto, and so its identity") {
   const std::vector<Density> clean = ball(0);
-  const test::TempFolder folder;
+  const TemporaryFolder folder;
   const LoadedScene automatic = load_scene(scene_of(folder, clean, ""));
   const LoadedScene off = load_scene(scene_of(folder, clean, "denoise = \"off\"\n"));
   CHECK(automatic.volumes[0].denoised == 0);
@@ -149,7 +146,7 @@ TEST_CASE("denoise of labels and of few levels is refused in one line; auto leav
   for (std::size_t i = 0; i < labels.size(); ++i) {
     labels[i] = static_cast<Density>((i % 40 / 8 * 6 + i / 40 % 40 / 7) * 7 % 30 * 2000);
   }
-  const test::TempFolder folder;
+  const TemporaryFolder folder;
   const auto error = [&](const std::vector<Density>& values, const std::string& lines) {
     return test::error_of([&] { static_cast<void>(load_scene(scene_of(folder, values, lines))); });
   };
@@ -160,9 +157,8 @@ TEST_CASE("denoise of labels and of few levels is refused in one line; auto leav
           "out") != std::string::npos);
   CHECK(few.find('\n') == std::string::npos);
   const std::string map = error(labels, "denoise = 1\n");
-  CHECK(map.find(
-            "scene.toml:2: denoise: 1 for a label map, whose steps are no noise; leave it out") !=
-        std::string::npos);
+  CHECK(
+      has(map, "scene.toml:2: denoise: 1 for a label map, whose steps are no noise; leave it out"));
   CHECK(map.find('\n') == std::string::npos);
   CHECK(error(labels, "denoise = \"off\"\n").empty());
   CHECK(load(labels, "").denoised == 0);
@@ -171,7 +167,7 @@ TEST_CASE("denoise of labels and of few levels is refused in one line; auto leav
 }
 
 TEST_CASE("the phantom is smoothed only where a scene says how often") {
-  const test::TempFolder folder;
+  const TemporaryFolder folder;
   const auto phantom = [&](const std::string& lines) {
     return load_scene(folder.write("scene.toml",
                                    "[[volume]]\nfile = \"phantom\"\niso = 0.45\n"
@@ -189,12 +185,98 @@ TEST_CASE("the phantom is smoothed only where a scene says how often") {
 }
 
 TEST_CASE("a volume of the command line keeps the scene's word on noise") {
-  const test::TempFolder folder;
+  const TemporaryFolder folder;
   const std::filesystem::path scan =
-      folder.write("other.nrrd", test::nrrd(kGrid, {0.1, 0.1, 0.1}, ball(0.02)));
+      folder.write("other.nrrd", nrrd(kGrid, {0.1, 0.1, 0.1}, ball(0.02)));
   const SceneOverrides with{.volume_file = scan};
   CHECK(load_scene(scene_of(folder, ball(0), ""), with).volumes[0].denoised > 0);
   CHECK(load_scene(scene_of(folder, ball(0), "denoise = \"off\"\n"), with).volumes[0].denoised ==
         0);
   CHECK(load_scene(scene_of(folder, ball(0), "denoise = 1\n"), with).volumes[0].denoised == 1);
+}
+
+namespace {
+
+constexpr Density kIso = 32768;
+
+/// A row of voxels along x.
+VolumeImage row(std::vector<Density> density, std::vector<Label> labels) {
+  VolumeImage image;
+  image.grid = {static_cast<std::int32_t>(density.size()), 1, 1};
+  image.density = std::move(density);
+  image.labels = std::move(labels);
+  return image;
+}
+
+std::vector<Material> soft_pulp(double felt_iso) {
+  std::vector<Material> materials = default_materials();
+  materials[3].felt_iso = felt_iso;
+  return materials;
+}
+
+std::string load_error(const std::string& lines) {
+  const TemporaryFolder folder;
+  const auto scene = folder.write("scene.toml", lines);
+  return test::error_of([&] { static_cast<void>(load_scene(scene)); });
+}
+
+}  // namespace
+
+TEST_CASE("a material's own iso becomes the volume's, full density stays full") {
+  VolumeImage image = row({4096, 16000, 40000, 65535}, {3, 3, 3, 3});
+  scale_to_felt_iso(soft_pulp(0.25), kIso, image);
+  CHECK(image.density == std::vector<Density>{8192, 32000, 65535, 65535});
+}
+
+TEST_CASE("other materials, air far away and an image without labels keep their densities") {
+  const std::vector<Density> density{5000, 5000, 5000, 5000, 5000, 5000, 5000};
+  VolumeImage image = row(density, {3, 0, 0, 0, 0, 1, 1});
+  scale_to_felt_iso(soft_pulp(0.25), kIso, image);
+  // Three unlabelled voxels are the pulp's edge at most, and the enamel has its own.
+  CHECK(image.density == std::vector<Density>{10000, 10000, 10000, 5000, 5000, 5000, 5000});
+  VolumeImage bare = row(density, {});
+  scale_to_felt_iso(soft_pulp(0.25), kIso, bare);
+  CHECK(bare.density == density);
+  VolumeImage same = row(density, std::vector<Label>(7, 3));
+  scale_to_felt_iso(default_materials(), kIso, same);
+  CHECK(same.density == density);
+}
+
+TEST_CASE("a scene's felt_iso is read, and makes the phantom's pulp solid") {
+  const std::string scene =
+      "[[volume]]\nfile = \"phantom\"\nsize = [64, 64, 40]\niso = 0.45\n"
+      "[[tool]]\nshape = \"ball\"\nsize_vox = 8\n"
+      "[[material]]\nname = \"pulp\"\n";
+  const TemporaryFolder folder;
+  const LoadedScene hollow = load_scene(folder.write("hollow.toml", scene));
+  const LoadedScene full = load_scene(folder.write("full.toml", scene + "felt_iso = 0.14\n"));
+  CHECK(full.materials[3].felt_iso == 0.14);
+  const VolumeImage &before = hollow.volumes[0].image, &after = full.volumes[0].image;
+  REQUIRE(before.grid == after.grid);
+  int pulp = 0;
+  for (std::size_t i = 0; i < before.density.size(); ++i) {
+    // A voxel of half of the pulp's density or more is inside of it.
+    if (after.labels[i] == 3 && before.density[i] >= 0.15 * kDensityMax) {
+      ++pulp;
+      REQUIRE(after.density[i] > full.volumes[0].iso);
+    }
+    if (after.labels[i] == 1) REQUIRE(after.density[i] == before.density[i]);
+  }
+  CHECK(pulp > 50);
+}
+
+TEST_CASE("a felt_iso that cannot be is refused with a way out") {
+  const std::string tool = "[[tool]]\nshape = \"ball\"\nsize_vox = 8\n";
+  const std::string phantom = "[[volume]]\nfile = \"phantom\"\nsize = [64, 64, 40]\n" + tool;
+  const std::string pulp = "[[material]]\nname = \"pulp\"\nfelt_iso = ";
+  CHECK(has(load_error(phantom + pulp + "0\n"), "material.felt_iso = 0 is out of range"));
+  CHECK(has(load_error(phantom + pulp + "1.5\n"), "material.felt_iso = 1.5 is out of range"));
+  const VoxelGrid grid{30, 30, 24};
+  const TemporaryFolder folder;
+  static_cast<void>(folder.write(
+      "block.nrrd", nrrd(grid, {0.1, 0.1, 0.1}, block(grid, {{5, 5, 7}, {25, 25, 17}}, 1000))));
+  const auto scene =
+      folder.write("scene.toml", "[[volume]]\nfile = \"block.nrrd\"\n" + tool + pulp + "0.1\n");
+  const std::string error = test::error_of([&] { static_cast<void>(load_scene(scene)); });
+  CHECK(has(error, "material pulp has felt_iso = 0.1, and no volume has labels"));
 }

@@ -2,8 +2,14 @@
 // Every rounding of the fixed kernels against exact rational arithmetic: to the nearest, ties up.
 // Fast paths share these functions with the definitions that they are compared with, so a wrong
 // half would move both alike and nothing but a test of the function itself could see it.
+#include "controller/kernel/sampling.hpp"
+
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
+#include <limits>
+#include <numeric>
 #include <random>
 #include <vector>
 
@@ -13,9 +19,12 @@
 #include "controller/kernel/kernel_set.hpp"
 #include "controller/kernel/milling.hpp"
 #include "controller/kernel/overlap.hpp"
-#include "controller/kernel/sampling.hpp"
+#include "shared/numeric/numbers.hpp"
+#include "tests/kernel/support.hpp"
+#include "tests/support/property.hpp"
 
 using namespace kerf;
+using namespace kerf::test;
 
 namespace {
 
@@ -195,4 +204,93 @@ TEST_CASE("the bent overlap is the nearest weight between two entries of its tab
     CHECK(bent_ratio(rate, FixedNumbers::kWeightOne) == FixedNumbers::kWeightOne);
   }
   CHECK(wrong == 0);
+}
+
+// N5
+TEST_CASE("Q15 weights with 8 kept bits are within 3.1 steps of exact interpolation, 0.3 rms") {
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> fraction(0.0, 1.0);
+  double worst = 0, square = 0;
+  constexpr int kCases = 6000;
+  for (int n = 0; n < kCases; ++n) {
+    std::array<std::int32_t, 8> kept{};
+    std::array<double, 8> exact{};
+    for (std::size_t c = 0; c < 8; ++c) {
+      const auto value = static_cast<std::int16_t>(random() >> 16);
+      kept[c] = value * FixedNumbers::kSampleOne;
+      exact[c] = value;
+    }
+    const VoxelVec<double> t{fraction(random), fraction(random), fraction(random)};
+    const auto weight = [](double w) {
+      return static_cast<std::int32_t>(std::lround(w * FixedNumbers::kWeightOne));
+    };
+    const double value = trilinear<FixedNumbers>(kept, {weight(t.x), weight(t.y), weight(t.z)});
+    const double error = value / FixedNumbers::kSampleOne - trilinear<DoubleNumbers>(exact, t);
+    worst = std::max(worst, std::abs(error));
+    square += error * error;
+  }
+  CHECK(worst <= 3.1);
+  CHECK(std::sqrt(square / kCases) <= 0.3);
+}
+
+TEST_CASE("corners at both ends of the range do not overflow") {
+  constexpr std::int32_t kLow = std::numeric_limits<std::int16_t>::min() * FixedNumbers::kSampleOne;
+  constexpr std::int32_t kHigh =
+      std::numeric_limits<std::int16_t>::max() * FixedNumbers::kSampleOne;
+  const std::array<std::int32_t, 8> corner = {kLow, kHigh, kHigh, kLow, kHigh, kLow, kLow, kHigh};
+  for (const std::int32_t w : {0, 1, 16384, 32767, 32768}) {
+    const std::int32_t value = trilinear<FixedNumbers>(corner, {w, w, w});
+    CHECK(value >= kLow);
+    CHECK(value <= kHigh);
+  }
+  CHECK(trilinear<FixedNumbers>(corner, {32768, 32768, 32768}) == kHigh);
+}
+
+TEST_CASE_TEMPLATE("trilinear reproduces a linear field inside the cell", N, FixedNumbers,
+                   DoubleNumbers) {
+  const auto field = [](double x, double y, double z) {
+    return 1000.0 + 2000.0 * x - 3000.0 * y + 4000.0 * z;
+  };
+  std::array<typename N::Sample, 8> corner{};
+  for (std::size_t c = 0; c < 8; ++c) {
+    corner[c] = static_cast<typename N::Sample>(
+        field(double(c & 1), double(c >> 1 & 1), double(c >> 2)) * N::kSampleOne);
+  }
+  for (double t = 0.0; t < 1.0; t += 0.0625) {
+    using Real = typename N::Real;
+    const auto cell = cell_at<N>({Real(t), Real(1 - t), Real(t / 2)});
+    // A weight of 1 - 0 belongs to the next cell: read it as this one's far end.
+    auto weight = cell.weight;
+    if (cell.low.y == 1) weight.y = N::kWeightOne;
+    const double value = double(trilinear<N>(corner, weight)) / double(N::kSampleOne);
+    CHECK(value == doctest::Approx(field(t, 1 - t, t / 2)).epsilon(1e-6));
+  }
+}
+
+TEST_CASE("a position splits into cell and weight by flooring, below zero too") {
+  const auto cell = cell_at<FixedNumbers>({Q16(-0.25), Q16(2.0), Q16::from_raw(3 * 65536 - 1)});
+  CHECK(cell.low == VoxelIndex{-1, 2, 2});
+  CHECK(cell.weight.x == 24576);
+  CHECK(cell.weight.y == 0);
+  CHECK(cell.weight.z == 32768);
+  const auto real = cell_at<DoubleNumbers>({-0.25, 2.0, 2.75});
+  CHECK(real.low == VoxelIndex{-1, 2, 2});
+  CHECK(real.weight.x == 0.75);
+  CHECK(real.weight.z == 0.75);
+}
+
+TEST_CASE_TEMPLATE("a sample beyond the position limit stays at the limit, NaN as well", N,
+                   FixedNumbers, DoubleNumbers) {
+  ToolPose<N> pose = pose_at<N>({1e9, -1e9, 0.0});
+  auto at = sample_position(pose, ToolOffset{});
+  CHECK(double(at.x) == kPositionLimitVox);
+  CHECK(double(at.y) == -kPositionLimitVox);
+  CHECK(double(at.z) == 0.0);
+  for (auto& row : pose.step) row.fill(std::numeric_limits<typename N::Step>::max());
+  at = sample_position(pose, ToolOffset{32767, 32767, 32767});
+  CHECK(double(at.z) == kPositionLimitVox);
+  if constexpr (!N::kIsFixed) {
+    pose.centre_vox.z = std::numeric_limits<typename N::Real>::quiet_NaN();
+    CHECK(sample_position(pose, ToolOffset{}).z == -kPositionLimitVox);
+  }
 }
