@@ -16,7 +16,7 @@ class HardeningSpring {
       {"hardening_n_per_mm3", "N/mm^3", 0, 10, 0.005, "H"},
       {"damping_ns_per_mm", "N s/mm", 0, 0.1, 0.002, "along the spring"},
   }};
-  struct State {};  // it remembers nothing
+  struct State {};  // no memory
 
   explicit HardeningSpring(const kerf::LawSetup& setup)
       : k_(Ratio(setup["stiffness_n_per_mm"])),

@@ -43,38 +43,6 @@ constexpr double kNothing = 1e-9;
 
 }  // namespace
 
-TEST_CASE_TEMPLATE("no tool is dragged in the air beside a tilted wall, however fast", N,
-                   FixedNumbers, DoubleNumbers) {
-  struct Case {
-    double rate_hz, voxel_mm, m_per_s, gap_mm, turn_rad_per_s;
-  };
-  const auto walls = tilted_walls();
-  for (const Case& c : {Case{250, 0.05, 0.5, 0.5, 0},
-                        {250, 0.05, 1, 0.5, 30},
-                        {250, 0.02, 0.4, 0.24, 0},
-                        {1000, 0.02, 1, 0.22, 0},
-                        {1000, 0.02, 3, 0.24, 30},
-                        {8000, 0.02, 1, 0.03, 30},
-                        {250, 0.1, 0.35, 0.14, 0},
-                        {250, 0.1, 2, 1.1, 30},
-                        {1000, 0.1, 1, 0.14, 30},
-                        {8000, 0.1, 10, 0.14, 0}}) {
-    for (const SceneTool& made : kTools) {
-      const SampledTool tool(made);
-      const AirFlight flight{1000 * c.m_per_s / c.rate_hz / c.voxel_mm, c.gap_mm / c.voxel_mm,
-                             c.turn_rad_per_s / c.rate_hz};
-      const Flown flown = flown_at<N>(tool, walls, flight, 50);
-      CAPTURE(c.rate_hz);
-      CAPTURE(c.voxel_mm);
-      CAPTURE(c.m_per_s);
-      CAPTURE(made.name);
-      CAPTURE(made.radius_mm);
-      CHECK(flown.longest_spring < kNothing);
-      CHECK(flown.ticks == 50 * static_cast<int>(walls.size()));
-    }
-  }
-}
-
 TEST_CASE_TEMPLATE("no tool is dragged through soft tissue, however fast", N, FixedNumbers,
                    DoubleNumbers) {
   Dice dice(5);

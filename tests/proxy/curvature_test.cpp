@@ -6,7 +6,7 @@
 #include <doctest/doctest.h>
 
 #include "controller/kernel/proxy/constraint_set.hpp"
-#include "tests/proxy/solid_field.hpp"
+#include "tests/proxy/support.hpp"
 
 using namespace kerf;
 using namespace kerf::test;

@@ -6,9 +6,10 @@
 #include <doctest/doctest.h>
 
 #include "lab/rig/contact_rig.hpp"
+#include "tests/proxy/support.hpp"
 
 using namespace kerf;
-using namespace kerf::extremes;
+using namespace kerf::test;
 
 namespace {
 
@@ -97,8 +98,8 @@ namespace {
 
 /// Solid everywhere but 3 units out in one direction; allows so many queries a tick.
 template <class N>
-struct OneWayField {
-  using Real = typename N::Real;
+struct OneWayField : PlainField<N> {
+  using typename PlainField<N>::Real;
 
   Contacts<N> query(ContactVec<Real> q) {
     --left;
@@ -106,11 +107,11 @@ struct OneWayField {
     felt.buried = length(point_of<N>(q) - way_out) > 0.01;
     return felt;
   }
-  [[nodiscard]] Real free_distance(ContactVec<Real>, ContactVec<Real>) const { return Real(0); }
   [[nodiscard]] bool is_solid(ContactVec<Real>) const { return true; }
-  [[nodiscard]] bool half_spent() const { return false; }
   [[nodiscard]] bool may_query() const { return left > 0; }
   void turn(const Orientation<N>&) { left = 5; }
+
+  explicit OneWayField(Point out) : way_out(out) {}
 
   Point way_out;
   int left = 0;

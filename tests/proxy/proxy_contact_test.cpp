@@ -6,7 +6,7 @@
 
 #include "controller/kernel/proxy/proxy.hpp"
 #include "tests/kernel/contact_support.hpp"
-#include "tests/proxy/flat_field.hpp"
+#include "tests/proxy/support.hpp"
 
 using namespace kerf;
 using namespace kerf::test;

@@ -72,29 +72,6 @@ LoopGain gain_in_a_crease(double friction, int loops) {
 
 }  // namespace
 
-TEST_CASE_TEMPLATE("force is smooth over bumps", N, FixedNumbers, DoubleNumbers) {
-  struct Row {
-    double bump, step, depth;
-    double limit;  // of the force step over the mean; the ball itself turns by step / height
-  };
-  for (const Row& row : {Row{40, 0.5, 2, 0.016}, Row{40, 0.5, 1, 0.016}, Row{40, 1, 1, 0.028},
-                         Row{14, 0.5, 1, 0.031}, Row{14, 1, 1, 0.054}}) {
-    Dice dice(5);
-    SlideFigures figures;
-    for (int k = 0; k < 3; ++k) {
-      slide_over<N>({.bump = row.bump, .step = row.step, .depth = row.depth}, dice, figures);
-    }
-    MESSAGE(std::string(N::kName) << ", bump of " << row.bump << ", " << row.step
-                                  << " units a tick, " << row.depth << " deep: force steps by "
-                                  << 100 * figures.force_step << " % (the direction alone "
-                                  << 100 * row.step / (row.bump + kRadius) << "), angle within "
-                                  << figures.degrees << " degrees");
-    CHECK(figures.force_step < row.limit);
-    CHECK(figures.degrees < 0.5);
-    CHECK(figures.queries <= 8);
-  }
-}
-
 TEST_CASE("on one motion fixed point feels what double feels") {
   Dice dice(5);
   const BumpSlide slide;
@@ -124,25 +101,6 @@ TEST_CASE("on one motion fixed point feels what double feels") {
   MESSAGE("fixed against double: ", 100 * rms / mean, " % of the mean force rms, ",
           100 * most / mean, " % at most");
   CHECK(most < 5e-4 * mean);
-}
-
-// F9
-TEST_CASE_TEMPLATE("a ball rests on a flat of any tilt", N, FixedNumbers, DoubleNumbers) {
-  Dice dice(6);
-  double mean = 0, most = 0;
-  constexpr int kTilts = 100;
-  for (int k = 0; k < kTilts; ++k) {
-    Frame frame(dice, {12, 12, 12});
-    frame.place = frame.at(0, -4, 0);
-    const Body volume = blurred({26, 26, 26}, [&](Point p) { return frame.of(p)[1]; });
-    const Point rest = rest_of<N>(kBall, volume, frame.at(0, kRadius, 0), frame.up);
-    const double lack = kRadius - frame.of(rest)[1];
-    mean += lack / kTilts;
-    most = std::max(most, std::abs(lack));
-  }
-  MESSAGE(std::string(N::kName) << ": sunk by " << mean << " units, at most " << most);
-  CHECK(std::abs(mean) < 0.02);
-  CHECK(most < 0.05);
 }
 
 // Without play a ball does not find its way in, so it starts there.

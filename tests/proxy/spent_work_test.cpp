@@ -7,7 +7,7 @@
 #include <doctest/doctest.h>
 
 #include "controller/kernel/proxy/proxy.hpp"
-#include "tests/proxy/solid_field.hpp"
+#include "tests/proxy/support.hpp"
 
 using namespace kerf;
 using namespace kerf::test;
@@ -16,28 +16,28 @@ namespace {
 
 constexpr double kBowl = 5;
 
+using Face = std::pair<double, Point> (*)(Point);
+
 /// A point in a bowl about the origin, solid beyond kBowl, whose queries of a tick are counted
 /// down; beyond them they answer `buried`. A turned tool is in the solid while `holds_turns`.
 template <class N>
-class CountedBowl {
+class CountedBowl : public SolidField<N, Face> {
  public:
-  explicit CountedBowl(int queries) : queries_(queries) {}
+  explicit CountedBowl(int queries)
+      : SolidField<N, Face>(0,
+                            [](Point at) { return std::pair(kBowl - length(at), -1 * unit(at)); }),
+        queries_(queries) {}
 
   void begin_tick() { left_ = queries_; }
   Contacts<N> query(ContactVec<typename N::Real> at) {
-    Contacts<N> felt;
-    felt.buried = (left_ <= 0 && !unseen_) || (holds_turns && !(turn_ == Orientation<N>{}));
+    Contacts<N> contacts;
+    contacts.buried = (left_ <= 0 && !unseen_) || (holds_turns && !(turn_ == Orientation<N>{}));
     unseen_ = false;
     --left_;
-    return felt.buried ? felt : bowl_.query(at);
+    return contacts.buried ? contacts : SolidField<N, Face>::query(at);
   }
   [[nodiscard]] bool half_spent() const { return left_ <= queries_ / 2; }
   [[nodiscard]] bool may_query() const { return left_ > 0; }
-  [[nodiscard]] bool is_solid(ContactVec<typename N::Real> at) const { return bowl_.is_solid(at); }
-  [[nodiscard]] typename N::Real free_distance(ContactVec<typename N::Real> at,
-                                               ContactVec<typename N::Real> move) const {
-    return bowl_.free_distance(at, move);
-  }
   void turn(const Orientation<N>& turn) {
     turn_ = turn;
     unseen_ = true;
@@ -46,14 +46,9 @@ class CountedBowl {
   bool holds_turns = false;
 
  private:
-  static std::pair<double, Point> height_in_bowl(Point at) {
-    return {kBowl - length(at), -1 * unit(at)};
-  }
-
   int queries_, left_ = 0;
   bool unseen_ = false;
   Orientation<N> turn_{};
-  SolidField<N, decltype(&height_in_bowl)> bowl_{0, &height_in_bowl};
 };
 
 /// Leads the point from the bowl's bottom to under `goal` outside of it, and says where it is.
@@ -79,23 +74,16 @@ struct Led {
 /// Air at the origin alone, in solid that pushes back and lets nothing out; counts how often a free
 /// way is asked for.
 template <class N>
-struct Cage {
-  void turn(const Orientation<N>&) {}
-  [[nodiscard]] Contacts<N> query(ContactVec<typename N::Real> at) const {
-    Contacts<N> felt;
-    if (at == ContactVec<typename N::Real>{}) return felt;
-    felt.depth = typename N::Real(1.5);
-    insert(felt, ConstraintPlane<N>{.normal = {{}, typename N::Unit(1), {}}, .depth = felt.depth});
-    return felt;
+struct Cage : PlainField<N> {
+  using typename PlainField<N>::Place;
+
+  [[nodiscard]] Contacts<N> query(Place at) const {
+    return at == Place{} ? Contacts<N>{} : one_plane<N>({0, 1, 0}, 1.5);
   }
-  [[nodiscard]] typename N::Real free_distance(ContactVec<typename N::Real>,
-                                               ContactVec<typename N::Real>) {
+  [[nodiscard]] typename N::Real free_distance(Place, Place) {
     ++asked;
     return {};
   }
-  [[nodiscard]] bool is_solid(ContactVec<typename N::Real>) const { return false; }
-  [[nodiscard]] bool half_spent() const { return false; }
-  [[nodiscard]] bool may_query() const { return true; }
 
   int asked = 0;
 };

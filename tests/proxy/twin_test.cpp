@@ -9,7 +9,7 @@
 #include <doctest/doctest.h>
 
 #include "controller/kernel/proxy/proxy_sweep.hpp"
-#include "tests/proxy/solid_field.hpp"
+#include "tests/proxy/support.hpp"
 
 using namespace kerf;
 using namespace kerf::test;

@@ -10,16 +10,12 @@
 #include "controller/law/virtual_coupling.hpp"
 #include "controller/scene/scene.hpp"
 
-using kerf::DeviceVec;
-using kerf::DoubleNumbers;
-using kerf::FixedNumbers;
-using kerf::virtual_coupling_force;
+using namespace kerf;
 
 namespace {
 
 template <class N>
-kerf::VirtualCoupling<N> coupling(double stiffness_n_per_mm = 0.4,
-                                  double damping_ns_per_mm = 0.002) {
+VirtualCoupling<N> coupling(double stiffness_n_per_mm = 0.4, double damping_ns_per_mm = 0.002) {
   return {typename N::Ratio(stiffness_n_per_mm), typename N::Unit(damping_ns_per_mm)};
 }
 
@@ -65,8 +61,8 @@ TEST_CASE_TEMPLATE("both ends of what a scene may say give a force in the spring
                    FixedNumbers, DoubleNumbers) {
   using Real = typename N::Real;
   constexpr double kFar = 32767;
-  for (const double stiffness : {kerf::kMinStiffnessNPerMm, 1.0, kerf::kMaxStiffnessNPerMm}) {
-    for (const double damping : {0.0, kerf::kMaxDampingNsPerMm}) {
+  for (const double stiffness : {kMinStiffnessNPerMm, 1.0, kMaxStiffnessNPerMm}) {
+    for (const double damping : {0.0, kMaxDampingNsPerMm}) {
       const auto gains = coupling<N>(stiffness, damping);
       CHECK(double(gains.stiffness_n_per_mm) == doctest::Approx(stiffness).epsilon(1e-4));
       CHECK(double(gains.damping_ns_per_mm) == doctest::Approx(damping));
@@ -89,18 +85,17 @@ TEST_CASE_TEMPLATE("both ends of what a scene may say give a force in the spring
     }
   }
   // Fixed: stays at the end of its range, where double goes on.
-  const auto most = virtual_coupling_force(coupling<N>(kerf::kMaxStiffnessNPerMm, 0),
-                                           vec<N>(0, kFar, 0), vec<N>(0, 0, 0));
+  const auto most = virtual_coupling_force(coupling<N>(kMaxStiffnessNPerMm, 0), vec<N>(0, kFar, 0),
+                                           vec<N>(0, 0, 0));
   if constexpr (N::kIsFixed) {
     CHECK(double(most.y) == doctest::Approx(32768).epsilon(1e-4));
   } else {
-    CHECK(double(most.y) == doctest::Approx(kFar * kerf::kMaxStiffnessNPerMm));
+    CHECK(double(most.y) == doctest::Approx(kFar * kMaxStiffnessNPerMm));
   }
 }
 
 TEST_CASE("fixed follows double, and no input makes it point the wrong way") {
   CHECK(rc::check([](std::array<std::int32_t, 6> raw) {
-    using kerf::Q16;
     const auto at = [&](std::size_t i) {
       return DeviceVec<Q16>{Q16::from_raw(raw[i]), Q16::from_raw(raw[i + 1]),
                             Q16::from_raw(raw[i + 2])};
@@ -111,9 +106,9 @@ TEST_CASE("fixed follows double, and no input makes it point the wrong way") {
     const auto fixed = exact(virtual_coupling_force(coupling<FixedNumbers>(), at(0), at(3)));
     const auto truth =
         virtual_coupling_force(coupling<DoubleNumbers>(), exact(at(0)), exact(at(3)));
-    RC_ASSERT(kerf::dot(fixed, exact(at(0))) >= 0.0);
-    if (kerf::norm(exact(at(0))) < 0.05) return;  // short springs have coarse directions
-    if (kerf::norm(exact(at(0))) > 3000 || kerf::norm(exact(at(3))) > 10'000) return;
-    RC_ASSERT(kerf::norm(fixed - truth) <= 2e-3 * (1 + kerf::norm(truth)));
+    RC_ASSERT(dot(fixed, exact(at(0))) >= 0.0);
+    if (norm(exact(at(0))) < 0.05) return;  // short springs have coarse directions
+    if (norm(exact(at(0))) > 3000 || norm(exact(at(3))) > 10'000) return;
+    RC_ASSERT(norm(fixed - truth) <= 2e-3 * (1 + norm(truth)));
   }));
 }

@@ -12,13 +12,10 @@
 #include "controller/servo/kinematics.hpp"
 #include "shared/wire/falcon.hpp"
 
-using kerf::DeviceVec;
-using kerf::DoubleNumbers;
-using kerf::FixedNumbers;
+using namespace kerf;
 
 namespace {
 
-namespace falcon = kerf::falcon;
 using Point = std::array<double, 3>;
 
 /// Crank angles by the closed form of Stamper's thesis; nothing out of reach.
@@ -44,10 +41,10 @@ std::optional<std::array<double, 3>> angles_at(const Point& tip) {
 }
 
 template <class N>
-kerf::ForwardKinematics<N> pose_at(const std::array<double, 3>& angles) {
+ForwardKinematics<N> pose_at(const std::array<double, 3>& angles) {
   using Angle = typename N::Angle;
-  return kerf::delta_arm_pose(kerf::device_parts::delta_arm<N>(),
-                              {Angle(angles[0]), Angle(angles[1]), Angle(angles[2])});
+  return delta_arm_pose(device_parts::delta_arm<N>(),
+                        {Angle(angles[0]), Angle(angles[1]), Angle(angles[2])});
 }
 
 /// Calls `check(tip, angles)` on a grid over the device's workspace, a cube of 100 mm and a little.

@@ -13,7 +13,6 @@
 #include "controller/loop/allocation_counter.hpp"
 #include "controller/scene/scene_presets.hpp"
 #include "controller/tool/tool_shapes.hpp"
-#include "controller/volume/phantom.hpp"
 #include "lab/rig/cutting_hand.hpp"
 #include "tests/case_count.hpp"
 #include "tests/servo/support.hpp"
@@ -46,15 +45,6 @@ double along(const std::array<double, 3>& a, const std::array<double, 3>& b) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-/// What a hand takes off a flat at height 0 in 0.2 s of a stroke down to 0.9 mm from it, mm^3.
-double removed_by_stroke(const LoadedScene& scene) {
-  Miller miller(scene);
-  for (int step = 0; step < 10; ++step) {
-    static_cast<void>(miller.hold({0.1 * step, 0.8 - 0.1 * step, 0}, 0.02));
-  }
-  return miller.removed_mm3();
-}
-
 }  // namespace
 
 // F11
@@ -75,18 +65,6 @@ TEST_CASE("what the servo removes is the integral of G F") {
       CHECK(std::abs(miller.removed_mm3() / miller.fed_mm3() - 1) < 1e-6);
     }
   }
-}
-
-TEST_CASE("the same hand removes the same at 1, 2, 4 and 8 kHz") {
-  std::vector<double> removed_mm3;
-  for (const int rate_hz : {1000, 2000, 4000, 8000}) {
-    LoadedScene scene = mill_scene();
-    scene.servo.rate_hz = rate_hz;
-    scene.cut.machinability_mm3_per_s_n = 4;
-    removed_mm3.push_back(removed_by_stroke(scene));
-  }
-  CHECK(removed_mm3[0] > 0.1);
-  for (const double mm3 : removed_mm3) CHECK(std::abs(mm3 / removed_mm3[0] - 1) < 0.01);
 }
 
 // F12
@@ -195,22 +173,6 @@ TEST_CASE("the press is shared by two volumes, whatever their voxels") {
   CHECK(std::abs(miller.removed_mm3() / miller.fed_mm3() - 1) < 1e-3);
   // Nearly the same volume of both, though half as many voxels.
   CHECK(double(steps[0]) / double(2 * steps[1]) == doctest::Approx(1).epsilon(0.2));
-}
-
-TEST_CASE("milling into a tooth changes the force by less than 2 % a tick") {
-  // The crown of the phantom around the middle of its chewing face, all of it enamel.
-  double top_mm = 12;
-  while (phantom_signed_distance(1, 1, top_mm) > 0) top_mm -= 0.01;
-  const Shape crown = [&](double x, double y, double z) {
-    return phantom_signed_distance(x + 1, 1 - z, y + top_mm);
-  };
-  LoadedScene scene = mill_scene(crown, 64);
-  scene.force.damping_ns_per_mm = 0;  // of the hand's own steps, which are counts
-  Miller miller(scene);
-  const SunkForce felt = sink(miller);
-  MESSAGE("largest step ", 100 * felt.step_ratio, " % of ", felt.mean_n, " N");
-  CHECK(miller.removed_mm3() > 0.05);
-  CHECK(felt.step_ratio < 0.02);
 }
 
 // What a CT of a tooth gives in 8 bits: of the range up to enamel the iso is a fifth, so that noise

@@ -6,14 +6,12 @@
 #include <doctest/doctest.h>
 #include <rapidcheck.h>
 
-using kerf::DeviceVec;
-using kerf::DoubleNumbers;
-using kerf::FixedNumbers;
+using namespace kerf;
 
 namespace {
 
 template <class N>
-kerf::ForceLimits<N> omni_limits() {
+ForceLimits<N> omni_limits() {
   using Real = typename N::Real;
   return {Real(3.3), Real(0.88), Real(0.5), typename N::Ratio(1.0 / 10000)};
 }
@@ -28,7 +26,7 @@ double length(V v) {
 
 TEST_CASE_TEMPLATE("a clamped force keeps its direction", N, FixedNumbers, DoubleNumbers) {
   using Real = typename N::Real;
-  const auto v = kerf::clamped(DeviceVec<Real>{Real(30.0), Real(-40.0), Real(0.0)}, Real(3.3));
+  const auto v = clamped(DeviceVec<Real>{Real(30.0), Real(-40.0), Real(0.0)}, Real(3.3));
   CHECK(length(v) == doctest::Approx(3.3).epsilon(1e-4));
   CHECK(double(v.x) / double(v.y) == doctest::Approx(-0.75).epsilon(1e-4));
 }
@@ -37,10 +35,10 @@ TEST_CASE_TEMPLATE("a force that is cut down keeps its direction, by peak, slew 
                    FixedNumbers, DoubleNumbers) {
   using Real = typename N::Real;
   const DeviceVec<Real> wanted{Real(6.0), Real(-3.0), Real(2.0)};  // 7 N
-  kerf::ThermalState<N> thermal;
+  ThermalState<N> thermal;
   DeviceVec<Real> sent{};
   for (int tick = 0; tick < 20'000; ++tick) {
-    sent = kerf::limited_force<N>(omni_limits<N>(), thermal, wanted, sent, false);
+    sent = limited_force<N>(omni_limits<N>(), thermal, wanted, sent, false);
     const double along = (6 * double(sent.x) - 3 * double(sent.y) + 2 * double(sent.z)) / 7;
     CHECK(along == doctest::Approx(length(sent)).epsilon(1e-4));
   }
@@ -49,11 +47,10 @@ TEST_CASE_TEMPLATE("a force that is cut down keeps its direction, by peak, slew 
 
 TEST_CASE("whatever is wanted, peak and slew hold, also from the ends of the number range") {
   CHECK(rc::check([](std::int32_t x, std::int32_t y, std::int32_t z) {
-    using kerf::Q16;
-    kerf::ThermalState<FixedNumbers> thermal;
+    ThermalState<FixedNumbers> thermal;
     DeviceVec<Q16> sent{};
     for (int tick = 0; tick < 50; ++tick) {
-      const auto next = kerf::limited_force<FixedNumbers>(
+      const auto next = limited_force<FixedNumbers>(
           omni_limits<FixedNumbers>(), thermal,
           {Q16::from_raw(x), Q16::from_raw(y), Q16::from_raw(z)}, sent, false);
       RC_ASSERT(length(next) <= double(Q16(3.3)));
@@ -66,12 +63,12 @@ TEST_CASE("whatever is wanted, peak and slew hold, also from the ends of the num
 TEST_CASE_TEMPLATE("a peak held for long settles at the continuous force", N, FixedNumbers,
                    DoubleNumbers) {
   using Real = typename N::Real;
-  kerf::ThermalState<N> thermal;
+  ThermalState<N> thermal;
   DeviceVec<Real> sent{};
   double peak_n = 0;
   for (int tick = 0; tick < 60'000; ++tick) {
-    sent = kerf::limited_force<N>(omni_limits<N>(), thermal, {Real(0.0), Real(3.3), Real(0.0)},
-                                  sent, false);
+    sent =
+        limited_force<N>(omni_limits<N>(), thermal, {Real(0.0), Real(3.3), Real(0.0)}, sent, false);
     peak_n = std::max(peak_n, length(sent));
   }
   CHECK(peak_n == doctest::Approx(3.3).epsilon(1e-3));
@@ -79,20 +76,17 @@ TEST_CASE_TEMPLATE("a peak held for long settles at the continuous force", N, Fi
 }
 
 TEST_CASE("one more peak is there after a rest") {
-  using kerf::Q16;
-  kerf::ThermalState<FixedNumbers> thermal;
+  ThermalState<FixedNumbers> thermal;
   DeviceVec<Q16> sent{};
   const DeviceVec<Q16> push{Q16(0), Q16(3.3), Q16(0)};
   for (int tick = 0; tick < 20'000; ++tick) {
-    sent =
-        kerf::limited_force<FixedNumbers>(omni_limits<FixedNumbers>(), thermal, push, sent, false);
+    sent = limited_force<FixedNumbers>(omni_limits<FixedNumbers>(), thermal, push, sent, false);
   }
   for (int tick = 0; tick < 30'000; ++tick) {
-    sent = kerf::limited_force<FixedNumbers>(omni_limits<FixedNumbers>(), thermal, {}, sent, false);
+    sent = limited_force<FixedNumbers>(omni_limits<FixedNumbers>(), thermal, {}, sent, false);
   }
   for (int tick = 0; tick < 20; ++tick) {
-    sent =
-        kerf::limited_force<FixedNumbers>(omni_limits<FixedNumbers>(), thermal, push, sent, false);
+    sent = limited_force<FixedNumbers>(omni_limits<FixedNumbers>(), thermal, push, sent, false);
   }
   CHECK(length(sent) == doctest::Approx(3.3).epsilon(1e-3));
 }
@@ -105,8 +99,8 @@ TEST_CASE_TEMPLATE(
   limits.slew_n_per_tick = Real(0.01);
   const DeviceVec<Real> last{Real(1.0), Real(2.0), Real(-2.0)};  // 3 N
   const auto sent = [&](DeviceVec<Real> wanted, bool leaves) {
-    kerf::ThermalState<N> thermal;
-    return kerf::limited_force<N>(limits, thermal, wanted, last, leaves);
+    ThermalState<N> thermal;
+    return limited_force<N>(limits, thermal, wanted, last, leaves);
   };
   CHECK(length(sent({}, true)) < 1e-4);
   CHECK(length(sent({}, false)) == doctest::Approx(2.99).epsilon(1e-4));

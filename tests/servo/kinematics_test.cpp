@@ -13,14 +13,12 @@
 #include "hil/device/omni.hpp"
 #include "shared/wire/omni.hpp"
 
-using kerf::DeviceVec;
-using kerf::DoubleNumbers;
-using kerf::FixedNumbers;
+using namespace kerf;
 
 namespace {
 
 /// Joint angles inside the Omni's end stops.
-kerf::JointVec<double> random_joints() {
+JointVec<double> random_joints() {
   const auto between = [](double lo, double hi) {
     return lo + (hi - lo) * *rc::gen::inRange(0, 1'000'001) / 1e6;
   };
@@ -29,13 +27,12 @@ kerf::JointVec<double> random_joints() {
 }
 
 template <class N>
-kerf::ForwardKinematics<N> omni_pose(const kerf::JointVec<double>& q) {
+ForwardKinematics<N> omni_pose(const JointVec<double>& q) {
   using Real = typename N::Real;
   using Angle = typename N::Angle;
-  namespace omni = kerf::omni;
-  return kerf::serial_arm_pose<N>({Real(omni::kUpperLinkMm), Real(omni::kForearmMm),
-                                   Real(omni::kOriginHeightMm), Real(omni::kOriginDepthMm)},
-                                  {Angle(q.x), Angle(q.y), Angle(q.z)});
+  return serial_arm_pose<N>({Real(omni::kUpperLinkMm), Real(omni::kForearmMm),
+                             Real(omni::kOriginHeightMm), Real(omni::kOriginDepthMm)},
+                            {Angle(q.x), Angle(q.y), Angle(q.z)});
 }
 
 template <class N>
@@ -54,7 +51,7 @@ TEST_CASE_TEMPLATE("sine and cosine agree with the library over all that an angl
     // Beyond 2 rad a float adds twice what it lacks of pi (8.7e-8), and half a step at 5 rad.
     const double of_pi = sizeof(typename N::Unit) == 4 && std::abs(x) > 2 ? 4.2e-7 : 0;
     const double tolerance = sizeof(typename N::Unit) == 8 ? 2e-9 : 2.5e-7 + of_pi;
-    const auto [sine, cosine] = kerf::sine_cosine<N>(angle);
+    const auto [sine, cosine] = sine_cosine<N>(angle);
     REQUIRE(std::abs(double(sine) - std::sin(x)) < tolerance);
     REQUIRE(std::abs(double(cosine) - std::cos(x)) < tolerance);
   }
@@ -64,7 +61,7 @@ TEST_CASE_TEMPLATE("the tip agrees with the emulator's own kinematics", N, Fixed
                    DoubleNumbers) {
   // A step of Q15.16 is 1.5e-5 mm; three roundings and the angle's add up to less than 2e-4.
   const double tolerance_mm = sizeof(typename N::Real) == 8 ? 1e-6 : 2e-4;
-  const kerf::OmniArm arm;
+  const OmniArm arm;
   CHECK(rc::check([&] {
     const auto q = random_joints();
     RC_ASSERT(worst<N>(omni_pose<N>(q).tip_mm, arm.tip_mm(q)) < tolerance_mm);
@@ -73,7 +70,7 @@ TEST_CASE_TEMPLATE("the tip agrees with the emulator's own kinematics", N, Fixed
 
 TEST_CASE_TEMPLATE("torques push the tip with the commanded force, by the emulator's Jacobian", N,
                    FixedNumbers, DoubleNumbers) {
-  const kerf::OmniArm arm;
+  const OmniArm arm;
   CHECK(rc::check([&] {
     const auto q = random_joints();
     RC_PRE(std::abs(std::sin(q.z - q.y)) <
@@ -92,18 +89,18 @@ TEST_CASE_TEMPLATE("torques push the tip with the commanded force, by the emulat
 
 TEST_CASE_TEMPLATE("orientations stay rotations, whatever counters and pots read", N, FixedNumbers,
                    DoubleNumbers) {
-  const auto plan = std::make_unique<kerf::ServoPlan<N>>();
-  kerf::plan_device<N>({}, *plan);
+  const auto plan = std::make_unique<ServoPlan<N>>();
+  plan_device<N>({}, *plan);
   CHECK(rc::check([&] {
-    kerf::EncoderState encoders;
+    EncoderState encoders;
     for (std::int32_t& counts : encoders.unwrapped) counts = *rc::gen::arbitrary<std::int32_t>();
-    kerf::GimbalFilter gimbal;
-    constexpr std::uint32_t kMost = kerf::kMaxGimbalSamples * std::uint32_t{65535};
+    GimbalFilter gimbal;
+    constexpr std::uint32_t kMost = kMaxGimbalSamples * std::uint32_t{65535};
     for (std::uint32_t& sum : gimbal.sum) {
       sum = *rc::gen::oneOf(rc::gen::just(std::uint32_t{0}), rc::gen::just(kMost),
                             rc::gen::inRange<std::uint32_t>(0, kMost));
     }
-    const auto r = kerf::device_pose<N>(plan->device, encoders, gimbal).rotation;
+    const auto r = device_pose<N>(plan->device, encoders, gimbal).rotation;
     for (std::size_t i = 0; i < 3; ++i) {
       for (std::size_t j = 0; j < 3; ++j) {
         double product = 0;
@@ -115,17 +112,17 @@ TEST_CASE_TEMPLATE("orientations stay rotations, whatever counters and pots read
 }
 
 TEST_CASE("a straight gimbal and arm leave the tool's shaft upright") {
-  const auto r = kerf::omni_orientation<DoubleNumbers>({0.0, 0.5, 0.0}, {0.0, 0.0, 0.0});
+  const auto r = omni_orientation<DoubleNumbers>({0.0, 0.5, 0.0}, {0.0, 0.0, 0.0});
   CHECK(r.row[1][1] == doctest::Approx(1.0));
   // A turret turned to the left carries the tool's x axis towards the user's side.
-  const auto left = kerf::omni_orientation<DoubleNumbers>({0.5, 0.5, 0.0}, {0.0, 0.0, 0.0});
+  const auto left = omni_orientation<DoubleNumbers>({0.5, 0.5, 0.0}, {0.0, 0.0, 0.0});
   CHECK(left.row[0][2] == doctest::Approx(-std::sin(0.5)));
 }
 
 TEST_CASE("gimbal pots read their centre when both wipers are equal, and nothing when dead") {
   const auto centred =
-      kerf::omni_gimbal<FixedNumbers>({0x8000, 0x8000, 0x8000}, {0x8000, 0x8000, 0x8000});
-  const auto dead = kerf::omni_gimbal<FixedNumbers>({0, 0, 0}, {0, 0, 0});
+      omni_gimbal<FixedNumbers>({0x8000, 0x8000, 0x8000}, {0x8000, 0x8000, 0x8000});
+  const auto dead = omni_gimbal<FixedNumbers>({0, 0, 0}, {0, 0, 0});
   for (std::size_t i = 0; i < 3; ++i) {
     CHECK(std::abs(double(centred[i])) < 1e-6);
     CHECK(double(dead[i]) == 0.0);

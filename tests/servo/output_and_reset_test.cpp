@@ -62,27 +62,6 @@ TEST_CASE("a tool that finds no free place is told, and feels nothing until it h
   CHECK_FALSE(armed.settled(inkwell.x, inkwell.y + up_mm, inkwell.z).refused);
 }
 
-TEST_CASE("motion after a gap is booked at the mean of the forces that were sent meanwhile") {
-  for (const auto numeric : {NumericKind::fixed, NumericKind::float64}) {
-    for (const int lost : {1, 4, 12}) {
-      CAPTURE(lost);
-      LoadedScene scene = half_space_scene();
-      scene.servo.numeric = numeric;
-      ArmedServo armed(scene);
-      const ServoOutput before = armed.settled(0, 0.3, 0);
-      double sent_n = before.force_n[1];
-      for (int i = 0; i < lost; ++i) {
-        sent_n += armed.servo->step({}).force_n[1];
-      }
-      const ServoOutput after = armed.step(0, 0.4, 0);
-      const double moved_mm = after.position_mm[1] - before.position_mm[1];
-      REQUIRE(moved_mm > 0.05);
-      CHECK(after.absorbed_mj - before.absorbed_mj ==
-            doctest::Approx(-sent_n / (lost + 1) * moved_mm).epsilon(0.02).scale(0));
-    }
-  }
-}
-
 TEST_CASE("a new tool stands still and rubs nothing") {
   LoadedScene scene = half_space_scene(48);
   scene.cut.model = CutModel::preston;

@@ -6,10 +6,8 @@
 
 #include "tests/servo/support.hpp"
 
-using kerf::DeviceReport;
-using kerf::Phase;
-using kerf::test::FakeArm;
-using kerf::test::half_space_scene;
+using namespace kerf;
+using namespace kerf::test;
 
 namespace {
 
@@ -17,9 +15,9 @@ constexpr int kReportsPerS = 1000;
 
 struct RestingServo {
   explicit RestingServo(int rate) : rate_hz(rate) {
-    kerf::LoadedScene scene = half_space_scene(8);
+    LoadedScene scene = half_space_scene(8);
     scene.servo.rate_hz = rate;
-    servo = kerf::compile(scene);
+    servo = compile(scene);
   }
 
   /// One tick in which the device may have said something since the last one.
@@ -35,7 +33,7 @@ struct RestingServo {
   int rate_hz;
   int ticks = 0, said = 0;
   FakeArm arm;
-  std::unique_ptr<kerf::Servo> servo;
+  std::unique_ptr<Servo> servo;
 };
 
 /// From the first report, which only tells where the arm is, to the end of the rest.

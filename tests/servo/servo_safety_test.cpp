@@ -15,17 +15,8 @@
 #include "controller/tool/tool_shapes.hpp"
 #include "tests/servo/support.hpp"
 
-using kerf::Fault;
-using kerf::LoadedScene;
-using kerf::NumericKind;
-using kerf::Phase;
-using kerf::ServoOutput;
-using kerf::test::arm_at;
-using kerf::test::ArmedServo;
-using kerf::test::FakeArm;
-using kerf::test::half_space_scene;
-using kerf::test::length;
-using kerf::test::paper_scene;
+using namespace kerf;
+using namespace kerf::test;
 
 TEST_CASE("reports stop: the force holds 5 ms, is zero at 20 ms, motors off, fault latched") {
   LoadedScene scene = half_space_scene();
@@ -68,7 +59,7 @@ TEST_CASE("one packet with the docked bit neither moves the tip nor forgives a f
 
 TEST_CASE("a stylus that moves while the docked bit is set is not calibrated") {
   LoadedScene scene = half_space_scene();
-  const auto servo = kerf::compile(scene);
+  const auto servo = compile(scene);
   FakeArm arm;
   for (int tick = 0; tick < 100; ++tick) {
     auto report = arm.at(0, -30 + tick * 0.5, 0);
@@ -82,7 +73,7 @@ TEST_CASE("after a stall the force starts again from nothing") {
   scene.force.stiffness_n_per_mm = 50;
   ArmedServo armed(scene);
   REQUIRE(length(armed.settled(0, 0.3, 0).force_n) > 3);
-  armed.servo->apply({.kind = kerf::ServoCommand::Kind::fade_in});
+  armed.servo->apply({.kind = ServoCommand::Kind::fade_in});
   double last_n = 0;
   for (int tick = 0; tick < 20; ++tick) {
     const double force_n = length(armed.step(0, 0.3, 0).force_n);
@@ -154,23 +145,23 @@ TEST_CASE("a force that is not finite ends the motors at once") {
 TEST_CASE("a pose that is not finite: motors off after 2 ms, until the device was parked") {
   // No counts of a real arm give NaN in double. A step of infinite size does at count zero, and
   // ends at the joint's limit at any other.
-  using N = kerf::DoubleNumbers;
+  using N = DoubleNumbers;
   LoadedScene scene = half_space_scene();
-  scene.device.personality = kerf::Personality::woodenhaptics;
+  scene.device.personality = Personality::woodenhaptics;
   scene.servo.numeric = NumericKind::float64;
   for (const int rate_hz : {250, 1000, 8000}) {
     CAPTURE(rate_hz);
     scene.servo.rate_hz = rate_hz;
-    kerf::ServoPlan<N> plan;
-    kerf::plan_device(scene.device, plan);
-    kerf::plan_limits(scene, plan);
-    kerf::plan_laws(scene, plan);
+    ServoPlan<N> plan;
+    plan_device(scene.device, plan);
+    plan_limits(scene, plan);
+    plan_laws(scene, plan);
     plan.device.joints[0].angle_per_count = std::numeric_limits<double>::infinity();
-    const auto state = std::make_unique<kerf::ServoState<N>>();
-    kerf::DeviceReport report{.fresh = true, .parked = true, .homed = true};
+    const auto state = std::make_unique<ServoState<N>>();
+    DeviceReport report{.fresh = true, .parked = true, .homed = true};
     report.encoder = {1, 1, 1};
     const auto motors_on = [&] {
-      static_cast<void>(kerf::sense(plan, *state, report));
+      static_cast<void>(sense(plan, *state, report));
       return state->supervisor.motors_on();
     };
     for (int tick = 0; tick <= rate_hz / 10; ++tick) motors_on();
@@ -201,7 +192,7 @@ TEST_CASE("counters far beyond any joint leave a place in range, and docking for
     CAPTURE(static_cast<int>(numeric));
     LoadedScene scene = half_space_scene();
     scene.servo.numeric = numeric;
-    scene.servo.velocity = {kerf::LawKind::velocity, "difference", {{"tau_ms", 1000}}};
+    scene.servo.velocity = {LawKind::velocity, "difference", {{"tau_ms", 1000}}};
     ArmedServo armed(scene);
     auto report = armed.arm.at(0, 5, 0);
     for (int i = 0; i < 100; ++i) {  // to a million counts, where the sines' series leaves floats
@@ -236,12 +227,10 @@ TEST_CASE("a very stiff scene meets every limit and keeps the force below 3.3 N"
     const ServoOutput out = armed.step(0, tick < 100 ? 0.0 : 5.0, 0);
     CHECK(length(out.force_n) <= 3.3);
     // In the tick in which the hand leaves the force may fall along its own direction at once.
-    const double square = kerf::vec3::dot(last, last);
-    const double kept = tick == 100 && square > 0
-                            ? std::clamp(kerf::vec3::dot(out.force_n, last) / square, 0.0, 1.0)
-                            : 1;
-    CHECK(length(kerf::vec3::operator-(out.force_n, kerf::vec3::operator*(kept, last))) <=
-          0.5 + 1e-4);
+    const double square = vec3::dot(last, last);
+    const double kept =
+        tick == 100 && square > 0 ? std::clamp(vec3::dot(out.force_n, last) / square, 0.0, 1.0) : 1;
+    CHECK(length(vec3::operator-(out.force_n, vec3::operator*(kept, last))) <= 0.5 + 1e-4);
     for (const auto counts : out.motor_counts) CHECK(std::abs(counts) <= 2047);
     last = out.force_n;
   }
@@ -253,13 +242,13 @@ TEST_CASE("whatever counters and pots read, the tool keeps its size and the forc
       CAPTURE(static_cast<int>(numeric));
       CAPTURE(scale);
       LoadedScene scene = half_space_scene();
-      scene.tools = {kerf::make_tool("thin", "cylinder",
-                                     {.pitch_mm = 0.125, .radius_mm = 0.1, .length_mm = 0.4})};
+      scene.tools = {
+          make_tool("thin", "cylinder", {.pitch_mm = 0.125, .radius_mm = 0.1, .length_mm = 0.4})};
       scene.servo.numeric = numeric;
       scene.device.workspace_scale = scale;
       ArmedServo armed(scene);
       static_cast<void>(armed.settled(0, 0.05, 0));
-      kerf::DeviceReport report = armed.arm.at(0, 0.05, 0);
+      DeviceReport report = armed.arm.at(0, 0.05, 0);
       std::uint32_t state = 1;
       const auto next = [&state] {
         state = state * 1664525 + 1013904223;

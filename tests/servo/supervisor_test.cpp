@@ -6,11 +6,7 @@
 
 #include <doctest/doctest.h>
 
-using kerf::Fault;
-using kerf::Phase;
-using kerf::SafetyInputs;
-using kerf::SafetyTiming;
-using kerf::Supervisor;
+using namespace kerf;
 
 namespace {
 
@@ -24,7 +20,7 @@ constexpr SafetyInputs kSilent{};
 Supervisor after(std::initializer_list<std::pair<SafetyInputs, int>> script) {
   Supervisor s;
   for (const auto& [input, ticks] : script) {
-    for (int i = 0; i < ticks; ++i) kerf::supervise(kTiming, input, s);
+    for (int i = 0; i < ticks; ++i) supervise(kTiming, input, s);
   }
   return s;
 }
@@ -112,10 +108,10 @@ TEST_CASE("missing reports: tolerated for less than 20 ms, then a latched fault"
 }
 
 TEST_CASE("the held force is whole up to 5 ms and gone at 20 ms, falling in between") {
-  CHECK(kerf::stale_fraction(kTiming, 5) == kTiming.zero_ticks - kTiming.hold_ticks);
-  CHECK(kerf::stale_fraction(kTiming, 20) == 0);
+  CHECK(stale_fraction(kTiming, 5) == kTiming.zero_ticks - kTiming.hold_ticks);
+  CHECK(stale_fraction(kTiming, 20) == 0);
   for (std::uint32_t t = 5; t < 20; ++t) {
-    CHECK(kerf::stale_fraction(kTiming, t + 1) < kerf::stale_fraction(kTiming, t));
+    CHECK(stale_fraction(kTiming, t + 1) < stale_fraction(kTiming, t));
   }
 }
 
@@ -145,7 +141,7 @@ TEST_CASE("every reachable state and input: only legal transitions, no motors wi
     for (const SafetyInputs& input : all_inputs()) {
       const Supervisor before = states[i];
       Supervisor s = before;
-      kerf::supervise(kShort, input, s);
+      supervise(kShort, input, s);
       REQUIRE((s.phase == Phase::fault) == (s.fault != Fault::none));
       REQUIRE_FALSE((s.motors_on() && s.fault != Fault::none));
       REQUIRE((!s.motors_on() || s.started));

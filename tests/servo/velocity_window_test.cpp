@@ -9,9 +9,7 @@
 
 #include "controller/law/velocity_estimators.hpp"
 
-using kerf::DeviceVec;
-using kerf::DoubleNumbers;
-using kerf::FixedNumbers;
+using namespace kerf;
 
 namespace {
 
@@ -20,9 +18,9 @@ constexpr double kNoiseMm = kStepMm / 2;
 
 /// The velocity after the tip of the next tick.
 template <class N>
-kerf::DeviceVec<typename N::Real> advance(
-    kerf::VelocityWindow<N>& window, const kerf::VelocityPlan<N>& plan,
-    std::type_identity_t<kerf::DeviceVec<typename N::Real>> tip_mm, std::uint32_t gap = 1) {
+DeviceVec<typename N::Real> advance(VelocityWindow<N>& window, const VelocityPlan<N>& plan,
+                                    std::type_identity_t<DeviceVec<typename N::Real>> tip_mm,
+                                    std::uint32_t gap = 1) {
   window.take(tip_mm, gap);
   return window.velocity(plan);
 }
@@ -35,8 +33,8 @@ struct Errors {
 template <class N>
 Errors errors(int rate_hz, double velocity_mm_per_s) {
   using Real = typename N::Real;
-  const kerf::VelocityPlan<N> plan{rate_hz, std::max(1, rate_hz / 1000), Real(kNoiseMm)};
-  kerf::VelocityWindow<N> window;
+  const VelocityPlan<N> plan{rate_hz, std::max(1, rate_hz / 1000), Real(kNoiseMm)};
+  VelocityWindow<N> window;
   window.start({});
   double squares = 0, largest = 0;
   const int settled = rate_hz / 10;
@@ -78,8 +76,8 @@ TEST_CASE_TEMPLATE("a steady hand is seen through all 16 intervals at any speed"
 TEST_CASE_TEMPLATE("a hand that stops dead is at rest within two encoder steps", N, FixedNumbers,
                    DoubleNumbers) {
   using Real = typename N::Real;
-  const kerf::VelocityPlan<N> plan{1000, 1, Real(kNoiseMm)};
-  kerf::VelocityWindow<N> window;
+  const VelocityPlan<N> plan{1000, 1, Real(kNoiseMm)};
+  VelocityWindow<N> window;
   window.start({});
   double x_mm = 0;
   for (int k = 0; k < 50; ++k) {  // 200 mm/s
@@ -95,16 +93,16 @@ TEST_CASE_TEMPLATE("a hand that stops dead is at rest within two encoder steps",
 
 TEST_CASE("whatever the places, the velocity is theirs within the range, and fixed is double") {
   CHECK(rc::check([](std::vector<std::int32_t> places) {
-    const kerf::VelocityPlan<FixedNumbers> fixed_plan{8000, 8, kerf::Q16(kNoiseMm)};
-    const kerf::VelocityPlan<DoubleNumbers> plan{8000, 8, double(kerf::Q16(kNoiseMm))};
-    kerf::VelocityWindow<FixedNumbers> fixed;
-    kerf::VelocityWindow<DoubleNumbers> exact;
+    const VelocityPlan<FixedNumbers> fixed_plan{8000, 8, Q16(kNoiseMm)};
+    const VelocityPlan<DoubleNumbers> plan{8000, 8, double(Q16(kNoiseMm))};
+    VelocityWindow<FixedNumbers> fixed;
+    VelocityWindow<DoubleNumbers> exact;
     for (const std::int32_t raw : places) {
-      const auto place = kerf::Q16::from_raw(raw);
+      const auto place = Q16::from_raw(raw);
       const double is = double(advance(fixed, fixed_plan, {place, place, place}).y);
       const double should = advance(exact, plan, {double(place), double(place), double(place)}).y;
-      const double lowest = double(kerf::Q16::from_raw(INT32_MIN));
-      const double highest = double(kerf::Q16::from_raw(INT32_MAX));
+      const double lowest = double(Q16::from_raw(INT32_MIN));
+      const double highest = double(Q16::from_raw(INT32_MAX));
       RC_ASSERT(std::abs(is - std::clamp(should, lowest, highest)) <= 1e-4);
     }
   }));
@@ -117,8 +115,8 @@ TEST_CASE_TEMPLATE("missing reports leave a steady hand its velocity", N, FixedN
     for (const std::uint32_t gap : {2U, 5U, 20U, 400U}) {  // the last is longer than the window
       CAPTURE(rate_hz);
       CAPTURE(gap);
-      const kerf::VelocityPlan<N> plan{rate_hz, std::max(1, rate_hz / 1000), Real(kNoiseMm)};
-      kerf::VelocityWindow<N> window;
+      const VelocityPlan<N> plan{rate_hz, std::max(1, rate_hz / 1000), Real(kNoiseMm)};
+      VelocityWindow<N> window;
       window.start({});
       constexpr double kMmPerS = 50;
       double x_mm = 0;
