@@ -337,7 +337,7 @@ struct LoadPlane {
 /// ahead(j) as a linear form of the position of the voxel. Fixed: 20 fraction bits; steps below
 /// 2^30, positions below 2^13.
 template <class N>
-[[nodiscard]] constexpr AheadForm<typename N::Sum> ahead_form(
+[[nodiscard]] constexpr AheadForm<typename N::Sum> contact_form(
     VoxelVec<typename N::Real> centre_vox,
     const Transform<typename N::Ratio, WorldSpace, VoxelSpace>& rims_from_voxel,
     const LoadPlane<N>& plane) noexcept {
@@ -370,7 +370,7 @@ template <class N>
 
 /// The form that counts every covered voxel fully.
 template <class N>
-[[nodiscard]] constexpr AheadForm<typename N::Sum> ahead_everywhere() noexcept {
+[[nodiscard]] constexpr AheadForm<typename N::Sum> everywhere() noexcept {
   return {N::kIsFixed ? typename N::Sum(1 << 20) : typename N::Sum(1), {}};
 }
 

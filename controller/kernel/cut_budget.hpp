@@ -105,8 +105,8 @@ template <class N>
 
 /// The same as a number of the loop.
 template <class N>
-[[nodiscard]] constexpr typename N::Unit unit_share_of(CutWeight<N> part,
-                                                       CutWeight<N> whole) noexcept {
+[[nodiscard]] constexpr typename N::Unit unit_fraction_of(CutWeight<N> part,
+                                                          CutWeight<N> whole) noexcept {
   const auto share = fraction_of<N>(part, whole);
   if constexpr (N::kIsFixed) {
     return N::Unit::from_raw(static_cast<std::int32_t>(share));

@@ -199,7 +199,7 @@ class DragSums {
 
   [[nodiscard]] constexpr SurfaceDrag<N> mean() const noexcept {
     if (!(weight_ > 0)) return {};
-    return {along(x_), along(z_), unit_share_of<N>(weight_speed_, weight_)};
+    return {along(x_), along(z_), unit_fraction_of<N>(weight_speed_, weight_)};
   }
 
  private:
@@ -218,7 +218,7 @@ class DragSums {
   [[nodiscard]] constexpr Unit along(Sum moment) const noexcept {
     const bool negative = moment < 0;
     const auto length = static_cast<Weight>(negative ? -moment : moment);
-    const Unit share = unit_share_of<N>(std::min(length, weight_ + weight_ / 2), weight_);
+    const Unit share = unit_fraction_of<N>(std::min(length, weight_ + weight_ / 2), weight_);
     return negative ? -share : share;
   }
 

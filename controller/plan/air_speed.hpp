@@ -101,18 +101,18 @@ template <class N>
 template <class N>
 [[nodiscard]] double least_air_move(const SweptTool<N>& tool, std::size_t volumes,
                                     double turn_rad) {
-  const QueryWork work = query_work(tool.point_shell, tool.behind, volumes);
+  const QueryWork work = query_work(tool.point_shell, tool.shaft, volumes);
   const auto times = static_cast<std::int64_t>(volumes);
   std::int64_t query = 0, beyond = 0;
   const auto add = [&](const PointTable<N>& table) {
-    query += times * (QueryWork::kQueryOverhead + 3 * QueryWork::kFreeLook) +
+    query += times * (QueryWork::kQueryOverhead + 3 * QueryWork::kFreeStep) +
              most_read_beside_wall(table);
     if (table.round && table.needed_whole <= kFreeFarthest) return;  // as one sphere
-    beyond = std::max(beyond, times * 2 * QueryWork::kFreeLook * table.groups);
+    beyond = std::max(beyond, times * 2 * QueryWork::kFreeStep * table.groups);
   };
   add(tool.point_shell.table);
-  for (std::size_t i = 0; i < tool.behind.count; ++i) {
-    add(tool.behind.part[i].point_shell.table);
+  for (std::size_t i = 0; i < tool.shaft.count; ++i) {
+    add(tool.shaft.part[i].point_shell.table);
   }
   const double step_rad = 2 * double(tool.proxy.rotation_step);
   const std::int64_t turns =

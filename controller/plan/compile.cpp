@@ -112,7 +112,7 @@ class CompiledSceneOf final : public CompiledScene {
     plan.offsets = memory_.hold_samples(tool);
     if (plan_.contact.swept) {
       plan.swept.point_shell = memory_.contact().hold_point_shell(scene, tool);
-      plan.swept.behind = memory_.contact().hold_parts_behind(scene, tool);
+      plan.swept.shaft = memory_.contact().hold_shaft(scene, tool);
       plan_proxy(scene, tool, plan.swept);
       costs_.air_speeds_mm_per_s.push_back(
           air_speed_mm_per_s(scene, plan.swept, plan_.volume_count));
@@ -134,7 +134,7 @@ class CompiledSceneOf final : public CompiledScene {
   /// Of one volume, rounded up.
   [[nodiscard]] std::uint64_t most_samples(const SweptTool<N>& tool) const {
     if (!plan_.contact.swept) return 0;
-    const std::int64_t all = query_work(tool.point_shell, tool.behind, plan_.volume_count).most();
+    const std::int64_t all = query_work(tool.point_shell, tool.shaft, plan_.volume_count).most();
     return (static_cast<std::uint64_t>(all) + plan_.volume_count - 1) / plan_.volume_count;
   }
 

@@ -146,17 +146,18 @@ void plan_proxy(const LoadedScene& scene, const SceneTool& tool, SweptTool<N>& s
   constexpr double kRampNPerMs = 0.1;  // after a start inside of the solid: docs/theory.md 4.7
   const double n_per_unit =
       scene.force.stiffness_n_per_mm * contact_unit_mm(scene) / scene.device.workspace_scale;
-  swept.turned = tool.turns && (!tool.round || swept.behind.count > 0);
+  swept.follows_stylus = tool.turns && (!tool.round || swept.shaft.count > 0);
   double reach = std::max(1.0, static_cast<double>(swept.point_shell.reach));
-  for (std::size_t i = 0; i < swept.behind.count; ++i) {
-    const ShaftPart<N>& part = swept.behind.part[i];
+  for (std::size_t i = 0; i < swept.shaft.count; ++i) {
+    const ShaftPart<N>& part = swept.shaft.part[i];
     reach = std::max(reach, static_cast<double>(part.up + part.point_shell.reach));
   }
-  swept.proxy = {.friction = typename N::Unit(scene.force.friction),
-                 .rotation_step = typename N::Unit(swept.turned ? rotation_step_of(reach) : 0.0),
-                 // At least a step of fixed point, else the ramp would never end.
-                 .ramp_per_tick = typename N::Real(std::max(
-                     kRampNPerMs * 1000 / scene.servo.rate_hz / n_per_unit, std::ldexp(1.0, -16)))};
+  swept.proxy = {
+      .friction = typename N::Unit(scene.force.friction),
+      .rotation_step = typename N::Unit(swept.follows_stylus ? rotation_step_of(reach) : 0.0),
+      // At least a step of fixed point, else the ramp would never end.
+      .ramp_per_tick = typename N::Real(
+          std::max(kRampNPerMs * 1000 / scene.servo.rate_hz / n_per_unit, std::ldexp(1.0, -16)))};
 }
 
 }  // namespace kerf

@@ -95,9 +95,9 @@ template <class N>
   for (std::size_t v = 0; v < plan.volume_count; ++v) {
     const double share = voxel_mm3[v] / largest;
     if constexpr (N::kIsFixed) {
-      cut.voxel_share[v] = typename N::Unit(share).raw();
+      cut.voxel_fraction[v] = typename N::Unit(share).raw();
     } else {
-      cut.voxel_share[v] = static_cast<CutBudget<N>>(share);
+      cut.voxel_fraction[v] = static_cast<CutBudget<N>>(share);
     }
   }
   return cut;

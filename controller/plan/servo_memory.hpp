@@ -73,7 +73,7 @@ struct SnapshotOf final : ServoSnapshot {
     placed.stroke.pool = here.stroke.pool;
     placed.stroke.kept_in = here.stroke.kept_in;
     placed.contact.volumes = here.contact.volumes;
-    placed.contact.behind = here.contact.behind;
+    placed.contact.shaft_volumes = here.contact.shaft_volumes;
     placed.force_cut.list = here.force_cut.list;
     return placed;
   }
@@ -115,18 +115,18 @@ class ContactMemory {
   }
 
   /// The same for the parts behind the tool's head.
-  ShaftParts<N> hold_parts_behind(const LoadedScene& scene, const SceneTool& tool) {
+  ShaftParts<N> hold_shaft(const LoadedScene& scene, const SceneTool& tool) {
     const double unit_mm = contact_unit_mm(scene);
-    ShaftParts<N> behind;
+    ShaftParts<N> shaft;
     for (const ToolPart& part : shaft_parts(tool)) {
       const auto samples = named(scene, [&] { return part_samples(tool, part, unit_mm); });
-      auto& places = places_behind_[behind.count];
+      auto& places = shaft_places_[shaft.count];
       places.resize(places_.size());
-      behind.part[behind.count++] = {
+      shaft.part[shaft.count++] = {
           hold(tool.name + "'s " + part.name, unit_mm, samples, false, places),
           typename N::Real(part.middle_mm / unit_mm)};
     }
-    return behind;
+    return shaft;
   }
 
   /// Makes room in one more volume of the plan.
@@ -146,9 +146,9 @@ class ContactMemory {
     const MappedField& field = fields_.emplace_back(volume.image.grid, density, volume.iso);
     state.volumes[v] = {field.field(), contact_frame<N>(scene, volume), places_[v].places()};
     for (std::size_t part = 0; part < kMaxShaftParts; ++part) {
-      state.behind[part][v] = state.volumes[v];
-      if (v < places_behind_[part].size()) {
-        state.behind[part][v].places = places_behind_[part][v].places();
+      state.shaft_volumes[part][v] = state.volumes[v];
+      if (v < shaft_places_[part].size()) {
+        state.shaft_volumes[part][v].places = shaft_places_[part][v].places();
       }
     }
   }
@@ -160,7 +160,7 @@ class ContactMemory {
     }
     for (std::size_t v = 0; v < names_.size(); ++v) {
       std::size_t places = places_[v].bytes();
-      for (const auto& behind : places_behind_) places += v < behind.size() ? behind[v].bytes() : 0;
+      for (const auto& behind : shaft_places_) places += v < behind.size() ? behind[v].bytes() : 0;
       list.push_back({"places in " + names_[v], places, true});
       list.push_back({"free bricks of " + names_[v], map_bytes_[v], false});
     }
@@ -196,7 +196,7 @@ class ContactMemory {
   std::vector<std::size_t> map_bytes_;
   std::vector<TransformedShell<N>> places_;
   std::array<std::vector<TransformedShell<N>>, kMaxShaftParts>
-      places_behind_;  ///< if a tool has a part
+      shaft_places_;  ///< if a tool has a part
   std::vector<MappedField> fields_;
 };
 

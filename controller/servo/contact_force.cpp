@@ -34,8 +34,8 @@ ProxyContact<N> follow_tool(const ServoPlan<N>& plan, const SweptTool<N>& tool,
     return std::span(volumes).first(plan.volume_count);
   };
   std::array<std::span<const ContactVolume<N>>, kMaxShaftParts> shaft_volumes;
-  std::ranges::transform(state.behind, shaft_volumes.begin(), in_volumes);
-  ContactQuery<N> field(*plan.kernels, tool.point_shell, in_volumes(state.volumes), tool.behind,
+  std::ranges::transform(state.shaft_volumes, shaft_volumes.begin(), in_volumes);
+  ContactQuery<N> field(*plan.kernels, tool.point_shell, in_volumes(state.volumes), tool.shaft,
                         shaft_volumes);
   field.begin_tick();
   const ProxyContact<N> contact = follow<N>(tool.proxy, state.proxy, field, goal);
@@ -54,7 +54,7 @@ void list_planes(const ContactPlan<N>& contact, const ProxyContact<N>& proxy,
     const ConstraintPlane<N>& plane = proxy.planes.plane[i];
     out.planes[out.plane_count++] = {relabel<DeviceSpace>(plane.normal),
                                      at_device(contact, plane.arm), proxy.part[i] * force_n,
-                                     plane.behind};
+                                     plane.on_shaft};
   }
 }
 
@@ -89,7 +89,7 @@ ContactResult<N> proxy_force(const ServoPlan<N>& plan, ServoState<N>& state,
 
   ProxyPose<N> goal;
   goal.centre = scaled(relabel<ContactSpace>(tip_mm - contact.origin_mm), contact.units_per_mm);
-  if (tool.turned) goal.turn = orientation_of<N>(rotation.row);
+  if (tool.follows_stylus) goal.turn = orientation_of<N>(rotation.row);
 
   ContactResult<N> out;
   const ProxyContact<N> proxy = follow_tool(plan, tool, state.contact, goal, out.samples_read);
@@ -110,7 +110,7 @@ ContactResult<N> proxy_force(const ServoPlan<N>& plan, ServoState<N>& state,
   out.shaft_force_n = multiply<Real>(proxy.shaft_fraction, force_n);
   out.centre_mm =
       contact.origin_mm + relabel<WorldSpace>(scaled(proxy.pose.centre, contact.mm_per_unit));
-  if (tool.turned) out.rotation = {rows_of(proxy.pose.turn)};
+  if (tool.follows_stylus) out.rotation = {rows_of(proxy.pose.turn)};
   out.normal = relabel<WorldSpace>(proxy.normal);
   out.press = relabel<WorldSpace>(proxy.press);
   out.head_fraction = proxy.head_fraction;

@@ -18,7 +18,8 @@ template <class N>
 struct ForceParts {
   using Force = DeviceVec<typename N::Real>;
 
-  bool felt = false;  ///< `spring` and `friction` are those of a tool that was felt in this tick
+  bool contact =
+      false;  ///< `spring` and `friction` are those of a tool with contact forces in this tick
   Force spring{}, damping{}, friction{}, cutting{};
   Force limits{}, stabiliser{};
 };
@@ -61,11 +62,11 @@ class EnergyLedger {
     of(EnergySource::cutting) = work_of_hand<N>(sent_.cutting, moved_mm_);
     of(EnergySource::limits) = work_of_hand<N>(sent_.limits, moved_mm_);
     of(EnergySource::stabiliser) = work_of_hand<N>(sent_.stabiliser, moved_mm_);
-    const bool felt = sent_.felt && now.felt;
+    const bool both = sent_.contact && now.contact;
     for (const auto& [source, then, next] :
          {Elastic{EnergySource::spring, sent_.spring, now.spring},
           Elastic{EnergySource::friction, sent_.friction, now.friction}}) {
-      const Energy grown = felt ? work_of_hand<N>(next - then, moved_mm_) : Energy(0);
+      const Energy grown = both ? work_of_hand<N>(next - then, moved_mm_) : Energy(0);
       const Energy half = grown / Energy(2);
       of(source) = sum_of_energy<N>(work_of_hand<N>(then, moved_mm_), half);
       of(EnergySource::leak) =

@@ -74,7 +74,7 @@ class LoadDistribution {
 
   [[nodiscard]] CutWeight<N> in_largest_voxels(CutWeight<N> weight, std::size_t v) const noexcept {
     return static_cast<CutWeight<N>>(
-        portion<N>(static_cast<CutBudget<N>>(weight), plan_.force_cut.voxel_share[v]));
+        portion<N>(static_cast<CutBudget<N>>(weight), plan_.force_cut.voxel_fraction[v]));
   }
 
  private:
@@ -115,12 +115,12 @@ void find_loads(const ServoPlan<N>& plan, const ServoState<N>& state,
     const LoadPlane<N> bears{relabel<WorldSpace>(plane.normal),
                              tool.round ? Ratio(-1) : Ratio(arm_mm / tool.rim_mm), tool.steepness};
     shares.add(plane.load_n, [&](std::size_t v) {
-      return ahead_form<N>(voxel_position(plan.volumes[v], centre_mm),
-                           tool.in_volume[v].rims_from_voxel, bears);
+      return contact_form<N>(voxel_position(plan.volumes[v], centre_mm),
+                             tool.in_volume[v].rims_from_voxel, bears);
     });
   }
   if (!shares.some()) {
-    shares.add(Real(1), [](std::size_t) { return ahead_everywhere<N>(); });
+    shares.add(Real(1), [](std::size_t) { return everywhere<N>(); });
   }
   if (shares.some()) shares.give(covered);
 }
@@ -135,7 +135,7 @@ template <class N>
   }
   for (std::size_t v = 0; v < plan.volume_count; ++v) {
     const CoveredLoads<N> at =
-        loads(covered.in[v], ahead_everywhere<N>(), state.volumes[v].density, plan.volumes[v].iso);
+        loads(covered.in[v], everywhere<N>(), state.volumes[v].density, plan.volumes[v].iso);
     for (const CutWeight<N> bearing : at.bearing) {
       if (bearing > 0) return true;
     }
@@ -172,11 +172,11 @@ template <class N>
 template <class N>
 const Rotation<N>& spindle_axes(const ToolPlan<N>& tool, const ServoState<N>& state,
                                 const ContactResult<N>& at) noexcept {
-  return tool.round && tool.turns && !tool.swept.turned ? state.rotation : at.rotation;
+  return tool.round && tool.turns && !tool.swept.follows_stylus ? state.rotation : at.rotation;
 }
 
-/// Distributes a press of `cut.press_n` over the volumes by their loads, cuts them and returns the
-/// friction.
+/// Distributes a press of `cut.normal_force_n` over the volumes by their loads, cuts them and
+/// returns the friction.
 template <class N>
 CuttingFriction<N> press_on_volumes(const ServoPlan<N>& plan, ServoState<N>& state,
                                     const ContactResult<N>& at, ForceCut<N>& cut) noexcept {
@@ -190,14 +190,15 @@ CuttingFriction<N> press_on_volumes(const ServoPlan<N>& plan, ServoState<N>& sta
   const ToolPlan<N>& tool = plan.tools[state.active_tool];
   const auto normal = transposed(spindle_axes(tool, state, at)) * at.normal;
   CuttingFriction<N> friction;
-  const auto drive = cut_drive<N>(cut.press_n, rules.threshold_n, state.force_cut.spindle.ratio);
+  const auto drive =
+      cut_drive<N>(cut.normal_force_n, rules.threshold_n, state.force_cut.spindle.ratio);
   bool starves = drive > 0 && !meets_press(plan, state, covered);
   for (std::size_t v = 0; v < plan.volume_count; ++v) {
     if (covered.in[v].list.empty() || !(covered.whole > 0)) continue;
     const PrestonPlan<N>& volume = rules.volume[v];
     cut.forbidden |= touched_forbidden(volume, covered.in[v]);
     const Real press_n =
-        multiply<Real>(unit_share_of<N>(covered.borne[v], covered.whole), cut.press_n);
+        multiply<Real>(unit_fraction_of<N>(covered.borne[v], covered.whole), cut.normal_force_n);
     if (drive > 0) keep_bricks(plan, state, v, voxel_position(plan.volumes[v], centre_mm));
     const SurfaceDrag<N>& drag = covered.in[v].drag;
     friction.add(rules.friction, press_n, tool.round ? ball_drag<N>(normal, drag.arm) : drag);
@@ -246,9 +247,10 @@ ForceCut<N> cut_by_sent_force(const ServoPlan<N>& plan, ServoState<N>& state,
   ForceCutState<N>& memory = state.force_cut;
   ForceCut<N> cut;
   const Real along_n = along<N>(relabel<ContactSpace>(at.press), relabel<ContactSpace>(sent_n));
-  cut.press_n = std::max(Real(0), multiply<Real>(at.head_fraction, along_n) / plan.workspace_scale);
+  cut.normal_force_n =
+      std::max(Real(0), multiply<Real>(at.head_fraction, along_n) / plan.workspace_scale);
   CuttingFriction<N> friction;
-  if (cut.press_n > Real(0)) friction = press_on_volumes(plan, state, at, cut);
+  if (cut.normal_force_n > Real(0)) friction = press_on_volumes(plan, state, at, cut);
   const bool turns = rules.spindle.free_ratio > typename N::Unit{};
   if (!turns) friction = {};
   turn_spindle(rules.spindle, runs, friction.torque_n_mm(plan.tools[state.active_tool].rim_mm),

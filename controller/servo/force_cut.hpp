@@ -16,8 +16,8 @@ namespace kerf {
 /// What one tick cut.
 template <class N>
 struct ForceCut {
-  typename N::Real press_n{};   ///< normal force in the scene
-  std::uint64_t forbidden = 0;  ///< bit m: the tool presses on material m, which is forbidden
+  typename N::Real normal_force_n{};  ///< normal force in the scene
+  std::uint64_t forbidden = 0;        ///< bit m: the tool presses on material m, which is forbidden
   std::array<Removed, kMaxVolumes> removed{};  ///< by volume of the scene
 };
 

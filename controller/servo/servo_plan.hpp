@@ -146,8 +146,8 @@ struct ContactPlan {
 template <class N>
 struct SweptTool {
   PointShell<N> point_shell;  ///< of the head
-  ShaftParts<N> behind;
-  bool turned = false;  ///< by the stylus; else it keeps the world's axes, or is a ball alone
+  ShaftParts<N> shaft;
+  bool follows_stylus = false;  ///< else it keeps the world's axes, or is a ball alone
   ProxyPlan<N> proxy;
 };
 
@@ -171,7 +171,7 @@ struct ForceCutPlan {
   FrictionPlan<N> friction;
   std::array<PrestonPlan<N>, kMaxVolumes> volume{};
   /// Size of a voxel over that of the largest, as a `fraction_of`.
-  std::array<CutBudget<N>, kMaxVolumes> voxel_share{};
+  std::array<CutBudget<N>, kMaxVolumes> voxel_fraction{};
 };
 
 /// The covered voxels: groups for the kernels of fixed point, voxel by voxel otherwise.

@@ -41,7 +41,7 @@ struct ContactState {
   using Volumes = std::array<ContactVolume<N>, kMaxVolumes>;  ///< by index of the plan's volumes
   Volumes volumes{};
   std::array<Volumes, kMaxShaftParts>
-      behind{};  ///< the same with places of the parts behind the head
+      shaft_volumes{};  ///< the same with the samples of shaft and handpiece
   ProxyState<N> proxy;
 };
 

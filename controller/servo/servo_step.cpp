@@ -150,7 +150,7 @@ void write_output(const ServoPlan<N>& plan, ServoState<N>& state, const Sensed<N
   out.held = state.hold;
   out.contact = norm(state.force_n) > Real(kContactThresholdN);
   const ProxyState<N>& proxy = state.contact.proxy;
-  out.refused = plan.contact.swept && !proxy.placed && proxy.search.refused();
+  out.refused = plan.contact.swept && !proxy.valid && proxy.search.refused();
   for (std::size_t i = 0; i < 3; ++i) {
     out.joint_counts[i] = state.encoders.unwrapped[i];
     out.gimbal_rad[i] = as_double(sensed.pose.gimbal[i]);
@@ -160,7 +160,7 @@ void write_output(const ServoPlan<N>& plan, ServoState<N>& state, const Sensed<N
   // is held lags behind the stylus.
   const ToolPlan<N>& tool = plan.tools[state.active_tool];
   Rotation<N> rotation = tool.turns ? state.rotation : identity_rotation<N>();
-  if (tool.swept.behind.count > 0 && proxy.placed) rotation = {rows_of(proxy.pose.turn)};
+  if (tool.swept.shaft.count > 0 && proxy.valid) rotation = {rows_of(proxy.pose.turn)};
   for (std::size_t i = 0; i < 9; ++i) out.rotation[i] = as_double(rotation.row[i / 3][i % 3]);
   out.velocity_mm_per_s = as_doubles(sensed.velocity_mm_per_s);
   out.force_n = as_doubles(state.force_n);
@@ -228,7 +228,7 @@ ForceRequest<N> wanted_force(const ServoPlan<N>& plan, ServoState<N>& state,
     return {};
   }
   const DeviceVec<Real> tool_n = contact.contact_n + contact.modification_n;
-  const ForceParts<N> parts{.felt = true,
+  const ForceParts<N> parts{.contact = true,
                             .spring = contact.spring_n,
                             .damping = contact.contact_n - contact.spring_n - contact.friction_n,
                             .friction = contact.friction_n,
@@ -321,7 +321,7 @@ void cut(const ServoPlan<N>& plan, ServoState<N>& state, const ContactResult<N>&
   out.spindle_ratio = as_double(state.force_cut.spindle.ratio);
   const bool runs = state.supervisor.motors_on() && !state.held();
   const ForceCut<N> done = cut_by_sent_force(plan, state, contact, state.force_n, runs);
-  out.press_n = as_double(done.press_n);
+  out.press_n = as_double(done.normal_force_n);
   out.spindle_load = as_double(state.force_cut.spindle.load);
   out.forbidden_materials = done.forbidden;
   out.forbidden = done.forbidden != 0;

@@ -117,7 +117,7 @@ template <class N, class Stabiliser>
                         state);
     sent_n = steady_n == limited_n ? limited_n : limited(steady_n, thermal);
     if (steady_n == limited_n) thermal = heated;
-    const ForceParts<N> parts{.felt = true,
+    const ForceParts<N> parts{.contact = true,
                               .spring = spring_n,
                               .limits = limited_n - spring_n + (sent_n - steady_n),
                               .stabiliser = steady_n - limited_n};

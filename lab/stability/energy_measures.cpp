@@ -182,7 +182,7 @@ double ledger_ns(const std::vector<Tick<N>>& ticks) {
     for (const Tick<N>& tick : ticks) {
       ledger.move(tick.force_n, tick.moved_mm, 1);
       const auto spring_n = virtual_coupling_force(spring, tick.spring_mm, {});
-      const ForceParts<N> parts{.felt = true,
+      const ForceParts<N> parts{.contact = true,
                                 .spring = spring_n,
                                 .damping = tick.force_n - spring_n,
                                 .friction = tick.moved_mm,

@@ -88,7 +88,7 @@ TEST_CASE_TEMPLATE("each volume gives a plane, the deepest three are kept in ord
     const Contacts<N> felt = rig.at({13.5, 13.5, 13.5});
     CHECK(felt.count == static_cast<int>(std::min<std::size_t>(i + 1, 3)));
     CHECK(felt.depth == felt.plane[0].depth);
-    CHECK_FALSE(felt.buried);
+    CHECK_FALSE(felt.no_normal);
   }
   const Contacts<N> felt = rig.at({13.5, 13.5, 13.5});
   const std::size_t order[] = {1, 3, 2};
@@ -125,10 +125,10 @@ TEST_CASE_TEMPLATE("a tool deep in the solid is buried and has no plane", N, Fix
   for (const SceneTool& tool : {kBall, tool_of_units("cone", 6, 18)}) {
     QueryRig<N> rig(tool, volume);
     const Contacts<N> felt = rig.at({20, 20, 20});
-    CHECK(felt.buried);
+    CHECK(felt.no_normal);
     CHECK(felt.count == 0);
     CHECK(felt.depth > typename N::Real(0.5));
-    CHECK_FALSE(rig.at({20, 20, 50}).buried);
+    CHECK_FALSE(rig.at({20, 20, 50}).no_normal);
   }
 }
 
@@ -241,7 +241,7 @@ TEST_CASE_TEMPLATE(
     const Point middle{20, 20, 20};
     const auto answered = [&] {
       int queries = 0;
-      while (queries < 100 && !rig.at(middle).buried) ++queries;
+      while (queries < 100 && !rig.at(middle).no_normal) ++queries;
       return queries;
     };
     CHECK(answered() == 100);  // nothing is counted before the first tick
@@ -270,7 +270,7 @@ TEST_CASE_TEMPLATE("all volumes of a query are looked at alike, while the tick h
     const auto place = place_of<N>(top + dice.uniform(4, 8) * n);
     rig.field().begin_tick();
     rig.field().turn(dice.turn<N>(0));
-    for (Contacts<N> felt = rig.field().query(place); !felt.buried;
+    for (Contacts<N> felt = rig.field().query(place); !felt.no_normal;
          felt = rig.field().query(place)) {
       for (std::int32_t k = 1; k < felt.count; ++k) {
         CHECK(felt.plane[static_cast<std::size_t>(k)].depth == felt.plane[0].depth);

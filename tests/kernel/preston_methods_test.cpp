@@ -180,7 +180,7 @@ TEST_CASE("what materials bear of a press is the same in groups, on every instru
       const LoadPlane<N> plane{{N::Unit(part(random)), N::Unit(part(random)), N::Unit(0.1)},
                                N::Ratio(i % 2 == 0 ? -1 : 20 * part(random)),
                                N::Ratio(i % 3 == 0 ? 16 : 1)};
-      const AheadForm<N::Sum> form = ahead_form<N>(at, rims, plane);
+      const AheadForm<N::Sum> form = contact_form<N>(at, rims, plane);
       constexpr Density kIso = 30000;
       overlap<N>(grid, tool, pose, N::kStepOne, cutter.overlap);
       const auto covered = covered_voxels<N>(grid, std::span<const Density>(volume.density), labels,
@@ -224,18 +224,18 @@ TEST_CASE_TEMPLATE("a tool bears what lies at its contact", N, FixedNumbers, Dou
   };
   const WorldVec<Unit> up{{}, Unit(1), {}}, left{Unit(-1), {}, {}};
   // A ball that presses towards +x is foremost there, at its rim.
-  const auto ball = ahead_form<N>(centre, rims, {left, Ratio(-1), Ratio(1)});
+  const auto ball = contact_form<N>(centre, rims, {left, Ratio(-1), Ratio(1)});
   CHECK(ahead(ball, 28, 30, 40) == doctest::Approx(1).epsilon(1e-5));
   CHECK(std::abs(ahead(ball, 20, 22, 48)) < 1e-5);
   CHECK(ahead(ball, 12, 30, 40) == doctest::Approx(-1).epsilon(1e-5));
   // One whose end is three rims below its centre bears within one voxel above that end.
-  const auto end = ahead_form<N>(centre, rims, {up, Ratio(-3), Ratio(8)});
+  const auto end = contact_form<N>(centre, rims, {up, Ratio(-3), Ratio(8)});
   for (const double x : {12, 20, 28}) {
     CHECK(ahead(end, x, 6, 40) == doctest::Approx(1).epsilon(1e-4));
     CHECK(ahead(end, x, 6.5, 40) == doctest::Approx(0.5).epsilon(1e-4));
     CHECK(std::abs(ahead(end, x, 7, 40)) < 1e-4);
   }
-  CHECK(ahead(ahead_everywhere<N>(), 3, 5, 60) == 1);
+  CHECK(ahead(everywhere<N>(), 3, 5, 60) == 1);
 }
 
 TEST_CASE("a long thin tool of any step along its rows weighs the same in groups") {

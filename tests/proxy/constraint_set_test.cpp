@@ -71,7 +71,7 @@ TEST_CASE_TEMPLATE("a slide ends at the nearest place that its planes allow", N,
   for (int i = 0; i < 300; ++i) {
     const auto constraints = random_constraints<N>(dice);
     const Point displacement = dice.uniform(0, 3) * dice.direction();
-    const Slide<N> slide = nearest(constraints, place_of<N>(displacement));
+    const ConstrainedMove<N> slide = constrained_move(constraints, place_of<N>(displacement));
     const Point truth = projected(constraints, displacement);
     if (length(truth) > 10) continue;  // a cone too narrow for Dykstra
     CHECK(length(point_of<N>(slide.move) - truth) < 2e-3);
@@ -87,7 +87,7 @@ TEST_CASE_TEMPLATE("planes push and never pull, and only where they are touched"
   for (int i = 0; i < 20'000; ++i) {
     const auto constraints = random_constraints<N>(dice);
     const Point displacement = dice.uniform(0, 3) * dice.direction();
-    const Slide<N> slide = nearest(constraints, place_of<N>(displacement));
+    const ConstrainedMove<N> slide = constrained_move(constraints, place_of<N>(displacement));
     Point pushed = point_of<N>(slide.move) - displacement;
     for (std::size_t k = 0; k < constraints.count; ++k) {
       const ConstraintPlane<N>& plane = constraints.plane[k];
@@ -106,7 +106,7 @@ TEST_CASE_TEMPLATE("a goal at the end of the range saturates nothing", N, FixedN
                    DoubleNumbers) {
   ConstraintSet<N> floor;
   floor.plane[floor.count++] = plane<N>({0, 1, 0}, 0);
-  const Slide<N> slide = nearest(floor, place_of<N>({16384, -16384, 16384}));
+  const ConstrainedMove<N> slide = constrained_move(floor, place_of<N>({16384, -16384, 16384}));
   CHECK(length(point_of<N>(slide.move) - Point{16384, 0, 16384}) < 1e-3);
   CHECK(double(slide.load[0]) == doctest::Approx(16384));
 }
@@ -117,8 +117,8 @@ TEST_CASE_TEMPLATE("where planes leave no room the oldest gives way", N, FixedNu
   slot.plane[slot.count++] = plane<N>({1, 0, 0}, 0.125);
   slot.plane[slot.count++] = plane<N>({0, 1, 0}, 0);
   slot.plane[slot.count++] = plane<N>({-1, 0, 0}, 0.125);
-  CHECK(point_of<N>(nearest(slot, place_of<N>({-3, -4, 5})).move) == Point{0.125, 0, 5});
-  CHECK(point_of<N>(nearest(slot, place_of<N>({3, -4, 5})).move) == Point{3, 0, 5});
+  CHECK(point_of<N>(constrained_move(slot, place_of<N>({-3, -4, 5})).move) == Point{0.125, 0, 5});
+  CHECK(point_of<N>(constrained_move(slot, place_of<N>({3, -4, 5})).move) == Point{3, 0, 5});
 }
 
 TEST_CASE_TEMPLATE("a plane seen before is kept while it is near and unlike the new ones", N,
@@ -149,8 +149,8 @@ TEST_CASE_TEMPLATE("a place that was too deep teaches the plane that it met", N,
   ConstraintSet<N> known;
   known.plane[known.count++] = plane<N>({0, 1, 0}, 0);
   const auto met = felt<N>(plane<N>({1, 0, 0}, 0.5));
-  CHECK(learn(known, met, place_of<N>({-0.5, 0, 0})));
+  CHECK(add_blocking_planes(known, met, place_of<N>({-0.5, 0, 0})));
   REQUIRE(known.count == 2);
   CHECK(std::abs(double(known.plane[1].depth)) < 1e-4);
-  CHECK_FALSE(learn(known, met, place_of<N>({-0.5, 0, 0})));  // known by now
+  CHECK_FALSE(add_blocking_planes(known, met, place_of<N>({-0.5, 0, 0})));  // known by now
 }

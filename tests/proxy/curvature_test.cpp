@@ -44,8 +44,8 @@ bool eases(const CurvatureEstimate<N>& curvature) {
 /// Where a step ends from `from` under a load of 2 straight down.
 template <class N, class Field>
 Point end_of_step(Field field, const CurvatureEstimate<N>& curvature, double play, Point from) {
-  const auto slide = nearest(constraints_of(field.query(place_of<N>(from))),
-                             place_of<N>(Point{0, -play - 2, 0} - from));
+  const auto slide = constrained_move(constraints_of(field.query(place_of<N>(from))),
+                                      place_of<N>(Point{0, -play - 2, 0} - from));
   return from + point_of<N>(curvature.eased(slide.move, slide.load[0]));
 }
 
@@ -69,7 +69,7 @@ TEST_CASE_TEMPLATE("a head's plane and a shaft's tell of no bowl", N, FixedNumbe
   CurvatureEstimate<N> curvature;
   curvature.learn(before, after, place_of<N>(to - from));
   CHECK(eases(curvature));
-  after.plane[0].behind = true;
+  after.plane[0].on_shaft = true;
   curvature.learn(before, after, place_of<N>(to - from));
   CHECK_FALSE(eases(curvature));
 }

@@ -76,7 +76,7 @@ TEST_CASE_TEMPLATE("a tool deep in solid is at no allowed place, however faint a
           const Contacts<N> felt = rig.field().query(
               place_of<N>({dice.uniform(18, 26), dice.uniform(18, 26), dice.uniform(18, 26)}));
           INFO(shape, ", level ", level, ", noise ", noise, ", place ", i);
-          CHECK((felt.buried || double(felt.depth) > SweepRules::kTolerance));
+          CHECK((felt.no_normal || double(felt.depth) > SweepRules::kTolerance));
         }
       }
     }
@@ -111,7 +111,7 @@ TEST_CASE_TEMPLATE("matter of 0.97 of the iso holds no tool, wherever and howeve
           const Contacts<N> felt = rig.field().query(place_of<N>(at));
           INFO(shape, ", faces ", faces, ", noise ", noise, ", place ", i);
           CHECK(double(felt.depth) <= SweepRules::kTolerance);
-          CHECK(!felt.buried);
+          CHECK(!felt.no_normal);
         }
       }
     }

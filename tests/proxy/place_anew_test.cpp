@@ -23,7 +23,7 @@ template <class N>
 ProxyState<N> placed_anew(ContactRig<N>& rig, Point at, Point hand) {
   ProxyState<N> state;
   state.pose.centre = place_of<N>(at);
-  state.placed = true;
+  state.valid = true;
   state.search_again();
   for (int tick = 0; tick < 600; ++tick) {
     rig.field().begin_tick();
@@ -44,7 +44,7 @@ TEST_CASE_TEMPLATE("in a cavity with a play of 0.1 units a tool stays, wherever 
       blurred({65, 65, 65}, [&](Point p) { return kRadius + 0.1 - length(p - kMiddle); });
   ContactRig<N> rig(ball, body);
   const ProxyState<N> state = placed_anew<N>(rig, kMiddle, {32, 90, 32});
-  REQUIRE(state.placed);
+  REQUIRE(state.valid);
   CHECK(length(point_of<N>(state.pose.centre) - kMiddle) < 0.3);
 }
 
@@ -56,7 +56,7 @@ TEST_CASE_TEMPLATE("a larger tool comes off the wall on its own side", N, FixedN
   for (const double above : {2.0, 4.0, 6.0, 7.5}) {  // where a smaller tool's centre was
     CAPTURE(above);
     const ProxyState<N> state = placed_anew<N>(rig, {32, 33 + above, 32}, {32, 10, 32});
-    REQUIRE(state.placed);
+    REQUIRE(state.valid);
     CHECK(point_of<N>(state.pose.centre)[1] == doctest::Approx(33 + kRadius).epsilon(0.005));
   }
 }
@@ -73,7 +73,7 @@ TEST_CASE_TEMPLATE("a larger tool that has no room in its cavity is not put outs
     ContactRig<N> rig(ball, shell);
     for (const Point at : {kMiddle, kMiddle + Point{3, -2, 1}, kMiddle + Point{0, 0, 5.5}}) {
       const ProxyState<N> state = placed_anew<N>(rig, at, kMiddle);
-      CHECK_FALSE(state.placed);
+      CHECK_FALSE(state.valid);
       CHECK(state.search.refused());
     }
   }
@@ -87,11 +87,11 @@ TEST_CASE_TEMPLATE("a tool that fits nowhere is refused until its goal is free",
   });
   ContactRig<N> rig(ball, solid);
   ProxyState<N> state = placed_anew<N>(rig, {80, 80, 80}, {80, 80, 80});
-  CHECK_FALSE(state.placed);
+  CHECK_FALSE(state.valid);
   CHECK(state.search.refused());
   rig.field().begin_tick();
   rig.follow(plan<N>(), state, {place_of<N>({80, 260, 80}), {}});
-  CHECK(state.placed);
+  CHECK(state.valid);
 }
 
 namespace {
@@ -104,7 +104,7 @@ struct OneWayField : PlainField<N> {
   Contacts<N> query(ContactVec<Real> q) {
     --left;
     Contacts<N> felt;
-    felt.buried = length(point_of<N>(q) - way_out) > 0.01;
+    felt.no_normal = length(point_of<N>(q) - way_out) > 0.01;
     return felt;
   }
   [[nodiscard]] bool is_solid(ContactVec<Real>) const { return true; }

@@ -63,7 +63,7 @@ TEST_CASE_TEMPLATE("a contact tells spring, normal and no torque of a ball", N, 
   const TestVolume volume = block();
   ContactRig<N> rig(kBall, volume);
   ProxyState<N> state;
-  CHECK(follow(plan<N>(), state, rig.field(), pose_of<N>({30, 40, 30})).placing ==
+  CHECK(follow(plan<N>(), state, rig.field(), pose_of<N>({30, 40, 30})).status ==
         ProxyStatus::placed);
   ProxyContact<N> contact;
   for (double y = 40; y > 35; y -= 0.5) {
@@ -141,7 +141,7 @@ TEST_CASE_TEMPLATE("a tool with no room to turn keeps its orientation, and follo
   ProxyState<N> state;
   const auto turning = plan<N>(0, rotation_step_of(9.5));
   ProxyPose<N> goal = pose_of<N>({35, 35, 35});
-  REQUIRE(follow(turning, state, rig.field(), goal).placing == ProxyStatus::placed);
+  REQUIRE(follow(turning, state, rig.field(), goal).status == ProxyStatus::placed);
   const double half = 0.5;  // a radian about z
   goal.turn = {{}, {}, typename N::Unit(std::sin(half)), typename N::Unit(std::cos(half))};
   ProxyContact<N> contact;
@@ -170,8 +170,8 @@ TEST_CASE_TEMPLATE("a start inside of the solid ends outside, by a force that gr
     CHECK(field.queries <= SweepRules::kMaxQueries);
     const double now = length(point_of<N>(contact.spring));
     CHECK(now <= felt + 0.25 + 1e-3);
-    CHECK((contact.placing == ProxyStatus::placed || now == 0));
-    searched += contact.placing == ProxyStatus::placed ? 0 : 1;
+    CHECK((contact.status == ProxyStatus::placed || now == 0));
+    searched += contact.status == ProxyStatus::placed ? 0 : 1;
     felt = now;
   }
   CHECK(searched >= 28);  // two ticks a unit
@@ -186,9 +186,9 @@ TEST_CASE_TEMPLATE("a start with nothing free near is refused, until the hand is
   ProxyState<N> state;
   ProxyContact<N> contact;
   for (int i = 0; i < 150; ++i) contact = follow(plan<N>(), state, field, pose_of<N>({0, -200, 0}));
-  CHECK(contact.placing == ProxyStatus::refused);
+  CHECK(contact.status == ProxyStatus::refused);
   CHECK(length(point_of<N>(contact.spring)) == 0);
-  CHECK(follow(plan<N>(), state, field, pose_of<N>({0, 3, 0})).placing == ProxyStatus::placed);
+  CHECK(follow(plan<N>(), state, field, pose_of<N>({0, 3, 0})).status == ProxyStatus::placed);
   const auto back = follow(plan<N>(), state, field, pose_of<N>({0, -2, 0}));
   CHECK(point_of<N>(back.spring)[1] == doctest::Approx(2).epsilon(0.01));  // and no ramp
 }
@@ -201,7 +201,7 @@ TEST_CASE_TEMPLATE("a volume that fills up around the tool starts the search aga
   std::fill(volume.density.begin(), volume.density.end(), Density{0});
   ProxyState<N> state;
   const auto goal = pose_of<N>({30, 31, 30});
-  CHECK(follow(plan<N>(), state, rig.field(), goal).placing == ProxyStatus::placed);
+  CHECK(follow(plan<N>(), state, rig.field(), goal).status == ProxyStatus::placed);
   std::copy(full.density.begin(), full.density.end(), volume.density.begin());
   double felt = 0;
   ProxyContact<N> contact;
@@ -211,7 +211,7 @@ TEST_CASE_TEMPLATE("a volume that fills up around the tool starts the search aga
     CHECK(now <= felt + 0.25 + 1e-3);
     felt = now;
   }
-  CHECK(contact.placing == ProxyStatus::placed);
+  CHECK(contact.status == ProxyStatus::placed);
   CHECK(felt == doctest::Approx(7).epsilon(0.03));
 }
 

@@ -247,11 +247,11 @@ TEST_CASE_TEMPLATE("a start with the shaft inside of the solid finds a place for
   const Body body = ledge();
   ShaftRig<N> rig(tool_with("ball", 5, 10, kShaft), {&body});
   const Point hand{28, 28, 32};
-  for (int tick = 0; tick < 300 && !rig.state().placed; ++tick) rig.tick(hand);
-  REQUIRE(rig.state().placed);
+  for (int tick = 0; tick < 300 && !rig.state().valid; ++tick) rig.tick(hand);
+  REQUIRE(rig.state().valid);
   rig.field().begin_tick();
   const Contacts<N> felt = rig.field().query(rig.state().pose.centre);
-  CHECK_FALSE(felt.buried);
+  CHECK_FALSE(felt.no_normal);
   CHECK(double(felt.depth) < 0.06);
 }
 

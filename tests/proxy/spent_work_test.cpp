@@ -19,7 +19,7 @@ constexpr double kBowl = 5;
 using Face = std::pair<double, Point> (*)(Point);
 
 /// A point in a bowl about the origin, solid beyond kBowl, whose queries of a tick are counted
-/// down; beyond them they answer `buried`. A turned tool is in the solid while `holds_turns`.
+/// down; beyond them they answer `no_normal`. A turned tool is in the solid while `holds_turns`.
 template <class N>
 class CountedBowl : public SolidField<N, Face> {
  public:
@@ -31,10 +31,10 @@ class CountedBowl : public SolidField<N, Face> {
   void begin_tick() { left_ = queries_; }
   Contacts<N> query(ContactVec<typename N::Real> at) {
     Contacts<N> contacts;
-    contacts.buried = (left_ <= 0 && !unseen_) || (holds_turns && !(turn_ == Orientation<N>{}));
+    contacts.no_normal = (left_ <= 0 && !unseen_) || (holds_turns && !(turn_ == Orientation<N>{}));
     unseen_ = false;
     --left_;
-    return contacts.buried ? contacts : SolidField<N, Face>::query(at);
+    return contacts.no_normal ? contacts : SolidField<N, Face>::query(at);
   }
   [[nodiscard]] bool half_spent() const { return left_ <= queries_ / 2; }
   [[nodiscard]] bool may_query() const { return left_ > 0; }
@@ -58,7 +58,7 @@ struct Led {
     plan.rotation_step = typename N::Unit(rotation_step);
     plan.ramp_per_tick = typename N::Real(1);
     state.pose.centre = place_of<N>({0, -kBowl, 0});
-    state.placed = true;
+    state.valid = true;
   }
   ProxyContact<N> tick(Point goal, const Orientation<N>& turn = {}) {
     field.begin_tick();
@@ -139,7 +139,7 @@ TEST_CASE_TEMPLATE("a shorter step asks for no free way", N, FixedNumbers, Doubl
   using Real = typename N::Real;
   Cage<N> cage;
   ProxyState<N> state;
-  state.placed = true;
+  state.valid = true;
   const auto tick = [&] { return follow({}, state, cage, {place_of<N>({0, -9, 0}), {}}); };
   CHECK(tick().queries > 3);  // one step after the other fails
   CHECK(cage.asked == 1);

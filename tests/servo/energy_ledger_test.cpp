@@ -73,7 +73,7 @@ EnergyLedger<N> press(double n_per_mm, int ticks, At at_mm) {
     const Real at = static_cast<Real>(at_mm(i));
     ledger.move(sum<N>(parts), {Real(0), at - last, Real(0)}, 1);
     last = at;
-    parts = {.felt = true, .spring = vec<N>(0, n_per_mm * std::max(0.0, -double(at)), 0)};
+    parts = {.contact = true, .spring = vec<N>(0, n_per_mm * std::max(0.0, -double(at)), 0)};
     ledger.split(parts);
     ledger.send(parts);
   }
@@ -139,7 +139,7 @@ TEST_CASE_TEMPLATE(
   constexpr double kStiffness = 0.5, kFromMm = 1, kToMm = 1.5;
   constexpr std::uint32_t kGap = 10;
   const auto spring = [](double depth_mm) {
-    return ForceParts<N>{.felt = true, .spring = vec<N>(0, kStiffness * depth_mm, 0)};
+    return ForceParts<N>{.contact = true, .spring = vec<N>(0, kStiffness * depth_mm, 0)};
   };
   for (const double share : {1.0, 0.7}) {  // held all the time; faded, to this mean
     CAPTURE(share);
@@ -174,7 +174,7 @@ TEST_CASE("S14: the observer is the integral of force and velocity, whatever the
     CHECK(std::abs(ledger.total_mj() / 1000 - integral_j) < 1e-9);
     lowest_j = std::min(lowest_j, integral_j);
     const double force_n = kStiffnessNPerM * std::max(0.0, -x_m);
-    parts = {.felt = true, .spring = {0, force_n, 0}};
+    parts = {.contact = true, .spring = {0, force_n, 0}};
     ledger.split(parts);
     ledger.send(parts);
     for (int i = 0; i < kSteps; ++i) {

@@ -27,7 +27,7 @@ struct ConstraintPlane {
   ContactVec<typename N::Unit> normal{};  ///< out of the solid, length 1
   typename N::Real depth{};               ///< units; above 0: the tool is in too deep
   ContactVec<typename N::Real> arm{};     ///< from the tool's centre to the contact, units
-  bool behind = false;                    ///< met by shaft or handpiece (contact_query.hpp)
+  bool on_shaft = false;                  ///< met by shaft or handpiece (contact_query.hpp)
 
   friend constexpr bool operator==(const ConstraintPlane&,
                                    const ConstraintPlane&) noexcept = default;
@@ -55,7 +55,7 @@ struct Contacts {
   typename N::Real depth{-1};  ///< the largest of the planes' depths; -1 if nothing is near
   std::int32_t count = 0;
   std::array<ConstraintPlane<N>, kMaxPlanes> plane{};
-  bool buried = false;  ///< full density all round, or not queried: no normal, no plane
+  bool no_normal = false;  ///< full density all round, or not queried: no normal, no plane
 
   friend constexpr bool operator==(const Contacts&, const Contacts&) noexcept = default;
 };
@@ -63,20 +63,20 @@ struct Contacts {
 /// Inserts a plane by its depth. Of planes of one face, met by the same part, and of more than
 /// kMaxPlanes the deepest stay.
 template <class N>
-constexpr void insert(Contacts<N>& felt, const ConstraintPlane<N>& plane) noexcept {
-  const auto count = static_cast<std::size_t>(felt.count);
+constexpr void insert(Contacts<N>& contacts, const ConstraintPlane<N>& plane) noexcept {
+  const auto count = static_cast<std::size_t>(contacts.count);
   const auto says_the_same = [&](const ConstraintPlane<N>& other) {
-    return other.behind == plane.behind && are_one_face<N>(other.normal, plane.normal);
+    return other.on_shaft == plane.on_shaft && are_one_face<N>(other.normal, plane.normal);
   };
   std::size_t slot = 0;  // for the plane, in place of one of the same face or a shallower one
-  while (slot < count && !says_the_same(felt.plane[slot])) ++slot;
+  while (slot < count && !says_the_same(contacts.plane[slot])) ++slot;
   if (slot == kMaxPlanes) --slot;
-  if (slot < count && felt.plane[slot].depth >= plane.depth) return;
-  if (slot == count) ++felt.count;
-  for (; slot > 0 && felt.plane[slot - 1].depth < plane.depth; --slot) {
-    felt.plane[slot] = felt.plane[slot - 1];
+  if (slot < count && contacts.plane[slot].depth >= plane.depth) return;
+  if (slot == count) ++contacts.count;
+  for (; slot > 0 && contacts.plane[slot - 1].depth < plane.depth; --slot) {
+    contacts.plane[slot] = contacts.plane[slot - 1];
   }
-  felt.plane[slot] = plane;
+  contacts.plane[slot] = plane;
 }
 
 /// The planes that hold the tool. Depths are relative to the current position of its centre.
@@ -88,7 +88,7 @@ struct ConstraintSet {
 
 /// The allowed part of a displacement: `move` = displacement + SUM load_i normal_i.
 template <class N>
-struct Slide {
+struct ConstrainedMove {
   ContactVec<typename N::Real> move{};
   std::array<typename N::Real, kMaxPlanes> load{};  ///< of each plane, units
 };
@@ -155,8 +155,8 @@ class Loads {
 /// |displacement| <= 16384 units. At most 8 + 4 + 2 sets. Fixed: within 4 steps of each plane if
 /// the displacement is some units long.
 template <class N>
-[[nodiscard]] constexpr Slide<N> nearest(const ConstraintSet<N>& planes,
-                                         ContactVec<typename N::Real> displacement) noexcept {
+[[nodiscard]] constexpr ConstrainedMove<N> constrained_move(
+    const ConstraintSet<N>& planes, ContactVec<typename N::Real> displacement) noexcept {
   using Real = typename N::Real;
   using Unit = typename N::Unit;
   constexpr auto kTouching = Real(1.0 / 16384);  // 4 steps of Q15.16
@@ -171,7 +171,7 @@ template <class N>
   }
   for (std::size_t count = planes.count; count > 0; --count) {
     for (unsigned set = 0; set < 1U << count; ++set) {
-      Slide<N> slide{displacement};
+      ConstrainedMove<N> slide{displacement};
       if (set == 7) {
         if (!Loads<N>::of_three(products, need, slide.load)) continue;
       } else if (set != 0) {
@@ -206,7 +206,7 @@ template <class N>
                                             const ConstraintPlane<N>& plane) noexcept {
   for (std::size_t i = 0; i < planes.count; ++i) {
     const ConstraintPlane<N>& other = planes.plane[i];
-    if (other.behind == plane.behind &&
+    if (other.on_shaft == plane.on_shaft &&
         dot(other.normal, plane.normal) > typename N::Unit(kFalseCreaseCosine)) {
       return true;
     }
@@ -215,8 +215,8 @@ template <class N>
 }
 
 template <class N>
-[[nodiscard]] constexpr ConstraintSet<N> constraints_of(const Contacts<N>& felt) noexcept {
-  return {static_cast<std::size_t>(felt.count), felt.plane};
+[[nodiscard]] constexpr ConstraintSet<N> constraints_of(const Contacts<N>& contacts) noexcept {
+  return {static_cast<std::size_t>(contacts.count), contacts.plane};
 }
 
 /// Adds `older` planes while there is room; their depths are relative to a position `moved` before
@@ -236,8 +236,9 @@ constexpr void keep(ConstraintSet<N>& constraints, const ConstraintSet<N>& older
 /// Adds the planes of a position that turned out too deep, `displacement` ahead, that also hold the
 /// tool at its current position, to 0.02 units. Returns whether there was one.
 template <class N>
-[[nodiscard]] constexpr bool learn(ConstraintSet<N>& constraints, const Contacts<N>& seen,
-                                   ContactVec<typename N::Real> displacement) noexcept {
+[[nodiscard]] constexpr bool add_blocking_planes(
+    ConstraintSet<N>& constraints, const Contacts<N>& seen,
+    ContactVec<typename N::Real> displacement) noexcept {
   using Real = typename N::Real;
   constexpr auto kNear = Real(0.02);
   const std::size_t before = constraints.count;
@@ -273,17 +274,18 @@ template <class N>
 class CurvatureEstimate {
   using Real = typename N::Real;
   using Unit = typename N::Unit;
-  using Place = ContactVec<Real>;
+  using Position = ContactVec<Real>;
   using Turn = ContactVec<Unit>;  ///< of a normal: far less than a unit
 
  public:
   /// Learns from the deepest planes of two positions, the second `moved` from the first. Unlike
   /// planes are two walls, or one is met by the head and one by the shaft: all is forgotten.
   /// Normals that diverge are a bump: its steps only fall short, and are not eased.
-  constexpr void learn(const Contacts<N>& before, const Contacts<N>& after, Place moved) noexcept {
+  constexpr void learn(const Contacts<N>& before, const Contacts<N>& after,
+                       Position moved) noexcept {
     constexpr double kTelling = 0.01;  // units: over less, noise rotates a normal as much
     if (before.count == 0 || after.count == 0) return forget();
-    if (before.plane[0].behind != after.plane[0].behind) return forget();
+    if (before.plane[0].on_shaft != after.plane[0].on_shaft) return forget();
     const auto& from = before.plane[0].normal;
     const auto& to = after.plane[0].normal;
     if (dot(from, to) < Unit(kFalseCreaseCosine)) return forget();
@@ -308,12 +310,12 @@ class CurvatureEstimate {
 
   /// Newton's step with this curvature: `step`, shortened so that it ends where the load presses
   /// straight.
-  [[nodiscard]] constexpr Place eased(Place step, Real load) const noexcept {
+  [[nodiscard]] constexpr Position eased(Position step, Real load) const noexcept {
     if (!first_.known() || load <= Real(0)) return step;
-    const Unit p = share<N>(load, load + first_.radius);
+    const Unit p = fraction<N>(load, load + first_.radius);
     const Real a = along<N>(first_.across, step);
     if (!second_.known()) return step - times<N>(first_.across, multiply<Real>(p, a));
-    const Unit q = share<N>(load, load + second_.radius);
+    const Unit q = fraction<N>(load, load + second_.radius);
     const Real b = along<N>(second_.across, step);
     const Unit mixed = dot(first_.across, second_.across);
     const Real whole(Unit(1) - mixed * p * (mixed * q));
@@ -337,16 +339,16 @@ class CurvatureEstimate {
     turn_ = {};
   }
 
-  static constexpr Curve<N> curve_of(Turn turned, Place moved, Real least) noexcept {
+  static constexpr Curve<N> curve_of(Turn turned, Position moved, Real least) noexcept {
     const Turn across = direction_of_turn<N>(turned);
     const Real closing = along<N>(across, moved);
     if (closing <= least) return {};
     return {across, quotient<N>(closing, norm(turned))};
   }
   /// At most a radian.
-  static constexpr Turn turn_of_normal(const Curve<N>& curve, Place moved) noexcept {
+  static constexpr Turn turn_of_normal(const Curve<N>& curve, Position moved) noexcept {
     const Real step = std::clamp(along<N>(curve.across, moved), -curve.radius, curve.radius);
-    const Unit turn = share<N>(step, curve.radius);
+    const Unit turn = fraction<N>(step, curve.radius);
     return {curve.across.x * turn, curve.across.y * turn, curve.across.z * turn};
   }
 

@@ -28,9 +28,9 @@ namespace kerf {
 ///
 /// Call `turn` before the first query; any number of queries with this orientation may follow. A
 /// query reads the samples of the point shell in every volume, except for those in free space. With
-/// `refined` it adds a closer look near rest (docs/theory.md 3.5): at the cap of a ball, or at the
-/// close samples of another part and a patch of the volume. In fixed all kernels give the same
-/// bits. Servo thread; no heap.
+/// `refined` it adds samples near rest (docs/theory.md 3.5): the cap of a ball, or the close
+/// samples of another part and a patch of the volume. In fixed all kernels give the same bits.
+/// Servo thread; no heap.
 template <class N>
 class PartQuery {
  public:
@@ -70,13 +70,14 @@ class PartQuery {
   [[nodiscard]] bool may_query() const noexcept {
     return budget().left() >= work_.query + work_.closer;
   }
-  /// Whether enough work is left for a query at `q` with closer looks. If there is not enough for
+  /// Whether enough work is left for a query at `q` with refinement. If there is not enough for
   /// the costliest one, counts the samples that are near.
   [[nodiscard]] bool may_refine(ContactVec<Real> q) const noexcept {
     if (may_query()) return true;
     std::int64_t cost = work_.closer;
     for (const ContactVolume<N>& volume : volumes_) {
-      cost += QueryWork::kQueryOverhead + reader_.samples_near(volume, Reader::place_of(volume, q));
+      cost += QueryWork::kQueryOverhead +
+              reader_.samples_near(volume, Reader::voxel_position(volume, q));
     }
     return budget().left() >= cost;
   }
@@ -84,7 +85,7 @@ class PartQuery {
   /// Whether a volume's density at `q` reaches its iso.
   [[nodiscard]] bool is_solid(ContactVec<Real> q) const noexcept {
     return std::any_of(volumes_.begin(), volumes_.end(), [&](const ContactVolume<N>& volume) {
-      const VoxelVec<Real> at = Reader::place_of(volume, q);
+      const VoxelVec<Real> at = Reader::voxel_position(volume, q);
       return point_sample<N>(volume.field, {Reader::number_of(at.x), Reader::number_of(at.y),
                                             Reader::number_of(at.z)})
                  .density >= Reader::kIsoDensity;
@@ -100,11 +101,11 @@ class PartQuery {
     if (!(length > Real(SweepRules::kStep))) return Real(0);
     const PointTable<N>& table = points_.table;
     const bool as_one = table.round && table.needed_whole <= kFreeFarthest;
-    const std::int64_t spare = std::max<std::int64_t>(work, 0) / QueryWork::kFreeLook;
+    const std::int64_t spare = std::max<std::int64_t>(work, 0) / QueryWork::kFreeStep;
     std::int64_t looks = spare;
     MoveShare<N> share = kWholeMove<N>;
     for (const ContactVolume<N>& volume : volumes_) {
-      const VoxelVec<Real> at = Reader::place_of(volume, q),
+      const VoxelVec<Real> at = Reader::voxel_position(volume, q),
                            by = volume.frame.voxel_from_contact * move;
       // No edge of a voxel is shorter than a unit.
       const FreePath<N> way(
@@ -124,7 +125,7 @@ class PartQuery {
     } else {
       free = length * share;
     }
-    const std::int64_t looked = QueryWork::kFreeLook * (spare - looks);
+    const std::int64_t looked = QueryWork::kFreeStep * (spare - looks);
     budget().spend(looked);
     if (free <= Real(SweepRules::kStep)) budget().add_fruitless(looked);
     return free;
@@ -135,10 +136,10 @@ class PartQuery {
 
   [[nodiscard]] QueryBudget& budget() const noexcept { return reader_.budget(); }
 
-  /// Adds the plane of this volume, after a closer look if it is near rest; the deepest come first.
+  /// Adds the plane of this volume, refined if it is near rest; the deepest come first.
   void add_plane(const ContactVolume<N>& volume, ContactVec<Real> q, bool refined,
                  Contacts<N>& contacts) const noexcept {
-    const VoxelVec<Real> at = Reader::place_of(volume, q);
+    const VoxelVec<Real> at = Reader::voxel_position(volume, q);
     const Real margin = points_.reach + Real(1);
     const auto near = [&](Real x, std::int32_t n) { return x > -margin && x < Real(n) + margin; };
     const VoxelGrid& grid = volume.field.grid;
@@ -153,14 +154,14 @@ class PartQuery {
     const bool same_all_round = plane.normal == ContactVec<typename N::Unit>{};
     if (same_all_round && soft) return;
     if (same_all_round) {
-      contacts.buried = true;
+      contacts.no_normal = true;
       contacts.depth = std::max(contacts.depth, plane.depth);
       return;
     }
     insert(contacts, plane);
   }
 
-  /// The plane of these sums, after a closer look if it is near rest.
+  /// The plane of these sums, refined if it is near rest.
   [[nodiscard]] ConstraintPlane<N> plane_at(const ContactVolume<N>& volume, VoxelVec<Real> at,
                                             const PointSums<N>& sums, bool refined) const noexcept {
     const bool round = points_.table.round;
@@ -178,16 +179,17 @@ class PartQuery {
     using Unit = typename N::Unit;
     if (is_midway(volume.field.scale)) return;
     ContactVolume<N> seen = volume;
-    for (int look = 0; look < kMidwayLooks; ++look) {
+    for (int look = 0; look < kMidRampQueries; ++look) {
       if (plane.normal == ContactVec<Unit>{} || !may_query()) return;
       const auto arm = points_.table.round ? times<N>(-plane.normal, points_.reach) : plane.arm;
       const auto middle = ramp_middle<N>([&](Real below) {
-        budget().spend(QueryWork::kFreeLook);
+        budget().spend(QueryWork::kFreeStep);
         return Reader::density_at(volume, q + arm - times<N>(plane.normal, below));
       });
       if (middle.level == 0 || !may_query()) return;
       seen.field.scale = density_scale(middle.level);
-      const VoxelVec<Real> at = Reader::place_of(volume, q - times<N>(plane.normal, middle.below));
+      const VoxelVec<Real> at =
+          Reader::voxel_position(volume, q - times<N>(plane.normal, middle.below));
       const PointSums<N> sums = reader_.sums_at(seen.field, points_.table, volume.places, at);
       if (sums.weight <= typename N::Sum(0)) return;
       const ConstraintPlane<N> found = plane_at(seen, at, sums, true);
@@ -206,19 +208,18 @@ class PartQuery {
   mutable std::int32_t nearest_ = 0;  ///< group that stopped the last march
 };
 
-/// Most parts behind a head: shaft and handpiece.
+/// Shaft and handpiece.
 inline constexpr std::size_t kMaxShaftParts = 2;
 
-/// A part of a tool behind its head: it has contact and cuts nothing. It has a point shell of its
-/// own about its own middle, so that the head keeps the accuracy of its own reach, and planes of
-/// its own.
+/// Shaft or handpiece of a tool: a part with contact that cuts nothing. It has a point shell about
+/// its own middle, so that the head keeps the accuracy of its own reach, and planes of its own.
 template <class N>
 struct ShaftPart {
   PointShell<N> point_shell;
   typename N::Real up{};  ///< from the tool's centre to the part's, along the shaft, units
 };
 
-/// All parts of one tool behind its head; none without a shaft.
+/// Shaft and handpiece of one tool, if it has them.
 template <class N>
 struct ShaftParts {
   std::size_t count = 0;
@@ -227,11 +228,11 @@ struct ShaftParts {
 
 /// Cost of the queries of a whole tool.
 template <class N>
-[[nodiscard]] constexpr QueryWork query_work(const PointShell<N>& head, const ShaftParts<N>& behind,
+[[nodiscard]] constexpr QueryWork query_work(const PointShell<N>& head, const ShaftParts<N>& shaft,
                                              std::size_t volumes) noexcept {
   QueryWork work = query_work(head.table, volumes);
-  for (std::size_t i = 0; i < behind.count; ++i) {
-    work = work + query_work(behind.part[i].point_shell.table, volumes);
+  for (std::size_t i = 0; i < shaft.count; ++i) {
+    work = work + query_work(shaft.part[i].point_shell.table, volumes);
   }
   return work;
 }
@@ -245,10 +246,10 @@ template <class N>
 ///
 /// The work of a tick is counted in samples (`query_work`), since a query among noise or soft
 /// tissue costs twice that of one at a face. One budget serves all parts. Once it is spent, queries
-/// return `buried` without reading, and a sweep stays at its last position. With a shaft a query
-/// begins only if the work of the last one is left, and returns `buried` if a part has more samples
-/// near it than is left. The first query after a turn is always answered, then without closer
-/// looks. Servo thread; no heap.
+/// return `no_normal` without reading, and a sweep stays at its last position. With a shaft a query
+/// begins only if the work of the last one is left, and returns `no_normal` if a part has more
+/// samples near it than are left. The first query after a rotation is always answered, then without
+/// refinement. Servo thread; no heap.
 template <class N>
 class ContactQuery {
   using Real = typename N::Real;
@@ -309,26 +310,26 @@ class ContactQuery {
   [[nodiscard]] Contacts<N> query(ContactVec<Real> q) noexcept {
     Contacts<N> contacts;
     const bool refined = may_query(), answered = turned_;
-    contacts.buried = !refined && !answered;
-    if (contacts.buried) return contacts;
+    contacts.no_normal = !refined && !answered;
+    if (contacts.no_normal) return contacts;
     turned_ = false;
     const std::int64_t before = budget_.left();
     contacts = head_.query(q, refined);
     if (shaft_parts_ == 0) return contacts;
-    bool short_of_work = false;  // for closer looks at all parts
+    bool short_of_work = false;  // to refine all parts
     each_shaft_part([&](Part& part) {
       const ContactVec<Real> at = q + part.from_head;
       short_of_work = refined && (short_of_work || !part.query.may_refine(at));
       Contacts<N> of_part;
-      of_part.buried = short_of_work && !answered;
-      if (!of_part.buried) of_part = part.query.query(at, refined && !short_of_work);
+      of_part.no_normal = short_of_work && !answered;
+      if (!of_part.no_normal) of_part = part.query.query(at, refined && !short_of_work);
       for (std::size_t i = 0; i < static_cast<std::size_t>(of_part.count); ++i) {
         ConstraintPlane<N> plane = of_part.plane[i];
         plane.arm = plane.arm + part.from_head;
-        plane.behind = true;
+        plane.on_shaft = true;
         insert(contacts, plane);
       }
-      contacts.buried = contacts.buried || of_part.buried;
+      contacts.no_normal = contacts.no_normal || of_part.no_normal;
       contacts.depth = std::max(contacts.depth, of_part.depth);
     });
     last_ = short_of_work && !answered ? std::numeric_limits<std::int64_t>::max()

@@ -57,7 +57,7 @@ class ContactRefinement {
     using Ratio = typename N::Ratio;
     PointNumber<N> peak[3] = {};
     peak_offset(sums_, fall_of(means_, false), peak);
-    const Closeup<N> seen = reader_.look_closely_at(volume_, at_, peak);
+    const Closeup<N> seen = reader_.closeup_at(volume_, at_, peak);
     // If the tool touches at two positions the peak from two means may be at neither.
     if (seen.height <= Ratio(0)) return;
     const auto offset = turned_offset<N>(seen.offset, reader_.rows());
@@ -163,7 +163,7 @@ inline constexpr double kMidwayFrom = 0.32, kMidwayTo = 0.6;
 /// Range of the search for the middle to each side, units. It is at most one unit below the
 /// iso-surface, and reads raise a surface of low iso by up to 0.6 more.
 inline constexpr double kMidwayFarthest = 1.6;
-inline constexpr int kMidwayLooks = 2;          ///< the second along the normal of the first,
+inline constexpr int kMidRampQueries = 2;       ///< the second along the normal of the first,
 inline constexpr double kMidwayAlike = 0.9998;  ///< if it is rotated by more than a degree; cosine
 
 [[nodiscard]] constexpr bool is_midway(const DensityScale& scale) noexcept {

@@ -57,8 +57,8 @@ template <class N>
 
 /// part / whole, |part| <= whole, whole > 0. Fixed: rounds toward 0 at 2^-30.
 template <class N>
-[[nodiscard]] constexpr typename N::Unit share(typename N::Real part,
-                                               typename N::Real whole) noexcept {
+[[nodiscard]] constexpr typename N::Unit fraction(typename N::Real part,
+                                                  typename N::Real whole) noexcept {
   if constexpr (N::kIsFixed) {
     using Unit = typename N::Unit;
     const std::int64_t scaled = std::int64_t{part.raw()} * Unit(1).raw();
@@ -88,7 +88,7 @@ template <class N>
   using Real = typename N::Real;
   const Real length = norm(v);
   if (length < Real(1e-4)) return {};
-  return {share<N>(v.x, length), share<N>(v.y, length), share<N>(v.z, length)};
+  return {fraction<N>(v.x, length), fraction<N>(v.y, length), fraction<N>(v.z, length)};
 }
 
 /// The direction of a small rotation; 0 below 1e-6.

@@ -27,14 +27,14 @@ enum class ProxyStatus : std::uint8_t { searching, placed, refused };
 template <class N>
 class StartSearch {
   using Real = typename N::Real;
-  using Place = ContactVec<Real>;
+  using Position = ContactVec<Real>;
 
  public:
   static constexpr std::int32_t kReach = 64;  ///< units
 
   StartSearch() = default;
   /// Searches around the position of a former tool.
-  explicit constexpr StartSearch(Place around) noexcept : around_(around), replaces_(true) {}
+  explicit constexpr StartSearch(Position around) noexcept : around_(around), replaces_(true) {}
   /// The same search from its start, for another tool.
   [[nodiscard]] constexpr StartSearch again() const noexcept {
     return replaces_ ? StartSearch(around_) : StartSearch();
@@ -44,7 +44,7 @@ class StartSearch {
   template <ContactField<N> Field>
   constexpr ProxyStatus tick(Field& field, const ProxyPose<N>& goal, ProxyPose<N>& pose) noexcept {
     field.turn(goal.turn);
-    const Place middle = replaces_ && !refused() ? around_ : goal.centre;
+    const Position middle = replaces_ && !refused() ? around_ : goal.centre;
     if (is_free(field, middle, replaces_ ? SweepRules::kWedged : SweepRules::kTolerance)) {
       pose = {middle, goal.turn};
       return ProxyStatus::placed;
@@ -57,7 +57,7 @@ class StartSearch {
         if (refused()) return ProxyStatus::refused;
       }
       const int direction = direction_++;
-      const Place centre = middle + step(direction);
+      const Position centre = middle + step(direction);
       if (!leads_on(field, direction, middle, centre)) continue;
       ++queries;
       if (is_free(field, centre, SweepRules::kTolerance)) {
@@ -72,14 +72,15 @@ class StartSearch {
   static constexpr int kDirections = 27, kQueries = 13;
 
   template <ContactField<N> Field>
-  [[nodiscard]] static constexpr bool is_free(Field& field, Place centre, double depth) noexcept {
-    const Contacts<N> felt = field.query(centre);
-    return !felt.buried && felt.depth <= static_cast<Real>(depth);
+  [[nodiscard]] static constexpr bool is_free(Field& field, Position centre,
+                                              double depth) noexcept {
+    const Contacts<N> contacts = field.query(centre);
+    return !contacts.no_normal && contacts.depth <= static_cast<Real>(depth);
   }
   /// Whether this direction still leads out of the solid at `centre`, one unit after the last.
   template <ContactField<N> Field>
-  [[nodiscard]] constexpr bool leads_on(const Field& field, int direction, Place middle,
-                                        Place centre) noexcept {
+  [[nodiscard]] constexpr bool leads_on(const Field& field, int direction, Position middle,
+                                        Position centre) noexcept {
     const std::uint32_t bit = 1U << direction;
     if (direction == kDirections / 2 || (ended_ & bit) != 0)
       return false;  // the middle is no direction
@@ -90,14 +91,14 @@ class StartSearch {
     return (ended_ & bit) == 0;
   }
   /// `distance_` along one of the 27 directions of a 3x3x3 cube, by number.
-  [[nodiscard]] constexpr Place step(int direction) const noexcept {
+  [[nodiscard]] constexpr Position step(int direction) const noexcept {
     constexpr double kPerAxis[4] = {0, 1, 0.7071067811865476, 0.5773502691896258};
     const int x = direction % 3 - 1, y = direction / 3 % 3 - 1, z = direction / 9 - 1;
     const Real part = Real(distance_) * static_cast<Real>(kPerAxis[x * x + y * y + z * z]);
     return {Real(x) * part, Real(y) * part, Real(z) * part};
   }
 
-  Place around_{};
+  Position around_{};
   bool replaces_ = false;
   std::int32_t distance_ = 1;
   int direction_ = 0;  ///< to be tried next at this distance
@@ -120,7 +121,7 @@ struct ProxyPlan {
 template <class N>
 struct ProxyState {
   ProxyPose<N> pose;
-  bool placed = false;
+  bool valid = false;
   StartSearch<N> search;
   bool ramping = false;
   typename N::Real longest{};  ///< limit of the spring while it ramps, units
@@ -128,8 +129,8 @@ struct ProxyState {
 
   /// Searches a position around the current one: another tool took over, or the solid changed.
   constexpr void search_again() noexcept {
-    search = placed ? StartSearch<N>(pose.centre) : search.again();
-    placed = false;
+    search = valid ? StartSearch<N>(pose.centre) : search.again();
+    valid = false;
     memory = {};
   }
   /// The spring grows from 0 again, after ticks without force.
@@ -142,7 +143,7 @@ struct ProxyState {
 /// The contact of one tick.
 template <class N>
 struct ProxyContact {
-  ProxyStatus placing = ProxyStatus::searching;
+  ProxyStatus status = ProxyStatus::searching;
   ProxyPose<N> pose;
   ContactVec<typename N::Real> spring{};  ///< from goal to proxy, units: force over stiffness
   /// Of the press of the head, out of the solid; 0 in air.
@@ -181,8 +182,8 @@ constexpr void add_loads(const SweepResult<N>& swept, typename N::Unit friction,
   using Real = typename N::Real;
   const Real length = norm(contact.spring);
   if (length < Real(1e-3)) return;
-  ContactVec<Real> pressed{}, behind{}, arm{}, head_arm{};
-  Real whole(0), load_behind(0);
+  ContactVec<Real> pressed{}, on_shaft{}, arm{}, head_arm{};
+  Real whole(0), shaft_load(0);
   for (std::size_t i = 0; i < swept.planes.count; ++i) whole = whole + swept.slide.load[i];
   const bool loaded = whole >= Real(1e-3);
   if (!loaded && moving) return;
@@ -192,13 +193,13 @@ constexpr void add_loads(const SweepResult<N>& swept, typename N::Unit friction,
     const ConstraintPlane<N>& plane = swept.planes.plane[i];
     const Real load = swept.slide.load[i];
     pressed = pressed + times<N>(plane.normal, load);
-    if (plane.behind) {
-      behind = behind + times<N>(plane.normal, load);
-      load_behind = load_behind + load;
+    if (plane.on_shaft) {
+      on_shaft = on_shaft + times<N>(plane.normal, load);
+      shaft_load = shaft_load + load;
     } else {
-      head_arm = head_arm + part_of<N>(plane.arm, share<N>(load, whole));
+      head_arm = head_arm + part_of<N>(plane.arm, fraction<N>(load, whole));
     }
-    arm = arm + part_of<N>(plane.arm, share<N>(load, whole));
+    arm = arm + part_of<N>(plane.arm, fraction<N>(load, whole));
     contact.part[i] = load / length;
     contact.moment_arm = contact.moment_arm + moment<N>(plane.arm, plane.normal) * contact.part[i];
   }
@@ -206,26 +207,26 @@ constexpr void add_loads(const SweepResult<N>& swept, typename N::Unit friction,
   const Real rubbed = norm(along_faces);
   const Real held = multiply<Real>(friction, norm(pressed));
   if (rubbed > held && !moving)
-    pressed = pressed + part_of<N>(along_faces, share<N>(rubbed - held, rubbed));
+    pressed = pressed + part_of<N>(along_faces, fraction<N>(rubbed - held, rubbed));
   // If the shaft presses, less than the tolerance of a position is no press of the head.
-  const ContactVec<Real> head = pressed - behind;
+  const ContactVec<Real> head = pressed - on_shaft;
   const Real by_head = norm(head);
-  if (load_behind <= Real(0) || by_head >= Real(SweepRules::kTolerance)) {
+  if (shaft_load <= Real(0) || by_head >= Real(SweepRules::kTolerance)) {
     contact.normal = direction_of<N>(head);
   }
   contact.moment_arm = contact.moment_arm + moment<N>(arm, direction_of<N>(along_faces)) *
                                                 (std::min(rubbed, length) / length);
   contact.head_arm = head_arm;
   contact.press = direction_of<N>(pressed);
-  if (load_behind <= Real(0)) return;
-  const Real on_head = whole - load_behind;
+  if (shaft_load <= Real(0)) return;
+  const Real on_head = whole - shaft_load;
   if (on_head > Real(1e-3)) contact.head_arm = head_arm * (whole / on_head);
-  contact.shaft_fraction = share<N>(std::min(load_behind, length), length);
+  contact.shaft_fraction = fraction<N>(std::min(shaft_load, length), length);
   // If shaft and head press against each other, both bear more than the press of the hand.
   const Real together = norm(pressed);
   const bool presses = by_head >= Real(SweepRules::kTolerance);
   if (!presses || by_head < together) {
-    contact.head_fraction = presses ? share<N>(by_head, together) : typename N::Unit(0);
+    contact.head_fraction = presses ? fraction<N>(by_head, together) : typename N::Unit(0);
   }
 }
 
@@ -241,7 +242,7 @@ constexpr ProxyContact<N> follow(const ProxyPlan<N>& plan, ProxyState<N>& state,
   using Real = typename N::Real;
   ProxyContact<N> contact;
   contact.pose = state.pose;
-  contact.placing = state.placed ? ProxyStatus::placed : ProxyStatus::searching;
+  contact.status = state.valid ? ProxyStatus::placed : ProxyStatus::searching;
   if (!is_finite(goal.centre.x + goal.centre.y + goal.centre.z) ||
       !is_finite(goal.turn.x + goal.turn.y + goal.turn.z + goal.turn.w)) {
     return contact;
@@ -250,12 +251,12 @@ constexpr ProxyContact<N> follow(const ProxyPlan<N>& plan, ProxyState<N>& state,
     return std::clamp(at, Real(-kContactLimit), Real(kContactLimit));
   };
   goal.centre = {clamped(goal.centre.x), clamped(goal.centre.y), clamped(goal.centre.z)};
-  if (!state.placed) {
-    contact.placing = state.search.tick(field, goal, state.pose);
-    state.placed = contact.placing == ProxyStatus::placed;
-    state.ramping = state.placed && !(state.pose == goal);
+  if (!state.valid) {
+    contact.status = state.search.tick(field, goal, state.pose);
+    state.valid = contact.status == ProxyStatus::placed;
+    state.ramping = state.valid && !(state.pose == goal);
     state.longest = Real(0);
-    contact.pose = state.placed ? state.pose : goal;
+    contact.pose = state.valid ? state.pose : goal;
     return contact;
   }
   const ProxyPose<N> last = state.pose;
@@ -265,10 +266,10 @@ constexpr ProxyContact<N> follow(const ProxyPlan<N>& plan, ProxyState<N>& state,
   contact.pose = state.pose;
   contact.queries = swept.queries;
   contact.turned = swept.turned;
-  if (swept.buried || swept.depth > Real(kLostDepth)) {
+  if (swept.no_normal || swept.depth > Real(kLostDepth)) {
     state.pose = last;
     state.search_again();
-    contact.placing = ProxyStatus::searching;
+    contact.status = ProxyStatus::searching;
     contact.pose = goal;
     return contact;
   }
@@ -280,7 +281,8 @@ constexpr ProxyContact<N> follow(const ProxyPlan<N>& plan, ProxyState<N>& state,
     state.longest = state.longest + plan.ramp_per_tick;
     const Real length = norm(contact.spring);
     state.ramping = length > state.longest;
-    if (state.ramping) contact.spring = part_of<N>(contact.spring, share<N>(state.longest, length));
+    if (state.ramping)
+      contact.spring = part_of<N>(contact.spring, fraction<N>(state.longest, length));
   }
   return contact;
 }

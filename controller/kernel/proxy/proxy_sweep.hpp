@@ -10,15 +10,15 @@
 
 namespace kerf {
 
-/// What the sweep asks of tool and volumes.
+/// The queries that the sweep needs of tool and volumes.
 ///
-///   query(q)          what the tool feels with its centre at q
-///   free_distance(q, m)  how far the centre may go from q along m and feel nothing: a lower
+///   query(q)          contacts of the tool with its centre at q
+///   free_distance(q, m)  how far the centre may go from q along m without contact: a lower
 ///                     bound, at most |m|; 0 if unknown
 ///   turn(t)           sets the orientation of the tool for all queries from now on
-///   is_solid(q)       the place is in the solid
-///   half_spent()      half of the tick's work is spent: the rest is the move's
-///   may_query()       the tick's work allows another query
+///   is_solid(q)       whether the position is in the solid
+///   half_spent()      whether half of the tick's work is spent: the rest is the move's
+///   may_query()       whether the tick's work allows another query
 template <class F, class N>
 concept ContactField = requires(F field, ContactVec<typename N::Real> q, Orientation<N> turn) {
   { field.query(q) } -> std::convertible_to<Contacts<N>>;
@@ -32,10 +32,10 @@ concept ContactField = requires(F field, ContactVec<typename N::Real> q, Orienta
 /// Constants of the sweep (docs/theory.md 4.2 and after); lengths in units of contact space.
 struct SweepRules {
   static constexpr std::int32_t kMaxQueries = 32;
-  /// No turn begins once so many queries are made, pushes included; the rest is the move's.
+  /// No rotation begins after so many queries, pushes included; the rest is the move's.
   static constexpr std::int32_t kMaxRotationQueries = 12;
-  static constexpr double kTolerance = 0.01;  ///< a place this deep is allowed
-  /// The same of a turn. It leaves the move some play: else an inverted cone with a shaft stops
+  static constexpr double kTolerance = 0.01;  ///< a position this deep is allowed
+  /// The same of a rotation. It leaves the move some play: else an inverted cone with a shaft stops
   /// between plates (rows `traps`, --seed 15590).
   static constexpr double kTurnTolerance = 0.005;
   static constexpr double kArrived = 0.004;  ///< no shorter displacement is tried
@@ -43,36 +43,36 @@ struct SweepRules {
   /// units, is one unit deep: beyond it density falls again, and its gradient leads onward.
   static constexpr double kStep = 0.875;
   /// A step this much nearer to the goal is kept. Without it the force steps by 2.1 instead of 1.2
-  /// % at the worst place of a noisy valley (tests/servo/force_cut_test.cpp).
+  /// % at the worst position of a noisy valley (tests/servo/force_cut_test.cpp).
   static constexpr double kGain = 0.001;
-  static constexpr double kResidual = 0.8;  ///< share of the displacement that a step may leave
-  /// A next step shorter than this share of a failed one is tried whole. Without it the force of
+  static constexpr double kResidual = 0.8;  ///< fraction of the displacement that a step may leave
+  /// A next step shorter than this fraction of a failed one is tried whole. Without it the force of
   /// `cutting, milling into the GE tooth, 16 bits` steps by 1.5 % instead of 0.3.
   static constexpr double kEased = 0.5;
   static constexpr double kShrink = 0.4;  ///< of a failed step, for the next try
-  /// Share of a step below which the proxy rather lags. What a tool has milled leaves it a play of
-  /// hundredths of a unit, where longer steps only meet the other wall.
+  /// Fraction of a step below which the proxy lags instead. A groove of the tool's own leaves it a
+  /// play of hundredths of a unit, and longer steps only meet the other wall.
   static constexpr double kShortest = 0.02;
   static constexpr double kPush = 0.5;  ///< longest correction of one push
-  /// The tool may be this deep in one wall where a push out of it leads into another. What two
-  /// opposite faces read differs by some hundredths from place to place, and a tool that is turned
-  /// until both hold it would stay whatever the hand does: of tools that spin askew in slots 4 %
-  /// did, with 0.03 still one in a thousand. And it may be so deep where a tick has no query left
-  /// for a push before it kept any step: else it would stay, too.
+  /// The tool may be this deep in one wall if a push out of it leads into another. The depths of
+  /// two opposite faces differ by some hundredths between positions, and a tool that is rotated
+  /// until both hold it would stay whatever the hand does: 4 % of the tools that spin askew in
+  /// slots did, with 0.03 still one in a thousand. It may also be this deep if a tick has no query
+  /// left for a push before it kept any step: else it would stay, too.
   static constexpr double kWedged = 0.05;
-  /// No step ends so much farther from the goal than the nearest place of the tick. With more a
-  /// tool at rest wanders about on noise. With less than two kTolerance, by which allowed places
-  /// differ in depth, a slot without play does not let the tool out.
+  /// No step ends farther from the goal than the nearest position of the tick by more than this.
+  /// With more a tool at rest wanders about on noise. With less than two kTolerance, by which
+  /// allowed positions differ in depth, a slot without play does not let the tool out.
   static constexpr double kAstray = 0.03;
 };
 
-/// Sine of half the largest turn theta of one step (docs/theory.md 4.6): a sample `reach` units
+/// Sine of half the largest rotation theta of one step (docs/theory.md 4.6): a sample `reach` units
 /// from the centre, reach >= 1, moves by kStep at most, as theta / 2 <= 1.0472 sin(theta / 2).
 [[nodiscard]] constexpr double rotation_step_of(double reach) noexcept {
   return SweepRules::kStep / (2 * 1.0472 * reach);
 }
 
-/// Where the proxy is and how it is turned.
+/// Position and orientation of the proxy.
 template <class N>
 struct ProxyPose {
   ContactVec<typename N::Real> centre{};
@@ -81,52 +81,52 @@ struct ProxyPose {
   friend constexpr bool operator==(const ProxyPose&, const ProxyPose&) noexcept = default;
 };
 
-/// What one tick of the sweep found.
+/// Result of one tick of the sweep.
 template <class N>
 struct SweepResult {
-  ConstraintSet<N> planes;  ///< that hold the proxy; depths from its centre
-  Slide<N> slide;           ///< of the displacement to the goal; loads in units
+  ConstraintSet<N> planes;   ///< that hold the proxy; depths from its centre
+  ConstrainedMove<N> slide;  ///< of the displacement to the goal; loads in units
   std::int32_t queries = 0;
-  bool turned = true;  ///< the tool has the orientation that was asked
+  bool turned = true;  ///< the tool has the orientation of the goal
   typename N::Real depth{-1};
-  bool buried = false;  ///< nothing to push against: the start rule is needed
+  bool no_normal = false;  ///< nothing to push against: the start rule is needed
 };
 
-/// What one tick of the sweep hands to the next, while the tool and the solid stay.
+/// Memory of the sweep from tick to tick, while the tool and the solid stay.
 template <class N>
 struct SweepMemory {
-  /// Of the solid around the tool as it is turned. Learned anew in each tick, its first step would
-  /// be as wrong as the noise of a normal times the spring: deep in a bore of its own a tool would
-  /// jump about by a unit in a tick.
+  /// Of the solid around the tool in its orientation. Estimated anew in each tick, its first step
+  /// would have an error of the noise of a normal times the spring: deep in a bore of its own a
+  /// tool would jump by a unit in a tick.
   CurvatureEstimate<N> curvature;
-  std::int32_t stuck_ticks = 0;  ///< ticks in a row whose work found no step
+  std::int32_t stuck_ticks = 0;  ///< ticks in a row that found no step
 };
 
 /// One tick of the proxy (docs/theory.md 4.2, 4.6): it moves from a pose that the solid allows
 /// towards a goal, first the orientation, then the centre. When its queries or its attempts are
 /// spent it lags. It never jumps, so a wall of 2 units holds it at any speed.
 ///
-/// Where a tick's work is spent before any step was kept, the next one would try the same in vain.
-/// So it does not turn, and its first step is kShrink of the last one's, down to kShortest: each
-/// length is once a tick's first try. Then it begins anew.
+/// If the work of a tick is spent before any step was kept, the next tick would try the same in
+/// vain. So it does not rotate, and its first step is kShrink of the last one's, down to kShortest:
+/// each length is the first try of one tick. Then it starts again with whole steps.
 ///
-/// From an allowed place the tool goes at most kAstray farther from its goal: in a groove of its
+/// From an allowed position the tool goes at most kAstray farther from its goal: in a groove of its
 /// own shape planes that change from query to query would lead it on and on.
 ///
 /// At most kMaxQueries calls of `query`. Coordinates within +-kContactLimit.
 ///
-/// Limits: a loose bit of material less than 1.5 units across may slip in between the samples. What
-/// is wholly inside of the tool is not felt until the tool leaves it; from 2 units on it may then
-/// hold the tool. The tool may not find into a slot without any play.
+/// Limits: a loose bit of material less than 1.5 units across may slip in between the samples. A
+/// bit that is wholly inside of the tool has no contact until the tool leaves it; from 2 units on
+/// it may then hold the tool. The tool may not find its way into a slot without any play.
 template <class N, ContactField<N> Field>
 class ProxySweep {
   using Real = typename N::Real;
   using Unit = typename N::Unit;
-  using Place = ContactVec<Real>;
+  using Position = ContactVec<Real>;
 
  public:
   /// `friction`: Coulomb's coefficient, 0 to 1. `rotation_step`: rotation_step_of(reach), or 0 for
-  /// a tool that does not turn or is round. `memory`: what the last tick left in it, or new.
+  /// a tool that does not rotate or is round. `memory`: of the last tick, or new.
   constexpr ProxySweep(Field& field, ProxyPose<N>& pose, SweepMemory<N>& memory, Unit friction,
                        Unit rotation_step) noexcept
       : field_(field),
@@ -138,92 +138,92 @@ class ProxySweep {
   constexpr SweepResult<N> tick(const ProxyPose<N>& goal) noexcept {
     here_ = turn_to(goal.turn);
     held_by_ = constraints_of(here_);
-    const Slide<N> slide = move_to(goal.centre);
-    return {held_by_, slide, queries_, pose_.turn == goal.turn, here_.depth, here_.buried};
+    const ConstrainedMove<N> slide = move_to(goal.centre);
+    return {held_by_, slide, queries_, pose_.turn == goal.turn, here_.depth, here_.no_normal};
   }
 
  private:
-  /// A place that was tried: where the tool ended after the pushes, what it feels there and which
-  /// planes it met; `first` is what it felt before the pushes.
+  /// A position that was tried: where the tool ended after the pushes, its contacts there and the
+  /// planes that it met; `first` are the contacts before the pushes.
   struct Trial {
-    Place centre;
-    Contacts<N> felt;
+    Position centre;
+    Contacts<N> contacts;
     ConstraintSet<N> planes;
     Contacts<N> first;
     bool allowed = false;  ///< the tool may go there
   };
   enum class Trying { turn, move };
 
-  constexpr Contacts<N> look(Place centre) noexcept {
+  constexpr Contacts<N> query(Position centre) noexcept {
     ++queries_;
     return field_.query(centre);
   }
-  [[nodiscard]] constexpr bool may_look() const noexcept {
+  [[nodiscard]] constexpr bool queries_left() const noexcept {
     return queries_ < SweepRules::kMaxQueries;
   }
-  /// No deeper than a wedged tool may be: it need not get out.
-  [[nodiscard]] static constexpr bool allows_rest(const Contacts<N>& felt) noexcept {
-    return !felt.buried && felt.depth <= Real(SweepRules::kWedged);
+  /// Not deeper than a wedged tool may be: it need not get out.
+  [[nodiscard]] static constexpr bool allows_rest(const Contacts<N>& contacts) noexcept {
+    return !contacts.no_normal && contacts.depth <= Real(SweepRules::kWedged);
   }
-  /// Within the tolerance, or no deeper than the tool is where it is too deep already.
-  [[nodiscard]] constexpr bool allows(const Contacts<N>& felt, Real tolerance) const noexcept {
-    return !felt.buried && felt.depth <= std::max(tolerance, here_.depth);
+  /// Within the tolerance, or not deeper than the tool is if it is too deep already.
+  [[nodiscard]] constexpr bool allows(const Contacts<N>& contacts, Real tolerance) const noexcept {
+    return !contacts.no_normal && contacts.depth <= std::max(tolerance, here_.depth);
   }
 
-  /// How to go on from a place.
+  /// The next displacement from a position.
   struct Route {
-    Slide<N> slide;      ///< under the planes alone
-    Place displacement;  ///< that friction leaves of it
+    ConstrainedMove<N> slide;  ///< under the planes alone
+    Position displacement;     ///< that friction leaves of it
     Real length;
   };
 
   /// Coulomb's friction (docs/theory.md 4.5): across the pressing direction the tool sticks while
-  /// its displacement is at most friction times the load, and else slides that much less. Towards
-  /// the planes nothing rubs.
+  /// its displacement is at most friction times the load, and else slides that much less. There is
+  /// no friction towards the planes.
   [[nodiscard]] constexpr Route route(const ConstraintSet<N>& planes,
-                                      Place displacement) const noexcept {
-    const Slide<N> slide = nearest(planes, displacement);
-    const Place& move = slide.move;
+                                      Position displacement) const noexcept {
+    const ConstrainedMove<N> slide = constrained_move(planes, displacement);
+    const Position& move = slide.move;
     if (friction_ <= Unit(0) || planes.count == 0) return {slide, move, norm(move)};
-    const Place pressed = move - displacement;
+    const Position pressed = move - displacement;
     const auto normal = direction_of<N>(pressed);
-    const Place closing = times<N>(normal, along<N>(normal, move));
-    const Place rubbing = move - closing;
+    const Position closing = times<N>(normal, along<N>(normal, move));
+    const Position rubbing = move - closing;
     const Real held = multiply<Real>(friction_, norm(pressed));
     const Real length = norm(rubbing);
     if (length <= held) return {slide, closing, norm(closing)};
-    const Place left = closing + part_of<N>(rubbing, share<N>(length - held, length));
+    const Position left = closing + part_of<N>(rubbing, fraction<N>(length - held, length));
     return {slide, left, norm(left)};
   }
 
-  /// Looks at `centre`, which is `moved` from the place where the depths of `known` count. A tool
-  /// that is too deep there is pushed out, twice at most. A turn begins no push in the second half
-  /// of the tick's work.
-  constexpr Trial attempt(Trying what, Place centre, const ConstraintSet<N>& known,
-                          Place moved) noexcept {
+  /// Queries `centre`, which is `moved` from the position of the depths of `known`. A tool that is
+  /// too deep there is pushed out, twice at most. A rotation begins no push in the second half of
+  /// the tick's work.
+  constexpr Trial attempt(Trying what, Position centre, const ConstraintSet<N>& known,
+                          Position moved) noexcept {
     const bool turns = what == Trying::turn;
     const auto tolerance =
         static_cast<Real>(turns ? SweepRules::kTurnTolerance : SweepRules::kTolerance);
-    const Contacts<N> first = look(centre);
+    const Contacts<N> first = query(centre);
     Trial trial{centre, first, constraints_of(first), first};
     keep(trial.planes, known, moved);
     const ConstraintSet<N> unpushed = trial.planes;
-    Place pushed{};
+    Position pushed{};
     int pushes = 0;
     for (; pushes < 2; ++pushes) {
-      if (allows(trial.felt, tolerance) || trial.felt.count == 0) break;
-      if (!may_look() || !field_.may_query()) break;
+      if (allows(trial.contacts, tolerance) || trial.contacts.count == 0) break;
+      if (!queries_left() || !field_.may_query()) break;
       if (turns && field_.half_spent()) break;
       for (auto& plane : trial.planes.plane) {
         plane.depth = std::min(plane.depth, Real(SweepRules::kPush));
       }
-      pushed = pushed + nearest(trial.planes, {}).move;
+      pushed = pushed + constrained_move(trial.planes, {}).move;
       trial.centre = centre + pushed;
-      trial.felt = look(trial.centre);
-      trial.planes = constraints_of(trial.felt);
+      trial.contacts = query(trial.centre);
+      trial.planes = constraints_of(trial.contacts);
       keep(trial.planes, known, moved + pushed);
     }
-    trial.allowed = allows(trial.felt, tolerance);
+    trial.allowed = allows(trial.contacts, tolerance);
     if (!turns && !trial.allowed && (pushes > 0 || !kept_) && allows_rest(first)) {
       return {centre, first, unpushed, first, true};
     }
@@ -231,19 +231,20 @@ class ProxySweep {
     return trial;
   }
 
-  /// How far a turn to `next` may push the tool: as far as it moves the tool's own samples, which
-  /// is what a wall can ask. A wedge of two walls asks for more: it would lift the tool out.
+  /// Longest push of the tool by a rotation to `next`: as far as it moves the tool's own samples,
+  /// which is enough for one wall. A wedge of two walls would need more: it would lift the tool
+  /// out.
   [[nodiscard]] constexpr Real longest_push(const Orientation<N>& next) const noexcept {
     const Unit of_step = std::min(half_sine_between(next, pose_.turn) / rotation_step_, Unit(1));
     return multiply<Real>(Real(SweepRules::kStep), of_step) + Real(SweepRules::kTolerance);
   }
 
-  /// Turns towards `goal` while places are found that allow it, and says what the tool feels then.
+  /// Rotates towards `goal` while allowed positions are found. Returns the contacts then.
   constexpr Contacts<N> turn_to(const Orientation<N>& goal) noexcept {
     if (rotation_step_ <= Unit(0)) {
       pose_.turn = goal;
       field_.turn(goal);
-      return look(pose_.centre);
+      return query(pose_.centre);
     }
     Unit step = rotation_step_;
     bool known = false;
@@ -256,7 +257,7 @@ class ProxySweep {
       if (trial.allowed && norm(trial.centre - pose_.centre) <= longest_push(next)) {
         pose_ = {trial.centre, next};
         memory_.curvature = {};
-        here_ = trial.felt;
+        here_ = trial.contacts;
         known = true;
         step = rotation_step_;
       } else {
@@ -265,39 +266,39 @@ class ProxySweep {
       }
     }
     field_.turn(pose_.turn);
-    return known ? here_ : look(pose_.centre);
+    return known ? here_ : query(pose_.centre);
   }
 
-  /// The route in a bowl, from a place whose deepest plane stands first.
+  /// The route in a bowl, from a position whose deepest plane is the first.
   [[nodiscard]] constexpr Route eased_route(const ConstraintSet<N>& planes,
-                                            Place displacement) const noexcept {
+                                            Position displacement) const noexcept {
     Route onward = route(planes, displacement);
     onward.displacement = memory_.curvature.eased(onward.displacement, onward.slide.load[0]);
     onward.length = norm(onward.displacement);
     return onward;
   }
 
-  /// Moves towards `goal` while steps are found that the solid allows and that bring the tool
-  /// onward: the displacement that is left under all known planes shrinks to kResidual, or the goal
-  /// comes nearer. By the distance to the goal alone the proxy would stick in creases and cycle in
-  /// grooves. Returns the slide of the last place.
-  constexpr Slide<N> move_to(Place goal) noexcept {
+  /// Moves towards `goal` while steps are found that the solid allows and that are progress: the
+  /// displacement that is left under all known planes shrinks to kResidual, or the goal comes
+  /// nearer. By the distance to the goal alone the proxy would stick in creases and cycle in
+  /// grooves. Returns the constrained move of the last position.
+  constexpr ConstrainedMove<N> move_to(Position goal) noexcept {
     Unit shrink = first_step();
     Route onward = eased_route(held_by_, goal - pose_.centre);
-    // Farther than any place, while the tool has to get out of the solid.
+    // Farther than any position, while the tool has to get out of the solid.
     Real nearest_yet = allows_rest(here_) ? norm(goal - pose_.centre) : Real(4 * kContactLimit);
     const auto enough = static_cast<Real>(SweepRules::kArrived);
-    while (may_look() && field_.may_query() && !here_.buried && onward.length >= enough) {
-      const Place from = pose_.centre;
+    while (queries_left() && field_.may_query() && !here_.no_normal && onward.length >= enough) {
+      const Position from = pose_.centre;
       auto step = static_cast<Real>(SweepRules::kStep);
-      // A whole step that failed found no free way, and none is asked for again.
+      // A whole step that failed found no free path, so a shorter one does not search again.
       if (here_.count == 0 && shrink == Unit(1)) {
         step = std::max(step, field_.free_distance(from, onward.displacement));
       }
-      const Unit capped = step < onward.length ? share<N>(step, onward.length) : Unit(1);
-      const Place moved = part_of<N>(onward.displacement, shrink * capped);
+      const Unit capped = step < onward.length ? fraction<N>(step, onward.length) : Unit(1);
+      const Position moved = part_of<N>(onward.displacement, shrink * capped);
       const Trial trial = attempt(Trying::move, from + moved, held_by_, moved);
-      memory_.curvature.learn(here_, trial.felt, trial.centre - from);
+      memory_.curvature.learn(here_, trial.contacts, trial.centre - from);
       if (trial.allowed) {
         const Route next = eased_route(trial.planes, goal - trial.centre);
         const Real distance = norm(goal - trial.centre);
@@ -305,7 +306,7 @@ class ProxySweep {
         const bool leads = next.length < multiply<Real>(Unit(SweepRules::kResidual), onward.length);
         if ((leads && !strays) || distance < norm(goal - from) - Real(SweepRules::kGain)) {
           pose_.centre = trial.centre;
-          here_ = trial.felt;
+          here_ = trial.contacts;
           if (allows_rest(here_)) nearest_yet = std::min(nearest_yet, distance);
           held_by_ = trial.planes;
           onward = next;
@@ -314,7 +315,7 @@ class ProxySweep {
           continue;
         }
       }
-      const bool learned = learn(held_by_, trial.first, moved);
+      const bool learned = add_blocking_planes(held_by_, trial.first, moved);
       const Route again = eased_route(held_by_, goal - from);
       if (learned || again.length < multiply<Real>(Unit(SweepRules::kEased), norm(moved))) {
         onward = again;
@@ -330,7 +331,7 @@ class ProxySweep {
     return onward.slide;
   }
 
-  /// Share of a step that a tick tries first.
+  /// Fraction of a step that a tick tries first.
   [[nodiscard]] constexpr Unit first_step() const noexcept {
     Unit step(1);
     for (std::int32_t tick = 0; tick < memory_.stuck_ticks; ++tick) {

@@ -29,15 +29,15 @@ struct QueryWork {
   static constexpr std::int64_t kCloseSamples = 2;     ///< cost of one sample of a closeup
 
   /// Cost of one step in the free-space map: each waits for the result of the last one.
-  static constexpr std::int64_t kFreeLook = 12;
+  static constexpr std::int64_t kFreeStep = 12;
   /// Cost of finding whether a group is in free space. Without it the costliest tick of an
   /// inverted cone with a handpiece takes 98 us, not 66 (rows `ticks`).
-  static constexpr std::int64_t kGroupLook = 2;
+  static constexpr std::int64_t kGroupTest = 2;
   /// Cost of finding whether a voxel near a sample reaches the iso.
-  static constexpr std::int64_t kNearLook = 27;
+  static constexpr std::int64_t kIsoTest = 27;
 
   std::int64_t query = 0;   ///< one query at most: all samples in every volume
-  std::int64_t closer = 0;  ///< its closer looks at most
+  std::int64_t closer = 0;  ///< its refinements at most
   std::int64_t turn = 0;    ///< to transform all samples
   std::int64_t head = 0;    ///< query and turn of the head alone; 0: no shaft
   std::int64_t near = 0;    ///< extra of a query, not part of the budget that it needs to begin
@@ -50,15 +50,15 @@ struct QueryWork {
     return {a.query + b.query, more ? a.closer : a.closer + b.closer, a.turn + b.turn,
             more ? a.head : a.query + a.turn, a.near + b.near};
   }
-  /// Budget of a tick. Only the first query after a turn may exceed it, and then has no closer
-  /// look.
+  /// Budget of a tick. Only the first query after a rotation may exceed it, and then without
+  /// refinement.
   [[nodiscard]] constexpr std::int64_t budget() const noexcept {
     return std::max(kTickSamples, kLeastQueries * (head > 0 ? head : query + turn));
   }
   /// Limit of the work for fruitless marches through free space; beyond it no group tries one.
   [[nodiscard]] constexpr std::int64_t most_wasted() const noexcept { return budget() / 8; }
-  /// Upper bound of a tick of a sweep: the budget, and one query after the turns, whose last ones
-  /// may reach into the half of the move. A tool of few samples runs out of queries first.
+  /// Upper bound of a tick of a sweep: the budget, and one query after the rotations, whose last
+  /// ones may reach into the half of the move. A tool of few samples runs out of queries first.
   [[nodiscard]] constexpr std::int64_t most() const noexcept {
     const std::int64_t after = 8 * (query + closer) > budget() ? turn + query : 0;
     return std::min(budget() + after + 2 * near, SweepRules::kMaxQueries * (query + closer + near) +
@@ -66,7 +66,7 @@ struct QueryWork {
   }
 };
 
-/// The work of a tool with this point shell. Its closer looks are the cap of a ball, or a closeup
+/// The work of a tool with this point shell. Its refinements are the cap of a ball, or a closeup
 /// and two patches of another shape (closeup.hpp).
 template <class N>
 [[nodiscard]] constexpr QueryWork query_work(const PointTable<N>& point_shell,
@@ -80,7 +80,7 @@ template <class N>
   return {.query = times * query,
           .closer = times * (point_shell.round ? cap : closeup + 2 * patch),
           .turn = times * (point_shell.count / 8),
-          .near = times * Work::kNearLook};
+          .near = times * Work::kIsoTest};
 }
 
 /// Work that is left of a tick, in the samples of `QueryWork`; all parts of a tool spend it. Before
@@ -94,7 +94,7 @@ class QueryBudget {
     fruitless_ = 0;
   }
   constexpr void spend(std::int64_t work) noexcept { left_ -= work; }
-  /// Counts work that was spent on a march through free space which found no way.
+  /// Counts work of a march through free space that found no free path.
   constexpr void add_fruitless(std::int64_t work) noexcept { fruitless_ += work; }
 
   [[nodiscard]] constexpr std::int64_t left() const noexcept { return left_; }
@@ -155,8 +155,8 @@ class SampleReader {
     }
   }
   /// A position of contact space in voxels of a volume.
-  [[nodiscard]] static VoxelVec<Real> place_of(const ContactVolume<N>& volume,
-                                               ContactVec<Real> q) noexcept {
+  [[nodiscard]] static VoxelVec<Real> voxel_position(const ContactVolume<N>& volume,
+                                                     ContactVec<Real> q) noexcept {
     return volume.frame.voxel_from_contact * q + volume.frame.origin_vox;
   }
 
@@ -191,7 +191,7 @@ class SampleReader {
   [[nodiscard]] std::int64_t samples_near(const ContactVolume<N>& volume,
                                           VoxelVec<Real> at) const noexcept {
     const PointNumber<N> centre[3] = {number_of(at.x), number_of(at.y), number_of(at.z)};
-    budget_.spend(QueryWork::kGroupLook * points_.table.groups);
+    budget_.spend(QueryWork::kGroupTest * points_.table.groups);
     std::int64_t near = 0;
     for (std::int32_t group = 0; group < points_.table.groups; ++group) {
       if (!is_free(points_.table, volume.places, centre, volume.field, group)) near += kPointGroup;
@@ -200,8 +200,8 @@ class SampleReader {
   }
 
   /// The peak of the close samples around an offset of the tool, whose centre is at `at`.
-  [[nodiscard]] Closeup<N> look_closely_at(const ContactVolume<N>& volume, VoxelVec<Real> at,
-                                           const PointNumber<N> (&offset)[3]) const noexcept {
+  [[nodiscard]] Closeup<N> closeup_at(const ContactVolume<N>& volume, VoxelVec<Real> at,
+                                      const PointNumber<N> (&offset)[3]) const noexcept {
     CloseSamples<N> samples;
     samples.take(points_.close, offset);
     const PointTable<N> table = samples.table();
@@ -226,7 +226,7 @@ class SampleReader {
   /// does (docs/theory.md 3.2).
   [[nodiscard]] bool iso_is_near(const ContactVolume<N>& volume, VoxelVec<Real> at,
                                  std::int32_t sample) const noexcept {
-    budget_.spend(QueryWork::kNearLook);  // a sample has eight voxels
+    budget_.spend(QueryWork::kIsoTest);  // a sample has eight voxels
     const VoxelGrid& grid = volume.field.grid;
     const PointNumber<N> centre[3] = {number_of(at.x), number_of(at.y), number_of(at.z)};
     const std::int32_t end[3] = {grid.nx, grid.ny, grid.nz};
@@ -254,7 +254,7 @@ class SampleReader {
                                        ContactVec<Real> place) noexcept {
     DensityField plain = volume.field;
     plain.scale = {};
-    const VoxelVec<Real> at = place_of(volume, place);
+    const VoxelVec<Real> at = voxel_position(volume, place);
     const auto density =
         point_sample<N>(plain, {number_of(at.x), number_of(at.y), number_of(at.z)}).density;
     if constexpr (N::kIsFixed) {
