@@ -84,35 +84,40 @@ TEST_CASE("after a stall the force starts again from nothing") {
   CHECK(last_n > 0.5);
 }
 
-TEST_CASE("a device that is parked again and again while it presses bears the heat of every ramp") {
+namespace {
+
+/// Steps a servo that presses with more than the peak, which alone is three times the budget of
+/// heat, by `step(armed, tick)`: the heat stays within the budget, and uses it.
+template <class Step>
+void check_heat(const Step& step) {
   LoadedScene scene = half_space_scene();
-  scene.force.stiffness_n_per_mm = 50;  // more than the peak, which alone is three times the budget
+  scene.force.stiffness_n_per_mm = 50;
   ArmedServo armed(scene);
   double heat_n2 = 0;
   for (int tick = 0; tick < 8000; ++tick) {
-    auto report = armed.arm.at(0, 0.3, 0);
-    report.parked =
-        tick % 130 < 20;  // too short to calibrate, and hardly more than the ramp between
-    const double force_n = length(armed.servo->step(report).force_n);
+    const double force_n = length(step(armed, tick).force_n);
     heat_n2 += (force_n * force_n - heat_n2) / 10'000;
     CHECK(std::sqrt(heat_n2) <= scene.limits.continuous_force_n + 0.01);
   }
   CHECK(std::sqrt(heat_n2) > 0.9 * scene.limits.continuous_force_n);
 }
 
+}  // namespace
+
+TEST_CASE("a device that is parked again and again while it presses bears the heat of every ramp") {
+  check_heat([](ArmedServo& armed, int tick) {
+    auto report = armed.arm.at(0, 0.3, 0);
+    report.parked =
+        tick % 130 < 20;  // too short to calibrate, and little more than the ramp between
+    return armed.servo->step(report);
+  });
+}
+
 TEST_CASE("a force that is held without reports heats the motors like any other") {
-  LoadedScene scene = half_space_scene();
-  scene.force.stiffness_n_per_mm = 50;  // more than the peak
-  ArmedServo armed(scene);
-  double heat_n2 = 0;
-  for (int tick = 0; tick < 8000; ++tick) {
+  check_heat([](ArmedServo& armed, int tick) {
     const bool lost = tick % 5 != 0;  // as long as a force is held in full
-    const ServoOutput out = lost ? armed.servo->step({}) : armed.step(0, 0.3, 0);
-    const double force_n = length(out.force_n);
-    heat_n2 += (force_n * force_n - heat_n2) / 10'000;
-    CHECK(std::sqrt(heat_n2) <= scene.limits.continuous_force_n + 0.01);
-  }
-  CHECK(std::sqrt(heat_n2) > 0.9 * scene.limits.continuous_force_n);
+    return lost ? armed.servo->step({}) : armed.step(0, 0.3, 0);
+  });
 }
 
 TEST_CASE("a force beyond the motors keeps its direction, and what was sent is what is told") {

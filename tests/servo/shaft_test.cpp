@@ -126,28 +126,6 @@ TEST_CASE("a head that is pressed beside its shaft cuts by its own part of the f
   }
 }
 
-TEST_CASE("a tool cuts the same bits as without its shaft while that is in air") {
-  for (const auto numeric : {NumericKind::fixed, NumericKind::float64}) {
-    CAPTURE(static_cast<int>(numeric));
-    LoadedScene bare = upright_scene([](double, double y, double) { return y; });
-    bare.servo.numeric = numeric;
-    bare.cut.machinability_mm3_per_s_n = 1;
-    LoadedScene shafted = bare;
-    bare.tools[0].shaft = {};
-    Miller without(bare), with(shafted);
-    for (int tick = 0; tick < 600; ++tick) {
-      const std::array<double, 3> at{0.5 * std::sin(0.01 * tick), std::max(0.3, 1.3 - 0.003 * tick),
-                                     0};
-      const ServoOutput a = without.step(at), b = with.step(at);
-      REQUIRE(a.removed_steps == b.removed_steps);
-      REQUIRE(a.force_n == b.force_n);
-      REQUIRE(a.proxy_offset_mm == b.proxy_offset_mm);
-      REQUIRE_FALSE(b.shaft);
-    }
-    CHECK(without.removed_mm3() > 0.05);
-  }
-}
-
 TEST_CASE("a ball that cuts its own bore is not held by its shaft, neither in nor out") {
   for (const auto numeric : {NumericKind::fixed, NumericKind::float64}) {
     CAPTURE(static_cast<int>(numeric));

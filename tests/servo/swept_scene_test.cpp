@@ -52,23 +52,6 @@ TEST_CASE("a workspace scale leaves the stiffness at the device as it is") {
   CHECK(out.force_n[1] == doctest::Approx(0.4 * (1 - out.position_mm[1]) / 0.5).epsilon(0.02));
 }
 
-TEST_CASE("no stroke gets through a wall of two voxels, nor feels nothing behind it") {
-  LoadedScene scene = swept_scene(NumericKind::fixed);
-  scene.volumes[0] = volume_of(
-      48, kVoxelMm, [](double, double y, double) { return (std::abs(y) - kVoxelMm) / 2; });
-  ArmedServo armed(scene, {0, 3, 0});
-  double y_mm = 3;
-  while (y_mm > -2.5) {  // 4 m/s, across the wall within two ticks
-    y_mm -= 4;
-    static_cast<void>(armed.step(0, std::max(y_mm, -2.5), 0));
-  }
-  for (int tick = 0; tick < 50; ++tick) {
-    const ServoOutput out = armed.step(0, -2.5, 0);
-    CHECK(out.position_mm[1] + out.proxy_offset_mm[1] > 1);  // the ball rests on the upper face
-    CHECK(out.contact_n[1] > 1);
-  }
-}
-
 TEST_CASE("a larger tool that takes over under pressure is pushed out with a ramp") {
   LoadedScene scene = swept_scene(NumericKind::fixed);
   scene.tools.push_back(ball(32));
