@@ -51,6 +51,23 @@ bool begins(const std::string& text, const std::string& with) {
   return text.starts_with(with);
 }
 
+Triangles moved(Triangles triangles, float x, float y, float z) {
+  for (LooseTriangle& t : triangles) {
+    for (auto& corner : t) corner = {corner[0] + x, corner[1] + y, corner[2] + z};
+  }
+  return triangles;
+}
+
+Triangles both(Triangles a, const Triangles& b) {
+  a.insert(a.end(), b.begin(), b.end());
+  return a;
+}
+
+Triangles inverted(Triangles triangles) {
+  for (LooseTriangle& t : triangles) std::swap(t[0], t[1]);
+  return triangles;
+}
+
 double volume_mm3(const ToolMesh& mesh) {
   double sum = 0;
   for (const auto& t : mesh.triangles) {
@@ -58,6 +75,10 @@ double volume_mm3(const ToolMesh& mesh) {
     sum += extremes::dot(a, extremes::cross(b, c)) / 6;
   }
   return sum;
+}
+
+double volume_mm3(const Triangles& triangles) {
+  return volume_mm3(join_triangles(triangles, 1, "bur.stl"));
 }
 
 }  // namespace
@@ -137,11 +158,7 @@ TEST_CASE("a file of more triangles than are taken is refused before they are") 
 }
 
 TEST_CASE("joined triangles share corners, stand in the middle and are in mm") {
-  Triangles high = kBar;
-  for (LooseTriangle& t : high) {
-    for (auto& corner : t) corner[1] += 10;
-  }
-  const ToolMesh mesh = join_triangles(high, 0.5, "bur.stl");
+  const ToolMesh mesh = join_triangles(moved(kBar, 0, 10, 0), 0.5, "bur.stl");
   CHECK(mesh.points_mm.size() == 10);
   CHECK(mesh.triangles.size() == 16);
   double low = 1e9, top = -1e9;
@@ -154,63 +171,26 @@ TEST_CASE("joined triangles share corners, stand in the middle and are in mm") {
   CHECK(volume_mm3(mesh) == doctest::Approx(4.5 * 4 / 8));
 }
 
-TEST_CASE("a mesh that is inside out is turned, and a triangle without area is left out") {
-  Triangles inside_out = kBar;
-  for (LooseTriangle& t : inside_out) std::swap(t[0], t[1]);
-  CHECK(volume_mm3(join_triangles(inside_out, 1, "bur.stl")) == doctest::Approx(4.5 * 4));
+TEST_CASE(
+    "a mesh or a part of it that is inside out is turned, and a hollow stays one in any order of "
+    "the parts") {
+  CHECK(volume_mm3(inverted(kBar)) == doctest::Approx(4.5 * 4));
+  CHECK(volume_mm3(both(kBar, inverted(moved(kBar, 5, 0, 0)))) == doctest::Approx(2 * 4.5 * 4));
+  const Triangles body = prism(3, 8, 4);
+  CHECK(volume_mm3(both(body, inverted(kBar))) == doctest::Approx(volume_mm3(body) - 4.5 * 4));
+  CHECK(volume_mm3(both(kBar, inverted(body))) == doctest::Approx(volume_mm3(body) - 4.5 * 4));
+  // The body aside is the larger: the mesh is not inside out as a whole.
+  const Triangles aside = moved(prism(4, 8, 4), 20, 0, 0);
+  const double solid_mm3 = volume_mm3(aside) + volume_mm3(body);
+  const std::array<Triangles, 3> parts{aside, inverted(body), inverted(kBar)};
+  std::array<std::size_t, 3> order{0, 1, 2};
+  do {
+    const Triangles all = both(both(parts[order[0]], parts[order[1]]), parts[order[2]]);
+    CHECK(volume_mm3(all) == doctest::Approx(solid_mm3 - 4.5 * 4));
+  } while (std::next_permutation(order.begin(), order.end()));
   Triangles more = kBar;
-  more.push_back({kBar[0][0], kBar[0][1], kBar[0][0]});
+  more.push_back({kBar[0][0], kBar[0][1], kBar[0][0]});  // without area: it is left out
   CHECK(join_triangles(more, 1, "bur.stl").triangles.size() == 16);
-}
-
-TEST_CASE("a part that is inside out is turned beside one that is not") {
-  Triangles both = kBar;
-  for (LooseTriangle t : kBar) {
-    for (auto& corner : t) corner[0] += 5;
-    std::swap(t[0], t[1]);
-    both.push_back(t);
-  }
-  const ToolMesh mesh = join_triangles(both, 1, "bur.stl");
-  CHECK(volume_mm3(mesh) == doctest::Approx(2 * 4.5 * 4));
-  CHECK(mesh.triangles.size() == 32);
-}
-
-TEST_CASE("a hollow stays one, also where the whole mesh is inside out") {
-  const Triangles outer = extremes::prism(3, 8, 4);
-  Triangles hollow = outer, inside_out = kBar;
-  for (LooseTriangle t : kBar) {
-    std::swap(t[0], t[1]);
-    hollow.push_back(t);
-  }
-  for (LooseTriangle t : outer) {
-    std::swap(t[0], t[1]);
-    inside_out.push_back(t);
-  }
-  const double outer_mm3 = volume_mm3(join_triangles(outer, 1, "bur.stl"));
-  for (const Triangles& mesh : {hollow, inside_out}) {
-    CHECK(volume_mm3(join_triangles(mesh, 1, "bur.stl")) == doctest::Approx(outer_mm3 - 4.5 * 4));
-  }
-}
-
-TEST_CASE("a body that is inside out keeps its hollow, in whatever order its parts come") {
-  const auto inside_out = [](Triangles mesh) {
-    for (LooseTriangle& t : mesh) std::swap(t[0], t[1]);
-    return mesh;
-  };
-  Triangles aside = extremes::prism(4, 8, 4);  // the larger: the mesh is not inside out as a whole
-  for (LooseTriangle& t : aside) {
-    for (auto& corner : t) corner[0] += 20;
-  }
-  const Triangles body = extremes::prism(3, 8, 4), hollow = kBar;
-  const double solid_mm3 = volume_mm3(join_triangles(aside, 1, "bur.stl")) +
-                           volume_mm3(join_triangles(body, 1, "bur.stl"));
-  std::array<Triangles, 3> parts{aside, inside_out(body), inside_out(hollow)};
-  for (std::array<std::size_t, 3> order{0, 1, 2};;) {
-    Triangles all;
-    for (const std::size_t i : order) all.insert(all.end(), parts[i].begin(), parts[i].end());
-    CHECK(volume_mm3(join_triangles(all, 1, "bur.stl")) == doctest::Approx(solid_mm3 - 4.5 * 4));
-    if (!std::next_permutation(order.begin(), order.end())) break;
-  }
 }
 
 TEST_CASE("a folder or a pipe is no STL file, and says so") {
@@ -251,23 +231,7 @@ TEST_CASE("coordinates that no tool has are refused with their triangle") {
   CHECK(begins(join_error(kBar, 1000), "bur.stl: triangle 1 has the coordinate "));
 }
 
-using extremes::fluted_bur;
-using extremes::mesh_of_units;
-using extremes::prism;
-
 namespace {
-
-Triangles moved(Triangles triangles, float x, float y, float z) {
-  for (LooseTriangle& t : triangles) {
-    for (auto& corner : t) corner = {corner[0] + x, corner[1] + y, corner[2] + z};
-  }
-  return triangles;
-}
-
-Triangles both(Triangles a, const Triangles& b) {
-  a.insert(a.end(), b.begin(), b.end());
-  return a;
-}
 
 /// Whose sides lie in the planes x, z = +-half.
 Triangles upright_bar(double half, double length) {
@@ -316,21 +280,15 @@ TEST_CASE("bodies that overlap are one, and a body beside the axis stays there")
 }
 
 TEST_CASE("a hollow body has no samples in its hollow") {
-  Triangles hollow = upright_bar(2.3, 4);
-  for (LooseTriangle& t : hollow) std::swap(t[0], t[1]);
-  const SceneTool shell = mesh_of_units("t", both(upright_bar(5.2, 10), hollow));
+  const SceneTool shell =
+      mesh_of_units("t", both(upright_bar(5.2, 10), inverted(upright_bar(2.3, 4))));
   CHECK(shell.offsets.size() == 11 * 11 * 10 - 5 * 5 * 4);
 }
 
 TEST_CASE("samples fill the volume of a fluted bur, in any direction of its triangles") {
   const SceneTool bur = mesh_of_units("t", fluted_bur(40));
-  double volume = 0;
-  for (const auto& t : bur.mesh.triangles) {
-    const auto [a, b, c] = bur.mesh.corners(t);
-    volume += extremes::dot(a, extremes::cross(b, c)) / 6;
-  }
   CHECK(static_cast<double>(bur.offsets.size()) ==
-        doctest::Approx(volume).epsilon(0.03));  // edges of its blades too
+        doctest::Approx(volume_mm3(bur.mesh)).epsilon(0.03));  // edges of its blades too
   const std::set<ToolOffset> different(bur.offsets.begin(), bur.offsets.end());
   CHECK(different.size() == bur.offsets.size());
 }
