@@ -4,11 +4,10 @@
 #include <algorithm>
 #include <array>
 #include <string>
+#include <type_traits>
 #include <utility>
 
-#include "hil/device/falcon.hpp"
-#include "hil/device/omni.hpp"
-#include "hil/device/wooden.hpp"
+#include "hil/device/devices.hpp"
 #include "hil/hil_error.hpp"
 #include "hil/script/hand_script_file.hpp"
 #include "shared/numeric/fnv1a.hpp"
@@ -39,17 +38,14 @@ FaultScript faults_of(const EmulatorOptions& o) {
   return script;
 }
 
-/// Parameters of a device from script and command line.
-template <class Params>
-Params plant_of(const EmulatorOptions& o, const PlantValues& of_script) {
-  Params params;
+/// Sets the parameters that script and command line give.
+void take_plants(const EmulatorOptions& o, const PlantValues& of_script, PlantParams& params) {
   take_plant(of_script, params);
   take_plant(o.plant, params);
   if (params.mode_hz > 0 && params.joint_inertia_kg_m2[0] <= 0) {
     throw HilError("--mode-hz: without inertia nothing rings; give --joint-inertia, such as 1e-4");
   }
   if (o.drop_torque) params.on_silence = OnSilence::drop_torque;
-  return params;
 }
 
 }  // namespace
@@ -85,22 +81,17 @@ void HandServer::lead(Emulator& emulator, int cycles) noexcept {
 }
 
 std::unique_ptr<DeviceModel> make_device(const EmulatorOptions& o, const PlantValues& of_script) {
-  switch (o.personality) {
-    case Personality::falcon:
-      return std::make_unique<FalconModel>(plant_of<FalconParams>(o, of_script));
-    case Personality::woodenhaptics: {
-      auto params = plant_of<WoodenParams>(o, of_script);
+  return with_device_params(o.personality, [&](auto params) {
+    take_plants(o, of_script, params);
+    if constexpr (std::is_same_v<decltype(params), WoodenParams>) {
       params.packet_bytes = o.packet_bytes;
       params.wireless_button = o.wireless_button;
-      return std::make_unique<WoodenModel>(params);
+    } else if constexpr (std::is_same_v<decltype(params), OmniParams>) {
+      params.pot_noise = o.pot_noise;
+      params.seed = o.seed;
     }
-    case Personality::omni:
-      break;
-  }
-  auto params = plant_of<OmniParams>(o, of_script);
-  params.pot_noise = o.pot_noise;
-  params.seed = o.seed;
-  return std::make_unique<OmniModel>(params);
+    return make_model(params);
+  });
 }
 
 EmulatedDevice::EmulatedDevice(const EmulatorOptions& options)

@@ -50,7 +50,7 @@ std::vector<VoxelVec<double>> face_voxels(const ContactCase& at, std::size_t cou
 }
 
 void add_normals(const ContactMethod& method, const ContactCase& at, std::size_t count,
-                 Spread& errors) {
+                 ErrorStats& errors) {
   for (const VoxelVec<double>& voxel : face_voxels(at, count)) {
     const Point inward = relabel<WorldSpace>(method.sample(voxel));
     errors.add(angle_deg(-inward, at.shape.normal(at.volume.mm_from_voxel(voxel))));
@@ -58,7 +58,7 @@ void add_normals(const ContactMethod& method, const ContactCase& at, std::size_t
 }
 
 /// Steps along the face: if only the sampling changes the force, all of the change is error.
-void add_steps(const ForceAt& force, const Contact& contact, int count, Spread& errors) {
+void add_steps(const ForceAt& force, const Contact& contact, int count, ErrorStats& errors) {
   const Point step = along_face(contact.normal)[0] * kStepMm;
   Point before = force(contact.centre_mm);
   for (int i = 1; i <= count; ++i) {
@@ -98,7 +98,7 @@ double TiltedLoop::work(const ForceAt& force, int steps) const {
 }
 
 void add_errors(const ContactMethod& method, const ContactCase& at, const BallTool& tool,
-                const Effort& effort, ContactErrors& errors) {
+                const ErrorCases& effort, ContactErrors& errors) {
   const ForceAt force = [&](Point centre) { return force_share(method, at.volume, tool, centre); };
   const ForceAt sample = [&](Point place) {
     return relabel<WorldSpace>(method.sample(at.volume.voxel_from_mm(place)));
@@ -120,7 +120,7 @@ void add_errors(const ContactMethod& method, const ContactCase& at, const BallTo
 }
 
 void add_difference(const ContactMethod& method, const ContactMethod& truth, const ContactCase& at,
-                    const BallTool& tool, Spread& errors) {
+                    const BallTool& tool, ErrorStats& errors) {
   for (const Contact& contact : at.contacts) {
     errors.add(norm(force_share(method, at.volume, tool, contact.centre_mm) -
                     force_share(truth, at.volume, tool, contact.centre_mm)));
@@ -137,7 +137,7 @@ double noise_gain(const ContactChoice& choice, const BallTool& tool) {
     noise.density.push_back(static_cast<Density>(random() >> 16));
   }
   const auto method = contact_method(choice, noise, tool);
-  Spread spread;
+  ErrorStats spread;
   for (std::int32_t z = kGuard; z < kSide - kGuard; ++z) {
     for (std::int32_t y = kGuard; y < kSide - kGuard; ++y) {
       for (std::int32_t x = kGuard; x < kSide - kGuard; ++x) {
@@ -149,10 +149,10 @@ double noise_gain(const ContactChoice& choice, const BallTool& tool) {
   return spread.rms();
 }
 
-Spread interpolation_error(Arithmetic arithmetic) {
+ErrorStats interpolation_error(Arithmetic arithmetic) {
   constexpr int kCases = 6000;
   std::mt19937 random(5);
-  Spread spread;
+  ErrorStats spread;
   for (int n = 0; n < kCases; ++n) {
     std::array<std::int16_t, 8> corner{};
     for (std::int16_t& value : corner) value = static_cast<std::int16_t>(random() >> 16);

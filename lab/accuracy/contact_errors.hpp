@@ -12,14 +12,14 @@
 namespace kerf::accuracy {
 
 /// Errors of many cases: their root mean square and the largest.
-class Spread {
+class ErrorStats {
  public:
   void add(double error) noexcept {
     square_ += error * error;
     worst_ = std::max(worst_, std::abs(error));
     ++count_;
   }
-  void add(const Spread& other) noexcept {
+  void add(const ErrorStats& other) noexcept {
     square_ += other.square_;
     worst_ = std::max(worst_, other.worst_);
     count_ += other.count_;
@@ -38,19 +38,19 @@ class Spread {
 /// Errors of a method. Forces are shares of p0 pi R^2, works shares of the work that goes to
 /// and fro on the way.
 struct ContactErrors {
-  Spread theory;         ///< |F - F_theory|
-  Spread direction_deg;  ///< between the two, if theory has a tenth of full scale
-  Spread normal_deg;     ///< of one sample at the voxels on the face, against the true normal
-  Spread sample_loop;    ///< closed loops of one sample about a place on the face
-  Spread tool_loop;      ///< the same of the whole tool, about the contact
-  Spread step;           ///< |dF| per kStepMm along the face
+  ErrorStats theory;         ///< |F - F_theory|
+  ErrorStats direction_deg;  ///< between the two, if theory has a tenth of full scale
+  ErrorStats normal_deg;     ///< of one sample at the voxels on the face, against the true normal
+  ErrorStats sample_loop;    ///< closed loops of one sample about a place on the face
+  ErrorStats tool_loop;      ///< the same of the whole tool, about the contact
+  ErrorStats step;           ///< |dF| per kStepMm along the face
 };
 
 inline constexpr double kLoopMm = 0.375;    ///< radius of the loops: 3 voxels of 0.125 mm
 inline constexpr double kStepMm = 0.00125;  ///< 0.01 of such a voxel
 
 /// How far the measurement goes.
-struct Effort {
+struct ErrorCases {
   int sample_loop_steps = 2000;
   int tool_loop_steps = 500;
   int line_steps = 300;
@@ -58,11 +58,11 @@ struct Effort {
 };
 
 void add_errors(const ContactMethod& method, const ContactCase& at, const BallTool& tool,
-                const Effort& effort, ContactErrors& errors);
+                const ErrorCases& effort, ContactErrors& errors);
 
 /// |F - F_double| of the same contacts.
 void add_difference(const ContactMethod& method, const ContactMethod& truth, const ContactCase& at,
-                    const BallTool& tool, Spread& errors);
+                    const BallTool& tool, ErrorStats& errors);
 
 using ForceAt = std::function<Point(Point)>;
 
@@ -80,6 +80,6 @@ struct TiltedLoop {
 
 /// One trilinear interpolation of random 16-bit corners against double, in steps of the corners;
 /// 8 bits of the result are kept. Not for float64, which is the truth.
-[[nodiscard]] Spread interpolation_error(Arithmetic arithmetic);
+[[nodiscard]] ErrorStats interpolation_error(Arithmetic arithmetic);
 
 }  // namespace kerf::accuracy

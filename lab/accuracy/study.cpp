@@ -56,7 +56,7 @@ std::vector<Variant> variants() {
 using Figures = std::vector<Figure>;
 
 void add(Figures& figures, const std::string& shape, const std::string& metric,
-         const Spread& spread, const char* unit) {
+         const ErrorStats& spread, const char* unit) {
   if (spread.count() == 0) return;
   figures.push_back({shape, metric + "_rms", spread.rms(), unit});
   figures.push_back({shape, metric + "_max", spread.worst(), unit});
@@ -83,16 +83,16 @@ TickTimes time_contact(const ContactMethod& method, const ContactCase& at, int t
       });
 }
 
-Entry measured(const Variant& variant, const std::vector<Subject>& subjects, const Scope& scope) {
+Entry measured(const Variant& variant, const std::vector<TestShape>& subjects, const Scope& scope) {
   const ContactChoice& choice = variant.choice;
   const BallTool tool = ball_tool(kToolMm, choice.pitch_vox * choice.voxel_mm);
   Entry entry;
   Figures& figures = entry.figures;
   ContactErrors all;
-  Spread all_differences;
-  for (const Subject& subject : subjects) {
+  ErrorStats all_differences;
+  for (const TestShape& subject : subjects) {
     ContactErrors errors;
-    Spread differences;
+    ErrorStats differences;
     for (const ContactCase& at : subject.cases) {
       const auto method = contact_method(choice, at.volume, tool);
       add_errors(*method, at, tool, scope.effort, errors);
@@ -158,7 +158,7 @@ std::vector<Entry> study(
   const Subjects touched(scope.contacts, scope.walks);
   const std::vector<Variant> list = variants();
   std::optional<double> voxel_mm;
-  std::vector<Subject> subjects;
+  std::vector<TestShape> subjects;
   std::optional<Entry> standard;  // the one that every knob has
   std::vector<Entry> entries;
   for (const Variant& variant : list) {

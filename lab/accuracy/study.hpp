@@ -35,7 +35,7 @@ struct Entry {
 
 /// How much is measured; the defaults take about a minute on one core.
 struct Scope {
-  Effort effort;
+  ErrorCases effort;
   std::size_t contacts = 100;  ///< of each shape, and tilts of the plane
   std::size_t walks = 4;       ///< of each shape
   double side_mm = 16;         ///< of the volumes: 128 voxels of 0.125 mm

@@ -175,14 +175,14 @@ Subjects::Subjects(std::size_t contacts, std::size_t walks) : walks_(walks) {
   }
 }
 
-std::vector<Subject> Subjects::in_voxels(double voxel_mm, double side_mm) const {
-  Subject plane{"plane", {}};
+std::vector<TestShape> Subjects::in_voxels(double voxel_mm, double side_mm) const {
+  TestShape plane{"plane", {}};
   for (const Touched& tilted : planes_) {
     const std::size_t walks = plane.cases.size() < walks_ ? 1 : 0;
     plane.cases.push_back(
         {tilted.shape, volume_of(tilted.shape, kTiltSideMm, voxel_mm), tilted.contacts, walks});
   }
-  std::vector<Subject> subjects{std::move(plane)};
+  std::vector<TestShape> subjects{std::move(plane)};
   for (const Touched& solid : solids_) {
     subjects.push_back({solid.shape.name,
                         {{solid.shape, volume_of(solid.shape, side_mm, voxel_mm), solid.contacts,

@@ -101,7 +101,7 @@ inline constexpr double kVoxelMm = 0.125;  ///< of the standard
 inline constexpr double kToolMm = 0.625;   ///< radius of the ball tool: 5 such voxels
 
 /// A shape of the study: one volume, or one for each tilt of the plane.
-struct Subject {
+struct TestShape {
   std::string name;
   std::vector<ContactCase> cases;
 };
@@ -114,7 +114,7 @@ class Subjects {
   Subjects(std::size_t contacts, std::size_t walks);
 
   /// In cubes of `side_mm`; the planes have smaller ones.
-  [[nodiscard]] std::vector<Subject> in_voxels(double voxel_mm, double side_mm) const;
+  [[nodiscard]] std::vector<TestShape> in_voxels(double voxel_mm, double side_mm) const;
 
  private:
   struct Touched {

@@ -39,18 +39,8 @@ void pause(std::chrono::nanoseconds time) {
   }
 }
 
-WorkFolder::WorkFolder() {
-  std::string pattern = (std::filesystem::temp_directory_path() / "kerf-bridge-XXXXXX").string();
-  if (mkdtemp(pattern.data()) == nullptr) {
-    throw HilError(pattern + ": cannot be made; set TMPDIR to a folder that can be written");
-  }
-  path_ = pattern;
-  setenv("XDG_RUNTIME_DIR", pattern.c_str(), 1);  // NOLINT(concurrency-mt-unsafe): first thread
-}
-
-WorkFolder::~WorkFolder() {
-  std::error_code ignored;
-  std::filesystem::remove_all(path_, ignored);
+WorkFolder::WorkFolder() : folder_("kerf-bridge") {
+  setenv("XDG_RUNTIME_DIR", path().c_str(), 1);  // NOLINT(concurrency-mt-unsafe): first thread
 }
 
 BridgeFiles::BridgeFiles(std::filesystem::path in)

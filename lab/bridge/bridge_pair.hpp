@@ -18,13 +18,10 @@ void pause(std::chrono::nanoseconds time);
 class WorkFolder {
  public:
   WorkFolder();
-  ~WorkFolder();
-  WorkFolder(const WorkFolder&) = delete;
-  WorkFolder& operator=(const WorkFolder&) = delete;
-  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+  [[nodiscard]] const std::filesystem::path& path() const { return folder_.path(); }
 
  private:
-  std::filesystem::path path_;
+  sweep::PrivateFolder folder_;
 };
 
 /// What the bridges of a measurement need: a certificate, made with openssl, and a token.

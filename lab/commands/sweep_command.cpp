@@ -10,7 +10,6 @@
 #include <mutex>
 #include <ostream>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include <unistd.h>
@@ -20,7 +19,8 @@
 #include "hil/hil_error.hpp"
 #include "lab/commands/cell_run.hpp"
 #include "lab/run/child_process.hpp"
-#include "lab/run/grid.hpp"
+#include "lab/run/grid_axes.hpp"
+#include "lab/run/grid_run.hpp"
 #include "lab/run/lab_command.hpp"
 #include "shared/numeric/fnv1a.hpp"
 #include "shared/posix/program.hpp"
@@ -30,28 +30,6 @@
 
 namespace kerf::sweep {
 namespace {
-
-/// A folder of this process alone; goes with its owner.
-class WorkFolder {
- public:
-  WorkFolder() {
-    std::string pattern = (std::filesystem::temp_directory_path() / "kerf-sweep-XXXXXX").string();
-    if (mkdtemp(pattern.data()) == nullptr) {
-      throw HilError(pattern + ": cannot be made; set TMPDIR to a folder that can be written");
-    }
-    path_ = pattern;
-  }
-  ~WorkFolder() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path_, ignored);
-  }
-  WorkFolder(const WorkFolder&) = delete;
-  WorkFolder& operator=(const WorkFolder&) = delete;
-  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
-
- private:
-  std::filesystem::path path_;
-};
 
 /// A value as a cell of the table: no comma and no quote, so that any reader splits at commas.
 std::string plain(std::string text) {
@@ -65,11 +43,11 @@ struct SweepRequest {
   std::string scene;
   std::string device;  ///< empty: an axis has it
   double seconds;
-  std::vector<Axis> axes;
+  std::vector<grid::Axis> axes;
 
   [[nodiscard]] CellJob job(std::size_t run, const std::string& name) const {
     CellJob job{scene, device, seconds, {}, {}, name};
-    const std::vector<std::string> values = values_of(axes, run);
+    const std::vector<std::string> values = grid::values_of(axes, run);
     for (std::size_t i = 0; i < axes.size(); ++i) {
       if (!axes[i].of_emulator()) {
         job.settings.push_back(axes[i].key + "=" + values[i]);
@@ -87,7 +65,7 @@ struct SweepRequest {
   /// One line: equal for equal bytes of the table. Programs of another build may give others.
   [[nodiscard]] std::string line(const std::string& hand_script) const {
     std::string axes_text;
-    for (const Axis& axis : axes) {
+    for (const grid::Axis& axis : axes) {
       axes_text += " " + axis.key + "=";
       for (const std::string& value : axis.values) axes_text += value + ",";
     }
@@ -101,7 +79,7 @@ struct SweepRequest {
 
   [[nodiscard]] std::string head() const {
     std::string head;
-    for (const Axis& axis : axes) head += axis.key + ",";
+    for (const grid::Axis& axis : axes) head += axis.key + ",";
     head += "exit,";
     for (const std::string& column : result_columns()) head += column + ",";
     return head + "message";
@@ -109,7 +87,7 @@ struct SweepRequest {
 
   [[nodiscard]] std::string row(std::size_t run, const CellResult& result) const {
     std::string row;
-    for (const std::string& value : values_of(axes, run)) row += plain(value) + ",";
+    for (const std::string& value : grid::values_of(axes, run)) row += plain(value) + ",";
     row += std::to_string(result.exit) + ",";
     for (const std::string& value : result.values) row += plain(value) + ",";
     row.append(result_columns().size() - result.values.size(), ',');
@@ -122,7 +100,7 @@ struct SweepRequest {
 Scene first_scene(const SweepRequest& request) {
   std::exception_ptr first_refusal;
   constexpr std::size_t kLooks = 1000;
-  for (std::size_t run = 0; run < std::min(runs_of(request.axes), kLooks); ++run) {
+  for (std::size_t run = 0; run < std::min(grid::cells_of(request.axes), kLooks); ++run) {
     std::vector<KeyOverride> settings;
     for (const std::string& text : request.job(run, "").settings) {
       settings.push_back(parse_setting(text));
@@ -139,92 +117,49 @@ Scene first_scene(const SweepRequest& request) {
 /// Refuses options of the emulator that neither the first nor the last run can start with: the ends
 /// of each axis.
 void check_emulator(const SweepRequest& request, const std::atomic<bool>& stop) {
-  if (std::ranges::none_of(request.axes, &Axis::of_emulator)) return;
-  const WorkFolder folder;
+  if (std::ranges::none_of(request.axes, &grid::Axis::of_emulator)) return;
+  const PrivateFolder folder("kerf-sweep");
   const std::string first = emulator_refusal(request.job(0, ""), folder.path(), stop);
   if (first.empty()) return;
-  if (!emulator_refusal(request.job(runs_of(request.axes) - 1, ""), folder.path(), stop).empty()) {
+  if (!emulator_refusal(request.job(grid::cells_of(request.axes) - 1, ""), folder.path(), stop)
+           .empty()) {
     throw HilError("--set emulator: " + first);
   }
 }
 
-/// Makes the runs that the table lacks, on `jobs` threads; returns how many failed. Throws what a
-/// thread threw, once all have ended.
-class Crew {
- public:
-  Crew(const SweepRequest& request, Table& table, const std::atomic<bool>& asked_to_stop)
-      : request_(request), table_(table), asked_(asked_to_stop), runs_(runs_of(request.axes)) {}
-
-  void work(std::size_t jobs) {
-    already_ = table_.size();
-    {
-      std::vector<std::jthread> threads;
-      for (std::size_t i = 0; i < jobs; ++i) {
-        threads.emplace_back([this] {
-          const BlockStopSignals to_main;
-          run_all();
-        });
-      }
-      const ProgressBar bar(true);
-      while (working_ends_ < jobs) {
-        if (asked_) stop_ = true;
-        show(bar);
-        std::this_thread::sleep_for(std::chrono::milliseconds(50));
-      }
-    }
-    if (failure_) std::rethrow_exception(failure_);
+/// Makes the runs that the table lacks, until all are done or `asked_to_stop` is set.
+void make_runs(const SweepRequest& request, std::size_t jobs,
+               const std::atomic<bool>& asked_to_stop, grid::Table& table) {
+  const std::size_t runs = grid::cells_of(request.axes), already = table.size();
+  std::vector<std::size_t> wanted;
+  for (std::size_t run = 0; run < runs; ++run) {
+    if (!table.has(run)) wanted.push_back(run);
   }
-
-  [[nodiscard]] bool stopped() const { return stop_; }
-
- private:
-  void run_all() {
-    try {
-      for (std::size_t run = 0; (run = next_++) < runs_ && !stop_;) {
-        if (!table_.has(run)) run_one(run);
-      }
-    } catch (...) {
-      const std::scoped_lock lock(mutex_);
-      if (!failure_) failure_ = std::current_exception();
-      stop_ = true;
-    }
-    ++working_ends_;
-  }
-
-  void run_one(std::size_t run) {
-    const WorkFolder folder;
+  grid::Run all(jobs, &asked_to_stop);
+  const auto work = [&](std::size_t i, std::size_t) {
+    const std::size_t run = wanted[i];
+    const PrivateFolder folder("kerf-sweep");
     const std::string name = "sweep-" + std::to_string(getpid()) + "-" + std::to_string(run);
-    const auto result = run_cell(request_.job(run, name), folder.path(), stop_);
+    const auto result = run_cell(request.job(run, name), folder.path(), all.stop());
     if (!result) return;
-    const std::scoped_lock lock(mutex_);
-    table_.add(run, request_.row(run, *result));
-  }
-
-  void show(const ProgressBar& bar) {
-    const std::scoped_lock lock(mutex_);
-    const std::size_t done = table_.size(), here = done - already_;
-    std::string text = std::to_string(done) + "/" + std::to_string(runs_) + " runs";
+    const std::scoped_lock hold(all.results());
+    table.add(run, request.row(run, *result));
+  };
+  const auto began = std::chrono::steady_clock::now();
+  const ProgressBar bar(true);
+  const auto show = [&] {
+    const std::size_t done = table.size(), here = done - already;
+    std::string text = std::to_string(done) + "/" + std::to_string(runs) + " runs";
     if (here > 0) {
-      const std::chrono::duration<double> worked = std::chrono::steady_clock::now() - began_;
+      const std::chrono::duration<double> worked = std::chrono::steady_clock::now() - began;
       const double left_s =
-          worked.count() / static_cast<double>(here) * static_cast<double>(runs_ - done);
+          worked.count() / static_cast<double>(here) * static_cast<double>(runs - done);
       text += ", " + number_text(std::ceil(left_s)) + " s left";
     }
-    bar.show(static_cast<double>(done) / static_cast<double>(runs_), text);
-  }
-
-  const SweepRequest& request_;
-  Table& table_;
-  const std::atomic<bool>& asked_;
-  const std::size_t runs_;
-  const std::chrono::steady_clock::time_point began_ = std::chrono::steady_clock::now();
-  std::size_t already_ = 0;
-  std::atomic<std::size_t> next_{0};
-  std::atomic<std::size_t> working_ends_{0};
-  std::atomic<bool> stop_{false};
-  std::mutex mutex_;  ///< of the table and of the failure
-  std::exception_ptr failure_;
-};
+    bar.show(static_cast<double>(done) / static_cast<double>(runs), text);
+  };
+  all.all(wanted.size(), work, show);
+}
 
 /// `kerf-lab sweep`, which `./kerf sweep` is: one demo in lock-step for each combination of values,
 /// on all cores, into one table. The same sweep gives the same bytes on any number of cores, and
@@ -267,9 +202,9 @@ Command::Command(Arguments& program)
 }
 
 int Command::run(std::ostream& out) const {
-  const std::vector<Axis> axes = parse_axes(set_);
-  const bool device_is_axis =
-      std::ranges::any_of(axes, [](const Axis& axis) { return axis.key == "device.personality"; });
+  const std::vector<grid::Axis> axes = grid::parse_axes(set_);
+  const bool device_is_axis = std::ranges::any_of(
+      axes, [](const grid::Axis& axis) { return axis.key == "device.personality"; });
   if (device_is_axis && !device_.empty()) {
     throw HilError("--device: --set device.personality says it; leave one of the two out");
   }
@@ -285,19 +220,17 @@ int Command::run(std::ostream& out) const {
     }
   }
   check_emulator(request, catch_stop_signals());
-  Table table(out_, request.line(scene.hand_script));
-  const std::size_t cores = std::max(1U, std::thread::hardware_concurrency());
-  Crew crew(request, table, catch_stop_signals());
-  crew.work(std::min(jobs_ > 0 ? static_cast<std::size_t>(jobs_) : cores, runs_of(axes)));
-  const std::string place = (std::filesystem::path(out_) / kTableName).string();
-  if (table.size() < runs_of(axes)) {
-    out << "interrupted: " << table.size() << " of " << runs_of(axes)
+  grid::Table table(out_, request.line(scene.hand_script));
+  make_runs(request, grid::threads_for(jobs_), catch_stop_signals(), table);
+  const std::string place = (std::filesystem::path(out_) / grid::kTableName).string();
+  if (table.size() < grid::cells_of(axes)) {
+    out << "interrupted: " << table.size() << " of " << grid::cells_of(axes)
         << " runs are kept; the same command goes on\n";
     return 130;
   }
   table.finish(request.head());
   const std::size_t failed = table.failed();
-  out << place << ": " << runs_of(axes) << " runs, " << failed << " failed\n";
+  out << place << ": " << grid::cells_of(axes) << " runs, " << failed << " failed\n";
   return failed == 0 ? 0 : 1;
 }
 

@@ -2,25 +2,21 @@
 #include "lab/contact/hands.hpp"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <complex>
 #include <cstddef>
-#include <memory>
 #include <numbers>
 #include <span>
 #include <string>
 
-#include "controller/device/device_driver.hpp"
 #include "controller/load/load_scene.hpp"
-#include "controller/plan/compile.hpp"
 #include "hil/device/emulator.hpp"
 #include "hil/device/omni.hpp"
 #include "hil/device/packet_device.hpp"
 #include "hil/hil_error.hpp"
 #include "hil/script/hand_script_file.hpp"
-#include "lab/rig/direct_port.hpp"
 #include "lab/rig/geometry.hpp"
+#include "lab/rig/virtual_loop.hpp"
 
 namespace kerf::extremes {
 namespace {
@@ -94,23 +90,15 @@ HandRun run_hand(LoadedScene scene, const HandScript& hand, double seconds) {
   }
   HandRun run;
   run.rate_hz = scene.servo.rate_hz;
-  const std::unique_ptr<CompiledScene> servo = compile(scene);
   Emulator emulator(params, hand);
   DirectPort port(emulator);
-  const std::unique_ptr<DeviceDriver> driver = make_driver(Personality::omni, port);
-  const int cycles_per_tick = kCyclesPerSecond / scene.servo.rate_hz;
+  VirtualLoop loop(scene, port);
   const auto ticks = static_cast<std::int64_t>(seconds * scene.servo.rate_hz);
   double removed_mm3 = 0;
-  driver->start();
   while (static_cast<std::int64_t>(run.ticks.size()) < ticks) {
-    for (int cycle = 0; cycle < cycles_per_tick; ++cycle) port.cycle();
-    const DeviceReport report = driver->read();
-    const auto begin = std::chrono::steady_clock::now();
-    const ServoOutput out = servo->step(report);
-    const std::chrono::duration<double, std::micro> took = std::chrono::steady_clock::now() - begin;
-    driver->command(out);
+    const ServoOutput out = loop.tick();
     if (!out.started) {
-      if (emulator.stats().cycles < kPatienceS * kCyclesPerSecond) continue;
+      if (loop.cycles() < kPatienceS * kCyclesPerSecond) continue;
       throw HilError(
           "the emulated hand: did not take up the device within 20 s; see [device] dock_rad");
     }
@@ -120,7 +108,7 @@ HandRun run_hand(LoadedScene scene, const HandScript& hand, double seconds) {
     }
     const double height_mm = out.position_mm[1] - scene.device.offset_mm[1];
     run.ticks.push_back({height_mm, height_mm + out.proxy_offset_mm[1], out.force_n, removed_mm3,
-                         out.contact, took.count()});
+                         out.contact, loop.step_us()});
   }
   return run;
 }

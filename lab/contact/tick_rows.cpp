@@ -69,18 +69,19 @@ void keep_costliest(std::vector<Tick>& ticks, std::size_t count) {
 }
 
 template <class Rig>
-void find_with(Rig& rig, const Trap& trap, int ticks, WorstTick& worst) {
+void find_with(Rig& rig, const WorstCase& worst_case, int ticks, WorstTick& worst) {
   Stopwatch<Rig> stopwatch(rig);
   Dice dice(3);
   std::vector<Tick> tried;
   ProxyState<N> state;
-  Point hand = trap.middle;
+  Point hand = worst_case.middle;
   Orientation<N> turn;
   for (int i = 0; i < ticks; ++i) {
     const bool far = i % 16 == 15;  // beyond the volume, and back
     hand = hand + std::pow(10.0, dice.uniform(0, 2)) * dice.direction();
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      hand[axis] = std::clamp(hand[axis], trap.middle[axis] - 20, trap.middle[axis] + 20);
+      hand[axis] =
+          std::clamp(hand[axis], worst_case.middle[axis] - 20, worst_case.middle[axis] + 20);
     }
     turn = compose(dice.turn<N>(i % 3 == 0 ? 3 : dice.uniform(0, 0.2)), turn);
     if (i % 64 == 63) state = {};  // looks for a place
@@ -113,7 +114,8 @@ void find_with(Rig& rig, const Trap& trap, int ticks, WorstTick& worst) {
     }
   }
   for (const Tick& tick : tried) {
-    if (tick.ns / 1e3 > worst.us) worst = {tick.ns / 1e3, tick.queries, trap.name, tick.samples};
+    if (tick.ns / 1e3 > worst.us)
+      worst = {tick.ns / 1e3, tick.queries, worst_case.name, tick.samples};
   }
 }
 
@@ -121,7 +123,7 @@ constexpr VoxelGrid kGrid{256, 256, 161};
 constexpr Point kMiddle{128.3, 127.6, 96.6};
 
 /// By signed distance from `kMiddle`, tilted so that no layer of voxels lies along a face.
-Trap solid(const char* name, double (*distance)(Point)) {
+WorstCase solid(const char* name, double (*distance)(Point)) {
   return {name,
           [distance] {
             return blurred(kGrid, [distance](Point p) {
@@ -133,7 +135,7 @@ Trap solid(const char* name, double (*distance)(Point)) {
 }
 
 /// Any densities between two shares of the whole.
-Trap tissue(const char* name, double low, double high) {
+WorstCase tissue(const char* name, double low, double high) {
   return {name,
           [low, high] {
             Dice dice(5);
@@ -142,7 +144,7 @@ Trap tissue(const char* name, double low, double high) {
           kMiddle, kIso};
 }
 
-Trap tooth(const std::filesystem::path& file) {
+WorstCase tooth(const std::filesystem::path& file) {
   const SourceVolume source = read_volume(file, {.spacing_mm = std::array{0.1, 0.1, 0.1}});
   VolumeImage image = apply_window(source, range_window(source));
   const Density iso = otsu_threshold(image);
@@ -175,16 +177,16 @@ void measure_worst_ticks(const Effort& effort, const RowSink& add_row) {
        tool_with("inverted_cone", 6, 12,
                  {.radius_mm = 4, .length_mm = 40, .handpiece_radius_mm = 12}),
        {}}};
-  for (const Trap& trap : worst_traps(effort.data)) {
-    const Body body = trap.body();
+  for (const WorstCase& worst_case : worst_cases(effort.data)) {
+    const Body body = worst_case.body();
     for (Subject& subject : subjects) {
-      find_worst_tick(subject.tool, trap, body, 2 * effort.tick_count, subject.worst);
+      find_worst_tick(subject.tool, worst_case, body, 2 * effort.tick_count, subject.worst);
     }
   }
   for (const Subject& subject : subjects) {
     add_row({"ticks",
-             std::string("proxy, ") + subject.name + ", costliest tick found (" +
-                 subject.worst.trap + ")",
+             std::string("proxy, ") + subject.name + ", costliest tick found (" + subject.worst.at +
+                 ")",
              subject.worst.us, "us", 60, 40});
     add_row({"ticks",
              std::string("proxy, ") + subject.name + ", samples of that tick",
@@ -215,18 +217,18 @@ void measure_cutting_ticks(const Effort& effort, const RowSink& add_row) {
 
 }  // namespace
 
-void find_worst_tick(const SceneTool& tool, const Trap& trap, const Body& body, int ticks,
-                     WorstTick& worst) {
+void find_worst_tick(const SceneTool& tool, const WorstCase& worst_case, const Body& body,
+                     int ticks, WorstTick& worst) {
   if (tool.shaft.radius_mm > 0) {
-    ShaftRig<N> rig(tool, {&body}, trap.iso);
-    return find_with(rig, trap, ticks, worst);
+    ShaftRig<N> rig(tool, {&body}, worst_case.iso);
+    return find_with(rig, worst_case, ticks, worst);
   }
-  ContactRig<N> rig(tool, body, trap.iso);
-  find_with(rig, trap, ticks, worst);
+  ContactRig<N> rig(tool, body, worst_case.iso);
+  find_with(rig, worst_case, ticks, worst);
 }
 
-std::vector<Trap> worst_traps(const std::filesystem::path& data) {
-  std::vector<Trap> traps{
+std::vector<WorstCase> worst_cases(const std::filesystem::path& data) {
+  std::vector<WorstCase> cases{
       solid("flat", [](Point p) { return p[2]; }),
       solid("edge", [](Point p) { return (p[2] + std::abs(p[0])) * std::sqrt(0.5); }),
       solid("crease", [](Point p) { return (p[2] - std::abs(p[0])) * std::sqrt(0.5); }),
@@ -241,8 +243,8 @@ std::vector<Trap> worst_traps(const std::filesystem::path& data) {
       tissue("soft tissue", 0.38, 0.48),
   };
   const std::filesystem::path file = data / "ge_tooth_16bit/tooth.nhdr";
-  if (!data.empty() && std::filesystem::exists(file)) traps.push_back(tooth(file));
-  return traps;
+  if (!data.empty() && std::filesystem::exists(file)) cases.push_back(tooth(file));
+  return cases;
 }
 
 void measure_ticks(const Effort& effort, const RowSink& add_row) {

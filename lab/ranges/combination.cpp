@@ -4,22 +4,17 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <cstdlib>
 #include <exception>
 #include <fstream>
 #include <limits>
 #include <memory>
 #include <optional>
-#include <system_error>
 #include <utility>
-
-#include <unistd.h>
 
 #include "controller/input/load_error.hpp"
 #include "controller/load/load_scene.hpp"
 #include "controller/plan/compile.hpp"
 #include "controller/volume/file/volume_write.hpp"
-#include "hil/hil_error.hpp"
 #include "lab/ranges/rules.hpp"
 #include "lab/rig/geometry.hpp"
 #include "lab/rig/kinematic_arm.hpp"
@@ -57,7 +52,7 @@ class Writer {
   void arm() {
     glide(dock_, 20, true);
     rest(56, true);
-    mark(Mark::Kind::armed);
+    expect(Expectation::Kind::armed);
     out_.recovered = out_.reports.size();
     // Over the solid: a proxy that came through it would stay below.
     constexpr double kHighMm = 70;
@@ -65,7 +60,7 @@ class Writer {
     glide(hand_.counts_at({0, kHighMm, 0}), 5, true);
     glide(hand_.counts_at(top_), 10, true);
     rest(101, false);
-    mark(Mark::Kind::active);
+    expect(Expectation::Kind::active);
   }
   void press() {
     move(deep_, kPressMs);
@@ -93,7 +88,7 @@ class Writer {
   }
   void silence() {
     for (std::size_t i = ticks(25); i > 0; --i) out_.reports.push_back({});
-    mark(Mark::Kind::faded);
+    expect(Expectation::Kind::faded);
     rest(5, false);
   }
 
@@ -103,7 +98,9 @@ class Writer {
   [[nodiscard]] std::size_t ticks(double ms) const {
     return static_cast<std::size_t>(std::ceil(ms * rate_hz_ / 1000)) + 1;
   }
-  void mark(Mark::Kind kind) { out_.marks.push_back({kind, out_.reports.size() - 1}); }
+  void expect(Expectation::Kind kind) {
+    out_.expectations.push_back({kind, out_.reports.size() - 1});
+  }
   void say(const CountHand::Counts& counts, bool parked = false) {
     out_.reports.push_back(hand_.report(counts, parked));
   }
@@ -201,7 +198,7 @@ struct Loaded {
 
 /// Empty if the scene is refused; the outcome has the reason.
 std::optional<Loaded> load(const KeyTexts& texts, NumericKind numeric,
-                           const std::filesystem::path& file, Outcome& outcome) {
+                           const std::filesystem::path& file, SceneOutcome& outcome) {
   std::ofstream(file) << scene_text(texts);
   try {
     auto scene = std::make_unique<LoadedScene>(load_scene(file, {.numeric = numeric}));
@@ -218,16 +215,17 @@ std::optional<Loaded> load(const KeyTexts& texts, NumericKind numeric,
   return std::nullopt;
 }
 
-void look_at_mark(const Mark& mark, const ServoOutput& out, bool motors, Rules& rules) {
+void check_expectation(const Expectation& expected, const ServoOutput& out, bool motors,
+                       Rules& rules) {
   const auto phase = std::to_string(static_cast<int>(out.phase));
-  switch (mark.kind) {
-    case Mark::Kind::active:
+  switch (expected.kind) {
+    case Expectation::Kind::active:
       if (out.phase == Phase::active && out.motors_on == motors) return;
       return rules.broken("active", "phase " + phase);
-    case Mark::Kind::faded:
+    case Expectation::Kind::faded:
       if (!out.motors_on && out.force_n == std::array<double, 3>{}) return;
       return rules.broken("faded", "phase " + phase);
-    case Mark::Kind::armed:
+    case Expectation::Kind::armed:
       if (out.phase == Phase::armed && out.fault == Fault::none) return;
       return rules.broken("armed", "phase " + phase);
   }
@@ -248,18 +246,19 @@ std::uint64_t play(CompiledScene& servo, const StressInput& hand, std::size_t fr
 }
 
 End play_watched(CompiledScene& servo, const StressInput& hand, const LoadedScene& scene,
-                 Rules& rules, Outcome& outcome) {
+                 Rules& rules, SceneOutcome& outcome) {
   End end;
   ServoOutput out;
   const bool motors = scene.device.torque_scale.has_value();
-  auto mark = hand.marks.begin();
+  auto due = hand.expectations.begin();
   const std::uint64_t before = sum_of(servo, scene.volumes.size());
   std::uint64_t removed = 0;
   for (std::size_t i = 0; i < hand.reports.size(); ++i) {
     if (i == hand.recovered) end.recovered = servo.keep();
     out = servo.step(hand.reports[i]);
     rules.look_at(hand.reports[i], out);
-    if (mark != hand.marks.end() && mark->tick == i) look_at_mark(*mark++, out, motors, rules);
+    if (due != hand.expectations.end() && due->tick == i)
+      check_expectation(*due++, out, motors, rules);
     removed += out.removed_steps;
     outcome.felt = outcome.felt || out.contact;
     outcome.faulted = outcome.faulted || out.fault != Fault::none;
@@ -292,32 +291,21 @@ StressInput hard_hand(const LoadedScene& scene) {
   return out;
 }
 
-SceneFolder::SceneFolder() {
-  std::error_code fault;
-  std::string name = (std::filesystem::temp_directory_path(fault) / "kerf-ranges.XXXXXX").string();
-  if (fault || mkdtemp(name.data()) == nullptr) {
-    throw HilError("TMPDIR: no folder can be made there; set it to one that can be written");
-  }
-  path_ = name;
-  write_volume(half_space(), path_ / "solid.nrrd", VolumeEncoding::raw);
-  std::ofstream(path_ / "bur.stl") << octahedron();
+SceneFolder::SceneFolder() : folder_("kerf-ranges") {
+  write_volume(half_space(), path() / "solid.nrrd", VolumeEncoding::raw);
+  std::ofstream(path() / "bur.stl") << octahedron();
 }
 
-SceneFolder::~SceneFolder() {
-  std::error_code ignored;
-  std::filesystem::remove_all(path_, ignored);
-}
-
-Outcome load_combination(const KeyTexts& texts, NumericKind numeric,
-                         const std::filesystem::path& file) {
-  Outcome outcome;
+SceneOutcome load_combination(const KeyTexts& texts, NumericKind numeric,
+                              const std::filesystem::path& file) {
+  SceneOutcome outcome;
   static_cast<void>(load(texts, numeric, file, outcome));
   return outcome;
 }
 
-Outcome run_combination(const KeyTexts& texts, NumericKind numeric,
-                        const std::filesystem::path& file) {
-  Outcome outcome;
+SceneOutcome run_combination(const KeyTexts& texts, NumericKind numeric,
+                             const std::filesystem::path& file) {
+  SceneOutcome outcome;
   std::optional<Loaded> loaded = load(texts, numeric, file, outcome);
   if (!loaded) return outcome;
   LoadedScene& scene = *loaded->scene;

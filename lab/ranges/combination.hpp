@@ -11,12 +11,13 @@
 #include "controller/servo/servo.hpp"
 #include "lab/ranges/key_levels.hpp"
 #include "lab/ranges/rules.hpp"
+#include "lab/run/child_process.hpp"
 
 /// One scene of any combination of values: its input, its run, and the rules that it must keep.
 namespace kerf::ranges {
 
 /// A state that the servo must have reached after a tick.
-struct Mark {
+struct Expectation {
   enum class Kind { active, faded, armed } kind;
   std::size_t tick;
 };
@@ -26,7 +27,7 @@ struct Mark {
 /// press.
 struct StressInput {
   std::vector<DeviceReport> reports;
-  std::vector<Mark> marks;
+  std::vector<Expectation> expectations;
   std::size_t recovered = 0;  ///< tick after the last disturbance at which it is armed again
 };
 
@@ -39,18 +40,14 @@ struct StressInput {
 class SceneFolder {
  public:
   SceneFolder();
-  ~SceneFolder();
-  SceneFolder(const SceneFolder&) = delete;
-  SceneFolder& operator=(const SceneFolder&) = delete;
-
-  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+  [[nodiscard]] const std::filesystem::path& path() const { return folder_.path(); }
 
  private:
-  std::filesystem::path path_;
+  sweep::PrivateFolder folder_;
 };
 
 /// The outcome of one scene.
-struct Outcome {
+struct SceneOutcome {
   bool refused = false;
   std::string refusal;
   std::vector<Violation> violations;
@@ -70,11 +67,11 @@ struct Outcome {
 ///   recovered  a servo restored from the state after the last recovery gives the same bits
 ///
 /// `file` is written and read; one for each thread.
-[[nodiscard]] Outcome run_combination(const KeyTexts& texts, NumericKind numeric,
-                                      const std::filesystem::path& file);
+[[nodiscard]] SceneOutcome run_combination(const KeyTexts& texts, NumericKind numeric,
+                                           const std::filesystem::path& file);
 
 /// Loads it only, and reports the refusal if there is one.
-[[nodiscard]] Outcome load_combination(const KeyTexts& texts, NumericKind numeric,
-                                       const std::filesystem::path& file);
+[[nodiscard]] SceneOutcome load_combination(const KeyTexts& texts, NumericKind numeric,
+                                            const std::filesystem::path& file);
 
 }  // namespace kerf::ranges

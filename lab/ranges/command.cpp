@@ -6,7 +6,6 @@
 #include <ostream>
 #include <stdexcept>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include "controller/scene/scene_file.hpp"
@@ -14,6 +13,7 @@
 #include "lab/ranges/extreme_rows.hpp"
 #include "lab/ranges/key_study.hpp"
 #include "lab/ranges/long_run.hpp"
+#include "lab/run/grid_run.hpp"
 #include "lab/run/lab_command.hpp"
 #include "lab/run/lab_run.hpp"
 #include "shared/posix/program.hpp"
@@ -63,9 +63,9 @@ std::string long_line(NumericKind numeric, const LongRun& run) {
 }
 
 /// The printed and written output of a run.
-class Teller {
+class RowPrinter {
  public:
-  explicit Teller(std::ostream& out) : out_(out) {}
+  explicit RowPrinter(std::ostream& out) : out_(out) {}
 
   void row(const std::string& group, const std::string& name, const std::string& rule,
            const std::string& line, std::size_t broken) {
@@ -100,17 +100,17 @@ class Teller {
 
 constexpr const char* kTickRules = "rules of every tick and scene (lab/ranges/rules.hpp)";
 
-void tell_keys(const std::vector<KeyRow>& keys, Teller& teller) {
+void print_keys(const std::vector<KeyRow>& keys, RowPrinter& printer) {
   Tally all;
   for (const KeyRow& row : keys) {
-    teller.row("key", std::string(row.levels.key->name), kTickRules, key_line(row),
-               row.ends.broken.size());
+    printer.row("key", std::string(row.levels.key->name), kTickRules, key_line(row),
+                row.ends.broken.size());
     all.add(row.ends);
   }
-  teller.row("keys", "ends alone", kTickRules, "ends alone: " + tally_text(all), 0);
+  printer.row("keys", "ends alone", kTickRules, "ends alone: " + tally_text(all), 0);
 }
 
-void tell_extremes(const Effort& effort, const std::vector<KeyRow>& keys, Teller& teller) {
+void print_extremes(const StudySize& effort, const std::vector<KeyRow>& keys, RowPrinter& printer) {
   for (const ExtremeRow& row : extreme_rows()) {
     std::vector<Violation> broken;
     std::string told = row.measure != nullptr ? row.measure(effort, keys, broken) : "";
@@ -118,24 +118,24 @@ void tell_extremes(const Effort& effort, const std::vector<KeyRow>& keys, Teller
       told += (told.empty() ? "" : "; ") + ("tests/" + std::string(test.file)) + " \"" + test.name +
               '"';
     }
-    teller.row(
+    printer.row(
         "extreme", row.name, row.rule,
         std::string(row.name) + ": " + row.rule + "\n    " + told + "   " +
             (broken.empty() ? (row.measure != nullptr ? "pass" : "shown by the tests") : "FAIL"),
         broken.size());
-    for (const Violation& violation : broken) teller.broken(violation);
+    for (const Violation& violation : broken) printer.broken(violation);
   }
 }
 
-void tell_pairs(const PairRows& pairs, Teller& teller) {
-  teller.row("pairs", "ends of two keys", kTickRules,
-             "pairs: " + std::to_string(pairs.arrays) + " arrays, " +
-                 std::to_string(pairs.together) + " of " + std::to_string(pairs.pairs) +
-                 " pairs stood together; " + tally_text(pairs.tally),
-             pairs.tally.broken.size());
+void print_pairs(const PairRows& pairs, RowPrinter& printer) {
+  printer.row("pairs", "ends of two keys", kTickRules,
+              "pairs: " + std::to_string(pairs.arrays) + " arrays, " +
+                  std::to_string(pairs.together) + " of " + std::to_string(pairs.pairs) +
+                  " pairs stood together; " + tally_text(pairs.tally),
+              pairs.tally.broken.size());
   constexpr std::size_t kTold = 8;
   for (std::size_t i = 0; i < std::min(kTold, pairs.tally.broken.size()); ++i) {
-    teller.broken(shrunk(pairs.tally.broken[i]));
+    printer.broken(shrunk(pairs.tally.broken[i]));
   }
 }
 
@@ -149,11 +149,11 @@ KeyTexts texts_of(const std::vector<std::string>& settings) {
   return texts;
 }
 
-void tell_one(const KeyTexts& texts, const Effort& effort, Teller& teller) {
+void print_one(const KeyTexts& texts, const StudySize& effort, RowPrinter& printer) {
   const SceneFolder folder;
   for (const NumericKind numeric : effort.numerics) {
     const auto file = folder.path() / "scene.toml";
-    const Outcome outcome = run_combination(texts, numeric, file);
+    const SceneOutcome outcome = run_combination(texts, numeric, file);
     if (outcome.refused) {  // it names a file that is gone by then
       const std::size_t place = outcome.refusal.find(": ");
       throw HilError("--set: " +
@@ -161,9 +161,9 @@ void tell_one(const KeyTexts& texts, const Effort& effort, Teller& teller) {
     }
     Tally tally;
     tally.add(texts, numeric, outcome);
-    teller.row("one", std::string(word_of(numeric)), kTickRules,
-               std::string(word_of(numeric)) + ": " + tally_text(tally), tally.broken.size());
-    for (const Broken& broken : tally.broken) teller.broken(shrunk(broken));
+    printer.row("one", std::string(word_of(numeric)), kTickRules,
+                std::string(word_of(numeric)) + ": " + tally_text(tally), tally.broken.size());
+    for (const Broken& broken : tally.broken) printer.broken(shrunk(broken));
   }
 }
 
@@ -216,7 +216,7 @@ int Command::run(std::ostream& out) const {
 }
 
 int Command::study(std::ostream& out) const {
-  Effort effort;
+  StudySize effort;
   for (std::size_t i = 0; i < kNumericWords.size(); ++i) {
     const bool wanted =
         numerics_.empty() || std::ranges::find(numerics_, kNumericWords.at(i)) != numerics_.end();
@@ -224,25 +224,24 @@ int Command::study(std::ostream& out) const {
   }
   effort.combinations = static_cast<std::size_t>(combinations_);
   effort.seed = static_cast<std::uint64_t>(seed_);
-  effort.jobs = jobs_ > 0 ? static_cast<std::size_t>(jobs_)
-                          : std::max(1U, std::thread::hardware_concurrency());
+  effort.jobs = grid::threads_for(jobs_);
   const LabOutput report("--report", report_, ".json");
   const ProgressBar bar(true);
-  Teller teller(out);
+  RowPrinter printer(out);
   const StudyEvents events{
       .progress = [&](double share, const std::string& what) { bar.show(share, what); },
-      .broken = [&](const Broken& broken) { bar.hide(), teller.broken(broken); },
-      .part = [&](const PairRows& so_far) { bar.hide(), teller.so_far(so_far.tally); }};
+      .broken = [&](const Broken& broken) { bar.hide(), printer.broken(broken); },
+      .part = [&](const PairRows& so_far) { bar.hide(), printer.so_far(so_far.tally); }};
   if (!set_.empty()) {
-    tell_one(texts_of(set_), effort, teller);
+    print_one(texts_of(set_), effort, printer);
   } else if (combinations_ > 0) {
     const std::vector<KeyRow> keys = study_keys(effort, events);
     bar.hide();
-    tell_keys(keys, teller);
-    tell_extremes(effort, keys, teller);
+    print_keys(keys, printer);
+    print_extremes(effort, keys, printer);
     const PairRows pairs = study_pairs(keys, effort, events);
     bar.hide();
-    tell_pairs(pairs, teller);
+    print_pairs(pairs, printer);
   }
   for (const NumericKind numeric : effort.numerics) {
     const auto ticks = static_cast<std::uint64_t>(hours_ * 3.6e6);
@@ -252,15 +251,15 @@ int Command::study(std::ostream& out) const {
       bar.show(share, "long run");
     });
     bar.hide();
-    teller.row("long", std::string(word_of(numeric)), "as lab/ranges/long_run.hpp says",
-               long_line(numeric, run), run.violations.size());
-    for (const Violation& violation : run.violations) teller.broken(violation);
+    printer.row("long", std::string(word_of(numeric)), "as lab/ranges/long_run.hpp says",
+                long_line(numeric, run), run.violations.size());
+    for (const Violation& violation : run.violations) printer.broken(violation);
   }
-  out << "violations: " << teller.violations() << std::endl;
-  report.write(
-      Json{{"rows", teller.rows()}, {"violations", static_cast<std::int64_t>(teller.violations())}}
-          .document());
-  return teller.violations() == 0 ? 0 : 1;
+  out << "violations: " << printer.violations() << std::endl;
+  report.write(Json{{"rows", printer.rows()},
+                    {"violations", static_cast<std::int64_t>(printer.violations())}}
+                   .document());
+  return printer.violations() == 0 ? 0 : 1;
 }
 
 }  // namespace

@@ -115,7 +115,8 @@ double rest_cycle_mm(NumericKind numeric, double quantum_mm) {
   return high - low;
 }
 
-std::string measure_stiffness(const Effort& effort, const std::vector<KeyRow>& keys, Found& found) {
+std::string measure_stiffness(const StudySize& effort, const std::vector<KeyRow>& keys,
+                              Found& found) {
   for (const NumericKind numeric : effort.numerics) {
     LoadedScene scene = scene_of(numeric, ForceModel::paper, {0.25, 0.25, 0.25}, solid_half);
     scene.force.p0_n_per_mm2 = 0;
@@ -130,12 +131,12 @@ std::string measure_stiffness(const Effort& effort, const std::vector<KeyRow>& k
   return key_found("force.stiffness_n_per_mm", keys, found);
 }
 
-std::string measure_damping(const Effort&, const std::vector<KeyRow>& keys, Found& found) {
+std::string measure_damping(const StudySize&, const std::vector<KeyRow>& keys, Found& found) {
   return key_found("force.damping_ns_per_mm", keys, found);
 }
 
 /// At rest in the flat, some three voxels deep: force over stiffness times depth.
-std::string measure_voxel_sizes(const Effort& effort, const std::vector<KeyRow>&, Found& found) {
+std::string measure_voxel_sizes(const StudySize& effort, const std::vector<KeyRow>&, Found& found) {
   double worst = 0;
   for (const NumericKind numeric : effort.numerics) {
     for (const std::array<double, 3>& mm : {std::array{0.01, 0.01, 0.01},
@@ -167,7 +168,7 @@ std::string measure_voxel_sizes(const Effort& effort, const std::vector<KeyRow>&
   return format("force within %.2g of K depth", worst);
 }
 
-std::string measure_fields(const Effort& effort, const std::vector<KeyRow>&, Found& found) {
+std::string measure_fields(const StudySize& effort, const std::vector<KeyRow>&, Found& found) {
   const std::array<Field, 4> all{{
       {"empty", [](extremes::Point) { return 0.0; }, true},
       {"full", [](extremes::Point) { return 1.0; }, false},
@@ -204,7 +205,7 @@ std::string measure_fields(const Effort& effort, const std::vector<KeyRow>&, Fou
   return format("largest force %.3g N", largest_n);
 }
 
-std::string measure_quantum(const Effort& effort, const std::vector<KeyRow>&, Found& found) {
+std::string measure_quantum(const StudySize& effort, const std::vector<KeyRow>&, Found& found) {
   constexpr double kCountMm = 0.056;  // of an Omni, whose counts follow the quantum
   double worst = 0;
   for (const NumericKind numeric : effort.numerics) {
@@ -221,7 +222,7 @@ std::string measure_quantum(const Effort& effort, const std::vector<KeyRow>&, Fo
 
 /// In a servo of doubles a heat that decays for 2.5 hours at 250 Hz comes below 2^-1022: e^(-t / 10
 /// s).
-std::string measure_denormals(const Effort&, const std::vector<KeyRow>&, Found& found) {
+std::string measure_denormals(const StudySize&, const std::vector<KeyRow>&, Found& found) {
   constexpr int kTicks = 2'250'000;
   LoadedScene scene =
       scene_of(NumericKind::float64, ForceModel::paper, {0.25, 0.25, 0.25}, solid_half);
@@ -245,7 +246,7 @@ std::string measure_denormals(const Effort&, const std::vector<KeyRow>&, Found& 
   return format("%d ticks of 250 Hz, none subnormal", kTicks);
 }
 
-std::string measure_energy(const Effort&, const std::vector<KeyRow>&, Found& found) {
+std::string measure_energy(const StudySize&, const std::vector<KeyRow>&, Found& found) {
   constexpr auto kMost = std::numeric_limits<std::int64_t>::max(),
                  kLeast = std::numeric_limits<std::int64_t>::min();
   if (saturating_add(kMost, 1) != kMost || saturating_add(kLeast, -1) != kLeast) {

@@ -20,7 +20,8 @@ struct ExtremeRow {
   const char* rule;
   /// Measures a rule that no test shows; null if tests do. Returns the finding, and adds violations
   /// to the list.
-  std::string (*measure)(const Effort&, const std::vector<KeyRow>& keys, std::vector<Violation>&);
+  std::string (*measure)(const StudySize&, const std::vector<KeyRow>& keys,
+                         std::vector<Violation>&);
   std::vector<ShownBy> shown_by;
 };
 

@@ -2,7 +2,6 @@
 #include "lab/ranges/key_study.hpp"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <cstddef>
 #include <filesystem>
@@ -10,7 +9,6 @@
 #include <mutex>
 #include <optional>
 #include <string>
-#include <thread>
 #include <utility>
 #include <vector>
 
@@ -26,22 +24,14 @@ namespace {
 void in_parallel(std::size_t count, std::size_t jobs, const SceneFolder& folder,
                  const std::function<void(std::size_t, const std::filesystem::path&)>& work,
                  const std::function<void(std::size_t, double share)>& done) {
-  std::atomic<std::size_t> next{0};
   std::size_t ended = 0;
-  std::mutex telling;
-  const auto run = [&](std::size_t worker) {
-    const auto file = folder.path() / ("scene" + std::to_string(worker) + ".toml");
-    for (std::size_t i = next++; i < count && !stop_requested(); i = next++) {
-      work(i, file);
-      const std::lock_guard lock(telling);
-      done(i, static_cast<double>(++ended) / static_cast<double>(count));
-    }
-  };
-  {
-    std::vector<std::jthread> workers;
-    for (std::size_t worker = 1; worker < jobs; ++worker) workers.emplace_back(run, worker);
-    run(0);
-  }
+  grid::Run run(jobs);
+  run.all(count, [&](std::size_t i, std::size_t thread) {
+    end_if_asked();
+    work(i, folder.path() / ("scene" + std::to_string(thread) + ".toml"));
+    const std::scoped_lock hold(run.results());
+    done(i, static_cast<double>(++ended) / static_cast<double>(count));
+  });
   end_if_asked();
 }
 
@@ -54,7 +44,7 @@ bool set(const SceneKey& key, const std::string& text, KeyTexts& texts) {
 
 /// The last value from the plain one toward `end` that the loader takes in the first numbers of the
 /// effort; empty if there is none. By bisection: of sizes by their ratio.
-std::string last_accepted(const SceneKey& key, double end, const Effort& effort,
+std::string last_accepted(const SceneKey& key, double end, const StudySize& effort,
                           const std::filesystem::path& file) {
   constexpr int kHalvings = 8;
   const std::optional<PlainNumber> plain = plain_number(key);
@@ -142,10 +132,10 @@ struct KeyFactors {
 };
 
 /// One row, made smaller until it loads.
-Outcome run_row(const KeyFactors& factors, NumericKind numeric, const std::filesystem::path& file,
-                Levels& row) {
+SceneOutcome run_row(const KeyFactors& factors, NumericKind numeric,
+                     const std::filesystem::path& file, Levels& row) {
   for (std::size_t turn = 0;; ++turn) {
-    Outcome outcome = run_combination(factors.texts(row), numeric, file);
+    SceneOutcome outcome = run_combination(factors.texts(row), numeric, file);
     if (!outcome.refused || !outcome.violations.empty()) return outcome;
     if (!factors.give_up(outcome.refusal, turn, row)) return outcome;
   }
@@ -182,7 +172,7 @@ bool pair_texts(const KeyFactors& factors, const Pair& pair, KeyTexts& texts) {
 
 }  // namespace
 
-void Tally::add(const KeyTexts& texts, NumericKind numeric, const Outcome& outcome) {
+void Tally::add(const KeyTexts& texts, NumericKind numeric, const SceneOutcome& outcome) {
   ++(outcome.refused ? refused : ran);
   felt += outcome.felt ? 1 : 0;
   cut += outcome.cut ? 1 : 0;
@@ -202,7 +192,7 @@ void Tally::add(const Tally& other) {
   broken.insert(broken.end(), other.broken.begin(), other.broken.end());
 }
 
-std::vector<KeyRow> study_keys(const Effort& effort, const StudyEvents& events) {
+std::vector<KeyRow> study_keys(const StudySize& effort, const StudyEvents& events) {
   std::vector<KeyRow> rows;
   for (KeyLevels& levels : key_levels()) rows.push_back({std::move(levels), {}, 0, {}});
   const SceneFolder folder;
@@ -214,7 +204,7 @@ std::vector<KeyRow> study_keys(const Effort& effort, const StudyEvents& events) 
       if (!set(key, text, texts)) return;
       bool refused = false;
       for (const NumericKind numeric : effort.numerics) {
-        const Outcome outcome = run_combination(texts, numeric, file);
+        const SceneOutcome outcome = run_combination(texts, numeric, file);
         row.ends.add(texts, numeric, outcome);
         refused = refused || outcome.refused;
       }
@@ -232,7 +222,7 @@ std::vector<KeyRow> study_keys(const Effort& effort, const StudyEvents& events) 
     for (const std::string& text : row.levels.beyond) {
       KeyTexts texts;
       if (!set(key, text, texts)) continue;
-      const Outcome outcome = load_combination(texts, effort.numerics.front(), file);
+      const SceneOutcome outcome = load_combination(texts, effort.numerics.front(), file);
       row.beyond_refused += outcome.refused ? 1 : 0;
       for (const Violation& v : outcome.violations)
         row.ends.broken.push_back({texts, effort.numerics.front(), v});
@@ -249,7 +239,7 @@ std::vector<KeyRow> study_keys(const Effort& effort, const StudyEvents& events) 
   return rows;
 }
 
-PairRows study_pairs(const std::vector<KeyRow>& keys, const Effort& effort,
+PairRows study_pairs(const std::vector<KeyRow>& keys, const StudySize& effort,
                      const StudyEvents& events) {
   const KeyFactors factors(keys);
   const Factors all{.level_counts = factors.level_counts,
@@ -289,7 +279,7 @@ PairRows study_pairs(const std::vector<KeyRow>& keys, const Effort& effort,
     ++out.arrays;
     run(rows.size(), [&](std::size_t i, const std::filesystem::path& file, Tally& tally) {
       for (const NumericKind numeric : effort.numerics) {
-        const Outcome outcome = run_row(factors, numeric, file, rows[i]);
+        const SceneOutcome outcome = run_row(factors, numeric, file, rows[i]);
         tally.add(factors.texts(rows[i]), numeric, outcome);
       }
     });
@@ -301,7 +291,7 @@ PairRows study_pairs(const std::vector<KeyRow>& keys, const Effort& effort,
       KeyTexts texts;
       if (!pair_texts(factors, missing[i], texts)) return;
       for (const NumericKind numeric : effort.numerics) {
-        const Outcome outcome = run_combination(texts, numeric, file);
+        const SceneOutcome outcome = run_combination(texts, numeric, file);
         tally.add(texts, numeric, outcome);
         seen[i] = outcome.refused ? 0 : 1;
       }
@@ -316,7 +306,8 @@ PairRows study_pairs(const std::vector<KeyRow>& keys, const Effort& effort,
 Broken shrunk(Broken broken) {
   const SceneFolder folder;
   const auto breaks = [&](const KeyTexts& texts) {
-    const Outcome outcome = run_combination(texts, broken.numeric, folder.path() / "scene.toml");
+    const SceneOutcome outcome =
+        run_combination(texts, broken.numeric, folder.path() / "scene.toml");
     return std::ranges::find(outcome.violations, broken.violation.rule, &Violation::rule) !=
            outcome.violations.end();
   };

@@ -10,20 +10,19 @@
 #include "controller/scene/scene.hpp"
 #include "lab/ranges/combination.hpp"
 #include "lab/ranges/key_levels.hpp"
+#include "lab/run/grid_run.hpp"
 #include "shared/posix/stop_signals.hpp"
 
 /// Studies of all keys at their ends: each alone, and all pairs.
 namespace kerf::ranges {
 
-/// Thrown out of a study whose program was asked to end.
-struct Interrupted {};
-
+/// Throws `Interrupted` if a signal asked for the end.
 inline void end_if_asked() {
   if (stop_requested()) throw Interrupted();
 }
 
 /// The size of a study.
-struct Effort {
+struct StudySize {
   std::vector<NumericKind> numerics;
   std::size_t combinations = 0;  ///< of keys at their ends, at least
   std::uint64_t seed = 1;
@@ -42,7 +41,7 @@ struct Tally {
   std::size_t ran = 0, refused = 0, felt = 0, cut = 0, faulted = 0, ticks = 0;
   std::vector<Broken> broken;
 
-  void add(const KeyTexts& texts, NumericKind numeric, const Outcome& outcome);
+  void add(const KeyTexts& texts, NumericKind numeric, const SceneOutcome& outcome);
   void add(const Tally& other);
 };
 
@@ -70,12 +69,12 @@ struct StudyEvents {
 };
 
 /// Each end of each key alone, and the values just beyond, in all numbers.
-[[nodiscard]] std::vector<KeyRow> study_keys(const Effort& effort, const StudyEvents& events);
+[[nodiscard]] std::vector<KeyRow> study_keys(const StudySize& effort, const StudyEvents& events);
 
 /// Covering arrays of the accepted ends, one after the other until there are as many combinations
 /// as the effort says. A row that the loader refuses gives up the key that the refusal names, until
 /// it loads; pairs that were lost so are tried by themselves after the first array.
-[[nodiscard]] PairRows study_pairs(const std::vector<KeyRow>& keys, const Effort& effort,
+[[nodiscard]] PairRows study_pairs(const std::vector<KeyRow>& keys, const StudySize& effort,
                                    const StudyEvents& events);
 
 /// Takes keys out of a scene as long as it still breaks the rule.

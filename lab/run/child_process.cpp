@@ -4,6 +4,7 @@
 #include <cerrno>
 #include <chrono>
 #include <csignal>
+#include <cstdlib>
 #include <fstream>
 #include <system_error>
 #include <thread>
@@ -85,6 +86,21 @@ std::string Child::last_line() const {
     if (!line.empty()) last = line;
   }
   return last;
+}
+
+PrivateFolder::PrivateFolder(const char* name) {
+  std::error_code error;
+  std::string pattern =
+      std::filesystem::temp_directory_path(error) / (name + std::string("-XXXXXX"));
+  if (error || mkdtemp(pattern.data()) == nullptr) {
+    throw HilError("TMPDIR: no folder can be made there; set it to one that can be written");
+  }
+  path_ = pattern;
+}
+
+PrivateFolder::~PrivateFolder() {
+  std::error_code ignored;
+  std::filesystem::remove_all(path_, ignored);
 }
 
 std::string program_beside(const char* name) {

@@ -33,6 +33,20 @@ class Child {
   std::filesystem::path output_;
 };
 
+/// A folder of this process alone below $TMPDIR; goes with its owner. Throws `HilError`.
+class PrivateFolder {
+ public:
+  /// `name` begins that of the folder.
+  explicit PrivateFolder(const char* name);
+  ~PrivateFolder();
+  PrivateFolder(const PrivateFolder&) = delete;
+  PrivateFolder& operator=(const PrivateFolder&) = delete;
+  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+};
+
 /// Path of a program of kerf, by its short name: it lies beside this one.
 [[nodiscard]] std::string program_beside(const char* name);
 

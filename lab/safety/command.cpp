@@ -6,25 +6,26 @@
 #include <cstdint>
 #include <cstdio>
 #include <filesystem>
-#include <future>
 #include <map>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <ostream>
 #include <string>
 #include <string_view>
-#include <thread>
+#include <utility>
 #include <vector>
 
 #include "controller/load/load_scene.hpp"
 #include "controller/load/loaded_scene.hpp"
 #include "controller/servo/servo.hpp"
+#include "hil/device/devices.hpp"
 #include "hil/device/hand_script.hpp"
 #include "hil/device/packet_device.hpp"
 #include "hil/hil_error.hpp"
 #include "hil/script/fault_script.hpp"
 #include "hil/script/hand_script_file.hpp"
-#include "lab/rig/direct_port.hpp"
+#include "lab/run/grid_run.hpp"
 #include "lab/run/lab_command.hpp"
 #include "lab/run/lab_run.hpp"
 #include "lab/safety/fault_run.hpp"
@@ -48,33 +49,33 @@ struct Cell {
 };
 
 /// A cell, a script, all seeds.
-struct Row {
+struct FaultRow {
   std::string device, model, numeric, script;
   int rate_hz = 0;
   unsigned runs = 0;
-  unsigned pushed_again = 0;         ///< runs with force after the last fault
-  unsigned latched = 0;              ///< runs whose reports amounted to a fault
-  std::vector<std::string> vacuous;  ///< a line for each run that shows nothing
-  std::string latches;               ///< of the script
-  Outcome worst;
+  unsigned pushed_again = 0;              ///< runs with force after the last fault
+  unsigned latched = 0;                   ///< runs whose reports amounted to a fault
+  std::vector<std::string> inconclusive;  ///< a line for each run that shows nothing
+  std::string latches;                    ///< of the script
+  FaultOutcome worst;
 };
 
 /// The worst figures of a matrix.
 class Summary {
  public:
-  void add(const Row& row);
-  [[nodiscard]] bool held() const noexcept { return broken_ == 0 && vacuous_ == 0; }
+  void add(const FaultRow& row);
+  [[nodiscard]] bool held() const noexcept { return broken_ == 0 && inconclusive_ == 0; }
   [[nodiscard]] std::string text() const;
   [[nodiscard]] Json json() const;
 
  private:
-  std::uint64_t runs_ = 0, broken_ = 0, vacuous_ = 0;
-  Outcome worst_;
+  std::uint64_t runs_ = 0, broken_ = 0, inconclusive_ = 0;
+  FaultOutcome worst_;
   std::map<std::string, double> latch_ms_;  ///< by fault, of scripts that name it
 };
 
 /// The larger figure of each kind; counts add up.
-void take_worst(const Outcome& from, Outcome& worst) {
+void take_worst(const FaultOutcome& from, FaultOutcome& worst) {
   const auto larger = [](double value, double& into) { into = std::max(into, value); };
   larger(from.latch_ms, worst.latch_ms);
   larger(from.peak_n, worst.peak_n);
@@ -88,7 +89,7 @@ void take_worst(const Outcome& from, Outcome& worst) {
   if (worst.violations.empty()) worst.violations = from.violations;
 }
 
-Json figures_of(const Outcome& worst) {
+Json figures_of(const FaultOutcome& worst) {
   return {{"peak_n", worst.peak_n},
           {"device_peak_n", worst.device_peak_n},
           {"steepest_n_per_ms", worst.steepest_n_per_ms},
@@ -106,8 +107,9 @@ bool applies(const NamedScript& named, const Cell& cell) {
 }
 
 /// Seeds `seed_base` to `seed_base + seeds - 1`. The same arguments give the same row.
-Row run_row(const Cell& cell, const NamedScript& named, std::uint32_t seed_base, unsigned seeds) {
-  Row row;
+FaultRow run_row(const Cell& cell, const NamedScript& named, std::uint32_t seed_base,
+                 unsigned seeds) {
+  FaultRow row;
   row.device = cell.device;
   row.model = cell.model;
   row.numeric = cell.numeric;
@@ -117,9 +119,9 @@ Row run_row(const Cell& cell, const NamedScript& named, std::uint32_t seed_base,
     FaultScript script = named.script ? *named.script : random_faults(seed);
     script.seed = seed;
     row.latches = script.latches;
-    Outcome outcome = run_faults({.scene = cell.scene, .hand = cell.hand}, script);
+    FaultOutcome outcome = run_faults({.scene = cell.scene, .hand = cell.hand}, script);
     const std::string name = "seed " + std::to_string(seed) + ": ";
-    if (!outcome.vacuous.empty()) row.vacuous.push_back(name + outcome.vacuous);
+    if (!outcome.inconclusive.empty()) row.inconclusive.push_back(name + outcome.inconclusive);
     for (std::string& line : outcome.violations) line.insert(0, name);
     ++row.runs;
     row.pushed_again += outcome.pushed_again ? 1 : 0;
@@ -135,7 +137,7 @@ std::string table_head() {
          "  peak N   tip N    N/ms  RMS N alone ms off ms vacuous broken";
 }
 
-std::string line_of(const Row& row) {
+std::string line_of(const FaultRow& row) {
   char text[240];
   std::snprintf(text, sizeof text,
                 "%-13s %7d %-5s %-7s %-18s %4u %7llu %7u %8.2f %8u %7.2f %7.2f %7.3f %6.3f %8.2f "
@@ -145,12 +147,12 @@ std::string line_of(const Row& row) {
                 static_cast<unsigned long long>(row.worst.faults_begun), row.latched,
                 row.worst.latch_ms, row.pushed_again, row.worst.peak_n, row.worst.device_peak_n,
                 row.worst.steepest_n_per_ms, row.worst.rms_n, row.worst.longest_alone_ms,
-                row.worst.slowest_off_ms, row.vacuous.size(),
+                row.worst.slowest_off_ms, row.inconclusive.size(),
                 static_cast<unsigned long long>(row.worst.violation_count));
   return text;
 }
 
-Json json_of(const Row& row) {
+Json json_of(const FaultRow& row) {
   return {{"device", row.device},
           {"rate_hz", row.rate_hz},
           {"model", row.model},
@@ -162,14 +164,14 @@ Json json_of(const Row& row) {
           {"slowest_latch_ms", row.worst.latch_ms},
           {"runs_pushed_again", row.pushed_again},
           {"worst", figures_of(row.worst)},
-          {"vacuous", row.vacuous},
+          {"vacuous", row.inconclusive},
           {"violations", row.worst.violation_count},
           {"first_violations", row.worst.violations}};
 }
 
-void Summary::add(const Row& row) {
+void Summary::add(const FaultRow& row) {
   runs_ += row.runs;
-  vacuous_ += row.vacuous.size();
+  inconclusive_ += row.inconclusive.size();
   broken_ += row.worst.violation_count;
   take_worst(row.worst, worst_);
   if (row.latches.empty() || row.latches == fault_name(Fault::none)) return;
@@ -183,7 +185,7 @@ std::string Summary::text() const {
       text, sizeof text,
       "%llu runs, %llu show nothing, %llu rules broken. Worst: %.3f N, %.3f N/ms, RMS %.3f "
       "N, alone %.2f ms, off %.2f ms",
-      static_cast<unsigned long long>(runs_), static_cast<unsigned long long>(vacuous_),
+      static_cast<unsigned long long>(runs_), static_cast<unsigned long long>(inconclusive_),
       static_cast<unsigned long long>(broken_), worst_.peak_n, worst_.steepest_n_per_ms,
       worst_.rms_n, worst_.longest_alone_ms, worst_.slowest_off_ms);
   std::string all = text;
@@ -198,7 +200,7 @@ Json Summary::json() const {
   Json latches = Json::List{};
   for (const auto& [name, ms] : latch_ms_) latches.push_back(Json{{"fault", name}, {"ms", ms}});
   return {{"runs", runs_},
-          {"vacuous", vacuous_},
+          {"vacuous", inconclusive_},
           {"violations", broken_},
           {"worst", figures_of(worst_)},
           {"slowest_latches", latches}};
@@ -354,22 +356,25 @@ int Command::run(std::ostream& out) const {
   out << table_head() << std::endl;
   Json rows = Json::List{};
   Summary summary;
-  // As many rows at once as there are cores; told in order.
-  std::vector<std::future<Row>> running;
-  const std::size_t cores = std::max(1U, std::thread::hardware_concurrency());
-  for (std::size_t i = 0; i < jobs.size(); ++i) {
-    for (std::size_t next = running.size(); next < std::min(jobs.size(), i + cores); ++next) {
-      running.push_back(std::async(std::launch::async, [&, next] {
-        return run_row(*jobs[next].cell, *jobs[next].script, seed_base_, seeds_);
-      }));
-    }
-    const Row row = running[i].get();
+  const auto print = [&](const FaultRow& row) {
     out << line_of(row) << std::endl;
     for (const std::string& line : row.worst.violations) out << "  broken: " << line << '\n';
-    if (!row.vacuous.empty()) out << "  shows nothing: " << row.vacuous.front() << '\n';
+    if (!row.inconclusive.empty()) out << "  shows nothing: " << row.inconclusive.front() << '\n';
     summary.add(row);
     rows.push_back(json_of(row));
-  }
+  };
+  std::map<std::size_t, FaultRow> early;  // rows that end before one above them
+  std::size_t printed = 0;
+  grid::Run run(grid::threads_for(0));
+  run.all(jobs.size(), [&](std::size_t job, std::size_t) {
+    FaultRow row = run_row(*jobs[job].cell, *jobs[job].script, seed_base_, seeds_);
+    const std::scoped_lock hold(run.results());
+    early.emplace(job, std::move(row));
+    for (auto next = early.begin(); next != early.end() && next->first == printed; ++printed) {
+      print(next->second);
+      next = early.erase(next);
+    }
+  });
   out << summary.text() << '\n';
   report.write(Json{{"rows", rows}, {"all", summary.json()}}.document());
   return summary.held() ? 0 : 1;

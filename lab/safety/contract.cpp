@@ -56,7 +56,7 @@ double change_but_for_fall_n(DeviceVec<double> last, DeviceVec<double> force) {
 
 }  // namespace
 
-SafetyMonitor::SafetyMonitor(const LoadedScene& scene, bool trusted, Outcome& outcome)
+SafetyMonitor::SafetyMonitor(const LoadedScene& scene, bool trusted, FaultOutcome& outcome)
     : limits_(scene.limits),
       tick_ms_(1000.0 / scene.servo.rate_hz),
       trusted_(trusted),

@@ -29,7 +29,7 @@ class SafetyMonitor {
  public:
   /// `trusted`: neither sensors nor commands are broken on the way, so the motors' true force must
   /// follow the commands. `scene` and `outcome` outlive it.
-  SafetyMonitor(const LoadedScene& scene, bool trusted, Outcome& outcome);
+  SafetyMonitor(const LoadedScene& scene, bool trusted, FaultOutcome& outcome);
 
   /// The host has asked for packets of the device.
   void listened(double time_ms) noexcept { listened_ms_ = time_ms; }
@@ -71,7 +71,7 @@ class SafetyMonitor {
   LimitSettings limits_;
   double tick_ms_;
   bool trusted_;
-  Outcome& outcome_;
+  FaultOutcome& outcome_;
   DeviceWire wire_;
   OutwardNormal outward_;
 

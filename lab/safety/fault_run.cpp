@@ -8,19 +8,17 @@
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <type_traits>
 
 #include "controller/device/device_driver.hpp"
 #include "controller/device/port/packet_port.hpp"
 #include "controller/loop/servo_loop.hpp"
 #include "controller/loop/tick_source.hpp"
-#include "controller/plan/compile.hpp"
+#include "hil/device/devices.hpp"
 #include "hil/device/emulator.hpp"
-#include "hil/device/falcon.hpp"
-#include "hil/device/omni.hpp"
 #include "hil/device/packet_device.hpp"
-#include "hil/device/wooden.hpp"
 #include "hil/script/faulty_device.hpp"
-#include "lab/rig/direct_port.hpp"
+#include "lab/rig/virtual_loop.hpp"
 #include "lab/safety/contract.hpp"
 
 namespace kerf::faults {
@@ -53,31 +51,17 @@ class WatchedPort final : public PacketPort {
 };
 
 /// The plant that the hand script asks for. Half of the seeds hold the torque when the host is
-/// silent, half drop it: a device's behaviour is not known.
-template <class Params>
-Params plant_of(const HandScript& hand, std::uint32_t seed) {
-  Params params;
-  take_plant(hand.plant, params);
-  params.on_silence = seed % 2 == 0 ? OnSilence::hold_torque : OnSilence::drop_torque;
-  return params;
-}
-
-Emulator make_emulator(const Subject& subject, std::uint32_t seed) {
-  switch (subject.scene.device.personality) {
-    case Personality::falcon:
-      return {std::make_unique<FalconModel>(plant_of<FalconParams>(subject.hand, seed)),
-              subject.hand};
-    case Personality::woodenhaptics: {
-      WoodenParams wooden;  // lets go by itself
-      take_plant(subject.hand.plant, wooden);
-      return {std::make_unique<WoodenModel>(wooden), subject.hand};
+/// silent, half drop it: a device's behaviour is not known. WoodenHaptics lets go by itself.
+std::unique_ptr<DeviceModel> model_of(const FaultCase& subject, std::uint32_t seed) {
+  const DeviceSettings& device = subject.scene.device;
+  return with_device_params(device.personality, [&](auto params) {
+    take_plant(subject.hand.plant, params);
+    if (device.personality != Personality::woodenhaptics) {
+      params.on_silence = seed % 2 == 0 ? OnSilence::hold_torque : OnSilence::drop_torque;
     }
-    case Personality::omni:
-      break;
-  }
-  auto params = plant_of<OmniParams>(subject.hand, seed);
-  params.dock_rad = subject.scene.device.dock_rad;
-  return {params, subject.hand};
+    if constexpr (std::is_same_v<decltype(params), OmniParams>) params.dock_rad = device.dock_rad;
+    return make_model(params);
+  });
 }
 
 /// Returns true if the motors' true force need not follow the commands under this script: a sensor
@@ -124,39 +108,14 @@ FaultScript shifted(FaultScript script) {
 }
 
 /// One line if the run shows nothing: no contact, or a fault that never was.
-std::string vacuous_line(const FaultScript& script, Personality personality, const Outcome& outcome,
-                         std::uint64_t met) {
+std::string inconclusive_line(const FaultScript& script, Personality personality,
+                              const FaultOutcome& outcome, std::uint64_t met) {
   if (!outcome.pushed) return "the motors never pushed at the tip";
   const auto due = std::ranges::count_if(
       script.faults, [&](const DeviceFault& fault) { return concerns(fault.kind, personality); });
   if (script.is_random ? met > 0 || due == 0 : met >= static_cast<std::uint64_t>(due)) return {};
   return std::to_string(met) + " of " + std::to_string(due) + " faults changed anything";
 }
-
-/// The shell of a controller in virtual time: its clock is the emulator's.
-class VirtualShell {
- public:
-  VirtualShell(const LoadedScene& scene, CompiledScene& servo, PacketPort& port)
-      : servo_(servo),
-        driver_(make_driver(scene.device.personality, port, scene.device.encoder_sign)) {}
-
-  void start() { driver_->start(); }
-  void look(std::int64_t now_ns) { watchdog_.look(now_ns); }
-  void tick(std::int64_t now_ns) {
-    const DeviceReport report = driver_->read();
-    static_cast<void>(recover(signals_, standstill_.stood_still(now_ns), servo_));
-    send_tick(servo_.step(report), signals_, *driver_);
-    ++signals_.heartbeat;
-  }
-
- private:
-  CompiledScene& servo_;
-  std::unique_ptr<DeviceDriver> driver_;
-  std::atomic<bool> stop_{false};
-  LoopSignals signals_{stop_};
-  Watchdog watchdog_{*driver_, signals_};
-  StandstillWatch standstill_;
-};
 
 }  // namespace
 
@@ -166,29 +125,31 @@ bool concerns(FaultKind kind, Personality personality) noexcept {
   return true;
 }
 
-Outcome run_faults(const Subject& subject, const FaultScript& as_written) {
+FaultOutcome run_faults(const FaultCase& subject, const FaultScript& as_written) {
   const FaultScript script = shifted(as_written);
   LoadedScene scene = subject.scene;  // the servo takes its volumes
-  const std::unique_ptr<CompiledScene> servo = compile(scene);
-  Emulator emulator = make_emulator(subject, script.seed);
+  Emulator emulator(model_of(subject, script.seed), subject.hand);
   FaultyDevice device(emulator, script);
   DirectPort wire(device);
 
-  Outcome outcome;
+  FaultOutcome outcome;
   const bool trusted = std::ranges::none_of(script.faults, misleads);
   SafetyMonitor contract(subject.scene, trusted, outcome);
   double time_ms = 0;
   WatchedPort port(wire, contract, time_ms);
-  VirtualShell shell(scene, *servo, port);
+  VirtualLoop loop(scene, wire, port);
 
-  const int cycles_per_tick = kCyclesPerSecond / scene.servo.rate_hz;
+  // The guards of the controller's loop; their clock is the emulator's.
+  std::atomic<bool> stop{false};
+  LoopSignals signals{stop};
+  Watchdog watchdog(loop.driver(), signals);
+  StandstillWatch standstill;
   const auto cycles_per_look =
       static_cast<std::uint32_t>(cycles_of(std::chrono::duration<double>(kWatchdogPeriod).count()));
   double first_push_ms = -1;
-  shell.start();
   const std::int64_t cycles = cycles_of(script.seconds);
   for (std::int64_t cycle = 1; cycle <= cycles; ++cycle) {
-    wire.cycle();
+    const bool due = loop.cycle();
     time_ms = static_cast<double>(cycle) * 1000 / kCyclesPerSecond;
     if (device.begun() > outcome.faults_begun) contract.fault_begins(time_ms);
     outcome.faults_begun = device.begun();
@@ -196,12 +157,16 @@ Outcome run_faults(const Subject& subject, const FaultScript& as_written) {
     if (first_push_ms < 0 && outcome.pushed) first_push_ms = time_ms;
     const auto now_ns = static_cast<std::int64_t>(time_ms * 1e6);
     if ((static_cast<std::uint64_t>(cycle) + script.seed) % cycles_per_look == 0)
-      shell.look(now_ns);
-    if (cycle % cycles_per_tick == 0 && !device.host_is_late()) shell.tick(now_ns);
+      watchdog.look(now_ns);
+    if (!due || device.host_is_late()) continue;
+    const DeviceReport report = loop.driver().read();
+    static_cast<void>(recover(signals, standstill.stood_still(now_ns), loop.servo()));
+    send_tick(loop.servo().step(report), signals, loop.driver());
+    ++signals.heartbeat;
   }
   constexpr double kGraceMs = 50;
   contract.end(time_ms, script.latches, first_push_ms + end_of(script) * 1000 + kGraceMs);
-  outcome.vacuous = vacuous_line(script, scene.device.personality, outcome, device.met());
+  outcome.inconclusive = inconclusive_line(script, scene.device.personality, outcome, device.met());
   return outcome;
 }
 

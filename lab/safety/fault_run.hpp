@@ -13,17 +13,17 @@
 namespace kerf::faults {
 
 /// One emulated device, its driver and the servo step in virtual time, with faults between them.
-struct Subject {
+struct FaultCase {
   const LoadedScene& scene;  ///< its device is the one that is emulated
   const HandScript& hand;
 };
 
 /// The findings of a run on the safety contract (docs/safety.md), by the wire, the emulated device
 /// and its clock.
-struct Outcome {
+struct FaultOutcome {
   std::vector<std::string> violations;  ///< the first few, with their times
   std::uint64_t violation_count = 0;
-  std::string vacuous;  ///< the reason if the run shows nothing, else empty
+  std::string inconclusive;  ///< the reason if the run shows nothing, else empty
   std::uint64_t faults_begun = 0;
   double peak_n = 0;             ///< commanded
   double device_peak_n = 0;      ///< of the motors at the true tip
@@ -42,6 +42,6 @@ struct Outcome {
 
 /// Plays `script` on `subject`, each seed at another moment of the hand's motion. The same
 /// arguments give the same outcome.
-[[nodiscard]] Outcome run_faults(const Subject& subject, const FaultScript& script);
+[[nodiscard]] FaultOutcome run_faults(const FaultCase& subject, const FaultScript& script);
 
 }  // namespace kerf::faults

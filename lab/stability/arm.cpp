@@ -10,18 +10,14 @@
 #include <string>
 #include <utility>
 
-#include "controller/device/device_driver.hpp"
 #include "controller/load/load_scene.hpp"
-#include "controller/plan/compile.hpp"
 #include "controller/tool/tool_shapes.hpp"
+#include "hil/device/devices.hpp"
 #include "hil/device/emulator.hpp"
-#include "hil/device/falcon.hpp"
-#include "hil/device/omni.hpp"
 #include "hil/device/packet_device.hpp"
-#include "hil/device/wooden.hpp"
 #include "hil/hil_error.hpp"
 #include "lab/rig/bench_scene.hpp"
-#include "lab/rig/direct_port.hpp"
+#include "lab/rig/virtual_loop.hpp"
 #include "lab/stability/one_axis.hpp"
 #include "shared/numeric/linear_algebra.hpp"
 
@@ -35,7 +31,7 @@ constexpr double kAwayMm = 3;  ///< the tool's middle above the flat, between tw
 constexpr double kCornerMm = 4.25;
 
 /// The hand that pushes: the subject's, or a spring so soft that the device is as good as free.
-SampledHand pushing_hand(const Subject& subject) {
+SampledHand pushing_hand(const LoopCase& subject) {
   SampledHand hand = subject.loop.hand;
   constexpr double kSoft = 0.2;
   if (hand.stiffness_n_per_mm <= 0) hand.stiffness_n_per_mm = kSoft;
@@ -43,7 +39,7 @@ SampledHand pushing_hand(const Subject& subject) {
 }
 
 template <class Params>
-Params with_plant(Params params, const Subject& subject) {
+Params with_plant(Params params, const LoopCase& subject) {
   const SampledHand hand = pushing_hand(subject);
   params.tip_mass_kg = subject.loop.mass_kg;
   params.viscous_ns_per_mm = subject.loop.viscous_ns_per_mm;
@@ -62,16 +58,9 @@ Params with_plant(Params params, const Subject& subject) {
   return params;
 }
 
-Emulator emulator_of(const Subject& subject, const HandScript& hand) {
-  switch (subject.device) {
-    case Personality::falcon:
-      return {std::make_unique<FalconModel>(with_plant(FalconParams{}, subject)), hand};
-    case Personality::woodenhaptics:
-      return {std::make_unique<WoodenModel>(with_plant(WoodenParams{}, subject)), hand};
-    case Personality::omni:
-      break;
-  }
-  return {with_plant(OmniParams{}, subject), hand};
+std::unique_ptr<DeviceModel> model_of(const LoopCase& subject) {
+  return with_device_params(
+      subject.device, [&](const auto& params) { return make_model(with_plant(params, subject)); });
 }
 
 /// One way of meeting a wall; device mm, of the tool's middle. Judged along `normal`.
@@ -83,7 +72,7 @@ struct ArmHit {
 };
 
 /// At a place that the seed shifts.
-std::array<ArmHit, kArmHits> hits_of(const Subject& subject, std::uint64_t seed) {
+std::array<ArmHit, kArmHits> hits_of(const LoopCase& subject, std::uint64_t seed) {
   const double depth_mm =
       (subject.push_n + subject.loop.coulomb_n) / pushing_hand(subject).stiffness_n_per_mm;
   constexpr std::uint64_t kPlaces = 1000;
@@ -103,7 +92,7 @@ std::array<ArmHit, kArmHits> hits_of(const Subject& subject, std::uint64_t seed)
 
 /// Each hit from its start, a stay, and off again by the way it came; high over to the next. The
 /// reach ends high above the first, and the hand comes down so slowly that it does not swing.
-HandScript script_of(const Subject& subject, const std::array<ArmHit, kArmHits>& hits,
+HandScript script_of(const LoopCase& subject, const std::array<ArmHit, kArmHits>& hits,
                      double seconds) {
   constexpr double kHighMm = 20, kPeriods = 3;
   const double hand_rad_per_s = with_plant(PlantParams{}, subject).hand_rad_per_s();
@@ -130,33 +119,21 @@ HandScript script_of(const Subject& subject, const std::array<ArmHit, kArmHits>&
   return script;
 }
 
-/// One device, its driver and a servo; a step is one tick.
+/// The whole arm in virtual time.
 class Rig {
  public:
-  Rig(LoadedScene scene, const Subject& subject, const HandScript& hand)
-      : servo_(compile(scene)),
-        emulator_(emulator_of(subject, hand)),
-        port_(emulator_),
-        driver_(make_driver(subject.device, port_)),
-        cycles_per_tick_(kCyclesPerSecond / scene.servo.rate_hz) {
-    driver_->start();
-  }
-  ServoOutput tick() {
-    for (int cycle = 0; cycle < cycles_per_tick_; ++cycle) port_.cycle();
-    const ServoOutput out = servo_->step(driver_->read());
-    driver_->command(out);
-    return out;
-  }
+  Rig(LoadedScene scene, const LoopCase& subject, const HandScript& hand)
+      : emulator_(model_of(subject), hand), port_(emulator_), loop_(scene, port_) {}
+
+  ServoOutput tick() { return loop_.tick(); }
   /// The mechanics. Their work is the motors' work on the tip, delay included: the servo books what
   /// it asked for.
   [[nodiscard]] const PlantState& plant() const { return emulator_.model().state(); }
 
  private:
-  std::unique_ptr<CompiledScene> servo_;
   Emulator emulator_;
   DirectPort port_;
-  std::unique_ptr<DeviceDriver> driver_;
-  int cycles_per_tick_;
+  VirtualLoop loop_;
 };
 
 /// The verdict on a latched fault, or on a device that never comes free of the wall.
@@ -164,7 +141,7 @@ constexpr LimitCycle kLost{.swings = true, .active = true};
 
 /// One hit: nothing before the first contact; the verdict after `seconds`. Empty if the hand does
 /// not bring the device to the wall.
-std::optional<LimitCycle> watch_hit(Rig& rig, const Subject& subject, const ArmHit& hit,
+std::optional<LimitCycle> watch_hit(Rig& rig, const LoopCase& subject, const ArmHit& hit,
                                     double seconds, StepCounter& ticks, const SwingWatch& watch) {
   const double rate_hz = 1 / subject.loop.period_s;
   const std::int64_t count = std::llround(seconds * rate_hz);
@@ -204,7 +181,7 @@ std::optional<LimitCycle> watch_hit(Rig& rig, const Subject& subject, const ArmH
 }
 
 /// The scene of one cell.
-LoadedScene cell_scene(const LoadedScene& scene, const Subject& subject,
+LoadedScene cell_scene(const LoadedScene& scene, const LoopCase& subject,
                        double stiffness_n_per_mm) {
   LoadedScene own = scene;
   own.force.stiffness_n_per_mm = stiffness_n_per_mm;
@@ -218,7 +195,7 @@ LoadedScene cell_scene(const LoadedScene& scene, const Subject& subject,
 
 }  // namespace
 
-LoadedScene walls_scene(const Subject& subject) {
+LoadedScene walls_scene(const LoopCase& subject) {
   const int rate_hz = static_cast<int>(std::lround(1 / subject.loop.period_s));
   if (kCyclesPerSecond % rate_hz != 0) {
     throw HilError("--rate: " + std::to_string(rate_hz) +
@@ -252,8 +229,9 @@ LoadedScene walls_scene(const Subject& subject) {
   return scene;
 }
 
-LimitCycle hit_with_arm(const LoadedScene& scene, const Subject& subject, double stiffness_n_per_mm,
-                        double seconds, std::uint64_t seed, StepCounter& ticks) {
+LimitCycle hit_with_arm(const LoadedScene& scene, const LoopCase& subject,
+                        double stiffness_n_per_mm, double seconds, std::uint64_t seed,
+                        StepCounter& ticks) {
   const std::array<ArmHit, kArmHits> hits = hits_of(subject, seed);
   Rig rig(cell_scene(scene, subject, stiffness_n_per_mm), subject,
           script_of(subject, hits, seconds));
@@ -267,7 +245,7 @@ LimitCycle hit_with_arm(const LoadedScene& scene, const Subject& subject, double
   return worst;
 }
 
-void watch_arm(const LoadedScene& scene, const Subject& subject, double stiffness_n_per_mm,
+void watch_arm(const LoadedScene& scene, const LoopCase& subject, double stiffness_n_per_mm,
                double seconds, std::uint64_t seed, StepCounter& ticks,
                const std::function<SwingWatch(std::size_t hit)>& begin) {
   const std::array<ArmHit, kArmHits> hits = hits_of(subject, seed);

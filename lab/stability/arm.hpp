@@ -18,7 +18,7 @@ inline constexpr std::size_t kArmHits = 5;
 /// A ball of 1 mm over a flat that meets two more walls in a corner, felt by the swept contact and
 /// not cut, for the subject's device. Throws HilError for a rate that does not divide that of the
 /// devices' mechanics.
-[[nodiscard]] LoadedScene walls_scene(const Subject& subject);
+[[nodiscard]] LoadedScene walls_scene(const LoopCase& subject);
 
 /// Nothing was measured: within 8 s the hand did not bring the device to the wall, by too much
 /// friction, mass or damping.
@@ -38,14 +38,14 @@ class NotMet : public HilError {
 ///
 /// The subject's delay counts in whole bus cycles of 125 us; encoder and limits are those of
 /// device and servo. Without a hand a spring of 0.2 N/mm pushes. Throws NotMet, or Interrupted.
-[[nodiscard]] LimitCycle hit_with_arm(const LoadedScene& scene, const Subject& subject,
+[[nodiscard]] LimitCycle hit_with_arm(const LoadedScene& scene, const LoopCase& subject,
                                       double stiffness_n_per_mm, double seconds, std::uint64_t seed,
                                       StepCounter& ticks);
 
 /// The same hits one after the other, whatever they show, until the hand no longer brings the
 /// device to the wall: `begin` gives for each who is told of its ticks, by the device's true
 /// mechanics.
-void watch_arm(const LoadedScene& scene, const Subject& subject, double stiffness_n_per_mm,
+void watch_arm(const LoadedScene& scene, const LoopCase& subject, double stiffness_n_per_mm,
                double seconds, std::uint64_t seed, StepCounter& ticks,
                const std::function<SwingWatch(std::size_t hit)>& begin);
 

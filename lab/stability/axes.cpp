@@ -12,6 +12,7 @@
 #include "hil/device/plant_params.hpp"
 #include "hil/device/wooden.hpp"
 #include "hil/hil_error.hpp"
+#include "lab/run/grid_axes.hpp"
 #include "shared/text/text.hpp"
 #include "shared/wire/falcon.hpp"
 #include "shared/wire/woodenhaptics.hpp"
@@ -67,20 +68,14 @@ bool has_word(const std::string& words, const std::string& word) {
   return std::ranges::find(list, word) != list.end();
 }
 
-/// from:to:count.
-struct Range {
-  double from, to;
-  int count;
-};
 constexpr int kMostValues = 1000;
 
-std::optional<Range> range_in(const std::string& text) {
-  const auto parts = split(text, ':');
-  if (parts.size() != 3) return std::nullopt;
-  const auto from = number_in(parts[0]), to = number_in(parts[1]), count = number_in(parts[2]);
-  if (!from || !to || !count || *count != std::floor(*count)) return std::nullopt;
-  if (*count < 2 || *count > kMostValues || !(*from < *to)) return std::nullopt;
-  return Range{*from, *to, static_cast<int>(*count)};
+/// from:to:count, rising; empty for another text.
+std::optional<grid::Range> rising_range(const std::string& text) {
+  const auto range = grid::range_in(text);
+  const bool fits = range && range->count == std::floor(range->count) && range->count >= 2 &&
+                    range->count <= kMostValues && range->lo < range->hi;
+  return fits ? range : std::nullopt;
 }
 
 /// Mass, damping, stiffness. The pen-holds are chosen, not measured: light lets the device swing
@@ -227,10 +222,10 @@ const std::array<AxisKind, kAxisCount>& axis_kinds() {
 AxisValues axis_values(AxisId axis, const std::string& text) {
   const AxisKind& kind = kKinds[index_of(axis)];
   AxisValues values;
-  if (const auto range = range_in(text); range && kind.lowest != kind.highest) {
+  if (const auto range = rising_range(text); range && kind.lowest != kind.highest) {
     for (int i = 0; i < range->count; ++i) {
       const double share = static_cast<double>(i) / (range->count - 1);
-      values.push_back(format("%.9g", range->from + (range->to - range->from) * share));
+      values.push_back(format("%.9g", range->lo + (range->hi - range->lo) * share));
     }
   } else {
     values = split(text, ',');
@@ -257,10 +252,10 @@ std::vector<double> stiffness_values(const std::string& text) {
                    "as 0.05:50:40 (from, "
                    "to, count) or 0.5,1,2");
   };
-  if (const auto range = range_in(text); range && range->from > 0) {
+  if (const auto range = rising_range(text); range && range->lo > 0) {
     for (int i = 0; i < range->count; ++i) {
       const double share = static_cast<double>(i) / (range->count - 1);
-      values.push_back(range->from * std::pow(range->to / range->from, share));
+      values.push_back(range->lo * std::pow(range->hi / range->lo, share));
     }
   } else {
     for (const std::string& part : split(text, ',')) {
@@ -308,10 +303,10 @@ std::string laws_of(const Assignment& values) {
   return text;
 }
 
-Subject subject_of(const Assignment& values) {
+LoopCase subject_of(const Assignment& values) {
   const auto text = [&](AxisId axis) { return value_of(values, axis); };
   const auto number = [&](AxisId axis) { return number_in(text(axis)).value_or(0); };
-  Subject subject;
+  LoopCase subject;
   SampledLoop& loop = subject.loop;
   loop.mass_kg = number(AxisId::mass);
   loop.viscous_ns_per_mm = number(AxisId::viscous);

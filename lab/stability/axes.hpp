@@ -22,12 +22,12 @@ enum class Law : std::uint8_t {
   linear,     ///< max(0, K delta - B v)
   two_sided,  ///< -K x - B v on both sides of the face: the loop of the exact boundary
   paper,      ///< the paper's pressure on the covered voxels, of the whole arm alone
-  own         ///< `Subject::force_law`
+  own         ///< `LoopCase::force_law`
 };
 
 /// One cell of a map without its stiffness: the loop that is pressed against the wall, and the
 /// wall.
-struct Subject {
+struct LoopCase {
   SampledLoop loop;
   double damping_ns_per_mm = 0;
   double push_n = 0.5;  ///< of the hand, above Coulomb friction
@@ -46,7 +46,7 @@ struct Subject {
 
 /// The subject's own force law at this stiffness: `stiffness_n_per_mm` and, if it has it,
 /// `damping_ns_per_mm` are its settings.
-[[nodiscard]] inline LawChoice force_law_at(const Subject& subject, double stiffness_n_per_mm) {
+[[nodiscard]] inline LawChoice force_law_at(const LoopCase& subject, double stiffness_n_per_mm) {
   LawChoice choice = subject.force_law;
   if (choice.name.empty()) return choice;
   choice.settings.emplace_back("stiffness_n_per_mm", stiffness_n_per_mm);
@@ -108,7 +108,7 @@ using Assignment = std::array<std::string, kAxisCount>;
 [[nodiscard]] std::vector<Assignment> combinations(const AxisTable& table);
 
 /// The subject of these values, with the standards of their loop and device.
-[[nodiscard]] Subject subject_of(const Assignment& values);
+[[nodiscard]] LoopCase subject_of(const Assignment& values);
 
 /// The value in force, given or standard, as in the files of a map.
 [[nodiscard]] std::string value_of(const Assignment& values, AxisId axis);

@@ -12,12 +12,12 @@
 #include <set>
 #include <stdexcept>
 #include <string>
-#include <thread>
 #include <utility>
 #include <vector>
 
 #include "controller/run/law_trial.hpp"
 #include "hil/hil_error.hpp"
+#include "lab/run/grid_run.hpp"
 #include "lab/run/lab_command.hpp"
 #include "lab/run/lab_run.hpp"
 #include "lab/stability/arm.hpp"
@@ -102,7 +102,7 @@ void tell(const Part& part, std::ostream& out) {
   out << format("%-*s %10s %10s %10s %10s  re-entry\n", int(width), "column (N/mm)", "swings",
                 "energy", "exact", "passive");
   for (const auto& [index, column] : part.columns) {
-    const Subject subject = subject_of(columns[index]);
+    const LoopCase subject = subject_of(columns[index]);
     if (column.cells.empty()) {
       const std::string why = impossible(part.spec, subject);
       ++empty_count;
@@ -135,7 +135,6 @@ class Command final : public LabCommand {
   [[nodiscard]] MapSpec spec() const;
   static void try_laws(const MapSpec& map, std::ostream& out);
   [[nodiscard]] Shard shard() const;
-  [[nodiscard]] int threads(std::size_t columns) const;
   /// The columns of the shard that `kept` has not; false: interrupted.
   [[nodiscard]] bool measure(const MapSpec& map, const Shard& shard, PartWriter& kept,
                              std::ostream& out) const;
@@ -205,7 +204,7 @@ void Command::try_laws(const MapSpec& map, std::ostream& out) {
       laws += value_of(values, axis) + ' ';
     }
     if (!tried.insert(laws).second) continue;
-    const Subject subject = subject_of(values);
+    const LoopCase subject = subject_of(values);
     for (const double stiffness : {map.stiffness_n_per_mm.front(), map.stiffness_n_per_mm.back()}) {
       LoadedScene scene;
       scene.path = "zwidth";
@@ -339,12 +338,6 @@ Shard Command::shard() const {
   return {static_cast<std::size_t>(*index), static_cast<std::size_t>(*count)};
 }
 
-int Command::threads(std::size_t columns) const {
-  const std::size_t cores = std::max(1U, std::thread::hardware_concurrency());
-  const std::size_t wanted = jobs_ > 0 ? static_cast<std::size_t>(jobs_) : cores;
-  return static_cast<int>(std::clamp<std::size_t>(columns, 1, wanted));
-}
-
 void Command::write_page(std::ostream& out) const {
   check_can_plot();
   const LabOutput as_page("--page", page_, ".md");
@@ -371,7 +364,7 @@ bool Command::measure(const MapSpec& map, const Shard& shard, PartWriter& kept,
   for (std::size_t i = 0; i < count; ++i) {
     if (shard.has(i) && !kept.columns().contains(i)) wanted.push_back(i);
   }
-  const int jobs = threads(wanted.size());
+  const std::size_t jobs = std::clamp<std::size_t>(wanted.size(), 1, grid::threads_for(jobs_));
   const std::atomic<bool>& stop = catch_stop_signals();
   const ProgressBar bar(true);
   const auto begun = Clock::now();
@@ -396,9 +389,9 @@ bool Command::measure(const MapSpec& map, const Shard& shard, PartWriter& kept,
   }
   if (done > 0) {
     out << format(
-        "%zu columns, %.3g servo steps in %.1f s on %d threads: %.3g steps per second and core\n",
+        "%zu columns, %.3g servo steps in %.1f s on %zu threads: %.3g steps per second and core\n",
         done, static_cast<double>(ticks), seconds(), jobs,
-        static_cast<double>(ticks) / seconds() / jobs);
+        static_cast<double>(ticks) / seconds() / static_cast<double>(jobs));
   }
   return true;
 }

@@ -13,6 +13,7 @@
 #include <string>
 #include <thread>
 
+#include "lab/run/grid_run.hpp"
 #include "shared/posix/threads.hpp"
 
 /// Verdicts on a run of a sampled loop: whether it goes on swinging, and the guard against a step
@@ -102,9 +103,6 @@ class LimitCycleDetector {
   std::array<Third, 3> thirds_{};
   double first_given_mj_ = 0, port_minimum_mj_ = 0;
 };
-
-/// Thrown out of a hit that is no longer wanted.
-struct Interrupted {};
 
 /// Ticks that a column took, and the request to end it half-way. Each thread has its own; others
 /// may read the count.

@@ -4,10 +4,8 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <exception>
 #include <mutex>
 #include <numbers>
-#include <thread>
 #include <utility>
 
 #include "controller/law/registry/law_registry.hpp"
@@ -16,6 +14,7 @@
 #include "hil/device/packet_device.hpp"
 #include "hil/device/plant_params.hpp"
 #include "hil/hil_error.hpp"
+#include "lab/run/grid_run.hpp"
 #include "lab/stability/arm.hpp"
 #include "lab/stability/limit_cycle.hpp"
 #include "lab/stability/one_axis.hpp"
@@ -27,7 +26,7 @@ namespace {
 /// All cells of one column, each measured once.
 class ColumnRun {
  public:
-  ColumnRun(const MapSpec& spec, const Subject& subject, StepCounter& ticks)
+  ColumnRun(const MapSpec& spec, const LoopCase& subject, StepCounter& ticks)
       : spec_(spec), subject_(subject), ticks_(ticks) {
     if (spec.arm) scene_ = walls_scene(subject);
   }
@@ -83,7 +82,7 @@ class ColumnRun {
   }
 
   const MapSpec& spec_;
-  Subject subject_;
+  LoopCase subject_;
   StepCounter& ticks_;
   LoadedScene scene_;  ///< of the whole arm
   std::map<double, LimitCycle> known_;
@@ -93,7 +92,7 @@ constexpr double kLongestS = 600;  // of a hit: a column of one axis is then som
 
 }  // namespace
 
-double needed_seconds(const Subject& subject, double stiffness_n_per_mm) {
+double needed_seconds(const LoopCase& subject, double stiffness_n_per_mm) {
   const SampledLoop& loop = subject.loop;
   const double mass_kg = loop.mass_kg + loop.hand.mass_kg;
   const double n_per_m = 1000 * (stiffness_n_per_mm + loop.hand.stiffness_n_per_mm);
@@ -112,7 +111,7 @@ double needed_seconds(const Subject& subject, double stiffness_n_per_mm) {
   return 3 * std::max(kPeriods * (period_s + flight_s), slow_s);
 }
 
-std::string impossible(const MapSpec& spec, const Subject& subject) {
+std::string impossible(const MapSpec& spec, const LoopCase& subject) {
   const double cycles = subject.loop.delay_s * kCyclesPerSecond;
   constexpr double kRounding = 1e-6;
   const bool ticks_fit = kCyclesPerSecond % std::lround(1 / subject.loop.period_s) == 0;
@@ -144,7 +143,7 @@ std::string impossible(const MapSpec& spec, const Subject& subject) {
 }
 
 Column measure_column(const MapSpec& spec, const Assignment& values, StepCounter& ticks) {
-  const Subject subject = subject_of(values);
+  const LoopCase subject = subject_of(values);
   Column column;
   if (!impossible(spec, subject).empty()) return column;
   try {
@@ -162,35 +161,19 @@ Column measure_column(const MapSpec& spec, const Assignment& values, StepCounter
   return column;
 }
 
-void measure_columns(const MapSpec& spec, const std::vector<std::size_t>& wanted, int jobs,
+void measure_columns(const MapSpec& spec, const std::vector<std::size_t>& wanted, std::size_t jobs,
                      const std::atomic<bool>& stop, const ColumnDone& done) {
   const std::vector<Assignment> columns = spec.columns();
-  std::atomic<std::size_t> next{0};
-  std::mutex lock;
-  TickWatch watch(lock);
-  std::exception_ptr failure;
-  const auto work = [&] {
-    try {
-      for (std::size_t i = next++; i < wanted.size() && !stop; i = next++) {
-        StepCounter ticks(stop);
-        const TickWatch::Watched watched(watch, ticks, laws_of(columns[wanted[i]]));
-        Column column = measure_column(spec, columns[wanted[i]], ticks);
-        const std::scoped_lock hold(lock);
-        done(wanted[i], std::move(column), ticks.ticks());
-      }
-    } catch (const Interrupted&) {  // finished columns are kept
-    } catch (...) {
-      const std::scoped_lock hold(lock);
-      failure = std::current_exception();
-      next = wanted.size();
-    }
-  };
-  {
-    std::vector<std::jthread> threads;
-    for (int i = 1; i < jobs; ++i) threads.emplace_back(work);
-    work();
-  }
-  if (failure) std::rethrow_exception(failure);
+  grid::Run run(jobs, &stop);
+  TickWatch watch(run.results());
+  run.all(wanted.size(), [&](std::size_t i, std::size_t) {
+    const Assignment& values = columns[wanted[i]];
+    StepCounter ticks(run.stop());
+    const TickWatch::Watched watched(watch, ticks, laws_of(values));
+    Column column = measure_column(spec, values, ticks);
+    const std::scoped_lock hold(run.results());
+    done(wanted[i], std::move(column), ticks.ticks());
+  });
 }
 
 }  // namespace kerf::zwidth

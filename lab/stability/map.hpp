@@ -49,12 +49,12 @@ using Columns = std::map<std::size_t, Column>;
 /// away, at the rate b/(2 m) without a wall and less and less up to the boundary, so long that the
 /// verdict's ratio puts the boundary within 1 % of b (S9 asks for 2). 0 for the latter if
 /// nothing damps: no boundary is near.
-[[nodiscard]] double needed_seconds(const Subject& subject, double stiffness_n_per_mm);
+[[nodiscard]] double needed_seconds(const LoopCase& subject, double stiffness_n_per_mm);
 
 /// The reason if a column cannot exist: its damping alone is beyond what any sampled wall may have,
 /// the emulated device cannot have its delay or rate, or a hit would last for more than ten
 /// minutes; else empty.
-[[nodiscard]] std::string impossible(const MapSpec& spec, const Subject& subject);
+[[nodiscard]] std::string impossible(const MapSpec& spec, const LoopCase& subject);
 
 /// The column of `values`. Throws Interrupted.
 [[nodiscard]] Column measure_column(const MapSpec& spec, const Assignment& values,
@@ -66,7 +66,7 @@ using ColumnDone = std::function<void(std::size_t index, Column column, std::uin
 /// Measures the columns of `wanted` on `jobs` threads, until all are done or `stop` is set: a
 /// column that is not done then is lost. An exception of a thread is thrown here. A step that does
 /// not end ends the program (`TickWatch`).
-void measure_columns(const MapSpec& spec, const std::vector<std::size_t>& wanted, int jobs,
+void measure_columns(const MapSpec& spec, const std::vector<std::size_t>& wanted, std::size_t jobs,
                      const std::atomic<bool>& stop, const ColumnDone& done);
 
 }  // namespace kerf::zwidth

@@ -2,17 +2,11 @@
 #include "lab/stability/map_file.hpp"
 
 #include <algorithm>
-#include <cerrno>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
 #include <system_error>
 #include <utility>
-
-#include <fcntl.h>
-#include <sys/file.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
 #include "controller/stability/gain_limits.hpp"
 #include "hil/hil_error.hpp"
@@ -25,6 +19,11 @@ namespace kerf::zwidth {
 namespace {
 
 constexpr int kFormat = 2;  ///< of a part file
+constexpr grid::PartWords kPartWords{
+    .option = "--part",
+    .busy = "another run is at work on it; wait for that, or name another file",
+    .not_opened = "; name another file",
+    .not_written = "cannot be written; make room and run again"};
 
 Json json_of(const StabilityBoundary& crossing) {
   return Json{
@@ -101,11 +100,6 @@ void take_head(const std::string& line, Part& part) {
   spec.arm = json.at("arm").get<bool>();
   spec.seconds = json.at("seconds").get<double>();
   spec.seed = json.at("seed").get<std::uint64_t>();
-}
-
-/// Bytes up to the end of the last whole line.
-off_t whole_lines(const std::string& path) {
-  return static_cast<off_t>(text_in(path).rfind('\n') + 1);  // none: 0
 }
 
 /// A pipe would wait for ever, and /dev/null keeps nothing.
@@ -289,68 +283,38 @@ Part merge_parts(const std::vector<std::string>& paths) {
   return whole;
 }
 
-PartWriter::PartWriter(std::string path, const MapSpec& spec, const Shard& shard)
-    : path_(std::move(path)), part_{spec, shard, {}} {
-  if (path_.empty()) return;
-  check_is_file(path_);
-  fd_ = open(path_.c_str(), O_RDWR | O_CREAT | O_APPEND | O_CLOEXEC, 0666);
-  if (fd_ < 0) refuse(std::generic_category().message(errno) + "; name another file");
-  struct stat held {};
-  struct stat there {};
-  // A run that ended in between has put a new file in the place of the one that is locked.
-  if (flock(fd_, LOCK_EX | LOCK_NB) != 0 || fstat(fd_, &held) != 0 ||
-      stat(path_.c_str(), &there) != 0 || held.st_ino != there.st_ino) {
-    refuse("another run is at work on it; wait for that, or name another file");
-  }
-  if (held.st_size == 0) {
-    write(head_of(part_) + "\n");
+PartWriter::PartWriter(const std::string& path, const MapSpec& spec, const Shard& shard)
+    : part_{spec, shard, {}} {
+  if (path.empty()) return;
+  check_is_file(path);
+  file_.emplace(kPartWords, path);
+  if (file_->text().empty()) {
+    file_->add(head_of(part_));
     return;
   }
-  try {
-    Part found = read_part(path_);
-    if (map_of(found) == map_of(part_) && found.program != part_.program) {
-      refuse(
-          "another program measured it, which may move other bits; name another file, or "
-          "remove it to begin anew");
-    }
-    if (head_of(found) != head_of(part_)) {
-      refuse("has another map or shard; name another file, or remove it to begin anew");
-    }
-    part_.columns = std::move(found.columns);
-  } catch (...) {
-    close(std::exchange(fd_, -1));  // a constructor that throws has no destructor
-    throw;
+  Part found = read_part(path);
+  if (map_of(found) == map_of(part_) && found.program != part_.program) {
+    file_->refuse(
+        "another program measured it, which may move other bits; name another file, or "
+        "remove it to begin anew");
   }
-  // Takes off a last line that is not whole.
-  if (ftruncate(fd_, whole_lines(path_)) != 0) refuse("cannot be written; name another file");
-}
-
-PartWriter::~PartWriter() {
-  if (fd_ >= 0) close(fd_);
-}
-
-void PartWriter::refuse(const std::string& why) {
-  if (fd_ >= 0) close(std::exchange(fd_, -1));
-  throw HilError("--part " + path_ + ": " + why);
-}
-
-void PartWriter::write(const std::string& text) {
-  if (::write(fd_, text.data(), text.size()) != static_cast<ssize_t>(text.size())) {
-    refuse("cannot be written; make room and run again");
+  if (head_of(found) != head_of(part_)) {
+    file_->refuse("has another map or shard; name another file, or remove it to begin anew");
   }
+  part_.columns = std::move(found.columns);
+  file_->cut_to_whole_lines();
 }
 
 void PartWriter::add(std::size_t index, Column column) {
-  if (!path_.empty()) write(line_of(index, column) + "\n");
+  if (file_) file_->add(line_of(index, column));
   part_.columns[index] = std::move(column);
 }
 
 void PartWriter::finish() {
-  if (path_.empty()) return;
-  write_new_file(path_, part_text(part_));
+  if (file_) write_new_file(file_->path(), part_text(part_));
 }
 
-Analytic analytic_of(const Subject& subject) {
+Analytic analytic_of(const LoopCase& subject) {
   const bool is_bare = subject.loop.delay_s <= 0 && subject.damping_ns_per_mm <= 0;
   return {highest_stiffness(subject.loop, subject.damping_ns_per_mm),
           passive_stiffness(subject.loop, subject.damping_ns_per_mm),
@@ -387,7 +351,7 @@ std::string json_of(const Part& part) {
   Json columns = Json::List{};
   for (const auto& [index, column] : part.columns) {
     const Assignment& values = assignments[index];
-    const Subject subject = subject_of(values);
+    const LoopCase subject = subject_of(values);
     const Analytic analytic = analytic_of(subject);
     const std::string why = impossible(part.spec, subject);
     Json cells = Json::List{};

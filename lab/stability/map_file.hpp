@@ -2,9 +2,11 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "lab/run/grid_run.hpp"
 #include "lab/stability/map.hpp"
 #include "shared/text/json.hpp"
 
@@ -48,10 +50,7 @@ class PartWriter {
  public:
   /// With an empty path nothing is read or written. Throws HilError if the file has another map or
   /// is another program's, if another run is at work on it, or if it cannot be written.
-  PartWriter(std::string path, const MapSpec& spec, const Shard& shard);
-  ~PartWriter();
-  PartWriter(const PartWriter&) = delete;
-  PartWriter& operator=(const PartWriter&) = delete;
+  PartWriter(const std::string& path, const MapSpec& spec, const Shard& shard);
 
   [[nodiscard]] const Columns& columns() const { return part_.columns; }
   void add(std::size_t index, Column column);
@@ -59,12 +58,8 @@ class PartWriter {
   void finish();
 
  private:
-  void write(const std::string& text);
-  [[noreturn]] void refuse(const std::string& why);
-
-  std::string path_;
   Part part_;
-  int fd_ = -1;  ///< locked
+  std::optional<grid::PartFile> file_;
 };
 
 /// The analytic boundaries of a column, N/mm; 0: none is stable, or the bound is about another loop
@@ -73,7 +68,7 @@ class PartWriter {
 struct Analytic {
   double exact, passive, quantum;
 };
-[[nodiscard]] Analytic analytic_of(const Subject& subject);
+[[nodiscard]] Analytic analytic_of(const LoopCase& subject);
 
 /// One row for each cell: all axes, then its figures. A column that cannot exist has no rows.
 [[nodiscard]] std::string csv_of(const Part& part);

@@ -21,7 +21,7 @@ class OneAxisWall {
  public:
   using Real = typename N::Real;
 
-  OneAxisWall(const Subject& subject, double stiffness_n_per_mm, double tip_mm)
+  OneAxisWall(const LoopCase& subject, double stiffness_n_per_mm, double tip_mm)
       : law_(subject.law),
         limits_on_(subject.limits),
         coupling_{typename N::Ratio(stiffness_n_per_mm),
@@ -135,7 +135,7 @@ LimitCycle lost(const LimitCycleDetector& meter, double travel_mm = 0, double gi
 }
 
 template <class N>
-LimitCycle hit(const Subject& subject, double stiffness, double hit_mm_per_s, double seconds,
+LimitCycle hit(const LoopCase& subject, double stiffness, double hit_mm_per_s, double seconds,
                std::uint64_t seed, StepCounter& ticks, const SwingWatch& watch) {
   const SampledLoop& loop = subject.loop;
   const double push_n = loop.coulomb_n + subject.push_n;
@@ -166,7 +166,7 @@ LimitCycle hit(const Subject& subject, double stiffness, double hit_mm_per_s, do
 
 }  // namespace
 
-LimitCycle hit_one_axis(const Subject& subject, double stiffness_n_per_mm, double hit_mm_per_s,
+LimitCycle hit_one_axis(const LoopCase& subject, double stiffness_n_per_mm, double hit_mm_per_s,
                         double seconds, std::uint64_t seed, StepCounter& ticks,
                         const SwingWatch& watch) {
   return subject.numeric == NumericKind::fixed

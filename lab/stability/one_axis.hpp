@@ -19,7 +19,7 @@ inline constexpr double kStartMm = 0.1;
 ///
 /// `seed` shifts the encoder's steps against the wall by a part of one; 0: an edge lies on it.
 /// Returns the verdict of `seconds`. The same arguments give the same bits. Throws Interrupted.
-[[nodiscard]] LimitCycle hit_one_axis(const Subject& subject, double stiffness_n_per_mm,
+[[nodiscard]] LimitCycle hit_one_axis(const LoopCase& subject, double stiffness_n_per_mm,
                                       double hit_mm_per_s, double seconds, std::uint64_t seed,
                                       StepCounter& ticks, const SwingWatch& watch = {});
 

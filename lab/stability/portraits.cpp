@@ -71,7 +71,7 @@ Json thinned(const Curves& curves) {
   return hits;
 }
 
-Curves curves_of_axis(const MapSpec& spec, const Subject& subject, double stiffness,
+Curves curves_of_axis(const MapSpec& spec, const LoopCase& subject, double stiffness,
                       StepCounter& ticks) {
   Curves curves;
   for (const double speed : kHitsMmPerS) {
@@ -82,7 +82,7 @@ Curves curves_of_axis(const MapSpec& spec, const Subject& subject, double stiffn
   return curves;
 }
 
-Curves curves_of_arm(const MapSpec& spec, const Subject& subject, double stiffness,
+Curves curves_of_arm(const MapSpec& spec, const LoopCase& subject, double stiffness,
                      StepCounter& ticks) {
   Curves curves(kArmHits);
   watch_arm(walls_scene(subject), subject, stiffness, spec.seconds, spec.seed, ticks,
@@ -107,7 +107,7 @@ std::string portraits_of(const MapSpec& spec, const std::vector<std::string>& ce
                    std::to_string(spec.table[axis].size()) + " values; give it one");
   }
   std::vector<std::pair<double, double>> places;
-  Subject subject = subject_of(spec.columns().front());
+  LoopCase subject = subject_of(spec.columns().front());
   for (const std::string& cell : cells) {
     const auto place = cell_in(cell);
     if (std::ranges::find(places, place) != places.end()) {

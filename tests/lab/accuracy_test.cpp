@@ -29,7 +29,7 @@ Point centre() {
 }
 
 /// Errors of the gradients on the face of a ball of ten voxels.
-Spread normal_error(GradientKernel kernel) {
+ErrorStats normal_error(GradientKernel kernel) {
   const Shape shape = ball(centre(), 10 * kVoxelMm);
   const ContactCase at{shape, volume_of(shape, 5, kVoxelMm), {}, 0};
   const BallTool tool = five_voxels();
@@ -144,19 +144,19 @@ TEST_CASE("N2: noise gains are those of the kernels' table") {
 }
 
 TEST_CASE("N3: normals on a ball are off by what the kernels' table says") {
-  const Spread central = normal_error(GradientKernel::central);
+  const ErrorStats central = normal_error(GradientKernel::central);
   CHECK(central.rms() == doctest::Approx(8.1).epsilon(0.05));
   CHECK(central.worst() == doctest::Approx(15.1).epsilon(0.05));
-  const Spread sobel = normal_error(GradientKernel::sobel5);
+  const ErrorStats sobel = normal_error(GradientKernel::sobel5);
   CHECK(sobel.rms() == doctest::Approx(0.83).epsilon(0.05));
   CHECK(sobel.worst() == doctest::Approx(2.0).epsilon(0.05));
-  const Spread farid = normal_error(GradientKernel::farid);
+  const ErrorStats farid = normal_error(GradientKernel::farid);
   CHECK(farid.rms() == doctest::Approx(0.57).epsilon(0.05));
   CHECK(farid.worst() == doctest::Approx(1.53).epsilon(0.05));
 }
 
 TEST_CASE("N5: interpolation errors are those of the formats' table") {
-  const Spread q15 = interpolation_error(Arithmetic::q15);
+  const ErrorStats q15 = interpolation_error(Arithmetic::q15);
   CHECK(q15.worst() <= 3.1);
   CHECK(q15.rms() <= 0.3);
   CHECK(interpolation_error(Arithmetic::q12).rms() == doctest::Approx(2.2).epsilon(0.05));

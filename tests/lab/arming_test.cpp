@@ -1,53 +1,35 @@
 // SPDX-License-Identifier: Apache-2.0
 // All devices arm at every rate of the servo, in the same time.
 #include <algorithm>
-#include <memory>
 
 #include <doctest/doctest.h>
 
-#include "controller/device/device_driver.hpp"
+#include "hil/device/devices.hpp"
 #include "hil/device/emulator.hpp"
-#include "hil/device/falcon.hpp"
-#include "hil/device/omni.hpp"
 #include "hil/device/packet_device.hpp"
-#include "hil/device/wooden.hpp"
-#include "lab/rig/direct_port.hpp"
+#include "lab/rig/virtual_loop.hpp"
 #include "tests/servo/support.hpp"
 
 using kerf::Personality;
 
 namespace {
 
-kerf::Emulator emulator_of(Personality personality, const kerf::HandScript& hand) {
-  switch (personality) {
-    case Personality::falcon:
-      return {std::make_unique<kerf::FalconModel>(kerf::FalconParams{}), hand};
-    case Personality::woodenhaptics:
-      return {std::make_unique<kerf::WoodenModel>(kerf::WoodenParams{}), hand};
-    case Personality::omni:
-      break;
-  }
-  return {kerf::OmniParams{}, hand};
-}
-
-/// From the first bus cycle until the motors go on, in emulated ms; 10 s where they never do.
+/// From the first bus cycle until the motors go on, in emulated ms; 10 s if they never do.
 double arming_ms(Personality personality, int rate_hz) {
   kerf::LoadedScene scene = kerf::test::half_space_scene(8);
   scene.device.personality = personality;
   scene.servo.rate_hz = rate_hz;
-  const auto servo = kerf::compile(scene);
   kerf::HandScript hand;
   hand.steps = {kerf::hand_move({0, 4, 0}, 10)};
-  kerf::Emulator emulator = emulator_of(personality, hand);
+  kerf::Emulator emulator(
+      kerf::with_device_params(personality,
+                               [](const auto& params) { return kerf::make_model(params); }),
+      hand);
   kerf::DirectPort port(emulator);
-  const auto driver = kerf::make_driver(personality, port);
-  driver->start();
-  for (int cycle = 0; cycle < 10 * kerf::kCyclesPerSecond; ++cycle) {
-    port.cycle();
-    if ((cycle + 1) % (kerf::kCyclesPerSecond / rate_hz) != 0) continue;
-    const kerf::ServoOutput output = servo->step(driver->read());
-    driver->command(output);
-    if (output.motors_on) return (cycle + 1) * 1000.0 / kerf::kCyclesPerSecond;
+  kerf::VirtualLoop loop(scene, port);
+  while (loop.cycles() < 10 * kerf::kCyclesPerSecond) {
+    if (loop.tick().motors_on)
+      return static_cast<double>(loop.cycles()) * 1000 / kerf::kCyclesPerSecond;
   }
   return 10'000;
 }

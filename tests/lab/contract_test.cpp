@@ -18,7 +18,7 @@ using kerf::OmniCommand;
 using kerf::OmniReport;
 using kerf::faults::DeviceMoment;
 using kerf::faults::DeviceWire;
-using kerf::faults::Outcome;
+using kerf::faults::FaultOutcome;
 using kerf::faults::SafetyMonitor;
 
 namespace {
@@ -34,7 +34,7 @@ kerf::LoadedScene omni_scene() {
 /// An Omni and its host as packets, in ticks of 1 ms: what a perfect servo and a broken one send.
 struct Watched {
   kerf::LoadedScene scene = omni_scene();
-  Outcome outcome;
+  FaultOutcome outcome;
   SafetyMonitor contract{scene, true, outcome};
   DeviceWire wire{scene.device.personality, scene.device.dock_rad};
   double ms = 0;

@@ -1,39 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cmath>
-#include <filesystem>
-#include <fstream>
-#include <sstream>
 #include <string>
 #include <vector>
 
 #include <doctest/doctest.h>
-#include <unistd.h>
 
 #include "lab/contact/comparison.hpp"
 #include "lab/contact/rows.hpp"
 #include "lab/contact/tick_rows.hpp"
-#include "lab/program.hpp"
 #include "lab/rig/contact_rig.hpp"
 #include "lab/rig/exact_contact.hpp"
 #include "tests/json.hpp"
+#include "tests/lab/lab_line.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 using namespace kerf::extremes;
-
-namespace {
-
-struct Answer {
-  int code;
-  std::string said, complained;
-};
-
-Answer extremes(std::vector<const char*> arguments) {
-  arguments.insert(arguments.begin(), {"kerf-lab", "extremes"});
-  std::ostringstream out, err;
-  const int code = kerf::run_lab(static_cast<int>(arguments.size()), arguments.data(), out, err);
-  return {code, out.str(), err.str()};
-}
-
-}  // namespace
+using kerf::test::lab, kerf::test::LabAnswer;
 
 TEST_CASE("a row passes up to its limit; one without a limit is only told") {
   CHECK(Row{"g", "n", 2, "1", 2, 1}.pass());
@@ -47,36 +29,26 @@ TEST_CASE("a row that was skipped is not judged") {
   CHECK(skipped.pass());
 }
 
-TEST_CASE("extremes refuses what it cannot do before anything is measured") {
-  CHECK(extremes({"--only", "wall"}).code == 2);
-  CHECK(extremes({"--only", "walls", "--page", "contact.md"}).code == 2);
-  const Answer answer = extremes({"--page", "/nonexistent/contact.md"});
-  CHECK(answer.code == 2);
-  CHECK(answer.said.empty());
-  CHECK(answer.complained.find("/nonexistent/contact.md: cannot be written") != std::string::npos);
-}
-
 TEST_CASE("the report has each row with its limit and whether it is kept, and the code says so") {
-  const auto file = std::filesystem::temp_directory_path() /
-                    ("kerf-extremes-" + std::to_string(getpid()) + ".json");
-  const Answer answer = extremes({"--quick", "--only", "slides", "--report", file.c_str()});
+  const kerf::test::TemporaryFolder folder;
+  const auto file = folder / "report.json";
+  const LabAnswer answer = lab("extremes --quick --only slides --report " + file.string());
   const auto rows = kerf::test::read_json_file(file)["rows"];
-  std::filesystem::remove(file);
   CHECK(rows.size() == 12);
   bool all = true;
   for (const kerf::test::ReadJson row : rows) {
     CHECK(row["group"] == "slides");
     CHECK(row["pass"] == (row["value"] <= row["limit"]));
     all = all && row["pass"].get<bool>();
-    CHECK(answer.said.find(row["name"].get<std::string>()) != std::string::npos);
+    CHECK(answer.out.find(row["name"].get<std::string>()) != std::string::npos);
   }
   CHECK(answer.code == (all ? 0 : 1));
 }
 
 TEST_CASE("a head that is wedged against its own shaft between two walls goes on cutting") {
   // The sent force stands across the face that the head is pressed on.
-  const Answer answer = extremes({"--only", "traps", "--presses", "23", "--seed", "5"});
-  CAPTURE(answer.said);
+  const LabAnswer answer = lab("extremes --only traps --presses 23 --seed 5");
+  CAPTURE(answer.out);
   CHECK(answer.code == 0);
 }
 
@@ -100,17 +72,17 @@ TEST_CASE("the paper's force ends inside of a wall and can be passed; the proxy'
 }
 
 TEST_CASE("the costliest tick is told with its place; a body out of reach keeps the one before") {
-  const Trap flat{"flat", {}, {20, 20, 20}, kIso};
+  const WorstCase flat{"flat", {}, {20, 20, 20}, kIso};
   const Body solid = blurred({40, 40, 40}, [](Point p) { return p[2] - 20; });
   const kerf::SceneTool ball = tool_of_units("ball", 8, 16);
   WorstTick worst;
   find_worst_tick(ball, flat, solid, 200, worst);
   CHECK(worst.us > 0);
-  CHECK(worst.trap == "flat");
+  CHECK(worst.at == "flat");
   CHECK(worst.queries <= kerf::SweepRules::kMaxQueries);
   worst.us = 1e9;
   find_worst_tick(ball, {"air", {}, {1000, 20, 20}, kIso}, solid, 200, worst);
-  CHECK(worst.trap == "flat");
+  CHECK(worst.at == "flat");
 }
 
 TEST_CASE("exact contact on a smooth ball is where and how the ball is") {

@@ -22,8 +22,8 @@ kerf::LoadedScene falcon_scene(int rate_hz = 1000) {
 }
 
 /// A Falcon whose hand comes down on a half-space and presses on; a servo in double.
-kerf::faults::Outcome pressing_falcon(const DeviceFault& fault, const char* latches = "not_finite",
-                                      int rate_hz = 1000) {
+kerf::faults::FaultOutcome pressing_falcon(const DeviceFault& fault,
+                                           const char* latches = "not_finite", int rate_hz = 1000) {
   const kerf::LoadedScene scene = falcon_scene(rate_hz);
   kerf::HandScript hand;
   hand.start = {0, 4, 0};
@@ -33,7 +33,7 @@ kerf::faults::Outcome pressing_falcon(const DeviceFault& fault, const char* latc
 }
 
 /// The same hand, and it stays above.
-kerf::faults::Outcome run_in_air() {
+kerf::faults::FaultOutcome run_in_air() {
   const kerf::LoadedScene scene = falcon_scene();
   kerf::HandScript hand;
   hand.start = {0, 10, 0};
@@ -53,7 +53,7 @@ TEST_CASE(
   CHECK(outcome.faults_begun == 1);
   CHECK(outcome.pushed);
   CHECK(outcome.latched == "not_finite");
-  CHECK(outcome.vacuous.empty());
+  CHECK(outcome.inconclusive.empty());
   CHECK_FALSE(outcome.pushed_again);
 }
 
@@ -66,15 +66,15 @@ TEST_CASE("a jump through the solid that no speed limit sees is pulled back the 
     const auto outcome = pressing_falcon(jump, "", 250);
     for (const std::string& violation : outcome.violations) MESSAGE(violation);
     CHECK(outcome.violation_count == 0);
-    CHECK(outcome.vacuous.empty());
+    CHECK(outcome.inconclusive.empty());
   }
 }
 
 TEST_CASE("a run without contact, or whose fault never was, shows nothing and says so") {
   const auto away = run_in_air();
-  CHECK(away.vacuous == "the motors never pushed at the tip");
+  CHECK(away.inconclusive == "the motors never pushed at the tip");
   const auto never = pressing_falcon({.kind = FaultKind::silence, .at_s = 100, .for_s = 1});
-  CHECK(never.vacuous == "0 of 1 faults changed anything");
+  CHECK(never.inconclusive == "0 of 1 faults changed anything");
   const auto nothing_to_break = pressing_falcon({.kind = FaultKind::noise, .at_s = 0, .for_s = 1});
-  CHECK(nothing_to_break.vacuous.empty());  // a Falcon has no pots: the matrix leaves it out
+  CHECK(nothing_to_break.inconclusive.empty());  // a Falcon has no pots: the matrix leaves it out
 }

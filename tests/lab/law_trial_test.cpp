@@ -17,7 +17,7 @@
 
 #include "controller/law/law.hpp"
 #include "controller/law/registry/law_registry.hpp"
-#include "lab/program.hpp"
+#include "tests/lab/lab_line.hpp"
 
 using namespace kerf;
 
@@ -167,10 +167,8 @@ TEST_CASE("a scene's own law is tried before it runs: what would hang is refused
 
 TEST_CASE("the lab tries one law by its name, and knows all of them") {
   const auto lab = [](const char* name) {
-    const char* argv[] = {"kerf-lab", "law", name};
-    std::ostringstream out, err;
-    const int code = run_lab(3, argv, out, err);
-    return std::to_string(code) + " " + out.str() + err.str();
+    const test::LabAnswer answer = test::lab(std::string("law ") + name);
+    return std::to_string(answer.code) + " " + answer.out + answer.err;
   };
   CHECK(lab("fine").find("0 force law fine (fixed): fine in 100000 steps of ") == 0);
   CHECK(lab("rooter").find("1 force law rooter (fixed): fine in ") == 0);

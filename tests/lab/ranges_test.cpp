@@ -14,7 +14,6 @@
 
 #include "controller/load/load_scene.hpp"
 #include "controller/plan/compile.hpp"
-#include "lab/program.hpp"
 #include "lab/ranges/combination.hpp"
 #include "lab/ranges/covering.hpp"
 #include "lab/ranges/extreme_rows.hpp"
@@ -22,6 +21,7 @@
 #include "lab/ranges/key_study.hpp"
 #include "lab/ranges/long_run.hpp"
 #include "lab/ranges/rules.hpp"
+#include "tests/lab/lab_line.hpp"
 
 using namespace kerf;
 using namespace kerf::ranges;
@@ -65,14 +65,6 @@ std::vector<KeyRow> few_keys() {
   return rows;
 }
 
-int lab(std::vector<const char*> arguments, std::string& complained) {
-  arguments.insert(arguments.begin(), {"kerf-lab", "ranges"});
-  std::ostringstream out, err;
-  const int code = run_lab(static_cast<int>(arguments.size()), arguments.data(), out, err);
-  complained = err.str();
-  return code;
-}
-
 }  // namespace
 
 TEST_CASE("each extreme names its rule, and a measurement or tests that exist") {
@@ -91,9 +83,9 @@ TEST_CASE("each extreme names its rule, and a measurement or tests that exist") 
 }
 
 TEST_CASE("a setting that no scene takes is refused in one line, and is no pass") {
-  std::string complained;
-  CHECK(lab({"--set", "force.stiffness_n_per_mm=1e9"}, complained) == 2);
-  CHECK(complained ==
+  const test::LabAnswer answer = test::lab("ranges --set force.stiffness_n_per_mm=1e9");
+  CHECK(answer.code == 2);
+  CHECK(answer.err ==
         "kerf-lab: --set: force.stiffness_n_per_mm = 1e+09 is out of range; use 0.001 to 100\n");
 }
 
@@ -195,10 +187,11 @@ TEST_CASE(
     "a scene at an end keeps every rule; what is refused is told; the same again on two threads") {
   const SceneFolder folder;
   const auto file = folder.path() / "scene.toml";
-  const Outcome refused = run_combination({{"tool.radius_mm", "1000"}}, NumericKind::fixed, file);
+  const SceneOutcome refused =
+      run_combination({{"tool.radius_mm", "1000"}}, NumericKind::fixed, file);
   CHECK(refused.refused);
   CHECK(refused.violations.empty());
-  const Outcome deep = run_combination({{"volume.iso", "1.0"}}, NumericKind::fixed, file);
+  const SceneOutcome deep = run_combination({{"volume.iso", "1.0"}}, NumericKind::fixed, file);
   CHECK(deep.felt);
   CHECK(deep.violations.empty());
   const std::vector<KeyRow> keys = few_keys();
@@ -262,13 +255,4 @@ TEST_CASE("a run in two halves ends alike, and cuts, fades in and books as it sh
     CHECK(run.ramps >= 6);
     CHECK(run.longest_ramp == run.shortest_ramp);
   }
-}
-
-TEST_CASE("ranges refuses what it cannot do before anything is measured") {
-  std::string complained;
-  CHECK(lab({"--numeric", "real"}, complained) == 2);
-  CHECK(lab({"--hours", "nan"}, complained) == 2);
-  CHECK(lab({"--combinations", "-1"}, complained) == 2);
-  CHECK(lab({"--report", "/nonexistent/rows.json"}, complained) == 2);
-  CHECK(complained.find("/nonexistent/rows.json: cannot be written") != std::string::npos);
 }

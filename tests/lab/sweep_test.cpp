@@ -6,8 +6,11 @@
 #include <doctest/doctest.h>
 
 #include "hil/hil_error.hpp"
-#include "lab/run/grid.hpp"
+#include "lab/run/grid_axes.hpp"
+#include "lab/run/grid_run.hpp"
+#include "tests/lab/lab_line.hpp"
 #include "tests/programs/pair.hpp"
+#include "tests/support/errors.hpp"
 
 using kerf::test::eventually;
 using kerf::test::kBin;
@@ -16,18 +19,13 @@ using kerf::test::Pair;
 using kerf::test::Process;
 using kerf::test::TemporaryFolder;
 using kerf::test::text_of;
-using namespace kerf::sweep;
+using namespace kerf::grid;
 using namespace std::chrono_literals;
 
 namespace {
 
 std::string refusal_of(const std::string& axis) {
-  try {
-    static_cast<void>(parse_axes(std::vector{axis}));
-  } catch (const std::exception& error) {
-    return error.what();
-  }
-  return "";
+  return kerf::test::error_of([&] { static_cast<void>(parse_axes(std::vector{axis})); });
 }
 
 /// A scene that loads at once, with a hand.
@@ -94,33 +92,22 @@ TEST_CASE("an axis is a range with both ends, or a list; the last axis changes f
         std::vector<std::string>{"{name=\"difference\",tau_ms=1}", "{name=\"foaw\"}"});
   const std::vector<std::string> texts{"servo.rate_hz=1,2,3", "emulator.seed=7,8"};
   const std::vector<Axis> axes = parse_axes(texts);
-  CHECK(runs_of(axes) == 6);
+  CHECK(cells_of(axes) == 6);
   CHECK(values_of(axes, 0) == std::vector<std::string>{"1", "7"});
   CHECK(values_of(axes, 1) == std::vector<std::string>{"1", "8"});
   CHECK(values_of(axes, 5) == std::vector<std::string>{"3", "8"});
 }
 
 TEST_CASE("what is no axis is refused in one line that names it") {
-  for (const char* const text : {"force",
-                                 "=1",
-                                 "force.stiffness_n_per_mm=",
-                                 "force.stiffness_n_per_mm=1,,2",
-                                 "force.stiffness_n_per_mm=1:2:0",
-                                 "force.stiffness_n_per_mm=1:2:1",
-                                 "force.stiffness_n_per_mm=1:2:2.5",
-                                 "force.stiffness_n_per_mm=1:2:1e9",
-                                 "force.stifness=1",
-                                 "servo.rate=500",
-                                 "servo.rate_hz=500,1000,500",
-                                 "servo.rate_hz=1000,1e3",
-                                 "emulator.hand=a.toml",
-                                 "emulator.stay=true",
-                                 "emulator.hand-socket=s",
-                                 "servo.rate_hz=1000,+1000",
-                                 "force.friction=0.2, 0.2",
-                                 "force.friction=0,-0",
-                                 "device.offset_mm=[0,1,2],[0, 1, 2]",
-                                 "force.stiffness_n_per_mm=0.3:0.3:2"}) {
+  for (const std::string& text : kerf::test::cases_in(
+           "force; =1; force.stiffness_n_per_mm=; force.stiffness_n_per_mm=1,,2; "
+           "force.stiffness_n_per_mm=1:2:0; force.stiffness_n_per_mm=1:2:1; "
+           "force.stiffness_n_per_mm=1:2:2.5; force.stiffness_n_per_mm=1:2:1e9; "
+           "force.stifness=1; servo.rate=500; servo.rate_hz=500,1000,500; "
+           "servo.rate_hz=1000,1e3; emulator.hand=a.toml; emulator.stay=true; "
+           "emulator.hand-socket=s; servo.rate_hz=1000,+1000; force.friction=0.2, 0.2; "
+           "force.friction=0,-0; device.offset_mm=[0,1,2],[0, 1, 2]; "
+           "force.stiffness_n_per_mm=0.3:0.3:2")) {
     CAPTURE(text);
     const std::string line = refusal_of(text);
     CHECK(line.starts_with("--set "));

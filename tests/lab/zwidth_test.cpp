@@ -17,15 +17,18 @@
 #include "controller/stability/axis_simulation.hpp"
 #include "controller/stability/gain_limits.hpp"
 #include "hil/hil_error.hpp"
-#include "lab/program.hpp"
 #include "lab/stability/arm.hpp"
 #include "lab/stability/axes.hpp"
 #include "lab/stability/map.hpp"
 #include "lab/stability/map_file.hpp"
 #include "lab/stability/one_axis.hpp"
+#include "tests/lab/lab_line.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 using namespace kerf;
 using namespace kerf::zwidth;
+using kerf::test::cases_in, kerf::test::lab, kerf::test::LabAnswer, kerf::test::TemporaryFolder,
+    kerf::test::text_of;
 
 namespace {
 
@@ -54,8 +57,8 @@ class BareSpring {
 };
 
 /// The loop of the theory.
-Subject ideal(double delay_periods) {
-  Subject subject;
+LoopCase ideal(double delay_periods) {
+  LoopCase subject;
   subject.loop.viscous_ns_per_mm = 0.0002;
   subject.loop.delay_s = delay_periods * subject.loop.period_s;
   subject.estimator = {LawKind::velocity, "difference", {}};
@@ -65,43 +68,11 @@ Subject ideal(double delay_periods) {
   return subject;
 }
 
-bool swings(const Subject& subject, double stiffness, bool by_energy = false) {
+bool swings(const LoopCase& subject, double stiffness, bool by_energy = false) {
   StepCounter ticks;
   const LimitCycle swing = hit_one_axis(subject, stiffness, 0, 3, 0, ticks);
   return by_energy ? swing.active : swing.swings;
 }
-
-/// `kerf-lab` with these arguments: exit code, and what it said.
-struct Said {
-  int code;
-  std::string out, err;
-};
-Said lab(const std::string& line) {
-  std::vector<std::string> words{"kerf-lab"};
-  std::istringstream in(line);
-  for (std::string word; in >> word;) words.push_back(word);
-  std::vector<const char*> argv;
-  for (const std::string& word : words) argv.push_back(word.c_str());
-  std::ostringstream out, err;
-  const int code = run_lab(static_cast<int>(argv.size()), argv.data(), out, err);
-  return {code, out.str(), err.str()};
-}
-
-std::string bytes(const std::filesystem::path& path) {
-  std::ifstream in(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), {}};
-}
-
-/// An empty folder that goes with the test.
-struct Folder {
-  std::filesystem::path path;
-  Folder() {
-    std::string name = (std::filesystem::temp_directory_path() / "kerf-zwidth-XXXXXX").string();
-    path = mkdtemp(name.data());
-  }
-  ~Folder() { std::filesystem::remove_all(path); }
-  [[nodiscard]] std::string at(const std::string& name) const { return (path / name).string(); }
-};
 
 constexpr const char* kSmall =
     "zwidth --damping 0,0.002,0.02 --stiffness 0.2:20:6 --seconds 0.3 --delay 0,1 ";
@@ -133,7 +104,7 @@ KERF_REGISTER_FORCE_LAW(BareSpring)
 TEST_CASE("one axis in time has the exact boundary, by travel and by energy") {
   for (const double delay : {0.0, 0.5, 1.0, 2.3}) {
     for (const double damping : {0.002, 0.01}) {
-      Subject subject = ideal(delay);
+      LoopCase subject = ideal(delay);
       subject.damping_ns_per_mm = damping;
       const double exact = highest_stiffness(subject.loop, damping);
       CAPTURE(delay);
@@ -156,7 +127,7 @@ TEST_CASE("Coulomb friction carries a wall without any damping, as computed else
                            {.05, .02, 1.736},
                            {.1, .02, 4.603},
                            {.26, .2, 10.532}}) {
-    Subject subject = ideal(0);
+    LoopCase subject = ideal(0);
     subject.law = Law::linear;
     subject.loop.viscous_ns_per_mm = 0;
     subject.loop.coulomb_n = cell.coulomb_n;
@@ -190,7 +161,7 @@ TEST_CASE("a mass with friction comes to rest where its energy says, and stays")
 
 TEST_CASE("the whole arm comes to rest on a soft wall and swings on a hard one") {
   for (const NumericKind numeric : {NumericKind::fixed, NumericKind::float64}) {
-    Subject subject = subject_of({});
+    LoopCase subject = subject_of({});
     subject.numeric = numeric;
     subject.loop.delay_s = 0;
     const LoadedScene scene = walls_scene(subject);
@@ -206,49 +177,52 @@ TEST_CASE("the whole arm comes to rest on a soft wall and swings on a hard one")
 }
 
 TEST_CASE("a map has the same bytes on any number of threads and shards, and after a break") {
-  const Folder folder;
+  const TemporaryFolder folder;
   const auto files = [&](const std::string& name) {
-    return " --csv " + folder.at(name + ".csv") + " --json " + folder.at(name + ".json");
+    return " --csv " + (folder / (name + ".csv")).string() + " --json " +
+           (folder / (name + ".json")).string();
   };
-  REQUIRE(
-      lab(kSmall + std::string("--jobs 1 --part ") + folder.at("whole.part") + files("one")).code ==
-      0);
+  REQUIRE(lab(kSmall + std::string("--jobs 1 --part ") + (folder / "whole.part").string() +
+              files("one"))
+              .code == 0);
   REQUIRE(lab(kSmall + std::string("--jobs 3") + files("three")).code == 0);
   std::string parts;
   for (const char* shard : {"3", "1", "2"}) {
-    const std::string part = folder.at(std::string("shard-") + shard + ".part");
+    const std::string part = (folder / (std::string("shard-") + shard + ".part")).string();
     REQUIRE(lab(kSmall + std::string("--shard ") + shard + "/3 --part " + part).code == 0);
     parts += " " + part;
   }
   REQUIRE(lab("merge" + parts + files("merged")).code == 0);
-  CHECK(bytes(folder.at("one.csv")).size() > 500);
+  CHECK(text_of(folder / "one.csv").size() > 500);
   for (const char* end : {".csv", ".json"}) {
-    const std::string one = bytes(folder.at(std::string("one") + end));
-    CHECK(one == bytes(folder.at(std::string("three") + end)));
-    CHECK(one == bytes(folder.at(std::string("merged") + end)));
+    const std::string one = text_of(folder / (std::string("one") + end));
+    CHECK(one == text_of(folder / (std::string("three") + end)));
+    CHECK(one == text_of(folder / (std::string("merged") + end)));
   }
   // Killed in the middle of a line: what is whole stays, the rest is measured again.
-  const std::string whole = bytes(folder.at("whole.part"));
-  std::ofstream(folder.at("torn.part"), std::ios::binary) << whole.substr(0, whole.size() * 3 / 5);
-  const Said again = lab(kSmall + std::string("--part ") + folder.at("torn.part") + files("again"));
+  const std::string whole = text_of(folder / "whole.part");
+  std::ofstream(folder / "torn.part", std::ios::binary) << whole.substr(0, whole.size() * 3 / 5);
+  const LabAnswer again =
+      lab(kSmall + std::string("--part ") + (folder / "torn.part").string() + files("again"));
   CHECK(again.code == 0);
   CHECK(again.out.find("\n") != std::string::npos);
-  CHECK(bytes(folder.at("torn.part")) == whole);
-  CHECK(bytes(folder.at("again.csv")) == bytes(folder.at("one.csv")));
+  CHECK(text_of(folder / "torn.part") == whole);
+  CHECK(text_of(folder / "again.csv") == text_of(folder / "one.csv"));
   // Another seed is another map.
   REQUIRE(lab(kSmall + std::string("--seed 2") + files("seed")).code == 0);
-  CHECK(bytes(folder.at("seed.csv")) != bytes(folder.at("one.csv")));
+  CHECK(text_of(folder / "seed.csv") != text_of(folder / "one.csv"));
 }
 
 TEST_CASE("parts that make no map are refused in one line, and nothing is lost") {
-  const Folder folder;
-  const std::string a = folder.at("a.part"), b = folder.at("b.part"), c = folder.at("c.part");
+  const TemporaryFolder folder;
+  const std::string a = (folder / "a.part").string(), b = (folder / "b.part").string(),
+                    c = (folder / "c.part").string();
   REQUIRE(lab(kSmall + std::string("--shard 1/2 --part ") + a).code == 0);
   REQUIRE(lab(kSmall + std::string("--seed 2 --shard 2/2 --part ") + b).code == 0);
   REQUIRE(lab(kSmall + std::string("--shard 2/2 --part ") + c).code == 0);
-  const std::string kept = bytes(a);
+  const std::string kept = text_of(a);
   const auto refused = [&](const std::string& line, const char* why) {
-    const Said said = lab(line);
+    const LabAnswer said = lab(line);
     CAPTURE(line);
     CAPTURE(said.err);
     CHECK(said.code == 2);
@@ -258,7 +232,7 @@ TEST_CASE("parts that make no map are refused in one line, and nothing is lost")
   refused("merge " + a + " " + b, "seed 2, not the 1");
   refused("merge " + a, "shard 2/2 is missing");
   refused("merge " + a + " " + a, "again");
-  refused("merge " + folder.at("none.part"), "cannot be read");
+  refused("merge " + (folder / "none.part").string(), "cannot be read");
   refused(kSmall + std::string("--hand firm --shard 1/2 --part ") + a, "another map or shard");
   std::string foreign = kept;
   const std::string program = "\"program\":\"";
@@ -266,7 +240,7 @@ TEST_CASE("parts that make no map are refused in one line, and nothing is lost")
   std::ofstream(b, std::ios::binary) << foreign;
   refused("merge " + b + " " + c, "another program measured it than");
   refused(kSmall + std::string("--shard 1/2 --part ") + b, "another program measured it, which");
-  CHECK(bytes(b) == foreign);
+  CHECK(text_of(b) == foreign);
   refused("merge " + a + " " + c + " --csv " + c, "is a file of this run itself");
   refused(kSmall + std::string("--shard 1/2 --part ") + a + " --json " + a,
           "is a file of this run itself");
@@ -295,75 +269,44 @@ TEST_CASE("parts that make no map are refused in one line, and nothing is lost")
   refused("merge " + b + " " + c, "line 1");
   std::ofstream(b, std::ios::binary) << "";
   refused("merge " + b + " " + c, "no part of a map");
-  CHECK(bytes(a) == kept);
+  CHECK(text_of(a) == kept);
 }
 
 TEST_CASE("axes that mean nothing are refused in one line; columns that cannot exist are told") {
-  for (const char* line : {"--damping 1:0:5",
-                           "--damping 0:1:1",
-                           "--damping -1",
-                           "--damping nan",
-                           "--damping 0.02,0.002",
-                           "--rate 1000,1000",
-                           "--law coupling,coupling",
-                           "--damping 0,,1",
-                           "--delay 65",
-                           "--rate 0",
-                           "--hand soft",
-                           "--hand 1/2",
-                           "--hand -1/0/0",
-                           "--law none",
-                           "--stiffness 0:1:5",
-                           "--stiffness 2,1",
-                           "--stiffness 1:200:4",
-                           "--map damping",
-                           "--map damping,damping",
-                           "--map x,stiffness",
-                           "--map delay,stiffness",
-                           "--shard 3/2 --part x",
-                           "--shard 0/2 --part x",
-                           "--shard 1/2",
-                           "--shard a/b",
-                           "--mode 100",
-                           "--arm --quantum 0.1",
-                           "--stiffness 1,1.00000001",
-                           "--estimator difference/tau_ms=5 --filter 5",
-                           "--part /dev/null",
-                           "--law paper --damping 0",
-                           "--arm --law paper",
-                           "--page /dev/null --cells 1:0.002",
-                           "--page /dev/null --shard 1/2",
-                           "--portraits /dev/null --cells 1:0.002 --damping 0.01",
-                           "--portraits /dev/null --cells 1:0.002 --stiffness 1,2",
-                           "--portraits /dev/null --cells 1:0.002,1:0.002",
-                           "--portraits /dev/null --cells 0.00001:0",
-                           "--portraits /dev/null --cells 127:2",
-                           "--portraits /dev/null",
-                           "--portraits /dev/null --cells 1",
-                           "--portraits /dev/null --cells 1:0.002 --csv /dev/null",
-                           "--page /dev/null --csv /dev/null",
-                           "--page /dev/null --portraits /dev/null",
-                           "--page /dev/null --rate 500",
-                           "--cells 1:0.002",
-                           "--portraits /dev/null --cells 1:0.002 --delay 0,1",
-                           "--filter 5",
-                           "--filter 0,5 --estimator difference,foaw",
-                           "--stabiliser passivity/mass_kg=-1",
-                           "--seconds 0",
-                           "--plot /dev/null --delay 0:3:7 --quantum 0,0.1"}) {
-    const Said said = lab(std::string("zwidth ") + line);
+  for (const std::string& line : cases_in(
+           "--damping 1:0:5; --damping 0:1:1; --damping -1; --damping nan; "
+           "--damping 0.02,0.002; --rate 1000,1000; --law coupling,coupling; --damping 0,,1; "
+           "--delay 65; --rate 0; --hand soft; --hand 1/2; --hand -1/0/0; --law none; "
+           "--stiffness 0:1:5; --stiffness 2,1; --stiffness 1:200:4; --map damping; "
+           "--map damping,damping; --map x,stiffness; --map delay,stiffness; "
+           "--shard 3/2 --part x; --shard 0/2 --part x; --shard 1/2; --shard a/b; --mode 100; "
+           "--arm --quantum 0.1; --stiffness 1,1.00000001; "
+           "--estimator difference/tau_ms=5 --filter 5; --part /dev/null; "
+           "--law paper --damping 0; --arm --law paper; --page /dev/null --cells 1:0.002; "
+           "--page /dev/null --shard 1/2; --portraits /dev/null --cells 1:0.002 --damping 0.01; "
+           "--portraits /dev/null --cells 1:0.002 --stiffness 1,2; "
+           "--portraits /dev/null --cells 1:0.002,1:0.002; "
+           "--portraits /dev/null --cells 0.00001:0; --portraits /dev/null --cells 127:2; "
+           "--portraits /dev/null; --portraits /dev/null --cells 1; "
+           "--portraits /dev/null --cells 1:0.002 --csv /dev/null; "
+           "--page /dev/null --csv /dev/null; --page /dev/null --portraits /dev/null; "
+           "--page /dev/null --rate 500; --cells 1:0.002; "
+           "--portraits /dev/null --cells 1:0.002 --delay 0,1; --filter 5; "
+           "--filter 0,5 --estimator difference,foaw; --stabiliser passivity/mass_kg=-1; "
+           "--seconds 0; --plot /dev/null --delay 0:3:7 --quantum 0,0.1")) {
+    const LabAnswer said = lab("zwidth " + line);
     CAPTURE(line);
     CAPTURE(said.err);
     CHECK(said.code == 2);
     CHECK(std::count(said.err.begin(), said.err.end(), '\n') == 1);
   }
   // B T/m above 2 without a delay: no wall may have it.
-  const Said said =
+  const LabAnswer said =
       lab("zwidth --damping 0.002,0.2 --delay 0 --viscous 0 --stiffness 0.2,1 --seconds 0.2");
   CHECK(said.code == 0);
   CHECK(said.out.find("1 of 2 columns are left empty: damping ") != std::string::npos);
   // What was measured beside it is not lost.
-  const Said rates =
+  const LabAnswer rates =
       lab("zwidth --arm --rate 1000,3000 --damping 0.002 --stiffness 0.2,1 --seconds 0.1");
   CHECK(rates.code == 0);
   CHECK(rates.out.find("1 of 2 columns are left empty: rate 3000 Hz: ") != std::string::npos);
@@ -371,7 +314,7 @@ TEST_CASE("axes that mean nothing are refused in one line; columns that cannot e
 
 TEST_CASE("what the emulated device cannot do, or the hand never meets, is empty and told") {
   const auto told = [](const char* line) {
-    const Said said =
+    const LabAnswer said =
         lab(std::string("zwidth --arm --damping 0.002 --stiffness 0.3,3 --seconds 0.1 ") + line);
     CHECK(said.code == 0);
     return said.out;
@@ -387,7 +330,7 @@ TEST_CASE("what the emulated device cannot do, or the hand never meets, is empty
 TEST_CASE("a map without any column that can exist is refused in one line") {
   for (const char* line :
        {"--damping 0.1:0.2:3", "--arm --damping 0 --delay 64", "--arm --damping 0 --rate 333"}) {
-    const Said said = lab(std::string("zwidth --stiffness 0.3,3 --seconds 0.1 ") + line);
+    const LabAnswer said = lab(std::string("zwidth --stiffness 0.3,3 --seconds 0.1 ") + line);
     CAPTURE(line);
     CHECK(said.code == 2);
     CHECK(said.err.find("no column of this map can exist: ") != std::string::npos);
@@ -420,14 +363,14 @@ TEST_CASE("a column tells its first crossing and what comes to rest above it apa
 }
 
 TEST_CASE("a law of the user's own gets its map, on one axis and with the whole arm") {
-  const Folder folder;
+  const TemporaryFolder folder;
   const auto verdicts = [&](const std::string& options) {
-    const std::string file = folder.at("map.csv");
+    const std::string file = (folder / "map.csv").string();
     REQUIRE(lab("zwidth --damping 0 --delay 0.5 --stiffness 0.3:30:8 --seconds 0.3 --csv " + file +
                 " " + options)
                 .code == 0);
     // From the stiffness on: the law's name stands before it.
-    std::istringstream in(bytes(file));
+    std::istringstream in(text_of(file));
     std::string all;
     for (std::string line; std::getline(in, line);) {
       std::size_t at = line.size();
@@ -480,7 +423,7 @@ TEST_CASE("each cell tells the lowest energy of its port, which the passivity co
 }
 
 TEST_CASE("the paper's force has its map, with the whole arm") {
-  Subject subject = subject_of({});
+  LoopCase subject = subject_of({});
   subject.law = Law::paper;
   subject.damping_ns_per_mm = 0;
   subject.loop.delay_s = 0;
@@ -494,7 +437,7 @@ TEST_CASE("the paper's force has its map, with the whole arm") {
 TEST_CASE("behind a delay the arm's port gives what its motors did, not what the servo booked") {
   Assignment values;
   values[index_of(AxisId::delay)] = "8";
-  const Subject subject = subject_of(values);
+  const LoopCase subject = subject_of(values);
   StepCounter ticks;
   const LimitCycle swing = hit_with_arm(walls_scene(subject), subject, 0.5, 0.5, 1, ticks);
   CHECK(swing.swings);
@@ -507,7 +450,7 @@ TEST_CASE("every hit of a whole arm begins at the wall, whatever the device") {
     Assignment values;
     values[index_of(AxisId::device)] = device;
     values[index_of(AxisId::damping)] = "0.003";
-    const Subject subject = subject_of(values);
+    const LoopCase subject = subject_of(values);
     std::vector<std::vector<SwingTick>> curves(kArmHits);
     StepCounter ticks;
     watch_arm(walls_scene(subject), subject, 0.5, 0.3, 1, ticks, [&](std::size_t hit) {
@@ -533,31 +476,32 @@ TEST_CASE("a heavy device's boundary is found, too: its hits last as long as its
     const Column column =
         column_of("0.05:20:10", 0.5,
                   {{AxisId::loop, "ideal"}, {AxisId::mass, mass}, {AxisId::damping, "0.002"}});
-    const Subject subject = subject_of(ideal);
+    const LoopCase subject = subject_of(ideal);
     const double exact = highest_stiffness(subject.loop, subject.damping_ns_per_mm);
     CHECK(std::abs(column.swing.first_n_per_mm / exact - 1) < 0.03);
     CHECK(std::abs(column.energy.first_n_per_mm / exact - 1) < 0.03);
   }
   MapSpec spec;
   spec.stiffness_n_per_mm = {0.0001};
-  Subject slow = subject_of({});
+  LoopCase slow = subject_of({});
   slow.loop.mass_kg = 100;
   CHECK(impossible(spec, slow).find("mass 100 kg: a hit would last") == 0);
 }
 
 TEST_CASE("a column has the same bits in every map that has it") {
-  const Folder folder;
+  const TemporaryFolder folder;
   const std::string options = " --stiffness 0.2:20:4 --seconds 0.2 --csv ";
-  const std::string alone = folder.at("alone.csv"), among = folder.at("among.csv");
+  const std::string alone = (folder / "alone.csv").string(),
+                    among = (folder / "among.csv").string();
   REQUIRE(lab("zwidth --damping 0.02" + options + alone).code == 0);
   REQUIRE(lab("zwidth --damping 0.001,0.01,0.02" + options + among).code == 0);
-  const std::string rows = bytes(alone).substr(bytes(alone).find('\n') + 1);
-  CHECK(bytes(among).find(rows) != std::string::npos);
+  const std::string rows = text_of(alone).substr(text_of(alone).find('\n') + 1);
+  CHECK(text_of(among).find(rows) != std::string::npos);
 }
 
 TEST_CASE("a part belongs to one run at a time, and a hit ends with the word") {
-  const Folder folder;
-  const std::string path = folder.at("map.part");
+  const TemporaryFolder folder;
+  const std::string path = (folder / "map.part").string();
   const MapSpec spec = two_cells();
   {
     const PartWriter first(path, spec, {});
@@ -578,8 +522,8 @@ TEST_CASE("a part belongs to one run at a time, and a hit ends with the word") {
 }
 
 TEST_CASE("what no map has in a part's first line is refused, and nothing crashes") {
-  const Folder folder;
-  const std::string path = folder.at("map.part");
+  const TemporaryFolder folder;
+  const std::string path = (folder / "map.part").string();
   const MapSpec spec = two_cells();
   const std::string good = part_text({spec, {}, {}});
   const std::pair<const char*, const char*> wrongs[] = {

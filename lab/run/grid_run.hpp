@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <mutex>
+#include <string>
+
+namespace kerf {
+
+/// Thrown out of a cell that is no longer wanted, because its program was asked to end.
+struct Interrupted {};
+
+}  // namespace kerf
+
+/// The cells of a grid, measured on threads, and their rows in a file that survives an
+/// interruption. No cell depends on another, so any number of threads gives the same rows.
+namespace kerf::grid {
+
+/// `asked` threads; if 0, one for each core.
+[[nodiscard]] std::size_t threads_for(int asked);
+
+/// Measures cells on threads. The calling thread waits, and alone receives the signals that ask for
+/// the end.
+class Run {
+ public:
+  /// On at most `threads` threads. `asked_to_stop` is set from outside and outlives this object.
+  explicit Run(std::size_t threads, const std::atomic<bool>* asked_to_stop = nullptr)
+      : threads_(threads), asked_(asked_to_stop) {}
+
+  /// `work(cell, thread)` for the cells 0 to `cells` - 1, started in this order, `thread` counts
+  /// from 0; until all are done or `stop()` is set. `meanwhile` is called by the calling thread
+  /// every 50 ms, with `results()` held. Once all threads have ended it throws the first exception
+  /// of a cell; `Interrupted` only ends the thread that threw it.
+  void all(std::size_t cells, const std::function<void(std::size_t cell, std::size_t thread)>& work,
+           const std::function<void()>& meanwhile = {});
+
+  /// Set if the end was asked for or a cell threw. Long cells read it and give up.
+  [[nodiscard]] const std::atomic<bool>& stop() const { return stop_; }
+  /// To be held while a cell changes anything that the cells share, such as rows and files.
+  [[nodiscard]] std::mutex& results() { return results_; }
+
+ private:
+  std::size_t threads_;
+  const std::atomic<bool>* asked_;
+  std::atomic<bool> stop_{false};
+  std::mutex results_;
+};
+
+/// Texts of the messages about a part file.
+struct PartWords {
+  const char* option;      ///< of the command line that names the file
+  const char* busy;        ///< if another run has locked it
+  const char* not_opened;  ///< follows the reason of the system
+  const char* not_written;
+};
+
+/// A text file that grows by whole lines, each on the disk before the next cell is reported.
+/// Locked: one run at a time. Throws `HilError` "OPTION PATH: reason".
+class PartFile {
+ public:
+  /// Opens the file, or makes it.
+  PartFile(const PartWords& words, std::filesystem::path path);
+  ~PartFile();
+  PartFile(const PartFile&) = delete;
+  PartFile& operator=(const PartFile&) = delete;
+
+  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+  [[nodiscard]] std::string text() const;
+  /// Removes a last line that is not whole: its run was killed while it wrote.
+  void cut_to_whole_lines();
+  /// `line` without its end of line.
+  void add(const std::string& line);
+  [[noreturn]] void refuse(const std::string& why) const;
+
+ private:
+  PartWords words_;
+  std::filesystem::path path_;
+  int fd_ = -1;
+};
+
+inline constexpr const char* kTableName = "sweep.csv";
+inline constexpr const char* kPartName = "sweep.part";
+
+/// The rows of a sweep in a folder: in `sweep.part` in the order in which cells end, and at the end
+/// in the order of the cells in `sweep.csv`. A row is opaque text.
+///
+/// `plan` is one line that identifies the sweep; a part of another plan is refused, one of the same
+/// plan is continued. A row that was cut is measured again. Throws `HilError`.
+class Table {
+ public:
+  Table(const std::filesystem::path& folder, const std::string& plan);
+
+  [[nodiscard]] bool has(std::size_t cell) const { return rows_.contains(cell); }
+  [[nodiscard]] std::size_t size() const { return rows_.size(); }
+  /// Rows whose last value, the message, is not empty.
+  [[nodiscard]] std::size_t failed() const;
+  /// `row` without its end of line and without the number of the cell.
+  void add(std::size_t cell, const std::string& row);
+  /// Writes `sweep.csv` and removes the part.
+  void finish(const std::string& head);
+
+ private:
+  PartFile part_;
+  std::map<std::size_t, std::string> rows_;
+};
+
+}  // namespace kerf::grid
