@@ -245,7 +245,7 @@ class WatchedDevice final : public kerf::PacketDevice {
   }
 
   // After the last call of the others.
-  [[nodiscard]] const kerf::faults::Outcome& outcome() const { return outcome_; }
+  [[nodiscard]] const kerf::faults::FaultOutcome& outcome() const { return outcome_; }
   [[nodiscard]] std::size_t faults_begun() const { return device_.begun(); }
 
  private:
@@ -253,7 +253,7 @@ class WatchedDevice final : public kerf::PacketDevice {
   kerf::FaultyDevice device_;
   std::mutex mutex_;
   double time_ms_ = 0;
-  kerf::faults::Outcome outcome_;
+  kerf::faults::FaultOutcome outcome_;
   kerf::faults::SafetyMonitor contract_;
 };
 
