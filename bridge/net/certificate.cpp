@@ -52,7 +52,7 @@ std::string readable(const char* option, const std::filesystem::path& file) {
 /// In capitals, a colon between bytes; at most a digest.
 std::string hex_of(const unsigned char* bytes, std::size_t count) {
   std::array<char, 3 * EVP_MAX_MD_SIZE> text{};
-  OPENSSL_buf2hexstr_ex(text.data(), text.size(), nullptr, bytes, static_cast<long>(count), ':');
+  OPENSSL_buf2hexstr_ex(text.data(), text.size(), nullptr, bytes, count, ':');
   return text.data();
 }
 
