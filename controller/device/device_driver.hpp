@@ -51,9 +51,9 @@ class DeviceDriver {
   bool release_for_good() noexcept;
 
   [[nodiscard]] bool wait(int milliseconds) noexcept { return port_.wait(milliseconds); }
-  /// Numbered packets of the device that never came (0 if it does not number them); and packets
-  /// that were no reports.
+  /// Packets missing by the device's own counter; 0 if it has none.
   [[nodiscard]] std::uint64_t lost() const noexcept { return lost_; }
+  /// Packets that `take` rejected: not a report, or older than the last one.
   [[nodiscard]] std::uint64_t refused() const noexcept { return refused_; }
 
  protected:
@@ -138,10 +138,10 @@ class OmniDriver final : public DeviceDriver {
 /// pose.
 class WoodenDriver final : public DeviceDriver {
  public:
-  /// `encoder_sign`: 1 or -1 at each joint. With -1 the count of the device falls as the
-  /// joint turns in the sense of shared/wire/woodenhaptics.hpp, and its motor turns the other way
-  /// too: the makers' branches differ in that. Counts in reports and of motors are in the sense of
-  /// the joints.
+  /// `encoder_sign`: 1 or -1 at each joint. If -1, the device counts down while the joint rotates
+  /// in its positive direction (shared/wire/woodenhaptics.hpp), and its motor is reversed too;
+  /// published versions of the device differ here. `DeviceReport` and motor counts always use the
+  /// positive direction of the joint.
   explicit WoodenDriver(PacketPort& port, std::array<int, 3> encoder_sign = {1, 1, 1}) noexcept
       : DeviceDriver(port), sign_(encoder_sign) {}
 

@@ -248,8 +248,8 @@ struct CoverRow {
   std::int32_t slowest = 0;              ///< least speed
 };
 
-/// Sums over voxels; `covered_number` weights `covered` with the voxel's number, the first being 0.
-/// Exact.
+/// Exact sums over voxels. `covered_number` is the sum of index times covered; the first voxel has
+/// the index 0.
 struct CoverSums {
   std::uint64_t covered, covered_number, weight, weight_speed;
 };

@@ -26,8 +26,8 @@ struct VelocityPlan {
 
 /// Velocity of the tip by first-order adaptive windowing (docs/theory.md 5.2): on each axis the
 /// longest window of at most 16 intervals whose line misses no sample by more than twice
-/// `noise_mm`: both the sample and the newest may be off by it, so a steady hand never shortens its
-/// window. Servo thread; 135 comparisons an axis at most; no heap.
+/// `noise_mm`, because the sample and the newest position can each be off by `noise_mm`. A resting
+/// hand therefore keeps the full window. Servo thread; 135 comparisons an axis at most; no heap.
 template <class N>
 class VelocityWindow {
  public:

@@ -81,8 +81,8 @@ class CompiledScene : public Servo {
 
   /// All that the last tick hands to the next, copied. After `take`, between two ticks.
   [[nodiscard]] virtual std::unique_ptr<ServoSnapshot> keep() const = 0;
-  /// Continues from a snapshot of this servo or of another of the same scene. Throws
-  /// std::invalid_argument for one of another scene.
+  /// Continues from a snapshot that this servo, or another one of the same scene, made. Throws
+  /// std::invalid_argument if the scene differs.
   virtual void restore(const ServoSnapshot& kept) = 0;
 };
 

@@ -320,8 +320,8 @@ class ServoMemory {
   [[nodiscard]] SnapshotOf<N> keep(const ServoState<N>& state) const {
     return {state, densities_, gradients_, carries_, cut_blocks_, pool_, kept_in_};
   }
-  /// The arrays keep their addresses: plan and state point at them. Throws std::invalid_argument if
-  /// the snapshot is of another scene.
+  /// Copies the snapshot into the existing arrays. Their addresses do not change, because plan and
+  /// state point to them. Throws std::invalid_argument if the snapshot is from another scene.
   void restore(const SnapshotOf<N>& kept, ServoState<N>& state) {
     restore_arrays(kept.densities, densities_);
     restore_arrays(kept.gradients, gradients_);

@@ -61,8 +61,8 @@ struct CostReport {
 /// A note if a volume ends in a density that contact counts; else empty.
 [[nodiscard]] std::string border_line(const SceneVolume& volume);
 
-/// Path of volume `v` for --final: the first has the given name, others are beside it under their
-/// own.
+/// Output file of volume `v` for --final. The first volume gets the given path FOLDER/STEM.EXT,
+/// each other one FOLDER/STEM-VOLUME.EXT.
 [[nodiscard]] std::filesystem::path final_path(const ControllerOptions& options,
                                                const LoadedScene& scene, std::size_t v);
 

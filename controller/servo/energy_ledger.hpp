@@ -37,8 +37,8 @@ class EnergyLedger {
   using Real = typename N::Real;
   using Energy = typename N::Energy;
 
-  /// The tip moved by `moved_mm` in `ticks` ticks, 1 to 1000, against a force of `sent_n`: over a
-  /// gap in the reports the mean of what the motors held in it.
+  /// Books the work of a tip motion `moved_mm` that took `ticks` ticks, 1 to 1000, while the motors
+  /// applied `sent_n`. If reports were missing, `sent_n` is the mean force in that time.
   constexpr void move(DeviceVec<Real> sent_n, DeviceVec<Real> moved_mm,
                       std::uint32_t ticks) noexcept {
     moved_mm_ = moved_mm;

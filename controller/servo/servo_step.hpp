@@ -11,9 +11,10 @@ namespace kerf {
 /// system call or exception, and no loop without a bound known at load.
 ///
 /// sanitise report -> kinematics -> safety -> contact force from the volumes as they are, and the
-/// paper's cut by overlap -> limits -> joint torques -> cut by the force that was sent. A missing
-/// report holds the last force and then fades it; a pose that is not finite holds it for
-/// `not_finite_ticks`, then the motors go off. Nothing is felt or cut meanwhile.
+/// paper's cut by overlap -> limits -> stabiliser -> limits -> joint torques -> cut by the force
+/// that was sent. A missing report holds the last force and then fades it; a pose that is not
+/// finite holds it for `not_finite_ticks`, then the motors go off. There is no contact and no cut
+/// meanwhile.
 template <class N>
 [[nodiscard]] ServoOutput servo_step(const ServoPlan<N>& plan, ServoState<N>& state,
                                      const DeviceReport& report) noexcept;

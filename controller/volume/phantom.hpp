@@ -27,8 +27,8 @@ inline constexpr Label kLabelDentin = 2;
 inline constexpr Label kLabelPulp = 3;
 inline constexpr Label kLabelCaries = 4;  ///< a scene names its material
 
-/// Densities of the phantom. Pulp is soft: it lies below the iso density of 0.45 that suits the
-/// tooth.
+/// Densities of the phantom. Pulp is below the iso density of the tooth's scenes (0.45), so it does
+/// not count as solid.
 inline constexpr Density kPhantomEnamel = 65535;
 inline constexpr Density kPhantomDentin = 40632;  // 0.62
 inline constexpr Density kPhantomPulp = 18350;    // 0.28

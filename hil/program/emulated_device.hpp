@@ -50,8 +50,8 @@ class HandServer {
 [[nodiscard]] std::unique_ptr<DeviceModel> make_device(const EmulatorOptions& options,
                                                        const PlantValues& of_script);
 
-/// The device of kerf-emulator with its hand and its faults; each client gets all three from their
-/// start, as if it were the first one. One thread.
+/// The emulated device with its hand and its faults. All three restart for each new client. One
+/// thread.
 class EmulatedDevice final : public PacketDevice {
  public:
   /// `options` outlive it. Reads the scripts; throws `HilError`.

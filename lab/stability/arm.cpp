@@ -139,8 +139,9 @@ class Rig {
 /// The verdict on a latched fault, or on a device that never comes free of the wall.
 constexpr LimitCycle kLost{.swings = true, .active = true};
 
-/// One hit: nothing before the first contact; the verdict after `seconds`. Empty if the hand does
-/// not bring the device to the wall.
+/// Runs one hit and measures for `seconds` from the first contact on. Returns the verdict; a lost
+/// device after a fault, or if it still moves after kPatienceS without contact; empty if it rests
+/// without contact.
 std::optional<LimitCycle> watch_hit(Rig& rig, const LoopCase& subject, const ArmHit& hit,
                                     double seconds, StepCounter& ticks, const SwingWatch& watch) {
   const double rate_hz = 1 / subject.loop.period_s;

@@ -18,9 +18,9 @@ namespace kerf {
 //
 // 32 and 33 belong to the C library.
 
-/// From now on the first kind only asks, and the signals of writes become errors. Returns what is
-/// true once an end was asked for. One that is ignored already (nohup) stays so, but INT and TERM.
-/// Calls that a signal met are started again.
+/// From now on the signals that ask for an end only set the returned flag, and SIGPIPE and SIGXFSZ
+/// become errors of the write. Signals that were ignored (nohup) stay ignored, except INT and TERM.
+/// Unblocks these signals; interrupted calls restart.
 ///
 /// Main thread, once per process; stays for the rest of it.
 std::atomic<bool>& catch_stop_signals() noexcept;

@@ -12,18 +12,18 @@
 
 namespace kerf {
 
-// The shared segment byte by byte: the controller writes it, every reader maps it.
+// The shared segment byte by byte: the controller writes it (on a second machine `kerf-bridge
+// join`, replica_writer.hpp), and readers map it read-only.
 //
-//     0                  SegmentHeader, one page; each hot word on its own 64-byte line
-//     off_volume_table   one VolumeDescriptor per volume
-//     off_scene          canonical scene, JSON text
-//     off_state          ring of TickRecord, slot = index mod state_slots
-//     off_dirty          ring of DirtyRecord, slot = index mod dirty_slots
-//     per volume         u64 version per brick | 512 densities per brick | labels (optional)
+//     0                  SegmentHeader, one page; each frequently written word on its own 64-byte
+//     line off_volume_table   one VolumeDescriptor per volume off_scene          canonical scene,
+//     JSON text off_state          ring of TickRecord, slot = index mod state_slots off_dirty ring
+//     of DirtyRecord, slot = index mod dirty_slots per volume         u64 version per brick | 512
+//     densities per brick | labels (optional)
 //
 // Little-endian, natural alignment, offsets instead of pointers. `layout_table.hpp` lists every
 // field as (name, offset, type); the table is checked against these structs and hashed into
-// `kAbiHash`, so a program of another layout refuses the segment instead of misreading it.
+// `kAbiHash`, so a program built with another layout refuses the segment instead of misreading it.
 
 static_assert(std::endian::native == std::endian::little,
               "the segment and the log are little-endian and written as they lie in memory; a "

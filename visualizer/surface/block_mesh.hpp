@@ -84,8 +84,8 @@ struct BlockMesh {
 struct SurfaceSource {
   VolumeSamples volume;
   Density iso = 1;  ///< solid from here up; at least 1
-  /// Turns a normal into the direction inwards if voxel edges are unequal; the largest part
-  /// is 1.
+  /// 1 / spacing^2 of each axis, scaled so that the largest is 1. A vertex normal times this is the
+  /// direction, in voxels, of the normal in the world.
   glm::vec3 inverse_square_spacing{1.0F};
   const VertexShading* shading = nullptr;
   GradientFilter gradient = GradientFilter::corners;  ///< of the normals

@@ -79,9 +79,11 @@ struct FirewireClaim {
   std::int32_t channel = -1;  ///< -1: not allocated
 };
 
-/// One open file of the device's node, for access to its registers and for claims of channels.
+/// One open file of the device's node, for its registers and for the allocation of isochronous
+/// channels.
 ///
-/// Every request, also a failed one, is answered by an event with its `closure`. A request made
+/// Every request that the kernel accepts is answered by an event with its `closure`, also if the
+/// device refuses it. A request made
 /// in an older generation of the bus fails with RCODE_GENERATION. No function allocates, throws or
 /// sleeps unless noted.
 class FirewireRequests {

@@ -23,8 +23,8 @@ using ContactVec = Vec<S, ContactSpace>;
 /// 16384, where the products below have room.
 inline constexpr std::int32_t kContactLimit = 8192;
 
-/// The part of `v` along a normal. Fixed: each product is below 2^60, so that three fit; one
-/// rounding.
+/// Dot product of `v` and a unit normal. Fixed: each product is below 2^60, so the sum of three
+/// fits 64 bits; it is rounded once.
 template <class N>
 [[nodiscard]] constexpr typename N::Real along(ContactVec<typename N::Unit> normal,
                                                ContactVec<typename N::Real> v) noexcept {

@@ -42,8 +42,9 @@ struct QueryWork {
   std::int64_t head = 0;    ///< query and turn of the head alone; 0: no shaft
   std::int64_t near = 0;    ///< extra of a query, not part of the budget that it needs to begin
 
-  /// Work of a head, or of head and shaft, plus one more part. `closer` covers the head and one
-  /// part: a query needs no more to begin.
+  /// Adds the work of one more part; begins with the head. `query`, `turn` and `near` are sums;
+  /// `closer` is that of the head and the first part added, the minimum that a query needs to
+  /// begin.
   [[nodiscard]] friend constexpr QueryWork operator+(const QueryWork& a,
                                                      const QueryWork& b) noexcept {
     const bool more = a.head > 0;
@@ -83,8 +84,8 @@ template <class N>
           .near = times * Work::kIsoTest};
 }
 
-/// Work that is left of a tick, in the samples of `QueryWork`; all parts of a tool spend it. Before
-/// the first `begin_tick` there is no limit. Servo thread.
+/// Remaining work of a tick, in the units of `QueryWork`, for all parts of a tool together.
+/// Unlimited before the first `begin_tick`. Servo thread.
 class QueryBudget {
  public:
   explicit constexpr QueryBudget(std::int64_t whole) noexcept : whole_(whole) {}

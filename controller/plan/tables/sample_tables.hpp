@@ -12,8 +12,8 @@
 #include "controller/kernel/kernel_set.hpp"
 #include "controller/kernel/sampling.hpp"
 
-// Owners of the tables and the scratch of the overlap methods: memory of a tick, ordered samples of
-// `gather` and `splat`, the table of `aligned`.
+// Classes that own the memory of the overlap methods: scratch of a tick that all tools use, the
+// ordered samples of `gather` and `splat` (SampleTool), the table of `aligned` (AlignedTool).
 
 namespace kerf {
 
