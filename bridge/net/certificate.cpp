@@ -280,7 +280,9 @@ bool CertificateCheck::accepts(bool verified, X509_STORE_CTX* chain) {
     return false;
   }
   refusal_ =
-      "nobody vouches for its certificate; if serve prints the same, add --fingerprint " + seen;
+      "no authority that this machine knows signed its certificate; if serve prints the same, add "
+      "--fingerprint " +
+      seen;
   return false;
 }
 

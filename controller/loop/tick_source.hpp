@@ -122,13 +122,13 @@ class RealTimeTicks final : public TickSource {
 
 /// Virtual time: one tick per report, as fast as both processes run. After a device has been silent
 /// for two seconds of real time, ticks pass without a report until the next one comes. With a
-/// leash, each tick first waits until the leash allows it.
+/// gate, each tick first waits until the gate allows it.
 class LockStepTicks final : public TickSource {
  public:
-  explicit LockStepTicks(DeviceDriver& device, TickGate* leash = nullptr) noexcept
-      : device_(device), leash_(leash) {}
+  explicit LockStepTicks(DeviceDriver& device, TickGate* gate = nullptr) noexcept
+      : device_(device), gate_(gate) {}
   std::int64_t wait_next() noexcept override {
-    if (leash_ != nullptr) leash_->wait_for(++tick_);
+    if (gate_ != nullptr) gate_->wait_for(++tick_);
     silent_ = !device_.wait(silent_ ? 0 : kPatienceMs);
     return 0;
   }
@@ -137,7 +137,7 @@ class LockStepTicks final : public TickSource {
  private:
   static constexpr int kPatienceMs = 2000;
   DeviceDriver& device_;
-  TickGate* leash_;
+  TickGate* gate_;
   std::uint64_t tick_ = 0;
   bool silent_ = false;
 };

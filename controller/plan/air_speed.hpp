@@ -121,7 +121,7 @@ template <class N>
                    : 0;
   const std::int64_t left =
       work.budget() - (beyond > 0 ? work.most_wasted() + beyond : 0) -
-      std::min((turns + 1) * (query + work.turn), work.budget() / 2 + 2 * (query + work.turn));
+      std::min((turns + 1) * (query + work.orient), work.budget() / 2 + 2 * (query + work.orient));
   const std::int64_t last = work.query + work.closer;  // no query begins with less
   const std::int64_t queries = left < last ? 0 : (left - last) / query + 1;
   return SweepRules::kStep * double(std::min(SweepRules::kMaxQueries - turns - 1, queries)) -

@@ -137,9 +137,9 @@ EndReason serve(const Run& run, LoopSignals& signals, CallGuard* calls) {
   }
   Publisher eyes(run.segment, run.servo);
   RealTimeTicks real_time(kNsPerSecond / run.rate_hz, options.real_time.spin_us * 1000);
-  std::optional<TickGate> leash;
-  if (!options.until.empty()) leash.emplace(options.until, run.stop);
-  LockStepTicks lock_step(run.device, leash ? &*leash : nullptr);
+  std::optional<TickGate> gate;
+  if (!options.until.empty()) gate.emplace(options.until, run.stop);
+  LockStepTicks lock_step(run.device, gate ? &*gate : nullptr);
   TickSource& clock = options.virtual_time ? static_cast<TickSource&>(lock_step) : real_time;
   if (calls != nullptr) calls->enter(run.port);
   const EndReason end = run_servo(clock, run.device, run.servo, eyes, run.server,

@@ -89,7 +89,7 @@ ContactResult<N> proxy_force(const ServoPlan<N>& plan, ServoState<N>& state,
 
   ProxyPose<N> goal;
   goal.centre = scaled(relabel<ContactSpace>(tip_mm - contact.origin_mm), contact.units_per_mm);
-  if (tool.follows_stylus) goal.turn = orientation_of<N>(rotation.row);
+  if (tool.follows_stylus) goal.orientation = orientation_of<N>(rotation.row);
 
   ContactResult<N> out;
   const ProxyContact<N> proxy = follow_tool(plan, tool, state.contact, goal, out.samples_read);
@@ -110,7 +110,7 @@ ContactResult<N> proxy_force(const ServoPlan<N>& plan, ServoState<N>& state,
   out.shaft_force_n = multiply<Real>(proxy.shaft_fraction, force_n);
   out.centre_mm =
       contact.origin_mm + relabel<WorldSpace>(scaled(proxy.pose.centre, contact.mm_per_unit));
-  if (tool.follows_stylus) out.rotation = {rows_of(proxy.pose.turn)};
+  if (tool.follows_stylus) out.rotation = {rows_of(proxy.pose.orientation)};
   out.normal = relabel<WorldSpace>(proxy.normal);
   out.press = relabel<WorldSpace>(proxy.press);
   out.head_fraction = proxy.head_fraction;

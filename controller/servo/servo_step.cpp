@@ -160,7 +160,7 @@ void write_output(const ServoPlan<N>& plan, ServoState<N>& state, const Sensed<N
   // is held lags behind the stylus.
   const ToolPlan<N>& tool = plan.tools[state.active_tool];
   Rotation<N> rotation = tool.turns ? state.rotation : identity_rotation<N>();
-  if (tool.swept.shaft.count > 0 && proxy.valid) rotation = {rows_of(proxy.pose.turn)};
+  if (tool.swept.shaft.count > 0 && proxy.valid) rotation = {rows_of(proxy.pose.orientation)};
   for (std::size_t i = 0; i < 9; ++i) out.rotation[i] = as_double(rotation.row[i / 3][i % 3]);
   out.velocity_mm_per_s = as_doubles(sensed.velocity_mm_per_s);
   out.force_n = as_doubles(state.force_n);

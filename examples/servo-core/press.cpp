@@ -14,7 +14,7 @@ int main(int argc, char** argv) {
     motors.torque_scale = {0.342, 0.342, 0.342};  // N mm at the joint per motor count
     kerf::LoadedScene scene = kerf::load_scene(argv[1], motors);
     const auto servo = kerf::compile(scene);
-    kerf::FakeArm arm;
+    kerf::KinematicOmni arm;
     kerf::arm_at(*servo, arm, 0, 5, 0);  // docked, taken in hand, led to 5 mm above the middle
     for (int tick = 0; tick <= 7000; ++tick) {
       const double y_mm = 5 - 0.001 * tick;

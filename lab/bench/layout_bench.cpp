@@ -204,7 +204,7 @@ class QueryBench {
     queries("query/" + name + "/half", samples, half_, at_depth(96.6));
     queries("query/" + name + "/immersed", samples, half_, at_depth(66.8));
     rows("turn/" + name, samples, half_,
-         [](ContactQuery<FixedNumbers>& query, int /*i*/) { query.turn({}); });
+         [](ContactQuery<FixedNumbers>& query, int /*i*/) { query.orient({}); });
   }
 
   [[nodiscard]] std::vector<KernelRow> rows() && { return std::move(rows_); }
@@ -232,7 +232,7 @@ class QueryBench {
     double plain_p50_ns = 0;
     for (const KernelSet* set : sets) {
       ContactQuery<FixedNumbers> query(*set, point_shell, std::span(&volume, 1));
-      query.turn({});
+      query.orient({});
       const TickTimes times = time_ticks(
           kTicks, [] {}, [&](int i) { tick(query, i); });
       if (plain_p50_ns == 0) plain_p50_ns = times.p50_ns;

@@ -74,7 +74,7 @@ class TwoModels {
  private:
   [[nodiscard]] Point at(double height) const { return frame_.at(0, height, 0); }
 
-  Dice dice_{4};
+  RandomNumbers dice_{4};
   Frame frame_{dice_, {32, 32, 32}};
   Body body_;
   PaperForce paper_;
@@ -143,9 +143,9 @@ void tell(const Wall& wall, const RowSink& add_row) {
 }
 
 Slide slide_both() {
-  Dice dice(5);
+  RandomNumbers random(5);
   const BumpSlide bumped;
-  const Bump bump(bumped, dice);
+  const Bump bump(bumped, random);
   const Body body = bump.body();
   const PaperForce paper(kRadius, body);
   GuidedTool<N> guided(tool_of_units("ball", kRadius, 2 * kRadius), body,

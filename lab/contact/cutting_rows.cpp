@@ -57,7 +57,7 @@ double balance_error(double voxel_mm) {
   // So much that the carry is a millionth of all, and no more than lies under the tool.
   scene.cut.machinability_mm3_per_s_n = 64 * voxel_mm;
   scene.cut.threshold_n = 0.0625;  // a number that fixed point holds
-  Miller miller(scene);
+  CuttingHand miller(scene);
   for (int ms = 0; ms < 3000; ++ms) {
     static_cast<void>(miller.step({1.5 * std::sin(0.005 * ms), 0.8 - 0.0008 * ms, 0}));
   }
@@ -80,7 +80,7 @@ double milling_step(LoadedScene scene) {
   double largest = 0;
   for (const double x_mm : {-0.3, 0.0, 0.2}) {
     for (const double z_mm : {-0.2, 0.0, 0.3}) {
-      Miller miller(scene, {x_mm, kSinkFromMm, z_mm});
+      CuttingHand miller(scene, {x_mm, kSinkFromMm, z_mm});
       largest = std::max(largest, sink(miller, x_mm, z_mm).step_ratio);
     }
   }

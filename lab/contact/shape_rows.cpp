@@ -109,18 +109,18 @@ void measure_shapes(const Effort& effort, const RowSink& add_row) {
         Subject{"STL, fluted bur, any pose", mesh_of_units("bur", fluted_bur(24)), Pose::any}}) {
     const Reach reach(subject.tool);
     const SampledTool tool(subject.tool);
-    Dice dice(8);
+    RandomNumbers random(8);
     double sum = 0, most = 0, degrees = 0;
     for (int k = 0; k < effort.tilts; ++k) {
-      const Frame frame(dice, kMiddle);
+      const Frame frame(random, kMiddle);
       const Point axis = subject.pose == Pose::upright ? frame.up
                          : subject.pose == Pose::lying ? frame.along
-                                                       : dice.direction();
-      const Axes axes = standing_on(axis, dice);
+                                                       : random.direction();
+      const Axes axes = standing_on(axis, random);
       const double support = reach.along(axes.to_tool(-1 * frame.up));
       const Body body = blurred(kGrid, [&](Point p) { return frame.of(p)[1] + support; });
       // From so high that the tool can turn first.
-      const Point rest = rest_of<N>(tool, body, frame.place, frame.up, axes.turn<N>(), 20);
+      const Point rest = rest_of<N>(tool, body, frame.place, frame.up, axes.orientation<N>(), 20);
       const double off = frame.of(rest)[1];
       sum += off;
       most = std::max(most, std::abs(off));
@@ -142,11 +142,11 @@ void measure_shape_edges(const Effort& effort, const RowSink& add_row) {
   for (const EdgedTool& subject : edged_tools()) {
     const std::vector<Point> surface = surface_points(subject.tool);
     const SampledTool tool(subject.tool);
-    Dice dice(7);
+    RandomNumbers random(7);
     double sum = 0, most = 0;
     for (int k = 0; k < effort.tilts; ++k) {
-      const Frame frame(dice, {21, 21, 21});
-      const Axes axes = standing_on(dice.direction(), dice);
+      const Frame frame(random, {21, 21, 21});
+      const Axes axes = standing_on(random.direction(), random);
       // The edge of 90 degrees lies where a tool about `frame.place` touches it.
       const auto above = [&](Point along) {
         return dot(along, frame.up) + std::abs(dot(along, frame.across));
@@ -161,7 +161,7 @@ void measure_shape_edges(const Effort& effort, const RowSink& add_row) {
       const Body body = blurred({44, 44, 44}, [&](Point p) {
         return (above(p - frame.place) - lowest) * std::sqrt(0.5);
       });
-      const Point rest = rest_of<N>(tool, body, frame.place, frame.up, axes.turn<N>(), 20);
+      const Point rest = rest_of<N>(tool, body, frame.place, frame.up, axes.orientation<N>(), 20);
       const Point out = unit(rest - frame.at(0, -1, 0));  // from the hand
       const double off = -depth_of(body, near, rest, out);
       sum += off;

@@ -86,8 +86,8 @@ class Course {
 /// A bump turned at random, a tool in some pose, and the tool's way over the bump.
 class Slide {
  public:
-  Slide(const SampledTool& tool, const Reach& reach, Dice& dice)
-      : tool_(tool), frame_(dice, {28, 28, 28}), axes_(standing_on(dice.direction(), dice)) {
+  Slide(const SampledTool& tool, const Reach& reach, RandomNumbers& random)
+      : tool_(tool), frame_(random, {28, 28, 28}), axes_(standing_on(random.direction(), random)) {
     frame_.place = frame_.at(0, -4 - kBump, 0);
     path_ = path_over(frame_, axes_, reach);
   }
@@ -98,17 +98,17 @@ class Slide {
   }
   /// Adds the figures of the tool.
   void feel(const Body& body, Figures& figures) const {
-    const Orientation<N> turn = axes_.turn<N>();
+    const Orientation<N> orientation = axes_.orientation<N>();
     constexpr double kHigh = 20;  // the tool turns first
     GuidedTool<N> guided(tool_, body, path_.front().hand(-kHigh));
-    for (int i = 0; i < 100 && !(guided.pose().turn == turn); ++i) {
-      guided.tick(path_.front().hand(-kHigh), turn);
+    for (int i = 0; i < 100 && !(guided.pose().orientation == orientation); ++i) {
+      guided.tick(path_.front().hand(-kHigh), orientation);
     }
     for (double depth = -kHigh; depth < kDepth; depth += 0.1)
-      guided.tick(path_.front().hand(depth), turn);
+      guided.tick(path_.front().hand(depth), orientation);
     Course course;
     for (const Touch& touch : path_) {
-      const Point force = guided.tick(touch.hand(kDepth), turn);
+      const Point force = guided.tick(touch.hand(kDepth), orientation);
       course.add(touch, force, dot(guided.proxy() - touch.centre, touch.normal));
     }
     course.worsen(figures);
@@ -162,9 +162,9 @@ void measure_slides(const Effort& effort, const RowSink& add_row) {
                 {1.2, 0.9},
                 {0.02, 0.015}}}) {
     SlideFigures figures;
-    Dice dice(5);
+    RandomNumbers random(5);
     for (int k = 0; k < effort.slides; ++k) {
-      slide_over<FixedNumbers>(subject.slide, dice, figures);
+      slide_over<FixedNumbers>(subject.slide, random, figures);
     }
     const auto row = [&](const char* what, double value, const char* unit, double scale,
                          const Limits& limits) {
@@ -186,14 +186,14 @@ void measure_edge_slides(const Effort& effort, const RowSink& add_row) {
                                  Subject{"cylinder", tool_of_units("cylinder", 5, 16)}}) {
     const SampledTool tool(subject.tool);
     for (const EdgeWay way : {EdgeWay::along, EdgeWay::over}) {
-      Dice dice(13);
+      RandomNumbers random(13);
       double step = 0;
       for (int k = 0; k < 2 * effort.slides; ++k) {
-        Frame frame(dice, {25, 25, 25});
+        Frame frame(random, {25, 25, 25});
         frame.place = frame.at(0, -4, 0);
-        const Axes lying = standing_on(frame.across, dice);  // its side on the edge
+        const Axes lying = standing_on(frame.across, random);  // its side on the edge
         const EdgeFigures figures = slide_at_edge<FixedNumbers>(
-            {.way = way}, subject.tool, tool, frame, lying, dice.uniform(-0.5, 0.5));
+            {.way = way}, subject.tool, tool, frame, lying, random.uniform(-0.5, 0.5));
         step = std::max(step, figures.roughness.ratio());
       }
       add_row({"edges",
@@ -222,11 +222,11 @@ void measure_shape_slides(const Effort& effort, const RowSink& add_row) {
       row(", angle", figures.degrees, "deg", limits.degrees);
       row(", surface sd", figures.height_sd, "voxels", limits.sd);
     };
-    Dice dice(5);
+    RandomNumbers random(5);
     CtEdge ct;
     Figures clean, smoothed, noisy, exact;
     for (int k = 0; k < 2 * effort.slides; ++k) {
-      const Slide slide(tool, reach, dice);
+      const Slide slide(tool, reach, random);
       slide.feel(slide.body([](double distance) { return 0.5 - distance / 2; }), clean);
       Body body = slide.body(std::ref(ct));
       slide.feel(body, noisy);

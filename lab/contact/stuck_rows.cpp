@@ -83,11 +83,11 @@ Matter layers() {
 }
 
 /// Bits that touch and overlap, each third of them soft.
-Matter rubble(Dice& dice) {
+Matter rubble(RandomNumbers& random) {
   std::array<std::pair<Point, double>, 24> bits;
   for (auto& [place, radius] : bits) {
-    place = {dice.uniform(-3, 3), dice.uniform(-3.5, -0.5), dice.uniform(-3, 3)};
-    radius = dice.uniform(0.3, 1.2);
+    place = {random.uniform(-3, 3), random.uniform(-3.5, -0.5), random.uniform(-3, 3)};
+    radius = random.uniform(0.3, 1.2);
   }
   const auto nearest = [bits](Point at, std::size_t from, std::size_t to) {
     double nearest_mm = 9;
@@ -101,8 +101,8 @@ Matter rubble(Dice& dice) {
 }
 
 /// A groove and a hole, as from earlier milling; soft material fills them.
-Matter pit(Dice& dice) {
-  const double radius_mm = dice.uniform(0.3, 1.2);
+Matter pit(RandomNumbers& random) {
+  const double radius_mm = random.uniform(0.3, 1.2);
   const auto hollow = [radius_mm](Point at) {
     return std::min(std::hypot(at[0] - 0.5, at[2]), std::hypot(at[0] + 0.7, at[1])) - radius_mm;
   };
@@ -111,8 +111,8 @@ Matter pit(Dice& dice) {
 }
 
 /// Nested shells of 1.2 to 3 voxels, with tissue in them.
-Matter shells(Dice& dice) {
-  const double wall_mm = dice.uniform(1.2, 3) * kVoxelMm, gap_mm = dice.uniform(0.4, 1.2);
+Matter shells(RandomNumbers& random) {
+  const double wall_mm = random.uniform(1.2, 3) * kVoxelMm, gap_mm = random.uniform(0.4, 1.2);
   const auto depth = [](Point at) { return 3.5 - length(at + Point{0, 3.5, 0}); };
   return {"shells",
           [=](Point at) {
@@ -123,8 +123,8 @@ Matter shells(Dice& dice) {
 }
 
 /// Parallel thin walls that stand on a floor.
-Matter plates(Dice& dice) {
-  const double wall_mm = dice.uniform(1.2, 4) * kVoxelMm, gap_mm = dice.uniform(0.2, 1.5);
+Matter plates(RandomNumbers& random) {
+  const double wall_mm = random.uniform(1.2, 4) * kVoxelMm, gap_mm = random.uniform(0.2, 1.5);
   return {"plates",
           [=](Point at) {
             const double along = std::fmod(at[0] + 100 * (wall_mm + gap_mm), wall_mm + gap_mm);
@@ -139,20 +139,20 @@ Matter block() {
           [](Point at) { return filled(std::hypot(at[0], at[2]) - 0.4); }};
 }
 
-Matter matter_of(Dice& dice) {
-  switch (static_cast<int>(dice.uniform(0, 8))) {
+Matter matter_of(RandomNumbers& random) {
+  switch (static_cast<int>(random.uniform(0, 8))) {
     case 0:
       return crown();
     case 1:
       return layers();
     case 2:
-      return rubble(dice);
+      return rubble(random);
     case 3:
-      return pit(dice);
+      return pit(random);
     case 4:
-      return shells(dice);
+      return shells(random);
     case 5:
-      return plates(dice);
+      return plates(random);
     case 6:
       return block();
     default:
@@ -182,13 +182,14 @@ VolumeImage image_of(VoxelGrid grid, const Matter& matter, Point middle_mm, doub
 }
 
 /// A scene around this image, whose middle is at `middle_mm` before all is turned about the origin.
-LoadedScene scene_around(VolumeImage image, Point middle_mm, const Loop& loop, Dice& dice) {
+LoadedScene scene_around(VolumeImage image, Point middle_mm, const Loop& loop,
+                         RandomNumbers& random) {
   LoadedScene scene;
   SceneVolume& volume = scene.volumes.emplace_back();
   volume.name = "matter";
   volume.iso = static_cast<Density>(std::lround(kIsoShare * kDensityMax));
   volume.image = enclosed_in_air(std::move(image), volume.iso);
-  const Point axis = std::sin(dice.uniform(0, 0.5)) * dice.direction();
+  const Point axis = std::sin(random.uniform(0, 0.5)) * random.direction();
   const double w = std::sqrt(std::max(0.0, 1 - dot(axis, axis)));
   const Matrix3 turn = rotation_of(std::array{axis[0], axis[1], axis[2], w});
   Point middle{};
@@ -200,29 +201,29 @@ LoadedScene scene_around(VolumeImage image, Point middle_mm, const Loop& loop, D
   scene.force.model = ForceModel::proxy;
   scene.cut.model = CutModel::preston;
   constexpr double kRates[] = {1, 4, 8};
-  scene.cut.machinability_mm3_per_s_n *= kRates[static_cast<std::size_t>(dice.uniform(0, 3))];
+  scene.cut.machinability_mm3_per_s_n *= kRates[static_cast<std::size_t>(random.uniform(0, 3))];
   scene.device.torque_scale = std::array{0.342, 0.342, 0.342};
   scene.servo.numeric = loop.numeric;
   scene.servo.rate_hz = loop.rate_hz;
   scene.materials = default_materials();
-  scene.materials[kLabelPulp].forbidden = dice.uniform(0, 1) < 0.5;
+  scene.materials[kLabelPulp].forbidden = random.uniform(0, 1) < 0.5;
   return scene;
 }
 
-void add_tools(bool bur, Dice& dice, LoadedScene& scene) {
+void add_tools(bool bur, RandomNumbers& random, LoadedScene& scene) {
   for (const std::string_view shape : kToolShapes) {
     const std::string name(shape);
-    const double radius_mm = dice.uniform(0.4, 1);
+    const double radius_mm = random.uniform(0.4, 1);
     scene.tools.push_back(make_tool(name, name, {.pitch_mm = kVoxelMm, .radius_mm = radius_mm}));
   }
   if (bur) scene.tools.push_back(shipped_bur(1, kVoxelMm));
   for (SceneTool& tool : scene.tools) {
-    const bool shafted = dice.uniform(0, 1) < 0.5;
+    const bool shafted = random.uniform(0, 1) < 0.5;
     ToolShaft shaft;
-    shaft.radius_mm = tool.radius_mm * dice.uniform(0.3, 1.2);
-    shaft.end_mm = tool.length_mm / 2 + dice.uniform(1, 6);
-    if (dice.uniform(0, 1) < 0.5) {
-      shaft.handpiece_radius_mm = shaft.radius_mm + dice.uniform(0.5, 2);
+    shaft.radius_mm = tool.radius_mm * random.uniform(0.3, 1.2);
+    shaft.end_mm = tool.length_mm / 2 + random.uniform(1, 6);
+    if (random.uniform(0, 1) < 0.5) {
+      shaft.handpiece_radius_mm = shaft.radius_mm + random.uniform(0.5, 2);
       shaft.handpiece_end_mm = shaft.end_mm + 8;
     }
     if (shafted) tool.shaft = shaft;
@@ -236,16 +237,16 @@ void add_tools(bool bur, Dice& dice, LoadedScene& scene) {
 /// handpiece; one scene of four has the fluted bur of scenes/burs. Throws LoadError if that cannot
 /// be read.
 TrapScene trap_scene(std::uint64_t number) {
-  Dice dice(number);
+  RandomNumbers random(number);
   const Loop& loop = loop_of(number);
-  const Matter matter = matter_of(dice);
+  const Matter matter = matter_of(random);
   const bool border = std::string_view(matter.name).starts_with("block");
-  const double softness = dice.uniform(0, 1) < 0.5 ? kIsoShare * dice.uniform(0.2, 0.97) : 0;
+  const double softness = random.uniform(0, 1) < 0.5 ? kIsoShare * random.uniform(0.2, 0.97) : 0;
   const VoxelGrid grid = border ? VoxelGrid{24, 32, 24} : VoxelGrid{64, 64, 64};
   const Point middle_mm = border ? Point{0, -2, 0} : Point{};
   LoadedScene scene =
-      scene_around(image_of(grid, matter, middle_mm, softness), middle_mm, loop, dice);
-  add_tools(number % 4 == 2, dice, scene);
+      scene_around(image_of(grid, matter, middle_mm, softness), middle_mm, loop, random);
+  add_tools(number % 4 == 2, random, scene);
   std::string what = matter.name;
   if (softness > 0 && matter.soft) {
     what += scene.materials[kLabelPulp].forbidden ? ", forbidden pulp" : ", pulp";
@@ -255,12 +256,12 @@ TrapScene trap_scene(std::uint64_t number) {
 
 /// The same with a flat that is softer than its iso, all of it: 0.2 to 0.97 of that.
 TrapScene soft_scene(std::uint64_t number) {
-  Dice dice(~number);
+  RandomNumbers random(~number);
   const Loop& loop = loop_of(number);
-  const double softness = kIsoShare * dice.uniform(0.2, 0.97);
+  const double softness = kIsoShare * random.uniform(0.2, 0.97);
   const Matter matter{"soft", [softness](Point at) { return softness * filled(at[1]); }, {}};
-  LoadedScene scene = scene_around(image_of({64, 64, 64}, matter, {}, 0), {}, loop, dice);
-  add_tools(number % 4 == 2, dice, scene);
+  LoadedScene scene = scene_around(image_of({64, 64, 64}, matter, {}, 0), {}, loop, random);
+  add_tools(number % 4 == 2, random, scene);
   return {std::move(scene), std::string("soft, ") + loop.name, loop.presses};
 }
 
@@ -277,7 +278,7 @@ struct Pressed {
 };
 
 /// The part of the sent force that the head must bear, whatever the shaft does.
-double force_on_head(Miller& miller, const LoadedScene& scene, const SceneTool& tool,
+double force_on_head(CuttingHand& miller, const LoadedScene& scene, const SceneTool& tool,
                      const ServoOutput& out) {
   const double force_n = length(out.force_n);
   if (tool.shaft.radius_mm <= 0 || force_n <= 0) return force_n;
@@ -296,7 +297,7 @@ struct Hand {
 
 /// A hand that presses and trembles by 0.1 mm, for `seconds`; it goes on at 50 mm/s if nothing
 /// holds it. The press ends if the tool leaves the matter, or counts as stuck.
-Pressed press(Miller& miller, const Hand& how, const LoadedScene& scene, const SceneTool& tool,
+Pressed press(CuttingHand& miller, const Hand& how, const LoadedScene& scene, const SceneTool& tool,
               double seconds) {
   constexpr double kMmPerS = 50, kTremorMm = 0.1, kTremorHz = 9, kLeftMm = 5, kRestS = 0.1;
   const double tick_s = 1.0 / scene.servo.rate_hz, step_mm = kMmPerS * tick_s;
@@ -340,11 +341,12 @@ Pressed press(Miller& miller, const Hand& how, const LoadedScene& scene, const S
 
 /// The hand takes the tool out of the matter, chooses the next one, turned anyhow, and holds it
 /// above. Returns its position.
-Point begin(Miller& miller, std::size_t tool, Dice& dice) {
-  const Point from{dice.uniform(-1.5, 1.5), dice.uniform(3, 4), dice.uniform(-1.5, 1.5)};
+Point begin(CuttingHand& miller, std::size_t tool, RandomNumbers& random) {
+  const Point from{random.uniform(-1.5, 1.5), random.uniform(3, 4), random.uniform(-1.5, 1.5)};
   miller.travel(kAbove);
   miller.servo().apply({ServoCommand::Kind::select_tool, static_cast<std::uint32_t>(tool)});
-  miller.turn_wrist({dice.uniform(-0.5, 0.5), dice.uniform(-0.7, 0.7), dice.uniform(-0.5, 0.5)});
+  miller.turn_wrist(
+      {random.uniform(-0.5, 0.5), random.uniform(-0.7, 0.7), random.uniform(-0.5, 0.5)});
   miller.travel(from);
   static_cast<void>(miller.hold(from, 0.1));
   return from;
@@ -368,13 +370,13 @@ Search search(int presses, std::uint64_t first, double seconds, double limit, co
   Search found;
   for (std::uint64_t number = first; found.made < presses; ++number) {
     const TrapScene at = make(number);
-    Miller miller(at.scene, kAbove);
-    Dice dice(number ^ 0x5eed);
+    CuttingHand miller(at.scene, kAbove);
+    RandomNumbers random(number ^ 0x5eed);
     for (int i = 0; i < std::min(at.presses, presses - found.made); ++i) {
       const std::size_t tool = (static_cast<std::size_t>(i) + number) % at.scene.tools.size();
-      const Point from = begin(miller, tool, dice);
-      const Point down = unit(Point{dice.uniform(-0.7, 0.7), -1, dice.uniform(-0.7, 0.7)});
-      const Hand hand{from, down, dice.uniform(0.1, 1), dice.uniform(0, 1) < 0.7};
+      const Point from = begin(miller, tool, random);
+      const Point down = unit(Point{random.uniform(-0.7, 0.7), -1, random.uniform(-0.7, 0.7)});
+      const Hand hand{from, down, random.uniform(0.1, 1), random.uniform(0, 1) < 0.7};
       const Pressed seen = press(miller, hand, at.scene, at.scene.tools[tool], seconds);
       found.touched += seen.touched ? 1 : 0;
       found.by_shaft += seen.by_shaft ? 1 : 0;

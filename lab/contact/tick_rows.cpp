@@ -71,21 +71,21 @@ void keep_costliest(std::vector<Tick>& ticks, std::size_t count) {
 template <class Rig>
 void find_with(Rig& rig, const WorstCase& worst_case, int ticks, WorstTick& worst) {
   Stopwatch<Rig> stopwatch(rig);
-  Dice dice(3);
+  RandomNumbers random(3);
   std::vector<Tick> tried;
   ProxyState<N> state;
   Point hand = worst_case.middle;
-  Orientation<N> turn;
+  Orientation<N> orientation;
   for (int i = 0; i < ticks; ++i) {
     const bool far = i % 16 == 15;  // beyond the volume, and back
-    hand = hand + std::pow(10.0, dice.uniform(0, 2)) * dice.direction();
+    hand = hand + std::pow(10.0, random.uniform(0, 2)) * random.direction();
     for (std::size_t axis = 0; axis < 3; ++axis) {
       hand[axis] =
           std::clamp(hand[axis], worst_case.middle[axis] - 20, worst_case.middle[axis] + 20);
     }
-    turn = compose(dice.turn<N>(i % 3 == 0 ? 3 : dice.uniform(0, 0.2)), turn);
+    orientation = compose(random.rotation<N>(i % 3 == 0 ? 3 : random.uniform(0, 0.2)), orientation);
     if (i % 64 == 63) state = {};  // looks for a place
-    Tick tick{state, {place_of<N>(far ? 5000 * dice.direction() : hand), turn}};
+    Tick tick{state, {place_of<N>(far ? 5000 * random.direction() : hand), orientation}};
     state = stopwatch.time(tick, 2);
     tried.push_back(tick);
   }
@@ -96,9 +96,10 @@ void find_with(Rig& rig, const WorstCase& worst_case, int ticks, WorstTick& wors
   for (std::size_t k = 0; k < std::min(kCostliest, tried.size()); ++k) {
     for (int i = 0; i < kBeside; ++i) {
       Tick beside = tried[k];
-      const Point off = std::pow(10.0, dice.uniform(-1, 1.5)) * dice.direction();
+      const Point off = std::pow(10.0, random.uniform(-1, 1.5)) * random.direction();
       beside.goal.centre = beside.goal.centre + place_of<N>(off);
-      beside.goal.turn = compose(dice.turn<N>(dice.uniform(0, 0.3)), beside.goal.turn);
+      beside.goal.orientation =
+          compose(random.rotation<N>(random.uniform(0, 0.3)), beside.goal.orientation);
       stopwatch.time(beside, 2);
       tried.push_back(beside);
     }
@@ -138,8 +139,8 @@ WorstCase solid(const char* name, double (*distance)(Point)) {
 WorstCase tissue(const char* name, double low, double high) {
   return {name,
           [low, high] {
-            Dice dice(5);
-            return body_of(kGrid, [&](Point) { return dice.uniform(low, high); });
+            RandomNumbers random(5);
+            return body_of(kGrid, [&](Point) { return random.uniform(low, high); });
           },
           kMiddle, kIso};
 }

@@ -91,9 +91,9 @@ void measure_walls(const Effort& effort, const RowSink& add_row) {
                                  Subject{"turning bur (STL), wall of 2 voxels", 2, bur, 0.05}}) {
     const SampledTool made(subject.tool.made());
     Shaken seen;
-    Dice dice(11);
+    RandomNumbers random(11);
     for (int k = 0; k < effort.walls; ++k) {
-      shake<FixedNumbers>(subject.thickness, subject.tool, made, kTicksPerWall, dice, seen);
+      shake<FixedNumbers>(subject.thickness, subject.tool, made, kTicksPerWall, random, seen);
     }
     const std::string name = subject.name;
     const auto row = [&](const char* what, double value, const char* unit,
@@ -118,9 +118,9 @@ void measure_air(const Effort& effort, const RowSink& add_row) {
     const char *name, *shape;
     double radius_mm, length_mm, turn_rad_per_s;
   };
-  Dice dice(23);
+  RandomNumbers random(23);
   std::vector<AirWall> walls;
-  for (int k = 0; k < effort.air_walls; ++k) walls.emplace_back(dice);
+  for (int k = 0; k < effort.air_walls; ++k) walls.emplace_back(random);
   for (const Flight& at : {Flight{250, 0.05, 0.5, 0.5},
                            {250, 0.05, 1, 0.5},
                            {1000, 0.02, 1, 0.25},
@@ -138,7 +138,7 @@ void measure_air(const Effort& effort, const RowSink& add_row) {
       const AirFlight flight{1000 * at.m_per_s / at.rate_hz / at.voxel_mm, at.gap_mm / at.voxel_mm,
                              tool.turn_rad_per_s / at.rate_hz};
       Flown flown;
-      for (const AirWall& wall : walls) fly<FixedNumbers>(made, wall, flight, 100, dice, flown);
+      for (const AirWall& wall : walls) fly<FixedNumbers>(made, wall, flight, 100, random, flown);
       char name[128];
       std::snprintf(name, sizeof name, "%s, %g Hz, voxels of %g mm, %g m/s, %g mm beside a wall",
                     tool.name, at.rate_hz, at.voxel_mm, at.m_per_s, at.gap_mm);
@@ -155,11 +155,11 @@ void measure_air(const Effort& effort, const RowSink& add_row) {
 void measure_rests(const Effort& effort, const RowSink& add_row) {
   const SampledTool ball(tool_of_units("ball", kRadius, 2 * kRadius));
   const auto placed = [&](const Solid& solid, const auto& measured) {
-    Dice dice(6);
+    RandomNumbers random(6);
     for (int k = 0; k < effort.tilts; ++k) {
-      const Frame frame(dice, kMiddle);
+      const Frame frame(random, kMiddle);
       const Body body = blurred(kGrid, [&](Point p) { return solid(frame.of(p)); });
-      measured(frame, body, dice);
+      measured(frame, body, random);
     }
   };
   struct Subject {
@@ -171,7 +171,7 @@ void measure_rests(const Effort& effort, const RowSink& add_row) {
         Subject{"convex 6", convex(6)}, Subject{"concave 40", concave(40)},
         Subject{"concave 14", concave(14)}, Subject{"crease of 90 degrees", crease}}) {
     double sum = 0, most = 0;
-    placed(solid, [&](const Frame& frame, const Body& body, Dice&) {
+    placed(solid, [&](const Frame& frame, const Body& body, RandomNumbers&) {
       const Point rest = rest_of<N>(ball, body, frame.place, frame.up);
       const double off = solid(frame.of(rest)) - kRadius;
       sum += off;
@@ -182,8 +182,8 @@ void measure_rests(const Effort& effort, const RowSink& add_row) {
     add_row({"rests", std::string(name) + ": largest offset", most, "voxels", 0.05, 0.02});
   }
   double sum = 0, most = 0;
-  placed(edge, [&](const Frame& frame, const Body& body, Dice& dice) {
-    const double lean = dice.uniform(-0.7, 0.7);  // still on the edge, not on a face beside it
+  placed(edge, [&](const Frame& frame, const Body& body, RandomNumbers& random) {
+    const double lean = random.uniform(-0.7, 0.7);  // still on the edge, not on a face beside it
     const Point up = unit(std::cos(lean) * frame.up + std::sin(lean) * frame.across);
     const Point top = frame.at(0, -kRadius, 0);
     const Point rest = rest_of<N>(ball, body, top + kRadius * up, up);

@@ -43,8 +43,8 @@ class Writer {
     aside_.x += std::min(way_mm, kReachMm);
     aside_.z += std::min(way_mm, kReachMm) / 3;
     // An Omni is parked in its inkwell, from which its encoders count; others anywhere.
-    dock_ =
-        scene.device.personality == Personality::omni ? CountHand::Counts{} : hand_.counts_at(top_);
+    dock_ = scene.device.personality == Personality::omni ? KinematicHand::Counts{}
+                                                          : hand_.counts_at(top_);
     at_ = dock_;
   }
 
@@ -75,7 +75,7 @@ class Writer {
   }
   /// One report far away, and back; then counts at the ends of 16 bits, and a lost homing.
   void jump() {
-    const CountHand::Counts here = at_;
+    const KinematicHand::Counts here = at_;
     say({here[0] + 3000, here[1] - 2000, here[2] + 2500});
     say(here);
     constexpr double kEnd = std::numeric_limits<std::int16_t>::max();
@@ -101,15 +101,15 @@ class Writer {
   void expect(Expectation::Kind kind) {
     out_.expectations.push_back({kind, out_.reports.size() - 1});
   }
-  void say(const CountHand::Counts& counts, bool parked = false) {
+  void say(const KinematicHand::Counts& counts, bool parked = false) {
     out_.reports.push_back(hand_.report(counts, parked));
   }
   void rest(double ms, bool parked) {
     for (std::size_t i = ticks(ms); i > 0; --i) say(at_, parked);
   }
   /// By joints.
-  void glide(const CountHand::Counts& to, double ms, bool parked) {
-    const CountHand::Counts from = at_;
+  void glide(const KinematicHand::Counts& to, double ms, bool parked) {
+    const KinematicHand::Counts from = at_;
     // No encoder steps half of its 16 bits in a tick.
     const std::size_t steps = std::max<std::size_t>(ticks(ms), 5);
     for (std::size_t i = 1; i <= steps; ++i) {
@@ -142,11 +142,11 @@ class Writer {
     }
   }
 
-  CountHand hand_;
+  KinematicHand hand_;
   double rate_hz_;
   StressInput& out_;
   Place top_, deep_, aside_, place_;
-  CountHand::Counts dock_{}, at_{};
+  KinematicHand::Counts dock_{}, at_{};
 };
 
 VolumeImage half_space() {

@@ -86,14 +86,14 @@ double rest_cycle_mm(NumericKind numeric, double quantum_mm) {
   constexpr int kTicks = 900, kSteps = 100;
   constexpr double kDt = 1e-3 / kSteps;
   LoadedScene scene = scene_of(numeric, ForceModel::proxy, {0.25, 0.25, 0.25}, solid_half);
-  CountHand hand(scene.device);
+  KinematicHand hand(scene.device);
   const auto servo = compile(scene);
   const double start_mm = 1.2;
   const auto report_at = [&](double y_mm) {
     const double y = quantum_mm > 0 ? std::floor(y_mm / quantum_mm) * quantum_mm : y_mm;
     return hand.report(hand.counts_at({0, y, 0}), false);
   };
-  const CountHand::Counts dock{}, top = hand.counts_at({0, start_mm, 0});
+  const KinematicHand::Counts dock{}, top = hand.counts_at({0, start_mm, 0});
   for (int i = 0; i < 60; ++i) static_cast<void>(servo->step(hand.report(dock, true)));
   for (int i = 1; i <= 100; ++i) {
     const double s = i / 100.0;
@@ -231,7 +231,7 @@ std::string measure_denormals(const StudySize&, const std::vector<KeyRow>&, Foun
   const auto servo = compile(scene);
   for (const DeviceReport& report : hand.reports) static_cast<void>(servo->step(report));
   // Up, out of the solid: the motors stay on, without force.
-  CountHand still(scene.device);
+  KinematicHand still(scene.device);
   const DeviceReport rest = still.report(still.counts_at({0, 10, 0}), false);
   int subnormal = 0;
   ServoOutput out;

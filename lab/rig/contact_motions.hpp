@@ -21,8 +21,8 @@ struct AirWall {
   Frame frame;
   Body body;
 
-  explicit AirWall(Dice& dice)
-      : frame(dice, {kEdge / 2.0, kEdge / 2.0, kEdge / 2.0}),
+  explicit AirWall(RandomNumbers& random)
+      : frame(random, {kEdge / 2.0, kEdge / 2.0, kEdge / 2.0}),
         body(blurred({kEdge, kEdge, kEdge}, [&](Point p) { return frame.of(p)[1]; })) {}
 };
 
@@ -42,9 +42,9 @@ struct Flown {
 
 template <class N>
 void fly(const SampledTool& tool, const AirWall& wall, const AirFlight& flight, int ticks,
-         Dice& dice, Flown& flown) {
-  Orientation<N> turn = dice.turn<N>(dice.uniform(0, 3));
-  const auto rows = rows_of(turn);
+         RandomNumbers& random, Flown& flown) {
+  Orientation<N> orientation = random.rotation<N>(random.uniform(0, 3));
+  const auto rows = rows_of(orientation);
   double below = 0, reach = 0;
   for (const Point& sample : tool.samples) {
     double height = 0;
@@ -58,16 +58,17 @@ void fly(const SampledTool& tool, const AirWall& wall, const AirFlight& flight, 
   }
   const double height = (flight.turn_rad > 0 ? reach : below) + flight.gap_units;
   const double half = std::max(0.3 * AirWall::kEdge, 0.65 * flight.units_per_tick);
-  double at = dice.uniform(-half, half), way = flight.units_per_tick;
+  double at = random.uniform(-half, half), way = flight.units_per_tick;
   const Point far = wall.frame.at(at, 3 * reach, 0);
   GuidedTool<N> guided(tool, wall.body, far);
-  for (int i = 0; i < 20; ++i) static_cast<void>(guided.tick(far, turn));  // it takes time to turn
+  for (int i = 0; i < 20; ++i)
+    static_cast<void>(guided.tick(far, orientation));  // it takes time to turn
   guided.start(wall.frame.at(at, height, 0));
   for (int i = 0; i <= ticks; ++i) {
     const Point hand = wall.frame.at(at, height, 0);
     // The hand, as the numbers of the sweep have it.
     const Point hand_felt = point_of<N>(place_of<N>(hand));
-    static_cast<void>(guided.tick(hand, turn));
+    static_cast<void>(guided.tick(hand, orientation));
     if (i > 0) {
       ++flown.ticks;
       flown.longest_spring = std::max(flown.longest_spring, length(guided.proxy() - hand_felt));
@@ -75,7 +76,8 @@ void fly(const SampledTool& tool, const AirWall& wall, const AirFlight& flight, 
     }
     if (std::abs(at + way) > half) way = -way;
     at += way;
-    if (flight.turn_rad > 0) turn = compose(dice.turn<N>(flight.turn_rad), turn);
+    if (flight.turn_rad > 0)
+      orientation = compose(random.rotation<N>(flight.turn_rad), orientation);
   }
 }
 
@@ -102,7 +104,8 @@ inline constexpr double kSlideRadius = 8;
 /// A bump in a cube of 60, turned at random, and the path of the hand over it.
 class Bump {
  public:
-  Bump(const BumpSlide& slide, Dice& dice) : slide_(slide), frame_(dice, {28, 28, 28}) {
+  Bump(const BumpSlide& slide, RandomNumbers& random)
+      : slide_(slide), frame_(random, {28, 28, 28}) {
     frame_.place = frame_.at(0, -4 - slide.bump, 0);
   }
 
@@ -126,8 +129,8 @@ class Bump {
 
 /// F8 of docs/validation.md: slides once over the bump.
 template <class N>
-void slide_over(const BumpSlide& slide, Dice& dice, SlideFigures& figures) {
-  const Bump bump(slide, dice);
+void slide_over(const BumpSlide& slide, RandomNumbers& random, SlideFigures& figures) {
+  const Bump bump(slide, random);
   const Body body = bump.body();
   GuidedTool<N> guided(tool_of_units("ball", kSlideRadius, 2 * kSlideRadius), body,
                        bump.hand(-bump.end(), -2));
@@ -215,18 +218,18 @@ template <class N>
     const auto covered = [](double d) { return std::clamp(0.5 - d / 2, 0.0, 1.0); };
     return covered((height + aside) * std::sqrt(0.5)) * covered((height - aside) * std::sqrt(0.5));
   });
-  const Orientation<N> turn = axes.turn<N>();
+  const Orientation<N> orientation = axes.orientation<N>();
   const auto hand_of = [&](const Hand& hand, double depth) {
     return hand.centre - depth * hand.normal;
   };
   constexpr double kHigh = 12;  // the tool turns first
   GuidedTool<N> guided(tool, body, hand_of(path.front(), -kHigh));
-  for (int i = 0; i < 100; ++i) guided.tick(hand_of(path.front(), -kHigh), turn);
+  for (int i = 0; i < 100; ++i) guided.tick(hand_of(path.front(), -kHigh), orientation);
   for (double depth = -kHigh; depth < slide.depth; depth += 0.1)
-    guided.tick(hand_of(path.front(), depth), turn);
+    guided.tick(hand_of(path.front(), depth), orientation);
   EdgeFigures figures;
   for (const Hand& hand : path) {
-    const Point force = guided.tick(hand_of(hand, slide.depth), turn);
+    const Point force = guided.tick(hand_of(hand, slide.depth), orientation);
     figures.roughness.add(force);
     figures.degrees = std::max(figures.degrees, degrees_between(force, hand.normal));
   }
@@ -246,11 +249,11 @@ template <class N>
 [[nodiscard]] IsoRests rest_at_iso(const SceneTool& shape, const SampledTool& tool, double iso,
                                    double bump, int count, double full = 1) {
   const Reach reach(shape);
-  Dice dice(8);
+  RandomNumbers random(8);
   IsoRests found;
   for (int k = 0; k < count; ++k) {
-    const Frame frame(dice, {21, 21, 21});
-    const Axes axes = standing_on(dice.direction(), dice);
+    const Frame frame(random, {21, 21, 21});
+    const Axes axes = standing_on(random.direction(), random);
     const Point touching =
         tool.round ? -8.0 * frame.up : axes.to_world(reach.farthest(axes.to_tool(-1 * frame.up)));
     const double outward = 1 - 2 * iso / full;
@@ -261,8 +264,8 @@ template <class N>
       return full * std::clamp(0.5 - distance / 2, 0.0, 1.0);
     });
     const auto level = static_cast<Density>(std::lround(iso * kDensityMax));
-    const Point rest =
-        rest_of<N>(tool, body, frame.place, frame.up, axes.turn<N>(), tool.round ? 4 : 20, level);
+    const Point rest = rest_of<N>(tool, body, frame.place, frame.up, axes.orientation<N>(),
+                                  tool.round ? 4 : 20, level);
     const Point force = rest - frame.at(0, -1, 0);
     found.degrees = std::max(found.degrees, degrees_between(force, frame.up));
     found.offset = std::max(found.offset, std::abs(dot(rest - frame.place, frame.up)));
@@ -287,9 +290,9 @@ struct ShakenTool {
   }
   /// Its reach down along `up` from its centre.
   template <class N>
-  [[nodiscard]] double reach_below(const Orientation<N>& turn, Point up) const {
+  [[nodiscard]] double reach_below(const Orientation<N>& orientation, Point up) const {
     if (round) return radius;
-    const auto rows = rows_of(turn);
+    const auto rows = rows_of(orientation);
     Point in_tool{};  // `up` along the tool's axes
     for (std::size_t i = 0; i < 3; ++i) {
       for (std::size_t j = 0; j < 3; ++j) in_tool[j] += double(rows[i][j]) * up[i];
@@ -322,26 +325,26 @@ struct Shaken {
 /// random steps of 0.1 to 10 m/s (at 0.1 mm a unit and 1 kHz), with small turns and large ones. No
 /// supervisor stops it. `made` is the tool's. Depths and crossings count from density 1/2.
 template <class N>
-void shake(double thickness, const ShakenTool& tool, const SampledTool& made, int ticks, Dice& dice,
-           Shaken& seen, Density iso = kIso) {
-  const Frame frame(dice, {32, 32, 32});
+void shake(double thickness, const ShakenTool& tool, const SampledTool& made, int ticks,
+           RandomNumbers& random, Shaken& seen, Density iso = kIso) {
+  const Frame frame(random, {32, 32, 32});
   const Body wall = blurred({66, 66, 66}, [&](Point p) {
     const double height = frame.of(p)[1];
     return thickness > 40 ? height : std::abs(height + thickness / 2) - thickness / 2;
   });
   Point hand = frame.at(0, tool.reach() + 3, 0);
-  Orientation<N> turn;
+  Orientation<N> orientation;
   GuidedTool<N> guided(made, wall, hand, 0, iso);
   for (int i = 0; i < ticks; ++i) {
-    hand = hand + std::pow(10.0, dice.uniform(0, 2)) * dice.direction();
+    hand = hand + std::pow(10.0, random.uniform(0, 2)) * random.direction();
     const Point h = frame.of(hand);
     const double aside = std::max(1.0, std::hypot(h[0], h[2]) / 10);  // stay inside of the volume
     hand = frame.at(h[0] / aside, std::clamp(h[1], -14.0, 14.0), h[2] / aside);
-    turn = compose(dice.turn<N>(i % 3 == 0 ? 3 : dice.uniform(0, 0.2)), turn);
+    orientation = compose(random.rotation<N>(i % 3 == 0 ? 3 : random.uniform(0, 0.2)), orientation);
     const Point before = guided.proxy();
-    const double spring = length(guided.tick(hand, turn));
+    const double spring = length(guided.tick(hand, orientation));
 
-    const double below = tool.reach_below(guided.pose().turn, frame.up);
+    const double below = tool.reach_below(guided.pose().orientation, frame.up);
     const double height = frame.of(guided.proxy())[1];
     ++seen.ticks;
     seen.most_queries = std::max(seen.most_queries, guided.swept().queries);

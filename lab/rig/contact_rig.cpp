@@ -21,7 +21,7 @@ void ContactRig<N>::add(const Body& body, const ContactFrame<N>& frame, Density 
   memories_.emplace_back().hold(points_);
   volumes_.push_back({fields_.back().field(), frame, memories_.back().places()});
   query_.emplace(kernels_, points_, volumes_);
-  query_->turn({});
+  query_->orient({});
 }
 
 template <class N>
@@ -39,11 +39,11 @@ GuidedTool<N>::GuidedTool(const SampledTool& tool, const Body& body, Point start
     : rig_(tool, body, iso), pose_{place_of<N>(start), {}}, friction_(friction) {}
 
 template <class N>
-Point GuidedTool<N>::tick(Point hand, const Orientation<N>& turn) {
+Point GuidedTool<N>::tick(Point hand, const Orientation<N>& orientation) {
   rig_.field().begin_tick();
   swept_ =
       ProxySweep<N, ContactQuery<N>>(rig_.field(), pose_, memory_, friction_, rig_.rotation_step())
-          .tick({place_of<N>(hand), turn});
+          .tick({place_of<N>(hand), orientation});
   most_queries_ = std::max(most_queries_, swept_.queries);
   return proxy() - hand;
 }

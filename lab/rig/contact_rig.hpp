@@ -89,7 +89,7 @@ class GuidedTool {
              Density iso = kIso);
 
   /// The spring from the hand to the proxy: the force over the stiffness.
-  Point tick(Point hand, const Orientation<N>& turn = {});
+  Point tick(Point hand, const Orientation<N>& orientation = {});
 
   /// Moves the proxy to a free position.
   void start(Point at) { pose_.centre = place_of<N>(at); }
@@ -169,16 +169,16 @@ class ShaftRig {
   ProxyContact<N> follow(const ProxyPlan<N>& plan, ProxyState<N>& state, const ProxyPose<N>& goal) {
     return kerf::follow<N>(plan, state, *field_, goal);
   }
-  ProxyContact<N> tick(Point hand, const Orientation<N>& turn = {}) {
+  ProxyContact<N> tick(Point hand, const Orientation<N>& orientation = {}) {
     field_->begin_tick();
     return follow({.rotation_step = rotation_step(), .ramp_per_tick = typename N::Real(1)}, state_,
-                  {place_of<N>(hand), turn});
+                  {place_of<N>(hand), orientation});
   }
   /// The last of so many ticks along a line.
-  ProxyContact<N> lead(Point from, Point to, int ticks, const Orientation<N>& turn = {}) {
+  ProxyContact<N> lead(Point from, Point to, int ticks, const Orientation<N>& orientation = {}) {
     ProxyContact<N> contact;
     for (int i = 1; i <= ticks; ++i) {
-      contact = tick(from + (double(i) / ticks) * (to - from), turn);
+      contact = tick(from + (double(i) / ticks) * (to - from), orientation);
     }
     return contact;
   }
@@ -204,10 +204,12 @@ class ShaftRig {
 /// units above `at`, along `up`, to one unit below.
 template <class N>
 [[nodiscard]] Point rest_of(const SampledTool& tool, const Body& body, Point at, Point up,
-                            const Orientation<N>& turn = {}, double off = 1.5, Density iso = kIso) {
+                            const Orientation<N>& orientation = {}, double off = 1.5,
+                            Density iso = kIso) {
   GuidedTool<N> guided(tool, body, at + off * up, 0, iso);
   constexpr int kTicks = 20;
-  for (int i = 0; i <= kTicks; ++i) guided.tick(at + (off - (off + 1) * i / kTicks) * up, turn);
+  for (int i = 0; i <= kTicks; ++i)
+    guided.tick(at + (off - (off + 1) * i / kTicks) * up, orientation);
   return guided.proxy();
 }
 

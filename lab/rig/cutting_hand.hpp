@@ -18,11 +18,11 @@ namespace kerf::extremes {
 
 /// A servo that cuts by force, led by a hand that ignores it, and the two sides of its balance: the
 /// volume removed, and SUM G F T of material without a label.
-class Miller {
+class CuttingHand {
  public:
   /// From the inkwell around the solid and down on `start_mm`; the force is faded in
   /// and the spindle up to speed then. Volumes are low and about the device's origin.
-  explicit Miller(LoadedScene scene, const std::array<double, 3>& start_mm = {0, 1.3, 0})
+  explicit CuttingHand(LoadedScene scene, const std::array<double, 3>& start_mm = {0, 1.3, 0})
       : tick_s_(1.0 / scene.servo.rate_hz),
         threshold_n_(scene.cut.threshold_n),
         machinability_(scene.cut.machinability_mm3_per_s_n) {
@@ -81,7 +81,7 @@ class Miller {
   double tick_s_, threshold_n_, machinability_;
   std::vector<double> mm3_per_step_;
   std::unique_ptr<Servo> servo_;
-  FakeArm arm_;
+  KinematicOmni arm_;
   Point at_mm_{};
   double removed_mm3_ = 0, fed_mm3_ = 0;
 };
@@ -89,13 +89,13 @@ class Miller {
 /// The volume that a hand removes from a flat at height 0 in half a second by a given force, up to
 /// 1.2 N and back, mm^3.
 inline double removed_by_press(const LoadedScene& scene) {
-  Miller miller(scene);
+  CuttingHand miller(scene);
   constexpr double kSeconds = 0.5, kMeanN = 0.6;
   const int ticks = static_cast<int>(kSeconds * scene.servo.rate_hz);
   double proxy_mm = 1;
   for (int i = 0; i < ticks; ++i) {
-    const double turn = 2 * std::numbers::pi * (i + 0.5) / ticks;
-    const double force_n = kMeanN * (1 - std::cos(turn));
+    const double angle = 2 * std::numbers::pi * (i + 0.5) / ticks;
+    const double force_n = kMeanN * (1 - std::cos(angle));
     const ServoOutput out =
         miller.step({0, proxy_mm - force_n / scene.force.stiffness_n_per_mm, 0});
     proxy_mm = out.position_mm[1] + out.proxy_offset_mm[1];
@@ -114,7 +114,7 @@ struct SunkForce {
 
 /// A count of the encoders is a step of the hand and not of the cut: such ticks do not count for
 /// the step. The miller is above the position.
-inline SunkForce sink(Miller& miller, double x_mm = 0, double z_mm = 0) {
+inline SunkForce sink(CuttingHand& miller, double x_mm = 0, double z_mm = 0) {
   constexpr int kSinkMs = 500, kMs = 2500, kFeltMs = 200;
   double sum_n = 0, largest_n = 0, last_n = 0;
   std::array<double, 3> last_mm{};

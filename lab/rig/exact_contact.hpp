@@ -124,8 +124,8 @@ class ShaftTouch {
     const Point x = unit(cross(down, std::abs(down[0]) < 0.7 ? Point{1, 0, 0} : Point{0, 1, 0}));
     const Point y = cross(down, x);
     const double across = std::sqrt(1 - along * along);
-    const double turn = i * std::numbers::pi * (3 - std::sqrt(5.0));
-    return along * down + across * std::cos(turn) * x + across * std::sin(turn) * y;
+    const double angle = i * std::numbers::pi * (3 - std::sqrt(5.0));
+    return along * down + across * std::cos(angle) * x + across * std::sin(angle) * y;
   }
 
   /// How much deeper the shaft gets by one voxel along a way, in voxels; 1 if that is more than

@@ -48,9 +48,9 @@ Point normal_of(const ConstraintPlane<N>& plane) {
 }
 
 /// Random numbers, the same sequence on every machine.
-class Dice {
+class RandomNumbers {
  public:
-  explicit Dice(std::uint64_t seed) : random_(seed) {}
+  explicit RandomNumbers(std::uint64_t seed) : random_(seed) {}
 
   double uniform(double low, double high) {
     return low + (high - low) * static_cast<double>(random_() >> 11) * 0x1p-53;
@@ -65,7 +65,7 @@ class Dice {
   Point across(Point n) { return unit(cross(n, direction())); }
   /// About a random axis.
   template <class N>
-  Orientation<N> turn(double angle_rad) {
+  Orientation<N> rotation(double angle_rad) {
     using Unit = typename N::Unit;
     const Point axis = std::sin(angle_rad / 2) * direction();
     return {Unit(axis[0]), Unit(axis[1]), Unit(axis[2]), Unit(std::cos(angle_rad / 2))};
@@ -79,10 +79,10 @@ class Dice {
 struct Frame {
   Point place, up, along, across;
 
-  Frame(Dice& dice, Point about)
-      : place(about + Point{dice.uniform(0, 1), dice.uniform(0, 1), dice.uniform(0, 1)}),
-        up(dice.direction()),
-        along(dice.across(up)),
+  Frame(RandomNumbers& random, Point about)
+      : place(about + Point{random.uniform(0, 1), random.uniform(0, 1), random.uniform(0, 1)}),
+        up(random.direction()),
+        along(random.across(up)),
         across(cross(up, along)) {}
   /// Coordinates in the frame.
   [[nodiscard]] Point of(Point p) const {
@@ -109,7 +109,7 @@ class CtEdge {
     return r * std::cos(2 * std::numbers::pi * dice_.uniform(0, 1));
   }
 
-  Dice dice_{9};
+  RandomNumbers dice_{9};
 };
 
 /// A volume of densities, and its size. Its voxels are units, the first at the origin.
@@ -151,7 +151,7 @@ struct Axes {
   Point x, y, z;
 
   template <class N>
-  [[nodiscard]] Orientation<N> turn() const {
+  [[nodiscard]] Orientation<N> orientation() const {
     using Unit = typename N::Unit;
     RotationRows<N> rows;
     for (std::size_t i = 0; i < 3; ++i) rows[i] = {Unit(x[i]), Unit(y[i]), Unit(z[i])};
@@ -163,8 +163,8 @@ struct Axes {
   [[nodiscard]] Point to_world(Point tool) const { return tool[0] * x + tool[1] * y + tool[2] * z; }
 };
 
-[[nodiscard]] inline Axes standing_on(Point axis, Dice& dice) {
-  const Point across = dice.across(axis);
+[[nodiscard]] inline Axes standing_on(Point axis, RandomNumbers& random) {
+  const Point across = random.across(axis);
   return {across, axis, cross(across, axis)};
 }
 

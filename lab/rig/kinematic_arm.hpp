@@ -21,7 +21,7 @@
 namespace kerf {
 
 /// An Omni at any position, with the counts that it has after power-up.
-class FakeArm {
+class KinematicOmni {
  public:
   /// The stylus in the inkwell, buttons up, gimbal centred.
   [[nodiscard]] DeviceReport docked() {
@@ -67,7 +67,7 @@ class FakeArm {
 inline constexpr int kDockTicks = 60;  ///< enough rest in the inkwell to be calibrated at 1 kHz
 
 /// Docks, leaves the inkwell, waits there until the force is faded in.
-inline void arm_at(Servo& servo, FakeArm& arm, double x_mm, double y_mm, double z_mm,
+inline void arm_at(Servo& servo, KinematicOmni& arm, double x_mm, double y_mm, double z_mm,
                    int ticks = 1) {
   for (int tick = 0; tick < kDockTicks * ticks; ++tick) static_cast<void>(servo.step(arm.docked()));
   // The move from the inkwell is slow enough for the speed limit: held far away, then close.
@@ -89,11 +89,11 @@ namespace kerf::ranges {
 
 /// A hand on any device: reports of joint counts, rounded to whole ones. A position out of reach
 /// gives the nearest angles.
-class CountHand {
+class KinematicHand {
  public:
   using Counts = std::array<double, 3>;
 
-  explicit CountHand(const DeviceSettings& device) : device_(device) {}
+  explicit KinematicHand(const DeviceSettings& device) : device_(device) {}
 
   [[nodiscard]] Counts counts_at(DeviceVec<double> tip_mm) const {
     Counts counts{};

@@ -90,7 +90,7 @@ class Rider {
 
  private:
   std::unique_ptr<Servo> servo_;
-  FakeArm arm_;
+  KinematicOmni arm_;
   Place at_mm_{};
 };
 

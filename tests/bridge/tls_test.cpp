@@ -141,7 +141,8 @@ TEST_CASE("join verifies the server's certificate: its CA, host, time or fingerp
            {"cert.pem", "", own, "joined"},
            {"cert.pem", strange, "", "--ca " + strange + " does not vouch for it ("},
            {"cert.pem", "", "",
-            "nobody vouches for its certificate; if serve prints the same, add "
+            "no authority that this machine knows signed its certificate; if serve prints the "
+            "same, add "
             "--fingerprint " +
                 own},
            {"cert.pem", "", old, "its certificate has another fingerprint, " + own},

@@ -122,7 +122,7 @@ bool make_scene(Bytes& in, kerf::LoadedScene& scene) {
 }
 
 /// What the device says next.
-void change(Bytes& in, kerf::FakeArm& arm, kerf::DeviceReport& report) {
+void change(Bytes& in, kerf::KinematicOmni& arm, kerf::DeviceReport& report) {
   const std::uint8_t how = in.next();
   switch (how % 5) {
     case 0:  // led anywhere near
@@ -182,7 +182,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   } catch (const kerf::LoadError&) {
     return 0;
   }
-  kerf::FakeArm arm;
+  kerf::KinematicOmni arm;
   kerf::arm_at(*servo, arm, 0, 5, 0, std::max(1, scene.servo.rate_hz / 1000));
   kerf::DeviceReport report = arm.at(0, 5, 0);
   constexpr int kMostTicks = 200;  // one costs up to 5 ms here

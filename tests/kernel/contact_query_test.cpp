@@ -68,11 +68,12 @@ struct Rest {
 template <class N>
 Rest rest_on(const Solid& body_under, int places) {
   static const SceneTool ball = tool_of_units("ball", kRadius, 2 * kRadius);
-  Dice dice(3);
+  RandomNumbers random(3);
   Rest found;
   for (int i = 0; i < places; ++i) {
-    const Point n = dice.direction(), b = dice.across(n);
-    const Point centre{13 + dice.uniform(0, 1), 13 + dice.uniform(0, 1), 13 + dice.uniform(0, 1)};
+    const Point n = random.direction(), b = random.across(n);
+    const Point centre{13 + random.uniform(0, 1), 13 + random.uniform(0, 1),
+                       13 + random.uniform(0, 1)};
     const Point p = centre - body_under.rest * n;
     const TestVolume volume =
         blurred({28, 28, 28}, [&](const Point& x) { return body_under.distance(n, b, x - p); });
@@ -128,9 +129,9 @@ TEST_CASE_TEMPLATE("thin things hold a ball too", N, FixedNumbers, DoubleNumbers
 TEST_CASE_TEMPLATE("sliding over a ball of 40 the height is steady and the normal true", N,
                    FixedNumbers, DoubleNumbers) {
   const SceneTool ball = tool_of_units("ball", kRadius, 2 * kRadius);
-  Dice dice(5);
+  RandomNumbers random(5);
   for (int path = 0; path < 3; ++path) {
-    const Point n = dice.direction(), along = dice.across(n);
+    const Point n = random.direction(), along = random.across(n);
     const Point middle = Point{15.2, 15.4, 15.7} - (40 + kRadius) * n;
     const TestVolume volume =
         blurred({32, 32, 32}, [&](const Point& x) { return length(x - middle) - 40; });
@@ -156,16 +157,17 @@ TEST_CASE_TEMPLATE("sliding over a ball of 40 the height is steady and the norma
 TEST_CASE("fixed point feels what double feels, on noise as well") {
   const SceneTool tools[] = {tool_of_units("ball", kRadius, 2 * kRadius),
                              tool_of_units("cylinder", 5, 16)};
-  Dice dice(7);
+  RandomNumbers random(7);
   for (const SceneTool& tool : tools) {
     double worst_height = 0, worst_deg = 0;
     for (int i = 0; i < 120; ++i) {
-      const Point n = dice.direction();
+      const Point n = random.direction();
       const double noise = i % 3 == 0 ? 0.02 : 0, rise = std::abs(n[1]);
       const double support = tool.round ? 8 : 8 * rise + 5 * std::sqrt(1 - rise * rise);
-      const Point centre{15 + dice.uniform(0, 1), 15 + dice.uniform(0, 1), 15 + dice.uniform(0, 1)};
+      const Point centre{15 + random.uniform(0, 1), 15 + random.uniform(0, 1),
+                         15 + random.uniform(0, 1)};
       const TestVolume volume = blurred({32, 32, 32}, [&](const Point& x) {
-        return dot(n, x - centre) + support - 0.3 + dice.uniform(-noise, noise);
+        return dot(n, x - centre) + support - 0.3 + random.uniform(-noise, noise);
       });
       QueryRig<FixedNumbers> fixed(tool, volume);
       QueryRig<DoubleNumbers> real(tool, volume);
@@ -188,20 +190,21 @@ TEST_CASE("fixed point feels what double feels, on noise as well") {
 TEST_CASE_TEMPLATE("a turned cylinder rests on rim, side and face", N, FixedNumbers,
                    DoubleNumbers) {
   const SceneTool cylinder = tool_of_units("cylinder", 5, 16);
-  Dice dice(3);
+  RandomNumbers random(3);
   double mean = 0;
   constexpr int kPlaces = 100;
   for (int i = 0; i < kPlaces; ++i) {
-    const Point n = dice.direction();
+    const Point n = random.direction();
     // The tool's axis anywhere, then along n, then across it.
-    const Point axis = i % 4 == 0 ? n : i % 4 == 1 ? dice.across(n) : dice.direction();
+    const Point axis = i % 4 == 0 ? n : i % 4 == 1 ? random.across(n) : random.direction();
     const double rise = std::abs(dot(n, axis));
     const double support = 8 * rise + 5 * std::sqrt(1 - std::min(1.0, rise * rise));
-    const Point centre{15 + dice.uniform(0, 1), 15 + dice.uniform(0, 1), 15 + dice.uniform(0, 1)};
+    const Point centre{15 + random.uniform(0, 1), 15 + random.uniform(0, 1),
+                       15 + random.uniform(0, 1)};
     const TestVolume volume =
         blurred({32, 32, 32}, [&](const Point& x) { return dot(n, x - centre) + support; });
     QueryRig<N> rig(cylinder, volume);
-    rig.turn(turned_to(axis, dice));
+    rig.orient(turned_to(axis, random));
     const double offset = rig.rest(centre, n);
     mean += offset / kPlaces;
     CHECK(std::abs(offset) < 0.075);
@@ -229,20 +232,21 @@ TEST_CASE_TEMPLATE("every shape rests on planes whatever its pose", N, FixedNumb
                         {"cylinder", 1, 12}}) {
     const SceneTool tool = tool_of_units(c.shape, c.radius, c.length);
     const auto profile = tool_profile(tool, 512);
-    Dice dice(11);
+    RandomNumbers random(11);
     double mean = 0;
     constexpr int kPlaces = 30;
     for (int i = 0; i < kPlaces; ++i) {
-      const Point n = dice.direction(), axis = dice.direction();
+      const Point n = random.direction(), axis = random.direction();
       const double rise = dot(n, axis), across = std::sqrt(1 - rise * rise);
       double support = 0;
       for (const auto& [y, radius] : profile)
         support = std::max(support, radius * across - y * rise);
-      const Point centre{14 + dice.uniform(0, 1), 14 + dice.uniform(0, 1), 14 + dice.uniform(0, 1)};
+      const Point centre{14 + random.uniform(0, 1), 14 + random.uniform(0, 1),
+                         14 + random.uniform(0, 1)};
       const TestVolume volume =
           blurred({30, 30, 30}, [&](const Point& x) { return dot(n, x - centre) + support; });
       QueryRig<N> rig(tool, volume);
-      rig.turn(turned_to(axis, dice));
+      rig.orient(turned_to(axis, random));
       const double offset = rig.rest(centre, n);
       CAPTURE(std::string(c.shape));
       CHECK(std::abs(offset) < 0.075);
@@ -272,10 +276,10 @@ SceneTool blade(std::size_t axis) {
 }
 
 /// Axes of a tool whose face `sign` across `axis` looks along -up.
-Axes facing(std::size_t axis, double sign, const Point& up, Dice& dice) {
+Axes facing(std::size_t axis, double sign, const Point& up, RandomNumbers& random) {
   Point along[3];
   along[axis] = -sign * up;
-  along[(axis + 1) % 3] = dice.across(up);
+  along[(axis + 1) % 3] = random.across(up);
   along[(axis + 2) % 3] = cross(along[axis], along[(axis + 1) % 3]);
   return {along[0], along[1], along[2]};
 }
@@ -288,20 +292,20 @@ TEST_CASE_TEMPLATE("either face of a thin tool touches a bump where it is, with 
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const SampledTool tool(blade(axis));
     for (const double sign : {-1.0, 1.0}) {
-      Dice dice(3);
-      const Point up = dice.direction(), top{20, 20, 20};
+      RandomNumbers random(3);
+      const Point up = random.direction(), top{20, 20, 20};
       const TestVolume bump =
           blurred({40, 40, 40}, [&](Point p) { return length(p - top + kBump * up) - kBump; });
       ContactRig<N> rig(tool, bump);
-      const Axes axes = facing(axis, sign, up, dice);
-      rig.field().turn(axes.turn<N>());
+      const Axes axes = facing(axis, sign, up, random);
+      rig.field().orient(axes.orientation<N>());
       double turned = 0, beside = 0;
       for (int i = 0; i < 60; ++i) {
         Point touching{};
         touching[axis] = sign * kThin / 2;
-        touching[(axis + 1) % 3] = dice.uniform(-4, 4);
-        touching[(axis + 2) % 3] = dice.uniform(-4, 4);
-        const Point centre = top - axes.to_world(touching) + dice.uniform(-0.05, 0.05) * up;
+        touching[(axis + 1) % 3] = random.uniform(-4, 4);
+        touching[(axis + 2) % 3] = random.uniform(-4, 4);
+        const Point centre = top - axes.to_world(touching) + random.uniform(-0.05, 0.05) * up;
         const Contacts<N> felt = rig.field().query(place_of<N>(centre));
         REQUIRE(felt.count == 1);
         turned = std::max(turned, degrees_between(normal_of(felt.plane[0]), up));
@@ -321,14 +325,14 @@ TEST_CASE_TEMPLATE("a face that lies on a flat is held in its middle, on noise t
        {mesh_of_units("block", prism(11.3, 16, 4)), tool_of_units("cylinder", 8, 16)}) {
     const SampledTool tool(block);
     for (const double noise : {0.0, 0.02}) {
-      Dice dice(3);
-      const Point up = dice.direction(), top{30, 30, 30};
+      RandomNumbers random(3);
+      const Point up = random.direction(), top{30, 30, 30};
       const TestVolume flat = body_of({60, 60, 60}, [&](Point p) {
-        return 0.5 - dot(p - top, up) / 2 + std::sqrt(3) * dice.uniform(-noise, noise);
+        return 0.5 - dot(p - top, up) / 2 + std::sqrt(3) * random.uniform(-noise, noise);
       });
       ContactRig<N> rig(tool, flat);
-      const Axes axes = facing(1, -1, up, dice);
-      rig.field().turn(axes.turn<N>());
+      const Axes axes = facing(1, -1, up, random);
+      rig.field().orient(axes.orientation<N>());
       double turned = 0, beside = 0, steps = 0;
       Point last{};
       for (int i = 0; i < 200; ++i) {
@@ -395,25 +399,25 @@ TEST_CASE_TEMPLATE(
     "a sphere meets nothing on its free way, ends where something is, and looks as "
     "often as it enters bricks",
     N, FixedNumbers, DoubleNumbers) {
-  Dice dice(3);
+  RandomNumbers random(3);
   int whole = 0, none = 0, part = 0;
   for (int i = 0; i < cases(400); ++i) {
     std::vector<Density> density(kGrid.voxel_count(), 0);
     std::vector<Point> hot;
     for (int k = 0; k < i % 7 * 5; ++k) {
-      const Point v{std::floor(dice.uniform(0, 50)), std::floor(dice.uniform(0, 40)),
-                    std::floor(dice.uniform(0, 45))};
+      const Point v{std::floor(random.uniform(0, 50)), std::floor(random.uniform(0, 40)),
+                    std::floor(random.uniform(0, 45))};
       density[kGrid.index(int(v[0]), int(v[1]), int(v[2]))] = 9;
       hot.push_back(v);
     }
     const FreeBrickMap map(kGrid, density, 9);
     for (int k = 0; k < 10; ++k) {
       // Inside, outside, across; along an axis, not at all and far.
-      const Point from{dice.uniform(-20, 70), dice.uniform(-20, 60), dice.uniform(-20, 65)};
-      Point move = (k == 0 ? 2000 : dice.uniform(1, 90)) * dice.direction();
+      const Point from{random.uniform(-20, 70), random.uniform(-20, 60), random.uniform(-20, 65)};
+      Point move = (k == 0 ? 2000 : random.uniform(1, 90)) * random.direction();
       if (k == 1) move[0] = move[2] = 0;
       if (k == 2) move = {};
-      const double radius = dice.uniform(0, 6), size = std::max(1.0, length(move));
+      const double radius = random.uniform(0, 6), size = std::max(1.0, length(move));
       const FreeSpaceMap bricks = map.bricks();
       const FreePath<N> way(bricks, {number<N>(move[0]), number<N>(move[1]), number<N>(move[2])},
                             number<N>(size + 0.001));

@@ -22,8 +22,8 @@ Orientation<N> tool_turn(const std::array<Point, 3>& rotation) {
 }
 
 /// Rows of the rotation that takes the tool's y axis to `axis`.
-inline std::array<Point, 3> turned_to(const Point& axis, Dice& dice) {
-  const Point a = dice.across(axis), b = cross(a, axis);
+inline std::array<Point, 3> turned_to(const Point& axis, RandomNumbers& random) {
+  const Point a = random.across(axis), b = cross(a, axis);
   return {{{a[0], axis[0], b[0]}, {a[1], axis[1], b[1]}, {a[2], axis[2], b[2]}}};
 }
 
@@ -33,7 +33,9 @@ class QueryRig : public ContactRig<N> {
  public:
   using ContactRig<N>::ContactRig;
 
-  void turn(const std::array<Point, 3>& rotation) { this->field().turn(tool_turn<N>(rotation)); }
+  void orient(const std::array<Point, 3>& rotation) {
+    this->field().orient(tool_turn<N>(rotation));
+  }
   [[nodiscard]] Contacts<N> at(const Point& q) { return this->field().query(place_of<N>(q)); }
   [[nodiscard]] double free_distance(const Point& q, const Point& move) {
     return double(this->field().free_distance(place_of<N>(q), place_of<N>(move)));

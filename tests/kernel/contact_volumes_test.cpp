@@ -41,13 +41,13 @@ const SceneTool kBall = tool_of_units("ball", 8, 16);
 
 TEST_CASE_TEMPLATE("turned volumes of long voxels feel like upright ones", N, FixedNumbers,
                    DoubleNumbers) {
-  Dice dice(2);
+  RandomNumbers random(2);
   for (int i = 0; i < 20; ++i) {
-    const Point n = dice.direction();
-    const std::array<Point, 3> axes = turned_to(dice.direction(), dice);
-    const Point edge{1, dice.uniform(1, 1.5), dice.uniform(1, 2)};
+    const Point n = random.direction();
+    const std::array<Point, 3> axes = turned_to(random.direction(), random);
+    const Point edge{1, random.uniform(1, 1.5), random.uniform(1, 2)};
     const SceneTool tool = i % 2 == 0 ? kBall : tool_of_units("cylinder", 5, 16);
-    const Point tool_axis = i % 4 == 1 ? n : dice.across(n);
+    const Point tool_axis = i % 4 == 1 ? n : random.across(n);
     const double support = tool.round || tool_axis == n ? 8 : 5;
     // Contact space begins in the middle of the volume; the plane is `support` below.
     // The edge of the density is two voxels wide where they are longest.
@@ -61,7 +61,7 @@ TEST_CASE_TEMPLATE("turned volumes of long voxels feel like upright ones", N, Fi
     const TestVolume volume = blurred({30, 30, 30}, height, 4);
     QueryRig<N> rig(tool);
     rig.add(volume, frame_of<N>(axes, edge, {14.5, 14.5, 14.5}));
-    rig.turn(turned_to(tool_axis, dice));
+    rig.orient(turned_to(tool_axis, random));
     const double offset = rig.rest({0, 0, 0}, n);
     CHECK(std::abs(offset) < 0.09);
     const Contacts<N> felt = rig.at(offset * n);
@@ -156,7 +156,7 @@ TEST_CASE_TEMPLATE("far from every volume nothing is felt", N, FixedNumbers, Dou
 
 TEST_CASE_TEMPLATE("within the free distance a tool feels nothing", N, FixedNumbers,
                    DoubleNumbers) {
-  Dice dice(8);
+  RandomNumbers random(8);
   const Point middle{20, 25, 20};
   const TestVolume volume =
       blurred({60, 50, 60}, [&](const Point& x) { return length(x - middle) - 6; });
@@ -164,12 +164,12 @@ TEST_CASE_TEMPLATE("within the free distance a tool feels nothing", N, FixedNumb
     QueryRig<N> rig(tool, volume);
     int free = 0, stopped = 0;
     for (int i = 0; i < cases(1000); ++i) {
-      const Point axis = dice.direction();
-      rig.turn(turned_to(axis, dice));
-      const Point q{dice.uniform(-20, 80), dice.uniform(-20, 70), dice.uniform(-20, 80)};
+      const Point axis = random.direction();
+      rig.orient(turned_to(axis, random));
+      const Point q{random.uniform(-20, 80), random.uniform(-20, 70), random.uniform(-20, 80)};
       // Anywhere, and close by the middle.
-      const Point move = i % 2 == 0 ? dice.uniform(0.1, 60) * dice.direction()
-                                    : middle + 12.0 * dice.direction() - q;
+      const Point move = i % 2 == 0 ? random.uniform(0.1, 60) * random.direction()
+                                    : middle + 12.0 * random.direction() - q;
       static_cast<void>(rig.at(q));
       const double distance = rig.free_distance(q, move);
       CHECK(distance <= length(move) + 1e-4);
@@ -252,7 +252,7 @@ TEST_CASE_TEMPLATE(
       CHECK(queries >= (tool.round ? QueryWork::kLeastQueries : 8));
       CHECK(queries <= 25);
     }
-    rig.field().turn({});
+    rig.field().orient({});
     CHECK(answered() == 1);
   }
 }
@@ -260,16 +260,16 @@ TEST_CASE_TEMPLATE(
 TEST_CASE_TEMPLATE("all volumes of a query are looked at alike, while the tick has some left", N,
                    FixedNumbers, DoubleNumbers) {
   const SampledTool cylinder(tool_of_units("cylinder", 5, 16));
-  Dice dice(4);
+  RandomNumbers random(4);
   for (int pose = 0; pose < 20; ++pose) {
-    const Point n = dice.direction(), top{20, 20, 20};
+    const Point n = random.direction(), top{20, 20, 20};
     const TestVolume flat = blurred({40, 40, 40}, [&](Point p) { return dot(p - top, n); });
     ContactRig<N> rig(cylinder);
     for (int copy = 0; copy < 3; ++copy) rig.add(flat, plain_frame<N>());
-    rig.field().turn(dice.turn<N>(dice.uniform(0, 3)));
-    const auto place = place_of<N>(top + dice.uniform(4, 8) * n);
+    rig.field().orient(random.rotation<N>(random.uniform(0, 3)));
+    const auto place = place_of<N>(top + random.uniform(4, 8) * n);
     rig.field().begin_tick();
-    rig.field().turn(dice.turn<N>(0));
+    rig.field().orient(random.rotation<N>(0));
     for (Contacts<N> felt = rig.field().query(place); !felt.no_normal;
          felt = rig.field().query(place)) {
       for (std::int32_t k = 1; k < felt.count; ++k) {
@@ -289,12 +289,12 @@ TEST_CASE_TEMPLATE("no tick of a sweep spends more than a scene is planned with"
     ContactRig<N> rig(tool);
     rig.add(tissue, plain_frame<N>());
     const QueryWork work = rig.field().work();
-    Dice dice(7);
+    RandomNumbers random(7);
     std::int64_t most = 0;
     for (int tick = 0; tick < 300; ++tick) {
       ProxyPose<N> pose{place_of<N>(middle), {}};
-      const ProxyPose<N> goal{place_of<N>(middle + dice.uniform(1, 30) * dice.direction()),
-                              dice.turn<N>(dice.uniform(0, 3))};
+      const ProxyPose<N> goal{place_of<N>(middle + random.uniform(1, 30) * random.direction()),
+                              random.rotation<N>(random.uniform(0, 3))};
       rig.field().begin_tick();
       SweepMemory<N> memory;
       ProxySweep<N, ContactQuery<N>>(rig.field(), pose, memory, {}, rig.rotation_step()).tick(goal);

@@ -41,34 +41,35 @@ bool same(const Sums& a, const Sums& b) {
 
 /// Some samples of a sphere, the last group not full.
 PointShellTable<FixedNumbers> some_shell(int count, double radius, bool round) {
-  Dice dice(static_cast<std::uint32_t>(count));
+  RandomNumbers random(static_cast<std::uint32_t>(count));
   std::vector<Point> samples;
-  for (int i = 0; i < count; ++i) samples.push_back(radius * dice.direction());
+  for (int i = 0; i < count; ++i) samples.push_back(radius * random.direction());
   return PointShellTable<FixedNumbers>(samples, round);
 }
 
 /// Any densities, or walls of them between air.
-TestVolume hard_field(const VoxelGrid& grid, int kind, Dice& dice) {
+TestVolume hard_field(const VoxelGrid& grid, int kind, RandomNumbers& random) {
   return made_of(grid, [&](std::int32_t x, std::int32_t y, std::int32_t z) -> Density {
     switch (kind) {
       case 0:
-        return static_cast<Density>(dice.uniform(0, 65536));
+        return static_cast<Density>(random.uniform(0, 65536));
       case 1:
-        return dice.uniform(0, 1) < 0.5 ? 0 : 65535;
+        return random.uniform(0, 1) < 0.5 ? 0 : 65535;
       case 2:
         return 65535;
       case 3:
         return (x + y + z) % 2 == 0 ? 65535 : 0;
       default:
-        return x < grid.nx / 3 ? static_cast<Density>(dice.uniform(0, 65536)) : Density{0};
+        return x < grid.nx / 3 ? static_cast<Density>(random.uniform(0, 65536)) : Density{0};
     }
   });
 }
 
-PointStep<FixedNumbers> any_step(const PointShell<FixedNumbers>& point_shell, Dice& dice) {
-  const std::array<Point, 3> rotation = turned_to(dice.direction(), dice);
+PointStep<FixedNumbers> any_step(const PointShell<FixedNumbers>& point_shell,
+                                 RandomNumbers& random) {
+  const std::array<Point, 3> rotation = turned_to(random.direction(), random);
   const double stretch =
-      std::ldexp(double(point_shell.reach), point_shell.step_bits) * dice.uniform(0.2, 1);
+      std::ldexp(double(point_shell.reach), point_shell.step_bits) * random.uniform(0.2, 1);
   PointStep<FixedNumbers> step;
   step.shift = point_shell.step_bits - 1;
   for (std::size_t i = 0; i < 3; ++i) {
@@ -82,11 +83,11 @@ PointStep<FixedNumbers> any_step(const PointShell<FixedNumbers>& point_shell, Di
 }  // namespace
 
 TEST_CASE("every instruction set sums a point point_shell to the bit, wherever it is") {
-  Dice dice(1);
+  RandomNumbers random(1);
   int felt = 0, skipped = 0;
   for (const VoxelGrid grid : {VoxelGrid{33, 20, 18}, {2, 2, 2}, {9, 40, 3}, {60, 12, 12}}) {
     for (int kind = 0; kind < 5; ++kind) {
-      const TestVolume volume = hard_field(grid, kind, dice);
+      const TestVolume volume = hard_field(grid, kind, random);
       for (const int count : {1, 16, 47, 96}) {
         const bool round = count % 2 == 0;
         const PointShellTable<FixedNumbers> tool = some_shell(count, count == 1 ? 0.5 : 4.5, round);
@@ -96,18 +97,18 @@ TEST_CASE("every instruction set sums a point point_shell to the bit, wherever i
         truth_memory.hold(point_shell);
         const std::int32_t whole = count / kPointGroup * kPointGroup;  // groups to be read
         const auto room = static_cast<std::size_t>(whole);
-        const Density iso = kind == 2 ? 65535 : static_cast<Density>(dice.uniform(1, 65536));
+        const Density iso = kind == 2 ? 65535 : static_cast<Density>(random.uniform(1, 65536));
         const DensityField all{grid, volume.density.data(), density_scale(iso), {}};
         const FreeBrickMap map(grid, volume.density, 1);
         DensityField field = all;
         field.free = map.bricks();
         for (int i = 0; i < cases(1250); ++i) {
-          const PointStep<FixedNumbers> step = any_step(point_shell, dice);
+          const PointStep<FixedNumbers> step = any_step(point_shell, random);
           transform_points<FixedNumbers>(point_shell.table, step, truth_memory.places());
           const double out = i % 3 == 0 ? 7 : -1;  // across the border, or inside
-          const Q16 at[3] = {Q16(dice.uniform(-out, grid.nx + out)),
-                             Q16(dice.uniform(-out, grid.ny + out)),
-                             Q16(dice.uniform(-out, grid.nz + out))};
+          const Q16 at[3] = {Q16(random.uniform(-out, grid.nx + out)),
+                             Q16(random.uniform(-out, grid.ny + out)),
+                             Q16(random.uniform(-out, grid.nz + out))};
           std::int32_t centre[3] = {at[0].raw(), at[1].raw(), at[2].raw()};
           if (i % 4 == 1) centre[0] |= 0xffff;
           if (i % 4 == 2) centre[1] &= ~0xffff;
@@ -184,8 +185,8 @@ TEST_CASE("a volume without a cell is not felt") {
     for (auto set = kernel_sets(); *set != nullptr; ++set) {
       TransformedShell<FixedNumbers> memory;
       memory.hold(point_shell);
-      Dice dice(1);
-      (*set)->transform_points(point_shell.table, any_step(point_shell, dice), memory.places());
+      RandomNumbers random(1);
+      (*set)->transform_points(point_shell.table, any_step(point_shell, random), memory.places());
       const std::int32_t centre[3] = {0, 2 << 16, 2 << 16};
       Sums sums;
       (*set)->sum_points(point_shell.table, memory.places(), centre,
@@ -202,11 +203,11 @@ TEST_CASE("beside a volume that is solid to its border nothing is read") {
   const TestVolume volume = filled(grid, 65535);
   const FreeBrickMap map(grid, volume.density, 1);
   const DensityField field{grid, volume.density.data(), density_scale(32768), map.bricks()};
-  Dice dice(6);
+  RandomNumbers random(6);
   for (auto set = kernel_sets(); *set != nullptr; ++set) {
     TransformedShell<FixedNumbers> memory;
     memory.hold(point_shell);
-    (*set)->transform_points(point_shell.table, any_step(point_shell, dice), memory.places());
+    (*set)->transform_points(point_shell.table, any_step(point_shell, random), memory.places());
     // The sphere about a group of any samples is no wider than the tool.
     for (const int from_border : {-8, 0, 20, 60, 300, 6000}) {
       CAPTURE(from_border);
@@ -230,8 +231,8 @@ TEST_CASE("at the end of the places that there are nothing is felt and nothing r
     for (auto set = kernel_sets(); *set != nullptr; ++set) {
       TransformedShell<FixedNumbers> memory;
       memory.hold(point_shell);
-      Dice dice(1);
-      (*set)->transform_points(point_shell.table, any_step(point_shell, dice), memory.places());
+      RandomNumbers random(1);
+      (*set)->transform_points(point_shell.table, any_step(point_shell, random), memory.places());
       const std::int32_t centre[3] = {x, x, x};
       Sums sums;
       (*set)->sum_points(point_shell.table, memory.places(), centre,
@@ -309,24 +310,26 @@ std::unique_ptr<Samples> taken(const DenseSamples<FixedNumbers>& cells, double r
 }  // namespace
 
 TEST_CASE("every instruction set sums close samples to the bit") {
-  Dice dice(1);
+  RandomNumbers random(1);
   auto samples = std::make_unique<Samples>();
   int felt = 0;
   for (int i = 0; i < cases(20000); ++i) {
-    samples->count = static_cast<std::int32_t>(dice.uniform(0, kMostClose + 1));
-    const double most = i % 5 == 0 ? 32767 : dice.uniform(0, 40000);  // of 2048 and less all faint
+    samples->count = static_cast<std::int32_t>(random.uniform(0, kMostClose + 1));
+    const double most =
+        i % 5 == 0 ? 32767 : random.uniform(0, 40000);  // of 2048 and less all faint
     const double least = i % 2 == 0 ? 0 : 0.9 * most;
     for (std::size_t k = 0; k < kMostClose; ++k) {
-      samples->density[k] = static_cast<std::int32_t>(std::min(32767.0, dice.uniform(least, most)));
+      samples->density[k] =
+          static_cast<std::int32_t>(std::min(32767.0, random.uniform(least, most)));
       for (auto* vector : {&samples->offset, &samples->normal}) {
         for (auto& part : *vector)
-          part[k] = i % 7 == 0 ? -32768 : static_cast<std::int32_t>(dice.uniform(-32768, 32768));
+          part[k] = i % 7 == 0 ? -32768 : static_cast<std::int32_t>(random.uniform(-32768, 32768));
       }
     }
     for (auto& middle : samples->middle) {
-      middle = static_cast<std::int32_t>(dice.uniform(-40000, 40000));
+      middle = static_cast<std::int32_t>(random.uniform(-40000, 40000));
     }
-    samples->radius = static_cast<std::int32_t>(dice.uniform(i % 4 == 0 ? 96 : 20000, 200000));
+    samples->radius = static_cast<std::int32_t>(random.uniform(i % 4 == 0 ? 96 : 20000, 200000));
     const auto look = samples->fade(samples->table());
     const auto truth = close_sums<FixedNumbers>(look);
     felt += truth.low.weight > 0 ? 1 : 0;
@@ -456,9 +459,9 @@ TEST_CASE("a closer look takes all samples around a place, and of too many a par
   CHECK(taken(cells, reach, {30, -30, 30})->count == 0);
 }
 
-TEST_CASE("what a closeup tells moves on with the look, without a jump") {
-  // A row of two bumps, 4 units apart and 0.01 different in height, under a thick plate: the look
-  // goes from one to the other.
+TEST_CASE("the peak of a closeup moves continuously with its centre") {
+  // A row of two bumps, 4 units apart and 0.01 different in height, under a thick plate: the centre
+  // of the closeup goes from one to the other.
   const auto surface = plate(10, 8, kClosePitch);
   const double reach = reach_of(surface);
   const DenseSamples<FixedNumbers> cells(surface, reach);

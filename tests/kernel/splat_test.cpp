@@ -224,9 +224,9 @@ Field hard_field(const VoxelGrid& grid, int kind, std::mt19937& random) {
   return field;
 }
 
-/// Equal on every instruction set? Tells how many of the cases felt anything.
-int felt_alike(const VoxelGrid& grid, const Field& field, std::span<const ToolOffset> tool,
-               const SampleTable& samples, const ToolPose<FixedNumbers>& pose) {
+/// Checks that every instruction set gives the same sum; returns in how many cases it is not zero.
+int count_not_zero(const VoxelGrid& grid, const Field& field, std::span<const ToolOffset> tool,
+                   const SampleTable& samples, const ToolPose<FixedNumbers>& pose) {
   const std::span<const Gradient<FixedNumbers>> voxels(field.data(), grid.voxel_count());
   const auto truth = contact_sum<FixedNumbers>(grid, voxels, tool, pose);
   for (auto set = kernel_sets(); *set != nullptr; ++set) {
@@ -273,7 +273,7 @@ TEST_CASE("gathering gives the bits of the plain loop for any tool in any pose")
               tool.pitch);
           if (i % 4 == 1) pose.centre_vox.x = Q16::from_raw(pose.centre_vox.x.raw() | 0xffff);
           if (i % 4 == 2) pose.centre_vox.y = Q16::from_raw(pose.centre_vox.y.raw() & ~0xffff);
-          felt += felt_alike(grid, field, tool.offsets, samples.table(), pose);
+          felt += count_not_zero(grid, field, tool.offsets, samples.table(), pose);
         }
       }
     }
@@ -288,7 +288,7 @@ TEST_CASE("a sum of more samples than 32 bits can hold is widened in time") {
   const SampleTool samples(tool, SampleOrder::as_given);
   for (const int kind : {0, 1}) {
     const Field field = hard_field(grid, kind, random);
-    CHECK(felt_alike(grid, field, tool, samples.table(), pose_at({35.3, 34.9, 22.6})) == 1);
+    CHECK(count_not_zero(grid, field, tool, samples.table(), pose_at({35.3, 34.9, 22.6})) == 1);
   }
 }
 
@@ -298,7 +298,7 @@ TEST_CASE("a volume without a single cell is not felt, and a place beyond all vo
   std::mt19937 random(1);
   for (const VoxelGrid grid : {VoxelGrid{1, 5, 5}, {5, 1, 5}, {5, 5, 1}}) {
     const Field field = hard_field(grid, 0, random);
-    CHECK(felt_alike(grid, field, tool, samples.table(), pose_at({0.5, 2, 2})) == 0);
+    CHECK(count_not_zero(grid, field, tool, samples.table(), pose_at({0.5, 2, 2})) == 0);
   }
   const VoxelGrid grid{5, 5, 5};
   const Field field = hard_field(grid, 0, random);
@@ -306,6 +306,6 @@ TEST_CASE("a volume without a single cell is not felt, and a place beyond all vo
   for (const auto& at : {std::array{kFar, 0, 0}, {0, -kFar - 1, 0}, {2 << 16, 2 << 16, kFar}}) {
     auto pose = pose_at({0, 0, 0});
     pose.centre_vox = {Q16::from_raw(at[0]), Q16::from_raw(at[1]), Q16::from_raw(at[2])};
-    CHECK(felt_alike(grid, field, tool, samples.table(), pose) == 0);
+    CHECK(count_not_zero(grid, field, tool, samples.table(), pose) == 0);
   }
 }

@@ -87,10 +87,10 @@ TEST_CASE("the costliest tick is told with its place; a body out of reach keeps 
 
 TEST_CASE("exact contact on a smooth ball is where and how the ball is") {
   const SampledTool cone(tool_of_units("cone", 5, 16));
-  Dice dice(2);
+  RandomNumbers random(2);
   for (int pose = 0; pose < 10; ++pose) {
-    const Point up = dice.direction(), top{30, 30, 30};
-    const Axes axes = standing_on(dice.direction(), dice);
+    const Point up = random.direction(), top{30, 30, 30};
+    const Axes axes = standing_on(random.direction(), random);
     const Body bump =
         blurred({60, 60, 60}, [&](Point p) { return length(p - top + 40 * up) - 40; });
     const Reach reach(tool_of_units("cone", 5, 16));

@@ -243,12 +243,12 @@ TEST_CASE("a scene is planned with what the servo allows the queries of a tick")
   points.round = true;
   CHECK(query_work(points, 2).query == 2 * (512 + 128));
   CHECK(query_work(points, 2).closer == 2 * (128 + 128));
-  CHECK(query_work(points, 2).turn == 2 * 62);
+  CHECK(query_work(points, 2).orient == 2 * 62);
   points.round = false;
   CHECK(query_work(points, 1).query == 512 + 128);
   CHECK(query_work(points, 1).closer == (128 + 2 * 448) + 2 * (128 + 32));
-  const auto most = [](std::int64_t query, std::int64_t closer, std::int64_t turn) {
-    return QueryWork{query, closer, turn}.most();
+  const auto most = [](std::int64_t query, std::int64_t closer, std::int64_t orient) {
+    return QueryWork{query, closer, orient}.most();
   };
   CHECK(most(300, 100, 50) == 32 * 400 + 13 * 50);
   CHECK(most(900, 100, 90) == 15000);

@@ -18,10 +18,10 @@ using kerf::test::cases;
 namespace {
 
 std::vector<AirWall> tilted_walls() {
-  Dice dice(17);
+  RandomNumbers random(17);
   std::vector<AirWall> walls;
   const int count = cases(3);
-  for (int i = 0; i < count; ++i) walls.emplace_back(dice);
+  for (int i = 0; i < count; ++i) walls.emplace_back(random);
   return walls;
 }
 
@@ -33,8 +33,8 @@ template <class N>
 Flown flown_at(const SampledTool& tool, const std::vector<AirWall>& walls, const AirFlight& flight,
                int ticks) {
   Flown flown;
-  Dice dice(5);
-  for (const AirWall& wall : walls) fly<N>(tool, wall, flight, ticks, dice, flown);
+  RandomNumbers random(5);
+  for (const AirWall& wall : walls) fly<N>(tool, wall, flight, ticks, random, flown);
   return flown;
 }
 
@@ -45,14 +45,15 @@ constexpr double kNothing = 1e-9;
 
 TEST_CASE_TEMPLATE("no tool is dragged through soft tissue, however fast", N, FixedNumbers,
                    DoubleNumbers) {
-  Dice dice(5);
-  const Body soft = body_of({120, 120, 120}, [&](Point) { return dice.uniform(0.38, 0.48); });
+  RandomNumbers random(5);
+  const Body soft = body_of({120, 120, 120}, [&](Point) { return random.uniform(0.38, 0.48); });
   for (const SceneTool& made :
        {kTools[0], kTools[2], tool_with("ball", 5.6, 11.2, {.radius_mm = 3.6, .length_mm = 72})}) {
     ShaftRig<N> rig(made, {&soft});
     CAPTURE(made.name);
     for (int i = 0; i < 50; ++i) {
-      const Point hand = {dice.uniform(20, 100), dice.uniform(20, 100), dice.uniform(20, 100)};
+      const Point hand = {random.uniform(20, 100), random.uniform(20, 100),
+                          random.uniform(20, 100)};
       rig.tick(hand);
       CAPTURE(i);
       CHECK(length(rig.proxy() - hand) < SweepRules::kArrived);

@@ -14,9 +14,9 @@ using namespace kerf::test;
 TEST_CASE_TEMPLATE("a cap lies on its ball, wherever it is laid", N, FixedNumbers, DoubleNumbers) {
   constexpr double kBall = 8, kOne = N::kIsFixed ? 32768 : 1;
   const auto& offset = kCapArrays<N>.offset;
-  Dice dice(3);
+  RandomNumbers random(3);
   for (int k = 0; k < 50; ++k) {
-    const Point out = k < 2 ? Point{0, 0, k == 0 ? 1.0 : -1.0} : dice.direction();
+    const Point out = k < 2 ? Point{0, 0, k == 0 ? 1.0 : -1.0} : random.direction();
     using Real = typename N::Real;
     const auto rows = cap_rows<N>(normal_of<N>(out), Real(kCapRadius), Real(kBall));
     for (std::size_t i = 0; i < kCapSamples; ++i) {

@@ -17,13 +17,13 @@ constexpr double kStep = N::kIsFixed                     ? 0x1p-16
 
 /// One to three planes, no two closer than 15 degrees, that leave room at some place near.
 template <class N>
-ConstraintSet<N> random_constraints(Dice& dice) {
+ConstraintSet<N> random_constraints(RandomNumbers& random) {
   ConstraintSet<N> constraints;
-  const auto wanted = static_cast<std::size_t>(dice.uniform(1, 4));
-  const Point room = dice.uniform(0, 0.5) * dice.direction();
+  const auto wanted = static_cast<std::size_t>(random.uniform(1, 4));
+  const Point room = random.uniform(0, 0.5) * random.direction();
   while (constraints.count < wanted) {
-    const Point normal = dice.direction();
-    const double depth = dot(normal, room) - dice.uniform(0, 0.3);
+    const Point normal = random.direction();
+    const double depth = dot(normal, room) - random.uniform(0, 0.3);
     const ConstraintPlane<N> plane{normal_of<N>(normal), typename N::Real(depth), {}};
     if (!has_plane_like(constraints, plane)) constraints.plane[constraints.count++] = plane;
   }
@@ -66,11 +66,11 @@ Contacts<N> felt(ConstraintPlane<N> one) {
 
 TEST_CASE_TEMPLATE("a slide ends at the nearest place that its planes allow", N, FixedNumbers,
                    DoubleNumbers) {
-  Dice dice(1);
+  RandomNumbers random(1);
   int checked = 0;
   for (int i = 0; i < 300; ++i) {
-    const auto constraints = random_constraints<N>(dice);
-    const Point displacement = dice.uniform(0, 3) * dice.direction();
+    const auto constraints = random_constraints<N>(random);
+    const Point displacement = random.uniform(0, 3) * random.direction();
     const ConstrainedMove<N> slide = constrained_move(constraints, place_of<N>(displacement));
     const Point truth = projected(constraints, displacement);
     if (length(truth) > 10) continue;  // a cone too narrow for Dykstra
@@ -83,10 +83,10 @@ TEST_CASE_TEMPLATE("a slide ends at the nearest place that its planes allow", N,
 TEST_CASE_TEMPLATE("planes push and never pull, and only where they are touched", N, FixedNumbers,
                    DoubleNumbers) {
   using Real = typename N::Real;
-  Dice dice(2);
+  RandomNumbers random(2);
   for (int i = 0; i < 20'000; ++i) {
-    const auto constraints = random_constraints<N>(dice);
-    const Point displacement = dice.uniform(0, 3) * dice.direction();
+    const auto constraints = random_constraints<N>(random);
+    const Point displacement = random.uniform(0, 3) * random.direction();
     const ConstrainedMove<N> slide = constrained_move(constraints, place_of<N>(displacement));
     Point pushed = point_of<N>(slide.move) - displacement;
     for (std::size_t k = 0; k < constraints.count; ++k) {

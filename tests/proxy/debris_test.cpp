@@ -24,12 +24,12 @@ struct Tally {
 /// A ball pushed straight at a round bit, 5 units beyond the touch, and pulled back.
 template <class N>
 Tally pushed_at_bits(double bit_radius, int bits) {
-  Dice dice(5);
+  RandomNumbers random(5);
   Tally tally;
   for (int i = 0; i < bits; ++i) {
     const Point bit =
-        Point{20, 20, 20} + Point{dice.uniform(0, 1), dice.uniform(0, 1), dice.uniform(0, 1)};
-    const Point direction = dice.direction(), start = bit - 12 * direction;
+        Point{20, 20, 20} + Point{random.uniform(0, 1), random.uniform(0, 1), random.uniform(0, 1)};
+    const Point direction = random.direction(), start = bit - 12 * direction;
     const TestVolume volume =
         blurred({41, 41, 41}, [&](Point p) { return length(p - bit) - bit_radius; });
     ContactRig<N> rig(tool_of_units("ball", kRadius, 2 * kRadius), volume);

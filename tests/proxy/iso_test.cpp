@@ -47,11 +47,11 @@ TEST_CASE_TEMPLATE("walls of low iso hold a ball and a turning cylinder", N, Fix
   for (const ShakenTool& tool : {ball, cylinder}) {
     const SampledTool made(tool.made());
     for (const double iso : {0.02, 0.05, 0.3}) {
-      Dice dice(3);
+      RandomNumbers random(3);
       Shaken seen;
       for (int wall = 0; wall < test::cases(8); ++wall) {
         const auto level = static_cast<Density>(std::lround(iso * kDensityMax));
-        shake<N>(2, tool, made, 250, dice, seen, level);
+        shake<N>(2, tool, made, 250, random, seen, level);
       }
       INFO("iso ", iso, ", round ", tool.round);
       CHECK(seen.crossed == 0);
@@ -64,17 +64,17 @@ TEST_CASE_TEMPLATE("a tool deep in solid is at no allowed place, however faint a
                    FixedNumbers, DoubleNumbers) {
   for (const std::string shape : {"ball", "cylinder", "cone", "inverted_cone", "flame", "wheel"}) {
     const SampledTool tool(tool_of_units(shape.c_str(), 5, 10));
-    Dice dice(5);
+    RandomNumbers random(5);
     for (const double level : {1.03, 1.2, 1.9, 2.0}) {
       for (const double noise : {0.0, 0.02, 0.2}) {
         const Body solid = body_of({44, 44, 44}, [&](Point) {
-          return std::min(0.5 * (level + dice.uniform(0, noise)), 1.0);
+          return std::min(0.5 * (level + random.uniform(0, noise)), 1.0);
         });
         ContactRig<N> rig(tool, solid);
         for (int i = 0; i < 30; ++i) {
-          rig.field().turn(dice.turn<N>(dice.uniform(0, 3)));
-          const Contacts<N> felt = rig.field().query(
-              place_of<N>({dice.uniform(18, 26), dice.uniform(18, 26), dice.uniform(18, 26)}));
+          rig.field().orient(random.rotation<N>(random.uniform(0, 3)));
+          const Contacts<N> felt = rig.field().query(place_of<N>(
+              {random.uniform(18, 26), random.uniform(18, 26), random.uniform(18, 26)}));
           INFO(shape, ", level ", level, ", noise ", noise, ", place ", i);
           CHECK((felt.no_normal || double(felt.depth) > SweepRules::kTolerance));
         }
@@ -87,16 +87,16 @@ TEST_CASE_TEMPLATE("matter of 0.97 of the iso holds no tool, wherever and howeve
                    N, FixedNumbers, DoubleNumbers) {
   for (const std::string shape : {"ball", "cylinder", "cone", "inverted_cone", "flame", "wheel"}) {
     const SampledTool tool(tool_of_units(shape.c_str(), 5, 10));
-    Dice dice(4);
+    RandomNumbers random(4);
     for (const int faces : {1, 2, 3}) {  // a flat, an edge, a corner
       for (const double noise : {0.0, 0.15, 0.6}) {
-        const Frame frame(dice, {21, 21, 21});
+        const Frame frame(random, {21, 21, 21});
         const Body soft = body_of({44, 44, 44}, [&](Point p) {
           const Point at = frame.of(p);
           double deepest = at[1];
           if (faces > 1) deepest = std::max(deepest, at[0]);
           if (faces > 2) deepest = std::max(deepest, at[2]);
-          return (0.97 - dice.uniform(0, noise)) * 0.5 * std::clamp(0.5 - deepest / 2, 0.0, 1.0);
+          return (0.97 - random.uniform(0, noise)) * 0.5 * std::clamp(0.5 - deepest / 2, 0.0, 1.0);
         });
         // Solid that was cut away since: the map of what bears nothing does not know.
         Body cut = soft;
@@ -105,9 +105,9 @@ TEST_CASE_TEMPLATE("matter of 0.97 of the iso holds no tool, wherever and howeve
         ContactRig<N> rig(tool, cut);
         std::ranges::copy(soft.density, cut.density.begin());
         for (int i = 0; i < 100; ++i) {
-          rig.field().turn(dice.turn<N>(dice.uniform(0, 3)));
+          rig.field().orient(random.rotation<N>(random.uniform(0, 3)));
           const Point at =
-              frame.at(dice.uniform(-14, 8), dice.uniform(-14, 8), dice.uniform(-14, 8));
+              frame.at(random.uniform(-14, 8), random.uniform(-14, 8), random.uniform(-14, 8));
           const Contacts<N> felt = rig.field().query(place_of<N>(at));
           INFO(shape, ", faces ", faces, ", noise ", noise, ", place ", i);
           CHECK(double(felt.depth) <= SweepRules::kTolerance);

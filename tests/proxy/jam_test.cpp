@@ -66,17 +66,17 @@ TEST_CASE_TEMPLATE("a tool that turns on and on askew in a tight hollow is pulle
   struct Cylinder {
     double radius, length;
   };
-  Dice dice(1);
+  RandomNumbers random(1);
   const int rounds = test::cases(N::kIsFixed ? 40 : 5);
   for (const auto [radius, length] : {Cylinder{7, 20}, Cylinder{8, 24}, Cylinder{10, 30}}) {
     const SampledTool tool(tool_of_units("cylinder", radius, length));
     const int lifted = static_cast<int>((kTop + 3 + length / 2 - kBottom) / 0.2);
     for (int round = 0; round < rounds; ++round) {
       for (const Hollow hollow : {Hollow::well, Hollow::slot}) {
-        const double play = dice.uniform(0.12, 0.6);
-        const bool fast = dice.uniform(0, 1) < 0.5;
-        const Twist twist{dice.uniform(29.5, 30.5), dice.uniform(0.03, 0.2),
-                          fast ? dice.uniform(0.3, 3) : dice.uniform(0.02, 0.3)};
+        const double play = random.uniform(0.12, 0.6);
+        const bool fast = random.uniform(0, 1) < 0.5;
+        const Twist twist{random.uniform(29.5, 30.5), random.uniform(0.03, 0.2),
+                          fast ? random.uniform(0.3, 3) : random.uniform(0.02, 0.3)};
         const Body body = block_with(hollow, radius + play, twist.middle);
         CAPTURE(length);
         CAPTURE((hollow == Hollow::slot));

@@ -109,7 +109,7 @@ struct OneWayField : PlainField<N> {
   }
   [[nodiscard]] bool is_solid(ContactVec<Real>) const { return true; }
   [[nodiscard]] bool may_query() const { return left > 0; }
-  void turn(const Orientation<N>&) { left = 5; }
+  void orient(const Orientation<N>&) { left = 5; }
 
   explicit OneWayField(Point out) : way_out(out) {}
 

@@ -45,7 +45,7 @@ struct CountedField {
                                  ContactVec<typename N::Real> move) const {
     return field.free_distance(q, move);
   }
-  void turn(const Orientation<N>& turn) { field.turn(turn); }
+  void orient(const Orientation<N>& orientation) { field.orient(orientation); }
 
   ContactQuery<N>& field;
   int queries = 0;
@@ -121,7 +121,7 @@ TEST_CASE_TEMPLATE("a turn that would sink the tool lifts it", N, FixedNumbers, 
   double lifted = 0.5;
   for (int i = 1; i <= 100; ++i) {  // by 0.5 radians, downwards
     const double half = -0.005 * i / 2;
-    goal.turn = {{}, {}, typename N::Unit(std::sin(half)), typename N::Unit(std::cos(half))};
+    goal.orientation = {{}, {}, typename N::Unit(std::sin(half)), typename N::Unit(std::cos(half))};
     const auto contact = follow(turning, state, field, goal);
     CHECK(contact.turned);
     const double height = point_of<N>(contact.pose.centre)[1];
@@ -143,14 +143,14 @@ TEST_CASE_TEMPLATE("a tool with no room to turn keeps its orientation, and follo
   ProxyPose<N> goal = pose_of<N>({35, 35, 35});
   REQUIRE(follow(turning, state, rig.field(), goal).status == ProxyStatus::placed);
   const double half = 0.5;  // a radian about z
-  goal.turn = {{}, {}, typename N::Unit(std::sin(half)), typename N::Unit(std::cos(half))};
+  goal.orientation = {{}, {}, typename N::Unit(std::sin(half)), typename N::Unit(std::cos(half))};
   ProxyContact<N> contact;
   for (int i = 0; i < 50; ++i) contact = follow(turning, state, rig.field(), goal);
   CHECK_FALSE(contact.turned);
-  const double turned = 2 * std::asin(double(contact.pose.turn.z));
+  const double turned = 2 * std::asin(double(contact.pose.orientation.z));
   CHECK(turned > 0.05);
   CHECK(turned < 0.4);
-  goal.turn = {};
+  goal.orientation = {};
   CHECK(follow(turning, state, rig.field(), goal).turned);
 }
 
@@ -229,7 +229,7 @@ TEST_CASE("a goal that is no number gives no force and changes nothing") {
     CHECK(contact.pose == before.pose);
   }
   ProxyPose<N> bad_turn = pose_of<N>({0, -2, 0});
-  bad_turn.turn.w = kNan;
+  bad_turn.orientation.w = kNan;
   CHECK(length(point_of<N>(follow(plan<N>(), state, field, bad_turn).spring)) == 0);
   CHECK(follow(plan<N>(), state, field, pose_of<N>({0, -2, 0})).spring == before.spring);
 }

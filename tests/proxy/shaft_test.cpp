@@ -78,11 +78,11 @@ TEST_CASE_TEMPLATE("a head feels the same bits as without its shaft while that i
     ShaftRig<N> with(tool, {&body});
     ContactRig<N> without(tool, body);
     ProxyState<N> state;
-    Dice dice(7);
+    RandomNumbers random(7);
     Point hand{40, 28, 32};
     for (int tick = 0; tick < 400; ++tick) {
-      hand = hand + Point{dice.uniform(-0.3, 0.3), tick < 100 ? -0.1 : dice.uniform(-0.3, 0.3),
-                          dice.uniform(-0.3, 0.3)};
+      hand = hand + Point{random.uniform(-0.3, 0.3), tick < 100 ? -0.1 : random.uniform(-0.3, 0.3),
+                          random.uniform(-0.3, 0.3)};
       const ProxyContact<N> felt = with.tick(hand);
       without.field().begin_tick();
       const ProxyContact<N> alone = without.follow(
@@ -205,7 +205,7 @@ TEST_CASE_TEMPLATE("in the bore that a ball has cut its shaft has play, and lean
   CHECK(held.shaft_fraction == typename N::Unit(0));
   for (int tick = 0; tick < 100; ++tick) held = rig.tick(bottom, leaning<N>(2 * rim_rad));
   CHECK_FALSE(held.turned);
-  const double leant_rad = 2 * std::asin(double(held.pose.turn.z));
+  const double leant_rad = 2 * std::asin(double(held.pose.orientation.z));
   CHECK(leant_rad == doctest::Approx(rim_rad).epsilon(0.05));
   CHECK(length(rig.proxy() - bottom) < 0.4);
 }
@@ -231,11 +231,11 @@ TEST_CASE_TEMPLATE("no random motion takes a shaft through a ledge of two units"
   const Body blade =
       blurred(kGrid, [](Point p) { return std::max(std::abs(p[0] - 30) - 1, p[2] - 40); });
   ShaftRig<N> rig(tool_with("ball", 5, 10, kShaft), {&blade});
-  Dice dice(11);
+  RandomNumbers random(11);
   rig.tick({50, 28, 32});
   for (int tick = 0; tick < 3000; ++tick) {
-    const Point hand{30 + dice.uniform(-25, 25), dice.uniform(15, 40), dice.uniform(10, 32)};
-    const double lean_rad = dice.uniform(-0.2, 0.2);
+    const Point hand{30 + random.uniform(-25, 25), random.uniform(15, 40), random.uniform(10, 32)};
+    const double lean_rad = random.uniform(-0.2, 0.2);
     rig.tick(hand, leaning<N>(lean_rad));
     // It stays on its side, ball and shaft.
     REQUIRE(rig.proxy()[0] > 36 - 0.1);
@@ -267,14 +267,14 @@ TEST_CASE_TEMPLATE("askew in a hole with a play of half a unit a shaft sinks int
   const ToolPart part = shaft_parts(tool)[0];
   const PartSamples surface = part_samples(tool, part, 1);
   rig.lead({40, 70, 32}, {40, 20, 32}, 500);
-  Dice dice(5);
+  RandomNumbers random(5);
   double deepest = 0, most_lean = 0;
   for (int tick = 0; tick < 600; ++tick) {
     const double lean_rad = 0.25 * std::sin(0.02 * tick);
-    const Point hand{40 + dice.uniform(-2, 2), 20, 32 + dice.uniform(-2, 2)};
+    const Point hand{40 + random.uniform(-2, 2), 20, 32 + random.uniform(-2, 2)};
     const ProxyContact<N> held = rig.tick(hand, leaning<N>(lean_rad));
-    const RotationRows<N> rows = rows_of(held.pose.turn);
-    most_lean = std::max(most_lean, std::abs(2 * std::asin(double(held.pose.turn.z))));
+    const RotationRows<N> rows = rows_of(held.pose.orientation);
+    most_lean = std::max(most_lean, std::abs(2 * std::asin(double(held.pose.orientation.z))));
     for (const Point& at : surface.samples) {
       Point in_world = rig.proxy();
       const Point offset{at[0], at[1] + part.middle_mm, at[2]};
@@ -292,19 +292,19 @@ TEST_CASE_TEMPLATE("askew in a hole with a play of half a unit a shaft sinks int
 
 TEST_CASE_TEMPLATE("no tick costs more than its bound, whatever there is to feel", N, FixedNumbers,
                    DoubleNumbers) {
-  Dice noise(3);
+  RandomNumbers noise(3);
   const Body body = body_of(kGrid, [&](Point) { return noise.uniform(0, 0.6); });
   const SceneTool tool = tool_with(
       "ball", 5, 10,
       {.radius_mm = 3, .length_mm = 30, .handpiece_radius_mm = 14, .handpiece_length_mm = 10});
   ShaftRig<N> rig(tool, {&body});
-  Dice dice(4);
+  RandomNumbers random(4);
   std::int64_t most = 0;
   rig.tick({40, 120, 32});
   for (int tick = 0; tick < 300; ++tick) {
     const ProxyContact<N> held =
-        rig.tick({dice.uniform(20, 60), dice.uniform(20, 90), dice.uniform(10, 50)},
-                 dice.template turn<N>(dice.uniform(0, 0.5)));
+        rig.tick({random.uniform(20, 60), random.uniform(20, 90), random.uniform(10, 50)},
+                 random.template rotation<N>(random.uniform(0, 0.5)));
     REQUIRE(held.queries <= SweepRules::kMaxQueries);
     most = std::max(most, rig.field().spent());
   }

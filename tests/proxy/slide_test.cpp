@@ -35,18 +35,18 @@ struct LoopGain {
 
 LoopGain gain_in_a_crease(double friction, int loops) {
   using N = DoubleNumbers;
-  Dice dice(21);
+  RandomNumbers random(21);
   LoopGain gain;
   for (int k = 0; k < loops; ++k) {
-    Frame frame(dice, {30, 30, 30});
+    Frame frame(random, {30, 30, 30});
     frame.place = frame.at(0, -8, 0);
     const Body volume = blurred({62, 62, 62}, [&](Point p) {
       const Point at = frame.of(p);
       return (at[1] - std::abs(at[2])) * std::sqrt(0.5);
     });
     const double rest = kRadius * std::sqrt(2.0);
-    const Point middle = frame.at(0, rest - 3, 0), one = dice.direction(),
-                other = unit(cross(one, dice.direction()));
+    const Point middle = frame.at(0, rest - 3, 0), one = random.direction(),
+                other = unit(cross(one, random.direction()));
     GuidedTool<N> guided(kBall, volume, frame.at(0, rest + 3, 0), friction);
     for (int i = 0; i < 60; ++i) guided.tick(middle + (6 - 0.1 * i) * frame.up);
     constexpr int kTicks = 250;
@@ -73,9 +73,9 @@ LoopGain gain_in_a_crease(double friction, int loops) {
 }  // namespace
 
 TEST_CASE("on one motion fixed point feels what double feels") {
-  Dice dice(5);
+  RandomNumbers random(5);
   const BumpSlide slide;
-  const Bump bump(slide, dice);
+  const Bump bump(slide, random);
   const Body body = bump.body();
   const Point above = bump.hand(-bump.end(), -2);
   GuidedTool<FixedNumbers> fixed(kBall, body, above);
@@ -108,12 +108,12 @@ TEST_CASE_TEMPLATE("a ball follows a slot with play, with hardly any and with no
                    N, FixedNumbers, DoubleNumbers) {
   for (const double radius : {8.5, 8.1, 8.0}) {
     for (const double aside : {0.0, 1.0}) {
-      Dice dice(7);
+      RandomNumbers random(7);
       const double start = radius > kRadius ? radius + 4 : 0.2;
       double force_step = 0, behind = 0, pulled = 0, held = 0;
       int queries = 0;
       for (int k = 0; k < 2; ++k) {
-        const Frame frame(dice, {40, 40, 40});
+        const Frame frame(random, {40, 40, 40});
         const Body volume = slot(frame, radius);
         GuidedTool<N> guided(kBall, volume, frame.at(-12, start, 0));
         const auto tick = [&](Point hand) {

@@ -31,15 +31,16 @@ class CountedBowl : public SolidField<N, Face> {
   void begin_tick() { left_ = queries_; }
   Contacts<N> query(ContactVec<typename N::Real> at) {
     Contacts<N> contacts;
-    contacts.no_normal = (left_ <= 0 && !unseen_) || (holds_turns && !(turn_ == Orientation<N>{}));
+    contacts.no_normal =
+        (left_ <= 0 && !unseen_) || (holds_turns && !(orientation_ == Orientation<N>{}));
     unseen_ = false;
     --left_;
     return contacts.no_normal ? contacts : SolidField<N, Face>::query(at);
   }
   [[nodiscard]] bool half_spent() const { return left_ <= queries_ / 2; }
   [[nodiscard]] bool may_query() const { return left_ > 0; }
-  void turn(const Orientation<N>& turn) {
-    turn_ = turn;
+  void orient(const Orientation<N>& orientation) {
+    orientation_ = orientation;
     unseen_ = true;
   }
 
@@ -48,7 +49,7 @@ class CountedBowl : public SolidField<N, Face> {
  private:
   int queries_, left_ = 0;
   bool unseen_ = false;
-  Orientation<N> turn_{};
+  Orientation<N> orientation_{};
 };
 
 /// Leads the point from the bowl's bottom to under `goal` outside of it, and says where it is.
@@ -60,9 +61,9 @@ struct Led {
     state.pose.centre = place_of<N>({0, -kBowl, 0});
     state.valid = true;
   }
-  ProxyContact<N> tick(Point goal, const Orientation<N>& turn = {}) {
+  ProxyContact<N> tick(Point goal, const Orientation<N>& orientation = {}) {
     field.begin_tick();
-    return follow(plan, state, field, {place_of<N>(goal), turn});
+    return follow(plan, state, field, {place_of<N>(goal), orientation});
   }
   [[nodiscard]] Point at() const { return point_of<N>(state.pose.centre); }
 

@@ -23,7 +23,7 @@ struct PlainField {
   [[nodiscard]] bool may_query() const { return true; }
   [[nodiscard]] bool is_solid(Place) const { return false; }
   [[nodiscard]] Real free_distance(Place, Place) const { return {}; }
-  void turn(const Orientation<N>&) const {}
+  void orient(const Orientation<N>&) const {}
 };
 
 /// One plane, out of the solid along `normal`, and its depth.
@@ -53,11 +53,11 @@ class FlatField : public PlainField<N> {
   [[nodiscard]] Real free_distance(Place at, Place) const {
     return Real(std::max(0.0, dot(up_, point_of<N>(at) + turned_arm()) - 1));
   }
-  void turn(const Orientation<N>& turn) { turn_ = turn; }
+  void orient(const Orientation<N>& orientation) { orientation_ = orientation; }
 
  private:
   [[nodiscard]] Point turned_arm() const {
-    const auto rows = rows_of(turn_);
+    const auto rows = rows_of(orientation_);
     Point turned{};
     for (std::size_t a = 0; a < 3; ++a) {
       for (std::size_t b = 0; b < 3; ++b) turned[a] += double(rows[a][b]) * arm_[b];
@@ -66,7 +66,7 @@ class FlatField : public PlainField<N> {
   }
 
   Point up_, arm_;
-  Orientation<N> turn_;
+  Orientation<N> orientation_;
 };
 
 /// A ball against a solid, in double whatever the numbers of the solver: `Nearest` gives the height

@@ -27,10 +27,10 @@ constexpr double kFine = N::kIsFixed ? 1e-7 : 1e-12;
 
 TEST_CASE_TEMPLATE("a turn and its matrix are the same rotation, at any angle", N, FixedNumbers,
                    DoubleNumbers) {
-  Dice dice(3);
+  RandomNumbers random(3);
   for (int i = 0; i < 2000; ++i) {
-    const auto turn = dice.turn<N>(i < 20 ? kPi : dice.uniform(0, 2 * kPi));
-    CHECK(angle_between(orientation_of<N>(rows_of(turn)), turn) < kFine<N>);
+    const auto orientation = random.rotation<N>(i < 20 ? kPi : random.uniform(0, 2 * kPi));
+    CHECK(angle_between(orientation_of<N>(rows_of(orientation)), orientation) < kFine<N>);
   }
 }
 
@@ -44,11 +44,11 @@ TEST_CASE("a quarter about z takes x to y") {
 
 TEST_CASE_TEMPLATE("a tool turns the short way by its step, and arrives", N, FixedNumbers,
                    DoubleNumbers) {
-  Dice dice(4);
+  RandomNumbers random(4);
   const double half_sine = 0.05, step = 2 * std::asin(half_sine);
   for (int i = 0; i < 200; ++i) {
-    auto now = dice.turn<N>(dice.uniform(0, kPi));
-    const auto goal = dice.turn<N>(dice.uniform(0, kPi));
+    auto now = random.rotation<N>(random.uniform(0, kPi));
+    const auto goal = random.rotation<N>(random.uniform(0, kPi));
     double rest = angle_between(goal, now);
     for (int k = 0; k < 40 && !(now == goal); ++k) {
       const auto next = rotate_towards(now, goal, typename N::Unit(half_sine));
@@ -63,11 +63,13 @@ TEST_CASE_TEMPLATE("a tool turns the short way by its step, and arrives", N, Fix
 
 TEST_CASE_TEMPLATE("a turn keeps its length through a million products", N, FixedNumbers,
                    DoubleNumbers) {
-  Dice dice(5);
-  const auto little = dice.turn<N>(0.37);
-  Orientation<N> turn;
-  for (int i = 0; i < 1'000'000; ++i) turn = compose(little, turn);
-  const double square = double(turn.x) * double(turn.x) + double(turn.y) * double(turn.y) +
-                        double(turn.z) * double(turn.z) + double(turn.w) * double(turn.w);
+  RandomNumbers random(5);
+  const auto little = random.rotation<N>(0.37);
+  Orientation<N> orientation;
+  for (int i = 0; i < 1'000'000; ++i) orientation = compose(little, orientation);
+  const double square = double(orientation.x) * double(orientation.x) +
+                        double(orientation.y) * double(orientation.y) +
+                        double(orientation.z) * double(orientation.z) +
+                        double(orientation.w) * double(orientation.w);
   CHECK(std::abs(square - 1) < (sizeof(typename N::Unit) == 4 ? 1e-6 : 1e-12));
 }

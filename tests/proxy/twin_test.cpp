@@ -27,14 +27,14 @@ template <class Nearest>
 Tally led_alike(const Nearest& nearest, double friction, int ticks) {
   using F = FixedNumbers;
   using D = DoubleNumbers;
-  Dice dice(31);
+  RandomNumbers random(31);
   SolidField<F, Nearest> fixed_field(8, nearest);
   SolidField<D, Nearest> double_field(8, nearest);
   Point hand{0, 14, 0};
   ProxyPose<F> fixed{place_of<F>(hand), {}};
   Tally tally;
   for (int i = 0; i < ticks; ++i) {
-    hand = hand + std::pow(10.0, dice.uniform(-1.5, 1.5)) * dice.direction();
+    hand = hand + std::pow(10.0, random.uniform(-1.5, 1.5)) * random.direction();
     for (double& at : hand) at = std::clamp(at, -25.0, 25.0);
     const auto goal = place_of<F>(hand);
     ProxyPose<D> twin{place_of<D>(point_of<F>(fixed.centre)), {}};

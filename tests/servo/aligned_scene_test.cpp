@@ -55,7 +55,7 @@ class Pair {
 
  private:
   std::unique_ptr<Servo> fixed_, exact_;
-  FakeArm fixed_arm_, exact_arm_;
+  KinematicOmni fixed_arm_, exact_arm_;
 };
 
 LoadedScene cutting_scene() {

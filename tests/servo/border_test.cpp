@@ -15,7 +15,7 @@
 
 using namespace kerf;
 using namespace kerf::test;
-using extremes::Miller;
+using extremes::CuttingHand;
 
 namespace {
 
@@ -45,7 +45,7 @@ constexpr double kAboveMm = kFaceMm + kRadiusMm + 0.3;
 constexpr double kPressMm = kFaceMm + kRadiusMm - 1;  ///< some 0.4 N
 
 /// Down on the face within 50 ms, and held there.
-ServoOutput press(Miller& hand, int rate_hz, double seconds) {
+ServoOutput press(CuttingHand& hand, int rate_hz, double seconds) {
   const int ticks = rate_hz / 20;
   for (int i = 1; i <= ticks; ++i) {
     static_cast<void>(hand.step({0, kAboveMm + (kPressMm - kAboveMm) * i / ticks, 0}));
@@ -67,7 +67,7 @@ TEST_CASE("on a solid that ends at the volume's border a tool rests, slides and 
         CAPTURE(rate_hz);
         CAPTURE(std::string(shape));
         LoadedScene scene = block_scene(shape, numeric, rate_hz);
-        Miller hand(scene, {0, kAboveMm, 0});
+        CuttingHand hand(scene, {0, kAboveMm, 0});
         const double bottom_mm = scene.tools[0].round ? kRadiusMm : 0;
         const ServoOutput rests = press(hand, rate_hz, 0.1);
         CHECK(length(rests.force_n) > 0.1);
@@ -83,7 +83,7 @@ TEST_CASE("on a solid that ends at the volume's border a tool rests, slides and 
 
         scene.cut.model = CutModel::preston;
         scene.cut.machinability_mm3_per_s_n = 4;
-        Miller cuts(scene, {0, kAboveMm, 0});
+        CuttingHand cuts(scene, {0, kAboveMm, 0});
         const ServoOutput cut = press(cuts, rate_hz, 0.5);
         CHECK(cuts.removed_mm3() > 0.1);
         // What a tick is fed it removes, or the next one.

@@ -19,7 +19,7 @@
 
 using namespace kerf;
 using namespace kerf::test;
-using extremes::Dice, extremes::Miller, extremes::sink, extremes::SunkForce;
+using extremes::RandomNumbers, extremes::CuttingHand, extremes::sink, extremes::SunkForce;
 
 namespace {
 
@@ -57,7 +57,7 @@ TEST_CASE("what the servo removes is the integral of G F") {
       scene.servo.numeric = numeric;
       scene.device.workspace_scale = scale;
       scene.cut.machinability_mm3_per_s_n = 8;  // so that what is carried is a millionth of it all
-      Miller miller(scene, {0, 1.3 / scale, 0});
+      CuttingHand miller(scene, {0, 1.3 / scale, 0});
       for (int ms = 0; ms < 1000; ++ms) {
         miller.step({0.3 * std::sin(0.01 * ms), (0.8 - 0.0025 * ms) / scale, 0});
       }
@@ -71,7 +71,7 @@ TEST_CASE("what the servo removes is the integral of G F") {
 TEST_CASE("a spindle that stands removes nothing and rubs nothing") {
   LoadedScene scene = mill_scene();
   scene.spindle.speed_krpm = 0;
-  Miller miller(scene);
+  CuttingHand miller(scene);
   const ServoOutput out = miller.hold({0, -0.5, 0}, 0.1);
   CHECK(out.press_n > 0.5);
   CHECK(out.spindle_ratio == 0);
@@ -81,7 +81,7 @@ TEST_CASE("a spindle that stands removes nothing and rubs nothing") {
 }
 
 TEST_CASE("the spindle runs up, slows down under load and is braked by a hold") {
-  Miller miller(mill_scene());
+  CuttingHand miller(mill_scene());
   const ServoOutput running = miller.step({0, 1.3, 0});
   CHECK(running.spindle_ratio == doctest::Approx(1).epsilon(0.01));
   CHECK(running.spindle_load == 0);
@@ -95,7 +95,7 @@ TEST_CASE("the spindle runs up, slows down under load and is braked by a hold") 
 }
 
 TEST_CASE("friction pulls against a bur that turns clockwise, by its part of the press") {
-  Miller miller(mill_scene());
+  CuttingHand miller(mill_scene());
   const ServoOutput out = miller.hold({0, 0, 0}, 0.05);
   // The face lies at -y of the centre: omega x r with omega along minus the shaft is R a x y.
   const std::array<double, 3> shaft{out.rotation[1], out.rotation[4], out.rotation[7]};
@@ -113,7 +113,7 @@ TEST_CASE("friction pulls against a bur that turns clockwise, by its part of the
 TEST_CASE("friction does not press a ball in its own bore") {
   LoadedScene scene = mill_scene(flat, 64);
   scene.cut.machinability_mm3_per_s_n = 0.5;
-  Miller miller(scene);
+  CuttingHand miller(scene);
   static_cast<void>(miller.hold({0, -1, 0}, 1));
   double pressed = 0, largest = 0;
   for (int ms = 0; ms < 1000; ++ms) {
@@ -140,7 +140,7 @@ TEST_CASE("a forbidden material is told and never cut") {
   }
   const std::vector<Label> labels = image.labels;
   const std::vector<Density> before = image.density;
-  Miller miller(scene);
+  CuttingHand miller(scene);
   scene = {};  // the servo keeps the labels that it needs
   CHECK_FALSE(miller.hold({0, 0.6, 0}, 0.01).forbidden);
   CHECK(miller.hold({0, -1.5, 0}, 0.5).forbidden);
@@ -164,7 +164,7 @@ TEST_CASE("the press is shared by two volumes, whatever their voxels") {
   std::reverse(image.density.begin(), image.density.end());
   const double corner = -second.pose.position_mm[0];
   second.pose = {{corner, corner, -corner}, {0, 0, 1, 0}};
-  Miller miller(scene);
+  CuttingHand miller(scene);
   std::array<std::uint64_t, 2> steps{};
   for (int ms = 0; ms < 600; ++ms) {
     const ServoOutput out = miller.step({0, 0.8 - 0.002 * ms, 0});
@@ -188,7 +188,7 @@ TEST_CASE("milling into a noisy valley changes the force by less than 2 % a tick
   scene.cut.threshold_n = LoadedScene{}.cut.threshold_n;
   SceneVolume& volume = scene.volumes[0];
   volume.iso = static_cast<Density>(kIsoShare * kDensityMax);
-  Dice dice(9);
+  RandomNumbers random(9);
   std::size_t voxel = 0;
   const double corner = volume.pose.position_mm[0];
   for (int z = 0; z < kEdge; ++z) {
@@ -196,8 +196,8 @@ TEST_CASE("milling into a noisy valley changes the force by less than 2 % a tick
       for (int x = 0; x < kEdge; ++x) {
         const double depth_vox =
             -valley(corner + x * kVoxelMm, corner + y * kVoxelMm, corner + z * kVoxelMm) / kVoxelMm;
-        const double spread = std::sqrt(-2 * std::log(dice.uniform(1e-12, 1)));
-        const double noise = spread * std::cos(2 * std::numbers::pi * dice.uniform(0, 1));
+        const double spread = std::sqrt(-2 * std::log(random.uniform(1e-12, 1)));
+        const double noise = spread * std::cos(2 * std::numbers::pi * random.uniform(0, 1));
         const double share = 0.5 * std::erfc(-depth_vox / std::sqrt(2.0)) + kNoise * noise;
         const double level = std::round(kLevels * std::clamp(share, 0.0, 1.0)) / kLevels;
         volume.image.density[voxel++] = static_cast<Density>(std::lround(kDensityMax * level));
@@ -209,7 +209,7 @@ TEST_CASE("milling into a noisy valley changes the force by less than 2 % a tick
                                                {0.2, 0},     {0.2, 0.3},  {0.1, -0.3}, {0.1, 0},
                                                {-0.4, 0},    {-0.4, 0.15}};
   for (const auto& [x_mm, z_mm] : kPlaces) {
-    Miller miller(scene, {x_mm, extremes::kSinkFromMm, z_mm});
+    CuttingHand miller(scene, {x_mm, extremes::kSinkFromMm, z_mm});
     const SunkForce felt = sink(miller, x_mm, z_mm);
     MESSAGE("at ", x_mm, ", ", z_mm, " mm: largest step ", 100 * felt.step_ratio, " % of ",
             felt.mean_n, " N");
@@ -224,7 +224,7 @@ TEST_CASE("a thin wall gives way to cutting alone, and without a blow") {
     scene.spindle.speed_krpm = turns ? 300 : 0;
     scene.cut.machinability_mm3_per_s_n = 2;
     scene.force.damping_ns_per_mm = 0;
-    Miller miller(scene);
+    CuttingHand miller(scene);
     std::array<double, 3> last_n{};
     double worst_n = 0;
     ServoOutput out;
@@ -245,7 +245,7 @@ TEST_CASE("a thin wall gives way to cutting alone, and without a blow") {
 TEST_CASE("a tool that leaves its groove is not held back") {
   LoadedScene scene = mill_scene();
   scene.cut.machinability_mm3_per_s_n = 1;
-  Miller miller(scene);
+  CuttingHand miller(scene);
   miller.hold({0, 0.2, 0}, 0.5);
   for (int ms = 0; ms < 150; ++ms) {
     const ServoOutput out = miller.step({0, 0.2 + 0.02 * ms, 0});
@@ -260,7 +260,7 @@ TEST_CASE("a tool that turns with the stylus cuts by the same law") {
   scene.tools = {
       make_tool("shaft", "cylinder", {.pitch_mm = kVoxelMm, .radius_mm = 0.5, .length_mm = 3.0})};
   scene.cut.machinability_mm3_per_s_n = 0.5;
-  Miller miller(scene, {0, 4, 0});
+  CuttingHand miller(scene, {0, 4, 0});
   for (int ms = 0; ms < 1000; ++ms) miller.step({0, 3 - 0.004 * ms, 0});
   CHECK(miller.removed_mm3() > 0.05);
   // Its samples end inside of the rim that it rests on. What they miss waits, and it reaches deeper
@@ -272,7 +272,7 @@ TEST_CASE("a ball of one sample at each pole loses nothing of what it should cut
   LoadedScene scene = mill_scene(flat, 64);
   scene.tools = {make_tool("ball", "ball", {.pitch_mm = kVoxelMm, .radius_mm = 1.0})};
   scene.cut.machinability_mm3_per_s_n = 2;  // 24 times that of enamel
-  Miller miller(scene);
+  CuttingHand miller(scene);
   for (int ms = 0; ms < 1500; ++ms) {
     miller.step({1.5 * std::sin(0.005 * ms), 0.8 - 0.0008 * ms, 0});
   }
@@ -283,7 +283,7 @@ TEST_CASE("a ball of one sample at each pole loses nothing of what it should cut
 TEST_CASE("the same reports cut the same bits, and no tick of cutting touches the heap") {
   const auto run = [](double force) {
     LoadedScene scene = mill_scene();
-    Miller miller(scene);
+    CuttingHand miller(scene);
     const std::uint64_t before = CountedAllocations::total();
     ServoOutput out;
     {
@@ -318,7 +318,7 @@ TEST_CASE(
     scene.cut.friction = 0;
     scene.spindle.stall_torque_n_mm = 1000;  // it never slows down
     scene.limits.continuous_force_n = scene.limits.force_n;
-    Miller miller(scene, {0, 1.3, 0});
+    CuttingHand miller(scene, {0, 1.3, 0});
     const double start_n = length(miller.hold({0, -1, 0}, 0.05).force_n);  // of x0 = 2 mm
     const auto force_after = [&](int voxels) { return start_n - voxels * kStiffness * kVoxelMm; };
     struct Moment {

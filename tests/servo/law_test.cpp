@@ -176,7 +176,7 @@ TEST_CASE(
   for (auto* scene : {&force, &stabiliser}) {
     const Fault fault = scene == &force ? Fault::force_law : Fault::stabiliser;
     auto servo = compile(*scene);
-    FakeArm arm;
+    KinematicOmni arm;
     for (int round = 0; round < 2; ++round) {
       arm_at(*servo, arm, 0, 5, 0);
       const ServoOutput out = servo->step(arm.at(0, 5, 0));
@@ -194,7 +194,7 @@ TEST_CASE("a velocity that is no number is told as 0 and latches a fault of its 
   scene.servo.numeric = NumericKind::float64;
   scene.servo.velocity = {LawKind::velocity, "sleeper", {}};
   auto servo = compile(scene);
-  FakeArm arm;
+  KinematicOmni arm;
   arm_at(*servo, arm, 0, 5, 0);
   ServoOutput out;
   int ticks = 0;

@@ -18,7 +18,7 @@
 
 using namespace kerf;
 using namespace kerf::test;
-using extremes::Miller;
+using extremes::CuttingHand;
 
 namespace {
 
@@ -49,7 +49,7 @@ LoadedScene bored_scene(const char* shape) {
 struct TakenOf {
   double of_label = 0, of_others = 0;
 };
-TakenOf removed_since(const std::vector<Density>& before, Miller& miller,
+TakenOf removed_since(const std::vector<Density>& before, CuttingHand& miller,
                       const std::vector<Label>& labels, Label label) {
   TakenOf removed;
   const auto after = miller.servo().density(0);
@@ -61,7 +61,7 @@ TakenOf removed_since(const std::vector<Density>& before, Miller& miller,
 
 /// The fraction of what a press removes that is of high x.
 double share_of_high(const LoadedScene& scene, const std::array<double, 3>& press_mm) {
-  Miller miller(scene, {0, kTopMm + 1.5, 0});
+  CuttingHand miller(scene, {0, kTopMm + 1.5, 0});
   for (double y = kTopMm + 1.5; y > kDownMm; y -= 0.01) static_cast<void>(miller.step({0, y, 0}));
   const auto density = miller.servo().density(0);
   const std::vector<Density> before(density.begin(), density.end());
@@ -96,7 +96,7 @@ TEST_CASE("two materials under one face share the press by what lies ahead in ea
                                        return (y - kTopMm) / 2;
                                      }).image.density;
     const double bottom_mm = scene.tools[0].length_mm / 2;
-    Miller miller(scene, {0, kTopMm + bottom_mm + 0.3, 0});
+    CuttingHand miller(scene, {0, kTopMm + bottom_mm + 0.3, 0});
     static_cast<void>(miller.hold({0, kTopMm + bottom_mm - 0.5, 0}, 0.3));
     const VolumeImage& image = scene.volumes[0].image;
     const TakenOf taken = removed_since(image.density, miller, image.labels, kHigh);
@@ -136,7 +136,7 @@ void press_into(LoadedScene scene, double x_mm, double z_mm, Taken& taken) {
   const std::vector<Label> labels = scene.volumes[0].image.labels;
   const std::vector<Density> before = scene.volumes[0].image.density;
   const double half_mm = scene.tools[0].length_mm / 2;
-  Miller miller(std::move(scene), {x_mm, kTopMm + half_mm + 0.5, z_mm});
+  CuttingHand miller(std::move(scene), {x_mm, kTopMm + half_mm + 0.5, z_mm});
   taken.press_n = std::min(taken.press_n, miller.hold({x_mm, kTopMm - half_mm, z_mm}, 0.5).press_n);
   const TakenOf gone = removed_since(before, miller, labels, kLabelPulp);
   taken.filling += gone.of_label / kDensityMax;
@@ -206,7 +206,7 @@ TEST_CASE("soft matter that is never cut lets a press through to what bears it")
       scene.servo.rate_hz = rate_hz;
       const std::vector<Label> labels = scene.volumes[0].image.labels;
       const std::vector<Density> before = scene.volumes[0].image.density;
-      Miller miller(std::move(scene), {0, 2, 0});
+      CuttingHand miller(std::move(scene), {0, 2, 0});
       miller.travel({0, -0.5, 0});
       static_cast<void>(miller.hold({0, -0.5, 0}, 0.5));
       CHECK(removed_since(before, miller, labels, kLabelPulp).of_label == 0);
@@ -237,7 +237,7 @@ TEST_CASE("soft matter that is never cut lets a press through to what bears it")
 TEST_CASE("matter that bears a press and may not be cut keeps what is below it") {
   for (const double share_of_iso : {1.02, 1.1, 1.9}) {
     CAPTURE(share_of_iso);
-    Miller miller(covered_flat(share_of_iso, 1, true), {0, 2, 0});
+    CuttingHand miller(covered_flat(share_of_iso, 1, true), {0, 2, 0});
     miller.travel({0, -0.5, 0});
     const ServoOutput out = miller.hold({0, -0.5, 0}, 0.5);
     CHECK(out.press_n > 0.1);

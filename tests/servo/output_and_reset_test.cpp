@@ -13,7 +13,7 @@
 
 using namespace kerf;
 using namespace kerf::test;
-using extremes::Miller;
+using extremes::CuttingHand;
 
 namespace {
 
@@ -66,7 +66,7 @@ TEST_CASE("a new tool stands still and rubs nothing") {
   LoadedScene scene = half_space_scene(48);
   scene.cut.model = CutModel::preston;
   scene.tools.push_back(ball(8));
-  Miller miller(scene);
+  CuttingHand miller(scene);
   const ServoOutput cutting = miller.hold({0, 0.2, 0}, 0.1);
   REQUIRE(length(cutting.modification_n) > 0.05);
   REQUIRE(cutting.spindle_ratio > 0.5);

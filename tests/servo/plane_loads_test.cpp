@@ -13,7 +13,7 @@
 
 using namespace kerf;
 using namespace kerf::test;
-using kerf::extremes::Miller;
+using kerf::extremes::CuttingHand;
 using vec3::cross, vec3::dot;
 
 namespace {
@@ -81,7 +81,7 @@ TEST_CASE("the friction of cutting turns the tool by its moment about the centre
     LoadedScene scene = half_space_scene(48);
     scene.servo.numeric = numeric;
     scene.cut.model = CutModel::preston;
-    Miller miller(scene);
+    CuttingHand miller(scene);
     const ServoOutput out = miller.hold({0, 0.2, 0}, 0.1);
     REQUIRE(length(out.modification_n) > 0.05);
     REQUIRE(out.plane_count == 1);

@@ -16,7 +16,7 @@
 
 using namespace kerf;
 using namespace kerf::test;
-using extremes::Miller;
+using extremes::CuttingHand;
 
 namespace {
 
@@ -157,7 +157,7 @@ TEST_CASE("what limits, fading in and cutting do has an account") {
 
   LoadedScene block = half_space_scene(48);
   block.cut.model = CutModel::preston;
-  Miller miller(block);
+  CuttingHand miller(block);
   static_cast<void>(miller.hold({0, 0.2, 0}, 0.1));
   ServoOutput cut;
   for (int i = 0; i < 200; ++i) cut = miller.step({0.01 * i, 0.2, 0});

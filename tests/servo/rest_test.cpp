@@ -32,7 +32,7 @@ struct RestingServo {
 
   int rate_hz;
   int ticks = 0, said = 0;
-  FakeArm arm;
+  KinematicOmni arm;
   std::unique_ptr<Servo> servo;
 };
 

@@ -13,7 +13,7 @@
 
 using namespace kerf;
 using namespace kerf::test;
-using extremes::Miller;
+using extremes::CuttingHand;
 
 namespace {
 
@@ -34,7 +34,7 @@ std::array<double, 3> parts_cut(const SceneTool& tool, double half_mm, NumericKi
   scene.cut.model = CutModel::preston;
   scene.cut.machinability_mm3_per_s_n = 4;
   const double above_mm = half_mm + 0.3, pressed_mm = half_mm - 1;
-  Miller hand(scene, {0, above_mm, 0});
+  CuttingHand hand(scene, {0, above_mm, 0});
   const int down = rate_hz / 20;
   for (int i = 1; i <= down; ++i) {
     static_cast<void>(hand.step({0, above_mm + (pressed_mm - above_mm) * i / down, 0}));

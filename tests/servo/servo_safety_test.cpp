@@ -60,7 +60,7 @@ TEST_CASE("one packet with the docked bit neither moves the tip nor forgives a f
 TEST_CASE("a stylus that moves while the docked bit is set is not calibrated") {
   LoadedScene scene = half_space_scene();
   const auto servo = compile(scene);
-  FakeArm arm;
+  KinematicOmni arm;
   for (int tick = 0; tick < 100; ++tick) {
     auto report = arm.at(0, -30 + tick * 0.5, 0);
     report.parked = true;

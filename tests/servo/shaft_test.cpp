@@ -14,7 +14,7 @@
 
 using namespace kerf;
 using namespace kerf::test;
-using extremes::Miller;
+using extremes::CuttingHand;
 
 namespace {
 
@@ -51,7 +51,7 @@ TEST_CASE("what the shaft presses on is felt, told and never cut, in every kind 
       LoadedScene scene = upright_scene(ledge);
       scene.servo.numeric = numeric;
       scene.servo.rate_hz = rate_hz;
-      Miller miller(scene, {2, 0, 0});
+      CuttingHand miller(scene, {2, 0, 0});
       miller.hold({1.4, 0, 0}, 0.05);
       CHECK_FALSE(miller.hold({0.7, 0, 0}, 0.05).shaft);
       miller.hold({-0.3, 0, 0}, 0.05);  // in steps below the limit of speed
@@ -80,7 +80,7 @@ TEST_CASE("a handpiece behind the shaft is felt as the shaft is, in every kind o
     CAPTURE(static_cast<int>(numeric));
     LoadedScene scene = upright_scene(ledge, kBoth);
     scene.servo.numeric = numeric;
-    Miller miller(scene, {2, 0, 0});
+    CuttingHand miller(scene, {2, 0, 0});
     CHECK_FALSE(miller.hold({1, 0, 0}, 0.05).shaft);
     miller.hold({0, 0, 0}, 0.05);
     const ServoOutput out = miller.hold({-0.8, 0, 0}, 0.3);
@@ -115,7 +115,7 @@ TEST_CASE("a head that is pressed beside its shaft cuts by its own part of the f
     scene.servo.numeric = numeric;
     scene.cut.friction = 0;
     scene.cut.machinability_mm3_per_s_n = 0.1;
-    Miller miller(scene, {2, 0, 0});
+    CuttingHand miller(scene, {2, 0, 0});
     miller.hold({1, -0.9, 0}, 0.1);
     const ServoOutput out = miller.hold({-1.5, -2.2, 0}, 0.3);
     CHECK(out.shaft);
@@ -133,7 +133,7 @@ TEST_CASE("a ball that cuts its own bore is not held by its shaft, neither in no
       LoadedScene scene = upright_scene([](double, double y, double) { return y - 2; }, shaft);
       scene.servo.numeric = numeric;
       scene.cut.machinability_mm3_per_s_n = 40;
-      Miller miller(scene, {0, 3.2, 0});
+      CuttingHand miller(scene, {0, 3.2, 0});
       double proxy_mm = 3;
       for (int ticks = 0; proxy_mm > -2 && ticks < 3000; ++ticks) {
         const ServoOutput out = miller.step({0, proxy_mm - 1.5, 0});  // presses with 0.6 N
@@ -199,7 +199,7 @@ TEST_CASE("ticks with a shaft and a handpiece never touch the heap") {
       ledge_and_floor,
       {.radius_mm = 0.5, .length_mm = 5.0, .handpiece_radius_mm = 2.0, .handpiece_length_mm = 2.0});
   scene.tools[0].turns = true;
-  Miller miller(scene, {2, 0, 0});
+  CuttingHand miller(scene, {2, 0, 0});
   const CountedAllocations counted;
   const auto before = CountedAllocations::total();
   double sum_n = 0;

@@ -75,7 +75,7 @@ TEST_CASE("a soft material is cut, and felt after the cut, as a hard one of its 
     scene.force.model = ForceModel::proxy;
     scene.cut.model = CutModel::preston;
     scene.cut.machinability_mm3_per_s_n = 4;
-    Miller miller(std::move(scene));
+    CuttingHand miller(std::move(scene));
     const ServoOutput out = miller.hold({0, 0.2, 0}, 0.3);
     return std::pair(miller.removed_mm3(), out);
   };

@@ -16,7 +16,7 @@
 
 namespace kerf::test {
 
-using kerf::arm_at, kerf::FakeArm, kerf::kDockTicks;
+using kerf::arm_at, kerf::KinematicOmni, kerf::kDockTicks;
 
 inline constexpr double kVoxelMm = 0.125;
 
@@ -105,7 +105,7 @@ struct ArmedServo {
   }
 
   std::unique_ptr<Servo> servo;
-  FakeArm arm;
+  KinematicOmni arm;
 };
 
 }  // namespace kerf::test

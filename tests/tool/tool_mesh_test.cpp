@@ -438,11 +438,12 @@ struct Rests {
 Rests rest_on_flats(const SceneTool& shape, const SceneTool& mesh) {
   constexpr VoxelGrid kGrid{40, 40, 40};
   const SampledTool shape_samples(shape), mesh_samples(mesh);
-  Dice dice(5);
+  RandomNumbers random(5);
   Rests rests;
   for (int k = 0; k < 8; ++k) {
-    const Frame frame(dice, {19, 19, 19});
-    const Point axis = dice.direction(), across = dice.across(axis), third = cross(across, axis);
+    const Frame frame(random, {19, 19, 19});
+    const Point axis = random.direction(), across = random.across(axis),
+                third = cross(across, axis);
     RotationRows<N> rows;
     for (std::size_t i = 0; i < 3; ++i) {
       rows[i] = {N::Unit(across[i]), N::Unit(axis[i]), N::Unit(third[i])};

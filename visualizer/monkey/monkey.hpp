@@ -76,7 +76,7 @@ class Monkey {
 
   Window* window_;
   bool large_;
-  Dice dice_;
+  RandomNumbers dice_;
   VisualizerOptions options_;
   std::unique_ptr<MonkeyController> controller_;
   std::optional<WindowRun> run_;

@@ -49,20 +49,20 @@ std::string monkey_scene(std::size_t volumes) {
 
 }  // namespace
 
-MonkeyController::MonkeyController(const std::string& name, Dice& dice)
-    : volumes_(static_cast<std::size_t>(1 + dice.below(3))) {
+MonkeyController::MonkeyController(const std::string& name, RandomNumbers& random)
+    : volumes_(static_cast<std::size_t>(1 + random.below(3))) {
   SegmentSpec spec;
   for (Volume& volume : volumes_) {
-    volume.grid = {1 + dice.below(40), 1 + dice.below(40), 1 + dice.below(40)};
-    fill(volume, dice);
+    volume.grid = {1 + random.below(40), 1 + random.below(40), 1 + random.below(40)};
+    fill(volume, random);
     SegmentVolumeSpec& shown = spec.volumes.emplace_back();
     shown.grid = volume.grid;
-    shown.spacing_mm = {kVoxelMm, kVoxelMm, dice.once_in(3) ? 2.0 * kVoxelMm : kVoxelMm};
-    for (double& at : shown.origin_mm) at = dice.between(-12.0, -4.0);
-    if (dice.once_in(2)) shown.orientation = {0.0F, 0.0F, 0.3826834F, 0.9238795F};
+    shown.spacing_mm = {kVoxelMm, kVoxelMm, random.once_in(3) ? 2.0 * kVoxelMm : kVoxelMm};
+    for (double& at : shown.origin_mm) at = random.between(-12.0, -4.0);
+    if (random.once_in(2)) shown.orientation = {0.0F, 0.0F, 0.3826834F, 0.9238795F};
     shown.iso = kIsoDensity;
     shown.density = volume.density;
-    if (dice.once_in(3)) {
+    if (random.once_in(3)) {
       volume.labels.resize(volume.density.size());
       for (std::size_t i = 0; i < volume.labels.size(); ++i) {
         volume.labels[i] = static_cast<Label>(i / 97 % 3);
@@ -75,14 +75,14 @@ MonkeyController::MonkeyController(const std::string& name, Dice& dice)
   server_ = std::make_unique<SegmentServer>(name, *writer_, CommandLimits{.tools = kTools});
   writer_->set_lifecycle(Lifecycle::run);
   hand_.orientation[3] = 1.0F;
-  if (!dice.once_in(4)) move(dice);  // else: no tick yet
+  if (!random.once_in(4)) move(random);  // else: no tick yet
 }
 
 /// Bars with a slope, and gaps that are the greater half.
-void MonkeyController::fill(Volume& volume, Dice& dice) {
-  const int period = 4 + dice.below(14);
-  const int axis = dice.below(3);
-  const int full = 30'000 + 5'000 * dice.below(8);
+void MonkeyController::fill(Volume& volume, RandomNumbers& random) {
+  const int period = 4 + random.below(14);
+  const int axis = random.below(3);
+  const int full = 30'000 + 5'000 * random.below(8);
   volume.density.assign(volume.grid.voxel_count(), 0);
   for_each_voxel(volume.grid.box(), [&](int x, int y, int z) {
     const int along = axis == 0 ? x : axis == 1 ? y : z;
@@ -91,23 +91,23 @@ void MonkeyController::fill(Volume& volume, Dice& dice) {
   });
 }
 
-VoxelBox MonkeyController::any_box(const VoxelGrid& grid, Dice& dice) const {
-  const VoxelIndex at{dice.below(grid.nx), dice.below(grid.ny), dice.below(grid.nz)};
-  const int edge = 1 + dice.below(10);
+VoxelBox MonkeyController::any_box(const VoxelGrid& grid, RandomNumbers& random) const {
+  const VoxelIndex at{random.below(grid.nx), random.below(grid.ny), random.below(grid.nz)};
+  const int edge = 1 + random.below(10);
   return VoxelBox{at, {at.x + edge, at.y + edge, at.z + edge}}.clipped(grid.box());
 }
 
 /// Air stays the greater part of what is below any iso in a volume without labels: translucent
 /// renderers take the median of that for air when they are made, and draw no less a picture than
 /// others made later.
-void MonkeyController::cut(Dice& dice) {
+void MonkeyController::cut(RandomNumbers& random) {
   writer_->begin_tick(++now_);
-  for (int boxes = 1 + dice.below(4); boxes > 0; --boxes) {
-    const auto v = static_cast<std::size_t>(dice.below(static_cast<int>(volumes_.size())));
+  for (int boxes = 1 + random.below(4); boxes > 0; --boxes) {
+    const auto v = static_cast<std::size_t>(random.below(static_cast<int>(volumes_.size())));
     Volume& volume = volumes_[v];
-    const VoxelBox box = any_box(volume.grid, dice);
-    const bool adds = dice.once_in(4), in_part = !volume.labels.empty();
-    const int left = in_part ? dice.below(3) : 0;
+    const VoxelBox box = any_box(volume.grid, random);
+    const bool adds = random.once_in(4), in_part = !volume.labels.empty();
+    const int left = in_part ? random.below(3) : 0;
     std::uint32_t removed = 0;
     for_each_voxel(box, [&](int x, int y, int z) {
       Density& at = volume.density[volume.grid.index(x, y, z)];
@@ -121,31 +121,31 @@ void MonkeyController::cut(Dice& dice) {
   finish_tick();
 }
 
-void MonkeyController::refill(Dice& dice) {
-  const auto v = static_cast<std::size_t>(dice.below(static_cast<int>(volumes_.size())));
+void MonkeyController::refill(RandomNumbers& random) {
+  const auto v = static_cast<std::size_t>(random.below(static_cast<int>(volumes_.size())));
   writer_->begin_tick(++now_);
-  fill(volumes_[v], dice);
+  fill(volumes_[v], random);
   writer_->publish_box(v, volumes_[v].density, volumes_[v].grid.box(), 0);
   finish_tick();
 }
 
-void MonkeyController::move(Dice& dice) {
+void MonkeyController::move(RandomNumbers& random) {
   while (const auto command = server_->take_command()) {
     if (command->kind == CommandKind::select_tool) hand_.active_tool = command->argument;
   }
-  if (dice.once_in(8)) {
-    hand_.active_tool = static_cast<std::uint32_t>(dice.below(kTools + 1));  // one is not there
+  if (random.once_in(8)) {
+    hand_.active_tool = static_cast<std::uint32_t>(random.below(kTools + 1));  // one is not there
   }
-  for (double& at : hand_.position_mm) at = dice.between(-12.0, 12.0);
-  const double half_rad = dice.between(-1.5, 1.5);
+  for (double& at : hand_.position_mm) at = random.between(-12.0, 12.0);
+  const double half_rad = random.between(-1.5, 1.5);
   hand_.orientation[0] = static_cast<float>(std::sin(half_rad));
   hand_.orientation[3] = static_cast<float>(std::cos(half_rad));
   for (float& force : hand_.commanded_force_n) {
-    force = dice.once_in(3) ? 0.0F : static_cast<float>(dice.between(-2.0, 2.0));
+    force = random.once_in(3) ? 0.0F : static_cast<float>(random.between(-2.0, 2.0));
   }
-  hand_.penetration_mm = static_cast<float>(dice.between(0.0, 0.5));
+  hand_.penetration_mm = static_cast<float>(random.between(0.0, 0.5));
   hand_.flags =
-      kFlagStarted | (dice.once_in(6) ? kFlagRefused : 0) | (dice.once_in(6) ? kFlagShaft : 0);
+      kFlagStarted | (random.once_in(6) ? kFlagRefused : 0) | (random.once_in(6) ? kFlagShaft : 0);
   tick();
 }
 

@@ -15,9 +15,9 @@
 namespace kerf {
 
 /// Chance with a seed: the same numbers on every machine.
-class Dice {
+class RandomNumbers {
  public:
-  explicit Dice(std::uint32_t seed) : random_(seed) {}
+  explicit RandomNumbers(std::uint32_t seed) : random_(seed) {}
 
   /// 0 to n - 1.
   [[nodiscard]] int below(int n) {
@@ -45,15 +45,15 @@ class MonkeyController {
  public:
   static constexpr std::uint32_t kTools = 9;
 
-  /// Volumes as the dice fall. Throws SegmentError.
-  MonkeyController(const std::string& name, Dice& dice);
+  /// Volumes at random. Throws SegmentError.
+  MonkeyController(const std::string& name, RandomNumbers& random);
 
   /// Moves the hand and changes its force; also takes the tool that was asked for.
-  void move(Dice& dice);
+  void move(RandomNumbers& random);
   /// Removes or adds material in a box anywhere; several boxes in one tick.
-  void cut(Dice& dice);
+  void cut(RandomNumbers& random);
   /// All bricks of a volume at once: more than a tick publishes.
-  void refill(Dice& dice);
+  void refill(RandomNumbers& random);
   /// A tick in which nothing happened.
   void tick();
   /// Says how it ends.
@@ -68,8 +68,8 @@ class MonkeyController {
     std::vector<Label> labels;
   };
 
-  void fill(Volume& volume, Dice& dice);
-  [[nodiscard]] VoxelBox any_box(const VoxelGrid& grid, Dice& dice) const;
+  void fill(Volume& volume, RandomNumbers& random);
+  [[nodiscard]] VoxelBox any_box(const VoxelGrid& grid, RandomNumbers& random) const;
   void finish_tick();
 
   std::vector<Volume> volumes_;

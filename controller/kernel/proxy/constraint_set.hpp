@@ -332,7 +332,7 @@ class CurvatureEstimate {
   /// beside its shaft than without one (tests/servo/shaft_test.cpp).
   static constexpr double kNoise = 0.02;  ///< rad
   static constexpr double kSkew =
-      0.3;  ///< least cosine to the step at which the rest of a turn counts
+      0.3;  ///< least cosine to the step at which the rest of an arc counts
 
   constexpr void forget() noexcept {
     first_ = second_ = last_ = {};
@@ -348,8 +348,8 @@ class CurvatureEstimate {
   /// At most a radian.
   static constexpr Turn turn_of_normal(const Curve<N>& curve, Position moved) noexcept {
     const Real step = std::clamp(along<N>(curve.across, moved), -curve.radius, curve.radius);
-    const Unit turn = fraction<N>(step, curve.radius);
-    return {curve.across.x * turn, curve.across.y * turn, curve.across.z * turn};
+    const Unit angle = fraction<N>(step, curve.radius);
+    return {curve.across.x * angle, curve.across.y * angle, curve.across.z * angle};
   }
 
   Curve<N> first_, second_;  ///< of the estimate

@@ -48,21 +48,21 @@ template <class N>
 /// Turns an offset from the tool's axes to those of the world.
 template <class N>
 [[nodiscard]] constexpr ContactVec<typename N::Ratio> turned_offset(
-    const typename N::Ratio (&offset)[3], const RotationRows<N>& turn) noexcept {
+    const typename N::Ratio (&offset)[3], const RotationRows<N>& rotation) noexcept {
   using Ratio = typename N::Ratio;
   const auto turned = [&](const std::array<typename N::Unit, 3>& row) {
     return multiply<Ratio>(row[0], offset[0]) + multiply<Ratio>(row[1], offset[1]) +
            multiply<Ratio>(row[2], offset[2]);
   };
-  return {turned(turn[0]), turned(turn[1]), turned(turn[2])};
+  return {turned(rotation[0]), turned(rotation[1]), turned(rotation[2])};
 }
 
-/// All means of a query; `turn` takes the mean offset from the tool's axes to the world's.
+/// All means of a query; `rotation` takes the mean offset from the tool's axes to the world's.
 template <class N>
 [[nodiscard]] constexpr PointMeans<N> point_means(const PointSums<N>& sums,
                                                   const DensityScale& scale,
                                                   const ContactFrame<N>& frame,
-                                                  const RotationRows<N>& turn,
+                                                  const RotationRows<N>& rotation,
                                                   bool round) noexcept {
   using Ratio = typename N::Ratio;
   PointMeans<N> means;
@@ -84,7 +84,7 @@ template <class N>
   if constexpr (N::kIsFixed) lift >>= round ? 15 : 0;         // Q24 of Q39: 16 at least
   const Ratio offset[3] = {mean_of<N>(sums.offset[0], lift, 9), mean_of<N>(sums.offset[1], lift, 9),
                            mean_of<N>(sums.offset[2], lift, 9)};
-  means.offset = turned_offset<N>(offset, turn);
+  means.offset = turned_offset<N>(offset, rotation);
   if constexpr (N::kIsFixed) {
     means.top = Ratio::from_raw(sums.top << 9);
   } else {

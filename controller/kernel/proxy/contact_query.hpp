@@ -26,7 +26,7 @@ namespace kerf {
 
 /// Collision queries of one part of a tool against the solid volumes of a scene.
 ///
-/// Call `turn` before the first query; any number of queries with this orientation may follow. A
+/// Call `orient` before the first query; any number of queries with this orientation may follow. A
 /// query reads the samples of the point shell in every volume, except for those in free space. With
 /// `refined` it adds samples near rest (docs/theory.md 3.5): the cap of a ball, or the close
 /// samples of another part and a patch of the volume. In fixed all kernels give the same bits.
@@ -45,9 +45,9 @@ class PartQuery {
         work_(query_work(points.table, volumes.size())) {}
 
   /// Orients the part in all queries from now on.
-  void turn(const Orientation<N>& turn) noexcept {
-    reader_.turn(rows_of(turn));
-    budget().spend(work_.turn);
+  void orient(const Orientation<N>& orientation) noexcept {
+    reader_.orient(rows_of(orientation));
+    budget().spend(work_.orient);
     for (const ContactVolume<N>& volume : volumes_) {
       reader_.place(points_, reader_.rows(), volume.frame, volume.places);
     }
@@ -272,17 +272,17 @@ class ContactQuery {
       part_[i].emplace(Part{
           {kernels, part.point_shell, shaft_volumes[i], budget_}, part.up, ContactVec<Real>{}});
     }
-    if (!head_turns_) head_.turn({});
+    if (!head_turns_) head_.orient({});
   }
   ContactQuery(const ContactQuery&) = delete;  // its parts point to its budget
   ContactQuery& operator=(const ContactQuery&) = delete;
 
-  /// Orients the tool in all queries from now on; once for a tool that does not turn.
-  void turn(const Orientation<N>& turn) noexcept {
-    if (head_turns_) head_.turn(turn);
-    const RotationRows<N> rows = rows_of(turn);
+  /// Orients the tool in all queries from now on; once for a tool that keeps its orientation.
+  void orient(const Orientation<N>& orientation) noexcept {
+    if (head_turns_) head_.orient(orientation);
+    const RotationRows<N> rows = rows_of(orientation);
     each_shaft_part([&](Part& part) {
-      part.query.turn(turn);
+      part.query.orient(orientation);
       part.from_head = times<N>({rows[0][1], rows[1][1], rows[2][1]}, part.up);
     });
     turned_ = true;

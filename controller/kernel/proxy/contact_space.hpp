@@ -68,16 +68,16 @@ template <class N>
   }
 }
 
-/// length / turn, `turn` > 0 an angle: the radius of an arc. Fixed: rounds toward 0, saturates.
+/// length / angle, `angle` > 0: the radius of an arc. Fixed: rounds toward 0, saturates.
 template <class N>
 [[nodiscard]] constexpr typename N::Real quotient(typename N::Real length,
-                                                  typename N::Unit turn) noexcept {
+                                                  typename N::Unit angle) noexcept {
   if constexpr (N::kIsFixed) {
     using Unit = typename N::Unit;
     const std::int64_t scaled = std::int64_t{length.raw()} * Unit(1).raw();
-    return N::Real::from_raw(saturate_i32(scaled / turn.raw()));
+    return N::Real::from_raw(saturate_i32(scaled / angle.raw()));
   } else {
-    return length / turn;
+    return length / angle;
   }
 }
 
@@ -142,8 +142,8 @@ template <class N>
 }
 
 template <class N>
-[[nodiscard]] constexpr Orientation<N> inverse(const Orientation<N>& turn) noexcept {
-  return {-turn.x, -turn.y, -turn.z, turn.w};
+[[nodiscard]] constexpr Orientation<N> inverse(const Orientation<N>& orientation) noexcept {
+  return {-orientation.x, -orientation.y, -orientation.z, orientation.w};
 }
 
 template <class N>

@@ -43,10 +43,10 @@ class StartSearch {
 
   template <ContactField<N> Field>
   constexpr ProxyStatus tick(Field& field, const ProxyPose<N>& goal, ProxyPose<N>& pose) noexcept {
-    field.turn(goal.turn);
+    field.orient(goal.orientation);
     const Position middle = replaces_ && !refused() ? around_ : goal.centre;
     if (is_free(field, middle, replaces_ ? SweepRules::kWedged : SweepRules::kTolerance)) {
-      pose = {middle, goal.turn};
+      pose = {middle, goal.orientation};
       return ProxyStatus::placed;
     }
     if (refused()) return ProxyStatus::refused;
@@ -61,7 +61,7 @@ class StartSearch {
       if (!leads_on(field, direction, middle, centre)) continue;
       ++queries;
       if (is_free(field, centre, SweepRules::kTolerance)) {
-        pose = {centre, goal.turn};
+        pose = {centre, goal.orientation};
         return ProxyStatus::placed;
       }
     }
@@ -244,7 +244,8 @@ constexpr ProxyContact<N> follow(const ProxyPlan<N>& plan, ProxyState<N>& state,
   contact.pose = state.pose;
   contact.status = state.valid ? ProxyStatus::placed : ProxyStatus::searching;
   if (!is_finite(goal.centre.x + goal.centre.y + goal.centre.z) ||
-      !is_finite(goal.turn.x + goal.turn.y + goal.turn.z + goal.turn.w)) {
+      !is_finite(goal.orientation.x + goal.orientation.y + goal.orientation.z +
+                 goal.orientation.w)) {
     return contact;
   }
   const auto clamped = [](Real at) {

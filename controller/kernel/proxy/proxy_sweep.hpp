@@ -15,15 +15,16 @@ namespace kerf {
 ///   query(q)          contacts of the tool with its centre at q
 ///   free_distance(q, m)  how far the centre may go from q along m without contact: a lower
 ///                     bound, at most |m|; 0 if unknown
-///   turn(t)           sets the orientation of the tool for all queries from now on
+///   orient(o)         sets the orientation of the tool for all queries from now on
 ///   is_solid(q)       whether the position is in the solid
 ///   half_spent()      whether half of the tick's work is spent: the rest is the move's
 ///   may_query()       whether the tick's work allows another query
 template <class F, class N>
-concept ContactField = requires(F field, ContactVec<typename N::Real> q, Orientation<N> turn) {
+concept ContactField = requires(F field, ContactVec<typename N::Real> q,
+                                Orientation<N> orientation) {
   { field.query(q) } -> std::convertible_to<Contacts<N>>;
   { field.free_distance(q, q) } -> std::convertible_to<typename N::Real>;
-  field.turn(turn);
+  field.orient(orientation);
   { field.is_solid(q) } -> std::convertible_to<bool>;
   { field.half_spent() } -> std::convertible_to<bool>;
   { field.may_query() } -> std::convertible_to<bool>;
@@ -76,7 +77,7 @@ struct SweepRules {
 template <class N>
 struct ProxyPose {
   ContactVec<typename N::Real> centre{};
-  Orientation<N> turn{};
+  Orientation<N> orientation{};
 
   friend constexpr bool operator==(const ProxyPose&, const ProxyPose&) noexcept = default;
 };
@@ -136,10 +137,11 @@ class ProxySweep {
         rotation_step_(rotation_step) {}
 
   constexpr SweepResult<N> tick(const ProxyPose<N>& goal) noexcept {
-    here_ = turn_to(goal.turn);
+    here_ = turn_to(goal.orientation);
     held_by_ = constraints_of(here_);
     const ConstrainedMove<N> slide = move_to(goal.centre);
-    return {held_by_, slide, queries_, pose_.turn == goal.turn, here_.depth, here_.no_normal};
+    return {held_by_,    slide,          queries_, pose_.orientation == goal.orientation,
+            here_.depth, here_.no_normal};
   }
 
  private:
@@ -152,7 +154,7 @@ class ProxySweep {
     Contacts<N> first;
     bool allowed = false;  ///< the tool may go there
   };
-  enum class Trying { turn, move };
+  enum class Trying { orient, move };
 
   constexpr Contacts<N> query(Position centre) noexcept {
     ++queries_;
@@ -201,7 +203,7 @@ class ProxySweep {
   /// the tick's work.
   constexpr Trial attempt(Trying what, Position centre, const ConstraintSet<N>& known,
                           Position moved) noexcept {
-    const bool turns = what == Trying::turn;
+    const bool turns = what == Trying::orient;
     const auto tolerance =
         static_cast<Real>(turns ? SweepRules::kTurnTolerance : SweepRules::kTolerance);
     const Contacts<N> first = query(centre);
@@ -235,25 +237,26 @@ class ProxySweep {
   /// which is enough for one wall. A wedge of two walls would need more: it would lift the tool
   /// out.
   [[nodiscard]] constexpr Real longest_push(const Orientation<N>& next) const noexcept {
-    const Unit of_step = std::min(half_sine_between(next, pose_.turn) / rotation_step_, Unit(1));
+    const Unit of_step =
+        std::min(half_sine_between(next, pose_.orientation) / rotation_step_, Unit(1));
     return multiply<Real>(Real(SweepRules::kStep), of_step) + Real(SweepRules::kTolerance);
   }
 
   /// Rotates towards `goal` while allowed positions are found. Returns the contacts then.
   constexpr Contacts<N> turn_to(const Orientation<N>& goal) noexcept {
     if (rotation_step_ <= Unit(0)) {
-      pose_.turn = goal;
-      field_.turn(goal);
+      pose_.orientation = goal;
+      field_.orient(goal);
       return query(pose_.centre);
     }
     Unit step = rotation_step_;
     bool known = false;
     const bool goes_on = first_step() < Unit(1);  // with the last tick's move
-    while (!goes_on && !(pose_.turn == goal) && queries_ < SweepRules::kMaxRotationQueries &&
+    while (!goes_on && !(pose_.orientation == goal) && queries_ < SweepRules::kMaxRotationQueries &&
            !field_.half_spent()) {
-      const Orientation<N> next = rotate_towards(pose_.turn, goal, step);
-      field_.turn(next);
-      const Trial trial = attempt(Trying::turn, pose_.centre, {}, {});
+      const Orientation<N> next = rotate_towards(pose_.orientation, goal, step);
+      field_.orient(next);
+      const Trial trial = attempt(Trying::orient, pose_.centre, {}, {});
       if (trial.allowed && norm(trial.centre - pose_.centre) <= longest_push(next)) {
         pose_ = {trial.centre, next};
         memory_.curvature = {};
@@ -265,7 +268,7 @@ class ProxySweep {
         if (step < rotation_step_ * Unit(SweepRules::kShortest)) break;
       }
     }
-    field_.turn(pose_.turn);
+    field_.orient(pose_.orientation);
     return known ? here_ : query(pose_.centre);
   }
 

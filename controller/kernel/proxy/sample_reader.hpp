@@ -38,32 +38,33 @@ struct QueryWork {
 
   std::int64_t query = 0;   ///< one query at most: all samples in every volume
   std::int64_t closer = 0;  ///< its refinements at most
-  std::int64_t turn = 0;    ///< to transform all samples
-  std::int64_t head = 0;    ///< query and turn of the head alone; 0: no shaft
+  std::int64_t orient = 0;  ///< to transform all samples
+  std::int64_t head = 0;    ///< query and orient of the head alone; 0: no shaft
   std::int64_t near = 0;    ///< extra of a query, not part of the budget that it needs to begin
 
-  /// Adds the work of one more part; begins with the head. `query`, `turn` and `near` are sums;
+  /// Adds the work of one more part; begins with the head. `query`, `orient` and `near` are sums;
   /// `closer` is that of the head and the first part added, the minimum that a query needs to
   /// begin.
   [[nodiscard]] friend constexpr QueryWork operator+(const QueryWork& a,
                                                      const QueryWork& b) noexcept {
     const bool more = a.head > 0;
-    return {a.query + b.query, more ? a.closer : a.closer + b.closer, a.turn + b.turn,
-            more ? a.head : a.query + a.turn, a.near + b.near};
+    return {a.query + b.query, more ? a.closer : a.closer + b.closer, a.orient + b.orient,
+            more ? a.head : a.query + a.orient, a.near + b.near};
   }
   /// Budget of a tick. Only the first query after a rotation may exceed it, and then without
   /// refinement.
   [[nodiscard]] constexpr std::int64_t budget() const noexcept {
-    return std::max(kTickSamples, kLeastQueries * (head > 0 ? head : query + turn));
+    return std::max(kTickSamples, kLeastQueries * (head > 0 ? head : query + orient));
   }
   /// Limit of the work for fruitless marches through free space; beyond it no group tries one.
   [[nodiscard]] constexpr std::int64_t most_wasted() const noexcept { return budget() / 8; }
   /// Upper bound of a tick of a sweep: the budget, and one query after the rotations, whose last
   /// ones may reach into the half of the move. A tool of few samples runs out of queries first.
   [[nodiscard]] constexpr std::int64_t most() const noexcept {
-    const std::int64_t after = 8 * (query + closer) > budget() ? turn + query : 0;
-    return std::min(budget() + after + 2 * near, SweepRules::kMaxQueries * (query + closer + near) +
-                                                     (SweepRules::kMaxRotationQueries + 1) * turn);
+    const std::int64_t after = 8 * (query + closer) > budget() ? orient + query : 0;
+    return std::min(budget() + after + 2 * near,
+                    SweepRules::kMaxQueries * (query + closer + near) +
+                        (SweepRules::kMaxRotationQueries + 1) * orient);
   }
 };
 
@@ -80,7 +81,7 @@ template <class N>
   const auto times = static_cast<std::int64_t>(volumes);
   return {.query = times * query,
           .closer = times * (point_shell.round ? cap : closeup + 2 * patch),
-          .turn = times * (point_shell.count / 8),
+          .orient = times * (point_shell.count / 8),
           .near = times * Work::kIsoTest};
 }
 
@@ -143,7 +144,7 @@ class SampleReader {
   [[nodiscard]] const PointShell<N>& points() const noexcept { return points_; }
   [[nodiscard]] const RotationRows<N>& rows() const noexcept { return rows_; }
   /// Sets the orientation of the tool; call `place` for each volume after it.
-  void turn(const RotationRows<N>& rows) noexcept { rows_ = rows; }
+  void orient(const RotationRows<N>& rows) noexcept { rows_ = rows; }
 
   [[nodiscard]] QueryBudget& budget() const noexcept { return budget_; }
 

@@ -69,9 +69,10 @@ struct Place : test::RuntimeFolder {
 };
 
 /// A controller that mills a groove into a solid block, a slab further each tick.
-class Miller {
+class GrooveController {
  public:
-  Miller() : writer_(SegmentWriter::create(spec())), server_(std::in_place, "test", writer_) {
+  GrooveController()
+      : writer_(SegmentWriter::create(spec())), server_(std::in_place, "test", writer_) {
     writer_.set_lifecycle(Lifecycle::run);
   }
 
@@ -144,7 +145,7 @@ TEST_CASE("a headless run writes its pictures, follows the milling and ends with
   // The visualizer is started first and waits.
   auto code = std::async(std::launch::async, [&] { return run_headless(options); });
   std::this_thread::sleep_for(std::chrono::milliseconds(100));
-  Miller miller;
+  GrooveController miller;
   // Ticks count from the first armed one, tick 1.
   for (const int picture : {1, 2, 3}) {
     miller.run_to(static_cast<Tick>(50 * picture + 1));
@@ -181,7 +182,7 @@ TEST_CASE("a headless video plays in the servo's time, to the end of the run") {
   options.frames = 0;
   options.record = (place / "a.y4m").string();
   options.video_hz = 50;
-  Miller miller;
+  GrooveController miller;
   miller.run_to(1);
   auto code = std::async(std::launch::async, [&] { return run_headless(options); });
   const std::size_t frame = 6 + 96 * 72 * 3 / 2;
@@ -208,7 +209,7 @@ TEST_CASE("a headless video plays in the servo's time, to the end of the run") {
 
 TEST_CASE("a session tells once when the oldest new removal was, and nothing from before it") {
   const Place place;
-  Miller miller;
+  GrooveController miller;
   miller.run_to(20);  // cuts in ticks 1, 8 and 16
   Session session("test");
   CHECK_FALSE(session.take_oldest_removal());
@@ -234,7 +235,7 @@ TEST_CASE("a controller that vanishes or faults is shown in its last state, and 
   if (!have_gl()) return;
   for (const bool fault : {false, true}) {
     const Place place;
-    Miller miller;
+    GrooveController miller;
     auto code = std::async(std::launch::async, [&] { return run_headless(place.options()); });
     miller.run_to(51);
     REQUIRE(appears(place.options().out / "frame-0001.png"));
@@ -252,7 +253,7 @@ TEST_CASE("a controller that vanishes or faults is shown in its last state, and 
 TEST_CASE("every renderer draws a session") {
   if (!have_gl()) return;
   const Place place;
-  Miller miller;
+  GrooveController miller;
   miller.run_to(20);
   miller.say(Lifecycle::clean_end);
   std::vector<std::string> pictures;
@@ -277,7 +278,7 @@ TEST_CASE("every renderer draws a session") {
 TEST_CASE("a visualizer that joins late shows the picture of one that was there all the time") {
   if (!have_gl()) return;
   const Place place;
-  Miller miller;
+  GrooveController miller;
   VisualizerOptions options = place.options();
   options.size = {640, 480};
   options.every_ticks = 100'000;  // only the final state
@@ -306,7 +307,7 @@ TEST_CASE("a visualizer that joins late shows the picture of one that was there 
 TEST_CASE("a headless run exports the final surface, drawn by the surface renderer") {
   if (!have_gl()) return;
   const Place place;
-  Miller miller;
+  GrooveController miller;
   VisualizerOptions options = place.options();
   options.settings.renderer = "surface";
   options.mesh = place / "block.stl";
@@ -329,7 +330,7 @@ TEST_CASE("a headless run exports the final surface, drawn by the surface render
 TEST_CASE("a sheet at the end of a headless run shows the opacities of --transfer") {
   if (!have_gl()) return;
   const Place place;
-  Miller miller;
+  GrooveController miller;
   miller.run_to(60);
   miller.say(Lifecycle::clean_end);
   std::vector<std::string> sheets;
@@ -380,7 +381,7 @@ TEST_CASE("a video alone ends when its time is over") {
   options.every_ticks.reset();
   options.seconds = 0.1;
   options.record = (place / "a.y4m").string();
-  Miller miller;
+  GrooveController miller;
   miller.run_to(1);
   CHECK(run_headless(options) == 0);
   CHECK(test::text_of(*options.record).find("FRAME") != std::string::npos);
