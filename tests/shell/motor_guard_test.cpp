@@ -91,7 +91,6 @@ Ending ending_by(WayOut way_out) {
     close(ends[0]);
     PairPort port(ends[1]);
     kerf::OmniDriver driver(port);
-    std::signal(SIGHUP, SIG_DFL);  // ignored if the tests run under nohup, and then left so
     std::atomic<bool>& stop = kerf::catch_stop_and_pause_signals();
     kerf::MotorGuard guard(driver);
     const kerf::HandlerStack handlers = guard.guard_stack();
