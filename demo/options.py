@@ -6,7 +6,7 @@ import re
 
 BUSES = {"omni": ("fw", "fw1"), "falcon": ("usb", "usb"), "woodenhaptics": ("hid", "hidraw0")}  # word of --port, its node
 FLAGS = ("--headless", "--serve", "--stereo", "--voxel-tool", "--mute", "--colour-blind", "--virtual")
-OF_SCENE = ("--scene", "--volume", "--spacing", "--window", "--set")
+OF_SCENE = ("--scene", "--volume", "--spacing", "--override-spacing", "--window", "--set")
 WITH_VALUE = OF_SCENE + ("--hand", "--seconds", "--rate", "--out", "--size", "--renderer", "--gradient", "--panel-scale",
                          "--device", "--port", "--sheet", "--transfer", "--record", "--listen")
 
@@ -18,7 +18,7 @@ class Refusal(Exception):
 @dataclasses.dataclass
 class Options:
     scene: str = ""
-    volume: list = dataclasses.field(default_factory=list)  # --volume, --spacing, --window and --set, for the controller
+    volume: list = dataclasses.field(default_factory=list)  # those of OF_SCENE, for the controller
     look: list = dataclasses.field(default_factory=list)  # for the visualizer
     again: list = dataclasses.field(default_factory=list)  # all but the scene: for the next demo of the same window
     hand: str = ""
@@ -61,7 +61,7 @@ def parse(words):
             raise Refusal(f"{name}: stands there twice; give it once")
         given.add(name)
         value = words.pop(0)
-        if name not in ("--scene", "--volume", "--spacing", "--window"):
+        if name not in OF_SCENE or name == "--set":
             options.again += [name, value]
         if name in ("--renderer", "--gradient", "--transfer", "--panel-scale"):
             options.look += [name, value]

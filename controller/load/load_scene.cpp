@@ -157,8 +157,8 @@ constexpr double kPhantomVoxelMm = 0.125;  // of the default grid; other grids k
 
 /// The voxel edge for which the sizes of tools were written, before --volume replaced the volume.
 double written_voxel_mm(const VolumeSpec& volume) {
-  if (volume.spacing_mm) {
-    return *std::min_element(volume.spacing_mm->begin(), volume.spacing_mm->end());
+  for (const auto& spacing_mm : {volume.override_spacing_mm, volume.spacing_mm}) {
+    if (spacing_mm) return std::ranges::min(*spacing_mm);
   }
   if (!volume.phantom_size) return kPhantomVoxelMm;
   return kPhantomVoxelMm * PhantomSpec{}.grid.nx / volume.phantom_size->nx;
@@ -174,6 +174,9 @@ void check_overrides(const SceneOverrides& overrides) {
     refuse("--window", " is empty; write low,high with low < high");
   }
   if (overrides.spacing_mm) check_spacing("--spacing", *overrides.spacing_mm);
+  if (overrides.override_spacing_mm) {
+    check_spacing("--override-spacing", *overrides.override_spacing_mm);
+  }
 }
 
 void apply_overrides(const SceneOverrides& overrides, Scene& scene) {
@@ -191,11 +194,18 @@ void apply_overrides(const SceneOverrides& overrides, Scene& scene) {
     first = replaced;
     scene.offset_given = false;
   }
-  if (is_phantom(first) && (overrides.spacing_mm || overrides.window)) {
-    refuse(overrides.spacing_mm ? "--spacing" : "--window",
-           ": the phantom has its own; leave the option out, or give a --volume");
+  for (const auto& [option, given] :
+       {std::pair{"--spacing", overrides.spacing_mm.has_value()},
+        {"--override-spacing", overrides.override_spacing_mm.has_value()},
+        {"--window", overrides.window.has_value()}}) {
+    if (!given || !is_phantom(first)) continue;
+    refuse(option, ": the phantom has its own; leave the option out, or give a --volume");
   }
-  if (overrides.spacing_mm) first.spacing_mm = overrides.spacing_mm;
+  // Either option replaces both keys of the scene.
+  if (overrides.spacing_mm || overrides.override_spacing_mm) {
+    first.spacing_mm = overrides.spacing_mm;
+    first.override_spacing_mm = overrides.override_spacing_mm;
+  }
   if (overrides.window) first.window = overrides.window;
   if (overrides.phantom_size) {
     for (VolumeSpec& volume : scene.volumes) {

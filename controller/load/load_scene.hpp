@@ -19,17 +19,18 @@ namespace kerf {
 /// Settings of a scene that the command line may replace. Spacing and window belong to the first
 /// volume.
 struct SceneOverrides {
-  std::vector<KeyOverride> settings{};                  ///< --set table.key=VALUE
-  std::optional<std::filesystem::path> volume_file{};   ///< --volume, "phantom" or a path
-  std::optional<std::array<double, 3>> spacing_mm{};    ///< --spacing a[,b,c]
-  std::optional<std::array<double, 2>> window{};        ///< --window lo,hi
-  std::optional<int> rate_hz{};                         ///< --rate
-  std::optional<NumericKind> numeric{};                 ///< --numeric
-  std::optional<Personality> personality{};             ///< --device; cancels torque_scale
-  std::optional<std::array<double, 3>> torque_scale{};  ///< --torque-scale a,b,c
-  std::optional<VoxelGrid> phantom_size{};              ///< every phantom, for tests and the lab
-  bool unchecked_gain = false;                          ///< --unchecked-gain
-  int read_cpu_s = kReadCpuSeconds;                     ///< --read-seconds, of each file
+  std::vector<KeyOverride> settings{};                         ///< --set table.key=VALUE
+  std::optional<std::filesystem::path> volume_file{};          ///< --volume, "phantom" or a path
+  std::optional<std::array<double, 3>> spacing_mm{};           ///< --spacing a[,b,c]
+  std::optional<std::array<double, 3>> override_spacing_mm{};  ///< --override-spacing a[,b,c]
+  std::optional<std::array<double, 2>> window{};               ///< --window lo,hi
+  std::optional<int> rate_hz{};                                ///< --rate
+  std::optional<NumericKind> numeric{};                        ///< --numeric
+  std::optional<Personality> personality{};                    ///< --device; cancels torque_scale
+  std::optional<std::array<double, 3>> torque_scale{};         ///< --torque-scale a,b,c
+  std::optional<VoxelGrid> phantom_size{};  ///< every phantom, for tests and the lab
+  bool unchecked_gain = false;              ///< --unchecked-gain
+  int read_cpu_s = kReadCpuSeconds;         ///< --read-seconds, of each file
 };
 
 /// The tool of the default scene, at scale 1; `--volume` scales it for any other volume.

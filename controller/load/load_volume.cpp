@@ -30,8 +30,9 @@ namespace {
 
 /// Adds the doubt about a spacing to the proposal, unless the scene gives one.
 void add_odd_spacing(const std::string& odd, const VolumeSpec& spec, SceneVolume& volume) {
-  if (odd.empty() || spec.spacing_mm) return;
-  volume.proposal.push_back("spacing=" + odd + "; give the true one with --spacing x,y,z (mm)");
+  if (odd.empty() || spec.spacing_mm || spec.override_spacing_mm) return;
+  volume.proposal.push_back("spacing=" + odd +
+                            "; give the true one with --override-spacing x,y,z (mm)");
 }
 
 /// Takes the proposal for a volume of which the scene has no settings.
@@ -81,8 +82,10 @@ void load_image(const VolumeSpec& spec, const VolumeSource& from, std::size_t kn
         make_phantom({.shape = spec.shape, .grid = spec.phantom_size.value_or(PhantomSpec{}.grid)});
   } else {
     const std::filesystem::path path = from.folder / spec.file;
-    const SourceVolume source =
-        read_volume(path, {.spacing_mm = spec.spacing_mm, .cpu_s = from.cpu_s});
+    const SourceVolume source = read_volume(path, {.spacing_mm = spec.spacing_mm,
+                                                   .override_spacing_mm = spec.override_spacing_mm,
+                                                   .cpu_s = from.cpu_s});
+    volume.note = source.note;
     end_if_asked(path.string());
     const bool proposing = from.unknown && !std::filesystem::exists(labels_path(path));
     volume.image = apply_window(source, spec.window && !proposing

@@ -27,6 +27,7 @@ struct Pose {
 struct SceneVolume {
   std::string name;
   std::string file;
+  std::string note{};  ///< of the reading of its file (SourceVolume), or empty
   VolumeImage image;
   Pose pose;
   Density iso = 32768;

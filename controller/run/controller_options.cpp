@@ -43,7 +43,7 @@ std::ptrdiff_t index_of(const std::array<std::string_view, N>& words, const std:
 
 /// Values of options that belong to the scene, as they are written; empty if not given.
 struct Raw {
-  std::vector<double> spacing_mm, window, torque_scale;
+  std::vector<double> spacing_mm, override_spacing_mm, window, torque_scale;
   int rate_hz = 0;
   std::string numeric, device;
   std::vector<std::string> settings;
@@ -59,9 +59,14 @@ void declare_scene_options(Arguments& app, ControllerOptions& options, Raw& raw)
   app.option("--volume", options.overrides.volume_file,
              "replace the first volume: NRRD, MetaImage, NIfTI, DICOM folder")
       .shown_as("FILE");
-  app.option("--spacing", raw.spacing_mm, "voxel size of that volume in mm: one number or three")
+  Option fills =
+      app.option("--spacing", raw.spacing_mm,
+                 "mm per voxel of that volume, if its file has none: one number or three");
+  fills.values(1, 3).shown_as("A[,B,C]");
+  app.option("--override-spacing", raw.override_spacing_mm, "the same, in place of the file's")
       .values(1, 3)
-      .shown_as("A[,B,C]");
+      .shown_as("A[,B,C]")
+      .excludes(fills);
   app.option("--window", raw.window, "source values shown as air and as densest")
       .values(2, 2)
       .shown_as("LO,HI");
@@ -150,11 +155,15 @@ void declare_run_options(Arguments& app, ControllerOptions& options, Raw& raw) {
 
 /// The conflict between options, as text; empty if there is none.
 std::string wrong_with(const ControllerOptions& options, const Raw& raw) {
-  if (raw.spacing_mm.size() == 2) {
-    return "--spacing has 2 numbers; give one for all axes, or three";
-  }
-  for (const double edge_mm : raw.spacing_mm) {
-    if (!(edge_mm > 0)) return "--spacing: a voxel edge is above 0 mm, for example 0.125";
+  for (const auto& [option, edges_mm] : {std::pair{"--spacing", &raw.spacing_mm},
+                                         {"--override-spacing", &raw.override_spacing_mm}}) {
+    if (edges_mm->size() == 2) {
+      return std::string(option) + " has 2 numbers; give one for all axes, or three";
+    }
+    for (const double edge_mm : *edges_mm) {
+      if (edge_mm > 0) continue;
+      return std::string(option) + ": a voxel edge is above 0 mm, for example 0.125";
+    }
   }
   for (const double scale : raw.torque_scale) {
     if (std::abs(scale) < kMinTorqueScale) {
@@ -192,6 +201,9 @@ void override_scene(const Raw& raw, SceneOverrides& scene) {
     scene.settings.push_back(setting);
   }
   if (!raw.spacing_mm.empty()) scene.spacing_mm = three_of(raw.spacing_mm);
+  if (!raw.override_spacing_mm.empty()) {
+    scene.override_spacing_mm = three_of(raw.override_spacing_mm);
+  }
   if (!raw.window.empty()) scene.window = std::array{raw.window[0], raw.window[1]};
   if (raw.rate_hz != 0) scene.rate_hz = raw.rate_hz;
   if (!raw.numeric.empty()) {

@@ -95,9 +95,13 @@ void warn_of_motors(const LoadedScene& scene) {
               ": the motors stay off; measure it, and write device.personality beside it");
 }
 
-/// Prints the choices for a volume without settings at once, not with the summary.
+/// Prints the notes of reading, and the choices for a volume without settings, at once, not with
+/// the summary.
 void tell_proposal(const LoadedScene& scene) {
   for (const SceneVolume& volume : scene.volumes) {
+    if (!volume.note.empty()) {
+      std::fprintf(stderr, "kerf: %s: %s\n", escaped(volume.name).c_str(), volume.note.c_str());
+    }
     for (std::string choice : volume.proposal) {
       choice.replace(choice.find('='), 1, " ");
       std::fprintf(stderr, "kerf: %s: %s\n", escaped(volume.name).c_str(), escaped(choice).c_str());

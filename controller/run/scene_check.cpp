@@ -314,6 +314,7 @@ void print_scene(const LoadedScene& scene, const SceneCosts& costs, const GainMa
     const auto& h = v.image.spacing_mm;
     std::printf("volume=%s %dx%dx%d spacing_mm=%g,%g,%g iso=%.4f solid=%d\n", v.name.c_str(), g.nx,
                 g.ny, g.nz, h[0], h[1], h[2], v.iso / kDensityMax, v.solid ? 1 : 0);
+    if (!v.note.empty()) std::printf("note=%s %s\n", v.name.c_str(), v.note.c_str());
     for (const std::string& choice : v.proposal) std::printf("proposed_%s\n", choice.c_str());
     std::printf("noise=%s share=%.4f passes=%d\n", v.name.c_str(), v.noise.share, v.denoised);
     if (v.enclosed) {

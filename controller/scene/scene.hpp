@@ -196,9 +196,10 @@ struct VolumeSpec {
   std::string file;                                 ///< as written
   std::string shape{kMolar};                        ///< one of kPhantomShapes, with the phantom
   std::optional<VoxelGrid> phantom_size;            ///< only with file = "phantom"
-  std::optional<std::array<double, 3>> spacing_mm;  ///< if empty, the spacing of the file
-  std::optional<std::array<double, 2>> window;      ///< source values of density 0 and 1
-  std::optional<double> iso;                        ///< density 0..1; if empty, Otsu's threshold
+  std::optional<std::array<double, 3>> spacing_mm;  ///< along axes of which the file has none
+  std::optional<std::array<double, 3>> override_spacing_mm;  ///< in place of the file's
+  std::optional<std::array<double, 2>> window;               ///< source values of density 0 and 1
+  std::optional<double> iso;  ///< density 0..1; if empty, Otsu's threshold
   Denoise denoise = Denoise::automatic;
   bool crop = true;
   bool solid = true;

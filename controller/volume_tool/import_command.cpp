@@ -151,7 +151,8 @@ void refuse_stretched(const std::string& path, const VolumeFrame& frame) {
   std::ostringstream text;
   text << path << ": spacing " << s[0] << " x " << s[1] << " x " << s[2]
        << " mm has a side of more than " << kMostStretched
-       << " times another; give the true voxel size with --spacing x,y,z (mm), or resample it";
+       << " times another; give the true voxel size with --override-spacing x,y,z (mm), or "
+          "resample it";
   throw LoadError(text.str());
 }
 
@@ -175,6 +176,11 @@ const char* way_to_change(const std::string& what) {
 }
 
 }  // namespace
+
+/// Two lines of the output: the file, and the note of its reading.
+struct ImportCommand::SourceLines {
+  std::string file, note;
+};
 
 /// The written files.
 struct ImportCommand::Files {
@@ -200,8 +206,7 @@ ImportCommand::ImportCommand(Arguments& app)
   command_.flag("--big-endian", big_endian_, "of its numbers: the highest byte is first")
       .needs(dims);
   command_.option("--skip", skip_, "bytes before its first voxel").within(0, 1e12).needs(dims);
-  command_.option("--spacing", spacing_, "mm per voxel, in place of the file's")
-      .shown_as("A[,B,C]");
+  spacing_.add_to(command_);
   command_.option("--iso", iso_, "the surface, in values of the file (HU of a CT)")
       .shown_as("VALUE");
   command_.option("--window", window_, "values that become density 0 and 1").shown_as("LO,HI");
@@ -252,7 +257,7 @@ ReadOptions ImportCommand::read_options() const {
     options.raw = RawLayout{grid_from("--dims", dims_), static_cast<VoxelType>(word), big_endian_,
                             static_cast<std::uint64_t>(skip_)};
   }
-  if (!spacing_.empty()) options.spacing_mm = spacing_from(spacing_);
+  spacing_.set(options);
   return options;
 }
 
@@ -298,7 +303,7 @@ void ImportCommand::run(std::ostream& out) const {
     constexpr bool kOftenOneMm = true;  // as a CT in HU is
     refuse_odd(odd_spacing(source, solid_box(whole, otsu_threshold(whole)), kOftenOneMm));
     source = {};
-    return import_labelled(std::move(whole), values.str(), to, out);
+    return import_labelled(std::move(whole), {values.str(), note}, to, out);
   }
   ProposedVolume proposed = propose_volume(std::move(whole), range, wished);
   const VolumeProposal& proposal = proposed.proposal;
@@ -322,8 +327,7 @@ void ImportCommand::run(std::ostream& out) const {
   write(std::move(image), {path_, to.volume, &proposal, 0, iso / kDensityMax, passes}, preview, to);
 
   if (proposal.surface.hounsfield) values << ", HU by their air of -1000";
-  line(out, "file", values.str(), spacing_.empty() ? "--spacing A,B,C for another voxel size" : "");
-  if (!note.empty()) line(out, "series", note, "--series for another");
+  print_source({values.str(), note}, out);
   for (const ProposalLine& choice : proposal_lines(proposal)) {
     line(out, choice.what, choice.chosen, way_to_change(choice.what));
   }
@@ -337,10 +341,16 @@ void ImportCommand::run(std::ostream& out) const {
   line(out, "try", "./kerf demo --scene " + to.scene.string(), "");
 }
 
+void ImportCommand::print_source(const SourceLines& source, std::ostream& out) const {
+  line(out, "file", source.file,
+       spacing_.given() ? "" : "--override-spacing A,B,C for another voxel size");
+  if (!source.note.empty()) line(out, "note", source.note, "");
+}
+
 void ImportCommand::refuse_odd(const std::string& odd) const {
-  if (odd.empty() || !spacing_.empty()) return;
+  if (odd.empty() || spacing_.given()) return;
   throw LoadError(path_ + ": spacing " + odd +
-                  "; give the true voxel size with --spacing x,y,z (mm)");
+                  "; confirm it with --spacing x,y,z (mm), or replace it with --override-spacing");
 }
 
 void ImportCommand::refuse_beside_labels() const {
@@ -375,7 +385,7 @@ void ImportCommand::write(VolumeImage image, ImportedScene scene, const std::str
   if (!labelled) remove_labels(to.volume);
 }
 
-void ImportCommand::import_labelled(VolumeImage image, const std::string& values, const Files& to,
+void ImportCommand::import_labelled(VolumeImage image, const SourceLines& source, const Files& to,
                                     std::ostream& out) const {
   const Density iso = otsu_threshold(image);
   if (!whole_) image = crop_to_solid(image, iso);
@@ -383,7 +393,7 @@ void ImportCommand::import_labelled(VolumeImage image, const std::string& values
   const Label last = *std::ranges::max_element(image.labels);
   const std::string preview = png_bytes(label_preview(image, iso));
   write(std::move(image), {path_, to.volume, nullptr, last, iso / kDensityMax, 0}, preview, to);
-  line(out, "file", values, spacing_.empty() ? "--spacing A,B,C for another voxel size" : "");
+  print_source(source, out);
   line(out, "materials", "by label, the highest is " + std::to_string(last),
        "edit [[material]] in the scene");
   line(out, "crop", size_text(kept) + (whole_ ? kAll : kCropped), whole_ ? "" : kKeepsAll);

@@ -7,6 +7,7 @@
 
 #include "controller/input/sandbox.hpp"
 #include "controller/volume/file/volume_image.hpp"
+#include "controller/volume_tool/volume_commands.hpp"
 #include "shared/text/command_line.hpp"
 
 namespace kerf {
@@ -29,6 +30,7 @@ class ImportCommand {
 
  private:
   struct Files;
+  struct SourceLines;
   [[nodiscard]] Files files() const;
   /// The options for reading the file, and those that replace a proposal.
   [[nodiscard]] ReadOptions read_options() const;
@@ -40,11 +42,13 @@ class ImportCommand {
   void refuse_odd(const std::string& odd) const;
   /// Refuses options for the surface, which the labels define.
   void refuse_beside_labels() const;
-  void import_labelled(VolumeImage image, const std::string& values, const Files& files,
+  void print_source(const SourceLines& source, std::ostream& out) const;
+  void import_labelled(VolumeImage image, const SourceLines& source, const Files& files,
                        std::ostream& out) const;
 
   Arguments command_;
-  std::string path_, out_, spacing_, window_, iso_, denoise_ = "auto";
+  SpacingOptions spacing_;
+  std::string path_, out_, window_, iso_, denoise_ = "auto";
   std::string series_, dims_, type_ = "uint16";
   std::int64_t skip_ = 0;
   bool big_endian_ = false;

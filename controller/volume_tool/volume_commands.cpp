@@ -45,12 +45,26 @@ std::vector<double> numbers(const std::string& option, const std::string& text, 
 
 }  // namespace
 
-std::array<double, 3> spacing_from(const std::string& text) {
-  const std::vector<double> s = numbers("--spacing", text, ',');
+std::array<double, 3> spacing_from(const std::string& option, const std::string& text) {
+  const std::vector<double> s = numbers(option, text, ',');
   if (s.size() == 1) return {s[0], s[0], s[0]};
   if (s.size() == 3) return {s[0], s[1], s[2]};
-  throw LoadError("--spacing: " + text + " has " + std::to_string(s.size()) +
+  throw LoadError(option + ": " + text + " has " + std::to_string(s.size()) +
                   " numbers; give one, or three as x,y,z (mm)");
+}
+
+void SpacingOptions::add_to(Arguments& command) {
+  Option fills = command.option("--spacing", spacing, "mm per voxel, if the file has none");
+  fills.shown_as("A[,B,C]");
+  command.option("--override-spacing", override_spacing, "mm per voxel, in place of the file's")
+      .shown_as("A[,B,C]")
+      .excludes(fills);
+}
+
+void SpacingOptions::set(ReadOptions& options) const {
+  if (!spacing.empty()) options.spacing_mm = spacing_from("--spacing", spacing);
+  if (override_spacing.empty()) return;
+  options.override_spacing_mm = spacing_from("--override-spacing", override_spacing);
 }
 
 Window window_from(const std::string& text) {
@@ -108,7 +122,8 @@ struct VolumeInfo : VolumeFrame {
   static constexpr std::size_t kHistogramBins = 64;
 
   std::string file;
-  bool has_spacing = true;
+  std::uint32_t spacing_known = kAllAxes;
+  std::string note;
   double min = 0, max = 0;  ///< values of the file
   Window window;
   Density otsu = 0;
@@ -149,7 +164,8 @@ VolumeInfo describe(const std::string& file, const SourceVolume& volume, Window 
   VolumeInfo info;
   static_cast<VolumeFrame&>(info) = volume;
   info.file = file;
-  info.has_spacing = volume.has_spacing;
+  info.spacing_known = volume.spacing_known;
+  info.note = volume.note;
   info.min = volume.min;
   info.max = volume.max;
   info.window = window;
@@ -172,12 +188,17 @@ void print(const VolumeInfo& info, std::ostream& out) {
   const auto& d = info.direction;
   out << "file       " << escaped(info.file) << "\nsize       " << info.grid.nx << " x "
       << info.grid.ny << " x " << info.grid.nz << " voxels\nspacing    ";
-  if (info.has_spacing) {
+  if (info.spacing_known == kAllAxes) {
     out << s[0] << " x " << s[1] << " x " << s[2] << " mm\nextent     " << s[0] * info.grid.nx
         << " x " << s[1] * info.grid.ny << " x " << s[2] * info.grid.nz << " mm\n";
   } else {
+    for (std::size_t axis = 0; info.spacing_known != 0 && axis < 3; ++axis) {
+      const bool known = (info.spacing_known >> axis & 1) != 0;
+      out << (known ? number_text(s[axis]) : "?") << (axis < 2 ? " x " : " mm: ");
+    }
     out << "not in the file; give it with --spacing or spacing_mm\n";
   }
+  if (!info.note.empty()) out << "note       " << info.note << '\n';
   out << "origin     " << o[0] << " " << o[1] << " " << o[2] << " mm\ndirection  (" << d[0] << " "
       << d[3] << " " << d[6] << ") (" << d[1] << " " << d[4] << " " << d[7] << ") (" << d[2] << " "
       << d[5] << " " << d[8] << ")\nvalues     " << info.min << " .. " << info.max
@@ -195,13 +216,14 @@ void write_report(const VolumeInfo& info, const std::filesystem::path& path) {
   const Json report{{"denoise_passes", passes_for(info.noise)},
                     {"direction", info.direction},
                     {"file", info.file},
-                    {"has_spacing", info.has_spacing},
+                    {"has_spacing", info.spacing_known == kAllAxes},
                     {"histogram", info.histogram},
                     {"max", info.max},
                     {"min", info.min},
                     {"noise_density", info.noise.density},
                     {"noise_share", info.noise.share},
                     {"origin_mm", info.origin_mm},
+                    {"note", info.note},
                     {"otsu_density", info.otsu / kDensityMax},
                     {"otsu_value", info.otsu_value},
                     {"size_vox", std::array{info.grid.nx, info.grid.ny, info.grid.nz}},
@@ -214,17 +236,15 @@ void write_report(const VolumeInfo& info, const std::filesystem::path& path) {
 
 /// The input of the commands that read a volume.
 struct Source {
-  std::string file, spacing, window;
+  std::string file, window;
+  SpacingOptions spacing;
   int cpu_s = kReadCpuSeconds;
 
   void add_to(Arguments& command, bool with_spacing) {
     command.option("file", file, "volume file, or folder with a DICOM series")
         .required()
         .shown_as("FILE");
-    if (with_spacing) {
-      command.option("--spacing", spacing, "mm per voxel, in place of the file's")
-          .shown_as("A[,B,C]");
-    }
+    if (with_spacing) spacing.add_to(command);
     command.option("--window", window, "values that become density 0 and 1 (default: all)")
         .shown_as("LO,HI");
     command.option("--read-seconds", cpu_s, "CPU time that parsing a file may take")
@@ -235,14 +255,16 @@ struct Source {
     ReadOptions options;
     options.allow_missing_spacing = allow_missing_spacing;
     options.cpu_s = cpu_s;
-    if (!spacing.empty()) options.spacing_mm = spacing_from(spacing);
+    spacing.set(options);
     return read_volume(file, options);
   }
   [[nodiscard]] Window window_for(const SourceVolume& source) const {
     return window.empty() ? range_window(source) : window_from(window);
   }
-  [[nodiscard]] VolumeImage image() const {
+  /// Prints the note of the reading, if there is one.
+  [[nodiscard]] VolumeImage image(std::ostream& out) const {
     const SourceVolume source = read();
+    if (!source.note.empty()) out << escaped(file) << ": " << source.note << '\n';
     VolumeImage image = apply_window(source, window_for(source));
     read_labels_beside(file, image, cpu_s);
     return image;
@@ -330,12 +352,13 @@ struct Commands {
       print(figures, out);
       if (!report.empty()) write_report(figures, report);
     } else if (crop.chosen()) {
-      const VolumeImage image = source.image();
+      const VolumeImage image = source.image(out);
       const Density threshold =
           iso < 0.0 ? otsu_threshold(image) : static_cast<Density>(std::lround(iso * kDensityMax));
       target.write(crop_to_solid(image, threshold, guard), out);
     } else if (resample.chosen()) {
-      target.write(kerf::resample(source.image(), spacing_from(resample_spacing)), out);
+      target.write(kerf::resample(source.image(out), spacing_from("--spacing", resample_spacing)),
+                   out);
     } else {
       PhantomSpec spec;
       spec.shape = shape;

@@ -7,8 +7,10 @@
 #include <string>
 #include <vector>
 
+#include "controller/volume/file/volume_io.hpp"
 #include "controller/volume/windowing.hpp"
 #include "shared/posix/atomic_file.hpp"
+#include "shared/text/command_line.hpp"
 
 // The program kerf-volume, and the options and outputs that its commands share.
 
@@ -19,10 +21,22 @@ namespace kerf {
 int run_volume_tool(int argc, const char* const* argv, std::ostream& out, std::ostream& err);
 
 /// The texts of options as values. Each throws LoadError, one line that names the option.
-[[nodiscard]] std::array<double, 3> spacing_from(const std::string& text);  ///< "0.2" or "1,1,2"
-[[nodiscard]] Window window_from(const std::string& text);                  ///< "-200,1500"
+[[nodiscard]] Window window_from(const std::string& text);  ///< "-200,1500"
+/// "0.2" or "1,1,2"
+[[nodiscard]] std::array<double, 3> spacing_from(const std::string& option,
+                                                 const std::string& text);
 /// "256x256x161"
 [[nodiscard]] VoxelGrid grid_from(const std::string& option, const std::string& text);
+
+/// The two options for the size of a voxel, as they are written.
+struct SpacingOptions {
+  std::string spacing, override_spacing;
+
+  void add_to(Arguments& command);
+  /// Throws as the functions above.
+  void set(ReadOptions& options) const;
+  [[nodiscard]] bool given() const { return !spacing.empty() || !override_spacing.empty(); }
+};
 
 /// The inputs of a command, which its outputs must not replace: the volume's file or folder, and
 /// its labels.

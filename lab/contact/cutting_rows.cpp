@@ -101,7 +101,7 @@ LoadedScene tooth_crown(const std::filesystem::path& file, const Matrix3& standi
   LoadedScene scene = mill_scene(flat);
   SceneVolume& volume = scene.volumes.front();
   const SourceVolume source =
-      read_volume(file, {.spacing_mm = std::array{kVoxelMm, kVoxelMm, kVoxelMm}});
+      read_volume(file, {.override_spacing_mm = std::array{kVoxelMm, kVoxelMm, kVoxelMm}});
   volume.image = apply_window(source, range_window(source));
   volume.iso = otsu_threshold(volume.image);
   volume.image = crop_to_solid(volume.image, volume.iso);

@@ -146,7 +146,7 @@ WorstCase tissue(const char* name, double low, double high) {
 }
 
 WorstCase tooth(const std::filesystem::path& file) {
-  const SourceVolume source = read_volume(file, {.spacing_mm = std::array{0.1, 0.1, 0.1}});
+  const SourceVolume source = read_volume(file, {.override_spacing_mm = std::array{0.1, 0.1, 0.1}});
   VolumeImage image = apply_window(source, range_window(source));
   const Density iso = otsu_threshold(image);
   const Body body{image.grid, std::move(image.density)};

@@ -154,9 +154,14 @@ constexpr Companion kCompanions[] = {
 
 /// Values in the plain scene of keys without a default of their own.
 constexpr std::pair<std::string_view, const char*> kPlain[] = {
-    {"volume.spacing_mm", "0.25"}, {"tool.scale", "1.0"},       {"tool.pitch_mm", "0.25"},
-    {"tool.size_vox", "8"},        {"tool.length_mm", "2.0"},   {"volume.denoise", "1"},
-    {"volume.iso", "0.5"},         {"device.offset_mm", "0.0"},
+    {"volume.override_spacing_mm", "0.25"},
+    {"tool.scale", "1.0"},
+    {"tool.pitch_mm", "0.25"},
+    {"tool.size_vox", "8"},
+    {"tool.length_mm", "2.0"},
+    {"volume.denoise", "1"},
+    {"volume.iso", "0.5"},
+    {"device.offset_mm", "0.0"},
 };
 
 /// Ends that lie within a row's range, because of a rule of their own (scene_file.cpp).
@@ -164,7 +169,7 @@ constexpr std::pair<std::string_view, const char*> kInnerEnds[] = {
     {"device.torque_scale", "[0.001, -0.001, 0.001]"},
     {"volume.pose.orientation", "[1.0, 0.0, 0.0, 0.0]"},
     {"volume.pose.orientation", "[0.5, -0.5, 0.5, 0.5]"},
-    {"volume.spacing_mm", "[0.125, 0.25, 0.5]"},
+    {"volume.override_spacing_mm", "[0.125, 0.25, 0.5]"},
 };
 
 /// The scene that the keys change.

@@ -109,11 +109,12 @@ TEST_CASE("the device origin is put on the first surface unless the scene says w
 
 TEST_CASE("the first solid volume is touched, not what is only seen") {
   const TemporaryFolder folder;
-  const LoadedScene scene = load_scene(block_scene(
-      folder, 0.5,
-      "solid = false\n[[volume]]\nname = \"felt\"\nfile = \"block.nrrd\"\nspacing_mm = 0.25\n"
-      "pose = { position_mm = [20, 0, 0] }\n" +
-          kBall));
+  const LoadedScene scene =
+      load_scene(block_scene(folder, 0.5,
+                             "solid = false\n[[volume]]\nname = \"felt\"\nfile = "
+                             "\"block.nrrd\"\noverride_spacing_mm = 0.25\n"
+                             "pose = { position_mm = [20, 0, 0] }\n" +
+                                 kBall));
   CHECK(scene.device.offset_mm[0] == doctest::Approx(20));
   CHECK(scene.tools.at(0).pitch_mm == 0.25);
 }
@@ -289,7 +290,7 @@ TEST_CASE("options of the command line change the scene") {
   SceneOverrides overrides;
   overrides.rate_hz = 4000;
   overrides.numeric = NumericKind::float64;
-  overrides.spacing_mm = {0.2, 0.3, 0.4};
+  overrides.override_spacing_mm = {0.2, 0.3, 0.4};
   overrides.window = {0, 2000};
   const LoadedScene scene = load_scene(path, overrides);
   CHECK(scene.servo.rate_hz == 4000);
@@ -298,6 +299,7 @@ TEST_CASE("options of the command line change the scene") {
   CHECK(scene.volumes.at(0).image.spacing_mm == std::array<double, 3>{0.2, 0.3, 0.4});
   const auto& density = scene.volumes.at(0).image.density;
   CHECK(*std::max_element(density.begin(), density.end()) == 32768);  // 1000 of 2000
+  CHECK(has(scene.volumes.at(0).note, "OVERRIDDEN: spacing 0.2 x 0.3 x 0.4 mm"));
   CHECK(load_scene(path).cut.rate_per_s == 1000);
 }
 
@@ -310,6 +312,10 @@ TEST_CASE("bad options and volumes that cannot be used are refused in one line w
   CHECK(has(load_error(path, {.rate_hz = 10}), "--rate 10 is out of range; use 250 to 8000"));
   CHECK(has(load_error(path, {.window = std::array{3.0, 3.0}}), "--window is empty"));
   CHECK(has(load_error(path, {.spacing_mm = std::array{0.0, 1.0, 1.0}}), "--spacing"));
+  CHECK(has(load_error(path, {.override_spacing_mm = std::array{0.0, 1.0, 1.0}}),
+            "--override-spacing"));
+  CHECK(has(load_error(path, {.spacing_mm = std::array{0.5, 0.5, 0.25}}),
+            "spacing 0.25 mm along z is given, and the file has 0.5"));
   CHECK(has(load_error(phantom, {.spacing_mm = std::array{1.0, 1.0, 1.0}}),
             "--spacing: the phantom"));
   CHECK(load_error(phantom, missing).starts_with("--volume: "));

@@ -109,6 +109,7 @@ TEST_CASE("every key reaches its place") {
     file = "ct/a.nrrd"
     name = "jaw"
     spacing_mm = [0.1, 0.2, 0.3]
+    override_spacing_mm = 0.4
     window = [-100, 900]
     iso = 0.4
     crop = false
@@ -162,6 +163,7 @@ TEST_CASE("every key reaches its place") {
   CHECK(jaw.where == "scenes/x.toml:4");
   CHECK(jaw.name == "jaw");
   CHECK(jaw.spacing_mm == std::array<double, 3>{0.1, 0.2, 0.3});
+  CHECK(jaw.override_spacing_mm == std::array<double, 3>{0.4, 0.4, 0.4});
   CHECK(jaw.window == std::array<double, 2>{-100, 900});
   CHECK(jaw.iso == 0.4);
   CHECK_FALSE(jaw.crop);
@@ -512,7 +514,7 @@ TEST_CASE("a damaged scene file is loaded whole or explained") {
   static_cast<void>(folder.write(
       "a.nrrd", nrrd(grid, {0.5, 0.5, 0.5}, block(grid, {{3, 3, 3}, {9, 9, 9}}, 700))));
   const std::string scene =
-      "[[volume]]\nfile=\"a.nrrd\"\nspacing_mm=[0.5,0.4,0.3]\nwindow=[0,900]\niso=0.4\n"
+      "[[volume]]\nfile=\"a.nrrd\"\noverride_spacing_mm=[0.5,0.4,0.3]\nwindow=[0,900]\niso=0.4\n"
       "pose={position_mm=[1,2,3]}\n[[tool]]\nshape=\"flame\"\nradius_mm=0.6\nlength_mm=2.5\n"
       "[device]\nworkspace_scale=2\n[limits]\nforce_n=2.5\n[servo]\nrate_hz=2000\n";
   LoadedScene valid = load_scene(folder.write("valid.toml", scene));

@@ -38,7 +38,7 @@ void check_counting(const SourceVolume& v) {
   CHECK(v.min == 0.0);
   CHECK(v.max == 59.0);
   CHECK(v.spacing_mm == Three{1, 2, 3});
-  CHECK(v.has_spacing);
+  CHECK(v.spacing_known == kAllAxes);
 }
 
 /// Where voxel (i, j, k) lies in the frame of the file.
@@ -129,26 +129,74 @@ TEST_CASE("NIfTI is read plain and gzipped, in both byte orders, with one layer 
       folder.write("d.nii", nifti(spec) + bytes_of(counting<std::int16_t>(), std::endian::big))));
 }
 
-TEST_CASE("the spacing of the options goes before the file's") {
+TEST_CASE("a spacing of the options fills in what the file lacks") {
+  const TemporaryFolder folder;
+  const auto path =
+      folder.write("a.nrrd", nrrd("uint8", "") + "\n" + bytes_of(counting<std::uint8_t>()));
+  const SourceVolume v = read_volume(path, {.spacing_mm = Three{0.5, 0.25, 0.125}});
+  CHECK(v.spacing_mm == Three{0.5, 0.25, 0.125});
+  CHECK(v.spacing_known == kAllAxes);
+  CHECK(v.note.empty());
+}
+
+TEST_CASE("a spacing of the options that contradicts the file is refused with both values") {
+  const TemporaryFolder folder;
+  const auto path =
+      folder.write("a.nrrd", nrrd("uint8", kSpacings) + "\n" + bytes_of(counting<std::uint8_t>()));
+  CHECK(read_volume(path, {.spacing_mm = Three{1, 2, 3}}).note.empty());
+  for (const auto& [given, what] :
+       {std::pair{Three{1, 2, 2}, "spacing 2 mm along z is given, and the file has 3;"},
+        {Three{1, 2.001, 3}, "spacing 2.001 mm along y is given, and the file has 2;"},
+        {Three{3, 2, 1}, "spacing 3 mm along x is given, and the file has 1;"}}) {
+    const std::string message = refusal(path, {.spacing_mm = given});
+    CAPTURE(message);
+    CHECK(has(message, what));
+    CHECK(has(message, "--override-spacing"));
+    CHECK(is_one_line(message));
+  }
+}
+
+TEST_CASE("a spacing that is the file's but for rounding is accepted, and the file's is used") {
+  const TemporaryFolder folder;
+  const auto read = [&](const char* in_file, double given) {
+    const auto path =
+        folder.write("a.nrrd", nrrd("uint8", std::string("spacings: ") + in_file + " 1 1\n") +
+                                   "\n" + bytes_of(counting<std::uint8_t>()));
+    return read_volume(path, {.spacing_mm = Three{given, 1, 1}});
+  };
+  const SourceVolume v = read("0.48828125", 0.488);
+  CHECK(v.spacing_mm == Three{0.48828125, 1, 1});
+  CHECK(has(v.note, "spacing 0.488 mm along x is given, rounded; the file's 0.48828125 is used"));
+  CHECK(read("0.488281", 0.48828125).spacing_mm[0] == 0.488281);
+  CHECK_THROWS_AS(static_cast<void>(read("0.48828125", 0.487)), LoadError);
+  CHECK_THROWS_AS(static_cast<void>(read("0.488", 0.5)), LoadError);  // another value
+  CHECK_THROWS_AS(static_cast<void>(read("1", 1.0001)), LoadError);
+}
+
+TEST_CASE("a spacing that overrides replaces the file's, and the note has both") {
   const TemporaryFolder folder;
   const auto bytes = bytes_of(counting<std::uint8_t>());
-  ReadOptions options;
-  options.spacing_mm = Three{0.5, 0.25, 0.125};
   const auto with = folder.write("a.nrrd", nrrd("uint8", kSpacings) + "\n" + bytes);
-  CHECK(read_volume(with, options).spacing_mm == *options.spacing_mm);
+  const SourceVolume v = read_volume(with, {.override_spacing_mm = Three{0.5, 0.25, 0.125}});
+  CHECK(v.spacing_mm == Three{0.5, 0.25, 0.125});
+  CHECK(v.note == "OVERRIDDEN: spacing 0.5 x 0.25 x 0.125 mm in place of the file's 1 x 2 x 3 mm");
   const auto without = folder.write("b.nrrd", nrrd("uint8", "") + "\n" + bytes);
-  const SourceVolume v = read_volume(without, options);
-  CHECK(v.spacing_mm == *options.spacing_mm);
-  CHECK(v.has_spacing);
+  CHECK(read_volume(without, {.override_spacing_mm = Three{1, 1, 2}}).note ==
+        "OVERRIDDEN: spacing 1 x 1 x 2 mm in place of the file's none");
+  CHECK(has(refusal(with, {.spacing_mm = Three{1, 2, 3}, .override_spacing_mm = Three{1, 2, 3}}),
+            "both given"));
+  for (const double bad : {0.0, -1.0, 1e9, std::numeric_limits<double>::quiet_NaN()}) {
+    CHECK(has(refusal(with, {.override_spacing_mm = Three{1, 1, bad}}), "is not a voxel size"));
+  }
 }
 
 TEST_CASE("a first look may go without spacing, and is told so") {
   const TemporaryFolder folder;
-  ReadOptions options;
-  options.allow_missing_spacing = true;
   const auto path =
       folder.write("a.nrrd", nrrd("uint8", "") + "\n" + bytes_of(counting<std::uint8_t>()));
-  CHECK_FALSE(read_volume(path, options).has_spacing);
+  const SourceVolume v = read_volume(path, {.allow_missing_spacing = true});
+  CHECK(v.spacing_known == 0);
+  CHECK(v.spacing_mm == Three{1, 1, 1});
 }
 
 TEST_CASE("position and direction of a file are kept") {

@@ -129,7 +129,7 @@ TEST_CASE("an import leaves a scene that runs, or nothing") {
   CHECK_NOTHROW(static_cast<void>(load_scene(folder / "small.toml")));
 
   const Outcome wide =
-      run({"import", blob, "--spacing", "900", "--out", (folder / "wide.nrrd").string()});
+      run({"import", blob, "--override-spacing", "900", "--out", (folder / "wide.nrrd").string()});
   CHECK(wide.code == 2);
   CHECK(wide.out.empty());
   CHECK(has(wide.err, "wide.toml:5: the box needs a workspace scale of "));
@@ -143,8 +143,8 @@ TEST_CASE("an import that is refused replaces nothing") {
   const std::string blob = blob_file(folder);
   const std::string names[] = {"old.nrrd", "old-labels.nrrd", "old.toml", "old.png"};
   for (const std::string& name : names) folder.write(name, "mine: " + name);
-  const Outcome refused =
-      run({"import", blob, "--spacing", "900", "--out", (folder / "old.nrrd").string(), "--force"});
+  const Outcome refused = run({"import", blob, "--override-spacing", "900", "--out",
+                               (folder / "old.nrrd").string(), "--force"});
   CHECK(refused.code == 2);
   for (const std::string& name : names) {
     CAPTURE(name);

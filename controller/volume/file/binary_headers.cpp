@@ -183,8 +183,8 @@ VolumeHeader read_nifti_header(const fs::path& path) {
   }
   walk_data(path, file.get(), h, expected);
   VolumeHeader header;
-  header.has_spacing = std::all_of(h.pixdim.begin(), h.pixdim.end(),
-                                   [](double edge) { return std::isfinite(edge) && edge != 0.0; });
+  const auto is_length = [](double edge) { return std::isfinite(edge) && edge != 0.0; };
+  header.spacing_known = std::ranges::all_of(h.pixdim, is_length) ? kAllAxes : 0;
   return header;
 }
 
@@ -243,7 +243,7 @@ VolumeHeader read_tiff_header(const fs::path& path) {
     if (++pages > kMaxVoxelsPerAxis) check_grid(path.string(), 1, 1, pages);
   }
   VolumeHeader header;
-  header.has_spacing = false;  // a TIFF has none between pages
+  header.spacing_known = 0;  // a TIFF has none between pages
   return header;
 }
 

@@ -9,6 +9,8 @@
 
 #include <zlib.h>
 
+#include "controller/volume/file/volume_image.hpp"
+
 // Facts of a volume file's header that ITK's readers do not pass on, or judge badly.
 // text_headers.cpp reads NRRD and MetaImage, binary_headers.cpp NIfTI and TIFF.
 
@@ -27,7 +29,7 @@ namespace kerf {
 /// Facts of a header that ITK's readers do not pass on: they replace a missing spacing by 1, wrap
 /// huge sizes to 32 bits, and (MetaImage, NIfTI) accept a cut-off file.
 struct VolumeHeader {
-  bool has_spacing = true;
+  std::uint32_t spacing_known = kAllAxes;  ///< as in UntrustedHeader
   /// The most bytes of voxels that the file can hold, given its size and encoding.
   std::uint64_t data_bytes_at_most = std::numeric_limits<std::uint64_t>::max();
   std::string data_file;  ///< file of the voxels, for messages

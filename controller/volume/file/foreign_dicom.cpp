@@ -107,7 +107,7 @@ void read_dicom_file(const fs::path& path, const MemoryRequest& offer) {
                       ": one slice; name the folder that holds the whole DICOM series");
     }
     refuse_broken_rescale(path, *io);
-    header.has_spacing = names_spacing(*io) && names_slice_distance(*io);
+    header.spacing_known = names_spacing(*io) && names_slice_distance(*io) ? kAllAxes : 0;
   }
   read_one_file(path, *io, header, offer);
 }
@@ -142,7 +142,7 @@ std::vector<Series> all_series(const std::vector<fs::path>& files, SandboxReader
     Series& series = found[{number, uid}];
     series.uid = uid;
     series.name = trimmed(value_of(*io, "0008|103e").value_or(""));
-    series.images.push_back({file, claim_of(file, *io, size, names_spacing(*io))});
+    series.images.push_back({file, claim_of(file, *io, size, names_spacing(*io) ? kAllAxes : 0)});
   }
   std::vector<Series> all;
   for (auto& [key, series] : found) all.push_back(std::move(series));
@@ -249,9 +249,9 @@ Stack stack_of(const fs::path& folder, const std::vector<Image>& images) {
     const UntrustedHeader& own = image.claim;
     // What no tag names is a guess, and differs from one time to the next.
     const bool same_spacing =
-        own.has_spacing == first.claim.has_spacing &&
-        (own.has_spacing == 0 || (own.spacing_mm[0] == first.claim.spacing_mm[0] &&
-                                  own.spacing_mm[1] == first.claim.spacing_mm[1]));
+        own.spacing_known == first.claim.spacing_known &&
+        (own.spacing_known == 0 || (own.spacing_mm[0] == first.claim.spacing_mm[0] &&
+                                    own.spacing_mm[1] == first.claim.spacing_mm[1]));
     if (own.size != first.claim.size || own.size[2] != 1 || own.axes[0] != x || own.axes[1] != y ||
         !same_spacing) {
       throw LoadError(image.file.string() + ": its size, spacing or direction differs from " +
@@ -288,10 +288,9 @@ void read_dicom_series(const fs::path& folder, const std::vector<fs::path>& besi
 
   Stack stack = stack_of(folder, images);
   if (all.size() > 1) {
-    const std::string note = "series " + std::to_string(chosen + 1) + " of " +
-                             std::to_string(all.size()) + ", " + text_of(all[chosen]);
-    std::copy_n(note.begin(), std::min(note.size(), stack.claim.note.size() - 1),
-                stack.claim.note.begin());
+    add_note(stack.claim, "series " + std::to_string(chosen + 1) + " of " +
+                              std::to_string(all.size()) + ", " + text_of(all[chosen]) +
+                              " (import --series chooses another)");
   }
   std::span<std::byte> rest = offer(stack.claim);
   const std::size_t bytes = static_cast<std::size_t>(stack.claim.size[0] * stack.claim.size[1]) *

@@ -55,6 +55,19 @@ std::string last_line(const std::string& message) {
 
 }  // namespace
 
+void add_note(UntrustedHeader& header, std::string_view sentence) {
+  const auto end = std::ranges::find(header.note, '\0');
+  constexpr std::string_view kCut = "...";
+  const std::string text = (end == header.note.begin() ? "" : "; ") + std::string(sentence);
+  const auto room = static_cast<std::size_t>(header.note.end() - end) - 1;  // ends in a zero
+  if (text.size() <= room) {
+    std::ranges::copy(text, end);
+  } else {
+    std::copy_n(text.begin(), room, end);
+    std::ranges::copy(kCut, header.note.end() - 1 - kCut.size());
+  }
+}
+
 Quiet::Quiet() : cerr_(std::cerr.rdbuf(kept_.rdbuf())), cout_(std::cout.rdbuf(kept_.rdbuf())) {}
 
 Quiet::~Quiet() {
@@ -129,12 +142,12 @@ void read_voxels(const fs::path& path, ImageIo& io, std::span<std::byte> bytes) 
 }
 
 UntrustedHeader claim_of(const fs::path& path, const ImageIo& io,
-                         const std::array<std::int64_t, 3>& size, bool has_spacing) {
+                         const std::array<std::int64_t, 3>& size, std::uint32_t spacing_known) {
   UntrustedHeader claim;
   claim.size = size;
   claim.voxel_bytes = static_cast<std::uint32_t>(io.GetComponentSize());
   claim.kind = kind_of(type_of(path, io));
-  claim.has_spacing = has_spacing ? 1 : 0;
+  claim.spacing_known = spacing_known;
   for (unsigned axis = 0; axis < 3; ++axis) {
     const std::vector<double> way = io.GetDirection(axis);
     claim.spacing_mm[axis] = io.GetSpacing(axis);
@@ -171,7 +184,7 @@ void read_one_file(const fs::path& path, ImageIo& io, const VolumeHeader& header
   if (header.data_bytes_at_most < bytes) {
     refuse_truncated(header.data_file, header.data_bytes_at_most, bytes);
   }
-  const UntrustedHeader claim = claim_of(path, io, size, header.has_spacing);
+  const UntrustedHeader claim = claim_of(path, io, size, header.spacing_known);
   const std::span<std::byte> memory = offer(claim);
   // The file's own voxels fill the end of the memory, their values then its begin.
   const std::span<std::byte> own = memory.last(bytes);
@@ -203,7 +216,7 @@ void read_raw(const fs::path& path, const RawLayout& layout, const MemoryRequest
   claim.size = {layout.grid.nx, layout.grid.ny, layout.grid.nz};
   claim.voxel_bytes = static_cast<std::uint32_t>(each);
   claim.kind = kerf::kind_of(layout.type);
-  claim.has_spacing = 0;
+  claim.spacing_known = 0;
   claim.axes = {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
   const std::span<std::byte> memory = offer(claim);
   const std::span<std::byte> own = memory.last(wanted);

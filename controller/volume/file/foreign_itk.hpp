@@ -96,9 +96,10 @@ auto guarded(const std::filesystem::path& path, Step&& step) {
 /// Reads all voxels of the opened file, unconverted, into `bytes`.
 void read_voxels(const std::filesystem::path& path, ImageIo& io, std::span<std::byte> bytes);
 
-/// The claim of the opened file. `kind` is that of its own type.
+/// The claim of the opened file. `kind` is that of its own type; `spacing_known` as in the claim.
 [[nodiscard]] UntrustedHeader claim_of(const std::filesystem::path& path, const ImageIo& io,
-                                       const std::array<std::int64_t, 3>& size, bool has_spacing);
+                                       const std::array<std::int64_t, 3>& size,
+                                       std::uint32_t spacing_known);
 
 /// One file that holds a whole volume.
 void read_one_file(const std::filesystem::path& path, ImageIo& io, const VolumeHeader& header,

@@ -197,7 +197,7 @@ void read_slice_stack(const fs::path& folder, const std::vector<fs::path>& besid
     }
   }
   claim.voxel_bytes = static_cast<std::uint32_t>(bytes_of(claim.kind));
-  claim.has_spacing = 0;
+  claim.spacing_known = 0;
   // Rows run downwards and slices upwards in a body that lies on its back, as in DICOM.
   claim.axes = {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
 

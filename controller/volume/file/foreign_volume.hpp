@@ -7,6 +7,7 @@
 #include <functional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "controller/input/sandbox.hpp"
@@ -34,11 +35,16 @@ struct UntrustedHeader {
   std::array<std::int64_t, 3> size{};
   std::uint32_t voxel_bytes = 0;  ///< of the requested memory, at least those of a value
   ValueKind kind = ValueKind::float32;
-  std::uint32_t has_spacing = 1;  ///< else `spacing_mm` is a library's guess
+  /// Bit a: the file names the distance along axis a; else `spacing_mm[a]` is a library's guess.
+  std::uint32_t spacing_known = kAllAxes;
   std::array<double, 3> spacing_mm{1, 1, 1}, origin_mm{};
   std::array<vec3::Vec, 3> axes{};  ///< direction of each
-  std::array<char, 256> note{};     ///< the choice among several, for the user
+  std::array<char, 1024> note{};    ///< for the user: sentences of `add_note`
 };
+
+/// Adds a sentence to the note, after "; " if it has one: a choice among several, an order by
+/// number, skipped files. A sentence that does not fit is cut off, and ends in "...".
+void add_note(UntrustedHeader& header, std::string_view sentence);
 
 /// Hands over the claim and returns the memory for it.
 using MemoryRequest = std::function<std::span<std::byte>(const UntrustedHeader&)>;

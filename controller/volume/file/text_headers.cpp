@@ -328,7 +328,7 @@ VolumeHeader read_nrrd_header(const fs::path& path) {
   VolumeHeader header;
   const std::vector<double> spacings = numbers(text.get("spacings"));
   const std::vector<double> directions = numbers(text.get("space directions"));
-  header.has_spacing = spacings.size() >= 3 || directions.size() >= 9;
+  header.spacing_known = spacings.size() >= 3 || directions.size() >= 9 ? kAllAxes : 0;
   if (std::find(spacings.begin(), spacings.end(), 0.0) != spacings.end()) {
     throw LoadError(path.string() + ": spacings: " + shown(text.get("spacings")) +
                     " holds a zero; correct the header, or remove the line and give the spacing in "
@@ -363,7 +363,8 @@ VolumeHeader read_meta_header(const fs::path& path) {
   check_meta_fields(path, text.fields);
   check_sizes(path, sizes);
   VolumeHeader header;
-  header.has_spacing = !text.get("elementspacing").empty() || !text.get("elementsize").empty();
+  const bool spaced = !text.get("elementspacing").empty() || !text.get("elementsize").empty();
+  header.spacing_known = spaced ? kAllAxes : 0;
   const bool several = data.find('%') != std::string::npos || lower(data).rfind("list", 0) == 0;
   const bool packed = lower(text.get("compresseddata")) == "true";
   header.leaves_out = several || packed;

@@ -26,6 +26,9 @@ struct VolumeFrame {
   std::array<double, 9> direction{1, 0, 0, 0, 1, 0, 0, 0, 1};
 };
 
+/// Axes of a volume as bits, bit a for axis a: all of them.
+inline constexpr std::uint32_t kAllAxes = 0b111;
+
 /// A volume in memory as the scene keeps it: u16 density, x fastest, in its own axes. Load time
 /// only.
 struct VolumeImage : VolumeFrame {
@@ -42,8 +45,10 @@ inline constexpr std::int64_t kMaxVoxels = std::int64_t{512} << 20;
 void check_grid(const std::string& place, std::int64_t nx, std::int64_t ny, std::int64_t nz,
                 const char* way_out = "crop or resample it first");
 
-/// Throws LoadError unless each spacing is finite and within 1 nm .. 1 m.
-void check_spacing(const std::string& place, const std::array<double, 3>& spacing_mm);
+/// Throws LoadError unless each spacing is finite and within 1 nm .. 1 m. `place` and `way_out` as
+/// above.
+void check_spacing(const std::string& place, const std::array<double, 3>& spacing_mm,
+                   const char* way_out = "`spacing_mm = [..]` in the scene or `--spacing`");
 
 /// Type of the values of a file in memory: the smallest that holds each value exactly, or nearest.
 /// A CT of 16 bits takes 2 bytes a voxel.

@@ -3,12 +3,14 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <charconv>
 #include <cmath>
 #include <cstddef>
 #include <cstring>
 #include <limits>
 #include <span>
 #include <string>
+#include <string_view>
 #include <system_error>
 #include <type_traits>
 #include <utility>
@@ -177,21 +179,106 @@ void set_grid(const fs::path& path, const std::array<std::int64_t, 3>& size, Sou
                  static_cast<std::int32_t>(size[2])};
 }
 
-/// Takes the spacing of the option, else that of the file. If both lack it, refuses unless the
-/// options allow that.
-void set_spacing(const fs::path& path, const ReadOptions& options, bool in_file,
-                 const std::array<double, 3>& from_file, SourceVolume& volume) {
-  volume.has_spacing = in_file || options.spacing_mm.has_value();
-  if (options.spacing_mm) {
-    volume.spacing_mm = *options.spacing_mm;
-  } else if (in_file) {
-    volume.spacing_mm = from_file;
-  } else if (!options.allow_missing_spacing) {
-    throw LoadError(path.string() +
-                    ": spacing is not in the file; add `spacing_mm = [x, y, z]` to the scene or "
-                    "`--spacing x,y,z` (mm)");
+void add_sentence(std::string& note, const std::string& sentence) {
+  note += (note.empty() ? "" : "; ") + sentence;
+}
+
+constexpr std::string_view kAxisLetters = "xyz";
+constexpr const char* kOverride =
+    "`override_spacing_mm = [..]` in the scene or `--override-spacing`";
+
+/// How far a value may be from the one that was rounded to it, mm: half a unit of the last digit of
+/// its shortest decimal text, as a float if it is one. 0 for less than three digits: 0.5 and 1 are
+/// rather values of their own.
+double rounding_mm(double value) {
+  std::array<char, 512> text{};
+  const auto narrow = static_cast<float>(value);
+  const char* const end =
+      (static_cast<double>(narrow) == value
+           ? std::to_chars(text.begin(), text.end(), narrow, std::chars_format::fixed)
+           : std::to_chars(text.begin(), text.end(), value, std::chars_format::fixed))
+          .ptr;
+  const char* const point = std::find(text.cbegin(), end, '.');
+  const auto decimals = point == end ? std::ptrdiff_t{0} : end - point - 1;
+  const double unit = std::pow(10.0, -static_cast<double>(decimals));
+  return value < 100 * unit ? 0 : unit / 2;
+}
+
+/// Whether two distances along an axis of `count` voxels are one, rounded: to the digits of the
+/// coarser one, and no voxel moves by more than half a voxel.
+bool is_rounded(double file_mm, double given_mm, std::int32_t count) {
+  const double apart_mm = std::abs(file_mm - given_mm);
+  return apart_mm <= std::max(rounding_mm(file_mm), rounding_mm(given_mm)) &&
+         2 * apart_mm * (count - 1) <= file_mm;
+}
+
+/// The spacing along each axis, a letter for one that is not known.
+std::string spacing_text(const std::array<double, 3>& mm, std::uint32_t known,
+                         const char* between) {
+  std::string text;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    text += axis == 0 ? "" : between;
+    text += (known >> axis & 1) != 0 ? number_text(mm[axis]) : std::string(1, kAxisLetters[axis]);
   }
-  check_spacing(path.string(), volume.spacing_mm);
+  return text;
+}
+
+[[noreturn]] void refuse_unspaced(const fs::path& path, const std::array<double, 3>& mm,
+                                  std::uint32_t known) {
+  std::string axes;
+  for (std::size_t axis = 0; known != 0 && axis < 3; ++axis) {
+    if ((known >> axis & 1) != 0) continue;
+    axes += (axes.empty() ? " along " : ", ") + std::string(1, kAxisLetters[axis]);
+  }
+  throw LoadError(path.string() + ": spacing" + axes + " is not in the file; add `spacing_mm = [" +
+                  spacing_text(mm, known, ", ") + "]` to the scene or `--spacing " +
+                  spacing_text(mm, known, ",") + "` (mm)");
+}
+
+/// Takes the spacing of the file, and that of the options for the axes of which it has none.
+/// Refuses a conflict between them, and a missing one unless the options allow that.
+void set_spacing(const fs::path& path, const ReadOptions& options, const UntrustedHeader& claim,
+                 SourceVolume& volume) {
+  const std::uint32_t in_file = claim.spacing_known & kAllAxes;
+  std::array<double, 3> mm{1, 1, 1};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    if ((in_file >> axis & 1) != 0) mm[axis] = claim.spacing_mm[axis];
+  }
+  volume.spacing_known = in_file;
+  if (options.override_spacing_mm) {
+    volume.spacing_known = kAllAxes;
+    volume.spacing_mm = *options.override_spacing_mm;
+    check_spacing(path.string(), volume.spacing_mm, kOverride);
+    add_sentence(volume.note,
+                 "OVERRIDDEN: spacing " + spacing_text(volume.spacing_mm, kAllAxes, " x ") +
+                     " mm in place of the file's " +
+                     (in_file == 0 ? "none" : spacing_text(mm, in_file, " x ") + " mm"));
+    return;
+  }
+  check_spacing(path.string(), mm, kOverride);
+  if (options.spacing_mm) {
+    const std::array<double, 3>& given = *options.spacing_mm;
+    check_spacing(path.string(), given);
+    const std::array<std::int32_t, 3> count{volume.grid.nx, volume.grid.ny, volume.grid.nz};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      if ((in_file >> axis & 1) == 0) {
+        mm[axis] = given[axis];
+      } else if (given[axis] != mm[axis]) {
+        const std::string both = number_text(given[axis]) + " mm along " + kAxisLetters[axis];
+        if (!is_rounded(mm[axis], given[axis], count[axis])) {
+          throw LoadError(path.string() + ": spacing " + both + " is given, and the file has " +
+                          number_text(mm[axis]) + "; leave it out, or replace the file's with " +
+                          kOverride);
+        }
+        add_sentence(volume.note, "spacing " + both + " is given, rounded; the file's " +
+                                      number_text(mm[axis]) + " is used");
+      }
+    }
+    volume.spacing_known = kAllAxes;
+  } else if (in_file != kAllAxes && !options.allow_missing_spacing) {
+    refuse_unspaced(path, mm, in_file);
+  }
+  volume.spacing_mm = mm;
 }
 
 /// Refuses an origin that is not finite.
@@ -275,21 +362,21 @@ void set_frame(const fs::path& path, Axis x, Axis y, Axis z, SourceVolume& volum
 /// Checks the header that the sandbox reports; returns the bytes of memory for it.
 std::size_t accept(const fs::path& path, const ReadOptions& options, const UntrustedHeader& claim,
                    SourceVolume& source) {
+  source.note = escaped(std::string(claim.note.begin(), std::ranges::find(claim.note, '\0')));
   set_grid(path, claim.size, source);
-  set_spacing(path, options, claim.has_spacing != 0, claim.spacing_mm, source);
+  set_spacing(path, options, claim, source);
   set_origin(path, claim.origin_mm, source);
   const std::uint64_t each = std::clamp<std::uint64_t>(claim.voxel_bytes, bytes_of(claim.kind), 8);
   return source.grid.voxel_count() * each;
 }
 
-/// On one line of a terminal.
-std::string note_of(const UntrustedHeader& claim) {
-  return escaped(std::string(claim.note.begin(), std::ranges::find(claim.note, '\0')));
-}
-
 }  // namespace
 
 SourceVolume read_volume(const fs::path& path, const ReadOptions& options) {
+  if (options.spacing_mm && options.override_spacing_mm) {
+    throw LoadError(path.string() +
+                    ": a spacing and one that overrides it are both given; leave one of them out");
+  }
   const std::vector<fs::path> folder = files_in(path);
   const Kind kind = kind_of(path, folder, options.raw.has_value());
   SourceVolume source;
@@ -314,7 +401,6 @@ SourceVolume read_volume(const fs::path& path, const ReadOptions& options) {
         return accept(path, options, claim, source);
       });
   source.values = VoxelValues(memory.bytes(), claim.kind, source.grid.voxel_count());
-  source.note = note_of(claim);
   source.memory = std::move(memory);
   set_range(path, source);
   set_frame(path, claim.axes[0], claim.axes[1], claim.axes[2], source);

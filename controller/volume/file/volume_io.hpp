@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <span>
@@ -19,19 +20,23 @@ namespace kerf {
 /// The frame is LPS for the medical formats, the file's own if it names none. A mirrored file is
 /// read with its last axis reversed, so the picture is the same and the axes are right-handed.
 struct SourceVolume : VolumeFrame {
-  bool has_spacing = true;  ///< false: neither file nor options have one; 1 mm is used
-  VoxelValues values;       ///< in `memory`
-  std::string note;         ///< the choice among several, or empty
+  /// Bit a: file or options have the distance along axis a; else `spacing_mm[a]` is 1.
+  std::uint32_t spacing_known = kAllAxes;
+  VoxelValues values;  ///< in `memory`
+  std::string note;    ///< what the user should know of the reading, on one line; or empty
   double min = 0, max = 0;
   SharedBytes memory;
 };
 
 struct ReadOptions {
-  std::optional<std::array<double, 3>> spacing_mm;  ///< replaces that of the file
-  bool allow_missing_spacing = false;               ///< for a preview; see `has_spacing`
-  int cpu_s = kReadCpuSeconds;                      ///< CPU time that parsing may take
-  std::string series{};            ///< of several in a folder: its number or a part of its name
-  std::optional<RawLayout> raw{};  ///< of a file without a header
+  /// For the axes of which the file has no distance. Along the others it must be the file's, but
+  /// for the rounding of its digits: a conflict is refused.
+  std::optional<std::array<double, 3>> spacing_mm{};
+  std::optional<std::array<double, 3>> override_spacing_mm{};  ///< in place of any of the file's
+  bool allow_missing_spacing = false;  ///< for a preview; see `spacing_known`
+  int cpu_s = kReadCpuSeconds;         ///< CPU time that parsing may take
+  std::string series{};                ///< of several in a folder: its number or a part of its name
+  std::optional<RawLayout> raw{};      ///< of a file without a header
 };
 
 /// Reads NRRD (.nrrd, .nhdr), MetaImage (.mha, .mhd), NIfTI (.nii, .nii.gz), TIFF of several pages,

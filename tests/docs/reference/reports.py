@@ -127,6 +127,7 @@ REPORTS = [
      ["hi", "lo"], [
         ("file", "", "its path"),
         ("size_vox, spacing_mm, has_spacing", "voxels, mm", "x, y, z; whether the file has a spacing"),
+        ("note", "", "of the reading: what was chosen, skipped or replaced; empty if nothing was"),
         ("origin_mm, direction", "mm", "centre of voxel (0, 0, 0); axes, nine numbers by rows"),
         ("min, max", "", "values of the file"),
         ("window", "", "values that become density 0 and 1"),

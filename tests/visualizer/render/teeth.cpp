@@ -64,7 +64,7 @@ std::optional<Tooth> ct_tooth() {
     return std::nullopt;
   }
   ReadOptions options;
-  options.spacing_mm = {0.125, 0.125, 0.125};
+  options.override_spacing_mm = {0.125, 0.125, 0.125};
   constexpr double kAir = 391.0;
   constexpr double kMost = 1300.0;
   constexpr double kIso = 620.0;
