@@ -46,8 +46,8 @@ constexpr std::initializer_list<int> kHarmless{
     SCMP_SYS(mremap),         SCMP_SYS(brk),           SCMP_SYS(madvise),
     SCMP_SYS(getrandom),      SCMP_SYS(clock_gettime), SCMP_SYS(gettimeofday),
     SCMP_SYS(uname),          SCMP_SYS(getpid),        SCMP_SYS(gettid),
-    SCMP_SYS(rt_sigprocmask), SCMP_SYS(rt_sigreturn),  SCMP_SYS(exit),
-    SCMP_SYS(exit_group)};
+    SCMP_SYS(rt_sigprocmask), SCMP_SYS(rt_sigreturn),  SCMP_SYS(rt_sigaction),
+    SCMP_SYS(exit),           SCMP_SYS(exit_group)};
 
 #ifdef KERF_SANITIZED
 // The sanitizers of our own code test addresses with a pipe and report on stderr.

@@ -507,8 +507,8 @@ struct Sample {
 
 DicomSpec slices_in_one() {
   DicomSpec spec;
-  spec.frames = 5;
-  spec.slice_spacing = "1";
+  spec.set(0x0028, 0x0008, "IS", "5");
+  spec.set(0x0018, 0x0088, "DS", "1");
   spec.values = counting<std::int16_t>();
   return spec;
 }

@@ -58,14 +58,12 @@ std::string nifti(const NiftiSpec& spec) {
   return header;
 }
 
-namespace {
-
-std::string element(std::uint16_t group, std::uint16_t number, const std::string& type,
-                    std::string value) {
-  const bool binary = type == "OB" || type == "OW" || type == "US" || type == "UL";
-  if (value.size() % 2 == 1) value += type == "UI" || binary ? '\0' : ' ';
+std::string dicom_element(std::uint16_t group, std::uint16_t number, const std::string& type,
+                          std::string value) {
+  const bool text = type != "OB" && type != "OW" && type != "UI" && type != "SQ" && type != "UN";
+  if (value.size() % 2 == 1) value += text ? ' ' : '\0';
   std::string bytes = bytes_of(group) + bytes_of(number) + type;
-  if (type == "OB" || type == "OW") {
+  if (type[0] == 'O' || type == "SQ" || type == "UN") {
     bytes += std::string(2, '\0') + bytes_of(static_cast<std::uint32_t>(value.size()));
   } else {
     bytes += bytes_of(static_cast<std::uint16_t>(value.size()));
@@ -73,44 +71,54 @@ std::string element(std::uint16_t group, std::uint16_t number, const std::string
   return bytes + value;
 }
 
-std::string text(double value) {
-  std::ostringstream out;
-  out << value;
-  return out.str();
+std::string dicom_item(const std::string& elements) {
+  return bytes_of(std::uint16_t{0xfffe}) + bytes_of(std::uint16_t{0xe000}) +
+         bytes_of(static_cast<std::uint32_t>(elements.size())) + elements;
 }
-
-}  // namespace
 
 std::string dicom(const DicomSpec& spec) {
   const std::string ct = "1.2.840.10008.5.1.4.1.1.2";
   const std::string instance = spec.series + ".7." + std::to_string(spec.instance);
   const auto u16 = [](int value) { return bytes_of(static_cast<std::uint16_t>(value)); };
-  std::string meta = element(0x0002, 0x0001, "OB", std::string("\0\1", 2)) +
-                     element(0x0002, 0x0002, "UI", ct) + element(0x0002, 0x0003, "UI", instance) +
-                     element(0x0002, 0x0010, "UI", "1.2.840.10008.1.2.1");
-  meta = element(0x0002, 0x0000, "UL", bytes_of(static_cast<std::uint32_t>(meta.size()))) + meta;
-  std::string data =
-      element(0x0008, 0x0016, "UI", ct) + element(0x0008, 0x0018, "UI", instance) +
-      element(0x0008, 0x0060, "CS", "CT") +
-      (spec.slice_spacing.empty() ? "" : element(0x0018, 0x0088, "DS", spec.slice_spacing)) +
-      (spec.imager_spacing.empty() ? "" : element(0x0018, 0x1164, "DS", spec.imager_spacing)) +
-      element(0x0020, 0x000D, "UI", "1.2.826.0.1.9") + element(0x0020, 0x000E, "UI", spec.series) +
-      element(0x0020, 0x0013, "IS", std::to_string(spec.instance)) +
-      element(0x0020, 0x0032, "DS",
-              text(spec.position_mm[0]) + "\\" + text(spec.position_mm[1]) + "\\" +
-                  text(spec.position_mm[2])) +
-      element(0x0020, 0x0037, "DS", spec.orientation) + element(0x0028, 0x0002, "US", u16(1)) +
-      element(0x0028, 0x0004, "CS", "MONOCHROME2") +
-      (spec.frames == 0 ? "" : element(0x0028, 0x0008, "IS", std::to_string(spec.frames))) +
-      element(0x0028, 0x0010, "US", u16(spec.rows)) +
-      element(0x0028, 0x0011, "US", u16(spec.columns));
-  if (spec.pixel_spacing) data += element(0x0028, 0x0030, "DS", *spec.pixel_spacing);
-  data += element(0x0028, 0x0100, "US", u16(16)) + element(0x0028, 0x0101, "US", u16(16)) +
-          element(0x0028, 0x0102, "US", u16(15)) + element(0x0028, 0x0103, "US", u16(1)) +
-          element(0x0028, 0x1052, "DS", text(spec.intercept)) +
-          element(0x0028, 0x1053, "DS", text(spec.slope)) +
-          element(0x7FE0, 0x0010, "OW", bytes_of(spec.values));
-  return std::string(128, '\0') + "DICM" + meta + data;
+  const auto text = [](double value) {
+    std::ostringstream out;
+    out << value;
+    return out.str();
+  };
+  DicomSpec all;  // its `others` have all elements, in the order of their tags
+  all.set(0x0008, 0x0016, "UI", ct);
+  all.set(0x0008, 0x0018, "UI", instance);
+  all.set(0x0008, 0x0060, "CS", "CT");
+  all.set(0x0020, 0x000d, "UI", "1.2.826.0.1.9");
+  all.set(0x0020, 0x000e, "UI", spec.series);
+  all.set(0x0020, 0x0013, "IS", std::to_string(spec.instance));
+  all.set(0x0020, 0x0032, "DS",
+          text(spec.position_mm[0]) + "\\" + text(spec.position_mm[1]) + "\\" +
+              text(spec.position_mm[2]));
+  all.set(0x0020, 0x0037, "DS", spec.orientation);
+  all.set(0x0028, 0x0002, "US", u16(1));
+  all.set(0x0028, 0x0004, "CS", "MONOCHROME2");
+  all.set(0x0028, 0x0010, "US", u16(spec.rows));
+  all.set(0x0028, 0x0011, "US", u16(spec.columns));
+  if (spec.pixel_spacing) all.set(0x0028, 0x0030, "DS", *spec.pixel_spacing);
+  all.set(0x0028, 0x0100, "US", u16(16));
+  all.set(0x0028, 0x0101, "US", u16(16));
+  all.set(0x0028, 0x0102, "US", u16(15));
+  all.set(0x0028, 0x0103, "US", u16(1));
+  all.set(0x0028, 0x1052, "DS", text(spec.intercept));
+  all.set(0x0028, 0x1053, "DS", text(spec.slope));
+  all.set(0x7fe0, 0x0010, "OW", bytes_of(spec.values));
+  for (const auto& [tag, element] : spec.others) all.others[tag] = element;
+
+  std::string meta = dicom_element(0x0002, 0x0001, "OB", std::string("\0\1", 2)) +
+                     dicom_element(0x0002, 0x0002, "UI", ct) +
+                     dicom_element(0x0002, 0x0003, "UI", instance) +
+                     dicom_element(0x0002, 0x0010, "UI", spec.syntax);
+  const auto meta_size = static_cast<std::uint32_t>(meta.size());
+  std::string bytes = std::string(128, '\0') + "DICM" +
+                      dicom_element(0x0002, 0x0000, "UL", bytes_of(meta_size)) + meta;
+  for (const auto& [tag, element] : all.others) bytes += element;
+  return bytes;
 }
 
 std::string refusal(const fs::path& path, const ReadOptions& options) {

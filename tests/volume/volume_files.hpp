@@ -6,6 +6,7 @@
 #include <bit>
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string>
 #include <type_traits>
@@ -65,18 +66,29 @@ struct NiftiSpec {
 /// A NIfTI-1 header for a single file, with the 4 bytes that end it.
 [[nodiscard]] std::string nifti(const NiftiSpec& spec);
 
+/// A DICOM element in explicit little endian; of type SQ its value is items.
+[[nodiscard]] std::string dicom_element(std::uint16_t group, std::uint16_t number,
+                                        const std::string& type, std::string value);
+[[nodiscard]] std::string dicom_item(const std::string& elements);
+
 struct DicomSpec {
   int rows = 4, columns = 3;
   std::array<double, 3> position_mm{0, 0, 0};
   std::string orientation = "1\\0\\0\\0\\1\\0";
   std::optional<std::string> pixel_spacing = "0.5\\0.25";  ///< between rows, between columns
-  std::string imager_spacing;                              ///< at the detector; empty: left out
-  std::string slice_spacing;                               ///< empty: left out
-  int frames = 0;                                          ///< of one file; 0: not told
   std::string series = "1.2.826.0.1.3680043.2.1125.1";
   int instance = 1;
   double slope = 1, intercept = 0;
   std::vector<std::int16_t> values;
+  std::string syntax = "1.2.840.10008.1.2.1";
+  std::map<std::uint32_t, std::string> others;  ///< by tag: their elements, for the usual ones
+
+  /// Adds or replaces an element; an empty type leaves it out.
+  void set(std::uint16_t group, std::uint16_t number, const std::string& type,
+           const std::string& value = {}) {
+    others[std::uint32_t{group} << 16 | number] =
+        type.empty() ? "" : dicom_element(group, number, type, value);
+  }
 };
 /// One CT slice, explicit little-endian.
 [[nodiscard]] std::string dicom(const DicomSpec& spec);

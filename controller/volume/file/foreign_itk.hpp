@@ -57,7 +57,7 @@ class Quiet {
   Quiet(const Quiet&) = delete;
   Quiet& operator=(const Quiet&) = delete;
 
-  /// MetaIO and GDCM only print that voxels are missing or cannot be unpacked, and go on: throws
+  /// MetaIO only prints that voxels are missing or cannot be unpacked, and goes on: throws
   /// LoadError for them. The kept output is that of all files read so far.
   void refuse_if_missing(const std::filesystem::path& path) const;
 
@@ -105,10 +105,6 @@ void read_voxels(const std::filesystem::path& path, ImageIo& io, std::span<std::
 void read_one_file(const std::filesystem::path& path, ImageIo& io, const VolumeHeader& header,
                    const MemoryRequest& offer);
 
-void read_dicom_file(const std::filesystem::path& path, const MemoryRequest& offer);
-void read_dicom_series(const std::filesystem::path& folder,
-                       const std::vector<std::filesystem::path>& beside, const std::string& series,
-                       SandboxReader& sandbox, const MemoryRequest& offer);
 /// Pictures of one size in the order of the numbers in their names.
 void read_slice_stack(const std::filesystem::path& folder,
                       const std::vector<std::filesystem::path>& beside, VolumeKind kind,

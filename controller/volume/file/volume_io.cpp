@@ -2,11 +2,13 @@
 #include "controller/volume/file/volume_io.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <charconv>
 #include <cmath>
 #include <cstddef>
 #include <cstring>
+#include <fstream>
 #include <limits>
 #include <span>
 #include <string>
@@ -123,8 +125,19 @@ bool in_natural_order(const std::string& a, const std::string& b) {
   return a.size() != b.size() ? a.size() < b.size() : a < b;
 }
 
-/// The regular files of a folder, but hidden ones, in the order of their names. If it has none but
-/// an index, those of its folders, as on a disc of DICOM; none if `path` is no folder.
+/// Whether a file may be a slice: a DICOM file by its mark (PS3.10 7.1), others by their names.
+bool may_be_slice(const fs::path& file) {
+  const std::string end = lower(file.extension().string());
+  for (const char* known : {".dcm", ".png", ".tif", ".tiff"}) {
+    if (end == known) return true;
+  }
+  std::array<char, 132> head{};
+  std::ifstream(file, std::ios::binary).read(head.data(), head.size());
+  return std::string_view(head.data(), head.size()).ends_with("DICM");
+}
+
+/// The regular files of a folder, but hidden ones, in the order of their names. If none of them is
+/// a slice, those of its folders, as on a disc of DICOM; none if `path` is no folder.
 std::vector<fs::path> files_in(const fs::path& path) {
   constexpr int kDeepest = 5;
   constexpr std::size_t kMostFiles = 20000;
@@ -149,7 +162,7 @@ std::vector<fs::path> files_in(const fs::path& path) {
     throw LoadError(path.string() + ": cannot be listed (" + fault.message() +
                     "); check its permissions");
   }
-  if (files.empty()) files = std::move(below);
+  if (!below.empty() && std::ranges::none_of(files, may_be_slice)) files = std::move(below);
   std::ranges::sort(files, in_natural_order, [](const fs::path& file) { return file.string(); });
   return files;
 }
