@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tests/volume/volume_files.hpp"
 
+#include <cmath>
 #include <sstream>
 
 #include <zlib.h>
 
 #include "controller/input/load_error.hpp"
 #include "controller/volume_tool/volume_commands.hpp"
+#include "tests/support/voxels.hpp"
 
 namespace kerf::test {
 namespace fs = std::filesystem;
@@ -132,6 +134,31 @@ std::string refusal(const fs::path& path, const ReadOptions& options) {
 
 bool same_values(const SourceVolume& volume, const std::vector<float>& values) {
   return volume.values.visit([&](auto held) { return std::ranges::equal(held, values); });
+}
+
+std::string misplaced(const SourceVolume& volume, const FilePlaces& places) {
+  if (!(volume.grid == kSmall)) return "another size";
+  std::vector<int> seen(kSmall.voxel_count());
+  for (const auto& [a, b, c] : voxels(kSmall)) {
+    const float value = volume.values[kSmall.index(a, b, c)];
+    const int number = value >= 0 && value < 60 ? static_cast<int>(value) : 0;
+    if (static_cast<float>(number) != value || seen[static_cast<std::size_t>(number)]++ > 0) {
+      return "value " + std::to_string(value);
+    }
+    const std::array in_volume{a, b, c}, in_file{number % 3, number / 3 % 4, number / 12};
+    for (std::size_t row = 0; row < 3; ++row) {
+      double is = volume.origin_mm[row], should = places.origin[row];
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        is += volume.direction[3 * row + axis] * volume.spacing_mm[axis] * in_volume[axis];
+        should += places.steps[axis][row] * in_file[axis];
+      }
+      if (std::abs(is - should) > 1e-9) {
+        return "voxel " + std::to_string(number) + ": coordinate " + std::to_string(row) + " is " +
+               std::to_string(is) + ", should be " + std::to_string(should);
+      }
+    }
+  }
+  return {};
 }
 
 bool is_one_line(const std::string& message) {

@@ -100,6 +100,15 @@ struct DicomSpec {
 /// Whether a volume holds these, in their order.
 [[nodiscard]] bool same_values(const SourceVolume& volume, const std::vector<float>& values);
 
+/// Positions in LPS of the voxels of a file: (0, 0, 0), and the step along each axis of the file.
+struct FilePlaces {
+  std::array<double, 3> origin{};
+  std::array<std::array<double, 3>, 3> steps{{{1, 0, 0}, {0, 2, 0}, {0, 0, 3}}};
+};
+/// The first voxel of a volume of counting values (above) that does not lie at its place; empty if
+/// all do.
+[[nodiscard]] std::string misplaced(const SourceVolume& volume, const FilePlaces& places = {});
+
 /// What may stand for a one-line message: `place: value; way out`.
 [[nodiscard]] bool is_one_line(const std::string& message);
 

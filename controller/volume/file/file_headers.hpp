@@ -12,7 +12,7 @@
 #include "controller/volume/file/volume_image.hpp"
 
 // Facts of a volume file's header that ITK's readers do not pass on, or judge badly.
-// text_headers.cpp reads NRRD and MetaImage, binary_headers.cpp NIfTI and TIFF.
+// binary_headers.cpp reads NIfTI and TIFF.
 
 namespace kerf::volume {
 
@@ -27,23 +27,16 @@ using GzFile = std::unique_ptr<gzFile_s, CloseGz>;
 namespace kerf {
 
 /// Facts of a header that ITK's readers do not pass on: they replace a missing spacing by 1, wrap
-/// huge sizes to 32 bits, and (MetaImage, NIfTI) accept a cut-off file.
+/// huge sizes to 32 bits, and (NIfTI) accept a cut-off file.
 struct VolumeHeader {
   std::uint32_t spacing_known = kAllAxes;  ///< as in UntrustedHeader
   /// The most bytes of voxels that the file can hold, given its size and encoding.
   std::uint64_t data_bytes_at_most = std::numeric_limits<std::uint64_t>::max();
   std::string data_file;  ///< file of the voxels, for messages
-  bool leaves_out =
-      false;  ///< MetaImage, in several files or packed: unreadable voxels are skipped
 };
 
 /// In lower case, ASCII only: for comparing keys of headers and ends of file names.
 [[nodiscard]] std::string lower(std::string text);
-
-/// Each reads one header, checks sizes against the limits, and throws LoadError for faults
-/// that it finds: no header, bad sizes, zero spacing, no data file.
-[[nodiscard]] VolumeHeader read_nrrd_header(const std::filesystem::path& path);
-[[nodiscard]] VolumeHeader read_meta_header(const std::filesystem::path& path);
 
 /// NIfTI-1 and -2 in one file, gzipped or not. Also walks the data, because the NIfTI library
 /// neither reports missing bytes nor keeps NaN (it reads 0 for them): both are refused here.

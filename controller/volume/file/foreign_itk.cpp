@@ -12,9 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include <itkMetaImageIO.h>
 #include <itkNiftiImageIO.h>
-#include <itkNrrdImageIO.h>
 #include <itkTIFFImageIO.h>
 
 #include "controller/input/load_error.hpp"
@@ -22,12 +20,13 @@
 #include "controller/volume/file/file_headers.hpp"
 #include "controller/volume/file/foreign_volume.hpp"
 #include "controller/volume/file/volume_image.hpp"
+#include "controller/volume/file/voxel_files.hpp"
 
 #ifdef KERF_SANITIZED
-// NrrdIO and MetaIO leak memory when they refuse a file, GDCM when an assertion of it fails.
+// GDCM leaks memory when an assertion of it fails.
 extern "C" const char* __lsan_default_suppressions();   // NOLINT(bugprone-reserved-identifier)
 extern "C" const char* __lsan_default_suppressions() {  // NOLINT(bugprone-reserved-identifier)
-  return "leak:libITKNrrdIO\nleak:libITKMetaIO\nleak:gdcm\n";
+  return "leak:gdcm\n";
 }
 #endif
 
@@ -157,24 +156,6 @@ UntrustedHeader claim_of(const fs::path& path, const ImageIo& io,
   return claim;
 }
 
-namespace {
-
-/// MetaIO silently skips voxels that it cannot unpack and data files that are missing: those bytes
-/// stay as they were. A second reading over other bytes finds them.
-void read_all_voxels(const fs::path& path, ImageIo& io, std::span<std::byte> bytes) {
-  const auto hash_over = [&](std::byte before) {
-    std::ranges::fill(bytes, before);
-    read_voxels(path, io, bytes);
-    return std::hash<std::string_view>{}(
-        {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
-  };
-  if (hash_over(std::byte{0xff}) == hash_over(std::byte{0})) return;
-  throw LoadError(path.string() +
-                  ": voxels are missing in its data; copy it again, with all of its data files");
-}
-
-}  // namespace
-
 void read_one_file(const fs::path& path, ImageIo& io, const VolumeHeader& header,
                    const MemoryRequest& offer) {
   const Quiet quiet;
@@ -188,11 +169,7 @@ void read_one_file(const fs::path& path, ImageIo& io, const VolumeHeader& header
   const std::span<std::byte> memory = offer(claim);
   // The file's own voxels fill the end of the memory, their values then its begin.
   const std::span<std::byte> own = memory.last(bytes);
-  if (header.leaves_out) {
-    read_all_voxels(path, io, own);
-  } else {
-    read_voxels(path, io, own);
-  }
+  read_voxels(path, io, own);
   quiet.refuse_if_missing(path);
   convert_values(type_of(path, io), own, claim.kind, memory);
 }
@@ -214,24 +191,10 @@ void read_raw(const fs::path& path, const RawLayout& layout, const MemoryRequest
   }
   UntrustedHeader claim;
   claim.size = {layout.grid.nx, layout.grid.ny, layout.grid.nz};
-  claim.voxel_bytes = static_cast<std::uint32_t>(each);
-  claim.kind = kerf::kind_of(layout.type);
   claim.spacing_known = 0;
   claim.axes = {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
-  const std::span<std::byte> memory = offer(claim);
-  const std::span<std::byte> own = memory.last(wanted);
-  std::ifstream in(path, std::ios::binary);
-  in.seekg(static_cast<std::streamoff>(layout.skip));
-  in.read(reinterpret_cast<char*>(own.data()), static_cast<std::streamsize>(own.size()));
-  if (static_cast<std::uint64_t>(in.gcount()) != wanted) {
-    refuse_truncated(path.string(), static_cast<std::uint64_t>(in.gcount()), wanted);
-  }
-  if (layout.big_endian) {
-    for (std::size_t at = 0; each > 1 && at < own.size(); at += each) {
-      std::ranges::reverse(own.subspan(at, each));
-    }
-  }
-  convert_values(layout.type, own, claim.kind, memory);
+  read_voxel_files(path, {layout.type, Packing::raw, layout.big_endian, {{path, layout.skip}}},
+                   claim, offer);
 }
 
 void read_foreign_volume(const std::filesystem::path& path, VolumeKind kind,
@@ -243,9 +206,9 @@ void read_foreign_volume(const std::filesystem::path& path, VolumeKind kind,
   };
   switch (kind) {
     case VolumeKind::nrrd:
-      return read_one_file(path, *itk::NrrdImageIO::New(), read_nrrd_header(path), offer);
+      return read_nrrd(path, offer);
     case VolumeKind::meta:
-      return read_one_file(path, *itk::MetaImageIO::New(), read_meta_header(path), offer);
+      return read_meta(path, offer);
     case VolumeKind::nifti:
       return read_one_file(path, *itk::NiftiImageIO::New(), read_nifti_header(path), offer);
     case VolumeKind::tiff:

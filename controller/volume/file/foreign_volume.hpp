@@ -58,6 +58,11 @@ void read_foreign_volume(const std::filesystem::path& path, VolumeKind kind,
                          const std::vector<std::filesystem::path>& folder,
                          const std::string& series, SandboxReader& sandbox);
 
+/// In the sandbox: one file of that kind, and those that it names. Throw LoadError for what is no
+/// single volume of grey values whose geometry is clear.
+void read_nrrd(const std::filesystem::path& path, const MemoryRequest& offer);
+void read_meta(const std::filesystem::path& path, const MemoryRequest& offer);
+
 /// In the sandbox. Throws LoadError for a file whose size is not that of the layout.
 void read_raw(const std::filesystem::path& path, const RawLayout& layout,
               const MemoryRequest& offer);

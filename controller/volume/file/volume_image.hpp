@@ -123,6 +123,34 @@ struct RawLayout {
   std::uint64_t skip = 0;  ///< bytes before the first voxel
 };
 
+/// Calls `use` with a value of the type.
+template <class Use>
+decltype(auto) visit_type(VoxelType type, const Use& use) {
+  switch (type) {
+    case VoxelType::uint8:
+      return use(std::uint8_t{});
+    case VoxelType::int8:
+      return use(std::int8_t{});
+    case VoxelType::uint16:
+      return use(std::uint16_t{});
+    case VoxelType::int16:
+      return use(std::int16_t{});
+    case VoxelType::uint32:
+      return use(std::uint32_t{});
+    case VoxelType::int32:
+      return use(std::int32_t{});
+    case VoxelType::uint64:
+      return use(std::uint64_t{});
+    case VoxelType::int64:
+      return use(std::int64_t{});
+    case VoxelType::float32:
+      return use(float{});
+    case VoxelType::float64:
+      break;
+  }
+  return use(double{});
+}
+
 [[nodiscard]] std::size_t bytes_of(VoxelType type) noexcept;
 [[nodiscard]] ValueKind kind_of(VoxelType type) noexcept;
 

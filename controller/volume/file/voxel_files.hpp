@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <limits>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "controller/volume/file/foreign_volume.hpp"
+#include "controller/volume/file/header_fields.hpp"
+#include "controller/volume/file/volume_image.hpp"
+
+// Voxels behind a header of NRRD or MetaImage, or without one: in one file or in several, packed or
+// not, as bytes or as text.
+
+namespace kerf::volume {
+
+enum class Packing : std::uint8_t { raw, text, hex, deflated };
+
+/// A file with a part of the voxels.
+struct VoxelPart {
+  std::filesystem::path file;
+  std::uint64_t begin = 0;  ///< offset: the end of a header in the same file
+  std::uint64_t lines = 0;  ///< to skip from there
+  std::int64_t bytes = 0;   ///< to skip after them, unpacked; -1 - n: the voxels end n bytes
+                            ///< before the file does
+};
+
+struct VoxelFiles {
+  VoxelType type = VoxelType::uint16;
+  Packing packing = Packing::raw;
+  bool big_endian = false;
+  std::vector<VoxelPart> parts;  ///< of equal numbers of voxels, in order
+  /// Of each part: the most bytes that it takes of its file.
+  std::uint64_t packed_bytes = std::numeric_limits<std::uint64_t>::max();
+};
+
+/// Names of data files as a header writes them: `NAME`, `LIST [axes]`, or a pattern such as
+/// `slice_%03d.raw`, and behind it whole numbers.
+struct FileNames {
+  std::string pattern;
+  std::vector<std::int64_t> numbers;  ///< at most `most`
+
+  FileNames(const std::string& text, std::size_t most);
+  [[nodiscard]] bool is_list() const { return pattern == "LIST" || pattern == "SKIPLIST"; }
+  /// Whether the name holds a number, as in `%03d`.
+  [[nodiscard]] bool is_pattern() const { return name(0) != name(1); }
+  /// `pattern` with the number in it.
+  [[nodiscard]] std::string name(std::int64_t number) const;
+};
+
+/// The names, beside the header, of a pattern with the first number, the last, the step and, if it
+/// is there, the number of axes in one file; or those that follow `LIST`. One file holds all axes
+/// but the last if that number is missing; all of them: equally many last layers. Refuses the field
+/// `key` if the number of names does not fit.
+[[nodiscard]] std::vector<std::filesystem::path> files_of(const HeaderFields& fields,
+                                                          const char* key, const FileNames& names,
+                                                          const std::vector<std::string>& list,
+                                                          const std::vector<std::int64_t>& sizes);
+
+/// Offers `claim`, whose type of values is set here, and reads the voxels into the memory. Throws
+/// LoadError, before memory is taken if their sizes show it, for files that are missing, too short
+/// or broken, or (text, packed) hold more than the voxels. Bytes that follow raw voxels are left
+/// out, and the note says so. `header`: the file that names the others, for messages.
+void read_voxel_files(const std::filesystem::path& header, VoxelFiles files, UntrustedHeader claim,
+                      const MemoryRequest& offer);
+
+}  // namespace kerf::volume
