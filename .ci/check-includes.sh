@@ -124,6 +124,7 @@ broken() {
     shared/posix/monotonic_clock.hpp || true
   includes '<itk' "${programs[@]}" | grep -v '^controller/volume/file/foreign_[a-z]*\.[ch]pp:'
   includes '<gdcm' "${programs[@]}" | grep -v '^controller/volume/file/dicom_[a-z]*\.cpp:'
+  includes '<(archive|archive_entry|expat)\.h' "${programs[@]}" | grep -v '^controller/volume/file/foreign_invesalius.cpp:'
   includes '<(boost|openssl)/' "${programs[@]}" | grep -vE '^bridge/(net|join|serve)/'
   includes '<lz4' "${programs[@]}" | grep -v '^bridge/wire/compression.cpp:'
   includes '<igtl' "${programs[@]}" | grep -v '^bridge/igtl/'

@@ -41,16 +41,6 @@ void check_counting(const SourceVolume& v) {
   CHECK(v.spacing_known == kAllAxes);
 }
 
-/// Where voxel (i, j, k) lies in the frame of the file.
-Three place(const SourceVolume& v, double i, double j, double k) {
-  Three p = v.origin_mm;
-  const Three step{i * v.spacing_mm[0], j * v.spacing_mm[1], k * v.spacing_mm[2]};
-  for (std::size_t r = 0; r < 3; ++r) {
-    for (std::size_t c = 0; c < 3; ++c) p[r] += v.direction[3 * r + c] * step[c];
-  }
-  return p;
-}
-
 double determinant(const std::array<double, 9>& d) {
   return d[0] * (d[4] * d[8] - d[5] * d[7]) - d[1] * (d[3] * d[8] - d[5] * d[6]) +
          d[2] * (d[3] * d[7] - d[4] * d[6]);
@@ -210,9 +200,9 @@ TEST_CASE("position and direction of a file are kept") {
           "\n" + bytes_of(counting<std::uint8_t>()));
   const SourceVolume v = read_volume(path);
   CHECK(v.spacing_mm == Three{0.5, 0.25, 2});
-  CHECK(place(v, 0, 0, 0) == Three{10, 20, 30});
-  CHECK(place(v, 2, 0, 0) == Three{10, 21, 30});
-  CHECK(place(v, 0, 1, 0) == Three{9.75, 20, 30});
+  CHECK(position_of(v, 0, 0, 0) == Three{10, 20, 30});
+  CHECK(position_of(v, 2, 0, 0) == Three{10, 21, 30});
+  CHECK(position_of(v, 0, 1, 0) == Three{9.75, 20, 30});
   CHECK(determinant(v.direction) == doctest::Approx(1.0));
 }
 
@@ -226,7 +216,7 @@ TEST_CASE("a left-handed file becomes right-handed and every value stays in its 
   const SourceVolume v = read_volume(path);
   CHECK(determinant(v.direction) == doctest::Approx(1.0));
   for (const auto& [i, j, k] : voxels(kSmall)) {
-    const Three p = place(v, i, j, k);
+    const Three p = position_of(v, i, j, k);
     // In the file voxel (a, b, c) lies at (10 + a, 20 + 2b, 30 - 3c) and holds its own index.
     const auto a = static_cast<std::int32_t>(std::lround(p[0] - 10));
     const auto b = static_cast<std::int32_t>(std::lround((p[1] - 20) / 2));

@@ -136,6 +136,16 @@ bool same_values(const SourceVolume& volume, const std::vector<float>& values) {
   return volume.values.visit([&](auto held) { return std::ranges::equal(held, values); });
 }
 
+std::array<double, 3> position_of(const VolumeFrame& frame, double i, double j, double k) {
+  std::array<double, 3> p = frame.origin_mm;
+  const std::array<double, 3> step{i * frame.spacing_mm[0], j * frame.spacing_mm[1],
+                                   k * frame.spacing_mm[2]};
+  for (std::size_t r = 0; r < 3; ++r) {
+    for (std::size_t c = 0; c < 3; ++c) p[r] += frame.direction[3 * r + c] * step[c];
+  }
+  return p;
+}
+
 std::string misplaced(const SourceVolume& volume, const FilePlaces& places) {
   if (!(volume.grid == kSmall)) return "another size";
   std::vector<int> seen(kSmall.voxel_count());
@@ -145,16 +155,15 @@ std::string misplaced(const SourceVolume& volume, const FilePlaces& places) {
     if (static_cast<float>(number) != value || seen[static_cast<std::size_t>(number)]++ > 0) {
       return "value " + std::to_string(value);
     }
-    const std::array in_volume{a, b, c}, in_file{number % 3, number / 3 % 4, number / 12};
+    const std::array in_file{number % 3, number / 3 % 4, number / 12};
+    const std::array<double, 3> is = position_of(volume, a, b, c);
     for (std::size_t row = 0; row < 3; ++row) {
-      double is = volume.origin_mm[row], should = places.origin[row];
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        is += volume.direction[3 * row + axis] * volume.spacing_mm[axis] * in_volume[axis];
+      double should = places.origin[row];
+      for (std::size_t axis = 0; axis < 3; ++axis)
         should += places.steps[axis][row] * in_file[axis];
-      }
-      if (std::abs(is - should) > 1e-9) {
+      if (std::abs(is[row] - should) > 1e-9) {
         return "voxel " + std::to_string(number) + ": coordinate " + std::to_string(row) + " is " +
-               std::to_string(is) + ", should be " + std::to_string(should);
+               std::to_string(is[row]) + ", should be " + std::to_string(should);
       }
     }
   }

@@ -100,6 +100,10 @@ struct DicomSpec {
 /// Whether a volume holds these, in their order.
 [[nodiscard]] bool same_values(const SourceVolume& volume, const std::vector<float>& values);
 
+/// Position of the centre of voxel (i, j, k) in the frame of the file, mm.
+[[nodiscard]] std::array<double, 3> position_of(const VolumeFrame& frame, double i, double j,
+                                                double k);
+
 /// Positions in LPS of the voxels of a file: (0, 0, 0), and the step along each axis of the file.
 struct FilePlaces {
   std::array<double, 3> origin{};

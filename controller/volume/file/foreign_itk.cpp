@@ -215,6 +215,8 @@ void read_foreign_volume(const std::filesystem::path& path, VolumeKind kind,
       return read_one_file(path, *itk::TIFFImageIO::New(), read_tiff_header(path), offer);
     case VolumeKind::dicom_file:
       return read_dicom(path, {path}, series, sandbox, offer);
+    case VolumeKind::invesalius:
+      return read_invesalius(path, offer);
     case VolumeKind::dicom_series:
       return read_dicom(path, folder, series, sandbox, offer);
     case VolumeKind::png_stack:

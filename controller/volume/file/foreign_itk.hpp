@@ -105,6 +105,8 @@ void read_voxels(const std::filesystem::path& path, ImageIo& io, std::span<std::
 void read_one_file(const std::filesystem::path& path, ImageIo& io, const VolumeHeader& header,
                    const MemoryRequest& offer);
 
+/// A project of InVesalius 3. Throws as above; no ITK in it.
+void read_invesalius(const std::filesystem::path& path, const MemoryRequest& offer);
 /// Pictures of one size in the order of the numbers in their names.
 void read_slice_stack(const std::filesystem::path& folder,
                       const std::vector<std::filesystem::path>& beside, VolumeKind kind,

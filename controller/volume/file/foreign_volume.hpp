@@ -24,6 +24,7 @@ enum class VolumeKind : std::uint8_t {
   nifti,
   tiff,
   dicom_file,
+  invesalius,
   dicom_series,
   png_stack,
   tiff_stack,

@@ -8,7 +8,6 @@
 #include <cmath>
 #include <cstddef>
 #include <cstring>
-#include <fstream>
 #include <limits>
 #include <span>
 #include <string>
@@ -23,6 +22,7 @@
 #include "controller/input/load_error.hpp"
 #include "controller/input/sandbox.hpp"
 #include "controller/volume/file/file_headers.hpp"
+#include "controller/volume/file/folder_files.hpp"
 #include "controller/volume/file/foreign_volume.hpp"
 #include "controller/volume/file/volume_image.hpp"
 #include "controller/volume/file/volume_write.hpp"
@@ -54,19 +54,8 @@ struct Kind {
   const char* name;
 };
 
-/// Kind of the volume in a folder, by the names of its files.
-Kind kind_of_folder(const std::vector<fs::path>& files) {
-  std::size_t png = 0, tiff = 0;
-  for (const fs::path& file : files) {
-    const std::string end = lower(file.extension().string());
-    png += end == ".png" ? 1 : 0;
-    tiff += end == ".tif" || end == ".tiff" ? 1 : 0;
-  }
-  if (2 * std::max(png, tiff) <= files.size()) return {VolumeKind::dicom_series, "DICOM"};
-  return png >= tiff ? Kind{VolumeKind::png_stack, "PNG"} : Kind{VolumeKind::tiff_stack, "TIFF"};
-}
-
-Kind kind_of(const fs::path& path, const std::vector<fs::path>& folder, bool raw) {
+/// Kind of the volume in a file.
+Kind kind_of(const fs::path& path, bool raw) {
   std::error_code fault;
   if (const std::string why = access_error(path); !why.empty()) {
     throw LoadError(path.string() + why);
@@ -75,7 +64,6 @@ Kind kind_of(const fs::path& path, const std::vector<fs::path>& folder, bool raw
   if (!fs::exists(status)) {
     throw LoadError(path.string() + ": no such file or folder; check the path");
   }
-  if (fs::is_directory(status)) return kind_of_folder(folder);
   if (!fs::is_regular_file(status)) {
     throw LoadError(path.string() +
                     ": a pipe, socket or device; copy what it gives to a file, and name that");
@@ -87,84 +75,25 @@ Kind kind_of(const fs::path& path, const std::vector<fs::path>& folder, bool raw
   if (raw) return {VolumeKind::raw, "raw voxels"};
   const std::string name = lower(path.filename().string());
   constexpr std::pair<const char*, Kind> kEnds[] = {
-      {".nrrd", {VolumeKind::nrrd, "NRRD"}},      {".nhdr", {VolumeKind::nrrd, "NRRD"}},
-      {".mha", {VolumeKind::meta, "MetaImage"}},  {".mhd", {VolumeKind::meta, "MetaImage"}},
-      {".nii", {VolumeKind::nifti, "NIfTI"}},     {".nii.gz", {VolumeKind::nifti, "NIfTI"}},
-      {".tif", {VolumeKind::tiff, "TIFF"}},       {".tiff", {VolumeKind::tiff, "TIFF"}},
-      {".dcm", {VolumeKind::dicom_file, "DICOM"}}};
+      {".nrrd", {VolumeKind::nrrd, "NRRD"}},
+      {".nhdr", {VolumeKind::nrrd, "NRRD"}},
+      {".mha", {VolumeKind::meta, "MetaImage"}},
+      {".mhd", {VolumeKind::meta, "MetaImage"}},
+      {".nii", {VolumeKind::nifti, "NIfTI"}},
+      {".nii.gz", {VolumeKind::nifti, "NIfTI"}},
+      {".tif", {VolumeKind::tiff, "TIFF"}},
+      {".tiff", {VolumeKind::tiff, "TIFF"}},
+      {".dcm", {VolumeKind::dicom_file, "DICOM"}},
+      {".inv3", {VolumeKind::invesalius, "InVesalius"}}};
   for (const auto& [end, kind] : kEnds) {
     if (name.ends_with(end)) return kind;
   }
   if (name.ends_with(".raw")) refuse_raw(path);
-  throw LoadError(path.string() +
-                  ": not a kind of volume that kerf reads; use .nrrd .nhdr .mha .mhd .nii .nii.gz "
-                  ".tif .dcm, a folder of DICOM, PNG or TIFF slices, or --dims of kerf volume "
-                  "import");
-}
-
-/// Runs of digits count as numbers: slice2 comes before slice10.
-bool in_natural_order(const std::string& a, const std::string& b) {
-  const auto digit = [](char c) { return c >= '0' && c <= '9'; };
-  for (std::size_t i = 0, j = 0; i < a.size() && j < b.size();) {
-    if (!digit(a[i]) || !digit(b[j])) {
-      if (a[i] != b[j]) return a[i] < b[j];
-      ++i;
-      ++j;
-      continue;
-    }
-    const auto number = [&](const std::string& text, std::size_t& at) {
-      while (at < text.size() && text[at] == '0') ++at;
-      const std::size_t first = at;
-      while (at < text.size() && digit(text[at])) ++at;
-      return text.substr(first, at - first);
-    };
-    const std::string x = number(a, i), y = number(b, j);
-    if (x.size() != y.size()) return x.size() < y.size();
-    if (x != y) return x < y;
-  }
-  return a.size() != b.size() ? a.size() < b.size() : a < b;
-}
-
-/// Whether a file may be a slice: a DICOM file by its mark (PS3.10 7.1), others by their names.
-bool may_be_slice(const fs::path& file) {
-  const std::string end = lower(file.extension().string());
-  for (const char* known : {".dcm", ".png", ".tif", ".tiff"}) {
-    if (end == known) return true;
-  }
-  std::array<char, 132> head{};
-  std::ifstream(file, std::ios::binary).read(head.data(), head.size());
-  return std::string_view(head.data(), head.size()).ends_with("DICM");
-}
-
-/// The regular files of a folder, but hidden ones, in the order of their names. If none of them is
-/// a slice, those of its folders, as on a disc of DICOM; none if `path` is no folder.
-std::vector<fs::path> files_in(const fs::path& path) {
-  constexpr int kDeepest = 5;
-  constexpr std::size_t kMostFiles = 20000;
-  std::vector<fs::path> files, below;
-  std::error_code fault;
-  if (!fs::is_directory(path, fault)) return files;
-  for (fs::recursive_directory_iterator entry(path, fault), end; !fault && entry != end;
-       entry.increment(fault)) {
-    if (entry.depth() >= kDeepest) entry.disable_recursion_pending();
-    const std::string name = entry->path().filename().string();
-    const bool hidden = name.starts_with('.');  // such as those of macOS beside each file
-    if (hidden) entry.disable_recursion_pending();
-    std::error_code gone;
-    if (hidden || name == "DICOMDIR" || !entry->is_regular_file(gone)) continue;
-    (entry.depth() == 0 ? files : below).push_back(entry->path());
-    if (files.size() + below.size() > kMostFiles) {
-      throw LoadError(path.string() + ": more than " + std::to_string(kMostFiles) +
-                      " files; name the folder that holds the slices");
-    }
-  }
-  if (fault && files.empty()) {
-    throw LoadError(path.string() + ": cannot be listed (" + fault.message() +
-                    "); check its permissions");
-  }
-  if (!below.empty() && std::ranges::none_of(files, may_be_slice)) files = std::move(below);
-  std::ranges::sort(files, in_natural_order, [](const fs::path& file) { return file.string(); });
-  return files;
+  throw LoadError(
+      path.string() +
+      ": not a kind of volume that kerf reads; use .nrrd .nhdr .mha .mhd .nii .nii.gz "
+      ".tif .dcm .inv3, a folder of DICOM, PNG or TIFF slices, or --dims of kerf volume "
+      "import");
 }
 
 /// Size of the largest file, at most that of the largest volume's voxels.
@@ -375,7 +304,8 @@ void set_frame(const fs::path& path, Axis x, Axis y, Axis z, SourceVolume& volum
 /// Checks the header that the sandbox reports; returns the bytes of memory for it.
 std::size_t accept(const fs::path& path, const ReadOptions& options, const UntrustedHeader& claim,
                    SourceVolume& source) {
-  source.note = escaped(std::string(claim.note.begin(), std::ranges::find(claim.note, '\0')));
+  const std::string note(claim.note.begin(), std::ranges::find(claim.note, '\0'));
+  if (!note.empty()) add_sentence(source.note, escaped(note));
   set_grid(path, claim.size, source);
   set_spacing(path, options, claim, source);
   set_origin(path, claim.origin_mm, source);
@@ -390,12 +320,16 @@ SourceVolume read_volume(const fs::path& path, const ReadOptions& options) {
     throw LoadError(path.string() +
                     ": a spacing and one that overrides it are both given; leave one of them out");
   }
-  const std::vector<fs::path> folder = files_in(path);
-  const Kind kind = kind_of(path, folder, options.raw.has_value());
+  volume::FolderFiles folder;
+  std::error_code fault;
+  const bool is_folder = fs::is_directory(path, fault);
+  if (is_folder) folder = volume::files_of_volume(path);
+  const Kind kind =
+      is_folder ? Kind{folder.kind, folder.name} : kind_of(path, options.raw.has_value());
   SourceVolume source;
   UntrustedHeader claim;
   SharedBytes memory = read_in_sandbox(
-      {path.string(), kind.name, largest_bytes(folder.empty() ? std::vector{path} : folder),
+      {path.string(), kind.name, largest_bytes(is_folder ? folder.files : std::vector{path}),
        options.cpu_s},
       [&](SandboxReader& sandbox) {
         if (kind.kind == VolumeKind::raw) {
@@ -403,7 +337,7 @@ SourceVolume read_volume(const fs::path& path, const ReadOptions& options) {
             return sandbox.offer(std::as_bytes(std::span(&raw, 1)));
           });
         }
-        volume::read_foreign_volume(path, kind.kind, folder, options.series, sandbox);
+        volume::read_foreign_volume(path, kind.kind, folder.files, options.series, sandbox);
       },
       [&](std::span<const std::byte> header) {
         if (header.size() != sizeof claim) {
@@ -411,6 +345,7 @@ SourceVolume read_volume(const fs::path& path, const ReadOptions& options) {
         }
         std::memcpy(&claim, header.data(), sizeof claim);
         if (claim.kind > ValueKind::uint16) claim.kind = ValueKind::float32;
+        source.note = escaped(folder.note);
         return accept(path, options, claim, source);
       });
   source.values = VoxelValues(memory.bytes(), claim.kind, source.grid.voxel_count());
