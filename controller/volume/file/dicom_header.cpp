@@ -269,6 +269,22 @@ std::optional<std::array<WrittenNumber, 2>> spacing_of(const Facts& facts) {
   return spacing && (*spacing)[0].value > 0 && (*spacing)[1].value > 0 ? spacing : std::nullopt;
 }
 
+/// Refuses an orientation that is not two directions of length 1 at right angles.
+void check_directions(const DicomFrame& frame) {
+  if (!frame.orientation) return;
+  constexpr double kRounded = 2e-3;  // as in set_frame of volume_io.cpp
+  std::array<double, 3> products{-1, -1, 0};
+  for (std::size_t i = 0; i < 3; ++i) {
+    const double x = (*frame.orientation)[i].value, y = (*frame.orientation)[3 + i].value;
+    products[0] += x * x;
+    products[1] += y * y;
+    products[2] += x * y;
+  }
+  if (std::ranges::all_of(products, [](double off) { return std::abs(off) < kRounded; })) return;
+  throw Unfit{"ImageOrientationPatient is not two directions at right angles",
+              "correct the file, or export it again"};
+}
+
 DicomFrame frame_of(const Facts& facts, std::size_t index, const StoredPixels& pixels) {
   DicomFrame frame;
   frame.index = index;
@@ -281,6 +297,7 @@ DicomFrame frame_of(const Facts& facts, std::size_t index, const StoredPixels& p
   };
   numbers(frame.position_mm, Tag(0x0020, 0x9113), Tag(0x0020, 0x0032), "ImagePositionPatient");
   numbers(frame.orientation, Tag(0x0020, 0x9116), Tag(0x0020, 0x0037), "ImageOrientationPatient");
+  check_directions(frame);
   frame.spacing_mm = spacing_of(facts);
   if (const auto distance = written_number(facts.text(kMeasures, Tag(0x0018, 0x0088)))) {
     frame.distance_mm = distance->value;
@@ -642,13 +659,13 @@ std::optional<DicomFile> read_dicom_header(const fs::path& path) {
       read_frames(reader, file_bytes, in, file);
       return file;
     }
-    if (!magic) return std::nullopt;  // looked like one, as any file may
     in.clear();
     in.seekg(0);
     std::ostringstream all;
     all << in.rdbuf();
     std::string bytes = std::move(all).str();
     file.series = series_in(bytes);
+    if (!magic && file.series.empty()) return std::nullopt;  // looked like one, as any file may
     const auto syntax = replace_syntax(bytes);
     std::istringstream stream(std::move(bytes));
     gdcm::Reader again;

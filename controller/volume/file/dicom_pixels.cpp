@@ -186,7 +186,7 @@ std::unique_ptr<gdcm::ImageCodec> codec_of(const DicomFile& file) {
 
 /// JPEG in all its forms ends with a mark, which a decoder replaces if it is missing.
 bool has_end(std::string_view bytes, bool is_rle) {
-  while (bytes.ends_with('\0')) bytes.remove_suffix(1);
+  while (bytes.ends_with('\0') || bytes.ends_with('\xff')) bytes.remove_suffix(1);  // padding
   return is_rle || bytes.ends_with("\xff\xd9");
 }
 

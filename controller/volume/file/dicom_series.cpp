@@ -569,6 +569,9 @@ void read_dicom(const fs::path& path, const std::vector<fs::path>& files, const 
     note.add("series " + std::to_string(chosen + 1) + " of " + std::to_string(all.size()) + ", " +
              text_of(stack) + " (import --series chooses another)");
   }
+  if (const DicomSlice* odd = odd_one(all, stack)) {
+    note.add("skipped " + name_of(*odd) + " (of another size or direction)");
+  }
   note_unfit(found, stack, note);
   if (stack.slices.size() == 1) {
     throw LoadError(stack.slices.front().file->path.string() +
