@@ -123,7 +123,7 @@ broken() {
     controller/servo controller/loop controller/run controller/device shared/segment \
     shared/posix/monotonic_clock.hpp || true
   includes '<itk' "${programs[@]}" | grep -v '^controller/volume/file/foreign_[a-z]*\.[ch]pp:'
-  includes '<gdcm' "${programs[@]}" | grep -v '^controller/volume/file/dicom_[a-z]*\.cpp:'
+  includes '<gdcm' "${programs[@]}" | grep -v '^controller/volume/file/dicom_[a-z]*\.[ch]pp:'
   includes '<(archive|archive_entry|expat)\.h' "${programs[@]}" | grep -v '^controller/volume/file/foreign_invesalius.cpp:'
   includes '<(boost|openssl)/' "${programs[@]}" | grep -vE '^bridge/(net|join|serve)/'
   includes '<lz4' "${programs[@]}" | grep -v '^bridge/wire/compression.cpp:'

@@ -195,7 +195,7 @@ ImportCommand::ImportCommand(Arguments& app)
   command_
       .option("--out", out_, "the volume; scene and preview lie beside it (default: PATH's name)")
       .shown_as("OUT.nrrd");
-  command_.option("--series", series_, "of several in a folder: its number or a part of its name")
+  command_.option("--series", series_, "of several of DICOM: its number or a part of its name")
       .shown_as("WHICH");
   Option dims = command_.option("--dims", dims_, "voxels of a file without a header");
   dims.shown_as("NXxNYxNZ");
@@ -275,9 +275,6 @@ ProposalWishes ImportCommand::wishes() const {
 
 void ImportCommand::run(std::ostream& out) const {
   std::error_code fault;
-  if (!series_.empty() && fs::is_regular_file(path_, fault)) {
-    throw LoadError("--series: " + path_ + " is one file; leave it out, or name the folder");
-  }
   if (!dims_.empty() && fs::is_directory(path_, fault)) {
     throw LoadError("--dims: " + path_ +
                     " is a folder; name one file without a header, or leave it out");

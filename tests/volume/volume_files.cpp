@@ -4,6 +4,7 @@
 #include <cmath>
 #include <sstream>
 
+#include <doctest/doctest.h>
 #include <zlib.h>
 
 #include "controller/input/load_error.hpp"
@@ -81,7 +82,6 @@ std::string dicom_item(const std::string& elements) {
 std::string dicom(const DicomSpec& spec) {
   const std::string ct = "1.2.840.10008.5.1.4.1.1.2";
   const std::string instance = spec.series + ".7." + std::to_string(spec.instance);
-  const auto u16 = [](int value) { return bytes_of(static_cast<std::uint16_t>(value)); };
   const auto text = [](double value) {
     std::ostringstream out;
     out << value;
@@ -121,6 +121,32 @@ std::string dicom(const DicomSpec& spec) {
                       dicom_element(0x0002, 0x0000, "UL", bytes_of(meta_size)) + meta;
   for (const auto& [tag, element] : all.others) bytes += element;
   return bytes;
+}
+
+DicomSpec dicom_slice(int k) {
+  DicomSpec spec;
+  spec.instance = k + 1;
+  spec.position_mm = {-10, 20, 100.0 + 2 * k};
+  for (int i = 0; i < 12; ++i) spec.values.push_back(static_cast<std::int16_t>(12 * k + i));
+  return spec;
+}
+
+void write_dicom_series(const TemporaryFolder& folder,
+                        const std::function<void(DicomSpec&, int)>& change) {
+  for (int k = 0; k < 5; ++k) {
+    DicomSpec spec = dicom_slice(k);
+    change(spec, k);
+    folder.write("image" + std::to_string((k * 3) % 5) + ".dcm", dicom(spec));
+  }
+}
+
+std::string series_message(const std::function<void(DicomSpec&, int)>& change) {
+  const TemporaryFolder folder;
+  write_dicom_series(folder, change);
+  std::string message = refusal(folder.path());
+  const bool fine = message == "no error" || is_one_line(message);
+  CHECK(fine);
+  return message;
 }
 
 std::string refusal(const fs::path& path, const ReadOptions& options) {

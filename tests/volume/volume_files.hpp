@@ -6,6 +6,7 @@
 #include <bit>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <optional>
 #include <string>
@@ -92,6 +93,18 @@ struct DicomSpec {
 };
 /// One CT slice, explicit little-endian.
 [[nodiscard]] std::string dicom(const DicomSpec& spec);
+/// A DICOM number of 16 bits.
+[[nodiscard]] inline std::string u16(int value) {
+  return bytes_of(static_cast<std::uint16_t>(value));
+}
+
+/// Slice k of a 3 x 4 x 5 series with the values 12 k .. 12 k + 11, 2 mm apart.
+[[nodiscard]] DicomSpec dicom_slice(int k);
+/// Writes five slices, each changed, in an order of names that is not their order in space.
+void write_dicom_series(const TemporaryFolder& folder,
+                        const std::function<void(DicomSpec&, int)>& change);
+/// What reading such a series says, in one line; "no error" for nothing.
+[[nodiscard]] std::string series_message(const std::function<void(DicomSpec&, int)>& change);
 
 /// The message of the LoadError that reading throws; "no error" without one.
 [[nodiscard]] std::string refusal(const std::filesystem::path& path,

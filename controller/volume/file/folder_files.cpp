@@ -70,18 +70,6 @@ std::vector<fs::path> all_files(const fs::path& folder, std::string& note) {
   return files;
 }
 
-/// Whether a file begins as DICOM does (PS3.10 7.1), or, as older ones do, with an element of group
-/// 2 or 8.
-bool begins_as_dicom(const fs::path& file) {
-  constexpr std::size_t kPreamble = 128;
-  std::array<char, kPreamble + 4> bytes{};
-  std::ifstream in(file, std::ios::binary);
-  in.read(bytes.data(), bytes.size());
-  if (std::string_view(bytes.data() + kPreamble, 4) == "DICM") return true;
-  const bool group = bytes[0] == 2 || bytes[0] == 8;
-  return in.gcount() >= 8 && group && bytes[1] == 0 && bytes[3] == 0;
-}
-
 enum Family : std::size_t { dicom, png, tiff, other };
 constexpr std::array<const char*, 3> kNames{"DICOM", "PNG", "TIFF"};
 
@@ -114,6 +102,16 @@ Family usual_family(const fs::path& folder, const Families& found) {
 }
 
 }  // namespace
+
+bool begins_as_dicom(const fs::path& file) {
+  constexpr std::size_t kPreamble = 128;
+  std::array<char, kPreamble + 4> bytes{};
+  std::ifstream in(file, std::ios::binary);
+  in.read(bytes.data(), bytes.size());
+  if (std::string_view(bytes.data() + kPreamble, 4) == "DICM") return true;
+  const bool group = bytes[0] == 2 || bytes[0] == 8;
+  return in.gcount() >= 8 && group && bytes[1] == 0 && bytes[3] == 0;
+}
 
 FolderFiles files_of_volume(const fs::path& folder) {
   FolderFiles volume;

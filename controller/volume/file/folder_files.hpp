@@ -33,4 +33,8 @@ struct FolderFiles {
 [[nodiscard]] FolderFiles files_of_volume(const std::filesystem::path& folder);
 inline constexpr int kDeepest = 5;
 
+/// Whether a file begins as DICOM does (PS3.10 7.1), or, as older ones do, with an element of group
+/// 2 or 8.
+[[nodiscard]] bool begins_as_dicom(const std::filesystem::path& file);
+
 }  // namespace kerf::volume

@@ -88,6 +88,7 @@ Kind kind_of(const fs::path& path, bool raw) {
   for (const auto& [end, kind] : kEnds) {
     if (name.ends_with(end)) return kind;
   }
+  if (volume::begins_as_dicom(path)) return {VolumeKind::dicom_file, "DICOM"};
   if (name.ends_with(".raw")) refuse_raw(path);
   throw LoadError(
       path.string() +
@@ -326,6 +327,11 @@ SourceVolume read_volume(const fs::path& path, const ReadOptions& options) {
   if (is_folder) folder = volume::files_of_volume(path);
   const Kind kind =
       is_folder ? Kind{folder.kind, folder.name} : kind_of(path, options.raw.has_value());
+  const bool is_dicom =
+      kind.kind == VolumeKind::dicom_file || kind.kind == VolumeKind::dicom_series;
+  if (!options.series.empty() && !is_dicom) {
+    throw LoadError("--series: " + path.string() + " is no DICOM; leave it out");
+  }
   SourceVolume source;
   UntrustedHeader claim;
   SharedBytes memory = read_in_sandbox(
