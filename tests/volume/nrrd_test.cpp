@@ -289,7 +289,10 @@ TEST_CASE("NRRD: spacings beside directions must agree, to the digits that are w
   CHECK(refusal_of(attached(oblique + "spacings: nan nan NaN\n")) == "no error");
   check_refusal(attached(oblique + "spacings: 0.5 0.6 0.7\n"),
                 "contradicts `space directions`, which has 0.5 along axis 2");
-  check_refusal(attached(oblique + "spacings: 1 1 1\n"), "contradicts `space directions`");
+  for (const std::string other : {"1 1 1", "0.5 0.52 0.7071", "0.5 0.5 0.706", "-0.5 0.5 0.707"}) {
+    check_refusal(attached(oblique + "spacings: " + other + "\n"),
+                  "contradicts `space directions`");
+  }
   check_refusal(attached(oblique + "spacings: 0.5 0.5\n"), "is not 3 numbers");
   const TemporaryFolder folder;
   ReadOptions options;
@@ -316,10 +319,11 @@ TEST_CASE("NRRD: what does not concern position or value changes nothing") {
                           "spacings: 1 2 3\naxis maxs: 1 1 1\n")) == "");
   CHECK(fault_of(attached(in_space("RAS") + "measurement frame: (0,1,0) (1,0,0) (0,0,1)\n"),
                  turned({-1, -1, 1})) == "");
-  for (const std::string magic : {"NRRD00.01", "NRRD0001", "NRRD0002", "NRRD0003", "NRRD0004"}) {
+  for (const std::string magic :
+       {"NRRD00.01", "NRRD0001", "NRRD0002", "NRRD0003", "NRRD0004", "NRRD0006"}) {
     CHECK(fault_of(magic + attached("spacings: 1 2 3\n").substr(8)) == "");
   }
-  check_refusal("NRRD0006" + attached("spacings: 1 2 3\n").substr(8), "no NRRD header");
+  check_refusal("NRRD0007" + attached("spacings: 1 2 3\n").substr(8), "no NRRD header");
 }
 
 TEST_CASE("NRRD: a number, a word or a field that cannot be is refused by its name") {

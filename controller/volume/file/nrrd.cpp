@@ -86,10 +86,11 @@ NrrdHeader nrrd_header(const fs::path& path) {
   HeaderLines lines(path);
   NrrdHeader header{HeaderFields(path), {}, 0};
   const std::string magic = stripped(lines.next().value_or(""));
-  constexpr std::string_view kMagics = "|NRRD00.01|NRRD0001|NRRD0002|NRRD0003|NRRD0004|NRRD0005|";
+  constexpr std::string_view kMagics =
+      "|NRRD00.01|NRRD0001|NRRD0002|NRRD0003|NRRD0004|NRRD0005|NRRD0006|";
   if (!magic.starts_with("NRRD") || kMagics.find("|" + magic + "|") == std::string_view::npos) {
     throw LoadError(path.string() +
-                    ": no NRRD header (its first line is not NRRD0001 .. NRRD0005)" +
+                    ": no NRRD header (its first line is not NRRD0001 .. NRRD0006)" +
                     "; is it another format?");
   }
   bool lists_names = false;
