@@ -145,6 +145,10 @@ TEST_CASE("MetaImage: byte order, headers before the voxels, text, and voxels in
                            "ElementByteOrderMSB = True\nBinaryDataByteOrderMSB = False\n")),
             "ElementByteOrderMSB: True contradicts"));
   CHECK(wrong_in(local(kElementSpacing + "HeaderSize = -1\n", "junk" + kNumbered)) == "");
+  for (const std::string size : {"10", "-2"}) {
+    CHECK(has(wrong_in(local(kElementSpacing + "HeaderSize = " + size + "\n")),
+              "HeaderSize: " + size + " is not the number of bytes before the voxels"));
+  }
   std::string words;
   for (int i = 0; i < 60; ++i) words += std::to_string(i) + "\n";
   CHECK(wrong_in(local(kElementSpacing + "BinaryData = False\n", words)) == "");

@@ -251,7 +251,10 @@ std::vector<VoxelPart> meta_parts(const MetaHeader& header,
     parts.push_back({fields.path().parent_path() / text});
   }
   const std::int64_t skip = fields.whole_number_or("HeaderSize", 0);
-  if (skip < -1) fields.refuse("HeaderSize", "is negative; correct the header");
+  const bool inside = skip > 0 && parts.front().begin > static_cast<std::uint64_t>(skip);
+  if (skip < -1 || inside) {
+    fields.refuse("HeaderSize", "is not the number of bytes before the voxels; correct it");
+  }
   for (VoxelPart& part : parts) {
     if (skip > 0) part.begin = static_cast<std::uint64_t>(skip);
     part.bytes = std::min<std::int64_t>(skip, 0);

@@ -238,8 +238,9 @@ std::vector<Vector> vectors_of(const HeaderFields& fields, const char* key, std:
   std::vector<Vector> vectors;
   const auto refuse = [&] {
     const std::string one = dimensions == 4 ? "(1,0,0,0)" : "(1,0,0)";
-    fields.refuse(key, "is not " + std::to_string(count) + " vectors such as " + one +
-                           ", with decimal points; correct the header");
+    const std::string all = count == 1 ? "a vector" : std::to_string(count) + " vectors";
+    fields.refuse(
+        key, "is not " + all + " such as " + one + ", with decimal points; correct the header");
   };
   const std::string text = fields.text(key);
   for (std::size_t at = 0; (at = text.find_first_not_of(" \t", at)) != std::string::npos;) {
