@@ -26,7 +26,7 @@
 namespace kerf {
 namespace {
 
-using vec3::cross, vec3::dot, vec3::length, vec3::operator-, vec3::operator*;
+using vec3::cross, vec3::dot, vec3::length, vec3::operator+, vec3::operator-, vec3::operator*;
 
 using Edge = std::pair<std::uint32_t, std::uint32_t>;  // lower corner first
 
@@ -54,7 +54,8 @@ struct Passes {
   int up = 0, down = 0;
 };
 
-void check_closed(const ToolMesh& mesh, const std::string& place) {
+/// Why the mesh encloses nothing; empty if it does.
+std::string fault_of(const ToolMesh& mesh) {
   std::map<Edge, Passes> edges;
   for (const ToolMesh::Triangle& t : mesh.triangles) {
     for (std::size_t k = 0; k < 3; ++k) {
@@ -68,11 +69,76 @@ void check_closed(const ToolMesh& mesh, const std::string& place) {
     const std::string ends = "the edge from " + text_of(mesh.points_mm[edge.first]) + " to " +
                              text_of(mesh.points_mm[edge.second]) + " mm";
     if ((passes.up + passes.down) % 2 == 1) {
-      refuse(place, ": not closed, " + ends + " has no partner; close the hole there");
+      return ": not closed, " + ends + " has no partner; close the hole there";
     }
-    refuse(place, ": the triangles at " + ends +
-                      " are turned against each other; let all be counter-clockwise from outside");
+    return ": the triangles at " + ends +
+           " are turned against each other; let all be counter-clockwise from outside";
   }
+  return {};
+}
+
+/// Joins corners of equal coordinates (`noise` 0), or those that no coordinate sets apart by more
+/// than `noise`: to the first of them.
+ToolMesh joined(std::span<const LooseTriangle> triangles, double scale, double noise) {
+  using Cell = ToolMesh::Point;
+  ToolMesh mesh;
+  std::map<Cell, std::uint32_t> known;  // at most one corner in a cell of edge `noise`
+  const auto index_of = [&](const ToolMesh::Point& corner) {
+    Cell own = corner;
+    if (noise > 0) {
+      for (double& x : own) x = std::floor(x / noise);
+      for (int near = 0; near < 27; ++near) {
+        const Cell cell = own + Cell{near % 3 - 1.0, near / 3 % 3 - 1.0, near / 9 - 1.0};
+        const auto at = known.find(cell);
+        if (at == known.end()) continue;
+        const ToolMesh::Point apart = mesh.points_mm[at->second] - scale * corner;
+        if (std::ranges::all_of(apart, [&](double x) { return std::abs(x) <= scale * noise; })) {
+          return at->second;
+        }
+      }
+    }
+    const auto next = static_cast<std::uint32_t>(mesh.points_mm.size());
+    const auto [at, is_new] = known.try_emplace(own, next);
+    if (is_new) mesh.points_mm.push_back(scale * corner);
+    return at->second;
+  };
+  for (const LooseTriangle& loose : triangles) {
+    ToolMesh::Triangle t{};
+    std::ranges::transform(loose, t.begin(), [&](const auto& corner) {
+      return index_of({corner[0], corner[1], corner[2]});
+    });
+    if (t[0] != t[1] && t[1] != t[2] && t[2] != t[0]) mesh.triangles.push_back(t);
+  }
+  return mesh;
+}
+
+/// Distances by which writers may set one corner apart in its triangles: four steps of a float of
+/// the size of the largest coordinate, after a few operations; one unit of the sixth digit, which
+/// is the last that C and C++ write by default, and so less than one and a half.
+std::array<double, 2> noises(std::span<const LooseTriangle> triangles) {
+  float largest = 0;
+  for (const LooseTriangle& triangle : triangles) {
+    for (const auto& corner : triangle) {
+      for (const float x : corner) largest = std::max(largest, std::abs(x));
+    }
+  }
+  const auto size = static_cast<double>(largest);
+  const double float_step = std::numeric_limits<float>::epsilon() * std::exp2(std::ilogb(size));
+  return {4 * float_step, 1.5e-5 * std::pow(10, std::floor(std::log10(size)))};
+}
+
+/// The mesh with its corners joined: as they are, else without the noise of their numbers.
+ToolMesh closed_mesh(std::span<const LooseTriangle> triangles, double scale,
+                     const std::string& place) {
+  ToolMesh mesh = joined(triangles, scale, 0);
+  const std::string fault = fault_of(mesh);
+  if (fault.empty()) return mesh;
+  for (const double noise : noises(triangles)) {
+    if (!(noise > 0)) continue;
+    mesh = joined(triangles, scale, noise);
+    if (fault_of(mesh).empty()) return mesh;
+  }
+  refuse(place, fault);
 }
 
 /// For each triangle the first one of its part; edges join triangles to parts.
@@ -201,20 +267,7 @@ ToolMesh join_triangles(std::span<const LooseTriangle> triangles, double scale,
                       std::to_string(kMaxMeshTriangles) + "; simplify the mesh");
   }
   check_coordinates(triangles, scale, place);
-  ToolMesh mesh;
-  std::map<std::array<float, 3>, std::uint32_t> known;
-  for (const LooseTriangle& loose : triangles) {
-    ToolMesh::Triangle t{};
-    for (std::size_t k = 0; k < 3; ++k) {
-      const auto next = static_cast<std::uint32_t>(mesh.points_mm.size());
-      const auto [at, is_new] = known.try_emplace(loose[k], next);
-      t[k] = at->second;
-      if (is_new)
-        mesh.points_mm.push_back(scale * vec3::Vec{loose[k][0], loose[k][1], loose[k][2]});
-    }
-    if (t[0] != t[1] && t[1] != t[2] && t[2] != t[0]) mesh.triangles.push_back(t);
-  }
-  check_closed(mesh, place);
+  ToolMesh mesh = closed_mesh(triangles, scale, place);
   stand_in_the_middle(mesh.points_mm);
   const double volume_mm3 = turn_outward(mesh);
   if (volume_mm3 < 1e-9) {
@@ -288,7 +341,10 @@ class StlText {
     if (fault == std::errc::result_out_of_range)
       value = std::strtod(std::string(word).c_str(), nullptr);
     const bool number = fault != std::errc::invalid_argument && end == word.data() + word.size();
-    if (!number || std::abs(value) > std::numeric_limits<float>::max()) complain(word, "a number");
+    if (!number || std::abs(value) > std::numeric_limits<float>::max()) {
+      const bool comma = word.find(',') != word.npos;
+      complain(word, comma ? "a number with a decimal point" : "a number");
+    }
     return static_cast<float>(value);
   }
   void skip_line() { skip(std::min(rest_.find('\n'), rest_.size())); }
@@ -313,9 +369,16 @@ class StlText {
   std::ptrdiff_t line_ = 1;
 };
 
+/// The word that ends a block: in one, as `endloop`, or in two.
+void expect_end(StlText& text, const std::string& of) {
+  const std::string_view word = text.next();
+  if (is_word(word, "end")) return text.expect(of);
+  if (!is_word(word, "end" + of)) text.complain(word, "end" + of);
+}
+
 LooseTriangle read_facet(StlText& text) {
   text.expect("normal");
-  for (int i = 0; i < 3; ++i) static_cast<void>(text.number());
+  for (int i = 0; i < 3; ++i) static_cast<void>(text.next());  // not used, and often no numbers
   text.expect("outer");
   text.expect("loop");
   LooseTriangle triangle{};
@@ -323,24 +386,27 @@ LooseTriangle read_facet(StlText& text) {
     text.expect("vertex");
     for (float& x : corner) x = text.number();
   }
-  text.expect("endloop");
-  text.expect("endfacet");
+  expect_end(text, "loop");
+  expect_end(text, "facet");
   return triangle;
 }
 
 std::vector<LooseTriangle> text_triangles(StlText text, const std::string& place) {
   std::vector<LooseTriangle> triangles;
-  for (std::string_view solid = text.next(); !solid.empty(); solid = text.next()) {
-    if (!is_word(solid, "solid")) text.complain(solid, "solid");
-    text.skip_line();  // its name
-    for (;;) {
-      const std::string_view word = text.next();
-      if (is_word(word, "endsolid")) break;
-      if (!is_word(word, "facet")) text.complain(word, "facet or endsolid");
+  bool in_solid = false;
+  for (std::string_view word = text.next(); !word.empty(); word = text.next()) {
+    if (in_solid && is_word(word, "facet")) {
       triangles.push_back(read_facet(text));
       check_count(triangles.size(), place);
+    } else if (is_word(word, "solid")) {
+      in_solid = true;
+      text.skip_line();  // its name
+    } else if (in_solid && (is_word(word, "endsolid") || is_word(word, "end"))) {
+      text.skip_line();
+      in_solid = false;
+    } else {
+      text.complain(word, in_solid ? "facet or endsolid" : "solid");
     }
-    text.skip_line();
   }
   return triangles;
 }
@@ -362,6 +428,8 @@ std::vector<LooseTriangle> parse_stl(std::string_view bytes, const std::string& 
                         "; export the mesh again");
     }
   }
+  constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";
+  if (bytes.starts_with(kByteOrderMark)) bytes.remove_prefix(kByteOrderMark.size());
   return text_triangles(StlText(bytes, place), place);
 }
 

@@ -38,9 +38,11 @@ struct ToolMesh {
 /// A triangle whose corners are not yet joined with those of others.
 using LooseTriangle = std::array<std::array<float, 3>, 3>;
 
-/// Joins triangles at corners of equal coordinates. `scale` is mm per unit of theirs; `place`
-/// begins each message. Triangles with two equal corners are left out. An inside-out mesh is
-/// turned outward, and so is each part of it, joined by edges, that is no hollow in another.
+/// Joins triangles at corners of equal coordinates; if that closes no mesh, at corners that the
+/// rounding of their numbers sets apart: four steps of a float, then one unit of the sixth digit,
+/// of the largest coordinate. `scale` is mm per unit of theirs; `place` begins each message.
+/// Triangles with two equal corners are left out. An inside-out mesh is turned outward, and so is
+/// each part of it, joined by edges, that is no hollow in another.
 ///
 /// Throws LoadError for coordinates beyond kLargestMeshMm, for an edge without a partner, for
 /// neighbours of opposite orientation, and if no volume is enclosed. Load time.
@@ -54,7 +56,8 @@ inline constexpr std::uintmax_t kMaxStlBytes = std::uintmax_t{512} * kMaxMeshTri
 ///
 /// Binary: 80 bytes of header, u32 count, then 50 bytes each: normal and three corners as f32, and
 /// two unused bytes; little-endian. Text: `solid`, `facet normal`, `outer loop`, three
-/// `vertex`, `endloop`, `endfacet`, `endsolid`, in any case; several solids are one mesh. A file
+/// `vertex`, `endloop`, `endfacet`, `endsolid`, in any case, or `end loop` and so on; the last
+/// `endsolid` may be missing, and several solids are one mesh. A file
 /// whose size is that of its binary count is binary, with any first word; any other without a zero
 /// byte is text.
 ///

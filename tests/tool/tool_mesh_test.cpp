@@ -130,6 +130,42 @@ TEST_CASE("several solids of one text are one mesh") {
   CHECK(parse_stl(text_stl(kBar) + text_stl(kBar), "bur.stl").size() == 2 * kBar.size());
 }
 
+namespace {
+
+std::string replaced(std::string text, const std::string& what, const std::string& with) {
+  for (std::size_t at = 0; (at = text.find(what, at)) != text.npos; at += with.size()) {
+    text.replace(at, what.size(), with);
+  }
+  return text;
+}
+
+}  // namespace
+
+TEST_CASE("a text STL may close its blocks in two words, or the last solid with none") {
+  const std::string text = text_stl(kBar);
+  const std::string spaced =
+      replaced(replaced(text, "endsolid", "end solid"), "endloop", "end loop");
+  CHECK(parse_stl(replaced(spaced, "endfacet", "End Facet"), "bur.stl") == kBar);
+  const std::string open = text.substr(0, text.rfind("endsolid"));
+  CHECK(parse_stl(open, "bur.stl") == kBar);
+  CHECK(parse_stl("\xef\xbb\xbf" + open + text, "bur.stl").size() == 2 * kBar.size());
+  CHECK(begins(parse_error(text + "facet"), "bur.stl:115: \"facet\" where solid belongs"));
+  CHECK(begins(parse_error(open + "end\nfacets"), "bur.stl:115: \"facets\" where solid belongs"));
+}
+
+TEST_CASE("normals are not used, so any three words do, and corners are numbers with points") {
+  const std::string text = text_stl(kBar);
+  const std::size_t from = text.find("normal") + 6, to = text.find('\n', from);
+  for (const char* words : {"-1.#IND -1.#IND -1.#IND", "nan nan -nan(ind)", "0,5 x 1e999"}) {
+    CHECK(parse_stl(std::string(text).replace(from, to - from, " " + std::string(words)),
+                    "bur.stl") == kBar);
+  }
+  const auto error = parse_error("solid x\nfacet normal 0 0 1\nouter loop\nvertex 0,5 0 0\n");
+  CHECK(error ==
+        "bur.stl:4: \"0,5\" where a number with a decimal point belongs; export the mesh again");
+  CHECK(begins(parse_error(replaced(text, "vertex", "vertex -1.#IND")), "bur.stl:4: \"-1.#IND\""));
+}
+
 TEST_CASE("a file that is no STL is refused with the place, what is there and the way out") {
   const std::string bytes = binary_stl(kBar), text = text_stl(kBar);
   CHECK(parse_error(bytes.substr(0, bytes.size() - 1)) ==
@@ -219,6 +255,42 @@ TEST_CASE("a mesh that encloses nothing or has a hole is refused with the edge")
   Triangles flat = {kBar[0], kBar[0]};
   std::swap(flat[1][0], flat[1][1]);
   CHECK(begins(join_error(flat), "bur.stl: the mesh encloses 0 mm^3"));
+}
+
+TEST_CASE("corners that the rounding of their numbers sets apart are joined, real detail is not") {
+  const ToolMesh exact = join_triangles(kBar, 1, "bur.stl");
+  const auto each_corner = [](Triangles triangles, auto change) {
+    int count = 0;
+    for (LooseTriangle& t : triangles) {
+      for (auto& corner : t) {
+        for (float& x : corner) x = change(x, count++);
+      }
+    }
+    return triangles;
+  };
+  // Steps of the float at hand, and digits that were cut elsewhere.
+  const auto stepped = each_corner(kBar, [](float x, int n) {
+    return n % 3 == 0 ? std::nextafter(x, 9.0F) : n % 3 == 1 ? std::nextafter(x, -9.0F) : x;
+  });
+  const auto six_digits = each_corner(
+      kBar, [](float x, int n) { return x + (n % 2 == 0 ? 1e-5F : 0) * std::copysign(1.0F, x); });
+  CHECK(join_error(stepped).empty());
+  CHECK(join_error(six_digits).empty());
+  CHECK(join_error(moved(stepped, 0, 900, 0)).empty());
+  const ToolMesh welded = join_triangles(six_digits, 1, "bur.stl");
+  CHECK(welded.points_mm.size() == exact.points_mm.size());
+  CHECK(volume_mm3(welded) == doctest::Approx(volume_mm3(exact)).epsilon(1e-4));
+  const auto gaping =
+      each_corner(kBar, [](float x, int n) { return x + (n % 2 == 0 ? 1e-4F : 0); });
+  CHECK(begins(join_error(gaping), "bur.stl: not closed"));
+  // A closed mesh keeps what is smaller than any noise.
+  Triangles fine = extremes::loft({-4, -3.999999, 4}, 4, [](double y, double angle) {
+    return extremes::Point{std::cos(angle), y, std::sin(angle)};
+  });
+  CHECK(join_triangles(fine, 1, "bur.stl").points_mm.size() == 14);
+  // What the noise made flat goes, and the rest is closed.
+  fine = each_corner(fine, [](float x, int n) { return n % 2 == 0 ? std::nextafter(x, 9.0F) : x; });
+  CHECK(join_error(fine).empty());
 }
 
 TEST_CASE("coordinates that no tool has are refused with their triangle") {
