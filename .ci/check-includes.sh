@@ -122,9 +122,9 @@ broken() {
   grep -rnE --include='*.[ch]pp' 'system_clock|CLOCK_REALTIME|gettimeofday|timespec_get' \
     controller/servo controller/loop controller/run controller/device shared/segment \
     shared/posix/monotonic_clock.hpp || true
-  includes '<itk' "${programs[@]}" | grep -v '^controller/volume/file/foreign_[a-z]*\.[ch]pp:'
   includes '<gdcm' "${programs[@]}" | grep -v '^controller/volume/file/dicom_[a-z]*\.[ch]pp:'
   includes '<(archive|archive_entry|expat)\.h' "${programs[@]}" | grep -v '^controller/volume/file/foreign_invesalius.cpp:'
+  includes '<(nifti/|tiff)' "${programs[@]}" | grep -vE '^controller/volume/file/(nifti|tiff)\.cpp:'
   includes '<(boost|openssl)/' "${programs[@]}" | grep -vE '^bridge/(net|join|serve)/'
   includes '<lz4' "${programs[@]}" | grep -v '^bridge/wire/compression.cpp:'
   includes '<igtl' "${programs[@]}" | grep -v '^bridge/igtl/'

@@ -89,7 +89,7 @@ else
 fi
 
 libraries=$(dpkg-query -W -f '${Package} ${Version}\n' libusb-1.0-0-dev libhidapi-dev \
-  libseccomp-dev libinsighttoolkit5-dev 2>/dev/null | sed -E 's/(-dev)? ([0-9]+:)?([0-9.]+).*/ \3/' |
+  libseccomp-dev libgdcm-dev 2>/dev/null | sed -E 's/(-dev)? ([0-9]+:)?([0-9.]+).*/ \3/' |
   paste -sd ',' | sed 's/,/, /g') || true
 if [[ -z $installed ]]; then row ok libraries "${libraries:-unknown: this is not Debian}"; fi
 

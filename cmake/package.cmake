@@ -22,6 +22,6 @@ set(CPACK_DEBIAN_KERF_PACKAGE_DEPENDS "libegl1, libgl1, libgl1-mesa-dri, python3
 set(CPACK_DEBIAN_KERF_PACKAGE_RECOMMENDS "udev, bash-completion, openssl")
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_NAME kerf-dev)
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS
-  "kerf (= ${PROJECT_VERSION}), cmake, g++, pkg-config, libinsighttoolkit5-dev, zlib1g-dev, libarchive-dev, libexpat1-dev, libusb-1.0-0-dev, libhidapi-dev, libseccomp-dev")
+  "kerf (= ${PROJECT_VERSION}), cmake, g++, pkg-config, libgdcm-dev, libpng-dev, libtiff-dev, zlib1g-dev, libarchive-dev, libexpat1-dev, libusb-1.0-0-dev, libhidapi-dev, libseccomp-dev")
 set(CPACK_COMPONENT_DEVELOPMENT_DESCRIPTION "Headers and static libraries of kerf: find_package(kerf).")
 include(CPack)

@@ -69,4 +69,4 @@ for file in bin/kerf bin/kerf-controller share/man/man1/kerf-controller.1 share/
   grep -qxF "./usr/$file" "$home/files" || fail "$package: lacks /usr/$file"
 done
 ! grep -qE '\.(hpp|a)$' "$home/files" || fail "$package: has what belongs into kerf-dev"
-dpkg-deb -f "$package" Depends | grep -q 'libinsighttoolkit5' || fail "$package: does not ask for its libraries"
+dpkg-deb -f "$package" Depends | grep -q 'libgdcm3' || fail "$package: does not ask for its libraries"

@@ -25,7 +25,8 @@ std::string chunk(const std::string& type, const std::string& data) {
 }
 
 /// PNG of `channels` numbers a pixel, all as they lie in `rows`.
-std::string png(int width, int height, int bits, int colour, const std::string& pixels) {
+std::string png(int width, int height, int bits, int colour, const std::string& pixels,
+                const std::string& more_chunks = "") {
   std::string rows;
   const std::size_t row = pixels.size() / static_cast<std::size_t>(height);
   for (std::size_t y = 0; y < static_cast<std::size_t>(height); ++y) {
@@ -40,37 +41,13 @@ std::string png(int width, int height, int bits, int colour, const std::string& 
          chunk("IHDR", big(static_cast<std::uint32_t>(width)) +
                            big(static_cast<std::uint32_t>(height)) + static_cast<char>(bits) +
                            static_cast<char>(colour) + std::string(3, '\0')) +
-         chunk("IDAT", packed) + chunk("IEND", "");
+         more_chunks + chunk("IDAT", packed) + chunk("IEND", "");
 }
 constexpr int kGrey = 0, kRgba = 6;
 
-/// TIFF of grey pages, not packed, little-endian.
-std::string tiff(std::uint32_t width, std::uint32_t height, std::uint16_t bits,
-                 const std::vector<std::string>& pages) {
-  std::string bytes = std::string("II*\0", 4) + bytes_of(std::uint32_t{8});
-  for (std::size_t page = 0; page < pages.size(); ++page) {
-    constexpr std::uint16_t kEntries = 10;
-    const auto begin = static_cast<std::uint32_t>(bytes.size());
-    const std::uint32_t data = begin + 2 + kEntries * 12 + 4;
-    const auto entry = [](std::uint16_t tag, std::uint16_t type, std::uint32_t value) {
-      return bytes_of(tag) + bytes_of(type) + bytes_of(std::uint32_t{1}) + bytes_of(value);
-    };
-    constexpr std::uint16_t kShort = 3, kLong = 4;
-    const auto size = static_cast<std::uint32_t>(pages[page].size());
-    bytes += bytes_of(kEntries) + entry(256, kLong, width) + entry(257, kLong, height) +
-             entry(258, kShort, bits) + entry(259, kShort, 1) + entry(262, kShort, 1) +
-             entry(273, kLong, data) + entry(277, kShort, 1) + entry(278, kLong, height) +
-             entry(279, kLong, size) + entry(284, kShort, 1);
-    bytes += bytes_of(page + 1 < pages.size() ? data + size : std::uint32_t{0}) + pages[page];
-  }
-  return bytes;
-}
-
-/// The slice z of 3 x 4 x 5 voxels that count 0 .. 59.
-template <class T>
-std::string slice(int z, std::endian order = std::endian::little) {
-  const std::vector<T> all = counting<T>();
-  return bytes_of(std::vector<T>(all.begin() + 12 * z, all.begin() + 12 * (z + 1)), order);
+/// A TIFF of one page of 3 x 4.
+std::string one_page(std::uint16_t bits, const std::string& pixels) {
+  return tiff({{.pixels = pixels, .bits = bits}});
 }
 
 /// Five files whose numbers have no leading zeros: 8 .. 12.
@@ -94,38 +71,14 @@ TEST_CASE("a folder of grey pictures is a volume, in the order of the numbers in
     });
   }
   SUBCASE("TIFF") {
-    write_stack(folder, ".tif", [](int z) { return tiff(3, 4, 16, {slice<std::uint16_t>(z)}); });
+    write_stack(folder, ".tif", [](int z) { return one_page(16, slice<std::uint16_t>(z)); });
   }
   folder.write("notes.txt", "not a slice");
   const SourceVolume v = read_volume(folder.path(), kSpaced);
   CHECK(v.grid == kSmall);
   CHECK(same_values(v, counting<float>()));
+  CHECK(v.note.starts_with("slices in the order of the numbers in their names, slice8"));
   CHECK(refusal(folder.path()).find("spacing is not in the file") != std::string::npos);
-}
-
-TEST_CASE("a TIFF of several pages is a volume") {
-  const TemporaryFolder folder;
-  std::vector<std::string> pages;
-  for (int z = 0; z < 5; ++z) pages.push_back(slice<std::uint8_t>(z));
-  const SourceVolume v = read_volume(folder.write("a.tiff", tiff(3, 4, 8, pages)), kSpaced);
-  CHECK(v.grid == kSmall);
-  CHECK(same_values(v, counting<float>()));
-}
-
-TEST_CASE("a TIFF that is cut off is refused, wherever it is") {
-  const TemporaryFolder folder;
-  std::vector<std::string> pages;
-  for (int z = 0; z < 5; ++z) pages.push_back(slice<std::uint8_t>(z));
-  const std::string whole = tiff(3, 4, 8, pages);
-  for (std::size_t held = 0; held < whole.size(); held += 7) {
-    const std::string message = refusal(folder.write("a.tif", whole.substr(0, held)), kSpaced);
-    CAPTURE(held);
-    CAPTURE(message);
-    CHECK(is_one_line(message));
-  }
-  std::string endless = whole;  // the first page is followed by itself
-  endless.replace(8 + 2 + 120, 4, bytes_of(std::uint32_t{8}));
-  CHECK(is_one_line(refusal(folder.write("b.tif", endless), kSpaced)));
 }
 
 TEST_CASE("values of 16 bits come whole from the largest and the smallest") {
@@ -138,6 +91,25 @@ TEST_CASE("values of 16 bits come whole from the largest and the smallest") {
   const SourceVolume v = read_volume(folder.path(), kSpaced);
   CHECK(v.min == 0);
   CHECK(v.max == 65535);
+}
+
+TEST_CASE("pixels of a palette, with transparency or of less than 8 bits are no grey values") {
+  const auto refused = [](const std::string& picture) {
+    const TemporaryFolder folder;
+    write_stack(folder, ".png", [&](int) { return picture; });
+    const std::string message = refusal(folder.path(), kSpaced);
+    CAPTURE(message);
+    CHECK(is_one_line(message));
+    return message.substr(message.find_last_of('/') + 1);
+  };
+  const std::string twelve(12, 'x'), more(24, 'x');
+  CHECK(refused(png(3, 4, 8, 3, twelve, chunk("PLTE", more)))
+            .starts_with("slice8.png: pixels of a pal"));
+  CHECK(refused(png(3, 4, 8, 4, more)).starts_with("slice8.png: pixels of grey with transparency"));
+  CHECK(refused(png(3, 4, 8, kGrey, twelve, chunk("tRNS", std::string(2, '\1'))))
+            .starts_with("slice8.png: pixels of grey with transparency"));
+  CHECK(refused(png(3, 4, 4, kGrey, std::string(8, 'x')))
+            .starts_with("slice8.png: values of 4 bits"));
 }
 
 TEST_CASE("pictures that are no stack are refused in one line") {
@@ -153,7 +125,7 @@ TEST_CASE("pictures that are no stack are refused in one line") {
   };
   refused(
       ".png", [](int) { return png(3, 4, 8, kRgba, std::string(std::size_t{4} * 12, 'x')); },
-      "slice8.png: 4 values per voxel");
+      "slice8.png: pixels of colours");
   refused(
       ".png", [&](int z) { return z == 3 ? png(4, 3, 8, kGrey, slice<std::uint8_t>(z)) : grey(z); },
       "slice11.png: 4 x 3 pixels, and slice8.png has 3 x 4");
@@ -164,7 +136,7 @@ TEST_CASE("pictures that are no stack are refused in one line") {
   refused(
       ".tif",
       [](int z) {
-        return tiff(3, 4, 8, {slice<std::uint8_t>(z), slice<std::uint8_t>(z)});
+        return tiff({{slice<std::uint8_t>(z)}, {slice<std::uint8_t>(z)}});
       },
       "slice8.tif");
   refused(
@@ -176,8 +148,7 @@ TEST_CASE("pictures that are no stack are refused in one line") {
   refused(
       ".tif",
       [](int z) {
-        return z == 3 ? tiff(3, 4, 16, {slice<std::uint16_t>(z)})
-                      : tiff(3, 4, 8, {slice<std::uint8_t>(z)});
+        return z == 3 ? one_page(16, slice<std::uint16_t>(z)) : one_page(8, slice<std::uint8_t>(z));
       },
       "slice11.tif: values of uint16, and slice8");
   const TemporaryFolder folder;
@@ -192,7 +163,7 @@ TEST_CASE("a stack that is not whole, or not one, is refused by the slice") {
     int z = 0;
     for (const std::string& name : names) {
       folder.write(name,
-                   name.ends_with(".tif") ? tiff(3, 4, 8, {slice<std::uint8_t>(z % 5)}) : grey(z));
+                   name.ends_with(".tif") ? one_page(8, slice<std::uint8_t>(z % 5)) : grey(z));
       ++z;
     }
     const std::string message = refusal(folder.path(), kSpaced);

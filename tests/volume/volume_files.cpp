@@ -57,8 +57,75 @@ std::string nifti(const NiftiSpec& spec) {
   for (std::size_t i = 0; i < 3; ++i) put(80 + 4 * i, spec.pixdim[i]);
   put(108, 352.0F);
   header[123] = 2;  // mm
+  put(254, static_cast<std::int16_t>(spec.sform ? 1 : 0));
+  put(280, -spec.pixdim[0]);
+  put(300, -spec.pixdim[1]);
+  put(320, spec.pixdim[2]);
   header.replace(344, 3, "n+1");
   return header;
+}
+
+std::string tiff(const std::vector<TiffPage>& pages, std::endian order) {
+  constexpr std::uint16_t kText = 2, kShort = 3, kLong = 4, kRatio = 5;
+  std::string bytes =
+      (order == std::endian::big ? "MM" : "II") + bytes_of(std::uint16_t{42}, order);
+  std::size_t link = bytes.size();
+  bytes += bytes_of(std::uint32_t{0}, order);
+  const auto here = [&] { return bytes_of(static_cast<std::uint32_t>(bytes.size()), order); };
+  for (const TiffPage& page : pages) {
+    struct Field {
+      std::uint16_t type;
+      std::size_t count;
+      std::string value;
+    };
+    std::map<std::uint16_t, Field> fields;
+    const auto longs = [&](std::uint16_t tag, std::uint32_t value) {
+      fields[tag] = {kLong, 1, bytes_of(value, order)};
+    };
+    const auto shorts = [&](std::uint16_t tag, std::uint16_t value) {
+      fields[tag] = {kShort, 1, bytes_of(value, order)};
+    };
+    longs(256, page.width);
+    longs(257, page.height);
+    shorts(258, page.bits);
+    shorts(259, 1);
+    shorts(262, 1);
+    fields[273] = {kLong, 1, here()};
+    bytes += page.pixels + (page.pixels.size() % 2 == 1 ? "x" : "");
+    shorts(277, 1);
+    longs(278, page.height);
+    longs(279, static_cast<std::uint32_t>(page.pixels.size()));
+    for (const auto& [tag, values] : page.shorts) {
+      fields[tag] = {kShort, values.size(), bytes_of(values, order)};
+    }
+    for (const auto& [tag, values] : page.longs) {
+      fields[tag] = {kLong, values.size(), bytes_of(values, order)};
+    }
+    for (const auto& [tag, values] : page.ratios) {
+      fields[tag] = {kRatio, values.size() / 2, bytes_of(values, order)};
+    }
+    if (!page.description.empty()) {
+      fields[270] = {kText, page.description.size() + 1, page.description + '\0'};
+    }
+    for (auto& [tag, field] : fields) {
+      if (field.value.size() <= 4) {
+        field.value.resize(4);
+        continue;
+      }
+      const std::string at = here();
+      bytes += field.value + (field.value.size() % 2 == 1 ? "x" : "");
+      field.value = at;
+    }
+    bytes.replace(link, 4, here());
+    bytes += bytes_of(static_cast<std::uint16_t>(fields.size()), order);
+    for (const auto& [tag, field] : fields) {
+      bytes += bytes_of(tag, order) + bytes_of(field.type, order) +
+               bytes_of(static_cast<std::uint32_t>(field.count), order) + field.value;
+    }
+    link = bytes.size();
+    bytes += bytes_of(std::uint32_t{0}, order);
+  }
+  return bytes;
 }
 
 std::string dicom_element(std::uint16_t group, std::uint16_t number, const std::string& type,

@@ -61,6 +61,7 @@ inline const std::string kElementSpacing = "ElementSpacing = 1 2 3\n";
 struct NiftiSpec {
   std::vector<std::int16_t> dim{3, 4, 5};
   std::array<float, 3> pixdim{1, 2, 3};
+  bool sform = true;                      ///< of pixdim, along the axes of LPS
   std::int16_t datatype = 16, bits = 32;  ///< float32
   std::endian order = std::endian::little;
 };
@@ -71,6 +72,26 @@ struct NiftiSpec {
 [[nodiscard]] std::string dicom_element(std::uint16_t group, std::uint16_t number,
                                         const std::string& type, std::string value);
 [[nodiscard]] std::string dicom_item(const std::string& elements);
+/// A page of a TIFF, as one strip that is not packed: grey values of `bits`.
+struct TiffPage {
+  std::string pixels;
+  std::uint32_t width = 3, height = 4;
+  std::uint16_t bits = 8;
+  /// Further fields, or others in place of the usual ones: shorts, longs, a text, or pairs of
+  /// longs.
+  std::map<std::uint16_t, std::vector<std::uint16_t>> shorts{};
+  std::map<std::uint16_t, std::vector<std::uint32_t>> longs{}, ratios{};
+  std::string description{};
+};
+[[nodiscard]] std::string tiff(const std::vector<TiffPage>& pages,
+                               std::endian order = std::endian::little);
+
+/// The layer z of 3 x 4 x 5 voxels that count 0 .. 59.
+template <class T>
+std::string slice(int z, std::endian order = std::endian::little) {
+  const std::vector<T> all = counting<T>();
+  return bytes_of(std::vector<T>(all.begin() + 12 * z, all.begin() + 12 * (z + 1)), order);
+}
 
 struct DicomSpec {
   int rows = 4, columns = 3;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <iostream>
 #include <list>
 #include <map>
 #include <span>
@@ -16,7 +17,8 @@
 #include "controller/volume/file/dicom_header.hpp"
 #include "controller/volume/file/dicom_pixels.hpp"
 #include "controller/volume/file/dicom_stack.hpp"
-#include "controller/volume/file/foreign_itk.hpp"
+#include "controller/volume/file/file_headers.hpp"
+#include "controller/volume/file/foreign_volume.hpp"
 #include "controller/volume/file/volume_image.hpp"
 #include "shared/text/text.hpp"
 
@@ -160,7 +162,7 @@ std::size_t chosen_stack(const fs::path& path, const std::vector<Stack>& all,
       "; choose one with ./kerf volume import --series:" + list);
 }
 
-[[noreturn]] void refuse(const DicomFile& file) {
+[[noreturn]] void refuse_unfit(const DicomFile& file) {
   throw LoadError(file.path.string() + ": " + file.unfit + "; " + file.way_out);
 }
 
@@ -170,7 +172,7 @@ void note_unfit(const std::list<DicomFile>& files, const Stack& stack, Note& not
   std::vector<const DicomFile*> unfit;
   for (const DicomFile& file : files) {
     if (file.unfit.empty()) continue;
-    if (file.is_slice && file.series == stack.series) refuse(file);
+    if (file.is_slice && file.series == stack.series) refuse_unfit(file);
     unfit.push_back(&file);
   }
   for (std::size_t i = 0; i < std::min(unfit.size(), kMostNamed); ++i) {
@@ -208,17 +210,19 @@ void refuse_if_all_unfit(const std::list<DicomFile>& files, const std::vector<St
   if (std::ranges::any_of(all, [](const Stack& stack) { return stack.slices.size() > 1; })) return;
   const auto is_unfit = [](const DicomFile& file) { return !file.unfit.empty(); };
   for (const DicomFile& file : files) {
-    if (is_unfit(file) && file.is_slice) refuse(file);
+    if (is_unfit(file) && file.is_slice) refuse_unfit(file);
   }
   const auto any = std::ranges::find_if(files, is_unfit);
-  if (all.empty() && any != files.end()) refuse(*any);
+  if (all.empty() && any != files.end()) refuse_unfit(*any);
 }
 
 }  // namespace
 
 void read_dicom(const fs::path& path, const std::vector<fs::path>& files, const std::string& wanted,
                 SandboxReader& sandbox, const MemoryRequest& offer) {
-  const Quiet quiet;
+  // GDCM prints to both; the process ends with this volume.
+  std::cerr.rdbuf(nullptr);
+  std::cout.rdbuf(nullptr);
   gdcm::Trace::WarningOff();
   gdcm::Trace::ErrorOff();
   std::list<DicomFile> found;

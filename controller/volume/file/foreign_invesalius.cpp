@@ -21,7 +21,6 @@
 
 #include "controller/input/load_error.hpp"
 #include "controller/volume/file/file_headers.hpp"
-#include "controller/volume/file/foreign_itk.hpp"
 #include "controller/volume/file/foreign_volume.hpp"
 #include "controller/volume/file/volume_image.hpp"
 #include "shared/numeric/linear_algebra.hpp"

@@ -14,7 +14,7 @@
 #include "controller/volume/file/volume_image.hpp"
 #include "shared/numeric/linear_algebra.hpp"
 
-// The readers of foreign volumes as the program calls them, in the sandbox. No ITK here.
+// The readers of foreign volumes as the program calls them, in the sandbox.
 
 namespace kerf::volume {
 
@@ -47,6 +47,10 @@ struct UntrustedHeader {
 /// number, skipped files. A sentence that does not fit is cut off, and ends in "...".
 void add_note(UntrustedHeader& header, std::string_view sentence);
 
+/// Of slices without a frame: rows run downwards and slices upwards in a body that lies on its
+/// back, as in DICOM.
+inline constexpr std::array<vec3::Vec, 3> kSliceAxes{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
+
 /// Hands over the claim and returns the memory for it.
 using MemoryRequest = std::function<std::span<std::byte>(const UntrustedHeader&)>;
 
@@ -63,6 +67,15 @@ void read_foreign_volume(const std::filesystem::path& path, VolumeKind kind,
 /// single volume of grey values whose geometry is clear.
 void read_nrrd(const std::filesystem::path& path, const MemoryRequest& offer);
 void read_meta(const std::filesystem::path& path, const MemoryRequest& offer);
+void read_nifti(const std::filesystem::path& path, const MemoryRequest& offer);
+void read_tiff(const std::filesystem::path& path, const MemoryRequest& offer);
+void read_invesalius(const std::filesystem::path& path, const MemoryRequest& offer);
+
+/// In the sandbox: pictures of one size in the order of the numbers in their names. `beside`: the
+/// files of the folder.
+void read_slice_stack(const std::filesystem::path& folder,
+                      const std::vector<std::filesystem::path>& beside, VolumeKind kind,
+                      SandboxReader& sandbox, const MemoryRequest& offer);
 
 /// In the sandbox. Throws LoadError for a file whose size is not that of the layout.
 void read_raw(const std::filesystem::path& path, const RawLayout& layout,

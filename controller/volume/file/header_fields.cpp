@@ -29,6 +29,15 @@ void refuse_not_finite(const fs::path& path, std::uint64_t count, std::uint64_t 
   throw LoadError(text.str());
 }
 
+void refuse_unreadable(const fs::path& path, const std::string& reason) {
+  std::error_code fault;
+  if (fs::file_size(path, fault) == 0 && !fault) {
+    throw LoadError(path.string() + ": is empty; copy the file again");
+  }
+  throw LoadError(one_line(path.string() + ": cannot be read (" + reason +
+                           "); check that the file is whole and of the kind its name says"));
+}
+
 void refuse_truncated(const std::string& file, std::uint64_t held, std::uint64_t expected) {
   std::ostringstream text;
   text << file << ": " << held << " of " << expected

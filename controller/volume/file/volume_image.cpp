@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstring>
+#include <limits>
 #include <sstream>
 
 #include "controller/input/load_error.hpp"
@@ -43,14 +45,19 @@ namespace {
 constexpr std::size_t kBlock = 1024;
 
 template <class From, class To>
-void convert_as(std::span<const std::byte> from, std::span<std::byte> to) {
+void convert_as(std::span<const std::byte> from, std::span<std::byte> to, const Scaling& scaling) {
+  const bool scaled = scaling != Scaling{};
   std::array<From, kBlock> values;
   std::array<To, kBlock> converted;
   for (std::size_t left = std::min(from.size() / sizeof(From), to.size() / sizeof(To)); left > 0;) {
     const std::size_t count = std::min(left, kBlock);
     std::memcpy(values.data(), from.data(), count * sizeof(From));
-    std::transform(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(count),
-                   converted.begin(), [](From value) { return static_cast<To>(value); });
+    for (std::size_t i = 0; i < count; ++i) {
+      converted[i] =
+          scaled
+              ? static_cast<To>(scaling.slope * static_cast<double>(values[i]) + scaling.intercept)
+              : static_cast<To>(values[i]);
+    }
     std::memcpy(to.data(), converted.data(), count * sizeof(To));
     from = from.subspan(count * sizeof(From));
     to = to.subspan(count * sizeof(To));
@@ -59,59 +66,42 @@ void convert_as(std::span<const std::byte> from, std::span<std::byte> to) {
 }
 
 template <class From>
-void convert_from(std::span<const std::byte> from, ValueKind kind, std::span<std::byte> to) {
+void convert_from(std::span<const std::byte> from, ValueKind kind, std::span<std::byte> to,
+                  const Scaling& scaling) {
   if constexpr (sizeof(From) <= sizeof(std::int16_t)) {
-    if (kind == ValueKind::int16) return convert_as<From, std::int16_t>(from, to);
-    if (kind == ValueKind::uint16) return convert_as<From, std::uint16_t>(from, to);
+    if (kind == ValueKind::int16) return convert_as<From, std::int16_t>(from, to, scaling);
+    if (kind == ValueKind::uint16) return convert_as<From, std::uint16_t>(from, to, scaling);
   }
-  convert_as<From, float>(from, to);
+  convert_as<From, float>(from, to, scaling);
 }
 
 }  // namespace
 
 std::size_t bytes_of(VoxelType type) noexcept {
-  constexpr std::array<std::size_t, std::size(kVoxelTypeWords)> kBytes{1, 1, 2, 2, 4,
-                                                                       4, 8, 8, 4, 8};
-  return kBytes[static_cast<std::size_t>(type)];
+  return visit_type(type, [](auto number) { return sizeof number; });
 }
 
-ValueKind kind_of(VoxelType type) noexcept {
-  switch (type) {
-    case VoxelType::uint8:
-    case VoxelType::int8:
-    case VoxelType::int16:
-      return ValueKind::int16;
-    case VoxelType::uint16:
-      return ValueKind::uint16;
-    default:
-      return ValueKind::float32;
-  }
+ValueKind kind_of(VoxelType type, const Scaling& scaling) noexcept {
+  const bool whole = scaling.slope == std::floor(scaling.slope) &&
+                     scaling.intercept == std::floor(scaling.intercept);
+  return visit_type(type, [&]<class T>(T) {
+    using Range = std::numeric_limits<T>;
+    if (!whole || !Range::is_integer || sizeof(T) > sizeof(std::int16_t)) return ValueKind::float32;
+    const double a = scaling.slope * static_cast<double>(Range::min()) + scaling.intercept,
+                 b = scaling.slope * static_cast<double>(Range::max()) + scaling.intercept;
+    const auto hold = [&]<class V>(V) {
+      return std::min(a, b) >= std::numeric_limits<V>::min() &&
+             std::max(a, b) <= std::numeric_limits<V>::max();
+    };
+    return hold(std::int16_t{})    ? ValueKind::int16
+           : hold(std::uint16_t{}) ? ValueKind::uint16
+                                   : ValueKind::float32;
+  });
 }
 
 void convert_values(VoxelType type, std::span<const std::byte> from, ValueKind kind,
-                    std::span<std::byte> to) {
-  switch (type) {
-    case VoxelType::uint8:
-      return convert_from<std::uint8_t>(from, kind, to);
-    case VoxelType::int8:
-      return convert_from<std::int8_t>(from, kind, to);
-    case VoxelType::uint16:
-      return convert_from<std::uint16_t>(from, kind, to);
-    case VoxelType::int16:
-      return convert_from<std::int16_t>(from, kind, to);
-    case VoxelType::uint32:
-      return convert_from<std::uint32_t>(from, kind, to);
-    case VoxelType::int32:
-      return convert_from<std::int32_t>(from, kind, to);
-    case VoxelType::uint64:
-      return convert_from<std::uint64_t>(from, kind, to);
-    case VoxelType::int64:
-      return convert_from<std::int64_t>(from, kind, to);
-    case VoxelType::float32:
-      return convert_from<float>(from, kind, to);
-    case VoxelType::float64:
-      return convert_from<double>(from, kind, to);
-  }
+                    std::span<std::byte> to, const Scaling& scaling) {
+  visit_type(type, [&]<class T>(T) { convert_from<T>(from, kind, to, scaling); });
 }
 
 }  // namespace kerf

@@ -151,12 +151,19 @@ decltype(auto) visit_type(VoxelType type, const Use& use) {
   return use(double{});
 }
 
+/// Values that a file stores as other numbers: slope * number + intercept, in double.
+struct Scaling {
+  double slope = 1, intercept = 0;
+  bool operator==(const Scaling&) const = default;
+};
+
 [[nodiscard]] std::size_t bytes_of(VoxelType type) noexcept;
-[[nodiscard]] ValueKind kind_of(VoxelType type) noexcept;
+/// Of all numbers of the type, scaled.
+[[nodiscard]] ValueKind kind_of(VoxelType type, const Scaling& scaling = {}) noexcept;
 
 /// Converts numbers of a file, in this machine's byte order, to values, in order: as many as `from`
 /// holds and `to` has room for. The two may overlap if `to` does not begin after `from`.
 void convert_values(VoxelType type, std::span<const std::byte> from, ValueKind kind,
-                    std::span<std::byte> to);
+                    std::span<std::byte> to, const Scaling& scaling = {});
 
 }  // namespace kerf

@@ -354,7 +354,7 @@ void read_voxel_files(const fs::path& header, VoxelFiles files, UntrustedHeader 
     add_note(claim, std::to_string(behind) + " bytes after the voxels are not read");
   }
   claim.voxel_bytes = static_cast<std::uint32_t>(each);
-  claim.kind = kind_of(files.type);
+  claim.kind = kind_of(files.type, files.scaling);
   const std::span<std::byte> memory = offer(claim);
   // The file's own voxels fill the end of the memory, their values then its begin.
   std::span<std::byte> own = memory.last(wanted);
@@ -362,7 +362,7 @@ void read_voxel_files(const fs::path& header, VoxelFiles files, UntrustedHeader 
     read_part(files, part, own.first(of_part));
     own = own.subspan(of_part);
   }
-  convert_values(files.type, memory.last(wanted), claim.kind, memory);
+  convert_values(files.type, memory.last(wanted), claim.kind, memory, files.scaling);
 }
 
 }  // namespace kerf::volume

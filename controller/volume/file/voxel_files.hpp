@@ -12,8 +12,8 @@
 #include "controller/volume/file/header_fields.hpp"
 #include "controller/volume/file/volume_image.hpp"
 
-// Voxels behind a header of NRRD or MetaImage, or without one: in one file or in several, packed or
-// not, as bytes or as text.
+// Voxels behind a header of NRRD, MetaImage or NIfTI, or without one: in one file or in several,
+// packed or not, as bytes or as text.
 
 namespace kerf::volume {
 
@@ -32,6 +32,7 @@ struct VoxelFiles {
   VoxelType type = VoxelType::uint16;
   Packing packing = Packing::raw;
   bool big_endian = false;
+  Scaling scaling;
   std::vector<VoxelPart> parts;  ///< of equal numbers of voxels, in order
   /// Of each part: the most bytes that it takes of its file.
   std::uint64_t packed_bytes = std::numeric_limits<std::uint64_t>::max();

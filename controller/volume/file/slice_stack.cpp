@@ -10,12 +10,10 @@
 #include <string>
 #include <vector>
 
-#include "controller/volume/file/foreign_itk.hpp"
-// ITK from here on.
-#include <itkPNGImageIO.h>
-#include <itkTIFFImageIO.h>
-
 #include "controller/input/load_error.hpp"
+#include "controller/volume/file/file_headers.hpp"
+#include "controller/volume/file/foreign_volume.hpp"
+#include "controller/volume/file/slices.hpp"
 
 namespace kerf::volume {
 namespace fs = std::filesystem;
@@ -154,67 +152,89 @@ std::vector<fs::path> pictures_among(const std::vector<fs::path>& files, VolumeK
   return pictures;
 }
 
+/// Reads one picture of a stack.
+void read_picture(const fs::path& file, VolumeKind kind, const SliceMemory& memory) {
+  if (kind == VolumeKind::png_stack) return read_png_slice(file, memory);
+  read_tiff_slices(file, [&](const Slices& found) {
+    if (found.size[2] == 1) return memory(found);
+    kerf::refuse(file.string(),
+                 ": " + std::to_string(found.size[2]) +
+                     " pages; a stack is one picture in each file, name this file alone");
+  });
+}
+
+/// Refuses a picture of another size, type or meaning than the first.
+void check_equal(const fs::path& file, const Slices& own, const fs::path& first_file,
+                 const Slices& first) {
+  const auto text = [](const auto& numbers) {
+    return short_text(static_cast<double>(numbers[0])) + " x " +
+           short_text(static_cast<double>(numbers[1]));
+  };
+  const auto differ = [&](const std::string& one, const std::string& other,
+                          const std::string& way_out) {
+    kerf::refuse(file.string(), ": " + one + ", and " + first_file.filename().string() + " has " +
+                                    other + "; " + way_out);
+  };
+  if (own.size != first.size) {
+    differ(text(own.size) + " pixels", text(first.size), "keep one stack of slices per folder");
+  }
+  if (own.type != first.type) {
+    const auto word = [](const Slices& of) {
+      return std::string(kVoxelTypeWords[static_cast<std::size_t>(of.type)]);
+    };
+    differ("values of " + word(own), word(first), "save all slices with values of one type");
+  }
+  if (own.scaling != first.scaling || own.spacing_known != first.spacing_known ||
+      own.spacing_mm != first.spacing_mm) {
+    const auto words = [&](const Slices& of) {
+      return text(of.spacing_mm) + " mm, values times " + short_text(of.scaling.slope) + " plus " +
+             short_text(of.scaling.intercept);
+    };
+    differ("a calibration of " + words(own), words(first), "calibrate all slices alike");
+  }
+}
+
 }  // namespace
 
 void read_slice_stack(const fs::path& folder, const std::vector<fs::path>& beside, VolumeKind kind,
                       SandboxReader& sandbox, const MemoryRequest& offer) {
-  const Quiet quiet;
   const std::vector<fs::path> files = pictures_among(beside, kind);
   if (files.size() < 2) {
     throw LoadError(folder.string() + ": one picture; name a folder that holds all slices");
   }
   check_slice_names(files);
-  // A new reader for each file: a used one of TIFF reports the first file again.
-  const auto reader = [kind] {
-    return kind == VolumeKind::png_stack ? ImageIo::Pointer(itk::PNGImageIO::New())
-                                         : ImageIo::Pointer(itk::TIFFImageIO::New());
-  };
-  UntrustedHeader claim;
-  VoxelType type{};
-  const auto word = [](VoxelType of) {
-    return std::string(kVoxelTypeWords[static_cast<std::size_t>(of)]);
-  };
+  Slices first;
   for (const fs::path& file : files) {
     sandbox.at(file.string());
-    const ImageIo::Pointer io = reader();
-    const std::array<std::int64_t, 3> size = open_image(file, *io, 2);
-    const VoxelType own = type_of(file, *io);
-    if (file == files.front()) {
-      claim.size = {size[0], size[1], static_cast<std::int64_t>(files.size())};
-      claim.kind = kind_of(own);
-      type = own;
-    } else if (size[0] != claim.size[0] || size[1] != claim.size[1]) {
-      throw LoadError(file.string() + ": " + std::to_string(size[0]) + " x " +
-                      std::to_string(size[1]) + " pixels, and " +
-                      files.front().filename().string() + " has " + std::to_string(claim.size[0]) +
-                      " x " + std::to_string(claim.size[1]) +
-                      "; keep one stack of slices per folder");
-    }
-    if (own != type) {
-      throw LoadError(file.string() + ": values of " + word(own) + ", and " +
-                      files.front().filename().string() + " has " + word(type) +
-                      "; save all slices with values of one type");
-    }
+    read_picture(file, kind, [&](const Slices& own) {
+      if (file == files.front()) first = own;
+      check_equal(file, own, files.front(), first);
+      return std::span<std::byte>{};
+    });
   }
+  UntrustedHeader claim;
+  claim.size = {first.size[0], first.size[1], static_cast<std::int64_t>(files.size())};
+  claim.kind = kind_of(first.type, first.scaling);
   claim.voxel_bytes = static_cast<std::uint32_t>(bytes_of(claim.kind));
-  claim.spacing_known = 0;
-  // Rows run downwards and slices upwards in a body that lies on its back, as in DICOM.
-  claim.axes = {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
+  claim.spacing_mm = {first.spacing_mm[0], first.spacing_mm[1], 1};
+  claim.spacing_known = first.spacing_known & 0b011;  // none between files
+  claim.axes = kSliceAxes;
+  add_note(claim, "slices in the order of the numbers in their names, " +
+                      files.front().filename().string() + " first");
+  if (!first.note.empty()) add_note(claim, first.note);
 
   sandbox.at(folder.string());
   std::span<std::byte> rest = offer(claim);
-  const std::size_t bytes =
-      static_cast<std::size_t>(claim.size[0] * claim.size[1]) * bytes_of(claim.kind);
-  std::vector<std::byte> own;
+  const auto pixels = static_cast<std::size_t>(claim.size[0] * claim.size[1]);
+  std::vector<std::byte> own(pixels * bytes_of(first.type));
   for (const fs::path& file : files) {
     sandbox.at(file.string());
-    const ImageIo::Pointer io = reader();
-    static_cast<void>(open_image(file, *io, 2));
-    own.resize(static_cast<std::size_t>(io->GetImageSizeInBytes()));
-    read_voxels(file, *io, own);
-    quiet.refuse_if_missing(file);
-    convert_values(type_of(file, *io), own, claim.kind, rest.first(bytes));
-    rest = rest.subspan(bytes);
+    read_picture(file, kind, [&](const Slices& found) {
+      check_equal(file, found, files.front(), first);
+      return std::span(own);
+    });
+    convert_values(first.type, own, claim.kind, rest, first.scaling);
+    rest = rest.subspan(pixels * claim.voxel_bytes);
   }
 }
 
