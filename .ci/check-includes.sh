@@ -123,7 +123,8 @@ broken() {
     controller/servo controller/loop controller/run controller/device shared/segment \
     shared/posix/monotonic_clock.hpp || true
   includes '<gdcm' "${programs[@]}" | grep -v '^controller/volume/file/dicom_[a-z]*\.[ch]pp:'
-  includes '<(archive|archive_entry|expat)\.h' "${programs[@]}" | grep -v '^controller/volume/file/foreign_invesalius.cpp:'
+  includes '<(archive|archive_entry|expat)\.h' "${programs[@]}" |
+    grep -vE '^controller/volume/file/(foreign_invesalius|voxel_files).cpp:'
   includes '<(nifti/|tiff)' "${programs[@]}" | grep -vE '^controller/volume/file/(nifti|tiff)\.cpp:'
   includes '<(boost|openssl)/' "${programs[@]}" | grep -vE '^bridge/(net|join|serve)/'
   includes '<lz4' "${programs[@]}" | grep -v '^bridge/wire/compression.cpp:'

@@ -18,6 +18,15 @@ using namespace kerf::test;
 
 namespace {
 
+/// The numbers, packed by `bzip2 -1`.
+constexpr unsigned char kBzip2[] = {
+    0x42, 0x5a, 0x68, 0x31, 0x31, 0x41, 0x59, 0x26, 0x53, 0x59, 0x54, 0xa9, 0xeb, 0xbb, 0x00, 0x00,
+    0x00, 0xf8, 0x00, 0x7f, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xf8, 0x20, 0x00, 0x54, 0x66, 0x80,
+    0x00, 0x00, 0x00, 0x00, 0x00, 0x00, 0x1a, 0x0c, 0x06, 0x80, 0x00, 0x06, 0x80, 0x00, 0x00, 0x00,
+    0x07, 0xc3, 0x08, 0x39, 0x04, 0x80, 0xa2, 0xcc, 0x34, 0xe3, 0xd0, 0x45, 0x24, 0xd4, 0x55, 0x65,
+    0xd8, 0x65, 0xa6, 0xdc, 0x0b, 0xaf, 0x3f, 0x04, 0x31, 0x47, 0x24, 0xb3, 0x4f, 0x45, 0x35, 0x57,
+    0x65, 0xb7, 0x5f, 0x86, 0x39, 0x67, 0xae, 0xdb, 0xf1, 0xcf, 0x5d, 0xf9, 0xe8, 0x7e, 0x08, 0x00,
+    0x20, 0x01, 0xf8, 0xbb, 0x92, 0x29, 0xc2, 0x84, 0x82, 0xa5, 0x4f, 0x5d, 0xd8};
 const std::string kNumbers = bytes_of(counting<std::int16_t>());
 const std::string kSpaced = "endian: little\nspacings: 1 2 3\n";
 
@@ -97,6 +106,8 @@ TEST_CASE("NRRD: every space that the format names is turned to LPS, axis by axi
   CHECK(has(note_of(attached(in_space("scanner-xyz"))), "no frame of a patient"));
   CHECK(has(note_of(attached(in_space("3D-left-handed"))), "mirrored"));
   CHECK(note_of(attached(in_space("LPS"))).empty());
+  CHECK(has(note_of(attached("space dimension: 3\nspace directions: (1,0,0) (0,2,0) (0,0,3)\n")),
+            "space: without a name is no frame of a patient"));
   for (const std::string name : {"left-posterior-inferior", "right-up", "LPI", "time", "x"}) {
     check_refusal(attached(in_space(name)), "space: " + name + " is no space");
   }
@@ -202,6 +213,13 @@ TEST_CASE("NRRD: voxels as hex, as text, packed in members, behind lines and byt
   CHECK(detached(gzipped(kNumbers.substr(0, 50)) + gzipped(kNumbers.substr(50)), "", "gz") == "");
   CHECK(detached("line\n" + gzipped("xyz" + kNumbers), "line skip: 1\nbyte skip: 3\n", "gzip") ==
         "");
+  const std::string packed_tight(std::begin(kBzip2), std::end(kBzip2));
+  const std::size_t tight = packed_tight.size();
+  CHECK(detached(packed_tight, "", "bzip2") == "");
+  CHECK(detached("line\n" + packed_tight, "line skip: 1\n", "BZ2") == "");
+  CHECK(has(detached(packed_tight.substr(0, tight - 9), "", "bz2"), "packed voxels are broken"));
+  CHECK(has(detached(kNumbers, "", "bz2"), "packed voxels are broken"));
+  CHECK(has(detached(packed_tight, "byte skip: 2\n", "bz2"), "118 of 120 bytes"));
   CHECK(has(detached(hex.substr(1), "", "hex"), "119 of 120 bytes"));
   CHECK(has(detached("g" + hex, "", "hex"), "no hex digit"));
   CHECK(has(detached(words + " 60", "", "text"), "more voxels than its header says"));

@@ -48,12 +48,6 @@ void refuse_truncated(const std::string& file, std::uint64_t held, std::uint64_t
 namespace volume {
 namespace {
 
-std::string key_of(std::string_view key) {
-  std::string all = lower(std::string(key));
-  std::erase(all, ' ');
-  return all;
-}
-
 template <class Number>
 std::optional<Number> parsed(std::string_view word) {
   if (word.starts_with('+')) word.remove_prefix(1);
@@ -89,6 +83,12 @@ std::string stripped(std::string_view text) {
   return std::string(text.substr(first, text.find_last_not_of(kBlanks) - first + 1));
 }
 
+std::string squeezed(std::string_view text, std::string_view without) {
+  std::string all = lower(std::string(text));
+  std::erase_if(all, [&](char c) { return without.find(c) != std::string_view::npos; });
+  return all;
+}
+
 std::vector<std::string> words_of(const std::string& text) {
   std::istringstream in(text);
   std::vector<std::string> words;
@@ -119,18 +119,18 @@ std::optional<Written> header_number(std::string_view word) {
 }
 
 void HeaderFields::add(std::string_view key, const std::string& text) {
-  const auto [field, is_new] = all_.try_emplace(key_of(key), text);
+  const auto [field, is_new] = all_.try_emplace(squeezed(key), text);
   if (!is_new && field->second != text) {
     refuse(key, "and also " + one_line(text.substr(0, 80)) + "; keep one of the two lines");
   }
 }
 
 bool HeaderFields::has(std::string_view key) const {
-  return all_.contains(key_of(key));
+  return all_.contains(squeezed(key));
 }
 
 std::string HeaderFields::text(std::string_view key) const {
-  const auto field = all_.find(key_of(key));
+  const auto field = all_.find(squeezed(key));
   return field == all_.end() ? std::string{} : field->second;
 }
 

@@ -37,6 +37,8 @@ struct Written {
 
 /// Text without blanks at its ends.
 [[nodiscard]] std::string stripped(std::string_view text);
+/// In lower case and without the characters of `without`.
+[[nodiscard]] std::string squeezed(std::string_view text, std::string_view without = " \t");
 [[nodiscard]] std::vector<std::string> words_of(const std::string& text);
 /// A whole number, all of `word`; none otherwise.
 [[nodiscard]] std::optional<std::int64_t> whole_number(std::string_view word);

@@ -14,6 +14,7 @@
 #include <system_error>
 #include <type_traits>
 
+#include <archive.h>
 #include <zlib.h>
 
 #include "controller/input/load_error.hpp"
@@ -28,6 +29,7 @@ namespace {
 /// of at most 8 bytes; by deflate.
 std::uint64_t most_bytes(Packing packing, std::uint64_t held) {
   constexpr std::uint64_t kText = 4, kDeflated = 1032;
+  constexpr std::uint64_t kBzip2 = 1 << 20;  // a block of 46 bytes may hold 45,899,236
   switch (packing) {
     case Packing::text:
       return (held + 1) * kText;  // no blank after the last
@@ -35,6 +37,8 @@ std::uint64_t most_bytes(Packing packing, std::uint64_t held) {
       return held / 2;
     case Packing::deflated:
       return held * kDeflated;
+    case Packing::bzip2:
+      return held * kBzip2;
     case Packing::raw:
       break;
   }
@@ -45,6 +49,14 @@ std::string shown(const fs::path& file) {
   return one_line(file.string());
 }
 
+[[noreturn]] void refuse_broken(const fs::path& file) {
+  throw LoadError(shown(file) + ": its packed voxels are broken; copy the file again");
+}
+
+bool is_packed(Packing packing) {
+  return packing == Packing::deflated || packing == Packing::bzip2;
+}
+
 [[noreturn]] void refuse_surplus(const fs::path& file) {
   throw LoadError(shown(file) + ": holds more voxels than its header says; correct the sizes");
 }
@@ -52,7 +64,8 @@ std::string shown(const fs::path& file) {
 /// The bytes of a part, unpacked if they are packed.
 class PartBytes {
  public:
-  PartBytes(const VoxelPart& part, bool packed, std::uint64_t packed_bytes, std::uint64_t wanted)
+  PartBytes(const VoxelPart& part, Packing packing, std::uint64_t packed_bytes,
+            std::uint64_t wanted)
       : file_(part.file), in_(part.file, std::ios::binary), left_(packed_bytes) {
     in_.seekg(static_cast<std::streamoff>(part.begin));
     for (std::uint64_t line = 0; line < part.lines && in_; ++line) {
@@ -63,10 +76,11 @@ class PartBytes {
       in_.seekg(static_cast<std::streamoff>(fs::file_size(part.file) - behind - wanted));
     }
     constexpr int kGzipOrZlib = 15 + 32;  // largest window, either framing
-    if (packed) {
+    if (packing == Packing::deflated) {
       unpacks_ = inflateInit2(&stream_, kGzipOrZlib) == Z_OK;
       if (!unpacks_) throw std::bad_alloc();
     }
+    if (packing == Packing::bzip2) open_bzip2();
     std::array<std::byte, kPiece> skipped;
     for (auto left = static_cast<std::uint64_t>(std::max<std::int64_t>(part.bytes, 0)); left > 0;) {
       const std::size_t got = read(std::span(skipped).first(std::min<std::uint64_t>(left, kPiece)));
@@ -76,12 +90,19 @@ class PartBytes {
   }
   ~PartBytes() {
     if (unpacks_) inflateEnd(&stream_);
+    archive_read_free(bzip2_);
   }
   PartBytes(const PartBytes&) = delete;
   PartBytes& operator=(const PartBytes&) = delete;
 
   /// Fills `to`; returns the number of bytes, fewer at the end alone.
-  std::size_t read(std::span<std::byte> to) { return unpacks_ ? unpacked(to) : plain(to); }
+  std::size_t read(std::span<std::byte> to) {
+    if (bzip2_ == nullptr) return unpacks_ ? unpacked(to) : plain(to);
+    const la_ssize_t got = archive_read_data(bzip2_, to.data(), to.size());
+    if (got < 0) refuse_broken(file_);
+    ended_ = static_cast<std::size_t>(got) < to.size();
+    return static_cast<std::size_t>(got);
+  }
   /// Whether the packed bytes were read to their end, and their checksum is right.
   [[nodiscard]] bool ended() const noexcept { return ended_; }
 
@@ -117,14 +138,31 @@ class PartBytes {
         ended_ = !has_input() || std::byte{*stream_.next_in} != kGzip;
         if (!ended_) inflateReset(&stream_);
       } else if (state != Z_OK && state != Z_BUF_ERROR) {
-        throw LoadError(shown(file_) + ": its packed voxels are broken; copy the file again");
+        refuse_broken(file_);
       }
     }
     return done;
   }
 
+  void open_bzip2() {
+    const auto next_block = [](archive*, void* self, const void** block) {
+      auto& bytes = *static_cast<PartBytes*>(self);
+      *block = bytes.packed_.data();
+      return static_cast<la_ssize_t>(bytes.plain(bytes.packed_));
+    };
+    bzip2_ = archive_read_new();
+    archive_read_support_filter_bzip2(bzip2_);
+    archive_read_support_format_raw(bzip2_);
+    archive_entry* entry = nullptr;
+    const bool opened =
+        archive_read_open(bzip2_, this, nullptr, next_block, nullptr) == ARCHIVE_OK &&
+        archive_read_next_header(bzip2_, &entry) == ARCHIVE_OK;
+    if (!opened || archive_filter_code(bzip2_, 0) != ARCHIVE_FILTER_BZIP2) refuse_broken(file_);
+  }
+
   const fs::path& file_;
   std::ifstream in_;
+  archive* bzip2_ = nullptr;
   std::uint64_t left_;  ///< packed bytes that are not read
   z_stream stream_{};
   bool unpacks_ = false, ended_ = false;
@@ -228,8 +266,8 @@ void read_hex(const VoxelPart& part, PartBytes& bytes, std::span<std::byte> to) 
 }
 
 void read_part(const VoxelFiles& files, const VoxelPart& part, std::span<std::byte> to) {
-  const bool packed = files.packing == Packing::deflated;
-  PartBytes bytes(part, packed, files.packed_bytes, to.size());
+  const bool packed = is_packed(files.packing);
+  PartBytes bytes(part, files.packing, files.packed_bytes, to.size());
   if (files.packing == Packing::text) return read_text(part, files.type, bytes, to);
   if (files.packing == Packing::hex) {
     read_hex(part, bytes, to);
@@ -259,7 +297,7 @@ std::uint64_t check_part(const fs::path& header, const VoxelFiles& files, const 
                     "); put it beside the header or correct the header");
   }
   const bool from_end = part.bytes < 0;
-  const bool packed = files.packing == Packing::deflated;
+  const bool packed = is_packed(files.packing);
   const std::uint64_t skipped =
       from_end ? static_cast<std::uint64_t>(-(part.bytes + 1))
                : part.begin + (packed ? 0 : static_cast<std::uint64_t>(part.bytes));

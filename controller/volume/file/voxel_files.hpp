@@ -17,7 +17,7 @@
 
 namespace kerf::volume {
 
-enum class Packing : std::uint8_t { raw, text, hex, deflated };
+enum class Packing : std::uint8_t { raw, text, hex, deflated, bzip2 };
 
 /// A file with a part of the voxels.
 struct VoxelPart {
