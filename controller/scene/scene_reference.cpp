@@ -30,7 +30,9 @@ struct AllowedText {
     return range() + (allowed.words.empty() ? "" : ", or " + words());
   }
   std::string operator()(const Denoise*) const { return "whole, " + range() + ", or " + words(); }
-  std::string operator()(const LawChoice*) const { return "{ name = \"..\", .. }"; }
+  std::string operator()(const LawChoice*) const {
+    return "\"NAME\", { name = \"NAME\", .. }, \"none\"";
+  }
   template <class Text>
   std::string operator()(const Text*) const {
     return allowed.words.empty() ? "text" : words();
