@@ -153,7 +153,7 @@ class Demo:
             *(["--rate", options.rate] if options.rate else []), "--name", self.name,
             *(["--virtual"] if options.virtual else []), *until, *(["--progress"] if sys.stdout.isatty() else []),
             "--emulator-args", self.told, "--report", os.path.join(self.results, "report.json"),
-            "--final", os.path.join(self.results, "final.nrrd")], out="summary", program=options.controller)
+            "--final", os.path.join(self.results, "final.nrrd")], out="summary")
         while not self.told.exists() and self.controller.poll() is None:
             time.sleep(0.005)
 

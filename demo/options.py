@@ -8,7 +8,7 @@ BUSES = {"omni": ("fw", "fw1"), "falcon": ("usb", "usb"), "woodenhaptics": ("hid
 FLAGS = ("--headless", "--serve", "--stereo", "--voxel-tool", "--mute", "--colour-blind", "--virtual")
 OF_SCENE = ("--scene", "--volume", "--spacing", "--override-spacing", "--window", "--set")
 WITH_VALUE = OF_SCENE + ("--hand", "--seconds", "--rate", "--out", "--size", "--renderer", "--gradient", "--panel-scale",
-                         "--device", "--port", "--sheet", "--transfer", "--record", "--listen", "--controller")
+                         "--device", "--port", "--sheet", "--transfer", "--record", "--listen")
 
 
 class Refusal(Exception):
@@ -29,7 +29,6 @@ class Options:
     device: str = "omni"
     port: str = "socket"
     listen: str = ""
-    controller: str = ""  # a program with laws of its own, instead of kerf-controller
     sheet: str = ""
     record: str = ""
     headless: bool = False
@@ -82,8 +81,6 @@ def check(options):
     """Completes the options by defaults, and throws Refusal for values and combinations that cannot be."""
     if options.record == "-":
         raise Refusal("--record -: the demo itself writes to the standard output; name a file or a pipe")
-    if options.controller and not (os.path.isfile(options.controller) and os.access(options.controller, os.X_OK)):
-        raise Refusal(f"--controller {options.controller}: no program that can be run; build it (docs/own-law.md)")
     if options.listen and not options.serve:
         raise Refusal(f"--listen {options.listen}: nothing listens without --serve; give both")
     if options.mouse:

@@ -59,11 +59,10 @@ class Processes:
     def path(self, name):
         return os.path.join(self.run, name)
 
-    def start(self, name, arguments, out=None, log=None, program=None):
+    def start(self, name, arguments, out=None, log=None):
         """Its own session keeps a Ctrl-C from it; the kernel ends it if this process is killed. `out`, `log`: files in `run`
-        for its standard output and errors. `program`: its path, if it is not kerf's."""
-        program = os.path.abspath(program) if program else os.path.join(self.folder, "kerf-" + name)
-        command = ["setpriv", "--pdeathsig", "TERM", program, *map(str, arguments)]
+        for its standard output and errors."""
+        command = ["setpriv", "--pdeathsig", "TERM", os.path.join(self.folder, "kerf-" + name), *map(str, arguments)]
         return self.popen(command, out, log, start_new_session=True, pass_fds=self.keep_open)
 
     def popen(self, command, out=None, log=None, **options):

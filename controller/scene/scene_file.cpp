@@ -69,7 +69,7 @@ KeyOverride parse_setting(std::string_view text, SceneKeys keys) {
     refuse(place, ": not KEY=VALUE; write such as force.stiffness_n_per_mm=0.3");
   }
   const std::string_view key = text.substr(0, equals);
-  if (key_or_law_of(key, keys) == nullptr) {
+  if (std::ranges::find(keys, key, &SceneKey::name) == keys.end()) {
     std::vector<std::string_view> known;
     for (const SceneKey& row : keys) known.push_back(row.name);
     const std::string_view near = nearest(key, known);
@@ -81,39 +81,16 @@ KeyOverride parse_setting(std::string_view text, SceneKeys keys) {
   return {std::string(key), std::string(text.substr(equals + 1))};
 }
 
-namespace {
-
-/// The table at `key` of `table`, a new one if there is none. A law that is only named becomes a
-/// table with its name.
-TomlNode& table_below(TomlNode& table, std::string_view key) {
-  TomlNode& below = entry_of(table, key);
-  if (below.form == TomlNode::Form::value) {
-    TomlNode name = below;
-    name.key = "name";
-    below.form = TomlNode::Form::table;
-    below.entries = {std::move(name)};
-  }
-  return below;
-}
-
-}  // namespace
-
-void override_keys(std::span<const KeyOverride> given, TomlNode& root) {
-  std::vector<KeyOverride> settings(given.begin(), given.end());
-  // A law given as a whole would drop its settings that came before it.
-  std::ranges::stable_partition(settings, [](const KeyOverride& setting) {
-    return std::ranges::count(setting.key, '.') == 1;
-  });
+void override_keys(std::span<const KeyOverride> settings, TomlNode& root) {
   for (const KeyOverride& setting : settings) {
     const std::size_t dot = setting.key.find('.'), last = setting.key.rfind('.');
     const std::string table = setting.key.substr(0, dot), key = setting.key.substr(last + 1);
     const auto put = [&](TomlNode& into) {
       // `[[volume]]` has a table below it, `pose`.
       TomlNode& below =
-          last == dot ? into : table_below(into, setting.key.substr(dot + 1, last - dot - 1));
+          last == dot ? into : entry_of(into, setting.key.substr(dot + 1, last - dot - 1));
       TomlNode node = value_node(setting);
       node.key = key;
-      if (below.shown.empty()) below.shown = "{ " + key + " = " + node.shown + " }";
       entry_of(below, key) = std::move(node);
     };
     if (most_of(table) == 0) {

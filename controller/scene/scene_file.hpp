@@ -16,17 +16,15 @@ namespace kerf {
 
 /// A key of a scene that replaces the value of the file: `table.key=VALUE` on a command line.
 struct KeyOverride {
-  std::string key;    ///< `table.key`, or `table.key.setting` of a law
+  std::string key;    ///< `table.key`
   std::string value;  ///< as TOML writes it; text needs no quotes
 };
 
-/// Reads `table.key=VALUE`; throws LoadError for another form or a key that no scene has. Any
-/// setting of a law is accepted here: its name is checked with the scene.
+/// Reads `table.key=VALUE`; throws LoadError for another form or a key that no scene has.
 [[nodiscard]] KeyOverride parse_setting(std::string_view text, SceneKeys keys = scene_keys());
 
-/// Replaces the values of the file by the settings, in order, but laws before their own settings;
-/// every `[[table]]` of the file gets the value of its key. The values are checked with the scene.
-/// Throws LoadError.
+/// Replaces the values of the file by the settings, in order; every `[[table]]` of the file gets
+/// the value of its key. The values are checked with the scene. Throws LoadError.
 void override_keys(std::span<const KeyOverride> settings, TomlNode& root);
 
 /// Reads TOML text. `settings` replace values of it. No file is opened: `path` appears in messages

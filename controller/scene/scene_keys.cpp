@@ -64,20 +64,6 @@ std::size_t most_of(std::string_view table) {
   return row == scene_tables().end() ? 0 : row->limit;
 }
 
-const SceneKey* key_or_law_of(std::string_view name, SceneKeys keys) {
-  const auto row = [&](std::string_view key) {
-    const auto found = std::ranges::find(keys, key, &SceneKey::name);
-    return found == keys.end() ? nullptr : &*found;
-  };
-  if (const SceneKey* key = row(name)) return key;
-  const std::size_t dot = name.rfind('.');
-  if (dot == name.npos || dot + 1 == name.size()) return nullptr;
-  const SceneKey* law = row(name.substr(0, dot));
-  SceneParts parts;
-  const bool is_law = law != nullptr && std::holds_alternative<LawChoice*>(law->at(parts));
-  return is_law ? law : nullptr;
-}
-
 std::vector<std::string_view> names_below(std::string_view prefix, SceneKeys keys) {
   std::vector<std::string_view> names;
   for (const SceneKey& key : keys) {

@@ -33,9 +33,6 @@ using SceneSlot =
                  std::optional<VoxelGrid>*, Personality*, ForceModel*, CutModel*, NumericKind*,
                  GradientKernel*, Denoise*, LawChoice*>;
 
-/// Stands for a law without a name: the default of its kind.
-inline constexpr std::string_view kNoLaw = "none";
-
 /// Both ends are allowed values.
 struct Range {
   double lo = 0, hi = 0;
@@ -97,8 +94,6 @@ struct SceneTableRow {
 
 /// The names that come next below `prefix` (empty, `table.` or `table.key.`), in the table's order.
 [[nodiscard]] std::vector<std::string_view> names_below(std::string_view prefix, SceneKeys keys);
-/// The row of `table.key`, or the row of the law whose setting `table.key.setting` is; else null.
-[[nodiscard]] const SceneKey* key_or_law_of(std::string_view name, SceneKeys keys);
 /// The rows of one table.
 [[nodiscard]] std::vector<SceneKey> keys_of(std::string_view table, SceneKeys keys);
 /// `table.key` without the table.

@@ -30,9 +30,7 @@ struct AllowedText {
     return range() + (allowed.words.empty() ? "" : ", or " + words());
   }
   std::string operator()(const Denoise*) const { return "whole, " + range() + ", or " + words(); }
-  std::string operator()(const LawChoice*) const {
-    return "\"NAME\", { name = \"NAME\", .. }, \"none\"";
-  }
+  std::string operator()(const LawChoice*) const { return "{ name = \"..\", .. }"; }
   template <class Text>
   std::string operator()(const Text*) const {
     return allowed.words.empty() ? "text" : words();

@@ -53,17 +53,12 @@ struct Take {
     }
     *into = Denoise{static_cast<std::int8_t>(passes)};
   }
-  /// The name of a law, alone or with given settings. `none` alone is the default of its kind.
+  /// The name of a law, and its given settings.
   void operator()(LawChoice* into) const {
-    const bool has_settings = node.form == TomlNode::Form::table;
-    const TomlNode* name = has_settings ? node.find("name") : &node;
+    const TomlNode* name = node.form == TomlNode::Form::table ? node.find("name") : nullptr;
     const std::string* text = name == nullptr ? nullptr : std::get_if<std::string>(&name->value);
     if (text == nullptr) {
       refuse(place, " does not say which; write { name = \"..\" } and what it sets");
-    }
-    if (!has_settings && *text == kNoLaw) {
-      *into = {into->kind, "", {}};
-      return;
     }
     const auto place_below = [&](const TomlNode& entry) {
       return place_of(entry, std::string(key.name) + "." + one_line(entry.key), file);
@@ -72,7 +67,7 @@ struct Take {
     try {
       row = &find_law(into->kind, *text);
     } catch (const LawError& error) {
-      refuse(has_settings ? place_below(*name) : place, error.what());
+      refuse(place_below(*name), error.what());
     }
     *into = {into->kind, *text, {}};
     for (const TomlNode& entry : node.entries) {

@@ -2,7 +2,6 @@
 #include "hil/device/emulator.hpp"
 
 #include <algorithm>
-#include <span>
 
 #include "shared/numeric/fnv1a.hpp"
 
@@ -14,31 +13,6 @@ constexpr std::int64_t kPatienceCycles =
     std::int64_t{2} * kCyclesPerSecond;  // hosts that never show it
 
 }  // namespace
-
-void TipSwing::add(const DeviceVec<double>& from_goal_mm) noexcept {
-  Box& part = parts_[static_cast<std::size_t>(cycles_ / kPartCycles % kParts)];
-  if (cycles_++ % kPartCycles == 0) part = {from_goal_mm, from_goal_mm};
-  const auto widen = [](double& low, double& high, double to) {
-    low = std::min(low, to);
-    high = std::max(high, to);
-  };
-  widen(part.low.x, part.high.x, from_goal_mm.x);
-  widen(part.low.y, part.high.y, from_goal_mm.y);
-  widen(part.low.z, part.high.z, from_goal_mm.z);
-}
-
-double TipSwing::peak_to_peak_mm() const noexcept {
-  const std::int64_t begun = (cycles_ + kPartCycles - 1) / kPartCycles;
-  if (begun == 0) return 0;
-  Box all = parts_[0];
-  for (const Box& part : std::span(parts_).first(std::min(begun, kParts))) {
-    all.low = {std::min(all.low.x, part.low.x), std::min(all.low.y, part.low.y),
-               std::min(all.low.z, part.low.z)};
-    all.high = {std::max(all.high.x, part.high.x), std::max(all.high.y, part.high.y),
-                std::max(all.high.z, part.high.z)};
-  }
-  return std::max({all.high.x - all.low.x, all.high.y - all.low.y, all.high.z - all.low.z});
-}
 
 void Emulator::receive(std::span<const std::uint8_t> packet) noexcept {
   ++(model_->receive(packet) ? stats_.commands : stats_.refused);
@@ -77,9 +51,7 @@ HandGoal Emulator::next_goal() noexcept {
 void Emulator::advance(int cycles) noexcept {
   asked_ = false;
   for (int i = 0; i < cycles; ++i) {
-    const HandGoal goal = next_goal();
-    model_->step(goal);
-    stats_.swing.add(model_->tip_mm() - goal.target_mm);
+    model_->step(next_goal());
     ++stats_.cycles;
     stats_.peak_motor_force_n = std::max(stats_.peak_motor_force_n, norm(model_->motor_force_n()));
     if (!model_->docked() && !stats_.undocked_at) stats_.undocked_at = stats_.cycles;

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <array>
 #include <concepts>
 #include <cstdint>
 #include <memory>
@@ -18,22 +17,6 @@
 
 namespace kerf {
 
-/// The oscillation of the tip about the hand's goal, in the last half second: peak to peak along
-/// the widest axis. In eight parts, of which the oldest gives way, so it needs no log.
-class TipSwing {
- public:
-  void add(const DeviceVec<double>& from_goal_mm) noexcept;
-  [[nodiscard]] double peak_to_peak_mm() const noexcept;
-
- private:
-  static constexpr std::int64_t kParts = 8, kPartCycles = kCyclesPerSecond / 2 / kParts;
-  struct Box {
-    DeviceVec<double> low, high;
-  };
-  std::array<Box, kParts> parts_{};
-  std::int64_t cycles_ = 0;
-};
-
 /// Counts of a run so far.
 struct EmulatorStats {
   std::int64_t cycles = 0;
@@ -41,7 +24,6 @@ struct EmulatorStats {
   std::uint64_t commands = 0;
   std::uint64_t refused = 0;  ///< packets that were no commands
   double peak_motor_force_n = 0;
-  TipSwing swing;
   std::optional<std::int64_t> undocked_at;  ///< bus cycle in which the arm left its rest
   std::uint64_t report_hash = kFnv1aBasis;  ///< FNV-1a of all handed-out bytes
 };

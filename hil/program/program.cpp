@@ -68,7 +68,6 @@ void write_run_report(const std::string& file, const EmulatedDevice& device,
                        {"p99", front.wake.percentile_us(0.99)},
                        {"max", front.wake.max_us()}};
   report["peak_motor_force_n"] = stats.peak_motor_force_n;
-  report["swing_mm"] = stats.swing.peak_to_peak_mm();
   report["calibrated"] = model.calibration() == Calibration::done;
   report["docked"] = model.docked();
   report["undocked_at_s"] = stats.undocked_at ? Json(seconds_of(*stats.undocked_at)) : nullptr;

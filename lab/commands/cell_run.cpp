@@ -5,7 +5,6 @@
 #include <csignal>
 #include <map>
 #include <sstream>
-#include <string_view>
 #include <thread>
 
 #include "hil/hil_error.hpp"
@@ -82,14 +81,6 @@ std::string changed_by_faults(const Json& report, const std::string& name) {
   return std::to_string(changed);
 }
 
-/// `energy_SOURCE_j`: the work of one source.
-std::string energy_of(const Json& report, const std::string& name) {
-  constexpr std::string_view kBefore = "energy_", kAfter = "_j", kTable = "energy_by_source_j";
-  if (!report.contains(std::string(kTable))) return "";
-  return cell_text(report.at(std::string(kTable)),
-                   name.substr(kBefore.size(), name.size() - kBefore.size() - kAfter.size()));
-}
-
 struct Column {
   const char* name;
   bool of_emulator;
@@ -104,21 +95,11 @@ constexpr Column kColumns[] = {
     {"peak_force_n", false},
     {"removed_mm3", false},
     {"energy_j", false},
-    {"port_minimum_j", false},
-    {"energy_spring_j", false, energy_of},
-    {"energy_damping_j", false, energy_of},
-    {"energy_friction_j", false, energy_of},
-    {"energy_cutting_j", false, energy_of},
-    {"energy_limits_j", false, energy_of},
-    {"energy_hold_j", false, energy_of},
-    {"energy_leak_j", false, energy_of},
-    {"energy_stabiliser_j", false, energy_of},
     {"fault_count", false},
     {"config_hash", false},
     {"volume_hash", false},
     {"output_hash", false},
     {"peak_motor_force_n", true},
-    {"swing_mm", true},
     {"injected", true, changed_by_faults},
 };
 

@@ -6,8 +6,6 @@
 #include <csignal>
 #include <cstdlib>
 #include <fstream>
-#include <sstream>
-#include <string_view>
 #include <system_error>
 #include <thread>
 #include <utility>
@@ -106,27 +104,8 @@ PrivateFolder::~PrivateFolder() {
 }
 
 std::string program_beside(const char* name) {
-  const std::filesystem::path self = std::filesystem::read_symlink("/proc/self/exe");
-  const std::string own = self.filename().string();
-  const std::string prefix = own.substr(0, own.rfind('-') + 1);
-  const auto runs = [](const std::filesystem::path& file) {
-    return access(file.c_str(), X_OK) == 0 && !std::filesystem::is_directory(file);
-  };
-  const std::filesystem::path of_its_own =
-      std::filesystem::path(self).replace_filename(prefix + name);
-  // Another controller would not know the laws.
-  if (runs(of_its_own) || name == std::string_view("controller")) return of_its_own;
-  const std::string kerf = std::string("kerf-") + name;
-  const std::filesystem::path beside = std::filesystem::path(self).replace_filename(kerf);
-  if (runs(beside)) return beside;
-  const char* path = std::getenv("PATH");
-  std::istringstream folders(path == nullptr ? "" : path);
-  for (std::string folder; std::getline(folders, folder, ':');) {
-    if (!folder.empty() && runs(std::filesystem::path(folder) / kerf)) {
-      return std::filesystem::path(folder) / kerf;
-    }
-  }
-  return beside;
+  return std::filesystem::read_symlink("/proc/self/exe")
+      .replace_filename(std::string("kerf-") + name);
 }
 
 }  // namespace kerf::sweep

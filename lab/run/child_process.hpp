@@ -47,9 +47,7 @@ class PrivateFolder {
   std::filesystem::path path_;
 };
 
-/// Path of a program of kerf, by its short name. A program with laws of its own, `own-lab`, takes
-/// its own controller, `own-controller` beside it. Any other lies beside this one, or on the PATH.
-/// If there is none: the path where it should be.
+/// Path of a program of kerf, by its short name: it lies beside this one.
 [[nodiscard]] std::string program_beside(const char* name);
 
 }  // namespace kerf::sweep

@@ -6,10 +6,8 @@
 #include <doctest/doctest.h>
 
 #include "hil/hil_error.hpp"
-#include "lab/commands/cell_run.hpp"
 #include "lab/run/grid_axes.hpp"
 #include "lab/run/grid_run.hpp"
-#include "shared/numeric/energy_source.hpp"
 #include "tests/lab/lab_line.hpp"
 #include "tests/programs/pair.hpp"
 #include "tests/support/errors.hpp"
@@ -170,37 +168,6 @@ TEST_CASE("a sweep gives the same bytes on any number of cores, interrupted or n
   const std::string table = text_of(folder / "two/sweep.csv");
   CHECK(table == text_of(folder / "cut/sweep.csv"));
   CHECK(std::ranges::count(table, '\n') == 7);
-}
-
-TEST_CASE("docs/scenes.md has every column of a sweep, and each source of energy is one") {
-  const std::string page = text_of(kScenes + "/../docs/scenes.md");
-  for (const std::string& column : kerf::sweep::result_columns()) {
-    CAPTURE(column);
-    CHECK(page.find("`" + column + "`") != std::string::npos);
-  }
-  for (const std::string_view source : kerf::kEnergySourceNames) {
-    CHECK(std::ranges::count(kerf::sweep::result_columns(),
-                             "energy_" + std::string(source) + "_j") == 1);
-  }
-}
-
-TEST_CASE("a sweep over no stabiliser and one's number has energy by source and the swing") {
-  const TemporaryFolder folder;
-  Process process(
-      {kBin + "/kerf-lab", "sweep", kScenes + "/touch.toml", "--set",
-       "force.stabiliser=none,passivity", "--seconds", "1.5", "--out", (folder / "out").string()},
-      folder / "log");
-  CHECK(process.wait() == 0);
-  for (const int row : {0, 1}) {
-    const auto cells = row_of(text_of(folder / "out/sweep.csv"), row);
-    double sum_j = 0;
-    for (const auto& [name, cell] : cells) {
-      if (name.starts_with("energy_") && name != "energy_j") sum_j += std::stod(cell);
-    }
-    CHECK(sum_j == doctest::Approx(std::stod(cells.at("energy_j"))));
-    CHECK(std::stod(cells.at("port_minimum_j")) <= 0);
-    CHECK(std::stod(cells.at("swing_mm")) > 0);
-  }
 }
 
 TEST_CASE("a sweep over fault scripts tells how much each of them changed") {

@@ -33,7 +33,7 @@ class TestOptions(unittest.TestCase):
                              (["--seconds", "1234567"], "--seconds"), (["--size", "big"], "--size big"),
                              (["--size", "8193x10"], "--size"), (["--size", "0x480"], "--size"), (["--device", "pen"], "--device"),
                              (["--port", "usb"], "--port usb"), (["--device", "falcon", "--port", "usb", "--virtual"], "--virtual"),
-                             (["--listen", "0.0.0.0:1"], "--listen"), (["--controller", "/dev/null"], "--controller"), (["--record", "-"], "--record"),
+                             (["--listen", "0.0.0.0:1"], "--listen"), (["--record", "-"], "--record"),
                              (["--hand", "mouse"], "--hand mouse"), (["--hand", "mouse", "--virtual"], "--hand mouse"),
                              (["--hand", "mouse", "--sheet", "s.png"], "--hand mouse")]:
             with self.subTest(words), self.assertRaises(options.Refusal) as refused:

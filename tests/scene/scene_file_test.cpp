@@ -443,39 +443,6 @@ TEST_CASE("a bur of ISO 6360 stands for shape, radius, neck and name, and its ta
              "scenes/x.toml: --set tool.bur = \"001 999\" is no bur;"));
 }
 
-TEST_CASE("a law on a command line: its name, none, its numbers one by one, in any order") {
-  const auto stabiliser = [](std::vector<KeyOverride> settings, const std::string& more = "") {
-    return parse_scene("[[volume]]\nfile = \"phantom\"\n[[tool]]\nbur = \"001 014\"\n" + more,
-                       "scenes/x.toml", scene_keys(), settings)
-        .force.stabiliser;
-  };
-  const std::string passivity = "[force]\nstabiliser = { name = \"passivity\", mass_kg = 0.2 }\n";
-  const KeyOverride none = parse_setting("force.stabiliser=none"),
-                    named = parse_setting("force.stabiliser=passivity"),
-                    mass = parse_setting("force.stabiliser.mass_kg=0.3"),
-                    by_name = parse_setting("force.stabiliser.name=passivity");
-  const LawChoice heavy{LawKind::stabiliser, "passivity", {{"mass_kg", 0.3}}};
-  CHECK(stabiliser({none}).name.empty());
-  CHECK(stabiliser({none}, passivity).name.empty());
-  CHECK(stabiliser({named}, passivity) == LawChoice{LawKind::stabiliser, "passivity", {}});
-  CHECK(stabiliser({named, mass}) == heavy);
-  CHECK(stabiliser({mass, named}) == heavy);  // the name as a whole drops no number before it
-  CHECK(stabiliser({by_name, mass}) == heavy);
-  CHECK(stabiliser({mass}, passivity) == heavy);
-  CHECK(stabiliser({mass}, "[force]\nstabiliser = \"passivity\"\n") == heavy);
-  const auto problem = [&](const KeyOverride& setting) {
-    return test::error_of([&] { static_cast<void>(stabiliser({setting})); });
-  };
-  CHECK(
-      begins(problem(mass), "scenes/x.toml: --set force.stabiliser = { mass_kg = 0.3 } does not"));
-  CHECK(begins(problem(parse_setting("force.stabiliser=None")),
-               "scenes/x.toml: --set force.stabiliser = \"None\" is unknown; known: "));
-  for (const char* no_key : {"force.friction.mass_kg=1", "force.stabiliser.=1", "force.x.mass_kg=1",
-                             "force.stabiliser.mass_kg.x=1"}) {
-    CHECK(begins(test::error_of([&] { static_cast<void>(parse_setting(no_key)); }), "--set "));
-  }
-}
-
 TEST_CASE("a file that an option names stands in no line, and its place says so") {
   const auto scene = [](std::span<const KeyOverride> settings) {
     return parse_scene("[[volume]]\nfile = \"phantom\"\n[[tool]]\nbur = \"001 014\"\n",
