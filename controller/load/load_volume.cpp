@@ -10,6 +10,7 @@
 #include <iterator>
 #include <optional>
 #include <string>
+#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -82,6 +83,12 @@ void load_image(const VolumeSpec& spec, const VolumeSource& from, std::size_t kn
         make_phantom({.shape = spec.shape, .grid = spec.phantom_size.value_or(PhantomSpec{}.grid)});
   } else {
     const std::filesystem::path path = from.folder / spec.file;
+    std::error_code fault;
+    if (!from.unknown && !std::filesystem::exists(path, fault) && !fault) {
+      throw LoadError(path.string() +
+                      ": no such file or folder; check the path, or get it as the comment at the "
+                      "top of the scene says");
+    }
     const SourceVolume source = read_volume(path, {.spacing_mm = spec.spacing_mm,
                                                    .override_spacing_mm = spec.override_spacing_mm,
                                                    .cpu_s = from.cpu_s});

@@ -161,7 +161,7 @@ constexpr SceneKey kKeys[] = {
     {"volume.name", "", at<&VolumeSpec::name>, {},
      "tells it from others in pictures and reports", {}, {.default_text = "the file's"}},
     {"volume.file", "", at<&VolumeSpec::file>, {},
-     "NRRD, MetaImage, NIfTI, TIFF, or a folder of DICOM, PNG or TIFF slices, from the scene's folder; or \"phantom\"",
+     "NRRD, MetaImage, NIfTI, TIFF, InVesalius, or a folder of DICOM, PNG or TIFF slices, from the scene's folder; or \"phantom\"",
      {}, {.required_as = "file = \"phantom\" or a path"}},
     {"volume.shape", "", at<&VolumeSpec::shape>, one_of(kPhantomShapes),
      "what the phantom is: a tooth, one with caries, or a plain solid to measure on", kPhantom},

@@ -36,7 +36,8 @@ NOT_HERE = {
     "runs in the test own_law": ["own-law.md: "],
     "runs in the tests packages and reader": ["./kerf package", "packages.md: cmake", "pip install ./python"],
     "needs a CT that does not come with kerf; the test examples_scenes brings it": [
-        "./kerf demo --scene scenes/spine/", './kerf volume import "$KERF_DATA'],
+        "./kerf demo --scene scenes/spine/", "./kerf demo --scene scenes/skull",
+        "./kerf volume import /usr/share", './kerf volume import "$KERF_DATA'],
     "runs in the test docs_tutorial": ["tutorial.md: "],
     "needs a registry of images": ["podman "],
     "runs all tests, or many minutes": [

@@ -4,7 +4,7 @@
 
 Two seconds of a demo in lock-step, without a display: no fault, all ticks, a picture, and a touch where there is
 something to touch. What a scene's comment says is to be done first is done first (`#     ./kerf volume ...`). Where
-that needs KERF_DATA and there is none, the scene is left out, which is said."""
+that needs KERF_DATA or a file of a package and there is none, the scene is left out, and a line says so."""
 import json
 import os
 import pathlib
@@ -38,15 +38,19 @@ def main(root, bin_folder):
     wrong, ran = [], 0
     with tempfile.TemporaryDirectory() as scratch:
         folder = pathlib.Path(scratch)
-        shutil.copytree(root / "scenes", folder / "scenes")
+        shutil.copytree(root / "scenes", folder / "scenes", ignore=shutil.ignore_patterns("ct.*"))  # what an import made
         (folder / "kerf").symlink_to(root / "kerf")
         environment = dict(os.environ, KERF_BIN=str(bin_folder))
         for scene in sorted((folder / "scenes").rglob("*.toml")):
             if scene.parent.name == "hands":
                 continue
             first = re.findall(r"^#     (\./kerf volume .*)", scene.read_text(), re.MULTILINE)
-            if any("KERF_DATA" in line for line in first) and not environment.get("KERF_DATA"):
-                print(f"{scene.name}: left out, for want of KERF_DATA")
+            words = " ".join(first).split()
+            missing = [word for word in words if word.startswith("/") and not pathlib.Path(word).exists()]
+            if not environment.get("KERF_DATA"):
+                missing += [word for word in words if "KERF_DATA" in word]
+            if missing:
+                print(f"{scene.name}: left out, for want of {missing[0]}")
                 continue
             for line in first:
                 subprocess.run(["bash", "-c", line], cwd=folder, env=environment, check=True)

@@ -54,6 +54,7 @@ TEST_CASE("all scenes of the project load") {
   int count = 0;
   for (const auto& entry : std::filesystem::directory_iterator(KERF_SCENES_DIR)) {
     if (entry.path().extension() != ".toml") continue;
+    if (entry.path().stem() == "skull") continue;  // its CT does not come with kerf
     CAPTURE(entry.path());
     ++count;
     const LoadedScene scene = load_scene(entry.path(), {.phantom_size = VoxelGrid{64, 64, 40}});
@@ -319,6 +320,9 @@ TEST_CASE("bad options and volumes that cannot be used are refused in one line w
   CHECK(has(load_error(phantom, {.spacing_mm = std::array{1.0, 1.0, 1.0}}),
             "--spacing: the phantom"));
   CHECK(load_error(phantom, missing).starts_with("--volume: "));
+  std::filesystem::copy(std::filesystem::path(KERF_SCENES_DIR) / "skull.toml", folder.path());
+  CHECK(has(load_error(folder / "skull.toml"),
+            "skull/ct.nrrd: no such file or folder; check the path, or get it as the comment"));
   static_cast<void>(folder.write("cut.nrrd", nrrd(kGrid, {1, 1, 1}, std::vector<Density>(10))));
   for (const auto& [scene, why] :
        {std::pair{folder.write("m.toml", "\n[[volume]]\nfile = \"gone.nrrd\"\n" + kBall),

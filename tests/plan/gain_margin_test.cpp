@@ -82,6 +82,7 @@ TEST_CASE("every scene of the project is held with a safe margin at its own rate
   int count = 0;
   for (const auto& entry : std::filesystem::directory_iterator(KERF_SCENES_DIR)) {
     if (entry.path().extension() != ".toml") continue;
+    if (entry.path().stem() == "skull") continue;  // its CT does not come with kerf
     LoadedScene scene = load_scene(entry.path(), {.phantom_size = VoxelGrid{64, 64, 40}});
     // The paper's stiffness goes with the tool's radius, and that with the voxels.
     if (scene.force.model == ForceModel::paper) scene = load_scene(entry.path());
