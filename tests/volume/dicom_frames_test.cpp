@@ -168,6 +168,17 @@ TEST_CASE("several times in one file are several volumes, of which one is chosen
   CHECK(has(refusal_of(folder, enhanced(between)), "2 DICOM series"));
 }
 
+TEST_CASE("frames of several files are one volume, or one in each file") {
+  const TemporaryFolder parts, copies;
+  parts.write("a.dcm", dicom(enhanced({frame(4), frame(0)})));
+  parts.write("b.dcm", dicom(enhanced({frame(1), frame(3), frame(2)})));
+  CHECK(same_values(read_volume(parts.path()), counting<float>()));
+  for (const char* name : {"a.dcm", "b.dcm"}) {
+    copies.write(name, dicom(enhanced({frame(0), frame(1)})));
+  }
+  CHECK(has(refusal(copies.path()), "1 '', file a.dcm (2 slices of 3 x 4), 2 '', file b.dcm"));
+}
+
 TEST_CASE("slices in one file without positions have the distance that it names, or none") {
   const TemporaryFolder folder;
   DicomSpec spec;

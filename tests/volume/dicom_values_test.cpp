@@ -87,11 +87,11 @@ TEST_CASE("padding becomes air, and nothing else does") {
           spec.slope = 0.5;
         }) == expected(0.5, -1024, -1024));
   // A range, either way round.
-  for (const auto& [from, to] : {std::pair{63000, 63600}, std::pair{63600, 63000}}) {
+  for (const auto& range : {std::pair{63000, 63600}, std::pair{63600, 63000}}) {
     CHECK(padded([&](DicomSpec& spec) {
             unsigned_cells(spec);
-            spec.set(0x0028, 0x0120, "US", u16(from));
-            spec.set(0x0028, 0x0121, "US", u16(to));
+            spec.set(0x0028, 0x0120, "US", u16(range.first));
+            spec.set(0x0028, 0x0121, "US", u16(range.second));
           }) == expected(1, -1024, -1000));
   }
   // 63536 in twelve bits would be 2096: the bits that the file stores have no such number.

@@ -299,6 +299,7 @@ void read_frames(const gdcm::DataSet& set, std::size_t count, DicomFile& file) {
       const auto in_stack =
           binary<std::uint32_t>(facts_of(i).find(kFrameContent, Tag(0x0020, 0x9057)));
       file.frames.back().number = static_cast<double>(in_stack.value_or(i));
+      file.frames.back().marks.emplace_back("file", file.path.filename().string());
     }
   } else {
     const DicomFrame first = frame_of(Facts(nullptr, all, &set), 0, file.pixels);

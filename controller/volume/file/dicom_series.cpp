@@ -152,13 +152,21 @@ std::size_t chosen_stack(const fs::path& path, const std::vector<Stack>& all,
     });
   }
   if (fit.size() == 1) return fit.front();
+  const std::string found = path.string() + ": " + std::to_string(all.size()) + " DICOM series";
   std::string list;
+  std::size_t named = 0, left = 0;
   for (std::size_t i = 0; i < all.size(); ++i) {
-    list += (i == 0 ? " " : ", ") + std::to_string(i + 1) + " " + text_of(all[i]);
+    constexpr std::size_t kMostNamed = 20;
+    if (all[i].slices.size() == 1 || named == kMostNamed) {
+      ++left;
+    } else {
+      list += (named++ == 0 ? " " : ", ") + std::to_string(i + 1) + " " + text_of(all[i]);
+    }
   }
+  if (named == 0) throw LoadError(found + " of one slice each; name a folder of a whole series");
+  if (left > 0) list += ", and " + std::to_string(left) + " others";
   throw LoadError(
-      path.string() + ": " + std::to_string(all.size()) + " DICOM series" +
-      (wanted.empty() ? "" : ", and --series " + one_line(wanted) + " is not one of them") +
+      found + (wanted.empty() ? "" : ", and --series " + one_line(wanted) + " is not one of them") +
       "; choose one with ./kerf volume import --series:" + list);
 }
 
