@@ -106,6 +106,7 @@ TEST_CASE("reduced copies and masks among the pages of a TIFF are left out, and 
   std::vector<TiffPage> paged = five();
   for (TiffPage& page : paged) page.longs[kNewSubfileType] = {2};  // one of several
   check_counting(read(paged));
+  CHECK(has(refusal_of({five()[0]}), "a.tif: one page; name the folder that holds all slices"));
   CHECK(has(refusal_of({extra(1), extra(4)}), "no page of it is a slice (2 of its pages"));
 }
 

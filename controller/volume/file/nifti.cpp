@@ -88,7 +88,7 @@ Nifti fields_of(const Raw& raw, bool swapped) {
 Nifti read_header(const fs::path& path) {
   static_assert(sizeof(nifti_1_header) == 348 && sizeof(nifti_2_header) == 540);
   const GzFile file(gzopen(path.c_str(), "rb"));
-  if (!file) refuse_header(path, "cannot be opened", "check its permissions");
+  if (!file) refuse_header(path, "cannot be opened", "check that it is there, and its permissions");
   std::array<char, sizeof(nifti_2_header) + 4> bytes{};
   const int got = gzread(file.get(), bytes.data(), bytes.size());
   if (got < 0) refuse_unreadable(path, "its packed bytes are broken");
@@ -108,7 +108,7 @@ Nifti read_header(const fs::path& path) {
   };
   if (auto h = as(nifti_1_header{})) return *h;
   if (auto h = as(nifti_2_header{})) return *h;
-  refuse_header(path, "no NIfTI header", "is it another format, or cut off?");
+  refuse_unreadable(path, "no NIfTI header");
 }
 
 VoxelType type_in(const fs::path& path, const Nifti& h) {

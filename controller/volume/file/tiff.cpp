@@ -18,6 +18,7 @@
 #include "controller/input/load_error.hpp"
 #include "controller/volume/file/file_headers.hpp"
 #include "controller/volume/file/foreign_volume.hpp"
+#include "controller/volume/file/header_fields.hpp"
 #include "controller/volume/file/slices.hpp"
 
 namespace kerf::volume {
@@ -284,14 +285,13 @@ class Description {
   std::string text_;
 };
 
-std::optional<double> mm_of(const std::string& unit) {
-  constexpr std::pair<const char*, double> kUnits[] = {
-      {"mm", 1},         {"millimeter", 1},  {"cm", 10},       {"um", 1e-3},      {"\u00b5m", 1e-3},
-      {"\u03bcm", 1e-3}, {"\\u00B5m", 1e-3}, {"micron", 1e-3}, {"microns", 1e-3}, {"nm", 1e-6},
-      {"m", 1e3},        {"inch", 25.4},     {"in", 25.4}};
-  const auto* const found =
-      std::ranges::find(kUnits, unit, [](const auto& row) { return std::string(row.first); });
-  return found == std::end(kUnits) ? std::nullopt : std::optional(found->second);
+/// A unit in mm; none for one that is no length, such as ImageJ's `pixel`.
+std::optional<double> mm_of(std::string unit) {
+  constexpr std::string_view kMicro = "\\u00B5";  // as ImageJ writes it
+  if (unit.starts_with(kMicro)) unit.replace(0, kMicro.size(), "u");
+  const auto length = unit.empty() ? std::nullopt : length_unit(unit);
+  if (!length) return {};
+  return length->times / length->over;
 }
 
 /// Refuses a file whose pages are not the slices of one volume by its description.
@@ -398,6 +398,9 @@ Slices slices_of(const fs::path& path) {
       if (file.number<std::uint16_t>(TIFFTAG_PHOTOMETRIC, 1) == PHOTOMETRIC_MINISWHITE) {
         say(slices, "it shows 0 as white, its values are taken as they are");
       }
+      if (file.number<std::uint16_t>(TIFFTAG_COMPRESSION) == COMPRESSION_JPEG) {
+        say(slices, "its pages are packed with loss (JPEG)");
+      }
     } else if (width != slices.size[0] || height != slices.size[1] || type != slices.type) {
       file.refuse_page(text(width, height, type) + ", and the pages before have " +
                            text(slices.size[0], slices.size[1], slices.type),
@@ -440,6 +443,9 @@ void read_tiff(const fs::path& path, const MemoryRequest& offer) {
   Slices slices;
   std::span<std::byte> memory, own;
   read_tiff_slices(path, [&](const Slices& found) {
+    if (found.size[2] == 1) {
+      kerf::refuse(path.string(), ": one page; name the folder that holds all slices");
+    }
     slices = found;
     claim.size = slices.size;
     claim.voxel_bytes = static_cast<std::uint32_t>(bytes_of(slices.type));
