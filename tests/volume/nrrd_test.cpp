@@ -293,7 +293,12 @@ TEST_CASE("NRRD: lengths in another unit become mm, and a unit that is no length
   CHECK(read_volume(
             folder.write("a.nrrd", attached("spacings: 1 1 2\nunits" + units("inch", "cm", "dm"))))
             .spacing_mm == std::array<double, 3>{25.4, 10, 200});
-  check_refusal(attached("spacings: 1 2 3\nunits" + units("mm", "pixel", "mm")), "is no length");
+  check_refusal(attached("spacings: 1 2 3\nunits" + units("mm", "line", "mm")), "is no length");
+  check_refusal(attached("spacings: 1 1 1\nunits" + units("mm", "pixel", "mm")),
+                "spacing along y is not in the file");
+  check_refusal(attached(in_space("LPS") + "space units" + units("px", "px", "px")),
+                "is no length");
+  check_refusal(attached("spacings: 1 2 0\n"), "1 2 0 mm is not a voxel size");
   check_refusal(attached("spacings: 1 2 3\nunits: mm mm mm\n"), "is not 3 units in quotes");
   check_refusal(attached("spacings: 1 2 3\nunits: \"mm\" \"mm\"\n"), "is not 3 units in quotes");
   check_refusal(attached(in_space("LPS") + "units" + units("um", "um", "um")),

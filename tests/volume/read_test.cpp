@@ -393,7 +393,7 @@ TEST_CASE(
                  {"a.mha", mha_file(""), "spacing is not in the file"},
                  {"a.nii", nifti(zero) + floats, "spacing along y is not in the file"},
                  {"b.nrrd", spaced("spacings: 1 -2 1\n"), "1 -2 1 mm is not a voxel size"},
-                 {"c.nrrd", spaced("spacings: 1 0 1\n"), "holds a zero"},
+                 {"c.nrrd", spaced("spacings: 1 0 1\n"), "1 0 1 mm is not a voxel size"},
                  {"b.mha", mha_file("ElementSpacing = 0 1 1\n"), "0 1 1 mm is not a voxel size"}});
   for (const std::string word : {"nan", "inf", "-inf", "x", "1e999"}) {
     check_refused({{"a.nrrd", spaced("spacings: " + word + " 1 1\n"), ""},

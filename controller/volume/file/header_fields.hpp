@@ -74,11 +74,13 @@ class HeaderFields {
   std::map<std::string, std::string> all_;
 };
 
-/// A unit of length: mm are `times / over` of it.
+/// A unit of length: mm are `times / over` of it. Or a voxel, which is no length.
 struct LengthUnit {
   double times = 1, over = 1;
+  bool is_index = false;
 };
-/// `mm`, `microns`, `inch`, ...; mm for an empty word or one of question marks; none for another.
+/// `mm`, `microns`, `inch`, `pixel`, ...; mm for an empty word or one of question marks; none for
+/// another.
 [[nodiscard]] std::optional<LengthUnit> length_unit(const std::string& word);
 
 }  // namespace kerf::volume

@@ -103,9 +103,11 @@ std::vector<Vector> vectors_of(const HeaderFields& fields, const char* key, std:
   return vectors;
 }
 
-/// Units in quotes, `count` of them; mm for a missing field.
+/// Units in quotes, `count` of them; mm for a missing field. Along an axis of the file the unit may
+/// be a voxel: its spacing is not known then.
 std::vector<LengthUnit> units_of(const HeaderFields& fields, const char* key,
-                                 const std::vector<std::size_t>& wanted, std::size_t count) {
+                                 const std::vector<std::size_t>& wanted, std::size_t count,
+                                 bool allows_index = false) {
   std::vector<LengthUnit> units(wanted.size());
   if (!fields.has(key)) return units;
   std::istringstream in(fields.text(key));
@@ -119,7 +121,7 @@ std::vector<LengthUnit> units_of(const HeaderFields& fields, const char* key,
   }
   for (std::size_t i = 0; i < wanted.size(); ++i) {
     const auto unit = length_unit(words[wanted[i]]);
-    if (!unit) {
+    if (!unit || (unit->is_index && !allows_index)) {
       fields.refuse(key, "is no length that kerf reads; write the header's lengths in mm");
     }
     units[i] = *unit;
@@ -210,7 +212,7 @@ void set_straight(const HeaderFields& fields, const std::vector<std::size_t>& ax
     const double spacing = spacings[axes[i]].value, min = mins[axes[i]].value;
     claim.axes[i] = {};
     claim.axes[i][i] = 1;
-    if (std::isnan(spacing)) continue;
+    if (std::isnan(spacing) || units[i].is_index) continue;
     claim.spacing_mm[i] = spacing * scale;
     claim.spacing_known |= 1U << i;
     const bool is_node = lower(centers[axes[i]]) == "node";
@@ -244,7 +246,6 @@ UntrustedHeader nrrd_claim(const HeaderFields& fields, const std::vector<std::in
   claim.spacing_known = 0;
   for (std::size_t i = 0; i < 3; ++i) {
     claim.size[i] = sizes[axes[i]];
-    if (spacings[axes[i]].value == 0) fields.refuse("spacings", "holds a zero; correct the header");
   }
   const std::vector<LengthUnit> units =
       units_of(fields, "space units", {0, 1, 2}, space.dimensions);
@@ -255,7 +256,7 @@ UntrustedHeader nrrd_claim(const HeaderFields& fields, const std::vector<std::in
                     "without `space directions`; add them, such as (0.5,0,0) (0,0.5,0) (0,0,0.5)");
     }
     set_straight(fields, axes, spacings,
-                 fields.has("units") ? units_of(fields, "units", axes, count) : units, claim);
+                 fields.has("units") ? units_of(fields, "units", axes, count, true) : units, claim);
     if (space.is_patient) {
       add_note(claim, "no space directions: its axes are taken as those of LPS");
     }
