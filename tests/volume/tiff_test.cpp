@@ -98,7 +98,7 @@ TEST_CASE("reduced copies and masks among the pages of a TIFF are left out, and 
     pages[3].shorts[kSubfileType] = {2};  // of TIFF 5.0
     const SourceVolume v = read(pages);
     check_counting(v);
-    CHECK(v.note == "5 of its pages are reduced copies or masks, left out");
+    CHECK(v.note == "pages left out as reduced copies or masks: 5");
   }
   std::vector<TiffPage> many = five();
   for (int i = 0; i < 40; ++i) many.push_back(extra(i % 2 == 0 ? 4 : 1, 9));
@@ -107,7 +107,8 @@ TEST_CASE("reduced copies and masks among the pages of a TIFF are left out, and 
   for (TiffPage& page : paged) page.longs[kNewSubfileType] = {2};  // one of several
   check_counting(read(paged));
   CHECK(has(refusal_of({five()[0]}), "a.tif: one page; name the folder that holds all slices"));
-  CHECK(has(refusal_of({extra(1), extra(4)}), "no page of it is a slice (2 of its pages"));
+  CHECK(has(refusal_of({extra(1), extra(4)}),
+            "no page of it is a slice (pages left out as reduced copies or masks: 2)"));
 }
 
 TEST_CASE("a page within a page is left out, and the note says so") {

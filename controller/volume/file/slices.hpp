@@ -22,7 +22,9 @@ struct Slices {
   Scaling scaling;  ///< as ImageJ names it
   std::array<double, 3> spacing_mm{1, 1, 1};
   std::uint32_t spacing_known = 0;  ///< bit a: by ImageJ or OME-XML, along axis a
-  std::string note;                 ///< what the user should know
+  std::string note;                 ///< for the user: sentences
+
+  void say(const std::string& sentence) { note += (note.empty() ? "" : "; ") + sentence; }
 };
 
 /// Returns the memory for the slices; empty if only their facts are wanted.

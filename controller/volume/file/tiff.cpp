@@ -18,16 +18,12 @@
 #include "controller/input/load_error.hpp"
 #include "controller/volume/file/file_headers.hpp"
 #include "controller/volume/file/foreign_volume.hpp"
-#include "controller/volume/file/header_fields.hpp"
 #include "controller/volume/file/slices.hpp"
+#include "controller/volume/file/tiff_description.hpp"
 
 namespace kerf::volume {
 namespace fs = std::filesystem;
 namespace {
-
-void say(Slices& slices, const std::string& text) {
-  slices.note += (slices.note.empty() ? "" : "; ") + text;
-}
 
 /// An open TIFF and the last complaint of libtiff about it.
 class Tiff {
@@ -224,153 +220,11 @@ void check_page(const Tiff& file) {
   }
 }
 
-/// What programs write about a stack: ImageJ `key=value` on lines, OME-XML `key="value"`, tifffile
-/// a shape.
-class Description {
- public:
-  explicit Description(std::string text) : text_(std::move(text)) {}
-
-  [[nodiscard]] bool is_imagej() const { return text_.starts_with("ImageJ="); }
-  [[nodiscard]] bool is_ome() const { return text_.find("<OME") != std::string::npos; }
-
-  /// Empty if there is none.
-  [[nodiscard]] std::string word(const std::string& key) const {
-    const bool lines = is_imagej();
-    const std::string start = key + (lines ? "=" : "=\"");
-    for (std::size_t at = 0; (at = text_.find(start, at)) != std::string::npos; ++at) {
-      if (at == 0 ||
-          std::string_view(lines ? "\n" : " \t\r\n").find(text_[at - 1]) == std::string::npos)
-        continue;  // the end of a longer key
-      const std::string rest = text_.substr(at + start.size());
-      return rest.substr(0, rest.find_first_of(lines ? "\r\n" : "\""));
-    }
-    return {};
-  }
-  [[nodiscard]] std::optional<double> number(const std::string& key) const {
-    const std::string text = word(key);
-    double value = 0;
-    const auto [end, fault] = std::from_chars(text.data(), text.data() + text.size(), value);
-    if (fault != std::errc{} || end != text.data() + text.size()) return {};
-    return value;
-  }
-  /// Names and lengths of the axes beyond rows and columns.
-  [[nodiscard]] std::vector<std::pair<std::string, double>> axes() const {
-    std::vector<std::pair<std::string, double>> found;
-    for (const char* const key : {"channels", "slices", "frames", "SizeC", "SizeZ", "SizeT"}) {
-      if (const auto count = number(key)) found.emplace_back(key, *count);
-    }
-    if (!text_.starts_with("{\"shape\": [")) return found;
-    std::istringstream shape(text_.substr(text_.find('[') + 1));
-    char after = ',';
-    for (double count = 0; after == ',' && shape >> count >> after;) {
-      found.emplace_back("axis " + std::to_string(found.size() + 1), count);
-    }
-    found.resize(std::max<std::size_t>(found.size(), 2) - 2);
-    return found;
-  }
-  /// Whether OME-XML has the planes in the order of the pages.
-  [[nodiscard]] bool in_order() const {
-    for (std::size_t at = 0; (at = text_.find("<TiffData", at)) != std::string::npos; ++at) {
-      const Description part(text_.substr(at, text_.find('>', at) - at));
-      double plane = 0;
-      for (const char* const key : {"FirstZ", "FirstC", "FirstT"}) {
-        plane += part.number(key).value_or(0);
-      }
-      if (plane != part.number("IFD").value_or(plane)) return false;
-    }
-    return true;
-  }
-
- private:
-  std::string text_;
-};
-
-/// A unit in mm; none for one that is no length, such as ImageJ's `pixel`.
-std::optional<double> mm_of(std::string unit) {
-  constexpr std::string_view kMicro = "\\u00B5";  // as ImageJ writes it
-  if (unit.starts_with(kMicro)) unit.replace(0, kMicro.size(), "u");
-  const auto length = unit.empty() ? std::nullopt : length_unit(unit);
-  if (!length) return {};
-  return length->times / length->over;
-}
-
-/// Refuses a file whose pages are not the slices of one volume by its description.
-void check_axes(const fs::path& path, const Description& description, Slices& slices) {
-  double images = 1;
-  std::vector<std::string> names;
-  for (const auto& [name, count] : description.axes()) {
-    images *= count;
-    if (count > 1) names.push_back(name);
-  }
-  if (names.size() > 1) {
-    kerf::refuse(path.string(), ": its description has " + names[0] + " and " + names[1] +
-                                    "; save one volume, of slices alone, to a file of its own");
-  }
-  images = std::max(images, description.number("images").value_or(1));
-  if (images > 1 && images != static_cast<double>(slices.size[2])) {
-    kerf::refuse(path.string(), ": its description names " + short_text(images) +
-                                    " images, and the file has pages for " +
-                                    std::to_string(slices.size[2]) +
-                                    "; save it again with a page for each image");
-  }
-  if (!description.in_order()) {
-    kerf::refuse(path.string(), ": its OME-XML has the pages in another order; save them in order");
-  }
-  if (!names.empty() && names[0] != "slices" && names[0] != "SizeZ" && names[0] != "axis 1") {
-    say(slices, "its " + names[0] + " are taken as slices");
-  }
-}
-
-/// Sets the spacing that ImageJ or OME-XML names. Resolution alone is a size for printing, often a
-/// program's constant: it is noted and not taken.
-void set_spacing(const Tiff& file, const Description& description, Slices& slices) {
-  const double across[] = {static_cast<double>(file.number<float>(TIFFTAG_XRESOLUTION)),
-                           static_cast<double>(file.number<float>(TIFFTAG_YRESOLUTION))};
-  const auto set = [&](std::size_t axis, double edge, const std::optional<double>& unit_mm) {
-    if (!unit_mm || !(edge > 0) || !(edge < std::numeric_limits<double>::max())) return;
-    slices.spacing_mm[axis] = edge * *unit_mm;
-    slices.spacing_known |= 1U << axis;
-  };
-  if (description.is_imagej()) {
-    const std::string unit = description.word("unit");
-    const auto unit_of = [&](const char* key) {
-      const std::string own = description.word(key);
-      return mm_of(own.empty() ? unit : own);
-    };
-    set(0, 1 / across[0], mm_of(unit));
-    set(1, 1 / across[1], unit_of("yunit"));
-    set(2, description.number("spacing").value_or(0), unit_of("zunit"));
-  } else if (description.is_ome()) {
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      const std::string key = std::string("PhysicalSize") + "XYZ"[axis];
-      const std::string unit = description.word(key + "Unit");
-      set(axis, description.number(key).value_or(0), mm_of(unit.empty() ? "um" : unit));
-    }
-  } else if (across[0] > 0 && across[1] > 0) {
-    const auto unit = file.number<std::uint16_t>(TIFFTAG_RESOLUTIONUNIT, RESUNIT_INCH);
-    const double mm = unit == RESUNIT_INCH ? 25.4 : unit == RESUNIT_CENTIMETER ? 10 : 0;
-    if (mm > 0) {
-      say(slices, "its resolution for printing, " + short_text(mm / across[0]) + " x " +
-                      short_text(mm / across[1]) + " mm a pixel, is not taken as its spacing");
-    }
-  }
-}
-
-/// ImageJ keeps signed and calibrated images as unsigned numbers and a straight line.
-Scaling scaling_of(const fs::path& path, const Description& description) {
-  constexpr double kStraightLine = 0, kNone = 20;  // ij.measure.Calibration
-  const auto function = description.number("cf");
-  if (!description.is_imagej() || !function || *function == kNone) return {};
-  const auto intercept = description.number("c0"), slope = description.number("c1");
-  if (*function == kStraightLine && intercept && slope) return {*slope, *intercept};
-  kerf::refuse(path.string(), ": ImageJ's calibration function " + short_text(*function) +
-                                  " is no straight line; save it uncalibrated");
-}
-
 /// Checks all pages; returns what they have in common.
 Slices slices_of(const fs::path& path) {
   Slices slices;
-  Description description("");
+  std::string description;
+  TiffResolution resolution;
   std::int64_t left_out = 0;
   bool within = false;
   const auto text = [](std::int64_t width, std::int64_t height, VoxelType type) {
@@ -391,15 +245,16 @@ Slices slices_of(const fs::path& path) {
     if (slices.size[2] == 0) {
       slices.size = {width, height, 0};
       slices.type = type;
-      description = Description(file.text(TIFFTAG_IMAGEDESCRIPTION));
-      set_spacing(file, description, slices);
-      slices.scaling = scaling_of(path, description);
+      description = file.text(TIFFTAG_IMAGEDESCRIPTION);
+      resolution = {file.number<float>(TIFFTAG_XRESOLUTION),
+                    file.number<float>(TIFFTAG_YRESOLUTION),
+                    file.number<std::uint16_t>(TIFFTAG_RESOLUTIONUNIT, RESUNIT_INCH)};
       // "imaged as white", section 8: of the display.
       if (file.number<std::uint16_t>(TIFFTAG_PHOTOMETRIC, 1) == PHOTOMETRIC_MINISWHITE) {
-        say(slices, "it shows 0 as white, its values are taken as they are");
+        slices.say("it shows 0 as white, its values are taken as they are");
       }
       if (file.number<std::uint16_t>(TIFFTAG_COMPRESSION) == COMPRESSION_JPEG) {
-        say(slices, "its pages are packed with loss (JPEG)");
+        slices.say("its pages are packed with loss (JPEG)");
       }
     } else if (width != slices.size[0] || height != slices.size[1] || type != slices.type) {
       file.refuse_page(text(width, height, type) + ", and the pages before have " +
@@ -410,14 +265,14 @@ Slices slices_of(const fs::path& path) {
     check_grid(path.string(), slices.size[0], slices.size[1], slices.size[2]);
   }
   if (left_out > 0) {
-    say(slices, std::to_string(left_out) + " of its pages are reduced copies or masks, left out");
+    slices.say("pages left out as reduced copies or masks: " + std::to_string(left_out));
   }
-  if (within) say(slices, "images within its pages are left out");
+  if (within) slices.say("images within its pages are left out");
   if (slices.size[2] == 0) {
     kerf::refuse(path.string(),
                  ": no page of it is a slice (" + slices.note + "); save each slice as a page");
   }
-  check_axes(path, description, slices);
+  describe_slices(path, description, resolution, slices);
   return slices;
 }
 
