@@ -83,8 +83,8 @@ class Description {
 std::optional<double> mm_of(std::string unit) {
   constexpr std::string_view kMicro = "\\u00B5";  // as ImageJ writes it
   if (unit.starts_with(kMicro)) unit.replace(0, kMicro.size(), "u");
-  const auto length = unit.empty() ? std::nullopt : length_unit(unit);
-  if (!length) return {};
+  const auto length = unit.empty() || unit[0] == '?' ? std::nullopt : length_unit(unit);
+  if (!length || length->is_index) return {};
   return length->times / length->over;
 }
 
