@@ -188,8 +188,7 @@ std::optional<LengthUnit> length_unit(const std::string& word) {
       {"|um|\u00b5m|\u03bcm|micron|microns|micrometer|micrometers|micrometre|micrometres|",
        {1, 1000}},
       {"|nm|nanometer|nanometers|nanometre|nanometres|", {1, 1000000}},
-      {"|in|inch|inches|", {25.4, 1}},
-      {"|px|pixel|pixels|vx|voxel|voxels|", {1, 1, true}}};
+      {"|in|inch|inches|", {25.4, 1}}};
   const std::string barred = "|" + lower(stripped(word)) + "|";
   for (const Row& row : kRows) {
     if (row.words.find(barred) != std::string_view::npos) return row.unit;

@@ -74,13 +74,11 @@ class HeaderFields {
   std::map<std::string, std::string> all_;
 };
 
-/// A unit of length: mm are `times / over` of it. Or a voxel, which is no length.
+/// A unit of length: mm are `times / over` of it.
 struct LengthUnit {
   double times = 1, over = 1;
-  bool is_index = false;
 };
-/// `mm`, `microns`, `inch`, `pixel`, ...; mm for an empty word or one of question marks; none for
-/// another.
+/// `mm`, `microns`, `inch`, ...; mm for an empty word or one of question marks; none for another.
 [[nodiscard]] std::optional<LengthUnit> length_unit(const std::string& word);
 
 }  // namespace kerf::volume

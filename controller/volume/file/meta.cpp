@@ -177,8 +177,7 @@ UntrustedHeader meta_claim(const HeaderFields& fields, const std::vector<std::in
   const std::vector<Written> spacing =
       one_meaning(fields, {fields.has("ElementSpacing") ? "ElementSpacing" : "ElementSize"}, count);
   const auto unit = length_unit(fields.text("DistanceUnits"));
-  if (!unit || unit->is_index)
-    fields.refuse("DistanceUnits", "is no length that kerf reads; write lengths in mm");
+  if (!unit) fields.refuse("DistanceUnits", "is no length that kerf reads; write lengths in mm");
   UntrustedHeader claim;
   claim.spacing_known = spacing.empty() ? 0 : 7;
   for (std::size_t i = 0; i < 3; ++i) {

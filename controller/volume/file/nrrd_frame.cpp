@@ -9,6 +9,7 @@
 #include <limits>
 #include <optional>
 #include <sstream>
+#include <string_view>
 #include <utility>
 
 #include "controller/input/load_error.hpp"
@@ -104,10 +105,10 @@ std::vector<Vector> vectors_of(const HeaderFields& fields, const char* key, std:
 }
 
 /// Units in quotes, `count` of them; mm for a missing field. Along an axis of the file the unit may
-/// be a voxel: its spacing is not known then.
+/// be a pixel: NaN, since its spacing is not known then.
 std::vector<LengthUnit> units_of(const HeaderFields& fields, const char* key,
                                  const std::vector<std::size_t>& wanted, std::size_t count,
-                                 bool allows_index = false) {
+                                 bool allows_pixels = false) {
   std::vector<LengthUnit> units(wanted.size());
   if (!fields.has(key)) return units;
   std::istringstream in(fields.text(key));
@@ -120,8 +121,13 @@ std::vector<LengthUnit> units_of(const HeaderFields& fields, const char* key,
                            " units in quotes, such as \"mm\" \"mm\" \"mm\"; correct the header");
   }
   for (std::size_t i = 0; i < wanted.size(); ++i) {
-    const auto unit = length_unit(words[wanted[i]]);
-    if (!unit || (unit->is_index && !allows_index)) {
+    const std::string& word = words[wanted[i]];
+    constexpr std::string_view kPixels = "|px|pixel|pixels|voxel|voxels|";
+    const bool is_pixel = kPixels.find("|" + lower(word) + "|") != std::string_view::npos;
+    const auto unit = allows_pixels && is_pixel
+                          ? LengthUnit{std::numeric_limits<double>::quiet_NaN(), 1}
+                          : length_unit(word);
+    if (!unit) {
       fields.refuse(key, "is no length that kerf reads; write the header's lengths in mm");
     }
     units[i] = *unit;
@@ -212,7 +218,7 @@ void set_straight(const HeaderFields& fields, const std::vector<std::size_t>& ax
     const double spacing = spacings[axes[i]].value, min = mins[axes[i]].value;
     claim.axes[i] = {};
     claim.axes[i][i] = 1;
-    if (std::isnan(spacing) || units[i].is_index) continue;
+    if (std::isnan(spacing * scale)) continue;
     claim.spacing_mm[i] = spacing * scale;
     claim.spacing_known |= 1U << i;
     const bool is_node = lower(centers[axes[i]]) == "node";

@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <cstring>
 #include <fstream>
+#include <memory>
 #include <new>
 #include <optional>
 #include <string_view>
@@ -81,24 +82,26 @@ class PartBytes {
       if (!unpacks_) throw std::bad_alloc();
     }
     if (packing == Packing::bzip2) open_bzip2();
-    std::array<std::byte, kPiece> skipped;
-    for (auto left = static_cast<std::uint64_t>(std::max<std::int64_t>(part.bytes, 0)); left > 0;) {
-      const std::size_t got = read(std::span(skipped).first(std::min<std::uint64_t>(left, kPiece)));
-      if (got == 0) break;
-      left -= got;
-    }
   }
   ~PartBytes() {
     if (unpacks_) inflateEnd(&stream_);
-    archive_read_free(bzip2_);
   }
   PartBytes(const PartBytes&) = delete;
   PartBytes& operator=(const PartBytes&) = delete;
 
+  /// Leaves out so many bytes, or all if there are fewer.
+  void skip(std::uint64_t left) {
+    std::array<std::byte, kPiece> skipped;
+    std::size_t got = 1;
+    for (; left > 0 && got > 0; left -= got) {
+      got = read(std::span(skipped).first(std::min<std::uint64_t>(left, kPiece)));
+    }
+  }
+
   /// Fills `to`; returns the number of bytes, fewer at the end alone.
   std::size_t read(std::span<std::byte> to) {
-    if (bzip2_ == nullptr) return unpacks_ ? unpacked(to) : plain(to);
-    const la_ssize_t got = archive_read_data(bzip2_, to.data(), to.size());
+    if (!bzip2_) return unpacks_ ? unpacked(to) : plain(to);
+    const la_ssize_t got = archive_read_data(bzip2_.get(), to.data(), to.size());
     if (got < 0) refuse_broken(file_);
     ended_ = static_cast<std::size_t>(got) < to.size();
     return static_cast<std::size_t>(got);
@@ -150,19 +153,20 @@ class PartBytes {
       *block = bytes.packed_.data();
       return static_cast<la_ssize_t>(bytes.plain(bytes.packed_));
     };
-    bzip2_ = archive_read_new();
-    archive_read_support_filter_bzip2(bzip2_);
-    archive_read_support_format_raw(bzip2_);
+    bzip2_.reset(archive_read_new());
+    archive* const bzip2 = bzip2_.get();
+    archive_read_support_filter_bzip2(bzip2);
+    archive_read_support_format_raw(bzip2);
     archive_entry* entry = nullptr;
     const bool opened =
-        archive_read_open(bzip2_, this, nullptr, next_block, nullptr) == ARCHIVE_OK &&
-        archive_read_next_header(bzip2_, &entry) == ARCHIVE_OK;
-    if (!opened || archive_filter_code(bzip2_, 0) != ARCHIVE_FILTER_BZIP2) refuse_broken(file_);
+        archive_read_open(bzip2, this, nullptr, next_block, nullptr) == ARCHIVE_OK &&
+        archive_read_next_header(bzip2, &entry) == ARCHIVE_OK;
+    if (!opened || archive_filter_code(bzip2, 0) != ARCHIVE_FILTER_BZIP2) refuse_broken(file_);
   }
 
   const fs::path& file_;
   std::ifstream in_;
-  archive* bzip2_ = nullptr;
+  std::unique_ptr<archive, int (*)(archive*)> bzip2_{nullptr, archive_read_free};
   std::uint64_t left_;  ///< packed bytes that are not read
   z_stream stream_{};
   bool unpacks_ = false, ended_ = false;
@@ -268,6 +272,7 @@ void read_hex(const VoxelPart& part, PartBytes& bytes, std::span<std::byte> to) 
 void read_part(const VoxelFiles& files, const VoxelPart& part, std::span<std::byte> to) {
   const bool packed = is_packed(files.packing);
   PartBytes bytes(part, files.packing, files.packed_bytes, to.size());
+  bytes.skip(static_cast<std::uint64_t>(std::max<std::int64_t>(part.bytes, 0)));
   if (files.packing == Packing::text) return read_text(part, files.type, bytes, to);
   if (files.packing == Packing::hex) {
     read_hex(part, bytes, to);
