@@ -301,7 +301,8 @@ expect 'a slow one' kerf_gives 0 demo --seconds 1
 expect 'leaves the emulator its own pace' test "$(grep -c -- --packet-cycles "$lab/calls")" == 0
 expect 'a demo keeps its results' kerf_gives 0 demo --seconds 1 --out "$lab/out" --virtual
 expect 'all of them' kept "$all"
-expect 'in a folder of its user alone' test "$(stat -c %a "$lab/out")" == 700
+expect 'in a folder with the rights that the umask leaves' \
+  test "$(stat -c %a "$lab/out")" == "$(printf %o $((0777 & ~$(umask) | 0700)))"
 expect 'lock-step reaches the controller' called '^controller.*--virtual'
 expect 'lock-step reaches the emulator' called '^emulator.*--lockstep'
 expect 'and is led from picture to picture' called '^controller.*--virtual --until .*/lead '

@@ -60,7 +60,7 @@ class Demo:
             self.out = OutFolder(self.options.out)
             self.out.check()
         self.build()
-        os.umask(0o077)  # as the programs' own files
+        os.umask(os.umask(0o077) & 0o077)  # as the programs: the user keeps all rights of his own
         self.watch_signals()
         try:
             return self.run_programs()
@@ -223,20 +223,28 @@ class Demo:
             time.sleep(0.02)
 
     def watch(self):
-        """Until the controller ends. A program that cannot go on (a full disk, say) ends the demo; so does a window that is
-        closed while it is the hand, or in which another scene was chosen. Returns the exit code of what failed, and whether
-        the run was cut short with its window."""
+        """Until the controller ends. Pictures that cannot begin end the demo; so does a window that is closed while it is the
+        hand, or in which another scene was chosen. What fails later, as on a full disk, is reported in its own line, and the
+        rest goes on. Returns the exit code of what ended the demo, and whether anything failed or was cut short."""
         processes, failed, cut = self.processes, 0, False
         while self.controller.poll() is None:
             time.sleep(0.1)
             if failed:
                 continue
             if self.recorder is not None and self.recorder.poll() is not None:
-                failed = processes.conclude("recorder", self.recorder, 0)
+                worst = processes.conclude("recorder", self.recorder, 0)
                 self.recorder = None
+                if self.is_taken():
+                    failed = worst
+                else:
+                    cut = bool(worst) or cut
             if self.pictures is not None and self.pictures.poll() is not None:
-                failed = processes.conclude("visualizer", self.pictures, 0) or failed
+                worst = processes.conclude("visualizer", self.pictures, 0)
                 self.pictures = None
+                if self.is_taken() or not os.path.exists(processes.path("painter-shows")):
+                    failed = worst or failed
+                else:
+                    cut = bool(worst) or cut
             leads = self.options.mouse or os.path.exists(processes.path("choice"))
             if self.window is not None and leads and self.window.poll() is not None:
                 failed = processes.conclude("window", self.window, 0) or failed
@@ -257,7 +265,7 @@ class Demo:
         if failed:
             return failed
         # It has reported why it could not begin, and the others only wait for it.
-        if code == 2 and self.code_of_signal is None:
+        if code == 2 and self.code_of_signal is None and not self.has_log():
             if self.emulator is not None and self.emulator.poll() is not None:
                 processes.conclude("emulator", self.emulator, 0)
             return 2
@@ -281,6 +289,13 @@ class Demo:
             self.next_demo(choice.read_text().rstrip("\n"))
         return code if self.code_of_signal is None else self.code_of_signal
 
+    def is_taken(self):
+        """Another program took the folder of the results away."""
+        return bool(self.out) and not os.path.isdir(self.results)
+
+    def has_log(self):
+        return os.path.exists(os.path.join(self.results, "log", "ticks.npy"))
+
     def print_summary(self):
         try:
             say(pathlib.Path(self.processes.path("summary")).read_text(errors="replace").rstrip("\n"))
@@ -288,13 +303,13 @@ class Demo:
             pass
 
     def keep(self, code):
-        """Draws the plot and publishes the results. Returns the exit code."""
+        """Draws the plot and publishes the results, as many as there are. Returns the exit code."""
         options, processes = self.options, self.processes
-        if self.out and code != 2 and os.path.exists(os.path.join(self.results, "report.json")):
+        if self.out and (self.has_log() or code != 2 and os.path.exists(os.path.join(self.results, "report.json"))):
             plot = processes.start("record", ["plot", os.path.join(self.results, "log"), "--out", os.path.join(self.results, "forces.svg")],
                                    out="record.log", log="record.log")
-            if processes.conclude("record", plot, 30):
-                code = 1
+            if processes.conclude("record", plot, 30) or code:
+                code = code if code > 2 else 1
             line, in_place = self.out.publish()
             if in_place:
                 say(line)

@@ -17,6 +17,7 @@ from options import Refusal
 
 OWN = ".kerf-demo"
 KIB_A_SECOND, KIB_AT_LEAST = 384, 16384  # 384 bytes a tick; pictures, plot and volume
+RESERVE_BYTES = 65536  # for the list of the results, even on a disk that is full by then
 KINDS = ((stat.S_ISREG, "f"), (stat.S_ISLNK, "l"), (stat.S_ISFIFO, "p"), (stat.S_ISSOCK, "s"), (stat.S_ISBLK, "b"),
          (stat.S_ISCHR, "c"))
 
@@ -109,6 +110,7 @@ class OutFolder:
             if os.path.lexists(self.results):
                 shutil.rmtree(self.results)
             os.mkdir(self.results)
+            pathlib.Path(self.own, "reserve").write_bytes(bytes(RESERVE_BYTES))
         except OSError:
             raise self.refusal("cannot be written; name another folder") from None
         needed_kib = int(KIB_AT_LEAST + seconds * KIB_A_SECOND)
@@ -153,6 +155,7 @@ class OutFolder:
         list. Returns the line to print, and whether the results lie where they belong."""
         old = self.left()
         try:
+            os.unlink(os.path.join(self.own, "reserve"))
             lines = [line for line, _ in entries(self.results)]
             pathlib.Path(self.own, "files.new").write_text("".join(line + "\n" for line in lines), errors="surrogateescape")
         except OSError:
@@ -188,6 +191,10 @@ class OutFolder:
         """Removes what is not a result: on every way out."""
         if self.lock is not None:
             shutil.rmtree(self.results, ignore_errors=True)
+            try:
+                os.unlink(os.path.join(self.own, "reserve"))
+            except OSError:
+                pass
             if not os.path.exists(os.path.join(self.own, "files")):
                 shutil.rmtree(self.own, ignore_errors=True)
             os.close(self.lock)

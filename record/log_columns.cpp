@@ -22,9 +22,9 @@ constexpr LogColumn kColumns[] = {
     {"seq", "", "twice the number of records published before this one, + 2: a step of more than 2 "
      "is a gap"},
     {"tick", "tick", "count of servo steps since the start of the controller, from 1"},
-    {"start_ns", "ns", "when the tick began, CLOCK_MONOTONIC"},
+    {"start_ns", "ns", "when the tick began, CLOCK_MONOTONIC; in lock-step `tick` times the manifest's `tick_ns`"},
     {"period_error_ns", "ns", "how late it began, after its deadline", "0 in lock-step"},
-    {"execution_ns", "ns", "time that the servo step took"},
+    {"execution_ns", "ns", "time that the servo step took", "0 in lock-step"},
     {"flags", "", "bits, below"},
     {"missed_deadlines", "tick", "deadlines missed since the start", "0 in lock-step"},
     {"encoder_counts", "count, mrad", "0 to 2: joints, unwrapped; 3 to 5: yaw, pitch and roll of "

@@ -137,27 +137,39 @@ int run_recorder(const RecorderOptions& options, const std::atomic<bool>& stop) 
   Recorder recorder(reader, log);
   write_manifest(options.out, reader.info(), recorder, 0, kStillRunning);
 
-  std::uint64_t reported_lost = 0;
-  auto next_sync = Clock::now() + kSyncPeriod;
-  bool ended = false;
-  while (!ended) {
-    // Checked before the poll, which records all that was published until then.
-    ended = stop || is_final(reader.lifecycle()) || !connection.alive();
-    const std::uint64_t got = recorder.poll();
-    if (recorder.lost() != reported_lost) {
-      std::cerr << "kerf-recorder: GAP: " << recorder.lost() - reported_lost
-                << " ticks overwritten before they were read\n";
-      reported_lost = recorder.lost();
+  const auto record_all = [&] {
+    std::uint64_t reported_lost = 0;
+    auto next_sync = Clock::now() + kSyncPeriod;
+    bool ended = false;
+    while (!ended) {
+      // Checked before the poll, which records all that was published until then.
+      ended = stop || is_final(reader.lifecycle()) || !connection.alive();
+      const std::uint64_t got = recorder.poll();
+      if (recorder.lost() != reported_lost) {
+        std::cerr << "kerf-recorder: GAP: " << recorder.lost() - reported_lost
+                  << " ticks overwritten before they were read\n";
+        reported_lost = recorder.lost();
+      }
+      if (Clock::now() >= next_sync) {
+        log.sync();
+        next_sync = Clock::now() + kSyncPeriod;
+      }
+      // A ring that fills fast (virtual time) is read again at once.
+      if (!ended && got < reader.info().state_slots / 8) std::this_thread::sleep_for(kPollPeriod);
     }
-    if (Clock::now() >= next_sync) {
-      log.sync();
-      next_sync = Clock::now() + kSyncPeriod;
+    recorder.drain();
+    log.sync();
+  };
+  try {
+    record_all();
+  } catch (const RecordError&) {
+    // The rows so far stay readable. The manifest of a full disk may stay that of the beginning.
+    try {
+      write_manifest(options.out, reader.info(), recorder, log.rows(), kNoRoom);
+    } catch (const FileError&) {  // NOLINT(bugprone-empty-catch): the first failure is reported
     }
-    // A ring that fills fast (virtual time) is read again at once.
-    if (!ended && got < reader.info().state_slots / 8) std::this_thread::sleep_for(kPollPeriod);
+    throw;
   }
-  recorder.drain();
-  log.sync();
   const std::string_view end_reason = reason(reader.lifecycle(), stop);
   write_manifest(options.out, reader.info(), recorder, log.rows(), end_reason);
   if (!options.report.empty()) write_report(options, recorder, log.rows(), end_reason);

@@ -123,6 +123,10 @@ RecordSummary summarise(const std::filesystem::path& folder) {
   RecordSummary out;
   out.rows = log.rows();
   out.end_reason = manifest.end_reason;
+  if (log.rows() < log.counted()) {
+    out.end_reason = "cut after " + std::to_string(log.rows()) + " of " +
+                     std::to_string(log.counted()) + " rows";
+  }
   out.missed_before_start = manifest.missed_before_start;
   std::uint64_t next_seq = 2 * manifest.missed_before_start + 2;  // of index i: 2 i + 2
   std::uint32_t fault = 0;

@@ -19,6 +19,7 @@ inline constexpr std::string_view kTickLogName = "ticks.npy";
 inline constexpr std::string_view kManifestName = "manifest.json";
 inline constexpr std::string_view kSceneName = "scene.json";
 inline constexpr std::string_view kStillRunning = "running";
+inline constexpr std::string_view kNoRoom = "no room";  ///< the disk was full
 
 /// Facts about a log beside its rows.
 struct Manifest {

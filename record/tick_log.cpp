@@ -123,12 +123,19 @@ namespace {
 [[nodiscard]] std::uint64_t rows_of(const std::string& header, const std::string& path) {
   constexpr std::string_view kShape = "'shape': (";
   const std::size_t at = header.find(kShape);
+  if (header.size() < kTickLogHeaderBytes) {
+    const std::string_view fixed = std::string_view(header).substr(0, at);
+    if (tick_log_header(0).starts_with(fixed)) {
+      throw RecordError(path + ": " + std::to_string(header.size()) +
+                        " bytes, cut before its first tick; record it again");
+    }
+  }
   std::uint64_t rows = 0;
   if (at != std::string::npos) {
     const char* const digits = header.data() + at + kShape.size();
     std::from_chars(digits, header.data() + header.size(), rows);
   }
-  if (header != tick_log_header(rows)) {
+  if (header.size() < kTickLogHeaderBytes || header != tick_log_header(rows)) {
     throw RecordError(path + ": not a tick log of this version; record it again");
   }
   return rows;
@@ -146,15 +153,12 @@ TickLogReader::TickLogReader(std::filesystem::path path) : path_(std::move(path)
   }
   std::string header(kTickLogHeaderBytes, '\0');
   file_.read(header.data(), static_cast<std::streamsize>(header.size()));
-  const std::uint64_t counted = rows_of(header, path_.string());
+  header.resize(static_cast<std::size_t>(file_.gcount()));
+  counted_ = rows_of(header, path_.string());
   file_.clear();
   file_.seekg(0, std::ios::end);
   const auto bytes = static_cast<std::uint64_t>(file_.tellg());
   rows_ = bytes < kTickLogHeaderBytes ? 0 : (bytes - kTickLogHeaderBytes) / sizeof(TickRecord);
-  if (rows_ < counted) {
-    throw RecordError(path_.string() + ": " + std::to_string(rows_) + " rows of " +
-                      std::to_string(counted) + "; the file was cut, copy it again");
-  }
 }
 
 void TickLogReader::for_each(const std::function<void(const TickRecord&)>& visit) {

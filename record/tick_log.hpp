@@ -68,11 +68,14 @@ class TickLogWriter {
 /// Reads one log, row by row, with constant memory.
 class TickLogReader {
  public:
-  /// Throws `RecordError` if the file has another layout or ends inside a counted row.
+  /// Throws `RecordError` if the file has another layout or ends in its header. One that was cut
+  /// later, at any byte, has the complete rows before the cut.
   explicit TickLogReader(std::filesystem::path path);
 
   /// Complete rows in the file, also those beyond the count of the header.
   [[nodiscard]] std::uint64_t rows() const noexcept { return rows_; }
+  /// As the header has them: more than `rows()` if the file was cut.
+  [[nodiscard]] std::uint64_t counted() const noexcept { return counted_; }
 
   /// Calls `visit` for each row in order. Throws `RecordError` at a row whose checksum is wrong.
   void for_each(const std::function<void(const TickRecord&)>& visit);
@@ -80,7 +83,7 @@ class TickLogReader {
  private:
   std::filesystem::path path_;
   std::ifstream file_;
-  std::uint64_t rows_ = 0;
+  std::uint64_t rows_ = 0, counted_ = 0;
 };
 
 [[nodiscard]] inline double magnitude(const float (&vector)[3]) noexcept {

@@ -59,11 +59,16 @@ namespace {
                      a.volumes.size() * sizeof(VolumeDescriptor)) == 0;
 }
 
+/// Its ticks then have no time of any clock.
+[[nodiscard]] bool is_lockstep(const ParsedHello& hello) noexcept {
+  return hello.head.start_ns == 0;
+}
+
 [[nodiscard]] MirrorSpec spec_of(const ParsedHello& hello, const ClockOffset& clock,
                                  std::uint64_t most_bytes) {
   return {.session_id = hello.head.session,
           .config_hash = hello.head.config_hash,
-          .start_ns = clock.local(hello.head.start_ns),
+          .start_ns = is_lockstep(hello) ? 0 : clock.local(hello.head.start_ns),
           .tick_ns = hello.head.tick_ns,
           .scene_bytes = hello.head.scene_bytes,
           .build_id = hello.head.build_id,
@@ -226,7 +231,7 @@ void Mirror::records(std::span<const std::byte> message) {
     const std::uint64_t index = in.head.first + std::uint64_t{i} * in.head.stride;
     if (static_cast<Ring>(in.head.ring) == Ring::ticks) {
       auto record = record_at<TickRecord>(in.bytes, i);
-      record.start_ns = clock_.local(record.start_ns);
+      if (!is_lockstep(*hello_)) record.start_ns = clock_.local(record.start_ns);
       writer.put_record(index, record);
     } else {
       auto record = record_at<DirtyRecord>(in.bytes, i);

@@ -160,7 +160,7 @@ void Publisher::publish(Tick tick, const DeviceReport& report, const ServoOutput
   record.stale = output.stale ? 1 : 0;
   record.penetration_mm = static_cast<float>(servo_.penetration_mm());
   segment_.publish_state(record);
-  segment_.end_tick(static_cast<std::uint64_t>(timing.start_ns));
+  segment_.end_tick(static_cast<std::uint64_t>(timing.heartbeat_ns));
 }
 
 }  // namespace kerf

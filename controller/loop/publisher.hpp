@@ -12,9 +12,10 @@ namespace kerf {
 
 /// Times and losses of a tick, which the loop knows and the servo step must not.
 struct TickTiming {
-  std::int64_t start_ns = 0;
+  std::int64_t start_ns = 0;      ///< as TickSource has it
+  std::int64_t heartbeat_ns = 0;  ///< CLOCK_MONOTONIC, in lock-step too
   std::int64_t late_ns = 0;
-  std::int64_t compute_ns = 0;
+  std::int64_t compute_ns = 0;  ///< 0 in lock-step
   std::uint64_t missed_deadlines = 0;
   std::uint64_t lost_packets = 0;
   std::uint64_t refused_packets = 0;

@@ -33,8 +33,11 @@ class RunStatistics {
   RunStatistics(RunRecord& record, const TickSource& clock) noexcept
       : record_(record), clock_(clock) {}
 
-  void count(Tick tick, const ServoOutput& output, const TickTiming& timing, std::int64_t sent_ns,
-             std::int64_t publish_ns) noexcept {
+  /// Times as the processor took them, in lock-step too.
+  struct Spent {
+    std::int64_t late_ns, compute_ns, sent_ns, publish_ns;
+  };
+  void count(Tick tick, const ServoOutput& output, const Spent& spent) noexcept {
     if (output.fault != last_fault_ && output.fault != Fault::none) {
       record_.add_fault(tick, fault_name(output.fault));
     }
@@ -70,7 +73,7 @@ class RunStatistics {
     const double force_n = vec3::length(output.force_n);
     record_.peak_force_n = std::max(record_.peak_force_n, force_n);
     if (record_.first_force_ns == 0 && output.motors_on && force_n > 0) {
-      record_.first_force_ns = sent_ns;
+      record_.first_force_ns = spent.sent_ns;
     }
     for (std::size_t v = 0; v < kMaxVolumes; ++v) {
       record_.removed_steps[v] += output.removed_by_volume[v];
@@ -82,9 +85,9 @@ class RunStatistics {
     record_.port_minimum_mj = output.port_minimum_mj;
     std::ranges::transform(output.energy_steps, record_.energy_mj.begin(), energy_mj_of_steps);
     record_.output_hash = output.output_hash;
-    record_.wake.record(timing.late_ns);
-    record_.compute.record(timing.compute_ns);
-    record_.publish.record(publish_ns);
+    record_.wake.record(spent.late_ns);
+    record_.compute.record(spent.compute_ns);
+    record_.publish.record(spent.publish_ns);
   }
 
   void start() noexcept {
@@ -127,7 +130,8 @@ EndReason run_servo(TickSource& clock, DeviceDriver& device, Servo& servo, Publi
   for (Tick tick = 1; !signals.stop.load(std::memory_order_relaxed); ++tick) {
     TickTiming timing;
     timing.late_ns = clock.wait_next();
-    timing.start_ns = monotonic_ns();
+    timing.heartbeat_ns = monotonic_ns();
+    timing.start_ns = clock.start_ns(tick);
     const DeviceReport report = device.read();  // newest pose; never blocks
     if (const auto command = commands.take_command()) {
       if (!servo.apply(servo_command(*command))) record.add_event(tick, "refused_command");
@@ -138,14 +142,15 @@ EndReason run_servo(TickSource& clock, DeviceDriver& device, Servo& servo, Publi
     }
     const std::int64_t in_hand_ns = monotonic_ns();
     const ServoOutput output = servo.step(report);  // all physics, all limits
-    timing.compute_ns = monotonic_ns() - in_hand_ns;
+    const std::int64_t compute_ns = monotonic_ns() - in_hand_ns;
+    timing.compute_ns = clock.takes_time() ? compute_ns : 0;
     timing.missed_deadlines = clock.overruns();
     timing.lost_packets = device.lost();
     timing.refused_packets = device.refused();
     send_tick(output, signals, device);  // the device first,
     const std::int64_t sent_ns = monotonic_ns();
     eyes.publish(tick, report, output, last_command, timing);  // then the readers
-    books.count(tick, output, timing, sent_ns, monotonic_ns() - sent_ns);
+    books.count(tick, output, {timing.late_ns, compute_ns, sent_ns, monotonic_ns() - sent_ns});
 
     signals.heartbeat.store(tick, std::memory_order_relaxed);
     signals.armed_ticks.store(record.ticks, std::memory_order_relaxed);

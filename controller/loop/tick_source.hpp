@@ -97,6 +97,12 @@ class TickSource {
   virtual std::int64_t wait_next() noexcept = 0;
   /// Deadlines that were skipped because a tick ran over.
   [[nodiscard]] virtual std::uint64_t overruns() const noexcept = 0;
+  /// Begin of a tick: CLOCK_MONOTONIC; in lock-step the time of the servo itself, from 0.
+  [[nodiscard]] virtual std::int64_t start_ns(std::uint64_t) const noexcept {
+    return monotonic_ns();
+  }
+  /// Whether a tick takes time. In lock-step it takes none: two runs publish the same bytes.
+  [[nodiscard]] virtual bool takes_time() const noexcept { return true; }
   /// Whether this tick began kStandstillNs or more after the last one; false without a clock.
   [[nodiscard]] virtual bool stood_still() const noexcept { return false; }
 };
@@ -125,18 +131,23 @@ class RealTimeTicks final : public TickSource {
 /// gate, each tick first waits until the gate allows it.
 class LockStepTicks final : public TickSource {
  public:
-  explicit LockStepTicks(DeviceDriver& device, TickGate* gate = nullptr) noexcept
-      : device_(device), gate_(gate) {}
+  LockStepTicks(DeviceDriver& device, std::int64_t period_ns, TickGate* gate = nullptr) noexcept
+      : device_(device), period_ns_(period_ns), gate_(gate) {}
   std::int64_t wait_next() noexcept override {
     if (gate_ != nullptr) gate_->wait_for(++tick_);
     silent_ = !device_.wait(silent_ ? 0 : kPatienceMs);
     return 0;
   }
   [[nodiscard]] std::uint64_t overruns() const noexcept override { return 0; }
+  [[nodiscard]] std::int64_t start_ns(std::uint64_t tick) const noexcept override {
+    return static_cast<std::int64_t>(tick) * period_ns_;
+  }
+  [[nodiscard]] bool takes_time() const noexcept override { return false; }
 
  private:
   static constexpr int kPatienceMs = 2000;
   DeviceDriver& device_;
+  std::int64_t period_ns_;
   TickGate* gate_;
   std::uint64_t tick_ = 0;
   bool silent_ = false;

@@ -139,7 +139,7 @@ EndReason serve(const Run& run, LoopSignals& signals, CallGuard* calls) {
   RealTimeTicks real_time(kNsPerSecond / run.rate_hz, options.real_time.spin_us * 1000);
   std::optional<TickGate> gate;
   if (!options.until.empty()) gate.emplace(options.until, run.stop);
-  LockStepTicks lock_step(run.device, gate ? &*gate : nullptr);
+  LockStepTicks lock_step(run.device, kNsPerSecond / run.rate_hz, gate ? &*gate : nullptr);
   TickSource& clock = options.virtual_time ? static_cast<TickSource&>(lock_step) : real_time;
   if (calls != nullptr) calls->enter(run.port);
   const EndReason end = run_servo(clock, run.device, run.servo, eyes, run.server,

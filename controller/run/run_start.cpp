@@ -141,7 +141,7 @@ SegmentWriter new_segment(const ControllerOptions& options, const PlannedScene& 
   const SegmentSpec spec = segment_spec(scene, json, report.config_hash);
   check_memory(scene, planned.servo->costs(), plan_segment(spec).header.total_bytes);
   if (!options.emulator_args.empty()) write_new_file(options.emulator_args, hand_lines(scene));
-  return SegmentWriter::create(spec);
+  return SegmentWriter::create(spec, options.virtual_time);
 }
 
 }  // namespace

@@ -51,6 +51,26 @@ TomlNode value_node(const KeyOverride& setting) {
   return node;
 }
 
+/// Whether `key` is a setting below a law, `force.law.NAME`. The law itself knows which it has.
+bool is_law_setting(std::string_view key, SceneKeys keys) {
+  const std::size_t last = key.rfind('.');
+  const auto law = std::ranges::find(keys, key.substr(0, last), &SceneKey::name);
+  if (last == key.npos || last + 1 == key.size() || law == keys.end()) return false;
+  SceneParts parts;
+  return std::holds_alternative<LawChoice*>(law->at(parts));
+}
+
+/// A law as a table: one that is given by its name alone gets the table of that name.
+TomlNode& law_table(TomlNode& law) {
+  if (!std::holds_alternative<std::string>(law.value)) return law;
+  TomlNode name = law;
+  name.key = "name";
+  law.form = TomlNode::Form::table;
+  law.value = {};
+  law.entries = {std::move(name)};
+  return law;
+}
+
 /// The entry of that key; a new one if there is none.
 TomlNode& entry_of(TomlNode& table, std::string_view key) {
   const auto found = std::ranges::find(table.entries, key, &TomlNode::key);
@@ -69,7 +89,7 @@ KeyOverride parse_setting(std::string_view text, SceneKeys keys) {
     refuse(place, ": not KEY=VALUE; write such as force.stiffness_n_per_mm=0.3");
   }
   const std::string_view key = text.substr(0, equals);
-  if (std::ranges::find(keys, key, &SceneKey::name) == keys.end()) {
+  if (std::ranges::find(keys, key, &SceneKey::name) == keys.end() && !is_law_setting(key, keys)) {
     std::vector<std::string_view> known;
     for (const SceneKey& row : keys) known.push_back(row.name);
     const std::string_view near = nearest(key, known);
@@ -82,15 +102,22 @@ KeyOverride parse_setting(std::string_view text, SceneKeys keys) {
 }
 
 void override_keys(std::span<const KeyOverride> settings, TomlNode& root) {
-  for (const KeyOverride& setting : settings) {
+  // A law is there before its settings, in whatever order they come.
+  std::vector<KeyOverride> in_order(settings.begin(), settings.end());
+  std::ranges::stable_partition(in_order, [](const KeyOverride& setting) {
+    return !is_law_setting(setting.key, scene_keys());
+  });
+  for (const KeyOverride& setting : in_order) {
     const std::size_t dot = setting.key.find('.'), last = setting.key.rfind('.');
     const std::string table = setting.key.substr(0, dot), key = setting.key.substr(last + 1);
     const auto put = [&](TomlNode& into) {
-      // `[[volume]]` has a table below it, `pose`.
+      // `[[volume]]` has a table below it, `pose`; a law has its settings.
       TomlNode& below =
-          last == dot ? into : entry_of(into, setting.key.substr(dot + 1, last - dot - 1));
+          last == dot ? into
+                      : law_table(entry_of(into, setting.key.substr(dot + 1, last - dot - 1)));
       TomlNode node = value_node(setting);
       node.key = key;
+      if (below.shown.empty()) below.shown = "{ " + key + " = " + node.shown + " }";
       entry_of(below, key) = std::move(node);
     };
     if (most_of(table) == 0) {

@@ -273,11 +273,11 @@ constexpr SceneKey kKeys[] = {
      "Coulomb coefficient of the tool on the surface", kProxy},
 
     {"force.law", "", at<&ForceSettings::law>, {},
-     "a law in place of the coupling, and its settings (docs/own-law.md)",
+     "a law in place of the coupling, by name or with its settings (docs/own-law.md); \"coupling\": none",
      kProxy, {.default_text = "the coupling of stiffness_n_per_mm and damping_ns_per_mm",
               .json = InJson::if_changed}},
     {"force.stabiliser", "", at<&ForceSettings::stabiliser>, {},
-     "what sees the force after its limits and may change it, and its settings (docs/own-law.md)",
+     "what sees the force after its limits and may change it, by name or with its settings (docs/own-law.md); \"none\"",
      {}, {.default_text = "none", .json = InJson::if_changed}},
 
     {"cut.model", "", at<&CutSettings::model>, one_of(kCutModelWords),
@@ -319,7 +319,7 @@ constexpr SceneKey kKeys[] = {
     {"servo.kernel", "", at<&ServoSettings::kernel>, one_of(kGradientWords),
      "how the gradient of density is estimated"},
     {"servo.velocity", "", at<&ServoSettings::velocity>, {},
-     "the estimator of the hand's velocity, and its settings (docs/own-law.md)",
+     "the estimator of the hand's velocity, by name or with its settings (docs/own-law.md)",
      {}, {.json = InJson::if_changed}},
 
     {"hand.script", "", at<&SceneSettings::hand_script>, {},

@@ -17,6 +17,12 @@
 namespace kerf {
 namespace {
 
+/// What a scene writes for no law of this kind; empty: such a kind has always one by name.
+std::string_view default_law_word(LawKind kind) {
+  if (const LawRow* row = default_law(kind)) return row->name;
+  return kind == LawKind::stabiliser ? "none" : "";
+}
+
 /// Takes the value of a key into its slot, if it is of that type and allowed.
 struct Take {
   const SceneKey& key;
@@ -53,12 +59,17 @@ struct Take {
     }
     *into = Denoise{static_cast<std::int8_t>(passes)};
   }
-  /// The name of a law, and its given settings.
+  /// The name of a law, alone or in a table with its given settings; or the word for the default.
   void operator()(LawChoice* into) const {
-    const TomlNode* name = node.form == TomlNode::Form::table ? node.find("name") : nullptr;
+    const bool is_table = node.form == TomlNode::Form::table;
+    const TomlNode* name = is_table ? node.find("name") : &node;
     const std::string* text = name == nullptr ? nullptr : std::get_if<std::string>(&name->value);
     if (text == nullptr) {
       refuse(place, " does not say which; write { name = \"..\" } and what it sets");
+    }
+    if (!is_table && *text == default_law_word(into->kind)) {
+      *into = {into->kind, "", {}};
+      return;
     }
     const auto place_below = [&](const TomlNode& entry) {
       return place_of(entry, std::string(key.name) + "." + one_line(entry.key), file);
@@ -67,7 +78,9 @@ struct Take {
     try {
       row = &find_law(into->kind, *text);
     } catch (const LawError& error) {
-      refuse(place_below(*name), error.what());
+      if (is_table) refuse(place_below(*name), error.what());
+      const std::string word(default_law_word(into->kind));
+      refuse(place, error.what() + (word.empty() ? "" : "; none: \"" + word + '"'));
     }
     *into = {into->kind, *text, {}};
     for (const TomlNode& entry : node.entries) {

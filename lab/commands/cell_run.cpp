@@ -1,14 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "lab/commands/cell_run.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <csignal>
 #include <map>
 #include <sstream>
+#include <string_view>
 #include <thread>
 
 #include "hil/hil_error.hpp"
 #include "lab/run/child_process.hpp"
+#include "shared/numeric/energy_source.hpp"
+#include "shared/posix/program.hpp"
 #include "shared/text/json.hpp"
 #include "shared/text/text.hpp"
 
@@ -33,14 +37,21 @@ Lines lines_of(const std::string& text) {
   return lines;
 }
 
+/// The last value of a key of the scene in the settings of a run, without quotes; empty: none.
+std::string setting_of(const CellJob& job, const std::string& key) {
+  std::string value;
+  for (const std::string& setting : job.settings) {
+    if (setting.starts_with(key + "=")) value = setting.substr(key.size() + 1);
+  }
+  std::erase_if(value, [](char c) { return c == '"' || c == '\'' || c == ' '; });
+  return value;
+}
+
 /// The device of a run: the job's, or that of its settings.
 std::string device_of(const CellJob& job) {
   if (!job.device.empty()) return job.device;
-  const std::string key = "device.personality=";
-  for (const std::string& setting : job.settings) {
-    if (setting.starts_with(key)) return setting.substr(key.size());
-  }
-  return "omni";
+  const std::string set = setting_of(job, "device.personality");
+  return set.empty() ? "omni" : set;
 }
 
 std::vector<std::string> emulator(const CellJob& job, std::vector<std::string> more) {
@@ -81,27 +92,38 @@ std::string changed_by_faults(const Json& report, const std::string& name) {
   return std::to_string(changed);
 }
 
+/// Work at the device port of one source; the name is `SOURCE_j`.
+std::string energy_of_source(const Json& report, const std::string& name) {
+  constexpr const char* kSources = "energy_by_source_j";
+  if (!report.contains(kSources)) return "";
+  return cell_text(report.at(kSources), name.substr(0, name.rfind('_')));
+}
+
 struct Column {
-  const char* name;
+  std::string name;
   bool of_emulator;
   std::string (*text)(const Json& report, const std::string& name) = cell_text;
 };
-constexpr Column kColumns[] = {
-    {"ticks", false},
-    {"contact_ticks", false},
-    {"shaft_ticks", false},
-    {"stale_ticks", false},
-    {"lost_packets", false},
-    {"peak_force_n", false},
-    {"removed_mm3", false},
-    {"energy_j", false},
-    {"fault_count", false},
-    {"config_hash", false},
-    {"volume_hash", false},
-    {"output_hash", false},
-    {"peak_motor_force_n", true},
-    {"injected", true, changed_by_faults},
-};
+
+const std::vector<Column>& columns() {
+  static const std::vector<Column> list = [] {
+    std::vector<Column> all{
+        {"ticks", false},       {"contact_ticks", false}, {"shaft_ticks", false},
+        {"stale_ticks", false}, {"lost_packets", false},  {"peak_force_n", false},
+        {"removed_mm3", false}, {"energy_j", false},      {"port_minimum_j", false},
+    };
+    for (const std::string_view source : kEnergySourceNames) {
+      all.push_back({std::string(source) + "_j", false, energy_of_source});
+    }
+    const std::vector<Column> rest{
+        {"fault_count", false}, {"config_hash", false},       {"volume_hash", false},
+        {"output_hash", false}, {"peak_motor_force_n", true}, {"injected", true, changed_by_faults},
+    };
+    all.insert(all.end(), rest.begin(), rest.end());
+    return all;
+  }();
+  return list;
+}
 
 CellResult result_of(int exit, const std::filesystem::path& folder, const std::string& last_line) {
   CellResult result{exit, {}, exit == 0 ? "" : last_line};
@@ -111,7 +133,7 @@ CellResult result_of(int exit, const std::filesystem::path& folder, const std::s
       return text.empty() ? Json(Json::Members{}) : Json::parse(text);
     };
     const Json ours = report("report.json"), theirs = report("emulator.json");
-    for (const Column& column : kColumns) {
+    for (const Column& column : columns()) {
       result.values.push_back(column.text(column.of_emulator ? theirs : ours, column.name));
     }
     if (exit == 1) {
@@ -119,7 +141,7 @@ CellResult result_of(int exit, const std::filesystem::path& folder, const std::s
       for (const Json& fault : ours.at("faults")) result.message += "; " + cell_text(fault, "name");
     }
   } catch (const JsonError&) {
-    result.values.assign(std::size(kColumns), "");
+    result.values.assign(columns().size(), "");
     if (result.message.empty()) result.message = "report.json: cannot be read; look at the disk";
   }
   if (exit != 0 && result.message.empty()) {
@@ -134,7 +156,7 @@ CellResult result_of(int exit, const std::filesystem::path& folder, const std::s
 const std::vector<std::string>& result_columns() {
   static const std::vector<std::string> names = [] {
     std::vector<std::string> list;
-    for (const Column& column : kColumns) list.emplace_back(column.name);
+    for (const Column& column : columns()) list.push_back(column.name);
     return list;
   }();
   return names;
@@ -162,11 +184,14 @@ std::optional<CellResult> run_cell(const CellJob& job, const std::filesystem::pa
   }
   for (const std::string& word :
        {std::string("--device"), device_of(job), std::string("--port"), "socket:" + at("device"),
-        std::string("--torque-scale"), lines_of(text_in(folder / "describe"))["torque_scale"],
         std::string("--seconds"), number_text(job.seconds), std::string("--name"), job.name,
         std::string("--virtual"), std::string("--emulator-args"), at("told"),
         std::string("--report"), at("report.json")}) {
     servo.push_back(word);
+  }
+  if (setting_of(job, "device.torque_scale").empty()) {
+    servo.emplace_back("--torque-scale");
+    servo.push_back(lines_of(text_in(folder / "describe"))["torque_scale"]);
   }
   Child controller(servo, folder / "controller");
   while (!std::filesystem::exists(folder / "told")) {
@@ -176,9 +201,11 @@ std::optional<CellResult> run_cell(const CellJob& job, const std::filesystem::pa
     std::this_thread::sleep_for(kLook);
   }
   Lines told = lines_of(text_in(folder / "told"));
-  Child device(emulator(job, {"--front", "socket", "--socket", at("device"), "--hand",
-                              told["hand_script"], "--unit-mm", told["hand_unit_mm"], "--lockstep",
-                              "--rate", told["rate_hz"], "--report", at("emulator.json")}),
+  std::string& hand = told["hand_script"];
+  if (hand.empty()) hand = find_data_file("scenes/hands/cut_cavity.toml");  // as the demo
+  Child device(emulator(job, {"--front", "socket", "--socket", at("device"), "--hand", hand,
+                              "--unit-mm", told["hand_unit_mm"], "--lockstep", "--rate",
+                              told["rate_hz"], "--report", at("emulator.json")}),
                folder / "emulator");
   const auto end = Clock::now() + kLongestRun;
   while (!controller.ended() && device.ended().value_or(0) == 0 && Clock::now() < end) {

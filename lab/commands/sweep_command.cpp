@@ -56,8 +56,8 @@ struct SweepRequest {
       std::string option = "--" + axes[i].key.substr(axes[i].key.find('.') + 1);
       std::ranges::replace(option, '_', '-');
       if (values[i] == "false") continue;
+      if (values[i] != "true") option += "=" + values[i];  // one word: -1 is no option
       job.emulator_options.push_back(option);
-      if (values[i] != "true") job.emulator_options.push_back(values[i]);
     }
     return job;
   }

@@ -104,8 +104,15 @@ PrivateFolder::~PrivateFolder() {
 }
 
 std::string program_beside(const char* name) {
-  return std::filesystem::read_symlink("/proc/self/exe")
-      .replace_filename(std::string("kerf-") + name);
+  namespace fs = std::filesystem;
+  const fs::path own = fs::read_symlink("/proc/self/exe");
+  const std::string stem = own.filename().string();
+  const std::size_t dash = stem.rfind('-');
+  const std::string prefix = dash == stem.npos ? "kerf" : stem.substr(0, dash);
+  const fs::path beside = own.parent_path() / (prefix + "-" + name);
+  const fs::path below = own.parent_path() / prefix / (std::string("kerf-") + name);
+  std::error_code ignored;
+  return !fs::exists(beside, ignored) && fs::exists(below, ignored) ? below : beside;
 }
 
 }  // namespace kerf::sweep

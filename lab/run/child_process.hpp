@@ -47,7 +47,8 @@ class PrivateFolder {
   std::filesystem::path path_;
 };
 
-/// Path of a program of kerf, by its short name: it lies beside this one.
+/// Path of a program of kerf, by its short name: it lies beside this one, and its name begins as
+/// this one's, or it is in the folder of that name that `kerf_programs` makes (docs/own-law.md).
 [[nodiscard]] std::string program_beside(const char* name);
 
 }  // namespace kerf::sweep

@@ -5,6 +5,7 @@
 #include <charconv>
 #include <cmath>
 #include <cstdio>
+#include <cstring>
 #include <iterator>
 #include <optional>
 #include <set>
@@ -13,6 +14,7 @@
 #include "controller/scene/scene_file.hpp"
 #include "hil/hil_error.hpp"
 #include "shared/text/text.hpp"
+#include "shared/text/toml.hpp"
 
 namespace kerf::grid {
 namespace {
@@ -45,26 +47,25 @@ std::optional<std::vector<std::string>> range_of(std::string_view text, std::str
   return list;
 }
 
-/// A value without characters that TOML does not read: 1000 and +1e3, "a" and a, [0,1] and [0, 1]
-/// are the same.
-std::string meaning_of(const std::string& value) {
-  std::string meaning, word;
-  const auto end_word = [&] {
-    const auto number = number_in(word.starts_with('+') ? word.substr(1) : word);
-    meaning += number ? number_text(*number == 0 ? 0 : *number) : word;  // -0 is 0
-    word.clear();
-  };
-  for (const char c : value) {
-    if (c == ' ' || c == '\t' || c == '"') continue;
-    if (std::string_view("[]{},=").find(c) == std::string_view::npos) {
-      word += c;
-      continue;
-    }
-    end_word();
-    meaning += c;
-  }
-  end_word();
+std::string meaning_of(const TomlNode& node) {
+  if (const auto number = node.number()) return number_text(*number == 0 ? 0 : *number);  // no -0
+  if (node.form == TomlNode::Form::value) return written(node.value);
+  std::vector<std::string> parts;
+  for (const TomlNode& entry : node.entries) parts.push_back(entry.key + "=" + meaning_of(entry));
+  if (node.form == TomlNode::Form::table) std::ranges::sort(parts);
+  std::string meaning = "[";
+  for (const std::string& part : parts) meaning += part + ",";
   return meaning;
+}
+
+/// Equal for values that are the same in TOML: 1000 and +1e3, "a" and a, [0,1] and [0, 1]. As for
+/// the scene, what TOML cannot read is a text.
+std::string meaning_of(const std::string& value) {
+  try {
+    return meaning_of(parse_toml("v = " + value).entries.at(0));
+  } catch (const TomlError&) {
+    return written(value);
+  }
 }
 
 void refuse_twins(std::string_view text, const std::vector<std::string>& values) {
@@ -91,17 +92,32 @@ void refuse_own_option(std::string_view text, std::string option) {
 }  // namespace
 
 std::vector<std::string> split(std::string_view text, char separator) {
+  // Quotes and brackets are those of TOML where a value of TOML begins: a bare text may hold both.
   std::vector<std::string> parts(1);
   int depth = 0;
-  bool quoted = false;
-  for (const char c : text) {
-    quoted = quoted != (c == '"');
-    depth += c == '[' || c == '{' ? 1 : c == ']' || c == '}' ? -1 : 0;
-    if (c == separator && depth == 0 && !quoted) {
-      parts.emplace_back();
-    } else {
-      parts.back() += c;
+  char quote = 0, before = separator;  // the last character that is no space
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const char c = text[i];
+    if (quote != 0) {
+      parts.back() += before = c;
+      if (c == '\\' && quote == '"' && i + 1 < text.size()) {
+        parts.back() += text[++i];
+      } else if (c == quote) {
+        quote = 0;
+      }
+      continue;
     }
+    if (c == separator && depth == 0) {
+      parts.emplace_back();
+      before = separator;
+      continue;
+    }
+    const bool begins = before == separator || (depth > 0 && std::strchr("[{=,", before));
+    if (begins && (c == '"' || c == '\'')) quote = c;
+    if ((c == '[' || c == '{') && (begins || depth > 0)) ++depth;
+    if ((c == ']' || c == '}') && depth > 0) --depth;
+    parts.back() += c;
+    if (c != ' ' && c != '\t') before = c;
   }
   return parts;
 }

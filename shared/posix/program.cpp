@@ -43,7 +43,7 @@ void check_stack() {
 
 int run_program(const char* program, const std::function<int()>& work) {
   keep_standard_numbers();
-  umask(S_IRWXG | S_IRWXO);
+  umask(umask(S_IRWXG | S_IRWXO) & (S_IRWXG | S_IRWXO));  // the user keeps all rights of his own
   std::signal(SIGXFSZ, SIG_IGN);
   try {
     check_stack();

@@ -18,8 +18,9 @@ inline constexpr unsigned long long kLeastStackBytes = 1 << 20;
 
 /// The body of every `main` of kerf: runs `work` and returns its exit code. Around it:
 /// - no file or socket that it opens becomes standard input, output or error;
-/// - its files and sockets get mode 0600, its folders 0700, whatever the umask was: they may hold
-///   data of patients;
+/// - its files and folders get the rights that the umask leaves, and all of the user's own;
+/// sockets,
+///   private folders and what lies in these belong to the user alone;
 /// - a file that may not grow any more (`ulimit -f`) is an error of the write, not a signal;
 /// - a stack of less than kLeastStackBytes is refused, because it would end in a crash;
 /// - an exception becomes one line on standard error, after `program`, and exit code 2;

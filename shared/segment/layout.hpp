@@ -67,7 +67,7 @@ struct SegmentHeader {
   std::uint64_t session_id;  ///< random; a restarted controller has another
   std::uint64_t total_bytes;
   std::uint64_t config_hash;
-  std::uint64_t start_ns;  ///< CLOCK_MONOTONIC when the segment was made
+  std::uint64_t start_ns;  ///< CLOCK_MONOTONIC when the segment was made; 0 in lock-step
   std::uint32_t tick_ns;
   std::uint32_t volume_count;
   std::uint64_t off_state;

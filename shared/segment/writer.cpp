@@ -71,7 +71,7 @@ struct SegmentWriter::State {
   }
 };
 
-SegmentWriter SegmentWriter::create(const SegmentSpec& spec) {
+SegmentWriter SegmentWriter::create(const SegmentSpec& spec, bool virtual_time) {
   SegmentPlan plan = plan_segment(spec);
   SegmentHeader& header = plan.header;
   auto state = std::make_unique<State>(State{
@@ -85,7 +85,7 @@ SegmentWriter SegmentWriter::create(const SegmentSpec& spec) {
   });
   std::byte* const base = state->memory.bytes().data();
   header.session_id = random_session_id();
-  header.start_ns = state->last_end_ns;
+  header.start_ns = virtual_time ? 0 : state->last_end_ns;
 
   for (std::size_t i = 0; i < plan.volumes.size(); ++i) {
     const SegmentVolumeSpec& source = spec.volumes[i];
@@ -115,7 +115,7 @@ SegmentWriter SegmentWriter::create(const SegmentSpec& spec) {
                   .mask = header.dirty_slots - 1};
 
   header.epoch = stable_version(0);
-  header.heartbeat_ns = header.start_ns;
+  header.heartbeat_ns = state->last_end_ns;
   std::memcpy(base, &header, sizeof header);
   words::word(base).store(kSegmentMagic, std::memory_order_release);
   state->header = header;

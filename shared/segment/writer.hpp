@@ -27,8 +27,8 @@ inline constexpr std::uint32_t kMaxBricksPerTick = 512;
 class SegmentWriter {
  public:
   /// Throws `SegmentError` if a volume is empty, too large or does not match its spans, or if
-  /// memory cannot be allocated.
-  [[nodiscard]] static SegmentWriter create(const SegmentSpec& spec);
+  /// memory cannot be allocated. `virtual_time`: the run has no clock, and begins at 0 ns.
+  [[nodiscard]] static SegmentWriter create(const SegmentSpec& spec, bool virtual_time = false);
 
   SegmentWriter(SegmentWriter&&) noexcept;
   SegmentWriter& operator=(SegmentWriter&&) noexcept;
@@ -56,6 +56,7 @@ class SegmentWriter {
 
   /// *Servo.* Copies the changed bricks, each once, and closes the tick. While bricks wait, the
   /// epoch stays odd: readers then know that the mirror is not yet the volume of one tick.
+  /// `now_ns`: CLOCK_MONOTONIC, in lock-step too: the heartbeat.
   void end_tick(std::uint64_t now_ns) noexcept;
 
   /// Any one thread at a time.

@@ -2,12 +2,19 @@
 #include <csignal>
 #include <map>
 #include <sstream>
+#include <type_traits>
+#include <variant>
 
 #include <doctest/doctest.h>
 
+#include "controller/scene/scene_file.hpp"
+#include "controller/scene/scene_keys.hpp"
 #include "hil/hil_error.hpp"
+#include "lab/commands/cell_run.hpp"
 #include "lab/run/grid_axes.hpp"
 #include "lab/run/grid_run.hpp"
+#include "shared/numeric/energy_source.hpp"
+#include "shared/text/text.hpp"
 #include "tests/lab/lab_line.hpp"
 #include "tests/programs/pair.hpp"
 #include "tests/support/errors.hpp"
@@ -96,6 +103,135 @@ TEST_CASE("an axis is a range with both ends, or a list; the last axis changes f
   CHECK(values_of(axes, 0) == std::vector<std::string>{"1", "7"});
   CHECK(values_of(axes, 1) == std::vector<std::string>{"1", "8"});
   CHECK(values_of(axes, 5) == std::vector<std::string>{"3", "8"});
+}
+
+namespace {
+
+/// Values that a scene may give to a key: ends of its range, words, texts, lists, laws.
+std::vector<std::string> values_of_key(const kerf::SceneKey& key) {
+  kerf::SceneParts parts;
+  std::vector<std::string> values;
+  const auto [lo, hi] = key.allowed.range;
+  const std::string low = kerf::number_text(lo), high = kerf::number_text(hi);
+  for (const std::string_view word : key.allowed.words) values.emplace_back(word);
+  const auto list = [&](std::size_t count) {
+    std::string up = "[", down = "[ ";
+    for (std::size_t i = 0; i < count; ++i) {
+      up += (i > 0 ? "," : "") + (i == 1 ? high : low);
+      down += (i > 0 ? ", " : "") + (i == 1 ? low : high);
+    }
+    values.insert(values.end(), {up + "]", down + " ]"});
+    if (key.options.one_for_all) values.push_back(high);
+  };
+  std::visit(
+      [&](auto* slot) {
+        using T = std::remove_pointer_t<decltype(slot)>;
+        using std::is_same_v;
+        if constexpr (is_same_v<T, bool>) {
+          values = {"true", "false"};
+        } else if constexpr (is_same_v<T, std::string>) {
+          if (!key.allowed.words.empty()) return;
+          values = {"plain", "two words", "twowords", "\"a, b\"", "'c, \"d\"'", "e:f",
+                    "1/T",   "\"1:2:3\"", "it's",     "x]",       "[y",         "\"q\\\"r,s\""};
+        } else if constexpr (is_same_v<T, kerf::LawChoice>) {
+          if (slot->kind == kerf::LawKind::force) values = {"coupling"};
+          if (slot->kind == kerf::LawKind::velocity)
+            values = {"foaw", "{name=\"difference\",tau_ms=1}",
+                      "{ name = 'difference', tau_ms = 2 }"};
+          if (slot->kind == kerf::LawKind::stabiliser)
+            values = {"none", "passivity", "{ name = \"energy_bounding\" }"};
+        } else if constexpr (is_same_v<T, std::array<double, 3>> ||
+                             is_same_v<T, std::optional<std::array<double, 3>>> ||
+                             is_same_v<T, std::optional<kerf::VoxelGrid>>) {
+          list(3);
+        } else if constexpr (is_same_v<T, std::optional<std::array<double, 2>>>) {
+          list(2);
+        } else if constexpr (is_same_v<T, std::optional<std::array<double, 4>>>) {
+          list(4);
+        } else if (lo < hi) {
+          values.insert(values.end(), {low, high});
+        }
+      },
+      key.at(parts));
+  return values;
+}
+
+}  // namespace
+
+TEST_CASE("an axis takes every value of every key that a scene takes, alone and in a list") {
+  for (const kerf::SceneKey& key : kerf::scene_keys()) {
+    const std::string name(key.name);
+    CAPTURE(name);
+    const std::vector<std::string> values = values_of_key(key);
+    REQUIRE_FALSE(values.empty());
+    std::string all;
+    for (const std::string& value : values) all += (all.empty() ? "" : ",") + value;
+    // A bracket that opens a bare text is that of a list: its commas are not between values.
+    const bool is_text = std::ranges::find(values, "[y") != values.end();
+    if (is_text) all.replace(all.find("[y"), 2, "\"[y\"");
+    CAPTURE(all);
+    CHECK(parse_axis(name + "=" + all).values.size() == values.size());
+    for (const std::string& value : values) {
+      CAPTURE(value);
+      CHECK(parse_axis(name + "=" + value).values == std::vector<std::string>{value});
+    }
+  }
+  CHECK(parse_axis("force.stabiliser=none,passivity").values.size() == 2);
+}
+
+TEST_CASE("the numbers of a law are axes below its key, whichever law it is") {
+  CHECK(parse_axis("force.law.hardening_n_per_mm3=0:1:3").values ==
+        std::vector<std::string>{"0", "0.5", "1"});
+  CHECK(parse_axis("servo.velocity.tau_ms=1,2").key == "servo.velocity.tau_ms");
+  for (const char* const text : {"force.law.=1", "force.law.a.b=1", "force.friction.a=1"}) {
+    CHECK(refusal_of(text).starts_with("--set "));
+  }
+  const std::string scene =
+      "[[volume]]\nfile = \"phantom\"\n[[tool]]\nshape = \"ball\"\nsize_vox = 8\n";
+  const auto tau_ms = [&](const std::vector<std::string>& texts) {
+    std::vector<kerf::KeyOverride> settings;
+    for (const std::string& text : texts) settings.push_back(kerf::parse_setting(text));
+    const kerf::Scene read = kerf::parse_scene(scene, "scene.toml", kerf::scene_keys(), settings);
+    return read.servo.velocity.settings.at(0).second;
+  };
+  CHECK(tau_ms({"servo.velocity=difference", "servo.velocity.tau_ms=3"}) == 3);
+  CHECK(tau_ms({"servo.velocity.tau_ms=4", "servo.velocity={name=\"difference\",tau_ms=1}"}) == 4);
+  CHECK(kerf::test::error_of([&] {
+          tau_ms({"servo.velocity.tau_ms=4"});
+        }).find("--set servo.velocity = { tau_ms = 4 } does not say which") != std::string::npos);
+  CHECK(kerf::test::error_of([&] {
+          tau_ms({"servo.velocity.taus=4", "servo.velocity=difference"});
+        }).find("taus") != std::string::npos);
+}
+
+TEST_CASE("a sweep takes laws by name, and has energy by source and the least energy") {
+  const TemporaryFolder folder;
+  Process process({kBin + "/kerf-lab", "sweep", kScenes + "/touch.toml", "--set",
+                   "force.stabiliser=none,passivity,{name=\"energy_bounding\"}", "--seconds", "3",
+                   "--out", (folder / "out").string()},
+                  folder / "log");
+  CHECK(process.wait() == 0);
+  const std::string table = text_of(folder / "out/sweep.csv");
+  for (int run = 0; run < 3; ++run) {
+    const auto row = row_of(table, run);
+    CHECK(row.at("exit") == "0");
+    CHECK(std::stod(row.at("port_minimum_j")) <= 0);
+    double sum_j = 0;
+    for (const std::string_view source : kerf::kEnergySourceNames) {
+      sum_j += std::stod(row.at(std::string(source) + "_j"));
+    }
+    CHECK(sum_j == doctest::Approx(std::stod(row.at("energy_j"))));
+  }
+}
+
+TEST_CASE("the page of sweeps has the columns of the table, in their order") {
+  const std::string page = text_of(std::filesystem::path(kScenes) / "../docs/scenes.md");
+  std::size_t at = page.find("| `exit` |");
+  for (const std::string& column : kerf::sweep::result_columns()) {
+    CAPTURE(column);
+    at = page.find("`" + column + "`", at);
+    REQUIRE(at != std::string::npos);
+  }
 }
 
 TEST_CASE("what is no axis is refused in one line that names it") {

@@ -11,6 +11,7 @@
 
 #include <doctest/doctest.h>
 
+#include "record/tick_log.hpp"
 #include "shared/numeric/fnv1a.hpp"
 #include "shared/segment/connection.hpp"
 #include "shared/text/text.hpp"
@@ -58,6 +59,60 @@ TEST_CASE("virtual time: the same demo twice gives the same volume and output ha
   CHECK(reports[0]["allocations"] == 0);
   CHECK(reports[0]["volume_hash"] == reports[1]["volume_hash"]);
   CHECK(reports[0]["output_hash"] == reports[1]["output_hash"]);
+}
+
+TEST_CASE(
+    "virtual time: the log of the same demo twice has the same bytes, its time is the servo's") {
+  std::string before;
+  for (int run = 0; run < 2; ++run) {
+    Pair pair;
+    Process recorder(
+        {kBin + "/kerf-recorder", "--name", pair.name, "--out", (pair.folder / "log").string()},
+        pair.folder / "recorder.log");
+    pair.scene = "touch.toml";
+    pair.start("touch.toml", {"--virtual", "--seconds", "2"}, {"--lockstep"});
+    REQUIRE(pair.controller->wait() == 0);
+    REQUIRE(recorder.wait() == 0);
+    const auto manifest = kerf::test::read_json_file(pair.folder / "log/manifest.json");
+    CHECK(manifest["start_ns"] == 0);
+    CHECK(manifest["lost_ticks"] == 0);
+    const std::string log = text_of(pair.folder / "log/ticks.npy");
+    CHECK((before.empty() || log == before));
+    before = log;
+    kerf::TickLogReader ticks(pair.folder / "log/ticks.npy");
+    CHECK(ticks.rows() > 2000);
+    ticks.for_each([](const kerf::TickRecord& tick) {
+      if (tick.start_ns != tick.tick * 1'000'000 || tick.execution_ns != 0)
+        FAIL("tick ", tick.tick);
+    });
+  }
+}
+
+TEST_CASE("virtual time: a stiffer tooth is pressed less deep, as the tutorial has it") {
+  const std::string page = text_of(std::filesystem::path(kScenes) / "../docs/tutorial.md");
+  for (const char* const stiffness : {"0.2", "0.6"}) {
+    Pair pair;
+    Process recorder(
+        {kBin + "/kerf-recorder", "--name", pair.name, "--out", (pair.folder / "log").string()},
+        pair.folder / "recorder.log");
+    pair.scene = "touch.toml";
+    pair.start("touch.toml",
+               {"--virtual", "--seconds", "4", "--device", "omni", "--rate", "1000", "--set",
+                "force.stiffness_n_per_mm=" + std::string(stiffness)},
+               {"--lockstep", "--rate", "1000", "--unit-mm", "1"});
+    REQUIRE(pair.controller->wait() == 0);
+    REQUIRE(recorder.wait() == 0);
+    double peak_n = 0, deepest_mm = 0;
+    kerf::TickLogReader(pair.folder / "log/ticks.npy").for_each([&](const kerf::TickRecord& tick) {
+      peak_n = std::max(peak_n, kerf::magnitude(tick.commanded_force_n));
+      deepest_mm = std::max(deepest_mm, double{tick.penetration_mm});
+    });
+    for (const std::string& figure :
+         {kerf::format("%.2f N", peak_n), kerf::format("%.2f mm", deepest_mm)}) {
+      CAPTURE(figure);
+      CHECK(page.find(figure) != std::string::npos);
+    }
+  }
 }
 
 TEST_CASE("virtual time: faults keep packets back, and the same run gives the same hashes") {

@@ -83,15 +83,35 @@ TEST_CASE("a recording is never overwritten") {
   CHECK(TickLogReader(folder / "ticks.npy").rows() == 3);
 }
 
-TEST_CASE("a log that is cut, changed, foreign or missing is refused in one line") {
+TEST_CASE("a log that was cut has the rows before the cut, whatever the byte") {
+  const RuntimeFolder folder;
+  const std::filesystem::path path = folder / "ticks.npy";
+  write_rows(path, 100);
+  for (std::uintmax_t bytes = kTickLogHeaderBytes + 100 * sizeof(TickRecord);
+       bytes >= kTickLogHeaderBytes; bytes -= 7) {
+    CAPTURE(bytes);
+    std::filesystem::resize_file(path, bytes);
+    TickLogReader log(path);
+    CHECK(log.rows() == (bytes - kTickLogHeaderBytes) / sizeof(TickRecord));
+    CHECK(log.counted() == 100);
+    std::uint64_t rows = 0;
+    log.for_each([&](const TickRecord&) { ++rows; });
+    CHECK(rows == log.rows());
+  }
+  for (std::uintmax_t bytes = kTickLogHeaderBytes - 1; bytes > 0; bytes /= 2) {
+    std::filesystem::resize_file(path, bytes);
+    CHECK(error_of([&] { TickLogReader cut(path); }).find("cut before its first tick") !=
+          std::string::npos);
+  }
+}
+
+TEST_CASE("a log that is changed, foreign or missing is refused in one line") {
   const RuntimeFolder folder;
   const std::filesystem::path path = folder / "ticks.npy";
   const auto read = [&] { TickLogReader(path).for_each([](const TickRecord&) {}); };
   CHECK(error_of(read).find("cannot be read") != std::string::npos);
   write_rows(path, 100);
   CHECK(error_of(read).empty());
-  std::filesystem::resize_file(path, kTickLogHeaderBytes + 99 * sizeof(TickRecord) + 463);
-  CHECK(error_of(read).find("99 rows of 100") != std::string::npos);
   std::filesystem::remove(path);
   write_rows(path, 100);
   {
@@ -100,7 +120,7 @@ TEST_CASE("a log that is cut, changed, foreign or missing is refused in one line
     file.put('!');
   }
   CHECK(error_of(read).find("row 42 has a wrong checksum") != std::string::npos);
-  for (const char* const text : {"", "hello", "\x93NUMPY"}) {
+  for (const char* const text : {"hello", "\x93NUMPX"}) {
     std::ofstream(path, std::ios::trunc) << text;
     CHECK(error_of(read).find("not a tick log") != std::string::npos);
   }

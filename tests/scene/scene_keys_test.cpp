@@ -143,8 +143,13 @@ struct Samples {
   void operator()(const LawChoice* law) {
     for (const LawRow* known : known_laws(law->kind)) {
       right.push_back("{ name = " + in_quotes(known->name) + " }");
+      right.push_back(in_quotes(known->name));
     }
-    for (const char* value : {"\"zzz\"", "1", "[]", "{}", "{ name = 1 }", "{ tau_ms = 1 }"}) {
+    if (law->kind != LawKind::velocity) {
+      right.push_back(law->kind == LawKind::force ? "\"coupling\"" : "\"none\"");
+    }
+    wrong.push_back({"\"zzz\"", " is unknown"});
+    for (const char* value : {"1", "[]", "{}", "{ name = 1 }", "{ tau_ms = 1 }"}) {
       wrong.push_back({value, " does not say which; write { name = "});
     }
   }

@@ -185,6 +185,7 @@ void Session::read_removals() {
 // there, its start.
 std::uint64_t Session::began_ns(const DirtyRecord& removal) const {
   const SegmentReader& reader = connection_.reader();
+  if (reader.info().start_ns == 0) return removal.time_ns;  // lock-step: ticks have no such time
   const std::uint64_t head = reader.state_head();
   TickRecord state;
   if (head == 0 || reader.state_at(head - 1, state) != ReadState::ok) return removal.time_ns;
@@ -264,7 +265,11 @@ double Session::servo_s() const noexcept {
 
 double Session::record_age_s() const noexcept {
   constexpr double kSPerNs = 1e-9;
-  return latest_ ? (now_ns() - static_cast<double>(latest_->start_ns)) * kSPerNs : 0.0;
+  if (!latest_) return 0.0;
+  const SegmentReader& reader = connection_.reader();
+  const bool is_lockstep = reader.info().start_ns == 0;
+  const std::uint64_t began_ns = is_lockstep ? reader.heartbeat_ns() : latest_->start_ns;
+  return (now_ns() - static_cast<double>(began_ns)) * kSPerNs;
 }
 
 bool Session::ended() const noexcept {
