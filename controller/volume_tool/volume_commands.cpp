@@ -56,9 +56,13 @@ std::array<double, 3> spacing_from(const std::string& option, const std::string&
 void SpacingOptions::add_to(Arguments& command) {
   Option fills = command.option("--spacing", spacing, "mm per voxel, if the file has none");
   fills.shown_as("A[,B,C]");
-  command.option("--override-spacing", override_spacing, "mm per voxel, in place of the file's")
-      .shown_as("A[,B,C]")
-      .excludes(fills);
+  add_override_to(command).excludes(fills);
+}
+
+Option SpacingOptions::add_override_to(Arguments& command) {
+  return command
+      .option("--override-spacing", override_spacing, "mm per voxel, in place of the file's")
+      .shown_as("A[,B,C]");
 }
 
 void SpacingOptions::set(ReadOptions& options) const {
@@ -244,7 +248,11 @@ struct Source {
     command.option("file", file, "volume file, or folder with a DICOM series")
         .required()
         .shown_as("FILE");
-    if (with_spacing) spacing.add_to(command);
+    if (with_spacing) {
+      spacing.add_to(command);
+    } else {
+      spacing.add_override_to(command);
+    }
     command.option("--window", window, "values that become density 0 and 1 (default: all)")
         .shown_as("LO,HI");
     command.option("--read-seconds", cpu_s, "CPU time that parsing a file may take")
@@ -261,9 +269,14 @@ struct Source {
   [[nodiscard]] Window window_for(const SourceVolume& source) const {
     return window.empty() ? range_window(source) : window_from(window);
   }
-  /// Prints the note of the reading, if there is one.
-  [[nodiscard]] VolumeImage image(std::ostream& out) const {
-    const SourceVolume source = read();
+  /// Prints the note of the reading, if there is one. `spacing_is_new`: of the output, in mm.
+  [[nodiscard]] VolumeImage image(std::ostream& out, bool spacing_is_new = false) const {
+    const SourceVolume source = read(spacing_is_new);
+    if (source.spacing_known != kAllAxes) {
+      throw LoadError(file +
+                      ": spacing is not in the file; give it with --override-spacing x,y,z "
+                      "(mm), since --spacing is the new one");
+    }
     if (!source.note.empty()) out << escaped(file) << ": " << source.note << '\n';
     VolumeImage image = apply_window(source, window_for(source));
     read_labels_beside(file, image, cpu_s);
@@ -357,8 +370,9 @@ struct Commands {
           iso < 0.0 ? otsu_threshold(image) : static_cast<Density>(std::lround(iso * kDensityMax));
       target.write(crop_to_solid(image, threshold, guard), out);
     } else if (resample.chosen()) {
-      target.write(kerf::resample(source.image(out), spacing_from("--spacing", resample_spacing)),
-                   out);
+      target.write(
+          kerf::resample(source.image(out, true), spacing_from("--spacing", resample_spacing)),
+          out);
     } else {
       PhantomSpec spec;
       spec.shape = shape;

@@ -33,6 +33,8 @@ struct SpacingOptions {
   std::string spacing, override_spacing;
 
   void add_to(Arguments& command);
+  /// Only the one that replaces the file's; the other means something else there.
+  Option add_override_to(Arguments& command);
   /// Throws as the functions above.
   void set(ReadOptions& options) const;
   [[nodiscard]] bool given() const { return !spacing.empty() || !override_spacing.empty(); }

@@ -143,6 +143,9 @@ TEST_CASE("a spacing that is the file's but for rounding is accepted, and the fi
   CHECK(v.spacing_mm == Three{0.48828125, 1, 1});
   CHECK(has(v.note, "spacing 0.488 mm along x is given, rounded; the file's 0.48828125 is used"));
   CHECK(read("0.488281", 0.48828125).spacing_mm[0] == 0.488281);
+  CHECK(read("0.7000000000000001", 0.7).note.empty());  // noise of floats is no rounding
+  CHECK(read("0.699999988079071", 0.7).note.empty());
+  CHECK_THROWS_AS(static_cast<void>(read("0.70001", 0.7)), LoadError);
   CHECK_THROWS_AS(static_cast<void>(read("0.48828125", 0.487)), LoadError);
   CHECK_THROWS_AS(static_cast<void>(read("0.488", 0.5)), LoadError);  // another value
   CHECK_THROWS_AS(static_cast<void>(read("1", 1.0001)), LoadError);

@@ -122,6 +122,30 @@ TEST_CASE("the phantom and its labels survive phantom, crop and resample") {
   CHECK(fine.labels.size() == fine.density.size());
 }
 
+TEST_CASE("each command takes a spacing in place of the file's, and prints that it does") {
+  const TemporaryFolder folder;
+  const std::string blob = blob_file(folder), out = (folder / "out.nrrd").string();
+  for (const std::vector<std::string>& arguments :
+       {std::vector<std::string>{"info", blob},
+        {"crop", blob, "--out", out},
+        {"resample", blob, "--spacing", "1", "--out", out},
+        {"import", blob, "--out", out}}) {
+    CAPTURE(arguments.front());
+    std::vector<std::string> all = arguments;
+    for (const char* more : {"--override-spacing", "0.5"}) all.emplace_back(more);
+    if (arguments.front() != "info") all.emplace_back("--force");
+    const Outcome done = run(all);
+    CAPTURE(done.err);
+    CHECK(done.code == 0);
+    CHECK(has(done.out, "OVERRIDDEN: spacing 0.5 x 0.5 x 0.5 mm in place of the file's"));
+  }
+  const auto unspaced =
+      folder.write("u.nrrd", nrrd("uint8", "") + "\n" + bytes_of(counting<std::uint8_t>()));
+  const Outcome asked = run(
+      {"resample", unspaced.string(), "--spacing", "1", "--out", (folder / "new.nrrd").string()});
+  CHECK(has(asked.err, "give it with --override-spacing"));
+}
+
 TEST_CASE("an import leaves a scene that runs, or nothing") {
   const TemporaryFolder folder;
   const std::string blob = blob_file(folder);  // smaller than the usual tools

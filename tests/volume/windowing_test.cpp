@@ -215,6 +215,35 @@ TEST_CASE("labels that do not fit the volume beside them are refused") {
   VolumeImage other = air(kSmall);
   CHECK_THROWS_WITH_AS(read_labels_beside(folder / "tooth.nrrd", other),
                        doctest::Contains("labels do not fit"), LoadError);
+  // Halves of labels would become other labels.
+  static_cast<void>(
+      folder.write("float-labels.nrrd", nrrd("float", "endian: little\n" + kSpacings) + "\n" +
+                                            bytes_of(std::vector<float>(60, 1.5F))));
+  CHECK_THROWS_WITH_AS(read_labels_beside(folder / "float.nrrd", other),
+                       doctest::Contains("whole values"), LoadError);
+}
+
+TEST_CASE("labels of another frame than the volume's are refused, those without a frame are not") {
+  const TemporaryFolder folder;
+  VolumeImage image = air(kSmall);
+  image.spacing_mm = {1, 2, 3};
+  image.origin_mm = {10, 20, 30};
+  image.direction = {0, -1, 0, 1, 0, 0, 0, 0, 1};
+  image.labels.assign(60, 1);
+  write_volume(image, folder / "tooth.nrrd");
+  read_labels_beside(folder / "tooth.nrrd", image);
+  VolumeImage moved = image, mirrored = image;
+  moved.origin_mm[2] += 0.4;  // less than half a voxel
+  CHECK_NOTHROW(read_labels_beside(folder / "tooth.nrrd", moved));
+  moved.origin_mm[2] += 0.2;
+  mirrored.direction = {0, 1, 0, 1, 0, 0, 0, 0, -1};
+  for (VolumeImage* other : {&moved, &mirrored}) {
+    CHECK_THROWS_WITH_AS(read_labels_beside(folder / "tooth.nrrd", *other),
+                         doctest::Contains("labels lie elsewhere"), LoadError);
+  }
+  static_cast<void>(
+      folder.write("plain-labels.nrrd", nrrd("uint8", "") + "\n" + std::string(60, '\1')));
+  CHECK_NOTHROW(read_labels_beside(folder / "plain.nrrd", image));
 }
 
 TEST_CASE("a full disk leaves the old volume as it was and nothing else") {

@@ -55,7 +55,7 @@ std::vector<fs::path> all_files(const fs::path& folder, std::string& note) {
       entry.disable_recursion_pending();
       if (!hidden) note = "folders more than 5 levels below are not searched";
     }
-    if (hidden || name == "DICOMDIR" || !entry->is_regular_file(gone)) continue;
+    if (hidden || lower(name) == "dicomdir" || !entry->is_regular_file(gone)) continue;
     files.push_back(listed);
     if (files.size() > kMostFiles) {
       throw LoadError(folder.string() + ": more than " + std::to_string(kMostFiles) +

@@ -4,14 +4,12 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
-#include <charconv>
 #include <cmath>
 #include <cstddef>
 #include <cstring>
 #include <limits>
 #include <span>
 #include <string>
-#include <string_view>
 #include <system_error>
 #include <type_traits>
 #include <utility>
@@ -25,6 +23,7 @@
 #include "controller/volume/file/folder_files.hpp"
 #include "controller/volume/file/foreign_volume.hpp"
 #include "controller/volume/file/volume_image.hpp"
+#include "controller/volume/file/volume_spacing.hpp"
 #include "controller/volume/file/volume_write.hpp"
 #include "shared/numeric/linear_algebra.hpp"
 #include "shared/posix/error_text.hpp"
@@ -126,108 +125,6 @@ void set_grid(const fs::path& path, const std::array<std::int64_t, 3>& size, Sou
                  static_cast<std::int32_t>(size[2])};
 }
 
-void add_sentence(std::string& note, const std::string& sentence) {
-  note += (note.empty() ? "" : "; ") + sentence;
-}
-
-constexpr std::string_view kAxisLetters = "xyz";
-constexpr const char* kOverride =
-    "`override_spacing_mm = [..]` in the scene or `--override-spacing`";
-
-/// How far a value may be from the one that was rounded to it, mm: half a unit of the last digit of
-/// its shortest decimal text, as a float if it is one. 0 for less than three digits: 0.5 and 1 are
-/// rather values of their own.
-double rounding_mm(double value) {
-  std::array<char, 512> text{};
-  const auto narrow = static_cast<float>(value);
-  const char* const end =
-      (static_cast<double>(narrow) == value
-           ? std::to_chars(text.begin(), text.end(), narrow, std::chars_format::fixed)
-           : std::to_chars(text.begin(), text.end(), value, std::chars_format::fixed))
-          .ptr;
-  const char* const point = std::find(text.cbegin(), end, '.');
-  const auto decimals = point == end ? std::ptrdiff_t{0} : end - point - 1;
-  const double unit = std::pow(10.0, -static_cast<double>(decimals));
-  return value < 100 * unit ? 0 : unit / 2;
-}
-
-/// Whether two distances along an axis of `count` voxels are one, rounded: to the digits of the
-/// coarser one, and no voxel moves by more than half a voxel.
-bool is_rounded(double file_mm, double given_mm, std::int32_t count) {
-  const double apart_mm = std::abs(file_mm - given_mm);
-  return apart_mm <= std::max(rounding_mm(file_mm), rounding_mm(given_mm)) &&
-         2 * apart_mm * (count - 1) <= file_mm;
-}
-
-/// The spacing along each axis, a letter for one that is not known.
-std::string spacing_text(const std::array<double, 3>& mm, std::uint32_t known,
-                         const char* between) {
-  std::string text;
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    text += axis == 0 ? "" : between;
-    text += (known >> axis & 1) != 0 ? number_text(mm[axis]) : std::string(1, kAxisLetters[axis]);
-  }
-  return text;
-}
-
-[[noreturn]] void refuse_unspaced(const fs::path& path, const std::array<double, 3>& mm,
-                                  std::uint32_t known) {
-  std::string axes;
-  for (std::size_t axis = 0; known != 0 && axis < 3; ++axis) {
-    if ((known >> axis & 1) != 0) continue;
-    axes += (axes.empty() ? " along " : ", ") + std::string(1, kAxisLetters[axis]);
-  }
-  throw LoadError(path.string() + ": spacing" + axes + " is not in the file; add `spacing_mm = [" +
-                  spacing_text(mm, known, ", ") + "]` to the scene or `--spacing " +
-                  spacing_text(mm, known, ",") + "` (mm)");
-}
-
-/// Takes the spacing of the file, and that of the options for the axes of which it has none.
-/// Refuses a conflict between them, and a missing one unless the options allow that.
-void set_spacing(const fs::path& path, const ReadOptions& options, const UntrustedHeader& claim,
-                 SourceVolume& volume) {
-  const std::uint32_t in_file = claim.spacing_known & kAllAxes;
-  std::array<double, 3> mm{1, 1, 1};
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    if ((in_file >> axis & 1) != 0) mm[axis] = claim.spacing_mm[axis];
-  }
-  volume.spacing_known = in_file;
-  if (options.override_spacing_mm) {
-    volume.spacing_known = kAllAxes;
-    volume.spacing_mm = *options.override_spacing_mm;
-    check_spacing(path.string(), volume.spacing_mm, kOverride);
-    add_sentence(volume.note,
-                 "OVERRIDDEN: spacing " + spacing_text(volume.spacing_mm, kAllAxes, " x ") +
-                     " mm in place of the file's " +
-                     (in_file == 0 ? "none" : spacing_text(mm, in_file, " x ") + " mm"));
-    return;
-  }
-  check_spacing(path.string(), mm, kOverride);
-  if (options.spacing_mm) {
-    const std::array<double, 3>& given = *options.spacing_mm;
-    check_spacing(path.string(), given);
-    const std::array<std::int32_t, 3> count{volume.grid.nx, volume.grid.ny, volume.grid.nz};
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      if ((in_file >> axis & 1) == 0) {
-        mm[axis] = given[axis];
-      } else if (given[axis] != mm[axis]) {
-        const std::string both = number_text(given[axis]) + " mm along " + kAxisLetters[axis];
-        if (!is_rounded(mm[axis], given[axis], count[axis])) {
-          throw LoadError(path.string() + ": spacing " + both + " is given, and the file has " +
-                          number_text(mm[axis]) + "; leave it out, or replace the file's with " +
-                          kOverride);
-        }
-        add_sentence(volume.note, "spacing " + both + " is given, rounded; the file's " +
-                                      number_text(mm[axis]) + " is used");
-      }
-    }
-    volume.spacing_known = kAllAxes;
-  } else if (in_file != kAllAxes && !options.allow_missing_spacing) {
-    refuse_unspaced(path, mm, in_file);
-  }
-  volume.spacing_mm = mm;
-}
-
 /// Refuses an origin that is not finite.
 void set_origin(const fs::path& path, const std::array<double, 3>& origin_mm,
                 SourceVolume& volume) {
@@ -306,13 +203,33 @@ void set_frame(const fs::path& path, Axis x, Axis y, Axis z, SourceVolume& volum
                       x[2], y[2], right_handed[2]};
 }
 
+/// Whether the axes of the labels' file are those of the image, and no voxel lies more than half a
+/// voxel from its own. A file that names no frame has that of its voxels, and lies as the image.
+bool lies_as(const VolumeFrame& labels, const VolumeFrame& image) {
+  const VolumeFrame unnamed;
+  if (labels.direction == unnamed.direction && labels.origin_mm == unnamed.origin_mm) return true;
+  const double shortest_mm = std::ranges::min(image.spacing_mm);
+  const std::array<double, 3> far_mm{image.spacing_mm[0] * (image.grid.nx - 1),
+                                     image.spacing_mm[1] * (image.grid.ny - 1),
+                                     image.spacing_mm[2] * (image.grid.nz - 1)};
+  for (std::size_t row = 0; row < 3; ++row) {
+    double apart_mm = std::abs(labels.origin_mm[row] - image.origin_mm[row]);
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const std::size_t at = 3 * row + axis;
+      apart_mm += std::abs(labels.direction[at] - image.direction[at]) * far_mm[axis];
+    }
+    if (apart_mm > shortest_mm / 2) return false;
+  }
+  return true;
+}
+
 /// Checks the header that the sandbox reports; returns the bytes of memory for it.
 std::size_t accept(const fs::path& path, const ReadOptions& options, const UntrustedHeader& claim,
                    SourceVolume& source) {
   const std::string note(claim.note.begin(), std::ranges::find(claim.note, '\0'));
-  if (!note.empty()) add_sentence(source.note, escaped(note));
+  if (!note.empty()) source.note += (source.note.empty() ? "" : "; ") + escaped(note);
   set_grid(path, claim.size, source);
-  set_spacing(path, options, claim, source);
+  take_spacing(path.string(), options, claim, source);
   set_origin(path, claim.origin_mm, source);
   const std::uint64_t each = std::clamp<std::uint64_t>(claim.voxel_bytes, bytes_of(claim.kind), 8);
   return source.grid.voxel_count() * each;
@@ -372,11 +289,19 @@ void read_labels_beside(const fs::path& volume_path, VolumeImage& image, int cpu
   options.allow_missing_spacing = true;
   options.cpu_s = cpu_s;
   const SourceVolume source = read_volume(path, options);
-  const bool fits = source.grid == image.grid && source.min >= 0.0 &&
-                    source.max <= std::numeric_limits<Label>::max();
+  bool fits = source.grid == image.grid && source.min >= 0.0 &&
+              source.max <= std::numeric_limits<Label>::max();
+  source.values.visit([&](auto values) {
+    fits = fits && std::ranges::all_of(values, [](auto v) { return v == static_cast<Label>(v); });
+  });
   if (!fits) {
     throw LoadError(path.string() + ": labels do not fit " + volume_path.filename().string() +
-                    " (same size, values 0..255); remove or rename them");
+                    " (same size, whole values 0..255); remove or rename them");
+  }
+  if (!lies_as(source, image)) {
+    throw LoadError(path.string() + ": labels lie elsewhere than the voxels of " +
+                    volume_path.filename().string() +
+                    " (other axes or origin); resample them to its grid, or remove them");
   }
   image.labels.resize(source.values.size());
   source.values.visit([&](auto values) {

@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "controller/volume/file/volume_spacing.hpp"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <string>
+#include <string_view>
+
+#include "controller/input/load_error.hpp"
+
+namespace kerf {
+
+using volume::UntrustedHeader;
+
+namespace {
+
+void add_sentence(std::string& note, const std::string& sentence) {
+  note += (note.empty() ? "" : "; ") + sentence;
+}
+
+constexpr std::string_view kAxisLetters = "xyz";
+constexpr const char* kOverride =
+    "`override_spacing_mm = [..]` in the scene or `--override-spacing`";
+
+/// Shortest text of a length that reads back as the same float: headers have no more digits, and
+/// what is computed from theirs, such as 0.7000000000000001, has noise beyond them.
+std::string mm_text(double mm) {
+  std::array<char, 512> text{};
+  const auto end =
+      std::to_chars(text.begin(), text.end(), static_cast<float>(mm), std::chars_format::fixed);
+  return {text.data(), end.ptr};
+}
+
+/// How far a value may be from the one that was rounded to it, mm: half a unit of the last digit of
+/// its text. 0 for less than three digits: 0.5 and 1 are rather values of their own.
+double rounding_mm(double value) {
+  const std::string text = mm_text(value);
+  const std::size_t point = text.find('.');
+  const std::size_t decimals = point == text.npos ? 0 : text.size() - point - 1;
+  const double unit = std::pow(10.0, -static_cast<double>(decimals));
+  return value < 100 * unit ? 0 : unit / 2;
+}
+
+/// Whether two distances are one but for the rounding of floats: of a length from three of them,
+/// the root of a sum of squares, at most two units of each.
+bool is_same(double file_mm, double given_mm) {
+  constexpr double kNoise = 4 * std::numeric_limits<float>::epsilon();
+  return std::abs(file_mm - given_mm) <= kNoise * file_mm;
+}
+
+/// Whether two distances along an axis of `count` voxels are one, rounded: to the digits of the
+/// coarser one, and no voxel moves by more than half a voxel.
+bool is_rounded(double file_mm, double given_mm, std::int32_t count) {
+  const double apart_mm = std::abs(file_mm - given_mm);
+  return apart_mm <= std::max(rounding_mm(file_mm), rounding_mm(given_mm)) &&
+         2 * apart_mm * (count - 1) <= file_mm;
+}
+
+/// The spacing along each axis, a letter for one that is not known.
+std::string spacing_text(const std::array<double, 3>& mm, std::uint32_t known,
+                         const char* between) {
+  std::string text;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    text += axis == 0 ? "" : between;
+    text += (known >> axis & 1) != 0 ? mm_text(mm[axis]) : std::string(1, kAxisLetters[axis]);
+  }
+  return text;
+}
+
+[[noreturn]] void refuse_unspaced(const std::string& place, const std::array<double, 3>& mm,
+                                  std::uint32_t known) {
+  std::string axes;
+  for (std::size_t axis = 0; known != 0 && axis < 3; ++axis) {
+    if ((known >> axis & 1) != 0) continue;
+    axes += (axes.empty() ? " along " : ", ") + std::string(1, kAxisLetters[axis]);
+  }
+  throw LoadError(place + ": spacing" + axes + " is not in the file; add `spacing_mm = [" +
+                  spacing_text(mm, known, ", ") + "]` to the scene or `--spacing " +
+                  spacing_text(mm, known, ",") + "` (mm)");
+}
+
+}  // namespace
+
+void take_spacing(const std::string& place, const ReadOptions& options,
+                  const UntrustedHeader& claim, SourceVolume& volume) {
+  const std::uint32_t in_file = claim.spacing_known & kAllAxes;
+  std::array<double, 3> mm{1, 1, 1};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    if ((in_file >> axis & 1) != 0) mm[axis] = claim.spacing_mm[axis];
+  }
+  volume.spacing_known = in_file;
+  if (options.override_spacing_mm) {
+    volume.spacing_known = kAllAxes;
+    volume.spacing_mm = *options.override_spacing_mm;
+    check_spacing(place, volume.spacing_mm, kOverride);
+    add_sentence(volume.note,
+                 "OVERRIDDEN: spacing " + spacing_text(volume.spacing_mm, kAllAxes, " x ") +
+                     " mm in place of the file's " +
+                     (in_file == 0 ? "none" : spacing_text(mm, in_file, " x ") + " mm"));
+    return;
+  }
+  check_spacing(place, mm, kOverride);
+  if (options.spacing_mm) {
+    const std::array<double, 3>& given = *options.spacing_mm;
+    check_spacing(place, given);
+    const std::array<std::int32_t, 3> count{volume.grid.nx, volume.grid.ny, volume.grid.nz};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      if ((in_file >> axis & 1) == 0) {
+        mm[axis] = given[axis];
+      } else if (!is_same(mm[axis], given[axis])) {
+        const std::string both = mm_text(given[axis]) + " mm along " + kAxisLetters[axis];
+        if (!is_rounded(mm[axis], given[axis], count[axis])) {
+          throw LoadError(place + ": spacing " + both + " is given, and the file has " +
+                          mm_text(mm[axis]) + "; leave it out, or replace the file's with " +
+                          kOverride);
+        }
+        add_sentence(volume.note, "spacing " + both + " is given, rounded; the file's " +
+                                      mm_text(mm[axis]) + " is used");
+      }
+    }
+    volume.spacing_known = kAllAxes;
+  } else if (in_file != kAllAxes && !options.allow_missing_spacing) {
+    refuse_unspaced(place, mm, in_file);
+  }
+  volume.spacing_mm = mm;
+}
+
+}  // namespace kerf
