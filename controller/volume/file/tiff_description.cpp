@@ -84,7 +84,7 @@ std::optional<double> mm_of(std::string unit) {
   constexpr std::string_view kMicro = "\\u00B5";  // as ImageJ writes it
   if (unit.starts_with(kMicro)) unit.replace(0, kMicro.size(), "u");
   const auto length = unit.empty() || unit[0] == '?' ? std::nullopt : length_unit(unit);
-  if (!length || length->is_index) return {};
+  if (!length) return {};
   return length->times / length->over;
 }
 
