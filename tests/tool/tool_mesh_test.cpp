@@ -289,8 +289,16 @@ TEST_CASE("corners that the rounding of their numbers sets apart are joined, rea
   });
   CHECK(join_triangles(fine, 1, "bur.stl").points_mm.size() == 14);
   // What the noise made flat goes, and the rest is closed.
-  fine = each_corner(fine, [](float x, int n) { return n % 2 == 0 ? std::nextafter(x, 9.0F) : x; });
-  CHECK(join_error(fine).empty());
+  const auto stepped_up = [&](const Triangles& mesh) {
+    return each_corner(mesh,
+                       [](float x, int n) { return n % 2 == 0 ? std::nextafter(x, 9.0F) : x; });
+  };
+  CHECK(join_error(stepped_up(fine)).empty());
+  // Detail above the noise of floats, below that of six digits.
+  const auto detailed = stepped_up(extremes::loft({-4, -3.99999, 4}, 4, [](double y, double angle) {
+    return extremes::Point{std::cos(angle), y, std::sin(angle)};
+  }));
+  CHECK(join_triangles(detailed, 1, "bur.stl").points_mm.size() == 14);
 }
 
 TEST_CASE("coordinates that no tool has are refused with their triangle") {

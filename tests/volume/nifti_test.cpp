@@ -34,10 +34,9 @@ std::string f32(const std::vector<float>& values) {
 }
 
 // Offsets of fields in nifti1.h.
-constexpr std::size_t kDim = 40, kDatatype = 70, kBitpix = 72, kQfac = 76, kPixdim = 80,
-                      kVoxOffset = 108, kSlope = 112, kUnits = 123, kCalMax = 124, kQform = 252,
-                      kSform = 254, kQuatern = 256, kQoffset = 268, kSrow = 280, kMagic = 344,
-                      kExtension = 348;
+constexpr std::size_t kDim = 40, kDatatype = 70, kQfac = 76, kPixdim = 80, kVoxOffset = 108,
+                      kSlope = 112, kUnits = 123, kCalMax = 124, kQform = 252, kSform = 254,
+                      kQuatern = 256, kQoffset = 268, kSrow = 280, kMagic = 344, kExtension = 348;
 
 const std::string kFloats = bytes_of(counting<float>());
 const std::string kShorts = bytes_of(counting<std::int16_t>());

@@ -90,7 +90,7 @@ TEST_CASE_TEMPLATE("TIFF pages of every integer and floating type keep their val
 }
 
 TEST_CASE("reduced copies and masks among the pages of a TIFF are left out, and the note says so") {
-  for (const std::size_t at : {0, 2, 5}) {
+  for (const std::size_t at : {0U, 2U, 5U}) {
     std::vector<TiffPage> pages = five();
     pages.insert(pages.begin() + static_cast<std::ptrdiff_t>(at), extra(1));
     check_counting(read(pages));
