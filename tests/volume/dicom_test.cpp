@@ -183,6 +183,8 @@ TEST_CASE("numbers that were rounded differently are the same numbers, as far as
     });
   };
   CHECK(at({"0", "0.6", "1.3", "1.9", "2.5"}) == "no error");  // 0.625 mm apart
+  CHECK(at({"0", "0.0004", "0.0008", "0.0012", "0.0016"}) == "no error");
+  CHECK(has(at({"0", "0.0004", "0.0012", "0.0016", "0.002"}), "0.0008 mm before slice"));
   CHECK(at({"0.00", "0.60", "1.30", "1.90", "2.50"}) == "no error");
   CHECK(has(at({"0.00", "0.60", "1.31", "1.90", "2.50"}), "is usual"));
   CHECK(has(at({"0", "0.6", "1.3", "2.5", "3.1"}), "1.2 mm before slice image4.dcm"));

@@ -117,8 +117,11 @@ void put_in_order(Stack& stack) {
 }
 
 std::size_t doubled(const Stack& stack) {
-  for (std::size_t i = 1; i < stack.depth_mm.size(); ++i) {
-    if (stack.depth_mm[i] - stack.depth_mm[i - 1] < kSameMm) return i;
+  const std::vector<double>& depth = stack.depth_mm;
+  const double step = (depth.back() - depth.front()) / static_cast<double>(depth.size());
+  const double same_mm = std::min(kSameMm, step / 4);  // micrometres apart are two positions
+  for (std::size_t i = 1; i < depth.size(); ++i) {
+    if (depth[i] - depth[i - 1] <= same_mm) return i;
   }
   return 0;
 }
