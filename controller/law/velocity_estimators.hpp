@@ -88,6 +88,10 @@ class VelocityWindow {
     const Wide most = Wide(2) * wide(plan.noise_mm);
     std::array<Wide, kIntervals + 1> back{};  // newest - sample
     const Wide newest = at(0);
+    std::int32_t same = 1;
+    while (same <= kIntervals && at(same) == newest) ++same;
+    if (same > kIntervals) return Real(0);  // as below, without its 135 comparisons
+
     Wide slope{}, slope_of{1};  // per interval: slope / slope_of
     Wide sum{};                 // SUM_j back_j
     Wide moment{};              // SUM_j j back_j

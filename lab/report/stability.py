@@ -17,7 +17,7 @@ import subprocess
 import tempfile
 
 import text
-from stability_map import AXES, NEVER
+from stability_map import AXES, NEVER, crossing, lowest
 
 ABOUT = """\
 # Stability
@@ -31,19 +31,28 @@ sampled wall adds a little energy in every tick; damping of device, wall and han
 than removed, and the tip oscillates.
 
 Each cell of a map is a device at a flat wall, without a hand unless stated. The runs of a cell start 0.1 mm before the
-wall, at rest, at 50 and at 200 mm/s, and push with the Coulomb friction plus 0.5 N.
+wall, at rest, at 50 and at 200 mm/s, and push with the Coulomb friction plus 0.5 N. All are repeated for each seed, and
+a cell has the worst verdict of all.
 
-* Split each run in thirds. A cell *swings* if the last third's travel exceeds three encoder steps and 97 % of the middle
-  third's.
-* A cell is *active* if the wall's work goes on rising by as much.
-* *First* is the lowest K of a column that swings or is active, to 0.5 %, between two cells of the grid. A finer grid may
-  find a narrower unstable island below. Stable cells above it are reported apart, because a hand cannot reach them.
+* A cell *rests* if each run is proven to: friction holds the tip under a constant force for longer than the loop
+  remembers; or in the last half of the run the travel is at most one encoder step, and the energy given at most that of
+  a push over it. A loop without encoder steps counts as at rest within 0.0001 mm.
+* A cell *swings* if in both halves of the last half of a run the tip reverses at least twice, each time after more than
+  one encoder step, and its travel does not fall in all of eight windows. A creep does not reverse, so it is no swing.
+* A cell is *active* if in both halves of the last half the motors give more energy than a push over one encoder step
+  takes.
+* Any other cell is *undecided*.
+* A run ends when its rest is proven, else after 60 s, and later if mass and damping make its motion slower than that. A
+  swing with friction and encoder steps is chaotic: one run in a hundred stops only after 3 to 45 s. `--seconds` makes
+  the limit longer, never shorter, so that no verdict depends on it.
+* *First* is the lowest K of a column at which a run of any seed swings or is active: searched upwards in steps of 1 %,
+  the whole arm in those of the map, then halved to 0.5 %. The picture has a bar from the lowest to the highest first
+  swing of a single seed. Stable cells above are reported apart, because a hand cannot reach them.
 * There is no thermal limit: weaker motors would end an oscillation.
-* A run lasts longer than asked if mass and damping make a decay too slow to see in thirds.
 
-The boundary depends on the phase of the encoder steps relative to the wall, with friction by up to a factor of two. The
-seed sets this phase, equal in every column, so that two columns differ by their axes alone. Another `--seed` shows how
-far the boundary moves.
+A seed sets the phase of the encoder steps relative to the wall, with friction worth up to a factor of two in K. It is
+equal in every column, so that two columns differ by their axes alone. `--seed` is the first seed, `--seeds` their
+number, 5 unless given.
 
 *One axis* runs the servo's own coupling, velocity estimator, stabilisers and force limits, as the same templates and in
 the loop's numbers, with exact mechanics. *Whole arm* (`--arm`) runs the servo step with the emulated device, its driver
@@ -56,12 +65,12 @@ DEVICES = """\
 The lowest K in N/mm that swings or is active, at two dampings B: the default, and the one with the highest K on the
 device's map.
 
-* *Linear, exact* is the boundary without friction and encoder steps.
+* *Linear, exact* is the boundary of another loop: a linear two-sided wall with the backward difference, in double,
+  without friction, encoder steps and limits. A picture draws it in black for that loop alone, dotted beside others.
 * The firm hand has 0.1 kg, 0.005 N s/mm, 0.5 N/mm. In *whole arm* a spring of 0.2 N/mm pushes.
-* Each measured K is the minimum of three seeds: on one axis 160 stiffnesses from 0.05 to 50 N/mm, runs of 2 s; with the
-  whole arm 14 stiffnesses, runs of 1 s.
-* *Recommended K* is the minimum of the row over 1.5. The margin covers unstable islands narrower than a step of the map:
-  one lies at 0.82 of a first crossing (Omni, no delay, B 0.002).
+* Each measured K is the lowest of five seeds; undecided counts as unstable. The whole arm has 14 stiffnesses.
+* *Recommended K* is the minimum of the row over 1.5. The margin covers phases, speeds and islands between two steps
+  that no run of the map met.
 * The delay of a real device is not known; assume two periods until you measure it.
 * Take no more damping than the map shows as stable: beyond its maximum the lag of the velocity and the encoder steps
   drive the oscillation.
@@ -74,8 +83,7 @@ These are the emulator's devices. The check of a scene (docs/devices.md, "Gains"
 STABILISERS = """
 ## Stabilisers
 
-The same with B = 0.002 N s/mm and a stabiliser that has the device's mass and damping: one axis / whole arm, one seed,
-40 and 14 stiffnesses. docs/energy.md has the effect on the hand. `passivity` books a force in the tick that commands
+The same with B = 0.002 N s/mm and a stabiliser that has the device's mass and damping: one axis / whole arm, one seed. docs/energy.md has the effect on the hand. `passivity` books a force in the tick that commands
 it. With a delay the force acts later, and the port may give far more energy than is booked: `port_minimum_mj` of `--csv`
 has the lowest energy of the port in each cell. A run that swings and is active ends its cell.
 
@@ -93,7 +101,7 @@ KNOBS = """\
 
 An Omni with B = 0.002 N s/mm and a delay of one period; one parameter changes at a time, the default is bold, K in N/mm.
 The linear boundary includes mass, both dampings, delay, rate, hand and filter. *Re-entry* is the lowest stable K above
-the first crossing. One seed, 40 stiffnesses from 0.05 to 50 N/mm, runs of 2 s; a finer map finds more islands.
+the first crossing. Five seeds, 40 stiffnesses from 0.05 to 50 N/mm.
 
 """
 
@@ -101,6 +109,41 @@ NUMBERS = """
 They differ where a run is chaotic, which is near every boundary of a loop with friction and encoder steps: a difference
 of 2^-16 mm or N moves an encoder step to another tick, and with it the rest position of the tip. No number type is better
 in general.
+
+"""
+
+FILES = """\
+## Files of a map
+
+`--csv` has one row for each cell, with the axes as `--help` lists them, then the figures. A column that cannot exist has
+no rows.
+
+| column | unit | meaning |
+|---|---|---|
+| loop, device, damping_ns_per_mm, rate_hz, delay_periods, quantum_mm, friction_n, viscous_ns_per_mm, mass_kg, estimator, filter_ms, hand, mode_hz, numeric, law, stabiliser, limits | in the name | value of each axis, given or standard |
+| stiffness_n_per_mm | N/mm | K of the cell |
+| swings, active, undecided | 0 or 1 | a run shows it; a cell with three zeros is proven to rest |
+| travel_mm | mm | peak to peak in the last half of a run, the largest of all runs; 0: held by friction |
+| given_mj | mJ | energy that the motors gave in that half |
+| port_minimum_mj | mJ | lowest energy of the device port in a run that begins at 0 |
+
+`--json` has the whole map:
+
+| key | meaning |
+|---|---|
+| version, seed, seeds, seconds, whole_arm | of the run: program, first seed, number of seeds, least limit of a run, `--arm` |
+| mapped, varied | axes of the picture; axes with several values |
+| stiffness_n_per_mm | of the cells of each column, N/mm |
+| columns | a list, one for each combination of the other axes, of the following |
+| axes | value of each axis as a text, by the names of the CSV |
+| impossible | why the column has no cells; null: it has |
+| by_travel, by_energy | crossings by *swings* and *active*, each with the next three rows |
+| first_n_per_mm, reason | lowest K of all seeds; or null, and the reason: `below all`, `above all`, `undecided` (no cell is bad, one is undecided), `not measured` |
+| last_n_per_mm, last_reason | the same of the seed that crosses last |
+| re_entry_from_n_per_mm, re_entry_to_n_per_mm | cells above the first crossing that rest again; null: none |
+| undecided_from_n_per_mm | lowest K at which a run is undecided; null: none |
+| analytic | exact_n_per_mm, passive_n_per_mm, quantum_n_per_mm: bounds of the linear loop, 0: nothing is stable, null: for another loop; exact_holds, passive_holds: whether this column's loop is the one of the bound |
+| cells | swings, active, undecided, travel_mm, given_mj, port_minimum_mj of each stiffness |
 
 """
 
@@ -127,7 +170,6 @@ parallel, and as a job array of Slurm (`examples/cluster/zwidth.sbatch`):
 
 NAMES = {"omni": "Omni", "falcon": "Falcon", "woodenhaptics": "WoodenHaptics"}
 MARGIN = 1.5
-SEEDS = 3
 
 # Axis, its values, and options that they need. In bold: the standard.
 KNOBS_MEASURED = [
@@ -136,16 +178,6 @@ KNOBS_MEASURED = [
     ("mass", "0.02,0.045,0.2"), ("hand", "none,light,firm"), ("estimator", "foaw,difference"),
     ("filter", "0,1,5", "--estimator", "difference"), ("law", "coupling,linear,two_sided"),
     ("stabiliser", "none,passivity,energy_bounding"), ("limits", "on,off"), ("numeric", "fixed,double")]
-
-
-def crossing(boundary):
-    first = boundary["first_n_per_mm"]
-    return NEVER if first is None else first
-
-
-def lowest(column):
-    """The lower first crossing of both rules; 0 if the column has no cells."""
-    return min(crossing(column["by_travel"]), crossing(column["by_energy"])) if column["cells"] else 0
 
 
 def exact_of(column):
@@ -164,13 +196,13 @@ class Maps:
         self.program, self.quick, self.jobs = order["program"], order["quick"], order["jobs"]
         self.parent = os.getppid()
 
-    def measure(self, axes, stiffnesses, seconds=2, more=()):
+    def measure(self, axes, stiffnesses, more=()):
         quick = self.quick
         if os.getppid() != self.parent:  # the command was ended
             raise text.BadInput("kerf-lab: ended; no page is made")
         with tempfile.TemporaryDirectory() as folder:
             words = [self.program, "zwidth", *more, "--json", f"{folder}/map.json",
-                     "--stiffness", f"0.05:50:{6 if quick else stiffnesses}", "--seconds", str(0.3 if quick else seconds)]
+                     "--stiffness", "0.05:2:3" if quick else f"0.05:50:{stiffnesses}", *(["--seeds", "1"] if quick and "--seeds" not in more else [])]
             for axis, values in axes.items():
                 words += [f"--{axis}", values]
             if self.jobs:
@@ -180,21 +212,18 @@ class Maps:
             with open(f"{folder}/map.json", encoding="utf-8") as file:
                 return json.load(file)
 
-    def lowest_of_seeds(self, axes, arm):
-        """The lowest crossing of each column of these axes, over several phases of the encoder steps."""
-        least = {}
-        for seed in range(1, (1 if self.quick else SEEDS) + 1):
-            found = self.measure(axes, 14 if arm else 160, 1 if arm else 2, ["--seed", str(seed), *(["--arm"] if arm else [])])
-            for column in found["columns"]:
-                key = value(column, "device"), value(column, "delay"), value(column, "hand")
-                least[key] = min(least.get(key, NEVER), lowest(column))
-        return least
+    def lowest(self, axes, arm):
+        """The lowest crossing of each column of these axes."""
+        found = self.measure(axes, 14 if arm else 40, ["--arm"] if arm else [])
+        return {tuple(value(column, axis) for axis in ("device", "delay", "hand")): lowest(column)
+                for column in found["columns"]}
 
 
 def measure(order):
     maps, quick = Maps(order), order["quick"]
     devices = maps.measure({"device": ",".join(NAMES), "damping": "0:0.03:3" if quick else "0:0.03:31"}, 36)
-    rates = maps.measure({"rate": "250,500,1000,2000,4000,8000", "damping": "0:0.03:3" if quick else "0:0.03:21"}, 30, 1)
+    rates = maps.measure({"rate": "250,500,1000,2000,4000,8000", "damping": "0:0.03:3" if quick else "0:0.03:21"}, 30,
+                         ["--seeds", "1"])
     return json.dumps({"provenance": order["provenance"], "devices": devices, "rates": rates,
                        "table": measure_devices(maps, devices), "stabilisers": measure_stabilisers(maps),
                        "knobs": measure_knobs(maps, devices), "numbers": measure_numbers(maps)})
@@ -210,8 +239,8 @@ def measure_devices(maps, devices):
         for damping in [best] if maps.quick else ["0.002", best]:
             axes = {"device": device, "delay": delays, "damping": damping}
             exact = {value(column, "delay"): exact_of(column) for column in maps.measure(axes, 2)["columns"]}
-            axis = maps.lowest_of_seeds({**axes, "hand": "none,firm"}, False)
-            arm = maps.lowest_of_seeds(axes, True)
+            axis = maps.lowest({**axes, "hand": "none,firm"}, False)
+            arm = maps.lowest(axes, True)
             rows += [{"device": NAMES[device], "delay": delay, "damping": damping, "exact": exact[delay],
                       "axis": axis[device, delay, "none"], "held": axis[device, delay, "firm"],
                       "arm": arm[device, delay, "none"]} for delay in delays.split(",")]
@@ -222,7 +251,7 @@ def measure_stabilisers(maps):
     axes = {"device": ",".join(NAMES), "delay": "1" if maps.quick else "0,1,2", "damping": "0.002",
             "stabiliser": "none" if maps.quick else "none,passivity,energy_bounding"}
     rows = {}
-    for found in (maps.measure(axes, 40), maps.measure(axes, 14, 1, ["--arm"])):
+    for found in (maps.measure(axes, 40, ["--seeds", "1"]), maps.measure(axes, 14, ["--arm", "--seeds", "1"])):
         for column in found["columns"]:
             row = rows.setdefault((value(column, "device"), value(column, "delay")), {})
             row.setdefault(value(column, "stabiliser"), []).append(lowest(column))
@@ -233,11 +262,11 @@ def measure_knobs(maps, devices):
     standard = {**devices["columns"][0]["axes"], AXES["damping"][0]: "0.002"}  # the Omni's
     rows = []
     for axis, values, *more in KNOBS_MEASURED:
-        for column in maps.measure({"damping": "0.002", axis: values}, 40, 2, more)["columns"]:
+        for column in maps.measure({"damping": "0.002", axis: values}, 40, more)["columns"]:
             rows.append({"name": axis, "unit": AXES[axis][1], "value": value(column, axis),
                          "standard": value(column, axis) == standard[AXES[axis][0]],
                          "swings": crossing(column["by_travel"]), "active": crossing(column["by_energy"]),
-                         "exact": exact_of(column), "re_entry": column["by_travel"]["re_entry_from_n_per_mm"]})
+                         "exact": exact_of(column), "re_entry": column["by_travel"]["re_entry_from_n_per_mm"] or 0})
     return rows
 
 
@@ -299,7 +328,7 @@ def page(data, devices, rates):
             + "".join(f"* {row['numeric']}: {row['others']} of {row['cells']} cells have another verdict than in double; the "
                       f"first crossing differs in {row['columns']} columns, at most by a\n  factor of {row['factor']:.3g}.\n"
                       for row in data["numbers"])
-            + NUMBERS + HOW + data["provenance"] + "\n")
+            + NUMBERS + HOW + FILES + data["provenance"] + "\n")
 
 
 def devices(data):

@@ -4,9 +4,10 @@
     mapped                      the two axes of the plot, "stiffness" or a name of AXES
     varied                      all axes that were given more than one value
     stiffness_n_per_mm          of the cells of a column
-    seconds, seed, whole_arm    of the hits
-    columns                     {axes, by_travel, by_energy, analytic, cells}: the value of each axis as a text; the first
-                                crossing by each rule, null: none; cells {swings, active}, an empty list: not measured
+    seconds, seed, seeds, whole_arm    of the hits
+    columns                     {axes, by_travel, by_energy, undecided_from_n_per_mm, analytic, cells}: the value of each
+                                axis as a text; by each rule the lowest and the highest first crossing of the seeds, null
+                                with a reason; cells {swings, active, undecided}, an empty list: not measured
 
 portraits (`--portraits`) reads the same without mapped, varied and columns, and with
 
@@ -30,7 +31,7 @@ AXES = {
     "law": ("law", ""), "stabiliser": ("stabiliser", ""), "limits": ("limits", "")}
 LOOPS = {"ideal": "the loop of the theory: linear, exact numbers", "kerf": "the loop of kerf: friction, encoder steps, its own force"}
 
-RESTS, ACTIVE, SWINGS, NONE = "#CFE8DC", "#F7E3A1", "#F0B79B", "#D9D9D9"
+RESTS, ACTIVE, SWINGS, UNDECIDED, NONE = "#CFE8DC", "#F7E3A1", "#F0B79B", "#B8B4DC", "#D9D9D9"
 HITS = {"push": "#0072B2", "50 mm/s": "#D55E00", "200 mm/s": "#009E73", "slide": "#CC79A7", "corner": "#E69F00"}
 MOST_NUMBERS = 14  # a side: more do not fit into the cells
 
@@ -68,6 +69,20 @@ class Scale:
             getattr(axes, f"set_{axis}ticks")(self.places, self.texts)
 
 
+def crossing(boundary, key="first_n_per_mm", reason="reason"):
+    """A first crossing: 0 if even the lowest stiffness is bad, NEVER if none is, NaN if it is not measured."""
+    texts = {"below all": 0, "above all": NEVER, "undecided": NEVER, "not measured": math.nan}
+    return texts[boundary[reason]] if boundary[key] is None else boundary[key]
+
+
+def lowest(column):
+    """The lowest stiffness that is not proven to rest; 0 if the column has no cells."""
+    if not column["cells"]:
+        return 0
+    undecided = column["undecided_from_n_per_mm"]
+    return min(crossing(column["by_travel"]), crossing(column["by_energy"]), NEVER if undecided is None else undecided)
+
+
 def label_of(name):
     _, unit, *label = AXES[name]
     return label[0] if label else f"{name} ({unit})" if unit else name
@@ -94,7 +109,8 @@ def foot(data, axes, varies):
     parts += say("rate", "", " Hz") + say("delay", "delay ", " periods") + say("damping", "B ", " N s/mm") + say("hand", "hand ")
     parts += ["whole arm" if data["whole_arm"] else "one axis", "hits: a push", "50 and 200 mm/s"]
     parts += ["a slide", "a corner"] if data["whole_arm"] else []
-    parts += [f"{data['seconds']:g} s each", f"seed {data['seed']}"]
+    seed, seeds = data["seed"], data.get("seeds", 1)
+    parts += [f"{data['seconds']:g} s each at most", f"seeds {seed} to {seed + seeds - 1}" if seeds > 1 else f"seed {seed}"]
     lines = [""]
     for part in parts:
         if len(lines[-1]) + len(part) > 150:
@@ -140,7 +156,7 @@ def map(data):
         return Scale(name, list(dict.fromkeys(column["axes"][AXES[name][0]] for column in columns)))
 
     x, y = scale(x_axis), scale(y_axis)
-    picture, flat, width, height = panels(len(by_title), 135 if verdicts else 75, 25 if verdicts else 135)
+    picture, flat, width, height = panels(len(by_title), 150 if verdicts else 90, 25 if verdicts else 135)
     for axes, (title, of_panel) in zip(flat, by_title.items()):
         axes.set_title(title)
         x.apply(axes, "x")
@@ -149,7 +165,7 @@ def map(data):
             draw_verdicts(axes, of_panel, x, y, AXES[x_axis][0])
         else:
             draw_heights(picture, axes, of_panel, x, y, (AXES[x_axis][0], AXES[y_axis][0]), data["stiffness_n_per_mm"])
-    draw_legend(picture, columns, data["stiffness_n_per_mm"] if verdicts else None, (135 if verdicts else 70) / height)
+    draw_legend(picture, columns, data["stiffness_n_per_mm"] if verdicts else None, (150 if verdicts else 85) / height)
     picture.text(20 / width, 18 / height, foot(data, columns[0]["axes"], varies), fontsize=8.5, color=fig.FRAME, va="bottom")
     return fig.svg(picture)
 
@@ -161,7 +177,8 @@ def draw_verdicts(axes, columns, x, y, key):
     lines = []
     for column in sorted(columns, key=lambda column: x.values.index(column["axes"][key])):
         i = x.values.index(column["axes"][key])
-        colours = [SWINGS if cell["swings"] else ACTIVE if cell["active"] else RESTS for cell in column["cells"]]
+        colours = [SWINGS if cell["swings"] else ACTIVE if cell["active"] else UNDECIDED if cell["undecided"] else RESTS
+                   for cell in column["cells"]]
         colours = colours or [NONE] * len(y.places)
         start = 0
         for k in range(1, len(colours) + 1):
@@ -170,10 +187,11 @@ def draw_verdicts(axes, columns, x, y, key):
             axes.add_patch(Rectangle((x.edges[i], y.edges[start]), x.edges[i + 1] - x.edges[i], y.edges[k] - y.edges[start],
                                      facecolor=colours[start], edgecolor=colours[start], linewidth=0.6))
             start = k
-        analytic, is_seen = column["analytic"], bool(column["cells"])
-        lines.append([analytic["exact_n_per_mm"], analytic["passive_n_per_mm"], analytic["quantum_n_per_mm"],
-                      column["by_travel"]["first_n_per_mm"] if is_seen else None,
-                      column["by_energy"]["first_n_per_mm"] if is_seen else None])
+        swing = column["by_travel"]
+        lines.append([*analytic_lines(column), swing["first_n_per_mm"], column["by_energy"]["first_n_per_mm"]])
+        band = [crossing(swing), crossing(swing, "last_n_per_mm", "last_reason")]
+        if band[0] < band[1]:
+            axes.vlines(x.places[i], *(min(max(end, y.edges[0]), y.edges[-1]) for end in band), **BAND)
     places = [x.places[x.values.index(value)] for value in x.values
               if any(column["axes"][key] == value for column in columns)]
     heights = [[value if value else math.nan for value in line] for line in zip(*lines)]
@@ -181,9 +199,24 @@ def draw_verdicts(axes, columns, x, y, key):
         axes.plot(places, line, **style)
 
 
+def analytic_lines(column):
+    """The exact boundary if the column's loop is the one that it is derived for; the same if it is not, for loops that
+    are at least near; then passive and quantum."""
+    analytic = column["analytic"]
+    exact, holds = analytic["exact_n_per_mm"], analytic["exact_holds"]
+    near = column["axes"]["stabiliser"] == "none" and column["axes"]["law"] in ("coupling", "linear", "two_sided")
+    passive = [analytic[key] if analytic["passive_holds"] else None for key in ("passive_n_per_mm", "quantum_n_per_mm")]
+    return [exact if holds else None, exact if near and not holds else None, *passive]
+
+
+BAND = {"color": "#D55E00", "linewidth": 3.5, "alpha": 0.45}
+
+
 def line_styles(count):
     import figure as fig
-    return [{"color": fig.BLACK, "linewidth": 2.2, "marker": "_" if count == 1 else None, "markersize": 14},
+    marker = "_" if count == 1 else None
+    return [{"color": fig.BLACK, "linewidth": 2.2, "marker": marker, "markersize": 14},
+            {"color": fig.GREY, "linewidth": 1.4, "linestyle": ":", "marker": marker, "markersize": 14},
             {"color": fig.BLUE, "linewidth": 1.6, "linestyle": "--", "marker": "x", "markersize": 4},
             {"color": fig.GREEN, "linewidth": 1.6, "linestyle": "-.", "marker": "^", "markersize": 5, "markerfacecolor": "white"},
             {"color": fig.RED, "linewidth": 1.2, "marker": "o", "markersize": 3.5},
@@ -201,13 +234,14 @@ def draw_heights(picture, axes, columns, x, y, keys, stiffness):
     norm = LogNorm(low, high)
     for column in columns:
         i, k = (scale.values.index(column["axes"][key]) for scale, key in ((x, keys[0]), (y, keys[1])))
-        first = min(NEVER if column[rule]["first_n_per_mm"] is None else column[rule]["first_n_per_mm"]
-                    for rule in ("by_travel", "by_energy")) if column["cells"] else None
-        colour = NONE if first is None else colours(norm(min(max(first, low), high)))
+        first = lowest(column) if column["cells"] else None
+        is_open = first is not None and first == column["undecided_from_n_per_mm"]
+        colour = NONE if first is None else UNDECIDED if is_open else colours(norm(min(max(first, low), high)))
         axes.add_patch(Rectangle((x.edges[i], y.edges[k]), x.edges[i + 1] - x.edges[i], y.edges[k + 1] - y.edges[k],
                                  facecolor=colour, edgecolor=colour, linewidth=0.6))
         if first is not None and max(len(x.values), len(y.values)) <= MOST_NUMBERS:
-            text = f"<{low:g}" if first < low else f">{high:g}" if first > stiffness[-1] else f"{first:.2g}"
+            text = f"<{low:g}" if first < low else f">{high:g}" if first > stiffness[-1] else \
+                f"{first:.2g}" + ("?" if is_open else "")
             axes.text(x.places[i], y.places[k], text, ha="center", va="center", fontsize=8.5, color=fig.BLACK)
     box = axes.get_position()
     width = picture.get_figwidth() * 96
@@ -221,22 +255,24 @@ def draw_legend(picture, columns, stiffness, top):
     """`stiffness`: of the cells whose verdicts the panels show; None: they show the highest stiffness."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
-    patches = [(RESTS, "comes to rest"), (ACTIVE, "travel small or falling, but the wall goes on giving energy"),
-               (SWINGS, "swings on (a limit cycle, or worse)"), (NONE, "not stable even without a wall, or not measured")]
+    patches = [(RESTS, "comes to rest: proven"), (ACTIVE, "travel small or falling, but the wall goes on giving energy"),
+               (SWINGS, "swings on (a limit cycle, or worse)"), (UNDECIDED, "undecided: neither rest nor swing is proven"),
+               (NONE, "not stable even without a wall, or not measured")]
     groups = [[Patch(color=colour, label=label) for colour, label in (patches if stiffness else patches[3:])]]
     if stiffness:
-        def is_seen(key):
-            return any(stiffness[0] <= (column["analytic"][key] or 0) <= stiffness[-1] for column in columns)
+        def is_seen(values):
+            return any(stiffness[0] <= (value or 0) <= stiffness[-1] for value in values)
 
-        exact, passive, quantum, swing, energy = line_styles(2)
-        groups.append([Line2D([], [], label="measured: first swing", **swing),
+        exact, other, passive, quantum, swing, energy = line_styles(2)
+        groups.append([Line2D([], [], label="measured: first swing, of any seed", **swing),
+                       Line2D([], [], label="bar: first swings of all seeds", **BAND),
                        Line2D([], [], label="measured: first energy that goes on", **energy)])
-        groups.append([Line2D([], [], label="linear loop, exact (no friction, no encoder steps)", **exact)])
-        if is_seen("passive_n_per_mm"):
-            groups[2].append(Line2D([], [], label="passive: stable with any hand", **passive))
-        if is_seen("quantum_n_per_mm"):
-            groups[2].append(Line2D([], [], label="friction swallows encoder steps (for B = 0)", **quantum))
-    for place, group in zip((0.015, 0.42, 0.67), groups):
+        seen = [is_seen(values) for values in zip(*(analytic_lines(column) for column in columns))]
+        groups.append([Line2D([], [], label=label, **style) for drawn, label, style in zip(
+            seen, ("exact for this loop", "exact for another loop: linear two-sided wall,\nbackward difference, no friction, steps, limits",
+                   "passive: stable with any hand", "friction swallows encoder steps (for B = 0)"),
+            (exact, other, passive, quantum)) if drawn])
+    for place, group in zip((0.015, 0.42, 0.66), groups):
         picture.legend(handles=group, loc="upper left", bbox_to_anchor=(place, top), borderaxespad=0)
 
 

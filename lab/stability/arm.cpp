@@ -6,7 +6,6 @@
 #include <cmath>
 #include <memory>
 #include <numbers>
-#include <optional>
 #include <string>
 #include <utility>
 
@@ -25,7 +24,8 @@ namespace kerf::zwidth {
 namespace {
 
 constexpr double kRadiusMm = 1, kVoxelMm = 0.25;
-constexpr double kAwayMm = 3;  ///< the tool's middle above the flat, between two hits
+constexpr double kAwayMm = 3;     ///< the tool's middle above the flat, before a hit
+constexpr double kGentlyS = 0.4;  ///< from there into the wall, of a push
 /// x and z at which two more walls meet the flat: away from the hand's way in, which comes from -z,
 /// and from the point at which friction stops a soft hand short.
 constexpr double kCornerMm = 4.25;
@@ -90,32 +90,22 @@ std::array<ArmHit, kArmHits> hits_of(const LoopCase& subject, std::uint64_t seed
            {corner + out * kAwayMm, corner - out * depth_mm, 50, out, dot(corner, out)}}};
 }
 
-/// Each hit from its start, a stay, and off again by the way it came; high over to the next. The
-/// reach ends high above the first, and the hand comes down so slowly that it does not swing.
-HandScript script_of(const LoopCase& subject, const std::array<ArmHit, kArmHits>& hits,
-                     double seconds) {
+/// To the hit's start, at which it waits, then into the wall, where it stays. The reach ends high
+/// above, and the hand comes down so slowly that it does not swing.
+HandScript script_of(const LoopCase& subject, const ArmHit& hit) {
   constexpr double kHighMm = 20, kPeriods = 3;
   const double hand_rad_per_s = with_plant(PlantParams{}, subject).hand_rad_per_s();
   HandScript script;
-  const auto first = hits.front().from;
-  script.start = {first.x, first.y + kHighMm, first.z};
-  script.steps.push_back(hand_move(first, kPeriods * 2 * std::numbers::pi / hand_rad_per_s));
-  HandStep wait, stay;
+  script.start = {hit.from.x, hit.from.y + kHighMm, hit.from.z};
+  HandStep wait;
   wait.seconds = 0.2;
-  stay.seconds = seconds + 0.3;
-  for (const ArmHit& hit : hits) {
-    script.steps.push_back(hand_move(hit.from, 0.2));
-    script.steps.push_back(wait);
-    constexpr double kGentlyS = 0.4;
-    HandStep down = hand_move(hit.to, kGentlyS);
-    if (hit.mm_per_s > 0) {
-      down.seconds = norm(hit.to - hit.from) / hit.mm_per_s;
-      down.ease = HandStep::Ease::linear;
-    }
-    script.steps.push_back(down);
-    script.steps.push_back(stay);
-    script.steps.push_back(hand_move(hit.from + hit.normal * kAwayMm, 0.2));
+  HandStep down = hand_move(hit.to, kGentlyS);
+  if (hit.mm_per_s > 0) {
+    down.seconds = norm(hit.to - hit.from) / hit.mm_per_s;
+    down.ease = HandStep::Ease::linear;
   }
+  script.steps = {hand_move(hit.from, kPeriods * 2 * std::numbers::pi / hand_rad_per_s), wait,
+                  down};
   return script;
 }
 
@@ -136,49 +126,44 @@ class Rig {
   VirtualLoop loop_;
 };
 
-/// The verdict on a latched fault, or on a device that never comes free of the wall.
+/// The verdict on a latched fault.
 constexpr LimitCycle kLost{.swings = true, .active = true};
 
-/// Runs one hit and measures for `seconds` from the first contact on. Returns the verdict; a lost
-/// device after a fault, or if it still moves after kPatienceS without contact; empty if it rests
-/// without contact.
-std::optional<LimitCycle> watch_hit(Rig& rig, const LoopCase& subject, const ArmHit& hit,
-                                    double seconds, StepCounter& ticks, const SwingWatch& watch) {
+/// Runs one hit and follows it from the first contact on. Returns the verdict; a lost device after
+/// a fault. Throws NotMet after kPatienceS without contact.
+LimitCycle watch_hit(Rig& rig, const LoopCase& subject, const ArmHit& hit,
+                     const LimitCycleDetector::Ticks& limits, StepCounter& ticks,
+                     const SwingWatch& watch) {
   const double rate_hz = 1 / subject.loop.period_s;
-  const std::int64_t count = std::llround(seconds * rate_hz);
-  constexpr double kPatienceS = 8;  // calibration, the way there, and a stay that chattered away
-  LimitCycleDetector meter(count, subject.loop.quantum_mm, subject.push_n);
+  constexpr double kPatienceS = 8;  // calibration, and the way there
+  LimitCycleDetector detector(limits, subject.loop.quantum_mm, subject.push_n);
   std::int64_t away = 0;
-  // Some steps of the encoders within a second: else friction holds it, and nothing is unstable.
-  constexpr double kRestMm = 0.1;
-  std::array<double, 3> from_mm{};
-  bool restless = false;
-  std::int64_t judged = 0;
+  bool has_met = false;
   const std::int64_t settled = std::llround(0.05 * rate_hz);
   const std::int64_t patience = std::llround(kPatienceS * rate_hz);
-  for (std::int64_t tick = 0; judged < count; ++tick, ticks.tick()) {
-    if (tick - judged > patience) return restless ? std::optional(kLost) : std::nullopt;
+  ServoOutput last;
+  DeviceVec<double> last_mm{};
+  for (std::int64_t tick = 0;; ++tick, ticks.tick()) {
+    if (!has_met && tick > patience) throw NotMet();
     const ServoOutput out = rig.tick();
     if (out.fault != Fault::none) return kLost;
-    if (tick % std::llround(rate_hz) == 0) {
-      from_mm = out.position_mm;
-      restless = false;
-    }
-    restless = restless || vec3::length(vec3::operator-(out.position_mm, from_mm)) > kRestMm;
     const bool free = out.motors_on && out.phase == Phase::active && !out.contact;
-    if (judged == 0 && away < settled) {
+    const DeviceVec<double> true_mm = rig.plant().pose.tip_mm;
+    if (!has_met && away < settled) {
       away = free ? away + 1 : 0;
-    } else if (judged > 0 || out.contact) {
+    } else if (has_met || out.contact) {
+      has_met = true;
       const DeviceVec<double> tip_mm{out.position_mm[0], out.position_mm[1], out.position_mm[2]};
-      meter.take(dot(tip_mm, hit.normal), rig.plant().motor_work_mj);
-      if (watch) {
-        watch({dot(rig.plant().pose.tip_mm, hit.normal) - hit.wall_mm,
-               dot(rig.plant().velocity, hit.normal)});
+      if (watch)
+        watch({dot(true_mm, hit.normal) - hit.wall_mm, dot(rig.plant().velocity, hit.normal)});
+      const bool is_held = true_mm == last_mm && out.force_n == last.force_n;
+      if (detector.take(dot(tip_mm, hit.normal), rig.plant().motor_work_mj, is_held)) {
+        return detector.verdict();
       }
-      ++judged;
     }
+    last = out;
+    last_mm = true_mm;
   }
-  return meter.swing();
 }
 
 /// The scene of one cell.
@@ -231,30 +216,14 @@ LoadedScene walls_scene(const LoopCase& subject) {
 }
 
 LimitCycle hit_with_arm(const LoadedScene& scene, const LoopCase& subject,
-                        double stiffness_n_per_mm, double seconds, std::uint64_t seed,
-                        StepCounter& ticks) {
-  const std::array<ArmHit, kArmHits> hits = hits_of(subject, seed);
-  Rig rig(cell_scene(scene, subject, stiffness_n_per_mm), subject,
-          script_of(subject, hits, seconds));
-  LimitCycle worst;
-  for (const ArmHit& hit : hits) {
-    const std::optional<LimitCycle> seen = watch_hit(rig, subject, hit, seconds, ticks, {});
-    if (!seen && !worst.swings && !worst.active) throw NotMet();
-    worst.join(seen.value_or(kLost));
-    if (worst.swings && worst.active) break;
-  }
-  return worst;
-}
-
-void watch_arm(const LoadedScene& scene, const LoopCase& subject, double stiffness_n_per_mm,
-               double seconds, std::uint64_t seed, StepCounter& ticks,
-               const std::function<SwingWatch(std::size_t hit)>& begin) {
-  const std::array<ArmHit, kArmHits> hits = hits_of(subject, seed);
-  Rig rig(cell_scene(scene, subject, stiffness_n_per_mm), subject,
-          script_of(subject, hits, seconds));
-  for (std::size_t h = 0; h < hits.size(); ++h) {
-    if (!watch_hit(rig, subject, hits[h], seconds, ticks, begin(h))) return;
-  }
+                        double stiffness_n_per_mm, std::size_t hit, double limit_s,
+                        std::uint64_t seed, StepCounter& ticks, const SwingWatch& watch) {
+  // A tip that friction holds does not move before the hand has come to its place.
+  constexpr double kRememberedS = 2 * kGentlyS;
+  const ArmHit way = hits_of(subject, seed)[hit];
+  Rig rig(cell_scene(scene, subject, stiffness_n_per_mm), subject, script_of(subject, way));
+  return watch_hit(rig, subject, way, hit_ticks(subject, stiffness_n_per_mm, limit_s, kRememberedS),
+                   ticks, watch);
 }
 
 }  // namespace kerf::zwidth

@@ -3,7 +3,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <functional>
 
 #include "controller/load/loaded_scene.hpp"
 #include "hil/hil_error.hpp"
@@ -30,23 +29,17 @@ class NotMet : public HilError {
             "damping, or --hand firm") {}
 };
 
-/// The whole servo step, driver and emulated device in virtual time, on `walls_scene`: the hand
-/// pushes slowly, hits the flat at 50 and 200 mm/s, slides onto it at 50 mm/s, then hits the corner
-/// of three walls at 50 mm/s, and stays for `seconds` each time. A hit is judged along the normal,
-/// in the corner along the diagonal, from its first contact on, by the device's own encoders and
-/// the servo's own account of its work; the first that is bad by both rules ends the run.
+/// The whole servo step, driver and emulated device in virtual time, on `walls_scene`. The hits,
+/// each from a fresh start: the hand pushes slowly, hits the flat at 50 and 200 mm/s, slides onto
+/// it at 50 mm/s, or hits the corner of three walls at 50 mm/s; then it stays. A hit is judged
+/// along the normal, in the corner along the diagonal, from its first contact on, by the device's
+/// own encoders and the work of its motors. `watch` gets the device's true mechanics.
 ///
 /// The subject's delay counts in whole bus cycles of 125 us; encoder and limits are those of
 /// device and servo. Without a hand a spring of 0.2 N/mm pushes. Throws NotMet, or Interrupted.
 [[nodiscard]] LimitCycle hit_with_arm(const LoadedScene& scene, const LoopCase& subject,
-                                      double stiffness_n_per_mm, double seconds, std::uint64_t seed,
-                                      StepCounter& ticks);
-
-/// The same hits one after the other, whatever they show, until the hand no longer brings the
-/// device to the wall: `begin` gives for each who is told of its ticks, by the device's true
-/// mechanics.
-void watch_arm(const LoadedScene& scene, const LoopCase& subject, double stiffness_n_per_mm,
-               double seconds, std::uint64_t seed, StepCounter& ticks,
-               const std::function<SwingWatch(std::size_t hit)>& begin);
+                                      double stiffness_n_per_mm, std::size_t hit, double limit_s,
+                                      std::uint64_t seed, StepCounter& ticks,
+                                      const SwingWatch& watch = {});
 
 }  // namespace kerf::zwidth

@@ -70,12 +70,14 @@ bool has_word(const std::string& words, const std::string& word) {
 
 constexpr int kMostValues = 1000;
 
-/// from:to:count, rising; empty for another text.
-std::optional<grid::Range> rising_range(const std::string& text) {
-  const auto range = grid::range_in(text);
+/// from:to:count with two ends, in rising order; empty for another text.
+std::optional<grid::Range> ordered_range(const std::string& text) {
+  auto range = grid::range_in(text);
   const bool fits = range && range->count == std::floor(range->count) && range->count >= 2 &&
-                    range->count <= kMostValues && range->lo < range->hi;
-  return fits ? range : std::nullopt;
+                    range->count <= kMostValues && range->lo != range->hi;
+  if (!fits) return std::nullopt;
+  if (range->lo > range->hi) std::swap(range->lo, range->hi);
+  return range;
 }
 
 /// Mass, damping, stiffness. The pen-holds are chosen, not measured: light lets the device swing
@@ -221,8 +223,9 @@ const std::array<AxisKind, kAxisCount>& axis_kinds() {
 
 AxisValues axis_values(AxisId axis, const std::string& text) {
   const AxisKind& kind = kKinds[index_of(axis)];
+  const bool numbers = kind.lowest != kind.highest;
   AxisValues values;
-  if (const auto range = rising_range(text); range && kind.lowest != kind.highest) {
+  if (const auto range = ordered_range(text); range && numbers) {
     for (int i = 0; i < range->count; ++i) {
       const double share = static_cast<double>(i) / (range->count - 1);
       values.push_back(format("%.9g", range->lo + (range->hi - range->lo) * share));
@@ -232,27 +235,35 @@ AxisValues axis_values(AxisId axis, const std::string& text) {
   }
   if (values.empty()) fail(kind, text, "; give one, a list or a range (from:to:count)");
   for (const std::string& value : values) check(axis, value);
-  const bool numbers = kind.lowest != kind.highest;
-  for (std::size_t i = 1; i < values.size(); ++i) {
-    const bool falls = numbers && *number_in(values[i]) <= *number_in(values[i - 1]);
-    const bool again = std::find(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(i),
-                                 values[i]) != values.begin() + static_cast<std::ptrdiff_t>(i);
-    if (falls) fail(kind, text, "are no rising values; sort them, each once");
-    if (again) fail(kind, text, "has " + values[i] + " twice; name each once");
+  const auto same = [&](const std::string& a, const std::string& b) {
+    return numbers ? *number_in(a) == *number_in(b) : a == b;
+  };
+  if (numbers) {
+    std::ranges::stable_sort(values, {}, [](const std::string& a) { return *number_in(a); });
+  }
+  for (auto value = values.begin(); value != values.end(); ++value) {
+    const auto twin = std::find_if(value + 1, values.end(),
+                                   [&](const std::string& other) { return same(*value, other); });
+    if (twin == values.end()) continue;
+    fail(
+        kind, text,
+        "has " + *value + " twice" + (*twin == *value ? "" : ", as " + *twin) + "; name each once");
   }
   return values;
+}
+
+double seven_digits(double value) {
+  return *number_in(format("%.7g", value));
 }
 
 std::vector<double> stiffness_values(const std::string& text) {
   constexpr double kLowest = 1e-4, kHighest = 127;  // N/mm: steps of fixed point; below its 128
   std::vector<double> values;
-  const auto refuse = [&] {
-    throw HilError("--stiffness: " + text +
-                   " are no rising values from 0.0001 to 127 N/mm, apart by seven digits; use such "
-                   "as 0.05:50:40 (from, "
-                   "to, count) or 0.5,1,2");
+  const auto refuse = [&](const std::string& what) {
+    throw HilError("--stiffness: " + text + ": " + what +
+                   "; use such as 0.05:50:40 (from, to, count) or 0.5,1,2");
   };
-  if (const auto range = rising_range(text); range && range->lo > 0) {
+  if (const auto range = ordered_range(text); range && range->lo > 0) {
     for (int i = 0; i < range->count; ++i) {
       const double share = static_cast<double>(i) / (range->count - 1);
       values.push_back(range->lo * std::pow(range->hi / range->lo, share));
@@ -260,15 +271,18 @@ std::vector<double> stiffness_values(const std::string& text) {
   } else {
     for (const std::string& part : split(text, ',')) {
       const auto value = number_in(part);
-      if (!value || (!values.empty() && *value <= values.back())) refuse();
+      if (!value) refuse(part + " is no number");
       values.push_back(*value);
     }
   }
-  if (values.empty() || values.front() < kLowest || values.back() > kHighest) refuse();
-  // Seven digits: the same text, and so the same number, with every libm.
-  for (double& value : values) value = *number_in(format("%.7g", value));
-  for (std::size_t i = 1; i < values.size(); ++i) {
-    if (!(values[i] > values[i - 1])) refuse();
+  if (values.empty()) refuse("no value");
+  std::ranges::sort(values);
+  if (!(values.front() >= kLowest && values.back() <= kHighest)) {
+    refuse("not within 0.0001 and 127 N/mm");
+  }
+  for (double& value : values) value = seven_digits(value);
+  if (std::ranges::adjacent_find(values) != values.end()) {
+    refuse("a value twice, to seven digits");
   }
   return values;
 }

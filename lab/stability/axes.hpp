@@ -97,12 +97,16 @@ using AxisTable = std::array<AxisValues, kAxisCount>;
 /// One value for each axis; empty: the standard.
 using Assignment = std::array<std::string, kAxisCount>;
 
-/// "0:3:4" (from:to:count, even steps), "0,1,2" or one value, checked against the axis. Throws
-/// HilError with one line.
+/// "0:3:4" (from:to:count, even steps), "0,1,2" or one value, checked against the axis; numbers in
+/// rising order, whatever that of the text. Throws HilError with one line, also for a value twice.
 [[nodiscard]] AxisValues axis_values(AxisId axis, const std::string& text);
 
-/// The stiffnesses of "0.05:50:40", even in their ratio, or of a list, which must rise.
+/// The stiffnesses of "0.05:50:40", even in their ratio, or of a list, in rising order. Throws
+/// HilError with one line, also for a value twice.
 [[nodiscard]] std::vector<double> stiffness_values(const std::string& text);
+
+/// To seven digits: the same text, and so the same number, with every libm.
+[[nodiscard]] double seven_digits(double value);
 
 /// All combinations: the last axis turns fastest. Axes without values stay empty.
 [[nodiscard]] std::vector<Assignment> combinations(const AxisTable& table);

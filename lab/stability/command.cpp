@@ -75,10 +75,14 @@ void Outputs::write(const Part& part, std::ostream& out) const {
   plot_.write_report({"stability_map", "map"}, json, out);
 }
 
-std::string crossing_text(const StabilityBoundary& crossing) {
-  if (crossing.first_n_per_mm == StabilityBoundary::kNever) return "above all";
-  if (crossing.first_n_per_mm == 0) return "below all";
-  return format("%.4g", crossing.first_n_per_mm);
+/// The first crossings of the seeds, from the lowest to the highest.
+std::string crossing_text(const Column& column, const StabilityBoundary& crossing) {
+  const auto text = [&](double n_per_mm) {
+    const std::string none = no_crossing(column, n_per_mm);
+    return none.empty() ? format("%.4g", n_per_mm) : none;
+  };
+  const std::string first = text(crossing.first_n_per_mm), last = text(crossing.last_n_per_mm);
+  return first == last ? first : first + " to " + last;
 }
 
 /// One line for each column: its values, and the stiffness at which it stops.
@@ -99,8 +103,8 @@ void tell(const Part& part, std::ostream& out) {
   for (const auto& [index, column] : part.columns) {
     width = std::max(width, name_of(index).size());
   }
-  out << format("%-*s %10s %10s %10s %10s  re-entry\n", int(width), "column (N/mm)", "swings",
-                "energy", "exact", "passive");
+  out << format("%-*s %18s %18s %10s %10s  re-entry\n", int(width), "column (N/mm)", "swings",
+                "energy", "linear", "passive");
   for (const auto& [index, column] : part.columns) {
     const LoopCase subject = subject_of(columns[index]);
     if (column.cells.empty()) {
@@ -110,9 +114,9 @@ void tell(const Part& part, std::ostream& out) {
       continue;
     }
     const Analytic analytic = analytic_of(subject);
-    out << format("%-*s %10s %10s %10.4g %10.4g", int(width), name_of(index).c_str(),
-                  crossing_text(column.swing).c_str(), crossing_text(column.energy).c_str(),
-                  analytic.exact, analytic.passive);
+    out << format("%-*s %18s %18s %10.4g %10.4g", int(width), name_of(index).c_str(),
+                  crossing_text(column, column.swing).c_str(),
+                  crossing_text(column, column.energy).c_str(), analytic.exact, analytic.passive);
     if (column.swing.re_entry_from_n_per_mm > 0) {
       out << format("  %.4g to %.4g", column.swing.re_entry_from_n_per_mm,
                     column.swing.re_entry_to_n_per_mm);
@@ -147,7 +151,7 @@ class Command final : public LabCommand {
   bool quick_ = false, arm_ = false;
   double seconds_ = 0;
   std::uint32_t seed_ = 1;
-  int jobs_ = 0;
+  int jobs_ = 0, seeds_ = 0;
 };
 
 Command::Command(Arguments& program)
@@ -167,9 +171,17 @@ Command::Command(Arguments& program)
   app_.option("--map", map_, "the two axes of the picture").shown_as("X,Y").shows_default();
   app_.flag("--quick", quick_, "a small map of both loops, in seconds");
   app_.flag("--arm", arm_, "the whole servo step with an emulated device in place of one axis");
-  app_.option("--seconds", seconds_, "of each hit [3; 1 where quick]").within(0.1, 60);
+  app_.option(
+          "--seconds", seconds_,
+          "up to which a hit that is still open is followed, at least 60 [60]; for --portraits, "
+          "of each curve [3]")
+      .within(0.1, kLongestLimitS);
   app_.option("--seed", seed_, "shifts the encoders' steps against the wall; 0: an edge lies on it")
       .shows_default();
+  app_.option("--seeds", seeds_,
+              "so many from --seed on; a cell has the worst of them [5; 2 with "
+              "--quick]")
+      .within(1, static_cast<int>(kMostSeeds));
   app_.option("--jobs", jobs_, "threads [all cores]").within(1, 1024);
   app_.option("--shard", shard_, "only part i of n, into --part").shown_as("i/n");
   app_.option("--part", part_, "keep finished columns here, and go on from those that it has")
@@ -186,7 +198,8 @@ Command::Command(Arguments& program)
           "measure and write docs/stability.md, its pictures in plots/ beside it; takes minutes")
       .shown_as("FILE");
   app_.footer(
-      "An axis takes one value, a list (0,1,2) or a range (0:3:4: from, to, count). Two are "
+      "An axis takes one value, a list (0,1,2) or a range (0:3:4: from, to, count), in any order. "
+      "Two are "
       "mapped;\n"
       "each combination of the others is a panel of the picture. docs/stability.md has examples.\n"
       "Exit codes: 0 fine, 2 bad input or set-up; 130 interrupted, and --part has what is done.");
@@ -307,8 +320,14 @@ MapSpec Command::spec() const {
              : " has no low-pass behind it; add --estimator difference, or leave it out"));
   }
   spec.arm = arm_;
-  spec.seconds = seconds_ > 0 ? seconds_ : quick_ ? 1 : 3;
+  // No verdict depends on a shorter limit: the run that decides it is always followed.
+  constexpr double kCurveS = 3;
+  spec.seconds = portraits_.empty() ? std::max(seconds_, kLimitS)
+                 : seconds_ > 0     ? seconds_
+                                    : kCurveS;
   spec.seed = seed_;
+  if (quick_) spec.seeds = 2;
+  if (seeds_ > 0) spec.seeds = static_cast<std::size_t>(seeds_);
   constexpr std::size_t kMostColumns = 100000;
   std::size_t count = 1;
   for (const AxisValues& values : spec.table) {
@@ -407,7 +426,7 @@ int Command::run(std::ostream& out) const {
     const bool chooses =
         std::ranges::any_of(axes_, [](const std::string& a) { return !a.empty(); });
     if (chooses || arm_ || !stiffness_.empty() || !portraits_.empty() || seconds_ > 0 ||
-        seed_ != 1 || !cells_.empty() || shard_ != "1/1") {
+        seed_ != 1 || seeds_ > 0 || !cells_.empty() || shard_ != "1/1") {
       throw HilError("--page: its maps are its own; leave all but --quick and --jobs out");
     }
     write_page(out);
@@ -425,11 +444,11 @@ int Command::run(std::ostream& out) const {
   try_laws(map, out);
   if (!paths_.plot.empty()) check_panels(map);
   if (!portraits_.empty()) {
-    if (!axes_[index_of(AxisId::damping)].empty() || !stiffness_.empty() || shard_ != "1/1") {
+    if (!axes_[index_of(AxisId::damping)].empty() || !stiffness_.empty() || seeds_ > 0 ||
+        shard_ != "1/1") {
       throw HilError(
-          "--portraits: --cells have the stiffness and the damping; leave --stiffness, --damping "
-          "and "
-          "--shard out");
+          "--portraits: --cells have the stiffness and the damping, --seed the one seed; leave "
+          "--stiffness, --damping, --seeds and --shard out");
     }
     check_can_plot();
     const LabOutput output("--portraits", portraits_, ".svg");

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -16,26 +17,31 @@
 #include "lab/run/grid_run.hpp"
 #include "shared/posix/threads.hpp"
 
-/// Verdicts on a run of a sampled loop: whether it goes on swinging, and the guard against a step
-/// that does not end.
+/// Verdicts on a run of a sampled loop: whether it comes to rest or goes on swinging, and the guard
+/// against a step that does not end.
 namespace kerf::zwidth {
 
-/// The verdict on a run, by two rules.
+/// The verdict on a run. A run with none of the three flags is proven to be at rest.
 struct LimitCycle {
-  /// The tip's travel in the last third is above three encoder steps, and at least 0.97 of that in
-  /// the middle third: it does not die out.
+  /// In both halves of the last half of the run the tip reverses at least twice, each time after
+  /// more than one encoder step, and its travel does not fall. Or the run cannot go on.
   bool swings = false;
-  /// The wall gives energy in the last third, more than a push over three encoder steps takes, and
-  /// at least 0.94 (0.97 squared) of its energy in the middle third.
+  /// In both halves of the last half the motors give more energy than a push over one encoder step
+  /// takes, and neither this nor the travel falls.
   bool active = false;
-  double travel_mm = 0;  ///< in the last third
-  double given_mj = 0;   ///< by the motors to tip and hand: rise of the maximum in the last third
+  /// Neither: but travel or energy of the last half is above one encoder step.
+  bool undecided = false;
+  double travel_mm = 0;  ///< in the last half; 0: held by friction
+  double given_mj = 0;   ///< by the motors to tip and hand: rise of the maximum in the last half
   double port_minimum_mj = 0;  ///< lowest energy of the device port in a run that begins at 0
 
+  /// The worst that a run can show: no further run changes it.
+  [[nodiscard]] bool worst() const noexcept { return swings && active; }
   /// The worse of two runs.
   void join(const LimitCycle& other) noexcept {
     swings = swings || other.swings;
     active = active || other.active;
+    undecided = undecided || other.undecided;
     travel_mm = std::max(travel_mm, other.travel_mm);
     given_mj = std::max(given_mj, other.given_mj);
     port_minimum_mj = std::min(port_minimum_mj, other.port_minimum_mj);
@@ -50,58 +56,161 @@ struct SwingTick {
 /// Called with each tick; may be empty.
 using SwingWatch = std::function<void(const SwingTick&)>;
 
-/// Follows one run of a known number of ticks.
+/// Follows one run until its verdict is final. Rest is only reported if it is proven:
+///
+/// * the tip is held by friction under a constant force for longer than the loop remembers: a fixed
+///   point;
+/// * or travel and energy of the last half of the run are within one encoder step. A loop with an
+///   encoder can be quiet for long and then burst, so that counts at the limit alone. A loop
+///   without encoder steps ends as soon as it holds for the half of a shorter run, of the limit
+///   over a power of two: there it is so small that the loop is linear.
+///
+/// Any other run is followed to the limit. The verdict depends on the limit alone.
 class LimitCycleDetector {
  public:
-  static constexpr double kGoesOn = 0.97;  ///< travel of a third over that of the one before
+  struct Ticks {
+    std::int64_t limit;    ///< of the run
+    std::int64_t first;    ///< of the shortest run that counts, some periods of the loop
+    std::int64_t settled;  ///< held for so long: no earlier motion has an effect any more
+  };
 
-  LimitCycleDetector(std::int64_t ticks, double step_mm, double push_n) noexcept
-      : ticks_(ticks), least_mm_(std::max(3 * step_mm, kLeastMm)), least_mj_(least_mm_ * push_n) {}
-
-  /// Once per tick: position of the tip, and energy given by the motors since the start (N mm).
-  void take(double tip_mm, double given_mj) noexcept {
-    const auto third = static_cast<std::size_t>(std::min<std::int64_t>(2, tick_ * 3 / ticks_));
-    Third& now = thirds_[third];
-    now.lowest_mm = std::min(now.lowest_mm, tip_mm);
-    now.highest_mm = std::max(now.highest_mm, tip_mm);
-    now.given_mj = std::max(now.given_mj, given_mj);
-    if (tick_ == 0) first_given_mj_ = given_mj;
-    port_minimum_mj_ = std::min(port_minimum_mj_, first_given_mj_ - given_mj);
-    ++tick_;
+  LimitCycleDetector(const Ticks& ticks, double step_mm, double push_n) noexcept
+      : limit_(std::max<std::int64_t>(1, ticks.limit)),
+        settled_(ticks.settled),
+        smooth_(!(step_mm > 0)),
+        most_mm_(smooth_ ? kSmoothMm : step_mm),
+        most_mj_(most_mm_ * push_n) {
+    while ((limit_ >> (halvings_ + 1)) >= std::max(ticks.first, std::int64_t{kWindows})) {
+      ++halvings_;
+    }
+    end_ = limit_ >> halvings_;
   }
 
-  /// Of a run that has come to rest before its end.
-  [[nodiscard]] LimitCycle rest() const noexcept { return {.port_minimum_mj = port_minimum_mj_}; }
+  /// Once per tick: position of the tip, energy given by the motors since the start (N mm), and
+  /// whether tip and force are those of the last tick. Returns true if the verdict is final; no
+  /// more ticks are taken then.
+  [[nodiscard]] bool take(double tip_mm, double given_mj, bool is_held) noexcept {
+    if (tick_ == 0) {
+      first_given_mj_ = most_given_mj_ = before_mj_ = given_mj;
+      lowest_mm_ = highest_mm_ = tip_mm;
+    }
+    most_given_mj_ = std::max(most_given_mj_, given_mj);
+    port_minimum_mj_ = std::min(port_minimum_mj_, first_given_mj_ - given_mj);
+    Window& now = windows_[static_cast<std::size_t>((tick_ - begin_) * kWindows / (end_ - begin_))];
+    now.lowest_mm = std::min(now.lowest_mm, tip_mm);
+    now.highest_mm = std::max(now.highest_mm, tip_mm);
+    now.given_mj = most_given_mj_;
+    now.turns += turns(tip_mm) ? 1 : 0;
+    ++tick_;
+    held_ = is_held ? held_ + 1 : 0;
+    if (held_ > settled_) {
+      verdict_ = {.port_minimum_mj = port_minimum_mj_};
+      return true;
+    }
+    if (tick_ < end_) return false;
+    if (end_ == limit_ || (smooth_ && is_quiet())) {
+      verdict_ = judged();
+      return true;
+    }
+    begin_ = end_;
+    end_ = limit_ >> --halvings_;
+    before_mj_ = most_given_mj_;
+    windows_ = {};
+    return false;
+  }
 
-  [[nodiscard]] LimitCycle swing() const noexcept {
-    const double before = travel(thirds_[1]), last = travel(thirds_[2]);
-    const double gave = thirds_[1].given_mj - thirds_[0].given_mj;
-    LimitCycle swing = rest();
-    swing.travel_mm = last;
-    swing.given_mj = thirds_[2].given_mj - thirds_[1].given_mj;
-    swing.swings = last > least_mm_ && last >= kGoesOn * before;
-    swing.active = swing.given_mj > least_mj_ && swing.given_mj >= kGoesOn * kGoesOn * gave;
-    return swing;
+  [[nodiscard]] const LimitCycle& verdict() const noexcept { return verdict_; }
+
+  /// The verdict on a run that cannot go on.
+  [[nodiscard]] LimitCycle lost(double travel_mm = 0, double given_mj = 0) const noexcept {
+    return {.swings = true,
+            .active = true,
+            .travel_mm = travel_mm,
+            .given_mj = given_mj,
+            .port_minimum_mj = port_minimum_mj_};
   }
 
  private:
-  /// Below the step of any encoder: a loop without encoder steps counts as at rest within it.
-  static constexpr double kLeastMm = 1e-4;
+  static constexpr std::int64_t kWindows = 8;  ///< of half a run
+  /// In place of the step of an encoder, below that of any: a loop without one counts as at rest.
+  static constexpr double kSmoothMm = 1e-4;
 
-  struct Third {
+  struct Window {
     double lowest_mm = std::numeric_limits<double>::infinity();
     double highest_mm = -std::numeric_limits<double>::infinity();
-    double given_mj = -std::numeric_limits<double>::infinity();
+    double given_mj = 0;  ///< the most since the start
+    int turns = 0;
+
+    [[nodiscard]] double travel_mm() const noexcept { return highest_mm - lowest_mm; }
   };
-  static double travel(const Third& third) noexcept {
-    return std::max(0.0, third.highest_mm - third.lowest_mm);
+
+  /// Whether the tip has now come back by more than a step from its farthest point.
+  bool turns(double tip_mm) noexcept {
+    lowest_mm_ = std::min(lowest_mm_, tip_mm);
+    highest_mm_ = std::max(highest_mm_, tip_mm);
+    const bool falls = side_ >= 0 && highest_mm_ - tip_mm > most_mm_;
+    const bool rises = side_ <= 0 && tip_mm - lowest_mm_ > most_mm_;
+    if (!falls && !rises) return false;
+    const bool is_turn = side_ != 0;  // the first motion is none
+    side_ = rises ? 1 : -1;
+    lowest_mm_ = highest_mm_ = tip_mm;
+    return is_turn;
   }
 
-  std::int64_t ticks_;
-  double least_mm_, least_mj_;
-  std::int64_t tick_ = 0;
-  std::array<Third, 3> thirds_{};
-  double first_given_mj_ = 0, port_minimum_mj_ = 0;
+  [[nodiscard]] double travel_mm() const noexcept {
+    double lowest = windows_[0].lowest_mm, highest = windows_[0].highest_mm;
+    for (const Window& window : windows_) {
+      lowest = std::min(lowest, window.lowest_mm);
+      highest = std::max(highest, window.highest_mm);
+    }
+    return highest - lowest;
+  }
+
+  [[nodiscard]] double given_mj() const noexcept { return windows_.back().given_mj - before_mj_; }
+
+  [[nodiscard]] bool is_quiet() const noexcept {
+    return travel_mm() <= most_mm_ && given_mj() <= most_mj_;
+  }
+
+  [[nodiscard]] LimitCycle judged() const noexcept {
+    LimitCycle verdict{
+        .travel_mm = travel_mm(), .given_mj = given_mj(), .port_minimum_mj = port_minimum_mj_};
+    if (is_quiet()) return verdict;
+    // A chaotic swing has so many windows of ever less travel in one of 8! cases.
+    bool travel_falls = true, energy_falls = true;
+    std::array<int, 2> turns{};
+    double before_mj = windows_[0].given_mj, last_mj = before_mj - before_mj_;
+    for (std::size_t i = 0; i < windows_.size(); ++i) {
+      turns[2 * i / windows_.size()] += windows_[i].turns;
+      if (i == 0) continue;
+      travel_falls = travel_falls && windows_[i].travel_mm() < windows_[i - 1].travel_mm();
+      const double rise_mj = windows_[i].given_mj - before_mj;
+      energy_falls = energy_falls && rise_mj < last_mj;
+      before_mj = windows_[i].given_mj;
+      last_mj = rise_mj;
+    }
+    const double middle_mj = windows_[kWindows / 2 - 1].given_mj;
+    constexpr int kTurns = 2;
+    verdict.swings =
+        verdict.travel_mm > most_mm_ && turns[0] >= kTurns && turns[1] >= kTurns && !travel_falls;
+    verdict.active = middle_mj - before_mj_ > most_mj_ &&
+                     windows_.back().given_mj - middle_mj > most_mj_ && !travel_falls &&
+                     !energy_falls;
+    verdict.undecided = !verdict.swings && (verdict.travel_mm > most_mm_ || !verdict.active);
+    return verdict;
+  }
+
+  std::int64_t limit_, settled_;
+  bool smooth_;
+  double most_mm_, most_mj_;
+  int halvings_ = 0;
+  std::int64_t begin_ = 0, end_ = 0;  ///< of the half that is followed
+  std::int64_t tick_ = 0, held_ = 0;
+  std::array<Window, kWindows> windows_{};
+  int side_ = 0;                           ///< to which the tip moves
+  double lowest_mm_ = 0, highest_mm_ = 0;  ///< since it has turned
+  double first_given_mj_ = 0, most_given_mj_ = 0, before_mj_ = 0, port_minimum_mj_ = 0;
+  LimitCycle verdict_;
 };
 
 /// Ticks that a column took, and the request to end it half-way. Each thread has its own; others

@@ -5,7 +5,6 @@
 #include <atomic>
 #include <cmath>
 #include <mutex>
-#include <numbers>
 #include <utility>
 
 #include "controller/law/registry/law_registry.hpp"
@@ -27,56 +26,107 @@ namespace {
 class ColumnRun {
  public:
   ColumnRun(const MapSpec& spec, const LoopCase& subject, StepCounter& ticks)
-      : spec_(spec), subject_(subject), ticks_(ticks) {
+      : spec_(spec),
+        subject_(subject),
+        ticks_(ticks),
+        // The seed shifts the steps of the encoders.
+        seeds_(spec.arm || subject.loop.quantum_mm > 0 ? spec.seeds : 1) {
     if (spec.arm) scene_ = walls_scene(subject);
   }
 
-  const LimitCycle& at(double stiffness) {
-    const auto [place, is_new] = known_.try_emplace(stiffness);
-    if (is_new) place->second = measure(stiffness);
-    return place->second;
+  LimitCycle cell(double stiffness) {
+    LimitCycle worst;
+    for (std::size_t i = 0; i < seeds_ && !worst.worst(); ++i) worst.join(at(stiffness, i));
+    return worst;
   }
 
-  StabilityBoundary crossing(bool LimitCycle::*rule) {
-    const std::vector<double>& grid = spec_.stiffness_n_per_mm;
-    const auto bad = [&](double stiffness) { return at(stiffness).*rule; };
+  StabilityBoundary crossing(bool LimitCycle::*rule, const std::vector<LimitCycle>& cells) {
     StabilityBoundary found;
-    std::size_t first = 0;
-    while (first < grid.size() && !bad(grid[first])) ++first;
-    if (first == grid.size()) return found;
-    for (std::size_t i = first; i < grid.size(); ++i) {
-      if (bad(grid[i])) {
+    found.last_n_per_mm = 0;
+    for (std::size_t i = 0; i < seeds_; ++i) {
+      const double first = first_of(rule, i);
+      found.first_n_per_mm = std::min(found.first_n_per_mm, first);
+      found.last_n_per_mm = std::max(found.last_n_per_mm, first);
+    }
+    for (std::size_t i = 0; i < cells.size(); ++i) {
+      const double stiffness = spec_.stiffness_n_per_mm[i];
+      if (stiffness <= found.first_n_per_mm) continue;
+      if (cells[i].*rule || cells[i].undecided) {
         if (found.re_entry_from_n_per_mm > 0) break;
         continue;
       }
-      if (found.re_entry_from_n_per_mm == 0) found.re_entry_from_n_per_mm = grid[i];
-      found.re_entry_to_n_per_mm = grid[i];
+      if (found.re_entry_from_n_per_mm == 0) found.re_entry_from_n_per_mm = stiffness;
+      found.re_entry_to_n_per_mm = stiffness;
     }
-    found.first_n_per_mm = 0;
-    if (first == 0) return found;
-    double low = grid[first - 1], high = grid[first];
-    constexpr double kClose = 1.005;
-    while (high > low * kClose) {
-      const double middle = std::sqrt(low * high);
-      (bad(middle) ? high : low) = middle;
-    }
-    found.first_n_per_mm = low;
     return found;
   }
 
- private:
-  /// Until one hit has shown the worst by both rules. The same places in all columns, so that two
-  /// columns differ by their values alone, whatever else the map has.
-  LimitCycle measure(double stiffness) {
-    const double seconds = std::max(spec_.seconds, needed_seconds(subject_, stiffness));
-    if (spec_.arm) {
-      return hit_with_arm(scene_, subject_, stiffness, seconds, spec_.seed, ticks_);
+  /// The lowest of all that have a verdict.
+  [[nodiscard]] double undecided() const {
+    for (const auto& [place, seen] : known_) {
+      if (seen.undecided) return place.first;
     }
+    return StabilityBoundary::kNever;
+  }
+
+ private:
+  /// From the lowest stiffness up, in steps so fine that an island of swings between two cells of
+  /// the map is found; then halved to 0.5 %. The whole arm, which is slower, has the map's steps.
+  double first_of(bool LimitCycle::*rule, std::size_t seed) {
+    constexpr double kFine = 1.01, kClose = 1.005;
+    const auto bad = [&](double stiffness) { return at(stiffness, seed).*rule; };
+    const std::vector<double>& grid = spec_.stiffness_n_per_mm;
+    if (bad(grid.front())) return 0;
+    for (std::size_t cell = 1; cell < grid.size(); ++cell) {
+      const double ratio = grid[cell] / grid[cell - 1];
+      const int parts = spec_.arm ? 1 : int(std::ceil(std::log(ratio) / std::log(kFine)));
+      double low = grid[cell - 1];
+      for (int part = 1; part <= parts; ++part) {
+        double high =
+            part == parts
+                ? grid[cell]
+                : seven_digits(grid[cell - 1] * std::pow(ratio, static_cast<double>(part) / parts));
+        const bool is_cell = part == parts;
+        if ((!is_cell && !(looked(high, seed).*rule)) || !bad(high)) {
+          low = high;
+          continue;
+        }
+        while (high > low * kClose) {
+          const double middle = seven_digits(std::sqrt(low * high));
+          (bad(middle) ? high : low) = middle;
+        }
+        return high;
+      }
+    }
+    return StabilityBoundary::kNever;
+  }
+
+  const LimitCycle& at(double stiffness, std::size_t nth) {
+    const auto [place, is_new] = known_.try_emplace({stiffness, nth});
+    if (is_new) place->second = measured(stiffness, nth, 1);
+    return place->second;
+  }
+
+  /// A first look between two cells, with a fifth of the limit: what swings there gets the verdict.
+  const LimitCycle& looked(double stiffness, std::size_t nth) {
+    constexpr double kPart = 0.2;
+    const auto [place, is_new] = looked_.try_emplace({stiffness, nth});
+    if (is_new) place->second = measured(stiffness, nth, kPart);
+    return place->second;
+  }
+
+  /// All hits of a seed, until one has shown the worst by both rules. The same places in all
+  /// columns, so that two columns differ by their values alone, whatever else the map has.
+  LimitCycle measured(double stiffness, std::size_t nth, double part) {
+    const std::uint64_t seed = spec_.seed + nth;
+    const double limit_s = part * std::max(spec_.seconds, needed_seconds(subject_, stiffness));
     LimitCycle worst;
-    for (std::size_t hit = 0; hit < kHitsMmPerS.size(); ++hit) {
-      const std::uint64_t seed = spec_.seed == 0 ? 0 : (spec_.seed << 32) + hit;
-      worst.join(hit_one_axis(subject_, stiffness, kHitsMmPerS[hit], seconds, seed, ticks_));
-      if (worst.swings && worst.active) break;
+    for (std::size_t hit = 0; hit < (spec_.arm ? kArmHits : kHitsMmPerS.size()); ++hit) {
+      const std::uint64_t place_of_hit = seed == 0 ? 0 : (seed << 32) + hit;
+      worst.join(spec_.arm ? hit_with_arm(scene_, subject_, stiffness, hit, limit_s, seed, ticks_)
+                           : hit_one_axis(subject_, stiffness, kHitsMmPerS[hit], limit_s,
+                                          place_of_hit, ticks_));
+      if (worst.worst()) break;
     }
     return worst;
   }
@@ -84,11 +134,10 @@ class ColumnRun {
   const MapSpec& spec_;
   LoopCase subject_;
   StepCounter& ticks_;
-  LoadedScene scene_;  ///< of the whole arm
-  std::map<double, LimitCycle> known_;
+  std::size_t seeds_;
+  LoadedScene scene_;                                                    ///< of the whole arm
+  std::map<std::pair<double, std::size_t>, LimitCycle> known_, looked_;  ///< by stiffness and seed
 };
-
-constexpr double kLongestS = 600;  // of a hit: a column of one axis is then some minutes
 
 }  // namespace
 
@@ -96,19 +145,13 @@ double needed_seconds(const LoopCase& subject, double stiffness_n_per_mm) {
   const SampledLoop& loop = subject.loop;
   const double mass_kg = loop.mass_kg + loop.hand.mass_kg;
   const double n_per_m = 1000 * (stiffness_n_per_mm + loop.hand.stiffness_n_per_mm);
-  const double period_s = 2 * std::numbers::pi * std::sqrt(mass_kg / n_per_m);
   const double ns_per_m =
       1000 * (loop.viscous_ns_per_mm + subject.damping_ns_per_mm + loop.hand.damping_ns_per_mm);
-  constexpr double kPeriods = 2;  // of a third: its travel is then from peak to peak
-  constexpr double kOfDecay = 0.01;
-  const double rate_per_s = ns_per_m / (2 * mass_kg);
-  const double slow_s =
-      rate_per_s > 0 ? -std::log(LimitCycleDetector::kGoesOn) / (kOfDecay * rate_per_s) : 0;
-  // Let go with the most force for all of the delay, the tip flies until the push has taken the
-  // same impulse back.
-  const double delay_s = subject.loop.delay_s + subject.loop.period_s;
-  const double flight_s = 2 * LimitSettings().force_n * delay_s / subject.push_n;
-  return 3 * std::max(kPeriods * (period_s + flight_s), slow_s);
+  constexpr double kWindows = 16, kConstants = 12, kOfDecay = 0.01, kFall = 0.09;
+  const bool creeps = ns_per_m * ns_per_m > 4 * mass_kg * n_per_m;
+  return std::max({kWindows * slowest_swing_s(subject, stiffness_n_per_mm),
+                   creeps ? kConstants * ns_per_m / n_per_m : 0,
+                   ns_per_m > 0 ? kFall * 2 * mass_kg / (kOfDecay * ns_per_m) : 0});
 }
 
 std::string impossible(const MapSpec& spec, const LoopCase& subject) {
@@ -131,10 +174,11 @@ std::string impossible(const MapSpec& spec, const LoopCase& subject) {
                   rate_hz);
   }
   const double needed_s = needed_seconds(subject, spec.stiffness_n_per_mm.front());
-  if (needed_s > kLongestS) {
+  if (needed_s > kLongestLimitS) {
     return format(
-        "mass %g kg: a hit would last %.3g s, above %g, to show whether its swings die out",
-        subject.loop.mass_kg, needed_s, kLongestS);
+        "mass %g kg, damping %g N s/mm: a hit would last %.3g s, above %g, to show whether its "
+        "motion dies out",
+        subject.loop.mass_kg, subject.loop.viscous_ns_per_mm, needed_s, kLongestLimitS);
   }
   const double most = highest_damping(subject.loop);
   if (subject.damping_ns_per_mm <= most) return {};
@@ -149,10 +193,11 @@ Column measure_column(const MapSpec& spec, const Assignment& values, StepCounter
   try {
     ColumnRun run(spec, subject, ticks);
     for (const double stiffness : spec.stiffness_n_per_mm) {
-      column.cells.push_back(run.at(stiffness));
+      column.cells.push_back(run.cell(stiffness));
     }
-    column.swing = run.crossing(&LimitCycle::swings);
-    column.energy = run.crossing(&LimitCycle::active);
+    column.swing = run.crossing(&LimitCycle::swings, column.cells);
+    column.energy = run.crossing(&LimitCycle::active, column.cells);
+    column.undecided_n_per_mm = run.undecided();
   } catch (const NotMet&) {
     return {};
   } catch (const LawError& error) {

@@ -16,14 +16,19 @@
 
 namespace kerf::zwidth {
 
+/// A hit that is still open is followed for so long, s.
+inline constexpr double kLimitS = 60, kLongestLimitS = 600;
+inline constexpr std::size_t kMostSeeds = 100;
+
 /// The specification of a map. Two runs with the same value give the same map, bit for bit.
 struct MapSpec {
   std::array<std::size_t, 2> mapped{};  ///< axes of the picture, `kAxisCount`: stiffness
   std::vector<double> stiffness_n_per_mm;
   AxisTable table;
-  bool arm = false;    ///< the whole servo with an emulated device, else one axis
-  double seconds = 3;  ///< of each hit, at least
-  std::uint64_t seed = 1;
+  bool arm = false;          ///< the whole servo with an emulated device, else one axis
+  double seconds = kLimitS;  ///< to which a hit that is still open is followed, at least
+  std::uint64_t seed = 1;    ///< the first one
+  std::size_t seeds = 5;     ///< so many, one after the other; one alone if encoders have no steps
 
   [[nodiscard]] std::vector<Assignment> columns() const { return combinations(table); }
 };
@@ -31,8 +36,10 @@ struct MapSpec {
 /// The stiffness at which a column stops being fine, by one rule.
 struct StabilityBoundary {
   static constexpr double kNever = std::numeric_limits<double>::infinity();
-  /// The first crossing, to 0.5 %; 0: not even the lowest stiffness is fine; kNever: all are.
+  /// The lowest stiffness, within 0.5 %, at which a hit of any seed is bad; 0: the lowest of all
+  /// is; kNever: none is.
   double first_n_per_mm = kNever;
+  double last_n_per_mm = kNever;  ///< the largest first one of a single seed
   /// Cells above it that are fine again, their lowest and highest; 0: none.
   double re_entry_from_n_per_mm = 0, re_entry_to_n_per_mm = 0;
 };
@@ -41,14 +48,15 @@ struct StabilityBoundary {
 struct Column {
   std::vector<LimitCycle> cells;  ///< empty: it cannot exist, or the hand never met the wall
   StabilityBoundary swing, energy;
+  /// The lowest stiffness at which a hit is undecided; kNever: none.
+  double undecided_n_per_mm = StabilityBoundary::kNever;
 };
 using Columns = std::map<std::size_t, Column>;
 
-/// How long a hit has to last, s, so that its thirds tell a swing that dies out: two periods of the
-/// spring and the mass each, and of the flight behind a delay; and if damping b takes the swing
-/// away, at the rate b/(2 m) without a wall and less and less up to the boundary, so long that the
-/// verdict's ratio puts the boundary within 1 % of b (S9 asks for 2). 0 for the latter if
-/// nothing damps: no boundary is near.
+/// The limit that a hit needs, s, so that a swing that dies out is told from one that does not: in
+/// half of it eight windows of the slowest swing; twelve time constants of an overdamped creep; and
+/// if damping b takes the swing away, at the rate b/(2 m) without a wall and less and less up to
+/// the boundary, so long that at 1 % of that rate it falls by 9 %.
 [[nodiscard]] double needed_seconds(const LoopCase& subject, double stiffness_n_per_mm);
 
 /// The reason if a column cannot exist: its damping alone is beyond what any sampled wall may have,

@@ -18,7 +18,7 @@
 namespace kerf::zwidth {
 namespace {
 
-constexpr int kFormat = 2;  ///< of a part file
+constexpr int kFormat = 3;  ///< of a part file
 constexpr grid::PartWords kPartWords{
     .option = "--part",
     .busy = "another run is at work on it; wait for that, or name another file",
@@ -27,28 +27,30 @@ constexpr grid::PartWords kPartWords{
 
 Json json_of(const StabilityBoundary& crossing) {
   return Json{
-      {"first", crossing.first_n_per_mm},  // null: never
+      {"first", Json::List{crossing.first_n_per_mm, crossing.last_n_per_mm}},  // null: never
       {"re_entry", Json::List{crossing.re_entry_from_n_per_mm, crossing.re_entry_to_n_per_mm}}};
 }
 
+double stiffness_in(const Json& json) {
+  return json.is_null() ? StabilityBoundary::kNever : json.get<double>();
+}
+
 StabilityBoundary crossing_in(const Json& json) {
-  StabilityBoundary crossing;
-  if (!json.at("first").is_null()) crossing.first_n_per_mm = json.at("first").get<double>();
-  crossing.re_entry_from_n_per_mm = json.at("re_entry").at(0).get<double>();
-  crossing.re_entry_to_n_per_mm = json.at("re_entry").at(1).get<double>();
-  return crossing;
+  return {stiffness_in(json.at("first").at(0)), stiffness_in(json.at("first").at(1)),
+          json.at("re_entry").at(0).get<double>(), json.at("re_entry").at(1).get<double>()};
 }
 
 std::string line_of(std::size_t index, const Column& column) {
   Json cells = Json::List{};
   for (const LimitCycle& cell : column.cells) {
-    cells.push_back(
-        Json::List{cell.swings, cell.active, cell.travel_mm, cell.given_mj, cell.port_minimum_mj});
+    cells.push_back(Json::List{cell.swings, cell.active, cell.undecided, cell.travel_mm,
+                               cell.given_mj, cell.port_minimum_mj});
   }
   return Json{{"column", index},
               {"cells", std::move(cells)},
               {"swing", json_of(column.swing)},
-              {"energy", json_of(column.energy)}}
+              {"energy", json_of(column.energy)},
+              {"undecided", column.undecided_n_per_mm}}
       .canonical();
 }
 
@@ -56,12 +58,13 @@ void take_line(const std::string& line, Part& part) {
   const Json json = Json::parse(line);
   Column column;
   for (const Json& cell : json.at("cells")) {
-    column.cells.push_back({cell.at(0).get<bool>(), cell.at(1).get<bool>(),
-                            cell.at(2).get<double>(), cell.at(3).get<double>(),
-                            cell.at(4).get<double>()});
+    column.cells.push_back({cell.at(0).get<bool>(), cell.at(1).get<bool>(), cell.at(2).get<bool>(),
+                            cell.at(3).get<double>(), cell.at(4).get<double>(),
+                            cell.at(5).get<double>()});
   }
   column.swing = crossing_in(json.at("swing"));
   column.energy = crossing_in(json.at("energy"));
+  column.undecided_n_per_mm = stiffness_in(json.at("undecided"));
   part.columns[json.at("column").get<std::size_t>()] = std::move(column);
 }
 
@@ -75,7 +78,8 @@ std::string head_of(const Part& part) {
               {"program", part.program}, {"shard", Json::List{part.shard.index, part.shard.count}},
               {"map", spec.mapped},      {"stiffness_n_per_mm", spec.stiffness_n_per_mm},
               {"axes", std::move(axes)}, {"arm", spec.arm},
-              {"seconds", spec.seconds}, {"seed", spec.seed}}
+              {"seconds", spec.seconds}, {"seed", spec.seed},
+              {"seeds", spec.seeds}}
       .canonical();
 }
 
@@ -100,6 +104,7 @@ void take_head(const std::string& line, Part& part) {
   spec.arm = json.at("arm").get<bool>();
   spec.seconds = json.at("seconds").get<double>();
   spec.seed = json.at("seed").get<std::uint64_t>();
+  spec.seeds = json.at("seeds").get<std::size_t>();
 }
 
 /// A pipe would wait for ever, and /dev/null keeps nothing.
@@ -120,18 +125,24 @@ void check_spec(const MapSpec& spec) {
   for (std::size_t i = 0; i < kAxisCount; ++i) {
     if (spec.table[i].empty()) continue;
     const std::string text = joined(spec.table[i], [](const std::string& value) { return value; });
-    static_cast<void>(axis_values(static_cast<AxisId>(i), text));
+    if (axis_values(static_cast<AxisId>(i), text) != spec.table[i]) {
+      throw HilError(std::string("--") + axis_kinds()[i].name + ": " + text + " does not rise");
+    }
   }
-  static_cast<void>(stiffness_values(joined(spec.stiffness_n_per_mm, number_text)));
+  const std::string stiffnesses = joined(spec.stiffness_n_per_mm, number_text);
+  if (stiffness_values(stiffnesses) != spec.stiffness_n_per_mm) {
+    throw HilError("--stiffness: " + stiffnesses + " does not rise");
+  }
   for (const std::size_t axis : spec.mapped) {
     if (axis < kAxisCount ? spec.table[axis].empty() : axis > kAxisCount) {
       throw HilError("--map: an axis without values");
     }
   }
   if (spec.mapped[0] == spec.mapped[1]) throw HilError("--map: the same axis twice");
-  if (!(spec.seconds >= 0.1 && spec.seconds <= 60)) {
-    throw HilError("--seconds: not within 0.1 and 60");
+  if (!(spec.seconds >= kLimitS && spec.seconds <= kLongestLimitS)) {
+    throw HilError("--seconds: not within 60 and 600");
   }
+  if (spec.seeds < 1 || spec.seeds > kMostSeeds) throw HilError("--seeds: not within 1 and 100");
 }
 
 /// The same map, whatever the shard and the program.
@@ -156,12 +167,23 @@ std::string gap_of(const Part& part, std::size_t column_count) {
          " columns; run its shard " + shard_text(part.shard) + " again, it resumes";
 }
 
-Json crossing_json(const StabilityBoundary& crossing) {
-  const bool all = crossing.first_n_per_mm == StabilityBoundary::kNever;
-  return Json{{"first_n_per_mm", crossing.first_n_per_mm},  // null where all cells are fine
-              {"all_fine", all},
-              {"re_entry_from_n_per_mm", crossing.re_entry_from_n_per_mm},
-              {"re_entry_to_n_per_mm", crossing.re_entry_to_n_per_mm}};
+/// A stiffness, or null; 0 and kNever are none.
+Json stiffness_json(double n_per_mm) {
+  const bool is_one = n_per_mm > 0 && n_per_mm != StabilityBoundary::kNever;
+  return is_one ? Json(n_per_mm) : Json(nullptr);
+}
+
+Json crossing_json(const Column& column, const StabilityBoundary& crossing) {
+  const auto reason = [&](double n_per_mm) {
+    const std::string text = no_crossing(column, n_per_mm);
+    return text.empty() ? Json(nullptr) : Json(text);
+  };
+  return Json{{"first_n_per_mm", stiffness_json(crossing.first_n_per_mm)},
+              {"reason", reason(crossing.first_n_per_mm)},
+              {"last_n_per_mm", stiffness_json(crossing.last_n_per_mm)},
+              {"last_reason", reason(crossing.last_n_per_mm)},
+              {"re_entry_from_n_per_mm", stiffness_json(crossing.re_entry_from_n_per_mm)},
+              {"re_entry_to_n_per_mm", stiffness_json(crossing.re_entry_to_n_per_mm)}};
 }
 
 template <class Each>
@@ -315,16 +337,30 @@ void PartWriter::finish() {
 }
 
 Analytic analytic_of(const LoopCase& subject) {
-  const bool is_bare = subject.loop.delay_s <= 0 && subject.damping_ns_per_mm <= 0;
-  return {highest_stiffness(subject.loop, subject.damping_ns_per_mm),
-          passive_stiffness(subject.loop, subject.damping_ns_per_mm),
-          is_bare ? quantum_stiffness(subject.loop) : 0};
+  const SampledLoop& loop = subject.loop;
+  const bool is_bare = loop.delay_s <= 0 && subject.damping_ns_per_mm <= 0;
+  const bool differs = subject.estimator.name != "difference" ||
+                       (subject.law != Law::two_sided && subject.law != Law::linear) ||
+                       !subject.stabiliser.name.empty();
+  const bool is_passive = !differs && !subject.limits && subject.numeric == NumericKind::float64;
+  const bool is_linear =
+      is_passive && subject.law == Law::two_sided && loop.coulomb_n == 0 && loop.quantum_mm == 0;
+  return {highest_stiffness(loop, subject.damping_ns_per_mm),
+          passive_stiffness(loop, subject.damping_ns_per_mm), is_bare ? quantum_stiffness(loop) : 0,
+          is_linear, is_passive};
+}
+
+std::string no_crossing(const Column& column, double n_per_mm) {
+  if (column.cells.empty()) return "not measured";
+  if (n_per_mm == 0) return "below all";
+  if (n_per_mm != StabilityBoundary::kNever) return {};
+  return column.undecided_n_per_mm == StabilityBoundary::kNever ? "above all" : "undecided";
 }
 
 std::string csv_of(const Part& part) {
   std::string text;
   each_axis([&](AxisId, const AxisKind& kind) { text += column_name(kind) + ","; });
-  text += "stiffness_n_per_mm,swings,active,travel_mm,given_mj,port_minimum_mj\n";
+  text += "stiffness_n_per_mm,swings,active,undecided,travel_mm,given_mj,port_minimum_mj\n";
   const std::vector<Assignment> columns = part.spec.columns();
   for (const auto& [index, column] : part.columns) {
     std::string head;
@@ -332,8 +368,9 @@ std::string csv_of(const Part& part) {
     for (std::size_t i = 0; i < column.cells.size(); ++i) {
       const LimitCycle& cell = column.cells[i];
       text += head + number_text(part.spec.stiffness_n_per_mm[i]) + (cell.swings ? ",1" : ",0") +
-              (cell.active ? ",1," : ",0,") + number_text(cell.travel_mm) + "," +
-              number_text(cell.given_mj) + "," + number_text(cell.port_minimum_mj) + "\n";
+              (cell.active ? ",1" : ",0") + (cell.undecided ? ",1," : ",0,") +
+              number_text(cell.travel_mm) + "," + number_text(cell.given_mj) + "," +
+              number_text(cell.port_minimum_mj) + "\n";
     }
   }
   return text;
@@ -358,18 +395,22 @@ std::string json_of(const Part& part) {
     for (const LimitCycle& cell : column.cells) {
       cells.push_back({{"swings", cell.swings},
                        {"active", cell.active},
+                       {"undecided", cell.undecided},
                        {"travel_mm", cell.travel_mm},
                        {"given_mj", cell.given_mj},
                        {"port_minimum_mj", cell.port_minimum_mj}});
     }
     columns.push_back({{"axes", axes_json(values)},
                        {"impossible", why.empty() ? Json(nullptr) : Json(why)},
-                       {"by_travel", crossing_json(column.swing)},
-                       {"by_energy", crossing_json(column.energy)},
+                       {"by_travel", crossing_json(column, column.swing)},
+                       {"by_energy", crossing_json(column, column.energy)},
+                       {"undecided_from_n_per_mm", stiffness_json(column.undecided_n_per_mm)},
                        {"analytic",
                         {{"exact_n_per_mm", analytic.exact},
                          {"passive_n_per_mm", analytic.passive},
-                         {"quantum_n_per_mm", analytic.quantum}}},
+                         {"quantum_n_per_mm", stiffness_json(analytic.quantum)},
+                         {"exact_holds", analytic.exact_holds},
+                         {"passive_holds", analytic.passive_holds}}},
                        {"cells", std::move(cells)}});
   }
   Json varied = Json::List{};
@@ -380,13 +421,10 @@ std::string json_of(const Part& part) {
   for (const std::size_t axis : part.spec.mapped) {
     mapped.push_back(axis == kAxisCount ? "stiffness" : axis_kinds()[axis].name);
   }
-  return Json{{"version", KERF_VERSION},
-              {"seed", part.spec.seed},
-              {"seconds", part.spec.seconds},
-              {"whole_arm", part.spec.arm},
-              {"mapped", std::move(mapped)},
-              {"varied", std::move(varied)},
-              {"stiffness_n_per_mm", part.spec.stiffness_n_per_mm},
+  return Json{{"version", KERF_VERSION},      {"seed", part.spec.seed},
+              {"seeds", part.spec.seeds},     {"seconds", part.spec.seconds},
+              {"whole_arm", part.spec.arm},   {"mapped", std::move(mapped)},
+              {"varied", std::move(varied)},  {"stiffness_n_per_mm", part.spec.stiffness_n_per_mm},
               {"columns", std::move(columns)}}
       .document();
 }

@@ -63,12 +63,22 @@ class PartWriter {
 };
 
 /// The analytic boundaries of a column, N/mm; 0: none is stable, or the bound is about another loop
-/// (`quantum`: without delay and B). Of the linear loop, without the limits, and with the backward
-/// difference for every estimator.
+/// (`quantum`: without delay and B). Of the linear loop with the backward difference, whatever the
+/// column's own loop is.
 struct Analytic {
   double exact, passive, quantum;
+  /// The column's loop is that of `exact`: two-sided linear wall, backward difference, double,
+  /// without friction, encoder steps, limits and stabiliser.
+  bool exact_holds;
+  /// Its wall is that of `passive` and `quantum`, which hold with friction, encoder steps and a
+  /// wall that never pulls: linear, backward difference, double, without limits and stabiliser.
+  bool passive_holds;
 };
 [[nodiscard]] Analytic analytic_of(const LoopCase& subject);
+
+/// Why a first crossing (`StabilityBoundary`) is no stiffness: "not measured", "below all", "above
+/// all", or "undecided" if no cell is bad but one is open; else empty.
+[[nodiscard]] std::string no_crossing(const Column& column, double n_per_mm);
 
 /// One row for each cell: all axes, then its figures. A column that cannot exist has no rows.
 [[nodiscard]] std::string csv_of(const Part& part);

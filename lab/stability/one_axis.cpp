@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <numbers>
 
 #include "controller/law/velocity_estimators.hpp"
 #include "controller/law/virtual_coupling.hpp"
@@ -125,17 +126,8 @@ double shift_of(std::uint64_t seed) {
   return static_cast<double>((seed ^ (seed >> 31)) >> 11) * 0x1p-53;
 }
 
-/// A run that cannot go on.
-LimitCycle lost(const LimitCycleDetector& meter, double travel_mm = 0, double given_mj = 0) {
-  LimitCycle swing = meter.rest();
-  swing.swings = swing.active = true;
-  swing.travel_mm = travel_mm;
-  swing.given_mj = given_mj;
-  return swing;
-}
-
 template <class N>
-LimitCycle hit(const LoopCase& subject, double stiffness, double hit_mm_per_s, double seconds,
+LimitCycle hit(const LoopCase& subject, double stiffness, double hit_mm_per_s, double limit_s,
                std::uint64_t seed, StepCounter& ticks, const SwingWatch& watch) {
   const SampledLoop& loop = subject.loop;
   const double push_n = loop.coulomb_n + subject.push_n;
@@ -143,36 +135,55 @@ LimitCycle hit(const LoopCase& subject, double stiffness, double hit_mm_per_s, d
   axis.start(kStartMm, -hit_mm_per_s);
   OneAxisWall<N> wall(subject, stiffness, axis.encoder_mm());
 
-  const std::int64_t count = std::llround(seconds / loop.period_s);
-  // Friction holds the tip, and all that the wall remembers is over.
-  const std::int64_t settled = std::llround(0.2 / loop.period_s) +
-                               static_cast<std::int64_t>(kMaxDelayPeriods) +
-                               VelocityWindow<N>::kIntervals * VelocityWindow<N>::kMaxStride;
-  constexpr double kFarMm = 1e4;  // no motion comes back from there
-  LimitCycleDetector meter(count, loop.quantum_mm, push_n);
-  std::int64_t still = 0;
-  for (std::int64_t tick = 0; tick < count; ++tick, ticks.tick()) {
+  constexpr double kRememberedS = 0.2, kFarMm = 1e4;  // no motion comes back from there
+  LimitCycleDetector detector(hit_ticks(subject, stiffness, limit_s, kRememberedS), loop.quantum_mm,
+                              push_n);
+  double last_n = 0;
+  while (true) {
     const double asked_n = wall.force(axis.encoder_mm());
-    if (!std::isfinite(asked_n)) return lost(meter);  // the servo would latch a fault
+    if (!std::isfinite(asked_n)) return detector.lost();  // the servo would latch a fault
     axis.tick(asked_n, -push_n);
-    meter.take(axis.place_mm(), axis.motor_work_mj());
+    ticks.tick();
     if (watch) watch({axis.place_mm(), axis.mm_per_s()});
-    still = axis.stuck() ? still + 1 : 0;
-    if (still > settled) return meter.rest();
-    if (!(std::abs(axis.place_mm()) < kFarMm)) return lost(meter, kFarMm, axis.motor_work_mj());
+    if (!(std::abs(axis.place_mm()) < kFarMm)) return detector.lost(kFarMm, axis.motor_work_mj());
+    const bool is_held = axis.stuck() && asked_n == last_n;
+    last_n = asked_n;
+    if (detector.take(axis.place_mm(), axis.motor_work_mj(), is_held)) return detector.verdict();
   }
-  return meter.swing();
 }
 
 }  // namespace
 
+double slowest_swing_s(const LoopCase& subject, double stiffness_n_per_mm) {
+  const SampledLoop& loop = subject.loop;
+  const double mass_kg = loop.mass_kg + loop.hand.mass_kg;
+  const double n_per_m = 1000 * (stiffness_n_per_mm + loop.hand.stiffness_n_per_mm);
+  const double period_s = 2 * std::numbers::pi * std::sqrt(mass_kg / n_per_m);
+  const double delay_s = loop.delay_s + loop.period_s;
+  const double flight_s = 2 * LimitSettings().force_n * delay_s / subject.push_n;
+  constexpr double kLeastS = 0.25;
+  return std::max(kLeastS, period_s + flight_s);
+}
+
+LimitCycleDetector::Ticks hit_ticks(const LoopCase& subject, double stiffness_n_per_mm,
+                                    double limit_s, double remembered_s) {
+  const double period_s = subject.loop.period_s;
+  constexpr int kSwings = 4;  // two in half a run: its travel is then from peak to peak
+  return {
+      .limit = std::llround(limit_s / period_s),
+      .first = std::llround(kSwings * slowest_swing_s(subject, stiffness_n_per_mm) / period_s),
+      .settled =
+          std::llround(remembered_s / period_s) + static_cast<std::int64_t>(kMaxDelayPeriods) +
+          VelocityWindow<DoubleNumbers>::kIntervals * VelocityWindow<DoubleNumbers>::kMaxStride};
+}
+
 LimitCycle hit_one_axis(const LoopCase& subject, double stiffness_n_per_mm, double hit_mm_per_s,
-                        double seconds, std::uint64_t seed, StepCounter& ticks,
+                        double limit_s, std::uint64_t seed, StepCounter& ticks,
                         const SwingWatch& watch) {
   return subject.numeric == NumericKind::fixed
-             ? hit<FixedNumbers>(subject, stiffness_n_per_mm, hit_mm_per_s, seconds, seed, ticks,
+             ? hit<FixedNumbers>(subject, stiffness_n_per_mm, hit_mm_per_s, limit_s, seed, ticks,
                                  watch)
-             : hit<DoubleNumbers>(subject, stiffness_n_per_mm, hit_mm_per_s, seconds, seed, ticks,
+             : hit<DoubleNumbers>(subject, stiffness_n_per_mm, hit_mm_per_s, limit_s, seed, ticks,
                                   watch);
 }
 

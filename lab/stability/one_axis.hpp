@@ -14,13 +14,24 @@ namespace kerf::zwidth {
 inline constexpr std::array<double, 3> kHitsMmPerS{0, 50, 200};
 inline constexpr double kStartMm = 0.1;
 
+/// The slowest motion of a hit, s: the period of the spring and the mass, with the flight behind a
+/// delay. Let go with the most force for all of the delay, the tip flies until the push has taken
+/// the same impulse back. Never below 0.25 s.
+[[nodiscard]] double slowest_swing_s(const LoopCase& subject, double stiffness_n_per_mm);
+
+/// The same for a run of this limit, as ticks. `remembered_s` is how long an earlier motion of a
+/// tip that is held has an effect, beyond the delay and the velocity window.
+[[nodiscard]] LimitCycleDetector::Ticks hit_ticks(const LoopCase& subject,
+                                                  double stiffness_n_per_mm, double limit_s,
+                                                  double remembered_s);
+
 /// One axis against a wall at 0, the solid below: exact mechanics and the servo's own coupling,
 /// velocity window and force limits, in the subject's numbers.
 ///
 /// `seed` shifts the encoder's steps against the wall by a part of one; 0: an edge lies on it.
-/// Returns the verdict of `seconds`. The same arguments give the same bits. Throws Interrupted.
+/// `limit_s` is that of the verdict. The same arguments give the same bits. Throws Interrupted.
 [[nodiscard]] LimitCycle hit_one_axis(const LoopCase& subject, double stiffness_n_per_mm,
-                                      double hit_mm_per_s, double seconds, std::uint64_t seed,
+                                      double hit_mm_per_s, double limit_s, std::uint64_t seed,
                                       StepCounter& ticks, const SwingWatch& watch = {});
 
 }  // namespace kerf::zwidth

@@ -71,26 +71,17 @@ Json thinned(const Curves& curves) {
   return hits;
 }
 
-Curves curves_of_axis(const MapSpec& spec, const LoopCase& subject, double stiffness,
-                      StepCounter& ticks) {
-  Curves curves;
-  for (const double speed : kHitsMmPerS) {
-    Curve& curve = curves.emplace_back();
-    static_cast<void>(hit_one_axis(subject, stiffness, speed, spec.seconds, spec.seed, ticks,
-                                   [&](const SwingTick& tick) { curve.push_back(tick); }));
+Curves curves_of(const MapSpec& spec, const LoopCase& subject, double stiffness,
+                 StepCounter& ticks) {
+  Curves curves(spec.arm ? kArmHits : kHitsMmPerS.size());
+  const LoadedScene scene = spec.arm ? walls_scene(subject) : LoadedScene();
+  for (std::size_t hit = 0; hit < curves.size(); ++hit) {
+    const auto watch = [&curve = curves[hit]](const SwingTick& tick) { curve.push_back(tick); };
+    static_cast<void>(spec.arm ? hit_with_arm(scene, subject, stiffness, hit, spec.seconds,
+                                              spec.seed, ticks, watch)
+                               : hit_one_axis(subject, stiffness, kHitsMmPerS[hit], spec.seconds,
+                                              spec.seed, ticks, watch));
   }
-  return curves;
-}
-
-Curves curves_of_arm(const MapSpec& spec, const LoopCase& subject, double stiffness,
-                     StepCounter& ticks) {
-  Curves curves(kArmHits);
-  watch_arm(walls_scene(subject), subject, stiffness, spec.seconds, spec.seed, ticks,
-            [&](std::size_t hit) {
-              return [&curve = curves[hit]](const SwingTick& tick) { curve.push_back(tick); };
-            });
-  std::erase_if(curves, [](const Curve& curve) { return curve.empty(); });
-  if (curves.empty()) throw NotMet();
   return curves;
 }
 
@@ -126,11 +117,9 @@ std::string portraits_of(const MapSpec& spec, const std::vector<std::string>& ce
     subject.damping_ns_per_mm = damping;
     StepCounter ticks;
     const TickWatch::Watched watched(watch, ticks, laws_of(values));
-    const Curves curves = spec.arm ? curves_of_arm(spec, subject, stiffness, ticks)
-                                   : curves_of_axis(spec, subject, stiffness, ticks);
     list.push_back({{"stiffness_n_per_mm", stiffness},
                     {"damping_ns_per_mm", damping},
-                    {"hits", thinned(curves)}});
+                    {"hits", thinned(curves_of(spec, subject, stiffness, ticks))}});
   }
   return Json{{"seed", spec.seed},
               {"seconds", spec.seconds},

@@ -47,7 +47,7 @@ PY
 "$bin/kerf-lab" sweep "$root/scenes/touch.toml" --set force.stiffness_n_per_mm=0.2,0.4 \
   --set servo.rate_hz=500,1000 --seconds 1.2 --out "$work/sweep" >"$work/sweep.txt"
 if "$bin/kerf-lab" --help | grep -q '^ *zwidth '; then
-  "$bin/kerf-lab" zwidth --stiffness 0.1:10:8 --damping 0:0.01:4 --loop ideal --seconds 0.3 \
+  "$bin/kerf-lab" zwidth --stiffness 0.1:10:8 --damping 0:0.01:4 --loop ideal \
     --csv "$work/map.csv" >"$work/map.txt"
 fi
 examples=$root/examples/python

@@ -113,9 +113,9 @@ def accuracy_rows():
 
 ACCURACY = {"provenance": "a day, a machine.", "rows": accuracy_rows()}
 
-MAP = lab("zwidth", "--damping", "0:0.03:3", "--rate", "500,1000", "--stiffness", "0.05:50:6", "--seconds", "0.2")
+MAP = lab("zwidth", "--damping", "0:0.03:3", "--rate", "500,1000", "--stiffness", "0.05:50:6", "--seeds", "1")
 HEIGHTS = lab("zwidth", "--map", "numeric,rate", "--numeric", "fixed,double", "--rate", "500,1000", "--damping", "0.002",
-              "--stiffness", "0.05:50:5", "--seconds", "0.2")
+              "--stiffness", "0.05:50:5", "--seeds", "1")
 PORTRAITS = {"seed": 1, "seconds": 1, "whole_arm": False, "axes": MAP["columns"][0]["axes"],
              "cells": [{"stiffness_n_per_mm": 1, "damping_ns_per_mm": 0.002,
                         "hits": [{"name": "push", "tip_mm": [0, -1], "mm_per_s": [0, 1]}]}]}
