@@ -87,7 +87,8 @@ ToolMesh joined(std::span<const LooseTriangle> triangles, double scale, double n
     Cell own = corner;
     if (noise > 0) {
       for (double& x : own) x = std::floor(x / noise);
-      for (int near = 0; near < 27; ++near) {
+      for (int step = 0; step < 27; ++step) {
+        const int near = (step + 13) % 27;  // the corner's own cell first
         const Cell cell = own + Cell{near % 3 - 1.0, near / 3 % 3 - 1.0, near / 9 - 1.0};
         const auto at = known.find(cell);
         if (at == known.end()) continue;
