@@ -175,7 +175,9 @@ TEST_CASE("a project that is not whole, or no project, is refused in one line") 
       {tar_file("a/main.plist", plist({})) + tar_file("b/matrix.dat", "x") + kEnd, "is missing"},
       {tar_file("a/main.plist", "<plist><dict>") + kEnd, "its main.plist is no XML"},
       {tar_file("a/main.plist", std::string((1 << 20) + 1, ' ')) + kEnd, "above 1 MiB"},
-      {with([](Project& p) { p.shape = "<integer>60</integer>"; }), "no shape of three"},
+      {with([](Project& p) { p.shape = "<integer>60</integer>"; }),
+       "matrix/shape has not 3 numbers"},
+      {with([](Project& p) { p.shape = ""; }), "no shape of three"},
       {with([](Project& p) { p.shape = "<integer>0</integer><real>4</real><real>3</real>"; }), "0"},
       {with([](Project& p) { p.shape = "<real>9e18</real><real>4</real><real>3</real>"; }),
        "9e+18"},
@@ -185,7 +187,14 @@ TEST_CASE("a project that is not whole, or no project, is refused in one line") 
       {with([](Project& p) { p.matrix += "x"; }), "121 bytes where its shape asks for 120"},
       {with([](Project& p) { p.orientation = "<integer>4</integer>"; }), "orientation is '4'"},
       {with([](Project& p) { p.orientation = ""; }), "orientation is ''"},
-      {with([](Project& p) { p.spacing = "<real>1</real>"; }), "spacing is not in the file"},
+      {with([](Project& p) { p.spacing = ""; }), "spacing is not in the file"},
+      {with([](Project& p) { p.spacing = "<real>1</real>"; }), "spacing has not 3 numbers"},
+      {with([](Project& p) { p.spacing = "<real>1</real><real>nan</real><real>1</real>"; }),
+       "spacing has not 3 numbers"},
+      {with([](Project& p) { p.more = "<key>patient_orientation</key><string>L</string>"; }),
+       "patient_orientation has not 6 numbers"},
+      {with([](Project& p) { p.more = affine("1 0 0"); }), "affine has not 16 numbers"},
+      {with([](Project& p) { p.more = "<key>affine</key><string></string>"; }), "no error"},
       {with([](Project& p) { p.spacing = "<real>1</real><real>-2</real><real>3</real>"; }),
        "1 -2 3 mm is not a voxel size"},
       {with([](Project& p) { p.more = affine("2 0 0 0 0 2 0 0 0 0 2 0 0 0 0 1"); }),
@@ -197,7 +206,7 @@ TEST_CASE("a project that is not whole, or no project, is refused in one line") 
     CAPTURE(message);
     CAPTURE(std::string(what));
     CHECK(has(message, what));
-    CHECK(is_one_line(message));
+    CHECK((is_one_line(message) || message == "no error"));
   }
 }
 

@@ -109,7 +109,7 @@ class Archive {
 /// array are in the order of the array.
 class PropertyList {
  public:
-  PropertyList(const fs::path& path, std::string_view xml) {
+  PropertyList(const fs::path& path, std::string_view xml) : path_(path) {
     const std::unique_ptr<XML_ParserStruct, void (*)(XML_Parser)> parser(XML_ParserCreate(nullptr),
                                                                          XML_ParserFree);
     XML_SetUserData(parser.get(), this);
@@ -139,13 +139,20 @@ class PropertyList {
     const std::vector<std::string> all = texts(key);
     return all.size() == 1 ? all.front() : std::string();
   }
-  /// The numbers of a key with `count` of them, else none.
+  /// The numbers of a key; none if it is not there, or empty as `affine` often is. Refuses others
+  /// than `count` of them.
   [[nodiscard]] std::vector<double> numbers(const std::string& key, std::size_t count) const {
     std::vector<double> values;
-    for (const std::string& text : texts(key)) {
+    const std::vector<std::string> all = texts(key);
+    for (const std::string& text : all) {
       if (const auto value = number_in(text)) values.push_back(*value);
     }
-    return values.size() == count && texts(key).size() == count ? values : std::vector<double>{};
+    const bool absent = all.empty() || (all.size() == 1 && all.front().empty());
+    if (!absent && (all.size() != count || values.size() != count)) {
+      refuse(path_, "its " + key + " has not " + std::to_string(count) +
+                        " numbers; save the project again");
+    }
+    return values;
   }
 
  private:
@@ -168,6 +175,7 @@ class PropertyList {
     }
   }
 
+  const fs::path& path_;
   std::map<std::string, std::vector<std::string>> values_;
   std::string way_, text_;
   std::vector<std::size_t> before_;  ///< for each open dict and array: length of the way to it
