@@ -307,7 +307,7 @@ UntrustedHeader claim_of(const fs::path& path, const Stack& stack, Note& note) {
       claim.spacing_known |= kBetween;
     }
     note.add("slices without position, in the order of " +
-             std::string(first.file->frames.size() > 1 ? "frames" : "InstanceNumber") +
+             std::string(first.file->frames.size() > 1 ? "their numbers" : "InstanceNumber") +
              ": may be mirrored");
   }
   return claim;
