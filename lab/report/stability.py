@@ -83,9 +83,10 @@ These are the emulator's devices. The check of a scene (docs/devices.md, "Gains"
 STABILISERS = """
 ## Stabilisers
 
-The same with B = 0.002 N s/mm and a stabiliser that has the device's mass and damping: one axis / whole arm, one seed. docs/energy.md has the effect on the hand. `passivity` books a force in the tick that commands
-it. With a delay the force acts later, and the port may give far more energy than is booked: `port_minimum_mj` of `--csv`
-has the lowest energy of the port in each cell. A run that swings and is active ends its cell.
+The same with B = 0.002 N s/mm and a stabiliser that has the device's mass and damping: one axis / whole arm, one seed.
+docs/energy.md has the effect on the hand. `passivity` books a force in the tick that commands it. With a delay the force
+acts later, and the port may give far more energy than is booked: `port_minimum_mj` of `--csv` has the lowest energy of the
+port in each cell. A run that swings and is active ends its cell.
 
 """
 
@@ -202,7 +203,8 @@ class Maps:
             raise text.BadInput("kerf-lab: ended; no page is made")
         with tempfile.TemporaryDirectory() as folder:
             words = [self.program, "zwidth", *more, "--json", f"{folder}/map.json",
-                     "--stiffness", "0.05:2:3" if quick else f"0.05:50:{stiffnesses}", *(["--seeds", "1"] if quick and "--seeds" not in more else [])]
+                     "--stiffness", "0.05:2:3" if quick else f"0.05:50:{stiffnesses}",
+                     *(["--seeds", "1"] if quick and "--seeds" not in more else [])]
             for axis, values in axes.items():
                 words += [f"--{axis}", values]
             if self.jobs:
