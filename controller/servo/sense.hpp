@@ -131,14 +131,17 @@ template <class N>
 TipMotion move_tip(const ServoPlan<N>& plan, ServoState<N>& state,
                    const DevicePose<N>& pose) noexcept {
   using Real = typename N::Real;
-  const std::uint32_t gap = std::clamp<std::uint32_t>(state.tip_ticks, 1, 1000);
+  constexpr std::uint32_t kMostMean = 32'000;  // a Real holds it; the force is long faded by then
+  const std::uint32_t since = std::clamp<std::uint32_t>(state.tip_ticks, 1, kMostMean);
+  const std::uint32_t gap = std::min<std::uint32_t>(since, 1000);
   if (!state.tip_known) state.tip_mm = pose.arm.tip_mm;
   const auto moved_mm = pose.arm.tip_mm - state.tip_mm;
   const auto ticks = Real(static_cast<double>(gap));
+  const auto summed = Real(static_cast<double>(since));
   const DeviceVec<Real> sent_n =
       gap == 1 ? state.force_n
-               : DeviceVec<Real>{state.force_sum_n.x / ticks, state.force_sum_n.y / ticks,
-                                 state.force_sum_n.z / ticks};
+               : DeviceVec<Real>{state.force_sum_n.x / summed, state.force_sum_n.y / summed,
+                                 state.force_sum_n.z / summed};
   state.ledger.move(sent_n, moved_mm, gap);
   state.velocity_mm_per_s =
       plan.velocity(state.velocity, {pose.arm.tip_mm, gap, !state.velocity.begun});

@@ -202,7 +202,8 @@ std::int64_t track_without_force(const ServoPlan<N>& plan, ServoState<N>& state,
 
 /// The force on the tool, and its removal by overlap. Without a usable pose the force of the last
 /// good report is held and then faded, and nothing is cut. `contact` stays the default if the hand
-/// gets no force, apart from the samples that were read, and if the force law failed.
+/// gets no force, and if the force law failed, apart from the samples that were read and the
+/// removal.
 template <class N>
 ForceRequest<N> wanted_force(const ServoPlan<N>& plan, ServoState<N>& state,
                              const Sensed<N>& sensed, ContactResult<N>& contact) noexcept {
@@ -224,7 +225,11 @@ ForceRequest<N> wanted_force(const ServoPlan<N>& plan, ServoState<N>& state,
   contact = contact_and_cut(plan, state, sensed.tip_mm, state.rotation, sensed.velocity_mm_per_s);
   if (plan.contact.swept && !(all_finite(contact.contact_n) && all_finite(contact.spring_n))) {
     latch(Fault::force_law, supervisor);
-    contact = {};
+    // What the overlap removed in this tick is gone: it stays counted, and a reset restores it.
+    ContactResult<N> kept;
+    kept.removed = contact.removed;
+    kept.samples_read = contact.samples_read;
+    contact = kept;
     return {};
   }
   const DeviceVec<Real> tool_n = contact.contact_n + contact.modification_n;

@@ -12,6 +12,7 @@
 #include "lab/rig/contact_rig.hpp"
 #include "lab/rig/geometry.hpp"
 #include "lab/rig/tool_meshes.hpp"
+#include "shared/posix/program.hpp"
 
 namespace kerf::extremes {
 namespace {
@@ -84,8 +85,8 @@ std::array<EdgedTool, 3> edged_tools() {
 }
 
 SceneTool shipped_bur(double units_per_mm, double pitch) {
-  constexpr const char* kFile = "scenes/burs/fluted.stl";
-  return make_mesh_tool("bur", join_triangles(read_stl(kFile), units_per_mm, kFile), pitch);
+  const std::string file = find_data_file("scenes/burs/fluted.stl");
+  return make_mesh_tool("bur", join_triangles(read_stl(file), units_per_mm, file), pitch);
 }
 
 void measure_shapes(const Effort& effort, const RowSink& add_row) {

@@ -7,6 +7,7 @@
 The commands of kerf run it for --page, --plot, --svg and --portraits; it writes no file. The head of each subject's module
 has the form of its JSON. A page needs Python alone, a plot matplotlib too. The same input gives the same bytes. Exit code
 2 and one line on standard error: the input or the set-up is wrong."""
+import difflib
 import importlib
 import importlib.util
 import json
@@ -45,8 +46,9 @@ def run(words):
         return ""
     draws = KINDS.get(tuple(words[:2]))
     if draws is None:
-        raise BadInput(f"lab/report: {' '.join(words) or 'nothing'}: unknown; known are "
-                       + ", ".join(" ".join(kind) for kind in KINDS))
+        wanted = " ".join(words[:2]) or "nothing"
+        near = difflib.get_close_matches(wanted, map(" ".join, KINDS), 1, 0)[0]
+        raise BadInput(f"lab/report: {wanted}: unknown; did you mean {near}? The head of {__file__} lists all")
     if draws:
         need_matplotlib()
     name = f"lab/report: {words[0]} {words[1]}"

@@ -246,6 +246,22 @@ TEST_CASE("clocks that differ by hours: local readers see local times") {
   }
 }
 
+TEST_CASE("a run in lock-step has no clock: its ticks keep their times on the far side") {
+  FarEnd far;
+  Sender sender(7);
+  sender.hello.server_ns = far.now_ns + 30 * kHourNs;
+  sender.hello.start_ns = 0;
+  far.greet(sender);
+  sender.next.heartbeat_ns = far.now_ns + 30 * kHourNs - 9'000'000;
+  far.mirror.records(sender.record(41, 42'000'000));
+  far.apply(sender.whole_pass(3));
+  const SegmentConnection connection = connect_segment("far");
+  CHECK(connection.reader().info().start_ns == 0);
+  REQUIRE(connection.reader().latest());
+  CHECK(connection.reader().latest()->start_ns == 42'000'000);
+  CHECK(connection.reader().heartbeat_ns() == static_cast<std::uint64_t>(far.now_ns - 9'000'000));
+}
+
 TEST_CASE("the clock's offset is that of the fastest message, and follows a drift slowly") {
   ClockOffset clock;
   const std::int64_t start = 10 * kHourNs, way = 20'000'000;

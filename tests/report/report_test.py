@@ -201,7 +201,7 @@ class Report(unittest.TestCase):
             self.refused(words, {**data, rows: []})
             less = {key: value for key, value in data.items() if key != rows}
             self.assertIn(f"no '{rows}'", self.refused(words, less))
-        self.assertIn("known are recording forces", self.refused(["none", "page"], {}))
+        self.assertIn("did you mean stability_map map?", self.refused(["stabilty", "map"], {}))
         code, out, complaint = run_alone(["kernels", "page"], {})
         self.assertEqual((code, out, complaint.count("\n")), (2, "", 1))
         self.assertTrue(complaint.startswith("lab/report: kernels page: no 'provenance' in the JSON"), complaint)

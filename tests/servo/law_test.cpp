@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -187,6 +188,27 @@ TEST_CASE(
       CHECK(out.motor_counts == std::array<std::int16_t, 3>{});
     }
   }
+}
+
+TEST_CASE("what the overlap removes in the tick in which a law fails is counted, and comes back") {
+  LoadedScene scene = with_force_law(NumericKind::float64, 0);
+  scene.cut.model = CutModel::overlap;
+  scene.cut.rate_per_s = 500;
+  auto servo = compile(scene);
+  const std::span<const Density> density = servo->density(0);
+  const std::vector<Density> before(density.begin(), density.end());
+  KinematicOmni arm;
+  arm_at(*servo, arm, 0, 0.4, 0);
+  const ServoOutput out = servo->step(arm.at(0, 0.4, 0));
+  REQUIRE(out.fault == Fault::force_law);
+  std::uint64_t gone = 0;
+  for (std::size_t i = 0; i < before.size(); ++i) gone += before[i] - density[i];
+  CHECK(gone > 0);
+  CHECK(out.removed_by_volume[0] == gone);
+  CHECK_FALSE(out.changed[0].empty());
+  servo->apply({.kind = ServoCommand::Kind::reset});
+  for (int tick = 0; tick < 2000; ++tick) static_cast<void>(servo->step(arm.at(0, 5, 0)));
+  CHECK(std::ranges::equal(before, density));
 }
 
 TEST_CASE("a velocity that is no number is told as 0 and latches a fault of its own") {

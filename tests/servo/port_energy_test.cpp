@@ -141,6 +141,25 @@ TEST_CASE("lost reports: the spring keeps its store, and what holding and fading
   }
 }
 
+TEST_CASE("a silence of seconds books the mean of the forces over all of its ticks") {
+  for (const NumericKind numeric : {NumericKind::fixed, NumericKind::float64}) {
+    for (const int lost : {500, 3000}) {
+      CAPTURE(lost);
+      LoadedScene scene = half_space_scene();
+      scene.servo.numeric = numeric;
+      ArmedServo armed(scene);
+      const ServoOutput before = armed.settled(0, 0.4, 0);
+      double sent_n = before.force_n[1];
+      for (int i = 0; i < lost; ++i) sent_n += armed.servo->step({}).force_n[1];
+      const ServoOutput after = armed.step(0, 0.2, 0);
+      const double moved_mm = before.position_mm[1] - after.position_mm[1];
+      const double step_n = numeric == NumericKind::fixed ? 2e-5 : 1e-9;
+      CHECK(std::abs(after.absorbed_mj - before.absorbed_mj - sent_n / (lost + 1) * moved_mm) <=
+            step_n * moved_mm + 1e-6);
+    }
+  }
+}
+
 TEST_CASE("what limits, fading in and cutting do has an account") {
   LoadedScene scene = half_space_scene();
   ArmedServo armed(scene);
