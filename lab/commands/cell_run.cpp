@@ -8,13 +8,23 @@
 #include <sstream>
 #include <string_view>
 #include <thread>
+#include <utility>
 
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "controller/plan/plan_device.hpp"
 #include "hil/hil_error.hpp"
+#include "lab/commands/contact_swing.hpp"
 #include "lab/run/child_process.hpp"
 #include "shared/numeric/energy_source.hpp"
+#include "shared/posix/monotonic_clock.hpp"
 #include "shared/posix/program.hpp"
+#include "shared/segment/connection.hpp"
 #include "shared/text/json.hpp"
 #include "shared/text/text.hpp"
+#include "shared/wire/personality.hpp"
 
 namespace kerf::sweep {
 namespace {
@@ -53,6 +63,65 @@ std::string device_of(const CellJob& job) {
   const std::string set = setting_of(job, "device.personality");
   return set.empty() ? "omni" : set;
 }
+
+/// Of a word that names none, which the programs refuse, the first.
+Personality personality_of(const std::string& word) {
+  const auto found = std::ranges::find(kPersonalityWords, word);
+  return static_cast<Personality>(
+      found == kPersonalityWords.end() ? 0 : found - kPersonalityWords.begin());
+}
+
+/// Reads every tick of a run in lock-step: the controller waits at a FIFO until the ring of ticks
+/// has room again, so that no run depends on the speed of this process.
+class TickFollower {
+ public:
+  /// Makes the FIFO `--until`. Throws `HilError`.
+  TickFollower(std::string name, const std::filesystem::path& fifo, Personality device)
+      : name_(std::move(name)), step_mm_(2 * device_parts::tip_noise_mm(device)) {
+    if (mkfifo(fifo.c_str(), S_IRUSR | S_IWUSR) == 0) {
+      fifo_ = OwnedFd(open(fifo.c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC));
+    }
+    if (fifo_.get() < 0) throw HilError(fifo.string() + ": no FIFO can be made; set TMPDIR");
+  }
+
+  /// Reads the ticks that are there, and allows the next ones.
+  void poll() {
+    if (!run_ && !connect()) return;
+    const SegmentReader& reader = run_->reader();
+    TickRecord record;
+    while (next_ < reader.state_head() && reader.state_at(next_, record) == ReadState::ok) {
+      swing_->take(record);
+      ++next_;
+    }
+    const std::uint64_t allowed = next_ + reader.info().state_slots / 2;
+    if (allowed < allowed_ + reader.info().state_slots / 8) return;
+    allowed_ = allowed;
+    static_cast<void>(!write(fifo_.get(), &allowed_, sizeof allowed_));
+  }
+
+  [[nodiscard]] std::string swing() const { return swing_ ? swing_->word() : ""; }
+
+ private:
+  bool connect() {
+    try {
+      run_.emplace(connect_segment(name_));
+    } catch (const SegmentError&) {
+      return false;
+    }
+    const SegmentInfo& info = run_->reader().info();
+    const Json scene = Json::parse(info.scene_json);
+    const double scale = scene.at("device").at("workspace_scale").get<double>();
+    swing_.emplace(static_cast<double>(kNsPerSecond) / info.tick_ns, step_mm_ * scale);
+    return true;
+  }
+
+  std::string name_;
+  double step_mm_;  ///< of the encoders, at the device
+  OwnedFd fifo_;
+  std::optional<SegmentConnection> run_;
+  std::optional<ContactSwing> swing_;
+  std::uint64_t next_ = 0, allowed_ = 0;
+};
 
 std::vector<std::string> emulator(const CellJob& job, std::vector<std::string> more) {
   std::vector<std::string> line{program_beside("emulator"), "--personality", device_of(job)};
@@ -104,6 +173,7 @@ struct Column {
   bool of_emulator;
   std::string (*text)(const Json& report, const std::string& name) = cell_text;
 };
+constexpr const char* kSwingColumn = "swing";
 
 const std::vector<Column>& columns() {
   static const std::vector<Column> list = [] {
@@ -116,6 +186,7 @@ const std::vector<Column>& columns() {
       all.push_back({std::string(source) + "_j", false, energy_of_source});
     }
     const std::vector<Column> rest{
+        {kSwingColumn, false},  // not of the report: added to it
         {"fault_count", false}, {"config_hash", false},       {"volume_hash", false},
         {"output_hash", false}, {"peak_motor_force_n", true}, {"injected", true, changed_by_faults},
     };
@@ -125,14 +196,17 @@ const std::vector<Column>& columns() {
   return list;
 }
 
-CellResult result_of(int exit, const std::filesystem::path& folder, const std::string& last_line) {
+CellResult result_of(int exit, const std::filesystem::path& folder, const std::string& last_line,
+                     const std::string& swing = "") {
   CellResult result{exit, {}, exit == 0 ? "" : last_line};
   try {
     const auto report = [&](const char* name) {
       const std::string text = text_in(folder / name);
       return text.empty() ? Json(Json::Members{}) : Json::parse(text);
     };
-    const Json ours = report("report.json"), theirs = report("emulator.json");
+    Json ours = report("report.json");
+    const Json theirs = report("emulator.json");
+    ours[kSwingColumn] = swing;
     for (const Column& column : columns()) {
       result.values.push_back(column.text(column.of_emulator ? theirs : ours, column.name));
     }
@@ -177,6 +251,7 @@ std::optional<CellResult> run_cell(const CellJob& job, const std::filesystem::pa
   if (!known) return std::nullopt;
   if (*known != 0) return result_of(*known, folder, described.last_line());
 
+  TickFollower ticks(job.name, folder / "until", personality_of(device_of(job)));
   std::vector<std::string> servo{program_beside("controller"), "--scene", job.scene};
   for (const std::string& setting : job.settings) {
     servo.emplace_back("--set");
@@ -185,8 +260,8 @@ std::optional<CellResult> run_cell(const CellJob& job, const std::filesystem::pa
   for (const std::string& word :
        {std::string("--device"), device_of(job), std::string("--port"), "socket:" + at("device"),
         std::string("--seconds"), number_text(job.seconds), std::string("--name"), job.name,
-        std::string("--virtual"), std::string("--emulator-args"), at("told"),
-        std::string("--report"), at("report.json")}) {
+        std::string("--virtual"), std::string("--until"), at("until"),
+        std::string("--emulator-args"), at("told"), std::string("--report"), at("report.json")}) {
     servo.push_back(word);
   }
   if (setting_of(job, "device.torque_scale").empty()) {
@@ -210,8 +285,10 @@ std::optional<CellResult> run_cell(const CellJob& job, const std::filesystem::pa
   const auto end = Clock::now() + kLongestRun;
   while (!controller.ended() && device.ended().value_or(0) == 0 && Clock::now() < end) {
     if (stop) return std::nullopt;
+    ticks.poll();
     std::this_thread::sleep_for(kLook);
   }
+  ticks.poll();
   if (!controller.ended()) {
     const auto refused = device.ended();
     controller.signal(SIGKILL);
@@ -220,7 +297,7 @@ std::optional<CellResult> run_cell(const CellJob& job, const std::filesystem::pa
         refused ? device.last_line() : "kerf-controller: no end after 30 minutes; killed");
   }
   if (!end_of(device, stop, kGrace)) return std::nullopt;
-  return result_of(*controller.ended(), folder, controller.last_line());
+  return result_of(*controller.ended(), folder, controller.last_line(), ticks.swing());
 }
 
 }  // namespace kerf::sweep

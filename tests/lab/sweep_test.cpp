@@ -204,7 +204,7 @@ TEST_CASE("the numbers of a law are axes below its key, whichever law it is") {
         }).find("taus") != std::string::npos);
 }
 
-TEST_CASE("a sweep takes laws by name, and has energy by source and the least energy") {
+TEST_CASE("a sweep takes laws by name, and has energy by source, least energy and swing") {
   const TemporaryFolder folder;
   Process process({kBin + "/kerf-lab", "sweep", kScenes + "/touch.toml", "--set",
                    "force.stabiliser=none,passivity,{name=\"energy_bounding\"}", "--seconds", "3",
@@ -221,6 +221,26 @@ TEST_CASE("a sweep takes laws by name, and has energy by source and the least en
       sum_j += std::stod(row.at(std::string(source) + "_j"));
     }
     CHECK(sum_j == doctest::Approx(std::stod(row.at("energy_j"))));
+    CHECK(row.at("swing") == "rest");
+  }
+}
+
+TEST_CASE("a wall that the device cannot hold swings in a sweep, whatever the number of cores") {
+  const TemporaryFolder folder;
+  std::string before;
+  for (const char* const jobs : {"1", "3"}) {
+    const std::filesystem::path out = folder / jobs;
+    Process process(
+        {kBin + "/kerf-lab", "sweep", scene_with_hand(folder), "--set",
+         "force.stiffness_n_per_mm=0.3,9", "--set", "force.unchecked_gain=true", "--set",
+         "force.damping_ns_per_mm=0", "--seconds", "3", "--jobs", jobs, "--out", out.string()},
+        folder / "log");
+    CHECK(process.wait() == 0);
+    const std::string table = text_of(out / "sweep.csv");
+    CHECK(row_of(table, 0).at("swing") == "rest");
+    CHECK(row_of(table, 1).at("swing") == "swings");
+    CHECK((before.empty() || table == before));
+    before = table;
   }
 }
 
