@@ -230,11 +230,11 @@ TEST_CASE("a wall that the device cannot hold swings in a sweep, whatever the nu
   std::string before;
   for (const char* const jobs : {"1", "3"}) {
     const std::filesystem::path out = folder / jobs;
-    Process process(
-        {kBin + "/kerf-lab", "sweep", scene_with_hand(folder), "--set",
-         "force.stiffness_n_per_mm=0.3,9", "--set", "force.unchecked_gain=true", "--set",
-         "force.damping_ns_per_mm=0", "--seconds", "3", "--jobs", jobs, "--out", out.string()},
-        folder / "log");
+    Process process({kBin + "/kerf-lab", "sweep", scene_with_hand(folder), "--set",
+                     "force.stiffness_n_per_mm=0.3,9", "--set", "force.unchecked_gain=true",
+                     "--set", "servo.rate_hz=250", "--set", "force.damping_ns_per_mm=0",
+                     "--seconds", "3", "--jobs", jobs, "--out", out.string()},
+                    folder / "log");
     CHECK(process.wait() == 0);
     const std::string table = text_of(out / "sweep.csv");
     CHECK(row_of(table, 0).at("swing") == "rest");

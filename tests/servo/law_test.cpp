@@ -63,6 +63,23 @@ class PlainSpring {
 };
 KERF_REGISTER_FORCE_LAW(PlainSpring)
 
+/// Gives no force up to 0.2 mm, and beyond no number.
+template <class N>
+class Breaker {
+ public:
+  static constexpr const char* kName = "breaker";
+  static constexpr const char* kMeaning = "fails in a press";
+  static constexpr std::array<LawSetting, 0> kSettings{};
+  struct State {};
+  explicit Breaker(const LawSetup&) {}
+  DeviceVec<typename N::Real> step(const ForceInput<N>& in, State&) const noexcept {
+    using Real = typename N::Real;
+    if (norm(in.spring_mm) < Real(0.2)) return {};
+    return {Real(std::numeric_limits<double>::quiet_NaN()), {}, {}};
+  }
+};
+KERF_REGISTER_FORCE_LAW(Breaker)
+
 /// Gives the wanted force times `share`, and `push_n` along x.
 template <class N>
 class Changer {
@@ -191,23 +208,24 @@ TEST_CASE(
 }
 
 TEST_CASE("what the overlap removes in the tick in which a law fails is counted, and comes back") {
-  LoadedScene scene = with_force_law(NumericKind::float64, 0);
+  LoadedScene scene = half_space_scene();
+  scene.servo.numeric = NumericKind::float64;
+  scene.force.law = {LawKind::force, "breaker", {}};
   scene.cut.model = CutModel::overlap;
   scene.cut.rate_per_s = 500;
-  auto servo = compile(scene);
-  const std::span<const Density> density = servo->density(0);
+  ArmedServo armed(scene);
+  const std::span<const Density> density = armed.servo->density(0);
   const std::vector<Density> before(density.begin(), density.end());
-  KinematicOmni arm;
-  arm_at(*servo, arm, 0, 0.4, 0);
-  const ServoOutput out = servo->step(arm.at(0, 0.4, 0));
+  static_cast<void>(armed.settled(0, 1.2, 0));
+  const ServoOutput out = armed.step(0, 0.6, 0);
   REQUIRE(out.fault == Fault::force_law);
   std::uint64_t gone = 0;
   for (std::size_t i = 0; i < before.size(); ++i) gone += before[i] - density[i];
   CHECK(gone > 0);
   CHECK(out.removed_by_volume[0] == gone);
   CHECK_FALSE(out.changed[0].empty());
-  servo->apply({.kind = ServoCommand::Kind::reset});
-  for (int tick = 0; tick < 2000; ++tick) static_cast<void>(servo->step(arm.at(0, 5, 0)));
+  armed.servo->apply({.kind = ServoCommand::Kind::reset});
+  for (int tick = 0; tick < 2000; ++tick) static_cast<void>(armed.step(0, 5, 0));
   CHECK(std::ranges::equal(before, density));
 }
 
@@ -348,7 +366,7 @@ TEST_CASE("a law that a scene names and the program has not is refused with the 
   };
   CHECK(refusal({LawKind::force, "plane_spring", {}}) ==
         "test: force.law \"plane_spring\" is unknown; did you mean \"plain_spring\"? known: "
-        "plain_spring");
+        "breaker, plain_spring");
   CHECK(refusal({LawKind::force, "plain_spring", {{"k", 101}}}) ==
         "test: force.law \"plain_spring\".k = 101 is out of range; use 0 to 100");
   LoadedScene scene = half_space_scene();
