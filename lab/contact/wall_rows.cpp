@@ -201,21 +201,21 @@ void measure_isos(const Effort& effort, const RowSink& add_row) {
   for (const EdgedTool& subject :
        {EdgedTool{"ball", tool_of_units("ball", 8, 16)}, edged_tools()[0], edged_tools()[1]}) {
     const SampledTool tool(subject.tool);
-    const auto degrees_at = [&](double iso) {
+    const auto degrees_at = [&](double iso, int tilts) {
       double most = 0;
       for (const double bump : {0.0, kBump}) {
-        const IsoRests rests =
-            rest_at_iso<FixedNumbers>(subject.tool, tool, iso, bump, effort.tilts);
+        const IsoRests rests = rest_at_iso<FixedNumbers>(subject.tool, tool, iso, bump, tilts);
         most = std::max(most, rests.degrees);
       }
       return most;
     };
-    const double middle = degrees_at(kMiddle);
+    // The limit of all rows: a largest angle of few tilts would be no limit of others.
+    const double middle = degrees_at(kMiddle, Effort{}.tilts);
     for (const double iso : {0.02, 0.05, 0.1, 0.2, 0.3, kMiddle, 0.6, 0.7, 0.8, 0.95}) {
       char name[80];
       std::snprintf(name, sizeof name, "%s, iso %g: angle", subject.name, iso);
-      add_row(
-          {"isos", name, iso == kMiddle ? middle : degrees_at(iso), "deg", 1.5 * middle, middle});
+      add_row({"isos", name, iso == kMiddle ? middle : degrees_at(iso, effort.tilts), "deg",
+               1.5 * middle, middle});
     }
   }
 }

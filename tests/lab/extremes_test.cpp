@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cmath>
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -43,6 +44,19 @@ TEST_CASE("the report has each row with its limit and whether it is kept, and th
     CHECK(answer.out.find(row["name"].get<std::string>()) != std::string::npos);
   }
   CHECK(answer.code == (all ? 0 : 1));
+}
+
+TEST_CASE(
+    "a quick run measures the iso-surfaces against the limit of a full one, from any folder") {
+  const auto here = std::filesystem::current_path();
+  const kerf::test::TemporaryFolder folder;
+  std::filesystem::current_path(folder.path());
+  const LabAnswer isos = lab("extremes --quick --only isos");
+  const LabAnswer shapes = lab("extremes --quick --only shapes");  // reads a bur of scenes/burs
+  std::filesystem::current_path(here);
+  CAPTURE(isos.out);
+  CHECK(isos.code == 0);
+  CHECK(shapes.code != 2);
 }
 
 TEST_CASE("a head that is wedged against its own shaft between two walls goes on cutting") {
