@@ -73,6 +73,11 @@ class Tiff {
     const char* value = nullptr;
     return TIFFGetField(file_, tag, &value) == 1 && value != nullptr ? value : "";
   }
+  /// PageNumber of TIFF 6.0, section 12; -1 if there is none.
+  [[nodiscard]] int page_number() const {
+    std::uint16_t number = 0, total = 0;
+    return TIFFGetField(file_, TIFFTAG_PAGENUMBER, &number, &total) == 1 ? number : -1;
+  }
   [[nodiscard]] bool has_pages_within() const {
     std::uint16_t count = 0;
     const std::uint64_t* offsets = nullptr;
@@ -226,6 +231,7 @@ Slices slices_of(const fs::path& path) {
   std::string description;
   TiffResolution resolution;
   std::int64_t left_out = 0;
+  int highest_number = 0;
   bool within = false;
   const auto text = [](std::int64_t width, std::int64_t height, VoxelType type) {
     return std::to_string(width) + " x " + std::to_string(height) + " pixels of " +
@@ -239,6 +245,14 @@ Slices slices_of(const fs::path& path) {
       continue;
     }
     check_page(file);
+    if (const int number = file.page_number(); number >= 0) {
+      if (number < highest_number) {  // "The page numbers need not be ... in numerical order"
+        file.refuse_page("its PageNumber " + std::to_string(number) + " follows " +
+                             std::to_string(highest_number),
+                         "save the pages in the order of their numbers");
+      }
+      highest_number = number;
+    }
     const std::int64_t width = file.number<std::uint32_t>(TIFFTAG_IMAGEWIDTH),
                        height = file.number<std::uint32_t>(TIFFTAG_IMAGELENGTH);
     const VoxelType type = page_type(file);
