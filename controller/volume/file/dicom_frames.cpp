@@ -281,6 +281,9 @@ void describe_values(const Facts& facts, const std::string& modality, DicomFile&
 }  // namespace
 
 void read_frames(const gdcm::DataSet& set, std::size_t count, DicomFile& file) {
+  if (set.FindDataElement(Tag(0x3004, 0x000e))) {  // DoseGridScaling, PS3.3 C.8.8.3
+    throw Unfit{"is a dose, in steps of DoseGridScaling", "convert it to NRRD in its own unit"};
+  }
   std::optional<gdcm::DataSet> shared = item(set, kSharedGroups, 0);
   gdcm::SmartPointer<gdcm::SequenceOfItems> own;
   if (set.FindDataElement(kFrameGroups)) own = set.GetDataElement(kFrameGroups).GetValueAsSQ();
