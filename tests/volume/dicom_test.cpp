@@ -11,34 +11,6 @@
 using namespace kerf;
 using namespace kerf::test;
 
-TEST_CASE("a DICOM series is put together by position, with spacing and rescaling") {
-  const TemporaryFolder folder;
-  write_dicom_series(folder, [](DicomSpec& spec, int) {
-    spec.slope = 2;
-    spec.intercept = -1000;
-  });
-  folder.write("notes.txt", "not an image");
-  const SourceVolume v = read_volume(folder.path());
-  CHECK(v.grid == kSmall);
-  CHECK(v.spacing_mm == std::array<double, 3>{0.25, 0.5, 2});
-  CHECK(v.origin_mm == std::array<double, 3>{-10, 20, 100});
-  CHECK(v.direction == std::array<double, 9>{1, 0, 0, 0, 1, 0, 0, 0, 1});
-  for (std::size_t i = 0; i < 60; ++i) CHECK(v.values[i] == 2.0F * static_cast<float>(i) - 1000.0F);
-}
-
-TEST_CASE("a turned DICOM series keeps right-handed axes") {
-  const TemporaryFolder folder;
-  // Coronal: rows run along +x, columns down along -z, so slices follow +y.
-  write_dicom_series(folder, [](DicomSpec& spec, int k) {
-    spec.orientation = "1\\0\\0\\0\\0\\-1";
-    spec.position_mm = {0, 3.0 * k, 50};
-  });
-  const SourceVolume v = read_volume(folder.path());
-  CHECK(v.spacing_mm[2] == doctest::Approx(3.0));
-  CHECK(v.direction == std::array<double, 9>{1, 0, 0, 0, 0, 1, 0, -1, 0});
-  CHECK(same_values(v, counting<float>()));
-}
-
 TEST_CASE("a DICOM folder that is not one even stack is refused in one line") {
   using Change = std::function<void(DicomSpec&, int)>;
   const std::pair<Change, std::string> cases[] = {

@@ -41,11 +41,6 @@ void check_counting(const SourceVolume& v) {
   CHECK(v.spacing_known == kAllAxes);
 }
 
-double determinant(const std::array<double, 9>& d) {
-  return d[0] * (d[4] * d[8] - d[5] * d[7]) - d[1] * (d[3] * d[8] - d[5] * d[6]) +
-         d[2] * (d[3] * d[7] - d[4] * d[6]);
-}
-
 }  // namespace
 
 TEST_CASE("NRRD is read attached and detached, in both byte orders, raw, gzip and text") {
@@ -71,25 +66,6 @@ TEST_CASE("NRRD is read attached and detached, in both byte orders, raw, gzip an
   for (const int value : counting<int>()) words << value << '\n';
   check_counting(
       read_volume(folder.write("f.nrrd", nrrd("short", kSpacings, "ascii") + "\n" + words.str())));
-}
-
-TEST_CASE_TEMPLATE("NRRD voxels of every integer and floating type keep their values", T,
-                   std::int8_t, std::uint8_t, std::int16_t, std::uint16_t, std::int32_t,
-                   std::uint32_t, std::int64_t, std::uint64_t, float, double) {
-  const char* type = std::is_same_v<T, float>    ? "float"
-                     : std::is_same_v<T, double> ? "double"
-                     : sizeof(T) == 1            ? (std::is_signed_v<T> ? "int8" : "uint8")
-                     : sizeof(T) == 2            ? (std::is_signed_v<T> ? "int16" : "uint16")
-                     : sizeof(T) == 4            ? (std::is_signed_v<T> ? "int32" : "uint32")
-                                                 : (std::is_signed_v<T> ? "int64" : "uint64");
-  std::vector<T> values = counting<T>();
-  values[0] = static_cast<T>(std::is_signed_v<T> ? -100 : 100);
-  const TemporaryFolder folder;
-  const auto path =
-      folder.write("a.nrrd", nrrd(type, "endian: little\n" + kSpacings) + "\n" + bytes_of(values));
-  const SourceVolume v = read_volume(path);
-  CHECK(v.values[0] == (std::is_signed_v<T> ? -100.0F : 100.0F));
-  CHECK(v.values[59] == 59.0F);
 }
 
 TEST_CASE("MetaImage is read attached and detached, in both byte orders") {
@@ -175,43 +151,6 @@ TEST_CASE("a first look may go without spacing, and is told so") {
   const SourceVolume v = read_volume(path, {.allow_missing_spacing = true});
   CHECK(v.spacing_known == 0);
   CHECK(v.spacing_mm == Three{1, 1, 1});
-}
-
-TEST_CASE("position and direction of a file are kept") {
-  const TemporaryFolder folder;
-  // A quarter turn about z: the first axis points along +y, the second along -x.
-  const auto path = folder.write(
-      "a.nrrd",
-      nrrd("uint8",
-           "space: left-posterior-superior\n"
-           "space directions: (0,0.5,0) (-0.25,0,0) (0,0,2)\nspace origin: (10,20,30)\n") +
-          "\n" + bytes_of(counting<std::uint8_t>()));
-  const SourceVolume v = read_volume(path);
-  CHECK(v.spacing_mm == Three{0.5, 0.25, 2});
-  CHECK(position_of(v, 0, 0, 0) == Three{10, 20, 30});
-  CHECK(position_of(v, 2, 0, 0) == Three{10, 21, 30});
-  CHECK(position_of(v, 0, 1, 0) == Three{9.75, 20, 30});
-  CHECK(determinant(v.direction) == doctest::Approx(1.0));
-}
-
-TEST_CASE("a left-handed file becomes right-handed and every value stays in its place") {
-  const TemporaryFolder folder;
-  const std::string frame =
-      "space: left-posterior-superior\nspace origin: (10,20,30)\nspace directions: ";
-  const auto bytes = bytes_of(counting<std::uint8_t>());
-  const auto path =
-      folder.write("a.nrrd", nrrd("uint8", frame + "(1,0,0) (0,2,0) (0,0,-3)\n") + "\n" + bytes);
-  const SourceVolume v = read_volume(path);
-  CHECK(determinant(v.direction) == doctest::Approx(1.0));
-  for (const auto& [i, j, k] : voxels(kSmall)) {
-    const Three p = position_of(v, i, j, k);
-    // In the file voxel (a, b, c) lies at (10 + a, 20 + 2b, 30 - 3c) and holds its own index.
-    const auto a = static_cast<std::int32_t>(std::lround(p[0] - 10));
-    const auto b = static_cast<std::int32_t>(std::lround((p[1] - 20) / 2));
-    const auto c = static_cast<std::int32_t>(std::lround((30 - p[2]) / 3));
-    REQUIRE(kSmall.contains({a, b, c}));
-    CHECK(v.values[kSmall.index(i, j, k)] == static_cast<float>(kSmall.index(a, b, c)));
-  }
 }
 
 TEST_CASE("reading prints nothing, whatever the library has to say") {
