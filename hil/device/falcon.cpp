@@ -28,16 +28,24 @@ struct Leg {
         shin_mm(std::sqrt(std::max(0.0, falcon::kShinMm * falcon::kShinMm - across * across))),
         length_mm(kShinEndsMm + shin_mm) {}
 
+  /// Whether it reaches the grip with a bent knee. At the border the joint has no gradient.
+  [[nodiscard]] bool bends() const noexcept {
+    return std::abs(across) < falcon::kShinMm && square_of_root() > 0;
+  }
   [[nodiscard]] double joint_rad() const noexcept {
-    const double e = -2 * falcon::kThighMm * out;
-    const double f = -2 * falcon::kThighMm * rise;
-    const double g =
-        out * out + rise * rise + falcon::kThighMm * falcon::kThighMm - length_mm * length_mm;
-    const double root = std::sqrt(std::max(0.0, e * e + f * f - g * g));
+    const double root = std::sqrt(std::max(0.0, square_of_root()));
     // The lower one of two angles, (-f - root) / (g - e), written so that it never divides by zero:
     // the grip is in front of the hips, f < 0.
-    return 2 * std::atan2(g + e, root - f);
+    return 2 * std::atan2(g() + e(), root - f());
   }
+
+  // The loop of the leg is e cos t + f sin t + g = 0.
+  [[nodiscard]] double e() const noexcept { return -2 * falcon::kThighMm * out; }
+  [[nodiscard]] double f() const noexcept { return -2 * falcon::kThighMm * rise; }
+  [[nodiscard]] double g() const noexcept {
+    return out * out + rise * rise + falcon::kThighMm * falcon::kThighMm - length_mm * length_mm;
+  }
+  [[nodiscard]] double square_of_root() const noexcept { return e() * e() + f() * f() - g() * g(); }
 
   /// d t / d tip: minus the loop's derivative by the tip over that by t.
   [[nodiscard]] DeviceVec<double> gradient(double joint_rad) const noexcept {
@@ -59,6 +67,10 @@ std::array<double, 3> counts_of(JointVec<double> q) noexcept {
     return (angle_rad - falcon::kZeroRad) / falcon::kRadPerCount;
   };
   return {count(q.x), count(q.y), count(q.z)};
+}
+
+bool reaches(DeviceVec<double> tip_mm) noexcept {
+  return Leg(0, tip_mm).bends() && Leg(1, tip_mm).bends() && Leg(2, tip_mm).bends();
 }
 
 }  // namespace
@@ -85,14 +97,23 @@ JointVec<double> FalconArm::joint_rates(const ArmPose& pose,
 }
 
 DeviceVec<double> FalconArm::tip_mm(JointVec<double> q) const noexcept {
-  constexpr int kMaxIterations = 20;
+  constexpr int kMaxIterations = 50;
   constexpr double kDoneMm = 1e-10;
   ArmPose pose{joints_rad({}), {}};
   for (int i = 0; i < kMaxIterations; ++i) {
     const Gradients by_tip = gradients(pose);
     Transform<double, JointSpace, DeviceSpace> rates;
     for (std::size_t k = 0; k < 3; ++k) rates.row[k] = {by_tip[k].x, by_tip[k].y, by_tip[k].z};
-    const DeviceVec<double> step = solve(rates, q - pose.q);
+    DeviceVec<double> step = solve(rates, q - pose.q);
+    // Beyond the reach of a leg there is no gradient to come back by, and a step that leads away
+    // from the joints may end at another grip with the same ones.
+    constexpr double kRounding = 1e-9;
+    const double off_rad = norm(q - pose.q) + kRounding;
+    const auto leads_on = [&] {
+      const DeviceVec<double> next = pose.tip_mm + step;
+      return reaches(next) && norm(q - joints_rad(next)) <= off_rad;
+    };
+    for (int halves = 0; halves < 50 && !leads_on(); ++halves) step = step * 0.5;
     pose.tip_mm = pose.tip_mm + step;
     pose.q = joints_rad(pose.tip_mm);
     if (norm(step) < kDoneMm) break;

@@ -30,7 +30,7 @@ namespace kerf {
 class FalconArm {
  public:
   [[nodiscard]] JointVec<double> joints_rad(DeviceVec<double> tip_mm) const noexcept;
-  /// Newton's iteration from the middle of the workspace.
+  /// Newton's iteration from the middle of the workspace, in steps that all legs reach.
   [[nodiscard]] DeviceVec<double> tip_mm(JointVec<double> q) const noexcept;
 
   /// The force that joint torques exert at a free tip.
