@@ -119,23 +119,19 @@ void set_worst_slope(const LoadedScene& scene, const SampledLoop& loop, GainMarg
   }
 }
 
-/// From the linear boundary up, by doubling and then halving to 1 %. Damping that is unstable
-/// without any wall has no such boundary: friction stops only small swings then, even if one push
-/// decays.
+/// From the linear boundary upwards in steps of 1 %, to the first wall on which a push is not
+/// proven to come to rest: with friction and an encoder, walls that rest lie above others that
+/// swing. Damping that is unstable without any wall has no such boundary: friction stops only small
+/// swings then, even if one push decays.
 double with_friction(const SampledLoop& loop, double damping, double linear_n_per_mm) {
   if (damping > highest_damping(loop)) return 0;
-  const auto swings = [&](double stiffness) {
-    return push_on_wall(loop, stiffness, damping, {.push_n = 1}).swings_on();
+  const auto rests = [&](double stiffness) {
+    return push_on_wall(loop, stiffness, damping, {.push_n = 1}).rests();
   };
+  constexpr double kStep = 1.01;
   double stable = std::max(linear_n_per_mm, kMinStiffnessNPerMm);
-  if (swings(stable)) return linear_n_per_mm;
-  while (stable < kMostNPerMm && !swings(2 * stable)) stable *= 2;
-  double unstable = 2 * stable;
-  constexpr int kHalvings = 7;  // 2^7 parts of a doubling
-  for (int i = 0; i < kHalvings; ++i) {
-    const double middle = (stable + unstable) / 2;
-    (swings(middle) ? unstable : stable) = middle;
-  }
+  if (!rests(stable)) return linear_n_per_mm;
+  while (stable < kMostNPerMm && rests(kStep * stable)) stable *= kStep;
   return stable;
 }
 

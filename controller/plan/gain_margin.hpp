@@ -44,8 +44,8 @@ struct GainMargin {
 
 enum class PlayFriction : std::uint8_t { where_it_decides, always };
 
-/// Friction is simulated, not computed: 20 ms at 1 kHz, eight times as long at 8 kHz. If it does
-/// not decide and the caller does not request it, its boundary stays 0.
+/// Friction is simulated, not computed: some 10 ms, up to 0.4 s at 8 kHz. If it does not decide and
+/// the caller does not request it, its boundary stays 0.
 [[nodiscard]] GainMargin gain_margin(const LoadedScene& scene,
                                      PlayFriction friction = PlayFriction::always);
 

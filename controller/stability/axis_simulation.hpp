@@ -5,7 +5,9 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 
+#include "controller/stability/limit_cycle.hpp"
 #include "controller/stability/sampled_loop.hpp"
 
 // Exact simulation of one axis: device and hand under a held force, with Coulomb friction, encoder
@@ -225,63 +227,38 @@ class SampledWall {
 struct WallContactTest {
   double from_mm = -0.1;
   double push_n = 0.5;  ///< on top of the device's Coulomb friction
-  double seconds = 3;
+  /// Limit of the run: of chaotic swings one in a hundred stops only after 3 to 45 s, and a hum may
+  /// take as long to give energy (docs/stability.md).
+  double seconds = 60;
 };
 
-/// Result of such a push, for each third of its time.
-struct WallSwing {
-  std::array<double, 3> span_mm{};   ///< peak to peak
-  std::array<double, 3> motor_mj{};  ///< work of the motors at the end of each third
-  double quantum_mm = 0;
-
-  /// By the motion: the last third swings by more than three quanta and does not decay.
-  [[nodiscard]] bool swings_on() const noexcept {
-    constexpr double kNothingMm = 1e-6;  // of an encoder without a quantum
-    constexpr double kDiedDown = 0.97;
-    return span_mm[2] > std::max(3 * quantum_mm, kNothingMm) &&
-           span_mm[2] >= kDiedDown * span_mm[1];
-  }
-  /// By the energy: in the last third the motors gave more than they took.
-  [[nodiscard]] bool gives_energy() const noexcept {
-    constexpr double kNothingMj = 1e-9;
-    return motor_mj[2] - motor_mj[1] > kNothingMj;
-  }
-};
-
-/// Simulates the push against any law: `force_n(encoder_mm)` once per period, towards negative
-/// positions out of the wall. Stops once the motion is far beyond any device (1 m).
-template <class Law>
-[[nodiscard]] WallSwing push_on_wall(const SampledLoop& loop, Law&& force_n,
-                                     const WallContactTest& push = {}) {
+/// Simulates the push against the sampled wall until the tip is proven to be at rest, or to the
+/// limit. A tip more than 1 m away is lost: far beyond any device.
+[[nodiscard]] inline LimitCycle push_on_wall(const SampledLoop& loop, double stiffness_n_per_mm,
+                                             double damping_ns_per_mm,
+                                             const WallContactTest& push = {}) {
   constexpr double kLostMm = 1000;
+  // A backward Euler low-pass decays in so many periods and time constants to e^-40 < 2^-53.
+  constexpr double kDecayed = 40;
+  const double push_n = loop.coulomb_n + push.push_n;
+  const auto limit = static_cast<std::int64_t>(push.seconds / loop.period_s);
+  const double settled = kMaxDelayPeriods + kDecayed * (1 + loop.velocity_filter_s / loop.period_s);
+  LimitCycleDetector detector(
+      {.limit = limit, .first = limit / 2, .settled = static_cast<std::int64_t>(settled)},
+      loop.quantum_mm, push_n);
   AxisSimulation axis(loop);
   axis.start(push.from_mm);
-  WallSwing swing;
-  swing.quantum_mm = loop.quantum_mm;
-  const auto ticks = static_cast<long>(push.seconds / loop.period_s);
-  for (std::size_t third = 0; third < 3; ++third) {
-    double low = axis.place_mm(), high = low;
-    const long end = ticks * static_cast<long>(third + 1) / 3;
-    for (long i = ticks * static_cast<long>(third) / 3; i < end; ++i) {
-      axis.tick(force_n(axis.encoder_mm()), loop.coulomb_n + push.push_n);
-      low = std::min(low, axis.place_mm());
-      high = std::max(high, axis.place_mm());
-      if (high - low > kLostMm) break;
-    }
-    swing.span_mm[third] = high - low;
-    swing.motor_mj[third] = axis.motor_work_mj();
-  }
-  return swing;
-}
-
-/// The same against the sampled wall.
-[[nodiscard]] inline WallSwing push_on_wall(const SampledLoop& loop, double stiffness_n_per_mm,
-                                            double damping_ns_per_mm,
-                                            const WallContactTest& push = {}) {
   SampledWall wall(loop, stiffness_n_per_mm, damping_ns_per_mm);
   wall.start(push.from_mm);
-  return push_on_wall(
-      loop, [&](double encoder_mm) { return wall.force_n(encoder_mm); }, push);
+  double last_n = 0;
+  while (true) {
+    const double asked_n = wall.force_n(axis.encoder_mm());
+    axis.tick(asked_n, push_n);
+    if (!(std::abs(axis.place_mm()) < kLostMm)) return detector.lost(kLostMm, axis.motor_work_mj());
+    const bool is_held = axis.stuck() && asked_n == last_n;
+    last_n = asked_n;
+    if (detector.take(axis.place_mm(), axis.motor_work_mj(), is_held)) return detector.verdict();
+  }
 }
 
 }  // namespace kerf

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <deque>
 
-#include "lab/stability/limit_cycle.hpp"
+#include "controller/stability/limit_cycle.hpp"
 #include "shared/segment/layout.hpp"
 
 namespace kerf::sweep {
@@ -32,14 +32,13 @@ class ContactSwing {
     constexpr std::uint32_t kTouches = kFlagContact | kFlagStarted;
     if ((record.flags & kTouches) == kTouches && record.tick >= next_tick_) {
       // Not ended before its time, whatever is held: `settled` is its whole length.
-      watches_.emplace_back(zwidth::LimitCycleDetector::Ticks{ticks_, ticks_, ticks_}, step_mm_,
-                            kPushN);
+      watches_.emplace_back(LimitCycleDetector::Ticks{ticks_, ticks_, ticks_}, step_mm_, kPushN);
       next_tick_ = record.tick + std::max<std::uint64_t>(1, apart_);
     }
     constexpr double kMjPerJ = 1000;
     const double tip_mm = -double{record.penetration_mm};
     const double given_mj = -record.port_minimum_j * kMjPerJ;
-    std::erase_if(watches_, [&](zwidth::LimitCycleDetector& watch) {
+    std::erase_if(watches_, [&](LimitCycleDetector& watch) {
       if (!watch.take(tip_mm, given_mj, false)) return false;
       add(watch.verdict());
       return true;
@@ -58,18 +57,18 @@ class ContactSwing {
  private:
   static constexpr double kPushN = 0.5;  ///< as of a map of stability
 
-  void add(const zwidth::LimitCycle& verdict) {
+  void add(const LimitCycle& verdict) {
     swings_ = swings_ || verdict.swings;
     active_ = active_ || verdict.active;
     undecided_ = undecided_ || verdict.undecided;
-    rests_ = rests_ || !(verdict.swings || verdict.active || verdict.undecided);
+    rests_ = rests_ || verdict.rests();
   }
 
   std::int64_t ticks_;
   std::uint64_t apart_;
   double step_mm_;
   std::uint64_t next_tick_ = 0;
-  std::deque<zwidth::LimitCycleDetector> watches_;
+  std::deque<LimitCycleDetector> watches_;
   bool swings_ = false, active_ = false, undecided_ = false, rests_ = false;
 };
 

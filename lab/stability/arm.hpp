@@ -5,9 +5,10 @@
 #include <cstdint>
 
 #include "controller/load/loaded_scene.hpp"
+#include "controller/stability/limit_cycle.hpp"
 #include "hil/hil_error.hpp"
 #include "lab/stability/axes.hpp"
-#include "lab/stability/limit_cycle.hpp"
+#include "lab/stability/tick_watch.hpp"
 
 namespace kerf::zwidth {
 

@@ -10,13 +10,14 @@
 #include "controller/law/registry/law_registry.hpp"
 #include "controller/load/loaded_scene.hpp"
 #include "controller/stability/gain_limits.hpp"
+#include "controller/stability/limit_cycle.hpp"
 #include "hil/device/packet_device.hpp"
 #include "hil/device/plant_params.hpp"
 #include "hil/hil_error.hpp"
 #include "lab/run/grid_run.hpp"
 #include "lab/stability/arm.hpp"
-#include "lab/stability/limit_cycle.hpp"
 #include "lab/stability/one_axis.hpp"
+#include "lab/stability/tick_watch.hpp"
 #include "shared/text/text.hpp"
 
 namespace kerf::zwidth {

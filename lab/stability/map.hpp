@@ -11,8 +11,9 @@
 #include <string>
 #include <vector>
 
+#include "controller/stability/limit_cycle.hpp"
 #include "lab/stability/axes.hpp"
-#include "lab/stability/limit_cycle.hpp"
+#include "lab/stability/tick_watch.hpp"
 
 namespace kerf::zwidth {
 

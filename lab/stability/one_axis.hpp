@@ -4,8 +4,9 @@
 #include <array>
 #include <cstdint>
 
+#include "controller/stability/limit_cycle.hpp"
 #include "lab/stability/axes.hpp"
-#include "lab/stability/limit_cycle.hpp"
+#include "lab/stability/tick_watch.hpp"
 
 namespace kerf::zwidth {
 

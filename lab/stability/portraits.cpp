@@ -11,9 +11,9 @@
 
 #include "hil/hil_error.hpp"
 #include "lab/stability/arm.hpp"
-#include "lab/stability/limit_cycle.hpp"
 #include "lab/stability/map_file.hpp"
 #include "lab/stability/one_axis.hpp"
+#include "lab/stability/tick_watch.hpp"
 #include "shared/text/json.hpp"
 #include "shared/text/text.hpp"
 

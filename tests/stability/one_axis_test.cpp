@@ -2,6 +2,7 @@
 // The time-domain loop against the exact boundary and against maps that another simulator made
 // (100 sub-steps of semi-implicit Euler, Karnopp's stiction, 0.1 mm before the wall, K in steps of
 // 3 %).
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -11,6 +12,7 @@
 
 #include "controller/stability/axis_simulation.hpp"
 #include "controller/stability/gain_limits.hpp"
+#include "controller/stability/limit_cycle.hpp"
 #include "controller/stability/sampled_loop.hpp"
 
 using namespace kerf;
@@ -30,18 +32,17 @@ SampledLoop omni(double viscous_ns_per_m, double coulomb_n, double quantum_mm,
   return loop;
 }
 
-/// The lowest K that swings, by a scan of 35 % around `about` in steps of 2 %. With friction and an
-/// encoder rest becomes swing not at one K but in a band, in which single walls rest above others
-/// that swing; what comes first is what the tables have.
+/// The lowest K that swings by more than three encoder steps, as the tables have it: by a scan of
+/// 35 % around `about` in steps of 2 %. With friction and an encoder rest becomes swing not at one
+/// K but in a band, in which single walls rest above others that swing.
 double first_swing(const SampledLoop& loop, double damping_ns_per_mm, double push_n,
                    double about_n_per_mm) {
   constexpr double kBand = 1.35, kStep = 1.02;
-  double k = about_n_per_mm / kBand;
-  while (k < about_n_per_mm * kBand &&
-         !push_on_wall(loop, k, damping_ns_per_mm, {.push_n = push_n}).swings_on()) {
-    k *= kStep;
+  for (double k = about_n_per_mm / kBand; k < about_n_per_mm * kBand; k *= kStep) {
+    const LimitCycle run = push_on_wall(loop, k, damping_ns_per_mm, {.push_n = push_n});
+    if (run.swings && run.travel_mm > 3 * loop.quantum_mm) return k;
   }
-  return k;
+  return about_n_per_mm * kBand;
 }
 
 /// Whether a small swing about the depth at which the hand's push and the wall rest grows: contact
@@ -49,11 +50,21 @@ double first_swing(const SampledLoop& loop, double damping_ns_per_mm, double pus
 /// with the contact lost in each turn, keeps its width.
 bool grows(const SampledLoop& loop, double stiffness_n_per_mm, double damping_ns_per_mm) {
   constexpr double kPushN = 1;
-  const double depth_mm = kPushN / stiffness_n_per_mm;
-  const WallSwing swing =
-      push_on_wall(loop, stiffness_n_per_mm, damping_ns_per_mm,
-                   {.from_mm = depth_mm * (1 + 1e-6), .push_n = kPushN, .seconds = 1.5});
-  return swing.span_mm[2] >= 0.99 * swing.span_mm[1];
+  AxisSimulation axis(loop);
+  axis.start(kPushN / stiffness_n_per_mm * (1 + 1e-6));
+  SampledWall wall(loop, stiffness_n_per_mm, damping_ns_per_mm);
+  wall.start(axis.encoder_mm());
+  std::array<double, 3> span_mm{};  // peak to peak, in each third of 1.5 s
+  for (double& span : span_mm) {
+    double low = axis.place_mm(), high = low;
+    for (int tick = 0; tick < 0.5 / loop.period_s; ++tick) {
+      axis.tick(wall.force_n(axis.encoder_mm()), kPushN);
+      low = std::min(low, axis.place_mm());
+      high = std::max(high, axis.place_mm());
+    }
+    span = high - low;
+  }
+  return span_mm[2] >= 0.99 * span_mm[1];
 }
 
 }  // namespace
@@ -166,7 +177,7 @@ TEST_CASE("S13: each sample of delay costs stiffness, with friction and without"
     CAPTURE(d);
     const double between = std::sqrt(kByTable[d - 1] * kByTable[d]);
     const auto swings = [&](double delay_ms) {
-      return push_on_wall(omni(0.2, 0.26, 0.055, delay_ms), between, 0, {.push_n = 1}).swings_on();
+      return !push_on_wall(omni(0.2, 0.26, 0.055, delay_ms), between, 0, {.push_n = 1}).rests();
     };
     CHECK_FALSE(swings(static_cast<double>(d) - 1));
     CHECK(swings(static_cast<double>(d)));
@@ -192,12 +203,47 @@ TEST_CASE("S17: one difference knows velocity in quanta of D/T alone") {
 
 TEST_CASE("a wall that swings gives the energy that friction takes, a quiet one takes it") {
   const SampledLoop loop = omni(0.2, 0.05, 0.055, 2);
-  const WallSwing quiet = push_on_wall(loop, 0.4, 0.002);
-  CHECK_FALSE(quiet.swings_on());
-  CHECK_FALSE(quiet.gives_energy());
-  const WallSwing loud = push_on_wall(loop, 2, 0.002);
-  CHECK(loud.swings_on());
-  CHECK(loud.gives_energy());
+  const LimitCycle quiet = push_on_wall(loop, 0.4, 0.002);
+  CHECK(quiet.rests());
+  CHECK(quiet.given_mj == 0);
+  const LimitCycle loud = push_on_wall(loop, 2, 0.002);
+  CHECK(loud.swings);
+  CHECK(loud.active);
+}
+
+TEST_CASE("a limit cycle that fluctuates is never at rest, whether its travel falls or grows") {
+  // In 3 s the travel of the last second is 0.92, 0.82, 0.56, 0.85 and 0.94 of the one before; in
+  // 60 s it is larger still.
+  struct Row {
+    double coulomb_n, damping_ns_per_mm, stiffness_n_per_mm;
+  };
+  for (const Row& row : std::vector<Row>{{0.05, 0.001, 4.7},
+                                         {0.05, 0.002, 6.81},
+                                         {0.05, 0.005, 12.62},
+                                         {0.1, 0.001, 8.42},
+                                         {0.1, 0.002, 9.66}}) {
+    CAPTURE(row.stiffness_n_per_mm);
+    const SampledLoop loop = omni(0.2, row.coulomb_n, 0.055);
+    for (const double seconds : {3.0, 6.0, 12.0, 60.0}) {
+      CAPTURE(seconds);
+      const LimitCycle run =
+          push_on_wall(loop, row.stiffness_n_per_mm, row.damping_ns_per_mm, {.seconds = seconds});
+      CHECK_FALSE(run.rests());
+      CHECK(run.swings);
+      CHECK(run.travel_mm > 1);
+    }
+  }
+}
+
+TEST_CASE("a hum within one encoder step that the motors feed is not at rest, nor a slow decay") {
+  const LimitCycle hum = push_on_wall(omni(0.2, 0.05, 0.055), 0.8 * 5.661, 0.002, {.push_n = 1});
+  CHECK_FALSE(hum.swings);
+  CHECK(hum.travel_mm < 0.055);
+  CHECK(hum.active);
+  CHECK_FALSE(hum.rests());
+  const SampledLoop smooth = omni(0.2, 0, 0);
+  CHECK_FALSE(push_on_wall(smooth, 0.01, 0, {.seconds = 3}).rests());
+  CHECK(push_on_wall(smooth, 0.4, 0.002).rests());
 }
 
 TEST_CASE("without a force the axis coasts as its equation says, whatever the delay") {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "lab/stability/limit_cycle.hpp"
+#include "lab/stability/tick_watch.hpp"
 
 #include <chrono>
 #include <condition_variable>
