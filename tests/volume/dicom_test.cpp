@@ -183,7 +183,7 @@ TEST_CASE("what is no slice is left out and named; a slice that cannot be read i
   packed.series = "1.7";
   packed.syntax = "1.2.840.10008.1.2.4.201";
   folder.write("packed", dicom(packed));
-  folder.write("broken", dicom(dicom_slice(7)).substr(0, 140));
+  folder.write("below/broken", dicom(dicom_slice(7)).substr(0, 140));
   folder.write("readme", "none of DICOM");
   const SourceVolume v = read_volume(folder.path());
   CHECK(same_values(v, counting<float>()));
@@ -198,6 +198,41 @@ TEST_CASE("what is no slice is left out and named; a slice that cannot be read i
   CHECK(has(refusal(folder.path()),
             "packed: its encoding cannot be read (1.2.840.10008.1.2.4.201, High-Throughput JPEG "
             "2000); export it"));
+}
+
+TEST_CASE("a file of no series beside the slices may be one of them and is refused by name") {
+  const std::string slice = dicom(dicom_slice(4));
+  const std::size_t series = slice.find(dicom_slice(4).series);
+  const std::pair<std::string, const char*> lost[] = {
+      {"", "is empty"},
+      {std::string(1100, '\0'), "holds zeroes alone"},
+      {slice.substr(0, 100), "holds zeroes alone"},
+      {slice.substr(0, 140), "cannot be read"},
+      {slice.substr(0, series - 8), ""},
+      {slice.substr(0, series + 5), "cannot be read"}};
+  for (const char* name : {"image4.dcm", "image2.dcm", "IM7"}) {
+    for (const auto& [bytes, why] : lost) {
+      const TemporaryFolder folder;
+      write_dicom_series(folder, [](DicomSpec&, int) {});
+      folder.write(name, bytes);
+      const std::string message = refusal(folder.path());
+      CAPTURE(message);
+      CHECK(is_one_line(message));
+      CHECK(has(message, std::string(name) + ": " + why));
+      CHECK(has(message, ", and may be a slice of this series; "));
+    }
+  }
+  const TemporaryFolder folder;
+  write_dicom_series(folder, [](DicomSpec&, int) {});
+  std::filesystem::create_symlink(folder / "gone", folder / "image9");
+  CHECK(has(refusal(folder.path()), "image9: cannot be opened (No such file or directory)"));
+  std::filesystem::remove(folder / "image9");
+  folder.write("below/nothing", "");
+  folder.write("below/broken.dcm", "none of DICOM");
+  const SourceVolume v = read_volume(folder.path());
+  CHECK(same_values(v, counting<float>()));
+  CHECK(has(v.note, "skipped nothing (is empty)"));
+  CHECK(has(v.note, "skipped broken.dcm (cannot be read)"));
 }
 
 TEST_CASE("an overview among the slices of a series is left out and named") {

@@ -2,6 +2,8 @@
 #include "controller/volume/file/dicom_header.hpp"
 
 #include <algorithm>
+#include <array>
+#include <cerrno>
 #include <cmath>
 #include <csetjmp>
 #include <csignal>
@@ -15,6 +17,8 @@
 #include <gdcmTransferSyntax.h>
 
 #include "controller/volume/file/dicom_elements.hpp"
+#include "controller/volume/file/file_headers.hpp"
+#include "controller/volume/file/folder_files.hpp"
 
 namespace kerf::volume {
 namespace fs = std::filesystem;
@@ -197,17 +201,22 @@ bool read_up_to_pixels(gdcm::Reader& reader) {
   return read;
 }
 
-/// The series of a file that GDCM cannot parse: what follows the first such tag; or empty.
+/// The series of a file that GDCM cannot parse: what follows the first such tag,
+/// whole; or empty.
 std::string series_in(std::string_view bytes) {
   using namespace std::string_view_literals;
-  for (const std::string_view element : {"\x20\x00\x0e\x00UI"sv, "\x20\x00\x0e\x00"sv}) {
+  for (const std::string_view element :
+       {"\x20\x00\x0e\x00UI"sv, "\x00\x20\x00\x0eUI"sv, "\x20\x00\x0e\x00"sv}) {
     const std::size_t at = bytes.find(element);
     if (at == bytes.npos || at + 8 > bytes.size()) continue;
     const std::size_t length_at = at + (element.size() == 6 ? 6 : 4);
+    const std::size_t low = element[0] == 0 ? 1 : 0;  // 1: big-endian
     const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(bytes[i]); };
-    const std::size_t length = byte(length_at) + std::size_t{256} * byte(length_at + 1);
+    const std::size_t length = byte(length_at + low) + std::size_t{256} * byte(length_at + 1 - low);
     constexpr std::size_t kLongestUid = 64;
-    if (length <= kLongestUid) return trimmed(bytes.substr(at + 8, length));
+    if (length <= kLongestUid && at + 8 + length <= bytes.size()) {
+      return trimmed(bytes.substr(at + 8, length));
+    }
   }
   return {};
 }
@@ -230,6 +239,26 @@ std::optional<std::string> replace_syntax(std::string& bytes) {
   return uid;
 }
 
+/// Refuses a file that shows nothing of what it was: one that cannot be opened or read, is empty,
+/// or has zeroes alone, as a copy that was interrupted.
+void refuse_without_content(std::ifstream& in) {
+  const int reason = errno;
+  if (!in) {
+    throw Unfit{"cannot be opened (" + std::generic_category().message(reason) + ")",
+                "check its permissions"};
+  }
+  std::array<char, 65536> bytes{};
+  bool any = false;
+  do {
+    in.read(bytes.data(), bytes.size());
+    const std::string_view got(bytes.data(), static_cast<std::size_t>(in.gcount()));
+    if (got.find_first_not_of('\0') != got.npos) return;
+    any = any || !got.empty();
+  } while (in);
+  if (in.bad()) throw Unfit{"cannot be read from its disc", kCopyAgain};
+  throw Unfit{any ? "holds zeroes alone" : "is empty", kCopyAgain};
+}
+
 void describe(const gdcm::DataSet& set, DicomFile& file) {
   const auto text = [&](std::uint16_t group, std::uint16_t element) {
     return text_of(set.GetDataElement(Tag(group, element)));
@@ -242,6 +271,7 @@ void describe(const gdcm::DataSet& set, DicomFile& file) {
   file.is_slice = set.FindDataElement(Tag(0x0020, 0x0032)) ||
                   set.FindDataElement(Tag(0x5200, 0x9230)) ||
                   (set.FindDataElement(Tag(0x0028, 0x0010)) && samples.value_or(1) == 1);
+  file.is_index = set.FindDataElement(Tag(0x0004, 0x1220));
 }
 
 }  // namespace
@@ -250,15 +280,14 @@ std::optional<DicomFile> read_dicom_header(const fs::path& path) {
   DicomFile file;
   file.path = path;
   std::ifstream in(path, std::ios::binary);
-  std::array<char, 132> head{};
-  in.read(head.data(), head.size());
-  const bool magic = in && std::string_view(head.data() + 128, 4) == "DICM";
   std::error_code fault;
   const std::uint64_t file_bytes = fs::file_size(path, fault);
   try {
+    refuse_without_content(in);
+    const bool named = begins_as_dicom(path) || lower(path.extension().string()) == ".dcm";
     gdcm::Reader reader;
     reader.SetFileName(path.c_str());
-    if (!reader.CanRead()) return std::nullopt;
+    if (!reader.CanRead() && !named) return std::nullopt;
     if (read_up_to_pixels(reader)) {
       describe(reader.GetFile().GetDataSet(), file);
       const gdcm::DataSet& set = reader.GetFile().GetDataSet();
@@ -274,7 +303,7 @@ std::optional<DicomFile> read_dicom_header(const fs::path& path) {
     all << in.rdbuf();
     std::string bytes = std::move(all).str();
     file.series = series_in(bytes);
-    if (!magic && file.series.empty()) return std::nullopt;  // looked like one, as any file may
+    if (!named && file.series.empty()) return std::nullopt;  // looked like one, as any file may
     const auto syntax = replace_syntax(bytes);
     std::istringstream stream(std::move(bytes));
     gdcm::Reader again;

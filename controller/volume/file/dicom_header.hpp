@@ -83,10 +83,12 @@ struct DicomFile {
 
   std::string unfit, way_out;  ///< why it has no frames, and what to do; or empty
   bool is_slice = false;       ///< unfit, and its series is incomplete without it
+  bool is_index = false;       ///< a DICOMDIR of any name, which has no series
 };
 
-/// Reads a file up to its pixels; none if it is not DICOM. Throws nothing but std::bad_alloc: what
-/// is wrong with the file is in `unfit`.
+/// Reads a file up to its pixels; none if it is not DICOM. One that may have been DICOM, as it
+/// cannot be opened, is empty or has zeroes alone, is unfit and of no series. Throws nothing but
+/// std::bad_alloc: what is wrong with the file is in `unfit`.
 [[nodiscard]] std::optional<DicomFile> read_dicom_header(const std::filesystem::path& path);
 
 }  // namespace kerf::volume

@@ -174,6 +174,14 @@ std::size_t chosen_stack(const fs::path& path, const std::vector<Stack>& all,
   throw LoadError(file.path.string() + ": " + file.unfit + "; " + file.way_out);
 }
 
+/// Whether a file that names no series lies beside slices of this one: it may be one of them.
+bool may_belong(const DicomFile& file, const Stack& stack) {
+  return file.series.empty() && !file.is_index &&
+         std::ranges::any_of(stack.slices, [&](const DicomSlice& slice) {
+           return slice.file->path.parent_path() == file.path.parent_path();
+         });
+}
+
 /// Refuses an unreadable slice of the series; names the other files that are left out.
 void note_unfit(const std::list<DicomFile>& files, const Stack& stack, Note& note) {
   constexpr std::size_t kMostNamed = 3;
@@ -181,6 +189,10 @@ void note_unfit(const std::list<DicomFile>& files, const Stack& stack, Note& not
   for (const DicomFile& file : files) {
     if (file.unfit.empty()) continue;
     if (file.is_slice && file.series == stack.series) refuse_unfit(file);
+    if (may_belong(file, stack)) {
+      throw LoadError(file.path.string() + ": " + file.unfit +
+                      ", and may be a slice of this series; " + file.way_out + ", or remove it");
+    }
     unfit.push_back(&file);
   }
   for (std::size_t i = 0; i < std::min(unfit.size(), kMostNamed); ++i) {

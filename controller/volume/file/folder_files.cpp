@@ -39,7 +39,16 @@ bool in_natural_order(const std::string& a, const std::string& b) {
   return a.size() != b.size() ? a.size() < b.size() : a < b;
 }
 
-/// The regular files of a folder and of those below, in the order of their names.
+/// Whether there is a file to read: a regular one, or one that is lost, as a link to a file that is
+/// gone, which its reader refuses by name.
+bool is_file(const fs::directory_entry& entry) {
+  std::error_code fault;
+  const fs::file_type type = entry.status(fault).type();
+  return type == fs::file_type::regular || type == fs::file_type::not_found ||
+         type == fs::file_type::none;
+}
+
+/// The files of a folder and of those below, in the order of their names.
 std::vector<fs::path> all_files(const fs::path& folder, std::string& note) {
   constexpr std::size_t kMostFiles = 20000;
   std::vector<fs::path> files;
@@ -55,7 +64,7 @@ std::vector<fs::path> all_files(const fs::path& folder, std::string& note) {
       entry.disable_recursion_pending();
       if (!hidden) note = "folders more than 5 levels below are not searched";
     }
-    if (hidden || lower(name) == "dicomdir" || !entry->is_regular_file(gone)) continue;
+    if (hidden || lower(name) == "dicomdir" || !is_file(*entry)) continue;
     files.push_back(listed);
     if (files.size() > kMostFiles) {
       throw LoadError(folder.string() + ": more than " + std::to_string(kMostFiles) +

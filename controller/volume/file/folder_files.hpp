@@ -20,7 +20,7 @@ struct FolderFiles {
   std::string note;  ///< for the user; or empty
 };
 
-/// Searches a folder and those below it, to kDeepest levels below, for regular files, without
+/// Searches a folder and those below it, to kDeepest levels below, for files, without
 /// hidden ones and DICOMDIR.
 ///
 /// Images of a kind in the folder itself choose the kind; a single picture does not. If it has
