@@ -195,7 +195,63 @@ TEST_CASE("slices in one file without positions have the distance that it names,
   spec.set(0x0018, 0x0088, "DS", "-1");
   CHECK(has(refusal_of(folder, spec), "SpacingBetweenSlices -1 is negative"));
   spec.set(0x0028, 0x0009, "AT", u16(0x0018) + u16(0x1063));
-  CHECK(has(refusal_of(folder, spec), "counted by (0018,1063), a time or a view"));
+  CHECK(has(refusal_of(folder, spec), "counted by (0018,1063), a time, view or page"));
+}
+
+TEST_CASE("frames are put in order by SliceVector, or refused") {
+  const TemporaryFolder folder;
+  DicomSpec spec;
+  spec.set(0x0028, 0x0008, "IS", "5");
+  spec.set(0x0018, 0x0088, "DS", "2");
+  std::string vector;
+  for (const int k : {3, 0, 4, 1, 2}) {
+    for (int i = 0; i < 12; ++i) spec.values.push_back(static_cast<std::int16_t>(12 * k + i));
+    vector += u16(k + 1);
+  }
+  const std::string pointer = u16(0x0054) + u16(0x0080);
+  spec.set(0x0028, 0x0009, "AT", pointer);
+  CHECK(has(refusal_of(folder, spec), "counted by (0054,0080), which is not in the file"));
+  spec.set(0x0054, 0x0080, "US", vector);
+  for (const bool named : {true, false}) {
+    spec.set(0x0028, 0x0009, named ? "AT" : "", pointer);
+    const SourceVolume v = read(folder, spec);
+    CHECK(same_values(v, counting<float>()));
+    CHECK(has(v.note, "in the order of SliceVector"));
+  }
+  spec.set(0x0020, 0x0032, "");
+  CHECK(same_values(read(folder, spec), counting<float>()));
+  for (const std::string& wrong :
+       {u16(0) + vector.substr(2), u16(6) + vector.substr(2), vector.substr(0, 8),
+        vector.substr(0, 8) + vector.substr(0, 2)}) {
+    spec.set(0x0054, 0x0080, "US", wrong);
+    CHECK(has(refusal_of(folder, spec), "SliceVector does not number its 5 frames from 1"));
+  }
+  for (const std::string& other : {pointer + u16(0x0054) + u16(0x0010), u16(0x0018) + u16(0x2001),
+                                   u16(0x0054) + u16(0x0100)}) {
+    spec.set(0x0054, 0x0080, "US", vector);
+    spec.set(0x0028, 0x0009, "AT", other);
+    CHECK(has(refusal_of(folder, spec), "a time, view or page, and are no slices"));
+  }
+}
+
+TEST_CASE("slices without positions of which one has no number are refused by name") {
+  const TemporaryFolder folder;
+  std::vector<Frame> frames;
+  for (int k = 0; k < 3; ++k) {
+    frames.push_back(frame(k));
+    frames.back().z.clear();
+  }
+  CHECK(
+      has(refusal_of(folder, enhanced(frames)), "its 3 slices have neither positions nor numbers"));
+  for (int without = 0; without < 5; ++without) {
+    const std::string message = series_message([&](DicomSpec& spec, int k) {
+      spec.set(0x0020, 0x0032, "");
+      spec.set(0x0018, 0x0088, "DS", "2");
+      if (k == without) spec.set(0x0020, 0x0013, "");
+    });
+    CAPTURE(message);
+    CHECK(has(message, "has neither a position nor a number"));
+  }
 }
 
 TEST_CASE("slices without positions are put in order by location or number, which is noted") {
@@ -240,5 +296,5 @@ TEST_CASE("slices without positions are put in order by location or number, whic
               no_position(spec);
               spec.set(0x0020, 0x0013, "");
             }),
-            "its 5 slices have one number"));
+            "its 5 slices have neither positions nor numbers"));
 }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <array>
+#include <cstdio>
 #include <functional>
 #include <string>
 #include <utility>
@@ -162,6 +163,28 @@ TEST_CASE("numbers that were rounded differently are the same numbers, as far as
   CHECK(has(at({"0", "0.6", "1.3", "2.5", "3.1"}), "1.2 mm before slice image4.dcm"));
   CHECK(has(at({"0", "0.1", "0.2", "0.4", "0.5"}), "is usual"));   // rounding would hide a gap
   CHECK(has(at({"0", "1", "2", "4", "5"}), "2 mm before slice"));  // whole numbers are not rounded
+}
+
+TEST_CASE("slices are even as far as each coordinate is written, at every distance") {
+  const auto rounded = [](double apart, double from, int count, const char* beside) {
+    const TemporaryFolder folder;
+    for (int k = 0; k < count; ++k) {
+      DicomSpec spec = dicom_slice(0);
+      std::array<char, 64> z{};
+      std::snprintf(z.data(), z.size(), "%.1f", from + apart * k);
+      spec.set(0x0020, 0x0032, "DS", beside + std::string(z.data()));
+      folder.write("I" + std::to_string(k), dicom(spec));
+    }
+    return refusal(folder.path());
+  };
+  for (const double apart : {0.625, 1.25, 0.75, 0.375, 0.45, 0.35}) {
+    for (const double from : {-30.0, -30.01, 12.3, -1000.0, 2.0}) {
+      CAPTURE(apart);
+      CAPTURE(from);
+      CHECK(rounded(apart, from, 20, "0\\0\\") == "no error");
+      CHECK(rounded(apart, from, 200, "-10.123456\\20.654321\\") == "no error");
+    }
+  }
 }
 
 TEST_CASE("what is no slice is left out and named; a slice that cannot be read is not") {

@@ -200,29 +200,54 @@ DicomFrame frame_of(const Facts& facts, std::size_t index, const StoredPixels& p
   return frame;
 }
 
+const Tag kOffsets(0x3004, 0x000c), kSliceVector(0x0054, 0x0080);
+
 /// Refuses frames that follow one another in time or by views, not through a body: the tag that
-/// counts them says so.
+/// counts them says so. Refuses one that is not in the file, too.
 void refuse_no_slices(const gdcm::DataSet& set) {
   const gdcm::DataElement& pointers = set.GetDataElement(Tag(0x0028, 0x0009));
-  constexpr std::uint32_t kSlices[] = {0x3004000c, 0x00540080, 0x00182001};
   for (std::size_t i = 0; const auto group = binary<std::uint16_t>(pointers, i); i += 2) {
-    const std::uint32_t tag =
-        std::uint32_t{*group} << 16 | binary<std::uint16_t>(pointers, i + 1).value_or(0);
-    if (std::ranges::find(kSlices, tag) != std::end(kSlices)) continue;
+    const Tag tag(*group, binary<std::uint16_t>(pointers, i + 1).value_or(0));
     std::array<char, 16> text{};
-    std::snprintf(text.data(), text.size(), "(%04x,%04x)", tag >> 16, tag & 0xffff);
-    throw Unfit{std::string("its frames are counted by ") + text.data() +
-                    ", a time or a view, and are no slices",
-                "name a file or folder of slices"};
+    std::snprintf(text.data(), text.size(), "(%04x,%04x)", tag.GetGroup(), tag.GetElement());
+    const std::string counted = std::string("its frames are counted by ") + text.data();
+    if (tag != kOffsets && tag != kSliceVector) {
+      throw Unfit{counted + ", a time, view or page, and are no slices",
+                  "name a file or folder of slices"};
+    }
+    if (bytes_of(set.GetDataElement(tag)).empty()) {
+      throw Unfit{counted + ", which is not in the file", "export it again"};
+    }
   }
 }
 
+/// Numbers of the frames from 0, in the order through the body: those of a SliceVector (PS3.3
+/// C.8.4.8.1), which begin at 1; else the order of the file.
+std::vector<std::size_t> slice_numbers(const gdcm::DataSet& set, std::size_t count) {
+  const gdcm::DataElement& vector = set.GetDataElement(kSliceVector);
+  std::vector<std::size_t> numbers(count);
+  for (std::size_t i = 0; i < count; ++i) numbers[i] = i;
+  if (bytes_of(vector).empty()) return numbers;
+  std::vector<bool> taken(count, false);
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::size_t own = binary<std::uint16_t>(vector, i).value_or(0);
+    if (own == 0 || own > count || taken[own - 1]) {
+      throw Unfit{
+          "SliceVector does not number its " + std::to_string(count) + " frames from 1, each once",
+          "export it again, one volume in a file"};
+    }
+    taken[own - 1] = true;
+    numbers[i] = own - 1;
+  }
+  return numbers;
+}
+
 /// Positions of the frames of a file without functional groups: they follow one another in the
-/// order of the file, by a table (RT dose, PS3.3 C.8.8.3.2) or by one distance.
+/// order of a SliceVector or of the file, by a table (RT dose, PS3.3 C.8.8.3.2) or by one distance.
 void place_frames(const gdcm::DataSet& set, DicomFile& file) {
   refuse_no_slices(set);
   const DicomFrame first = file.frames.front();
-  const std::string table = text_of(set.GetDataElement(Tag(0x3004, 0x000c)));
+  const std::string table = text_of(set.GetDataElement(kOffsets));
   std::vector<double> offsets;
   std::istringstream words(table);
   for (std::string word; std::getline(words, word, '\\');) {
@@ -240,10 +265,16 @@ void place_frames(const gdcm::DataSet& set, DicomFile& file) {
                     " is negative, and its frames have no position",
                 "export it again, with the position of each frame"};
   }
-  file.remark = "frames in the order of the file, which has no position of each";
+  const std::vector<std::size_t> numbers = slice_numbers(set, file.frames.size());
+  const bool by_vector = !bytes_of(set.GetDataElement(kSliceVector)).empty();
+  if (by_table && by_vector) {
+    throw Unfit{"has a SliceVector and a GridFrameOffsetVector", "leave one of them out"};
+  }
+  file.remark = std::string("frames in the order of ") + (by_vector ? "SliceVector" : "the file") +
+                ", which has no position of each";
   const bool known = (by_table || distance > 0) && first.position_mm && first.orientation;
   for (DicomFrame& frame : file.frames) {
-    const auto at = static_cast<double>(frame.index);
+    const auto at = static_cast<double>(numbers[frame.index]);
     frame.number = at;
     frame.location_mm.reset();
     if (!known) {
@@ -301,7 +332,7 @@ void read_frames(const gdcm::DataSet& set, std::size_t count, DicomFile& file) {
       file.frames.push_back(frame_of(facts_of(i), i, file.pixels));
       const auto in_stack =
           binary<std::uint32_t>(facts_of(i).find(kFrameContent, Tag(0x0020, 0x9057)));
-      file.frames.back().number = static_cast<double>(in_stack.value_or(i));
+      if (in_stack) file.frames.back().number = static_cast<double>(*in_stack);
       file.frames.back().marks.emplace_back("file", file.path.filename().string());
     }
   } else {

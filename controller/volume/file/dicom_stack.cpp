@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "controller/volume/file/dicom_stack.hpp"
 
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <span>
 #include <sstream>
 
 #include "controller/input/load_error.hpp"
@@ -166,40 +168,71 @@ double unevenness(const std::vector<double>& depth, double step) {
     return most - least;
   };
   double low = step / 2, high = 2 * step;
-  constexpr int kHalvings = 60;
-  for (int i = 0; i < kHalvings; ++i) {
+  constexpr int kSteps = 100;  // by two thirds each: below an ulp
+  for (int i = 0; i < kSteps; ++i) {
     const double a = low + (high - low) / 3, b = high - (high - low) / 3;
     (width(a) < width(b) ? high : low) = width(a) < width(b) ? b : a;
   }
   return std::min(width(low), width(step));
 }
 
-/// The most by which the writer has changed the depths. A gap among slices `step` apart makes them
-/// uneven by half a step or more: rounding by a quarter of it or more would hide one, and does not
-/// count.
-double rounding_of_depths(const Stack& stack, double step, const Vec& normal) {
-  int decimals = 0;
-  double largest = 0;
-  for (const DicomSlice& slice : stack.slices) {
-    if (stack.order == Order::position) {
-      for (const WrittenNumber& number : *slice.frame->position_mm) {
-        decimals = std::max(decimals, number.decimals);
-        largest = std::max(largest, std::abs(number.value));
-      }
-    } else if (stack.order == Order::location) {
-      decimals = std::max(decimals, slice.frame->location_mm->decimals);
-      largest = std::max(largest, std::abs(slice.frame->location_mm->value));
+struct DepthErrors {
+  double rounding = 0;  ///< by the digits of the file
+  double noise = 0;     ///< by the sums of this program
+};
+
+/// The most by which the depths may be wrong. Each coordinate is rounded by its own digits. A gap
+/// among slices `step` apart makes them uneven by half a step or more: rounding by a quarter of it
+/// or more would hide one, and does not count.
+DepthErrors errors_of_depths(const Stack& stack, double step, const Vec& normal) {
+  std::array<WrittenNumber, 3> worst{};  // of the largest value and the most decimals
+  std::size_t terms = 0;
+  const auto take = [&](std::span<const WrittenNumber> numbers) {
+    terms = numbers.size();
+    for (std::size_t i = 0; i < terms; ++i) {
+      worst[i].value = std::max(worst[i].value, std::abs(numbers[i].value));
+      worst[i].decimals = std::max(worst[i].decimals, numbers[i].decimals);
     }
+  };
+  for (const DicomSlice& slice : stack.slices) {
+    if (stack.order == Order::position) take(*slice.frame->position_mm);
+    if (stack.order == Order::location) take(std::span(&*slice.frame->location_mm, 1));
   }
-  const double noise = largest * std::numeric_limits<float>::epsilon();  // of a float's writer
-  const double all = std::max(rounding_of(decimals), noise) *
-                     (std::abs(normal[0]) + std::abs(normal[1]) + std::abs(normal[2]));
+  DepthErrors errors;
+  double largest = 0;
+  for (std::size_t i = 0; i < terms; ++i) {
+    const double part = stack.order == Order::position ? std::abs(normal[i]) : 1;
+    const double float_noise = worst[i].value * std::numeric_limits<float>::epsilon();
+    errors.rounding += part * std::max(rounding_of(worst[i].decimals), float_noise);
+    largest += part * worst[i].value;
+  }
+  // With u = epsilon / 2: 7 u of a depth (its text, the normal, product and sums), 7 u of what is
+  // taken from it (i times the slope, at most twice the largest, and the difference), 2 u of the
+  // slope that is found.
+  constexpr double kRoundings = 8;
+  errors.noise = kRoundings * std::numeric_limits<double>::epsilon() * largest;
   constexpr double kHidesGap = 0.25;
-  return all < kHidesGap * step ? all : 0;
+  if (errors.rounding >= kHidesGap * step) errors.rounding = 0;
+  return errors;
+}
+
+/// Refuses slices of which any has neither a position nor a number: their order is not known.
+void check_numbers(const fs::path& path, const Stack& stack) {
+  const auto has_number = [](const DicomSlice& slice) { return slice.frame->number.has_value(); };
+  const auto lacks = std::ranges::find_if_not(stack.slices, has_number);
+  if (lacks == stack.slices.end()) return;
+  if (std::ranges::none_of(stack.slices, has_number)) {
+    throw LoadError(path.string() + ": its " + std::to_string(stack.slices.size()) +
+                    " slices have neither positions nor numbers; export it again, with positions");
+  }
+  throw LoadError(lacks->file->path.string() + ": " + name_of(*lacks) +
+                  " has neither a position nor a number, and other slices have a number; export "
+                  "the series again, with positions");
 }
 
 /// The common distance of the slices. Refuses gaps, doubled positions and a slanted stack.
 double slice_distance(const fs::path& path, const Stack& stack) {
+  if (stack.order == Order::number) check_numbers(path, stack);
   const std::vector<double>& depth = stack.depth_mm;
   const Axes axes = axes_of(stack.slices.front());
   const double step = (depth.back() - depth.front()) / static_cast<double>(depth.size() - 1);
@@ -215,8 +248,8 @@ double slice_distance(const fs::path& path, const Stack& stack) {
                     (stack.order == Order::number ? "number" : "position") + " of " + name_of(a) +
                     ", and no tag tells two volumes apart; keep one volume in a series");
   }
-  const double rounding = rounding_of_depths(stack, step, axes.normal);
-  const double slack_mm = std::max(kOffVoxels * step, rounding);
+  const DepthErrors errors = errors_of_depths(stack, step, axes.normal);
+  const double slack_mm = std::max(kOffVoxels * step, errors.rounding) + errors.noise;
   if (unevenness(depth, step) > 2 * slack_mm ||
       (stack.order == Order::number && std::abs(step - 1) > kOffVoxels)) {
     refuse_uneven(path, stack);
