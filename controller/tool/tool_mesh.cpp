@@ -348,7 +348,7 @@ class StlText {
     }
     return static_cast<float>(value);
   }
-  void skip_line() { skip(std::min(rest_.find('\n'), rest_.size())); }
+  void skip_line() { skip(std::min(rest_.find_first_of("\r\n"), rest_.size())); }
 
   [[noreturn]] void complain(std::string_view word, std::string_view wanted) const {
     constexpr std::size_t kLongest = 40;
@@ -360,8 +360,10 @@ class StlText {
 
  private:
   void skip(std::size_t bytes) {
-    const auto end = rest_.begin() + static_cast<std::ptrdiff_t>(bytes);
-    line_ += std::count(rest_.begin(), end, '\n');
+    for (std::size_t at = 0; at < bytes; ++at) {  // a line ends with \n, \r\n or \r
+      const bool is_return = rest_[at] == '\r' && !rest_.substr(at + 1).starts_with('\n');
+      line_ += rest_[at] == '\n' || is_return ? 1 : 0;
+    }
     rest_.remove_prefix(bytes);
   }
 

@@ -89,6 +89,9 @@ TEST_CASE("a binary STL and the same as text give the same triangles") {
   std::string crlf = text_stl(kBar);
   for (std::size_t at = 0; (at = crlf.find('\n', at)) != crlf.npos; at += 2) crlf.insert(at, "\r");
   CHECK(parse_stl(crlf, "bur.stl") == kBar);
+  std::string cr = text_stl(kBar);
+  std::ranges::replace(cr, '\n', '\r');
+  CHECK(parse_stl(cr, "bur.stl") == kBar);
 }
 
 TEST_CASE("a binary STL whose header begins as text does is still binary") {
