@@ -89,16 +89,18 @@ TEST_CASE_TEMPLATE("TIFF pages of every integer and floating type keep their val
   }
 }
 
-TEST_CASE("reduced copies and masks among the pages of a TIFF are left out, and the note says so") {
+TEST_CASE(
+    "copies, masks and depth maps among the pages of a TIFF are left out, and the note says so") {
   for (const std::size_t at : {0U, 2U, 5U}) {
     std::vector<TiffPage> pages = five();
     pages.insert(pages.begin() + static_cast<std::ptrdiff_t>(at), extra(1));
     check_counting(read(pages));
-    pages.insert(pages.begin(), {extra(4, 2), extra(3, 1), extra(5, 7), extra(0)});
+    pages.insert(pages.begin(),
+                 {extra(4, 2), extra(3, 1), extra(5, 7), extra(0), extra(8), extra(16)});
     pages[3].shorts[kSubfileType] = {2};  // of TIFF 5.0
     const SourceVolume v = read(pages);
     check_counting(v);
-    CHECK(v.note == "pages left out as reduced copies or masks: 5");
+    CHECK(v.note == "pages left out as copies, masks or depth maps: 7");
   }
   std::vector<TiffPage> many = five();
   for (int i = 0; i < 40; ++i) many.push_back(extra(i % 2 == 0 ? 4 : 1, 9));
@@ -108,7 +110,7 @@ TEST_CASE("reduced copies and masks among the pages of a TIFF are left out, and 
   check_counting(read(paged));
   CHECK(has(refusal_of({five()[0]}), "a.tif: one page; name the folder that holds all slices"));
   CHECK(has(refusal_of({extra(1), extra(4)}),
-            "no page of it is a slice (pages left out as reduced copies or masks: 2)"));
+            "no page of it is a slice (pages left out as copies, masks or depth maps: 2)"));
 }
 
 TEST_CASE("a page within a page is left out, and the note says so") {
@@ -261,6 +263,14 @@ TEST_CASE("pages of several channels or times, or fewer pages than images, are n
   CHECK(has(refusal_of(described("<OME><Pixels SizeC=\"1\" SizeZ=\"5\" SizeT=\"1\">"
                                  "<TiffData FirstZ=\"4\" IFD=\"0\"/></Pixels></OME>")),
             "OME-XML has the pages in another order"));
+  CHECK(has(refusal_of(described(image_j + "images=5\nchannels=5\n")),
+            "its description has 5 channels; save one of them"));
+  CHECK(has(refusal_of(described("<OME><Pixels SizeC=\"5\" SizeZ=\"1\" SizeT=\"1\"/></OME>")),
+            "its description has 5 channels"));
+  CHECK(has(refusal_of(described("{\"shape\": [5, 4, 3], \"axes\": \"CYX\"}")),
+            "its description has 5 channels"));
+  CHECK(read(described("{\"shape\": [5, 4, 3], \"axes\": \"TYX\"}")).note ==
+        "its frames are taken as slices");
   CHECK(has(refusal_of(described("{\"shape\": [2, 5, 4, 3]}")), "axis 1 and axis 2"));
   check_counting(read(described("{\"shape\": [1, 5, 4, 3], \"axes\": \"CZYX\"}")));
   check_counting(read(described("{\"shape\": [4, 3]}")));

@@ -164,9 +164,10 @@ class Tiff {
   Message error_{}, warning_{};
 };
 
-/// Whether the page belongs to another one: NewSubfileType of TIFF 6.0, section 8.
+/// Whether the page is of its own: NewSubfileType of TIFF 6.0, section 8, and of DNG 1.7.
 bool is_slice(Tiff& file) {
-  constexpr std::uint32_t kNone = FILETYPE_REDUCEDIMAGE | FILETYPE_MASK;
+  constexpr std::uint32_t kDepthMap = 8, kEnhanced = 16;
+  constexpr std::uint32_t kNone = FILETYPE_REDUCEDIMAGE | FILETYPE_MASK | kDepthMap | kEnhanced;
   return !file.is_old_copy() && (file.number<std::uint32_t>(TIFFTAG_SUBFILETYPE) & kNone) == 0;
 }
 
@@ -279,7 +280,7 @@ Slices slices_of(const fs::path& path) {
     check_grid(path.string(), slices.size[0], slices.size[1], slices.size[2]);
   }
   if (left_out > 0) {
-    slices.say("pages left out as reduced copies or masks: " + std::to_string(left_out));
+    slices.say("pages left out as copies, masks or depth maps: " + std::to_string(left_out));
   }
   if (within) slices.say("images within its pages are left out");
   if (slices.size[2] == 0) {

@@ -59,6 +59,13 @@ class Description {
     for (double count = 0; after == ',' && shape >> count >> after;) {
       found.emplace_back("axis " + std::to_string(found.size() + 1), count);
     }
+    constexpr std::string_view kLetters = "\"axes\": \"";
+    const std::size_t letters = text_.find(kLetters);
+    for (std::size_t i = 0; letters != std::string::npos && i < found.size(); ++i) {
+      const std::string rest = text_.substr(std::min(letters + kLetters.size() + i, text_.size()));
+      if (rest.starts_with('C') || rest.starts_with('S')) found[i].first = "channels";
+      if (rest.starts_with('T')) found[i].first = "frames";
+    }
     found.resize(std::max<std::size_t>(found.size(), 2) - 2);
     return found;
   }
@@ -99,6 +106,10 @@ void check_axes(const fs::path& path, const Description& description, Slices& sl
   if (names.size() > 1) {
     kerf::refuse(path.string(), ": its description has " + names[0] + " and " + names[1] +
                                     "; save one volume, of slices alone, to a file of its own");
+  }
+  if (!names.empty() && (names[0] == "channels" || names[0] == "SizeC")) {
+    kerf::refuse(path.string(), ": its description has " + short_text(images) +
+                                    " channels; save one of them to a file of its own");
   }
   images = std::max(images, description.number("images").value_or(1));
   if (images > 1 && images != static_cast<double>(slices.size[2])) {
