@@ -192,3 +192,24 @@ TEST_CASE_TEMPLATE("MetaImage: every type of numbers keeps its values", T, std::
   const std::string sign = std::is_floating_point_v<T> || std::is_signed_v<T> ? "" : "U";
   CHECK(wrong_in(meta("MET_" + sign + type, kElementSpacing) + bytes_of(counting<T>())) == "");
 }
+
+TEST_CASE("MetaImage: an empty file, a missing field, a header as data and twice the bytes") {
+  const TemporaryFolder folder;
+  CHECK(has(refusal(folder.write("a.mha", "")), "a.mha: is empty; copy the file again"));
+  CHECK(has(wrong_in("DimSize = 3 4 5\nElementDataFile = LOCAL\n"),
+            "a.mha: NDims is missing; correct the header"));
+  for (const std::string name : {"a.mha", "./a.mha", "LIST 3\na.mha"}) {
+    CHECK(has(wrong_in(meta("MET_SHORT", kElementSpacing, name)),
+              "names the header itself; write LOCAL"));
+  }
+  CHECK(has(wrong_in(meta("MET_LONG", kElementSpacing) + bytes_of(counting<std::int64_t>())),
+            "holds 480 bytes of voxels, and its header says 240; correct the sizes or the type"));
+}
+
+TEST_CASE("MetaImage: an origin beyond 1 km is refused, and one at it is not") {
+  CHECK(wrong_in(local(kElementSpacing + "Offset = 1e6 -1e6 0\n"), {{1e6, -1e6, 0}}) == "");
+  for (const std::string far : {"1000001", "-1e30", "1e300"}) {
+    CHECK(has(wrong_in(local(kElementSpacing + "Offset = 0 0 " + far + "\n")),
+              "its origin is farther than 1 km; correct the header"));
+  }
+}

@@ -234,8 +234,30 @@ TEST_CASE("NRRD: voxels as hex, as text, packed in members, behind lines and byt
   CHECK(has(detached(kNumbers, "line skip: 9\n"), "0 of 120 bytes"));
   CHECK(has(detached(kNumbers, "byte skip: 9223372036854775807\n"), "0 of 120 bytes"));
   CHECK(has(detached(kNumbers, "byte skip: -9223372036854775808\n"), "0 of 120 bytes"));
-  CHECK(has(note_of(attached("spacings: 1 2 3\n") + "more"),
-            "4 bytes after the voxels are not read"));
+}
+
+TEST_CASE("NRRD: as many bytes again behind raw voxels are a contradiction, fewer are noted") {
+  const std::string whole = attached("spacings: 1 2 3\n");
+  CHECK(has(note_of(whole + "more"), "4 bytes after the voxels are not read"));
+  CHECK(has(note_of(whole + kNumbers.substr(1)), "119 bytes after the voxels are not read"));
+  check_refusal(whole + kNumbers, "holds 240 bytes of voxels, and its header says 120; correct");
+  check_refusal(whole + kNumbers + kNumbers + "x", "holds 361 bytes of voxels");
+  const TemporaryFolder folder;
+  folder.write("voxels", "a\nb\n" + kNumbers + kNumbers.substr(3));
+  const auto behind_lines = [&](const char* lines) {
+    return folder.write("a.nhdr", shorts(kSpaced + "data file: voxels\nline skip: " + lines));
+  };
+  CHECK(has(read_volume(behind_lines("2\n")).note, "117 bytes after the voxels are not read"));
+  CHECK(has(refusal(behind_lines("1\nbyte skip: -1\n")), "no error"));
+  CHECK(has(refusal(behind_lines("0\n")), "holds 241 bytes of voxels"));
+}
+
+TEST_CASE("NRRD: a header is not its own data file, and an empty file has its line") {
+  for (const std::string lines : {"data file: a.nrrd\n", "data file: ./a.nrrd\nbyte skip: -1\n",
+                                  "data file: LIST 3\na.nrrd\n"}) {
+    check_refusal(attached("spacings: 1 2 3\n" + lines), "names the header itself; leave the line");
+  }
+  check_refusal("", "a.nrrd: is empty; copy the file again");
 }
 
 TEST_CASE("NRRD: data files of a list, of a pattern, elsewhere") {
@@ -267,6 +289,9 @@ TEST_CASE("NRRD: data files of a list, of a pattern, elsewhere") {
   CHECK(read("in/t%02d 9 5 -1 2") == "");
   CHECK(read("in/s%d 8 12 1 2", "3 4 5 1") == "");
   CHECK(has(read("LIST\nin/s8\nin/s9\n"), "names 2 files, and the sizes are those of 5"));
+  CHECK(read("SKIPLIST\n0 in/all\n24 in/all\n48 in/all\n72 in/all\n96 in/all\n") == "");
+  CHECK(has(read("LIST\nin/s8\nin/s9\nin/s9\nin/s11\nin/s12\n"),
+            "names the same voxels of s9 twice; correct the list"));
   CHECK(has(read("LIST 3\nin/s8\nin/s9\n"), "names 2 files"));
   CHECK(has(read("LIST 0\nin/all\n"), "names 1 files"));
   CHECK(has(read("LIST"), "names 0 files"));
@@ -336,6 +361,25 @@ TEST_CASE("NRRD: axis mins is the border of the first voxel, or the centre at a 
   CHECK(fault_of(attached(in_space("LPS") + "centers: cell cell cell\n"), turned({1, 1, 1})) == "");
 }
 
+TEST_CASE("NRRD: spacings agree with axis mins and maxs, from border to border or node to node") {
+  const auto from_to = [](const std::string& maxs, const std::string& more = "") {
+    return attached("spacings: 1 2 3\naxis mins: 10 20 30\naxis maxs: " + maxs + "\n" + more);
+  };
+  const FilePlaces cells{{10.5, 21, 31.5}}, nodes{{10, 20, 30}};
+  const std::string cell = "centers: cell cell cell\n", node = "centers: node node node\n";
+  CHECK(fault_of(from_to("13 28 45"), cells) == "");
+  CHECK(fault_of(from_to("13 28 45", cell), cells) == "");
+  CHECK(fault_of(from_to("13.04 nan 45"), cells) != "");
+  CHECK(fault_of(from_to("13.00 nan 45.0"), cells) == "");
+  CHECK(fault_of(from_to("12 26 42"), nodes) == "");
+  CHECK(fault_of(from_to("12 26 42", node), nodes) == "");
+  for (const std::string& other :
+       {from_to("12 26 42", cell), from_to("13 28 45", node), from_to("13 28 44"),
+        from_to("7 12 15"), from_to("10 20 30"), from_to("13 1e300 45")}) {
+    check_refusal(other, "contradicts `axis mins` and `axis maxs`, which are ");
+  }
+}
+
 TEST_CASE("NRRD: what does not concern position or value changes nothing") {
   CHECK(fault_of(attached("content: a: b\nmin: 5\nold min: -1000\nold max: 3000\nnumber: x\nsample "
                           "units: \"HU\"\nlabels: \"a\" \"b c\" \"\"\nthicknesses: 9 9 9\n"
@@ -364,11 +408,11 @@ TEST_CASE("NRRD: a number, a word or a field that cannot be is refused by its na
                 "no direction");
   check_refusal(with("short", "block"), "type: block is not a type of numbers");
   check_refusal(with("little", "middle"), "endian: middle is neither little nor big");
-  check_refusal(with("endian: little\n", ""), "endian: is neither little nor big");
+  check_refusal(with("endian: little\n", ""), "endian is neither little nor big");
   check_refusal(with("raw", "zrl"), "encoding: zrl is not one of");
   check_refusal(with("dimension: 3", "dimension: 17"), "dimension: 17 is not a number of axes");
   check_refusal(with("dimension: 3", "dimension: 4"), "sizes: 3 4 5 is not 4 whole numbers");
   check_refusal(with("3 4 5", "3 4 99999999999999999999"), "is not 3 whole numbers");
   check_refusal(with("3 4 5", "3 4 -5"), "is empty");
-  check_refusal(with("sizes: 3 4 5\n", ""), "sizes: is missing");
+  check_refusal(with("sizes: 3 4 5\n", ""), "sizes is missing");
 }

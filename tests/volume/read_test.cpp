@@ -218,7 +218,7 @@ TEST_CASE("a file that is not there, of no known kind or without a header is ref
        {"a.mhd", meta("MET_USHORT", kElementSpacing, "gone.raw"), "gone.raw cannot be read"},
        {"a.png", "x", "not a kind of volume"},
        {"a.nrrd", "something else", "no NRRD header"},
-       {"a.mha", "", "no MetaImage header"},
+       {"a.mha", "something else", "no MetaImage header"},
        {"a.nii", "short", "no NIfTI header"},
        {"a.dcm", "short", "cannot be read"}});
   const auto raw = folder.write("tooth.raw", kBytes);

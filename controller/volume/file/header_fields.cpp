@@ -61,7 +61,9 @@ std::optional<Number> parsed(std::string_view word) {
 
 HeaderLines::HeaderLines(const fs::path& path) {
   constexpr std::uintmax_t kLongest = std::uintmax_t{16} << 20;
-  text_.resize(std::min(fs::file_size(path), kLongest));
+  const std::uintmax_t size = fs::file_size(path);
+  if (size == 0) refuse_unreadable(path, "");
+  text_.resize(std::min(size, kLongest));
   std::ifstream in(path, std::ios::binary);
   in.read(text_.data(), static_cast<std::streamsize>(text_.size()));
   text_.resize(static_cast<std::size_t>(in.gcount()));
@@ -171,8 +173,8 @@ std::vector<Written> HeaderFields::numbers(std::string_view key, std::size_t cou
 void HeaderFields::refuse(std::string_view key, const std::string& why) const {
   constexpr std::size_t kShown = 80;
   const std::string found = text(key);
-  throw LoadError(path_.string() + ": " + std::string(key) + ": " +
-                  (found.empty() ? "" : one_line(found.substr(0, kShown)) + " ") + why);
+  throw LoadError(path_.string() + ": " + std::string(key) +
+                  (found.empty() ? " " : ": " + one_line(found.substr(0, kShown)) + " ") + why);
 }
 
 std::optional<LengthUnit> length_unit(const std::string& word) {

@@ -14,7 +14,7 @@
 
 namespace kerf::volume {
 
-/// The lines of a header, from the begin of its file.
+/// The lines of a header, from the begin of its file; an empty file is refused.
 class HeaderLines {
  public:
   explicit HeaderLines(const std::filesystem::path& path);

@@ -250,6 +250,9 @@ std::vector<VoxelPart> meta_parts(const MetaHeader& header,
   } else {
     parts.push_back({fields.path().parent_path() / text});
   }
+  for (const VoxelPart& part : parts) {
+    if (part.begin == 0) refuse_itself(fields, kData, part.file, "write LOCAL");
+  }
   const std::int64_t skip = fields.whole_number_or("HeaderSize", 0);
   const bool inside = skip > 0 && parts.front().begin > static_cast<std::uint64_t>(skip);
   if (skip < -1 || inside) {

@@ -158,6 +158,9 @@ std::vector<VoxelPart> nrrd_parts(const NrrdHeader& header,
   } else {
     parts.push_back({fields.path(), header.end});
   }
+  for (const VoxelPart& part : parts) {
+    if (fields.has(kKey)) refuse_itself(fields, kKey, part.file, "leave the line out");
+  }
   const std::int64_t lines = fields.whole_number_or("line skip", 0);
   const std::int64_t bytes = fields.whole_number_or("byte skip", 0);
   if (lines < 0) fields.refuse("line skip", "is negative; correct the header");

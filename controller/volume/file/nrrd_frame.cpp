@@ -200,6 +200,28 @@ void set_axis(const HeaderFields& fields, const Space& space, const std::vector<
   claim.spacing_known |= 1U << axis;
 }
 
+/// Whether the border of the volume, or the centre of its first and last voxel (a node), is at
+/// `mins` and `maxs`: as the word of `centers` says; without one, as they fit the spacing, by
+/// default the border. Refuses a spacing that contradicts them.
+bool is_node(const HeaderFields& fields, const std::string& center, std::int64_t size,
+             const Written& spacing, const Written& min, const Written& max) {
+  const bool says_node = lower(center) == "node", says_cell = lower(center) == "cell";
+  const double extent = max.value - min.value;
+  const auto fits = [&](std::int64_t steps) {
+    const auto count = static_cast<double>(steps);
+    // Two products or differences, each of numbers that were rounded as they were read.
+    const double rounding = 4 * std::numeric_limits<double>::epsilon() *
+                            (std::abs(min.value) + std::abs(max.value) + count * spacing.value);
+    return std::abs(count * spacing.value - extent) <=
+           count * spacing.rounding + min.rounding + max.rounding + rounding;
+  };
+  if (std::isnan(extent) || (!says_node && fits(size))) return says_node;
+  if (!says_cell && fits(size - 1)) return true;
+  fields.refuse("spacings", "contradicts `axis mins` and `axis maxs`, which are " +
+                                number_text(extent) + " apart for " + std::to_string(size) +
+                                " voxels; correct the header");
+}
+
 /// Without directions: spacings, and `axis mins`, which is the centre of the first voxel or
 /// (centers: cell, and by default) its border.
 void set_straight(const HeaderFields& fields, const std::vector<std::size_t>& axes,
@@ -207,7 +229,9 @@ void set_straight(const HeaderFields& fields, const std::vector<std::size_t>& ax
                   UntrustedHeader& claim) {
   const std::size_t count = spacings.size();
   std::vector<Written> mins(count, {std::numeric_limits<double>::quiet_NaN(), 0});
+  std::vector<Written> maxs = mins;
   if (fields.has("axis mins")) mins = fields.numbers("axis mins", count);
+  if (fields.has("axis maxs")) maxs = fields.numbers("axis maxs", count);
   std::vector<std::string> centers = words_of(fields.text("centers"));
   if (!centers.empty() && centers.size() != count) {
     fields.refuse("centers", "is not one word for each axis; correct the header");
@@ -221,8 +245,9 @@ void set_straight(const HeaderFields& fields, const std::vector<std::size_t>& ax
     if (std::isnan(spacing * scale)) continue;
     claim.spacing_mm[i] = spacing * scale;
     claim.spacing_known |= 1U << i;
-    const bool is_node = lower(centers[axes[i]]) == "node";
-    if (!std::isnan(min)) claim.origin_mm[i] = (min + (is_node ? 0 : spacing / 2)) * scale;
+    const bool node = is_node(fields, centers[axes[i]], claim.size[i], spacings[axes[i]],
+                              mins[axes[i]], maxs[axes[i]]);
+    if (!std::isnan(min)) claim.origin_mm[i] = (min + (node ? 0 : spacing / 2)) * scale;
   }
 }
 

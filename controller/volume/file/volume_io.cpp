@@ -125,13 +125,15 @@ void set_grid(const fs::path& path, const std::array<std::int64_t, 3>& size, Sou
                  static_cast<std::int32_t>(size[2])};
 }
 
-/// Refuses an origin that is not finite.
+/// Refuses an origin that is not finite, or so far away that no position would be exact.
 void set_origin(const fs::path& path, const std::array<double, 3>& origin_mm,
                 SourceVolume& volume) {
   for (const double o : origin_mm) {
-    if (std::isfinite(o)) continue;
-    throw LoadError(path.string() +
-                    ": its origin is not a number of mm; correct the header, or leave it out");
+    constexpr double kFarthest_mm = 1e6;
+    if (std::abs(o) <= kFarthest_mm) continue;
+    throw LoadError(path.string() + ": its origin is " +
+                    (std::isfinite(o) ? "farther than 1 km" : "not a number of mm") +
+                    "; correct the header, or leave it out");
   }
   volume.origin_mm = origin_mm;
 }

@@ -8,9 +8,11 @@
 #include <cstddef>
 #include <cstring>
 #include <fstream>
+#include <map>
 #include <memory>
 #include <new>
 #include <optional>
+#include <set>
 #include <string_view>
 #include <system_error>
 #include <type_traits>
@@ -62,16 +64,24 @@ bool is_packed(Packing packing) {
   throw LoadError(shown(file) + ": holds more voxels than its header says; correct the sizes");
 }
 
+/// Offset of the first byte after the lines that a part skips; the end of a file of fewer lines.
+std::uint64_t after_lines(const VoxelPart& part) {
+  if (part.lines == 0) return part.begin;
+  std::ifstream in(part.file, std::ios::binary);
+  in.seekg(static_cast<std::streamoff>(part.begin));
+  for (std::uint64_t line = 0; line < part.lines && in; ++line) {
+    in.ignore(std::numeric_limits<std::streamsize>::max(), '\n');
+  }
+  return in.good() ? static_cast<std::uint64_t>(in.tellg()) : fs::file_size(part.file);
+}
+
 /// The bytes of a part, unpacked if they are packed.
 class PartBytes {
  public:
   PartBytes(const VoxelPart& part, Packing packing, std::uint64_t packed_bytes,
             std::uint64_t wanted)
       : file_(part.file), in_(part.file, std::ios::binary), left_(packed_bytes) {
-    in_.seekg(static_cast<std::streamoff>(part.begin));
-    for (std::uint64_t line = 0; line < part.lines && in_; ++line) {
-      in_.ignore(std::numeric_limits<std::streamsize>::max(), '\n');
-    }
+    in_.seekg(static_cast<std::streamoff>(after_lines(part)));
     if (part.bytes < 0) {  // of raw voxels alone
       const auto behind = static_cast<std::uint64_t>(-(part.bytes + 1));
       in_.seekg(static_cast<std::streamoff>(fs::file_size(part.file) - behind - wanted));
@@ -290,10 +300,11 @@ void read_part(const VoxelFiles& files, const VoxelPart& part, std::span<std::by
   for (std::size_t at = 0; at < to.size(); at += each) std::ranges::reverse(to.subspan(at, each));
 }
 
-/// Refuses a part that is missing, or too short for `wanted` bytes of voxels. Returns the number of
-/// bytes that follow raw voxels.
+/// Refuses a part that is missing, too short for `wanted` bytes of voxels, or that holds as many
+/// raw bytes again: another type, or sizes of fewer voxels. Returns the number of bytes that follow
+/// raw voxels. Both only if no other part is in the file.
 std::uint64_t check_part(const fs::path& header, const VoxelFiles& files, const VoxelPart& part,
-                         std::uint64_t wanted) {
+                         std::uint64_t wanted, bool is_alone) {
   std::error_code error;
   const std::uint64_t size = fs::file_size(part.file, error);
   if (error) {
@@ -305,12 +316,17 @@ std::uint64_t check_part(const fs::path& header, const VoxelFiles& files, const 
   const bool packed = is_packed(files.packing);
   const std::uint64_t skipped =
       from_end ? static_cast<std::uint64_t>(-(part.bytes + 1))
-               : part.begin + (packed ? 0 : static_cast<std::uint64_t>(part.bytes));
+               : after_lines(part) + (packed ? 0 : static_cast<std::uint64_t>(part.bytes));
   const std::uint64_t held = std::min(size - std::min(size, skipped), files.packed_bytes);
   const std::uint64_t most = most_bytes(files.packing, held);
   if (most < wanted) refuse_truncated(shown(part.file), most, wanted);
-  const bool counted = files.packing == Packing::raw && !from_end && part.lines == 0;
-  return counted ? most - wanted : 0;
+  if (files.packing != Packing::raw || from_end || !is_alone) return 0;
+  if (most / 2 >= wanted) {
+    throw LoadError(shown(part.file) + ": holds " + std::to_string(most) +
+                    " bytes of voxels, and its header says " + std::to_string(wanted) +
+                    "; correct the sizes or the type");
+  }
+  return most - wanted;
 }
 
 }  // namespace
@@ -347,6 +363,14 @@ std::string FileNames::name(std::int64_t number) const {
     at = end + 1;
   }
   return text;
+}
+
+void refuse_itself(const HeaderFields& fields, const char* key, const fs::path& file,
+                   const char* remedy) {
+  std::error_code error;
+  if (fs::equivalent(file, fields.path(), error)) {
+    fields.refuse(key, std::string("names the header itself; ") + remedy);
+  }
 }
 
 std::vector<fs::path> files_of(const HeaderFields& fields, const char* key, const FileNames& names,
@@ -391,8 +415,17 @@ void read_voxel_files(const fs::path& header, VoxelFiles files, UntrustedHeader 
   const auto wanted =
       static_cast<std::uint64_t>(claim.size[0] * claim.size[1] * claim.size[2]) * each;
   const std::uint64_t of_part = wanted / files.parts.size();
+  std::map<fs::path, std::set<std::int64_t>> starts;  // several parts may lie in one file
+  for (const VoxelPart& part : files.parts) {
+    if (starts[part.file].insert(part.bytes).second) continue;
+    throw LoadError(header.string() + ": names the same voxels of " +
+                    one_line(part.file.filename().string()) + " twice; correct the list");
+  }
   std::uint64_t behind = 0;
-  for (const VoxelPart& part : files.parts) behind += check_part(header, files, part, of_part);
+  for (const VoxelPart& part : files.parts) {
+    const bool is_alone = starts[part.file].size() == 1;
+    behind += check_part(header, files, part, of_part, is_alone);
+  }
   if (behind > 0) {
     add_note(claim, std::to_string(behind) + " bytes after the voxels are not read");
   }

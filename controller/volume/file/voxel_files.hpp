@@ -61,10 +61,15 @@ struct FileNames {
                                                           const std::vector<std::string>& list,
                                                           const std::vector<std::int64_t>& sizes);
 
+/// Refuses the field `key` if its data file is the header.
+void refuse_itself(const HeaderFields& fields, const char* key, const std::filesystem::path& file,
+                   const char* remedy);
+
 /// Offers `claim`, whose type of values is set here, and reads the voxels into the memory. Throws
 /// LoadError, before memory is taken if their sizes show it, for files that are missing, too short
-/// or broken, or (text, packed) hold more than the voxels. Bytes that follow raw voxels are left
-/// out, and the note says so. `header`: the file that names the others, for messages.
+/// or broken, or (text, packed) hold more than the voxels, or (raw) twice their bytes or more.
+/// Fewer bytes that follow raw voxels are left out, and the note says so. `header`: the file that
+/// names the others, for messages.
 void read_voxel_files(const std::filesystem::path& header, VoxelFiles files, UntrustedHeader claim,
                       const MemoryRequest& offer);
 
