@@ -187,6 +187,25 @@ TEST_CASE("slices are even as far as each coordinate is written, at every distan
   }
 }
 
+TEST_CASE("slices of two patients, studies or frames of reference are refused by name") {
+  const std::pair<std::uint32_t, std::string> tags[] = {{0x00100020, "PatientID"},
+                                                        {0x0020000d, "StudyInstanceUID"},
+                                                        {0x00200052, "FrameOfReferenceUID"}};
+  for (const auto& [tag, name] : tags) {
+    const auto message = [&](const std::function<const char*(int)>& text) {
+      return series_message([&](DicomSpec& spec, int k) {
+        spec.set(static_cast<std::uint16_t>(tag >> 16), static_cast<std::uint16_t>(tag & 0xffff),
+                 "LO", text(k));
+      });
+    };
+    CHECK(has(message([](int k) { return k < 3 ? "1.2.9" : "1.2.10"; }),
+              name + " 1.2.10, and image0.dcm of the same series has 1.2.9; keep one"));
+    CHECK(has(message([](int k) { return k < 4 ? "1.2.9" : "1.2.10"; }), "image2.dcm: " + name));
+    CHECK(has(message([](int k) { return k % 2 == 0 ? "1.2.9" : "1.2.10"; }), "2 DICOM series"));
+    CHECK(message([](int k) { return k == 2 ? "" : "1.2.9"; }) == "no error");
+  }
+}
+
 TEST_CASE("what is no slice is left out and named; a slice that cannot be read is not") {
   const TemporaryFolder folder;
   write_dicom_series(folder, [](DicomSpec&, int) {});

@@ -48,6 +48,9 @@ struct Mark {
   enum class As : std::uint8_t { text, u16, u32, f32, f64 } as;
 };
 const Mark kMarks[] = {
+    {"PatientID", kNoGroup, Tag(0x0010, 0x0020), Mark::As::text},
+    {"StudyInstanceUID", kNoGroup, Tag(0x0020, 0x000d), Mark::As::text},
+    {"FrameOfReferenceUID", kNoGroup, Tag(0x0020, 0x0052), Mark::As::text},
     {"TemporalPositionIndex", kFrameContent, Tag(0x0020, 0x9128), Mark::As::u32},
     {"TemporalPositionIdentifier", kNoGroup, Tag(0x0020, 0x0100), Mark::As::text},
     {"StackID", kFrameContent, Tag(0x0020, 0x9056), Mark::As::text},

@@ -56,9 +56,16 @@ std::vector<Stack> parts_by(const Stack& whole, const std::string& mark) {
 }
 
 /// Marks by which parts that reach over the same depths are different volumes in any case.
-constexpr std::string_view kSureMarks[] = {
-    "TemporalPositionIndex", "TemporalPositionIdentifier", "StackID",        "EchoNumbers",
-    "EffectiveEchoTime",     "ReferencedSegmentNumber",    "DiffusionBValue"};
+constexpr std::string_view kSureMarks[] = {"PatientID",
+                                           "StudyInstanceUID",
+                                           "FrameOfReferenceUID",
+                                           "TemporalPositionIndex",
+                                           "TemporalPositionIdentifier",
+                                           "StackID",
+                                           "EchoNumbers",
+                                           "EffectiveEchoTime",
+                                           "ReferencedSegmentNumber",
+                                           "DiffusionBValue"};
 
 bool overlap(const std::vector<Stack>& parts) {
   for (const Stack& a : parts) {
@@ -213,6 +220,23 @@ const DicomSlice* odd_one(const std::vector<Stack>& all, const Stack& chosen) {
   return nullptr;
 }
 
+/// Refuses slices of two bodies, studies or frames of reference: positions are comparable within
+/// one (PS3.3 C.7.4.1.1.1). A slice that does not name its own may be of any.
+void check_one_body(const Stack& stack) {
+  for (const char* mark : {"PatientID", "StudyInstanceUID", "FrameOfReferenceUID"}) {
+    const DicomSlice* named = nullptr;
+    for (const DicomSlice& slice : stack.slices) {
+      const std::string own = mark_of(slice, mark);
+      if (own.empty()) continue;
+      if (named == nullptr) named = &slice;
+      if (own == mark_of(*named, mark)) continue;
+      throw LoadError(slice.file->path.string() + ": " + mark + ' ' + one_line(own) + ", and " +
+                      name_of(*named) + " of the same series has " +
+                      one_line(mark_of(*named, mark)) + "; keep one of them in a folder");
+    }
+  }
+}
+
 UntrustedHeader whole_claim_of(const fs::path& path, const std::vector<Stack>& all,
                                const Stack& stack, Note& note) {
   try {
@@ -275,6 +299,7 @@ void read_dicom(const fs::path& path, const std::vector<fs::path>& files, const 
     throw LoadError(stack.slices.front().file->path.string() +
                     ": one slice; name the folder that holds the whole DICOM series");
   }
+  check_one_body(stack);
   UntrustedHeader claim = whole_claim_of(path, all, stack, note);
   const DicomValues values = values_of(stack.slices);
   for (const DicomSlice& slice : stack.slices) {
