@@ -200,7 +200,7 @@ void print(const VolumeInfo& info, std::ostream& out) {
       const bool known = (info.spacing_known >> axis & 1) != 0;
       out << (known ? number_text(s[axis]) : "?") << (axis < 2 ? " x " : " mm: ");
     }
-    out << "not in the file; give it with --spacing or spacing_mm\n";
+    out << "not known from the file; give it with --spacing or spacing_mm\n";
   }
   if (!info.note.empty()) out << "note       " << info.note << '\n';
   out << "origin     " << o[0] << " " << o[1] << " " << o[2] << " mm\ndirection  (" << d[0] << " "
@@ -274,7 +274,7 @@ struct Source {
     const SourceVolume source = read(spacing_is_new);
     if (source.spacing_known != kAllAxes) {
       throw LoadError(file +
-                      ": spacing is not in the file; give it with --override-spacing x,y,z "
+                      ": spacing is not known from the file; give it with --override-spacing x,y,z "
                       "(mm), since --spacing is the new one");
     }
     if (!source.note.empty()) out << escaped(file) << ": " << source.note << '\n';

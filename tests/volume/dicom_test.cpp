@@ -97,7 +97,8 @@ TEST_CASE("a spacing at the detector is not in the file") {
 }
 
 TEST_CASE(
-    "a spacing that is no two distances is not in the file, whatever the library makes of it") {
+    "a spacing that is no two distances is not used and is shown, whatever the library makes of "
+    "it") {
   const std::string nul(1, '\0');
   for (const std::string& text :
        {std::string(""), std::string("0\\0"), std::string("0.3\\0"), std::string("0\\0.3"),
@@ -111,12 +112,14 @@ TEST_CASE(
     const std::string message = refusal(folder.path());
     CAPTURE(text);
     CAPTURE(message);
-    CHECK(has(message,
-              ": spacing along x, y is not in the file; add `spacing_mm = [x, y, 2]` to the scene "
-              "or `--spacing x,y,2` (mm)"));
+    CHECK(has(message, text.empty() ? ": spacing along x, y is not in the file; add"
+                                    : ": spacing along x, y cannot be read from PixelSpacing '"));
+    CHECK(has(message, "; add `spacing_mm = [x, y, 2]` to the scene or `--spacing x,y,2` (mm)"));
     ReadOptions options;
     options.spacing_mm = {0.25, 0.5, 2};
-    CHECK(read_volume(folder.path(), options).spacing_mm == *options.spacing_mm);
+    const SourceVolume v = read_volume(folder.path(), options);
+    CHECK(v.spacing_mm == *options.spacing_mm);
+    CHECK(has(v.note, "is no two distances and is not used") == !text.empty());
   }
   for (const std::string& text : {std::string("0.5\\0.25"), std::string(" 0.5 \\ 0.25"),
                                   std::string("+5e-1\\2.5E-1"), "0.5\\0.25" + nul}) {

@@ -194,6 +194,7 @@ DicomFrame frame_of(const Facts& facts, std::size_t index, const StoredPixels& p
   numbers(frame.orientation, Tag(0x0020, 0x9116), Tag(0x0020, 0x0037), "ImageOrientationPatient");
   check_directions(frame);
   frame.spacing_mm = spacing_of(facts);
+  if (!frame.spacing_mm) frame.bad_spacing = facts.text(kMeasures, Tag(0x0028, 0x0030));
   if (const auto distance = written_number(facts.text(kMeasures, Tag(0x0018, 0x0088)))) {
     frame.distance_mm = distance->value;
   }

@@ -45,9 +45,10 @@ struct DicomFrame {
   std::optional<std::array<WrittenNumber, 3>> position_mm;
   std::optional<std::array<WrittenNumber, 6>> orientation;  ///< along a row, along a column
   std::optional<std::array<WrittenNumber, 2>> spacing_mm;   ///< between rows, between columns
-  std::optional<double> distance_mm;                        ///< to the next slice, if above 0
-  std::optional<WrittenNumber> location_mm;                 ///< SliceLocation
-  std::optional<double> number;                             ///< in the order of its series or file
+  std::string bad_spacing;                   ///< PixelSpacing, if it is there and no two distances
+  std::optional<double> distance_mm;         ///< to the next slice, if above 0
+  std::optional<WrittenNumber> location_mm;  ///< SliceLocation
+  std::optional<double> number;              ///< in the order of its series or file
   ModalityTransform transform;
   /// What may differ between two volumes in one series, such as a time: its name and its text.
   std::vector<std::pair<std::string, std::string>> marks;

@@ -10,6 +10,7 @@
 
 #include "controller/input/load_error.hpp"
 #include "shared/numeric/linear_algebra.hpp"
+#include "shared/text/text.hpp"
 
 namespace kerf::volume {
 namespace fs = std::filesystem;
@@ -317,6 +318,12 @@ UntrustedHeader claim_of(const fs::path& path, const Stack& stack, Note& note) {
     claim.spacing_known = kInPlane;
     claim.spacing_mm = {(*finest->frame->spacing_mm)[1].value,
                         (*finest->frame->spacing_mm)[0].value, 1};
+  }
+  if (const std::string& bad = finest->frame->bad_spacing; !bad.empty()) {
+    constexpr std::size_t kMostShown = 40;
+    const std::string text = "PixelSpacing '" + one_line(bad.substr(0, kMostShown)) + "'";
+    text.copy(claim.bad_spacing.data(), claim.bad_spacing.size() - 1);
+    note.add(text + " is no two distances and is not used");
   }
   const double step = slice_distance(path, stack);
   if (stack.order != Order::number) {

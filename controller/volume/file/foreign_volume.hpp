@@ -38,6 +38,7 @@ struct UntrustedHeader {
   ValueKind kind = ValueKind::float32;
   /// Bit a: the file names the distance along axis a; else `spacing_mm[a]` is a library's guess.
   std::uint32_t spacing_known = kAllAxes;
+  std::array<char, 96> bad_spacing{};  ///< what the file has that is no distance; or empty
   std::array<double, 3> spacing_mm{1, 1, 1}, origin_mm{};
   std::array<vec3::Vec, 3> axes{};  ///< direction of each
   std::array<char, 1024> note{};    ///< for the user: sentences of `add_note`

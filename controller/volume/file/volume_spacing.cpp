@@ -12,6 +12,7 @@
 #include <string_view>
 
 #include "controller/input/load_error.hpp"
+#include "shared/text/text.hpp"
 
 namespace kerf {
 
@@ -73,15 +74,16 @@ std::string spacing_text(const std::array<double, 3>& mm, std::uint32_t known,
 }
 
 [[noreturn]] void refuse_unspaced(const std::string& place, const std::array<double, 3>& mm,
-                                  std::uint32_t known) {
+                                  std::uint32_t known, const std::string& bad) {
   std::string axes;
   for (std::size_t axis = 0; known != 0 && axis < 3; ++axis) {
     if ((known >> axis & 1) != 0) continue;
     axes += (axes.empty() ? " along " : ", ") + std::string(1, kAxisLetters[axis]);
   }
-  throw LoadError(place + ": spacing" + axes + " is not in the file; add `spacing_mm = [" +
-                  spacing_text(mm, known, ", ") + "]` to the scene or `--spacing " +
-                  spacing_text(mm, known, ",") + "` (mm)");
+  throw LoadError(place + ": spacing" + axes +
+                  (bad.empty() ? " is not in the file" : " cannot be read from " + bad) +
+                  "; add `spacing_mm = [" + spacing_text(mm, known, ", ") +
+                  "]` to the scene or `--spacing " + spacing_text(mm, known, ",") + "` (mm)");
 }
 
 }  // namespace
@@ -125,7 +127,8 @@ void take_spacing(const std::string& place, const ReadOptions& options,
     }
     volume.spacing_known = kAllAxes;
   } else if (in_file != kAllAxes && !options.allow_missing_spacing) {
-    refuse_unspaced(place, mm, in_file);
+    const std::string bad(claim.bad_spacing.begin(), std::ranges::find(claim.bad_spacing, '\0'));
+    refuse_unspaced(place, mm, in_file, escaped(bad));
   }
   volume.spacing_mm = mm;
 }
