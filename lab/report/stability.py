@@ -226,7 +226,7 @@ def measure(order):
     devices = maps.measure({"device": ",".join(NAMES), "damping": "0:0.03:3" if quick else "0:0.03:31"}, 36)
     rates = maps.measure({"rate": "250,500,1000,2000,4000,8000", "damping": "0:0.03:3" if quick else "0:0.03:21"}, 30,
                          ["--seeds", "1"])
-    return json.dumps({"provenance": order["provenance"], "devices": devices, "rates": rates,
+    return json.dumps({"provenance": order["provenance"], "highest_n_per_mm": 2 if quick else 50, "devices": devices, "rates": rates,
                        "table": measure_devices(maps, devices), "stabilisers": measure_stabilisers(maps),
                        "knobs": measure_knobs(maps, devices), "numbers": measure_numbers(maps)})
 
@@ -293,9 +293,9 @@ def measure_numbers(maps):
     return rows
 
 
-def first(n_per_mm):
-    """A first crossing; the ends are those of all maps of the page."""
-    return "> 50" if n_per_mm == NEVER else text.figure(n_per_mm) if n_per_mm > 0 else "< 0.05"
+def first_below(highest):
+    """The text of a first crossing; the ends are those of all maps of the page."""
+    return lambda n_per_mm: f"> {highest}" if n_per_mm == NEVER else text.figure(n_per_mm) if n_per_mm > 0 else "< 0.05"
 
 
 def below(number, digits):
@@ -310,7 +310,7 @@ def recommended(row):
 
 
 def page(data, devices, rates):
-    kinds = list(text.rows_of(data, "stabilisers")[0]["lowest"])
+    kinds, first = list(text.rows_of(data, "stabilisers")[0]["lowest"]), first_below(data["highest_n_per_mm"])
     return (ABOUT + f"## Devices\n\n![Maps of three devices]({devices})\n\n" + DEVICES
             + text.table(["device", ">delay, periods", ">B, N s/mm", ">linear, exact", ">one axis", ">with a firm hand",
                           ">whole arm", ">recommended K"],
