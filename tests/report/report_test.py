@@ -119,7 +119,7 @@ HEIGHTS = lab("zwidth", "--map", "numeric,rate", "--numeric", "fixed,double", "-
 PORTRAITS = {"seed": 1, "seconds": 1, "whole_arm": False, "axes": MAP["columns"][0]["axes"],
              "cells": [{"stiffness_n_per_mm": 1, "damping_ns_per_mm": 0.002,
                         "hits": [{"name": "push", "tip_mm": [0, -1], "mm_per_s": [0, 1]}]}]}
-STABILITY = {"provenance": "a day, a machine.", "devices": MAP, "rates": MAP,
+STABILITY = {"highest_n_per_mm": 50, "provenance": "a day, a machine.", "devices": MAP, "rates": MAP,
              "table": [{"device": "Omni", "delay": "1", "damping": "0.002", "exact": 1.59, "axis": 2.4, "held": 3,
                         "arm": float("inf")}],
              "stabilisers": [{"device": "Omni", "delay": "1", "lowest": {"none": [2.4, 0]}}],
