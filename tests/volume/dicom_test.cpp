@@ -247,7 +247,7 @@ TEST_CASE("what is no slice is left out and named; a slice that cannot be read i
 
 TEST_CASE("a file of no series beside the slices may be one of them and is refused by name") {
   const std::string slice = dicom(dicom_slice(4));
-  const std::size_t series = slice.find(dicom_slice(4).series);
+  const std::size_t series = slice.find(std::string("\x20\x00\x0e\x00UI", 6)) + 8;
   const std::pair<std::string, const char*> lost[] = {
       {"", "is empty"},
       {std::string(1100, '\0'), "holds zeroes alone"},
@@ -269,6 +269,10 @@ TEST_CASE("a file of no series beside the slices may be one of them and is refus
   }
   const TemporaryFolder folder;
   write_dicom_series(folder, [](DicomSpec&, int) {});
+  const std::string series_text = dicom_slice(4).series;
+  folder.write("image2.dcm", slice.substr(0, series + series_text.size() + series_text.size() % 2));
+  CHECK(has(refusal(folder.path()), "image2.dcm: holds no image"));
+  folder.write("image2.dcm", slice);
   std::filesystem::create_symlink(folder / "gone", folder / "image9");
   CHECK(has(refusal(folder.path()), "image9: cannot be opened (No such file or directory)"));
   std::filesystem::remove(folder / "image9");

@@ -266,9 +266,13 @@ void describe(const gdcm::DataSet& set, DicomFile& file) {
   file.series = text(0x0020, 0x000e);
   file.series_name = text(0x0008, 0x103e);
   file.series_number = number_in(text(0x0020, 0x0011)).value_or(0);
-  // A slice has a grey value per pixel, or a position.
+  // A slice has a grey value per pixel, or a position; one that is cut off before both has the
+  // modality of slices.
   const auto samples = binary<std::uint16_t>(set.GetDataElement(Tag(0x0028, 0x0002)));
-  file.is_slice = set.FindDataElement(Tag(0x0020, 0x0032)) ||
+  const std::string modality = text(0x0008, 0x0060);
+  const bool of_slices = modality == "CT" || modality == "MR" || modality == "PT";
+  file.is_slice = (of_slices && !set.FindDataElement(Tag(0x0028, 0x0010))) ||
+                  set.FindDataElement(Tag(0x0020, 0x0032)) ||
                   set.FindDataElement(Tag(0x5200, 0x9230)) ||
                   (set.FindDataElement(Tag(0x0028, 0x0010)) && samples.value_or(1) == 1);
   file.is_index = set.FindDataElement(Tag(0x0004, 0x1220));
