@@ -54,7 +54,7 @@ struct Column {
 };
 using Columns = std::map<std::size_t, Column>;
 
-/// The limit that a hit needs, s, so that a swing that dies out is told from one that does not: in
+/// The limit that a hit needs, s, that separates a swing that dies out from one that does not: in
 /// half of it eight windows of the slowest swing; twelve time constants of an overdamped creep; and
 /// if damping b takes the swing away, at the rate b/(2 m) without a wall and less and less up to
 /// the boundary, so long that at 1 % of that rate it falls by 9 %.

@@ -247,7 +247,7 @@ double slice_distance(const fs::path& path, const Stack& stack) {
     const DicomSlice &a = stack.slices[twin - 1], &b = stack.slices[twin];
     throw LoadError(path.string() + ": " + name_of(b) + " has the " +
                     (stack.order == Order::number ? "number" : "position") + " of " + name_of(a) +
-                    ", and no tag tells two volumes apart; keep one volume in a series");
+                    ", and no tag separates two volumes; keep one volume in a series");
   }
   const DepthErrors errors = errors_of_depths(stack, step, axes.normal);
   const double slack_mm = std::max(kOffVoxels * step, errors.rounding) + errors.noise;

@@ -9,7 +9,7 @@
 
 namespace kerf::volume {
 
-/// The volume in a folder: its kind, the files for its reader, and what is left out.
+/// The volume in a folder: its kind, the files for its reader, and the others.
 struct FolderFiles {
   VolumeKind kind = VolumeKind::dicom_series;
   const char* name = "";  ///< of the kind, for messages
