@@ -70,12 +70,18 @@ bool has_word(const std::string& words, const std::string& word) {
 
 constexpr int kMostValues = 1000;
 
-/// from:to:count with two ends, in rising order; empty for another text.
-std::optional<grid::Range> ordered_range(const std::string& text) {
+/// from:to:count, in rising order; empty for a text that is not three numbers. Throws HilError for
+/// a range with equal ends, or a count that is not 2 to kMostValues.
+std::optional<grid::Range> ordered_range(const std::string& option, const std::string& text) {
   auto range = grid::range_in(text);
   const bool fits = range && range->count == std::floor(range->count) && range->count >= 2 &&
                     range->count <= kMostValues && range->lo != range->hi;
-  if (!fits) return std::nullopt;
+  if (!range) return std::nullopt;
+  if (!fits) {
+    throw HilError("--" + option + ": " + text +
+                   ": no range; give two different ends and a count of 2 to " +
+                   std::to_string(kMostValues));
+  }
   if (range->lo > range->hi) std::swap(range->lo, range->hi);
   return range;
 }
@@ -225,7 +231,7 @@ AxisValues axis_values(AxisId axis, const std::string& text) {
   const AxisKind& kind = kKinds[index_of(axis)];
   const bool numbers = kind.lowest != kind.highest;
   AxisValues values;
-  if (const auto range = ordered_range(text); range && numbers) {
+  if (const auto range = numbers ? ordered_range(kind.name, text) : std::nullopt) {
     for (int i = 0; i < range->count; ++i) {
       const double share = static_cast<double>(i) / (range->count - 1);
       values.push_back(format("%.9g", range->lo + (range->hi - range->lo) * share));
@@ -263,7 +269,8 @@ std::vector<double> stiffness_values(const std::string& text) {
     throw HilError("--stiffness: " + text + ": " + what +
                    "; use such as 0.05:50:40 (from, to, count) or 0.5,1,2");
   };
-  if (const auto range = ordered_range(text); range && range->lo > 0) {
+  if (const auto range = ordered_range("stiffness", text)) {
+    if (range->lo <= 0) refuse("its ends are not above 0");
     for (int i = 0; i < range->count; ++i) {
       const double share = static_cast<double>(i) / (range->count - 1);
       values.push_back(range->lo * std::pow(range->hi / range->lo, share));

@@ -51,6 +51,10 @@ TEST_CASE("a DICOM folder that is not one even stack is refused in one line") {
   }
   whole.write("image3 (copy).dcm", dicom(dicom_slice(1)));
   CHECK(has(refusal(whole.path()), ": image3.dcm has the position of image3 (copy).dcm"));
+  std::filesystem::remove(whole / "image3 (copy).dcm");
+  std::filesystem::create_directory(whole / "copy");
+  whole.write("copy/image3.dcm", dicom(dicom_slice(1)));
+  CHECK(has(refusal(whole.path()), ": image3.dcm has the position of copy/image3.dcm"));
 }
 
 TEST_CASE("one of several DICOM series is taken by its number or identifier") {

@@ -245,8 +245,13 @@ double slice_distance(const fs::path& path, const Stack& stack) {
   }
   if (twin != 0) {
     const DicomSlice &a = stack.slices[twin - 1], &b = stack.slices[twin];
-    throw LoadError(path.string() + ": " + name_of(b) + " has the " +
-                    (stack.order == Order::number ? "number" : "position") + " of " + name_of(a) +
+    // Files of one name lie in two folders.
+    const bool same_name = name_of(a) == name_of(b);
+    const auto shown = [&](const DicomSlice& slice) {
+      return same_name ? slice.file->path.lexically_relative(path).string() : name_of(slice);
+    };
+    throw LoadError(path.string() + ": " + shown(b) + " has the " +
+                    (stack.order == Order::number ? "number" : "position") + " of " + shown(a) +
                     ", and no tag separates two volumes; keep one volume in a series");
   }
   const DepthErrors errors = errors_of_depths(stack, step, axes.normal);
