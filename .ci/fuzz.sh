@@ -22,9 +22,10 @@ lists=$build/tests/fuzz
 # fuzz NAME CORPUS...: one fuzzer; its last lines when it finds something, else its figures.
 fuzz() {
   local name=$1 work=$build/fuzz/$1 status=0 own=(-timeout=5)
-  # A child may take a second of a core that others want as well; the day's mutations can be repeated.
+  # A child may take a second of a core that others want as well; the day's mutations can be repeated. The name of
+  # a function is found by a process that stays, and the next input would find a child left.
   if grep -q "^$name " "$lists/importers"; then
-    own=(-timeout=60 -seed="$seed" -max_len=8192 -reduce_inputs=0)
+    own=(-timeout=60 -seed="$seed" -max_len=8192 -reduce_inputs=0 -print_funcs=0)
   fi
   mkdir -p "$work/inputs"
   # Memory of a text's nesting and of error messages stays far below; so does the time of one input.
@@ -32,6 +33,7 @@ fuzz() {
     -artifact_prefix="$work/" -print_final_stats=1 "$work/inputs" "${@:2}" \
     >"$work/log" 2>&1 || status=$?
   if ((status)); then
+    grep -m 1 '^import: ' "$work/log" >&2  # the reason comes before the stack
     tail -n 30 "$work/log" >&2
     echo "fuzz: $name: found an input (above): $work" >&2
     return 1
