@@ -25,6 +25,44 @@ def on_files(files, config):
     return files
 
 
+ITEM = re.compile(r" *([*+-]|\d+\.) +(?=\S)")
+
+
+def as_python_markdown(markdown):
+    """CommonMark, as GitHub shows it, for Python-Markdown: what belongs to an item of a list begins in its text's column
+    there and behind four blanks here, an item behind a text needs a blank line, and a fence has a language alone: the file
+    that it names too, ```cpp law.cpp, becomes its caption."""
+    lines, columns, fence = [], [], None  # columns: where the text of each open item begins
+    for line in markdown.split("\n"):
+        starts, item, open_items = not lines or not lines[-1], fence is None and ITEM.match(line), len(columns)
+        indent = len(line) - len(line.lstrip())
+        while columns and line and indent < columns[-1] and (starts or item) and fence is None:
+            columns.pop()
+        within = columns[-1] if columns else 0
+        item = item if indent < within + 4 else None
+        if item and not starts and len(columns) == open_items and item[1] not in "*+-1.":
+            lines[-1] += " " + line.strip()  # a number that ended a sentence
+            continue
+        if item and not starts and not in_list:
+            lines.append("")
+        if starts or item:
+            in_list = bool(item)
+        line = " " * 4 * len(columns) + line[min(indent, within):] if line.strip() else ""
+        if mark := re.match(r" *```(\w*) *([\w./-]*)$", line):
+            if fence is None and mark[2]:
+                lines += [f'<p class="file"><code>{mark[2]}</code></p>', ""]
+                line = f"```{mark[1]}"
+            fence = None if fence else mark[0]
+        elif item:
+            columns.append(item.end())
+        lines.append(line)
+    return "\n".join(lines)
+
+
+def on_page_markdown(markdown, **_):
+    return as_python_markdown(markdown)
+
+
 def on_post_build(config):
     site = pathlib.Path(config["site_dir"])
     search = site / "search"

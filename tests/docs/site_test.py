@@ -2,9 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """The site of `./kerf docs` as its reader has it, from a folder:  site_test.py ROOT
 
-It is small, loads nothing from elsewhere, has every page in its list, and its search finds. Exit code 77: skipped, for
+It is small, loads nothing from elsewhere, leaves no Markdown as text, has every page in its list, and its search finds. Exit code 77: skipped, for
 want of mkdocs, or of chromium once all else is fine."""
 import html.parser
+import itertools
 import json
 import pathlib
 import re
@@ -16,6 +17,7 @@ import tempfile
 root = pathlib.Path(sys.argv[1]).resolve()
 sys.path.insert(0, str(root / "tests" / "page"))
 import browser
+import pages
 
 MOST_BYTES = 5_000_000
 # What a reader types, and the section that must come among the first three.
@@ -38,6 +40,57 @@ class Loads(html.parser.HTMLParser):
         self.anchors.add(values.get("id"))
         if tag != "a":
             self.addresses += [values[name] for name in ("src", "href", "data", "poster") if values.get(name)]
+
+
+class Prose(html.parser.HTMLParser):
+    """The text of a page's article outside of code, piece by piece, and its headings."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.within, self.pieces, self.headings = [], [], []
+        self.feed(text.partition('role="main">')[2].partition("<footer")[0])
+
+    def handle_starttag(self, tag, _):
+        if tag not in ("br", "hr", "img", "input"):
+            self.within.append(tag)
+        self.headings += [""] if re.fullmatch("h[1-6]", tag) else []
+
+    def handle_endtag(self, tag):
+        while self.within and self.within.pop() != tag:
+            pass
+
+    def handle_data(self, text):
+        if {"h1", "h2", "h3", "h4", "h5", "h6"} & set(self.within):
+            self.headings[-1] += text
+        elif not {"code", "pre", "script"} & set(self.within):
+            self.pieces.append("\0" + text if self.within[-1:] == ["p"] else text)
+
+
+# What is left of Markdown that was not understood: a fence, a heading, a row of a table, an item of a list right below a
+# line of text, a link, a mark of emphasis, a line of C++.
+LITERAL = re.compile(r"```|~~~|(?:^|[\0\n])(?:#{1,6} |\|[^\n]*\|$|[*+-] |\d+\. )|\]\(|\*\*|__\w|^#include", re.M)
+
+
+def headings_of(markdown):
+    """Those outside of fences."""
+    fence = None
+    for line in markdown.splitlines():
+        if mark := re.match("```|~~~", line):
+            fence = None if fence == mark[0] else fence or mark[0]
+        elif fence is None and (heading := re.match(r"#+ (.*)", line)):
+            yield re.sub(r"\[([^]]*)\]\([^)]*\)", r"\1", heading[1]).replace("`", "").replace("\\", "").strip()
+
+
+def faults_of_prose(site):
+    for page in pages.all_pages(root):
+        file = site / ("index.html" if page.name == "README.md" else f"{page.stem}.html")
+        shown, told = Prose(file.read_text(encoding="utf-8")), list(headings_of(page.read_text(encoding="utf-8")))
+        for there, said in itertools.zip_longest(shown.headings, told):
+            if there != said:
+                yield f"{file.name}: the heading {there!r} is shown, and {said!r} was written"
+                break
+        for found in LITERAL.finditer("".join(shown.pieces)):
+            yield f"{file.name}: Markdown as text: {found.string[max(0, found.start() - 20):found.end() + 40]!r}"
 
 
 def faults_of_files(site):
@@ -97,7 +150,7 @@ def main():
         site = pathlib.Path(folder) / "site"
         subprocess.run(["mkdocs", "build", "--quiet", "--strict", "--config-file", root / "mkdocs.yml", "--site-dir", site],
                        check=True)
-        wrong = list(faults_of_files(site))
+        wrong = [*faults_of_files(site), *faults_of_prose(site)]
         chromium = browser.find_chromium()
         if chromium:
             wrong += faults_of_search(site, chromium)
