@@ -14,9 +14,10 @@ import exit_codes
 import layouts
 import reports
 import script_keys
+import wire
 from source import Lack
 
-PAGES = {"script-keys.md": script_keys.page, "segment.md": layouts.segment, "wire.md": layouts.wire,
+PAGES = {"script-keys.md": script_keys.page, "segment.md": layouts.segment, "wire.md": wire.page,
          "reports.md": lambda *where: f"{reports.page(*where).rstrip()}\n\n{exit_codes.section(*where)}"}
 BY = "Made by `tests/docs/reference/make.py` from what the programs say and from their source.\n"
 

@@ -23,11 +23,13 @@ class Source:
         return self.text[at:self.text.index("\n}", at)]
 
     def number(self, name):
-        """A constant that is written as one number, or as 1 shifted."""
+        """A constant that is written as one number, as 1 shifted, or as a product of two."""
         found = re.search(rf"\b{name}(?: =|\{{)\s*([^;}}]+)", self.text)
         value = found and found[1].strip().replace("'", "")
         if shift := value and re.fullmatch(r"(?:std::uint\d+_t\{1\}|1U?) << (\d+)", value):
             return 1 << int(shift[1])
+        if factors := value and re.fullmatch(r"(\d+) \* (\d+)", value):
+            return int(factors[1]) * int(factors[2])
         try:
             return int(value, 0)
         except (TypeError, ValueError):
@@ -36,6 +38,13 @@ class Source:
             return float(value)
         except (TypeError, ValueError):
             raise Lack(f"{self.path}: {name} is no plain number; tests/docs/reference has to follow") from None
+
+    def numbers(self, name):
+        """The numbers of an array, without the units behind them."""
+        found = re.search(rf"\b{name}(?: =|\{{)\s*\{{?([^;}}]*)", self.text)
+        if not found:
+            raise Lack(f"{self.path}: no {name}; tests/docs/reference has to follow")
+        return [float(one) for one in re.findall(r"-?\d+(?:\.\d+)?", re.sub("//.*", "", found[1]))]
 
     def words(self, name):
         """The texts of an array."""
