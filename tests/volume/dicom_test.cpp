@@ -213,6 +213,20 @@ TEST_CASE("slices of two patients, studies or frames of reference are refused by
   }
 }
 
+TEST_CASE("a note names what the values depend on and the slices do not share") {
+  const auto note = [](const std::function<const char*(int)>& kv) {
+    const TemporaryFolder folder;
+    write_dicom_series(folder, [&](DicomSpec& spec, int k) {
+      if (*kv(k) != 0) spec.set(0x0018, 0x0060, "DS", kv(k));
+    });
+    return read_volume(folder.path()).note;
+  };
+  CHECK(has(note([](int k) { return k % 2 == 0 ? "80" : "140"; }),
+            "its slices differ in KVP (140, 80)"));
+  CHECK(has(note([](int k) { return k == 2 ? "" : "80"; }), "differ in KVP (none, 80)"));
+  CHECK(note([](int) { return "80"; }).empty());
+}
+
 TEST_CASE("what is no slice is left out and named; a slice that cannot be read is not") {
   const TemporaryFolder folder;
   write_dicom_series(folder, [](DicomSpec&, int) {});

@@ -5,9 +5,12 @@
 #include <algorithm>
 #include <cstddef>
 #include <iostream>
+#include <iterator>
 #include <list>
 #include <map>
+#include <set>
 #include <span>
+#include <string>
 #include <string_view>
 #include <utility>
 
@@ -237,6 +240,22 @@ void check_one_body(const Stack& stack) {
   }
 }
 
+/// Names what the values depend on and the slices do not share: two acquisitions that alternate in
+/// space look like one volume.
+void note_mixed(const Stack& stack, Note& note) {
+  for (const char* mark :
+       {"EchoTime", "CT FrameType", "MR FrameType", "ImageType", "ConvolutionKernel", "KVP"}) {
+    std::set<std::string> texts;
+    for (const DicomSlice& slice : stack.slices) texts.insert(mark_of(slice, mark));
+    if (texts.size() < 2) continue;
+    const auto shown = [](const std::string& text) {
+      return text.empty() ? "none" : one_line(text);
+    };
+    note.add("its slices differ in " + std::string(mark) + " (" + shown(*texts.begin()) + ", " +
+             shown(*std::next(texts.begin())) + (texts.size() > 2 ? ", ..." : "") + ")");
+  }
+}
+
 UntrustedHeader whole_claim_of(const fs::path& path, const std::vector<Stack>& all,
                                const Stack& stack, Note& note) {
   try {
@@ -300,6 +319,7 @@ void read_dicom(const fs::path& path, const std::vector<fs::path>& files, const 
                     ": one slice; name the folder that holds the whole DICOM series");
   }
   check_one_body(stack);
+  note_mixed(stack, note);
   UntrustedHeader claim = whole_claim_of(path, all, stack, note);
   const DicomValues values = values_of(stack.slices);
   for (const DicomSlice& slice : stack.slices) {
