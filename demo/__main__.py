@@ -93,7 +93,7 @@ class Demo:
             self.results = self.processes.path("results")
             os.mkdir(self.results)
             self.processes.shown = (self.results, "its folder")
-        self.name = f"demo-{os.getpid()}"
+        self.name = options.name or f"demo-{os.getpid()}"
         self.find_meeting_point()
         if options.serve:
             self.start_bridge()

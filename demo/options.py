@@ -1,14 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """The options of `./kerf demo`: `./kerf --help` has their meaning."""
 import dataclasses
+import errno
 import os
 import re
+import socket
 
 BUSES = {"omni": ("fw", "fw1"), "falcon": ("usb", "usb"), "woodenhaptics": ("hid", "hidraw0")}  # word of --port, its node
 FLAGS = ("--headless", "--serve", "--stereo", "--voxel-tool", "--mute", "--colour-blind", "--virtual")
 OF_SCENE = ("--scene", "--volume", "--spacing", "--override-spacing", "--window", "--set")
 WITH_VALUE = OF_SCENE + ("--hand", "--seconds", "--rate", "--out", "--size", "--renderer", "--gradient", "--panel-scale",
-                         "--device", "--port", "--sheet", "--transfer", "--record", "--listen")
+                         "--device", "--port", "--sheet", "--transfer", "--record", "--listen", "--name")
 
 
 class Refusal(Exception):
@@ -29,6 +31,7 @@ class Options:
     device: str = "omni"
     port: str = "socket"
     listen: str = ""
+    name: str = ""  # of the controller; demo-PID
     sheet: str = ""
     record: str = ""
     headless: bool = False
@@ -77,6 +80,17 @@ def has_display():
     return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 
+def runs(name):
+    """Whether a controller of this name is there: its socket refuses one of another type, and does not notice."""
+    runtime = os.environ.get("XDG_RUNTIME_DIR", "")
+    folder = f"{runtime}/kerf" if runtime.startswith("/") else f"/tmp/kerf-{os.geteuid()}"
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as asking:
+        try:
+            return asking.connect_ex(f"{folder}/{name}.sock") == errno.EPROTOTYPE
+        except OSError:  # longer than a socket's path, which the controller refuses
+            return False
+
+
 def check(options):
     """Completes the options by defaults, and throws Refusal for values and combinations that cannot be."""
     if options.record == "-":
@@ -90,6 +104,10 @@ def check(options):
             raise Refusal("--hand mouse: --headless and --sheet have no window to point at; leave one of them out")
         if not has_display():
             raise Refusal("--hand mouse: no display; set DISPLAY, or leave it out: a script is the hand then")
+    if options.name and not re.fullmatch(r"[A-Za-z0-9_-][A-Za-z0-9._-]{0,63}", options.name):
+        raise Refusal(f"--name {options.name}: no name of a controller; use 1 to 64 letters, digits, '.', '_' or '-'")
+    if options.name and runs(options.name):
+        raise Refusal(f"--name {options.name}: a controller of this name runs; stop it or choose another name")
     options.seconds = options.seconds or ("600" if options.mouse else "60" if options.serve else "10")
     if not re.fullmatch(r"[0-9]{1,6}(\.[0-9]+)?", options.seconds) or not re.search("[1-9]", options.seconds):
         raise Refusal(f"--seconds {options.seconds}: not a positive number of seconds; take 10")

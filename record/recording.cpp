@@ -61,7 +61,7 @@ Manifest read_manifest(const std::filesystem::path& folder) {
   std::ifstream file;
   if (std::filesystem::is_regular_file(path, fault)) file.open(path);  // a pipe would be waited for
   if (!file.is_open()) {
-    throw RecordError(path.string() + ": cannot be read; give the folder of a recording");
+    throw RecordError(path.string() + ": cannot be read; " + way_to_recording(folder));
   }
   Manifest out;
   try {

@@ -143,13 +143,21 @@ namespace {
 
 }  // namespace
 
+std::string way_to_recording(const std::filesystem::path& folder) {
+  const std::filesystem::path below = folder / "log";
+  std::error_code fault;
+  const bool is_below = std::filesystem::is_regular_file(below / "ticks.npy", fault);
+  return "give " + (is_below ? below.string() : "the folder of a recording");
+}
+
 TickLogReader::TickLogReader(std::filesystem::path path) : path_(std::move(path)) {
   std::error_code fault;
   const bool is_file =
       std::filesystem::is_regular_file(path_, fault);  // a pipe would be waited for
   if (is_file) file_.open(path_, std::ios::binary);
   if (!file_.is_open()) {
-    throw RecordError(path_.string() + ": cannot be read; give the folder of a recording");
+    throw RecordError(path_.string() + ": cannot be read; " +
+                      way_to_recording(path_.parent_path()));
   }
   std::string header(kTickLogHeaderBytes, '\0');
   file_.read(header.data(), static_cast<std::streamsize>(header.size()));

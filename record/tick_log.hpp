@@ -65,6 +65,9 @@ class TickLogWriter {
   std::vector<TickRecord> buffer_;
 };
 
+/// The remedy if `folder` holds no recording: names the one of a demo's folder, which is in `log`.
+[[nodiscard]] std::string way_to_recording(const std::filesystem::path& folder);
+
 /// Reads one log, row by row, with constant memory.
 class TickLogReader {
  public:

@@ -16,7 +16,7 @@ def draw(table, picture, *words):
     x, y, colour = (data[name] for name in names)
     if not x: raise ValueError(f"{table}: no rows{' of these values' if only else ''}; give others")
     (xs, column), (ys, row) = (np.unique(values, return_inverse=True) for values in (x, y))
-    if len(set(zip(row, column))) < len(x): raise ValueError(f"{table}: several rows for one cell; keep COLUMN=VALUE")
+    if len(set(zip(row, column))) < len(x): raise ValueError(f"{table}: several rows for one cell; {tables.way(data, row, column)}")
     grid = np.full((len(ys), len(xs)), np.nan)  # a cell that no run filled stays white
     grid[row, column] = colour
     plt.colorbar(plt.pcolormesh(np.arange(len(xs) + 1), np.arange(len(ys) + 1), grid, cmap="cividis"), label=names[2])

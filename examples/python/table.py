@@ -19,3 +19,11 @@ def columns_of(path, only=()):
         except ValueError:
             columns[name] = list(texts)
     return columns
+
+
+def way(columns, *cell):
+    """What to keep if several rows have one cell: a value of the column with the fewest of those that tell them apart."""
+    apart = [name for name, values in columns.items() if len({*zip(*cell, values)}) == len(values)]
+    name = min(apart, key=lambda name: len({*columns[name]}), default="COLUMN")
+    value = columns[name][0] if apart else "VALUE"
+    return f"keep those of one {name}, such as {name}={value if isinstance(value, str) else f'{value:g}'}"

@@ -4,7 +4,7 @@ import pathlib
 
 import numpy as np
 
-from .layout import STARTED
+from .layout import STARTED, TICK
 
 
 def _rows_of(file):
@@ -14,16 +14,19 @@ def _rows_of(file):
         size = file.stat().st_size
         what = "is empty" if size == 0 else f"{size} bytes are no table of NumPy, or the file was cut"
         raise ValueError(f"{file}: {what}; record it again, or give the folder of another recording") from None
-    if rows.dtype.names is None:
-        raise ValueError(f"{file}: no ticks of kerf; give the folder of a recording")
+    if getattr(rows, "dtype", None) != TICK or rows.ndim != 1:
+        raise ValueError(f"{file}: no ticks of this version of kerf; give the folder of a recording, or use its kerf_reader")
     return rows
 
 
 def _words_of(file):
     try:
-        return json.loads(file.read_text())
+        words = json.loads(file.read_text())
     except ValueError:
         raise ValueError(f"{file}: no JSON, or the file was cut; give the folder of another recording") from None
+    if not isinstance(words, dict):
+        raise ValueError(f"{file}: no table of names and values; give the folder of another recording")
+    return words
 
 
 class Log:
@@ -38,9 +41,12 @@ class Log:
             self.manifest = _words_of(folder / "manifest.json")
             self.scene = _words_of(folder / "scene.json")
         except OSError as error:
-            raise ValueError(f"{error.filename}: {error.strerror}; give the folder of a recording") from None
-        if "tick_ns" not in self.manifest:
-            raise ValueError(f"{folder / 'manifest.json'}: no tick_ns; give the folder of a recording")
+            below = folder / "log"  # of --out of a demo
+            way = below if (below / "ticks.npy").is_file() else "the folder of a recording"
+            raise ValueError(f"{error.filename}: {error.strerror}; give {way}") from None
+        tick_ns = self.manifest.get("tick_ns")
+        if type(tick_ns) is not int or tick_ns <= 0:
+            raise ValueError(f"{folder / 'manifest.json'}: tick_ns: not a positive number; give the folder of another recording")
 
     def __len__(self):
         return len(self.ticks)

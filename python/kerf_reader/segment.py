@@ -1,4 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
+import errno
+import glob
 import json
 import mmap
 import os
@@ -17,11 +19,31 @@ class SegmentError(Exception):
     """One line: place, what is wrong, way out."""
 
 
+NAME = r"[A-Za-z0-9_-][A-Za-z0-9._-]{0,63}"
+
+
+def _folder():
+    runtime = os.environ.get("XDG_RUNTIME_DIR", "")
+    return f"{runtime}/kerf" if runtime.startswith("/") else f"/tmp/kerf-{os.getuid()}"
+
+
 def _socket_of(name):
-    if not re.fullmatch(r"[A-Za-z0-9_-][A-Za-z0-9._-]{0,63}", name):
+    if not re.fullmatch(NAME, name):
         raise SegmentError(f"{name!r}: no name of a controller; use letters, digits, '.', '_' or '-'")
-    runtime = os.environ.get("XDG_RUNTIME_DIR")
-    return os.path.join(f"{runtime}/kerf" if runtime else f"/tmp/kerf-{os.getuid()}", name + ".sock")
+    return os.path.join(_folder(), name + ".sock")
+
+
+def _listens(path):
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as asking:  # another type: no listener notices
+        return asking.connect_ex(path) == errno.EPROTOTYPE
+
+
+def _running():
+    """", or take a name that runs: ...", or nothing."""
+    files = glob.glob(os.path.join(glob.escape(_folder()), "*.sock"))
+    names = sorted(os.path.basename(file)[:-5] for file in files if _listens(file))
+    names = [name for name in names if re.fullmatch(NAME, name)]
+    return f", or take a name that runs: {', '.join(names[:8])}{', ...' * (len(names) > 8)}" if names else ""
 
 
 class Segment:
@@ -39,7 +61,8 @@ class Segment:
             hello, files, _, _ = socket.recv_fds(self._socket, HELLO.itemsize, 1)
         except OSError as error:
             self._socket.close()
-            raise SegmentError(f"{path}: {error.strerror or error}; start kerf-controller with this name first") from None
+            raise SegmentError(f"{path}: {error.strerror or error}; start kerf-controller with this name "
+                               f"first{_running()}") from None
         try:
             self._map(path, hello, files)
         except SegmentError:

@@ -7,7 +7,10 @@
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
+#include <filesystem>
+#include <system_error>
 #include <utility>
+#include <vector>
 
 #include <fcntl.h>
 #include <poll.h>
@@ -54,13 +57,51 @@ std::string segment_folder() {
   return folder;
 }
 
-std::string segment_socket(std::string_view name) {
+namespace {
+
+bool is_name(std::string_view name) {
   constexpr std::size_t kMaxName = 64;
   const bool plain = std::all_of(name.begin(), name.end(), [](char c) {
     return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '.' ||
            c == '_' || c == '-';
   });
-  if (name.empty() || name.size() > kMaxName || name.front() == '.' || !plain) {
+  return plain && !name.empty() && name.size() <= kMaxName && name.front() != '.';
+}
+
+/// Connects `fd` to the socket at `path`; returns 0, or the error.
+int connect_to(int fd, const std::string& path) {
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  if (path.size() >= sizeof address.sun_path) return ENAMETOOLONG;
+  std::copy(path.begin(), path.end(), address.sun_path);
+  return connect(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0 ? 0 : errno;
+}
+
+/// What to do if no controller has the name: those that run are named, such as a demo's.
+std::string way_to_a_controller() {
+  constexpr std::size_t kMost = 8;
+  std::vector<std::string> names;
+  std::error_code error;
+  for (const auto& entry : std::filesystem::directory_iterator(segment_folder(), error)) {
+    const std::filesystem::path& path = entry.path();
+    if (path.extension() != ".sock" || !is_name(path.stem().native())) continue;
+    // Another type of socket: refused either way, and the listener does not notice.
+    const OwnedFd asking(socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0));
+    if (connect_to(asking.get(), path.native()) == EPROTOTYPE)
+      names.push_back(path.stem().string());
+  }
+  std::string way = "start kerf-controller with this name first";
+  if (names.empty()) return way;
+  std::ranges::sort(names);
+  way += ", or take a name that runs: ";
+  for (std::size_t i = 0; i < std::min(names.size(), kMost); ++i) way += (i ? ", " : "") + names[i];
+  return names.size() > kMost ? way + ", ..." : way;
+}
+
+}  // namespace
+
+std::string segment_socket(std::string_view name) {
+  if (!is_name(name)) {
     throw SegmentError("--name: '" + std::string(name) +
                        "'; use 1 to 64 letters, digits, '.', '_' or '-', not starting with '.'");
   }
@@ -177,17 +218,14 @@ Reply SegmentConnection::send(const Command& command) {
 
 SegmentConnection connect_segment(std::string_view name) {
   const std::string path = segment_socket(name);
-  sockaddr_un address{};
-  address.sun_family = AF_UNIX;
-  std::copy(path.begin(), path.end(), address.sun_path);
   OwnedFd link(socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0));
   if (link.get() < 0) {
     throw SegmentError("--name " + std::string(name) + ": " + system_message(errno) + "; " +
                        remedy_for(errno, "end other programs"));
   }
-  if (connect(link.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
-    throw SegmentAbsent("--name " + std::string(name) + ": " + system_message(errno) + " (" + path +
-                        "); start kerf-controller with this name first");
+  if (const int error = connect_to(link.get(), path); error != 0) {
+    throw SegmentAbsent("--name " + std::string(name) + ": " + system_message(error) + " (" + path +
+                        "); " + way_to_a_controller());
   }
   setsockopt(link.get(), SOL_SOCKET, SO_RCVTIMEO, &kAnswerTimeout, sizeof kAnswerTimeout);
   setsockopt(link.get(), SOL_SOCKET, SO_SNDTIMEO, &kAnswerTimeout, sizeof kAnswerTimeout);

@@ -43,7 +43,8 @@ class SegmentConnection {
   SegmentReader reader_;
 };
 
-/// Connects to controller `name` and maps its segment. Throws `SegmentError` if there is none.
+/// Connects to controller `name` and maps its segment. Throws `SegmentError` if there is none; the
+/// message names those that run.
 [[nodiscard]] SegmentConnection connect_segment(std::string_view name);
 
 /// First message of the server; the memfd is passed with it. After it the client sends `Command`s,

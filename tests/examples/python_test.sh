@@ -105,7 +105,11 @@ refused 'no axis' phase_portrait "$work/log" "$work/none.png" 3
 refused 'TABLE.csv' kb_map
 refused 'nowhere.csv' kb_map "$work/nowhere.csv" "$work/none.png"
 refused 'no column' kb_map "$work/sweep/sweep.csv" "$work/none.png" a b c
-refused 'several rows for one cell' kb_map "$work/sweep/sweep.csv" "$work/none.png" servo.rate_hz exit peak_force_n
+refused 'several rows for one cell; keep those of one force.stiffness_n_per_mm' kb_map "$work/sweep/sweep.csv" "$work/none.png" servo.rate_hz exit peak_force_n
+if [[ -e $work/map.csv ]]; then
+  "$bin/kerf-lab" zwidth --stiffness 0.1:10:3 --damping 0:0.01:2 --loop ideal,kerf --csv "$work/both.csv" >"$work/map.txt"
+  refused 'keep those of one loop, such as loop=' kb_map "$work/both.csv" "$work/none.png"
+fi
 refused 'not three columns' kb_map "$work/sweep/sweep.csv" "$work/none.png" servo.rate_hz
 refused 'no rows of these' kb_map "$work/sweep/sweep.csv" "$work/none.png" servo.rate_hz force.stiffness_n_per_mm \
   peak_force_n servo.rate_hz=3

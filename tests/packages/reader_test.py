@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""reader_test.py ROOT BIN: kerf_reader built and installed without a network, then against a real run: the same
+"""reader_test.py ROOT BIN: kerf_reader installed by the lines of docs/packages.md, without a network, then against a real run: the same
 rows from segment and log, the same voxels as in the controller's own file, one line for what is not there.
 
-Exit code 77: skipped, for want of numpy or setuptools."""
+Exit code 77: skipped, for want of numpy, setuptools, venv or wheel."""
 import os
 import pathlib
+import re
 import subprocess
 import sys
 import tempfile
@@ -14,22 +15,39 @@ import time
 root, programs = (pathlib.Path(p).resolve() for p in sys.argv[1:3])
 try:
     import numpy as np
-    import setuptools  # noqa: F401
+    import ensurepip, setuptools, wheel  # noqa: F401, E401
 except ImportError as lack:
     if sys.executable != "/usr/bin/python3" and os.path.exists("/usr/bin/python3"):  # Debian's own has them
         os.execv("/usr/bin/python3", ["/usr/bin/python3", *sys.argv])
-    print(f"reader: {lack}; apt-get install python3-numpy python3-setuptools")
+    print(f"reader: {lack}; apt-get install python3-numpy python3-setuptools python3-venv python3-wheel")
     sys.exit(77)
 
 home = tempfile.TemporaryDirectory()
 os.chdir(home.name)
 os.environ["XDG_RUNTIME_DIR"] = home.name
-subprocess.run(["cp", "-r", root / "python", "source"], check=True)
-build = [sys.executable, "-c", "import setuptools; setuptools.setup()", "-q", "build", "--build-lib", home.name + "/site"]
-subprocess.run(build, cwd="source", check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-sys.path.insert(0, home.name + "/site")
+subprocess.run(["cp", "-r", root / "python", "python"], check=True)
+# The page's own lines, where no network answers.
+page = (root / "docs" / "packages.md").read_text(encoding="utf-8")
+install = re.search(r"\n    (python3 -m venv .*)\n    (venv/bin/pip .*)\n", page)
+environment = {name: value for name, value in os.environ.items() if not name.startswith("PIP_")}
+environment.update(PATH=f"{os.path.dirname(sys.executable)}:{os.environ['PATH']}", PIP_CONFIG_FILE=os.devnull, HOME=home.name,
+                   https_proxy="http://127.0.0.1:9", http_proxy="http://127.0.0.1:9")
+for line in install.groups():
+    done = subprocess.run(["bash", "-c", line], env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    assert done.returncode == 0, f"docs/packages.md: {line}: {done.stdout}"
+sys.path[:0] = map(str, pathlib.Path("venv").resolve().glob("lib/python3*/site-packages"))
 import kerf_reader  # noqa: E402
 from kerf_reader import Log, Segment, SegmentError, layout  # noqa: E402
+
+
+def refused(what, kind, words):
+    try:
+        what()
+    except kind as error:
+        assert all(word in str(error) for word in words) and "\n" not in str(error), error
+        return
+    assert False, f"nothing was refused: {words}"
+
 
 assert kerf_reader.__file__.startswith(home.name)
 quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
@@ -46,6 +64,7 @@ for _ in range(500):
     except SegmentError:
         assert controller.poll() is None, "kerf-controller: ended before it could be read"
         time.sleep(0.02)
+refused(lambda: Segment("nobody"), SegmentError, ["nobody.sock", "with this name first, or take a name that runs: reader"])
 seen, after = [], 0
 while segment.alive:
     rows, after = segment.records(after)
@@ -74,25 +93,24 @@ density = segment.density()
 assert density.tobytes() == data, "the voxels differ from the controller's own file"
 assert segment.labels() is None and density.max() == 65535 and density.min() == 0
 
-
-def refused(what, kind, words):
-    try:
-        what()
-    except kind as error:
-        assert all(word in str(error) for word in words) and "\n" not in str(error), error
-        return
-    assert False, f"nothing was refused: {words}"
-
-
-refused(lambda: Segment("nobody"), SegmentError, ["nobody.sock", "start kerf-controller"])
+refused(lambda: Segment("nobody"), SegmentError, ["nobody.sock", "start kerf-controller with this name first"])
 refused(lambda: Segment("../x"), SegmentError, ["no name of a controller"])
 refused(lambda: Log("nowhere"), ValueError, ["nowhere", "give the folder"])
 os.mkdir("empty")
 refused(lambda: Log("empty"), ValueError, ["empty/ticks.npy: No such file", "give the folder"])
 whole = pathlib.Path("log/ticks.npy").read_bytes()
 pathlib.Path("log/manifest.json").rename("manifest.json")
-pathlib.Path("log/manifest.json").write_text("{")
-refused(lambda: Log("log"), ValueError, ["log/manifest.json: no JSON"])
+refused(lambda: Log("."), ValueError, ["ticks.npy: No such file", "; give log"])
+for text, why in (("{", "no JSON"), ("3", "no table"), ("[]", "no table"), ("{}", "tick_ns"), ('{"tick_ns": "1"}', "tick_ns"),
+                  ('{"tick_ns": 0}', "tick_ns"), ('{"tick_ns": true}', "tick_ns")):
+    pathlib.Path("log/manifest.json").write_text(text)
+    refused(lambda: Log("log"), ValueError, ["log/manifest.json: " + why])
+for foreign in (np.zeros(3), np.zeros(3, [("tick", "<u8")]), np.zeros((2, 2), layout.TICK)):
+    np.save("log/ticks.npy", foreign)
+    refused(lambda: Log("log"), ValueError, ["log/ticks.npy: no ticks of this version", "give the folder"])
+np.savez("log/ticks.npz", foreign)
+pathlib.Path("log/ticks.npz").rename("log/ticks.npy")
+refused(lambda: Log("log"), ValueError, ["log/ticks.npy: no ticks of this version"])
 for length in (0, 5, 100, 5000, len(whole) - 1):
     pathlib.Path("log/ticks.npy").write_bytes(whole[:length])
     refused(lambda: Log("log"), ValueError, ["log/ticks.npy: ", "cut" if length else "is empty", "give the folder"])

@@ -5,6 +5,7 @@
 import os
 import pathlib
 import signal
+import socket
 import subprocess
 import sys
 import tempfile
@@ -35,11 +36,23 @@ class TestOptions(unittest.TestCase):
                              (["--port", "usb"], "--port usb"), (["--device", "falcon", "--port", "usb", "--virtual"], "--virtual"),
                              (["--listen", "0.0.0.0:1"], "--listen"), (["--record", "-"], "--record"),
                              (["--hand", "mouse"], "--hand mouse"), (["--hand", "mouse", "--virtual"], "--hand mouse"),
-                             (["--hand", "mouse", "--sheet", "s.png"], "--hand mouse")]:
+                             (["--hand", "mouse", "--sheet", "s.png"], "--hand mouse"),
+                             (["--name", "a/b"], "--name a/b"), (["--name", ".x"], "--name"), (["--name", "x" * 65], "--name")]:
             with self.subTest(words), self.assertRaises(options.Refusal) as refused:
                 checked(*words)
             self.assertTrue(str(refused.exception).startswith(place), refused.exception)
             self.assertNotIn("\n", str(refused.exception))
+
+    def test_a_name_that_runs_is_refused(self):
+        with tempfile.TemporaryDirectory() as runtime, unittest.mock.patch.dict(os.environ, {"XDG_RUNTIME_DIR": runtime}), \
+                socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as server:
+            self.assertEqual(checked("--name", "tooth").name, "tooth")
+            os.mkdir(runtime + "/kerf")
+            server.bind(runtime + "/kerf/tooth.sock")
+            server.listen()
+            self.assertEqual(checked("--name", "teeth").again, ["--name", "teeth"])
+            with self.assertRaisesRegex(options.Refusal, "^--name tooth: a controller of this name runs"):
+                checked("--name", "tooth")
 
     def test_defaults(self):
         self.assertEqual((checked().seconds, checked().out, checked().headless), ("10", "kerf-demo", True))

@@ -3,7 +3,9 @@
 #include <csignal>
 #include <cstring>
 #include <filesystem>
+#include <fstream>
 #include <limits>
+#include <string>
 
 #include <doctest/doctest.h>
 #include <fcntl.h>
@@ -238,8 +240,25 @@ TEST_CASE("names that would leave the folder and folders open to others are refu
                        doctest::Contains("not a folder of yours alone"), SegmentError);
 }
 
-TEST_CASE("connecting where nobody listens says what to start") {
+TEST_CASE("connecting where nobody listens says what to start, and names what runs") {
   const RuntimeFolder folder;
+  const auto said = [] {
+    try {
+      static_cast<void>(connect_segment("demo"));
+    } catch (const SegmentAbsent& absent) {
+      return std::string(absent.what());
+    }
+    return std::string();
+  };
+  CHECK(said().ends_with("; start kerf-controller with this name first"));
+  {
+    const NoiseVolume volume({8, 8, 8});
+    const SegmentWriter writer = SegmentWriter::create(spec_of(volume));
+    const SegmentServer one("demo-17", writer), another("atlas", writer);
+    std::ofstream(folder.path() / "kerf" / "nobody.sock");
+    CHECK(said().ends_with("first, or take a name that runs: atlas, demo-17"));
+  }
+  CHECK(said().ends_with("first"));
   CHECK_THROWS_WITH_AS(static_cast<void>(connect_segment("demo")),
                        doctest::Contains("start kerf-controller"), SegmentError);
 }

@@ -85,8 +85,9 @@ What the controller writes and every reader maps, read-only: layout {file.number
 instead of pointers. An installed kerf and `python/kerf_reader` have readers ([packages](packages.md)). The
 magic is `KERFSHM1`. `abi_hash` is a hash of the layout below: a reader with another hash refuses the segment.
 
-The controller named NAME listens at `$XDG_RUNTIME_DIR/kerf/NAME.sock`, else `/tmp/kerf-$UID/NAME.sock`. It answers a
-connection with {8 + 4 + 4 + 8 + 8} bytes (magic, major, minor, `abi_hash`, `session_id`) and the segment's file descriptor.
+The controller named NAME listens at `$XDG_RUNTIME_DIR/kerf/NAME.sock`, else `/tmp/kerf-$UID/NAME.sock`. NAME
+is its `--name` (`kerf`); that of a demo is `demo-PID`, or what `./kerf demo` has as `--name`. It answers a connection with
+{8 + 4 + 4 + 8 + 8} bytes (magic, major, minor, `abi_hash`, `session_id`) and the segment's file descriptor.
 
 | from | what |
 |---|---|
