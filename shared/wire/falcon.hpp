@@ -149,11 +149,12 @@ struct Unpacked {
   unsigned info = 0;
 };
 
-/// Nothing unless these are 16 bytes from '<' to '>' with twelve nibbles and an info of at most
-/// `max_info`. The spare byte is ignored.
+/// Nothing unless these are 16 bytes from '<' to '>' with twelve nibbles, an info of at most
+/// `max_info` and the spare byte.
 [[nodiscard]] constexpr std::optional<Unpacked> unpack(std::span<const std::uint8_t> bytes,
                                                        unsigned max_info) noexcept {
   if (bytes.size() != kPacketBytes || bytes[0] != kBegin || bytes[15] != kEnd) return std::nullopt;
+  if (bytes[kSpareAt] != kBias) return std::nullopt;
   Unpacked packet;
   std::array<unsigned, 3> numbers{};
   for (std::size_t nibble = 0; nibble < 12; ++nibble) {

@@ -174,11 +174,15 @@ inline constexpr std::uint16_t kReportFw = 0x5746;
   return bytes;
 }
 
-/// Host side. Nothing unless there are 44 bytes; the constant words are not checked, because units
-/// that answer differently may exist.
+/// Host side. Nothing unless these are 44 bytes with the words that every trace has.
 [[nodiscard]] constexpr std::optional<OmniReport> decode_report(
     std::span<const std::uint8_t> bytes) noexcept {
   if (bytes.size() != omni::kReportBytes) return std::nullopt;
+  if (wire::get_u16(bytes, 0) != 0 || wire::get_u16(bytes, 2) != omni::kReportMark ||
+      wire::get_u16(bytes, 20) != omni::kReportFlags ||
+      wire::get_u16(bytes, 28) != omni::kReportFw) {
+    return std::nullopt;
+  }
   OmniReport report;
   for (std::size_t i = 0; i < 3; ++i) {
     report.encoder[i] = wire::get_i16(bytes, 4 + 2 * i);

@@ -144,13 +144,16 @@ inline constexpr int kButtonCounts = 10000;
   return command;
 }
 
-/// Host side. Nothing unless there are 14 or 64 bytes.
+/// Host side. Nothing unless there are 14 or 64 bytes and the button is 0 or 1, which also refuses
+/// the firmware that fills 64 bytes with text.
 [[nodiscard]] constexpr std::optional<WoodenReport> decode_report(
     std::span<const std::uint8_t> bytes) noexcept {
   if (!is_packet_size(bytes.size())) return std::nullopt;
+  const std::uint16_t button = wire::get_u16(bytes, kInfoAt);
+  if (button > 1) return std::nullopt;
   WoodenReport report;
   for (std::size_t i = 0; i < 6; ++i) report.encoder[i] = wire::get_i16(bytes, 2 * i);
-  report.calibrate = wire::get_i16(bytes, kInfoAt) == 1;
+  report.calibrate = button == 1;
   return report;
 }
 

@@ -94,10 +94,23 @@ TEST_CASE("any command survives the wire, its motors saturated to 12 bits") {
   }));
 }
 
+TEST_CASE("a report with another constant word is refused, other bytes do not matter") {
+  for (std::size_t at = 0; at < kerf::omni::kReportBytes; ++at) {
+    for (const unsigned bit : {0x01u, 0x80u}) {
+      Bytes bytes = from_hex(kDockedReport);
+      bytes[at] ^= static_cast<std::uint8_t>(bit);
+      const bool constant = at < 4 || at == 20 || at == 21 || at == 28 || at == 29;
+      CAPTURE(at);
+      CHECK(kerf::decode_report(bytes).has_value() == !constant);
+    }
+  }
+  CHECK_FALSE(kerf::decode_report(Bytes(44)));
+}
+
 TEST_CASE("packets of another length are refused") {
-  Bytes report = from_hex(kDockedReport);
-  Bytes command = bytes_of(OmniCommand{});
   for (std::size_t size = 0; size <= 64; ++size) {
+    Bytes report = from_hex(kDockedReport);
+    Bytes command = bytes_of(OmniCommand{});
     report.resize(size);
     command.resize(size);
     CHECK(kerf::decode_report(report).has_value() == (size == kerf::omni::kReportBytes));

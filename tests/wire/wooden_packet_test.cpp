@@ -76,6 +76,10 @@ TEST_CASE("only 14 or 64 bytes are a WoodenHaptics packet, and only commands 0 a
     packet[6] = static_cast<std::uint8_t>(kind & 0xFF);
     packet[7] = static_cast<std::uint8_t>(kind >> 8);
     CHECK(kerf::wooden::decode_command(packet).has_value() == (kind < 2));
+    auto report = kReportBytes;
+    report[12] = packet[6];
+    report[13] = packet[7];
+    CHECK(kerf::wooden::decode_report(report).has_value() == (kind < 2));
   }
 }
 
