@@ -12,7 +12,24 @@
 
 namespace kerf {
 
+namespace {
+
+bool pushes(const ServoOutput& sent) noexcept {
+  return sent.motors_on &&
+         std::ranges::any_of(sent.motor_counts, [](std::int16_t count) { return count != 0; });
+}
+
+/// Whether two reports are of the same readings.
+bool is_same(const DeviceReport& a, const DeviceReport& b) noexcept {
+  return a.encoder == b.encoder && a.wiper_a == b.wiper_a && a.wiper_b == b.wiper_b &&
+         a.button1 == b.button1 && a.button2 == b.button2 && a.parked == b.parked &&
+         a.homed == b.homed;
+}
+
+}  // namespace
+
 DeviceReport DeviceDriver::read() noexcept {
+  const DeviceReport before = last_;
   last_.fresh = false;
   std::array<std::uint8_t, kMaxPacketBytes + 1> packet;  // one byte more, to detect a longer packet
   for (int taken = 0; taken < kMaxDrain; ++taken) {
@@ -24,7 +41,24 @@ DeviceReport DeviceDriver::read() noexcept {
       ++refused_;
     }
   }
+  if (port_.closed()) released_.store(true);
+  if (!are_numbered()) follow_change(before);
+  silent_reads_ = last_.fresh ? 0 : silent_reads_ + (silent_reads_ < UINT32_MAX ? 1U : 0U);
   return last_;
+}
+
+/// Once the readings count as standing still, that lasts while the force fades too.
+void DeviceDriver::follow_change(const DeviceReport& before) noexcept {
+  const bool changed = last_.fresh && !is_same(last_, before);
+  const bool is_still = still_reads_ >= most_still_reads_;
+  if (changed || !(pushing_ || (forcing_ && is_still))) {
+    still_reads_ = 0;
+  } else if (!is_still) {
+    ++still_reads_;
+  } else if (last_.fresh) {
+    last_.fresh = false;
+    ++refused_;
+  }
 }
 
 void DeviceDriver::command(const ServoOutput& output) noexcept {
@@ -40,6 +74,7 @@ void DeviceDriver::command(const ServoOutput& output) noexcept {
     port_.send(std::span(packet).first(size));
   }
   forcing_ = allowed.motors_on;
+  pushing_ = pushes(allowed);
   if (forcing_ && released_.load()) release();  // set meanwhile by another thread
 }
 
@@ -114,7 +149,7 @@ OmniCommand::Light light_of(Phase phase) noexcept {
 }
 
 // Packets in 20 ms of an 8 kHz stream, after which the force is off in any case: one more packet
-// costs nothing then.
+// costs nothing then. And ticks in 20 ms of the fastest servo.
 constexpr std::uint32_t kNear = 160;
 // Packets in 2 s of it, after which the controller gives the device up: more cannot be missing.
 constexpr std::uint32_t kMostMissing = 16'000;
@@ -124,17 +159,17 @@ constexpr std::uint32_t kMostMissing = 16'000;
 bool OmniDriver::is_newest(std::uint32_t counter) noexcept {
   const std::uint32_t step = counter - newest_;
   if (seen_) {
-    if (step == 0 || 0U - step <= kNear) return false;
-    if (step <= kNear) {
+    const bool is_ahead = step - 1 < kMostMissing;
+    if (step - 1 < kNear) {
       lost_ += step - 1;
     } else {
-      const bool goes_on = far_ && counter - *far_ - 1 < kNear;
-      far_ = counter;
-      if (!goes_on) return false;
-      if (step <= kMostMissing) lost_ += step - 2;  // the refused one came
+      const bool goes_on = refused_counter_ && counter - *refused_counter_ - 1 < kNear;
+      refused_counter_ = counter;
+      if (!goes_on || !(is_ahead || silent_reads_ >= kNear)) return false;
+      if (is_ahead) lost_ += step - 2;  // the refused one came
     }
   }
-  far_.reset();
+  refused_counter_.reset();
   seen_ = true;
   newest_ = counter;
   return true;
@@ -194,6 +229,8 @@ WoodenDriver::Counts WoodenDriver::turned(const Counts& counts) const noexcept {
 bool WoodenDriver::take(std::span<const std::uint8_t> packet, DeviceReport& report) noexcept {
   const auto said = wooden::decode_report(packet);
   if (!said) return false;
+  if (seen_ && packet.size() != packet_bytes_.load(std::memory_order_relaxed)) return false;
+  seen_ = true;
   packet_bytes_.store(packet.size(), std::memory_order_relaxed);
   button_ = said->calibrate;
   counts_ = said->encoder;
@@ -234,21 +271,26 @@ std::size_t WoodenDriver::compose_release(Packet& packet) const noexcept {
   return packet_bytes_.load(std::memory_order_relaxed);
 }
 
-std::unique_ptr<DeviceDriver> make_driver(
-    Personality personality, PacketPort& port,
-    const std::optional<std::array<double, 3>>& encoder_sign) {
+std::unique_ptr<DeviceDriver> make_driver(Personality personality, PacketPort& port,
+                                          const std::optional<std::array<double, 3>>& encoder_sign,
+                                          int rate_hz) {
+  std::unique_ptr<DeviceDriver> driver;
   switch (personality) {
+    case Personality::omni:
+      driver = std::make_unique<OmniDriver>(port);
+      break;
     case Personality::falcon:
-      return std::make_unique<FalconDriver>(port);
+      driver = std::make_unique<FalconDriver>(port);
+      break;
     case Personality::woodenhaptics: {
       const auto sign = encoder_sign.value_or(std::array{1.0, 1.0, 1.0});
-      return std::make_unique<WoodenDriver>(
+      driver = std::make_unique<WoodenDriver>(
           port, std::array{sign[0] < 0 ? -1 : 1, sign[1] < 0 ? -1 : 1, sign[2] < 0 ? -1 : 1});
-    }
-    case Personality::omni:
       break;
+    }
   }
-  return std::make_unique<OmniDriver>(port);
+  driver->set_rate(rate_hz);
+  return driver;
 }
 
 }  // namespace kerf

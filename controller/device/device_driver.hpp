@@ -35,7 +35,26 @@ class DeviceDriver {
 
   /// Newest report; `fresh` is false when nothing has arrived since the last call. At most
   /// `kMaxDrain` packets are taken, so a flood cannot hold the servo.
+  ///
+  /// Once the device's side of the link has ended, every later command is neutral.
   [[nodiscard]] DeviceReport read() noexcept;
+
+  /// Calls of `read` a second.
+  void set_rate(int rate_hz) noexcept {
+    most_still_reads_ = static_cast<std::uint32_t>(kStillS * rate_hz);
+  }
+
+  /// A device without a number in its packets may repeat an old one for ever. After so long under
+  /// torque without any change of a reading its reports are not fresh, until one changes or the
+  /// motors are off.
+  ///
+  /// No shorter, since an arm may truly stand still: its friction (0.2 to 0.3 N) hides the tremor
+  /// of the hand that holds it (0.1 mm on a grip of 0.5 N/mm), until the hand's force drifts by as
+  /// much, and a weight is measured at an arm that rests for two seconds (docs/devices.md). Such an
+  /// arm answers the fading force by a motion, or loses it.
+  static constexpr double kStillS = 3.0;
+  /// For a measurement, whose emulated hand may stand still under force for ever.
+  void allow_stillness() noexcept { most_still_reads_ = UINT32_MAX; }
 
   /// Sends the motor counts of this tick, with the lights of the phase. On a half-duplex link a
   /// packet that switches the motors off goes out of turn.
@@ -53,7 +72,7 @@ class DeviceDriver {
   [[nodiscard]] bool wait(int milliseconds) noexcept { return port_.wait(milliseconds); }
   /// Packets missing by the device's own counter; 0 if it has none.
   [[nodiscard]] std::uint64_t lost() const noexcept { return lost_; }
-  /// Packets that `take` rejected: not a report, or older than the last one.
+  /// Packets that are no report, old or repeated, and ticks of reports that stand still.
   [[nodiscard]] std::uint64_t refused() const noexcept { return refused_; }
 
  protected:
@@ -66,26 +85,34 @@ class DeviceDriver {
                                   DeviceReport& report) noexcept = 0;
   /// The packet for `output` into `packet`; its size.
   [[nodiscard]] virtual std::size_t compose(const ServoOutput& output, Packet& packet) noexcept = 0;
+  /// Whether packets have a number, by which `take` rejects old ones.
+  [[nodiscard]] virtual bool are_numbered() const noexcept { return false; }
   /// The packet that switches the motors off. Any thread.
   [[nodiscard]] virtual std::size_t compose_release(Packet& packet) const noexcept = 0;
 
   std::uint64_t lost_ = 0;
+  std::uint32_t silent_reads_ = 0;  ///< calls of `read` since the last fresh report
 
  private:
   static constexpr int kMaxDrain = 64;  // 8 ms of an 8 kHz stream
 
+  void follow_change(const DeviceReport& before) noexcept;
+
   PacketPort& port_;
   std::atomic<bool> released_{false};
   bool forcing_ = false;  ///< by the last command
+  bool pushing_ = false;  ///< and a motor with torque
   DeviceReport last_;
   std::uint64_t refused_ = 0;
+  std::uint32_t still_reads_ = 0;  ///< under torque, in which no reading has changed
+  std::uint32_t most_still_reads_ = static_cast<std::uint32_t>(kStillS * 1000);
 };
 
 /// The driver of a device; `port` outlives it. `encoder_sign` is for a
 /// `WoodenDriver`.
 [[nodiscard]] std::unique_ptr<DeviceDriver> make_driver(
     Personality personality, PacketPort& port,
-    const std::optional<std::array<double, 3>>& encoder_sign = {});
+    const std::optional<std::array<double, 3>>& encoder_sign = {}, int rate_hz = 1000);
 
 /// The Falcon: it answers each packet once, and sends nothing else. Requests homing until all three
 /// axes are homed. The grip's centre button parks: held at rest it calibrates, released it starts
@@ -109,10 +136,12 @@ class FalconDriver final : public DeviceDriver {
 /// The Omni: a stream of reports, counted by the device itself. The inkwell's light: steady once
 /// calibrated, slow flash while waiting for the stylus, fast flash in a fault.
 ///
-/// A counter near the last one is valid: a newer one counts the missing packets, an older one is an
-/// old packet. A far one may be a wrong bit, so it waits for a second packet that continues it; the
-/// first is refused then. A device that starts to count anew is found in the same way, without lost
-/// packets.
+/// A counter up to kNear ahead of the last one is the next packet, and counts the missing ones. One
+/// that is farther ahead may be a wrong bit, so it waits for a second packet that continues it; the
+/// first is refused then. Every other one is of an old packet, or of a device that counts anew and
+/// whose encoders may do so too: it is believed when it is continued and kNear calls of `read` had
+/// no report. At any rate of the servo these are 20 ms or more, after which `stale_input` is
+/// latched: neither moves the tip while the motors are on.
 class OmniDriver final : public DeviceDriver {
  public:
   using DeviceDriver::DeviceDriver;
@@ -123,12 +152,13 @@ class OmniDriver final : public DeviceDriver {
   [[nodiscard]] std::size_t compose(const ServoOutput& output, Packet& packet) noexcept override;
   [[nodiscard]] std::size_t compose_release(Packet& packet) const noexcept override;
 
+  [[nodiscard]] bool are_numbered() const noexcept override { return true; }
   /// Whether a packet with this counter is the newest; counts the missing ones before it.
   [[nodiscard]] bool is_newest(std::uint32_t counter) noexcept;
 
   bool seen_ = false;
   std::uint32_t newest_ = 0;
-  std::optional<std::uint32_t> far_;  ///< counter of the last packet, if it was far
+  std::optional<std::uint32_t> refused_counter_;  ///< of the last packet, if it was refused
 };
 
 /// WoodenHaptics: a stream of HID reports that begins with the host's first one.
@@ -158,7 +188,9 @@ class WoodenDriver final : public DeviceDriver {
   [[nodiscard]] Counts turned(const Counts& counts) const noexcept;
 
   std::array<int, 3> sign_;
-  /// Later the size of the device's own packets. The watchdog and signal handlers read it.
+  bool seen_ = false;
+  /// After the first report the size of the device's own packets: another one is refused. The
+  /// watchdog and signal handlers read it.
   std::atomic<std::size_t> packet_bytes_{wooden::kPacketBytes};
   bool button_ = false;                   ///< of the newest report
   std::array<std::int16_t, 6> counts_{};  ///< of the newest report

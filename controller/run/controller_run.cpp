@@ -332,8 +332,8 @@ int run_with_device(const ControllerOptions& options, std::int64_t began_ns, Run
   const LoadedScene& scene = start.planned.scene;
   CompiledScene& servo = *start.planned.servo;
   SegmentWriter& segment = start.segment;
-  const std::unique_ptr<DeviceDriver> driver =
-      make_driver(scene.device.personality, *start.port, scene.device.encoder_sign);
+  const std::unique_ptr<DeviceDriver> driver = make_driver(
+      scene.device.personality, *start.port, scene.device.encoder_sign, scene.servo.rate_hz);
   DeviceDriver& device = *driver;
   device.start();
   if (!options.virtual_time) {

@@ -107,8 +107,13 @@ DeviceSettings device_of(const ControllerOptions& options) {
 
 /// Adds the next steps of a start that the device itself still needs.
 void add_lacks_of_device(const DeviceSettings& device, const ProbeView::Seen& seen,
-                         std::vector<SetupProblem>& lacks) {
+                         std::uint64_t refused, std::vector<SetupProblem>& lacks) {
   const std::string name = word_of(device.personality);
+  if (seen.reports == 0 && refused > 0) {
+    lacks.push_back({name + ": not one of " + std::to_string(refused) + " packets is its report",
+                     "check --device and the firmware; docs/wire.md has the bytes"});
+    return;
+  }
   const auto lacks_deed = [&](const char* what, Waiting waiting) {
     lacks.push_back({name + what, action_for(device.personality, waiting)});
   };
@@ -286,7 +291,7 @@ int run_probe(const ControllerOptions& options) {
     if (!stop) throw;
     return stopped_early(options, device.personality);
   }
-  const auto driver = make_driver(device.personality, *port, device.encoder_sign);
+  const auto driver = make_driver(device.personality, *port, device.encoder_sign, rate_hz);
   driver->start();
   static_cast<void>(become_real_time(options.real_time));  // missing rights are printed at the end
 
@@ -297,7 +302,7 @@ int run_probe(const ControllerOptions& options) {
   watch(*driver, *port, view, ticks, rate_hz, stop);
 
   std::vector<SetupProblem> lacks;
-  add_lacks_of_device(device, view.seen(), lacks);
+  add_lacks_of_device(device, view.seen(), driver->refused(), lacks);
   const auto rights = lacks_of_rights();
   lacks.insert(lacks.end(), rights.begin(), rights.end());
   std::printf("kerf: %llu reports, longest gap %.1f ms, %llu lost, %llu refused\n",

@@ -46,6 +46,8 @@ class PacketDevice {
   /// The packet that is due now, valid until the next call; empty if none is (any more). Several
   /// may be due after one `advance`.
   [[nodiscard]] virtual std::span<const std::uint8_t> next_packet() noexcept = 0;
+  /// It has ended its side of the link: it sends nothing any more, and still receives.
+  [[nodiscard]] virtual bool hung_up() const noexcept { return false; }
 };
 
 }  // namespace kerf

@@ -20,6 +20,7 @@ constexpr int kMaxTakenPerPeriod = 64;              // a flooding host cannot ho
 using Buffer = std::array<std::uint8_t, 65>;
 
 void send(PacketLink& client, PacketDevice& device, FrontStats& stats) noexcept {
+  if (device.hung_up()) return client.hang_up();
   for (auto packet = device.next_packet(); !packet.empty(); packet = device.next_packet()) {
     const PacketLink::Sent sent = client.send(packet);
     if (sent == PacketLink::Sent::yes) ++stats.sent;
@@ -29,6 +30,7 @@ void send(PacketLink& client, PacketDevice& device, FrontStats& stats) noexcept 
 
 /// Sends all that is due as one turn, which may be empty.
 void send_turn(PacketLink& client, PacketDevice& device, FrontStats& stats) noexcept {
+  if (device.hung_up()) return client.hang_up();
   Turn turn;
   std::uint64_t packets = 0;
   for (auto packet = device.next_packet(); !packet.empty(); packet = device.next_packet()) {

@@ -33,6 +33,8 @@ class PacketLink {
                                                    int timeout_ms) noexcept;
   /// Never blocks: `full` if the peer does not read.
   [[nodiscard]] virtual Sent send(std::span<const std::uint8_t> packet) noexcept = 0;
+  /// Ends this side of the link; the peer's packets still arrive.
+  virtual void hang_up() noexcept = 0;
   [[nodiscard]] bool closed() const noexcept { return closed_; }
   [[nodiscard]] int descriptor() const noexcept { return fd_; }
 
@@ -140,6 +142,7 @@ class HandshakeLink final : public PacketLink {
   [[nodiscard]] std::span<const std::uint8_t> take(
       std::span<std::uint8_t> buffer) noexcept override;
   [[nodiscard]] Sent send(std::span<const std::uint8_t> packet) noexcept override;
+  void hang_up() noexcept override { client_.hang_up(); }
 
   /// The reason if the client was refused, else empty.
   [[nodiscard]] const std::string& refusal() const noexcept { return refusal_; }

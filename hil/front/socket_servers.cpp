@@ -123,6 +123,10 @@ PacketLink::Sent SeqpacketLink::send(std::span<const std::uint8_t> packet) noexc
   return Sent::closed;
 }
 
+void SeqpacketLink::hang_up() noexcept {
+  shutdown(fd_, SHUT_WR);
+}
+
 SeqpacketServer::SeqpacketServer(std::string path, const char* option)
     : path_(std::move(path)), option_(option) {
   check_path(path_, option_);
@@ -199,6 +203,10 @@ PacketLink::Sent UdpLink::send(std::span<const std::uint8_t> packet) noexcept {
   const ssize_t sent = sendto(fd_, packet.data(), packet.size(), MSG_DONTWAIT | MSG_NOSIGNAL,
                               generic(host_), host_bytes_);
   return sent >= 0 ? Sent::yes : Sent::full;  // a host that cannot be reached falls silent
+}
+
+void UdpLink::hang_up() noexcept {
+  static_cast<void>(send({}));
 }
 
 UdpServer::UdpServer(const std::string& where) : fd_(bind_to(where)) {}

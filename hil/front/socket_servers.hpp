@@ -25,6 +25,7 @@ class SeqpacketLink final : public PacketLink {
   [[nodiscard]] std::span<const std::uint8_t> take(
       std::span<std::uint8_t> buffer) noexcept override;
   [[nodiscard]] Sent send(std::span<const std::uint8_t> packet) noexcept override;
+  void hang_up() noexcept override;
 };
 
 /// A listening socket at a path of the file system.
@@ -64,6 +65,7 @@ class UdpLink final : public PacketLink {
   [[nodiscard]] std::span<const std::uint8_t> take(
       std::span<std::uint8_t> buffer) noexcept override;
   [[nodiscard]] Sent send(std::span<const std::uint8_t> packet) noexcept override;
+  void hang_up() noexcept override;
 
  private:
   sockaddr_storage host_;

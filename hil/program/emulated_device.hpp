@@ -59,6 +59,7 @@ class EmulatedDevice final : public PacketDevice {
 
   void receive(std::span<const std::uint8_t> packet) noexcept override { faulty_->receive(packet); }
   void advance(int cycles) noexcept override;
+  [[nodiscard]] bool hung_up() const noexcept override { return faulty_->hung_up(); }
   [[nodiscard]] std::span<const std::uint8_t> next_packet() noexcept override {
     return faulty_->next_packet();
   }

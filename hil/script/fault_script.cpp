@@ -25,7 +25,7 @@ bool has_counts(FaultKind kind) {
   return kind == FaultKind::jump || kind == FaultKind::wander;
 }
 bool has_ms(FaultKind kind) {
-  return kind == FaultKind::delay || kind == FaultKind::host_late;
+  return kind == FaultKind::delay || kind == FaultKind::host_late || kind == FaultKind::replay;
 }
 
 DeviceFault fault_of(const ScriptTable& table) {
@@ -43,7 +43,7 @@ DeviceFault fault_of(const ScriptTable& table) {
   only_if(is_of_axis(fault.kind), "axis");
   only_if(has_counts(fault.kind), "counts");
   only_if(has_ms(fault.kind), "ms");
-  only_if(fault.kind != FaultKind::host_late, "for_s");
+  only_if(fault.kind != FaultKind::host_late && fault.kind != FaultKind::hang_up, "for_s");
   fault.of_commands =
       table.word("packets", "reports", std::array<std::string_view, 2>{"reports", "commands"}) ==
       "commands";
@@ -93,7 +93,7 @@ FaultScript random_faults(std::uint32_t seed) {
   const int count = 3 + below(4);
   for (int i = 0; i < count; ++i) {
     DeviceFault fault;
-    fault.kind = static_cast<FaultKind>(below(kFaultWords.size()));
+    fault.kind = static_cast<FaultKind>(below(static_cast<std::uint32_t>(FaultKind::replay)));
     fault.of_commands = is_of_packets(fault.kind) && below(2) == 1;
     fault.at_s = below(1600) / 1000.0;
     fault.for_s = fault.kind == FaultKind::host_late ? 0 : (20 + below(300)) / 1000.0;

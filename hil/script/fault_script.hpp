@@ -28,11 +28,15 @@ enum class FaultKind : std::uint8_t {
   silence,    ///< the device sends nothing, and still receives
   unplug,     ///< it neither sends nor receives
   host_late,  ///< the host stands still for `ms`
+  replay,     ///< the packets of `ms` ago come again instead of new ones (Omni: they are numbered)
+  freeze,     ///< every reading stands still (Falcon, WoodenHaptics)
+  hang_up,    ///< the device ends the link for good, and still receives
 };
 
-inline constexpr std::array<std::string_view, 16> kFaultWords{
-    "lose",   "delay", "duplicate", "reorder", "truncate", "corrupt", "stick",  "jump",
-    "wander", "park",  "chatter",   "unhome",  "noise",    "silence", "unplug", "host_late"};
+inline constexpr std::array<std::string_view, 19> kFaultWords{
+    "lose",   "delay",     "duplicate", "reorder", "truncate", "corrupt", "stick",
+    "jump",   "wander",    "park",      "chatter", "unhome",   "noise",   "silence",
+    "unplug", "host_late", "replay",    "freeze",  "hang_up"};
 
 /// The start of a script's clock; words in fault files are those of `kFaultClockWords`.
 enum class FaultClock : std::uint8_t {
@@ -92,8 +96,8 @@ struct FaultScript {
 /// The same from text; `place` names it in errors.
 [[nodiscard]] FaultScript parse_fault_script(std::string_view text, const std::string& place);
 
-/// Three to six faults of any kind, each of 20 to 320 ms (a late host: 1 to 100 ms), within two
-/// seconds, by `seed`.
+/// Three to six faults of any kind but the last three, each of 20 to 320 ms (a late host: 1 to 100
+/// ms), within two seconds, by `seed`.
 [[nodiscard]] FaultScript random_faults(std::uint32_t seed);
 
 }  // namespace kerf

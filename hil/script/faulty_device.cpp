@@ -104,6 +104,9 @@ FaultyDevice::FaultyDevice(Emulator& device, const FaultScript& script)
   for (const DeviceFault& fault : script.faults) {
     const std::int64_t from = cycles_of(fault.at_s);
     const double seconds = fault.kind == FaultKind::host_late ? fault.ms / 1000 : fault.for_s;
+    if (fault.kind == FaultKind::replay) {
+      replay_cycles_ = std::max(replay_cycles_, cycles_of(fault.ms / 1000));
+    }
     faults_.push_back(
         {.fault = fault, .from = from, .to = from + std::max<std::int64_t>(cycles_of(seconds), 1)});
   }
@@ -116,6 +119,12 @@ bool FaultyDevice::runs(const Running& running) const noexcept {
 bool FaultyDevice::host_is_late() const noexcept {
   return std::ranges::any_of(faults_, [&](const Running& running) {
     return running.fault.kind == FaultKind::host_late && runs(running);
+  });
+}
+
+bool FaultyDevice::hung_up() const noexcept {
+  return std::ranges::any_of(faults_, [](const Running& running) {
+    return running.fault.kind == FaultKind::hang_up && running.begun;
   });
 }
 
@@ -145,13 +154,17 @@ bool FaultyDevice::hits(Running& running, bool of_commands) noexcept {
 bool FaultyDevice::send_on(std::span<const std::uint8_t> packet, bool of_commands,
                            std::deque<Due>& in_flight) {
   Due due{cycle_, Bytes(packet.begin(), packet.end())};
-  if (!of_commands) break_sensors(due.bytes);
+  if (!of_commands) {
+    break_sensors(due.bytes);
+    replace_by_old(due.bytes);
+  }
   bool twice = false;
   for (Running& running : faults_) {
     const DeviceFault& fault = running.fault;
     const bool unplugged = fault.kind == FaultKind::unplug && runs(running);
     const bool silent = fault.kind == FaultKind::silence && !of_commands && runs(running);
-    if (unplugged || silent) {
+    const bool hung = fault.kind == FaultKind::hang_up && !of_commands && running.begun;
+    if (unplugged || silent || hung) {
       ++running.changed;
       return false;
     }
@@ -185,6 +198,19 @@ bool FaultyDevice::send_on(std::span<const std::uint8_t> packet, bool of_command
   return true;
 }
 
+/// By the one that was sent as long ago as the running replay says.
+void FaultyDevice::replace_by_old(Bytes& packet) {
+  if (replay_cycles_ == 0) return;
+  sent_.push_back({cycle_, packet});
+  while (sent_.front().at + replay_cycles_ < cycle_) sent_.pop_front();
+  for (Running& running : faults_) {
+    if (running.fault.kind != FaultKind::replay || !runs(running)) continue;
+    const std::int64_t from = cycle_ - cycles_of(running.fault.ms / 1000);
+    packet = std::ranges::find_if(sent_, [&](const Due& old) { return old.at >= from; })->bytes;
+    ++running.changed;
+  }
+}
+
 void FaultyDevice::break_sensors(Bytes& packet) {
   auto readings = readings_of(packet);
   if (!readings) return;
@@ -194,6 +220,7 @@ void FaultyDevice::break_sensors(Bytes& packet) {
     std::int16_t& count = readings->encoder[static_cast<std::size_t>(fault.axis)];
     if (!runs(running)) {
       running.stuck_at = count;
+      if (fault.kind == FaultKind::freeze) running.held = packet;
       continue;
     }
     changed = true;
@@ -201,6 +228,9 @@ void FaultyDevice::break_sensors(Bytes& packet) {
     switch (fault.kind) {
       case FaultKind::stick:
         count = running.stuck_at;
+        break;
+      case FaultKind::freeze:
+        readings = readings_of(running.held).value_or(*readings);
         break;
       case FaultKind::jump:
         count = wrapped(count + fault.counts);

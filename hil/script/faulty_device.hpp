@@ -32,6 +32,8 @@ class FaultyDevice final : public PacketDevice {
   void advance(int cycles) noexcept override;
   [[nodiscard]] std::span<const std::uint8_t> next_packet() noexcept override;
 
+  [[nodiscard]] bool hung_up() const noexcept override;
+
   /// Returns true if a fault makes the host stand still now; the caller keeps it from running then.
   [[nodiscard]] bool host_is_late() const noexcept;
   /// Faults that have begun.
@@ -54,6 +56,7 @@ class FaultyDevice final : public PacketDevice {
     int packets = 0;            ///< of its stream since it began
     std::int16_t stuck_at = 0;  ///< of `stick`
     int off_by = 0;             ///< of `wander`
+    Bytes held{};               ///< of `freeze`: the last packet before it
   };
   /// A packet on its way.
   struct Due {
@@ -65,6 +68,7 @@ class FaultyDevice final : public PacketDevice {
   /// Returns true if the running fault meets this packet of its stream.
   [[nodiscard]] bool hits(Running& running, bool of_commands) noexcept;
   /// Returns false if a fault drops the packet.
+  void replace_by_old(Bytes& packet);
   bool send_on(std::span<const std::uint8_t> packet, bool of_commands, std::deque<Due>& in_flight);
   void break_sensors(Bytes& packet);
   void step_clock() noexcept;
@@ -75,6 +79,8 @@ class FaultyDevice final : public PacketDevice {
   std::optional<std::int64_t> clock_;  ///< cycles; nothing before it starts
   std::int64_t cycle_ = 0;
   std::deque<Due> reports_, commands_;
+  std::deque<Due> sent_;  ///< reports of the last `replay_cycles_`
+  std::int64_t replay_cycles_ = 0;
   Bytes handed_out_;
   std::uint64_t begun_ = 0, withheld_ = 0;
 };

@@ -25,7 +25,8 @@ std::size_t DirectPort::receive(std::span<std::uint8_t> out) noexcept {
 VirtualLoop::VirtualLoop(LoadedScene& scene, DirectPort& wire, PacketPort& port)
     : wire_(wire),
       servo_(compile(scene)),
-      driver_(make_driver(scene.device.personality, port, scene.device.encoder_sign)),
+      driver_(make_driver(scene.device.personality, port, scene.device.encoder_sign,
+                          scene.servo.rate_hz)),
       cycles_per_tick_(kCyclesPerSecond / scene.servo.rate_hz) {
   driver_->start();
 }

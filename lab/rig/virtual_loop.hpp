@@ -30,7 +30,9 @@ class DirectPort final : public PacketPort {
     device_.receive(packet);
     return true;
   }
-  [[nodiscard]] bool closed() const noexcept override { return false; }
+  [[nodiscard]] bool closed() const noexcept override {
+    return waiting_.empty() && device_.hung_up();
+  }
   [[nodiscard]] bool wait(int) noexcept override { return !waiting_.empty(); }
 
  private:

@@ -18,8 +18,10 @@ constexpr double kNotFiniteMs = 2;    // from the first tick without a finite po
 constexpr double kStandstillMs = 20;  // a host that came back after that
 constexpr double kWatchdogMs = 25;
 constexpr double kThermalTimeMs = 10'000;
-constexpr int kRestCounts = 2;   // an encoder that jitters at an edge rests
-constexpr double kReportMs = 1;  // from one report to the next, of the slowest device
+constexpr double kStillMs = 3000;   // no reading changes while the motors push
+constexpr double kAnewTicks = 160;  // without a newer number: the device counts anew
+constexpr int kRestCounts = 2;      // an encoder that jitters at an edge rests
+constexpr double kReportMs = 1;     // from one report to the next, of the slowest device
 constexpr double kCycleMs = 0.125;
 // A step of the converters is 0.4 to 5 mN at the tip, and the watch is on the outside of them.
 constexpr double kStepN = 0.01;
@@ -84,7 +86,7 @@ void SafetyMonitor::broken(double time_ms, const std::string& what) {
 }
 
 void SafetyMonitor::reported(double time_ms, std::span<const std::uint8_t> packet) {
-  const auto told = wire_.report(packet);
+  const auto told = wire_.report(packet, time_ms - heard_ms_ > (kAnewTicks + 0.5) * tick_ms_);
   if (!told) return;
   told_ = *told;
   fresh_ = true;
@@ -168,11 +170,28 @@ void SafetyMonitor::follow_report(double time_ms) {
 void SafetyMonitor::follow_silence(double time_ms) {
   if (off_ != Off::no_reason) return;
   constexpr double kRounding = 1e-6;
-  if (listened_ms_ - heard_ms_ > kZeroMs + kRounding) {
+  if (link_ended_) {
+    must_stay_off(fault_name(Fault::stale_input));
+  } else if (listened_ms_ - heard_ms_ > kZeroMs + kRounding) {
     must_stay_off(fault_name(Fault::stale_input));
   } else if (no_pose_since_ms_ >= 0 &&
              time_ms - no_pose_since_ms_ > kNotFiniteMs + tick_ms_ + kRounding) {
     must_stay_off(fault_name(Fault::not_finite));
+  }
+}
+
+/// Readings that stand still under torque are no news, and a device without numbers may repeat
+/// them.
+void SafetyMonitor::follow_stillness(double time_ms) {
+  if (wire_.numbers_its_packets()) return;
+  const double still_ms = time_ms - still_since_ms_;
+  const bool changed = !(told_ == still_);
+  if (changed || (last_.asked.off() && still_ms <= kStillMs)) {
+    still_ = told_;
+    still_since_ms_ = time_ms;
+  } else if (off_ == Off::no_reason) {
+    if (still_ms > kStillMs && still_ms <= kStillMs + tick_ms_) fault_begins(time_ms);
+    if (still_ms > kStillMs + kZeroMs + 2 * tick_ms_) must_stay_off(fault_name(Fault::stale_input));
   }
 }
 
@@ -190,6 +209,7 @@ void SafetyMonitor::commanded(double time_ms, std::span<const std::uint8_t> pack
   if (!asked) return broken(time_ms, "a packet that the device cannot read");
   if (fresh_) follow_report(time_ms);
   follow_silence(time_ms);
+  follow_stillness(time_ms);
   Command command{.time_ms = time_ms,
                   .tick_ms = std::min(time_ms - last_.time_ms, tick_ms_),
                   .asked = *asked,

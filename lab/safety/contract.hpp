@@ -35,6 +35,8 @@ class SafetyMonitor {
   void listened(double time_ms) noexcept { listened_ms_ = time_ms; }
   /// A packet of the device that the host has taken.
   void reported(double time_ms, std::span<const std::uint8_t> packet);
+  /// The host knows that the device has ended its side of the link.
+  void link_ended() noexcept { link_ended_ = true; }
   /// A packet that the host has sent.
   void commanded(double time_ms, std::span<const std::uint8_t> packet);
   /// A bus cycle of the device is over.
@@ -57,6 +59,7 @@ class SafetyMonitor {
   void follow_report(double time_ms);
   void follow_rest(double time_ms);
   void follow_silence(double time_ms);
+  void follow_stillness(double time_ms);
   void must_stay_off(const char* fault);
   void follow_stall(const Command& command);
   void check_state(const Command& command);
@@ -86,6 +89,9 @@ class SafetyMonitor {
   double no_pose_since_ms_ = -1;  ///< reports tell of none since; negative: they do
   EncoderCounts rest_count_{};
   double rest_since_ms_ = -1;  ///< parked and still; negative: it is not
+  bool link_ended_ = false;
+  ObservedReport still_;       ///< without a number in its packets: what it has told ...
+  double still_since_ms_ = 0;  ///< ... since then, under torque
   bool calibrated_ = false;
   double told_at_ms_ = 0;                 ///< the last command that a report was for
   double rest_without_gap_since_ms_ = 0;  ///< parked and still, in every report that was due

@@ -58,7 +58,8 @@ DeviceWire::DeviceWire(Personality personality, const std::array<double, 3>& doc
   }
 }
 
-std::optional<ObservedReport> DeviceWire::report(std::span<const std::uint8_t> packet) {
+std::optional<ObservedReport> DeviceWire::report(std::span<const std::uint8_t> packet,
+                                                 bool may_count_anew) {
   if (personality_ == Personality::woodenhaptics) return wooden_report(packet);
   if (personality_ == Personality::falcon) {
     const auto said = falcon::decode_report(packet);
@@ -68,18 +69,20 @@ std::optional<ObservedReport> DeviceWire::report(std::span<const std::uint8_t> p
   }
   const auto said = decode_report(packet);
   if (!said) return std::nullopt;
-  // Newer or older by up to 20 ms of an 8 kHz stream is as it says. What is farther off may be a
-  // wrong bit: it counts from the second packet on that goes on from there.
-  constexpr std::int64_t kNear = 160;
+  // Newer by up to 20 ms of an 8 kHz stream is as it says. What is farther ahead may be a wrong
+  // bit: up to 2 s ahead it counts from the second packet on that goes on from there. All else is
+  // old, until the device may count anew.
+  constexpr std::int64_t kNear = 160, kMostAhead = 16'000;
   const auto from = [&](std::uint32_t number) {
     return static_cast<std::int32_t>(said->counter - number);
   };
-  if (packet_number_ && from(*packet_number_) <= 0 && -kNear <= from(*packet_number_))
-    return std::nullopt;
-  if (packet_number_ && std::abs(std::int64_t{from(*packet_number_)}) > kNear) {
-    const bool goes_on = far_number_ && from(*far_number_) > 0 && from(*far_number_) <= kNear;
+  const auto is_ahead = [&](std::uint32_t of, std::int64_t most) {
+    return from(of) > 0 && from(of) <= most;
+  };
+  if (packet_number_ && !is_ahead(*packet_number_, kNear)) {
+    const bool goes_on = far_number_ && is_ahead(*far_number_, kNear);
     far_number_ = said->counter;
-    if (!goes_on) return std::nullopt;
+    if (!goes_on || !(may_count_anew || is_ahead(*packet_number_, kMostAhead))) return std::nullopt;
   }
   packet_number_ = said->counter;
   far_number_.reset();

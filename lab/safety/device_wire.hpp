@@ -19,6 +19,7 @@ struct ObservedReport {
   EncoderCounts count{};
   bool parked = false;
   bool homed = true;
+  friend bool operator==(const ObservedReport&, const ObservedReport&) noexcept = default;
 };
 
 /// The motor command of a packet of the host.
@@ -38,7 +39,9 @@ class DeviceWire {
   DeviceWire(Personality personality, const std::array<double, 3>& dock_rad);
 
   /// Empty if it is no report of this device, or an Omni's that is not newer than the last one.
-  [[nodiscard]] std::optional<ObservedReport> report(std::span<const std::uint8_t> packet);
+  /// `may_count_anew`: it was silent for long, so an older number may be that of a new count.
+  [[nodiscard]] std::optional<ObservedReport> report(std::span<const std::uint8_t> packet,
+                                                     bool may_count_anew);
   /// Empty if it is no packet of a host.
   [[nodiscard]] std::optional<ObservedCommand> command(std::span<const std::uint8_t> packet);
 
@@ -49,6 +52,9 @@ class DeviceWire {
                                           const std::array<std::int16_t, 3>& count) const;
   /// Motor counts lie within +- this.
   [[nodiscard]] int count_end() const noexcept { return count_end_; }
+  [[nodiscard]] bool numbers_its_packets() const noexcept {
+    return personality_ == Personality::omni;
+  }
   /// Whether a calibration in a wrong pose moves every later one: encoders that count from it.
   [[nodiscard]] bool counts_from_rest() const noexcept { return personality_ == Personality::omni; }
   /// What such encoders tell at the dock, as the host must think since its last calibration.
@@ -63,7 +69,7 @@ class DeviceWire {
   EncoderCounts dock_count_{};
   std::array<double, 3> zero_rad_{}, rad_per_count_{}, nmm_per_count_{};
   std::optional<std::uint32_t> packet_number_;  ///< of the Omni's last report
-  std::optional<std::uint32_t> far_number_;     ///< of the last packet, if it was far from that
+  std::optional<std::uint32_t> far_number_;     ///< of the last packet, if it did not follow that
   bool parked_ = false, encoders_set_ = false;  ///< WoodenHaptics
 };
 

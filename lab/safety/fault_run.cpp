@@ -35,6 +35,7 @@ class WatchedPort final : public PacketPort {
     contract_.listened(time_ms_);
     const std::size_t size = port_.receive(out);
     if (size > 0 && size <= out.size()) contract_.reported(time_ms_, out.first(size));
+    if (port_.closed()) contract_.link_ended();
     return size;
   }
   bool send(std::span<const std::uint8_t> packet) noexcept override {
@@ -74,6 +75,8 @@ bool misleads(const DeviceFault& fault) {
     case FaultKind::corrupt:
     case FaultKind::unplug:
     case FaultKind::host_late:
+    case FaultKind::replay:
+    case FaultKind::freeze:
       return true;
     case FaultKind::lose:
     case FaultKind::delay:
@@ -86,6 +89,7 @@ bool misleads(const DeviceFault& fault) {
     case FaultKind::unhome:
     case FaultKind::noise:
     case FaultKind::silence:
+    case FaultKind::hang_up:
       break;
   }
   return false;
@@ -121,7 +125,9 @@ std::string inconclusive_line(const FaultScript& script, Personality personality
 
 bool concerns(FaultKind kind, Personality personality) noexcept {
   if (kind == FaultKind::unhome) return personality == Personality::falcon;
-  if (kind == FaultKind::noise) return personality == Personality::omni;
+  if (kind == FaultKind::noise || kind == FaultKind::replay)
+    return personality == Personality::omni;
+  if (kind == FaultKind::freeze) return personality != Personality::omni;
   return true;
 }
 

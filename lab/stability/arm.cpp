@@ -113,7 +113,9 @@ HandScript script_of(const LoopCase& subject, const ArmHit& hit) {
 class Rig {
  public:
   Rig(LoadedScene scene, const LoopCase& subject, const HandScript& hand)
-      : emulator_(model_of(subject), hand), port_(emulator_), loop_(scene, port_) {}
+      : emulator_(model_of(subject), hand), port_(emulator_), loop_(scene, port_) {
+    loop_.driver().allow_stillness();
+  }
 
   ServoOutput tick() { return loop_.tick(); }
   /// The mechanics. Their work is the motors' work on the tip, delay included: the servo books what

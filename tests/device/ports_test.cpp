@@ -10,11 +10,14 @@
 #include <string>
 #include <vector>
 
+#include <arpa/inet.h>
 #include <doctest/doctest.h>
+#include <netinet/in.h>
 #include <sys/socket.h>
 #include <sys/un.h>
 #include <unistd.h>
 
+#include "controller/device/device_driver.hpp"
 #include "controller/device/open_port.hpp"
 #include "controller/device/port/socket_port.hpp"
 #include "hil/front/socket_servers.hpp"
@@ -187,7 +190,7 @@ TEST_CASE("over UDP packets keep their borders both ways, and the end shows on b
     CHECK(port->wait(1000));
     CHECK(port->receive(buffer) == 0);
     CHECK(port->closed());
-    CHECK_FALSE(port->send(std::array<std::uint8_t, 1>{1}));
+    CHECK(port->send(std::array<std::uint8_t, 1>{1}));  // motors off, for a device that listens
   }
 }
 
@@ -203,6 +206,125 @@ TEST_CASE("over UDP a device that is killed closes the port") {
     CHECK(port.receive(buffer) == 0);
   }
   CHECK(port.closed());
+}
+
+// ---- a device that ends the link with torque on its motors ----
+
+namespace {
+
+/// A host over a socket or UDP, and the device's end of it as a bare descriptor.
+struct TorqueLink {
+  explicit TorqueLink(bool over_udp) : udp(over_udp) {
+    if (!udp) {
+      port = std::make_unique<kerf::SocketPort>(listener.path, 0, kGoOn);
+      peer = accept(listener.fd, nullptr, nullptr);
+    } else {
+      peer = bound();
+      port = std::make_unique<kerf::UdpPort>(std::to_string(number), 0, kGoOn);
+      char greeting = 0;
+      socklen_t bytes = sizeof host;
+      REQUIRE(recvfrom(peer, &greeting, 1, 0, as_address(host), &bytes) == 0);
+      REQUIRE(connect(peer, as_address(host), bytes) == 0);
+    }
+    driver = kerf::make_driver(Personality::omni, *port);
+  }
+  ~TorqueLink() { close(peer); }
+
+  static sockaddr* as_address(sockaddr_in& address) {
+    return reinterpret_cast<sockaddr*>(&address);
+  }
+  /// A descriptor at the device's port, the first time a free one.
+  int bound() {
+    const int fd = socket(AF_INET, SOCK_DGRAM, 0);
+    sockaddr_in own{};
+    own.sin_family = AF_INET;
+    own.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    own.sin_port = htons(number);
+    socklen_t bytes = sizeof own;
+    REQUIRE(bind(fd, as_address(own), bytes) == 0);
+    REQUIRE(getsockname(fd, as_address(own), &bytes) == 0);
+    number = ntohs(own.sin_port);
+    return fd;
+  }
+  void tick() {
+    static_cast<void>(driver->read());
+    kerf::ServoOutput output;
+    output.motor_counts = {100, -100, 100};
+    output.motors_on = true;
+    driver->command(output);
+  }
+  /// The commands that wait at the device.
+  [[nodiscard]] std::vector<kerf::OmniCommand> commands() const {
+    std::vector<kerf::OmniCommand> all;
+    Buffer packet{};
+    for (ssize_t size = 0; (size = recv(peer, packet.data(), packet.size(), MSG_DONTWAIT)) > 0;) {
+      all.push_back(
+          kerf::decode_command(std::span(packet).first(static_cast<std::size_t>(size))).value());
+    }
+    return all;
+  }
+
+  Listener listener;
+  bool udp;
+  std::uint16_t number = 0;
+  sockaddr_in host{};
+  int peer = -1;
+  std::unique_ptr<kerf::PacketPort> port;
+  std::unique_ptr<kerf::DeviceDriver> driver;
+};
+
+void check_off(const std::vector<kerf::OmniCommand>& commands) {
+  CHECK_FALSE(commands.empty());
+  for (const auto& command : commands) {
+    CHECK_FALSE(command.motors_on);
+    CHECK(command.motor == kerf::OmniCommand{}.motor);
+  }
+}
+
+}  // namespace
+
+TEST_CASE("however the device ends the link, all that it hears from then on is: motors off") {
+  struct {
+    bool udp;
+    void (*end)(int peer);
+  } const ends[] = {{false, [](int peer) { shutdown(peer, SHUT_WR); }},
+                    {false, [](int peer) { send(peer, nullptr, 0, 0); }},
+                    {true, [](int peer) { send(peer, nullptr, 0, 0); }}};
+  for (const auto& [udp, end] : ends) {
+    CAPTURE(udp);
+    for (std::uint32_t moment = 1; moment <= 20; ++moment) {
+      TorqueLink link(udp);
+      for (std::uint32_t i = 1; i <= moment; ++i) {
+        const auto report = kerf::encode(kerf::OmniReport{.counter = i});
+        REQUIRE(send(link.peer, report.data(), report.size(), 0) > 0);
+        if (i % 3 != 0) link.tick();  // some wait when the end comes
+      }
+      CHECK(link.commands().back().motors_on);
+      end(link.peer);
+      for (int tick = 0; tick < 3; ++tick) link.tick();
+      check_off(link.commands());
+      CHECK(link.port->closed());
+      CHECK(link.driver->release());
+      link.port.reset();
+      check_off(link.commands());
+    }
+  }
+}
+
+TEST_CASE("over UDP the refusal of a packet does not cost the next one, which is: motors off") {
+  for (const bool by_watchdog : {false, true}) {
+    TorqueLink link(true);
+    link.tick();
+    close(link.peer);
+    link.tick();  // refused
+    link.peer = link.bound();
+    if (by_watchdog) {
+      CHECK(link.driver->release());
+    } else {
+      link.tick();
+    }
+    check_off(link.commands());
+  }
 }
 
 TEST_CASE("a UDP address that is none, or answers nothing, is one line that names the way out") {

@@ -323,6 +323,7 @@ class FakeClient final : public kerf::PacketLink {
     heard.emplace_back(packet.begin(), packet.end());
     return Sent::yes;
   }
+  void hang_up() noexcept override {}
   void say(std::span<const std::uint8_t> packet) {
     said.emplace_back(packet.begin(), packet.end());
   }

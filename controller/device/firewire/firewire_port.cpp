@@ -138,7 +138,7 @@ std::vector<LinkCounter> FirewirePort::counters() const {
 }
 
 bool FirewirePort::send(std::span<const std::uint8_t> packet) noexcept {
-  if (closed_.load(std::memory_order_relaxed)) return false;
+  if (transmitted_.gone()) return false;
   if (muted_.load(std::memory_order_relaxed)) packet = kNeutral;
   int skips = 0;
   if (options_.fill) {

@@ -158,7 +158,7 @@ bool HidPort::open(const std::string& where) {
 }
 
 bool HidPort::send(std::span<const std::uint8_t> packet) noexcept {
-  if (closed() || !outbox_.put(packet)) return false;
+  if (gone_ || !outbox_.put(packet)) return false;
   sem_post(&raised_);
   return true;
 }
@@ -189,10 +189,10 @@ void HidPort::write_commands() noexcept {
     }
     std::array<std::uint8_t, 1 + wooden::kLongPacketBytes> report{wooden::kReportId};
     const std::size_t size = outbox_.take(std::span(report).subspan(1));
-    if (size > 0 && !closed()) {
+    if (size > 0) {
       std::fill(report.begin() + 1 + static_cast<std::ptrdiff_t>(size), report.end(), 0);
       if (hid_write(device_, report.data(), 1 + packet_bytes_) < 0) {
-        closed_ = true;
+        gone_ = closed_.exchange(true);
       } else {
         ++commands_;
       }

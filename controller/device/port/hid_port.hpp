@@ -60,6 +60,7 @@ class HidPort final : public PacketPort {
   hid_device_* device_ = nullptr;
   std::size_t packet_bytes_ = 0;     ///< of this firmware; shorter packets are filled up
   std::atomic<bool> closed_{false};  ///< set by the first thread that sees the end
+  std::atomic<bool> gone_{false};    ///< and a packet after it could not be sent
   SpscRing inbox_;
   LatestCommand outbox_;
   sem_t raised_{};                                       ///< once per packet, and once to stop

@@ -39,7 +39,8 @@ class PacketPort {
   /// by another thread, it waits up to 20 ms until this one has left.
   virtual bool send_last(std::span<const std::uint8_t> packet) noexcept { return send(packet); }
 
-  /// True once the other end is gone for good.
+  /// True once no packet of the device will come any more, because it ended the link or is gone.
+  /// Packets may still be sent: a device that ended only its own side obeys them.
   [[nodiscard]] virtual bool closed() const noexcept = 0;
 
   /// Waits at most `milliseconds` for a packet, for lock-step runs and for calibration. Not real

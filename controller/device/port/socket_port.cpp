@@ -69,13 +69,16 @@ std::size_t SocketPort::receive(std::span<std::uint8_t> out) noexcept {
 }
 
 bool SocketPort::send(std::span<const std::uint8_t> packet) noexcept {
-  if (closed_) return false;
-  const ssize_t sent = ::send(fd_, packet.data(), packet.size(), MSG_DONTWAIT | MSG_NOSIGNAL);
-  if (sent == static_cast<ssize_t>(packet.size())) return true;
+  const auto sends = [&] {
+    return ::send(fd_, packet.data(), packet.size(), MSG_DONTWAIT | MSG_NOSIGNAL) ==
+           static_cast<ssize_t>(packet.size());
+  };
+  if (sends()) return true;
   if (errno == EPIPE || errno == ECONNRESET || errno == ENOTCONN || errno == ECONNREFUSED) {
     closed_ = true;
   }
-  return false;
+  // Over UDP this may be the refusal of an earlier packet, and this one has not left.
+  return errno == ECONNREFUSED && sends();
 }
 
 bool SocketPort::wait(int milliseconds) noexcept {
@@ -128,7 +131,7 @@ UdpPort::UdpPort(const std::string& where, int patience_ms, const std::atomic<bo
     : SocketPort(connect_to(where, patience_ms, stop)) {}
 
 UdpPort::~UdpPort() {
-  send({});
+  if (!closed()) send({});
 }
 
 }  // namespace kerf

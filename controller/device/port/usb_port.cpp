@@ -300,7 +300,7 @@ void UsbPort::run() noexcept {
   thread_id_ = gettid();
   become(io_);
   for (Transfer& read : reads_) submit(read);
-  while (!closed() && !stop_) {
+  while (!gone_ && !stop_) {
     send_waiting();
     const std::int64_t now_ns = monotonic_ns();
     if (turns_.ours(now_ns) && now_ns < reply_due_ns_) {
@@ -324,7 +324,7 @@ void UsbPort::run() noexcept {
 /// Sends the waiting packets at the end, as many as the device takes in time.
 void UsbPort::send_rest() noexcept {
   const std::int64_t until_ns = monotonic_ns() + kLastPacketMs * 1'000'000;
-  while (!closed() && (write_.busy || !outbox_.empty()) && monotonic_ns() < until_ns) {
+  while (!gone_ && (write_.busy || !outbox_.empty()) && monotonic_ns() < until_ns) {
     hurry_ = true;
     send_waiting();
     handle_events(kEventsNs);
@@ -334,7 +334,7 @@ void UsbPort::send_rest() noexcept {
 void UsbPort::submit(Transfer& transfer) noexcept {
   const int error = libusb_submit_transfer(transfer.usb);
   transfer.busy = error == 0;
-  if (error == LIBUSB_ERROR_NO_DEVICE) closed_ = true;
+  if (error == LIBUSB_ERROR_NO_DEVICE) closed_ = gone_ = true;
   if (error != 0) failed(transfer);
 }
 
@@ -378,7 +378,7 @@ void UsbPort::finished(Transfer& transfer) noexcept {
       if (!is_read) turns_.answered();  // there will be no answer
       break;
     case LIBUSB_TRANSFER_NO_DEVICE:
-      closed_ = true;
+      closed_ = gone_ = true;
       break;
     default:
       failed(transfer);
@@ -405,7 +405,7 @@ void UsbPort::repair() noexcept {
   if (std::exchange(write_halted_, false)) {
     libusb_clear_halt(device_->handle(), falcon::kEndpointOut);
   }
-  if (!read_halted_) return;
+  if (!read_halted_ || closed()) return;
   if (std::ranges::any_of(reads_, &Transfer::busy)) {
     for (Transfer& read : reads_) libusb_cancel_transfer(read.usb);
     return;  // until they have ended

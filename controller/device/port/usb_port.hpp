@@ -102,7 +102,7 @@ class UsbPort final : public PacketPort {
     return inbox_.take(out);
   }
   bool send(std::span<const std::uint8_t> packet) noexcept override {
-    return !closed() && outbox_.put(packet);
+    return !gone_.load(std::memory_order_relaxed) && outbox_.put(packet);
   }
   bool send_now(std::span<const std::uint8_t> packet) noexcept override;
   bool send_last(std::span<const std::uint8_t> packet) noexcept override;
@@ -141,7 +141,9 @@ class UsbPort final : public PacketPort {
   std::unique_ptr<UsbFalcon> device_;
   SpscRing inbox_;
   LatestCommand outbox_;
-  std::atomic<bool> closed_{false}, stop_{false};
+  std::atomic<bool> closed_{false};  ///< no report comes any more
+  std::atomic<bool> gone_{false};    ///< and no command leaves: unplugged
+  std::atomic<bool> stop_{false};
   std::atomic<bool> hurry_{false};  ///< send the waiting command out of turn
   std::atomic<int> thread_id_{0};
   std::atomic<std::uint64_t> packets_{0}, overflow_{0}, strays_{0}, commands_{0}, failures_{0};

@@ -74,11 +74,11 @@ def faults(root):
         ("kind", "below", "needed", "what goes wrong"),
         ("packets", "`reports`, `commands`", "`reports`", "whose packets: the device's, or the host's"),
         ("at_s", f"0 to {seconds} s", "0", "when it begins, by the clock"),
-        ("for_s", f"0 to {seconds} s", "0: once", "how long it lasts; not of `host_late`"),
+        ("for_s", f"0 to {seconds} s", "0: once", "how long it lasts; not of `host_late`, `hang_up`"),
         ("every", f"1 to {int(file.number('kMaxEvery'))}", "1", "each so-many-th packet, the first one included"),
         ("axis", "0, 1, 2", "0", "which encoder"),
         ("counts", f"-{counts} to {counts}, not 0", "needed", "how far the encoder is off"),
-        ("ms", f"above 0, to {file.number('kMaxDelayMs'):g} ms", "needed", "how late")]
+        ("ms", f"above 0, to {file.number('kMaxDelayMs'):g} ms", "needed", "how late, or how old")]
     same(f"{file.path}: the file", [row[0] for row in top], file.allowed("FaultScript parse_fault_script("))
     same(f"{file.path}: [[fault]]", [row[0] for row in fault], file.allowed("DeviceFault fault_of("))
     same_defaults(file.path, top, file.defaults("FaultScript parse_fault_script(", head))
@@ -87,7 +87,7 @@ def faults(root):
     same(f"{head.path}: kFaultWords", [word for word, _ in kinds], head.words("kFaultWords"))
     names = [word for word, _ in kinds]
     known = {"packets": names[:names.index("corrupt") + 1], "axis": ["stick", "jump", "wander"], "counts": ["jump", "wander"],
-             "ms": ["delay", "host_late"]}
+             "ms": ["delay", "host_late", "replay"]}
     for key, begin in (("axis", "bool is_of_axis("), ("counts", "bool has_counts("), ("ms", "bool has_ms(")):
         same(f"{file.path}: {key}", known[key], re.findall(r"FaultKind::(\w+)", file.body(begin)))
     same(f"{file.path}: packets", ["corrupt"], re.findall(r"FaultKind::(\w+)", file.body("bool is_of_packets(")))

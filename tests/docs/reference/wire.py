@@ -42,11 +42,15 @@ def omni(root):
 
 {drawing(file, 'namespace kerf {')}
 
-Bytes that are not listed are written as zero and ignored when read; the words that have a value here have it in every
-packet. `on` is bit 3 of the word at 6, `lights` its two lowest bits: 0 off, 1 flashes slowly, 2 fast, 3 steady. Of the byte at
+Bytes that are not listed are written as zero and ignored when read. The words that have a value here have it in every
+packet, and a packet with another one is refused. `on` is bit 3 of the word at 6, `lights` its two lowest bits: 0 off, 1 flashes slowly, 2 fast, 3 steady. Of the byte at
 19: 1 button 1, 2 button 2, 4 inkwell; each is 0 while it is pressed or docked.
 
 **Speaks first**: the device. It streams by its own clock (in lock-step it sends its first report unasked).
+
+**Packet counter**: one more in each packet. kerf takes a packet whose counter is 1 to 160 ahead of the last one. Up to 16,000
+ahead it waits for a second packet that continues it. Any other packet is old: refused until nothing newer has come for 160
+ticks, by when the motors are off.
 
 **Counts to joints**, in rad, c = 2 pi / {number('kCountsPerRev')}; `dock` is the count in the inkwell. q1 is the turret, to the left; q2 the
 thigh above the horizontal; q3 the forearm from straight down, outwards. All three are against the base.
@@ -81,7 +85,7 @@ Serial, in packets of {number('kPacketBytes')} printable bytes; `shared/wire/fal
 
 {drawing(file, 'namespace kerf {')}
 
-The host's numbers are motor torques, up to +-{number('kMotorCountMax')}; the device's are encoder counts.
+A report with other bytes in these places is refused. The host's numbers are motor torques, up to +-{number('kMotorCountMax')}; the device's are encoder counts.
 
 **Speaks first**: the host, with a packet without torque. Host and device take turns: one answer to each packet.
 
@@ -116,6 +120,8 @@ def wooden(root):
 HID reports, 14 bytes or the first 14 of 64, seven i16; the host answers in the length that the device has:
 
 {drawing(file, 'namespace kerf {')}
+
+A report of another length than the first one, or with another word at 12 than 0 or 1, is refused.
 
 **Speaks first**: the host, with currents of 0. From then on the device reports every 1 ms; after {plain(number('kWatchdogS'))} s without a packet
 it switches its amplifiers off.
@@ -157,7 +163,9 @@ one packet** of the device, as above, without anything around it. The emulator l
    nothing to send in a tick sends a turn without packets. A turn with packets says the same as these packets; the emulator
    sends turns only if it plays faults, and the host sends none.
 4. **End.** The last packet of a host switches the motors off. On a socket, close it. Over UDP an empty datagram is the
-   goodbye (as the first one of a host it does nothing); 2 s of silence of the host end the link too.
+   goodbye (as the first one of a host it does nothing); 2 s of silence of the host end the link too. **A device** ends the
+   link by `shutdown(SHUT_WR)`, an empty packet or `close`, over UDP by an empty datagram. kerf reads no more then. Its
+   next packet, at most a tick later, switches the motors off, as does each one until it closes its side 2 s later.
 
 | packet | byte | type | what |
 |---|---|---|---|
