@@ -6,11 +6,15 @@ search of mkdocs finds nothing there. The index becomes a script, and search.js 
 import json
 import pathlib
 import re
+import sys
 import tempfile
 
+from markdown.extensions.toc import slugify
 from mkdocs.structure.files import File
 
 HERE = pathlib.Path(__file__).parent
+sys.path.insert(0, str(HERE))
+import formulas
 # Formats of the one font for browsers that are older than ten years.
 OLD_FONTS = (".eot", ".svg", ".ttf", ".otf", ".woff")
 
@@ -31,8 +35,8 @@ ITEM = re.compile(r" *([*+-]|\d+\.) +(?=\S)")
 def as_python_markdown(markdown):
     """CommonMark, as GitHub shows it, for Python-Markdown: what belongs to an item of a list begins in its text's column
     there and behind four blanks here, an item behind a text needs a blank line, and a fence has a language alone: the file
-    that it names too, ```cpp law.cpp, becomes its caption."""
-    lines, columns, fence = [], [], None  # columns: where the text of each open item begins
+    that it names too, ```cpp law.cpp, becomes its caption. Returns the lines, and of each its indentation as code, or nothing."""
+    lines, codes, columns, fence = [], [], [], None  # columns: where the text of each open item begins
     for line in markdown.split("\n"):
         starts, item, open_items = not lines or not lines[-1], fence is None and ITEM.match(line), len(columns)
         indent = len(line) - len(line.lstrip())
@@ -45,22 +49,78 @@ def as_python_markdown(markdown):
             continue
         if item and not starts and not in_list:
             lines.append("")
+            codes.append(0)
         if starts or item:
             in_list = bool(item)
+        is_code = fence is None and line.strip() and not item and indent >= within + 4 and (starts or codes[-1])
         line = " " * 4 * len(columns) + line[min(indent, within):] if line.strip() else ""
         if mark := re.match(r" *```(\w*) *([\w./-]*)$", line):
             if fence is None and mark[2]:
                 lines += [f'<p class="file"><code>{mark[2]}</code></p>', ""]
+                codes += [0, 0]
                 line = f"```{mark[1]}"
             fence = None if fence else mark[0]
         elif item:
             columns.append(item.end())
         lines.append(line)
+        codes.append(4 * len(columns) + 4 if is_code else 0)
+    return lines, codes
+
+
+FORMULAS = {"theory.md", "wire.md"}  # their indented blocks are formulas, where they can be read as such
+IN_TEXT = {"theory.md"}  # formulas within its text, too
+# Parts of a line that stay as they are, and a page that is named: in code, or plain, perhaps with its section behind it.
+NAMED = re.compile(r"""(?P<link>!?\[[^]]*\]\([^)]*\)|<[^>]+>)|(?P<tick>`?)docs/(?P<page>[\w-]+\.md)(?P=tick)"""
+                   r"""(?P<section>,? "[^"]+"| \d+(?:\.\d+)?(?![\w.]*\w))?|(?P<code>`[^`]*`)""")
+
+
+def anchor_of(page, section):
+    """'#' and the anchor of a section by its number or its title, or nothing."""
+    if not section:
+        return ""
+    wanted = section.strip(', "')
+    for heading in re.findall(r"^#+ (.*)", page.read_text(encoding="utf-8"), re.M):
+        if re.match(re.escape(wanted) + r"(\.? |$)", heading):
+            return "#" + slugify(heading.replace("`", ""), "-")
+    return ""
+
+
+def with_links(text, docs):
+    """`docs/x.md` becomes a link to this page of the site, and to its section where one is named."""
+    def link(found):
+        page = found["page"] and docs / found["page"]
+        if not page or not page.exists():
+            return found[0]
+        section = found["section"] or ""
+        return f"[{found[0]}]({found['page']}{anchor_of(page, section)})"
+    return NAMED.sub(link, text)
+
+
+def with_formulas(text):
+    """Its parts outside of code, links and HTML."""
+    return "".join(part if part[:1] in "`[<!" and len(part) > 1 else formulas.in_text(part)
+                   for part in re.split(r"(`[^`]*`|!?\[[^]]*\]\([^)]*\)|<[^>]+>)", text))
+
+
+def on_page_markdown(markdown, page, config, **_):
+    docs, name = pathlib.Path(config["docs_dir"]), page.file.src_path
+    lines, block, fenced = [], [], False
+    for line, code in zip(*(one + [end] for one, end in zip(as_python_markdown(markdown), ("", 0)))):
+        if code:
+            block.append(line)
+            depth = code - 4
+            continue
+        if block:
+            made = formulas.block(block) if name in FORMULAS else None
+            lines += [" " * depth + made] if made else block
+            block = []
+        fenced ^= line.startswith("```")
+        lines.append(line if fenced or line.startswith(("```", "#")) else prose(line, name, docs))
     return "\n".join(lines)
 
 
-def on_page_markdown(markdown, **_):
-    return as_python_markdown(markdown)
+def prose(line, name, docs):
+    return with_links(with_formulas(line) if name in IN_TEXT else line, docs)
 
 
 def on_post_build(config):
@@ -76,6 +136,7 @@ def on_post_build(config):
     words = json.dumps(sections, ensure_ascii=False, separators=(",", ":")).replace("</", "<\\/")
     (search / "index.js").write_text(f"const searchIndex = {words};\n", encoding="utf-8")
     (search / "main.js").write_text((HERE / "search.js").read_text(encoding="utf-8"), encoding="utf-8")
+    (site / "css" / "kerf.css").write_text((HERE / "kerf.css").read_text(encoding="utf-8"), encoding="utf-8")
     for file in (site / "fonts").iterdir():
         if file.suffix in OLD_FONTS:
             file.unlink()

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Searches searchIndex: [place, page, title, text] of each section. First come those that have the most of the words; then
-// a word in a title counts most.
+// a word in a title counts most. Messages to wrong input come last among those that have as many.
 'use strict';
 {
   const input = document.getElementById('mkdocs-search-query');
@@ -17,15 +17,15 @@
 
   const countOf = (word, text) => text.split(word).length - 1;
 
-  function scoreOf(words, [, page, title, text]) {
-    const kAnotherWord = 1e6;
+  function scoreOf(words, [place, page, title, text]) {
+    const kAnotherWord = 1e6, kMessages = 'errors.html';
     let score = 0;
     for (const word of words) {
       const here = 20 * Math.min(2, countOf(word, title.toLowerCase())) + 10 * Math.min(1, countOf(word, page.toLowerCase())) +
         Math.min(10, countOf(word, text.toLowerCase()));
       if (here > 0) score += kAnotherWord + here;
     }
-    return score;
+    return score > 0 && place.startsWith(kMessages) ? score - kAnotherWord / 2 : score;
   }
 
   function shown([place, page, title, text], words) {

@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The site of `./kerf docs` as its reader has it, from a folder:  site_test.py ROOT
 
-It is small, loads nothing from elsewhere, leaves no Markdown as text, has every page in its list, and its search finds. Exit code 77: skipped, for
+It is small, loads nothing from elsewhere, leaves no Markdown as text, has every page in its list, and its search finds. Its formulas
+are drawn, it fits on a phone, and it can be read in the dark. Exit code 77: skipped, for
 want of mkdocs, or of chromium once all else is fine."""
 import html.parser
 import itertools
@@ -21,6 +22,7 @@ import pages
 
 MOST_BYTES = 5_000_000
 # What a reader types, and the section that must come among the first three.
+NARROW = 390  # pixels of a phone
 SEARCHES = [("zigzag_mm", "script-keys.html#hands"), ("exit codes", "reports.html#exit-codes"),
             ("mouse pointer wheel", "window.html#a-hand-without-a-device-pointer-keys-gamepad-spacemouse"),
             ("threshold tissue HU", "own-volume.html#a-volume-of-your-own"),
@@ -135,11 +137,66 @@ def faults_of_search(site, chromium):
                     file, _, anchor = address.rpartition("/")[2].partition("#")
                     if anchor not in Loads((site / file).read_text(encoding="utf-8")).anchors:
                         yield f"search: {words}: leads to {file}#{anchor}, which is not there"
+            for words in ("stiffness", "token", "volume spacing"):
+                page.go((site / "index.html").as_uri() + f"?q={words.replace(' ', '+')}")
+                if not page.until("document.querySelectorAll('#mkdocs-search-results a').length > 3", 10):
+                    yield f"search: {words}: finds too little"
+                found = page.evaluate("[...document.querySelectorAll('#mkdocs-search-results a')].map((a) => a.href)")
+                if any("/errors.html" in one for one in found[:3]):
+                    yield f"search: {words}: messages come first: {[one.rsplit('/', 1)[1] for one in found[:3]]}"
             page.go((site / "log.html").as_uri() + "?q=qqqq+wwww")
             if not page.until("document.querySelector('#mkdocs-search-results')?.textContent === 'No results found'", 10):
                 yield "search: does not say that it found nothing"
         finally:
             page.close()
+
+
+def faults_of_looks(site, chromium):
+    """Each page on a phone, and a page in the dark."""
+    with tempfile.TemporaryDirectory() as profile:
+        page = browser.Page(chromium, profile)
+        try:
+            page.size(NARROW, 844, touch=True)
+            for file in sorted(site.glob("*.html")):
+                page.go(file.as_uri())
+                page.until(f"document.readyState === 'complete' && location.pathname.endsWith('/{file.name}')")
+                if (width := page.evaluate("document.documentElement.scrollWidth")) > NARROW:
+                    yield f"{file.name}: {width} pixels wide on a screen of {NARROW}"
+            for scheme in ("light", "dark"):
+                page.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": scheme}])
+                page.go((site / "devices.html").as_uri() + f"?{scheme}")
+                page.until(f"document.readyState === 'complete' && location.search === '?{scheme}'")
+                for place in ("body", "h2", "p", "pre code", "td", "p code", "p a", ".bs-sidebar a"):
+                    text, ground = page.evaluate(CONTRAST % json.dumps(place))
+                    if (text > ground) != (scheme == "dark") or abs(text - ground) < 60:
+                        yield f"devices.html: {scheme}: {place} has the brightness {text:.0f} on {ground:.0f}"
+        finally:
+            page.close()
+
+
+# Brightness of an element's text, and of the nearest ground behind it that is not clear.
+CONTRAST = """(() => {
+  const brightness = (colour) => { const [r, g, b] = colour.match(/[\\d.]+/g).map(Number); return 0.3 * r + 0.6 * g + 0.1 * b; };
+  const element = document.querySelector(%s);
+  let behind = element;
+  const clear = (one) => /rgba\\(.*, 0(\\.0.*)?\\)/.test(getComputedStyle(one).backgroundColor);
+  while (behind.parentElement && clear(behind)) behind = behind.parentElement;
+  return [brightness(getComputedStyle(element).color), clear(behind) ? 255 : brightness(getComputedStyle(behind).backgroundColor)];
+})()"""
+
+
+def faults_of_formulas(site):
+    """Those of theory.md are MathML, and none is left as text; a page that is named is a link."""
+    text = (site / "theory.html").read_text(encoding="utf-8")
+    formulas = re.findall(r"<math>(.*?)</math>", text)
+    if len(formulas) < 30 or any(one.count("<m") != one.count("</m") + one.count("/>") for one in formulas):
+        yield f"theory.html: {len(formulas)} formulas, or one that does not close"
+    bare = re.sub(r"<pre>.*?</pre>|<code>.*?</code>|<math>.*?</math>", "", text, flags=re.S)
+    bare = bare.partition('role="main">')[2].partition("<footer")[0]
+    yield from (f"theory.html: a formula as text: {found}" for found in re.findall(r".{20}(?:\w\^|\w_[\w{]|<=|\bSUM\b).{10}", bare))
+    for file in site.glob("*.html"):
+        page = re.sub(r"<a [^>]*>.*?</a>|<pre>.*?</pre>", "", file.read_text(encoding="utf-8"), flags=re.S)
+        yield from (f"{file.name}: {name}: is named and no link" for name in re.findall(r"<code>(docs/[\w-]+\.md)</code>", page))
 
 
 def main():
@@ -150,10 +207,10 @@ def main():
         site = pathlib.Path(folder) / "site"
         subprocess.run(["mkdocs", "build", "--quiet", "--strict", "--config-file", root / "mkdocs.yml", "--site-dir", site],
                        check=True)
-        wrong = [*faults_of_files(site), *faults_of_prose(site)]
+        wrong = [*faults_of_files(site), *faults_of_prose(site), *faults_of_formulas(site)]
         chromium = browser.find_chromium()
         if chromium:
-            wrong += faults_of_search(site, chromium)
+            wrong += [*faults_of_search(site, chromium), *faults_of_looks(site, chromium)]
     print(*wrong, sep="\n")
     print(f"{len(SEARCHES)} searches, {len(wrong)} wrong" if chromium else "no chromium: nothing was searched for")
     return 1 if wrong else 0 if chromium else 77

@@ -235,7 +235,7 @@ acknowledgement for each frame that it has applied, and commands. What follows a
 * command: `kind` {kinds}.
 * reply: `status` {replies.replace('`kCommandSlots`', str(command.number('kCommandSlots')))}.
 
-`set_hash` is the sum of block_hash over all blocks that the viewer holds, mod 2^64; `session` is that of the hello:
+`set_hash` is the sum of `block_hash` over all blocks that the viewer holds, mod 2^64; `session` is that of the hello:
 
     block_hash(id, version, session):
 {chr(10).join('        ' + step for step in steps)}
