@@ -74,7 +74,7 @@ dangling=$({
       what = part[2]
       if (seen[part[3] what]++) continue
       if (part[1] == "file") {
-        sub(/^(\.\/|\/.*\/)/, "", what)
+        sub(/^(\.\/|\/(.*\/)?)/, "", what)
         if (!(what in ends)) print part[3] ": " what ": no such file"
       } else if (part[1] == "link") {
         from = part[3]; sub(/[^\/]*$/, "", from)
