@@ -44,8 +44,10 @@ except OSError as error: refuse(f"{sys.argv[1]}: {error}; name a path that is no
 with contextlib.suppress(ConnectionError):
     while packet := host.recv(64):
         if packet[:8] == b"kerf\0hi\1":
+            if packet[8] != 1: refuse(f"{sys.argv[1]}: the host wants another device; start it with --device falcon")
             host.send(packet)  # the device, the clock and the rate that the host has
             continue
+        if len(packet) != 16 or not all(65 <= byte < 81 for byte in packet[1:13]): continue  # no packet of its host
         digits = [byte - 65 for byte in packet[1:13]]
         motors = struct.unpack("<3h", bytes(low | high << 4 for low, high in zip(digits[::2], digits[1::2])))
         at = (0, height_mm(tick), 0)

@@ -20,7 +20,7 @@ def refuse(text):
     print(text, file=sys.stderr)
     sys.exit(2)
 
-if len(sys.argv) != 3: refuse(__doc__)
+if len(sys.argv) != 3 or not sys.argv[2].isdecimal() or int(sys.argv[2]) < 1: refuse(__doc__)
 try:
     link = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     link.connect(sys.argv[1])
@@ -48,5 +48,5 @@ try:
         highest_n = max(highest_n, up_n)
     link.send(OFF)
     print(f"tip_mm={tip[0]:.3f},{tip[1]:.3f},{tip[2]:.3f}\nforce_n={highest_n:.3f}")
-except (OSError, StopIteration, IndexError, struct.error, ValueError) as error:
+except (OSError, StopIteration, IndexError, struct.error) as error:
     refuse(f"{sys.argv[1]}: {error or 'the link ended'}; is kerf-emulator there, and has it a hand?")

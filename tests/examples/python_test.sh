@@ -115,7 +115,7 @@ refused 'no rows of these' kb_map "$work/sweep/sweep.csv" "$work/none.png" servo
   peak_force_n servo.rate_hz=3
 for example in "$examples"/*.py; do
   most=30
-  [[ $example == */@(omni_host|falcon_device).py ]] && most=60
+  [[ $example == */@(omni_host|falcon_device).py ]] && most=62
   (($(wc -l <"$example") < most)) || { echo "$example: $most lines or more" && exit 1; }
 done
 
@@ -148,4 +148,7 @@ for example in omni_host falcon_device; do
 done
 "$bin/kerf-emulator" --personality falcon --lockstep --socket "$work/another" >/dev/null 2>&1 &
 until [[ -S $work/another ]]; do sleep 0.02; done
+"$bin/kerf-controller" --scene "$root/scenes/wall.toml" --port "socket:$work/other" --virtual --seconds 1 --name "python-$$" \
+  >/dev/null 2>&1 &
+refused 'the host wants another device' falcon_device "$work/other"
 refused 'not an Omni in lock-step' omni_host "$work/another" 1
