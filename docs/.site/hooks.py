@@ -60,6 +60,10 @@ def as_python_markdown(markdown):
                 codes += [0, 0]
                 line = f"```{mark[1]}"
             fence = None if fence else mark[0]
+            if columns:  # in an item Python-Markdown knows no fence, but a block
+                line = ""
+        elif fence and columns:
+            line = "    " + line if line else ""
         elif item:
             columns.append(item.end())
         lines.append(line)
