@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# The files that a user installs by hand: udev rules and systemd unit. Ids agree with the drivers,
-# every rule has the form that udev reads (its own `verify` is newer than Debian 12), and systemd
-# finds nothing to say about the unit.
+# The files that a user installs by hand: udev rules and systemd units. Ids agree with the drivers,
+# every rule has the form that udev reads (its own `verify` is newer than Debian 12), systemd finds
+# nothing to say about the units, and only the bridge starts again by itself.
 set -euo pipefail
 cd "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/.."
 rules=controller/device/60-kerf.rules
-unit=controller/run/kerf@.service
+units=(controller/run/kerf@.service bridge/kerf-bridge@.service)
 failures=0
 complain() {
   echo "check-install-files: $*" >&2
@@ -33,14 +33,19 @@ for firmware in Mbed Teensy; do
     "$(constant woodenhaptics.hpp "k${firmware}ProductId")"
 done
 
+grep -qx 'Restart=no' "${units[0]}" || complain "${units[0]}: a fault waits for a person: Restart=no"
+grep -qx 'Restart=on-failure' "${units[1]}" || complain "${units[1]}: a bridge that died starts again: Restart=on-failure"
+
 if command -v systemd-analyze >/dev/null; then
   lab=$(mktemp -d)
   trap 'rm -rf "$lab"' EXIT
-  # Its program lies elsewhere on this machine; any one stands for it.
-  sed 's|^ExecStart=[^ ]*|ExecStart=/bin/true|' "$unit" >"$lab/kerf@.service"
-  said=$(systemd-analyze verify --man=no "$lab/kerf@.service" 2>&1 | grep 'kerf@' || true)
-  [[ -z $said ]] || complain "$unit: $said"
+  # Their programs lie elsewhere on this machine; any one stands for them.
+  for unit in "${units[@]}"; do sed 's|^ExecStart=[^ ]*|ExecStart=/bin/true|' "$unit" >"$lab/${unit##*/}"; done
+  for unit in "${units[@]}"; do
+    said=$(systemd-analyze verify --man=no "$lab/${unit##*/}" 2>&1 | grep -F "${unit##*/}" || true)
+    [[ -z $said ]] || complain "$unit: $said"
+  done
 else
-  echo 'check-install-files: no systemd-analyze: the unit was not checked' >&2
+  echo 'check-install-files: no systemd-analyze: the units were not checked' >&2
 fi
 ((failures == 0)) && echo 'check-install-files: fine'

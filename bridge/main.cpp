@@ -30,6 +30,10 @@ Arguments add_serve(CommandLine& app, ServeOptions& options) {
       app.command("serve", "Shows a running kerf-controller to browsers and to join.");
   serve.option("--listen", options.listen, "HOST:PORT; off loopback TLS 1.3, always")
       .shows_default();
+  serve
+      .option("--public-url", options.public_url,
+              "of a reverse proxy in front: its address for browsers, as https://lab.example/kerf")
+      .shown_as("URL");
   serve.option("--name", options.name, "name of the controller").shows_default();
   add_certificate(serve, options, "PEM file: certificate, then those above it; else self-signed");
   serve

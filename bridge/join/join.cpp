@@ -43,6 +43,12 @@ struct Hopeless : BridgeError {
   using BridgeError::BridgeError;
 };
 
+/// The server knows its token or its pinned certificate no more, and will not again: ends the
+/// program, also after a connection that worked.
+struct Outdated : Hopeless {
+  using Hopeless::Hopeless;
+};
+
 // Every operation ends in an error code: with exceptions beside it all of Beast is compiled twice.
 void throw_if(const ErrorCode& error) {
   if (error) throw boost::system::system_error(error);
@@ -52,7 +58,10 @@ constexpr auto kConnectPatience = 1500ms;  // a lost SYN comes again after 1 s
 constexpr auto kGreetingPatience = 10s;    // TLS and HTTP over a slow link
 
 [[noreturn]] void throw_no_tls(const CertificateCheck& check, const ErrorCode& error) {
-  if (const std::string reason = check.refusal(); !reason.empty()) throw Hopeless(reason);
+  if (const std::string reason = check.refusal(); !reason.empty()) {
+    if (check.is_pinned()) throw Outdated(reason);
+    throw Hopeless(reason);
+  }
   if (error.category() == asio::error::get_ssl_category()) {
     throw Hopeless("no TLS 1.3 there; is it a kerf-bridge serve, and off loopback?");
   }
@@ -87,7 +96,9 @@ void throw_no_certificate(const ErrorCode& error) {
   if (status == 400) throw Hopeless("takes no unencrypted viewers; take wss://");
   if (status == 404) throw Hopeless("no kerf-bridge serve answers; take its port");
   if (status == 421) {
-    throw Hopeless("does not know itself by this name; take the address it prints");
+    throw Hopeless(
+        "does not know itself by this name; take the address it prints, or give serve "
+        "--public-url");
   }
   const std::string answer = "answers " + std::to_string(status) + "; is it a kerf-bridge serve?";
   // A gateway whose server is not up yet, or is overloaded: that may change.
@@ -123,7 +134,7 @@ asio::awaitable<void> dial(WebSocket& ws, const BridgeAddress& address, Certific
   }
   ws.read_message_max(kMaxMessageBytes);
   const std::string target =
-      kBridgePath + (address.token.empty() ? std::string() : "?token=" + address.token);
+      address.path + kBridgePath + (address.token.empty() ? "" : "?token=" + address.token);
   websocket::response_type response;
   co_await ws.async_handshake(response, address.host_and_port(), target, quiet(error));
   if (error) throw_no_welcome(error, response.result_int());
@@ -136,9 +147,9 @@ asio::awaitable<void> dial(WebSocket& ws, const BridgeAddress& address, Certific
   switch (static_cast<CloseCode>(code)) {
     case CloseCode::no_token:
       if (!had_token) {
-        throw Hopeless("asks for a token; take all of the wss:// address it prints, in quotes");
+        throw Outdated("asks for a token; take all of the wss:// address it prints, in quotes");
       }
-      throw Hopeless("the token is not one of its own; take the wss:// address it prints");
+      throw Outdated("the token is not one of its own; take the wss:// address it prints");
     case CloseCode::too_many:
       throw BridgeError("has as many viewers as it takes");
     case CloseCode::too_slow:
@@ -244,6 +255,8 @@ class Joiner {
       since_ns_ = monotonic_ns();
       try {
         co_await follow(WebSocket(tcp::socket(io_), address_.secure ? &tls_ : nullptr));
+      } catch (const Outdated& error) {
+        throw BridgeError(place() + error.what());
       } catch (const Hopeless& error) {
         if (joins_ == 0) throw BridgeError(place() + error.what());
         lost(error.what());

@@ -112,59 +112,104 @@ namespace {
   return error == std::errc() && end == text.data() + text.size() && port != 0;
 }
 
-}  // namespace
+constexpr const char *kHttpsPort = "443", *kHttpPort = "80";
 
-std::string BridgeAddress::host_and_port() const {
-  return (host.find(':') == std::string::npos ? host : "[" + host + "]") + ":" + port;
+/// Reads the path that a proxy adds: segments of letters, digits and -._~, none of them only dots.
+[[nodiscard]] bool is_path(std::string_view path) noexcept {
+  while (!path.empty()) {
+    if (!take(path, "/")) return false;
+    const std::string_view segment = path.substr(0, path.find('/'));
+    if (segment.find_first_not_of('.') == segment.npos || !plain(segment, "-._~")) return false;
+    path.remove_prefix(segment.size());
+  }
+  return true;
 }
 
-BridgeAddress parse_address(std::string_view text) {
-  const auto refuse = [text](const std::string& way_out) {
+/// `form`: what an address is, and what to do if it is none.
+BridgeAddress read_address(std::string_view text, const std::string& option,
+                           const std::string& form) {
+  const auto refuse = [&](const std::string& way_out) {
     // The token is a secret, and the rest may be long or hold line ends.
     const std::size_t shown = std::min<std::size_t>(text.find('?'), 80);
-    return BridgeError(one_line("join: " + std::string(text.substr(0, shown)) + ": " + way_out));
+    return BridgeError(one_line(option + std::string(text.substr(0, shown)) + ": " + way_out));
   };
-  constexpr const char* kForm = "not wss://HOST:PORT/?token=TOKEN; take what serve prints";
   BridgeAddress out;
+  out.port = "7400";
   std::string_view rest = text;
-  if (take(rest, "ws://") || take(rest, "http://")) {
+  if (take(rest, "https://")) {
+    out.port = kHttpsPort;
+  } else if (take(rest, "http://")) {
     out.secure = false;
-  } else if (!take(rest, "wss://") && !take(rest, "https://")) {
-    throw refuse(kForm);
+    out.port = kHttpPort;
+  } else if (take(rest, "ws://")) {
+    out.secure = false;
+  } else if (!take(rest, "wss://")) {
+    throw refuse(form);
   }
   const std::size_t end = std::min(rest.find_first_of("/?"), rest.size());
   std::string_view place = rest.substr(0, end), query = rest.substr(end);
   if (take(place, "[")) {
     const std::size_t close = place.find(']');
-    if (close == place.npos) throw refuse(kForm);
+    if (close == place.npos) throw refuse(form);
     out.host = place.substr(0, close);
     place.remove_prefix(close + 1);
-    if (!plain(out.host, ":.")) throw refuse(kForm);
+    if (!plain(out.host, ":.")) throw refuse(form);
   } else {
     out.host = place.substr(0, place.find(':'));
     place.remove_prefix(out.host.size());
-    if (!plain(out.host, ".-_")) throw refuse(kForm);
+    if (!plain(out.host, ".-_")) throw refuse(form);
   }
-  if (out.host.empty() || out.host.size() > kLongest) throw refuse(kForm);
+  if (out.host.empty() || out.host.size() > kLongest) throw refuse(form);
   if (take(place, ":")) {
     if (!is_port(place)) throw refuse("no port from 1 to 65535; take what serve prints");
     out.port = place;
   } else if (!place.empty()) {
-    throw refuse(kForm);
+    throw refuse(form);
   }
-  static_cast<void>(take(query, "/"));
+  out.path = query.substr(0, query.find('?'));
+  query.remove_prefix(out.path.size());
+  while (out.path.ends_with('/')) out.path.pop_back();
+  if (out.path.size() > kLongest || !is_path(out.path)) throw refuse(form);
   if (take(query, "?token=")) {
     if (query.empty() || query.size() > kLongest || !plain(query, "-_.~")) {
       throw refuse("no such token; take the one that serve prints");
     }
     out.token = query;
   } else if (!query.empty()) {
-    throw refuse(kForm);
+    throw refuse(form);
   }
   if (!out.secure && !is_loopback(out.host)) {
-    throw refuse("unencrypted is for loopback only; take wss://");
+    throw refuse("unencrypted is for loopback only; take " +
+                 std::string(text.starts_with("http") ? "https://" : "wss://"));
   }
   return out;
+}
+
+}  // namespace
+
+std::string BridgeAddress::host_and_port() const {
+  return (host.find(':') == std::string::npos ? host : "[" + host + "]") + ":" + port;
+}
+
+std::string BridgeAddress::origin() const {
+  std::string text = (secure ? "https://" : "http://") + host_and_port();
+  if (port == (secure ? kHttpsPort : kHttpPort)) text.resize(text.size() - port.size() - 1);
+  return text;
+}
+
+BridgeAddress parse_address(std::string_view text) {
+  return read_address(text, "join: ", "not wss://HOST:PORT/?token=TOKEN; take what serve prints");
+}
+
+BridgeAddress parse_public_url(std::string_view text) {
+  const std::string form =
+      "not https://HOST[:PORT][/PATH]; give the address at which browsers reach the proxy";
+  if (!text.starts_with("http") || text.find('?') != text.npos) {
+    throw BridgeError(one_line(
+        "--public-url " + std::string(text.substr(0, std::min<std::size_t>(text.find('?'), 80))) +
+        ": " + form));
+  }
+  return read_address(text, "--public-url ", form);
 }
 
 }  // namespace kerf::bridge

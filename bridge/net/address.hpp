@@ -28,17 +28,24 @@ struct BridgeError : std::runtime_error {
 
 /// The address of a bridge, as `kerf-bridge serve` prints it.
 struct BridgeAddress {
-  bool secure = true;  ///< wss, not ws
+  bool secure = true;  ///< wss or https, not ws or http
   std::string host;    ///< a name, or an address; IPv6 without brackets
-  std::string port = "7400";
+  std::string port;
+  std::string path;   ///< that a proxy adds, as /lab/kerf; empty: none
   std::string token;  ///< empty: none
 
   /// HOST:PORT, for messages and for the request.
   [[nodiscard]] std::string host_and_port() const;
+  /// http(s)://HOST[:PORT] as a browser writes it in the header Origin: without the usual port.
+  [[nodiscard]] std::string origin() const;
 };
 
-/// Reads `wss://HOST[:PORT][/][?token=TOKEN]`; https:// and http:// mean wss:// and ws://, since a
-/// browser shows them. Throws `BridgeError`, also for ws:// to another machine.
+/// Reads `wss://HOST[:PORT][PATH][?token=TOKEN]`; without a port it is 7400. https:// and http://
+/// mean wss:// and ws://, since a browser shows them, and their usual port, which it leaves out.
+/// Throws `BridgeError`, also for ws:// to another machine.
 [[nodiscard]] BridgeAddress parse_address(std::string_view text);
+
+/// Reads `https://HOST[:PORT][PATH]` of serve's `--public-url`. Throws `BridgeError`.
+[[nodiscard]] BridgeAddress parse_public_url(std::string_view text);
 
 }  // namespace kerf::bridge

@@ -54,6 +54,8 @@ class CertificateCheck {
   void begin(SSL* connection);
   /// After a handshake that failed: one line; empty: the certificate was not the reason.
   [[nodiscard]] const std::string& refusal() const noexcept { return refusal_; }
+  /// It demands one certificate, by its fingerprint.
+  [[nodiscard]] bool is_pinned() const noexcept { return !fingerprint_.empty(); }
 
  private:
   [[nodiscard]] bool accepts(bool verified, X509_STORE_CTX* chain);

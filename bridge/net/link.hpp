@@ -8,6 +8,7 @@
 
 #include <boost/asio/any_io_executor.hpp>
 #include <boost/asio/associated_executor.hpp>
+#include <boost/asio/awaitable.hpp>
 #include <boost/asio/buffer.hpp>
 #include <boost/asio/redirect_error.hpp>
 #include <boost/asio/ssl.hpp>
@@ -96,6 +97,8 @@ class Link {
   [[nodiscard]] bool is_tls() const noexcept { return tls_ != nullptr; }
   /// For handshakes; only if `is_tls`.
   beast::ssl_stream<beast::tcp_stream&>& tls() noexcept { return *tls_; }
+  /// From now on every read ends as if the peer had closed, also one that waits. Writes go on.
+  void stop_reading();
 
   template <class Buffers, class Handler>
   auto async_read_some(const Buffers& buffers, Handler&& handler) {
@@ -124,7 +127,12 @@ class Link {
 
   beast::tcp_stream tcp_;
   std::unique_ptr<Tls> tls_;
+  bool reads_ = true;
 };
+
+/// Reads and forgets until the peer closes, or for a second: a socket that is closed with unread
+/// bytes is reset, and what was sent last may be lost on its way. Only without another reader.
+asio::awaitable<void> linger(beast::tcp_stream& stream);
 
 // After the closing frame of a WebSocket the connection is closed at once, without TLS's own close
 // message: that frame marks the end already.

@@ -203,8 +203,9 @@ bool is_own_host(std::string_view host, const std::vector<std::string>& names) {
                      [&text](const std::string& name) { return same_text(text, name); });
 }
 
-bool is_own_origin(std::string_view origin, std::string_view host, bool tls) {
-  return origin.empty() ||
+bool is_own_origin(std::string_view origin, std::string_view host, bool tls,
+                   std::string_view public_origin) {
+  return origin.empty() || same_text(origin, public_origin) ||
          same_text(origin, std::string(tls ? "https://" : "http://") + std::string(host));
 }
 

@@ -83,7 +83,8 @@ class OneTimeToken {
 [[nodiscard]] bool is_own_host(std::string_view host, const std::vector<std::string>& names);
 
 /// Whether the page that opens a WebSocket was loaded from here: the origin is empty (no browser),
-/// or has the scheme and host of the request.
-[[nodiscard]] bool is_own_origin(std::string_view origin, std::string_view host, bool tls);
+/// or has the scheme and host of the request, or is `public_origin`, that of a proxy.
+[[nodiscard]] bool is_own_origin(std::string_view origin, std::string_view host, bool tls,
+                                 std::string_view public_origin = {});
 
 }  // namespace kerf::bridge

@@ -122,21 +122,23 @@ HostPort parse_listen(const std::string& text) {
   return tls;
 }
 
-/// The address of the page or of join, at `host`.
-[[nodiscard]] std::string address_of(const char* scheme, bool tls, const std::string& host,
-                                     std::uint16_t port, const std::string& token) {
-  const bool v6 = host.find(':') != std::string::npos;
-  return std::string(scheme) + (tls ? "s://" : "://") + (v6 ? '[' + host + ']' : host) + ':' +
-         std::to_string(port) + "/?token=" + token;
+/// Where the server can be reached: at the proxy's address, or at those of `--listen`.
+[[nodiscard]] std::vector<BridgeAddress> places_of(const ServerSetup& setup, std::uint16_t port) {
+  if (setup.public_url) return {*setup.public_url};
+  std::vector<BridgeAddress> out;
+  for (std::string& host : reached_at(setup.host)) {
+    out.push_back({setup.tls != nullptr, std::move(host), std::to_string(port), {}, {}});
+  }
+  return out;
 }
 
 /// The page's address for one browser. The QR code is for a browser of another machine.
 void print_pages(const ServerSetup& setup, std::uint16_t port, const std::string& page_token,
                  bool qr) {
   std::string for_others;
-  for (const std::string& host : reached_at(setup.host)) {
-    const std::string address = address_of("http", setup.tls != nullptr, host, port, page_token);
-    if (for_others.empty() && !is_loopback(host)) for_others = address;
+  for (const BridgeAddress& place : places_of(setup, port)) {
+    const std::string address = place.origin() + place.path + "/?token=" + page_token;
+    if (for_others.empty() && !is_loopback(place.host)) for_others = address;
     std::cout << address << '\n';
   }
   if (qr && !for_others.empty()) std::cout << qr_code(for_others);
@@ -145,8 +147,9 @@ void print_pages(const ServerSetup& setup, std::uint16_t port, const std::string
 void print_addresses(const ServerSetup& setup, std::uint16_t port, const std::string& page_token,
                      bool qr) {
   std::cout << "for kerf bridge join, as often as it is shown\n";
-  for (const std::string& host : reached_at(setup.host)) {
-    std::cout << address_of("ws", setup.tls != nullptr, host, port, setup.tokens.first()) << '\n';
+  for (const BridgeAddress& place : places_of(setup, port)) {
+    std::cout << (place.secure ? "wss://" : "ws://") << place.host_and_port() << place.path
+              << "/?token=" << setup.tokens.first() << '\n';
   }
   if (setup.tokens.may_command()) {
     std::cout << "with a token of --allow-commands in its place a viewer may command, too\n";
@@ -160,6 +163,7 @@ void print_addresses(const ServerSetup& setup, std::uint16_t port, const std::st
 int run_serve(const ServeOptions& options, const std::atomic<bool>& stop) {
   const HostPort at = parse_listen(options.listen);
   ServerSetup setup;
+  if (!options.public_url.empty()) setup.public_url = parse_public_url(options.public_url);
   setup.host = at.host;
   setup.port = at.port;
   setup.name = options.name;

@@ -25,6 +25,7 @@ struct ServeOptions {
   std::filesystem::path client_ca;   ///< PEM file: CAs of viewers' certificates; empty: none needed
   std::filesystem::path token_file;  ///< tokens of viewers; empty: one token, made now
   std::filesystem::path command_tokens;  ///< tokens of viewers that may command; empty: none
+  std::string public_url;                ///< of a reverse proxy; empty: none
   int max_viewers = kMostViewers;
   bool dedicated_link = false;
   int openigtlink = 0;  ///< port for 3D Slicer, at the same host; 0: none

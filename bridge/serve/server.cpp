@@ -78,6 +78,7 @@ tcp::acceptor listen_at(asio::io_context& io, const ServerSetup& setup) {
 Server::Impl::Impl(ServerSetup setup)
     : setup_(std::move(setup)), acceptor_(listen_at(io_, setup_)) {
   static_cast<void>(segment_socket(setup_.name));  // refuses a name that cannot exist
+  if (setup_.public_url) setup_.host_names.push_back(setup_.public_url->host);
   if (setup_.tls) tls_.emplace(context_of(setup_.tls));
   const std::string why = why_no_bbr(acceptor_.native_handle());
   if (!why.empty()) {

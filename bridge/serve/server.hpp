@@ -6,9 +6,11 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "bridge/net/address.hpp"
 #include "bridge/net/certificate.hpp"
 #include "bridge/net/tokens.hpp"
 
@@ -20,8 +22,9 @@ struct ServerSetup {
   std::uint16_t port = 7400;       ///< 0: one that is free
   std::string name;                ///< of the controller
   Tokens tokens;
-  Tls tls;                              ///< empty: plain, on loopback only
-  std::vector<std::string> host_names;  ///< names that a browser may use, beside addresses
+  Tls tls;                                  ///< empty: plain, on loopback only
+  std::vector<std::string> host_names;      ///< names that a browser may use, beside addresses
+  std::optional<BridgeAddress> public_url;  ///< of a reverse proxy in front of it
   std::size_t max_viewers = 32;
   bool dedicated_link = false;
   std::function<void(const std::string&)> on_page_token;  ///< called with each new one-time token

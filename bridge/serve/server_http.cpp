@@ -32,12 +32,15 @@ struct HttpReply {
   std::string cookie;  ///< value of Set-Cookie; empty: none
   bool keep_alive = true;
   bool head_only = false;  ///< the request was a HEAD
+  std::string location;    ///< of a redirection; empty: none
 };
 
 std::string_view reason(int status) noexcept {
   switch (status) {
     case 200:
       return "OK";
+    case 308:
+      return "Permanent Redirect";
     case 400:
       return "Bad Request";
     case 401:
@@ -78,6 +81,7 @@ std::string http_text(const HttpReply& reply) {
   text += kHeaders;
   if (reply.status == 405) text += "Allow: GET, HEAD\r\n";
   if (!reply.cookie.empty()) text += "Set-Cookie: " + reply.cookie + "\r\n";
+  if (!reply.location.empty()) text += "Location: " + reply.location + "\r\n";
   text += reply.keep_alive ? "\r\n" : "Connection: close\r\n\r\n";
   if (!reply.head_only) text += reply.body;
   return text;
@@ -145,10 +149,35 @@ Server::Impl::Credentials Server::Impl::credentials_of(const Request& request) c
   return {Right::none, !asked.empty() || !kept.empty(), false, {}};
 }
 
+/// The path that is asked for. A proxy may have removed its own path already, or not; empty: it is
+/// the proxy's path itself, without the slash that relative addresses of the page need.
+std::string_view Server::Impl::route_of(const Request& request) const {
+  std::string_view route = path_of(text(request.target()));
+  const std::string_view path =
+      setup_.public_url ? std::string_view(setup_.public_url->path) : std::string_view();
+  if (!route.starts_with(path)) return route;
+  const std::string_view rest = route.substr(path.size());
+  return rest.empty() || rest.starts_with('/') ? rest : route;
+}
+
+/// Whether it came to the address of `--public-url`, as far as the proxy tells.
+bool Server::Impl::is_public(const Request& request) const {
+  return setup_.public_url &&
+         is_own_origin(setup_.public_url->origin(), text(request[http::field::host]),
+                       setup_.public_url->secure);
+}
+
 std::string Server::Impl::page_text(const Request& request, const Credentials& shown) {
   HttpReply reply;
   reply.keep_alive = request.keep_alive();
   reply.head_only = request.method() == http::verb::head;
+  if (route_of(request).empty()) {
+    const std::string_view target = text(request.target());
+    const std::size_t path = path_of(target).size();
+    reply.status = 308;
+    reply.location = std::string(target.substr(0, path)) + "/" + std::string(target.substr(path));
+    return http_text(reply);
+  }
   if (shown.right == Right::none) {
     reply.status = 401;
     reply.body = shown.secret
@@ -159,21 +188,24 @@ std::string Server::Impl::page_text(const Request& request, const Credentials& s
     return http_text(reply);
   }
   if (!shown.cookie.empty() && !reply.head_only) {
-    reply.cookie = cookie_name() + "=" + shown.cookie + "; Path=/; HttpOnly; SameSite=Strict" +
-                   (tls_ ? "; Secure" : "");
+    // Without a Path it is good for the folder that the browser sees, behind any proxy.
+    const bool secure = tls_ || (is_public(request) && setup_.public_url->secure);
+    reply.cookie = cookie_name() + "=" + shown.cookie + "; HttpOnly; SameSite=Strict" +
+                   (secure ? "; Secure" : "");
     if (shown.one_time) {
       page_token_.renew();
       if (setup_.on_page_token) setup_.on_page_token(page_token_.token());
     }
   }
-  std::string_view name = path_of(text(request.target())).substr(1);
+  std::string_view name = route_of(request).substr(1);
   if (name.empty()) name = "index.html";
   const auto files = page_files();
   const auto file = std::find_if(files.begin(), files.end(),
                                  [name](const PageFile& one) { return one.name == name; });
   if (file == files.end()) {
     reply.status = 404;
-    reply.body = "No such page.\n";
+    reply.body =
+        "No such page. If a proxy adds a path to the address: kerf bridge serve --public-url.\n";
   } else {
     reply.content_type = file->content_type;
     reply.body = file->bytes;
@@ -195,7 +227,7 @@ asio::awaitable<void> Server::Impl::refuse(Link& link, int status, std::string_v
       http_text({status, "text/plain; charset=utf-8", why, "", false, head_only});
   link.next_layer().expires_after(kReplyTime);
   co_await asio::async_write(link, asio::buffer(reply), quiet(error));
-  link.next_layer().socket().shutdown(tcp::socket::shutdown_send, error);
+  if (!error) co_await linger(link.next_layer());
 }
 
 asio::awaitable<void> Server::Impl::talk_http(std::unique_ptr<WebSocket> ws,
@@ -218,15 +250,22 @@ asio::awaitable<void> Server::Impl::talk_http(std::unique_ptr<WebSocket> ws,
       co_return co_await refuse(link, 400, "This names its host or its origin twice.\n", head);
     }
     if (!is_own_host(host_name(host), setup_.host_names)) {
-      co_return co_await refuse(link, 421, "Open this machine by its address or its own name.\n",
+      co_return co_await refuse(link, 421,
+                                "Open this machine by its address or its own name; if a proxy has "
+                                "another: kerf bridge serve --public-url.\n",
                                 head);
     }
     if ((request.method() != http::verb::get && !head) || !request.target().starts_with('/')) {
       co_return co_await refuse(link, 405, "Only GET and HEAD are answered here.\n", head);
     }
     const bool upgrade = beast::websocket::is_upgrade(request);
-    if (upgrade && !is_own_origin(text(request[http::field::origin]), host, tls_.has_value())) {
-      co_return co_await refuse(link, 403, "A page from elsewhere may not look in here.\n", head);
+    const std::string proxy = setup_.public_url ? setup_.public_url->origin() : std::string();
+    if (upgrade &&
+        !is_own_origin(text(request[http::field::origin]), host, tls_.has_value(), proxy)) {
+      co_return co_await refuse(link, 403,
+                                "A page from elsewhere may not look in here; if it came through a "
+                                "proxy: kerf bridge serve --public-url.\n",
+                                head);
     }
     const Credentials shown = credentials_of(request);
     if (shown.right == Right::none && shown.secret) {
@@ -237,7 +276,7 @@ asio::awaitable<void> Server::Impl::talk_http(std::unique_ptr<WebSocket> ws,
       co_await wait.async_wait(quiet(error));
       slot.is_guess = false;
     }
-    if (upgrade && path_of(text(request.target())) == kBridgePath) {
+    if (upgrade && route_of(request) == kBridgePath) {
       const Request upgrade_request = parser.release();
       co_return co_await view(std::move(ws), upgrade_request, shown.right, slot);
     }

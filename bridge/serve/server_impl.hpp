@@ -43,7 +43,8 @@ struct Viewer {
   std::int64_t byte_credit = 0;      ///< bytes that it may still send, with TLS
   std::uint64_t received_bytes = 0;  ///< from it, when `byte_credit` was updated
   bool commanding = false;           ///< the controller has a command of it
-  bool gone = false;                 ///< its socket has failed or is closed
+  bool reading = false;              ///< `read_viewer` runs: Beast's reader has the socket
+  bool gone = false;                 ///< its socket is closed
   std::optional<CloseCode> closing;  ///< it is to be closed with this code
   std::int64_t close_by_ns = 0;      ///< then the socket is closed
 
@@ -93,6 +94,8 @@ class Server::Impl {
   /// With the port, since browsers keep cookies by host alone.
   [[nodiscard]] std::string cookie_name() const { return "kerf" + std::to_string(port()); }
   [[nodiscard]] Credentials credentials_of(const Request& request) const;
+  [[nodiscard]] std::string_view route_of(const Request& request) const;
+  [[nodiscard]] bool is_public(const Request& request) const;
   [[nodiscard]] std::string page_text(const Request& request, const Credentials& shown);
 
   // server_viewer.cpp
@@ -100,6 +103,7 @@ class Server::Impl {
             HandshakeSlot& slot);
   Void read_viewer(std::shared_ptr<Viewer> viewer);
   Void write_viewer(std::shared_ptr<Viewer> viewer);
+  Void say_goodbye(Viewer& viewer);
   [[nodiscard]] bool handle_message(const std::shared_ptr<Viewer>& viewer,
                                     std::span<const std::byte> message);
   void command(const std::shared_ptr<Viewer>& viewer, const CommandMessage& message);

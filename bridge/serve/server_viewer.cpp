@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 #include <chrono>
+#include <string>
 #include <utility>
 #include <variant>
 #include <vector>
@@ -8,6 +9,7 @@
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/detached.hpp>
 #include <boost/asio/post.hpp>
+#include <boost/asio/write.hpp>
 
 #include "bridge/net/tcp_socket.hpp"
 #include "bridge/serve/server_impl.hpp"
@@ -49,6 +51,15 @@ std::string_view words(CloseCode code) {
   return "";
 }
 
+/// A server's close frame (RFC 6455, 5.5.1). Its payload is shorter than 126 bytes.
+std::string close_frame(CloseCode code) {
+  const auto number = static_cast<std::uint16_t>(code);
+  const std::string payload =
+      std::string{static_cast<char>(number >> 8), static_cast<char>(number & 255)} +
+      std::string(words(code));
+  return std::string{static_cast<char>(0x88), static_cast<char>(payload.size())} + payload;
+}
+
 }  // namespace
 
 asio::awaitable<void> Server::Impl::view(std::unique_ptr<WebSocket> ws, const Request& request,
@@ -84,6 +95,7 @@ asio::awaitable<void> Server::Impl::view(std::unique_ptr<WebSocket> ws, const Re
   });
   viewers_.push_back(viewer);
   if (connection_) open_stream(*viewer);
+  viewer->reading = true;
   asio::co_spawn(io_, read_viewer(viewer), asio::detached);
   co_await write_viewer(viewer);
   viewers_.remove(viewer);
@@ -100,7 +112,7 @@ void Server::Impl::open_stream(Viewer& viewer) {
 asio::awaitable<void> Server::Impl::write_viewer(std::shared_ptr<Viewer> viewer) {
   ErrorCode error;
   std::vector<std::byte> out;
-  while (!viewer->closing && !viewer->gone && !error) {
+  while (!viewer->closing && viewer->reading && !error) {
     if (!viewer->replies.empty()) {
       const ReplyMessage reply = viewer->replies.front();
       viewer->replies.pop_front();
@@ -115,24 +127,35 @@ asio::awaitable<void> Server::Impl::write_viewer(std::shared_ptr<Viewer> viewer)
       co_await viewer->wake.async_wait(quiet(woken));
     }
   }
-  if (viewer->closing && !viewer->gone && !error) {
-    const websocket::close_reason reason(
-        static_cast<websocket::close_code>(*viewer->closing),
-        beast::string_view(words(*viewer->closing).data(), words(*viewer->closing).size()));
-    co_await viewer->ws->async_close(reason, quiet(error));
-  }
+  if (viewer->closing && !viewer->gone && !error) co_await say_goodbye(*viewer);
   viewer->gone = true;
   viewer->stream.reset();
   viewer->ws->next_layer().next_layer().socket().close(error);
 }
 
+/// Beast's own close reads while `read_viewer` does: a message in fragments then ends the program
+/// by an assertion of Beast (1.74, `read_size_hint_pmd`). So the reader ends first, nothing that
+/// the viewer sends afterwards is looked at, and the close frame goes out without Beast.
+asio::awaitable<void> Server::Impl::say_goodbye(Viewer& viewer) {
+  Link& link = viewer.ws->next_layer();
+  ErrorCode error;
+  link.stop_reading();
+  while (viewer.reading) {
+    viewer.wake.expires_at(asio::steady_timer::time_point::max());
+    co_await viewer.wake.async_wait(quiet(error));
+  }
+  const std::string frame = close_frame(*viewer.closing);
+  co_await asio::async_write(link, asio::buffer(frame), quiet(error));
+  if (!error) co_await linger(link.next_layer());
+}
+
 asio::awaitable<void> Server::Impl::read_viewer(std::shared_ptr<Viewer> viewer) {
   ErrorCode error;
   beast::flat_buffer in;
-  while (!error) {
+  while (!error && !viewer->closing) {
     in.clear();
     co_await viewer->ws->async_read(in, quiet(error));
-    if (error || viewer->closing) continue;
+    if (error || viewer->closing) break;
     const std::span message(static_cast<const std::byte*>(in.data().data()), in.data().size());
     if (!viewer->ws->got_binary() || --viewer->message_credit < 0 ||
         !handle_message(viewer, message)) {
@@ -140,7 +163,7 @@ asio::awaitable<void> Server::Impl::read_viewer(std::shared_ptr<Viewer> viewer) 
     }
     viewer->wake.cancel();
   }
-  viewer->gone = true;
+  viewer->reading = false;
   viewer->wake.cancel();
 }
 

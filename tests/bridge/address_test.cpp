@@ -23,7 +23,15 @@ TEST_CASE("an address is taken as serve prints it and as a browser shows it") {
   CHECK(three.host == "::1");
   CHECK(three.host_and_port() == "[::1]:65535");
   CHECK(three.token == "a");
+  CHECK(three.path.empty());
   CHECK(parse_address("http://127.0.0.1:1/").port == "1");
+  const BridgeAddress proxy = parse_address("https://lab.example/rooms/kerf.1/?token=a");
+  CHECK(proxy.port == "443");  // a browser shows no usual port
+  CHECK(proxy.path == "/rooms/kerf.1");
+  CHECK(proxy.origin() == "https://lab.example");
+  CHECK(parse_address("http://[::1]/kerf").origin() == "http://[::1]");
+  CHECK(parse_address("ws://localhost:80/kerf?token=a").path == "/kerf");
+  CHECK(parse_address("wss://a:80").origin() == "https://a:80");
   CHECK(parse_address("ws://localhost:7400/?token=a").host == "localhost");
 }
 
@@ -43,7 +51,10 @@ TEST_CASE("an address that is none is refused in one line that keeps the token t
                            "wss://[::1]7400",
                            "wss://a b",
                            "wss://a\r\nHost: b",
-                           "wss://a/other?token=secret",
+                           "wss://a/../other?token=secret",
+                           "wss://a//other?token=secret",
+                           "wss://a/o%20ther?token=secret",
+                           "wss://a/other#elsewhere",
                            "wss://a/?token=",
                            "wss://a/?token=sec ret",
                            "wss://a/?token=sec&ret",
@@ -65,4 +76,24 @@ TEST_CASE("an address that is none is refused in one line that keeps the token t
     }
   }
   CHECK_THROWS_AS(static_cast<void>(parse_address("wss://" + std::string(300, 'a'))), BridgeError);
+}
+
+TEST_CASE("the address of a proxy is one that a browser opens, without a token") {
+  const BridgeAddress one = parse_public_url("https://lab.example/kerf/");
+  CHECK(one.origin() + one.path == "https://lab.example/kerf");
+  CHECK(parse_public_url("http://localhost:8080").origin() == "http://localhost:8080");
+  for (const char* text :
+       {"", "lab.example", "wss://lab.example", "https://", "https://a/?token=secret",
+        "https://a?secret", "https://a:0", "http://lab.example/kerf", "https://a/kerf\r\nX: y",
+        "https://a/#kerf", "https://secret@a"}) {
+    CAPTURE(text);
+    try {
+      static_cast<void>(parse_public_url(text));
+      FAIL("taken");
+    } catch (const BridgeError& error) {
+      const std::string line = error.what();
+      CHECK(line.starts_with("--public-url "));
+      CHECK(line.find('\n') == std::string::npos);
+    }
+  }
 }

@@ -3,6 +3,8 @@
 #include "bridge/join/join.hpp"
 
 #include <fstream>
+#include <memory>
+#include <ostream>
 #include <string>
 
 #include <doctest/doctest.h>
@@ -59,4 +61,35 @@ TEST_CASE("join takes its token from a file that nobody else reads") {
   CHECK(first_words(options).starts_with("joined "));
   options.address += "/?token=" + kLook;
   CHECK(first_words(options).ends_with("the address has a token; give one of both"));
+}
+
+TEST_CASE("a token that a restarted bridge does not know ends the join, also after a picture") {
+  const TestController controller;
+  ServerSetup setup;
+  const std::string token = "only-of-the-first-bridge";
+  setup.tokens.add(token, Right::look);
+  auto bridge = std::make_unique<TestBridge>(setup);
+  JoinOptions options;
+  options.name = "join-test";
+  const std::string place = "127.0.0.1:" + std::to_string(bridge->port());
+  options.address = "ws://" + place + "/?token=" + token;
+  bool restarted = false;
+  OnWords words([&](const std::string& said) {
+    if (restarted || said.find("joined ") == std::string::npos) return;
+    restarted = true;
+    ServerSetup anew;
+    anew.port = bridge->port();
+    bridge.reset();
+    bridge = std::make_unique<TestBridge>(anew);
+  });
+  std::ostream said(&words);
+  const std::atomic<bool> stop{false};
+  std::string end = "no end";
+  try {
+    run_join(options, stop, said);
+  } catch (const BridgeError& error) {
+    end = error.what();
+  }
+  CHECK(restarted);
+  CHECK(end == place + ": the token is not one of its own; take the wss:// address it prints");
 }

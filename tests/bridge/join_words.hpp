@@ -2,9 +2,11 @@
 #pragma once
 
 #include <atomic>
+#include <functional>
 #include <ostream>
 #include <sstream>
 #include <string>
+#include <utility>
 
 #include "bridge/join/join.hpp"
 #include "bridge/net/address.hpp"
@@ -32,6 +34,16 @@ inline std::string first_words(const bridge::JoinOptions& options) {
   const std::string line = words.str().substr(std::string("kerf-bridge: ").size());
   return line.substr(0, line.find('\n'));
 }
+
+/// Calls `act` with all that a join has said, whenever it says something.
+struct OnWords : std::stringbuf {
+  explicit OnWords(std::function<void(const std::string&)> its) : act(std::move(its)) {}
+  int sync() override {
+    act(str());
+    return 0;
+  }
+  std::function<void(const std::string&)> act;
+};
 
 /// With what a join ends by itself.
 inline std::string last_words(const bridge::JoinOptions& options) {

@@ -18,6 +18,8 @@
 #include <sys/time.h>
 #include <unistd.h>
 
+#include "tests/bridge/websocket_bytes.hpp"
+
 namespace kerf::test {
 
 /// A peer of the bridge that can also misbehave: sockets and bytes, no library that would refuse to
@@ -113,20 +115,12 @@ class RawClient {
                            "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n");
   }
 
-  /// One WebSocket frame, masked with zeros.
   bool send_frame(unsigned opcode, std::span<const std::byte> payload, bool last = true) {
-    std::string frame{static_cast<char>((last ? 0x80U : 0U) | opcode)};
-    if (payload.size() < 126) {
-      frame += static_cast<char>(0x80U | payload.size());
-    } else {
-      frame += static_cast<char>(0xfeU);
-      frame += static_cast<char>(payload.size() >> 8);
-      frame += static_cast<char>(payload.size() & 255);
-    }
-    frame += std::string(4, 0);
-    frame.append(reinterpret_cast<const char*>(payload.data()), payload.size());
-    return send_bytes(frame);
+    const std::string_view text(reinterpret_cast<const char*>(payload.data()), payload.size());
+    return send_bytes(websocket_frame(opcode, text, last, true));
   }
+  /// The peer sees the end of what this client sends, and may go on sending.
+  void end_sending() const { shutdown(fd_, SHUT_WR); }
   template <class T>
   bool send_value(const T& value) {
     return send_frame(2, std::as_bytes(std::span(&value, 1)));

@@ -53,7 +53,7 @@ struct TestBridge {
 
   static bridge::ServerSetup prepared(bridge::ServerSetup setup) {
     use_own_sockets();
-    setup.port = 0;
+    if (setup.port == bridge::ServerSetup{}.port) setup.port = 0;
     setup.name = "bridge-test";
     setup.tokens.add(kLook, bridge::Right::look);
     setup.tokens.add(kCommand, bridge::Right::command);

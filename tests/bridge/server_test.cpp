@@ -196,6 +196,39 @@ TEST_CASE("a page from elsewhere cannot open the socket, and who has no token is
   CHECK(cookie.message().has_value());
 }
 
+TEST_CASE(
+    "behind a proxy the address of --public-url is its own, whatever the proxy removes of it") {
+  const TestController controller;
+  ServerSetup setup;
+  setup.public_url = parse_public_url("https://Lab.example/rooms/kerf");
+  const TestBridge bridge(setup);
+  const auto ask = [&](const std::string& target, const std::string& head) {
+    return RawClient(bridge.port()).ask(target, head);
+  };
+  const std::string kept = "Host: lab.example\r\n", rewritten = "Host: 127.0.0.1:7400\r\n";
+  const std::string token = "?token=" + kLook;
+  for (const char* path : {"/", "/rooms/kerf/"}) {  // the proxy removes its path, or not
+    CHECK(has(ask(path + token, kept), "HttpOnly; SameSite=Strict; Secure\r\n"));
+    CHECK(has(ask(path + token, rewritten), "HttpOnly; SameSite=Strict\r\n"));
+    CHECK(has(ask(path + std::string("kerf.js") + token, kept), "200 OK"));
+    for (const std::string& host : {kept, rewritten}) {
+      const auto open = [&](const std::string& origin) {
+        return RawClient(bridge.port())
+            .upgrade(path + ("bridge" + token), host + "Origin: " + origin + "\r\n");
+      };
+      CHECK(has(open("https://lab.example"), "101 "));
+      CHECK(has(open("https://lab.example:444"), "403 "));
+      CHECK(has(open("https://evil.example"), "403 "));
+    }
+  }
+  const std::string moved = ask("/rooms/kerf" + token, kept);
+  CHECK(has(moved, "308 "));
+  CHECK(has(moved, "\r\nLocation: /rooms/kerf/" + token + "\r\n"));
+  CHECK(has(ask("/rooms/kerfuffle" + token, kept), "404 "));
+  CHECK(has(ask("/kerf/" + token, kept), "404 "));
+  CHECK(has(ask("/" + token, "Host: other.example\r\n"), "421 "));
+}
+
 TEST_CASE("what a viewer may not say ends its connection and no other") {
   const TestController controller;
   const TestBridge bridge;
@@ -226,6 +259,44 @@ TEST_CASE("what a viewer may not say ends its connection and no other") {
                ++i) {
           }
         }) == 1009);
+  CHECK(good.follow([&, frames = good.far.frames] { return good.far.frames > frames + 5; }));
+}
+
+TEST_CASE("nothing that a viewer sends after its refusal is looked at") {
+  const TestController controller;
+  const TestBridge bridge;
+  TestViewer good(bridge.port());
+  REQUIRE(good.until_whole());
+  const auto frame = [](unsigned opcode, std::string_view payload, bool last) {
+    return websocket_frame(opcode, payload, last, true);
+  };
+  // Beast's own close would read the last fragment of a message that its reader has begun.
+  const std::string tail = frame(2, "KB", false) + frame(0, "A1", false) + frame(9, "", true) +
+                           frame(0, std::string(20, 'x'), true);
+  const std::string refused = frame(2, "garbage!garbage", true);
+  const std::vector<std::string> ends = {
+      refused + tail,
+      refused + tail + tail + frame(8, "", true) + tail,
+      refused + frame(10, "late", true) + frame(2, "KB", false).substr(0, 3),
+      refused + frame(9, std::string(125, 'p'), true) + frame(3, "", true),
+      refused + frame(8, "\x0f", true) + refused,
+  };
+  for (int i = 0; i < 20; ++i) {
+    for (const std::string& bytes : ends) {
+      TestViewer bad(bridge.port());
+      bad.client.send_bytes(bytes);
+      CHECK(code_of(bad.client) == static_cast<int>(CloseCode::not_understood));
+    }
+  }
+  // The refusal comes from the bridge's clock, amid a message.
+  TestViewer flood(bridge.port());
+  std::string many;
+  for (int i = 0; i < 150'000; ++i) many += frame(i == 0 ? 2 : 0, "", false);
+  flood.client.send_bytes(many + frame(9, "", true) + tail.substr(8));
+  CHECK(code_of(flood.client) == static_cast<int>(CloseCode::not_understood));
+  TestViewer stranger(bridge.port(), kLook + "x");
+  stranger.client.send_bytes(tail + refused);
+  CHECK(code_of(stranger.client) == static_cast<int>(CloseCode::no_token));
   CHECK(good.follow([&, frames = good.far.frames] { return good.far.frames > frames + 5; }));
 }
 

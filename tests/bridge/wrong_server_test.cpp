@@ -7,45 +7,24 @@
 #include <thread>
 
 #include <doctest/doctest.h>
-#include <openssl/evp.h>
-#include <openssl/sha.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
 #include "bridge/wire/messages.hpp"
 #include "tests/bridge/join_words.hpp"
 #include "tests/bridge/local_port.hpp"
+#include "tests/bridge/websocket_bytes.hpp"
 
 using namespace kerf::bridge;
 using namespace kerf::test;
 
 namespace {
 
-/// The head that opens a WebSocket for a client's request (RFC 6455), and `message` in one frame.
-std::string websocket_answer(const std::string& request, const std::string& message) {
-  const std::string name = "Sec-WebSocket-Key: ";
-  const std::size_t at = request.find(name) + name.size();
-  const std::string key =
-      request.substr(at, request.find("\r\n", at) - at) + "258EAFA5-E914-47DA-95CA-C5AB0DC85B11";
-  unsigned char digest[SHA_DIGEST_LENGTH], text[64];
-  SHA1(reinterpret_cast<const unsigned char*>(key.data()), key.size(), digest);
-  EVP_EncodeBlock(text, digest, SHA_DIGEST_LENGTH);
-  std::string frame = "\x82";  // binary; its length has one byte or two more
-  if (message.size() >= 126) {
-    frame += '\x7e';
-    frame += static_cast<char>(message.size() >> 8);
-  }
-  frame += static_cast<char>(message.size() & 255);
-  return "HTTP/1.1 101 Switching Protocols\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
-         "Sec-WebSocket-Accept: " +
-         std::string(reinterpret_cast<const char*>(text)) + "\r\n\r\n" + frame + message;
-}
-
-/// Answers the first client, with text as it is or with a message over a WebSocket, and waits until
-/// it goes. The destructor waits for that too.
+/// Answers the first client, with text as it is, or over a WebSocket with a message or with frames,
+/// and waits until it goes. The destructor waits for that too.
 class WrongServer {
  public:
-  enum class Kind { text, message };
+  enum class Kind { text, message, frames };
 
   WrongServer(Kind kind, const std::string& answer) {
     listen(port_.fd(), 1);
@@ -60,7 +39,11 @@ class WrongServer {
       };
       while (request.find("\r\n\r\n") == std::string::npos && receive()) {
       }
-      const std::string bytes = kind == Kind::text ? answer : websocket_answer(request, answer);
+      const std::string bytes =
+          kind == Kind::text ? answer
+          : kind == Kind::message
+              ? websocket_welcome(request) + websocket_frame(2, answer, true, false)
+              : websocket_welcome(request) + answer;
       send(fd, bytes.data(), bytes.size(), MSG_NOSIGNAL);
       while (receive()) {
       }
@@ -124,4 +107,27 @@ TEST_CASE("join ends at a greeting that cannot be, or of another build") {
   CHECK(words_of_message(hello) == "message: volumes = 0; expected 1 to 8");
   CHECK(words_of_message(std::uint32_t{0x12345678}) ==
         "message: of no kind that is known here; use programs of one build");
+}
+
+TEST_CASE("join outlives whatever frames a server sends before, in and after its refusal") {
+  const auto frame = [](unsigned opcode, const std::string& payload, bool last = true) {
+    return websocket_frame(opcode, payload, last, false);
+  };
+  const std::string ping = frame(9, std::string(125, 'p'));
+  const std::string parts =
+      frame(2, "KB", false) + frame(0, "A1", false) + frame(9, "") + frame(0, std::string(20, 'x'));
+  const std::string full = frame(8, std::string{'\x0f', '\xa4'});  // 4004: too many viewers
+  const auto words = [](const std::string& frames) {
+    return words_of(WrongServer::Kind::frames, frames);
+  };
+  const std::string unknown = "message: of no kind that is known here; use programs of one build";
+  CHECK(words(parts + parts) == unknown);
+  CHECK(words(frame(2, "garbage!garbage") + parts) == unknown);
+  CHECK(words(frame(2, "KB", false) + ping + full + parts) ==
+        "has as many viewers as it takes; trying again");
+  CHECK(words(full + full + ping) == "has as many viewers as it takes; trying again");
+  CHECK(words(frame(8, "x") + parts).ends_with("; trying again"));  // a close of one byte
+  CHECK(words(frame(9, std::string(126, 'p'))).ends_with("; trying again"));
+  CHECK(words(frame(0, "no message before")).ends_with("; trying again"));
+  CHECK(words(websocket_frame(2, "masked", true, true)).ends_with("; trying again"));
 }

@@ -54,7 +54,8 @@ export class Link {
     this.greeted = false;
     this.on.state('connecting', false);
     this.heard = performance.now();
-    const address = `${location.protocol.replace('http', 'ws')}//${location.host}/bridge`;
+    const address = new URL('bridge', location.href);  // below the page's folder, whatever a proxy adds before it
+    address.protocol = address.protocol.replace('http', 'ws');
     const socket = this.socket = new WebSocket(address);
     socket.binaryType = 'arraybuffer';
     socket.onmessage = ({data}) => this.take(socket, data);
