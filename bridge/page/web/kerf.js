@@ -50,10 +50,12 @@ const link = new Link({
     now.ended = (frame.flags & kRunEnded) !== 0;
     if (!(frame.flags & kLastOfPass)) return;
     if (!scene) begin();
+    const wasLost = now.lost;
     now.takenNs = frame.takenNs;
     now.lost = false;
     document.body.dataset.tick = frame.tick;
     this.state(now.ended ? 'ended' : isStale(frame) ? 'stale' : 'live', false);
+    if (wasLost) tellBanner();
   },
   records(message) {
     if (message.record !== 'TickRecord') return;
@@ -105,6 +107,10 @@ function removedByMaterial() {
   return [...rows.slice(1), rows[0]];
 }
 
+function tellBanner() {
+  showBanner(bannerOf(now, performance.now() - now.beatMs));
+}
+
 let shownBefore = 0, figuresBefore = performance.now();
 function showNews() {
   const at = performance.now();
@@ -119,7 +125,7 @@ function showNews() {
     removed: scene ? removedByMaterial() : [],
     servoHz: span > 0 && news ? 1e9 * Number(record.tick - earlier[0].tick) / span : null,
     ageMs: now.takenNs && news ? Math.max(link.clock.ageMs(now.takenNs), 0) : null});
-  showBanner(bannerOf(now, at - now.beatMs));
+  tellBanner();
   plot.draw();
   if (record && document.activeElement !== element('tool')) element('tool').value = record.active_tool;
 }

@@ -23,9 +23,9 @@ export const isStale = frame => frame !== null && frame.heartbeatNs > 0n &&
 
 /** What is to be said large over the picture: {text, old, alarm}; null where there is nothing. `old`: by
  * how much the picture is, from `silentMs` since the servo's last sign of life. */
-export function bannerOf({record, frame, ended, newRun, lost}, silentMs) {
+export function bannerOf({record, frame, takenNs, ended, newRun, lost}, silentMs) {
   const old = ` This picture is ${spanText(silentMs)} old.`;
-  if (lost && frame && !ended) return {text: 'No news from the bridge.', old, alarm: true};
+  if (lost && takenNs !== null && !ended) return {text: 'No news from the bridge.', old, alarm: true};
   if (ended) {
     return frame.lifecycle === Lifecycle.clean_end ?
       {text: 'The controller has ended: this is the final state.', alarm: false} :
