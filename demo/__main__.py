@@ -73,12 +73,14 @@ class Demo:
                 self.out.close()
 
     def build(self):
-        names = ["controller", "emulator", "visualizer", "recorder", "record"] + ["bridge"] * self.options.serve
+        names = ["controller", "emulator", "visualizer", "recorder", "record"]
+        names += ["bridge"] * (self.options.serve or self.options.two_machines) + ["lab"] * self.options.two_machines
         code = subprocess.run([self.kerf, "_programs", *names], check=False).returncode
         if code:
             sys.exit(code if code > 0 else 128 - code)
-        if self.options.serve and not os.access(os.path.join(self.programs, "kerf-bridge"), os.X_OK):
-            raise Refusal("--serve: kerf-bridge was not built, for want of a library; try ./kerf setup")
+        if "bridge" in names and not os.access(os.path.join(self.programs, "kerf-bridge"), os.X_OK):
+            raise Refusal(("--serve" if self.options.serve else "--two-machines")
+                          + ": kerf-bridge was not built, for want of a library; try ./kerf setup")
 
     def run_programs(self):
         options = self.options
@@ -93,6 +95,8 @@ class Demo:
             self.results = self.processes.path("results")
             os.mkdir(self.results)
             self.processes.shown = (self.results, "its folder")
+        if options.two_machines:
+            return self.run_two_machines()
         self.name = options.name or f"demo-{os.getpid()}"
         self.find_meeting_point()
         if options.serve:
@@ -102,6 +106,25 @@ class Demo:
             self.start_others()
         failed, cut = self.watch()
         return self.finish(failed, cut)
+
+    def run_two_machines(self):
+        """`kerf-lab two-machines` makes the networks and starts all parts on them."""
+        options = self.options
+        words = [f"--controller-word={word}" for word in [*options.volume, *(["--rate", options.rate] if options.rate else [])]]
+        look = [*options.look, *(["--record", options.record] if options.record else []),
+                *(["--sheet", options.sheet] if options.sheet else [])]
+        words += [f"--visualizer-word={word}" for word in look]
+        hand = ["--hand", options.hand] if options.hand else []
+        self.controller = self.emulator = self.processes.start("lab", [
+            "two-machines", "--scene", self.scene, "--device", options.device, *hand, "--seconds", options.seconds,
+            "--size", options.size, *options.link, *["--headless"] * options.headless, *words,
+            *(["--out", self.results] if self.out else [])])  # it speaks for itself
+        code = self.controller.wait()
+        if self.code_of_signal is not None:
+            return self.code_of_signal
+        if code == 77 or code == 2:
+            return code
+        return self.keep(1 if crashed("lab", exit_code(self.controller)) else code)
 
     def find_meeting_point(self):
         """`meet` exists once the emulator is ready; `ask` and `offer` are the options of controller and emulator for it."""

@@ -7,10 +7,11 @@ import re
 import socket
 
 BUSES = {"omni": ("fw", "fw1"), "falcon": ("usb", "usb"), "woodenhaptics": ("hid", "hidraw0")}  # word of --port, its node
-FLAGS = ("--headless", "--serve", "--stereo", "--voxel-tool", "--mute", "--colour-blind", "--virtual")
+FLAGS = ("--headless", "--serve", "--stereo", "--voxel-tool", "--mute", "--colour-blind", "--virtual", "--two-machines")
 OF_SCENE = ("--scene", "--volume", "--spacing", "--override-spacing", "--window", "--set")
-WITH_VALUE = OF_SCENE + ("--hand", "--seconds", "--rate", "--out", "--size", "--renderer", "--gradient", "--panel-scale",
-                         "--device", "--port", "--sheet", "--transfer", "--record", "--listen", "--name")
+OF_LINK = {"--loss": 50, "--delay-ms": 2000, "--mbit": 100000}  # between two machines, and the most of each
+WITH_VALUE = (*OF_SCENE, *OF_LINK, "--hand", "--seconds", "--rate", "--out", "--size", "--renderer", "--gradient", "--panel-scale",
+              "--device", "--port", "--sheet", "--transfer", "--record", "--listen", "--name")
 
 
 class Refusal(Exception):
@@ -34,6 +35,8 @@ class Options:
     name: str = ""  # of the controller; demo-PID
     sheet: str = ""
     record: str = ""
+    link: list = dataclasses.field(default_factory=list)  # those of OF_LINK
+    two_machines: bool = False
     headless: bool = False
     serve: bool = False
     virtual: bool = False
@@ -51,8 +54,8 @@ def parse(words):
         name = words.pop(0)
         if name in FLAGS:
             options.again.append(name)
-            if name in ("--headless", "--serve", "--virtual"):
-                setattr(options, name[2:], True)
+            if name in ("--headless", "--serve", "--virtual", "--two-machines"):
+                setattr(options, name[2:].replace("-", "_"), True)
             else:
                 options.look.append(name)
             continue
@@ -70,6 +73,8 @@ def parse(words):
             options.look += [name, value]
         elif name in OF_SCENE and name != "--scene":
             options.volume += [name, value]
+        elif name in OF_LINK:
+            options.link += [name, value]
         else:
             setattr(options, name[2:], value)
     options.headless = options.headless or bool(options.sheet)
@@ -91,12 +96,31 @@ def runs(name):
             return False
 
 
+def check_link(options):
+    """What belongs to two machines, and what they exclude."""
+    for name, value in zip(options.link[::2], options.link[1::2]):
+        if not options.two_machines:
+            raise Refusal(f"{name} {value}: of a link between two machines; give --two-machines too")
+        if not re.fullmatch(r"[0-9]{1,6}(\.[0-9]+)?", value) or float(value) > OF_LINK[name]:
+            raise Refusal(f"{name} {value}: not a number from 0 to {OF_LINK[name]}")
+    if not options.two_machines:
+        return
+    for given, word, why in ((options.virtual, "--virtual", "a link has a clock"),
+                             (options.mouse, "--hand mouse", "the picture is on one machine and the hand on the other"),
+                             (options.serve, "--serve", "no browser of this machine reaches a network of their own"),
+                             (options.name, "--name", "no reader of this machine reaches it"),
+                             (options.port != "socket", f"--port {options.port}", "their device is a socket")):
+        if given:
+            raise Refusal(f"{word}: not with --two-machines: {why}; leave one of them out")
+
+
 def check(options):
     """Completes the options by defaults, and throws Refusal for values and combinations that cannot be."""
     if options.record == "-":
         raise Refusal("--record -: the demo itself writes to the standard output; name a file or a pipe")
     if options.listen and not options.serve:
         raise Refusal(f"--listen {options.listen}: nothing listens without --serve; give both")
+    check_link(options)
     if options.mouse:
         if options.virtual:
             raise Refusal("--hand mouse: nobody is as fast as --virtual; leave one of them out")

@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <iosfwd>
+#include <iterator>
 #include <memory>
 #include <ostream>
 #include <sstream>
@@ -58,51 +59,88 @@ bool wait_for(Child& child, seconds patience, Condition there) {
   return std::getenv("DISPLAY") != nullptr || std::getenv("WAYLAND_DISPLAY") != nullptr;
 }
 
+/// What a demo shows, and where its results stay.
+struct DemoOptions {
+  std::string scene = "scenes/phantom.toml";
+  std::string device = "omni";
+  std::string hand;  ///< script of the hand; empty: the scene's
+  double seconds = 10;
+  std::string size = "640x480";
+  std::string out;        ///< folder of the results; empty: none are kept
+  bool headless = false;  ///< no window, though there is a display
+  std::vector<std::string> controller_words, visualizer_words;  ///< more options of the programs
+};
+
 /// What runs on both machines, with its files in one folder.
 class Demo {
  public:
-  Demo(const LinkSettings& link, std::filesystem::path folder)
-      : folder_(std::move(folder)), networks_(link), files_(folder_) {}
+  Demo(const LinkSettings& link, std::filesystem::path folder, const DemoOptions& options)
+      : folder_(std::move(folder)),
+        results_(options.out.empty() ? folder_ / "results" : std::filesystem::path(options.out)),
+        options_(options),
+        networks_(link),
+        files_(folder_) {
+    std::filesystem::create_directories(results_);
+  }
 
-  void start_controller(const std::string& scene, double run_s) {
-    Child describe({program_beside("emulator"), "--personality", "omni", "--describe"},
+  void start_controller() {
+    Child describe({program_beside("emulator"), "--personality", options_.device, "--describe"},
                    at("describe"));
     wait_for(describe, seconds(10), [&] { return describe.ended().has_value(); });
-    controller_ = networks_.start(Side::near,
-                                  {program_beside("controller"), "--scene", scene, "--device",
-                                   "omni", "--port", "socket:" + at("device"), "--torque-scale",
-                                   value_in(text_in(at("describe")), "torque_scale"), "--seconds",
-                                   number_text(run_s), "--name", BridgePair::kNearName,
-                                   "--emulator-args", at("told"), "--report", at("report.json")},
-                                  at("controller.log"));
+    std::vector<std::string> words{program_beside("controller"),
+                                   "--scene",
+                                   find_data_file(options_.scene),
+                                   "--device",
+                                   options_.device,
+                                   "--port",
+                                   "socket:" + at("device"),
+                                   "--torque-scale",
+                                   value_in(text_in(at("describe")), "torque_scale"),
+                                   "--seconds",
+                                   number_text(options_.seconds),
+                                   "--name",
+                                   BridgePair::kNearName,
+                                   "--emulator-args",
+                                   at("told"),
+                                   "--report",
+                                   results_ / "report.json",
+                                   "--final",
+                                   results_ / "final.nrrd"};
+    std::ranges::copy(options_.controller_words, std::back_inserter(words));
+    controller_ = networks_.start(Side::near, words, at("controller.log"));
     const bool told =
         wait_for(*controller_, seconds(60), [&] { return std::filesystem::exists(at("told")); });
     if (!told) throw HilError(controller_->last_line());
     told_ = text_in(at("told"));
+    if (options_.out.empty()) return;
+    recorder_ = networks_.start(
+        Side::near,
+        {program_beside("recorder"), "--name", BridgePair::kNearName, "--out", results_ / "log"},
+        at("recorder.log"));
   }
 
-  void start_picture(const std::string& size, const std::string& out, double run_s) {
+  void start_picture() {
     pair_ = std::make_unique<BridgePair>(networks_, files_, false);
     join_ = pair_->join(kFarName);
     std::vector<std::string> words{program_beside("visualizer"),
                                    "--name",
                                    kFarName,
                                    "--size",
-                                   size,
+                                   options_.size,
                                    "--wait",
                                    "30",
                                    "--attached",
                                    at("attached"),
                                    "--out",
-                                   out};
-    window_ = has_display();
+                                   results_};
+    std::ranges::copy(options_.visualizer_words, std::back_inserter(words));
+    window_ = has_display() && !options_.headless;
     if (!window_) {
-      const double rate_hz = std::strtod(value_in(told_, "rate_hz").c_str(), nullptr);
-      const auto every = static_cast<long>(run_s * (rate_hz > 0 ? rate_hz : 1000) / kPictures);
+      const auto every = static_cast<long>(options_.seconds * rate_hz() / kPictures);
       for (const std::string& word :
            {std::string("--headless"), std::string("--frames"), std::to_string(kPictures),
             std::string("--every-ticks"), std::to_string(std::max(every, 1L)),
-            std::string("--report"), at("visualizer.json")}) {
+            std::string("--report"), (results_ / "visualizer.json").string()}) {
         words.push_back(word);
       }
     }
@@ -117,12 +155,27 @@ class Demo {
   }
 
   void start_hand() {
-    emulator_ =
-        networks_.start(Side::near,
-                        {program_beside("emulator"), "--personality", "omni", "--front", "socket",
-                         "--socket", at("device"), "--hand", value_in(told_, "hand_script"),
-                         "--unit-mm", value_in(told_, "hand_unit_mm")},
-                        at("emulator.log"));
+    std::string hand = options_.hand.empty() ? value_in(told_, "hand_script") : options_.hand;
+    if (hand.empty()) hand = find_data_file("scenes/hands/cut_cavity.toml");
+    std::vector<std::string> words{program_beside("emulator"),
+                                   "--personality",
+                                   options_.device,
+                                   "--front",
+                                   "socket",
+                                   "--socket",
+                                   at("device"),
+                                   "--hand",
+                                   hand,
+                                   "--unit-mm",
+                                   value_in(told_, "hand_unit_mm"),
+                                   "--report",
+                                   results_ / "emulator.json"};
+    constexpr int kBusCyclesHz = 8000, kUsualHz = 2000;  // as often as it looks for the host
+    if (rate_hz() > kUsualHz) {
+      words.emplace_back("--packet-cycles");
+      words.push_back(std::to_string(static_cast<int>(kBusCyclesHz / rate_hz())));
+    }
+    emulator_ = networks_.start(Side::near, words, at("emulator.log"));
   }
 
   /// The controller's exit code; 1 if a part of the demo ended before its time, which is reported.
@@ -132,8 +185,10 @@ class Demo {
            {std::pair<const char*, Child*>{"kerf-bridge serve", &pair_->serve()},
             {"kerf-bridge join", join_.get()},
             {"kerf-visualizer", visualizer_.get()},
+            {"kerf-recorder", recorder_.get()},
             {"kerf-emulator", emulator_.get()}}) {
-        if (broken_.empty() && part->ended().value_or(0) != 0) broken_ = end_of(name, *part);
+        if (part == nullptr || !broken_.empty()) continue;
+        if (part->ended().value_or(0) != 0) broken_ = end_of(name, *part);
       }
       if (!broken_.empty()) controller_->signal(SIGTERM);
       pause(std::chrono::milliseconds(20));
@@ -145,6 +200,8 @@ class Demo {
     wait_for(*visualizer_, seconds(20), [] { return false; });
     join_->signal(SIGTERM);
     wait_for(*join_, seconds(5), [] { return false; });
+    wait_for(*emulator_, seconds(5), [] { return false; });
+    if (recorder_) wait_for(*recorder_, seconds(10), [] { return false; });
     return code;
   }
 
@@ -157,7 +214,7 @@ class Demo {
     }
     if (visualizer_->ended() != 0) out << visualizer_->last_line() << '\n';
     if (window_) return;
-    const std::string text = text_in(at("visualizer.json"));
+    const std::string text = text_in(results_ / "visualizer.json");
     if (text.empty()) return;
     const Json report = Json::parse(text);
     const double wall_ms = report.at("wall_ms").at("p50").get<double>();
@@ -171,6 +228,10 @@ class Demo {
 
  private:
   [[nodiscard]] std::string at(const char* name) const { return folder_ / name; }
+  [[nodiscard]] double rate_hz() const {
+    const double told_hz = std::strtod(value_in(told_, "rate_hz").c_str(), nullptr);
+    return told_hz > 0 ? told_hz : 1000;
+  }
   static std::string end_of(const char* name, Child& part) {
     const int code = part.ended().value_or(0);
     const std::string how = code > 128 ? " ended by signal " + std::to_string(code - 128)
@@ -179,19 +240,20 @@ class Demo {
     return name + how + (code > 128 || last.empty() ? "" : ": " + last);
   }
 
-  std::filesystem::path folder_;
+  std::filesystem::path folder_, results_;
+  const DemoOptions& options_;
   TwoNetworks networks_;
   BridgeFiles files_;
   std::string told_;
   bool window_ = false;
   std::string broken_;  ///< the part that ended before its time, and how; empty if none
   std::unique_ptr<BridgePair> pair_;
-  std::unique_ptr<Child> controller_, join_, visualizer_, emulator_;
+  std::unique_ptr<Child> controller_, recorder_, join_, visualizer_, emulator_;
 };
 
-/// `kerf-lab two-machines`, which `./kerf demo --two-machines` is: controller, emulated device and
-/// `kerf-bridge serve` on one machine, `join` and the visualizer on another, both of them network
-/// namespaces of this one.
+/// `kerf-lab two-machines`, which `./kerf demo --two-machines` runs: controller, emulated device
+/// and `kerf-bridge serve` on one machine, `join` and the visualizer on another, both of them
+/// network namespaces of this one.
 class DemoCommand final : public LabCommand {
  public:
   explicit DemoCommand(Arguments& program);
@@ -200,19 +262,19 @@ class DemoCommand final : public LabCommand {
   [[nodiscard]] int run(std::ostream& out) const override;
 
  private:
-  std::string scene_;
-  double seconds_ = 10;
+  DemoOptions demo_;
   double loss_percent_ = 0, delay_ms_ = 0, mbit_ = 0;
-  std::string size_;
-  std::string out_;
 };
 
 DemoCommand::DemoCommand(Arguments& program)
-    : LabCommand(program, "two-machines", "a demo whose picture is on a second machine"),
-      scene_("scenes/phantom.toml"),
-      size_("640x480") {
-  app_.option("--scene", scene_, "what is touched").shows_default();
-  app_.option("--seconds", seconds_, "that the hand works").within(1, 100'000).shows_default();
+    : LabCommand(program, "two-machines", "a demo whose picture is on a second machine") {
+  app_.option("--scene", demo_.scene, "what is touched").shows_default();
+  app_.option("--device", demo_.device, "that is emulated")
+      .one_of({"omni", "falcon", "woodenhaptics"})
+      .shows_default();
+  app_.option("--hand", demo_.hand, "the script of the hand, in place of the scene's")
+      .shown_as("FILE");
+  app_.option("--seconds", demo_.seconds, "that the hand works").within(1, 100'000).shows_default();
   app_.option("--loss", loss_percent_, "of packets on the link, in %")
       .within(0, 50)
       .shows_default();
@@ -220,8 +282,16 @@ DemoCommand::DemoCommand(Arguments& program)
   app_.option("--mbit", mbit_, "rate of the link, Mbit/s; 0: no bound")
       .within(0, 100'000)
       .shows_default();
-  app_.option("--size", size_, "of the pictures").shown_as("WxH [640x480]");
-  app_.option("--out", out_, "keep the pictures in this folder").shown_as("DIR");
+  app_.option("--size", demo_.size, "of the pictures").shown_as("WxH [640x480]");
+  app_.option("--out", demo_.out, "keep pictures, report, log and final volume in this folder")
+      .shown_as("DIR");
+  app_.flag("--headless", demo_.headless, "no window, though there is a display");
+  app_.option("--controller-word", demo_.controller_words, "one more word for kerf-controller")
+      .one_each()
+      .shown_as("WORD");
+  app_.option("--visualizer-word", demo_.visualizer_words, "one more word for kerf-visualizer")
+      .one_each()
+      .shown_as("WORD");
   app_.footer(
       "Exit codes: 0 fine, 1 a check failed, 2 bad input or set-up, 77 this machine forbids "
       "network\n"
@@ -238,10 +308,10 @@ int DemoCommand::run(std::ostream& out) const {
   }
   catch_stop_signals();
   const WorkFolder folder;
-  const std::string pictures = out_.empty() ? (folder.path() / "pictures").string() : out_;
-  Demo demo({.loss = loss_percent_ / 100, .delay_ms = delay_ms_, .mbit = mbit_}, folder.path());
-  demo.start_controller(find_data_file(scene_), seconds_);
-  demo.start_picture(size_, pictures, seconds_);
+  Demo demo({.loss = loss_percent_ / 100, .delay_ms = delay_ms_, .mbit = mbit_}, folder.path(),
+            demo_);
+  demo.start_controller();
+  demo.start_picture();
   demo.start_hand();
   const int code = demo.wait_for_end();
   demo.tell(out);
