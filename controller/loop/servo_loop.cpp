@@ -68,6 +68,7 @@ class RunStatistics {
     }
     ++record_.ticks;
     record_.stale_ticks += output.stale ? 1 : 0;
+    stale_in_a_row_ = output.stale ? stale_in_a_row_ + 1 : 0;
     record_.contact_ticks += output.contact ? 1 : 0;
     record_.shaft_ticks += output.shaft ? 1 : 0;
     const double force_n = vec3::length(output.force_n);
@@ -90,6 +91,9 @@ class RunStatistics {
     record_.publish.record(spent.publish_ns);
   }
 
+  /// The device has gone: ticks without a report since then are no losses on the way.
+  void forget_last_stale() noexcept { record_.stale_ticks -= stale_in_a_row_; }
+
   void start() noexcept {
     overruns_ = clock_.overruns();
     faults_ = thread_faults();
@@ -110,6 +114,7 @@ class RunStatistics {
   bool last_refused_ = false;
   bool last_reset_ = false;
   bool last_undo_ = false;
+  std::uint64_t stale_in_a_row_ = 0;
   std::uint64_t overruns_ = 0;
   std::uint64_t allocations_ = 0;
   ThreadFaults faults_;
@@ -162,6 +167,7 @@ EndReason run_servo(TickSource& clock, DeviceDriver& device, Servo& servo, Publi
     }
     if (silent_ticks >= limits.gone_ticks) {
       record.add_fault(tick, "device_gone");
+      books.forget_last_stale();
       end = EndReason::device_gone;
       break;
     }

@@ -40,6 +40,7 @@ TEST_CASE("kill -9 of the emulator: fault in the report, exit 1 after 2000 ticks
   };
   CHECK(met("stale_input"));
   CHECK(met("device_gone"));
+  CHECK(report["stale_ticks"] < 2000);  // without the silence after its end
 
   // The segment outlives the controller: in it, from 20 silent ticks on there is no force.
   const kerf::SegmentReader& reader = connection.reader();

@@ -22,7 +22,7 @@ REPORTS = [
         ("ticks", "", "servo steps since the device was taken in hand; the counts below are of these"),
         ("armed_at_tick", "", "tick of the segment and of the log that was the first of them"),
         ("overruns", "", "deadlines that were skipped because a tick ran over"),
-        ("stale_ticks", "", "ticks that had no new report of the device"),
+        ("stale_ticks", "", "ticks that had no new report of the device, before it had gone"),
         ("wake_us, compute_us, publish_us", "us", f"how late ticks began; computed; published: {SPREAD}"),
         ("allocations", "", "of the heap in the loop"),
         ("allocations_counted", "", "false: a build with sanitizers does not count them"),
