@@ -9,7 +9,7 @@ import socket
 BUSES = {"omni": ("fw", "fw1"), "falcon": ("usb", "usb"), "woodenhaptics": ("hid", "hidraw0")}  # word of --port, its node
 FLAGS = ("--headless", "--serve", "--stereo", "--voxel-tool", "--mute", "--colour-blind", "--virtual", "--two-machines")
 OF_SCENE = ("--scene", "--volume", "--spacing", "--override-spacing", "--window", "--set")
-OF_LINK = {"--loss": 50, "--delay-ms": 2000, "--mbit": 100000}  # between two machines, and the most of each
+OF_LINK = {"--loss": (50, 1), "--delay-ms": (2000, 20), "--mbit": (100000, 4)}  # of two machines: the most of each, a bad one
 WITH_VALUE = (*OF_SCENE, *OF_LINK, "--hand", "--seconds", "--rate", "--out", "--size", "--renderer", "--gradient", "--panel-scale",
               "--device", "--port", "--sheet", "--transfer", "--record", "--listen", "--name")
 
@@ -101,8 +101,9 @@ def check_link(options):
     for name, value in zip(options.link[::2], options.link[1::2]):
         if not options.two_machines:
             raise Refusal(f"{name} {value}: of a link between two machines; give --two-machines too")
-        if not re.fullmatch(r"[0-9]{1,6}(\.[0-9]+)?", value) or float(value) > OF_LINK[name]:
-            raise Refusal(f"{name} {value}: not a number from 0 to {OF_LINK[name]}")
+        most, usual = OF_LINK[name]
+        if not re.fullmatch(r"[0-9]{1,6}(\.[0-9]+)?", value) or float(value) > most:
+            raise Refusal(f"{name} {value}: not a number from 0 to {most}; take {usual}")
     if not options.two_machines:
         return
     for given, word, why in ((options.virtual, "--virtual", "a link has a clock"),

@@ -274,7 +274,7 @@ DemoCommand::DemoCommand(Arguments& program)
       .shows_default();
   app_.option("--hand", demo_.hand, "the script of the hand, in place of the scene's")
       .shown_as("FILE");
-  app_.option("--seconds", demo_.seconds, "that the hand works").within(1, 100'000).shows_default();
+  app_.option("--seconds", demo_.seconds, "that the hand works").within(0.001, 1e6).shows_default();
   app_.option("--loss", loss_percent_, "of packets on the link, in %")
       .within(0, 50)
       .shows_default();

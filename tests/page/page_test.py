@@ -134,8 +134,13 @@ def tells_faults_and_ends(case):
     address = case.address.split('/')[2]
     rig.end('bridge')
     case.check(page.until('document.body.dataset.state === "trouble"'), 'a bridge that has gone is told')
+    case.check(page.until(text_of('#banner') + ".startsWith('No news')"), 'over the picture, too')
+    page.evaluate("""window.both = 0; new MutationObserver(() => window.both += document.body.dataset.state === 'live' &&
+      !document.getElementById('banner').hidden && document.getElementById('banner').textContent.startsWith('No news'))
+      .observe(document.body, {attributeFilter: ['data-state']})""")
     rig.start_bridge(address, *case.bridge)
     case.check(page.until('document.body.dataset.state === "live"'), 'and joined again')
+    case.check(page.evaluate('window.both') == 0, 'and never both')
 
 
 def is_small_and_breaks_no_rule(case):
