@@ -300,6 +300,7 @@ expect 'two machines, anywhere among the options' kerf_gives 0 demo --seconds 2 
   --renderer blend --rate 500 --hand h.toml --device falcon --out "$lab/out"
 expect 'with the options of a demo' called '^lab two-machines --scene .*/scenes/phantom.toml --device falcon --hand h.toml --seconds 2 --size 640x480 --loss 1 --headless --controller-word=--set --controller-word=a.b=1 --controller-word=--rate --controller-word=500 --visualizer-word=--renderer --visualizer-word=blend --out '
 expect 'and the same results' says '^kept in .*report.json, 1 frame'
+expect 'nothing survives them' nothing_survives
 expect 'a machine that forbids them says so by its exit code' with FAIL_lab=77 kerf_gives 77 demo --two-machines
 for wrong in --virtual --serve '--port fw' '--hand mouse' '--loss 51' '--loss nan' '--delay-ms 2001'; do
   # shellcheck disable=SC2086  # two words
@@ -308,7 +309,6 @@ for wrong in --virtual --serve '--port fw' '--hand mouse' '--loss 51' '--loss na
 done
 expect 'a link needs two ends' kerf_gives 2 demo --mbit 4
 expect 'in its words' says 'give --two-machines too'
-expect 'nothing survives them' nothing_survives
 expect 'a fast servo' with RATE_HZ=8000 kerf_gives 0 demo --seconds 1
 expect 'is answered in every cycle of the bus' called '^emulator.*--packet-cycles 1 '
 expect 'its rate' kerf_gives 0 demo --seconds 1 --rate 4000
