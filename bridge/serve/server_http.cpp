@@ -32,7 +32,7 @@ struct HttpReply {
   std::string cookie;  ///< value of Set-Cookie; empty: none
   bool keep_alive = true;
   bool head_only = false;  ///< the request was a HEAD
-  std::string location;    ///< of a redirection; empty: none
+  std::string location{};  ///< of a redirection; empty: none
 };
 
 std::string_view reason(int status) noexcept {
