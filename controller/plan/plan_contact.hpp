@@ -108,7 +108,7 @@ void plan_contact(const LoadedScene& scene, ServoPlan<N>& plan) {
     const SceneVolume& volume = scene.volumes[plan.volumes[v].scene_index];
     const auto middle = contact_parts::middle_mm(volume);
     for (std::size_t i = 0; i < 3; ++i) {
-      if (std::abs(middle[i] - first[i]) < kContactLimit / 2 * unit_mm) continue;
+      if (std::abs(middle[i] - first[i]) < kContactLimit * 0.5 * unit_mm) continue;
       throw LoadError(scene.path + ": volume " + volume.name +
                       " lies more than 4096 of the finest voxels from the first; bring them "
                       "together or set force.model = \"paper\"");

@@ -73,7 +73,7 @@ template <class N>
 template <class N>
 [[nodiscard]] constexpr Rotation<N> widest_rotation() {
   using U = typename N::Unit;
-  constexpr double a = std::numbers::sqrt2 / 2, b = std::numbers::inv_sqrt3, c = a * b;
+  const double a = std::numbers::sqrt2 / 2, b = std::numbers::inv_sqrt3, c = a * b;
   return {{{{U(a), U(b), U(c)}, {U(-a), U(b), U(c)}, {U(0), U(b), U(-2 * c)}}}};
 }
 

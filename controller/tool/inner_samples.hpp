@@ -22,7 +22,8 @@ class SampleLattice {
   SampleLattice(std::int32_t across, std::int32_t along)
       : across_(across),
         along_(along),
-        kept_(static_cast<std::size_t>(across * across * along)),
+        kept_(static_cast<std::size_t>(across) * static_cast<std::size_t>(across) *
+              static_cast<std::size_t>(along)),
         added_(kept_.size()) {}
 
   /// Keeps the sample at an index along each axis, 0 up to one before the side's length.
@@ -49,7 +50,9 @@ class SampleLattice {
     return kept_[index(x, y, z)] || added_[index(x, y, z)];
   }
   [[nodiscard]] std::size_t index(std::int32_t x, std::int32_t y, std::int32_t z) const {
-    return static_cast<std::size_t>((y * across_ + z) * across_ + x);
+    const auto across = static_cast<std::size_t>(across_);
+    return (static_cast<std::size_t>(y) * across + static_cast<std::size_t>(z)) * across +
+           static_cast<std::size_t>(x);
   }
 
   std::int32_t across_, along_;
