@@ -101,6 +101,9 @@ constexpr LogCode kFlags[] = {
     {kFlagUndo, "undo",
      "the last stroke is undone: no force, and nothing is cut; `removed` is given back"},
     {kFlagUndoable, "undoable", "the last stroke can be undone"},
+    {kFlagRedo, "redo", "a stroke that was undone is cut again: no force; `removed` is it"},
+    {kFlagRedoable, "redoable", "it can be"},
+    {kFlagPedal, "pedal", "the tool cuts only while button 1 is pressed"},
 };
 constexpr LogCode kPhases[] = {
     {0, "off", "no report has come yet"},

@@ -220,6 +220,9 @@ void apply_overrides(const SceneOverrides& overrides, Scene& scene) {
     scene.device.torque_scale.reset();  // of another device's motors
   }
   if (overrides.torque_scale) scene.device.torque_scale = overrides.torque_scale;
+  if (scene.cut.pedal == CutPedal::automatic && overrides.pedal) {
+    scene.cut.pedal = CutPedal::button;
+  }
   if (scene.cut_in_one_tick) scene.cut.rate_per_s = scene.servo.rate_hz;
 }
 

@@ -43,11 +43,15 @@ std::uint32_t flags_of(const DeviceReport& report, const ServoOutput& output) no
   set(output.resetting, kFlagReset);
   set(output.undoing, kFlagUndo);
   set(output.undoable, kFlagUndoable);
+  set(output.redoing, kFlagRedo);
+  set(output.redoable, kFlagRedoable);
+  set(output.pedalled, kFlagPedal);
   return flags;
 }
 
 DirtyCause cause_of(const ServoOutput& output) noexcept {
   if (output.resetting) return DirtyCause::reset;
+  if (output.redoing) return DirtyCause::redo;
   return output.undoing ? DirtyCause::undo : DirtyCause::milling;
 }
 

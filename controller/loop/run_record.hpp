@@ -51,6 +51,7 @@ struct RunRecord {
   std::array<std::uint64_t, kMostForbidden> forbidden_ticks{};  ///< by material, since then too
   std::uint64_t resets = 0;    ///< of the volumes; before arming too
   std::uint64_t undos = 0;     ///< of the last stroke each
+  std::uint64_t redos = 0;     ///< likewise
   double absorbed_mj = 0;      ///< at the device port, + is taken from the hand
   double port_minimum_mj = 0;  ///< lowest value of it: below 0 the loop gave more than it took
   std::array<double, kEnergySources> energy_mj{};  ///< it by source

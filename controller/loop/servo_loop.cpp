@@ -23,6 +23,8 @@ ServoCommand servo_command(const Command& command) noexcept {
       return {ServoCommand::Kind::reset, 0};
     case CommandKind::undo:
       return {ServoCommand::Kind::undo, 0};
+    case CommandKind::redo:
+      return {ServoCommand::Kind::redo, 0};
   }
   return {};
 }
@@ -58,6 +60,11 @@ class RunStatistics {
       record_.add_event(tick, "undo");
     }
     last_undo_ = output.undoing;
+    if (output.redoing && !last_redo_) {
+      ++record_.redos;
+      record_.add_event(tick, "redo");
+    }
+    last_redo_ = output.redoing;
     for (std::size_t v = 0; v < kMaxVolumes; ++v) {
       record_.removed_steps[v] -= output.returned_by_volume[v];
     }
@@ -115,6 +122,7 @@ class RunStatistics {
   bool last_reset_ = false;
   bool last_undo_ = false;
   std::uint64_t stale_in_a_row_ = 0;
+  bool last_redo_ = false;
   std::uint64_t overruns_ = 0;
   std::uint64_t allocations_ = 0;
   ThreadFaults faults_;

@@ -23,11 +23,13 @@
 namespace kerf {
 namespace {
 
-/// Ticks in a quarter of a second: a bur that the hand's tremor lifts is back within a period of
-/// it, an eighth of a second at 8 Hz; to lift it on purpose and set it down elsewhere takes longer.
-std::uint32_t stroke_pause_ticks(std::int32_t rate_hz) {
-  constexpr int kPerS = 4;
-  return static_cast<std::uint32_t>(std::max(1, rate_hz / kPerS));
+/// Ticks of the pause that ends a stroke. A quarter of a second without contact: a bur that the
+/// hand's tremor lifts is back within a period of it, an eighth of a second at 8 Hz; to lift it on
+/// purpose and set it down elsewhere takes longer. With a pedal, 1/32 s: contacts of a switch
+/// bounce for at most 20 ms, and no finger presses again so soon.
+std::uint32_t stroke_pause_ticks(std::int32_t rate_hz, bool pedalled) {
+  const int per_s = pedalled ? 32 : 4;
+  return static_cast<std::uint32_t>(std::max(1, rate_hz / per_s));
 }
 
 template <class N>
@@ -44,7 +46,8 @@ class CompiledSceneOf final : public CompiledScene {
         scene.cut.model == CutModel::overlap || scene.cut.model == CutModel::overlap_exact;
     plan_.removal_rate = removal_rate<N>(scene.cut.rate_per_s / scene.servo.rate_hz,
                                          scene.cut.model == CutModel::overlap_exact);
-    plan_.stroke_pause_ticks = stroke_pause_ticks(scene.servo.rate_hz);
+    plan_.pedalled = scene.cut.pedal == CutPedal::button;
+    plan_.stroke_pause_ticks = stroke_pause_ticks(scene.servo.rate_hz, plan_.pedalled);
     plan_volumes(scene, plan_);
     plan_contact(scene, plan_);
     plan_.force_cut = plan_force_cut(scene, plan_);

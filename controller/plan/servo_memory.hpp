@@ -355,7 +355,7 @@ class ServoMemory {
     if (cuts_) {
       std::size_t stamps = 0;
       for (const auto& [name, grid] : solids_) stamps += BrickGrid::of(grid).count();
-      add("bricks of the last stroke", pool_size() * sizeof(KeptBrick), false);
+      add("bricks of the last strokes", pool_size() * sizeof(KeptBrick), false);
       add("whether they are kept", stamps * sizeof(std::uint32_t), false);
     }
     for (const auto& [name, samples] : samples_) {
@@ -370,13 +370,13 @@ class ServoMemory {
   }
 
  private:
-  /// Entries for the bricks of a stroke, and for those that may be cut next: 16 MiB hold 8 cm^3 of
-  /// voxels of 0.1 mm, several teeth; small volumes fit whole.
+  /// Entries for the bricks of the strokes that can be undone, and for those that may be cut next:
+  /// 16 MiB hold 8 cm^3 of voxels of 0.1 mm, several teeth; small volumes fit whole into each.
   [[nodiscard]] std::size_t pool_size() const {
     constexpr std::size_t kMost = (std::size_t{16} << 20) / sizeof(KeptBrick);
     std::size_t bricks = 0;
     for (const auto& [name, grid] : solids_) bricks += BrickGrid::of(grid).count();
-    return std::min(2 * bricks, kMost);
+    return std::min((kUndoLevels + 2) * bricks, kMost);
   }
 
   struct VolumeBytes {
@@ -393,7 +393,7 @@ class ServoMemory {
   std::array<std::vector<RemovalCarry<N>>, kMaxVolumes> carries_;
   std::array<std::vector<Density>, kMaxVolumes> firsts_;  ///< if the scene cuts, as the next
   std::array<std::vector<std::uint64_t>, kMaxVolumes> cut_blocks_;
-  std::vector<KeptBrick> pool_;  ///< of the last stroke, as the next
+  std::vector<KeptBrick> pool_;  ///< of the last strokes, as the next
   std::array<std::vector<std::uint32_t>, kMaxVolumes> kept_in_;
   std::vector<typename N::Weight> overlap_;
   std::vector<GradientScratch> refresh_;

@@ -97,6 +97,9 @@ void declare_scene_options(Arguments& app, ControllerOptions& options, Raw& raw)
       .within(0.01, kLongestS)
       .shown_as("S")
       .shows_default();
+  app.flag("--pedal", options.overrides.pedal,
+           "the tool cuts only while the device's first button is pressed, unless the scene's "
+           "cut.pedal is \"always\": for a hand that a window leads");
   app.option("--rate", raw.rate_hz, "servo rate, instead of the scene's")
       .within(250, 8000)
       .shown_as("HZ");

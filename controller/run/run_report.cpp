@@ -140,6 +140,7 @@ std::string report_json(const RunReport& report) {
       {"forbidden_ms", forbidden_of(report.materials)},
       {"resets", r.resets},
       {"undos", r.undos},
+      {"redos", r.redos},
       {"energy_j", r.absorbed_mj / 1000.0},
       {"port_minimum_j", r.port_minimum_mj / 1000.0},
       {"energy_by_source_j", by_source(r)},

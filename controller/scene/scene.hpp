@@ -108,6 +108,12 @@ enum class ForceModel : std::uint8_t {
 };
 /// How material leaves (docs/cutting.md).
 enum class CutModel : std::uint8_t { none, overlap, overlap_exact, preston };
+/// When the tool cuts.
+enum class CutPedal : std::uint8_t {
+  automatic,  ///< `button` with `--pedal`, else `always`
+  always,
+  button  ///< while the device's first button is pressed
+};
 
 /// The filter against a volume's noise: a word, or how many passes of it.
 enum class Denoise : std::int8_t { automatic = -1, off = 0 };
@@ -143,6 +149,7 @@ struct ForceSettings {
 /// [cut]
 struct CutSettings {
   CutModel model = CutModel::preston;
+  CutPedal pedal = CutPedal::automatic;
   double rate_per_s = 20.0;  ///< k; 1/T is the paper's own step
   double p1_n_per_mm2 = 0.06;
   // If the model is preston:
@@ -237,6 +244,7 @@ struct Scene : SceneSettings {
 inline constexpr std::array<std::string_view, 2> kForceModelWords = {"paper", "proxy"};
 inline constexpr std::array<std::string_view, 4> kCutModelWords = {"none", "overlap",
                                                                    "overlap_exact", "preston"};
+inline constexpr std::array<std::string_view, 3> kCutPedalWords = {"auto", "always", "button"};
 inline constexpr std::array<std::string_view, 2> kNumericWords = {"fixed", "double"};
 inline constexpr std::array<std::string_view, 3> kGradientWords = {"central", "sobel5", "farid"};
 
@@ -245,6 +253,9 @@ inline constexpr std::array<std::string_view, 3> kGradientWords = {"central", "s
 }
 [[nodiscard]] constexpr std::string_view word_of(CutModel model) {
   return kCutModelWords.at(static_cast<std::size_t>(model));
+}
+[[nodiscard]] constexpr std::string_view word_of(CutPedal pedal) {
+  return kCutPedalWords.at(static_cast<std::size_t>(pedal));
 }
 [[nodiscard]] constexpr std::string_view word_of(NumericKind numeric) {
   return kNumericWords.at(static_cast<std::size_t>(numeric));

@@ -136,7 +136,7 @@ ContactResult<N> contact_and_cut(const ServoPlan<N>& plan, ServoState<N>& state,
   for (std::size_t v = 0; v < plan.volume_count; ++v) {
     const VolumeTick<N> at{plan, state, v,
                            tool_pose(plan.volumes[v], tool, tool.in_volume[v], tip_mm, rotation)};
-    if (plan.cutting) keep_bricks(plan, state, v, at.pose.centre_vox);
+    if (at.cuts()) keep_bricks(plan, state, v, at.pose.centre_vox);
     const VolumeForces<N> in_volume =
         by_method<N>(tool.in_volume[v].method, [&](auto step) { return step.contact_and_cut(at); });
     out.contact_n = out.contact_n - in_volume.contact_n;

@@ -190,8 +190,8 @@ CuttingFriction<N> press_on_volumes(const ServoPlan<N>& plan, ServoState<N>& sta
   const ToolPlan<N>& tool = plan.tools[state.active_tool];
   const auto normal = transposed(spindle_axes(tool, state, at)) * at.normal;
   CuttingFriction<N> friction;
-  const auto drive =
-      cut_drive<N>(cut.normal_force_n, rules.threshold_n, state.force_cut.spindle.ratio);
+  const auto ratio = state.pedal_down ? state.force_cut.spindle.ratio : typename N::Unit{};
+  const auto drive = cut_drive<N>(cut.normal_force_n, rules.threshold_n, ratio);
   bool starves = drive > 0 && !meets_press(plan, state, covered);
   for (std::size_t v = 0; v < plan.volume_count; ++v) {
     if (covered.in[v].list.empty() || !(covered.whole > 0)) continue;
@@ -251,7 +251,7 @@ ForceCut<N> cut_by_sent_force(const ServoPlan<N>& plan, ServoState<N>& state,
       std::max(Real(0), multiply<Real>(at.head_fraction, along_n) / plan.workspace_scale);
   CuttingFriction<N> friction;
   if (cut.normal_force_n > Real(0)) friction = press_on_volumes(plan, state, at, cut);
-  const bool turns = rules.spindle.free_ratio > typename N::Unit{};
+  const bool turns = rules.spindle.free_ratio > typename N::Unit{} && state.pedal_down;
   if (!turns) friction = {};
   turn_spindle(rules.spindle, runs, friction.torque_n_mm(plan.tools[state.active_tool].rim_mm),
                memory.spindle);

@@ -37,8 +37,8 @@ template <class N>
 /// One tick of the spindle, and of what it cuts where the tool touches. `sent_n` is the force that
 /// the hand feels; the head's share of its normal part, over the workspace scale, presses in the
 /// scene, by F_device = s F_scene. Friction is left out of it: it is made of that force and would
-/// feed on itself. The spindle is switched on while `runs`; where it stands nothing is cut and
-/// nothing rubs.
+/// feed on itself. The spindle is switched on while `runs`; where it stands, or the pedal is up,
+/// nothing is cut and nothing rubs.
 ///
 /// The force of this tick decides about this cut; the cut's friction is felt from the next tick on.
 /// Servo thread; no heap. Work: the tool's box in each volume, and the voxels in it.

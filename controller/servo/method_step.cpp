@@ -56,7 +56,7 @@ VolumeForces<N> AlignedStep<N>::contact_and_cut(const VolumeTick<N>& at) noexcep
   if (!at.plan.contact.swept) {
     forces.contact_n = force_of_sum<N>(at.in_volume().contact, tick.contact());
   }
-  if (!at.plan.cutting) return forces;
+  if (!at.cuts()) return forces;
   const AlignedTick::Milled milled = tick.mill(at.plan.removal_rate, at.memory().carry);
   forces.modification_n = force_of_sum<N>(at.in_volume().modification, milled.modification);
   forces.removed = milled.removed;
@@ -87,7 +87,7 @@ VolumeForces<N> GatherStep<N>::contact_and_cut(const VolumeTick<N>& at) noexcept
       forces.contact_n = force_of_sum<N>(
           in_volume.contact, contact_sum<N>(at.grid(), gradient, at.tool().offsets, at.pose));
     }
-    if (at.plan.cutting) cut(at, gradient, forces);
+    if (at.cuts()) cut(at, gradient, forces);
   }
   return forces;
 }
@@ -116,6 +116,7 @@ VolumeForces<N> SplatStep<N>::contact_and_cut(const VolumeTick<N>& at) noexcept 
   if (!at.plan.contact.swept) {
     forces.contact_n = force_of_sum<N>(in_volume.contact, felt.contact);
   }
+  if (!at.cuts()) return forces;
   forces.modification_n = force_of_sum<N>(in_volume.modification, felt.modification);
   forces.removed = tick.cut(at.plan.removal_rate, at.memory().carry);
   return forces;

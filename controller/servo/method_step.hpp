@@ -26,6 +26,8 @@ struct VolumeTick {
   [[nodiscard]] const ToolInVolume<N>& in_volume() const noexcept { return tool().in_volume[v]; }
   [[nodiscard]] const VoxelGrid& grid() const noexcept { return plan.volumes[v].grid; }
   [[nodiscard]] VolumeState<N>& memory() const noexcept { return state.volumes[v]; }
+  /// By overlap, whatever the force; a pedal that is up prevents it.
+  [[nodiscard]] bool cuts() const noexcept { return plan.cutting && state.pedal_down; }
 };
 
 /// The forces of one volume at the device port, along the gradient: the hand gets the negative; and

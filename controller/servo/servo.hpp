@@ -41,7 +41,8 @@ struct ServoCommand {
     hold,
     fade_in,  ///< force starts again from 0: after a stall of the servo
     reset,    ///< the volumes' first content, over several ticks; at once if nothing is cut
-    undo      ///< the volumes before the last stroke, likewise; refused if there is none
+    undo,     ///< the volumes before the last stroke, likewise; refused if there is none
+    redo      ///< the stroke that was undone last again, likewise
   };
   Kind kind = Kind::none;
   std::uint32_t argument = 0;  ///< index of the tool; hold: 1 on, 0 off
@@ -121,6 +122,9 @@ struct ServoOutput {
   bool held = false;                      ///< by a command: no force and no cut
   bool undoing = false;                   ///< the last stroke is undone: likewise
   bool undoable = false;                  ///< it can be
+  bool redoing = false;                   ///< a stroke that was undone is cut again: likewise
+  bool redoable = false;                  ///< it can be
+  bool pedalled = false;                  ///< nothing is cut without button 1
   bool resetting = false;  ///< volumes go back to their first content: changes are no cuts
 
   std::array<std::int32_t, 3> joint_counts{};  ///< unwrapped since calibration

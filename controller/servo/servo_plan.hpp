@@ -255,7 +255,8 @@ struct ServoPlan {
   SafetyTiming timing;
   typename N::Real speed_limit_mm_per_tick{};
   std::int32_t rate_hz = 1000;
-  std::uint32_t stroke_pause_ticks = 250;  ///< without contact, and the stroke is over
+  bool pedalled = false;                   ///< nothing is cut without button 1
+  std::uint32_t stroke_pause_ticks = 250;  ///< without contact, or pedal; the stroke is over
 };
 
 }  // namespace kerf

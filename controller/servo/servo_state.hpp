@@ -75,21 +75,37 @@ struct KeptBrick {
   std::array<Density, kBrickVoxels> density{};  ///< of its voxels that exist, x fastest
 };
 
-/// The last stroke, and bricks that may belong to the next (volume_restore.hpp). `pool` is a ring;
-/// indices in it only grow: begin .. next is the last stroke, next .. end waits for one.
+inline constexpr std::size_t kUndoLevels = 20;
+
+/// The bricks of a stroke in the pool.
+struct Stroke {
+  std::uint64_t begin = 0, end = 0;
+};
+
+/// The last strokes, and bricks that may belong to the next (volume_restore.hpp). `pool` is a ring;
+/// indices in it only grow. An undo and a redo swap the bricks of a stroke with the volume's, so
+/// the entries of a stroke that is done are its past, those of an undone one its future.
 struct StrokeState {
+  enum class Motion : std::uint8_t { none, undo, redo };
+
   std::span<KeptBrick> pool;  ///< empty if nothing is cut
   std::array<std::span<std::uint32_t>, kMaxVolumes>
       kept_in;  ///< by brick: the generation that kept it
   std::uint32_t generation = 1;
-  std::uint64_t begin = 0, next = 0, end = 0;
-  bool open = false;       ///< it continues, and is begin .. end
-  bool lost = false;       ///< it is longer than the pool
-  bool next_lost = false;  ///< likewise, if one begins in this tick
-  bool undoing = false;
-  std::uint32_t quiet_ticks = 0;  ///< since the last contact
+  std::array<Stroke, kUndoLevels> strokes{};  ///< oldest first: `done`, then those undone, to `all`
+  std::size_t done = 0, all = 0;
+  std::uint64_t from = 0, end = 0;  ///< of the stroke that continues, or waiting for one
+  bool open = false;                ///< it continues
+  bool lost = false;                ///< it is longer than its room; or would be, if it begins now
+  std::uint32_t quiet_ticks = 0;    ///< since the last contact; or since the pedal is up
+  Motion motion = Motion::none;     ///< what runs now, of
+  Stroke moving{};                  ///< the rest of this stroke
+
   [[nodiscard]] constexpr bool can_undo() const noexcept {
-    return !lost && !undoing && (open ? end : next) != begin;
+    return motion == Motion::none && (open ? !lost : done > 0);
+  }
+  [[nodiscard]] constexpr bool can_redo() const noexcept {
+    return motion == Motion::none && done < all;
   }
 };
 
@@ -127,10 +143,13 @@ struct ServoState {
   EncoderState encoders;
   GimbalFilter gimbal;
   std::uint32_t active_tool = 0;
-  bool hold = false;  ///< by command: force 0, nothing is cut
-  ResetState reset;   ///< by command; a hold while it runs
+  bool pedal_down = true;  ///< in the last report; a plan without a pedal has it always
+  bool hold = false;       ///< by command: force 0, nothing is cut
+  ResetState reset;        ///< by command; a hold while it runs
   StrokeState stroke;
-  [[nodiscard]] constexpr bool undoes() const noexcept { return stroke.undoing; }
+  [[nodiscard]] constexpr bool undoes() const noexcept {
+    return stroke.motion != StrokeState::Motion::none;
+  }
   [[nodiscard]] constexpr bool held() const noexcept { return hold || reset.runs || undoes(); }
 
   JacobianTransposed<N> jacobian_t_mm;  ///< of the last good report

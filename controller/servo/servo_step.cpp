@@ -148,6 +148,7 @@ void write_output(const ServoPlan<N>& plan, ServoState<N>& state, const Sensed<N
   out.fault = state.supervisor.fault;
   out.started = state.supervisor.started;
   out.held = state.hold;
+  out.pedalled = plan.pedalled;
   out.contact = norm(state.force_n) > Real(kContactThresholdN);
   const ProxyState<N>& proxy = state.contact.proxy;
   out.refused = plan.contact.swept && !proxy.valid && proxy.search.refused();
@@ -318,13 +319,14 @@ void book(ServoState<N>& state, const ForceRequest<N>& wanted, bool motors_on) n
   state.ledger.send(parts);
 }
 
-/// Cuts by the force that was sent. The spindle runs while the motors hold the hand.
+/// Cuts by the force that was sent. The spindle runs while the motors hold the hand and the pedal,
+/// if there is one, is down; with the pedal up nothing is cut, though the spindle runs down.
 template <class N>
 void cut(const ServoPlan<N>& plan, ServoState<N>& state, const ContactResult<N>& contact,
          ServoOutput& out) noexcept {
   if (!plan.force_cut.on) return;
   out.spindle_ratio = as_double(state.force_cut.spindle.ratio);
-  const bool runs = state.supervisor.motors_on() && !state.held();
+  const bool runs = state.supervisor.motors_on() && !state.held() && state.pedal_down;
   const ForceCut<N> done = cut_by_sent_force(plan, state, contact, state.force_n, runs);
   out.press_n = as_double(done.normal_force_n);
   out.spindle_load = as_double(state.force_cut.spindle.load);
@@ -333,21 +335,24 @@ void cut(const ServoPlan<N>& plan, ServoState<N>& state, const ContactResult<N>&
   add_removed(done.removed, out);
 }
 
-/// Marks what was cut, or restores it while a reset or an undo runs: then nothing is cut.
+/// Marks what was cut, or restores it while a reset, an undo or a redo runs: then nothing is cut.
 template <class N>
 void follow_cuts(const ServoPlan<N>& plan, ServoState<N>& state, ServoOutput& out) noexcept {
   out.resetting = state.reset.runs;
   if (out.resetting) return restore_some(plan, state, out.changed);
-  out.undoing = state.undoes();
-  if (out.undoing) return undo_some(plan, state, out);
+  out.undoing = state.stroke.motion == StrokeState::Motion::undo;
+  out.redoing = state.stroke.motion == StrokeState::Motion::redo;
+  if (state.undoes()) return swap_some(plan, state, out);
   for (std::size_t v = 0; v < plan.volume_count; ++v) {
     const VolumePlan<N>& volume = plan.volumes[v];
     mark_cut(volume.grid, out.changed[volume.scene_index], state.volumes[v].cut_blocks);
   }
   if (state.stroke.pool.empty()) return;
   const bool touches = !(state.contact_n == DeviceVec<typename N::Real>{});
-  follow_stroke(plan.stroke_pause_ticks, out.removed_steps > 0, touches, state.stroke);
+  follow_stroke(plan.stroke_pause_ticks, out.removed_steps > 0,
+                plan.pedalled ? state.pedal_down : touches, state.stroke);
   out.undoable = state.stroke.can_undo();
+  out.redoable = state.stroke.can_redo();
 }
 
 }  // namespace
@@ -356,6 +361,7 @@ template <class N>
 ServoOutput servo_step(const ServoPlan<N>& plan, ServoState<N>& state,
                        const DeviceReport& report) noexcept {
   ServoOutput out;
+  if (report.fresh) state.pedal_down = !plan.pedalled || report.button1;
   const Sensed<N> sensed = sense(plan, state, report);
   ContactResult<N> contact;
   ForceRequest<N> wanted = wanted_force(plan, state, sensed, contact);
@@ -421,11 +427,12 @@ bool apply_command(const ServoPlan<N>& plan, ServoState<N>& state,
       return true;
     case ServoCommand::Kind::reset:
       state.reset.runs = plan.cutting || plan.force_cut.on;
-      state.stroke.undoing = false;  // its bricks are among those that were cut
-      forget_strokes(state.stroke);
+      forget_strokes(state.stroke);  // their bricks are among those that were cut
       return true;
     case ServoCommand::Kind::undo:
       return !state.reset.runs && begin_undo(state.stroke);
+    case ServoCommand::Kind::redo:
+      return !state.reset.runs && begin_redo(state.stroke);
   }
   return false;
 }

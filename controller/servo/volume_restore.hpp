@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <utility>
 
 #include "controller/kernel/gradient.hpp"
 #include "controller/kernel/sampling.hpp"
@@ -15,7 +16,7 @@
 #include "shared/numeric/vec.hpp"
 #include "shared/volume/brick_grid.hpp"
 
-// Restores volumes: reset to the first content, and undo of the last stroke, a few bricks a tick.
+// Restores volumes: reset to the first content, undo and redo of strokes, a few bricks a tick.
 // Servo thread; no heap.
 
 namespace kerf {
@@ -152,16 +153,52 @@ void restore_some(const ServoPlan<N>& plan, ServoState<N>& state,
 
 // Undo: every brick is saved before the first cut of the stroke in it. Each cut saves the bricks
 // that it may reach; a brick that was saved and then not cut belongs to the next stroke, since it
-// did not change.
+// did not change. A stroke that does not fit into its room cannot be undone, nor can older ones.
 
-/// Bricks of a pool that a stroke may take; the others are for the next cuts.
+/// Bricks of a pool that all strokes together may take; the others are for the next cuts.
 [[nodiscard]] constexpr std::size_t stroke_room(std::size_t pool) noexcept {
   return pool - pool / 4;
 }
 
+/// Drops the bricks that wait for the next stroke.
+inline void forget_waiting(StrokeState& stroke) noexcept {
+  stroke.end = stroke.from;
+  stroke.lost = false;
+  ++stroke.generation;
+}
+
+inline void forget_oldest(StrokeState& stroke) noexcept {
+  std::shift_left(stroke.strokes.begin(), stroke.strokes.end(), 1);
+  --stroke.all;
+  if (stroke.done > 0) --stroke.done;
+}
+
+/// Drops the oldest strokes until all that is in the pool leaves `room`, or none is left.
+inline void keep_within(std::size_t room, StrokeState& stroke) noexcept {
+  while (stroke.all > 0 && stroke.end - stroke.strokes[0].begin > room) forget_oldest(stroke);
+}
+
+/// Notes that a brick of the next cut finds no room: the stroke that continues is lost, with all
+/// before it, or the one that may begin in this tick.
+inline void lose_stroke(StrokeState& stroke) noexcept {
+  stroke.lost = true;
+  if (stroke.open) stroke.done = stroke.all = 0;
+}
+
+/// The next entry of the pool, for which the oldest strokes make room; null, and the stroke is
+/// lost, if it has no room of its own left.
+inline KeptBrick* entry_for_brick(StrokeState& stroke) noexcept {
+  const std::size_t pool = stroke.pool.size(), room = stroke_room(pool);
+  if (stroke.end - stroke.from >= (stroke.open ? room : pool - room)) {
+    lose_stroke(stroke);
+    return nullptr;
+  }
+  keep_within(pool - 1, stroke);
+  return &stroke.pool[stroke.end++ % pool];
+}
+
 /// Keeps the bricks around a tool at `centre_vox`, each once a stroke. Copies at most the bricks of
-/// the tool's box, of which the cut that follows weighs every voxel. If the pool is full, the
-/// stroke cannot be undone.
+/// the tool's box, of which the cut that follows weighs every voxel.
 template <class N>
 void keep_bricks(const ServoPlan<N>& plan, ServoState<N>& state, std::size_t v,
                  const VoxelVec<typename N::Real>& centre_vox) noexcept {
@@ -185,22 +222,18 @@ void keep_bricks(const ServoPlan<N>& plan, ServoState<N>& state, std::size_t v,
         const std::uint32_t id = bricks.id({x, y, z});
         std::uint32_t& kept_in = stroke.kept_in[v][id];
         if (kept_in == stroke.generation) continue;
-        const bool full = stroke.open ? stroke.end - stroke.begin >= stroke_room(stroke.pool.size())
-                                      : stroke.end - stroke.begin >= stroke.pool.size();
-        if (full) {
-          (stroke.open ? stroke.lost : stroke.next_lost) = true;
-          return;
-        }
-        KeptBrick& kept = stroke.pool[stroke.end++ % stroke.pool.size()];
+        KeptBrick* const kept = entry_for_brick(stroke);
+        if (kept == nullptr) return;
         kept_in = stroke.generation;
-        kept.volume = static_cast<std::uint32_t>(v);
-        kept.id = id;
+        kept->volume = static_cast<std::uint32_t>(v);
+        kept->id = id;
         const VoxelBox box = bricks.voxels(id);
         const auto row = static_cast<std::size_t>(box.hi.x - box.lo.x);
         std::size_t to = 0;
         for (std::int32_t k = box.lo.z; k < box.hi.z; ++k) {
           for (std::int32_t j = box.lo.y; j < box.hi.y; ++j, to += row) {
-            copy_row(&kept.density[to], &state.volumes[v].density[grid.index(box.lo.x, j, k)], row);
+            copy_row(&kept->density[to], &state.volumes[v].density[grid.index(box.lo.x, j, k)],
+                     row);
           }
         }
       }
@@ -208,43 +241,43 @@ void keep_bricks(const ServoPlan<N>& plan, ServoState<N>& state, std::size_t v,
   }
 }
 
-/// Ends the stroke: bricks that are saved from now on belong to the next one.
+/// Ends the stroke that continues: bricks that are saved from now on belong to the next one.
 inline void close_stroke(StrokeState& stroke) noexcept {
-  stroke.open = false;
-  stroke.next = stroke.end;
-  ++stroke.generation;
-}
-
-/// Drops the bricks that were saved for the next stroke.
-inline void forget_next(StrokeState& stroke) noexcept {
-  stroke.end = stroke.next;
-  stroke.next_lost = false;
+  if (!stroke.lost) {
+    if (stroke.done == kUndoLevels) forget_oldest(stroke);
+    stroke.strokes[stroke.done] = {stroke.from, stroke.end};
+    stroke.all = ++stroke.done;
+    keep_within(stroke_room(stroke.pool.size()), stroke);
+  }
+  stroke.from = stroke.end;
+  stroke.open = stroke.lost = false;
   ++stroke.generation;
 }
 
 /// Drops all bricks, before the volumes change by a reset.
 inline void forget_strokes(StrokeState& stroke) noexcept {
-  close_stroke(stroke);
-  stroke.begin = stroke.end;
-  stroke.lost = stroke.next_lost = false;
+  stroke.done = stroke.all = 0;
+  stroke.open = false;
+  stroke.motion = StrokeState::Motion::none;
+  stroke.from = stroke.end;
+  forget_waiting(stroke);
 }
 
-/// At the end of a tick without restoring: a cut begins or continues a stroke, and a pause without
-/// contact ends it.
-inline void follow_stroke(std::uint32_t pause_ticks, bool cuts, bool touches,
+/// At the end of a tick without restoring: a cut begins or continues a stroke and drops those that
+/// were undone; a pause in which the tool does not `hold_on`, by contact or by the pedal, ends it.
+inline void follow_stroke(std::uint32_t pause_ticks, bool cuts, bool holds_on,
                           StrokeState& stroke) noexcept {
   if (cuts && !stroke.open) {
     stroke.open = true;
-    stroke.begin = stroke.next;
-    stroke.lost = stroke.next_lost;
-    stroke.next_lost = false;
+    stroke.all = stroke.done;
+    if (stroke.lost) lose_stroke(stroke);
     stroke.quiet_ticks = 0;
   }
   if (!stroke.open) {
-    if (stroke.next_lost) forget_next(stroke);
+    if (stroke.lost) forget_waiting(stroke);
     return;
   }
-  stroke.quiet_ticks = cuts || touches ? 0 : stroke.quiet_ticks + 1;
+  stroke.quiet_ticks = cuts || holds_on ? 0 : stroke.quiet_ticks + 1;
   if (stroke.quiet_ticks >= pause_ticks) close_stroke(stroke);
 }
 
@@ -255,16 +288,27 @@ inline bool begin_undo(StrokeState& stroke) noexcept {
   if (stroke.open) {
     close_stroke(stroke);
   } else {
-    forget_next(stroke);
+    forget_waiting(stroke);
   }
-  stroke.undoing = true;
+  stroke.moving = stroke.strokes[--stroke.done];
+  stroke.motion = StrokeState::Motion::undo;
   return true;
 }
 
-/// Puts one brick back. Returns its box; adds what came back to `returned`.
+/// Starts to cut the stroke again that was undone last. Returns false if there is none.
+inline bool begin_redo(StrokeState& stroke) noexcept {
+  if (!stroke.can_redo()) return false;
+  forget_waiting(stroke);
+  stroke.moving = stroke.strokes[stroke.done++];
+  stroke.motion = StrokeState::Motion::redo;
+  return true;
+}
+
+/// Swaps one brick with the volume's. Returns its box; adds what comes back to `returned`, what
+/// goes to `removed`.
 template <class N>
-VoxelBox put_back(const ServoPlan<N>& plan, const KeptBrick& kept, ServoState<N>& state,
-                  std::uint64_t& returned) noexcept {
+VoxelBox swap_brick(const ServoPlan<N>& plan, KeptBrick& kept, ServoState<N>& state,
+                    std::uint64_t& returned, std::uint64_t& removed) noexcept {
   const VoxelGrid& grid = plan.volumes[kept.volume].grid;
   VolumeState<N>& volume = state.volumes[kept.volume];
   const VoxelBox box = BrickGrid::of(grid).voxels(kept.id);
@@ -274,9 +318,11 @@ VoxelBox put_back(const ServoPlan<N>& plan, const KeptBrick& kept, ServoState<N>
     for (std::int32_t y = box.lo.y; y < box.hi.y; ++y, from += row) {
       Density* const to = &volume.density[grid.index(box.lo.x, y, z)];
       for (std::size_t i = 0; i < row; ++i) {
-        returned += static_cast<std::uint64_t>(kept.density[from + i] - to[i]);
+        Density& other = kept.density[from + i];
+        (other > to[i] ? returned : removed) +=
+            static_cast<std::uint64_t>(other > to[i] ? other - to[i] : to[i] - other);
+        std::swap(other, to[i]);
       }
-      copy_row(to, &kept.density[from], row);
     }
   }
   if (!volume.gradient.empty()) {
@@ -286,34 +332,39 @@ VoxelBox put_back(const ServoPlan<N>& plan, const KeptBrick& kept, ServoState<N>
   return box;
 }
 
-/// One tick of an undo that runs: bricks of one volume that are close to each other; writes them to
-/// `out`. The last tick ends it.
+/// One tick of an undo or a redo that runs: bricks of one volume that are close to each other;
+/// writes them to `out`. The last tick ends it.
 template <class N>
-void undo_some(const ServoPlan<N>& plan, ServoState<N>& state, ServoOutput& out) noexcept {
+void swap_some(const ServoPlan<N>& plan, ServoState<N>& state, ServoOutput& out) noexcept {
   constexpr std::int32_t kWidest = BrickBlocks::kEdge * kBrickEdge;  // as a block of a reset
   StrokeState& stroke = state.stroke;
-  if (stroke.begin == stroke.end) {
-    stroke.undoing = false;
+  Stroke& rest = stroke.moving;
+  if (rest.begin == rest.end) {
+    stroke.motion = StrokeState::Motion::none;
     for (std::size_t v = 0; v < plan.volume_count; ++v) forget_debts(state, v);
     end_restoring(state);
     return;
   }
-  const auto last = [&]() -> const KeptBrick& {
-    return stroke.pool[(stroke.end - 1) % stroke.pool.size()];
+  const auto last = [&]() -> KeptBrick& {
+    return stroke.pool[(rest.end - 1) % stroke.pool.size()];
   };
   const std::uint32_t v = last().volume;
   const VolumePlan<N>& volume = plan.volumes[v];
   const BrickGrid bricks = BrickGrid::of(volume.grid);
   VoxelBox around;
+  std::uint64_t returned = 0, removed = 0;
   for (int left = bricks_per_tick(plan.rate_hz, !state.volumes[v].gradient.empty());
-       left > 0 && stroke.begin != stroke.end && last().volume == v; --left) {
+       left > 0 && rest.begin != rest.end && last().volume == v; --left) {
     const VoxelBox with = around.united(bricks.voxels(last().id));
     const VoxelIndex extent = with.extent();
     if (std::max({extent.x, extent.y, extent.z}) > kWidest) break;
     around = with;
-    put_back(plan, last(), state, out.returned_by_volume[volume.scene_index]);
-    stroke.next = --stroke.end;
+    swap_brick(plan, last(), state, returned, removed);
+    --rest.end;
   }
+  out.returned_by_volume[volume.scene_index] = returned;
+  out.removed_by_volume[volume.scene_index] = removed;
+  out.removed_steps += removed;
   out.changed[volume.scene_index] = around;
 }
 

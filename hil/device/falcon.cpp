@@ -178,6 +178,7 @@ HandRoute FalconModel::route() const {
   return {.rest_tip_mm = plant_.rest().tip_mm,
           .calibration = {hand_move({0, 20, 35}, 0.2), hand_move({0, 20, -35}, 0.3), press},
           .detour = HandRoute::Detour{.lift_mm = 0, .y_mm = 20, .z_mm = -20},
+          .first_button_parks = true,
           .hand_rad_per_s = params().hand_rad_per_s()};
 }
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 namespace kerf {
 namespace {
@@ -174,7 +175,7 @@ HandGoal HandMotion::next() noexcept {
 
 GuidedHand::GuidedHand(double stiffness_n_per_mm, const HandRoute& route,
                        DeviceVec<double> start_mm) noexcept
-    : max_pull_mm_(kMaxPullN / stiffness_n_per_mm) {
+    : max_pull_mm_(kMaxPullN / stiffness_n_per_mm), first_button_parks_(route.first_button_parks) {
   const ReachCurve way = reach_curve(route, route.rest_tip_mm, start_mm);
   std::reverse_copy(way.points_mm.begin(), way.points_mm.end(), way_back_mm_.begin());
 }
@@ -236,8 +237,10 @@ HandGoal GuidedHand::next(const HandGoal& start, DeviceVec<double> tip_mm) noexc
     constexpr double kMost = kMaxTurnRadPerS * kCycleS;
     goal_->orientation_rad[i] += std::clamp(turn, -kMost, kMost);
   }
-  goal_->button1 = !stale && target_->button1;
-  goal_->button2 = !stale && target_->button2;
+  const bool follows = !stale && !parking_;  // who leaves or parks presses no pedal
+  goal_->button1 = follows && target_->button1;
+  goal_->button2 = follows && target_->button2;
+  if (first_button_parks_) std::swap(goal_->button1, goal_->button2);
   goal_->in_inkwell = parking_ == way_back_mm_.size();
   if (goal_->in_inkwell) ++parked_for_;
   return *goal_;

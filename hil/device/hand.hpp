@@ -102,10 +102,10 @@ class HandMotion {
 /// Its goal follows the newest target as a hand can: with the lag of its bandwidth, no faster than
 /// its strokes, and it pulls at its grip with at most `kMaxPullN`. Without a target for `kStaleS`
 /// (a window that hangs), or after `release` (a window that is gone), it holds the tip at its
-/// position and presses no more; `kPatienceS` later it withdraws to its start, straight up first.
-/// The next target moves it from its position. A target with `park` makes it take the device's path
-/// back to the rest pose, whatever later targets are, and stay there for `kParkedS`. In bus cycles,
-/// without a clock. One thread; never allocates.
+/// position, presses no more and lets go of the buttons; `kPatienceS` later it withdraws to its
+/// start, straight up first. The next target moves it from its position. A target with `park` makes
+/// it take the device's path back to the rest pose, whatever later targets are, its buttons up, and
+/// stay there for `kParkedS`. In bus cycles, without a clock. One thread; never allocates.
 class GuidedHand {
  public:
   /// Voluntary motion reaches some 8 Hz: a first-order lag with that corner.
@@ -142,6 +142,7 @@ class GuidedHand {
   [[nodiscard]] DeviceVec<double> retreat(DeviceVec<double> start_mm) const noexcept;
 
   double max_pull_mm_;
+  bool first_button_parks_;
   std::optional<HandTarget> target_;
   std::optional<HandGoal> goal_;              ///< empty: still at its start
   std::int64_t since_target_ = 0;             ///< bus cycles

@@ -59,6 +59,9 @@ struct HandRoute {
     double z_mm;     ///< ... to this depth, and from there to the start
   };
   std::optional<Detour> detour;
+  /// The first button of a script is the device's way to park (Falcon), so a led hand has its pedal
+  /// at the second.
+  bool first_button_parks = false;
   /// Of the hand's own spring with its load: `PlantParams::hand_rad_per_s`.
   double hand_rad_per_s = PlantParams().hand_rad_per_s();
 };

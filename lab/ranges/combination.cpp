@@ -103,6 +103,7 @@ class Writer {
   }
   void say(const KinematicHand::Counts& counts, bool parked = false) {
     out_.reports.push_back(hand_.report(counts, parked));
+    out_.reports.back().button1 = true;  // the pedal of scenes that have one
   }
   void rest(double ms, bool parked) {
     for (std::size_t i = ticks(ms); i > 0; --i) say(at_, parked);

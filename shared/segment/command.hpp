@@ -19,6 +19,7 @@ enum class CommandKind : std::uint32_t {
   hold = 2,         ///< argument: 1 stops cutting and force, 0 goes on
   reset = 3,        ///< argument: 0; the volumes go back to their first content
   undo = 4,         ///< argument: 0; the volumes go back to their content before the last stroke
+  redo = 5,         ///< argument: 0; the stroke that was undone last is cut again
 };
 
 /// One command: a message of fixed size over the socket, validated outside the servo, applied by
@@ -66,6 +67,7 @@ struct CommandLimits {
       return command.argument <= 1;
     case CommandKind::reset:
     case CommandKind::undo:
+    case CommandKind::redo:
       return command.argument == 0;
   }
   return false;

@@ -192,6 +192,9 @@ inline constexpr std::uint32_t kFlagShaft = 1U << 12;      ///< pressed with sha
 inline constexpr std::uint32_t kFlagReset = 1U << 13;      ///< volumes go back to what they were
 inline constexpr std::uint32_t kFlagUndo = 1U << 14;       ///< the last stroke is undone
 inline constexpr std::uint32_t kFlagUndoable = 1U << 15;   ///< it can be
+inline constexpr std::uint32_t kFlagRedo = 1U << 16;       ///< an undone stroke is cut again
+inline constexpr std::uint32_t kFlagRedoable = 1U << 17;   ///< it can be
+inline constexpr std::uint32_t kFlagPedal = 1U << 18;      ///< nothing is cut without button 1
 
 inline constexpr std::size_t kRawEncoder = 0;  ///< first of 3
 inline constexpr std::size_t kRawPot = 3;      ///< first of 6
@@ -199,7 +202,7 @@ inline constexpr std::size_t kRawStatus = 9;   ///< bits: button 1, button 2, pa
 inline constexpr std::size_t kRawDeviceCounter = 10;
 
 /// Why a box of voxels changed.
-enum class DirtyCause : std::uint16_t { milling = 0, load = 1, reset = 2, undo = 3 };
+enum class DirtyCause : std::uint16_t { milling = 0, load = 1, reset = 2, undo = 3, redo = 4 };
 
 /// One changed box. A hint and a history: volume correctness never depends on it.
 struct DirtyRecord {

@@ -286,7 +286,16 @@ TEST_CASE(
     // And a target moves it from there.
     lead(hand, tip, {.tip_mm = {2, 3, 1}}, 1);
     CHECK(norm(tip - DeviceVec<double>{2, 3, 1}) < 0.01);
+    // Who parks presses no pedal on the way.
+    hand.set_target({.tip_mm = {2, 3, 1}, .button1 = true, .park = true});
+    CHECK_FALSE(hand.next(kStart, tip).button1);
   }
+  // On a Falcon the first button parks; the pedal is the driver's first.
+  GuidedHand falcon{kStiffness, kerf::FalconModel().route(), kStart.target_mm};
+  falcon.set_target({.tip_mm = kStart.target_mm, .button1 = true});
+  const HandGoal pressed = falcon.next(kStart, kStart.target_mm);
+  CHECK_FALSE(pressed.button1);
+  CHECK(pressed.button2);
 }
 
 TEST_CASE("a target is decoded as it was encoded, within its limits; other bytes are none") {

@@ -417,7 +417,7 @@ TEST_CASE("a scene holds the arrays that it names, and no others") {
   LoadedScene cut = touch;
   cut.cut.model = CutModel::overlap;
   CHECK(arrays_of(cut) == Names{"density of test", "carry of test", "first content of test",
-                                "cut bricks of test", "bricks of the last stroke",
+                                "cut bricks of test", "bricks of the last strokes",
                                 "whether they are kept", "samples of ball", "table of ball", "box",
                                 "columns inside", "overlap ratios", "filtered rows", "live rows"});
   LoadedScene odd = touch;
@@ -429,7 +429,7 @@ TEST_CASE("a scene holds the arrays that it names, and no others") {
   odd_cut.volumes[0].image.labels.assign(odd_cut.volumes[0].image.density.size(), 1);
   CHECK(arrays_of(odd_cut) ==
         Names{"density of test", "labels of test", "carry of test", "first content of test",
-              "cut bricks of test", "bricks of the last stroke", "whether they are kept",
+              "cut bricks of test", "bricks of the last strokes", "whether they are kept",
               "samples of cone", "ordered samples of cone", "box", "columns inside",
               "overlap ratios", "filtered rows", "live rows", "sample places", "overlap sums",
               "rest rows", "live rest rows"});
@@ -437,7 +437,7 @@ TEST_CASE("a scene holds the arrays that it names, and no others") {
   floating.servo.numeric = NumericKind::float64;
   CHECK(arrays_of(floating) == Names{"density of test", "labels of test", "gradient of test",
                                      "carry of test", "first content of test", "cut bricks of test",
-                                     "bricks of the last stroke", "whether they are kept",
+                                     "bricks of the last strokes", "whether they are kept",
                                      "samples of cone", "overlap box", "refresh planes"});
   odd_cut.tools[0].turns = false;
   const Names unturned = arrays_of(odd_cut);

@@ -31,5 +31,6 @@ TEST_CASE("every flag that a record can have is on the page, once") {
   }
   CHECK(seen == (kFlagButton1 | kFlagButton2 | kFlagContact | kFlagClamped | kFlagStaleInput |
                  kFlagDeviceFault | kFlagMotorsOn | kFlagParked | kFlagStarted | kFlagForbidden |
-                 kFlagRefused | kFlagShaft | kFlagReset | kFlagUndo | kFlagUndoable));
+                 kFlagRefused | kFlagShaft | kFlagReset | kFlagUndo | kFlagUndoable | kFlagRedo |
+                 kFlagRedoable | kFlagPedal));
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The commands `reset` and `undo`: the volumes go back to their first content, or to that of before
-// the last stroke. The hand notices only that its force is gone and comes back slowly.
+// The commands `reset`, `undo` and `redo`: the volumes go back to their first content, or to that
+// of before a stroke, or after it. The hand notices only that its force is gone and comes back
+// slowly. The pedal: without it nothing is cut, and a press of it is a stroke.
 #include <algorithm>
 #include <array>
 #include <bit>
@@ -9,6 +10,7 @@
 #include <memory>
 #include <numeric>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <doctest/doctest.h>
@@ -17,6 +19,7 @@
 #include "controller/servo/volume_restore.hpp"
 #include "shared/volume/checksum.hpp"
 #include "tests/servo/support.hpp"
+#include "tests/support/property.hpp"
 
 using namespace kerf;
 using namespace kerf::test;
@@ -25,6 +28,7 @@ namespace {
 
 constexpr ServoCommand kReset{.kind = ServoCommand::Kind::reset};
 constexpr ServoCommand kUndo{.kind = ServoCommand::Kind::undo};
+constexpr ServoCommand kRedo{.kind = ServoCommand::Kind::redo};
 constexpr std::array kBoth{kReset, kUndo};
 using Place = std::array<double, 3>;
 constexpr Place kAbove{0, 5, 0}, kGrooveEnd{0.5, -0.9, 0};
@@ -67,7 +71,9 @@ struct CuttingHand : ArmedServo {
     return density_hash(servo->density(v));
   }
   ServoOutput step_to(const Place& at) {
-    const ServoOutput out = step(at[0], at[1], at[2]);
+    DeviceReport report = arm.at(at[0], at[1], at[2]);
+    report.button1 = pedal;
+    const ServoOutput out = servo->step(report);
     for (std::size_t v = 0; v < kMaxVolumes; ++v) {
       removed += out.removed_by_volume[v] - out.returned_by_volume[v];
     }
@@ -101,7 +107,7 @@ struct CuttingHand : ArmedServo {
   int restore(const ServoCommand& command, const Place& hand = kAbove) {
     REQUIRE(servo->apply(command));
     int ticks = 0;
-    for (ServoOutput out; (out = step_to(hand)).resetting || out.undoing;) {
+    for (ServoOutput out; (out = step_to(hand)).resetting || out.undoing || out.redoing;) {
       REQUIRE(++ticks < 20000);
       for (std::size_t v = 0; v < volumes; ++v) restored[v] = hash(v);
     }
@@ -109,6 +115,7 @@ struct CuttingHand : ArmedServo {
   }
 
   std::array<std::uint64_t, kMaxVolumes> restored{};
+  bool pedal = false;
   int per_ms;
   std::size_t volumes;
   std::uint64_t first;
@@ -149,11 +156,7 @@ TEST_CASE("an undo brings back the bits of before the last stroke, and only of t
     hand.restore(kUndo);
     CHECK(hand.hash() == once);
     CHECK(hand.removed == removed_once);
-    CHECK_FALSE(hand.rest(kAbove, 1).undoable);
-    CHECK_FALSE(hand.servo->apply(kUndo));  // one stroke is kept
-    hand.stroke(0.6);
-    hand.restore(kUndo);
-    CHECK(hand.hash() == once);
+    CHECK(hand.rest(kAbove, 1).undoable);  // the one before
   }
 }
 
@@ -301,16 +304,181 @@ TEST_CASE("a stroke that is longer than the pool is told, and the next one can b
   StrokeState stroke;
   std::vector<KeptBrick> pool(8);
   stroke.pool = pool;
-  stroke.end = stroke_room(pool.size());
-  stroke.open = true;
-  stroke.lost = true;  // `keep_bricks` sets it if the pool is full
+  stroke.end = 1;
+  follow_stroke(1, true, true, stroke);
+  close_stroke(stroke);
+  CHECK(stroke.can_undo());
+  stroke.end += stroke_room(pool.size());
+  follow_stroke(1, true, true, stroke);
+  lose_stroke(stroke);  // as `keep_bricks` does if the pool is full
   CHECK_FALSE(stroke.can_undo());
   CHECK_FALSE(begin_undo(stroke));
   follow_stroke(1, false, false, stroke);
   CHECK_FALSE(stroke.open);
+  CHECK_FALSE(stroke.can_undo());  // one before it would bring back half of it
   ++stroke.end;
   follow_stroke(1, true, true, stroke);
   CHECK(stroke.can_undo());
+}
+
+TEST_CASE("twenty strokes are undone and cut again bit by bit; the next cut drops what is undone") {
+  for (const CutKind& kind : {kCutKinds[0], kCutKinds[2], kCutKinds[4]}) {
+    CAPTURE(std::string(kind.name));
+    CuttingHand hand(cut_scene(kind));
+    struct Seen {
+      std::uint64_t hash, removed;
+    };
+    std::vector<Seen> seen;
+    const auto stroke = [&](int i) {
+      hand.stroke(-1.2 + 0.12 * (i % 20));
+      hand.rest(kAbove, 300);
+      seen.push_back({hand.hash(), hand.removed});
+    };
+    const auto is = [&](std::size_t i) {
+      return hand.hash() == seen[i].hash && hand.removed == seen[i].removed;
+    };
+    for (int i = 0; i < 23; ++i) stroke(i);
+    CHECK_FALSE(hand.servo->apply(kRedo));
+    for (std::size_t i = 22; i-- > 2;) {
+      hand.restore(kUndo);
+      CHECK(is(i));
+    }
+    const ServoOutput oldest = hand.rest(kAbove, 1);
+    CHECK_FALSE(oldest.undoable);
+    CHECK(oldest.redoable);
+    CHECK_FALSE(hand.servo->apply(kUndo));
+    for (std::size_t i = 3; i < 23; ++i) {
+      hand.restore(kRedo);
+      CHECK(is(i));
+    }
+    CHECK_FALSE(hand.servo->apply(kRedo));
+    for (int i = 0; i < 3; ++i) hand.restore(kUndo);
+    CHECK(is(19));
+    seen.resize(20);
+    stroke(7);
+    CHECK_FALSE(hand.servo->apply(kRedo));
+    hand.restore(kUndo);
+    CHECK(is(19));
+    hand.restore(kRedo);
+    CHECK(is(20));
+  }
+}
+
+// Strokes, undos and redos in any order against a list of all contents; a brick is one number.
+TEST_CASE("of a full pool the oldest strokes go, and what is left comes back whole") {
+  CHECK(property([] {
+    StrokeState stroke;
+    std::vector<KeptBrick> pool(16);
+    stroke.pool = pool;
+    std::vector<Density> volume(14);
+    std::vector<std::vector<Density>> contents{volume};
+    std::size_t now = 0, lost_before = 0;
+    Density next = 0;
+    const auto swap_all = [&] {
+      for (; stroke.moving.begin != stroke.moving.end; --stroke.moving.end) {
+        KeptBrick& kept = pool[(stroke.moving.end - 1) % pool.size()];
+        std::swap(kept.density[0], volume[kept.id]);
+      }
+      stroke.motion = StrokeState::Motion::none;
+    };
+    for (int step = 0; step < 60; ++step) {
+      const int what = in_range(0, 4);
+      if (what < 2) {
+        const auto bricks = in_range<std::uint32_t>(1, 15);
+        for (std::uint32_t id = 0; id < bricks; ++id) {
+          if (KeptBrick* const kept = entry_for_brick(stroke)) {
+            kept->id = id;
+            kept->density[0] = volume[id];
+          }
+          volume[id] = ++next;
+          follow_stroke(1, true, true, stroke);
+        }
+        HOLDS(stroke.can_undo() == (bricks <= stroke_room(pool.size())));
+        contents.resize(++now);
+        contents.push_back(volume);
+        if (!stroke.can_undo()) lost_before = now;
+        close_stroke(stroke);
+      } else if (what == 2 && begin_undo(stroke)) {
+        swap_all();
+        HOLDS(now > lost_before);
+        HOLDS(volume == contents[--now]);
+      } else if (what == 3) {
+        const bool could = begin_redo(stroke);
+        HOLDS(could == (now + 1 < contents.size()));
+        if (!could) continue;
+        swap_all();
+        HOLDS(volume == contents[++now]);
+      }
+      HOLDS(stroke.all == 0 || stroke.end - stroke.strokes[0].begin <= stroke_room(pool.size()));
+    }
+  }));
+}
+
+namespace {
+
+LoadedScene pedal_scene(const CutKind& kind) {
+  LoadedScene scene = cut_scene(kind);
+  scene.cut.pedal = CutPedal::button;
+  return scene;
+}
+
+}  // namespace
+
+TEST_CASE("without the pedal nothing is cut, however the tool came to press") {
+  for (const CutKind& kind : kCutKinds) {
+    CAPTURE(std::string(kind.name));
+    CuttingHand hand(pedal_scene(kind)), held(pedal_scene(kind)), always(cut_scene(kind));
+    hand.groove();
+    hand.rest(kGrooveEnd, 1000);
+    const ServoOutput up = hand.rest(kGrooveEnd, 1);
+    CHECK(hand.hash() == hand.first);
+    CHECK(up.pedalled);
+    CHECK(up.spindle_ratio == 0);
+    CHECK(length(up.modification_n) == 0);
+    CHECK(length(up.contact_n) > 0.01);  // it is felt all the same
+    CHECK_FALSE(up.undoable);
+    hand.pedal = true;
+    hand.rest(kGrooveEnd, 500);
+    const std::uint64_t pressed = hand.hash();
+    CHECK(pressed != hand.first);
+    hand.pedal = false;
+    hand.rest(kGrooveEnd, 300);
+    CHECK(hand.hash() == pressed);  // in the very tick, though the spindle runs down
+    held.pedal = true;              // a script that holds it cuts as one that needs none
+    for (CuttingHand* const one : {&held, &always}) {
+      one->rest(kAbove, 2000);  // the spindle runs up
+      one->groove();
+    }
+    CHECK(held.hash() == always.hash());
+    CHECK_FALSE(always.rest(kGrooveEnd, 1).pedalled);
+  }
+}
+
+TEST_CASE("a press of the pedal is a stroke, though the tool never lifts") {
+  CuttingHand hand(pedal_scene(kCutKinds[0]));
+  const Place middle{0, -0.9, 0}, end{0.8, -0.9, 0};
+  hand.lead(kAbove, {0, 0.5, 0}, 200);
+  hand.pedal = true;
+  hand.lead({0, 0.5, 0}, middle, 300);
+  hand.pedal = false;
+  hand.rest(middle, 10);  // a bounce of the switch
+  hand.pedal = true;
+  hand.rest(middle, 50);
+  hand.pedal = false;
+  hand.rest(middle, 60);
+  const std::uint64_t once = hand.hash();
+  hand.pedal = true;
+  hand.lead(middle, end, 400);
+  hand.pedal = false;
+  hand.rest(end, 60);
+  REQUIRE(hand.hash() != once);
+  hand.restore(kUndo, end);
+  CHECK(hand.restored[0] == once);
+  hand.rest(end, 200);  // in the solid
+  CHECK(hand.hash() == once);
+  hand.restore(kUndo, end);
+  CHECK(hand.restored[0] == hand.first);
+  CHECK_FALSE(hand.servo->apply(kUndo));
 }
 
 TEST_CASE("a reset forgets the last stroke, and ends an undo that runs") {
@@ -383,12 +551,17 @@ TEST_CASE(
   CHECK(CuttingHand(cut_scene(kCutKinds[0])).restore(kReset) == 1);
 }
 
-TEST_CASE("both repeat bit by bit from a snapshot in the middle, without the heap") {
+TEST_CASE("all repeat bit by bit from a snapshot in the middle, without the heap") {
   for (const CutKind& kind : kCutKinds) {
-    for (const ServoCommand& command : kBoth) {
+    for (const ServoCommand& command : {kReset, kUndo, kRedo}) {
       CAPTURE(std::string(kind.name));
       CuttingHand hand(cut_scene(kind));
       hand.groove();
+      const bool again =
+          command.kind == kRedo.kind;  // a tool in the solid would cut something else
+      if (again) hand.lead(kGrooveEnd, kAbove, 100);
+      if (again) hand.restore(kUndo);
+      const Place at = again ? kAbove : kGrooveEnd;
       const auto without_heap = [&](const auto& work) {
         const CountedAllocations counted;
         const std::uint64_t before = CountedAllocations::total();
@@ -397,16 +570,16 @@ TEST_CASE("both repeat bit by bit from a snapshot in the middle, without the hea
       };
       without_heap([&] {
         CHECK(hand.servo->apply(command));
-        hand.rest(kGrooveEnd, 1);
+        hand.rest(at, 1);
       });
       auto& compiled = dynamic_cast<CompiledScene&>(*hand.servo);
       const std::unique_ptr<ServoSnapshot> kept = compiled.keep();
       std::uint64_t output = 0;
-      without_heap([&] { output = hand.rest(kGrooveEnd, 300).output_hash; });
+      without_heap([&] { output = hand.rest(at, 300).output_hash; });
       const std::uint64_t volume = hand.hash();
       hand.rest(kAbove, 100);  // elsewhere
       compiled.restore(*kept);
-      CHECK(hand.rest(kGrooveEnd, 300).output_hash == output);
+      CHECK(hand.rest(at, 300).output_hash == output);
       CHECK(hand.hash() == volume);
     }
   }

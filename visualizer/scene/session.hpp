@@ -107,6 +107,8 @@ class Session {
   bool reset() { return send(CommandKind::reset, 0); }
   /// They go back to what they were before the last stroke.
   bool undo() { return send(CommandKind::undo, 0); }
+  /// The stroke that was undone last is cut again.
+  bool redo() { return send(CommandKind::redo, 0); }
 
  private:
   bool send(CommandKind kind, std::uint32_t argument);

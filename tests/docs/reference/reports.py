@@ -34,7 +34,7 @@ REPORTS = [
         ("removed_mm3", "mm3", "since the last reset"),
         ("removed_mm3_by_material", "mm3", "the same, by the scene's materials"),
         ("forbidden_ms", "ms", "how long each forbidden material was touched"),
-        ("resets, undos", "", "of the volumes; of one stroke each"),
+        ("resets, undos, redos", "", "of the volumes; of one stroke each"),
         ("energy_j", "J", "work at the device port: positive is taken from the hand"),
         ("port_minimum_j", "J", "its lowest value: below 0 the loop gave more than it took"),
         ("energy_by_source_j", "J", "the same by source, below"),
