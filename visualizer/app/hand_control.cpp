@@ -36,6 +36,11 @@ void PointerHand::step(const WindowInput& input, bool over_panel, const View& vi
   const HeldControls& held = input.held;
   by_pad_ = held.by_pad || (by_pad_ && !input.hovers);
   leads_ = input.hovers || by_pad_;
+  const bool down = input.pointer.down || held.pedal;
+  spent_ = down && (spent_ || input.left || !points);
+  const bool by_pointer = down && !spent_;
+  pedal_ = by_pointer || held.press;
+  press_mm_ = glm::dvec3(0.0);
   const SeenPoint tool = seen_at(view, size, tool_mm);
   if (tool.depth_mm <= 0.0) return;  // a tool behind the eye is not led
   const bool acts = input.free_right != 0.0 || input.free_up != 0.0 || input.wheel != 0.0 ||
@@ -60,9 +65,9 @@ void PointerHand::step(const WindowInput& input, bool over_panel, const View& vi
   const double most_mm = std::max(seen.depth_mm, tool.depth_mm + kMostAheadMm * scale);
   seen = deeper(seen, by_mm, least_mm, most_mm);
   goal_mm_ = world_at(view, size, seen);
-  const bool presses = (points && input.pointer.down) || held.press;
+  const bool presses = (by_pointer && input.pointer.down) || held.press;
   const glm::dvec3 eye_mm(glm::inverse(view.eye_from_world)[3]);
-  press_mm_ = presses ? glm::normalize(*goal_mm_ - eye_mm) * (kPressMm * scale) : glm::dvec3(0.0);
+  if (presses) press_mm_ = glm::normalize(*goal_mm_ - eye_mm) * (kPressMm * scale);
   const glm::dvec2 turned = glm::dvec2(held.tilt_right, held.tilt_up) * (kHeldRadPerS * frame_s);
   tilt_rad_ = glm::clamp(tilt_rad_ + turned, -kMaxTargetRad, kMaxTargetRad);
 }
@@ -74,7 +79,9 @@ std::optional<glm::dvec3> PointerHand::goal_mm() const {
 
 HandTarget PointerHand::target(const DeviceFrame& device) const {
   const glm::dvec3 at = (goal_mm().value_or(device.offset_mm) - device.offset_mm) / device.scale;
-  return {.tip_mm = {at.x, at.y, at.z}, .orientation_rad = {tilt_rad_.x, tilt_rad_.y, 0.0}};
+  return {.tip_mm = {at.x, at.y, at.z},
+          .orientation_rad = {tilt_rad_.x, tilt_rad_.y, 0.0},
+          .button1 = pedal_};
 }
 
 namespace {

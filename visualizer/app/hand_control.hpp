@@ -26,7 +26,12 @@ namespace kerf {
 /// the eye, and along the ray from the eye with wheel, keys and sticks; while the left button is
 /// down it lies `kPressMm` deeper. It stands under the pointer, at the tool's own depth, when the
 /// pointer, its wheel or its button is first used, when the pointer comes from outside or from a
-/// panel, and again on `come`. A camera that turns or moves leaves it where it is. Lengths below
+/// panel, and again on `come`. A camera that turns or moves leaves it where it is.
+///
+/// The pedal is down while the left button, the space bar, or a pad's or SpaceMouse's button is. A
+/// press of button or bar ends when the pointer is no longer over the window or comes over a panel,
+/// when the goal jumps, and on `end_press`; it does not go on when the pointer comes back: it is to
+/// be pressed anew. Lengths below
 /// are mm of the hand: of the world, times the scene's scale.
 class PointerHand {
  public:
@@ -42,7 +47,14 @@ class PointerHand {
   void step(const WindowInput& input, bool over_panel, const View& view, PictureSize size,
             const glm::dvec3& tool_mm, const DeviceFrame& device, double frame_s);
   /// The goal goes back under the pointer.
-  void come() noexcept { under_pointer_ = false; }
+  void come() noexcept {
+    under_pointer_ = false;
+    end_press();
+  }
+  /// Whether the pedal was down in the last frame.
+  [[nodiscard]] bool presses() const noexcept { return pedal_; }
+  /// Button and bar count as up until they are pressed anew.
+  void end_press() noexcept { spent_ = true; }
 
   /// Whether the user holds the hand: the pointer is over the window, or a gamepad came after it.
   [[nodiscard]] bool leads() const noexcept { return leads_ && goal_mm_.has_value(); }
@@ -56,6 +68,8 @@ class PointerHand {
   glm::dvec2 tilt_rad_{0.0};
   bool under_pointer_ = false;  ///< since the pointer came
   bool leads_ = false, by_pad_ = false;
+  bool pedal_ = false;
+  bool spent_ = false;  ///< the press that is held has ended
 };
 
 /// What a SpaceMouse of 3Dconnexion holds: six axes and the first button.

@@ -74,6 +74,11 @@ void declare_look(Arguments& app, VisualizerOptions& o, std::string& gradient) {
 /// How long a run is, and where.
 void declare_run(Arguments& app, VisualizerOptions& o) {
   app.option("--seconds", o.seconds, "end after this time").within(0.0, 1e6);
+  app.option("--ends-after", o.ends_after_s,
+             "in a window: this much servo time after arming the run ends; the user is told two "
+             "minutes and ten seconds before")
+      .within(0.0, 1e6)
+      .shown_as("S");
   app.option("--wait", o.wait_s, "seconds to wait for the controller")
       .within(0.0, 1e6)
       .shows_default();

@@ -24,6 +24,7 @@ struct VisualizerOptions {
   std::optional<std::uint64_t> every_ticks;  ///< headless: default once a second of servo time
   std::filesystem::path out = ".";           ///< pictures, screenshots
   std::optional<double> seconds;             ///< ends after this time; default: with the controller
+  std::optional<double> ends_after_s;        ///< of servo time, the run ends: said before it does
   double wait_s = 10.0;                      ///< for the controller to appear
   std::optional<std::filesystem::path> attached;  ///< --attached: made once it is shown
   bool mute = false;                              ///< no sound until the user asks for it

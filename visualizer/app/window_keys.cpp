@@ -67,15 +67,26 @@ void undo_all(std::optional<Notices::Clock::time_point>& asked, Session& session
 void undo_stroke(Session& session, Notices& notices, Notices::Clock::time_point now) {
   const auto& newest = session.latest();
   if (!newest || (newest->flags & kFlagUndoable) == 0) {
-    notices.say(
-        {"undo: there is no stroke to take back, or it was longer than can be kept, at most 12 "
-         "MiB of voxels; u, u undoes all cuts",
-         true},
-        now);
+    notices.say({"undo: there is no stroke to take back: none, 20 are undone, or one was longer "
+                 "than can be "
+                 "kept, at most 12 MiB of voxels; u, u undoes all cuts",
+                 true},
+                now);
   } else if (session.undo()) {
-    notices.say({"the last stroke is undone"}, now);
+    notices.say({"the last stroke is undone; shift and z cuts it again"}, now);
   } else {
     notices.say({"undo: the controller did not take it; press z again", true}, now);
+  }
+}
+
+void redo_stroke(Session& session, Notices& notices, Notices::Clock::time_point now) {
+  const auto& newest = session.latest();
+  if (!newest || (newest->flags & kFlagRedoable) == 0) {
+    notices.say({"redo: no stroke was undone since the last cut", true}, now);
+  } else if (session.redo()) {
+    notices.say({"the stroke is cut again"}, now);
+  } else {
+    notices.say({"redo: the controller did not take it; press shift and z again", true}, now);
   }
 }
 
@@ -148,7 +159,9 @@ bool WindowKeys::apply(const WindowInput& input, Session& session, Picture& pict
     if (key == 'g') come = true;
     if (key == 'k') park = true;
     if (key == 'z') undo_stroke(session, notices, now);
+    if (key == 'Z') redo_stroke(session, notices, now);
     if (key == 'u') undo_all(undo_asked, session, notices, now);
+    end_press = end_press || key == 'z' || key == 'Z' || key == 'u';
     if (key == 'c') settings.clip.on = !settings.clip.on;
     if (key == 'x') settings.clip = picture.facing_plane(tip_of(session));
     if (key == 'y') settings.colour_blind = !settings.colour_blind;

@@ -36,12 +36,13 @@ struct WindowKeys {
   bool slices = false;
   bool open = false;  ///< open the list of scenes, or leave it
   bool screenshot = false;
-  bool mesh = false;    ///< export the surface
-  bool write = false;   ///< write the opacities
-  bool film = false;    ///< begin a film, or end it
-  bool come = false;    ///< the hand comes to the pointer
-  bool park = false;    ///< it brings the stylus to rest and back
-  std::size_t one = 0;  ///< volume that v is for, counted from 1; 0: all
+  bool mesh = false;       ///< export the surface
+  bool write = false;      ///< write the opacities
+  bool film = false;       ///< begin a film, or end it
+  bool come = false;       ///< the hand comes to the pointer
+  bool park = false;       ///< it brings the stylus to rest and back
+  bool end_press = false;  ///< cuts are undone or redone: the press that is held ends
+  std::size_t one = 0;     ///< volume that v is for, counted from 1; 0: all
   std::optional<Notices::Clock::time_point> undo_asked{};  ///< u once: the second one is meant
 
   /// Takes the keys of `input`: the camera and the settings of `picture`, and the tool, follow at

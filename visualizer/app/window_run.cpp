@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdio>
 #include <utility>
 
@@ -18,6 +19,7 @@ constexpr auto kReattachPause = std::chrono::milliseconds(500);
 
 constexpr double kFarthestPullMm = 60;   // of the hand: farther off it parks, and pulls nothing
 constexpr double kLongestFrameS = 0.05;  // one that took longer was none of the user's
+constexpr double kStaleS = 0.25;         // after which the hand presses no more (GuidedHand)
 
 void move_camera(OrbitCamera& camera, const WindowInput& input) {
   camera.orbit(input.turn_right + input.drag_right, input.turn_up + input.drag_up);
@@ -98,6 +100,7 @@ WindowRun::Frame WindowRun::step(const WindowInput& input, PictureSize size,
   if (hand_link_) {
     if (const auto news = hand_link_->step(now)) notices_.say(*news, now);
   }
+  foretell_end(now);
   if (keys_.screenshot) notices_.clear();  // what was said of the one before
   if (!visible) return {};
   const Redrawn redrawn = draw(size, input, now);
@@ -174,7 +177,13 @@ std::optional<SliceViews> WindowRun::slices_at_tip() {
 
 void WindowRun::follow(const WindowInput& input, OverlayFigures& figures, PictureSize size,
                        Clock::time_point now) {
-  const bool over_panel = picture().handle(input.pointer, figures, size);
+  // A button that began to press in the picture is none for the panels: else they let the pointer
+  // pass, and the hand would go on behind them.
+  Pointer pointer = input.pointer;
+  press_is_hands_ = press_is_hands_ && pointer.down;
+  pointer.down = pointer.down && !press_is_hands_;
+  const bool over_panel = picture().handle(pointer, figures, size);
+  press_is_hands_ = press_is_hands_ || (hand_link_ && input.pointer.down && !over_panel);
   if (!over_panel) {
     const auto centre_mm = hand_centre_mm();
     centre_mm ? move_camera_around(picture().camera(), *centre_mm, input)
@@ -196,23 +205,32 @@ void WindowRun::lead_hand(const WindowInput& input, bool over_panel, OverlayFigu
   const double frame_s = std::chrono::duration<double>(now - last_led_).count();
   last_led_ = now;
   if (std::exchange(keys_.come, false)) hand_.come();
+  const bool hung = frame_s > kStaleS && hand_.presses();  // not: it began while the window hung
+  if (std::exchange(keys_.end_press, false) || hung) hand_.end_press();
   WindowInput seen = input;
   if (const auto news = space_mouse_->step(seen.held)) notices_.say({*news, true}, now);
+  if (!input.visible) seen.held = {};  // no pad presses what its user cannot see
   const auto held = session().latest() ? hand_of(*session().latest()) : std::nullopt;
   if (!held || !hand_link_->leads()) return;
   const SceneView& scene = session().scene();
   const View view = picture().middle_view(size);
   const PictureSize eye = picture().eye_size(size);
+  check_pedal(now);
   const bool in_second = seen.pointer.x >= eye.width;
   if (in_second) seen.pointer.x -= eye.width;
-  if (std::exchange(in_second_eye_, in_second) != in_second) hand_.come();  // a jump is no motion
+  const bool crossed = std::exchange(in_second_eye_, in_second) != in_second;
+  const bool in_stereo = picture().settings().stereo.on;
+  const bool switched = std::exchange(in_stereo_, in_stereo) != in_stereo;
+  if (crossed && !switched) hand_.come();  // a jump is no motion; nor is another way of seeing
   hand_.step(seen, over_panel, view, eye, held->tip_mm, scene.device,
              std::min(frame_s, kLongestFrameS));
   time_the_tool(input, held->tip_mm, now);
-  if (!hand_.leads()) return;
+  const bool leads = hand_.leads();
+  if (!std::exchange(led_, leads) && !leads) return;  // one more target lets go of the pedal
   HandTarget target = hand_.target(scene.device);
   target.park = std::exchange(keys_.park, false);
   hand_link_->send(target);
+  if (!leads) return;
   const SeenPoint goal = seen_at(view, eye, *hand_.goal_mm());
   const SeenPoint tool = seen_at(view, eye, held->tip_mm);
   const double away_mm = glm::length(*hand_.goal_mm() - held->tip_mm) / scene.device.scale;
@@ -225,6 +243,33 @@ void WindowRun::lead_hand(const WindowInput& input, bool over_panel, OverlayFigu
                   tool.pixel.y,
                   radius_mm * eye.height / (2.0 * view.tan_half_height * goal.depth_mm),
                   goal.depth_mm - tool.depth_mm};
+}
+
+void WindowRun::foretell_end(Clock::time_point now) {
+  constexpr std::array kBeforeS{10.0, 120.0};
+  const auto ticks = session().ticks_since_armed();
+  if (!options_.ends_after_s || !ticks || session().ended()) return;
+  constexpr double kNsPerS = 1e9;
+  const double run_s = static_cast<double>(*ticks) * session().tick_ns() / kNsPerS;
+  const double left_s = *options_.ends_after_s - run_s;
+  const auto* const before = std::ranges::find_if(kBeforeS, [&](double s) { return left_s <= s; });
+  if (before == kBeforeS.end() || told_left_s_ <= *before) return;
+  told_left_s_ = *before;
+  notices_.say({"this run ends in " + std::to_string(std::lround(std::max(left_s, 0.0))) +
+                " s: it was given " + std::to_string(std::lround(*options_.ends_after_s)) +
+                " s, by --seconds or by default; give --seconds N for more"},
+               now);
+}
+
+void WindowRun::check_pedal(Clock::time_point now) {
+  const std::uint32_t flags = session().latest()->flags;
+  if ((flags & kFlagStarted) == 0 || std::exchange(pedal_is_checked_, true)) return;
+  if ((flags & kFlagPedal) != 0) return;
+  notices_.say(
+      {"this tool cuts whenever it presses, without a pedal: give kerf-controller --pedal, "
+       "or the scene no cut.pedal = \"always\"",
+       true},
+      now);
 }
 
 void WindowRun::time_the_tool(const WindowInput& input, const glm::dvec3& tool_mm,

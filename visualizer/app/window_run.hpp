@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <utility>
 
@@ -97,6 +98,10 @@ class WindowRun {
   [[nodiscard]] std::optional<glm::dvec3> hand_centre_mm();
   void lead_hand(const WindowInput& input, bool over_panel, OverlayFigures& figures,
                  PictureSize size, Clock::time_point now);
+  /// Tells how long the run will last, two minutes and ten seconds before its end.
+  void foretell_end(Clock::time_point now);
+  /// Warns once if the tool cuts without the pedal.
+  void check_pedal(Clock::time_point now);
   void time_the_tool(const WindowInput& input, const glm::dvec3& tool_mm, Clock::time_point now);
   Redrawn draw(PictureSize size, const WindowInput& input, Clock::time_point now);
 
@@ -122,7 +127,12 @@ class WindowRun {
   glm::dvec3 last_tool_mm_{0.0};
   /// Since when, and from where, a tool that rested is to follow the pointer.
   std::optional<std::pair<Clock::time_point, glm::dvec3>> followed_since_;
-  bool pointer_leads_ = false, tool_follows_ = false, in_second_eye_ = false;
+  bool pointer_leads_ = false, tool_follows_ = false;
+  bool in_second_eye_ = false, in_stereo_ = false;
+  double told_left_s_ = std::numeric_limits<double>::infinity();  ///< of the run
+  bool press_is_hands_ = false;    ///< the left button went down over the picture
+  bool led_ = false;               ///< the last frame sent a target
+  bool pedal_is_checked_ = false;  ///< whether the controller obeys it
 };
 
 }  // namespace kerf

@@ -56,10 +56,6 @@ char letter_of(int key, int scancode) {
   return '\0';
 }
 
-bool is_down(GLFWwindow* handle, int button) {
-  return glfwGetMouseButton(handle, button) == GLFW_PRESS;
-}
-
 bool has_shift(GLFWwindow* handle) {
   return glfwGetKey(handle, GLFW_KEY_LEFT_SHIFT) == GLFW_PRESS ||
          glfwGetKey(handle, GLFW_KEY_RIGHT_SHIFT) == GLFW_PRESS;
@@ -190,8 +186,13 @@ WindowInput Window::poll() {
     input_.pointer.x = cursor_x_ * size().width / width;
     input_.pointer.y = cursor_y_ * size().height / height;
   }
-  if (is_down(handle_, GLFW_MOUSE_BUTTON_LEFT)) input_.pointer.down = true;
-  input_.hovers = cursor_known_;
+  const bool seen = is_seen();
+  input_.visible = seen;
+  if (!seen) let_go();
+  // A pointer with a button down belongs to this window wherever it goes: its place tells.
+  input_.hovers = cursor_known_ && is_over();
+  input_.left = input_.left || !input_.hovers;
+  if (down_[GLFW_MOUSE_BUTTON_LEFT]) input_.pointer.down = true;
   float density = 1.0F;
   glfwGetWindowContentScale(handle_, &density, nullptr);
   input_.density = static_cast<double>(density);
@@ -199,14 +200,38 @@ WindowInput Window::poll() {
   held.deeper = of_keys(handle_, GLFW_KEY_PAGE_DOWN, GLFW_KEY_PAGE_UP);
   held.tilt_right = of_keys(handle_, GLFW_KEY_LEFT, GLFW_KEY_RIGHT);
   held.tilt_up = of_keys(handle_, GLFW_KEY_DOWN, GLFW_KEY_UP);
-  add_gamepad(held);
+  held.pedal = pedal_;
+  if (seen) add_gamepad(held);
   return std::exchange(input_, {});
 }
 
-void Window::on_key(GLFWwindow* handle, int key, int scancode, int action, int /*mods*/) {
+bool Window::is_seen() const {
+  return glfwGetWindowAttrib(handle_, GLFW_VISIBLE) == GLFW_TRUE &&
+         glfwGetWindowAttrib(handle_, GLFW_ICONIFIED) == GLFW_FALSE;
+}
+
+bool Window::is_over() const {
+  int width = 0;
+  int height = 0;
+  glfwGetWindowSize(handle_, &width, &height);
+  return cursor_x_ >= 0 && cursor_y_ >= 0 && cursor_x_ < width && cursor_y_ < height &&
+         glfwGetWindowAttrib(handle_, GLFW_HOVERED) == GLFW_TRUE;
+}
+
+void Window::let_go() noexcept {
+  down_ = {};
+  pedal_ = false;
+  input_.left = true;
+}
+
+void Window::on_key(GLFWwindow* handle, int key, int scancode, int action, int mods) {
+  Window& window = window_of(handle);
+  if (key == GLFW_KEY_SPACE && action != GLFW_REPEAT) window.pedal_ = action == GLFW_PRESS;
   if (action != GLFW_PRESS) return;
   const char letter = letter_of(key, scancode);
-  if (letter != '\0') window_of(handle).input_.keys.push_back(letter);
+  const bool redo = (letter == 'z' && (mods & GLFW_MOD_SHIFT) != 0) ||
+                    (letter == 'y' && (mods & GLFW_MOD_CONTROL) != 0);
+  if (letter != '\0') window.input_.keys.push_back(redo ? 'Z' : letter);
 }
 
 void Window::on_cursor(GLFWwindow* handle, double x, double y) {
@@ -218,13 +243,13 @@ void Window::on_cursor(GLFWwindow* handle, double x, double y) {
   int height = 0;
   glfwGetWindowSize(handle, &width, &height);
   if (height <= 0) return;
-  const bool left = is_down(handle, GLFW_MOUSE_BUTTON_LEFT);
+  const bool left = window.down_[GLFW_MOUSE_BUTTON_LEFT];
   const bool shift = has_shift(handle);
   WindowInput& input = window.input_;
-  if (is_down(handle, GLFW_MOUSE_BUTTON_MIDDLE) || (left && shift)) {
+  if (window.down_[GLFW_MOUSE_BUTTON_MIDDLE] || (left && shift)) {
     input.move_right += right / height;
     input.move_up += up / height;
-  } else if (is_down(handle, GLFW_MOUSE_BUTTON_RIGHT)) {
+  } else if (window.down_[GLFW_MOUSE_BUTTON_RIGHT]) {
     input.turn_right += right / height;
     input.turn_up += up / height;
   } else if (left) {
@@ -237,14 +262,17 @@ void Window::on_cursor(GLFWwindow* handle, double x, double y) {
 }
 
 void Window::on_enter(GLFWwindow* handle, int entered) {
-  if (entered == GLFW_FALSE) window_of(handle).cursor_known_ = false;
+  if (entered == GLFW_TRUE) return;
+  window_of(handle).cursor_known_ = false;
+  window_of(handle).input_.left = true;
 }
 
 void Window::on_button(GLFWwindow* handle, int button, int action, int /*mods*/) {
+  Window& window = window_of(handle);
+  const auto at = static_cast<std::size_t>(button);
+  if (at < window.down_.size()) window.down_[at] = action == GLFW_PRESS;
   // A click may be over before the next `poll`.
-  if (button == GLFW_MOUSE_BUTTON_LEFT && action == GLFW_PRESS) {
-    window_of(handle).input_.pointer.down = true;
-  }
+  if (button == GLFW_MOUSE_BUTTON_LEFT && action == GLFW_PRESS) window.input_.pointer.down = true;
 }
 
 void Window::on_scroll(GLFWwindow* handle, double /*x*/, double y) {

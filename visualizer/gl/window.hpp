@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -20,6 +21,7 @@ struct HeldControls {
   double deeper = 0.0;                     ///< away from the eye; page up and down, right stick
   double tilt_right = 0.0, tilt_up = 0.0;  ///< arrows, the pad's cross
   bool press = false;                      ///< the pad's right bumper or lower button
+  bool pedal = false;                      ///< the space bar
   bool by_pad = false;                     ///< a gamepad has a part in it
 };
 
@@ -34,7 +36,9 @@ struct WindowInput {
   double zoom = 0.0;       ///< the wheel with control
   double plane = 0.0;      ///< with shift
   HeldControls held;       ///< now
-  bool hovers = false;     ///< the pointer is over the window
+  bool hovers = false;     ///< the pointer is over the window, and nothing lies between
+  bool left = false;       ///< it was elsewhere in between, or the window was not visible
+  bool visible = true;     ///< neither minimised nor taken off the screen
   Pointer pointer;         ///< at the end; down if it was so at any time
   std::vector<char> keys;  ///< lower-case letters and digits as printed on them
   double density = 1.0;    ///< of the display, over that of 96 dots per inch
@@ -68,6 +72,13 @@ class Window final : public GlContext {
   [[nodiscard]] WindowInput poll();
 
  private:
+  /// False while it is minimised or taken off the screen.
+  [[nodiscard]] bool is_seen() const;
+  /// Whether the pointer is over the part of the window that is seen.
+  [[nodiscard]] bool is_over() const;
+  /// Lets go of all that is held down: its end will not be told.
+  void let_go() noexcept;
+
   static void on_key(GLFWwindow* handle, int key, int scancode, int action, int mods);
   static void on_cursor(GLFWwindow* handle, double x, double y);
   static void on_enter(GLFWwindow* handle, int entered);
@@ -79,7 +90,9 @@ class Window final : public GlContext {
   WindowInput input_;
   double cursor_x_ = 0.0;
   double cursor_y_ = 0.0;
-  bool cursor_known_ = false;  ///< it is over the window, and has said where
+  bool cursor_known_ = false;   ///< it is over the window, and has said where
+  std::array<bool, 3> down_{};  ///< buttons, by GLFW's numbers
+  bool pedal_ = false;          ///< the space bar is down
   bool pointer_shown_ = true;
 };
 

@@ -133,7 +133,7 @@ void Monkey::choose(WindowInput& input) {
 }
 
 void Monkey::press_key(WindowInput& input) {
-  constexpr std::string_view kOften = "vvvvbccxxyttttlhpp123456789rzu";
+  constexpr std::string_view kOften = "vvvvbccxxyttttlhpp123456789rzZu";
   constexpr std::string_view kSeldom = "sewm";  // each leaves a file
   const std::string_view keys = dice_.once_in(15) ? kSeldom : kOften;
   input.keys.push_back(keys[static_cast<std::size_t>(dice_.below(static_cast<int>(keys.size())))]);

@@ -18,6 +18,7 @@ inline constexpr auto kKeys = std::to_array<KeyHelp>({
     {"wheel", "nearer, farther"},
     {"r", "first view again"},
     {"z", "undo the last stroke"},
+    {"shift + z", "cut it again"},
     {"u, u", "undo all cuts"},
     {"1 .. 9", "take this tool"},
     {"v", "next renderer"},
@@ -45,7 +46,8 @@ inline constexpr std::size_t kMouseKeys = 3;
 /// What changes when the pointer leads the emulated hand (--hand-socket).
 inline constexpr auto kHandKeys = std::to_array<KeyHelp>({
     {"pointer", "leads the hand: see the ring"},
-    {"left button", "press"},
+    {"left button", "press: only this cuts"},
+    {"space", "pedal: cuts without pressing"},
     {"wheel", "deeper; or page up, down"},
     {"arrows", "tilt the tool"},
     {"g", "the hand comes here"},

@@ -130,6 +130,64 @@ TEST_CASE("the left button presses along the ray while it is down") {
   CHECK(glm::length(*bench.hand.goal_mm() - before) < 1e-9);
 }
 
+TEST_CASE(
+    "the pedal is down while button, space bar or a pad's button is, and not before or after") {
+  Bench bench;
+  const auto pedal = [&] { return bench.hand.target(bench.device).button1; };
+  bench.frame(at(120, 80));
+  const glm::dvec3 before = *bench.hand.goal_mm();
+  CHECK_FALSE(pedal());
+  for (const int by : {0, 1, 2}) {
+    CAPTURE(by);
+    WindowInput press = at(120, 80);
+    press.pointer.down = by == 0;
+    press.held.pedal = by == 1;
+    press.held.press = by == 2;
+    bench.frame(press);
+    CHECK(pedal());
+    const double deeper_mm = by == 1 ? 0.0 : PointerHand::kPressMm * 2.0;
+    CHECK(glm::length(*bench.hand.goal_mm() - before) == doctest::Approx(deeper_mm));
+    bench.frame(at(120, 80));
+    CHECK_FALSE(pedal());
+  }
+}
+
+TEST_CASE("a press ends whatever takes the pointer away, and does not go on when it is back") {
+  for (const bool by_bar : {false, true}) {
+    for (const int way : {0, 1, 2, 3, 4, 5}) {
+      CAPTURE(way);
+      Bench bench;
+      const auto pressed = [&] {
+        const bool deep = glm::length(*bench.hand.goal_mm() - bench.tool_mm) > 3.0;
+        CHECK((by_bar || deep == bench.hand.target(bench.device).button1));
+        return bench.hand.target(bench.device).button1;
+      };
+      const SeenPoint tool = bench.tool();
+      WindowInput press = at(tool.pixel.x, tool.pixel.y);
+      bench.frame(press);
+      (by_bar ? press.held.pedal : press.pointer.down) = true;
+      bench.frame(press);
+      REQUIRE(pressed());
+      WindowInput away = press;
+      if (way == 0) away.hovers = false;  // the pointer is outside, and the button still down
+      if (way == 1) away.left = true;     // it was outside, and is back, within one frame
+      if (way == 4) bench.hand.come();
+      if (way == 5) bench.hand.end_press();
+      const glm::dvec3 tool_mm = bench.tool_mm;
+      if (way == 3) bench.tool_mm = {0.0, 1e4, 1e4};  // the tool is behind the eye
+      bench.frame(way == 3 ? at(tool.pixel.x, tool.pixel.y) : away, way == 2);
+      bench.tool_mm = tool_mm;
+      CHECK_FALSE(pressed());
+      if (way == 3) continue;
+      bench.frame(press);
+      CHECK_FALSE(pressed());  // back, but never released
+      bench.frame(at(tool.pixel.x, tool.pixel.y));
+      bench.frame(press);
+      CHECK(pressed());
+    }
+  }
+}
+
 TEST_CASE("a camera that turns about the goal leaves it where it is, in world and picture") {
   Bench bench;
   bench.frame(at(120, 80));

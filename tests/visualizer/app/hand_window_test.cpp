@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Controller, emulator and window as a user without a device has them: pointer events alone cut.
+#include <array>
 #include <chrono>
+#include <cmath>
 #include <csignal>
 #include <cstdint>
 #include <filesystem>
@@ -10,6 +12,7 @@
 
 #include <doctest/doctest.h>
 
+#include "shared/volume/checksum.hpp"
 #include "tests/json.hpp"
 #include "tests/support/process.hpp"
 #include "tests/visualizer/app/window_fixture.hpp"
@@ -44,11 +47,12 @@ struct Bench {
     emulator.emplace(std::vector{kPrograms + "/kerf-emulator", std::string("--socket"), port,
                                  std::string("--hand-socket"), hand},
                      screen.folder / "emulator.log");
-    controller.emplace(std::vector<std::string>{kPrograms + "/kerf-controller", "--scene",
-                                                cut_scene(screen.folder), "--torque-scale",
-                                                "0.342,0.342,0.342", "--port", "socket:" + port,
-                                                "--name", "test", "--report", report.string()},
-                       screen.folder / "controller.log");
+    controller.emplace(
+        std::vector<std::string>{kPrograms + "/kerf-controller", "--scene",
+                                 cut_scene(screen.folder), "--torque-scale", "0.342,0.342,0.342",
+                                 "--port", "socket:" + port, "--name", "test", "--pedal",
+                                 "--report", report.string()},
+        screen.folder / "controller.log");
     window.emplace(arguments(), screen.folder / "window.log");
     REQUIRE(said(*window, "the hand is yours"));
   }
@@ -74,6 +78,37 @@ struct Bench {
     kerf::Session session("test");
     constexpr std::uint16_t kFault = 5;
     return session.latest() && session.latest()->phase == kFault;
+  }
+  /// What is left of the tooth, once it stays so for a moment.
+  static std::uint64_t tooth() {
+    kerf::Session session("test");
+    return kerf::density_hash(session.contents()[0].density);
+  }
+  static kerf::TickRecord tick() {
+    kerf::Session session("test");
+    REQUIRE(session.latest());
+    return *session.latest();
+  }
+  /// Holds the left button over this pixel until the bur cuts there, 5 mm deeper than the tip's
+  /// start; the button stays down. A busy machine may latch a fault, which parking clears.
+  static void press(int x, int y) {
+    const std::string there = "mousemove " + std::to_string(x) + " " + std::to_string(y);
+    const std::uint64_t before = tooth();
+    for (int tries = 0; tries < 4; ++tries) {
+      act(there + " sleep 0.3 mousedown 1 sleep 0.8");
+      if (tooth() != before) return;
+      act("mouseup 1");
+      if (faulted()) act("key k sleep 5");
+      act(there + " sleep 0.2 click --repeat 4 --delay 10 4 sleep 0.3");
+    }
+    FAIL("nothing was cut");
+  }
+  /// Nothing is cut in the next half second.
+  static void check_rests() {
+    const std::uint64_t before = tooth();
+    act("sleep 0.5");
+    CHECK((tick().flags & kerf::kFlagButton1) == 0);
+    CHECK(tooth() == before);
   }
   /// Ends the run; what the controller counted.
   double removed_mm3() {
@@ -112,6 +147,108 @@ TEST_CASE("pointer events cut where the tooth is, and nowhere else") {
     act("mousemove 60 330" + kCut);   // over the controls
     CHECK(bench.removed_mm3() == 0.0);
   }
+}
+
+TEST_CASE("a press ends with whatever takes the pointer or the window away, and is made anew") {
+  if (!have("Xvfb") || !have("xdotool")) return;
+  Bench bench;
+  const OtherWindow other({320, 60, 150, 120});
+  const std::string find = "search --name 'kerf: test' ";
+  act("mousemove 240 150 sleep 0.2 click --repeat 20 --delay 10 4 sleep 0.3");
+  struct Way {
+    const char* name;
+    std::string away, back;
+  };
+  const Way ways[] = {
+      {"outside", "mousemove 700 500", "mousemove 240 150"},
+      {"along the edge and out", "mousemove 240 359 mousemove 240 400", "mousemove 240 150"},
+      {"another window lies there", "mousemove 400 120", "mousemove 240 150"},
+      {"a panel", "mousemove 60 330", "mousemove 240 150"},
+      {"another window has the focus", find + "windowfocus sleep 0.2", ""},
+      {"taken off the screen", find + "windowunmap", find + "windowmap sleep 0.3"},
+  };
+  int x = 228;
+  for (const Way& way : ways) {
+    CAPTURE(std::string(way.name));
+    Bench::press(x += 4, 150);
+    act(way.away);
+    if (way.back.empty()) other.take_focus();
+    act("sleep 0.1");
+    Bench::check_rests();
+    if (!way.back.empty()) act(way.back);
+    Bench::check_rests();
+    act("mouseup 1");
+    Bench::check_rests();
+  }
+  SUBCASE("the window hangs") {
+    Bench::press(240, 156);
+    bench.window->signal(SIGSTOP);
+    act("sleep 0.2");
+    Bench::check_rests();
+    bench.window->signal(SIGCONT);
+    act("sleep 0.2");
+    Bench::check_rests();  // the button is still down
+  }
+  SUBCASE("the window is killed") {
+    Bench::press(240, 156);
+    bench.window->signal(SIGKILL);
+    act("sleep 0.1");
+    Bench::check_rests();
+  }
+  act("mouseup 1");
+}
+
+TEST_CASE(
+    "only a press cuts: not a hand that hovers deep, is let go, walks to a list, or sees twice") {
+  if (!have("Xvfb") || !have("xdotool")) return;
+  Bench bench;
+  const std::uint64_t whole = Bench::tooth();
+  act("mousemove 260 150 sleep 0.2 click --repeat 24 --delay 10 4 sleep 0.5 "
+      "mousemove_relative -- 6 0 sleep 0.3 mousemove_relative -- -12 4 sleep 0.3");
+  CHECK(Bench::tooth() == whole);
+  Bench::press(260, 150);
+  act("mouseup 1");
+  Bench::check_rests();
+  const auto place = [] {
+    const kerf::TickRecord tick = Bench::tick();
+    return std::array{tick.position_mm[0], tick.position_mm[1], tick.position_mm[2]};
+  };
+  const auto before = place();
+  act("key t sleep 0.5");
+  const auto after = place();
+  for (std::size_t i = 0; i < 3; ++i) CHECK(std::abs(after[i] - before[i]) < 0.1);
+  act("key t sleep 0.3");
+  const std::uint64_t once = Bench::tooth();
+  act("mousemove 200 200 sleep 0.1 mousemove 60 330 sleep 0.5");
+  CHECK(Bench::tooth() == once);
+  act("mousemove 240 170 sleep 0.3 keydown space sleep 0.8");  // the pedal alone
+  CHECK((Bench::tick().flags & kerf::kFlagButton1) != 0);
+  act("mousemove 700 500");
+  Bench::check_rests();
+  act("keyup space");
+}
+
+TEST_CASE("z takes back one press, shift and z makes it again, though the bur never leaves") {
+  if (!have("Xvfb") || !have("xdotool")) return;
+  Bench bench;
+  act("mousemove 240 150 sleep 0.2 click --repeat 20 --delay 10 4 sleep 0.3");
+  std::array<std::uint64_t, 4> tooth{Bench::tooth()};
+  for (std::size_t i = 1; i < tooth.size(); ++i) {
+    Bench::press(232 + 6 * static_cast<int>(i), 150);
+    act("mouseup 1 sleep 0.1");
+    tooth[i] = Bench::tooth();
+  }
+  for (std::size_t i = tooth.size() - 1; i-- > 0;) {
+    act("key z sleep 0.3");
+    CHECK(Bench::tooth() == tooth[i]);
+  }
+  for (std::size_t i = 1; i < tooth.size(); ++i) {
+    act("key shift+z sleep 0.3");
+    CHECK(Bench::tooth() == tooth[i]);
+  }
+  act("mousedown 1 sleep 0.3 key z sleep 0.5");  // while a press is held: it ends
+  Bench::check_rests();
+  act("mouseup 1");
 }
 
 TEST_CASE("windows and emulators come and go, and each is told") {

@@ -186,6 +186,30 @@ int Controller::asked(CommandKind kind) {
   return asked;
 }
 
+OtherWindow::OtherWindow(const std::array<int, 4>& place) {
+  Display* const display = XOpenDisplay(nullptr);
+  REQUIRE(display != nullptr);
+  display_ = display;
+  XSetWindowAttributes attributes{};
+  attributes.override_redirect = True;
+  window_ =
+      XCreateWindow(display, DefaultRootWindow(display), place[0], place[1],
+                    static_cast<unsigned>(place[2]), static_cast<unsigned>(place[3]), 0,
+                    CopyFromParent, InputOutput, CopyFromParent, CWOverrideRedirect, &attributes);
+  XMapRaised(display, window_);
+  XSync(display, False);
+}
+
+OtherWindow::~OtherWindow() {
+  XCloseDisplay(static_cast<Display*>(display_));
+}
+
+void OtherWindow::take_focus() const {
+  Display* const display = static_cast<Display*>(display_);
+  XSetInputFocus(display, window_, RevertToNone, CurrentTime);
+  XSync(display, False);
+}
+
 void act(const std::string& events) {
   send(events);
   let_it_show();

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <future>
@@ -59,6 +60,20 @@ class Controller {
   SegmentWriter writer_;
   SegmentServer server_;
   Tick now_ = 0;
+};
+
+/// Another program's window, on top of all there are now: of `x, y, width, height` in pixels.
+class OtherWindow {
+ public:
+  explicit OtherWindow(const std::array<int, 4>& place);
+  ~OtherWindow();
+  OtherWindow(const OtherWindow&) = delete;
+  OtherWindow& operator=(const OtherWindow&) = delete;
+  void take_focus() const;
+
+ private:
+  void* display_;
+  unsigned long window_;
 };
 
 /// Real events at the screen that DISPLAY names, and the time in which a window shows what they do.
