@@ -99,6 +99,8 @@ class Demo:
             return self.run_two_machines()
         self.name = options.name or f"demo-{os.getpid()}"
         self.find_meeting_point()
+        if options.bound_is_told:
+            say(f"kerf: demo: runs for {options.seconds} s; --seconds N: another time")
         if options.serve:
             self.start_bridge()
         self.start_controller()
@@ -174,7 +176,7 @@ class Demo:
         self.controller = processes.start("controller", [
             "--scene", self.scene, *options.volume, "--device", options.device, *self.ask, "--seconds", options.seconds,
             *(["--rate", options.rate] if options.rate else []), "--name", self.name,
-            *(["--virtual"] if options.virtual else []), *until, *(["--progress"] if sys.stdout.isatty() else []),
+            *(["--virtual"] if options.virtual else []), *(["--pedal"] if options.mouse else []), *until, *(["--progress"] if sys.stdout.isatty() else []),
             "--emulator-args", self.told, "--report", os.path.join(self.results, "report.json"),
             "--final", os.path.join(self.results, "final.nrrd")], out="summary")
         while not self.told.exists() and self.controller.poll() is None:
@@ -210,7 +212,8 @@ class Demo:
 
     def hand(self, told):
         if self.options.mouse:
-            return ["--hand-socket", self.processes.path("hand")]
+            pedal = ["--wireless-button"] if self.options.device == "woodenhaptics" else []  # its arm has no button
+            return ["--hand-socket", self.processes.path("hand"), *pedal]
         if self.options.hand:
             return ["--hand", self.options.hand]
         script = told.get("hand_script", "")
@@ -225,6 +228,7 @@ class Demo:
         record = ["--record", options.record] if options.record else []
         if not options.headless:
             led = ["--hand-socket", processes.path("hand")] if options.mouse else []
+            led += ["--ends-after", options.seconds] if options.bound_is_told else []
             keys_out = ["--out", self.results] if self.out else []  # else the window's keys write to the current folder
             self.window = processes.start("visualizer", [
                 *common, *record, *led, *keys_out, "--attached", processes.path("window-shows"),

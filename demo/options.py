@@ -40,6 +40,7 @@ class Options:
     headless: bool = False
     serve: bool = False
     virtual: bool = False
+    bound_is_told: bool = False
 
     @property
     def mouse(self):
@@ -133,6 +134,7 @@ def check(options):
         raise Refusal(f"--name {options.name}: no name of a controller; use 1 to 64 letters, digits, '.', '_' or '-'")
     if options.name and runs(options.name):
         raise Refusal(f"--name {options.name}: a controller of this name runs; stop it or choose another name")
+    options.bound_is_told = options.mouse or options.serve  # a person works as long as they do, not as a script does
     options.seconds = options.seconds or ("600" if options.mouse else "60" if options.serve else "10")
     if not re.fullmatch(r"[0-9]{1,6}(\.[0-9]+)?", options.seconds) or not re.search("[1-9]", options.seconds):
         raise Refusal(f"--seconds {options.seconds}: not a positive number of seconds; take 10")

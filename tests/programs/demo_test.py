@@ -57,7 +57,9 @@ class TestOptions(unittest.TestCase):
     def test_defaults(self):
         self.assertEqual((checked().seconds, checked().out, checked().headless), ("10", "kerf-demo", True))
         self.assertEqual(checked("--serve").seconds, "60")
-        self.assertEqual(checked("--hand", "mouse", display=":0").seconds, "600")
+        mouse = checked("--hand", "mouse", display=":0")
+        self.assertEqual((mouse.seconds, mouse.bound_is_told), ("600", True))
+        self.assertFalse(checked("--seconds", "3").bound_is_told)
         self.assertFalse(checked(display=":0").headless)
         self.assertEqual(checked("--headless").out, "")
         self.assertEqual(checked("--size", "8192x1", "--seconds", "999999.5").size, "8192x1")
