@@ -231,15 +231,42 @@ bool none_is_labelled(const LoadedScene& scene) {
                              [](const SceneVolume& volume) { return volume.image.labels.empty(); });
 }
 
-/// A surface of a material's own needs labels.
-void check_felt_materials(const LoadedScene& scene) {
+/// A surface of a material's own, and its protection, need labels.
+void check_labelled_materials(const LoadedScene& scene) {
   if (!none_is_labelled(scene)) return;
-  for (const Material& material : scene.materials) {
-    if (!material.felt_iso) continue;
-    refuse(scene.path, ": material " + material.name +
-                           " has felt_iso = " + number_text(*material.felt_iso) +
+  const auto need_labels = [&](const Material& material, const std::string& key,
+                               const std::string& value) {
+    refuse(scene.path, ": material " + material.name + " has " + key + " = " + value +
                            ", and no volume has labels to tell where it is; put them beside its "
-                           "file (NAME-labels.nrrd), or leave felt_iso out");
+                           "file (NAME-labels.nrrd), or leave " +
+                           key + " out");
+  };
+  for (const Material& material : scene.materials) {
+    if (material.felt_iso) need_labels(material, "felt_iso", number_text(*material.felt_iso));
+    if (material.forbidden) need_labels(material, "forbidden", "true");
+  }
+}
+
+/// A material of the scene without a voxel shows and protects nothing: its name is a slip. Below
+/// the highest label it may hold the place of one that this file lacks, but not to be protected.
+void check_material_names(const LoadedScene& scene) {
+  std::vector<bool> there(scene.materials.size());
+  for (const SceneVolume& volume : scene.volumes) {
+    for (const Label label : volume.image.labels) there[label] = true;
+  }
+  std::vector<std::string_view> known;
+  std::size_t highest = 0;
+  for (std::size_t m = 1; m < there.size(); ++m) {
+    if (!there[m]) continue;
+    known.push_back(scene.materials[m].name);
+    highest = m;
+  }
+  for (std::size_t m = 1; m < there.size(); ++m) {
+    const Material& material = scene.materials[m];
+    if (!material.in_scene || there[m] || (m < highest && !material.forbidden)) continue;
+    refuse(scene.path, ": material.name = \"" + material.name + '"' +
+                           unknown_word(material.name, known, "\"") +
+                           ", the materials of which its volumes have voxels");
   }
 }
 
@@ -324,7 +351,9 @@ LoadedScene load_parsed(Scene spec, const std::filesystem::path& path,
     scene.volumes.push_back(load_volume(spec.volumes[i], from, scene.materials,
                                         from_command_line ? written_iso : std::nullopt));
   }
-  check_felt_materials(scene);
+  // A volume of the command line is not the one that the scene was written for.
+  if (!overrides.volume_file) check_labelled_materials(scene);
+  if (!overrides.volume_file && !none_is_labelled(scene)) check_material_names(scene);
   const bool fitted = overrides.volume_file.has_value() || spec.device.fit;
   if (fitted) fit_to_volume(written_mm, spec, scene);
   if (none_is_labelled(scene)) {

@@ -280,3 +280,40 @@ TEST_CASE("a felt_iso that cannot be is refused with a way out") {
   const std::string error = test::error_of([&] { static_cast<void>(load_scene(scene)); });
   CHECK(has(error, "material pulp has felt_iso = 0.1, and no volume has labels"));
 }
+
+TEST_CASE(
+    "a scene's material without a voxel is refused with the nearest name; a place may be held") {
+  const std::string tool = "[[tool]]\nshape = \"ball\"\nsize_vox = 8\n";
+  const std::string phantom = "[[volume]]\nfile = \"phantom\"\nsize = [64, 64, 40]\n" + tool;
+  const auto material = [](const std::string& name, const std::string& more = "") {
+    return "[[material]]\nname = \"" + name + "\"\n" + more;
+  };
+  const std::string forbidden = "forbidden = true\n";
+  CHECK(has(
+      load_error(phantom + material("Pulp", forbidden)),
+      "material.name = \"Pulp\" is unknown; did you mean \"pulp\"? known: enamel, dentin, pulp, "
+      "the materials of which its volumes have voxels"));
+  CHECK(has(load_error(phantom + material("caries")), "\"caries\" is unknown; known: enamel"));
+  CHECK(load_error(phantom + material("pulp", forbidden)).empty());
+
+  // Labels 1 and 4 alone: 2 and 3 hold places.
+  const VoxelGrid grid{30, 30, 24};
+  const TemporaryFolder folder;
+  static_cast<void>(folder.write(
+      "block.nrrd", nrrd(grid, {0.1, 0.1, 0.1}, block(grid, {{5, 5, 7}, {25, 25, 17}}, 1000))));
+  const std::string file = "[[volume]]\nfile = \"block.nrrd\"\n" + tool;
+  const auto error = [&](const std::string& materials) {
+    const auto scene = folder.write("scene.toml", file + materials);
+    return test::error_of([&] { static_cast<void>(load_scene(scene)); });
+  };
+  CHECK(has(error(material("bone", forbidden)),
+            "bone has forbidden = true, and no volume has labels"));
+  CHECK(error(material("bone")).empty());
+  auto labels = block(grid, {{5, 5, 7}, {25, 25, 17}}, 1);
+  labels[(10 * 30 + 10) * 30 + 10] = 4;
+  static_cast<void>(folder.write("block-labels.nrrd", nrrd(grid, {0.1, 0.1, 0.1}, labels)));
+  CHECK(error(material("pulp") + material("nerve", forbidden)).empty());
+  CHECK(has(error(material("pulp", forbidden) + material("nerve")),
+            "material.name = \"pulp\" is unknown; known: enamel, nerve"));
+  CHECK(has(error(material("nerve") + material("bone")), "\"bone\" is unknown; "));
+}
