@@ -59,12 +59,14 @@ ReachCurve reach_curve(const HandRoute& route, DeviceVec<double> from_mm,
 }
 
 HandMotion::HandMotion(const HandScript& script, const HandRoute& route)
-    : route_(route), start_mm_(vec_of(script.start) * script.unit_mm), from_mm_(route.rest_tip_mm) {
+    : route_(route),
+      start_mm_(vec_of(script.start) * script.unit_mm.value_or(1)),
+      from_mm_(route.rest_tip_mm) {
   for (const HandStep& step : route.calibration) add(step, 1.0);
   reach_ = legs_.size();
   legs_.emplace_back();
   begin_reach();
-  for (const HandStep& step : script.steps) add(step, script.unit_mm);
+  for (const HandStep& step : script.steps) add(step, script.unit_mm.value_or(1));
   repeat_from_ = script.repeat_from ? reach_ + 1 + *script.repeat_from : legs_.size();
 }
 

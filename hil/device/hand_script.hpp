@@ -39,7 +39,7 @@ struct HandStep {
 
 /// A scripted hand.
 struct HandScript {
-  double unit_mm = 1.0;                  ///< device mm per script unit
+  std::optional<double> unit_mm{};       ///< device mm per script unit; if empty, the scene's, or 1
   std::array<double, 3> start{0, 5, 0};  ///< first point above the surface
   std::vector<HandStep> steps;
   std::optional<std::size_t> repeat_from;  ///< after the last step go on here; empty: stay

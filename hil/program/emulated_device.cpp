@@ -23,7 +23,7 @@ std::optional<HandScript> hand_of(const EmulatorOptions& o) {
   if (o.hand.empty() && o.hand_socket.empty()) return std::nullopt;
   HandScript script;  // one that a window leads only goes to its start
   if (!o.hand.empty()) script = read_hand_script(o.hand);
-  if (o.unit_mm) script.unit_mm = *o.unit_mm;
+  if (!script.unit_mm) script.unit_mm = o.unit_mm;
   return script;
 }
 

@@ -206,7 +206,9 @@ void declare(Arguments& app, EmulatorOptions& o) {
              "path of a socket at which a window (kerf-visualizer --hand-socket) leads the hand, "
              "in place of a script");
   app.option("--fault", o.fault, "fault script (TOML), for example hil/faults/late_reports.toml");
-  app.option("--unit-mm", o.unit_mm, "device mm per unit of the hand script").within(1e-3, 100.0);
+  app.option("--unit-mm", o.unit_mm,
+             "device mm per unit of a hand script without unit_mm (default: 1)")
+      .within(1e-3, 100.0);
   declare_front(app, o);
   declare_device(app, o);
   app.option("--report", o.report, "write what was seen as JSON");

@@ -95,7 +95,7 @@ HandScript parse_hand_script(std::string_view text, const std::string& place) {
   const ScriptTable top(file, place, "");
   top.allow_only({"unit_mm", "start_mm", "device", "hand", "step"});
   HandScript script;
-  script.unit_mm = top.number("unit_mm", script.unit_mm, {0, kMaxUnitMm, true});
+  if (top.has("unit_mm")) script.unit_mm = top.number("unit_mm", 1, {0, kMaxUnitMm, true});
   script.start = top.numbers<3>("start_mm", script.start, kLength);
 
   script.plant = plant_of(top, place);

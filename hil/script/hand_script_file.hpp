@@ -11,7 +11,7 @@ namespace kerf {
 
 /// Reads a hand script, TOML of at most 1 MiB and 10000 steps:
 ///
-///     unit_mm  = 1.0             # device mm per unit of length below
+///     unit_mm  = 1.0             # device mm per unit of length below; if missing, the scene's
 ///     start_mm = [0, 5, 0]       # first point above the surface
 ///     [device]                   # any key of kPlantKeys that belongs to it; options win
 ///     coulomb_n = 0.1

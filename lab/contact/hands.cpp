@@ -141,7 +141,7 @@ LoadedScene shipped_scene(const std::string& name, const Effort& effort) {
 
 HandRun run_hand(const LoadedScene& scene, const std::string& name, const Effort& effort) {
   HandScript hand = read_hand_script("scenes/hands/" + name + ".toml");
-  hand.unit_mm = hand_unit_mm(scene);
+  if (!hand.unit_mm) hand.unit_mm = hand_unit_mm(scene);
   HandRun run = run_hand(scene, hand, effort.hand_seconds);
   run.name = name;
   return run;

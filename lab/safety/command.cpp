@@ -311,7 +311,7 @@ std::vector<int> Command::rates() const {
 
 std::vector<Cell> Command::cells() const {
   const std::string place = find_data_file(scene_);
-  HandScript hand = read_hand_script(find_data_file(hand_));
+  const HandScript script = read_hand_script(find_data_file(hand_));
   std::vector<Cell> cells;
   for (const std::string& device : devices_) {
     SceneOverrides overrides;
@@ -323,7 +323,8 @@ std::vector<Cell> Command::cells() const {
       for (const std::string& numeric : numerics_) {
         overrides.numeric = named<NumericKind>(numeric, kNumericWords);
         LoadedScene scene = load_scene(place, overrides);
-        hand.unit_mm = hand_unit_mm(scene);
+        HandScript hand = script;
+        if (!hand.unit_mm) hand.unit_mm = hand_unit_mm(scene);
         for (const std::string& model : models_) {
           scene.force.model = named<ForceModel>(model, kModelWords);
           cells.push_back({scene, hand, device, model, numeric});

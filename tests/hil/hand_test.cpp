@@ -131,6 +131,24 @@ TEST_CASE("the unit scales every length of the script and none of the way out") 
   CHECK(norm(after(motion, kSecond).target_mm - DeviceVec<double>{0, -3, 0}) < 1e-9);
 }
 
+TEST_CASE("a script's own unit is obeyed; --unit-mm is for one without, as a demo gives it") {
+  const kerf::test::TemporaryFolder folder;
+  const auto tip_mm = [&](const char* own_unit, std::optional<double> unit_mm) {
+    kerf::EmulatorOptions options;
+    options.hand = folder.write(
+        "hand.toml", std::string(own_unit) + "\nstart_mm = [0, 8, 0]\n[[step]]\nhold = 9");
+    options.unit_mm = unit_mm;
+    kerf::EmulatedDevice device(options);
+    device.receive(encode(kerf::OmniCommand{.light = kerf::OmniCommand::Light::steady}));
+    device.advance(3 * kSecond);
+    return device.model().tip_mm();
+  };
+  const DeviceVec<double> tripled = tip_mm("", 3);
+  CHECK(norm(tip_mm("unit_mm = 3", std::nullopt) - tripled) == 0);
+  CHECK(norm(tip_mm("unit_mm = 3", 0.5) - tripled) == 0);
+  CHECK(norm(tip_mm("", std::nullopt) - tripled) > 10);
+}
+
 TEST_CASE("the repeated block comes again to the cycle, and the orientation is kept") {
   auto motion = motion_of(
       "[[step]]\nmove_mm = [0, 3, 0]\nseconds = 0.5\norientation_deg = [0, 30, 0]\n"

@@ -9,7 +9,7 @@ def hand(root):
     file, limits = Source(root, "hil/script/hand_script_file.cpp"), Source(root, "hil/script/script_table.hpp")
     length, seconds = f"{file.number('kMaxLength'):g}", f"{limits.number('kMaxScriptSeconds'):g}"
     top = [
-        ("unit_mm", f"above 0, to {file.number('kMaxUnitMm'):g}", "1", "device mm per unit of length in this file"),
+        ("unit_mm", f"above 0, to {file.number('kMaxUnitMm'):g}", "none: the scene's, else 1", "device mm per unit of length in this file"),
         ("start_mm", f"[x, y, z], -{length} to {length}", "[0, 5, 0]", "first point, above the surface"),
         ("device", "table", "the device's own", "the arm, below"),
         ("hand", "table", "the device's own", "the grip, below"),
@@ -44,8 +44,9 @@ def hand(root):
     return f"""## Hands
 
 `--hand FILE` of `./kerf demo` and `./kerf emulator`, and `[hand] script` of a scene. Lengths count in units of `unit_mm`,
-in the device's frame: x right, y up, z to the user. The origin is the surface point under the tool. `scenes/hands`
-has examples.
+in the device's frame: x right, y up, z to the user. The origin is the surface point under the tool. Without `unit_mm` a unit
+is the radius of the scene's first tool at the device, so one script fits scenes of all sizes; `--unit-mm` of
+`./kerf emulator` sets it then. `scenes/hands` has examples.
 
 {table(heads, code(top))}
 
