@@ -67,20 +67,31 @@ template <class Real>
   return clamped(v, left);
 }
 
+/// `to` if it is within `most` of `from`, else the point at that distance on the way to it.
+template <class Real>
+[[nodiscard]] constexpr DeviceVec<Real> within_step(DeviceVec<Real> to, DeviceVec<Real> from,
+                                                    Real most) noexcept {
+  return norm(to - from) > most ? from + clamped(to - from, most) : to;
+}
+
 /// Clamps the wanted force to peak and thermal limit, then its step from the force of the last
 /// tick; heats the winding by what is left, the force to send.
 ///
 /// A hand that `leaves`, moving with the force of the last tick, is given energy by it: then that
-/// force may fall along its own direction at once, and the step counts from where it fell to.
+/// force may fall along its own direction at once, and the step counts from where it fell to. Both
+/// together change the force by no more than the slew or the last force, whichever is larger:
+/// |F - F'| <= max(slew, |F'|), the bound of every tick. A force that is scaled to the motors'
+/// range or switched off keeps it too, as a point between F and 0.
 template <class N>
 [[nodiscard]] constexpr DeviceVec<typename N::Real> limited_force(
     const ForceLimits<N>& limits, ThermalState<N>& thermal, DeviceVec<typename N::Real> wanted_n,
     DeviceVec<typename N::Real> last_n, bool leaves) noexcept {
   const auto bounded = clamped(wanted_n, std::min(limits.peak_n, thermal_limit(limits, thermal)));
+  const auto whole_n = last_n;
   if (leaves) last_n = fallen(last_n, bounded);
   // The second clamp takes off what rounding of the slew steps may have added up.
-  const auto sent =
-      clamped(last_n + clamped(bounded - last_n, limits.slew_n_per_tick), limits.peak_n);
+  auto sent = clamped(last_n + clamped(bounded - last_n, limits.slew_n_per_tick), limits.peak_n);
+  if (leaves) sent = within_step(sent, whole_n, std::max(limits.slew_n_per_tick, norm(whole_n)));
   heat_up(limits, thermal, sent);
   return sent;
 }

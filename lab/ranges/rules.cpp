@@ -96,6 +96,10 @@ void Rules::look_at_force(const ServoOutput& out, bool leaves) {
                                                      : length(out.force_n - last_force_n_);
   if (!(step_n <= slew_n_ + kRounding))
     broken("slew", format("%.9g N in a tick, above %.9g", step_n, slew_n_));
+  const double whole_n = length(out.force_n - last_force_n_);
+  const double bound_n = std::max(slew_n_, length(last_force_n_));
+  if (!(whole_n <= bound_n + kRounding))
+    broken("slew", format("%.9g N in a tick, above %.9g in all", whole_n, bound_n));
 }
 
 void Rules::look_at_motion(const DeviceReport& report, const ServoOutput& out, double way_mm) {

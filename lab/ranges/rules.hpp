@@ -29,7 +29,7 @@ struct Violation {
 ///   clamp       |F| is at most limits.force_n
 ///   slew        |F - F'| is at most limits.slew_n_per_ms; but a force may fall along its own
 ///               direction at once if the hand leaves with it or a motor is at its end, and the
-///               motors may go off
+///               motors may go off; in all by no more than |F'|, or the slew
 ///   off         motors that are off get no counts and give no force; they are on without a fault
 ///               only, while the phase is ramping or active
 ///   stale       without reports no force grows; after 20 ms the motors are off

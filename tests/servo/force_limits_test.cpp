@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "controller/servo/force_limits.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include <doctest/doctest.h>
@@ -51,6 +52,29 @@ TEST_CASE("whatever is wanted, peak and slew hold, also from the ends of the num
       sent = next;
     }
   }));
+}
+
+TEST_CASE_TEMPLATE("in no tick the force changes by more than the slew, or than there was of it", N,
+                   FixedNumbers, DoubleNumbers) {
+  using Real = typename N::Real;
+  const auto limits = omni_limits<N>();
+  CHECK(rc::check([&] {
+    const auto part = [](double most_n) {
+      return Real(*rc::gen::inRange(-10'000, 10'001) * most_n / 10'000);
+    };
+    const DeviceVec<Real> last =
+        clamped(DeviceVec<Real>{part(3.3), part(3.3), part(3.3)}, limits.peak_n);
+    const double wide_n = *rc::gen::element(0.1, 1.0, 10.0);
+    ThermalState<N> thermal;
+    const auto sent = limited_force<N>(limits, thermal, {part(wide_n), part(wide_n), part(wide_n)},
+                                       last, *rc::gen::arbitrary<bool>());
+    RC_ASSERT(length(sent - last) <= std::max(0.5, length(last)) + 6e-5);
+  }));
+  // A force that turns round while the hand leaves with it: gone, and no farther.
+  ThermalState<N> thermal;
+  const auto sent = limited_force<N>(limits, thermal, {Real(-2.0), Real(0.5), Real(0.0)},
+                                     {Real(1.3), Real(0.0), Real(0.0)}, true);
+  CHECK(length(sent - DeviceVec<Real>{Real(1.3), Real(0.0), Real(0.0)}) <= 1.3 + 6e-5);
 }
 
 TEST_CASE_TEMPLATE("a peak held for long settles at the continuous force", N, FixedNumbers,
