@@ -121,6 +121,8 @@ constexpr LogCode kFaults[] = {
     {4, "force_law", "the scene's force law gave what is no number"},
     {5, "velocity_estimator", "the scene's velocity estimator gave what is no number"},
     {6, "stabiliser", "the scene's stabiliser gave what is no number"},
+    {7, "wrong_dock", "parked at rest, but not where it was calibrated first"},
+    {8, "sparse_input", "reports came too seldom for too long"},
 };
 
 /// Each field of a tick record has its row, in its order.

@@ -107,6 +107,11 @@ inline double tip_noise_mm(Personality personality) {
   return wooden::kRadPerCount[1] * (wooden::kUpperLinkMm + wooden::kForearmMm) / 2;
 }
 
+/// How far from its first calibration a joint may rest parked: the play of a stylus in its inkwell,
+/// 3 mm at the wrist, and twice the 10 mrad within which a hand holds WoodenHaptics in its home
+/// pose. A Falcon has no dock: its button is held anywhere.
+inline constexpr double kDockPlayRad = 0.025;
+
 }  // namespace device_parts
 
 /// The device, its position in the scene and its motors.
@@ -126,6 +131,10 @@ void plan_device(const DeviceSettings& device, ServoPlan<N>& plan) {
   const auto joints = device_parts::joints_of(device);
   for (std::size_t i = 0; i < 3; ++i) {
     arm.joints[i].home_rad = typename N::Angle(joints[i].home_rad);
+    if (device.personality != Personality::falcon) {
+      arm.dock_counts[i] =
+          static_cast<std::int32_t>(device_parts::kDockPlayRad / std::abs(joints[i].rad_per_count));
+    }
     if constexpr (N::kIsFixed) {
       constexpr auto kOne = static_cast<double>(std::int64_t{1} << kAnglePerCountBits);
       arm.joints[i].angle_per_count = static_cast<std::int64_t>(joints[i].rad_per_count * kOne);

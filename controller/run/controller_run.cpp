@@ -300,6 +300,24 @@ void name_law_faults(const LoadedScene& scene, const EventList& faults) {
   }
 }
 
+/// Warns once of each fault whose name does not show the way out.
+void explain_faults(const EventList& faults) {
+  constexpr std::array<std::pair<Fault, const char*>, 2> kWhy{
+      {{Fault::wrong_dock,
+        ": the device rested parked elsewhere than in its first calibration, and the motors went "
+        "off; rest it there, or start again if it lies there"},
+       {Fault::sparse_input,
+        ": reports came more than 5 ms apart again and again, and the motors went off; see to the "
+        "cable, and to what else this machine does (docs/real-time.md)"}}};
+  for (const auto& [fault, why] : kWhy) {
+    const auto first = std::ranges::find(
+        faults.kept(), std::string_view(fault_name(fault)),
+        [](const EventList::Event& event) { return std::string_view(event.name); });
+    if (first == faults.kept().end()) continue;
+    log_warning(std::string(first->name) + " at tick " + std::to_string(first->tick) + why);
+  }
+}
+
 RunReport new_report(const ControllerOptions& options) {
   RunReport report;
   report.end = text_of(EndReason::stopped);
@@ -355,6 +373,7 @@ int run_with_device(const ControllerOptions& options, std::int64_t began_ns, Run
   segment.set_lifecycle(clean ? Lifecycle::clean_end : Lifecycle::fault);
   report.end = text_of(end);
   name_law_faults(scene, report.record.faults);
+  explain_faults(report.record.faults);
   report.removed_mm3 = removed_mm3(scene, report.record);
   report.materials = scores_of(scene, servo, report.record);
   report.workspace_scale = scene.device.workspace_scale;

@@ -39,7 +39,7 @@ ProbeView::ProbeView(const DeviceSettings& device, int rate_hz) {
 }
 
 void ProbeView::take(const DeviceReport& report, std::int64_t now_ns) noexcept {
-  if (follow_encoders(report, plan_.absolute_encoders, timing_, encoders_)) {
+  if (follow_encoders(report, plan_, timing_, encoders_) == Rest::docked) {
     seen_.calibrated = true;
   }
   if (!report.fresh) {

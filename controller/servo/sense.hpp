@@ -5,6 +5,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <cstdlib>
 #include <limits>
 
 #include "controller/servo/kinematics.hpp"
@@ -40,15 +41,36 @@ inline void follow_silence(const SafetyTiming& timing, EncoderState& encoders) n
   encoders.rest_ticks = rests ? std::min(encoders.rest_ticks + 1, timing.rest_ticks) : 0;
 }
 
+/// A rest that is long enough for a calibration, in this report.
+enum class Rest : std::uint8_t {
+  none,
+  docked,    ///< where the first one was, or it is the first: calibrated
+  elsewhere  ///< a false sign of parking, or counts that were lost: nothing changes
+};
+
+/// Whether a rest with these counts is where the first calibration was; a first one is.
+[[nodiscard]] inline bool fits_dock(const std::array<std::int16_t, 3>& count,
+                                    const std::array<std::int32_t, 3>& dock_counts,
+                                    EncoderState& encoders) noexcept {
+  if (!encoders.dock) encoders.dock = count;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const std::int32_t off = static_cast<std::int16_t>(count[i] - (*encoders.dock)[i]);
+    if (std::abs(off) > dock_counts[i]) return false;
+  }
+  return true;
+}
+
 /// One tick of the encoders, followed over the wrap at 16 bits. Parked at rest for `rest_ticks` and
-/// homed, the counters start again, from 0 or from the device's absolute counts: that is the
-/// calibration. Returns whether it holds in this report; never in one that is not fresh.
-inline bool follow_encoders(const DeviceReport& report, bool absolute, const SafetyTiming& timing,
-                            EncoderState& encoders) noexcept {
+/// homed, at the dock, the counters start again, from 0 or from the device's absolute counts: that
+/// is the calibration. A report that is not fresh has no rest.
+template <class N>
+inline Rest follow_encoders(const DeviceReport& report, const DevicePlan<N>& device,
+                            const SafetyTiming& timing, EncoderState& encoders) noexcept {
   if (!report.fresh) {
     follow_silence(timing, encoders);
-    return false;
+    return Rest::none;
   }
+  const bool absolute = device.absolute_encoders;
   encoders.silent_ticks = 0;
   bool at_rest = report.parked && report.homed;
   for (std::size_t i = 0; i < 3; ++i) {
@@ -63,10 +85,11 @@ inline bool follow_encoders(const DeviceReport& report, bool absolute, const Saf
   }
   if (!at_rest) encoders.rest_from = report.encoder;
   encoders.rest_ticks = at_rest ? std::min(encoders.rest_ticks + 1, timing.rest_ticks) : 0;
-  if (encoders.rest_ticks < timing.rest_ticks) return false;
+  if (encoders.rest_ticks < timing.rest_ticks) return Rest::none;
+  if (!fits_dock(report.encoder, device.dock_counts, encoders)) return Rest::elsewhere;
   encoders.unwrapped = {};
   if (absolute) std::ranges::copy(report.encoder, encoders.unwrapped.begin());
-  return true;
+  return Rest::docked;
 }
 
 /// Adds a reading; `samples`, 1 to kMaxGimbalSamples, make up the sum.
@@ -172,8 +195,9 @@ template <class N>
 [[nodiscard]] Sensed<N> sense(const ServoPlan<N>& plan, ServoState<N>& state,
                               const DeviceReport& report) noexcept {
   SafetyInputs seen{.fresh = report.fresh, .parked = report.parked, .homed = report.homed};
-  seen.calibrated =
-      follow_encoders(report, plan.device.absolute_encoders, plan.timing, state.encoders);
+  const Rest rest = follow_encoders(report, plan.device, plan.timing, state.encoders);
+  seen.calibrated = rest == Rest::docked;
+  seen.misplaced = rest == Rest::elsewhere;
   if (report.fresh) follow_gimbal(report, plan.device.gimbal_samples, state.gimbal);
   Sensed<N> sensed;
   sensed.pose = device_pose(plan.device, state.encoders, state.gimbal);

@@ -70,7 +70,9 @@ enum class Fault : std::uint32_t {
   // A law of the scene gave a value that is not finite:
   force_law = 4,
   velocity_estimator = 5,
-  stabiliser = 6
+  stabiliser = 6,
+  wrong_dock = 7,   ///< parked at rest, but not where it was calibrated first
+  sparse_input = 8  ///< reports came too seldom for too long
 };
 
 [[nodiscard]] constexpr const char* fault_name(Fault fault) noexcept {
@@ -89,6 +91,10 @@ enum class Fault : std::uint32_t {
       return "velocity_estimator";
     case Fault::stabiliser:
       return "stabiliser";
+    case Fault::wrong_dock:
+      return "wrong_dock";
+    case Fault::sparse_input:
+      return "sparse_input";
   }
   return "unknown";
 }

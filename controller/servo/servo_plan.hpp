@@ -123,6 +123,9 @@ struct DevicePlan {
   /// Encoders are absolute once the device is `homed`; else they count from the pose in which it
   /// was parked at rest.
   bool absolute_encoders = false;
+  static constexpr std::int32_t kNoDock = 1 << 15;
+  /// How far from its first calibration a joint may rest parked; `kNoDock`: anywhere.
+  std::array<std::int32_t, 3> dock_counts{kNoDock, kNoDock, kNoDock};
   SerialArm<N> serial{};  ///< of the Omni and WoodenHaptics
   DeltaArm<N> delta{};    ///< of the Falcon
 

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 
 #include "controller/kernel/gradient.hpp"
@@ -112,10 +113,11 @@ struct StrokeState {
 /// Joint counters since the last calibration.
 struct EncoderState {
   std::array<std::int16_t, 3> last{};
-  std::array<std::int32_t, 3> unwrapped{};  ///< counts from home, beyond 16 bits
-  std::array<std::int16_t, 3> rest_from{};  ///< reading with which the rest began
-  std::uint32_t rest_ticks = 0;             ///< since it is parked and no joint turns
-  std::uint32_t silent_ticks = 0;           ///< since the last report
+  std::array<std::int32_t, 3> unwrapped{};            ///< counts from home, beyond 16 bits
+  std::array<std::int16_t, 3> rest_from{};            ///< reading with which the rest began
+  std::optional<std::array<std::int16_t, 3>> dock{};  ///< reading of the first calibration
+  std::uint32_t rest_ticks = 0;                       ///< since it is parked and no joint turns
+  std::uint32_t silent_ticks = 0;                     ///< since the last report
 };
 
 /// Sliding sum over the gimbal readings of the last 20 ms: the pots' low bits are noise.

@@ -14,6 +14,14 @@ struct SafetyTiming {
   std::uint32_t not_finite_ticks = 2;  ///< NaN for longer: motors off
   std::uint32_t fade_in_ticks = 100;   ///< after arming
   std::uint32_t rest_ticks = 50;       ///< parked at rest this long: calibrated (50 ms at least)
+
+  std::uint32_t sparse_share = 20;  ///< see `sparse_ticks`
+
+  /// So many ticks in which the force falls for want of reports are a fault; 1 / `sparse_share` of
+  /// the ticks in which it does not are taken off. Twice `zero_ticks`: of gaps of 19 ms in a row
+  /// the fourth latches, and a single one is forgotten after 0.3 s. A device that reports each 7 ms
+  /// latches after 0.4 s; one that keeps within `hold_ticks` never.
+  [[nodiscard]] constexpr std::uint32_t sparse_ticks() const noexcept { return 2 * zero_ticks; }
 };
 
 /// What the supervisor saw in this tick.
@@ -21,6 +29,7 @@ struct SafetyInputs {
   bool fresh = false;
   bool parked = false;      ///< the device says so in this report
   bool calibrated = false;  ///< and has rested there for `rest_ticks`
+  bool misplaced = false;   ///< it has, but elsewhere than in its first calibration
   bool homed = true;        ///< its encoders have a meaning
   bool finite = true;
   bool overspeed = false;
@@ -36,7 +45,8 @@ struct SafetyInputs {
 ///                                         '-- rest -- fault <-- any fault, of either
 ///
 /// The parked bit alone switches the motors off, but only rest calibrates and clears: one corrupt
-/// packet must neither move the tip nor forgive a fault.
+/// packet must neither move the tip nor forgive a fault. A rest elsewhere than in the first
+/// calibration is a fault of its own: a false sign of parking would move the world.
 struct Supervisor {
   Phase phase = Phase::off;
   Fault fault = Fault::none;
@@ -44,11 +54,28 @@ struct Supervisor {
   std::uint32_t stale_ticks = 0;
   std::uint32_t not_finite_ticks = 0;
   std::uint32_t fade_ticks = 0;
+  std::uint32_t sparse = 0;  ///< ticks of falling force times `sparse_share`, less the others
 
   [[nodiscard]] constexpr bool motors_on() const noexcept {
     return phase == Phase::ramping || phase == Phase::active;
   }
 };
+
+/// Latches a fault; also one that shows only after the force was computed.
+constexpr void latch(Fault fault, Supervisor& s) noexcept {
+  s.fault = fault;
+  s.phase = Phase::fault;
+}
+
+/// Books a tick with motors on: reports that come again and again just before the force is zero
+/// would shake the hand with it.
+constexpr void count_sparse(const SafetyTiming& timing, Supervisor& s) noexcept {
+  if (s.stale_ticks > timing.hold_ticks) {
+    s.sparse += timing.sparse_share;
+  } else if (s.sparse > 0) {
+    --s.sparse;
+  }
+}
 
 /// One tick of the state machine. Bounded, no clock.
 constexpr void supervise(const SafetyTiming& timing, const SafetyInputs& in,
@@ -67,7 +94,9 @@ constexpr void supervise(const SafetyTiming& timing, const SafetyInputs& in,
     }
     if (in.parked) {
       if (in.calibrated) s.fault = Fault::none;
+      if (in.calibrated) s.sparse = 0;
       if (in.calibrated || s.motors_on()) s.phase = Phase::armed;
+      if (in.misplaced) latch(Fault::wrong_dock, s);
       return;
     }
     if (s.phase == Phase::armed) {
@@ -77,6 +106,7 @@ constexpr void supervise(const SafetyTiming& timing, const SafetyInputs& in,
     }
   }
   if (!s.motors_on()) return;
+  count_sparse(timing, s);
 
   if (in.overspeed) {
     s.fault = Fault::overspeed;
@@ -84,18 +114,14 @@ constexpr void supervise(const SafetyTiming& timing, const SafetyInputs& in,
     s.fault = Fault::not_finite;
   } else if (s.stale_ticks >= timing.zero_ticks) {
     s.fault = Fault::stale_input;
+  } else if (s.sparse >= timing.sparse_ticks() * timing.sparse_share) {
+    s.fault = Fault::sparse_input;
   }
   if (s.fault != Fault::none) {
     s.phase = Phase::fault;
     return;
   }
   if (s.phase == Phase::ramping && ++s.fade_ticks >= timing.fade_in_ticks) s.phase = Phase::active;
-}
-
-/// Latches a fault that shows only after the force was computed.
-constexpr void latch(Fault fault, Supervisor& s) noexcept {
-  s.fault = fault;
-  s.phase = Phase::fault;
 }
 
 /// Fades the force in again, where it was in.

@@ -48,8 +48,8 @@ inline constexpr std::array<std::string_view, 2> kFaultClockWords{"push", "start
 
 /// The only fault that a controller latches in such a run if it keeps its safety contract; words in
 /// fault files.
-inline constexpr std::array<std::string_view, 4> kLatchWords{"none", "stale_input", "not_finite",
-                                                             "overspeed"};
+inline constexpr std::array<std::string_view, 6> kLatchWords{
+    "none", "stale_input", "not_finite", "overspeed", "wrong_dock", "sparse_input"};
 
 /// One fault, by the script's clock.
 struct DeviceFault {

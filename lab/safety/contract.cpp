@@ -20,8 +20,10 @@ constexpr double kWatchdogMs = 25;
 constexpr double kThermalTimeMs = 10'000;
 constexpr double kStillMs = 3000;   // no reading changes while the motors push
 constexpr double kAnewTicks = 160;  // without a newer number: the device counts anew
-constexpr int kRestCounts = 2;      // an encoder that jitters at an edge rests
-constexpr double kReportMs = 1;     // from one report to the next, of the slowest device
+constexpr double kSparseMs = 40, kSparseForgiven = 1.0 / 20;
+constexpr double kDockPlayRad = 0.025;
+constexpr int kRestCounts = 2;   // an encoder that jitters at an edge rests
+constexpr double kReportMs = 1;  // from one report to the next, of the slowest device
 constexpr double kCycleMs = 0.125;
 // A step of the converters is 0.4 to 5 mN at the tip, and the watch is on the outside of them.
 constexpr double kStepN = 0.01;
@@ -36,7 +38,9 @@ constexpr std::size_t kMaxListed = 4;
 /// From the start of a fault at the device until the motors must be off for `name`. A fault that
 /// the servo bears for a while begins for it with the report that first shows it, or is missing.
 double latest_latch_ms(const std::string& name, double tick_ms) {
-  if (name == fault_name(Fault::stale_input)) return kZeroMs + kReportMs + tick_ms;
+  const bool by_silence =
+      name == fault_name(Fault::stale_input) || name == fault_name(Fault::sparse_input);
+  if (by_silence) return kZeroMs + kReportMs + tick_ms;
   if (name == fault_name(Fault::not_finite)) return kNotFiniteMs + kReportMs + tick_ms;
   return kReportMs + tick_ms;
 }
@@ -107,10 +111,17 @@ void SafetyMonitor::follow_rest(double time_ms) {
   if (!goes_on) rest_without_gap_since_ms_ = time_ms;
   const bool may_have_rested = still && time_ms - rest_since_ms_ >= kRestMs - tolerance_ms;
   if (!may_have_rested) return;
+  const bool has_rested = time_ms - rest_without_gap_since_ms_ >= kRestMs + tolerance_ms;
+  if (wire_.has_dock() && dock_ && wire_.turned_rad(*dock_, told_.count) > kDockPlayRad) {
+    // No dock: it calibrates nothing, and forgives nothing.
+    if (has_rested) must_stay_off(fault_name(Fault::wrong_dock));
+    return;
+  }
+  if (has_rested && !dock_) dock_ = told_.count;
+  sparse_ms_ = 0;
   calibrated_again_ = calibrated_again_ || outcome_.pushed;
   calibrated_ = true;
   if (!wire_.counts_from_rest()) return;
-  const bool has_rested = time_ms - rest_without_gap_since_ms_ >= kRestMs + tolerance_ms;
   zero_is_known_ = has_rested || is_near(told_.count, wire_.dock_count());
   zero_is_true_ = docked_;
   if (has_rested) wire_.calibrated_at(told_.count);
@@ -195,6 +206,15 @@ void SafetyMonitor::follow_stillness(double time_ms) {
   }
 }
 
+/// Reports that come again and again just before the force is zero.
+void SafetyMonitor::follow_sparse(double time_ms) {
+  if (off_ != Off::no_reason) return;
+  const double tick_ms = std::min(time_ms - last_.time_ms, tick_ms_);
+  const bool falls = listened_ms_ - heard_ms_ > kHoldMs;
+  sparse_ms_ = falls ? sparse_ms_ + tick_ms : std::max(0.0, sparse_ms_ - tick_ms * kSparseForgiven);
+  if (sparse_ms_ > kSparseMs + 2 * tick_ms_) must_stay_off(fault_name(Fault::sparse_input));
+}
+
 /// A host that was silent for 20 ms begins at zero and fades in again; the packet that ends the
 /// silence may be the watchdog's packet, and then the next one is the host's own.
 void SafetyMonitor::follow_stall(const Command& command) {
@@ -210,6 +230,7 @@ void SafetyMonitor::commanded(double time_ms, std::span<const std::uint8_t> pack
   if (fresh_) follow_report(time_ms);
   follow_silence(time_ms);
   follow_stillness(time_ms);
+  follow_sparse(time_ms);
   Command command{.time_ms = time_ms,
                   .tick_ms = std::min(time_ms - last_.time_ms, tick_ms_),
                   .asked = *asked,
@@ -281,6 +302,11 @@ void SafetyMonitor::check_change(const Command& command) {
   outcome_.steepest_n_per_ms = std::max(outcome_.steepest_n_per_ms, change / command.tick_ms);
   check(change <= most_n + kStepN, command.time_ms, "change of the force in a tick, in N", change,
         most_n);
+  // And in all, whatever made it fall.
+  const double whole_n = norm(command.force_n - last_.force_n);
+  const double bound_n = std::max(most_n, norm(last_.force_n));
+  check(whole_n <= bound_n + kStepN, command.time_ms, "fall and turn of the force in a tick, in N",
+        whole_n, bound_n);
 }
 
 /// What was sent after the last report, turned and weakened by nothing.

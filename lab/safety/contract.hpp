@@ -60,6 +60,7 @@ class SafetyMonitor {
   void follow_rest(double time_ms);
   void follow_silence(double time_ms);
   void follow_stillness(double time_ms);
+  void follow_sparse(double time_ms);
   void must_stay_off(const char* fault);
   void follow_stall(const Command& command);
   void check_state(const Command& command);
@@ -95,6 +96,7 @@ class SafetyMonitor {
   bool calibrated_ = false;
   double told_at_ms_ = 0;                 ///< the last command that a report was for
   double rest_without_gap_since_ms_ = 0;  ///< parked and still, in every report that was due
+  std::optional<EncoderCounts> dock_;     ///< told in the first rest that was long enough
   bool zero_is_known_ = true;  ///< false: whether that rest was long enough is a matter of a tick
   bool zero_is_true_ = true;   ///< false: the host calibrated while the device was not at rest
   bool calibrated_again_ = false;  ///< in the run, after it had pushed
@@ -109,6 +111,7 @@ class SafetyMonitor {
   bool way_in_is_known_ = true;  ///< false: a jump of the tip may have gone through the solid
   double inward_since_ms_ = -1;  ///< the force points into the solid; negative: it does not
   bool silence_told_ = false;
+  double sparse_ms_ = 0;     ///< in which the force fell for want of reports, less its forgiveness
   double began_off_ms_ = 0;  ///< the last packet that asks for nothing, after one that did
   bool docked_ = true;
   double begun_ms_ = 0;

@@ -160,6 +160,15 @@ std::optional<ArmPose> DeviceWire::pose(const EncoderCounts& count) const {
   return is_finite(pose.tip_mm) ? std::optional(pose) : std::nullopt;
 }
 
+double DeviceWire::turned_rad(const EncoderCounts& a, const EncoderCounts& b) const noexcept {
+  double most_rad = 0;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const auto counts = static_cast<std::int16_t>(static_cast<std::uint16_t>(int{b[i]} - a[i]));
+    most_rad = std::max(most_rad, std::abs(counts * rad_per_count_[i]));
+  }
+  return most_rad;
+}
+
 DeviceVec<double> DeviceWire::force_n(const ArmPose& pose,
                                       const std::array<std::int16_t, 3>& count) const {
   const JointVec<double> torque_nmm{count[0] * nmm_per_count_[0], count[1] * nmm_per_count_[1],

@@ -57,6 +57,10 @@ class DeviceWire {
   }
   /// Whether a calibration in a wrong pose moves every later one: encoders that count from it.
   [[nodiscard]] bool counts_from_rest() const noexcept { return personality_ == Personality::omni; }
+  /// Whether it is parked at one place alone, where every calibration must be.
+  [[nodiscard]] bool has_dock() const noexcept { return personality_ != Personality::falcon; }
+  /// The farthest that a joint turned from `a` to `b`.
+  [[nodiscard]] double turned_rad(const EncoderCounts& a, const EncoderCounts& b) const noexcept;
   /// What such encoders tell at the dock, as the host must think since its last calibration.
   [[nodiscard]] const EncoderCounts& dock_count() const noexcept { return dock_count_; }
   void calibrated_at(const EncoderCounts& count) noexcept { dock_count_ = count; }

@@ -221,6 +221,11 @@ TEST_CASE("the contract sees each way to break it") {
     run.lose(30, 1);
     run.contract.end(run.ms, "overspeed", run.ms);
   }
+  SUBCASE("a fall and a turn in one tick") {
+    run.push_up_to(1.3);
+    run.leave();
+    run.tick(-0.45);
+  }
   SUBCASE("motors that go off for good though nothing is wrong") {
     run.push_up_to(1);
     const double fault_ends_ms = run.ms;
@@ -231,36 +236,25 @@ TEST_CASE("the contract sees each way to break it") {
   CHECK_FALSE(run.outcome.violations.empty());
 }
 
-TEST_CASE("speed counts from the zero that the host took last, be it wrong") {
-  // Parked and still far from the dock, by broken sensors: a host cannot know better.
+TEST_CASE("a rest away from the dock leaves the motors off, until the device is docked") {
   Watched run;
   run.push_up_to(0);
-  const auto counts_a_mm = [&] {
-    auto turned = run.told.encoder;
-    turned[0] = static_cast<std::int16_t>(turned[0] - 100);
-    return 100 / norm(run.wire.pose(turned)->tip_mm - run.wire.pose(run.told.encoder)->tip_mm);
-  };
-  const double of_dock = counts_a_mm();
-  run.told.encoder[1] = static_cast<std::int16_t>(run.told.encoder[1] - 1500);
-  REQUIRE(counts_a_mm() > 1.6 * of_dock);
-  const auto turn_mm = [&](double mm) {
-    run.told.encoder[0] =
-        static_cast<std::int16_t>(run.told.encoder[0] - std::lround(mm * of_dock));
+  const auto dock = run.told.encoder;
+  run.told.encoder[1] = static_cast<std::int16_t>(dock[1] - 1500);
+  SUBCASE("a long rest") {
+    run.park(60);
+    CHECK(run.outcome.violation_count == 0);
     run.tick(0);
-  };
-  constexpr double kLimitMm = 10;  // a tick
-  SUBCASE("a long rest: the host has taken it") {
+    CHECK(run.outcome.violation_count == 1);
+    run.told.encoder = dock;
     run.park(60);
     run.tick(0);
-    turn_mm(0.9 * kLimitMm);
-    CHECK(run.outcome.violation_count == 0);
-    turn_mm(1.2 * kLimitMm);
     CHECK(run.outcome.violation_count == 1);
+    CHECK(run.outcome.latched == "wrong_dock");
   }
   SUBCASE("a rest of 50 ms, one tick more or less: who knows") {
     run.park(50);
     run.tick(0);
-    turn_mm(2 * kLimitMm);
     CHECK(run.outcome.violation_count == 0);
   }
   SUBCASE("a rest with a gap in the reports may have begun anew") {
@@ -269,10 +263,20 @@ TEST_CASE("speed counts from the zero that the host took last, be it wrong") {
     for (int i = 0; i < 8; ++i) run.tick(0, false, false);
     run.park(25);
     run.tick(0);
-    turn_mm(2 * kLimitMm);
     CHECK(run.outcome.violation_count == 0);
   }
-  CHECK(run.outcome.latched == (run.outcome.violation_count > 0 ? "overspeed" : "none"));
+}
+
+TEST_CASE("reports that are too seldom for too long must leave the motors off") {
+  Watched run;
+  run.push_up_to(0.5);
+  for (int gap = 0; gap < 4; ++gap) {
+    CHECK(run.outcome.violation_count == 0);
+    run.lose(18, 0.5);
+    run.tick(0.5);
+  }
+  CHECK(run.outcome.violation_count > 0);
+  CHECK(run.outcome.latched == "sparse_input");
 }
 
 TEST_CASE("the contract accepts the fault that the script says, in time") {

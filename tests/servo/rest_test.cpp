@@ -4,6 +4,8 @@
 
 #include <doctest/doctest.h>
 
+#include "controller/plan/plan_device.hpp"
+#include "controller/servo/sense.hpp"
 #include "tests/servo/support.hpp"
 
 using namespace kerf;
@@ -102,6 +104,63 @@ TEST_CASE("a gap of 4 ms does not end a rest") {
     while (resting.now_ms() < 44) REQUIRE(resting.tick(false) != Phase::armed);
     while (resting.now_ms() < 55) static_cast<void>(resting.tick());
     CHECK(resting.tick() == Phase::armed);
+  }
+}
+
+TEST_CASE("pressing on the tooth, the sign of parking for 60 ms: a fault, and the world stays") {
+  for (const bool latched : {false, true}) {
+    CAPTURE(latched);
+    LoadedScene scene = half_space_scene();
+    ArmedServo armed(scene);
+    const ServoOutput before = armed.settled(0, 0.3, 0);
+    REQUIRE(before.motors_on);
+    for (int tick = 0; latched && tick < 30; ++tick) static_cast<void>(armed.servo->step({}));
+    DeviceReport false_dock = armed.arm.at(0, 0.3, 0);
+    false_dock.parked = true;
+    for (int tick = 0; tick < 60; ++tick) static_cast<void>(armed.servo->step(false_dock));
+    const ServoOutput after = armed.settled(0, 0.3, 0);
+    CHECK(after.position_mm == before.position_mm);
+    CHECK(after.joint_counts == before.joint_counts);
+    CHECK(after.fault == Fault::wrong_dock);
+    CHECK_FALSE(after.motors_on);
+    arm_at(*armed.servo, armed.arm, 0, 5, 0);  // the true dock
+    CHECK(vec3::length(armed.settled(0, 0.3, 0).force_n) > 0.1);
+  }
+}
+
+TEST_CASE("a later rest must be where the first was, within the play of a dock, over the wrap") {
+  const SafetyTiming timing;
+  for (const Personality personality :
+       {Personality::omni, Personality::falcon, Personality::woodenhaptics}) {
+    CAPTURE(static_cast<int>(personality));
+    ServoPlan<FixedNumbers> plan;
+    DeviceSettings device;
+    device.personality = personality;
+    plan_device(device, plan);
+    for (std::size_t joint = 0; joint < 3; ++joint) {
+      const auto rest_at = [&](int first, int later) {
+        EncoderState encoders;
+        Rest rest = Rest::none;
+        for (const int at : {first, later}) {
+          DeviceReport report{.fresh = true, .parked = true};
+          report.encoder[joint] = static_cast<std::int16_t>(at);
+          for (std::uint32_t tick = 0; tick <= timing.rest_ticks; ++tick) {
+            rest = follow_encoders(report, plan.device, timing, encoders);
+          }
+        }
+        return rest;
+      };
+      const bool has_dock = personality != Personality::falcon;
+      const int play = plan.device.dock_counts[joint];
+      CHECK((play < 200) == has_dock);
+      for (const int first : {0, 32760, -32760}) {
+        CHECK(rest_at(first, first + (has_dock ? play : 20'000)) == Rest::docked);
+        CHECK(rest_at(first, first - (has_dock ? play : 20'000)) == Rest::docked);
+        if (!has_dock) continue;
+        CHECK(rest_at(first, first + play + 1) == Rest::elsewhere);
+        CHECK(rest_at(first, first - play - 1) == Rest::elsewhere);
+      }
+    }
   }
 }
 

@@ -120,6 +120,53 @@ TEST_CASE("a force that is held without reports heats the motors like any other"
   });
 }
 
+TEST_CASE("whatever noise the encoders have, the force changes by the slew or by what there was") {
+  for (const int rate_hz : {250, 1000, 8000}) {
+    CAPTURE(rate_hz);
+    LoadedScene scene = half_space_scene();
+    scene.servo.rate_hz = rate_hz;
+    scene.force.stiffness_n_per_mm = 3;
+    scene.force.damping_ns_per_mm = 0.02;
+    ArmedServo armed(scene, {0, 1.1, 0}, std::max(1, rate_hz / 1000));
+    std::uint32_t random = 1;
+    std::array<double, 3> last = armed.settled(0, 0.3, 0).force_n;
+    const int most = rate_hz > 1000 ? 2 : 5;  // counts; more is faster than 10 m/s
+    double steepest_n = 0;
+    for (int tick = 0; tick < 2000; ++tick) {
+      auto report = armed.arm.at(0, 0.3, 0);
+      for (auto& count : report.encoder) {
+        random = random * 1664525 + 1013904223;
+        count = static_cast<std::int16_t>(count + static_cast<int>(random >> 16) % (2 * most + 1) -
+                                          most);
+      }
+      const ServoOutput out = armed.servo->step(report);
+      REQUIRE(out.fault == Fault::none);
+      const double change_n = length(vec3::operator-(out.force_n, last));
+      CHECK(change_n <= std::max(500.0 / rate_hz, length(last)) + 1e-4);
+      steepest_n = std::max(steepest_n, change_n);
+      last = out.force_n;
+    }
+    CHECK(steepest_n > 500.0 / rate_hz);  // it fell at once, too
+  }
+}
+
+TEST_CASE("a packet each 19 ms, for ever: a latched fault within 0.1 s, at any rate") {
+  for (const int rate_hz : {250, 1000, 8000}) {
+    CAPTURE(rate_hz);
+    LoadedScene scene = half_space_scene();
+    scene.servo.rate_hz = rate_hz;
+    ArmedServo armed(scene, {0, 1.1, 0}, std::max(1, rate_hz / 1000));
+    REQUIRE(length(armed.settled(0, 0.3, 0).force_n) > 0.1);
+    const int period = 19 * rate_hz / 1000;
+    ServoOutput out;
+    for (int tick = 1; tick <= rate_hz / 10; ++tick) {
+      out = tick % period == 0 ? armed.step(0, 0.3, 0) : armed.servo->step({});
+    }
+    CHECK(out.fault == Fault::sparse_input);
+    CHECK_FALSE(out.motors_on);
+  }
+}
+
 TEST_CASE("a force beyond the motors keeps its direction, and what was sent is what is told") {
   LoadedScene scene = half_space_scene();
   scene.force.stiffness_n_per_mm = 50;

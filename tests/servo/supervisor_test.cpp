@@ -27,11 +27,12 @@ Supervisor after(std::initializer_list<std::pair<SafetyInputs, int>> script) {
 
 std::vector<SafetyInputs> all_inputs() {
   std::vector<SafetyInputs> inputs;
-  for (unsigned bits = 0; bits < 64; ++bits) {
+  for (unsigned bits = 0; bits < 128; ++bits) {
     const bool homed = (bits & 32) == 0;
     inputs.push_back({.fresh = (bits & 1) != 0,
                       .parked = (bits & 2) != 0,
-                      .calibrated = (bits & 18) == 18 && homed,
+                      .calibrated = (bits & 82) == 18 && homed,
+                      .misplaced = (bits & 83) == 83 && homed,
                       .homed = homed,
                       .finite = (bits & 4) != 0,
                       .overspeed = (bits & 8) != 0});
@@ -56,7 +57,9 @@ bool is_legal(const Supervisor& before, Phase after, const SafetyInputs& in) {
     case Phase::active:
       return before.phase == Phase::ramping;
     case Phase::fault:
-      return before.motors_on() || before.phase == Phase::armed;  // taken and found bad in one tick
+      return before.motors_on() ||
+             before.phase == Phase::armed ||  // taken and found bad in one tick
+             (parked && in.misplaced);
   }
   return false;
 }
@@ -107,6 +110,44 @@ TEST_CASE("missing reports: tolerated for less than 20 ms, then a latched fault"
   CHECK(after({{kRested, 1}, {kFree, 150}, {kSilent, 20}, {kFree, 500}}).phase == Phase::fault);
 }
 
+TEST_CASE("reports that come too seldom for too long are a fault; a single gap is forgiven") {
+  const auto fault_after = [](int period, int pause, int periods) {
+    Supervisor s = after({{kRested, 1}, {kFree, 150}});
+    for (int i = 0; i < periods && s.fault == Fault::none; ++i) {
+      for (int tick = 1; tick < period; ++tick) supervise(kTiming, kSilent, s);
+      for (int tick = 0; tick <= pause; ++tick) supervise(kTiming, kFree, s);
+    }
+    return s.fault;
+  };
+  CHECK(fault_after(19, 0, 3) == Fault::none);
+  CHECK(fault_after(19, 0, 4) == Fault::sparse_input);  // after 70 ms
+  CHECK(fault_after(7, 0, 70) == Fault::sparse_input);  // after half a second
+  CHECK(fault_after(6, 0, 10'000) == Fault::none);      // the force is held all the time
+  CHECK(fault_after(19, 270, 100) == Fault::none);
+  CHECK(fault_after(19, 200, 100) == Fault::sparse_input);
+  // A chattering button forgives none; a calibration does.
+  const auto thrice = [](SafetyInputs parked) {
+    Supervisor s = after({{kRested, 1}, {kFree, 150}, {kSilent, 19}, {kFree, 1}, {kSilent, 19}});
+    supervise(kTiming, parked, s);
+    for (int tick = 0; tick < 19; ++tick) supervise(kTiming, tick == 0 ? kFree : kSilent, s);
+    return s.fault;
+  };
+  CHECK(thrice(kParkBit) == Fault::sparse_input);
+  CHECK(thrice(kRested) == Fault::none);
+}
+
+TEST_CASE("a rest elsewhere than at the dock is a fault, and forgives none") {
+  constexpr SafetyInputs kElsewhere{.fresh = true, .parked = true, .misplaced = true};
+  for (const int silent : {0, 30}) {
+    Supervisor s = after({{kRested, 1}, {kFree, 150}, {kSilent, silent}, {kElsewhere, 1}});
+    CHECK(s.fault == Fault::wrong_dock);
+    for (int tick = 0; tick < 500; ++tick) supervise(kTiming, kFree, s);
+    CHECK(s.phase == Phase::fault);
+    supervise(kTiming, kRested, s);
+    CHECK(s.phase == Phase::armed);
+  }
+}
+
 TEST_CASE("the held force is whole up to 5 ms and gone at 20 ms, falling in between") {
   CHECK(stale_fraction(kTiming, 5) == kTiming.zero_ticks - kTiming.hold_ticks);
   CHECK(stale_fraction(kTiming, 20) == 0);
@@ -125,18 +166,22 @@ TEST_CASE("too fast, or not finite for more than 2 ms, ends the motors at once")
 
 TEST_CASE("every reachable state and input: only legal transitions, no motors with a fault") {
   // Breadth first over all inputs, with short timings so that the whole state space is visited.
-  constexpr SafetyTiming kShort{
-      .hold_ticks = 1, .zero_ticks = 3, .not_finite_ticks = 1, .fade_in_ticks = 2};
+  constexpr SafetyTiming kShort{.hold_ticks = 1,
+                                .zero_ticks = 3,
+                                .not_finite_ticks = 1,
+                                .fade_in_ticks = 2,
+                                .sparse_share = 2};
   const auto key = [](const Supervisor& s) {
-    return std::array<std::uint32_t, 6>{static_cast<std::uint32_t>(s.phase),
+    return std::array<std::uint32_t, 7>{static_cast<std::uint32_t>(s.phase),
                                         static_cast<std::uint32_t>(s.fault),
                                         s.started ? 1U : 0U,
                                         std::min(s.stale_ticks, 5U),
                                         std::min(s.not_finite_ticks, 4U),
-                                        s.fade_ticks};
+                                        s.fade_ticks,
+                                        s.sparse};
   };
   std::vector<Supervisor> states{Supervisor{}};
-  std::vector<std::array<std::uint32_t, 6>> seen{key(states[0])};
+  std::vector<std::array<std::uint32_t, 7>> seen{key(states[0])};
   for (std::size_t i = 0; i < states.size(); ++i) {
     for (const SafetyInputs& input : all_inputs()) {
       const Supervisor before = states[i];
@@ -150,6 +195,7 @@ TEST_CASE("every reachable state and input: only legal transitions, no motors wi
       if (before.phase != s.phase) REQUIRE(is_legal(before, s.phase, input));
       if (input.fresh && !input.homed) REQUIRE_FALSE(s.motors_on());
       if (input.fresh && input.parked) REQUIRE_FALSE(s.motors_on());
+      if (input.misplaced) REQUIRE(s.fault == Fault::wrong_dock);
       if (std::find(seen.begin(), seen.end(), key(s)) == seen.end()) {
         seen.push_back(key(s));
         s.stale_ticks = std::min(s.stale_ticks, 5U);

@@ -45,15 +45,21 @@ glm::dvec3 direction_of(const ClipPlane& plane) {
 std::string state_words(const TickRecord& record) {
   // Phases and faults as docs/log.md lists them.
   constexpr std::uint16_t kCalibrating = 1, kArmed = 2, kFault = 5;
-  constexpr std::array<const char*, 7> kFaults{"none",      "stale_input", "not_finite",
-                                               "overspeed", "force_law",   "velocity_estimator",
-                                               "stabiliser"};
+  constexpr std::array<const char*, 9> kFaults{"none",       "stale_input", "not_finite",
+                                               "overspeed",  "force_law",   "velocity_estimator",
+                                               "stabiliser", "wrong_dock",  "sparse_input"};
+  constexpr std::uint32_t kWrongDock = 7;
   switch (record.phase) {
     case kCalibrating:
       return "the motors are off: park the device at rest, so that it is calibrated";
     case kArmed:
       return "parked: take the device in hand";
     case kFault:
+      if (record.fault == kWrongDock) {
+        return "fault wrong_dock: parked elsewhere than when the run began; rest the device there, "
+               "or "
+               "start again if it lies there";
+      }
       return std::string("fault ") + (record.fault < kFaults.size() ? kFaults[record.fault] : "") +
              ": the motors are off; park the device at rest (a hand led by the pointer: k)";
     default:
