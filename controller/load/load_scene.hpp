@@ -90,6 +90,11 @@ inline constexpr std::array<double, 3> kWorkspaceMm = {100.0, 80.0, 60.0};
 /// Whether a volume is the phantom, which has no file.
 [[nodiscard]] bool is_phantom(const VolumeSpec& volume);
 
+/// Path of a volume's file, which a scene in `folder` names. For a scene that comes with kerf,
+/// whose folder may belong to root, it may lie at the same path below the user's data folder.
+[[nodiscard]] std::filesystem::path volume_path(const std::filesystem::path& folder,
+                                                const std::string& file);
+
 /// Source of one volume.
 struct VolumeSource {
   std::filesystem::path folder;

@@ -25,6 +25,7 @@
 #include "controller/volume/phantom.hpp"
 #include "controller/volume/volume_proposal.hpp"
 #include "controller/volume/windowing.hpp"
+#include "shared/posix/program.hpp"
 
 namespace kerf {
 namespace {
@@ -32,8 +33,7 @@ namespace {
 /// Adds the doubt about a spacing to the proposal, unless the scene gives one.
 void add_odd_spacing(const std::string& odd, const VolumeSpec& spec, SceneVolume& volume) {
   if (odd.empty() || spec.spacing_mm || spec.override_spacing_mm) return;
-  volume.proposal.push_back("spacing=" + odd +
-                            "; give the true one with --override-spacing x,y,z (mm)");
+  volume.proposal.push_back("spacing=" + odd);
 }
 
 /// Takes the proposal for a volume of which the scene has no settings.
@@ -73,6 +73,19 @@ bool propose_labels(const SourceVolume& source, const VolumeSpec& spec, std::siz
   return true;
 }
 
+/// Where the file of a scene of kerf's own may lie in the user's data folder; empty for another
+/// scene.
+std::filesystem::path path_in_user_data(const std::filesystem::path& folder,
+                                        const std::string& file) {
+  std::error_code fault;
+  const std::string shipped = find_beside_program("scenes"), data = user_data_folder();
+  if (shipped.empty() || data.empty()) return {};
+  const std::filesystem::path below = std::filesystem::relative(
+      folder.empty() ? std::filesystem::path(".") : folder, shipped, fault);
+  if (fault || below.empty() || below.begin()->string() == "..") return {};
+  return (std::filesystem::path(data) / "scenes" / below / file).lexically_normal();
+}
+
 /// The image of a volume and the density of its surface; the scene has `known` materials.
 void load_image(const VolumeSpec& spec, const VolumeSource& from, std::size_t known,
                 SceneVolume& volume) {
@@ -82,17 +95,24 @@ void load_image(const VolumeSpec& spec, const VolumeSource& from, std::size_t kn
     volume.image =
         make_phantom({.shape = spec.shape, .grid = spec.phantom_size.value_or(PhantomSpec{}.grid)});
   } else {
-    const std::filesystem::path path = from.folder / spec.file;
+    const std::filesystem::path path =
+        from.unknown ? std::filesystem::path(spec.file) : volume_path(from.folder, spec.file);
     std::error_code fault;
     if (!from.unknown && !std::filesystem::exists(path, fault) && !fault) {
+      const std::filesystem::path own = path_in_user_data(from.folder, spec.file);
       throw LoadError(path.string() +
                       ": no such file or folder; check the path, or get it as the comment at the "
-                      "top of the scene says");
+                      "top of the scene says" +
+                      (own.empty() ? "" : ", here or as " + own.string()));
     }
     const SourceVolume source = read_volume(path, {.spacing_mm = spec.spacing_mm,
                                                    .override_spacing_mm = spec.override_spacing_mm,
                                                    .cpu_s = from.cpu_s});
     volume.note = source.note;
+    if (!source.axes_note.empty()) {
+      volume.note += (volume.note.empty() ? "axes " : "; axes ") + source.axes_note +
+                     "; import --axes gives others";
+    }
     end_if_asked(path.string());
     const bool proposing = from.unknown && !std::filesystem::exists(labels_path(path));
     volume.image = apply_window(source, spec.window && !proposing
@@ -170,6 +190,14 @@ void grow_labels(const VoxelGrid& grid, std::vector<Label>& labels) {
 }
 
 }  // namespace
+
+std::filesystem::path volume_path(const std::filesystem::path& folder, const std::string& file) {
+  const std::filesystem::path beside = folder / file;
+  std::error_code fault;
+  if (std::filesystem::exists(beside, fault)) return beside;
+  const std::filesystem::path own = path_in_user_data(folder, file);
+  return !own.empty() && std::filesystem::exists(own, fault) ? own : beside;
+}
 
 bool is_phantom(const VolumeSpec& volume) {
   return volume.file == kPhantomFile;

@@ -14,7 +14,9 @@
 #include "controller/input/load_error.hpp"
 #include "controller/scene/scene.hpp"
 #include "controller/scene/scene_reference.hpp"
+#include "shared/posix/program.hpp"
 #include "shared/text/command_line.hpp"
+#include "shared/text/text.hpp"
 
 namespace kerf {
 namespace {
@@ -242,6 +244,10 @@ std::optional<int> parse_options(int argc, const char* const* argv, ControllerOp
     return 2;
   }
   override_scene(raw, options.overrides);
+  if (const std::string found = find_scene_file(options.scene); found != options.scene) {
+    std::cerr << "kerf-controller: --scene " << one_line(options.scene) << ": " << found << '\n';
+    options.scene = found;
+  }
   options.overrides.unchecked_gain = options.unchecked_gain;
   return std::nullopt;
 }

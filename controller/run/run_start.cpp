@@ -19,6 +19,7 @@
 #include "controller/plan/work_budget.hpp"
 #include "controller/run/law_trial.hpp"
 #include "controller/run/scene_check.hpp"
+#include "controller/tool/mesh_parts.hpp"
 #include "shared/numeric/fnv1a.hpp"
 #include "shared/posix/atomic_file.hpp"
 #include "shared/segment/connection.hpp"
@@ -95,8 +96,8 @@ void warn_of_motors(const LoadedScene& scene) {
               ": the motors stay off; measure it, and write device.personality beside it");
 }
 
-/// Prints the notes of reading, and the choices for a volume without settings, at once, not with
-/// the summary.
+/// Prints the notes of reading volumes and meshes, and the choices for a volume without settings,
+/// at once, not with the summary.
 void tell_proposal(const LoadedScene& scene) {
   for (const SceneVolume& volume : scene.volumes) {
     if (!volume.note.empty()) {
@@ -109,6 +110,11 @@ void tell_proposal(const LoadedScene& scene) {
     if (volume.proposal.empty()) continue;
     std::fprintf(stderr, "kerf: %s: ./kerf volume import %s writes a scene with other choices\n",
                  escaped(volume.name).c_str(), escaped(volume.file).c_str());
+  }
+  for (const SceneTool& tool : scene.tools) {
+    const std::string note = tool.mesh.triangles.empty() ? "" : mesh_note(tool.mesh);
+    if (note.empty()) continue;
+    std::fprintf(stderr, "kerf: tool %s: %s\n", escaped(tool.name).c_str(), note.c_str());
   }
 }
 

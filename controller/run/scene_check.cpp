@@ -19,6 +19,7 @@
 #include "controller/scene/scene.hpp"
 #include "controller/scene/scene_file.hpp"
 #include "controller/scene/scene_reference.hpp"
+#include "controller/tool/mesh_parts.hpp"
 #include "controller/volume/file/volume_write.hpp"
 #include "shared/posix/atomic_file.hpp"
 #include "shared/posix/program.hpp"
@@ -258,7 +259,7 @@ std::vector<fs::path> files_read(const ControllerOptions& options, const Scene& 
     const fs::path file =
         from_command_line ? *options.overrides.volume_file : fs::path(scene.volumes[v].file);
     if (file == kPhantomFile) continue;
-    files.push_back(from_command_line ? file : folder / file);
+    files.push_back(from_command_line ? file : volume_path(folder, file.string()));
     const fs::path labels = labels_path(files.back());
     std::error_code fault;
     if (fs::exists(fs::symlink_status(labels, fault))) files.push_back(labels);
@@ -326,6 +327,8 @@ void print_scene(const LoadedScene& scene, const SceneCosts& costs, const GainMa
   for (const SceneTool& t : scene.tools) {
     std::printf("tool=%s %s samples=%zu pitch_mm=%g radius_mm=%g\n", t.name.c_str(),
                 t.shape.c_str(), t.offsets.size(), t.pitch_mm, t.radius_mm);
+    const std::string note = t.mesh.triangles.empty() ? "" : mesh_note(t.mesh);
+    if (!note.empty()) std::printf("note=tool %s: %s\n", t.name.c_str(), note.c_str());
   }
   const auto& o = scene.device.offset_mm;
   std::printf("workspace_scale=%g\noffset_mm=%g,%g,%g\n", scene.device.workspace_scale, o[0], o[1],

@@ -12,14 +12,14 @@
 #include <iterator>
 #include <limits>
 #include <map>
-#include <numbers>
-#include <numeric>
+#include <set>
 #include <span>
 #include <system_error>
 #include <utility>
 
 #include "controller/input/load_error.hpp"
 #include "controller/input/sandbox.hpp"
+#include "controller/tool/mesh_parts.hpp"
 #include "shared/numeric/linear_algebra.hpp"
 #include "shared/posix/error_text.hpp"
 
@@ -54,8 +54,16 @@ struct Passes {
   int up = 0, down = 0;
 };
 
-/// Why the mesh encloses nothing; empty if it does.
+/// Why the mesh encloses nothing, or something twice; empty if it encloses a solid.
 std::string fault_of(const ToolMesh& mesh) {
+  std::set<ToolMesh::Triangle> known;  // with their lowest corner first
+  for (ToolMesh::Triangle t : mesh.triangles) {
+    std::ranges::rotate(t, std::ranges::min_element(t));
+    if (known.insert(t).second) continue;
+    return ": two triangles have the corners " + text_of(mesh.points_mm[t[0]]) + ", " +
+           text_of(mesh.points_mm[t[1]]) + " and " + text_of(mesh.points_mm[t[2]]) +
+           " mm; remove doubled triangles";
+  }
   std::map<Edge, Passes> edges;
   for (const ToolMesh::Triangle& t : mesh.triangles) {
     for (std::size_t k = 0; k < 3; ++k) {
@@ -68,8 +76,11 @@ std::string fault_of(const ToolMesh& mesh) {
     if (passes.up == passes.down) continue;
     const std::string ends = "the edge from " + text_of(mesh.points_mm[edge.first]) + " to " +
                              text_of(mesh.points_mm[edge.second]) + " mm";
-    if ((passes.up + passes.down) % 2 == 1) {
-      return ": not closed, " + ends + " has no partner; close the hole there";
+    const int count = passes.up + passes.down;
+    if (count == 1) return ": not closed, " + ends + " has no partner; close the hole there";
+    if (count % 2 == 1) {
+      return ": " + std::to_string(count) + " triangles meet at " + ends +
+             ", and two enclose a solid; remove the wall within it, or the sheet on it";
     }
     return ": the triangles at " + ends +
            " are turned against each other; let all be counter-clockwise from outside";
@@ -140,110 +151,6 @@ ToolMesh closed_mesh(std::span<const LooseTriangle> triangles, double scale,
     if (fault_of(mesh).empty()) return mesh;
   }
   refuse(place, fault);
-}
-
-/// For each triangle the first one of its part; edges join triangles to parts.
-std::vector<std::size_t> first_of_parts(const ToolMesh& mesh) {
-  std::vector<std::size_t> next(mesh.triangles.size());  // toward the first of the part
-  std::iota(next.begin(), next.end(), std::size_t{0});
-  const auto first_of = [&](std::size_t t) {
-    while (next[t] != t) t = next[t] = next[next[t]];
-    return t;
-  };
-  std::map<Edge, std::size_t> known;
-  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-    const ToolMesh::Triangle& triangle = mesh.triangles[t];
-    for (std::size_t k = 0; k < 3; ++k) {
-      const Edge edge = std::minmax(triangle[k], triangle[(k + 1) % 3]);
-      const std::size_t a = first_of(known.try_emplace(edge, t).first->second), b = first_of(t);
-      next[std::max(a, b)] = std::min(a, b);
-    }
-  }
-  for (std::size_t t = 0; t < next.size(); ++t) next[t] = first_of(t);
-  return next;
-}
-
-/// Triangles of a part and the box around them.
-struct Part {
-  std::vector<std::size_t> triangles;
-  ToolMesh::Point low{1e9, 1e9, 1e9}, high{-1e9, -1e9, -1e9};
-  double volume_mm3 = 0;
-
-  [[nodiscard]] bool box_holds(const ToolMesh::Point& p) const {
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      if (p[axis] < low[axis] || p[axis] > high[axis]) return false;
-    }
-    return true;
-  }
-};
-
-std::vector<Part> parts_of(const ToolMesh& mesh) {
-  const std::vector<std::size_t> first = first_of_parts(mesh);
-  std::vector<Part> by_first(first.size()), parts;
-  for (std::size_t t = 0; t < first.size(); ++t) {
-    Part& part = by_first[first[t]];
-    part.triangles.push_back(t);
-    const auto corners = mesh.corners(mesh.triangles[t]);
-    for (const ToolMesh::Point& p : corners) {
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        part.low[axis] = std::min(part.low[axis], p[axis]);
-        part.high[axis] = std::max(part.high[axis], p[axis]);
-      }
-    }
-    part.volume_mm3 += dot(corners[0], cross(corners[1], corners[2])) / 6;
-  }
-  std::ranges::copy_if(by_first, std::back_inserter(parts),
-                       [](const Part& part) { return !part.triangles.empty(); });
-  return parts;
-}
-
-/// Winding number of a part around a position: the sum of the solid angles of its triangles (Van
-/// Oosterom and Strackee 1983) over that of the sphere.
-double winding(const ToolMesh& mesh, const Part& part, const ToolMesh::Point& at) {
-  double half_angles = 0;
-  for (const std::size_t t : part.triangles) {
-    auto [a, b, c] = mesh.corners(mesh.triangles[t]);
-    a = a - at, b = b - at, c = c - at;
-    const double la = length(a), lb = length(b), lc = length(c);
-    half_angles += std::atan2(dot(a, cross(b, c)),
-                              la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb);
-  }
-  return half_angles / (2 * std::numbers::pi);
-}
-
-/// Turns the whole mesh outward, and then each part of it that is no hollow in another. A part is
-/// judged after those that it lies in, for any order in the file. Returns the enclosed volume.
-double turn_outward(ToolMesh& mesh) {
-  std::vector<Part> parts = parts_of(mesh);
-  const auto sum_mm3 = [&] {
-    return std::accumulate(parts.begin(), parts.end(), 0.0,
-                           [](double sum, const Part& part) { return sum + part.volume_mm3; });
-  };
-  const auto turn = [&](Part& part) {
-    for (const std::size_t t : part.triangles)
-      std::swap(mesh.triangles[t][1], mesh.triangles[t][2]);
-    part.volume_mm3 = -part.volume_mm3;
-  };
-  // The sum of `of`(winding number) of the other parts around this one.
-  const auto around = [&](const Part& part, auto of) {
-    const ToolMesh::Point at = mesh.corners(mesh.triangles[part.triangles.front()])[0];
-    double sum = 0;
-    for (const Part& other : parts) {
-      if (&other != &part && other.box_holds(at)) sum += of(winding(mesh, other, at));
-    }
-    return sum;
-  };
-  if (sum_mm3() < 0) std::ranges::for_each(parts, turn);
-  std::vector<std::pair<double, Part*>> inside_out;  // by the number of parts that each lies in
-  for (Part& part : parts) {
-    if (part.volume_mm3 >= 0) continue;
-    inside_out.emplace_back(around(part, [](double w) { return std::round(std::abs(w)); }), &part);
-  }
-  std::ranges::stable_sort(inside_out, {}, &std::pair<double, Part*>::first);
-  for (const auto& [depth, part] : inside_out) {
-    if (around(*part, [](double w) { return w; }) < 0.5) turn(*part);
-  }
-  return sum_mm3();
 }
 
 /// Puts the middle of the height at 0, in whole nanometres.

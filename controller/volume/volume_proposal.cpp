@@ -17,6 +17,7 @@
 #include "controller/volume/connected_parts.hpp"
 #include "controller/volume/denoise.hpp"
 #include "controller/volume/windowing.hpp"
+#include "shared/text/text.hpp"
 
 namespace kerf {
 namespace {
@@ -394,7 +395,13 @@ std::string odd_spacing(const VolumeFrame& frame, const VoxelBox& solid, bool ho
   std::ostringstream text;
   text << s[0] << " x " << s[1] << " x " << s[2] << " mm "
        << (placeholder ? "(often written where none is known) " : "") << "makes what is solid "
-       << size_mm[0] << " x " << size_mm[1] << " x " << size_mm[2] << " mm";
+       << size_mm[0] << " x " << size_mm[1] << " x " << size_mm[2] << " mm; ";
+  const std::string own =
+      s[0] == s[1] && s[1] == s[2]
+          ? number_text(s[0])
+          : number_text(s[0]) + ',' + number_text(s[1]) + ',' + number_text(s[2]);
+  if (!is_stretched(frame)) text << "confirm it with --spacing " << own << ", or ";
+  text << "give the true one with --override-spacing x,y,z (mm)";
   return text.str();
 }
 

@@ -116,8 +116,8 @@ struct ProposalLine {
 inline constexpr double kMostStretched = 60;
 [[nodiscard]] bool is_stretched(const VolumeFrame& frame);
 
-/// Reason why the voxel size of a file may be wrong, for a message that begins with "spacing";
-/// empty if it may be right:
+/// Reason why the voxel size of a file may be wrong, and how to confirm or replace it, for a
+/// message that begins with "spacing"; empty if it may be right:
 ///
 /// - 1 x 1 x 1 mm without HU: libraries write that for an unknown size.
 /// - The solid box is longer than 2 m, the reach of a scanner, or shorter than 0.5 mm: then the

@@ -177,9 +177,9 @@ const char* way_to_change(const std::string& what) {
 
 }  // namespace
 
-/// Two lines of the output: the file, and the note of its reading.
+/// Lines of the output: the file, the note of its reading, and guessed axes.
 struct ImportCommand::SourceLines {
-  std::string file, note;
+  std::string file, note, axes;
 };
 
 /// The written files.
@@ -206,7 +206,7 @@ ImportCommand::ImportCommand(Arguments& app)
   command_.flag("--big-endian", big_endian_, "of its numbers: the highest byte is first")
       .needs(dims);
   command_.option("--skip", skip_, "bytes before its first voxel").within(0, 1e12).needs(dims);
-  spacing_.add_to(command_);
+  frame_.add_to(command_);
   command_.option("--iso", iso_, "the surface, in values of the file (HU of a CT)")
       .shown_as("VALUE");
   command_.option("--window", window_, "values that become density 0 and 1").shown_as("LO,HI");
@@ -257,7 +257,7 @@ ReadOptions ImportCommand::read_options() const {
     options.raw = RawLayout{grid_from("--dims", dims_), static_cast<VoxelType>(word), big_endian_,
                             static_cast<std::uint64_t>(skip_)};
   }
-  spacing_.set(options);
+  frame_.set(options);
   return options;
 }
 
@@ -285,7 +285,7 @@ void ImportCommand::run(std::ostream& out) const {
   SourceVolume source = read_volume(path_, options);
   refuse_stretched(path_, source);
   const Window range = range_window(source);
-  const std::string note = source.note;
+  const std::string note = source.note, axes = source.axes_note;
   std::ostringstream values;
   values << path_ << ": " << size_text(source) << ", values " << source.min << " .. " << source.max;
 
@@ -300,7 +300,7 @@ void ImportCommand::run(std::ostream& out) const {
     constexpr bool kOftenOneMm = true;  // as a CT in HU is
     refuse_odd(odd_spacing(source, solid_box(whole, otsu_threshold(whole)), kOftenOneMm));
     source = {};
-    return import_labelled(std::move(whole), {values.str(), note}, to, out);
+    return import_labelled(std::move(whole), {values.str(), note, axes}, to, out);
   }
   ProposedVolume proposed = propose_volume(std::move(whole), range, wished);
   const VolumeProposal& proposal = proposed.proposal;
@@ -324,7 +324,7 @@ void ImportCommand::run(std::ostream& out) const {
   write(std::move(image), {path_, to.volume, &proposal, 0, iso / kDensityMax, passes}, preview, to);
 
   if (proposal.surface.hounsfield) values << ", HU by their air of -1000";
-  print_source({values.str(), note}, out);
+  print_source({values.str(), note, axes}, out);
   for (const ProposalLine& choice : proposal_lines(proposal)) {
     line(out, choice.what, choice.chosen, way_to_change(choice.what));
   }
@@ -340,14 +340,14 @@ void ImportCommand::run(std::ostream& out) const {
 
 void ImportCommand::print_source(const SourceLines& source, std::ostream& out) const {
   line(out, "file", source.file,
-       spacing_.given() ? "" : "--override-spacing A,B,C for another voxel size");
+       frame_.gives_spacing() ? "" : "--override-spacing A,B,C for another voxel size");
   if (!source.note.empty()) line(out, "note", source.note, "");
+  if (!source.axes.empty()) line(out, "axes", source.axes, "--axes XYZ for others");
 }
 
 void ImportCommand::refuse_odd(const std::string& odd) const {
-  if (odd.empty() || spacing_.given()) return;
-  throw LoadError(path_ + ": spacing " + odd +
-                  "; confirm it with --spacing x,y,z (mm), or replace it with --override-spacing");
+  if (odd.empty() || frame_.gives_spacing()) return;
+  throw LoadError(path_ + ": spacing " + odd);
 }
 
 void ImportCommand::refuse_beside_labels() const {

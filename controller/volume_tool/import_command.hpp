@@ -47,7 +47,7 @@ class ImportCommand {
                        std::ostream& out) const;
 
   Arguments command_;
-  SpacingOptions spacing_;
+  FrameOptions frame_;
   std::string path_, out_, window_, iso_, denoise_ = "auto";
   std::string series_, dims_, type_ = "uint16";
   std::int64_t skip_ = 0;

@@ -53,19 +53,23 @@ std::array<double, 3> spacing_from(const std::string& option, const std::string&
                   " numbers; give one, or three as x,y,z (mm)");
 }
 
-void SpacingOptions::add_to(Arguments& command) {
+void FrameOptions::add_to(Arguments& command, bool with_spacing) {
+  Option replaces = command.option("--override-spacing", override_spacing,
+                                   "mm per voxel, in place of the file's");
+  replaces.shown_as("A[,B,C]");
+  command
+      .option("--axes", axes,
+              "if the file has none: where columns, rows and slices lead in the body, such as LPS "
+              "(left, back, top) or RAI (right, front, bottom)")
+      .shown_as("XYZ");
+  if (!with_spacing) return;
   Option fills = command.option("--spacing", spacing, "mm per voxel, if the file has none");
   fills.shown_as("A[,B,C]");
-  add_override_to(command).excludes(fills);
+  replaces.excludes(fills);
 }
 
-Option SpacingOptions::add_override_to(Arguments& command) {
-  return command
-      .option("--override-spacing", override_spacing, "mm per voxel, in place of the file's")
-      .shown_as("A[,B,C]");
-}
-
-void SpacingOptions::set(ReadOptions& options) const {
+void FrameOptions::set(ReadOptions& options) const {
+  options.axes = axes;
   if (!spacing.empty()) options.spacing_mm = spacing_from("--spacing", spacing);
   if (override_spacing.empty()) return;
   options.override_spacing_mm = spacing_from("--override-spacing", override_spacing);
@@ -127,7 +131,7 @@ struct VolumeInfo : VolumeFrame {
 
   std::string file;
   std::uint32_t spacing_known = kAllAxes;
-  std::string note;
+  std::string note, axes_note;
   double min = 0, max = 0;  ///< values of the file
   Window window;
   Density otsu = 0;
@@ -170,6 +174,7 @@ VolumeInfo describe(const std::string& file, const SourceVolume& volume, Window 
   info.file = file;
   info.spacing_known = volume.spacing_known;
   info.note = volume.note;
+  info.axes_note = volume.axes_note;
   info.min = volume.min;
   info.max = volume.max;
   info.window = window;
@@ -203,6 +208,9 @@ void print(const VolumeInfo& info, std::ostream& out) {
     out << "not known from the file; give it with --spacing or spacing_mm\n";
   }
   if (!info.note.empty()) out << "note       " << info.note << '\n';
+  if (!info.axes_note.empty()) {
+    out << "axes       " << info.axes_note << "; --axes XYZ for others\n";
+  }
   out << "origin     " << o[0] << " " << o[1] << " " << o[2] << " mm\ndirection  (" << d[0] << " "
       << d[3] << " " << d[6] << ") (" << d[1] << " " << d[4] << " " << d[7] << ") (" << d[2] << " "
       << d[5] << " " << d[8] << ")\nvalues     " << info.min << " .. " << info.max
@@ -228,6 +236,7 @@ void write_report(const VolumeInfo& info, const std::filesystem::path& path) {
                     {"noise_share", info.noise.share},
                     {"origin_mm", info.origin_mm},
                     {"note", info.note},
+                    {"axes_note", info.axes_note},
                     {"otsu_density", info.otsu / kDensityMax},
                     {"otsu_value", info.otsu_value},
                     {"size_vox", std::array{info.grid.nx, info.grid.ny, info.grid.nz}},
@@ -241,18 +250,14 @@ void write_report(const VolumeInfo& info, const std::filesystem::path& path) {
 /// The input of the commands that read a volume.
 struct Source {
   std::string file, window;
-  SpacingOptions spacing;
+  FrameOptions frame;
   int cpu_s = kReadCpuSeconds;
 
   void add_to(Arguments& command, bool with_spacing) {
     command.option("file", file, "volume file, or folder with a DICOM series")
         .required()
         .shown_as("FILE");
-    if (with_spacing) {
-      spacing.add_to(command);
-    } else {
-      spacing.add_override_to(command);
-    }
+    frame.add_to(command, with_spacing);
     command.option("--window", window, "values that become density 0 and 1 (default: all)")
         .shown_as("LO,HI");
     command.option("--read-seconds", cpu_s, "CPU time that parsing a file may take")
@@ -263,7 +268,7 @@ struct Source {
     ReadOptions options;
     options.allow_missing_spacing = allow_missing_spacing;
     options.cpu_s = cpu_s;
-    spacing.set(options);
+    frame.set(options);
     return read_volume(file, options);
   }
   [[nodiscard]] Window window_for(const SourceVolume& source) const {
@@ -278,6 +283,9 @@ struct Source {
                       "(mm), since --spacing is the new one");
     }
     if (!source.note.empty()) out << escaped(file) << ": " << source.note << '\n';
+    if (!source.axes_note.empty()) {
+      out << escaped(file) << ": axes " << source.axes_note << "; --axes XYZ for others\n";
+    }
     VolumeImage image = apply_window(source, window_for(source));
     read_labels_beside(file, image, cpu_s);
     return image;

@@ -28,16 +28,15 @@ int run_volume_tool(int argc, const char* const* argv, std::ostream& out, std::o
 /// "256x256x161"
 [[nodiscard]] VoxelGrid grid_from(const std::string& option, const std::string& text);
 
-/// The two options for the size of a voxel, as they are written.
-struct SpacingOptions {
-  std::string spacing, override_spacing;
+/// The options for size and axes of the voxels, as they are written.
+struct FrameOptions {
+  std::string spacing, override_spacing, axes;
 
-  void add_to(Arguments& command);
-  /// Only the one that replaces the file's; the other means something else there.
-  Option add_override_to(Arguments& command);
+  /// `with_spacing`: false where --spacing means something else.
+  void add_to(Arguments& command, bool with_spacing = true);
   /// Throws as the functions above.
   void set(ReadOptions& options) const;
-  [[nodiscard]] bool given() const { return !spacing.empty() || !override_spacing.empty(); }
+  [[nodiscard]] bool gives_spacing() const { return !spacing.empty() || !override_spacing.empty(); }
 };
 
 /// The inputs of a command, which its outputs must not replace: the volume's file or folder, and

@@ -89,7 +89,7 @@ class Demo {
     wait_for(describe, seconds(10), [&] { return describe.ended().has_value(); });
     std::vector<std::string> words{program_beside("controller"),
                                    "--scene",
-                                   find_data_file(options_.scene),
+                                   find_scene_file(options_.scene),
                                    "--device",
                                    options_.device,
                                    "--port",

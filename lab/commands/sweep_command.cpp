@@ -208,7 +208,7 @@ int Command::run(std::ostream& out) const {
   if (device_is_axis && !device_.empty()) {
     throw HilError("--device: --set device.personality says it; leave one of the two out");
   }
-  const SweepRequest request{std::filesystem::absolute(find_data_file(scene_)).string(),
+  const SweepRequest request{std::filesystem::absolute(find_scene_file(scene_)).string(),
                              device_is_axis    ? ""
                              : device_.empty() ? "omni"
                                                : device_,

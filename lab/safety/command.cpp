@@ -310,7 +310,7 @@ std::vector<int> Command::rates() const {
 }
 
 std::vector<Cell> Command::cells() const {
-  const std::string place = find_data_file(scene_);
+  const std::string place = find_scene_file(scene_);
   const HandScript script = read_hand_script(find_data_file(hand_));
   std::vector<Cell> cells;
   for (const std::string& device : devices_) {

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <iostream>
@@ -96,6 +97,24 @@ std::string find_data_file(const std::string& name) {
   if (name.empty() || std::filesystem::exists(name, error)) return name;
   const std::string found = find_beside_program(name);
   return found.empty() ? name : found;
+}
+
+std::string find_scene_file(const std::string& name) {
+  std::error_code error;
+  const std::string as_named = find_data_file(name);
+  if (name.empty() || std::filesystem::exists(as_named, error)) return as_named;
+  for (const std::string& shipped : {"scenes/" + name, "scenes/" + name + ".toml"}) {
+    const std::string found = find_beside_program(shipped);
+    if (!found.empty()) return found;
+  }
+  return name;
+}
+
+std::string user_data_folder() {
+  const char* own = std::getenv("XDG_DATA_HOME");
+  if (own != nullptr && own[0] == '/') return std::string(own) + "/kerf";  // relative: not valid
+  const char* home = std::getenv("HOME");
+  return home != nullptr && home[0] == '/' ? std::string(home) + "/.local/share/kerf" : "";
 }
 
 }  // namespace kerf

@@ -38,7 +38,16 @@ inline constexpr unsigned long long kLeastStackBytes = 1 << 20;
 /// `name`, so that opening it fails with that name. Start-up only.
 [[nodiscard]] std::string find_data_file(const std::string& name);
 
-/// The same without the current folder, for files that a program runs; empty if there is none.
+/// The same for a scene, of which a name is enough, as `touch`: those of kerf have a folder of
+/// their own and the ending .toml.
+[[nodiscard]] std::string find_scene_file(const std::string& name);
+
+/// Folder for what the user adds to an installed kerf: $XDG_DATA_HOME/kerf, by default
+/// ~/.local/share/kerf; empty if there is neither (XDG Base Directory Specification 0.8).
+[[nodiscard]] std::string user_data_folder();
+
+/// Path as of find_data_file, without the current folder, for files that a program runs; empty if
+/// there is none.
 [[nodiscard]] std::string find_beside_program(const std::string& name);
 
 /// A progress bar on stderr; shows nothing unless it is wanted and stderr is a terminal. The

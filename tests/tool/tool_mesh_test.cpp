@@ -18,6 +18,7 @@
 #include "controller/input/load_error.hpp"
 #include "controller/load/load_scene.hpp"
 #include "controller/tool/inner_samples.hpp"
+#include "controller/tool/mesh_parts.hpp"
 #include "controller/tool/mesh_surface.hpp"
 #include "controller/tool/surface_samples.hpp"
 #include "controller/tool/tool_shapes.hpp"
@@ -260,6 +261,77 @@ TEST_CASE("a mesh that encloses nothing or has a hole is refused with the edge")
   CHECK(begins(join_error(flat), "bur.stl: the mesh encloses 0 mm^3"));
 }
 
+namespace {
+
+/// Whose sides lie in the planes x, z = +-half.
+Triangles upright_bar(double half, double length) {
+  return extremes::loft({-length / 2, length / 2}, 4, [&](double y, double angle) {
+    const double diagonal = angle + std::numbers::pi / 4;
+    return extremes::Point{half * std::round(std::sqrt(2) * std::cos(diagonal)), y,
+                           half * std::round(std::sqrt(2) * std::sin(diagonal))};
+  });
+}
+
+}  // namespace
+
+TEST_CASE("doubled triangles, walls and sheets are named as what they are") {
+  Triangles doubled = kBar;
+  doubled.push_back(kBar[5]);
+  CHECK(begins(join_error(doubled), "bur.stl: two triangles have the corners ("));
+  CHECK(test::has(join_error(doubled), " mm; remove doubled triangles"));
+  CHECK(join_error(both(kBar, kBar)) != "");  // twice the volume, and each edge has its partner
+  LooseTriangle turned = kBar[5];
+  std::ranges::rotate(turned, turned.begin() + 1);
+  CHECK(join_error(both(kBar, {turned})) == join_error(doubled));
+  Triangles sheet = kBar;  // a flap at one edge of the bar
+  sheet.push_back({kBar[5][0], kBar[5][1], {9, 9, 9}});
+  CHECK(test::has(join_error(sheet), "3 triangles meet at the edge from ("));
+}
+
+namespace {
+
+Triangles mapped(Triangles triangles, auto to) {
+  for (LooseTriangle& t : triangles) {
+    for (auto& corner : t) corner = to(corner[0], corner[1], corner[2]);
+  }
+  return triangles;
+}
+
+std::string note_of(const Triangles& triangles) {
+  return mesh_note(join_triangles(triangles, 1, "bur.stl"));
+}
+
+}  // namespace
+
+TEST_CASE("a bur that is round about another axis or beside it, and several shells, are told") {
+  using Corner = std::array<float, 3>;
+  const Triangles bur = prism(1, 8, 12);
+  CHECK(note_of(bur).empty());
+  CHECK(note_of(prism(4, 1, 12)).empty());    // a wheel
+  CHECK(note_of(upright_bar(1, 2)).empty());  // a cube, round about no axis
+  CHECK(note_of(mapped(upright_bar(1, 9), [](float x, float y, float z) {
+          return Corner{3 * x, y, z};  // a blade, which is not round either
+        })).empty());
+  const auto along_z = [](float x, float y, float z) { return Corner{x, -z, y}; };
+  CHECK(begins(note_of(mapped(bur, along_z)), "it is round about (0, 0, 1), and the spindle"));
+  CHECK(begins(note_of(mapped(bur,
+                              [](float x, float y, float z) {
+                                return Corner{y, -x, z};
+                              })),
+               "it is round about (1, 0, 0), and"));
+  for (const float degrees : {3.0F, 45.0F}) {
+    const float c = std::cos(degrees / 57.3F), s = std::sin(degrees / 57.3F);
+    const std::string note = note_of(mapped(bur, [&](float x, float y, float z) {
+      return Corner{x, c * y - s * z, s * y + c * z};
+    }));
+    CHECK(note.empty() == (degrees < 5));
+  }
+  CHECK(begins(note_of(moved(bur, 0.3F, 0, 0)), "its middle is 0.3 mm beside the spindle's axis"));
+  const std::string two = note_of(both(bur, moved(prism(0.5, 1, 4), 0, 10, 0)));
+  CHECK(begins(two, "its mesh is 2 closed shells without a common edge, the smallest from ("));
+  CHECK(note_of(both(bur, inverted(prism(0.5, 1, 4)))).starts_with("its mesh is 2 closed shells"));
+}
+
 TEST_CASE("corners that the rounding of their numbers sets apart are joined, real detail is not") {
   const ToolMesh exact = join_triangles(kBar, 1, "bur.stl");
   const auto each_corner = [](Triangles triangles, auto change) {
@@ -313,19 +385,6 @@ TEST_CASE("coordinates that no tool has are refused with their triangle") {
   }
   CHECK(begins(join_error(kBar, 1000), "bur.stl: triangle 1 has the coordinate "));
 }
-
-namespace {
-
-/// Whose sides lie in the planes x, z = +-half.
-Triangles upright_bar(double half, double length) {
-  return extremes::loft({-length / 2, length / 2}, 4, [&](double y, double angle) {
-    const double diagonal = angle + std::numbers::pi / 4;
-    return extremes::Point{half * std::round(std::sqrt(2) * std::cos(diagonal)), y,
-                           half * std::round(std::sqrt(2) * std::sin(diagonal))};
-  });
-}
-
-}  // namespace
 
 TEST_CASE("the samples of a mesh are those of the same body as a shape") {
   // A corner of the sides is on each sample of the rim.

@@ -227,6 +227,33 @@ TEST_CASE("a note names what the values depend on and the slices do not share") 
   CHECK(note([](int) { return "80"; }).empty());
 }
 
+TEST_CASE("a DICOM object that is no image is named, whole or cut off, alone or beside slices") {
+  const TemporaryFolder folder;
+  for (const auto& [uid, name] :
+       {std::pair{"1.2.840.10008.5.1.4.1.1.481.3", "RT Structure Set"},
+        std::pair{"1.2.840.10008.5.1.4.1.1.88.33", "Comprehensive SR"},
+        std::pair{"1.2.840.10008.5.1.4.1.1.104.1", "Encapsulated PDF"},
+        std::pair{"1.2.840.10008.5.1.4.1.1.66.1", "Spatial Registration"}}) {
+    DicomSpec spec = dicom_slice(7);
+    spec.series = "1.8";
+    for (const int number : {0x0002, 0x0004, 0x0010, 0x0011}) {
+      spec.set(0x0028, static_cast<std::uint16_t>(number), "");
+    }
+    spec.set(0x7fe0, 0x0010, "");
+    spec.set(0x0008, 0x0016, "UI", uid);
+    std::string bytes = dicom(spec);
+    const std::string meta = dicom_element(0x0002, 0x0002, "UI", "1.2.840.10008.5.1.4.1.1.2");
+    const std::string own = dicom_element(0x0002, 0x0002, "UI", uid);
+    bytes.replace(bytes.find(meta), meta.size(), own);
+    const auto grown = static_cast<std::uint32_t>(own.size() - meta.size());
+    // The length of the meta header, which it begins with.
+    bytes[140] = static_cast<char>(static_cast<unsigned char>(bytes[140]) + grown);
+    const std::string is = std::string(": is a DICOM ") + name + ", which holds no image";
+    CHECK(has(refusal(folder.write("a.dcm", bytes)), is));
+    CHECK(has(refusal(folder.write("a.dcm", bytes.substr(0, bytes.size() - 3))), is));
+  }
+}
+
 TEST_CASE("what is no slice is left out and named; a slice that cannot be read is not") {
   const TemporaryFolder folder;
   write_dicom_series(folder, [](DicomSpec&, int) {});

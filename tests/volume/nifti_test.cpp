@@ -177,8 +177,7 @@ TEST_CASE(
   check_numbered(bare, [](double i, double j, double k) {
     return Three{i - 1, -(2 * j - 3), 3 * k - 6};
   });
-  CHECK(bare.note ==
-        "the header has no sform or qform, so no patient frame: left and right may be exchanged");
+  CHECK(has(bare.axes_note, "LAS (columns to the left, rows to the front, slices to the top of a"));
 }
 
 TEST_CASE("a NIfTI's qfac of -1 mirrors, 0 does not, and a broken qform is refused") {

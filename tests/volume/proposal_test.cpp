@@ -190,7 +190,8 @@ TEST_CASE("a voxel size that makes no sense is told") {
   VolumeFrame frame;
   const VoxelBox tooth{{0, 0, 0}, {88, 78, 155}};
   CHECK(odd_spacing(frame, tooth, false) ==
-        "1 x 1 x 1 mm (often written where none is known) makes what is solid 88 x 78 x 155 mm");
+        "1 x 1 x 1 mm (often written where none is known) makes what is solid 88 x 78 x 155 mm; "
+        "confirm it with --spacing 1, or give the true one with --override-spacing x,y,z (mm)");
   CHECK(odd_spacing(frame, tooth, true).empty());  // a head of 1 mm is usual
   frame.spacing_mm = {0.125, 0.125, 0.125};
   CHECK(odd_spacing(frame, tooth, false).empty());

@@ -1,6 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
 #include <functional>
+#include <string>
+#include <string_view>
 
 #include <doctest/doctest.h>
 #include <zlib.h>
@@ -211,6 +216,47 @@ TEST_CASE("a file without a header is what its layout says") {
                     counting<float>()));
   CHECK(same_values(read(bytes_of(counting<std::int64_t>()), {kSmall, VoxelType::int64}),
                     counting<float>()));
+}
+
+TEST_CASE("axes that no file names are said, and any that are given are obeyed, mirrored or not") {
+  const TemporaryFolder folder;
+  const auto raw = folder.write("a.bin", bytes_of(counting<std::uint16_t>()));
+  const auto read = [&](const std::string& axes) {
+    return read_volume(raw, {.spacing_mm = std::array<double, 3>{1, 2, 3},
+                             .raw = RawLayout{kSmall, VoxelType::uint16, false, 0},
+                             .axes = axes});
+  };
+  CHECK(has(read("").axes_note, "LPS (columns to the left, rows to the back, slices to the top"));
+  constexpr std::array<std::string_view, 2> kLetters{"LPS", "rai"};  // in any case
+  std::array<std::size_t, 3> order{0, 1, 2};
+  int ways = 0;
+  do {
+    for (unsigned signs = 0; signs < 8; ++signs) {
+      FilePlaces places{{}, {}};
+      std::string axes;
+      for (std::size_t a = 0; a < 3; ++a) {
+        const unsigned back = signs >> a & 1;
+        axes += kLetters[back][order[a]];
+        places.steps[a] = {};
+        places.steps[a][order[a]] = static_cast<double>(a + 1) * (back != 0 ? -1 : 1);
+      }
+      CAPTURE(axes);
+      const SourceVolume v = read(axes);
+      CHECK(misplaced(v, places).empty());
+      CHECK(v.axes_note.empty());
+      ++ways;
+    }
+  } while (std::next_permutation(order.begin(), order.end()));
+  CHECK(ways == 48);
+  for (const char* wrong : {"LP", "LPSS", "LRS", "LPX", "lp1", "LLP", "L P"}) {
+    CHECK(has(test::error_of([&] { static_cast<void>(read(wrong)); }),
+              std::string("--axes: ") + wrong + " is not three letters"));
+  }
+  const auto named = folder.write(
+      "b.nrrd", nrrd("uint8", "space: LPS\nspace directions: (1,0,0) (0,2,0) (0,0,3)\n") +
+                    bytes_of(counting<std::uint8_t>()));
+  CHECK(read_volume(named).axes_note.empty());
+  CHECK(has(refusal(named, {.axes = "RAS"}), "b.nrrd has axes of its own; leave it out"));
 }
 
 TEST_CASE("a file without a header is refused where its size is not that of the layout") {

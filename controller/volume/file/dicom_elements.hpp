@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <cstring>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -77,36 +78,56 @@ inline std::optional<gdcm::DataSet> item(const gdcm::DataSet& set, const gdcm::T
   return items->GetItem(at + 1).GetNestedDataSet();
 }
 
+/// The first items of the sequences of a data set, each parsed once: a file may have thousands of
+/// frames, which share some of them.
+class Groups {
+ public:
+  /// `set` outlives the object; null holds nothing.
+  explicit Groups(const gdcm::DataSet* set) : set_(set) {}
+
+  /// Null if there is no such sequence.
+  [[nodiscard]] const gdcm::DataSet* find(const gdcm::Tag& sequence) const {
+    if (set_ == nullptr || !set_->FindDataElement(sequence)) return nullptr;
+    const auto [at, is_new] = items_.try_emplace(sequence);
+    if (is_new) at->second = item(*set_, sequence, 0);
+    return at->second ? &*at->second : nullptr;
+  }
+  [[nodiscard]] const gdcm::DataSet& all() const { return *set_; }
+
+ private:
+  const gdcm::DataSet* set_;
+  mutable std::map<gdcm::Tag, std::optional<gdcm::DataSet>> items_;
+};
+
 /// The facts of one frame: its own functional groups, those of all frames, the top of the file.
 class Facts {
  public:
-  /// The parts outlive the object.
-  Facts(const gdcm::DataSet* own, const gdcm::DataSet* shared, const gdcm::DataSet* top)
-      : levels_{own, shared, top} {}
+  /// `shared` and `top` outlive the object, as what `own` refers to does.
+  Facts(const gdcm::DataSet* own, const Groups& shared, const Groups& top)
+      : own_(own), shared_(shared), top_(top) {}
 
   /// An element, in the sequence `group` or, of older files, on the top of the file.
   [[nodiscard]] gdcm::DataElement find(const gdcm::Tag& group, const gdcm::Tag& tag) const {
-    for (const gdcm::DataSet* level : levels_) {
-      if (level == nullptr) continue;
-      const auto inside = item(*level, group, 0);
-      if (inside && inside->FindDataElement(tag)) return inside->GetDataElement(tag);
+    for (const Groups* level : {&own_, &shared_, &top_}) {
+      const gdcm::DataSet* inside = level->find(group);
+      if (inside != nullptr && inside->FindDataElement(tag)) return inside->GetDataElement(tag);
     }
-    return levels_[2]->GetDataElement(tag);
+    return top_.all().GetDataElement(tag);
   }
   [[nodiscard]] std::string text(const gdcm::Tag& group, const gdcm::Tag& tag) const {
     return text_of(find(group, tag));
   }
-  /// If any level has the sequence.
-  [[nodiscard]] std::optional<gdcm::DataSet> group(const gdcm::Tag& sequence) const {
-    for (const gdcm::DataSet* level : levels_) {
-      if (level == nullptr) continue;
-      if (auto inside = item(*level, sequence, 0)) return inside;
+  /// Null unless any level has the sequence.
+  [[nodiscard]] const gdcm::DataSet* group(const gdcm::Tag& sequence) const {
+    for (const Groups* level : {&own_, &shared_, &top_}) {
+      if (const gdcm::DataSet* inside = level->find(sequence)) return inside;
     }
-    return {};
+    return nullptr;
   }
 
  private:
-  std::array<const gdcm::DataSet*, 3> levels_;
+  Groups own_;
+  const Groups &shared_, &top_;
 };
 
 /// Fills in the frames of a file, whose `pixels` are known, and what the user should know of them.

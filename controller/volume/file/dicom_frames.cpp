@@ -148,7 +148,7 @@ ModalityTransform transform_of(const Facts& facts, bool signed_cells) {
   ModalityTransform transform;
   transform.slope = rescale_number(facts, Tag(0x0028, 0x1053), "RescaleSlope", 1);
   transform.intercept = rescale_number(facts, Tag(0x0028, 0x1052), "RescaleIntercept", 0);
-  if (const auto set = facts.group(Tag(0x0028, 0x3000))) {
+  if (const gdcm::DataSet* set = facts.group(Tag(0x0028, 0x3000))) {
     if (transform != ModalityTransform{}) {
       throw Unfit{"has a Modality LUT and a RescaleSlope or RescaleIntercept",
                   "leave one of them out"};
@@ -298,7 +298,7 @@ void place_frames(const gdcm::DataSet& set, DicomFile& file) {
 /// What the user should know of the units of the values.
 void describe_values(const Facts& facts, const std::string& modality, DicomFile& file) {
   std::string type = facts.text(kTransformation, Tag(0x0028, 0x1054));
-  if (const auto lut = facts.group(Tag(0x0028, 0x3000))) {
+  if (const gdcm::DataSet* lut = facts.group(Tag(0x0028, 0x3000))) {
     type = text_of(lut->GetDataElement(Tag(0x0028, 0x3004)));
   }
   // C.11.1.1.2: HU, if no other type is named.
@@ -308,7 +308,7 @@ void describe_values(const Facts& facts, const std::string& modality, DicomFile&
   };
   if (!type.empty() && type != "HU") add("its values are in " + one_line(type) + ", not in HU");
   const bool plain = file.frames.front().transform == ModalityTransform{};
-  if (plain && facts.group(Tag(0x0040, 0x9096))) {
+  if (plain && facts.group(Tag(0x0040, 0x9096)) != nullptr) {
     add("values as stored: its Real World Value Mapping is not applied");
   }
 }
@@ -327,20 +327,20 @@ void read_frames(const gdcm::DataSet& set, std::size_t count, DicomFile& file) {
                     std::to_string(own->GetNumberOfItems()),
                 "export it again"};
   }
-  const gdcm::DataSet* all = shared ? &*shared : nullptr;
+  const Groups all(shared ? &*shared : nullptr), top(&set);
   const auto facts_of = [&](std::size_t i) {
-    return Facts(own ? &own->GetItem(i + 1).GetNestedDataSet() : nullptr, all, &set);
+    return Facts(own ? &own->GetItem(i + 1).GetNestedDataSet() : nullptr, all, top);
   };
   if (own) {
     for (std::size_t i = 0; i < count; ++i) {
-      file.frames.push_back(frame_of(facts_of(i), i, file.pixels));
-      const auto in_stack =
-          binary<std::uint32_t>(facts_of(i).find(kFrameContent, Tag(0x0020, 0x9057)));
+      const Facts facts = facts_of(i);
+      file.frames.push_back(frame_of(facts, i, file.pixels));
+      const auto in_stack = binary<std::uint32_t>(facts.find(kFrameContent, Tag(0x0020, 0x9057)));
       if (in_stack) file.frames.back().number = static_cast<double>(*in_stack);
       file.frames.back().marks.emplace_back("file", file.path.filename().string());
     }
   } else {
-    const DicomFrame first = frame_of(Facts(nullptr, all, &set), 0, file.pixels);
+    const DicomFrame first = frame_of(facts_of(0), 0, file.pixels);
     file.frames.assign(count, first);
     for (std::size_t i = 0; i < count; ++i) file.frames[i].index = i;
     if (count > 1) place_frames(set, file);

@@ -8,6 +8,7 @@
 #include <csetjmp>
 #include <csignal>
 #include <fstream>
+#include <initializer_list>
 #include <new>
 #include <sstream>
 #include <string_view>
@@ -15,6 +16,7 @@
 
 #include <gdcmReader.h>
 #include <gdcmTransferSyntax.h>
+#include <gdcmUIDs.h>
 
 #include "controller/volume/file/dicom_elements.hpp"
 #include "controller/volume/file/file_headers.hpp"
@@ -27,6 +29,9 @@ namespace {
 
 /// More frames than files of a folder are read.
 constexpr std::size_t kMostFrames = 20000;
+
+/// The file meta information (PS3.10 7.1) lies within.
+constexpr std::size_t kMetaBytes = 4096;
 
 const Tag kPixelData(0x7fe0, 0x0010);
 const Tag kFloatPixels(0x7fe0, 0x0008), kDoublePixels(0x7fe0, 0x0009);
@@ -48,6 +53,22 @@ std::optional<std::pair<double, double>> padding_of(const gdcm::DataSet& set,
                           : numbers(std::uint16_t{}, 0x0120, 0x0121);
 }
 
+/// What an object is that is no image, by its SOP class (PS3.6 A); empty for images, and for
+/// classes that GDCM does not know.
+std::string kind_without_image(const std::string& uid) {
+  gdcm::UIDs known;
+  if (uid.empty() || !known.SetFromUID(uid.c_str())) return {};
+  std::string name = known.GetName();
+  for (const char* pixels : {"Image", "Volume", "RT Dose", "Parametric Map"}) {
+    if (name.find(pixels) != name.npos || name == "Segmentation Storage") return {};
+  }
+  constexpr std::string_view kStorage = " Storage";
+  if (const std::size_t at = name.find(kStorage); at != name.npos) name.erase(at);
+  return "is a DICOM " + name + ", which holds no image";
+}
+
+constexpr const char* kNameSlices = "name a file or folder of slices";
+
 /// Refuses what is no picture of one value per pixel.
 StoredPixels pixels_of(const gdcm::DataSet& set) {
   const auto u16 = [&](std::uint16_t element) {
@@ -57,7 +78,8 @@ StoredPixels pixels_of(const gdcm::DataSet& set) {
   pixels.rows = u16(0x0010).value_or(0);
   pixels.columns = u16(0x0011).value_or(0);
   if (!u16(0x0010) && !u16(0x0011)) {
-    throw Unfit{"holds no image", "name a file or folder of slices"};
+    const std::string kind = kind_without_image(text_of(set.GetDataElement(Tag(0x0008, 0x0016))));
+    throw Unfit{kind.empty() ? "holds no image" : kind, kNameSlices};
   }
   const std::string colours = text_of(set.GetDataElement(Tag(0x0028, 0x0004)));
   const unsigned samples = u16(0x0002).value_or(1);
@@ -201,12 +223,9 @@ bool read_up_to_pixels(gdcm::Reader& reader) {
   return read;
 }
 
-/// The series of a file that GDCM cannot parse: what follows the first such tag,
-/// whole; or empty.
-std::string series_in(std::string_view bytes) {
-  using namespace std::string_view_literals;
-  for (const std::string_view element :
-       {"\x20\x00\x0e\x00UI"sv, "\x00\x20\x00\x0eUI"sv, "\x20\x00\x0e\x00"sv}) {
+/// A UID in a file that GDCM cannot parse: what follows the first of these tags, whole; or empty.
+std::string uid_in(std::string_view bytes, std::initializer_list<std::string_view> elements) {
+  for (const std::string_view element : elements) {
     const std::size_t at = bytes.find(element);
     if (at == bytes.npos || at + 8 > bytes.size()) continue;
     const std::size_t length_at = at + (element.size() == 6 ? 6 : 4);
@@ -227,7 +246,6 @@ std::optional<std::string> replace_syntax(std::string& bytes) {
   using namespace std::string_view_literals;
   constexpr std::string_view kElement = "\x02\x00\x10\x00UI"sv;
   constexpr std::string_view kKnown = "1.2.840.10008.1.2.1"sv;
-  constexpr std::size_t kMetaBytes = 4096;
   const std::size_t at = std::string_view(bytes).substr(0, kMetaBytes).find(kElement);
   if (at == bytes.npos || at + 8 > bytes.size()) return std::nullopt;
   const auto length = static_cast<std::size_t>(static_cast<unsigned char>(bytes[at + 6])) |
@@ -306,8 +324,11 @@ std::optional<DicomFile> read_dicom_header(const fs::path& path) {
     std::ostringstream all;
     all << in.rdbuf();
     std::string bytes = std::move(all).str();
-    file.series = series_in(bytes);
+    using namespace std::string_view_literals;
+    file.series =
+        uid_in(bytes, {"\x20\x00\x0e\x00UI"sv, "\x00\x20\x00\x0eUI"sv, "\x20\x00\x0e\x00"sv});
     if (!named && file.series.empty()) return std::nullopt;  // looked like one, as any file may
+    const std::string bytes_of_meta = bytes.substr(0, kMetaBytes);
     const auto syntax = replace_syntax(bytes);
     std::istringstream stream(std::move(bytes));
     gdcm::Reader again;
@@ -316,6 +337,9 @@ std::optional<DicomFile> read_dicom_header(const fs::path& path) {
       describe(again.GetFile().GetDataSet(), file);
       refuse_syntax(*syntax);
     }
+    const std::string kind = kind_without_image(uid_in(bytes_of_meta, {"\x02\x00\x02\x00UI"sv}));
+    file.is_index = !kind.empty();
+    if (!kind.empty()) throw Unfit{kind, kNameSlices};
     file.is_slice = !file.series.empty();
     throw Unfit{"cannot be read", "check that the file is whole and of the kind its name says"};
   } catch (const Unfit& unfit) {

@@ -84,7 +84,7 @@ struct DicomFile {
 
   std::string unfit, way_out;  ///< why it has no frames, and what to do; or empty
   bool is_slice = false;       ///< unfit, and its series is incomplete without it
-  bool is_index = false;       ///< a DICOMDIR of any name, which has no series
+  bool is_index = false;       ///< a DICOMDIR of any name, or a cut object that is no image
 };
 
 /// Reads a file up to its pixels; none if it is not DICOM. One that may have been DICOM, as it

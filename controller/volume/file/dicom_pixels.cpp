@@ -313,9 +313,11 @@ void DicomPixels::convert(const DicomSlice& slice, std::span<std::byte> to) {
       if (keep_padding) padded_[before + i] = padding;
     }
   };
-  // Cells of up to 16 bits by a table of all: most files have one transform for all frames.
-  const auto by_table = [&]<class Cell>(Cell) {
+  // Cells of up to 16 bits by a table of all, if that is no longer than the frame: each may have a
+  // transform of its own.
+  const auto by_table = [&]<class Cell>(Cell cell_type) {
     constexpr std::size_t kCells = std::size_t{1} << 8 * sizeof(Cell);
+    if (values.size() < kCells) return each(cell_type);
     OpenFile& now = *open_;
     const auto key = [](const StoredPixels& p) {
       return std::tuple(p.allocated, p.stored, p.high_bit, p.is_signed, p.padding);

@@ -44,8 +44,7 @@ std::vector<Stack> parts_by(const Stack& whole, const std::string& mark) {
     const std::string text = mark_of(slice, mark);
     Stack& part = parts[{number_in(text).value_or(0), text}];
     if (part.slices.empty()) {
-      part = whole;
-      part.slices.clear();
+      part = {whole.number, whole.series, whole.name, whole.part, whole.order, {}, {}};
       part.part += (part.part.empty() ? "" : ", ") + mark + ' ' + (text.empty() ? "none" : text);
     }
     part.slices.push_back(slice);
@@ -96,6 +95,7 @@ std::vector<Stack> split(const Stack& whole, int marks_left = 3) {
     std::vector<Stack> all;
     bool clean = true;
     for (const Stack& part : parts) {
+      if (!clean) break;
       for (Stack& each : split(part, marks_left - 1)) {
         clean = clean && doubled(each) == 0;
         all.push_back(std::move(each));
@@ -116,6 +116,12 @@ std::vector<Stack> all_stacks(const std::list<DicomFile>& files) {
       auto own = std::ranges::find_if(
           stacks, [&](const Stack& stack) { return alike(stack.slices.front(), slice); });
       if (own == stacks.end()) {
+        constexpr std::size_t kMostDirections = 1000;
+        if (stacks.size() == kMostDirections) {
+          throw LoadError(file.path.string() + ": the slices of its series have more than " +
+                          std::to_string(kMostDirections) +
+                          " sizes or directions; name a file or folder of one stack");
+        }
         stacks.push_back({file.series_number, file.series, file.series_name, {}, {}, {}, {}});
         own = stacks.end() - 1;
       }

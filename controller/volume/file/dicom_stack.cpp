@@ -317,6 +317,7 @@ UntrustedHeader claim_of(const fs::path& path, const Stack& stack, Note& note) {
   claim.size = {first.file->pixels.columns, first.file->pixels.rows,
                 static_cast<std::int64_t>(stack.slices.size())};
   claim.axes = {axes.x, axes.y, axes.normal};
+  claim.axes_known = stack.order == Order::position && first.frame->orientation ? 1 : 0;
   constexpr std::uint32_t kInPlane = 0b011, kBetween = 0b100;
   claim.spacing_known = 0;
   if (finest->frame->spacing_mm) {

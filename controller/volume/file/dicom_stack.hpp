@@ -43,7 +43,9 @@ void put_in_order(Stack& stack);
 class Note {
  public:
   void add(const std::string& sentence) {
-    if (sentence.empty() || std::ranges::find(sentences_, sentence) != sentences_.end()) return;
+    constexpr std::size_t kMost = 64;  // more than a claim has room for
+    if (sentence.empty() || sentences_.size() == kMost) return;
+    if (std::ranges::find(sentences_, sentence) != sentences_.end()) return;
     sentences_.push_back(sentence);
   }
   void write(UntrustedHeader& claim) const {

@@ -244,6 +244,7 @@ void set_frame(const fs::path& path, const PropertyList& project, UntrustedHeade
   claim.axes = coronal    ? std::array{row, -1.0 * normal, -1.0 * column}
                : sagittal ? std::array{normal, row, -1.0 * column}
                           : std::array{row, -1.0 * column, normal};
+  claim.axes_known = told.empty() ? 0 : 1;
   add_note(claim,
            told.empty()
                ? std::string("the project keeps no directions of the patient: they are taken "

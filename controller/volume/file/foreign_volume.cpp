@@ -51,6 +51,7 @@ void read_raw(const fs::path& path, const RawLayout& layout, const MemoryRequest
   claim.size = {layout.grid.nx, layout.grid.ny, layout.grid.nz};
   claim.spacing_known = 0;
   claim.axes = kSliceAxes;
+  claim.axes_known = 0;
   read_voxel_files(path, {layout.type, Packing::raw, layout.big_endian, {}, {{path, layout.skip}}},
                    claim, offer);
 }

@@ -40,7 +40,8 @@ struct UntrustedHeader {
   std::uint32_t spacing_known = kAllAxes;
   std::array<char, 96> bad_spacing{};  ///< what the file has that is no distance; or empty
   std::array<double, 3> spacing_mm{1, 1, 1}, origin_mm{};
-  std::array<vec3::Vec, 3> axes{};  ///< direction of each
+  std::array<vec3::Vec, 3> axes{};  ///< direction of each, LPS
+  std::uint32_t axes_known = 1;     ///< 0: the file names no axes of a body, these are usual ones
   std::array<char, 1024> note{};    ///< for the user: sentences of `add_note`
 };
 

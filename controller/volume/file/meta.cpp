@@ -180,6 +180,7 @@ UntrustedHeader meta_claim(const HeaderFields& fields, const std::vector<std::in
   if (!unit) fields.refuse("DistanceUnits", "is no length that kerf reads; write lengths in mm");
   UntrustedHeader claim;
   claim.spacing_known = spacing.empty() ? 0 : 7;
+  claim.axes_known = matrix.empty() && !fields.has("AnatomicalOrientation") ? 0 : 1;
   for (std::size_t i = 0; i < 3; ++i) {
     claim.size[i] = sizes[axes[i]];
     if (!spacing.empty()) claim.spacing_mm[i] = spacing[axes[i]].value * unit->times / unit->over;

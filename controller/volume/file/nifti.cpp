@@ -282,11 +282,7 @@ void place(const fs::path& path, const Nifti& h, UntrustedHeader& claim) {
     if (!sform && h.pixdim[axis + 1] == 0) claim.spacing_known &= ~(1U << axis);
   }
   claim.origin_mm = unit * Three{0.0 - at.origin[0], 0.0 - at.origin[1], at.origin[2]};
-  if (!sform && !qform) {
-    add_note(claim,
-             "the header has no sform or qform, so no patient frame: left and right may be "
-             "exchanged");
-  }
+  claim.axes_known = sform || qform ? 1 : 0;
   // Rounded to float32, from a product of rotation and scale.
   constexpr double kRounding = 8 * std::numeric_limits<float>::epsilon();
   const bool contradicts = std::ranges::any_of(std::array{0U, 1U, 2U}, [&](unsigned axis) {

@@ -288,9 +288,7 @@ UntrustedHeader nrrd_claim(const HeaderFields& fields, const std::vector<std::in
     }
     set_straight(fields, axes, spacings,
                  fields.has("units") ? units_of(fields, "units", axes, count, true) : units, claim);
-    if (space.is_patient) {
-      add_note(claim, "no space directions: its axes are taken as those of LPS");
-    }
+    claim.axes_known = 0;
   } else {
     for (const LengthUnit& unit : units_of(fields, "units", axes, count)) {
       if (unit.times == unit.over) continue;

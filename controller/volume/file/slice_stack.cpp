@@ -219,6 +219,7 @@ void read_slice_stack(const fs::path& folder, const std::vector<fs::path>& besid
   claim.spacing_mm = {first.spacing_mm[0], first.spacing_mm[1], 1};
   claim.spacing_known = first.spacing_known & 0b011;  // none between files
   claim.axes = kSliceAxes;
+  claim.axes_known = 0;
   add_note(claim, "slices in the order of the numbers in their names, " +
                       files.front().filename().string() + " first");
   if (!first.note.empty()) add_note(claim, first.note);

@@ -323,6 +323,7 @@ void read_tiff(const fs::path& path, const MemoryRequest& offer) {
     claim.spacing_mm = slices.spacing_mm;
     claim.spacing_known = slices.spacing_known;
     claim.axes = kSliceAxes;
+    claim.axes_known = 0;
     if (!slices.note.empty()) add_note(claim, slices.note);
     memory = offer(claim);
     own = memory.last(static_cast<std::size_t>(claim.size[0] * claim.size[1] * claim.size[2]) *

@@ -22,6 +22,7 @@
 #include "controller/volume/file/file_headers.hpp"
 #include "controller/volume/file/folder_files.hpp"
 #include "controller/volume/file/foreign_volume.hpp"
+#include "controller/volume/file/volume_axes.hpp"
 #include "controller/volume/file/volume_image.hpp"
 #include "controller/volume/file/volume_spacing.hpp"
 #include "controller/volume/file/volume_write.hpp"
@@ -226,12 +227,13 @@ bool lies_as(const VolumeFrame& labels, const VolumeFrame& image) {
 }
 
 /// Checks the header that the sandbox reports; returns the bytes of memory for it.
-std::size_t accept(const fs::path& path, const ReadOptions& options, const UntrustedHeader& claim,
+std::size_t accept(const fs::path& path, const ReadOptions& options, UntrustedHeader& claim,
                    SourceVolume& source) {
   const std::string note(claim.note.begin(), std::ranges::find(claim.note, '\0'));
   if (!note.empty()) source.note += (source.note.empty() ? "" : "; ") + escaped(note);
   set_grid(path, claim.size, source);
   take_spacing(path.string(), options, claim, source);
+  source.axes_note = take_axes(path.string(), options.axes, claim);
   set_origin(path, claim.origin_mm, source);
   const std::uint64_t each = std::clamp<std::uint64_t>(claim.voxel_bytes, bytes_of(claim.kind), 8);
   return source.grid.voxel_count() * each;

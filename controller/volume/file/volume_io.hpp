@@ -24,6 +24,8 @@ struct SourceVolume : VolumeFrame {
   std::uint32_t spacing_known = kAllAxes;
   VoxelValues values;  ///< in `memory`
   std::string note;    ///< what the user should know of the reading, on one line; or empty
+  /// Which axes are taken for a file that names none, and how to give others; or empty.
+  std::string axes_note;
   double min = 0, max = 0;
   SharedBytes memory;
 };
@@ -37,6 +39,7 @@ struct ReadOptions {
   int cpu_s = kReadCpuSeconds;         ///< CPU time that parsing may take
   std::string series{};                ///< of several in a folder: its number or a part of its name
   std::optional<RawLayout> raw{};      ///< of a file without a header
+  std::string axes{};  ///< of a file that names none: as axes_from of volume_axes.hpp has it
 };
 
 /// Reads NRRD (.nrrd, .nhdr), MetaImage (.mha, .mhd), NIfTI (.nii, .nii.gz), TIFF of several pages,
