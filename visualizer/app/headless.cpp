@@ -293,7 +293,7 @@ int run_headless(const VisualizerOptions& options) {
   report.latency_ms.clear();
 
   std::optional<Film> film;
-  if (options.record) film.emplace(*options.record, options.size, options.video_hz);
+  if (options.record) begin_recording(options, options.size, film);
   FrameSchedule schedule(options.frames, options.every_ticks.value_or(ticks_between(
                                              options.frames, options.seconds, session.tick_ns())));
   std::optional<TickLead> lead;

@@ -179,7 +179,8 @@ std::optional<VisualizerOptions> parse_options(int argc, const char* const* argv
       .shows_default();
   declare_run(app, options);
   const Option record = app.option("--record", options.record,
-                                   "raw video in true time (y4m): a file, a pipe, or - for stdout; "
+                                   "video in true time: a file, raw (y4m) or by ffmpeg (.mp4, "
+                                   ".mkv), a pipe, or - for stdout; "
                                    "headless without pictures unless --frames")
                             .shown_as("FILE");
   declare_files(app, options, headless);

@@ -8,6 +8,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <limits>
+#include <optional>
 #include <string>
 #include <system_error>
 #include <thread>
@@ -18,6 +19,7 @@
 #include "shared/posix/atomic_file.hpp"
 #include "shared/posix/stop_signals.hpp"
 #include "shared/posix/threads.hpp"
+#include "shared/text/text.hpp"
 #include "visualizer/app/window_run.hpp"
 #include "visualizer/gl/window.hpp"
 #include "visualizer/scene/appearance.hpp"
@@ -44,8 +46,19 @@ int exit_code(const Session& session, bool video_is_cut) {
   return lost || video_is_cut ? 1 : 0;
 }
 
+void begin_recording(const VisualizerOptions& options, PictureSize size,
+                     std::optional<Film>& film) {
+  const std::string growth = video_growth(*options.record, size, options.video_hz);
+  if (!growth.empty()) {
+    std::fprintf(stderr, "kerf-visualizer: video %s: %s\n", escaped(*options.record).c_str(),
+                 growth.c_str());
+  }
+  film.emplace(*options.record, size, options.video_hz);
+}
+
 void check_files(const VisualizerOptions& options) {
   if (options.mesh) check_export(*options.mesh);
+  if (options.record) check_video(*options.record);
   const auto path = [](const auto& asked) { return std::filesystem::path(asked.value_or("")); };
   const std::filesystem::path mesh = path(options.mesh), attached = path(options.attached);
   const std::string mesh_ending = mesh.extension().string();

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "visualizer/app/options.hpp"
+#include "visualizer/picture/image_files.hpp"
 
 namespace kerf {
 
@@ -28,6 +30,9 @@ class Session;
 /// 0 if the controller still runs or ended cleanly, 1 if it went away without a word, which
 /// is reported on stderr, or if a video is cut short.
 [[nodiscard]] int exit_code(const Session& session, bool video_is_cut);
+
+/// Begins the video of --record, and says on stderr how fast its file grows. Throws FileError.
+void begin_recording(const VisualizerOptions& options, PictureSize size, std::optional<Film>& film);
 
 /// Follows one run of a controller and writes frame-0001.png and so on into `options.out`; the last
 /// one shows the final state. A video goes on to the end of the run. Returns the `exit_code`;

@@ -3,14 +3,17 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <cstdio>
 #include <filesystem>
 #include <stdexcept>
 #include <string>
+#include <system_error>
 #include <vector>
 
+#include "shared/text/text.hpp"
 #include "visualizer/compose/tool_painter.hpp"
 #include "visualizer/picture/image_files.hpp"
 #include "visualizer/render/renderer.hpp"
@@ -188,15 +191,25 @@ Notice take_screenshot(const VisualizerOptions& options, const RenderTarget& tar
 Notice toggle_film(const VisualizerOptions& options, PictureSize size, std::optional<Film>& film) {
   if (film) {
     const VideoFile& file = film->file();
-    const Notice ended{"video: " + file.path() + ": " + std::to_string(file.frames()) + " frames"};
-    film.reset();
-    return ended;
+    const std::string path = file.path(), frames = std::to_string(file.frames());
+    film.reset();  // now it is whole
+    std::error_code fault;
+    const auto bytes = std::filesystem::file_size(path, fault);
+    return {"video: " + path + ": " + frames + " frames" +
+            (fault
+                 ? ""
+                 : ", " + number_text(std::round(static_cast<double>(bytes) / 1e5) / 10) + " MB")};
   }
-  return write_for_user("video begins", [&] {
-    const std::filesystem::path file = unused_file(options.out, ".y4m");
+  Notice begun = write_for_user("video begins", [&] {
+    const std::filesystem::path file = unused_file(options.out, have_ffmpeg() ? ".mp4" : ".y4m");
     film.emplace(file.string(), size, options.video_hz);
     return file;
   });
+  if (film) {
+    const std::string growth = video_growth(film->file().path(), size, options.video_hz);
+    if (!growth.empty()) begun.text += " (" + growth + ")";
+  }
+  return begun;
 }
 
 Notice write_opacities(const VisualizerOptions& options, const Picture& picture) {

@@ -286,7 +286,7 @@ void WindowRun::time_the_tool(const WindowInput& input, const glm::dvec3& tool_m
 Redrawn WindowRun::draw(PictureSize size, const WindowInput& input, Clock::time_point now) {
   if (!target_ || target_->size() != size) target_.emplace(size);
   if (std::exchange(record_from_start_, false)) {
-    film_.emplace(*options_.record, size, options_.video_hz);
+    begin_recording(options_, size, film_);
   }
   if (std::exchange(keys_.film, false)) notices_.say(toggle_film(options_, size, film_), now);
   OverlayFigures figures = figures_at(now);

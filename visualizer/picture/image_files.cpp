@@ -5,9 +5,13 @@
 #include <algorithm>
 #include <cerrno>
 #include <climits>
+#include <cmath>
 #include <csignal>
 #include <cstddef>
+#include <cstdlib>
 #include <cstring>
+#include <filesystem>
+#include <sstream>
 #include <string>
 #include <string_view>
 #include <system_error>
@@ -16,6 +20,8 @@
 #include <fcntl.h>
 #include <png.h>
 #include <poll.h>
+#include <spawn.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include "shared/posix/atomic_file.hpp"
@@ -54,8 +60,7 @@ std::span<const std::uint8_t> bytes_of(std::string_view text) {
   return {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()};
 }
 
-int opened(const std::string& path) {
-  std::signal(SIGPIPE, SIG_IGN);  // a closed pipe is an error of `write`
+int opened_raw(const std::string& path) {
   if (path == "-") {
     const int fd = dup(STDOUT_FILENO);
     dup2(STDERR_FILENO, STDOUT_FILENO);  // messages for the user would end up in the video
@@ -63,6 +68,55 @@ int opened(const std::string& path) {
   }
   constexpr int kNew = O_WRONLY | O_CREAT | O_TRUNC | O_NOFOLLOW | O_CLOEXEC;
   return is_stream(path) ? open_stream(path) : open(path.c_str(), kNew, 0666);
+}
+
+/// Starts ffmpeg, which reads YUV4MPEG2 from `from` and writes `path`; returns its id, or -errno.
+/// It has a session of its own, so that a Ctrl-C of the terminal leaves it to end the file.
+pid_t start_ffmpeg(int from, const std::string& path) {
+  const std::string to = "file:" + std::filesystem::absolute(path).string();
+  std::vector<std::string> words = {"ffmpeg", "-nostdin", "-loglevel", "quiet", "-y", "-i", "-"};
+  // An odd side is padded, as 4:2:0 of H.264 has none. Fragments: whole without a proper end.
+  for (const char* word : {"-vf",
+                           "pad=ceil(iw/2)*2:ceil(ih/2)*2",
+                           "-c:v",
+                           "libx264",
+                           "-preset",
+                           "ultrafast",
+                           "-crf",
+                           "20",
+                           "-g",
+                           "60",
+                           "-pix_fmt",
+                           "yuv420p",
+                           "-colorspace",
+                           "bt709",
+                           "-color_primaries",
+                           "bt709",
+                           "-color_trc",
+                           "bt709",
+                           "-movflags",
+                           "+frag_keyframe+empty_moov"}) {
+    words.emplace_back(word);
+  }
+  words.push_back(to);
+  std::vector<char*> arguments;
+  for (std::string& word : words) arguments.push_back(word.data());
+  arguments.push_back(nullptr);
+  posix_spawn_file_actions_t actions;
+  posix_spawnattr_t attributes;
+  posix_spawn_file_actions_init(&actions);
+  posix_spawnattr_init(&attributes);
+  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSID);
+  posix_spawn_file_actions_adddup2(&actions, from, STDIN_FILENO);
+  for (const int number : {STDOUT_FILENO, STDERR_FILENO}) {
+    posix_spawn_file_actions_addopen(&actions, number, "/dev/null", O_WRONLY, 0);
+  }
+  pid_t child = 0;
+  const int error =
+      posix_spawnp(&child, "ffmpeg", &actions, &attributes, arguments.data(), environ);
+  posix_spawnattr_destroy(&attributes);
+  posix_spawn_file_actions_destroy(&actions);
+  return error == 0 ? child : -error;
 }
 
 // Of BT.709, times the range of the result over 255, in 1/65536.
@@ -93,8 +147,52 @@ std::uint8_t value(const Weights& weight, std::int32_t r, std::int32_t g, std::i
 
 }  // namespace
 
+bool is_compressed(const std::string& path) {
+  return path.ends_with(".mp4") || path.ends_with(".mkv");
+}
+
+bool have_ffmpeg() {
+  const char* folders = std::getenv("PATH");
+  std::istringstream list(folders == nullptr ? "" : folders);
+  for (std::string folder; std::getline(list, folder, ':');) {
+    if (!folder.empty() && access((folder + "/ffmpeg").c_str(), X_OK) == 0) return true;
+  }
+  return false;
+}
+
+void check_video(const std::string& path) {
+  if (!is_compressed(path) || have_ffmpeg()) return;
+  throw FileError("video " + path +
+                  ": no ffmpeg to compress it; apt-get install ffmpeg, or name a .y4m");
+}
+
+std::string video_growth(const std::string& path, PictureSize size, int frames_per_s) {
+  if (path == "-" || is_compressed(path) || is_stream(path)) return {};
+  const double bytes = 1.5 * size.width * size.height * frames_per_s;
+  return "raw, " + std::to_string(std::lround(bytes / 1e6)) + " MB a second; " +
+         (have_ffmpeg() ? "a name that ends in .mp4 compresses it"
+                        : "ffmpeg would compress it, apt-get install ffmpeg");
+}
+
+VideoFile::Descriptor VideoFile::opened(const std::string& path) {
+  std::signal(SIGPIPE, SIG_IGN);  // a closed pipe is an error of `write`
+  if (!is_compressed(path) || is_stream(path)) return {opened_raw(path)};
+  check_video(path);
+  check_new_file(path);
+  int ends[2];
+  if (pipe2(ends, O_CLOEXEC) != 0) return {};
+  constexpr int kSomeFrames = 1 << 20;
+  static_cast<void>(fcntl(ends[1], F_SETPIPE_SZ, kSomeFrames));
+  const pid_t child = start_ffmpeg(ends[0], path);
+  close(ends[0]);
+  if (child > 0) return {ends[1], child};
+  close(ends[1]);
+  errno = -child;
+  return {};
+}
+
 VideoFile::VideoFile(std::string path, PictureSize size, int frames_per_s)
-    : path_(std::move(path)), size_(size), to_{opened(path_)} {
+    : path_(std::move(path)), size_(size), to_(opened(path_)) {
   if (to_.fd < 0) fail(not_written(errno));
   // The colour differences stand in the middle of their squares, which y4m calls "jpeg"; the range
   // is limited all the same.
@@ -106,6 +204,9 @@ VideoFile::VideoFile(std::string path, PictureSize size, int frames_per_s)
 
 VideoFile::Descriptor::~Descriptor() {
   if (fd >= 0) close(fd);
+  if (ffmpeg == 0) return;
+  while (waitpid(ffmpeg, nullptr, 0) < 0 && errno == EINTR) {
+  }
 }
 
 void VideoFile::fail(const std::string& reason) const {
@@ -121,14 +222,16 @@ void VideoFile::write(std::span<const std::uint8_t> bytes) {
     pollfd ready{to_.fd, POLLOUT, 0};
     const int count = poll(&ready, 1, kPatienceMs);
     if (count < 0 && errno == EINTR) continue;
+    const bool compressed = to_.ffmpeg != 0;
     if (count == 0) fail("its reader takes nothing any more; record to a file");
     // What a pipe that is ready takes without waiting.
     const ssize_t written =
         ::write(to_.fd, bytes.data(), std::min<std::size_t>(bytes.size(), PIPE_BUF));
     if (written < 0 && (errno == EINTR || errno == EAGAIN)) continue;
     if (written < 0) {
-      fail(errno == EPIPE ? "its reader has gone; record to a file"
-                          : std::string(std::strerror(errno)) + "; name a place with room");
+      fail(errno == EPIPE && compressed ? "ffmpeg has ended; make room, or name a .y4m"
+           : errno == EPIPE             ? "its reader has gone; record to a file"
+                            : std::string(std::strerror(errno)) + "; name a place with room");
     }
     bytes = bytes.subspan(static_cast<std::size_t>(written));
     written_bytes_ += written;

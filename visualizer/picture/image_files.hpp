@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include <sys/types.h>
+
 #include "visualizer/gl/target.hpp"
 #include "visualizer/scene/pixel_rect.hpp"
 
@@ -32,9 +34,22 @@ void make_folder(const std::filesystem::path& folder);
 void fill_yuv420(PictureSize size, std::span<const std::uint8_t> rgb,
                  std::vector<std::uint8_t>& yuv);
 
-/// Raw video that grows frame by frame: YUV4MPEG2 (4:2:0, BT.709, limited range), which players and
+/// Whether a video of that name is compressed, by its ending: .mp4 or .mkv.
+[[nodiscard]] bool is_compressed(const std::string& path);
+
+/// Whether the program that compresses, ffmpeg, is in PATH.
+[[nodiscard]] bool have_ffmpeg();
+
+/// Throws FileError for a name of a compressed video, if there is no ffmpeg.
+void check_video(const std::string& path);
+
+/// How fast a raw video in a file grows, and the way out; empty for a pipe and a compressed one.
+[[nodiscard]] std::string video_growth(const std::string& path, PictureSize size, int frames_per_s);
+
+/// Video that grows frame by frame: YUV4MPEG2 (4:2:0, BT.709, limited range), which players and
 /// ffmpeg read. A file is good up to its last whole frame whenever writing ends; "-" is the
-/// standard output, and a path that is a pipe is written to.
+/// standard output, and a path that is a pipe is written to. One that `is_compressed` is made by
+/// ffmpeg, which is good up to the last second if ffmpeg is killed.
 ///
 /// Every failure is a FileError of one line. A reader that takes nothing for `kPatienceMs` counts
 /// as gone: a picture must not wait for ever for who films it.
@@ -56,9 +71,11 @@ class VideoFile {
 
  private:
   struct Descriptor {
-    int fd;
-    ~Descriptor();
+    int fd = -1;
+    pid_t ffmpeg = 0;  ///< 0: none
+    ~Descriptor();     ///< waits until ffmpeg has written all
   };
+  [[nodiscard]] static Descriptor opened(const std::string& path);
 
   void write(std::span<const std::uint8_t> bytes);
   [[noreturn]] void fail(const std::string& reason) const;

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <csignal>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <optional>
@@ -239,6 +240,42 @@ TEST_CASE("a full disk leaves whole frames and says so in one line") {
   CHECK(problem_of([&] { VideoFile(link, size, 60); }).find("is a link; name a file itself") !=
         std::string::npos);
   CHECK_FALSE(std::filesystem::exists(folder / "another's"));
+}
+
+TEST_CASE("a name that ends in .mp4 is written by ffmpeg, and is whole when the film ends") {
+  const TemporaryFolder folder;
+  const std::string path_before = std::getenv("PATH");
+  const PictureSize size{64, 64};
+  const Bytes frame(64 * 64 * 3 / 2, 100);
+  const std::string file = (folder / "-a film.mp4").string();
+  setenv("PATH", folder.path().c_str(), 1);
+  CHECK_FALSE(have_ffmpeg());
+  CHECK(problem_of([&] { VideoFile(file, size, 60); }).find("no ffmpeg to compress it; apt-get") !=
+        std::string::npos);
+  CHECK(video_growth("a.y4m", {640, 480}, 60).starts_with("raw, 28 MB a second; ffmpeg would"));
+  const auto become = [&](const std::string& script) {
+    folder.write("ffmpeg", "#!/bin/sh\nPATH=" + path_before + "\n" + script);
+    chmod((folder / "ffmpeg").c_str(), 0755);
+  };
+  // Writes what it reads, later than it is closed, to its last argument.
+  become(
+      "for last; do :; done\ncat >\"${last#file:}.part\"\nsleep 0.2\n"
+      "mv \"${last#file:}.part\" \"${last#file:}\"\n");
+  {
+    VideoFile video(file, size, 60);
+    for (int i = 0; i < 40; ++i) video.write_frame(frame);
+  }
+  CHECK(read_back(file, size).frames.size() == 40);
+  CHECK(video_growth("a.y4m", {640, 480}, 60).ends_with("ends in .mp4 compresses it"));
+  CHECK(video_growth("a.mkv", size, 60).empty());
+  CHECK(video_growth("-", size, 60).empty());
+  CHECK(video_growth("/dev/null", size, 60).empty());
+  become("exit 1\n");
+  CHECK(problem_of([&] {
+          VideoFile video(file, size, 60);
+          while (true) video.write_frame(frame);
+        }).find("ffmpeg has ended; make room, or name a .y4m") != std::string::npos);
+  setenv("PATH", path_before.c_str(), 1);
 }
 
 TEST_CASE("a reader that is not there, goes away or takes nothing is told in one line") {

@@ -13,6 +13,7 @@
 
 #include "tests/json.hpp"
 #include "visualizer/app/run.hpp"
+#include "visualizer/picture/image_files.hpp"
 // After all others: it defines plain words.
 #include <X11/Xlib.h>
 #include <X11/Xutil.h>
@@ -249,7 +250,7 @@ RgbPicture User::whole() {
 
 void User::begin_video() {
   send("key m");
-  wait_for(out_ / "kerf-0001.y4m");
+  wait_for(out_ / (have_ffmpeg() ? "kerf-0001.mp4" : "kerf-0001.y4m"));
 }
 
 std::vector<std::uint8_t> User::picture() {
