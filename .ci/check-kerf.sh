@@ -218,8 +218,10 @@ expect 'a demo runs' kerf_gives 0 demo --seconds 1
 expect 'without a display it says where its pictures are' says '^kept in kerf-demo: '
 expect 'and there they are' test -e kerf-demo/frame-0001.png
 expect 'and once more, in place of the first' kerf_gives 0 demo --seconds 1
-expect 'asked for no window, it keeps none' kerf_gives 0 demo --seconds 1 --headless
-expect 'and says so' says '^kept nothing: --out DIR keeps'
+expect 'asked for no window, it keeps the same' kerf_gives 0 demo --seconds 1 --headless
+expect 'and says so' says '^kept in kerf-demo: '
+expect 'but a sheet alone, if that is asked for' kerf_gives 0 demo --seconds 1 --sheet s.png
+expect 'and says so, too' says '^kept s.png alone: --out DIR keeps'
 mv kerf-demo/frame-0001.png kerf-demo/mine.png
 expect 'a folder of somebody else is not touched' kerf_gives 2 demo --seconds 1
 rm -r kerf-demo
@@ -238,7 +240,7 @@ expect 'a disk that fills up ends it' \
   with FULL=1 with FAIL_visualizer=2 kerf_gives 2 demo --seconds 60 --headless --out "$lab/out"
 expect 'in one line' test "$(wc -l <"$lab/said")" == 1
 expect 'a program that does not end is ended' with STUCK=1 kerf_gives 1 demo --seconds 1 --headless
-expect 'in one line beside the summary' test "$(grep -vc '^the summary$' "$lab/said")" == 1
+expect 'in one line beside the summary' test "$(grep -vcE '^(the summary$|kept in )' "$lab/said")" == 1
 expect 'which says so' says '^kerf: demo: recorder: still busy after 10 s; ended by force$'
 expect 'a folder that is taken away ends it' \
   with TAKEN=1 kerf_gives 2 demo --seconds 60 --headless --out "$lab/gone"
@@ -257,7 +259,7 @@ expect 'reach the visualizer' called '^visualizer.*--stereo --transfer t.toml --
 expect 'with a display they' with DISPLAY=:99 kerf_gives 0 demo --seconds 1 --stereo \
   --record v.y4m --out "$lab/out"
 expect 'reach the window, which keeps its files with the others' \
-  called '^visualizer --name [^ ]* --size [^ ]* --stereo --record v.y4m --out .*/out/\.kerf-demo/new '
+  called '^visualizer --name [^ ]* --size [^ ]* --stereo --record v.y4m --out .*/out '
 expect 'and there is one video' test "$(grep -c -- --record "$lab/calls")" == 1
 expect 'the pointer is the hand' with DISPLAY=:99 kerf_gives 0 demo --seconds 1 --hand mouse
 expect 'in the window' called '^visualizer.*--hand-socket [^ ]*/hand '

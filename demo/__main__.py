@@ -26,11 +26,21 @@ class Demo:
     def __init__(self, programs, kerf, options):
         self.programs, self.kerf, self.options = programs, kerf, options
         self.root = os.path.dirname(kerf)
-        self.scene = options.scene or os.path.join(self.root, "scenes", "phantom.toml")
+        self.scene = self.find_scene(options.scene or "phantom")
         self.out = self.processes = None
         self.controller = self.emulator = self.recorder = self.window = self.pictures = self.bridge = None
         self.code_of_signal = None
         self.finishing = False  # the results are being kept: a signal is too late
+
+    def find_scene(self, name):
+        """The file of that name; else that of kerf's own scenes, with or without their folder and the ending."""
+        shipped = os.path.join(self.root, "scenes")
+        for path in (name, os.path.join(self.root, name), os.path.join(shipped, name), os.path.join(shipped, name + ".toml")):
+            if os.path.isfile(path):
+                if path != name != "phantom":
+                    say(f"kerf: demo: --scene {name}: {path}")
+                return path
+        return name
 
     # -- signals
 
@@ -186,6 +196,8 @@ class Demo:
         options, processes = self.options, self.processes
         told = dict(line.split("=", 1) for line in self.told.read_text().splitlines() if "=" in line)
         rate_hz = int(told.get("rate_hz", 1000))
+        for line in demo_options.growth(options, rate_hz):
+            say("kerf: demo: " + line)
         self.recorder = processes.start("recorder", ["--name", self.name, "--out", os.path.join(self.results, "log")],
                                         out="recorder.log", log="recorder.log")
         hand = self.hand(told)
@@ -229,7 +241,8 @@ class Demo:
         if not options.headless:
             led = ["--hand-socket", processes.path("hand")] if options.mouse else []
             led += ["--ends-after", options.seconds] if options.bound_is_told else []
-            keys_out = ["--out", self.results] if self.out else []  # else the window's keys write to the current folder
+            # Where the path that a line shows leads to at once, and after the run.
+            keys_out = ["--out", self.options.out] if self.out else []  # else the window's keys write to the current folder
             self.window = processes.start("visualizer", [
                 *common, *record, *led, *keys_out, "--attached", processes.path("window-shows"),
                 "--choice", processes.path("choice"), "--open-in", os.path.dirname(self.scene) or "."],
@@ -343,8 +356,8 @@ class Demo:
             else:
                 complain(line)
                 code = 1
-        elif not self.out and not options.record and not options.sheet and options.headless and code == 0:
-            say("kept nothing: --out DIR keeps pictures, plot, report and log")
+        elif not self.out and options.headless and code == 0:
+            say(f"kept {' '.join(filter(None, (options.sheet, options.record)))} alone: --out DIR keeps pictures, plot, report and log")
         return code
 
     def next_demo(self, path):
@@ -365,7 +378,9 @@ def main():
     try:
         return Demo(programs, kerf, demo_options.parse(words)).run()
     except Refusal as refusal:
-        complain("kerf: demo: " + re.sub(r"[\x00-\x1f\x7f]", "?", str(refusal)))
+        text = re.sub(r"[\x00-\x1f\x7f]", "?", str(refusal))
+        installed = not os.path.exists(os.path.join(os.path.dirname(kerf), "CMakeLists.txt"))
+        complain("kerf: demo: " + (text.replace("./kerf ", "kerf ") if installed else text))
         return 2
     except KeyboardInterrupt:  # while it builds
         return 130

@@ -4,6 +4,7 @@ import dataclasses
 import errno
 import os
 import re
+import shutil
 import socket
 
 BUSES = {"omni": ("fw", "fw1"), "falcon": ("usb", "usb"), "woodenhaptics": ("hid", "hidraw0")}  # word of --port, its node
@@ -116,6 +117,27 @@ def check_link(options):
             raise Refusal(f"{word}: not with --two-machines: {why}; leave one of them out")
 
 
+def is_compressed(video):
+    """As the visualizer has it."""
+    return video.endswith((".mp4", ".mkv"))
+
+
+TICK_BYTES = 488  # a row of the log
+
+
+def growth(options, rate_hz):
+    """Lines that say beforehand how large files become: a raw video, the log of more than a minute."""
+    lines, seconds = [], float(options.seconds)
+    width, height = map(int, options.size.split("x"))
+    is_stream = os.path.exists(options.record) and not os.path.isfile(options.record)
+    if options.record and not is_compressed(options.record) and not is_stream:
+        way = "a name that ends in .mp4 compresses it" if shutil.which("ffmpeg") else "ffmpeg would compress it, apt-get install ffmpeg"
+        lines.append(f"--record {options.record}: raw, {1.5 * width * height * 60 / 1e6:.0f} MB a second; {way}")
+    if options.out and seconds > 60:
+        lines.append(f"--out {options.out}: its log grows by {60 * rate_hz * TICK_BYTES / 1e6:.0f} MB a minute")
+    return lines
+
+
 def check(options):
     """Completes the options by defaults, and throws Refusal for values and combinations that cannot be."""
     if options.record == "-":
@@ -138,6 +160,8 @@ def check(options):
     options.seconds = options.seconds or ("600" if options.mouse else "60" if options.serve else "10")
     if not re.fullmatch(r"[0-9]{1,6}(\.[0-9]+)?", options.seconds) or not re.search("[1-9]", options.seconds):
         raise Refusal(f"--seconds {options.seconds}: not a positive number of seconds; take 10")
+    if is_compressed(options.record) and not shutil.which("ffmpeg"):
+        raise Refusal(f"--record {options.record}: no ffmpeg to compress it; apt-get install ffmpeg, or name a .y4m")
     size = re.fullmatch(r"([1-9][0-9]{0,4})x([1-9][0-9]{0,4})", options.size)
     if not size or int(size[1]) > 8192 or int(size[2]) > 8192:
         raise Refusal(f"--size {options.size}: not WIDTHxHEIGHT in pixels, 1 to 8192 each; take 640x480")
@@ -148,6 +172,6 @@ def check(options):
         raise Refusal(f"--port {options.port}: not for --device {options.device}; take socket or {bus}")
     if options.virtual and options.port not in ("socket", "fw"):
         raise Refusal("--virtual: a USB bus keeps its own time; take --port socket")
-    if not options.headless and not has_display():
-        options.headless = True
-        options.out = options.out or "kerf-demo"  # a user without a display finds the pictures there
+    options.headless = options.headless or not has_display()
+    if options.headless and not (options.sheet or options.record):
+        options.out = options.out or "kerf-demo"  # who sees no window finds the pictures there

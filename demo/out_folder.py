@@ -2,6 +2,8 @@
 """The folder of --out. It is new, empty, or holds the unchanged results of an earlier demo, which this demo replaces:
 files of others are never touched.
 
+The keys of the window write to it at once; what they wrote goes on the list, too.
+
 In it, `.kerf-demo` is kerf's own: `lock` (one demo at a time), `files` (the list of the results of the last demo), `new` (the
 results of this one, until they move to their places together at the end)."""
 import fcntl
@@ -18,6 +20,7 @@ from options import Refusal
 OWN = ".kerf-demo"
 KIB_A_SECOND, KIB_AT_LEAST = 384, 16384  # 384 bytes a tick; pictures, plot and volume
 RESERVE_BYTES = 65536  # for the list of the results, even on a disk that is full by then
+BY_KEYS = re.compile(r"kerf-[0-9]{4}\.(png|y4m|mp4|toml|ply)")  # names that the window's keys give
 KINDS = ((stat.S_ISREG, "f"), (stat.S_ISLNK, "l"), (stat.S_ISFIFO, "p"), (stat.S_ISSOCK, "s"), (stat.S_ISBLK, "b"),
          (stat.S_ISCHR, "c"))
 
@@ -181,7 +184,16 @@ class OutFolder:
             raise self.refusal("cannot be written; name another folder") from None
         frames = [name for name in names if re.fullmatch(r"frame-.*\.png", name)]
         kept = [name for name in names if name not in frames]
+        kept += [line.split(" ", 3)[3] for line in self.written_by_keys()]
         return f"kept in {self.name}: {' '.join(kept)}, {len(frames)} frame{'s' if len(frames) != 1 else ''}", True
+
+    def written_by_keys(self):
+        """Lines of the files that the window's keys wrote in this demo: before it, all there was stood on the list."""
+        try:
+            left = self.left()
+            return [line for line, path in entries(self.place) if BY_KEYS.fullmatch(path) and line not in left]
+        except OSError:
+            return []
 
     def move(self, names, to):
         for name in names:
@@ -191,6 +203,10 @@ class OutFolder:
         """Removes what is not a result: on every way out."""
         if self.lock is not None:
             shutil.rmtree(self.results, ignore_errors=True)
+            lines = self.written_by_keys()
+            if lines:
+                with open(os.path.join(self.own, "files"), "a", errors="surrogateescape") as listed:
+                    listed.write("".join(line + "\n" for line in lines))
             try:
                 os.unlink(os.path.join(self.own, "reserve"))
             except OSError:

@@ -61,8 +61,21 @@ class TestOptions(unittest.TestCase):
         self.assertEqual((mouse.seconds, mouse.bound_is_told), ("600", True))
         self.assertFalse(checked("--seconds", "3").bound_is_told)
         self.assertFalse(checked(display=":0").headless)
-        self.assertEqual(checked("--headless").out, "")
+        self.assertEqual(checked("--headless", display=":0").out, "kerf-demo")
+        self.assertEqual((checked(display=":0").out, checked("--sheet", "s.png", display=":0").out, checked("--record", "v").out), ("", "", ""))
         self.assertEqual(checked("--size", "8192x1", "--seconds", "999999.5").size, "8192x1")
+
+    def test_how_large_files_become_is_said_beforehand(self):
+        raw = checked("--record", "no-such.y4m", "--seconds", "61", "--out", "o")
+        with unittest.mock.patch.object(options.shutil, "which", return_value="/usr/bin/ffmpeg"):
+            self.assertEqual(options.growth(raw, 2000), [
+                "--record no-such.y4m: raw, 28 MB a second; a name that ends in .mp4 compresses it",
+                "--out o: its log grows by 59 MB a minute"])
+            self.assertEqual(options.growth(checked("--record", "v.mp4", "--seconds", "60", "--out", "o"), 1000), [])
+            self.assertEqual(options.growth(checked("--record", "/dev/null"), 1000), [])
+        with unittest.mock.patch.object(options.shutil, "which", return_value=None), \
+                self.assertRaisesRegex(options.Refusal, "--record v.mp4: no ffmpeg"):
+            checked("--record", "v.mp4")
 
     def test_the_next_demo_gets_all_but_the_scene(self):
         found = checked("--scene", "a.toml", "--volume", "b.nrrd", "--set", "x=1", "--set", "y=2", "--stereo", "--rate", "500")
@@ -99,6 +112,16 @@ class TestOutFolder(unittest.TestCase):
         self.assertTrue(in_place)
         self.assertEqual(said, f"kept in {self.out}: final.nrrd report.json, 0 frames")
         self.assertEqual(self.held(), ["final.nrrd", "report.json"])
+
+    def test_what_the_windows_keys_write_lies_there_at_once_and_is_replaced_with_the_rest(self):
+        said, in_place = self.demo(meanwhile=["kerf-0001.mp4"])
+        self.assertTrue(in_place)
+        self.assertTrue(said.startswith(f"kept in {self.out}: log report.json kerf-0001.mp4, 1 frame"), said)
+        self.assertTrue(self.demo()[1])
+        self.assertNotIn("kerf-0001.mp4", self.held())
+        (self.out / "kerf-0002.png").write_text("not by a demo")
+        with self.assertRaisesRegex(options.Refusal, "holds kerf-0002.png, which no demo wrote"):
+            self.demo()
 
     def test_files_of_others_are_refused_and_stay(self):
         self.demo()
