@@ -61,6 +61,9 @@ add_custom_command(OUTPUT ${pages}/kerf.1 ${completion}/kerf
     ${PROJECT_SOURCE_DIR}/cmake/kerf-completion.sh VERBATIM)
 add_custom_target(manuals ALL DEPENDS ${manuals} ${pages}/kerf.1)
 install(DIRECTORY ${pages}/ DESTINATION ${CMAKE_INSTALL_MANDIR}/man1)
+# As Debian's policy has it (12.1, 12.7).
+install(CODE "file(GLOB pages \"\$ENV{DESTDIR}\${CMAKE_INSTALL_PREFIX}/${CMAKE_INSTALL_MANDIR}/man1/kerf*.1\")
+execute_process(COMMAND gzip -9nf \${pages} COMMAND_ERROR_IS_FATAL ANY)")
 install(DIRECTORY ${completion}/ DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions)
 
 # ./kerf looks for all else beside itself, and finds that it is installed.
@@ -74,12 +77,14 @@ install(DIRECTORY scenes DESTINATION ${share} PATTERN "ct.*" EXCLUDE PATTERN .gi
 install(DIRECTORY hil/faults DESTINATION ${share}/hil)
 install(DIRECTORY lab/report DESTINATION ${share}/lab PATTERN __pycache__ EXCLUDE)
 install(DIRECTORY docs/ DESTINATION ${CMAKE_INSTALL_DOCDIR} PATTERN .site EXCLUDE)  # the make of the site
-install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR} RENAME copyright)
+install(FILES CHANGELOG.md DESTINATION ${CMAKE_INSTALL_DOCDIR})
+install(FILES cmake/copyright DESTINATION ${CMAKE_INSTALL_DOCDIR})
 install(FILES controller/device/60-kerf.rules DESTINATION lib/udev/rules.d)
 install(DIRECTORY examples python DESTINATION ${CMAKE_INSTALL_DOCDIR}
   PATTERN __pycache__ EXCLUDE)
 
 set(CMAKE_INSTALL_DEFAULT_COMPONENT_NAME development)
+install(FILES cmake/copyright DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/kerf-dev)
 set(package ${CMAKE_INSTALL_LIBDIR}/cmake/kerf)
 set(headers ${CMAKE_INSTALL_INCLUDEDIR}/kerf)
 install(TARGETS ${libraries} EXPORT kerf
@@ -101,7 +106,7 @@ endforeach()
 configure_package_config_file(cmake/kerf-config.cmake.in ${PROJECT_BINARY_DIR}/kerf-config.cmake
   INSTALL_DESTINATION ${package} PATH_VARS CMAKE_INSTALL_DATADIR CMAKE_INSTALL_BINDIR)
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/kerf-config-version.cmake
-  COMPATIBILITY ExactVersion)
+  COMPATIBILITY SameMinorVersion)
 install(FILES ${PROJECT_BINARY_DIR}/kerf-config.cmake ${PROJECT_BINARY_DIR}/kerf-config-version.cmake
   DESTINATION ${package})
 include(cmake/package.cmake)

@@ -1,7 +1,35 @@
 # SPDX-License-Identifier: Apache-2.0
 # shellcheck shell=bash
-# Completion of kerf (and of ./kerf) in bash: its commands and options as its own help has them; behind the name of
-# a program, what that program offers.
+# Completion of kerf (and of ./kerf) in bash: its commands, options and their words as its own help has them; behind
+# the name of a program, what that program offers.
+
+# _kerf_values OPTION WORD: in COMPREPLY what may follow an option, whose help (one line each) comes in. Returns 1 if
+# the option takes no value.
+_kerf_values() {
+  local option=$1 word=$2 line name words='' home=${COMP_WORDS[0]}
+  line=$(grep -E -- "(^| )$option [A-Z]" | head -n 1)
+  [[ -n $line ]] || return 1
+  line=${line#*"$option "}
+  name=${line%% *}
+  case $name in
+    FILE | PATH | DIR)
+      compopt -o filenames 2>/dev/null
+      if [[ $option == --scene ]]; then
+        home=$(dirname "$(readlink -f "$(type -P "$home" || echo "$home")")")
+        words=$(find "$home/scenes" -maxdepth 1 -name '*.toml' -printf '%f\n' 2>/dev/null | sed 's/\.toml$//')
+      elif [[ $option == --hand ]]; then
+        words=mouse
+      fi
+      mapfile -t COMPREPLY < <(compgen -W "$words" -- "$word" && true; compgen -f -- "$word")
+      ;;
+    *)
+      compopt +o default 2>/dev/null
+      words=$(grep -oP '([a-z][a-z0-9-]*, )+[a-z][a-z0-9-]* or [a-z][a-z0-9-]*' <<<"$line" | head -n 1)
+      mapfile -t COMPREPLY < <(compgen -W "$(sed 's/, / /g; s/ or / /' <<<"$words")" -- "$word")
+      ;;
+  esac
+}
+
 _kerf() {
   local command=${COMP_WORDS[1]:-} help
   if ((COMP_CWORD > 1)) && type "kerf-$command" &>/dev/null; then
@@ -15,12 +43,14 @@ _kerf() {
   fi
   help=$("$1" --help 2>/dev/null)
   if ((COMP_CWORD == 1)); then
-    help=$(grep -oP '^  \./kerf (\K[a-z]+|NAME.* any program: \K[a-z ]+)' <<<"$help")
+    help=$(grep -oP '^  (\./)?kerf (\K[a-z]+|NAME.* any program: \K[a-z ]+)' <<<"$help")
   else
     # A command's part of the help goes to the next heading. There words stand behind the heading or below them,
-    # options anywhere.
+    # options anywhere; what is further to the right belongs to the line before.
     help=$(awk -v heading="$command:" '/^[^ ]/ { mine = $1 == heading } mine' <<<"$help" |
-      grep -oP '^([a-z]+: +| {7,8})\K[a-z][a-z-]*|(?<= )--?[A-Za-z][a-z-]*' | sort -u)
+      sed -E ':a; N; $!ba; s/\n {15,}/ /g')
+    if [[ $3 == -* ]] && _kerf_values "$3" "$2" <<<"$help"; then return; fi
+    help=$(grep -oP '^([a-z]+: +| {7,8})\K[a-z][a-z-]*|(?<= )--?[A-Za-z][a-z-]*' <<<"$help" | sort -u)
   fi
   mapfile -t COMPREPLY < <(compgen -W "$help" -- "$2")
 }

@@ -3,10 +3,16 @@
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_NAME kerf)
 set(CPACK_PACKAGE_VENDOR kerf)
-set(CPACK_PACKAGE_CONTACT "The authors of kerf <kerf@localhost>")
+set(KERF_MAINTAINER "The authors of kerf <kerf@packages.invalid>" CACHE STRING
+  "Name and address of who makes these packages, for their users' questions")
+set(CPACK_PACKAGE_CONTACT "${KERF_MAINTAINER}")
 set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "feel, mill and see a tooth")
-set(CPACK_PACKAGE_DESCRIPTION "A deterministic haptic controller that lets a dental bur cut a tooth of voxels, with its
-pictures and an emulator of the device, so that no hardware is needed.")
+set(CPACK_COMPONENT_KERF_DESCRIPTION "A deterministic haptic controller lets a dental bur cut a tooth of voxels or any CT.
+It has its pictures, a recorder, a bridge to browsers and to a second machine,
+and an emulator of the device, so that no hardware is needed.")
+set(CPACK_COMPONENT_DEVELOPMENT_DESCRIPTION "Headers and static libraries of kerf, for programs of one's own.
+A project finds them by find_package(kerf); with them come the sources of its
+main programs, for laws of force that are linked into them.")
 set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
 set(CPACK_STRIP_FILES ON)
 set(CPACK_THREADS 0)
@@ -19,9 +25,30 @@ set(CPACK_DEBIAN_KERF_PACKAGE_NAME kerf)
 set(CPACK_DEBIAN_KERF_PACKAGE_SHLIBDEPS ON)
 # What is no linked library: OpenGL is looked for at run time, lab/report draws forces.svg, and demo/ calls umount.
 set(CPACK_DEBIAN_KERF_PACKAGE_DEPENDS "libegl1, libgl1, libgl1-mesa-dri, python3-matplotlib, mount")
+set(CPACK_DEBIAN_KERF_PACKAGE_SUGGESTS "ffmpeg")
 set(CPACK_DEBIAN_KERF_PACKAGE_RECOMMENDS "udev, bash-completion, openssl")
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_NAME kerf-dev)
+set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS
   "kerf (= ${PROJECT_VERSION}), cmake, g++, pkg-config, libgdcm-dev, libpng-dev, libtiff-dev, zlib1g-dev, libarchive-dev, libexpat1-dev, libusb-1.0-0-dev, libhidapi-dev, libseccomp-dev")
-set(CPACK_COMPONENT_DEVELOPMENT_DESCRIPTION "Headers and static libraries of kerf: find_package(kerf).")
+# The changelog of a package in Debian's form, which leads to the one for users.
+string(TIMESTAMP day "%a, %d %b %Y %H:%M:%S +0000" UTC)
+foreach(package kerf kerf-dev)
+  file(CONFIGURE OUTPUT ${PROJECT_BINARY_DIR}/changelog/${package} CONTENT
+"kerf (${PROJECT_VERSION}) unstable; urgency=medium
+
+  * What users notice: /usr/share/doc/kerf/CHANGELOG.md
+
+ -- ${KERF_MAINTAINER}  ${day}
+")
+endforeach()
+foreach(pair kerf:kerf development:kerf-dev)
+  string(REPLACE ":" ";" pair ${pair})
+  list(GET pair 0 component)
+  list(GET pair 1 package)
+  set(to "${CMAKE_INSTALL_DATADIR}/doc/${package}")
+  install(FILES ${PROJECT_BINARY_DIR}/changelog/${package} DESTINATION ${to} RENAME changelog COMPONENT ${component})
+  install(CODE "execute_process(COMMAND gzip -9nf \"\$ENV{DESTDIR}\${CMAKE_INSTALL_PREFIX}/${to}/changelog\"
+    COMMAND_ERROR_IS_FATAL ANY)" COMPONENT ${component})
+endforeach()
 include(CPack)

@@ -52,10 +52,18 @@ for name in names:
         help_text = said(root / 'kerf', '--help').replace('./kerf', 'kerf')
         if help_text.split('\n', 2)[2].strip() not in page.replace('\\-', '-').replace('\\e', '\\'):
             wrong.append('kerf.1: is not what --help says')
-        script = (f'. {build}/completion/kerf; COMP_WORDS=({root}/kerf demo --sec); COMP_CWORD=2;'
-                  f'_kerf {root}/kerf --sec demo; echo "${{COMPREPLY[@]}}"')
-        if said('bash', '-c', script).split() != ['--seconds']:
-            wrong.append(f'completion of kerf: offers {said("bash", "-c", script)!r} for demo --sec')
+        # What is typed behind `kerf`, and what bash offers then; behind an option no other options.
+        for words, offer in [(['demo', '--sec'], ['--seconds']), (['demo', '--device', ''], ['omni', 'falcon', 'woodenhaptics']),
+                             (['demo', '--renderer', 'cast'], ['cast', 'cast-blend']), (['demo', '--port', 'u'], ['usb']),
+                             (['demo', '--gradient', 'f'], ['farid5']), (['demo', '--scene', 'two'], ['two_teeth']),
+                             (['demo', '--scene', 'scenes/wal'], ['scenes/wall.toml']), (['demo', '--hand', 'mo'], ['mouse']),
+                             (['demo', '--volume', 'sce'], ['scenes']), (['demo', '--seconds', ''], []),
+                             (['demo', '--mute', '--sec'], ['--seconds']), (['test', '--preset', 'a'], ['asan'])]:
+            script = (f'. {build}/completion/kerf; cd {root}; COMP_WORDS=({root}/kerf {" ".join(words[:-1])} "{words[-1]}");'
+                      f'COMP_CWORD={len(words)}; _kerf {root}/kerf "{words[-1]}" {words[-2]}; echo "${{COMPREPLY[@]}}"')
+            found = [word for word in said('bash', '-c', script).split() if offer != ['mouse'] or word == 'mouse']
+            if sorted(found) != sorted(offer):
+                wrong.append(f'completion of kerf: offers {found} for {" ".join(words)}')
         continue
     program = build / 'bin' / name
     help_text = said(program, '--help')

@@ -54,7 +54,25 @@ grep -qE '^tick [0-9]+: tip -?[0-9.]+ -?[0-9.]+ -?[0-9.]+ mm, force 0\.[0-9]*[1-
 [[ -s $home/demo/forces.svg && -s $home/demo/frame-0012.png ]] || fail 'kerf demo: made no pictures'
 (cd "$home" && kerf-lab faults --device omni --seeds 1 --scripts hil/faults/gone.toml >/dev/null) ||
   fail 'kerf-lab faults: does not find its scripts'
-[[ $(kerf test 2>&1) == 'kerf: test: this kerf is installed; '* ]] || fail 'kerf test: runs without sources'
+for command in test 'bench safety'; do  # whole, or nothing
+  # shellcheck disable=SC2086
+  [[ $(kerf $command 2>&1) == "kerf: $command: this kerf is installed; "* ]] || fail "kerf $command: runs without sources"
+done
+! kerf --help | grep -q '\./kerf' || fail 'kerf --help: speaks of ./kerf'
+kerf --help | grep -q 'bench safety need a clone' || fail 'kerf --help: does not say what needs a clone'
+for scene in touch touch.toml scenes/touch.toml; do  # from any folder, by its name
+  (cd "$home" && kerf controller --check --scene $scene 2>/dev/null) | grep -qx "scene=$scenes/touch.toml" ||
+    fail "kerf controller --scene $scene: does not find it"
+done
+(cd "$home" && kerf demo --virtual --seconds 1 --scene touch --out touched) >"$home/said" || fail 'kerf demo --scene touch'
+grep -qx "kerf: demo: --scene touch: $scenes/touch.toml" "$home/said" || fail 'kerf demo --scene touch: does not say which'
+# A volume that does not come with kerf, from the user's own folder.
+export XDG_DATA_HOME=$home/data
+spine() { kerf controller --check --scene spine/spine.toml 2>&1; }
+[[ $(spine) == *"here or as $home/data/kerf/scenes/spine/ct.nrrd"* ]] || fail "kerf: where a CT belongs: $(spine)"
+mkdir -p "$home/data/kerf/scenes/spine" && kerf volume phantom --size 64x64x64 --out "$home/data/kerf/scenes/spine/ct.nrrd" >/dev/null
+[[ $(spine) == *'volume=spine '* ]] || fail "kerf: a CT in the user's folder: $(spine)"
+[[ $(cd "$home" && kerf demo --fast 2>&1) == 'kerf: demo: --fast: unknown; see kerf --help' ]] || fail 'kerf demo: speaks of ./kerf'
 
 for tool in dpkg-shlibdeps file; do
   command -v "$tool" >/dev/null && continue
@@ -63,10 +81,26 @@ for tool in dpkg-shlibdeps file; do
 done
 (cd "$1" && cpack -B "$home/packages" >"$home/cpack.log" 2>&1) || { cat "$home/cpack.log" && fail 'cpack'; }
 package=$(echo "$home"/packages/kerf_*.deb)
+if command -v lintian >/dev/null; then
+  found=$(lintian --no-cfg --fail-on none "$home"/packages/kerf*.deb | grep '^E: ' || true)
+  [[ -z $found ]] || fail "lintian: $found"
+else
+  skipped='lintian: not there, so the packages are not checked by it; apt-get install lintian'
+fi
 dpkg-deb -c "$package" | awk '{ print $6 }' >"$home/files"
-for file in bin/kerf bin/kerf-controller share/man/man1/kerf-controller.1 share/kerf/scenes/phantom.toml \
+for file in bin/kerf bin/kerf-controller share/man/man1/kerf-controller.1.gz share/doc/kerf/copyright share/doc/kerf/changelog.gz share/kerf/scenes/phantom.toml \
   share/kerf/lab/report/__main__.py share/doc/kerf/tutorial.md share/bash-completion/completions/kerf-lab lib/udev/rules.d/60-kerf.rules; do
   grep -qxF "./usr/$file" "$home/files" || fail "$package: lacks /usr/$file"
 done
 ! grep -qE '\.(hpp|a)$' "$home/files" || fail "$package: has what belongs into kerf-dev"
+dpkg-deb -c "$home"/packages/kerf-dev_*.deb | grep -q ' ./usr/share/doc/kerf-dev/copyright$' || fail 'kerf-dev: lacks a copyright'
+for field in Maintainer Description; do
+  for deb in "$home"/packages/kerf*.deb; do
+    [[ -n $(dpkg-deb -f "$deb" "$field") ]] || fail "$deb: no $field"
+  done
+done
 dpkg-deb -f "$package" Depends | grep -q 'libgdcm3' || fail "$package: does not ask for its libraries"
+if [[ -n ${skipped:-} ]]; then
+  echo "packages: $skipped; all else is fine" >&2
+  exit 77
+fi

@@ -39,7 +39,7 @@ struct ReadOptions {
   int cpu_s = kReadCpuSeconds;         ///< CPU time that parsing may take
   std::string series{};                ///< of several in a folder: its number or a part of its name
   std::optional<RawLayout> raw{};      ///< of a file without a header
-  std::string axes{};  ///< of a file that names none: as axes_from of volume_axes.hpp has it
+  std::string axes{};  ///< of a file that names none: where columns, rows and slices lead, as LPS
 };
 
 /// Reads NRRD (.nrrd, .nhdr), MetaImage (.mha, .mhd), NIfTI (.nii, .nii.gz), TIFF of several pages,

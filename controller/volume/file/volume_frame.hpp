@@ -6,6 +6,8 @@
 #include "controller/volume/file/foreign_volume.hpp"
 #include "controller/volume/file/volume_io.hpp"
 
+// What the options complete or replace in the frame of a file: the size and the axes of its voxels.
+
 namespace kerf {
 
 /// Sets the spacing of a volume, mm, whose grid is set: that of the file, and that of the options
@@ -16,5 +18,11 @@ namespace kerf {
 /// spacing of the options that overrides the file's contradicts nothing.
 void take_spacing(const std::string& place, const ReadOptions& options,
                   const volume::UntrustedHeader& claim, SourceVolume& volume);
+
+/// Sets the axes of a file that names none from `letters`; without letters returns, on one line,
+/// which usual ones are taken: if they are wrong the volume is turned or mirrored. Throws LoadError
+/// for letters that are none, and for a file that has axes of its own.
+[[nodiscard]] std::string take_axes(const std::string& place, const std::string& letters,
+                                    volume::UntrustedHeader& claim);
 
 }  // namespace kerf
