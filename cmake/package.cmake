@@ -7,9 +7,9 @@ set(KERF_MAINTAINER "The authors of kerf <kerf@packages.invalid>" CACHE STRING
   "Name and address of who makes these packages, for their users' questions")
 set(CPACK_PACKAGE_CONTACT "${KERF_MAINTAINER}")
 set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "feel, mill and see a tooth")
-set(CPACK_COMPONENT_KERF_DESCRIPTION "A deterministic haptic controller lets a dental bur cut a tooth of voxels or any CT.
-It has its pictures, a recorder, a bridge to browsers and to a second machine,
-and an emulator of the device, so that no hardware is needed.")
+set(CPACK_COMPONENT_KERF_DESCRIPTION "A deterministic haptic controller lets a dental bur cut a tooth of voxels, or
+any CT. It has its pictures, a recorder, a bridge to browsers and to a second
+machine, and an emulator of the device, so that no hardware is needed.")
 set(CPACK_COMPONENT_DEVELOPMENT_DESCRIPTION "Headers and static libraries of kerf, for programs of one's own.
 A project finds them by find_package(kerf); with them come the sources of its
 main programs, for laws of force that are linked into them.")
@@ -17,7 +17,7 @@ set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
 set(CPACK_STRIP_FILES ON)
 set(CPACK_THREADS 0)
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
-set(CPACK_DEBIAN_COMPRESSION_TYPE zstd)
+set(CPACK_DEBIAN_COMPRESSION_TYPE xz)
 set(CPACK_DEBIAN_PACKAGE_SECTION science)
 set(CPACK_DEB_COMPONENT_INSTALL ON)
 set(CPACK_COMPONENTS_ALL kerf development)

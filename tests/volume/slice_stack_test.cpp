@@ -253,7 +253,7 @@ TEST_CASE("axes that no file names are said, and any that are given are obeyed, 
               std::string("--axes: ") + wrong + " is not three letters"));
   }
   const auto named = folder.write(
-      "b.nrrd", nrrd("uint8", "space: LPS\nspace directions: (1,0,0) (0,2,0) (0,0,3)\n") +
+      "b.nrrd", nrrd("uint8", "space: LPS\nspace directions: (1,0,0) (0,2,0) (0,0,3)\n") + "\n" +
                     bytes_of(counting<std::uint8_t>()));
   CHECK(read_volume(named).axes_note.empty());
   CHECK(has(refusal(named, {.axes = "RAS"}), "b.nrrd has axes of its own; leave it out"));

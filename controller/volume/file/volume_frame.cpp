@@ -132,6 +132,7 @@ void take_spacing(const std::string& place, const ReadOptions& options,
   }
   volume.spacing_mm = mm;
 }
+
 namespace {
 
 constexpr std::string_view kToward = "LPSRAI";  // +x, +y, +z of LPS, then -x, -y, -z
