@@ -137,8 +137,8 @@ int run_recorder(const RecorderOptions& options, const std::atomic<bool>& stop) 
   write_new_file(options.out / kSceneName, reader.info().scene_json);
   Recorder recorder(reader, log);
   const double bytes_per_s = 1e9 / static_cast<double>(reader.info().tick_ns) * sizeof(TickRecord);
-  std::cerr << "kerf-recorder: " << options.out.string() << ": grows by "
-            << std::lround(60 * bytes_per_s / 1e6) << " MB a minute\n";
+  std::cout << options.out.string() << " grows by " << std::lround(60 * bytes_per_s / 1e6)
+            << " MB a minute" << std::endl;
   write_manifest(options.out, reader.info(), recorder, 0, kStillRunning);
 
   const auto record_all = [&] {
