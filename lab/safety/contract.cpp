@@ -197,6 +197,7 @@ void SafetyMonitor::follow_stillness(double time_ms) {
   if (wire_.numbers_its_packets()) return;
   const double still_ms = time_ms - still_since_ms_;
   const bool changed = !(told_ == still_);
+  stands_still_ = !changed && still_ms > kStillMs;
   if (changed || (last_.asked.off() && still_ms <= kStillMs)) {
     still_ = told_;
     still_since_ms_ = time_ms;
@@ -311,8 +312,9 @@ void SafetyMonitor::check_change(const Command& command) {
 
 /// What was sent after the last report, turned and weakened by nothing.
 void SafetyMonitor::check_hold(const Command& command) {
-  const bool holds =
-      !fresh_ && !begins_anew_ && off_ == Off::no_reason && command.time_ms - heard_ms_ <= kHoldMs;
+  // Reports that stand still are none, though they were heard.
+  const bool holds = !fresh_ && !stands_still_ && !begins_anew_ && off_ == Off::no_reason &&
+                     command.time_ms - heard_ms_ <= kHoldMs;
   const double off_by_n = norm(command.force_n - held_n_);
   check(!holds || off_by_n <= kStepN, command.time_ms, "change of a held force, in N", off_by_n,
         kStepN);

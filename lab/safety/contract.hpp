@@ -93,6 +93,7 @@ class SafetyMonitor {
   bool link_ended_ = false;
   ObservedReport still_;       ///< without a number in its packets: what it has told ...
   double still_since_ms_ = 0;  ///< ... since then, under torque
+  bool stands_still_ = false;  ///< for longer than reports that stand still are believed
   bool calibrated_ = false;
   double told_at_ms_ = 0;                 ///< the last command that a report was for
   double rest_without_gap_since_ms_ = 0;  ///< parked and still, in every report that was due

@@ -128,6 +128,7 @@ REPORTS = [
         ("file", "", "its path"),
         ("size_vox, spacing_mm, has_spacing", "voxels, mm", "x, y, z; whether the file has a spacing"),
         ("note", "", "of the reading: what was chosen, skipped or replaced; empty if nothing was"),
+        ("axes_note", "", "which axes were guessed, because the file has none; empty if it has them or `--axes` gave them"),
         ("origin_mm, direction", "mm", "centre of voxel (0, 0, 0); axes, nine numbers by rows"),
         ("min, max", "", "values of the file"),
         ("window", "", "values that become density 0 and 1"),
