@@ -71,6 +71,7 @@ export XDG_DATA_HOME=$home/data
 spine() { kerf controller --check --scene spine/spine.toml 2>&1; }
 [[ $(spine) == *"here or as $home/data/kerf/scenes/spine/ct.nrrd"* ]] || fail "kerf: where a CT belongs: $(spine)"
 mkdir -p "$home/data/kerf/scenes/spine" && kerf volume phantom --size 64x64x64 --out "$home/data/kerf/scenes/spine/ct.nrrd" >/dev/null
+rm "$home/data/kerf/scenes/spine/ct-labels.nrrd"  # of a tooth's materials
 [[ $(spine) == *'volume=spine '* ]] || fail "kerf: a CT in the user's folder: $(spine)"
 [[ $(cd "$home" && kerf demo --fast 2>&1) == 'kerf: demo: --fast: unknown; see kerf --help' ]] || fail 'kerf demo: speaks of ./kerf'
 
