@@ -50,7 +50,7 @@ foreach(program ${programs})
   add_custom_command(OUTPUT ${pages}/${program}.1 ${completion}/${program}
     COMMAND ${program} --man > ${pages}/${program}.1
     COMMAND ${program} --completion > ${completion}/${program}
-    VERBATIM)
+    DEPENDS ${program} VERBATIM)
   list(APPEND manuals ${pages}/${program}.1 ${completion}/${program})
 endforeach()
 add_custom_command(OUTPUT ${pages}/kerf.1 ${completion}/kerf

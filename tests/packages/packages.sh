@@ -94,7 +94,8 @@ for file in bin/kerf bin/kerf-controller share/man/man1/kerf-controller.1.gz sha
   grep -qxF "./usr/$file" "$home/files" || fail "$package: lacks /usr/$file"
 done
 ! grep -qE '\.(hpp|a)$' "$home/files" || fail "$package: has what belongs into kerf-dev"
-dpkg-deb -c "$home"/packages/kerf-dev_*.deb | grep -q ' ./usr/share/doc/kerf-dev/copyright$' || fail 'kerf-dev: lacks a copyright'
+dpkg-deb -c "$home"/packages/kerf-dev_*.deb >"$home/files-dev"
+grep -q ' ./usr/share/doc/kerf-dev/copyright$' "$home/files-dev" || fail 'kerf-dev: lacks a copyright'
 for field in Maintainer Description; do
   for deb in "$home"/packages/kerf*.deb; do
     [[ -n $(dpkg-deb -f "$deb" "$field") ]] || fail "$deb: no $field"
