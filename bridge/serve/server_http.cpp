@@ -160,7 +160,7 @@ std::string_view Server::Impl::route_of(const Request& request) const {
   return rest.empty() || rest.starts_with('/') ? rest : route;
 }
 
-/// Whether it came to the address of `--public-url`, as far as the proxy tells.
+/// Whether it came to the address of `--public-url`, as far as the proxy reports it.
 bool Server::Impl::is_public(const Request& request) const {
   return setup_.public_url &&
          is_own_origin(setup_.public_url->origin(), text(request[http::field::host]),

@@ -177,7 +177,7 @@ TEST_CASE("each page of the keys covers at most a quarter, and all keys have the
       CAPTURE(figures.help);
       const double fraction = covered(overlay, figures, kPlain, &seen.emplace_back());
       CHECK(fraction < 0.25);
-      CHECK(fraction > 0.05);
+      CHECK(fraction > (figures.help < pages ? 0.1 : 0.05));  // the last one has the rest
       if (seen.size() > 1) CHECK(seen[seen.size() - 1] != seen[seen.size() - 2]);
     }
   }
