@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/run/controller_run.hpp"
+#include "controller/run/controller_options.hpp"
 
 int main(int argc, char** argv) {
   return kerf::run_controller_program(argc, argv);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <iostream>
 
-#include "lab/program.hpp"
+#include "lab/run/lab_command.hpp"
 #include "shared/posix/program.hpp"
 
 int main(int argc, char** argv) {

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "lab/program.hpp"
 
 #include <array>
 #include <ostream>

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <iterator>
 #include <span>
 #include <vector>
 
@@ -198,5 +200,30 @@ class BlockPlan {
   std::vector<BlockPlane> planes_;
   std::uint32_t count_ = 0;
 };
+
+inline BlockPlan::BlockPlan(std::uint32_t scene_bytes, std::span<const VolumeDescriptor> volumes) {
+  constexpr auto kText = static_cast<std::uint32_t>(kTextBlockBytes);
+  add(BlockKind::text, 0, scene_bytes / kText + (scene_bytes % kText != 0 ? 1 : 0));
+  const auto each = [&](BlockKind kind, auto wanted) {
+    for (std::uint32_t i = 0; i < volumes.size(); ++i) {
+      if (wanted(volumes[i])) add(kind, i, volumes[i].brick_count);
+    }
+  };
+  each(BlockKind::density, [](const VolumeDescriptor&) { return true; });
+  each(BlockKind::labels, [](const VolumeDescriptor& volume) { return volume.off_labels != 0; });
+}
+
+inline void BlockPlan::add(BlockKind kind, std::uint32_t volume, std::uint32_t count) {
+  if (count == 0) return;
+  planes_.push_back({kind, volume, count_, count});
+  count_ += count;
+}
+
+inline const BlockPlane& BlockPlan::plane_of(std::uint32_t id) const noexcept {
+  const auto after = std::upper_bound(
+      planes_.begin(), planes_.end(), id,
+      [](std::uint32_t wanted, const BlockPlane& plane) { return wanted < plane.first; });
+  return *std::prev(after);
+}
 
 }  // namespace kerf::bridge

@@ -23,7 +23,6 @@
 #include <unistd.h>
 
 #include "controller/input/load_error.hpp"
-#include "controller/input/sandbox_rights.hpp"
 #include "shared/posix/error_text.hpp"
 #include "shared/posix/monotonic_clock.hpp"
 #include "shared/posix/program.hpp"

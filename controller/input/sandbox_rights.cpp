@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/input/sandbox_rights.hpp"
-
 #include <algorithm>
 #include <array>
 #include <cerrno>
@@ -19,6 +17,8 @@
 #include <sys/prctl.h>
 #include <sys/resource.h>
 #include <unistd.h>
+
+#include "controller/input/sandbox.hpp"
 
 namespace kerf {
 namespace {

@@ -21,7 +21,6 @@
 #include "controller/volume/crop_resample.hpp"
 #include "controller/volume/denoise.hpp"
 #include "controller/volume/file/volume_io.hpp"
-#include "controller/volume/file/volume_write.hpp"
 #include "controller/volume/phantom.hpp"
 #include "controller/volume/volume_proposal.hpp"
 #include "controller/volume/windowing.hpp"

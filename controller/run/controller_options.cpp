@@ -13,7 +13,7 @@
 #include "controller/device/open_port.hpp"
 #include "controller/input/load_error.hpp"
 #include "controller/scene/scene.hpp"
-#include "controller/scene/scene_reference.hpp"
+#include "controller/scene/scene_keys.hpp"
 #include "shared/posix/program.hpp"
 #include "shared/text/command_line.hpp"
 #include "shared/text/text.hpp"

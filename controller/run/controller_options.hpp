@@ -36,4 +36,8 @@ struct ControllerOptions {
 [[nodiscard]] std::optional<int> parse_options(int argc, const char* const* argv,
                                                ControllerOptions& options);
 
+/// `kerf-controller`: the whole program, for its main and for that of a project with laws of its
+/// own. Returns the exit code: 0 success, 1 a failed run, 2 bad input or set-up.
+[[nodiscard]] int run_controller_program(int argc, char** argv);
+
 }  // namespace kerf

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/run/controller_run.hpp"
 
 #include <algorithm>
 #include <array>
@@ -35,7 +34,7 @@
 #include "controller/run/scene_check.hpp"
 #include "controller/scene/scene.hpp"
 #include "controller/scene/scene_file.hpp"
-#include "controller/volume/file/volume_write.hpp"
+#include "controller/volume/file/volume_io.hpp"
 #include "shared/numeric/fnv1a.hpp"
 #include "shared/posix/atomic_file.hpp"
 #include "shared/posix/monotonic_clock.hpp"

@@ -19,7 +19,6 @@
 #include "controller/loop/tick_source.hpp"
 #include "controller/loop/wait_state.hpp"
 #include "controller/plan/plan_device.hpp"
-#include "controller/run/probe_nodes.hpp"
 #include "controller/scene/scene_file.hpp"
 #include "shared/posix/atomic_file.hpp"
 #include "shared/posix/stop_signals.hpp"

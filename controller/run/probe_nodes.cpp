@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/run/probe_nodes.hpp"
-
 #include <algorithm>
 #include <array>
 #include <cerrno>
@@ -20,6 +18,7 @@
 #include <unistd.h>
 
 #include "controller/loop/real_time.hpp"
+#include "controller/run/probe.hpp"
 #include "shared/posix/threads.hpp"
 #include "shared/wire/falcon.hpp"
 #include "shared/wire/omni.hpp"

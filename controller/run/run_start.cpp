@@ -19,7 +19,7 @@
 #include "controller/plan/work_budget.hpp"
 #include "controller/run/law_trial.hpp"
 #include "controller/run/scene_check.hpp"
-#include "controller/tool/mesh_parts.hpp"
+#include "controller/tool/tool_mesh.hpp"
 #include "shared/numeric/fnv1a.hpp"
 #include "shared/posix/atomic_file.hpp"
 #include "shared/segment/connection.hpp"

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <string>
 #include <string_view>
 #include <variant>
 #include <vector>
@@ -101,5 +102,12 @@ struct SceneTableRow {
 [[nodiscard]] bool is_used(const SceneKey& key, SceneParts& parts);
 /// The value of a key as a scene would write it; empty if it has none.
 [[nodiscard]] TomlValue value_of(const SceneKey& key, SceneParts& parts);
+
+/// The reference page of scene files, docs/scene-keys.md, in Markdown.
+[[nodiscard]] std::string scene_keys_page(SceneKeys keys = scene_keys());
+
+/// Every setting in effect, one line `table.key=value` each, values as a scene writes them. A key
+/// that the scene would refuse, or that has no value, is left out.
+[[nodiscard]] std::string settings_text(const Scene& scene, SceneKeys keys = scene_keys());
 
 }  // namespace kerf

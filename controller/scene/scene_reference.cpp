@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/scene/scene_reference.hpp"
-
 #include <algorithm>
 #include <array>
 #include <optional>
@@ -9,6 +7,7 @@
 
 #include "controller/input/load_error.hpp"
 #include "controller/law/registry/law_registry.hpp"
+#include "controller/scene/scene_keys.hpp"
 
 namespace kerf {
 namespace {

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/tool/mesh_parts.hpp"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -15,6 +13,7 @@
 #include <vector>
 
 #include "controller/input/load_error.hpp"
+#include "controller/tool/tool_mesh.hpp"
 #include "shared/numeric/linear_algebra.hpp"
 
 namespace kerf {

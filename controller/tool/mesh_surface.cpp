@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/tool/mesh_surface.hpp"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -13,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "controller/tool/surface_samples.hpp"
 #include "controller/tool/tool_mesh.hpp"
 #include "shared/numeric/linear_algebra.hpp"
 

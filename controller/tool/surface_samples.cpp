@@ -10,7 +10,6 @@
 
 #include "controller/input/load_error.hpp"
 #include "controller/kernel/point_shell/point_table.hpp"
-#include "controller/tool/mesh_surface.hpp"
 #include "controller/tool/tool_shapes.hpp"
 
 namespace kerf {

@@ -19,7 +19,6 @@
 
 #include "controller/input/load_error.hpp"
 #include "controller/input/sandbox.hpp"
-#include "controller/tool/mesh_parts.hpp"
 #include "shared/numeric/linear_algebra.hpp"
 #include "shared/posix/error_text.hpp"
 

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/volume_tool/import_preview.hpp"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -13,6 +11,7 @@
 
 #include <zlib.h>
 
+#include "controller/volume_tool/import_command.hpp"
 #include "shared/numeric/linear_algebra.hpp"
 #include "shared/volume/material.hpp"
 

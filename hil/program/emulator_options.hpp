@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <iosfwd>
 #include <optional>
 #include <string>
 #include <vector>
@@ -67,5 +69,11 @@ void declare(Arguments& app, EmulatorOptions& options);
 
 /// Finds the personality. Throws `HilError` for options that do not fit together.
 void check(EmulatorOptions& options);
+
+/// The whole of kerf-emulator, for `main` and for tests: parses, serves, reports. Ends early when
+/// `stop` becomes true (within 100 ms). Exit code 0 = fine, 2 = bad input or set-up (one line on
+/// `err`).
+int run_emulator(int argc, const char* const* argv, const std::atomic<bool>& stop,
+                 std::ostream& out, std::ostream& err);
 
 }  // namespace kerf

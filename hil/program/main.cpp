@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <iostream>
 
-#include "hil/program/program.hpp"
+#include "hil/program/emulator_options.hpp"
 #include "shared/posix/program.hpp"
 #include "shared/posix/stop_signals.hpp"
 

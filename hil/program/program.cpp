@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "hil/program/program.hpp"
 
 #include <array>
 #include <cstddef>

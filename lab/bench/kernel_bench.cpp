@@ -12,7 +12,6 @@
 #include "controller/kernel/preston.hpp"
 #include "controller/plan/method/tool_bounds.hpp"
 #include "controller/plan/tables/sample_tables.hpp"
-#include "lab/bench/paper_baseline.hpp"
 #include "lab/rig/bench_scene.hpp"
 #include "lab/run/lab_run.hpp"
 

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "lab/bench/paper_baseline.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
 
 #include "controller/kernel/gradient.hpp"
+#include "lab/bench/kernel_bench.hpp"
 
 namespace kerf {
 namespace {

@@ -10,7 +10,6 @@
 #include <utility>
 #include <vector>
 
-#include "lab/contact/comparison.hpp"
 #include "lab/contact/hands.hpp"
 #include "lab/contact/rows.hpp"
 #include "lab/rig/geometry.hpp"

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "lab/contact/comparison.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <functional>
 #include <string>
 
 #include "lab/accuracy/contact_method.hpp"
+#include "lab/contact/hands.hpp"
 #include "lab/rig/contact_motions.hpp"
 #include "lab/rig/contact_rig.hpp"
 

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "lab/contact/tick_rows.hpp"
 
 #include <algorithm>
 #include <chrono>

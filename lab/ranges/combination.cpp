@@ -14,7 +14,7 @@
 #include "controller/input/load_error.hpp"
 #include "controller/load/load_scene.hpp"
 #include "controller/plan/compile.hpp"
-#include "controller/volume/file/volume_write.hpp"
+#include "controller/volume/file/volume_io.hpp"
 #include "lab/ranges/rules.hpp"
 #include "lab/rig/geometry.hpp"
 #include "lab/rig/kinematic_arm.hpp"

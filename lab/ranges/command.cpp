@@ -12,7 +12,6 @@
 #include "hil/hil_error.hpp"
 #include "lab/ranges/extreme_rows.hpp"
 #include "lab/ranges/key_study.hpp"
-#include "lab/ranges/long_run.hpp"
 #include "lab/run/grid_run.hpp"
 #include "lab/run/lab_command.hpp"
 #include "lab/run/lab_run.hpp"

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "lab/ranges/long_run.hpp"
-
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -13,6 +11,7 @@
 #include "controller/load/load_scene.hpp"
 #include "controller/plan/compile.hpp"
 #include "lab/ranges/combination.hpp"
+#include "lab/ranges/extreme_rows.hpp"
 #include "lab/ranges/rules.hpp"
 
 namespace kerf::ranges {

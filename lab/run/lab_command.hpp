@@ -45,4 +45,7 @@ class LabCommand {
 [[nodiscard]] std::unique_ptr<LabCommand> make_two_machines_command(Arguments& program);
 [[nodiscard]] std::unique_ptr<LabCommand> make_zwidth_command(Arguments& program);
 
+/// `kerf-lab`: measurements without a device. Returns the exit code: 0 fine, 2 bad input or set-up.
+[[nodiscard]] int run_lab(int argc, const char* const* argv, std::ostream& out, std::ostream& err);
+
 }  // namespace kerf

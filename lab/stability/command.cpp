@@ -24,7 +24,6 @@
 #include "lab/stability/axes.hpp"
 #include "lab/stability/map.hpp"
 #include "lab/stability/map_file.hpp"
-#include "lab/stability/portraits.hpp"
 #include "shared/posix/atomic_file.hpp"
 #include "shared/posix/program.hpp"
 #include "shared/posix/report_tool.hpp"

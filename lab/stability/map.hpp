@@ -78,4 +78,10 @@ using ColumnDone = std::function<void(std::size_t index, Column column, std::uin
 void measure_columns(const MapSpec& spec, const std::vector<std::size_t>& wanted, std::size_t jobs,
                      const std::atomic<bool>& stop, const ColumnDone& done);
 
+/// Phase portraits as JSON (lab/report/stability_map.py has its form): position of the tip and its
+/// speed, one curve for each hit of each cell. `cells` are 1 to 12 texts "stiffness:damping" in
+/// N/mm and N s/mm; all else is that of the map's one column. Throws HilError that names the
+/// option.
+[[nodiscard]] std::string portraits_of(const MapSpec& spec, const std::vector<std::string>& cells);
+
 }  // namespace kerf::zwidth

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "lab/stability/portraits.hpp"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -11,6 +9,7 @@
 
 #include "hil/hil_error.hpp"
 #include "lab/stability/arm.hpp"
+#include "lab/stability/map.hpp"
 #include "lab/stability/map_file.hpp"
 #include "lab/stability/one_axis.hpp"
 #include "lab/stability/tick_watch.hpp"

@@ -3,7 +3,7 @@
 
 #include "controller/input/load_error.hpp"
 #include "controller/tool/inner_samples.hpp"
-#include "controller/tool/mesh_surface.hpp"
+#include "controller/tool/surface_samples.hpp"
 #include "controller/tool/tool_mesh.hpp"
 #include "controller/tool/tool_shapes.hpp"
 #include "tests/fuzz/text_fuzz.hpp"

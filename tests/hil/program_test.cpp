@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "hil/program/program.hpp"
-
 #include <atomic>
 #include <filesystem>
 #include <string>
@@ -9,6 +7,7 @@
 
 #include <doctest/doctest.h>
 
+#include "hil/program/emulator_options.hpp"
 #include "tests/hil/fake_host.hpp"
 #include "tests/hil/run_emulator.hpp"
 #include "tests/support/errors.hpp"

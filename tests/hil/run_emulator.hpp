@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "hil/program/program.hpp"
+#include "hil/program/emulator_options.hpp"
 
 namespace kerf::test {
 

@@ -6,9 +6,8 @@
 
 #include <doctest/doctest.h>
 
-#include "lab/contact/comparison.hpp"
+#include "lab/contact/hands.hpp"
 #include "lab/contact/rows.hpp"
-#include "lab/contact/tick_rows.hpp"
 #include "lab/rig/contact_rig.hpp"
 #include "lab/rig/exact_contact.hpp"
 #include "tests/json.hpp"

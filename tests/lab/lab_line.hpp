@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "lab/program.hpp"
+#include "lab/run/lab_command.hpp"
 
 namespace kerf::test {
 

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // The baseline of all ratios is the paper's method indeed, computed right.
-#include "lab/bench/paper_baseline.hpp"
-
 #include <array>
 #include <cmath>
 
 #include <doctest/doctest.h>
 
+#include "lab/bench/kernel_bench.hpp"
 #include "tests/kernel/support.hpp"
 
 using namespace kerf;

@@ -19,7 +19,6 @@
 #include "lab/ranges/extreme_rows.hpp"
 #include "lab/ranges/key_levels.hpp"
 #include "lab/ranges/key_study.hpp"
-#include "lab/ranges/long_run.hpp"
 #include "lab/ranges/rules.hpp"
 #include "tests/lab/lab_line.hpp"
 

@@ -20,7 +20,6 @@
 #include "controller/law/registry/law_registry.hpp"
 #include "controller/load/scene_json.hpp"
 #include "controller/scene/scene_file.hpp"
-#include "controller/scene/scene_reference.hpp"
 #include "controller/volume/phantom.hpp"
 #include "tests/scene/scene_lines.hpp"
 #include "tests/scene/support.hpp"

@@ -16,7 +16,6 @@
 
 #include "controller/loop/wait_state.hpp"
 #include "controller/run/probe.hpp"
-#include "controller/run/probe_nodes.hpp"
 #include "controller/run/run_report.hpp"
 #include "controller/run/scene_check.hpp"
 #include "controller/tool/tool_shapes.hpp"

@@ -18,8 +18,6 @@
 #include "controller/input/load_error.hpp"
 #include "controller/load/load_scene.hpp"
 #include "controller/tool/inner_samples.hpp"
-#include "controller/tool/mesh_parts.hpp"
-#include "controller/tool/mesh_surface.hpp"
 #include "controller/tool/surface_samples.hpp"
 #include "controller/tool/tool_shapes.hpp"
 #include "lab/rig/contact_rig.hpp"

@@ -12,10 +12,10 @@
 #include <unistd.h>
 
 #include "controller/scene/scene_file.hpp"
-#include "controller/volume/file/volume_write.hpp"
+#include "controller/volume/file/volume_io.hpp"
 #include "controller/volume/phantom.hpp"
 #include "controller/volume/windowing.hpp"
-#include "controller/volume_tool/import_preview.hpp"
+#include "controller/volume_tool/import_command.hpp"
 #include "tests/case_count.hpp"
 #include "tests/support/voxels.hpp"
 #include "tests/volume/volume_files.hpp"

@@ -25,7 +25,6 @@
 #include <unistd.h>
 
 #include "controller/input/load_error.hpp"
-#include "controller/input/sandbox_rights.hpp"
 #include "tests/volume/volume_files.hpp"
 
 using namespace kerf;

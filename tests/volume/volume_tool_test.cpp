@@ -9,7 +9,7 @@
 #include <doctest/doctest.h>
 
 #include "controller/load/load_scene.hpp"
-#include "controller/volume/file/volume_write.hpp"
+#include "controller/volume/file/volume_io.hpp"
 #include "controller/volume/phantom.hpp"
 #include "controller/volume/windowing.hpp"
 #include "tests/json.hpp"

@@ -9,7 +9,7 @@
 #include <sys/resource.h>
 
 #include "controller/input/load_error.hpp"
-#include "controller/volume/file/volume_write.hpp"
+#include "controller/volume/file/volume_io.hpp"
 #include "shared/posix/atomic_file.hpp"
 #include "tests/support/property.hpp"
 #include "tests/volume/volume_files.hpp"

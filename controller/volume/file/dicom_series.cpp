@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // The frames of DICOM files as series, and one of these as a volume.
-#include "controller/volume/file/dicom_series.hpp"
 
 #include <algorithm>
 #include <cstddef>

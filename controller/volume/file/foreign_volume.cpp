@@ -5,7 +5,6 @@
 #include <cstddef>
 
 #include "controller/input/load_error.hpp"
-#include "controller/volume/file/dicom_series.hpp"
 #include "controller/volume/file/voxel_files.hpp"
 
 #ifdef KERF_SANITIZED

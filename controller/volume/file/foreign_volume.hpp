@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "controller/input/sandbox.hpp"
+#include "controller/volume/file/header_fields.hpp"
 #include "controller/volume/file/volume_image.hpp"
 #include "shared/numeric/linear_algebra.hpp"
 
@@ -82,5 +83,22 @@ void read_slice_stack(const std::filesystem::path& folder,
 /// In the sandbox. Throws LoadError for a file whose size is not that of the layout.
 void read_raw(const std::filesystem::path& path, const RawLayout& layout,
               const MemoryRequest& offer);
+
+/// Size, spacing, origin and axes of a NRRD of `sizes`, in LPS and mm; the note says what the
+/// header leaves open. Throws LoadError for more than one value per voxel, not three axes in space,
+/// an unknown space or unit, and what contradicts itself. The sizes are not checked against the
+/// limits.
+[[nodiscard]] UntrustedHeader nrrd_claim(const HeaderFields& fields,
+                                         const std::vector<std::int64_t>& sizes);
+
+/// One volume from the frames of DICOM files: of one file, or of those of a folder, among which
+/// other files may be. In the sandbox, as `read_foreign_volume`, which calls it. `path`: the file
+/// or folder, for messages.
+///
+/// Frames are put in order by their positions along the normal; without any position by
+/// SliceLocation, else by number, which the note names. Refused by name: no unique series, a gap,
+/// two frames at one position, slices that are shifted sideways, a slice that cannot be read.
+void read_dicom(const std::filesystem::path& path, const std::vector<std::filesystem::path>& files,
+                const std::string& series, SandboxReader& sandbox, const MemoryRequest& offer);
 
 }  // namespace kerf::volume

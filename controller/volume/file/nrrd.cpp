@@ -12,7 +12,6 @@
 #include "controller/volume/file/file_headers.hpp"
 #include "controller/volume/file/foreign_volume.hpp"
 #include "controller/volume/file/header_fields.hpp"
-#include "controller/volume/file/nrrd_frame.hpp"
 #include "controller/volume/file/voxel_files.hpp"
 #include "shared/text/text.hpp"
 

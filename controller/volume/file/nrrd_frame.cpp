@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // Where the voxels of a NRRD lie: its spaces, directions, spacings and units, in LPS and mm.
-#include "controller/volume/file/nrrd_frame.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -14,6 +12,7 @@
 
 #include "controller/input/load_error.hpp"
 #include "controller/volume/file/file_headers.hpp"
+#include "controller/volume/file/foreign_volume.hpp"
 #include "shared/numeric/linear_algebra.hpp"
 #include "shared/text/text.hpp"
 

@@ -19,7 +19,6 @@
 #include "controller/volume/file/file_headers.hpp"
 #include "controller/volume/file/foreign_volume.hpp"
 #include "controller/volume/file/slices.hpp"
-#include "controller/volume/file/tiff_description.hpp"
 
 namespace kerf::volume {
 namespace fs = std::filesystem;

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/volume/file/tiff_description.hpp"
-
 #include <algorithm>
 #include <charconv>
 #include <cstddef>
@@ -13,6 +11,7 @@
 
 #include "controller/input/load_error.hpp"
 #include "controller/volume/file/header_fields.hpp"
+#include "controller/volume/file/slices.hpp"
 
 namespace kerf::volume {
 namespace fs = std::filesystem;

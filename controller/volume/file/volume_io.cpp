@@ -24,7 +24,6 @@
 #include "controller/volume/file/foreign_volume.hpp"
 #include "controller/volume/file/volume_frame.hpp"
 #include "controller/volume/file/volume_image.hpp"
-#include "controller/volume/file/volume_write.hpp"
 #include "shared/numeric/linear_algebra.hpp"
 #include "shared/posix/error_text.hpp"
 #include "shared/text/text.hpp"

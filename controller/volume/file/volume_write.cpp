@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controller/volume/file/volume_write.hpp"
-
 #include <algorithm>
 #include <array>
 #include <bit>
@@ -13,6 +11,7 @@
 #include <zlib.h>
 
 #include "controller/input/load_error.hpp"
+#include "controller/volume/file/volume_io.hpp"
 #include "shared/posix/atomic_file.hpp"
 
 namespace kerf {

@@ -8,7 +8,7 @@
 #include <doctest/doctest.h>
 
 #include "controller/volume/crop_resample.hpp"
-#include "controller/volume/file/volume_write.hpp"
+#include "controller/volume/file/volume_io.hpp"
 #include "controller/volume/windowing.hpp"
 #include "tests/case_count.hpp"
 #include "tests/volume/import_truth/check.hpp"
