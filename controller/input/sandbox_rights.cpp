@@ -112,7 +112,7 @@ void drop_inheritance(pid_t parent, int channel, int memory) {
   }
   sigset_t none;
   sigemptyset(&none);
-  sigprocmask(SIG_SETMASK, &none, nullptr);
+  pthread_sigmask(SIG_SETMASK, &none, nullptr);
 
   const int null = ::open("/dev/null", O_RDWR);
   if (null < 0 && errno != EMFILE) fail("/dev/null", errno);

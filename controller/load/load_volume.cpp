@@ -191,7 +191,7 @@ void grow_labels(const VoxelGrid& grid, std::vector<Label>& labels) {
 }  // namespace
 
 std::filesystem::path volume_path(const std::filesystem::path& folder, const std::string& file) {
-  const std::filesystem::path beside = folder / file;
+  std::filesystem::path beside = folder / file;
   std::error_code fault;
   if (std::filesystem::exists(beside, fault)) return beside;
   const std::filesystem::path own = path_in_user_data(folder, file);

@@ -135,14 +135,28 @@ template <bool kInside>
                      scale.shift);
 }
 
+/// Adds the gradient of the density between the `corner`s, weighted by `weight`.
+[[gnu::always_inline]] inline void add_gradients(const V (&corner)[4], const PointCells& cell, V at,
+                                                 V near_z, V far_z, V weight,
+                                                 PointVectors& sums) noexcept {
+  if (!Simd::any(weight)) return;
+  const V near_y = blend16(corner[0], corner[2], cell.z),
+          far_y = blend16(corner[1], corner[3], cell.z);
+  const V slope[3] = {Simd::multiply_pairs(at, Simd::pair16(-1, 1)),
+                      blend_halves(Simd::sub16(far_y, near_y), cell.x),
+                      blend_halves(Simd::sub16(far_z, near_z), cell.x)};
+  const PointWeights pulls(weight);
+  for (std::size_t axis = 0; axis < 3; ++axis) pulls.add(sums.gradient[axis], slope[axis]);
+}
+
 /// `point_sample` and `add_sample` of kPointLanes samples.
 template <bool kRound, bool kInside>
 [[gnu::always_inline]] inline void add_samples(const PointTable<FixedNumbers>& table,
                                                const DensityScale& scale, std::int32_t first,
                                                const PointCells& cell, const V (&corner)[4],
                                                PointVectors& sums) noexcept {
-  const V c00 = corner[0], c10 = corner[1], c01 = corner[2], c11 = corner[3];
-  const V near_z = blend16(c00, c10, cell.y), far_z = blend16(c01, c11, cell.y);
+  const V near_z = blend16(corner[0], corner[1], cell.y);
+  const V far_z = blend16(corner[2], corner[3], cell.y);
   const V at = blend16(near_z, far_z, cell.z);
   const V scaled = scaled_density<kInside>(at, cell, scale);
   // Only density that is not clipped has a gradient.
@@ -193,14 +207,7 @@ template <bool kRound, bool kInside>
 
   V v = w;
   if constexpr (kRound) v = Simd::sub32(Simd::add32(Simd::add32(w, w), w), r3);
-  v = Simd::bit_and(v, open);
-  if (!Simd::any(v)) return;
-  const V near_y = blend16(c00, c01, cell.z), far_y = blend16(c10, c11, cell.z);
-  const V slope[3] = {Simd::multiply_pairs(at, Simd::pair16(-1, 1)),
-                      blend_halves(Simd::sub16(far_y, near_y), cell.x),
-                      blend_halves(Simd::sub16(far_z, near_z), cell.x)};
-  const PointWeights pulls(v);
-  for (std::size_t axis = 0; axis < 3; ++axis) pulls.add(sums.gradient[axis], slope[axis]);
+  add_gradients(corner, cell, at, near_z, far_z, Simd::bit_and(v, open), sums);
 }
 
 template <bool kRound, bool kInside>
