@@ -207,7 +207,10 @@ std::vector<StageCost> most_stages(const ToolMethod& method, const TickShape& sh
   std::vector<StageCost> most;
   for (const VoxelIndex& box : box_sizes(in.tool, in.volume)) {
     std::vector<StageCost> stages = tick_stages(method, shape, box, queried, covered);
-    if (most.empty()) most = std::move(stages);
+    if (most.empty()) {
+      most = std::move(stages);
+      continue;
+    }
     for (std::size_t s = 0; s < stages.size(); ++s) {
       most[s].operations = std::max(most[s].operations, stages[s].operations);
     }

@@ -88,8 +88,12 @@ DenseSamples<N>::DenseSamples(std::span<const SurfaceSample> samples_units, doub
                                         static_cast<std::size_t>(cells_[2]));
   for (const Close& sample : samples) {
     const Vector& offset = sample.offset;
-    const std::int32_t row = cell_of(offset, 2) * cells_[1] + cell_of(offset, 1);
-    cells[static_cast<std::size_t>(row * cells_[0] + cell_of(offset, 0))].push_back(sample);
+    std::size_t cell = 0;
+    for (const std::size_t axis : {2UL, 1UL, 0UL}) {
+      cell = cell * static_cast<std::size_t>(cells_[axis]) +
+             static_cast<std::size_t>(cell_of(offset, axis));
+    }
+    cells[cell].push_back(sample);
   }
   for (const auto& cell : cells) {
     first_.push_back(static_cast<std::int32_t>(offset_[0].size()));
