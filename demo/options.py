@@ -122,7 +122,7 @@ def is_compressed(video):
     return video.endswith((".mp4", ".mkv"))
 
 
-TICK_BYTES = 488  # a row of the log
+TICK_BYTES = 496  # a row of the log
 
 
 def growth(options, rate_hz):

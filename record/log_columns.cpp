@@ -79,6 +79,8 @@ constexpr LogColumn kColumns[] = {
     {"plane_load_n", "N", "load along each plane's normal, before limits", "the first plane_count"},
     {"plane_normal", "", "x, y, z of each plane's normal, out of the solid", "the first plane_count"},
     {"plane_arm_mm", "mm", "x, y, z from the tool's centre to each contact", "the first plane_count"},
+    {"command", "", "bits, below: command and restart that were applied before this tick's step"},
+    {"command_argument", "", "of that command: index of the tool; hold: 1 on, 0 off"},
     {"crc32c", "", "checksum of the row from tick on"},
 };
 // clang-format on

@@ -169,23 +169,28 @@ TickLogReader::TickLogReader(std::filesystem::path path) : path_(std::move(path)
   rows_ = bytes < kTickLogHeaderBytes ? 0 : (bytes - kTickLogHeaderBytes) / sizeof(TickRecord);
 }
 
-void TickLogReader::for_each(const std::function<void(const TickRecord&)>& visit) {
-  constexpr std::size_t kChunkRows = 1024;
-  std::vector<TickRecord> chunk(kChunkRows);
+std::size_t TickLogReader::read(std::uint64_t first, std::span<TickRecord> rows) {
+  const std::uint64_t left = rows_ - std::min(first, rows_);
+  const auto count = static_cast<std::size_t>(std::min<std::uint64_t>(rows.size(), left));
   file_.clear();
-  file_.seekg(kTickLogHeaderBytes);
+  file_.seekg(static_cast<std::streamoff>(kTickLogHeaderBytes + first * sizeof(TickRecord)));
+  file_.read(reinterpret_cast<char*>(rows.data()),
+             static_cast<std::streamsize>(count * sizeof(TickRecord)));
+  if (!file_) throw RecordError(path_.string() + ": cannot be read; copy it again");
+  for (std::size_t i = 0; i < count; ++i) {
+    if (tick_record_crc(rows[i]) == rows[i].crc32c) continue;
+    throw RecordError(path_.string() + ": row " + std::to_string(first + i) +
+                      " has a wrong checksum; copy it again");
+  }
+  return count;
+}
+
+void TickLogReader::for_each(const std::function<void(const TickRecord&)>& visit) {
+  std::vector<TickRecord> chunk(kChunkRows);
   for (std::uint64_t row = 0; row < rows_;) {
-    const auto count = static_cast<std::size_t>(std::min<std::uint64_t>(kChunkRows, rows_ - row));
-    file_.read(reinterpret_cast<char*>(chunk.data()),
-               static_cast<std::streamsize>(count * sizeof(TickRecord)));
-    if (!file_) throw RecordError(path_.string() + ": cannot be read; copy it again");
-    for (std::size_t i = 0; i < count; ++i, ++row) {
-      if (tick_record_crc(chunk[i]) != chunk[i].crc32c) {
-        throw RecordError(path_.string() + ": row " + std::to_string(row) +
-                          " has a wrong checksum; copy it again");
-      }
-      visit(chunk[i]);
-    }
+    const std::size_t count = read(row, chunk);
+    for (std::size_t i = 0; i < count; ++i) visit(chunk[i]);
+    row += count;
   }
 }
 

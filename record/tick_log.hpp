@@ -71,6 +71,8 @@ class TickLogWriter {
 /// Reads one log, row by row, with constant memory.
 class TickLogReader {
  public:
+  static constexpr std::size_t kChunkRows = 1024;  ///< that `for_each` reads at a time
+
   /// Throws `RecordError` if the file has another layout or ends in its header. One that was cut
   /// later, at any byte, has the complete rows before the cut.
   explicit TickLogReader(std::filesystem::path path);
@@ -80,7 +82,11 @@ class TickLogReader {
   /// As the header has them: more than `rows()` if the file was cut.
   [[nodiscard]] std::uint64_t counted() const noexcept { return counted_; }
 
-  /// Calls `visit` for each row in order. Throws `RecordError` at a row whose checksum is wrong.
+  /// Reads rows from `first` on into `rows`; returns how many there are, less at the end. Throws
+  /// `RecordError` at a row whose checksum is wrong.
+  [[nodiscard]] std::size_t read(std::uint64_t first, std::span<TickRecord> rows);
+
+  /// Calls `visit` for each row in order. Throws as `read`.
   void for_each(const std::function<void(const TickRecord&)>& visit);
 
  private:

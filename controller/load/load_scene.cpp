@@ -394,7 +394,13 @@ LoadedScene load_parsed(Scene spec, const std::filesystem::path& path,
 }  // namespace
 
 LoadedScene load_scene(const std::filesystem::path& path, const SceneOverrides& overrides) {
-  return load_parsed(parse_scene_file(path, overrides.settings), path, overrides, nullptr);
+  return load_scene(path, read_scene_text(path), overrides);
+}
+
+LoadedScene load_scene(const std::filesystem::path& path, std::string_view text,
+                       const SceneOverrides& overrides) {
+  return load_parsed(parse_scene(text, path, scene_keys(), overrides.settings), path, overrides,
+                     nullptr);
 }
 
 LoadedScene load_scene(const std::filesystem::path& path, std::string_view text,

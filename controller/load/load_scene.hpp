@@ -72,6 +72,10 @@ inline constexpr std::array<double, 3> kWorkspaceMm = {100.0, 80.0, 60.0};
 /// voxels of 0.125 mm. If no volume has labels, only the materials that the scene names stay.
 [[nodiscard]] LoadedScene load_scene(const std::filesystem::path& path, const SceneOverrides& = {});
 
+/// The same with the text that the file has, or had.
+[[nodiscard]] LoadedScene load_scene(const std::filesystem::path& path, std::string_view text,
+                                     const SceneOverrides& overrides);
+
 /// The same before files are written: a scene whose text will be written to `path`, and the
 /// densities and labels of its first volume, whose window there is [0, 65535].
 [[nodiscard]] LoadedScene load_scene(const std::filesystem::path& path, std::string_view text,

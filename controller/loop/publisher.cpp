@@ -11,6 +11,7 @@
 #include "shared/numeric/linear_algebra.hpp"
 #include "shared/numeric/numbers.hpp"
 #include "shared/segment/layout.hpp"
+#include "shared/volume/checksum.hpp"
 
 namespace kerf {
 namespace {
@@ -87,41 +88,30 @@ void put_raw(const DeviceReport& report, TickRecord& record) noexcept {
 
 }  // namespace
 
-void Publisher::publish_volumes(const ServoOutput& output, TickRecord& record) noexcept {
-  VoxelBox first_box;
-  for (std::size_t v = 0; v < output.changed.size(); ++v) {
-    const VoxelBox& box = output.changed[v];
-    if (box.empty()) continue;
-    const std::span<const Density> density = servo_.density(v);
-    const std::uint64_t steps = output.removed_by_volume[v] + output.returned_by_volume[v];
-    const std::uint64_t hash =
-        segment_.publish_box(v, density, box, static_cast<std::uint32_t>(steps), cause_of(output));
-    removal_hash_ = fnv1a_step(removal_hash_, hash);
-    record.dirty_volumes |= 1U << v;
-    if (first_box.empty()) first_box = box;
-  }
-  const auto narrow = [](std::int32_t value) { return static_cast<std::uint16_t>(value); };
-  const std::array lo{narrow(first_box.lo.x), narrow(first_box.lo.y), narrow(first_box.lo.z)};
-  const std::array hi{narrow(first_box.hi.x), narrow(first_box.hi.y), narrow(first_box.hi.z)};
-  std::ranges::copy(lo, record.dirty_lo);
-  std::ranges::copy(hi, record.dirty_hi);
+std::uint64_t hash_of_volumes(const Servo& servo, std::size_t count) noexcept {
+  std::uint64_t hash = kFnv1aBasis;
+  for (std::size_t v = 0; v < count; ++v) hash = fnv1a_step(hash, density_hash(servo.density(v)));
+  return hash;
 }
 
-void Publisher::publish(Tick tick, const DeviceReport& report, const ServoOutput& output,
-                        std::uint32_t last_command, const TickTiming& timing) noexcept {
-  TickRecord record{};
-  if (std::exchange(held_, output.held) != output.held) {
-    segment_.set_lifecycle(output.held ? Lifecycle::hold : Lifecycle::run);
-  }
-  segment_.begin_tick(tick);
-  publish_volumes(output, record);
+void Publisher::publish_volumes(const ServoOutput& output, TickRecord& record) noexcept {
+  const auto publish_box = [&](std::size_t v, const VoxelBox& box) {
+    const std::uint64_t steps = output.removed_by_volume[v] + output.returned_by_volume[v];
+    return segment_.publish_box(v, servo_.density(v), box, static_cast<std::uint32_t>(steps),
+                                cause_of(output));
+  };
+  put_changes(output, publish_box, removal_hash_, record);
+}
 
-  record.tick = tick;
-  record.start_ns = static_cast<std::uint64_t>(timing.start_ns);
-  record.period_error_ns = saturate_i32(timing.late_ns);
-  record.execution_ns = static_cast<std::uint32_t>(timing.compute_ns);
+TickRecord record_of(const DeviceReport& report, const TickCommands& commands,
+                     const ServoOutput& output) noexcept {
+  TickRecord record{};
+  put_raw(report, record);
+  record.command =
+      static_cast<std::uint32_t>(commands.command.kind) | (commands.fade_in ? kCommandFadeIn : 0);
+  record.command_argument = commands.command.argument;
+  record.last_command = commands.last_index;
   record.flags = flags_of(report, output);
-  record.missed_deadlines = static_cast<std::uint32_t>(timing.missed_deadlines);
   std::ranges::copy(output.joint_counts, record.encoder_counts);
   for (std::size_t i = 0; i < 3; ++i) {
     record.encoder_counts[3 + i] =
@@ -149,19 +139,56 @@ void Publisher::publish(Tick tick, const DeviceReport& report, const ServoOutput
   for (std::size_t i = 0; i < kEnergySources; ++i) {
     record.*kEnergyColumns[i] = output.energy_steps[i];
   }
-  record.volume_hash = removal_hash_;
   record.output_hash = output.output_hash;
-  record.lost_packets = static_cast<std::uint32_t>(timing.lost_packets);
-  record.refused_packets = static_cast<std::uint32_t>(timing.refused_packets);
   record.phase = static_cast<std::uint16_t>(output.phase);
   record.press_n = static_cast<float>(output.press_n);
-  record.last_command = last_command;
-  put_raw(report, record);
   record.spindle_ratio = static_cast<float>(output.spindle_ratio);
   record.spindle_load = static_cast<float>(output.spindle_load);
   record.active_tool = output.active_tool;
   record.fault = static_cast<std::uint32_t>(output.fault);
   record.stale = output.stale ? 1 : 0;
+  return record;
+}
+
+DeviceReport report_of(const TickRecord& record) noexcept {
+  DeviceReport report;
+  const auto& raw = record.raw;
+  for (std::size_t i = 0; i < 3; ++i) {
+    report.encoder[i] = static_cast<std::int16_t>(raw[kRawEncoder + i]);
+    report.wiper_a[i] = static_cast<std::uint16_t>(raw[kRawPot + i]);
+    report.wiper_b[i] = static_cast<std::uint16_t>(raw[kRawPot + 3 + i]);
+  }
+  report.fresh = record.stale == 0;
+  report.button1 = (raw[kRawStatus] & 1) != 0;
+  report.button2 = (raw[kRawStatus] & 2) != 0;
+  report.parked = (raw[kRawStatus] & 4) != 0;
+  report.homed = (raw[kRawStatus] & 8) == 0;
+  report.counter = static_cast<std::uint32_t>(raw[kRawDeviceCounter]);
+  return report;
+}
+
+TickCommands commands_of(const TickRecord& record) noexcept {
+  return {{static_cast<ServoCommand::Kind>(record.command & kCommandKind), record.command_argument},
+          (record.command & kCommandFadeIn) != 0,
+          record.last_command};
+}
+
+void Publisher::publish(Tick tick, const DeviceReport& report, const TickCommands& commands,
+                        const ServoOutput& output, const TickTiming& timing) noexcept {
+  TickRecord record = record_of(report, commands, output);
+  if (std::exchange(held_, output.held) != output.held) {
+    segment_.set_lifecycle(output.held ? Lifecycle::hold : Lifecycle::run);
+  }
+  segment_.begin_tick(tick);
+  publish_volumes(output, record);
+
+  record.tick = tick;
+  record.start_ns = static_cast<std::uint64_t>(timing.start_ns);
+  record.period_error_ns = saturate_i32(timing.late_ns);
+  record.execution_ns = static_cast<std::uint32_t>(timing.compute_ns);
+  record.missed_deadlines = static_cast<std::uint32_t>(timing.missed_deadlines);
+  record.lost_packets = static_cast<std::uint32_t>(timing.lost_packets);
+  record.refused_packets = static_cast<std::uint32_t>(timing.refused_packets);
   record.penetration_mm = static_cast<float>(servo_.penetration_mm());
   segment_.publish_state(record);
   segment_.end_tick(static_cast<std::uint64_t>(timing.heartbeat_ns));

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 
 #include "controller/servo/servo.hpp"
@@ -21,6 +22,50 @@ struct TickTiming {
   std::uint64_t refused_packets = 0;
 };
 
+/// What the servo was given in a tick besides the report: with it and the reports a run can be
+/// repeated (replay/replay.hpp).
+struct TickCommands {
+  ServoCommand command;          ///< of a reader; `none` in most ticks
+  bool fade_in = false;          ///< behind it, after a stall
+  std::uint32_t last_index = 0;  ///< `Command::index` of the last one so far
+};
+
+/// The record of a tick, as far as report, commands and output determine it: all but times,
+/// losses, hashes of volumes and penetration.
+[[nodiscard]] TickRecord record_of(const DeviceReport& report, const TickCommands& commands,
+                                   const ServoOutput& output) noexcept;
+/// The report in a record, and what `record_of` was given as commands.
+[[nodiscard]] DeviceReport report_of(const TickRecord& record) noexcept;
+[[nodiscard]] TickCommands commands_of(const TickRecord& record) noexcept;
+
+/// Puts the boxes that changed into the record, and steps the chain of their hashes. `hash_of` a
+/// volume and its box gives the hash of the densities there.
+template <class HashOf>
+void put_changes(const ServoOutput& output, const HashOf& hash_of, std::uint64_t& chain,
+                 TickRecord& record) noexcept {
+  const auto narrow = [](std::int32_t value) { return static_cast<std::uint16_t>(value); };
+  const auto store = [&](std::uint16_t(&to)[3], VoxelIndex from) {
+    to[0] = narrow(from.x);
+    to[1] = narrow(from.y);
+    to[2] = narrow(from.z);
+  };
+  for (std::size_t v = 0; v < output.changed.size(); ++v) {
+    const VoxelBox& box = output.changed[v];
+    if (box.empty()) continue;
+    if (record.dirty_volumes == 0) {
+      store(record.dirty_lo, box.lo);
+      store(record.dirty_hi, box.hi);
+    }
+    record.dirty_volumes |= 1U << v;
+    chain = fnv1a_step(chain, hash_of(v, box));
+  }
+  record.volume_hash = chain;
+}
+
+/// Hash of the first `count` volumes as they are now: `volume_hash` of a report. While no step
+/// runs.
+[[nodiscard]] std::uint64_t hash_of_volumes(const Servo& servo, std::size_t count) noexcept;
+
 /// Publishes each tick to the readers of the segment, after the device has its command.
 ///
 /// Servo thread only; wait-free, no system call, no allocation.
@@ -29,8 +74,8 @@ class Publisher {
   Publisher(SegmentWriter& segment, const Servo& servo) noexcept
       : segment_(segment), servo_(servo) {}
 
-  void publish(Tick tick, const DeviceReport& report, const ServoOutput& output,
-               std::uint32_t last_command, const TickTiming& timing) noexcept;
+  void publish(Tick tick, const DeviceReport& report, const TickCommands& commands,
+               const ServoOutput& output, const TickTiming& timing) noexcept;
 
  private:
   void publish_volumes(const ServoOutput& output, TickRecord& record) noexcept;

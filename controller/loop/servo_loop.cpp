@@ -134,7 +134,7 @@ EndReason run_servo(TickSource& clock, DeviceDriver& device, Servo& servo, Publi
                     SegmentServer& commands, const LoopLimits& limits, LoopSignals& signals,
                     RunRecord& record) noexcept {
   EndReason end = EndReason::stopped;
-  std::uint32_t last_command = 0;
+  TickCommands given;
   std::uint64_t silent_ticks = 0;
   const CountedAllocations counted;
   RunStatistics books(record, clock);
@@ -146,13 +146,15 @@ EndReason run_servo(TickSource& clock, DeviceDriver& device, Servo& servo, Publi
     timing.heartbeat_ns = monotonic_ns();
     timing.start_ns = clock.start_ns(tick);
     const DeviceReport report = device.read();  // newest pose; never blocks
+    given.command = {};
     if (const auto command = commands.take_command()) {
-      if (!servo.apply(servo_command(*command))) record.add_event(tick, "refused_command");
-      last_command = command->index;
+      given.command = servo_command(*command);
+      given.last_index = command->index;
+      if (!servo.apply(given.command)) record.add_event(tick, "refused_command");
     }
-    if (const char* stall = recover(signals, clock.stood_still(), servo)) {
-      record.add_event(tick, stall);
-    }
+    const char* const stall = recover(signals, clock.stood_still(), servo);
+    given.fade_in = stall != nullptr;
+    if (given.fade_in) record.add_event(tick, stall);
     const std::int64_t in_hand_ns = monotonic_ns();
     const ServoOutput output = servo.step(report);  // all physics, all limits
     const std::int64_t compute_ns = monotonic_ns() - in_hand_ns;
@@ -162,7 +164,7 @@ EndReason run_servo(TickSource& clock, DeviceDriver& device, Servo& servo, Publi
     timing.refused_packets = device.refused();
     send_tick(output, signals, device);  // the device first,
     const std::int64_t sent_ns = monotonic_ns();
-    eyes.publish(tick, report, output, last_command, timing);  // then the readers
+    eyes.publish(tick, report, given, output, timing);  // then the readers
     books.count(tick, output, {timing.late_ns, compute_ns, sent_ns, monotonic_ns() - sent_ns});
 
     signals.heartbeat.store(tick, std::memory_order_relaxed);

@@ -35,7 +35,6 @@
 #include "controller/scene/scene.hpp"
 #include "controller/scene/scene_file.hpp"
 #include "controller/volume/file/volume_io.hpp"
-#include "shared/numeric/fnv1a.hpp"
 #include "shared/posix/atomic_file.hpp"
 #include "shared/posix/monotonic_clock.hpp"
 #include "shared/posix/program.hpp"
@@ -43,7 +42,6 @@
 #include "shared/posix/threads.hpp"
 #include "shared/segment/server.hpp"
 #include "shared/segment/writer.hpp"
-#include "shared/volume/checksum.hpp"
 #include "shared/volume/material.hpp"
 #include "shared/wire/personality.hpp"
 
@@ -264,14 +262,6 @@ MaterialScores scores_of(const LoadedScene& scene, const CompiledScene& servo,
   return scores;
 }
 
-std::uint64_t hash_of_volumes(const LoadedScene& scene, const Servo& servo) {
-  std::uint64_t hash = kFnv1aBasis;
-  for (std::size_t v = 0; v < scene.volumes.size(); ++v) {
-    hash = fnv1a_step(hash, density_hash(servo.density(v)));
-  }
-  return hash;
-}
-
 /// Writes the volumes in their current state.
 void write_final(const ControllerOptions& options, const LoadedScene& scene, const Servo& servo) {
   for (std::size_t v = 0; v < scene.volumes.size(); ++v) {
@@ -384,7 +374,7 @@ int run_with_device(const ControllerOptions& options, std::int64_t began_ns, Run
   if (const std::int64_t first_ns = report.record.first_force_ns; first_ns > 0) {
     report.start_to_force_ms = static_cast<double>(first_ns - began_ns) / 1e6;
   }
-  report.volume_hash = hash_of_volumes(scene, servo);
+  report.volume_hash = hash_of_volumes(servo, scene.volumes.size());
   std::fputs(summary(report).c_str(), stdout);
   if (!options.report.empty()) write_new_file(options.report, report_json(report));
   if (!options.final_volume.empty()) write_final(options, scene, servo);

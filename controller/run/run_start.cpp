@@ -144,7 +144,8 @@ SegmentWriter new_segment(const ControllerOptions& options, const PlannedScene& 
   const LoadedScene& scene = planned.scene;
   const std::string json = canonical_json(scene);
   report.config_hash = fnv1a(json);
-  const SegmentSpec spec = segment_spec(scene, json, report.config_hash);
+  const std::string with_source = json_with_source(json, planned.source);
+  const SegmentSpec spec = segment_spec(scene, with_source, report.config_hash);
   check_memory(scene, planned.servo->costs(), plan_segment(spec).header.total_bytes);
   if (!options.emulator_args.empty()) write_new_file(options.emulator_args, hand_lines(scene));
   return SegmentWriter::create(spec, options.virtual_time);
@@ -153,11 +154,12 @@ SegmentWriter new_segment(const ControllerOptions& options, const PlannedScene& 
 }  // namespace
 
 PlannedScene load_and_plan(const ControllerOptions& options) {
-  LoadedScene scene = load_scene(options.scene, options.overrides);
+  SceneSource source = read_source(options.scene, options.overrides);
+  LoadedScene scene = load_scene(options.scene, source.text, options.overrides);
   for (const std::string& line : try_own_laws(scene)) log_warning(line);
   std::unique_ptr<CompiledScene> servo = plan_scene(scene);
   end_if_asked(options.scene);
-  return {std::move(scene), std::move(servo)};
+  return {std::move(source), std::move(scene), std::move(servo)};
 }
 
 void check_options(const ControllerOptions& options, const LoadedScene& scene) {

@@ -8,6 +8,7 @@
 
 #include "controller/device/port/packet_port.hpp"
 #include "controller/load/loaded_scene.hpp"
+#include "controller/load/scene_source.hpp"
 #include "controller/plan/compile.hpp"
 #include "controller/plan/gain_margin.hpp"
 #include "controller/run/controller_options.hpp"
@@ -28,8 +29,9 @@ namespace kerf {
 /// the program without a message. Throws std::runtime_error with one line.
 void check_memory(const LoadedScene& scene, const SceneCosts& costs, std::uint64_t segment_bytes);
 
-/// A scene with its files, and the planned servo.
+/// A scene with its files, what it was loaded from, and the planned servo.
 struct PlannedScene {
+  SceneSource source;
   LoadedScene scene;
   std::unique_ptr<CompiledScene> servo;
 };

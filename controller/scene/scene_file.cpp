@@ -421,7 +421,7 @@ Scene parse_scene(std::string_view text, const std::filesystem::path& path, Scen
   }
 }
 
-Scene parse_scene_file(const std::filesystem::path& path, std::span<const KeyOverride> settings) {
+std::string read_scene_text(const std::filesystem::path& path) {
   constexpr std::uintmax_t kLargestFile = std::uintmax_t{1} << 20;
   std::error_code fault;
   if (const std::string why = access_error(path); !why.empty()) refuse(path.string(), why);
@@ -447,7 +447,11 @@ Scene parse_scene_file(const std::filesystem::path& path, std::span<const KeyOve
   } catch (const std::ios_base::failure&) {
     refuse(path.string(), ": cannot be read; copy it again, or check its disk");
   }
-  return parse_scene(text, path, scene_keys(), settings);
+  return text;
+}
+
+Scene parse_scene_file(const std::filesystem::path& path, std::span<const KeyOverride> settings) {
+  return parse_scene(read_scene_text(path), path, scene_keys(), settings);
 }
 
 void check_hand_script(const SceneSettings& scene) {

@@ -34,7 +34,10 @@ void override_keys(std::span<const KeyOverride> settings, TomlNode& root);
                                 SceneKeys keys = scene_keys(),
                                 std::span<const KeyOverride> settings = {});
 
-/// Reads a scene file of at most 1 MiB.
+/// The text of a scene file of at most 1 MiB. Throws LoadError.
+[[nodiscard]] std::string read_scene_text(const std::filesystem::path& path);
+
+/// Both in one.
 [[nodiscard]] Scene parse_scene_file(const std::filesystem::path& path,
                                      std::span<const KeyOverride> settings = {});
 

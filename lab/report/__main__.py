@@ -18,7 +18,7 @@ from text import BadInput
 
 # Subject and kind: the function KIND of the module SUBJECT, and whether it draws.
 KINDS = {
-    ("recording", "forces"): True,
+    ("recording", "forces"): True, ("recording", "replay"): True,
     ("burs", "sheet"): True,
     ("kernels", "page"): False,
     ("energy", "page"): False, ("energy", "tables"): False,

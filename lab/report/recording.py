@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The plot of a recording (`kerf record plot`, forces.svg of a demo). JSON:
+"""The plot of a recording (`kerf record plot`, forces.svg of a demo), and of a run beside its replay. JSON of the first:
 
     end_s                       end of the time axis
     curves, sources             lists of {name, s, values}: times in s with the values there. Curves are contact,
@@ -45,4 +45,31 @@ def forces(data):
         axes.legend(handles=handles, loc="lower left", bbox_to_anchor=(-0.01, 0.99), ncol=len(handles), columnspacing=1.6)
     force.tick_params(labelbottom=False)
     depth.tick_params(labelbottom=False)
+    return fig.svg(picture)
+
+
+def replay(data):
+    """JSON: end_s, and curves by name as above: recorded_n and replayed_n, apart_mm, recorded_mm3 and replayed_mm3."""
+    curves = {curve["name"]: curve for curve in data["curves"]}
+    picture, ((force,), (place,), (removed,)) = fig.new_figure(960, 920, rows=3, left=80, right=80, top=40, down=50,
+                                                               bottom=50)
+
+    def draw(axes, name, colour, label, width):
+        axes.plot(curves[name]["s"], curves[name]["values"], color=colour, label=label, linewidth=width)
+
+    for axes, unit in ((force, "n"), (removed, "mm3")):
+        draw(axes, "recorded_" + unit, fig.ORANGE, "recorded", 3.2)
+        draw(axes, "replayed_" + unit, fig.BLUE, "replayed", 1.5)
+    draw(place, "apart_mm", fig.GREEN, "between both places", 1.5)
+    force.set_ylabel("commanded force (N)")
+    place.set_ylabel("tool apart (mm)")
+    removed.set_ylabel("removed (mm³)")
+    removed.set_xlabel("time (s)")
+    for axes in (force, place, removed):
+        axes.set_xlim(0, data["end_s"])
+        axes.set_ylim(min(0, axes.dataLim.intervaly[0]), max(axes.dataLim.intervaly[1], 0.01) * 1.05)
+        axes.grid(True)
+        axes.legend(loc="lower left", bbox_to_anchor=(-0.01, 0.99), ncol=2, columnspacing=1.6)
+    force.tick_params(labelbottom=False)
+    place.tick_params(labelbottom=False)
     return fig.svg(picture)

@@ -37,7 +37,7 @@ inline constexpr std::uint64_t kSegmentMagic = [] {
   return magic;
 }();
 inline constexpr std::uint32_t kLayoutMajor = 1;
-inline constexpr std::uint32_t kLayoutMinor = 2;
+inline constexpr std::uint32_t kLayoutMinor = 3;
 inline constexpr std::uint32_t kStateSlots = 4096;  // 4.1 s at 1 kHz: as long as a reader may stop
 inline constexpr std::uint32_t kDirtySlots = 4096;
 inline constexpr std::uint64_t kMaxSceneBytes = std::uint64_t{1} << 26;  // a reader copies it whole
@@ -163,11 +163,13 @@ struct TickRecord {
   std::uint32_t fault;
   std::uint32_t stale;
   float penetration_mm;
-  std::uint32_t plane_count;  ///< of the planes that hold the tool, at most 3
-  float plane_load_n[3];      ///< along each normal, before any limit, at the device port
-  float plane_normal[9];      ///< x, y, z of each plane: out of the solid
-  float plane_arm_mm[9];      ///< likewise: from the tool's centre to the contact
-  std::uint32_t crc32c;       ///< filled by the writer, over bytes 8 up to this one
+  std::uint32_t plane_count;       ///< of the planes that hold the tool, at most 3
+  float plane_load_n[3];           ///< along each normal, before any limit, at the device port
+  float plane_normal[9];           ///< x, y, z of each plane: out of the solid
+  float plane_arm_mm[9];           ///< likewise: from the tool's centre to the contact
+  std::uint32_t command;           ///< kCommand... below: applied before this tick's step
+  std::uint32_t command_argument;  ///< its argument: index of the tool; hold: 1 on, 0 off
+  std::uint32_t crc32c;            ///< filled by the writer, over bytes 8 up to this one
 };
 
 /// The checksum that a tick record carries: of all bytes between its sequence number and it.
@@ -195,6 +197,11 @@ inline constexpr std::uint32_t kFlagUndoable = 1U << 15;   ///< it can be
 inline constexpr std::uint32_t kFlagRedo = 1U << 16;       ///< an undone stroke is cut again
 inline constexpr std::uint32_t kFlagRedoable = 1U << 17;   ///< it can be
 inline constexpr std::uint32_t kFlagPedal = 1U << 18;      ///< nothing is cut without button 1
+
+/// Bits of `command`: the kind of the command, as `ServoCommand` has it, and behind it a restart of
+/// the force after a stall of the servo.
+inline constexpr std::uint32_t kCommandKind = 0xff;
+inline constexpr std::uint32_t kCommandFadeIn = 1U << 8;
 
 inline constexpr std::size_t kRawEncoder = 0;  ///< first of 3
 inline constexpr std::size_t kRawPot = 3;      ///< first of 6

@@ -165,7 +165,9 @@ inline constexpr std::array kLayoutTable = {
     KERF_FIELD(TickRecord, plane_load_n, 400, "f32", 3),
     KERF_FIELD(TickRecord, plane_normal, 412, "f32", 9),
     KERF_FIELD(TickRecord, plane_arm_mm, 448, "f32", 9),
-    KERF_FIELD(TickRecord, crc32c, 484, "u32", 1),
+    KERF_FIELD(TickRecord, command, 484, "u32", 1),
+    KERF_FIELD(TickRecord, command_argument, 488, "u32", 1),
+    KERF_FIELD(TickRecord, crc32c, 492, "u32", 1),
 
     KERF_FIELD(DirtyRecord, seq, 0, "u64", 1),
     KERF_FIELD(DirtyRecord, tick, 8, "u64", 1),
@@ -195,7 +197,7 @@ inline constexpr std::array kLayoutTable = {
 }
 static_assert(layout_matches("SegmentHeader", 4096) && sizeof(SegmentHeader) == 4096);
 static_assert(layout_matches("VolumeDescriptor", 128) && sizeof(VolumeDescriptor) == 128);
-static_assert(layout_matches("TickRecord", 488) && sizeof(TickRecord) == 488);
+static_assert(layout_matches("TickRecord", 496) && sizeof(TickRecord) == 496);
 static_assert(layout_matches("DirtyRecord", 64) && sizeof(DirtyRecord) == 64);
 static_assert(kStaticHeaderBytes == 0x100);
 

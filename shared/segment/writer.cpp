@@ -148,6 +148,11 @@ void SegmentWriter::begin_tick(Tick tick) noexcept {
   state_->tick = std::max(tick, state_->tick + 1);
 }
 
+std::uint64_t changed_box_hash(const BrickGrid& bricks, std::span<const Density> linear,
+                               const VoxelBox& box) noexcept {
+  return bricks.touched_by(box) <= kMaxBricksPerTick ? box_hash(linear, bricks.grid, box) : 0;
+}
+
 std::uint64_t SegmentWriter::publish_box(std::size_t volume, std::span<const Density> linear,
                                          const VoxelBox& changed, std::uint32_t removed,
                                          DirtyCause cause) noexcept {
@@ -159,7 +164,6 @@ std::uint64_t SegmentWriter::publish_box(std::size_t volume, std::span<const Den
   const VoxelBox box = changed.clipped(mirrored.bricks.grid.box());
   if (box.empty() || linear.size() != mirrored.bricks.grid.voxel_count()) return 0;
   mirrored.linear = linear;
-  const VoxelBox touched = mirrored.bricks.bricks_of(box);
   mirrored.dirty.mark(box);
 
   DirtyRecord record{};
@@ -175,12 +179,8 @@ std::uint64_t SegmentWriter::publish_box(std::size_t volume, std::span<const Den
   record.removed = removed;
   record.volume = static_cast<std::uint16_t>(volume);
   record.cause = static_cast<std::uint16_t>(cause);
-  const VoxelIndex bricks = touched.extent();
-  record.bricks = static_cast<std::uint32_t>(bricks.x) * static_cast<std::uint32_t>(bricks.y) *
-                  static_cast<std::uint32_t>(bricks.z);
-  if (record.bricks <= kMaxBricksPerTick) {
-    record.box_hash = box_hash(linear, mirrored.bricks.grid, box);
-  }
+  record.bricks = mirrored.bricks.touched_by(box);
+  record.box_hash = changed_box_hash(mirrored.bricks, linear, box);
   state.boxes.push(record);
   return record.box_hash;
 }

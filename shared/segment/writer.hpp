@@ -19,6 +19,12 @@ namespace kerf {
 /// deadline.
 inline constexpr std::uint32_t kMaxBricksPerTick = 512;
 
+/// Hash of the densities in a box that changed, which lies in the volume `linear`; 0 if it touches
+/// more than kMaxBricksPerTick bricks.
+[[nodiscard]] std::uint64_t changed_box_hash(const BrickGrid& bricks,
+                                             std::span<const Density> linear,
+                                             const VoxelBox& box) noexcept;
+
 /// The one writer of a segment: a sealed memfd, mapped, populated, the volumes in it as tick 0.
 ///
 /// `create` and the destructor run outside the servo. The members marked *servo* are called by one

@@ -67,6 +67,12 @@ struct BrickGrid {
             {((in.hi.x - 1) >> kBrickLog2) + 1, ((in.hi.y - 1) >> kBrickLog2) + 1,
              ((in.hi.z - 1) >> kBrickLog2) + 1}};
   }
+  /// Number of them.
+  [[nodiscard]] constexpr std::uint32_t touched_by(const VoxelBox& box) const noexcept {
+    const VoxelIndex bricks = bricks_of(box).extent();
+    return static_cast<std::uint32_t>(bricks.x) * static_cast<std::uint32_t>(bricks.y) *
+           static_cast<std::uint32_t>(bricks.z);
+  }
 };
 
 }  // namespace kerf

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "record/force_plot.hpp"
+#include "record/recording.hpp"
+#include "shared/segment/layout.hpp"
+
+namespace kerf {
+
+/// How a run and its replay part: forces, places of the tool as it is felt, removed volumes. For a
+/// replay with changes, and for one in other numbers.
+class ComparedRuns {
+ public:
+  /// `ticks`: number of the `add` calls to come, at most.
+  ComparedRuns(std::uint64_t ticks, const Manifest& manifest);
+
+  void add(const TickRecord& recorded, const TickRecord& replayed);
+
+  /// Both peaks and the largest differences, in two columns for people.
+  [[nodiscard]] std::string text() const;
+
+  /// Draws three panels over time as SVG: both commanded forces, the distance between both places,
+  /// both removed volumes. The file appears whole or not at all. Throws `RecordError` for a replay
+  /// of no tick, `ReportError` or `FileError`.
+  void plot(const std::filesystem::path& svg);
+
+ private:
+  struct Curve {
+    std::string_view name;
+    Envelope envelope;
+  };
+  enum Name : std::size_t { recorded_n, replayed_n, apart_mm, recorded_mm3, replayed_mm3 };
+  void draw(Name curve, double value) { curves_[curve].envelope.add(seconds_, value); }
+
+  Manifest manifest_;
+  std::vector<Curve> curves_;  ///< by `Name`
+  double seconds_ = 0;         ///< of the last tick
+  double recorded_peak_n_ = 0, replayed_peak_n_ = 0, force_apart_n_ = 0, apart_mm_ = 0;
+  double recorded_mm3_ = 0, replayed_mm3_ = 0;
+};
+
+}  // namespace kerf

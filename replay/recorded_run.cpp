@@ -1,0 +1,171 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "replay/recorded_run.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <fstream>
+#include <iterator>
+#include <string_view>
+#include <system_error>
+#include <utility>
+
+#include "controller/load/load_scene.hpp"
+#include "controller/load/scene_json.hpp"
+#include "controller/scene/scene_file.hpp"
+#include "record/tick_log.hpp"
+#include "shared/segment/layout.hpp"
+#include "shared/text/command_line.hpp"
+#include "shared/text/json.hpp"
+#include "shared/text/text.hpp"
+
+namespace kerf {
+namespace {
+
+/// The text of scene.json, which is no larger than a segment may hold.
+std::string scene_text(const std::filesystem::path& path) {
+  std::error_code fault;
+  const std::uintmax_t bytes = std::filesystem::file_size(path, fault);
+  if (fault || !std::filesystem::is_regular_file(path, fault)) {
+    throw RecordError(path.string() + ": cannot be read; " + way_to_recording(path.parent_path()));
+  }
+  if (bytes > kMaxSceneBytes) {
+    throw RecordError(path.string() + ": larger than any scene; copy the recording again");
+  }
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+struct RecordedScene {
+  std::string canonical;  ///< of the loaded scene
+  SceneSource source;
+};
+
+RecordedScene read_scene(const std::filesystem::path& path) {
+  const std::string text = scene_text(path);
+  try {
+    return {json_without_source(text), source_in(text)};
+  } catch (const JsonError&) {
+    throw RecordError(path.string() +
+                      ": does not say what the scene was loaded from; record it with this version");
+  }
+}
+
+/// A short form of a value: a number or a text as it is, else its beginning.
+std::string short_value(const Json& value) {
+  constexpr std::size_t kMost = 40;
+  std::string text = value.canonical();
+  if (text.size() > kMost) text = text.substr(0, kMost) + "...";
+  return one_line(text);
+}
+
+struct Difference {
+  std::string key, recorded, loaded;
+};
+
+/// The first value in which two scenes differ, depth first in the order of the keys.
+std::optional<Difference> first_difference(const Json& recorded, const Json& loaded,
+                                           const std::string& key) {
+  if (recorded.canonical() == loaded.canonical()) return std::nullopt;
+  const auto members_of = [](const Json& value) {
+    return value.visit([]<class T>(const T& held) -> const Json::Members* {
+      if constexpr (std::is_same_v<T, Json::Members>) {
+        return &held;
+      } else {
+        return nullptr;
+      }
+    });
+  };
+  const auto list_of = [](const Json& value) {
+    return value.visit([]<class T>(const T& held) -> const Json::List* {
+      if constexpr (std::is_same_v<T, Json::List>) {
+        return &held;
+      } else {
+        return nullptr;
+      }
+    });
+  };
+  if (const auto* a = members_of(recorded), *b = members_of(loaded); a != nullptr && b != nullptr) {
+    for (const Json::Member& member : *a) {
+      const std::string below = key.empty() ? member.key : key + "." + member.key;
+      if (!loaded.contains(member.key)) return Difference{below, short_value(member.value), "none"};
+      if (auto found = first_difference(member.value, loaded.at(member.key), below)) return found;
+    }
+    for (const Json::Member& member : *b) {
+      if (recorded.contains(member.key)) continue;
+      return Difference{key.empty() ? member.key : key + "." + member.key, "none",
+                        short_value(member.value)};
+    }
+  }
+  if (const auto* a = list_of(recorded), *b = list_of(loaded);
+      a != nullptr && b != nullptr && a->size() == b->size()) {
+    for (std::size_t i = 0; i < a->size(); ++i) {
+      const std::string below = key + "[" + std::to_string(i) + "]";
+      if (auto found = first_difference((*a)[i], (*b)[i], below)) return found;
+    }
+  }
+  return Difference{key, short_value(recorded), short_value(loaded)};
+}
+
+/// What a user does about a difference in that key.
+std::string way_out(const std::string& key) {
+  if (key.starts_with("volumes[")) return "put back the volume that it was recorded with";
+  if (key.starts_with("tools[")) return "put back the tool's file that it was recorded with";
+  return "replay it with the version of kerf that recorded it";
+}
+
+void check_same(const std::filesystem::path& folder, const std::string& recorded,
+                const std::string& loaded) {
+  const auto found = first_difference(Json::parse(recorded), Json::parse(loaded), "");
+  if (!found) return;
+  throw RecordError((folder / kSceneName).string() + ": " + found->key + " is " + found->recorded +
+                    " in the recording and " + found->loaded + " now; " + way_out(found->key));
+}
+
+SceneSource changed(SceneSource source, const ReplayChanges& changes) {
+  if (changes.scene) source = read_source(*changes.scene, source.overrides);
+  for (const std::string& text : changes.settings) {
+    const KeyOverride setting = parse_setting(text);
+    auto& all = source.overrides.settings;
+    std::erase_if(all, [&](const KeyOverride& one) { return one.key == setting.key; });
+    all.push_back(setting);
+  }
+  if (changes.numeric) source.overrides.numeric = changes.numeric;
+  return source;
+}
+
+void check_begins_at_first_tick(const std::filesystem::path& folder, const Manifest& manifest) {
+  if (manifest.missed_before_start == 0) return;
+  throw RecordError(folder.string() + ": the first " +
+                    std::to_string(manifest.missed_before_start) +
+                    " ticks of the run are not in it; start the recorder before the controller, "
+                    "as ./kerf demo does");
+}
+
+}  // namespace
+
+RecordedRun load_run(const std::filesystem::path& folder, const ReplayChanges& changes,
+                     const KernelSet& kernels) {
+  RecordedRun run;
+  run.manifest = read_manifest(folder);
+  check_begins_at_first_tick(folder, run.manifest);
+  const RecordedScene recorded = read_scene(folder / kSceneName);
+  const SceneSource source = changed(recorded.source, changes);
+  run.scene = load_scene(source);
+  run.canonical = canonical_json(run.scene);
+  run.scene_json = json_with_source(run.canonical, source);
+  if (changes.none()) check_same(folder, recorded.canonical, run.canonical);
+  run.servo = compile(run.scene, kernels);
+  return run;
+}
+
+const KernelSet& kernels_named(const std::string& name) {
+  std::string known;
+  for (const KernelSet* const* set = kernel_sets(); *set != nullptr; ++set) {
+    if (name.empty() || name == (*set)->name) return **set;
+    known += std::string(known.empty() ? "" : ", ") + (*set)->name;
+  }
+  throw UsageError("--kernels " + one_line(name) + ": not on this machine; use one of " + known);
+}
+
+}  // namespace kerf

@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "controller/kernel/kernel_set.hpp"
+#include "controller/load/loaded_scene.hpp"
+#include "controller/load/scene_source.hpp"
+#include "controller/plan/compile.hpp"
+#include "record/recording.hpp"
+
+// A recording as a run that can be repeated: its scene, loaded again.
+
+namespace kerf {
+
+/// What a replay changes: all empty repeats the run as it was.
+struct ReplayChanges {
+  std::vector<std::string> settings{};           ///< `table.key=VALUE`
+  std::optional<std::filesystem::path> scene{};  ///< in place of the recorded one
+  std::optional<NumericKind> numeric{};
+
+  [[nodiscard]] bool none() const { return settings.empty() && !scene && !numeric; }
+};
+
+/// The scene of a recording, planned; it may be stepped from the first tick on.
+struct RecordedRun {
+  Manifest manifest;
+  LoadedScene scene;       ///< without its densities, which the servo has
+  std::string canonical;   ///< `canonical_json` of it
+  std::string scene_json;  ///< the same with its source
+  std::unique_ptr<CompiledScene> servo;
+};
+
+/// Loads the scene of the recording in `folder` from what it was loaded from, with `changes`.
+///
+/// Without changes the loaded scene must be the recorded one to the bit; else throws `RecordError`,
+/// one line that names the first key or volume that differs. Throws `RecordError` too if the
+/// recording does not begin at the run's first tick, LoadError if the scene cannot be loaded.
+[[nodiscard]] RecordedRun load_run(const std::filesystem::path& folder,
+                                   const ReplayChanges& changes, const KernelSet& kernels);
+
+/// The kernels of that name, as `kernel_sets` has them; the fastest if `name` is empty. Throws
+/// UsageError with those of this machine.
+[[nodiscard]] const KernelSet& kernels_named(const std::string& name);
+
+}  // namespace kerf

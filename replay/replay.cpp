@@ -1,0 +1,225 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "replay/replay.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstddef>
+#include <cstdio>
+#include <fstream>
+#include <iostream>
+#include <iterator>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "controller/loop/publisher.hpp"
+#include "record/recording.hpp"
+#include "replay/compared_runs.hpp"
+#include "shared/numeric/fnv1a.hpp"
+#include "shared/posix/atomic_file.hpp"
+#include "shared/segment/writer.hpp"
+#include "shared/text/json.hpp"
+#include "shared/text/text.hpp"
+#include "shared/volume/brick_grid.hpp"
+
+namespace kerf {
+namespace {
+
+/// One tick of the recording, computed again.
+class ReplayStep {
+ public:
+  explicit ReplayStep(CompiledScene& servo) : servo_(servo) {}
+
+  [[nodiscard]] TickRecord operator()(const TickRecord& recorded) noexcept {
+    const DeviceReport report = report_of(recorded);
+    const TickCommands commands = commands_of(recorded);
+    // As the loop does: the reader's command, then the restart after a stall, then the step.
+    if (commands.command.kind != ServoCommand::Kind::none) {
+      static_cast<void>(servo_.apply(commands.command));
+    }
+    if (commands.fade_in) {
+      static_cast<void>(servo_.apply({.kind = ServoCommand::Kind::fade_in}));
+    }
+    const ServoOutput output = servo_.step(report);
+    TickRecord record = record_of(report, commands, output);
+    const auto hash_of = [&](std::size_t v, const VoxelBox& box) {
+      return changed_box_hash(BrickGrid::of(servo_.grid(v)), servo_.density(v), box);
+    };
+    put_changes(output, hash_of, volume_chain_, record);
+    record.penetration_mm = static_cast<float>(servo_.penetration_mm());
+    copy_times(recorded, record);
+    record.crc32c = tick_record_crc(record);
+    return record;
+  }
+
+ private:
+  /// What belongs to the machine of the run: so a replay's log has the time axis of the run.
+  static void copy_times(const TickRecord& from, TickRecord& to) noexcept {
+    to.seq = from.seq;
+    to.tick = from.tick;
+    to.start_ns = from.start_ns;
+    to.period_error_ns = from.period_error_ns;
+    to.execution_ns = from.execution_ns;
+    to.missed_deadlines = from.missed_deadlines;
+    to.lost_packets = from.lost_packets;
+    to.refused_packets = from.refused_packets;
+  }
+
+  CompiledScene& servo_;
+  std::uint64_t volume_chain_ = kFnv1aBasis;
+};
+
+std::string gap_text(Tick last, Tick next) {
+  return "ticks " + std::to_string(last + 1) + " to " + std::to_string(next - 1) +
+         " were not recorded; what the servo was given there is unknown";
+}
+
+}  // namespace
+
+ReplayResult replay_ticks(RecordedRun& run, TickLogReader& log, Tick until,
+                          const std::atomic<bool>& stop, const TickVisitor& visit) {
+  ReplayResult result;
+  ReplayStep step(*run.servo);
+  std::vector<TickRecord> rows(TickLogReader::kChunkRows);
+  for (std::uint64_t row = 0; row < log.rows();) {
+    const std::size_t count = log.read(row, rows);
+    for (const TickRecord& recorded : std::span(rows).first(count)) {
+      if (recorded.tick > until) return result;
+      if (stop) {
+        result.cut_short = "a signal stopped it";
+        return result;
+      }
+      if (recorded.tick != result.last_tick + 1) {
+        result.cut_short = gap_text(result.last_tick, recorded.tick);
+        return result;
+      }
+      const TickRecord replayed = step(recorded);
+      ++result.ticks;
+      result.last_tick = recorded.tick;
+      result.output_hash = replayed.output_hash;
+      if (!visit(recorded, replayed)) return result;
+    }
+    row += count;
+  }
+  return result;
+}
+
+namespace {
+
+/// The log of a replay, and beside it manifest and scene: a recording like any other.
+class ReplayLog {
+ public:
+  ReplayLog(const std::filesystem::path& out, const std::filesystem::path& from)
+      : out_(out), from_(from), log_(new_folder(out) / kTickLogName) {}
+
+  void append(const TickRecord& record) { log_.append(record); }
+
+  void close(const RecordedRun& run, const ReplayResult& result) {
+    log_.sync();
+    std::ifstream file(from_ / kManifestName);
+    Json manifest = Json::parse(std::string{std::istreambuf_iterator<char>(file), {}});
+    manifest["replay_of"] = from_.string();
+    manifest["config_hash"] = hex64(fnv1a(run.canonical));
+    manifest["rows"] = result.ticks;
+    manifest["lost_ticks"] = 0;
+    manifest["gaps"] = Json::List{};
+    manifest["end_reason"] = "replayed";
+    write_new_file(out_ / kSceneName, run.scene_json);
+    write_new_file(out_ / kManifestName, manifest.document());
+  }
+
+ private:
+  static std::filesystem::path new_folder(const std::filesystem::path& out) {
+    check_new_folder(out);
+    std::error_code error;
+    std::filesystem::create_directories(out, error);
+    if (!error) return out;
+    throw RecordError(out.string() + ": " + error.message() + "; choose another --out");
+  }
+
+  std::filesystem::path out_, from_;
+  TickLogWriter log_;
+};
+
+std::uint64_t volume_hash_of(const RecordedRun& run) {
+  return hash_of_volumes(*run.servo, run.scene.volumes.size());
+}
+
+void print_end(const ReplayResult& result, const RecordedRun& run, bool changed, double wall_s) {
+  const double run_s = static_cast<double>(result.ticks) * run.manifest.tick_ns * 1e-9;
+  if (!result.difference && !changed) {
+    std::printf("%llu ticks, each equal to the last bit\n",
+                static_cast<unsigned long long>(result.ticks));
+  }
+  std::printf("output hash  %s\nvolume hash  %s\n%.1f s of the run in %.2f s\n",
+              hex64(result.output_hash).c_str(), hex64(volume_hash_of(run)).c_str(), run_s, wall_s);
+}
+
+void print_difference(const ReplayResult::Found& found, const RecordedRun& run) {
+  std::printf("tick %llu (%.3f s), %s: %s was %s, is %s\n",
+              static_cast<unsigned long long>(found.tick),
+              static_cast<double>(found.tick) * run.manifest.tick_ns * 1e-9,
+              std::string(found.at.stage).c_str(), found.at.field.c_str(),
+              found.at.recorded.c_str(), found.at.replayed.c_str());
+}
+
+Json json_of(const ReplayResult& result, const RecordedRun& run) {
+  Json report = {{"ticks", result.ticks},
+                 {"last_tick", result.last_tick},
+                 {"output_hash", hex64(result.output_hash)},
+                 {"volume_hash", hex64(volume_hash_of(run))},
+                 {"cut_short", result.cut_short}};
+  report["difference"] = nullptr;
+  if (result.difference) {
+    const auto& [tick, at] = *result.difference;
+    report["difference"] = Json{{"tick", tick},
+                                {"stage", at.stage},
+                                {"field", at.field},
+                                {"recorded", at.recorded},
+                                {"replayed", at.replayed}};
+  }
+  return report;
+}
+
+}  // namespace
+
+int run_replay(const ReplayOptions& options, const std::atomic<bool>& stop) {
+  check_outputs(recording_files(options.folder),
+                {{"--report", options.report, ".json"}, {"--plot", options.plot, ".svg"}});
+  TickLogReader log(options.folder / kTickLogName);
+  if (log.rows() == 0) {
+    throw RecordError((options.folder / kTickLogName).string() + ": 0 rows; nothing to replay");
+  }
+  RecordedRun run = load_run(options.folder, options.changes, kernels_named(options.kernels));
+  std::optional<ReplayLog> copy;
+  if (!options.out.empty()) copy.emplace(options.out, options.folder);
+  ComparedRuns compared(log.rows(), run.manifest);
+  const bool changed = !options.changes.none();
+
+  std::optional<ReplayResult::Found> difference;
+  const auto began = std::chrono::steady_clock::now();
+  const auto visit = [&](const TickRecord& recorded, const TickRecord& replayed) {
+    if (copy) copy->append(replayed);
+    compared.add(recorded, replayed);
+    if (difference || recorded.tick < options.from) return true;
+    if (const auto found = first_difference(recorded, replayed)) {
+      difference = {recorded.tick, *found};
+    }
+    return changed || !difference;
+  };
+  ReplayResult result = replay_ticks(run, log, options.until, stop, visit);
+  result.difference = difference;
+  const std::chrono::duration<double> wall = std::chrono::steady_clock::now() - began;
+
+  if (copy) copy->close(run, result);
+  if (changed) std::fputs(compared.text().c_str(), stdout);
+  if (difference) print_difference(*difference, run);
+  print_end(result, run, changed, wall.count());
+  if (!result.cut_short.empty()) std::cout << "stopped: " << result.cut_short << '\n';
+  if (!options.plot.empty()) compared.plot(options.plot);
+  if (!options.report.empty()) write_new_file(options.report, json_of(result, run).document());
+  return (difference && !changed) || !result.cut_short.empty() ? 1 : 0;
+}
+
+}  // namespace kerf

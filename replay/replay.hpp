@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <string>
+
+#include "record/tick_log.hpp"
+#include "replay/recorded_run.hpp"
+#include "replay/tick_stages.hpp"
+#include "shared/segment/layout.hpp"
+
+// A recorded run, stepped again without device and clock.
+
+namespace kerf {
+
+/// What a replay found.
+struct ReplayResult {
+  std::uint64_t ticks = 0;  ///< that were stepped
+  Tick last_tick = 0;
+  std::uint64_t output_hash = 0;  ///< after it
+  struct Found {
+    Tick tick = 0;
+    TickDifference at;
+  };
+  std::optional<Found> difference;  ///< the first one
+  std::string cut_short;            ///< why ticks of the recording are left; empty: none are
+};
+
+/// Takes a recorded tick and the same one computed again; returns whether to go on.
+using TickVisitor = std::function<bool(const TickRecord& recorded, const TickRecord& replayed)>;
+
+/// Gives the servo the reports and commands of the recording's ticks, in order, up to tick `until`,
+/// and hands each tick to `visit`. A gap ends it: what the servo was given there is unknown. So
+/// does `stop`. Throws `RecordError` at a row whose checksum is wrong.
+[[nodiscard]] ReplayResult replay_ticks(RecordedRun& run, TickLogReader& log, Tick until,
+                                        const std::atomic<bool>& stop, const TickVisitor& visit);
+
+/// Options of kerf-replay.
+struct ReplayOptions {
+  std::filesystem::path folder;
+  ReplayChanges changes;
+  std::string kernels;           ///< empty: the fastest
+  Tick from = 0;                 ///< the first tick that is compared
+  Tick until = UINT64_MAX;       ///< the last one
+  std::filesystem::path out;     ///< a recording of the replay; may be empty
+  std::filesystem::path plot;    ///< SVG of both runs; may be empty
+  std::filesystem::path report;  ///< JSON; may be empty
+};
+
+/// Replays the recording and prints what it found. Returns the exit code: 0; 1 if a tick differs
+/// although nothing was changed, or if ticks are left. Bad input throws, one line.
+[[nodiscard]] int run_replay(const ReplayOptions& options, const std::atomic<bool>& stop);
+
+}  // namespace kerf

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <iostream>
+#include <optional>
+#include <string>
+
+#include "controller/scene/scene.hpp"
+#include "replay/replay.hpp"
+#include "shared/posix/program.hpp"
+#include "shared/posix/stop_signals.hpp"
+#include "shared/text/command_line.hpp"
+
+namespace kerf {
+namespace {
+
+constexpr const char* kAbout =
+    "Runs a recording again, tick by tick, without device and clock.\n\n"
+    "Each tick is compared with the recorded one, to the last bit. With another scene, setting, "
+    "law "
+    "or arithmetic it shows what would have been felt: the hand moves as it did, the volumes "
+    "start as they were.";
+
+/// False if help or version was requested, and printed.
+bool parse_replay(int argc, char** argv, ReplayOptions& options) {
+  CommandLine app(kAbout, "kerf-replay", KERF_VERSION);
+  app.footer("\nExit codes: 0 fine, 1 a tick differs or the recording has a gap, 2 bad input.");
+  std::string numeric, scene, law;
+  app.option("DIR", options.folder, "folder of a recording").required();
+  app.option("--from", options.from, "the first tick that is compared").shown_as("TICK");
+  app.option("--until", options.until, "the last tick that is replayed").shown_as("TICK");
+  app.option("--kernels", options.kernels, "those of an instruction set, as scalar or avx2")
+      .shown_as("NAME");
+  app.option("--set", options.changes.settings,
+             "another value of a key of the scene; may be given often")
+      .one_each()
+      .shown_as("KEY=VALUE");
+  app.option("--law", law, "another force law: --set force.law=NAME").shown_as("NAME");
+  app.option("--scene", scene, "another scene, on the recorded hand").shown_as("FILE");
+  app.option("--numeric", numeric, "other numbers of the loop").one_of({"fixed", "double"});
+  app.option("--out", options.out, "folder for a recording of the replay").shown_as("DIR");
+  app.option("--plot", options.plot, "forces, places and volumes of both, as SVG").shown_as("FILE");
+  app.option("--report", options.report, "write what it found as JSON").shown_as("FILE");
+  if (!app.parse(argc, argv, std::cout)) return false;
+  if (!law.empty()) options.changes.settings.push_back("force.law=" + law);
+  if (!scene.empty()) options.changes.scene = find_scene_file(scene);
+  if (!numeric.empty()) {
+    options.changes.numeric = numeric == "double" ? NumericKind::float64 : NumericKind::fixed;
+  }
+  return true;
+}
+
+}  // namespace
+}  // namespace kerf
+
+int main(int argc, char** argv) {
+  return kerf::run_program("kerf-replay", [&] {
+    kerf::ReplayOptions options;
+    if (!kerf::parse_replay(argc, argv, options)) return 0;
+    return kerf::run_replay(options, kerf::catch_stop_signals());
+  });
+}

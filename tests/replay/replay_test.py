@@ -1,0 +1,172 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A recording is replayed to the bit, and what is wrong with one is named: runs controller, emulator, recorder and replay.
+
+    replay_test.py ROOT BIN"""
+import json
+import pathlib
+import shutil
+import struct
+import subprocess
+import sys
+import tempfile
+import unittest
+
+ROOT, BIN = (pathlib.Path(path).resolve() for path in (sys.argv.pop(1), sys.argv.pop(1)))
+HEADER = 4096  # bytes before the first row
+CRC32C = []
+for index in range(256):
+    value = index
+    for _ in range(8):
+        value = value >> 1 ^ (0x82F63B78 if value & 1 else 0)
+    CRC32C.append(value)
+
+
+def crc32c(data):
+    crc = 0xFFFFFFFF
+    for byte in data:
+        crc = crc >> 8 ^ CRC32C[(crc ^ byte) & 0xFF]
+    return crc ^ 0xFFFFFFFF
+
+
+def record(folder, scene, seconds, *options):
+    """Runs a scene in lock-step with its hand; returns controller's report."""
+    out, report, device = folder / "log", folder / "report.json", folder / "device"
+    name = f"replay-{folder.name}"
+    programs = [subprocess.Popen([BIN / "kerf-recorder", "--name", name, "--out", out], stdout=subprocess.DEVNULL),
+                subprocess.Popen([BIN / "kerf-emulator", "--lockstep", "--rate", "1000", "--socket", device, "--hand",
+                                  ROOT / "scenes/hands/touch.toml"], stdout=subprocess.DEVNULL)]
+    controller = subprocess.run([BIN / "kerf-controller", "--scene", scene, "--virtual", "--name", name, "--seconds", str(seconds),
+                                 "--torque-scale", "0.05,0.05,0.05", "--port", f"socket:{device}", "--report", report, *options],
+                                stdout=subprocess.DEVNULL)
+    for program in programs:
+        program.wait(timeout=60)
+    assert controller.returncode == 0
+    return json.loads(report.read_text())
+
+
+def replay(log, *options, code=0):
+    done = subprocess.run([BIN / "kerf-replay", log, *options], capture_output=True, text=True)
+    assert done.returncode == code, f"{done.returncode}: {done.stdout}{done.stderr}"
+    if code == 2:
+        assert done.stderr.count("\n") == 1, done.stderr
+        return done.stderr
+    return done.stdout
+
+
+class TestReplay(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.temporary = tempfile.TemporaryDirectory()
+        cls.run_folder = pathlib.Path(cls.temporary.name)
+        cls.scene = cls.run_folder / "own.toml"
+        cls.scene.write_text((ROOT / "scenes/phantom.toml").read_text())
+        cls.report = record(cls.run_folder, cls.scene, 2)
+        cls.log = cls.run_folder / "log"
+        cls.row = 496
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.temporary.cleanup()
+
+    def setUp(self):
+        self.copies = 0
+
+    def copy(self):
+        self.copies += 1
+        copy = self.run_folder / f"{self.id().split('.')[-1]}-{self.copies}"
+        shutil.copytree(self.log, copy)
+        return copy
+
+    def rows(self, log):
+        return (log / "ticks.npy").read_bytes()
+
+    def with_row(self, tick, offset, data):
+        """A copy of the recording with other bytes in one row, and the checksum that fits them."""
+        log = self.copy()
+        rows = bytearray(self.rows(log))
+        at = HEADER + (tick - 1) * self.row
+        rows[at + offset:at + offset + len(data)] = data
+        rows[at + self.row - 4:at + self.row] = struct.pack("<I", crc32c(rows[at + 8:at + self.row - 4]))
+        (log / "ticks.npy").write_bytes(rows)
+        return log
+
+    def test_a_run_is_replayed_to_the_bit(self):
+        found = replay(self.log)
+        self.assertIn("each equal to the last bit", found)
+        self.assertIn(self.report["output_hash"], found)
+        self.assertIn(self.report["volume_hash"], found)
+        self.assertGreater(self.report["removed_mm3"], 0.01)  # else it proves less
+
+    def test_the_scalar_kernels_give_the_same_bits(self):
+        self.assertIn(self.report["output_hash"], replay(self.log, "--kernels", "scalar"))
+        self.assertIn("--kernels mmx: not on this machine; use one of", replay(self.log, "--kernels", "mmx", code=2))
+
+    def test_the_scene_file_may_have_gone(self):
+        text = self.scene.read_text()
+        self.scene.unlink()
+        try:
+            self.assertIn("each equal", replay(self.log))
+        finally:
+            self.scene.write_text(text)
+
+    def test_another_input_is_found_at_its_tick(self):
+        encoder = struct.unpack_from("<i", self.rows(self.log), HEADER + 1500 * self.row + 264)[0]
+        found = replay(self.with_row(1501, 264, struct.pack("<i", encoder + 3)), code=1)
+        self.assertRegex(found, r"tick 1501 \(1\.501 s\), pose: encoder_counts\[0\] was -?\d+, is -?\d+")
+
+    def test_another_output_is_found_at_its_tick_and_stage(self):
+        log = self.with_row(1600, 172, struct.pack("<I", 12345))  # removed
+        self.assertIn("tick 1600 (1.600 s), cut: removed was 12345, is ", replay(log, code=1))
+        self.assertIn("each equal", replay(log, "--from", "1601"))
+        self.assertIn("1599 ticks, each equal", replay(log, "--until", "1599"))
+
+    def test_what_if(self):
+        out, plot, report = (self.run_folder / name for name in ("soft", "soft.svg", "soft.json"))
+        found = replay(self.log, "--set", "force.stiffness_n_per_mm=0.2", "--out", out, "--plot", plot, "--report", report)
+        self.assertRegex(found, r"peak force +\d+\.\d+ +\d+\.\d+ N")
+        self.assertNotIn(self.report["output_hash"], found)
+        self.assertIn("each equal", replay(out))  # a replay is a recording like any other
+        self.assertTrue(plot.read_text().startswith("<?xml"))
+        self.assertEqual(json.loads(report.read_text())["ticks"], len(self.rows(self.log)[HEADER:]) // self.row)
+        self.assertIn("holds a recording; choose another --out", replay(self.log, "--out", out, code=2))
+        self.assertIn("places of the tool", replay(self.log, "--numeric", "double"))
+        self.assertIn("did you mean", replay(self.log, "--set", "force.stifness_n_per_mm=1", code=2))
+        self.assertIn("places of the tool", replay(self.log, "--scene", ROOT / "scenes/touch.toml"))
+
+    def test_gaps_and_cuts(self):
+        log = self.copy()
+        rows = self.rows(log)
+        at = HEADER + 700 * self.row
+        (log / "ticks.npy").write_bytes(rows[:at] + rows[at + 9 * self.row:])
+        self.assertIn("stopped: ticks 701 to 709 were not recorded", replay(log, code=1))
+        (log / "ticks.npy").write_bytes(rows[:at + 100])
+        self.assertIn("700 ticks, each equal", replay(log))
+        (log / "ticks.npy").write_bytes(rows[:HEADER])
+        self.assertIn("0 rows; nothing to replay", replay(log, code=2))
+        (log / "ticks.npy").write_bytes(rows[:at + 50] + b"x" + rows[at + 51:])
+        self.assertIn("row 700 has a wrong checksum", replay(log, code=2))
+
+    def test_a_changed_scene_is_named_first(self):
+        log = self.copy()
+        scene = json.loads((log / "scene.json").read_text())
+        for key, value, place in [("force", {**scene["force"], "stiffness_n_per_mm": 0.123}, "force.stiffness_n_per_mm is 0.123 in "),
+                                  ("volumes", [{**scene["volumes"][0], "density_hash": "00"}], 'volumes[0].density_hash is "00" in')]:
+            (log / "scene.json").write_text(json.dumps({**scene, key: value}))
+            self.assertIn(place, replay(log, code=2))
+        del scene["source"]
+        (log / "scene.json").write_text(json.dumps(scene))
+        self.assertIn("does not say what the scene was loaded from", replay(log, code=2))
+        (log / "scene.json").write_text("[" * 100000)
+        self.assertIn("scene.json", replay(log, code=2))
+
+    def test_no_recording(self):
+        self.assertIn("give the folder of a recording", replay(self.run_folder / "none", code=2))
+        self.assertIn(f"give {self.log}", replay(self.run_folder, code=2))
+        log = self.copy()
+        manifest = json.loads((log / "manifest.json").read_text())
+        (log / "manifest.json").write_text(json.dumps({**manifest, "missed_before_start": 12}))
+        self.assertIn("the first 12 ticks of the run are not in it", replay(log, code=2))
+
+
+if __name__ == "__main__":
+    unittest.main()
