@@ -309,9 +309,9 @@ struct SceneTables {
 
   /// `[name]`; an empty table if the file has none.
   [[nodiscard]] SceneTable once(std::string_view name) const {
-    static const TomlNode nothing;
+    static const TomlNode kNothing;
     const TomlNode* node = root.find(name);
-    return {std::string(name), file, node == nullptr ? nothing : *node, keys};
+    return {std::string(name), file, node == nullptr ? kNothing : *node, keys};
   }
   /// All `[[name]]` in the order of the file.
   [[nodiscard]] std::vector<SceneTable> all(std::string_view name) const {

@@ -91,7 +91,7 @@ class ChangedBricks {
       for (std::int32_t part = 0; part < 64; ++part) {
         const int low_bit = 16 * (part / 4 % 4) + 2 * (part % 4);
         const std::uint64_t rows = std::uint64_t{0x0303} << low_bit;
-        const auto z = static_cast<std::size_t>(part / 16 * 2);
+        const auto z = 2 * static_cast<std::size_t>(part / 16);
         VoxelMask within{};
         within[z] = brick.voxels[z] & rows;
         within[z + 1] = brick.voxels[z + 1] & rows;
