@@ -18,7 +18,7 @@ constexpr std::size_t kDefaultMaterials = 4;
 
 /// Density at half-way to the next softer tissue; the default ones first.
 const std::vector<Material>& all_known() {
-  static const std::vector<Material> materials = {
+  static const std::vector<Material> kMaterials = {
       {.name = "none", .iso = 0.0, .machinability = 0.0, .colour = {0.0, 0.0, 0.0}},
       {.name = "enamel", .iso = 0.81, .machinability = 1.0, .colour = {0.91, 0.88, 0.80}},
       {.name = "dentin", .iso = 0.45, .machinability = 3.0, .colour = {0.80, 0.66, 0.42}},
@@ -26,7 +26,7 @@ const std::vector<Material>& all_known() {
       {.name = "bone", .iso = 0.40, .machinability = 4.0, .colour = {0.89, 0.83, 0.68}},
       {.name = "caries", .iso = 0.25, .machinability = 6.0, .colour = {0.42, 0.28, 0.14}},
       {.name = "amalgam", .iso = 0.90, .machinability = 2.5, .colour = {0.55, 0.56, 0.58}}};
-  return materials;
+  return kMaterials;
 }
 
 }  // namespace

@@ -76,12 +76,15 @@ KERF_METHODS(KERF_STEP)
 template <class N, class Work>
 decltype(auto) by_method(Method method, Work&& work) noexcept {
   switch (method) {
+// NOLINTBEGIN(bugprone-macro-parentheses,bugprone-branch-clone): a template's name; cases that do
+// not serve
 #define KERF_CASE(name, Step, serves)             \
   case Method::name:                              \
     if constexpr (serves) return work(Step<N>{}); \
     break;
     KERF_METHODS(KERF_CASE)
 #undef KERF_CASE
+    // NOLINTEND(bugprone-macro-parentheses,bugprone-branch-clone)
   }
   return work(GatherStep<N>{});  // serves always
 }

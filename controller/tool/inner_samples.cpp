@@ -165,7 +165,9 @@ class Columns {
 
  private:
   [[nodiscard]] std::size_t first_of(std::int32_t ix, std::int32_t iz) const {
-    return static_cast<std::size_t>((iz * across_ + ix) * (along_ + 1));
+    return (static_cast<std::size_t>(iz) * static_cast<std::size_t>(across_) +
+            static_cast<std::size_t>(ix)) *
+           (static_cast<std::size_t>(along_) + 1);
   }
 
   /// The columns of samples from `low` to `high`: first and one after the last.

@@ -337,7 +337,11 @@ class SiteGrid {
     return cell;
   }
   [[nodiscard]] std::size_t index_of(const std::array<int, 3>& cell) const {
-    return static_cast<std::size_t>((cell[2] * size_[1] + cell[1]) * size_[0] + cell[0]);
+    std::size_t index = 0;
+    for (std::size_t i = 3; i-- > 0;) {
+      index = index * static_cast<std::size_t>(size_[i]) + static_cast<std::size_t>(cell[i]);
+    }
+    return index;
   }
 
   std::span<const Site> sites_;

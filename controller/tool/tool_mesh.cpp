@@ -99,7 +99,8 @@ ToolMesh joined(std::span<const LooseTriangle> triangles, double scale, double n
       for (double& x : own) x = std::floor(x / noise);
       for (int step = 0; step < 27; ++step) {
         const int near = (step + 13) % 27;  // the corner's own cell first
-        const Cell cell = own + Cell{near % 3 - 1.0, near / 3 % 3 - 1.0, near / 9 - 1.0};
+        const auto beside = [&](int by) { return static_cast<double>(near / by % 3 - 1); };
+        const Cell cell = own + Cell{beside(1), beside(3), beside(9)};
         const auto at = known.find(cell);
         if (at == known.end()) continue;
         const ToolMesh::Point apart = mesh.points_mm[at->second] - scale * corner;
