@@ -97,7 +97,9 @@ template <class N>
 [[nodiscard]] constexpr auto fraction_of(CutWeight<N> part, CutWeight<N> whole) noexcept {
   if constexpr (N::kIsFixed) {
     const int spare = std::max(0, static_cast<int>(std::bit_width(whole)) - 33);
-    return static_cast<std::int64_t>(((part >> spare) << 30) / (whole >> spare));
+    // The 33 highest bits of a number above 0 are not 0.
+    const auto low = whole >> spare;  // NOLINTNEXTLINE(clang-analyzer-core.DivideZero)
+    return static_cast<std::int64_t>(((part >> spare) << 30) / low);
   } else {
     return part / whole;
   }

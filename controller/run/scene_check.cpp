@@ -288,7 +288,7 @@ std::string air_lines(const LoadedScene& scene, const SceneCosts& costs) {
   const auto slowest = std::min_element(speeds.begin(), speeds.end());
   char speed[32];
   std::snprintf(speed, sizeof speed, "%.2f", *slowest / 1000);
-  const std::string lines = "free_of_drag_m_per_s=" + std::string(speed) + "\n";
+  std::string lines = "free_of_drag_m_per_s=" + std::string(speed) + "\n";
   if (*slowest >= kHandSpeedMmPerS) return lines;
   const auto tool = static_cast<std::size_t>(slowest - speeds.begin());
   return lines + "note=tool " + scene.tools[tool].name +
