@@ -149,7 +149,7 @@ constexpr std::string_view kHead =
 |---|---|
 | `ticks.npy` | one row for each tick, the columns below, for NumPy as it is |
 | `manifest.json` | length of a tick, voxels, losses of the recorder and where they lie, how the run ended |
-| `scene.json` | the scene as it was loaded, every setting |
+| `scene.json` | the scene as it was loaded, every setting; `source` is what it was loaded from |
 
 Three lines of NumPy read it (`python/` is a reader with more, `examples/python/` uses it):
 
@@ -158,7 +158,7 @@ Three lines of NumPy read it (`python/` is a reader with more, `examples/python/
     print(np.abs(log["commanded_force_n"]).max(axis=0), "N")
 
 `log["position_mm"]` is an array of rows x 3. World millimetres, newtons at the device port, little-endian.
-`info` counts as lost what was published and is in no row, so the manifest says the same; a recorder that was
+`./kerf replay DIR/log` runs it again ([replay](replay.md)). `info` counts as lost what was published and is in no row, so the manifest says the same; a recorder that was
 killed leaves a manifest that says `running`, and all rows.
 
 This page is made from the table in `record/log_columns.cpp` by
