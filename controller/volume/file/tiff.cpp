@@ -225,6 +225,29 @@ void check_page(const Tiff& file) {
   }
 }
 
+/// Refuses a page whose number is below that of an earlier one, and keeps the highest.
+void check_order(Tiff& file, int& highest) {
+  const int number = file.page_number();
+  if (number < 0) return;
+  if (number < highest) {  // "The page numbers need not be ... in numerical order"
+    file.refuse_page(
+        "its PageNumber " + std::to_string(number) + " follows " + std::to_string(highest),
+        "save the pages in the order of their numbers");
+  }
+  highest = number;
+}
+
+/// Notes how the values of the first page, and so of all, are to be understood.
+void note_values(Tiff& file, Slices& slices) {
+  // "imaged as white", section 8: of the display.
+  if (file.number<std::uint16_t>(TIFFTAG_PHOTOMETRIC, 1) == PHOTOMETRIC_MINISWHITE) {
+    slices.say("it shows 0 as white, its values are taken as they are");
+  }
+  if (file.number<std::uint16_t>(TIFFTAG_COMPRESSION) == COMPRESSION_JPEG) {
+    slices.say("its pages are packed with loss (JPEG)");
+  }
+}
+
 /// Checks all pages; returns what they have in common.
 Slices slices_of(const fs::path& path) {
   Slices slices;
@@ -245,14 +268,7 @@ Slices slices_of(const fs::path& path) {
       continue;
     }
     check_page(file);
-    if (const int number = file.page_number(); number >= 0) {
-      if (number < highest_number) {  // "The page numbers need not be ... in numerical order"
-        file.refuse_page("its PageNumber " + std::to_string(number) + " follows " +
-                             std::to_string(highest_number),
-                         "save the pages in the order of their numbers");
-      }
-      highest_number = number;
-    }
+    check_order(file, highest_number);
     const std::int64_t width = file.number<std::uint32_t>(TIFFTAG_IMAGEWIDTH),
                        height = file.number<std::uint32_t>(TIFFTAG_IMAGELENGTH);
     const VoxelType type = page_type(file);
@@ -263,13 +279,7 @@ Slices slices_of(const fs::path& path) {
       resolution = {file.number<float>(TIFFTAG_XRESOLUTION),
                     file.number<float>(TIFFTAG_YRESOLUTION),
                     file.number<std::uint16_t>(TIFFTAG_RESOLUTIONUNIT, RESUNIT_INCH)};
-      // "imaged as white", section 8: of the display.
-      if (file.number<std::uint16_t>(TIFFTAG_PHOTOMETRIC, 1) == PHOTOMETRIC_MINISWHITE) {
-        slices.say("it shows 0 as white, its values are taken as they are");
-      }
-      if (file.number<std::uint16_t>(TIFFTAG_COMPRESSION) == COMPRESSION_JPEG) {
-        slices.say("its pages are packed with loss (JPEG)");
-      }
+      note_values(file, slices);
     } else if (width != slices.size[0] || height != slices.size[1] || type != slices.type) {
       file.refuse_page(text(width, height, type) + ", and the pages before have " +
                            text(slices.size[0], slices.size[1], slices.type),
