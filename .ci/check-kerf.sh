@@ -104,6 +104,9 @@ case $name in
     if [[ -n ${MEANWHILE:-} ]]; then mkdir -p "${MEANWHILE%/*}" && echo mine >"$MEANWHILE"; fi
     ;;
   lab)
+    trap 'stop=1' TERM
+    echo 'emulator --hand of lab' >>"$LAB/calls"
+    until [[ -z ${LONG:-} ]] || ((stop)); do sleep 0.02; done
     if ((!code)); then mkdir -p "$out" && touch "$out/report.json" "$out/frame-0001.png"; fi
     ;;
   bridge)
@@ -156,11 +159,11 @@ nothing_survives() {
     if grep -qs '^State:[[:space:]]*[^[:space:]ZX]' "/proc/$pid/status"; then return 1; fi
   done <"$lab/pids"
 }
-# interrupted SIGNAL: a demo that is hit in its middle ends within three seconds.
+# interrupted SIGNAL CODE OPTION...: a demo that is hit in its middle ends with CODE, long before its time.
 interrupted() {
   rm -f "$lab/pids" "$lab/calls" "$lab/segment"
   # A background process ignores SIGINT and SIGQUIT, and so does all that runs below one.
-  env --default-signal=INT,QUIT "$root/kerf" demo --seconds 60 --out "$lab/out" >"$lab/said" 2>&1 &
+  env --default-signal=INT,QUIT "$root/kerf" demo --seconds 60 --out "$lab/out" "${@:3}" >"$lab/said" 2>&1 &
   local demo=$! code=0 began
   until [[ -e $lab/calls ]] && called '^emulator'; do sleep 0.05; done
   sleep 0.2
@@ -371,6 +374,10 @@ expect 'nothing survives it' nothing_survives
 rm -rf out
 expect 'nobody has to read what it says' eval '"$root/kerf" demo --seconds 1 --out out | true'
 expect 'to keep its results' kept "$all"
+expect 'so does one on two machines' with LONG=1 interrupted INT 130 --two-machines
+expect 'it keeps its results, too' says "^kept in $lab/out: forces.svg report.json, 1 frame"
+expect 'nothing survives it' nothing_survives
+rm -rf out
 expect 'a terminated demo ends with 143' interrupted TERM 143
 expect 'nothing survives a termination' nothing_survives
 for signal in PWR QUIT RTMIN+3; do
@@ -430,7 +437,7 @@ expect 'a test needs a pattern' kerf_gives 2 test -R ''
 expect 'as it says' one_line 'kerf: test: -R: no value; see ./kerf --help'
 expect 'an unknown program is refused' kerf_gives 2 polish
 expect 'and the known ones are listed' one_line "kerf: polish: unknown; known are \
-setup demo test bench sweep doctor docs package bridge controller emulator record recorder visualizer"
+setup demo test bench sweep doctor docs package bridge controller emulator lab record recorder visualizer"
 # What the script has a case for, but lab, which is a program too.
 expect 'all of them' test "$(sed -n '/^case $command/,/^esac/s/^  \([a-z]*\)).*/\1/p' "$root/kerf" | grep -vx lab | sort)" == \
   "$("$root/kerf" --help | sed -n 's|^  \./kerf \([a-z]*\) .*|\1|p' | sort)"

@@ -132,11 +132,13 @@ class Demo:
             "--size", options.size, *options.link, *["--headless"] * options.headless, *words,
             *(["--out", self.results] if self.out else [])])  # it speaks for itself
         code = self.controller.wait()
-        if self.code_of_signal is not None:
-            return self.code_of_signal
         if code == 77 or code == 2:
-            return code
-        return self.keep(1 if crashed("lab", exit_code(self.controller)) else code)
+            return self.code_of_signal or code
+        if self.code_of_signal is None and crashed("lab", exit_code(self.controller)):
+            code = 1
+        self.finishing = True
+        code = self.keep(code)
+        return code if self.code_of_signal is None else self.code_of_signal
 
     def find_meeting_point(self):
         """`meet` exists once the emulator is ready; `ask` and `offer` are the options of controller and emulator for it."""

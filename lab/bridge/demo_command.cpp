@@ -10,6 +10,7 @@
 #include <ostream>
 #include <sstream>
 #include <string>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -52,6 +53,14 @@ bool wait_for(Child& child, seconds patience, Condition there) {
     pause(std::chrono::milliseconds(5));
   }
   return false;
+}
+
+/// Waits until `child` has ended or it took too long, also after a signal.
+void let_end(Child& child, seconds patience) {
+  const auto end = std::chrono::steady_clock::now() + patience;
+  while (!child.ended() && std::chrono::steady_clock::now() < end) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
 }
 
 [[nodiscard]] bool has_display() {
@@ -179,6 +188,7 @@ class Demo {
   }
 
   /// The controller's exit code; 1 if a part of the demo ended before its time, which is reported.
+  /// A signal ends the hand's work, and all parts write their results.
   int wait_for_end() {
     while (!controller_->ended()) {
       for (const auto& [name, part] :
@@ -190,18 +200,18 @@ class Demo {
         if (part == nullptr || !broken_.empty()) continue;
         if (part->ended().value_or(0) != 0) broken_ = end_of(name, *part);
       }
-      if (!broken_.empty()) controller_->signal(SIGTERM);
-      pause(std::chrono::milliseconds(20));
+      if (!broken_.empty() || stop_requested()) controller_->signal(SIGTERM);
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
     }
     const int code = *controller_->ended();
     if (broken_.empty() && code > 128) broken_ = end_of("kerf-controller", *controller_);
     if (!broken_.empty()) return 1;
     if (window_) visualizer_->signal(SIGTERM);
-    wait_for(*visualizer_, seconds(20), [] { return false; });
+    let_end(*visualizer_, seconds(20));
     join_->signal(SIGTERM);
-    wait_for(*join_, seconds(5), [] { return false; });
-    wait_for(*emulator_, seconds(5), [] { return false; });
-    if (recorder_) wait_for(*recorder_, seconds(10), [] { return false; });
+    let_end(*join_, seconds(5));
+    let_end(*emulator_, seconds(5));
+    if (recorder_) let_end(*recorder_, seconds(10));
     return code;
   }
 
