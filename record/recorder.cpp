@@ -93,7 +93,7 @@ constexpr auto kConnectPeriod = std::chrono::milliseconds(50);
 
 [[nodiscard]] std::string_view reason(Lifecycle lifecycle, bool stopped) noexcept {
   if (lifecycle == Lifecycle::clean_end) return "clean end";
-  if (lifecycle == Lifecycle::fault) return "fault";
+  if (lifecycle == Lifecycle::fault) return kFault;
   return stopped ? "stopped" : "controller gone";
 }
 

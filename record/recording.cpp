@@ -130,6 +130,7 @@ RecordSummary summarise(const std::filesystem::path& folder) {
   out.missed_before_start = manifest.missed_before_start;
   std::uint64_t next_seq = 2 * manifest.missed_before_start + 2;  // of index i: 2 i + 2
   std::uint32_t fault = 0;
+  std::uint64_t stale_in_a_row = 0;
   log.for_each([&](const TickRecord& record) {
     if (out.last_tick == 0) out.first_tick = record.tick;
     if (record.seq > next_seq) out.lost_ticks += (record.seq - next_seq) / 2;
@@ -137,7 +138,9 @@ RecordSummary summarise(const std::filesystem::path& folder) {
     out.last_tick = record.tick;
     out.contact_ticks += (record.flags & kFlagContact) != 0 ? 1 : 0;
     out.shaft_ticks += (record.flags & kFlagShaft) != 0 ? 1 : 0;
-    out.stale_ticks += (record.flags & kFlagStaleInput) != 0 ? 1 : 0;
+    const bool stale = (record.flags & kFlagStarted) != 0 && (record.flags & kFlagStaleInput) != 0;
+    out.stale_ticks += stale ? 1 : 0;
+    stale_in_a_row = stale ? stale_in_a_row + 1 : 0;
     out.faults += record.fault != 0 && record.fault != fault ? 1 : 0;
     fault = record.fault;
     out.missed_deadlines = std::max(out.missed_deadlines, record.missed_deadlines);
@@ -153,6 +156,8 @@ RecordSummary summarise(const std::filesystem::path& folder) {
       out.energy_mj[i] = energy_mj_of_steps(record.*kEnergyColumns[i]);
     }
   });
+  // The run ended because its device had gone: as in its report, that is no loss on the way.
+  if (manifest.end_reason == kFault) out.stale_ticks -= stale_in_a_row;
   if (manifest.complete()) out.lost_ticks = std::max(out.lost_ticks, manifest.lost_ticks);
   if (out.rows != 0) {
     out.seconds = static_cast<double>(out.last_tick - out.first_tick + 1) * manifest.tick_ns * 1e-9;

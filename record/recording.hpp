@@ -19,6 +19,7 @@ inline constexpr std::string_view kTickLogName = "ticks.npy";
 inline constexpr std::string_view kManifestName = "manifest.json";
 inline constexpr std::string_view kSceneName = "scene.json";
 inline constexpr std::string_view kStillRunning = "running";
+inline constexpr std::string_view kFault = "fault";     ///< the run did not end as it was asked to
 inline constexpr std::string_view kNoRoom = "no room";  ///< the disk was full
 
 /// Facts about a log beside its rows.
@@ -56,8 +57,8 @@ struct RecordSummary {
   std::uint64_t missed_before_start = 0;  ///< published and gone before the recorder came
   std::uint64_t contact_ticks = 0;
   std::uint64_t shaft_ticks = 0;  ///< shaft or handpiece touched
-  std::uint64_t stale_ticks = 0;
-  std::uint64_t faults = 0;  ///< changes of the fault code to another one than 0
+  std::uint64_t stale_ticks = 0;  ///< since the device was taken in hand, before it had gone
+  std::uint64_t faults = 0;       ///< changes of the fault code to another one than 0
   std::uint32_t missed_deadlines = 0;
   std::uint32_t lost_packets = 0;
   std::uint32_t refused_packets = 0;

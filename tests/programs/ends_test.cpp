@@ -9,6 +9,7 @@
 
 #include <doctest/doctest.h>
 
+#include "record/recording.hpp"
 #include "tests/json.hpp"
 #include "tests/programs/pair.hpp"
 
@@ -31,8 +32,14 @@ TEST_CASE("kill -9 of the emulator: fault in the report, exit 1 after 2000 ticks
       },
       20s));
   const auto connection = kerf::connect_segment(pair.name);
+  kerf::test::Process recorder({kerf::test::kBin + "/kerf-recorder", "--name", pair.name, "--out",
+                                (pair.folder / "log").string()},
+                               pair.folder / "recorder.log");
+  REQUIRE(eventually([&] { return std::filesystem::exists(pair.folder / "log/manifest.json"); },
+                     20s));
   pair.emulator->signal(SIGKILL);
   CHECK(pair.controller->wait() == 1);
+  CHECK(recorder.wait() == 0);
   const auto report = pair.report();
   const auto met = [&](const char* name) {
     return std::ranges::any_of(report["faults"],
@@ -41,6 +48,7 @@ TEST_CASE("kill -9 of the emulator: fault in the report, exit 1 after 2000 ticks
   CHECK(met("stale_input"));
   CHECK(met("device_gone"));
   CHECK(report["stale_ticks"] < 2000);  // without the silence after its end
+  CHECK(report["stale_ticks"] == kerf::summarise(pair.folder / "log").stale_ticks);
 
   // The segment outlives the controller: in it, from 20 silent ticks on there is no force.
   const kerf::SegmentReader& reader = connection.reader();

@@ -101,6 +101,36 @@ TEST_CASE("info and the manifest agree on losses, before the first row and behin
   CHECK(lost_of(kStillRunning) == kLost);  // a killed recorder: by the rows alone
 }
 
+TEST_CASE("stale ticks are those of the run, without the silence of a device that has gone") {
+  const RuntimeFolder folder;
+  const NoiseVolume volume({8, 8, 8});
+  SegmentWriter writer = SegmentWriter::create(spec_of(volume));
+  const SegmentReader reader = SegmentReader::map(writer.fd());
+  std::filesystem::create_directories(folder / "log");
+  TickLogWriter log(folder / "log" / std::string(kTickLogName));
+  Recorder recorder(reader, log);
+  const auto publish = [&](Tick first, Tick last, std::uint32_t flags) {
+    for (Tick tick = first; tick <= last; ++tick) {
+      TickRecord record = made_up_tick(tick, 100);
+      record.flags = flags;
+      publish_tick(writer, record);
+    }
+  };
+  publish(1, 10, kFlagStaleInput);  // nobody has taken the device in hand
+  publish(11, 13, kFlagStarted | kFlagStaleInput);
+  publish(14, 20, kFlagStarted);
+  publish(21, 70, kFlagStarted | kFlagStaleInput);
+  recorder.drain();
+  log.sync();
+  const auto stale_of = [&](std::string_view end_reason) {
+    std::filesystem::remove(folder / "log/manifest.json");
+    write_manifest(folder / "log", reader.info(), recorder, log.rows(), end_reason);
+    return summarise(folder / "log").stale_ticks;
+  };
+  CHECK(stale_of(kFault) == 3);
+  CHECK(stale_of("clean end") == 53);
+}
+
 TEST_CASE("the CSV has a line per tick and reads back to the same numbers") {
   const RuntimeFolder folder;
   record(folder / "log", 50);

@@ -102,7 +102,7 @@ REPORTS = [
     ("Summary of a log", "`./kerf record info LOG --report FILE`.", [("record/recording.cpp", "Json figures(")], [], [
         ("rows, first_tick, last_tick, seconds", "", "what the log covers"),
         ("lost_ticks, missed_before_start, end_reason", "", "as above; `end_reason` of a log that was cut says after which row"),
-        ("contact_ticks, shaft_ticks, stale_ticks, faults", "", "ticks of that kind; faults that latched"),
+        ("contact_ticks, shaft_ticks, stale_ticks, faults", "", "ticks of that kind, `stale_ticks` as in the report of the controller; faults that latched"),
         ("missed_deadlines, lost_packets, refused_packets", "", "at the end of the log"),
         ("peak_force_n, deepest_mm", "N, mm", "highest force, greatest depth"),
         ("removed_mm3", "mm3", "in all"),
