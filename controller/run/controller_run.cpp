@@ -290,20 +290,25 @@ void name_law_faults(const LoadedScene& scene, const EventList& faults) {
 }
 
 /// Warns once of each fault whose name does not show the way out.
-void explain_faults(const EventList& faults) {
-  constexpr std::array<std::pair<Fault, const char*>, 2> kWhy{
+void explain_faults(const EventList& faults, const std::string& port) {
+  const bool is_emulated = port.starts_with("socket:") || port.starts_with("udp:");
+  const std::array<std::pair<Fault, const char*>, 2> why{
       {{Fault::wrong_dock,
         ": the device rested parked elsewhere than in its first calibration, and the motors went "
         "off; rest it there, or start again if it lies there"},
        {Fault::sparse_input,
-        ": reports came more than 5 ms apart again and again, and the motors went off; see to the "
-        "cable, and to what else this machine does (docs/real-time.md)"}}};
-  for (const auto& [fault, why] : kWhy) {
+        is_emulated
+            ? ": the emulator's reports came more than 5 ms apart again and again, and the motors "
+              "went off; if no fault script held them back, its machine is too busy for real time: "
+              "end what else runs on it, or run in lock-step (--virtual)"
+            : ": reports came more than 5 ms apart again and again, and the motors went off; see "
+              "to the cable, and to what else this machine does (docs/real-time.md)"}}};
+  for (const auto& [fault, way_out] : why) {
     const auto first = std::ranges::find(
         faults.kept(), std::string_view(fault_name(fault)),
         [](const EventList::Event& event) { return std::string_view(event.name); });
     if (first == faults.kept().end()) continue;
-    log_warning(std::string(first->name) + " at tick " + std::to_string(first->tick) + why);
+    log_warning(std::string(first->name) + " at tick " + std::to_string(first->tick) + way_out);
   }
 }
 
@@ -362,7 +367,7 @@ int run_with_device(const ControllerOptions& options, std::int64_t began_ns, Run
   segment.set_lifecycle(clean ? Lifecycle::clean_end : Lifecycle::fault);
   report.end = text_of(end);
   name_law_faults(scene, report.record.faults);
-  explain_faults(report.record.faults);
+  explain_faults(report.record.faults, start.port_text);
   report.removed_mm3 = removed_mm3(scene, report.record);
   report.materials = scores_of(scene, servo, report.record);
   report.workspace_scale = scene.device.workspace_scale;

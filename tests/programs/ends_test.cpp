@@ -35,8 +35,8 @@ TEST_CASE("kill -9 of the emulator: fault in the report, exit 1 after 2000 ticks
   kerf::test::Process recorder({kerf::test::kBin + "/kerf-recorder", "--name", pair.name, "--out",
                                 (pair.folder / "log").string()},
                                pair.folder / "recorder.log");
-  REQUIRE(eventually([&] { return std::filesystem::exists(pair.folder / "log/manifest.json"); },
-                     20s));
+  REQUIRE(
+      eventually([&] { return std::filesystem::exists(pair.folder / "log/manifest.json"); }, 20s));
   pair.emulator->signal(SIGKILL);
   CHECK(pair.controller->wait() == 1);
   CHECK(recorder.wait() == 0);
@@ -66,6 +66,19 @@ TEST_CASE("kill -9 of the emulator: fault in the report, exit 1 after 2000 ticks
   }
   CHECK(silent > 1900);
   CHECK_FALSE(connection.alive());
+}
+
+TEST_CASE("late reports of an emulator: the warning names its busy machine, not a cable") {
+  Pair pair;
+  pair.scene = kerf::test::small_scene(pair.folder);
+  pair.start("touch.toml", {"--virtual", "--seconds", "2"},
+             {"--lockstep", "--fault", kerf::test::kScenes + "/../hil/faults/sparse_reports.toml"});
+  CHECK(pair.controller->wait() == 1);
+  const std::string said = pair.controller->output();
+  CAPTURE(said);
+  CHECK(said.find("warning: sparse_input at tick") != std::string::npos);
+  CHECK(said.find("its machine is too busy for real time") != std::string::npos);
+  CHECK(said.find("cable") == std::string::npos);
 }
 
 TEST_CASE("SIGINT, SIGTERM and SIGHUP end in order: exit 0, a report, no socket left") {
