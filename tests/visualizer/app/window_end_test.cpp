@@ -105,3 +105,28 @@ TEST_CASE("when the X server dies the window ends with one line, and the control
     CHECK(fs::exists(options.out / "frame-0001.png"));
   }
 }
+
+TEST_CASE("a window says two minutes and ten seconds before its run ends that it will") {
+  if (!have("Xvfb") || !have("xdotool")) return;
+  const Screen screen;
+  Controller controller;
+  controller.take_in_hand();
+  controller.tick();
+  Process window(
+      {KERF_TEST_BIN "/kerf-visualizer", "--name", "test", "--mute", "--ends-after", "131"},
+      screen.folder / "said");
+  act("search --sync --onlyvisible --name 'kerf: test'");
+  CHECK(window.output().find("this run ends") == std::string::npos);
+  constexpr int kTicksPerS = 1000;
+  int now_s = 0;
+  for (const int left_s : {120, 10}) {
+    for (; now_s < 131 - left_s; ++now_s) {
+      for (int i = 0; i < kTicksPerS; ++i) controller.tick();
+    }
+    const std::string words = "this run ends in " + std::to_string(left_s) +
+                              " s: it was given 131 s, by --seconds or by default; give --seconds "
+                              "N for more\n";
+    CHECK(eventually([&] { return window.output().find(words) != std::string::npos; },
+                     std::chrono::seconds(30)));
+  }
+}

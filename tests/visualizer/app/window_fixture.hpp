@@ -48,6 +48,8 @@ class Controller {
   int undos() { return asked(CommandKind::undo); }
   /// From the next tick on: the last stroke can be undone.
   void offer_undo() { flags_ = kFlagUndoable; }
+  /// From the next tick on: the device has been taken in hand.
+  void take_in_hand() { flags_ = kFlagStarted; }
   /// How often it asked for a reset since the last call; forgets the tools that it asked for.
   int resets() { return asked(CommandKind::reset); }
   void say(Lifecycle lifecycle) { writer_.set_lifecycle(lifecycle); }
