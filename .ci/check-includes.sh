@@ -130,7 +130,7 @@ broken() {
     grep -vE '^controller/volume/file/(foreign_invesalius|voxel_files).cpp:'
   includes '<(nifti/|tiff)' "${programs[@]}" | grep -vE '^controller/volume/file/(nifti|tiff)\.cpp:'
   includes '<(boost|openssl)/' "${programs[@]}" | grep -vE '^bridge/(net|join|serve)/'
-  includes '<lz4' "${programs[@]}" | grep -v '^bridge/wire/compression.cpp:'
+  includes '<lz4' "${programs[@]}" | grep -vE '^(bridge/wire/compression|record/mcap_file).cpp:'
   includes '<igtl' "${programs[@]}" | grep -v '^bridge/igtl/'
   includes '<qrencode' "${programs[@]}" | grep -v '^bridge/serve/serve.cpp:'
 }

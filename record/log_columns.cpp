@@ -143,7 +143,7 @@ constexpr std::string_view kHead =
     R"(# The log of a run
 
 `kerf-recorder` writes every tick of a running controller into a folder; `./kerf demo --out DIR` keeps it as
-`DIR/log`. `./kerf record info DIR/log` sums it up, `record plot` draws it, `record export` makes text of it.
+`DIR/log`. `./kerf record info DIR/log` sums it up, `record plot` draws it, `record export` makes CSV or MCAP of it.
 
 | file | what |
 |---|---|
@@ -160,6 +160,22 @@ Three lines of NumPy read it (`python/` is a reader with more, `examples/python/
 `log["position_mm"]` is an array of rows x 3. World millimetres, newtons at the device port, little-endian.
 `./kerf replay DIR/log` runs it again ([replay](replay.md)). `info` counts as lost what was published and is in no row, so the manifest says the same; a recorder that was
 killed leaves a manifest that says `running`, and all rows.
+
+## For other tools
+
+    ./kerf record export DIR/log --mcap run.mcap
+    ./kerf record export DIR/log --csv run.csv
+
+MCAP opens in Foxglove and its open forks, in PlotJuggler and with ROS 2 (`ros2 bag`); the definitions of the messages are in
+the file. Times are `start_ns`.
+
+| topic | message | rate |
+|---|---|---|
+| `/kerf/tick` | `kerf_msgs/msg/Tick`: all columns below, by their names | every tick |
+| `/kerf/tip` | `geometry_msgs/msg/PoseStamped`: the tool's tip in metres, in frame `scene`; from docking on | 100 Hz |
+| `/kerf/force` | `geometry_msgs/msg/WrenchStamped`: `commanded_force_n`, in frame `device`, and `tip_torque_n_mm` in N m | 100 Hz |
+
+Chunks are packed by LZ4, and `--unpacked` leaves them as they are.
 
 This page is made from the table in `record/log_columns.cpp` by
 

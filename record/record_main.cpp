@@ -4,6 +4,7 @@
 
 #include "record/force_plot.hpp"
 #include "record/log_columns.hpp"
+#include "record/mcap_export.hpp"
 #include "record/recording.hpp"
 #include "shared/posix/atomic_file.hpp"
 #include "shared/posix/program.hpp"
@@ -13,13 +14,15 @@
 namespace kerf {
 namespace {
 
-/// `info DIR`, `plot DIR --out FILE.svg`, `export DIR --csv FILE`, `columns`. Bad input throws.
+/// `info DIR`, `plot DIR --out FILE.svg`, `export DIR --csv FILE` or `--mcap FILE`, `columns`. Bad
+/// input throws.
 int run_record(int argc, char** argv) {
   CommandLine app("Looks at what kerf-recorder wrote.", "kerf-record", KERF_VERSION);
   std::filesystem::path folder;
   std::filesystem::path report;
   std::filesystem::path svg;
-  std::filesystem::path csv;
+  std::filesystem::path csv, mcap;
+  bool unpacked = false;
   const auto add_command = [&](const char* name, const char* what) {
     Arguments command = app.command(name, what);
     command.option("DIR", folder, "folder of a recording").required();
@@ -29,8 +32,10 @@ int run_record(int argc, char** argv) {
   info.option("--report", report, "write the figures as JSON");
   Arguments plot = add_command("plot", "forces and penetration over time, as SVG");
   plot.option("--out", svg, "the SVG file").required();
-  Arguments table = add_command("export", "every tick as a line of text");
-  table.option("--csv", csv, "the CSV file").required();
+  Arguments table = add_command("export", "every tick for other programs: a line of text, or MCAP");
+  table.option("--csv", csv, "as CSV").shown_as("FILE");
+  table.option("--mcap", mcap, "as MCAP, for Foxglove, PlotJuggler and ROS 2").shown_as("FILE");
+  table.flag("--unpacked", unpacked, "the MCAP without LZ4, for readers that have none");
   const Arguments columns = app.command("columns", "what each column of a log says, as a page");
   if (!app.parse(argc, argv, std::cout)) return 0;
   if (columns.chosen()) std::cout << log_page();
@@ -44,7 +49,13 @@ int run_record(int argc, char** argv) {
     plot_forces(folder, svg);
     if (!is_stream(svg)) std::cout << svg.string() << ": written\n";
   }
-  if (table.chosen()) export_csv(folder, csv);
+  if (table.chosen() && csv.empty() && mcap.empty()) {
+    throw UsageError("export: as what? give --csv FILE or --mcap FILE");
+  }
+  if (!csv.empty()) export_csv(folder, csv);
+  if (!mcap.empty()) {
+    export_mcap(folder, mcap, unpacked ? McapWriter::Packing::none : McapWriter::Packing::lz4);
+  }
   return 0;
 }
 

@@ -53,8 +53,9 @@ Json json_of(const SceneSource& source) {
     out["settings"].push_back(setting.key + "=" + setting.value);
   }
   if (given.volume_file) {
-    const bool phantom = is_phantom({.file = given.volume_file->string()});
-    out["volume"] = (phantom ? *given.volume_file : absolute_path(*given.volume_file)).string();
+    VolumeSpec volume;
+    volume.file = given.volume_file->string();
+    out["volume"] = is_phantom(volume) ? volume.file : absolute_path(*given.volume_file).string();
   }
   put(out, "spacing_mm", given.spacing_mm);
   put(out, "override_spacing_mm", given.override_spacing_mm);

@@ -12,6 +12,9 @@ import tempfile
 import unittest
 
 ROOT, BIN = (pathlib.Path(path).resolve() for path in (sys.argv.pop(1), sys.argv.pop(1)))
+sys.path.insert(0, str(ROOT / "tests/record"))
+from lockstep_run import record
+
 HEADER = 4096  # bytes before the first row
 CRC32C = []
 for index in range(256):
@@ -26,22 +29,6 @@ def crc32c(data):
     for byte in data:
         crc = crc >> 8 ^ CRC32C[(crc ^ byte) & 0xFF]
     return crc ^ 0xFFFFFFFF
-
-
-def record(folder, scene, seconds, *options):
-    """Runs a scene in lock-step with its hand; returns controller's report."""
-    out, report, device = folder / "log", folder / "report.json", folder / "device"
-    name = f"replay-{folder.name}"
-    programs = [subprocess.Popen([BIN / "kerf-recorder", "--name", name, "--out", out], stdout=subprocess.DEVNULL),
-                subprocess.Popen([BIN / "kerf-emulator", "--lockstep", "--rate", "1000", "--socket", device, "--hand",
-                                  ROOT / "scenes/hands/touch.toml"], stdout=subprocess.DEVNULL)]
-    controller = subprocess.run([BIN / "kerf-controller", "--scene", scene, "--virtual", "--name", name, "--seconds", str(seconds),
-                                 "--torque-scale", "0.05,0.05,0.05", "--port", f"socket:{device}", "--report", report, *options],
-                                stdout=subprocess.DEVNULL)
-    for program in programs:
-        program.wait(timeout=60)
-    assert controller.returncode == 0
-    return json.loads(report.read_text())
 
 
 def replay(log, *options, code=0):
@@ -60,7 +47,7 @@ class TestReplay(unittest.TestCase):
         cls.run_folder = pathlib.Path(cls.temporary.name)
         cls.scene = cls.run_folder / "own.toml"
         cls.scene.write_text((ROOT / "scenes/phantom.toml").read_text())
-        cls.report = record(cls.run_folder, cls.scene, 2)
+        cls.report = record(ROOT, BIN, cls.run_folder, cls.scene, 2)
         cls.log = cls.run_folder / "log"
         cls.row = 496
 

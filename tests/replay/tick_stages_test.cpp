@@ -17,11 +17,20 @@ using namespace kerf;
 
 namespace {
 
-const std::set<std::string_view> kGiven{
-    "seq",           "tick",         "start_ns",        "period_error_ns",
-    "execution_ns",  "raw",          "stale",           "missed_deadlines",
-    "lost_packets",  "last_command", "refused_packets", "command",
-    "crc32c",        "command_argument"};
+const std::set<std::string_view> kGiven{"seq",
+                                        "tick",
+                                        "start_ns",
+                                        "period_error_ns",
+                                        "execution_ns",
+                                        "raw",
+                                        "stale",
+                                        "missed_deadlines",
+                                        "lost_packets",
+                                        "last_command",
+                                        "refused_packets",
+                                        "command",
+                                        "crc32c",
+                                        "command_argument"};
 
 }  // namespace
 

@@ -89,7 +89,7 @@ Order order_of(const std::vector<DicomSlice>& slices) {
 }  // namespace
 
 std::string name_of(const DicomSlice& slice) {
-  const std::string file = slice.file->path.filename().string();
+  std::string file = slice.file->path.filename().string();
   if (slice.file->frames.size() == 1) return file;
   return "frame " + std::to_string(slice.frame->index + 1) + " of " + file;
 }

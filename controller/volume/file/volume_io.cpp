@@ -128,8 +128,8 @@ void set_grid(const fs::path& path, const std::array<std::int64_t, 3>& size, Sou
 void set_origin(const fs::path& path, const std::array<double, 3>& origin_mm,
                 SourceVolume& volume) {
   for (const double o : origin_mm) {
-    constexpr double kFarthest_mm = 1e6;
-    if (std::abs(o) <= kFarthest_mm) continue;
+    constexpr double kFarthestMm = 1e6;
+    if (std::abs(o) <= kFarthestMm) continue;
     throw LoadError(path.string() + ": its origin is " +
                     (std::isfinite(o) ? "farther than 1 km" : "not a number of mm") +
                     "; correct the header, or leave it out");

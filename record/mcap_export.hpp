@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+
+#include "record/mcap_file.hpp"
+
+namespace kerf {
+
+/// Writes the recording in `folder` as MCAP, for Foxglove, PlotJuggler and ROS 2: messages in CDR,
+/// whose definitions are in the file. Whole or not at all, in constant memory but for the index.
+///
+///   /kerf/tick    kerf_msgs/msg/Tick            every column of every tick, in their order
+///   /kerf/tip     geometry_msgs/msg/PoseStamped    the tool's tip in metres, from docking on
+///   /kerf/force   geometry_msgs/msg/WrenchStamped  the commanded force, in the device's axes
+///
+/// Tip and force come 100 times a second: the tick has all of them. Times are `start_ns`. Throws
+/// `RecordError`, or `FileError` if the file cannot be written.
+void export_mcap(const std::filesystem::path& folder, const std::filesystem::path& mcap,
+                 McapWriter::Packing packing);
+
+}  // namespace kerf

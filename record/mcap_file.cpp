@@ -1,0 +1,233 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "record/mcap_file.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstring>
+#include <stdexcept>
+#include <utility>
+
+#include <lz4frame.h>
+#include <zlib.h>
+
+namespace kerf {
+namespace {
+
+constexpr std::string_view kMagic{"\x89MCAP0\r\n", 8};
+
+enum Opcode : std::uint8_t {
+  header = 0x01,
+  footer = 0x02,
+  schema = 0x03,
+  channel_record = 0x04,
+  message_record = 0x05,
+  chunk_record = 0x06,
+  message_index = 0x07,
+  chunk_index = 0x08,
+  statistics = 0x0b,
+  summary_offset = 0x0e,
+  data_end = 0x0f
+};
+
+std::uint32_t crc(std::string_view bytes, std::uint32_t before = 0) {
+  return static_cast<std::uint32_t>(
+      crc32(before, reinterpret_cast<const Bytef*>(bytes.data()), static_cast<uInt>(bytes.size())));
+}
+
+/// A map of numbers behind the length of its bytes.
+void put_map(McapBytes& out, const std::map<std::uint16_t, std::uint64_t>& map) {
+  out.number(
+      static_cast<std::uint32_t>(map.size() * (sizeof(std::uint16_t) + sizeof(std::uint64_t))));
+  for (const auto& [key, value] : map) {
+    out.number(key);
+    out.number(value);
+  }
+}
+
+}  // namespace
+
+std::size_t McapBytes::begin(std::uint8_t opcode) {
+  number(opcode);
+  number(std::uint64_t{0});
+  return bytes_.size();
+}
+
+void McapBytes::end(std::size_t begun) {
+  const std::uint64_t length = bytes_.size() - begun;
+  std::memcpy(bytes_.data() + begun - sizeof length, &length, sizeof length);
+}
+
+McapWriter::McapWriter(ByteSink sink, std::string_view profile, std::string_view library,
+                       Packing packing)
+    : sink_(std::move(sink)), packing_(packing) {
+  McapBytes bytes;
+  bytes.raw(kMagic);
+  const std::size_t begun = bytes.begin(header);
+  bytes.text(profile);
+  bytes.text(library);
+  bytes.end(begun);
+  put(bytes.bytes());
+}
+
+void McapWriter::put(std::string_view bytes) {
+  sink_(bytes);
+  written_ += bytes.size();
+}
+
+std::uint16_t McapWriter::add(const Channel& channel) {
+  const auto id = static_cast<std::uint16_t>(counts_.size() + 1);
+  McapBytes bytes;
+  std::size_t begun = bytes.begin(schema);
+  bytes.number(id);
+  bytes.text(channel.schema);
+  bytes.text(channel.schema_encoding);
+  bytes.text(channel.definition);
+  bytes.end(begun);
+  schemas_ += bytes.bytes();
+  bytes.clear();
+  begun = bytes.begin(channel_record);
+  bytes.number(id);
+  bytes.number(id);  // of the schema
+  bytes.text(channel.topic);
+  bytes.text(channel.encoding);
+  bytes.number(std::uint32_t{0});  // no metadata
+  bytes.end(begun);
+  channels_ += bytes.bytes();
+  counts_[id] = 0;
+  return id;
+}
+
+void McapWriter::message(std::uint16_t channel, std::uint64_t time_ns, std::string_view data) {
+  if (chunk_.size() == 0) {
+    chunk_.raw(chunks_.empty() ? schemas_ + channels_ : std::string());
+    first_ns_ = time_ns;
+    if (chunks_.empty()) begin_ns_ = time_ns;
+  }
+  last_ns_ = end_ns_ = time_ns;
+  index_[channel].emplace_back(time_ns, chunk_.size());
+  const std::size_t begun = chunk_.begin(message_record);
+  chunk_.number(channel);
+  chunk_.number(static_cast<std::uint32_t>(counts_[channel]++));
+  chunk_.number(time_ns);
+  chunk_.number(time_ns);  // published when logged
+  chunk_.raw(data);
+  chunk_.end(begun);
+  if (chunk_.size() >= kMcapChunkBytes) end_chunk();
+}
+
+std::string_view McapWriter::packing_name() const noexcept {
+  return packing_ == Packing::lz4 ? "lz4" : "";
+}
+
+std::string McapWriter::packed() const {
+  if (packing_ == Packing::none) return chunk_.bytes();
+  std::string out(LZ4F_compressFrameBound(chunk_.size(), nullptr), '\0');
+  const std::size_t size =
+      LZ4F_compressFrame(out.data(), out.size(), chunk_.bytes().data(), chunk_.size(), nullptr);
+  if (LZ4F_isError(size) != 0) throw std::runtime_error("lz4: a chunk cannot be packed");
+  out.resize(size);
+  return out;
+}
+
+void McapWriter::end_chunk() {
+  if (chunk_.size() == 0) return;
+  const std::string records = packed();
+  IndexedChunk indexed{first_ns_, last_ns_, written_, 0, records.size(), chunk_.size(), 0, {}};
+  McapBytes bytes;
+  std::size_t begun = bytes.begin(chunk_record);
+  bytes.number(first_ns_);
+  bytes.number(last_ns_);
+  bytes.number(std::uint64_t{chunk_.size()});
+  bytes.number(crc(chunk_.bytes()));
+  bytes.text(packing_name());
+  bytes.number(std::uint64_t{records.size()});
+  bytes.raw(records);
+  bytes.end(begun);
+  put(bytes.bytes());
+  indexed.bytes = bytes.size();
+  bytes.clear();
+  for (const auto& [channel, messages] : index_) {
+    indexed.index_offsets[channel] = written_ + bytes.size();
+    begun = bytes.begin(message_index);
+    bytes.number(channel);
+    bytes.number(static_cast<std::uint32_t>(messages.size() * 2 * sizeof(std::uint64_t)));
+    for (const auto& [time_ns, offset] : messages) {
+      bytes.number(time_ns);
+      bytes.number(offset);
+    }
+    bytes.end(begun);
+  }
+  put(bytes.bytes());
+  indexed.index_bytes = bytes.size();
+  chunks_.push_back(std::move(indexed));
+  chunk_.clear();
+  index_.clear();
+}
+
+void McapWriter::close() {
+  end_chunk();
+  McapBytes bytes;
+  std::size_t begun = bytes.begin(data_end);
+  bytes.number(std::uint32_t{0});  // no checksum over all of the data: each chunk has its own
+  bytes.end(begun);
+  put(bytes.bytes());
+
+  const std::uint64_t summary = written_;
+  McapBytes offsets;
+  bytes.clear();
+  const auto end_group = [&](std::uint8_t opcode, std::size_t from) {
+    if (bytes.size() == from) return;
+    const std::size_t start = offsets.begin(summary_offset);
+    offsets.number(opcode);
+    offsets.number(summary + from);
+    offsets.number(std::uint64_t{bytes.size() - from});
+    offsets.end(start);
+  };
+  bytes.raw(schemas_);
+  end_group(schema, 0);
+  std::size_t from = bytes.size();
+  bytes.raw(channels_);
+  end_group(channel_record, from);
+  from = bytes.size();
+  begun = bytes.begin(statistics);
+  std::uint64_t messages = 0;
+  for (const auto& [id, count] : counts_) messages += count;
+  bytes.number(messages);
+  bytes.number(static_cast<std::uint16_t>(counts_.size()));  // schemas
+  bytes.number(static_cast<std::uint32_t>(counts_.size()));  // channels
+  bytes.number(std::uint32_t{0});                            // attachments
+  bytes.number(std::uint32_t{0});                            // metadata
+  bytes.number(static_cast<std::uint32_t>(chunks_.size()));
+  bytes.number(begin_ns_);
+  bytes.number(end_ns_);
+  put_map(bytes, counts_);
+  bytes.end(begun);
+  end_group(statistics, from);
+  from = bytes.size();
+  for (const IndexedChunk& chunk : chunks_) {
+    begun = bytes.begin(chunk_index);
+    bytes.number(chunk.first_ns);
+    bytes.number(chunk.last_ns);
+    bytes.number(chunk.offset);
+    bytes.number(chunk.bytes);
+    put_map(bytes, chunk.index_offsets);
+    bytes.number(chunk.index_bytes);
+    bytes.text(packing_name());
+    bytes.number(chunk.packed);
+    bytes.number(chunk.unpacked);
+    bytes.end(begun);
+  }
+  end_group(chunk_index, from);
+
+  const std::uint64_t offsets_at = summary + bytes.size();
+  bytes.raw(offsets.bytes());
+  bytes.number(footer);
+  bytes.number(std::uint64_t{2 * sizeof(std::uint64_t) + sizeof(std::uint32_t)});
+  bytes.number(summary);
+  bytes.number(offsets_at);
+  bytes.number(crc(bytes.bytes()));  // over the summary and the footer up to here
+  put(bytes.bytes());
+  put(kMagic);
+}
+
+}  // namespace kerf

@@ -1,0 +1,127 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The MCAP of a recording, read by the readers of that format's own project (npm: package.json of mcap/).
+
+    mcap_test.py ROOT BIN BUILD      BUILD: folder for the readers
+Exit code 77: skipped, without node, npm or its registry."""
+import json
+import pathlib
+import shutil
+import subprocess
+import sys
+import tempfile
+import unittest
+
+import numpy as np
+
+ROOT, BIN, BUILD = (pathlib.Path(sys.argv.pop(1)).resolve() for _ in range(3))
+sys.path.insert(0, str(ROOT / "tests/record"))
+from lockstep_run import record
+
+
+def get_readers():
+    """Whether they are there: installed once in BUILD."""
+    BUILD.mkdir(parents=True, exist_ok=True)
+    for file in ("package.json", "package-lock.json", "read.mjs"):
+        shutil.copy(ROOT / "tests/record/mcap" / file, BUILD)
+    if not shutil.which("npm"):
+        return False
+    return subprocess.run(["npm", "ci", "--no-audit", "--no-fund", "--prefer-offline"], cwd=BUILD,
+                          stdout=subprocess.DEVNULL).returncode == 0
+
+
+def export(log, to, *options, code=0):
+    done = subprocess.run([BIN / "kerf-record", "export", log, "--mcap", to, *options], capture_output=True, text=True)
+    assert done.returncode == code, done.stderr
+    return done.stderr
+
+
+def read(path, *seek):
+    done = subprocess.run(["node", "read.mjs", path, *map(str, seek)], cwd=BUILD, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+class TestMcap(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.temporary = tempfile.TemporaryDirectory()
+        cls.folder = pathlib.Path(cls.temporary.name)
+        record(ROOT, BIN, cls.folder, ROOT / "scenes/touch.toml", 4)
+        cls.log = cls.folder / "log"
+        cls.rows = np.load(cls.log / "ticks.npy")
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.temporary.cleanup()
+
+    def test_each_tick_reads_as_it_is_in_the_log(self):
+        for options in ((), ("--unpacked",)):
+            path = self.folder / f"run{len(options)}.mcap"
+            export(self.log, path, *options)
+            found = read(path)
+            self.assertTrue(found["done"])
+            self.assertGreater(found["statistics"]["chunks"], 1)
+            ticks = found["ticks"]
+            self.assertEqual([tick[0] for tick in ticks], self.rows["tick"].tolist())
+            # null is NaN: before docking no place is known.
+            places = np.array([tick[1] for tick in ticks], dtype=float)
+            np.testing.assert_array_equal(places, self.rows["position_mm"])
+            np.testing.assert_array_equal(np.array([tick[2] for tick in ticks], dtype=np.float32), self.rows["commanded_force_n"])
+            self.assertEqual([int(tick[3]) for tick in ticks], self.rows["output_hash"].tolist())
+            self.assertEqual([tick[4] for tick in ticks], self.rows["crc32c"].tolist())
+            self.assertEqual([tick[5] for tick in ticks], self.rows["start_ns"].tolist())
+
+    def test_poses_and_wrenches_are_those_of_ros(self):
+        path = self.folder / "views.mcap"
+        export(self.log, path)
+        found = read(path)
+        channels = found["channels"]
+        self.assertEqual({topic: channel["schema"] for topic, channel in channels.items()},
+                         {"/kerf/tick": "kerf_msgs/msg/Tick", "/kerf/tip": "geometry_msgs/msg/PoseStamped",
+                          "/kerf/force": "geometry_msgs/msg/WrenchStamped"})
+        pose = found["first"]["/kerf/tip"]
+        known = self.rows[np.isfinite(self.rows["position_mm"][:, 0]) & (self.rows["tick"] % 10 == 0)]
+        self.assertEqual(channels["/kerf/tip"]["count"], len(known))
+        self.assertEqual(channels["/kerf/force"]["count"], np.count_nonzero(self.rows["tick"] % 10 == 0))
+        self.assertEqual(pose["header"]["frame_id"], "scene")
+        self.assertEqual(int(pose["header"]["stamp"]["sec"]) * 10**9 + int(pose["header"]["stamp"]["nsec"]), known["start_ns"][0])
+        np.testing.assert_array_equal([pose["pose"]["position"][axis] for axis in "xyz"], known["position_mm"][0] / 1000)
+        wrench = found["first"]["/kerf/force"]
+        self.assertEqual(wrench["header"]["frame_id"], "device")
+        self.assertEqual(set(wrench["wrench"]), {"force", "torque"})
+
+    def test_a_reader_seeks_by_the_index(self):
+        path = self.folder / "seek.mcap"
+        export(self.log, path)
+        found = read(path, 3.5)
+        self.assertEqual(found["ticks"][0][0], 3500)
+        self.assertLess(found["bytesRead"], path.stat().st_size)
+
+    def test_sizes(self):
+        plain, packed = self.folder / "plain.mcap", self.folder / "packed.mcap"
+        export(self.log, plain, "--unpacked")
+        export(self.log, packed)
+        npy = (self.log / "ticks.npy").stat().st_size
+        self.assertLess(plain.stat().st_size, 1.2 * npy)
+        self.assertLess(packed.stat().st_size, npy)
+
+    def test_what_cannot_be(self):
+        self.assertIn("is a recording's own", export(self.log, self.log / "ticks.npy", code=2) or "")
+        self.assertIn("cannot be read", export(self.folder / "none", self.folder / "x.mcap", code=2))
+        self.assertFalse((self.folder / "x.mcap").exists())
+        done = subprocess.run([BIN / "kerf-record", "export", self.log], capture_output=True, text=True)
+        self.assertEqual((done.returncode, done.stderr), (2, "kerf-record: export: as what? give --csv FILE or --mcap FILE\n"))
+        empty = self.folder / "empty"
+        shutil.copytree(self.log, empty)
+        with open(empty / "ticks.npy", "r+b") as file:
+            file.truncate(4096)
+        path = self.folder / "empty.mcap"
+        export(empty, path)
+        self.assertEqual(read(path)["statistics"], {"messages": 0, "chunks": 0})
+
+
+if __name__ == "__main__":
+    if not get_readers():
+        print("skipped: no node, no npm, or its registry does not answer")
+        sys.exit(77)
+    unittest.main()
