@@ -14,7 +14,7 @@ unset DISPLAY WAYLAND_DISPLAY
 # the exit code FAIL_<name> where that is set, or by the signal CRASH_<name>. The file `segment` lives as long as the controller.
 cat >"$lab/stand-in" <<'PROGRAM'
 #!/usr/bin/env bash
-name=${0##*/kerf-}
+name=${0##*/kerf-} words=$*
 echo $$ >>"$LAB/pids"
 echo "$name $*" >>"$LAB/calls"
 fail=FAIL_$name code=0
@@ -97,7 +97,8 @@ case $name in
       exit 2
     fi
     while [[ -e $LAB/segment ]]; do sleep 0.05; done
-    if [[ $name == recorder ]]; then rm -f "$out/begun" && mkdir -p "$out" && touch "$out/ticks.npy"; else touch "$out/frame-0001.png"; fi
+    if [[ $name == recorder ]]; then rm -f "$out/begun" && mkdir -p "$out" && touch "$out/ticks.npy"; fi
+    if [[ $words == *--headless* ]]; then touch "$out/frame-0001.png"; fi  # a window writes what its keys ask for
     ;;
   record)
     touch "$out"
