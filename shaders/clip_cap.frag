@@ -9,7 +9,6 @@ uniform mat4 u_texture_from_eye;  // mm to texture coordinates
 uniform vec3 u_up_eye;            // world up
 uniform float u_near_mm;
 uniform float u_far_mm;
-uniform vec4 u_clip_plane_eye;    // clip plane
 uniform float u_iso;
 
 vec3 eye_direction_at(vec2 ndc);
@@ -18,6 +17,7 @@ float density_at(vec3 texture_point);
 vec3 material_at(vec3 p, vec3 inward_texture);
 vec3 lit(vec3 albedo, vec3 normal, vec3 to_eye, vec3 up_eye, float ao_factor);
 vec3 srgb(vec3 linear);
+vec3 section_normal();
 float window_depth(float eye_mm, float near_mm, float far_mm);
 
 void main() {
@@ -29,7 +29,7 @@ void main() {
 
   vec3 albedo = material_at(p, vec3(0.0));
   vec3 to_eye = -normalize(eye_direction);
-  vec3 colour = lit(albedo, -u_clip_plane_eye.xyz, to_eye, u_up_eye, 1.0);
+  vec3 colour = lit(albedo, section_normal(), to_eye, u_up_eye, 1.0);
   o_colour = vec4(srgb(colour), 1.0);
   gl_FragDepth = window_depth(shown.x, u_near_mm, u_far_mm);
 }

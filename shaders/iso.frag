@@ -16,7 +16,6 @@ uniform vec3 u_texels;             // extent of the volume's textures
 uniform vec3 u_up_eye;             // world up
 uniform float u_near_mm;
 uniform float u_far_mm;
-uniform vec4 u_clip_plane_eye;     // clip plane
 uniform float u_iso;
 uniform float u_step_vox;          // along the ray
 
@@ -25,6 +24,7 @@ vec2 shown_mm(vec3 eye_direction);
 vec2 box_mm(vec3 origin, vec3 inverse_direction, vec3 lo, vec3 hi);
 vec3 lit(vec3 albedo, vec3 normal, vec3 to_eye, vec3 up_eye, float ao_factor);
 vec3 srgb(vec3 linear);
+vec3 section_normal();
 float window_depth(float eye_mm, float near_mm, float far_mm);
 vec3 gradient_at(vec3 texture_point);
 float density_at(vec3 texture_point);
@@ -124,7 +124,7 @@ void main() {
   vec3 inward = mat3(u_texture_from_eye) * -normal;
   inward /= length(inward * u_texels);  // one voxel edge
   if (on_face) {
-    normal = -u_clip_plane_eye.xyz;
+    normal = section_normal();
     inward = vec3(0.0);  // no border: it shows what lies in the plane
   }
 

@@ -3,9 +3,14 @@
 // What every renderer shares: light, and the step to the screen's colours. Linked to a fragment
 // shader that declares the functions it uses.
 
+const vec3 kKey = normalize(vec3(-0.45, 0.75, 0.70));
+
+// What a section through solid faces: the key light, so that each material has its own colour
+// wherever the clip plane lies.
+vec3 section_normal() { return kKey; }
+
 // Two lights of a photographer that go with the eye, and a sky that stays with the world.
 vec3 lit(vec3 albedo, vec3 normal, vec3 to_eye, vec3 up_eye, float ao_factor) {
-  const vec3 kKey = normalize(vec3(-0.45, 0.75, 0.70));
   const vec3 kFill = normalize(vec3(0.80, 0.05, 0.45));
   vec3 ambient = mix(vec3(0.16, 0.145, 0.13), vec3(0.32, 0.34, 0.37),
                      0.5 + 0.5 * dot(normal, up_eye));

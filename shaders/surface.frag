@@ -13,17 +13,17 @@ in vec4 v_shading;
 layout(location = 0) out vec4 o_colour;
 
 uniform vec3 u_up_eye;     // world up
-uniform vec4 u_clip_plane_eye;  // clip plane
 
 vec3 lit(vec3 albedo, vec3 normal, vec3 to_eye, vec3 up_eye, float ao_factor);
 vec3 srgb(vec3 linear);
+vec3 section_normal();
 
 void main() {
   vec3 to_eye = -normalize(v_eye_mm);
   vec3 normal = normalize(v_normal);
   float ao_factor = v_shading.a;
   if (!gl_FrontFacing) {
-    normal = -u_clip_plane_eye.xyz;
+    normal = section_normal();
     ao_factor = 1.0;
   } else if (dot(normal, to_eye) < 0.0) {
     // What is seen faces the eye, whatever the gradient says at a silhouette.

@@ -35,8 +35,20 @@ vec4 label_colour_at(vec3 texture_point) {
   return sum;
 }
 
+// The mean of the labels over 3.5 voxels: in a clip plane their borders are steps of voxels.
+vec4 face_colour_at(vec3 p) {
+  const float kReachVox = 0.75;
+  vec4 sum = vec4(0.0);
+  for (int corner = 0; corner < 8; ++corner) {
+    vec3 side = vec3((corner & 1) * 2 - 1, (corner & 2) - 1, (corner & 4) / 2 - 1);
+    sum += 0.125 * label_colour_at(p + kReachVox * side / u_texels);
+  }
+  return sum;
+}
+
 // Below the surface, because the surface itself is half air. Soft tissue that lies on the surface,
-// too thin for iso, coats it until it is milled away: pulp on the walls of its chamber.
+// too thin for iso, coats it until it is milled away: pulp on the walls of its chamber. A face in the
+// clip plane has no inward direction: it shows what lies there.
 vec3 material_at(vec3 p, vec3 inward_texture) {
   const float kDepthVox = 1.25;
   const float kFullDepthVox = 2.5;  // past the two voxels over which a border is antialiased
@@ -44,8 +56,9 @@ vec3 material_at(vec3 p, vec3 inward_texture) {
   vec3 below = p + kDepthVox * inward_texture;
   vec3 above = p - kDepthVox * inward_texture;
   if (u_has_labels) {
-    vec4 labelled = label_colour_at(below);
-    if (density_at(above) > kCoatDensity) {
+    bool on_face = inward_texture == vec3(0.0);
+    vec4 labelled = on_face ? face_colour_at(p) : label_colour_at(below);
+    if (!on_face && density_at(above) > kCoatDensity) {
       vec4 coat = label_colour_at(above);
       labelled = mix(labelled, coat, coat.a);
     }

@@ -263,7 +263,8 @@ std::chrono::duration<double> pause_before_frame(const Film& film, const Session
 
 }  // namespace
 
-int run_headless(const VisualizerOptions& options) {
+int run_headless(const VisualizerOptions& asked) {
+  VisualizerOptions options = asked;
   place_process(options.cpus);
   if (options.frames > 0) check_new_folder(options.out);
   check_files(options);
@@ -272,6 +273,7 @@ int run_headless(const VisualizerOptions& options) {
   }
   const auto context = make_headless_context();
   const GlDriver driver = query_gl_driver();
+  take_default_renderer(options);
   FrameReport report{.renderer = options.settings.renderer,
                      .gl_renderer = driver.renderer,
                      .context = to_string(context->kind()),

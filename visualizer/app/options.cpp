@@ -36,17 +36,17 @@ std::string footer() {
   return text.str();
 }
 
-/// The view settings at first; `gradient` by its name.
-void declare_look(Arguments& app, VisualizerOptions& o, std::string& gradient) {
-  app.option("--renderer", o.settings.renderer,
-             "how volumes are drawn: " + listed(renderer_kinds()) +
-                 "; with commas one for each volume, such as surface,blend")
-      .shown_as("KIND[,KIND...]")
-      .shows_default();
+/// The view settings at first; `gradient` by its name. Returns --renderer.
+Option declare_look(Arguments& app, VisualizerOptions& o, std::string& gradient) {
+  const Option renderer =
+      app.option("--renderer", o.settings.renderer,
+                 "how volumes are drawn: " + listed(renderer_kinds()) +
+                     "; with commas one for each volume, such as surface,blend (default: iso, or "
+                     "cast if OpenGL draws on the processor)")
+          .shown_as("KIND[,KIND...]");
   app.option("--gradient", gradient,
-             "what iso, surface, blend and slices shade from: central (two voxels), corners "
-             "(2x2x2 means) or farid5 (5x5x5, 8 more bytes a voxel in iso); cast always "
-             "corners")
+             "what volumes are shaded from: central (two voxels), corners (2x2x2 means), farid5 "
+             "(5x5x5 voxels) or adaptive (15x15x15 but at edges)")
       .shows_default();
   app.option("--transfer", o.transfer,
              "opacity of each material, TOML, for blend, slices and cast-blend; in the window w "
@@ -69,6 +69,7 @@ void declare_look(Arguments& app, VisualizerOptions& o, std::string& gradient) {
   app.option("--convergence", o.settings.stereo.convergence_mm,
              "stereo: mm to what lies in the screen (default: to where the camera looks)")
       .within(1.0, 1e6);
+  return renderer;
 }
 
 /// How long a run is, and where.
@@ -165,7 +166,7 @@ std::optional<VisualizerOptions> parse_options(int argc, const char* const* argv
   app.option("--name", options.name, "the controller's name").shows_default();
   const Option sized =
       app.option("--size", size, "width and height in pixels").shown_as("WxH").shows_default();
-  declare_look(app, options, gradient);
+  const Option renderer = declare_look(app, options, gradient);
   const Option headless =
       app.flag("--headless", options.headless, "no window: pictures into --out");
   const Option frames = app.option("--frames", options.frames, "headless: number of pictures")
@@ -198,6 +199,7 @@ std::optional<VisualizerOptions> parse_options(int argc, const char* const* argv
                           " has no pointer that could lead a hand; give one of the two");
   }
   options.size = parse_size(size);
+  options.renderer_is_given = renderer.given();
   check_renderers(options.settings.renderer);
   options.settings.gradient = gradient_named(gradient);
   if (options.transfer) options.settings.opacities = read_transfer(*options.transfer);

@@ -17,6 +17,7 @@ namespace kerf {
 struct VisualizerOptions {
   std::string name = kDefaultName;  ///< of the controller
   ViewSettings settings;            ///< at first; its opacities are those of `transfer`
+  bool renderer_is_given = true;    ///< else `take_default_renderer`
   PictureSize size{800, 600};
   std::optional<double> panel_scale;  ///< of the panels' letters; none: the display's density
   bool headless = false;

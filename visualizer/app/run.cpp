@@ -40,6 +40,10 @@ Session attach(const VisualizerOptions& options) {
   return session;
 }
 
+void take_default_renderer(VisualizerOptions& options) {
+  if (!options.renderer_is_given && query_gl_driver().software) options.settings.renderer = "cast";
+}
+
 int exit_code(const Session& session, bool video_is_cut) {
   const bool lost = session.ended() && !session.ended_cleanly();
   if (lost) std::fprintf(stderr, "kerf-visualizer: the controller went away without a clean end\n");
@@ -153,7 +157,8 @@ bool step(WindowRun& run, Window& window, WindowSound& sound) {
 
 }  // namespace
 
-int run_window(const VisualizerOptions& options) {
+int run_window(const VisualizerOptions& asked) {
+  VisualizerOptions options = asked;
   place_process(options.cpus);
   check_files(options);
   WindowSound sound(options.mute);  // before any thread
@@ -161,6 +166,7 @@ int run_window(const VisualizerOptions& options) {
   const Stopwatch since_attached;
   Window window(options.size, Window::Visibility::shown);
   window.set_title("kerf: " + options.name);
+  take_default_renderer(options);
   WindowRun run(options, std::move(session), window, since_attached);
   constexpr double kMsPerS = 1e3;
   const double end_ms = options.seconds.value_or(std::numeric_limits<double>::infinity()) * kMsPerS;

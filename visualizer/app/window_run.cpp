@@ -116,9 +116,10 @@ int WindowRun::end() {
   return exit_code(session(), video_is_cut_);
 }
 
-OverlayFigures WindowRun::figures_at(Clock::time_point now) {
+OverlayFigures WindowRun::figures_at(PictureSize size, Clock::time_point now) {
   OverlayFigures figures = overlay_figures(session());
   if (film_) figures.filmed_frames = film_->file().frames();
+  figures.picture_age_ms = picture().age_ms();
   rates_.show(figures, now);
   figures.help = keys_.help;
   figures.leads_hand = hand_link_.has_value();
@@ -126,7 +127,7 @@ OverlayFigures WindowRun::figures_at(Clock::time_point now) {
   notices_.show(figures, now);
   if (keys_.plot) figures.plot = plot_.points();
   figures.score = picture().score(session());
-  if (keys_.slices) figures.slices = slices_at_tip();
+  if (keys_.slices) figures.slices = slices_at_tip(picture().eye_size(size));
   figures.open = open_;
   figures.scale = options_.panel_scale.value_or(density_);
   figures.controls = picture().controls();
@@ -167,12 +168,21 @@ void WindowRun::choose(const OpenPanel& panel, Clock::time_point now) {
   }
 }
 
-std::optional<SliceViews> WindowRun::slices_at_tip() {
-  constexpr double kSide = 56.0;  // three of them leave room for the others
+std::optional<SliceViews> WindowRun::slices_at_tip(PictureSize size) {
   const auto hand = session().latest() ? hand_of(*session().latest()) : std::nullopt;
-  if (!hand) return std::nullopt;
-  const int side = static_cast<int>(kSide * options_.panel_scale.value_or(density_));
-  return slice_views(picture().shown_scene(), session().contents(), hand->tip_mm, side);
+  const int side = slice_side(size, options_.panel_scale.value_or(density_));
+  if (!hand || side == 0) return std::nullopt;
+  bool changed = !slices_ || slices_->side != side || sliced_at_mm_ != hand->tip_mm ||
+                 sliced_with_ != picture().settings();
+  for (std::size_t v = 0; v < session().scene().volumes.size(); ++v) {
+    changed = changed || !session().snapshot(v).changed.empty();
+  }
+  if (changed) {
+    slices_ = slice_views(picture().shown_scene(), session().contents(), hand->tip_mm, side);
+    sliced_at_mm_ = hand->tip_mm;
+    sliced_with_ = picture().settings();
+  }
+  return slices_;
 }
 
 void WindowRun::follow(const WindowInput& input, OverlayFigures& figures, PictureSize size,
@@ -289,7 +299,7 @@ Redrawn WindowRun::draw(PictureSize size, const WindowInput& input, Clock::time_
     begin_recording(options_, size, film_);
   }
   if (std::exchange(keys_.film, false)) notices_.say(toggle_film(options_, size, film_), now);
-  OverlayFigures figures = figures_at(now);
+  OverlayFigures figures = figures_at(size, now);
   const std::size_t held = figures.controls->tool;
   follow(input, figures, size, now);
   if (figures.open && figures.open->chosen) choose(*figures.open, now);

@@ -84,13 +84,13 @@ class WindowRun {
   [[nodiscard]] Picture& picture() noexcept { return followed_.picture(); }
 
  private:
-  [[nodiscard]] OverlayFigures figures_at(Clock::time_point now);
+  [[nodiscard]] OverlayFigures figures_at(PictureSize size, Clock::time_point now);
   /// Opens or leaves the list of scenes, if a program waits for a choice.
   void toggle_list(Clock::time_point now);
   /// What the mouse chose of it: another folder, or what the window ends with.
   void choose(const OpenPanel& panel, Clock::time_point now);
-  /// None while the position of the tip is unknown.
-  [[nodiscard]] std::optional<SliceViews> slices_at_tip();
+  /// For one eye's picture of `size`; none while the position of the tip is unknown.
+  [[nodiscard]] std::optional<SliceViews> slices_at_tip(PictureSize size);
   /// What the user wants of hand and camera; the mark of the hand goes into the figures.
   void follow(const WindowInput& input, OverlayFigures& figures, PictureSize size,
               Clock::time_point now);
@@ -118,6 +118,9 @@ class WindowRun {
   Notices notices_;
   ForcePlot plot_;
   std::optional<Film> film_;
+  std::optional<SliceViews> slices_;  ///< made last, where and with what
+  glm::dvec3 sliced_at_mm_{0.0};
+  ViewSettings sliced_with_;
   std::optional<OpenPanel> open_;
   bool chosen_ = false;  ///< and written: the window ends
   std::optional<HandLink> hand_link_;

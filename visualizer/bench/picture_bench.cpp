@@ -7,6 +7,7 @@
 #include <numbers>
 #include <random>
 
+#include <glm/gtc/matrix_access.hpp>
 #include <glm/gtc/matrix_transform.hpp>
 #include <unistd.h>
 
@@ -28,78 +29,125 @@ namespace kerf {
 
 namespace {
 
-constexpr int kSide = 64;
+constexpr int kSide = 80;  // no gradient looks from the ball beyond it
 constexpr double kRadius = 28.0;
 constexpr double kNoise = 0.015;        // of full density; standard deviation
 constexpr double kLeastFacing = 0.342;  // sine of 20 degrees
+constexpr double kRim = 5.0;            // voxels of a hollow that belong to its rim
 constexpr PictureSize kSize{256, 256};
 
-/// Voxels of 1 mm with the ball in their middle.
-std::vector<Density> ball(double noise) {
-  std::mt19937 random(1);
+/// A volume with voxels of 1 mm around the origin, and the eye.
+struct BallStage {
+  SceneView scene;
+  View view;
+  glm::dvec3 towards{};  ///< the eye, of length 1
+
+  BallStage() {
+    VolumeView& volume = scene.volumes.emplace_back();
+    volume.bricks = BrickGrid::of({kSide, kSide, kSide});
+    volume.world_from_voxel = glm::translate(glm::dmat4(1.0), glm::dvec3(-0.5 * (kSide - 1)));
+    OrbitCamera camera;
+    camera.frame(scene.corners(), 1.0);
+    view = camera.view(1.0, 2.0 * kSide);
+    towards = glm::normalize(glm::dvec3(glm::row(view.eye_from_world, 2)));
+  }
+};
+
+/// `fraction(at)` of full density at each voxel, 0..1.
+template <class Fraction>
+std::vector<Density> filled(const Fraction& fraction) {
   std::vector<Density> density;
   for (int i = 0; i < kSide * kSide * kSide; ++i) {
     const glm::dvec3 at(i % kSide, i / kSide % kSide, i / kSide / kSide);
-    const double distance = glm::length(at - 0.5 * (kSide - 1)) - kRadius;
+    const double value = std::clamp(fraction(at - 0.5 * (kSide - 1)), 0.0, 1.0);
+    density.push_back(static_cast<Density>(std::lround(value * kDensityMax)));
+  }
+  return density;
+}
+
+/// A border is antialiased over two voxels.
+double antialiased(double distance) {
+  return std::clamp(0.5 - 0.5 * distance, 0.0, 1.0);
+}
+
+std::vector<Density> ball(double noise) {
+  std::mt19937 random(1);
+  return filled([&](const glm::dvec3& at) {
     // A sum of twelve has the variance 1 and, unlike the library's, the same bits everywhere.
     double normal = 0.0;
     for (int k = 0; k < 12 && noise > 0.0; ++k) {
       normal += static_cast<double>(random()) * 0x1p-32 - 0.5;
     }
-    const double fraction = std::clamp(0.5 - 0.5 * distance, 0.0, 1.0) + noise * normal;
-    density.push_back(
-        static_cast<Density>(std::lround(std::clamp(fraction, 0.0, 1.0) * kDensityMax)));
-  }
-  return density;
+    return antialiased(glm::length(at) - kRadius) + noise * normal;
+  });
 }
 
-double angle_deg(GradientFilter gradient, const std::vector<Density>& density) {
-  SceneView scene;
-  scene.gradient = gradient;
-  VolumeView& volume = scene.volumes.emplace_back();
-  volume.bricks = BrickGrid::of({kSide, kSide, kSide});
-  volume.world_from_voxel = glm::translate(glm::dmat4(1.0), glm::dvec3(-0.5 * (kSide - 1)));
+/// Half a ball milled out of a block. A tool that stays takes voxels of overlap c down to exp(-k
+/// c): those that it covers by more than a little are empty, all others full (docs/theory.md 7.5).
+std::vector<Density> hollow(const glm::dvec3& towards) {
+  constexpr double kDwell = 30.0;
+  return filled([&](const glm::dvec3& at) {
+    const double overlap = std::clamp(0.5 - (glm::length(at) - kRadius), 0.0, 1.0);
+    return std::min(antialiased(glm::dot(at, towards)), std::exp(-kDwell * overlap));
+  });
+}
+
+/// Degrees between the shader's normal and that of the ball at the point that a pixel shows.
+struct Angles {
+  double rms = 0.0, p99 = 0.0;
+};
+
+Angles angles_of(BallStage stage, GradientFilter gradient, const std::vector<Density>& density,
+                 bool is_hollow) {
+  stage.scene.gradient = gradient;
+  const View& view = stage.view;
   const VolumeContent content{density, {}};
-  IsoRenderer renderer(scene, {&content, 1}, {.light = "normals.frag"});
-  OrbitCamera camera;
-  camera.frame(scene.corners(), 1.0);
-  const View view = camera.view(1.0, 2.0 * kSide);
+  IsoRenderer renderer(stage.scene, {&content, 1}, {.light = "normals.frag"});
   const RenderTarget target(kSize);
   target.bind();
   glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
   renderer.draw(view, target);
   const std::vector<std::uint8_t> rgb = target.read_rgb();
-
+  const std::vector<float> depth = target.read_depth();
   const glm::dvec3 centre(view.eye_from_world * glm::dvec4(0.0, 0.0, 0.0, 1.0));
+  const double span_mm = view.far_mm - view.near_mm;
   double sum = 0.0;
-  int pixels = 0;
-  for (int y = 0; y < kSize.height; ++y) {
-    for (int x = 0; x < kSize.width; ++x) {
-      const glm::dvec2 ndc((2.0 * x + 1.0) / kSize.width - 1.0,
-                           1.0 - (2.0 * y + 1.0) / kSize.height);
-      const glm::dvec3 ray = glm::normalize(glm::dvec3(ndc * view.tan_half_height, -1.0));
-      const double middle = glm::dot(ray, centre);
-      const double inside = kRadius * kRadius - glm::dot(centre, centre) + middle * middle;
-      if (inside < 0.0) continue;
-      const glm::dvec3 normal = ((middle - std::sqrt(inside)) * ray - centre) / kRadius;
-      if (-glm::dot(normal, ray) < kLeastFacing) continue;
-      const glm::dvec3 seen = shown_normal(&rgb[3 * static_cast<std::size_t>(y * kSize.width + x)]);
-      const double angle = 2.0 * std::asin(0.5 * std::min(glm::length(seen - normal), 2.0));
-      sum += angle * angle;
-      ++pixels;
-    }
+  std::vector<double> angles;
+  for (std::size_t i = 0; i < depth.size(); ++i) {
+    if (depth[i] >= 1.0F) continue;
+    const glm::dvec2 pixel(i % kSize.width, i / kSize.width);
+    const glm::dvec2 ndc = (2.0 * pixel + 1.0) / glm::dvec2(kSize.width, kSize.height) - 1.0;
+    const glm::dvec3 ray(ndc.x * view.tan_half_height, -ndc.y * view.tan_half_height, -1.0);
+    // Equation (1) of the paper, for t.
+    const double eye_mm =
+        view.far_mm * view.near_mm / (view.far_mm - static_cast<double>(depth[i]) * span_mm);
+    const glm::dvec3 from_centre = eye_mm * ray - centre;
+    // Around the hollow lie the block's own faces.
+    const bool beside = std::abs(glm::length(from_centre) - kRadius) > 2.0;
+    if (is_hollow && (beside || from_centre.z > -kRim)) continue;
+    const glm::dvec3 normal = glm::normalize(from_centre) * (is_hollow ? -1.0 : 1.0);
+    if (-glm::dot(normal, glm::normalize(ray)) < kLeastFacing) continue;
+    const double off = glm::length(shown_normal(&rgb[3 * i]) - normal);
+    angles.push_back(2.0 * std::asin(0.5 * std::min(off, 2.0)) * 180.0 / std::numbers::pi);
+    sum += angles.back() * angles.back();
   }
-  return std::sqrt(sum / pixels) * 180.0 / std::numbers::pi;
+  const double rms = std::sqrt(sum / static_cast<double>(angles.size()));
+  return {rms, percentile(angles, 0.99)};
 }
 
 }  // namespace
 
 std::vector<GradientRow> measure_gradients() {
+  const BallStage stage;
   const std::vector<Density> clean = ball(0.0), noisy = ball(kNoise);
+  const std::vector<Density> milled = hollow(stage.towards);
   std::vector<GradientRow> rows;
   for (std::size_t i = 0; i < kGradientNames.size(); ++i) {
     const auto gradient = static_cast<GradientFilter>(i);
-    rows.push_back({gradient, angle_deg(gradient, clean), angle_deg(gradient, noisy)});
+    const Angles of_ball = angles_of(stage, gradient, clean, false);
+    const Angles of_hollow = angles_of(stage, gradient, milled, true);
+    rows.push_back({gradient, of_ball.rms, angles_of(stage, gradient, noisy, false).rms,
+                    of_ball.p99, of_hollow.rms, of_hollow.p99});
   }
   return rows;
 }
@@ -165,7 +213,7 @@ class Stage {
     target_.restrict_to(target_.all());
     if (change.partial) {
       RedrawTiles tiles(target_.size());
-      renderer_->mark_redraw(0, {tooth_.view(), tooth_.density(), view_, target_}, tiles);
+      renderer_->mark_redraw(0, {tooth_.view(), view_, target_}, tiles);
       target_.restrict_to(tiles.rects());
     }
     renderer_->forget_changes();
@@ -192,7 +240,8 @@ std::vector<PictureRow> subjects() {
       }
     }
   }
-  for (const GradientFilter gradient : {GradientFilter::central, GradientFilter::farid5}) {
+  for (const GradientFilter gradient :
+       {GradientFilter::central, GradientFilter::corners, GradientFilter::farid5}) {
     rows.push_back({.renderer = "iso", .gradient = gradient, .volume = kBenchVolumes.back()});
   }
   return rows;
@@ -245,7 +294,10 @@ std::string picture_report(const PictureFigures& figures) {
   for (const GradientRow& row : figures.gradients) {
     gradients.push_back({{"gradient", name_of(row.gradient)},
                          {"angle_deg", row.angle_deg},
-                         {"noisy_angle_deg", row.noisy_angle_deg}});
+                         {"noisy_angle_deg", row.noisy_angle_deg},
+                         {"p99_deg", row.p99_deg},
+                         {"milled_angle_deg", row.milled_angle_deg},
+                         {"milled_p99_deg", row.milled_p99_deg}});
   }
   const Json report{{"day", today()},
                     {"gl_renderer", figures.gl_renderer},

@@ -27,20 +27,23 @@ namespace kerf {
 /// What one way to take the gradient does to the normals of `iso`.
 struct GradientRow {
   GradientFilter gradient;
-  double angle_deg;        ///< root mean square, on a ball
-  double noisy_angle_deg;  ///< the same with noise in the density
+  double angle_deg = 0.0;         ///< root mean square, on a ball
+  double noisy_angle_deg = 0.0;   ///< the same with noise in the density
+  double p99_deg = 0.0;           ///< of 99 of 100 pixels of the ball
+  double milled_angle_deg = 0.0;  ///< both in a hollow that a ball milled
+  double milled_p99_deg = 0.0;
 };
 
 /// Measures each on an analytic ball of 28 voxels radius whose border is antialiased over two, as
 /// tools and teeth are, in the shader's own normals; without noise, and with the 1.5 % of full
-/// density that a CT of dentin has. Pixels seen at less than 20 degrees do not count. Needs a
-/// current GL context.
+/// density that a CT of dentin has; and in a hollow as a ball leaves it that stays. Pixels seen at
+/// less than 20 degrees, and the rim of the hollow, do not count. Needs a current GL context.
 [[nodiscard]] std::vector<GradientRow> measure_gradients();
 
 /// What one kind of frame costs.
 struct PictureRow {
   std::string renderer;
-  GradientFilter gradient = GradientFilter::corners;
+  GradientFilter gradient = kDefaultGradient;
   VoxelGrid volume;          ///< as the paper names it, before any crop
   int tool = 0;              ///< voxels across: a ball is cut before each frame; 0: none
   bool cropped = false;      ///< only the tooth's box

@@ -24,18 +24,24 @@ struct CastBlock {
   float begin_mm, end_mm;
 };
 
+/// `GradientRows` as the kernels see it.
+struct CastGradient {
+  const std::uint16_t* entries = nullptr;  ///< four for each voxel
+  std::int32_t row = 0, plane = 0;         ///< in voxels
+  float last[3] = {};                      ///< a hair before the far side of the border
+};
+
 /// One volume as the cast kernels see it: plain pointers, because their files are compiled for
 /// instruction sets that other machines lack, and no inline function may be shared with them.
 ///
 /// Positions are in voxel edges, counted from the border of air: voxel v is at v + 1.
 struct CastVolumeJob {
-  const std::uint32_t* density = nullptr;   ///< `PairedRows`
-  const std::uint16_t* labels = nullptr;    ///< `PairedRows`, or none
-  const std::uint32_t* gradient = nullptr;  ///< `GradientRows`, for blend
-  const std::uint8_t* active = nullptr;     ///< of each macrocell: not 0 if it may show anything
-  const CastBlock* blocks = nullptr;        ///< `MacrocellDepthRange`: rows of the picture's blocks
-  std::int32_t row = 0, plane = 0;          ///< of density and labels, in entries
-  std::int32_t gradient_plane = 0;          ///< its rows are as long as the others
+  const std::uint32_t* density = nullptr;  ///< `PairedRows`
+  const std::uint16_t* labels = nullptr;   ///< `PairedRows`, or none
+  CastGradient gradient;
+  const std::uint8_t* active = nullptr;  ///< of each macrocell: not 0 if it may show anything
+  const CastBlock* blocks = nullptr;     ///< `MacrocellDepthRange`: rows of the picture's blocks
+  std::int32_t row = 0, plane = 0;       ///< of density and labels, in entries
   std::int32_t cell_row = 0, cell_plane = 0;
   float last[3] = {};         ///< a hair before the far side of the border
   float origin[3] = {};       ///< the eye
@@ -106,9 +112,6 @@ extern const CastKernels kCastScalar;
 struct RayFootprint {
   int along = 0;   ///< before the ray's end
   int at_end = 0;  ///< at the ray's end; 0: as before it. Else both are odd, or both even
-  /// The ray ends on a surface, whose shading samples the volume along the normal
-  /// (`kShadingTapsVox`).
-  bool taps_normal = false;
 };
 
 /// Marks of the cells of a `RedrawJob`.
@@ -139,13 +142,12 @@ struct RedrawJob {
   const float* depth = nullptr;
   PixelRect window;
 
-  /// All of the volume, for surfaces whose shading samples it (`kShadingTapsVox`); else null.
-  const std::uint16_t* density = nullptr;
-  std::int32_t extent[3] = {};  ///< of the volume
-  float first_voxel[3] = {};    ///< position of voxel (0, 0, 0)
-  float centre_mm[3] = {};      ///< of the marked cells, in eye space
-  float half_mm[3][3] = {};     ///< half their edges, in eye space: [axis of the volume]
-  float edge_mm = 1.0F;         ///< of a voxel, the longest
+  /// Of a volume whose surfaces sample it along their normals (`kShadingTapsVox`); else null.
+  CastGradient gradient;
+  float border[3] = {};      ///< position of the border's first voxel, (-1, -1, -1)
+  float centre_mm[3] = {};   ///< of the marked cells, in eye space
+  float half_mm[3][3] = {};  ///< half their edges, in eye space: [axis of the volume]
+  float edge_mm = 1.0F;      ///< of a voxel, the longest
 };
 
 }  // namespace kerf

@@ -17,68 +17,6 @@ namespace kerf {
 
 namespace {
 
-constexpr std::uint32_t kNoGradient = 0x00808080;
-
-/// 128 + 127 * sum / (four differences of the highest density).
-std::uint32_t byte_of(std::int32_t sum) {
-  constexpr float kScale = 127.0F / (4.0F * static_cast<float>(kDensityMax));
-  return static_cast<std::uint32_t>(static_cast<float>(sum) * kScale + 128.5F);
-}
-
-std::int32_t low(std::uint32_t entry) {
-  return static_cast<std::int32_t>(entry & 0xffff);
-}
-std::int32_t high(std::uint32_t entry) {
-  return static_cast<std::int32_t>(entry >> 16);
-}
-
-}  // namespace
-
-GradientRows::GradientRows(VoxelGrid grid, const Densities& density)
-    : grid_(grid),
-      // A plane more: a cell beyond the last voxels is read and has no weight.
-      entries_(static_cast<std::size_t>(grid.nx + 2) * static_cast<std::size_t>(grid.ny + 2) *
-                   static_cast<std::size_t>(grid.nz + 3),
-               kNoGradient) {
-  update(grid.box(), density);
-}
-
-void GradientRows::update(const VoxelBox& box, const Densities& density) {
-  const VoxelBox touched = box.grown(1).clipped(grid_.box());
-  for (std::int32_t z = touched.lo.z; z < touched.hi.z; ++z) {
-    for (std::int32_t y = touched.lo.y; y < touched.hi.y; ++y) fill_row(y, z, touched, density);
-  }
-}
-
-void GradientRows::fill_row(std::int32_t y, std::int32_t z, const VoxelBox& box,
-                            const Densities& density) {
-  // In border coordinates voxel y is y + 1: the row before begins at y, and row y + 1 pairs that
-  // voxel with the one after.
-  const auto at = [&](std::int32_t row, std::int32_t plane) {
-    return density.data() + static_cast<std::ptrdiff_t>(plane) * density.plane() +
-           static_cast<std::ptrdiff_t>(row) * density.row();
-  };
-  const std::uint32_t* const low_z[2] = {at(y, z), at(y + 1, z)};
-  const std::uint32_t* const high_z[2] = {at(y, z + 2), at(y + 1, z + 2)};
-  std::uint32_t* const out = entries_.data() + static_cast<std::ptrdiff_t>(z + 1) * plane() +
-                             static_cast<std::ptrdiff_t>(y + 1) * row();
-  for (std::int32_t x = box.lo.x + 1; x <= box.hi.x; ++x) {
-    std::int32_t sum[3] = {};
-    for (const std::int32_t side : {-1, 1}) {
-      const std::int32_t ll = low(low_z[0][x + side]);
-      const std::int32_t hl = high(low_z[1][x + side]);
-      const std::int32_t lh = low(high_z[0][x + side]);
-      const std::int32_t hh = high(high_z[1][x + side]);
-      sum[0] += side * (ll + hl + lh + hh);
-      sum[1] += hl + hh - ll - lh;
-      sum[2] += lh + hh - ll - hl;
-    }
-    out[x] = byte_of(sum[0]) | byte_of(sum[1]) << 8 | byte_of(sum[2]) << 16;
-  }
-}
-
-namespace {
-
 constexpr float kMost = 0.996F;  // opacity: 1 has no finite extinction
 constexpr double kBorder = 1.0;  // voxels of air around the volume: voxel v is at v + 1
 
@@ -91,7 +29,7 @@ Density least_visible(CastMode mode, const VolumeView& volume, const TransferFun
 VoxelGrid checked(const VolumeView& volume) {
   const VoxelGrid& n = volume.bricks.grid;
   constexpr auto kLimit = static_cast<std::size_t>(std::numeric_limits<std::int32_t>::max());
-  const std::size_t entries = GradientRows::Densities::entry_count(n);
+  const std::size_t entries = GradientRows::entry_count(n);
   if (entries <= kLimit) return n;
   throw VisualizerError("volume " + volume.name + ": " + std::to_string(n.nx) + "x" +
                         std::to_string(n.ny) + "x" + std::to_string(n.nz) +
@@ -101,19 +39,20 @@ VoxelGrid checked(const VolumeView& volume) {
 
 }  // namespace
 
-CastVolume::CastVolume(const VolumeView& volume, const CastContent& content, CastMode mode)
+CastVolume::CastVolume(const VolumeView& volume, const CastContent& content, CastMode mode,
+                       GradientFilter filter)
     : bricks_(volume.bricks),
       world_from_voxel_(volume.world_from_voxel),
       transfer_(content.transfer),
       iso_(static_cast<float>(volume.iso / kDensityMax)),
       density_(checked(volume)),
+      gradient_(filter, volume.bricks.grid, content.density),
       cells_(volume.bricks.grid, content.density, least_visible(mode, volume, content.transfer),
              kCastCellVox) {
   set_materials(content.transfer.materials);
   active_.resize(cells_.active().size() + sizeof(std::uint32_t));
   take_cells(cells_.grid().box());
   density_.copy(bricks_.grid.box(), content.density);
-  if (mode == CastMode::blend) gradient_.emplace(bricks_.grid, density_);
   if (content.labels.empty()) return;
   labels_.emplace(bricks_.grid);
   labels_->copy(bricks_.grid.box(), content.labels);
@@ -140,8 +79,8 @@ std::optional<BoxCorners> CastVolume::body() const {
 
 void CastVolume::update_bricks(std::span<const Density> density, const ChangedBricks& changed) {
   for (const ChangedBrick& brick : changed) density_.copy(bricks_.voxels(brick.id), density);
-  if (gradient_) {
-    for (const ChangedBrick& brick : changed) gradient_->update(bricks_.voxels(brick.id), density_);
+  for (const ChangedBrick& brick : changed) {
+    gradient_.update(ChangedBricks::bounds(brick, bricks_), density);
   }
   const VoxelBox flipped = cells_.update_bricks(bricks_, changed, density);
   if (!flipped.empty()) take_cells(flipped);
@@ -210,13 +149,10 @@ CastVolumeJob CastVolume::job(const View& view, std::int32_t width, std::int32_t
   blocks_.draw(outer_cells_, near_plane_is_inside(view, world_from_cell), world_from_cell, view,
                width, height, part);
   const glm::dmat4 voxel_from_eye = glm::affineInverse(view.eye_from_world * world_from_border);
-  const VoxelGrid& grid = bricks_.grid;
-  const glm::ivec3 extent(grid.nx, grid.ny, grid.nz);
   CastVolumeJob job;
   job.density = density_.data();
   job.labels = labels_ ? labels_->data() : nullptr;
-  job.gradient = gradient_ ? gradient_->data() : nullptr;
-  job.gradient_plane = gradient_ ? gradient_->plane() : 0;
+  job.gradient = gradient_.view();
   job.active = active_.data();
   job.blocks = blocks_.data();
   job.row = density_.row();
@@ -230,10 +166,7 @@ CastVolumeJob CastVolume::job(const View& view, std::int32_t width, std::int32_t
   job.full = static_cast<float>(transfer_.full);
   job.edge_mm = static_cast<float>(edge_mm());
   job.iso = iso_;
-  for (int to = 0; to < 3; ++to) {
-    // The last cell of voxels ends at extent + 1; its far side belongs to no cell.
-    job.last[to] = std::nextafter(static_cast<float>(extent[to] + 1), 0.0F);
-  }
+  std::copy_n(job.gradient.last, 3, job.last);
   put(job.origin, glm::dvec3(voxel_from_eye[3]));
   put(job.from_eye, glm::dmat3(voxel_from_eye));
   return job;

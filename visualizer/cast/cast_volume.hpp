@@ -9,6 +9,7 @@
 
 #include "shared/volume/voxel_grid.hpp"
 #include "visualizer/cast/cast_kernels.hpp"
+#include "visualizer/cast/gradient_rows.hpp"
 #include "visualizer/cast/macrocells.hpp"
 #include "visualizer/scene/appearance.hpp"
 #include "visualizer/scene/camera.hpp"
@@ -71,32 +72,6 @@ class PairedRows {
   std::vector<Entry> entries_;
 };
 
-/// The density gradient at each voxel, for rays that need it often: differences over two voxel
-/// edges along one axis, means of four along the others, as iso.frag takes them. Interpolated they
-/// are the gradient of that cube at any place, but for their 8 bits. In a border of none, as the
-/// density: voxel v is at v + 1.
-///
-///     entry = byte x | byte y << 8 | byte z << 16,   byte = 128 + 127 * difference
-class GradientRows {
- public:
-  using Densities = PairedRows<Density, std::uint32_t>;
-
-  GradientRows(VoxelGrid grid, const Densities& density);
-
-  /// Call after the density of `box` has changed.
-  void update(const VoxelBox& box, const Densities& density);
-
-  [[nodiscard]] const std::uint32_t* data() const noexcept { return entries_.data(); }
-  [[nodiscard]] std::int32_t row() const noexcept { return grid_.nx + 2; }
-  [[nodiscard]] std::int32_t plane() const noexcept { return row() * (grid_.ny + 2); }
-
- private:
-  void fill_row(std::int32_t y, std::int32_t z, const VoxelBox& box, const Densities& density);
-
-  VoxelGrid grid_;
-  std::vector<std::uint32_t> entries_;
-};
-
 /// `view` as the kernels take it, for a picture of `width` x `height` pixels.
 [[nodiscard]] CastEye cast_eye(const View& view, std::int32_t width, std::int32_t height);
 
@@ -119,7 +94,8 @@ struct CastContent {
 class CastVolume {
  public:
   /// Throws VisualizerError for a volume that the kernels cannot address.
-  CastVolume(const VolumeView& volume, const CastContent& content, CastMode mode);
+  CastVolume(const VolumeView& volume, const CastContent& content, CastMode mode,
+             GradientFilter filter);
 
   /// Takes bricks `changed` of `density` (the whole volume) and the cells they touch.
   void update_bricks(std::span<const Density> density, const ChangedBricks& changed);
@@ -130,6 +106,7 @@ class CastVolume {
   /// Other colours and opacities.
   void set_materials(const Palette& materials);
 
+  [[nodiscard]] const GradientRows& gradient() const noexcept { return gradient_; }
   [[nodiscard]] double edge_mm() const { return shortest_edge_mm(world_from_voxel_); }
   /// A box around all that can be seen of it; nothing can if there is none.
   [[nodiscard]] std::optional<BoxCorners> body() const;
@@ -151,7 +128,7 @@ class CastVolume {
   float iso_;                  ///< 0..1
   PairedRows<Density, std::uint32_t> density_;
   std::optional<PairedRows<Label, std::uint16_t>> labels_;
-  std::optional<GradientRows> gradient_;  ///< blend only
+  GradientRows gradient_;
   Macrocells cells_;
   std::vector<std::uint8_t> active_;  ///< of the cells, and room to load four at the last
   std::vector<MacrocellDepthRange::Cell> outer_cells_;  ///< active, with a face to an empty one

@@ -34,7 +34,7 @@ Caster::Caster(const SceneView& scene, std::span<const CastContent> contents,
   }
   volumes_.reserve(scene.volumes.size());
   for (std::size_t i = 0; i < scene.volumes.size(); ++i) {
-    volumes_.emplace_back(scene.volumes[i], contents[i], options.mode);
+    volumes_.emplace_back(scene.volumes[i], contents[i], options.mode, scene.gradient);
   }
 }
 

@@ -77,6 +77,10 @@ class Caster {
     volumes_[volume].set_transform(world_from_voxel);
   }
 
+  /// By which the surfaces of a volume are shaded.
+  [[nodiscard]] const GradientRows& gradient(std::size_t volume) const {
+    return volumes_[volume].gradient();
+  }
   /// What each picture shows is in one of these boxes.
   [[nodiscard]] std::vector<BoxCorners> bodies() const;
   /// Other colours and opacities for all volumes, as in `TransferFunction`.

@@ -129,13 +129,12 @@ std::vector<PixelRect> ScenePainter::bounds(const Hand& hand, const View& view,
   return bounds;
 }
 
-void ScenePainter::mark_redraw(Layer layer, RedrawTiles& tiles,
-                               std::span<const VolumeContent> contents, const View& view,
+void ScenePainter::mark_redraw(Layer layer, RedrawTiles& tiles, const View& view,
                                const RenderTarget& kept) const {
   for (std::size_t v = 0; v < volumes_.size(); ++v) {
     const Renderer& renderer = renderer_of(v);
     if (layer_of(renderer) != layer) continue;
-    renderer.mark_redraw(indices_[v].index, {volumes_[v], contents[v].density, view, kept}, tiles);
+    renderer.mark_redraw(indices_[v].index, {volumes_[v], view, kept}, tiles);
   }
 }
 
@@ -152,8 +151,7 @@ bool has_moved(const std::optional<Hand>& from, const std::optional<Hand>& to) {
 }  // namespace
 
 PictureLayers::Redraw PictureLayers::redraw(const View& view, const std::optional<Hand>& hand,
-                                            const ScenePainter& painter,
-                                            std::span<const VolumeContent> contents) const {
+                                            const ScenePainter& painter) const {
   const PixelRect all = composite_.all();
   const bool view_changed = shown_ && shown_->view != view;
   const FrameState now{view, view_changed || (shown_ && has_moved(shown_->hand, hand)), hand};
@@ -167,10 +165,10 @@ PictureLayers::Redraw PictureLayers::redraw(const View& view, const std::optiona
     }
   }
   RedrawTiles tiles(composite_.size());
-  painter.mark_redraw(Layer::opaque, tiles, contents, view, opaque_);
+  painter.mark_redraw(Layer::opaque, tiles, view, opaque_);
   if (painter.hand_is_opaque_volume()) tiles.mark(of_hand);
   const std::vector<PixelRect> opaque = tiles.rects();
-  painter.mark_redraw(Layer::translucent, tiles, contents, view, opaque_);
+  painter.mark_redraw(Layer::translucent, tiles, view, opaque_);
   tiles.mark(of_hand);
   if (!now.moving) tiles.mark(coarse_);
   return {now, opaque, tiles.rects()};

@@ -51,7 +51,7 @@ class ScenePainter {
   }
 
   [[nodiscard]] bool any(Layer layer) const;
-  /// Whether a renderer has a property, such as `&Renderer::takes_gradient`.
+  /// Whether a renderer has a property, such as `&Renderer::coarse_while_moving`.
   [[nodiscard]] bool any(bool (Renderer::*property)() const noexcept) const;
   /// True if the picture of the opaque volumes changes when the hand moves.
   [[nodiscard]] bool hand_is_opaque_volume() const;
@@ -60,10 +60,9 @@ class ScenePainter {
                                               PictureSize size) const;
 
   /// Marks the changes since `forget_changes` in the volumes of a layer, but for a tool of voxels.
-  /// `contents` are the volumes of the scene as they are now, `kept` the last picture of its opaque
-  /// volumes.
-  void mark_redraw(Layer layer, RedrawTiles& tiles, std::span<const VolumeContent> contents,
-                   const View& view, const RenderTarget& kept) const;
+  /// `kept` is the last picture of the opaque volumes.
+  void mark_redraw(Layer layer, RedrawTiles& tiles, const View& view,
+                   const RenderTarget& kept) const;
   void forget_changes();
 
  private:
@@ -124,10 +123,9 @@ class PictureLayers {
   explicit PictureLayers(PictureSize size)
       : opaque_(size), composite_(size), smooth_(size), coarse_(size) {}
 
-  /// What must be drawn again to show `view`, `hand` and the volumes, which are now `contents`.
+  /// What must be drawn again to show `view`, `hand` and the volumes.
   [[nodiscard]] Redraw redraw(const View& view, const std::optional<Hand>& hand,
-                              const ScenePainter& painter,
-                              std::span<const VolumeContent> contents) const;
+                              const ScenePainter& painter) const;
   /// Draws it. Returns the parts of `seen` that changed.
   std::vector<PixelRect> draw(const Redraw& redraw, ScenePainter& painter, ScreenPasses& passes);
 

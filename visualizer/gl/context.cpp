@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "visualizer/gl/context.hpp"
 
+#include <algorithm>
 #include <array>
 #include <string_view>
 #include <vector>
@@ -25,15 +26,22 @@ const char* to_string(ContextKind kind) noexcept {
   return "?";
 }
 
+bool is_software_gl(std::string_view renderer) {
+  constexpr auto kKnown = std::to_array<std::string_view>(
+      {"llvmpipe", "softpipe", "swrast", "SWR", "SwiftShader", "Software Rasterizer",
+       "Apple Software Renderer", "Microsoft Basic Render", "GDI Generic"});
+  return std::any_of(kKnown.begin(), kKnown.end(), [&](std::string_view known) {
+    return renderer.find(known) != std::string_view::npos;
+  });
+}
+
 GlDriver query_gl_driver() {
   const auto text = [](GLenum name) {
     const GLubyte* const found = glGetString(name);
     return std::string(found != nullptr ? reinterpret_cast<const char*>(found) : "");
   };
   GlDriver driver{.renderer = text(GL_RENDERER), .version = text(GL_VERSION)};
-  for (const std::string_view known : {"llvmpipe", "softpipe", "swrast", "SWR"}) {
-    driver.software = driver.software || driver.renderer.find(known) != std::string::npos;
-  }
+  driver.software = is_software_gl(driver.renderer);
   glGetIntegerv(GL_MAX_3D_TEXTURE_SIZE, &driver.max_texture_size_3d);
   return driver;
 }

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <string_view>
 
 namespace kerf {
 
@@ -20,6 +21,8 @@ struct GlDriver {
   int max_texture_size_3d = 0;
 };
 [[nodiscard]] GlDriver query_gl_driver();
+/// Whether a GL_RENDERER draws on the processor.
+[[nodiscard]] bool is_software_gl(std::string_view renderer);
 
 /// An OpenGL 4.5 core context, current on the thread that made it until it goes. One at a time.
 class GlContext {

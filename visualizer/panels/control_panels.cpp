@@ -232,7 +232,7 @@ float SettingsPanel::draw(ViewControls& controls, float height, float most_high,
   ImGui::PushItemWidth(130.0F * unit_px());
   choose_tool(controls);
   choose_renderers(controls);
-  if (controls.takes_gradient) choose_gradient(settings);
+  choose_gradient(settings);
   if (controls.has_iso) choose_iso(controls);
   if (!controls.opacities.empty()) choose_opacities(controls);
   choose_clip_plane(settings);

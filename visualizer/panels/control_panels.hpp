@@ -49,7 +49,6 @@ struct ViewControls {
   std::size_t tool = 0;                ///< in the hand, or asked for
   std::vector<std::string> volumes{};  ///< their names
   bool has_iso = false;                ///< a volume shows its iso-surface
-  bool takes_gradient = false;         ///< a renderer shades by that of the settings
   Opacities opacities{};               ///< of all materials, as they are; empty: not shown
   bool write = false;                  ///< the user asks for a file with them
   std::optional<Pointer> over{};       ///< the mouse, while it is over them

@@ -47,7 +47,7 @@ float width_of_slices(const SliceViews& slices) {
   return wide + 2.0F * ImGui::GetStyle().WindowPadding.x;
 }
 
-float draw_slices(const SliceViews& slices, ImTextureID texture, ImVec2 size) {
+void draw_slices(const SliceViews& slices, ImTextureID texture, ImVec2 size) {
   const float gap = panel_gap();
   ImGui::SetNextWindowPos(ImVec2(size.x - gap, gap), 0, ImVec2(1.0F, 0.0F));
   ImGui::Begin("slices", nullptr, kStillPanel);
@@ -66,9 +66,7 @@ float draw_slices(const SliceViews& slices, ImTextureID texture, ImVec2 size) {
     to.AddLine({corner.x, tip.y}, {corner.x + side, tip.y}, colour);
     to.AddLine({tip.x, corner.y}, {tip.x, corner.y + side}, colour);
   }
-  const float area = area_of_panel();
   ImGui::End();
-  return area;
 }
 
 float draw_banner(const std::string& text, bool alarm, ImVec2 size, float controls_x) {
@@ -168,9 +166,9 @@ const ImVec4 kAlert{1.0F, 0.62F, 0.25F, 1.0F};  // the last, light enough for le
 constexpr double kLeastFullForceN = 0.5;
 constexpr double kLeastFullDepthMm = 0.1;
 constexpr float kWide = 170.0F;
+constexpr double kOldMs = 250.0;  // later than this a picture no longer follows the hand
 // What keeps it small with any scene.
-constexpr std::size_t kMostMaterials = 4, kFewMaterials = 3, kSpindleRows = 2, kMostLabel = 16,
-                      kMostName = 12;
+constexpr std::size_t kMostMaterials = 4, kFewMaterials = 3, kMostLabel = 16, kMostName = 12;
 
 void force_bar(const OverlayFigures& figures) {
   const double fraction = std::clamp(figures.force_n / figures.full_force_n, 0.0, 1.0);
@@ -208,10 +206,8 @@ void curve(const char* label, const char* format, const std::vector<ForcePlot::P
 /// The materials with their colours: what was removed of each.
 void material_rows(const OverlayFigures& figures) {
   const std::vector<ScoreRow>& score = figures.score;
-  const std::size_t few = figures.spindle ? kFewMaterials - kSpindleRows : kFewMaterials;
-  const std::size_t most = figures.slices ? few : kMostMaterials;
   if (!score.empty() && figures.score_is_partial) panel_row("materials", "%s", "since joining");
-  const std::size_t shown = std::min(score.size(), most);
+  const std::size_t shown = std::min(score.size(), kMostMaterials);
   for (std::size_t i = 0; i < shown; ++i) {
     const ScoreRow& material = score[i];
     ImGui::TableNextRow();
@@ -228,9 +224,10 @@ void material_rows(const OverlayFigures& figures) {
     ImGui::TableNextColumn();
     ImGui::TextColored(kValueColour, "%.2f mm3", material.removed_mm3);
   }
-  if (shown < score.size()) {
-    panel_row("and others", "%s", std::to_string(score.size() - shown).c_str());
-  }
+  if (shown == score.size()) return;
+  double others_mm3 = 0.0;
+  for (std::size_t i = shown; i < score.size(); ++i) others_mm3 += score[i].removed_mm3;
+  panel_row((std::to_string(score.size() - shown) + " others").c_str(), "%.2f mm3", others_mm3);
 }
 
 }  // namespace
@@ -272,6 +269,10 @@ ImVec2 draw_figures(const OverlayFigures& figures) {
     if (rates && figures.tick_rate_hz) panel_row("servo", "%.0f Hz", *figures.tick_rate_hz);
     if (rates && figures.frame_rate_hz) panel_row("picture", "%.0f /s", *figures.frame_rate_hz);
     if (rates && figures.data_age_ms) panel_row("data age", "%.1f ms", *figures.data_age_ms);
+    if (figures.picture_age_ms) {
+      const bool old = *figures.picture_age_ms > kOldMs;
+      panel_row("picture age", "%.0f ms", *figures.picture_age_ms, old ? kAlert : kValueColour);
+    }
     if (figures.filmed_frames) {
       panel_row("filmed", "%ju frames", std::uintmax_t{*figures.filmed_frames});
     }

@@ -62,7 +62,7 @@ void panel_row(const char* label, const char* format, Value value,
 ImVec2 draw_figures(const OverlayFigures& figures);
 
 /// Three sections through the tip, one below the other: right edge. `texture` holds them so.
-float draw_slices(const SliceViews& slices, ImTextureID texture, ImVec2 size);
+void draw_slices(const SliceViews& slices, ImTextureID texture, ImVec2 size);
 /// How wide that panel is.
 [[nodiscard]] float width_of_slices(const SliceViews& slices);
 

@@ -51,6 +51,7 @@ OverlayFigures OverlayFigures::rounded() const {
     material.removed_mm3 = rounded_to(0.01, material.removed_mm3);
   }
   if (data_age_ms) shown.data_age_ms = rounded_to(0.1, *data_age_ms);
+  if (picture_age_ms) shown.picture_age_ms = rounded_to(10.0, *picture_age_ms);
   return shown;
 }
 
@@ -99,6 +100,18 @@ std::vector<Box> laid_out() {
 }
 
 }  // namespace
+
+int slice_side(PictureSize size, double scale) {
+  constexpr double kThird = 1.0 / 3.0, kLeast = 24.0;
+  const ImGuiStyle plain = style_for(1.0F);
+  const double unit = static_cast<double>(letters_for(scale, size) / kPlainLetters);
+  const double gap = 12.0 * unit;
+  const double label = (static_cast<double>(kPlainLetters) + 2.0 * plain.ItemSpacing.y) * unit;
+  const double wide = kThird * size.width - gap - 2.0 * plain.WindowPadding.x * unit;
+  const double high = kThird * (size.height - 2.0 * (gap + plain.WindowPadding.y * unit)) - label;
+  const double side = std::floor(std::min(wide, high));
+  return side < kLeast ? 0 : static_cast<int>(side);
+}
 
 Overlay::Overlay() {
   ImGui::CreateContext();
@@ -162,7 +175,7 @@ void Overlay::lay_out(OverlayFigures& figures, PictureSize size) {
     if (figures.slices && width_of_slices(*figures.slices) <= right) {
       show(*figures.slices);
       const auto texture = static_cast<std::intptr_t>(slices_->id());
-      room -= draw_slices(*figures.slices, reinterpret_cast<ImTextureID>(texture), all);
+      draw_slices(*figures.slices, reinterpret_cast<ImTextureID>(texture), all);
     }
     if (figures.controls && below >= SettingsPanel::least_high()) {
       controls_x = settings_panel_.draw(*figures.controls, all.y, below, room);
@@ -251,11 +264,13 @@ void ShownRates::show(OverlayFigures& figures, Clock::time_point now) {
     tick_rate_hz_ = figures.tick_rate_hz;
     frame_rate_hz_ = frame_rate_hz();
     data_age_ms_ = figures.data_age_ms;
+    picture_age_ms_ = figures.picture_age_ms;
     filmed_frames_ = figures.filmed_frames;
   }
   figures.tick_rate_hz = tick_rate_hz_;
   figures.frame_rate_hz = frame_rate_hz_;
   figures.data_age_ms = data_age_ms_;
+  figures.picture_age_ms = picture_age_ms_;
   figures.filmed_frames = filmed_frames_;
 }
 

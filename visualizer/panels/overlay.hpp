@@ -86,6 +86,7 @@ struct OverlayFigures {
   std::optional<double> tick_rate_hz;
   std::optional<double> frame_rate_hz;
   std::optional<double> data_age_ms;
+  std::optional<double> picture_age_ms;        ///< since all of the picture was as finely drawn
   std::optional<std::uint64_t> filmed_frames;  ///< written so far; none: no video
   std::string banner;                          ///< shown large; empty: there is nothing to say
   bool alarm = false;                          ///< the banner reports a fault
@@ -108,8 +109,9 @@ struct OverlayFigures {
 /// The panels over the picture, by Dear ImGui, which is given the position of the mouse: it needs
 /// no window. One at a time, on the thread of the GL context.
 ///
-/// Together they cover at most a quarter of a picture of 640x480 or more: what a full panel has no
-/// room for is scrolled to or, of the keys, on a page of its own. A menu that is open comes on top.
+/// Together, without the slices, they cover at most a quarter of a picture of 640x480 or more: what
+/// a full panel has no room for is scrolled to or, of the keys, on a page of its own. A menu that
+/// is open comes on top.
 class Overlay {
  public:
   Overlay();
@@ -140,6 +142,10 @@ class Overlay {
   std::optional<SliceViews> uploaded_;
   std::optional<GlTexture2D> slices_;
 };
+
+/// Side of the three slices in a picture of this size, whose panel takes a third of its width or
+/// all of its height; 0 if there is no room.
+[[nodiscard]] int slice_side(PictureSize size, double scale);
 
 /// What came of something that the user asked for.
 struct Notice {
@@ -183,7 +189,7 @@ class ShownRates {
 
   std::deque<Clock::time_point> frames_;
   std::optional<Clock::time_point> shown_since_;
-  std::optional<double> tick_rate_hz_, frame_rate_hz_, data_age_ms_;
+  std::optional<double> tick_rate_hz_, frame_rate_hz_, data_age_ms_, picture_age_ms_;
   std::optional<std::uint64_t> filmed_frames_;
 };
 

@@ -128,7 +128,6 @@ void Picture::set_view(const Session& session, const ViewSettings& settings) {
 ViewControls Picture::controls() const {
   ViewControls controls{.settings = settings_, .own_iso = scene_.main_volume().iso / kDensityMax};
   for (const VolumeView& volume : scene_.volumes) controls.volumes.push_back(volume.name);
-  controls.takes_gradient = painter_->any(&Renderer::takes_gradient);
   controls.has_iso = painter_->any(ScenePainter::Layer::opaque);
   if (painter_->any(ScenePainter::Layer::translucent)) {
     controls.opacities = opacities();
@@ -240,16 +239,16 @@ Redrawn Picture::draw(const Session& session, const OverlayFigures& figures,
     for (std::size_t eye = 0; eye < views.size(); ++eye) eyes_.emplace_back(size);
     shown_in_ = 0;
   }
-  const std::vector<VolumeContent> contents = session.contents();
   std::vector<PictureLayers::Redraw> redraws;
   for (std::size_t eye = 0; eye < views.size(); ++eye) {
-    redraws.push_back(eyes_[eye].redraw(views[eye], hand, *painter_, contents));
+    redraws.push_back(eyes_[eye].redraw(views[eye], hand, *painter_));
   }
   painter_->forget_changes();
   const OverlayFigures panel = figures.rounded();
   const bool same_target = target.framebuffer() == shown_in_ && target.size() == shown_size_;
   const bool rests = std::all_of(redraws.begin(), redraws.end(),
                                  [](const auto& one) { return one.composite.empty(); });
+  since_drawn_ = Stopwatch();
   if (rests && same_target && panel == shown_figures_) return {};
 
   if (!same_target) clear(target);  // an odd column belongs to neither eye

@@ -38,6 +38,8 @@ class Picture {
   Redrawn draw(const Session& session, const OverlayFigures& figures, const RenderTarget& target);
   /// Draws the panels of the last `draw` over another target of its size, as that did.
   void draw_panels(const RenderTarget& target);
+  /// Since the last `draw` began.
+  [[nodiscard]] double age_ms() const { return since_drawn_.wall_ms(); }
   /// The next `draw` draws everything.
   void redraw_all() noexcept { eyes_.clear(); }
 
@@ -93,6 +95,7 @@ class Picture {
   glm::dvec3 low_mm_{0, 0, 0}, high_mm_{0, 0, 0};  ///< the box of all volumes
   ScreenPasses passes_;
   std::vector<PictureLayers> eyes_;  ///< empty: draw everything
+  Stopwatch since_drawn_;
   Overlay overlay_;
   OverlayFigures shown_figures_;
   GLuint shown_in_ = 0;     ///< framebuffer, whose name may be given to a later one

@@ -100,14 +100,11 @@ RedrawJob redraw_job(const ChangedCells& cells, const KeptPicture& kept) {
   return job;
 }
 
-/// Adds the volume itself, for surfaces whose shading samples it.
-void put_density(RedrawJob& job, const ChangedCells& cells, const KeptPicture& kept) {
-  const VoxelGrid& grid = kept.volume.bricks.grid;
-  job.density = kept.density.data();
-  job.extent[0] = grid.nx;
-  job.extent[1] = grid.ny;
-  job.extent[2] = grid.nz;
-  put(job.first_voxel, -cells.low());
+/// Adds the normals of surfaces whose shading samples the volume along them.
+void put_gradient(RedrawJob& job, const GradientRows& gradient, const ChangedCells& cells,
+                  const KeptPicture& kept) {
+  job.gradient = gradient.view();
+  put(job.border, -1.0 - cells.low());
   const glm::dmat4 eye_from_voxel = kept.view.eye_from_world * kept.volume.world_from_voxel;
   const glm::dvec3 half = 0.5 * (cells.high() - cells.low());
   put(job.centre_mm, glm::dvec3(eye_from_voxel * glm::dvec4(cells.low() + half, 1.0)));
@@ -132,11 +129,11 @@ void mark_if(RedrawTiles& tiles, const PixelRect& within, const Changes& changes
 }  // namespace
 
 void mark_rays(std::span<const VoxelBox> changed, const RayFootprint& footprint, bool end_at_kept,
-               const KeptPicture& kept, RedrawTiles& tiles) {
+               const GradientRows* shading, const KeptPicture& kept, RedrawTiles& tiles) {
   const VoxelBox all_changed = united(changed);
   if (changed.size() > kMaxBoxes) changed = {&all_changed, 1};
   const CastKernels& kernels = *cast_kernels()[0];
-  const double taps_vox = footprint.taps_normal ? kLongestTapVox : 0.0;
+  const double taps_vox = shading != nullptr ? kLongestTapVox : 0.0;
   // The pixels whose rays may pass a box in voxel coordinates, or `vox` beside it.
   const auto pixels_around = [&](const glm::dvec3& low, const glm::dvec3& high, double vox) {
     return screen_bounds(box_corners(low - vox, high + vox, kept.volume.world_from_voxel),
@@ -160,8 +157,8 @@ void mark_rays(std::span<const VoxelBox> changed, const RayFootprint& footprint,
       job.depth = depth.data();
     }
     mark_if(tiles, passing, [&](const PixelRect& tile) { return kernels.rays_touch(job, tile); });
-    if (!footprint.taps_normal) continue;
-    put_density(job, cells, kept);
+    if (shading == nullptr) continue;
+    put_gradient(job, *shading, cells, kept);
     mark_if(tiles, all, [&](const PixelRect& tile) { return kernels.shading_touches(job, tile); });
   }
 }

@@ -9,6 +9,7 @@
 
 #include "shared/volume/voxel_grid.hpp"
 #include "visualizer/cast/cast_kernels.hpp"
+#include "visualizer/cast/gradient_rows.hpp"
 #include "visualizer/redraw/redraw_tiles.hpp"
 
 namespace kerf {
@@ -41,8 +42,10 @@ class ChangedCells {
 
 /// Marks the tiles with a ray whose footprint holds a voxel of `changed`; all other tiles would be
 /// drawn with the same bits again. `end_at_kept`: rays end at the depth of the kept picture, as
-/// those of opaque volumes do. None of the boxes is empty.
+/// those of opaque volumes do. `shading`: gradients by which the surfaces are shaded where rays
+/// end, as they are now; null if their shading samples nothing along their normals. None of the
+/// boxes is empty.
 void mark_rays(std::span<const VoxelBox> changed, const RayFootprint& footprint, bool end_at_kept,
-               const KeptPicture& kept, RedrawTiles& tiles);
+               const GradientRows* shading, const KeptPicture& kept, RedrawTiles& tiles);
 
 }  // namespace kerf

@@ -48,12 +48,11 @@ class RedrawTiles {
   std::vector<std::uint8_t> marked_;
 };
 
-/// The last picture, and one of its volumes as it is now: the input of a redraw.
+/// The last picture, and one of its volumes: the input of a redraw.
 struct KeptPicture {
   const VolumeView& volume;
-  std::span<const Density> density;  ///< all of the volume
-  const View& view;                  ///< of the last picture and of the next
-  const RenderTarget& target;        ///< opaque volumes of the last picture, with their depth
+  const View& view;            ///< of the last picture and of the next
+  const RenderTarget& target;  ///< opaque volumes of the last picture, with their depth
 };
 
 /// Marks the tiles in which one of `triangles`, old or new, may cover the centre of a pixel. A tile

@@ -25,13 +25,15 @@ class CastRenderer final : public Renderer {
   void set_opacities(std::span<const MaterialView> materials,
                      std::span<const VolumeContent> contents) override;
   void draw(const View& view, const RenderTarget& target) override;
-  [[nodiscard]] bool takes_gradient() const noexcept override { return false; }
   [[nodiscard]] bool translucent() const noexcept override { return mode_ == CastMode::blend; }
 
  private:
   void upload(std::size_t volume, std::span<const Density> density,
               const ChangedBricks& changed) override {
     caster_.update(volume, density, changed);
+  }
+  [[nodiscard]] const GradientRows* surface_gradient(std::size_t volume) const override {
+    return mode_ == CastMode::iso ? &caster_.gradient(volume) : nullptr;
   }
   /// The picture on both sides.
   struct Frame {

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <cstdint>
-#include <optional>
 #include <span>
 #include <string_view>
 #include <vector>
 
+#include "visualizer/cast/gradient_rows.hpp"
 #include "visualizer/gl/program.hpp"
 #include "visualizer/render/macrocell_faces.hpp"
 #include "visualizer/render/renderer.hpp"
@@ -14,14 +13,14 @@
 
 namespace kerf {
 
-/// One volume for `iso`: what it is made of, its macrocells, and the gradient if it spans too
-/// many voxels for a shader: 8 bytes a voxel. Uploaded whole once, then by changed bricks.
+/// One volume for `iso`: what it is made of, its macrocells and its gradient. Uploaded whole once,
+/// then by changed bricks.
 class VolumeOnGpu {
  public:
   /// `skip_empty` false takes every cell for active: the slow obvious picture, for comparison.
   /// Throws VisualizerError if the volume is beyond `max_texture_size`.
   VolumeOnGpu(const VolumeView& volume, const VolumeContent& content, int max_texture_size,
-              bool skip_empty, GradientFilter gradient = GradientFilter::corners);
+              bool skip_empty, GradientFilter gradient);
 
   /// Uploads bricks `changed` of `density` (the whole volume) and the cells they touch.
   void update_bricks(std::span<const Density> density, const ChangedBricks& changed);
@@ -33,16 +32,13 @@ class VolumeOnGpu {
   void bind(const GlProgram& program, const View& view) const;
 
   [[nodiscard]] const CellsOnGpu& cells() const noexcept { return cells_; }
+  [[nodiscard]] const GradientRows& gradient() const noexcept { return gradient_; }
 
  private:
   SolidOnGpu solid_;
   CellsOnGpu cells_;
-
-  using GradientTexel = std::array<std::int16_t, 4>;  ///< 32767 as 1; the last is nothing
-  void upload_gradient(std::span<const Density> density, const VoxelBox& box);
-  std::optional<VoxelTexture> gradient_;
-  std::vector<glm::vec3> gradients_;  ///< of the last upload
-  std::vector<GradientTexel> texels_;
+  GradientRows gradient_;
+  VoxelTexture gradient_texture_;
 };
 
 /// Iso-surfaces by ray casting in a fragment shader.
@@ -66,16 +62,17 @@ class IsoRenderer final : public Renderer {
     volumes_[volume].set_transform(world_from_voxel);
   }
   void draw(const View& view, const RenderTarget& target) override;
-  [[nodiscard]] RayFootprint footprint() const noexcept override;
 
  private:
   void upload(std::size_t volume, std::span<const Density> density,
               const ChangedBricks& changed) override {
     volumes_[volume].update_bricks(density, changed);
   }
+  [[nodiscard]] const GradientRows* surface_gradient(std::size_t volume) const override {
+    return &volumes_[volume].gradient();
+  }
   void cast_rays(const VolumeOnGpu& volume, const View& view, const RenderTarget& target);
 
-  GradientFilter gradient_;
   GlProgram cast_program_;
   GlTexture2D palette_;
   std::vector<VolumeOnGpu> volumes_;

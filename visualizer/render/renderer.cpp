@@ -52,12 +52,11 @@ const Kind& find_kind(std::string_view name) {
   throw VisualizerError("--renderer: " + std::string(name) + unknown_word(name, renderer_kinds()));
 }
 
-// A density is interpolated between two voxels (1 edge), a surface has its gradient from a cube two
-// voxels wide (2).
-constexpr RayFootprint kSurfaceFootprint{.along = 3, .at_end = 5, .taps_normal = true};
-// A sample within takes its material from 1.5 edges up the gradient (translucent_sample.frag), or
-// its gradient from five voxels along each axis (3).
-constexpr RayFootprint kTranslucentFootprint{.along = 6}, kWideTranslucentFootprint{.along = 7};
+// A density is interpolated between two voxels (1 edge), and so are gradients. A sample within
+// takes its material from 1.5 edges up the gradient (translucent_sample.frag).
+constexpr int kGradientVox = gradient_reach(GradientFilter::adaptive) + 1;  // of the widest
+constexpr RayFootprint kSurfaceFootprint{.along = 3, .at_end = 2 * kGradientVox + 1};
+constexpr RayFootprint kTranslucentFootprint{.along = 2 * kGradientVox + 1};
 
 }  // namespace
 
@@ -65,7 +64,7 @@ void Renderer::mark_redraw(std::size_t volume, const KeptPicture& kept, RedrawTi
   std::vector<VoxelBox> boxes;
   changed_[volume].for_each_box(kept.volume.bricks,
                                 [&](const VoxelBox& box) { boxes.push_back(box); });
-  mark_rays(boxes, footprint(), !translucent(), kept, tiles);
+  mark_rays(boxes, footprint(), !translucent(), surface_gradient(volume), kept, tiles);
 }
 
 void Renderer::forget_changes() {
@@ -73,8 +72,7 @@ void Renderer::forget_changes() {
 }
 
 RayFootprint Renderer::footprint() const noexcept {
-  if (!translucent()) return kSurfaceFootprint;
-  return takes_gradient() ? kWideTranslucentFootprint : kTranslucentFootprint;
+  return translucent() ? kTranslucentFootprint : kSurfaceFootprint;
 }
 
 std::unique_ptr<Renderer> make_renderer(std::string_view kind, const SceneView& scene,

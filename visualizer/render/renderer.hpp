@@ -55,15 +55,17 @@ class Renderer {
   /// first: some renderers look through.
   virtual void draw(const View& view, const RenderTarget& target) = 0;
   /// A ray whose footprint holds no changed voxel keeps its colour.
-  [[nodiscard]] virtual RayFootprint footprint() const noexcept;
-  /// Shades from the gradient that the scene names; else always from `GradientFilter::corners`.
-  [[nodiscard]] virtual bool takes_gradient() const noexcept { return true; }
+  [[nodiscard]] RayFootprint footprint() const noexcept;
   /// Lets what lies behind a surface shine through, so that it must be drawn before.
   [[nodiscard]] virtual bool translucent() const noexcept { return false; }
 
  private:
   virtual void upload(std::size_t volume, std::span<const Density> density,
                       const ChangedBricks& changed) = 0;
+  /// By which the surfaces of a volume are shaded pixel by pixel; null if none are.
+  [[nodiscard]] virtual const GradientRows* surface_gradient(std::size_t /*volume*/) const {
+    return nullptr;
+  }
 
   std::vector<ChangedBricks> changed_;  ///< by volume
 };

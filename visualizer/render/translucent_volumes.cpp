@@ -66,9 +66,11 @@ void TranslucentVolume::upload(std::span<const Density> density, const VoxelBox&
 void TranslucentVolume::update_bricks(std::span<const Density> density,
                                       const ChangedBricks& changed) {
   for (const ChangedBrick& one : changed) {
-    const VoxelBox brick = bricks_.voxels(one.id);
-    upload(density, brick.grown(gradient_reach(gradient_)).clipped(bricks_.grid.box()));
+    const VoxelBox box = ChangedBricks::bounds(one, bricks_);
+    if (box.empty()) continue;
+    upload(density, box.grown(gradient_reach(gradient_)).clipped(bricks_.grid.box()));
     if (!material_texels_) continue;
+    const VoxelBox brick = bricks_.voxels(one.id);
     // A voxel without a label has the material of its density.
     materials_.upload(material_texels_->of(brick, density).data(), brick);
   }

@@ -38,12 +38,12 @@ VoxelTexture::VoxelTexture(const VoxelGrid& grid, TexelFormat format, const void
   glClearTexImage(texture_.id(), 0, format.format, format.type, air);
 }
 
-void VoxelTexture::upload_from(const void* whole, const VoxelBox& box) {
-  glPixelStorei(GL_UNPACK_ROW_LENGTH, grid_.nx);
-  glPixelStorei(GL_UNPACK_IMAGE_HEIGHT, grid_.ny);
-  glPixelStorei(GL_UNPACK_SKIP_PIXELS, box.lo.x);
-  glPixelStorei(GL_UNPACK_SKIP_ROWS, box.lo.y);
-  glPixelStorei(GL_UNPACK_SKIP_IMAGES, box.lo.z);
+void VoxelTexture::upload_from(const void* whole, const VoxelBox& box, int border) {
+  glPixelStorei(GL_UNPACK_ROW_LENGTH, grid_.nx + 2 * border);
+  glPixelStorei(GL_UNPACK_IMAGE_HEIGHT, grid_.ny + 2 * border);
+  glPixelStorei(GL_UNPACK_SKIP_PIXELS, box.lo.x + border);
+  glPixelStorei(GL_UNPACK_SKIP_ROWS, box.lo.y + border);
+  glPixelStorei(GL_UNPACK_SKIP_IMAGES, box.lo.z + border);
   upload(whole, box);
   for (const GLenum name : kUnpackPlaces) {
     glPixelStorei(name, 0);  // others upload too

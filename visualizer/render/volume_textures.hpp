@@ -33,8 +33,8 @@ class VoxelTexture {
   /// Filled with `air`, a texel of the format; null for zeros.
   VoxelTexture(const VoxelGrid& grid, TexelFormat format, const void* air = nullptr);
 
-  /// Uploads `box` out of a whole volume's texels, x fastest.
-  void upload_from(const void* whole, const VoxelBox& box);
+  /// Uploads `box` out of a whole volume's texels, x fastest, which has a border of so many.
+  void upload_from(const void* whole, const VoxelBox& box, int border = 0);
   /// Uploads texels that fill `box`, x fastest.
   void upload(const void* texels, const VoxelBox& box);
 

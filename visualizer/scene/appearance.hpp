@@ -44,7 +44,7 @@ struct ViewSettings {
   std::string renderer = "iso";  ///< of all volumes, or of each: renderer.hpp
   std::optional<double> iso{};   ///< of all volumes, 0..1 of full density; none: each its own
   Opacities opacities{};         ///< of the others: their own
-  GradientFilter gradient = GradientFilter::corners;
+  GradientFilter gradient = kDefaultGradient;
   ClipPlane clip{};
   Stereo stereo{};
   bool voxel_tool = false;    ///< the tool is a volume, not a mesh

@@ -87,9 +87,9 @@ struct SceneView {
   std::vector<ToolView> tools;
   std::vector<MaterialView> materials;
   DeviceFrame device{};
-  GradientFilter gradient = GradientFilter::corners;  ///< by which its volumes are shaded
-  bool voxel_tool = false;                            ///< the tool is one volume more
-  bool has_spindle = false;                           ///< force cuts, and something turns the tool
+  GradientFilter gradient = kDefaultGradient;  ///< by which its volumes are shaded
+  bool voxel_tool = false;                     ///< the tool is one volume more
+  bool has_spindle = false;                    ///< force cuts, and something turns the tool
 
   /// Of the boxes of all volumes.
   [[nodiscard]] std::vector<glm::dvec3> corners() const;

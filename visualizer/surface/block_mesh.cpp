@@ -146,25 +146,6 @@ class Neighbourhood {
   /// Sample (0, 0, 0) is the block's start; each part -1..9.
   [[nodiscard]] const Density* at(int x, int y, int z) const { return &density_[index(x, y, z)]; }
 
-  /// `GradientFilter::corners` of a sample 0..8, up to a factor.
-  [[nodiscard]] static glm::vec3 corner_gradient(const Density* at) {
-    // Sum and difference along x of the four rows, then along y and z.
-    std::array<int, 4> sum{};
-    std::array<int, 4> rise{};
-    for (int row = 0; row < 4; ++row) {
-      const Density* middle = at + ((row & 1) * 2 - 1) * kStride[1] + ((row & 2) - 1) * kStride[2];
-      sum[static_cast<std::size_t>(row)] = middle[1] + middle[-1];
-      rise[static_cast<std::size_t>(row)] = middle[1] - middle[-1];
-    }
-    return glm::vec3(rise[0] + rise[1] + rise[2] + rise[3], sum[1] - sum[0] + sum[3] - sum[2],
-                     sum[2] + sum[3] - sum[0] - sum[1]);
-  }
-  /// `GradientFilter::central` of a sample 0..8, up to a factor.
-  [[nodiscard]] static glm::vec3 central_gradient(const Density* at) {
-    return glm::vec3(at[kStride[0]] - at[-kStride[0]], at[kStride[1]] - at[-kStride[1]],
-                     at[kStride[2]] - at[-kStride[2]]);
-  }
-
  private:
   static constexpr std::size_t index(int x, int y, int z) {
     return static_cast<std::size_t>((z + 1) * kStride[2] + (y + 1) * kStride[1] + x + 1);
@@ -324,30 +305,6 @@ std::uint16_t unit16(float fraction) {
   return static_cast<std::uint16_t>(std::clamp(fraction, 0.0F, 1.0F) * 65535.0F + 0.5F);
 }
 
-/// `GradientFilter::farid5` up to a factor: it looks farther than a neighbourhood.
-glm::vec3 wide_gradient(const VolumeSamples& volume, VoxelIndex at) {
-  constexpr FilterTaps kTaps = gradient_taps(GradientFilter::farid5);
-  constexpr int kReach = gradient_reach(GradientFilter::farid5);
-  glm::vec3 sum(0.0F);
-  for (int z = 0; z <= 2 * kReach; ++z) {
-    for (int y = 0; y <= 2 * kReach; ++y) {
-      float slope = 0.0F, smooth = 0.0F;
-      for (int x = 0; x <= 2 * kReach; ++x) {
-        const auto i = static_cast<std::size_t>(x);
-        const float density =
-            volume.density_at(VoxelIndex{at.x + x - kReach, at.y + y - kReach, at.z + z - kReach});
-        slope += kTaps.slope[i] * density;
-        smooth += kTaps.smooth[i] * density;
-      }
-      const auto j = static_cast<std::size_t>(y), k = static_cast<std::size_t>(z);
-      sum += glm::vec3(kTaps.smooth[j] * kTaps.smooth[k] * slope,
-                       kTaps.slope[j] * kTaps.smooth[k] * smooth,
-                       kTaps.smooth[j] * kTaps.slope[k] * smooth);
-    }
-  }
-  return sum;
-}
-
 /// From what the vertex holds, not from what it was made of: to do it again gives the same bits.
 FinePoint inward_of(const SurfaceVertex& vertex, const glm::vec3& inverse_square_spacing) {
   glm::vec3 along(vertex.normal[0], vertex.normal[1], vertex.normal[2]);
@@ -358,19 +315,6 @@ FinePoint inward_of(const SurfaceVertex& vertex, const glm::vec3& inverse_square
   }
   const glm::vec3 step = along * (-float{kFinePerVoxel} / length);
   return {rounded(step.x), rounded(step.y), rounded(step.z)};
-}
-
-/// Of a voxel `at`, whose density is `sample` of a neighbourhood; up to a factor.
-glm::vec3 gradient_of(const SurfaceSource& source, const Density* sample, VoxelIndex at) {
-  switch (source.gradient) {
-    case GradientFilter::corners:
-      return Neighbourhood::corner_gradient(sample);
-    case GradientFilter::central:
-      return Neighbourhood::central_gradient(sample);
-    case GradientFilter::farid5:
-      break;
-  }
-  return wide_gradient(source.volume, at);
 }
 
 /// Computes normal, colour and ambient occlusion of a vertex from its position and the volume. The
@@ -391,9 +335,9 @@ void dress(SurfaceVertex& vertex, const SurfaceSource& source, VoxelIndex start,
   const Density* low = near.at(from[0], from[1], from[2]);
   const Density* high = low + Neighbourhood::kStride[axis];
   VoxelIndex end{start.x + from[0], start.y + from[1], start.z + from[2]};
-  const glm::vec3 low_slope = gradient_of(source, low, end);
+  const glm::vec3 low_slope = source.gradient->at(end);
   (axis == 0 ? end.x : axis == 1 ? end.y : end.z) += 1;
-  const glm::vec3 high_slope = gradient_of(source, high, end);
+  const glm::vec3 high_slope = source.gradient->at(end);
   const glm::vec3 slope =
       glm::mix(low_slope, high_slope, static_cast<float>(along) / float{kFinePerVoxel});
   const float length = std::sqrt(glm::dot(slope, slope));

@@ -9,7 +9,7 @@
 
 #include <glm/glm.hpp>
 
-#include "visualizer/scene/gradient.hpp"
+#include "visualizer/cast/gradient_rows.hpp"
 #include "visualizer/surface/vertex_shading.hpp"
 #include "visualizer/surface/volume_samples.hpp"
 
@@ -88,7 +88,7 @@ struct SurfaceSource {
   /// direction, in voxels, of the normal in the world.
   glm::vec3 inverse_square_spacing{1.0F};
   const VertexShading* shading = nullptr;
-  GradientFilter gradient = GradientFilter::corners;  ///< of the normals
+  const GradientRows* gradient = nullptr;  ///< of the normals
 };
 
 /// The changed cells of a block's mesh: triangles in them came, went or changed colour.

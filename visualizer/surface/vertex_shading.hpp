@@ -16,7 +16,7 @@ namespace kerf {
 class VertexShading {
  public:
   /// A voxel farther from a point than this has no influence on its shading.
-  static constexpr int kColourReachVox = 4;
+  static constexpr int kColourReachVox = gradient_reach(GradientFilter::adaptive) + 1;
   static constexpr int kAoReachVox = 13;
 
   VertexShading(const std::vector<MaterialView>& materials, Density iso);

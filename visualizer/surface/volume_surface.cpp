@@ -37,7 +37,7 @@ VolumeSurface::VolumeSurface(const VolumeView& volume, const std::vector<Materia
       iso_(std::max(volume.iso, Density{1})),
       inverse_square_spacing_(inverse_square_spacing(volume.world_from_voxel)),
       shading_(materials, iso_),
-      gradient_(gradient),
+      gradient_(gradient, bricks_.grid, density),
       labels_(labels.begin(), labels.end()),
       meshes_(blocks_.voxel_count()),
       work_(blocks_.voxel_count(), Work::none) {
@@ -53,7 +53,7 @@ VolumeSurface::VolumeSurface(const VolumeView& volume, const std::vector<Materia
 }
 
 SurfaceSource VolumeSurface::source(std::span<const Density> density) const {
-  return {{bricks_.grid, density, labels_}, iso_, inverse_square_spacing_, &shading_, gradient_};
+  return {{bricks_.grid, density, labels_}, iso_, inverse_square_spacing_, &shading_, &gradient_};
 }
 
 VoxelIndex VolumeSurface::block(std::uint32_t id) const noexcept {
@@ -77,6 +77,7 @@ std::span<const std::uint32_t> VolumeSurface::update(std::span<const Density> de
     const VoxelBox box = ChangedBricks::bounds(brick, bricks_);
     if (box.empty()) continue;
     all = all.united(box);
+    gradient_.update(box, density);
     mark(blocks_on(box), Work::mesh);
     mark(blocks_on(box.grown(VertexShading::kAoReachVox)), Work::shading);
   }

@@ -21,7 +21,7 @@ class VolumeSurface {
   /// `density` and `labels` (empty, or one per voxel) cover the volume. The labels are copied.
   VolumeSurface(const VolumeView& volume, const std::vector<MaterialView>& materials,
                 std::span<const Density> density, std::span<const Label> labels,
-                GradientFilter gradient = GradientFilter::corners);
+                GradientFilter gradient = kDefaultGradient);
 
   /// Follows a change; `density` is all of the volume as it is now. `changed` must hold every voxel
   /// that changed since the last call. Returns the blocks whose mesh changed, ascending.
@@ -50,7 +50,7 @@ class VolumeSurface {
   Density iso_;
   glm::vec3 inverse_square_spacing_;
   VertexShading shading_;
-  GradientFilter gradient_;
+  GradientRows gradient_;
   std::vector<Label> labels_;
   std::vector<BlockMesh> meshes_;
   std::vector<Work> work_;                ///< by block; all none between calls

@@ -56,7 +56,7 @@ TEST_CASE("a size that is none is refused with the limits") {
 }
 
 TEST_CASE("the gradient and a tool of voxels are part of the first look") {
-  CHECK(parse({})->settings.gradient == GradientFilter::corners);
+  CHECK(parse({})->settings.gradient == GradientFilter::adaptive);
   CHECK_FALSE(parse({})->settings.voxel_tool);
   const ViewSettings settings = parse({"--gradient", "farid5", "--voxel-tool"})->settings;
   CHECK(settings.gradient == GradientFilter::farid5);

@@ -42,7 +42,7 @@ OverlayFigures crowded() {
     controls.tools.push_back({"1.6 mm tool " + std::to_string(tool), side});
   }
   for (int v = 0; v < 8; ++v) controls.volumes.push_back("volume " + std::to_string(v));
-  controls.has_iso = controls.takes_gradient = true;
+  controls.has_iso = true;
   controls.settings.clip.on = true;
   for (int m = 0; m < 31; ++m) controls.opacities["material " + std::to_string(m)] = 0.5;
   return figures;
@@ -63,7 +63,18 @@ std::vector<ForcePlot::Point> some_plot() {
   return plot;
 }
 
-/// Share of a black picture's pixels that `overlay` changes.
+/// Share of a white picture's pixels that are none any longer, in its first columns.
+double covered_left_of(int column, const std::vector<std::uint8_t>& rgb, PictureSize size) {
+  int count = 0;
+  for (std::size_t i = 0; i < rgb.size(); i += 3) {
+    const bool is_white = rgb[i] == 255 && rgb[i + 1] == 255 && rgb[i + 2] == 255;
+    const auto x = static_cast<int>(i / 3 % static_cast<std::size_t>(size.width));
+    count += x < column && !is_white ? 1 : 0;
+  }
+  return static_cast<double>(count) / (size.width * size.height);
+}
+
+/// Share of the pixels that `overlay` changes.
 double covered(Overlay& overlay, const OverlayFigures& figures, PictureSize size,
                std::vector<std::uint8_t>* picture = nullptr) {
   const RenderTarget target(size);
@@ -75,12 +86,8 @@ double covered(Overlay& overlay, const OverlayFigures& figures, PictureSize size
   overlay.draw(target);
   glDisable(GL_SCISSOR_TEST);
   const std::vector<std::uint8_t> rgb = target.read_rgb();
-  int count = 0;
-  for (std::size_t i = 0; i < rgb.size(); i += 3) {
-    count += rgb[i] != 255 || rgb[i + 1] != 255 || rgb[i + 2] != 255 ? 1 : 0;
-  }
   if (picture != nullptr) *picture = rgb;
-  return static_cast<double>(count) / (size.width * size.height);
+  return covered_left_of(size.width, rgb, size);
 }
 
 /// The middle ninth of the picture is as it was.
@@ -108,15 +115,44 @@ TEST_CASE("panels cover at most a quarter of a window, and not its middle, whate
         CAPTURE(plot);
         OverlayFigures figures = crowded();
         figures.scale = scale;
-        if (slices) figures.slices = grey_slices(static_cast<int>(56 * scale));
+        const int side = slice_side(size, scale);
+        if (slices) figures.slices = grey_slices(side);
         if (plot) figures.plot = some_plot();
         std::vector<std::uint8_t> picture;
         const double fraction = covered(overlay, figures, size, &picture);
-        CHECK(fraction < 0.25);
+        // The slices with the edges of their panel are at the right.
+        const int beside = slices ? side + static_cast<int>(34.0 * scale) : 0;
+        CHECK(covered_left_of(size.width - beside, picture, size) < 0.25);
         CHECK(fraction > 0.1);  // it shows them
         CHECK(middle_is_free(picture, size));
       }
     }
+  }
+}
+
+TEST_CASE("slices are as large as a third of the window holds, and none are too small to read") {
+  CHECK(slice_side({1280, 800}, 1.0) > 220);  // three of them are as high as the window
+  CHECK(slice_side({600, 1200}, 1.0) > 160);  // a third of its width
+  CHECK(slice_side({640, 480}, 1.0) > 110);
+  CHECK(slice_side({1280, 960}, 2.0) > 220);
+  for (const PictureSize size : {PictureSize{640, 100}, PictureSize{120, 700}, PictureSize{1, 1}}) {
+    CHECK(slice_side(size, 1.0) == 0);
+  }
+}
+
+TEST_CASE("beside slices and a spindle the score counts every material") {
+  const auto context = make_headless_context();
+  Overlay overlay;
+  OverlayFigures figures = crowded();
+  figures.slices = grey_slices(slice_side(kPlain, 1.0));
+  std::vector<std::uint8_t> before, after;
+  static_cast<void>(covered(overlay, figures, kPlain, &before));
+  for (const std::size_t material : {0, 1, 2, 3, 4, 30}) {
+    CAPTURE(material);
+    OverlayFigures more = figures;
+    more.score[material].removed_mm3 += 1.0;
+    static_cast<void>(covered(overlay, more, kPlain, &after));
+    CHECK(after != before);
   }
 }
 

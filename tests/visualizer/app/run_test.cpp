@@ -141,8 +141,9 @@ bool appears(const fs::path& file) {
 TEST_CASE("a headless run writes its pictures, follows the milling and ends with the controller") {
   if (!have_gl()) return;
   const Place place;
-  const VisualizerOptions options = place.options();
+  VisualizerOptions options = place.options();
   // The visualizer is started first and waits.
+  options.renderer_is_given = false;
   auto code = std::async(std::launch::async, [&] { return run_headless(options); });
   std::this_thread::sleep_for(std::chrono::milliseconds(100));
   GrooveController miller;
@@ -168,6 +169,8 @@ TEST_CASE("a headless run writes its pictures, follows the milling and ends with
   CHECK(report["frames"] == 4);
   CHECK(report["bricks_uploaded"] > 64);  // all of them once, then what changed
   CHECK(report["gl_renderer"] != "");
+  const bool software = is_software_gl(report["gl_renderer"].get<std::string>());
+  CHECK(report["renderer"] == (software ? "cast" : "iso"));
   CHECK(report["cpu_ms"]["p50"] > 0.0);
   // Each picture but the last is 50 ticks of a millisecond after the one before, and a cut comes
   // every eight.

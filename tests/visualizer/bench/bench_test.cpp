@@ -67,7 +67,7 @@ TEST_CASE("the bench's report has a row for each kind of frame") {
   const std::vector<PictureRow> rows{row("iso", 0, false, 50.0), row("iso", 16, true, 4.0),
                                      row("cast", 0, false, 8.0)};
   const PictureFigures figures{.rows = rows,
-                               .gradients = {{GradientFilter::corners, 0.5, 1.25}},
+                               .gradients = {{GradientFilter::corners, 0.5, 1.25, 2.5, 3.0, 4.5}},
                                .gl_renderer = "a driver",
                                .size = {512, 512},
                                .cores = 2};
@@ -75,11 +75,12 @@ TEST_CASE("the bench's report has a row for each kind of frame") {
   CHECK(report["gl_renderer"] == "a driver");
   CHECK(report["rows"].size() == 3);
   CHECK(report["rows"][1]["volume"] == "256x256x161");
-  CHECK(report["rows"][1]["gradient"] == "corners");
+  CHECK(report["rows"][1]["gradient"] == "adaptive");
   CHECK(report["rows"][1]["modifying"] == true);
   CHECK(report["rows"][1]["partial"] == true);
   CHECK(report["rows"][1]["fps"].get<double>() == doctest::Approx(250.0));
   CHECK(report["gradients"][0]["noisy_angle_deg"] == 1.25);
+  CHECK(report["gradients"][0]["milled_p99_deg"] == 4.5);
 }
 
 TEST_CASE("each program replaces its own part of a page and leaves the others") {
@@ -92,17 +93,18 @@ TEST_CASE("each program replaces its own part of a page and leaves the others") 
   CHECK(with_part("by hand\n", "a", "") == "by hand\n\n<!-- begin a -->\n<!-- end a -->\n");
 }
 
-TEST_CASE("on an antialiased ball the widest gradient has the least angle, with noise too") {
+TEST_CASE("the default gradient shades balls and milled hollows within 3 degrees at 99 of 100") {
   if (!kerf::test::have_gl()) return;
   const std::vector<GradientRow> rows = measure_gradients();
   REQUIRE(rows.size() == kGradientNames.size());
-  const GradientRow& widest = rows.back();
-  CHECK(widest.gradient == GradientFilter::farid5);
-  CHECK(widest.angle_deg < 0.3);
-  CHECK(widest.noisy_angle_deg < 0.6);
   for (const GradientRow& row : rows) {
-    CHECK(row.angle_deg >= widest.angle_deg);
-    CHECK(row.noisy_angle_deg >= widest.noisy_angle_deg);
+    CAPTURE(name_of(row.gradient));
+    CAPTURE(row.p99_deg);
+    CAPTURE(row.milled_p99_deg);
     CHECK(row.noisy_angle_deg > row.angle_deg);
+    const bool is_default = row.gradient == kDefaultGradient;
+    CHECK((row.p99_deg < 1.0) == (is_default || row.gradient == GradientFilter::farid5));
+    CHECK((row.milled_p99_deg < 3.0) == is_default);
+    CHECK((row.noisy_angle_deg < 0.5) == (is_default || row.gradient == GradientFilter::farid5));
   }
 }

@@ -49,6 +49,16 @@ TEST_CASE("a lost context is told in one line with its reason and the way out") 
   glGetGraphicsResetStatus = driver;
 }
 
+TEST_CASE("a GL that draws on the processor is known by its name") {
+  for (const char* name : {"llvmpipe (LLVM 15.0.6, 256 bits)", "softpipe", "Google SwiftShader",
+                           "ANGLE (Google, Vulkan 1.3.0 (SwiftShader Device (LLVM 10.0.0)))"}) {
+    CHECK(is_software_gl(name));
+  }
+  for (const char* name : {"NVIDIA H100 PCIe/PCIe/SSE2", "Mesa Intel(R) UHD Graphics 620", ""}) {
+    CHECK_FALSE(is_software_gl(name));
+  }
+}
+
 TEST_CASE("a software context says that it would tell of its loss") {
   if (!have_gl()) return;
   if (!query_gl_driver().software) return;  // other drivers may or may not

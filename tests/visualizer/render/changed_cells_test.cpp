@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <random>
 #include <vector>
 
@@ -20,13 +21,14 @@ namespace {
 
 constexpr PictureSize kSize{61, 47};  // no multiple of a packet
 constexpr VoxelGrid kGrid{40, 36, 32};
-constexpr RayFootprint kReach{.along = 3, .at_end = 5, .taps_normal = true};
+constexpr RayFootprint kReach{.along = 3, .at_end = 5};
 
 /// A ball whose surface looks into a hollow, seen by an eye 60 voxel edges, here mm, away.
 struct LoadedScene {
   std::vector<Density> density;
   std::vector<double> ends_mm;
   std::vector<float> depth;
+  std::optional<GradientRows> gradient;
   View view = look_at({50, 38, 40}, {20, 18, 16}, 20, 90);
 
   LoadedScene() {
@@ -36,6 +38,7 @@ struct LoadedScene {
       const double fraction = std::clamp(0.5 - 0.5 * std::max(outside, hollow), 0.0, 1.0);
       density.push_back(static_cast<Density>(fraction * kDensityMax));
     });
+    gradient.emplace(kDefaultGradient, kGrid, density);
     view.aspect = static_cast<double>(kSize.width) / kSize.height;
     for (int y = 0; y < kSize.height; ++y) {
       for (int x = 0; x < kSize.width; ++x) {
@@ -70,11 +73,8 @@ RedrawJob job_of(const LoadedScene& scene, const ChangedCells& cells) {
   cells.put(job);
   job.depth = scene.depth.data();
   job.window = {0, 0, kSize.width, kSize.height};
-  job.density = scene.density.data();
-  job.extent[0] = kGrid.nx;
-  job.extent[1] = kGrid.ny;
-  job.extent[2] = kGrid.nz;
-  put(job.first_voxel, -cells.low());
+  job.gradient = scene.gradient->view();
+  put(job.border, -1.0 - cells.low());
   const glm::dvec3 half = 0.5 * (cells.high() - cells.low());
   put(job.centre_mm, glm::dvec3(eye_from_cell * glm::dvec4(half, 1.0)));
   for (int axis = 0; axis < 3; ++axis) {

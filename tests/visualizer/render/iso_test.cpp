@@ -69,9 +69,9 @@ TEST_CASE("a volume beyond the driver's limit is refused, and the limit is named
   if (!have_gl()) return;
   const VoxelGrid grid{31, 8, 8};
   const TestVolume volume(grid, glm::dmat4(1.0), [](glm::dvec3) { return 0.0; });
-  CHECK_NOTHROW(VolumeOnGpu(volume.view, volume.content(), 33, true));
+  CHECK_NOTHROW(VolumeOnGpu(volume.view, volume.content(), 33, true, kDefaultGradient));
   CHECK_THROWS_WITH_AS(
-      VolumeOnGpu(volume.view, volume.content(), 32, true),
+      VolumeOnGpu(volume.view, volume.content(), 32, true, kDefaultGradient),
       "volume test: 31x8x8 voxels, and this OpenGL driver takes 30 a side; crop or "
       "resample it",
       VisualizerError);

@@ -103,7 +103,7 @@ TEST_CASE("a ball: vertices, normals, area and volume converge with the second o
   struct Errors {  // root mean squares; what is missing
     double position_mm = 0.0, normal = 0.0, area = 0.0, volume = 0.0;
   };
-  constexpr double kRadius = 4.0;
+  constexpr double kRadius = 4.0, kRampMm = 3.0;
   const glm::dvec3 centre{0.11, -0.07, 0.05};
   // Unequal edges and a turned volume: normals must follow.
   const glm::dmat4 turn = glm::rotate(glm::dmat4(1.0), 0.7, glm::normalize(glm::dvec3(1, 2, 3)));
@@ -114,8 +114,10 @@ TEST_CASE("a ball: vertices, normals, area and volume converge with the second o
     };
     const VoxelGrid grid{side(1.0), side(1.25), side(0.8)};
     const glm::dmat4 pose = turn * centred(grid, edge_mm * glm::dvec3(1.0, 1.25, 0.8));
-    const TestVolume volume(grid, pose, density_of(ball_shape(centre, kRadius), 3.0));
-    const ClosedMesh mesh = closed(volume);
+    const TestVolume volume(grid, pose, density_of(ball_shape(centre, kRadius), kRampMm));
+    // The other gradients are wider than the ramp on the coarsest voxels.
+    const ClosedMesh mesh =
+        closed(VolumeSurface(volume.view, {}, volume.density, {}, GradientFilter::corners), volume);
     CHECK(open_sides(mesh.triangles) == 0);
     CHECK(euler_number(mesh) == 2);
     Errors errors;
@@ -138,10 +140,14 @@ TEST_CASE("a ball: vertices, normals, area and volume converge with the second o
     for (const auto part :
          {&Errors::position_mm, &Errors::normal, &Errors::area, &Errors::volume}) {
       const double reached = order(all[i].*part, all[i + 1].*part);
-      CHECK(reached > 1.8);
+      const bool is_rounded = i == 1 && part == &Errors::normal;
+      if (!is_rounded) CHECK(reached > 1.8);
       CHECK(reached < 2.2);
     }
   }
+  // Stored gradients have steps of 1/32767; one is the rise of the density over two edges.
+  const double rounding = std::sqrt(2.0 / 12.0) / 32767.0 / (2.0 * 0.08 / kRampMm);
+  CHECK(all[2].normal < std::hypot(all[1].normal / std::exp2(1.8), rounding));
   CHECK(all.back().position_mm < 0.005 * 0.1);  // of a voxel
 }
 

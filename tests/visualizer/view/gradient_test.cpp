@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "visualizer/scene/gradient.hpp"
 
+#include <cmath>
 #include <string>
 
 #include <doctest/doctest.h>
@@ -13,7 +14,10 @@ using namespace kerf;
 namespace {
 
 constexpr GradientFilter kAll[]{GradientFilter::central, GradientFilter::corners,
-                                GradientFilter::farid5};
+                                GradientFilter::farid5, GradientFilter::adaptive};
+/// Those that are sums of their taps.
+constexpr GradientFilter kLinear[]{GradientFilter::central, GradientFilter::corners,
+                                   GradientFilter::farid5};
 
 std::vector<Density> random_density(const VoxelGrid& grid) {
   return *rc::gen::container<std::vector<Density>>(grid.voxel_count(),
@@ -25,10 +29,10 @@ glm::dvec3 plain_gradient(GradientFilter kind, const VoxelGrid& grid,
                           const std::vector<Density>& density, VoxelIndex at) {
   const FilterTaps taps = gradient_taps(kind);
   glm::dvec3 sum(0.0);
-  for (int z = 0; z < 5; ++z) {
-    for (int y = 0; y < 5; ++y) {
-      for (int x = 0; x < 5; ++x) {
-        const VoxelIndex v{at.x + x - 2, at.y + y - 2, at.z + z - 2};
+  for (int z = 0; z < 15; ++z) {
+    for (int y = 0; y < 15; ++y) {
+      for (int x = 0; x < 15; ++x) {
+        const VoxelIndex v{at.x + x - 7, at.y + y - 7, at.z + z - 7};
         if (!grid.contains(v)) continue;
         const auto smooth = [&](int i) { return double{taps.smooth[static_cast<std::size_t>(i)]}; };
         const auto slope = [&](int i) { return double{taps.slope[static_cast<std::size_t>(i)]}; };
@@ -44,16 +48,16 @@ glm::dvec3 plain_gradient(GradientFilter kind, const VoxelGrid& grid,
 }  // namespace
 
 TEST_CASE("every gradient of a linear field is that of the field, a step over two edges being 1") {
-  const VoxelGrid grid{9, 8, 7};
+  const VoxelGrid grid{19, 18, 17};
   std::vector<Density> density;
   for_each_voxel(grid.box(), [&](int x, int y, int z) {
-    density.push_back(static_cast<Density>(30000 + 2000 * x - 1500 * y + 500 * z));
+    density.push_back(static_cast<Density>(30000 + 1000 * x - 750 * y + 250 * z));
   });
   for (const GradientFilter kind : kAll) {
     std::vector<glm::vec3> gradients;
-    fill_gradients(kind, grid, density, {{2, 2, 2}, {7, 6, 5}}, gradients);
+    fill_gradients(kind, grid, density, {{7, 7, 7}, {12, 11, 10}}, gradients);
     for (const glm::vec3& g : gradients) {
-      const glm::dvec3 off = glm::dvec3(g) - glm::dvec3(4000, -3000, 1000) / kDensityMax;
+      const glm::dvec3 off = glm::dvec3(g) - glm::dvec3(2000, -1500, 500) / kDensityMax;
       CHECK(glm::length(off) < 1e-6);
     }
   }
@@ -76,8 +80,10 @@ TEST_CASE("a gradient is the sum of its taps, with air around, and has the same 
     std::size_t at = 0;
     for_each_voxel(box, [&](int x, int y, int z) {
       RC_ASSERT(part[at] == whole[grid.index(x, y, z)]);
-      const glm::dvec3 plain = plain_gradient(kind, grid, density, {x, y, z});
-      RC_ASSERT(glm::length(glm::dvec3(part[at]) - plain) < 1e-6);
+      if (kind != GradientFilter::adaptive) {
+        const glm::dvec3 plain = plain_gradient(kind, grid, density, {x, y, z});
+        RC_ASSERT(glm::length(glm::dvec3(part[at]) - plain) < 1e-6);
+      }
       ++at;
     });
     RC_ASSERT(at == part.size());
@@ -85,20 +91,40 @@ TEST_CASE("a gradient is the sum of its taps, with air around, and has the same 
 }
 
 TEST_CASE("a gradient depends on no voxel beyond its reach") {
-  constexpr VoxelGrid kGrid{9, 9, 9};
-  for (const GradientFilter kind : kAll) {
+  constexpr VoxelGrid kGrid{15, 15, 15};
+  for (const GradientFilter kind : kLinear) {
     std::vector<Density> density(kGrid.voxel_count());
-    density[kGrid.index(4, 4, 4)] = 60'000;
+    density[kGrid.index(7, 7, 7)] = 60'000;
     std::vector<glm::vec3> gradients;
     fill_gradients(kind, kGrid, density, kGrid.box(), gradients);
     VoxelBox reached;
     for (int i = 0; i < static_cast<int>(gradients.size()); ++i) {
       if (gradients[static_cast<std::size_t>(i)] == glm::vec3(0.0F)) continue;
-      const VoxelIndex at{i % 9, i / 9 % 9, i / 81};
-      reached = reached.united({at, {at.x + 1, at.y + 1, at.z + 1}});
+      reached = reached.with({i % 15, i / 15 % 15, i / 225});
     }
-    CHECK(reached == VoxelBox{{4, 4, 4}, {5, 5, 5}}.grown(gradient_reach(kind)));
+    CHECK(reached == VoxelBox{{7, 7, 7}, {8, 8, 8}}.grown(gradient_reach(kind)));
   }
+}
+
+TEST_CASE("the adaptive gradient keeps an edge as sharp as farid5, and its length everywhere") {
+  // A corner of a block: three edges of 90 degrees.
+  constexpr VoxelGrid kGrid{40, 40, 40};
+  std::vector<Density> density;
+  for_each_voxel(kGrid.box(), [&](int x, int y, int z) {
+    density.push_back(x < 20 && y < 20 && z < 20 ? 65'535 : 0);
+  });
+  std::vector<glm::vec3> narrow, adaptive;
+  fill_gradients(GradientFilter::farid5, kGrid, density, kGrid.box(), narrow);
+  fill_gradients(GradientFilter::adaptive, kGrid, density, kGrid.box(), adaptive);
+  for (std::size_t i = 0; i < narrow.size(); ++i) {
+    REQUIRE(glm::length(adaptive[i]) == doctest::Approx(glm::length(narrow[i])).epsilon(1e-4));
+  }
+  const auto angle = [&](VoxelIndex at) {
+    const glm::vec3 a = glm::normalize(narrow[kGrid.index(at.x, at.y, at.z)]);
+    const glm::vec3 b = glm::normalize(adaptive[kGrid.index(at.x, at.y, at.z)]);
+    return std::acos(std::min(glm::dot(a, b), 1.0F)) * 57.2958F;
+  };
+  for (int y = 10; y < 20; ++y) CHECK(angle({19, y, 10}) < 12.0F);  // along a face to its edge
 }
 
 TEST_CASE("a gradient has a name, and an unknown one is refused") {

@@ -56,7 +56,7 @@ inline Material lit_material(const CastJob& job, const CastVolumeJob& volume, Ve
   }
   const M fading = Simd::both(plain, Simd::less(density, full));
   Vec3 gradient{};
-  if (Simd::any(Simd::either(noticeable, fading))) gradient = stored_gradient_at(volume, p);
+  if (Simd::any(Simd::either(noticeable, fading))) gradient = gradient_at(volume.gradient, p);
   const F size_2 = dot(gradient, gradient);
   const M sloped = Simd::less(zero, size_2);
   const F size = Simd::sqrt(size_2);

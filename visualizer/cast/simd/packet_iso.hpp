@@ -136,9 +136,7 @@ inline void iso_packet(const CastJob& job, const Packet& packet) {
     F ao_factor = ao_factor_at(volume, at);
     const M on_face = Simd::both(begins[v], Simd::less(Simd::set(job.eye.near_mm), part.begin_mm));
     if (Simd::any(on_face)) {
-      const Vec3 face = -Vec3{Simd::set(job.eye.clip_plane[0]), Simd::set(job.eye.clip_plane[1]),
-                              Simd::set(job.eye.clip_plane[2])};
-      at.normal = select(on_face, face, at.normal);
+      at.normal = select(on_face, vec3(job.key_light), at.normal);  // section_normal
       at.inward = select(on_face, Vec3{}, at.inward);  // no border: it shows what lies in the plane
       ao_factor = Simd::select(on_face, Simd::set(1.0F), ao_factor);
     }

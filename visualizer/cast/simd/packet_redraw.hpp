@@ -63,60 +63,6 @@ inline bool crosses_changed_cell(const RedrawJob& job, const VolumeRays& rays, M
   return Simd::any(alive);  // so far away that its steps are lost in rounding
 }
 
-/// `gradient_at` for a volume without a border of air around it. The value is right only in lanes
-/// that `is_inside` names.
-inline Vec3 plain_gradient_at(const RedrawJob& job, Vec3 voxel) {
-  const auto low = [](F at, std::int32_t extent) {
-    return Simd::to_int(
-        Simd::max(Simd::min(at, Simd::set(static_cast<float>(extent - 3))), Simd::set(1.0F)));
-  };
-  const I x = low(voxel.x, job.extent[0]);
-  const I y = low(voxel.y, job.extent[1]);
-  const I z = low(voxel.z, job.extent[2]);
-  const Vec3 fraction{voxel.x - Simd::to_float(x), voxel.y - Simd::to_float(y),
-                      voxel.z - Simd::to_float(z)};
-  const std::int32_t row = job.extent[0];
-  const std::int32_t plane = row * job.extent[1];
-  const I first = (x - 1) + (y - 1) * row + (z - 1) * plane;
-  // Of four planes, between the rows: at both sides in y, the sum and the rise along x.
-  F sums[4], rises_x[4], rises_y[4];
-  for (std::int32_t k = 0; k < 4; ++k) {
-    F sum[4], rise[4];
-    for (std::int32_t j = 0; j < 4; ++j) {
-      I low{}, high{};  // two densities each
-      Simd::gather_two<2>(job.density, first + (j * row + k * plane), low, high);
-      const auto between = [&](I pair) {
-        return mix(Simd::to_float(pair & 0xffff), Simd::to_float(pair >> 16 & 0xffff), fraction.x);
-      };
-      const F before = between(low);
-      const F behind = between(high);
-      sum[j] = before + behind;
-      rise[j] = behind - before;
-    }
-    const F before = mix(sum[0], sum[1], fraction.y);
-    const F behind = mix(sum[2], sum[3], fraction.y);
-    sums[k] = before + behind;
-    rises_y[k] = behind - before;
-    rises_x[k] = mix(rise[0], rise[1], fraction.y) + mix(rise[2], rise[3], fraction.y);
-  }
-  const auto both = [&](const F(&of)[4]) {
-    return mix(of[0], of[1], fraction.z) + mix(of[2], of[3], fraction.z);
-  };
-  return Simd::set(1.0F / 65535.0F) *
-         Vec3{both(rises_x), both(rises_y),
-              mix(sums[2], sums[3], fraction.z) - mix(sums[0], sums[1], fraction.z)};
-}
-
-/// The lanes in which all voxels that the gradient at `voxel` takes are in the volume.
-inline M is_inside(const RedrawJob& job, Vec3 voxel) {
-  const auto along = [](F at, std::int32_t extent) {
-    return Simd::but_not(Simd::less(at, Simd::set(static_cast<float>(extent - 2))),
-                         Simd::less(at, Simd::set(1.0F)));
-  };
-  return Simd::both(along(voxel.x, job.extent[0]),
-                    Simd::both(along(voxel.y, job.extent[1]), along(voxel.z, job.extent[2])));
-}
-
 /// Where the rays of a packet end, by the depth of the last picture.
 struct Ends {
   M there;  ///< the rays that hit something
@@ -174,13 +120,12 @@ inline bool packet_shading_touches(const RedrawJob& job, const Packet& packet) {
   const F shown_from_mm = shown_of(job.eye, eye).begin_mm;
   const M on_face = Simd::both(Simd::less(Simd::set(job.eye.near_mm), shown_from_mm),
                                Simd::less(ends.t, Simd::set(1.0001F) * shown_from_mm));
-  const Vec3 voxel = p - vec3(job.first_voxel);
-  M known = Simd::but_not(Simd::both(near, is_inside(job, voxel)), on_face);
-  if (!Simd::any(known)) return true;
-  const Vec3 gradient = plain_gradient_at(job, voxel);
-  // A texture unit may filter with 8 bits of weight: on this steep a slope (of 4, from air to full
-  // density) the normal of a shader is off by less than 1/24, half a voxel at the farthest sample.
-  const F least_slope = Simd::set(0.5F);
+  const Vec3 gradient = gradient_at(job.gradient, p - vec3(job.border));
+  // A texture unit may filter with 8 bits of weight. The gradient changes by 0.56 per edge at most
+  // (farid5), so on this steep a slope the normal of a shader is off by less than 1/24, half a
+  // voxel at the farthest sample.
+  const F least_slope = Simd::set(0.15F);
+  M known = Simd::but_not(near, on_face);
   known = Simd::but_not(known, Simd::less(dot(gradient, gradient), least_slope * least_slope));
   if (Simd::any(Simd::but_not(near, known))) return true;
   const Vec3 inward = facing_of(job.from_eye, gradient, -normalized(eye)).inward;

@@ -16,24 +16,22 @@ struct CellSample {
   Vec3 fraction;
 };
 
-/// Beyond the border everything is as on it: air.
-inline Vec3 within(const CastVolumeJob& volume, Vec3 p) {
-  return {Simd::min(positive(p.x), Simd::set(volume.last[0])),
-          Simd::min(positive(p.y), Simd::set(volume.last[1])),
-          Simd::min(positive(p.z), Simd::set(volume.last[2]))};
+/// Beyond the border everything is as on it: air. `Rows` is a volume or its gradient.
+template <class Rows>
+Vec3 within(const Rows& rows, Vec3 p) {
+  return {Simd::min(positive(p.x), Simd::set(rows.last[0])),
+          Simd::min(positive(p.y), Simd::set(rows.last[1])),
+          Simd::min(positive(p.z), Simd::set(rows.last[2]))};
 }
 
-inline CellSample cell_place(const CastVolumeJob& volume, Vec3 p, std::int32_t plane) {
-  const Vec3 q = within(volume, p);
+template <class Rows>
+CellSample cell_place(const Rows& rows, Vec3 p) {
+  const Vec3 q = within(rows, p);
   const I x = Simd::to_int(q.x);
   const I y = Simd::to_int(q.y);
   const I z = Simd::to_int(q.z);
-  return {x + y * volume.row + z * plane,
+  return {x + y * rows.row + z * rows.plane,
           {q.x - Simd::to_float(x), q.y - Simd::to_float(y), q.z - Simd::to_float(z)}};
-}
-
-inline CellSample cell_place(const CastVolumeJob& volume, Vec3 p) {
-  return cell_place(volume, p, volume.plane);
 }
 
 inline F mix(F a, F b, F fraction) {
@@ -63,51 +61,27 @@ inline F density_at(const CastVolumeJob& volume, Vec3 p) {
   return density_in(volume, cell_place(volume, p));
 }
 
-/// The density gradient per voxel edge, from the eight corners of a cube around p: differences
-/// along one axis, means along the others (iso.frag). All corners have the same position within
-/// their cells.
-inline Vec3 gradient_at(const CastVolumeJob& volume, Vec3 p) {
-  const F one = Simd::set(1.0F);
-  const auto inner = [&](F x, float last) {  // the whole cube is inside the border
-    return Simd::max(Simd::min(x, Simd::set(last - 1.0F)), one);
+/// The density gradient per voxel edge, trilinear. One load of 64 bits brings all of a voxel's.
+inline Vec3 gradient_at(const CastGradient& field, Vec3 p) {
+  const CellSample cell = cell_place(field, p);
+  const auto row_at = [&](std::int32_t step) {
+    const std::uint16_t* const entries = field.entries + std::int64_t{4} * step;
+    I left_xy{}, left_z{}, right_xy{}, right_z{};
+    Simd::gather_two<8>(entries, cell.at, left_xy, left_z);
+    Simd::gather_two<8>(entries + 4, cell.at, right_xy, right_z);
+    const auto between = [&](I left, I right) {
+      return mix(Simd::to_float(left), Simd::to_float(right), cell.fraction.x);
+    };
+    return Vec3{between(left_xy & 0xffff, right_xy & 0xffff),
+                between(Simd::high_half(left_xy), Simd::high_half(right_xy)),
+                between(left_z, right_z)};
   };
-  const CellSample middle = cell_place(
-      volume, {inner(p.x, volume.last[0]), inner(p.y, volume.last[1]), inner(p.z, volume.last[2])});
-  Vec3 sum{};
-  for (int corner = 0; corner < 8; ++corner) {
-    const int x = (corner & 1) != 0 ? 1 : -1;
-    const int y = (corner & 2) != 0 ? 1 : -1;
-    const int z = (corner & 4) != 0 ? 1 : -1;
-    const F density =
-        density_in(volume, {middle.at + (x + y * volume.row + z * volume.plane), middle.fraction});
-    sum.x = x > 0 ? sum.x + density : sum.x - density;
-    sum.y = y > 0 ? sum.y + density : sum.y - density;
-    sum.z = z > 0 ? sum.z + density : sum.z - density;
-  }
-  return Simd::set(0.125F) * sum;
-}
-
-/// The same from stored gradients, in 8 bits: a quarter of the loads.
-inline Vec3 stored_gradient_at(const CastVolumeJob& volume, Vec3 p) {
-  const CellSample cell = cell_place(volume, p, volume.gradient_plane);
-  I corner[4][2];  // by y and z, by x
-  for (int i = 0; i < 4; ++i) {
-    const std::int32_t step = (i & 1) * volume.row + (i >> 1) * volume.gradient_plane;
-    Simd::gather_two<4>(volume.gradient + step, cell.at, corner[i][0], corner[i][1]);
-  }
-  const auto component = [&](int shift) {  // of bytes where they lie, times 2^shift
-    const std::int32_t byte = 0xff << shift;
-    F row[4];
-    for (int i = 0; i < 4; ++i) {
-      row[i] = mix(Simd::to_float(corner[i][0] & byte), Simd::to_float(corner[i][1] & byte),
-                   cell.fraction.x);
-    }
-    const F mean = mix(mix(row[0], row[1], cell.fraction.y), mix(row[2], row[3], cell.fraction.y),
-                       cell.fraction.z);
-    const auto unit = static_cast<float>(1 << shift);
-    return (mean - Simd::set(128.0F * unit)) * Simd::set(0.5F / 127.0F / unit);
+  const auto plane_at = [&](std::int32_t step) {
+    return mix(row_at(step), row_at(step + field.row), cell.fraction.y);
   };
-  return {component(0), component(8), component(16)};
+  const Vec3 mean = mix(plane_at(0), plane_at(field.plane), cell.fraction.z);
+  const F none = Simd::set(32768.0F);
+  return Simd::set(0.5F / 32767.0F) * (mean - Vec3{none, none, none});
 }
 
 /// The part of each ray between the near, the far and the clip plane (ray.frag).
@@ -314,11 +288,29 @@ struct SurfacePoint {
 inline SurfacePoint surface_point(const CastVolumeJob& volume, const VolumeRays& rays, F t,
                                   Vec3 to_eye) {
   const Vec3 p = rays.origin + t * rays.direction;
-  const Facing facing = facing_of(volume.from_eye, gradient_at(volume, p), to_eye);
+  const Facing facing = facing_of(volume.from_eye, gradient_at(volume.gradient, p), to_eye);
   return {p, facing.inward, facing.normal};
 }
 
-/// Below the surface, because the surface itself is half air; soft tissue on it coats it.
+/// The mean of the labels over 3.5 voxels: in a clip plane their borders are steps of voxels.
+inline Labelled by_labels_around(const CastVolumeJob& volume, Vec3 p, M needed) {
+  constexpr float kReachVox = 0.75F;
+  Material sum{};
+  F fraction{};
+  for (int corner = 0; corner < 8; ++corner) {
+    const Vec3 side{Simd::set((corner & 1) != 0 ? kReachVox : -kReachVox),
+                    Simd::set((corner & 2) != 0 ? kReachVox : -kReachVox),
+                    Simd::set((corner & 4) != 0 ? kReachVox : -kReachVox)};
+    const Labelled one = by_labels(volume, p + side, needed);
+    sum = {sum.rgb + one.fraction * one.mean.rgb, sum.extinction};
+    fraction = fraction + one.fraction;
+  }
+  const F per_fraction = Simd::set(1.0F) / Simd::max(fraction, Simd::set(kSmall));
+  return {{per_fraction * sum.rgb, sum.extinction}, Simd::set(0.125F) * fraction};
+}
+
+/// Below the surface, because the surface itself is half air; soft tissue on it coats it. A face in
+/// the clip plane has no inward direction: it shows what lies there.
 inline Vec3 material_at(const CastVolumeJob& volume, const SurfacePoint& at, M needed) {
   const F depth_vox = Simd::set(1.25F);
   const F full_depth_vox = Simd::set(2.5F);
@@ -329,7 +321,14 @@ inline Vec3 material_at(const CastVolumeJob& volume, const SurfacePoint& at, M n
   if (volume.labels != nullptr) {
     Labelled labelled = by_labels(volume, below, needed);
     const Vec3 above = at.position - depth_vox * at.inward;
-    const M coated = Simd::both(needed, Simd::less(coat_density, density_at(volume, above)));
+    const M on_face = Simd::both(needed, Simd::equal(dot(at.inward, at.inward), Simd::set(0.0F)));
+    if (Simd::any(on_face)) {
+      const Labelled around = by_labels_around(volume, at.position, on_face);
+      labelled = {select(on_face, around.mean, labelled.mean),
+                  Simd::select(on_face, around.fraction, labelled.fraction)};
+    }
+    const M coated = Simd::both(Simd::but_not(needed, on_face),
+                                Simd::less(coat_density, density_at(volume, above)));
     if (Simd::any(coated)) {
       const Labelled coat = by_labels(volume, above, coated);
       const F cover = Simd::select(coated, coat.fraction, Simd::set(0.0F));

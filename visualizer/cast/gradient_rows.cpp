@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "visualizer/cast/gradient_rows.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "visualizer/cast/caster.hpp"
+
+namespace kerf {
+
+namespace {
+
+GradientRows::Entry entry_of(const glm::vec3& gradient) {
+  const auto part = [](float g) { return static_cast<std::uint16_t>(g * 32767.0F + 32768.5F); };
+  return {part(gradient.x), part(gradient.y), part(gradient.z), 0};
+}
+
+}  // namespace
+
+std::size_t GradientRows::entry_count(const VoxelGrid& grid) noexcept {
+  // A plane more: a cell beyond the last voxels is read and has no weight.
+  return static_cast<std::size_t>(grid.nx + 2) * static_cast<std::size_t>(grid.ny + 2) *
+         static_cast<std::size_t>(grid.nz + 3);
+}
+
+GradientRows::GradientRows(GradientFilter filter, const VoxelGrid& grid,
+                           std::span<const Density> density)
+    : filter_(filter), grid_(grid), entries_(entry_count(grid), kNone) {
+  constexpr std::int32_t kThick = 16;  // a layer is worked out by one thread
+  const auto layers = static_cast<std::uint32_t>((grid.nz + kThick - 1) / kThick);
+  TilePool().run(layers, [&](std::uint32_t layer) {
+    const auto z = static_cast<std::int32_t>(layer) * kThick;
+    std::vector<glm::vec3> gradients;
+    fill(VoxelBox{{0, 0, z}, {grid.nx, grid.ny, z + kThick}}.clipped(grid.box()), density,
+         gradients);
+  });
+}
+
+void GradientRows::fill(const VoxelBox& box, std::span<const Density> density,
+                        std::vector<glm::vec3>& gradients) {
+  fill_gradients(filter_, grid_, density, box, gradients);
+  const CastGradient rows = view();
+  const glm::vec3* from = gradients.data();
+  const std::int32_t wide = box.hi.x - box.lo.x;
+  for (std::int32_t z = box.lo.z; z < box.hi.z; ++z) {
+    for (std::int32_t y = box.lo.y; y < box.hi.y; ++y, from += wide) {
+      const std::ptrdiff_t at =
+          std::ptrdiff_t{z + 1} * rows.plane + std::ptrdiff_t{y + 1} * rows.row + box.lo.x + 1;
+      std::transform(from, from + wide, entries_.begin() + at, entry_of);
+    }
+  }
+}
+
+VoxelBox GradientRows::update(const VoxelBox& box, std::span<const Density> density) {
+  if (box.empty()) return {};
+  const VoxelBox around = box.grown(gradient_reach(filter_)).clipped(grid_.box());
+  fill(around, density, gradients_);
+  return around;
+}
+
+glm::vec3 GradientRows::at(const VoxelIndex& voxel) const noexcept {
+  const CastGradient rows = view();
+  const Entry& entry =
+      entries_[static_cast<std::size_t>(std::ptrdiff_t{voxel.z + 1} * rows.plane +
+                                        std::ptrdiff_t{voxel.y + 1} * rows.row + voxel.x + 1)];
+  return (glm::vec3(entry[0], entry[1], entry[2]) - 32768.0F) * (1.0F / 32767.0F);
+}
+
+CastGradient GradientRows::view() const noexcept {
+  CastGradient view;
+  view.entries = entries_.data()->data();
+  view.row = grid_.nx + 2;
+  view.plane = view.row * (grid_.ny + 2);
+  const std::int32_t extent[3] = {grid_.nx, grid_.ny, grid_.nz};
+  for (int axis = 0; axis < 3; ++axis) {
+    // The last cell of voxels ends at extent + 1; its far side belongs to no cell.
+    view.last[axis] = std::nextafter(static_cast<float>(extent[axis] + 1), 0.0F);
+  }
+  return view;
+}
+
+}  // namespace kerf

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "shared/volume/voxel_grid.hpp"
+#include "visualizer/cast/cast_kernels.hpp"
+#include "visualizer/scene/gradient.hpp"
+
+namespace kerf {
+
+/// The density gradient at each voxel, for all that shades surfaces: on the processor, on
+/// the GPU, at the vertices of a mesh, and to find out what of a picture must be drawn again.
+/// Interpolated between voxels. In a border of none, as the density: voxel v is at v + 1.
+class GradientRows {
+ public:
+  /// 32768 + 32767 g along each axis, g in -1..1; the last is nothing. GL's RGBA16.
+  using Entry = std::array<std::uint16_t, 4>;
+  static constexpr Entry kNone{32768, 32768, 32768, 0};
+
+  /// Throws std::bad_alloc.
+  GradientRows(GradientFilter filter, const VoxelGrid& grid, std::span<const Density> density);
+
+  /// What a volume of this extent takes.
+  [[nodiscard]] static std::size_t entry_count(const VoxelGrid& grid) noexcept;
+
+  /// Call after the voxels of `box` have changed in `density`, which is all of the volume. Returns
+  /// the voxels whose gradients may have.
+  VoxelBox update(const VoxelBox& box, std::span<const Density> density);
+
+  /// Of a voxel, or of the border.
+  [[nodiscard]] glm::vec3 at(const VoxelIndex& voxel) const noexcept;
+  /// As the kernels take it; good as long as this object.
+  [[nodiscard]] CastGradient view() const noexcept;
+  [[nodiscard]] const Entry* data() const noexcept { return entries_.data(); }
+
+ private:
+  void fill(const VoxelBox& box, std::span<const Density> density,
+            std::vector<glm::vec3>& gradients);
+
+  GradientFilter filter_;
+  VoxelGrid grid_;
+  std::vector<Entry> entries_;
+  std::vector<glm::vec3> gradients_;  ///< of the last box
+};
+
+}  // namespace kerf
