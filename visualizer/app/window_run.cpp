@@ -66,6 +66,16 @@ void FollowedSession::attach_again(double aspect, Clock::time_point now) {
   picture_.emplace(session_, settings, aspect);
 }
 
+void FramePace::learn(double pixels, PictureSize size, double ms) noexcept {
+  constexpr double kFewest = 1.0 / 64.0;  // of a picture: of fewer the rest of a frame costs most
+  constexpr double kForget = 0.3;         // air is cheap, and what comes next may not be
+  if (pixels < kFewest * size.width * size.height) return;
+  if (!std::exchange(begun_, true)) return;  // it compiled shaders
+  const double now = ms / pixels;
+  const double before = std::isfinite(ms_per_pixel_) ? ms_per_pixel_ : now;
+  ms_per_pixel_ = std::max(now, before + kForget * (now - before));
+}
+
 WindowRun::WindowRun(const VisualizerOptions& options, Session first, const GlContext& context,
                      const Stopwatch& since_attached)
     : options_(options),
@@ -119,7 +129,8 @@ int WindowRun::end() {
 OverlayFigures WindowRun::figures_at(PictureSize size, Clock::time_point now) {
   OverlayFigures figures = overlay_figures(session());
   if (film_) figures.filmed_frames = film_->file().frames();
-  figures.picture_age_ms = picture().age_ms();
+  const Clock::time_point complete = complete_since_.value_or(now);
+  figures.picture_age_ms = std::chrono::duration<double, std::milli>(now - complete).count();
   rates_.show(figures, now);
   figures.help = keys_.help;
   figures.leads_hand = hand_link_.has_value();
@@ -307,11 +318,18 @@ Redrawn WindowRun::draw(PictureSize size, const WindowInput& input, Clock::time_
     take_tool(figures.controls->tool, session(), notices_, now);
     figures.controls->tool = held;  // until the controller has changed it
   }
+  const std::string drawn_by = picture().settings().renderer;
   change_view(picture(), session(), figures.controls->settings, notices_, now);
+  if (picture().settings().renderer != drawn_by) pace_ = {};
   if (std::exchange(keys_.write, false) || std::exchange(figures.controls->write, false)) {
     notices_.say(write_opacities(options_, picture()), now);
   }
+  const bool is_kept = film_ || keys_.screenshot;  // a file holds no coarse part
+  picture().set_most_pixels(is_kept ? std::numeric_limits<double>::infinity()
+                                    : fixed_pixels_.value_or(pace_.most_pixels()));
   const Redrawn redrawn = draw_measured(picture(), session(), figures, *target_, report_);
+  if (!picture().is_late()) complete_since_ = now;
+  if (redrawn.any) pace_.learn(redrawn.pixels, size, report_.wall_ms.back());
   if (std::exchange(tool_follows_, false)) {
     const std::chrono::duration<double, std::milli> late = Clock::now() - followed_since_->first;
     report_.pointer_ms.push_back(late.count());

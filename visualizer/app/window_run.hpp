@@ -51,6 +51,21 @@ class FollowedSession {
   Clock::time_point next_attach_{};
 };
 
+/// How many pixels with volumes in them a frame draws, so that it takes about `kFrameMs`: from what
+/// the frames before took. The least at first.
+class FramePace {
+ public:
+  static constexpr double kFrameMs = 50;  // the hand is led by what a frame shows
+
+  [[nodiscard]] double most_pixels() const noexcept { return kFrameMs / ms_per_pixel_; }
+  /// From a frame that drew so many in a picture of `size`, which took `ms`.
+  void learn(double pixels, PictureSize size, double ms) noexcept;
+
+ private:
+  double ms_per_pixel_ = std::numeric_limits<double>::infinity();
+  bool begun_ = false;
+};
+
 /// What a window does from its first frame to its last: input, the session, panels, picture, film.
 /// It needs no window: what it draws is a target, and what the user did is handed to it. `options`
 /// outlives it.
@@ -78,6 +93,9 @@ class WindowRun {
 
   /// Completes and writes the report; returns the exit code.
   [[nodiscard]] int end();
+
+  /// Each frame draws volumes in about so many pixels, in place of those of a pace.
+  void set_most_pixels(double most) noexcept { fixed_pixels_ = most; }
 
   [[nodiscard]] double age_ms() const { return since_attached_.wall_ms(); }
   [[nodiscard]] Session& session() noexcept { return followed_.session(); }
@@ -112,6 +130,10 @@ class WindowRun {
   double aspect_;
   double density_ = 1.0;  ///< of the display
   FollowedSession followed_;
+  FramePace pace_;
+  std::optional<double> fixed_pixels_;
+  /// Began the last frame after which all was shown as finely as it will be.
+  std::optional<Clock::time_point> complete_since_;
   std::optional<RenderTarget> target_;
   ShownRates rates_;
   WindowKeys keys_;

@@ -148,72 +148,153 @@ bool has_moved(const std::optional<Hand>& from, const std::optional<Hand>& to) {
   return from && to ? !from->rests_at(*to) : from.has_value() != to.has_value();
 }
 
+RedrawTiles tiles_in(std::span<const PixelRect> parts, PictureSize size) {
+  RedrawTiles tiles(size);
+  for (const PixelRect& part : parts) tiles.mark(part);
+  return tiles;
+}
+
+/// With which `pixels` take at most half the budget, as far as that goes.
+int coarse_edge(double pixels, double most_pixels) {
+  int edge = 2;
+  while (edge < PictureLayers::kCoarsest && pixels / (edge * edge) > 0.5 * most_pixels) edge *= 2;
+  return edge;
+}
+
 }  // namespace
 
 PictureLayers::Redraw PictureLayers::redraw(const View& view, const std::optional<Hand>& hand,
-                                            const ScenePainter& painter) const {
+                                            const ScenePainter& painter, double most_pixels) const {
+  constexpr double kLeastProgress = 0.25;  // of the budget
+  const PictureSize size = composite_.size();
   const PixelRect all = composite_.all();
+  // A frame costs something whatever it draws: fewer pixels would take longer for all of them.
+  most_pixels = std::max(most_pixels, static_cast<double>(all.area()) / (kCoarsest * kCoarsest));
   const bool view_changed = shown_ && shown_->view != view;
+  const bool anew = !shown_ || view_changed;
   const FrameState now{view, view_changed || (shown_ && has_moved(shown_->hand, hand)), hand};
-  if (!shown_ || view_changed) return {now, {all}, {all}};
-  RedrawTiles of_hand(composite_.size());
-  if (hand != shown_->hand) {
-    for (const auto& one : {hand, shown_->hand}) {
-      if (!one) continue;
-      for (const PixelRect& part : painter.bounds(*one, view, composite_.size()))
-        of_hand.mark(part);
+  RedrawTiles opaque(size), composite(size), late = later_;
+  if (anew) {
+    for (RedrawTiles* const tiles : {&opaque, &composite, &late}) tiles->mark(all);
+  } else {
+    RedrawTiles of_hand(size);
+    if (hand != shown_->hand) {
+      for (const auto& one : {hand, shown_->hand}) {
+        if (!one) continue;
+        for (const PixelRect& part : painter.bounds(*one, view, size)) of_hand.mark(part);
+      }
     }
+    painter.mark_redraw(Layer::opaque, opaque, view, opaque_);
+    if (painter.hand_is_opaque_volume()) opaque.mark(of_hand);
+    composite = opaque;
+    painter.mark_redraw(Layer::translucent, composite, view, opaque_);
+    composite.mark(of_hand);
   }
-  RedrawTiles tiles(composite_.size());
-  painter.mark_redraw(Layer::opaque, tiles, view, opaque_);
-  if (painter.hand_is_opaque_volume()) tiles.mark(of_hand);
-  const std::vector<PixelRect> opaque = tiles.rects();
-  painter.mark_redraw(Layer::translucent, tiles, view, opaque_);
-  tiles.mark(of_hand);
-  if (!now.moving) tiles.mark(coarse_);
-  return {now, opaque, tiles.rects()};
+  opaque.mark(composite.common(late));
+  const bool translucent = painter.any(Layer::translucent);
+  const RedrawTiles changed = translucent ? composite : opaque;  // those that cost volumes
+  double left = most_pixels - changed.pixels(), coarse_pixels = 0.0;
+  RedrawTiles coarse(size);
+  int edge = 1;
+  if (left < 0.0) {
+    coarse = changed;
+    edge = coarse_edge(changed.pixels(), most_pixels);
+    coarse_pixels = changed.pixels() / (edge * edge);
+    composite = composite.without(coarse);
+    opaque = opaque.without(coarse);
+    left = anew ? 0.0 : most_pixels - coarse_pixels;  // of a view that moves nothing is kept
+  }
+  if (!anew) {
+    left = std::max(left, kLeastProgress * most_pixels);
+    RedrawTiles resting = late;
+    if (!now.moving) resting.mark(moved_);
+    resting = resting.without(changed);
+    const RedrawTiles first = resting.take(left);
+    RedrawTiles moving = coarse;
+    const RedrawTiles then = moving.take(left - first.pixels());
+    composite.mark(first);
+    composite.mark(then);
+  }
+  const std::vector<PixelRect> fine = composite.rects();  // a few tiles more
+  const RedrawTiles finished = tiles_in(fine, size);
+  const std::vector<PixelRect> coarsely = coarse.without(finished).rects();
+  late.mark(tiles_in(coarsely, size));
+  for (const RedrawTiles& stale : {coarse, late}) opaque.mark(finished.common(stale));
+  const std::vector<PixelRect> of_opaque = opaque.rects();
+  const double pixels = coarse_pixels + (translucent ? finished : opaque).pixels();
+  return {now, coarsely, edge, of_opaque, fine, late.without(finished), pixels};
 }
 
 std::vector<PixelRect> PictureLayers::draw(const Redraw& redraw, ScenePainter& painter,
                                            ScreenPasses& passes) {
-  shown_ = redraw.now;
-  if (redraw.composite.empty()) return {};
-  painter.set_moving(redraw.now.moving);
-  if (!redraw.now.moving) {
-    coarse_.clear();
+  const FrameState& now = redraw.now;
+  shown_ = now;
+  later_ = redraw.later;
+  if (redraw.empty()) return {};
+  painter.set_moving(now.moving);
+  const RedrawTiles drawn = tiles_in(redraw.composite, composite_.size());
+  if (!now.moving) {
+    moved_ = moved_.without(drawn);
   } else if (painter.any(&Renderer::coarse_while_moving)) {
-    for (const PixelRect& part : redraw.composite) coarse_.mark(part);
+    moved_.mark(drawn);
   }
-  if (redraw.now.hand) painter.hold(*redraw.now.hand);
-  draw_opaque(redraw, painter, passes);
-  draw_composite(redraw, painter);
-  std::vector<PixelRect> smoothed;
+  if (now.hand) painter.hold(*now.hand);
+  draw_coarse(redraw, painter, passes);
+  draw_opaque(now, redraw.opaque, painter, passes);
+  draw_composite(now, redraw.composite, painter);
+  std::vector<PixelRect> seen;
   for (const PixelRect& part : redraw.composite) {
-    smoothed.push_back(part.grown(ScreenPasses::kSmoothingReach));
+    seen.push_back(part.grown(ScreenPasses::kSmoothingReach));
   }
-  smooth_.restrict_to(smoothed);
+  smooth_.restrict_to(seen);
   passes.smooth_edges(composite_, smooth_);
-  return smoothed;
+  seen.insert(seen.end(), redraw.coarse.begin(), redraw.coarse.end());
+  return seen;
 }
 
-void PictureLayers::draw_opaque(const Redraw& redraw, ScenePainter& painter, ScreenPasses& passes) {
-  if (redraw.opaque.empty()) return;
-  opaque_.restrict_to(redraw.opaque);
+void PictureLayers::draw_coarse(const Redraw& redraw, ScenePainter& painter, ScreenPasses& passes) {
+  if (redraw.coarse.empty()) return;
+  const PictureSize size = composite_.size();
+  const int edge = redraw.coarse_edge;
+  const PictureSize small{(size.width + edge - 1) / edge, (size.height + edge - 1) / edge};
+  if (!small_ || small_->composite_.size() != small) {
+    small_ = std::make_unique<PictureLayers>(small);
+  }
+  RedrawTiles tiles(small);
+  for (const PixelRect& part : redraw.coarse) {
+    const PixelRect within{part.x0 / edge, part.y0 / edge, part.x1 / edge + 1, part.y1 / edge + 1};
+    tiles.mark(within.grown(1));  // enlarging reads one beyond
+  }
+  const std::vector<PixelRect> parts = tiles.rects();
+  small_->draw_opaque(redraw.now, parts, painter, passes);
+  small_->draw_composite(redraw.now, parts, painter);
+  // Smoothing reads beyond what is drawn finely later.
+  for (const RenderTarget* to : {&composite_, &smooth_}) {
+    to->enlarge(small_->composite_, redraw.coarse);
+  }
+}
+
+void PictureLayers::draw_opaque(const FrameState& now, std::span<const PixelRect> parts,
+                                ScenePainter& painter, ScreenPasses& passes) {
+  if (parts.empty()) return;
+  opaque_.restrict_to(parts);
   passes.draw_backdrop(opaque_);
-  painter.draw_volumes(Layer::opaque, redraw.now.view, opaque_);
+  painter.draw_volumes(Layer::opaque, now.view, opaque_);
 }
 
-void PictureLayers::draw_composite(const Redraw& redraw, ScenePainter& painter) {
-  composite_.restrict_to(redraw.composite);
-  for (const PixelRect& part : redraw.composite) composite_.copy(opaque_, part);
-  const auto& [view, moving, hand] = redraw.now;
+void PictureLayers::draw_composite(const FrameState& now, std::span<const PixelRect> parts,
+                                   ScenePainter& painter) {
+  if (parts.empty()) return;
+  composite_.restrict_to(parts);
+  for (const PixelRect& part : parts) composite_.copy(opaque_, part);
+  const auto& [view, moving, hand] = now;
   std::vector<PixelRect> of_hand;  // a mesh costs its vertices for each part
   if (hand) {
-    of_hand = clipped(redraw.composite, united(painter.bounds(*hand, view, composite_.size())));
+    of_hand = clipped(parts, united(painter.bounds(*hand, view, composite_.size())));
     composite_.restrict_to(of_hand);
     painter.draw_tool(*hand, view, composite_);
   }
-  composite_.restrict_to(redraw.composite);
+  composite_.restrict_to(parts);
   painter.draw_volumes(Layer::translucent, view, composite_);
   if (!hand) return;
   composite_.restrict_to(of_hand);

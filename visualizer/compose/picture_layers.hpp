@@ -106,6 +106,11 @@ class ScreenPasses {
 /// The picture of one eye, kept from frame to frame in three layers: backdrop and opaque volumes;
 /// the composite with hand and translucent volumes; the composite with smoothed edges. So a hand
 /// that moves over opaque volumes costs no volume.
+///
+/// What changes is drawn at once if its volumes cover no more pixels than a budget. Else it is
+/// drawn coarsely at once and finely later, some tiles with each picture: first those that rest,
+/// because those that still change would be drawn again. Tiles that are finished stay as they are.
+/// With the last tile the picture has the pixels of one drawn at once.
 class PictureLayers {
  public:
   /// What a picture shows beside the volumes.
@@ -117,30 +122,45 @@ class PictureLayers {
   /// The parts of two layers that must be drawn again, and with which state.
   struct Redraw {
     FrameState now;
+    std::vector<PixelRect> coarse;  ///< of the picture, drawn first, each pixel `coarse_edge` wide
+    int coarse_edge;
     std::vector<PixelRect> opaque, composite;
+    RedrawTiles later;  ///< of all layers, left for the next pictures
+    double pixels;      ///< with volumes in them, coarse ones counted as one
+    [[nodiscard]] bool empty() const noexcept { return coarse.empty() && composite.empty(); }
   };
+  static constexpr int kCoarsest = 8;
 
   explicit PictureLayers(PictureSize size)
-      : opaque_(size), composite_(size), smooth_(size), coarse_(size) {}
+      : opaque_(size), composite_(size), smooth_(size), moved_(size), later_(size) {}
 
-  /// What must be drawn again to show `view`, `hand` and the volumes.
+  /// What must be drawn again to show `view`, `hand` and the volumes, within about `most_pixels`.
   [[nodiscard]] Redraw redraw(const View& view, const std::optional<Hand>& hand,
-                              const ScenePainter& painter) const;
+                              const ScenePainter& painter, double most_pixels) const;
   /// Draws it. Returns the parts of `seen` that changed.
   std::vector<PixelRect> draw(const Redraw& redraw, ScenePainter& painter, ScreenPasses& passes);
+  /// Whether a part of `seen` is coarser than it will be, though nothing moves.
+  [[nodiscard]] bool is_late() const {
+    return !later_.empty() || (shown_ && !shown_->moving && !moved_.empty());
+  }
 
   /// The finished picture; its depth is not used.
   [[nodiscard]] const RenderTarget& seen() const noexcept { return smooth_; }
 
  private:
-  void draw_opaque(const Redraw& redraw, ScenePainter& painter, ScreenPasses& passes);
-  void draw_composite(const Redraw& redraw, ScenePainter& painter);
+  void draw_coarse(const Redraw& redraw, ScenePainter& painter, ScreenPasses& passes);
+  void draw_opaque(const FrameState& now, std::span<const PixelRect> parts, ScenePainter& painter,
+                   ScreenPasses& passes);
+  void draw_composite(const FrameState& now, std::span<const PixelRect> parts,
+                      ScenePainter& painter);
 
   RenderTarget opaque_;
   RenderTarget composite_;
   RenderTarget smooth_;
-  RedrawTiles coarse_;  ///< of the composite, drawn while something moved: drawn again at rest
-  std::optional<FrameState> shown_{};  ///< of the last picture
+  RedrawTiles moved_;  ///< of the composite, drawn in longer steps: drawn again at rest
+  RedrawTiles later_;  ///< of all layers, seen coarsely: not drawn since they changed
+  std::unique_ptr<PictureLayers> small_{};  ///< what was drawn coarsely last
+  std::optional<FrameState> shown_{};       ///< of the last picture
 };
 
 }  // namespace kerf

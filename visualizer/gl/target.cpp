@@ -65,6 +65,16 @@ void RenderTarget::copy_colour(const RenderTarget& from, const PixelRect& part, 
   copy_texture(from.colour_, colour_, part.clipped(from.all()), right);
 }
 
+void RenderTarget::enlarge(const RenderTarget& from, std::span<const PixelRect> parts) const {
+  glEnable(GL_SCISSOR_TEST);
+  for (const PixelRect& part : parts) {
+    scissor(part);
+    glBlitNamedFramebuffer(from.framebuffer(), framebuffer(), 0, 0, from.size_.width,
+                           from.size_.height, 0, 0, size_.width, size_.height, GL_COLOR_BUFFER_BIT,
+                           GL_LINEAR);
+  }
+}
+
 std::vector<std::uint8_t> RenderTarget::read_rgb() const {
   const auto row = static_cast<std::size_t>(size_.width) * 3;
   const auto rows = static_cast<std::size_t>(size_.height);

@@ -52,6 +52,9 @@ class RenderTarget {
   /// Takes the colour of `part` of another target over, to the same place or to one `right` pixels
   /// farther right; all of it must fit.
   void copy_colour(const RenderTarget& from, const PixelRect& part, int right = 0) const;
+  /// Takes the colours of `parts` over from a smaller picture of the same, filtered. Leaves the
+  /// scissor at the last part.
+  void enlarge(const RenderTarget& from, std::span<const PixelRect> parts) const;
   /// RGB, 3 bytes per pixel, first row at the top. Waits until the picture is complete.
   [[nodiscard]] std::vector<std::uint8_t> read_rgb() const;
   /// Window depth 0..1, first row at the top.

@@ -91,6 +91,11 @@ Monkey::Monkey(const GlContext& context, const Habits& habits)
   options_.settings.renderer = dice_.one_of(std::span<const std::string_view>(kinds));
   controller_ = std::make_unique<MonkeyController>(kMonkeyName, dice_);
   run_.emplace(options_, Session(kMonkeyName), context);
+  // Some runs see each change at once; the others coarsely at first, whatever it costs.
+  constexpr double kFewPixels = 2500, kManyPixels = 60'000;
+  run_->set_most_pixels(dice_.once_in(2) ? std::numeric_limits<double>::infinity()
+                        : habits.large   ? kManyPixels
+                                         : kFewPixels);
   event_ = "begin with " + options_.settings.renderer;
 }
 
@@ -244,8 +249,12 @@ void Monkey::frame(const WindowInput& input) {
 /// What moves may be drawn coarsely, and a button goes up in a frame of its own.
 void Monkey::rest() {
   constexpr int kMost = 6;  // a release, the setting it changes, the tool's rest
+  constexpr int kMostFiner = 2000;
   frame({});
-  for (int frames = 0; frames < kMost && !rests_; ++frames) frame({});
+  for (int frames = 0, finer = 0; frames < kMost && finer < kMostFiner && !rests_;) {
+    ++(run_->picture().is_late() ? finer : frames);
+    frame({});
+  }
   if (!rests_) {
     throw VisualizerError("frames do not come to rest, though nothing happens");
   }

@@ -86,7 +86,7 @@ struct OverlayFigures {
   std::optional<double> tick_rate_hz;
   std::optional<double> frame_rate_hz;
   std::optional<double> data_age_ms;
-  std::optional<double> picture_age_ms;        ///< since all of the picture was as finely drawn
+  std::optional<double> picture_age_ms;        ///< of the newest state that is shown finely
   std::optional<std::uint64_t> filmed_frames;  ///< written so far; none: no video
   std::string banner;                          ///< shown large; empty: there is nothing to say
   bool alarm = false;                          ///< the banner reports a fault

@@ -240,20 +240,20 @@ Redrawn Picture::draw(const Session& session, const OverlayFigures& figures,
     shown_in_ = 0;
   }
   std::vector<PictureLayers::Redraw> redraws;
+  const double most_each = most_pixels_ / static_cast<double>(views.size());
   for (std::size_t eye = 0; eye < views.size(); ++eye) {
-    redraws.push_back(eyes_[eye].redraw(views[eye], hand, *painter_));
+    redraws.push_back(eyes_[eye].redraw(views[eye], hand, *painter_, most_each));
   }
   painter_->forget_changes();
   const OverlayFigures panel = figures.rounded();
   const bool same_target = target.framebuffer() == shown_in_ && target.size() == shown_size_;
-  const bool rests = std::all_of(redraws.begin(), redraws.end(),
-                                 [](const auto& one) { return one.composite.empty(); });
-  since_drawn_ = Stopwatch();
+  const bool rests =
+      std::all_of(redraws.begin(), redraws.end(), [](const auto& one) { return one.empty(); });
   if (rests && same_target && panel == shown_figures_) return {};
 
   if (!same_target) clear(target);  // an odd column belongs to neither eye
   const PixelRect panels = overlay_.prepare(panel, size);
-  double redrawn = 0.0;
+  double redrawn = 0.0, pixels = 0.0;
   for (std::size_t eye = 0; eye < eyes_.size(); ++eye) {
     std::vector<PixelRect> others = eyes_[eye].draw(redraws[eye], *painter_, passes_);
     const RenderTarget& seen = eyes_[eye].seen();
@@ -269,6 +269,8 @@ Redrawn Picture::draw(const Session& session, const OverlayFigures& figures,
     const std::vector<PixelRect>& volumes =
         translucent ? redraws[eye].composite : redraws[eye].opaque;
     for (const PixelRect& part : volumes) redrawn += part.area();
+    for (const PixelRect& part : redraws[eye].coarse) redrawn += part.area();
+    pixels += redraws[eye].pixels;
   }
   overlay_.draw(target, static_cast<int>(eyes_.size()));
   glDisable(GL_SCISSOR_TEST);
@@ -276,7 +278,12 @@ Redrawn Picture::draw(const Session& session, const OverlayFigures& figures,
   shown_in_ = target.framebuffer();
   shown_size_ = target.size();
   shown_panels_ = panels;
-  return {true, redrawn / (static_cast<double>(eyes_.size()) * size.width * size.height)};
+  return {true, redrawn / (static_cast<double>(eyes_.size()) * size.width * size.height), pixels};
+}
+
+bool Picture::is_late() const {
+  return std::any_of(eyes_.begin(), eyes_.end(),
+                     [](const PictureLayers& eye) { return eye.is_late(); });
 }
 
 void Picture::draw_panels(const RenderTarget& target) {

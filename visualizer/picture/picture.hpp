@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -19,6 +20,7 @@ namespace kerf {
 struct Redrawn {
   bool any = false;       ///< false: nothing had changed, nothing was drawn
   double fraction = 0.0;  ///< of the picture's pixels in which volumes were drawn again
+  double pixels = 0.0;    ///< how many were, of a coarse part fewer than it covers
 };
 
 /// Everything that is seen of one session: backdrop, volumes, tool, force arrow, panel.
@@ -38,8 +40,11 @@ class Picture {
   Redrawn draw(const Session& session, const OverlayFigures& figures, const RenderTarget& target);
   /// Draws the panels of the last `draw` over another target of its size, as that did.
   void draw_panels(const RenderTarget& target);
-  /// Since the last `draw` began.
-  [[nodiscard]] double age_ms() const { return since_drawn_.wall_ms(); }
+  /// A `draw` draws volumes in about so many pixels, all eyes together: what does not fit is seen
+  /// coarsely at first and finer with each `draw`. Without a limit at first.
+  void set_most_pixels(double most) noexcept { most_pixels_ = most; }
+  /// Whether a part is seen coarsely that will be finer without a change.
+  [[nodiscard]] bool is_late() const;
   /// The next `draw` draws everything.
   void redraw_all() noexcept { eyes_.clear(); }
 
@@ -95,7 +100,7 @@ class Picture {
   glm::dvec3 low_mm_{0, 0, 0}, high_mm_{0, 0, 0};  ///< the box of all volumes
   ScreenPasses passes_;
   std::vector<PictureLayers> eyes_;  ///< empty: draw everything
-  Stopwatch since_drawn_;
+  double most_pixels_ = std::numeric_limits<double>::infinity();
   Overlay overlay_;
   OverlayFigures shown_figures_;
   GLuint shown_in_ = 0;     ///< framebuffer, whose name may be given to a later one

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <utility>
 #include <vector>
 
 #include <glm/gtc/matrix_transform.hpp>
@@ -37,6 +38,38 @@ void RedrawTiles::mark(const PixelRect& pixels) {
 void RedrawTiles::mark(const RedrawTiles& other) {
   std::transform(marked_.begin(), marked_.end(), other.marked_.begin(), marked_.begin(),
                  std::bit_or<>());
+}
+
+RedrawTiles RedrawTiles::common(const RedrawTiles& other) const {
+  RedrawTiles both(size_);
+  std::transform(marked_.begin(), marked_.end(), other.marked_.begin(), both.marked_.begin(),
+                 [](auto a, auto b) { return static_cast<std::uint8_t>(a & b); });
+  return both;
+}
+
+RedrawTiles RedrawTiles::without(const RedrawTiles& other) const {
+  RedrawTiles rest(size_);
+  std::transform(marked_.begin(), marked_.end(), other.marked_.begin(), rest.marked_.begin(),
+                 [](auto a, auto b) { return static_cast<std::uint8_t>(a & ~b); });
+  return rest;
+}
+
+RedrawTiles RedrawTiles::take(double pixels) {
+  RedrawTiles taken(size_);
+  for (std::size_t i = 0; i < marked_.size() && pixels > 0.0; ++i) {
+    if (marked_[i] == 0) continue;
+    taken.marked_[i] = std::exchange(marked_[i], std::uint8_t{0});
+    pixels -= kEdge * kEdge;
+  }
+  return taken;
+}
+
+double RedrawTiles::pixels() const {
+  return static_cast<double>(std::count(marked_.begin(), marked_.end(), 1)) * kEdge * kEdge;
+}
+
+bool RedrawTiles::empty() const {
+  return std::find(marked_.begin(), marked_.end(), 1) == marked_.end();
 }
 
 void RedrawTiles::clear() {

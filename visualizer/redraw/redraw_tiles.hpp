@@ -32,6 +32,15 @@ class RedrawTiles {
   /// Marks what is marked in `other`, which has the same size.
   void mark(const RedrawTiles& other);
   void clear();
+  /// The marked tiles that are, or are not, marked in `other`, which has the same size.
+  [[nodiscard]] RedrawTiles common(const RedrawTiles& other) const;
+  [[nodiscard]] RedrawTiles without(const RedrawTiles& other) const;
+  /// Takes tiles out, from the lowest row upwards, until they have `pixels` or more; none if that
+  /// is not positive.
+  [[nodiscard]] RedrawTiles take(double pixels);
+  /// Of the marked tiles, those at the border of the picture counted as whole ones.
+  [[nodiscard]] double pixels() const;
+  [[nodiscard]] bool empty() const;
   [[nodiscard]] bool marked(int x, int y) const { return marked_[at(x, y)] != 0; }
 
   /// Rectangles of pixels that do not overlap and cover the marked tiles. Each costs a draw call,

@@ -54,20 +54,27 @@ CastRenderer::Frame::Frame(PictureSize size) {
   for (const GlTexture2D* texture : {&colour, &depth}) read_nearest(texture->id());
 }
 
+CastRenderer::Frame& CastRenderer::frame_of(PictureSize size) {
+  constexpr std::size_t kMost = 2;
+  for (Frame& frame : frames_) {
+    if (PictureSize{frame.picture.width, frame.picture.height} == size) return frame;
+  }
+  if (frames_.size() == kMost) frames_.pop_front();
+  return frames_.emplace_back(size);
+}
+
 void CastRenderer::draw(const View& view, const RenderTarget& target) {
   const PictureSize size = target.size();
-  if (!frame_ || frame_->picture.width != size.width || frame_->picture.height != size.height) {
-    frame_.emplace(size);
-  }
   parts_ = clipped(target.parts(), bounds(view, size));
   if (parts_.empty()) return;
+  Frame& frame = frame_of(size);
   const PixelRect drawn = united(parts_);
   const bool ends_at_target = mode_ == CastMode::blend;
-  if (ends_at_target) read_end_depth(target, drawn);
-  caster_.draw(view, parts_, frame_->picture,
-               ends_at_target ? std::span<const float>(frame_->end_depth) : std::span<float>());
-  upload(drawn);
-  show(target);
+  if (ends_at_target) read_end_depth(frame, target, drawn);
+  caster_.draw(view, parts_, frame.picture,
+               ends_at_target ? std::span<const float>(frame.end_depth) : std::span<float>());
+  upload(frame, drawn);
+  show(frame, target);
 }
 
 PixelRect CastRenderer::bounds(const View& view, PictureSize size) const {
@@ -78,34 +85,34 @@ PixelRect CastRenderer::bounds(const View& view, PictureSize size) const {
   return bounds;
 }
 
-void CastRenderer::read_end_depth(const RenderTarget& target, const PixelRect& rect) {
-  const std::int32_t width = frame_->picture.width;
+void CastRenderer::read_end_depth(Frame& frame, const RenderTarget& target, const PixelRect& rect) {
+  const std::int32_t width = frame.picture.width;
   glBindFramebuffer(GL_READ_FRAMEBUFFER, target.framebuffer());
   glPixelStorei(GL_PACK_ALIGNMENT, 4);
   glPixelStorei(GL_PACK_ROW_LENGTH, width);
   glReadPixels(rect.x0, rect.y0, rect.x1 - rect.x0, rect.y1 - rect.y0, GL_DEPTH_COMPONENT, GL_FLOAT,
-               frame_->end_depth.data() + first_pixel(rect, width));
+               frame.end_depth.data() + first_pixel(rect, width));
   glPixelStorei(GL_PACK_ROW_LENGTH, 0);
 }
 
-void CastRenderer::upload(const PixelRect& rect) {
-  const CastPicture& picture = frame_->picture;
+void CastRenderer::upload(const Frame& frame, const PixelRect& rect) {
+  const CastPicture& picture = frame.picture;
   const std::size_t first = first_pixel(rect, picture.width);
   const GLsizei wide = rect.x1 - rect.x0;
   const GLsizei high = rect.y1 - rect.y0;
   glPixelStorei(GL_UNPACK_ALIGNMENT, 4);
   glPixelStorei(GL_UNPACK_ROW_LENGTH, picture.width);
-  glTextureSubImage2D(frame_->colour.id(), 0, rect.x0, rect.y0, wide, high, GL_RGBA,
-                      GL_UNSIGNED_BYTE, picture.rgba.data() + first);
-  glTextureSubImage2D(frame_->depth.id(), 0, rect.x0, rect.y0, wide, high, GL_RED, GL_FLOAT,
+  glTextureSubImage2D(frame.colour.id(), 0, rect.x0, rect.y0, wide, high, GL_RGBA, GL_UNSIGNED_BYTE,
+                      picture.rgba.data() + first);
+  glTextureSubImage2D(frame.depth.id(), 0, rect.x0, rect.y0, wide, high, GL_RED, GL_FLOAT,
                       picture.depth.data() + first);
   glPixelStorei(GL_UNPACK_ROW_LENGTH, 0);
 }
 
-void CastRenderer::show(const RenderTarget& target) {
+void CastRenderer::show(const Frame& frame, const RenderTarget& target) {
   target.bind();
-  glBindTextureUnit(0, frame_->colour.id());
-  glBindTextureUnit(1, frame_->depth.id());
+  glBindTextureUnit(0, frame.colour.id());
+  glBindTextureUnit(1, frame.depth.id());
   program_.use();
   glEnable(GL_DEPTH_TEST);
   glDepthFunc(GL_LESS);

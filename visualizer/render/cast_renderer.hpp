@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <optional>
+#include <list>
 #include <vector>
 
 #include "visualizer/cast/caster.hpp"
@@ -44,16 +44,18 @@ class CastRenderer final : public Renderer {
     GlTexture2D depth = GlTexture2D::create();
   };
 
+  /// That of this size.
+  [[nodiscard]] Frame& frame_of(PictureSize size);
   /// Pixels that may show anything of the volumes.
   [[nodiscard]] PixelRect bounds(const View& view, PictureSize size) const;
-  void read_end_depth(const RenderTarget& target, const PixelRect& rect);
-  void upload(const PixelRect& rect);
-  void show(const RenderTarget& target);
+  static void read_end_depth(Frame& frame, const RenderTarget& target, const PixelRect& rect);
+  static void upload(const Frame& frame, const PixelRect& rect);
+  void show(const Frame& frame, const RenderTarget& target);
 
   CastMode mode_;
   Caster caster_;
   GlProgram program_{"screen.vert", "cast.frag"};
-  std::optional<Frame> frame_;
+  std::list<Frame> frames_;       ///< two at most: finely and coarsely drawn parts take turns
   std::vector<PixelRect> parts_;  ///< that are cast in this frame
 };
 

@@ -271,6 +271,95 @@ TEST_CASE("so it does with any gradient") {
   }
 }
 
+TEST_CASE(
+    "what exceeds the pixels of a frame is seen coarsely at first, and as finely in the end") {
+  if (!have_gl()) return;
+  for (const std::string_view kind : renderer_kinds()) {
+    CAPTURE(std::string(kind));
+    for (const bool voxel_tool : {false, true}) {
+      Run run;
+      Picture picture(run.session, {.renderer = std::string(kind), .voxel_tool = voxel_tool},
+                      4.0 / 3.0);
+      const RenderTarget target({64, 48});
+      const auto finish = [&] {
+        int frames = 0;
+        for (; picture.is_late() && frames < 300; ++frames) {
+          CHECK(picture.draw(run.session, {}, target).any);
+        }
+        CHECK_FALSE(picture.is_late());
+        return frames;
+      };
+      const auto is_whole = [&] {
+        picture.set_most_pixels(1e9);
+        CHECK(equals_whole(picture, run, target));
+        picture.set_most_pixels(100.0);
+      };
+      picture.set_most_pixels(100.0);
+      const Redrawn first = picture.draw(run.session, {}, target);
+      CHECK(first.fraction == 1.0);
+      CHECK(first.pixels < 101.0);
+      CHECK(picture.is_late());
+      const auto coarse = target.read_rgb();
+      CHECK(finish() > 64 * 48 / 200);
+      CHECK(target.read_rgb() != coarse);
+      is_whole();
+      // Camera, cut and hand come while much is left to be done.
+      for (int event = 0; event < 6; ++event) {
+        picture.camera().orbit(0.1, 0.05);
+        for (int frame = 0; frame < 5; ++frame) {
+          static_cast<void>(picture.draw(run.session, {}, target));
+        }
+        CHECK(picture.is_late());
+        if (event % 3 == 1) run.controller.cut(0, {{10, 10, 5}, {22, 20, 18}}, 0.2);
+        if (event % 3 == 2) run.controller.move({.tip_mm = {event - 3.0, 6.0, 4.0}});
+        run.session.poll();
+        picture.update(run.session);
+        CHECK(picture.draw(run.session, {}, target).any);
+        finish();
+        // What moved comes to rest.
+        while (picture.draw(run.session, {}, target).any) finish();
+        is_whole();
+      }
+    }
+  }
+}
+
+TEST_CASE("beside a hand that moves on the picture becomes fine, and what is fine stays so") {
+  if (!have_gl()) return;
+  for (const char* const kind : {"cast", "cast-blend"}) {
+    CAPTURE(std::string(kind));
+    Run run;
+    Picture picture(run.session, {.renderer = kind}, 4.0 / 3.0);
+    const PictureSize size{160, 120};
+    const RenderTarget target(size);
+    const auto step = [&](int frame) {
+      run.controller.move({.tip_mm = {frame % 2 - 4.0, 8.0, 4.0}});
+      run.session.poll();
+      static_cast<void>(picture.draw(run.session, {}, target));
+      return target.read_rgb();
+    };
+    static_cast<void>(step(0));
+    const auto whole = step(1);
+    picture.redraw_all();
+    picture.set_most_pixels(size.width * size.height / 40.0);  // the hand alone covers more
+    const auto differing = [&](const std::vector<std::uint8_t>& picture) {
+      int count = 0;
+      for (std::size_t i = 0; i < whole.size(); i += 3) {
+        count += std::equal(&whole[i], &whole[i] + 3, &picture[i]) ? 0 : 1;
+      }
+      return count;
+    };
+    const int at_first = differing(step(1));
+    CHECK(at_first > 1000);
+    for (int frame = 2; frame < 202; ++frame) static_cast<void>(step(frame));
+    // All that is coarse still is what moves, and it stays so.
+    for (int frame = 203; frame < 211; frame += 2) {
+      static_cast<void>(step(frame - 1));
+      CHECK(differing(step(frame)) < at_first / 3);
+    }
+  }
+}
+
 TEST_CASE("so it does with a tool of voxels") {
   if (!have_gl()) return;
   for (const std::string_view kind : renderer_kinds()) {
