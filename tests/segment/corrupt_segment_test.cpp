@@ -113,7 +113,7 @@ TEST_CASE("every bit of header and descriptor, flipped in turn, is refused or ha
 TEST_CASE("another version names both versions, another layout both hashes") {
   const ForgedSegment forged;
   forged.put(0x008, std::byte{7});
-  CHECK(forged.read_everything().find("layout version = 7.2; expected 1.2") != std::string::npos);
+  CHECK(forged.read_everything().find("layout version = 7.3; expected 1.3") != std::string::npos);
   forged.restore(0x008);
   forged.put(0x010, forged.good(0x010) ^ std::byte{1});
   const std::string error = forged.read_everything();
