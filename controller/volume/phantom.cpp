@@ -84,7 +84,8 @@ class Sampler {
     const VoxelIndex last{n.x - 1, n.y - 1, n.z - 1};
     const phantom::Point middle =
         position(box.lo.x + 0.5 * last.x, box.lo.y + 0.5 * last.y, box.lo.z + 0.5 * last.z);
-    const phantom::Level& level = at_middles_[static_cast<std::size_t>(2 * box.lo.z + last.z)];
+    const phantom::Level& level =
+        at_middles_[2 * static_cast<std::size_t>(box.lo.z) + static_cast<std::size_t>(last.z)];
     const double radius_mm =
         0.5 * h_mm_ *
         std::sqrt(double(last.x) * last.x + double(last.y) * last.y + double(last.z) * last.z);

@@ -166,6 +166,13 @@ constexpr const char* kAll = ", all of it";
 constexpr const char* kCropped = ", what is solid and three voxels that end in air";
 constexpr const char* kKeepsAll = "--no-crop keeps all";
 
+std::string denoise_text(int passes, const Noise& noise) {
+  std::ostringstream text;
+  text << passes << (passes == 1 ? " pass" : " passes") << " against noise of "
+       << std::round(1000 * noise.share) / 10 << " % of the surface's step";
+  return text.str();
+}
+
 const char* way_to_change(const std::string& what) {
   if (what == "surface") return "--iso VALUE for another";
   if (what == "window") return "--window LO,HI for another";
@@ -326,12 +333,18 @@ void ImportCommand::run(std::ostream& out) const {
   for (const ProposalLine& choice : proposal_lines(proposal)) {
     line(out, choice.what, choice.chosen, way_to_change(choice.what));
   }
+  print_crop(kept, out);
+  line(out, "denoise", denoise_text(passes, noise), "--denoise off, 1, 2 or 3");
+  print_files(to, ", ", out);
+}
+
+void ImportCommand::print_crop(const VolumeFrame& kept, std::ostream& out) const {
   line(out, "crop", size_text(kept) + (whole_ ? kAll : kCropped), whole_ ? "" : kKeepsAll);
-  std::ostringstream smooth;
-  smooth << passes << (passes == 1 ? " pass" : " passes") << " against noise of "
-         << std::round(1000 * noise.share) / 10 << " % of the surface's step";
-  line(out, "denoise", smooth.str(), "--denoise off, 1, 2 or 3");
-  line(out, "wrote", to.volume.string() + ", " + to.scene.string() + ", " + to.preview.string(),
+}
+
+void ImportCommand::print_files(const Files& to, const char* behind_volume, std::ostream& out) {
+  line(out, "wrote",
+       to.volume.string() + behind_volume + to.scene.string() + ", " + to.preview.string(),
        "look at the last one first");
   line(out, "try", "./kerf demo --scene " + to.scene.string(), "");
 }
@@ -391,11 +404,8 @@ void ImportCommand::import_labelled(VolumeImage image, const SourceLines& source
   print_source(source, out);
   line(out, "materials", "by label, the highest is " + std::to_string(last),
        "edit [[material]] in the scene");
-  line(out, "crop", size_text(kept) + (whole_ ? kAll : kCropped), whole_ ? "" : kKeepsAll);
-  line(out, "wrote",
-       to.volume.string() + ", its labels, " + to.scene.string() + ", " + to.preview.string(),
-       "look at the last one first");
-  line(out, "try", "./kerf demo --scene " + to.scene.string(), "");
+  print_crop(kept, out);
+  print_files(to, ", its labels, ", out);
 }
 
 }  // namespace kerf

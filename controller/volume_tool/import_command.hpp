@@ -46,6 +46,8 @@ class ImportCommand {
   /// Refuses options for the surface, which the labels define.
   void refuse_beside_labels() const;
   void print_source(const SourceLines& source, std::ostream& out) const;
+  void print_crop(const VolumeFrame& kept, std::ostream& out) const;
+  static void print_files(const Files& to, const char* behind_volume, std::ostream& out);
   void import_labelled(VolumeImage image, const SourceLines& source, const Files& files,
                        std::ostream& out) const;
 

@@ -145,7 +145,8 @@ SeqpacketServer::SeqpacketServer(std::string path, const char* option)
   const int error = errno;
   if (fd_ >= 0) close(fd_);
   if (bound) unlink(unborn.c_str());
-  throw HilError(std::string(option_) + ": " + path_ + ": " + std::strerror(error) + "; " +
+  throw HilError(std::string(option_) + ": " + path_ + ": " +
+                 std::generic_category().message(error) + "; " +
                  remedy_for(error, "choose a path in a folder that you may write"));
 }
 
@@ -160,8 +161,8 @@ std::optional<SeqpacketLink> SeqpacketServer::accept(const std::atomic<bool>& st
     errno = 0;
     if (auto link = accept_waiting()) return link;
     if (errno == EMFILE || errno == ENFILE) {  // the client goes on waiting
-      throw HilError(std::string(option_) + ": " + path_ + ": " + std::strerror(errno) + "; " +
-                     remedy_for(errno, ""));
+      throw HilError(std::string(option_) + ": " + path_ + ": " +
+                     std::generic_category().message(errno) + "; " + remedy_for(errno, ""));
     }
   }
   return std::nullopt;

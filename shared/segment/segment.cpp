@@ -145,7 +145,8 @@ SegmentMemory SegmentMemory::create(std::uint64_t bytes) {
   memory.fd_ = memfd_create("kerf-segment", MFD_CLOEXEC | MFD_ALLOW_SEALING);
   if (memory.fd_ < 0) throw fail("memfd_create");
   // Reserving now turns a lack of memory into an error here instead of a SIGBUS in the servo.
-  if ((errno = posix_fallocate(memory.fd_, 0, static_cast<off_t>(bytes))) != 0) {
+  errno = posix_fallocate(memory.fd_, 0, static_cast<off_t>(bytes));
+  if (errno != 0) {
     throw fail("allocation");
   }
   void* const at =

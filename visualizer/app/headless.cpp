@@ -64,7 +64,8 @@ std::vector<std::uint8_t> reduced(const std::vector<std::uint8_t>& fine) {
       for (int i = 0; i < kFiner * kFiner; ++i) {
         const int column = 3 * (x / 3 * kFiner + i % kFiner) + x % 3;
         const int row = y * kFiner + i / kFiner;
-        sum += fine[static_cast<std::size_t>(row * 3 * kFiner * kTile.width + column)];
+        sum += fine[static_cast<std::size_t>(row) * 3 * kFiner * kTile.width +
+                    static_cast<std::size_t>(column)];
       }
       tile.push_back(static_cast<std::uint8_t>(sum / (kFiner * kFiner)));
     }
@@ -146,7 +147,7 @@ void write_contact_sheet(const std::filesystem::path& file, const SceneView& sce
     const int left = static_cast<int>(i) % kColumns * kTile.width;
     const int top = static_cast<int>(i) / kColumns * kTile.height;
     for (int y = 0; y < kTile.height; ++y) {
-      std::copy_n(tile.begin() + static_cast<std::ptrdiff_t>(3 * y * kTile.width), 3 * kTile.width,
+      std::copy_n(tile.begin() + std::ptrdiff_t{3} * y * kTile.width, 3 * kTile.width,
                   sheet.pixel(left, top + y));
     }
     pen.write(kinds[i], left + kMarginPx, top + kTile.height - kMarginPx - Pen::kHeightPx, sheet);
@@ -261,6 +262,32 @@ std::chrono::duration<double> pause_before_frame(const Film& film, const Session
   return std::clamp<std::chrono::duration<double>>(due, kShort, kIdle);
 }
 
+void check_lead(const VisualizerOptions& options) {
+  if (!options.lead || std::filesystem::is_fifo(*options.lead)) return;
+  throw VisualizerError("--lead " + *options.lead + ": no FIFO; make one with mkfifo");
+}
+
+void forget_frames(FrameReport& report) {
+  report.cpu_ms.clear();
+  report.wall_ms.clear();
+  report.redrawn.clear();
+  report.latency_ms.clear();
+}
+
+/// What is written once, at the end of the run.
+void keep_results(const VisualizerOptions& options, Session& session, Picture& picture,
+                  FrameReport& report) {
+  if (options.mesh) export_surface(*options.mesh, session.scene(), session.contents());
+  if (options.sheet) {
+    std::optional<Hand> hand;
+    if (session.latest()) hand = hand_of(*session.latest());
+    write_contact_sheet(*options.sheet, picture.shown_scene(), session.contents(), hand);
+  }
+  report.bricks_uploaded = picture.bricks_uploaded();
+  report.clean_end = session.ended_cleanly();
+  if (options.report) report.write(*options.report);
+}
+
 }  // namespace
 
 int run_headless(const VisualizerOptions& asked) {
@@ -268,9 +295,7 @@ int run_headless(const VisualizerOptions& asked) {
   place_process(options.cpus);
   if (options.frames > 0) check_new_folder(options.out);
   check_files(options);
-  if (options.lead && !std::filesystem::is_fifo(*options.lead)) {
-    throw VisualizerError("--lead " + *options.lead + ": no FIFO; make one with mkfifo");
-  }
+  check_lead(options);
   const auto context = make_headless_context();
   const GlDriver driver = query_gl_driver();
   take_default_renderer(options);
@@ -289,10 +314,7 @@ int run_headless(const VisualizerOptions& asked) {
   taker.draw(session);  // not kept: the driver compiles shaders at their first use
   if (options.attached) write_new_file(*options.attached, "");
   report.late_join_ms = since_attached.wall_ms();
-  report.cpu_ms.clear();
-  report.wall_ms.clear();
-  report.redrawn.clear();
-  report.latency_ms.clear();
+  forget_frames(report);
 
   std::optional<Film> film;
   if (options.record) begin_recording(options, options.size, film);
@@ -323,15 +345,7 @@ int run_headless(const VisualizerOptions& asked) {
     std::this_thread::sleep_for(film && ticks ? pause_before_frame(*film, session) : kIdle);
   }
 
-  if (options.mesh) export_surface(*options.mesh, session.scene(), session.contents());
-  if (options.sheet) {
-    std::optional<Hand> hand;
-    if (session.latest()) hand = hand_of(*session.latest());
-    write_contact_sheet(*options.sheet, picture.shown_scene(), session.contents(), hand);
-  }
-  report.bricks_uploaded = picture.bricks_uploaded();
-  report.clean_end = session.ended_cleanly();
-  if (options.report) report.write(*options.report);
+  keep_results(options, session, picture, report);
   tell(options, schedule, film, report);
   return exit_code(session, options.record && !film);
 }

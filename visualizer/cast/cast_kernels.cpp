@@ -42,8 +42,8 @@ Sets sets_of_this_machine() noexcept {
 }  // namespace
 
 const CastKernels* const* cast_kernels() noexcept {
-  static const Sets sets = sets_of_this_machine();
-  return sets.data();
+  static const Sets kSets = sets_of_this_machine();
+  return kSets.data();
 }
 
 }  // namespace kerf

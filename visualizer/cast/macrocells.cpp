@@ -167,7 +167,8 @@ void MacrocellDepthRange::cover(const glm::dvec2& low, const glm::dvec2& high,
   const std::int32_t y1 = std::min(block(high.y, drawn_.y0, drawn_.y1), drawn_.y1 - 1);
   for (std::int32_t y = y0; y <= y1; ++y) {
     for (std::int32_t x = x0; x <= x1; ++x) {
-      CastBlock& at = blocks_[static_cast<std::size_t>(y * across_ + x)];
+      CastBlock& at = blocks_[static_cast<std::size_t>(y) * static_cast<std::size_t>(across_) +
+                              static_cast<std::size_t>(x)];
       at.begin_mm = std::min(at.begin_mm, range.begin_mm);
       at.end_mm = std::max(at.end_mm, range.end_mm);
     }

@@ -159,6 +159,7 @@ std::unique_ptr<EglContext> best_egl_context() {
     auto other = EglContext::make(EGL_PLATFORM_DEVICE_EXT, device, ContextKind::egl_device);
     if (other == nullptr) continue;
     const bool software = query_gl_driver().software;
+    // NOLINTNEXTLINE(clang-analyzer-cplusplus.NewDeleteLeaks): `best` owns it
     if (best == nullptr || !software) best = std::move(other);
     if (!software) break;
   }

@@ -70,8 +70,8 @@ void draw_slices(const SliceViews& slices, ImTextureID texture, ImVec2 size) {
 }
 
 float draw_banner(const std::string& text, bool alarm, ImVec2 size, float controls_x) {
-  const ImVec4 kAlarm{0.45F, 0.20F, 0.0F, 0.92F};
-  const ImVec4 kNews{0.05F, 0.20F, 0.32F, 0.92F};
+  const ImVec4 of_alarm{0.45F, 0.20F, 0.0F, 0.92F};
+  const ImVec4 of_news{0.05F, 0.20F, 0.32F, 0.92F};
   const float gap = 8.0F * unit_px(), foot = 14.0F * unit_px(), least_wide = 160.0F * unit_px();
   const ImVec2 padding = ImGui::GetStyle().WindowPadding;
   const bool alone = controls_x <= 0.0F;
@@ -86,7 +86,7 @@ float draw_banner(const std::string& text, bool alarm, ImVec2 size, float contro
   const ImVec2 high{low.x + whole.x, low.y + whole.y};
   ImDrawList& to = *ImGui::GetForegroundDrawList();
   to.PushClipRect(low, high);
-  to.AddRectFilled(low, high, ImGui::GetColorU32(alarm ? kAlarm : kNews),
+  to.AddRectFilled(low, high, ImGui::GetColorU32(alarm ? of_alarm : of_news),
                    ImGui::GetStyle().WindowRounding);
   to.AddText(ImGui::GetFont(), ImGui::GetFontSize(), ImVec2(low.x + padding.x, low.y + padding.y),
              ImGui::GetColorU32(kValueColour), text.c_str(), nullptr, wrap);

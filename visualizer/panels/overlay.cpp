@@ -175,6 +175,7 @@ void Overlay::lay_out(OverlayFigures& figures, PictureSize size) {
     if (figures.slices && width_of_slices(*figures.slices) <= right) {
       show(*figures.slices);
       const auto texture = static_cast<std::intptr_t>(slices_->id());
+      // NOLINTNEXTLINE(performance-no-int-to-ptr): ImGui carries the texture's number as a pointer
       draw_slices(*figures.slices, reinterpret_cast<ImTextureID>(texture), all);
     }
     if (figures.controls && below >= SettingsPanel::least_high()) {

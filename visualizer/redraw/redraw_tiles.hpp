@@ -49,7 +49,8 @@ class RedrawTiles {
 
  private:
   [[nodiscard]] std::size_t at(int x, int y) const {
-    return static_cast<std::size_t>(y * across_ + x);
+    return static_cast<std::size_t>(y) * static_cast<std::size_t>(across_) +
+           static_cast<std::size_t>(x);
   }
 
   PictureSize size_;

@@ -13,7 +13,6 @@
 #include <limits>
 #include <optional>
 #include <string>
-#include <utility>
 
 #include <nifti/nifti1.h>
 #include <nifti/nifti2.h>
@@ -355,7 +354,7 @@ void read_nifti(const fs::path& named, const MemoryRequest& offer) {
     refuse_header(path, "scl_inter = " + short_text(h.scaling.intercept) + " is no number");
   }
   files.parts = {{.file = data, .bytes = offset_in(path, h)}};
-  read_voxel_files(path, std::move(files), claim, offer);
+  read_voxel_files(path, files, claim, offer);
 }
 
 }  // namespace kerf::volume

@@ -408,7 +408,7 @@ std::vector<fs::path> files_of(const HeaderFields& fields, const char* key, cons
   return files;
 }
 
-void read_voxel_files(const fs::path& header, VoxelFiles files, UntrustedHeader claim,
+void read_voxel_files(const fs::path& header, const VoxelFiles& files, UntrustedHeader claim,
                       const MemoryRequest& offer) {
   const std::size_t each = bytes_of(files.type);
   check_grid(header.string(), claim.size[0], claim.size[1], claim.size[2]);

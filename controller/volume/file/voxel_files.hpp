@@ -70,7 +70,7 @@ void refuse_itself(const HeaderFields& fields, const char* key, const std::files
 /// or broken, or (text, packed) hold more than the voxels, or (raw) twice their bytes or more.
 /// Fewer bytes that follow raw voxels are left out, and the note says so. `header`: the file that
 /// names the others, for messages.
-void read_voxel_files(const std::filesystem::path& header, VoxelFiles files, UntrustedHeader claim,
-                      const MemoryRequest& offer);
+void read_voxel_files(const std::filesystem::path& header, const VoxelFiles& files,
+                      UntrustedHeader claim, const MemoryRequest& offer);
 
 }  // namespace kerf::volume

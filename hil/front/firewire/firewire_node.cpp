@@ -91,11 +91,12 @@ void FirewireNode::wake() {
 
 /// Answers reads that wait for an event, and wakes clients that poll for one.
 void FirewireNode::deliver() {
-  for (auto& [id, open] : opens_) {
+  for (auto& entry : opens_) {
+    auto& open = entry.second;
     EventQueue& events = open.client->events();
     high_water_ = std::max(high_water_, events.high_water());
     deliver_to(
-        id, open, [&] { return !events.empty() || open.client->gone(); },
+        entry.first, open, [&] { return !events.empty() || open.client->gone(); },
         [&](std::size_t size) {
           return events.empty() ? FuseReply::fail(ENODEV) : take(open, size);
         });

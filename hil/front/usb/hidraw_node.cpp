@@ -170,10 +170,11 @@ void HidrawNode::plugged(bool in) {
 
 /// Answers reads that wait for a report, and wakes clients that poll for one.
 void HidrawNode::deliver() {
-  for (auto& [id, open] : opens_) {
+  for (auto& entry : opens_) {
+    auto& open = entry.second;
     take_writes(open);
     deliver_to(
-        id, open, [&] { return !open.waiting.empty() || open.gone; },
+        entry.first, open, [&] { return !open.waiting.empty() || open.gone; },
         [&](std::size_t size) {
           return open.waiting.empty() ? FuseReply::fail(EIO) : take(open, size);
         });

@@ -176,9 +176,10 @@ void UsbfsNode::plugged(bool in) {
 }
 
 void UsbfsNode::deliver() {
-  for (auto& [id, open] : opens_) {
+  for (auto& entry : opens_) {
+    auto& open = entry.second;
     deliver_to(
-        id, open, [&] { return !open.done.empty() || open.gone; },
+        entry.first, open, [&] { return !open.done.empty() || open.gone; },
         [](std::size_t) { return FuseReply{}; });  // no read sleeps here
   }
 }

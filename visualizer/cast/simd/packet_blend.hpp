@@ -193,6 +193,43 @@ inline void put(const CastJob& job, const Packet& packet, const Gathered& sum) {
   put(packet, Simd::select(sum.has_depth, depth, one), job.pixels.depth);
 }
 
+/// Steps of the rays: where the first volume begins, and where the last one ends.
+struct WalkedPart {
+  F first_k, end_mm;
+};
+
+/// The walk through each volume that the packet meets.
+inline WalkedPart begin_walks(const CastJob& job, const Packet& packet, const Shown& part,
+                              const Vec3& eye, Walk (&walks)[kMaxCastVolumes]) {
+  const F never = Simd::set(kNever);
+  WalkedPart walked{never, Simd::set(0.0F)};
+  for (int v = 0; v < job.volume_count; ++v) {
+    const CastVolumeJob& volume = job.volumes[v];
+    Walk& walk = walks[v];
+    walk.exit_k = never;
+    walk.visible = Simd::none();
+    walk.front_k = never;
+    walk.front = never;
+    if (!is_met(volume.blocks[packet.block])) continue;
+    walk.rays = rays_through(job, volume, volume.blocks[packet.block], part, eye);
+    const M meets = Simd::less(walk.rays.begin_mm, walk.rays.end_mm);
+    walk.exit_k = Simd::select(meets, whole(walk.rays.begin_mm / Simd::set(job.step_mm)), never);
+    walked.first_k = Simd::min(walked.first_k, walk.exit_k);
+    walked.end_mm = Simd::select(meets, Simd::max(walked.end_mm, walk.rays.end_mm), walked.end_mm);
+  }
+  return walked;
+}
+
+/// Adds the light of a piece of the rays, `length_mm` long.
+inline void gather(const Glow& glow, F length_mm, Gathered& sum) {
+  const F one = Simd::set(1.0F);
+  if (!Simd::any(Simd::less(Simd::set(0.0F), glow.per_mm))) return;
+  const F kept = exp2_of(-Simd::min(glow.per_mm * length_mm, Simd::set(100.0F)));
+  const F colour = sum.clear * (one - kept) / Simd::max(glow.per_mm, Simd::set(1e-9F));
+  sum.rgb = sum.rgb + colour * glow.rgb;
+  sum.clear = sum.clear * kept;
+}
+
 inline void blend_packet(const CastJob& job, const Packet& packet) {
   const F one = Simd::set(1.0F);
   const F never = Simd::set(kNever);
@@ -207,22 +244,7 @@ inline void blend_packet(const CastJob& job, const Packet& packet) {
     part.end_mm = Simd::min(end_mm, part.end_mm);
   }
   Walk walks[kMaxCastVolumes];
-  F k = never;
-  F end_mm = Simd::set(0.0F);
-  for (int v = 0; v < job.volume_count; ++v) {
-    const CastVolumeJob& volume = job.volumes[v];
-    Walk& walk = walks[v];
-    walk.exit_k = never;
-    walk.visible = Simd::none();
-    walk.front_k = never;
-    walk.front = never;
-    if (!is_met(volume.blocks[packet.block])) continue;
-    walk.rays = rays_through(job, volume, volume.blocks[packet.block], part, eye);
-    const M meets = Simd::less(walk.rays.begin_mm, walk.rays.end_mm);
-    walk.exit_k = Simd::select(meets, whole(walk.rays.begin_mm / step_mm), never);
-    k = Simd::min(k, walk.exit_k);
-    end_mm = Simd::select(meets, Simd::max(end_mm, walk.rays.end_mm), end_mm);
-  }
+  auto [k, end_mm] = begin_walks(job, packet, part, eye, walks);
   Gathered sum;
   sum.clear = one;
   sum.depth_mm = never;
@@ -246,13 +268,7 @@ inline void blend_packet(const CastJob& job, const Packet& packet) {
       for (int v = 0; v < job.volume_count; ++v) {
         add_piece(job, job.volumes[v], walks[v], alive, {k, from_mm, to_mm}, vectors, sum, glow);
       }
-      if (Simd::any(Simd::less(Simd::set(0.0F), glow.per_mm))) {
-        const F extinction = glow.per_mm * (positive(to_mm - from_mm) * length_per_mm);
-        const F kept = exp2_of(-Simd::min(extinction, Simd::set(100.0F)));
-        const F colour = sum.clear * (one - kept) / Simd::max(glow.per_mm, Simd::set(1e-9F));
-        sum.rgb = sum.rgb + colour * glow.rgb;
-        sum.clear = sum.clear * kept;
-      }
+      gather(glow, positive(to_mm - from_mm) * length_per_mm, sum);
       k = k + one;
       alive = Simd::both(alive, Simd::less(Simd::set(1.0F - kOpaque), sum.clear));
     }
