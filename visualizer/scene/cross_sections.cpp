@@ -64,7 +64,7 @@ class VolumeSampler {
 /// By a table: a power for each pixel would take most of the time.
 std::uint8_t eight_bits(double linear) {
   constexpr int kLast = 8191;
-  static const std::vector<std::uint8_t> table = [] {
+  static const std::vector<std::uint8_t> kTable = [] {
     constexpr double kGamma = 2.2;
     std::vector<std::uint8_t> made;
     for (int i = 0; i <= kLast; ++i) {
@@ -73,7 +73,7 @@ std::uint8_t eight_bits(double linear) {
     }
     return made;
   }();
-  return table[static_cast<std::size_t>(std::clamp(linear, 0.0, 1.0) * kLast + 0.5)];
+  return kTable[static_cast<std::size_t>(std::clamp(linear, 0.0, 1.0) * kLast + 0.5)];
 }
 
 }  // namespace

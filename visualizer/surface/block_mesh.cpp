@@ -148,7 +148,9 @@ class Neighbourhood {
 
  private:
   static constexpr std::size_t index(int x, int y, int z) {
-    return static_cast<std::size_t>((z + 1) * kStride[2] + (y + 1) * kStride[1] + x + 1);
+    return static_cast<std::size_t>(z + 1) * static_cast<std::size_t>(kStride[2]) +
+           static_cast<std::size_t>(y + 1) * static_cast<std::size_t>(kStride[1]) +
+           static_cast<std::size_t>(x + 1);
   }
 
   std::array<Density, static_cast<std::size_t>(kStride[2]) * (kSamples + 2)> density_{};
