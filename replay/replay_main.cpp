@@ -22,7 +22,8 @@ constexpr const char* kAbout =
 /// False if help or version was requested, and printed.
 bool parse_replay(int argc, char** argv, ReplayOptions& options) {
   CommandLine app(kAbout, "kerf-replay", KERF_VERSION);
-  app.footer("\nExit codes: 0 fine, 1 a tick differs or the recording has a gap, 2 bad input.");
+  app.footer(
+      "\nExit codes: 0 fine, 1 a tick differs or the recording has a gap, 2 bad input or set-up.");
   std::string numeric, scene, law;
   app.option("DIR", options.folder, "folder of a recording").required();
   app.option("--from", options.from, "the first tick that is compared").shown_as("TICK");

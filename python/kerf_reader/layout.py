@@ -6,8 +6,8 @@ and a segment with another one is refused."""
 import numpy as np
 
 MAGIC = int.from_bytes(b"KERFSHM1", "little")
-VERSION = (1, 2)
-ABI = 0x05ADF54FEBFBCA0A
+VERSION = (1, 3)
+ABI = 0x3AF3E5B115F717E7
 
 HELLO = np.dtype([("magic", "<u8"), ("major", "<u4"), ("minor", "<u4"), ("abi_hash", "<u8"), ("session_id", "<u8")])
 
@@ -38,7 +38,8 @@ TICK = np.dtype([
     ("energy_friction", "<i8"), ("energy_cutting", "<i8"), ("energy_limits", "<i8"), ("energy_hold", "<i8"),
     ("energy_leak", "<i8"), ("energy_stabiliser", "<i8"), ("spindle_load", "<f4"), ("active_tool", "<u4"),
     ("fault", "<u4"), ("stale", "<u4"), ("penetration_mm", "<f4"), ("plane_count", "<u4"), ("plane_load_n", "<f4", 3),
-    ("plane_normal", "<f4", 9), ("plane_arm_mm", "<f4", 9), ("crc32c", "<u4")])
+    ("plane_normal", "<f4", 9), ("plane_arm_mm", "<f4", 9), ("command", "<u4"), ("command_argument", "<u4"),
+    ("crc32c", "<u4")])
 
 STARTED = 1 << 9  # of `flags`: taken in hand at least once
 FINAL = 3         # the first `lifecycle` that ends a run

@@ -70,7 +70,7 @@ class TestOptions(unittest.TestCase):
         with unittest.mock.patch.object(options.shutil, "which", return_value="/usr/bin/ffmpeg"):
             self.assertEqual(options.growth(raw, 2000), [
                 "--record no-such.y4m: raw, 28 MB a second; a name that ends in .mp4 compresses it",
-                "--out o: its log grows by 59 MB a minute"])
+                "--out o: its log grows by 60 MB a minute"])
             self.assertEqual(options.growth(checked("--record", "v.mp4", "--seconds", "60", "--out", "o"), 1000), [])
             self.assertEqual(options.growth(checked("--record", "/dev/null"), 1000), [])
         with unittest.mock.patch.object(options.shutil, "which", return_value=None), \
