@@ -355,8 +355,11 @@ TEST_CASE("twenty strokes are undone and cut again bit by bit; the next cut drop
     for (int i = 0; i < 3; ++i) hand.restore(kUndo);
     CHECK(is(19));
     seen.resize(20);
-    stroke(7);
-    CHECK_FALSE(hand.servo->apply(kRedo));
+    hand.stroke(-1.2 + 0.12 * 7);
+    CHECK_FALSE(hand.servo->apply(kRedo));  // while it is cut,
+    hand.rest(kAbove, 300);
+    seen.push_back({hand.hash(), hand.removed});
+    CHECK_FALSE(hand.servo->apply(kRedo));  // and after it
     hand.restore(kUndo);
     CHECK(is(19));
     hand.restore(kRedo);
