@@ -18,6 +18,7 @@
 #include "shared/text/command_line.hpp"
 #include "shared/text/json.hpp"
 #include "shared/text/text.hpp"
+#include "shared/wire/personality.hpp"
 
 namespace kerf {
 namespace {
@@ -134,6 +135,25 @@ SceneSource changed(SceneSource source, const ReplayChanges& changes) {
   return source;
 }
 
+/// A replay takes ticks and counts as they are: of that rate and that device.
+void check_same_counts(const std::string& recorded, const LoadedScene& scene) {
+  const Json was = Json::parse(recorded);
+  const auto rate_hz = was.at("servo").at("rate_hz").get<int>();
+  const auto device = was.at("device").at("personality").get<std::string>();
+  const std::string_view now =
+      kPersonalityWords[static_cast<std::size_t>(scene.device.personality)];
+  if (scene.servo.rate_hz != rate_hz) {
+    throw RecordError(scene.path + ": servo.rate_hz is " + std::to_string(scene.servo.rate_hz) +
+                      ", and the ticks of the recording are of " + std::to_string(rate_hz) +
+                      " Hz; replay it at that rate");
+  }
+  if (device != now) {
+    throw RecordError(scene.path + ": device.personality is " + std::string(now) +
+                      ", and the counts of the recording are of " + one_line(device) +
+                      "; replay it with that device");
+  }
+}
+
 void check_begins_at_first_tick(const std::filesystem::path& folder, const Manifest& manifest) {
   if (manifest.missed_before_start == 0) return;
   throw RecordError(folder.string() + ": the first " +
@@ -154,7 +174,11 @@ RecordedRun load_run(const std::filesystem::path& folder, const ReplayChanges& c
   run.scene = load_scene(source);
   run.canonical = canonical_json(run.scene);
   run.scene_json = json_with_source(run.canonical, source);
-  if (changes.none()) check_same(folder, recorded.canonical, run.canonical);
+  if (changes.none()) {
+    check_same(folder, recorded.canonical, run.canonical);
+  } else {
+    check_same_counts(recorded.canonical, run.scene);
+  }
   run.servo = compile(run.scene, kernels);
   return run;
 }

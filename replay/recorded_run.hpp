@@ -38,8 +38,9 @@ struct RecordedRun {
 /// Loads the scene of the recording in `folder` from what it was loaded from, with `changes`.
 ///
 /// Without changes the loaded scene must be the recorded one to the bit; else throws `RecordError`,
-/// one line that names the first key or volume that differs. Throws `RecordError` too if the
-/// recording does not begin at the run's first tick, LoadError if the scene cannot be loaded.
+/// one line that names the first key or volume that differs. With changes rate and device stay.
+/// Throws `RecordError` too if the recording does not begin at the run's first tick, LoadError if
+/// the scene cannot be loaded.
 [[nodiscard]] RecordedRun load_run(const std::filesystem::path& folder,
                                    const ReplayChanges& changes, const KernelSet& kernels);
 

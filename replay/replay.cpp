@@ -146,11 +146,13 @@ std::uint64_t volume_hash_of(const RecordedRun& run) {
   return hash_of_volumes(*run.servo, run.scene.volumes.size());
 }
 
-void print_end(const ReplayResult& result, const RecordedRun& run, bool changed, double wall_s) {
+void print_end(const ReplayResult& result, const RecordedRun& run, Tick from, bool changed,
+               double wall_s) {
   const double run_s = static_cast<double>(result.ticks) * run.manifest.tick_ns * 1e-9;
   if (!result.difference && !changed) {
+    const Tick before = std::min(std::max<Tick>(from, 1) - 1, result.last_tick);
     std::printf("%llu ticks, each equal to the last bit\n",
-                static_cast<unsigned long long>(result.ticks));
+                static_cast<unsigned long long>(result.last_tick - before));
   }
   std::printf("output hash  %s\nvolume hash  %s\n%.1f s of the run in %.2f s\n",
               hex64(result.output_hash).c_str(), hex64(volume_hash_of(run)).c_str(), run_s, wall_s);
@@ -182,6 +184,19 @@ Json json_of(const ReplayResult& result, const RecordedRun& run) {
   return report;
 }
 
+/// Refuses a range in which nothing would be compared.
+void check_range(const ReplayOptions& options, TickLogReader& log) {
+  if (options.from > options.until) {
+    throw RecordError("--from " + std::to_string(options.from) + " lies behind --until " +
+                      std::to_string(options.until) + "; no tick would be compared");
+  }
+  TickRecord last;
+  static_cast<void>(log.read(log.rows() - 1, std::span(&last, 1)));
+  if (options.from <= last.tick) return;
+  throw RecordError("--from " + std::to_string(options.from) + ": the recording ends at tick " +
+                    std::to_string(last.tick) + "; give an earlier one");
+}
+
 }  // namespace
 
 int run_replay(const ReplayOptions& options, const std::atomic<bool>& stop) {
@@ -191,6 +206,7 @@ int run_replay(const ReplayOptions& options, const std::atomic<bool>& stop) {
   if (log.rows() == 0) {
     throw RecordError((options.folder / kTickLogName).string() + ": 0 rows; nothing to replay");
   }
+  check_range(options, log);
   RecordedRun run = load_run(options.folder, options.changes, kernels_named(options.kernels));
   std::optional<ReplayLog> copy;
   if (!options.out.empty()) copy.emplace(options.out, options.folder);
@@ -215,7 +231,7 @@ int run_replay(const ReplayOptions& options, const std::atomic<bool>& stop) {
   if (copy) copy->close(run, result);
   if (changed) std::fputs(compared.text().c_str(), stdout);
   if (difference) print_difference(*difference, run);
-  print_end(result, run, changed, wall.count());
+  print_end(result, run, options.from, changed, wall.count());
   if (!result.cut_short.empty()) std::cout << "stopped: " << result.cut_short << '\n';
   if (!options.plot.empty()) compared.plot(options.plot);
   if (!options.report.empty()) write_new_file(options.report, json_of(result, run).document());

@@ -27,7 +27,9 @@ bool parse_replay(int argc, char** argv, ReplayOptions& options) {
   std::string numeric, scene, law;
   app.option("DIR", options.folder, "folder of a recording").required();
   app.option("--from", options.from, "the first tick that is compared").shown_as("TICK");
-  app.option("--until", options.until, "the last tick that is replayed").shown_as("TICK");
+  app.option("--until", options.until, "the last tick that is replayed")
+      .within(1, 1e18)
+      .shown_as("TICK");
   app.option("--kernels", options.kernels, "those of an instruction set, as scalar or avx2")
       .shown_as("NAME");
   app.option("--set", options.changes.settings,

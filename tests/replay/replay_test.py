@@ -106,6 +106,10 @@ class TestReplay(unittest.TestCase):
         self.assertIn("tick 1600 (1.600 s), cut: removed was 12345, is ", replay(log, code=1))
         self.assertIn("each equal", replay(log, "--from", "1601"))
         self.assertIn("1599 ticks, each equal", replay(log, "--until", "1599"))
+        self.assertIn("100 ticks, each equal", replay(log, "--from", "1500", "--until", "1599"))
+        self.assertIn("no tick would be compared", replay(log, "--from", "1600", "--until", "1599", code=2))
+        self.assertIn("the recording ends at tick ", replay(log, "--from", "999999", code=2))
+        self.assertIn("--until", replay(log, "--until", "0", code=2))
 
     def test_what_if(self):
         out, plot, report = (self.run_folder / name for name in ("soft", "soft.svg", "soft.json"))
@@ -119,6 +123,9 @@ class TestReplay(unittest.TestCase):
         self.assertIn("places of the tool", replay(self.log, "--numeric", "double"))
         self.assertIn("did you mean", replay(self.log, "--set", "force.stifness_n_per_mm=1", code=2))
         self.assertIn("places of the tool", replay(self.log, "--scene", ROOT / "scenes/touch.toml"))
+        self.assertIn("the ticks of the recording are of 1000 Hz", replay(self.log, "--set", "servo.rate_hz=2000", code=2))
+        self.assertIn("the counts of the recording are of omni",
+                      replay(self.log, "--set", "device.personality=falcon", code=2))
 
     def test_gaps_and_cuts(self):
         log = self.copy()
