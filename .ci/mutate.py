@@ -102,6 +102,8 @@ def check(mutations):
         if mutation.name in names:
             raise Wrong(f"{mutation.name}: stands twice in {TABLE}; rename one")
         names.add(mutation.name)
+        if mutation.list != "contact" and not re.match(r"test_|\.ci/|(omni|falcon|woodenhaptics) ", mutation.catcher):
+            raise Wrong(f"{mutation.name}: '{mutation.catcher}' is no test, check or fault script; correct {TABLE}")
         if mutation.list == "safety" and f"`{mutation.name}`" not in page:
             raise Wrong(f"{mutation.name}: stands nowhere in docs/safety.md; name its rule there")
         mutation.contents(ROOT)
