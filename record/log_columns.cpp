@@ -79,7 +79,7 @@ constexpr LogColumn kColumns[] = {
     {"plane_load_n", "N", "load along each plane's normal, before limits", "the first plane_count"},
     {"plane_normal", "", "x, y, z of each plane's normal, out of the solid", "the first plane_count"},
     {"plane_arm_mm", "mm", "x, y, z from the tool's centre to each contact", "the first plane_count"},
-    {"command", "", "bits, below: command and restart that were applied before this tick's step"},
+    {"command", "", "code, below: what was applied before this tick's step; 0: nothing"},
     {"command_argument", "", "of that command: index of the tool; hold: 1 on, 0 off"},
     {"crc32c", "", "checksum of the row from tick on"},
 };
@@ -106,6 +106,15 @@ constexpr LogCode kFlags[] = {
     {kFlagRedo, "redo", "a stroke that was undone is cut again: no force; `removed` is it"},
     {kFlagRedoable, "redoable", "it can be"},
     {kFlagPedal, "pedal", "the tool cuts only while button 1 is pressed"},
+};
+constexpr LogCode kCommands[] = {
+    {1, "select_tool", "its index is the argument"},
+    {2, "hold", "argument 1: no force, nothing is cut; 0: goes on"},
+    {4, "reset", "the volumes go back to their first content"},
+    {5, "undo", "the last stroke"},
+    {6, "redo", "the stroke that was undone last"},
+    {kCommandFadeIn, "restart",
+     "added to the others: the force fades in after a stall of the servo"},
 };
 constexpr LogCode kPhases[] = {
     {0, "off", "no report has come yet"},
@@ -226,8 +235,8 @@ std::string log_page() {
   for (const LayoutField& field : kLayoutTable) {
     if (field.record == "TickRecord") page += page_row(field, kColumns[row++]);
   }
-  return page + codes("Flags", "bit", kFlags) + codes("Phases", "phase", kPhases) +
-         codes("Faults", "fault", kFaults);
+  return page + codes("Flags", "bit", kFlags) + codes("Commands", "command", kCommands) +
+         codes("Phases", "phase", kPhases) + codes("Faults", "fault", kFaults);
 }
 
 }  // namespace kerf

@@ -64,29 +64,24 @@ struct Difference {
   std::string key, recorded, loaded;
 };
 
+/// The value as what it holds; null if it holds something else.
+template <class Held>
+const Held* held_as(const Json& value) {
+  return value.visit([]<class T>(const T& held) -> const Held* {
+    if constexpr (std::is_same_v<T, Held>) {
+      return &held;
+    } else {
+      return nullptr;
+    }
+  });
+}
+
 /// The first value in which two scenes differ, depth first in the order of the keys.
 std::optional<Difference> first_difference(const Json& recorded, const Json& loaded,
                                            const std::string& key) {
   if (recorded.canonical() == loaded.canonical()) return std::nullopt;
-  const auto members_of = [](const Json& value) {
-    return value.visit([]<class T>(const T& held) -> const Json::Members* {
-      if constexpr (std::is_same_v<T, Json::Members>) {
-        return &held;
-      } else {
-        return nullptr;
-      }
-    });
-  };
-  const auto list_of = [](const Json& value) {
-    return value.visit([]<class T>(const T& held) -> const Json::List* {
-      if constexpr (std::is_same_v<T, Json::List>) {
-        return &held;
-      } else {
-        return nullptr;
-      }
-    });
-  };
-  if (const auto* a = members_of(recorded), *b = members_of(loaded); a != nullptr && b != nullptr) {
+  if (const auto* a = held_as<Json::Members>(recorded), *b = held_as<Json::Members>(loaded);
+      a != nullptr && b != nullptr) {
     for (const Json::Member& member : *a) {
       const std::string below = key.empty() ? member.key : key + "." + member.key;
       if (!loaded.contains(member.key)) return Difference{below, short_value(member.value), "none"};
@@ -98,7 +93,7 @@ std::optional<Difference> first_difference(const Json& recorded, const Json& loa
                         short_value(member.value)};
     }
   }
-  if (const auto* a = list_of(recorded), *b = list_of(loaded);
+  if (const auto* a = held_as<Json::List>(recorded), *b = held_as<Json::List>(loaded);
       a != nullptr && b != nullptr && a->size() == b->size()) {
     for (std::size_t i = 0; i < a->size(); ++i) {
       const std::string below = key + "[" + std::to_string(i) + "]";
@@ -177,7 +172,12 @@ RecordedRun load_run(const std::filesystem::path& folder, const ReplayChanges& c
   if (changes.none()) {
     check_same(folder, recorded.canonical, run.canonical);
   } else {
-    check_same_counts(recorded.canonical, run.scene);
+    try {
+      check_same_counts(recorded.canonical, run.scene);
+    } catch (const JsonError&) {
+      throw RecordError((folder / kSceneName).string() +
+                        ": has no rate or no device; copy the recording again");
+    }
   }
   run.servo = compile(run.scene, kernels);
   return run;

@@ -33,7 +33,8 @@ struct DeviceReport {
   std::uint32_t counter = 0;  ///< packet counter of the device, else of the driver
 };
 
-/// A command of a person or a program; applied at a tick boundary.
+/// A command of a person or a program; applied at a tick boundary. Values of kinds go into logs:
+/// append only.
 struct ServoCommand {
   enum class Kind : std::uint32_t {
     none,
