@@ -2,6 +2,8 @@
 #pragma once
 
 #include <atomic>
+#include <cerrno>
+#include <cstddef>
 #include <cstdint>
 #include <ctime>
 #include <system_error>
@@ -10,6 +12,7 @@
 #include <vector>
 
 #include <pthread.h>
+#include <sched.h>
 
 // Cores and priority of threads, worker threads, and a watchdog for a step that never ends.
 
@@ -17,17 +20,43 @@ namespace kerf {
 
 /// Cores that this process may use, in order; a container may hold fewer than the machine has. By
 /// convention the servo and its device take the last one, the visualizer the others.
-[[nodiscard]] std::vector<int> allowed_cores();
+[[nodiscard]] inline std::vector<int> allowed_cores() {
+  cpu_set_t allowed;
+  CPU_ZERO(&allowed);
+  std::vector<int> cores;
+  if (sched_getaffinity(0, sizeof allowed, &allowed) != 0) return {0};
+  for (int core = 0; core < CPU_SETSIZE; ++core) {
+    if (CPU_ISSET(static_cast<std::size_t>(core), &allowed)) cores.push_back(core);
+  }
+  return cores;
+}
 
 /// SCHED_FIFO `priority` for the calling thread. Returns 0 or the system's error number.
-[[nodiscard]] int set_fifo(int priority) noexcept;
+[[nodiscard]] inline int set_fifo(int priority) noexcept {
+  sched_param parameters{};
+  parameters.sched_priority = priority;
+  return pthread_setschedparam(pthread_self(), SCHED_FIFO, &parameters);
+}
 
 /// Keeps the calling thread on one core. Returns 0 or the system's error number.
-[[nodiscard]] int pin_to_core(int core) noexcept;
+[[nodiscard]] inline int pin_to_core(int core) noexcept {
+  if (core < 0 || core >= CPU_SETSIZE) return EINVAL;
+  cpu_set_t set;
+  CPU_ZERO(&set);
+  CPU_SET(static_cast<std::size_t>(core), &set);
+  return pthread_setaffinity_np(pthread_self(), sizeof set, &set);
+}
 
 /// Keeps the calling thread on the other cores that it may use. Returns 0 or the system's error
 /// number; if there is no other core, EINVAL, and the thread keeps its cores.
-[[nodiscard]] int avoid_core(int core) noexcept;
+[[nodiscard]] inline int avoid_core(int core) noexcept {
+  if (core < 0 || core >= CPU_SETSIZE) return EINVAL;
+  cpu_set_t set;
+  CPU_ZERO(&set);
+  if (sched_getaffinity(0, sizeof set, &set) != 0) return errno;
+  CPU_CLR(static_cast<std::size_t>(core), &set);
+  return pthread_setaffinity_np(pthread_self(), sizeof set, &set);  // refuses an empty set
+}
 
 /// Runs `work` in a thread of its own. If the system has no thread left, runs it here at once and
 /// returns an empty thread.
