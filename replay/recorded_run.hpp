@@ -9,7 +9,7 @@
 
 #include "controller/kernel/kernel_set.hpp"
 #include "controller/load/loaded_scene.hpp"
-#include "controller/load/scene_source.hpp"
+#include "controller/load/scene_json.hpp"
 #include "controller/plan/compile.hpp"
 #include "record/recording.hpp"
 

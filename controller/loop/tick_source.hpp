@@ -3,7 +3,14 @@
 
 #include <atomic>
 #include <cstdint>
+#include <limits>
+#include <stdexcept>
 #include <string>
+
+#include <fcntl.h>
+#include <poll.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include "controller/device/device_driver.hpp"
 #include "shared/posix/monotonic_clock.hpp"
@@ -55,18 +62,37 @@ class DeadlineClock {
 class TickGate {
  public:
   /// Throws std::runtime_error with one line if `fifo` is none. `stop` outlives it.
-  TickGate(const std::string& fifo, const std::atomic<bool>& stop);
-  ~TickGate();
+  TickGate(const std::string& fifo, const std::atomic<bool>& stop)
+      : fd_(open(fifo.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC)), stop_(stop) {
+    struct stat status {};
+    if (fd_ >= 0 && fstat(fd_, &status) == 0 && S_ISFIFO(status.st_mode)) return;
+    if (fd_ >= 0) close(fd_);
+    throw std::runtime_error("--until " + fifo + ": no FIFO; make one with mkfifo");
+  }
+  ~TickGate() { close(fd_); }
   TickGate(const TickGate&) = delete;
   TickGate& operator=(const TickGate&) = delete;
 
   /// Returns once `tick` is allowed, or the loop has to stop. If the writer is gone, or writes
   /// nothing for `kPatienceMs`, all later ticks pass.
-  void wait_for(std::uint64_t tick) noexcept;
+  void wait_for(std::uint64_t tick) noexcept {
+    for (int waited_ms = 0; tick > allowed_ && waited_ms < kPatienceMs;) {
+      if (stop_.load(std::memory_order_relaxed)) return;
+      pollfd fifo{fd_, POLLIN, 0};
+      if (poll(&fifo, 1, kLookMs) <= 0) {
+        waited_ms += kLookMs;
+      } else if (read(fd_, &allowed_, sizeof allowed_) != sizeof allowed_) {
+        break;  // the writer has gone; eight bytes come whole, or not at all
+      }
+    }
+    if (tick > allowed_) allowed_ = std::numeric_limits<std::uint64_t>::max();
+  }
 
   static constexpr int kPatienceMs = 10'000;
 
  private:
+  static constexpr int kLookMs = 100;  ///< period of the checks for a stop request
+
   int fd_;
   const std::atomic<bool>& stop_;
   std::uint64_t allowed_ = 0;

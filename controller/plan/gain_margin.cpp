@@ -14,7 +14,6 @@
 #include "controller/plan/plan_device.hpp"
 #include "controller/scene/scene.hpp"
 #include "controller/stability/axis_simulation.hpp"
-#include "controller/stability/gain_limits.hpp"
 #include "controller/stability/sampled_loop.hpp"
 #include "shared/numeric/numbers.hpp"
 #include "shared/text/text.hpp"

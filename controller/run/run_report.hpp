@@ -8,7 +8,7 @@
 
 #include "controller/device/port/packet_port.hpp"
 #include "controller/loop/real_time.hpp"
-#include "controller/loop/run_record.hpp"
+#include "controller/loop/servo_loop.hpp"
 
 namespace kerf {
 

@@ -8,7 +8,7 @@
 
 #include "controller/device/port/packet_port.hpp"
 #include "controller/load/loaded_scene.hpp"
-#include "controller/load/scene_source.hpp"
+#include "controller/load/scene_json.hpp"
 #include "controller/plan/compile.hpp"
 #include "controller/plan/gain_margin.hpp"
 #include "controller/run/controller_options.hpp"

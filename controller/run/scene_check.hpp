@@ -19,7 +19,7 @@ namespace kerf {
 /// One tool in one volume: upper bounds of its work, and a timed tick.
 struct ExplainedTick {
   std::string tool, volume, variant, why;
-  std::vector<StageCost> most;  ///< their work counts against the budget (work_budget.hpp)
+  std::vector<StageCost> most;  ///< their work counts against the budget (compile.hpp)
   TickTime time;
 };
 

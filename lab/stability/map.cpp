@@ -9,8 +9,8 @@
 
 #include "controller/law/registry/law_registry.hpp"
 #include "controller/load/loaded_scene.hpp"
-#include "controller/stability/gain_limits.hpp"
 #include "controller/stability/limit_cycle.hpp"
+#include "controller/stability/sampled_loop.hpp"
 #include "hil/device/packet_device.hpp"
 #include "hil/device/plant_params.hpp"
 #include "hil/hil_error.hpp"

@@ -8,7 +8,7 @@
 #include <system_error>
 #include <utility>
 
-#include "controller/stability/gain_limits.hpp"
+#include "controller/stability/sampled_loop.hpp"
 #include "hil/hil_error.hpp"
 #include "shared/numeric/fnv1a.hpp"
 #include "shared/posix/atomic_file.hpp"

@@ -15,7 +15,6 @@
 #include "controller/input/load_error.hpp"
 #include "controller/load/loaded_scene.hpp"
 #include "controller/plan/compile.hpp"
-#include "controller/plan/work_budget.hpp"
 #include "controller/tool/tool_shapes.hpp"
 #include "lab/rig/kinematic_arm.hpp"
 

@@ -14,7 +14,7 @@
 #include <doctest/doctest.h>
 #include <rapidcheck.h>
 
-#include "controller/stability/gain_limits.hpp"
+#include "controller/stability/sampled_loop.hpp"
 #include "hil/device/omni.hpp"
 #include "tests/hil/model_runs.hpp"
 

@@ -18,7 +18,7 @@
 
 #include "controller/law/law.hpp"
 #include "controller/stability/axis_simulation.hpp"
-#include "controller/stability/gain_limits.hpp"
+#include "controller/stability/sampled_loop.hpp"
 #include "hil/hil_error.hpp"
 #include "lab/stability/arm.hpp"
 #include "lab/stability/axes.hpp"

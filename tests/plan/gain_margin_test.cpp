@@ -10,7 +10,6 @@
 
 #include "controller/law/law.hpp"
 #include "controller/load/load_scene.hpp"
-#include "controller/stability/gain_limits.hpp"
 #include "controller/stability/sampled_loop.hpp"
 #include "tests/servo/support.hpp"
 #include "tests/support/errors.hpp"

@@ -13,7 +13,6 @@
 
 #include "controller/load/load_scene.hpp"
 #include "controller/plan/compile.hpp"
-#include "controller/plan/work_budget.hpp"
 #include "tests/json.hpp"
 #include "tests/servo/support.hpp"
 #include "tests/support/errors.hpp"

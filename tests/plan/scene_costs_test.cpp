@@ -14,9 +14,9 @@
 
 #include "controller/kernel/overlap.hpp"
 #include "controller/kernel/overlap_methods.hpp"
+#include "controller/plan/compile.hpp"
 #include "controller/plan/method/tool_method.hpp"
 #include "controller/plan/tables/sample_tables.hpp"
-#include "controller/plan/work_budget.hpp"
 #include "controller/plan/worst_tick.hpp"
 #include "controller/scene/scene_file.hpp"
 #include "tests/plan/costs_support.hpp"

@@ -11,7 +11,6 @@
 #include <doctest/doctest.h>
 
 #include "controller/stability/axis_simulation.hpp"
-#include "controller/stability/gain_limits.hpp"
 #include "controller/stability/limit_cycle.hpp"
 #include "controller/stability/sampled_loop.hpp"
 

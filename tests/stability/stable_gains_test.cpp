@@ -6,7 +6,7 @@
 
 #include <doctest/doctest.h>
 
-#include "controller/stability/gain_limits.hpp"
+#include "controller/stability/sampled_loop.hpp"
 
 namespace {
 

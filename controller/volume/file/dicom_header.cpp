@@ -19,8 +19,8 @@
 #include <gdcmUIDs.h>
 
 #include "controller/volume/file/dicom_elements.hpp"
-#include "controller/volume/file/file_headers.hpp"
 #include "controller/volume/file/folder_files.hpp"
+#include "controller/volume/file/header_fields.hpp"
 
 namespace kerf::volume {
 namespace fs = std::filesystem;

@@ -19,8 +19,8 @@
 #include "controller/volume/file/dicom_header.hpp"
 #include "controller/volume/file/dicom_pixels.hpp"
 #include "controller/volume/file/dicom_stack.hpp"
-#include "controller/volume/file/file_headers.hpp"
 #include "controller/volume/file/foreign_volume.hpp"
+#include "controller/volume/file/header_fields.hpp"
 #include "controller/volume/file/volume_image.hpp"
 #include "shared/text/text.hpp"
 

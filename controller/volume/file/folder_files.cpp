@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "controller/input/load_error.hpp"
-#include "controller/volume/file/file_headers.hpp"
+#include "controller/volume/file/header_fields.hpp"
 
 namespace kerf::volume {
 namespace fs = std::filesystem;

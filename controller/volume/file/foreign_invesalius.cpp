@@ -20,8 +20,8 @@
 #include <expat.h>
 
 #include "controller/input/load_error.hpp"
-#include "controller/volume/file/file_headers.hpp"
 #include "controller/volume/file/foreign_volume.hpp"
+#include "controller/volume/file/header_fields.hpp"
 #include "controller/volume/file/volume_image.hpp"
 #include "shared/numeric/linear_algebra.hpp"
 #include "shared/text/text.hpp"

@@ -9,7 +9,6 @@
 #include <system_error>
 
 #include "controller/input/load_error.hpp"
-#include "controller/volume/file/file_headers.hpp"
 #include "shared/text/text.hpp"
 
 namespace kerf {

@@ -19,8 +19,8 @@
 #include <zlib.h>
 
 #include "controller/input/load_error.hpp"
-#include "controller/volume/file/file_headers.hpp"
 #include "controller/volume/file/foreign_volume.hpp"
+#include "controller/volume/file/header_fields.hpp"
 #include "controller/volume/file/volume_image.hpp"
 #include "controller/volume/file/voxel_files.hpp"
 #include "shared/numeric/linear_algebra.hpp"

@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "controller/input/load_error.hpp"
-#include "controller/volume/file/file_headers.hpp"
 #include "controller/volume/file/foreign_volume.hpp"
 #include "controller/volume/file/header_fields.hpp"
 #include "controller/volume/file/voxel_files.hpp"

@@ -11,8 +11,8 @@
 #include <utility>
 
 #include "controller/input/load_error.hpp"
-#include "controller/volume/file/file_headers.hpp"
 #include "controller/volume/file/foreign_volume.hpp"
+#include "controller/volume/file/header_fields.hpp"
 #include "shared/numeric/linear_algebra.hpp"
 #include "shared/text/text.hpp"
 

@@ -11,9 +11,8 @@
 #include <vector>
 
 #include "controller/input/load_error.hpp"
-#include "controller/volume/file/file_headers.hpp"
 #include "controller/volume/file/foreign_volume.hpp"
-#include "controller/volume/file/slices.hpp"
+#include "controller/volume/file/header_fields.hpp"
 
 namespace kerf::volume {
 namespace fs = std::filesystem;

@@ -16,9 +16,8 @@
 #include <tiffio.h>
 
 #include "controller/input/load_error.hpp"
-#include "controller/volume/file/file_headers.hpp"
 #include "controller/volume/file/foreign_volume.hpp"
-#include "controller/volume/file/slices.hpp"
+#include "controller/volume/file/header_fields.hpp"
 
 namespace kerf::volume {
 namespace fs = std::filesystem;

@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "controller/input/load_error.hpp"
+#include "controller/volume/file/foreign_volume.hpp"
 #include "controller/volume/file/header_fields.hpp"
-#include "controller/volume/file/slices.hpp"
 
 namespace kerf::volume {
 namespace fs = std::filesystem;

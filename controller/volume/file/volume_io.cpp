@@ -19,9 +19,9 @@
 
 #include "controller/input/load_error.hpp"
 #include "controller/input/sandbox.hpp"
-#include "controller/volume/file/file_headers.hpp"
 #include "controller/volume/file/folder_files.hpp"
 #include "controller/volume/file/foreign_volume.hpp"
+#include "controller/volume/file/header_fields.hpp"
 #include "controller/volume/file/volume_frame.hpp"
 #include "controller/volume/file/volume_image.hpp"
 #include "shared/numeric/linear_algebra.hpp"

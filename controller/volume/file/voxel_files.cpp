@@ -21,7 +21,7 @@
 #include <zlib.h>
 
 #include "controller/input/load_error.hpp"
-#include "controller/volume/file/file_headers.hpp"
+#include "controller/volume/file/header_fields.hpp"
 #include "shared/text/text.hpp"
 
 namespace kerf::volume {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 
-#include "controller/stability/gain_limits.hpp"
+#include "controller/stability/sampled_loop.hpp"
 
 #include <algorithm>
 #include <array>
