@@ -7,7 +7,7 @@
 #include <type_traits>
 #include <utility>
 
-#include "hil/device/devices.hpp"
+#include "hil/device/emulator.hpp"
 #include "hil/hil_error.hpp"
 #include "hil/script/hand_script_file.hpp"
 #include "shared/numeric/fnv1a.hpp"

@@ -19,7 +19,7 @@
 #include "controller/load/load_scene.hpp"
 #include "controller/load/loaded_scene.hpp"
 #include "controller/servo/servo.hpp"
-#include "hil/device/devices.hpp"
+#include "hil/device/emulator.hpp"
 #include "hil/device/hand_script.hpp"
 #include "hil/device/packet_device.hpp"
 #include "hil/hil_error.hpp"

@@ -14,7 +14,6 @@
 #include "controller/device/port/packet_port.hpp"
 #include "controller/loop/servo_loop.hpp"
 #include "controller/loop/tick_source.hpp"
-#include "hil/device/devices.hpp"
 #include "hil/device/emulator.hpp"
 #include "hil/device/packet_device.hpp"
 #include "hil/script/faulty_device.hpp"

@@ -11,7 +11,6 @@
 
 #include "controller/load/load_scene.hpp"
 #include "controller/tool/tool_shapes.hpp"
-#include "hil/device/devices.hpp"
 #include "hil/device/emulator.hpp"
 #include "hil/device/packet_device.hpp"
 #include "hil/hil_error.hpp"

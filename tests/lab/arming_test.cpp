@@ -4,7 +4,6 @@
 
 #include <doctest/doctest.h>
 
-#include "hil/device/devices.hpp"
 #include "hil/device/emulator.hpp"
 #include "hil/device/packet_device.hpp"
 #include "lab/rig/virtual_loop.hpp"
