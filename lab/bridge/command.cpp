@@ -7,9 +7,8 @@
 #include <utility>
 #include <vector>
 
-#include "lab/bridge/bridge_pair.hpp"
 #include "lab/bridge/measurements.hpp"
-#include "lab/bridge/two_networks.hpp"
+#include "lab/bridge/two_machines.hpp"
 #include "lab/run/lab_command.hpp"
 #include "lab/run/lab_run.hpp"
 #include "shared/posix/stop_signals.hpp"

@@ -15,8 +15,7 @@
 #include <vector>
 
 #include "hil/hil_error.hpp"
-#include "lab/bridge/bridge_pair.hpp"
-#include "lab/bridge/two_networks.hpp"
+#include "lab/bridge/two_machines.hpp"
 #include "lab/run/lab_command.hpp"
 #include "shared/posix/program.hpp"
 #include "shared/posix/stop_signals.hpp"

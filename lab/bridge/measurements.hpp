@@ -5,8 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "lab/bridge/bridge_pair.hpp"
-#include "lab/bridge/two_networks.hpp"
+#include "lab/bridge/two_machines.hpp"
 #include "lab/bridge/volume_source.hpp"
 
 namespace kerf::two_machines {

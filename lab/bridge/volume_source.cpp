@@ -8,7 +8,7 @@
 #include <optional>
 #include <utility>
 
-#include "lab/bridge/bridge_pair.hpp"
+#include "lab/bridge/two_machines.hpp"
 #include "shared/posix/monotonic_clock.hpp"
 #include "shared/segment/connection.hpp"
 #include "shared/volume/checksum.hpp"

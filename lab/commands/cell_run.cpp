@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <chrono>
 #include <csignal>
+#include <cstdint>
+#include <deque>
 #include <map>
 #include <sstream>
 #include <string_view>
@@ -15,13 +17,14 @@
 #include <unistd.h>
 
 #include "controller/plan/plan_device.hpp"
+#include "controller/stability/limit_cycle.hpp"
 #include "hil/hil_error.hpp"
-#include "lab/commands/contact_swing.hpp"
 #include "lab/run/child_process.hpp"
 #include "shared/numeric/energy_source.hpp"
 #include "shared/posix/monotonic_clock.hpp"
 #include "shared/posix/program.hpp"
 #include "shared/segment/connection.hpp"
+#include "shared/segment/layout.hpp"
 #include "shared/text/json.hpp"
 #include "shared/text/text.hpp"
 #include "shared/wire/personality.hpp"
@@ -70,6 +73,68 @@ Personality personality_of(const std::string& word) {
   return static_cast<Personality>(
       found == kPersonalityWords.end() ? 0 : found - kPersonalityWords.begin());
 }
+
+/// The verdict of `LimitCycleDetector` on the contacts of a run of the whole servo, tick by tick.
+///
+/// A watch of the detector is `kSeconds` long; one begins every `kApartS` while the tool touches,
+/// so that each hold of the hand of 0.6 s or more has one of its own. The coordinate is the
+/// penetration, 0 in air: a tool that jumps off the solid swings, too. The energy that the motors
+/// give is what goes below the least energy of the port so far: a spring that returns what the hand
+/// stored gives none.
+class ContactSwing {
+ public:
+  static constexpr double kSeconds = 0.5, kApartS = 0.1;
+
+  /// `step_mm`: of the encoders, at the tip, in mm of the scene.
+  ContactSwing(double rate_hz, double step_mm)
+      : ticks_(static_cast<std::int64_t>(kSeconds * rate_hz)),
+        apart_(static_cast<std::uint64_t>(kApartS * rate_hz)),
+        step_mm_(step_mm) {}
+
+  /// Once per tick, in order.
+  void take(const TickRecord& record) {
+    constexpr std::uint32_t kTouches = kFlagContact | kFlagStarted;
+    if ((record.flags & kTouches) == kTouches && record.tick >= next_tick_) {
+      // Not ended before its time, whatever is held: `settled` is its whole length.
+      watches_.emplace_back(LimitCycleDetector::Ticks{ticks_, ticks_, ticks_}, step_mm_, kPushN);
+      next_tick_ = record.tick + std::max<std::uint64_t>(1, apart_);
+    }
+    constexpr double kMjPerJ = 1000;
+    const double tip_mm = -double{record.penetration_mm};
+    const double given_mj = -record.port_minimum_j * kMjPerJ;
+    std::erase_if(watches_, [&](LimitCycleDetector& watch) {
+      if (!watch.take(tip_mm, given_mj, false)) return false;
+      add(watch.verdict());
+      return true;
+    });
+  }
+
+  /// `swings`, `active`, `rest` or `undecided`, as docs/scenes.md has them; empty without a
+  /// verdict.
+  [[nodiscard]] const char* word() const {
+    if (swings_) return "swings";
+    if (active_) return "active";
+    if (rests_) return "rest";
+    return undecided_ ? "undecided" : "";
+  }
+
+ private:
+  static constexpr double kPushN = 0.5;  ///< as of a map of stability
+
+  void add(const LimitCycle& verdict) {
+    swings_ = swings_ || verdict.swings;
+    active_ = active_ || verdict.active;
+    undecided_ = undecided_ || verdict.undecided;
+    rests_ = rests_ || verdict.rests();
+  }
+
+  std::int64_t ticks_;
+  std::uint64_t apart_;
+  double step_mm_;
+  std::uint64_t next_tick_ = 0;
+  std::deque<LimitCycleDetector> watches_;
+  bool swings_ = false, active_ = false, undecided_ = false, rests_ = false;
+};
 
 /// Reads every tick of a run in lock-step: the controller waits at a FIFO until the ring of ticks
 /// has room again, so that no run depends on the speed of this process.

@@ -19,7 +19,6 @@
 #include "hil/hil_error.hpp"
 #include "lab/commands/cell_run.hpp"
 #include "lab/run/child_process.hpp"
-#include "lab/run/grid_axes.hpp"
 #include "lab/run/grid_run.hpp"
 #include "lab/run/lab_command.hpp"
 #include "shared/numeric/fnv1a.hpp"

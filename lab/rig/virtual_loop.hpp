@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <deque>
 #include <memory>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "controller/device/device_driver.hpp"
@@ -23,9 +26,20 @@ class DirectPort final : public PacketPort {
   explicit DirectPort(PacketDevice& device) : device_(device) {}
 
   /// One bus cycle of the device; its packets wait here.
-  void cycle();
+  void cycle() {
+    device_.advance(1);
+    for (auto packet = device_.next_packet(); !packet.empty(); packet = device_.next_packet()) {
+      waiting_.emplace_back(packet.begin(), packet.end());
+    }
+  }
 
-  std::size_t receive(std::span<std::uint8_t> out) noexcept override;
+  std::size_t receive(std::span<std::uint8_t> out) noexcept override {
+    if (waiting_.empty()) return 0;
+    const std::vector<std::uint8_t> packet = std::move(waiting_.front());
+    waiting_.pop_front();
+    std::copy_n(packet.begin(), std::min(packet.size(), out.size()), out.begin());
+    return packet.size();
+  }
   bool send(std::span<const std::uint8_t> packet) noexcept override {
     device_.receive(packet);
     return true;
@@ -46,15 +60,37 @@ class VirtualLoop {
  public:
   /// Starts the driver. `port` is the driver's view of `wire`, which both outlive this object. The
   /// servo takes the volumes of `scene`.
-  VirtualLoop(LoadedScene& scene, DirectPort& wire, PacketPort& port);
+  VirtualLoop(LoadedScene& scene, DirectPort& wire, PacketPort& port)
+      : wire_(wire),
+        servo_(compile(scene)),
+        driver_(make_driver(scene.device.personality, port, scene.device.encoder_sign,
+                            scene.servo.rate_hz)),
+        cycles_per_tick_(kCyclesPerSecond / scene.servo.rate_hz) {
+    driver_->start();
+  }
   VirtualLoop(LoadedScene& scene, DirectPort& wire) : VirtualLoop(scene, wire, wire) {}
 
   /// One bus cycle. Returns true if it ends a tick: a step is due.
-  [[nodiscard]] bool cycle();
+  [[nodiscard]] bool cycle() {
+    wire_.cycle();
+    return ++cycles_ % cycles_per_tick_ == 0;
+  }
   /// Reads the newest report, steps the servo and commands the device.
-  ServoOutput step();
+  ServoOutput step() {
+    const DeviceReport report = driver_->read();
+    const auto begin = std::chrono::steady_clock::now();
+    const ServoOutput out = servo_->step(report);
+    const std::chrono::duration<double, std::micro> took = std::chrono::steady_clock::now() - begin;
+    step_us_ = took.count();
+    driver_->command(out);
+    return out;
+  }
   /// Cycles up to the end of the tick, then a step.
-  ServoOutput tick();
+  ServoOutput tick() {
+    while (!cycle()) {
+    }
+    return step();
+  }
 
   [[nodiscard]] std::int64_t cycles() const noexcept { return cycles_; }
   /// Time of the last servo step, without the driver.

@@ -12,7 +12,7 @@
 #include "hil/device/plant_params.hpp"
 #include "hil/device/wooden.hpp"
 #include "hil/hil_error.hpp"
-#include "lab/run/grid_axes.hpp"
+#include "lab/run/grid_run.hpp"
 #include "shared/text/text.hpp"
 #include "shared/wire/falcon.hpp"
 #include "shared/wire/woodenhaptics.hpp"

@@ -2,14 +2,22 @@
 #pragma once
 
 #include <atomic>
+#include <chrono>
+#include <condition_variable>
 #include <cstdint>
+#include <cstdio>
+#include <cstdlib>
 #include <functional>
 #include <list>
 #include <mutex>
 #include <string>
 #include <thread>
+#include <utility>
+
+#include <pthread.h>
 
 #include "lab/run/grid_run.hpp"
+#include "shared/posix/program.hpp"
 #include "shared/posix/threads.hpp"
 
 /// Watches on a run of a sampled loop: its ticks, and the guard against a step that does not end.
@@ -56,13 +64,30 @@ class TickWatch {
 
  public:
   /// `results` is held while the program ends, so that no file is left half written.
-  explicit TickWatch(std::mutex& results);
+  explicit TickWatch(std::mutex& results)
+      : results_(results), thread_([this](const std::stop_token& stop) {
+          std::mutex own;
+          std::unique_lock wait(own);
+          std::condition_variable_any told;
+          constexpr std::chrono::milliseconds kPeriod{200};
+          while (!stop.stop_requested()) {
+            look();
+            told.wait_for(wait, stop, kPeriod, [] { return false; });
+          }
+        }) {}
 
   /// While it lives, the thread that made it is watched.
   class Watched {
    public:
-    Watched(TickWatch& watch, const StepCounter& ticks, std::string what);
-    ~Watched();
+    Watched(TickWatch& watch, const StepCounter& ticks, std::string what) : watch_(watch) {
+      const std::scoped_lock hold(watch.lock_);
+      place_ = watch.measured_.insert(
+          watch.measured_.end(), {StepWatchdog(pthread_self(), ticks.ticks()), std::move(what)});
+    }
+    ~Watched() {
+      const std::scoped_lock hold(watch_.lock_);
+      watch_.measured_.erase(place_);
+    }
     Watched(const Watched&) = delete;
     Watched& operator=(const Watched&) = delete;
 
@@ -72,7 +97,19 @@ class TickWatch {
   };
 
  private:
-  void look();
+  void look() {
+    const std::scoped_lock hold(lock_);
+    for (Measured& measured : measured_) {
+      if (!measured.step.look()) continue;
+      const std::scoped_lock files(results_);
+      ProgressBar(true).hide();
+      std::fprintf(stderr,
+                   "kerf-lab: %s: a step did not end in %d s; give every loop of your law a bound "
+                   "that does not depend on its input; a --part keeps the columns that it has\n",
+                   measured.what.c_str(), StepWatchdog::kMostSeconds);
+      std::_Exit(2);
+    }
+  }
 
   std::mutex& results_;
   std::mutex lock_;

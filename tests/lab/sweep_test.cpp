@@ -11,7 +11,6 @@
 #include "controller/scene/scene_keys.hpp"
 #include "hil/hil_error.hpp"
 #include "lab/commands/cell_run.hpp"
-#include "lab/run/grid_axes.hpp"
 #include "lab/run/grid_run.hpp"
 #include "shared/numeric/energy_source.hpp"
 #include "shared/text/text.hpp"
