@@ -87,7 +87,7 @@ take(visualizer/render/iso_renderer.hpp "step_vox = ([^;]+);" "step of iso")
 string(APPEND text "export const kIsoStepVox = ${value};\n")
 take(visualizer/render/translucent_renderers.hpp "step_vox = ([^;]+);" "step of blend")
 string(APPEND text "export const kBlendStepVox = ${value};\n")
-constants(visualizer/compose/tool_mesh.cpp kSides kCreaseDegrees kNeckPerRadius kShankPerRadius kNeckRadii
+constants(visualizer/compose/tool_painter.cpp kSides kCreaseDegrees kNeckPerRadius kShankPerRadius kNeckRadii
   kShankFromRadii kShankToRadii)
 constants(visualizer/compose/tool_painter.cpp kHeadLength kHeadRadius kHeadBare kFaint)
 constants(visualizer/compose/tool_painter.cpp kArrowScalesPerN kArrowThickness kLeastArrowN)

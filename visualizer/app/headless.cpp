@@ -32,7 +32,7 @@
 #include "visualizer/picture/picture.hpp"
 #include "visualizer/scene/frame_report.hpp"
 #include "visualizer/scene/visualizer_error.hpp"
-#include "visualizer/surface/mesh_file.hpp"
+#include "visualizer/surface/volume_surface.hpp"
 
 namespace kerf {
 

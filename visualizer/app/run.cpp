@@ -26,9 +26,8 @@
 #include "visualizer/scene/frame_report.hpp"
 #include "visualizer/scene/session.hpp"
 #include "visualizer/scene/visualizer_error.hpp"
-#include "visualizer/sound/sound_player.hpp"
 #include "visualizer/sound/spindle_sound.hpp"
-#include "visualizer/surface/mesh_file.hpp"
+#include "visualizer/surface/volume_surface.hpp"
 
 namespace kerf {
 

@@ -19,7 +19,7 @@
 #include "visualizer/render/renderer.hpp"
 #include "visualizer/scene/appearance.hpp"
 #include "visualizer/scene/visualizer_error.hpp"
-#include "visualizer/surface/mesh_file.hpp"
+#include "visualizer/surface/volume_surface.hpp"
 
 namespace kerf {
 namespace {

@@ -20,7 +20,7 @@
 #include "visualizer/app/run.hpp"
 #include "visualizer/bench/bench_tooth.hpp"
 #include "visualizer/gl/context.hpp"
-#include "visualizer/redraw/changed_cells.hpp"
+#include "visualizer/redraw/redraw_tiles.hpp"
 #include "visualizer/render/iso_renderer.hpp"
 #include "visualizer/render/renderer.hpp"
 #include "visualizer/scene/frame_report.hpp"

@@ -9,7 +9,6 @@
 #include <glm/glm.hpp>
 
 #include "shared/volume/changed_bricks.hpp"
-#include "visualizer/compose/tool_mesh.hpp"
 #include "visualizer/compose/tool_painter.hpp"
 #include "visualizer/scene/scene_view.hpp"
 

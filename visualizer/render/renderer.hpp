@@ -11,7 +11,7 @@
 
 #include "shared/volume/changed_bricks.hpp"
 #include "visualizer/gl/target.hpp"
-#include "visualizer/redraw/changed_cells.hpp"
+#include "visualizer/redraw/redraw_tiles.hpp"
 #include "visualizer/scene/camera.hpp"
 #include "visualizer/scene/scene_view.hpp"
 

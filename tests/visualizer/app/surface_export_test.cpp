@@ -15,7 +15,7 @@
 #include "tests/visualizer/gl/gl_fixture.hpp"
 #include "tests/visualizer/surface/mesh_checks.hpp"
 #include "visualizer/scene/visualizer_error.hpp"
-#include "visualizer/surface/mesh_file.hpp"
+#include "visualizer/surface/volume_surface.hpp"
 
 using namespace kerf;
 using namespace kerf::test;

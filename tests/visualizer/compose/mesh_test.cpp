@@ -6,7 +6,7 @@
 
 #include <doctest/doctest.h>
 
-#include "visualizer/compose/tool_mesh.hpp"
+#include "visualizer/compose/tool_painter.hpp"
 
 using namespace kerf;
 

@@ -12,7 +12,7 @@
 
 #include "tests/visualizer/render/order_scene.hpp"
 #include "visualizer/compose/picture_layers.hpp"
-#include "visualizer/compose/tool_mesh.hpp"
+#include "visualizer/compose/tool_painter.hpp"
 #include "visualizer/scene/appearance.hpp"
 #include "visualizer/scene/visualizer_error.hpp"
 

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // Which rays a change in a volume can reach, without any GL.
-#include "visualizer/redraw/changed_cells.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <optional>
@@ -13,6 +11,7 @@
 
 #include "tests/visualizer/gl/gl_fixture.hpp"
 #include "visualizer/cast/cast_volume.hpp"
+#include "visualizer/redraw/redraw_tiles.hpp"
 
 using namespace kerf;
 using namespace kerf::test;

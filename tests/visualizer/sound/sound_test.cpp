@@ -18,7 +18,6 @@
 #include <doctest/doctest.h>
 #include <unistd.h>
 
-#include "visualizer/sound/sound_player.hpp"
 #include "visualizer/sound/spindle_sound.hpp"
 
 using namespace kerf;

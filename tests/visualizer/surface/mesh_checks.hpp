@@ -14,7 +14,7 @@
 #include <glm/glm.hpp>
 
 #include "tests/visualizer/gl/gl_fixture.hpp"
-#include "visualizer/surface/mesh_file.hpp"
+#include "visualizer/surface/volume_surface.hpp"
 
 namespace kerf::test {
 
