@@ -168,7 +168,12 @@ TEST_CASE("omni: an old or repeated packet does not move the tip back") {
 
 TEST_CASE("truncated and overlong packets are refused, not read as reports") {
   Omni omni;
-  for (const std::size_t bytes : {43U, 45U, 1500U}) omni.port.incoming.emplace_back(bytes);
+  const auto whole = kerf::encode(kerf::OmniReport{.encoder = {1, 2, 3}, .counter = 1});
+  for (const std::size_t size : {43U, 45U, 1500U}) {  // each begins as a report does
+    std::vector<std::uint8_t> packet(whole.begin(), whole.end());
+    packet.resize(size);
+    omni.port.push(packet);
+  }
   CHECK_FALSE(omni.driver.read().fresh);
   CHECK(omni.driver.refused() == 3);
   Falcon falcon;

@@ -16,5 +16,5 @@ part faults --seeds 1 --seed-base "$day" --device "${devices[day / 3 % 3]}" --ra
   --model "${models[day % 2]}" --numeric "${numerics[day / 2 % 2]}"
 # Twenty presses a scene: two of the twenty scenes of the test `traps`.
 part extremes --only traps --presses 40 --seed "$((15580 + 2 * (day % 10)))"
-part ranges --combinations 10 --seed "$day"
+part ranges --combinations 10 --seed "$day" --numeric "${numerics[day / 2 % 2]}"
 part ranges --combinations 0 --hours 0.01

@@ -113,7 +113,7 @@ class Controller {
 #ifdef KERF_FEWER_CASES
 constexpr int kEdits = 40;
 #else
-constexpr int kEdits = 200;
+constexpr int kEdits = 100;
 #endif
 
 /// A run, polled once.
