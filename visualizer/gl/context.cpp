@@ -156,10 +156,10 @@ std::unique_ptr<EglContext> best_egl_context() {
   for (EGLint i = 0; i < count; ++i) {
     const EGLDeviceEXT device = devices[static_cast<std::size_t>(i)];
     if (best != nullptr && is_software_device(device)) continue;  // no better than what is there
+    // NOLINTNEXTLINE(clang-analyzer-cplusplus.NewDeleteLeaks): `best` owns it, or it goes below
     auto other = EglContext::make(EGL_PLATFORM_DEVICE_EXT, device, ContextKind::egl_device);
     if (other == nullptr) continue;
     const bool software = query_gl_driver().software;
-    // NOLINTNEXTLINE(clang-analyzer-cplusplus.NewDeleteLeaks): `best` owns it
     if (best == nullptr || !software) best = std::move(other);
     if (!software) break;
   }
