@@ -43,7 +43,7 @@ struct Curve {
 }
 
 /// `{end_s, curves: [{name, s, values}], sources: [...]}`, the sources of energy that did any work.
-[[nodiscard]] Json curves_of(const std::filesystem::path& folder) {
+[[nodiscard]] Json curves_of(const std::filesystem::path& folder, TickRange range) {
   const Manifest manifest = read_manifest(folder);
   TickLogReader log(folder / kTickLogName);
   if (log.rows() == 0) {
@@ -60,7 +60,7 @@ struct Curve {
   double removed = 0;
   double end_s = 0;
   std::uint64_t first_tick = 0;
-  log.for_each([&](const TickRecord& record) {
+  const auto add = [&](const TickRecord& record) {
     if (first_tick == 0) first_tick = record.tick;
     end_s = static_cast<double>(record.tick - first_tick) * manifest.tick_ns * 1e-9;
     if ((record.flags & kFlagReset) != 0) removed = 0;
@@ -76,7 +76,8 @@ struct Curve {
     for (std::size_t i = 0; i < kEnergySources; ++i) {
       curves[first_source + i].add(end_s, energy_mj_of_steps(record.*kEnergyColumns[i]));
     }
-  });
+  };
+  log.for_each(add, range);
   Json parts = Json::List{};
   Json sources = Json::List{};
   for (std::size_t i = 0; i < curves.size(); ++i) {
@@ -93,9 +94,10 @@ struct Curve {
 
 }  // namespace
 
-void plot_forces(const std::filesystem::path& folder, const std::filesystem::path& svg) {
+void plot_forces(const std::filesystem::path& folder, const std::filesystem::path& svg,
+                 TickRange range) {
   check_outputs(recording_files(folder), {{"--out", svg, ".svg"}});
-  write_new_file(svg, make_report({"recording", "forces"}, curves_of(folder).canonical()));
+  write_new_file(svg, make_report({"recording", "forces"}, curves_of(folder, range).canonical()));
 }
 
 }  // namespace kerf

@@ -6,6 +6,8 @@
 #include <filesystem>
 #include <vector>
 
+#include "record/tick_log.hpp"
+
 // The forces of a recording as a plot.
 
 namespace kerf {
@@ -15,7 +17,8 @@ namespace kerf {
 /// At most 4000 points per curve, every peak kept.
 ///
 /// The file appears whole or not at all. Throws `RecordError`, `ReportError` or `FileError`.
-void plot_forces(const std::filesystem::path& folder, const std::filesystem::path& svg);
+void plot_forces(const std::filesystem::path& folder, const std::filesystem::path& svg,
+                 TickRange range = {});
 
 /// A curve of at most `max_points` points that keeps every peak: the smallest and the largest of
 /// each stretch of samples, in their order. If all samples fit, all stay.

@@ -113,6 +113,7 @@ constexpr LogCode kCommands[] = {
     {4, "reset", "the volumes go back to their first content"},
     {5, "undo", "the last stroke"},
     {6, "redo", "the stroke that was undone last"},
+    {kCommandMark, "mark", "changes nothing: a place in the log"},
     {kCommandFadeIn, "restart",
      "added to the others: the force fades in after a stall of the servo"},
 };
@@ -152,7 +153,8 @@ constexpr std::string_view kHead =
     R"(# The log of a run
 
 `kerf-recorder` writes every tick of a running controller into a folder; `./kerf demo --out DIR` keeps it as
-`DIR/log`. `./kerf record info DIR/log` sums it up, `record plot` draws it, `record export` makes CSV or MCAP of it.
+`DIR/log`. `./kerf record info DIR/log` sums it up, `record plot` draws it, `record export` makes CSV or MCAP of it, each
+with `--from TICK` and `--until TICK` for a part.
 
 | file | what |
 |---|---|

@@ -135,7 +135,7 @@ void put_force(const TickRecord& record, CdrMessage& message) {
 }  // namespace
 
 void export_mcap(const std::filesystem::path& folder, const std::filesystem::path& mcap,
-                 McapWriter::Packing packing) {
+                 McapWriter::Packing packing, TickRange range) {
   check_outputs(recording_files(folder), {{"--mcap", mcap, ".mcap"}});
   const Manifest manifest = read_manifest(folder);
   TickLogReader log(folder / kTickLogName);
@@ -152,7 +152,7 @@ void export_mcap(const std::filesystem::path& folder, const std::filesystem::pat
   constexpr std::uint64_t kViewNs = 10'000'000;
   const std::uint64_t ticks_a_view = std::max<std::uint64_t>(1, kViewNs / manifest.tick_ns);
   CdrMessage message;
-  log.for_each([&](const TickRecord& record) {
+  const auto write_tick = [&](const TickRecord& record) {
     const auto write = [&](std::uint16_t to) {
       writer.message(to, record.start_ns, message.bytes());
     };
@@ -165,7 +165,8 @@ void export_mcap(const std::filesystem::path& folder, const std::filesystem::pat
     }
     put_force(record, message);
     write(forces);
-  });
+  };
+  log.for_each(write_tick, range);
   writer.close();
   file.close();
   file.commit();

@@ -4,6 +4,7 @@
 #include <filesystem>
 
 #include "record/mcap_file.hpp"
+#include "record/tick_log.hpp"
 
 namespace kerf {
 
@@ -17,6 +18,6 @@ namespace kerf {
 /// Tip and force come 100 times a second: the tick has all of them. Times are `start_ns`. Throws
 /// `RecordError`, or `FileError` if the file cannot be written.
 void export_mcap(const std::filesystem::path& folder, const std::filesystem::path& mcap,
-                 McapWriter::Packing packing);
+                 McapWriter::Packing packing, TickRange range = {});
 
 }  // namespace kerf

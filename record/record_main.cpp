@@ -2,6 +2,7 @@
 #include <filesystem>
 #include <iostream>
 
+#include "record/flight_recorder.hpp"
 #include "record/force_plot.hpp"
 #include "record/log_columns.hpp"
 #include "record/mcap_export.hpp"
@@ -14,7 +15,20 @@
 namespace kerf {
 namespace {
 
-/// `info DIR`, `plot DIR --out FILE.svg`, `export DIR --csv FILE` or `--mcap FILE`, `columns`. Bad
+/// A small log is read whole, with its checksums. Of a large one the recorder's own figures are
+/// shown, at once.
+RecordSummary summary_for_info(const std::filesystem::path& folder, TickRange range, bool scan) {
+  constexpr std::uintmax_t kLarge = std::uintmax_t{256} << 20;
+  std::error_code none;
+  const std::uintmax_t bytes = std::filesystem::file_size(folder / kTickLogName, none);
+  if (!scan && range.is_whole() && !none && bytes > kLarge) {
+    if (const auto kept = kept_summary(folder)) return *kept;
+  }
+  return summarise(folder, range);
+}
+
+/// `info DIR`, `plot DIR --out FILE.svg`, `export DIR --csv FILE` or `--mcap FILE`, `grab`,
+/// `columns`. Bad
 /// input throws.
 int run_record(int argc, char** argv) {
   CommandLine app("Looks at what kerf-recorder wrote.", "kerf-record", KERF_VERSION);
@@ -22,40 +36,50 @@ int run_record(int argc, char** argv) {
   std::filesystem::path report;
   std::filesystem::path svg;
   std::filesystem::path csv, mcap;
-  bool unpacked = false;
+  bool unpacked = false, scan = false;
+  TickRange range;
+  std::string name = kDefaultName;
   const auto add_command = [&](const char* name, const char* what) {
     Arguments command = app.command(name, what);
     command.option("DIR", folder, "folder of a recording").required();
+    command.option("--from", range.from, "the first tick").shown_as("TICK");
+    command.option("--until", range.until, "the last tick").shown_as("TICK");
     return command;
   };
   Arguments info = add_command("info", "length, losses, forces, removed volume");
   info.option("--report", report, "write the figures as JSON");
+  info.flag("--scan", scan,
+            "read all rows of a log above 256 MB, too: else the recorder's figures");
   Arguments plot = add_command("plot", "forces and penetration over time, as SVG");
   plot.option("--out", svg, "the SVG file").required();
   Arguments table = add_command("export", "every tick for other programs: a line of text, or MCAP");
   table.option("--csv", csv, "as CSV").shown_as("FILE");
   table.option("--mcap", mcap, "as MCAP, for Foxglove, PlotJuggler and ROS 2").shown_as("FILE");
   table.flag("--unpacked", unpacked, "the MCAP without LZ4, for readers that have none");
+  Arguments keep = app.command("grab", "a running flight recorder keeps the ticks until now");
+  keep.option("--name", name, "name of the controller").shows_default();
   const Arguments columns = app.command("columns", "what each column of a log says, as a page");
   if (!app.parse(argc, argv, std::cout)) return 0;
   if (columns.chosen()) std::cout << log_page();
   if (info.chosen()) {
     check_outputs(recording_files(folder), {{"--report", report, ".json"}});
-    const RecordSummary summary = summarise(folder);
+    const RecordSummary summary = summary_for_info(folder, range, scan);
     std::cout << to_text(summary);
     if (!report.empty()) write_new_file(report, to_json(summary));
   }
   if (plot.chosen()) {
-    plot_forces(folder, svg);
+    plot_forces(folder, svg, range);
     if (!is_stream(svg)) std::cout << svg.string() << ": written\n";
   }
   if (table.chosen() && csv.empty() && mcap.empty()) {
     throw UsageError("export: as what? give --csv FILE or --mcap FILE");
   }
-  if (!csv.empty()) export_csv(folder, csv);
+  if (!csv.empty()) export_csv(folder, csv, range);
   if (!mcap.empty()) {
-    export_mcap(folder, mcap, unpacked ? McapWriter::Packing::none : McapWriter::Packing::lz4);
+    export_mcap(folder, mcap, unpacked ? McapWriter::Packing::none : McapWriter::Packing::lz4,
+                range);
   }
+  if (keep.chosen()) std::cout << grab(name).string() << ": kept\n";
   return 0;
 }
 

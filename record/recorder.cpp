@@ -5,8 +5,10 @@
 #include <chrono>
 #include <cmath>
 #include <iostream>
-#include <system_error>
+#include <optional>
+#include <span>
 #include <thread>
+#include <utility>
 
 #include "record/recording.hpp"
 #include "record/tick_log.hpp"
@@ -14,16 +16,21 @@
 #include "shared/segment/connection.hpp"
 #include "shared/text/command_line.hpp"
 #include "shared/text/json.hpp"
+#include "shared/text/text.hpp"
 
 namespace kerf {
 
-Recorder::Recorder(const SegmentReader& reader, TickLogWriter& log) : reader_(reader), log_(log) {
+Recorder::Recorder(const SegmentReader& reader, TickSink& sink) : reader_(reader), sink_(sink) {
   next_ = oldest();
   // The segment of a run on another machine may hold less than its ring.
   TickRecord record;
   while (reader.state_at(next_, record) == ReadState::overrun) ++next_;
-  missed_before_start_ = next_;
+  losses_.missed_before_start = next_;
 }
+
+Recorder::Recorder(const SegmentReader& reader, TickSink& sink, std::uint64_t next,
+                   RecordLosses losses)
+    : reader_(reader), sink_(sink), next_(next), losses_(std::move(losses)) {}
 
 std::uint64_t Recorder::oldest() const noexcept {
   const std::uint64_t head = reader_.state_head();
@@ -32,22 +39,23 @@ std::uint64_t Recorder::oldest() const noexcept {
 
 std::uint64_t Recorder::poll() {
   const std::uint64_t head = reader_.state_head();
-  const std::uint64_t before = log_.rows();
+  std::uint64_t appended = 0;
   largest_lag_ = std::max(largest_lag_, head - std::min(next_, head));
   TickRecord record;
   while (next_ < head) {
     const ReadState state = reader_.state_at(next_, record);
     if (state == ReadState::busy || state == ReadState::not_yet) break;
     if (state == ReadState::ok) {
-      log_.append(record);
+      sink_.append(record);
+      ++appended;
       ++next_;
     } else {
       // The oldest record may be overwritten meanwhile: then the next round skips further.
       skip_to(std::max(next_ + 1, oldest()));
     }
   }
-  log_.flush();
-  return log_.rows() - before;
+  sink_.flush();
+  return appended;
 }
 
 void Recorder::drain() {
@@ -57,11 +65,12 @@ void Recorder::drain() {
 
 void Recorder::skip_to(std::uint64_t index) {
   const std::uint64_t count = index - next_;
-  lost_ += count;
-  if (!gaps_.empty() && gaps_.back().first_index + gaps_.back().count == next_) {
-    gaps_.back().count += count;
-  } else if (gaps_.size() < kMaxGaps) {
-    gaps_.push_back({next_, count});
+  losses_.lost += count;
+  std::vector<RecordGap>& gaps = losses_.gaps;
+  if (!gaps.empty() && gaps.back().first_index + gaps.back().count == next_) {
+    gaps.back().count += count;
+  } else if (gaps.size() < kMaxGaps) {
+    gaps.push_back({next_, count});
   }
   next_ = index;
 }
@@ -69,12 +78,16 @@ void Recorder::skip_to(std::uint64_t index) {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-constexpr auto kPollPeriod = std::chrono::milliseconds(5);
 constexpr auto kSyncPeriod = std::chrono::milliseconds(200);
 constexpr auto kConnectPeriod = std::chrono::milliseconds(50);
 
-[[nodiscard]] SegmentConnection connect_within(const RecorderOptions& options,
-                                               const std::atomic<bool>& stop) {
+[[nodiscard]] bool is_final(Lifecycle lifecycle) noexcept {
+  return lifecycle == Lifecycle::clean_end || lifecycle == Lifecycle::fault;
+}
+
+}  // namespace
+
+SegmentConnection connect_within(const RecorderOptions& options, const std::atomic<bool>& stop) {
   static_cast<void>(segment_socket(options.name));  // refuses an impossible name without a wait
   const auto deadline = Clock::now() + std::chrono::duration<double>(options.wait_s);
   for (;;) {
@@ -87,28 +100,16 @@ constexpr auto kConnectPeriod = std::chrono::milliseconds(50);
   }
 }
 
-[[nodiscard]] bool is_final(Lifecycle lifecycle) noexcept {
-  return lifecycle == Lifecycle::clean_end || lifecycle == Lifecycle::fault;
+bool has_ended(const SegmentConnection& connection) noexcept {
+  return is_final(connection.reader().lifecycle()) || !connection.alive();
 }
 
-[[nodiscard]] std::string_view reason(Lifecycle lifecycle, bool stopped) noexcept {
+std::string_view end_reason(const SegmentReader& reader, bool stopped) noexcept {
+  const Lifecycle lifecycle = reader.lifecycle();
   if (lifecycle == Lifecycle::clean_end) return "clean end";
   if (lifecycle == Lifecycle::fault) return kFault;
   return stopped ? "stopped" : "controller gone";
 }
-
-void write_report(const RecorderOptions& options, const Recorder& recorder, std::uint64_t rows,
-                  std::string_view end_reason) {
-  const Json report = {{"rows", rows},
-                       {"lost_ticks", recorder.lost()},
-                       {"gaps", recorder.gaps().size()},
-                       {"missed_before_start", recorder.missed_before_start()},
-                       {"largest_lag_ticks", recorder.largest_lag()},
-                       {"end_reason", end_reason}};
-  write_new_file(options.report, report.document());
-}
-
-}  // namespace
 
 bool parse_options(int argc, char** argv, RecorderOptions& options) {
   CommandLine app("Logs every tick of a running kerf-controller into a folder.", "kerf-recorder",
@@ -118,68 +119,178 @@ bool parse_options(int argc, char** argv, RecorderOptions& options) {
   app.option("--wait", options.wait_s, "seconds to wait for the controller")
       .within(0, 86400)
       .shows_default();
-  app.flag("--strict", options.strict, "exit 1 where ticks were lost");
+  app.flag("--resume", options.resume,
+           "go on with the recording of the same run in --out, after its recorder was killed");
+  app.option(
+         "--flight", options.flight_s,
+         "keep only the last SECONDS, in memory; each fault, SIGUSR1, kerf-record grab and key f "
+         "of the window write them as a recording into --out")
+      .within(1, kMostFlightS)
+      .shown_as("SECONDS");
+  app.flag("--strict", options.strict, "exit 1 if ticks were lost");
   app.option("--report", options.report, "write the figures as JSON");
-  return app.parse(argc, argv, std::cout);
+  if (!app.parse(argc, argv, std::cout)) return false;
+  if (options.resume && options.flight_s > 0) {
+    throw UsageError(
+        "--resume: a flight recorder has nothing to go on with; leave one of both out");
+  }
+  return true;
 }
+
+namespace {
+
+/// The log of a recorder, summed up as it grows.
+class SummedLog final : public TickSink {
+ public:
+  SummedLog(TickLogWriter& log, const SegmentInfo& info) : log_(log), summary_(info) {}
+  void append(const TickRecord& record) override {
+    log_.append(record);
+    summary_.add(record);
+  }
+  void flush() override { log_.flush(); }
+  [[nodiscard]] const SummaryBuilder& summary() const noexcept { return summary_; }
+
+ private:
+  TickLogWriter& log_;
+  SummaryBuilder summary_;
+};
+
+/// What a recorder begins with: nothing, or the log of the one before.
+struct Beginning {
+  TickLogWriter::Begin file = TickLogWriter::Begin::new_file;
+  std::optional<std::uint64_t> next{};  ///< none: what the ring has
+  RecordLosses losses{};
+};
+
+[[nodiscard]] Beginning beginning_in(const RecorderOptions& options, const SegmentReader& reader) {
+  if (!options.resume || !std::filesystem::exists(options.out / kTickLogName)) return {};
+  Beginning begin{.file = TickLogWriter::Begin::after_last};
+  // Killed between the file's first byte and its manifest: without rows.
+  constexpr std::uintmax_t kOneRow = kTickLogHeaderBytes + sizeof(TickRecord);
+  std::error_code none;
+  const bool is_empty = std::filesystem::file_size(options.out / kTickLogName, none) < kOneRow;
+  if (is_empty && !std::filesystem::exists(options.out / kManifestName)) return begin;
+  const Manifest manifest = read_manifest(options.out);
+  const std::string session = hex64(reader.info().session_id);
+  if (manifest.session_id != session) {
+    throw RecordError((options.out / kManifestName).string() + ": is of run " +
+                      one_line(manifest.session_id) + ", and run " + session +
+                      " goes on; choose another --out");
+  }
+  TickLogReader log(options.out / kTickLogName);
+  begin.losses = manifest.losses;
+  begin.next = manifest.losses.missed_before_start;
+  if (log.rows() > 0) {
+    TickRecord last;
+    static_cast<void>(log.read(log.rows() - 1, std::span(&last, 1)));
+    begin.next = index_of(last) + 1;
+  }
+  return begin;
+}
+
+/// One recording, from the first poll to the manifest of its end.
+class Recording {
+ public:
+  Recording(const RecorderOptions& options, const SegmentConnection& connection,
+            const Beginning& begin)
+      : out_(options.out),
+        connection_(connection),
+        log_(out_ / kTickLogName, begin.file),
+        sink_(log_, reader().info()),
+        recorder_(begin.next ? Recorder(reader(), sink_, *begin.next, begin.losses)
+                             : Recorder(reader(), sink_)),
+        whole_(log_.rows() == 0) {
+    write_new_file(out_ / kSceneName, reader().info().scene_json);
+    manifest(kStillRunning);
+  }
+
+  void run(const std::atomic<bool>& stop) {
+    auto next_sync = Clock::now() + kSyncPeriod;
+    bool ended = false;
+    while (!ended) {
+      // Checked before the poll, which records all that was published until then.
+      ended = stop || has_ended(connection_);
+      const std::uint64_t lost = recorder_.losses().lost;
+      const std::uint64_t got = recorder_.poll();
+      if (const std::uint64_t more = recorder_.losses().lost - lost; more > 0) {
+        std::cerr << "kerf-recorder: GAP: " << more << " ticks overwritten before they were read\n";
+        manifest(kStillRunning);
+      }
+      if (Clock::now() >= next_sync) {
+        log_.sync();
+        next_sync = Clock::now() + kSyncPeriod;
+      }
+      // A ring that fills fast (virtual time) is read again at once.
+      if (!ended && got < reader().info().state_slots / 8) std::this_thread::sleep_for(kPollPeriod);
+    }
+    recorder_.drain();
+    log_.sync();
+  }
+
+  void manifest(std::string_view reason) const {
+    std::optional<RecordSummary> summary;
+    if (whole_ && reason != kStillRunning) {
+      summary = sink_.summary().result(recorder_.losses(), reason);
+    }
+    write_manifest(out_, reader().info(), recorder_.losses(), log_.rows(), reason,
+                   summary ? &*summary : nullptr);
+  }
+  [[nodiscard]] std::uint64_t rows() const noexcept { return log_.rows(); }
+  [[nodiscard]] const Recorder& recorder() const noexcept { return recorder_; }
+
+ private:
+  [[nodiscard]] const SegmentReader& reader() const noexcept { return connection_.reader(); }
+
+  std::filesystem::path out_;
+  const SegmentConnection& connection_;
+  TickLogWriter log_;
+  SummedLog sink_;
+  Recorder recorder_;
+  bool whole_;  ///< all rows went through `sink_`
+};
+
+void write_report(const std::filesystem::path& path, const Recorder& recorder, std::uint64_t rows,
+                  std::string_view reason) {
+  const RecordLosses& losses = recorder.losses();
+  const Json report = {{"rows", rows},
+                       {"lost_ticks", losses.lost},
+                       {"gaps", losses.gaps.size()},
+                       {"missed_before_start", losses.missed_before_start},
+                       {"largest_lag_ticks", recorder.largest_lag()},
+                       {"end_reason", reason}};
+  write_new_file(path, report.document());
+}
+
+}  // namespace
 
 int run_recorder(const RecorderOptions& options, const std::atomic<bool>& stop) {
   check_new_folder(options.out);
   check_outputs(recording_files(options.out), {{"--report", options.report, ".json"}});
   const SegmentConnection connection = connect_within(options, stop);
   const SegmentReader& reader = connection.reader();
-  std::error_code error;
-  std::filesystem::create_directories(options.out, error);
-  if (error) {
-    throw RecordError(options.out.string() + ": " + error.message() + "; choose another --out");
-  }
-  TickLogWriter log(options.out / kTickLogName);
-  write_new_file(options.out / kSceneName, reader.info().scene_json);
-  Recorder recorder(reader, log);
+  make_recording_folder(options.out);
+  const Beginning begin = beginning_in(options, reader);
+  Recording recording(options, connection, begin);
   const double bytes_per_s = 1e9 / static_cast<double>(reader.info().tick_ns) * sizeof(TickRecord);
-  std::cout << options.out.string() << " grows by " << std::lround(60 * bytes_per_s / 1e6)
-            << " MB a minute" << std::endl;
-  write_manifest(options.out, reader.info(), recorder, 0, kStillRunning);
-
-  const auto record_all = [&] {
-    std::uint64_t reported_lost = 0;
-    auto next_sync = Clock::now() + kSyncPeriod;
-    bool ended = false;
-    while (!ended) {
-      // Checked before the poll, which records all that was published until then.
-      ended = stop || is_final(reader.lifecycle()) || !connection.alive();
-      const std::uint64_t got = recorder.poll();
-      if (recorder.lost() != reported_lost) {
-        std::cerr << "kerf-recorder: GAP: " << recorder.lost() - reported_lost
-                  << " ticks overwritten before they were read\n";
-        reported_lost = recorder.lost();
-      }
-      if (Clock::now() >= next_sync) {
-        log.sync();
-        next_sync = Clock::now() + kSyncPeriod;
-      }
-      // A ring that fills fast (virtual time) is read again at once.
-      if (!ended && got < reader.info().state_slots / 8) std::this_thread::sleep_for(kPollPeriod);
-    }
-    recorder.drain();
-    log.sync();
-  };
+  std::cout << options.out.string() << (begin.next ? " goes on" : "") << " grows by "
+            << std::lround(60 * bytes_per_s / 1e6) << " MB a minute" << std::endl;
   try {
-    record_all();
+    recording.run(stop);
   } catch (const RecordError&) {
     // The rows so far stay readable. The manifest of a full disk may stay that of the beginning.
     try {
-      write_manifest(options.out, reader.info(), recorder, log.rows(), kNoRoom);
+      recording.manifest(kNoRoom);
     } catch (const FileError&) {  // NOLINT(bugprone-empty-catch): the first failure is reported
     }
     throw;
   }
-  const std::string_view end_reason = reason(reader.lifecycle(), stop);
-  write_manifest(options.out, reader.info(), recorder, log.rows(), end_reason);
-  if (!options.report.empty()) write_report(options, recorder, log.rows(), end_reason);
-  std::cout << "recorded " << log.rows() << " ticks, lost " << recorder.lost() << " (" << end_reason
-            << ")\n";
-  return options.strict && recorder.lost() != 0 ? 1 : 0;
+  const std::string_view reason = end_reason(reader, stop);
+  recording.manifest(reason);
+  const Recorder& recorder = recording.recorder();
+  if (!options.report.empty()) write_report(options.report, recorder, recording.rows(), reason);
+  std::cout << "recorded " << recording.rows() << " ticks, lost " << recorder.losses().lost << " ("
+            << reason << ")\n";
+  return options.strict && recorder.losses().lost != 0 ? 1 : 0;
 }
 
 }  // namespace kerf

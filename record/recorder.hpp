@@ -2,13 +2,16 @@
 #pragma once
 
 #include <atomic>
+#include <chrono>
 #include <cstdint>
 #include <filesystem>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "record/tick_log.hpp"
 #include "shared/segment/command.hpp"
+#include "shared/segment/connection.hpp"
 #include "shared/segment/reader.hpp"
 
 // The recorder: ring of ticks to log, and the run of kerf-recorder.
@@ -21,11 +24,22 @@ struct RecordGap {
   std::uint64_t count = 0;
 };
 
-/// Copies the state ring into a tick log. Losses are counted.
+/// What of a run a recording lacks.
+struct RecordLosses {
+  std::uint64_t missed_before_start = 0;  ///< published, and gone before the recorder came
+  std::uint64_t lost = 0;                 ///< published since, in no row
+  std::vector<RecordGap> gaps{};          ///< at most `Recorder::kMaxGaps`; `lost` counts on
+};
+
+/// Copies the state ring into a log or into memory. Losses are counted.
 class Recorder {
  public:
   /// Starts at the oldest record that the ring still has.
-  Recorder(const SegmentReader& reader, TickLogWriter& log);
+  Recorder(const SegmentReader& reader, TickSink& sink);
+
+  /// Goes on at record `next`, with the losses of the recorder before; what the ring does not have
+  /// any more is a gap.
+  Recorder(const SegmentReader& reader, TickSink& sink, std::uint64_t next, RecordLosses losses);
 
   /// Appends the records published since the last call; returns their number. A torn record is read
   /// again at the next call.
@@ -34,11 +48,7 @@ class Recorder {
   /// After the end of the controller: `poll`; a record that is still torn is a gap.
   void drain();
 
-  /// Published before the start and already overwritten then: no loss of this recorder.
-  [[nodiscard]] std::uint64_t missed_before_start() const noexcept { return missed_before_start_; }
-  /// At most `kMaxGaps`; `lost` counts on.
-  [[nodiscard]] const std::vector<RecordGap>& gaps() const noexcept { return gaps_; }
-  [[nodiscard]] std::uint64_t lost() const noexcept { return lost_; }
+  [[nodiscard]] const RecordLosses& losses() const noexcept { return losses_; }
   /// Most waiting records of all polls.
   [[nodiscard]] std::uint64_t largest_lag() const noexcept { return largest_lag_; }
 
@@ -50,13 +60,14 @@ class Recorder {
   [[nodiscard]] std::uint64_t oldest() const noexcept;
 
   const SegmentReader& reader_;
-  TickLogWriter& log_;
+  TickSink& sink_;
   std::uint64_t next_ = 0;
-  std::uint64_t missed_before_start_ = 0;
-  std::uint64_t lost_ = 0;
+  RecordLosses losses_;
   std::uint64_t largest_lag_ = 0;
-  std::vector<RecordGap> gaps_;
 };
+
+inline constexpr std::chrono::milliseconds kPollPeriod{5};
+inline constexpr double kMostFlightS = 3600;
 
 /// Options of kerf-recorder.
 struct RecorderOptions {
@@ -64,11 +75,22 @@ struct RecorderOptions {
   std::filesystem::path out;
   double wait_s = 10;  ///< for the controller to appear
   bool strict = false;
+  bool resume = false;  ///< goes on with the recording of the same run in `out`, if there is one
+  double flight_s = 0;  ///< above 0: a flight recorder of as many seconds
   std::filesystem::path report;  ///< may be empty
 };
 
 /// False if help or version was requested, and printed. Throws `UsageError`.
 [[nodiscard]] bool parse_options(int argc, char** argv, RecorderOptions& options);
+
+/// Waits for controller `options.name` and connects. Throws `SegmentError` if none comes in time.
+[[nodiscard]] SegmentConnection connect_within(const RecorderOptions& options,
+                                               const std::atomic<bool>& stop);
+
+/// Whether nothing more will be published.
+[[nodiscard]] bool has_ended(const SegmentConnection& connection) noexcept;
+/// Why, as manifest.json has it.
+[[nodiscard]] std::string_view end_reason(const SegmentReader& reader, bool stopped) noexcept;
 
 /// Records the controller `options.name` into the folder `options.out` until it ends or `stop`:
 /// ticks.npy, scene.json, manifest.json. Returns the exit code: 0, or 1 under `strict` if ticks

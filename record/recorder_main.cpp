@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "record/flight_recorder.hpp"
 #include "record/recorder.hpp"
 #include "shared/posix/program.hpp"
 #include "shared/posix/stop_signals.hpp"
@@ -7,6 +8,8 @@ int main(int argc, char** argv) {
   return kerf::run_program("kerf-recorder", [&] {
     kerf::RecorderOptions options;
     if (!kerf::parse_options(argc, argv, options)) return 0;
-    return kerf::run_recorder(options, kerf::catch_stop_signals());
+    const std::atomic<bool>& stop = kerf::catch_stop_signals();
+    return options.flight_s > 0 ? kerf::run_flight_recorder(options, stop)
+                                : kerf::run_recorder(options, stop);
   });
 }

@@ -23,8 +23,63 @@
 
 namespace kerf {
 
+namespace {
+
+// The one list of figures: text, JSON and what is read back all come from it.
+template <class Summary, class Visit>
+void for_each_figure(Summary& s, Visit visit) {
+  visit("rows", s.rows);
+  visit("first_tick", s.first_tick);
+  visit("last_tick", s.last_tick);
+  visit("seconds", s.seconds);
+  visit("lost_ticks", s.lost_ticks);
+  visit("missed_before_start", s.missed_before_start);
+  visit("contact_ticks", s.contact_ticks);
+  visit("shaft_ticks", s.shaft_ticks);
+  visit("stale_ticks", s.stale_ticks);
+  visit("faults", s.faults);
+  visit("missed_deadlines", s.missed_deadlines);
+  visit("lost_packets", s.lost_packets);
+  visit("refused_packets", s.refused_packets);
+  visit("peak_force_n", s.peak_force_n);
+  visit("deepest_mm", s.deepest_mm);
+  visit("removed_mm3", s.removed_mm3);
+  visit("port_energy_mj", s.port_energy_mj);
+  visit("port_minimum_mj", s.port_minimum_mj);
+  for (std::size_t i = 0; i < kEnergySources; ++i) {
+    visit(std::string(kEnergySourceNames[i]) + "_mj", s.energy_mj[i]);
+  }
+  visit("end_reason", s.end_reason);
+}
+
+[[nodiscard]] Json figures(const RecordSummary& summary) {
+  Json list;
+  for_each_figure(summary, [&](const std::string& name, const auto& value) { list[name] = value; });
+  return list;
+}
+
+/// The opposite. Throws JsonError.
+[[nodiscard]] RecordSummary summary_of(const Json& list) {
+  RecordSummary out;
+  for_each_figure(out, [&]<class Value>(const std::string& name, Value& value) {
+    value = list.at(name).get<Value>();
+  });
+  return out;
+}
+
+}  // namespace
+
+void make_recording_folder(const std::filesystem::path& folder) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error) {
+    throw RecordError(folder.string() + ": " + error.message() + "; choose another --out");
+  }
+}
+
 void write_manifest(const std::filesystem::path& folder, const SegmentInfo& info,
-                    const Recorder& recorder, std::uint64_t rows, std::string_view end_reason) {
+                    const RecordLosses& losses, std::uint64_t rows, std::string_view end_reason,
+                    const RecordSummary* summary) {
   Json manifest;
   manifest["kerf"] = KERF_VERSION;
   manifest["compiler"] = __VERSION__;
@@ -42,13 +97,14 @@ void write_manifest(const std::filesystem::path& folder, const SegmentInfo& info
          {"initial_hash", hex64(volume.initial_hash)}});
   }
   manifest["rows"] = rows;
-  manifest["lost_ticks"] = recorder.lost();
-  manifest["missed_before_start"] = recorder.missed_before_start();
+  manifest["lost_ticks"] = losses.lost;
+  manifest["missed_before_start"] = losses.missed_before_start;
   manifest["gaps"] = Json::List{};
-  for (const RecordGap& gap : recorder.gaps()) {
+  for (const RecordGap& gap : losses.gaps) {
     manifest["gaps"].push_back({{"first_index", gap.first_index}, {"count", gap.count}});
   }
   manifest["end_reason"] = end_reason;
+  if (summary != nullptr) manifest["summary"] = figures(*summary);
   write_new_file(folder / kManifestName, manifest.document());
 }
 
@@ -69,8 +125,14 @@ Manifest read_manifest(const std::filesystem::path& folder) {
     const Json json = Json::parse(text);
     out.tick_ns = json.at("tick_ns").get<std::uint32_t>();
     out.end_reason = json.at("end_reason").get<std::string>();
-    out.lost_ticks = json.at("lost_ticks").get<std::uint64_t>();
-    out.missed_before_start = json.at("missed_before_start").get<std::uint64_t>();
+    out.session_id = json.at("session_id").get<std::string>();
+    out.losses.lost = json.at("lost_ticks").get<std::uint64_t>();
+    out.losses.missed_before_start = json.at("missed_before_start").get<std::uint64_t>();
+    for (const Json& gap : json.at("gaps")) {
+      out.losses.gaps.push_back(
+          {gap.at("first_index").get<std::uint64_t>(), gap.at("count").get<std::uint64_t>()});
+    }
+    if (json.contains("summary")) out.summary = summary_of(json.at("summary"));
     for (const Json& volume : json.at("volumes")) {
       const auto spacing = volume.at("spacing_mm").get<std::array<double, 3>>();
       out.voxel_mm3.push_back(spacing[0] * spacing[1] * spacing[2]);
@@ -86,83 +148,91 @@ Manifest read_manifest(const std::filesystem::path& folder) {
   return out;
 }
 
-namespace {
+SummaryBuilder::SummaryBuilder(std::uint32_t tick_ns, std::vector<double> voxel_mm3)
+    : tick_ns_(tick_ns), voxel_mm3_(std::move(voxel_mm3)) {}
 
-// The one list of figures: name, value. Text and JSON both come from it.
-[[nodiscard]] Json figures(const RecordSummary& s) {
-  Json list = {{"rows", s.rows},
-               {"first_tick", s.first_tick},
-               {"last_tick", s.last_tick},
-               {"seconds", s.seconds},
-               {"lost_ticks", s.lost_ticks},
-               {"missed_before_start", s.missed_before_start},
-               {"contact_ticks", s.contact_ticks},
-               {"shaft_ticks", s.shaft_ticks},
-               {"stale_ticks", s.stale_ticks},
-               {"faults", s.faults},
-               {"missed_deadlines", s.missed_deadlines},
-               {"lost_packets", s.lost_packets},
-               {"refused_packets", s.refused_packets},
-               {"peak_force_n", s.peak_force_n},
-               {"deepest_mm", s.deepest_mm},
-               {"removed_mm3", s.removed_mm3},
-               {"port_energy_mj", s.port_energy_mj},
-               {"port_minimum_mj", s.port_minimum_mj}};
-  for (std::size_t i = 0; i < kEnergySources; ++i) {
-    list[std::string(kEnergySourceNames[i]) + "_mj"] = s.energy_mj[i];
+SummaryBuilder::SummaryBuilder(const SegmentInfo& info) : tick_ns_(info.tick_ns) {
+  for (const SegmentVolumeInfo& volume : info.volumes) {
+    const auto& mm = volume.spacing_mm;
+    voxel_mm3_.push_back(mm[0] * mm[1] * mm[2]);
   }
-  list["end_reason"] = s.end_reason;
-  return list;
 }
 
-}  // namespace
+void SummaryBuilder::add(const TickRecord& record) {
+  const std::uint64_t index = index_of(record);
+  if (out_.rows++ == 0) {
+    out_.first_tick = record.tick;
+    first_index_ = next_index_ = index;
+  }
+  if (index > next_index_) out_.lost_ticks += index - next_index_;
+  next_index_ = index + 1;
+  out_.last_tick = record.tick;
+  out_.contact_ticks += (record.flags & kFlagContact) != 0 ? 1 : 0;
+  out_.shaft_ticks += (record.flags & kFlagShaft) != 0 ? 1 : 0;
+  const bool stale = (record.flags & kFlagStarted) != 0 && (record.flags & kFlagStaleInput) != 0;
+  out_.stale_ticks += stale ? 1 : 0;
+  stale_in_a_row_ = stale ? stale_in_a_row_ + 1 : 0;
+  out_.faults += record.fault != 0 && record.fault != fault_ ? 1 : 0;
+  fault_ = record.fault;
+  out_.missed_deadlines = std::max(out_.missed_deadlines, record.missed_deadlines);
+  out_.lost_packets = std::max(out_.lost_packets, record.lost_packets);
+  out_.refused_packets = std::max(out_.refused_packets, record.refused_packets);
+  out_.peak_force_n = std::max(out_.peak_force_n, magnitude(record.commanded_force_n));
+  out_.deepest_mm = std::max(out_.deepest_mm, double{record.penetration_mm});
+  if ((record.flags & kFlagReset) != 0) out_.removed_mm3 = 0;
+  out_.removed_mm3 += removed_mm3(record, voxel_mm3_);
+  out_.port_energy_mj = record.port_energy_j * 1000;
+  out_.port_minimum_mj = record.port_minimum_j * 1000;
+  for (std::size_t i = 0; i < kEnergySources; ++i) {
+    out_.energy_mj[i] = energy_mj_of_steps(record.*kEnergyColumns[i]);
+  }
+}
 
-RecordSummary summarise(const std::filesystem::path& folder) {
+RecordSummary SummaryBuilder::result(const RecordLosses& losses,
+                                     std::string_view end_reason) const {
+  RecordSummary out = out_;
+  out.end_reason = end_reason;
+  out.missed_before_start = losses.missed_before_start;
+  if (out.rows != 0 && first_index_ > losses.missed_before_start) {
+    out.lost_ticks += first_index_ - losses.missed_before_start;
+  }
+  // The run ended because its device had gone: as in its report, that is no loss on the way.
+  if (end_reason == kFault) out.stale_ticks -= stale_in_a_row_;
+  // The manifest of a killed recorder is that of its start.
+  if (end_reason != kStillRunning) out.lost_ticks = std::max(out.lost_ticks, losses.lost);
+  out.seconds =
+      out.rows == 0 ? 0 : static_cast<double>(out.last_tick - out.first_tick + 1) * tick_ns_ * 1e-9;
+  return out;
+}
+
+RecordSummary summarise(const std::filesystem::path& folder, TickRange range) {
   const Manifest manifest = read_manifest(folder);
   TickLogReader log(folder / kTickLogName);
-  RecordSummary out;
-  out.rows = log.rows();
-  out.end_reason = manifest.end_reason;
+  SummaryBuilder builder(manifest.tick_ns, manifest.voxel_mm3);
+  RecordLosses losses = manifest.losses;
+  std::uint64_t before_range = 0;
+  log.for_each(
+      [&](const TickRecord& record) {
+        if (builder.rows() == 0) before_range = index_of(record);
+        builder.add(record);
+      },
+      range);
+  if (!range.is_whole()) losses = {.missed_before_start = before_range};
+  RecordSummary out = builder.result(losses, manifest.end_reason);
   if (log.rows() < log.counted()) {
     out.end_reason = "cut after " + std::to_string(log.rows()) + " of " +
                      std::to_string(log.counted()) + " rows";
   }
-  out.missed_before_start = manifest.missed_before_start;
-  std::uint64_t next_seq = 2 * manifest.missed_before_start + 2;  // of index i: 2 i + 2
-  std::uint32_t fault = 0;
-  std::uint64_t stale_in_a_row = 0;
-  log.for_each([&](const TickRecord& record) {
-    if (out.last_tick == 0) out.first_tick = record.tick;
-    if (record.seq > next_seq) out.lost_ticks += (record.seq - next_seq) / 2;
-    next_seq = record.seq + 2;
-    out.last_tick = record.tick;
-    out.contact_ticks += (record.flags & kFlagContact) != 0 ? 1 : 0;
-    out.shaft_ticks += (record.flags & kFlagShaft) != 0 ? 1 : 0;
-    const bool stale = (record.flags & kFlagStarted) != 0 && (record.flags & kFlagStaleInput) != 0;
-    out.stale_ticks += stale ? 1 : 0;
-    stale_in_a_row = stale ? stale_in_a_row + 1 : 0;
-    out.faults += record.fault != 0 && record.fault != fault ? 1 : 0;
-    fault = record.fault;
-    out.missed_deadlines = std::max(out.missed_deadlines, record.missed_deadlines);
-    out.lost_packets = std::max(out.lost_packets, record.lost_packets);
-    out.refused_packets = std::max(out.refused_packets, record.refused_packets);
-    out.peak_force_n = std::max(out.peak_force_n, magnitude(record.commanded_force_n));
-    out.deepest_mm = std::max(out.deepest_mm, double{record.penetration_mm});
-    if ((record.flags & kFlagReset) != 0) out.removed_mm3 = 0;
-    out.removed_mm3 += removed_mm3(record, manifest.voxel_mm3);
-    out.port_energy_mj = record.port_energy_j * 1000;
-    out.port_minimum_mj = record.port_minimum_j * 1000;
-    for (std::size_t i = 0; i < kEnergySources; ++i) {
-      out.energy_mj[i] = energy_mj_of_steps(record.*kEnergyColumns[i]);
-    }
-  });
-  // The run ended because its device had gone: as in its report, that is no loss on the way.
-  if (manifest.end_reason == kFault) out.stale_ticks -= stale_in_a_row;
-  if (manifest.complete()) out.lost_ticks = std::max(out.lost_ticks, manifest.lost_ticks);
-  if (out.rows != 0) {
-    out.seconds = static_cast<double>(out.last_tick - out.first_tick + 1) * manifest.tick_ns * 1e-9;
-  }
   return out;
+}
+
+std::optional<RecordSummary> kept_summary(const std::filesystem::path& folder) {
+  const Manifest manifest = read_manifest(folder);
+  const TickLogReader log(folder / kTickLogName);
+  if (!manifest.summary || log.rows() != log.counted() || log.rows() != manifest.summary->rows) {
+    return std::nullopt;
+  }
+  return manifest.summary;
 }
 
 std::string to_text(const RecordSummary& summary) {
@@ -218,7 +288,8 @@ void for_each_number(Visit visit) {
 
 }  // namespace
 
-void export_csv(const std::filesystem::path& folder, const std::filesystem::path& csv) {
+void export_csv(const std::filesystem::path& folder, const std::filesystem::path& csv,
+                TickRange range) {
   check_outputs(recording_files(folder), {{"--csv", csv, ".csv"}});
   AtomicFile file(csv);
   TickLogReader log(folder / kTickLogName);
@@ -234,14 +305,15 @@ void export_csv(const std::filesystem::path& folder, const std::filesystem::path
     line += ',';
   });
   end_line();
-  log.for_each([&](const TickRecord& record) {
+  const auto write_row = [&](const TickRecord& record) {
     const auto* const bytes = reinterpret_cast<const std::byte*>(&record);
     for_each_number([&](const LayoutField& field, std::uint32_t i) {
       append_element(line, field.type, bytes + field.offset + i * type_bytes(field.type));
       line += ',';
     });
     end_line();
-  });
+  };
+  log.for_each(write_row, range);
   file.close();
   file.commit();
 }

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -22,28 +23,11 @@ inline constexpr std::string_view kStillRunning = "running";
 inline constexpr std::string_view kFault = "fault";     ///< the run did not end as it was asked to
 inline constexpr std::string_view kNoRoom = "no room";  ///< the disk was full
 
-/// Facts about a log beside its rows.
-struct Manifest {
-  std::uint32_t tick_ns = 0;
-  std::vector<double> voxel_mm3;  ///< per volume
-  std::string end_reason;
-  std::uint64_t lost_ticks = 0;  ///< by the recorder; 0 if that was killed
-  std::uint64_t missed_before_start = 0;
-  [[nodiscard]] bool complete() const { return end_reason != kStillRunning; }
-};
-
 /// The files of a recording, of which none may become an output beside it.
 [[nodiscard]] inline std::vector<std::filesystem::path> recording_files(
     const std::filesystem::path& folder) {
   return {folder / kTickLogName, folder / kManifestName, folder / kSceneName};
 }
-
-/// Writes manifest.json, whole or not at all.
-void write_manifest(const std::filesystem::path& folder, const SegmentInfo& info,
-                    const Recorder& recorder, std::uint64_t rows, std::string_view end_reason);
-
-/// Throws `RecordError` if it is missing or has no such values.
-[[nodiscard]] Manifest read_manifest(const std::filesystem::path& folder);
 
 /// The figures of one recording.
 struct RecordSummary {
@@ -71,8 +55,51 @@ struct RecordSummary {
   std::string end_reason;
 };
 
-/// Reads all of the recording in `folder`. Throws `RecordError`.
-[[nodiscard]] RecordSummary summarise(const std::filesystem::path& folder);
+/// Facts about a log beside its rows.
+struct Manifest {
+  std::uint32_t tick_ns = 0;
+  std::vector<double> voxel_mm3;  ///< per volume
+  std::string session_id;         ///< of the run, as 16 hexadecimal digits
+  std::string end_reason;
+  RecordLosses losses;                   ///< until the last loss that the recorder wrote down
+  std::optional<RecordSummary> summary;  ///< of all rows; none if the recorder was killed
+};
+
+/// Makes the folder of a new recording. Throws `RecordError`.
+void make_recording_folder(const std::filesystem::path& folder);
+
+/// Writes manifest.json, whole or not at all.
+void write_manifest(const std::filesystem::path& folder, const SegmentInfo& info,
+                    const RecordLosses& losses, std::uint64_t rows, std::string_view end_reason,
+                    const RecordSummary* summary = nullptr);
+
+/// Throws `RecordError` if it is missing or has no such values.
+[[nodiscard]] Manifest read_manifest(const std::filesystem::path& folder);
+
+/// Sums up rows that come in order.
+class SummaryBuilder {
+ public:
+  SummaryBuilder(std::uint32_t tick_ns, std::vector<double> voxel_mm3);
+  explicit SummaryBuilder(const SegmentInfo& info);
+  void add(const TickRecord& record);
+  [[nodiscard]] std::uint64_t rows() const noexcept { return out_.rows; }
+  [[nodiscard]] RecordSummary result(const RecordLosses& losses, std::string_view end_reason) const;
+
+ private:
+  RecordSummary out_;
+  std::uint32_t tick_ns_;
+  std::vector<double> voxel_mm3_;
+  std::uint64_t first_index_ = 0, next_index_ = 0;
+  std::uint32_t fault_ = 0;
+  std::uint64_t stale_in_a_row_ = 0;
+};
+
+/// Reads the rows of the recording in `folder`. Throws `RecordError`.
+[[nodiscard]] RecordSummary summarise(const std::filesystem::path& folder, TickRange range = {});
+
+/// The summary that the recorder left, without a look at the rows; none if it left none, or if the
+/// log has another number of rows. Throws `RecordError`.
+[[nodiscard]] std::optional<RecordSummary> kept_summary(const std::filesystem::path& folder);
 
 /// Two columns for people.
 [[nodiscard]] std::string to_text(const RecordSummary& summary);
@@ -80,9 +107,10 @@ struct RecordSummary {
 /// The same figures as JSON.
 [[nodiscard]] std::string to_json(const RecordSummary& summary);
 
-/// Writes every row of the recording in `folder` as CSV, whole or not at all: one column per number
+/// Writes the rows of the recording in `folder` as CSV, whole or not at all: one column per number
 /// (`position_mm_0` ...), floats in the shortest form that reads back to the same bits. Throws
 /// `RecordError`, or `FileError` if the file cannot be written.
-void export_csv(const std::filesystem::path& folder, const std::filesystem::path& csv);
+void export_csv(const std::filesystem::path& folder, const std::filesystem::path& csv,
+                TickRange range = {});
 
 }  // namespace kerf

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include <fcntl.h>
+#include <sys/file.h>
 #include <unistd.h>
 
 #include "shared/segment/layout_table.hpp"
@@ -61,12 +62,23 @@ std::string tick_log_header(std::uint64_t rows) {
   return header + '\n';
 }
 
-TickLogWriter::TickLogWriter(std::filesystem::path path) : path_(std::move(path)) {
-  fd_ = open(path_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+TickLogWriter::TickLogWriter(std::filesystem::path path, Begin begin) : path_(std::move(path)) {
+  std::error_code none;
+  const bool has_rows =
+      begin == Begin::after_last && std::filesystem::file_size(path_, none) >= kTickLogHeaderBytes;
+  if (has_rows) written_ = TickLogReader(path_).rows();
+  const int create = begin == Begin::new_file ? O_CREAT | O_EXCL : 0;
+  fd_ = open(path_.c_str(), O_WRONLY | O_CLOEXEC | create, 0666);
   if (fd_ < 0 && errno == EEXIST) {
     throw RecordError(path_.string() + ": holds a recording; choose another --out");
   }
   if (fd_ < 0) fail(errno);
+  if (flock(fd_, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK) {
+    close(std::exchange(fd_, -1));
+    throw RecordError(path_.string() + ": another recorder writes it; choose another --out");
+  }
+  const auto whole = static_cast<off_t>(kTickLogHeaderBytes + written_ * sizeof(TickRecord));
+  if (begin == Begin::after_last && ftruncate(fd_, whole) != 0) fail(errno);
   buffer_.reserve(kBufferRows);
   write_header();
 }
@@ -179,17 +191,38 @@ std::size_t TickLogReader::read(std::uint64_t first, std::span<TickRecord> rows)
   if (!file_) throw RecordError(path_.string() + ": cannot be read; copy it again");
   for (std::size_t i = 0; i < count; ++i) {
     if (tick_record_crc(rows[i]) == rows[i].crc32c) continue;
-    throw RecordError(path_.string() + ": row " + std::to_string(first + i) +
+    if (i > 0) return i;
+    throw RecordError(path_.string() + ": row " + std::to_string(first) +
                       " has a wrong checksum; copy it again");
   }
   return count;
 }
 
-void TickLogReader::for_each(const std::function<void(const TickRecord&)>& visit) {
+std::uint64_t TickLogReader::row_of(Tick tick) {
+  std::uint64_t below = 0,
+                end = rows_;  // rows before `below` are earlier, those from `end` are not
+  while (below < end) {
+    const std::uint64_t middle = below + (end - below) / 2;
+    Tick there = 0;
+    file_.clear();
+    file_.seekg(static_cast<std::streamoff>(kTickLogHeaderBytes + middle * sizeof(TickRecord) +
+                                            offsetof(TickRecord, tick)));
+    file_.read(reinterpret_cast<char*>(&there), sizeof there);
+    if (!file_) throw RecordError(path_.string() + ": cannot be read; copy it again");
+    (there < tick ? below : end) = there < tick ? middle + 1 : middle;
+  }
+  return below;
+}
+
+void TickLogReader::for_each(const std::function<void(const TickRecord&)>& visit, TickRange range) {
   std::vector<TickRecord> chunk(kChunkRows);
-  for (std::uint64_t row = 0; row < rows_;) {
+  for (std::uint64_t row = range.from == 0 ? 0 : row_of(range.from); row < rows_;) {
     const std::size_t count = read(row, chunk);
-    for (std::size_t i = 0; i < count; ++i) visit(chunk[i]);
+    for (const TickRecord& record : std::span(chunk).first(count)) {
+      if (record.tick > range.until) return;
+      visit(record);
+      if (record.tick == range.until) return;
+    }
     row += count;
   }
 }

@@ -36,19 +36,33 @@ inline constexpr std::size_t kTickLogHeaderBytes = 4096;
 /// The header of a log of `rows` rows: exactly `kTickLogHeaderBytes`.
 [[nodiscard]] std::string tick_log_header(std::uint64_t rows);
 
+/// Takes the ticks of a run in order.
+class TickSink {
+ public:
+  TickSink() = default;
+  virtual ~TickSink() = default;
+  TickSink(const TickSink&) = delete;
+  TickSink& operator=(const TickSink&) = delete;
+  virtual void append(const TickRecord& record) = 0;
+  /// After the last of several.
+  virtual void flush() {}
+};
+
 /// Writes one log. Not thread-safe. A failure throws `RecordError`; the file then has complete
 /// rows.
-class TickLogWriter {
+class TickLogWriter final : public TickSink {
  public:
-  /// Refuses a path that exists: a recording is never overwritten.
-  explicit TickLogWriter(std::filesystem::path path);
-  ~TickLogWriter();
-  TickLogWriter(const TickLogWriter&) = delete;
-  TickLogWriter& operator=(const TickLogWriter&) = delete;
+  enum class Begin {
+    new_file,   ///< refuses a path that exists: a recording is never overwritten
+    after_last  ///< goes on behind the complete rows of a log; cuts an incomplete row, or header
+  };
+  /// Refuses a log that another process writes.
+  explicit TickLogWriter(std::filesystem::path path, Begin begin = Begin::new_file);
+  ~TickLogWriter() override;
 
   /// Buffers a row; at most `kBufferRows` wait for `flush`.
-  void append(const TickRecord& record);
-  void flush();
+  void append(const TickRecord& record) override;
+  void flush() override;
   /// Rows to the disk, then the header that counts them, then the header to the disk.
   void sync();
 
@@ -68,6 +82,18 @@ class TickLogWriter {
 /// The remedy if `folder` holds no recording: names the one of a demo's folder, which is in `log`.
 [[nodiscard]] std::string way_to_recording(const std::filesystem::path& folder);
 
+/// Ticks of a log, both ends included.
+struct TickRange {
+  Tick from = 0;
+  Tick until = UINT64_MAX;
+  [[nodiscard]] bool is_whole() const noexcept { return from == 0 && until == UINT64_MAX; }
+};
+
+/// How many records were published before this one: of index i, `seq` is 2 i + 2.
+[[nodiscard]] inline std::uint64_t index_of(const TickRecord& record) noexcept {
+  return record.seq / 2 - 1;
+}
+
 /// Reads one log, row by row, with constant memory.
 class TickLogReader {
  public:
@@ -82,12 +108,16 @@ class TickLogReader {
   /// As the header has them: more than `rows()` if the file was cut.
   [[nodiscard]] std::uint64_t counted() const noexcept { return counted_; }
 
-  /// Reads rows from `first` on into `rows`; returns how many there are, less at the end. Throws
-  /// `RecordError` at a row whose checksum is wrong.
+  /// Reads rows from `first` on into `rows`; returns how many there are, less at the end and before
+  /// a row whose checksum is wrong. Throws `RecordError` if that is the first one.
   [[nodiscard]] std::size_t read(std::uint64_t first, std::span<TickRecord> rows);
 
-  /// Calls `visit` for each row in order. Throws as `read`.
-  void for_each(const std::function<void(const TickRecord&)>& visit);
+  /// The first row of `tick` or a later one, by bisection; `rows()` if there is none. No checksum
+  /// is looked at: that of the row found is, by `read`.
+  [[nodiscard]] std::uint64_t row_of(Tick tick);
+
+  /// Calls `visit` for each row of `range` in order. Throws as `read`.
+  void for_each(const std::function<void(const TickRecord&)>& visit, TickRange range = {});
 
  private:
   std::filesystem::path path_;

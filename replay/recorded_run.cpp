@@ -150,9 +150,9 @@ void check_same_counts(const std::string& recorded, const LoadedScene& scene) {
 }
 
 void check_begins_at_first_tick(const std::filesystem::path& folder, const Manifest& manifest) {
-  if (manifest.missed_before_start == 0) return;
+  if (manifest.losses.missed_before_start == 0) return;
   throw RecordError(folder.string() + ": the first " +
-                    std::to_string(manifest.missed_before_start) +
+                    std::to_string(manifest.losses.missed_before_start) +
                     " ticks of the run are not in it; start the recorder before the controller, "
                     "as ./kerf demo does");
 }

@@ -83,7 +83,14 @@ ReplayResult replay_ticks(RecordedRun& run, TickLogReader& log, Tick until,
   ReplayStep step(*run.servo);
   std::vector<TickRecord> rows(TickLogReader::kChunkRows);
   for (std::uint64_t row = 0; row < log.rows();) {
-    const std::size_t count = log.read(row, rows);
+    std::size_t count = 0;
+    try {
+      count = log.read(row, rows);
+    } catch (const RecordError& error) {
+      if (row == 0) throw;
+      result.cut_short = error.what();
+      return result;
+    }
     for (const TickRecord& recorded : std::span(rows).first(count)) {
       if (recorded.tick > until) return result;
       if (stop) {
@@ -132,10 +139,8 @@ class ReplayLog {
  private:
   static std::filesystem::path new_folder(const std::filesystem::path& out) {
     check_new_folder(out);
-    std::error_code error;
-    std::filesystem::create_directories(out, error);
-    if (!error) return out;
-    throw RecordError(out.string() + ": " + error.message() + "; choose another --out");
+    make_recording_folder(out);
+    return out;
   }
 
   std::filesystem::path out_, from_;

@@ -35,7 +35,7 @@ using TickVisitor = std::function<bool(const TickRecord& recorded, const TickRec
 
 /// Gives the servo the reports and commands of the recording's ticks, in order, up to tick `until`,
 /// and hands each tick to `visit`. A gap ends it: what the servo was given there is unknown. So
-/// does `stop`. Throws `RecordError` at a row whose checksum is wrong.
+/// do `stop` and a row whose checksum is wrong. Throws `RecordError` if that is the first one.
 [[nodiscard]] ReplayResult replay_ticks(RecordedRun& run, TickLogReader& log, Tick until,
                                         const std::atomic<bool>& stop, const TickVisitor& visit);
 

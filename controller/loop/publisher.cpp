@@ -167,6 +167,8 @@ DeviceReport report_of(const TickRecord& record) noexcept {
   return report;
 }
 
+static_assert(static_cast<std::uint32_t>(ServoCommand::Kind::mark) == kCommandMark);
+
 TickCommands commands_of(const TickRecord& record) noexcept {
   return {{static_cast<ServoCommand::Kind>(record.command & kCommandKind), record.command_argument},
           (record.command & kCommandFadeIn) != 0,

@@ -25,6 +25,8 @@ ServoCommand servo_command(const Command& command) noexcept {
       return {ServoCommand::Kind::undo, 0};
     case CommandKind::redo:
       return {ServoCommand::Kind::redo, 0};
+    case CommandKind::mark:
+      return {ServoCommand::Kind::mark, 0};
   }
   return {};
 }

@@ -43,7 +43,8 @@ struct ServoCommand {
     fade_in,  ///< force starts again from 0: after a stall of the servo
     reset,    ///< the volumes' first content, over several ticks; at once if nothing is cut
     undo,     ///< the volumes before the last stroke, likewise; refused if there is none
-    redo      ///< the stroke that was undone last again, likewise
+    redo,     ///< the stroke that was undone last again, likewise
+    mark      ///< nothing: a place in the log
   };
   Kind kind = Kind::none;
   std::uint32_t argument = 0;  ///< index of the tool; hold: 1 on, 0 off

@@ -408,6 +408,7 @@ bool apply_command(const ServoPlan<N>& plan, ServoState<N>& state,
                    const ServoCommand& command) noexcept {
   switch (command.kind) {
     case ServoCommand::Kind::none:
+    case ServoCommand::Kind::mark:
       return true;
     case ServoCommand::Kind::select_tool:
       if (command.argument >= plan.tool_count) return false;

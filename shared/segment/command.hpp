@@ -20,6 +20,7 @@ enum class CommandKind : std::uint32_t {
   reset = 3,        ///< argument: 0; the volumes go back to their first content
   undo = 4,         ///< argument: 0; the volumes go back to their content before the last stroke
   redo = 5,         ///< argument: 0; the stroke that was undone last is cut again
+  mark = 6,  ///< argument: 0; changes nothing: a place in the log, which a flight recorder keeps
 };
 
 /// One command: a message of fixed size over the socket, validated outside the servo, applied by
@@ -68,6 +69,7 @@ struct CommandLimits {
     case CommandKind::reset:
     case CommandKind::undo:
     case CommandKind::redo:
+    case CommandKind::mark:
       return command.argument == 0;
   }
   return false;

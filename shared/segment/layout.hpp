@@ -202,6 +202,7 @@ inline constexpr std::uint32_t kFlagPedal = 1U << 18;      ///< nothing is cut w
 /// the force after a stall of the servo.
 inline constexpr std::uint32_t kCommandKind = 0xff;
 inline constexpr std::uint32_t kCommandFadeIn = 1U << 8;
+inline constexpr std::uint32_t kCommandMark = 7;  ///< a kind: a place in the log, nothing else
 
 inline constexpr std::size_t kRawEncoder = 0;  ///< first of 3
 inline constexpr std::size_t kRawPot = 3;      ///< first of 6

@@ -34,7 +34,7 @@ TEST_CASE("a recorder that keeps up has every tick once and in order") {
   }
   recorder.drain();
   log.sync();
-  CHECK(recorder.lost() == 0);
+  CHECK(recorder.losses().lost == 0);
   CHECK(recorder.largest_lag() == 199);
   Tick expected = 1;
   TickLogReader(bench.folder / "ticks.npy").for_each([&](const TickRecord& record) {
@@ -53,10 +53,10 @@ TEST_CASE("a recorder that slept counts the overwritten ticks exactly") {
   recorder.poll();
   bench.publish(3);
   recorder.poll();
-  CHECK(recorder.lost() == 5);
-  REQUIRE(recorder.gaps().size() == 1);
-  CHECK(recorder.gaps()[0].first_index == 10);
-  CHECK(recorder.gaps()[0].count == 5);
+  CHECK(recorder.losses().lost == 5);
+  REQUIRE(recorder.losses().gaps.size() == 1);
+  CHECK(recorder.losses().gaps[0].first_index == 10);
+  CHECK(recorder.losses().gaps[0].count == 5);
   CHECK(log.rows() == 10 + kStateSlots + 3);
 }
 
@@ -66,8 +66,8 @@ TEST_CASE("ticks overwritten before the recorder came are not its loss") {
   TickLogWriter log(bench.folder / "ticks.npy");
   Recorder recorder(bench.reader, log);
   recorder.poll();
-  CHECK(recorder.missed_before_start() == 7);
-  CHECK(recorder.lost() == 0);
+  CHECK(recorder.losses().missed_before_start == 7);
+  CHECK(recorder.losses().lost == 0);
   CHECK(log.rows() == kStateSlots);
 }
 
@@ -93,13 +93,13 @@ TEST_CASE("of another machine's run a recorder takes what came, and counts what 
   const RuntimeFolder folder;
   TickLogWriter log(folder / "ticks.npy");
   Recorder recorder(reader, log);
-  CHECK(recorder.missed_before_start() == 2000);
+  CHECK(recorder.losses().missed_before_start == 2000);
   CHECK(recorder.poll() == 2);
   come(2002);
   come(2005);
   CHECK(recorder.poll() == 2);
-  CHECK(recorder.lost() == 2);
-  REQUIRE(recorder.gaps().size() == 1);
-  CHECK(recorder.gaps()[0].first_index == 2003);
-  CHECK(recorder.gaps()[0].count == 2);
+  CHECK(recorder.losses().lost == 2);
+  REQUIRE(recorder.losses().gaps.size() == 1);
+  CHECK(recorder.losses().gaps[0].first_index == 2003);
+  CHECK(recorder.losses().gaps[0].count == 2);
 }

@@ -150,3 +150,59 @@ TEST_CASE("a full disk is one line, and the rows that fit stay readable") {
         tick_log_header(log.rows()));
   CHECK(error_of([&] { log.for_each([](const TickRecord&) {}); }).empty());
 }
+
+TEST_CASE("a tick of a log of 11 GB is found, and its row read, without the rows before it") {
+  const TemporaryFolder folder;
+  const std::filesystem::path path = folder / "ticks.npy";
+  constexpr std::uint64_t kRows = 22'000'000;
+  {
+    TickLogWriter log(path);
+    log.append(made_up_tick(1, 2));
+    log.sync();
+  }
+  // Rows of zeros on no block of the disk, and a last one.
+  std::filesystem::resize_file(path, kTickLogHeaderBytes + (kRows - 1) * sizeof(TickRecord));
+  {
+    TickLogWriter log(path, TickLogWriter::Begin::after_last);
+    TickRecord last = made_up_tick(kRows, 2);
+    last.crc32c = tick_record_crc(last);
+    log.append(last);
+    log.sync();
+  }
+  TickLogReader reader(path);
+  CHECK(reader.rows() == kRows);
+  CHECK(reader.row_of(kRows) == kRows - 1);
+  CHECK(reader.row_of(kRows + 1) == kRows);
+  int visited = 0;
+  reader.for_each([&](const TickRecord& record) { visited += record.tick == kRows ? 1 : 2; },
+                  {.from = kRows});
+  CHECK(visited == 1);
+}
+
+TEST_CASE("a row with a wrong checksum ends a log behind the sound rows before it") {
+  const TemporaryFolder folder;
+  const std::filesystem::path path = folder / "ticks.npy";
+  {
+    TickLogWriter log(path);
+    for (Tick tick = 1; tick <= 100; ++tick) {
+      TickRecord record = made_up_tick(tick, 100);
+      record.crc32c = tick_record_crc(record);
+      log.append(record);
+    }
+    log.sync();
+  }
+  {
+    std::fstream file(path, std::ios::in | std::ios::out | std::ios::binary);
+    file.seekp(kTickLogHeaderBytes + 40 * sizeof(TickRecord) + 100);
+    file.put('x');
+  }
+  TickLogReader reader(path);
+  std::vector<TickRecord> rows(100);
+  CHECK(reader.read(0, rows) == 40);
+  CHECK(error_of([&] { static_cast<void>(reader.read(40, rows)); }).find("row 40 has a wrong") !=
+        std::string::npos);
+  CHECK(reader.read(41, rows) == 59);
+  int visited = 0;
+  CHECK_NOTHROW(reader.for_each([&](const TickRecord&) { ++visited; }, {.until = 40}));
+  CHECK(visited == 40);
+}

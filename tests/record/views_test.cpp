@@ -31,7 +31,7 @@ void record(const std::filesystem::path& folder, Tick ticks) {
   }
   recorder.drain();
   log.sync();
-  write_manifest(folder, reader.info(), recorder, log.rows(), "clean end");
+  write_manifest(folder, reader.info(), recorder.losses(), log.rows(), "clean end");
 }
 
 }  // namespace
@@ -88,14 +88,14 @@ TEST_CASE("info and the manifest agree on losses, before the first row and behin
   recorder.drain();
   log.sync();
   const auto lost_of = [&](std::string_view end_reason) {
-    write_manifest(folder / "log", reader.info(), recorder, log.rows(), end_reason);
+    write_manifest(folder / "log", reader.info(), recorder.losses(), log.rows(), end_reason);
     const RecordSummary summary = summarise(folder / "log");
     CHECK(summary.missed_before_start == kMissed);
     CHECK(summary.first_tick == kMissed + kLost + 1);
     CHECK(summary.rows + summary.lost_ticks + summary.missed_before_start == tick);
     return summary.lost_ticks;
   };
-  CHECK(recorder.lost() == kLost);
+  CHECK(recorder.losses().lost == kLost);
   CHECK(lost_of("clean end") == kLost);
   std::filesystem::remove(folder / "log/manifest.json");
   CHECK(lost_of(kStillRunning) == kLost);  // a killed recorder: by the rows alone
@@ -124,7 +124,7 @@ TEST_CASE("stale ticks are those of the run, without the silence of a device tha
   log.sync();
   const auto stale_of = [&](std::string_view end_reason) {
     std::filesystem::remove(folder / "log/manifest.json");
-    write_manifest(folder / "log", reader.info(), recorder, log.rows(), end_reason);
+    write_manifest(folder / "log", reader.info(), recorder.losses(), log.rows(), end_reason);
     return summarise(folder / "log").stale_ticks;
   };
   CHECK(stale_of(kFault) == 3);

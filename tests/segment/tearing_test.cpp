@@ -66,8 +66,9 @@ TEST_CASE("a reader that chases a writer flat out never keeps a torn brick or re
   std::uint64_t torn_records = 0;
   std::uint64_t consistent = 0;
   std::uint64_t mixed = 0;
+  // On a busy machine it takes longer until so many are kept.
   const auto end = Clock::now() + kDuration;
-  while (Clock::now() < end) {
+  while (Clock::now() < end || kept <= 1000) {
     const std::vector<std::uint64_t> before = snapshot.versions;
     reader.update(0, snapshot);
     for (const auto& [id, voxels] : snapshot.changed) {
@@ -100,7 +101,6 @@ TEST_CASE("a reader that chases a writer flat out never keeps a torn brick or re
     }
   }
   MESSAGE(kept, " bricks kept, ", consistent, " snapshots of one tick");
-  CHECK(kept > 1000);
   CHECK(torn == 0);
   CHECK(torn_records == 0);
   CHECK(mixed == 0);

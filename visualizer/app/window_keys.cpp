@@ -93,6 +93,15 @@ void redo_stroke(Session& session, Notices& notices, Notices::Clock::time_point 
   }
 }
 
+void mark_tick(Session& session, Notices& notices, Notices::Clock::time_point now) {
+  const auto& newest = session.latest();
+  if (newest && session.mark()) {
+    notices.say({"marked tick " + std::to_string(newest->tick)}, now);
+  } else {
+    notices.say({"mark: the controller did not take it; press f again", true}, now);
+  }
+}
+
 }  // namespace
 
 std::string no_such_tool(std::size_t index, std::size_t tools) {
@@ -165,6 +174,7 @@ bool WindowKeys::apply(const WindowInput& input, Session& session, Picture& pict
     if (key == 'Z') redo_stroke(session, notices, now);
     if (key == 'u') undo_all(undo_asked, session, notices, now);
     end_press = end_press || key == 'z' || key == 'Z' || key == 'u';
+    if (key == 'f') mark_tick(session, notices, now);
     if (key == 'c') settings.clip.on = !settings.clip.on;
     if (key == 'x') settings.clip = picture.facing_plane(tip_of(session));
     if (key == 'y') settings.colour_blind = !settings.colour_blind;

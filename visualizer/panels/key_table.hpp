@@ -20,6 +20,7 @@ inline constexpr auto kKeys = std::to_array<KeyHelp>({
     {"z", "undo the last stroke"},
     {"shift + z", "cut it again"},
     {"u, u", "undo all cuts"},
+    {"f", "mark this moment in the log"},
     {"1 .. 9", "take this tool"},
     {"v", "next renderer"},
     {"b", "v is for one volume; for all"},

@@ -109,6 +109,8 @@ class Session {
   bool undo() { return send(CommandKind::undo, 0); }
   /// The stroke that was undone last is cut again.
   bool redo() { return send(CommandKind::redo, 0); }
+  /// A place in the log; a flight recorder keeps what came before it.
+  bool mark() { return send(CommandKind::mark, 0); }
 
  private:
   bool send(CommandKind kind, std::uint32_t argument);

@@ -98,8 +98,9 @@ REPORTS = [
         ("scene", "", "file with the scene"),
         ("volumes", "", "each with `size_vox`, `spacing_mm`, `initial_hash`"),
         ("rows, lost_ticks, missed_before_start, end_reason", "", "as above; `end_reason` is `running` until the end, `no room` if the disk was full"),
-        ("gaps", "", "each with `first_index` and `count`")]),
-    ("Summary of a log", "`./kerf record info LOG --report FILE`.", [("record/recording.cpp", "Json figures(")], [], [
+        ("gaps", "", "each with `first_index` and `count`"),
+        ("summary", "", "what `record info` shows, of all rows; missing if the recorder was killed before")]),
+    ("Summary of a log", "`./kerf record info LOG --report FILE`.", [("record/recording.cpp", "void for_each_figure(")], [], [
         ("rows, first_tick, last_tick, seconds", "", "what the log covers"),
         ("lost_ticks, missed_before_start, end_reason", "", "as above; `end_reason` of a log that was cut says after which row"),
         ("contact_ticks, shaft_ticks, stale_ticks, faults", "", "ticks of that kind, `stale_ticks` as in the report of the controller; faults that latched"),

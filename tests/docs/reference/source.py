@@ -61,7 +61,8 @@ class Source:
     def json_keys(self, begin):
         """Every key that a function gives to JSON, nested ones too."""
         body = self.body(begin)
-        return set(re.findall(r'\{"([a-z_0-9]+)",', body)) | set(re.findall(r'\w\["([a-z_0-9]+)"\]', body))
+        return set(re.findall(r'\{"([a-z_0-9]+)",', body)) | set(re.findall(r'\w\["([a-z_0-9]+)"\]', body)) | set(
+            re.findall(r'\bvisit\("([a-z_0-9]+)",', body))
 
     def allowed(self, begin):
         """The keys that a function of a script lets pass."""

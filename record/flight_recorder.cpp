@@ -1,0 +1,238 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "record/flight_recorder.hpp"
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <csignal>
+#include <cstdio>
+#include <fstream>
+#include <iostream>
+#include <string_view>
+#include <system_error>
+#include <thread>
+#include <utility>
+
+#include "record/log_columns.hpp"
+#include "record/recording.hpp"
+#include "shared/posix/atomic_file.hpp"
+#include "shared/segment/connection.hpp"
+#include "shared/segment/layout.hpp"
+
+namespace kerf {
+namespace {
+
+std::string fault_word(std::uint32_t fault) {
+  for (const LogCode& code : log_faults()) {
+    if (code.value == fault) return std::string(code.name);
+  }
+  return "fault-" + std::to_string(fault);
+}
+
+}  // namespace
+
+void TickWindow::append(const TickRecord& record) {
+  rows_[end_++ % rows_.size()] = record;
+  if (record.fault != 0 && record.fault != fault_) {
+    event_ = {fault_word(record.fault), record.tick};
+  } else if ((record.command & kCommandKind) == kCommandMark && event_.reason.empty()) {
+    event_ = {"mark", record.tick};
+  }
+  fault_ = record.fault;
+}
+
+TickWindow::Event TickWindow::take_event() {
+  return std::exchange(event_, {});
+}
+
+namespace {
+
+constexpr const char* kSuffix = ".flight";
+
+/// Where a flight recorder says that it runs, and into which folder it writes.
+class FlightNotice {
+ public:
+  FlightNotice(const std::string& name, const std::filesystem::path& out)
+      : lock_(name + kSuffix), path_(file_of(name)) {
+    write_new_file(path_, std::filesystem::absolute(out).string());
+  }
+  ~FlightNotice() {
+    std::error_code gone;
+    std::filesystem::remove(path_, gone);
+  }
+  FlightNotice(const FlightNotice&) = delete;
+  FlightNotice& operator=(const FlightNotice&) = delete;
+
+  static std::filesystem::path file_of(const std::string& name) {
+    return segment_folder() + "/" + name + kSuffix;
+  }
+
+ private:
+  NameLock lock_;
+  std::filesystem::path path_;
+};
+
+volatile std::sig_atomic_t g_asked = 0;
+
+void catch_requests() noexcept {
+  struct sigaction action {};
+  action.sa_handler = [](int) { g_asked = 1; };
+  action.sa_flags = SA_RESTART;
+  sigaction(SIGUSR1, &action, nullptr);
+}
+
+/// A folder that sorts by time: TICK-REASON.
+std::string folder_name(const TickWindow::Event& event) {
+  std::array<char, 24> tick{};
+  std::snprintf(tick.data(), tick.size(), "%012llu", static_cast<unsigned long long>(event.tick));
+  return std::string(tick.data()) + "-" + event.reason;
+}
+
+class FlightRecorder {
+ public:
+  FlightRecorder(const RecorderOptions& options, const SegmentConnection& connection)
+      : out_(options.out),
+        connection_(connection),
+        capacity_(static_cast<std::uint64_t>(
+            std::ceil(options.flight_s * 1e9 / reader().info().tick_ns))),
+        window_(capacity_ + reader().info().state_slots),
+        recorder_(reader(), window_) {}
+
+  void run(const std::atomic<bool>& stop) {
+    bool ended = false;
+    while (!ended) {
+      ended = stop || has_ended(connection_);
+      const std::uint64_t got = recorder_.poll();
+      if (std::exchange(g_asked, 0) != 0) keep({"signal", newest()});
+      if (const TickWindow::Event event = window_.take_event(); !event.reason.empty()) keep(event);
+      if (!ended && got < reader().info().state_slots / 8) std::this_thread::sleep_for(kPollPeriod);
+    }
+    recorder_.drain();
+    const std::string_view reason = end_reason(reader(), stop);
+    if (reason == kFault) keep({"end", newest()});
+    if (reason == "controller gone") keep({"gone", newest()});
+  }
+
+  [[nodiscard]] int kept() const noexcept { return kept_; }
+
+ private:
+  [[nodiscard]] const SegmentReader& reader() const noexcept { return connection_.reader(); }
+  [[nodiscard]] Tick newest() const noexcept {
+    return window_.end() == 0 ? 0 : window_[window_.end() - 1].tick;
+  }
+
+  void keep(const TickWindow::Event& event) {
+    if (window_.end() == 0) return;
+    const std::filesystem::path folder = out_ / folder_name(event);
+    if (std::filesystem::exists(folder)) return;  // a fault and a mark in the same tick
+    if (kept_ >= kMostKept) {
+      std::cerr << "kerf-recorder: " << folder.string() << ": not kept, " << kMostKept
+                << " recordings are; start the flight recorder again\n";
+      return;
+    }
+    try {
+      write(folder, event);
+      ++kept_;
+      std::cout << folder.string() << ": kept" << std::endl;
+    } catch (const std::runtime_error& error) {
+      std::cerr << "kerf-recorder: " << error.what() << '\n';
+    }
+  }
+
+  /// Beside its name until it is whole. Goes on polling: the window has room for what comes while
+  /// it is written.
+  void write(const std::filesystem::path& folder, const TickWindow::Event& event) {
+    const std::filesystem::path partial = out_ / ("." + folder.filename().string());
+    std::error_code ignored;
+    std::filesystem::remove_all(partial, ignored);
+    make_recording_folder(partial);
+    {
+      const std::uint64_t end = window_.end();
+      std::uint64_t row = end - std::min(end, capacity_);
+      row = std::max(row, window_.first());
+      const std::uint64_t missed = index_of(window_[row]);
+      SummaryBuilder summary(reader().info());
+      TickLogWriter log(partial / kTickLogName);
+      constexpr std::uint64_t kRowsAPoll = 256;
+      while (row < end) {
+        row = std::max(row, window_.first());  // a disk that is slower than the run
+        for (const std::uint64_t next = std::min(end, row + kRowsAPoll); row < next; ++row) {
+          log.append(window_[row]);
+          summary.add(window_[row]);
+        }
+        log.flush();
+        recorder_.poll();
+      }
+      log.sync();
+      RecordLosses losses{.missed_before_start = missed};
+      const std::string reason = "kept at tick " + std::to_string(event.tick) + ": " + event.reason;
+      RecordSummary figures = summary.result(losses, reason);
+      losses.lost = figures.lost_ticks;
+      write_new_file(partial / kSceneName, reader().info().scene_json);
+      write_manifest(partial, reader().info(), losses, log.rows(), reason, &figures);
+    }
+    std::filesystem::rename(partial, folder);
+  }
+
+  std::filesystem::path out_;
+  const SegmentConnection& connection_;
+  std::uint64_t capacity_;  ///< of a recording
+  TickWindow window_;
+  Recorder recorder_;
+  int kept_ = 0;
+};
+
+}  // namespace
+
+int run_flight_recorder(const RecorderOptions& options, const std::atomic<bool>& stop) {
+  check_new_folder(options.out);
+  const SegmentConnection connection = connect_within(options, stop);
+  make_recording_folder(options.out);
+  const FlightNotice notice(options.name, options.out);
+  catch_requests();
+  FlightRecorder recorder(options, connection);
+  const double bytes =
+      options.flight_s * 1e9 / connection.reader().info().tick_ns * sizeof(TickRecord);
+  std::cout << "the last " << options.flight_s << " s are in memory, " << std::lround(bytes / 1e6)
+            << " MB" << std::endl;
+  recorder.run(stop);
+  std::cout << recorder.kept() << " recordings kept in " << options.out.string() << '\n';
+  return 0;
+}
+
+std::filesystem::path grab(const std::string& name) {
+  SegmentConnection connection = connect_segment(name);
+  std::ifstream notice(FlightNotice::file_of(name));
+  std::string out;
+  if (!std::getline(notice, out)) {
+    throw SegmentError(
+        "--name " + name +
+        ": no flight recorder runs; start kerf-recorder --flight 60 --out DIR first");
+  }
+  const Reply reply = connection.send({.kind = CommandKind::mark});
+  if (reply.status != ReplyStatus::accepted) {
+    throw SegmentError("--name " + name + ": the controller took no mark; try again");
+  }
+  // The tick of the mark is in the record in which the command was applied.
+  using Clock = std::chrono::steady_clock;
+  const auto deadline = Clock::now() + std::chrono::seconds(10);
+  const SegmentReader& reader = connection.reader();
+  std::uint64_t next = reader.state_head();
+  next -= std::min<std::uint64_t>(next, reader.info().state_slots / 2);
+  std::filesystem::path kept;
+  while (Clock::now() < deadline) {
+    TickRecord record;
+    for (; kept.empty() && reader.state_at(next, record) == ReadState::ok; ++next) {
+      const bool marked = (record.command & kCommandKind) == kCommandMark;
+      if (!marked || record.last_command != reply.index) continue;
+      kept = std::filesystem::path(out) / folder_name({"mark", record.tick});
+    }
+    if (kept.empty() && reader.state_at(next, record) == ReadState::overrun) ++next;
+    if (!kept.empty() && std::filesystem::exists(kept)) return kept;
+    std::this_thread::sleep_for(kPollPeriod);
+  }
+  throw SegmentError(out + ": the flight recorder kept nothing within 10 s; see its messages");
+}
+
+}  // namespace kerf

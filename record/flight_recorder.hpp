@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "record/recorder.hpp"
+#include "record/tick_log.hpp"
+
+// The flight recorder: the last ticks of a run in memory of constant size, kept on request.
+
+namespace kerf {
+
+/// The newest ticks, at most `capacity` of them. Allocates once.
+class TickWindow final : public TickSink {
+ public:
+  explicit TickWindow(std::size_t capacity) { rows_.resize(capacity); }
+
+  void append(const TickRecord& record) override;
+
+  /// Rows so far: row `i` of all is there if `first() <= i < end()`.
+  [[nodiscard]] std::uint64_t end() const noexcept { return end_; }
+  [[nodiscard]] std::uint64_t first() const noexcept {
+    return end_ - (end_ < rows_.size() ? end_ : rows_.size());
+  }
+  [[nodiscard]] const TickRecord& operator[](std::uint64_t i) const noexcept {
+    return rows_[i % rows_.size()];
+  }
+
+  /// The reason to keep the window, since the last call: a fault that began, or a mark; with its
+  /// tick. Empty: none. A fault wins over a mark.
+  struct Event {
+    std::string reason;
+    Tick tick = 0;
+  };
+  [[nodiscard]] Event take_event();
+
+ private:
+  std::vector<TickRecord> rows_;
+  std::uint64_t end_ = 0;
+  std::uint32_t fault_ = 0;
+  Event event_;
+};
+
+/// Keeps the last `options.flight_s` of controller `options.name` in memory until it ends or
+/// `stop`. A fault, a mark, SIGUSR1 and an end that nobody asked for write them as a recording into
+/// `options.out`/TICK-REASON, which appears whole. At most `kMostKept` of them. Returns the exit
+/// code, 0. Bad input throws; a full disk is one line, and the recorder goes on.
+[[nodiscard]] int run_flight_recorder(const RecorderOptions& options,
+                                      const std::atomic<bool>& stop);
+
+inline constexpr int kMostKept = 100;
+
+/// Asks the flight recorder of controller `name` to keep its window, by a mark in the run. Returns
+/// the folder of the recording, once that is whole. Throws `SegmentError` if no controller or no
+/// flight recorder of that name runs, or if none keeps it within 10 s.
+[[nodiscard]] std::filesystem::path grab(const std::string& name);
+
+}  // namespace kerf

@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "record/flight_recorder.hpp"
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <csignal>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "controller/servo/servo.hpp"
+#include "record/recording.hpp"
+#include "shared/segment/server.hpp"
+#include "tests/record/record_support.hpp"
+
+using namespace kerf;
+using namespace kerf::test;
+
+namespace {
+
+/// A controller at 1 kHz that applies commands, in a thread, beside a flight recorder of 0.5 s.
+class Flight {
+ public:
+  Flight() {
+    recorder_ = std::thread([this] {
+      RecorderOptions options;
+      options.name = "demo";
+      options.out = out();
+      options.flight_s = 0.5;
+      code_ = run_flight_recorder(options, stop_);
+    });
+    controller_ = std::thread([this] { control(); });
+  }
+  ~Flight() { end(Lifecycle::clean_end); }
+
+  void end(Lifecycle lifecycle) {
+    if (!controller_.joinable()) return;
+    leave_ = true;
+    controller_.join();
+    writer_.set_lifecycle(lifecycle);
+    recorder_.join();
+  }
+  void wait_for(Tick tick) const {
+    while (tick_ < tick) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  void fault(Fault fault) { fault_ = static_cast<std::uint32_t>(fault); }
+  [[nodiscard]] std::filesystem::path out() const { return folder_ / "flight"; }
+  /// The recordings, in the order of their ticks, by their reasons.
+  [[nodiscard]] std::vector<std::string> kept() const {
+    std::vector<std::string> names;
+    for (const auto& entry : std::filesystem::directory_iterator(out())) {
+      names.push_back(entry.path().filename().string());
+    }
+    std::ranges::sort(names);
+    for (std::string& name : names) name = name.substr(name.find('-') + 1);
+    return names;
+  }
+  [[nodiscard]] Tick now() const { return tick_; }
+
+ private:
+  void control() {
+    std::uint32_t last_command = 0;
+    while (!leave_) {
+      TickRecord record = made_up_tick(tick_ + 1, 10'000);
+      record.fault = fault_;
+      if (const auto command = server_.take_command()) {
+        record.command = command->kind == CommandKind::mark ? kCommandMark : 0;
+        last_command = command->index;
+      }
+      record.last_command = last_command;
+      publish_tick(writer_, record);
+      ++tick_;
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+  }
+
+  RuntimeFolder folder_;
+  NoiseVolume volume_{{8, 8, 8}};
+  SegmentWriter writer_ = SegmentWriter::create(spec_of(volume_));
+  SegmentServer server_{"demo", writer_};
+  std::atomic<bool> stop_{false}, leave_{false};
+  std::atomic<Tick> tick_{0};
+  std::atomic<std::uint32_t> fault_{0};
+  std::atomic<int> code_{-1};
+  std::thread recorder_, controller_;
+};
+
+}  // namespace
+
+TEST_CASE("a flight recorder keeps the ticks before a fault, a mark and a signal, each once") {
+  Flight flight;
+  flight.wait_for(700);
+  const std::filesystem::path marked = grab("demo");
+  const RecordSummary summary = summarise(marked);
+  CHECK(summary.rows == 500);
+  CHECK(summary.lost_ticks == 0);
+  CHECK(summary.missed_before_start == summary.first_tick - 1);
+  const std::string tick = std::to_string(std::stoul(marked.filename().string()));
+  CHECK(summary.end_reason == "kept at tick " + tick + ": mark");
+  CHECK(kept_summary(marked).has_value());
+
+  flight.fault(Fault::overspeed);
+  flight.wait_for(flight.now() + 50);
+  std::raise(SIGUSR1);
+  flight.wait_for(flight.now() + 50);
+  CHECK(flight.kept() == std::vector<std::string>{"mark", "overspeed", "signal"});
+  flight.fault(Fault::none);
+  flight.end(Lifecycle::clean_end);  // as it was asked to: nothing more
+  CHECK(flight.kept().size() == 3);
+}
+
+TEST_CASE("a flight recorder keeps the end of a run that nobody asked for; a short one whole") {
+  Flight flight;
+  flight.wait_for(100);
+  flight.end(Lifecycle::fault);
+  REQUIRE(flight.kept() == std::vector<std::string>{"end"});
+  for (const auto& entry : std::filesystem::directory_iterator(flight.out())) {
+    const RecordSummary summary = summarise(entry.path());
+    CHECK(summary.rows == flight.now());
+    CHECK(summary.missed_before_start == 0);
+  }
+}
+
+TEST_CASE("grab says what lacks: no controller, no flight recorder") {
+  const RuntimeFolder folder;
+  const auto error = [] { return error_of([] { static_cast<void>(grab("demo")); }); };
+  CHECK(error().find("start kerf-controller") != std::string::npos);
+  const NoiseVolume volume({8, 8, 8});
+  const SegmentWriter writer = SegmentWriter::create(spec_of(volume));
+  const SegmentServer server("demo", writer);
+  CHECK(error().find("no flight recorder runs") != std::string::npos);
+}
