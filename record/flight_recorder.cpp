@@ -14,7 +14,7 @@
 #include <thread>
 #include <utility>
 
-#include "record/log_columns.hpp"
+#include "shared/segment/log_columns.hpp"
 #include "record/recording.hpp"
 #include "shared/posix/atomic_file.hpp"
 #include "shared/segment/connection.hpp"

@@ -1,138 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "record/mcap_export.hpp"
 
-#include <algorithm>
-#include <cmath>
-#include <cstddef>
+#include <array>
 #include <cstdint>
-#include <string>
 #include <string_view>
 
-#include "record/log_columns.hpp"
 #include "record/recording.hpp"
 #include "record/tick_log.hpp"
 #include "shared/posix/atomic_file.hpp"
-#include "shared/segment/layout_table.hpp"
+#include "shared/segment/ros_messages.hpp"
 
 namespace kerf {
-namespace {
-
-/// A message in CDR, as ROS 2 has it: little-endian, each number at a multiple of its size.
-class CdrMessage {
- public:
-  CdrMessage() { begin(); }
-  void begin() {
-    bytes_.assign("\0\1\0\0", kHead);  // plain CDR, little-endian
-  }
-  template <class Number>
-  void number(Number value) {
-    align(sizeof value);
-    bytes_.append(reinterpret_cast<const char*>(&value), sizeof value);
-  }
-  void text(std::string_view value) {
-    number(static_cast<std::uint32_t>(value.size() + 1));
-    bytes_ += value;
-    bytes_ += '\0';
-  }
-  /// `count` numbers of `each` bytes.
-  void numbers(const std::byte* values, std::size_t each, std::size_t count) {
-    align(each);
-    bytes_.append(reinterpret_cast<const char*>(values), each * count);
-  }
-  [[nodiscard]] std::string_view bytes() const noexcept { return bytes_; }
-
- private:
-  static constexpr std::size_t kHead = 4;
-  void align(std::size_t to) {
-    const std::size_t at = bytes_.size() - kHead;
-    bytes_.append((to - at % to) % to, '\0');
-  }
-  std::string bytes_;
-};
-
-constexpr std::string_view kRule =
-    "\n================================================================================\nMSG: ";
-constexpr std::string_view kHeaderDefinition =
-    "std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id";
-constexpr std::string_view kTimeDefinition = "builtin_interfaces/Time\nint32 sec\nuint32 nanosec";
-constexpr std::string_view kVectorDefinition =
-    "geometry_msgs/Vector3\nfloat64 x\nfloat64 y\nfloat64 z";
-
-template <class... Parts>
-std::string joined(std::string_view first, Parts... parts) {
-  std::string text(first);
-  ((text += kRule, text += parts), ...);
-  return text;
-}
-
-std::string pose_definition() {
-  return joined("std_msgs/Header header\ngeometry_msgs/Pose pose", kHeaderDefinition,
-                kTimeDefinition,
-                "geometry_msgs/Pose\ngeometry_msgs/Point position\ngeometry_msgs/Quaternion "
-                "orientation",
-                "geometry_msgs/Point\nfloat64 x\nfloat64 y\nfloat64 z",
-                "geometry_msgs/Quaternion\nfloat64 x\nfloat64 y\nfloat64 z\nfloat64 w");
-}
-
-std::string wrench_definition() {
-  return joined("std_msgs/Header header\ngeometry_msgs/Wrench wrench", kHeaderDefinition,
-                kTimeDefinition,
-                "geometry_msgs/Wrench\ngeometry_msgs/Vector3 force\ngeometry_msgs/Vector3 torque",
-                kVectorDefinition);
-}
-
-/// The name of a number in a definition of ROS 2: f64 is float64, u16 is uint16.
-std::string ros_type(std::string_view type) {
-  const char kind = type.front();
-  const std::string bits(type.substr(1));
-  return (kind == 'f' ? "float" : kind == 'u' ? "uint" : "int") + bits;
-}
-
-/// A line for each column: type, name, unit and meaning.
-std::string tick_definition() {
-  std::string text = "# A tick of kerf: docs/log.md\n";
-  auto column = log_columns().begin();
-  for (const LayoutField& field : kLayoutTable) {
-    if (field.record != "TickRecord") continue;
-    const std::string many = field.count > 1 ? "[" + std::to_string(field.count) + "]" : "";
-    const std::string unit = column->unit.empty() ? "" : std::string(column->unit) + ": ";
-    text += ros_type(field.type) + many + " " + std::string(field.name) + "  # " + unit +
-            std::string(column->meaning) + "\n";
-    ++column;
-  }
-  return text;
-}
-
-void put_tick(const TickRecord& record, CdrMessage& message) {
-  message.begin();
-  const auto* const bytes = reinterpret_cast<const std::byte*>(&record);
-  for (const LayoutField& field : kLayoutTable) {
-    if (field.record != "TickRecord") continue;
-    message.numbers(bytes + field.offset, type_bytes(field.type), field.count);
-  }
-}
-
-void put_header(std::uint64_t time_ns, std::string_view frame, CdrMessage& message) {
-  constexpr std::uint64_t kNsPerS = 1'000'000'000;
-  message.begin();
-  message.number(static_cast<std::int32_t>(time_ns / kNsPerS));
-  message.number(static_cast<std::uint32_t>(time_ns % kNsPerS));
-  message.text(frame);
-}
-
-void put_tip(const TickRecord& record, CdrMessage& message) {
-  put_header(record.start_ns, "scene", message);
-  for (const double mm : record.position_mm) message.number(mm / 1000);
-  for (const float part : record.orientation) message.number(double{part});
-}
-
-void put_force(const TickRecord& record, CdrMessage& message) {
-  put_header(record.start_ns, "device", message);
-  for (const float n : record.commanded_force_n) message.number(double{n});
-  for (const float n_mm : record.tip_torque_n_mm) message.number(double{n_mm} / 1000);
-}
-
-}  // namespace
 
 void export_mcap(const std::filesystem::path& folder, const std::filesystem::path& mcap,
                  McapWriter::Packing packing, TickRange range) {
@@ -142,29 +20,18 @@ void export_mcap(const std::filesystem::path& folder, const std::filesystem::pat
   AtomicFile file(mcap);
   McapWriter writer([&](std::string_view bytes) { file.write(bytes.data(), bytes.size()); }, "ros2",
                     "kerf " KERF_VERSION, packing);
-  const auto channel = [&](const char* topic, const char* schema, std::string definition) {
-    return writer.add({topic, schema, std::move(definition), "ros2msg", "cdr"});
-  };
-  const auto ticks = channel("/kerf/tick", "kerf_msgs/msg/Tick", tick_definition());
-  const auto tips = channel("/kerf/tip", "geometry_msgs/msg/PoseStamped", pose_definition());
-  const auto forces =
-      channel("/kerf/force", "geometry_msgs/msg/WrenchStamped", wrench_definition());
-  constexpr std::uint64_t kViewNs = 10'000'000;
-  const std::uint64_t ticks_a_view = std::max<std::uint64_t>(1, kViewNs / manifest.tick_ns);
-  CdrMessage message;
+  std::array<std::uint16_t, kRosTopics> channels{};
+  std::uint16_t* added = channels.data();
+  for (const RosChannel& one : ros_channels()) {
+    *added++ = writer.add({std::string(one.topic), std::string(one.schema), one.definition,
+                           std::string(kRosSchemaEncoding), std::string(kRosEncoding)});
+  }
+  RosMessages messages(manifest.tick_ns);
   const auto write_tick = [&](const TickRecord& record) {
-    const auto write = [&](std::uint16_t to) {
-      writer.message(to, record.start_ns, message.bytes());
-    };
-    put_tick(record, message);
-    write(ticks);
-    if (record.tick % ticks_a_view != 0) return;
-    if (std::isfinite(record.position_mm[0])) {
-      put_tip(record, message);
-      write(tips);
+    for (const RosTopic topic : {ros_tick, ros_tip, ros_force}) {
+      if (!messages.has(topic, record)) continue;
+      writer.message(channels[topic], record.start_ns, messages.message(topic, record));
     }
-    put_force(record, message);
-    write(forces);
   };
   log.for_each(write_tick, range);
   writer.close();

@@ -4,7 +4,7 @@
 
 #include "record/flight_recorder.hpp"
 #include "record/force_plot.hpp"
-#include "record/log_columns.hpp"
+#include "record/log_page.hpp"
 #include "record/mcap_export.hpp"
 #include "record/recording.hpp"
 #include "shared/posix/atomic_file.hpp"

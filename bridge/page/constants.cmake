@@ -71,8 +71,8 @@ constants(shared/segment/layout.hpp kFlagContact kFlagDeviceFault kFlagForbidden
 enumeration(shared/segment/layout.hpp Lifecycle)
 enumeration(shared/segment/command.hpp CommandKind)
 enumeration(shared/segment/command.hpp ReplyStatus)
-codes(record/log_columns.cpp kFaults kFaults)
-codes(record/log_columns.cpp kPhases kPhases)
+codes(shared/segment/log_columns.cpp kFaults kFaults)
+codes(shared/segment/log_columns.cpp kPhases kPhases)
 
 constants(visualizer/scene/camera.cpp kHalfHeightRad kHomeYawRad kHomePitchRad kMaxPitchRad kZoomStep
   kMargin kNearest kFarthest kNearPlane)

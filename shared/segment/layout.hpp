@@ -114,7 +114,7 @@ struct VolumeDescriptor {
 };
 
 /// Input, contact and output of one servo tick. World mm for the tip; forces in N at the device
-/// port. `record/log_columns.cpp` has each field's unit, meaning and validity (docs/log.md).
+/// port. `log_columns.cpp` has each field's unit, meaning and validity (docs/log.md).
 struct TickRecord {
   std::uint64_t seq;  ///< filled by the writer: 2 * index + 1 while writing, + 2 when valid
   std::uint64_t tick;

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "record/log_columns.hpp"
+#include "shared/segment/log_columns.hpp"
 
 #include <doctest/doctest.h>
 
 #include "controller/servo/servo.hpp"
+#include "record/log_page.hpp"
 #include "tests/record/record_support.hpp"
 
 using namespace kerf;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The table of a log's columns. A new field of a tick record is one row here; then
 // `./kerf record columns > docs/log.md`.
-#include "record/log_columns.hpp"
+#include "shared/segment/log_columns.hpp"
 
 #include <array>
 #include <cstddef>
@@ -149,73 +149,6 @@ constexpr bool covers_all() {
 }
 static_assert(covers_all(), "log_columns.cpp: a row for each field of TickRecord, in its order");
 
-constexpr std::string_view kHead =
-    R"(# The log of a run
-
-`kerf-recorder` writes every tick of a running controller into a folder; `./kerf demo --out DIR` keeps it as
-`DIR/log`. `./kerf record info DIR/log` sums it up, `record plot` draws it, `record export` makes CSV or MCAP of it, each
-with `--from TICK` and `--until TICK` for a part.
-
-| file | what |
-|---|---|
-| `ticks.npy` | one row for each tick, the columns below, for NumPy as it is |
-| `manifest.json` | length of a tick, voxels, losses of the recorder and where they lie, how the run ended |
-| `scene.json` | the scene as it was loaded, every setting; `source` is what it was loaded from |
-
-Three lines of NumPy read it (`python/` is a reader with more, `examples/python/` uses it):
-
-    import numpy as np
-    log = np.load("DIR/log/ticks.npy", mmap_mode="r")
-    print(np.abs(log["commanded_force_n"]).max(axis=0), "N")
-
-`log["position_mm"]` is an array of rows x 3. World millimetres, newtons at the device port, little-endian.
-`./kerf replay DIR/log` runs it again ([replay](replay.md)). `info` counts as lost what was published and is in no row, so the manifest says the same; a recorder that was
-killed leaves a manifest that says `running`, and all rows.
-
-## For other tools
-
-    ./kerf record export DIR/log --mcap run.mcap
-    ./kerf record export DIR/log --csv run.csv
-
-MCAP opens in Foxglove and its open forks, in PlotJuggler and with ROS 2 (`ros2 bag`); the definitions of the messages are in
-the file. Times are `start_ns`.
-
-| topic | message | rate |
-|---|---|---|
-| `/kerf/tick` | `kerf_msgs/msg/Tick`: all columns below, by their names | every tick |
-| `/kerf/tip` | `geometry_msgs/msg/PoseStamped`: the tool's tip in metres, in frame `scene`; from docking on | 100 Hz |
-| `/kerf/force` | `geometry_msgs/msg/WrenchStamped`: `commanded_force_n`, in frame `device`, and `tip_torque_n_mm` in N m | 100 Hz |
-
-Chunks are packed by LZ4, and `--unpacked` leaves them as they are.
-
-This page is made from the table in `record/log_columns.cpp` by
-
-    ./kerf record columns > docs/log.md
-
-## Columns
-
-| column | type | unit | meaning | valid |
-|---|---|---|---|---|
-)";
-
-std::string page_row(const LayoutField& field, const LogColumn& column) {
-  std::string type(field.type);
-  if (field.count > 1) type += " x " + std::to_string(field.count);
-  return "| `" + std::string(column.name) + "` | " + type + " | " + std::string(column.unit) +
-         " | " + std::string(column.meaning) + " | " +
-         (column.valid.empty() ? "always" : std::string(column.valid)) + " |\n";
-}
-
-std::string codes(std::string_view title, std::string_view number, std::span<const LogCode> list) {
-  std::string text = "\n## " + std::string(title) + "\n\n| " + std::string(number) +
-                     " | name | meaning |\n|---|---|---|\n";
-  for (const LogCode& code : list) {
-    text += "| " + std::to_string(code.value) + " | " + std::string(code.name) + " | " +
-            std::string(code.meaning) + " |\n";
-  }
-  return text;
-}
-
 }  // namespace
 
 std::span<const LogColumn> log_columns() {
@@ -224,21 +157,14 @@ std::span<const LogColumn> log_columns() {
 std::span<const LogCode> log_flags() {
   return kFlags;
 }
+std::span<const LogCode> log_commands() {
+  return kCommands;
+}
 std::span<const LogCode> log_phases() {
   return kPhases;
 }
 std::span<const LogCode> log_faults() {
   return kFaults;
-}
-
-std::string log_page() {
-  std::string page(kHead);
-  std::size_t row = 0;
-  for (const LayoutField& field : kLayoutTable) {
-    if (field.record == "TickRecord") page += page_row(field, kColumns[row++]);
-  }
-  return page + codes("Flags", "bit", kFlags) + codes("Commands", "command", kCommands) +
-         codes("Phases", "phase", kPhases) + codes("Faults", "fault", kFaults);
 }
 
 }  // namespace kerf

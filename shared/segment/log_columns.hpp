@@ -3,13 +3,12 @@
 
 #include <cstdint>
 #include <span>
-#include <string>
 #include <string_view>
 
 namespace kerf {
 
-/// Meaning of a column of a tick log. Name, type and count are those of `layout_table.hpp`, in its
-/// order; the compiler checks that every column has its row here.
+/// Meaning of a column of a tick log, a field of `TickRecord`. Name, type and count are those of
+/// `layout_table.hpp`, in its order; the compiler checks that every column has its row here.
 struct LogColumn {
   std::string_view name;
   std::string_view unit;  ///< if empty, a plain number
@@ -26,10 +25,8 @@ struct LogCode {
 
 [[nodiscard]] std::span<const LogColumn> log_columns();
 [[nodiscard]] std::span<const LogCode> log_flags();
+[[nodiscard]] std::span<const LogCode> log_commands();
 [[nodiscard]] std::span<const LogCode> log_phases();
 [[nodiscard]] std::span<const LogCode> log_faults();
-
-/// docs/log.md: `./kerf record columns > docs/log.md`.
-[[nodiscard]] std::string log_page();
 
 }  // namespace kerf

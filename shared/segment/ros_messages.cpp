@@ -1,0 +1,152 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "shared/segment/ros_messages.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+#include "shared/segment/layout_table.hpp"
+#include "shared/segment/log_columns.hpp"
+
+namespace kerf {
+namespace {
+
+/// Writes a message in CDR into a buffer: little-endian, each number at a multiple of its size.
+class CdrWriter {
+ public:
+  explicit CdrWriter(std::string& bytes) : bytes_(bytes) {
+    bytes_.assign("\0\1\0\0", kHead);  // plain CDR, little-endian
+  }
+  template <class Number>
+  void number(Number value) {
+    align(sizeof value);
+    bytes_.append(reinterpret_cast<const char*>(&value), sizeof value);
+  }
+  void text(std::string_view value) {
+    number(static_cast<std::uint32_t>(value.size() + 1));
+    bytes_ += value;
+    bytes_ += '\0';
+  }
+  /// `count` numbers of `each` bytes.
+  void numbers(const std::byte* values, std::size_t each, std::size_t count) {
+    align(each);
+    bytes_.append(reinterpret_cast<const char*>(values), each * count);
+  }
+
+ private:
+  static constexpr std::size_t kHead = 4;
+  void align(std::size_t to) {
+    const std::size_t at = bytes_.size() - kHead;
+    bytes_.append((to - at % to) % to, '\0');
+  }
+  std::string& bytes_;
+};
+
+constexpr std::string_view kRule =
+    "\n================================================================================\nMSG: ";
+constexpr std::string_view kHeaderDefinition =
+    "std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id";
+constexpr std::string_view kTimeDefinition = "builtin_interfaces/Time\nint32 sec\nuint32 nanosec";
+constexpr std::string_view kVectorDefinition =
+    "geometry_msgs/Vector3\nfloat64 x\nfloat64 y\nfloat64 z";
+
+template <class... Parts>
+std::string joined(std::string_view first, Parts... parts) {
+  std::string text(first);
+  ((text += kRule, text += parts), ...);
+  return text;
+}
+
+std::string pose_definition() {
+  return joined("std_msgs/Header header\ngeometry_msgs/Pose pose", kHeaderDefinition,
+                kTimeDefinition,
+                "geometry_msgs/Pose\ngeometry_msgs/Point position\ngeometry_msgs/Quaternion "
+                "orientation",
+                "geometry_msgs/Point\nfloat64 x\nfloat64 y\nfloat64 z",
+                "geometry_msgs/Quaternion\nfloat64 x\nfloat64 y\nfloat64 z\nfloat64 w");
+}
+
+std::string wrench_definition() {
+  return joined("std_msgs/Header header\ngeometry_msgs/Wrench wrench", kHeaderDefinition,
+                kTimeDefinition,
+                "geometry_msgs/Wrench\ngeometry_msgs/Vector3 force\ngeometry_msgs/Vector3 torque",
+                kVectorDefinition);
+}
+
+/// The name of a number in a definition of ROS 2: f64 is float64, u16 is uint16.
+std::string ros_type(std::string_view type) {
+  const char kind = type.front();
+  const std::string bits(type.substr(1));
+  return (kind == 'f' ? "float" : kind == 'u' ? "uint" : "int") + bits;
+}
+
+/// A line for each column: type, name, unit and meaning.
+std::string tick_definition() {
+  std::string text = "# A tick of kerf: docs/log.md\n";
+  auto column = log_columns().begin();
+  for (const LayoutField& field : kLayoutTable) {
+    if (field.record != "TickRecord") continue;
+    const std::string many = field.count > 1 ? "[" + std::to_string(field.count) + "]" : "";
+    const std::string unit = column->unit.empty() ? "" : std::string(column->unit) + ": ";
+    text += ros_type(field.type) + many + " " + std::string(field.name) + "  # " + unit +
+            std::string(column->meaning) + "\n";
+    ++column;
+  }
+  return text;
+}
+
+void put_tick(const TickRecord& record, CdrWriter message) {
+  const auto* const bytes = reinterpret_cast<const std::byte*>(&record);
+  for (const LayoutField& field : kLayoutTable) {
+    if (field.record != "TickRecord") continue;
+    message.numbers(bytes + field.offset, type_bytes(field.type), field.count);
+  }
+}
+
+void put_header(std::uint64_t time_ns, std::string_view frame, CdrWriter& message) {
+  constexpr std::uint64_t kNsPerS = 1'000'000'000;
+  message.number(static_cast<std::int32_t>(time_ns / kNsPerS));
+  message.number(static_cast<std::uint32_t>(time_ns % kNsPerS));
+  message.text(frame);
+}
+
+void put_tip(const TickRecord& record, CdrWriter message) {
+  put_header(record.start_ns, "scene", message);
+  for (const double mm : record.position_mm) message.number(mm / 1000);
+  for (const float part : record.orientation) message.number(double{part});
+}
+
+void put_force(const TickRecord& record, CdrWriter message) {
+  put_header(record.start_ns, "device", message);
+  for (const float n : record.commanded_force_n) message.number(double{n});
+  for (const float n_mm : record.tip_torque_n_mm) message.number(double{n_mm} / 1000);
+}
+
+}  // namespace
+
+std::array<RosChannel, kRosTopics> ros_channels() {
+  return {{{"/kerf/tick", "kerf_msgs/msg/Tick", tick_definition()},
+           {"/kerf/tip", "geometry_msgs/msg/PoseStamped", pose_definition()},
+           {"/kerf/force", "geometry_msgs/msg/WrenchStamped", wrench_definition()}}};
+}
+
+RosMessages::RosMessages(std::uint64_t tick_ns) noexcept {
+  constexpr std::uint64_t kViewNs = 10'000'000;
+  ticks_a_view_ = std::max<std::uint64_t>(1, kViewNs / std::max<std::uint64_t>(1, tick_ns));
+}
+
+bool RosMessages::has(RosTopic topic, const TickRecord& record) const noexcept {
+  if (topic == ros_tick) return true;
+  if (record.tick % ticks_a_view_ != 0) return false;
+  return topic != ros_tip || std::isfinite(record.position_mm[0]);
+}
+
+std::string_view RosMessages::message(RosTopic topic, const TickRecord& record) {
+  const CdrWriter out(cdr_);
+  if (topic == ros_tick) put_tick(record, out);
+  if (topic == ros_tip) put_tip(record, out);
+  if (topic == ros_force) put_force(record, out);
+  return cdr_;
+}
+
+}  // namespace kerf
