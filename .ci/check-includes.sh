@@ -29,7 +29,7 @@ lab/run lab/rig lab/accuracy lab/bench lab/stability lab/contact lab/safety lab/
 visualizer/scene visualizer/sound visualizer/gl visualizer/cast visualizer/cast/simd visualizer/surface
 visualizer/redraw visualizer/render visualizer/compose visualizer/panels visualizer/picture visualizer/app visualizer/bench visualizer/monkey
 
-bridge/wire bridge/stream bridge/igtl bridge/page bridge/net bridge/join bridge/serve bridge
+bridge/wire bridge/stream bridge/foxglove bridge/igtl bridge/page bridge/net bridge/join bridge/serve bridge
 '
 programs=(shared controller record replay hil lab visualizer bridge)
 hash='^[[:space:]]*#[[:space:]]*include[[:space:]]*'

@@ -181,12 +181,12 @@ void Server::Impl::on_clock() {
   watch_controller(now_ns);
   const bool restart = setup_.dedicated_link && now_ns - bbr_restarted_ns_ >= kBbrRestartNs;
   if (restart) bbr_restarted_ns_ = now_ns;
-  const bool ended = connection_ == nullptr || !connection_->alive();
-  if (snapshot_ && !viewers_.empty()) snapshot_->update(now_ns, ended);
+  ended_ = connection_ == nullptr || !connection_->alive();
+  if (snapshot_ && !viewers_.empty()) snapshot_->update(now_ns, ended_);
   for (const std::shared_ptr<Viewer>& viewer : viewers_) {
     if (viewer->stream) {
       viewer->stream->note_changes();
-      viewer->stream->slot(now_ns, ended);
+      viewer->stream->slot(now_ns, ended_);
     }
     if (restart && !viewer->gone) restart_bbr(viewer->fd());
     update_viewer(*viewer, now_ns);
@@ -223,6 +223,7 @@ void Server::Impl::begin_run(std::unique_ptr<SegmentConnection> connection) {
   for (const std::shared_ptr<Viewer>& viewer : viewers_) viewer->stream.reset();
   snapshot_.reset();
   connection_ = std::move(connection);
+  ended_ = false;
   said_.clear();
   say_once("controller \"" + setup_.name + "\", run " +
            hex64(connection_->reader().info().session_id));

@@ -91,6 +91,16 @@ std::string_view text(beast::string_view view) {
   return {view.data(), view.size()};
 }
 
+/// Of all headers that offer some, in their order.
+std::string_view foxglove_protocol_of(const Request& request) {
+  const auto [begin, end] = request.equal_range(http::field::sec_websocket_protocol);
+  for (auto header = begin; header != end; ++header) {
+    const std::string_view protocol = foxglove_protocol(text(header->value()));
+    if (!protocol.empty()) return protocol;
+  }
+  return {};
+}
+
 }  // namespace
 
 asio::awaitable<void> Server::Impl::connection(tcp::socket socket) {
@@ -139,6 +149,7 @@ Server::Impl::Credentials Server::Impl::credentials_of(const Request& request) c
   if (const Right right = tokens.right_of(asked); right != Right::none) {
     return {right, true, false, cookie_for(asked)};
   }
+  if (is_foxglove(request)) return {Right::none, !asked.empty(), false, {}};
   const std::string_view kept = cookie_value(text(request[http::field::cookie]), cookie_name());
   if (const Right right = tokens.right_of_cookie(kept); right != Right::none) {
     return {right, true, false, {}};
@@ -158,6 +169,13 @@ std::string_view Server::Impl::route_of(const Request& request) const {
   if (!route.starts_with(path)) return route;
   const std::string_view rest = route.substr(path.size());
   return rest.empty() || rest.starts_with('/') ? rest : route;
+}
+
+/// Whether it opens a socket of Foxglove's protocol. Its client is a page from elsewhere, or a
+/// program that has no cookies: the token in the address counts alone, and so its origin does not
+/// matter.
+bool Server::Impl::is_foxglove(const Request& request) const {
+  return beast::websocket::is_upgrade(request) && route_of(request) == kFoxglovePath;
 }
 
 /// Whether it came to the address of `--public-url`, as far as the proxy reports it.
@@ -260,7 +278,8 @@ asio::awaitable<void> Server::Impl::talk_http(std::unique_ptr<WebSocket> ws,
     }
     const bool upgrade = beast::websocket::is_upgrade(request);
     const std::string proxy = setup_.public_url ? setup_.public_url->origin() : std::string();
-    if (upgrade &&
+    const bool foxglove = is_foxglove(request);
+    if (upgrade && !foxglove &&
         !is_own_origin(text(request[http::field::origin]), host, tls_.has_value(), proxy)) {
       co_return co_await refuse(link, 403,
                                 "A page from elsewhere may not look in here; if it came through a "
@@ -278,7 +297,24 @@ asio::awaitable<void> Server::Impl::talk_http(std::unique_ptr<WebSocket> ws,
     }
     if (upgrade && route_of(request) == kBridgePath) {
       const Request upgrade_request = parser.release();
-      co_return co_await view(std::move(ws), upgrade_request, shown.right, slot);
+      co_return co_await view(std::move(ws), upgrade_request, shown.right, {}, slot);
+    }
+    if (foxglove) {
+      if (shown.right == Right::none) {
+        co_return co_await refuse(link, 401,
+                                  "Foxglove needs a token: the wss:// address that kerf bridge "
+                                  "printed, with foxglove before its ?token=...\n",
+                                  head);
+      }
+      const std::string_view protocol = foxglove_protocol_of(request);
+      if (protocol.empty()) {
+        co_return co_await refuse(link, 400,
+                                  "Sec-WebSocket-Protocol has to offer foxglove.sdk.v1 or "
+                                  "foxglove.websocket.v1.\n",
+                                  head);
+      }
+      const Request upgrade_request = parser.release();
+      co_return co_await view(std::move(ws), upgrade_request, shown.right, protocol, slot);
     }
     const std::string reply = page_text(request, shown);
     more = request.keep_alive();

@@ -20,6 +20,7 @@
 #include <boost/asio/thread_pool.hpp>
 #include <boost/beast/http.hpp>
 
+#include "bridge/foxglove/foxglove_session.hpp"
 #include "bridge/net/link.hpp"
 #include "bridge/serve/server.hpp"
 #include "bridge/stream/stream.hpp"
@@ -27,7 +28,8 @@
 
 namespace kerf::bridge {
 
-/// One viewer: its socket, what it may do, and its stream while there is a run.
+/// One viewer: its socket, what it may do, and its stream while there is a run; or a client of
+/// Foxglove's protocol, with a session from its beginning to its end.
 struct Viewer {
   Viewer(std::unique_ptr<WebSocket> socket, Right its_right)
       : ws(std::move(socket)), wake(ws->get_executor()), right(its_right) {}
@@ -36,6 +38,7 @@ struct Viewer {
   asio::steady_timer wake;  ///< cancelled whenever there may be something to send
   Right right;
   std::unique_ptr<Stream> stream;
+  std::optional<FoxgloveSession> foxglove;
   std::deque<ReplyMessage> replies;
   std::int64_t heard_ns = 0;
   std::int64_t measured_ns = 0;      ///< when the round trip was read
@@ -43,6 +46,7 @@ struct Viewer {
   std::int64_t byte_credit = 0;      ///< bytes that it may still send, with TLS
   std::uint64_t received_bytes = 0;  ///< from it, when `byte_credit` was updated
   bool commanding = false;           ///< the controller has a command of it
+  bool writing = false;              ///< a message to a Foxglove client is under way
   bool reading = false;              ///< `read_viewer` runs: Beast's reader has the socket
   bool gone = false;                 ///< its socket is closed
   std::optional<CloseCode> closing;  ///< it is to be closed with this code
@@ -95,20 +99,23 @@ class Server::Impl {
   [[nodiscard]] std::string cookie_name() const { return "kerf" + std::to_string(port()); }
   [[nodiscard]] Credentials credentials_of(const Request& request) const;
   [[nodiscard]] std::string_view route_of(const Request& request) const;
+  [[nodiscard]] bool is_foxglove(const Request& request) const;
   [[nodiscard]] bool is_public(const Request& request) const;
   [[nodiscard]] std::string page_text(const Request& request, const Credentials& shown);
 
   // server_viewer.cpp
+  /// `foxglove`: the sub-protocol of Foxglove that was agreed; empty: a viewer of kerf.
   Void view(std::unique_ptr<WebSocket> ws, const Request& request, Right right,
-            HandshakeSlot& slot);
+            std::string_view foxglove, HandshakeSlot& slot);
   Void read_viewer(std::shared_ptr<Viewer> viewer);
   Void write_viewer(std::shared_ptr<Viewer> viewer);
   Void say_goodbye(Viewer& viewer);
-  [[nodiscard]] bool handle_message(const std::shared_ptr<Viewer>& viewer,
+  [[nodiscard]] bool handle_message(const std::shared_ptr<Viewer>& viewer, bool is_binary,
                                     std::span<const std::byte> message);
   void command(const std::shared_ptr<Viewer>& viewer, const CommandMessage& message);
   static void answer(Viewer& viewer, std::uint32_t sequence, const Reply& reply);
   void open_stream(Viewer& viewer);
+  [[nodiscard]] bool next_of_foxglove(Viewer& viewer, FoxgloveMessage& out);
   void update_viewer(Viewer& viewer, std::int64_t now_ns);
   static void drop(Viewer& viewer, CloseCode code);
 
@@ -125,6 +132,7 @@ class Server::Impl {
   std::unique_ptr<RunSnapshot> snapshot_;
   std::optional<SegmentConnection> command_link_;  // of `helper_` alone
   bool connecting_ = false;
+  bool ended_ = true;  ///< at the last clock: there is no controller, or it has gone
   std::int64_t next_try_ns_ = 0, bbr_restarted_ns_ = 0, warned_ns_ = 0;
   std::string said_;
 

@@ -63,12 +63,19 @@ std::string close_frame(CloseCode code) {
 }  // namespace
 
 asio::awaitable<void> Server::Impl::view(std::unique_ptr<WebSocket> ws, const Request& request,
-                                         Right right, HandshakeSlot& slot) {
+                                         Right right, std::string_view foxglove,
+                                         HandshakeSlot& slot) {
   auto& tcp_stream = ws->next_layer().next_layer();
   tcp_stream.expires_after(std::chrono::nanoseconds(setup_.handshake_ns));
-  ws->read_message_max(kMaxUpBytes);
+  ws->read_message_max(foxglove.empty() ? kMaxUpBytes : kMaxFoxgloveUpBytes);
   ws->auto_fragment(false);
   tune_socket(tcp_stream.socket().native_handle());
+  if (!foxglove.empty()) {
+    ws->set_option(websocket::stream_base::decorator([foxglove](websocket::response_type& reply) {
+      reply.set(beast::http::field::sec_websocket_protocol,
+                beast::string_view(foxglove.data(), foxglove.size()));
+    }));
+  }
   ErrorCode error;
   co_await ws->async_accept(request, quiet(error));
   if (error) co_return;
@@ -87,6 +94,7 @@ asio::awaitable<void> Server::Impl::view(std::unique_ptr<WebSocket> ws, const Re
     co_return;
   }
   slot.release();
+  viewer->heard_ns = monotonic_ns();
   viewer->message_credit = kMessageCredit;
   viewer->byte_credit = kByteCredit;
   viewer->received_bytes = link_figures(viewer->fd()).received_bytes;
@@ -94,6 +102,7 @@ asio::awaitable<void> Server::Impl::view(std::unique_ptr<WebSocket> ws, const Re
     if (--watched->message_credit < 0) drop(*watched, CloseCode::not_understood);
   });
   viewers_.push_back(viewer);
+  if (!foxglove.empty()) viewer->foxglove.emplace(setup_.name);
   if (connection_) open_stream(*viewer);
   viewer->reading = true;
   asio::co_spawn(io_, read_viewer(viewer), asio::detached);
@@ -102,6 +111,7 @@ asio::awaitable<void> Server::Impl::view(std::unique_ptr<WebSocket> ws, const Re
 }
 
 void Server::Impl::open_stream(Viewer& viewer) {
+  if (viewer.foxglove) return;  // it reads the ring of ticks alone, at any time
   if (!snapshot_) snapshot_ = std::make_unique<RunSnapshot>(connection_->reader());
   viewer.stream =
       std::make_unique<Stream>(*snapshot_, viewer.right == Right::command ? kMayCommand : 0);
@@ -109,9 +119,15 @@ void Server::Impl::open_stream(Viewer& viewer) {
   viewer.wake.cancel();
 }
 
+bool Server::Impl::next_of_foxglove(Viewer& viewer, FoxgloveMessage& out) {
+  const SegmentReader* const run = connection_ ? &connection_->reader() : nullptr;
+  return viewer.foxglove && viewer.foxglove->next(monotonic_ns(), run, ended_, out);
+}
+
 asio::awaitable<void> Server::Impl::write_viewer(std::shared_ptr<Viewer> viewer) {
   ErrorCode error;
   std::vector<std::byte> out;
+  FoxgloveMessage message;
   while (!viewer->closing && viewer->reading && !error) {
     if (!viewer->replies.empty()) {
       const ReplyMessage reply = viewer->replies.front();
@@ -121,6 +137,12 @@ asio::awaitable<void> Server::Impl::write_viewer(std::shared_ptr<Viewer> viewer)
       ++viewer->message_credit;
       viewer->byte_credit += kMessageBytes;
       co_await viewer->ws->async_write(asio::buffer(std::as_const(out)), quiet(error));
+    } else if (next_of_foxglove(*viewer, message)) {
+      viewer->ws->text(message.is_text);
+      viewer->writing = true;
+      co_await viewer->ws->async_write(asio::buffer(message.bytes), quiet(error));
+      viewer->writing = false;
+      viewer->heard_ns = monotonic_ns();
     } else {
       viewer->wake.expires_at(asio::steady_timer::time_point::max());
       ErrorCode woken;
@@ -157,8 +179,8 @@ asio::awaitable<void> Server::Impl::read_viewer(std::shared_ptr<Viewer> viewer) 
     co_await viewer->ws->async_read(in, quiet(error));
     if (error || viewer->closing) break;
     const std::span message(static_cast<const std::byte*>(in.data().data()), in.data().size());
-    if (!viewer->ws->got_binary() || --viewer->message_credit < 0 ||
-        !handle_message(viewer, message)) {
+    if (--viewer->message_credit < 0 ||
+        !handle_message(viewer, viewer->ws->got_binary(), message)) {
       drop(*viewer, CloseCode::not_understood);
     }
     viewer->wake.cancel();
@@ -167,8 +189,14 @@ asio::awaitable<void> Server::Impl::read_viewer(std::shared_ptr<Viewer> viewer) 
   viewer->wake.cancel();
 }
 
-bool Server::Impl::handle_message(const std::shared_ptr<Viewer>& viewer,
+bool Server::Impl::handle_message(const std::shared_ptr<Viewer>& viewer, bool is_binary,
                                   std::span<const std::byte> message) {
+  if (viewer->foxglove) {
+    viewer->foxglove->hear(!is_binary,
+                           {reinterpret_cast<const char*>(message.data()), message.size()});
+    return true;
+  }
+  if (!is_binary) return false;
   const auto up = parse_up(message);
   if (!up) return false;
   if (const auto* const wish = std::get_if<CommandMessage>(&*up)) {
@@ -230,7 +258,8 @@ void Server::Impl::update_viewer(Viewer& viewer, std::int64_t now_ns) {
     if (viewer.byte_credit < 0) drop(viewer, CloseCode::not_understood);
     viewer.byte_credit = std::min(viewer.byte_credit + kMessageBytes, kByteCredit);
   }
-  if (!viewer.stream || !viewer.stream->link().waits_for_ack()) viewer.heard_ns = now_ns;
+  const bool waits = viewer.stream ? viewer.stream->link().waits_for_ack() : viewer.writing;
+  if (!waits) viewer.heard_ns = now_ns;
   if (!viewer.closing && now_ns - viewer.heard_ns > setup_.silence_ns)
     drop(viewer, CloseCode::too_slow);
   if (viewer.closing && !viewer.gone && now_ns > viewer.close_by_ns) {

@@ -126,8 +126,9 @@ class RawClient {
     return send_frame(2, std::as_bytes(std::span(&value, 1)));
   }
 
-  /// The next message; nothing at the end, and then `close_code` is what was said, else 0.
-  std::optional<std::vector<std::byte>> message() {
+  /// The next message; nothing at the end, and then `close_code` is what was said, else 0. Texts
+  /// are passed over unless `with_text`; `is_text` is of the last message.
+  std::optional<std::vector<std::byte>> message(bool with_text = false) {
     for (;;) {
       const std::string head = receive_all(2);
       if (head.empty()) return std::nullopt;
@@ -146,7 +147,8 @@ class RawClient {
         }
         return std::nullopt;
       }
-      if (opcode != 2) continue;
+      is_text = opcode == 1;
+      if (opcode != 2 && !(with_text && is_text)) continue;
       std::vector<std::byte> out(payload.size());
       std::memcpy(out.data(), payload.data(), payload.size());
       return out;
@@ -155,6 +157,7 @@ class RawClient {
 
   [[nodiscard]] bool connected() const { return connected_; }
   int close_code = 0;
+  bool is_text = false;
 
  private:
   int fd_;

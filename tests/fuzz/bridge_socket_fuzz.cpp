@@ -95,12 +95,18 @@ void fuzz(unsigned visitor, std::span<const std::uint8_t> data) {
   static const TestController controller;
   static const TestBridge bridge;
   static unsigned inputs = 0;
-  TestViewer hostile(bridge.port(), (visitor & 7U) == 7 ? kLook + "x" : kLook);
-  for (const std::string& bytes : writes_of(data, true)) {
-    if (!hostile.client.send_bytes(bytes)) break;
+  const std::string token = (visitor & 7U) == 7 ? kLook + "x" : kLook;
+  RawClient hostile(bridge.port());
+  if ((visitor & 24U) == 24) {
+    hostile.upgrade("/foxglove?token=" + token, "Sec-WebSocket-Protocol: foxglove.sdk.v1\r\n");
+  } else {
+    hostile.upgrade("/bridge?token=" + token);
   }
-  hostile.client.end_sending();
-  while (!hostile.client.receive(1 << 16).empty()) {
+  for (const std::string& bytes : writes_of(data, true)) {
+    if (!hostile.send_bytes(bytes)) break;
+  }
+  hostile.end_sending();
+  while (!hostile.receive(1 << 16).empty()) {
   }
   if (++inputs % 64 != 0) return;
   TestViewer good(bridge.port());

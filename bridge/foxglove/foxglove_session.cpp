@@ -1,0 +1,247 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "bridge/foxglove/foxglove_session.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "shared/text/json.hpp"
+#include "shared/text/text.hpp"
+
+namespace kerf::bridge {
+namespace {
+
+constexpr std::array<std::string_view, 2> kProtocols{"foxglove.sdk.v1", "foxglove.websocket.v1"};
+constexpr std::uint8_t kMessageData = 1, kTime = 2;  // opcodes of binary messages
+constexpr std::uint64_t kLeastTickNs = 1'000'000;    // between two ticks that are sent
+
+// Operations of capabilities that this server does not have.
+constexpr std::array<std::string_view, 10> kRefused{"advertise",
+                                                    "unadvertise",
+                                                    "getParameters",
+                                                    "setParameters",
+                                                    "subscribeParameterUpdates",
+                                                    "unsubscribeParameterUpdates",
+                                                    "subscribeConnectionGraph",
+                                                    "unsubscribeConnectionGraph",
+                                                    "fetchAsset",
+                                                    "playbackControl"};
+
+/// Of a channel in messages: its place in `ros_channels`, from 1.
+constexpr std::uint32_t channel_of(std::size_t topic) noexcept {
+  return static_cast<std::uint32_t>(topic + 1);
+}
+
+Json advertisement() {
+  Json list;
+  std::size_t topic = 0;
+  for (const RosChannel& one : ros_channels()) {
+    list.push_back({{"id", channel_of(topic++)},
+                    {"topic", one.topic},
+                    {"encoding", kRosEncoding},
+                    {"schemaName", one.schema},
+                    {"schemaEncoding", kRosSchemaEncoding},
+                    {"schema", one.definition}});
+  }
+  return {{"op", "advertise"}, {"channels", std::move(list)}};
+}
+
+template <class Number>
+void put(std::string& bytes, Number value) {
+  bytes.append(reinterpret_cast<const char*>(&value), sizeof value);
+}
+
+/// `text`, cut where it is long, in quotes and on one line.
+std::string quoted_start(std::string_view text) {
+  constexpr std::size_t kMost = 40;
+  return '"' + escaped(text.substr(0, kMost)) + (text.size() > kMost ? "...\"" : "\"");
+}
+
+}  // namespace
+
+std::string_view foxglove_protocol(std::string_view offered) noexcept {
+  constexpr std::string_view kBlanks = " \t";
+  while (!offered.empty()) {
+    const std::size_t comma = std::min(offered.find(','), offered.size());
+    std::string_view one = offered.substr(0, comma);
+    one.remove_prefix(std::min(one.find_first_not_of(kBlanks), one.size()));
+    one = one.substr(0, one.find_last_not_of(kBlanks) + 1);
+    const auto* const known = std::ranges::find(kProtocols, one);
+    if (known != kProtocols.end()) return *known;
+    offered.remove_prefix(std::min(comma + 1, offered.size()));
+  }
+  return {};
+}
+
+FoxgloveSession::FoxgloveSession(std::string controller) : controller_(std::move(controller)) {}
+
+void FoxgloveSession::answer(Level level, const std::string& text) {
+  if (texts_.size() >= kMostAnswers) return;  // the client does not read them
+  const Json status{
+      {"op", "status"}, {"level", static_cast<std::uint8_t>(level)}, {"message", text}};
+  texts_.push_back(status.canonical());
+}
+
+void FoxgloveSession::hear(bool is_text, std::string_view message) {
+  if (!is_text) {
+    return answer(Level::error, "a binary message is refused: kerf only sends, it takes no data");
+  }
+  try {
+    obey(message);
+  } catch (const JsonError& error) {
+    answer(Level::error, std::string(error.what()) + " in " + quoted_start(message) +
+                             "; kerf understands subscribe and unsubscribe");
+  }
+}
+
+void FoxgloveSession::obey(std::string_view text) {
+  const Json message = Json::parse(text);
+  const auto op = message.at("op").get<std::string>();
+  if (op == "subscribe") {
+    for (const Json& one : message.at("subscriptions")) {
+      subscribe(one.at("id").get<std::uint32_t>(), one.at("channelId").get<std::uint32_t>());
+    }
+  } else if (op == "unsubscribe") {
+    for (const Json& id : message.at("subscriptionIds")) unsubscribe(id.get<std::uint32_t>());
+  } else if (std::ranges::find(kRefused, op) != kRefused.end()) {
+    answer(Level::error, op + " is refused: kerf only sends, and has its three channels alone");
+  } else {
+    answer(Level::warning,
+           "op " + quoted_start(op) + " is not known; kerf understands subscribe and unsubscribe");
+  }
+}
+
+void FoxgloveSession::subscribe(std::uint32_t id, std::uint32_t channel) {
+  const std::string what =
+      "subscribe: id " + std::to_string(id) + ", channelId " + std::to_string(channel) + ": ";
+  if (channel < channel_of(0) || channel > channel_of(kRosTopics - 1)) {
+    return answer(Level::error, what + "no such channel; 1 to 3 are advertised");
+  }
+  if (std::ranges::find(subscriptions_, id) != subscriptions_.end()) {
+    return answer(Level::error, what + "the id is in use; take another one");
+  }
+  std::optional<std::uint32_t>& own = subscriptions_[channel - channel_of(0)];
+  if (own) {
+    return answer(Level::error, what + "subscribed already, by id " + std::to_string(*own) +
+                                    "; unsubscribe that first");
+  }
+  own = id;
+}
+
+void FoxgloveSession::unsubscribe(std::uint32_t id) {
+  const auto own = std::ranges::find(subscriptions_, id);
+  if (own == subscriptions_.end()) {
+    return answer(Level::warning,
+                  "unsubscribe: " + std::to_string(id) + " is no id of a subscription");
+  }
+  own->reset();
+}
+
+void FoxgloveSession::greet(const SegmentReader* run) {
+  Json metadata{{"kerf", KERF_VERSION}};
+  if (run != nullptr) metadata["build"] = run->info().build_id;
+  const Json info{{"op", "serverInfo"},
+                  {"name", "kerf " + controller_},
+                  {"capabilities", Json::List{"time"}},
+                  {"sessionId", session_ ? hex64(*session_) : "none"},
+                  {"metadata", std::move(metadata)}};
+  texts_.push_back(info.canonical());
+}
+
+void FoxgloveSession::follow(const SegmentReader* run, bool ended) {
+  const bool is_new = run != nullptr && session_ != run->info().session_id;
+  const bool is_first = said_ == Said::nothing;
+  if (is_new) {
+    const SegmentInfo& info = run->info();
+    session_ = info.session_id;
+    messages_ = RosMessages(info.tick_ns);
+    stride_ = std::max<std::uint64_t>(1, kLeastTickNs / info.tick_ns);
+    most_behind_ = std::max<std::uint64_t>(
+        1, std::min<std::uint64_t>(kBehindNs / info.tick_ns, info.state_slots / 2));
+    index_ = run->state_head();
+    part_ = kParts;
+    left_out_ = 0;
+    said_ = Said::runs;
+  }
+  if (is_new || is_first) greet(run);
+  if (is_first) texts_.push_back(advertisement().canonical());
+  if (run == nullptr && said_ == Said::nothing) {
+    said_ = Said::waits;
+    answer(Level::warning,
+           "no controller \"" + controller_ + "\" yet; its ticks come when it runs");
+  }
+  if (run != nullptr && ended && said_ == Said::runs && index_ >= run->state_head()) {
+    said_ = Said::ended;
+    answer(Level::warning, "controller \"" + controller_ + "\" has ended; the next run follows");
+  }
+}
+
+bool FoxgloveSession::is_wanted(RosTopic topic) const noexcept {
+  return subscriptions_[topic] && messages_.has(topic, record_);
+}
+
+bool FoxgloveSession::next(std::int64_t now_ns, const SegmentReader* run, bool ended,
+                           FoxgloveMessage& out) {
+  follow(run, ended);
+  for (;;) {
+    if (!texts_.empty()) {
+      out = {true, std::move(texts_.front())};
+      texts_.pop_front();
+      return true;
+    }
+    if (next_of_tick(out)) return true;
+    if (run == nullptr || !take_tick(now_ns, *run)) return false;
+  }
+}
+
+bool FoxgloveSession::next_of_tick(FoxgloveMessage& out) {
+  while (part_ < kParts) {
+    const std::uint8_t part = part_++;
+    if (part == 0) {
+      if (!is_wanted(ros_tick) && !is_wanted(ros_tip) && !is_wanted(ros_force)) continue;
+      out = {false, {}};
+      put(out.bytes, kTime);
+      put(out.bytes, record_.start_ns);
+      return true;
+    }
+    const auto topic = static_cast<RosTopic>(part - 1);
+    if (!is_wanted(topic)) continue;
+    out = {false, {}};
+    put(out.bytes, kMessageData);
+    put(out.bytes, *subscriptions_[topic]);
+    put(out.bytes, record_.start_ns);
+    out.bytes += messages_.message(topic, record_);
+    return true;
+  }
+  return false;
+}
+
+bool FoxgloveSession::take_tick(std::int64_t now_ns, const SegmentReader& run) {
+  const std::uint64_t head = run.state_head();
+  if (std::ranges::none_of(subscriptions_, [](const auto& id) { return id.has_value(); })) {
+    index_ = head;  // who subscribes gets what comes from then on
+    return false;
+  }
+  if (index_ + most_behind_ < head) {
+    left_out_ += head - most_behind_ - index_;
+    index_ = head - most_behind_;
+  }
+  while (index_ < head) {
+    const ReadState state = run.state_at(index_, record_);
+    if (state == ReadState::not_yet) return false;
+    ++index_;
+    if (state != ReadState::ok) {
+      ++left_out_;
+    } else if (record_.tick % stride_ == 0) {
+      part_ = 0;
+      break;
+    }
+  }
+  if (left_out_ != 0 && now_ns - told_ns_ >= kToldNs) {
+    told_ns_ = now_ns;
+    answer(Level::warning, "ticks left out: " + std::to_string(std::exchange(left_out_, 0)) +
+                               "; the link or this program is too slow");
+  }
+  return part_ == 0 || !texts_.empty();
+}
+
+}  // namespace kerf::bridge

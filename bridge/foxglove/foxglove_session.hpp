@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "shared/segment/reader.hpp"
+#include "shared/segment/ros_messages.hpp"
+
+namespace kerf::bridge {
+
+inline constexpr const char* kFoxglovePath = "/foxglove";     ///< of its WebSocket
+inline constexpr std::size_t kMaxFoxgloveUpBytes = 4 * 1024;  ///< client to server
+
+/// The first sub-protocol of the client's list (`Sec-WebSocket-Protocol`, with commas between) that
+/// a `FoxgloveSession` speaks: foxglove.sdk.v1 and foxglove.websocket.v1, which are one protocol
+/// under two names. Empty: none of them.
+[[nodiscard]] std::string_view foxglove_protocol(std::string_view offered) noexcept;
+
+/// What goes to a client: a whole WebSocket message.
+struct FoxgloveMessage {
+  bool is_text = false;  ///< JSON; else binary
+  std::string bytes;
+};
+
+/// The Foxglove WebSocket protocol towards one client
+/// (https://github.com/foxglove/ws-protocol): the channels of `ros_channels`, with the clock of the
+/// servo (capability `time`). It only sends: all that would change something here is answered with
+/// a status of level 2. Without a network: the caller takes the next message whenever it can send
+/// one.
+///
+/// Nothing is queued but answers, `kMostAnswers` of them: ticks are read from the segment when they
+/// are sent. Ticks older than `kBehindNs` are left out, and the client is told so at most every
+/// `kToldNs`: over a slow link it gets evenly fewer, a little late. Of a servo that is faster than
+/// 1 kHz so many ticks are left out that 1,000 a second remain.
+///
+/// One thread.
+class FoxgloveSession {
+ public:
+  static constexpr std::uint64_t kBehindNs = 133'000'000;  ///< of the run, not of this machine
+  static constexpr std::int64_t kToldNs = 5'000'000'000;
+  static constexpr std::size_t kMostAnswers = 16;
+
+  /// `controller`: its name, as the client shows it.
+  explicit FoxgloveSession(std::string controller);
+
+  /// A message of the client, at most `kMaxFoxgloveUpBytes`. Whatever is wrong with it becomes a
+  /// status; beyond `kMostAnswers` that wait the status is left out.
+  void hear(bool is_text, std::string_view message);
+
+  /// The next message, if there is one. `run`: nullptr while there is no controller; the same for
+  /// all of a run. `ended`: the controller has gone.
+  bool next(std::int64_t now_ns, const SegmentReader* run, bool ended, FoxgloveMessage& out);
+
+ private:
+  enum class Level : std::uint8_t { info, warning, error };
+  enum class Said : std::uint8_t { nothing, waits, runs, ended };
+
+  void obey(std::string_view text);
+  void subscribe(std::uint32_t id, std::uint32_t channel);
+  void unsubscribe(std::uint32_t id);
+  void answer(Level level, const std::string& text);
+  void greet(const SegmentReader* run);
+  /// Tells once what the run is doing.
+  void follow(const SegmentReader* run, bool ended);
+  [[nodiscard]] bool is_wanted(RosTopic topic) const noexcept;
+  [[nodiscard]] bool next_of_tick(FoxgloveMessage& out);
+  [[nodiscard]] bool take_tick(std::int64_t now_ns, const SegmentReader& run);
+
+  std::string controller_;
+  std::deque<std::string> texts_;
+  std::array<std::optional<std::uint32_t>, kRosTopics> subscriptions_;  // their ids by topic
+  std::optional<std::uint64_t> session_;                                // of the run
+  Said said_ = Said::nothing;
+  RosMessages messages_{1};
+  std::uint64_t stride_ = 1, most_behind_ = 1;
+  std::uint64_t index_ = 0;     // of the next tick in the ring
+  std::uint64_t left_out_ = 0;  // ticks, not yet told
+  std::int64_t told_ns_ = 0;
+  TickRecord record_{};         // is being sent
+  std::uint8_t part_ = kParts;  // of it: the time, then each topic
+  static constexpr std::uint8_t kParts = 1 + kRosTopics;
+};
+
+}  // namespace kerf::bridge
