@@ -14,11 +14,11 @@
 #include <thread>
 #include <utility>
 
-#include "shared/segment/log_columns.hpp"
 #include "record/recording.hpp"
 #include "shared/posix/atomic_file.hpp"
 #include "shared/segment/connection.hpp"
 #include "shared/segment/layout.hpp"
+#include "shared/segment/log_columns.hpp"
 
 namespace kerf {
 namespace {
