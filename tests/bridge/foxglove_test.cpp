@@ -26,8 +26,8 @@ struct Run {
   explicit Run(std::uint32_t tick_ns = 1'000'000)
       : writer(SegmentWriter::create(spec(tick_ns))), reader(SegmentReader::map(writer.fd())) {}
 
-  static SegmentSpec spec(std::uint32_t tick_ns) {
-    SegmentSpec out = spec_of(NoiseVolume({8, 8, 8}));
+  [[nodiscard]] SegmentSpec spec(std::uint32_t tick_ns) const {
+    SegmentSpec out = spec_of(volume);
     out.tick_ns = tick_ns;
     return out;
   }
@@ -42,6 +42,7 @@ struct Run {
     writer.publish_state(record);
     writer.end_tick(ticks);
   }
+  NoiseVolume volume{{8, 8, 8}};
   SegmentWriter writer;
   SegmentReader reader;
   Tick ticks = 0;
