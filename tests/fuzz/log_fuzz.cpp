@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+#include <cstring>
+#include <string>
+#include <string_view>
+
+#include "controller/load/scene_json.hpp"
+#include "record/mcap_export.hpp"
+#include "record/recording.hpp"
+#include "shared/posix/atomic_file.hpp"
+#include "shared/text/json.hpp"
+#include "tests/support/temporary_folder.hpp"
+
+/// The three files of a recording, each as foreign bytes beside two sound ones. By the first byte:
+/// 0 manifest.json, 1 scene.json, 2 ticks.npy, 3 rows of ticks behind a sound header, with sound
+/// checksums. Every reader gives a result, or one line.
+namespace {
+
+constexpr std::string_view kManifest = R"({"session_id": "0", "tick_ns": 1000000, "end_reason": "",
+  "lost_ticks": 0, "missed_before_start": 0, "gaps": [], "volumes": [{"spacing_mm": [1, 1, 1]}]})";
+
+template <class Error, class Read>
+void must_read_or_explain(Read read) {
+  try {
+    read();
+  } catch (const Error& error) {
+    const std::string_view line = error.what();
+    if (line.empty() || line.size() > 1000 || line.find('\n') != line.npos) std::abort();
+  }
+}
+
+/// The bytes as rows, a checksum in each, behind their header.
+std::string log_of(std::string_view bytes) {
+  const std::size_t count = bytes.size() / sizeof(kerf::TickRecord);
+  std::string log = kerf::tick_log_header(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    kerf::TickRecord row;
+    std::memcpy(&row, bytes.data() + i * sizeof row, sizeof row);
+    row.crc32c = kerf::tick_record_crc(row);
+    log.append(reinterpret_cast<const char*>(&row), sizeof row);
+  }
+  return log;
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  static const kerf::test::TemporaryFolder folder;
+  if (size == 0) return 0;
+  const std::string_view bytes(reinterpret_cast<const char*>(data) + 1, size - 1);
+  const int kind = data[0] % 4;
+  if (kind == 1) {
+    must_read_or_explain<kerf::JsonError>([&] { static_cast<void>(kerf::source_in(bytes)); });
+    must_read_or_explain<kerf::JsonError>(
+        [&] { static_cast<void>(kerf::json_without_source(bytes)); });
+    return 0;
+  }
+  folder.write("manifest.json", kind == 0 ? bytes : kManifest);
+  folder.write("ticks.npy", kind == 2 ? std::string(bytes) : log_of(kind == 3 ? bytes : ""));
+  must_read_or_explain<kerf::RecordError>([] {
+    const kerf::RecordSummary summary = kerf::summarise(folder.path());
+    static_cast<void>(kerf::to_text(summary));
+    static_cast<void>(kerf::to_json(summary));
+  });
+  must_read_or_explain<kerf::RecordError>(
+      [] { static_cast<void>(kerf::kept_summary(folder.path())); });
+  must_read_or_explain<kerf::RecordError>(
+      [] { static_cast<void>(kerf::summarise(folder.path(), {.from = 1, .until = 1000})); });
+  must_read_or_explain<kerf::RecordError>(
+      [] { kerf::export_mcap(folder.path(), "/dev/null", kerf::McapWriter::Packing::lz4); });
+  must_read_or_explain<kerf::RecordError>([] { kerf::export_csv(folder.path(), "/dev/null"); });
+  return 0;
+}
