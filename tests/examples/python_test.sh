@@ -58,6 +58,17 @@ examples=$root/examples/python
 if [[ -e $work/map.csv ]]; then
   "$python" "$examples/kb_map.py" "$work/map.csv" "$work/map.png" loop=ideal
 fi
+# While it runs, in real time.
+"$bin/kerf-emulator" --socket "$work/live" --hand "$root/scenes/hands/touch.toml" >"$work/live.txt" &
+"$bin/kerf-controller" --scene "$root/scenes/touch.toml" --torque-scale 0.342,0.342,0.342 --port "socket:$work/live" \
+  --seconds 60 --name "live-$$" >"$work/live-controller.txt" 2>&1 &
+live=$!
+until "$python" "$examples/live_plot.py" "live-$$" 3 "$work/live.png" 2>"$work/live-plot.txt"; do
+  sleep 0.1
+  kill -0 $live
+done
+kill $live
+wait $live || true
 "$python" - "$work"/*.png <<'PY'
 import sys
 import matplotlib.image
@@ -102,6 +113,8 @@ done
 refused 'never in hand' phase_portrait "$work/idle" "$work/none.png"
 refused 'no force was sent' spectrum "$work/free" "$work/none.png"
 refused 'no axis' phase_portrait "$work/log" "$work/none.png" 3
+refused 'PICTURE.png' live_plot
+refused 'nobody' live_plot nobody 1 "$work/none.png"
 refused 'TABLE.csv' kb_map
 refused 'nowhere.csv' kb_map "$work/nowhere.csv" "$work/none.png"
 refused 'no column' kb_map "$work/sweep/sweep.csv" "$work/none.png" a b c
