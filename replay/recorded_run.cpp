@@ -12,8 +12,10 @@
 
 #include "controller/load/load_scene.hpp"
 #include "controller/load/scene_json.hpp"
+#include "controller/loop/publisher.hpp"
 #include "controller/scene/scene_file.hpp"
 #include "record/tick_log.hpp"
+#include "shared/numeric/fnv1a.hpp"
 #include "shared/segment/layout.hpp"
 #include "shared/text/command_line.hpp"
 #include "shared/text/json.hpp"
@@ -160,7 +162,7 @@ void check_begins_at_first_tick(const std::filesystem::path& folder, const Manif
 }  // namespace
 
 RecordedRun load_run(const std::filesystem::path& folder, const ReplayChanges& changes,
-                     const KernelSet& kernels) {
+                     const KernelSet& kernels, bool with_segment) {
   RecordedRun run;
   run.manifest = read_manifest(folder);
   check_begins_at_first_tick(folder, run.manifest);
@@ -178,6 +180,10 @@ RecordedRun load_run(const std::filesystem::path& folder, const ReplayChanges& c
       throw RecordError((folder / kSceneName).string() +
                         ": has no rate or no device; copy the recording again");
     }
+  }
+  if (with_segment) {
+    const std::uint64_t hash = fnv1a(run.canonical);
+    run.segment = SegmentWriter::create(segment_spec(run.scene, run.scene_json, hash));
   }
   run.servo = compile(run.scene, kernels);
   return run;

@@ -12,6 +12,7 @@
 #include "controller/load/scene_json.hpp"
 #include "controller/plan/compile.hpp"
 #include "record/recording.hpp"
+#include "shared/segment/writer.hpp"
 
 // A recording as a run that can be repeated: its scene, loaded again.
 
@@ -33,6 +34,7 @@ struct RecordedRun {
   std::string canonical;   ///< `canonical_json` of it
   std::string scene_json;  ///< the same with its source
   std::unique_ptr<CompiledScene> servo;
+  std::optional<SegmentWriter> segment;  ///< with the volumes as they start; if it was asked for
 };
 
 /// Loads the scene of the recording in `folder` from what it was loaded from, with `changes`.
@@ -42,7 +44,8 @@ struct RecordedRun {
 /// Throws `RecordError` too if the recording does not begin at the run's first tick, LoadError if
 /// the scene cannot be loaded.
 [[nodiscard]] RecordedRun load_run(const std::filesystem::path& folder,
-                                   const ReplayChanges& changes, const KernelSet& kernels);
+                                   const ReplayChanges& changes, const KernelSet& kernels,
+                                   bool with_segment = false);
 
 /// The kernels of that name, as `kernel_sets` has them; the fastest if `name` is empty. Throws
 /// UsageError with those of this machine.

@@ -11,11 +11,30 @@
 #include "record/tick_log.hpp"
 #include "replay/recorded_run.hpp"
 #include "replay/tick_stages.hpp"
+#include "shared/numeric/fnv1a.hpp"
 #include "shared/segment/layout.hpp"
 
 // A recorded run, stepped again without device and clock.
 
 namespace kerf {
+
+/// Gives the servo the commands and the report of a recorded tick, in the loop's order; returns its
+/// output.
+[[nodiscard]] ServoOutput give(CompiledScene& servo, const TickRecord& recorded) noexcept;
+
+/// Computes the ticks of a recording again, one after the other from the run's first.
+class ReplayStep {
+ public:
+  explicit ReplayStep(CompiledScene& servo) : servo_(servo) {}
+
+  /// Gives the servo what it was given in `recorded`; returns the record of the tick. Times are
+  /// those of `recorded`.
+  [[nodiscard]] TickRecord operator()(const TickRecord& recorded) noexcept;
+
+ private:
+  CompiledScene& servo_;
+  std::uint64_t volume_chain_ = kFnv1aBasis;
+};
 
 /// What a replay found.
 struct ReplayResult {
@@ -49,6 +68,7 @@ struct ReplayOptions {
   std::filesystem::path out;     ///< a recording of the replay; may be empty
   std::filesystem::path plot;    ///< SVG of both runs; may be empty
   std::filesystem::path report;  ///< JSON; may be empty
+  std::string watch;             ///< shown as the controller of this name; may be empty
 };
 
 /// Replays the recording and prints what it found. Returns the exit code: 0; 1 if a tick differs

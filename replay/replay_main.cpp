@@ -42,7 +42,15 @@ bool parse_replay(int argc, char** argv, ReplayOptions& options) {
   app.option("--out", options.out, "folder for a recording of the replay").shown_as("DIR");
   app.option("--plot", options.plot, "forces, places and volumes of both, as SVG").shown_as("FILE");
   app.option("--report", options.report, "write what it found as JSON").shown_as("FILE");
+  app.option(
+         "--watch", options.watch,
+         "show it as the controller NAME, to a window, the browser's page and every other reader")
+      .shown_as("NAME");
   if (!app.parse(argc, argv, std::cout)) return false;
+  const bool compares = !options.out.empty() || !options.plot.empty() || !options.report.empty();
+  if (!options.watch.empty() && compares) {
+    throw UsageError("--watch: compares nothing; leave --out, --plot and --report out");
+  }
   if (!law.empty()) options.changes.settings.push_back("force.law=" + law);
   if (!scene.empty()) options.changes.scene = find_scene_file(scene);
   if (!numeric.empty()) {

@@ -175,6 +175,28 @@ TickCommands commands_of(const TickRecord& record) noexcept {
           record.last_command};
 }
 
+SegmentSpec segment_spec(const LoadedScene& scene, const std::string& json, std::uint64_t hash) {
+  SegmentSpec spec;
+  spec.scene_json = json;
+  spec.config_hash = hash;
+  spec.tick_ns = static_cast<std::uint32_t>(1'000'000'000 / scene.servo.rate_hz);
+  spec.build_id = std::string("kerf-controller ") + KERF_VERSION;
+  spec.mirror_updates = scene.cut.model != CutModel::none;
+  for (const SceneVolume& volume : scene.volumes) {
+    SegmentVolumeSpec& v = spec.volumes.emplace_back();
+    v.grid = volume.image.grid;
+    v.spacing_mm = volume.image.spacing_mm;
+    v.origin_mm = volume.pose.position_mm;
+    for (std::size_t i = 0; i < 4; ++i) {
+      v.orientation[i] = static_cast<float>(volume.pose.orientation[i]);
+    }
+    v.iso = volume.iso;
+    v.density = volume.image.density;
+    v.labels = volume.image.labels;
+  }
+  return spec;
+}
+
 void Publisher::publish(Tick tick, const DeviceReport& report, const TickCommands& commands,
                         const ServoOutput& output, const TickTiming& timing) noexcept {
   TickRecord record = record_of(report, commands, output);

@@ -3,10 +3,13 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <string>
 
+#include "controller/load/loaded_scene.hpp"
 #include "controller/servo/servo.hpp"
 #include "shared/numeric/fnv1a.hpp"
 #include "shared/segment/layout.hpp"
+#include "shared/segment/segment.hpp"
 #include "shared/segment/writer.hpp"
 
 namespace kerf {
@@ -65,6 +68,10 @@ void put_changes(const ServoOutput& output, const HashOf& hash_of, std::uint64_t
 /// Hash of the first `count` volumes as they are now: `volume_hash` of a report. While no step
 /// runs.
 [[nodiscard]] std::uint64_t hash_of_volumes(const Servo& servo, std::size_t count) noexcept;
+
+/// The segment of this scene. Points into the scene: call it before `take`.
+[[nodiscard]] SegmentSpec segment_spec(const LoadedScene& scene, const std::string& json,
+                                       std::uint64_t hash);
 
 /// Publishes each tick to the readers of the segment, after the device has its command.
 ///

@@ -14,6 +14,7 @@
 #include "controller/input/load_error.hpp"
 #include "controller/load/load_scene.hpp"
 #include "controller/load/scene_json.hpp"
+#include "controller/loop/publisher.hpp"
 #include "controller/loop/wait_state.hpp"
 #include "controller/plan/compile.hpp"
 #include "controller/plan/gain_margin.hpp"
@@ -43,28 +44,6 @@ std::optional<std::uint64_t> available_memory() {
 }
 
 }  // namespace
-
-SegmentSpec segment_spec(const LoadedScene& scene, const std::string& json, std::uint64_t hash) {
-  SegmentSpec spec;
-  spec.scene_json = json;
-  spec.config_hash = hash;
-  spec.tick_ns = static_cast<std::uint32_t>(1'000'000'000 / scene.servo.rate_hz);
-  spec.build_id = std::string("kerf-controller ") + KERF_VERSION;
-  spec.mirror_updates = scene.cut.model != CutModel::none;
-  for (const SceneVolume& volume : scene.volumes) {
-    SegmentVolumeSpec& v = spec.volumes.emplace_back();
-    v.grid = volume.image.grid;
-    v.spacing_mm = volume.image.spacing_mm;
-    v.origin_mm = volume.pose.position_mm;
-    for (std::size_t i = 0; i < 4; ++i) {
-      v.orientation[i] = static_cast<float>(volume.pose.orientation[i]);
-    }
-    v.iso = volume.iso;
-    v.density = volume.image.density;
-    v.labels = volume.image.labels;
-  }
-  return spec;
-}
 
 void check_memory(const LoadedScene& scene, const SceneCosts& costs, std::uint64_t segment_bytes) {
   std::uint64_t bytes = segment_bytes;

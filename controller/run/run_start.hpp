@@ -21,10 +21,6 @@
 
 namespace kerf {
 
-/// The segment of this scene. Points into the scene: call it before `take`.
-[[nodiscard]] SegmentSpec segment_spec(const LoadedScene& scene, const std::string& json,
-                                       std::uint64_t hash);
-
 /// Checks that the memory of a run beyond the loaded scene is available: else locking it would end
 /// the program without a message. Throws std::runtime_error with one line.
 void check_memory(const LoadedScene& scene, const SceneCosts& costs, std::uint64_t segment_bytes);

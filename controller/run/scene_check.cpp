@@ -14,6 +14,7 @@
 
 #include "controller/load/load_scene.hpp"
 #include "controller/load/scene_json.hpp"
+#include "controller/loop/publisher.hpp"
 #include "controller/plan/compile.hpp"
 #include "controller/run/run_start.hpp"
 #include "controller/scene/scene.hpp"

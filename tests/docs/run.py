@@ -24,7 +24,8 @@ import dicom
 # end it is the whole command. A page alone, such as "own-law.md: ", is all of its blocks.
 NOT_HERE = {
     "changes the system, as root": ["sudo ", "echo '@plugdev"],
-    "needs a display, or a controller at work": ["./kerf demo --hand mouse", "./kerf visualizer"],
+    "needs a display, or a controller at work": [
+        "./kerf demo --hand mouse", "./kerf visualizer", "./kerf record grab", "./kerf replay once/log --watch"],
     "needs a device, or its kernel": [
         "cat /sys/kernel/realtime", "./kerf controller --probe",
         "./kerf controller --scene mine.toml --device omni --port fw"],

@@ -9,6 +9,7 @@ import struct
 import subprocess
 import sys
 import tempfile
+import time
 import unittest
 
 ROOT, BIN = (pathlib.Path(path).resolve() for path in (sys.argv.pop(1), sys.argv.pop(1)))
@@ -141,6 +142,65 @@ class TestReplay(unittest.TestCase):
         sound = replay(log, code=1)
         self.assertIn("700 ticks, each equal", sound)
         self.assertIn("row 700 has a wrong checksum", sound)
+
+    def watch(self, log, *options):
+        name = f"watched-{self.run_folder.name}"
+        watched = subprocess.Popen([BIN / "kerf-replay", log, "--watch", name, *options], stdin=subprocess.PIPE,
+                                   stdout=subprocess.PIPE, text=True)
+        self.addCleanup(watched.kill)
+
+        def told(keys, words):
+            """Presses keys, and returns the first line with these words."""
+            watched.stdin.write(keys)
+            watched.stdin.flush()
+            for line in watched.stdout:
+                if words in line:
+                    return line
+            raise AssertionError(f"{words}: not said after {keys!r}")
+        return name, watched, told
+
+    def ticks(self, log):
+        """Of each row: output hash by place, as all rows in order."""
+        out = log.parent / f"{log.name}.csv"
+        subprocess.run([BIN / "kerf-record", "export", log, "--csv", out], check=True)
+        head, *lines = out.read_text().splitlines()
+        column = head.split(",").index("output_hash")
+        return [line.split(",")[column] for line in lines]
+
+    def test_a_watched_replay_is_a_run_that_can_be_paused_stepped_and_sought(self):
+        was = self.ticks(self.log)
+        name, watched, told = self.watch(self.log)
+        told(" ", "paused")
+        out = self.run_folder / "seen"
+        recorder = subprocess.Popen([BIN / "kerf-recorder", "--name", name, "--out", out], stdout=subprocess.DEVNULL)
+        while not (out / "manifest.json").exists():
+            time.sleep(0.01)
+        self.assertIn("tick 1000 of", told("1000g", "tick"))
+        self.assertIn("tick 1001 of", told(".", "tick"))
+        self.assertIn("tick 1 of", told("b", "tick"))
+        self.assertIn("tick 1001 of", told("f", "tick"))
+        self.assertIn(f"tick {len(was)} of", told("999999999999999999999999g", "tick"))
+        self.assertIn("tick 1990 of", told("1990g", "tick"))
+        self.assertIn("speed 64", told("++++++", "speed 64"))
+        self.assertIn(f"tick {len(was)} of", told(" ", f"tick {len(was)}"))
+        watched.communicate("q", timeout=20)
+        self.assertEqual(watched.returncode, 0)
+        self.assertEqual(recorder.wait(timeout=20), 0)
+        seen = self.ticks(out)[-(6 + len(was) - 1990):]
+        self.assertEqual(seen, [was[tick - 1] for tick in [1000, 1001, 1, 1001, len(was), *range(1990, len(was) + 1)]])
+
+    def test_a_watched_replay_stops_before_a_gap_and_refuses_what_it_cannot_do(self):
+        log = self.copy()
+        rows = self.rows(log)
+        at = HEADER + 700 * self.row
+        (log / "ticks.npy").write_bytes(rows[:at] + rows[at + 9 * self.row:])
+        _, watched, told = self.watch(log, "--from", "690")
+        self.assertIn("tick 700 of 700", told("", "paused"))
+        out, _ = watched.communicate("q", timeout=20)
+        self.assertIn("tick 701 is not in the recording", out)
+        self.assertEqual(watched.returncode, 1)
+        self.assertIn("--watch: compares nothing", replay(self.log, "--watch", "x", "--out", "y", code=2))
+        self.assertIn("'a/b'", replay(self.log, "--watch", "a/b", code=2))
 
     def test_a_changed_scene_is_named_first(self):
         log = self.copy()

@@ -29,6 +29,7 @@
 #include "controller/load/load_scene.hpp"
 #include "controller/load/scene_json.hpp"
 #include "controller/loop/motor_guard.hpp"
+#include "controller/loop/publisher.hpp"
 #include "controller/loop/servo_loop.hpp"
 #include "controller/plan/compile.hpp"
 #include "controller/run/run_start.hpp"

@@ -21,6 +21,7 @@
 
 #include "controller/device/device_driver.hpp"
 #include "controller/load/scene_json.hpp"
+#include "controller/loop/publisher.hpp"
 #include "controller/loop/servo_loop.hpp"
 #include "controller/loop/tick_source.hpp"
 #include "controller/plan/compile.hpp"

@@ -347,6 +347,9 @@ OverlayFigures overlay_figures(const Session& session) {
                                              : "the controller is gone: this is its last state";
     figures.alarm = !session.ended_cleanly();
     figures.data_age_ms.reset();
+  } else if (figures.data_age_ms && *figures.data_age_ms > kStaleMs && session.is_held()) {
+    figures.banner = "paused";  // a replay: a controller on hold goes on sending
+    figures.data_age_ms.reset();
   } else if (figures.data_age_ms && *figures.data_age_ms > kStaleMs) {
     figures.banner = "stale: no news from the servo";
     figures.alarm = true;

@@ -276,6 +276,10 @@ bool Session::ended() const noexcept {
   return connection_.reader().lifecycle() >= Lifecycle::clean_end || !connection_.alive();
 }
 
+bool Session::is_held() const noexcept {
+  return connection_.reader().lifecycle() == Lifecycle::hold;
+}
+
 bool Session::ended_cleanly() const noexcept {
   return connection_.reader().lifecycle() == Lifecycle::clean_end;
 }

@@ -100,6 +100,8 @@ class Session {
   [[nodiscard]] bool ended() const noexcept;
   /// It said so, and it was no fault.
   [[nodiscard]] bool ended_cleanly() const noexcept;
+  /// The controller is on hold, or a replay is paused.
+  [[nodiscard]] bool is_held() const noexcept;
 
   // False if the controller refuses, is busy or has gone.
   bool select_tool(std::uint32_t index) { return send(CommandKind::select_tool, index); }

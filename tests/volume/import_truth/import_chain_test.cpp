@@ -12,6 +12,7 @@
 #include "bridge/igtl/igtl_messages.hpp"
 #include "controller/load/load_scene.hpp"
 #include "controller/load/scene_json.hpp"
+#include "controller/loop/publisher.hpp"
 #include "controller/run/run_start.hpp"
 #include "controller/volume/windowing.hpp"
 #include "shared/segment/reader.hpp"

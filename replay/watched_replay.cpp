@@ -1,0 +1,345 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "replay/watched_replay.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <chrono>
+#include <cstdint>
+#include <cstdio>
+#include <limits>
+#include <map>
+#include <memory>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include <poll.h>
+#include <termios.h>
+#include <unistd.h>
+
+#include "controller/loop/publisher.hpp"
+#include "shared/posix/monotonic_clock.hpp"
+#include "shared/segment/server.hpp"
+
+namespace kerf {
+namespace {
+
+/// What a key or a reader's command asks for.
+struct Request {
+  enum class Kind { none, pause, step, faster, slower, forward, back, go, quit };
+  Kind kind = Kind::none;
+  Tick tick = 0;  ///< of `go`
+};
+
+/// Single keys of standard input; a terminal is without echo and lines as long as this lives.
+class Keys {
+ public:
+  Keys() {
+    if (tcgetattr(STDIN_FILENO, &before_) != 0) return;
+    termios now = before_;
+    now.c_lflag &= ~static_cast<tcflag_t>(ICANON | ECHO);
+    is_terminal_ = tcsetattr(STDIN_FILENO, TCSANOW, &now) == 0;
+  }
+  ~Keys() {
+    if (is_terminal_) tcsetattr(STDIN_FILENO, TCSANOW, &before_);
+  }
+  Keys(const Keys&) = delete;
+  Keys& operator=(const Keys&) = delete;
+
+  /// The next request; never waits.
+  [[nodiscard]] Request next() {
+    for (char key = 0; read_key(key);) {
+      if (key >= '0' && key <= '9') {
+        constexpr Tick kMost = std::numeric_limits<Tick>::max() / 20;
+        number_ = std::min(number_, kMost) * 10 + static_cast<Tick>(key - '0');
+        continue;
+      }
+      const Tick number = std::exchange(number_, 0);
+      using enum Request::Kind;
+      if (key == ' ') return {pause};
+      if (key == '.') return {step};
+      if (key == '+') return {faster};
+      if (key == '-') return {slower};
+      if (key == 'f') return {forward};
+      if (key == 'b') return {back};
+      if (key == 'g') return {go, number};
+      if (key == 'q') return {quit};
+    }
+    return {};
+  }
+
+ private:
+  [[nodiscard]] bool read_key(char& key) {
+    pollfd input{STDIN_FILENO, POLLIN, 0};
+    if (is_closed_ || poll(&input, 1, 0) <= 0) return false;
+    const ssize_t got = read(STDIN_FILENO, &key, 1);
+    is_closed_ = got == 0 || (got < 0 && errno != EINTR && errno != EAGAIN);
+    return got == 1;
+  }
+
+  termios before_{};
+  bool is_terminal_ = false, is_closed_ = false;
+  Tick number_ = 0;
+};
+
+Request request_of(const Command& command, bool is_paused) {
+  using enum Request::Kind;
+  switch (command.kind) {
+    case CommandKind::hold:
+      return {(command.argument != 0) == is_paused ? none : pause};
+    case CommandKind::reset:
+      return {go, 1};
+    case CommandKind::undo:
+      return {back};
+    case CommandKind::redo:
+      return {forward};
+    case CommandKind::select_tool:  // of the recording
+    case CommandKind::mark:
+      return {};
+  }
+  return {};
+}
+
+/// The run between two ticks, at any of them.
+class WatchedRun {
+ public:
+  WatchedRun(RecordedRun& run, TickLogReader& log)
+      : run_(run), log_(log), publisher_(*run.segment, *run.servo) {
+    rows_.resize(TickLogReader::kChunkRows);
+    last_tick_ = log.rows();  // from tick 1 on, without a gap
+    ticks_a_snapshot_ = last_tick_ / snapshots_that_fit() + 1;
+    snapshots_[0] = run.servo->keep();
+  }
+
+  [[nodiscard]] Tick tick() const noexcept { return tick_; }
+  [[nodiscard]] Tick last_tick() const noexcept { return last_tick_; }
+
+  /// The next tick, published. False at the end, or before a gap or a damaged row.
+  bool step() {
+    const TickRecord* const recorded = next_row();
+    if (recorded == nullptr) return false;
+    ServoOutput output = step_servo(*recorded);
+    output.undoable = output.redoable = true;  // the keys of both go through the recording
+    const std::int64_t now = monotonic_ns();
+    published_ = std::max(published_ + 1, tick_);
+    publisher_.publish(published_, report_of(*recorded), commands_of(*recorded), output,
+                       {.start_ns = now, .heartbeat_ns = now});
+    return true;
+  }
+
+  /// To `tick`, or as near as the recording goes; readers see the volumes of that tick.
+  void go(Tick tick) {
+    tick = std::clamp<Tick>(tick, 1, last_tick_);
+    const auto& [at, kept] = *std::prev(snapshots_.upper_bound(tick - 1));
+    if (tick <= tick_ || at > tick_) {
+      run_.servo->restore(*kept);
+      tick_ = at;
+    }
+    while (tick_ + 1 < tick) {
+      const TickRecord* const recorded = next_row();
+      if (recorded == nullptr) break;
+      static_cast<void>(step_servo(*recorded));
+    }
+    show_volumes();
+    step();
+  }
+
+ private:
+  [[nodiscard]] std::uint64_t snapshots_that_fit() const {
+    std::size_t bytes = 1;
+    for (std::size_t v = 0; v < run_.scene.volumes.size(); ++v) {
+      bytes += run_.servo->density(v).size_bytes();
+    }
+    return std::clamp<std::uint64_t>(kSnapshotBytes / bytes, 1, kMostSnapshots);
+  }
+
+  /// The row of the next tick; null if there is none.
+  [[nodiscard]] const TickRecord* next_row() {
+    if (tick_ >= last_tick_) return nullptr;
+    if (tick_ < first_row_ || tick_ >= first_row_ + count_) {
+      first_row_ = tick_;
+      count_ = log_.read(first_row_, rows_);
+    }
+    const TickRecord& row = rows_[tick_ - first_row_];
+    if (row.tick == tick_ + 1) return &row;
+    last_tick_ = tick_;
+    return nullptr;
+  }
+
+  ServoOutput step_servo(const TickRecord& recorded) {
+    if (tick_ % ticks_a_snapshot_ == 0 && !snapshots_.contains(tick_)) {
+      snapshots_[tick_] = run_.servo->keep();
+    }
+    ++tick_;
+    return give(*run_.servo, recorded);
+  }
+
+  /// All bricks of all volumes, in as many ticks as that takes, without a record.
+  void show_volumes() {
+    SegmentWriter& segment = *run_.segment;
+    segment.begin_tick(++published_);
+    for (std::size_t v = 0; v < run_.scene.volumes.size(); ++v) {
+      const VoxelGrid& grid = run_.servo->grid(v);
+      const VoxelBox all{{0, 0, 0}, {grid.nx, grid.ny, grid.nz}};
+      if (run_.servo->first_density(v).empty()) continue;  // nothing cuts it
+      segment.publish_box(v, run_.servo->density(v), all, 0, DirtyCause::load);
+    }
+    segment.end_tick(static_cast<std::uint64_t>(monotonic_ns()));
+    while (segment.waiting_bricks() > 0) {
+      segment.begin_tick(++published_);
+      segment.end_tick(static_cast<std::uint64_t>(monotonic_ns()));
+    }
+  }
+
+  RecordedRun& run_;
+  TickLogReader& log_;
+  Publisher publisher_;
+  std::vector<TickRecord> rows_;
+  std::uint64_t first_row_ = 0, count_ = 0;
+  Tick tick_ = 0;       ///< of the recording
+  Tick published_ = 0;  ///< of the segment, where ticks only grow: the same until a way back
+  Tick last_tick_ = 0;
+  Tick ticks_a_snapshot_ = 1;
+  std::map<Tick, std::unique_ptr<ServoSnapshot>> snapshots_;  ///< by the tick that was the last
+};
+
+/// The clock of the replay: how many ticks are due.
+class Pace {
+ public:
+  explicit Pace(std::uint32_t tick_ns) : tick_ns_(tick_ns) {}
+
+  void start(std::int64_t now_ns) {
+    began_ns_ = now_ns;
+    stepped_ = 0;
+  }
+  void change(double factor, std::int64_t now_ns) {
+    constexpr double kMost = 64;
+    speed_ = std::clamp(speed_ * factor, 1 / kMost, kMost);
+    start(now_ns);
+  }
+  [[nodiscard]] std::uint64_t due(std::int64_t now_ns) {
+    const double ticks = static_cast<double>(now_ns - began_ns_) * speed_ / tick_ns_;
+    const auto all = static_cast<std::uint64_t>(std::max(ticks, 0.0));
+    return all - std::min(std::exchange(stepped_, std::max(all, stepped_)), all);
+  }
+  [[nodiscard]] double speed() const noexcept { return speed_; }
+
+ private:
+  std::uint32_t tick_ns_;
+  double speed_ = 1;
+  std::int64_t began_ns_ = 0;
+  std::uint64_t stepped_ = 0;
+};
+
+class Watch {
+ public:
+  Watch(WatchedRun& run, SegmentWriter& segment, std::uint32_t tick_ns)
+      : run_(run), segment_(segment), tick_ns_(tick_ns), pace_(tick_ns) {}
+
+  void run(SegmentServer& server, const std::atomic<bool>& stop) {
+    Keys keys;
+    pace_.start(monotonic_ns());
+    tell();
+    while (!stop) {
+      Request request = keys.next();
+      if (const auto command = server.take_command();
+          command && request.kind == Request::Kind::none) {
+        request = request_of(*command, is_paused_);
+      }
+      if (request.kind == Request::Kind::quit) return;
+      if (request.kind != Request::Kind::none) answer(request);
+      const std::uint64_t due = is_paused_ ? 0 : pace_.due(monotonic_ns());
+      for (std::uint64_t i = 0; i < due && !is_paused_; ++i) {
+        if (!run_.step()) pause(true);
+      }
+      std::this_thread::sleep_for(std::chrono::milliseconds(is_paused_ ? 10 : 1));
+    }
+  }
+
+ private:
+  void answer(const Request& request) {
+    const auto second = static_cast<Tick>(1e9 / tick_ns_);
+    const Tick now = run_.tick();
+    switch (request.kind) {
+      case Request::Kind::pause:
+        pause(!is_paused_);
+        return;
+      case Request::Kind::step:
+        pause(true, false);
+        run_.step();
+        break;
+      case Request::Kind::faster:
+        pace_.change(2, monotonic_ns());
+        break;
+      case Request::Kind::slower:
+        pace_.change(0.5, monotonic_ns());
+        break;
+      case Request::Kind::forward:
+        run_.go(now + second);
+        break;
+      case Request::Kind::back:
+        run_.go(now > second ? now - second : 1);
+        break;
+      case Request::Kind::go:
+        run_.go(std::max<Tick>(request.tick, 1));
+        break;
+      case Request::Kind::none:
+      case Request::Kind::quit:
+        return;
+    }
+    pace_.start(monotonic_ns());
+    tell();
+  }
+
+  void pause(bool pauses, bool tells = true) {
+    is_paused_ = pauses;
+    segment_.set_lifecycle(pauses ? Lifecycle::hold : Lifecycle::run);
+    pace_.start(monotonic_ns());
+    if (tells) tell();
+  }
+
+  void tell() const {
+    std::printf("tick %llu of %llu (%.3f s), speed %g%s\n",
+                static_cast<unsigned long long>(run_.tick()),
+                static_cast<unsigned long long>(run_.last_tick()),
+                static_cast<double>(run_.tick()) * tick_ns_ * 1e-9, pace_.speed(),
+                is_paused_ ? ", paused" : "");
+    std::fflush(stdout);
+  }
+
+  WatchedRun& run_;
+  SegmentWriter& segment_;
+  std::uint32_t tick_ns_;
+  Pace pace_;
+  bool is_paused_ = false;
+};
+
+}  // namespace
+
+int watch_replay(const ReplayOptions& options, const std::atomic<bool>& stop) {
+  TickLogReader log(options.folder / kTickLogName);
+  if (log.rows() == 0) {
+    throw RecordError((options.folder / kTickLogName).string() + ": 0 rows; nothing to replay");
+  }
+  RecordedRun run = load_run(options.folder, options.changes, kernels_named(options.kernels), true);
+  WatchedRun watched(run, log);
+  const std::uint64_t rows = watched.last_tick();
+  SegmentServer server(options.watch, *run.segment,
+                       {.tools = static_cast<std::uint32_t>(run.scene.tools.size())});
+  run.segment->set_lifecycle(Lifecycle::run);
+  std::printf(
+      "kerf visualizer --name %s shows it; space pauses, . steps, + and - change the speed, "
+      "f and b go a second on and back, 1600g goes to tick 1600, q quits\n",
+      options.watch.c_str());
+  if (options.from > 1) watched.go(options.from);
+  Watch(watched, *run.segment, run.manifest.tick_ns).run(server, stop);
+  run.segment->set_lifecycle(Lifecycle::clean_end);
+  if (watched.last_tick() == rows) return 0;
+  std::printf("tick %llu is not in the recording; it was shown until there\n",
+              static_cast<unsigned long long>(watched.last_tick() + 1));
+  return 1;
+}
+
+}  // namespace kerf

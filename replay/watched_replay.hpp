@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+
+#include "replay/replay.hpp"
+
+// A recorded run, shown: in real time, slower, faster, tick by tick, from any tick on.
+
+namespace kerf {
+
+/// Publishes the replay as the controller `options.watch`, from `options.from` on, until `stop`, or
+/// key q. Readers see it as a run: window, page, recorder.
+///
+/// Keys on standard input, a terminal or a pipe: space pauses and goes on, `.` steps one tick, `+`
+/// and `-` double and halve the speed, `f` and `b` go a second forward and back, a number and `g`
+/// goes to that tick. A reader's `hold` pauses, its `reset` goes to the start, `undo` and `redo` a
+/// second back and forward: so the keys of the window and the page's buttons do. To go back it
+/// continues from a snapshot of the servo; at most `kMostSnapshots` are in memory, and at most
+/// `kSnapshotBytes` of them, but always one.
+///
+/// Returns 0; 1 if ticks are missing in the recording, in front of which it stops. Throws as
+/// `run_replay`, and SegmentError if a controller of that name runs.
+[[nodiscard]] int watch_replay(const ReplayOptions& options, const std::atomic<bool>& stop);
+
+inline constexpr std::size_t kMostSnapshots = 32, kSnapshotBytes = std::size_t{512} << 20;
+
+}  // namespace kerf
