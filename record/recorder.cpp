@@ -134,6 +134,9 @@ bool parse_options(int argc, char** argv, RecorderOptions& options) {
     throw UsageError(
         "--resume: a flight recorder has nothing to go on with; leave one of both out");
   }
+  if (options.flight_s > 0 && (options.strict || !options.report.empty())) {
+    throw UsageError("--strict, --report: are of a whole run; leave them out beside --flight");
+  }
   return true;
 }
 

@@ -199,7 +199,6 @@ void check_range(const ReplayOptions& options, TickLogReader& log) {
 }  // namespace
 
 int run_replay(const ReplayOptions& options, const std::atomic<bool>& stop) {
-  if (!options.watch.empty()) return watch_replay(options, stop);
   check_outputs(recording_files(options.folder),
                 {{"--report", options.report, ".json"}, {"--plot", options.plot, ".svg"}});
   TickLogReader log(options.folder / kTickLogName);
@@ -207,6 +206,7 @@ int run_replay(const ReplayOptions& options, const std::atomic<bool>& stop) {
     throw RecordError((options.folder / kTickLogName).string() + ": 0 rows; nothing to replay");
   }
   check_range(options, log);
+  if (!options.watch.empty()) return watch_replay(options, log, stop);
   RecordedRun run = load_run(options.folder, options.changes, kernels_named(options.kernels));
   std::optional<ReplayLog> copy;
   if (!options.out.empty()) copy.emplace(options.out, options.folder);

@@ -105,10 +105,10 @@ Request request_of(const Command& command, bool is_paused) {
 /// The run between two ticks, at any of them.
 class WatchedRun {
  public:
-  WatchedRun(RecordedRun& run, TickLogReader& log)
+  WatchedRun(RecordedRun& run, TickLogReader& log, Tick until)
       : run_(run), log_(log), publisher_(*run.segment, *run.servo) {
     rows_.resize(TickLogReader::kChunkRows);
-    last_tick_ = log.rows();  // from tick 1 on, without a gap
+    last_tick_ = std::min<Tick>(log.rows(), until);  // from tick 1 on, without a gap
     ticks_a_snapshot_ = last_tick_ / snapshots_that_fit() + 1;
     snapshots_[0] = run.servo->keep();
   }
@@ -318,13 +318,9 @@ class Watch {
 
 }  // namespace
 
-int watch_replay(const ReplayOptions& options, const std::atomic<bool>& stop) {
-  TickLogReader log(options.folder / kTickLogName);
-  if (log.rows() == 0) {
-    throw RecordError((options.folder / kTickLogName).string() + ": 0 rows; nothing to replay");
-  }
+int watch_replay(const ReplayOptions& options, TickLogReader& log, const std::atomic<bool>& stop) {
   RecordedRun run = load_run(options.folder, options.changes, kernels_named(options.kernels), true);
-  WatchedRun watched(run, log);
+  WatchedRun watched(run, log, options.until);
   const std::uint64_t rows = watched.last_tick();
   SegmentServer server(options.watch, *run.segment,
                        {.tools = static_cast<std::uint32_t>(run.scene.tools.size())});

@@ -10,8 +10,9 @@
 
 namespace kerf {
 
-/// Publishes the replay as the controller `options.watch`, from `options.from` on, until `stop`, or
-/// key q. Readers see it as a run: window, page, recorder.
+/// Publishes the replay of `log`, the recording in `options.folder`, as the controller
+/// `options.watch`, from `options.from` to `options.until`, and until `stop` or key q. Readers see
+/// it as a run: window, page, recorder.
 ///
 /// Keys on standard input, a terminal or a pipe: space pauses and goes on, `.` steps one tick, `+`
 /// and `-` double and halve the speed, `f` and `b` go a second forward and back, a number and `g`
@@ -22,7 +23,8 @@ namespace kerf {
 ///
 /// Returns 0; 1 if ticks are missing in the recording, in front of which it stops. Throws as
 /// `run_replay`, and SegmentError if a controller of that name runs.
-[[nodiscard]] int watch_replay(const ReplayOptions& options, const std::atomic<bool>& stop);
+[[nodiscard]] int watch_replay(const ReplayOptions& options, TickLogReader& log,
+                               const std::atomic<bool>& stop);
 
 inline constexpr std::size_t kMostSnapshots = 32, kSnapshotBytes = std::size_t{512} << 20;
 
