@@ -1,9 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Force and depth of a running controller, while it runs:  live_plot.py NAME SECONDS PICTURE.png
-
-NAME is that of the controller (`kerf` if it was given none). The picture is drawn anew every second, so a viewer that
-reloads its file shows the run; the servo is not touched. Ends after SECONDS, or with the controller."""
+"""Force and depth of a running controller, drawn anew every second:  live_plot.py NAME SECONDS PICTURE.png
+NAME is the controller's, `kerf` if it was given none. The servo is not touched. Ends after SECONDS, or with the run."""
 import one_line  # first: it tells of a package that lacks
 import time
 import matplotlib.pyplot as plt
@@ -11,26 +9,21 @@ import numpy as np
 from kerf_reader import Segment, SegmentError
 
 def draw(name, seconds, picture):
-    end, rows, at = time.monotonic() + float(seconds), [], 0
+    end, ticks = time.monotonic() + float(seconds), []
     try:
         with Segment(name) as segment:
-            at = segment.head  # from now on
+            at = segment.head  # from now on; the ring has the last 4096 ticks
             while time.monotonic() < end and segment.alive:
-                time.sleep(min(1, max(0, end - time.monotonic())))
-                new, at = segment.records(at)  # the ring has the last 4096 ticks
-                rows.append(new)
-                if len(new): plot(np.concatenate(rows), picture)
+                time.sleep(max(0, min(1, end - time.monotonic())))
+                new, at = segment.records(at)
+                if len(new): plot(np.concatenate([*ticks, new]), picture), ticks.append(new)
     except SegmentError as error: raise ValueError(str(error)) from None
-    if not sum(map(len, rows)): raise ValueError(f"{name}: no tick came in {seconds} s; is its device there?")
+    if not ticks: raise ValueError(f"{name}: no tick came in {seconds} s; is its device there?")
 
 def plot(ticks, picture):
-    seconds = (ticks["start_ns"] - ticks["start_ns"][0]) * 1e-9
-    figure, (force, depth) = plt.subplots(2, sharex=True)
-    force.plot(seconds, np.linalg.norm(ticks["commanded_force_n"], axis=1), color="tab:red", linewidth=0.8)
-    force.set(ylabel="force (N)")
-    depth.plot(seconds, ticks["penetration_mm"], color="tab:blue", linewidth=0.8)
-    depth.set(ylabel="depth (mm)", xlabel="time (s)")
-    figure.savefig(picture, dpi=120)
-    plt.close(figure)
+    plt.clf(), plt.xlabel("time (s)")
+    for column, unit in (("commanded_force_n", "force (N)"), ("penetration_mm", "depth (mm)")):
+        plt.plot(ticks["start_ns"] * 1e-9, np.linalg.norm(ticks[column].reshape(len(ticks), -1), axis=1), label=unit)
+    plt.legend(), plt.savefig(picture, dpi=120)
 
 one_line.run(draw, __doc__)

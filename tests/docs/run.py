@@ -29,7 +29,7 @@ NOT_HERE = {
     "needs a device, or its kernel": [
         "cat /sys/kernel/realtime", "./kerf controller --probe",
         "./kerf controller --scene mine.toml --device omni --port fw"],
-    "records or exports the run of a device": ["./kerf recorder", "./kerf record export weights"],
+    "records or exports the run of a device": ["./kerf recorder", "./kerf record export"],
     "needs a second terminal or machine": [
         "./kerf emulator", "./kerf controller --scene scenes/touch.toml --torque-scale",
         "./kerf controller --scene scenes/phantom.toml --port socket", "./kerf controller --name tooth",
@@ -44,7 +44,7 @@ NOT_HERE = {
     "needs a registry of images": ["podman "],
     "runs all tests, or many minutes": [
         "./kerf test", "safety.md: ./kerf lab", "./kerf lab ranges", ".ci/check-determinism.sh", "./kerf bench",
-        "KERF_KILLS="],
+        "KERF_KILLS=", "KERF_WRITE_PAGE=", "./kerf lab ablate"],
     "holds a core for a minute; with other options it runs here or in the tests lab and examples_python": [
         "./kerf lab zwidth --rate", "./kerf lab zwidth --map", "./kerf lab zwidth --arm",
         "./kerf lab zwidth --stabiliser", "parallel ./kerf lab zwidth", "./kerf lab merge", "./kerf sweep"],
