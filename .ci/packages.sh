@@ -19,7 +19,9 @@ if command -v dpkg-query >/dev/null; then
     if [[ $state == installed ]]; then installed[$name]=1; fi
   done < <(dpkg-query -W -f '${db:Status-Status} ${Package}\n')
   while read -r group name _; do
-    if [[ " $* " == *" $group "* && -z ${installed[$name]:-} ]]; then missing+=("$name"); fi
+    if [[ " $* " != *" $group "* || -n ${installed[$name]:-} ]]; then continue; fi
+    if [[ $name == npm ]] && command -v npm >/dev/null; then continue; fi  # node of its own project brings it
+    missing+=("$name")
   done <"$list"
 elif [[ -z $only_print ]]; then
   echo "packages: this is not Debian; what $list names is taken as installed" >&2
