@@ -241,7 +241,7 @@ class Watch {
   void run(SegmentServer& server, const std::atomic<bool>& stop) {
     Keys keys;
     pace_.start(monotonic_ns());
-    tell();
+    print_state();
     while (!stop) {
       Request request = keys.next();
       if (const auto command = server.take_command();
@@ -290,17 +290,17 @@ class Watch {
         return;
     }
     pace_.start(monotonic_ns());
-    tell();
+    print_state();
   }
 
-  void pause(bool pauses, bool tells = true) {
+  void pause(bool pauses, bool prints = true) {
     is_paused_ = pauses;
     segment_.set_lifecycle(pauses ? Lifecycle::hold : Lifecycle::run);
     pace_.start(monotonic_ns());
-    if (tells) tell();
+    if (prints) print_state();
   }
 
-  void tell() const {
+  void print_state() const {
     std::printf("tick %llu of %llu (%.3f s), speed %g%s\n",
                 static_cast<unsigned long long>(run_.tick()),
                 static_cast<unsigned long long>(run_.last_tick()),

@@ -35,7 +35,7 @@ struct FoxgloveMessage {
 /// one.
 ///
 /// Nothing is queued but answers, `kMostAnswers` of them: ticks are read from the segment when they
-/// are sent. Ticks older than `kBehindNs` are left out, and the client is told so at most every
+/// are sent. Ticks older than `kBehindNs` are left out, and the client gets a status at most every
 /// `kToldNs`: over a slow link it gets evenly fewer, a little late. Of a servo that is faster than
 /// 1 kHz so many ticks are left out that 1,000 a second remain.
 ///
@@ -66,7 +66,7 @@ class FoxgloveSession {
   void unsubscribe(std::uint32_t id);
   void answer(Level level, const std::string& text);
   void greet(const SegmentReader* run);
-  /// Tells once what the run is doing.
+  /// Sends once what the run is doing.
   void follow(const SegmentReader* run, bool ended);
   [[nodiscard]] bool is_wanted(RosTopic topic) const noexcept;
   [[nodiscard]] bool next_of_tick(FoxgloveMessage& out);
@@ -80,7 +80,7 @@ class FoxgloveSession {
   RosMessages messages_{1};
   std::uint64_t stride_ = 1, most_behind_ = 1;
   std::uint64_t index_ = 0;     // of the next tick in the ring
-  std::uint64_t left_out_ = 0;  // ticks, not yet told
+  std::uint64_t left_out_ = 0;  // ticks, in no status yet
   std::int64_t told_ns_ = 0;
   TickRecord record_{};         // is being sent
   std::uint8_t part_ = kParts;  // of it: the time, then each topic
