@@ -18,7 +18,7 @@ RIG = ["lab/rig/*"]
 # Page, the command that makes it, the sources of its rows and texts.
 PAGES = {
     "docs/accuracy.md": ("./kerf lab accuracy --page docs/accuracy.md", ["lab/accuracy/*", "lab/report/accuracy.py", *RIG]),
-    "docs/contact.md": ("./kerf lab extremes --page docs/contact.md", ["lab/contact/*", "lab/report/contact.py", *RIG]),
+    "docs/contact.md": ("./kerf lab extremes --data DIR --page docs/contact.md", ["lab/contact/*", "lab/report/contact.py", *RIG]),
     "docs/energy.md": ("./kerf lab energy --page docs/energy.md", ["lab/stability/energy_*", "lab/report/energy.py"]),
     "docs/stability.md": ("./kerf lab zwidth --page docs/stability.md",
                           ["lab/stability/*", "!lab/stability/energy_*", "controller/stability/*", "lab/report/stability*"]),

@@ -185,6 +185,9 @@ class Demo:
         if options.virtual and (options.headless or options.out):  # else it is over before a picture
             os.mkfifo(processes.path("lead"))
             until, self.lead = ["--until", processes.path("lead")], ["--lead", processes.path("lead")]
+        if options.virtual:
+            os.mkfifo(processes.path("log-lead"))
+            until += ["--until", processes.path("log-lead")]
         self.controller = processes.start("controller", [
             "--scene", self.scene, *options.volume, "--device", options.device, *self.ask, "--seconds", options.seconds,
             *(["--rate", options.rate] if options.rate else []), "--name", self.name,
@@ -200,7 +203,8 @@ class Demo:
         rate_hz = int(told.get("rate_hz", 1000))
         for line in demo_options.growth(options, rate_hz):
             say("kerf: demo: " + line)
-        self.recorder = processes.start("recorder", ["--name", self.name, "--out", os.path.join(self.results, "log")],
+        lead = ["--lead", processes.path("log-lead")] if options.virtual else []
+        self.recorder = processes.start("recorder", ["--name", self.name, "--out", os.path.join(self.results, "log"), *lead],
                                         out="recorder.log", log="recorder.log")
         hand = self.hand(told)
         self.start_pictures(rate_hz)

@@ -11,8 +11,10 @@
 #include <utility>
 
 #include "record/recording.hpp"
+#include "record/starting_volumes.hpp"
 #include "record/tick_log.hpp"
 #include "shared/posix/atomic_file.hpp"
+#include "shared/posix/tick_lead.hpp"
 #include "shared/segment/connection.hpp"
 #include "shared/text/command_line.hpp"
 #include "shared/text/json.hpp"
@@ -127,6 +129,9 @@ bool parse_options(int argc, char** argv, RecorderOptions& options) {
          "of the window write them as a recording into --out")
       .within(1, kMostFlightS)
       .shown_as("SECONDS");
+  app.option("--lead", options.lead,
+             "lead a controller in lock-step (its --until), so that no tick is lost")
+      .shown_as("FIFO");
   app.flag("--strict", options.strict, "exit 1 if ticks were lost");
   app.option("--report", options.report, "write the figures as JSON");
   if (!app.parse(argc, argv, std::cout)) return false;
@@ -134,8 +139,10 @@ bool parse_options(int argc, char** argv, RecorderOptions& options) {
     throw UsageError(
         "--resume: a flight recorder has nothing to go on with; leave one of both out");
   }
-  if (options.flight_s > 0 && (options.strict || !options.report.empty())) {
-    throw UsageError("--strict, --report: are of a whole run; leave them out beside --flight");
+  if (options.flight_s > 0 &&
+      (options.strict || !options.report.empty() || !options.lead.empty())) {
+    throw UsageError(
+        "--strict, --report, --lead: are of a whole run; leave them out beside --flight");
   }
   return true;
 }
@@ -202,7 +209,9 @@ class Recording {
         sink_(log_, reader().info()),
         recorder_(begin.next ? Recorder(reader(), sink_, *begin.next, begin.losses)
                              : Recorder(reader(), sink_)),
-        whole_(log_.rows() == 0) {
+        whole_(log_.rows() == 0),
+        volumes_(options.name, options.out) {
+    if (!options.lead.empty()) lead_.emplace(options.lead);
     write_new_file(out_ / kSceneName, reader().info().scene_json);
     manifest(kStillRunning);
   }
@@ -213,6 +222,9 @@ class Recording {
     while (!ended) {
       // Checked before the poll, which records all that was published until then.
       ended = stop || has_ended(connection_);
+      // Half of the ring: the controller goes on while this reads, and overwrites nothing unread.
+      if (lead_ && volumes_.copied())
+        lead_->allow(recorder_.next() + reader().info().state_slots / 2);
       const std::uint64_t lost = recorder_.losses().lost;
       const std::uint64_t got = recorder_.poll();
       if (const std::uint64_t more = recorder_.losses().lost - lost; more > 0) {
@@ -228,6 +240,10 @@ class Recording {
     }
     recorder_.drain();
     log_.sync();
+    for (const std::string& problem : volumes_.finish()) {
+      if (recorder_.losses().missed_before_start > 0) continue;  // cannot be replayed anyhow
+      std::cerr << "kerf-recorder: " << problem << '\n';
+    }
   }
 
   void manifest(std::string_view reason) const {
@@ -250,6 +266,8 @@ class Recording {
   SummedLog sink_;
   Recorder recorder_;
   bool whole_;  ///< all rows went through `sink_`
+  std::optional<TickLead> lead_;
+  StartingVolumes volumes_;
 };
 
 void write_report(const std::filesystem::path& path, const Recorder& recorder, std::uint64_t rows,
@@ -269,6 +287,11 @@ void write_report(const std::filesystem::path& path, const Recorder& recorder, s
 int run_recorder(const RecorderOptions& options, const std::atomic<bool>& stop) {
   check_new_folder(options.out);
   check_outputs(recording_files(options.out), {{"--report", options.report, ".json"}});
+  if (!options.lead.empty()) {
+    if (const std::string why = TickLead::problem_with(options.lead); !why.empty()) {
+      throw RecordError(why);
+    }
+  }
   const SegmentConnection connection = connect_within(options, stop);
   const SegmentReader& reader = connection.reader();
   make_recording_folder(options.out);

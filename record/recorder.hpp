@@ -48,6 +48,8 @@ class Recorder {
   /// After the end of the controller: `poll`; a record that is still torn is a gap.
   void drain();
 
+  /// Index of the record that is read next.
+  [[nodiscard]] std::uint64_t next() const noexcept { return next_; }
   [[nodiscard]] const RecordLosses& losses() const noexcept { return losses_; }
   /// Most waiting records of all polls.
   [[nodiscard]] std::uint64_t largest_lag() const noexcept { return largest_lag_; }
@@ -76,6 +78,7 @@ struct RecorderOptions {
   double wait_s = 10;  ///< for the controller to appear
   bool strict = false;
   bool resume = false;  ///< goes on with the recording of the same run in `out`, if there is one
+  std::string lead;     ///< FIFO of a controller in lock-step (--until), which then loses no tick
   double flight_s = 0;  ///< above 0: a flight recorder of as many seconds
   std::filesystem::path report;  ///< may be empty
 };

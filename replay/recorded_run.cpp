@@ -14,6 +14,7 @@
 #include "controller/load/scene_json.hpp"
 #include "controller/loop/publisher.hpp"
 #include "controller/scene/scene_file.hpp"
+#include "record/starting_volumes.hpp"
 #include "record/tick_log.hpp"
 #include "shared/numeric/fnv1a.hpp"
 #include "shared/segment/layout.hpp"
@@ -42,16 +43,45 @@ std::string scene_text(const std::filesystem::path& path) {
 struct RecordedScene {
   std::string canonical;  ///< of the loaded scene
   SceneSource source;
+  InputsInJson inputs;
 };
 
 RecordedScene read_scene(const std::filesystem::path& path) {
   const std::string text = scene_text(path);
   try {
-    return {json_without_source(text), source_in(text)};
+    return {json_without_source(text), source_in(text), inputs_in(text)};
   } catch (const JsonError&) {
     throw RecordError(path.string() +
                       ": does not say what the scene was loaded from; record it with this version");
   }
+}
+
+/// What the recording has of its volumes and meshes, if the changes leave those as they were: keys
+/// of volumes and materials act on the densities as they are loaded, keys of tools on the meshes.
+RecordedInputs recorded_inputs(const std::filesystem::path& folder, InputsInJson from,
+                               const ReplayChanges& changes) {
+  const auto changes_one_of = [&](std::initializer_list<std::string_view> tables) {
+    return std::ranges::any_of(changes.settings, [&](const std::string& setting) {
+      return std::ranges::any_of(tables, [&](auto table) { return setting.starts_with(table); });
+    });
+  };
+  RecordedInputs out = std::move(from.inputs);
+  if (changes.scene || changes_one_of({"tool"})) out.meshes.clear();
+  const bool same_volumes = !changes.scene && !changes_one_of({"volume", "material"});
+  for (std::size_t v = 0; v < out.volumes.size(); ++v) {
+    std::optional<SceneVolume>& volume = out.volumes[v];
+    std::optional<VolumeContent> content;
+    if (same_volumes) {
+      content = read_starting_volume(folder, from.density_hashes[v], volume->image.grid);
+    }
+    if (!content) {
+      volume.reset();
+      continue;
+    }
+    volume->image.density = std::move(content->density);
+    volume->image.labels = std::move(content->labels);
+  }
+  return out;
 }
 
 /// A short form of a value: a number or a text as it is, else its beginning.
@@ -168,9 +198,9 @@ RecordedRun load_run(const std::filesystem::path& folder, const ReplayChanges& c
   check_begins_at_first_tick(folder, run.manifest);
   const RecordedScene recorded = read_scene(folder / kSceneName);
   const SceneSource source = changed(recorded.source, changes);
-  run.scene = load_scene(source);
+  run.scene = load_scene(source, recorded_inputs(folder, recorded.inputs, changes));
   run.canonical = canonical_json(run.scene);
-  run.scene_json = json_with_source(run.canonical, source);
+  run.scene_json = json_with_source(run.canonical, run.scene, source);
   if (changes.none()) {
     check_same(folder, recorded.canonical, run.canonical);
   } else {

@@ -15,6 +15,7 @@
 
 #include "controller/loop/publisher.hpp"
 #include "record/recording.hpp"
+#include "record/starting_volumes.hpp"
 #include "replay/compared_runs.hpp"
 #include "replay/watched_replay.hpp"
 #include "shared/numeric/fnv1a.hpp"
@@ -127,6 +128,7 @@ class ReplayLog {
     manifest["gaps"] = Json::List{};
     manifest["end_reason"] = "replayed";
     write_new_file(out_ / kSceneName, run.scene_json);
+    copy_starting_volumes(from_, out_);
     write_new_file(out_ / kManifestName, manifest.document());
   }
 

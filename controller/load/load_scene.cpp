@@ -67,11 +67,13 @@ SceneTool load_shape(const ToolSpec& spec, const ToolSize& size, double voxel_mm
 }
 
 SceneTool load_mesh(const ToolSpec& spec, double pitch_mm, double voxel_mm,
-                    const std::filesystem::path& folder, int cpu_s) {
-  const std::filesystem::path path = folder / spec.file;
+                    const MeshSource& from) {
+  const std::filesystem::path path = from.folder / spec.file;
   ToolMesh mesh;
   try {
-    mesh = join_triangles(read_stl(path, cpu_s), spec.scale, path.string());
+    mesh = from.mesh != nullptr
+               ? *from.mesh
+               : join_triangles(read_stl(path, from.cpu_s), spec.scale, path.string());
   } catch (const LoadError& error) {
     refuse(spec.where, std::string(": ") + error.what());
   }
@@ -120,8 +122,7 @@ SolidExtent touched_volumes(const std::vector<SceneVolume>& volumes) {
   return touched;
 }
 
-SceneTool load_tool(const ToolSpec& spec, const SolidExtent& touched,
-                    const std::filesystem::path& folder, int cpu_s) {
+SceneTool load_tool(const ToolSpec& spec, const SolidExtent& touched, const MeshSource& from) {
   ToolSize size = spec.size;
   if (!spec.pitch_given) {
     // Samples end inside of the surface by up to a pitch, and leave as large a part of that cell of
@@ -134,9 +135,8 @@ SceneTool load_tool(const ToolSpec& spec, const SolidExtent& touched,
     refuse(spec.pitch_place, " is above the smallest voxel edge and leaves gaps; use at most " +
                                  number_text(touched.voxel_mm));
   }
-  SceneTool tool = spec.shape == kMeshShape
-                       ? load_mesh(spec, size.pitch_mm, touched.voxel_mm, folder, cpu_s)
-                       : load_shape(spec, size, touched.voxel_mm);
+  SceneTool tool = spec.shape == kMeshShape ? load_mesh(spec, size.pitch_mm, touched.voxel_mm, from)
+                                            : load_shape(spec, size, touched.voxel_mm);
   tool.turns = spec.turns;
   check_shaft(spec, tool, touched.voxel_mm);
   tool.shaft = tool_shaft(spec.shaft, tool.length_mm);
@@ -331,9 +331,16 @@ void fit_to_volume(double written_mm, Scene& spec, LoadedScene& scene) {
   fit_cutting(grown, scale, scene);
 }
 
+const ToolMesh* mesh_of(const std::string& tool, const RecordedInputs& recorded) {
+  const auto found =
+      std::ranges::find(recorded.meshes, tool, &std::pair<std::string, ToolMesh>::first);
+  return found == recorded.meshes.end() ? nullptr : &found->second;
+}
+
 /// `first`: the image of the first volume, in place of its file.
 LoadedScene load_parsed(Scene spec, const std::filesystem::path& path,
-                        const SceneOverrides& overrides, VolumeImage* first) {
+                        const SceneOverrides& overrides, VolumeImage* first,
+                        RecordedInputs recorded = {}) {
   const double written_mm =
       spec.device.fit ? kPhantomVoxelMm : written_voxel_mm(spec.volumes.front());
   const std::optional<double> written_iso = spec.volumes.front().iso;
@@ -343,6 +350,10 @@ LoadedScene load_parsed(Scene spec, const std::filesystem::path& path,
   static_cast<SceneSettings&>(scene) = spec;
   scene.volume_specs = spec.volumes;
   for (std::size_t i = 0; i < spec.volumes.size(); ++i) {
+    if (i < recorded.volumes.size() && recorded.volumes[i]) {
+      scene.volumes.push_back(std::move(*recorded.volumes[i]));
+      continue;
+    }
     const bool from_command_line = i == 0 && overrides.volume_file;
     const VolumeSource from{.folder = from_command_line ? "" : path.parent_path(),
                             .unknown = from_command_line,
@@ -367,7 +378,8 @@ LoadedScene load_parsed(Scene spec, const std::filesystem::path& path,
   const SolidExtent touched = touched_volumes(scene.volumes);
   for (const ToolSpec& tool : spec.tools) {
     try {
-      scene.tools.push_back(load_tool(tool, touched, path.parent_path(), overrides.read_cpu_s));
+      scene.tools.push_back(load_tool(
+          tool, touched, {path.parent_path(), overrides.read_cpu_s, mesh_of(tool.name, recorded)}));
       scene.tool_specs.push_back(tool);
       scene.tool_specs.back().size.pitch_mm = scene.tools.back().pitch_mm;
       scene.tool_specs.back().size.radius_mm = scene.tools.back().radius_mm;
@@ -398,9 +410,9 @@ LoadedScene load_scene(const std::filesystem::path& path, const SceneOverrides& 
 }
 
 LoadedScene load_scene(const std::filesystem::path& path, std::string_view text,
-                       const SceneOverrides& overrides) {
+                       const SceneOverrides& overrides, RecordedInputs recorded) {
   return load_parsed(parse_scene(text, path, scene_keys(), overrides.settings), path, overrides,
-                     nullptr);
+                     nullptr, std::move(recorded));
 }
 
 LoadedScene load_scene(const std::filesystem::path& path, std::string_view text,

@@ -5,7 +5,9 @@
 #include <filesystem>
 #include <limits>
 #include <optional>
+#include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "controller/input/sandbox.hpp"
@@ -72,9 +74,15 @@ inline constexpr std::array<double, 3> kWorkspaceMm = {100.0, 80.0, 60.0};
 /// voxels of 0.125 mm. If no volume has labels, only the materials that the scene names stay.
 [[nodiscard]] LoadedScene load_scene(const std::filesystem::path& path, const SceneOverrides& = {});
 
+/// What a recording has of a loaded scene. Takes the place of its files.
+struct RecordedInputs {
+  std::vector<std::optional<SceneVolume>> volumes{};       ///< by number; none: of its file
+  std::vector<std::pair<std::string, ToolMesh>> meshes{};  ///< by the name of the tool
+};
+
 /// The same with the text that the file has, or had.
 [[nodiscard]] LoadedScene load_scene(const std::filesystem::path& path, std::string_view text,
-                                     const SceneOverrides& overrides);
+                                     const SceneOverrides& overrides, RecordedInputs recorded = {});
 
 /// The same before files are written: a scene whose text will be written to `path`, and the
 /// densities and labels of its first volume, whose window there is [0, 65535].
@@ -133,9 +141,16 @@ struct SolidExtent {
 };
 [[nodiscard]] SolidExtent touched_volumes(const std::vector<SceneVolume>& volumes);
 
-/// The samples of one tool, or those of its mesh from a file in `folder`. Throws LoadError if it
-/// does not fit the volumes. Load time.
+/// Source of the mesh of a tool.
+struct MeshSource {
+  std::filesystem::path folder;
+  int cpu_s = kReadCpuSeconds;
+  const ToolMesh* mesh = nullptr;  ///< if set, replaces the file; in mm
+};
+
+/// The samples of one tool, or those of its mesh. Throws LoadError if it does not fit the volumes.
+/// Load time.
 [[nodiscard]] SceneTool load_tool(const ToolSpec& spec, const SolidExtent& touched,
-                                  const std::filesystem::path& folder, int cpu_s = kReadCpuSeconds);
+                                  const MeshSource& from);
 
 }  // namespace kerf

@@ -28,11 +28,11 @@ struct SceneVolume {
   std::string name;
   std::string file;
   std::string note{};  ///< of the reading of its file (SourceVolume), or empty
-  VolumeImage image;
-  Pose pose;
+  VolumeImage image{};
+  Pose pose{};
   Density iso = 32768;
   bool solid = true;
-  Noise noise;                          ///< as estimated
+  Noise noise{};                        ///< as estimated
   int denoised = 0;                     ///< passes made against it
   std::vector<std::string> proposal{};  ///< of --volume: "what=chosen" for each choice
   std::vector<Material> proposed{};     ///< the materials for it

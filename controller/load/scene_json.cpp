@@ -14,19 +14,12 @@
 
 #include "controller/scene/scene_file.hpp"
 #include "controller/tool/tool_shapes.hpp"
-#include "shared/numeric/fnv1a.hpp"
 #include "shared/text/json.hpp"
 #include "shared/text/text.hpp"
+#include "shared/volume/checksum.hpp"
 
 namespace kerf {
 namespace {
-
-std::string content_hash(const VolumeImage& image) {
-  std::uint64_t hash = kFnv1aBasis;
-  for (const Density density : image.density) hash = fnv1a_bytes(hash, density, sizeof density);
-  for (const Label label : image.labels) hash = fnv1a_step(hash, label);
-  return hex64(hash);
-}
 
 Json volume_json(const SceneVolume& volume) {
   const VoxelGrid& grid = volume.image.grid;
@@ -38,7 +31,7 @@ Json volume_json(const SceneVolume& volume) {
           {"grid", std::array{grid.nx, grid.ny, grid.nz}},
           {"pose",
            {{"position_mm", volume.pose.position_mm}, {"orientation", volume.pose.orientation}}},
-          {"density_hash", content_hash(volume.image)}};
+          {"density_hash", hex64(volume_hash(volume.image.density, volume.image.labels))}};
 }
 
 Json tool_json(const SceneTool& tool) {
@@ -185,14 +178,75 @@ SceneSource read_source(const std::filesystem::path& scene, const SceneOverrides
   return {absolute_path(scene), read_scene_text(scene), overrides};
 }
 
-LoadedScene load_scene(const SceneSource& source) {
-  return load_scene(source.path, source.text, source.overrides);
+LoadedScene load_scene(const SceneSource& source, RecordedInputs recorded) {
+  return load_scene(source.path, source.text, source.overrides, std::move(recorded));
 }
 
-std::string json_with_source(const std::string& canonical, const SceneSource& source) {
-  Json scene = Json::parse(canonical);
-  scene[kSource] = json_of(source);
-  return scene.canonical();
+std::string json_with_source(const std::string& canonical, const LoadedScene& scene,
+                             const SceneSource& source) {
+  Json root = Json::parse(canonical);
+  root[kSource] = json_of(source);
+  for (const Material& material : scene.volumes.front().proposed) {
+    root[kSource]["proposed"].push_back(
+        {{"name", material.name}, {"iso", material.iso}, {"colour", material.colour}});
+  }
+  return root.canonical();
+}
+
+namespace {
+
+SceneVolume volume_in(const Json& json) {
+  SceneVolume volume{.name = json.at("name").get<std::string>(),
+                     .file = json.at("file").get<std::string>(),
+                     .iso = json.at("iso").get<Density>(),
+                     .solid = json.at("solid").get<bool>()};
+  const auto [nx, ny, nz] = json.at("grid").get<std::array<std::int32_t, 3>>();
+  check_grid(one_line(volume.name), nx, ny, nz);
+  volume.image.grid = {nx, ny, nz};
+  volume.image.spacing_mm = json.at("spacing_mm").get<std::array<double, 3>>();
+  check_spacing(one_line(volume.name), volume.image.spacing_mm);
+  const Json& pose = json.at("pose");
+  volume.pose = {pose.at("position_mm").get<std::array<double, 3>>(),
+                 pose.at("orientation").get<std::array<double, 4>>()};
+  return volume;
+}
+
+ToolMesh mesh_in(const Json& json) {
+  ToolMesh mesh;
+  for (const Json& point : json.at("points_mm")) {
+    mesh.points_mm.push_back(point.get<ToolMesh::Point>());
+  }
+  for (const Json& triangle : json.at("triangles")) {
+    mesh.triangles.push_back(triangle.get<ToolMesh::Triangle>());
+    if (std::ranges::max(mesh.triangles.back()) >= mesh.points_mm.size()) {
+      throw JsonError("mesh.triangles: no such point");
+    }
+  }
+  return mesh;
+}
+
+}  // namespace
+
+InputsInJson inputs_in(std::string_view json) {
+  const Json scene = Json::parse(json);
+  InputsInJson out;
+  for (const Json& volume : scene.at("volumes")) {
+    out.inputs.volumes.push_back(volume_in(volume));
+    out.density_hashes.push_back(volume.at("density_hash").get<std::string>());
+  }
+  if (const Json& source = scene.at(kSource); source.contains("proposed")) {
+    for (const Json& material : source.at("proposed")) {
+      out.inputs.volumes.at(0)->proposed.push_back(
+          {.name = material.at("name").get<std::string>(),
+           .iso = material.at("iso").get<double>(),
+           .colour = material.at("colour").get<std::array<double, 3>>()});
+    }
+  }
+  for (const Json& tool : scene.at("tools")) {
+    if (!tool.contains("mesh")) continue;
+    out.inputs.meshes.emplace_back(tool.at("name").get<std::string>(), mesh_in(tool.at("mesh")));
+  }
+  return out;
 }
 
 SceneSource source_in(std::string_view json) {

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "controller/load/load_scene.hpp"
 #include "controller/load/loaded_scene.hpp"
@@ -40,10 +41,21 @@ struct SceneSource {
                                       const SceneOverrides& overrides);
 
 /// As `load_scene` of its path. Throws LoadError.
-[[nodiscard]] LoadedScene load_scene(const SceneSource& source);
+[[nodiscard]] LoadedScene load_scene(const SceneSource& source, RecordedInputs recorded = {});
 
-/// `canonical_json` of the loaded scene, and in it the source as `source`.
-[[nodiscard]] std::string json_with_source(const std::string& canonical, const SceneSource& source);
+/// `canonical_json` of the scene that was loaded from `source`, and in it the source as `source`,
+/// with the materials that were proposed for its first volume.
+[[nodiscard]] std::string json_with_source(const std::string& canonical, const LoadedScene& scene,
+                                           const SceneSource& source);
+
+/// The volumes and meshes in such a text. A volume has no density and no labels yet, only their
+/// hash.
+struct InputsInJson {
+  RecordedInputs inputs;
+  std::vector<std::string> density_hashes;  ///< by volume
+};
+/// Throws JsonError if it has none, and LoadError for a volume of impossible size.
+[[nodiscard]] InputsInJson inputs_in(std::string_view json);
 
 /// The source in such a text. Throws JsonError if it is no JSON, has no source, or one of another
 /// form.

@@ -6,6 +6,7 @@
 #include <limits>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 #include <fcntl.h>
 #include <poll.h>
@@ -55,47 +56,64 @@ class DeadlineClock {
   std::uint64_t overruns_ = 0;
 };
 
-/// Gate of a lock-step run, whose ticks take no time: it waits for a process that must see certain
-/// ticks, so that pictures are spread over the run and show the same ticks each time. That process
-/// writes the last allowed tick into a FIFO, as u64 of this machine; the newest one counts. Virtual
-/// time only: it blocks.
+/// Gate of a lock-step run, whose ticks take no time: it waits for processes that must see certain
+/// ticks, so that pictures are spread over the run and no tick is missing in its log. Each of them
+/// writes the last tick that it allows into a FIFO of its own, as u64 of this machine; the newest
+/// one counts. Virtual time only: it blocks.
 class TickGate {
  public:
-  /// Throws std::runtime_error with one line if `fifo` is none. `stop` outlives it.
-  TickGate(const std::string& fifo, const std::atomic<bool>& stop)
-      : fd_(open(fifo.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC)), stop_(stop) {
-    struct stat status {};
-    if (fd_ >= 0 && fstat(fd_, &status) == 0 && S_ISFIFO(status.st_mode)) return;
-    if (fd_ >= 0) close(fd_);
-    throw std::runtime_error("--until " + fifo + ": no FIFO; make one with mkfifo");
+  /// Throws std::runtime_error with one line if one of `fifos` is none. `stop` outlives it.
+  TickGate(const std::vector<std::string>& fifos, const std::atomic<bool>& stop) : stop_(stop) {
+    for (const std::string& fifo : fifos) {
+      leads_.push_back({open(fifo.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC)});
+      struct stat status {};
+      const int fd = leads_.back().fd;
+      if (fd >= 0 && fstat(fd, &status) == 0 && S_ISFIFO(status.st_mode)) continue;
+      close_all();
+      throw std::runtime_error("--until " + fifo + ": no FIFO; make one with mkfifo");
+    }
   }
-  ~TickGate() { close(fd_); }
+  ~TickGate() { close_all(); }
   TickGate(const TickGate&) = delete;
   TickGate& operator=(const TickGate&) = delete;
 
-  /// Returns once `tick` is allowed, or the loop has to stop. If the writer is gone, or writes
-  /// nothing for `kPatienceMs`, all later ticks pass.
+  /// Returns once all allow `tick`, or the loop has to stop. If a writer is gone, or writes nothing
+  /// for `kPatienceMs`, it allows all later ticks.
   void wait_for(std::uint64_t tick) noexcept {
-    for (int waited_ms = 0; tick > allowed_ && waited_ms < kPatienceMs;) {
-      if (stop_.load(std::memory_order_relaxed)) return;
-      pollfd fifo{fd_, POLLIN, 0};
-      if (poll(&fifo, 1, kLookMs) <= 0) {
-        waited_ms += kLookMs;
-      } else if (read(fd_, &allowed_, sizeof allowed_) != sizeof allowed_) {
-        break;  // the writer has gone; eight bytes come whole, or not at all
-      }
-    }
-    if (tick > allowed_) allowed_ = std::numeric_limits<std::uint64_t>::max();
+    for (Lead& lead : leads_) wait_for(lead, tick);
   }
 
   static constexpr int kPatienceMs = 10'000;
 
  private:
+  struct Lead {
+    int fd = -1;
+    std::uint64_t allowed = 0;
+  };
+
+  void wait_for(Lead& lead, std::uint64_t tick) const noexcept {
+    for (int waited_ms = 0; tick > lead.allowed && waited_ms < kPatienceMs;) {
+      if (stop_.load(std::memory_order_relaxed)) return;
+      pollfd fifo{lead.fd, POLLIN, 0};
+      if (poll(&fifo, 1, kLookMs) <= 0) {
+        waited_ms += kLookMs;
+      } else if (read(lead.fd, &lead.allowed, sizeof lead.allowed) != sizeof lead.allowed) {
+        break;  // the writer has gone; eight bytes come whole, or not at all
+      }
+    }
+    if (tick > lead.allowed) lead.allowed = std::numeric_limits<std::uint64_t>::max();
+  }
+
+  void close_all() noexcept {
+    for (const Lead& lead : leads_) {
+      if (lead.fd >= 0) close(lead.fd);
+    }
+  }
+
   static constexpr int kLookMs = 100;  ///< period of the checks for a stop request
 
-  int fd_;
+  std::vector<Lead> leads_;
   const std::atomic<bool>& stop_;
-  std::uint64_t allowed_ = 0;
 };
 
 /// A servo whose ticks begin so far apart has stood still: its last contact is outdated.

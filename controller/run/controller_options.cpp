@@ -114,9 +114,11 @@ void declare_run_options(Arguments& app, ControllerOptions& options, Raw& raw) {
   app.option("--name", options.name, "name under which readers find the segment").shows_default();
   app.flag("--virtual", options.virtual_time,
            "lock-step with the device, no clock: the same input gives the same bits");
-  app.option("--until", options.until,
-             "with --virtual: go on only to the tick that a picture asks for in this FIFO (the "
-             "visualizer's --lead)")
+  app.option(
+         "--until", options.until,
+         "with --virtual: go on only to the tick that the other end of this FIFO allows (--lead "
+         "of visualizer and recorder); may be given often")
+      .one_each()
       .shown_as("FIFO");
   app.flag("--unchecked-gain", options.unchecked_gain,
            "give a real device a stiffness and damping above its own bounds or stability; the "

@@ -3,6 +3,7 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "controller/load/load_scene.hpp"
 #include "controller/loop/real_time.hpp"
@@ -19,8 +20,8 @@ struct ControllerOptions {
   double wait_s = 60;             ///< servo time for the device to be taken in hand
   std::string name = kDefaultName;
   bool virtual_time = false;
-  std::string until;            ///< FIFO with the tick up to which lock-step may go; empty: none
-  bool unchecked_gain = false;  ///< gains above the device's and beyond its stability
+  std::vector<std::string> until;  ///< FIFOs with the tick up to which lock-step may go
+  bool unchecked_gain = false;     ///< gains above the device's and beyond its stability
   bool check = false;
   bool explain = false;
   bool probe = false;

@@ -123,7 +123,7 @@ SegmentWriter new_segment(const ControllerOptions& options, const PlannedScene& 
   const LoadedScene& scene = planned.scene;
   const std::string json = canonical_json(scene);
   report.config_hash = fnv1a(json);
-  const std::string with_source = json_with_source(json, planned.source);
+  const std::string with_source = json_with_source(json, scene, planned.source);
   const SegmentSpec spec = segment_spec(scene, with_source, report.config_hash);
   check_memory(scene, planned.servo->costs(), plan_segment(spec).header.total_bytes);
   if (!options.emulator_args.empty()) write_new_file(options.emulator_args, hand_lines(scene));

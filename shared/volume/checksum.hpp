@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <span>
 
+#include "shared/numeric/fnv1a.hpp"
 #include "shared/volume/voxel_grid.hpp"
 
 namespace kerf {
@@ -26,6 +27,16 @@ class DensityHasher {
 
 /// Hash of a whole volume.
 [[nodiscard]] std::uint64_t density_hash(std::span<const Density> density) noexcept;
+
+/// fnv1a of all densities, low byte first, and all labels: the content of a volume, as the JSON of
+/// a scene and the files beside a log name it.
+[[nodiscard]] inline std::uint64_t volume_hash(std::span<const Density> density,
+                                               std::span<const Label> labels) noexcept {
+  std::uint64_t hash = kFnv1aBasis;
+  for (const Density one : density) hash = fnv1a_bytes(hash, one, sizeof one);
+  for (const Label label : labels) hash = fnv1a_step(hash, label);
+  return hash;
+}
 
 /// Hash of the densities in `box` of the volume `linear`, row by row; `box` lies in `grid`.
 [[nodiscard]] std::uint64_t box_hash(std::span<const Density> linear, const VoxelGrid& grid,

@@ -2,6 +2,7 @@
 """A recording is replayed to the bit, and what is wrong with one is named: runs controller, emulator, recorder and replay.
 
     replay_test.py ROOT BIN"""
+import gzip
 import json
 import pathlib
 import shutil
@@ -39,6 +40,38 @@ def replay(log, *options, code=0):
         assert done.stderr.count("\n") == 1, done.stderr
         return done.stderr
     return done.stdout
+
+
+SCENE_OF_FILES = """
+[[volume]]
+file = "ball.nrrd"
+iso = 0.45
+[[tool]]
+name = "bur"
+shape = "stl"
+file = "bur.stl"
+[cut]
+machinability_mm3_per_s_n = 40
+[[material]]
+name = "enamel"
+felt_iso = 0.4
+[hand]
+script = "touch.toml"
+"""
+
+
+def write_ball(path, labels):
+    """A ball of 10 mm that grows denser inwards, in 48 voxels of 0.25 mm a side; its upper half has label 1."""
+    side = 48
+    places = [(x, y, z) for z in range(side) for y in range(side) for x in range(side)]
+    depth = [20 - sum((2 * c - side + 1) ** 2 for c in place) ** 0.5 / 2 for place in places]
+    head = f"NRRD0004\ntype: %s\ndimension: 3\nspace: left-posterior-superior\nsizes: {side} {side} {side}\n" \
+        "space directions: (0.25,0,0) (0,0.25,0) (0,0,0.25)\nendian: little\nencoding: raw\nspace origin: (0,0,0)\n\n"
+    density = [max(0, min(65535, int(29000 + 4000 * inside))) for inside in depth]
+    path.write_bytes((head % "uint16").encode() + struct.pack(f"<{len(density)}H", *density))
+    if labels:
+        path.with_name(path.stem + "-labels.nrrd").write_bytes(
+            (head % "uint8").encode() + bytes(int(value > 0 and place[2] > 24) for place, value in zip(places, depth)))
 
 
 class TestReplay(unittest.TestCase):
@@ -96,6 +129,42 @@ class TestReplay(unittest.TestCase):
             self.assertIn("each equal", replay(self.log))
         finally:
             self.scene.write_text(text)
+
+    def test_the_files_of_the_scene_may_have_gone(self):
+        """A volume with labels and a mesh, and a volume without settings for which the scene's materials are proposed."""
+        folder = self.run_folder / "files"
+        folder.mkdir()
+        (folder / "scene.toml").write_text(SCENE_OF_FILES)
+        shutil.copy(ROOT / "scenes/burs/fluted.stl", folder / "bur.stl")
+        shutil.copy(ROOT / "scenes/hands/touch.toml", folder)
+        write_ball(folder / "ball.nrrd", labels=True)
+        write_ball(folder / "scan.nrrd", labels=False)
+        for name, options in (("own", ()), ("proposed", ("--volume", folder / "scan.nrrd"))):
+            (folder / name).mkdir()
+            report = record(ROOT, BIN, folder / name, folder / "scene.toml", 2, *options)
+            self.assertGreater(report["removed_mm3"], 1e-3)
+            (folder / name / "hash").write_text(report["output_hash"])
+        kept = folder / "own/log/volumes"
+        self.assertEqual(len(list(kept.iterdir())), 2)
+        for file in folder.iterdir():
+            if file.is_file():
+                file.unlink()
+        for name in ("own", "proposed"):
+            self.assertIn((folder / name / "hash").read_text(), replay(folder / name / "log"))
+        again = folder / "again"
+        self.assertIn("peak force", replay(folder / "own/log", "--set", "force.stiffness_n_per_mm=0.2", "--out", again))
+        self.assertIn("each equal", replay(again))
+        # Another window or scale needs the file itself.
+        for key, file in (("volume.window=[0, 50000]", "ball.nrrd: no such file"), ("tool.scale=0.9", "bur.stl: no such STL file")):
+            self.assertIn(file, replay(folder / "own/log", "--set", key, code=2))
+        labels, density = sorted(kept.iterdir(), key=lambda path: len(path.name), reverse=True)
+        sound = density.read_bytes()
+        for damaged in (sound[:100], sound[:-12], gzip.compress(gzip.decompress(sound) + b"x"),
+                        gzip.compress(gzip.decompress(sound)[:-1] + b"x"), labels.read_bytes(), b""):
+            density.write_bytes(damaged)
+            self.assertIn("copy the recording again", replay(folder / "own/log", code=2))
+        density.unlink()
+        self.assertIn("ball.nrrd", replay(folder / "own/log", code=2))
 
     def test_another_input_is_found_at_its_tick(self):
         encoder = struct.unpack_from("<i", self.rows(self.log), HEADER + 1500 * self.row + 264)[0]

@@ -70,7 +70,7 @@ TEST_CASE("a gate holds the ticks that were not allowed, and opens if the writer
   const TemporaryFolder folder;
   const std::string fifo = fifo_in(folder);
   const std::atomic<bool> stop{false};
-  TickGate gate(fifo, stop);
+  TickGate gate({fifo}, stop);
   const int writer = open(fifo.c_str(), O_WRONLY);
   REQUIRE(writer >= 0);
   const auto allow = [&](std::uint64_t tick) {
@@ -102,7 +102,7 @@ TEST_CASE("a gate opens on a stop request, and is a FIFO or refused") {
   const TemporaryFolder folder;
   const std::string fifo = fifo_in(folder);
   std::atomic<bool> stop{false};
-  TickGate gate(fifo, stop);
+  TickGate gate({fifo}, stop);
   auto waiting = std::async(std::launch::async, [&] { gate.wait_for(1); });
   CHECK(waiting.wait_for(std::chrono::milliseconds(50)) == std::future_status::timeout);
   stop = true;
@@ -110,7 +110,7 @@ TEST_CASE("a gate opens on a stop request, and is a FIFO or refused") {
 
   std::ofstream(folder / "file") << "12345678";
   for (const std::string& wrong : {(folder / "file").string(), (folder / "none").string()}) {
-    CHECK_THROWS_AS(TickGate(wrong, stop), std::runtime_error);
+    CHECK_THROWS_AS(TickGate({wrong}, stop), std::runtime_error);
   }
 }
 

@@ -24,6 +24,7 @@
 #include "shared/numeric/statistics.hpp"
 #include "shared/posix/atomic_file.hpp"
 #include "shared/posix/stop_signals.hpp"
+#include "shared/posix/tick_lead.hpp"
 #include "shared/text/text.hpp"
 #include "visualizer/app/run.hpp"
 #include "visualizer/compose/picture_layers.hpp"
@@ -161,33 +162,6 @@ constexpr auto kIdle = std::chrono::milliseconds(2);  // two ticks: a picture is
 constexpr auto kShort = std::chrono::microseconds(100);  // where the next tick is due
 constexpr double kMsPerS = 1e3;
 
-/// Leads a controller in lock-step from picture to picture: writes into its FIFO (`--until`) how
-/// far it may go. Never waits: a controller that does not read yet is written to again.
-class TickLead {
- public:
-  explicit TickLead(std::string fifo) noexcept : fifo_(std::move(fifo)) {
-    make_signals_of_writes_errors();
-  }
-  ~TickLead() {
-    if (fd_ >= 0) close(fd_);
-  }
-  TickLead(const TickLead&) = delete;
-  TickLead& operator=(const TickLead&) = delete;
-
-  /// Ticks up to this one may run. Call it as often as the picture is looked at.
-  void allow(std::uint64_t tick) noexcept {
-    // ENXIO while there is no reader.
-    if (fd_ < 0) fd_ = open(fifo_.c_str(), O_WRONLY | O_NONBLOCK | O_CLOEXEC);
-    if (fd_ < 0 || tick <= told_) return;
-    if (write(fd_, &tick, sizeof tick) == sizeof tick) told_ = tick;
-  }
-
- private:
-  std::string fifo_;
-  int fd_ = -1;
-  std::uint64_t told_ = 0;
-};
-
 std::filesystem::path frame_file(const std::filesystem::path& folder, std::uint32_t number) {
   std::array<char, 32> name{};
   std::snprintf(name.data(), name.size(), "frame-%04u.png", number);
@@ -263,8 +237,10 @@ std::chrono::duration<double> pause_before_frame(const Film& film, const Session
 }
 
 void check_lead(const VisualizerOptions& options) {
-  if (!options.lead || std::filesystem::is_fifo(*options.lead)) return;
-  throw VisualizerError("--lead " + *options.lead + ": no FIFO; make one with mkfifo");
+  if (!options.lead) return;
+  if (const std::string why = TickLead::problem_with(*options.lead); !why.empty()) {
+    throw VisualizerError(why);
+  }
 }
 
 void forget_frames(FrameReport& report) {

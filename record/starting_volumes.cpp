@@ -1,0 +1,217 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "record/starting_volumes.hpp"
+
+#include <algorithm>
+#include <cstddef>
+#include <memory>
+#include <set>
+#include <span>
+#include <system_error>
+#include <utility>
+
+#include <zlib.h>
+
+#include "record/tick_log.hpp"
+#include "shared/segment/connection.hpp"
+#include "shared/segment/reader.hpp"
+#include "shared/text/json.hpp"
+#include "shared/text/text.hpp"
+#include "shared/volume/checksum.hpp"
+
+namespace kerf {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::string_view kFolder = "volumes";
+constexpr unsigned kPiece = 1u << 20;
+
+/// A gzip file; no file if it cannot be opened.
+using GzipFile = std::unique_ptr<gzFile_s, decltype(&gzclose)>;
+
+GzipFile open_gzip(const fs::path& path, const char* mode) {
+  return {gzopen(path.c_str(), mode), &gzclose};
+}
+
+/// The header of an NPY file of one number per voxel, padded to 128 bytes.
+std::string volume_header(std::string_view type, const VoxelGrid& grid) {
+  constexpr std::size_t kBytes = 128;
+  constexpr std::size_t kPreamble = 10;
+  std::string header = "\x93NUMPY";
+  header += {'\x01', '\0', static_cast<char>(kBytes - kPreamble), '\0'};
+  header += "{'descr': '" + std::string(type) + "', 'fortran_order': False, 'shape': (" +
+            std::to_string(grid.nz) + ", " + std::to_string(grid.ny) + ", " +
+            std::to_string(grid.nx) + "), }";
+  header.resize(kBytes - 1, ' ');
+  return header + '\n';
+}
+
+template <class Voxel>
+constexpr std::string_view type_of() {
+  return sizeof(Voxel) == 1 ? "|u1" : "<u2";
+}
+
+fs::path density_path(const fs::path& folder, std::string_view hash) {
+  return folder / kFolder / (std::string(hash) + ".npy.gz");
+}
+fs::path labels_path(const fs::path& folder, std::string_view hash) {
+  return folder / kFolder / (std::string(hash) + "-labels.npy.gz");
+}
+
+/// Writes the file whole or not at all; false if the disk is full.
+template <class Voxel>
+bool write_voxels(const fs::path& path, const VoxelGrid& grid, std::span<const Voxel> voxels) {
+  const fs::path part = path.string() + ".part";
+  std::error_code fault;
+  GzipFile file = open_gzip(part, "wb1");  // the fastest: 3 % larger than the best on a CT
+  bool good = file != nullptr;
+  const auto write = [&](const void* data, std::size_t bytes) {
+    const auto* at = static_cast<const std::byte*>(data);
+    while (good && bytes > 0) {
+      const auto piece = static_cast<unsigned>(std::min<std::size_t>(bytes, kPiece));
+      good = gzwrite(file.get(), at, piece) == static_cast<int>(piece);
+      at += piece;
+      bytes -= piece;
+    }
+  };
+  const std::string header = volume_header(type_of<Voxel>(), grid);
+  write(header.data(), header.size());
+  write(voxels.data(), voxels.size_bytes());
+  good = file != nullptr && gzclose(file.release()) == Z_OK && good;
+  if (good) fs::rename(part, path, fault);
+  if (good && !fault) return true;
+  fs::remove(part, fault);
+  return false;
+}
+
+/// Reads exactly such a file. Throws RecordError.
+template <class Voxel>
+std::vector<Voxel> read_voxels(const fs::path& path, const VoxelGrid& grid) {
+  const auto refuse = [&]() -> std::vector<Voxel> {
+    throw RecordError(path.string() +
+                      ": not the volume that scene.json names; copy the recording again");
+  };
+  const GzipFile file = open_gzip(path, "rb");
+  if (file == nullptr) refuse();
+  const std::string header = volume_header(type_of<Voxel>(), grid);
+  std::string found(header.size(), '\0');
+  if (gzread(file.get(), found.data(), static_cast<unsigned>(found.size())) !=
+          static_cast<int>(found.size()) ||
+      found != header) {
+    refuse();
+  }
+  std::vector<Voxel> voxels(grid.voxel_count());
+  auto rest = std::as_writable_bytes(std::span(voxels));
+  while (!rest.empty()) {
+    const auto piece = static_cast<unsigned>(std::min<std::size_t>(rest.size(), kPiece));
+    if (gzread(file.get(), rest.data(), piece) != static_cast<int>(piece)) return refuse();
+    rest = rest.subspan(piece);
+  }
+  char beyond = 0;
+  if (gzread(file.get(), &beyond, 1) != 0) refuse();
+  return voxels;
+}
+
+/// One volume of a run: name and content hash as scene.json has them.
+struct NamedVolume {
+  std::string name, hash;
+};
+
+/// Empty if the scene has no such volumes.
+std::vector<NamedVolume> volumes_in(std::string_view scene_json) {
+  std::vector<NamedVolume> out;
+  try {
+    const Json scene = Json::parse(scene_json);
+    for (const Json& volume : scene.at("volumes")) {
+      out.push_back({one_line(volume.at("name").get<std::string>()),
+                     volume.at("density_hash").get<std::string>()});
+    }
+  } catch (const JsonError&) {
+    out.clear();
+  }
+  return out;
+}
+
+/// A hash is a part of a path, and scene.json of another machine may hold anything.
+bool is_hash(std::string_view text) {
+  return text.size() == 16 && text.find_first_not_of("0123456789abcdef") == std::string_view::npos;
+}
+
+}  // namespace
+
+StartingVolumes::StartingVolumes(std::string name, fs::path folder)
+    : name_(std::move(name)), folder_(std::move(folder)), thread_([this] { run(); }) {}
+
+std::vector<std::string> StartingVolumes::finish() {
+  if (thread_.joinable()) thread_.join();
+  return std::move(problems_);
+}
+
+void StartingVolumes::run() try {
+  const SegmentConnection connection = connect_segment(name_);
+  const SegmentReader& reader = connection.reader();
+  const std::vector<SegmentVolumeInfo>& infos = reader.info().volumes;
+  const std::vector<NamedVolume> named = volumes_in(reader.info().scene_json);
+  std::vector<VolumeSnapshot> copies(infos.size());
+  for (std::size_t v = 0; v < infos.size() && v < named.size(); ++v) reader.update(v, copies[v]);
+  copied_ = true;
+  std::set<std::string> kept;
+  for (std::size_t v = 0; v < infos.size() && v < named.size(); ++v) {
+    const auto& [volume, hash] = named[v];
+    if (!is_hash(hash) || !kept.insert(hash).second) continue;
+    const auto report = [&](std::string_view why) {
+      problems_.push_back("volume " + volume + ": not kept beside the log, " + std::string(why) +
+                          "; a replay reads its file again");
+    };
+    const std::vector<Density>& density = copies[v].density;
+    const std::span<const Label> labels = reader.labels(v);
+    if (fs::exists(density_path(folder_, hash))) continue;  // by the recorder before, of --resume
+    if (volume_hash(density, labels) != std::stoull(hash, nullptr, 16)) {
+      report("it was cut before it was copied");
+      continue;
+    }
+    std::error_code fault;
+    fs::create_directories(folder_ / kFolder, fault);
+    const VoxelGrid& grid = infos[v].grid;
+    // The densities last: they say that all is there.
+    const bool written =
+        (labels.empty() || write_voxels(labels_path(folder_, hash), grid, labels)) &&
+        write_voxels(density_path(folder_, hash), grid, std::span(density));
+    if (!written) report("the disk is full or refuses it");
+  }
+} catch (const std::exception& error) {
+  problems_.push_back(std::string("the volumes are not kept beside the log: ") + error.what());
+  copied_ = true;
+}
+
+std::optional<VolumeContent> read_starting_volume(const fs::path& folder, std::string_view hash,
+                                                  const VoxelGrid& grid) {
+  const fs::path path = density_path(folder, hash);
+  std::error_code fault;
+  if (!is_hash(hash) || !fs::is_regular_file(path, fault)) return std::nullopt;
+  VolumeContent out;
+  out.density = read_voxels<Density>(path, grid);
+  if (fs::is_regular_file(labels_path(folder, hash), fault)) {
+    out.labels = read_voxels<Label>(labels_path(folder, hash), grid);
+  }
+  if (hex64(volume_hash(out.density, out.labels)) != hash) {
+    throw RecordError(path.string() + ": damaged; copy the recording again");
+  }
+  return out;
+}
+
+void copy_starting_volumes(const fs::path& from, const fs::path& to) {
+  std::error_code fault;
+  if (!fs::is_directory(from / kFolder, fault)) return;
+  fs::create_directory(to / kFolder, fault);
+  for (const auto& entry : fs::directory_iterator(from / kFolder, fault)) {
+    if (!entry.path().string().ends_with(".npy.gz")) continue;
+    fs::copy_file(entry.path(), to / kFolder / entry.path().filename(), fault);
+    if (fault) {
+      throw RecordError((to / kFolder).string() + ": " + fault.message() +
+                        "; choose another --out");
+    }
+  }
+}
+
+}  // namespace kerf
