@@ -15,14 +15,15 @@ constexpr std::string_view kHead =
     R"(# The log of a run
 
 `kerf-recorder` writes every tick of a running controller into a folder; `./kerf demo --out DIR` keeps it as
-`DIR/log`. `./kerf record info DIR/log` sums it up, `record plot` draws it, `record export` makes CSV or MCAP of it, each
-with `--from TICK` and `--until TICK` for a part.
+`DIR/log`. `./kerf record info DIR/log` sums it up, `record plot` draws it, `record export` makes CSV, MCAP or HDF5 of
+it, each with `--from TICK` and `--until TICK` for a part.
 
 | file | what |
 |---|---|
 | `ticks.npy` | one row for each tick, the columns below, for NumPy as it is |
 | `manifest.json` | length of a tick, voxels, losses of the recorder and where they lie, how the run ended |
 | `scene.json` | the scene as it was loaded, every setting; `source` is what it was loaded from |
+| `volumes/HASH.npy.gz` | the densities of a volume as the run began, `[z, y, x]`; `HASH-labels.npy.gz`: its labels. HASH is `density_hash` in `scene.json` |
 
 Three lines of NumPy read it (`python/` is a reader with more, `examples/python/` uses it):
 
@@ -31,12 +32,13 @@ Three lines of NumPy read it (`python/` is a reader with more, `examples/python/
     print(np.abs(log["commanded_force_n"]).max(axis=0), "N")
 
 `log["position_mm"]` is an array of rows x 3. World millimetres, newtons at the device port, little-endian.
-`./kerf replay DIR/log` runs it again ([replay](replay.md)). `info` counts as lost what was published and is in no row, so the manifest says the same; a recorder that was
-killed leaves a manifest that says `running`, and all rows.
+`./kerf replay DIR/log` runs it again ([replay](replay.md)). `info` counts as lost what was published and is in no row, so the
+manifest says the same; a recorder that was killed leaves a manifest that says `running`, and all rows.
 
 ## For other tools
 
     ./kerf record export DIR/log --mcap run.mcap
+    ./kerf record export DIR/log --hdf5 run.h5
     ./kerf record export DIR/log --csv run.csv
 
 MCAP opens in Foxglove and its open forks, in PlotJuggler and with ROS 2 (`ros2 bag`); the definitions of the messages are in
@@ -49,6 +51,15 @@ the file. Times are `start_ns`.
 | `/kerf/force` | `geometry_msgs/msg/WrenchStamped`: `commanded_force_n`, in frame `device`, and `tip_torque_n_mm` in N m | 100 Hz |
 
 Chunks are packed by LZ4, and `--unpacked` leaves them as they are.
+
+HDF5 opens in MATLAB (`h5read("run.h5", "/ticks/position_mm")`), Julia, R and h5py: one dataset per column, `/ticks/COLUMN`,
+with `units`, `description` and `valid` as attributes, and `codes` if its values are codes or bits. `/scene` is the scene's
+JSON.
+
+A running controller can be plotted without a log: [Foxglove](second-machine.md) by the bridge, and PlotJuggler's UDP server
+(protocol JSON, timestamp from the message) by
+
+    ./kerf record live --udp 127.0.0.1:9870
 
 This page is made from the table in `shared/segment/log_columns.cpp` by
 

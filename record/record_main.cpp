@@ -4,6 +4,8 @@
 
 #include "record/flight_recorder.hpp"
 #include "record/force_plot.hpp"
+#include "record/hdf5_export.hpp"
+#include "record/live_json.hpp"
 #include "record/log_page.hpp"
 #include "record/mcap_export.hpp"
 #include "record/recording.hpp"
@@ -27,15 +29,14 @@ RecordSummary summary_for_info(const std::filesystem::path& folder, TickRange ra
   return summarise(folder, range);
 }
 
-/// `info DIR`, `plot DIR --out FILE.svg`, `export DIR --csv FILE` or `--mcap FILE`, `grab`,
-/// `columns`. Bad
-/// input throws.
+/// `info DIR`, `plot DIR --out FILE.svg`, `export DIR --csv FILE`, `--mcap FILE` or `--hdf5 FILE`,
+/// `grab`, `live`, `columns`. Bad input throws.
 int run_record(int argc, char** argv) {
   CommandLine app("Looks at what kerf-recorder wrote.", "kerf-record", KERF_VERSION);
   std::filesystem::path folder;
   std::filesystem::path report;
   std::filesystem::path svg;
-  std::filesystem::path csv, mcap;
+  std::filesystem::path csv, mcap, hdf5;
   bool unpacked = false, scan = false;
   TickRange range;
   std::string name = kDefaultName;
@@ -52,12 +53,22 @@ int run_record(int argc, char** argv) {
             "read all rows of a log above 256 MB, too: else the recorder's figures");
   Arguments plot = add_command("plot", "forces and penetration over time, as SVG");
   plot.option("--out", svg, "the SVG file").required();
-  Arguments table = add_command("export", "every tick for other programs: a line of text, or MCAP");
+  Arguments table =
+      add_command("export", "every tick for other programs: a line of text, MCAP, or HDF5");
   table.option("--csv", csv, "as CSV").shown_as("FILE");
   table.option("--mcap", mcap, "as MCAP, for Foxglove, PlotJuggler and ROS 2").shown_as("FILE");
+  table.option("--hdf5", hdf5, "as HDF5, for MATLAB, Julia and h5py").shown_as("FILE");
   table.flag("--unpacked", unpacked, "the MCAP without LZ4, for readers that have none");
   Arguments keep = app.command("grab", "a running flight recorder keeps the ticks until now");
   keep.option("--name", name, "name of the controller").shows_default();
+  LiveOptions live_to{.name = kDefaultName};
+  Arguments live = app.command(
+      "live", "send each tick of a running controller as JSON, as PlotJuggler takes it");
+  live.option("--name", live_to.name, "name of the controller").shows_default();
+  live.option("--udp", live_to.udp, "where to: [ADDRESS:]PORT").shows_default();
+  live.option("--every", live_to.every, "one datagram for so many ticks")
+      .within(1, 100'000)
+      .shows_default();
   const Arguments columns = app.command("columns", "what each column of a log says, as a page");
   if (!app.parse(argc, argv, std::cout)) return 0;
   if (columns.chosen()) std::cout << log_page();
@@ -71,16 +82,17 @@ int run_record(int argc, char** argv) {
     plot_forces(folder, svg, range);
     if (!is_stream(svg)) std::cout << svg.string() << ": written\n";
   }
-  if (table.chosen() && csv.empty() && mcap.empty()) {
-    throw UsageError("export: as what? give --csv FILE or --mcap FILE");
+  if (table.chosen() && csv.empty() && mcap.empty() && hdf5.empty()) {
+    throw UsageError("export: as what? give --csv FILE, --mcap FILE or --hdf5 FILE");
   }
+  if (!hdf5.empty()) export_hdf5(folder, hdf5, range);
   if (!csv.empty()) export_csv(folder, csv, range);
   if (!mcap.empty()) {
     export_mcap(folder, mcap, unpacked ? McapWriter::Packing::none : McapWriter::Packing::lz4,
                 range);
   }
   if (keep.chosen()) std::cout << grab(name).string() << ": kept\n";
-  return 0;
+  return live.chosen() ? send_live(live_to, catch_stop_signals()) : 0;
 }
 
 }  // namespace

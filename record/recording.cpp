@@ -2,9 +2,7 @@
 #include "record/recording.hpp"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
-#include <cstring>
 #include <fstream>
 #include <iomanip>
 #include <iterator>
@@ -14,10 +12,10 @@
 #include <system_error>
 
 #include "record/tick_log.hpp"
+#include "record/tick_text.hpp"
 #include "shared/posix/atomic_file.hpp"
 #include "shared/posix/error_text.hpp"
 #include "shared/segment/layout.hpp"
-#include "shared/segment/layout_table.hpp"
 #include "shared/text/json.hpp"
 #include "shared/text/text.hpp"
 
@@ -148,6 +146,20 @@ Manifest read_manifest(const std::filesystem::path& folder) {
   return out;
 }
 
+std::string recorded_scene(const std::filesystem::path& folder) {
+  const std::filesystem::path path = folder / kSceneName;
+  std::error_code fault;
+  const std::uintmax_t bytes = std::filesystem::file_size(path, fault);
+  if (fault || !std::filesystem::is_regular_file(path, fault)) {
+    throw RecordError(path.string() + ": cannot be read; " + way_to_recording(folder));
+  }
+  if (bytes > kMaxSceneBytes) {
+    throw RecordError(path.string() + ": larger than any scene; copy the recording again");
+  }
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
 SummaryBuilder::SummaryBuilder(std::uint32_t tick_ns, std::vector<double> voxel_mm3)
     : tick_ns_(tick_ns), voxel_mm3_(std::move(voxel_mm3)) {}
 
@@ -256,38 +268,6 @@ std::string to_json(const RecordSummary& summary) {
   return figures(summary).document();
 }
 
-namespace {
-
-template <class Number>
-void append(std::string& line, const std::byte* at) {
-  Number value{};
-  std::memcpy(&value, at, sizeof value);
-  char text[32];  // the longest double has 24 characters
-  line.append(text, std::to_chars(text, text + sizeof text, value).ptr);
-}
-
-void append_element(std::string& line, std::string_view type, const std::byte* at) {
-  if (type == "u64") append<std::uint64_t>(line, at);
-  if (type == "i64") append<std::int64_t>(line, at);
-  if (type == "u32") append<std::uint32_t>(line, at);
-  if (type == "i32") append<std::int32_t>(line, at);
-  if (type == "u16") append<std::uint16_t>(line, at);
-  if (type == "i16") append<std::int16_t>(line, at);
-  if (type == "f64") append<double>(line, at);
-  if (type == "f32") append<float>(line, at);
-}
-
-/// Calls `visit(field, element)` for each number of a tick record in order.
-template <class Visit>
-void for_each_number(Visit visit) {
-  for (const LayoutField& field : kLayoutTable) {
-    if (field.record != "TickRecord") continue;
-    for (std::uint32_t i = 0; i < field.count; ++i) visit(field, i);
-  }
-}
-
-}  // namespace
-
 void export_csv(const std::filesystem::path& folder, const std::filesystem::path& csv,
                 TickRange range) {
   check_outputs(recording_files(folder), {{"--csv", csv, ".csv"}});
@@ -299,17 +279,20 @@ void export_csv(const std::filesystem::path& folder, const std::filesystem::path
     file.write(line.data(), line.size());
     line.clear();
   };
-  for_each_number([&](const LayoutField& field, std::uint32_t i) {
-    line += field.name;
-    if (field.count > 1) line += "_" + std::to_string(i);
-    line += ',';
+  for_each_column([&](const LayoutField& field) {
+    for (std::uint32_t i = 0; i < field.count; ++i) {
+      line += field.name;
+      if (field.count > 1) line += "_" + std::to_string(i);
+      line += ',';
+    }
   });
   end_line();
   const auto write_row = [&](const TickRecord& record) {
-    const auto* const bytes = reinterpret_cast<const std::byte*>(&record);
-    for_each_number([&](const LayoutField& field, std::uint32_t i) {
-      append_element(line, field.type, bytes + field.offset + i * type_bytes(field.type));
-      line += ',';
+    for_each_column([&](const LayoutField& field) {
+      for (std::uint32_t i = 0; i < field.count; ++i) {
+        append_number(record, field, i, line);
+        line += ',';
+      }
     });
     end_line();
   };

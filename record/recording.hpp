@@ -76,6 +76,9 @@ void write_manifest(const std::filesystem::path& folder, const SegmentInfo& info
 /// Throws `RecordError` if it is missing or has no such values.
 [[nodiscard]] Manifest read_manifest(const std::filesystem::path& folder);
 
+/// The text of scene.json in `folder`. Throws `RecordError`, also if it is larger than any scene.
+[[nodiscard]] std::string recorded_scene(const std::filesystem::path& folder);
+
 /// Sums up rows that come in order.
 class SummaryBuilder {
  public:

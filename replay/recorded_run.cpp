@@ -4,10 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
-#include <fstream>
-#include <iterator>
 #include <string_view>
-#include <system_error>
 #include <utility>
 
 #include "controller/load/load_scene.hpp"
@@ -17,7 +14,6 @@
 #include "record/starting_volumes.hpp"
 #include "record/tick_log.hpp"
 #include "shared/numeric/fnv1a.hpp"
-#include "shared/segment/layout.hpp"
 #include "shared/text/command_line.hpp"
 #include "shared/text/json.hpp"
 #include "shared/text/text.hpp"
@@ -26,28 +22,15 @@
 namespace kerf {
 namespace {
 
-/// The text of scene.json, which is no larger than a segment may hold.
-std::string scene_text(const std::filesystem::path& path) {
-  std::error_code fault;
-  const std::uintmax_t bytes = std::filesystem::file_size(path, fault);
-  if (fault || !std::filesystem::is_regular_file(path, fault)) {
-    throw RecordError(path.string() + ": cannot be read; " + way_to_recording(path.parent_path()));
-  }
-  if (bytes > kMaxSceneBytes) {
-    throw RecordError(path.string() + ": larger than any scene; copy the recording again");
-  }
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
-
 struct RecordedScene {
   std::string canonical;  ///< of the loaded scene
   SceneSource source;
   InputsInJson inputs;
 };
 
-RecordedScene read_scene(const std::filesystem::path& path) {
-  const std::string text = scene_text(path);
+RecordedScene read_scene(const std::filesystem::path& folder) {
+  const std::filesystem::path path = folder / kSceneName;
+  const std::string text = recorded_scene(folder);
   try {
     return {json_without_source(text), source_in(text), inputs_in(text)};
   } catch (const JsonError&) {
@@ -196,7 +179,7 @@ RecordedRun load_run(const std::filesystem::path& folder, const ReplayChanges& c
   RecordedRun run;
   run.manifest = read_manifest(folder);
   check_begins_at_first_tick(folder, run.manifest);
-  const RecordedScene recorded = read_scene(folder / kSceneName);
+  const RecordedScene recorded = read_scene(folder);
   const SceneSource source = changed(recorded.source, changes);
   run.scene = load_scene(source, recorded_inputs(folder, recorded.inputs, changes));
   run.canonical = canonical_json(run.scene);

@@ -110,7 +110,7 @@ class TestMcap(unittest.TestCase):
         self.assertIn("cannot be read", export(self.folder / "none", self.folder / "x.mcap", code=2))
         self.assertFalse((self.folder / "x.mcap").exists())
         done = subprocess.run([BIN / "kerf-record", "export", self.log], capture_output=True, text=True)
-        self.assertEqual((done.returncode, done.stderr), (2, "kerf-record: export: as what? give --csv FILE or --mcap FILE\n"))
+        self.assertEqual((done.returncode, done.stderr), (2, "kerf-record: export: as what? give --csv FILE, --mcap FILE or --hdf5 FILE\n"))
         empty = self.folder / "empty"
         shutil.copytree(self.log, empty)
         with open(empty / "ticks.npy", "r+b") as file:

@@ -6,6 +6,7 @@ import gzip
 import json
 import pathlib
 import shutil
+import socket
 import struct
 import subprocess
 import sys
@@ -257,6 +258,35 @@ class TestReplay(unittest.TestCase):
         self.assertEqual(recorder.wait(timeout=20), 0)
         seen = self.ticks(out)[-(6 + len(was) - 1990):]
         self.assertEqual(seen, [was[tick - 1] for tick in [1000, 1001, 1, 1001, len(was), *range(1990, len(was) + 1)]])
+
+    def test_ticks_are_sent_as_json_and_a_receiver_may_go(self):
+        receiver = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        receiver.bind(("127.0.0.1", 0))
+        receiver.settimeout(20)
+        name, watched, told = self.watch(self.log)
+        told(" ", "paused")
+        sender = subprocess.Popen([BIN / "kerf-record", "live", "--name", name, "--udp", str(receiver.getsockname()[1])],
+                                  stdout=subprocess.PIPE, text=True)
+        self.assertIn("sends to", sender.stdout.readline())
+        for tick in (40, 1500):  # before docking, and in contact
+            told(f"{tick}g", "tick")
+            sent = json.loads(receiver.recv(65536))
+            while sent["kerf"]["tick"] != tick:  # those before the pause
+                sent = json.loads(receiver.recv(65536))
+            self.assertAlmostEqual(sent["timestamp"], sent["kerf"]["start_ns"] * 1e-9, 6)
+            self.assertEqual("position_mm" in sent["kerf"], tick > 40)  # no NaN
+            self.assertNotIn("output_hash", sent["kerf"])
+        self.assertGreater(sent["kerf"]["penetration_mm"], 0)
+        self.assertEqual(len(sent["kerf"]["plane_normal"]), 9)
+        receiver.close()
+        for _ in range(3):
+            told(".", "tick")
+        watched.communicate("q", timeout=20)
+        self.assertRegex(sender.communicate(timeout=20)[0], r"^\d ticks sent, [1-3] with no receiver, 0 lost\n$")
+        for wrong, why in (("127.0.0.1:99999", "no port"), ("no.such.host.invalid:1", "no.such.host.invalid")):
+            done = subprocess.run([BIN / "kerf-record", "live", "--name", name, "--udp", wrong], capture_output=True, text=True)
+            self.assertEqual((done.returncode, done.stderr.count("\n")), (2, 1), done.stderr)
+            self.assertIn(why, done.stderr)
 
     def test_a_watched_replay_stops_before_a_gap_and_refuses_what_it_cannot_do(self):
         log = self.copy()

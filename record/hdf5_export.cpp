@@ -1,0 +1,260 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "record/hdf5_export.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include <hdf5.h>
+
+#include "record/recording.hpp"
+#include "record/tick_text.hpp"
+#include "shared/posix/atomic_file.hpp"
+#include "shared/segment/log_columns.hpp"
+
+namespace kerf {
+namespace {
+
+constexpr unsigned kDeflate = 1;  // the fastest
+
+/// The library has failed; the caller knows the path.
+struct Hdf5Failure {};
+
+hid_t checked(hid_t id) {
+  if (id < 0) throw Hdf5Failure{};
+  return id;
+}
+
+/// An identifier of the library, released with its owner.
+class Handle {
+ public:
+  Handle(hid_t id, herr_t (*release)(hid_t)) : id_(checked(id)), release_(release) {}
+  Handle(Handle&& other) noexcept : id_(std::exchange(other.id_, -1)), release_(other.release_) {}
+  Handle& operator=(Handle&&) = delete;
+  ~Handle() {
+    if (id_ >= 0) release_(id_);
+  }
+  operator hid_t() const noexcept { return id_; }  // NOLINT(google-explicit-constructor): as such
+
+ private:
+  hid_t id_;
+  herr_t (*release_)(hid_t);
+};
+
+/// The type in the file: little-endian, as the log has it.
+hid_t type_of(std::string_view type) {
+  if (type == "u8" || type == "char") return H5T_STD_U8LE;
+  if (type == "u16") return H5T_STD_U16LE;
+  if (type == "u32") return H5T_STD_U32LE;
+  if (type == "u64") return H5T_STD_U64LE;
+  if (type == "i16") return H5T_STD_I16LE;
+  if (type == "i32") return H5T_STD_I32LE;
+  if (type == "i64") return H5T_STD_I64LE;
+  return type == "f32" ? H5T_IEEE_F32LE : H5T_IEEE_F64LE;
+}
+
+/// UTF-8 of `bytes` bytes; the library has none of 0 bytes.
+Handle text_type(std::size_t bytes) {
+  Handle type(H5Tcopy(H5T_C_S1), H5Tclose);
+  checked(H5Tset_size(type, std::max<std::size_t>(bytes, 1)));
+  checked(H5Tset_cset(type, H5T_CSET_UTF8));
+  checked(H5Tset_strpad(type, H5T_STR_NULLPAD));
+  return type;
+}
+
+void put_attribute(hid_t object, const char* name, hid_t type, const Handle& space,
+                   const void* data) {
+  const Handle attribute(H5Acreate2(object, name, type, space, H5P_DEFAULT, H5P_DEFAULT), H5Aclose);
+  checked(H5Awrite(attribute, type, data));
+}
+
+void put_text(hid_t object, const char* name, std::string_view text) {
+  const std::string ended(text);
+  put_attribute(object, name, text_type(text.size()), Handle(H5Screate(H5S_SCALAR), H5Sclose),
+                ended.c_str());
+}
+
+void put_number(hid_t object, const char* name, std::uint64_t number) {
+  put_attribute(object, name, H5T_NATIVE_UINT64, Handle(H5Screate(H5S_SCALAR), H5Sclose), &number);
+}
+
+/// Several texts of one attribute, each padded to the longest.
+void put_codes(hid_t object, std::span<const LogCode> codes) {
+  std::vector<std::string> lines;
+  std::size_t longest = 1;
+  for (const LogCode& code : codes) {
+    lines.push_back(std::to_string(code.value) + " " + std::string(code.name) + ": " +
+                    std::string(code.meaning));
+    longest = std::max(longest, lines.back().size());
+  }
+  std::string all;
+  for (std::string& line : lines) {
+    line.resize(longest, '\0');
+    all += line;
+  }
+  const hsize_t count = lines.size();
+  put_attribute(object, "codes", text_type(longest),
+                Handle(H5Screate_simple(1, &count, nullptr), H5Sclose), all.data());
+}
+
+std::span<const LogCode> codes_of(std::string_view column) {
+  if (column == "flags") return log_flags();
+  if (column == "command") return log_commands();
+  if (column == "phase") return log_phases();
+  if (column == "fault") return log_faults();
+  return {};
+}
+
+/// One column of the log as a dataset that grows.
+class Column {
+ public:
+  Column(hid_t group, const LayoutField& field, const LogColumn& meaning)
+      : field_(field), dataset_(create(group, field), H5Dclose) {
+    put_text(dataset_, "units", meaning.unit);
+    put_text(dataset_, "description", meaning.meaning);
+    put_text(dataset_, "valid", meaning.valid.empty() ? "in every row" : meaning.valid);
+    if (const auto codes = codes_of(field.name); !codes.empty()) put_codes(dataset_, codes);
+  }
+
+  /// Adds the column of `rows` behind the `before` rows that it has.
+  void append(std::span<const TickRecord> rows, hsize_t before) {
+    const std::size_t bytes = field_.count * type_bytes(field_.type);
+    values_.resize(rows.size() * bytes);
+    std::byte* to = values_.data();
+    for (const TickRecord& row : rows) {
+      const auto* const from = reinterpret_cast<const std::byte*>(&row) + field_.offset;
+      to = std::copy_n(from, bytes, to);
+    }
+    const std::array<hsize_t, 2> size{before + rows.size(), field_.count};
+    checked(H5Dset_extent(dataset_, size.data()));
+    const std::array<hsize_t, 2> start{before, 0}, count{rows.size(), field_.count};
+    const Handle in_file(H5Dget_space(dataset_), H5Sclose);
+    checked(
+        H5Sselect_hyperslab(in_file, H5S_SELECT_SET, start.data(), nullptr, count.data(), nullptr));
+    const Handle in_memory(H5Screate_simple(rank(field_), count.data(), nullptr), H5Sclose);
+    checked(
+        H5Dwrite(dataset_, type_of(field_.type), in_memory, in_file, H5P_DEFAULT, values_.data()));
+  }
+
+ private:
+  static int rank(const LayoutField& field) noexcept { return field.count > 1 ? 2 : 1; }
+
+  static hid_t create(hid_t group, const LayoutField& field) {
+    const std::array<hsize_t, 2> size{0, field.count}, most{H5S_UNLIMITED, field.count};
+    const std::array<hsize_t, 2> chunk{TickLogReader::kChunkRows, field.count};
+    const Handle space(H5Screate_simple(rank(field), size.data(), most.data()), H5Sclose);
+    const Handle layout(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
+    checked(H5Pset_chunk(layout, rank(field), chunk.data()));
+    checked(H5Pset_shuffle(layout));
+    checked(H5Pset_deflate(layout, kDeflate));
+    const std::string name(field.name);
+    return H5Dcreate2(group, name.c_str(), type_of(field.type), space, H5P_DEFAULT, layout,
+                      H5P_DEFAULT);
+  }
+
+  const LayoutField& field_;
+  Handle dataset_;
+  std::vector<std::byte> values_;
+};
+
+std::vector<Column> columns_in(hid_t group) {
+  std::vector<Column> out;
+  const LogColumn* meaning = log_columns().data();
+  for_each_column([&](const LayoutField& field) { out.emplace_back(group, field, *meaning++); });
+  return out;
+}
+
+void write_ticks(hid_t file, TickLogReader& log, TickRange range) {
+  const Handle group(H5Gcreate2(file, "ticks", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), H5Gclose);
+  std::vector<Column> columns = columns_in(group);
+  std::vector<TickRecord> rows;
+  hsize_t written = 0;
+  const auto flush = [&] {
+    for (Column& column : columns) column.append(rows, written);
+    written += rows.size();
+    rows.clear();
+  };
+  log.for_each(
+      [&](const TickRecord& row) {
+        rows.push_back(row);
+        if (rows.size() == TickLogReader::kChunkRows) flush();
+      },
+      range);
+  if (!rows.empty()) flush();
+}
+
+void write_scene(hid_t file, const std::filesystem::path& folder) {
+  const std::string scene = recorded_scene(folder);
+  const Handle type = text_type(scene.size());
+  const Handle space(H5Screate(H5S_SCALAR), H5Sclose);
+  const Handle dataset(
+      H5Dcreate2(file, "scene", type, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), H5Dclose);
+  checked(H5Dwrite(dataset, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, scene.c_str()));
+}
+
+void write_file(const std::filesystem::path& path, const std::filesystem::path& folder,
+                const Manifest& manifest, TickLogReader& log, TickRange range) {
+  // The last library that reads it: h5py and MATLAB from 2015 on.
+  const Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
+  checked(H5Pset_libver_bounds(access, H5F_LIBVER_EARLIEST, H5F_LIBVER_V18));
+  const Handle file(H5Fcreate(path.c_str(), H5F_ACC_EXCL, H5P_DEFAULT, access), H5Fclose);
+  put_text(file, "kerf", KERF_VERSION);
+  put_number(file, "tick_ns", manifest.tick_ns);
+  put_text(file, "session_id", manifest.session_id);
+  put_text(file, "end_reason", manifest.end_reason);
+  put_number(file, "lost_ticks", manifest.losses.lost);
+  write_scene(file, folder);
+  write_ticks(file, log, range);
+  checked(H5Fflush(file, H5F_SCOPE_GLOBAL));  // a full disk is reported here, not by the release
+}
+
+/// The name under which the file is written. The library opens files by name only.
+class PartFile {
+ public:
+  explicit PartFile(std::filesystem::path path) : path_(std::move(path)) { remove(); }
+  ~PartFile() { remove(); }
+  PartFile(const PartFile&) = delete;
+  PartFile& operator=(const PartFile&) = delete;
+  [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }
+
+ private:
+  void remove() const noexcept {
+    std::error_code none;  // usually it has gone
+    std::filesystem::remove(path_, none);
+  }
+  std::filesystem::path path_;
+};
+
+}  // namespace
+
+void export_hdf5(const std::filesystem::path& folder, const std::filesystem::path& hdf5,
+                 TickRange range) {
+  check_outputs(recording_files(folder), {{"--hdf5", hdf5, ".h5"}});
+  if (is_stream(hdf5)) {
+    throw RecordError(hdf5.string() + ": HDF5 is no stream; give the name of a file");
+  }
+  check_new_file(hdf5);
+  const Manifest manifest = read_manifest(folder);
+  TickLogReader log(folder / kTickLogName);
+  H5dont_atexit();  // after a full disk its clean-up at exit crashes (1.10.8)
+  H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);  // else it prints its own stack
+  const PartFile part(hdf5.string() + ".part");
+  std::error_code fault;
+  try {
+    write_file(part.path(), folder, manifest, log, range);
+    std::filesystem::rename(part.path(), hdf5, fault);
+    if (!fault) return;
+  } catch (const Hdf5Failure&) {  // NOLINT(bugprone-empty-catch): reported below
+  }
+  throw RecordError(hdf5.string() +
+                    ": cannot be written; is the disk full? free space, or choose another one");
+}
+
+}  // namespace kerf

@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+
+#include "record/tick_log.hpp"
+
+namespace kerf {
+
+/// Writes the recording in `folder` as HDF5, for MATLAB (`h5read`), h5py, Julia and R. Whole or not
+/// at all, in constant memory.
+///
+///   /ticks/COLUMN   one dataset per column of the log, of its type and its rows, in chunks of 1024
+///                   rows, packed with deflate; attributes units, description, valid (which rows it
+///                   holds for) and, for codes and bits, codes
+///   /scene          the scene as JSON text
+///   attributes of / kerf, tick_ns, session_id, end_reason, lost_ticks
+///
+/// A row has the same index in every dataset. Throws `RecordError`, also if the file cannot be
+/// written.
+void export_hdf5(const std::filesystem::path& folder, const std::filesystem::path& hdf5,
+                 TickRange range = {});
+
+}  // namespace kerf

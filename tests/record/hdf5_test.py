@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The HDF5 of a recording, read by h5py.
+
+    hdf5_test.py ROOT BIN
+Exit code 77: skipped, without h5py."""
+import pathlib
+import shutil
+import subprocess
+import sys
+import tempfile
+import unittest
+
+import numpy as np
+
+ROOT, BIN = (pathlib.Path(sys.argv.pop(1)).resolve() for _ in range(2))
+sys.path.insert(0, str(ROOT / "tests/record"))
+from lockstep_run import record
+
+
+def export(log, to, *options, code=0):
+    done = subprocess.run([BIN / "kerf-record", "export", log, "--hdf5", to, *options], capture_output=True, text=True)
+    assert done.returncode == code, done.stderr
+    return done.stderr
+
+
+class TestHdf5(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.temporary = tempfile.TemporaryDirectory()
+        cls.folder = pathlib.Path(cls.temporary.name)
+        record(ROOT, BIN, cls.folder, ROOT / "scenes/touch.toml", 4)
+        cls.log = cls.folder / "log"
+        cls.rows = np.load(cls.log / "ticks.npy")
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.temporary.cleanup()
+
+    def test_each_column_reads_as_it_is_in_the_log(self):
+        path = self.folder / "run.h5"
+        export(self.log, path)
+        with h5py.File(path, "r") as file:
+            ticks = file["ticks"]
+            self.assertEqual(sorted(ticks), sorted(self.rows.dtype.names))
+            for name in self.rows.dtype.names:
+                self.assertEqual(ticks[name].dtype, self.rows[name].dtype, name)
+                np.testing.assert_array_equal(ticks[name][:], self.rows[name], name)
+                for attribute in ("units", "description", "valid"):
+                    self.assertIsInstance(ticks[name].attrs[attribute], (str, bytes))
+            self.assertEqual(ticks["position_mm"].attrs["units"], b"mm")
+            self.assertIn(b"4 contact:", [code[:10] for code in ticks["flags"].attrs["codes"]])
+            self.assertEqual(file.attrs["tick_ns"], 1_000_000)
+            self.assertEqual(file["scene"][()].decode(), (self.log / "scene.json").read_text())
+        self.assertLess(path.stat().st_size, (self.log / "ticks.npy").stat().st_size)
+
+    def test_a_range_and_no_rows(self):
+        path = self.folder / "part.h5"
+        export(self.log, path, "--from", "1000", "--until", "3100")
+        with h5py.File(path, "r") as file:
+            self.assertEqual(file["ticks/tick"][:].tolist(), list(range(1000, 3101)))
+        export(self.log, path, "--from", "999999")  # an old file is replaced
+        with h5py.File(path, "r") as file:
+            self.assertEqual(file["ticks/position_mm"].shape, (0, 3))
+
+    def test_what_cannot_be(self):
+        self.assertIn("--hdf5 writes no .npy", export(self.log, self.log / "ticks.npy", code=2))
+        self.assertIn("give the name of a file", export(self.log, "/dev/stdout", code=2))
+        none = self.folder / "none.h5"
+        self.assertIn("cannot be read", export(self.folder / "none", none, code=2))
+        damaged = self.folder / "damaged"
+        shutil.copytree(self.log, damaged)
+        with open(damaged / "ticks.npy", "r+b") as file:
+            file.seek(4096 + 700 * self.rows.dtype.itemsize + 100)
+            file.write(b"x")
+        self.assertIn("row 700 has a wrong checksum", export(damaged, none, code=2))
+        self.assertIn("no.such", export(self.log, self.folder / "no.such/x.h5", code=2))
+        self.assertIn("is the disk full?", export(self.log, "/dev/shm/full/x.h5", code=2) if self.full_disk() else "is the disk full?")
+        self.assertEqual(list(self.folder.glob("*.part")) + list(self.folder.glob("none*")), [])
+
+    def full_disk(self):
+        """Whether a disk of 64 KiB can be mounted."""
+        folder = pathlib.Path("/dev/shm/full")
+        folder.mkdir(exist_ok=True)
+        mounted = subprocess.run(["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", folder], stderr=subprocess.DEVNULL)
+        self.addCleanup(folder.rmdir)
+        if mounted.returncode == 0:
+            self.addCleanup(subprocess.run, ["umount", folder])
+        return mounted.returncode == 0
+
+
+if __name__ == "__main__":
+    try:
+        import h5py
+    except ImportError:
+        print("skipped: no h5py")
+        sys.exit(77)
+    unittest.main()
