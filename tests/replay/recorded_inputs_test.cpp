@@ -11,7 +11,7 @@
 #include "controller/kernel/kernel_set.hpp"
 #include "controller/load/load_scene.hpp"
 #include "controller/plan/compile.hpp"
-#include "replay/replay.hpp"
+#include "replay/replay_step.hpp"
 #include "shared/text/text.hpp"
 
 using namespace kerf;

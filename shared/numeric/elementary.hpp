@@ -1,0 +1,168 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <numbers>
+
+// Elementary functions for load time, whose bits are the same on every machine: the C library's
+// last bit changes between libraries and versions, and a tool's samples with it. They use + - * /
+// and sqrt alone, which IEEE 754 rounds correctly, and compute in double-double (Dekker, "A
+// floating-point technique for extending the available precision", 1971): about 100 bits, so that
+// the result is the nearest double but for one argument in some 2^40.
+//
+// Arguments are finite. About 1 us for sine and cosine, 4 us for an arc.
+
+namespace kerf {
+
+/// An unevaluated sum: `low` is at most half a unit in the last place of `high`.
+struct DoubleDouble {
+  double high = 0, low = 0;
+};
+
+namespace elementary {
+
+/// a + b, exactly.
+[[nodiscard]] constexpr DoubleDouble two_sum(double a, double b) noexcept {
+  const double sum = a + b, part = sum - a;
+  return {sum, (a - (sum - part)) + (b - part)};
+}
+
+/// a * b, exactly, if no half of it underflows.
+[[nodiscard]] constexpr DoubleDouble two_product(double a, double b) noexcept {
+  constexpr double kSplit = 134217729;  // 2^27 + 1
+  const double wide_a = kSplit * a, wide_b = kSplit * b;
+  const double high_a = wide_a - (wide_a - a), high_b = wide_b - (wide_b - b);
+  const double low_a = a - high_a, low_b = b - high_b;
+  const double product = a * b;
+  return {product,
+          ((high_a * high_b - product) + high_a * low_b + low_a * high_b) + low_a * low_b};
+}
+
+[[nodiscard]] constexpr DoubleDouble operator+(DoubleDouble a, DoubleDouble b) noexcept {
+  const DoubleDouble high = two_sum(a.high, b.high), low = two_sum(a.low, b.low);
+  const DoubleDouble sum = two_sum(high.high, high.low + low.high);
+  return two_sum(sum.high, sum.low + low.low);
+}
+[[nodiscard]] constexpr DoubleDouble operator-(DoubleDouble a) noexcept { return {-a.high, -a.low}; }
+[[nodiscard]] constexpr DoubleDouble operator-(DoubleDouble a, DoubleDouble b) noexcept {
+  return a + -b;
+}
+[[nodiscard]] constexpr DoubleDouble operator*(DoubleDouble a, DoubleDouble b) noexcept {
+  const DoubleDouble product = two_product(a.high, b.high);
+  return two_sum(product.high, product.low + (a.high * b.low + a.low * b.high));
+}
+[[nodiscard]] constexpr DoubleDouble operator/(DoubleDouble a, DoubleDouble b) noexcept {
+  const double first = a.high / b.high;
+  const DoubleDouble rest = a - b * DoubleDouble{first};
+  const double second = rest.high / b.high;
+  const DoubleDouble last = rest - b * DoubleDouble{second};
+  return two_sum(first, second) + DoubleDouble{last.high / b.high};
+}
+[[nodiscard]] inline DoubleDouble square_root(DoubleDouble a) noexcept {
+  if (a.high <= 0) return {};
+  const double root = std::sqrt(a.high);
+  const DoubleDouble rest = a - two_product(root, root);
+  return two_sum(root, rest.high / (2 * root));
+}
+
+/// pi / 2 in four parts; the first three have 33 bits, so that k times them is exact up to k = 2^20.
+inline constexpr std::array<double, 4> kHalfPi = {1.5707963267341256, 6.077100506303966e-11,
+                                                  2.0222662487111665e-21, 8.4784276603689e-32};
+
+struct SineCosine {
+  DoubleDouble sine, cosine;
+};
+
+/// Of an angle within +-pi/4, by its Taylor series.
+[[nodiscard]] constexpr SineCosine series(DoubleDouble angle) noexcept {
+  constexpr int kTerms = 28;  // (pi/4)^29 / 29! < 2^-112
+  const DoubleDouble square = angle * angle;
+  SineCosine sum{angle, {1}};
+  DoubleDouble odd = angle, even{1};
+  for (int n = 2; n < kTerms; n += 2) {
+    even = -(even * square) / DoubleDouble{static_cast<double>(n * (n - 1))};
+    odd = -(odd * square) / DoubleDouble{static_cast<double>(n * (n + 1))};
+    sum.cosine = sum.cosine + even;
+    sum.sine = sum.sine + odd;
+  }
+  return sum;
+}
+
+/// Of any angle up to 2^20 quarter turns, in either direction.
+[[nodiscard]] inline SineCosine sine_cosine(DoubleDouble angle) noexcept {
+  const double quarters = std::nearbyint(angle.high / (std::numbers::pi / 2));
+  DoubleDouble rest = angle;
+  for (const double part : kHalfPi) rest = rest - two_product(quarters, part);
+  const SineCosine at = series(rest);
+  switch (static_cast<std::int64_t>(quarters) & 3) {
+    case 0:
+      return at;
+    case 1:
+      return {at.cosine, -at.sine};
+    case 2:
+      return {-at.sine, -at.cosine};
+    default:
+      return {-at.cosine, at.sine};
+  }
+}
+
+/// The angle of (x, y), in -pi .. pi; 0 for the origin. Two steps of Newton's method: a is wrong by
+/// t with tan t = (y cos a - x sin a) / (x cos a + y sin a), of which the series to t^5 is taken.
+[[nodiscard]] inline DoubleDouble arc(DoubleDouble y, DoubleDouble x) noexcept {
+  if (y.high == 0 && x.high == 0) return {};
+  const double ax = std::abs(x.high), ay = std::abs(y.high);
+  const double slope = ay < ax ? ay / ax : ax / ay;
+  double first = slope / (1 + 0.28125 * slope * slope);  // within 0.005 of the arctangent
+  if (ay >= ax) first = std::numbers::pi / 2 - first;
+  if (x.high < 0) first = std::numbers::pi - first;
+  if (y.high < 0) first = -first;
+  DoubleDouble angle{first};
+  for (int step = 0; step < 2; ++step) {
+    const auto [sine, cosine] = sine_cosine(angle);
+    const DoubleDouble tangent = (y * cosine - x * sine) / (x * cosine + y * sine);
+    const DoubleDouble square = tangent * tangent;
+    const DoubleDouble more =
+        square * (DoubleDouble{1.0 / 5} * square - DoubleDouble{1} / DoubleDouble{3});
+    angle = angle + tangent + tangent * more;
+  }
+  return angle;
+}
+
+}  // namespace elementary
+
+/// `angle` in radians, up to 2^20 quarter turns.
+[[nodiscard]] inline double sine(double angle) noexcept {
+  return elementary::sine_cosine({angle}).sine.high;
+}
+[[nodiscard]] inline double cosine(double angle) noexcept {
+  return elementary::sine_cosine({angle}).cosine.high;
+}
+
+/// In -pi .. pi; 0 for (0, 0).
+[[nodiscard]] inline double arctangent(double y, double x) noexcept {
+  return elementary::arc({y}, {x}).high;
+}
+
+/// Of -1 .. 1; in 0 .. pi.
+[[nodiscard]] inline double arccosine(double cosine) noexcept {
+  using elementary::operator-;
+  const DoubleDouble square = elementary::two_product(cosine, cosine);
+  return elementary::arc(elementary::square_root(DoubleDouble{1} - square), {cosine}).high;
+}
+
+/// Length of (x, y), and of (x, y, z). Squares must neither overflow nor underflow.
+[[nodiscard]] inline double hypotenuse(double x, double y, double z = 0) noexcept {
+  using namespace elementary;
+  return square_root(two_product(x, x) + two_product(y, y) + two_product(z, z)).high;
+}
+
+/// 10^-digits, to the nearest double up to 22 digits. `digits` may be negative.
+[[nodiscard]] constexpr double power_of_tenth(int digits) noexcept {
+  double power = 1;
+  for (int i = digits < 0 ? -digits : digits; i > 0; --i) power *= 10;
+  return digits < 0 ? power : 1 / power;
+}
+
+}  // namespace kerf
