@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -12,12 +13,16 @@
 #include <utility>
 #include <vector>
 
+#include <fcntl.h>
 #include <hdf5.h>
+#include <unistd.h>
 
 #include "record/recording.hpp"
 #include "record/tick_text.hpp"
 #include "shared/posix/atomic_file.hpp"
+#include "shared/posix/stop_signals.hpp"
 #include "shared/segment/log_columns.hpp"
+#include "shared/text/json.hpp"
 
 namespace kerf {
 namespace {
@@ -50,7 +55,6 @@ class Handle {
 
 /// The type in the file: little-endian, as the log has it.
 hid_t type_of(std::string_view type) {
-  if (type == "u8" || type == "char") return H5T_STD_U8LE;
   if (type == "u16") return H5T_STD_U16LE;
   if (type == "u32") return H5T_STD_U32LE;
   if (type == "u64") return H5T_STD_U64LE;
@@ -76,8 +80,9 @@ void put_attribute(hid_t object, const char* name, hid_t type, const Handle& spa
 }
 
 void put_text(hid_t object, const char* name, std::string_view text) {
-  const std::string ended(text);
-  put_attribute(object, name, text_type(text.size()), Handle(H5Screate(H5S_SCALAR), H5Sclose),
+  constexpr std::size_t kMost = 4096;  // the library has no attributes above 64 KiB
+  const std::string ended(text.substr(0, kMost));
+  put_attribute(object, name, text_type(ended.size()), Handle(H5Screate(H5S_SCALAR), H5Sclose),
                 ended.c_str());
 }
 
@@ -171,7 +176,8 @@ std::vector<Column> columns_in(hid_t group) {
   return out;
 }
 
-void write_ticks(hid_t file, TickLogReader& log, TickRange range) {
+void write_ticks(hid_t file, const std::filesystem::path& path, TickLogReader& log,
+                 TickRange range) {
   const Handle group(H5Gcreate2(file, "ticks", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), H5Gclose);
   std::vector<Column> columns = columns_in(group);
   std::vector<TickRecord> rows;
@@ -184,6 +190,7 @@ void write_ticks(hid_t file, TickLogReader& log, TickRange range) {
   log.for_each(
       [&](const TickRecord& row) {
         rows.push_back(row);
+        if (stop_requested()) throw RecordError(path.string() + ": stopped; nothing is written");
         if (rows.size() == TickLogReader::kChunkRows) flush();
       },
       range);
@@ -192,6 +199,11 @@ void write_ticks(hid_t file, TickLogReader& log, TickRange range) {
 
 void write_scene(hid_t file, const std::filesystem::path& folder) {
   const std::string scene = recorded_scene(folder);
+  try {
+    static_cast<void>(Json::parse(scene));
+  } catch (const JsonError&) {
+    throw RecordError((folder / kSceneName).string() + ": no JSON; copy the recording again");
+  }
   const Handle type = text_type(scene.size());
   const Handle space(H5Screate(H5S_SCALAR), H5Sclose);
   const Handle dataset(
@@ -204,31 +216,35 @@ void write_file(const std::filesystem::path& path, const std::filesystem::path& 
   // The last library that reads it: h5py and MATLAB from 2015 on.
   const Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
   checked(H5Pset_libver_bounds(access, H5F_LIBVER_EARLIEST, H5F_LIBVER_V18));
-  const Handle file(H5Fcreate(path.c_str(), H5F_ACC_EXCL, H5P_DEFAULT, access), H5Fclose);
+  const Handle file(H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, access), H5Fclose);
   put_text(file, "kerf", KERF_VERSION);
   put_number(file, "tick_ns", manifest.tick_ns);
   put_text(file, "session_id", manifest.session_id);
   put_text(file, "end_reason", manifest.end_reason);
-  put_number(file, "lost_ticks", manifest.losses.lost);
   write_scene(file, folder);
-  write_ticks(file, log, range);
+  write_ticks(file, path, log, range);
   checked(H5Fflush(file, H5F_SCOPE_GLOBAL));  // a full disk is reported here, not by the release
 }
 
-/// The name under which the file is written. The library opens files by name only.
+/// The name under which the file is written, new in its folder: the library opens files by name
+/// only.
 class PartFile {
  public:
-  explicit PartFile(std::filesystem::path path) : path_(std::move(path)) { remove(); }
-  ~PartFile() { remove(); }
+  explicit PartFile(const std::filesystem::path& whole)
+      : path_(whole.string() + ".new-" + std::to_string(getpid())) {
+    const int fd = open(path_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    if (fd < 0) throw RecordError(whole.string() + not_written(errno));
+    close(fd);
+  }
+  ~PartFile() {
+    std::error_code none;  // usually it has its own name by now
+    std::filesystem::remove(path_, none);
+  }
   PartFile(const PartFile&) = delete;
   PartFile& operator=(const PartFile&) = delete;
   [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }
 
  private:
-  void remove() const noexcept {
-    std::error_code none;  // usually it has gone
-    std::filesystem::remove(path_, none);
-  }
   std::filesystem::path path_;
 };
 
@@ -245,7 +261,7 @@ void export_hdf5(const std::filesystem::path& folder, const std::filesystem::pat
   TickLogReader log(folder / kTickLogName);
   H5dont_atexit();  // after a full disk its clean-up at exit crashes (1.10.8)
   H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);  // else it prints its own stack
-  const PartFile part(hdf5.string() + ".part");
+  const PartFile part(hdf5);
   std::error_code fault;
   try {
     write_file(part.path(), folder, manifest, log, range);

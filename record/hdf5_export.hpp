@@ -14,7 +14,7 @@ namespace kerf {
 ///                   rows, packed with deflate; attributes units, description, valid (which rows it
 ///                   holds for) and, for codes and bits, codes
 ///   /scene          the scene as JSON text
-///   attributes of / kerf, tick_ns, session_id, end_reason, lost_ticks
+///   attributes of / kerf, tick_ns, session_id, end_reason
 ///
 /// A row has the same index in every dataset. Throws `RecordError`, also if the file cannot be
 /// written.

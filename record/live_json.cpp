@@ -27,24 +27,35 @@ constexpr std::array<std::string_view, 4> kNoQuantities = {"seq", "volume_hash",
 /// Sends ticks; a datagram that cannot be sent is counted.
 class UdpSink final : public TickSink {
  public:
-  UdpSink(const UdpAddress& to, std::uint32_t every)
-      : every_(every), socket_(socket(to.get()->sa_family, SOCK_DGRAM | SOCK_CLOEXEC, 0)) {
+  UdpSink(const UdpAddress& to, const LiveOptions& options)
+      : every_(options.every), socket_(socket(to.get()->sa_family, SOCK_DGRAM | SOCK_CLOEXEC, 0)) {
     if (socket_.get() >= 0 && connect(socket_.get(), to.get(), to.bytes) == 0) return;
-    throw SegmentError("--udp: " + std::generic_category().message(errno) +
-                       "; give an address that this machine reaches");
+    throw UsageError("--udp " + one_line(options.udp) + ": " +
+                     std::generic_category().message(errno) + "; give another address");
   }
 
   void append(const TickRecord& record) override {
     if (record.tick % every_ != 0) return;
     const std::string text = tick_json(record);
-    const bool sent = send(socket_.get(), text.data(), text.size(), MSG_DONTWAIT) >= 0;
-    ++(sent ? sent_ : lost_);
+    if (send_now(text)) return;
+    // Refused was the datagram before; this one has not been sent yet.
+    if (errno == ECONNREFUSED) {
+      --sent_, ++lost_;
+      if (send_now(text)) return;
+    }
+    ++lost_;
   }
 
   [[nodiscard]] std::uint64_t sent() const noexcept { return sent_; }
   [[nodiscard]] std::uint64_t lost() const noexcept { return lost_; }
 
  private:
+  bool send_now(const std::string& text) {
+    const bool sent = send(socket_.get(), text.data(), text.size(), MSG_DONTWAIT) >= 0;
+    sent_ += sent ? 1 : 0;
+    return sent;
+  }
+
   std::uint32_t every_;
   OwnedFd socket_;
   std::uint64_t sent_ = 0, lost_ = 0;
@@ -79,12 +90,14 @@ std::string tick_json(const TickRecord& record) {
 
 int send_live(const LiveOptions& options, const std::atomic<bool>& stop) {
   const UdpAddress to = resolve_udp(options.udp);
-  if (!to.error.empty()) {
-    throw UsageError("--udp " + one_line(options.udp) + ": " + to.error + "; give [ADDRESS:]PORT");
+  const bool no_port = options.udp == "0" || options.udp.ends_with(":0");
+  const std::string why = no_port ? "port 0 receives nothing" : to.error;
+  if (!why.empty()) {
+    throw UsageError("--udp " + one_line(options.udp) + ": " + why + "; give [ADDRESS:]PORT");
   }
   const SegmentConnection connection = connect_segment(options.name);
   const SegmentReader& reader = connection.reader();
-  UdpSink sink(to, options.every);
+  UdpSink sink(to, options);
   Recorder recorder(reader, sink, reader.state_head(), {});
   std::cout << "sends to " << one_line(options.udp) << std::endl;
   for (bool ended = false; !ended;) {
@@ -92,7 +105,7 @@ int send_live(const LiveOptions& options, const std::atomic<bool>& stop) {
     recorder.poll();
     if (!ended) std::this_thread::sleep_for(kPollPeriod);
   }
-  std::cout << sink.sent() << " ticks sent, " << sink.lost() << " with no receiver, "
+  std::cout << sink.sent() << " ticks sent, " << sink.lost() << " not taken, "
             << recorder.losses().lost << " lost\n";
   return 0;
 }

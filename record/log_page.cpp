@@ -23,7 +23,7 @@ it, each with `--from TICK` and `--until TICK` for a part.
 | `ticks.npy` | one row for each tick, the columns below, for NumPy as it is |
 | `manifest.json` | length of a tick, voxels, losses of the recorder and where they lie, how the run ended |
 | `scene.json` | the scene as it was loaded, every setting; `source` is what it was loaded from |
-| `volumes/HASH.npy.gz` | the densities of a volume as the run began, `[z, y, x]`; `HASH-labels.npy.gz`: its labels. HASH is `density_hash` in `scene.json` |
+| `volumes/HASH.npy.gz` | the densities of a volume as the run began, `[z, y, x]`; `HASH-labels.npy.gz`: its labels. HASH is `density_hash` in `scene.json`, of both |
 
 Three lines of NumPy read it (`python/` is a reader with more, `examples/python/` uses it):
 

@@ -29,6 +29,15 @@ RecordSummary summary_for_info(const std::filesystem::path& folder, TickRange ra
   return summarise(folder, range);
 }
 
+/// Whether the log has fewer rows than its header counts; says so.
+bool tell_of_cut(const std::filesystem::path& folder) {
+  const TickLogReader log(folder / kTickLogName);
+  if (log.rows() >= log.counted()) return false;
+  std::cerr << "kerf-record: " << (folder / kTickLogName).string() << ": cut after " << log.rows()
+            << " of " << log.counted() << " rows; copy the recording again\n";
+  return true;
+}
+
 /// `info DIR`, `plot DIR --out FILE.svg`, `export DIR --csv FILE`, `--mcap FILE` or `--hdf5 FILE`,
 /// `grab`, `live`, `columns`. Bad input throws.
 int run_record(int argc, char** argv) {
@@ -85,13 +94,17 @@ int run_record(int argc, char** argv) {
   if (table.chosen() && csv.empty() && mcap.empty() && hdf5.empty()) {
     throw UsageError("export: as what? give --csv FILE, --mcap FILE or --hdf5 FILE");
   }
-  if (!hdf5.empty()) export_hdf5(folder, hdf5, range);
+  if (!hdf5.empty()) {
+    static_cast<void>(catch_stop_signals());  // leaves no half file
+    export_hdf5(folder, hdf5, range);
+  }
   if (!csv.empty()) export_csv(folder, csv, range);
   if (!mcap.empty()) {
     export_mcap(folder, mcap, unpacked ? McapWriter::Packing::none : McapWriter::Packing::lz4,
                 range);
   }
   if (keep.chosen()) std::cout << grab(name).string() << ": kept\n";
+  if (table.chosen() && tell_of_cut(folder)) return 1;
   return live.chosen() ? send_live(live_to, catch_stop_signals()) : 0;
 }
 

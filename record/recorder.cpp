@@ -117,7 +117,7 @@ bool parse_options(int argc, char** argv, RecorderOptions& options) {
   CommandLine app("Logs every tick of a running kerf-controller into a folder.", "kerf-recorder",
                   KERF_VERSION);
   app.option("--name", options.name, "name of the controller").shows_default();
-  app.option("--out", options.out, "folder for ticks.npy, scene.json, manifest.json").required();
+  app.option("--out", options.out, "folder for ticks, scene, manifest and volumes").required();
   app.option("--wait", options.wait_s, "seconds to wait for the controller")
       .within(0, 86400)
       .shows_default();
@@ -298,7 +298,7 @@ int run_recorder(const RecorderOptions& options, const std::atomic<bool>& stop) 
   const Beginning begin = beginning_in(options, reader);
   Recording recording(options, connection, begin);
   const double bytes_per_s = 1e9 / static_cast<double>(reader.info().tick_ns) * sizeof(TickRecord);
-  std::cout << options.out.string() << (begin.next ? " goes on" : "") << " grows by "
+  std::cout << options.out.string() << (begin.next ? " goes on, and" : "") << " grows by "
             << std::lround(60 * bytes_per_s / 1e6) << " MB a minute" << std::endl;
   try {
     recording.run(stop);

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <thread>
@@ -15,7 +16,8 @@
 // The volumes of a run as they were at its start, beside its log: so a recording replays on a
 // machine that has none of the scene's files.
 //
-//   volumes/HASH.npy.gz         densities, uint16 [z, y, x]; HASH: `density_hash` of scene.json
+//   volumes/HASH.npy.gz         densities, uint16 [z, y, x]; HASH: `density_hash` of scene.json,
+//                               which is `volume_hash`: labels count, too
 //   volumes/HASH-labels.npy.gz  labels, uint8, of the same shape; only if the volume has some
 //
 // Two volumes of equal content are one file. NumPy: `np.load(gzip.open(path))`.
@@ -31,8 +33,7 @@ class StartingVolumes {
   /// Whether the volumes are copied into memory, or could not be: from here on they may be cut.
   [[nodiscard]] bool copied() const noexcept { return copied_; }
 
-  /// Waits until the files are complete. Returns one line for each volume that has none: it was cut
-  /// before it was copied, or the disk is full.
+  /// Waits until the files are complete. Returns one line for each volume that has none, and why.
   [[nodiscard]] std::vector<std::string> finish();
 
  private:
@@ -57,7 +58,10 @@ struct VolumeContent {
                                                                 std::string_view hash,
                                                                 const VoxelGrid& grid);
 
-/// Copies the volumes of a recording into another one. Throws `RecordError`.
-void copy_starting_volumes(const std::filesystem::path& from, const std::filesystem::path& to);
+/// Writes such a volume, whole or not at all, over an older one. Throws `RecordError`, or
+/// FileError.
+void write_starting_volume(const std::filesystem::path& folder, std::string_view hash,
+                           const VoxelGrid& grid, std::span<const Density> density,
+                           std::span<const Label> labels);
 
 }  // namespace kerf

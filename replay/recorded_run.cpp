@@ -7,6 +7,7 @@
 #include <string_view>
 #include <utility>
 
+#include "controller/input/load_error.hpp"
 #include "controller/load/load_scene.hpp"
 #include "controller/load/scene_json.hpp"
 #include "controller/loop/publisher.hpp"
@@ -35,23 +36,34 @@ RecordedScene read_scene(const std::filesystem::path& folder) {
     return {json_without_source(text), source_in(text), inputs_in(text)};
   } catch (const JsonError&) {
     throw RecordError(path.string() +
-                      ": does not say what the scene was loaded from; record it with this version");
+                      ": does not say, as this version does, what the scene was loaded from; copy "
+                      "the recording again, or record it with this version");
   }
 }
 
-/// What the recording has of its volumes and meshes, if the changes leave those as they were: keys
-/// of volumes and materials act on the densities as they are loaded, keys of tools on the meshes.
+/// Whether the changes leave volumes, or meshes, as they were loaded.
+bool change_one_of(const ReplayChanges& changes, std::initializer_list<std::string_view> tables) {
+  if (changes.scene) return true;
+  return std::ranges::any_of(changes.settings, [&](const std::string& setting) {
+    return std::ranges::any_of(tables, [&](auto table) { return setting.starts_with(table); });
+  });
+}
+bool keep_volumes(const ReplayChanges& changes) {
+  return !change_one_of(changes, {"volume.", "material."});
+}
+/// `device.fit` scales the tools with the first volume.
+bool keep_meshes(const ReplayChanges& changes) {
+  return keep_volumes(changes) && !change_one_of(changes, {"tool.", "device."});
+}
+
+/// What the recording has of its volumes and meshes, if the changes leave those as they were.
 RecordedInputs recorded_inputs(const std::filesystem::path& folder, InputsInJson from,
                                const ReplayChanges& changes) {
-  const auto changes_one_of = [&](std::initializer_list<std::string_view> tables) {
-    return std::ranges::any_of(changes.settings, [&](const std::string& setting) {
-      return std::ranges::any_of(tables, [&](auto table) { return setting.starts_with(table); });
-    });
-  };
   RecordedInputs out = std::move(from.inputs);
-  if (changes.scene || changes_one_of({"tool"})) out.meshes.clear();
-  const bool same_volumes = !changes.scene && !changes_one_of({"volume", "material"});
+  if (!keep_meshes(changes)) out.meshes.clear();
+  const bool same_volumes = keep_volumes(changes);
   for (std::size_t v = 0; v < out.volumes.size(); ++v) {
+    end_if_asked(folder.string());
     std::optional<SceneVolume>& volume = out.volumes[v];
     std::optional<VolumeContent> content;
     if (same_volumes) {
@@ -118,11 +130,23 @@ std::optional<Difference> first_difference(const Json& recorded, const Json& loa
   return Difference{key, short_value(recorded), short_value(loaded)};
 }
 
-/// What a user does about a difference in that key.
-std::string way_out(const std::string& key) {
-  if (key.starts_with("volumes[")) return "put back the volume that it was recorded with";
-  if (key.starts_with("tools[")) return "put back the tool's file that it was recorded with";
-  return "replay it with the version of kerf that recorded it";
+/// The volumes first: what differs in a scene by another volume is seen in other keys, too.
+void check_same_volumes(const std::filesystem::path& folder, const std::string& recorded,
+                        const std::string& loaded) {
+  const auto hashes = [](const std::string& scene) {
+    Json out = Json::List{};
+    const Json root = Json::parse(scene);
+    for (const Json& volume : root.at("volumes")) {
+      out.push_back(volume.at("density_hash").get<std::string>());
+    }
+    return out;
+  };
+  const auto found = first_difference(hashes(recorded), hashes(loaded), "volumes");
+  if (!found) return;
+  throw RecordError(
+      (folder / kSceneName).string() + ": the content of " + found->key + " has hash " +
+      found->recorded + " in the recording and " + found->loaded +
+      " now, and no copy lies beside the log; put back the volume that it was recorded with");
 }
 
 void check_same(const std::filesystem::path& folder, const std::string& recorded,
@@ -130,7 +154,8 @@ void check_same(const std::filesystem::path& folder, const std::string& recorded
   const auto found = first_difference(Json::parse(recorded), Json::parse(loaded), "");
   if (!found) return;
   throw RecordError((folder / kSceneName).string() + ": " + found->key + " is " + found->recorded +
-                    " in the recording and " + found->loaded + " now; " + way_out(found->key));
+                    " in the recording and " + found->loaded +
+                    " now; replay it with the version of kerf that recorded it");
 }
 
 SceneSource changed(SceneSource source, const ReplayChanges& changes) {
@@ -184,6 +209,7 @@ RecordedRun load_run(const std::filesystem::path& folder, const ReplayChanges& c
   run.scene = load_scene(source, recorded_inputs(folder, recorded.inputs, changes));
   run.canonical = canonical_json(run.scene);
   run.scene_json = json_with_source(run.canonical, run.scene, source);
+  if (keep_volumes(changes)) check_same_volumes(folder, recorded.canonical, run.canonical);
   if (changes.none()) {
     check_same(folder, recorded.canonical, run.canonical);
   } else {

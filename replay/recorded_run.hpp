@@ -37,7 +37,8 @@ struct RecordedRun {
   std::optional<SegmentWriter> segment;  ///< with the volumes as they start; if it was asked for
 };
 
-/// Loads the scene of the recording in `folder` from what it was loaded from, with `changes`.
+/// Loads the scene of the recording in `folder`, with `changes`: volumes and meshes as the
+/// recording has them, else from their files.
 ///
 /// Without changes the loaded scene must be the recorded one to the bit; else throws `RecordError`,
 /// one line that names the first key or volume that differs. With changes rate and device stay.

@@ -22,6 +22,7 @@
 #include "shared/posix/atomic_file.hpp"
 #include "shared/text/json.hpp"
 #include "shared/text/text.hpp"
+#include "shared/volume/checksum.hpp"
 
 namespace kerf {
 namespace {
@@ -65,6 +66,10 @@ ReplayResult replay_ticks(RecordedRun& run, TickLogReader& log, Tick until,
     }
     row += count;
   }
+  if (log.rows() < log.counted()) {
+    result.cut_short = "the log is cut after " + std::to_string(log.rows()) + " of " +
+                       std::to_string(log.counted()) + " rows";
+  }
   return result;
 }
 
@@ -73,8 +78,17 @@ namespace {
 /// The log of a replay, and beside it manifest and scene: a recording like any other.
 class ReplayLog {
  public:
-  ReplayLog(const std::filesystem::path& out, const std::filesystem::path& from)
-      : out_(out), from_(from), log_(new_folder(out) / kTickLogName) {}
+  /// Before the first tick: it keeps the volumes of `run` as they are now.
+  ReplayLog(const std::filesystem::path& out, const std::filesystem::path& from,
+            const RecordedRun& run)
+      : out_(out), from_(from), log_(new_folder(out) / kTickLogName) {
+    for (std::size_t v = 0; v < run.scene.volumes.size(); ++v) {
+      const std::vector<Label>& labels = run.scene.volumes[v].image.labels;
+      const std::span<const Density> density = run.servo->density(v);
+      write_starting_volume(out, hex64(volume_hash(density, labels)), run.servo->grid(v), density,
+                            labels);
+    }
+  }
 
   void append(const TickRecord& record) { log_.append(record); }
 
@@ -89,7 +103,6 @@ class ReplayLog {
     manifest["gaps"] = Json::List{};
     manifest["end_reason"] = "replayed";
     write_new_file(out_ / kSceneName, run.scene_json);
-    copy_starting_volumes(from_, out_);
     write_new_file(out_ / kManifestName, manifest.document());
   }
 
@@ -172,7 +185,7 @@ int run_replay(const ReplayOptions& options, const std::atomic<bool>& stop) {
   if (!options.watch.empty()) return watch_replay(options, log, stop);
   RecordedRun run = load_run(options.folder, options.changes, kernels_named(options.kernels));
   std::optional<ReplayLog> copy;
-  if (!options.out.empty()) copy.emplace(options.out, options.folder);
+  if (!options.out.empty()) copy.emplace(options.out, options.folder, run);
   ComparedRuns compared(log.rows(), run.manifest);
   const bool changed = !options.changes.none();
 

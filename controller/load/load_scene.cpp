@@ -71,9 +71,12 @@ SceneTool load_mesh(const ToolSpec& spec, double pitch_mm, double voxel_mm,
   const std::filesystem::path path = from.folder / spec.file;
   ToolMesh mesh;
   try {
-    mesh = from.mesh != nullptr
-               ? *from.mesh
-               : join_triangles(read_stl(path, from.cpu_s), spec.scale, path.string());
+    if (from.mesh != nullptr) {
+      mesh = *from.mesh;
+      check_mesh(mesh, "the recorded mesh");
+    } else {
+      mesh = join_triangles(read_stl(path, from.cpu_s), spec.scale, path.string());
+    }
   } catch (const LoadError& error) {
     refuse(spec.where, std::string(": ") + error.what());
   }
@@ -350,15 +353,14 @@ LoadedScene load_parsed(Scene spec, const std::filesystem::path& path,
   static_cast<SceneSettings&>(scene) = spec;
   scene.volume_specs = spec.volumes;
   for (std::size_t i = 0; i < spec.volumes.size(); ++i) {
-    if (i < recorded.volumes.size() && recorded.volumes[i]) {
-      scene.volumes.push_back(std::move(*recorded.volumes[i]));
-      continue;
-    }
     const bool from_command_line = i == 0 && overrides.volume_file;
     const VolumeSource from{.folder = from_command_line ? "" : path.parent_path(),
                             .unknown = from_command_line,
                             .cpu_s = overrides.read_cpu_s,
-                            .image = i == 0 ? first : nullptr};
+                            .image = i == 0 ? first : nullptr,
+                            .recorded = i < recorded.volumes.size() && recorded.volumes[i]
+                                            ? &*recorded.volumes[i]
+                                            : nullptr};
     scene.volumes.push_back(load_volume(spec.volumes[i], from, scene.materials,
                                         from_command_line ? written_iso : std::nullopt));
   }

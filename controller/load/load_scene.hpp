@@ -74,9 +74,12 @@ inline constexpr std::array<double, 3> kWorkspaceMm = {100.0, 80.0, 60.0};
 /// voxels of 0.125 mm. If no volume has labels, only the materials that the scene names stay.
 [[nodiscard]] LoadedScene load_scene(const std::filesystem::path& path, const SceneOverrides& = {});
 
-/// What a recording has of a loaded scene. Takes the place of its files.
+/// What a recording has of a loaded scene. Takes the place of its files, and is checked as they
+/// are.
 struct RecordedInputs {
-  std::vector<std::optional<SceneVolume>> volumes{};       ///< by number; none: of its file
+  /// By number; none: of its file. Name, file, `solid` and a given iso are those of the scene's
+  /// text.
+  std::vector<std::optional<SceneVolume>> volumes{};
   std::vector<std::pair<std::string, ToolMesh>> meshes{};  ///< by the name of the tool
 };
 
@@ -112,7 +115,8 @@ struct VolumeSource {
   std::filesystem::path folder;
   bool unknown = false;  ///< the scene has no settings for it
   int cpu_s = 0;
-  VolumeImage* image = nullptr;  ///< if set, replaces the file
+  VolumeImage* image = nullptr;     ///< if set, replaces the file
+  SceneVolume* recorded = nullptr;  ///< if set, replaces file and reading: RecordedInputs
 };
 
 /// One volume after loading; the scene has these `materials`. `felt_at`: the iso for which their

@@ -188,6 +188,40 @@ void grow_labels(const VoxelGrid& grid, std::vector<Label>& labels) {
   }
 }
 
+/// Refuses a volume that reaches too far for the numbers of the servo.
+void check_place(const VolumeSpec& spec, const SceneVolume& volume) {
+  const WorldBox box = world_box(volume);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const double reach_mm = std::max(-box.lo_mm[axis], box.hi_mm[axis]);
+    if (reach_mm <= kLargestWorldMm) continue;  // not so for NaN
+    refuse(spec.where, ": the volume reaches " + short_text(reach_mm) +
+                           " mm from the origin; keep it within " + number_text(kLargestWorldMm) +
+                           ", check position_mm and spacing_mm");
+  }
+}
+
+/// A volume as a recording has it, for what the scene's text says of it.
+SceneVolume recorded_volume(const VolumeSpec& spec, SceneVolume volume, std::size_t materials) {
+  volume.name = spec.name;
+  volume.file = spec.file;
+  volume.solid = spec.solid;
+  if (spec.iso) volume.iso = nearest_density(*spec.iso * kDensityMax);
+  const auto refuse_volume = [&](const std::string& why) {
+    refuse(spec.where, ": the recorded volume " + why + "; copy the recording again");
+  };
+  if (volume.iso == 0) refuse_volume("has its surface at density 0");
+  double square = 0;
+  for (const double q : volume.pose.orientation) square += q * q;
+  if (!(std::abs(square - 1) < 1e-9)) refuse_volume("has an orientation that is no rotation");
+  try {
+    check_labels(volume.image, materials + volume.proposed.size());
+  } catch (const LoadError& error) {
+    refuse_volume(error.what());
+  }
+  check_place(spec, volume);
+  return volume;
+}
+
 }  // namespace
 
 std::filesystem::path volume_path(const std::filesystem::path& folder, const std::string& file) {
@@ -219,6 +253,9 @@ void scale_to_felt_iso(const std::vector<Material>& materials, Density iso, Volu
 
 SceneVolume load_volume(const VolumeSpec& spec, const VolumeSource& from,
                         std::vector<Material> materials, std::optional<double> felt_at) {
+  if (from.recorded != nullptr) {
+    return recorded_volume(spec, std::move(*from.recorded), materials.size());
+  }
   SceneVolume volume;
   volume.name = spec.name;
   volume.file = spec.file;
@@ -243,14 +280,7 @@ SceneVolume load_volume(const VolumeSpec& spec, const VolumeSource& from,
   volume.pose = place_volume(volume.image,
                              spec.orientation ? rotation_of(*spec.orientation) : kSourceStanding,
                              spec.position_mm);
-  const WorldBox box = world_box(volume);
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    const double reach_mm = std::max(-box.lo_mm[axis], box.hi_mm[axis]);
-    if (reach_mm <= kLargestWorldMm) continue;
-    refuse(spec.where, ": the volume reaches " + short_text(reach_mm) +
-                           " mm from the origin; keep it within " + number_text(kLargestWorldMm) +
-                           ", check position_mm and spacing_mm");
-  }
+  check_place(spec, volume);
   return volume;
 }
 

@@ -231,12 +231,14 @@ InputsInJson inputs_in(std::string_view json) {
   const Json scene = Json::parse(json);
   InputsInJson out;
   for (const Json& volume : scene.at("volumes")) {
+    if (out.density_hashes.size() == kMaxVolumes) throw JsonError("volumes: too many");
     out.inputs.volumes.push_back(volume_in(volume));
     out.density_hashes.push_back(volume.at("density_hash").get<std::string>());
   }
+  if (out.inputs.volumes.empty()) throw JsonError("volumes: none");
   if (const Json& source = scene.at(kSource); source.contains("proposed")) {
     for (const Json& material : source.at("proposed")) {
-      out.inputs.volumes.at(0)->proposed.push_back(
+      out.inputs.volumes.front()->proposed.push_back(
           {.name = material.at("name").get<std::string>(),
            .iso = material.at("iso").get<double>(),
            .colour = material.at("colour").get<std::array<double, 3>>()});

@@ -13,6 +13,7 @@
 #include "controller/load/loaded_scene.hpp"
 #include "controller/plan/plan_contact.hpp"
 #include "controller/servo/servo_plan.hpp"
+#include "shared/numeric/elementary.hpp"
 
 namespace kerf {
 
@@ -34,16 +35,16 @@ inline constexpr double kFastestTurnRadPerS = 30;
                       a[0] * b[1] - a[1] * b[0]};
   };
   auto first = cross(up, other);
-  const double length = std::hypot(first[0], first[1], first[2]);
+  const double length = hypotenuse(first[0], first[1], first[2]);
   for (double& part : first) part /= length;
   const auto second = cross(up, first);
   std::array<std::array<double, 3>, 3> edges{};
   for (std::size_t k = 0; k < 3; ++k) {
     const double angle = angle_rad + 2 * std::numbers::pi * static_cast<double>(k) / 3;
     for (std::size_t i = 0; i < 3; ++i) {
-      edges[k][i] = up[i] / std::numbers::sqrt3 +
-                    std::numbers::sqrt2 / std::numbers::sqrt3 *
-                        (std::cos(angle) * first[i] + std::sin(angle) * second[i]);
+      edges[k][i] =
+          up[i] / std::numbers::sqrt3 + std::numbers::sqrt2 / std::numbers::sqrt3 *
+                                            (cosine(angle) * first[i] + sine(angle) * second[i]);
     }
   }
   return edges;
@@ -63,7 +64,7 @@ template <class N>
   for (int k = 0; k < kDirections; ++k) {  // evenly, along a spiral of the golden angle
     const double y = (2 * k + 1.0) / kDirections - 1, turn = k * std::numbers::pi * 2.2360679775;
     const double out = std::sqrt(1 - y * y);
-    const std::array<double, 3> up{out * std::cos(turn), y, out * std::sin(turn)};
+    const std::array<double, 3> up{out * cosine(turn), y, out * sine(turn)};
     const auto edges = edges_about(up, turn);
     const auto along = [&](const std::array<double, 3>& way,
                            const PointNumber<N>* const(&offset)[3], std::int32_t i) {

@@ -12,6 +12,7 @@
 #include "controller/load/loaded_scene.hpp"
 #include "controller/plan/method/lattice.hpp"
 #include "controller/servo/servo_plan.hpp"
+#include "shared/numeric/elementary.hpp"
 #include "shared/wire/falcon.hpp"
 #include "shared/wire/omni.hpp"
 #include "shared/wire/woodenhaptics.hpp"
@@ -75,8 +76,8 @@ DeltaArm<N> delta_arm() {
                   .origin_depth_mm = Real(falcon::kOriginDepthMm),
                   .azimuth = {}};
   for (std::size_t i = 0; i < 3; ++i) {
-    arm.azimuth[i] = {Unit(std::sin(falcon::kLegAzimuthRad[i])),
-                      Unit(std::cos(falcon::kLegAzimuthRad[i]))};
+    arm.azimuth[i] = {Unit(sine(falcon::kLegAzimuthRad[i])),
+                      Unit(cosine(falcon::kLegAzimuthRad[i]))};
   }
   return arm;
 }

@@ -14,6 +14,7 @@
 #include "controller/plan/method/lattice.hpp"
 #include "controller/plan/method/tool_method.hpp"
 #include "controller/servo/servo_plan.hpp"
+#include "shared/numeric/elementary.hpp"
 
 // The tools of a scene in its volumes, and cutting by force, in the loop's numbers. Load time.
 
@@ -149,7 +150,7 @@ template <class N>
   constexpr double kCell = 2;  // beyond the sample, and before the centre's voxel
   double farthest = 0;         // half pitches
   for (const ToolOffset& offset : tool.offsets) {
-    farthest = std::max(farthest, std::hypot(offset[0], offset[1], offset[2]));
+    farthest = std::max(farthest, hypotenuse(offset[0], offset[1], offset[2]));
   }
   std::array<std::int32_t, 3> reach{};
   for (std::size_t axis = 0; axis < 3; ++axis) {

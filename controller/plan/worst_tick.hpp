@@ -15,6 +15,7 @@
 #include "controller/kernel/sampling.hpp"
 #include "controller/servo/contact_force.hpp"
 #include "controller/servo/force_cut.hpp"
+#include "shared/numeric/elementary.hpp"
 
 // Times ticks of the servo step at their highest cost. Load time; cut material stays cut.
 
@@ -180,8 +181,8 @@ class WorstCaseDriver {
     // side.
     constexpr double kJumpVox = 15, kTurn = 3.0;
     const double angle = kTurn * i;
-    return world({dense_.x + kJumpVox * std::cos(angle), dense_.y + kJumpVox * std::sin(angle),
-                  dense_.z + kJumpVox * std::sin(0.7 * angle)});
+    return world({dense_.x + kJumpVox * cosine(angle), dense_.y + kJumpVox * sine(angle),
+                  dense_.z + kJumpVox * sine(0.7 * angle)});
   }
 
   [[nodiscard]] std::uint64_t covered() const {

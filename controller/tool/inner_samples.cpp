@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "controller/tool/tool_shapes.hpp"
+#include "shared/numeric/elementary.hpp"
 #include "shared/numeric/linear_algebra.hpp"
 
 namespace kerf {
@@ -275,7 +276,7 @@ SceneTool make_mesh_tool(std::string name, ToolMesh mesh, double pitch_mm) {
   tool.radius_mm = 0;
   tool.length_mm = 0;
   for (const auto& [x, y, z] : mesh.points_mm) {
-    tool.radius_mm = std::max(tool.radius_mm, std::hypot(x, z));
+    tool.radius_mm = std::max(tool.radius_mm, hypotenuse(x, z));
     tool.length_mm = std::max(tool.length_mm, 2 * y);
   }
   tool.size_vox = {across, along, across};

@@ -14,6 +14,7 @@
 
 #include "controller/input/load_error.hpp"
 #include "controller/tool/tool_mesh.hpp"
+#include "shared/numeric/elementary.hpp"
 #include "shared/numeric/linear_algebra.hpp"
 
 namespace kerf {
@@ -86,7 +87,7 @@ double winding(const ToolMesh& mesh, const Part& part, const ToolMesh::Point& at
     auto [a, b, c] = mesh.corners(mesh.triangles[t]);
     a = a - at, b = b - at, c = c - at;
     const double la = length(a), lb = length(b), lc = length(c);
-    half_angles += std::atan2(dot(a, cross(b, c)),
+    half_angles += arctangent(dot(a, cross(b, c)),
                               la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb);
   }
   return half_angles / (2 * std::numbers::pi);
@@ -175,7 +176,7 @@ ToolMesh::Point round_axis(const Moments& all, const ToolMesh::Point& middle) {
   const double apart = std::copysign(std::sqrt(3 * j2), det);  // q - p
   constexpr double kAlike = 0.95, kDiffers = 0.3;
   if (!(std::abs(apart) > kDiffers * mean)) return {};
-  if (!(std::abs(det) > kAlike * 2 / 27 * std::pow(std::abs(apart), 3))) return {};
+  if (!(std::abs(det) > kAlike * 2 / 27 * std::abs(apart * apart * apart))) return {};
   std::size_t longest = 0;
   for (std::size_t i = 1; i < 3; ++i) {
     if (d[4 * i] / apart > d[4 * longest] / apart) longest = i;
@@ -214,8 +215,8 @@ std::string mesh_note(const ToolMesh& mesh) {
   }
   double radius_mm = 0;
   for (const ToolMesh::Point& p : mesh.points_mm)
-    radius_mm = std::max(radius_mm, std::hypot(p[0], p[2]));
-  const double aside_mm = std::hypot(middle[0], middle[2]);
+    radius_mm = std::max(radius_mm, hypotenuse(p[0], p[2]));
+  const double aside_mm = hypotenuse(middle[0], middle[2]);
   constexpr double kAside = 0.1;
   if (aside_mm > kAside * radius_mm) {
     found.push_back("its middle is " + short_text(std::round(1000 * aside_mm) / 1000) +

@@ -13,6 +13,7 @@
 
 #include "controller/tool/surface_samples.hpp"
 #include "controller/tool/tool_mesh.hpp"
+#include "shared/numeric/elementary.hpp"
 #include "shared/numeric/linear_algebra.hpp"
 
 namespace kerf {
@@ -27,10 +28,10 @@ using vec3::operator+, vec3::operator-, vec3::operator*;
 // Between two samples a pitch apart an edge of angle t rises 1/2 tan(t / 2) pitches above both.
 // That may be 0.04 units, the depth of a wedged tool (SweepRules::kWedged) less the tolerance.
 // The same holds for a row of samples along a rim that bends.
-const double kSharp = 2 * std::atan(2 * 0.04);
-const double kCosRim = std::cos(kSharp);
-const double kStraight = 2 * std::sin(kSharp / 2);  // sum of two unit vectors that part by it
-constexpr double kPointShare = 0.05;  // of the full angle, that a point lacks at least
+const double kSharp = 2 * arctangent(2 * 0.04, 1);
+const double kCosRim = cosine(kSharp);
+const double kStraight = 2 * sine(kSharp / 2);  // sum of two unit vectors that part by it
+constexpr double kPointShare = 0.05;            // of the full angle, that a point lacks at least
 // Pitches from a rim into both faces, and from a point along each of its rims. Tuned: on tilted
 // planes a cylinder of 48 sides and a square bar then rest within 0.01 voxels of the ideal in the
 // mean and 0.07 at most. On the rims and points themselves a bar rests 0.06 too high in the mean;
@@ -82,7 +83,7 @@ std::vector<bool> points_of(const ToolMesh& mesh) {
     for (std::size_t k = 0; k < 3; ++k) {
       const Point u = unit(corner[(k + 1) % 3] - corner[k]);
       const Point v = unit(corner[(k + 2) % 3] - corner[k]);
-      angle[t[k]] += std::acos(std::clamp(dot(u, v), -1.0, 1.0));
+      angle[t[k]] += arccosine(std::clamp(dot(u, v), -1.0, 1.0));
     }
   }
   std::vector<bool> is_point(angle.size());

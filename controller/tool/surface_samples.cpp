@@ -11,6 +11,7 @@
 #include "controller/input/load_error.hpp"
 #include "controller/kernel/point_shell/point_table.hpp"
 #include "controller/tool/tool_shapes.hpp"
+#include "shared/numeric/elementary.hpp"
 
 namespace kerf {
 namespace {
@@ -26,7 +27,7 @@ using Point = std::array<double, 3>;
 using Profile = std::vector<std::array<double, 2>>;  // {y, radius}
 
 double length_of(const std::array<double, 2>& a, const std::array<double, 2>& b) {
-  return std::hypot(b[0] - a[0], b[1] - a[1]);
+  return hypotenuse(b[0] - a[0], b[1] - a[1]);
 }
 
 double area_of(const Profile& profile) {
@@ -45,8 +46,8 @@ std::vector<Point> fibonacci_ball(double radius_mm, int count) {
   std::vector<Point> samples;
   for (int i = 0; i < count; ++i) {
     const double y = 2 * (i + kFirst) / (count - 1 + 2 * kFirst) - 1, across = std::sqrt(1 - y * y);
-    samples.push_back({radius_mm * across * std::cos(i * kGoldenAngle), radius_mm * y,
-                       radius_mm * across * std::sin(i * kGoldenAngle)});
+    samples.push_back({radius_mm * across * cosine(i * kGoldenAngle), radius_mm * y,
+                       radius_mm * across * sine(i * kGoldenAngle)});
   }
   return samples;
 }
@@ -55,7 +56,7 @@ std::vector<Point> fibonacci_ball(double radius_mm, int count) {
 std::vector<std::span<const std::array<double, 2>>> smooth_parts(const Profile& profile) {
   std::vector<std::span<const std::array<double, 2>>> parts;
   const auto heading = [&](std::size_t k) {
-    return std::atan2(profile[k + 1][1] - profile[k][1], profile[k + 1][0] - profile[k][0]);
+    return arctangent(profile[k + 1][1] - profile[k][1], profile[k + 1][0] - profile[k][0]);
   };
   std::size_t first = 0;
   for (std::size_t k = 1; k + 1 < profile.size(); ++k) {
@@ -116,7 +117,7 @@ class RingSampler {
     turn_ += kGoldenAngle;
     for (int i = 0; i < count; ++i) {
       const double angle = turn_ + 2 * std::numbers::pi * i / count;
-      const double x = std::cos(angle), z = std::sin(angle);
+      const double x = cosine(angle), z = sine(angle);
       samples_.push_back(
           {{radius_mm * x, y_mm, radius_mm * z}, {outward * x, upward, outward * z}});
     }
@@ -183,7 +184,7 @@ PartSamples part_samples(const SceneTool& tool, const ToolPart& part, double uni
   double reach_mm = 0;
   Profile profile = part.profile;
   for (auto& [y_mm, radius_mm] : profile) {
-    reach_mm = std::max(reach_mm, std::hypot(y_mm, radius_mm));
+    reach_mm = std::max(reach_mm, hypotenuse(y_mm, radius_mm));
     y_mm -= part.middle_mm;
   }
   if (reach_mm > kMostReach * unit_mm) {

@@ -19,6 +19,7 @@
 
 #include "controller/input/load_error.hpp"
 #include "controller/input/sandbox.hpp"
+#include "shared/numeric/elementary.hpp"
 #include "shared/numeric/linear_algebra.hpp"
 #include "shared/posix/error_text.hpp"
 
@@ -135,8 +136,11 @@ std::array<double, 2> noises(std::span<const LooseTriangle> triangles) {
     }
   }
   const auto size = static_cast<double>(largest);
-  const double float_step = std::numeric_limits<float>::epsilon() * std::exp2(std::ilogb(size));
-  return {4 * float_step, 1.5e-5 * std::pow(10, std::floor(std::log10(size)))};
+  const double float_step = std::numeric_limits<float>::epsilon() * std::ldexp(1, std::ilogb(size));
+  int digits = 0;  // behind the point, of the first one that is not 0
+  while (size > 0 && power_of_tenth(digits) > size) ++digits;
+  while (power_of_tenth(digits - 1) <= size) --digits;
+  return {4 * float_step, 1.5e-5 * power_of_tenth(digits)};
 }
 
 /// The mesh with its corners joined: as they are, else without the noise of their numbers.
@@ -165,23 +169,42 @@ void stand_in_the_middle(std::vector<ToolMesh::Point>& points_mm) {
   }
 }
 
+void check_size(std::size_t triangles, const std::string& place) {
+  if (triangles == 0) refuse(place, ": no triangles; export a closed mesh");
+  if (triangles <= kMaxMeshTriangles) return;
+  refuse(place, ": " + std::to_string(triangles) + " triangles, above the limit of " +
+                    std::to_string(kMaxMeshTriangles) + "; simplify the mesh");
+}
+
+void check_encloses(double volume_mm3, const std::string& place) {
+  if (volume_mm3 >= 1e-9) return;
+  refuse(place, ": the mesh encloses " + short_text(volume_mm3) +
+                    " mm^3; export a solid, check scale (mm per unit of the file)");
+}
+
 }  // namespace
+
+void check_mesh(const ToolMesh& mesh, const std::string& place) {
+  check_size(mesh.triangles.size(), place);
+  for (const ToolMesh::Point& point : mesh.points_mm) {
+    for (const double mm : point) {
+      if (std::abs(mm) <= 2 * kLargestMeshMm) continue;  // moved to the middle
+      refuse(place, ": has the coordinate " + short_text(mm) + " mm; record it again");
+    }
+  }
+  if (const std::string fault = fault_of(mesh); !fault.empty()) refuse(place, fault);
+  ToolMesh turned = mesh;
+  check_encloses(turn_outward(turned), place);
+  if (turned.triangles != mesh.triangles) refuse(place, ": inside out; record it again");
+}
 
 ToolMesh join_triangles(std::span<const LooseTriangle> triangles, double scale,
                         const std::string& place) {
-  if (triangles.empty()) refuse(place, ": no triangles; export a closed mesh");
-  if (triangles.size() > kMaxMeshTriangles) {
-    refuse(place, ": " + std::to_string(triangles.size()) + " triangles, above the limit of " +
-                      std::to_string(kMaxMeshTriangles) + "; simplify the mesh");
-  }
+  check_size(triangles.size(), place);
   check_coordinates(triangles, scale, place);
   ToolMesh mesh = closed_mesh(triangles, scale, place);
   stand_in_the_middle(mesh.points_mm);
-  const double volume_mm3 = turn_outward(mesh);
-  if (volume_mm3 < 1e-9) {
-    refuse(place, ": the mesh encloses " + short_text(volume_mm3) +
-                      " mm^3; export a solid, check scale (mm per unit of the file)");
-  }
+  check_encloses(turn_outward(mesh), place);
   return mesh;
 }
 

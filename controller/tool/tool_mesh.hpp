@@ -35,6 +35,9 @@ struct ToolMesh {
   }
 };
 
+/// Throws LoadError unless `join_triangles` could have made the mesh; each triangle has points.
+void check_mesh(const ToolMesh& mesh, const std::string& place);
+
 /// A triangle whose corners are not yet joined with those of others.
 using LooseTriangle = std::array<std::array<float, 3>, 3>;
 

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "controller/tool/inner_samples.hpp"
+#include "shared/numeric/elementary.hpp"
 
 namespace kerf {
 namespace {
@@ -81,8 +82,8 @@ void cover_surface(const SceneTool& tool, SampleLattice& lattice) {
     const int count = 8 * std::max(1, static_cast<int>(std::ceil(eighth_mm / apart_mm)));
     for (int i = 0; i < count; ++i) {
       const double angle = 2 * std::numbers::pi * i / count;
-      lattice.cover({radius_mm * std::cos(angle) / tool.pitch_mm, y_mm / tool.pitch_mm,
-                     radius_mm * std::sin(angle) / tool.pitch_mm});
+      lattice.cover({radius_mm * cosine(angle) / tool.pitch_mm, y_mm / tool.pitch_mm,
+                     radius_mm * sine(angle) / tool.pitch_mm});
     }
   }
 }
@@ -153,7 +154,7 @@ std::vector<std::array<double, 2>> tool_profile(const SceneTool& tool, int steps
   std::vector<std::array<double, 2>> line{{-half_mm, 0.0}};
   for (int i = 0; i <= steps; ++i) {
     const double y_mm =
-        std::clamp(-half_mm * std::cos(std::numbers::pi * i / steps), -half_mm, half_mm);
+        std::clamp(-half_mm * cosine(std::numbers::pi * i / steps), -half_mm, half_mm);
     const double radius_mm = profile_radius_mm(tool, y_mm);
     if (radius_mm > 0) line.push_back({y_mm, radius_mm});
   }

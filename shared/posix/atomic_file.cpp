@@ -38,9 +38,10 @@ int own_descriptor(const fs::path& path) noexcept {
 }
 
 /// Of the files that kerf reads and writes.
-constexpr std::string_view kEndings[] = {
-    ".nrrd", ".nhdr", ".mha", ".mhd", ".nii", ".gz",  ".tif", ".tiff", ".dcm", ".raw", ".toml",
-    ".json", ".npy",  ".npz", ".csv", ".svg", ".png", ".md",  ".stl",  ".ply", ".y4m", ".pem"};
+constexpr std::string_view kEndings[] = {".nrrd", ".nhdr", ".mha", ".mhd", ".nii",  ".gz",
+                                         ".tif",  ".tiff", ".dcm", ".raw", ".toml", ".json",
+                                         ".npy",  ".npz",  ".csv", ".svg", ".png",  ".md",
+                                         ".stl",  ".ply",  ".y4m", ".pem", ".h5",   ".mcap"};
 
 std::string ending_of(const fs::path& path) {
   std::string ending = path.extension().string();

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -69,20 +68,23 @@ inline constexpr std::size_t kLabelColours = 14;
 /// which differ for every kind of colour vision, the lightest first, because
 /// the first label is usually cut first. After seven they come again, darker; after 14 they repeat.
 [[nodiscard]] inline std::array<double, 3> label_colour(std::size_t label) {
-  constexpr std::array<std::array<double, 3>, 7> kScreen{{{86, 180, 233},   // sky blue
-                                                          {240, 228, 66},   // yellow
-                                                          {213, 94, 0},     // vermilion
-                                                          {0, 158, 115},    // bluish green
-                                                          {204, 121, 167},  // reddish purple
-                                                          {0, 114, 178},    // blue
-                                                          {230, 159, 0}}};  // orange
-  constexpr double kGamma = 2.2;
+  // Those of a screen over 255, to the power of 2.2: written out, since the last bit of std::pow is
+  // the C library's.
+  constexpr std::array<std::array<double, 3>, 7> kLinear{{
+      {0.09151835299891949, 0.4647411349738896, 0.8199637053235279},   // sky blue, 86 180 233
+      {0.8751375823652049, 0.7817506777739623, 0.051122050056493396},  // yellow, 240 228 66
+      {0.6730490732809419, 0.11129941482466024, 0.0},                  // vermilion, 213 94 0
+      {0.0, 0.348864834082879, 0.173439036332135},                     // bluish green, 0 158 115
+      {0.6120655998656237, 0.19397216704809314,
+       0.39408312608282897},                           // reddish purple, 204 121 167
+      {0.0, 0.1701383732233124, 0.4534564754857306},   // blue, 0 114 178
+      {0.7969165429079781, 0.35374090009662945, 0.0},  // orange, 230 159 0
+  }};
   constexpr double kDarker = 0.18;  // no two of 14 are nearer then, for any kind of vision
   const std::size_t at = (label - 1) % kLabelColours;
   std::array<double, 3> colour{};
   for (std::size_t i = 0; i < 3; ++i) {
-    colour[i] = std::pow(kScreen[at % kScreen.size()][i] / 255, kGamma) *
-                (at < kScreen.size() ? 1 : kDarker);
+    colour[i] = kLinear[at % kLinear.size()][i] * (at < kLinear.size() ? 1 : kDarker);
   }
   return colour;
 }

@@ -74,18 +74,29 @@ class TestHdf5(unittest.TestCase):
             file.write(b"x")
         self.assertIn("row 700 has a wrong checksum", export(damaged, none, code=2))
         self.assertIn("no.such", export(self.log, self.folder / "no.such/x.h5", code=2))
-        self.assertIn("is the disk full?", export(self.log, "/dev/shm/full/x.h5", code=2) if self.full_disk() else "is the disk full?")
-        self.assertEqual(list(self.folder.glob("*.part")) + list(self.folder.glob("none*")), [])
+        (damaged / "scene.json").write_bytes(b"\xff\xfe")
+        self.assertIn("no JSON", export(damaged, none, code=2))
+        self.assertEqual(list(self.folder.glob("*.new-*")) + list(self.folder.glob("none*")), [])
 
-    def full_disk(self):
-        """Whether a disk of 64 KiB can be mounted."""
-        folder = pathlib.Path("/dev/shm/full")
-        folder.mkdir(exist_ok=True)
-        mounted = subprocess.run(["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", folder], stderr=subprocess.DEVNULL)
-        self.addCleanup(folder.rmdir)
-        if mounted.returncode == 0:
-            self.addCleanup(subprocess.run, ["umount", folder])
-        return mounted.returncode == 0
+    def test_a_cut_log_gives_what_it_has_and_says_so(self):
+        cut = self.folder / "cut"
+        shutil.copytree(self.log, cut)
+        with open(cut / "ticks.npy", "r+b") as file:
+            file.truncate(4096 + 193 * self.rows.dtype.itemsize + 7)
+        self.assertIn(f"cut after 193 of {len(self.rows)} rows", export(cut, self.folder / "cut.h5", code=1))
+        with h5py.File(self.folder / "cut.h5", "r") as file:
+            self.assertEqual(len(file["ticks/tick"]), 193)
+
+    def test_a_full_disk_leaves_nothing(self):
+        full = self.folder / "full"
+        full.mkdir()
+        if subprocess.run(["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", full], stderr=subprocess.DEVNULL).returncode:
+            self.skipTest("no right to mount")
+        try:
+            self.assertIn("is the disk full?", export(self.log, full / "x.h5", code=2))
+            self.assertEqual(list(full.iterdir()), [])
+        finally:
+            subprocess.run(["umount", full], check=True)
 
 
 if __name__ == "__main__":

@@ -116,7 +116,7 @@ class TestMcap(unittest.TestCase):
         with open(empty / "ticks.npy", "r+b") as file:
             file.truncate(4096)
         path = self.folder / "empty.mcap"
-        export(empty, path)
+        self.assertIn(f"cut after 0 of {len(self.rows)} rows", export(empty, path, code=1))
         self.assertEqual(read(path)["statistics"], {"messages": 0, "chunks": 0})
 
 

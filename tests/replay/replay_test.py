@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """A recording is replayed to the bit, and what is wrong with one is named: runs controller, emulator, recorder and replay.
 
-    replay_test.py ROOT BIN"""
+    replay_test.py ROOT BIN LIBM     LIBM: a C library with other last bits (next_libm.cpp)"""
 import gzip
 import json
+import os
 import pathlib
 import shutil
 import socket
@@ -14,7 +15,7 @@ import tempfile
 import time
 import unittest
 
-ROOT, BIN = (pathlib.Path(path).resolve() for path in (sys.argv.pop(1), sys.argv.pop(1)))
+ROOT, BIN, LIBM = (pathlib.Path(sys.argv.pop(1)).resolve() for _ in range(3))
 sys.path.insert(0, str(ROOT / "tests/record"))
 from lockstep_run import record
 
@@ -34,8 +35,9 @@ def crc32c(data):
     return crc ^ 0xFFFFFFFF
 
 
-def replay(log, *options, code=0):
-    done = subprocess.run([BIN / "kerf-replay", log, *options], capture_output=True, text=True)
+def replay(log, *options, code=0, libm=None):
+    environment = {**os.environ, "LD_PRELOAD": str(libm)} if libm else None
+    done = subprocess.run([BIN / "kerf-replay", log, *options], capture_output=True, text=True, env=environment)
     assert done.returncode == code, f"{done.returncode}: {done.stdout}{done.stderr}"
     if code == 2:
         assert done.stderr.count("\n") == 1, done.stderr
@@ -123,6 +125,15 @@ class TestReplay(unittest.TestCase):
         self.assertIn(self.report["output_hash"], replay(self.log, "--kernels", "scalar"))
         self.assertIn("--kernels mmx: not on this machine; use one of", replay(self.log, "--kernels", "mmx", code=2))
 
+    def test_another_c_library_gives_the_same_bits(self):
+        """The scene is made again, all samples of its tools and its volume, and must be the recorded one to the last bit."""
+        shutil.rmtree((log := self.copy()) / "volumes")
+        self.assertIn(self.report["output_hash"], replay(log, libm=LIBM))
+        folder = self.run_folder / "meshes"
+        folder.mkdir()
+        record(ROOT, BIN, folder, ROOT / "scenes/fluted_bur.toml", 1)
+        self.assertIn("each equal", replay(folder / "log", libm=LIBM))
+
     def test_the_scene_file_may_have_gone(self):
         text = self.scene.read_text()
         self.scene.unlink()
@@ -167,6 +178,42 @@ class TestReplay(unittest.TestCase):
         density.unlink()
         self.assertIn("ball.nrrd", replay(folder / "own/log", code=2))
 
+    def test_recorded_volumes_and_meshes_are_checked_as_files_are(self):
+        log = self.copy()
+        scene = json.loads((log / "scene.json").read_text())
+        volume, tool = scene["volumes"][0], scene["tools"][0]
+
+        def refused(why, **changed):
+            (log / "scene.json").write_text(json.dumps({**scene, **changed}))
+            for options in ((), ("--set", "force.friction=0.1")):
+                self.assertIn(why, replay(log, *options, code=2))
+
+        mesh = {"points_mm": [], "triangles": []}
+        refused("loaded from", volumes=[])
+        refused("loaded from", volumes=[volume] * 9)
+        refused("above the limit", volumes=[{**volume, "grid": [4096, 4096, 4096]}])
+        refused("mm from the origin", volumes=[{**volume, "pose": {**volume["pose"], "position_mm": [1e300, 0, 0]}}])
+        refused("no rotation", volumes=[{**volume, "pose": {**volume["pose"], "orientation": [0, 0, 0, 0]}}])
+        refused("loaded from", tools=[{**tool, "mesh": {**mesh, "triangles": [[0, 1, 2]]}}])
+        (log / "scene.json").write_text(json.dumps(scene))
+        # A label that stands for no material, under the hash of its content.
+        density, labels = (gzip.decompress((log / f"volumes/{volume['density_hash']}{part}.npy.gz").read_bytes())[128:]
+                           for part in ("", "-labels"))
+        value = 0xCBF29CE484222325
+        for byte in density + (labels := labels[:-1] + b"\xc8"):
+            value = (value ^ byte) * 0x100000001B3 & (1 << 64) - 1
+        for part, data in (("", density), ("-labels", labels)):
+            path = log / f"volumes/{volume['density_hash']}{part}.npy.gz"
+            (log / f"volumes/{value:016x}{part}.npy.gz").write_bytes(gzip.compress(gzip.decompress(path.read_bytes())[:128] + data, 1))
+        refused("label 200 stands for no material", volumes=[{**volume, "density_hash": f"{value:016x}"}])
+
+    def test_a_replay_writes_only_below_out(self):
+        out, elsewhere = self.run_folder / "linked", self.run_folder / "elsewhere"
+        out.mkdir(), elsewhere.mkdir()
+        (out / "volumes").symlink_to(elsewhere)
+        self.assertIn("no folder of its own", replay(self.log, "--out", out, code=2))
+        self.assertEqual(list(elsewhere.iterdir()), [])
+
     def test_another_input_is_found_at_its_tick(self):
         encoder = struct.unpack_from("<i", self.rows(self.log), HEADER + 1500 * self.row + 264)[0]
         found = replay(self.with_row(1501, 264, struct.pack("<i", encoder + 3)), code=1)
@@ -205,7 +252,9 @@ class TestReplay(unittest.TestCase):
         (log / "ticks.npy").write_bytes(rows[:at] + rows[at + 9 * self.row:])
         self.assertIn("stopped: ticks 701 to 709 were not recorded", replay(log, code=1))
         (log / "ticks.npy").write_bytes(rows[:at + 100])
-        self.assertIn("700 ticks, each equal", replay(log))
+        cut = replay(log, code=1)
+        self.assertIn("700 ticks, each equal", cut)
+        self.assertRegex(cut, r"stopped: the log is cut after 700 of \d+ rows")
         (log / "ticks.npy").write_bytes(rows[:HEADER])
         self.assertIn("0 rows; nothing to replay", replay(log, code=2))
         (log / "ticks.npy").write_bytes(rows[:at + 50] + b"x" + rows[at + 51:])
@@ -282,7 +331,7 @@ class TestReplay(unittest.TestCase):
         for _ in range(3):
             told(".", "tick")
         watched.communicate("q", timeout=20)
-        self.assertRegex(sender.communicate(timeout=20)[0], r"^\d ticks sent, [1-3] with no receiver, 0 lost\n$")
+        self.assertRegex(sender.communicate(timeout=20)[0], r"^\d ticks sent, [23] not taken, 0 lost\n$")
         for wrong, why in (("127.0.0.1:99999", "no port"), ("no.such.host.invalid:1", "no.such.host.invalid")):
             done = subprocess.run([BIN / "kerf-record", "live", "--name", name, "--udp", wrong], capture_output=True, text=True)
             self.assertEqual((done.returncode, done.stderr.count("\n")), (2, 1), done.stderr)
@@ -305,12 +354,12 @@ class TestReplay(unittest.TestCase):
         log = self.copy()
         scene = json.loads((log / "scene.json").read_text())
         for key, value, place in [("force", {**scene["force"], "stiffness_n_per_mm": 0.123}, "force.stiffness_n_per_mm is 0.123 in "),
-                                  ("volumes", [{**scene["volumes"][0], "density_hash": "00"}], 'volumes[0].density_hash is "00" in')]:
+                                  ("volumes", [{**scene["volumes"][0], "density_hash": "00"}], 'the content of volumes[0] has hash "00" in')]:
             (log / "scene.json").write_text(json.dumps({**scene, key: value}))
             self.assertIn(place, replay(log, code=2))
         del scene["source"]
         (log / "scene.json").write_text(json.dumps(scene))
-        self.assertIn("does not say what the scene was loaded from", replay(log, code=2))
+        self.assertIn("what the scene was loaded from", replay(log, code=2))
         (log / "scene.json").write_text("[" * 100000)
         self.assertIn("scene.json", replay(log, code=2))
 

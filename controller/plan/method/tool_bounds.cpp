@@ -14,6 +14,7 @@
 
 #include "controller/kernel/kernel_set.hpp"
 #include "controller/plan/method/lattice.hpp"
+#include "shared/numeric/elementary.hpp"
 #include "shared/volume/voxel_grid.hpp"
 
 namespace kerf {
@@ -36,17 +37,18 @@ class Spans {
     double widest = 0;
     for (const ToolOffset& offset : offsets) {  // half pitches
       double& radius = rings[offset[1] / 2.0];
-      radius = std::max(radius, std::hypot(offset[0] / 2.0, offset[2] / 2.0));
+      radius = std::max(radius, hypotenuse(offset[0] / 2.0, offset[2] / 2.0));
       widest = std::max(widest, radius);
     }
     if (rings.empty()) return;
-    diameter_ = std::hypot(rings.rbegin()->first - rings.begin()->first, 2 * widest);
+    diameter_ = hypotenuse(rings.rbegin()->first - rings.begin()->first, 2 * widest);
     for (std::size_t i = 0; i < by_angle_.size(); ++i) {
       const double angle = static_cast<double>(i) * kStep;
+      const double along = cosine(angle), across = sine(angle);
       double up = -1e9, down = -1e9;
       for (const auto& [height, radius] : rings) {
-        up = std::max(up, height * std::cos(angle) + radius * std::sin(angle));
-        down = std::max(down, -height * std::cos(angle) + radius * std::sin(angle));
+        up = std::max(up, height * along + radius * across);
+        down = std::max(down, -height * along + radius * across);
       }
       by_angle_[i] = up + down;
     }
@@ -54,7 +56,7 @@ class Spans {
 
   /// Largest E for all angles within `slack` of the one with this cosine, 0..1.
   [[nodiscard]] double most(double cosine, double slack) const {
-    const double angle = std::acos(std::clamp(cosine, 0.0, 1.0));
+    const double angle = arccosine(std::clamp(cosine, 0.0, 1.0));
     const auto nearest = static_cast<std::size_t>(std::lround(angle / kStep));
     return by_angle_[nearest] + diameter_ * (slack + kStep / 2);
   }
@@ -75,7 +77,7 @@ class GrownHull {
   GrownHull(const SceneTool& tool, const SceneVolume& volume) {
     double low = 1e9, high = -1e9;  // half pitches
     for (const ToolOffset& offset : tool.offsets) {
-      radius_ = std::max(radius_, std::hypot(double(offset[0]), double(offset[2])));
+      radius_ = std::max(radius_, hypotenuse(double(offset[0]), double(offset[2])));
       low = std::min(low, double(offset[1]));
       high = std::max(high, double(offset[1]));
     }
@@ -162,14 +164,14 @@ std::vector<VoxelIndex> box_sizes(const SceneTool& tool, const SceneVolume& volu
   const Spans spans(tool.offsets);
   std::vector<VoxelIndex> sizes;
   for (int i = 0; i < kDirections; ++i) {
-    const double polar = (i + 0.5) * kStep;
+    const double polar = (i + 0.5) * kStep, out = sine(polar);
     for (int j = 0; j < kDirections; ++j) {
       const double around = (j + 0.5) * kStep;
       const auto cells = [&](std::size_t axis, double cosine) {
         return cells_of(spans.most(cosine, slack) * tool.pitch_mm / volume.image.spacing_mm[axis]);
       };
-      sizes.push_back({cells(0, std::sin(polar) * std::cos(around)),
-                       cells(1, std::sin(polar) * std::sin(around)), cells(2, std::cos(polar))});
+      sizes.push_back(
+          {cells(0, out * cosine(around)), cells(1, out * sine(around)), cells(2, cosine(polar))});
     }
   }
   const auto key = [](const VoxelIndex& v) { return std::tuple(v.x, v.y, v.z); };

@@ -5,6 +5,8 @@
 #include <cassert>
 #include <cmath>
 
+#include "shared/numeric/elementary.hpp"
+
 namespace kerf {
 namespace {
 
@@ -43,7 +45,7 @@ void group_together(std::span<Point> points) {
 }
 
 double distance(const Point& a, const Point& b) {
-  return std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
+  return hypotenuse(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
 }
 
 double reach_of(std::span<const Point> samples, std::span<const SurfaceSample> close) {

@@ -8,12 +8,13 @@
 #include <utility>
 
 #include "controller/volume/file/dicom_elements.hpp"
+#include "shared/numeric/elementary.hpp"
 
 namespace kerf::volume {
 using gdcm::Tag;
 
 double rounding_of(int decimals) noexcept {
-  return decimals > 0 ? 0.5 * std::pow(10, -decimals) : 0;
+  return decimals > 0 ? 0.5 * power_of_tenth(decimals) : 0;
 }
 
 std::optional<WrittenNumber> written_number(std::string_view padded) {

@@ -9,6 +9,7 @@
 #include <system_error>
 
 #include "controller/input/load_error.hpp"
+#include "shared/numeric/elementary.hpp"
 #include "shared/text/text.hpp"
 
 namespace kerf {
@@ -116,7 +117,7 @@ std::optional<Written> header_number(std::string_view word) {
     exponent = parsed<int>(word.substr(exponent_at + 1)).value_or(0);
   }
   const int last_digit = exponent - static_cast<int>(mantissa.size() - point - 1);
-  return Written{*value, 0.5 * std::pow(10.0, last_digit)};
+  return Written{*value, 0.5 * power_of_tenth(-last_digit)};
 }
 
 void HeaderFields::add(std::string_view key, const std::string& text) {

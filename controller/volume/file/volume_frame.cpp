@@ -12,6 +12,7 @@
 #include <string_view>
 
 #include "controller/input/load_error.hpp"
+#include "shared/numeric/elementary.hpp"
 #include "shared/text/text.hpp"
 
 namespace kerf {
@@ -43,7 +44,7 @@ double rounding_mm(double value) {
   const std::string text = mm_text(value);
   const std::size_t point = text.find('.');
   const std::size_t decimals = point == text.npos ? 0 : text.size() - point - 1;
-  const double unit = std::pow(10.0, -static_cast<double>(decimals));
+  const double unit = power_of_tenth(static_cast<int>(decimals));
   return value < 100 * unit ? 0 : unit / 2;
 }
 

@@ -3,53 +3,20 @@
 #include <array>
 #include <bit>
 #include <charconv>
-#include <new>
 #include <string>
 #include <string_view>
 #include <system_error>
 
-#include <zlib.h>
-
 #include "controller/input/load_error.hpp"
 #include "controller/volume/file/volume_io.hpp"
 #include "shared/posix/atomic_file.hpp"
+#include "shared/posix/gzip_writer.hpp"
 
 namespace kerf {
 namespace fs = std::filesystem;
 namespace {
 
 static_assert(std::endian::native == std::endian::little, "the header says little-endian");
-
-void write_gzip(AtomicFile& file, const void* data, std::size_t size) {
-  constexpr int kLevel = 4;             // near the best size for volumes, at twice the speed
-  constexpr int kGzipWindow = 15 + 16;  // largest window, gzip framing
-  constexpr int kMemory = 8;            // zlib's default
-  constexpr std::size_t kPiece = std::size_t{1} << 18;
-  z_stream stream{};
-  if (deflateInit2(&stream, kLevel, Z_DEFLATED, kGzipWindow, kMemory, Z_DEFAULT_STRATEGY) != Z_OK) {
-    throw std::bad_alloc();
-  }
-  const struct End {
-    z_stream* stream;
-    ~End() { deflateEnd(stream); }
-  } end{&stream};
-  std::vector<unsigned char> packed(kPiece);
-  const auto* at = static_cast<const unsigned char*>(data);
-  int state = Z_OK;
-  while (state != Z_STREAM_END) {
-    const std::size_t take = std::min(size, kPiece);
-    if (stream.avail_in == 0 && take > 0) {
-      stream.next_in = at;
-      stream.avail_in = static_cast<uInt>(take);
-      at += take;
-      size -= take;
-    }
-    stream.next_out = packed.data();
-    stream.avail_out = static_cast<uInt>(packed.size());
-    state = deflate(&stream, size == 0 ? Z_FINISH : Z_NO_FLUSH);
-    file.write(packed.data(), packed.size() - stream.avail_out);
-  }
-}
 
 /// Shortest text that reads back as the same number.
 void append(std::string& text, double value) {
@@ -94,7 +61,10 @@ void write_voxels(AtomicFile& file, const VolumeImage& image, const std::vector<
   file.write(header.data(), header.size());
   const std::size_t size = voxels.size() * sizeof(T);
   if (encoding == VolumeEncoding::gzip) {
-    write_gzip(file, voxels.data(), size);
+    constexpr int kLevel = 4;  // near the best size for volumes, at twice the speed
+    GzipWriter gzip(file, kLevel);
+    gzip.write(voxels.data(), size);
+    gzip.finish();
   } else {
     file.write(voxels.data(), size);
   }
