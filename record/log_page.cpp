@@ -21,7 +21,7 @@ it, each with `--from TICK` and `--until TICK` for a part.
 | file | what |
 |---|---|
 | `ticks.npy` | one row for each tick, the columns below, for NumPy as it is |
-| `manifest.json` | length of a tick, voxels, losses of the recorder and where they lie, how the run ended |
+| `manifest.json` | length of a tick, voxels, versions, compiler and processor, losses of the recorder and where they lie, how the run ended |
 | `scene.json` | the scene as it was loaded, every setting; `source` is what it was loaded from |
 | `volumes/HASH.npy.gz` | the densities of a volume as the run began, `[z, y, x]`; `HASH-labels.npy.gz`: its labels. HASH is `density_hash` in `scene.json`, of both |
 

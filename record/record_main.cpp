@@ -94,6 +94,9 @@ int run_record(int argc, char** argv) {
   if (table.chosen() && csv.empty() && mcap.empty() && hdf5.empty()) {
     throw UsageError("export: as what? give --csv FILE, --mcap FILE or --hdf5 FILE");
   }
+  if (table.chosen()) {
+    check_distinct({{"--csv", csv, ".csv"}, {"--mcap", mcap, ".mcap"}, {"--hdf5", hdf5, ".h5"}});
+  }
   if (!hdf5.empty()) {
     static_cast<void>(catch_stop_signals());  // leaves no half file
     export_hdf5(folder, hdf5, range);

@@ -15,6 +15,7 @@
 #include "record/tick_text.hpp"
 #include "shared/posix/atomic_file.hpp"
 #include "shared/posix/error_text.hpp"
+#include "shared/posix/program.hpp"
 #include "shared/segment/layout.hpp"
 #include "shared/text/json.hpp"
 #include "shared/text/text.hpp"
@@ -81,6 +82,8 @@ void write_manifest(const std::filesystem::path& folder, const SegmentInfo& info
   Json manifest;
   manifest["kerf"] = KERF_VERSION;
   manifest["compiler"] = __VERSION__;
+  manifest["flags"] = KERF_FLAGS;
+  manifest["cpu"] = processor_name();
   manifest["build_id"] = info.build_id;
   manifest["abi_hash"] = hex64(kAbiHash);
   manifest["session_id"] = hex64(info.session_id);

@@ -91,7 +91,8 @@ REPORTS = [
         ("end_reason", "", "`clean end`, `fault`, `stopped` or `controller gone`")]),
     ("Manifest of a log", "`manifest.json` beside `ticks.npy` ([the log](log.md)).",
      [("record/recording.cpp", "void write_manifest(")], ["size_vox", "spacing_mm", "initial_hash", "first_index", "count"], [
-        ("kerf, compiler, build_id", "", "version, compiler and build of the controller and the recorder"),
+        ("kerf, compiler, flags, build_id", "", "version, compiler, its flags and build of the controller and the recorder"),
+        ("cpu", "", "processor of the recorder"),
         ("abi_hash", "", "of the layout of a row"),
         ("session_id, config_hash", "", "of the run; of its settings"),
         ("tick_ns, start_ns", "ns", "length of a tick; when the run began, CLOCK_MONOTONIC; 0 in lock-step"),
