@@ -107,7 +107,7 @@ TEST_CASE("each index of an MCAP leads to its chunk and its messages") {
 }
 
 TEST_CASE("the footer of an MCAP leads to its summary, whose checksum is right") {
-  for (const std::size_t messages : {0, 1, 4000}) {
+  for (const std::size_t messages : {std::size_t{0}, std::size_t{1}, std::size_t{4000}}) {
     const std::string file = written(messages, 300);
     const std::string_view footer = std::string_view(file).substr(file.size() - kMagicBytes - 29);
     REQUIRE(number_at<std::uint8_t>(footer, 0) == 0x02);
