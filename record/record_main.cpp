@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <filesystem>
 #include <iostream>
+#include <string>
 
 #include "record/flight_recorder.hpp"
 #include "record/force_plot.hpp"
@@ -80,6 +81,10 @@ int run_record(int argc, char** argv) {
       .shows_default();
   const Arguments columns = app.command("columns", "what each column of a log says, as a page");
   if (!app.parse(argc, argv, std::cout)) return 0;
+  if (range.from > range.until) {
+    throw UsageError("--from " + std::to_string(range.from) + " lies behind --until " +
+                     std::to_string(range.until) + "; no tick lies between them");
+  }
   if (columns.chosen()) std::cout << log_page();
   if (info.chosen()) {
     check_outputs(recording_files(folder), {{"--report", report, ".json"}});
