@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <numbers>
 #include <span>
@@ -51,20 +52,22 @@ class Spans {
         down = std::max(down, -height * along + radius * across);
       }
       by_angle_[i] = up + down;
+      if (i < kAngles) least_cosine_[i] = cosine((static_cast<double>(i) + 0.5) * kStep);
     }
   }
 
   /// Largest E for all angles within `slack` of the one with this cosine, 0..1.
   [[nodiscard]] double most(double cosine, double slack) const {
-    const double angle = arccosine(std::clamp(cosine, 0.0, 1.0));
-    const auto nearest = static_cast<std::size_t>(std::lround(angle / kStep));
-    return by_angle_[nearest] + diameter_ * (slack + kStep / 2);
+    const auto nearest = std::ranges::lower_bound(least_cosine_, cosine, std::greater{});
+    return by_angle_[static_cast<std::size_t>(nearest - least_cosine_.begin())] +
+           diameter_ * (slack + kStep / 2);
   }
 
  private:
   static constexpr std::size_t kAngles = 1024;
   static constexpr double kStep = kRightAngle / kAngles;
   std::array<double, kAngles + 1> by_angle_{};
+  std::array<double, kAngles> least_cosine_{};  ///< For which i is the nearest of the angles.
   double diameter_ = 0;
 };
 
