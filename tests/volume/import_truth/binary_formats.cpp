@@ -274,8 +274,7 @@ struct Tiff {
 };
 
 constexpr int kSubfile = 254, kWidth = 256, kHeight = 257, kBits = 258, kPacking = 259,
-              kPhotometric = 262, kOrientation = 274, kSamples = 277, kPredictor = 317,
-              kFormat = 339;
+              kPhotometric = 262, kOrientation = 274, kSamples = 277, kFormat = 339;
 
 TiffPage tiff_page(const Numbered& v, int k, int rows_per_strip) {
   TiffPage page;
