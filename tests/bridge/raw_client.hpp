@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cerrno>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -68,6 +69,7 @@ class RawClient {
       const long sent = ssl_ != nullptr
                             ? SSL_write(ssl_, bytes.data(), static_cast<int>(bytes.size()))
                             : ::send(fd_, bytes.data(), bytes.size(), MSG_NOSIGNAL);
+      if (sent < 0 && ssl_ == nullptr && errno == EINTR) continue;
       if (sent <= 0) return false;
       bytes.remove_prefix(static_cast<std::size_t>(sent));
     }
@@ -77,8 +79,11 @@ class RawClient {
   /// Empty at the end of the connection.
   std::string receive(std::size_t most) {
     std::string bytes(most, 0);
-    const long got = ssl_ != nullptr ? SSL_read(ssl_, bytes.data(), static_cast<int>(most))
-                                     : recv(fd_, bytes.data(), most, 0);
+    long got = 0;
+    do {  // a call with a time limit is interrupted by signals, as by the fuzzers' clock
+      got = ssl_ != nullptr ? SSL_read(ssl_, bytes.data(), static_cast<int>(most))
+                            : recv(fd_, bytes.data(), most, 0);
+    } while (got < 0 && ssl_ == nullptr && errno == EINTR);
     bytes.resize(got > 0 ? static_cast<std::size_t>(got) : 0);
     return bytes;
   }

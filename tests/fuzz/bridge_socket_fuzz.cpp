@@ -7,6 +7,7 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <cstdio>
 #include <cstdlib>
 #include <ostream>
 #include <span>
@@ -110,7 +111,10 @@ void fuzz(unsigned visitor, std::span<const std::uint8_t> data) {
   }
   if (++inputs % 64 != 0) return;
   TestViewer good(bridge.port());
-  if (!good.until_whole()) std::abort();
+  if (good.until_whole()) return;
+  std::fprintf(stderr, "a sound viewer got: %s\nand close code %d\n", good.answer.c_str(),
+               good.client.close_code);
+  std::abort();
 }
 #endif
 
