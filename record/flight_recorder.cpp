@@ -9,13 +9,17 @@
 #include <cstdio>
 #include <fstream>
 #include <iostream>
+#include <optional>
 #include <string_view>
 #include <system_error>
 #include <thread>
 #include <utility>
 
+#include "record/earlier_inputs.hpp"
 #include "record/recording.hpp"
+#include "record/starting_volumes.hpp"
 #include "shared/posix/atomic_file.hpp"
+#include "shared/posix/tick_lead.hpp"
 #include "shared/segment/connection.hpp"
 #include "shared/segment/layout.hpp"
 #include "shared/segment/log_columns.hpp"
@@ -89,7 +93,51 @@ std::string folder_name(const TickWindow::Event& event) {
   return std::string(tick.data()) + "-" + event.reason;
 }
 
-class FlightRecorder {
+/// The start of the run, for recordings of its end: volumes and inputs, in a hidden folder that
+/// lasts as long as the flight recorder.
+class RunStart {
+ public:
+  RunStart(const std::string& name, const std::filesystem::path& out)
+      : folder_(new_folder(out / (".run-" + name))), volumes_(name, folder_), inputs_(folder_) {}
+  ~RunStart() {
+    static_cast<void>(volumes_.finish());
+    std::error_code ignored;
+    std::filesystem::remove_all(folder_, ignored);
+  }
+  RunStart(const RunStart&) = delete;
+  RunStart& operator=(const RunStart&) = delete;
+
+  void add(const TickRecord& record) { inputs_.add(record); }
+
+  /// Whether the volumes are on the disk, or will not be.
+  [[nodiscard]] bool is_ready() const noexcept { return volumes_.done(); }
+
+  /// Puts the start, up to tick `last`, into the recording in `folder`. After `is_ready`. Returns
+  /// why that cannot be replayed; empty: it can. Throws FileError.
+  [[nodiscard]] std::string keep(const std::filesystem::path& folder, Tick last) {
+    if (!inputs_.problem().empty()) return inputs_.problem();
+    inputs_.keep(folder, last);
+    link_files(folder_ / kVolumesName, folder / kVolumesName);
+    for (const std::string& problem : volumes_.finish()) {
+      std::cerr << "kerf-recorder: " << problem << '\n';
+    }
+    return {};
+  }
+
+ private:
+  static std::filesystem::path new_folder(const std::filesystem::path& folder) {
+    std::error_code ignored;
+    std::filesystem::remove_all(folder, ignored);  // of one that was killed
+    make_recording_folder(folder);
+    return folder;
+  }
+
+  std::filesystem::path folder_;
+  StartingVolumes volumes_;
+  EarlierInputs inputs_;
+};
+
+class FlightRecorder final : TickSink {
  public:
   FlightRecorder(const RecorderOptions& options, const SegmentConnection& connection)
       : out_(options.out),
@@ -97,12 +145,17 @@ class FlightRecorder {
         capacity_(static_cast<std::uint64_t>(
             std::ceil(options.flight_s * 1e9 / reader().info().tick_ns))),
         window_(capacity_ + reader().info().state_slots),
-        recorder_(reader(), window_) {}
+        start_(options.name, options.out),
+        recorder_(reader(), *this) {
+    if (!options.lead.empty()) lead_.emplace(options.lead);
+  }
 
   void run(const std::atomic<bool>& stop) {
     bool ended = false;
     while (!ended) {
       ended = stop || has_ended(connection_);
+      if (lead_ && start_.is_ready())
+        lead_->allow(recorder_.next() + reader().info().state_slots / 2);
       const std::uint64_t got = recorder_.poll();
       if (std::exchange(g_asked, 0) != 0) keep({"signal", newest()});
       if (const TickWindow::Event event = window_.take_event(); !event.reason.empty()) keep(event);
@@ -117,6 +170,11 @@ class FlightRecorder {
   [[nodiscard]] int kept() const noexcept { return kept_; }
 
  private:
+  void append(const TickRecord& record) override {
+    window_.append(record);
+    start_.add(record);
+  }
+
   [[nodiscard]] const SegmentReader& reader() const noexcept { return connection_.reader(); }
   [[nodiscard]] Tick newest() const noexcept {
     return window_.end() == 0 ? 0 : window_[window_.end() - 1].tick;
@@ -132,26 +190,34 @@ class FlightRecorder {
       return;
     }
     try {
-      write(folder, event);
+      const std::string problem = write(folder, event);
       ++kept_;
-      std::cout << folder.string() << ": kept" << std::endl;
+      std::cout << folder.string() << ": kept"
+                << (problem.empty() ? "" : "; cannot be replayed: " + problem) << std::endl;
     } catch (const std::runtime_error& error) {
       std::cerr << "kerf-recorder: " << error.what() << '\n';
     }
   }
 
   /// Beside its name until it is whole. Goes on polling: the window has room for what comes while
-  /// it is written.
-  void write(const std::filesystem::path& folder, const TickWindow::Event& event) {
+  /// it is written. Returns why it cannot be replayed; empty: it can.
+  [[nodiscard]] std::string write(const std::filesystem::path& folder,
+                                  const TickWindow::Event& event) {
     const std::filesystem::path partial = out_ / ("." + folder.filename().string());
     std::error_code ignored;
     std::filesystem::remove_all(partial, ignored);
     make_recording_folder(partial);
+    while (!start_.is_ready()) {
+      recorder_.poll();
+      std::this_thread::sleep_for(kPollPeriod);
+    }
+    std::string problem;
     {
       const std::uint64_t end = window_.end();
       std::uint64_t row = end - std::min(end, capacity_);
       row = std::max(row, window_.first());
       const std::uint64_t missed = index_of(window_[row]);
+      problem = start_.keep(partial, missed);
       SummaryBuilder summary(reader().info());
       TickLogWriter log(partial / kTickLogName);
       constexpr std::uint64_t kRowsAPoll = 256;
@@ -173,13 +239,16 @@ class FlightRecorder {
       write_manifest(partial, reader().info(), losses, log.rows(), reason, &figures);
     }
     std::filesystem::rename(partial, folder);
+    return problem;
   }
 
   std::filesystem::path out_;
   const SegmentConnection& connection_;
   std::uint64_t capacity_;  ///< of a recording
   TickWindow window_;
+  RunStart start_;
   Recorder recorder_;
+  std::optional<TickLead> lead_;
   int kept_ = 0;
 };
 

@@ -48,8 +48,11 @@ class TickWindow final : public TickSink {
 
 /// Keeps the last `options.flight_s` of controller `options.name` in memory until it ends or
 /// `stop`. A fault, a mark, SIGUSR1 and an end that nobody asked for write them as a recording into
-/// `options.out`/TICK-REASON, which appears whole. At most `kMostKept` of them. Returns the exit
-/// code, 0. Bad input throws; a full disk is one line, and the recorder goes on.
+/// `options.out`/TICK-REASON, which appears whole. It replays if the flight recorder saw the run
+/// from its first tick: then the recording has the inputs before its window, too
+/// (earlier_inputs.hpp), which meanwhile lie in `options.out`/.run-NAME. At most `kMostKept`
+/// recordings. Returns the exit code, 0. Bad input throws; a full disk is one line, and the
+/// recorder goes on.
 [[nodiscard]] int run_flight_recorder(const RecorderOptions& options,
                                       const std::atomic<bool>& stop);
 

@@ -24,6 +24,7 @@ it, each with `--from TICK` and `--until TICK` for a part.
 | `manifest.json` | length of a tick, voxels, versions, compiler and processor, losses of the recorder and where they lie, how the run ended |
 | `scene.json` | the scene as it was loaded, every setting; `source` is what it was loaded from |
 | `volumes/HASH.npy.gz` | the densities of a volume as the run began, `[z, y, x]`; `HASH-labels.npy.gz`: its labels. HASH is `density_hash` in `scene.json`, of both |
+| `inputs/TICK.npy.gz` | of a flight recording: what the servo was given in the ticks before the log, from tick 1 on; 65,536 rows a file, named by its first tick |
 
 Three lines of NumPy read it (`python/` is a reader with more, `examples/python/` uses it):
 

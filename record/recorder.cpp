@@ -139,10 +139,13 @@ bool parse_options(int argc, char** argv, RecorderOptions& options) {
     throw UsageError(
         "--resume: a flight recorder has nothing to go on with; leave one of both out");
   }
-  if (options.flight_s > 0 &&
-      (options.strict || !options.report.empty() || !options.lead.empty())) {
-    throw UsageError(
-        "--strict, --report, --lead: are of a whole run; leave them out beside --flight");
+  if (options.flight_s > 0 && (options.strict || !options.report.empty())) {
+    throw UsageError("--strict, --report: are of a whole run; leave them out beside --flight");
+  }
+  if (!options.lead.empty()) {
+    if (const std::string why = TickLead::problem_with(options.lead); !why.empty()) {
+      throw UsageError(why);
+    }
   }
   return true;
 }
@@ -287,11 +290,6 @@ void write_report(const std::filesystem::path& path, const Recorder& recorder, s
 int run_recorder(const RecorderOptions& options, const std::atomic<bool>& stop) {
   check_new_folder(options.out);
   check_outputs(recording_files(options.out), {{"--report", options.report, ".json"}});
-  if (!options.lead.empty()) {
-    if (const std::string why = TickLead::problem_with(options.lead); !why.empty()) {
-      throw RecordError(why);
-    }
-  }
   const SegmentConnection connection = connect_within(options, stop);
   const SegmentReader& reader = connection.reader();
   make_recording_folder(options.out);

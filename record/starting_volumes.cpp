@@ -3,17 +3,14 @@
 
 #include <algorithm>
 #include <cstddef>
-#include <memory>
 #include <set>
 #include <span>
 #include <system_error>
 #include <utility>
 
-#include <zlib.h>
-
+#include "record/packed_npy.hpp"
 #include "record/tick_log.hpp"
 #include "shared/posix/atomic_file.hpp"
-#include "shared/posix/gzip_writer.hpp"
 #include "shared/segment/connection.hpp"
 #include "shared/segment/reader.hpp"
 #include "shared/text/json.hpp"
@@ -25,73 +22,35 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::string_view kFolder = "volumes";
-constexpr std::size_t kPiece = std::size_t{1} << 20;
-
-/// The header of an NPY file of one number per voxel, padded to 128 bytes.
-std::string volume_header(std::string_view type, const VoxelGrid& grid) {
-  constexpr std::size_t kBytes = 128;
-  constexpr std::size_t kPreamble = 10;
-  std::string header = "\x93NUMPY";
-  header += {'\x01', '\0', static_cast<char>(kBytes - kPreamble), '\0'};
-  header += "{'descr': '" + std::string(type) + "', 'fortran_order': False, 'shape': (" +
-            std::to_string(grid.nz) + ", " + std::to_string(grid.ny) + ", " +
-            std::to_string(grid.nx) + "), }";
-  header.resize(kBytes - 1, ' ');
-  return header + '\n';
+template <class Voxel>
+constexpr std::string_view type_of() {
+  return sizeof(Voxel) == 1 ? "'|u1'" : "'<u2'";
 }
 
 template <class Voxel>
-constexpr std::string_view type_of() {
-  return sizeof(Voxel) == 1 ? "|u1" : "<u2";
+std::string header_of(const VoxelGrid& grid) {
+  constexpr std::size_t kBytes = 128;
+  const std::string shape =
+      std::to_string(grid.nz) + ", " + std::to_string(grid.ny) + ", " + std::to_string(grid.nx);
+  return npy_header(type_of<Voxel>(), shape, kBytes);
 }
 
 fs::path density_path(const fs::path& folder, std::string_view hash) {
-  return folder / kFolder / (std::string(hash) + ".npy.gz");
+  return folder / kVolumesName / (std::string(hash) + ".npy.gz");
 }
 fs::path labels_path(const fs::path& folder, std::string_view hash) {
-  return folder / kFolder / (std::string(hash) + "-labels.npy.gz");
-}
-
-/// Adds the file of a volume's voxels to `files`.
-template <class Voxel>
-void add_voxels(AtomicFiles& files, const fs::path& path, const VoxelGrid& grid,
-                std::span<const Voxel> voxels) {
-  constexpr int kFastest = 1;  // 3 % larger than the best on a CT
-  AtomicFile& file = files.add(path);
-  GzipWriter gzip(file, kFastest);
-  const std::string header = volume_header(type_of<Voxel>(), grid);
-  gzip.write(header.data(), header.size());
-  gzip.write(voxels.data(), voxels.size_bytes());
-  gzip.finish();
-  file.close();
+  return folder / kVolumesName / (std::string(hash) + "-labels.npy.gz");
 }
 
 /// Reads exactly such a file. Throws RecordError.
 template <class Voxel>
 std::vector<Voxel> read_voxels(const fs::path& path, const VoxelGrid& grid) {
-  const auto refuse = [&]() -> std::vector<Voxel> {
+  PackedNpyReader file(path, header_of<Voxel>(grid));
+  std::vector<Voxel> voxels(file.is_sound() ? grid.voxel_count() : 0);
+  if (!file.read(std::as_writable_bytes(std::span(voxels))) || !file.at_end()) {
     throw RecordError(path.string() +
                       ": not the volume that scene.json names; copy the recording again");
-  };
-  const std::unique_ptr<gzFile_s, decltype(&gzclose)> file(gzopen(path.c_str(), "rb"), &gzclose);
-  if (file == nullptr) refuse();
-  const std::string header = volume_header(type_of<Voxel>(), grid);
-  std::string found(header.size(), '\0');
-  if (gzread(file.get(), found.data(), static_cast<unsigned>(found.size())) !=
-          static_cast<int>(found.size()) ||
-      found != header) {
-    refuse();
   }
-  std::vector<Voxel> voxels(grid.voxel_count());
-  auto rest = std::as_writable_bytes(std::span(voxels));
-  while (!rest.empty()) {
-    const auto piece = static_cast<unsigned>(std::min<std::size_t>(rest.size(), kPiece));
-    if (gzread(file.get(), rest.data(), piece) != static_cast<int>(piece)) return refuse();
-    rest = rest.subspan(piece);
-  }
-  char beyond = 0;
-  if (gzread(file.get(), &beyond, 1) != 0) refuse();
   return voxels;
 }
 
@@ -133,15 +92,19 @@ bool is_kept(const fs::path& folder, std::string_view hash, const VoxelGrid& gri
 
 void write_starting_volume(const fs::path& folder, std::string_view hash, const VoxelGrid& grid,
                            std::span<const Density> density, std::span<const Label> labels) {
-  const fs::path volumes = folder / kFolder;
+  const fs::path volumes = folder / kVolumesName;
   std::error_code fault;
   fs::create_directory(volumes, fault);
   if (fs::is_symlink(volumes, fault) || !fs::is_directory(volumes, fault)) {
     throw RecordError(volumes.string() + ": no folder of its own; choose another --out");
   }
   AtomicFiles files;
-  add_voxels(files, density_path(folder, hash), grid, density);
-  if (!labels.empty()) add_voxels(files, labels_path(folder, hash), grid, labels);
+  write_packed_npy(files.add(density_path(folder, hash)), header_of<Density>(grid),
+                   std::as_bytes(density));
+  if (!labels.empty()) {
+    write_packed_npy(files.add(labels_path(folder, hash)), header_of<Label>(grid),
+                     std::as_bytes(labels));
+  }
   files.commit();
 }
 
@@ -153,7 +116,17 @@ std::vector<std::string> StartingVolumes::finish() {
   return std::move(problems_);
 }
 
-void StartingVolumes::run() try {
+void StartingVolumes::run() {
+  try {
+    copy();
+  } catch (const std::exception& error) {
+    problems_.push_back(std::string("the volumes are not kept beside the log: ") + error.what());
+  }
+  copied_ = true;
+  done_ = true;
+}
+
+void StartingVolumes::copy() {
   const SegmentConnection connection = connect_segment(name_);
   const SegmentReader& reader = connection.reader();
   const std::vector<SegmentVolumeInfo>& infos = reader.info().volumes;
@@ -176,9 +149,6 @@ void StartingVolumes::run() try {
                           "reads its file again");
     }
   }
-} catch (const std::exception& error) {
-  problems_.push_back(std::string("the volumes are not kept beside the log: ") + error.what());
-  copied_ = true;
 }
 
 std::optional<VolumeContent> read_starting_volume(const fs::path& folder, std::string_view hash,

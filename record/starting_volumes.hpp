@@ -24,6 +24,8 @@
 
 namespace kerf {
 
+inline constexpr std::string_view kVolumesName = "volumes";
+
 /// Copies the volumes of controller `name` into `folder`, beside the recorder, which must not wait:
 /// in a thread and with a connection of its own.
 class StartingVolumes {
@@ -33,16 +35,20 @@ class StartingVolumes {
   /// Whether the volumes are copied into memory, or could not be: from here on they may be cut.
   [[nodiscard]] bool copied() const noexcept { return copied_; }
 
+  /// Whether nothing more is done.
+  [[nodiscard]] bool done() const noexcept { return done_; }
+
   /// Waits until the files are complete. Returns one line for each volume that has none, and why.
   [[nodiscard]] std::vector<std::string> finish();
 
  private:
   void run();
+  void copy();
 
   std::string name_;
   std::filesystem::path folder_;
   std::vector<std::string> problems_;
-  std::atomic<bool> copied_{false};
+  std::atomic<bool> copied_{false}, done_{false};
   std::jthread thread_;  // last: it uses the members above
 };
 

@@ -12,6 +12,7 @@
 #include <sys/file.h>
 #include <unistd.h>
 
+#include "record/packed_npy.hpp"
 #include "shared/segment/layout_table.hpp"
 #include "shared/volume/checksum.hpp"
 
@@ -49,17 +50,7 @@ std::string tick_log_header(std::uint64_t rows) {
     if (field.count > 1) columns += ", (" + std::to_string(field.count) + ",)";
     columns += "), ";
   }
-  constexpr std::size_t kPreamble = 10;  // magic, version, length of the text
-  std::string header = "\x93NUMPY";
-  header += '\x01';
-  header += '\0';
-  constexpr std::size_t kText = kTickLogHeaderBytes - kPreamble;
-  header += static_cast<char>(kText & 0xff);
-  header += static_cast<char>(kText >> 8);
-  header += "{'descr': [" + columns + "], 'fortran_order': False, 'shape': (" +
-            std::to_string(rows) + ",), }";
-  header.resize(kTickLogHeaderBytes - 1, ' ');
-  return header + '\n';
+  return npy_header("[" + columns + "]", std::to_string(rows) + ",", kTickLogHeaderBytes);
 }
 
 TickLogWriter::TickLogWriter(std::filesystem::path path, Begin begin) : path_(std::move(path)) {

@@ -12,8 +12,10 @@
 #include "controller/load/scene_json.hpp"
 #include "controller/loop/publisher.hpp"
 #include "controller/scene/scene_file.hpp"
+#include "record/earlier_inputs.hpp"
 #include "record/starting_volumes.hpp"
 #include "record/tick_log.hpp"
+#include "replay/replay_step.hpp"
 #include "shared/numeric/fnv1a.hpp"
 #include "shared/text/command_line.hpp"
 #include "shared/text/json.hpp"
@@ -191,6 +193,8 @@ void check_same_counts(const std::string& recorded, const LoadedScene& scene) {
 
 void check_begins_at_first_tick(const std::filesystem::path& folder, const Manifest& manifest) {
   if (manifest.losses.missed_before_start == 0) return;
+  std::error_code none;
+  if (std::filesystem::is_directory(folder / kInputsName, none)) return;
   throw RecordError(folder.string() + ": the first " +
                     std::to_string(manifest.losses.missed_before_start) +
                     " ticks of the run are not in it; start the recorder before the controller, "
@@ -226,6 +230,15 @@ RecordedRun load_run(const std::filesystem::path& folder, const ReplayChanges& c
   }
   run.servo = compile(run.scene, kernels);
   return run;
+}
+
+void step_earlier_ticks(RecordedRun& run, const std::filesystem::path& folder) {
+  ReplayStep step(*run.servo, run.volume_chain);
+  for_each_input(folder, run.earlier_ticks(), [&](const TickRecord& inputs) {
+    constexpr Tick kOften = 1024;
+    if (inputs.tick % kOften == 0) end_if_asked(folder.string());
+    run.volume_chain = step(inputs).volume_hash;
+  });
 }
 
 const KernelSet& kernels_named(const std::string& name) {

@@ -12,6 +12,7 @@
 #include "controller/load/scene_json.hpp"
 #include "controller/plan/compile.hpp"
 #include "record/recording.hpp"
+#include "shared/numeric/fnv1a.hpp"
 #include "shared/segment/writer.hpp"
 
 // A recording as a run that can be repeated: its scene, loaded again.
@@ -27,13 +28,17 @@ struct ReplayChanges {
   [[nodiscard]] bool none() const { return settings.empty() && !scene && !numeric; }
 };
 
-/// The scene of a recording, planned; it may be stepped from the first tick on.
+/// The scene of a recording, planned; it may be stepped from the run's first tick on.
 struct RecordedRun {
   Manifest manifest;
+  /// Ticks of the run before the first one of the log.
+  [[nodiscard]] Tick earlier_ticks() const noexcept { return manifest.losses.missed_before_start; }
+
   LoadedScene scene;       ///< without its densities, which the servo has
   std::string canonical;   ///< `canonical_json` of it
   std::string scene_json;  ///< the same with its source
   std::unique_ptr<CompiledScene> servo;
+  std::uint64_t volume_chain = kFnv1aBasis;  ///< of the ticks before those of the log
   std::optional<SegmentWriter> segment;  ///< with the volumes as they start; if it was asked for
 };
 
@@ -42,11 +47,16 @@ struct RecordedRun {
 ///
 /// Without changes the loaded scene must be the recorded one to the bit; else throws `RecordError`,
 /// one line that names the first key or volume that differs. With changes rate and device stay.
-/// Throws `RecordError` too if the recording does not begin at the run's first tick, LoadError if
-/// the scene cannot be loaded.
+/// Throws `RecordError` too if the recording neither begins at the run's first tick nor has the
+/// inputs before its own, LoadError if the scene cannot be loaded.
 [[nodiscard]] RecordedRun load_run(const std::filesystem::path& folder,
                                    const ReplayChanges& changes, const KernelSet& kernels,
                                    bool with_segment = false);
+
+/// Steps the ticks before those of the log, of which a flight recording has the inputs alone; none
+/// in other recordings. Their results are in the hash chains of the first tick of the log. Throws
+/// `RecordError` if the inputs are damaged; a stop signal ends it as `end_if_asked` does.
+void step_earlier_ticks(RecordedRun& run, const std::filesystem::path& folder);
 
 /// The kernels of that name, as `kernel_sets` has them; the fastest if `name` is empty. Throws
 /// UsageError with those of this machine.

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "controller/loop/publisher.hpp"
+#include "record/earlier_inputs.hpp"
 #include "record/recording.hpp"
 #include "record/starting_volumes.hpp"
 #include "replay/compared_runs.hpp"
@@ -37,7 +38,8 @@ std::string gap_text(Tick last, Tick next) {
 ReplayResult replay_ticks(RecordedRun& run, TickLogReader& log, Tick until,
                           const std::atomic<bool>& stop, const TickVisitor& visit) {
   ReplayResult result;
-  ReplayStep step(*run.servo);
+  result.last_tick = run.earlier_ticks();
+  ReplayStep step(*run.servo, run.volume_chain);
   std::vector<TickRecord> rows(TickLogReader::kChunkRows);
   for (std::uint64_t row = 0; row < log.rows();) {
     std::size_t count = 0;
@@ -88,6 +90,7 @@ class ReplayLog {
       write_starting_volume(out, hex64(volume_hash(density, labels)), run.servo->grid(v), density,
                             labels);
     }
+    link_files(from / kInputsName, out / kInputsName);
   }
 
   void append(const TickRecord& record) { log_.append(record); }
@@ -123,11 +126,17 @@ std::uint64_t volume_hash_of(const RecordedRun& run) {
 
 void print_end(const ReplayResult& result, const RecordedRun& run, Tick from, bool changed,
                double wall_s) {
-  const double run_s = static_cast<double>(result.ticks) * run.manifest.tick_ns * 1e-9;
+  const double run_s =
+      static_cast<double>(run.earlier_ticks() + result.ticks) * run.manifest.tick_ns * 1e-9;
+  if (run.earlier_ticks() > 0) {
+    std::printf("%llu ticks before the log, by their inputs\n",
+                static_cast<unsigned long long>(run.earlier_ticks()));
+  }
   if (!result.difference && !changed) {
-    const Tick before = std::min(std::max<Tick>(from, 1) - 1, result.last_tick);
+    const Tick first = std::max<Tick>(from, run.earlier_ticks() + 1);
     std::printf("%llu ticks, each equal to the last bit\n",
-                static_cast<unsigned long long>(result.last_tick - before));
+                static_cast<unsigned long long>(result.last_tick + 1 -
+                                                std::min(first, result.last_tick + 1)));
   }
   std::printf("output hash  %s\nvolume hash  %s\n%.1f s of the run in %.2f s\n",
               hex64(result.output_hash).c_str(), hex64(volume_hash_of(run)).c_str(), run_s, wall_s);
@@ -165,11 +174,18 @@ void check_range(const ReplayOptions& options, TickLogReader& log) {
     throw RecordError("--from " + std::to_string(options.from) + " lies behind --until " +
                       std::to_string(options.until) + "; no tick would be compared");
   }
-  TickRecord last;
+  TickRecord first, last;
+  static_cast<void>(log.read(0, std::span(&first, 1)));
   static_cast<void>(log.read(log.rows() - 1, std::span(&last, 1)));
-  if (options.from <= last.tick) return;
-  throw RecordError("--from " + std::to_string(options.from) + ": the recording ends at tick " +
-                    std::to_string(last.tick) + "; give an earlier one");
+  if (options.from > last.tick) {
+    throw RecordError("--from " + std::to_string(options.from) + ": the recording ends at tick " +
+                      std::to_string(last.tick) + "; give an earlier one");
+  }
+  if (options.until < first.tick) {
+    throw RecordError("--until " + std::to_string(options.until) +
+                      ": the recording begins at tick " + std::to_string(first.tick) +
+                      "; give a later one");
+  }
 }
 
 }  // namespace
@@ -191,6 +207,7 @@ int run_replay(const ReplayOptions& options, const std::atomic<bool>& stop) {
 
   std::optional<ReplayResult::Found> difference;
   const auto began = std::chrono::steady_clock::now();
+  step_earlier_ticks(run, options.folder);
   const auto visit = [&](const TickRecord& recorded, const TickRecord& replayed) {
     if (copy) copy->append(replayed);
     compared.add(recorded, replayed);

@@ -34,9 +34,10 @@ struct ReplayResult {
 /// Takes a recorded tick and the same one computed again; returns whether to go on.
 using TickVisitor = std::function<bool(const TickRecord& recorded, const TickRecord& replayed)>;
 
-/// Gives the servo the reports and commands of the recording's ticks, in order, up to tick `until`,
+/// Gives the servo the reports and commands of the log's ticks, in order, up to tick `until`,
 /// and hands each tick to `visit`. A gap ends it: what the servo was given there is unknown. So
 /// do `stop` and a row whose checksum is wrong. Throws `RecordError` if that is the first one.
+/// After `step_earlier_ticks`.
 [[nodiscard]] ReplayResult replay_ticks(RecordedRun& run, TickLogReader& log, Tick until,
                                         const std::atomic<bool>& stop, const TickVisitor& visit);
 

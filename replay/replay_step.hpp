@@ -15,10 +15,12 @@ namespace kerf {
 /// output.
 [[nodiscard]] ServoOutput give(CompiledScene& servo, const TickRecord& recorded) noexcept;
 
-/// Computes the ticks of a recording again, one after the other from the run's first.
+/// Computes the ticks of a recording again, one after the other.
 class ReplayStep {
  public:
-  explicit ReplayStep(CompiledScene& servo) : servo_(servo) {}
+  /// `volume_chain`: that of the ticks which `servo` has stepped.
+  explicit ReplayStep(CompiledScene& servo, std::uint64_t volume_chain = kFnv1aBasis)
+      : servo_(servo), volume_chain_(volume_chain) {}
 
   /// Gives the servo what it was given in `recorded`; returns the record of the tick. Times are
   /// those of `recorded`.
@@ -26,7 +28,7 @@ class ReplayStep {
 
  private:
   CompiledScene& servo_;
-  std::uint64_t volume_chain_ = kFnv1aBasis;
+  std::uint64_t volume_chain_;
 };
 
 }  // namespace kerf

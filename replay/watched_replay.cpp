@@ -108,9 +108,10 @@ class WatchedRun {
   WatchedRun(RecordedRun& run, TickLogReader& log, Tick until)
       : run_(run), log_(log), publisher_(*run.segment, *run.servo) {
     rows_.resize(TickLogReader::kChunkRows);
-    last_tick_ = std::min<Tick>(log.rows(), until);  // from tick 1 on, without a gap
+    tick_ = before_log_ = run.earlier_ticks();
+    last_tick_ = std::min<Tick>(before_log_ + log.rows(), until);  // without a gap
     ticks_a_snapshot_ = last_tick_ / snapshots_that_fit() + 1;
-    snapshots_[0] = run.servo->keep();
+    snapshots_[before_log_] = run.servo->keep();
   }
 
   [[nodiscard]] Tick tick() const noexcept { return tick_; }
@@ -131,7 +132,7 @@ class WatchedRun {
 
   /// To `tick`, or as near as the recording goes; readers see the volumes of that tick.
   void go(Tick tick) {
-    tick = std::clamp<Tick>(tick, 1, last_tick_);
+    tick = std::clamp<Tick>(tick, before_log_ + 1, std::max(last_tick_, before_log_ + 1));
     const auto& [at, kept] = *std::prev(snapshots_.upper_bound(tick - 1));
     if (tick <= tick_ || at > tick_) {
       run_.servo->restore(*kept);
@@ -158,11 +159,12 @@ class WatchedRun {
   /// The row of the next tick; null if there is none.
   [[nodiscard]] const TickRecord* next_row() {
     if (tick_ >= last_tick_) return nullptr;
-    if (tick_ < first_row_ || tick_ >= first_row_ + count_) {
-      first_row_ = tick_;
+    const std::uint64_t at = tick_ - before_log_;
+    if (at < first_row_ || at >= first_row_ + count_) {
+      first_row_ = at;
       count_ = log_.read(first_row_, rows_);
     }
-    const TickRecord& row = rows_[tick_ - first_row_];
+    const TickRecord& row = rows_[at - first_row_];
     if (row.tick == tick_ + 1) return &row;
     last_tick_ = tick_;
     return nullptr;
@@ -198,8 +200,9 @@ class WatchedRun {
   Publisher publisher_;
   std::vector<TickRecord> rows_;
   std::uint64_t first_row_ = 0, count_ = 0;
-  Tick tick_ = 0;       ///< of the recording
-  Tick published_ = 0;  ///< of the segment, where ticks only grow: the same until a way back
+  Tick before_log_ = 0;  ///< the last tick before the log's first
+  Tick tick_ = 0;        ///< of the recording
+  Tick published_ = 0;   ///< of the segment, where ticks only grow: the same until a way back
   Tick last_tick_ = 0;
   Tick ticks_a_snapshot_ = 1;
   std::map<Tick, std::unique_ptr<ServoSnapshot>> snapshots_;  ///< by the tick that was the last
@@ -320,6 +323,7 @@ class Watch {
 
 int watch_replay(const ReplayOptions& options, TickLogReader& log, const std::atomic<bool>& stop) {
   RecordedRun run = load_run(options.folder, options.changes, kernels_named(options.kernels), true);
+  step_earlier_ticks(run, options.folder);
   WatchedRun watched(run, log, options.until);
   const std::uint64_t rows = watched.last_tick();
   SegmentServer server(options.watch, *run.segment,
@@ -329,7 +333,9 @@ int watch_replay(const ReplayOptions& options, TickLogReader& log, const std::at
       "kerf visualizer --name %s shows it; space pauses, . steps, + and - change the speed, "
       "f and b go a second on and back, 1600g goes to tick 1600, q quits\n",
       options.watch.c_str());
-  if (options.from > 1) watched.go(options.from);
+  if (const Tick from = std::max(options.from, run.earlier_ticks() + 1); from > 1) {
+    watched.go(from);
+  }
   Watch(watched, *run.segment, run.manifest.tick_ns).run(server, stop);
   run.segment->set_lifecycle(Lifecycle::clean_end);
   if (watched.last_tick() == rows) return 0;

@@ -25,7 +25,7 @@ import dicom
 NOT_HERE = {
     "changes the system, as root": ["sudo ", "echo '@plugdev"],
     "needs a display, or a controller at work": [
-        "./kerf demo --hand mouse", "./kerf visualizer", "./kerf record grab", "./kerf replay once/log --watch"],
+        "./kerf demo --hand mouse", "./kerf visualizer", "./kerf record grab", "./kerf record live", "./kerf replay once/log --watch"],
     "needs a device, or its kernel": [
         "cat /sys/kernel/realtime", "./kerf controller --probe",
         "./kerf controller --scene mine.toml --device omni --port fw"],

@@ -4,19 +4,21 @@
 #include <cstdint>
 #include <cstdlib>
 #include <cstring>
+#include <filesystem>
 #include <string>
 #include <string_view>
 
 #include "controller/load/scene_json.hpp"
+#include "record/earlier_inputs.hpp"
 #include "record/mcap_export.hpp"
 #include "record/recording.hpp"
 #include "shared/posix/atomic_file.hpp"
 #include "shared/text/json.hpp"
 #include "tests/support/temporary_folder.hpp"
 
-/// The three files of a recording, each as foreign bytes beside two sound ones. By the first byte:
+/// The files of a recording, each as foreign bytes beside sound ones. By the first byte:
 /// 0 manifest.json, 1 scene.json, 2 ticks.npy, 3 rows of ticks behind a sound header, with sound
-/// checksums. Every reader gives a result, or one line.
+/// checksums, 4 inputs before the log. Every reader gives a result, or one line.
 namespace {
 
 constexpr std::string_view kManifest = R"({"session_id": "0", "tick_ns": 1000000, "end_reason": "",
@@ -51,11 +53,18 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   static const kerf::test::TemporaryFolder folder;
   if (size == 0) return 0;
   const std::string_view bytes(reinterpret_cast<const char*>(data) + 1, size - 1);
-  const int kind = data[0] % 4;
+  const int kind = data[0] % 5;
   if (kind == 1) {
     must_read_or_explain<kerf::JsonError>([&] { static_cast<void>(kerf::source_in(bytes)); });
     must_read_or_explain<kerf::JsonError>(
         [&] { static_cast<void>(kerf::json_without_source(bytes)); });
+    return 0;
+  }
+  if (kind == 4) {
+    std::filesystem::create_directory(folder / "inputs");
+    folder.write("inputs/000000000001.npy.gz", bytes);
+    must_read_or_explain<kerf::RecordError>(
+        [] { kerf::for_each_input(folder.path(), 10, [](const kerf::TickRecord&) {}); });
     return 0;
   }
   folder.write("manifest.json", kind == 0 ? bytes : kManifest);

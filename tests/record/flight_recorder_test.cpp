@@ -50,7 +50,9 @@ class Flight {
   [[nodiscard]] std::vector<std::string> kept() const {
     std::vector<std::string> names;
     for (const auto& entry : std::filesystem::directory_iterator(out())) {
-      names.push_back(entry.path().filename().string());
+      const std::string name = entry.path().filename().string();
+      if (!name.starts_with('.'))
+        names.push_back(name);  // the start of the run, as long as it lasts
     }
     std::ranges::sort(names);
     for (std::string& name : names) name = name.substr(name.find('-') + 1);

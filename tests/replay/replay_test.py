@@ -134,6 +134,55 @@ class TestReplay(unittest.TestCase):
         record(ROOT, BIN, folder, ROOT / "scenes/fluted_bur.toml", 1)
         self.assertIn("each equal", replay(folder / "log", libm=LIBM))
 
+    def test_a_flight_recording_replays_from_the_first_tick(self):
+        """The device is silent for a while: a fault, at which the last second is kept."""
+        folder = self.run_folder / "flight"
+        folder.mkdir()
+        (folder / "silence.toml").write_text('latches = "stale_input"\n[[fault]]\nkind = "silence"\nat_s = 1.4\nfor_s = 0.3\n')
+        (folder / "scene.toml").write_text(self.scene.read_text())
+        record(ROOT, BIN, folder, folder / "scene.toml", 2.5, flight=True, fault=folder / "silence.toml")
+        (folder / "scene.toml").unlink()
+        self.assertEqual([path.name[:4] for path in (folder / "flights").iterdir()], ["0000"])  # the start of the run is gone
+        kept, = (folder / "flights").iterdir()
+        manifest = json.loads((kept / "manifest.json").read_text())
+        before = manifest["missed_before_start"]
+        self.assertEqual(manifest["rows"], 1000)
+        self.assertGreater(before, 200)
+        found = replay(kept)
+        self.assertIn(f"{before} ticks before the log, by their inputs\n1000 ticks, each equal to the last bit", found)
+        # The log of the whole run says the same of these ticks.
+        whole = self.rows(folder / "log")[HEADER + before * self.row:]
+        self.assertEqual(self.rows(kept)[HEADER:], whole[:1000 * self.row])
+        self.assertIn("11 ticks, each equal", replay(kept, "--from", str(before + 100), "--until", str(before + 110)))
+        self.assertIn(f"begins at tick {before + 1}", replay(kept, "--until", str(before), code=2))
+        # What if, and that once more.
+        changed = ("--set", "force.stiffness_n_per_mm=0.3")
+        again = folder / "again"
+        self.assertIn(f"{before} ticks before", replay(kept, *changed, "--out", again))
+        self.assertIn("1000 ticks, each equal", replay(again))
+        self.assertNotEqual(self.rows(again)[HEADER:], self.rows(kept)[HEADER:])
+        # Watched from its first tick on, with the volumes of then.
+        _, watched, told = self.watch(kept)
+        told(" ", "paused")
+        self.assertIn(f"tick {before + 1} of {before + 1000}", told("1g", "tick"))
+        self.assertIn(f"tick {before + 7} of", told(f"{before + 7}g", "tick"))
+        watched.communicate("q", timeout=20)
+        # Inputs that are not those of the run: missing, cut, longer, another array; or sound and wrong.
+        inputs, = (kept / "inputs").iterdir()
+        sound = gzip.decompress(inputs.read_bytes())
+        for damaged in (inputs.read_bytes()[:-20], gzip.compress(sound[:-60]), gzip.compress(sound + b"x"), gzip.compress(sound[256:]), b""):
+            inputs.unlink()
+            inputs.write_bytes(damaged)
+            self.assertIn("inputs from tick 1 on are missing or damaged", replay(kept, code=2))
+        wrong = bytearray(sound)
+        wrong[256 + 60 * (before - 1)] ^= 64  # an encoder count of the last of these ticks
+        inputs.write_bytes(gzip.compress(wrong))
+        self.assertIn(f"tick {before + 1} (", replay(kept, code=1))
+        inputs.unlink()
+        self.assertIn("inputs from tick 1 on are missing", replay(kept, code=2))
+        (kept / "inputs").rmdir()
+        self.assertIn(f"the first {before} ticks of the run are not in it", replay(kept, code=2))
+
     def test_the_scene_file_may_have_gone(self):
         text = self.scene.read_text()
         self.scene.unlink()

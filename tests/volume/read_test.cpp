@@ -529,7 +529,8 @@ TEST_CASE("the reader of a small file takes little memory, whatever the file pro
   getrusage(RUSAGE_CHILDREN, &after);
 #ifndef KERF_SANITIZED  // whose allocator keeps what was freed
   // What a child shows is also what it inherited.
-  const long most_kib = std::max(before.ru_maxrss, own.ru_maxrss) + (kSandboxBytes >> 10);
+  const long most_kib =
+      std::max(before.ru_maxrss, own.ru_maxrss) + static_cast<long>(kSandboxBytes >> 10);
   CHECK(after.ru_maxrss < most_kib);
 #endif
 }

@@ -18,14 +18,14 @@ constexpr auto kRead = Expected::read, kRefused = Expected::refused, kAsked = Ex
 
 struct DataSet;
 struct Element {
-  std::string vr, value;         ///< numbers little-endian
-  std::vector<DataSet> items{};  ///< of a sequence
+  std::string vr, value;       ///< numbers little-endian
+  std::vector<DataSet> items;  ///< of a sequence
 };
 struct DataSet {
   std::map<std::uint32_t, Element> elements;
 
   void set(std::uint32_t tag, const char* vr, const std::string& value) {
-    elements[tag] = {vr, value};
+    elements[tag] = {vr, value, {}};
   }
   void number(std::uint32_t tag, int value) {
     set(tag, "US", bytes_of(static_cast<std::uint16_t>(value)));
@@ -599,7 +599,7 @@ Frames frames_of(Draw& draw) {
 }
 
 void write_frames(Frames& f, const TemporaryFolder& folder) {
-  f.set.elements.try_emplace(0x00280008, Element{"IS", std::to_string(f.slice.size())});
+  f.set.elements.try_emplace(0x00280008, Element{"IS", std::to_string(f.slice.size()), {}});
   f.set.nest(0x52009229, {f.shared});
   f.set.nest(0x52009230, f.groups);
   std::string pixels;

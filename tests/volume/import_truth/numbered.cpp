@@ -152,9 +152,11 @@ Numbered numbered(Draw& draw, VoxelType type, int slices) {
     volume.axes = rotation(draw);
     if (draw.coin()) volume.axes[2] = -1.0 * volume.axes[2];
   } else {
-    std::array<int, 3> order{0, 1, 2};
-    for (int i = 2; i > 0; --i) std::swap(order[i], order[draw.below(i + 1)]);
-    for (int i = 0; i < 3; ++i) volume.axes[i][order[i]] = draw.coin() ? 1 : -1;
+    std::array<std::size_t, 3> order{0, 1, 2};
+    for (const std::size_t i : {2U, 1U}) {
+      std::swap(order[i], order[static_cast<std::size_t>(draw.below(static_cast<int>(i) + 1))]);
+    }
+    for (std::size_t i = 0; i < 3; ++i) volume.axes[i][order[i]] = draw.coin() ? 1 : -1;
   }
   volume.order = draw.coin() ? std::endian::little : std::endian::big;
   number_anew(draw, volume, type);

@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "record/earlier_inputs.hpp"
+
+#include <algorithm>
+#include <cstdio>
+#include <span>
+#include <system_error>
+#include <utility>
+
+#include "record/packed_npy.hpp"
+#include "record/tick_log.hpp"
+#include "shared/posix/atomic_file.hpp"
+
+namespace kerf {
+namespace {
+
+namespace fs = std::filesystem;
+
+fs::path file_of(const fs::path& folder, Tick first) {
+  char name[32];
+  std::snprintf(name, sizeof name, "%012llu.npy.gz", static_cast<unsigned long long>(first));
+  return folder / kInputsName / name;
+}
+
+std::string header_of(std::size_t rows) {
+  constexpr std::size_t kBytes = 256;
+  return npy_header(
+      "[('raw', '<i4', (11,)), ('stale', '<u4'), ('command', '<u4'), ('command_argument', '<u4'), "
+      "('last_command', '<u4')]",
+      std::to_string(rows) + ",", kBytes);
+}
+
+TickInputs inputs_of(const TickRecord& record) {
+  TickInputs out{};
+  std::ranges::copy(record.raw, out.raw);
+  out.stale = record.stale;
+  out.command = record.command;
+  out.command_argument = record.command_argument;
+  out.last_command = record.last_command;
+  return out;
+}
+
+TickRecord record_of(const TickInputs& inputs, Tick tick) {
+  TickRecord out{};
+  out.seq = 2 * tick;
+  out.tick = tick;
+  std::ranges::copy(inputs.raw, out.raw);
+  out.stale = inputs.stale;
+  out.command = inputs.command;
+  out.command_argument = inputs.command_argument;
+  out.last_command = inputs.last_command;
+  return out;
+}
+
+void write_inputs(const fs::path& path, std::span<const TickInputs> rows) {
+  std::error_code fault;
+  fs::create_directory(path.parent_path(), fault);
+  AtomicFile file(path);
+  write_packed_npy(file, header_of(rows.size()), std::as_bytes(rows));
+  file.commit();
+}
+
+/// Reads a file of exactly that many rows.
+bool read_inputs(const fs::path& path, std::size_t count, std::vector<TickInputs>& rows) {
+  rows.resize(count);
+  PackedNpyReader file(path, header_of(count));
+  return file.read(std::as_writable_bytes(std::span(rows))) && file.at_end();
+}
+
+}  // namespace
+
+EarlierInputs::EarlierInputs(fs::path folder) : folder_(std::move(folder)) {
+  rows_.reserve(kTicksAFile);
+}
+
+void EarlierInputs::add(const TickRecord& record) {
+  if (!problem_.empty()) return;
+  const Tick next = first_ + rows_.size();
+  if (record.tick != next) {
+    problem_ = "tick " + std::to_string(next) + " was not seen";
+    if (next == 1) problem_ += "; start the flight recorder before the controller";
+    return;
+  }
+  if (rows_.size() == kTicksAFile) {
+    try {
+      write_inputs(file_of(folder_, first_), rows_);
+    } catch (const FileError& error) {
+      problem_ = error.what();
+      return;
+    }
+    first_ = next;
+    rows_.clear();
+  }
+  rows_.push_back(inputs_of(record));
+}
+
+void EarlierInputs::keep(const fs::path& folder, Tick last) const {
+  link_files(folder_ / kInputsName, folder / kInputsName);
+  if (last < first_) return;
+  write_inputs(file_of(folder, first_), std::span(rows_).first(last - first_ + 1));
+}
+
+void for_each_input(const fs::path& folder, Tick last,
+                    const std::function<void(const TickRecord&)>& visit) {
+  std::vector<TickInputs> rows;
+  for (Tick first = 1; first <= last; first += EarlierInputs::kTicksAFile) {
+    const fs::path path = file_of(folder, first);
+    const std::size_t wanted = std::min<Tick>(last - first + 1, EarlierInputs::kTicksAFile);
+    if (!read_inputs(path, EarlierInputs::kTicksAFile, rows) && !read_inputs(path, wanted, rows)) {
+      throw RecordError(path.string() + ": the inputs from tick " + std::to_string(first) +
+                        " on are missing or damaged; copy the recording again");
+    }
+    for (std::size_t i = 0; i < wanted; ++i) visit(record_of(rows[i], first + i));
+  }
+}
+
+void link_files(const fs::path& from, const fs::path& to) {
+  std::error_code fault;
+  if (!fs::is_directory(from, fault)) return;
+  fs::create_directory(to, fault);
+  for (const auto& file : fs::directory_iterator(from, fault)) {
+    if (!file.is_regular_file(fault)) continue;
+    const fs::path name = to / file.path().filename();
+    fs::create_hard_link(file.path(), name, fault);
+    if (fault) fs::copy_file(file.path(), name, fault);
+    if (fault) throw FileError(name.string() + ": " + fault.message() + "; choose another --out");
+  }
+  if (fault) throw FileError(from.string() + ": " + fault.message());
+}
+
+}  // namespace kerf

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "shared/posix/atomic_file.hpp"
+
+// Arrays beside a log as NumPy's format, packed: `np.load(gzip.open(path))`.
+
+namespace kerf {
+
+/// The header of an NPY file, version 1, padded to `bytes`. `type` and `shape` are Python texts, as
+/// "'<u2'" and "3, 4". The caller's texts fit.
+[[nodiscard]] std::string npy_header(std::string_view type, std::string_view shape,
+                                     std::size_t bytes);
+
+/// Writes header and content into `file` as gzip and closes it. Throws FileError.
+void write_packed_npy(AtomicFile& file, std::string_view header,
+                      std::span<const std::byte> content);
+
+/// Reads such a file piece by piece.
+class PackedNpyReader {
+ public:
+  /// The file must be a regular one and begin with `header`: else nothing can be read.
+  PackedNpyReader(const std::filesystem::path& path, std::string_view header);
+
+  /// Whether the file began so and was read well up to here.
+  [[nodiscard]] bool is_sound() const noexcept { return file_ != nullptr; }
+  /// Fills `content` with the next bytes; false if there are not as many.
+  [[nodiscard]] bool read(std::span<std::byte> content);
+  /// Whether the file ends here, sound to its last byte.
+  [[nodiscard]] bool at_end();
+
+ private:
+  struct Close {
+    void operator()(void* file) const noexcept;
+  };
+  std::unique_ptr<void, Close> file_;  ///< gzFile; null: nothing can be read
+};
+
+}  // namespace kerf
