@@ -10,7 +10,7 @@
 set -euo pipefail
 here=$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")
 modules=(fuse vhci-hcd hid-generic uhid)
-programs=(kerf-controller kerf-emulator kerf-recorder kerf-record test_hil_clients)
+programs=(kerf-controller kerf-emulator kerf-recorder kerf-record kerf-replay test_hil_clients)
 
 lack() {
   echo "guest: $*"

@@ -170,6 +170,15 @@ TEST_CASE("guest: every program ends well; no byte is bad, no packet lost, none 
   }
 }
 
+TEST_CASE("guest: its log replays to the last bit") {
+  for (const std::string device : kDevices) {
+    CAPTURE(device);
+    const std::string found = first_run().only(device + " replay exit");
+    CHECK_MESSAGE(
+        (found.starts_with("0 ") && found.ends_with(" ticks, each equal to the last bit")), found);
+  }
+}
+
 TEST_CASE("guest: in virtual time a tick is over long before the next, on one core with the rest") {
   for (const std::string device : kDevices) {
     CAPTURE(device);
