@@ -255,11 +255,11 @@ class FlightRecorder final : TickSink {
 }  // namespace
 
 int run_flight_recorder(const RecorderOptions& options, const std::atomic<bool>& stop) {
+  catch_requests();  // else one that comes too early stops the recorder
   check_new_folder(options.out);
   const SegmentConnection connection = connect_within(options, stop);
   make_recording_folder(options.out);
   const FlightNotice notice(options.name, options.out);
-  catch_requests();
   FlightRecorder recorder(options, connection);
   const double bytes =
       options.flight_s * 1e9 / connection.reader().info().tick_ns * sizeof(TickRecord);
