@@ -147,7 +147,7 @@ TEST_CASE("beside slices and a spindle the score counts every material") {
   figures.slices = grey_slices(slice_side(kPlain, 1.0));
   std::vector<std::uint8_t> before, after;
   static_cast<void>(covered(overlay, figures, kPlain, &before));
-  for (const std::size_t material : {0, 1, 2, 3, 4, 30}) {
+  for (const std::size_t material : {0U, 1U, 2U, 3U, 4U, 30U}) {
     CAPTURE(material);
     OverlayFigures more = figures;
     more.score[material].removed_mm3 += 1.0;
