@@ -11,7 +11,7 @@ row='%-22s %-20s %-7s %-5s %-7s %-16s %-16s %-16s %7s\n'
 
 # check PROCESSOR COMPILER FLAGS: builds, runs, prints the rows of the table; false if any differs.
 check() {
-  local processor=$1 compiler=$2 flags=$3 name options=() targets=(test_golden) run=() result
+  local processor=$1 compiler=$2 flags=$3 name options=() targets=(test_golden test_load) run=() result
   name=$folder/$processor-$compiler${flags// /}
   if [[ $processor != "$(uname -m)" ]]; then
     options=(-DCMAKE_SYSTEM_NAME=Linux -DCMAKE_SYSTEM_PROCESSOR="$processor")
@@ -30,6 +30,11 @@ check() {
   fi
   # With its own kernels against their definition, where the tests of every change never run them.
   if [[ $processor == aarch64 ]] && ! result=$("${run[@]}" "$name/bin/test_aligned"); then
+    echo "$result"
+    return 1
+  fi
+  # What load time makes of each shipped scene.
+  if ! result=$("${run[@]}" "$name/bin/test_load"); then
     echo "$result"
     return 1
   fi
