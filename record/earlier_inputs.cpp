@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <exception>
 #include <span>
 #include <system_error>
 #include <utility>
@@ -53,11 +54,17 @@ TickRecord record_of(const TickInputs& inputs, Tick tick) {
 }
 
 void write_inputs(const fs::path& path, std::span<const TickInputs> rows) {
-  std::error_code fault;
-  fs::create_directory(path.parent_path(), fault);
   AtomicFile file(path);
   write_packed_npy(file, header_of(rows.size()), std::as_bytes(rows));
   file.commit();
+}
+
+/// Makes the folder for inputs in `recording`. Throws FileError if there is one, or a link.
+void make_inputs_folder(const fs::path& recording) {
+  std::error_code fault;
+  if (fs::create_directory(recording / kInputsName, fault)) return;
+  throw FileError((recording / kInputsName).string() + ": " +
+                  (fault ? fault.message() : "there is one") + "; choose another --out");
 }
 
 /// Reads a file of exactly that many rows.
@@ -70,7 +77,17 @@ bool read_inputs(const fs::path& path, std::size_t count, std::vector<TickInputs
 }  // namespace
 
 EarlierInputs::EarlierInputs(fs::path folder) : folder_(std::move(folder)) {
+  make_inputs_folder(folder_);
   rows_.reserve(kTicksAFile);
+}
+
+void EarlierInputs::finish_writing() {
+  if (!writing_.valid()) return;
+  try {
+    writing_.get();
+  } catch (const std::exception& error) {
+    problem_ = error.what();
+  }
 }
 
 void EarlierInputs::add(const TickRecord& record) {
@@ -82,22 +99,27 @@ void EarlierInputs::add(const TickRecord& record) {
     return;
   }
   if (rows_.size() == kTicksAFile) {
-    try {
-      write_inputs(file_of(folder_, first_), rows_);
-    } catch (const FileError& error) {
-      problem_ = error.what();
-      return;
-    }
+    finish_writing();
+    writing_ = std::async(std::launch::async, [path = file_of(folder_, first_), rows = rows_] {
+      write_inputs(path, rows);
+    });
     first_ = next;
     rows_.clear();
   }
   rows_.push_back(inputs_of(record));
 }
 
-void EarlierInputs::keep(const fs::path& folder, Tick last) const {
-  link_files(folder_ / kInputsName, folder / kInputsName);
-  if (last < first_) return;
-  write_inputs(file_of(folder, first_), std::span(rows_).first(last - first_ + 1));
+std::string EarlierInputs::keep(const fs::path& folder, Tick last) {
+  finish_writing();
+  if (!problem_.empty() || last == 0) return problem_;
+  make_inputs_folder(folder);
+  for (Tick first = 1; first < first_ && first <= last; first += kTicksAFile) {
+    link_file(file_of(folder_, first), file_of(folder, first));
+  }
+  if (first_ <= last) {
+    write_inputs(file_of(folder, first_), std::span(rows_).first(last - first_ + 1));
+  }
+  return {};
 }
 
 void for_each_input(const fs::path& folder, Tick last,
@@ -114,18 +136,24 @@ void for_each_input(const fs::path& folder, Tick last,
   }
 }
 
-void link_files(const fs::path& from, const fs::path& to) {
+void copy_inputs(const fs::path& from, const fs::path& to, Tick last) {
+  if (last == 0) return;
+  make_inputs_folder(to);
   std::error_code fault;
-  if (!fs::is_directory(from, fault)) return;
-  fs::create_directory(to, fault);
-  for (const auto& file : fs::directory_iterator(from, fault)) {
-    if (!file.is_regular_file(fault)) continue;
-    const fs::path name = to / file.path().filename();
-    fs::create_hard_link(file.path(), name, fault);
-    if (fault) fs::copy_file(file.path(), name, fault);
-    if (fault) throw FileError(name.string() + ": " + fault.message() + "; choose another --out");
+  for (Tick first = 1; first <= last && !fault; first += EarlierInputs::kTicksAFile) {
+    fs::copy_file(file_of(from, first), file_of(to, first), fault);
   }
-  if (fault) throw FileError(from.string() + ": " + fault.message());
+  if (!fault) return;
+  std::error_code ignored;
+  fs::remove_all(to / kInputsName, ignored);
+  throw FileError((to / kInputsName).string() + ": " + fault.message() + "; choose another --out");
+}
+
+void link_file(const fs::path& from, const fs::path& to) {
+  std::error_code fault;
+  fs::create_hard_link(from, to, fault);
+  if (fault) fs::copy_file(from, to, fault);
+  if (fault) throw FileError(to.string() + ": " + fault.message() + "; choose another --out");
 }
 
 }  // namespace kerf

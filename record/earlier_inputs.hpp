@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <future>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -33,8 +34,10 @@ struct TickInputs {
   std::uint32_t last_command;
 };
 
-/// Collects the inputs of a run from its first tick on, for recordings of its end. Memory for one
-/// file, allocated once; each full one goes to the disk.
+static_assert(sizeof(TickInputs) == 60);
+
+/// Collects the inputs of a run from its first tick on, for recordings of its end. Memory for two
+/// files; each full one goes to the disk, in a thread beside the recorder, which must not wait.
 class EarlierInputs {
  public:
   static constexpr std::size_t kTicksAFile = std::size_t{1} << 16;
@@ -46,18 +49,20 @@ class EarlierInputs {
   /// inputs are not complete any more.
   void add(const TickRecord& record);
 
-  /// Empty: all ticks since the first are here. Else why not, for a line.
-  [[nodiscard]] const std::string& problem() const noexcept { return problem_; }
-
   /// Puts the inputs up to tick `last` into the recording in `folder`: full files as further names
-  /// of the same file, or copies. Only while there is no problem. Throws FileError.
-  void keep(const std::filesystem::path& folder, Tick last) const;
+  /// of the same file, or copies. Returns why that is not possible; empty: it is done. Throws
+  /// FileError.
+  [[nodiscard]] std::string keep(const std::filesystem::path& folder, Tick last);
 
  private:
+  /// Waits for the thread.
+  void finish_writing();
+
   std::filesystem::path folder_;
   std::vector<TickInputs> rows_;  ///< of the file that grows
   Tick first_ = 1;                ///< of `rows_`
-  std::string problem_;
+  std::string problem_;           ///< why ticks are missing
+  std::future<void> writing_;     ///< of the file before; last, since it ends first
 };
 
 /// Calls `visit` for each tick from 1 to `last` in order, with the inputs that the recording in
@@ -66,8 +71,12 @@ class EarlierInputs {
 void for_each_input(const std::filesystem::path& folder, Tick last,
                     const std::function<void(const TickRecord&)>& visit);
 
-/// Gives the files in `from`, if there is such a folder, further names in the new folder `to`;
-/// copies them if the file system has no links. Throws FileError.
-void link_files(const std::filesystem::path& from, const std::filesystem::path& to);
+/// Copies the files with the inputs up to tick `last` from the recording in `from` to that in `to`,
+/// which has none. Throws FileError and leaves nothing.
+void copy_inputs(const std::filesystem::path& from, const std::filesystem::path& to, Tick last);
+
+/// Gives the regular file `from` the further name `to`; copies it if the file system has no links.
+/// Throws FileError.
+void link_file(const std::filesystem::path& from, const std::filesystem::path& to);
 
 }  // namespace kerf

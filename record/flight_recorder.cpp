@@ -110,18 +110,27 @@ class RunStart {
   void add(const TickRecord& record) { inputs_.add(record); }
 
   /// Whether the volumes are on the disk, or will not be.
-  [[nodiscard]] bool is_ready() const noexcept { return volumes_.done(); }
+  [[nodiscard]] bool has_volumes() const noexcept { return volumes_.done(); }
 
-  /// Puts the start, up to tick `last`, into the recording in `folder`. After `is_ready`. Returns
-  /// why that cannot be replayed; empty: it can. Throws FileError.
-  [[nodiscard]] std::string keep(const std::filesystem::path& folder, Tick last) {
-    if (!inputs_.problem().empty()) return inputs_.problem();
-    inputs_.keep(folder, last);
-    link_files(folder_ / kVolumesName, folder / kVolumesName);
-    for (const std::string& problem : volumes_.finish()) {
-      std::cerr << "kerf-recorder: " << problem << '\n';
+  /// Puts the inputs up to tick `last` into the recording in `folder`. Returns why it cannot be
+  /// replayed; empty: it can. Throws FileError.
+  [[nodiscard]] std::string keep_inputs(const std::filesystem::path& folder, Tick last) {
+    const std::string problem = inputs_.keep(folder, last);
+    return problem.empty() ? "" : "cannot be replayed: " + problem;
+  }
+
+  /// The same with the volumes, after `has_volumes`. Returns what a replay lacks.
+  [[nodiscard]] std::string keep_volumes(const std::filesystem::path& folder) {
+    std::error_code fault;
+    const std::filesystem::path from = folder_ / kVolumesName;
+    for (std::filesystem::directory_iterator file(from, fault), end; !fault && file != end;
+         file.increment(fault)) {
+      std::filesystem::create_directory(folder / kVolumesName, fault);
+      link_file(file->path(), folder / kVolumesName / file->path().filename());
     }
-    return {};
+    std::string lacks;
+    for (const std::string& problem : volumes_.finish()) lacks += "; " + problem;
+    return lacks.empty() ? "" : lacks.substr(2);
   }
 
  private:
@@ -154,10 +163,11 @@ class FlightRecorder final : TickSink {
     bool ended = false;
     while (!ended) {
       ended = stop || has_ended(connection_);
-      if (lead_ && start_.is_ready())
+      if (lead_ && start_.has_volumes())
         lead_->allow(recorder_.next() + reader().info().state_slots / 2);
       const std::uint64_t got = recorder_.poll();
-      if (std::exchange(g_asked, 0) != 0) keep({"signal", newest()});
+      // One that comes before the first tick waits for it.
+      if (window_.end() > 0 && std::exchange(g_asked, 0) != 0) keep({"signal", newest()});
       if (const TickWindow::Event event = window_.take_event(); !event.reason.empty()) keep(event);
       if (!ended && got < reader().info().state_slots / 8) std::this_thread::sleep_for(kPollPeriod);
     }
@@ -189,57 +199,56 @@ class FlightRecorder final : TickSink {
                 << " recordings are; start the flight recorder again\n";
       return;
     }
+    // Beside its name until it is whole.
+    const std::filesystem::path partial = out_ / ("." + folder.filename().string());
+    std::error_code ignored;
+    std::filesystem::remove_all(partial, ignored);
     try {
-      const std::string problem = write(folder, event);
+      const std::string lacks = write(partial, event);
+      std::filesystem::rename(partial, folder);
       ++kept_;
-      std::cout << folder.string() << ": kept"
-                << (problem.empty() ? "" : "; cannot be replayed: " + problem) << std::endl;
+      std::cout << folder.string() << ": kept" << (lacks.empty() ? "" : "; " + lacks) << std::endl;
     } catch (const std::runtime_error& error) {
+      std::filesystem::remove_all(partial, ignored);
       std::cerr << "kerf-recorder: " << error.what() << '\n';
     }
   }
 
-  /// Beside its name until it is whole. Goes on polling: the window has room for what comes while
-  /// it is written. Returns why it cannot be replayed; empty: it can.
+  /// The ticks until now, with all that a replay needs. Goes on polling: the window has room for
+  /// what comes while it is written. Returns what a replay lacks; empty: nothing.
   [[nodiscard]] std::string write(const std::filesystem::path& folder,
                                   const TickWindow::Event& event) {
-    const std::filesystem::path partial = out_ / ("." + folder.filename().string());
-    std::error_code ignored;
-    std::filesystem::remove_all(partial, ignored);
-    make_recording_folder(partial);
-    while (!start_.is_ready()) {
+    make_recording_folder(folder);
+    const std::uint64_t end = window_.end();
+    std::uint64_t row = end - std::min(end, capacity_);
+    row = std::max(row, window_.first());
+    const std::uint64_t missed = index_of(window_[row]);
+    std::string lacks = start_.keep_inputs(folder, missed);
+    SummaryBuilder summary(reader().info());
+    TickLogWriter log(folder / kTickLogName);
+    constexpr std::uint64_t kRowsAPoll = 256;
+    while (row < end) {
+      row = std::max(row, window_.first());  // a disk that is slower than the run
+      for (const std::uint64_t next = std::min(end, row + kRowsAPoll); row < next; ++row) {
+        log.append(window_[row]);
+        summary.add(window_[row]);
+      }
+      log.flush();
+      recorder_.poll();
+    }
+    log.sync();
+    while (!start_.has_volumes()) {  // in the first seconds of a run
       recorder_.poll();
       std::this_thread::sleep_for(kPollPeriod);
     }
-    std::string problem;
-    {
-      const std::uint64_t end = window_.end();
-      std::uint64_t row = end - std::min(end, capacity_);
-      row = std::max(row, window_.first());
-      const std::uint64_t missed = index_of(window_[row]);
-      problem = start_.keep(partial, missed);
-      SummaryBuilder summary(reader().info());
-      TickLogWriter log(partial / kTickLogName);
-      constexpr std::uint64_t kRowsAPoll = 256;
-      while (row < end) {
-        row = std::max(row, window_.first());  // a disk that is slower than the run
-        for (const std::uint64_t next = std::min(end, row + kRowsAPoll); row < next; ++row) {
-          log.append(window_[row]);
-          summary.add(window_[row]);
-        }
-        log.flush();
-        recorder_.poll();
-      }
-      log.sync();
-      RecordLosses losses{.missed_before_start = missed};
-      const std::string reason = "kept at tick " + std::to_string(event.tick) + ": " + event.reason;
-      RecordSummary figures = summary.result(losses, reason);
-      losses.lost = figures.lost_ticks;
-      write_new_file(partial / kSceneName, reader().info().scene_json);
-      write_manifest(partial, reader().info(), losses, log.rows(), reason, &figures);
-    }
-    std::filesystem::rename(partial, folder);
-    return problem;
+    if (lacks.empty()) lacks = start_.keep_volumes(folder);
+    RecordLosses losses{.missed_before_start = missed};
+    const std::string reason = "kept at tick " + std::to_string(event.tick) + ": " + event.reason;
+    RecordSummary figures = summary.result(losses, reason);
+    losses.lost = figures.lost_ticks;
+    write_new_file(folder / kSceneName, reader().info().scene_json);
+    write_manifest(folder, reader().info(), losses, log.rows(), reason, &figures);
+    return lacks;
   }
 
   std::filesystem::path out_;

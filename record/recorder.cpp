@@ -126,7 +126,7 @@ bool parse_options(int argc, char** argv, RecorderOptions& options) {
   app.option(
          "--flight", options.flight_s,
          "keep only the last SECONDS, in memory; each fault, SIGUSR1, kerf-record grab and key f "
-         "of the window write them as a recording into --out")
+         "of the window write them as a recording into --out, with what a replay needs")
       .within(1, kMostFlightS)
       .shown_as("SECONDS");
   app.option("--lead", options.lead,

@@ -111,9 +111,9 @@ void write_starting_volume(const fs::path& folder, std::string_view hash, const 
 StartingVolumes::StartingVolumes(std::string name, fs::path folder)
     : name_(std::move(name)), folder_(std::move(folder)), thread_([this] { run(); }) {}
 
-std::vector<std::string> StartingVolumes::finish() {
+const std::vector<std::string>& StartingVolumes::finish() {
   if (thread_.joinable()) thread_.join();
-  return std::move(problems_);
+  return problems_;
 }
 
 void StartingVolumes::run() {

@@ -39,7 +39,7 @@ class StartingVolumes {
   [[nodiscard]] bool done() const noexcept { return done_; }
 
   /// Waits until the files are complete. Returns one line for each volume that has none, and why.
-  [[nodiscard]] std::vector<std::string> finish();
+  [[nodiscard]] const std::vector<std::string>& finish();
 
  private:
   void run();

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <span>
 #include <string_view>
 #include <utility>
 
@@ -191,14 +192,22 @@ void check_same_counts(const std::string& recorded, const LoadedScene& scene) {
   }
 }
 
+/// Of the ticks before the log a recording has the inputs.
 void check_begins_at_first_tick(const std::filesystem::path& folder, const Manifest& manifest) {
-  if (manifest.losses.missed_before_start == 0) return;
+  const std::uint64_t missed = manifest.losses.missed_before_start;
+  if (missed == 0) return;
   std::error_code none;
-  if (std::filesystem::is_directory(folder / kInputsName, none)) return;
-  throw RecordError(folder.string() + ": the first " +
-                    std::to_string(manifest.losses.missed_before_start) +
-                    " ticks of the run are not in it; start the recorder before the controller, "
-                    "as ./kerf demo does");
+  if (!std::filesystem::is_directory(folder / kInputsName, none)) {
+    throw RecordError(folder.string() + ": the first " + std::to_string(missed) +
+                      " ticks of the run are not in it; start the recorder before the controller, "
+                      "as ./kerf demo does");
+  }
+  TickRecord first;
+  static_cast<void>(TickLogReader(folder / kTickLogName).read(0, std::span(&first, 1)));
+  if (first.tick == missed + 1) return;
+  throw RecordError((folder / kManifestName).string() + ": " + std::to_string(missed) +
+                    " ticks are before the log, and it begins at tick " +
+                    std::to_string(first.tick) + "; copy the recording again");
 }
 
 }  // namespace

@@ -83,14 +83,13 @@ class ReplayLog {
   /// Before the first tick: it keeps the volumes of `run` as they are now.
   ReplayLog(const std::filesystem::path& out, const std::filesystem::path& from,
             const RecordedRun& run)
-      : out_(out), from_(from), log_(new_folder(out) / kTickLogName) {
+      : out_(out), from_(from), log_(new_folder(out, from, run) / kTickLogName) {
     for (std::size_t v = 0; v < run.scene.volumes.size(); ++v) {
       const std::vector<Label>& labels = run.scene.volumes[v].image.labels;
       const std::span<const Density> density = run.servo->density(v);
       write_starting_volume(out, hex64(volume_hash(density, labels)), run.servo->grid(v), density,
                             labels);
     }
-    link_files(from / kInputsName, out / kInputsName);
   }
 
   void append(const TickRecord& record) { log_.append(record); }
@@ -110,9 +109,12 @@ class ReplayLog {
   }
 
  private:
-  static std::filesystem::path new_folder(const std::filesystem::path& out) {
+  static std::filesystem::path new_folder(const std::filesystem::path& out,
+                                          const std::filesystem::path& from,
+                                          const RecordedRun& run) {
     check_new_folder(out);
     make_recording_folder(out);
+    copy_inputs(from, out, run.earlier_ticks());
     return out;
   }
 

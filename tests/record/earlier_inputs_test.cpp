@@ -3,13 +3,11 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <fstream>
 #include <string>
 #include <vector>
 
-#include <unistd.h>
-
 #include "record/tick_log.hpp"
+#include "shared/posix/atomic_file.hpp"
 #include "tests/record/record_support.hpp"
 
 using namespace kerf;
@@ -60,35 +58,46 @@ TEST_CASE("inputs are read back as they were given, up to any tick") {
     for (const Tick last : {until - std::min<Tick>(until, 500), Tick{0}, until}) {
       const std::filesystem::path recording = folder / ("kept-" + std::to_string(++kept));
       std::filesystem::create_directory(recording);
-      inputs.keep(recording, last);
+      CHECK(inputs.keep(recording, last).empty());
       CAPTURE(until);
       CHECK(ticks_read(recording, last) == last);
     }
   }
-  CHECK(inputs.problem().empty());
-  // Full files are not copied.
+  // Full files are not copied here, and are for another recording.
   const std::filesystem::path first = folder / "kept-15/inputs/000000000001.npy.gz";
   CHECK(std::filesystem::hard_link_count(first) > 2);
+  std::filesystem::create_directory(folder / "copy");
+  copy_inputs(folder / "kept-15", folder / "copy", 2 * kFile + 1000);
+  CHECK(ticks_read(folder / "copy", 2 * kFile + 1000) == 2 * kFile + 1000);
+  CHECK(std::filesystem::hard_link_count(folder / "copy/inputs/000000000001.npy.gz") == 1);
+  CHECK_THROWS_AS(copy_inputs(folder / "kept-15", folder / "copy", 1),
+                  FileError);  // there are some
+  std::filesystem::create_directory(folder / "short");
+  CHECK_THROWS_AS(copy_inputs(folder / "kept-15", folder / "short", 4 * kFile), FileError);
+  CHECK(std::filesystem::is_empty(folder / "short"));
   CHECK_THROWS_AS(for_each_input(folder / "kept-15", 3 * kFile, [](const TickRecord&) {}),
                   RecordError);
 }
 
 TEST_CASE("after a missing tick the inputs are not complete, and stay so") {
-  const TemporaryFolder folder;
   for (const Tick missing : {Tick{1}, Tick{2}, Tick{9}}) {
+    const TemporaryFolder folder;
     EarlierInputs inputs(folder.path());
     for (Tick tick = 1; tick <= 20; ++tick) {
-      CHECK(inputs.problem().empty() == (tick <= missing + 1));
       if (tick != missing) inputs.add(given_in(tick));
     }
-    CHECK(inputs.problem().starts_with("tick " + std::to_string(missing) + " was not seen"));
+    std::filesystem::create_directory(folder / "kept");
+    CHECK(inputs.keep(folder / "kept", 5).starts_with("tick " + std::to_string(missing) + " was"));
+    CHECK(std::filesystem::is_empty(folder / "kept"));
   }
 }
 
-TEST_CASE("inputs that cannot be written are a problem, not an end") {
+TEST_CASE("inputs that cannot be written are a problem of the recordings, not an end") {
   const TemporaryFolder folder;
-  std::ofstream(folder / "file") << "not a folder";
-  EarlierInputs inputs(folder / "file");
-  for (Tick tick = 1; tick <= kFile + 2; ++tick) inputs.add(given_in(tick));
-  CHECK(inputs.problem().find("file/inputs") != std::string::npos);
+  std::filesystem::create_directory(folder / "run");
+  EarlierInputs inputs(folder / "run");
+  std::filesystem::remove(folder / "run/inputs");
+  for (Tick tick = 1; tick <= 2 * kFile + 2; ++tick) inputs.add(given_in(tick));
+  std::filesystem::create_directory(folder / "kept");
+  CHECK(inputs.keep(folder / "kept", kFile).find("run/inputs") != std::string::npos);
 }

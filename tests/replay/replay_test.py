@@ -161,6 +161,19 @@ class TestReplay(unittest.TestCase):
         self.assertIn(f"{before} ticks before", replay(kept, *changed, "--out", again))
         self.assertIn("1000 ticks, each equal", replay(again))
         self.assertNotEqual(self.rows(again)[HEADER:], self.rows(kept)[HEADER:])
+        (changed_in_place := next((again / "inputs").iterdir())).write_bytes(b"")  # a copy, not the same file
+        self.assertIn("1000 ticks, each equal", replay(kept))
+        self.assertEqual(changed_in_place.stat().st_nlink, 1)
+        # No link leads out of the folder, and what is refused leaves no log.
+        (folder / "linked").mkdir()
+        (folder / "victim").mkdir()
+        (folder / "linked/inputs").symlink_to(folder / "victim")
+        self.assertIn("linked/inputs: there is one; choose another --out", replay(kept, "--out", folder / "linked", code=2))
+        self.assertEqual([*(folder / "victim").iterdir()], [])
+        self.assertEqual([path.name for path in (folder / "linked").iterdir()], ["inputs"])
+        (kept / "manifest.json").write_text(json.dumps({**manifest, "missed_before_start": before + 1}))
+        self.assertIn(f"{before + 1} ticks are before the log, and it begins at tick {before + 1};", replay(kept, code=2))
+        (kept / "manifest.json").write_text(json.dumps(manifest))
         # Watched from its first tick on, with the volumes of then.
         _, watched, told = self.watch(kept)
         told(" ", "paused")
