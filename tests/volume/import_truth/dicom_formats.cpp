@@ -272,7 +272,11 @@ void add_unfit(Series& f, const char* series) {
   DataSet other = f.slices[0];
   other.set(0x00080018, "UI", "1.2.3.4");
   other.set(0x0020000E, "UI", series);
+#ifdef KERF_SANITIZED  // whose allocator ends a reader that asks for as much as a broken file says
+  const int kind = f.draw.below(3) % 2;
+#else
   const int kind = f.draw.below(3);
+#endif
   if (kind == 0) {
     other.number(0x00280002, 3);
     other.set(0x00280004, "CS", "RGB");
