@@ -125,7 +125,8 @@ void number_anew(Draw& draw, Numbered& volume, VoxelType type, int bits) {
     using T = typename decltype(as)::Type;
     for (double& value : volume.stored) {
       if constexpr (std::is_floating_point_v<T>) {
-        value = double{static_cast<float>(std::ldexp(draw.decimal(-1, 1), draw.below(40) - 20))};
+        const double digits = draw.decimal(-1, 1);
+        value = double{static_cast<float>(std::ldexp(digits, draw.below(40) - 20))};
         if (value == 0) value = 0.25;
         if (draw.invert_values) value = -value;
       } else {

@@ -74,9 +74,11 @@ std::string hex_of(const std::string& bytes) {
 void set_space(TextFile& f, const vec3::Vec& to_lps) {
   const auto vector = [&](const vec3::Vec& v) {
     const std::string comma = f.draw.of({",", ", "});
-    return "(" + decimal_text(f.draw, v[0] * to_lps[0]) + comma +
-           decimal_text(f.draw, v[1] * to_lps[1]) + comma + decimal_text(f.draw, v[2] * to_lps[2]) +
-           ")";
+    std::string text;  // one after the other: the order within a sum is the compiler's
+    for (std::size_t a = 0; a < 3; ++a) {
+      text += (a == 0 ? "(" : comma) + decimal_text(f.draw, v[a] * to_lps[a]);
+    }
+    return text + ")";
   };
   std::string directions;
   for (std::size_t a = 0; a < 3; ++a) {
