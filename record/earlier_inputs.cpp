@@ -31,13 +31,19 @@ std::string header_of(std::size_t rows) {
       std::to_string(rows) + ",", kBytes);
 }
 
+/// The columns that both have.
+template <class To, class From>
+void copy_columns(const From& from, To& to) {
+  std::ranges::copy(from.raw, to.raw);
+  to.stale = from.stale;
+  to.command = from.command;
+  to.command_argument = from.command_argument;
+  to.last_command = from.last_command;
+}
+
 TickInputs inputs_of(const TickRecord& record) {
   TickInputs out{};
-  std::ranges::copy(record.raw, out.raw);
-  out.stale = record.stale;
-  out.command = record.command;
-  out.command_argument = record.command_argument;
-  out.last_command = record.last_command;
+  copy_columns(record, out);
   return out;
 }
 
@@ -45,11 +51,7 @@ TickRecord record_of(const TickInputs& inputs, Tick tick) {
   TickRecord out{};
   out.seq = 2 * tick;
   out.tick = tick;
-  std::ranges::copy(inputs.raw, out.raw);
-  out.stale = inputs.stale;
-  out.command = inputs.command;
-  out.command_argument = inputs.command_argument;
-  out.last_command = inputs.last_command;
+  copy_columns(inputs, out);
   return out;
 }
 
