@@ -7,7 +7,8 @@ import re
 import shutil
 import socket
 
-BUSES = {"omni": ("fw", "fw1"), "falcon": ("usb", "usb"), "woodenhaptics": ("hid", "hidraw0")}  # word of --port, its node
+BUSES = {"omni": ("fw", "fw1"), "falcon": ("usb", "usb"), "woodenhaptics": ("hid", "hidraw0"),  # word of --port, its node
+         "inverse3": ("ws", ""), "touch": ("arm", ""), "omega": ("arm", "")}  # no node: a service or a library of the vendor
 FLAGS = ("--headless", "--serve", "--stereo", "--voxel-tool", "--mute", "--colour-blind", "--virtual", "--two-machines")
 OF_SCENE = ("--scene", "--volume", "--spacing", "--override-spacing", "--window", "--set")
 OF_LINK = {"--loss": (50, 1), "--delay-ms": (2000, 20), "--mbit": (100000, 4)}  # of two machines: the most of each, a bad one
@@ -166,7 +167,7 @@ def check(options):
     if not size or int(size[1]) > 8192 or int(size[2]) > 8192:
         raise Refusal(f"--size {options.size}: not WIDTHxHEIGHT in pixels, 1 to 8192 each; take 640x480")
     if options.device not in BUSES:
-        raise Refusal(f"--device {options.device}: unknown; take omni, falcon or woodenhaptics")
+        raise Refusal(f"--device {options.device}: unknown; take " + ", ".join(BUSES))
     bus = BUSES[options.device][0]
     if options.port not in ("socket", bus):
         raise Refusal(f"--port {options.port}: not for --device {options.device}; take socket or {bus}")

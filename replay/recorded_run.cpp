@@ -178,8 +178,7 @@ void check_same_counts(const std::string& recorded, const LoadedScene& scene) {
   const Json was = Json::parse(recorded);
   const auto rate_hz = was.at("servo").at("rate_hz").get<int>();
   const auto device = was.at("device").at("personality").get<std::string>();
-  const std::string_view now =
-      kPersonalityWords[static_cast<std::size_t>(scene.device.personality)];
+  const std::string_view now = word_of(scene.device.personality);
   if (scene.servo.rate_hz != rate_hz) {
     throw RecordError(scene.path + ": servo.rate_hz is " + std::to_string(scene.servo.rate_hz) +
                       ", and the ticks of the recording are of " + std::to_string(rate_hz) +

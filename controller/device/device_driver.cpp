@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <cstdlib>
 
+#include "shared/wire/cartesian.hpp"
 #include "shared/wire/falcon.hpp"
 #include "shared/wire/omni.hpp"
 #include "shared/wire/woodenhaptics.hpp"
@@ -156,17 +157,17 @@ constexpr std::uint32_t kMostMissing = 16'000;
 
 }  // namespace
 
-bool OmniDriver::is_newest(std::uint32_t counter) noexcept {
+bool PacketNumbers::is_newest(std::uint32_t counter, std::uint32_t silent_reads) noexcept {
   const std::uint32_t step = counter - newest_;
   if (seen_) {
     const bool is_ahead = step - 1 < kMostMissing;
     if (step - 1 < kNear) {
-      lost_ += step - 1;
+      missing_ += step - 1;
     } else {
       const bool goes_on = refused_counter_ && counter - *refused_counter_ - 1 < kNear;
       refused_counter_ = counter;
-      if (!goes_on || !(is_ahead || silent_reads_ >= kNear)) return false;
-      if (is_ahead) lost_ += step - 2;  // the refused one came
+      if (!goes_on || !(is_ahead || silent_reads >= kNear)) return false;
+      if (is_ahead) missing_ += step - 2;  // the refused one came
     }
   }
   refused_counter_.reset();
@@ -178,7 +179,8 @@ bool OmniDriver::is_newest(std::uint32_t counter) noexcept {
 bool OmniDriver::take(std::span<const std::uint8_t> packet, DeviceReport& report) noexcept {
   const auto said = decode_report(packet);
   if (!said) return false;
-  if (!is_newest(said->counter)) return false;
+  if (!numbers_.is_newest(said->counter, silent_reads_)) return false;
+  lost_ = numbers_.missing();
   report.encoder = said->encoder;
   report.wiper_a = said->pot_a;
   report.wiper_b = said->pot_b;
@@ -199,6 +201,55 @@ std::size_t OmniDriver::compose(const ServoOutput& output, Packet& packet) noexc
 
 std::size_t OmniDriver::compose_release(Packet& packet) const noexcept {
   const auto bytes = encode(OmniCommand{});
+  std::ranges::copy(bytes, packet.begin());
+  return bytes.size();
+}
+
+// Cartesian devices.
+
+bool CartesianDriver::take(std::span<const std::uint8_t> packet, DeviceReport& report) noexcept {
+  const auto said = decode_cartesian_report(packet);
+  if (!said) return false;
+  std::array<std::int16_t, 3> counts{};
+  for (std::size_t i = 0; i < 3; ++i) {
+    // To nearest, half away from zero.
+    const int half = said->position_um[i] < 0 ? -step_um_ / 2 : step_um_ / 2;
+    const int count = (said->position_um[i] + half) / step_um_;
+    if (count < INT16_MIN || count > INT16_MAX) return false;
+    counts[i] = static_cast<std::int16_t>(count);
+  }
+  if (!numbers_.is_newest(said->number, silent_reads_)) return false;
+  lost_ = numbers_.missing();
+  newest_ = said->number;
+  report.encoder = counts;
+  for (std::size_t i = 0; i < 3; ++i) {
+    report.wiper_a[i] = static_cast<std::uint16_t>(said->orientation[i]);
+  }
+  report.wiper_b = {static_cast<std::uint16_t>(said->orientation[3]), 0, 0};
+  report.button1 = said->button1;
+  report.button2 = said->button2;
+  report.parked = said->parked;
+  report.homed = said->homed && said->powered;
+  report.counter = said->number;
+  return true;
+}
+
+std::size_t CartesianDriver::compose(const ServoOutput& output, Packet& packet) noexcept {
+  using Light = CartesianCommand::Light;
+  const bool asks = output.phase == Phase::off || output.phase == Phase::calibrating;
+  const Light light = output.phase == Phase::fault ? Light::fault
+                      : asks                       ? Light::asks
+                                                   : Light::ready;
+  const auto bytes = encode(CartesianCommand{.force_mn = output.motor_counts,
+                                             .force_on = output.motors_on,
+                                             .light = light,
+                                             .answers = newest_});
+  std::ranges::copy(bytes, packet.begin());
+  return bytes.size();
+}
+
+std::size_t CartesianDriver::compose_release(Packet& packet) const noexcept {
+  const auto bytes = encode(CartesianCommand{});
   std::ranges::copy(bytes, packet.begin());
   return bytes.size();
 }
@@ -288,6 +339,11 @@ std::unique_ptr<DeviceDriver> make_driver(Personality personality, PacketPort& p
           port, std::array{sign[0] < 0 ? -1 : 1, sign[1] < 0 ? -1 : 1, sign[2] < 0 ? -1 : 1});
       break;
     }
+    case Personality::inverse3:
+    case Personality::touch:
+    case Personality::omega:
+      driver = std::make_unique<CartesianDriver>(port, cartesian::figures(personality)->step_um);
+      break;
   }
   driver->set_rate(rate_hz);
   return driver;

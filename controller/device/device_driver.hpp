@@ -11,6 +11,7 @@
 
 #include "controller/device/port/packet_port.hpp"
 #include "controller/servo/servo.hpp"
+#include "shared/wire/cartesian.hpp"
 #include "shared/wire/personality.hpp"
 #include "shared/wire/woodenhaptics.hpp"
 
@@ -133,8 +134,7 @@ class FalconDriver final : public DeviceDriver {
   bool homed_ = false;
 };
 
-/// The Omni: a stream of reports, counted by the device itself. The inkwell's light: steady once
-/// calibrated, slow flash while waiting for the stylus, fast flash in a fault.
+/// The numbers of a device that counts its own packets.
 ///
 /// A counter up to kNear ahead of the last one is the next packet, and counts the missing ones. One
 /// that is farther ahead may be a wrong bit, so it waits for a second packet that continues it; the
@@ -142,6 +142,23 @@ class FalconDriver final : public DeviceDriver {
 /// whose encoders may do so too: it is believed when it is continued and kNear calls of `read` had
 /// no report. At any rate of the servo these are 20 ms or more, after which `stale_input` is
 /// latched: neither moves the tip while the motors are on.
+class PacketNumbers {
+ public:
+  /// Whether a packet with this counter is the newest. `silent_reads`: calls of `read` without a
+  /// report before it.
+  [[nodiscard]] bool is_newest(std::uint32_t counter, std::uint32_t silent_reads) noexcept;
+  /// Packets that are missing so far.
+  [[nodiscard]] std::uint64_t missing() const noexcept { return missing_; }
+
+ private:
+  bool seen_ = false;
+  std::uint32_t newest_ = 0;
+  std::uint64_t missing_ = 0;
+  std::optional<std::uint32_t> refused_counter_;  ///< of the last packet, if it was refused
+};
+
+/// The Omni: a stream of reports, counted by the device itself. The inkwell's light: steady once
+/// calibrated, slow flash while waiting for the stylus, fast flash in a fault.
 class OmniDriver final : public DeviceDriver {
  public:
   using DeviceDriver::DeviceDriver;
@@ -153,12 +170,29 @@ class OmniDriver final : public DeviceDriver {
   [[nodiscard]] std::size_t compose_release(Packet& packet) const noexcept override;
 
   [[nodiscard]] bool are_numbered() const noexcept override { return true; }
-  /// Whether a packet with this counter is the newest; counts the missing ones before it.
-  [[nodiscard]] bool is_newest(std::uint32_t counter) noexcept;
 
-  bool seen_ = false;
+  PacketNumbers numbers_;
+};
+
+/// A Cartesian device: numbered reports of a pose in kerf's own packets, whoever makes them. A
+/// position that 16 bits of counts cannot hold is refused, so nothing wraps. An unpowered device
+/// counts as not homed: its motors stay off.
+class CartesianDriver final : public DeviceDriver {
+ public:
+  CartesianDriver(PacketPort& port, int step_um) noexcept : DeviceDriver(port), step_um_(step_um) {}
+
+  void start() noexcept override { static_cast<void>(release()); }
+
+ private:
+  [[nodiscard]] bool take(std::span<const std::uint8_t> packet,
+                          DeviceReport& report) noexcept override;
+  [[nodiscard]] std::size_t compose(const ServoOutput& output, Packet& packet) noexcept override;
+  [[nodiscard]] std::size_t compose_release(Packet& packet) const noexcept override;
+  [[nodiscard]] bool are_numbered() const noexcept override { return true; }
+
+  int step_um_;
+  PacketNumbers numbers_;
   std::uint32_t newest_ = 0;
-  std::optional<std::uint32_t> refused_counter_;  ///< of the last packet, if it was refused
 };
 
 /// WoodenHaptics: a stream of HID reports that begins with the host's first one.

@@ -64,7 +64,8 @@ namespace {
 
 constexpr std::string_view kSocket = "socket:";
 constexpr std::string_view kUdp = "udp:";
-constexpr std::array<std::string_view, 3> kBusOf{"fw", "usb", "hid"};  // by Personality
+/// By Personality.
+constexpr std::array<std::string_view, 6> kBusOf{"fw", "usb", "hid", "ws", "arm", "arm"};
 static_assert(kBusOf.size() == kPersonalityWords.size());
 
 struct Request {

@@ -223,6 +223,7 @@ void apply_overrides(const SceneOverrides& overrides, Scene& scene) {
     scene.device.torque_scale.reset();  // of another device's motors
   }
   if (overrides.torque_scale) scene.device.torque_scale = overrides.torque_scale;
+  settle_device(scene);
   if (scene.cut.pedal == CutPedal::automatic && overrides.pedal) {
     scene.cut.pedal = CutPedal::button;
   }

@@ -22,7 +22,7 @@ constexpr std::array<const char*, kKinds> kWaits{"",
                                                  "waiting to be taken"};
 
 /// By personality; an Omni needs no homing.
-constexpr std::array<std::array<const char*, kKinds>, 3> kDeeds{
+constexpr std::array<std::array<const char*, kKinds>, kPersonalityWords.size()> kDeeds{
     {{"", "unplug it and plug it in again", "", "rest the stylus in the inkwell",
       "let go of the stylus in the inkwell", "take the stylus out of the inkwell"},
      {"", "load its firmware (docs/devices.md), or unplug it and plug it in again",
@@ -30,10 +30,22 @@ constexpr std::array<std::array<const char*, kKinds>, 3> kDeeds{
       "hold the grip still, its centre button held", "let go of the grip's centre button"},
      {"", "unplug it and plug it in again", "hold the home pose, press its calibration button",
       "hold the home pose, press its calibration button", "hold the home pose still",
-      "move the arm away from its home pose"}}};
+      "move the arm away from its home pose"},
+     {"", "start the vendor's service, and wake the handle",
+      "hold the grip on the inkwell until its light is solid; is its power supply in?",
+      "hold the handle's parking button", "hold the handle still, its parking button held",
+      "let go of the handle's parking button"},
+     {"", "start ./kerf arm, or unplug the device and plug it in again",
+      "rest the stylus in the inkwell", "rest the stylus in the inkwell",
+      "let go of the stylus in the inkwell", "take the stylus out of the inkwell"},
+     {"", "start ./kerf arm, or switch the device on", "initialise it with the vendor's tool",
+      "hold its button, at rest", "hold the grip still, its button held", "let go of its button"}}};
 static_assert(static_cast<std::size_t>(Personality::omni) == 0 &&
               static_cast<std::size_t>(Personality::falcon) == 1 &&
-              static_cast<std::size_t>(Personality::woodenhaptics) == 2);
+              static_cast<std::size_t>(Personality::woodenhaptics) == 2 &&
+              static_cast<std::size_t>(Personality::inverse3) == 3 &&
+              static_cast<std::size_t>(Personality::touch) == 4 &&
+              static_cast<std::size_t>(Personality::omega) == 5);
 
 }  // namespace
 

@@ -69,7 +69,7 @@ std::vector<LawSlope> law_slopes(const LoadedScene& scene) {
 constexpr double kMostNPerMm = 1000;
 
 std::string device_word(const LoadedScene& scene) {
-  return std::string(kPersonalityWords[static_cast<std::size_t>(scene.device.personality)]);
+  return std::string(word_of(scene.device.personality));
 }
 
 SampledLoop loop_of(const LoadedScene& scene) {

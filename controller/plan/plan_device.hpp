@@ -13,6 +13,7 @@
 #include "controller/plan/method/lattice.hpp"
 #include "controller/servo/servo_plan.hpp"
 #include "shared/numeric/elementary.hpp"
+#include "shared/wire/cartesian.hpp"
 #include "shared/wire/falcon.hpp"
 #include "shared/wire/omni.hpp"
 #include "shared/wire/woodenhaptics.hpp"
@@ -27,12 +28,17 @@ namespace device_parts {
 struct JointSense {
   double home_rad = 0;       ///< angle where the count is 0
   double rad_per_count = 0;  ///< signed
-  double motor_sign = 1;     ///< of the count that gives a positive torque
+  double motor_sign = 1;     ///< of the count that gives a positive torque; Cartesian: counts per N
 };
 
-/// Joints turret, thigh and forearm of a serial arm; the legs of the Falcon.
+/// Joints turret, thigh and forearm of a serial arm; the legs of the Falcon; the axes of a
+/// Cartesian device, in mm.
 inline std::array<JointSense, 3> joints_of(const DeviceSettings& device) {
   std::array<JointSense, 3> joints;
+  if (const auto figures = cartesian::figures(device.personality)) {
+    joints.fill({0, figures->step_um / 1000.0, 1 / cartesian::kNewtonsPerCount});
+    return joints;
+  }
   for (std::size_t i = 0; i < 3; ++i) {
     switch (device.personality) {
       case Personality::omni:
@@ -47,6 +53,10 @@ inline std::array<JointSense, 3> joints_of(const DeviceSettings& device) {
         joints[i] = {kZeroRad[i], kSign[i] * wooden::kRadPerCount[i], kSign[i]};
         break;
       }
+      case Personality::inverse3:
+      case Personality::touch:
+      case Personality::omega:
+        break;  // above
     }
   }
   return joints;
@@ -89,20 +99,26 @@ inline std::int32_t motor_count_end(Personality personality) {
     case Personality::falcon:
       return falcon::kMotorCountMax;
     case Personality::woodenhaptics:
+      return wooden::kMaxMilliamps;
+    case Personality::inverse3:
+    case Personality::touch:
+    case Personality::omega:
       break;
   }
-  return wooden::kMaxMilliamps;
+  return static_cast<std::int32_t>(force_figures(personality).peak_n / cartesian::kNewtonsPerCount);
 }
 
 /// Largest distance of a tip from the position that its encoders, rounded to whole counts, give:
-/// half a count of one joint with the whole arm. The Omni's 0.056 mm is its data sheet's 0.055.
+/// half a count of one joint with the whole arm. The Omni's 0.056 mm is its data sheet's 0.055. Of
+/// a Cartesian device half of its resolution.
 inline double tip_noise_mm(Personality personality) {
+  if (const auto figures = cartesian::figures(personality)) return figures->quantum_um / 2000.0;
   switch (personality) {
     case Personality::omni:
       return omni::kRadPerCount * (omni::kUpperLinkMm + omni::kForearmMm) / 2;
     case Personality::falcon:
       return falcon::kRadPerCount * falcon::kThighMm / 2;
-    case Personality::woodenhaptics:
+    default:
       break;
   }
   return wooden::kRadPerCount[1] * (wooden::kUpperLinkMm + wooden::kForearmMm) / 2;
@@ -112,6 +128,23 @@ inline double tip_noise_mm(Personality personality) {
 /// 3 mm at the wrist, and twice the 10 mrad within which a hand holds WoodenHaptics in its home
 /// pose. A Falcon has no dock: its button is held anywhere.
 inline constexpr double kDockPlayRad = 0.025;
+/// The same of a Cartesian device with an inkwell: those 3 mm.
+inline constexpr double kDockPlayMm = 3;
+
+/// How far the counters of an axis at rest may move: two counts of an encoder; of a Cartesian
+/// device two steps of its resolution.
+inline std::int32_t rest_counts(Personality personality) {
+  const auto figures = cartesian::figures(personality);
+  return figures ? std::max(2, 2 * figures->quantum_um / figures->step_um) : 2;
+}
+
+/// How far from its first calibration a joint may rest parked.
+inline std::int32_t dock_counts(Personality personality, double per_count, std::int32_t anywhere) {
+  const auto figures = cartesian::figures(personality);
+  const bool has_dock = figures ? figures->has_dock : personality != Personality::falcon;
+  if (!has_dock) return anywhere;
+  return static_cast<std::int32_t>((figures ? kDockPlayMm : kDockPlayRad) / std::abs(per_count));
+}
 
 }  // namespace device_parts
 
@@ -129,13 +162,12 @@ void plan_device(const DeviceSettings& device, ServoPlan<N>& plan) {
   arm.delta = device_parts::delta_arm<N>();
   arm.motor_count_end = device_parts::motor_count_end(device.personality);
   arm.motors_configured = device.torque_scale.has_value();
+  arm.rest_counts = device_parts::rest_counts(device.personality);
   const auto joints = device_parts::joints_of(device);
   for (std::size_t i = 0; i < 3; ++i) {
     arm.joints[i].home_rad = typename N::Angle(joints[i].home_rad);
-    if (device.personality != Personality::falcon) {
-      arm.dock_counts[i] =
-          static_cast<std::int32_t>(device_parts::kDockPlayRad / std::abs(joints[i].rad_per_count));
-    }
+    arm.dock_counts[i] = device_parts::dock_counts(device.personality, joints[i].rad_per_count,
+                                                   DevicePlan<N>::kNoDock);
     if constexpr (N::kIsFixed) {
       constexpr auto kOne = static_cast<double>(std::int64_t{1} << kAnglePerCountBits);
       arm.joints[i].angle_per_count = static_cast<std::int64_t>(joints[i].rad_per_count * kOne);

@@ -132,6 +132,16 @@ Bus bus_of(Personality personality) {
     case Personality::falcon:
       return {"sys/bus/usb", "sudo modprobe xhci-pci (is there a controller? lspci | grep USB)",
               "connect and power it, then: lsusb -d 0403:cb48"};
+    case Personality::inverse3:
+      return {"sys/class/tty", "sudo modprobe cdc-acm",
+              "connect and power it, then: lsusb -d 16c0:0483; systemctl status "
+              "haply-inverse-service"};
+    case Personality::touch:
+      return {"sys/bus/usb", "sudo modprobe xhci-pci (is there a controller? lspci | grep USB)",
+              "connect and power it, then: lsusb -d 2988:; ./kerf arm --device touch"};
+    case Personality::omega:
+      return {"sys/bus/usb", "sudo modprobe xhci-pci (is there a controller? lspci | grep USB)",
+              "connect and power it, then: lsusb -d 1451:; ./kerf arm --device omega"};
     case Personality::woodenhaptics:
       break;
   }
@@ -198,7 +208,7 @@ std::vector<SetupProblem> lacks_of_nodes(std::optional<Personality> which,
     const Bus bus = bus_of(*which);
     std::error_code ignored;
     const bool has_bus = fs::exists(root / bus.sysfs, ignored);
-    const std::string name(kPersonalityWords[static_cast<std::size_t>(*which)]);
+    const std::string name(word_of(*which));
     lacks.push_back({name + (has_bus ? ": none is connected"
                                      : ": the kernel has no /" + std::string(bus.sysfs)),
                      has_bus ? bus.absent : bus.missing});

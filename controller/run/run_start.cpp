@@ -98,7 +98,7 @@ void tell_proposal(const LoadedScene& scene) {
 }
 
 void tell_of_scene(const LoadedScene& scene, RunReport& report) {
-  report.device = kPersonalityWords[static_cast<std::size_t>(scene.device.personality)];
+  report.device = word_of(scene.device.personality);
   report.numeric = word_of(scene.servo.numeric);
   report.velocity_estimator = scene.servo.velocity.name;
   report.rate_hz = scene.servo.rate_hz;

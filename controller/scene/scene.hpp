@@ -231,12 +231,18 @@ struct ToolSpec {
   bool turns = true;
 };
 
+/// `file:line: key = value` of limits; empty: the scene leaves it to the device.
+struct LimitPlaces {
+  std::string force, continuous, slew;
+};
+
 /// A scene file after parsing: every value is checked, no other file is read, no array is made.
 struct Scene : SceneSettings {
   std::vector<VolumeSpec> volumes;
   std::vector<ToolSpec> tools;
   bool offset_given = false;     ///< else the device origin is moved to the first surface
   bool cut_in_one_tick = false;  ///< rate_per_s = "1/T", the paper's own step
+  LimitPlaces limit_places;
 };
 
 // The words of a scene for the values of an enumeration, in its order: one list for reading a scene

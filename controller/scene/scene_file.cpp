@@ -292,13 +292,9 @@ void refuse_idle_coupling(const SceneTable& table, const ForceSettings& force) {
   }
 }
 
-void finish_limits(const SceneTable& table, LimitSettings& limits) {
-  if (limits.continuous_force_n <= limits.force_n) return;
-  if (table.has("continuous_force_n")) {
-    refuse(table.place("continuous_force_n"),
-           " is out of range; use 0.01 to " + number_text(limits.force_n));
-  }
-  limits.continuous_force_n = limits.force_n;
+LimitPlaces limit_places(const SceneTable& table) {
+  const auto place = [&](const char* key) { return table.has(key) ? table.place(key) : ""; };
+  return {place("force_n"), place("continuous_force_n"), place("slew_n_per_ms")};
 }
 
 /// A scene file after parsing, and its tables beside the rows of their keys.
@@ -396,7 +392,8 @@ Scene read_scene(const TomlNode& root, const std::filesystem::path& path, SceneK
   for (const SceneTable& table : once) table.read_conditional(parts);
   finish_device(tables.once("device"), scene);
   refuse_idle_coupling(tables.once("force"), scene.force);
-  finish_limits(tables.once("limits"), scene.limits);
+  scene.limit_places = limit_places(tables.once("limits"));
+  settle_device(scene);
   refuse_uncut(scene);
   refuse_unfelt(scene);
   if (!scene.hand_script.empty()) {
@@ -407,6 +404,37 @@ Scene read_scene(const TomlNode& root, const std::filesystem::path& path, SceneK
 }
 
 }  // namespace
+
+void settle_device(Scene& scene) {
+  // A motor count of a Cartesian device is 1 mN: a true force that is far from it is a slip.
+  constexpr double kLeastShare = 0.1, kMostShare = 10;
+  for (const double share : scene.device.torque_scale.value_or(std::array{1.0, 1.0, 1.0})) {
+    if (!is_cartesian(scene.device.personality)) break;
+    if (std::abs(share) >= kLeastShare && std::abs(share) <= kMostShare) continue;
+    refuse(scene.path, ": device.torque_scale: " + number_text(share) + " is out of range for " +
+                           std::string(word_of(scene.device.personality)) +
+                           ", true newtons per commanded newton; use 0.1 to 10, 1 to begin with");
+  }
+  const ForceFigures device = force_figures(scene.device.personality);
+  const auto settle = [&](const std::string& place, double low, double high, double own,
+                          double& value) {
+    if (place.empty()) {
+      value = own;
+    } else if (value < low || value > high) {
+      refuse(place, " is out of range for " + std::string(word_of(scene.device.personality)) +
+                        "; use " + number_text(low) + " to " + number_text(high));
+    }
+  };
+  LimitSettings& limits = scene.limits;
+  constexpr double kLeastN = 0.01;
+  settle(scene.limit_places.force, kLeastN, device.peak_n, device.peak_n, limits.force_n);
+  settle(scene.limit_places.continuous, kLeastN, std::min(limits.force_n, device.peak_n),
+         std::min(device.continuous_n, limits.force_n), limits.continuous_force_n);
+  // The fade when reports are missing takes 15 ms: of the Omni's peak at least.
+  constexpr double kFadeMs = 15, kLeastPeakN = 3.3;
+  settle(scene.limit_places.slew, std::max(limits.force_n, kLeastPeakN) / kFadeMs,
+         device.slew_n_per_ms, device.slew_n_per_ms, limits.slew_n_per_ms);
+}
 
 Scene parse_scene(std::string_view text, const std::filesystem::path& path, SceneKeys keys,
                   std::span<const KeyOverride> settings) {

@@ -41,6 +41,11 @@ void override_keys(std::span<const KeyOverride> settings, TomlNode& root);
 [[nodiscard]] Scene parse_scene_file(const std::filesystem::path& path,
                                      std::span<const KeyOverride> settings = {});
 
+/// Gives the limits that the scene leaves out the figures of its device
+/// (shared/wire/personality.hpp), and throws LoadError for one, or a torque scale, that the device
+/// does not allow. Again after another device is named.
+void settle_device(Scene& scene);
+
 /// Throws LoadError if the scene names a hand script that is no file. Loading a scene does not
 /// check this, since only an emulated hand needs the script.
 void check_hand_script(const SceneSettings& scene);

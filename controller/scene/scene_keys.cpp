@@ -249,7 +249,7 @@ constexpr SceneKey kKeys[] = {
      "scene point under the device's origin", {}, {.default_text = "the first surface below +y"}},
     {"device.torque_scale", "N mm", at<&DeviceSettings::torque_scale>,
      between(-kMaxTorqueScale, kMaxTorqueScale),
-     "at each joint per motor count, at least 0.001; the sign is the motor's (docs/devices.md)",
+     "at each joint per motor count, at least 0.001; the sign is the motor's; of inverse3, touch and omega the true force along x, y, z over the commanded one: 1 (docs/devices.md)",
      {}, {.default_text = "the motors stay off"}},
     {"device.dock_rad", "rad", at<&DeviceSettings::dock_rad>, between(-3.15, 3.15),
      "joint angles in the inkwell", kOmni, {.json = InJson::always}},
@@ -305,13 +305,17 @@ constexpr SceneKey kKeys[] = {
     {"spindle.inertia_g_mm2", "g mm^2", at<&SpindleSettings::inertia_g_mm2>, between(0.01, 1000),
      "of rotor and bur", kSpindle},
 
-    {"limits.force_n", "N", at<&LimitSettings::force_n>, between(0.01, 3.3),
-     "at the device; 3.3 is what an Omni can give"},
-    {"limits.continuous_force_n", "N", at<&LimitSettings::continuous_force_n>, between(0.01, 3.3),
-     "root mean square over time; at most force_n"},
-    {"limits.slew_n_per_ms", "N/ms", at<&LimitSettings::slew_n_per_ms>, between(0.22, 0.5),
+    {"limits.force_n", "N", at<&LimitSettings::force_n>, between(0.01, 12),
+     "at the device; at most its own peak, which is also the default: 3.3 (inverse3 10, omega 12)",
+     {}, {.default_text = "the device's: 3.3"}},
+    {"limits.continuous_force_n", "N", at<&LimitSettings::continuous_force_n>, between(0.01, 12),
+     "root mean square over time; at most force_n; of the device: 0.88 (inverse3 4, omega 12)",
+     {}, {.default_text = "the device's: 0.88"}},
+    {"limits.slew_n_per_ms", "N/ms", at<&LimitSettings::slew_n_per_ms>, between(0.22, 1.8),
      "change of force; a larger jump is felt as a blow, a smaller one cannot follow the fade when "
-     "reports are missing: 3.3 N in 15 ms"},
+     "reports are missing: force_n, at least 3.3 N, in 15 ms; of the device, and at most: 0.5 "
+     "(inverse3 1.5, omega 1.8)",
+     {}, {.default_text = "the device's: 0.5"}},
     {"limits.speed_mm_per_s", "mm/s", at<&LimitSettings::speed_mm_per_s>, between(1, 10000),
      "of the hand; faster is a fault of the sensor"},
 

@@ -321,4 +321,46 @@ template <class N>
   return pose;
 }
 
+// Cartesian devices: the vendor's side has done the kinematics.
+
+/// The tip is what was reported, and a motor is an axis of the device's frame: J^T is the identity,
+/// so that a "torque" is the force along that axis, in N.
+template <class N>
+[[nodiscard]] constexpr ForwardKinematics<N> cartesian_pose(
+    DeviceVec<typename N::Real> tip_mm) noexcept {
+  using Real = typename N::Real;
+  ForwardKinematics<N> pose;
+  pose.tip_mm = tip_mm;
+  pose.jacobian_t_mm.row = {
+      {{Real(1), Real(0), Real(0)}, {Real(0), Real(1), Real(0)}, {Real(0), Real(0), Real(1)}}};
+  return pose;
+}
+
+/// The turn of a quaternion x, y, z, w of any length, divided by its square, so that whole numbers
+/// lose nothing before the last division. A quaternion of zeros turns nothing.
+template <class N>
+[[nodiscard]] constexpr Rotation<N> rotation_of(
+    const std::array<std::int16_t, 4>& quaternion) noexcept {
+  using Unit = typename N::Unit;
+  const std::int64_t x = quaternion[0], y = quaternion[1], z = quaternion[2], w = quaternion[3];
+  const std::int64_t square = x * x + y * y + z * z + w * w;  // below 2^32
+  if (square == 0) return identity_rotation<N>();
+  const auto over_square = [&](std::int64_t part) {
+    if constexpr (N::kIsFixed) {
+      // |part| <= square, so the quotient is at most 1.
+      constexpr int kBits = Unit::kFractionBits;
+      static_assert(kBits <= 30);
+      return Unit::from_raw(saturate_i32(part * (std::int64_t{1} << kBits) / square));
+    } else {
+      return Unit(static_cast<double>(part) / static_cast<double>(square));
+    }
+  };
+  return {{{{over_square(w * w + x * x - y * y - z * z), over_square(2 * (x * y - w * z)),
+             over_square(2 * (x * z + w * y))},
+            {over_square(2 * (x * y + w * z)), over_square(w * w - x * x + y * y - z * z),
+             over_square(2 * (y * z - w * x))},
+            {over_square(2 * (x * z - w * y)), over_square(2 * (y * z + w * x)),
+             over_square(w * w - x * x - y * y + z * z)}}}};
+}
+
 }  // namespace kerf

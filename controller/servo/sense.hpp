@@ -29,11 +29,6 @@ struct DevicePose {
   std::array<typename N::Angle, 3> gimbal{};  ///< yaw, pitch, roll
 };
 
-/// Jitter of an encoder at an edge. During a rest that calibrates, no counter moves farther than
-/// this from its first value; on a device with absolute encoders, which a hand may hold still, none
-/// moves farther from one report to the next.
-inline constexpr std::int32_t kRestCounts = 2;
-
 /// One tick without a fresh report. If the servo is faster than the device the last report remains
 /// valid, and with it a rest, for as long as a force would be held.
 inline void follow_silence(const SafetyTiming& timing, EncoderState& encoders) noexcept {
@@ -64,6 +59,9 @@ enum class Rest : std::uint8_t {
 /// One tick of the encoders, followed over the wrap at 16 bits. Parked at rest for `rest_ticks` and
 /// homed, at the dock, the counters start again, from 0 or from the device's absolute counts: that
 /// is the calibration. A report that is not fresh has no rest.
+///
+/// During a rest no counter moves farther than `rest_counts` from its first value; on a device with
+/// absolute encoders, which a hand may hold still, none moves farther from one report to the next.
 template <class N>
 inline Rest follow_encoders(const DeviceReport& report, const DevicePlan<N>& device,
                             const SafetyTiming& timing, EncoderState& encoders) noexcept {
@@ -82,7 +80,7 @@ inline Rest follow_encoders(const DeviceReport& report, const DevicePlan<N>& dev
     encoders.last[i] = report.encoder[i];
     const auto moved =
         absolute ? step : static_cast<std::int16_t>(report.encoder[i] - encoders.rest_from[i]);
-    at_rest = at_rest && moved >= -kRestCounts && moved <= kRestCounts;
+    at_rest = at_rest && moved >= -device.rest_counts && moved <= device.rest_counts;
   }
   if (!at_rest) encoders.rest_from = report.encoder;
   encoders.rest_ticks = at_rest ? std::min(encoders.rest_ticks + 1, timing.rest_ticks) : 0;
@@ -91,6 +89,14 @@ inline Rest follow_encoders(const DeviceReport& report, const DevicePlan<N>& dev
   encoders.unwrapped = {};
   if (absolute) std::ranges::copy(report.encoder, encoders.unwrapped.begin());
   return Rest::docked;
+}
+
+/// The orientation that a Cartesian device reports, in the words of the wipers.
+[[nodiscard]] inline std::array<std::int16_t, 4> orientation_of(
+    const DeviceReport& report) noexcept {
+  return {
+      static_cast<std::int16_t>(report.wiper_a[0]), static_cast<std::int16_t>(report.wiper_a[1]),
+      static_cast<std::int16_t>(report.wiper_a[2]), static_cast<std::int16_t>(report.wiper_b[0])};
 }
 
 /// Adds a reading; `samples`, 1 to kMaxGimbalSamples, make up the sum.
@@ -120,10 +126,29 @@ template <class N>
   }
 }
 
+/// A length in mm from the counts of a Cartesian device.
+template <class N>
+[[nodiscard]] constexpr typename N::Real length_mm(const JointPlan<N>& axis,
+                                                   std::int32_t counts) noexcept {
+  if constexpr (N::kIsFixed) {
+    return N::Real::from_wide(counts * axis.angle_per_count, kAnglePerCountBits);
+  } else {
+    return typename N::Real(axis.angle_per_count * counts);
+  }
+}
+
 /// Forward kinematics of the filtered counts. A device without a gimbal never turns the tool.
 template <class N>
 [[nodiscard]] DevicePose<N> device_pose(const DevicePlan<N>& device, const EncoderState& encoders,
                                         const GimbalFilter& gimbal) noexcept {
+  if (is_cartesian(device.personality)) {
+    DevicePose<N> pose;
+    pose.arm = cartesian_pose<N>({length_mm(device.joints[0], encoders.unwrapped[0]),
+                                  length_mm(device.joints[1], encoders.unwrapped[1]),
+                                  length_mm(device.joints[2], encoders.unwrapped[2])});
+    pose.rotation = rotation_of<N>(gimbal.orientation);
+    return pose;
+  }
   std::array<typename N::Angle, 3> angles;
   for (std::size_t i = 0; i < 3; ++i) {
     angles[i] = joint_angle(device.joints[i], encoders.unwrapped[i]);
@@ -199,7 +224,13 @@ template <class N>
   const Rest rest = follow_encoders(report, plan.device, plan.timing, state.encoders);
   seen.calibrated = rest == Rest::docked;
   seen.misplaced = rest == Rest::elsewhere;
-  if (report.fresh) follow_gimbal(report, plan.device.gimbal_samples, state.gimbal);
+  if (report.fresh) {
+    if (is_cartesian(plan.device.personality)) {
+      state.gimbal.orientation = orientation_of(report);
+    } else {
+      follow_gimbal(report, plan.device.gimbal_samples, state.gimbal);
+    }
+  }
   Sensed<N> sensed;
   sensed.pose = device_pose(plan.device, state.encoders, state.gimbal);
   seen.finite = all_finite(sensed.pose.arm.tip_mm);

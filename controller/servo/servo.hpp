@@ -18,10 +18,14 @@ namespace kerf {
 /// Report of the device in this tick: raw counts, not angles. The only input of the servo step
 /// besides commands, and so the input of a replay.
 ///
+/// A Cartesian device has the position in `encoder`, in counts of its `step_um`
+/// (shared/wire/cartesian.hpp), and the orientation as a quaternion of 16-bit numbers: x, y, z in
+/// `wiper_a`, w in `wiper_b[0]`.
+///
 /// `parked` is the sign that the hand is not at work: the stylus sits in the inkwell (Omni), the
 /// centre button of the grip is held (Falcon), the arm has not left the home pose since its
-/// calibration button was pressed (WoodenHaptics). Parked at rest calibrates; motors stay off while
-/// parked.
+/// calibration button was pressed (WoodenHaptics), the stylus sits in the inkwell (Touch), a button
+/// is held (Inverse3, omega). Parked at rest calibrates; motors stay off while parked.
 struct DeviceReport {
   bool fresh = false;                      ///< false: nothing arrived since the last tick
   std::array<std::int16_t, 3> encoder{};   ///< counts, wrap at 16 bits

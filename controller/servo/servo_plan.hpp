@@ -98,8 +98,8 @@ template <class N>
 enum class Method : std::uint8_t { KERF_METHODS(KERF_ENUMERATOR) };
 #undef KERF_ENUMERATOR
 
-/// Radians per encoder count, finer than Angle, so that a full rotation is exact to the last bit of
-/// Angle: in fixed point an integer with 40 fraction bits.
+/// Radians per encoder count (mm of a Cartesian device), finer than Angle, so that a full rotation
+/// is exact to the last bit of Angle: in fixed point an integer with 40 fraction bits.
 template <class N>
 using AnglePerCount = std::conditional_t<N::kIsFixed, std::int64_t, double>;
 inline constexpr int kAnglePerCountBits = 40;
@@ -107,9 +107,10 @@ inline constexpr int kAnglePerCountBits = 40;
 /// One motor and its encoder.
 template <class N>
 struct JointPlan {
-  typename N::Angle home_rad;          ///< where the count is 0
+  typename N::Angle home_rad;          ///< where the count is 0; not of a Cartesian device
   AnglePerCount<N> angle_per_count{};  ///< signed: the encoder's sense
-  typename N::Real counts_per_n_mm{};  ///< motor counts per torque, signed
+  /// Motor counts per torque, signed; of a Cartesian device, per force along an axis in N.
+  typename N::Real counts_per_n_mm{};
 };
 
 /// Most readings of the gimbal that are summed: 20 ms at 8 kHz, the highest rate.
@@ -124,6 +125,8 @@ struct DevicePlan {
   /// was parked at rest.
   bool absolute_encoders = false;
   static constexpr std::int32_t kNoDock = 1 << 15;
+  /// Jitter of an encoder at an edge: how far a counter moves during a rest (sense.hpp).
+  std::int32_t rest_counts = 2;
   /// How far from its first calibration a joint may rest parked; `kNoDock`: anywhere.
   std::array<std::int32_t, 3> dock_counts{kNoDock, kNoDock, kNoDock};
   SerialArm<N> serial{};  ///< of the Omni and WoodenHaptics
@@ -132,7 +135,7 @@ struct DevicePlan {
   std::size_t gimbal_samples = 1;  ///< in 20 ms, of a device with a gimbal
 
   bool motors_configured = false;
-  std::int32_t motor_count_end = 0;  ///< motor counts lie within +- this
+  std::int32_t motor_count_end = 0;  ///< motor counts lie within +- this, at most 14 bits
 };
 
 /// Contact space in the world; constant during a run.

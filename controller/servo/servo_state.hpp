@@ -120,11 +120,13 @@ struct EncoderState {
   std::uint32_t silent_ticks = 0;                     ///< since the last report
 };
 
-/// Sliding sum over the gimbal readings of the last 20 ms: the pots' low bits are noise.
+/// Sliding sum over the gimbal readings of the last 20 ms: the pots' low bits are noise. Of a
+/// Cartesian device, the newest orientation.
 struct GimbalFilter {
   std::array<std::array<std::uint16_t, 6>, kMaxGimbalSamples> ring{};
   std::array<std::uint32_t, 6> sum{};
   std::size_t next = 0;
+  std::array<std::int16_t, 4> orientation{0, 0, 0, 32767};  ///< quaternion x, y, z, w
 };
 
 /// Everything that changes from tick to tick. A run is a function of plan, first state, reports and

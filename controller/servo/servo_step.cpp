@@ -45,8 +45,9 @@ template <class N>
       wide[i] = std::int64_t{torque[i].raw()} * plan.device.joints[i].counts_per_n_mm.raw();
       largest = std::max(largest, wide[i] < 0 ? -wide[i] : wide[i]);
     }
-    // end / largest with 30 fraction bits. No product exceeds end, 13 bits, with 12 + 30 more.
-    const std::int64_t scale = (end << (30 + 20)) / (largest >> (kBits - 20));
+    // end / largest with 30 fraction bits: 14 bits of end and 48 more. No product exceeds end with
+    // 12 + 30 more.
+    const std::int64_t scale = (end << (30 + 18)) / (largest >> (kBits - 18));
     command.scale = N::Unit::from_raw(static_cast<std::int32_t>(scale));
     for (std::size_t i = 0; i < 3; ++i) {
       command.counts[i] = static_cast<std::int16_t>(round_shift((wide[i] >> 20) * scale, 12 + 30));
@@ -63,7 +64,7 @@ template <class N>
     command.scale = end / largest;
     for (std::size_t i = 0; i < 3; ++i) {
       // Half up, as in fixed: the offset keeps the argument of the cast positive.
-      constexpr int kOffset = 8192;
+      constexpr int kOffset = 16384;
       command.counts[i] = static_cast<std::int16_t>(
           static_cast<int>(wide[i] * command.scale + Real(kOffset) + Real(0.5)) - kOffset);
     }

@@ -64,6 +64,12 @@ struct DeviceFigures {
       return {0.045, 0.0002, 0.26, 0.055, 0.002, 0.7, 0.005};
     case Personality::falcon:  // mass, friction: the emulator's; quantum: a count of a leg; CHAI3D
       return {0.12, 0.0002, 0.3, 0.038, 0.002, 3.0, 0.02};
+    case Personality::inverse3:  // stiffness, step: the vendor's claims; the rest: assumed
+      return {0.2, 0.0002, 0.1, 0.01, 0.002, 1.0, 0.01};
+    case Personality::touch:  // as the Omni, whose mechanics it has
+      return {0.045, 0.0002, 0.26, 0.055, 0.002, 0.7, 0.005};
+    case Personality::omega:  // gains: CHAI3D's caps of the omega.3; mass, friction: assumed
+      return {0.2, 0.0002, 0.1, 0.01, 0.002, 5.0, 0.04};
     case Personality::woodenhaptics:  // likewise; no cap is published: CHAI3D's of any other device
       break;
   }

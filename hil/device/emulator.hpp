@@ -9,6 +9,7 @@
 #include <span>
 #include <utility>
 
+#include "hil/device/cartesian.hpp"
 #include "hil/device/device_model.hpp"
 #include "hil/device/falcon.hpp"
 #include "hil/device/hand.hpp"
@@ -24,7 +25,8 @@ namespace kerf {
 // Every emulated device by its personality, and the emulator of one.
 
 /// Returns `use(params)`, given the parameters of this device as it is without options:
-/// `OmniParams`, `FalconParams` or `WoodenParams`. `use` returns one type for all.
+/// `OmniParams`, `FalconParams`, `WoodenParams` or `CartesianParams`. `use` returns one type for
+/// all.
 template <class Use>
 [[nodiscard]] auto with_device_params(Personality personality, const Use& use) {
   switch (personality) {
@@ -32,6 +34,10 @@ template <class Use>
       return use(FalconParams{});
     case Personality::woodenhaptics:
       return use(WoodenParams{});
+    case Personality::inverse3:
+    case Personality::touch:
+    case Personality::omega:
+      return use(CartesianParams(personality));
     case Personality::omni:
       break;
   }
@@ -47,10 +53,23 @@ template <class Use>
 [[nodiscard]] inline std::unique_ptr<DeviceModel> make_model(const WoodenParams& params) {
   return std::make_unique<WoodenModel>(params);
 }
+[[nodiscard]] inline std::unique_ptr<DeviceModel> make_model(const CartesianParams& params) {
+  return std::make_unique<CartesianModel>(params);
+}
 
-/// N mm per motor count of the emulated unit: a scene's `device.torque_scale`.
+/// A scene's `device.torque_scale` for these parameters: N mm per motor count of the emulated unit;
+/// the true force of a Cartesian device over the commanded one.
+[[nodiscard]] inline std::array<double, 3> torque_scale_of(const PlantParams& params,
+                                                           Personality personality) {
+  std::array<double, 3> scale = params.torque_scale();
+  if (is_cartesian(personality)) {
+    for (double& axis : scale) axis /= cartesian::kNewtonsPerCount;
+  }
+  return scale;
+}
 [[nodiscard]] inline std::array<double, 3> torque_scale_of(Personality personality) {
-  return with_device_params(personality, [](const auto& params) { return params.torque_scale(); });
+  return with_device_params(
+      personality, [&](const auto& params) { return torque_scale_of(params, personality); });
 }
 
 /// Counts of a run so far.

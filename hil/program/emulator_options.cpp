@@ -52,7 +52,8 @@ void declare_device(Arguments& app, EmulatorOptions& o) {
     app.option(row.option, o.plant[i], row.meaning).within(row.low, row.high);
   }
   app.flag("--drop-torque", o.drop_torque,
-           "omni, falcon: motors let go when the host is silent for 0.1 s (default: hold)");
+           "motors let go when the host is silent for 0.1 s (default: hold; woodenhaptics: after "
+           "0.5 s)");
   app.flag("--pot-noise", o.pot_noise, "omni: noise in the low bits of the gimbal pots");
   app.option("--packet-bytes", o.packet_bytes,
              "woodenhaptics: 14 (mbed) or, fronts fuse, uhid, 64 (Teensy)")
@@ -72,7 +73,7 @@ std::size_t known_at(const char* option, const std::string& value,
 }
 
 std::string word(Personality personality) {
-  return std::string(kPersonalityWords[static_cast<std::size_t>(personality)]);
+  return std::string(word_of(personality));
 }
 
 void check_front(const EmulatorOptions& o) {
@@ -112,7 +113,11 @@ void check_front(const EmulatorOptions& o) {
   };
   speaks_for("usbip", Personality::falcon);
   speaks_for("uhid", Personality::woodenhaptics);
-  const bool is_omni = o.personality == Personality::omni;
+  if (is_cartesian(o.personality) && o.front == "fuse") {
+    throw HilError("--front fuse: the bytes of " + o.device +
+                   " are its vendor's secret; use --front socket or udp");
+  }
+  const bool is_omni = o.personality == Personality::omni || is_cartesian(o.personality);
   const bool is_usb = o.front == "usbip" || o.front == "uhid" || (o.front == "fuse" && !is_omni);
   if (is_usb && o.lockstep) {
     throw HilError("--lockstep: the USB front runs by its own clock; use --front socket");
@@ -197,7 +202,8 @@ std::pair<std::int64_t, Fault> parse_fault(const std::string& text,
 }  // namespace
 
 void declare(Arguments& app, EmulatorOptions& o) {
-  app.option("--personality", o.device, "which device to be: omni, falcon, woodenhaptics")
+  app.option("--personality", o.device,
+             "which device to be: omni, falcon, woodenhaptics, inverse3, touch, omega")
       .shows_default();
   app.flag("--describe", o.describe,
            "print what a host has to be told of this unit (torque_scale), and end");

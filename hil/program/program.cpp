@@ -92,7 +92,7 @@ void write_run_report(const std::string& file, const EmulatedDevice& device,
 }
 
 void describe(const EmulatorOptions& o, std::ostream& out) {
-  const auto scale = make_device(o, {})->params().torque_scale();
+  const auto scale = torque_scale_of(make_device(o, {})->params(), o.personality);
   out << "torque_scale=" << scale[0] << ',' << scale[1] << ',' << scale[2] << '\n';
 }
 
@@ -112,7 +112,7 @@ void serve_clients(const EmulatorOptions& o, Server& server, const std::string& 
     device.renew();
     HandshakeLink link(*client, hello_of(o));
     if (o.lockstep) {
-      const bool device_first = o.personality == Personality::omni;
+      const bool device_first = o.personality == Personality::omni || is_cartesian(o.personality);
       serve_lockstep(link, device,
                      {.tick_cycles = kCyclesPerSecond / o.rate_hz,
                       .empty_turns = !o.fault.empty(),
@@ -248,6 +248,10 @@ void serve_on_fuse(const EmulatorOptions& o, BusService& service) {
       return serve_fuse(service, o.bus.mount, falcon_settings(o), usb_script(o.bus));
     case Personality::woodenhaptics:
       return serve_fuse(service, o.bus.mount, wooden_settings(o));
+    case Personality::inverse3:
+    case Personality::touch:
+    case Personality::omega:
+      break;  // check() has refused it: no node of theirs is public
   }
 }
 

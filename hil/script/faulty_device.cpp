@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "hil/device/packet_device.hpp"
+#include "shared/wire/cartesian.hpp"
 #include "shared/wire/falcon.hpp"
 #include "shared/wire/omni.hpp"
 #include "shared/wire/woodenhaptics.hpp"
@@ -21,9 +22,9 @@ constexpr int kPotNoiseMask = 31;
 /// The part of a device's report that a fault of a sensor can change, the same for all devices.
 struct Readings {
   std::array<std::int16_t, 3> encoder{};
-  /// Docked (Omni), centre button (Falcon), calibration button (WoodenHaptics).
+  /// Docked (Omni), centre button (Falcon), calibration button (WoodenHaptics), parked (Cartesian).
   bool parked = false;
-  bool homed = true;                    ///< of the Falcon
+  bool homed = true;                    ///< of the Falcon and of Cartesian devices
   std::array<std::uint16_t, 6> pots{};  ///< of the Omni's gimbal
 
   friend bool operator==(const Readings&, const Readings&) noexcept = default;
@@ -46,6 +47,27 @@ Readings read(const WoodenReport& report) noexcept {
   Readings readings{.parked = report.calibrate};
   std::copy_n(report.encoder.begin(), 3, readings.encoder.begin());
   return readings;
+}
+
+/// A fault counts in steps of the servo, which are what a sensor's counts are to it. Only changes
+/// are written back, so the rest of a position is not lost.
+constexpr std::int32_t kCartesianStepUm = 10;
+
+Readings read(const CartesianReport& report) noexcept {
+  Readings readings{.parked = report.parked, .homed = report.homed};
+  for (std::size_t i = 0; i < 3; ++i) {
+    readings.encoder[i] = static_cast<std::int16_t>(report.position_um[i] / kCartesianStepUm);
+  }
+  return readings;
+}
+
+void write(const Readings& readings, CartesianReport& report) noexcept {
+  const Readings before = read(report);
+  for (std::size_t i = 0; i < 3; ++i) {
+    report.position_um[i] += (readings.encoder[i] - before.encoder[i]) * kCartesianStepUm;
+  }
+  report.parked = readings.parked;
+  report.homed = readings.homed;
 }
 
 void write(const Readings& readings, OmniReport& report) noexcept {
@@ -72,6 +94,7 @@ void write(const Readings& readings, WoodenReport& report) noexcept {
 template <class Use>
 void with_report(std::span<const std::uint8_t> packet, const Use& use) noexcept {
   if (const auto omni = decode_report(packet)) return use(*omni);
+  if (const auto cartesian = decode_cartesian_report(packet)) return use(*cartesian);
   if (const auto falcon = falcon::decode_report(packet)) return use(*falcon);
   if (const auto wooden = wooden::decode_report(packet)) return use(*wooden);
 }

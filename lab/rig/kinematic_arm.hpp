@@ -6,12 +6,14 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <numbers>
 
 #include "controller/scene/scene.hpp"
 #include "controller/servo/servo.hpp"
 #include "hil/device/falcon.hpp"
 #include "hil/device/omni.hpp"
 #include "hil/device/wooden.hpp"
+#include "shared/wire/cartesian.hpp"
 #include "shared/wire/falcon.hpp"
 #include "shared/wire/omni.hpp"
 #include "shared/wire/woodenhaptics.hpp"
@@ -97,6 +99,10 @@ class KinematicHand {
 
   [[nodiscard]] Counts counts_at(DeviceVec<double> tip_mm) const {
     Counts counts{};
+    if (const auto figures = cartesian::figures(device_.personality)) {
+      const double per_mm = 1000.0 / figures->step_um;
+      return {tip_mm.x * per_mm, tip_mm.y * per_mm, tip_mm.z * per_mm};
+    }
     JointVec<double> q;
     switch (device_.personality) {
       case Personality::omni: {
@@ -114,7 +120,7 @@ class KinematicHand {
           counts[i] = (std::array{q.x, q.y, q.z}[i] - falcon::kZeroRad) / falcon::kRadPerCount;
         }
         return counts;
-      case Personality::woodenhaptics:
+      default:
         break;
     }
     q = WoodenArm().joints_rad(tip_mm);
@@ -135,12 +141,23 @@ class KinematicHand {
       report.encoder[i] =
           static_cast<std::int16_t>(std::llround(counts[i]));  // wraps as encoders do
     }
+    if (is_cartesian(device_.personality)) {
+      // The share of a pot as a turn about the shaft, from -90 to 90 degrees.
+      const double half = (wiper_[0] / static_cast<double>(kWipers) - 0.5) * std::numbers::pi / 2;
+      report.wiper_a = {0, orientation_word(std::sin(half)), 0};
+      report.wiper_b = {orientation_word(std::cos(half)), 0, 0};
+    }
     return report;
   }
   /// The wrist for all reports from now on: 0..1 of each pot.
   void turn_wrist(double share) { wiper_.fill(static_cast<std::uint16_t>(share * kWipers)); }
 
  private:
+  [[nodiscard]] static std::uint16_t orientation_word(double part) {
+    return static_cast<std::uint16_t>(
+        static_cast<std::int16_t>(std::lround(part * cartesian::kQuaternionOne)));
+  }
+
   static constexpr std::uint16_t kWipers = 0xfffe;
   DeviceSettings device_;
   std::array<std::uint16_t, 3> wiper_{kWipers / 2, kWipers / 2, kWipers / 2};

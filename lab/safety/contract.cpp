@@ -21,8 +21,6 @@ constexpr double kThermalTimeMs = 10'000;
 constexpr double kStillMs = 3000;   // no reading changes while the motors push
 constexpr double kAnewTicks = 160;  // without a newer number: the device counts anew
 constexpr double kSparseMs = 40, kSparseForgiven = 1.0 / 20;
-constexpr double kDockPlayRad = 0.025;
-constexpr int kRestCounts = 2;   // an encoder that jitters at an edge rests
 constexpr double kReportMs = 1;  // from one report to the next, of the slowest device
 constexpr double kCycleMs = 0.125;
 // A step of the converters is 0.4 to 5 mN at the tip, and the watch is on the outside of them.
@@ -46,10 +44,10 @@ double latest_latch_ms(const std::string& name, double tick_ms) {
 }
 
 /// Returns true if an arm that reported `before` and reports `now` rests.
-bool is_near(const EncoderCounts& now, const EncoderCounts& before) {
-  return std::ranges::equal(now, before, [](std::int16_t a, std::int16_t b) {
+bool is_near(const EncoderCounts& now, const EncoderCounts& before, int rest_counts) {
+  return std::ranges::equal(now, before, [&](std::int16_t a, std::int16_t b) {
     const auto step = static_cast<std::int16_t>(static_cast<std::uint16_t>(int{a} - int{b}));
-    return std::abs(int{step}) <= kRestCounts;
+    return std::abs(int{step}) <= rest_counts;
   });
 }
 
@@ -100,7 +98,8 @@ void SafetyMonitor::reported(double time_ms, std::span<const std::uint8_t> packe
 /// Parked, homed and no joint turning for 50 ms: calibrated, whatever was before. Counters that get
 /// their zero there may not creep away meanwhile.
 void SafetyMonitor::follow_rest(double time_ms) {
-  const bool still = told_.parked && told_.homed && is_near(told_.count, rest_count_);
+  const bool still =
+      told_.parked && told_.homed && is_near(told_.count, rest_count_, wire_.rest_counts());
   if (!still || !wire_.counts_from_rest()) rest_count_ = told_.count;
   // Whole ticks at both ends, and the first report may be one of its periods old.
   const double tolerance_ms = 2 * std::max(tick_ms_, kReportMs);
@@ -112,7 +111,7 @@ void SafetyMonitor::follow_rest(double time_ms) {
   const bool may_have_rested = still && time_ms - rest_since_ms_ >= kRestMs - tolerance_ms;
   if (!may_have_rested) return;
   const bool has_rested = time_ms - rest_without_gap_since_ms_ >= kRestMs + tolerance_ms;
-  if (wire_.has_dock() && dock_ && wire_.turned_rad(*dock_, told_.count) > kDockPlayRad) {
+  if (wire_.has_dock() && dock_ && wire_.turned_rad(*dock_, told_.count) > wire_.dock_play()) {
     // No dock: it calibrates nothing, and forgives nothing.
     if (has_rested) must_stay_off(fault_name(Fault::wrong_dock));
     return;
@@ -122,7 +121,7 @@ void SafetyMonitor::follow_rest(double time_ms) {
   calibrated_again_ = calibrated_again_ || outcome_.pushed;
   calibrated_ = true;
   if (!wire_.counts_from_rest()) return;
-  zero_is_known_ = has_rested || is_near(told_.count, wire_.dock_count());
+  zero_is_known_ = has_rested || is_near(told_.count, wire_.dock_count(), wire_.rest_counts());
   zero_is_true_ = docked_;
   if (has_rested) wire_.calibrated_at(told_.count);
 }

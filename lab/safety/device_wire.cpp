@@ -6,9 +6,11 @@
 #include <cstddef>
 #include <cstdlib>
 
+#include "hil/device/cartesian.hpp"
 #include "hil/device/falcon.hpp"
 #include "hil/device/omni.hpp"
 #include "hil/device/wooden.hpp"
+#include "shared/wire/cartesian.hpp"
 #include "shared/wire/falcon.hpp"
 #include "shared/wire/omni.hpp"
 #include "shared/wire/woodenhaptics.hpp"
@@ -55,6 +57,15 @@ DeviceWire::DeviceWire(Personality personality, const std::array<double, 3>& doc
       nmm_per_count_ = WoodenParams().torque_nmm_per_count;
       count_end_ = wooden::kMaxMilliamps;
       break;
+    case Personality::inverse3:
+    case Personality::touch:
+    case Personality::omega:
+      rad_per_count_.fill(cartesian::figures(personality)->step_um / 1000.0);
+      nmm_per_count_ = CartesianParams(personality).torque_nmm_per_count;
+      count_end_ = static_cast<int>(force_figures(personality).peak_n * 1000);
+      rest_counts_ = std::max(2, 2 * cartesian::figures(personality)->quantum_um /
+                                     cartesian::figures(personality)->step_um);
+      break;
   }
 }
 
@@ -67,26 +78,39 @@ std::optional<ObservedReport> DeviceWire::report(std::span<const std::uint8_t> p
     return ObservedReport{said->encoder, (said->buttons & falcon::kButtonCentre) != 0,
                           std::ranges::all_of(said->homed, [](bool homed) { return homed; })};
   }
+  if (is_cartesian(personality_)) {
+    const auto said = decode_cartesian_report(packet);
+    if (!said || !is_newest(said->number, may_count_anew)) return std::nullopt;
+    ObservedReport told{.parked = said->parked, .homed = said->homed && said->powered};
+    for (std::size_t i = 0; i < 3; ++i) {
+      const double counts = said->position_um[i] / (rad_per_count_[i] * 1000);
+      if (std::abs(counts) > 32'767.4) return std::nullopt;
+      told.count[i] = static_cast<std::int16_t>(std::lround(counts));
+    }
+    return told;
+  }
   const auto said = decode_report(packet);
-  if (!said) return std::nullopt;
+  if (!said || !is_newest(said->counter, may_count_anew)) return std::nullopt;
+  return ObservedReport{said->encoder, said->docked, true};
+}
+
+bool DeviceWire::is_newest(std::uint32_t number, bool may_count_anew) {
   // Newer by up to 20 ms of an 8 kHz stream is as it says. What is farther ahead may be a wrong
   // bit: up to 2 s ahead it counts from the second packet on that goes on from there. All else is
   // old, until the device may count anew.
   constexpr std::int64_t kNear = 160, kMostAhead = 16'000;
-  const auto from = [&](std::uint32_t number) {
-    return static_cast<std::int32_t>(said->counter - number);
-  };
   const auto is_ahead = [&](std::uint32_t of, std::int64_t most) {
-    return from(of) > 0 && from(of) <= most;
+    const auto by = static_cast<std::int32_t>(number - of);
+    return by > 0 && by <= most;
   };
   if (packet_number_ && !is_ahead(*packet_number_, kNear)) {
     const bool goes_on = far_number_ && is_ahead(*far_number_, kNear);
-    far_number_ = said->counter;
-    if (!goes_on || !(may_count_anew || is_ahead(*packet_number_, kMostAhead))) return std::nullopt;
+    far_number_ = number;
+    if (!goes_on || !(may_count_anew || is_ahead(*packet_number_, kMostAhead))) return false;
   }
-  packet_number_ = said->counter;
+  packet_number_ = number;
   far_number_.reset();
-  return ObservedReport{said->encoder, said->docked, true};
+  return true;
 }
 
 std::optional<ObservedReport> DeviceWire::wooden_report(std::span<const std::uint8_t> packet) {
@@ -125,6 +149,13 @@ std::optional<ObservedCommand> DeviceWire::command(std::span<const std::uint8_t>
       }
       return ObservedCommand{asked->milliamps, counts_are_set(asked->milliamps)};
     }
+    case Personality::inverse3:
+    case Personality::touch:
+    case Personality::omega: {
+      const auto asked = decode_cartesian_command(packet);
+      if (!asked) return std::nullopt;
+      return ObservedCommand{asked->force_mn, asked->force_on};
+    }
     case Personality::omni:
       break;
   }
@@ -156,6 +187,11 @@ std::optional<ArmPose> DeviceWire::pose(const EncoderCounts& count) const {
       if (!(off <= kClosesMm)) return std::nullopt;
       break;
     }
+    case Personality::inverse3:
+    case Personality::touch:
+    case Personality::omega:
+      pose.tip_mm = {q[0], q[1], q[2]};
+      break;
   }
   return is_finite(pose.tip_mm) ? std::optional(pose) : std::nullopt;
 }
@@ -178,6 +214,10 @@ DeviceVec<double> DeviceWire::force_n(const ArmPose& pose,
       return FalconArm().tip_force_n(pose, torque_nmm);
     case Personality::woodenhaptics:
       return WoodenArm().tip_force_n(pose, torque_nmm);
+    case Personality::inverse3:
+    case Personality::touch:
+    case Personality::omega:
+      return {torque_nmm.x, torque_nmm.y, torque_nmm.z};
     case Personality::omni:
       break;
   }

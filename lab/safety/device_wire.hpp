@@ -38,7 +38,7 @@ class DeviceWire {
  public:
   DeviceWire(Personality personality, const std::array<double, 3>& dock_rad);
 
-  /// Empty if it is no report of this device, or an Omni's that is not newer than the last one.
+  /// Empty if it is no report of this device, or a numbered one that is not newer than the last.
   /// `may_count_anew`: it was silent for long, so an older number may be that of a new count.
   [[nodiscard]] std::optional<ObservedReport> report(std::span<const std::uint8_t> packet,
                                                      bool may_count_anew);
@@ -53,12 +53,20 @@ class DeviceWire {
   /// Motor counts lie within +- this.
   [[nodiscard]] int count_end() const noexcept { return count_end_; }
   [[nodiscard]] bool numbers_its_packets() const noexcept {
-    return personality_ == Personality::omni;
+    return personality_ == Personality::omni || is_cartesian(personality_);
   }
   /// Whether a calibration in a wrong pose moves every later one: encoders that count from it.
   [[nodiscard]] bool counts_from_rest() const noexcept { return personality_ == Personality::omni; }
   /// Whether it is parked at one place alone, where every calibration must be.
-  [[nodiscard]] bool has_dock() const noexcept { return personality_ != Personality::falcon; }
+  [[nodiscard]] bool has_dock() const noexcept {
+    return personality_ != Personality::falcon && personality_ != Personality::inverse3 &&
+           personality_ != Personality::omega;
+  }
+  /// How far from its first place a joint may rest parked, rad; mm of a Cartesian device. The play
+  /// of a stylus in its inkwell.
+  [[nodiscard]] double dock_play() const noexcept { return is_cartesian(personality_) ? 3 : 0.025; }
+  /// How far the counters of a joint at rest may move from one report to the next.
+  [[nodiscard]] int rest_counts() const noexcept { return rest_counts_; }
   /// The farthest that a joint turned from `a` to `b`.
   [[nodiscard]] double turned_rad(const EncoderCounts& a, const EncoderCounts& b) const noexcept;
   /// What such encoders tell at the dock, as the host must think since its last calibration.
@@ -67,12 +75,15 @@ class DeviceWire {
 
  private:
   [[nodiscard]] std::optional<ObservedReport> wooden_report(std::span<const std::uint8_t> packet);
+  /// Of a device that numbers its packets.
+  [[nodiscard]] bool is_newest(std::uint32_t number, bool may_count_anew);
 
   Personality personality_;
   int count_end_ = 0;
+  int rest_counts_ = 2;  ///< an encoder that jitters at an edge rests
   EncoderCounts dock_count_{};
   std::array<double, 3> zero_rad_{}, rad_per_count_{}, nmm_per_count_{};
-  std::optional<std::uint32_t> packet_number_;  ///< of the Omni's last report
+  std::optional<std::uint32_t> packet_number_;  ///< of the last report, if it has one
   std::optional<std::uint32_t> far_number_;     ///< of the last packet, if it did not follow that
   bool parked_ = false, encoders_set_ = false;  ///< WoodenHaptics
 };

@@ -123,10 +123,13 @@ std::string inconclusive_line(const FaultScript& script, Personality personality
 }  // namespace
 
 bool concerns(FaultKind kind, Personality personality) noexcept {
-  if (kind == FaultKind::unhome) return personality == Personality::falcon;
-  if (kind == FaultKind::noise || kind == FaultKind::replay)
-    return personality == Personality::omni;
-  if (kind == FaultKind::freeze) return personality != Personality::omni;
+  const bool is_numbered = personality == Personality::omni || is_cartesian(personality);
+  if (kind == FaultKind::unhome) {
+    return personality == Personality::falcon || is_cartesian(personality);
+  }
+  if (kind == FaultKind::noise) return personality == Personality::omni;
+  if (kind == FaultKind::replay) return is_numbered;
+  if (kind == FaultKind::freeze) return !is_numbered;
   return true;
 }
 

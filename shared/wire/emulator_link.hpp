@@ -64,9 +64,7 @@ inline constexpr std::array<std::uint8_t, 8> kHelloMagic{'k', 'e', 'r', 'f', 0, 
 /// Why the two cannot work together, and what to change, for the messages of both; empty if they
 /// can. In real time each side keeps its own rate.
 [[nodiscard]] inline std::string discord(const LinkHello& controller, const LinkHello& emulator) {
-  const auto word = [](const LinkHello& hello) {
-    return std::string(kPersonalityWords[static_cast<std::size_t>(hello.personality)]);
-  };
+  const auto word = [](const LinkHello& hello) { return std::string(word_of(hello.personality)); };
   const auto hz = [](const LinkHello& hello) { return std::to_string(hello.rate_hz); };
   if (controller.personality != emulator.personality) {
     return "the controller wants a device " + word(controller) + ", the emulator is " +

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// The three drivers above a bus in memory.
+// The drivers above a bus in memory.
 #include <array>
 #include <cstdint>
 
 #include <doctest/doctest.h>
 
 #include "controller/device/device_driver.hpp"
+#include "shared/wire/cartesian.hpp"
 #include "shared/wire/falcon.hpp"
 #include "shared/wire/omni.hpp"
 #include "shared/wire/woodenhaptics.hpp"
@@ -344,4 +345,66 @@ TEST_CASE("wooden: packets are as long as the device's own") {
   CHECK(arm.driver.refused() == 2);
   CHECK_FALSE(arm.read({0, 0, 1}).fresh);  // another firmware's
   CHECK(arm.driver.refused() == 3);
+}
+
+TEST_CASE("cartesian: positions come in steps to nearest, and none that would wrap is taken") {
+  Bench<kerf::CartesianDriver> touch(10);
+  const auto read = [&](std::int32_t um, std::uint32_t number) {
+    kerf::CartesianReport report;
+    report.number = number;
+    report.position_um = {um, -um, 0};
+    report.homed = report.powered = true;
+    touch.port.push(kerf::encode(report));
+    return touch.driver.read();
+  };
+  CHECK(read(1234, 1).encoder == Counts{123, -123, 0});
+  CHECK(read(1235, 2).encoder == Counts{124, -124, 0});
+  CHECK(read(327'674, 3).encoder == Counts{32767, -32767, 0});
+  CHECK(read(327'674, 4).homed);
+  CHECK_FALSE(read(327'675, 5).fresh);
+  CHECK_FALSE(read(1'000'000, 6).fresh);
+  CHECK(touch.driver.refused() == 2);
+  CHECK(read(0, 9).fresh);
+  CHECK(touch.driver.lost() == 4);  // 5 to 8: what was refused has not arrived
+  CHECK_FALSE(read(50, 9).fresh);   // repeated
+  CHECK_FALSE(read(50, 8).fresh);   // old
+}
+
+TEST_CASE("cartesian: orientation, buttons and states arrive; without power it is not homed") {
+  Bench<kerf::CartesianDriver> arm(4);
+  kerf::CartesianReport report;
+  report.number = 1;
+  report.orientation = {1, -2, 3, 32767};
+  report.button1 = report.parked = report.homed = true;
+  arm.port.push(kerf::encode(report));
+  const kerf::DeviceReport unpowered = arm.driver.read();
+  CHECK(unpowered.wiper_a == std::array<std::uint16_t, 3>{1, 0xfffe, 3});
+  CHECK(unpowered.wiper_b == std::array<std::uint16_t, 3>{32767, 0, 0});
+  CHECK((unpowered.button1 && !unpowered.button2 && unpowered.parked && !unpowered.homed));
+  report.number = 2;
+  report.powered = report.button2 = true;
+  arm.port.push(kerf::encode(report));
+  const kerf::DeviceReport powered = arm.driver.read();
+  CHECK((powered.homed && powered.button2));
+}
+
+TEST_CASE("cartesian: the force goes out in mN with the light of the phase, and ends neutral") {
+  Bench<kerf::CartesianDriver> arm(10);
+  const auto sent = [&] { return kerf::decode_cartesian_command(arm.last()).value(); };
+  arm.driver.start();
+  CHECK(sent() == kerf::CartesianCommand{});
+  arm.driver.command(forcing({1500, -2, 0}));
+  CHECK(sent().force_mn == Counts{1500, -2, 0});
+  CHECK(sent().force_on);
+  CHECK(sent().light == kerf::CartesianCommand::Light::ready);
+  kerf::ServoOutput fault;
+  fault.phase = kerf::Phase::fault;
+  fault.motor_counts = {7, 7, 7};  // motors are off: no force, whatever stands here
+  arm.driver.command(fault);
+  CHECK(sent().force_mn == Counts{});
+  CHECK(sent().light == kerf::CartesianCommand::Light::fault);
+  CHECK(arm.driver.stay_released());
+  arm.driver.command(forcing({1500, 0, 0}));
+  CHECK(sent().force_mn == Counts{});
+  CHECK_FALSE(sent().force_on);
 }

@@ -23,8 +23,9 @@ namespace {
 /// The emulator's boot loader at the other end of a wire, in pieces of at most `piece` bytes.
 class Wire final : public kerf::FalconLine {
  public:
-  explicit Wire(bool runs, std::int64_t wrong_echo_at = -1, std::size_t piece = 62)
-      : loader(runs, wrong_echo_at), piece_(piece) {}
+  explicit Wire(bool runs, std::int64_t wrong_echo_at = -1, std::size_t piece = 62,
+                int wrong_loads = kerf::FalconBootLoader::kEveryLoad)
+      : loader(runs, wrong_echo_at, wrong_loads), piece_(piece) {}
 
   void control(FtdiRequest request, std::uint16_t value) override {
     settings.emplace_back(request, value);
@@ -72,20 +73,48 @@ std::vector<std::uint8_t> firmware() {
 
 TEST_CASE("falcon boot: firmware that runs is left alone") {
   Wire wire(true);
-  kerf::start_falcon(wire, {});
+  CHECK(kerf::start_falcon(wire, {}) == 0);
   CHECK(wire.settings.front() == std::pair(FtdiRequest::latency, kerf::falcon::kRunLatencyMs));
 }
 
 TEST_CASE("falcon boot: the loader is greeted, takes every byte, and the firmware runs") {
   for (const std::size_t piece : {62U, 1U, 3U}) {
     Wire wire(false, -1, piece);
-    kerf::start_falcon(wire, firmware());
+    CHECK(kerf::start_falcon(wire, firmware()) == 1);
     CHECK(wire.loader.running());
     CHECK(wire.loader.stored() == 1000);
     CHECK(wire.longest_write <= kerf::falcon::kUploadChunk);
     CHECK(wire.settings[wire.settings.size() - 3] ==
           std::pair(FtdiRequest::baud, kerf::falcon::kRunDivisor));
   }
+}
+
+TEST_CASE("falcon boot: a load that fails is repeated after a reset of the chip") {
+  for (int wrong = 1; wrong < kerf::kFirmwareTries; ++wrong) {
+    Wire wire(false, 700, 62, wrong);
+    CHECK(kerf::start_falcon(wire, firmware()) == wrong + 1);
+    CHECK(wire.loader.running());
+    CHECK(wire.loader.stored() == 1000);
+    CHECK(std::ranges::count(wire.settings,
+                             std::pair(FtdiRequest::reset, kerf::falcon::kFtdiReset)) == wrong);
+  }
+  Wire wire(false, 700, 62, kerf::kFirmwareTries);
+  CHECK_THROWS_AS(kerf::start_falcon(wire, firmware()), kerf::FalconBootError);
+}
+
+TEST_CASE("falcon boot: a line that breaks is not tried again") {
+  class Broken final : public kerf::FalconLine {
+   public:
+    void control(FtdiRequest, std::uint16_t) override {}
+    void write(std::span<const std::uint8_t>) override {
+      if (++writes == 11) throw std::runtime_error("unplugged");  // after the ten probes
+    }
+    std::size_t read(std::span<std::uint8_t>, int) override { return 0; }
+    int writes = 0;
+  };
+  Broken line;
+  CHECK(error_of([&] { kerf::start_falcon(line, firmware()); }) == "unplugged");
+  CHECK(line.writes == 11);
 }
 
 TEST_CASE("falcon boot: an error is one line with its position") {
@@ -103,7 +132,8 @@ TEST_CASE("falcon boot: an error is one line with its position") {
   }
   Wire silent(false);
   silent.loader_answers = false;
-  CHECK(error_with(silent, firmware()).starts_with("the boot loader does not answer; "));
+  const std::string silence = error_with(silent, firmware());
+  CHECK(silence.starts_with("the boot loader does not answer, in the last of 5 tries; unplug"));
   Wire mute(false);
   mute.firmware_answers = false;
   CHECK(error_with(mute, firmware()).starts_with("the firmware was taken and does not answer"));

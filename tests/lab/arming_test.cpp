@@ -38,7 +38,7 @@ double arming_ms(Personality personality, int rate_hz) {
 TEST_CASE("every device arms at every rate in the same time") {
   for (const Personality personality :
        {Personality::omni, Personality::falcon, Personality::woodenhaptics}) {
-    const auto name = kerf::kPersonalityWords[static_cast<std::size_t>(personality)];
+    const auto name = kerf::word_of(personality);
     double shortest_ms = 10'000, longest_ms = 0;
     for (const int rate_hz : {250, 1000, 2000, 4000, 8000}) {
       const double ms = arming_ms(personality, rate_hz);

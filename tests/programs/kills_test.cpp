@@ -90,10 +90,8 @@ void kill_once(const WatchedFront& front, const TemporaryFolder& folder, std::mt
   const auto served = kerf::test::serve(front, device, folder.path());
   Process controller(
       {kerf::test::kBin + "/kerf-controller", "--scene", (folder / "small.toml").string(),
-       "--device",
-       std::string(kerf::kPersonalityWords[static_cast<std::size_t>(front.personality)]),
-       "--torque-scale", "0.3,0.3,0.3", "--port", served->port(), "--name", "killed", "--report",
-       (folder / "report.json").string()},
+       "--device", std::string(kerf::word_of(front.personality)), "--torque-scale", "0.3,0.3,0.3",
+       "--port", served->port(), "--name", "killed", "--report", (folder / "report.json").string()},
       folder / "log");
   // Most are killed while they push, which also shows that they start after the last one's end.
   if (!from_start) {

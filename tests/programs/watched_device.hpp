@@ -5,14 +5,11 @@
 #include <array>
 #include <atomic>
 #include <cstdint>
-#include <memory>
 #include <span>
 
 #include "hil/device/emulator.hpp"
-#include "hil/device/falcon.hpp"
-#include "hil/device/omni.hpp"
-#include "hil/device/wooden.hpp"
 #include "shared/posix/monotonic_clock.hpp"
+#include "shared/wire/cartesian.hpp"
 #include "shared/wire/falcon.hpp"
 #include "shared/wire/omni.hpp"
 #include "shared/wire/personality.hpp"
@@ -35,6 +32,12 @@ inline bool asks_for_torque(Personality personality, std::span<const std::uint8_
       const auto command = wooden::decode_command(packet);
       return command && any(command->milliamps);
     }
+    case Personality::inverse3:
+    case Personality::touch:
+    case Personality::omega: {
+      const auto command = decode_cartesian_command(packet);
+      return command && (command->force_on || any(command->force_mn));
+    }
     case Personality::omni:
       break;
   }
@@ -51,15 +54,8 @@ inline HandScript pressing_hand() {
 }
 
 inline Emulator pressed_emulator(Personality personality) {
-  switch (personality) {
-    case Personality::falcon:
-      return {std::make_unique<FalconModel>(FalconParams{}), pressing_hand()};
-    case Personality::woodenhaptics:
-      return {std::make_unique<WoodenModel>(WoodenParams{}), pressing_hand()};
-    case Personality::omni:
-      break;
-  }
-  return {OmniParams{}, pressing_hand()};
+  return {with_device_params(personality, [](const auto& params) { return make_model(params); }),
+          pressing_hand()};
 }
 
 /// An emulated device that notes what the packets of its host say of the motors. The front's thread

@@ -247,7 +247,8 @@ TEST_CASE("a value of the wrong type or an unknown word is reported with its lin
 TEST_CASE("a value out of range is reported with its line and the range") {
   const std::string wooden = "[device]\npersonality = \"woodenhaptics\"\nencoder_sign = ";
   check_lines({
-      {after("[limits]\nforce_n = 5\n"), "7: limits.force_n = 5 is out of range; use 0.01 to 3.3"},
+      {after("[limits]\nforce_n = 5\n"),
+       "7: limits.force_n = 5 is out of range for omni; use 0.01 to 3.3"},
       {after("[servo]\nrate_hz = 100\n"),
        "7: servo.rate_hz = 100 is out of range; use 250 to 8000"},
       {after("[cut]\nmodel = \"overlap\"\nrate_per_s = -1\n"),
@@ -255,7 +256,7 @@ TEST_CASE("a value out of range is reported with its line and the range") {
       {after("[force]\nstiffness_n_per_mm = nan\n"),
        "7: force.stiffness_n_per_mm = nan is out of range"},
       {after("[limits]\nforce_n = 1\ncontinuous_force_n = 2\n"),
-       "8: limits.continuous_force_n = 2 is out of range; use 0.01 to 1"},
+       "8: limits.continuous_force_n = 2 is out of range for omni; use 0.01 to 1"},
       {phantom("iso = 2"), "3: volume.iso = 2 is out of range; use 0.0001 to 1, or \"otsu\""},
       {after(wooden + "[1, 0.5, 1]\n"),
        "8: device.encoder_sign = [1, 0.5, 1] is not 1 or -1 at each joint"},

@@ -196,6 +196,9 @@ TEST_CASE("every row: what it allows is read, both ends of its range too") {
     if (key.name == "tool.bur") continue;  // stands for other keys: scene_file_test.cpp
     for (const std::string& value : samples_of(key).right) {
       SceneLines lines = scene_for(key).set(key.name, value);
+      // The upper ends are those of the strongest device.
+      if (key.name.starts_with("limits.")) lines.set("device.personality", "\"omega\"");
+      if (key.name == "limits.slew_n_per_ms") lines.set("limits.force_n", "3.3");
       if (value == in_quotes(kMeshShape)) lines.set("tool.file", "\"a.stl\"").drop("tool.size_vox");
       // Something must be solid.
       const std::string second = "[[volume]]\nname = \"second\"\nfile = \"phantom\"\n";

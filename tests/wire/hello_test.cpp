@@ -30,8 +30,9 @@ bool is_told(const std::string& line) {
 
 TEST_CASE("a hello comes back, and any other byte makes it none or another one") {
   CHECK(rc::check([] {
-    const LinkHello hello{static_cast<Personality>(*rc::gen::inRange(0, 3)),
-                          *rc::gen::arbitrary<bool>(), *rc::gen::inRange(0, 8001)};
+    const LinkHello hello{
+        static_cast<Personality>(*rc::gen::inRange<int>(0, kerf::kPersonalityWords.size())),
+        *rc::gen::arbitrary<bool>(), *rc::gen::inRange(0, 8001)};
     auto bytes = encode(hello);
     RC_ASSERT(decode_hello(bytes) == hello);
     bytes[*rc::gen::inRange<std::size_t>(0, bytes.size())] ^=
@@ -39,9 +40,9 @@ TEST_CASE("a hello comes back, and any other byte makes it none or another one")
     RC_ASSERT(decode_hello(bytes) != hello);
   }));
   auto bytes = encode(kOmni);
-  for (const std::size_t at : {8U, 9U, 10U, 15U, 19U}) {  // no such device, no such word
+  for (const std::size_t at : {8U, 9U, 10U, 15U, 19U}) {
     auto broken = bytes;
-    broken[at] = 3;
+    broken[at] = kerf::kPersonalityWords.size();  // no such device, no such word
     CHECK_FALSE(decode_hello(broken).has_value());
   }
   for (std::size_t size = 0; size < bytes.size(); ++size) {

@@ -19,6 +19,7 @@ using falcon::FtdiRequest;
 constexpr int kAnswerMs = 20;  // the boot loader's latency timer is 16 ms
 constexpr int kEchoTries = 10;
 constexpr int kEchoMs = 200;
+constexpr int kSilenceMs = 100;
 
 void purge(FalconLine& line) {
   line.control(FtdiRequest::reset, falcon::kFtdiPurgeRx);
@@ -70,15 +71,13 @@ void greet(FalconLine& line) {
   line.control(FtdiRequest::modem, falcon::kFtdiDtrHigh);
   line.write(falcon::kBootHello);
   if (!hears(line, falcon::kBootHelloReply, falcon::kBootTries)) {
-    throw std::runtime_error(
-        "the boot loader does not answer; unplug the device and its power, plug them in again");
+    throw FalconBootError("the boot loader does not answer");
   }
   line.control(FtdiRequest::modem, falcon::kFtdiDtrLow);
   line.control(FtdiRequest::baud, falcon::kUploadDivisor);
   line.write(falcon::kUploadBegin);
   if (!hears(line, falcon::kUploadBegin, falcon::kBootTries)) {
-    throw std::runtime_error(
-        "the boot loader takes no firmware; unplug the device and its power, plug them in again");
+    throw FalconBootError("the boot loader takes no firmware");
   }
 }
 
@@ -89,16 +88,34 @@ void upload(FalconLine& line, std::span<const std::uint8_t> chunk, std::size_t o
   for (std::size_t done = 0; done < chunk.size();) {
     const std::size_t size = line.read(bytes, kEchoMs);
     if (size == 0) {
-      throw std::runtime_error("firmware: no echo from byte " + std::to_string(offset + done) +
-                               " on; unplug the device and its power, plug them in again");
+      throw FalconBootError("firmware: no echo from byte " + std::to_string(offset + done) + " on");
     }
     for (std::size_t i = 0; i < size && done < chunk.size(); ++i, ++done) {
       if (bytes[i] == chunk[done]) continue;
-      throw std::runtime_error(
-          "firmware: byte " + std::to_string(offset + done) + " was " +
-          std::to_string(chunk[done]) + " and came back as " + std::to_string(bytes[i]) +
-          "; unplug the device and its power, plug them in again, use another cable");
+      throw FalconBootError("firmware: byte " + std::to_string(offset + done) + " was " +
+                            std::to_string(chunk[done]) + " and came back as " +
+                            std::to_string(bytes[i]));
     }
+  }
+}
+
+/// One try.
+void load(FalconLine& line, std::span<const std::uint8_t> firmware) {
+  greet(line);
+  for (std::size_t at = 0; at < firmware.size(); at += falcon::kUploadChunk) {
+    const std::size_t size = std::min(falcon::kUploadChunk, firmware.size() - at);
+    upload(line, firmware.subspan(at, size), at);
+  }
+  settle_to_run(line);
+  if (!runs(line)) throw FalconBootError("the firmware was taken and does not answer");
+}
+
+/// Before another try: the chip forgets what is on its way, and the line is silent for a while.
+void reset(FalconLine& line) {
+  line.control(FtdiRequest::reset, falcon::kFtdiReset);
+  line.control(FtdiRequest::modem, falcon::kFtdiDtrLow);
+  std::array<std::uint8_t, falcon::kFtdiPacketBytes> dropped{};
+  for (int reads = 0; reads < kEchoTries && line.read(dropped, kSilenceMs) > 0; ++reads) {
   }
 }
 
@@ -120,22 +137,26 @@ std::vector<std::uint8_t> read_firmware(const std::string& file) {
   return bytes;
 }
 
-void start_falcon(FalconLine& line, std::span<const std::uint8_t> firmware) {
+int start_falcon(FalconLine& line, std::span<const std::uint8_t> firmware) {
   settle_to_run(line);
-  if (runs(line)) return;
+  if (runs(line)) return 0;
   if (firmware.empty()) {
     throw std::runtime_error(
         "the Falcon has no firmware since it was powered up; name its file: ,firmware=FILE");
   }
-  greet(line);
-  for (std::size_t at = 0; at < firmware.size(); at += falcon::kUploadChunk) {
-    const std::size_t size = std::min(falcon::kUploadChunk, firmware.size() - at);
-    upload(line, firmware.subspan(at, size), at);
-  }
-  settle_to_run(line);
-  if (!runs(line)) {
-    throw std::runtime_error(
-        "the firmware was taken and does not answer; is that file the Falcon's?");
+  for (int tries = 1;; ++tries) {
+    try {
+      load(line, firmware);
+      return tries;
+    } catch (const FalconBootError& error) {
+      if (tries == kFirmwareTries) {
+        throw FalconBootError(std::string(error.what()) + ", in the last of " +
+                              std::to_string(tries) +
+                              " tries; unplug the device and its power, plug them in again, use "
+                              "another cable; is the file the Falcon's firmware?");
+      }
+      reset(line);
+    }
   }
 }
 

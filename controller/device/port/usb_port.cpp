@@ -239,7 +239,7 @@ UsbPort::UsbPort(const UsbOptions& options, int patience_ms, const std::atomic<b
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
   }
   try {
-    start_falcon(*device_, firmware);
+    firmware_tries_ = start_falcon(*device_, firmware);
   } catch (const std::runtime_error& error) {
     refuse_usb(options.where, error.what());
   }
@@ -292,7 +292,8 @@ std::vector<LinkCounter> UsbPort::counters() const {
           {"overflow", now.overflow},
           {"stray_bytes", now.strays},
           {"commands", now.commands},
-          {"failed_transfers", now.failures}};
+          {"failed_transfers", now.failures},
+          {"firmware_tries", static_cast<std::uint64_t>(firmware_tries_)}};
 }
 
 void UsbPort::run() noexcept {

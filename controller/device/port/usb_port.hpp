@@ -158,6 +158,7 @@ class UsbPort final : public PacketPort {
   std::int64_t reply_due_ns_ = 0;  ///< end of the checks for the servo's answer to a packet
   int failures_in_a_row_ = 0;
   IoThread io_;
+  int firmware_tries_ = 0;
   std::thread thread_;
 };
 

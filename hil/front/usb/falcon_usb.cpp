@@ -73,7 +73,12 @@ void FalconBootLoader::take(std::uint8_t byte, std::deque<std::uint8_t>& line) {
       }
       return on_greeting(byte, line);
     case State::loading:
-      line.push_back(stored_++ == wrong_echo_at_ ? static_cast<std::uint8_t>(byte ^ 1) : byte);
+      if (stored_++ == wrong_echo_at_ && wrong_loads_ > 0) {
+        --wrong_loads_;
+        line.push_back(static_cast<std::uint8_t>(byte ^ 1));
+      } else {
+        line.push_back(byte);
+      }
       return;
   }
 }

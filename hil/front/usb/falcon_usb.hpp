@@ -23,8 +23,13 @@ namespace kerf {
 class FalconBootLoader {
  public:
   /// `wrong_echo_at`: fault, the n-th byte of the firmware (from 0) comes back wrong; -1: none.
-  explicit FalconBootLoader(bool firmware_runs, std::int64_t wrong_echo_at = -1)
-      : state_(firmware_runs ? State::running : State::asleep), wrong_echo_at_(wrong_echo_at) {}
+  /// `wrong_loads`: in so many loads, then in none.
+  explicit FalconBootLoader(bool firmware_runs, std::int64_t wrong_echo_at = -1,
+                            int wrong_loads = kEveryLoad)
+      : state_(firmware_runs ? State::running : State::asleep),
+        wrong_echo_at_(wrong_echo_at),
+        wrong_loads_(wrong_loads) {}
+  static constexpr int kEveryLoad = 1'000'000;
 
   [[nodiscard]] bool running() const noexcept { return state_ == State::running; }
   /// Bytes of firmware received.
@@ -44,6 +49,7 @@ class FalconBootLoader {
 
   State state_;
   std::int64_t wrong_echo_at_;
+  int wrong_loads_;
   std::int64_t stored_ = 0;
   std::size_t greeted_ = 0;  ///< bytes of the greeting that were right
   std::uint16_t divisor_ = 0;

@@ -1,0 +1,222 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+#include <optional>
+#include <span>
+
+#include "shared/wire/little_endian.hpp"
+#include "shared/wire/personality.hpp"
+
+// Cartesian devices: pose in, force out. Figures of each, and kerf's own packets for all of them.
+
+/// Figures of a Cartesian device.
+///
+/// Frame of the device, for all: x right, y up, z to the user; mm. Who talks to a vendor's service
+/// or library turns its axes into these.
+namespace kerf::cartesian {
+
+struct Figures {
+  int step_um;     ///< of a count in the servo: 16 bits of them hold the workspace
+  int quantum_um;  ///< resolution that the vendor states
+  bool has_wrist;  ///< reports an orientation
+  bool has_dock;   ///< is parked at one place alone: an inkwell
+  /// Workspace of the vendor's data sheet, or larger, about the origin of the device's frame.
+  std::array<double, 3> low_mm, high_mm;
+  std::array<double, 3> rest_mm;  ///< where the emulated one is parked
+};
+
+/// Inverse3 (510 x 460 x 230 mm, 10 um): the origin is ours, kInverse3OriginM in front of the
+/// service's. Touch (0.055 mm): the vendor's frame; its inkwell lies where all joint angles are 0.
+/// omega.3 (a cylinder of 160 mm and 110 mm along z, 10 um): the vendor's origin.
+/// Empty for a joint-count device.
+[[nodiscard]] constexpr std::optional<Figures> figures(Personality personality) noexcept {
+  switch (personality) {
+    case Personality::inverse3:
+      return Figures{10, 10, true, false, {-230, -255, -115}, {230, 255, 115}, {0, 80, 0}};
+    case Personality::touch:
+      return Figures{10, 55, true, true, {-200, -115, -95}, {200, 200, 95}, {0, -110, -35}};
+    case Personality::omega:
+      return Figures{4, 10, false, false, {-80, -80, -55}, {80, 80, 55}, {0, 50, 0}};
+    case Personality::omni:
+    case Personality::falcon:
+    case Personality::woodenhaptics:
+      break;
+  }
+  return std::nullopt;
+}
+
+/// A motor count of the servo: a force along one axis.
+inline constexpr double kNewtonsPerCount = 0.001;
+
+inline constexpr std::size_t kReportBytes = 40;
+inline constexpr std::size_t kCommandBytes = 16;
+inline constexpr std::uint32_t kReportMark = 0x3172636B;   // "kcr1": the last byte is the version
+inline constexpr std::uint32_t kCommandMark = 0x3163636B;  // "kcc1"
+
+/// A position farther away on any axis is none of a device: metres read as millimetres, or worse.
+inline constexpr int kFarthestUm = 1'000'000;
+inline constexpr double kQuaternionOne = 32767;
+
+}  // namespace kerf::cartesian
+
+/// The two packets, byte by byte; little-endian.
+///
+///     device -> host, 40 bytes                     host -> device, 16 bytes
+///      0  u32     mark "kcr1"                       0  u32     mark "kcc1"
+///      4  u32     number of the report, from 1      4  i16 x3  force in mN; x, y, z
+///      8  i32 x3  position in um; x, y, z          10  u8      1 = force on
+///     20  i16 x4  orientation x, y, z, w / 32767   11  u8      0 asks the user, 1 ready, 2 fault
+///     28  i16 x3  force that it gives, in mN       12  u32     number of the newest report read
+///     34  u8      1 first, 2 second button
+///     35  u8      1 parked, 2 homed, 4 powered
+///     36  u32     age of the pose when it was sent, in us; 0 = unknown
+///
+/// The orientation is that of the tool: identity is a shaft that points up. Any thread; nothing
+/// allocates, blocks or throws.
+namespace kerf {
+
+/// Device to host.
+struct CartesianReport {
+  std::uint32_t number = 0;
+  std::array<std::int32_t, 3> position_um{};
+  std::array<std::int16_t, 4> orientation{0, 0, 0, 32767};
+  std::array<std::int16_t, 3> force_mn{};
+  bool button1 = false, button2 = false;
+  bool parked = false;
+  bool homed = false;    ///< its position is absolute
+  bool powered = false;  ///< it can give a force
+  std::uint32_t age_us = 0;
+
+  friend constexpr bool operator==(const CartesianReport&,
+                                   const CartesianReport&) noexcept = default;
+};
+
+/// Host to device.
+struct CartesianCommand {
+  enum class Light : std::uint8_t { asks, ready, fault };
+
+  std::array<std::int16_t, 3> force_mn{};
+  bool force_on = false;
+  Light light = Light::asks;
+  std::uint32_t answers = 0;
+
+  friend constexpr bool operator==(const CartesianCommand&,
+                                   const CartesianCommand&) noexcept = default;
+};
+
+namespace cartesian {
+
+using ReportBytes = std::array<std::uint8_t, kReportBytes>;
+using CommandBytes = std::array<std::uint8_t, kCommandBytes>;
+
+/// A quaternion of any length but 0, as the packet has it. Not finite, or 0: nothing.
+[[nodiscard]] inline std::optional<std::array<std::int16_t, 4>> packed_orientation(
+    const std::array<double, 4>& xyzw) noexcept {
+  const double square =
+      xyzw[0] * xyzw[0] + xyzw[1] * xyzw[1] + xyzw[2] * xyzw[2] + xyzw[3] * xyzw[3];
+  if (!(square > 1e-12 && square < 1e12)) return std::nullopt;
+  const double scale = kQuaternionOne / std::sqrt(square);
+  std::array<std::int16_t, 4> packed;
+  for (std::size_t i = 0; i < 4; ++i) {
+    packed[i] = static_cast<std::int16_t>(std::lround(xyzw[i] * scale));
+  }
+  return packed;
+}
+
+/// A length in mm as the packet has it. Not finite, or farther than kFarthestUm: nothing.
+[[nodiscard]] inline std::optional<std::int32_t> packed_mm(double mm) noexcept {
+  if (!(std::abs(mm) <= kFarthestUm / 1000.0)) return std::nullopt;
+  return static_cast<std::int32_t>(std::lround(mm * 1000.0));
+}
+
+/// A force in N as the packet has it: not finite becomes 0, a larger one the end of the range.
+[[nodiscard]] inline std::int16_t packed_n(double newtons) noexcept {
+  constexpr double kEnd = 32767;
+  const double mn = newtons / kNewtonsPerCount;
+  return mn == mn ? static_cast<std::int16_t>(std::lround(std::clamp(mn, -kEnd, kEnd))) : 0;
+}
+
+}  // namespace cartesian
+
+[[nodiscard]] constexpr cartesian::ReportBytes encode(const CartesianReport& report) noexcept {
+  cartesian::ReportBytes bytes{};
+  wire::put_u32(bytes, 0, cartesian::kReportMark);
+  wire::put_u32(bytes, 4, report.number);
+  for (std::size_t i = 0; i < 3; ++i) {
+    wire::put_u32(bytes, 8 + 4 * i, static_cast<std::uint32_t>(report.position_um[i]));
+    wire::put_i16(bytes, 28 + 2 * i, report.force_mn[i]);
+  }
+  for (std::size_t i = 0; i < 4; ++i) wire::put_i16(bytes, 20 + 2 * i, report.orientation[i]);
+  bytes[34] = static_cast<std::uint8_t>((report.button1 ? 1 : 0) | (report.button2 ? 2 : 0));
+  bytes[35] = static_cast<std::uint8_t>((report.parked ? 1 : 0) | (report.homed ? 2 : 0) |
+                                        (report.powered ? 4 : 0));
+  wire::put_u32(bytes, 36, report.age_us);
+  return bytes;
+}
+
+/// Nothing unless these are the 40 bytes of a report with a position within kFarthestUm and an
+/// orientation whose length is 1 within 1 %.
+[[nodiscard]] constexpr std::optional<CartesianReport> decode_cartesian_report(
+    std::span<const std::uint8_t> bytes) noexcept {
+  if (bytes.size() != cartesian::kReportBytes ||
+      wire::get_u32(bytes, 0) != cartesian::kReportMark || bytes[34] > 3 || bytes[35] > 7) {
+    return std::nullopt;
+  }
+  CartesianReport report;
+  report.number = wire::get_u32(bytes, 4);
+  for (std::size_t i = 0; i < 3; ++i) {
+    report.position_um[i] = static_cast<std::int32_t>(wire::get_u32(bytes, 8 + 4 * i));
+    report.force_mn[i] = wire::get_i16(bytes, 28 + 2 * i);
+    if (report.position_um[i] < -cartesian::kFarthestUm ||
+        report.position_um[i] > cartesian::kFarthestUm) {
+      return std::nullopt;
+    }
+  }
+  std::int64_t square = 0;
+  for (std::size_t i = 0; i < 4; ++i) {
+    report.orientation[i] = wire::get_i16(bytes, 20 + 2 * i);
+    square += std::int64_t{report.orientation[i]} * report.orientation[i];
+  }
+  constexpr std::int64_t kOne = 32767 * 32767;
+  if (square < kOne * 98 / 100 || square > kOne * 102 / 100) return std::nullopt;
+  report.button1 = (bytes[34] & 1) != 0;
+  report.button2 = (bytes[34] & 2) != 0;
+  report.parked = (bytes[35] & 1) != 0;
+  report.homed = (bytes[35] & 2) != 0;
+  report.powered = (bytes[35] & 4) != 0;
+  report.age_us = wire::get_u32(bytes, 36);
+  return report;
+}
+
+[[nodiscard]] constexpr cartesian::CommandBytes encode(const CartesianCommand& command) noexcept {
+  cartesian::CommandBytes bytes{};
+  wire::put_u32(bytes, 0, cartesian::kCommandMark);
+  for (std::size_t i = 0; i < 3; ++i) wire::put_i16(bytes, 4 + 2 * i, command.force_mn[i]);
+  bytes[10] = command.force_on ? 1 : 0;
+  bytes[11] = static_cast<std::uint8_t>(command.light);
+  wire::put_u32(bytes, 12, command.answers);
+  return bytes;
+}
+
+/// Nothing unless these are the 16 bytes of a command.
+[[nodiscard]] constexpr std::optional<CartesianCommand> decode_cartesian_command(
+    std::span<const std::uint8_t> bytes) noexcept {
+  if (bytes.size() != cartesian::kCommandBytes ||
+      wire::get_u32(bytes, 0) != cartesian::kCommandMark || bytes[10] > 1 || bytes[11] > 2) {
+    return std::nullopt;
+  }
+  CartesianCommand command;
+  for (std::size_t i = 0; i < 3; ++i) command.force_mn[i] = wire::get_i16(bytes, 4 + 2 * i);
+  command.force_on = bytes[10] == 1;
+  command.light = static_cast<CartesianCommand::Light>(bytes[11]);
+  command.answers = wire::get_u32(bytes, 12);
+  return command;
+}
+
+}  // namespace kerf
