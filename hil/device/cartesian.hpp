@@ -70,6 +70,7 @@ class CartesianModel final : public DeviceModel {
   [[nodiscard]] const char* name() const noexcept override;
   [[nodiscard]] bool motors_on() const noexcept override { return command_.force_on; }
   [[nodiscard]] Calibration calibration() const noexcept override;
+  [[nodiscard]] int step_um() const noexcept override { return figures_.step_um; }
   [[nodiscard]] HandRoute route() const override;
   [[nodiscard]] const PlantState& state() const noexcept override { return plant_.state(); }
   [[nodiscard]] const PlantParams& params() const noexcept override { return params_; }

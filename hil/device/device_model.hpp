@@ -35,6 +35,8 @@ class DeviceModel {
   /// Whether torques of the host reach the motors.
   [[nodiscard]] virtual bool motors_on() const noexcept = 0;
   [[nodiscard]] virtual Calibration calibration() const noexcept = 0;
+  /// Of a Cartesian device: what the servo takes for a count of its position.
+  [[nodiscard]] virtual int step_um() const noexcept { return 0; }
   /// How a hand calibrates this device and gets to the start of its script.
   [[nodiscard]] virtual HandRoute route() const = 0;
   [[nodiscard]] virtual const PlantState& state() const noexcept = 0;

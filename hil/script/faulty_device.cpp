@@ -19,7 +19,8 @@ namespace {
 constexpr double kPushN = 0.05;
 constexpr int kPotNoiseMask = 31;
 
-/// The part of a device's report that a fault of a sensor can change, the same for all devices.
+/// The part of a device's report that a fault of a sensor can change, the same for all devices. A
+/// position of a Cartesian device is in the servo's counts, of `step_um`.
 struct Readings {
   std::array<std::int16_t, 3> encoder{};
   /// Docked (Omni), centre button (Falcon), calibration button (WoodenHaptics), parked (Cartesian).
@@ -30,54 +31,51 @@ struct Readings {
   friend bool operator==(const Readings&, const Readings&) noexcept = default;
 };
 
-Readings read(const OmniReport& report) noexcept {
+Readings read(const OmniReport& report, int /*step_um*/) noexcept {
   Readings readings{.encoder = report.encoder, .parked = report.docked};
   std::ranges::copy(report.pot_a, readings.pots.begin());
   std::ranges::copy(report.pot_b, readings.pots.begin() + 3);
   return readings;
 }
 
-Readings read(const FalconReport& report) noexcept {
+Readings read(const FalconReport& report, int /*step_um*/) noexcept {
   return {.encoder = report.encoder,
           .parked = (report.buttons & falcon::kButtonCentre) != 0,
           .homed = std::ranges::all_of(report.homed, [](bool homed) { return homed; })};
 }
 
-Readings read(const WoodenReport& report) noexcept {
+Readings read(const WoodenReport& report, int /*step_um*/) noexcept {
   Readings readings{.parked = report.calibrate};
   std::copy_n(report.encoder.begin(), 3, readings.encoder.begin());
   return readings;
 }
 
-/// A fault counts in steps of the servo, which are what a sensor's counts are to it. Only changes
-/// are written back, so the rest of a position is not lost.
-constexpr std::int32_t kCartesianStepUm = 10;
-
-Readings read(const CartesianReport& report) noexcept {
+Readings read(const CartesianReport& report, int step_um) noexcept {
   Readings readings{.parked = report.parked, .homed = report.homed};
   for (std::size_t i = 0; i < 3; ++i) {
-    readings.encoder[i] = static_cast<std::int16_t>(report.position_um[i] / kCartesianStepUm);
+    readings.encoder[i] = static_cast<std::int16_t>(report.position_um[i] / step_um);
   }
   return readings;
 }
 
-void write(const Readings& readings, CartesianReport& report) noexcept {
-  const Readings before = read(report);
+/// Adds the change alone, so that the rest of a position is not lost.
+void write(const Readings& readings, CartesianReport& report, int step_um) noexcept {
+  const Readings before = read(report, step_um);
   for (std::size_t i = 0; i < 3; ++i) {
-    report.position_um[i] += (readings.encoder[i] - before.encoder[i]) * kCartesianStepUm;
+    report.position_um[i] += (readings.encoder[i] - before.encoder[i]) * step_um;
   }
   report.parked = readings.parked;
   report.homed = readings.homed;
 }
 
-void write(const Readings& readings, OmniReport& report) noexcept {
+void write(const Readings& readings, OmniReport& report, int /*step_um*/) noexcept {
   report.encoder = readings.encoder;
   report.docked = readings.parked;
   std::copy_n(readings.pots.begin(), 3, report.pot_a.begin());
   std::copy_n(readings.pots.begin() + 3, 3, report.pot_b.begin());
 }
 
-void write(const Readings& readings, FalconReport& report) noexcept {
+void write(const Readings& readings, FalconReport& report, int /*step_um*/) noexcept {
   report.encoder = readings.encoder;
   const unsigned others = report.buttons & ~unsigned{falcon::kButtonCentre};
   report.buttons =
@@ -85,7 +83,7 @@ void write(const Readings& readings, FalconReport& report) noexcept {
   if (!readings.homed) report.homed = {};
 }
 
-void write(const Readings& readings, WoodenReport& report) noexcept {
+void write(const Readings& readings, WoodenReport& report, int /*step_um*/) noexcept {
   std::ranges::copy(readings.encoder, report.encoder.begin());
   report.calibrate = readings.parked;
 }
@@ -100,16 +98,16 @@ void with_report(std::span<const std::uint8_t> packet, const Use& use) noexcept 
 }
 
 /// Empty if `packet` is no report of a device; its size shows the device.
-std::optional<Readings> readings_of(std::span<const std::uint8_t> packet) noexcept {
+std::optional<Readings> readings_of(std::span<const std::uint8_t> packet, int step_um) noexcept {
   std::optional<Readings> readings;
-  with_report(packet, [&](const auto& report) { readings = read(report); });
+  with_report(packet, [&](const auto& report) { readings = read(report, step_um); });
   return readings;
 }
 
 /// Puts `readings` into a packet that `readings_of` has read.
-void put_readings(const Readings& readings, std::span<std::uint8_t> packet) noexcept {
+void put_readings(const Readings& readings, std::span<std::uint8_t> packet, int step_um) noexcept {
   with_report(packet, [&](auto report) {
-    write(readings, report);
+    write(readings, report, step_um);
     const auto bytes = encode(report);
     std::copy_n(bytes.begin(), packet.size(), packet.begin());
   });
@@ -235,7 +233,8 @@ void FaultyDevice::replace_by_old(Bytes& packet) {
 }
 
 void FaultyDevice::break_sensors(Bytes& packet) {
-  auto readings = readings_of(packet);
+  const int step_um = device_.model().step_um();
+  auto readings = readings_of(packet, step_um);
   if (!readings) return;
   bool changed = false;
   for (Running& running : faults_) {
@@ -253,7 +252,7 @@ void FaultyDevice::break_sensors(Bytes& packet) {
         count = running.stuck_at;
         break;
       case FaultKind::freeze:
-        readings = readings_of(running.held).value_or(*readings);
+        readings = readings_of(running.held, step_um).value_or(*readings);
         break;
       case FaultKind::jump:
         count = wrapped(count + fault.counts);
@@ -283,7 +282,7 @@ void FaultyDevice::break_sensors(Bytes& packet) {
     }
     running.changed += *readings != before ? 1 : 0;
   }
-  if (changed) put_readings(*readings, packet);
+  if (changed) put_readings(*readings, packet, step_um);
 }
 
 void FaultyDevice::receive(std::span<const std::uint8_t> packet) noexcept {
