@@ -142,6 +142,38 @@ counts from there.
 """
 
 
+def cartesian(root):
+    file = Source(root, "shared/wire/cartesian.hpp")
+    number = file.number
+    rows = re.findall(r"case Personality::(\w+):\n\s+return Figures\{(\d+), (\d+), (\w+), (\w+), "
+                      r"\{([-\d, ]+)\}, \{([-\d, ]+)\}, \{([-\d, ]+)\}\}", file.text)
+    forces = dict(re.findall(r"case Personality::(\w+):\n\s+return \{([\d., ]+)\};",
+                             Source(root, "shared/wire/personality.hpp").text))
+    if len(rows) != 3:
+        raise Lack(f"{file.path}: figures of {len(rows)} devices, not 3; tests/docs/reference has to follow")
+    table = "\n".join(
+        f"| {name} | {step} | {quantum} | {'yes' if wrist == 'true' else 'no'} | {'in its inkwell' if dock == 'true' else 'anywhere, by a button'} "
+        f"| ({low}) to ({high}) | {forces.get(name, '3.3, 0.88, 0.5')} |" for name, step, quantum, wrist, dock, low, high, _ in rows)
+    return f"""## Cartesian devices: inverse3, touch, omega
+
+What the vendors' services and libraries say is translated into these packets of kerf's own; the emulator serves them directly
+at `--front socket` and `udp`.
+
+{drawing(file, 'namespace kerf {')}
+
+The orientation is that of the tool: identity is a shaft that points up. A position of more than {number('kFarthestUm') // 1000} mm on an axis, or an orientation
+whose length is not 1 within 1 %, makes the packet none.
+
+| device | step of the servo, um | resolution, um | orientation | parked | workspace of the emulated one, mm | peak N, continuous N, N/ms |
+|---|---|---|---|---|---|---|
+{table}
+
+**Speaks first**: the device. **Number**: as the Omni's packet counter. **Force**: it counts while the byte at 10 is 1; the device
+clamps it to its peak. **Torque scale**: the true force over the commanded one along x, y, z: 1.
+**Calibration**: parked, homed and powered for 50 ms while no axis moves by more than two steps of the resolution.
+"""
+
+
 def links(root):
     link = Source(root, "shared/wire/emulator_link.hpp")
 
@@ -246,7 +278,7 @@ A connection is closed with {', '.join(f'{value} `{word}`' for word, value, _ in
 
 
 def page(root, programs):
-    same("shared/wire", ["omni", "falcon", "woodenhaptics", "emulator_link"],
+    same("shared/wire", ["omni", "falcon", "woodenhaptics", "cartesian", "emulator_link"],
          {path.stem for path in (root / "shared/wire").glob("*.hpp")} - {"little_endian", "personality"})
     return f"""# Wire bytes
 
@@ -257,4 +289,4 @@ This page is enough to write a host for the emulator, or a device for the contro
 Torque scales (N mm per count) are the host's setting: `torque_scale` of a scene, `--torque-scale`; `./kerf emulator
 --personality D --describe` prints the emulated device's.
 
-{chr(10).join(part(root) for part in (omni, falcon, wooden, links, bridge))}"""
+{chr(10).join(part(root) for part in (omni, falcon, wooden, cartesian, links, bridge))}"""
