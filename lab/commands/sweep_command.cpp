@@ -191,7 +191,7 @@ Command::Command(Arguments& program)
       .within(0.01, 1e6)
       .shows_default();
   app_.option("--jobs", jobs_, "runs at once (default: one for each core)").within(1, 1024);
-  app_.option("--device", device_, "omni, falcon or woodenhaptics (default: omni)")
+  app_.option("--device", device_, "the device (default: omni)")
       .one_of({kPersonalityWords.begin(), kPersonalityWords.end()})
       .shown_as("NAME");
   app_.footer(
