@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 # The golden run (tests/golden) and the recorded runs (tests/replay/inputs) on several compilers,
 # optimisation levels and processors, each with every kernel set that it runs; other processors under
-# qemu. Prints a table; fails where a hash is not the known one. Builds without any library.
+# qemu, WebAssembly under Node. Prints a table; fails where a hash is not the known one. Builds without any library.
 #     .ci/check-determinism.sh [--all]      --all: every combination, a quarter of an hour
 set -euo pipefail
 cd "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/.."
@@ -13,12 +13,22 @@ row='%-22s %-20s %-7s %-5s %-7s %-16s %-16s %-16s %7s\n'
 check() {
   local processor=$1 compiler=$2 flags=$3 name options=() targets=(test_golden test_load) run=() result
   name=$folder/$processor-$compiler${flags// /}
-  if [[ $processor != "$(uname -m)" ]]; then
+  if [[ $processor == wasm32 ]]; then
+    # Of golden alone: the standard library there reads no files, from which scenes are loaded.
+    options=(--toolchain cmake/wasm32-wasi.cmake)
+    targets=(test_golden)
+    run=(node --no-warnings .ci/run-wasi.js)
+  elif [[ $processor == arm ]]; then
+    options=(-DCMAKE_SYSTEM_NAME=Linux -DCMAKE_SYSTEM_PROCESSOR=arm)
+    run=(qemu-arm-static -L /usr/arm-linux-gnueabihf)
+  elif [[ $processor != "$(uname -m)" ]]; then
     options=(-DCMAKE_SYSTEM_NAME=Linux -DCMAKE_SYSTEM_PROCESSOR="$processor")
     run=("qemu-$processor-static" -L "/usr/$processor-linux-gnu")
   fi
   if [[ $processor == aarch64 ]]; then targets+=(test_aligned); fi
-  if [[ $processor != s390x ]]; then targets+=(test_recorded_inputs); fi  # logs are little-endian
+  if [[ $processor != s390x && $processor != wasm32 ]]; then
+    targets+=(test_recorded_inputs)  # logs are little-endian
+  fi
 
   # doctest is only headers; those of the other processor come first.
   if ! { cmake -S . -B "$name" -G Ninja -DKERF_CORE_ONLY=ON -DKERF_WERROR=ON \
@@ -34,12 +44,12 @@ check() {
     return 1
   fi
   # What load time makes of each shipped scene.
-  if ! result=$("${run[@]}" "$name/bin/test_load"); then
+  if [[ $processor != wasm32 ]] && ! result=$("${run[@]}" "$name/bin/test_load"); then
     echo "$result"
     return 1
   fi
   # What the servo was given in runs that g++ -O2 recorded on x86-64.
-  if [[ $processor != s390x ]] && ! result=$("${run[@]}" "$name/bin/test_recorded_inputs"); then
+  if [[ " ${targets[*]} " == *" test_recorded_inputs "* ]] && ! result=$("${run[@]}" "$name/bin/test_recorded_inputs"); then
     echo "$result"
     return 1
   fi
@@ -78,6 +88,8 @@ list() {
   local optimise compiler level
   if [[ ${1:-} != --all ]]; then  # beside g++ -O2 and clang -O2, which the other tests build with
     echo s390x s390x-linux-gnu-g++ -O2
+    echo arm arm-linux-gnueabihf-g++ -O2
+    echo wasm32 clang++-16 -O2
     echo aarch64 aarch64-linux-gnu-g++ -O2
     echo x86_64 clang++-16 -O3 -march=x86-64
     echo x86_64 g++ -O3 "-march=$(levels | tail -n 1)"

@@ -336,7 +336,7 @@ class ServoMemory {
   /// All arrays by name, with their sizes before `take`.
   [[nodiscard]] std::vector<ArrayBytes> arrays() const {
     std::vector<ArrayBytes> list;
-    const auto add = [&](const std::string& name, std::size_t bytes, bool taken) {
+    const auto add = [&](const std::string& name, std::uint64_t bytes, bool taken) {
       if (bytes != 0) list.push_back({name, bytes, taken});
     };
     for (const VolumeBytes& volume : volumes_) {

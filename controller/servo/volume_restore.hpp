@@ -194,7 +194,7 @@ inline KeptBrick* entry_for_brick(StrokeState& stroke) noexcept {
     return nullptr;
   }
   keep_within(pool - 1, stroke);
-  return &stroke.pool[stroke.end++ % pool];
+  return &stroke.pool[static_cast<std::size_t>(stroke.end++ % pool)];
 }
 
 /// Keeps the bricks around a tool at `centre_vox`, each once a stroke. Copies at most the bricks of
@@ -346,7 +346,7 @@ void swap_some(const ServoPlan<N>& plan, ServoState<N>& state, ServoOutput& out)
     return;
   }
   const auto last = [&]() -> KeptBrick& {
-    return stroke.pool[(rest.end - 1) % stroke.pool.size()];
+    return stroke.pool[static_cast<std::size_t>((rest.end - 1) % stroke.pool.size())];
   };
   const std::uint32_t v = last().volume;
   const VolumePlan<N>& volume = plan.volumes[v];

@@ -371,7 +371,8 @@ void begin_sites(std::span<Dot> dots, std::size_t count, std::vector<Site>& site
   const auto widest =
       static_cast<std::size_t>(std::max_element(side.begin(), side.end()) - side.begin());
   const std::size_t half = dots.size() * (count / 2) / count;
-  std::nth_element(dots.begin(), dots.begin() + static_cast<std::ptrdiff_t>(half), dots.end(),
+  // Stable, as every order here: standard libraries part equal dots in different ways.
+  std::stable_sort(dots.begin(), dots.end(),
                    [widest](const Dot& a, const Dot& b) { return a.at[widest] < b.at[widest]; });
   begin_sites(dots.first(half), count / 2, sites);
   begin_sites(dots.subspan(half), count - count / 2, sites);
@@ -392,8 +393,8 @@ void begin_sites_by_side(std::span<Dot> dots, std::size_t count, std::vector<Sit
   const std::size_t all = dots.size(), known = sites.size();
   auto rest = dots.begin();
   for (int side = 0; side < 6; ++side) {
-    const auto end = std::partition(rest, dots.end(),
-                                    [side](const Dot& dot) { return facing(dot.normal) == side; });
+    const auto end = std::stable_partition(
+        rest, dots.end(), [side](const Dot& dot) { return facing(dot.normal) == side; });
     if (rest == end) continue;
     const auto passed = static_cast<std::size_t>(end - dots.begin());
     begin_sites({rest, end}, passed * count / all - (sites.size() - known), sites);
@@ -449,7 +450,7 @@ std::vector<SurfaceSample> mesh_surface_samples(const ToolMesh& mesh, std::size_
     auto beyond = dots.begin();
     if (!sites.empty()) {
       const SiteGrid rims(sites, distance_mm);
-      beyond = std::partition(dots.begin(), dots.end(), [&](const Dot& dot) {
+      beyond = std::stable_partition(dots.begin(), dots.end(), [&](const Dot& dot) {
         const std::size_t rim = rims.nearest(dot);
         return rim != kNone &&
                squared_distance(sites[rim].at, dot.at) < distance_mm * distance_mm / 4;

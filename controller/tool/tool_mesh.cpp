@@ -219,7 +219,7 @@ std::uint32_t word_at(std::string_view bytes, std::size_t at) {
   return word;
 }
 
-void check_count(std::size_t triangles, const std::string& place) {
+void check_count(std::uint64_t triangles, const std::string& place) {
   if (triangles <= kMaxMeshTriangles) return;
   refuse(place,
          ": more than " + std::to_string(kMaxMeshTriangles) + " triangles; simplify the mesh");
@@ -381,7 +381,8 @@ void hand_over_stl(const std::filesystem::path& path, SandboxReader& sandbox) {
 
 }  // namespace
 
-std::vector<LooseTriangle> read_stl(const std::filesystem::path& path, int cpu_s) {
+std::vector<LooseTriangle> read_stl(const std::string& file, int cpu_s) {
+  const std::filesystem::path path(file);
   std::error_code fault;
   if (std::filesystem::is_directory(path, fault)) {
     refuse(path.string(), ": is a folder; name an STL file in it");
@@ -407,8 +408,8 @@ std::vector<LooseTriangle> read_stl(const std::filesystem::path& path, int cpu_s
         std::uint64_t count = 0;
         if (header.size() == sizeof count) std::memcpy(&count, header.data(), sizeof count);
         check_count(count, path.string());
-        triangles.resize(count);
-        return count * sizeof(LooseTriangle);
+        triangles.resize(static_cast<std::size_t>(count));
+        return triangles.size() * sizeof(LooseTriangle);
       });
   std::ranges::copy(memory.bytes(), std::as_writable_bytes(std::span(triangles)).begin());
   return triangles;

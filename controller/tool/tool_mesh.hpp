@@ -4,7 +4,6 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <filesystem>
 #include <span>
 #include <string>
 #include <string_view>
@@ -70,7 +69,7 @@ inline constexpr std::uintmax_t kMaxStlBytes = std::uintmax_t{512} * kMaxMeshTri
                                                    const std::string& place);
 
 /// The same of a file of at most kMaxStlBytes, in a sandbox.
-[[nodiscard]] std::vector<LooseTriangle> read_stl(const std::filesystem::path& path,
+[[nodiscard]] std::vector<LooseTriangle> read_stl(const std::string& file,
                                                   int cpu_s = kReadCpuSeconds);
 
 // The closed parts of a mesh: which way each faces, and what its user should know of the whole.

@@ -17,6 +17,7 @@
 #include "hil/hil_error.hpp"
 #include "lab/bridge/two_machines.hpp"
 #include "lab/run/lab_command.hpp"
+#include "shared/posix/atomic_file.hpp"
 #include "shared/posix/program.hpp"
 #include "shared/posix/stop_signals.hpp"
 #include "shared/text/json.hpp"

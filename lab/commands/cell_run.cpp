@@ -21,6 +21,7 @@
 #include "hil/hil_error.hpp"
 #include "lab/run/child_process.hpp"
 #include "shared/numeric/energy_source.hpp"
+#include "shared/posix/atomic_file.hpp"
 #include "shared/posix/monotonic_clock.hpp"
 #include "shared/posix/program.hpp"
 #include "shared/segment/connection.hpp"

@@ -22,6 +22,7 @@
 #include "lab/run/grid_run.hpp"
 #include "lab/run/lab_command.hpp"
 #include "shared/numeric/fnv1a.hpp"
+#include "shared/posix/atomic_file.hpp"
 #include "shared/posix/program.hpp"
 #include "shared/posix/stop_signals.hpp"
 #include "shared/text/text.hpp"

@@ -6,7 +6,9 @@
 #include <cerrno>
 #include <cstddef>
 #include <cstdio>
+#include <fstream>
 #include <iterator>
+#include <sstream>
 #include <string>
 #include <system_error>
 #include <utility>
@@ -88,6 +90,14 @@ void refuse_input(const OutputFile& output, const fs::path& input) {
 }
 
 }  // namespace
+
+std::string text_in(const std::filesystem::path& path) {
+  std::error_code fault;
+  if (!std::filesystem::is_regular_file(path, fault)) return {};
+  std::ostringstream text;
+  text << std::ifstream(path, std::ios::binary).rdbuf();
+  return std::move(text).str();
+}
 
 bool is_stream(const fs::path& path) {
   if (own_descriptor(path) >= 0) return true;

@@ -18,7 +18,9 @@ inline constexpr std::int64_t kNsPerSecond = 1'000'000'000;
 
 /// Sleeps until `deadline_ns`, also through interruptions by signals.
 inline void sleep_until_ns(std::int64_t deadline_ns) noexcept {
-  const timespec until{deadline_ns / kNsPerSecond, deadline_ns % kNsPerSecond};
+  timespec until{};
+  until.tv_sec = static_cast<time_t>(deadline_ns / kNsPerSecond);
+  until.tv_nsec = static_cast<long>(deadline_ns % kNsPerSecond);
   while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, nullptr) != 0) {
   }
 }

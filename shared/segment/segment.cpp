@@ -149,11 +149,12 @@ SegmentMemory SegmentMemory::create(std::uint64_t bytes) {
   if (errno != 0) {
     throw fail("allocation");
   }
+  const auto size = static_cast<std::size_t>(bytes);
   void* const at =
-      mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_POPULATE, memory.fd_, 0);
+      mmap(nullptr, size, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_POPULATE, memory.fd_, 0);
   if (at == MAP_FAILED) throw fail("mmap");
-  memory.bytes_ = {static_cast<std::byte*>(at), bytes};
-  memory.locked_ = mlock(at, bytes) == 0;
+  memory.bytes_ = {static_cast<std::byte*>(at), size};
+  memory.locked_ = mlock(at, size) == 0;
   return memory;
 }
 

@@ -4,7 +4,7 @@
 #include <doctest/doctest.h>
 #include <sys/stat.h>
 
-#include "shared/text/text.hpp"
+#include "shared/posix/atomic_file.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 using kerf::text_in;
