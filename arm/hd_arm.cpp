@@ -205,7 +205,8 @@ bool HdArm::read(ArmReading& reading) noexcept {
   reading.button1 = (buttons & 1) != 0;
   reading.button2 = (buttons & 2) != 0;
   reading.parked = is_out == 0;
-  reading.homed = follow_calibration(reading.parked);
+  // The first frames may have an inkwell's switch that was never read.
+  reading.homed = clean_ >= kCleanFrames && follow_calibration(reading.parked);
   return true;
 }
 

@@ -10,8 +10,8 @@
 namespace kerf {
 namespace {
 
-constexpr std::int64_t kNsPerMs = 1'000'000;
-constexpr std::int64_t kRetryNs = 10 * kNsPerMs;
+constexpr std::int64_t kMillisecondNs = 1'000'000;
+constexpr std::int64_t kRetryNs = 10 * kMillisecondNs;
 constexpr std::int64_t kPollNs = 50'000;
 
 std::string absent_text(const std::string& name, Personality device,
@@ -36,7 +36,7 @@ std::string absent_text(const std::string& name, Personality device,
 
 ArmPort::ArmPort(const std::string& name, Personality device, int patience_ms,
                  const std::atomic<bool>& stop) {
-  const std::int64_t give_up_ns = monotonic_ns() + patience_ms * kNsPerMs;
+  const std::int64_t give_up_ns = monotonic_ns() + patience_ms * kMillisecondNs;
   for (;;) {
     ArmPageController::Absence absence{};
     std::string said;
@@ -73,7 +73,7 @@ bool ArmPort::send(std::span<const std::uint8_t> packet) noexcept {
 }
 
 bool ArmPort::wait(int milliseconds) noexcept {
-  const std::int64_t until_ns = monotonic_ns() + milliseconds * kNsPerMs;
+  const std::int64_t until_ns = monotonic_ns() + milliseconds * kMillisecondNs;
   while (!page_->waits() && !closed()) {
     const std::int64_t now_ns = monotonic_ns();
     if (now_ns >= until_ns) return false;
@@ -89,7 +89,8 @@ std::vector<LinkCounter> ArmPort::counters() const {
 std::string parse_arm_port(std::string_view text) {
   if (text.empty()) return {};
   if (text.front() != ':' || text.size() == 1) {
-    throw std::runtime_error("--port arm" + escaped(text) + ": use arm, or arm:NAME with the --name of "
+    throw std::runtime_error("--port arm" + escaped(text) +
+                             ": use arm, or arm:NAME with the --name of "
                              "kerf-arm");
   }
   text.remove_prefix(1);
