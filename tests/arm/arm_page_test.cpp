@@ -129,6 +129,45 @@ TEST_CASE("page: the newest command counts, with its time") {
   }
 }
 
+TEST_CASE("page: a thread that was interrupted cannot put its older command over a newer one") {
+  const RuntimeFolder folder;
+  ArmPageAdapter arm("touch", Personality::touch, 1000);
+  arm.set_state(ArmState::running, "");
+  const auto end = open_end();
+  for (std::int16_t mn = 1; mn <= 4; ++mn) REQUIRE(end->send(forcing(mn), mn));
+  const int file = open(kerf::ArmPage::path_of("touch").c_str(), O_RDWR);
+  for (int place = 0; place < 4; ++place) {  // as if other threads had written them meanwhile
+    const std::uint64_t ticket = 1000 + static_cast<unsigned>(place);
+    REQUIRE(pwrite(file, &ticket, sizeof ticket, 320 + 64 * place + 8) == sizeof ticket);
+  }
+  close(file);
+  const std::int16_t newest = arm.newest()->command.force_mn[0];
+  for (int i = 0; i < 8; ++i) {
+    REQUIRE(end->send(forcing(500), 5));
+    CHECK(arm.newest()->command.force_mn[0] == newest);
+  }
+}
+
+TEST_CASE("page: a place that a killed thread has left in hand stops no other") {
+  const RuntimeFolder folder;
+  ArmPageAdapter arm("touch", Personality::touch, 1000);
+  arm.set_state(ArmState::running, "");
+  const auto end = open_end();
+  const int file = open(kerf::ArmPage::path_of("touch").c_str(), O_RDWR);
+  const std::uint64_t odd = 7;
+  for (int place = 0; place < 3; ++place) {
+    REQUIRE(pwrite(file, &odd, sizeof odd, 320 + 64 * place) == sizeof odd);
+  }
+  for (std::int16_t mn = 1; mn <= 9; ++mn) {
+    REQUIRE(end->send(forcing(mn), mn));
+    CHECK(arm.newest()->command.force_mn[0] == mn);
+  }
+  REQUIRE(pwrite(file, &odd, sizeof odd, 320 + 64 * 3) == sizeof odd);
+  CHECK_FALSE(end->send(forcing(1), 1));
+  CHECK_FALSE(arm.newest());
+  close(file);
+}
+
 TEST_CASE("page: one adapter of a name, and one controller") {
   const RuntimeFolder folder;
   ArmPageAdapter arm("touch", Personality::touch, 1000);
