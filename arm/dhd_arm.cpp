@@ -178,6 +178,12 @@ std::string DhdArm::last_error() const {
          (text != nullptr ? ": " + std::string(text) : "");
 }
 
+std::string DhdArm::warning() const {
+  if (has_watchdog_) return {};
+  return "the device takes no watchdog: if kerf-arm is killed or the machine stops, its force may "
+         "stay; keep a hand at its switch";
+}
+
 std::string DhdArm::text_of(std::uint32_t failure) const {
   switch (failure) {
     case ArmExchange::kStalled:

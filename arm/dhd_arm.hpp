@@ -73,6 +73,7 @@ class DhdArm final : public VendorArm {
   void stop() override;
   void close() override;
   [[nodiscard]] Facts facts() const override { return facts_; }
+  [[nodiscard]] std::string warning() const override;
   [[nodiscard]] std::string text_of(std::uint32_t failure) const override;
   [[nodiscard]] std::vector<std::pair<std::string, std::uint64_t>> errors() const override;
   [[nodiscard]] const char* notice() const noexcept override { return notice_.load(); }

@@ -64,12 +64,14 @@ void Overseer::set_reason(const std::string& reason) {
 
 void Overseer::watch() {
   const BlockStopSignals to_the_main_thread;
+  int asked_ms = 0;  // since a signal has asked for the end
   while (!stop_) {
     sleep_until_ns(monotonic_ns() + kLookMs * std::int64_t{1'000'000});
     const int ms = (looks_.fetch_add(1) + 1) * kLookMs;
     switch (phase_.load()) {
       case Phase::opening:
-        if (ms > limits_.opening_ms) {
+        asked_ms = stop_requested() ? asked_ms + kLookMs : 0;
+        if (ms > limits_.opening_ms || asked_ms > kMostClosingMs) {
           end("the vendor's library does not return from opening the device; unplug it and plug it "
               "in again");
         }

@@ -14,9 +14,10 @@ namespace kerf {
 /// Watches, from a thread of its own, over a vendor's library that may hang or crash.
 ///
 /// Time is counted in looks of this thread, kLookMs apart: a machine that stands still has no
-/// library that hangs. A call that opens or closes the device and does not return ends the program,
-/// and so does a crash in any thread: one line on standard error, exit code 2, and the page says
-/// `failed`. Frames that stop fail the exchange, and the program goes on to close the device.
+/// library that hangs. A call that opens or closes the device and does not return ends the program
+/// (after kMostClosingMs if a signal has asked for the end), and so does a crash in any thread: one
+/// line on standard error, exit code 2, and the page says `failed`. Frames that stop fail the
+/// exchange, and the program goes on to close the device.
 ///
 /// At most one per process. The page and the exchange outlive it.
 class Overseer {

@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "arm/run_arm.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <memory>
 #include <ostream>
+#include <system_error>
+#include <thread>
 
 #include "arm/arm_error.hpp"
 #include "arm/dhd_arm.hpp"
@@ -14,6 +17,7 @@
 #include "shared/arm/arm_page.hpp"
 #include "shared/posix/atomic_file.hpp"
 #include "shared/posix/error_text.hpp"
+#include "shared/posix/threads.hpp"
 #include "shared/text/command_line.hpp"
 #include "shared/text/json.hpp"
 #include "shared/text/text.hpp"
@@ -54,7 +58,8 @@ void declare(Arguments& app, ArmOptions& o) {
   app.option("--stall-ms", o.stall_ms, "a library without a frame for so long has failed")
       .within(50, 10'000)
       .shows_default();
-  app.option("--opening-s", o.opening_s, "patience for the library to open the device")
+  app.option("--opening-s", o.opening_s,
+             "patience for the library to open the device (with --auto-init at least 60)")
       .within(0.1, 600)
       .shows_default();
   app.option("--seconds", o.seconds, "end after so long (default: a signal ends it)");
@@ -76,6 +81,8 @@ void check(ArmOptions& o) {
     throw ArmError(std::string(o.auto_init ? "--auto-init" : "--index") +
                    ": of an omega; leave it out");
   }
+  constexpr double kMotionS = 60;
+  if (o.auto_init) o.opening_s = std::max(o.opening_s, kMotionS);
   check_outputs({}, {{"--report", o.report, ".json"}});
 }
 
@@ -203,7 +210,21 @@ std::string let_go(const Run& run, Overseer& overseer) {
   return failure;
 }
 
-int serve_arm(const ArmOptions& o, const std::atomic<bool>& stop, std::ostream& out) {
+/// Tries the priority on a thread of its own, since a trial takes it.
+void warn_of_priority(const ArmOptions& o, std::ostream& err) {
+  if (o.personality != Personality::omega || o.priority == 0) return;
+  int error = 0;
+  std::thread([&] { error = set_fifo(o.priority); }).join();
+  if (error == 0) return;
+  err << kProgram << ": warning: no right to SCHED_FIFO " << o.priority << " ("
+      << std::generic_category().message(error)
+      << "): frames may be milliseconds late; set an rtprio limit (./kerf doctor), or say "
+         "--priority 0"
+      << std::endl;
+}
+
+int serve_arm(const ArmOptions& o, const std::atomic<bool>& stop, std::ostream& out,
+              std::ostream& err) {
   ArmPageAdapter page(o.name, o.personality, rate_of(o));
   ArmExchange exchange(page, force_figures(o.personality).peak_n, rate_of(o));
   Overseer overseer(kProgram, page, exchange,
@@ -222,6 +243,10 @@ int serve_arm(const ArmOptions& o, const std::atomic<bool>& stop, std::ostream& 
     if (arm) arm->stop();
     if (arm) arm->close();
     throw;
+  }
+  warn_of_priority(o, err);
+  if (const std::string lack = arm->warning(); !lack.empty()) {
+    err << kProgram << ": warning: " << lack << std::endl;
   }
   const std::int64_t since_ns = monotonic_ns();
   overseer.enter(Overseer::Phase::frames);
@@ -255,7 +280,7 @@ int run_arm(int argc, const char* const* argv, const std::atomic<bool>& stop, st
     declare(app, options);
     if (!app.parse(argc, argv, out)) return 0;
     check(options);
-    return serve_arm(options, stop, out);
+    return serve_arm(options, stop, out, err);
   } catch (...) {
     err << kProgram << ": " << failure_text() << std::endl;
     return 2;

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "arm/vendor_library.hpp"
 
+#include <algorithm>
+#include <cstddef>
+
 #include <dlfcn.h>
 #include <link.h>
 
@@ -48,8 +51,12 @@ void* VendorLibrary::address_of(const char* symbol) {
 
 void VendorLibrary::require_all() const {
   if (missing_.empty()) return;
+  constexpr std::size_t kMost = 8;  // of another library altogether, all are missing
   std::string list;
-  for (const std::string& name : missing_) list += (list.empty() ? "" : ", ") + name;
+  for (std::size_t i = 0; i < std::min(missing_.size(), kMost); ++i) {
+    list += (i > 0 ? ", " : "") + missing_[i];
+  }
+  if (missing_.size() > kMost) list += " and " + std::to_string(missing_.size() - kMost) + " more";
   throw ArmError(file_ + ": lacks " + list + "; install " + product_ +
                  ", or name its file: --library PATH");
 }

@@ -13,7 +13,7 @@ FLAGS = ("--headless", "--serve", "--stereo", "--voxel-tool", "--mute", "--colou
 OF_SCENE = ("--scene", "--volume", "--spacing", "--override-spacing", "--window", "--set")
 OF_LINK = {"--loss": (50, 1), "--delay-ms": (2000, 20), "--mbit": (100000, 4)}  # of two machines: the most of each, a bad one
 WITH_VALUE = (*OF_SCENE, *OF_LINK, "--hand", "--seconds", "--rate", "--out", "--size", "--renderer", "--gradient", "--panel-scale",
-              "--device", "--port", "--sheet", "--transfer", "--record", "--listen", "--name")
+              "--device", "--port", "--library", "--sheet", "--transfer", "--record", "--listen", "--name")
 
 
 class Refusal(Exception):
@@ -33,6 +33,7 @@ class Options:
     size: str = "640x480"
     device: str = "omni"
     port: str = "socket"
+    library: str = ""  # of the vendor, for --port arm
     listen: str = ""
     name: str = ""  # of the controller; demo-PID
     sheet: str = ""

@@ -4,7 +4,8 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
-#include <span>
+#include <filesystem>
+#include <system_error>
 
 #include <fcntl.h>
 #include <sys/mman.h>
@@ -91,6 +92,25 @@ std::string ArmPage::path_of(std::string_view name) {
   } catch (const SegmentError& error) {
     throw ArmPageError(error.what());
   }
+}
+
+std::vector<std::string> running_arms() {
+  constexpr std::string_view kBegin = "arm-", kEnd = ".page";
+  std::vector<std::string> names;
+  std::error_code error;
+  try {
+    for (const auto& entry : std::filesystem::directory_iterator(segment_folder(), error)) {
+      const std::string file = entry.path().filename().string();
+      if (!file.starts_with(kBegin) || !file.ends_with(kEnd)) continue;
+      const OwnedFd page(open(entry.path().c_str(), O_RDWR | O_CLOEXEC | O_NOFOLLOW));
+      if (page.get() < 0 || !is_locked_by_another(page.get(), kAdapterByte)) continue;
+      names.push_back(file.substr(kBegin.size(), file.size() - kBegin.size() - kEnd.size()));
+    }
+  } catch (const SegmentError&) {
+    return {};
+  }
+  std::ranges::sort(names);
+  return names;
 }
 
 void ArmPage::map() {

@@ -11,6 +11,7 @@
 #include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 #include "shared/segment/connection.hpp"
 #include "shared/wire/cartesian.hpp"
@@ -66,6 +67,9 @@ struct ArmStatus {
   ArmState state = ArmState::starting;
   std::array<char, arm_page::kTextBytes> text{};  ///< ends with 0
 };
+
+/// Names of the adapters that run, for lists. Start-up only; a folder that cannot be read has none.
+[[nodiscard]] std::vector<std::string> running_arms();
 
 /// A command, and when it was written.
 struct TimedCommand {
