@@ -172,8 +172,12 @@ def check(options):
     bus = BUSES[options.device][0]
     if options.port not in ("socket", bus):
         raise Refusal(f"--port {options.port}: not for --device {options.device}; take socket or {bus}")
+    options.library = options.library or os.environ.get("KERF_ARM_LIBRARY", "")
+    if options.port == "arm" and not os.path.isfile(options.library):
+        raise Refusal(f"--port arm: {options.library or 'no library'}: name the file of a stand-in for the vendor's: --library PATH")
     if options.virtual and options.port not in ("socket", "fw"):
-        raise Refusal("--virtual: a USB bus keeps its own time; take --port socket")
+        own = "a vendor's library" if options.port == "arm" else "a USB bus"
+        raise Refusal(f"--virtual: {own} keeps its own time; take --port socket")
     options.headless = options.headless or not has_display()
     if options.headless and not (options.sheet or options.record):
         options.out = options.out or "kerf-demo"  # who sees no window finds the pictures there

@@ -11,6 +11,7 @@
 #include <fstream>
 #include <memory>
 #include <optional>
+#include <random>
 #include <sstream>
 #include <string>
 #include <thread>
@@ -119,7 +120,7 @@ class PushingChild {
  public:
   explicit PushingChild(Personality device) : pid_(fork()) {
     if (pid_ != 0) return;
-    std::signal(SIGSEGV, SIG_DFL);  // doctest's own
+    for (const int number : {SIGSEGV, SIGTERM}) std::signal(number, SIG_DFL);  // not doctest's
     const std::atomic<bool> stop{false};
     ArmPort port(std::string(word_of(device)), device, 5000, stop);
     for (;;) {
@@ -240,29 +241,43 @@ TEST_CASE("arm: asked to end it gives zero force for 20 ms, then stops and close
   }
 }
 
+// KERF_KILLS: of each device, by hand; in ctest each signal once.
 TEST_CASE("arm: zero force within 20 ms of a controller's end, stop or crash; the next one works") {
+  constexpr std::array kSignals{SIGKILL, SIGSTOP, SIGSEGV, SIGTERM};
+  const char* const wanted = std::getenv("KERF_KILLS");
+  const std::size_t kills = wanted != nullptr ? std::stoul(wanted) : kSignals.size();
+  std::mt19937_64 random(20261128);
+  long longest = 0;
   for (const Personality device : {Personality::touch, Personality::omega}) {
     CAPTURE(word_of(device));
     Bench bench;
     const auto arm = bench.arm(std::string(word_of(device)), "", {"--rate", "1000"});
     REQUIRE(eventually([&] { return runs(*arm); }, 10s));
-    for (const int number : {SIGKILL, SIGSTOP, SIGSEGV, SIGKILL}) {
+    for (std::size_t i = 0; i < kills; ++i) {
+      const int number = kSignals[i % kSignals.size()];
       CAPTURE(number);
       PushingChild controller(device);
-      const auto forced = [&] { return std::ranges::count_if(bench.frames(), &Frame::is_forced); };
-      const auto before = forced();
-      REQUIRE(eventually([&] { return forced() > before + 50; }, 10s));
+      const auto from = bench.frames().back().tick;
+      REQUIRE(eventually(
+          [&] {
+            const auto frames = bench.frames();
+            return frames.back().is_forced && frames.back().tick > from + 20;
+          },
+          10s));
+      std::this_thread::sleep_for(std::chrono::microseconds(random() % 20'000));
       controller.end(number);
       const long tick = bench.frames().back().tick;  // later ones run without it
-      REQUIRE(eventually([&] { return bench.frames().back().tick > tick + 100; }, 10s));
+      REQUIRE(eventually([&] { return bench.frames().back().tick > tick + 40; }, 10s));
       const auto frames = bench.frames();
       const auto last = std::ranges::find_if(frames.rbegin(), frames.rend(), &Frame::is_forced);
       REQUIRE(last != frames.rend());
-      CHECK(last->tick - tick <= 21);  // 20 ms, and the frame in which it was read
+      longest = std::max(longest, last->tick - tick);
+      CHECK(last->tick - tick <= 20);
     }
     arm->signal(SIGTERM);
     CHECK(arm->wait() == 0);
   }
+  MESSAGE("longest force after an end, in frames of 1 ms: " << longest);
 }
 
 TEST_CASE("arm: a killed adapter closes the port after a second; the next one is there at once") {
