@@ -3,12 +3,15 @@
 #include "shared/arm/arm_page.hpp"
 
 #include <array>
+#include <atomic>
 #include <cstdint>
 #include <cstdlib>
 #include <filesystem>
 #include <memory>
 #include <random>
 #include <string>
+#include <thread>
+#include <vector>
 
 #include <doctest/doctest.h>
 #include <fcntl.h>
@@ -297,6 +300,61 @@ TEST_CASE("page: a short file and one without an adapter are no adapter") {
     CHECK(absence_of() == Absence::no_adapter);
     CHECK_NOTHROW(ArmPageAdapter("touch", Personality::touch, 1000));  // which makes it whole
   }
+}
+
+TEST_CASE("page: both ends at once, and several senders, see whole packets alone") {
+  const RuntimeFolder folder;
+  ArmPageAdapter arm("touch", Personality::touch, 1000);
+  arm.set_state(ArmState::running, "");
+  const auto end = open_end();
+  REQUIRE(end);
+  constexpr std::int32_t kReports = 50'000;
+  std::atomic<bool> is_over{false};
+  std::atomic<int> torn{0};
+  std::vector<std::thread> senders;
+  for (int sender = 0; sender < 2; ++sender) {
+    senders.emplace_back([&] {
+      for (std::int16_t mn = 1; !is_over; mn = static_cast<std::int16_t>(mn % 30'000 + 1)) {
+        const auto packet =
+            encode(CartesianCommand{.force_mn = {mn, static_cast<std::int16_t>(-mn), mn},
+                                    .force_on = true,
+                                    .light = CartesianCommand::Light::ready,
+                                    .answers = static_cast<std::uint32_t>(mn)});
+        static_cast<void>(end->send(packet, mn));
+      }
+    });
+  }
+  std::thread adapter([&] {
+    for (std::int32_t um = 1; um <= kReports; ++um) {
+      arm.publish(report_at(um), um);
+      const auto newest = arm.newest();
+      if (!newest) continue;
+      const auto& force = newest->command.force_mn;
+      if (force[1] != -force[0] || force[2] != force[0] || newest->at_ns != force[0] ||
+          newest->command.answers != static_cast<std::uint32_t>(force[0])) {
+        ++torn;
+      }
+    }
+    is_over = true;
+  });
+  std::uint32_t last = 0, taken = 0;
+  kerf::cartesian::ReportBytes packet;
+  while (!is_over || end->waits()) {
+    if (!end->take(packet)) continue;
+    const auto report = kerf::decode_cartesian_report(packet);
+    const auto um = static_cast<std::int32_t>(report ? report->number : 0);
+    if (!report || report->number <= last ||
+        report->position_um != std::array<std::int32_t, 3>{um, -um, 2 * um}) {
+      ++torn;
+    }
+    last = report ? report->number : last;
+    ++taken;
+  }
+  adapter.join();
+  for (std::thread& sender : senders) sender.join();
+  CHECK(torn == 0);
+  CHECK(last == kReports);
+  CHECK(taken + end->overrun() == kReports);
 }
 
 TEST_CASE("page: foreign bytes anywhere lead to packets that are accepted or refused, no more") {

@@ -88,14 +88,17 @@ std::vector<LinkCounter> ArmPort::counters() const {
 
 std::string parse_arm_port(std::string_view text) {
   if (text.empty()) return {};
-  if (text.front() != ':' || text.size() == 1) {
-    throw std::runtime_error("--port arm" + escaped(text) +
-                             ": use arm, or arm:NAME with the --name of "
-                             "kerf-arm");
-  }
-  text.remove_prefix(1);
-  static_cast<void>(ArmPage::path_of(text));
-  return std::string(text);
+  const auto is_name = [](std::string_view name) {
+    try {
+      static_cast<void>(ArmPage::path_of(name));
+      return true;
+    } catch (const ArmPageError&) {
+      return false;
+    }
+  };
+  if (text.front() == ':' && is_name(text.substr(1))) return std::string(text.substr(1));
+  throw std::runtime_error("--port arm" + escaped(text) +
+                           ": not the name of a kerf-arm; use arm, or arm:NAME with its --name");
 }
 
 }  // namespace kerf
