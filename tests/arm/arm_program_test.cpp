@@ -165,6 +165,7 @@ TEST_CASE("arm: every bad library is one line and exit code 2") {
       {"touch", "crash_open", {}, "has crashed"},
       {"touch", "init_error", {}, "cannot be opened (error 300"},
       {"touch", "garbage_handle", {}, "an invalid handle"},
+      {"touch", "", {"--rate", "700"}, "--rate 700: not taken by the library (error 101"},
       {"touch", "start_error", {}, "hdStartScheduler: error 304"},
       {"touch", "no_ticks", soon, "has started no frame"},
       {"touch", "unset=100000", {}, "error 401"},
@@ -306,6 +307,40 @@ TEST_CASE("arm: a killed adapter closes the port after a second; the next one is
   arm->signal(SIGTERM);
   CHECK(arm->wait() == 0);
   CHECK(port->closed());
+}
+
+TEST_CASE("arm: a killed adapter is a lost device to a running controller") {
+  Bench bench;
+  std::ostringstream poses;  // docked, then up by 0.1 mm in each tick
+  for (int tick = 0; tick <= 2500; ++tick) {
+    const int lifted = std::max(0, tick - 2000);
+    poses << tick << " 0 " << -110 + 0.1 * lifted << " -35 1 0 0 0 1 0 0 0 1 0 " << (lifted < 10)
+          << '\n';
+  }
+  bench.folder.write("poses", poses.str());
+  setenv("KERF_MOCK_POSES", (bench.folder / "poses").c_str(), 1);
+  const auto arm = bench.arm("touch", "");
+  Process controller(
+      {kBin + "/kerf-controller", "--scene", std::string(KERF_TEST_SCENES) + "/wall.toml",
+       "--device", "touch", "--torque-scale", "1,1,1", "--port", "arm", "--guard", "--report",
+       (bench.folder / "run.json").string()},
+      bench.folder / "controller.log");
+  REQUIRE(eventually(
+      [&] {
+        const auto all = bench.frames();
+        return !all.empty() && all.back().tick > 3000;
+      },
+      30s));
+  arm->signal(SIGKILL);
+  REQUIRE(controller.ends_within(20s));
+  CAPTURE(controller.output());
+  CHECK(controller.wait() == 1);
+  const auto report = kerf::Json::parse(text_of(bench.folder / "run.json"));
+  CHECK(report.at("ticks").get<int>() > 0);  // it was taken in hand
+  REQUIRE(report.at("fault_count").get<int>() > 0);
+  CHECK(report.at("faults").at(std::size_t{0}).at("name").get<std::string>() == "stale_input");
+  CHECK(report.at("lost_packets").get<int>() == 0);
+  CHECK(report.at("unexpected_call").get<std::string>().empty());
 }
 
 TEST_CASE("arm: a second adapter of one name is refused, another name is another arm") {
