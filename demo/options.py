@@ -174,7 +174,8 @@ def check(options):
         raise Refusal(f"--port {options.port}: not for --device {options.device}; take socket or {bus}")
     options.library = options.library or os.environ.get("KERF_ARM_LIBRARY", "")
     if options.port == "arm" and not os.path.isfile(options.library):
-        raise Refusal(f"--port arm: {options.library or 'no library'}: name the file of a stand-in for the vendor's: --library PATH")
+        given = f"--library {options.library}: not a file" if options.library else "--port arm: no library"
+        raise Refusal(f"{given}; name that of a stand-in for the vendor's: --library PATH")
     if options.virtual and options.port not in ("socket", "fw"):
         own = "a vendor's library" if options.port == "arm" else "a USB bus"
         raise Refusal(f"--virtual: {own} keeps its own time; take --port socket")
