@@ -309,6 +309,27 @@ TEST_CASE("arm: a killed adapter closes the port after a second; the next one is
   CHECK(port->closed());
 }
 
+// KERF_KILLS: as above.
+TEST_CASE("arm: killed at any moment, the next adapter is there at once") {
+  Bench bench;
+  const char* const wanted = std::getenv("KERF_KILLS");
+  const std::size_t kills = wanted != nullptr ? std::stoul(wanted) : 4;
+  std::mt19937_64 random(20261129);
+  for (std::size_t i = 0; i < kills; ++i) {
+    const auto arm = bench.arm("touch", "");
+    std::this_thread::sleep_for(std::chrono::microseconds(random() % 100'000));
+    arm->signal(SIGKILL);
+    CHECK(arm->wait() == 128 + SIGKILL);
+  }
+  const auto arm = bench.arm("touch", "");
+  const std::atomic<bool> stop{false};
+  ArmPort port("touch", Personality::touch, 10'000, stop);
+  CHECK(port.wait(1000));
+  arm->signal(SIGTERM);
+  CHECK(arm->wait() == 0);
+  CHECK(std::distance(std::filesystem::directory_iterator(bench.folder / "kerf"), {}) == 0);
+}
+
 TEST_CASE("arm: a killed adapter is a lost device to a running controller") {
   Bench bench;
   std::ostringstream poses;  // docked, then up by 0.1 mm in each tick
