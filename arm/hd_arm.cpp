@@ -280,9 +280,15 @@ std::string HdArm::text_of(std::uint32_t failure) const {
     case ArmExchange::kSilent:
       return "the library's scheduler has started no frame; end other programs that use the device";
     default:
-      return "the library reports " + described(failure) +
-             "; check cable and power, and start kerf-arm again";
+      break;
   }
+  // In our own words: the library that has failed is not called for them.
+  const auto* known = std::ranges::find(kHdErrors, failure, &ErrorName::code);
+  char code[16];
+  std::snprintf(code, sizeof code, "error %x", failure);
+  return std::string("the library reports ") + code +
+         (known != std::end(kHdErrors) ? std::string(": ") + known->name : "") +
+         "; check cable and power, and start kerf-arm again";
 }
 
 std::vector<std::pair<std::string, std::uint64_t>> HdArm::errors() const {

@@ -85,6 +85,8 @@ void Overseer::watch() {
               "in again");
         }
         break;
+      case Phase::over:
+        break;
     }
   }
 }

@@ -36,8 +36,9 @@ class Overseer {
   Overseer(const Overseer&) = delete;
   Overseer& operator=(const Overseer&) = delete;
 
-  /// What the main thread is about to do. `frames`: the vendor's thread runs.
-  enum class Phase : std::uint8_t { opening, frames, closing };
+  /// What the main thread is about to do. `frames`: the vendor's thread runs; `over`: the library
+  /// is not called any more.
+  enum class Phase : std::uint8_t { opening, frames, closing, over };
   void enter(Phase phase) noexcept;
   /// What the line about a hang while closing says first: the failure that led there.
   void set_reason(const std::string& reason);

@@ -207,6 +207,7 @@ std::string let_go(const Run& run, Overseer& overseer) {
   overseer.enter(Overseer::Phase::closing);
   run.arm.stop();
   run.arm.close();
+  overseer.enter(Overseer::Phase::over);
   return failure;
 }
 

@@ -30,7 +30,7 @@ class VendorArm {
   [[nodiscard]] virtual Facts facts() const = 0;
   /// A lack of this device that the user should know, in one line; empty: none. After `open`.
   [[nodiscard]] virtual std::string warning() const { return {}; }
-  /// What a failure of the exchange means, with a way out. Main thread.
+  /// What a failure of the exchange means, with a way out. Calls no library. Main thread.
   [[nodiscard]] virtual std::string text_of(std::uint32_t failure) const = 0;
   /// How often each error of the library was seen. After `stop`.
   [[nodiscard]] virtual std::vector<std::pair<std::string, std::uint64_t>> errors() const = 0;

@@ -171,7 +171,7 @@ TEST_CASE("arm: every bad library is one line and exit code 2") {
       {"touch", "unset=100000", {}, "error 401"},
       {"touch", "hang_callback=50", stalls, "callback has stopped"},
       {"touch", "crash=50", {}, "has crashed"},
-      {"touch", "error=302@50", {}, "error 302: communication error of the mock"},
+      {"touch", "error=302@50", {}, "error 302: communication error; check"},
       {"touch", "vanish=50", {}, "error 302"},
       {"touch", "vanish=50,back=60", {}, "error 302"},
       {"touch", "error=204@50,crash_close", {}, "has crashed"},
