@@ -9,18 +9,20 @@ cd "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/.."
 # two folders can include each other. The programs meet only in shared; but lab, which measures, also
 # includes controller, record and hil, and replay, which repeats a run, controller and record. A folder that is missing here is refused.
 rooms='
-shared/numeric shared/volume shared/wire shared/text shared/posix shared/segment
+shared/numeric shared/volume shared/wire shared/text shared/posix shared/segment shared/arm
 
 controller/kernel/point_shell controller/kernel controller/kernel/proxy controller/kernel/sets
 controller/law controller/servo controller/law/registry
 controller/stability controller/input controller/scene controller/volume/file controller/volume controller/tool controller/load
 controller/plan/tables controller/plan/method controller/plan controller/volume_tool
-controller/device/port controller/device/firewire controller/device
+controller/device/port controller/device/firewire controller/device/arm controller/device
 controller/loop controller/run controller
 
 record
 
 replay
+
+arm
 
 hil hil/device hil/front hil/front/fuse hil/front/firewire hil/front/usb hil/script hil/program
 
@@ -31,7 +33,7 @@ visualizer/redraw visualizer/render visualizer/compose visualizer/panels visuali
 
 bridge/wire bridge/stream bridge/foxglove bridge/igtl bridge/page bridge/net bridge/join bridge/serve bridge
 '
-programs=(shared controller record replay hil lab visualizer bridge)
+programs=(shared controller record replay arm hil lab visualizer bridge)
 hash='^[[:space:]]*#[[:space:]]*include[[:space:]]*'
 
 # includes PATTERN PATH...: the lines below PATH... that include what matches PATTERN.
@@ -118,7 +120,7 @@ broken() {
   local posix='(fcntl|netdb|poll|pthread|sched|unistd|sys/(eventfd|file|mman|random|resource|socket|stat|time|un))\.h'
   includes '<' shared controller/kernel controller/law controller/servo |
     grep -vE "include[[:space:]]*<[a-z_]+>|$large" |
-    grep -vE "^shared/(posix|segment)/.*<$posix>" |
+    grep -vE "^shared/(posix|segment|arm)/.*<$posix>" |
     grep -vE '^shared/posix/report_tool.cpp:.*<(spawn|sys/wait)\.h>' |
     grep -vE '^shared/posix/gzip_writer.cpp:.*<zlib\.h>' |
     grep -vE '^controller/kernel/.*<(immintrin|arm_neon)\.h>'

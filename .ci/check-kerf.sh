@@ -469,7 +469,7 @@ offers() {
   [[ $(tr ' ' '\n' <<<"$offered" | LC_ALL=C sort | paste -sd ' ') == "$wanted" ]]
 }
 expect 'Tab offers commands and programs' \
-  offers 'bench bridge controller demo docs doctor emulator lab package record recorder replay setup sweep test visualizer volume' ''
+  offers 'arm bench bridge controller demo docs doctor emulator lab package record recorder replay setup sweep test visualizer volume' ''
 expect 'or those that begin so' offers 'docs doctor' 'do'
 expect 'what a bench can measure' offers 'bridge kernels pictures safety stability' bench ''
 expect 'or what begins so' offers 'kernels' bench k

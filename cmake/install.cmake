@@ -34,7 +34,7 @@ foreach(library ${libraries})  # kerf_law is kerf::law
   set_target_properties(${library} PROPERTIES EXPORT_NAME ${name})
 endforeach()
 
-set(programs kerf-controller kerf-emulator kerf-lab kerf-record kerf-recorder kerf-replay kerf-volume)
+set(programs kerf-arm kerf-controller kerf-emulator kerf-lab kerf-record kerf-recorder kerf-replay kerf-volume)
 foreach(program kerf-bridge kerf-visualizer)  # where their libraries are there
   if(TARGET ${program})
     list(APPEND programs ${program})

@@ -17,5 +17,5 @@ cat <<'FOOT'
 .fi
 .SH SEE ALSO
 kerf-controller(1), kerf-emulator(1), kerf-visualizer(1), kerf-recorder(1), kerf-record(1), kerf-replay(1), kerf-volume(1),
-kerf-bridge(1), kerf-lab(1)
+kerf-bridge(1), kerf-lab(1), kerf-arm(1)
 FOOT

@@ -28,7 +28,7 @@ class Demo:
         self.root = os.path.dirname(kerf)
         self.scene = self.find_scene(options.scene or "phantom")
         self.out = self.processes = None
-        self.controller = self.emulator = self.recorder = self.window = self.pictures = self.bridge = None
+        self.controller = self.emulator = self.arm = self.recorder = self.window = self.pictures = self.bridge = None
         self.code_of_signal = None
         self.finishing = False  # the results are being kept: a signal is too late
 
@@ -84,6 +84,7 @@ class Demo:
 
     def build(self):
         names = ["controller", "emulator", "visualizer", "recorder", "record"]
+        names += ["arm"] * (self.options.port == "arm")
         names += ["bridge"] * (self.options.serve or self.options.two_machines) + ["lab"] * self.options.two_machines
         code = subprocess.run([self.kerf, "_programs", *names], check=False).returncode
         if code:
@@ -145,7 +146,9 @@ class Demo:
         options, processes = self.options, self.processes
         self.meet = processes.path("device")
         self.ask, self.offer = ["--port", "socket:" + self.meet], ["--front", "socket", "--socket", self.meet]
-        if options.port != "socket":
+        if options.port == "arm":  # the emulator stands behind the library that kerf-arm loads
+            self.ask = ["--port", "arm:" + self.name]
+        elif options.port != "socket":
             bus = processes.path("bus")
             os.mkdir(bus)
             self.meet = os.path.join(bus, BUSES[options.device][1])
@@ -227,6 +230,15 @@ class Demo:
             if code:
                 sys.exit(code)
             self.emulator = None
+        elif options.port == "arm":
+            self.start_arm()
+
+    def start_arm(self):
+        """The adapter to the vendor's library. A stand-in for that finds its emulator by KERF_EMULATOR_SOCKET."""
+        os.environ["KERF_EMULATOR_SOCKET"] = self.meet
+        self.arm = self.processes.start("arm", [
+            "--device", self.options.device, "--name", self.name, "--library", os.path.abspath(self.options.library),
+            "--report", os.path.join(self.results, "arm.json")], out="arm.log", log="arm.log")
 
     def hand(self, told):
         if self.options.mouse:
@@ -312,13 +324,16 @@ class Demo:
             return failed
         # It has reported why it could not begin, and the others only wait for it.
         if code == 2 and self.code_of_signal is None and not self.has_log():
+            if self.arm is not None and self.arm.poll() is not None:
+                processes.conclude("arm", self.arm, 0)
             if self.emulator is not None and self.emulator.poll() is not None:
                 processes.conclude("emulator", self.emulator, 0)
             return 2
         self.print_summary()
         terminate(self.window)
+        terminate(self.arm)  # before its emulator ends, which would be a lost device to it
         for name, process, seconds in (("window", self.window, 10), ("recorder", self.recorder, 10),
-                                       ("visualizer", self.pictures, 60), ("emulator", self.emulator, 5)):
+                                       ("visualizer", self.pictures, 60), ("arm", self.arm, 5), ("emulator", self.emulator, 5)):
             if process is not None:
                 worst = processes.conclude(name, process, seconds)
                 failed = (1 if worst and name == "window" else worst) or failed

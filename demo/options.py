@@ -13,7 +13,7 @@ FLAGS = ("--headless", "--serve", "--stereo", "--voxel-tool", "--mute", "--colou
 OF_SCENE = ("--scene", "--volume", "--spacing", "--override-spacing", "--window", "--set")
 OF_LINK = {"--loss": (50, 1), "--delay-ms": (2000, 20), "--mbit": (100000, 4)}  # of two machines: the most of each, a bad one
 WITH_VALUE = (*OF_SCENE, *OF_LINK, "--hand", "--seconds", "--rate", "--out", "--size", "--renderer", "--gradient", "--panel-scale",
-              "--device", "--port", "--sheet", "--transfer", "--record", "--listen", "--name")
+              "--device", "--port", "--library", "--sheet", "--transfer", "--record", "--listen", "--name")
 
 
 class Refusal(Exception):
@@ -33,6 +33,7 @@ class Options:
     size: str = "640x480"
     device: str = "omni"
     port: str = "socket"
+    library: str = ""  # of the vendor, for --port arm
     listen: str = ""
     name: str = ""  # of the controller; demo-PID
     sheet: str = ""
@@ -171,8 +172,13 @@ def check(options):
     bus = BUSES[options.device][0]
     if options.port not in ("socket", bus):
         raise Refusal(f"--port {options.port}: not for --device {options.device}; take socket or {bus}")
+    options.library = options.library or os.environ.get("KERF_ARM_LIBRARY", "")
+    if options.port == "arm" and not os.path.isfile(options.library):
+        given = f"--library {options.library}: not a file" if options.library else "--port arm: no library"
+        raise Refusal(f"{given}; name that of a stand-in for the vendor's: --library PATH")
     if options.virtual and options.port not in ("socket", "fw"):
-        raise Refusal("--virtual: a USB bus keeps its own time; take --port socket")
+        own = "a vendor's library" if options.port == "arm" else "a USB bus"
+        raise Refusal(f"--virtual: {own} keeps its own time; take --port socket")
     options.headless = options.headless or not has_display()
     if options.headless and not (options.sheet or options.record):
         options.out = options.out or "kerf-demo"  # who sees no window finds the pictures there

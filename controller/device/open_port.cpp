@@ -10,6 +10,7 @@
 #include <stdexcept>
 #include <string_view>
 
+#include "controller/device/arm/arm_port.hpp"
 #include "controller/device/firewire/firewire_port.hpp"
 #include "controller/device/port/socket_port.hpp"
 #include "shared/posix/monotonic_clock.hpp"
@@ -117,6 +118,19 @@ std::unique_ptr<PacketPort> hid(std::string_view, const Request*) {
 }
 #endif
 
+std::unique_ptr<PacketPort> arm(std::string_view rest, const Request* request) {
+  std::string name = parse_arm_port(rest);
+  if (!request) return nullptr;
+  if (!is_cartesian(request->ours.personality)) {
+    throw std::runtime_error("--port arm: not for --device " +
+                             std::string(word_of(request->ours.personality)) +
+                             "; take --device touch or omega");
+  }
+  if (name.empty()) name = word_of(request->ours.personality);
+  return std::make_unique<ArmPort>(name, request->ours.personality, request->patience_ms,
+                                   request->stop);
+}
+
 std::unique_ptr<PacketPort> emulator(const std::string& text, const Request& request) {
   const bool is_udp = text.starts_with(kUdp);
   const std::string where = text.substr(is_udp ? kUdp.size() : kSocket.size());
@@ -135,9 +149,10 @@ std::unique_ptr<PacketPort> port(const std::string& text, const Request* request
   if (const auto rest = after("fw", text)) return firewire(*rest, request);
   if (const auto rest = after("usb", text)) return usb(*rest, request);
   if (const auto rest = after("hid", text)) return hid(*rest, request);
+  if (const auto rest = after("arm", text)) return arm(*rest, request);
   if (!text.starts_with(kUdp) && !text.starts_with(kSocket)) {
     throw std::runtime_error("--port '" + text +
-                             "' is not known; use auto, fw, usb, hid, or socket:PATH or "
+                             "' is not known; use auto, fw, usb, hid, arm, or socket:PATH or "
                              "udp:[ADDRESS:]PORT, where kerf-emulator listens");
   }
   return request ? emulator(text, *request) : nullptr;

@@ -137,6 +137,7 @@ constexpr std::initializer_list<int> kMailbox{SCMP_SYS(poll), SCMP_SYS(ppoll)};
 
 std::initializer_list<int> calls_of(std::string_view port) {
   if (port.starts_with("fw")) return kFireWire;
+  if (port.starts_with("arm")) return {};  // a page of memory
   return port.starts_with("usb") || port.starts_with("hid") ? kMailbox : kSocket;
 }
 

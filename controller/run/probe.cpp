@@ -20,6 +20,7 @@
 #include "controller/loop/wait_state.hpp"
 #include "controller/plan/plan_device.hpp"
 #include "controller/scene/scene_file.hpp"
+#include "shared/arm/arm_page.hpp"
 #include "shared/posix/atomic_file.hpp"
 #include "shared/posix/stop_signals.hpp"
 #include "shared/text/json.hpp"
@@ -234,6 +235,9 @@ int look_around(const ControllerOptions& options) {
                        {"usable", node.open_error == 0}});
   }
   if (nodes.empty()) std::puts("found    no device; ./kerf demo needs none");
+  for (const std::string& name : running_arms()) {
+    std::printf("found    kerf-arm at --port arm:%s\n", name.c_str());
+  }
   if (rights.empty()) std::puts("found    real-time priority and locked memory");
   print(lacks);
   if (!options.report.empty()) {

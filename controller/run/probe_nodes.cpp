@@ -58,11 +58,8 @@ std::optional<std::string> firewire_node(const fs::path& device) {
   return device.filename().string();
 }
 
-std::optional<std::string> falcon_node(const fs::path& device) {
-  if (hex_of(line_of(device / "idVendor")) != falcon::kVendorId ||
-      hex_of(line_of(device / "idProduct")) != falcon::kProductId) {
-    return std::nullopt;
-  }
+/// Of a device on USB.
+std::optional<std::string> usb_node(const fs::path& device) {
   int bus = 0;
   int number = 0;
   if (std::sscanf(line_of(device / "busnum").c_str(), "%d", &bus) != 1 ||
@@ -72,6 +69,32 @@ std::optional<std::string> falcon_node(const fs::path& device) {
   char name[32];
   std::snprintf(name, sizeof name, "bus/usb/%03d/%03d", bus, number);
   return name;
+}
+
+std::optional<std::string> falcon_node(const fs::path& device) {
+  if (hex_of(line_of(device / "idVendor")) != falcon::kVendorId ||
+      hex_of(line_of(device / "idProduct")) != falcon::kProductId) {
+    return std::nullopt;
+  }
+  return usb_node(device);
+}
+
+// Whose bytes only the vendor's library knows: found by their numbers, opened by kerf-arm.
+std::optional<std::string> touch_node(const fs::path& device) {
+  constexpr std::uint32_t kVendor = 0x2988, kVendorOfOthers = 0x0301, kProductOfOthers = 0x2988;
+  const auto vendor = hex_of(line_of(device / "idVendor"));
+  const bool is_other =
+      vendor == kVendorOfOthers && hex_of(line_of(device / "idProduct")) == kProductOfOthers;
+  return vendor == kVendor || is_other ? usb_node(device) : std::nullopt;
+}
+
+std::optional<std::string> omega_node(const fs::path& device) {
+  constexpr std::uint32_t kVendor = 0x1451, kProduct = 0x0402;
+  if (hex_of(line_of(device / "idVendor")) != kVendor ||
+      hex_of(line_of(device / "idProduct")) != kProduct) {
+    return std::nullopt;
+  }
+  return usb_node(device);
 }
 
 std::optional<std::string> wooden_node(const fs::path& device) {
@@ -107,6 +130,8 @@ std::vector<DeviceNode> list_device_nodes(const fs::path& root) {
   list(root, "sys/bus/firewire/devices", Personality::omni, firewire_node, nodes);
   list(root, "sys/bus/usb/devices", Personality::falcon, falcon_node, nodes);
   list(root, "sys/class/hidraw", Personality::woodenhaptics, wooden_node, nodes);
+  list(root, "sys/bus/usb/devices", Personality::touch, touch_node, nodes);
+  list(root, "sys/bus/usb/devices", Personality::omega, omega_node, nodes);
   std::ranges::sort(nodes, {}, &DeviceNode::path);
   return nodes;
 }

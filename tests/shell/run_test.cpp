@@ -290,6 +290,28 @@ TEST_CASE("devices are found by vendor and product, on each bus, and no others")
   CHECK(nodes[3].path == (root / "dev/hidraw2").string());
 }
 
+TEST_CASE("a Touch and an omega are found on USB by their numbers, and no others") {
+  const FakeRoot root;
+  const auto add = [&](const char* place, const char* vendor, const char* product, int number) {
+    const std::string folder = std::string("sys/bus/usb/devices/") + place + '/';
+    root.write(folder + "idVendor", std::string(vendor) + '\n');
+    root.write(folder + "idProduct", std::string(product) + '\n');
+    root.write(folder + "busnum", "2\n");
+    root.write(folder + "devnum", std::to_string(number) + '\n');
+  };
+  add("2-1", "2988", "0302", 1);
+  add("2-2", "0301", "2988", 2);
+  add("2-3", "1451", "0402", 3);
+  add("2-4", "0301", "0302", 4);
+  add("2-5", "1451", "0403", 5);
+  const auto nodes = list_device_nodes(root.path());
+  REQUIRE(nodes.size() == 3);
+  CHECK(nodes[0].personality == Personality::touch);
+  CHECK(nodes[1].personality == Personality::touch);
+  CHECK(nodes[2].personality == Personality::omega);
+  CHECK(nodes[2].path == (root / "dev/bus/usb/002/003").string());
+}
+
 TEST_CASE("a lack is reported with its cure: bus, device, rule, group") {
   const FakeRoot root;
   const auto lack = [&](const std::vector<DeviceNode>& nodes) {

@@ -6,6 +6,7 @@ from source import Lack, same, table
 
 # Programs whose --help says nothing of them, and when they end with 1.
 SILENT = {
+    "kerf-arm": "never",
     "kerf-bridge": "never",
     "kerf-emulator": "never",
     "kerf-record": "never",

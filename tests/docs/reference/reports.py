@@ -83,6 +83,21 @@ REPORTS = [
         ("final_tip_mm", "mm", "x, y, z in the device's frame"),
         ("wishes, wishes_refused", "", "with `--hand-socket`: of the window; that were none"),
         ("report_hash", "", "of all bytes that were handed out")]),
+    ("Adapter to a vendor's library", "`./kerf arm --report FILE` ([devices](devices.md)).",
+     [("arm/run_arm.cpp", "Json report_of("), ("arm/run_arm.cpp", "Json times_of(")], ["count", "p50", "p99", "max"], [
+        ("program, version", "", "kerf-arm and its version"),
+        ("device, name", "", "word of the device; name of the page"),
+        ("facts", "", "what the library says of itself and of the device"),
+        ("seconds", "s", "from the first frame to the end"),
+        ("frames, frames_per_s", "", "of the library"),
+        ("reports", "", "frames that were published"),
+        ("unreadable", "", "readings that were no pose"),
+        ("forced_frames, clamped_frames", "", "with a force; whose force was above the device's peak"),
+        ("expired_commands", "", "times that a force ended because its command was older than 19 ms"),
+        ("turn_us", "us", "what kerf-arm adds to a frame: `count`, `p50`, `p99`, `max`"),
+        ("command_age_us", "us", "of the commands whose force was given, likewise"),
+        ("errors", "", "how often each error of the library was seen, by name"),
+        ("failure", "", "why it ended; null: it was asked to")]),
     ("Recorder", "`./kerf recorder --report FILE`.", [("record/recorder.cpp", "void write_report(")], [], [
         ("rows", "", "ticks in the log"),
         ("lost_ticks, gaps", "", "ticks that were overwritten before they were read; in how many places"),
@@ -157,7 +172,7 @@ def page(root, programs):
     energies = re.findall(r"^  (\w+),?\s+///< (.*)", source.text, re.M)
     same(source.path, [word for word, _ in energies], source.words("kEnergySourceNames"))
     ports = []
-    for name, port in (("firewire/firewire", "fw"), ("port/usb", "usb"), ("port/hid", "hid")):
+    for name, port in (("firewire/firewire", "fw"), ("port/usb", "usb"), ("port/hid", "hid"), ("arm/arm", "arm")):
         file = Source(root, f"controller/device/{name}_port.cpp")
         body = re.search(r"::counters\(\) const \{(.*?)\n\}", file.text, re.S)[1]
         ports.append((f"`{port}`", ", ".join(f"`{key}`" for key in re.findall(r'\{"(\w+)",', body))))

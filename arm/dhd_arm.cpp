@@ -1,0 +1,211 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "arm/dhd_arm.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+#include "arm/arm_error.hpp"
+#include "shared/posix/stop_signals.hpp"
+#include "shared/posix/threads.hpp"
+
+namespace kerf {
+namespace {
+
+constexpr int kSdkMajor = 3;
+constexpr int kSaturated = 2;  // a result, no error
+constexpr int kExpertModeDisabled = 9;
+constexpr double kMmPerM = 1000;
+
+constexpr const char* kDhdErrors[] = {
+    "no error",        "error",         "communication",    "controller busy",   "no driver",
+    "no device",       "not available", "timeout",          "geometry",          "expert mode off",
+    "not implemented", "out of memory", "device not ready", "file not found",    "configuration",
+    "invalid index",   "deprecated",    "null argument",    "redundant sensors", "not enabled",
+    "device in use",   "invalid",       "no regulation"};
+constexpr std::size_t kKnownDhdErrors = std::size(kDhdErrors);
+
+}  // namespace
+
+DhdArm::DhdArm(const Options& options, ArmExchange& exchange)
+    : options_(options),
+      exchange_(exchange),
+      library_(options.library, {"libdrd.so.3", "libdrd.so"}, "the SDK of Force Dimension") {
+  library_.find("dhdGetSDKVersion", calls_.get_sdk_version);
+  library_.find("drdOpen", calls_.open);
+  library_.find("drdOpenID", calls_.open_id);
+  library_.find("drdClose", calls_.close);
+  library_.find("drdIsInitialized", calls_.is_initialized);
+  library_.find("drdAutoInit", calls_.auto_init);
+  library_.find("drdStop", calls_.stop_regulation);
+  library_.find("dhdGetSystemName", calls_.get_system_name);
+  library_.find("dhdErrorGetLast", calls_.error_get_last);
+  library_.find("dhdErrorGetLastStr", calls_.error_get_last_str);
+  library_.find("dhdEnableExpertMode", calls_.enable_expert_mode);
+  library_.find("dhdDisableExpertMode", calls_.disable_expert_mode);
+  library_.find("dhdSetWatchdog", calls_.set_watchdog);
+  library_.find("dhdEnableForce", calls_.enable_force);
+  library_.find("dhdGetPosition", calls_.get_position);
+  library_.find("dhdSetForce", calls_.set_force);
+  library_.find("dhdGetButton", calls_.get_button);
+  library_.require_all();
+}
+
+void DhdArm::open() {
+  static_assert(kKnownDhdErrors < std::tuple_size_v<decltype(error_counts_)>);
+  std::array<int, 4> version{};
+  calls_.get_sdk_version(&version[0], &version[1], &version[2], &version[3]);
+  std::string sdk;
+  for (const int part : version) sdk += (sdk.empty() ? "" : ".") + std::to_string(part);
+  if (version[0] != kSdkMajor) {
+    throw ArmError(library_.file() + ": SDK " + sdk + ", and kerf-arm knows 3; install SDK 3");
+  }
+  const int id =
+      options_.index < 0 ? calls_.open() : calls_.open_id(static_cast<char>(options_.index));
+  if (id < 0) {
+    throw ArmError("device" + (options_.index < 0 ? "" : " " + std::to_string(options_.index)) +
+                   ": cannot be opened (" + last_error() +
+                   "); check cable, power and the rights of its USB node, and end other programs "
+                   "that use it");
+  }
+  id_ = static_cast<char>(id);
+  is_open_ = true;
+  const char* const name = calls_.get_system_name(id_);
+  facts_ = {{"library", library_.file()}, {"version", sdk}, {"model", name != nullptr ? name : ""}};
+  is_initialized_ = calls_.is_initialized(id_);
+  if (!is_initialized_ && options_.initializes) {
+    if (calls_.auto_init(id_) < 0) throw ArmError("--auto-init: " + last_error());
+    // Without it the SDK would go on regulating; its force stays ours.
+    if (calls_.stop_regulation(true, id_) < 0) throw ArmError("--auto-init: " + last_error());
+    is_initialized_ = calls_.is_initialized(id_);
+  }
+  has_watchdog_ = set_watchdog();
+  facts_.emplace_back("watchdog", has_watchdog_ ? "20 ms" : "none: " + last_error());
+  if (calls_.enable_force(1, id_) < 0) {
+    throw ArmError("dhdEnableForce: " + last_error() +
+                   "; release the device's force button, and see the vendor's manual");
+  }
+}
+
+bool DhdArm::set_watchdog() noexcept {
+  if (calls_.set_watchdog(kWatchdogUnits, id_) >= 0) return true;
+  if (calls_.error_get_last() != kExpertModeDisabled) return false;
+  // Of the whole process, so no longer than for this call.
+  if (calls_.enable_expert_mode() < 0) return false;
+  const bool is_set = calls_.set_watchdog(kWatchdogUnits, id_) >= 0;
+  static_cast<void>(calls_.disable_expert_mode());
+  return is_set;
+}
+
+void DhdArm::start() {
+  thread_ = std::jthread([this] { run(); });
+}
+
+void DhdArm::stop() {
+  if (thread_.joinable()) thread_.join();
+}
+
+void DhdArm::close() {
+  if (!is_open_) return;
+  is_open_ = false;
+  static_cast<void>(calls_.close(id_));
+}
+
+void DhdArm::run() noexcept {
+  const BlockStopSignals to_the_main_thread;
+  if (options_.priority > 0) {
+    static_cast<void>(pin_to_core(options_.core >= 0 ? options_.core : allowed_cores().back()));
+    static_cast<void>(set_fifo(options_.priority));
+  }
+  const std::int64_t period_ns = kNsPerSecond / options_.rate_hz;
+  std::int64_t next_ns = monotonic_ns();
+  while (!exchange_.finished()) {
+    frame();
+    // Missed cycles are left out.
+    next_ns = std::max(next_ns + period_ns, monotonic_ns());
+    sleep_until_ns(next_ns);
+  }
+  static_cast<void>(calls_.enable_force(0, id_));
+}
+
+void DhdArm::frame() noexcept {
+  constexpr int kLookFrames = 256;  // how often the state is read that seldom changes
+  double x_m = 0;
+  double y_m = 0;
+  double z_m = 0;
+  std::optional<ArmReading> reading;
+  if (calls_.get_position(&x_m, &y_m, &z_m, id_) >= 0) {
+    unread_ = 0;
+    if (initialized_look_-- <= 0) {
+      initialized_look_ = kLookFrames;
+      is_initialized_ = calls_.is_initialized(id_);
+      notice_.store(is_initialized_ ? ""
+                                    : "not initialised: run the vendor's HapticInit, or "
+                                      "kerf-arm --auto-init, which moves the arm");
+    }
+    reading = ArmReading{.position_mm = {kMmPerM * y_m, kMmPerM * z_m, kMmPerM * x_m},
+                         .orientation = {0, 0, 0, 1},
+                         .button1 = calls_.get_button(1, id_) > 0,
+                         .button2 = false,
+                         .parked = calls_.get_button(0, id_) > 0,
+                         .homed = is_initialized_};
+  } else {
+    count_error();
+    const auto code = static_cast<std::uint32_t>(calls_.error_get_last());
+    if (++unread_ >= static_cast<int>(std::ceil(kGoneS * options_.rate_hz))) {
+      exchange_.fail(std::max(code, 1U));
+    }
+  }
+  const auto force_n = exchange_.turn(reading);
+  // Back into the SDK's axes.
+  const int result = calls_.set_force(force_n[2], force_n[0], force_n[1], id_);
+  if (result < 0) {
+    count_error();
+  } else if (result == kSaturated) {
+    ++saturated_;
+  }
+}
+
+void DhdArm::count_error() noexcept {
+  const int code = calls_.error_get_last();
+  const bool is_known = code >= 0 && static_cast<std::size_t>(code) < kKnownDhdErrors;
+  ++error_counts_[is_known ? static_cast<std::size_t>(code) : kKnownDhdErrors];
+}
+
+std::string DhdArm::last_error() const {
+  const char* const text = calls_.error_get_last_str();
+  return "error " + std::to_string(calls_.error_get_last()) +
+         (text != nullptr ? ": " + std::string(text) : "");
+}
+
+std::string DhdArm::warning() const {
+  if (has_watchdog_) return {};
+  return "the device takes no watchdog: if kerf-arm is killed or the machine stops, its force may "
+         "stay; keep a hand at its switch";
+}
+
+std::string DhdArm::text_of(std::uint32_t failure) const {
+  switch (failure) {
+    case ArmExchange::kStalled:
+      return "a call of the library has not returned; check the cable, and start kerf-arm again";
+    case ArmExchange::kUnreadable:
+    case ArmExchange::kSilent:
+      return "no reading of the arm is a position; is this library the device's own?";
+    default:
+      return "the device cannot be read any more (error " + std::to_string(failure) +
+             (failure < kKnownDhdErrors ? std::string(": ") + kDhdErrors[failure] : "") +
+             "); check cable and power, and start kerf-arm again";
+  }
+}
+
+std::vector<std::pair<std::string, std::uint64_t>> DhdArm::errors() const {
+  std::vector<std::pair<std::string, std::uint64_t>> seen;
+  for (std::size_t i = 0; i <= kKnownDhdErrors; ++i) {
+    if (error_counts_[i] == 0) continue;
+    seen.emplace_back(i < kKnownDhdErrors ? kDhdErrors[i] : "another", error_counts_[i]);
+  }
+  if (saturated_ > 0) seen.emplace_back("saturated motor", saturated_);
+  return seen;
+}
+
+}  // namespace kerf

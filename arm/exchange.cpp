@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "arm/exchange.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+namespace kerf {
+namespace {
+
+using Vec3 = std::array<double, 3>;
+
+double dot(const Vec3& a, const Vec3& b) noexcept {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+}  // namespace
+
+std::optional<std::array<double, 4>> orientation_of(const Vec3& x, const Vec3& y,
+                                                    const Vec3& z) noexcept {
+  constexpr double kWithin = 0.05;
+  const auto is = [](double value, double wanted) { return std::abs(value - wanted) <= kWithin; };
+  const Vec3 across{x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2],
+                    x[0] * y[1] - x[1] * y[0]};
+  if (!is(dot(x, x), 1) || !is(dot(y, y), 1) || !is(dot(z, z), 1) || !is(dot(x, y), 0) ||
+      !is(dot(across, z), 1)) {  // the last one excludes a mirror
+    return std::nullopt;
+  }
+  // Of the four components the largest is found from the diagonal, the others from sums beside it
+  // (Shepperd, J. Guidance and Control 1, 1978).
+  const double trace = x[0] + y[1] + z[2];
+  std::array<double, 4> q;
+  if (trace > std::max({x[0], y[1], z[2]})) {
+    q = {y[2] - z[1], z[0] - x[2], x[1] - y[0], 1 + trace};
+  } else if (x[0] >= y[1] && x[0] >= z[2]) {
+    q = {1 + x[0] - y[1] - z[2], y[0] + x[1], z[0] + x[2], y[2] - z[1]};
+  } else if (y[1] >= z[2]) {
+    q = {y[0] + x[1], 1 + y[1] - x[0] - z[2], z[1] + y[2], z[0] - x[2]};
+  } else {
+    q = {z[0] + x[2], z[1] + y[2], 1 + z[2] - x[0] - y[1], x[1] - y[0]};
+  }
+  const double length = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+  for (double& value : q) value /= length;
+  return q;
+}
+
+ArmExchange::ArmExchange(ArmPageAdapter& page, double peak_n, int rate_hz, Clock* clock) noexcept
+    : page_(page),
+      peak_n_(peak_n),
+      most_zero_frames_(std::max(kFewest, static_cast<std::uint64_t>(std::ceil(kZeroS * rate_hz)))),
+      clock_(clock) {}
+
+std::array<double, 3> ArmExchange::turn(const std::optional<ArmReading>& reading) noexcept {
+  const std::int64_t begin_ns = clock_();
+  Vec3 force_n{};
+  const bool is_pose = reading && publish(*reading, begin_ns);
+  if (is_pose) published_.fetch_add(1);
+  if (reading && !is_pose) ++counts_.unreadable;
+  const bool is_let_go = is_let_go_.load();
+  if (published_.load() > 0 && !is_let_go) force_n = commanded(begin_ns);
+  if (is_let_go) zero_frames_.fetch_add(1);
+  if (force_n != Vec3{}) ++counts_.forced;
+  last_force_n_ = force_n;
+  counts_.turn.record(clock_() - begin_ns);
+  frames_.fetch_add(1);
+  return force_n;
+}
+
+bool ArmExchange::publish(const ArmReading& reading, std::int64_t now_ns) noexcept {
+  CartesianReport report;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const auto um = cartesian::packed_mm(reading.position_mm[i]);
+    if (!um) return false;
+    report.position_um[i] = *um;
+    report.force_mn[i] = cartesian::packed_n(last_force_n_[i]);
+  }
+  const auto orientation = cartesian::packed_orientation(reading.orientation);
+  if (!orientation) return false;
+  report.orientation = *orientation;
+  report.button1 = reading.button1;
+  report.button2 = reading.button2;
+  report.parked = reading.parked;
+  report.homed = reading.homed;
+  report.powered = !is_let_go_.load();
+  page_.publish(report, now_ns);
+  return true;
+}
+
+std::array<double, 3> ArmExchange::commanded(std::int64_t now_ns) noexcept {
+  const auto newest = page_.newest();
+  if (!newest || !newest->command.force_on) return {};
+  // One that was written during this turn is a little younger than it; a time from farther ahead is
+  // none.
+  constexpr std::int64_t kAheadNs = 1'000'000;
+  const std::int64_t age_ns = now_ns - newest->at_ns;
+  if (age_ns >= kCommandLifeNs || age_ns < -kAheadNs) {
+    if (last_force_n_ != Vec3{}) ++counts_.expired;
+    return {};
+  }
+  Vec3 force_n;
+  for (std::size_t i = 0; i < 3; ++i) {
+    force_n[i] = newest->command.force_mn[i] * cartesian::kNewtonsPerCount;
+  }
+  const double length = std::sqrt(dot(force_n, force_n));
+  if (length > peak_n_) {
+    ++counts_.clamped;
+    for (double& component : force_n) component *= peak_n_ / length;
+  }
+  counts_.command_age.record(age_ns);
+  return force_n;
+}
+
+void ArmExchange::fail(std::uint32_t code) noexcept {
+  let_go();
+  std::uint32_t none = 0;
+  failure_.compare_exchange_strong(none, code);
+}
+
+}  // namespace kerf

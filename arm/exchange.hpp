@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+#include <optional>
+
+#include "shared/arm/arm_page.hpp"
+#include "shared/numeric/statistics.hpp"
+#include "shared/posix/monotonic_clock.hpp"
+
+namespace kerf {
+
+/// What a vendor's library reports in one frame, in kerf's frame and units: x right, y up, z to the
+/// user, mm; orientation of the tool as x, y, z, w.
+struct ArmReading {
+  std::array<double, 3> position_mm{};
+  std::array<double, 4> orientation{0, 0, 0, 1};
+  bool button1 = false, button2 = false;
+  bool parked = false;
+  bool homed = false;
+};
+
+/// Rotation of a tool whose axes are the columns `x`, `y`, `z`. Nothing unless they are of length 1
+/// and perpendicular within 5 %.
+[[nodiscard]] std::optional<std::array<double, 4>> orientation_of(
+    const std::array<double, 3>& x, const std::array<double, 3>& y,
+    const std::array<double, 3>& z) noexcept;
+
+/// One turn between a frame of the vendor's library and the page: the reading goes out, the force
+/// comes in.
+///
+/// `turn` belongs to the thread of the frames; it never blocks, allocates or throws. The rest is
+/// for any thread, unless noted.
+class ArmExchange {
+ public:
+  using Clock = std::int64_t() noexcept;
+
+  /// A command this old has no force any more. With a frame of 1 ms the force is zero within 20 ms
+  /// of the last command, whatever has happened to the controller.
+  static constexpr std::int64_t kCommandLifeNs = 19'000'000;
+  /// From `let_go` on, so many frames of zero force make the end, and at least kFewest.
+  static constexpr double kZeroS = 0.02;
+  static constexpr std::uint64_t kFewest = 3;
+
+  ArmExchange(ArmPageAdapter& page, double peak_n, int rate_hz,
+              Clock* clock = monotonic_ns) noexcept;
+
+  /// The force of this frame, in N in kerf's frame: that of the newest command, at most the peak;
+  /// zero before the first reading, without a command that is young enough, and after `let_go`.
+  /// Always finite. Without a reading, or if it is no pose, no report is published, and the servo
+  /// decides how long its force stays: docs/safety.md, "report lost".
+  [[nodiscard]] std::array<double, 3> turn(const std::optional<ArmReading>& reading) noexcept;
+
+  /// Zero force from the next frame on, for good.
+  void let_go() noexcept { is_let_go_.store(true); }
+  /// Whether enough frames of zero force have passed since.
+  [[nodiscard]] bool finished() const noexcept { return zero_frames_.load() >= most_zero_frames_; }
+
+  /// The first failure stays: a code of the library, or one of these. Zero force from then on.
+  enum : std::uint32_t { kStalled = 0xffff0001, kUnreadable, kSilent };
+  void fail(std::uint32_t code) noexcept;
+  /// 0: none.
+  [[nodiscard]] std::uint32_t failure() const noexcept { return failure_.load(); }
+
+  /// Frames so far: the heartbeat.
+  [[nodiscard]] std::uint64_t frames() const noexcept { return frames_.load(); }
+  [[nodiscard]] std::uint64_t published() const noexcept { return published_.load(); }
+
+  /// Once the frames have ended.
+  struct Counts {
+    std::uint64_t unreadable = 0;  ///< readings that are no pose
+    std::uint64_t forced = 0;      ///< frames with a force
+    std::uint64_t expired = 0;     ///< times that a force ended because its command was too old
+    std::uint64_t clamped = 0;     ///< frames whose force was above the peak
+    Histogram turn;                ///< duration of a turn
+    Histogram command_age;         ///< of the commands whose force was given
+  };
+  [[nodiscard]] const Counts& counts() const noexcept { return counts_; }
+
+ private:
+  [[nodiscard]] std::array<double, 3> commanded(std::int64_t now_ns) noexcept;
+  [[nodiscard]] bool publish(const ArmReading& reading, std::int64_t now_ns) noexcept;
+
+  ArmPageAdapter& page_;
+  double peak_n_;
+  std::uint64_t most_zero_frames_;
+  Clock* clock_;
+  std::atomic<bool> is_let_go_{false};
+  std::atomic<std::uint32_t> failure_{0};
+  std::atomic<std::uint64_t> frames_{0}, published_{0}, zero_frames_{0};
+  std::array<double, 3> last_force_n_{};
+  Counts counts_;
+};
+
+}  // namespace kerf

@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+#include <string>
+
+#include "arm/exchange.hpp"
+#include "arm/vendor_arm.hpp"
+#include "arm/vendor_library.hpp"
+
+namespace kerf {
+
+/// What kerf calls of the HD interface of OpenHaptics (3.0 and later), in our own words.
+///
+/// C linkage. Handles, codes and words for "what" are 32 bits without a sign; a "priority" is 16
+/// bits. Vectors are arrays of the caller.
+namespace hd {
+
+struct ErrorInfo {
+  std::uint32_t code = 0;
+  int internal = 0;
+  std::uint32_t device = 0;
+};
+using Callback = std::uint32_t(void* data);
+
+struct Calls {
+  std::uint32_t (*init_device)(const char* name);
+  void (*disable_device)(std::uint32_t device);
+  void (*begin_frame)(std::uint32_t device);
+  void (*end_frame)(std::uint32_t device);
+  void (*enable)(std::uint32_t what);
+  void (*get_booleanv)(std::uint32_t what, std::uint8_t* values);
+  void (*get_integerv)(std::uint32_t what, int* values);
+  void (*get_doublev)(std::uint32_t what, double* values);
+  void (*set_doublev)(std::uint32_t what, const double* values);
+  const char* (*get_string)(std::uint32_t what);
+  ErrorInfo (*get_error)();
+  const char* (*get_error_string)(std::uint32_t code);
+  std::uint32_t (*check_calibration)();
+  void (*update_calibration)(std::uint32_t style);
+  void (*start_scheduler)();
+  void (*stop_scheduler)();
+  void (*set_scheduler_rate)(unsigned long hz);
+  unsigned long (*schedule_asynchronous)(Callback* callback, void* data, std::uint16_t priority);
+  void (*unschedule)(unsigned long handle);
+};
+
+}  // namespace hd
+
+/// A Touch, Touch X or Omni by libHD.so.
+///
+/// One asynchronous callback of the highest priority runs a frame in each tick of the library's
+/// servo thread; it never blocks. HD's axes are kerf's; its +z of the stylus is the shaft of the
+/// tool. The position is that of the gimbal's centre, where the force acts.
+///
+/// A frame counts once kCleanFrames before it have had no error: the first ones after the start of
+/// the scheduler have none of the arm's readings. Calibration belongs to the frames as well:
+/// outside of the servo thread it never ended on a Touch.
+class HdArm final : public VendorArm {
+ public:
+  struct Options {
+    std::string library;      ///< empty: libHD.so
+    bool has_name = true;     ///< else the library chooses
+    std::string device_name;  ///< as in the vendor's set-up
+    int rate_hz = 0;          ///< 0: the library's own
+  };
+  static constexpr int kCleanFrames = 3;
+  /// Frames with errors in a row that make a failure.
+  static constexpr int kMostUnclean = 1000;
+
+  /// Loads the library. Throws ArmError.
+  HdArm(const Options& options, ArmExchange& exchange);
+
+  void open() override;
+  void start() override;
+  void stop() override;
+  void close() override;
+  [[nodiscard]] Facts facts() const override { return facts_; }
+  [[nodiscard]] std::string text_of(std::uint32_t failure) const override;
+  [[nodiscard]] std::vector<std::pair<std::string, std::uint64_t>> errors() const override;
+  [[nodiscard]] const char* notice() const noexcept override { return notice_.load(); }
+
+  /// One tick of the servo thread. Returns the word that goes on or ends the callback.
+  [[nodiscard]] std::uint32_t frame() noexcept;
+
+ private:
+  /// Takes all errors from the library's stack and counts them; returns the newest that spoils a
+  /// frame, or 0. One that means a lost device fails the exchange.
+  std::uint32_t pop_errors() noexcept;
+  void require_no_error(const char* call);
+  [[nodiscard]] bool read(ArmReading& reading) noexcept;
+  [[nodiscard]] bool follow_calibration(bool is_docked) noexcept;
+  [[nodiscard]] std::string fact(std::uint32_t what) const;
+  [[nodiscard]] std::string described(std::uint32_t code) const;
+
+  Options options_;
+  ArmExchange& exchange_;
+  VendorLibrary library_;
+  hd::Calls calls_{};
+  Facts facts_;
+  std::uint32_t device_ = 0;
+  unsigned long scheduled_ = 0;
+  bool is_open_ = false, is_started_ = false;
+  std::uint32_t calibration_style_ = 0;
+  std::atomic<bool> has_ended_{false};  ///< the callback
+  std::atomic<const char*> notice_{""};
+  // Of the servo thread, until `stop`.
+  int clean_ = 0, unclean_ = 0;
+  std::uint32_t unclean_code_ = 0;
+  int calibrated_look_ = 0;
+  bool is_calibrated_ = false;
+  std::array<std::uint64_t, 24> error_counts_{};  ///< by kHdErrors, the last one: any other
+};
+
+}  // namespace kerf

@@ -1,0 +1,291 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "arm/run_arm.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <memory>
+#include <ostream>
+#include <system_error>
+#include <thread>
+
+#include "arm/arm_error.hpp"
+#include "arm/dhd_arm.hpp"
+#include "arm/exchange.hpp"
+#include "arm/hd_arm.hpp"
+#include "arm/overseer.hpp"
+#include "shared/arm/arm_page.hpp"
+#include "shared/posix/atomic_file.hpp"
+#include "shared/posix/error_text.hpp"
+#include "shared/posix/threads.hpp"
+#include "shared/text/command_line.hpp"
+#include "shared/text/json.hpp"
+#include "shared/text/text.hpp"
+
+namespace kerf {
+namespace {
+
+constexpr const char* kProgram = "kerf-arm";
+constexpr int kUsualHz = 1000;       // of HD's scheduler
+constexpr int kUsualOmegaHz = 4000;  // of Force Dimension's devices
+
+void declare(Arguments& app, ArmOptions& o) {
+  app.option("--device", o.device,
+             "touch: by libHD of OpenHaptics; omega: by libdrd of the SDK of "
+             "Force Dimension")
+      .one_of({"touch", "omega"})
+      .required();
+  app.option("--name", o.name,
+             "name of the page; the controller's --port arm:NAME (default: the device's word)");
+  app.option("--library", o.library,
+             "file of the vendor's library (default: libHD.so; libdrd.so.3, else libdrd.so, as the "
+             "loader finds them: LD_LIBRARY_PATH, ldconfig, /usr/lib)");
+  app.option("--vendor-name", o.vendor_name, "touch: name of the device in the vendor's set-up")
+      .shows_default();
+  app.flag("--no-vendor-name", o.no_vendor_name, "touch: leave the choice to the library");
+  app.option("--index", o.index, "omega: which of several, from 0 (default: the SDK's)")
+      .within(0, 15);
+  app.option("--rate", o.rate_hz,
+             "frames a second; touch: 500, 1000 or as the device takes (default: the library's); "
+             "omega: up to 4000 (default: 4000)")
+      .within(100, 4000);
+  app.flag("--auto-init", o.auto_init,
+           "omega: if it is not initialised, let the SDK do so, which MOVES THE ARM");
+  app.option("--priority", o.priority, "omega: SCHED_FIFO priority of its thread, 0: none")
+      .within(0, 98)
+      .shows_default();
+  app.option("--cpu", o.cpu, "omega: core of its thread (default: the last one)").within(0, 1023);
+  app.option("--stall-ms", o.stall_ms, "a library without a frame for so long has failed")
+      .within(50, 10'000)
+      .shows_default();
+  app.option("--opening-s", o.opening_s,
+             "patience for the library to open the device (with --auto-init at least 60)")
+      .within(0.1, 600)
+      .shows_default();
+  app.option("--seconds", o.seconds, "end after so long (default: a signal ends it)");
+  app.option("--report", o.report, "write what was seen as JSON");
+}
+
+void check(ArmOptions& o) {
+  o.personality = o.device == "touch" ? Personality::touch : Personality::omega;
+  if (o.name.empty()) o.name = o.device;
+  static_cast<void>(ArmPage::path_of(o.name));
+  if (o.seconds && !(*o.seconds > 0 && *o.seconds < 1e7)) {
+    throw ArmError("--seconds " + std::to_string(*o.seconds) + ": not a positive number; take 60");
+  }
+  const bool is_touch = o.personality == Personality::touch;
+  if (!is_touch && o.no_vendor_name) {
+    throw ArmError("--no-vendor-name: of a touch; leave it out");
+  }
+  if (is_touch && (o.index >= 0 || o.auto_init)) {
+    throw ArmError(std::string(o.auto_init ? "--auto-init" : "--index") +
+                   ": of an omega; leave it out");
+  }
+  constexpr double kMotionS = 60;
+  if (o.auto_init) o.opening_s = std::max(o.opening_s, kMotionS);
+  check_outputs({}, {{"--report", o.report, ".json"}});
+}
+
+int rate_of(const ArmOptions& o) {
+  if (o.rate_hz > 0) return o.rate_hz;
+  return o.personality == Personality::touch ? kUsualHz : kUsualOmegaHz;
+}
+
+std::unique_ptr<VendorArm> load_arm(const ArmOptions& o, ArmExchange& exchange) {
+  if (o.personality == Personality::touch) {
+    return std::make_unique<HdArm>(HdArm::Options{.library = o.library,
+                                                  .has_name = !o.no_vendor_name,
+                                                  .device_name = o.vendor_name,
+                                                  .rate_hz = o.rate_hz},
+                                   exchange);
+  }
+  return std::make_unique<DhdArm>(DhdArm::Options{.library = o.library,
+                                                  .index = o.index,
+                                                  .rate_hz = rate_of(o),
+                                                  .initializes = o.auto_init,
+                                                  .priority = o.priority,
+                                                  .core = o.cpu},
+                                  exchange);
+}
+
+std::string model_of(const VendorArm& arm) {
+  for (const auto& [name, value] : arm.facts()) {
+    if (name == "model" && !value.empty()) return escaped(value);
+  }
+  return "a device without a name";
+}
+
+Json times_of(const Histogram& times) {
+  return {{"count", times.count()},
+          {"p50", times.percentile_us(0.5)},
+          {"p99", times.percentile_us(0.99)},
+          {"max", times.max_us()}};
+}
+
+/// Once the frames have ended.
+Json report_of(const ArmOptions& o, const VendorArm& arm, const ArmExchange& exchange,
+               double seconds, const std::string& failure) {
+  Json facts = Json::Members{};
+  for (const auto& [name, value] : arm.facts()) facts[name] = value;
+  Json errors = Json::Members{};
+  for (const auto& [name, count] : arm.errors()) errors[name] = count;
+  const ArmExchange::Counts& counts = exchange.counts();
+  return {{"program", kProgram},
+          {"version", KERF_VERSION},
+          {"device", o.device},
+          {"name", o.name},
+          {"facts", facts},
+          {"seconds", seconds},
+          {"frames", exchange.frames()},
+          {"frames_per_s", seconds > 0 ? static_cast<double>(exchange.frames()) / seconds : 0},
+          {"reports", exchange.published()},
+          {"unreadable", counts.unreadable},
+          {"forced_frames", counts.forced},
+          {"clamped_frames", counts.clamped},
+          {"expired_commands", counts.expired},
+          {"turn_us", times_of(counts.turn)},
+          {"command_age_us", times_of(counts.command_age)},
+          {"errors", errors},
+          {"failure", failure.empty() ? Json(nullptr) : Json(failure)}};
+}
+
+void nap() {
+  constexpr std::int64_t kNapNs = 5'000'000;
+  sleep_until_ns(monotonic_ns() + kNapNs);
+}
+
+/// What the parts of a run share.
+struct Run {
+  const ArmOptions& options;
+  const std::atomic<bool>& stop;
+  std::ostream& out;
+  ArmPageAdapter& page;
+  ArmExchange& exchange;
+  VendorArm& arm;
+};
+
+/// Until the first report, a failure, or the end of patience.
+void await_first_report(const Run& run) {
+  const std::int64_t give_up_ns =
+      monotonic_ns() + std::llround(run.options.opening_s * kNsPerSecond);
+  while (run.exchange.published() == 0 && run.exchange.failure() == 0 && !run.stop) {
+    if (monotonic_ns() > give_up_ns) {
+      run.exchange.fail(run.exchange.frames() == 0 ? std::uint32_t{ArmExchange::kSilent}
+                                                   : std::uint32_t{ArmExchange::kUnreadable});
+    }
+    nap();
+  }
+}
+
+/// Frames run on their own; this tells what the user has to do. Returns at the end.
+void serve(const Run& run, std::int64_t since_ns) {
+  const char* told = "";
+  const auto is_over = [&] {
+    return run.options.seconds &&
+           static_cast<double>(monotonic_ns() - since_ns) > *run.options.seconds * kNsPerSecond;
+  };
+  while (run.exchange.failure() == 0 && !run.stop && !is_over()) {
+    const char* const notice = run.arm.notice();
+    if (notice != told) {
+      told = notice;
+      if (notice[0] != 0) run.out << kProgram << ": " << notice << std::endl;
+    }
+    nap();
+  }
+}
+
+/// Zero force, then the end of the frames and of the device. Returns the text of a failure.
+std::string let_go(const Run& run, Overseer& overseer) {
+  run.exchange.let_go();
+  const std::uint32_t code = run.exchange.failure();
+  const std::string failure = code != 0 ? one_line(run.arm.text_of(code)) : "";
+  overseer.set_reason(failure);
+  run.page.set_state(failure.empty() ? ArmState::closing : ArmState::failed,
+                     failure.empty() ? "kerf-arm is asked to end" : failure);
+  constexpr int kNaps = 40;  // ten times as long as the frames of zero force take
+  for (int i = 0; i < kNaps && !run.exchange.finished(); ++i) nap();
+  overseer.enter(Overseer::Phase::closing);
+  run.arm.stop();
+  run.arm.close();
+  overseer.enter(Overseer::Phase::over);
+  return failure;
+}
+
+/// Tries the priority on a thread of its own, since a trial takes it.
+void warn_of_priority(const ArmOptions& o, std::ostream& err) {
+  if (o.personality != Personality::omega || o.priority == 0) return;
+  int error = 0;
+  std::thread([&] { error = set_fifo(o.priority); }).join();
+  if (error == 0) return;
+  err << kProgram << ": warning: no right to SCHED_FIFO " << o.priority << " ("
+      << std::generic_category().message(error)
+      << "): frames may be milliseconds late; set an rtprio limit (./kerf doctor), or say "
+         "--priority 0"
+      << std::endl;
+}
+
+int serve_arm(const ArmOptions& o, const std::atomic<bool>& stop, std::ostream& out,
+              std::ostream& err) {
+  ArmPageAdapter page(o.name, o.personality, rate_of(o));
+  ArmExchange exchange(page, force_figures(o.personality).peak_n, rate_of(o));
+  Overseer overseer(kProgram, page, exchange,
+                    {.opening_ms = static_cast<int>(o.opening_s * 1000), .stall_ms = o.stall_ms});
+  std::unique_ptr<VendorArm> arm;
+  page.set_state(ArmState::starting, "the vendor's library opens the device");
+  try {
+    arm = load_arm(o, exchange);
+    arm->open();
+    arm->start();
+  } catch (const std::exception& error) {
+    page.set_state(ArmState::failed, error.what());
+    exchange.let_go();
+    overseer.set_reason(error.what());
+    overseer.enter(Overseer::Phase::closing);
+    if (arm) arm->stop();
+    if (arm) arm->close();
+    throw;
+  }
+  warn_of_priority(o, err);
+  if (const std::string lack = arm->warning(); !lack.empty()) {
+    err << kProgram << ": warning: " << lack << std::endl;
+  }
+  const std::int64_t since_ns = monotonic_ns();
+  overseer.enter(Overseer::Phase::frames);
+  const Run run{o, stop, out, page, exchange, *arm};
+  await_first_report(run);
+  if (exchange.published() > 0 && exchange.failure() == 0) {
+    page.set_state(ArmState::running, model_of(*arm));
+    out << kProgram << ": " << o.device << " (" << model_of(*arm) << ") at arm:" << o.name
+        << std::endl;
+    serve(run, since_ns);
+  }
+  const std::string failure = let_go(run, overseer);
+  const double seconds = static_cast<double>(monotonic_ns() - since_ns) / kNsPerSecond;
+  if (!o.report.empty()) {
+    write_new_file(o.report, report_of(o, *arm, exchange, seconds, failure).document());
+  }
+  if (!failure.empty()) throw ArmError(failure);
+  return 0;
+}
+
+}  // namespace
+
+int run_arm(int argc, const char* const* argv, const std::atomic<bool>& stop, std::ostream& out,
+            std::ostream& err) {
+  try {
+    ArmOptions options;
+    CommandLine app(
+        "Connects a device to kerf by its vendor's library, which the user has "
+        "installed.",
+        kProgram, "kerf-arm " KERF_VERSION);
+    declare(app, options);
+    if (!app.parse(argc, argv, out)) return 0;
+    check(options);
+    return serve_arm(options, stop, out, err);
+  } catch (...) {
+    err << kProgram << ": " << failure_text() << std::endl;
+    return 2;
+  }
+}
+
+}  // namespace kerf

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <atomic>
+#include <iosfwd>
+#include <optional>
+#include <string>
+
+#include "shared/wire/personality.hpp"
+
+namespace kerf {
+
+/// The command line of kerf-arm.
+struct ArmOptions {
+  std::string device;
+  Personality personality{};
+  std::string name;     ///< empty: the word of the device
+  std::string library;  ///< empty: by the loader
+  std::string vendor_name = "Default Device";
+  bool no_vendor_name = false;
+  int index = -1;
+  int rate_hz = 0;  ///< 0: touch: the library's own; omega: 4000
+  bool auto_init = false;
+  int priority = 81;
+  int cpu = -1;
+  int stall_ms = 100;
+  double opening_s = 10;
+  std::optional<double> seconds;
+  std::string report;
+};
+
+/// `kerf-arm`: opens a device by its vendor's library and exchanges poses and forces with a
+/// controller by a shared page, until `stop`. Outlives its controllers: without one the force is
+/// zero, and the device stays open.
+///
+/// Returns the exit code: 0 ended as asked, 2 bad input, or a library or device that failed, with
+/// one line on `err`.
+[[nodiscard]] int run_arm(int argc, const char* const* argv, const std::atomic<bool>& stop,
+                          std::ostream& out, std::ostream& err);
+
+}  // namespace kerf

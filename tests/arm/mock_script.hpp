@@ -1,0 +1,139 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstdarg>
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <fstream>
+#include <mutex>
+#include <optional>
+#include <sstream>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include "shared/posix/monotonic_clock.hpp"
+
+// What the vendor libraries of the tests have in common: how they misbehave, where the arm is, and
+// the record of what was called. Written from the vendors' documentation alone, before the adapter.
+
+namespace kerf::mock {
+
+/// KERF_MOCK: words with commas between them, as `hang_open,error=302@50`.
+///
+/// Read when the library is loaded.
+class Behaviour {
+ public:
+  Behaviour() {
+    const char* const text = std::getenv("KERF_MOCK");
+    std::istringstream words(text != nullptr ? text : "");
+    for (std::string word; std::getline(words, word, ',');) words_.push_back(word);
+  }
+
+  [[nodiscard]] bool has(std::string_view name) const { return value_of(name).has_value(); }
+  /// The number after `name=`; `other` without it.
+  [[nodiscard]] long number(std::string_view name, long other) const {
+    const auto text = value_of(name);
+    return text && !text->empty() ? std::strtol(text->c_str(), nullptr, 10) : other;
+  }
+  /// The number after `name=NUMBER@`: when; -1 without it.
+  [[nodiscard]] long moment(std::string_view name) const {
+    const auto text = value_of(name);
+    const auto at = text ? text->find('@') : std::string::npos;
+    return at == std::string::npos ? -1 : std::strtol(text->c_str() + at + 1, nullptr, 10);
+  }
+
+ private:
+  [[nodiscard]] std::optional<std::string> value_of(std::string_view name) const {
+    for (const std::string& word : words_) {
+      if (word == name) return "";
+      if (word.starts_with(name) && word[name.size()] == '=') return word.substr(name.size() + 1);
+    }
+    return std::nullopt;
+  }
+
+  std::vector<std::string> words_;
+};
+
+/// Where the arm is from a tick on, in the vendor's own axes and units.
+struct Pose {
+  long tick = 0;
+  std::array<double, 3> position{};
+  std::array<double, 9> rotation{1, 0, 0, 0, 1, 0, 0, 0, 1};  ///< by rows
+  int buttons = 0;
+  bool docked = true;
+};
+
+/// KERF_MOCK_POSES: a file with a line for each change: tick, x y z, nine numbers of the rotation
+/// by rows, buttons, docked. Without it the arm stays at `rest`.
+inline std::vector<Pose> read_poses(const std::array<double, 3>& rest) {
+  std::vector<Pose> poses{{.tick = 0, .position = rest}};
+  const char* const file = std::getenv("KERF_MOCK_POSES");
+  std::ifstream lines(file != nullptr ? file : "/dev/null");
+  Pose pose;
+  while (lines >> pose.tick) {
+    for (double& value : pose.position) lines >> value;
+    for (double& value : pose.rotation) lines >> value;
+    lines >> pose.buttons >> pose.docked;
+    poses.push_back(pose);
+  }
+  return poses;
+}
+
+/// The pose of a tick: the last one that began.
+inline const Pose& pose_at(const std::vector<Pose>& poses, long tick) {
+  const Pose* now = &poses.front();
+  for (const Pose& pose : poses) {
+    if (pose.tick <= tick) now = &pose;
+  }
+  return *now;
+}
+
+/// KERF_MOCK_RECORD: a file of lines, each with its CLOCK_MONOTONIC time in ns first. Written at
+/// once, so they survive a SIGKILL.
+class Record {
+ public:
+  Record() {
+    const char* const file = std::getenv("KERF_MOCK_RECORD");
+    if (file != nullptr) fd_ = open(file, O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0600);
+  }
+
+  [[gnu::format(printf, 2, 3)]] void add(const char* format, ...) {
+    char text[256];
+    va_list arguments;
+    va_start(arguments, format);
+    const int size = std::vsnprintf(text, sizeof text, format, arguments);
+    va_end(arguments);
+    if (size < 0) return;
+    const std::lock_guard guard(mutex_);
+    lines_.emplace_back(text);
+    const std::string line = std::to_string(monotonic_ns()) + ' ' + text + '\n';
+    if (fd_ >= 0 && write(fd_, line.data(), line.size()) < 0) std::abort();
+  }
+  /// All lines so far, without their times.
+  [[nodiscard]] std::vector<std::string> lines() {
+    const std::lock_guard guard(mutex_);
+    return lines_;
+  }
+
+ private:
+  std::mutex mutex_;
+  std::vector<std::string> lines_;
+  int fd_ = -1;
+};
+
+[[noreturn]] inline void hang() {
+  for (;;) pause();
+}
+
+[[noreturn]] inline void crash() {
+  *static_cast<volatile int*>(nullptr) = 0;
+  std::abort();
+}
+
+}  // namespace kerf::mock
