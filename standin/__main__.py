@@ -24,7 +24,8 @@ NAMES = {"libHD.so": ("libHD.so", "libHD.so.3.0", "libHD.so.3.4"),  # built libr
 RATES_HZ = {"touch": (1000, 1000), "omega": (4000, 1000)}  # in real time, in lock-step
 SWITCHES = {"missed": ("hold", "drop"), "stop": ("hold", "drop"), "excess": ("clamp", "cut"),
             "before-enable": ("apply", "ignore"), "calibration": ("kept", "lost"), "handles": ("seen", "documented"),
-            "button0": ("parked", "hand"), "ramp": None, "stall": None}
+            "button0": ("parked", "hand"), "status": ("17", "16"),
+            "ramp": None, "stall": None}
 WITH_VALUE = ("--device", "--hand", "--fault", "--seconds", "--rate", "--on-silence", "--switch", "--report", "--junit")
 LINGER_S = 0.3  # three times the silence after which a device that drops its force does so
 GRACE_S = 5  # for a program that is asked to end

@@ -27,6 +27,7 @@ constexpr std::array kSwitches{
     Switch{"calibration", "kept", "lost", &Settings::uncalibrated},
     Switch{"handles", "seen", "documented", &Settings::documented_handles},
     Switch{"button0", "parked", "hand", &Settings::hand_buttons},
+    Switch{"status", "17", "16", &Settings::short_status},
 };
 
 [[noreturn]] void refuse(std::string_view part, const std::string& remedy) {

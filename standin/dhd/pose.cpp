@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 
 #include "standin/dhd/library.hpp"
 
@@ -136,7 +137,9 @@ KERF_STAND_IN_EXPORT int dhdGetStatus(int* status, char id) {
                                               static_cast<int>(arm.cause()),
                                               0,
                                               arm.is_initialised ? 7 : 0};
-    std::copy(words.begin(), words.end(), status);
+    // A client of an earlier SDK has room for 16.
+    const std::ptrdiff_t last = library().session.settings->short_status ? 1 : 0;
+    std::copy(words.begin(), words.end() - last, status);
     return kOk;
   });
 }

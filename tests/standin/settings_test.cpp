@@ -35,7 +35,8 @@ TEST_CASE("a socket alone is enough, and every unknown of a vendor has its first
 TEST_CASE("every key of the settings is read") {
   const auto settings = standin::parse_settings(
       "socket:s,device=omega,lockstep,rate=4000,ledger=/l,missed=drop,stop=drop,excess=cut,"
-      "before-enable=ignore,calibration=lost,handles=documented,button0=hand,ramp=0.5,stall=20");
+      "before-enable=ignore,calibration=lost,handles=documented,button0=hand,status=16,ramp=0.5,"
+      "stall=20");
   CHECK(settings.device == kerf::Personality::omega);
   CHECK(settings.lockstep);
   CHECK(settings.rate_hz == 4000);
@@ -47,6 +48,7 @@ TEST_CASE("every key of the settings is read") {
   CHECK(settings.uncalibrated);
   CHECK(settings.documented_handles);
   CHECK(settings.hand_buttons);
+  CHECK(settings.short_status);
   CHECK(settings.ramp_s == 0.5);
   CHECK(settings.stall_ms == 20);
   CHECK_FALSE(standin::parse_settings("socket:s,missed=drop,missed=hold").drop_without_frame);
