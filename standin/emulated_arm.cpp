@@ -105,10 +105,8 @@ bool EmulatedArm::take(int timeout_ms) noexcept {
   if (size <= 0) {
     if (size < 0 && (errno == EAGAIN || errno == EINTR)) return false;
     closed_ = true;
-    ledger_.add(Row::lost_link);
     return false;
   }
-  heard_ns_ = monotonic_ns();
   auto bytes = std::span<const std::uint8_t>(datagram).first(static_cast<std::size_t>(size));
   if (!Turn::is_turn(bytes)) {
     take_packet(bytes);
@@ -126,6 +124,8 @@ void EmulatedArm::take_packet(std::span<const std::uint8_t> bytes) noexcept {
   if (!report) return;
   const auto newer = static_cast<std::int32_t>(report->number - pose().number);
   if (known_ > 0 && newer <= 0) return;  // repeated, or overtaken
+  heard_ns_ = monotonic_ns();
+  silent_ticks_ = 0;
   newest_ = (newest_ + 1) % kHistory;
   known_ = std::min(known_ + 1, kHistory);
   Pose& pose = history_[newest_];
@@ -157,7 +157,9 @@ void EmulatedArm::command(DeviceVec<double> force_n, bool on, bool ready) noexce
     return;
   }
   ledger_.record_force_n(on ? norm(force_n) : 0.0);
-  if (lockstep_) static_cast<void>(take(kPatienceMs));
+  if (!lockstep_) return;
+  ++silent_ticks_;
+  static_cast<void>(take(kPatienceMs));
 }
 
 const Pose* EmulatedArm::oldest_within(double window_s) const noexcept {
@@ -192,8 +194,14 @@ DeviceVec<double> EmulatedArm::angular_velocity(double window_s) const noexcept 
   return axis * (angle / sine * report_hz_ / (pose().number - from->number));
 }
 
-bool EmulatedArm::lost() const noexcept {
-  return closed_ || (!lockstep_ && monotonic_ns() - heard_ns_ > kSilenceNs);
+bool EmulatedArm::lost() noexcept {
+  const double silent_s = lockstep_
+                              ? silent_ticks_ / report_hz_
+                              : static_cast<double>(monotonic_ns() - heard_ns_) / kNsPerSecond;
+  const bool is_lost = closed_ || silent_s > kSilenceS;
+  if (is_lost && !was_lost_) ledger_.add(Row::lost_link);
+  was_lost_ = is_lost;
+  return is_lost;
 }
 
 }  // namespace kerf::standin

@@ -47,13 +47,14 @@ class EmulatedArm {
   [[nodiscard]] std::optional<DeviceVec<double>> velocity(double window_s) const noexcept;
   /// Likewise of the rotation, rad/s.
   [[nodiscard]] DeviceVec<double> angular_velocity(double window_s) const noexcept;
-  /// The emulator has ended, or has not sent a report for kSilenceNs.
-  [[nodiscard]] bool lost() const noexcept;
+  /// The emulator has ended, or has not sent a report for kSilenceS: of the clock, or of the ticks
+  /// of lock-step. Each time that it comes to this is counted.
+  [[nodiscard]] bool lost() noexcept;
   /// Time of the newest pose by the device's clock, s.
   [[nodiscard]] double time_s() const noexcept { return pose().number / report_hz_; }
   [[nodiscard]] bool lockstep() const noexcept { return lockstep_; }
 
-  static constexpr std::int64_t kSilenceNs = 100'000'000;
+  static constexpr double kSilenceS = 0.1;
 
  private:
   void connect_to(const std::string& path);
@@ -73,6 +74,8 @@ class EmulatedArm {
   std::array<Pose, kHistory> history_{};
   std::size_t newest_ = 0, known_ = 0;
   std::int64_t heard_ns_ = 0;
+  int silent_ticks_ = 0;
+  bool was_lost_ = false;
 };
 
 }  // namespace kerf::standin

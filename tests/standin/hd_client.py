@@ -16,6 +16,7 @@ BUTTONS, POSITION, TRANSFORM, FORCE = 0x2000, 0x2050, 0x2052, 0x2700
 FORCE_OUTPUT = 0x4000
 STIFFNESS_N_PER_MM = 0.04
 MOST_N = 1.5
+REST = 1500  # ticks of no force at the end, in which the hand comes to rest
 
 
 class ErrorInfo(ctypes.Structure):
@@ -61,7 +62,7 @@ class Program:
         hd.hdGetIntegerv(BUTTONS, ctypes.byref(buttons))
         self.buttons |= buttons.value
         last = len(self.positions) + 1 >= self.count
-        if last and self.what == "spring":
+        if self.what == "spring" and len(self.positions) >= self.count - REST:
             force = [0.0, 0.0, 0.0]
         hd.hdSetDoublev(FORCE, Vector(*force))
         self.positions.append(position)
