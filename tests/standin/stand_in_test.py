@@ -188,8 +188,8 @@ class Unknowns(Case):
         for way in ("hold", "drop"):
             _, report, _, _ = self.run_client("hd_client.py", "open_frame", 50, ["--switch", f"missed={way}"])
             rms[way] = report["force"]["rms_n"]
-        self.close(rms["hold"], 1.5, 0.05)
-        self.close(rms["drop"], 1.5 * math.sqrt(0.9), 0.05)  # one tick of ten has none
+        self.close(rms["hold"], 1.5 * math.sqrt(50 / 51), 0.002)  # the last command of 51 closes the device
+        self.close(rms["drop"], 1.5 * math.sqrt(45 / 51), 0.002)  # one tick of ten has no frame
 
     def test_an_excess_is_clamped_or_cut(self):
         pull = self.file("pull.py", """
