@@ -189,7 +189,8 @@ class Run:
 
     def ask_to_end(self, patience_s):
         """After some time in which it may end by itself."""
-        for number, patience in ((None, patience_s), (signal.SIGINT, GRACE_S), (signal.SIGTERM, GRACE_S), (signal.SIGKILL, GRACE_S)):
+        requests = [(number, GRACE_S) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGKILL)]
+        for number, patience in [(None, patience_s), *requests]:
             if number is not None:
                 self.limited = number == signal.SIGINT
                 self.command.send_signal(number)

@@ -271,7 +271,11 @@ KERF_STAND_IN_EXPORT void hdStartScheduler() {
     const std::lock_guard lock(lib.mutex);
     if (lib.device) lib.device->run(true, lib.rate_hz);
   }
-  lib.scheduler.start(lib.lockstep(), lib.rate_hz);
+  try {
+    lib.scheduler.start(lib.lockstep(), lib.rate_hz);
+  } catch (const std::exception&) {  // the system has no thread left
+    lib.refuse(kTimer);
+  }
 }
 
 KERF_STAND_IN_EXPORT void hdStopScheduler() {

@@ -66,10 +66,9 @@ void Scheduler::serve(bool lockstep, int rate_hz) {
 void Scheduler::run_callbacks() {
   std::unique_lock lock(mutex_);
   // A callback may add and remove others, so the list is walked by handle.
-  std::vector<Ulong> due;
-  due.reserve(entries_.size());
-  for (const Entry& entry : entries_) due.push_back(entry.handle);
-  for (const Ulong handle : due) {
+  due_.clear();
+  for (const Entry& entry : entries_) due_.push_back(entry.handle);
+  for (const Ulong handle : due_) {
     const auto found = std::find_if(entries_.begin(), entries_.end(),
                                     [&](const Entry& entry) { return entry.handle == handle; });
     if (found == entries_.end()) continue;

@@ -74,6 +74,7 @@ class Scheduler {
   std::mutex mutex_;
   std::condition_variable changed_;
   std::vector<Entry> entries_;  ///< by falling priority
+  std::vector<Ulong> due_;      ///< in the current tick
   Ulong next_handle_ = 1;
   Ulong running_ = 0;  ///< handle of the callback that runs now
 };
