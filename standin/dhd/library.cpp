@@ -51,9 +51,9 @@ const char* text_of(int code) noexcept {
   return code >= 0 && code < kErrors ? kTexts[static_cast<std::size_t>(code)] : kTexts[kError];
 }
 
-Library& library() noexcept {
-  static auto* const one = new Library;  // never destroyed: see Session
-  return *one;
+Library& library() {
+  static auto* const kOne = new Library;  // never destroyed: see Session
+  return *kOne;
 }
 
 int Library::open() noexcept {

@@ -41,7 +41,7 @@ struct Library {
   std::atomic<bool> ticks_{false};
 };
 
-[[nodiscard]] Library& library() noexcept;
+[[nodiscard]] Library& library();
 
 /// Calls `use(device)`, whose result it returns, under the lock; kFailed and an error without an
 /// open device, or for another ID. -1 stands for the default device.

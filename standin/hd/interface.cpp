@@ -47,8 +47,8 @@ struct Library {
 };
 
 Library& library() {
-  static auto* const one = new Library;  // never destroyed: see Session
-  return *one;
+  static auto* const kOne = new Library;  // never destroyed: see Session
+  return *kOne;
 }
 
 /// Calls `use(device)` under the lock; without an open device an error, and `otherwise`.

@@ -16,11 +16,11 @@ using Long = long;            // NOLINT(google-runtime-int): the interface says 
 using Ulong = unsigned long;  // NOLINT(google-runtime-int)
 using Callback = Uint (*)(void*);
 
-/// Returned by value: 12 bytes.
+/// Returned by value: 12 bytes, as a struct of C.
 struct ErrorInfo {
-  Enum code = 0;
-  int internal_code = 0;
-  Handle device = 0;
+  Enum code;
+  int internal_code;
+  Handle device;
 };
 static_assert(sizeof(ErrorInfo) == 12);
 
