@@ -5,7 +5,7 @@
 set -euo pipefail
 cd "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/.."
 
-mapfile -t sources < <(find shared controller record hil lab visualizer bridge tests examples -name '*.[ch]pp' | sort)
+mapfile -t sources < <(find shared controller record hil standin lab visualizer bridge tests examples -name '*.[ch]pp' | sort)
 status=0
 # Many files to a call: it takes longer to start than to read one. Each line that would change is named.
 if ! found=$(printf '%s\0' "${sources[@]}" |

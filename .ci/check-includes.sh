@@ -26,6 +26,8 @@ arm
 
 hil hil/device hil/front hil/front/fuse hil/front/firewire hil/front/usb hil/script hil/program
 
+standin standin/hd standin/dhd
+
 lab/run lab/rig lab/accuracy lab/bench lab/stability lab/contact lab/safety lab/ranges lab/commands lab/bridge lab
 
 visualizer/scene visualizer/sound visualizer/gl visualizer/cast visualizer/cast/simd visualizer/surface
@@ -33,7 +35,7 @@ visualizer/redraw visualizer/render visualizer/compose visualizer/panels visuali
 
 bridge/wire bridge/stream bridge/foxglove bridge/igtl bridge/page bridge/net bridge/join bridge/serve bridge
 '
-programs=(shared controller record replay arm hil lab visualizer bridge)
+programs=(shared controller record replay arm hil standin lab visualizer bridge)
 hash='^[[:space:]]*#[[:space:]]*include[[:space:]]*'
 
 # includes PATTERN PATH...: the lines below PATH... that include what matches PATTERN.

@@ -438,7 +438,7 @@ expect 'a test needs a pattern' kerf_gives 2 test -R ''
 expect 'as it says' one_line 'kerf: test: -R: no value; see ./kerf --help'
 expect 'an unknown program is refused' kerf_gives 2 polish
 expect 'and the known ones are listed' one_line "kerf: polish: unknown; known are \
-setup demo test bench sweep doctor docs package bridge controller emulator lab record recorder visualizer"
+setup demo test bench sweep doctor stand-in docs package bridge controller emulator lab record recorder visualizer"
 # What the script has a case for, but lab, which is a program too.
 expect 'all of them' test "$(sed -n '/^case $command/,/^esac/s/^  \([a-z]*\)).*/\1/p' "$root/kerf" | grep -vx lab | sort)" == \
   "$("$root/kerf" --help | sed -n 's|^  \./kerf \([a-z]*\) .*|\1|p' | sort)"
@@ -469,7 +469,7 @@ offers() {
   [[ $(tr ' ' '\n' <<<"$offered" | LC_ALL=C sort | paste -sd ' ') == "$wanted" ]]
 }
 expect 'Tab offers commands and programs' \
-  offers 'arm bench bridge controller demo docs doctor emulator lab package record recorder replay setup sweep test visualizer volume' ''
+  offers 'arm bench bridge controller demo docs doctor emulator lab package record recorder replay setup stand-in sweep test visualizer volume' ''
 expect 'or those that begin so' offers 'docs doctor' 'do'
 expect 'what a bench can measure' offers 'bridge kernels pictures safety stability' bench ''
 expect 'or what begins so' offers 'kernels' bench k

@@ -43,14 +43,14 @@ _kerf() {
   fi
   help=$("$1" --help 2>/dev/null)
   if ((COMP_CWORD == 1)); then
-    help=$(grep -oP '^  (\./)?kerf (\K[a-z]+|NAME.* any program: \K[a-z ]+)' <<<"$help")
+    help=$(grep -oP '^  (\./)?kerf (\K[a-z-]+|NAME.* any program: \K[a-z ]+)' <<<"$help")
   else
     # A command's part of the help goes to the next heading. There words stand behind the heading or below them,
     # options anywhere; what is further to the right belongs to the line before.
     help=$(awk -v heading="$command:" '/^[^ ]/ { mine = $1 == heading } mine' <<<"$help" |
       sed -E ':a; N; $!ba; s/\n {15,}/ /g')
     if [[ $3 == -* ]] && _kerf_values "$3" "$2" <<<"$help"; then return; fi
-    help=$(grep -oP '^([a-z]+: +| {7,8})\K[a-z][a-z-]*|(?<= )--?[A-Za-z][a-z-]*' <<<"$help" | sort -u)
+    help=$(grep -oP '^([a-z-]+: +| {7,8})\K[a-z][a-z-]*|(?<= )--?[A-Za-z][a-z-]*' <<<"$help" | sort -u)
   fi
   mapfile -t COMPREPLY < <(compgen -W "$help" -- "$2")
 }

@@ -53,7 +53,10 @@ void Emulator::advance(int cycles) noexcept {
   for (int i = 0; i < cycles; ++i) {
     model_->step(next_goal());
     ++stats_.cycles;
-    stats_.peak_motor_force_n = std::max(stats_.peak_motor_force_n, norm(model_->motor_force_n()));
+    const DeviceVec<double> force_n = model_->motor_force_n();
+    stats_.peak_motor_force_n = std::max(stats_.peak_motor_force_n, norm(force_n));
+    stats_.square_sum_n2 += dot(force_n, force_n);
+    stats_.motor_work_mj = model_->state().motor_work_mj;
     if (!model_->docked() && !stats_.undocked_at) stats_.undocked_at = stats_.cycles;
   }
 }

@@ -79,6 +79,8 @@ struct EmulatorStats {
   std::uint64_t commands = 0;
   std::uint64_t refused = 0;  ///< packets that were no commands
   double peak_motor_force_n = 0;
+  double square_sum_n2 = 0;                 ///< of the motors' force, over all cycles
+  double motor_work_mj = 0;                 ///< of that force on the tip
   std::optional<std::int64_t> undocked_at;  ///< bus cycle in which the arm left its rest
   std::uint64_t report_hash = kFnv1aBasis;  ///< FNV-1a of all handed-out bytes
 };

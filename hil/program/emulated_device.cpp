@@ -124,6 +124,8 @@ EmulatorStats EmulatedDevice::joined(const EmulatorStats& earlier,
   all.commands += earlier.commands;
   all.refused += earlier.refused;
   all.peak_motor_force_n = std::max(earlier.peak_motor_force_n, later.peak_motor_force_n);
+  all.square_sum_n2 += earlier.square_sum_n2;
+  all.motor_work_mj += earlier.motor_work_mj;
   if (later.undocked_at) all.undocked_at = earlier.cycles + *later.undocked_at;
   if (earlier.undocked_at) all.undocked_at = earlier.undocked_at;
   all.report_hash = fnv1a_step(earlier.report_hash, later.report_hash);

@@ -44,6 +44,9 @@ void declare_front(Arguments& app, EmulatorOptions& o) {
   app.option("--seconds", o.seconds,
              "device time to serve, and the longest wait for a client (default: no limit)")
       .within(0.001, kMaxSeconds);
+  app.option("--linger", o.linger,
+             "fronts socket, udp: device time that goes on once a client has left, without a host")
+      .within(0, 60);
 }
 
 void declare_device(Arguments& app, EmulatorOptions& o) {

@@ -55,6 +55,7 @@ struct EmulatorOptions {
   int cpu = -1;
   bool stay = false;
   double seconds = 0;
+  double linger = 0;
   PlantValues plant;
   bool drop_torque = false;
   bool pot_noise = false;

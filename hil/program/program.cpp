@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <ostream>
@@ -78,6 +79,10 @@ void write_run_report(const std::string& file, const EmulatedDevice& device,
                        {"p99", front.wake.percentile_us(0.99)},
                        {"max", front.wake.max_us()}};
   report["peak_motor_force_n"] = stats.peak_motor_force_n;
+  report["rms_motor_force_n"] =
+      stats.cycles > 0 ? std::sqrt(stats.square_sum_n2 / static_cast<double>(stats.cycles)) : 0.0;
+  report["motor_work_mj"] = stats.motor_work_mj;
+  report["final_motor_force_n"] = norm(model.motor_force_n());
   report["calibrated"] = model.calibration() == Calibration::done;
   report["docked"] = model.docked();
   report["undocked_at_s"] = stats.undocked_at ? Json(seconds_of(*stats.undocked_at)) : nullptr;
@@ -121,7 +126,10 @@ void serve_clients(const EmulatorOptions& o, Server& server, const std::string& 
     } else {
       serve_real_time(link, device, o.packet_cycles, limits, stats);
     }
-    if (link.refusal().empty()) continue;
+    if (link.refusal().empty()) {
+      device.advance(static_cast<int>(cycles_of(o.linger)));
+      continue;
+    }
     if (!o.stay) throw HilError(place + ": " + link.refusal());
     err << "kerf-emulator: " << place << ": " << link.refusal() << std::endl;
   } while (o.stay && !limits.reached(stats.cycles));

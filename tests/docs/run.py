@@ -61,7 +61,7 @@ NOT_HERE = {
 # What stands for a reader's own file, within text.
 OWN = (("import PATH", "import ct/ --out own.nrrd"), ("info FILE", "info tooth.nrrd"), ("--volume FILE", "--volume tooth.nrrd"),
        ("--report FILE", "--report own.json"), ("DIR", "own"))
-EVERYWHERE = ("examples", "hil", "python", "scenes")
+EVERYWHERE = ("examples", "hil", "python", "scenes", "tests")
 # `./kerf` of a scratch folder: a page's own --seconds give way.
 DOOR = """#!/bin/bash
 words=()

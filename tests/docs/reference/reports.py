@@ -77,7 +77,10 @@ REPORTS = [
         ("commands_received, commands_refused", "", "of the host"),
         ("resyncs", "", "how often the process slept so long that time was skipped"),
         ("wake_us", "us", "how late cycles began: `p50`, `p99`, `max`"),
-        ("peak_motor_force_n", "N", "highest force of the motors at the tip"),
+        ("peak_motor_force_n, rms_motor_force_n", "N", "force of the motors at the tip: the highest; root of the mean square "
+         "over all its time"),
+        ("motor_work_mj", "mJ", "work of that force on the tip: what the device gave to the hand"),
+        ("final_motor_force_n", "N", "of the motors at the end"),
         ("calibrated, docked", "", "at the end"),
         ("undocked_at_s", "s", "when the stylus left its rest; null: never"),
         ("final_tip_mm", "mm", "x, y, z in the device's frame"),

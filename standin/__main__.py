@@ -1,0 +1,256 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`./kerf stand-in`: runs a program with kerf's libraries in place of those of a haptic device's vendor, over kerf-emulator,
+and reports what the program did with them (docs/stand-ins.md).
+
+    python3 standin FOLDER_OF_PROGRAMS FOLDER_OF_LIBRARIES [OPTION...] -- COMMAND...
+
+Exit codes: that of the command; 1 if it succeeded and misused the device; 2 bad input or set-up."""
+import dataclasses
+import json
+import os
+import pathlib
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+
+import findings
+
+NAMES = {"libHD.so": ("libHD.so", "libHD.so.3.0", "libHD.so.3.4"),  # built library: the names that programs load
+         "libdrd.so.3": ("libdrd.so", "libdrd.so.3", "libdhd.so", "libdhd.so.3")}
+RATES_HZ = {"touch": (1000, 1000), "omega": (4000, 1000)}  # in real time, in lock-step
+SWITCHES = {"missed": ("hold", "drop"), "stop": ("hold", "drop"), "excess": ("clamp", "cut"),
+            "before-enable": ("apply", "ignore"), "calibration": ("kept", "lost"), "handles": ("seen", "documented"),
+            "button0": ("parked", "hand"), "status": ("17", "16"),
+            "ramp": None, "stall": None}
+WITH_VALUE = ("--device", "--hand", "--fault", "--seconds", "--rate", "--on-silence", "--switch", "--report", "--junit")
+LINGER_S = 0.3  # three times the silence after which a device that drops its force does so
+GRACE_S = 5  # for a program that is asked to end
+
+
+class Refusal(Exception):
+    """Bad input or set-up: `place: value; remedy`. Exit code 2."""
+
+
+@dataclasses.dataclass
+class Options:
+    device: str = "touch"
+    hand: str = ""
+    fault: str = ""
+    seconds: str = ""
+    rate: str = ""
+    on_silence: str = "hold"
+    report: str = ""
+    junit: str = ""
+    lockstep: bool = False
+    switches: list = dataclasses.field(default_factory=list)
+    command: list = dataclasses.field(default_factory=list)
+
+
+def parse(words):
+    """Throws Refusal at the first word that is wrong."""
+    options, words = Options(), list(words)
+    while words:
+        name = words.pop(0)
+        if name == "--":
+            options.command = words
+            break
+        if name == "--lockstep":
+            options.lockstep = True
+            continue
+        if name not in WITH_VALUE:
+            raise Refusal(f"{name}: unknown; write -- before the command, and see ./kerf --help")
+        if not words or not words[0] or words[0].startswith("--"):
+            raise Refusal(f"{name}: no value; see ./kerf --help")
+        value = words.pop(0)
+        if name == "--switch":
+            options.switches.append(value)
+        else:
+            setattr(options, name[2:].replace("-", "_"), value)
+    check(options)
+    return options
+
+
+def check(options):
+    if not options.command:
+        raise Refusal("no command; write it behind --, as in ./kerf stand-in -- python3 program.py")
+    if options.device not in RATES_HZ:
+        raise Refusal(f"--device {options.device}: unknown; take touch or omega")
+    if options.on_silence not in ("hold", "drop"):
+        raise Refusal(f"--on-silence {options.on_silence}: unknown; take hold or drop")
+    if options.seconds and (not re.fullmatch(r"[0-9]{1,6}(\.[0-9]+)?", options.seconds) or float(options.seconds) < 0.01):
+        raise Refusal(f"--seconds {options.seconds}: not a number of seconds; take 10")
+    if options.rate and (not re.fullmatch(r"[0-9]{3,4}", options.rate) or not 100 <= int(options.rate) <= 8000
+                         or options.lockstep and 8000 % int(options.rate)):
+        raise Refusal(f"--rate {options.rate}: not a rate in Hz (in lock-step it divides 8000); take 1000")
+    for switch in options.switches:
+        name, _, value = switch.partition("=")
+        if name not in SWITCHES or not value or SWITCHES[name] and value not in SWITCHES[name]:
+            known = ", ".join(f"{key}={'|'.join(words) if words else 'N'}" for key, words in SWITCHES.items())
+            raise Refusal(f"--switch {switch}: unknown; take one of {known}")
+        if SWITCHES[name] is None and not re.fullmatch(r"[0-9]{1,5}(\.[0-9]+)?", value):
+            raise Refusal(f"--switch {switch}: not a number; take {'50' if name == 'stall' else '0.2'}")
+    for name, path in (("--hand", options.hand), ("--fault", options.fault)):
+        if path and not os.path.isfile(path):
+            raise Refusal(f"{name} {path}: no such file; name a script")
+    for name, path in (("--report", options.report), ("--junit", options.junit)):
+        if path and not os.path.isdir(os.path.dirname(os.path.abspath(path))):
+            raise Refusal(f"{name} {path}: no such folder; create it first")
+
+
+class Run:
+    """One command, its emulator, and a private folder for both. `end` leaves nothing behind."""
+
+    def __init__(self, programs, libraries, options):
+        self.programs, self.libraries, self.options = programs, libraries, options
+        parent = os.environ.get("TMPDIR") or "/tmp"
+        try:
+            self.folder = tempfile.mkdtemp(prefix="kerf-stand-in.", dir=parent)
+        except OSError:
+            raise Refusal(f"{parent}: cannot be written; set TMPDIR to a folder that can") from None
+        self.emulator = self.command = None
+        self.limited = False  # ended by --seconds
+
+    def path(self, *names):
+        return os.path.join(self.folder, *names)
+
+    @property
+    def rate_hz(self):
+        return int(self.options.rate) if self.options.rate else RATES_HZ[self.options.device][self.options.lockstep]
+
+    def place_libraries(self):
+        """Under every name that programs load, in the layout of a library path and of the vendor's SDK."""
+        sdk = self.path("sdk", "lib", "release", "lin-x86_64-gcc")
+        for folder in (self.path("lib"), sdk, os.path.join(sdk, "lib")):  # a client looks for a second lib in there
+            os.makedirs(folder)
+            for built, names in NAMES.items():
+                source = os.path.join(self.libraries, built)
+                if not os.path.exists(source):
+                    raise Refusal(f"{source}: not built; try ./kerf setup")
+                for name in names:
+                    os.symlink(os.path.realpath(source), os.path.join(folder, name))
+
+    def environment(self):
+        options = self.options
+        told = [f"socket:{self.path('device')}", f"device={options.device}", f"rate={self.rate_hz}",
+                f"ledger={self.path('ledger')}", *["lockstep"] * options.lockstep]
+        if options.on_silence == "drop":
+            told += ["missed=drop", "stop=drop"]
+        paths = [self.path("lib"), os.environ.get("LD_LIBRARY_PATH", "")]
+        return {**os.environ, "KERF_STAND_IN": ",".join(told + options.switches),
+                "LD_LIBRARY_PATH": ":".join(filter(None, paths)),
+                **{name: self.path("sdk") for name in ("FDSDK", "FORCEDIM_SDK", "FORCE_DIMENSION_SDK")}}
+
+    def start_emulator(self):
+        options = self.options
+        hand = options.hand or os.path.join(os.path.dirname(os.path.abspath(__file__)), "hand.toml")
+        pace = ["--lockstep", "--rate", str(self.rate_hz)] if options.lockstep else \
+            ["--packet-cycles", str(max(1, 8000 // max(self.rate_hz, 2000)))]
+        limit = ["--seconds", options.seconds] if options.lockstep and options.seconds else []
+        words = ["--personality", options.device, "--front", "socket", "--socket", self.path("device"), "--hand", hand, "--stay",
+                 "--linger", str(LINGER_S), "--report", self.path("emulator.json"), *pace, *limit,
+                 *(["--fault", options.fault] if options.fault else []), *["--drop-torque"] * (options.on_silence == "drop")]
+        with open(self.path("emulator.log"), "wb") as log:
+            self.emulator = subprocess.Popen(
+                ["setpriv", "--pdeathsig", "TERM", os.path.join(self.programs, "kerf-emulator"), *words],
+                stdin=subprocess.DEVNULL, stdout=log, stderr=log, start_new_session=True)
+        while not os.path.exists(self.path("device")):
+            if self.emulator.poll() is not None:
+                lines = pathlib.Path(self.path("emulator.log")).read_text(errors="replace").splitlines()
+                raise Refusal(lines[-1].removeprefix("kerf-emulator: ") if lines else "kerf-emulator: ended without a word")
+            time.sleep(0.005)
+
+    def run_command(self):
+        """Returns its exit code as a shell has it; 0 if --seconds ended it and it went at the first request."""
+        try:
+            self.command = subprocess.Popen(self.options.command, env=self.environment())
+        except OSError as error:
+            raise Refusal(f"{self.options.command[0]}: cannot be started ({error.strerror}); name a program") from None
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+            signal.signal(number, self.pass_on)
+        limit = time.monotonic() + float(self.options.seconds) if self.options.seconds and not self.options.lockstep else None
+        while self.command.poll() is None:
+            time.sleep(0.02)
+            gone = self.emulator.poll() is not None  # in lock-step its time is over
+            if gone or limit is not None and time.monotonic() >= limit:
+                self.ask_to_end(GRACE_S if gone else 0)
+        code = self.command.returncode
+        if self.limited and code in (0, 130, -signal.SIGINT):
+            return 0
+        return code if code >= 0 else 128 - code
+
+    def pass_on(self, number, _frame):
+        # A terminal has sent its own signals to the command, too.
+        if number != signal.SIGINT and self.command.poll() is None:
+            self.command.send_signal(number)
+
+    def ask_to_end(self, patience_s):
+        """After some time in which it may end by itself."""
+        requests = [(number, GRACE_S) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGKILL)]
+        for number, patience in [(None, patience_s), *requests]:
+            if number is not None:
+                self.limited = number == signal.SIGINT
+                self.command.send_signal(number)
+            try:
+                self.command.wait(patience)
+                return
+            except subprocess.TimeoutExpired:
+                continue
+
+    def emulator_report(self):
+        if self.emulator.poll() is None:
+            self.emulator.terminate()
+        try:
+            self.emulator.wait(10)
+            return json.loads(pathlib.Path(self.path("emulator.json")).read_text())
+        except (OSError, ValueError, subprocess.TimeoutExpired):
+            print("kerf: stand-in: kerf-emulator left no report; its figures are missing", file=sys.stderr)
+            return {}
+
+    def end(self):
+        for process in (self.command, self.emulator):
+            if process is not None and process.poll() is None:
+                process.kill()
+                process.wait()
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+
+def run(programs, libraries, options):
+    run = Run(programs, libraries, options)
+    try:
+        run.place_libraries()
+        run.start_emulator()
+        code = run.run_command()
+        emulator = run.emulator_report()
+        counts, periods = findings.read_ledger(run.path("ledger"))
+    finally:
+        run.end()
+    report = findings.findings(counts, periods, emulator, {
+        "command": options.command, "exit_code": code, "device": options.device, "lockstep": options.lockstep,
+        "rate_hz": run.rate_hz, "on_silence": options.on_silence, "switches": options.switches})
+    for path, write in ((options.report, findings.write_json), (options.junit, findings.write_junit)):
+        if path:
+            try:
+                write(path, report)
+            except OSError as error:
+                raise Refusal(f"{path}: cannot be written ({error.strerror}); name another file") from None
+    for line in findings.summary(report):
+        print("kerf: stand-in: " + line, file=sys.stderr)
+    return code or int(bool(report["misuse"]))
+
+
+def main():
+    programs, libraries, *words = sys.argv[1:]
+    try:
+        return run(programs, libraries, parse(words))
+    except (Refusal, ValueError) as refusal:
+        print("kerf: stand-in: " + re.sub(r"[\x00-\x1f\x7f]", "?", str(refusal)), file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        return 130
+
+
+sys.exit(main())

@@ -1,0 +1,135 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a program did with a stand-in: read from the ledger of the libraries and the report of the emulator, written as JSON
+and JUnit."""
+import json
+import struct
+from xml.sax.saxutils import escape, quoteattr
+
+BUCKET_US = 10
+HOUSE_KEEPING_N = 1e-3  # a force below one step of the packet is none
+
+MISUSE = {  # rows of the ledger, and what each one means
+    "frames_not_ended": "a frame was still open at the end of its tick",
+    "begins_refused": "a frame began within another, or a second one in its tick",
+    "ends_refused": "a frame ended that had not begun",
+    "set_outside_frame": "a force was set outside a frame",
+    "bad_handles": "a call for a device that is not open",
+    "bad_schedules": "a callback was unscheduled that is not scheduled",
+    "not_finite": "a force that is not a finite number",
+    "not_cleared": "the scheduler stopped, or the device was closed, with a force",
+    "stalls": "a callback, or a pause while a force was on, lasted too long",
+}
+NOTES = {
+    "excess": "forces above the device's limit",
+    "impulses": "steps of the force above the limit",
+    "too_fast": "ticks above the limit of speed",
+    "lost_link": "times that the device was gone",
+    "watchdog": "expiries of the watchdog",
+}
+
+
+def read_ledger(path):
+    """The rows by name, and the number of periods by bucket. A program that loaded no library leaves none."""
+    try:
+        with open(path, "rb") as file:
+            data = file.read()
+    except FileNotFoundError:
+        data = b""
+    if len(data) < 16:
+        return {}, []
+    magic, rows, buckets = struct.unpack_from("<8sII", data)
+    if magic != b"kerfldg1" or len(data) < 16 + 48 * rows + 8 * buckets:
+        raise ValueError(f"{path}: not a ledger of this version of kerf; build it again with ./kerf setup")
+    counts = {}
+    for at in range(16, 16 + 48 * rows, 48):
+        name = data[at:at + 39].rstrip(b"\0").decode()
+        counts[name] = struct.unpack_from("<d" if data[at + 39:at + 40] == b"d" else "<Q", data, at + 40)[0]
+    return counts, list(struct.unpack_from(f"<{buckets}Q", data, 16 + 48 * rows))
+
+
+def percentile_us(periods, fraction):
+    """The upper end of the bucket that holds it; None without a period."""
+    total, seen = sum(periods), 0
+    for bucket, count in enumerate(periods):
+        seen += count
+        if total and seen >= fraction * total:
+            return (bucket + 1) * BUCKET_US
+    return None
+
+
+def findings(counts, periods, emulator, run):
+    """The report as a dictionary. `run`: command, exit code, device and the like, which go in unchanged."""
+    commands = counts.get("commands", 0)
+    misuse = [{"what": name, "count": counts[name], "meaning": meaning}
+              for name, meaning in MISUSE.items() if counts.get(name)]
+    opened, closed = counts.get("opened", 0), counts.get("closed", 0)
+    if opened > closed:
+        misuse.append({"what": "left_open", "count": opened - closed, "meaning": "the program ended without closing the device"})
+    if opened > closed and counts.get("last_n", 0) > HOUSE_KEEPING_N:
+        misuse.append({"what": "force_at_end", "count": 1, "meaning": "the program ended with a force"})
+    if not opened:
+        misuse.append({"what": "not_opened", "count": 1, "meaning": "the program opened no device of the stand-in"})
+    return {
+        **run,
+        "seconds": emulator.get("seconds"),
+        "force": {
+            "commands": commands,
+            "peak_n": counts.get("peak_n", 0.0),
+            "rms_n": (counts["square_sum_n2"] / commands) ** 0.5 if commands else 0.0,
+            "given_peak_n": emulator.get("peak_motor_force_n"),
+            "given_rms_n": emulator.get("rms_motor_force_n"),
+            "given_at_end_n": emulator.get("final_motor_force_n"),
+        },
+        "energy": {"given_mj": emulator.get("motor_work_mj")},
+        "deadlines": {
+            "ticks": counts.get("ticks", 0),
+            "missed_ticks": counts.get("missed_ticks", 0),
+            "period_us": {"p50": percentile_us(periods, 0.5), "p99": percentile_us(periods, 0.99),
+                          "max": counts.get("longest_period_us") if sum(periods) else None},
+            "longest_callback_us": counts.get("longest_us", 0.0),
+        },
+        "misuse": misuse,
+        "notes": [{"what": name, "count": counts[name], "meaning": meaning}
+                  for name, meaning in NOTES.items() if counts.get(name)],
+        "final_tip_mm": emulator.get("final_tip_mm"),
+        "report_hash": emulator.get("report_hash"),
+    }
+
+
+def write_json(path, report):
+    with open(path, "w", encoding="utf-8") as file:
+        json.dump(report, file, indent=2)
+        file.write("\n")
+
+
+def write_junit(path, report):
+    """One case for the command, one for each kind of misuse."""
+    found = {one["what"]: one for one in report["misuse"]}
+    cases = [("command", f"exit code {report['exit_code']}" if report["exit_code"] else "")]
+    for name in [*MISUSE, "left_open", "force_at_end", "not_opened"]:
+        one = found.get(name)
+        cases.append((name, f"{one['count']} x {one['meaning']}" if one else ""))
+    failed = sum(bool(why) for _, why in cases)
+    with open(path, "w", encoding="utf-8") as file:
+        file.write('<?xml version="1.0" encoding="UTF-8"?>\n'
+                   f'<testsuite name="kerf stand-in" tests="{len(cases)}" failures="{failed}" errors="0" skipped="0">\n')
+        for name, why in cases:
+            file.write(f'  <testcase classname="stand-in" name={quoteattr(name)}')
+            file.write(f'><failure message={quoteattr(why)}>{escape(why)}</failure></testcase>\n' if why else "/>\n")
+        file.write("</testsuite>\n")
+
+
+def summary(report):
+    """Lines for a person."""
+    force, late = report["force"], report["deadlines"]
+    work = report["energy"]["given_mj"]
+    yield (f"force: {force['commands']} commands, peak {force['peak_n']:.2f} N, RMS {force['rms_n']:.2f} N"
+           + (f"; given to the hand: {work:.1f} mJ" if work is not None else ""))
+    period = late["period_us"]
+    if period["p50"] is not None:
+        yield (f"deadlines: {late['ticks']} ticks, {late['missed_ticks']} missed; period p50 {period['p50']} us, "
+               f"p99 {period['p99']} us, max {period['max']:.0f} us")
+    for one in report["notes"]:
+        yield f"note: {one['count']} {one['meaning']}"
+    for one in report["misuse"]:
+        yield f"misuse: {one['what']}: {one['count']} x {one['meaning']}"

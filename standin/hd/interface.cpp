@@ -1,0 +1,342 @@
+// SPDX-License-Identifier: Apache-2.0
+// The 36 functions of the HD interface, over Touch and Scheduler. Names and shapes are facts of the
+// interface; the bodies are ours.
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <exception>
+#include <mutex>
+#include <optional>
+#include <string_view>
+
+#include "standin/hd/error_stack.hpp"
+#include "standin/hd/numbers.hpp"
+#include "standin/hd/scheduler.hpp"
+#include "standin/hd/touch.hpp"
+#include "standin/session.hpp"
+
+namespace kerf::hd {
+namespace {
+
+using standin::Row;
+
+/// All state of the library. `mutex` guards the device; no callback runs while it is held.
+struct Library {
+  standin::Session session{"libHD"};
+  ErrorStack errors;
+  std::recursive_mutex mutex;
+  std::optional<Touch> device;
+  int rate_hz = 1000;
+  Scheduler scheduler;
+
+  Library()
+      : scheduler({[this] { tick(&Touch::begin_tick); }, [this] { tick(&Touch::end_tick); }},
+                  *session.ledger, session.settings ? session.settings->stall_ms : 50) {
+    if (session.settings) rate_hz = session.settings->rate_hz;
+  }
+
+  void tick(void (Touch::*what)() noexcept) {
+    const std::lock_guard lock(mutex);
+    if (device) ((*device).*what)();
+  }
+  [[nodiscard]] bool lockstep() const noexcept {
+    return session.settings && session.settings->lockstep;
+  }
+  void refuse(Enum code) noexcept { errors.push(code); }
+};
+
+Library& library() {
+  static auto* const kOne = new Library;  // never destroyed: see Session
+  return *kOne;
+}
+
+/// Calls `use(device)` under the lock; without an open device an error, and `otherwise`.
+template <class Result, class Use>
+Result with_device(Result otherwise, const Use& use) {
+  Library& lib = library();
+  const std::lock_guard lock(lib.mutex);
+  if (lib.device) return use(*lib.device);
+  lib.session.ledger->add(Row::bad_handles);
+  lib.refuse(kBadHandle);
+  return otherwise;
+}
+
+/// The same for a handle that the caller names.
+template <class Use>
+void with_handle(Handle handle, const Use& use) {
+  Library& lib = library();
+  const std::lock_guard lock(lib.mutex);
+  if (lib.device && handle == kTheDevice) return use(*lib.device);
+  lib.session.ledger->add(Row::bad_handles);
+  lib.errors.push(kBadHandle, handle);
+}
+
+template <class T>
+void get(Enum name, T* out, unsigned type) {
+  with_device(0, [&](Touch& device) {
+    if (out == nullptr) {
+      library().refuse(kInvalidValue);
+      return 0;
+    }
+    const auto values = device.read(name, type);
+    for (std::size_t i = 0; values && i < values->count; ++i) {
+      out[i] = static_cast<T>(type == kInt || type == kLong ? std::round(values->value[i])
+                                                            : values->value[i]);
+    }
+    return 0;
+  });
+}
+
+template <class T>
+void set(Enum name, const T* in, unsigned type) {
+  with_device(0, [&](Touch& device) {
+    const std::size_t count = device.writes(name, type);
+    if (count > 0 && in == nullptr) library().refuse(kInvalidValue);
+    if (count == 0 || in == nullptr) return 0;
+    std::array<double, 16> value{};
+    for (std::size_t i = 0; i < count; ++i) value[i] = static_cast<double>(in[i]);
+    device.write(name, value);
+    return 0;
+  });
+}
+
+bool is_the_device(const char* name) {
+  return name == nullptr || std::string_view(name) == "Default Device" ||
+         std::string_view(name) == "Default PHANToM";
+}
+
+}  // namespace
+}  // namespace kerf::hd
+
+// NOLINTBEGIN(readability-identifier-naming): names of the interface
+using namespace kerf::hd;  // NOLINT(google-build-using-namespace): the interface is global
+
+// Devices and frames.
+
+KERF_STAND_IN_EXPORT Handle hdInitDevice(const char* name) {
+  Library& lib = library();
+  const std::lock_guard lock(lib.mutex);
+  if (lib.device) {
+    lib.refuse(kAlreadyOpen);
+    return kNoDevice;
+  }
+  try {
+    if (lib.session.is_for(kerf::Personality::touch, "libHD")) {
+      if (is_the_device(name)) {
+        lib.device.emplace(*lib.session.settings, *lib.session.ledger, lib.errors);
+        lib.device->run(lib.scheduler.runs(), lib.rate_hz);
+        return kTheDevice;
+      }
+      kerf::standin::complain("libHD", std::string(name) +
+                                           ": no such device; open NULL, "
+                                           "\"Default Device\" or "
+                                           "\"Default PHANToM\"");
+    }
+  } catch (const std::exception& error) {
+    kerf::standin::complain("libHD", error.what());
+  }
+  lib.errors.push(kDeviceFault, kNoDevice);
+  return kNoDevice;
+}
+
+KERF_STAND_IN_EXPORT void hdDisableDevice(Handle handle) {
+  with_handle(handle, [](Touch& device) {
+    device.close();
+    library().device.reset();
+  });
+}
+
+KERF_STAND_IN_EXPORT void hdMakeCurrentDevice(Handle handle) {
+  with_handle(handle, [](Touch&) {});
+}
+
+KERF_STAND_IN_EXPORT Handle hdGetCurrentDevice() {
+  Library& lib = library();
+  const std::lock_guard lock(lib.mutex);
+  // A client in use runs only if this equals the handle that it gets later.
+  const bool is_documented = lib.session.settings && lib.session.settings->documented_handles;
+  return lib.device || !is_documented ? kTheDevice : kNoDevice;
+}
+
+KERF_STAND_IN_EXPORT void hdBeginFrame(Handle handle) {
+  with_handle(handle, [](Touch& device) { device.begin_frame(); });
+}
+
+KERF_STAND_IN_EXPORT void hdEndFrame(Handle handle) {
+  with_handle(handle, [](Touch& device) { device.end_frame(); });
+}
+
+KERF_STAND_IN_EXPORT ErrorInfo hdGetError() {
+  return library().errors.pop();
+}
+
+KERF_STAND_IN_EXPORT const char* hdGetErrorString(Enum code) {
+  return text_of(code);
+}
+
+// Capabilities and parameters.
+
+KERF_STAND_IN_EXPORT void hdEnable(Enum capability) {
+  with_device(0, [&](Touch& device) { return device.enable(capability, true), 0; });
+}
+
+KERF_STAND_IN_EXPORT void hdDisable(Enum capability) {
+  with_device(0, [&](Touch& device) { return device.enable(capability, false), 0; });
+}
+
+KERF_STAND_IN_EXPORT Boolean hdIsEnabled(Enum capability) {
+  return with_device(Boolean{0}, [&](Touch& device) {
+    return static_cast<Boolean>(device.is_enabled(capability) ? 1 : 0);
+  });
+}
+
+KERF_STAND_IN_EXPORT void hdGetBooleanv(Enum name, Boolean* out) {
+  get(name, out, kBool);
+}
+KERF_STAND_IN_EXPORT void hdGetIntegerv(Enum name, Int* out) {
+  get(name, out, kInt);
+}
+KERF_STAND_IN_EXPORT void hdGetFloatv(Enum name, float* out) {
+  get(name, out, kFloat);
+}
+KERF_STAND_IN_EXPORT void hdGetDoublev(Enum name, double* out) {
+  get(name, out, kDouble);
+}
+KERF_STAND_IN_EXPORT void hdGetLongv(Enum name, Long* out) {
+  get(name, out, kLong);
+}
+KERF_STAND_IN_EXPORT void hdSetBooleanv(Enum name, const Boolean* in) {
+  set(name, in, kBool);
+}
+KERF_STAND_IN_EXPORT void hdSetIntegerv(Enum name, const Int* in) {
+  set(name, in, kInt);
+}
+KERF_STAND_IN_EXPORT void hdSetFloatv(Enum name, const float* in) {
+  set(name, in, kFloat);
+}
+KERF_STAND_IN_EXPORT void hdSetDoublev(Enum name, const double* in) {
+  set(name, in, kDouble);
+}
+KERF_STAND_IN_EXPORT void hdSetLongv(Enum name, const Long* in) {
+  set(name, in, kLong);
+}
+
+KERF_STAND_IN_EXPORT const char* hdGetString(Enum name) {
+  if (name == kVersion) return "3.30.0 kerf stand-in " KERF_VERSION;
+  return with_device<const char*>(nullptr, [&](Touch& device) { return device.text(name); });
+}
+
+// Calibration.
+
+KERF_STAND_IN_EXPORT Enum hdCheckCalibration() {
+  return with_device(Enum{kNeedsHand}, [](Touch& device) { return device.calibration(); });
+}
+
+KERF_STAND_IN_EXPORT void hdUpdateCalibration(Enum style) {
+  with_device(0, [&](Touch& device) {
+    if (style == kInkwellStyle) {
+      device.calibrate();
+    } else {
+      library().refuse(kInvalidValue);
+    }
+    return 0;
+  });
+}
+
+KERF_STAND_IN_EXPORT Enum hdCheckCalibrationStyle() {
+  return kInkwellStyle;
+}
+
+KERF_STAND_IN_EXPORT void hdUpdateCalibrationMessage(Enum /*style*/) {}
+
+KERF_STAND_IN_EXPORT void hdScaleGimbalAngles(double x, double y, double z, double* transform) {
+  with_device(0, [&](Touch& device) {
+    const Transform16 scaled = device.with_scaled_gimbal({x, y, z});
+    if (transform != nullptr) std::copy(scaled.begin(), scaled.end(), transform);
+    return 0;
+  });
+}
+
+KERF_STAND_IN_EXPORT Boolean hdDeploymentLicense(const char* /*vendor*/, const char* /*program*/,
+                                                 const char* /*password*/) {
+  return 1;
+}
+
+// The scheduler.
+
+KERF_STAND_IN_EXPORT void hdStartScheduler() {
+  Library& lib = library();
+  {
+    const std::lock_guard lock(lib.mutex);
+    if (lib.device) lib.device->run(true, lib.rate_hz);
+  }
+  try {
+    lib.scheduler.start(lib.lockstep(), lib.rate_hz);
+  } catch (const std::exception&) {  // the system has no thread left
+    lib.refuse(kTimer);
+  }
+}
+
+KERF_STAND_IN_EXPORT void hdStopScheduler() {
+  Library& lib = library();
+  lib.scheduler.stop();
+  const std::lock_guard lock(lib.mutex);
+  if (lib.device) lib.device->run(false, lib.rate_hz);
+}
+
+KERF_STAND_IN_EXPORT void hdSetSchedulerRate(Ulong hertz) {
+  Library& lib = library();
+  const std::lock_guard lock(lib.mutex);
+  constexpr std::array<Ulong, 4> kRates{500, 1000, 1600, 2000};
+  const bool is_rate = std::find(kRates.begin(), kRates.end(), hertz) != kRates.end();
+  // In lock-step the emulator's tick is fixed, and a running thread keeps its own.
+  const bool is_now = static_cast<int>(hertz) == lib.rate_hz;
+  if (!is_rate || (!is_now && lib.lockstep())) return lib.refuse(kInvalidValue);
+  if (!is_now && lib.scheduler.runs()) return lib.refuse(kInvalidOperation);
+  lib.rate_hz = static_cast<int>(hertz);
+}
+
+KERF_STAND_IN_EXPORT void hdScheduleSynchronous(Callback callback, void* data,
+                                                std::uint16_t priority) {
+  Library& lib = library();
+  if (callback == nullptr) return lib.refuse(kInvalidValue);
+  if (!lib.scheduler.runs() || lib.scheduler.is_servo_thread()) {
+    return lib.scheduler.run_here(callback, data);
+  }
+  const Ulong handle = lib.scheduler.add(callback, data, priority);
+  if (handle == 0) return lib.refuse(kSchedulerFull);
+  lib.scheduler.wait(handle);
+}
+
+KERF_STAND_IN_EXPORT Ulong hdScheduleAsynchronous(Callback callback, void* data,
+                                                  std::uint16_t priority) {
+  Library& lib = library();
+  if (callback == nullptr) {
+    lib.refuse(kInvalidValue);
+    return 0;
+  }
+  if (lib.scheduler.is_servo_thread() && callback(data) == kDone) return 0;
+  const Ulong handle = lib.scheduler.add(callback, data, priority);
+  if (handle == 0) lib.refuse(kSchedulerFull);
+  return handle;
+}
+
+KERF_STAND_IN_EXPORT void hdUnschedule(Ulong handle) {
+  Library& lib = library();
+  if (lib.scheduler.remove(handle)) return;
+  lib.session.ledger->add(Row::bad_schedules);
+  lib.refuse(kInvalidValue);
+}
+
+KERF_STAND_IN_EXPORT Boolean hdWaitForCompletion(Ulong handle, Uint how) {
+  Library& lib = library();
+  if (how == kWaitForEnd && !lib.scheduler.is_servo_thread()) lib.scheduler.wait(handle);
+  return lib.scheduler.has(handle) ? 1 : 0;
+}
+
+KERF_STAND_IN_EXPORT double hdGetSchedulerTimeStamp() {
+  Library& lib = library();
+  return lib.lockstep() ? 0.0 : lib.scheduler.since_tick_s();
+}
+// NOLINTEND(readability-identifier-naming)

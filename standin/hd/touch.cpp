@@ -1,0 +1,205 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "standin/hd/touch.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "shared/wire/personality.hpp"
+
+namespace kerf::hd {
+
+using standin::Row;
+
+namespace {
+
+constexpr double kVelocityWindowS = 0.01;  // the vendor's filter is not known
+constexpr double kNothingN = 1e-9;
+
+[[nodiscard]] bool is_finite(DeviceVec<double> v) noexcept {
+  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+}
+
+}  // namespace
+
+Touch::Touch(const standin::Settings& settings, standin::Ledger& ledger, ErrorStack& errors)
+    : settings_(settings),
+      ledger_(ledger),
+      errors_(errors),
+      arm_(settings, ledger),
+      rate_hz_(settings.rate_hz),
+      calibrated_(!settings.uncalibrated) {
+  ledger_.add(Row::opened);
+}
+
+Readings Touch::sampled() const noexcept {
+  Readings readings;
+  readings.pose = arm_.pose();
+  readings.velocity = arm_.velocity(kVelocityWindowS).value_or(DeviceVec<double>{});
+  readings.angular_velocity = arm_.angular_velocity(kVelocityWindowS);
+  readings.buttons = (readings.pose.button1 ? 1U : 0U) | (readings.pose.button2 ? 2U : 0U);
+  const Matrix3 rotation = stylus_rotation(readings.pose.orientation);
+  readings.joints = joint_angles(readings.pose.tip_mm);
+  readings.gimbal = gimbal_angles(rotation, readings.joints);
+  readings.transform = transform_of(rotation, readings.pose.tip_mm);
+  return readings;
+}
+
+Transform16 Touch::with_scaled_gimbal(const Angles& scale) const noexcept {
+  Angles gimbal = now_.gimbal;
+  for (std::size_t i = 0; i < 3; ++i) gimbal[i] *= scale[i];
+  return transform_of(wrist_rotation(now_.joints, gimbal), now_.pose.tip_mm);
+}
+
+void Touch::begin_tick() noexcept {
+  had_frame_ = false;
+  if (!arm_.lockstep()) arm_.refresh();
+  if (!calibrated_ && arm_.pose().parked && runs_) calibrated_ = true;
+}
+
+void Touch::begin_frame() noexcept {
+  if (in_frame_ || (had_frame_ && one_frame_ && runs_)) {
+    ledger_.add(Row::begins_refused);
+    return push(kIllegalBegin);
+  }
+  if (!arm_.lockstep()) arm_.refresh();
+  if (arm_.lost()) push(kCommunication);
+  in_frame_ = true;
+  before_ = now_;
+  now_ = sampled();
+  if (!has_two_) before_ = now_;
+  has_two_ = true;
+  wanted_ = {};
+}
+
+void Touch::end_frame() noexcept {
+  if (!in_frame_) {
+    ledger_.add(Row::ends_refused);
+    return push(kIllegalEnd);
+  }
+  in_frame_ = false;
+  had_frame_ = true;
+  ledger_.add(Row::frames);
+  last_force_n_ = wanted_force();
+  output_n_ = force_output_ ? limited(last_force_n_) : DeviceVec<double>{};
+  if (!runs_) send();
+}
+
+DeviceVec<double> Touch::wanted_force() noexcept {
+  if (wanted_.has_dac && (wanted_.has_force || wanted_.joint_torque_mnm)) {
+    push(kForceError);
+    return {};
+  }
+  const DeviceVec<double> force_n = wanted_.joint_torque_mnm
+                                        ? force_of_torques(now_.joints, *wanted_.joint_torque_mnm)
+                                        : wanted_.force_n;
+  if (is_finite(force_n)) return force_n;
+  ledger_.add(Row::not_finite);
+  push(kInvalidValue);
+  return {};
+}
+
+DeviceVec<double> Touch::limited(DeviceVec<double> force_n) noexcept {
+  const double length = norm(force_n);
+  const double most_n = force_figures(Personality::touch).peak_n;
+  if (norm(now_.velocity) > velocity_limit_) {
+    ledger_.add(Row::too_fast);
+    push(kExceededVelocity);
+    return {};
+  }
+  if (length > most_n) {
+    ledger_.add(Row::excess);
+    if (checks_force_) push(kExceededForce);
+    if (settings_.cut_excess) return {};
+    if (clamps_) force_n = force_n * (most_n / length);
+  }
+  if (norm(force_n - output_n_) > impulse_limit_n_) {
+    ledger_.add(Row::impulses);
+    push(kExceededImpulse);
+    return {};
+  }
+  if (!ramps_ || settings_.ramp_s <= 0) return force_n;
+  const double since_s = static_cast<double>(ticks_) / rate_hz_;
+  return force_n * std::min(1.0, since_s / settings_.ramp_s);
+}
+
+void Touch::end_tick() noexcept {
+  if (in_frame_) {
+    in_frame_ = false;
+    ledger_.add(Row::frames_not_ended);
+  }
+  if (!had_frame_ && settings_.drop_without_frame) output_n_ = {};
+  if (arm_.pose().parked) ticks_ = 0;  // it ramps after the dock, too
+  ++ticks_;
+  send();
+}
+
+void Touch::send() noexcept {
+  arm_.command(output_n_, force_output_, calibrated_ && runs_);
+}
+
+void Touch::run(bool runs, int rate_hz) noexcept {
+  if (!runs && runs_ && force_output_ && norm(output_n_) > kNothingN) {
+    ledger_.add(Row::not_cleared);
+    if (settings_.drop_on_stop) {
+      output_n_ = {};
+      send();
+    }
+  }
+  if (runs && !runs_) ticks_ = 0;
+  runs_ = runs;
+  rate_hz_ = rate_hz;
+}
+
+void Touch::close() noexcept {
+  run(false, rate_hz_);
+  arm_.command({}, false, false);
+  ledger_.set(Row::last_n, 0);
+  ledger_.add(Row::closed);
+}
+
+bool* Touch::capability(Enum name) noexcept {
+  switch (name) {
+    case kForceOutput:
+      return &force_output_;
+    case kClampForce:
+      return &clamps_;
+    case kRampForce:
+      return &ramps_;
+    case kForceLimit:
+      return &checks_force_;
+    case kOneFrame:
+      return &one_frame_;
+    default:
+      break;
+  }
+  push(kInvalidEnum);
+  return nullptr;
+}
+
+void Touch::enable(Enum name, bool on) noexcept {
+  if (name == kVelocityLimit || name == kImpulseLimit) {  // capabilities by the same numbers
+    double& limit = name == kVelocityLimit ? velocity_limit_ : impulse_limit_n_;
+    limit = on ? (name == kVelocityLimit ? 1200 : 4) : HUGE_VAL;
+  } else if (bool* which = capability(name)) {
+    *which = on;
+    if (name == kForceOutput && !on) output_n_ = {};
+  }
+}
+
+bool Touch::is_enabled(Enum name) noexcept {
+  if (name == kVelocityLimit) return velocity_limit_ < HUGE_VAL;
+  if (name == kImpulseLimit) return impulse_limit_n_ < HUGE_VAL;
+  const bool* which = capability(name);
+  return which != nullptr && *which;
+}
+
+Enum Touch::calibration() noexcept {
+  if (!runs_ && !arm_.lockstep()) arm_.refresh();
+  return calibrated_ ? kCalibrated : kNeedsHand;
+}
+
+void Touch::calibrate() noexcept {
+  if (!calibrated_ && arm_.pose().parked && runs_) calibrated_ = true;
+}
+
+}  // namespace kerf::hd

@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "shared/numeric/vec.hpp"
+#include "standin/emulated_arm.hpp"
+#include "standin/hd/error_stack.hpp"
+#include "standin/hd/numbers.hpp"
+#include "standin/hd/touch_kinematics.hpp"
+#include "standin/ledger.hpp"
+#include "standin/settings.hpp"
+
+/// The open device of the HD stand-in: frames, force, limits, parameters.
+namespace kerf::hd {
+
+/// The types in which a parameter may be read or written.
+enum Types : unsigned { kBool = 1, kInt = 2, kFloat = 4, kDouble = 8, kLong = 16 };
+
+/// The values of a parameter, and the types in which they are given.
+struct Values {
+  unsigned types = 0;
+  std::size_t count = 0;
+  std::array<double, 16> value{};
+};
+
+/// The readings of one frame.
+struct Readings {
+  standin::Pose pose;
+  DeviceVec<double> velocity, angular_velocity;
+  std::uint32_t buttons = 0;
+  Angles joints{}, gimbal{};
+  Transform16 transform{};
+};
+
+/// A Touch behind kerf-emulator. Every error goes to the stack; nothing throws after the
+/// constructor. One thread at a time; only in lock-step does `end_tick` wait.
+///
+/// A frame: `begin_frame` samples, sets act on the frame, `end_frame` fixes its force; the packet
+/// leaves at the end of the tick, or at once without a scheduler. The force of a frame begins at 0.
+class Touch {
+ public:
+  /// Throws std::runtime_error with one line.
+  Touch(const standin::Settings& settings, standin::Ledger& ledger, ErrorStack& errors);
+
+  void begin_tick() noexcept;
+  /// A frame that is still open is thrown away and counted.
+  void end_tick() noexcept;
+  void begin_frame() noexcept;
+  void end_frame() noexcept;
+  /// The scheduler starts or stops. At a stop the force is held or dropped, by the switch.
+  void run(bool runs, int rate_hz) noexcept;
+  /// The motors go off.
+  void close() noexcept;
+
+  void enable(Enum capability, bool on) noexcept;
+  [[nodiscard]] bool is_enabled(Enum capability) noexcept;
+  [[nodiscard]] Enum calibration() noexcept;
+  void calibrate() noexcept;
+
+  /// Nothing, and an error, if there is no such parameter or none in these types.
+  [[nodiscard]] std::optional<Values> read(Enum name, unsigned type) noexcept;
+  /// Number of values that a write takes; 0, and an error, likewise.
+  [[nodiscard]] std::size_t writes(Enum name, unsigned type) noexcept;
+  void write(Enum name, const std::array<double, 16>& value) noexcept;
+  /// Null, and an error, for another parameter.
+  [[nodiscard]] const char* text(Enum name) noexcept;
+
+  /// The transform of the newest frame with its gimbal angles scaled.
+  [[nodiscard]] Transform16 with_scaled_gimbal(const Angles& scale) const noexcept;
+
+ private:
+  [[nodiscard]] Readings sampled() const noexcept;
+  [[nodiscard]] std::optional<Values> reading(Enum name, const Readings& from) const noexcept;
+  [[nodiscard]] std::optional<Values> figure(Enum name) const noexcept;
+  [[nodiscard]] bool* capability(Enum name) noexcept;
+  [[nodiscard]] DeviceVec<double> wanted_force() noexcept;
+  [[nodiscard]] DeviceVec<double> limited(DeviceVec<double> force_n) noexcept;
+  void send() noexcept;
+  void push(Enum code) noexcept { errors_.push(code); }
+
+  const standin::Settings& settings_;
+  standin::Ledger& ledger_;
+  ErrorStack& errors_;
+  standin::EmulatedArm arm_;
+
+  Readings now_, before_;
+  DeviceVec<double> last_force_n_;  ///< of the last frame
+  DeviceVec<double> output_n_;      ///< what is sent
+  bool in_frame_ = false, had_frame_ = false, has_two_ = false;
+  bool runs_ = false;
+  int rate_hz_ = 1000;
+  std::int64_t ticks_ = 0;  ///< since the start
+  bool calibrated_;
+
+  /// What the program has set in this frame.
+  struct Wanted {
+    DeviceVec<double> force_n;
+    std::optional<Angles> joint_torque_mnm;
+    bool has_force = false, has_dac = false;
+  };
+  Wanted wanted_;
+
+  bool force_output_ = false, clamps_ = true, ramps_ = true, checks_force_ = true,
+       one_frame_ = true;
+  double velocity_limit_ = 1200;  ///< mm/s, by one comment of a client
+  double impulse_limit_n_ = 4;    ///< N a tick, likewise
+  double ramping_rate_ = 0;
+};
+
+}  // namespace kerf::hd

@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "standin/settings.hpp"
+
+#include <stdexcept>
+#include <string>
+
+#include <doctest/doctest.h>
+
+namespace standin = kerf::standin;
+
+namespace {
+
+std::string refusal_of(const std::string& text) {
+  try {
+    static_cast<void>(standin::parse_settings(text));
+  } catch (const std::invalid_argument& error) {
+    return error.what();
+  }
+  return "accepted";
+}
+
+}  // namespace
+
+TEST_CASE("a socket alone is enough, and every unknown of a vendor has its first word then") {
+  const auto settings = standin::parse_settings("socket:/tmp/a b/device");
+  CHECK(settings.socket == "/tmp/a b/device");
+  CHECK(settings.device == kerf::Personality::touch);
+  CHECK_FALSE(settings.lockstep);
+  CHECK(settings.rate_hz == 1000);
+  CHECK(settings.ledger.empty());
+  CHECK_FALSE(settings.drop_without_frame);
+  CHECK_FALSE(settings.uncalibrated);
+}
+
+TEST_CASE("every key of the settings is read") {
+  const auto settings = standin::parse_settings(
+      "socket:s,device=omega,lockstep,rate=4000,ledger=/l,missed=drop,stop=drop,excess=cut,"
+      "before-enable=ignore,calibration=lost,handles=documented,button0=hand,status=16,ramp=0.5,"
+      "stall=20");
+  CHECK(settings.device == kerf::Personality::omega);
+  CHECK(settings.lockstep);
+  CHECK(settings.rate_hz == 4000);
+  CHECK(settings.ledger == "/l");
+  CHECK(settings.drop_without_frame);
+  CHECK(settings.drop_on_stop);
+  CHECK(settings.cut_excess);
+  CHECK(settings.force_needs_enable);
+  CHECK(settings.uncalibrated);
+  CHECK(settings.documented_handles);
+  CHECK(settings.hand_buttons);
+  CHECK(settings.short_status);
+  CHECK(settings.ramp_s == 0.5);
+  CHECK(settings.stall_ms == 20);
+  CHECK_FALSE(standin::parse_settings("socket:s,missed=drop,missed=hold").drop_without_frame);
+}
+
+TEST_CASE("wrong settings are refused in one line that names the part") {
+  for (const char* text :
+       {"", "udp:1", "socket:", "socket:s,", "socket:s,missed=keep", "socket:s,rate=0",
+        "socket:s,rate=nan", "socket:s,device=falcon", "socket:s,ledger=", "socket:s,stall=1e9",
+        "socket:s,what=ever", "socket:s,lockstep=1"}) {
+    CAPTURE(text);
+    const std::string line = refusal_of(text);
+    CHECK(line.starts_with("KERF_STAND_IN: '"));
+    CHECK(line.find('\n') == std::string::npos);
+  }
+}

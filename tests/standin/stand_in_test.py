@@ -1,0 +1,333 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`./kerf stand-in` with two programs by ctypes: what they measure against the emulator's truth, each kind of misuse, the
+switches for what no document says. In lock-step, so nothing depends on this machine's speed.
+
+    stand_in_test.py ROOT PROGRAMS LIBRARIES"""
+import ctypes
+import json
+import math
+import os
+import pathlib
+import subprocess
+import sys
+import tempfile
+import unittest
+import xml.etree.ElementTree
+
+ROOT, PROGRAMS, LIBRARIES = (pathlib.Path(path).resolve() for path in sys.argv[1:4])
+HERE = pathlib.Path(__file__).resolve().parent
+HD_NAMES = """InitDevice MakeCurrentDevice DisableDevice BeginFrame EndFrame GetCurrentDevice Enable Disable IsEnabled
+GetBooleanv GetIntegerv GetFloatv GetDoublev GetLongv SetBooleanv SetIntegerv SetFloatv SetDoublev SetLongv GetString
+GetErrorString GetError CheckCalibration UpdateCalibration CheckCalibrationStyle UpdateCalibrationMessage ScaleGimbalAngles
+DeploymentLicense StartScheduler StopScheduler SetSchedulerRate ScheduleSynchronous ScheduleAsynchronous Unschedule
+WaitForCompletion GetSchedulerTimeStamp""".split()
+COMMAND = ["/usr/bin/python3", "-B", ROOT / "standin", PROGRAMS, LIBRARIES, "--lockstep"]
+SECONDS = 60
+# Circles for all of the time, then to one place, where it stays.
+HAND = f"""
+unit_mm = 1.0
+start_mm = [0, 5, 0]
+[[step]]
+circle_mm = 25.0
+turns = {SECONDS // 3}
+seconds = {SECONDS - 8}
+button = 1
+[[step]]
+move_mm = [12, 7, -3]
+seconds = 1.5
+[[step]]
+hold = 1
+"""
+# One that lets the device lead it.
+SOFT_HAND = """
+unit_mm = 1.0
+start_mm = [0, 5, 0]
+[hand]
+stiffness_n_per_mm = 0.001
+[[step]]
+hold = 60
+"""
+
+
+class Case(unittest.TestCase):
+    def setUp(self):
+        self.folder = pathlib.Path(self.enterContext(tempfile.TemporaryDirectory()))
+
+    def file(self, name, text):
+        path = self.folder / name
+        path.write_text(text)
+        return str(path)
+
+    def run_command(self, *words, options=(), lockstep=True):
+        """The exit code, the report, and the lines for a person."""
+        done = subprocess.run(
+            [*COMMAND[:None if lockstep else -1], "--report", self.folder / "report.json", "--junit", self.folder / "report.xml",
+             *options, "--", *words], capture_output=True, text=True, check=False, timeout=300)
+        path = self.folder / "report.json"
+        report = json.loads(path.read_text()) if path.exists() else None
+        return done.returncode, report, done.stderr
+
+    def run_client(self, client, what, count, options=(), lockstep=True):
+        """As `run_command`; and what the client measured, nothing if it left no file."""
+        out = self.folder / "client.json"
+        out.unlink(missing_ok=True)
+        code, report, said = self.run_command("/usr/bin/python3", "-B", str(HERE / client), what, str(count), str(out),
+                                              options=options, lockstep=lockstep)
+        return code, report, json.loads(out.read_text()) if out.exists() else None, said
+
+    def misuse(self, report):
+        return sorted(one["what"] for one in report["misuse"])
+
+    def close(self, a, b, ratio=0.02):
+        self.assertLessEqual(abs(a - b), ratio * abs(b), f"{a} is not {b}")
+
+
+class ClosedLoop(Case):
+    """A minute of a spring, against what the emulator's mechanics did."""
+
+    def compare(self, client, options, count_mm, position_mm):
+        hand = ["--hand", self.file("hand.toml", HAND)]
+        first = self.run_client(client, "spring", SECONDS * 1000, [*options, *hand])
+        code, report, program, said = first
+        self.assertEqual((code, report["misuse"]), (0, []), said)
+        force = report["force"]
+        self.assertGreater(program["peak_n"], 1)
+        self.close(force["peak_n"], program["peak_n"])
+        self.close(force["given_peak_n"], program["peak_n"])
+        self.close(force["rms_n"], program["rms_n"])
+        self.close(force["given_rms_n"], program["rms_n"])
+        self.assertGreater(program["work_mj"], 20)  # the spring lifts the hand from where it is parked
+        self.close(report["energy"]["given_mj"], program["work_mj"])
+        for seen, truth in zip(position_mm(program), report["final_tip_mm"]):
+            self.assertLessEqual(abs(seen - truth), count_mm)
+        self.assertGreater(report["seconds"], SECONDS)
+        # The same once more, to the bit.
+        again = self.run_client(client, "spring", SECONDS * 1000, [*options, *hand])
+        self.assertEqual(again[1]["report_hash"], report["report_hash"])
+        self.assertEqual(again[2], program)
+        return program
+
+    def test_hd(self):
+        program = self.compare("hd_client.py", [], 0.055, lambda program: program["last_mm"])
+        self.assertEqual(program["errors"], [])
+        self.assertIn("kerf", program["vendor"])
+        self.assertEqual(program["buttons"], 1)
+        self.assertEqual([round(x) for x in program["first_mm"]], [0, -110, -35])
+
+    def test_dhd(self):
+        def in_mm(program):
+            x, y, z = (1000 * m for m in program["last_m"])
+            return y, z, x
+
+        program = self.compare("dhd_client.py", ["--device", "omega"], 0.010, in_mm)
+        self.assertEqual((program["name"], program["type"]), ("omega.3 (kerf stand-in)", 33))
+        self.assertEqual(program["first_m"], [0, 0, 0.05])  # parked above
+        self.assertEqual(program["buttons"], 0b11)  # parked, and the hand's first button
+
+    def test_drd_moves_a_hand_that_lets_it(self):
+        hand = ["--device", "omega", "--hand", self.file("hand.toml", SOFT_HAND)]
+        code, report, program, said = self.run_client("dhd_client.py", "move", 1, hand)
+        self.assertEqual((code, report["misuse"]), (0, []), said)
+        self.assertLess(max(program["off_m"]), 0.0015)
+
+
+class Misuse(Case):
+    def expect(self, client, what, found, options=(), code=1, count=400, lockstep=True):
+        with self.subTest(client=client, what=what, options=options):
+            exit_code, report, program, said = self.run_client(client, what, count, options, lockstep)
+            self.assertEqual(self.misuse(report), sorted(found), said)
+            self.assertEqual(exit_code, code, said)
+            failed = {case.get("name") for case in xml.etree.ElementTree.parse(self.folder / "report.xml").iter("testcase")
+                      if case.find("failure") is not None}
+            self.assertEqual(failed, set(found) | ({"command"} if report["exit_code"] else set()))
+            return report, program
+
+    def test_of_hd(self):
+        _, program = self.expect("hd_client.py", "open_frame", ["frames_not_ended", "not_cleared"])
+        self.assertEqual(set(program["errors"]), set())
+        for what, found, errors in (("twice", ["begins_refused"], {0x400}), ("end_twice", ["ends_refused"], {0x401}),
+                                    ("outside", ["set_outside_frame"], {0x402}), ("nan", ["not_finite"], {0x101}),
+                                    ("bad_handle", ["bad_handles", "bad_schedules"], {0x104, 0x101}),
+                                    ("not_cleared", ["not_cleared"], set()),
+                                    ("no_close", ["force_at_end", "left_open", "not_cleared"], set())):
+            _, program = self.expect("hd_client.py", what, found)
+            self.assertEqual(set(program["errors"]), errors, what)
+        self.expect("hd_client.py", "killed", ["force_at_end", "left_open"], code=137)
+        self.expect("hd_client.py", "stall", ["stalls"])
+
+    def test_of_dhd(self):
+        omega = ["--device", "omega"]
+        for what, found in (("nan", "not_finite"), ("wrong_id", "bad_handles"), ("not_cleared", "not_cleared")):
+            self.expect("dhd_client.py", what, [found], omega)
+        self.expect("dhd_client.py", "killed", ["force_at_end", "left_open"], omega, code=137)
+        self.expect("dhd_client.py", "pause", ["stalls"], omega, lockstep=False)  # a pause is one of the clock
+
+    def test_the_exit_code_is_the_commands(self):
+        for words, code in ((["false"], 1), (["sh", "-c", "exit 7"], 7), (["true"], 1)):
+            got, report, said = self.run_command(*words)
+            self.assertEqual((got, self.misuse(report)), (code, ["not_opened"]), said)
+
+    def test_a_program_for_another_device_is_told(self):
+        code, report, _, said = self.run_client("hd_client.py", "spring", 10, ["--device", "omega"])
+        self.assertEqual((code, self.misuse(report)), (1, ["not_opened"]))
+        self.assertIn("take ./kerf stand-in --device touch", said)
+
+
+class Unknowns(Case):
+    """What no document says about a vendor's device, both ways."""
+
+    def test_a_force_after_a_kill_is_held_or_dropped(self):
+        given = {}
+        for way in ("hold", "drop"):
+            _, report, _, _ = self.run_client("hd_client.py", "killed", 50, ["--on-silence", way])  # still in the inkwell
+            given[way] = report["force"]["given_at_end_n"]
+        self.close(given["hold"], 1.5)
+        self.assertLess(given["drop"], 0.001)
+
+    def test_a_tick_without_a_frame_holds_or_drops(self):
+        rms = {}
+        for way in ("hold", "drop"):
+            _, report, _, _ = self.run_client("hd_client.py", "open_frame", 50, ["--switch", f"missed={way}"])
+            rms[way] = report["force"]["rms_n"]
+        self.close(rms["hold"], 1.5 * math.sqrt(50 / 51), 0.002)  # the last command of 51 closes the device
+        self.close(rms["drop"], 1.5 * math.sqrt(45 / 51), 0.002)  # one tick of ten has no frame
+
+    def test_an_excess_is_clamped_or_cut(self):
+        pull = self.file("pull.py", """
+import ctypes
+dhd = ctypes.CDLL("libdhd.so")
+dhd.dhdSetForce.argtypes = [ctypes.c_double] * 3 + [ctypes.c_byte]
+dhd.dhdOpen()
+assert dhd.dhdSetForce(100, 0, 0, -1) == 2
+for _ in range(50): dhd.dhdSetForce(100, 0, 0, -1)
+dhd.dhdStop(-1); dhd.dhdClose(-1)
+""")
+        for way, peak in (("clamp", 12), ("cut", 0)):
+            options = ["--device", "omega", "--switch", f"excess={way}"]
+            _, report, said = self.run_command("/usr/bin/python3", "-B", pull, options=options)
+            self.assertEqual(report["misuse"], [], said)
+            self.assertAlmostEqual(report["force"]["given_peak_n"], peak)
+
+    def test_the_watchdog_ends_the_force(self):
+        code, report, program, said = self.run_client("dhd_client.py", "watchdog", 1, ["--device", "omega"])
+        self.assertEqual((code, [one["what"] for one in report["notes"]]), (0, ["watchdog"]), said)
+        self.assertEqual((program["status"][5], program["status"][6], program["status"][14]), (0, 1, 3))  # force, brake, cause
+
+    def test_a_device_that_goes_is_an_error_of_the_program(self):
+        gone = ["--fault", str(ROOT / "hil/faults/gone.toml")]
+        code, report, program, said = self.run_client("hd_client.py", "spring", 4000, gone)
+        self.assertIn(0x302, program["errors"], said)
+        self.assertEqual([one["what"] for one in report["notes"]], ["lost_link"])
+        self.assertEqual(code, 0, said)
+
+
+# Order of callbacks, and when a call returns; run in lock-step, where a tick needs a callback.
+SCHEDULER = """
+import ctypes
+hd = ctypes.CDLL('libHD.so.3.4')
+hd.hdScheduleAsynchronous.restype = ctypes.c_ulong
+hd.hdGetError.restype = type('Error', (ctypes.Structure,), {'_fields_': [(name, ctypes.c_uint) for name in 'abc']})
+kind = ctypes.CFUNCTYPE(ctypes.c_uint, ctypes.c_void_p)
+calls, ticks = [], []
+
+def callback(name, times, also=lambda: None):
+    left = [times]
+    def call(_data):
+        calls.append(name)
+        left[0] -= 1
+        also()
+        return 1 if left[0] else 0
+    return kind(call)
+
+before = hd.hdGetCurrentDevice()
+assert hd.hdInitDevice(b'Default PHANToM') == before == 0
+assert hd.hdInitDevice(None) == -1 and hd.hdGetError().a == 0x301
+hd.hdEnable(0x4000)
+at_once = callback('at once', 3)
+hd.hdScheduleSynchronous(at_once, None, 7)  # without a scheduler: here, until it is done
+assert calls == ['at once'] * 3, calls
+assert hd.hdCheckCalibration() == 0x5002  # lost, and the inkwell needs a running scheduler
+hd.hdStartScheduler()
+del calls[:]
+low, high = callback('low', 3), callback('high', 3)
+handles = []
+both = (low, None, 1), (high, None, 9)
+start = callback('start', 1, lambda: handles.extend(hd.hdScheduleAsynchronous(*one) for one in both))
+hd.hdScheduleSynchronous(start, None, 0xFFFF)
+assert calls[0] == 'start', calls
+for handle in handles:
+    assert hd.hdWaitForCompletion(ctypes.c_ulong(handle), 1) == 0
+endless = callback('endless', 0)
+handle = hd.hdScheduleAsynchronous(endless, None, 5)
+assert hd.hdWaitForCompletion(ctypes.c_ulong(handle), 0) == 1
+done = callback('done', 1)
+hd.hdScheduleSynchronous(done, None, 0)  # of the lowest priority: after all others of its tick
+assert calls[-1] == 'done' or calls[-1] == 'endless', calls
+hd.hdUnschedule(ctypes.c_ulong(handle))
+count = len(calls)
+assert hd.hdWaitForCompletion(ctypes.c_ulong(handle), 0) == 0
+# A callback that a callback schedules runs at once: low came first there; then by priority.
+order = [name for name in calls if name in ('low', 'high')]
+assert order == ['low', 'high', 'high', 'low', 'high', 'low'], order
+assert hd.hdCheckCalibration() == 0x5000
+hd.hdStopScheduler()
+assert len(calls) == count
+flag = ctypes.c_ubyte(7)
+hd.hdGetBooleanv(0x2002, ctypes.byref(flag))
+assert flag.value == 0, flag.value  # in the inkwell
+for get, name, error in (hd.hdGetIntegerv, 0x2050, 0x103), (hd.hdGetDoublev, 0x1234, 0x100), (hd.hdGetLongv, 0x2010, 0x102):
+    get(name, (ctypes.c_double * 16)())
+    assert hd.hdGetError().a == error
+hd.hdBeginFrame(1)
+hd.hdEndFrame(0)
+assert [hd.hdGetError().a for _ in range(3)] == [0x401, 0x104, 0]  # the newest first
+hd.hdDisableDevice(0)
+assert hd.hdInitDevice(None) == 0  # once more
+hd.hdDisableDevice(0)
+"""
+
+
+class Scheduler(Case):
+    def test_callbacks_run_by_priority_and_calls_return_when_they_should(self):
+        code, report, said = self.run_command("/usr/bin/python3", "-B", self.file("scheduler.py", SCHEDULER),
+                                              options=["--switch", "calibration=lost"])
+        self.assertEqual(report["exit_code"], 0, said)
+        self.assertEqual((code, self.misuse(report)), (1, ["bad_handles", "ends_refused"]), said)
+
+
+class Names(unittest.TestCase):
+    def test_every_name_of_the_interfaces_is_there(self):
+        hd = ctypes.CDLL(str(LIBRARIES / "libHD.so"))
+        self.assertEqual([name for name in HD_NAMES if not hasattr(hd, "hd" + name)], [])
+        self.assertEqual(len(HD_NAMES), 36)
+        drd = ctypes.CDLL(str(LIBRARIES / "libdrd.so.3"))
+        names = (HERE / "dhd_names.txt").read_text().split()
+        self.assertEqual([name for name in names if not hasattr(drd, name)], [])
+        self.assertGreater(len(names), 230)
+
+    def test_without_the_environment_there_is_no_device(self):
+        words = ("import ctypes; hd = ctypes.CDLL('libHD.so'); hd.hdInitDevice.restype = ctypes.c_uint; "
+                 "print(hd.hdInitDevice(None))")
+        environment = {name: value for name, value in os.environ.items() if name != "KERF_STAND_IN"}
+        done = subprocess.run(["/usr/bin/python3", "-c", words], capture_output=True, text=True, check=False,
+                              env={**environment, "LD_LIBRARY_PATH": str(LIBRARIES)})
+        self.assertEqual(done.stdout.strip(), str(0xFFFFFFFF))
+        self.assertIn("./kerf stand-in -- COMMAND", done.stderr)
+
+
+class BadInput(Case):
+    def test_every_wrong_option_is_one_line(self):
+        for options in (["--device", "falcon"], ["--seconds", "x"], ["--rate", "3"], ["--rate", "3000"],
+                        ["--on-silence", "kept"], ["--switch", "missed=both"], ["--switch", "x"], ["--switch", "stall=x"],
+                        ["--hand", "/nowhere"], ["--report", "/nowhere/x"], ["--what"], ["--hand"]):
+            with self.subTest(options=options):
+                done = subprocess.run([*COMMAND, *options, "--", "true"], capture_output=True, text=True, check=False)
+                self.assertEqual((done.returncode, done.stderr.count("\n")), (2, 1), done.stderr)
+
+    def test_a_hand_that_the_emulator_refuses_is_its_line(self):
+        code, _, said = self.run_command("true", options=["--hand", self.file("bad.toml", "what = 1\n")])
+        self.assertEqual((code, said.count("\n")), (2, 1), said)
+        self.assertIn("bad.toml", said)
+
+
+unittest.main(argv=sys.argv[:1], verbosity=1)
