@@ -20,6 +20,9 @@
 #ifdef KERF_HAS_USB
 #include "controller/device/port/usb_port.hpp"
 #endif
+#ifdef KERF_HAS_WS
+#include "controller/device/inverse3/service_port.hpp"
+#endif
 
 namespace kerf {
 namespace {
@@ -131,6 +134,20 @@ std::unique_ptr<PacketPort> arm(std::string_view rest, const Request* request) {
                                    request->stop);
 }
 
+#ifdef KERF_HAS_WS
+std::unique_ptr<PacketPort> ws(std::string_view rest, const Request* request) {
+  const inverse3::ServiceOptions options = inverse3::parse_service_port(rest);
+  if (!request) return nullptr;
+  return std::make_unique<inverse3::ServicePort>(options, request->ours, request->patience_ms,
+                                                 request->stop, request->io);
+}
+#else
+std::unique_ptr<PacketPort> ws(std::string_view, const Request*) {
+  throw std::runtime_error(
+      "--port ws: left out of this build; install libboost-dev, then ./kerf setup");
+}
+#endif
+
 std::unique_ptr<PacketPort> emulator(const std::string& text, const Request& request) {
   const bool is_udp = text.starts_with(kUdp);
   const std::string where = text.substr(is_udp ? kUdp.size() : kSocket.size());
@@ -150,9 +167,10 @@ std::unique_ptr<PacketPort> port(const std::string& text, const Request* request
   if (const auto rest = after("usb", text)) return usb(*rest, request);
   if (const auto rest = after("hid", text)) return hid(*rest, request);
   if (const auto rest = after("arm", text)) return arm(*rest, request);
+  if (const auto rest = after("ws", text)) return ws(*rest, request);
   if (!text.starts_with(kUdp) && !text.starts_with(kSocket)) {
     throw std::runtime_error("--port '" + text +
-                             "' is not known; use auto, fw, usb, hid, arm, or socket:PATH or "
+                             "' is not known; use auto, fw, usb, hid, arm, ws, or socket:PATH or "
                              "udp:[ADDRESS:]PORT, where kerf-emulator listens");
   }
   return request ? emulator(text, *request) : nullptr;

@@ -31,6 +31,7 @@ void agree(PacketPort& port, const std::string& place, const LinkHello& ours, bo
 ///     usb[:WHERE][,firmware=FILE]    the Falcon: UsbOptions
 ///     hid[:WHERE]                    WoodenHaptics: parse_hid_port
 ///     arm[:NAME]                     Touch, omega: kerf-arm of that name: parse_arm_port
+///     ws[:[HOST:]PORT][,OPTION...]   the Inverse3's service: ServiceOptions
 ///     auto                           the bus of the device, any connected one
 ///
 /// This throws std::runtime_error with one line for a text that names no port, or one that this

@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <thread>
+#include <vector>
+
+#include <semaphore.h>
+
+#include "controller/device/inverse3/session.hpp"
+#include "controller/device/inverse3/web_socket.hpp"
+#include "controller/device/port/io_mailbox.hpp"
+#include "controller/device/port/packet_port.hpp"
+#include "shared/wire/emulator_link.hpp"
+
+namespace kerf::inverse3 {
+
+/// What follows "ws" in `--port ws[:[HOST:]PORT][,park=NAME][,device=ID][,events=PORT]`.
+struct ServiceOptions {
+  HostPort service{"127.0.0.1", kServicePort};
+  /// Port of the service's events; 0: none. Of another service port than the usual one there is
+  /// none unless it is named.
+  std::uint16_t event_port = kEventPort;
+  Wanted wanted;
+};
+/// Throws std::runtime_error with one line.
+[[nodiscard]] ServiceOptions parse_service_port(std::string_view text);
+
+/// The Inverse3 by its vendor's Inverse Service, as a port of `CartesianReport` and
+/// `CartesianCommand`.
+///
+/// One I/O thread plays the turns: a force, then the service's one reply; the next when that is in
+/// and the servo has a newer command, or a millisecond has passed. Never two messages at once. The
+/// servo touches only the mailboxes, and in `send` a semaphore, which any thread and any signal
+/// handler may raise.
+///
+/// A reply that takes longer than 5 ms is counted; than 20 ms, and the next turn takes the force
+/// back; than 100 ms, and the connection is dropped. So it is for three messages in a row that
+/// cannot be read. A new connection is tried after 0.5, 1, 2 ... 10 s, and is barred like the first
+/// one until the parking button is held: but the servo gives a silent device up after 2 s. What
+/// cannot become right (`is_final`) closes the port, with one line on stderr.
+///
+/// In lock-step, with kerf's emulated service, a turn is one period of the servo, whatever the
+/// machine's clock says.
+class ServicePort final : public PacketPort {
+ public:
+  /// Connects, proves the force command while the device is well, then starts the thread. Tries for
+  /// `patience_ms` while no service answers or it has no device, or until `stop`. Throws
+  /// std::runtime_error with one line.
+  ServicePort(const ServiceOptions& options, const LinkHello& ours, int patience_ms,
+              const std::atomic<bool>& stop, IoThread io = {});
+  /// Turns without force for 20 ms, then closes.
+  ~ServicePort() override;
+  ServicePort(const ServicePort&) = delete;
+  ServicePort& operator=(const ServicePort&) = delete;
+
+  [[nodiscard]] std::size_t receive(std::span<std::uint8_t> out) noexcept override {
+    return inbox_.take(out);
+  }
+  bool send(std::span<const std::uint8_t> packet) noexcept override;
+  bool send_last(std::span<const std::uint8_t> packet) noexcept override;
+  [[nodiscard]] bool closed() const noexcept override {
+    return closed_.load(std::memory_order_relaxed);
+  }
+  [[nodiscard]] bool wait(int milliseconds) noexcept override {
+    return inbox_.wait(milliseconds, closed_);
+  }
+  [[nodiscard]] std::vector<LinkCounter> counters() const override;
+
+ private:
+  /// A service that answers, its events, and what was agreed.
+  struct Connection {
+    std::unique_ptr<WebSocket> service, events;
+    std::unique_ptr<Session> session;
+    std::uint64_t turns = 0;
+    int unread = 0;           ///< replies in a row that could not be read
+    bool takes_back = false;  ///< the next turn is without force
+  };
+  enum class Turn : std::uint8_t { done, lost };
+
+  [[nodiscard]] std::unique_ptr<Connection> connect() const;
+  void connect_within(int patience_ms, const std::atomic<bool>& stop);
+  void prove();
+  [[nodiscard]] ForceKey read_version() const;
+  void check_force_scale() const;
+
+  void run() noexcept;
+  [[nodiscard]] bool wait_for_turn() noexcept;
+  [[nodiscard]] Turn play_turn() noexcept;
+  [[nodiscard]] Turn await_reply(std::int64_t sent_ns) noexcept;
+  [[nodiscard]] Turn take_reply() noexcept;
+  void take_events() noexcept;
+  void drop() noexcept;
+  void reconnect() noexcept;
+  void end() noexcept;
+  void note_bar() noexcept;
+  void note(const std::string& text) const noexcept;
+  /// Time of the turns.
+  [[nodiscard]] std::int64_t now_ns() const noexcept;
+  [[nodiscard]] std::string place() const;
+
+  ServiceOptions options_;
+  LinkHello ours_;
+  IoThread io_;
+  std::unique_ptr<Connection> connection_;
+  ServiceState state_;  ///< of the newest message
+  std::uint32_t number_ = 0;
+  std::uint64_t turns_ = 0;   ///< of all connections
+  std::int64_t sent_ns_ = 0;  ///< the last message, by the machine's clock
+  std::int64_t backoff_ns_ = 0, retry_ns_ = 0;
+  Bar noted_ = Bar::parking;
+  CartesianCommand command_;
+  std::int64_t command_ns_ = 0;  ///< when it came, in time of the turns
+
+  std::atomic<bool> closed_{false};
+  SpscRing inbox_;
+  LatestCommand outbox_;
+  sem_t raised_{};  ///< once per command, and once to stop
+  std::atomic<bool> stop_{false};
+  std::atomic<int> thread_id_{0};
+  /// In the order of `counters`.
+  std::atomic<std::uint64_t> packets_{0}, overflow_{0}, commands_{0}, late_{0}, lost_{0},
+      unreadable_{0}, strays_{0}, bars_{0}, reconnections_{0}, longest_us_{0};
+  std::thread thread_;
+};
+
+}  // namespace kerf::inverse3

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <string_view>
+
+// A client of HTTP and WebSocket in plain words: Boost.Beast stands behind it, in one source file.
+
+namespace kerf::inverse3 {
+
+/// A TCP port of a host.
+struct HostPort {
+  std::string host = "127.0.0.1";
+  std::uint16_t port = 0;
+};
+
+/// The answer to a GET; its body has at most 64 KiB.
+struct HttpAnswer {
+  unsigned status = 0;
+  std::string body;
+};
+
+/// One GET on a connection of its own. Throws std::runtime_error with the reason, without a place:
+/// refused, no answer within the time, no HTTP.
+[[nodiscard]] HttpAnswer http_get(const HostPort& where, const std::string& path, int timeout_ms);
+
+/// One connection, text messages both ways; no pings and no compression of its own, and no delay of
+/// small packets. One thread. A message above `kMostMessageBytes` ends the connection.
+class WebSocket {
+ public:
+  /// Connects and upgrades. Throws std::runtime_error as `http_get`.
+  WebSocket(const HostPort& where, int timeout_ms);
+  /// Ends the connection at once, without a closing frame unless `close` was called.
+  ~WebSocket();
+  WebSocket(const WebSocket&) = delete;
+  WebSocket& operator=(const WebSocket&) = delete;
+
+  /// False if the message has not left within the time; the connection is useless then.
+  [[nodiscard]] bool send(std::string_view text, int timeout_ms) noexcept;
+
+  enum class Got : std::uint8_t { text, binary, nothing, lost };
+  /// Waits until `until_ns` of CLOCK_MONOTONIC for a message, which `message` returns then. In the
+  /// past: takes one that is there.
+  [[nodiscard]] Got receive(std::int64_t until_ns) noexcept;
+  /// The last one, until the next `receive`.
+  [[nodiscard]] std::string_view message() const noexcept;
+
+  /// Closes with code 1000 and waits so long for the peer to agree.
+  void close(int timeout_ms) noexcept;
+
+ private:
+  struct Connection;
+  std::unique_ptr<Connection> connection_;
+};
+
+}  // namespace kerf::inverse3
