@@ -69,6 +69,7 @@ const char* CartesianModel::name() const noexcept {
 bool CartesianModel::receive(std::span<const std::uint8_t> packet) noexcept {
   const auto decoded = decode_cartesian_command(packet);
   if (decoded) command(*decoded);
+  is_asked_ = is_asked_ || decoded;
   return decoded.has_value();
 }
 
@@ -130,6 +131,8 @@ CartesianReport CartesianModel::next_report() noexcept {
 }
 
 std::span<const std::uint8_t> CartesianModel::next_packet() noexcept {
+  if (params_.on_request && !is_asked_) return {};
+  is_asked_ = false;
   packet_ = encode(next_report());
   return packet_;
 }

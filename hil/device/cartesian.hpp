@@ -49,6 +49,7 @@ struct CartesianParams : PlantParams {
   explicit CartesianParams(Personality which);
   Personality personality;
   bool powered = true;
+  bool on_request = false;  ///< one packet for each command, as a service replies; else at any time
 };
 
 /// The device with the vendor's service or library before it: a packet whenever the host requests
@@ -82,6 +83,7 @@ class CartesianModel final : public DeviceModel {
   std::array<std::int16_t, 4> orientation_{0, 0, 0, 32767};
   bool button1_ = false, button2_ = false;
   CartesianCommand command_;
+  bool is_asked_ = false;  ///< by a command, since the last packet
   std::uint32_t packets_ = 0;
   cartesian::ReportBytes packet_{};
 };

@@ -45,7 +45,9 @@ void take_plants(const EmulatorOptions& o, const PlantValues& of_script, PlantPa
   if (params.mode_hz > 0 && params.joint_inertia_kg_m2[0] <= 0) {
     throw HilError("--mode-hz: without inertia nothing rings; give --joint-inertia, such as 1e-4");
   }
-  if (o.drop_torque) params.on_silence = OnSilence::drop_torque;
+  if (!o.drop_torque) return;
+  params.on_silence = OnSilence::drop_torque;
+  params.silence_cycles = o.silence_ms * kCyclesPerSecond / 1000;
 }
 
 }  // namespace
@@ -89,6 +91,8 @@ std::unique_ptr<DeviceModel> make_device(const EmulatorOptions& o, const PlantVa
     } else if constexpr (std::is_same_v<decltype(params), OmniParams>) {
       params.pot_noise = o.pot_noise;
       params.seed = o.seed;
+    } else if constexpr (std::is_same_v<decltype(params), CartesianParams>) {
+      params.on_request = o.front == "websocket";
     }
     return make_model(params);
   });

@@ -21,12 +21,13 @@ constexpr double kMaxSeconds = 1e6;
 
 void declare_front(Arguments& app, EmulatorOptions& o) {
   app.option("--front", o.front,
-             "how it is reached: socket; udp; fuse, a device node; usbip (falcon) or uhid "
-             "(woodenhaptics), "
-             "in this kernel's own USB or HID stack, as root")
+             "how it is reached: socket; udp; websocket (inverse3), as its vendor's service; fuse, "
+             "a device node; usbip (falcon) or uhid (woodenhaptics), in this kernel's own USB or "
+             "HID stack, as root")
       .shows_default();
   app.option("--socket", o.socket, "front socket: path of the SEQPACKET socket to serve");
   app.option("--udp", o.udp, "front udp: [ADDRESS:]PORT to serve (address: 127.0.0.1)");
+  declare_service(app, o.service);
   declare_bus(app, o.bus);
   app.flag("--lockstep", o.lockstep, "no clock: one servo period per command received");
   app.option("--rate", o.rate_hz, "servo rate for --lockstep, Hz; must divide 8000 (USB: 1000)")
@@ -57,6 +58,10 @@ void declare_device(Arguments& app, EmulatorOptions& o) {
   app.flag("--drop-torque", o.drop_torque,
            "motors let go when the host is silent for 0.1 s (default: hold; woodenhaptics: after "
            "0.5 s)");
+  app.option("--silence-ms", o.silence_ms,
+             "host silence after which --drop-torque acts")
+      .within(1, 10'000)
+      .shows_default();
   app.flag("--pot-noise", o.pot_noise, "omni: noise in the low bits of the gimbal pots");
   app.option("--packet-bytes", o.packet_bytes,
              "woodenhaptics: 14 (mbed) or, fronts fuse, uhid, 64 (Teensy)")
@@ -80,13 +85,17 @@ std::string word(Personality personality) {
 }
 
 void check_front(const EmulatorOptions& o) {
-  constexpr std::array<std::string_view, 5> kFronts{"socket", "udp", "fuse", "usbip", "uhid"};
+  constexpr std::array<std::string_view, 6> kFronts{"socket", "udp",   "websocket",
+                                                    "fuse",   "usbip", "uhid"};
   known_at("--front", o.front, kFronts);
   if (o.front == "socket" && o.socket.empty()) {
     throw HilError("--socket: no path; say where the socket shall be, or use --front udp");
   }
   if (o.front == "udp" && o.udp.empty()) {
     throw HilError("--udp: no port; say [ADDRESS:]PORT, or use --front socket");
+  }
+  if (o.front == "websocket" && o.service.where.empty()) {
+    throw HilError("--ws: no port; say [ADDRESS:]PORT, or use --front socket");
   }
   if (o.front == "fuse" && o.bus.mount.empty()) {
     throw HilError("--mount: missing; name an empty folder for --front fuse");
@@ -102,7 +111,10 @@ void check_front(const EmulatorOptions& o) {
   only_on({"socket", "udp"}, "--packet-cycles", o.packet_cycles != EmulatorOptions{}.packet_cycles);
   // Nobody fills up a short packet there, as a HID host does.
   only_on({"fuse", "uhid"}, "--packet-bytes", o.packet_bytes != wooden::kPacketBytes);
-  only_on({"fuse", "usbip", "uhid"}, "--bus-fault", !o.bus.faults.empty());
+  only_on({"fuse", "usbip", "uhid", "websocket"}, "--bus-fault", !o.bus.faults.empty());
+  only_on({"websocket"}, "--ws", !o.service.where.empty());
+  only_on({"websocket"}, "--ws-events", !o.service.event_port.empty());
+  only_on({"websocket"}, "--profile", o.service.profile != ServiceOptions{}.profile);
   only_on({"fuse", "usbip"}, "--firmware-runs", o.bus.firmware_runs);
   only_on({"fuse"}, "--mount", !o.bus.mount.empty());
   only_on({"fuse"}, "--packet-hz", o.bus.packet_hz != BusOptions{}.packet_hz);
@@ -116,6 +128,7 @@ void check_front(const EmulatorOptions& o) {
   };
   speaks_for("usbip", Personality::falcon);
   speaks_for("uhid", Personality::woodenhaptics);
+  speaks_for("websocket", Personality::inverse3);
   if (is_cartesian(o.personality) && o.front == "fuse") {
     throw HilError("--front fuse: the bytes of " + o.device +
                    " are its vendor's secret; use --front socket or udp");
@@ -137,10 +150,10 @@ void check_front(const EmulatorOptions& o) {
   if (o.lockstep && o.packet_cycles != EmulatorOptions{}.packet_cycles) {
     throw HilError("--packet-cycles: lock-step looks at the host once a tick; leave it out");
   }
-  if (o.lockstep && !o.fault.empty() && o.front == "fuse") {
-    throw HilError(
-        "--fault: in lock-step a node has no way to say that nothing came; use --front socket or "
-        "udp");
+  if (o.lockstep && !o.fault.empty() && (o.front == "fuse" || o.front == "websocket")) {
+    throw HilError("--fault: in lock-step a " +
+                   std::string(o.front == "fuse" ? "node" : "service") +
+                   " has no way to say that nothing came; use --front socket or udp");
   }
 }
 
@@ -159,6 +172,11 @@ void check_device(const EmulatorOptions& o) {
     throw HilError("--packet-bytes: " + std::to_string(o.packet_bytes) +
                    " is no firmware's length; use 14 or 64");
   }
+  if (o.silence_ms != EmulatorOptions{}.silence_ms && !o.drop_torque) {
+    throw HilError(
+        "--silence-ms: the motors hold for ever; give --drop-torque too, or leave it "
+        "out");
+  }
   if (o.drop_torque && o.personality == Personality::woodenhaptics) {
     throw HilError("--drop-torque: woodenhaptics lets go after 0.5 s anyway; leave it out");
   }
@@ -176,20 +194,25 @@ struct FaultWord {
   std::string_view word;
   Fault fault;
 };
-constexpr FaultWord<BusFault> kBusFaultWords[] = {
-    {"reset", BusFault::reset}, {"device-reset", BusFault::device_reset},
-    {"steal", BusFault::steal}, {"vanish", BusFault::vanish},
+constexpr std::array<FaultWord<BusFault>, 5> kBusFaultWords{{
+    {"reset", BusFault::reset},
+    {"device-reset", BusFault::device_reset},
+    {"steal", BusFault::steal},
+    {"vanish", BusFault::vanish},
     {"back", BusFault::back},
-};
-constexpr FaultWord<UsbFault> kUsbFaultWords[] = {
-    {"stall", UsbFault::stall},   {"split", UsbFault::split}, {"deaf", UsbFault::nak},
-    {"vanish", UsbFault::vanish}, {"back", UsbFault::back},
-};
+}};
+constexpr std::array<FaultWord<UsbFault>, 5> kUsbFaultWords{{
+    {"stall", UsbFault::stall},
+    {"split", UsbFault::split},
+    {"deaf", UsbFault::nak},
+    {"vanish", UsbFault::vanish},
+    {"back", UsbFault::back},
+}};
 
 /// SECONDS:KIND with one of the bus's words; the cycle, and which word it is.
 template <class Fault, std::size_t N>
 std::pair<std::int64_t, Fault> parse_fault(const std::string& text,
-                                           const FaultWord<Fault> (&words)[N]) {
+                                           const std::array<FaultWord<Fault>, N>& words) {
   const std::size_t colon = text.find(':');
   const auto seconds = number_in(std::string_view(text).substr(0, colon));
   const bool timed = colon != std::string::npos && seconds && *seconds >= 0 && *seconds < 1e6;
@@ -201,6 +224,16 @@ std::pair<std::int64_t, Fault> parse_fault(const std::string& text,
   throw HilError("--bus-fault: " + text + " is not SECONDS:KIND with one of " +
                  listed(words | std::views::transform(&FaultWord<Fault>::word)));
 }
+
+/// The words of `ServiceFault`, in its order.
+constexpr auto service_fault_words() {
+  std::array<FaultWord<ServiceFault>, kServiceFaultWords.size()> words{};
+  for (std::size_t i = 0; i < words.size(); ++i) {
+    words[i] = {kServiceFaultWords[i], static_cast<ServiceFault>(i)};
+  }
+  return words;
+}
+constexpr auto kServiceFaults = service_fault_words();
 
 }  // namespace
 
@@ -253,8 +286,36 @@ void declare_bus(Arguments& app, BusOptions& o) {
            "fronts fuse, usbip: the falcon was started before (default: it waits for its "
            "firmware)");
   app.option("--bus-fault", o.faults,
-             "fronts fuse, usbip, uhid: SECONDS:KIND, repeatable; vanish, back; omni: reset, "
-             "device-reset, steal; falcon: stall, split; falcon and woodenhaptics on fuse: deaf");
+             "fronts fuse, usbip, uhid, websocket: SECONDS:KIND, repeatable; vanish, back; omni: "
+             "reset, device-reset, steal; falcon: stall, split; falcon and woodenhaptics on fuse: "
+             "deaf; inverse3: malformed, close, reset, half_open, restart, other_id, second_arm, "
+             "power_off, power_on, grip_sleep, grip_wake, second_client, reconfigure, event");
+}
+
+void declare_service(Arguments& app, ServiceOptions& o) {
+  app.option("--ws", o.where,
+             "front websocket: [ADDRESS:]PORT to serve (address: 127.0.0.1; port 0: any free one, "
+             "which is printed)");
+  app.option("--ws-events", o.event_port,
+             "front websocket: port of the service's events at that address (default: none)");
+  app.option("--profile", o.profile,
+             "front websocket: version and handles of the service: 3.4, a wired one; 3.5, both; "
+             "3.5-wireless; 3.0, which kerf refuses")
+      .shows_default();
+}
+
+ServiceSettings service_settings(const ServiceOptions& o, const std::vector<std::string>& faults,
+                                 int lockstep_hz) {
+  ServiceSettings settings;
+  settings.profile =
+      static_cast<ServiceProfile>(known_at("--profile", o.profile, kServiceProfileWords));
+  settings.lockstep = lockstep_hz > 0;
+  if (settings.lockstep) settings.rate_hz = lockstep_hz;
+  for (const std::string& text : faults) {
+    const auto [cycle, fault] = parse_fault(text, kServiceFaults);
+    settings.script.push_back({cycle, fault});
+  }
+  return settings;
 }
 
 FirewireSettings firewire_settings(const BusOptions& o, int lockstep_hz) {

@@ -11,6 +11,7 @@
 
 #include "hil/device/plant_params.hpp"
 #include "hil/front/firewire/firewire_bus.hpp"
+#include "hil/front/inverse3/service_device.hpp"
 #include "hil/front/usb/usb_device.hpp"
 #include "shared/text/command_line.hpp"
 #include "shared/wire/personality.hpp"
@@ -35,6 +36,21 @@ void declare_bus(Arguments& app, BusOptions& options);
 /// The same for the other two devices' buses, which have no lock-step.
 [[nodiscard]] std::vector<ScriptedUsbFault> usb_script(const BusOptions& options);
 
+/// Options of the front websocket: the emulated Inverse Service.
+struct ServiceOptions {
+  std::string where;       ///< [ADDRESS:]PORT
+  std::string event_port;  ///< empty: no events
+  std::string profile = "3.5-wireless";
+};
+
+void declare_service(Arguments& app, ServiceOptions& options);
+
+/// Throws `HilError` for a fault that is none. `lockstep_hz`: servo rate in lock-step, 0 = real
+/// time.
+[[nodiscard]] ServiceSettings service_settings(const ServiceOptions& options,
+                                               const std::vector<std::string>& faults,
+                                               int lockstep_hz);
+
 /// The command line of kerf-emulator.
 struct EmulatorOptions {
   std::string device = "omni";  ///< a word of kPersonalityWords
@@ -44,6 +60,7 @@ struct EmulatorOptions {
   std::string socket;
   std::string udp;
   BusOptions bus;
+  ServiceOptions service;
   std::string hand;
   std::string hand_socket;
   std::string fault;
@@ -58,6 +75,7 @@ struct EmulatorOptions {
   double linger = 0;
   PlantValues plant;
   bool drop_torque = false;
+  int silence_ms = 100;
   bool pot_noise = false;
   std::size_t packet_bytes = 14;
   bool wireless_button = false;

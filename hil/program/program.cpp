@@ -13,6 +13,9 @@
 #include "hil/front/firewire/firewire_bus.hpp"
 #include "hil/front/firewire/firewire_node.hpp"
 #include "hil/front/fuse/fuse_mount.hpp"
+#ifdef KERF_HAS_WS
+#include "hil/front/inverse3/service_front.hpp"
+#endif
 #include "hil/front/serving.hpp"
 #include "hil/front/socket_servers.hpp"
 #include "hil/front/usb/falcon_usb.hpp"
@@ -263,6 +266,34 @@ void serve_on_fuse(const EmulatorOptions& o, BusService& service) {
   }
 }
 
+#ifdef KERF_HAS_WS
+/// `--front websocket`: the Inverse3 behind an emulated service of its vendor.
+void serve_websocket(const EmulatorOptions& o, EmulatedDevice& device, const ServeLimits& limits,
+                     FrontStats& stats, std::ostream& out) {
+  ServicePlace place{o.service.where, {}};
+  if (!o.service.event_port.empty()) {
+    const auto port = number_in(o.service.event_port);
+    if (!port || *port < 0 || *port > 65535 || *port != std::floor(*port)) {
+      throw HilError("--ws-events: " + o.service.event_port + " is no port from 0 to 65535");
+    }
+    place.event_port = static_cast<std::uint16_t>(*port);
+  }
+  ServiceFront front(place, service_settings(o.service, o.bus.faults, o.lockstep ? o.rate_hz : 0),
+                     device, [&device] { device.renew(); });
+  out << "kerf-emulator: inverse3 at ws port " << front.port();
+  if (front.event_port()) out << ", events at port " << *front.event_port();
+  out << std::endl;
+  front.serve(limits, o.stay, stats);
+}
+#else
+void serve_websocket(const EmulatorOptions&, EmulatedDevice&, const ServeLimits&, FrontStats&,
+                     std::ostream&) {
+  throw HilError(
+      "--front websocket: left out of this build; install libboost-dev, then ./kerf "
+      "setup");
+}
+#endif
+
 void serve(const EmulatorOptions& o, const std::atomic<bool>& stop, std::ostream& out,
            std::ostream& err) {
   check_report(o);
@@ -280,6 +311,8 @@ void serve(const EmulatorOptions& o, const std::atomic<bool>& stop, std::ostream
     serve_usbip(bus, falcon_settings(o), usb_script(o.bus));
   } else if (o.front == "uhid") {
     serve_uhid(bus, wooden_settings(o));
+  } else if (o.front == "websocket") {
+    serve_websocket(o, device, limits, stats, out);
   } else if (o.front == "udp") {
     UdpServer server(o.udp);
     const std::string place = "udp port " + std::to_string(server.port());

@@ -261,6 +261,11 @@ void ServicePort::prove() {
     if (is_final(bar)) throw std::runtime_error(place() + ": the device " + text_of(bar));
     if (bar != Bar::proving && bar != Bar::parking) break;
   }
+  // In lock-step each report is a tick, and the first one answers the driver's first command: one
+  // that waits already would be read with it or before it, as chance has it.
+  std::array<std::uint8_t, MailboxPacket::kMaxBytes> packet;
+  while (ours_.lockstep && inbox_.take(packet) > 0) {
+  }
 }
 
 bool ServicePort::send(std::span<const std::uint8_t> packet) noexcept {
@@ -402,10 +407,15 @@ ServicePort::Turn ServicePort::take_reply() noexcept {
     closed_ = true;
     return Turn::done;
   }
-  if (!report) return Turn::done;
-  ++number_;
-  ++(inbox_.put(encode(*report)) ? packets_ : overflow_);
+  if (report) pass_on(*report);
   return Turn::done;
+}
+
+/// Numbers count what the servo could read: what it is too late for is counted as overflow alone.
+void ServicePort::pass_on(const CartesianReport& report) noexcept {
+  const bool is_put = inbox_.put(encode(report));
+  number_ += is_put ? 1 : 0;
+  ++(is_put ? packets_ : overflow_);
 }
 
 void ServicePort::take_events() noexcept {
@@ -438,8 +448,7 @@ void ServicePort::take_events() noexcept {
 
 /// The connection is of no use. The servo hears of it at once, not only by the silence.
 void ServicePort::drop() noexcept {
-  ++number_;
-  ++(inbox_.put(encode(connection_->session->farewell(number_))) ? packets_ : overflow_);
+  pass_on(connection_->session->farewell(number_ + 1));
   connection_.reset();
   command_ = {};
   noted_ = Bar::parking;

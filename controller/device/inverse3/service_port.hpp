@@ -96,6 +96,7 @@ class ServicePort final : public PacketPort {
   [[nodiscard]] Turn play_turn() noexcept;
   [[nodiscard]] Turn await_reply(std::int64_t sent_ns) noexcept;
   [[nodiscard]] Turn take_reply() noexcept;
+  void pass_on(const CartesianReport& report) noexcept;
   void take_events() noexcept;
   void drop() noexcept;
   void reconnect() noexcept;
@@ -111,7 +112,7 @@ class ServicePort final : public PacketPort {
   IoThread io_;
   std::unique_ptr<Connection> connection_;
   ServiceState state_;  ///< of the newest message
-  std::uint32_t number_ = 0;
+  std::uint32_t number_ = 0;  ///< of the newest report
   std::uint64_t turns_ = 0;   ///< of all connections
   std::int64_t sent_ns_ = 0;  ///< the last message, by the machine's clock
   std::int64_t backoff_ns_ = 0, retry_ns_ = 0;

@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "hil/device/packet_device.hpp"
+#include "shared/wire/cartesian.hpp"
+
+/// The emulated Inverse Service without its sockets: an Inverse3 and its handle as messages of
+/// JSON, by the vendor's public pages alone. What they leave open is marked in the source.
+namespace kerf {
+
+/// Version of the service, and which handles it has. `v3_0` serves no WebSocket here, as its own is
+/// at another port.
+enum class ServiceProfile : std::uint8_t { v3_4, v3_5, v3_5_wireless, v3_0 };
+inline constexpr std::array<std::string_view, 4> kServiceProfileWords{"3.4", "3.5", "3.5-wireless",
+                                                                      "3.0"};
+
+/// Faults of the service and its link, beside those of a fault script.
+enum class ServiceFault : std::uint8_t {
+  malformed,      ///< the next reply cannot be read: each time in another way of kMalformedWays
+  close,          ///< the connection is closed in order (1000)
+  reset,          ///< it is reset
+  half_open,      ///< the service neither reads nor writes on it any more
+  restart,        ///< reset, and the service is back as the other of the versions 3.4 and 3.5
+  vanish,         ///< the device is not listed any more
+  back,           ///< it is again
+  other_id,       ///< it is listed under another id
+  second_arm,     ///< another Inverse3 is listed before it
+  power_off,      ///< its 24 V supply fails
+  power_on,       ///< and is back
+  grip_sleep,     ///< the handle sleeps: its orientation stands still
+  grip_wake,      ///< and is awake again
+  second_client,  ///< another session adds 1 N along X
+  reconfigure,    ///< another client has set damping, basis and force_scale
+  event,          ///< ebrake_triggered at the event port
+};
+inline constexpr std::array<std::string_view, 16> kServiceFaultWords{
+    "malformed", "close",         "reset",       "half_open", "restart",  "vanish",
+    "back",      "other_id",      "second_arm",  "power_off", "power_on", "grip_sleep",
+    "grip_wake", "second_client", "reconfigure", "event"};
+inline constexpr int kMalformedWays = 9;
+
+/// A fault at a bus cycle (125 us) of the device, from the first client on.
+struct ScriptedServiceFault {
+  std::int64_t cycle = 0;
+  ServiceFault fault = ServiceFault::malformed;
+};
+
+struct ServiceSettings {
+  ServiceProfile profile = ServiceProfile::v3_5_wireless;
+  bool lockstep = false;
+  int rate_hz = 1000;  ///< in lock-step: a message is one period of it
+  std::vector<ScriptedServiceFault> script{};
+};
+
+/// One message or HTTP answer of the service.
+struct ServiceMessage {
+  std::string text;
+  bool is_binary = false;
+};
+
+/// The device behind the service, for one client. The packets between are those of
+/// shared/wire/cartesian.hpp, so that a fault script acts as on any other front; the device answers
+/// each command with one. The caller keeps the time. One thread; allocates.
+///
+/// Commands last one message: one without a force for the device takes the force back. A member of
+/// another version's name is ignored without an error. Forces have steps of 14 mN.
+class ServiceDevice {
+ public:
+  /// `device` outlives it.
+  ServiceDevice(const ServiceSettings& settings, PacketDevice& device);
+
+  /// A client has connected: the state of the session begins anew. Returns the list of the devices.
+  [[nodiscard]] std::string greet();
+  /// A message of the client. In lock-step the device advances by one period, else by one cycle, in
+  /// which it takes the command.
+  void receive(std::string_view text);
+  /// The device's time goes on.
+  void advance(int cycles);
+  /// The replies that are due now, one by one.
+  [[nodiscard]] std::optional<ServiceMessage> next_reply();
+
+  /// A fault of the link that has begun: `close`, `reset`, `half_open` or `restart`, once each.
+  [[nodiscard]] std::optional<ServiceFault> take_link_fault();
+  /// A message for the event port.
+  [[nodiscard]] std::optional<std::string> take_event();
+  [[nodiscard]] bool hung_up() const noexcept { return device_.hung_up(); }
+
+  /// The body for a GET; empty: there is no such path.
+  [[nodiscard]] std::optional<std::string> get(std::string_view path) const;
+  [[nodiscard]] bool has_web_socket() const noexcept { return profile_ != ServiceProfile::v3_0; }
+
+  [[nodiscard]] std::int64_t cycles() const noexcept { return cycle_; }
+
+ private:
+  [[nodiscard]] bool is_3_5() const noexcept { return profile_ >= ServiceProfile::v3_5; }
+  void begin_faults();
+  void begin(ServiceFault fault);
+  void take_packets();
+  void follow(const CartesianReport& report) noexcept;
+  [[nodiscard]] CartesianCommand command_in(std::string_view text);
+  [[nodiscard]] std::string state_text(bool with_config) const;
+  [[nodiscard]] ServiceMessage broken(const std::string& text);
+
+  ServiceSettings settings_;
+  PacketDevice& device_;
+  ServiceProfile profile_;
+  std::int64_t cycle_ = 0;
+  std::size_t faults_begun_ = 0;
+  int session_ = 0;
+
+  CartesianReport report_;  ///< the newest that the device gave
+  std::int64_t report_cycle_ = 0;
+  std::array<double, 3> velocity_mm_s_{};  ///< kerf's frame, low-passed
+  bool is_forced_ = false;                 ///< the last message had a force
+  bool wants_full_state_ = false;
+  std::deque<ServiceMessage> replies_;
+
+  int malformed_left_ = 0, malformed_way_ = 0;
+  bool is_listed_ = true, has_other_id_ = false, has_second_arm_ = false;
+  bool is_powered_ = true, is_awake_ = true;
+  bool has_second_client_ = false, is_reconfigured_ = false;
+  std::array<std::int16_t, 4> held_orientation_{};
+  std::optional<ServiceFault> link_fault_;
+  std::deque<std::string> events_;
+};
+
+}  // namespace kerf
