@@ -9,6 +9,7 @@ import os
 import pathlib
 import re
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -142,12 +143,19 @@ class Demo:
         return code if self.code_of_signal is None else self.code_of_signal
 
     def find_meeting_point(self):
-        """`meet` exists once the emulator is ready; `ask` and `offer` are the options of controller and emulator for it."""
+        """`meet`, a path or an address, is there once the emulator is ready; `ask` and `offer` are the options of controller and
+        emulator for it."""
         options, processes = self.options, self.processes
         self.meet = processes.path("device")
         self.ask, self.offer = ["--port", "socket:" + self.meet], ["--front", "socket", "--socket", self.meet]
         if options.port == "arm":  # the emulator stands behind the library that kerf-arm loads
             self.ask = ["--port", "arm:" + self.name]
+        elif options.port == "ws":  # the service of its vendor, emulated; both sides must know the port beforehand
+            with socket.socket() as free:
+                free.bind(("127.0.0.1", 0))
+                self.meet = free.getsockname()
+            place = f"{self.meet[0]}:{self.meet[1]}"
+            self.ask, self.offer = ["--port", "ws:" + place], ["--front", "websocket", "--ws", place]
         elif options.port != "socket":
             bus = processes.path("bus")
             os.mkdir(bus)
@@ -223,9 +231,9 @@ class Demo:
         self.emulator = processes.start("emulator", [
             "--personality", options.device, *self.offer, *hand, "--unit-mm", told.get("hand_unit_mm", ""), *pace,
             "--report", os.path.join(self.results, "emulator.json")], out="emulator.log", log="emulator.log")
-        while not os.path.exists(self.meet) and self.emulator.poll() is None:
+        while not self.is_met() and self.emulator.poll() is None:
             time.sleep(0.02)
-        if not os.path.exists(self.meet):  # it refused something, or a very short run is over
+        if not self.is_met():  # it refused something, or a very short run is over
             code = processes.conclude("emulator", self.emulator, 0)
             if code:
                 sys.exit(code)
@@ -239,6 +247,12 @@ class Demo:
         self.arm = self.processes.start("arm", [
             "--device", self.options.device, "--name", self.name, "--library", os.path.abspath(self.options.library),
             "--report", os.path.join(self.results, "arm.json")], out="arm.log", log="arm.log")
+
+    def is_met(self):
+        if isinstance(self.meet, str):
+            return os.path.exists(self.meet)
+        with socket.socket() as asking:
+            return asking.connect_ex(self.meet) == 0
 
     def hand(self, told):
         if self.options.mouse:

@@ -176,7 +176,7 @@ def check(options):
     if options.port == "arm" and not os.path.isfile(options.library):
         given = f"--library {options.library}: not a file" if options.library else "--port arm: no library"
         raise Refusal(f"{given}; name that of a stand-in for the vendor's: --library PATH")
-    if options.virtual and options.port not in ("socket", "fw"):
+    if options.virtual and options.port not in ("socket", "fw", "ws"):
         own = "a vendor's library" if options.port == "arm" else "a USB bus"
         raise Refusal(f"--virtual: {own} keeps its own time; take --port socket")
     options.headless = options.headless or not has_display()
