@@ -258,7 +258,7 @@ void ServicePort::prove() {
                                kNeeds);
     }
     const Bar bar = connection_->session->bar();
-    if (is_final(bar)) throw std::runtime_error(place() + ": the device " + text_of(bar));
+    if (is_final(bar)) throw std::runtime_error(place() + ": " + text_of(bar));
     if (bar != Bar::proving && bar != Bar::parking) break;
   }
   // In lock-step each report is a tick, and the first one answers the driver's first command: one
@@ -289,7 +289,7 @@ void ServicePort::note_bar() noexcept {
   if (bar == noted_ || bar == Bar::none || bar == Bar::parking || bar == Bar::proving) return;
   noted_ = bar;
   ++bars_;
-  note("the device " + text_of(bar));
+  note(text_of(bar));
 }
 
 void ServicePort::run() noexcept {

@@ -111,7 +111,7 @@ class ServicePort final : public PacketPort {
   LinkHello ours_;
   IoThread io_;
   std::unique_ptr<Connection> connection_;
-  ServiceState state_;  ///< of the newest message
+  ServiceState state_;        ///< of the newest message
   std::uint32_t number_ = 0;  ///< of the newest report
   std::uint64_t turns_ = 0;   ///< of all connections
   std::int64_t sent_ns_ = 0;  ///< the last message, by the machine's clock

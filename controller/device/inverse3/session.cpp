@@ -14,41 +14,44 @@ namespace kerf::inverse3 {
 std::string text_of(Bar bar) {
   switch (bar) {
     case Bar::none:
-      return "may push";
+      return "the device may push";
     case Bar::parking:
-      return "waits for the handle's parking button";
+      return "the device waits for the handle's parking button";
     case Bar::gone:
       return "the device is gone from the service's list; connect it again";
     case Bar::unpowered:
-      return "has no 24 V supply; plug it in";
+      return "the device has no 24 V supply; plug it in";
     case Bar::uncalibrated:
-      return "is not calibrated; hold the grip on the inkwell until its light is solid";
+      return "the device is not calibrated; hold the grip on the inkwell until its light is solid";
     case Bar::not_ready:
-      return "is not ready by its service; see the vendor's Hub";
+      return "the device is not ready by its service; see the vendor's Hub";
     case Bar::proving:
-      return "is asked whether it obeys the force command";
+      return "the device is asked whether it obeys the force command";
     case Bar::no_handle:
       return "no handle is there, and it has the parking button; connect one and wake it";
     case Bar::handle_asleep:
-      return "its handle sleeps or is out of reach; wake it, then hold the parking button";
+      return "the handle sleeps or is out of reach; wake it, then hold the parking button";
     case Bar::no_button:
-      return "its handle has no such parking button; name one with park=NAME";
+      return "the handle has no such parking button; name one with park=NAME";
     case Bar::echo:
-      return "gives another force than was sent, so another program pushes too or the service "
+      return "the device gives another force than was sent, so another program pushes too or the "
+             "service "
              "changes it; end that program, then hold the parking button";
     case Bar::idle:
-      return "fell idle while forces were sent; end other programs that use it, then hold the "
+      return "the device fell idle while forces were sent; end other programs that use it, then "
+             "hold the "
              "parking button";
     case Bar::event:
-      return "its service reports a fault; see the vendor's Hub, then hold the parking button";
+      return "the service reports a fault; see the vendor's Hub, then hold the parking button";
     case Bar::stalled:
-      return "its service stood still; see what else this machine does, then hold the parking "
+      return "the service stood still; see what else this machine does, then hold the parking "
              "button";
     case Bar::unproven:
-      return "its state stays idle under the force command, so the service does not obey it; "
+      return "the device stays idle under the force command, so the service does not obey it; "
              "report the service's version to us (docs/devices.md)";
     case Bar::moved_frame:
-      return "its basis or mount is not the identity, so forces would point elsewhere; set basis "
+      return "the session's basis or mount is not the identity, so forces would point elsewhere; "
+             "set basis "
              "XYZ and no mount in the vendor's Hub";
     case Bar::damped:
       return "the service adds damping of its own; set it to 0 in the vendor's Hub";

@@ -260,11 +260,11 @@ ServiceMessage ServiceDevice::broken(const std::string& text) {
       return {replaced("\"inverse3\":", "\"deep\":" + std::string(1000, '[') +
                                             std::string(1000, ']') + ",\"inverse3\":")};
     case 5:
-      return {replaced("\"inverse3\":", "\"name\":\"\xff\",\"inverse3\":")};
-    case 6:
       return {text, true};
-    case 7:  // millimetres; the keys are sorted, so x stands before y
+    case 6:  // millimetres; the keys are sorted, so x stands before y
       return {replaced("\"cursor_position\":{\"x\":", "\"cursor_position\":{\"x\":1e308,\"was\":")};
+    case 7:  // a WebSocket's client ends the connection at this and the next
+      return {replaced("\"inverse3\":", "\"name\":\"\xff\",\"inverse3\":")};
     default:
       return {replaced("{\"inverse3\"",
                        "{\"pad\":\"" + std::string(std::size_t{1} << 20, 'x') + "\",\"inverse3\"")};
@@ -284,9 +284,6 @@ void ServiceDevice::begin(ServiceFault fault) {
       ++malformed_left_;
       break;
     case ServiceFault::restart:
-      profile_ = is_3_5() ? ServiceProfile::v3_4 : ServiceProfile::v3_5;
-      link_fault_ = fault;
-      break;
     case ServiceFault::close:
     case ServiceFault::reset:
     case ServiceFault::half_open:
@@ -335,6 +332,9 @@ void ServiceDevice::begin(ServiceFault fault) {
 }
 
 std::optional<ServiceFault> ServiceDevice::take_link_fault() {
+  if (link_fault_ == ServiceFault::restart) {
+    profile_ = is_3_5() ? ServiceProfile::v3_4 : ServiceProfile::v3_5;
+  }
   return std::exchange(link_fault_, std::nullopt);
 }
 
@@ -347,9 +347,10 @@ std::optional<std::string> ServiceDevice::take_event() {
 
 std::optional<std::string> ServiceDevice::get(std::string_view path) const {
   if (path == "/version") {
-    const char* version = profile_ == ServiceProfile::v3_0   ? "3.0.7.0"
-                          : profile_ == ServiceProfile::v3_4 ? "3.4.8.0"
-                                                             : "3.5.0.0";
+    const ServiceProfile claimed = settings_.claims.value_or(profile_);
+    const char* version = claimed == ServiceProfile::v3_0   ? "3.0.7.0"
+                          : claimed == ServiceProfile::v3_4 ? "3.4.8.0"
+                                                            : "3.5.0.0";
     const Json answer = {
         {"project_name", "haply-inverse-service"},
         {"project_version", version},

@@ -47,6 +47,7 @@ inline constexpr std::array<std::string_view, 16> kServiceFaultWords{
     "back",      "other_id",      "second_arm",  "power_off", "power_on", "grip_sleep",
     "grip_wake", "second_client", "reconfigure", "event"};
 inline constexpr int kMalformedWays = 9;
+inline constexpr int kMalformedText = 7;  ///< the first so many are text of UTF-8, or binary
 
 /// A fault at a bus cycle (125 us) of the device, from the first client on.
 struct ScriptedServiceFault {
@@ -56,6 +57,8 @@ struct ScriptedServiceFault {
 
 struct ServiceSettings {
   ServiceProfile profile = ServiceProfile::v3_5_wireless;
+  /// Version that it gives instead of its own: a service whose words changed without notice.
+  std::optional<ServiceProfile> claims{};
   bool lockstep = false;
   int rate_hz = 1000;  ///< in lock-step: a message is one period of it
   std::vector<ScriptedServiceFault> script{};

@@ -1,0 +1,282 @@
+// SPDX-License-Identifier: Apache-2.0
+// The port while the emulated service, its link or its device goes wrong, and when it ends itself.
+// By the machine's clock: a label keeps them from busy machines.
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include <doctest/doctest.h>
+
+#include "hil/front/inverse3/service_device.hpp"
+#include "tests/inverse3/served.hpp"
+
+namespace {
+
+using namespace kerf;
+using namespace kerf::test;
+
+/// Of the device, from the first client on: after the device is armed.
+constexpr std::int64_t kSoon = kCyclesPerSecond / 2;
+
+ServiceSettings with(ServiceFault fault, ServiceProfile profile = ServiceProfile::v3_5_wireless) {
+  return {.profile = profile, .script = {{kSoon, fault}}};
+}
+
+FaultScript script(FaultKind kind, double for_s, double ms = 0) {
+  FaultScript script;
+  script.clock = FaultClock::start;
+  DeviceFault fault;
+  fault.kind = kind;
+  fault.at_s = 0.5;
+  fault.for_s = for_s;
+  fault.ms = ms;
+  script.faults = {fault};
+  return script;
+}
+
+/// A device that is armed and pushes along x, until the fault bars it.
+CartesianReport pushed_until_barred(PacketPort& port) {
+  until_armed(port);
+  return until_barred(port, 1000);
+}
+
+}  // namespace
+
+TEST_CASE("a connection that ends is made anew, and the device has to be parked again") {
+  for (const ServiceFault fault :
+       {ServiceFault::close, ServiceFault::reset, ServiceFault::half_open, ServiceFault::restart}) {
+    CAPTURE(kServiceFaultWords[static_cast<std::size_t>(fault)]);
+    ServedService service(with(fault));
+    const auto port = open(service.options());
+    const CartesianReport barred = pushed_until_barred(*port);
+    CHECK_FALSE(barred.powered);
+    CHECK(barred.position_um == std::array<std::int32_t, 3>{0, 80'000, 0});
+    const CartesianReport first =
+        until(*port, 1000, [&](const CartesianReport& r) { return r.number > barred.number; });
+    CHECK(counter(*port, "reconnections") == 1);
+    CHECK_FALSE(first.homed);
+    CHECK(first.force_mn[0] == 0);
+    CHECK(until_armed(*port).powered);
+    CHECK_FALSE(port->closed());
+  }
+}
+
+TEST_CASE("a reply that is late is counted; after 20 ms the force is taken back") {
+  ServedService service({}, script(FaultKind::delay, 0.001, 50));
+  const auto port = open(service.options());
+  until_armed(*port);
+  const CartesianReport barred = until_barred(*port, 1000);
+  CHECK(counter(*port, "late_replies") >= 1);
+  CHECK(barred.powered);
+  CHECK(counter(*port, "lost_replies") == 0);
+  CHECK(counter(*port, "reconnections") == 0);
+  // The device holds its force while the service is silent; the next turn has none.
+  until(*port, 1000, [](const CartesianReport& r) { return !r.homed && r.force_mn[0] == 0; });
+  until_armed(*port);
+}
+
+TEST_CASE("a device that holds its force and one that drops it: both have none after a stall") {
+  for (const OnSilence on_silence : {OnSilence::hold_torque, OnSilence::drop_torque}) {
+    CAPTURE(static_cast<int>(on_silence));
+    CartesianParams params = ServedService::as_service();
+    params.on_silence = on_silence;
+    params.silence_cycles = 8 * 5;
+    ServedService service({}, script(FaultKind::silence, 0.3), params);
+    const auto port = open(service.options());
+    const CartesianReport barred = pushed_until_barred(*port);
+    CHECK_FALSE(barred.powered);  // dropped after 100 ms
+    CHECK(counter(*port, "lost_replies") == 1);
+    const CartesianReport first =
+        until(*port, 1000, [&](const CartesianReport& r) { return r.number > barred.number; });
+    CHECK_FALSE(first.homed);
+    until(*port, 1000, [](const CartesianReport& r) { return !r.homed && r.force_mn[0] == 0; });
+  }
+}
+
+TEST_CASE("a reply that gets lost ends the connection, and the next one is in step") {
+  ServedService service({}, script(FaultKind::lose, 0.001));
+  const auto port = open(service.options());
+  pushed_until_barred(*port);
+  until_counted(*port, "reconnections", 1);
+  until_armed(*port);
+  CHECK(counter(*port, "lost_replies") == 1);
+}
+
+TEST_CASE("of two replies to one message the second is dropped, and the game stays in step") {
+  FaultScript twice = script(FaultKind::duplicate, 0.05);
+  ServedService service({}, twice);
+  const auto port = open(service.options());
+  until_armed(*port);
+  until_counted(*port, "stray_replies", 1);
+  const std::uint64_t before = counter(*port, "packets");
+  until_counted(*port, "packets", before + 100);
+  CHECK(counter(*port, "lost_replies") == 0);
+  CHECK(counter(*port, "reconnections") == 0);
+  CHECK(until_armed(*port).homed);
+}
+
+TEST_CASE("a message that cannot be read is dropped, whatever is wrong with it") {
+  ServiceSettings settings;
+  for (int way = 0; way < kMalformedText; ++way) {
+    settings.script.push_back({kSoon + 400 * way, ServiceFault::malformed});
+  }
+  ServedService service(settings);
+  const auto port = open(service.options());
+  until_armed(*port);
+  until_counted(*port, "unreadable_replies", kMalformedText);
+  CHECK(counter(*port, "reconnections") == 0);
+  CHECK(counter(*port, "lost_replies") == 0);
+  CHECK(counter(*port, "unreadable_replies") == kMalformedText);
+  CHECK(until_armed(*port).homed);
+}
+
+TEST_CASE(
+    "three messages in a row that cannot be read, or one of no UTF-8 or 1 MiB, end a connection") {
+  ServiceSettings three;
+  for (int i = 0; i < 3; ++i) three.script.push_back({kSoon, ServiceFault::malformed});
+  ServiceSettings others;
+  for (int i = 0; i < kMalformedText + 1; ++i) {
+    others.script.push_back({kSoon + 400 * i, ServiceFault::malformed});
+  }
+  others.script.push_back({4 * kCyclesPerSecond, ServiceFault::malformed});
+  for (const auto& [settings, ends] : {std::pair(three, 1U), std::pair(others, 2U)}) {
+    ServedService service(settings);
+    const auto port = open(service.options());
+    until_armed(*port);
+    until_counted(*port, "reconnections", ends);
+    CHECK_FALSE(port->closed());
+    until_armed(*port);
+  }
+}
+
+TEST_CASE("a device that vanishes from the list and comes back has to be parked again") {
+  ServedService service(
+      {.script = {{kSoon, ServiceFault::vanish}, {kSoon + 800, ServiceFault::back}}});
+  const auto port = open(service.options());
+  const CartesianReport gone = pushed_until_barred(*port);
+  CHECK_FALSE(gone.powered);
+  const CartesianReport back =
+      until(*port, 1000, [&](const CartesianReport& r) { return r.number > gone.number; });
+  CHECK_FALSE(back.homed);
+  CHECK(back.powered);
+  CHECK(back.force_mn[0] == 0);
+  until_armed(*port);
+  CHECK(counter(*port, "reconnections") == 0);
+}
+
+TEST_CASE("a device under another id is not this one") {
+  ServedService service(with(ServiceFault::other_id));
+  const auto port = open(service.options());
+  const CartesianReport gone = pushed_until_barred(*port);
+  const std::uint64_t commands = counter(*port, "commands");
+  until_counted(*port, "commands", commands + 200);
+  CHECK(counter(*port, "packets") == gone.number);  // none since
+  CHECK(norm(service.end().motor_force_n()) == 0.0);
+}
+
+TEST_CASE("a second device in the list changes nothing for the first") {
+  ServedService service(with(ServiceFault::second_arm));
+  const auto port = open(service.options());
+  until_armed(*port);
+  const std::uint64_t packets = counter(*port, "packets");
+  until_counted(*port, "packets", packets + 700);
+  CHECK(counter(*port, "bars") == 0);
+}
+
+TEST_CASE("without its supply a device has no force, and none when the supply comes back") {
+  ServedService service(
+      {.script = {{kSoon, ServiceFault::power_off}, {kSoon + 1600, ServiceFault::power_on}}});
+  const auto port = open(service.options());
+  const CartesianReport off = pushed_until_barred(*port);
+  CHECK_FALSE(off.powered);
+  const CartesianReport on = until(*port, 1000, [](const CartesianReport& r) { return r.powered; });
+  CHECK_FALSE(on.homed);
+  CHECK(on.force_mn[0] == 0);
+  until_armed(*port);
+}
+
+TEST_CASE("a calibration that is lost bars the device while it lasts") {
+  ServedService service({}, script(FaultKind::unhome, 0.2));
+  const auto port = open(service.options());
+  CHECK(pushed_until_barred(*port).powered);
+  until_armed(*port);
+}
+
+TEST_CASE("a handle that sleeps bars the device until it is awake and its button held") {
+  ServedService service(
+      {.script = {{kSoon, ServiceFault::grip_sleep}, {kSoon + 1600, ServiceFault::grip_wake}}});
+  const auto port = open(service.options());
+  CHECK_FALSE(pushed_until_barred(*port).parked);
+  CHECK(until_armed(*port).parked);
+}
+
+TEST_CASE("another session that pushes too is found by the echo") {
+  ServedService service(with(ServiceFault::second_client));
+  const auto port = open(service.options());
+  const CartesianReport barred = pushed_until_barred(*port);
+  CHECK(barred.powered);
+  CHECK(barred.force_mn[0] > 1900);
+  // It lasts for as long as the other one pushes.
+  until(*port, 0, [&](const CartesianReport& r) {
+    CHECK_FALSE(r.homed);
+    return r.number > barred.number + 200;
+  });
+}
+
+TEST_CASE("a brake that the service reports at its event port bars the device") {
+  ServedService service(with(ServiceFault::event));
+  const auto port = open(service.options());
+  CHECK(pushed_until_barred(*port).powered);
+  CHECK(counter(*port, "bars") == 1);
+  until_armed(*port);
+}
+
+TEST_CASE("a session whose frame another client turned is found within 2000 turns, and closed") {
+  ServedService service(with(ServiceFault::reconfigure));
+  auto port = open(service.options());
+  until_armed(*port);
+  const std::int64_t give_up_ns = monotonic_ns() + 20 * kNsPerSecond;
+  while (!port->closed() && monotonic_ns() < give_up_ns) {
+    command(*port, 500);
+    static_cast<void>(newest(*port));
+    sleep_until_ns(monotonic_ns() + 1'000'000);
+  }
+  CHECK(port->closed());
+  CHECK_FALSE(port->send(encode(CartesianCommand{})));
+  port.reset();
+  CHECK(norm(service.end().motor_force_n()) == 0.0);
+}
+
+// ---- the end ----
+
+TEST_CASE("the last packet leaves, and a port that ends takes its force back") {
+  for (const bool says_so : {true, false}) {
+    CAPTURE(says_so);
+    ServedService service;
+    auto port = open(service.options());
+    until_armed(*port);
+    until(*port, 2000, [](const CartesianReport& report) { return report.force_mn[0] > 1900; });
+    if (says_so) CHECK(port->send_last(encode(CartesianCommand{})));
+    port.reset();
+    CHECK(norm(service.end().motor_force_n()) == 0.0);
+  }
+}
+
+TEST_CASE("a servo that stands still loses the force, though its port plays on") {
+  ServedService service;
+  const auto port = open(service.options());
+  until_armed(*port);
+  until(*port, 1000, [](const CartesianReport& report) { return report.force_mn[0] > 900; });
+  // No command any more.
+  const std::int64_t give_up_ns = monotonic_ns() + 10 * kNsPerSecond;
+  std::optional<CartesianReport> report;
+  while ((!report || report->force_mn[0] != 0) && monotonic_ns() < give_up_ns) {
+    static_cast<void>(port->wait(10));
+    report = newest(*port);
+  }
+  REQUIRE(report);
+  CHECK(report->force_mn[0] == 0);
+}

@@ -1,0 +1,250 @@
+// SPDX-License-Identifier: Apache-2.0
+// The port against the emulated service: names, versions, forces and the end.
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <cstdlib>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <arpa/inet.h>
+#include <doctest/doctest.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include "controller/device/open_port.hpp"
+#include "hil/front/inverse3/service_device.hpp"
+#include "tests/inverse3/served.hpp"
+#include "tests/support/errors.hpp"
+
+namespace {
+
+using namespace kerf;
+using namespace kerf::test;
+using inverse3::parse_service_port;
+using inverse3::ServiceOptions;
+
+}  // namespace
+
+// ---- its name ----
+
+TEST_CASE("--port ws: this machine's service by itself, or another place, button and device") {
+  const ServiceOptions plain = parse_service_port("");
+  CHECK(plain.service.host == "127.0.0.1");
+  CHECK(plain.service.port == 10001);
+  CHECK(plain.event_port == 10020);
+  CHECK(plain.wanted.park.view().empty());
+  const ServiceOptions all = parse_service_port(":10.0.0.2:12,park=home,device=0A1C,events=13");
+  CHECK(all.service.host == "10.0.0.2");
+  CHECK(all.service.port == 12);
+  CHECK(all.event_port == 13);
+  CHECK(all.wanted.park == "home");
+  CHECK(all.wanted.device_id == "0A1C");
+  CHECK(parse_service_port(":65535").service.port == 65535);
+  CHECK(parse_service_port(":5000").event_port == 0);
+  CHECK(parse_service_port(":[::1]:5000").service.host == "::1");
+  CHECK(parse_service_port(",events=0").event_port == 0);
+  for (const char* wrong :
+       {":", ":0", ":65536", ":x", "::5", ":host:", ",", ",park", ",park=", ",park=a b",
+        ",colour=red", ",events=65536", ",events=x", ",device=\"", ":1,,"}) {
+    CAPTURE(wrong);
+    CHECK(has(error_of([&] { static_cast<void>(parse_service_port(wrong)); }), "give ws alone"));
+  }
+}
+
+TEST_CASE("auto is the service for an Inverse3, and a port of the service is for it alone") {
+  CHECK(resolve_port("auto", Personality::inverse3) == "ws");
+  CHECK_NOTHROW(check_port("ws"));
+  CHECK_NOTHROW(check_port("ws:5000,park=a"));
+  CHECK(has(error_of([] { static_cast<void>(resolve_port("ws:5000", Personality::omni)); }),
+            "not for --device omni"));
+}
+
+// ---- versions ----
+
+TEST_CASE("each version of the service is understood: pose, parking button, force and echo") {
+  for (const ServiceProfile profile :
+       {ServiceProfile::v3_4, ServiceProfile::v3_5, ServiceProfile::v3_5_wireless}) {
+    CAPTURE(static_cast<int>(profile));
+    ServedService service({.profile = profile});
+    const auto port = open(service.options());
+    const CartesianReport armed = until_armed(*port);
+    CHECK(armed.position_um == std::array<std::int32_t, 3>{0, 80'000, 0});
+    CHECK(armed.orientation == std::array<std::int16_t, 4>{0, 0, 0, 32767});
+    CHECK(armed.parked);
+    CHECK(armed.powered);
+    if (profile == ServiceProfile::v3_4) continue;  // it gives no echo
+    for (const std::int16_t force_mn : std::array<std::int16_t, 4>{1000, -1003, 20, 7}) {
+      const auto echo = until(*port, force_mn, [&](const CartesianReport& report) {
+        return std::abs(report.force_mn[0] - force_mn) <= 14;
+      });
+      CHECK(echo.homed);
+      CHECK(std::abs(echo.force_mn[1]) <= 14);
+    }
+  }
+}
+
+TEST_CASE("a force acts along the axis that it has in kerf's frame") {
+  ServedService service;
+  const auto port = open(service.options());
+  until_armed(*port);
+  CartesianCommand command;
+  command.force_on = true;
+  command.force_mn = {280, -560, 840};  // whole steps
+  const std::int64_t give_up_ns = monotonic_ns() + 10 * kNsPerSecond;
+  std::optional<CartesianReport> report;
+  while ((!report || report->force_mn != command.force_mn) && monotonic_ns() < give_up_ns) {
+    port->send(encode(command));
+    static_cast<void>(port->wait(10));
+    report = newest(*port);
+  }
+  REQUIRE(report);
+  CHECK(report->force_mn == command.force_mn);
+}
+
+TEST_CASE("a service before 3.1, or one that obeys other words than its version's, is refused") {
+  ServedService old({.profile = ServiceProfile::v3_0});
+  CHECK(has(error_of([&] { open(old.options()); }),
+            "version 3.0.7.0; needs the vendor's Inverse Service 3.1 or newer"));
+  ServedService changed({.profile = ServiceProfile::v3_5, .claims = ServiceProfile::v3_4});
+  CHECK(has(error_of([&] { open(changed.options()); }), "stays idle under the force command"));
+  ServedService changed_back({.profile = ServiceProfile::v3_4, .claims = ServiceProfile::v3_5});
+  CHECK(has(error_of([&] { open(changed_back.options()); }), "stays idle under the force command"));
+}
+
+TEST_CASE("a service whose forces are scaled or damped is refused at the start") {
+  ServedService service({.script = {{0, ServiceFault::reconfigure}}});
+  // The settings change with the first client, so the second one finds them.
+  static_cast<void>(error_of([&] { open(service.options()); }));
+  CHECK(has(error_of([&] { open(service.options()); }), "scales every force by 0.5"));
+}
+
+// ---- other programs ----
+
+namespace {
+
+/// A program at a port that says `greeting` and nothing else.
+class Stranger {
+ public:
+  explicit Stranger(std::string greeting) : greeting_(std::move(greeting)) {
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    REQUIRE(bind(fd_, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0);
+    REQUIRE(listen(fd_, 8) == 0);
+    thread_ = std::thread([this] {
+      for (int client = accept(fd_, nullptr, nullptr); client >= 0;
+           client = accept(fd_, nullptr, nullptr)) {
+        clients_.push_back(client);
+        if (!greeting_.empty()) {
+          static_cast<void>(send(client, greeting_.data(), greeting_.size(), MSG_NOSIGNAL));
+        }
+      }
+    });
+  }
+  ~Stranger() {
+    shutdown(fd_, SHUT_RDWR);
+    thread_.join();
+    for (const int client : clients_) close(client);
+    close(fd_);
+  }
+  Stranger(const Stranger&) = delete;
+  Stranger& operator=(const Stranger&) = delete;
+
+  [[nodiscard]] std::uint16_t port() const {
+    sockaddr_in own{};
+    socklen_t bytes = sizeof own;
+    REQUIRE(getsockname(fd_, reinterpret_cast<sockaddr*>(&own), &bytes) == 0);
+    return ntohs(own.sin_port);
+  }
+
+ private:
+  std::string greeting_;
+  int fd_ = socket(AF_INET, SOCK_STREAM, 0);
+  std::vector<int> clients_;
+  std::thread thread_;
+};
+
+std::string refusal_of(std::uint16_t port) {
+  return error_of([&] { open(parse_service_port(":" + std::to_string(port))); });
+}
+
+}  // namespace
+
+TEST_CASE("nobody, a silent program and one that speaks otherwise: one line, and the way out") {
+  std::uint16_t free_port = 0;
+  {
+    const Stranger ended("");
+    free_port = ended.port();
+  }
+  const Stranger silent(""), banner("SSH-2.0-OpenSSH_9.2\r\n"),
+      page("HTTP/1.1 200 OK\r\nContent-Length: 5\r\n\r\nhello"),
+      other("HTTP/1.1 200 OK\r\nContent-Length: 26\r\n\r\n{\"project_version\": \"9\"   }"),
+      huge("HTTP/1.1 200 OK\r\nContent-Length: 999999999\r\n\r\nx");
+  for (const std::uint16_t port :
+       {free_port, silent.port(), banner.port(), page.port(), other.port(), huge.port()}) {
+    CAPTURE(port);
+    const std::string line = refusal_of(port);
+    CHECK(line.starts_with("--port ws:127.0.0.1:" + std::to_string(port) + ": "));
+    CHECK(has(line, "needs the vendor's Inverse Service 3.1 or newer"));
+    CHECK_FALSE(has(line, "\n"));
+  }
+}
+
+TEST_CASE("a second client is turned away, and the first one goes on") {
+  ServedService service;
+  const auto port = open(service.options());
+  until_armed(*port);
+  CHECK_FALSE(error_of([&] { open(service.options()); }).empty());
+  const std::uint64_t before = counter(*port, "packets");
+  until_counted(*port, "packets", before + 20);
+  CHECK_FALSE(port->closed());
+}
+
+// ---- lock-step ----
+
+namespace {
+
+/// The reports of a run in lock-step, in which each command is one report.
+std::vector<CartesianReport> lock_step_run(ServiceProfile profile) {
+  ServedService service({.profile = profile, .lockstep = true});
+  const auto port = open(service.options(), true);
+  std::vector<CartesianReport> reports;
+  for (int tick = 0; tick < 300; ++tick) {
+    command(*port, static_cast<std::int16_t>(10 * tick));
+    REQUIRE(port->wait(5000));
+    std::array<std::uint8_t, 65> packet;
+    const std::size_t size = port->receive(packet);
+    const auto report = decode_cartesian_report(std::span(packet).first(size));
+    REQUIRE(report);
+    CHECK(port->receive(packet) == 0);
+    reports.push_back(*report);
+  }
+  return reports;
+}
+
+}  // namespace
+
+TEST_CASE("in lock-step a command is a report, the same in each run") {
+  const auto first = lock_step_run(ServiceProfile::v3_5_wireless);
+  CHECK(first == lock_step_run(ServiceProfile::v3_5_wireless));
+  CHECK(first == lock_step_run(ServiceProfile::v3_5));
+  CHECK(first[0].number == static_cast<std::uint32_t>(inverse3::Session::kProofTurns + 1));
+  CHECK(first.back().force_mn[0] > 0);
+  auto old = lock_step_run(ServiceProfile::v3_4);
+  REQUIRE(old.size() == first.size());
+  for (std::size_t i = 0; i < old.size(); ++i) {
+    old[i].force_mn = first[i].force_mn;  // it gives no echo
+  }
+  CHECK(old == first);
+}
+
+TEST_CASE("a port by the clock and a service in lock-step do not fit, nor the other way round") {
+  ServedService lockstep({.lockstep = true});
+  CHECK(has(error_of([&] { open(lockstep.options()); }), "the emulator runs in lock-step"));
+  ServedService real;
+  CHECK(has(error_of([&] { open(real.options(), true); }), "the controller runs in lock-step"));
+}
