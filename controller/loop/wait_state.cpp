@@ -32,7 +32,7 @@ constexpr std::array<std::array<const char*, kKinds>, kPersonalityWords.size()> 
       "hold the home pose, press its calibration button", "hold the home pose still",
       "move the arm away from its home pose"},
      {"", "start the vendor's service, and wake the handle",
-      "hold the grip on the inkwell until its light is solid; is its power supply in?",
+      "hold the handle's parking button; if a line above names what is missing, see to that first",
       "hold the handle's parking button", "hold the handle still, its parking button held",
       "let go of the handle's parking button"},
      {"", "start ./kerf arm, or unplug the device and plug it in again",

@@ -73,12 +73,13 @@ class ProbeView {
 /// A device with a driver in kerf, as the kernel lists it.
 struct DeviceNode {
   Personality personality = Personality::omni;
-  std::string path;    ///< of its node in /dev
+  std::string path;    ///< of its node in /dev; of the Inverse3 its service's address
   int open_error = 0;  ///< errno of opening it as this user; 0: may read and write
 };
 
 /// All such devices, by sysfs: SensAble's vendor on FireWire, the ids of the Falcon on USB and of
-/// WoodenHaptics on HID. Opens nothing, so it disturbs no device. `root` stands for `/` in tests.
+/// WoodenHaptics on HID; an Inverse3 on USB whose service listens. Opens nothing, so it disturbs no
+/// device. `root` stands for `/` in tests.
 [[nodiscard]] std::vector<DeviceNode> list_device_nodes(const std::filesystem::path& root = "/");
 
 /// One thing that a device or the servo lacks on this machine, and the command that provides it.

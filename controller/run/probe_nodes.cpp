@@ -21,6 +21,7 @@
 #include "controller/run/probe.hpp"
 #include "shared/posix/threads.hpp"
 #include "shared/wire/falcon.hpp"
+#include "shared/wire/inverse3.hpp"
 #include "shared/wire/omni.hpp"
 #include "shared/wire/woodenhaptics.hpp"
 
@@ -111,6 +112,38 @@ std::optional<std::string> wooden_node(const fs::path& device) {
   return std::nullopt;
 }
 
+/// The Inverse3 has no node of its own for us: its vendor's service holds the serial port. The id
+/// of that port is shared with other devices.
+bool has_inverse3_port(const fs::path& root) {
+  constexpr std::uint32_t kVendor = 0x16c0, kProduct = 0x0483;
+  std::error_code ignored;
+  for (const auto& entry : fs::directory_iterator(root / "sys/bus/usb/devices", ignored)) {
+    if (hex_of(line_of(entry.path() / "idVendor")) == kVendor &&
+        hex_of(line_of(entry.path() / "idProduct")) == kProduct) {
+      return true;
+    }
+  }
+  return false;
+}
+
+/// Whether a program listens at this TCP port, by the kernel's tables.
+bool listens_at(const fs::path& root, std::uint16_t port) {
+  for (const char* table : {"proc/net/tcp", "proc/net/tcp6"}) {
+    std::ifstream stream(root / table);
+    for (std::string line; std::getline(stream, line);) {
+      unsigned own_port = 0;
+      unsigned state = 0;
+      constexpr unsigned kListens = 0x0A;
+      if (std::sscanf(line.c_str(), " %*d: %*[0-9A-F]:%x %*[0-9A-F]:%*x %x", &own_port, &state) ==
+              2 &&
+          own_port == port && state == kListens) {
+        return true;
+      }
+    }
+  }
+  return false;
+}
+
 void list(const fs::path& root, const char* folder, Personality personality, NodeOf node_of,
           std::vector<DeviceNode>& nodes) {
   std::error_code ignored;
@@ -132,6 +165,10 @@ std::vector<DeviceNode> list_device_nodes(const fs::path& root) {
   list(root, "sys/class/hidraw", Personality::woodenhaptics, wooden_node, nodes);
   list(root, "sys/bus/usb/devices", Personality::touch, touch_node, nodes);
   list(root, "sys/bus/usb/devices", Personality::omega, omega_node, nodes);
+  if (has_inverse3_port(root) && listens_at(root, inverse3::kServicePort)) {
+    nodes.push_back(
+        {Personality::inverse3, "127.0.0.1:" + std::to_string(inverse3::kServicePort), 0});
+  }
   std::ranges::sort(nodes, {}, &DeviceNode::path);
   return nodes;
 }
@@ -158,7 +195,7 @@ Bus bus_of(Personality personality) {
       return {"sys/bus/usb", "sudo modprobe xhci-pci (is there a controller? lspci | grep USB)",
               "connect and power it, then: lsusb -d 0403:cb48"};
     case Personality::inverse3:
-      return {"sys/class/tty", "sudo modprobe cdc-acm",
+      return {"sys/bus/usb", "sudo modprobe xhci-pci (is there a controller? lspci | grep USB)",
               "connect and power it, then: lsusb -d 16c0:0483; systemctl status "
               "haply-inverse-service"};
     case Personality::touch:
@@ -229,7 +266,11 @@ std::vector<SetupProblem> lacks_of_nodes(std::optional<Personality> which,
     lacks.push_back(
         {node.path + ": " + std::generic_category().message(node.open_error), cure_of_right(root)});
   }
-  if (which && !found) {
+  if (which == Personality::inverse3 && !found && has_inverse3_port(root)) {
+    lacks.push_back(
+        {"inverse3: no service listens at port " + std::to_string(inverse3::kServicePort),
+         "sudo systemctl start haply-inverse-service (version 3.1 or newer)"});
+  } else if (which && !found) {
     const Bus bus = bus_of(*which);
     std::error_code ignored;
     const bool has_bus = fs::exists(root / bus.sysfs, ignored);

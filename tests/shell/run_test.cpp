@@ -332,6 +332,32 @@ TEST_CASE("a lack is reported with its cure: bus, device, rule, group") {
   CHECK(lacks_of_nodes(std::nullopt, {}, root.path()).empty());
 }
 
+TEST_CASE("an Inverse3 is there if its port is on USB and its service listens") {
+  const FakeRoot root;
+  const auto lack = [&] {
+    const auto lacks =
+        lacks_of_nodes(Personality::inverse3, list_device_nodes(root.path()), root.path());
+    return lacks.empty() ? "" : lacks[0].what;
+  };
+  root.write("sys/bus/usb/devices/usb1/idVendor", "1d6b\n");
+  CHECK(lack() == "inverse3: none is connected");
+  constexpr const char* kTable =
+      "  sl  local_address rem_address   st tx_queue rx_queue\n"
+      "   0: 0100007F:2711 00000000:0000 %s 00000000:00000000 00:00000000 00000000\n";
+  const auto table = [&](const char* state) {
+    std::string text = kTable;
+    return text.replace(text.find("%s"), 2, state);
+  };
+  root.write("proc/net/tcp", table("0A"));
+  CHECK(lack() == "inverse3: none is connected");
+  root.write("sys/bus/usb/devices/1-3/idVendor", "16c0\n");
+  root.write("sys/bus/usb/devices/1-3/idProduct", "0483\n");
+  CHECK(lack().empty());
+  CHECK(list_device_nodes(root.path()).at(0).path == "127.0.0.1:10001");
+  root.write("proc/net/tcp", table("01"));  // a connection, no listener
+  CHECK(lack() == "inverse3: no service listens at port 10001");
+}
+
 TEST_CASE("the view follows counts over the wrap and knows the tip once parked at rest") {
   ProbeView view({}, 1000);
   std::int64_t now_ns = 0;

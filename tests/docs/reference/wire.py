@@ -174,6 +174,28 @@ clamps it to its peak. **Torque scale**: the true force over the commanded one a
 """
 
 
+def inverse3(root):
+    file = Source(root, "shared/wire/inverse3.hpp")
+    origin = ", ".join(part.strip() for part in re.search(r"kOriginM\{([^}]*)\}", file.text)[1].split(","))
+    device = Source(root, "hil/front/inverse3/service_device.hpp")
+    profiles = re.findall(r'"([^"]+)"', re.search(r"kServiceProfileWords\{([^}]*)\}", device.text)[1])
+    faults = re.findall(r'"([^"]+)"', re.search(r"kServiceFaultWords\{([^}]*)\}", device.text)[1])
+    return f"""## The Inverse3's service
+
+`--port ws` and `--front websocket`: JSON as text over a WebSocket at port {file.number('kServicePort')}, and events at {file.number('kEventPort')}. The words are those of
+the vendor's public pages; the emulated service has the members that kerf reads, and some more.
+
+* **Speaks first**: the service, with the list of its devices and their configuration. Then each message of the client has one
+  reply, and nothing else comes. In lock-step a message is one period of the servo.
+* **Force**, N: `{{"inverse3": [{{"device_id": "0A1C", "commands": {{"set_cursor_force": {{"vector": {{"x": 0, "y": -0.4, "z": 1.1}}}}}}}}]}}`;
+  `values` in place of `vector` before 3.5. It lasts one message.
+* **Frame**: X right, Y away from the user, Z up, m. kerf has x = X, y = Z, z = -Y, about ({origin}) m of the service, a choice of ours.
+* **Emulated**: versions {", ".join(f"`{word}`" for word in profiles)} (`--profile`); `GET /version`, `/devices`, `/settings/devices/force_scale`. The answer
+  to `/version` has a member `kerf_emulator`, by which kerf's driver sees whether both run in lock-step. Faults (`--bus-fault`):
+  {", ".join(f"`{word}`" for word in faults)}.
+"""
+
+
 def links(root):
     link = Source(root, "shared/wire/emulator_link.hpp")
 
@@ -278,7 +300,7 @@ A connection is closed with {', '.join(f'{value} `{word}`' for word, value, _ in
 
 
 def page(root, programs):
-    same("shared/wire", ["omni", "falcon", "woodenhaptics", "cartesian", "emulator_link"],
+    same("shared/wire", ["omni", "falcon", "woodenhaptics", "cartesian", "inverse3", "emulator_link"],
          {path.stem for path in (root / "shared/wire").glob("*.hpp")} - {"little_endian", "personality"})
     return f"""# Wire bytes
 
@@ -289,4 +311,4 @@ This page is enough to write a host for the emulator, or a device for the contro
 Torque scales (N mm per count) are the host's setting: `torque_scale` of a scene, `--torque-scale`; `./kerf emulator
 --personality D --describe` prints the emulated device's.
 
-{chr(10).join(part(root) for part in (omni, falcon, wooden, cartesian, links, bridge))}"""
+{chr(10).join(part(root) for part in (omni, falcon, wooden, cartesian, inverse3, links, bridge))}"""
