@@ -180,7 +180,8 @@ TEST_CASE("a shaft comes and goes with its tool, and is pushed out with a ramp")
     for (int time = 0; time < 2; ++time) {
       CHECK(armed.servo->apply({.kind = ServoCommand::Kind::select_tool, .argument = 1}));
       const ServoOutput bare = armed.settled(-1.3, 0, 0);
-      CHECK(length(bare.force_n) == 0);
+      CHECK(length(bare.force_n) <
+            1e-12);  // in double the proxy rests within a rounding of the hand
       CHECK_FALSE(bare.shaft);
       CHECK(armed.servo->apply({.kind = ServoCommand::Kind::select_tool, .argument = 0}));
       double last_n = 0;
