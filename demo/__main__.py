@@ -66,6 +66,8 @@ class Demo:
 
     def run(self):
         """Returns the exit code."""
+        has_sources = os.path.exists(os.path.join(self.root, "standin", "CMakeLists.txt"))
+        demo_options.choose_port(self.options, os.path.join(os.path.dirname(self.programs), "stand-in") if has_sources else "")
         demo_options.check(self.options)
         if self.options.out:
             self.out = OutFolder(self.options.out)
@@ -85,7 +87,7 @@ class Demo:
 
     def build(self):
         names = ["controller", "emulator", "visualizer", "recorder", "record"]
-        names += ["arm"] * (self.options.port == "arm")
+        names += ["arm"] * (self.options.port == "arm") + ["stand-in"] * self.options.stand_in
         names += ["bridge"] * (self.options.serve or self.options.two_machines) + ["lab"] * self.options.two_machines
         code = subprocess.run([self.kerf, "_programs", *names], check=False).returncode
         if code:
@@ -242,8 +244,8 @@ class Demo:
             self.start_arm()
 
     def start_arm(self):
-        """The adapter to the vendor's library. A stand-in for that finds its emulator by KERF_EMULATOR_SOCKET."""
-        os.environ["KERF_EMULATOR_SOCKET"] = self.meet
+        """The adapter to the vendor's library. kerf's stand-in for that finds the emulator by KERF_STAND_IN."""
+        os.environ["KERF_STAND_IN"] = f"socket:{self.meet},device={self.options.device},hand=pushed"
         self.arm = self.processes.start("arm", [
             "--device", self.options.device, "--name", self.name, "--library", os.path.abspath(self.options.library),
             "--report", os.path.join(self.results, "arm.json")], out="arm.log", log="arm.log")

@@ -9,6 +9,7 @@ import socket
 
 BUSES = {"omni": ("fw", "fw1"), "falcon": ("usb", "usb"), "woodenhaptics": ("hid", "hidraw0"),  # word of --port, its node
          "inverse3": ("ws", ""), "touch": ("arm", ""), "omega": ("arm", "")}  # no node: a service or a library of the vendor
+STAND_INS = {"touch": "libHD.so", "omega": "libdrd.so.3"}  # kerf's own in place of the vendor's library
 FLAGS = ("--headless", "--serve", "--stereo", "--voxel-tool", "--mute", "--colour-blind", "--virtual", "--two-machines")
 OF_SCENE = ("--scene", "--volume", "--spacing", "--override-spacing", "--window", "--set")
 OF_LINK = {"--loss": (50, 1), "--delay-ms": (2000, 20), "--mbit": (100000, 4)}  # of two machines: the most of each, a bad one
@@ -32,8 +33,9 @@ class Options:
     out: str = ""
     size: str = "640x480"
     device: str = "omni"
-    port: str = "socket"
-    library: str = ""  # of the vendor, for --port arm
+    port: str = ""  # by choose_port
+    library: str = ""  # for --port arm: in place of kerf's stand-in for the vendor's
+    stand_in: bool = False  # that one is used
     listen: str = ""
     name: str = ""  # of the controller; demo-PID
     sheet: str = ""
@@ -140,6 +142,20 @@ def growth(options, rate_hz):
     return lines
 
 
+def choose_port(options, stand_ins):
+    """If none is given: a Cartesian device by its vendor's service or library, as a real one, unless in lock-step or between two
+    machines; any other by a socket. `stand_ins`: the folder of kerf's libraries; empty if an installed kerf has none."""
+    if options.port == "arm" or not options.port:
+        options.library = options.library or os.environ.get("KERF_ARM_LIBRARY", "")
+    if not options.port:
+        own = BUSES.get(options.device, ("socket", ""))[0]
+        has_library = stand_ins or options.library
+        fits = own == "ws" or (own == "arm" and has_library)
+        options.port = own if fits and not options.virtual and not options.two_machines else "socket"
+    if options.port == "arm" and not options.library and stand_ins and options.device in STAND_INS:
+        options.library, options.stand_in = os.path.join(stand_ins, STAND_INS[options.device]), True
+
+
 def check(options):
     """Completes the options by defaults, and throws Refusal for values and combinations that cannot be."""
     if options.record == "-":
@@ -172,8 +188,7 @@ def check(options):
     bus = BUSES[options.device][0]
     if options.port not in ("socket", bus):
         raise Refusal(f"--port {options.port}: not for --device {options.device}; take socket or {bus}")
-    options.library = options.library or os.environ.get("KERF_ARM_LIBRARY", "")
-    if options.port == "arm" and not os.path.isfile(options.library):
+    if options.port == "arm" and not options.stand_in and not os.path.isfile(options.library):
         given = f"--library {options.library}: not a file" if options.library else "--port arm: no library"
         raise Refusal(f"{given}; name that of a stand-in for the vendor's: --library PATH")
     if options.virtual and options.port not in ("socket", "fw", "ws"):

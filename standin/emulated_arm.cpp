@@ -33,7 +33,7 @@ constexpr int kPatienceMs = 5000;  // a loaded machine, or an emulator that ends
 }  // namespace
 
 EmulatedArm::EmulatedArm(const Settings& settings, Ledger& ledger)
-    : ledger_(ledger), lockstep_(settings.lockstep) {
+    : ledger_(ledger), hand_waits_(settings.hand_waits), lockstep_(settings.lockstep) {
   try {
     connect_to(settings.socket);
     agree(settings);
@@ -148,8 +148,11 @@ void EmulatedArm::command(DeviceVec<double> force_n, bool on, bool ready) noexce
   CartesianCommand command;
   command.force_mn = {cartesian::packed_n(force_n.x), cartesian::packed_n(force_n.y),
                       cartesian::packed_n(force_n.z)};
-  command.force_on = on;
-  command.light = ready ? CartesianCommand::Light::ready : CartesianCommand::Light::asks;
+  // What the emulated hand waits for before it takes the arm.
+  if (norm(force_n) > 0) hand_waits_ = false;
+  command.force_on = on && !hand_waits_;
+  command.light =
+      ready && !hand_waits_ ? CartesianCommand::Light::ready : CartesianCommand::Light::asks;
   command.answers = pose().number;
   const auto bytes = encode(command);
   if (send(fd_, bytes.data(), bytes.size(), MSG_DONTWAIT | MSG_NOSIGNAL) < 0 && errno == EPIPE) {

@@ -69,6 +69,7 @@ class EmulatedArm {
   Ledger& ledger_;
   int fd_ = -1;
   bool closed_ = false;
+  bool hand_waits_;  ///< until the first force
   bool lockstep_;
   double report_hz_ = 1000;
   std::array<Pose, kHistory> history_{};

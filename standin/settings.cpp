@@ -28,6 +28,7 @@ constexpr std::array kSwitches{
     Switch{"handles", "seen", "documented", &Settings::documented_handles},
     Switch{"button0", "parked", "hand", &Settings::hand_buttons},
     Switch{"status", "17", "16", &Settings::short_status},
+    Switch{"hand", "enabled", "pushed", &Settings::hand_waits},
 };
 
 [[noreturn]] void refuse(std::string_view part, const std::string& remedy) {
