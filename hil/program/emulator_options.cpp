@@ -58,8 +58,7 @@ void declare_device(Arguments& app, EmulatorOptions& o) {
   app.flag("--drop-torque", o.drop_torque,
            "motors let go when the host is silent for 0.1 s (default: hold; woodenhaptics: after "
            "0.5 s)");
-  app.option("--silence-ms", o.silence_ms,
-             "host silence after which --drop-torque acts")
+  app.option("--silence-ms", o.silence_ms, "host silence after which --drop-torque acts")
       .within(1, 10'000)
       .shows_default();
   app.flag("--pot-noise", o.pot_noise, "omni: noise in the low bits of the gimbal pots");
