@@ -47,7 +47,6 @@ class TestLockStep(unittest.TestCase):
         self.assertGreater(first["contact_ticks"], 100)
         self.assertEqual(first["lost_packets"], 0)
         self.assertEqual(first["faults"], [])
-        self.assertTrue(its["calibrated"])
         # The force of the device in steps of 14 mN.
         self.assertLess(abs(its["peak_motor_force_n"] - first["peak_force_n"]), 0.02)
 

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <cstdlib>
 #include <memory>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
@@ -240,6 +241,21 @@ TEST_CASE("in lock-step a command is a report, the same in each run") {
     old[i].force_mn = first[i].force_mn;  // it gives no echo
   }
   CHECK(old == first);
+}
+
+TEST_CASE("a port that ends takes its force back by its last message") {
+  ServedService service({.lockstep = true});
+  auto port = open(service.options(), true);
+  std::optional<CartesianReport> report;
+  for (int tick = 0; tick < 300; ++tick) {
+    command(*port, 1000);
+    REQUIRE(port->wait(5000));
+    report = newest(*port);
+  }
+  REQUIRE(report);
+  CHECK(report->force_mn[0] > 900);
+  port.reset();
+  CHECK(norm(service.end().motor_force_n()) == 0.0);
 }
 
 TEST_CASE("a port by the clock and a service in lock-step do not fit, nor the other way round") {
