@@ -49,6 +49,7 @@ DhdArm::DhdArm(const Options& options, ArmExchange& exchange)
   library_.find("dhdSetForce", calls_.set_force);
   library_.find("dhdGetButton", calls_.get_button);
   library_.require_all();
+  library_.find("dhdGetStatus", calls_.get_status);  // without it the mode is not seen
 }
 
 void DhdArm::open() {
@@ -121,8 +122,9 @@ void DhdArm::run() noexcept {
   std::int64_t next_ns = monotonic_ns();
   while (!exchange_.finished()) {
     frame();
-    // Missed cycles are left out.
-    next_ns = std::max(next_ns + period_ns, monotonic_ns());
+    // Missed cycles are left out: this thread stands above the servo, and has to sleep.
+    const std::int64_t late_ns = std::max<std::int64_t>(monotonic_ns() - next_ns, 0);
+    next_ns += (late_ns / period_ns + 1) * period_ns;
     sleep_until_ns(next_ns);
   }
   static_cast<void>(calls_.enable_force(0, id_));
@@ -148,7 +150,9 @@ void DhdArm::frame() noexcept {
                          .button1 = calls_.get_button(1, id_) > 0,
                          .button2 = false,
                          .parked = calls_.get_button(0, id_) > 0,
-                         .homed = is_initialized_};
+                         .homed = is_initialized_,
+                         .powered = true};
+    follow_force_mode(*reading);
   } else {
     count_error();
     const auto code = static_cast<std::uint32_t>(calls_.error_get_last());
@@ -164,6 +168,21 @@ void DhdArm::frame() noexcept {
   } else if (result == kSaturated) {
     ++saturated_;
   }
+}
+
+/// A device that left the force mode (its force button, its velocity threshold, its watchdog) would
+/// give the whole force in one step when it comes back. So it counts as without power, and force
+/// begins anew from its parking button, held while the mode is back.
+void DhdArm::follow_force_mode(ArmReading& reading) noexcept {
+  constexpr int kLookFrames = 16;
+  constexpr std::size_t kForceMode = 5;
+  if (calls_.get_status != nullptr && mode_look_-- <= 0) {
+    mode_look_ = kLookFrames;
+    std::array<int, 32> status{};  // 17 words as of SDK 3.17
+    if (calls_.get_status(status.data(), id_) >= 0) gives_force_ = status[kForceMode] != 0;
+  }
+  if (!gives_force_ && reading.parked) static_cast<void>(calls_.enable_force(1, id_));
+  reading.powered = gives_force_;
 }
 
 void DhdArm::count_error() noexcept {

@@ -37,12 +37,13 @@ struct Calls {
   int (*get_position)(double* x_m, double* y_m, double* z_m, char id);
   int (*set_force)(double x_n, double y_n, double z_n, char id);
   int (*get_button)(int index, char id);
+  int (*get_status)(int* words, char id);  ///< null if the library has none
 };
 
 }  // namespace dhd
 
-/// An omega, delta, sigma or lambda of Force Dimension, or a Falcon, by libdrd.so.3: its three
-/// translations.
+/// An omega.3 of Force Dimension, by libdrd.so.3. Other devices of theirs open too, with the limits
+/// and the range of an omega.3.
 ///
 /// A thread of its own runs the frames: position, buttons, one turn, force. The SDK's axes are x to
 /// the user, y right, z up, in m: kerf (x, y, z) = (y, z, x) mm.
@@ -85,6 +86,7 @@ class DhdArm final : public VendorArm {
 
  private:
   void run() noexcept;
+  void follow_force_mode(ArmReading& reading) noexcept;
   [[nodiscard]] bool set_watchdog() noexcept;
   [[nodiscard]] std::string last_error() const;
   void count_error() noexcept;
@@ -100,7 +102,8 @@ class DhdArm final : public VendorArm {
   std::atomic<const char*> notice_{""};
   // Of that thread, until `stop`.
   int unread_ = 0;  ///< positions in a row that could not be read
-  int initialized_look_ = 0;
+  int initialized_look_ = 0, mode_look_ = 0;
+  bool gives_force_ = true;
   bool is_initialized_ = false;
   std::uint64_t saturated_ = 0;
   std::array<std::uint64_t, 24> error_counts_{};  ///< by the SDK's number, the last one: any other

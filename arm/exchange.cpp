@@ -47,6 +47,7 @@ std::optional<std::array<double, 4>> orientation_of(const Vec3& x, const Vec3& y
 ArmExchange::ArmExchange(ArmPageAdapter& page, double peak_n, int rate_hz, Clock* clock) noexcept
     : page_(page),
       peak_n_(peak_n),
+      command_life_ns_(kZeroNs - std::max<std::int64_t>(1'000'000, 1'000'000'000 / rate_hz)),
       most_zero_frames_(std::max(kFewest, static_cast<std::uint64_t>(std::ceil(kZeroS * rate_hz)))),
       clock_(clock) {}
 
@@ -81,7 +82,7 @@ bool ArmExchange::publish(const ArmReading& reading, std::int64_t now_ns) noexce
   report.button2 = reading.button2;
   report.parked = reading.parked;
   report.homed = reading.homed;
-  report.powered = !is_let_go_.load();
+  report.powered = reading.powered && !is_let_go_.load();
   page_.publish(report, now_ns);
   return true;
 }
@@ -92,8 +93,7 @@ std::array<double, 3> ArmExchange::commanded(std::int64_t now_ns) noexcept {
   // One that was written during this turn is a little younger than it; a time from farther ahead is
   // none.
   constexpr std::int64_t kAheadNs = 1'000'000;
-  const std::int64_t age_ns = now_ns - newest->at_ns;
-  if (age_ns >= kCommandLifeNs || age_ns < -kAheadNs) {
+  if (newest->at_ns <= now_ns - command_life_ns_ || newest->at_ns > now_ns + kAheadNs) {
     if (last_force_n_ != Vec3{}) ++counts_.expired;
     return {};
   }
@@ -106,7 +106,7 @@ std::array<double, 3> ArmExchange::commanded(std::int64_t now_ns) noexcept {
     ++counts_.clamped;
     for (double& component : force_n) component *= peak_n_ / length;
   }
-  counts_.command_age.record(age_ns);
+  counts_.command_age.record(now_ns - newest->at_ns);
   return force_n;
 }
 

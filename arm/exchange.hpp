@@ -20,6 +20,7 @@ struct ArmReading {
   bool button1 = false, button2 = false;
   bool parked = false;
   bool homed = false;
+  bool powered = true;  ///< it can give a force
 };
 
 /// Rotation of a tool whose axes are the columns `x`, `y`, `z`. Nothing unless they are of length 1
@@ -37,9 +38,12 @@ class ArmExchange {
  public:
   using Clock = std::int64_t() noexcept;
 
-  /// A command this old has no force any more. With a frame of 1 ms the force is zero within 20 ms
-  /// of the last command, whatever has happened to the controller.
-  static constexpr std::int64_t kCommandLifeNs = 19'000'000;
+  /// The force is zero within so long of the last command, whatever has happened to the controller.
+  static constexpr std::int64_t kZeroNs = 20'000'000;
+  /// So a command has no force any more one frame earlier; at least 1 ms, for a library whose rate
+  /// is not known.
+  [[nodiscard]] std::int64_t command_life_ns() const noexcept { return command_life_ns_; }
+  static constexpr int kSlowestHz = 200;  // leaves three quarters of it
   /// From `let_go` on, so many frames of zero force make the end, and at least kFewest.
   static constexpr double kZeroS = 0.02;
   static constexpr std::uint64_t kFewest = 3;
@@ -85,6 +89,7 @@ class ArmExchange {
 
   ArmPageAdapter& page_;
   double peak_n_;
+  std::int64_t command_life_ns_;
   std::uint64_t most_zero_frames_;
   Clock* clock_;
   std::atomic<bool> is_let_go_{false};

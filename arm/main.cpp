@@ -9,7 +9,7 @@
 
 int main(int argc, char** argv) {
   const int code = kerf::run_program("kerf-arm", [&] {
-    return kerf::run_arm(argc, argv, kerf::catch_stop_signals(), std::cout, std::cerr);
+    return kerf::run_arm(argc, argv, kerf::catch_stop_and_pause_signals(), std::cout, std::cerr);
   });
   // The vendor's library is loaded and may have threads: what it would do at an exit can only
   // crash.

@@ -48,7 +48,7 @@ void declare(Arguments& app, ArmOptions& o) {
   app.option("--rate", o.rate_hz,
              "frames a second; touch: 500, 1000 or as the device takes (default: the library's); "
              "omega: up to 4000 (default: 4000)")
-      .within(100, 4000);
+      .within(ArmExchange::kSlowestHz, 4000);
   app.flag("--auto-init", o.auto_init,
            "omega: if it is not initialised, let the SDK do so, which MOVES THE ARM");
   app.option("--priority", o.priority, "omega: SCHED_FIFO priority of its thread, 0: none")

@@ -145,12 +145,11 @@ def growth(options, rate_hz):
 def choose_port(options, stand_ins):
     """If none is given: a Cartesian device by its vendor's service or library, as a real one, unless in lock-step or between two
     machines; any other by a socket. `stand_ins`: the folder of kerf's libraries; empty if an installed kerf has none."""
-    if options.port == "arm" or not options.port:
+    if options.port == "arm":  # on the user's word alone: it may be a vendor's, and its device a real one
         options.library = options.library or os.environ.get("KERF_ARM_LIBRARY", "")
     if not options.port:
         own = BUSES.get(options.device, ("socket", ""))[0]
-        has_library = stand_ins or options.library
-        fits = own == "ws" or (own == "arm" and has_library)
+        fits = own == "ws" or (own == "arm" and stand_ins and not options.library)
         options.port = own if fits and not options.virtual and not options.two_machines else "socket"
     if options.port == "arm" and not options.library and stand_ins and options.device in STAND_INS:
         options.library, options.stand_in = os.path.join(stand_ins, STAND_INS[options.device]), True

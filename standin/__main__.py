@@ -24,7 +24,7 @@ NAMES = {"libHD.so": ("libHD.so", "libHD.so.3.0", "libHD.so.3.4"),  # built libr
 RATES_HZ = {"touch": (1000, 1000), "omega": (4000, 1000)}  # in real time, in lock-step
 SWITCHES = {"missed": ("hold", "drop"), "stop": ("hold", "drop"), "excess": ("clamp", "cut"),
             "before-enable": ("apply", "ignore"), "calibration": ("kept", "lost"), "handles": ("seen", "documented"),
-            "button0": ("parked", "hand"), "status": ("17", "16"),
+            "button0": ("parked", "hand"), "status": ("17", "16"), "hand": ("enabled", "pushed"),
             "ramp": None, "stall": None}
 WITH_VALUE = ("--device", "--hand", "--fault", "--seconds", "--rate", "--on-silence", "--switch", "--report", "--junit")
 LINGER_S = 0.3  # three times the silence after which a device that drops its force does so
@@ -175,6 +175,9 @@ class Run:
         while self.command.poll() is None:
             time.sleep(0.02)
             gone = self.emulator.poll() is not None  # in lock-step its time is over
+            if gone and not (self.options.lockstep and self.options.seconds and self.emulator.returncode == 0):
+                self.ask_to_end(0)
+                raise Refusal(f"kerf-emulator ended (exit code {self.emulator.returncode}) before the program; start it again")
             if gone or limit is not None and time.monotonic() >= limit:
                 self.ask_to_end(GRACE_S if gone else 0)
         code = self.command.returncode
@@ -207,8 +210,7 @@ class Run:
             self.emulator.wait(10)
             return json.loads(pathlib.Path(self.path("emulator.json")).read_text())
         except (OSError, ValueError, subprocess.TimeoutExpired):
-            print("kerf: stand-in: kerf-emulator left no report; its figures are missing", file=sys.stderr)
-            return {}
+            raise Refusal("kerf-emulator left no report, so nothing is known of the device; start it again") from None
 
     def end(self):
         for process in (self.command, self.emulator):

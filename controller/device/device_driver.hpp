@@ -174,21 +174,20 @@ class OmniDriver final : public DeviceDriver {
   PacketNumbers numbers_;
 };
 
-/// A Cartesian device: numbered reports of a pose in kerf's own packets, whoever makes them. A
-/// position that 16 bits of counts cannot hold is refused, so nothing wraps. An unpowered device
-/// counts as not homed: its motors stay off.
+/// A Cartesian device: numbered reports of a pose in kerf's own packets, whoever makes them. Old
+/// ones are refused; but the numbers are those of an adapter, which counts on if its device stands
+/// still, so readings that stand still under force are no reports here too. A position that 16 bits
+/// of counts cannot hold is refused, so nothing wraps. An unpowered device counts as not homed: its
+/// motors stay off.
 class CartesianDriver final : public DeviceDriver {
  public:
   CartesianDriver(PacketPort& port, int step_um) noexcept : DeviceDriver(port), step_um_(step_um) {}
-
-  void start() noexcept override { static_cast<void>(release()); }
 
  private:
   [[nodiscard]] bool take(std::span<const std::uint8_t> packet,
                           DeviceReport& report) noexcept override;
   [[nodiscard]] std::size_t compose(const ServoOutput& output, Packet& packet) noexcept override;
   [[nodiscard]] std::size_t compose_release(Packet& packet) const noexcept override;
-  [[nodiscard]] bool are_numbered() const noexcept override { return true; }
 
   int step_um_;
   PacketNumbers numbers_;

@@ -77,6 +77,8 @@ inline Rest follow_encoders(const DeviceReport& report, const DevicePlan<N>& dev
     constexpr std::int64_t kEnd = std::numeric_limits<std::int32_t>::max();  // either sign fits
     encoders.unwrapped[i] = static_cast<std::int32_t>(
         std::clamp(std::int64_t{encoders.unwrapped[i]} + step, -kEnd, kEnd));
+    // The position of a Cartesian device is whole in its counts, so it is taken, not summed up.
+    if (is_cartesian(device.personality)) encoders.unwrapped[i] = report.encoder[i];
     encoders.last[i] = report.encoder[i];
     const auto moved =
         absolute ? step : static_cast<std::int16_t>(report.encoder[i] - encoders.rest_from[i]);

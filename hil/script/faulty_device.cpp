@@ -113,6 +113,17 @@ void put_readings(const Readings& readings, std::span<std::uint8_t> packet, int 
   });
 }
 
+/// Puts all of a held report of a Cartesian device into `packet` but its number: orientation and
+/// the rest of a position stand still too. Nothing for another device.
+void hold_cartesian(std::span<const std::uint8_t> held, std::vector<std::uint8_t>& packet) {
+  const auto now = decode_cartesian_report(packet);
+  auto then = decode_cartesian_report(held);
+  if (!now || !then) return;
+  then->number = now->number;
+  const auto bytes = encode(*then);
+  packet.assign(bytes.begin(), bytes.end());
+}
+
 std::int16_t wrapped(int count) {
   return static_cast<std::int16_t>(static_cast<std::uint16_t>(count));
 }
@@ -252,6 +263,7 @@ void FaultyDevice::break_sensors(Bytes& packet) {
         count = running.stuck_at;
         break;
       case FaultKind::freeze:
+        hold_cartesian(running.held, packet);
         readings = readings_of(running.held, step_um).value_or(*readings);
         break;
       case FaultKind::jump:

@@ -52,8 +52,9 @@ class DeviceWire {
                                           const std::array<std::int16_t, 3>& count) const;
   /// Motor counts lie within +- this.
   [[nodiscard]] int count_end() const noexcept { return count_end_; }
+  /// Whether the device itself does, so that readings that stand still are known to be new.
   [[nodiscard]] bool numbers_its_packets() const noexcept {
-    return personality_ == Personality::omni || is_cartesian(personality_);
+    return personality_ == Personality::omni;
   }
   /// Whether a calibration in a wrong pose moves every later one: encoders that count from it.
   [[nodiscard]] bool counts_from_rest() const noexcept { return personality_ == Personality::omni; }

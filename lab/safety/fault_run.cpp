@@ -129,7 +129,7 @@ bool concerns(FaultKind kind, Personality personality) noexcept {
   }
   if (kind == FaultKind::noise) return personality == Personality::omni;
   if (kind == FaultKind::replay) return is_numbered;
-  if (kind == FaultKind::freeze) return !is_numbered;
+  if (kind == FaultKind::freeze) return personality != Personality::omni;
   return true;
 }
 

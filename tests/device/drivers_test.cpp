@@ -392,6 +392,8 @@ TEST_CASE("cartesian: the force goes out in mN with the light of the phase, and 
   Bench<kerf::CartesianDriver> arm(10);
   const auto sent = [&] { return kerf::decode_cartesian_command(arm.last()).value(); };
   arm.driver.start();
+  CHECK(arm.port.sent.empty());  // the device speaks first
+  CHECK(arm.driver.release());
   CHECK(sent() == kerf::CartesianCommand{});
   arm.driver.command(forcing({1500, -2, 0}));
   CHECK(sent().force_mn == Counts{1500, -2, 0});

@@ -9,6 +9,7 @@
 #include <stdexcept>
 #include <system_error>
 
+#include <poll.h>
 #include <unistd.h>
 
 #include "shared/posix/monotonic_clock.hpp"
@@ -20,6 +21,7 @@
 namespace kerf::inverse3 {
 namespace {
 
+constexpr int kMostStrays = 64, kMostEvents = 16;  // in a turn: a flood cannot hold the force
 constexpr std::int64_t kNsPerMs = 1'000'000;
 constexpr std::int64_t kLateNs = 5 * kNsPerMs;
 constexpr std::int64_t kTakeBackNs = 20 * kNsPerMs;
@@ -215,6 +217,7 @@ std::unique_ptr<ServicePort::Connection> ServicePort::connect() const {
     throw std::runtime_error(std::string("the list of the devices cannot be read; ") + kNeeds);
   }
   made->session = std::make_unique<Session>(options_.wanted, key, first, now_ns());
+  if (is_final(made->session->bar())) throw Refusal(text_of(made->session->bar()));
   if (options_.event_port != 0) {
     try {
       made->events = std::make_unique<WebSocket>(
@@ -253,6 +256,9 @@ void ServicePort::connect_within(int patience_ms, const std::atomic<bool>& stop)
 /// that is not well proves it later.
 void ServicePort::prove() {
   for (int turn = 0; turn < Session::kProofTurns; ++turn) {
+    // The service's state may be older than a turn on a fast link: 50 ms in all.
+    constexpr std::int64_t kPauseNs = 5 * kNsPerMs;
+    if (!ours_.lockstep && turn > 0) sleep_until_ns(sent_ns_ + kPauseNs);
     if (play_turn() == Turn::lost) {
       throw std::runtime_error(place() + ": the service closed the connection or does not reply; " +
                                kNeeds);
@@ -261,14 +267,20 @@ void ServicePort::prove() {
     if (is_final(bar)) throw std::runtime_error(place() + ": " + text_of(bar));
     if (bar != Bar::proving && bar != Bar::parking) break;
   }
-  // In lock-step each report is a tick, and the first one answers the driver's first command: one
-  // that waits already would be read with it or before it, as chance has it.
-  std::array<std::uint8_t, MailboxPacket::kMaxBytes> packet;
-  while (ours_.lockstep && inbox_.take(packet) > 0) {
+  if (!ours_.lockstep) return;
+  // In lock-step each report is a tick: the newest one waits for the first, as of a device that
+  // speaks first. More than one would be read together or apart, as chance has it.
+  std::array<std::uint8_t, MailboxPacket::kMaxBytes> packet, newest;
+  std::size_t size = 0;
+  while (const std::size_t taken = inbox_.take(packet)) {
+    newest = packet;
+    size = taken;
   }
+  if (size > 0) static_cast<void>(inbox_.put(std::span(newest).first(size)));
 }
 
 bool ServicePort::send(std::span<const std::uint8_t> packet) noexcept {
+  if (!ours_.lockstep) put_ns_.store(monotonic_ns(), std::memory_order_relaxed);
   if (closed() || !outbox_.put(packet)) return false;
   sem_post(&raised_);
   return true;
@@ -279,13 +291,17 @@ bool ServicePort::send_last(std::span<const std::uint8_t> packet) noexcept {
   return outbox_.send_and_wait([&] { return send(packet); }, kLastMs);
 }
 
+/// Left out if the terminal or pipe takes nothing: no force may wait for its reader.
 void ServicePort::note(const std::string& text) const noexcept {
+  pollfd error_stream{STDERR_FILENO, POLLOUT, 0};
+  if (poll(&error_stream, 1, 0) != 1 || (error_stream.revents & POLLOUT) == 0) return;
   std::fprintf(stderr, "kerf: warning: %s: %s\n", place().c_str(), one_line(text).c_str());
 }
 
 /// One line for each new reason why the device may not push; the user's own doing needs none.
 void ServicePort::note_bar() noexcept {
   const Bar bar = connection_->session->bar();
+  if (bar == Bar::none) noted_ = Bar::parking;  // the next one is news again
   if (bar == noted_ || bar == Bar::none || bar == Bar::parking || bar == Bar::proving) return;
   noted_ = bar;
   ++bars_;
@@ -326,24 +342,24 @@ ServicePort::Turn ServicePort::play_turn() noexcept {
   const std::size_t size = outbox_.take(packet);
   if (const auto command = decode_cartesian_command(std::span(packet).first(size))) {
     command_ = *command;
-    command_ns_ = now_ns();
+    command_ns_ = ours_.lockstep ? now_ns() : put_ns_.load(std::memory_order_relaxed);
     ++commands_;
   }
   const bool takes_back = std::exchange(link.takes_back, false);
   const auto force_n =
       link.session->force_n(takes_back ? neutral : command_, command_ns_, now_ns());
   const bool names_itself = link.turns == 0 && link.session->key() == ForceKey::vector;
-  const Extra extra = names_itself                                          ? Extra::profile
-                      : link.turns % kFullStateTurns == kFullStateTurns - 1 ? Extra::full_state
-                                                                            : Extra::none;
+  const Extra extra = names_itself                        ? Extra::profile
+                      : link.turns % kFullStateTurns == 1 ? Extra::full_state
+                                                          : Extra::none;
   MessageBuffer buffer;
   const std::string_view message =
       force_message(link.session->device_id(), link.session->key(), force_n, extra, buffer);
   // What came unasked since the last reply belongs to no turn.
-  while (true) {
+  for (int strays = 0;; ++strays) {
     const WebSocket::Got got = link.service->receive(0);
     if (got == WebSocket::Got::nothing) break;
-    if (got == WebSocket::Got::lost) return Turn::lost;
+    if (got == WebSocket::Got::lost || strays == kMostStrays) return Turn::lost;
     ++strays_;
   }
   sent_ns_ = monotonic_ns();
@@ -369,6 +385,11 @@ ServicePort::Turn ServicePort::await_reply(std::int64_t sent_ns) noexcept {
       const auto took_us = static_cast<std::uint64_t>((monotonic_ns() - sent_ns) / 1000);
       longest_us_ = std::max<std::uint64_t>(longest_us_, took_us);
       if (got == WebSocket::Got::binary) break;
+      // This thread itself may have been held up; then the reply was there on waking up.
+      if (!ours_.lockstep && monotonic_ns() - sent_ns > kTakeBackNs && passed < 2) {
+        link.takes_back = true;
+        link.session->raise(Bar::stalled, now_ns());
+      }
       return take_reply();
     }
     if (passed == 0) ++late_;
@@ -421,7 +442,7 @@ void ServicePort::pass_on(const CartesianReport& report) noexcept {
 void ServicePort::take_events() noexcept {
   Connection& link = *connection_;
   if (!link.events) return;
-  for (;;) {
+  for (int taken = 0; taken < kMostEvents; ++taken) {
     const WebSocket::Got got = link.events->receive(0);
     if (got == WebSocket::Got::nothing) return;
     if (got == WebSocket::Got::lost) {

@@ -118,7 +118,8 @@ class ServicePort final : public PacketPort {
   std::int64_t backoff_ns_ = 0, retry_ns_ = 0;
   Bar noted_ = Bar::parking;
   CartesianCommand command_;
-  std::int64_t command_ns_ = 0;  ///< when it came, in time of the turns
+  std::int64_t command_ns_ = 0;          ///< when it came, in time of the turns
+  std::atomic<std::int64_t> put_ns_{0};  ///< when the newest command was given, by the clock
 
   std::atomic<bool> closed_{false};
   SpscRing inbox_;

@@ -150,7 +150,9 @@ Session::Session(const Wanted& wanted, ForceKey key, const ServiceState& first, 
     : device_id_(chosen(wanted.device_id, first)),
       park_(wanted.park),
       key_(key),
-      barred_until_ns_(now_ns + kBarNs) {}
+      barred_until_ns_(now_ns + kBarNs) {
+  if (const Bar bar = bar_of_config(*arm_of(first, device_id_)); bar != Bar::none) bar_ = bar;
+}
 
 std::array<double, 3> Session::force_n(const CartesianCommand& command, std::int64_t came_ns,
                                        std::int64_t now_ns) noexcept {
@@ -196,7 +198,7 @@ Bar Session::bar_of_config(const ArmState& arm) noexcept {
 
 bool Session::is_echo_near(const ArmState& arm, std::int64_t now_ns) const noexcept {
   const auto echoed = whole(arm.echoed_n);
-  if (!echoed) return true;
+  if (!echoed) return key_ == ForceKey::values;  // before 3.5 no state has it
   const std::size_t kept = std::min(sent_count_, sent_.size());
   for (std::size_t axis = 0; axis < 3; ++axis) {
     double low = 0, high = 0;

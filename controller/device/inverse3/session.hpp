@@ -76,7 +76,8 @@ class Session {
   static constexpr std::int64_t kCommandNs = 20'000'000;
 
   /// `first` is the first message. Throws std::runtime_error with the reason and the way out if it
-  /// has not the wanted device, or several and none is wanted.
+  /// has not the wanted device, or several and none is wanted. If its configuration cannot be
+  /// borne, `bar` is final from the start.
   Session(const Wanted& wanted, ForceKey key, const ServiceState& first, std::int64_t now_ns);
 
   /// The force to send in this turn, N in the service's frame: that of the newest command, which
