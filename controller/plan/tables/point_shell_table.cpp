@@ -38,9 +38,11 @@ void group_together(std::span<Point> points) {
     if (b.high[axis] - b.low[axis] > b.high[widest] - b.low[widest]) widest = axis;
   }
   const std::size_t groups = (points.size() + kGroup - 1) / kGroup, half = groups / 2 * kGroup;
-  // Stable: standard libraries part equal points in different ways, and the order ends in the bits.
-  std::stable_sort(points.begin(), points.end(),
-                   [widest](const Point& p, const Point& q) { return p[widest] < q[widest]; });
+  // A total order: standard libraries part equal points in different ways, and that ends in the
+  // bits.
+  std::stable_sort(points.begin(), points.end(), [widest](const Point& p, const Point& q) {
+    return p[widest] != q[widest] ? p[widest] < q[widest] : p < q;
+  });
   group_together(points.first(half));
   group_together(points.subspan(half));
 }
