@@ -75,6 +75,7 @@ void DhdArm::open() {
   facts_ = {{"library", library_.file()}, {"version", sdk}, {"model", name != nullptr ? name : ""}};
   is_initialized_ = calls_.is_initialized(id_);
   if (!is_initialized_ && options_.initializes) {
+    static_cast<void>(set_watchdog());  // so that the motion does not outlive this process
     if (calls_.auto_init(id_) < 0) throw ArmError("--auto-init: " + last_error());
     // Without it the SDK would go on regulating; its force stays ours.
     if (calls_.stop_regulation(true, id_) < 0) throw ArmError("--auto-init: " + last_error());

@@ -410,3 +410,25 @@ TEST_CASE("cartesian: the force goes out in mN with the light of the phase, and 
   CHECK(sent().force_mn == Counts{});
   CHECK_FALSE(sent().force_on);
 }
+
+TEST_CASE(
+    "cartesian: readings that stand still under force are no reports, whatever their numbers") {
+  Bench<kerf::CartesianDriver> arm(10);
+  kerf::CartesianReport report;
+  report.homed = report.powered = true;
+  const auto next = [&] {
+    ++report.number;
+    arm.port.push(kerf::encode(report));
+    return arm.driver.read().fresh;
+  };
+  constexpr int kTicks = 3000;  // kStillS at 1 kHz
+  bool all_fresh = next();
+  for (int tick = 0; tick < kTicks; ++tick) {
+    arm.driver.command(forcing({100, 0, 0}));
+    all_fresh = next() && all_fresh;
+  }
+  CHECK(all_fresh);
+  CHECK_FALSE(next());
+  report.position_um[1] = 10;
+  CHECK(next());
+}

@@ -130,6 +130,17 @@ TEST_CASE("a Cartesian device that rests elsewhere than in its inkwell is a wron
   CHECK(fault_after(Personality::inverse3, 200) == Fault::none);
 }
 
+TEST_CASE("from one end of the counts to the other is a jump, not a step over the wrap") {
+  Arm arm(Personality::inverse3);
+  ServoOutput out = arm.press(5, 120);
+  REQUIRE(out.motors_on);
+  for (double x = 0; x < 327; x += 2) out = arm.step({x, 5, 0});
+  REQUIRE(out.fault == Fault::none);
+  out = arm.step({-327, 5, 0});
+  CHECK(out.fault == Fault::overspeed);
+  CHECK_FALSE(out.motors_on);
+}
+
 TEST_CASE("a rest is counted in steps of the device's resolution") {
   const auto calibrates = [](Personality personality, int jitter_um) {
     LoadedScene scene = half_space_scene();
