@@ -6,8 +6,8 @@ and a segment with another one is refused."""
 import numpy as np
 
 MAGIC = int.from_bytes(b"KERFSHM1", "little")
-VERSION = (1, 3)
-ABI = 0x3AF3E5B115F717E7
+VERSION = (1, 4)
+ABI = 0xCF3BEB3F32128E50
 
 HELLO = np.dtype([("magic", "<u8"), ("major", "<u4"), ("minor", "<u4"), ("abi_hash", "<u8"), ("session_id", "<u8")])
 
@@ -16,9 +16,10 @@ HEADER = np.dtype([
     ("total_bytes", "<u8"), ("config_hash", "<u8"), ("start_ns", "<u8"), ("tick_ns", "<u4"), ("volume_count", "<u4"),
     ("off_state", "<u8"), ("off_dirty", "<u8"), ("off_volume_table", "<u8"), ("state_slots", "<u4"),
     ("dirty_slots", "<u4"), ("state_record_bytes", "<u4"), ("dirty_record_bytes", "<u4"), ("off_scene", "<u8"),
-    ("scene_bytes", "<u8"), ("reserved0", "<u8"), ("build_id", "S64"), ("reserved1", "<u8", 8),
+    ("scene_bytes", "<u8"), ("off_state_2", "<u8"), ("build_id", "S64"), ("reserved1", "<u8", 8),
     ("state_head", "<u8"), ("pad_state", "<u8", 7), ("dirty_head", "<u8"), ("pad_dirty", "<u8", 7),
-    ("epoch", "<u8"), ("pad_epoch", "<u8", 7), ("heartbeat_ns", "<u8"), ("lifecycle", "<u4")])
+    ("epoch", "<u8"), ("pad_epoch", "<u8", 7), ("heartbeat_ns", "<u8"), ("lifecycle", "<u4"),
+    ("pad_life", "<u4"), ("pad_heartbeat", "<u8", 6), ("state_head_2", "<u8")])
 
 VOLUME = np.dtype([
     ("size", "<u2", 3), ("log2_brick", "u1"), ("bits_per_voxel", "u1"), ("bricks", "<u4", 3), ("brick_count", "<u4"),

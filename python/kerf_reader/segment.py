@@ -50,7 +50,8 @@ class Segment:
     """The segment of a running controller, read-only; it stays readable when that has gone.
 
     Never disturbs the servo, which does not wait for readers. scene: as a dictionary. tick_s: length of a tick.
-    volumes: one row of layout.VOLUME for each volume."""
+    volumes: one row of layout.VOLUME for each volume. arms: 1 or 2 devices, each with rows of its own; the same index
+    is the same tick, and arm 0 is the first."""
 
     def __init__(self, name="kerf"):
         path = _socket_of(name)
@@ -82,7 +83,9 @@ class Segment:
         self._bytes = mmap.mmap(files[0], 0, prot=mmap.PROT_READ)
         self._header = np.frombuffer(self._bytes, HEADER, 1)
         header = self._header[0]
-        self._ring = np.frombuffer(self._bytes, TICK, int(header["state_slots"]), int(header["off_state"]))
+        offsets = [int(header[word]) for word in ("off_state", "off_state_2")]
+        self._rings = [np.frombuffer(self._bytes, TICK, int(header["state_slots"]), at) for at in offsets if at]
+        self.arms = len(self._rings)
         self.volumes = np.frombuffer(self._bytes, VOLUME, int(header["volume_count"]), int(header["off_volume_table"]))
         begin = int(header["off_scene"])
         self.scene = json.loads(self._bytes[begin:begin + int(header["scene_bytes"])].rstrip(b"\0"))
@@ -101,25 +104,25 @@ class Segment:
         """How many ticks were published so far."""
         return int(self._header["state_head"][0])
 
-    def records(self, since=0):
-        """(rows of layout.TICK, next): what is still there of the ticks published from index `since` on. Ask for
+    def records(self, since=0, arm=0):
+        """(rows of layout.TICK, next): what is still there of an arm's ticks published from index `since` on. Ask for
         `next` the next time; more rows than since - next say that some were lost."""
-        head = self.head
-        first = max(since, head - len(self._ring), 0)
+        head, ring = self.head, self._rings[arm]  # the second arm's row is published before the first's
+        first = max(since, head - len(ring), 0)
         indices = np.arange(first, head, dtype=np.uint64)
-        rows = self._ring[indices % len(self._ring)]  # a copy
+        rows = ring[indices % len(ring)]  # a copy
         # Written anew while it was copied: its number before or after says so.
-        after = self._ring["seq"][indices % len(self._ring)]
+        after = ring["seq"][indices % len(ring)]
         whole = (rows["seq"] == 2 * indices + 2) & (after == 2 * indices + 2)
         return rows[whole], head
 
-    def latest(self):
-        """The newest row that came whole; None before the first."""
+    def latest(self, arm=0):
+        """The newest row of an arm that came whole; None before the first."""
         for _ in range(TRIES):
             head = self.head
             if head == 0:
                 return None
-            rows, _ = self.records(head - 1)
+            rows, _ = self.records(head - 1, arm)
             if len(rows):
                 return rows[-1]
         return None

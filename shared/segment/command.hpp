@@ -15,7 +15,7 @@ inline constexpr const char* kDefaultName = "kerf";
 
 /// Kinds of commands.
 enum class CommandKind : std::uint32_t {
-  select_tool = 1,  ///< argument: index into the scene's tools
+  select_tool = 1,  ///< argument: index into the scene's tools; of one arm, `Command::arm`
   hold = 2,         ///< argument: 1 stops cutting and force, 0 goes on
   reset = 3,        ///< argument: 0; the volumes go back to their first content
   undo = 4,         ///< argument: 0; the volumes go back to their content before the last stroke
@@ -29,8 +29,8 @@ struct Command {
   CommandKind kind = CommandKind::hold;
   std::uint32_t index = 0;  ///< set by the server: 1, 2, ... in order of acceptance
   std::uint32_t argument = 0;
-  std::uint32_t reserved0 = 0;
-  double value[4] = {};  ///< for kinds that carry numbers; finite
+  std::uint32_t arm = 0;  ///< select_tool: 0 the first arm, 1 the second; else 0: for all arms
+  double value[4] = {};   ///< for kinds that carry numbers; finite
   std::uint64_t reserved1[2] = {};
 };
 static_assert(sizeof(Command) == 64);
@@ -53,6 +53,7 @@ inline constexpr std::uint32_t kCommandSlots = 64;
 /// Limits of the arguments, by the scene; checked before the queue.
 struct CommandLimits {
   std::uint32_t tools = 1;
+  std::uint32_t arms = 1;
 };
 
 /// Whether `command` may go to the servo.
@@ -63,14 +64,14 @@ struct CommandLimits {
   }
   switch (command.kind) {
     case CommandKind::select_tool:
-      return command.argument < limits.tools;
+      return command.argument < limits.tools && command.arm < limits.arms;
     case CommandKind::hold:
-      return command.argument <= 1;
+      return command.argument <= 1 && command.arm == 0;
     case CommandKind::reset:
     case CommandKind::undo:
     case CommandKind::redo:
     case CommandKind::mark:
-      return command.argument == 0;
+      return command.argument == 0 && command.arm == 0;
   }
   return false;
 }

@@ -15,11 +15,13 @@ namespace kerf {
 // The shared segment byte by byte: the controller writes it (on a second machine `kerf-bridge
 // join`, replica_writer.hpp), and readers map it read-only.
 //
-//     0                  SegmentHeader, one page; each frequently written word on its own 64-byte
-//     line off_volume_table   one VolumeDescriptor per volume off_scene          canonical scene,
-//     JSON text off_state          ring of TickRecord, slot = index mod state_slots off_dirty ring
-//     of DirtyRecord, slot = index mod dirty_slots per volume         u64 version per brick | 512
-//     densities per brick | labels (optional)
+//     0                 SegmentHeader, one page; a hot word has a 64-byte line of its own
+//     off_volume_table  one VolumeDescriptor per volume
+//     off_scene         canonical scene, JSON text
+//     off_state         ring of TickRecord, slot = index mod state_slots
+//     off_state_2       ring of the second arm; 0: there is one arm
+//     off_dirty         ring of DirtyRecord, slot = index mod dirty_slots
+//     per volume        u64 version per brick | 512 densities per brick | labels (optional)
 //
 // Little-endian, natural alignment, offsets instead of pointers. `layout_table.hpp` lists every
 // field as (name, offset, type); the table is checked against these structs and hashed into
@@ -37,7 +39,8 @@ inline constexpr std::uint64_t kSegmentMagic = [] {
   return magic;
 }();
 inline constexpr std::uint32_t kLayoutMajor = 1;
-inline constexpr std::uint32_t kLayoutMinor = 3;
+inline constexpr std::uint32_t kLayoutMinor = 4;
+inline constexpr std::size_t kMaxArms = 2;  // devices of one scene, each with a ring of TickRecord
 inline constexpr std::uint32_t kStateSlots = 4096;  // 4.1 s at 1 kHz: as long as a reader may stop
 inline constexpr std::uint32_t kDirtySlots = 4096;
 inline constexpr std::uint64_t kMaxSceneBytes = std::uint64_t{1} << 26;  // a reader copies it whole
@@ -79,8 +82,8 @@ struct SegmentHeader {
   std::uint32_t dirty_record_bytes;
   std::uint64_t off_scene;
   std::uint64_t scene_bytes;
-  std::uint64_t reserved0;
-  char build_id[64];  ///< for messages only, zero-terminated
+  std::uint64_t off_state_2;  ///< of the second arm's ring of ticks; 0 with one arm
+  char build_id[64];          ///< for messages only, zero-terminated
   std::uint64_t reserved1[8];
   std::uint64_t state_head;  ///< tick records published so far
   std::uint64_t pad_state[7];
@@ -91,7 +94,10 @@ struct SegmentHeader {
   std::uint64_t heartbeat_ns;  ///< CLOCK_MONOTONIC of the last finished tick
   std::uint32_t lifecycle;
   std::uint32_t pad_life;
-  std::uint64_t pad_page[454];
+  std::uint64_t pad_heartbeat[6];
+  std::uint64_t state_head_2;  ///< tick records of the second arm published so far
+  std::uint64_t pad_state_2[7];
+  std::uint64_t pad_page[440];
 };
 inline constexpr std::size_t kStaticHeaderBytes = offsetof(SegmentHeader, state_head);
 
@@ -113,8 +119,8 @@ struct VolumeDescriptor {
   std::uint64_t off_labels;  ///< 0: none; else u8 per voxel, linear, x fastest, never changes
 };
 
-/// Input, contact and output of one servo tick. World mm for the tip; forces in N at the device
-/// port. `log_columns.cpp` has each field's unit, meaning and validity (docs/log.md).
+/// Input, contact and output of one arm in one servo tick. World mm for the tip; forces in N at the
+/// device port. `log_columns.cpp` has each field's unit, meaning and validity (docs/log.md).
 struct TickRecord {
   std::uint64_t seq;  ///< filled by the writer: 2 * index + 1 while writing, + 2 when valid
   std::uint64_t tick;
@@ -171,6 +177,11 @@ struct TickRecord {
   std::uint32_t command_argument;  ///< its argument: index of the tool; hold: 1 on, 0 off
   std::uint32_t crc32c;            ///< filled by the writer, over bytes 8 up to this one
 };
+
+/// The index of a published record in its ring. With two arms index i of both rings is one tick.
+[[nodiscard]] inline std::uint64_t record_index(const TickRecord& record) noexcept {
+  return record.seq / 2 - 1;
+}
 
 /// The checksum that a tick record carries: of all bytes between its sequence number and it.
 [[nodiscard]] inline std::uint32_t tick_record_crc(const TickRecord& record) noexcept {

@@ -55,6 +55,10 @@ void check_header(const SegmentHeader& header, std::uint64_t bytes) {
   };
   check_ring("state", header.off_state, header.state_slots, header.state_record_bytes,
              sizeof(TickRecord));
+  if (header.off_state_2 != 0) {
+    require(inside(header.off_state_2, header.state_slots, sizeof(TickRecord), bytes),
+            "off_state_2", header.off_state_2, "0 or a ring inside the memory");
+  }
   check_ring("dirty", header.off_dirty, header.dirty_slots, header.dirty_record_bytes,
              sizeof(DirtyRecord));
   require(header.scene_bytes <= kMaxSceneBytes, "scene_bytes", header.scene_bytes,
@@ -150,7 +154,8 @@ SegmentInfo parse_segment(std::span<std::byte> segment) {
   info.start_ns = header.start_ns;
   info.total_bytes = header.total_bytes;
   info.tick_ns = header.tick_ns;
-  info.off_state = header.off_state;
+  info.arms = header.off_state_2 == 0 ? 1 : 2;
+  info.off_state = {header.off_state, header.off_state_2};
   info.off_dirty = header.off_dirty;
   info.state_slots = header.state_slots;
   info.dirty_slots = header.dirty_slots;

@@ -95,9 +95,11 @@ SegmentReader::~SegmentReader() {
   if (!bytes_.empty()) munmap(bytes_.data(), bytes_.size());
 }
 
-std::uint64_t SegmentReader::state_head() const noexcept {
-  return words::word(bytes_.data() + offsetof(SegmentHeader, state_head))
-      .load(std::memory_order_acquire);
+std::uint64_t SegmentReader::state_head(std::size_t arm) const noexcept {
+  if (arm >= info_.arms) return 0;
+  const std::size_t offset =
+      arm == 0 ? offsetof(SegmentHeader, state_head) : offsetof(SegmentHeader, state_head_2);
+  return words::word(bytes_.data() + offset).load(std::memory_order_acquire);
 }
 
 std::uint64_t SegmentReader::dirty_head() const noexcept {
@@ -137,10 +139,12 @@ ReadState SegmentReader::record_at(std::uint64_t offset, std::uint32_t slots, st
   return ReadState::busy;
 }
 
-ReadState SegmentReader::state_at(std::uint64_t index, TickRecord& out) const noexcept {
+ReadState SegmentReader::state_at(std::uint64_t index, TickRecord& out,
+                                  std::size_t arm) const noexcept {
+  if (arm >= info_.arms) return ReadState::not_yet;
   TickRecord record;
   const ReadState state =
-      record_at(info_.off_state, info_.state_slots, state_head(), index, record);
+      record_at(info_.off_state[arm], info_.state_slots, state_head(arm), index, record);
   if (state != ReadState::ok) return state;
   if (tick_record_crc(record) != record.crc32c) return ReadState::busy;
   out = record;
@@ -151,14 +155,20 @@ ReadState SegmentReader::dirty_at(std::uint64_t index, DirtyRecord& out) const n
   return record_at(info_.off_dirty, info_.dirty_slots, dirty_head(), index, out);
 }
 
-std::optional<TickRecord> SegmentReader::latest() const noexcept {
+std::optional<TickRecord> SegmentReader::latest(std::size_t arm) const noexcept {
   TickRecord record;
   for (int i = 0; i < kMaxTries; ++i) {
-    const std::uint64_t head = state_head();
+    const std::uint64_t head = state_head(arm);
     if (head == 0) return std::nullopt;
-    if (state_at(head - 1, record) == ReadState::ok) return record;
+    if (state_at(head - 1, record, arm) == ReadState::ok) return record;
   }
   return std::nullopt;
+}
+
+std::optional<TickRecord> SegmentReader::second_of(const TickRecord& first) const noexcept {
+  TickRecord record;
+  if (state_at(record_index(first), record, 1) != ReadState::ok) return std::nullopt;
+  return record;
 }
 
 std::span<const Label> SegmentReader::labels(std::size_t volume) const noexcept {

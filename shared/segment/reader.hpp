@@ -39,7 +39,9 @@ struct SegmentInfo {
   std::string build_id;
   std::string scene_json;
   std::vector<SegmentVolumeInfo> volumes;
-  std::uint64_t off_state = 0, off_dirty = 0;
+  std::size_t arms = 1;                             ///< rings of tick records, at most kMaxArms
+  std::array<std::uint64_t, kMaxArms> off_state{};  ///< of each arm; 0: no such arm
+  std::uint64_t off_dirty = 0;
   std::uint32_t state_slots = 0, dirty_slots = 0;
 };
 
@@ -83,14 +85,22 @@ class SegmentReader {
 
   [[nodiscard]] const SegmentInfo& info() const noexcept { return info_; }
 
-  /// The newest tick record that came whole; none before the first one.
-  [[nodiscard]] std::optional<TickRecord> latest() const noexcept;
+  // Arms: 0 is the first, and an arm that the segment does not have has no records.
+
+  /// The newest tick record of an arm that came whole; none before the first one. Two calls may be
+  /// of two ticks: `second_of` is of one.
+  [[nodiscard]] std::optional<TickRecord> latest(std::size_t arm = 0) const noexcept;
+  /// The second arm's record of the tick of `first`, a record of the first arm; none with one arm,
+  /// or if it is no longer in the ring.
+  [[nodiscard]] std::optional<TickRecord> second_of(const TickRecord& first) const noexcept;
 
   /// Records published so far: indices state_head() - state_slots .. state_head() - 1 are readable.
-  [[nodiscard]] std::uint64_t state_head() const noexcept;
+  /// The second arm's is published before the first's: below state_head(0), both are there.
+  [[nodiscard]] std::uint64_t state_head(std::size_t arm = 0) const noexcept;
   [[nodiscard]] std::uint64_t dirty_head() const noexcept;
   /// `out` changes only if the result is `ok`.
-  [[nodiscard]] ReadState state_at(std::uint64_t index, TickRecord& out) const noexcept;
+  [[nodiscard]] ReadState state_at(std::uint64_t index, TickRecord& out,
+                                   std::size_t arm = 0) const noexcept;
   [[nodiscard]] ReadState dirty_at(std::uint64_t index, DirtyRecord& out) const noexcept;
 
   /// Labels of a volume, x fastest; empty if it has none. Lives as long as the reader.

@@ -34,6 +34,8 @@ ReplicaWriter ReplicaWriter::create(const MirrorSpec& spec) {
   plan.header.scene_bytes = spec.scene_bytes;
   plan.header.dirty_slots = kDirtySlots;
   set_build_id(plan.header, spec.build_id);
+  require_place(spec.arms >= 1 && spec.arms <= kMaxArms, "arms", spec.arms);
+  plan.header.off_state_2 = spec.arms == 2 ? 1 : 0;  // until `lay_out` places it
   plan.volumes = spec.volumes;
   lay_out(plan);
   check_plan(plan);
@@ -48,9 +50,7 @@ ReplicaWriter ReplicaWriter::create(const MirrorSpec& spec) {
   out.header_.epoch = writing_version(0);
   std::copy(out.volumes_.begin(), out.volumes_.end(),
             reinterpret_cast<VolumeDescriptor*>(out.at(out.header_.off_volume_table)));
-  out.ticks_ = {.slots = out.at(out.header_.off_state),
-                .head = out.at(offsetof(SegmentHeader, state_head)),
-                .mask = out.header_.state_slots - 1};
+  out.ticks_ = tick_rings(out.at(0), out.header_);
   out.boxes_ = {.slots = out.at(out.header_.off_dirty),
                 .head = out.at(offsetof(SegmentHeader, dirty_head)),
                 .mask = out.header_.dirty_slots - 1};
@@ -111,12 +111,13 @@ void ReplicaWriter::end_pass(Tick tick) noexcept {
   words::close(at(offsetof(SegmentHeader, epoch)), stable_version(tick));
 }
 
-void ReplicaWriter::put_record(std::uint64_t index, const TickRecord& record) noexcept {
-  if (index < ticks_.published) return;
+void ReplicaWriter::put_record(std::uint64_t index, const TickRecord& record,
+                               std::size_t arm) noexcept {
+  if (arm >= kMaxArms || ticks_[arm].slots == nullptr || index < ticks_[arm].published) return;
   TickRecord out = record;
   out.crc32c = tick_record_crc(out);
-  ticks_.skip_to(index);
-  ticks_.push(out);
+  ticks_[arm].skip_to(index);
+  ticks_[arm].push(out);
 }
 
 void ReplicaWriter::put_record(std::uint64_t index, const DirtyRecord& record) noexcept {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -23,6 +24,7 @@ struct MirrorSpec {
   std::uint32_t tick_ns = 0;
   std::uint32_t scene_bytes = 0;
   std::string build_id;                   ///< cut to 63 characters
+  std::size_t arms = 1;                   ///< 1..kMaxArms
   std::vector<VolumeDescriptor> volumes;  ///< off_labels not 0: has labels; no other offset counts
   std::uint64_t most_bytes = std::uint64_t{1} << 31;  ///< a larger segment is refused
 };
@@ -56,9 +58,10 @@ class ReplicaWriter {
   /// The volumes are those of `tick`.
   void end_pass(Tick tick) noexcept;
 
-  /// A record of the ring; `seq` and the checksum are filled in. An index that is not above the
-  /// last one is ignored, and those left out read as `ReadState::overrun`.
-  void put_record(std::uint64_t index, const TickRecord& record) noexcept;
+  /// A record of a ring; `seq` and the checksum are filled in. An index that is not above the last
+  /// one is ignored, and those left out read as `ReadState::overrun`. With two arms the second's
+  /// record of a tick comes before the first's, as in `SegmentWriter`.
+  void put_record(std::uint64_t index, const TickRecord& record, std::size_t arm = 0) noexcept;
   void put_record(std::uint64_t index, const DirtyRecord& record) noexcept;
 
   void beat(std::uint64_t heartbeat_ns) noexcept;
@@ -74,7 +77,7 @@ class ReplicaWriter {
   SegmentMemory memory_;
   SegmentHeader header_{};  // as written
   std::vector<VolumeDescriptor> volumes_;
-  RecordRing<TickRecord> ticks_;
+  std::array<RecordRing<TickRecord>, kMaxArms> ticks_;
   RecordRing<DirtyRecord> boxes_;
 };
 

@@ -89,9 +89,15 @@ SegmentPlan plan_segment(const SegmentSpec& spec) {
   }
   if (spec.tick_ns == 0) throw SegmentError("segment: tick of 0 ns; give the servo's period");
 
+  if (spec.arms == 0 || spec.arms > kMaxArms) {
+    throw SegmentError("segment: " + std::to_string(spec.arms) + " arms; a scene has 1 to " +
+                       std::to_string(kMaxArms));
+  }
+
   SegmentPlan plan;
   plan.header.config_hash = spec.config_hash;
   plan.header.tick_ns = spec.tick_ns;
+  plan.header.off_state_2 = spec.arms == 2 ? 1 : 0;  // until `lay_out` places it
   plan.header.dirty_slots = spec.mirror_updates ? kDirtySlots : 1;
   plan.header.scene_bytes = spec.scene_json.size();
   set_build_id(plan.header, spec.build_id);
@@ -126,6 +132,9 @@ void lay_out(SegmentPlan& plan) {
   header.off_volume_table = place(plan.volumes.size() * sizeof(VolumeDescriptor));
   header.off_scene = place(header.scene_bytes);
   header.off_state = place(std::uint64_t{header.state_slots} * sizeof(TickRecord));
+  if (header.off_state_2 != 0) {
+    header.off_state_2 = place(std::uint64_t{header.state_slots} * sizeof(TickRecord));
+  }
   header.off_dirty = place(std::uint64_t{header.dirty_slots} * sizeof(DirtyRecord));
   for (VolumeDescriptor& out : plan.volumes) {
     out.off_versions = place(std::uint64_t{out.brick_count} * sizeof(std::uint64_t));

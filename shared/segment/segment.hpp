@@ -55,6 +55,7 @@ struct SegmentSpec {
   std::uint64_t config_hash = 0;
   std::uint32_t tick_ns = 1'000'000;
   std::string build_id;        ///< cut to 63 characters
+  std::size_t arms = 1;        ///< 1..kMaxArms; each has a ring of tick records
   bool mirror_updates = true;  ///< false if nothing is cut: no dirty ring and no brick updates
 };
 
@@ -72,7 +73,8 @@ struct SegmentPlan {
 void set_build_id(SegmentHeader& header, std::string_view build_id);
 
 /// Fills the constant fields and all offsets, from the sizes of the volumes (`off_labels` not 0:
-/// has labels), the size of the scene and the slots of the dirty ring.
+/// has labels), the size of the scene, the arms (`off_state_2` not 0: two) and the slots of the
+/// dirty ring.
 void lay_out(SegmentPlan& plan);
 
 /// Checks a plan that is laid out, by the rules of `parse_segment`. Throws `SegmentError`.

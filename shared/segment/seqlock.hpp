@@ -2,10 +2,13 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+
+#include "shared/segment/layout.hpp"
 
 namespace kerf {
 
@@ -106,5 +109,20 @@ struct RecordRing {
     published = index;
   }
 };
+
+/// The rings of tick records of the segment at `base`, one for each arm; the second has no slots if
+/// there is one arm.
+[[nodiscard]] inline std::array<RecordRing<TickRecord>, kMaxArms> tick_rings(
+    std::byte* base, const SegmentHeader& header) noexcept {
+  std::array<RecordRing<TickRecord>, kMaxArms> rings;
+  rings[0].slots = base + header.off_state;
+  rings[0].head = base + offsetof(SegmentHeader, state_head);
+  if (header.off_state_2 != 0) {
+    rings[1].slots = base + header.off_state_2;
+    rings[1].head = base + offsetof(SegmentHeader, state_head_2);
+  }
+  for (auto& ring : rings) ring.mask = header.state_slots - 1;
+  return rings;
+}
 
 }  // namespace kerf

@@ -54,7 +54,7 @@ struct SegmentWriter::State {
   SegmentMemory memory;
   SegmentHeader header;  // as written, with offsets and session
   std::vector<MirroredVolume> volumes;
-  RecordRing<TickRecord> ticks;
+  std::array<RecordRing<TickRecord>, kMaxArms> ticks;  // of each arm; without slots: no such arm
   RecordRing<DirtyRecord> boxes;
   Tick tick = 0;
   std::uint64_t last_end_ns = 0;
@@ -107,9 +107,7 @@ SegmentWriter SegmentWriter::create(const SegmentSpec& spec, bool virtual_time) 
   }
   std::copy(spec.scene_json.begin(), spec.scene_json.end(),
             reinterpret_cast<char*>(base + header.off_scene));
-  state->ticks = {.slots = base + header.off_state,
-                  .head = base + offsetof(SegmentHeader, state_head),
-                  .mask = header.state_slots - 1};
+  state->ticks = tick_rings(base, header);
   state->boxes = {.slots = base + header.off_dirty,
                   .head = base + offsetof(SegmentHeader, dirty_head),
                   .mask = header.dirty_slots - 1};
@@ -185,10 +183,13 @@ std::uint64_t SegmentWriter::publish_box(std::size_t volume, std::span<const Den
   return record.box_hash;
 }
 
-void SegmentWriter::publish_state(const TickRecord& record) noexcept {
+void SegmentWriter::publish_state(const TickRecord& record, std::size_t arm) noexcept {
+  State& state = *state_;
+  assert(arm < kMaxArms && state.ticks[arm].slots != nullptr);
+  if (arm >= kMaxArms || state.ticks[arm].slots == nullptr) return;
   TickRecord out = record;
   out.crc32c = tick_record_crc(out);
-  state_->ticks.push(out);
+  state.ticks[arm].push(out);
 }
 
 void SegmentWriter::end_tick(std::uint64_t now_ns) noexcept {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -29,7 +30,8 @@ inline constexpr std::uint32_t kMaxBricksPerTick = 512;
 ///
 /// `create` and the destructor run outside the servo. The members marked *servo* are called by one
 /// thread: wait-free, no system call, no allocation; they write the segment and never read it. The
-/// order in a tick is begin_tick, publish_box (0 or more), publish_state, end_tick.
+/// order in a tick is begin_tick, publish_box (0 or more), publish_state (with two arms the second
+/// arm's, then the first's), end_tick.
 class SegmentWriter {
  public:
   /// Throws `SegmentError` if a volume is empty, too large or does not match its spans, or if
@@ -57,8 +59,10 @@ class SegmentWriter {
                             const VoxelBox& changed, std::uint32_t removed,
                             DirtyCause cause = DirtyCause::milling) noexcept;
 
-  /// *Servo.* Appends to the state ring; `seq` and `crc32c` are filled in.
-  void publish_state(const TickRecord& record) noexcept;
+  /// *Servo.* Appends to the state ring of `arm`; `seq` and `crc32c` are filled in. With two arms
+  /// each tick publishes both, arm 1 before arm 0: a reader that sees an index in the first ring
+  /// then finds it in the second. An arm that the segment does not have is ignored.
+  void publish_state(const TickRecord& record, std::size_t arm = 0) noexcept;
 
   /// *Servo.* Copies the changed bricks, each once, and closes the tick. While bricks wait, the
   /// epoch stays odd: readers then know that the mirror is not yet the volume of one tick.

@@ -24,7 +24,9 @@ constexpr std::size_t kPlaces = 65536;  // header, tables and scene lie below
 /// The start of a segment is all that parsing reads; what comes after it only counts.
 std::vector<std::byte> good_segment() {
   kerf::test::NoiseVolume volume({20, 9, 5});
-  const auto writer = kerf::SegmentWriter::create(kerf::test::spec_of(volume));
+  kerf::SegmentSpec spec = kerf::test::spec_of(volume);
+  spec.arms = 2;
+  const auto writer = kerf::SegmentWriter::create(spec);
   std::vector<std::byte> bytes(writer.total_bytes());
   if (pread(writer.fd(), bytes.data(), bytes.size(), 0) != static_cast<ssize_t>(bytes.size())) {
     std::abort();
@@ -44,7 +46,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if (size >= sizeof(kerf::Command)) {
     kerf::Command command;
     std::memcpy(&command, data, sizeof command);
-    static_cast<void>(kerf::is_valid(command, {.tools = 3}));
+    static_cast<void>(kerf::is_valid(command, {.tools = 3, .arms = 2}));
   }
   if (size < 2) return 0;
   const std::size_t cut = std::min<std::size_t>(u16_at(data), patched.size());

@@ -25,9 +25,11 @@ class ForgedSegment {
   ForgedSegment() : fd_(memfd_create("forged", MFD_ALLOW_SEALING)) {
     NoiseVolume volume({20, 9, 5});
     volume.labels.assign(volume.density.size(), 1);
-    SegmentWriter writer = SegmentWriter::create(spec_of(volume));
+    SegmentSpec spec = spec_of(volume);
+    spec.arms = 2;
+    SegmentWriter writer = SegmentWriter::create(spec);
     for (Tick tick = 1; tick < 10; ++tick) {
-      cut_and_publish(writer, volume, tick, {{0, 0, 0}, {9, 9, 5}});
+      cut_and_publish(writer, volume, tick, {{0, 0, 0}, {9, 9, 5}}, 2);
     }
     good_.resize(writer.total_bytes());
     REQUIRE(pread(writer.fd(), good_.data(), good_.size(), 0) ==
@@ -53,9 +55,12 @@ class ForgedSegment {
       TickRecord tick;
       DirtyRecord dirty;
       static_cast<void>(reader.latest());
+      static_cast<void>(reader.latest(1));
       static_cast<void>(reader.lifecycle());
       for (std::uint64_t i = 0; i < 12; ++i) {
         static_cast<void>(reader.state_at(i, tick));
+        static_cast<void>(reader.state_at(i, tick, 1));
+        static_cast<void>(reader.state_at(reader.state_head(1) - i, tick, 1));
         static_cast<void>(reader.state_at(reader.state_head() - i, tick));
         static_cast<void>(reader.dirty_at(reader.dirty_head() - i, dirty));
       }
@@ -113,7 +118,7 @@ TEST_CASE("every bit of header and descriptor, flipped in turn, is refused or ha
 TEST_CASE("another version names both versions, another layout both hashes") {
   const ForgedSegment forged;
   forged.put(0x008, std::byte{7});
-  CHECK(forged.read_everything().find("layout version = 7.3; expected 1.3") != std::string::npos);
+  CHECK(forged.read_everything().find("layout version = 7.4; expected 1.4") != std::string::npos);
   forged.restore(0x008);
   forged.put(0x010, forged.good(0x010) ^ std::byte{1});
   const std::string error = forged.read_everything();
@@ -141,8 +146,9 @@ TEST_CASE("random bytes anywhere in the segment never crash or stall a reader") 
 
 TEST_CASE("offsets at the end of the number range do not wrap around the checks") {
   const ForgedSegment forged;
-  for (const char* const name : {"off_state", "off_dirty", "off_volume_table", "off_scene",
-                                 "scene_bytes", "off_versions", "off_bricks", "off_labels"}) {
+  for (const char* const name :
+       {"off_state", "off_state_2", "off_dirty", "off_volume_table", "off_scene", "scene_bytes",
+        "off_versions", "off_bricks", "off_labels"}) {
     for (const LayoutField& field : kLayoutTable) {
       if (field.name != name) continue;
       const std::size_t first =
@@ -154,6 +160,22 @@ TEST_CASE("offsets at the end of the number range do not wrap around the checks"
       CHECK(!forged.read_everything().empty());
       for (std::size_t i = 0; i < 8; ++i) forged.restore(first + i);
     }
+  }
+}
+
+TEST_CASE("a second ring that does not fit is refused by name; 0 says that there is none") {
+  const ForgedSegment forged;
+  constexpr std::size_t kAt = offsetof(SegmentHeader, off_state_2);
+  const auto put = [&forged](std::uint64_t offset) {
+    for (std::size_t i = 0; i < 8; ++i) forged.put(kAt + i, std::byte(offset >> 8 * i & 0xff));
+    return forged.read_everything();
+  };
+  const std::uint64_t last = forged.size() - std::uint64_t{kStateSlots} * sizeof(TickRecord);
+  CHECK(put(last).empty());
+  CHECK(put(0).empty());
+  for (const std::uint64_t wrong : {last + 8, last - 4, std::uint64_t{8}, ~std::uint64_t{7}}) {
+    CHECK(put(wrong) == "segment: off_state_2 = " + std::to_string(wrong) +
+                            "; expected 0 or a ring inside the memory");
   }
 }
 

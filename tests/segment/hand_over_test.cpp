@@ -213,6 +213,28 @@ TEST_CASE("commands outside the limits are refused before they reach the servo")
   CHECK(server.take_command()->kind == CommandKind::hold);
 }
 
+TEST_CASE("a tool is chosen for one arm; every other command is for all, and says no arm") {
+  const RuntimeFolder folder;
+  const NoiseVolume volume({8, 8, 8});
+  const SegmentWriter writer = SegmentWriter::create(spec_of(volume));
+  const auto statuses = [&writer](std::uint32_t arms) {
+    SegmentServer server("demo", writer, CommandLimits{.tools = 3, .arms = arms});
+    SegmentConnection connection = connect_segment("demo");
+    std::vector<ReplyStatus> out;
+    for (const CommandKind kind :
+         {CommandKind::select_tool, CommandKind::hold, CommandKind::mark}) {
+      for (const std::uint32_t arm : {0U, 1U, 2U}) {
+        out.push_back(connection.send({.kind = kind, .arm = arm}).status);
+        if (const auto taken = server.take_command()) CHECK(taken->arm == arm);
+      }
+    }
+    return out;
+  };
+  constexpr auto kYes = ReplyStatus::accepted, kNo = ReplyStatus::refused;
+  CHECK(statuses(1) == std::vector{kYes, kNo, kNo, kYes, kNo, kNo, kYes, kNo, kNo});
+  CHECK(statuses(2) == std::vector{kYes, kYes, kNo, kYes, kNo, kNo, kYes, kNo, kNo});
+}
+
 TEST_CASE("one reader too many is refused and the others stay") {
   const RuntimeFolder folder;
   const NoiseVolume volume({8, 8, 8});

@@ -44,6 +44,7 @@ struct Remote {
             .tick_ns = header.tick_ns,
             .scene_bytes = static_cast<std::uint32_t>(header.scene_bytes),
             .build_id = header.build_id,
+            .arms = header.off_state_2 == 0 ? 1U : 2U,
             .volumes = volumes};
   }
   [[nodiscard]] std::span<const std::byte> brick(std::size_t volume, std::uint32_t id) const {
@@ -133,13 +134,24 @@ TEST_CASE("a mirror has all that the other machine's segment has") {
 
 TEST_CASE("a mirror of the same plan has the same bytes") {
   NoiseVolume volume({33, 20, 9});
-  SegmentWriter writer = SegmentWriter::create(spec_of(volume));
-  cut_and_publish(writer, volume, 1, {{0, 0, 0}, {30, 3, 9}});
+  SegmentSpec spec = spec_of(volume);
+  SUBCASE("one arm") {
+    spec.arms = 1;
+  }
+  SUBCASE("two arms") {
+    spec.arms = 2;
+  }
+  SegmentWriter writer = SegmentWriter::create(spec);
+  cut_and_publish(writer, volume, 1, {{0, 0, 0}, {30, 3, 9}}, spec.arms);
   const Remote remote(writer);
   ReplicaWriter mirror = ReplicaWriter::create(remote.spec());
   remote.copy_to(mirror);
   const SegmentReader theirs = SegmentReader::map(writer.fd());
   TickRecord record;
+  if (spec.arms == 2) {
+    REQUIRE(theirs.state_at(0, record, 1) == ReadState::ok);
+    mirror.put_record(0, record, 1);
+  }
   REQUIRE(theirs.state_at(0, record) == ReadState::ok);
   mirror.put_record(0, record);
   DirtyRecord box;
@@ -287,6 +299,8 @@ TEST_CASE("a mirror refuses a plan or a place that cannot be") {
   refused([](MirrorSpec& s) { s.volumes.clear(); });
   refused([](MirrorSpec& s) { s.volumes.resize(9, s.volumes[0]); });
   refused([](MirrorSpec& s) { s.tick_ns = 0; });
+  refused([](MirrorSpec& s) { s.arms = 0; });
+  refused([](MirrorSpec& s) { s.arms = 3; });
   refused([](MirrorSpec& s) { s.scene_bytes = kMaxSceneBytes + 1; });
   refused([](MirrorSpec& s) { s.volumes[0].brick_count = 0xffffffff; });
   refused([](MirrorSpec& s) { s.volumes[0].nx = 0; });

@@ -58,6 +58,75 @@ TEST_CASE("an overrun of the state ring is told exactly: slots are readable, one
   CHECK(record.tick == kPublished - kStateSlots + 1);  // untouched by the overrun
 }
 
+TEST_CASE("two arms have a ring each, and an index is the same tick in both") {
+  NoiseVolume volume({8, 8, 8});
+  SegmentSpec spec = spec_of(volume);
+  spec.arms = 2;
+  SegmentWriter writer = SegmentWriter::create(spec);
+  const SegmentReader reader = SegmentReader::map(writer.fd());
+  CHECK(reader.info().arms == 2);
+  CHECK(!reader.latest(1));
+  constexpr std::uint64_t kPublished = kStateSlots + 5;
+  for (Tick tick = 1; tick <= kPublished; ++tick) {
+    cut_and_publish(writer, volume, tick, {{0, 0, 0}, {1, 1, 1}}, 2);
+    REQUIRE(reader.latest(1));
+    CHECK(reader.latest(1)->position_mm[0] == -static_cast<double>(tick));
+    CHECK(reader.latest()->position_mm[0] == static_cast<double>(tick));
+  }
+  CHECK(reader.state_head(1) == kPublished);
+  TickRecord first, second;
+  for (std::uint64_t index = 0; index < kPublished; ++index) {
+    CAPTURE(index);
+    const ReadState expected = index < 5 ? ReadState::overrun : ReadState::ok;
+    CHECK(reader.state_at(index, first) == expected);
+    CHECK(reader.state_at(index, second, 1) == expected);
+    if (expected != ReadState::ok) continue;
+    CHECK(record_index(first) == index);
+    CHECK(second.seq == first.seq);
+    CHECK(second.tick == first.tick);
+    CHECK(second.crc32c == tick_record_crc(second));
+    REQUIRE(reader.second_of(first));
+    CHECK(reader.second_of(first)->position_mm[0] == -first.position_mm[0]);
+  }
+  first.seq = 2;  // of index 0, which has left the ring
+  CHECK(!reader.second_of(first));
+}
+
+TEST_CASE("the second arm's record is there before the first's, and both in the same tick") {
+  NoiseVolume volume({8, 8, 8});
+  SegmentSpec spec = spec_of(volume);
+  spec.arms = 2;
+  SegmentWriter writer = SegmentWriter::create(spec);
+  const SegmentReader reader = SegmentReader::map(writer.fd());
+  TickRecord record{};
+  record.tick = 1;
+  writer.begin_tick(1);
+  writer.publish_state(record, 1);
+  CHECK(reader.state_head(1) == 1);
+  CHECK(reader.state_head() == 0);
+  writer.publish_state(record);
+  REQUIRE(reader.latest());
+  CHECK(reader.second_of(*reader.latest()));
+}
+
+TEST_CASE("a segment of one arm has no second ring, and its parts lie where they lay") {
+  NoiseVolume volume({8, 8, 8});
+  const SegmentPlan plan = plan_segment(spec_of(volume));
+  CHECK(plan.header.off_state_2 == 0);
+  CHECK(plan.header.off_dirty ==
+        plan.header.off_state + std::uint64_t{kStateSlots} * sizeof(TickRecord));
+  SegmentWriter writer = SegmentWriter::create(spec_of(volume));
+  const SegmentReader reader = SegmentReader::map(writer.fd());
+  cut_and_publish(writer, volume, 1, {{0, 0, 0}, {1, 1, 1}});
+  CHECK(reader.info().arms == 1);
+  TickRecord record;
+  CHECK(reader.state_head(1) == 0);
+  CHECK(reader.state_head(7) == 0);
+  CHECK(!reader.latest(1));
+  CHECK(reader.state_at(0, record, 1) == ReadState::not_yet);
+  CHECK(!reader.second_of(*reader.latest()));
+}
+
 TEST_CASE("a dirty record names the box, the cause, the bricks and the content") {
   NoiseVolume volume({40, 20, 20});
   SegmentWriter writer = SegmentWriter::create(spec_of(volume));

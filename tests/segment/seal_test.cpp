@@ -84,4 +84,9 @@ TEST_CASE("a spec that cannot be is refused with place and value") {
   spec = spec_of(volume);
   spec.tick_ns = 0;
   CHECK(error_of(spec).find("tick") != std::string::npos);
+  spec = spec_of(volume);
+  spec.arms = 3;
+  CHECK(error_of(spec) == "segment: 3 arms; a scene has 1 to 2");
+  spec.arms = 0;
+  CHECK(error_of(spec) == "segment: 0 arms; a scene has 1 to 2");
 }

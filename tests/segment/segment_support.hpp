@@ -47,15 +47,21 @@ struct NoiseVolume {
   return spec;
 }
 
-/// One whole tick: cuts `box`, publishes it and a record that carries the tick.
+/// One whole tick: cuts `box`, publishes it and a record that carries the tick; the second arm's
+/// has the opposite position.
 inline void cut_and_publish(SegmentWriter& writer, NoiseVolume& volume, Tick tick,
-                            const VoxelBox& box) {
+                            const VoxelBox& box, std::size_t arms = 1) {
   volume.cut(box);
   writer.begin_tick(tick);
   writer.publish_box(0, volume.density, box, 1);
   TickRecord record{};
   record.tick = tick;
   record.position_mm[0] = static_cast<double>(tick);
+  if (arms == 2) {
+    TickRecord second = record;
+    second.position_mm[0] = -record.position_mm[0];
+    writer.publish_state(second, 1);
+  }
   writer.publish_state(record);
   writer.end_tick(tick * 1'000'000);
 }

@@ -95,6 +95,7 @@ is its `--name` (`kerf`); that of a demo is `demo-PID`, or what `./kerf demo` ha
 | `off_volume_table` | a `VolumeDescriptor` for each volume |
 | `off_scene` | the scene as JSON, `scene_bytes` long |
 | `off_state` | ring of `TickRecord`, {file.number('kStateSlots')} slots |
+| `off_state_2` | the same ring of the second arm; 0: the scene has one arm. Index i of both rings is one tick, and the second's record is published first |
 | `off_dirty` | ring of `DirtyRecord`, {file.number('kDirtySlots')} slots |
 | `off_versions`, of a volume | u64 for each brick: odd while tick t is written (2 t + 1), even when complete (2 t + 2), 0 never |
 | `off_bricks`, of a volume | bricks of 8 x 8 x 8 densities, u16, x fastest |
