@@ -17,10 +17,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-fs::path file_of(const fs::path& folder, Tick first) {
+fs::path file_of(const fs::path& folder, std::size_t arm, Tick first) {
   char name[32];
   std::snprintf(name, sizeof name, "%012llu.npy.gz", static_cast<unsigned long long>(first));
-  return folder / kInputsName / name;
+  return folder / inputs_name(arm) / name;
 }
 
 std::string header_of(std::size_t rows) {
@@ -62,10 +62,10 @@ void write_inputs(const fs::path& path, std::span<const TickInputs> rows) {
 }
 
 /// Makes the folder for inputs in `recording`. Throws FileError if there is one, or a link.
-void make_inputs_folder(const fs::path& recording) {
+void make_inputs_folder(const fs::path& recording, std::size_t arm) {
   std::error_code fault;
-  if (fs::create_directory(recording / kInputsName, fault)) return;
-  throw FileError((recording / kInputsName).string() + ": " +
+  if (fs::create_directory(recording / inputs_name(arm), fault)) return;
+  throw FileError((recording / inputs_name(arm)).string() + ": " +
                   (fault ? fault.message() : "there is one") + "; choose another --out");
 }
 
@@ -78,8 +78,9 @@ bool read_inputs(const fs::path& path, std::size_t count, std::vector<TickInputs
 
 }  // namespace
 
-EarlierInputs::EarlierInputs(fs::path folder) : folder_(std::move(folder)) {
-  make_inputs_folder(folder_);
+EarlierInputs::EarlierInputs(fs::path folder, std::size_t arm)
+    : folder_(std::move(folder)), arm_(arm) {
+  make_inputs_folder(folder_, arm_);
   rows_.reserve(kTicksAFile);
 }
 
@@ -102,9 +103,8 @@ void EarlierInputs::add(const TickRecord& record) {
   }
   if (rows_.size() == kTicksAFile) {
     finish_writing();
-    writing_ = std::async(std::launch::async, [path = file_of(folder_, first_), rows = rows_] {
-      write_inputs(path, rows);
-    });
+    writing_ = std::async(std::launch::async, [path = file_of(folder_, arm_, first_),
+                                               rows = rows_] { write_inputs(path, rows); });
     first_ = next;
     rows_.clear();
   }
@@ -114,21 +114,21 @@ void EarlierInputs::add(const TickRecord& record) {
 std::string EarlierInputs::keep(const fs::path& folder, Tick last) {
   finish_writing();
   if (!problem_.empty() || last == 0) return problem_;
-  make_inputs_folder(folder);
+  make_inputs_folder(folder, arm_);
   for (Tick first = 1; first < first_ && first <= last; first += kTicksAFile) {
-    link_file(file_of(folder_, first), file_of(folder, first));
+    link_file(file_of(folder_, arm_, first), file_of(folder, arm_, first));
   }
   if (first_ <= last) {
-    write_inputs(file_of(folder, first_), std::span(rows_).first(last - first_ + 1));
+    write_inputs(file_of(folder, arm_, first_), std::span(rows_).first(last - first_ + 1));
   }
   return {};
 }
 
 void for_each_input(const fs::path& folder, Tick last,
-                    const std::function<void(const TickRecord&)>& visit) {
+                    const std::function<void(const TickRecord&)>& visit, std::size_t arm) {
   std::vector<TickInputs> rows;
   for (Tick first = 1; first <= last; first += EarlierInputs::kTicksAFile) {
-    const fs::path path = file_of(folder, first);
+    const fs::path path = file_of(folder, arm, first);
     const std::size_t wanted = std::min<Tick>(last - first + 1, EarlierInputs::kTicksAFile);
     if (!read_inputs(path, EarlierInputs::kTicksAFile, rows) && !read_inputs(path, wanted, rows)) {
       throw RecordError(path.string() + ": the inputs from tick " + std::to_string(first) +
@@ -140,15 +140,18 @@ void for_each_input(const fs::path& folder, Tick last,
 
 void copy_inputs(const fs::path& from, const fs::path& to, Tick last) {
   if (last == 0) return;
-  make_inputs_folder(to);
-  std::error_code fault;
-  for (Tick first = 1; first <= last && !fault; first += EarlierInputs::kTicksAFile) {
-    fs::copy_file(file_of(from, first), file_of(to, first), fault);
+  std::error_code fault, ignored;
+  for (std::size_t arm = 0; arm < kMaxArms && !fault; ++arm) {
+    if (arm != 0 && !fs::exists(from / inputs_name(arm), ignored)) continue;
+    make_inputs_folder(to, arm);
+    for (Tick first = 1; first <= last && !fault; first += EarlierInputs::kTicksAFile) {
+      fs::copy_file(file_of(from, arm, first), file_of(to, arm, first), fault);
+    }
   }
   if (!fault) return;
-  std::error_code ignored;
-  fs::remove_all(to / kInputsName, ignored);
-  throw FileError((to / kInputsName).string() + ": " + fault.message() + "; choose another --out");
+  for (std::size_t arm = 0; arm < kMaxArms; ++arm) fs::remove_all(to / inputs_name(arm), ignored);
+  throw FileError((to / inputs_name(0)).string() + ": " + fault.message() +
+                  "; choose another --out");
 }
 
 void link_file(const fs::path& from, const fs::path& to) {

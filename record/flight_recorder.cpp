@@ -36,14 +36,23 @@ std::string fault_word(std::uint32_t fault) {
 
 }  // namespace
 
+void TickWindow::look_for_fault(const TickRecord& record, std::size_t arm) {
+  const std::uint32_t before = std::exchange(faults_[arm], record.fault);
+  if (record.fault == 0 || record.fault == before) return;
+  event_ = {(arm == 0 ? "" : "arm-2-") + fault_word(record.fault), record.tick};
+}
+
+void TickWindow::append_second(const TickRecord& record) {
+  second_[end_ % second_.size()] = record;
+  look_for_fault(record, 1);
+}
+
 void TickWindow::append(const TickRecord& record) {
   rows_[end_++ % rows_.size()] = record;
-  if (record.fault != 0 && record.fault != fault_) {
-    event_ = {fault_word(record.fault), record.tick};
-  } else if ((record.command & kCommandKind) == kCommandMark && event_.reason.empty()) {
+  look_for_fault(record, 0);
+  if ((record.command & kCommandKind) == kCommandMark && event_.reason.empty()) {
     event_ = {"mark", record.tick};
   }
-  fault_ = record.fault;
 }
 
 TickWindow::Event TickWindow::take_event() {
@@ -97,8 +106,10 @@ std::string folder_name(const TickWindow::Event& event) {
 /// lasts as long as the flight recorder.
 class RunStart {
  public:
-  RunStart(const std::string& name, const std::filesystem::path& out)
-      : folder_(new_folder(out / (".run-" + name))), volumes_(name, folder_), inputs_(folder_) {}
+  RunStart(const std::string& name, const std::filesystem::path& out, std::size_t arms)
+      : folder_(new_folder(out / (".run-" + name))), volumes_(name, folder_), inputs_(folder_) {
+    if (arms > 1) second_inputs_.emplace(folder_, 1);
+  }
   ~RunStart() {
     static_cast<void>(volumes_.finish());
     std::error_code ignored;
@@ -107,6 +118,7 @@ class RunStart {
   RunStart(const RunStart&) = delete;
   RunStart& operator=(const RunStart&) = delete;
 
+  void add_second(const TickRecord& record) { second_inputs_->add(record); }
   void add(const TickRecord& record) { inputs_.add(record); }
 
   /// Whether the volumes are on the disk, or will not be.
@@ -115,7 +127,8 @@ class RunStart {
   /// Puts the inputs up to tick `last` into the recording in `folder`. Returns why it cannot be
   /// replayed; empty: it can. Throws FileError.
   [[nodiscard]] std::string keep_inputs(const std::filesystem::path& folder, Tick last) {
-    const std::string problem = inputs_.keep(folder, last);
+    std::string problem = inputs_.keep(folder, last);
+    if (problem.empty() && second_inputs_) problem = second_inputs_->keep(folder, last);
     return problem.empty() ? "" : "cannot be replayed: " + problem;
   }
 
@@ -144,6 +157,7 @@ class RunStart {
   std::filesystem::path folder_;
   StartingVolumes volumes_;
   EarlierInputs inputs_;
+  std::optional<EarlierInputs> second_inputs_;
 };
 
 class FlightRecorder final : TickSink {
@@ -153,8 +167,8 @@ class FlightRecorder final : TickSink {
         connection_(connection),
         capacity_(static_cast<std::uint64_t>(
             std::ceil(options.flight_s * 1e9 / reader().info().tick_ns))),
-        window_(capacity_ + reader().info().state_slots),
-        start_(options.name, options.out),
+        window_(capacity_ + reader().info().state_slots, reader().info().arms),
+        start_(options.name, options.out, reader().info().arms),
         recorder_(reader(), *this) {
     if (!options.lead.empty()) lead_.emplace(options.lead);
   }
@@ -180,6 +194,10 @@ class FlightRecorder final : TickSink {
   [[nodiscard]] int kept() const noexcept { return kept_; }
 
  private:
+  void append_second(const TickRecord& record) override {
+    window_.append_second(record);
+    start_.add_second(record);
+  }
   void append(const TickRecord& record) override {
     window_.append(record);
     start_.add(record);
@@ -224,19 +242,26 @@ class FlightRecorder final : TickSink {
     row = std::max(row, window_.first());
     const std::uint64_t missed = index_of(window_[row]);
     std::string lacks = start_.keep_inputs(folder, missed);
-    SummaryBuilder summary(reader().info());
-    TickLogWriter log(folder / kTickLogName);
+    SummaryBuilder summary(reader().info()), second_summary(reader().info());
+    TickLogWriter log(folder / tick_log_name(0));
+    std::optional<TickLogWriter> second;
+    if (reader().info().arms > 1) second.emplace(folder / tick_log_name(1));
     constexpr std::uint64_t kRowsAPoll = 256;
     while (row < end) {
       row = std::max(row, window_.first());  // a disk that is slower than the run
       for (const std::uint64_t next = std::min(end, row + kRowsAPoll); row < next; ++row) {
         log.append(window_[row]);
         summary.add(window_[row]);
+        if (!second) continue;
+        second->append(window_.second(row));
+        second_summary.add(window_.second(row));
       }
       log.flush();
+      if (second) second->flush();
       recorder_.poll();
     }
     log.sync();
+    if (second) second->sync();
     while (!start_.has_volumes()) {  // in the first seconds of a run
       recorder_.poll();
       std::this_thread::sleep_for(kPollPeriod);
@@ -244,10 +269,11 @@ class FlightRecorder final : TickSink {
     if (lacks.empty()) lacks = start_.keep_volumes(folder);
     RecordLosses losses{.missed_before_start = missed};
     const std::string reason = "kept at tick " + std::to_string(event.tick) + ": " + event.reason;
-    RecordSummary figures = summary.result(losses, reason);
-    losses.lost = figures.lost_ticks;
+    ArmSummaries figures{summary.result(losses, reason)};
+    if (second) figures.push_back(second_summary.result(losses, reason));
+    losses.lost = figures.front().lost_ticks;
     write_new_file(folder / kSceneName, reader().info().scene_json);
-    write_manifest(folder, reader().info(), losses, log.rows(), reason, &figures);
+    write_manifest(folder, reader().info(), losses, log.rows(), reason, figures);
     return lacks;
   }
 
@@ -270,8 +296,9 @@ int run_flight_recorder(const RecorderOptions& options, const std::atomic<bool>&
   make_recording_folder(options.out);
   const FlightNotice notice(options.name, options.out);
   FlightRecorder recorder(options, connection);
+  const SegmentInfo& info = connection.reader().info();
   const double bytes =
-      options.flight_s * 1e9 / connection.reader().info().tick_ns * sizeof(TickRecord);
+      options.flight_s * 1e9 / info.tick_ns * static_cast<double>(info.arms * sizeof(TickRecord));
   std::cout << "the last " << options.flight_s << " s are in memory, " << std::lround(bytes / 1e6)
             << " MB" << std::endl;
   recorder.run(stop);

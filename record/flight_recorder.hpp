@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
@@ -15,11 +16,13 @@
 
 namespace kerf {
 
-/// The newest ticks, at most `capacity` of them. Allocates once.
+/// The newest ticks, at most `capacity` of them, of each arm. Allocates once.
 class TickWindow final : public TickSink {
  public:
-  explicit TickWindow(std::size_t capacity) { rows_.resize(capacity); }
+  explicit TickWindow(std::size_t capacity, std::size_t arms = 1)
+      : rows_(capacity), second_(arms > 1 ? capacity : 0) {}
 
+  void append_second(const TickRecord& record) override;
   void append(const TickRecord& record) override;
 
   /// Rows so far: row `i` of all is there if `first() <= i < end()`.
@@ -30,9 +33,13 @@ class TickWindow final : public TickSink {
   [[nodiscard]] const TickRecord& operator[](std::uint64_t i) const noexcept {
     return rows_[i % rows_.size()];
   }
+  /// The second arm's row of the same tick; with two arms only.
+  [[nodiscard]] const TickRecord& second(std::uint64_t i) const noexcept {
+    return second_[i % second_.size()];
+  }
 
-  /// The reason to keep the window, since the last call: a fault that began, or a mark; with its
-  /// tick. Empty: none. A fault wins over a mark.
+  /// The reason to keep the window, since the last call: a fault that began, of any arm, or a mark;
+  /// with its tick. Empty: none. A fault wins over a mark.
   struct Event {
     std::string reason;
     Tick tick = 0;
@@ -40,9 +47,11 @@ class TickWindow final : public TickSink {
   [[nodiscard]] Event take_event();
 
  private:
-  std::vector<TickRecord> rows_;
+  void look_for_fault(const TickRecord& record, std::size_t arm);
+
+  std::vector<TickRecord> rows_, second_;
   std::uint64_t end_ = 0;
-  std::uint32_t fault_ = 0;
+  std::array<std::uint32_t, kMaxArms> faults_{};  // of each arm
   Event event_;
 };
 

@@ -43,11 +43,14 @@ struct Curve {
 }
 
 /// `{end_s, curves: [{name, s, values}], sources: [...]}`, the sources of energy that did any work.
-[[nodiscard]] Json curves_of(const std::filesystem::path& folder, TickRange range) {
+/// With two arms the curves of the first have commanded_2 and penetration_2 of the second.
+[[nodiscard]] Json curves_of(const std::filesystem::path& folder, TickRange range,
+                             std::size_t arm) {
   const Manifest manifest = read_manifest(folder);
-  TickLogReader log(folder / kTickLogName);
+  require_arm(folder, manifest, arm);
+  TickLogReader log(folder / tick_log_name(arm));
   if (log.rows() == 0) {
-    throw RecordError((folder / kTickLogName).string() + ": 0 rows; nothing to plot");
+    throw RecordError((folder / tick_log_name(arm)).string() + ": 0 rows; nothing to plot");
   }
   const Envelope empty(log.rows(), kMaxPoints);
   std::vector<Curve> curves;
@@ -57,6 +60,7 @@ struct Curve {
   }
   const std::size_t first_source = curves.size();
   for (const std::string_view name : kEnergySourceNames) curves.push_back({name, empty});
+  Curve second_force{"commanded_2", empty}, second_depth{"penetration_2", empty};
   double removed = 0;
   double end_s = 0;
   std::uint64_t first_tick = 0;
@@ -77,7 +81,19 @@ struct Curve {
       curves[first_source + i].add(end_s, energy_mj_of_steps(record.*kEnergyColumns[i]));
     }
   };
-  log.for_each(add, range);
+  const auto add_second = [&](const TickRecord& second) {
+    if (second.stale != 0) return;
+    second_force.add(end_s, magnitude(second.commanded_force_n));
+    second_depth.add(end_s, double{second.penetration_mm});
+  };
+  if (arm == 0) {
+    for_each_tick(folder, manifest, range, [&](const TickRecord& first, const TickRecord* second) {
+      add(first);
+      if (second != nullptr) add_second(*second);
+    });
+  } else {
+    log.for_each(add, range);
+  }
   Json parts = Json::List{};
   Json sources = Json::List{};
   for (std::size_t i = 0; i < curves.size(); ++i) {
@@ -87,6 +103,10 @@ struct Curve {
       sources.push_back(json_of(curves[i]));
     }
   }
+  if (arm == 0 && manifest.arms > 1) {
+    parts.push_back(json_of(second_force));
+    parts.push_back(json_of(second_depth));
+  }
   return {{"end_s", end_s + manifest.tick_ns * 1e-9},
           {"curves", std::move(parts)},
           {"sources", std::move(sources)}};
@@ -95,9 +115,10 @@ struct Curve {
 }  // namespace
 
 void plot_forces(const std::filesystem::path& folder, const std::filesystem::path& svg,
-                 TickRange range) {
+                 TickRange range, std::size_t arm) {
   check_outputs(recording_files(folder), {{"--out", svg, ".svg"}});
-  write_new_file(svg, make_report({"recording", "forces"}, curves_of(folder, range).canonical()));
+  write_new_file(svg,
+                 make_report({"recording", "forces"}, curves_of(folder, range, arm).canonical()));
 }
 
 }  // namespace kerf

@@ -14,11 +14,12 @@ namespace kerf {
 
 /// Draws the recording in `folder` as an SVG of three panels over time: force magnitudes in N,
 /// penetration in mm with removed volume in mm^3, and the work of the hand in mJ with its sources.
-/// At most 4000 points per curve, every peak kept.
+/// At most 4000 points per curve, every peak kept. With two arms `arm` is drawn, and of the first
+/// also the commanded force and the penetration of the second.
 ///
 /// The file appears whole or not at all. Throws `RecordError`, `ReportError` or `FileError`.
 void plot_forces(const std::filesystem::path& folder, const std::filesystem::path& svg,
-                 TickRange range = {});
+                 TickRange range = {}, std::size_t arm = 0);
 
 /// A curve of at most `max_points` points that keeps every peak: the smallest and the largest of
 /// each stretch of samples, in their order. If all samples fit, all stay.

@@ -176,9 +176,9 @@ std::vector<Column> columns_in(hid_t group) {
   return out;
 }
 
-void write_ticks(hid_t file, const std::filesystem::path& path, TickLogReader& log,
-                 TickRange range) {
-  const Handle group(H5Gcreate2(file, "ticks", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), H5Gclose);
+void write_ticks(hid_t file, const char* name, const std::filesystem::path& path,
+                 TickLogReader& log, TickRange range) {
+  const Handle group(H5Gcreate2(file, name, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), H5Gclose);
   std::vector<Column> columns = columns_in(group);
   std::vector<TickRecord> rows;
   hsize_t written = 0;
@@ -212,7 +212,7 @@ void write_scene(hid_t file, const std::filesystem::path& folder) {
 }
 
 void write_file(const std::filesystem::path& path, const std::filesystem::path& folder,
-                const Manifest& manifest, TickLogReader& log, TickRange range) {
+                const Manifest& manifest, std::span<TickLogReader> logs, TickRange range) {
   // The last library that reads it: h5py and MATLAB from 2015 on.
   const Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
   checked(H5Pset_libver_bounds(access, H5F_LIBVER_EARLIEST, H5F_LIBVER_V18));
@@ -222,7 +222,8 @@ void write_file(const std::filesystem::path& path, const std::filesystem::path& 
   put_text(file, "session_id", manifest.session_id);
   put_text(file, "end_reason", manifest.end_reason);
   write_scene(file, folder);
-  write_ticks(file, path, log, range);
+  write_ticks(file, "ticks", path, logs[0], range);
+  if (logs.size() > 1) write_ticks(file, "ticks_2", path, logs[1], range);
   checked(H5Fflush(file, H5F_SCOPE_GLOBAL));  // a full disk is reported here, not by the release
 }
 
@@ -258,13 +259,16 @@ void export_hdf5(const std::filesystem::path& folder, const std::filesystem::pat
   }
   check_new_file(hdf5);
   const Manifest manifest = read_manifest(folder);
-  TickLogReader log(folder / kTickLogName);
+  std::vector<TickLogReader> logs;
+  for (std::size_t arm = 0; arm < manifest.arms; ++arm) {
+    logs.emplace_back(folder / tick_log_name(arm));
+  }
   H5dont_atexit();  // after a full disk its clean-up at exit crashes (1.10.8)
   H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);  // else it prints its own stack
   const PartFile part(hdf5);
   std::error_code fault;
   try {
-    write_file(part.path(), folder, manifest, log, range);
+    write_file(part.path(), folder, manifest, logs, range);
     std::filesystem::rename(part.path(), hdf5, fault);
     if (!fault) return;
   } catch (const Hdf5Failure&) {  // NOLINT(bugprone-empty-catch): reported below

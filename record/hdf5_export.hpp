@@ -13,6 +13,7 @@ namespace kerf {
 ///   /ticks/COLUMN   one dataset per column of the log, of its type and its rows, in chunks of 1024
 ///                   rows, packed with deflate; attributes units, description, valid (which rows it
 ///                   holds for) and, for codes and bits, codes
+///   /ticks_2/COLUMN of the second arm, if there is one; the same index is the same tick
 ///   /scene          the scene as JSON text
 ///   attributes of / kerf, tick_ns, session_id, end_reason
 ///

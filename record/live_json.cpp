@@ -5,6 +5,7 @@
 #include <array>
 #include <cerrno>
 #include <iostream>
+#include <optional>
 #include <string_view>
 #include <system_error>
 #include <thread>
@@ -34,9 +35,10 @@ class UdpSink final : public TickSink {
                      std::generic_category().message(errno) + "; give another address");
   }
 
+  void append_second(const TickRecord& record) override { second_ = record; }
   void append(const TickRecord& record) override {
     if (record.tick % every_ != 0) return;
-    const std::string text = tick_json(record);
+    const std::string text = tick_json(record, second_ ? &*second_ : nullptr);
     if (send_now(text)) return;
     // Refused was the datagram before; this one has not been sent yet.
     if (errno == ECONNREFUSED) {
@@ -58,15 +60,11 @@ class UdpSink final : public TickSink {
 
   std::uint32_t every_;
   OwnedFd socket_;
+  std::optional<TickRecord> second_;  // of the tick that comes
   std::uint64_t sent_ = 0, lost_ = 0;
 };
 
-}  // namespace
-
-std::string tick_json(const TickRecord& record) {
-  std::string text = R"({"timestamp":)";
-  append_number(static_cast<double>(record.start_ns) * 1e-9, text);
-  text += R"(,"kerf":{)";
+void append_columns(const TickRecord& record, std::string& text) {
   for_each_column([&](const LayoutField& field) {
     if (std::ranges::find(kNoQuantities, field.name) != kNoQuantities.end()) return;
     for (std::uint32_t i = 0; i < field.count; ++i) {
@@ -85,6 +83,19 @@ std::string tick_json(const TickRecord& record) {
     }
   });
   text.back() = '}';  // the last comma
+}
+
+}  // namespace
+
+std::string tick_json(const TickRecord& record, const TickRecord* second) {
+  std::string text = R"({"timestamp":)";
+  append_number(static_cast<double>(record.start_ns) * 1e-9, text);
+  text += R"(,"kerf":{)";
+  append_columns(record, text);
+  if (second != nullptr) {
+    text += R"(,"kerf_2":{)";
+    append_columns(*second, text);
+  }
   return text + '}';
 }
 

@@ -15,9 +15,9 @@ namespace kerf {
 inline constexpr const char* kPlotJugglerUdp = "127.0.0.1:9870";
 
 /// One tick as a JSON object: `timestamp`, its start in seconds, and in `kerf` the columns of
-/// docs/log.md, arrays as arrays. Left out are hashes and checksum, which are no quantities, and
-/// columns with a NaN, which JSON has not.
-[[nodiscard]] std::string tick_json(const TickRecord& record);
+/// docs/log.md, arrays as arrays; those of a second arm in `kerf_2`. Left out are hashes and
+/// checksum, which are no quantities, and columns with a NaN, which JSON has not.
+[[nodiscard]] std::string tick_json(const TickRecord& record, const TickRecord* second = nullptr);
 
 struct LiveOptions {
   std::string name;

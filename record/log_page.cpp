@@ -16,15 +16,17 @@ constexpr std::string_view kHead =
 
 `kerf-recorder` writes every tick of a running controller into a folder; `./kerf demo --out DIR` keeps it as
 `DIR/log`. `./kerf record info DIR/log` sums it up, `record plot` draws it, `record export` makes CSV, MCAP or HDF5 of
-it, each with `--from TICK` and `--until TICK` for a part.
+it, each with `--from TICK` and `--until TICK` for a part. With two devices `--arm 2` takes the second; `arms` in the
+manifest is then 2.
 
 | file | what |
 |---|---|
 | `ticks.npy` | one row for each tick, the columns below, for NumPy as it is |
+| `ticks-2.npy` | of a run with two devices: the second's, in the same columns. Row i of both is the same tick; a tick that was lost is in neither |
 | `manifest.json` | length of a tick, voxels, versions, compiler and processor, losses of the recorder and where they lie, how the run ended |
 | `scene.json` | the scene as it was loaded, every setting; `source` is what it was loaded from |
 | `volumes/HASH.npy.gz` | the densities of a volume as the run began, `[z, y, x]`; `HASH-labels.npy.gz`: its labels. HASH is `density_hash` in `scene.json`, of both |
-| `inputs/TICK.npy.gz` | of a flight recording: what the servo was given in the ticks before the log, from tick 1 on; 65,536 rows a file, named by its first tick |
+| `inputs/TICK.npy.gz` | of a flight recording: what the servo was given in the ticks before the log, from tick 1 on; 65,536 rows a file, named by its first tick; `inputs-2/` of a second device |
 
 Three lines of NumPy read it (`python/` is a reader with more, `examples/python/` uses it):
 
@@ -50,12 +52,13 @@ the file. Times are `start_ns`.
 | `/kerf/tick` | `kerf_msgs/msg/Tick`: all columns below, by their names | every tick |
 | `/kerf/tip` | `geometry_msgs/msg/PoseStamped`: the tool's tip in metres, in frame `scene`; from docking on | 100 Hz |
 | `/kerf/force` | `geometry_msgs/msg/WrenchStamped`: `commanded_force_n`, in frame `device`, and `tip_torque_n_mm` in N m | 100 Hz |
+| `/kerf/2/tick`, `/kerf/2/tip`, `/kerf/2/force` | of a second device, whose forces are in frame `device_2` | as above |
 
 Chunks are packed by LZ4, and `--unpacked` leaves them as they are.
 
 HDF5 opens in MATLAB (`h5read("run.h5", "/ticks/position_mm")`), Julia, R and h5py: one dataset per column, `/ticks/COLUMN`,
-with `units`, `description` and `valid` as attributes, and `codes` if its values are codes or bits. `/scene` is the scene's
-JSON.
+with `units`, `description` and `valid` as attributes, and `codes` if its values are codes or bits. `/ticks_2` is a
+second device's. `/scene` is the scene's JSON.
 
 A running controller can be plotted without a log: [Foxglove](second-machine.md) by the bridge, and PlotJuggler's UDP server
 (protocol JSON, timestamp from the message) by

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "record/mcap_export.hpp"
 
-#include <array>
+#include <cstddef>
 #include <cstdint>
+#include <string>
 #include <string_view>
+#include <vector>
 
 #include "record/recording.hpp"
 #include "record/tick_log.hpp"
@@ -16,24 +18,29 @@ void export_mcap(const std::filesystem::path& folder, const std::filesystem::pat
                  McapWriter::Packing packing, TickRange range) {
   check_outputs(recording_files(folder), {{"--mcap", mcap, ".mcap"}});
   const Manifest manifest = read_manifest(folder);
-  TickLogReader log(folder / kTickLogName);
   AtomicFile file(mcap);
   McapWriter writer([&](std::string_view bytes) { file.write(bytes.data(), bytes.size()); }, "ros2",
                     "kerf " KERF_VERSION, packing);
-  std::array<std::uint16_t, kRosTopics> channels{};
-  std::uint16_t* added = channels.data();
-  for (const RosChannel& one : ros_channels()) {
-    *added++ = writer.add({std::string(one.topic), std::string(one.schema), one.definition,
-                           std::string(kRosSchemaEncoding), std::string(kRosEncoding)});
+  std::vector<std::uint16_t> channels;  // of the first arm by topic, then of the second
+  for (std::size_t arm = 0; arm < manifest.arms; ++arm) {
+    for (const RosChannel& one : ros_channels(arm)) {
+      channels.push_back(
+          writer.add({std::string(one.topic), std::string(one.schema), one.definition,
+                      std::string(kRosSchemaEncoding), std::string(kRosEncoding)}));
+    }
   }
   RosMessages messages(manifest.tick_ns);
-  const auto write_tick = [&](const TickRecord& record) {
+  const auto write_arm = [&](const TickRecord& record, std::size_t arm) {
     for (const RosTopic topic : {ros_tick, ros_tip, ros_force}) {
       if (!messages.has(topic, record)) continue;
-      writer.message(channels[topic], record.start_ns, messages.message(topic, record));
+      writer.message(channels[arm * kRosTopics + topic], record.start_ns,
+                     messages.message(topic, record, arm));
     }
   };
-  log.for_each(write_tick, range);
+  for_each_tick(folder, manifest, range, [&](const TickRecord& first, const TickRecord* second) {
+    write_arm(first, 0);
+    if (second != nullptr) write_arm(*second, 1);
+  });
   writer.close();
   file.close();
   file.commit();

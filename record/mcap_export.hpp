@@ -15,6 +15,8 @@ namespace kerf {
 ///   /kerf/tip     geometry_msgs/msg/PoseStamped    the tool's tip in metres, from docking on
 ///   /kerf/force   geometry_msgs/msg/WrenchStamped  the commanded force, in the device's axes
 ///
+/// A second arm has /kerf/2/tick, /kerf/2/tip and /kerf/2/force, whose frame is device_2.
+///
 /// Tip and force come 100 times a second: the tick has all of them. Times are `start_ns`. Throws
 /// `RecordError`, or `FileError` if the file cannot be written.
 void export_mcap(const std::filesystem::path& folder, const std::filesystem::path& mcap,

@@ -20,14 +20,15 @@ namespace {
 
 /// A small log is read whole, with its checksums. Of a large one the recorder's own figures are
 /// shown, at once.
-RecordSummary summary_for_info(const std::filesystem::path& folder, TickRange range, bool scan) {
+RecordSummary summary_for_info(const std::filesystem::path& folder, TickRange range,
+                               std::size_t arm, bool scan) {
   constexpr std::uintmax_t kLarge = std::uintmax_t{256} << 20;
   std::error_code none;
-  const std::uintmax_t bytes = std::filesystem::file_size(folder / kTickLogName, none);
+  const std::uintmax_t bytes = std::filesystem::file_size(folder / tick_log_name(arm), none);
   if (!scan && range.is_whole() && !none && bytes > kLarge) {
-    if (const auto kept = kept_summary(folder)) return *kept;
+    if (const auto kept = kept_summary(folder, arm)) return *kept;
   }
-  return summarise(folder, range);
+  return summarise(folder, range, arm);
 }
 
 /// Whether the log has fewer rows than its header counts; says so.
@@ -49,6 +50,7 @@ int run_record(int argc, char** argv) {
   std::filesystem::path csv, mcap, hdf5;
   bool unpacked = false, scan = false;
   TickRange range;
+  std::size_t arm = 1;
   std::string name = kDefaultName;
   const auto add_command = [&](const char* name, const char* what) {
     Arguments command = app.command(name, what);
@@ -57,14 +59,20 @@ int run_record(int argc, char** argv) {
     command.option("--until", range.until, "the last tick").shown_as("TICK");
     return command;
   };
+  const auto add_arm = [&](Arguments& command, const char* what) {
+    command.option("--arm", arm, what).within(1, static_cast<double>(kMaxArms)).shows_default();
+  };
   Arguments info = add_command("info", "length, losses, forces, removed volume");
+  add_arm(info, "of a run with two devices, the figures of this one");
   info.option("--report", report, "write the figures as JSON");
   info.flag("--scan", scan,
             "read all rows of a log above 256 MB, too: else the recorder's figures");
   Arguments plot = add_command("plot", "forces and penetration over time, as SVG");
+  add_arm(plot, "of a run with two devices, this one; 1 also draws the force of the other");
   plot.option("--out", svg, "the SVG file").required();
   Arguments table =
       add_command("export", "every tick for other programs: a line of text, MCAP, or HDF5");
+  add_arm(table, "of a run with two devices, the one of the CSV; MCAP and HDF5 have both");
   table.option("--csv", csv, "as CSV").shown_as("FILE");
   table.option("--mcap", mcap, "as MCAP, for Foxglove, PlotJuggler and ROS 2").shown_as("FILE");
   table.option("--hdf5", hdf5, "as HDF5, for MATLAB, Julia and h5py").shown_as("FILE");
@@ -85,15 +93,17 @@ int run_record(int argc, char** argv) {
     throw UsageError("--from " + std::to_string(range.from) + " lies behind --until " +
                      std::to_string(range.until) + "; no tick lies between them");
   }
+  --arm;  // from here on an index
   if (columns.chosen()) std::cout << log_page();
   if (info.chosen()) {
     check_outputs(recording_files(folder), {{"--report", report, ".json"}});
-    const RecordSummary summary = summary_for_info(folder, range, scan);
+    const RecordSummary summary = summary_for_info(folder, range, arm, scan);
+    if (read_manifest(folder).arms > 1) std::cout << "arm                 " << arm + 1 << " of 2\n";
     std::cout << to_text(summary);
     if (!report.empty()) write_new_file(report, to_json(summary));
   }
   if (plot.chosen()) {
-    plot_forces(folder, svg, range);
+    plot_forces(folder, svg, range, arm);
     if (!is_stream(svg)) std::cout << svg.string() << ": written\n";
   }
   if (table.chosen() && csv.empty() && mcap.empty() && hdf5.empty()) {
@@ -102,11 +112,12 @@ int run_record(int argc, char** argv) {
   if (table.chosen()) {
     check_distinct({{"--csv", csv, ".csv"}, {"--mcap", mcap, ".mcap"}, {"--hdf5", hdf5, ".h5"}});
   }
+  if (table.chosen() && arm != 0) require_arm(folder, read_manifest(folder), arm);
   if (!hdf5.empty()) {
     static_cast<void>(catch_stop_signals());  // leaves no half file
     export_hdf5(folder, hdf5, range);
   }
-  if (!csv.empty()) export_csv(folder, csv, range);
+  if (!csv.empty()) export_csv(folder, csv, range, arm);
   if (!mcap.empty()) {
     export_mcap(folder, mcap, unpacked ? McapWriter::Packing::none : McapWriter::Packing::lz4,
                 range);

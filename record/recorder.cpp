@@ -25,8 +25,7 @@ namespace kerf {
 Recorder::Recorder(const SegmentReader& reader, TickSink& sink) : reader_(reader), sink_(sink) {
   next_ = oldest();
   // The segment of a run on another machine may hold less than its ring.
-  TickRecord record;
-  while (reader.state_at(next_, record) == ReadState::overrun) ++next_;
+  while (read_next() == ReadState::overrun) ++next_;
   losses_.missed_before_start = next_;
 }
 
@@ -39,16 +38,22 @@ std::uint64_t Recorder::oldest() const noexcept {
   return head - std::min<std::uint64_t>(head, reader_.info().state_slots);
 }
 
+ReadState Recorder::read_next() noexcept {
+  const ReadState state = reader_.state_at(next_, first_);
+  if (state != ReadState::ok || reader_.info().arms == 1) return state;
+  return reader_.state_at(next_, second_, 1);
+}
+
 std::uint64_t Recorder::poll() {
   const std::uint64_t head = reader_.state_head();
   std::uint64_t appended = 0;
   largest_lag_ = std::max(largest_lag_, head - std::min(next_, head));
-  TickRecord record;
   while (next_ < head) {
-    const ReadState state = reader_.state_at(next_, record);
+    const ReadState state = read_next();
     if (state == ReadState::busy || state == ReadState::not_yet) break;
     if (state == ReadState::ok) {
-      sink_.append(record);
+      if (reader_.info().arms > 1) sink_.append_second(second_);
+      sink_.append(first_);
       ++appended;
       ++next_;
     } else {
@@ -152,32 +157,73 @@ bool parse_options(int argc, char** argv, RecorderOptions& options) {
 
 namespace {
 
-/// The log of a recorder, summed up as it grows.
-class SummedLog final : public TickSink {
- public:
-  SummedLog(TickLogWriter& log, const SegmentInfo& info) : log_(log), summary_(info) {}
-  void append(const TickRecord& record) override {
-    log_.append(record);
-    summary_.add(record);
-  }
-  void flush() override { log_.flush(); }
-  [[nodiscard]] const SummaryBuilder& summary() const noexcept { return summary_; }
-
- private:
-  TickLogWriter& log_;
-  SummaryBuilder summary_;
-};
-
-/// What a recorder begins with: nothing, or the log of the one before.
+/// What a recorder begins with: nothing, or the logs of the one before.
 struct Beginning {
   TickLogWriter::Begin file = TickLogWriter::Begin::new_file;
   std::optional<std::uint64_t> next{};  ///< none: what the ring has
   RecordLosses losses{};
+  std::uint64_t rows = 0;  ///< that the logs of all arms have; further ones are read again
+  bool may_go_on = false;  ///< --resume
+};
+
+/// The log of one arm, summed up as it grows.
+struct SummedLog {
+  SummedLog(const std::filesystem::path& path, const Beginning& begin, const SegmentInfo& info)
+      : file(path, begin.file, begin.rows), summary(info) {}
+  void append(const TickRecord& record) {
+    file.append(record);
+    summary.add(record);
+  }
+
+  TickLogWriter file;
+  SummaryBuilder summary;
+};
+
+/// The logs of a recorder. Of each tick the second arm's row is written first: whenever the
+/// recorder is killed, each row of ticks.npy has its row in ticks-2.npy.
+class ArmLogs final : public TickSink {
+ public:
+  ArmLogs(const std::filesystem::path& folder, const Beginning& begin, const SegmentInfo& info) {
+    // Likewise the file: where there is ticks.npy, there is ticks-2.npy.
+    if (info.arms > 1) second_.emplace(folder / tick_log_name(1), of_second(folder, begin), info);
+    first_.emplace(folder / tick_log_name(0), begin, info);
+  }
+  void append_second(const TickRecord& record) override { second_->append(record); }
+  void append(const TickRecord& record) override { first_->append(record); }
+  void flush() override {
+    if (second_) second_->file.flush();
+    first_->file.flush();
+  }
+  void sync() {
+    if (second_) second_->file.sync();
+    first_->file.sync();
+  }
+  [[nodiscard]] std::uint64_t rows() const noexcept { return first_->file.rows(); }
+  /// Of each arm.
+  [[nodiscard]] ArmSummaries summaries(const RecordLosses& losses, std::string_view reason) const {
+    ArmSummaries out{first_->summary.result(losses, reason)};
+    if (second_) out.push_back(second_->summary.result(losses, reason));
+    return out;
+  }
+
+ private:
+  /// A recorder may have been killed between both files.
+  static Beginning of_second(const std::filesystem::path& folder, Beginning begin) {
+    const bool is_there = std::filesystem::exists(folder / tick_log_name(1));
+    const bool goes_on = begin.file == TickLogWriter::Begin::after_last || begin.may_go_on;
+    begin.file =
+        is_there && goes_on ? TickLogWriter::Begin::after_last : TickLogWriter::Begin::new_file;
+    return begin;
+  }
+
+  std::optional<SummedLog> first_, second_;
 };
 
 [[nodiscard]] Beginning beginning_in(const RecorderOptions& options, const SegmentReader& reader) {
-  if (!options.resume || !std::filesystem::exists(options.out / kTickLogName)) return {};
-  Beginning begin{.file = TickLogWriter::Begin::after_last};
+  if (!options.resume || !std::filesystem::exists(options.out / kTickLogName)) {
+    return {.may_go_on = options.resume};
+  }
+  Beginning begin{.file = TickLogWriter::Begin::after_last, .may_go_on = true};
   // Killed between the file's first byte and its manifest: without rows.
   constexpr std::uintmax_t kOneRow = kTickLogHeaderBytes + sizeof(TickRecord);
   std::error_code none;
@@ -193,9 +239,13 @@ struct Beginning {
   TickLogReader log(options.out / kTickLogName);
   begin.losses = manifest.losses;
   begin.next = manifest.losses.missed_before_start;
-  if (log.rows() > 0) {
+  begin.rows = log.rows();
+  if (reader.info().arms > 1) {
+    begin.rows = std::min(begin.rows, TickLogReader(options.out / tick_log_name(1)).rows());
+  }
+  if (begin.rows > 0) {
     TickRecord last;
-    static_cast<void>(log.read(log.rows() - 1, std::span(&last, 1)));
+    static_cast<void>(log.read(begin.rows - 1, std::span(&last, 1)));
     begin.next = index_of(last) + 1;
   }
   return begin;
@@ -208,11 +258,10 @@ class Recording {
             const Beginning& begin)
       : out_(options.out),
         connection_(connection),
-        log_(out_ / kTickLogName, begin.file),
-        sink_(log_, reader().info()),
-        recorder_(begin.next ? Recorder(reader(), sink_, *begin.next, begin.losses)
-                             : Recorder(reader(), sink_)),
-        whole_(log_.rows() == 0),
+        logs_(out_, begin, reader().info()),
+        recorder_(begin.next ? Recorder(reader(), logs_, *begin.next, begin.losses)
+                             : Recorder(reader(), logs_)),
+        whole_(logs_.rows() == 0),
         volumes_(options.name, options.out) {
     if (!options.lead.empty()) lead_.emplace(options.lead);
     write_new_file(out_ / kSceneName, reader().info().scene_json);
@@ -235,14 +284,14 @@ class Recording {
         manifest(kStillRunning);
       }
       if (Clock::now() >= next_sync) {
-        log_.sync();
+        logs_.sync();
         next_sync = Clock::now() + kSyncPeriod;
       }
       // A ring that fills fast (virtual time) is read again at once.
       if (!ended && got < reader().info().state_slots / 8) std::this_thread::sleep_for(kPollPeriod);
     }
     recorder_.drain();
-    log_.sync();
+    logs_.sync();
     for (const std::string& problem : volumes_.finish()) {
       if (recorder_.losses().missed_before_start > 0) continue;  // cannot be replayed anyhow
       std::cerr << "kerf-recorder: " << problem << '\n';
@@ -250,14 +299,11 @@ class Recording {
   }
 
   void manifest(std::string_view reason) const {
-    std::optional<RecordSummary> summary;
-    if (whole_ && reason != kStillRunning) {
-      summary = sink_.summary().result(recorder_.losses(), reason);
-    }
-    write_manifest(out_, reader().info(), recorder_.losses(), log_.rows(), reason,
-                   summary ? &*summary : nullptr);
+    ArmSummaries summaries;
+    if (whole_ && reason != kStillRunning) summaries = logs_.summaries(recorder_.losses(), reason);
+    write_manifest(out_, reader().info(), recorder_.losses(), logs_.rows(), reason, summaries);
   }
-  [[nodiscard]] std::uint64_t rows() const noexcept { return log_.rows(); }
+  [[nodiscard]] std::uint64_t rows() const noexcept { return logs_.rows(); }
   [[nodiscard]] const Recorder& recorder() const noexcept { return recorder_; }
 
  private:
@@ -265,10 +311,9 @@ class Recording {
 
   std::filesystem::path out_;
   const SegmentConnection& connection_;
-  TickLogWriter log_;
-  SummedLog sink_;
+  ArmLogs logs_;
   Recorder recorder_;
-  bool whole_;  ///< all rows went through `sink_`
+  bool whole_;  ///< all rows went through `logs_`
   std::optional<TickLead> lead_;
   StartingVolumes volumes_;
 };
@@ -295,7 +340,8 @@ int run_recorder(const RecorderOptions& options, const std::atomic<bool>& stop) 
   make_recording_folder(options.out);
   const Beginning begin = beginning_in(options, reader);
   Recording recording(options, connection, begin);
-  const double bytes_per_s = 1e9 / static_cast<double>(reader.info().tick_ns) * sizeof(TickRecord);
+  const double bytes_per_s = 1e9 / static_cast<double>(reader.info().tick_ns) *
+                             static_cast<double>(reader.info().arms * sizeof(TickRecord));
   std::cout << options.out.string() << (begin.next ? " goes on, and" : "") << " grows by "
             << std::lround(60 * bytes_per_s / 1e6) << " MB a minute" << std::endl;
   try {

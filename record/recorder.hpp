@@ -31,7 +31,8 @@ struct RecordLosses {
   std::vector<RecordGap> gaps{};          ///< at most `Recorder::kMaxGaps`; `lost` counts on
 };
 
-/// Copies the state ring into a log or into memory. Losses are counted.
+/// Copies the state ring into a log or into memory, with two arms both: a tick of which one arm's
+/// record is lost is a gap of both. Losses are counted.
 class Recorder {
  public:
   /// Starts at the oldest record that the ring still has.
@@ -57,6 +58,8 @@ class Recorder {
   static constexpr std::size_t kMaxGaps = 4096;
 
  private:
+  /// The records of index `next_` into `first_` and `second_`, of all arms or of none.
+  [[nodiscard]] ReadState read_next() noexcept;
   void skip_to(std::uint64_t index);
   /// The first index that the ring has room for.
   [[nodiscard]] std::uint64_t oldest() const noexcept;
@@ -64,6 +67,7 @@ class Recorder {
   const SegmentReader& reader_;
   TickSink& sink_;
   std::uint64_t next_ = 0;
+  TickRecord first_{}, second_{};
   RecordLosses losses_;
   std::uint64_t largest_lag_ = 0;
 };
@@ -96,8 +100,8 @@ struct RecorderOptions {
 [[nodiscard]] std::string_view end_reason(const SegmentReader& reader, bool stopped) noexcept;
 
 /// Records the controller `options.name` into the folder `options.out` until it ends or `stop`:
-/// ticks.npy, scene.json, manifest.json. Returns the exit code: 0, or 1 under `strict` if ticks
-/// were lost. Bad input and a full disk throw.
+/// ticks.npy (ticks-2.npy of a second arm), scene.json, manifest.json. Returns the exit code: 0, or
+/// 1 under `strict` if ticks were lost. Bad input and a full disk throw.
 [[nodiscard]] int run_recorder(const RecorderOptions& options, const std::atomic<bool>& stop);
 
 }  // namespace kerf

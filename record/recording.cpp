@@ -78,7 +78,7 @@ void make_recording_folder(const std::filesystem::path& folder) {
 
 void write_manifest(const std::filesystem::path& folder, const SegmentInfo& info,
                     const RecordLosses& losses, std::uint64_t rows, std::string_view end_reason,
-                    const RecordSummary* summary) {
+                    const ArmSummaries& summaries) {
   Json manifest;
   manifest["kerf"] = KERF_VERSION;
   manifest["compiler"] = __VERSION__;
@@ -97,6 +97,7 @@ void write_manifest(const std::filesystem::path& folder, const SegmentInfo& info
          {"spacing_mm", volume.spacing_mm},
          {"initial_hash", hex64(volume.initial_hash)}});
   }
+  if (info.arms > 1) manifest["arms"] = info.arms;
   manifest["rows"] = rows;
   manifest["lost_ticks"] = losses.lost;
   manifest["missed_before_start"] = losses.missed_before_start;
@@ -105,7 +106,8 @@ void write_manifest(const std::filesystem::path& folder, const SegmentInfo& info
     manifest["gaps"].push_back({{"first_index", gap.first_index}, {"count", gap.count}});
   }
   manifest["end_reason"] = end_reason;
-  if (summary != nullptr) manifest["summary"] = figures(*summary);
+  if (!summaries.empty()) manifest["summary"] = figures(summaries[0]);
+  if (summaries.size() > 1) manifest["summary_2"] = figures(summaries[1]);
   write_new_file(folder / kManifestName, manifest.document());
 }
 
@@ -133,13 +135,20 @@ Manifest read_manifest(const std::filesystem::path& folder) {
       out.losses.gaps.push_back(
           {gap.at("first_index").get<std::uint64_t>(), gap.at("count").get<std::uint64_t>()});
     }
-    if (json.contains("summary")) out.summary = summary_of(json.at("summary"));
+    if (json.contains("arms")) out.arms = json.at("arms").get<std::size_t>();
+    for (const char* const key : {"summary", "summary_2"}) {
+      if (json.contains(key)) out.summaries.push_back(summary_of(json.at(key)));
+    }
     for (const Json& volume : json.at("volumes")) {
       const auto spacing = volume.at("spacing_mm").get<std::array<double, 3>>();
       out.voxel_mm3.push_back(spacing[0] * spacing[1] * spacing[2]);
     }
   } catch (const JsonError&) {
     throw RecordError(path.string() + ": not a manifest of this version; record it again");
+  }
+  if (out.arms == 0 || out.arms > kMaxArms) {
+    throw RecordError(path.string() + ": arms = " + std::to_string(out.arms) +
+                      "; this version knows 1 and 2; use the kerf that recorded it");
   }
   const auto positive = [](double mm3) { return std::isfinite(mm3) && mm3 > 0; };
   if (out.tick_ns == 0 || out.voxel_mm3.empty() ||
@@ -220,9 +229,42 @@ RecordSummary SummaryBuilder::result(const RecordLosses& losses,
   return out;
 }
 
-RecordSummary summarise(const std::filesystem::path& folder, TickRange range) {
+void require_arm(const std::filesystem::path& folder, const Manifest& manifest, std::size_t arm) {
+  if (arm < manifest.arms) return;
+  throw RecordError(folder.string() + ": has no arm " + std::to_string(arm + 1) +
+                    ", the run had one device; leave --arm out");
+}
+
+void for_each_tick(const std::filesystem::path& folder, const Manifest& manifest, TickRange range,
+                   const std::function<void(const TickRecord&, const TickRecord*)>& visit) {
+  TickLogReader log(folder / tick_log_name(0));
+  std::optional<TickLogReader> second;
+  if (manifest.arms > 1) second.emplace(folder / tick_log_name(1));
+  std::vector<TickRecord> chunk(second ? TickLogReader::kChunkRows : 0);
+  std::uint64_t row = second && range.from != 0 ? log.row_of(range.from) : 0;
+  std::uint64_t begin = row;  // of `chunk`, in rows
+  std::uint64_t end = row;
+  log.for_each(
+      [&](const TickRecord& first) {
+        if (second && row == end && row < second->rows()) {
+          begin = row;
+          end = row + second->read(row, chunk);
+        }
+        const TickRecord* const other = row < end ? &chunk[row - begin] : nullptr;
+        if (other != nullptr && other->seq != first.seq) {
+          throw RecordError((folder / tick_log_name(1)).string() + ": row " + std::to_string(row) +
+                            " is not of the tick of ticks.npy; copy the recording again");
+        }
+        visit(first, other);
+        ++row;
+      },
+      range);
+}
+
+RecordSummary summarise(const std::filesystem::path& folder, TickRange range, std::size_t arm) {
   const Manifest manifest = read_manifest(folder);
-  TickLogReader log(folder / kTickLogName);
+  require_arm(folder, manifest, arm);
+  TickLogReader log(folder / tick_log_name(arm));
   SummaryBuilder builder(manifest.tick_ns, manifest.voxel_mm3);
   RecordLosses losses = manifest.losses;
   std::uint64_t before_range = 0;
@@ -241,13 +283,15 @@ RecordSummary summarise(const std::filesystem::path& folder, TickRange range) {
   return out;
 }
 
-std::optional<RecordSummary> kept_summary(const std::filesystem::path& folder) {
+std::optional<RecordSummary> kept_summary(const std::filesystem::path& folder, std::size_t arm) {
   const Manifest manifest = read_manifest(folder);
-  const TickLogReader log(folder / kTickLogName);
-  if (!manifest.summary || log.rows() != log.counted() || log.rows() != manifest.summary->rows) {
+  require_arm(folder, manifest, arm);
+  const TickLogReader log(folder / tick_log_name(arm));
+  if (arm >= manifest.summaries.size() || log.rows() != log.counted() ||
+      log.rows() != manifest.summaries[arm].rows) {
     return std::nullopt;
   }
-  return manifest.summary;
+  return manifest.summaries[arm];
 }
 
 std::string to_text(const RecordSummary& summary) {
@@ -272,10 +316,11 @@ std::string to_json(const RecordSummary& summary) {
 }
 
 void export_csv(const std::filesystem::path& folder, const std::filesystem::path& csv,
-                TickRange range) {
+                TickRange range, std::size_t arm) {
   check_outputs(recording_files(folder), {{"--csv", csv, ".csv"}});
+  if (arm != 0) require_arm(folder, read_manifest(folder), arm);
   AtomicFile file(csv);
-  TickLogReader log(folder / kTickLogName);
+  TickLogReader log(folder / tick_log_name(arm));
   std::string line;
   const auto end_line = [&] {
     line.back() = '\n';  // the last comma

@@ -53,11 +53,12 @@ std::string tick_log_header(std::uint64_t rows) {
   return npy_header("[" + columns + "]", std::to_string(rows) + ",", kTickLogHeaderBytes);
 }
 
-TickLogWriter::TickLogWriter(std::filesystem::path path, Begin begin) : path_(std::move(path)) {
+TickLogWriter::TickLogWriter(std::filesystem::path path, Begin begin, std::uint64_t most_rows)
+    : path_(std::move(path)) {
   std::error_code none;
   const bool has_rows =
       begin == Begin::after_last && std::filesystem::file_size(path_, none) >= kTickLogHeaderBytes;
-  if (has_rows) written_ = TickLogReader(path_).rows();
+  if (has_rows) written_ = std::min(TickLogReader(path_).rows(), most_rows);
   const int create = begin == Begin::new_file ? O_CREAT | O_EXCL : 0;
   fd_ = open(path_.c_str(), O_WRONLY | O_CLOEXEC | create, 0666);
   if (fd_ < 0 && errno == EEXIST) {

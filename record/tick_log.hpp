@@ -36,7 +36,7 @@ inline constexpr std::size_t kTickLogHeaderBytes = 4096;
 /// The header of a log of `rows` rows: exactly `kTickLogHeaderBytes`.
 [[nodiscard]] std::string tick_log_header(std::uint64_t rows);
 
-/// Takes the ticks of a run in order.
+/// Takes the ticks of a run in order, those of the first arm.
 class TickSink {
  public:
   TickSink() = default;
@@ -44,6 +44,8 @@ class TickSink {
   TickSink(const TickSink&) = delete;
   TickSink& operator=(const TickSink&) = delete;
   virtual void append(const TickRecord& record) = 0;
+  /// With two arms, before `append` of the same tick: the second arm's. Default: ignores it.
+  virtual void append_second(const TickRecord& /*record*/) {}
   /// After the last of several.
   virtual void flush() {}
 };
@@ -56,8 +58,9 @@ class TickLogWriter final : public TickSink {
     new_file,   ///< refuses a path that exists: a recording is never overwritten
     after_last  ///< goes on behind the complete rows of a log; cuts an incomplete row, or header
   };
-  /// Refuses a log that another process writes.
-  explicit TickLogWriter(std::filesystem::path path, Begin begin = Begin::new_file);
+  /// Refuses a log that another process writes. `most_rows`: of those that `after_last` keeps.
+  explicit TickLogWriter(std::filesystem::path path, Begin begin = Begin::new_file,
+                         std::uint64_t most_rows = UINT64_MAX);
   ~TickLogWriter() override;
 
   /// Buffers a row; at most `kBufferRows` wait for `flush`.
@@ -91,7 +94,7 @@ struct TickRange {
 
 /// How many records were published before this one: of index i, `seq` is 2 i + 2.
 [[nodiscard]] inline std::uint64_t index_of(const TickRecord& record) noexcept {
-  return record.seq / 2 - 1;
+  return record_index(record);
 }
 
 /// Reads one log, row by row, with constant memory.

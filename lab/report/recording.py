@@ -3,7 +3,8 @@
 
     end_s                       end of the time axis
     curves, sources             lists of {name, s, values}: times in s with the values there. Curves are contact,
-                                modification and commanded (N), penetration (mm), removed (mm3) and port (mJ); sources
+                                modification and commanded (N), penetration (mm), removed (mm3) and port (mJ), and with two
+                                arms commanded_2 and penetration_2 of the second; sources
                                 are those of energy that did any work (mJ)"""
 import figure as fig
 
@@ -22,8 +23,12 @@ def forces(data):
     draw(force, "commanded", fig.ORANGE, "commanded", 3.2)
     draw(force, "contact", fig.BLUE, "contact")
     draw(force, "modification", fig.GREEN, "modification")
+    if "commanded_2" in curves:
+        draw(force, "commanded_2", fig.RED, "commanded, second arm")
     force.set_ylabel("force (N)")
     lines = [draw(depth, "penetration", fig.BLUE, "penetration")]
+    if "penetration_2" in curves:
+        lines.append(draw(depth, "penetration_2", fig.GREEN, "penetration, second arm"))
     depth.set_ylabel("penetration (mm)")
     removed = depth.twinx()
     removed.spines["right"].set_visible(True)

@@ -32,7 +32,8 @@ def _words_of(file):
 class Log:
     """What kerf-recorder wrote into `folder`; docs/log.md tells each column.
 
-    ticks: one row for each tick, read from the disk as it is used. scene, manifest: as dictionaries."""
+    ticks: one row for each tick, read from the disk as it is used. second: of a run with two devices the second's rows,
+    row i of the same tick as row i of ticks; else None. scene, manifest: as dictionaries."""
 
     def __init__(self, folder):
         folder = pathlib.Path(folder)
@@ -40,6 +41,7 @@ class Log:
             self.ticks = _rows_of(folder / "ticks.npy")
             self.manifest = _words_of(folder / "manifest.json")
             self.scene = _words_of(folder / "scene.json")
+            self.second = _rows_of(folder / "ticks-2.npy") if self.manifest.get("arms") == 2 else None
         except OSError as error:
             below = folder / "log"  # of --out of a demo
             way = below if (below / "ticks.npy").is_file() else "the folder of a recording"

@@ -15,7 +15,7 @@ inline constexpr const char* kDefaultName = "kerf";
 
 /// Kinds of commands.
 enum class CommandKind : std::uint32_t {
-  select_tool = 1,  ///< argument: index into the scene's tools; of one arm, `Command::arm`
+  select_tool = 1,  ///< argument: index into the scene's tools; for one arm
   hold = 2,         ///< argument: 1 stops cutting and force, 0 goes on
   reset = 3,        ///< argument: 0; the volumes go back to their first content
   undo = 4,         ///< argument: 0; the volumes go back to their content before the last stroke

@@ -116,18 +116,22 @@ void put_tip(const TickRecord& record, CdrWriter message) {
   for (const float part : record.orientation) message.number(double{part});
 }
 
-void put_force(const TickRecord& record, CdrWriter message) {
-  put_header(record.start_ns, "device", message);
+void put_force(const TickRecord& record, std::size_t arm, CdrWriter message) {
+  put_header(record.start_ns, arm == 0 ? "device" : "device_2", message);
   for (const float n : record.commanded_force_n) message.number(double{n});
   for (const float n_mm : record.tip_torque_n_mm) message.number(double{n_mm} / 1000);
 }
 
 }  // namespace
 
-std::array<RosChannel, kRosTopics> ros_channels() {
-  return {{{"/kerf/tick", "kerf_msgs/msg/Tick", tick_definition()},
-           {"/kerf/tip", "geometry_msgs/msg/PoseStamped", pose_definition()},
-           {"/kerf/force", "geometry_msgs/msg/WrenchStamped", wrench_definition()}}};
+std::array<RosChannel, kRosTopics> ros_channels(std::size_t arm) {
+  constexpr std::array<std::array<std::string_view, kRosTopics>, kMaxArms> kTopics{
+      {{"/kerf/tick", "/kerf/tip", "/kerf/force"},
+       {"/kerf/2/tick", "/kerf/2/tip", "/kerf/2/force"}}};
+  const auto& topics = kTopics[arm];
+  return {{{topics[ros_tick], "kerf_msgs/msg/Tick", tick_definition()},
+           {topics[ros_tip], "geometry_msgs/msg/PoseStamped", pose_definition()},
+           {topics[ros_force], "geometry_msgs/msg/WrenchStamped", wrench_definition()}}};
 }
 
 RosMessages::RosMessages(std::uint64_t tick_ns) noexcept {
@@ -141,11 +145,11 @@ bool RosMessages::has(RosTopic topic, const TickRecord& record) const noexcept {
   return topic != ros_tip || std::isfinite(record.position_mm[0]);
 }
 
-std::string_view RosMessages::message(RosTopic topic, const TickRecord& record) {
+std::string_view RosMessages::message(RosTopic topic, const TickRecord& record, std::size_t arm) {
   const CdrWriter out(cdr_);
   if (topic == ros_tick) put_tick(record, out);
   if (topic == ros_tip) put_tip(record, out);
-  if (topic == ros_force) put_force(record, out);
+  if (topic == ros_force) put_force(record, arm, out);
   return cdr_;
 }
 

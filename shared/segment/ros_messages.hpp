@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <string>
 #include <string_view>
@@ -28,9 +29,10 @@ struct RosChannel {
 ///     /kerf/tip     geometry_msgs/msg/PoseStamped   the tool's tip in metres, in frame "scene"
 ///     /kerf/force   geometry_msgs/msg/WrenchStamped the commanded force in frame "device"
 ///
-/// Stamps are `start_ns`.
+/// Of the second arm: /kerf/2/tick, /kerf/2/tip, /kerf/2/force, with frame "device_2". Stamps are
+/// `start_ns`.
 enum RosTopic : std::uint8_t { ros_tick, ros_tip, ros_force, kRosTopics };
-[[nodiscard]] std::array<RosChannel, kRosTopics> ros_channels();
+[[nodiscard]] std::array<RosChannel, kRosTopics> ros_channels(std::size_t arm = 0);
 
 /// The messages of a run whose ticks take `tick_ns`.
 class RosMessages {
@@ -40,8 +42,9 @@ class RosMessages {
   /// Whether a tick has a message of this topic: tip and force come 100 times a second, since the
   /// tick has all of them, and no tip before docking.
   [[nodiscard]] bool has(RosTopic topic, const TickRecord& record) const noexcept;
-  /// The message; valid until the next call.
-  [[nodiscard]] std::string_view message(RosTopic topic, const TickRecord& record);
+  /// The message, of an arm's record; valid until the next call.
+  [[nodiscard]] std::string_view message(RosTopic topic, const TickRecord& record,
+                                         std::size_t arm = 0);
 
  private:
   std::uint64_t ticks_a_view_;

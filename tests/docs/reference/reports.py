@@ -118,7 +118,8 @@ REPORTS = [
         ("volumes", "", "each with `size_vox`, `spacing_mm`, `initial_hash`"),
         ("rows, lost_ticks, missed_before_start, end_reason", "", "as above; `end_reason` is `running` until the end, `no room` if the disk was full"),
         ("gaps", "", "each with `first_index` and `count`"),
-        ("summary", "", "what `record info` shows, of all rows; missing if the recorder was killed before")]),
+        ("arms", "", "2: the run had two devices, and there is `ticks-2.npy`; missing with one"),
+        ("summary, summary_2", "", "what `record info` shows, of all rows, of the first and the second device; missing if the recorder was killed before")]),
     ("Summary of a log", "`./kerf record info LOG --report FILE`.", [("record/recording.cpp", "void for_each_figure(")], [], [
         ("rows, first_tick, last_tick, seconds", "", "what the log covers"),
         ("lost_ticks, missed_before_start, end_reason", "", "as above; `end_reason` of a log that was cut says after which row"),
