@@ -26,16 +26,17 @@ constexpr std::array<std::string_view, 10> kRefused{"advertise",
                                                     "fetchAsset",
                                                     "playbackControl"};
 
-/// Of a channel in messages: its place in `ros_channels`, from 1.
-constexpr std::uint32_t channel_of(std::size_t topic) noexcept {
-  return static_cast<std::uint32_t>(topic + 1);
+/// Of a channel in messages: its place in `ros_channels` of the first arm, then of the second,
+/// from 1.
+constexpr std::uint32_t id_of(std::size_t channel) noexcept {
+  return static_cast<std::uint32_t>(channel + 1);
 }
 
-Json advertisement() {
+Json advertisement(std::size_t arm) {
   Json list;
-  std::size_t topic = 0;
-  for (const RosChannel& one : ros_channels()) {
-    list.push_back({{"id", channel_of(topic++)},
+  std::size_t channel = arm * kRosTopics;
+  for (const RosChannel& one : ros_channels(arm)) {
+    list.push_back({{"id", id_of(channel++)},
                     {"topic", one.topic},
                     {"encoding", kRosEncoding},
                     {"schemaName", one.schema},
@@ -103,7 +104,8 @@ void FoxgloveSession::obey(std::string_view text) {
   } else if (op == "unsubscribe") {
     for (const Json& id : message.at("subscriptionIds")) unsubscribe(id.get<std::uint32_t>());
   } else if (std::ranges::find(kRefused, op) != kRefused.end()) {
-    answer(Level::error, op + " is refused: kerf only sends, and has its three channels alone");
+    answer(Level::error, op + " is refused: kerf only sends, and has its " +
+                             (arms_ == 1 ? "three" : "six") + " channels alone");
   } else {
     answer(Level::warning,
            "op " + quoted_start(op) + " is not known; kerf understands subscribe and unsubscribe");
@@ -113,13 +115,14 @@ void FoxgloveSession::obey(std::string_view text) {
 void FoxgloveSession::subscribe(std::uint32_t id, std::uint32_t channel) {
   const std::string what =
       "subscribe: id " + std::to_string(id) + ", channelId " + std::to_string(channel) + ": ";
-  if (channel < channel_of(0) || channel > channel_of(kRosTopics - 1)) {
-    return answer(Level::error, what + "no such channel; 1 to 3 are advertised");
+  if (channel < id_of(0) || channel > id_of(channels() - 1)) {
+    return answer(Level::error,
+                  what + "no such channel; 1 to " + std::to_string(channels()) + " are advertised");
   }
   if (std::ranges::find(subscriptions_, id) != subscriptions_.end()) {
     return answer(Level::error, what + "the id is in use; take another one");
   }
-  std::optional<std::uint32_t>& own = subscriptions_[channel - channel_of(0)];
+  std::optional<std::uint32_t>& own = subscriptions_[channel - id_of(0)];
   if (own) {
     return answer(Level::error, what + "subscribed already, by id " + std::to_string(*own) +
                                     "; unsubscribe that first");
@@ -163,7 +166,11 @@ void FoxgloveSession::follow(const SegmentReader* run, bool ended) {
     said_ = Said::runs;
   }
   if (is_new || is_first) greet(run);
-  if (is_first) texts_.push_back(advertisement().canonical());
+  if (is_first) texts_.push_back(advertisement(0).canonical());
+  if (is_new && run->info().arms > arms_) {
+    arms_ = run->info().arms;
+    texts_.push_back(advertisement(1).canonical());
+  }
   if (run == nullptr && said_ == Said::nothing) {
     said_ = Said::waits;
     answer(Level::warning,
@@ -175,8 +182,10 @@ void FoxgloveSession::follow(const SegmentReader* run, bool ended) {
   }
 }
 
-bool FoxgloveSession::is_wanted(RosTopic topic) const noexcept {
-  return subscriptions_[topic] && messages_.has(topic, record_);
+bool FoxgloveSession::is_wanted(std::size_t channel) const noexcept {
+  const auto& record = records_[channel / kRosTopics];
+  const auto topic = static_cast<RosTopic>(channel % kRosTopics);
+  return subscriptions_[channel] && record && messages_.has(topic, *record);
 }
 
 bool FoxgloveSession::next(std::int64_t now_ns, const SegmentReader* run, bool ended,
@@ -195,21 +204,25 @@ bool FoxgloveSession::next(std::int64_t now_ns, const SegmentReader* run, bool e
 
 bool FoxgloveSession::next_of_tick(FoxgloveMessage& out) {
   while (part_ < kParts) {
-    const std::uint8_t part = part_++;
+    const std::size_t part = part_++;
     if (part == 0) {
-      if (!is_wanted(ros_tick) && !is_wanted(ros_tip) && !is_wanted(ros_force)) continue;
+      bool any = false;
+      for (std::size_t i = 0; i < kMostChannels; ++i) any = any || is_wanted(i);
+      if (!any) continue;
       out = {false, {}};
       put(out.bytes, kTime);
-      put(out.bytes, record_.start_ns);
+      put(out.bytes, records_[0]->start_ns);
       return true;
     }
-    const auto topic = static_cast<RosTopic>(part - 1);
-    if (!is_wanted(topic)) continue;
+    const std::size_t channel = part - 1;
+    if (!is_wanted(channel)) continue;
+    const std::size_t arm = channel / kRosTopics;
     out = {false, {}};
     put(out.bytes, kMessageData);
-    put(out.bytes, *subscriptions_[topic]);
-    put(out.bytes, record_.start_ns);
-    out.bytes += messages_.message(topic, record_);
+    put(out.bytes, *subscriptions_[channel]);
+    put(out.bytes, records_[arm]->start_ns);
+    out.bytes +=
+        messages_.message(static_cast<RosTopic>(channel % kRosTopics), *records_[arm], arm);
     return true;
   }
   return false;
@@ -226,12 +239,14 @@ bool FoxgloveSession::take_tick(std::int64_t now_ns, const SegmentReader& run) {
     index_ = head - most_behind_;
   }
   while (index_ < head) {
-    const ReadState state = run.state_at(index_, record_);
+    TickRecord record;
+    const ReadState state = run.state_at(index_, record);
     if (state == ReadState::not_yet) return false;
     ++index_;
     if (state != ReadState::ok) {
       ++left_out_;
-    } else if (record_.tick % stride_ == 0) {
+    } else if (record.tick % stride_ == 0) {
+      records_ = {record, run.second_of(record)};
       part_ = 0;
       break;
     }

@@ -30,7 +30,8 @@ struct FoxgloveMessage {
 
 /// The Foxglove WebSocket protocol towards one client
 /// (https://github.com/foxglove/ws-protocol): the channels of `ros_channels`, with the clock of the
-/// servo (capability `time`). It only sends: all that would change something here is answered with
+/// servo (capability `time`). Those of a second arm are advertised when the first run that has one
+/// comes, and stay. It only sends: all that would change something here is answered with
 /// a status of level 2. Without a network: the caller takes the next message whenever it can send
 /// one.
 ///
@@ -68,23 +69,28 @@ class FoxgloveSession {
   void greet(const SegmentReader* run);
   /// Sends once what the run is doing.
   void follow(const SegmentReader* run, bool ended);
-  [[nodiscard]] bool is_wanted(RosTopic topic) const noexcept;
+  /// Whether the client wants a channel, by its place among those of all arms, and the tick has a
+  /// message of it.
+  [[nodiscard]] bool is_wanted(std::size_t channel) const noexcept;
+  [[nodiscard]] std::size_t channels() const noexcept { return arms_ * kRosTopics; }
   [[nodiscard]] bool next_of_tick(FoxgloveMessage& out);
   [[nodiscard]] bool take_tick(std::int64_t now_ns, const SegmentReader& run);
 
   std::string controller_;
   std::deque<std::string> texts_;
-  std::array<std::optional<std::uint32_t>, kRosTopics> subscriptions_;  // their ids by topic
-  std::optional<std::uint64_t> session_;                                // of the run
+  static constexpr std::size_t kMostChannels = kMaxArms * kRosTopics;
+  std::size_t arms_ = 1;  // whose channels are advertised
+  std::array<std::optional<std::uint32_t>, kMostChannels> subscriptions_;  // their ids by channel
+  std::optional<std::uint64_t> session_;                                   // of the run
   Said said_ = Said::nothing;
   RosMessages messages_{1};
   std::uint64_t stride_ = 1, most_behind_ = 1;
   std::uint64_t index_ = 0;     // of the next tick in the ring
   std::uint64_t left_out_ = 0;  // ticks, in no status yet
   std::int64_t told_ns_ = 0;
-  TickRecord record_{};         // is being sent
-  std::uint8_t part_ = kParts;  // of it: the time, then each topic
-  static constexpr std::uint8_t kParts = 1 + kRosTopics;
+  std::array<std::optional<TickRecord>, kMaxArms> records_{};  // are being sent, of one tick
+  std::size_t part_ = kParts;  // of them: the time, then each channel
+  static constexpr std::size_t kParts = 1 + kMostChannels;
 };
 
 }  // namespace kerf::bridge

@@ -175,7 +175,7 @@ IgtlBytes label_message(const std::string& device, const SegmentVolumeInfo& volu
   return packed(*image, device.c_str());
 }
 
-std::optional<IgtlBytes> tool_message(const TickRecord& tick) {
+std::optional<IgtlBytes> tool_message(const TickRecord& tick, std::size_t arm) {
   const auto known = [](double x) { return std::isfinite(x); };
   if (!std::all_of(std::begin(tick.position_mm), std::end(tick.position_mm), known) ||
       !std::all_of(std::begin(tick.orientation), std::end(tick.orientation), known)) {
@@ -188,10 +188,10 @@ std::optional<IgtlBytes> tool_message(const TickRecord& tick) {
   }
   const igtl::TransformMessage::Pointer tool = igtl::TransformMessage::New();
   tool->SetMatrix(matrix);
-  return packed(*tool, "Tool");
+  return packed(*tool, arm == 0 ? "Tool" : "Tool 2");
 }
 
-IgtlBytes force_message(const TickRecord& tick) {
+IgtlBytes force_message(const TickRecord& tick, std::size_t arm) {
   const igtl::Unit::Pointer newton = igtl::Unit::New();
   newton->Append(igtl::Unit::SI_DERIVED_NEWTON, 1);
   const igtl::SensorMessage::Pointer force = igtl::SensorMessage::New();
@@ -200,7 +200,7 @@ IgtlBytes force_message(const TickRecord& tick) {
   for (unsigned int i = 0; i < 3; ++i) {
     force->SetValue(i, kRas[i] * double{tick.commanded_force_n[i]});
   }
-  return packed(*force, "Force");
+  return packed(*force, arm == 0 ? "Force" : "Force 2");
 }
 
 }  // namespace kerf::bridge

@@ -35,10 +35,12 @@ using IgtlBytes = std::shared_ptr<const std::vector<std::byte>>;
 [[nodiscard]] IgtlBytes label_message(const std::string& device, const SegmentVolumeInfo& volume,
                                       std::span<const Label> linear);
 
-/// World from tool as TRANSFORM "Tool"; none if the pose is not known yet.
-[[nodiscard]] std::optional<IgtlBytes> tool_message(const TickRecord& tick);
+/// World from the tool of an arm as TRANSFORM "Tool", of the second "Tool 2"; none if the pose is
+/// not known yet.
+[[nodiscard]] std::optional<IgtlBytes> tool_message(const TickRecord& tick, std::size_t arm = 0);
 
-/// The force that was sent to the hand as SENSOR "Force": x, y, z in newtons, along the same axes.
-[[nodiscard]] IgtlBytes force_message(const TickRecord& tick);
+/// The force that was sent to the hand as SENSOR "Force", of the second arm "Force 2": x, y, z in
+/// newtons, along the same axes.
+[[nodiscard]] IgtlBytes force_message(const TickRecord& tick, std::size_t arm = 0);
 
 }  // namespace kerf::bridge

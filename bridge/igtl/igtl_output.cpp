@@ -308,12 +308,16 @@ void IgtlOutput::State::attach() {
 void IgtlOutput::State::send_poses() {
   const auto tick = run->reader().latest();
   if (!tick) return;
-  const auto tool = tool_message(*tick);
-  const IgtlBytes force = force_message(*tick);
+  std::vector<IgtlBytes> messages;
+  const auto add = [&](const TickRecord& record, std::size_t arm) {
+    if (const auto tool = tool_message(record, arm)) messages.push_back(*tool);
+    messages.push_back(force_message(record, arm));
+  };
+  add(*tick, 0);
+  if (const auto second = run->reader().second_of(*tick)) add(*second, 1);
   for (auto& client : clients) {
     if (client->waits(IgtlClient::Kind::pose)) continue;
-    if (tool) client->add(*tool, IgtlClient::Kind::pose);
-    client->add(force, IgtlClient::Kind::pose);
+    for (const IgtlBytes& message : messages) client->add(message, IgtlClient::Kind::pose);
   }
 }
 

@@ -24,7 +24,8 @@ struct IgtlOptions {
 ///
 /// * each volume as IMAGE under its name, whole first, then the box of what changed, at most 20 Hz;
 /// * its labels, if it has any, as IMAGE "NAME labels" of 8 bits, once: they never change;
-/// * the tool's pose as TRANSFORM "Tool" and the force as SENSOR "Force" in newtons, at 60 Hz.
+/// * the tool's pose as TRANSFORM "Tool" and the force as SENSOR "Force" in newtons, at 60 Hz; of a
+///   second arm "Tool 2" and "Force 2", of the same tick.
 ///
 /// All of it is in RAS, for kerf's world as LPS, which is what medical files are loaded in: x and y
 /// change their signs. A client that is slow gets fewer and larger boxes, and holds up no other: at

@@ -231,6 +231,7 @@ void Server::Impl::command(const std::shared_ptr<Viewer>& viewer, const CommandM
   Command wish;
   wish.kind = kind;
   wish.argument = message.argument;
+  wish.arm = message.arm;
   asio::post(helper_, [this, wish, sequence, from = std::weak_ptr(viewer)] {
     Reply reply{ReplyStatus::busy, 0};
     try {

@@ -18,8 +18,11 @@ Reply RemoteCommand::request(const Command& command) noexcept {
   if (link_ != Link::open) {
     return {link_ == Link::down ? ReplyStatus::busy : ReplyStatus::refused, 0};
   }
-  to_send_ = CommandMessage{kCommandMagic, static_cast<std::uint32_t>(command.kind),
-                            command.argument, ++sequence_};
+  const auto kind = static_cast<std::uint32_t>(command.kind);
+  constexpr std::uint32_t kMost = 0xffff;  // of the message's fields; no such kind, no such arm
+  if (kind > kMost || command.arm > kMost) return {ReplyStatus::refused, 0};
+  to_send_ = CommandMessage{kCommandMagic, static_cast<std::uint16_t>(kind),
+                            static_cast<std::uint16_t>(command.arm), command.argument, ++sequence_};
   reply_.reset();
   answered_.wait_for(lock, kPatience, [this] { return reply_.has_value(); });
   to_send_.reset();
@@ -51,10 +54,14 @@ void RemoteCommand::set_link(Link link) {
 
 namespace {
 
+[[nodiscard]] std::size_t arms_of(const ParsedHello& hello) noexcept {
+  return (hello.head.flags & kTwoArms) != 0 ? 2 : 1;
+}
+
 /// True if both are the same run of the same scene: what is in its segment stays true.
 [[nodiscard]] bool same_run(const ParsedHello& a, const ParsedHello& b) noexcept {
   return a.head.session == b.head.session && a.head.scene_bytes == b.head.scene_bytes &&
-         a.volumes.size() == b.volumes.size() &&
+         a.volumes.size() == b.volumes.size() && arms_of(a) == arms_of(b) &&
          std::memcmp(a.volumes.data(), b.volumes.data(),
                      a.volumes.size() * sizeof(VolumeDescriptor)) == 0;
 }
@@ -72,6 +79,7 @@ namespace {
           .tick_ns = hello.head.tick_ns,
           .scene_bytes = hello.head.scene_bytes,
           .build_id = hello.head.build_id,
+          .arms = arms_of(hello),
           .volumes = hello.volumes,
           .most_bytes = most_bytes};
 }
@@ -227,16 +235,24 @@ void Mirror::records(std::span<const std::byte> message) {
   if (!hello_) throw StreamOutOfSync("records: came before the greeting");
   const ParsedRecords in = parse_records(message, hello_->head.session, scratch_);
   ReplicaWriter& writer = (next_ ? next_ : shown_)->writer;
+  const auto ring = static_cast<Ring>(in.head.ring);
+  const std::size_t arms = ring == Ring::pairs ? 2 : 1;
+  if (ring != Ring::dirty && arms != arms_of(*hello_)) {
+    throw StreamOutOfSync("records: of " + std::to_string(arms) + " arms, and the greeting had " +
+                          std::to_string(arms_of(*hello_)));
+  }
   for (std::uint32_t i = 0; i < in.head.count; ++i) {
     const std::uint64_t index = in.head.first + std::uint64_t{i} * in.head.stride;
-    if (static_cast<Ring>(in.head.ring) == Ring::ticks) {
-      auto record = record_at<TickRecord>(in.bytes, i);
-      if (!is_lockstep(*hello_)) record.start_ns = clock_.local(record.start_ns);
-      writer.put_record(index, record);
-    } else {
+    if (ring == Ring::dirty) {
       auto record = record_at<DirtyRecord>(in.bytes, i);
       record.time_ns = clock_.local(record.time_ns);
       writer.put_record(index, record);
+      continue;
+    }
+    for (std::size_t arm = arms; arm-- > 0;) {  // the second's first, as a controller publishes
+      auto record = record_at<TickRecord>(in.bytes, i * arms + arm);
+      if (!is_lockstep(*hello_)) record.start_ns = clock_.local(record.start_ns);
+      writer.put_record(index, record, arm);
     }
   }
 }

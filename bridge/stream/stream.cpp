@@ -52,7 +52,7 @@ void append(std::vector<std::byte>& out, const T& value) {
 
 void RecordBatches::plan(std::uint64_t records) noexcept {
   const SegmentInfo& info = reader_.info();
-  const bool ticks = ring_ == Ring::ticks;
+  const bool ticks = ring_ != Ring::dirty;
   const std::uint64_t head = ticks ? reader_.state_head() : reader_.dirty_head();
   const std::uint64_t slots = ticks ? info.state_slots : info.dirty_slots;
   end_ = head;
@@ -71,15 +71,17 @@ void RecordBatches::plan(std::uint64_t records) noexcept {
 }
 
 bool RecordBatches::read(std::uint64_t index, std::vector<std::byte>& out) const {
-  if (ring_ == Ring::ticks) {
-    TickRecord record;
-    if (reader_.state_at(index, record) != ReadState::ok) return false;
-    append(out, record);
-  } else {
+  if (ring_ == Ring::dirty) {
     DirtyRecord record;
     if (reader_.dirty_at(index, record) != ReadState::ok) return false;
     append(out, record);
+    return true;
   }
+  TickRecord record, second;
+  if (reader_.state_at(index, record) != ReadState::ok) return false;
+  if (ring_ == Ring::pairs && reader_.state_at(index, second, 1) != ReadState::ok) return false;
+  append(out, record);
+  if (ring_ == Ring::pairs) append(out, second);
   return true;
 }
 
@@ -115,7 +117,7 @@ Stream::Stream(RunSnapshot& snapshot, std::uint32_t flags)
       held_(snapshot.plan().count()),
       waiting_(snapshot.plan().count()),
       is_waiting_(snapshot.plan().count(), true),
-      ticks_(snapshot.reader(), Ring::ticks),
+      ticks_(snapshot.reader(), snapshot.reader().info().arms > 1 ? Ring::pairs : Ring::ticks),
       dirty_(snapshot.reader(), Ring::dirty) {
   std::iota(waiting_.begin(), waiting_.end(), 0U);
 }
@@ -140,7 +142,9 @@ void Stream::slot(std::int64_t now_ns, bool ended) {
   if (in_pass() && rate > 0) {
     record_bytes_ += kRecordShare * rate * static_cast<double>(now_ns - slot_ns_) * 1e-9;
     record_bytes_ = std::min<double>(record_bytes_, kMaxRawBytes);
-    const double each = (sizeof(TickRecord) + sizeof(DirtyRecord)) / ticks_.ratio();
+    const double each =
+        static_cast<double>(record_bytes(ticks_.ring()) + record_bytes(Ring::dirty)) /
+        ticks_.ratio();
     records = std::min(records, static_cast<std::uint64_t>(std::max(record_bytes_, 0.0) / each));
   } else {
     record_bytes_ = 0;
@@ -182,7 +186,7 @@ void Stream::write_hello(std::int64_t now_ns, std::vector<std::byte>& out) {
   head.layout_major = kLayoutMajor;
   head.layout_minor = kLayoutMinor;
   head.tick_ns = info.tick_ns;
-  head.flags = flags_;
+  head.flags = flags_ | (info.arms > 1 ? kTwoArms : 0);
   head.server_ns = now_ns;
   head.start_ns = info.start_ns;
   head.volume_count = static_cast<std::uint32_t>(info.volumes.size());

@@ -74,7 +74,7 @@ class LinkRate {
 /// If the link is too slow for all of them, every n-th is sent, and always the newest.
 class RecordBatches {
  public:
-  /// The reader outlives this.
+  /// The reader outlives this. `ring` is one that a run of so many arms has.
   RecordBatches(const SegmentReader& reader, Ring ring) noexcept : reader_(reader), ring_(ring) {}
 
   /// Of what was published since, at most `records` (and 1 at least) are to go out until the next
@@ -86,6 +86,7 @@ class RecordBatches {
   /// empty, if the records were overwritten meanwhile.
   bool write(double bytes_per_s, std::vector<std::byte>& out);
 
+  [[nodiscard]] Ring ring() const noexcept { return ring_; }
   /// Raw bytes per packed one.
   [[nodiscard]] double ratio() const noexcept { return pack_choice_.ratio(); }
 

@@ -45,6 +45,7 @@ inline constexpr std::uint32_t kAckMagic = magic("KBA1");
 inline constexpr std::uint32_t kCommandMagic = magic("KBC1");
 
 inline constexpr std::uint32_t kMayCommand = 1;  ///< HelloMessage::flags
+inline constexpr std::uint32_t kTwoArms = 2;     ///< HelloMessage::flags: Ring::pairs, not ticks
 inline constexpr std::uint32_t kPacked = 1;      ///< of frames and records: one LZ4 block
 inline constexpr std::uint32_t kLastOfPass = 2;  ///< FrameHead::flags
 inline constexpr std::uint32_t kRunEnded = 4;    ///< FrameHead::flags: the controller has gone
@@ -98,7 +99,9 @@ struct FrameHead {
 static_assert(sizeof(FrameHead) == 80);
 inline constexpr std::size_t kBlockEntryBytes = sizeof(std::uint64_t) + sizeof(std::uint32_t);
 
-enum class Ring : std::uint32_t { ticks = 0, dirty = 1 };
+/// A run of two arms has `pairs` in place of `ticks`: each is the first arm's record of a tick and
+/// behind it the second's.
+enum class Ring : std::uint32_t { ticks = 0, dirty = 1, pairs = 2 };
 
 /// Then the payload: `count` records of the ring as they lie in the segment. Record i has the index
 /// `first + i * stride`. On a slow link the stride is above 1; the newest record is always sent.
@@ -116,7 +119,9 @@ struct RecordsHead {
 };
 static_assert(sizeof(RecordsHead) == 48);
 [[nodiscard]] constexpr std::size_t record_bytes(Ring ring) noexcept {
-  return ring == Ring::ticks ? sizeof(TickRecord) : sizeof(DirtyRecord);
+  return ring == Ring::dirty   ? sizeof(DirtyRecord)
+         : ring == Ring::pairs ? 2 * sizeof(TickRecord)
+                               : sizeof(TickRecord);
 }
 
 struct ReplyMessage {
@@ -137,7 +142,8 @@ static_assert(sizeof(AckMessage) == 24);
 
 struct CommandMessage {
   std::uint32_t magic;
-  std::uint32_t kind;  ///< CommandKind
+  std::uint16_t kind;  ///< CommandKind
+  std::uint16_t arm;   ///< of `select_tool`: 0 the first, 1 the second; else 0
   std::uint32_t argument;
   std::uint32_t sequence;  ///< chosen by the viewer
 };

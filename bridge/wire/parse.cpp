@@ -137,7 +137,7 @@ ParsedRecords parse_records(Bytes message, std::uint64_t session,
                             std::span<std::byte, kMaxRawBytes> scratch) {
   const auto head = head_of<RecordsHead>(message, kRecordsMagic);
   require(head.session == session, "session", head.session, "that of the greeting");
-  require(head.ring <= static_cast<std::uint32_t>(Ring::dirty), "ring", head.ring, "0 or 1");
+  require(head.ring <= static_cast<std::uint32_t>(Ring::pairs), "ring", head.ring, "0 to 2");
   require(head.stride >= 1, "stride", head.stride, "1 or more");
   require(head.raw_bytes == std::uint64_t{head.count} * record_bytes(static_cast<Ring>(head.ring)),
           "raw_bytes", head.raw_bytes, "that of the records");

@@ -23,11 +23,13 @@ constexpr std::uint64_t kStartNs = 5'000'000'000;
 
 /// A controller that publishes ticks, each a millisecond after the one before it.
 struct Run {
-  explicit Run(std::uint32_t tick_ns = 1'000'000)
-      : writer(SegmentWriter::create(spec(tick_ns))), reader(SegmentReader::map(writer.fd())) {}
+  explicit Run(std::uint32_t tick_ns = 1'000'000, std::size_t arms = 1)
+      : writer(SegmentWriter::create(spec(tick_ns, arms))),
+        reader(SegmentReader::map(writer.fd())) {}
 
-  [[nodiscard]] SegmentSpec spec(std::uint32_t tick_ns) const {
+  [[nodiscard]] SegmentSpec spec(std::uint32_t tick_ns, std::size_t arms) const {
     SegmentSpec out = spec_of(volume);
+    out.arms = arms;
     out.tick_ns = tick_ns;
     return out;
   }
@@ -39,6 +41,11 @@ struct Run {
     record.commanded_force_n[1] = 0.5F;
     record.tip_torque_n_mm[2] = 250;
     writer.begin_tick(ticks);
+    if (reader.info().arms > 1) {
+      TickRecord second = record;
+      second.position_mm[0] = -x_mm;
+      writer.publish_state(second, 1);
+    }
     writer.publish_state(record);
     writer.end_tick(ticks);
   }
@@ -154,6 +161,50 @@ TEST_CASE("a subscription gets every tick from then on, with the servo's time be
     CHECK(client.data[i].clock_ns == client.data[i].time_ns);
     CHECK(client.data[i].payload == messages.message(ros_tick, record));
   }
+}
+
+TEST_CASE("a second arm's channels come with its run, and its messages with each tick") {
+  Run one;
+  Run two(1'000'000, 2);
+  Client client;
+  client.take(&one);
+  CHECK(client.texts.size() == 2);
+  client.say(R"({"op":"subscribe","subscriptions":[{"id":4,"channelId":4}]})");
+  client.take(&one);
+  CHECK(client.status() ==
+        "2 subscribe: id 4, channelId 4: no such channel; 1 to 3 are advertised");
+  client.take(&two);
+  const ReadJson channels = client.texts.back();
+  CHECK(channels["op"] == "advertise");
+  REQUIRE(channels["channels"].size() == 3);
+  for (std::size_t i = 0; i < 3; ++i) {
+    CHECK(channels["channels"][i]["id"] == i + 4);
+    CHECK(channels["channels"][i]["topic"] == ros_channels(1)[i].topic);
+    CHECK(ros_channels(1)[i].topic != ros_channels(0)[i].topic);
+  }
+  client.say(R"({"op":"subscribe","subscriptions":[{"id":1,"channelId":1},{"id":4,"channelId":4},
+                {"id":6,"channelId":6}]})");
+  for (int i = 0; i < 10; ++i) two.tick();
+  client.take(&two);
+  CHECK(client.data.size() == 21);
+  RosMessages messages(1'000'000);
+  TickRecord first, second;
+  REQUIRE(two.reader.state_at(9, first) == ReadState::ok);
+  REQUIRE(two.reader.state_at(9, second, 1) == ReadState::ok);
+  const auto* const last = &client.data[18];  // of the tenth tick
+  CHECK(last[0].id == 1);
+  CHECK(last[0].payload == messages.message(ros_tick, first));
+  CHECK(last[1].id == 4);
+  CHECK(last[1].payload == messages.message(ros_tick, second, 1));
+  CHECK(last[2].id == 6);
+  CHECK(last[2].payload == messages.message(ros_force, second, 1));
+  CHECK(last[2].payload.find("device_2") != std::string::npos);
+  CHECK(last[2].clock_ns == last[0].clock_ns);
+  client.take(&one);  // the next run has one arm: its channels are those that were there
+  one.tick();
+  client.take(&one);
+  CHECK(client.data.size() == 22);
+  CHECK(client.data.back().id == 1);
 }
 
 TEST_CASE("tip and force come a hundred times a second, the tip from docking on") {

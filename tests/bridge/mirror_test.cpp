@@ -313,12 +313,13 @@ TEST_CASE("a name that is taken, another layout and a segment too large are told
 TEST_CASE("a local reader's command gets the far side's answer, or is told that there is none") {
   RemoteCommand desk;
   std::atomic<bool> done{false};
-  std::atomic<std::uint32_t> kind{0};
+  std::atomic<std::uint32_t> kind{0}, arm{0};
   std::thread far([&] {
     for (; !done; std::this_thread::yield()) {
       const auto sent = desk.take();
       if (!sent) continue;
       kind = sent->kind;
+      arm = sent->arm;
       if (sent->argument == 1) desk.answer({kReplyMagic, sent->sequence - 1, 0, 4});  // late
       if (sent->argument <= 1) desk.answer({kReplyMagic, sent->sequence, 0, 9});
       if (sent->argument == 2) desk.answer({kReplyMagic, sent->sequence, 77, 0});
@@ -335,6 +336,12 @@ TEST_CASE("a local reader's command gets the far side's answer, or is told that 
     CHECK(reply.index == 9);
     CHECK(kind == static_cast<std::uint32_t>(CommandKind::select_tool));
   }
+  CHECK(desk.request({.kind = CommandKind::select_tool, .arm = 1}).status == ReplyStatus::accepted);
+  CHECK(arm == 1);
+  // What the message has no room for is not cut to what it has.
+  CHECK(desk.request({.kind = CommandKind::select_tool, .arm = 0x10001}).status ==
+        ReplyStatus::refused);
+  CHECK(desk.request({.kind = static_cast<CommandKind>(0x10001)}).status == ReplyStatus::refused);
   CHECK(desk.request({.argument = 2}).status == ReplyStatus::refused);
   CHECK(desk.request({.argument = 3}).status == ReplyStatus::busy);  // lost while it waited
   CHECK(!desk.take());

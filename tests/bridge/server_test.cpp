@@ -354,8 +354,8 @@ TEST_CASE("only who may command reaches the controller, and with what is valid")
   const TestBridge bridge;
   const auto say = [&](TestViewer& viewer, CommandKind kind, std::uint32_t argument) {
     const std::size_t before = viewer.far.replies.size();
-    viewer.client.send_value(
-        CommandMessage{kCommandMagic, static_cast<std::uint32_t>(kind), argument, 40 + argument});
+    viewer.client.send_value(CommandMessage{kCommandMagic, static_cast<std::uint16_t>(kind), 0,
+                                            argument, 40 + argument});
     REQUIRE(viewer.follow([&] { return viewer.far.replies.size() > before; }));
     CHECK(viewer.far.replies.back().sequence == 40 + argument);
     return static_cast<ReplyStatus>(viewer.far.replies.back().status);

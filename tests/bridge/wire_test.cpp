@@ -203,6 +203,8 @@ TEST_CASE("records are refused where count, size or index do not fit") {
   refused([](RecordsHead& h) { h.ring = 2; });
   refused([](RecordsHead& h) { h.count = 3; });
   refused([](RecordsHead& h) { h.count = 0x04000002; });  // 64 times it wraps to 128
+  refused([](RecordsHead& h) { h.ring = 3; });
+  refused([](RecordsHead& h) { h.ring = static_cast<std::uint32_t>(Ring::pairs); });  // longer
   refused([](RecordsHead& h) { h.stride = 0; });
   refused([](RecordsHead& h) { h.first = UINT64_MAX; });
   refused([](RecordsHead& h) { h.flags = kPacked; });
@@ -219,10 +221,19 @@ TEST_CASE("a server takes acks and commands of the right size and nothing else")
   CHECK(!parse_up(message).has_value());
   CHECK(!parse_up({}).has_value());
   message.clear();
-  append(message, CommandMessage{kCommandMagic, 2, 1, 9});
+  append(message, CommandMessage{kCommandMagic, 2, 1, 1, 9});
   up = parse_up(message);
   REQUIRE(up.has_value());
   CHECK(std::get<CommandMessage>(*up).sequence == 9);
+  CHECK(std::get<CommandMessage>(*up).arm == 1);
+  // Of a viewer that knows no arms the kind has 32 bits.
+  message.clear();
+  for (const std::uint32_t word : {kCommandMagic, 1U, 2U, 9U}) append(message, word);
+  up = parse_up(message);
+  REQUIRE(up.has_value());
+  CHECK(std::get<CommandMessage>(*up).kind == 1);
+  CHECK(std::get<CommandMessage>(*up).arm == 0);
+  CHECK(std::get<CommandMessage>(*up).argument == 2);
 }
 
 TEST_CASE("random bytes are refused, not obeyed") {

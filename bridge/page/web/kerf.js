@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The page: the bridge's news go to the stage and the panel, the user's wishes to both and back.
-import {CommandKind, kLastOfPass, kMayCommand, kRunEnded, records, ReplyStatus} from './constants.js';
+import {CommandKind, kLastOfPass, kMayCommand, kRunEnded, kTwoArms, records, ReplyStatus} from './constants.js';
 import {Link} from './link.js';
 import {bannerOf, isStale, LookControls, Plot, showBanner, showFigures} from './panel.js';
 import {materialOf, sceneView} from './scene.js';
@@ -11,11 +11,11 @@ import {recordAt} from './wire.js';
 const kFiguresMs = 200;
 const kSureMs = 3000;
 const kWanted = new Set(['tick', 'start_ns', 'flags', 'position_mm', 'orientation', 'commanded_force_n',
-  'proxy_offset_mm', 'active_tool', 'fault', 'penetration_mm']);
+  'proxy_offset_mm', 'active_tool', 'phase', 'fault', 'penetration_mm']);
 const element = id => document.getElementById(id);
 
 const plot = new Plot(element('plot'));
-const now = {record: null, frame: null, ended: false, newRun: 0, earlier: null, takenNs: null, lost: false,
+const now = {record: null, second: null, frame: null, ended: false, newRun: 0, earlier: null, takenNs: null, lost: false,
   beatMs: 0};  // the servo's last sign of life, by performance.now()
 let stage = null, scene = null, held = null;
 
@@ -35,7 +35,7 @@ const link = new Link({
   hello(news, sameRun) {
     if (!sameRun) {
       now.newRun = held ? performance.now() : 0;
-      Object.assign(now, {record: null, ended: false, frame: null, earlier: null, takenNs: null});
+      Object.assign(now, {record: null, second: null, ended: false, frame: null, earlier: null, takenNs: null});
       plot.clear();
       scene = null;
     }
@@ -60,15 +60,16 @@ const link = new Link({
   records(message) {
     if (message.record !== 'TickRecord') return;
     for (let i = 0; i < message.count; ++i) {
-      const record = recordAt('TickRecord', message.view, i * records.TickRecord.bytes, kWanted);
+      const [record, second = null] = Array.from({length: message.arms}, (_, arm) => recordAt('TickRecord',
+        message.view, (i * message.arms + arm) * records.TickRecord.bytes, kWanted));
       if (now.record && record.tick <= now.record.tick) continue;
-      now.record = record;
+      Object.assign(now, {record, second});
       plot.add(record);
       if (!now.earlier || record.start_ns - now.earlier[0].start_ns > 1000000000n) {
         now.earlier = now.earlier ? [now.earlier[1], record] : [record, record];
       }
     }
-    if (stage) stage.hand = handOf(now.record);
+    if (stage) stage.hands = now.second ? [handOf(now.record), handOf(now.second)] : [handOf(now.record)];
   },
   reply({sequence, status}) {
     const answer = {[ReplyStatus.accepted]: 'done', [ReplyStatus.busy]: 'busy, try again'}[status] ?? 'refused';
@@ -89,8 +90,10 @@ const look = new LookControls(stage);
 function begin() {
   scene = sceneView(held);
   scene.materialOf = materialOf(scene.materials);
-  const choice = element('tool');
-  choice.replaceChildren(...scene.tools.map((tool, i) => new Option(tool.name, i)));
+  for (const choice of ['tool', 'tool2']) {
+    element(choice).replaceChildren(...scene.tools.map((tool, i) => new Option(tool.name, i)));
+  }
+  element('second').hidden = !(held.hello.flags & kTwoArms);
   stage?.setScene(scene);
   look.begin(scene);
 }
@@ -117,29 +120,34 @@ function showNews() {
   const picturesHz = stage ? 1000 * (stage.shown - shownBefore) / (at - figuresBefore) : 0;
   shownBefore = stage?.shown ?? 0;
   figuresBefore = at;
-  const {record, earlier} = now;
+  const {record, second, earlier} = now;
   const span = record && earlier ? Number(record.start_ns - earlier[0].start_ns) : 0;
   const news = !now.ended && !now.lost && !isStale(now.frame);
   showFigures({record, picturesHz, late: held?.late ?? false,
     tool: record && scene?.tools[record.active_tool]?.name,
+    second: {record: second, tool: second && scene?.tools[second.active_tool]?.name},
     removed: scene ? removedByMaterial() : [],
     servoHz: span > 0 && news ? 1e9 * Number(record.tick - earlier[0].tick) / span : null,
     ageMs: now.takenNs && news ? Math.max(link.clock.ageMs(now.takenNs), 0) : null});
   tellBanner();
   plot.draw();
-  if (record && document.activeElement !== element('tool')) element('tool').value = record.active_tool;
+  for (const [id, of] of [['tool', record], ['tool2', second]]) {
+    if (of && document.activeElement !== element(id)) element(id).value = of.active_tool;
+  }
 }
 setInterval(showNews, kFiguresMs);
 
 // What is sent back, where that is allowed.
 
 const wishes = new Map();  // by the number under which a command was sent
-function wish(name, kind, argument) {
-  const number = link.send(kind, argument);
+function wish(name, kind, argument, arm = 0) {
+  const number = link.send(kind, argument, arm);
   if (number) wishes.set(number, name);
   element('reply').textContent = `${name}: ${number ? 'sent' : 'not connected'}`;
 }
 element('tool').addEventListener('change', ({target}) => wish('tool', CommandKind.select_tool, Number(target.value)));
+element('tool2').addEventListener('change', ({target}) =>
+  wish("second arm's tool", CommandKind.select_tool, Number(target.value), 1));
 element('hold').addEventListener('click', () => wish('hold', CommandKind.hold, 1));
 element('go').addEventListener('click', () => wish('go on', CommandKind.hold, 0));
 const reset = element('reset');

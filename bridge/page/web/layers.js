@@ -7,7 +7,7 @@ import {bind, cover, Program, requireNoError, Target, texture} from './gl.js';
 import {boxCorners} from './math.js';
 import {BlendCaster, Entries, IsoCaster, kUnitsPerVolume} from './renderers.js';
 import {SolidOnGpu, TranslucentOnGpu} from './textures.js';
-import {HandPainter, toolBounds} from './tool.js';
+import {HandPainter, sameHand, toolBounds} from './tool.js';
 import {palette} from './transfer_function.js';
 
 const kSmoothingReach = 3;  // pixels
@@ -128,17 +128,20 @@ export class Painter {
     return true;
   }
 
-  /** What of a picture of this size `boxes`, or another hand than `before`, may have changed; all of it
+  /** What of a picture of this size `boxes`, or other hands than `before`, may have changed; all of it
    * where `boxes` is null: {volumes, stage, pixels}, two parts that may be empty, and of volumes the
    * pixels that are to be cast. */
-  partsOf(view, hand, before, boxes, width, height) {
+  partsOf(view, hands, before, boxes, width, height) {
     const all = {x0: 0, y0: 0, x1: width, y1: height};
     let volumes = boxes ? null : all;
     for (const box of boxes ?? []) volumes = unitedRect(volumes, screenBounds(box, view, width, height));
     let stage = volumes;
     if (boxes) {
-      for (const one of hand === before ? [] : [hand, before]) {
-        if (one) stage = unitedRect(stage, toolBounds(this.scene, one, view, width, height));
+      for (let arm = 0; arm < Math.max(hands.length, before.length); ++arm) {
+        if (sameHand(hands[arm], before[arm])) continue;
+        for (const one of [hands[arm], before[arm]]) {
+          if (one) stage = unitedRect(stage, toolBounds(this.scene, one, view, width, height));
+        }
       }
     }
     const cast = this.blended > 0 ? stage : volumes;
@@ -147,16 +150,16 @@ export class Painter {
 
   /** Draws `view` into eye `index`, as much of it as `partsOf` says. Returns the pixels of volumes that
    * were cast. */
-  draw(index, view, hand, before, boxes) {
+  draw(index, view, hands, before, boxes) {
     const eye = this.eyes[index];
-    const {volumes, stage, pixels} = this.partsOf(view, hand, before, boxes, eye.all.x1, eye.all.y1);
+    const {volumes, stage, pixels} = this.partsOf(view, hands, before, boxes, eye.all.x1, eye.all.y1);
     if (isEmptyRect(stage)) return 0;
     if (!isEmptyRect(volumes)) this.drawOpaque(eye, view, volumes);
     eye.stage.copy(eye.opaque, stage);
     eye.stage.bind(stage);
-    if (hand) this.hand.drawTool(view, hand);
+    for (const hand of hands) if (hand) this.hand.drawTool(view, hand);
     if (this.blended > 0) this.drawInside(eye, view, stage);
-    if (hand) this.hand.drawForce(view, hand);
+    for (const hand of hands) if (hand) this.hand.drawForce(view, hand);
     this.smoothEdges(eye, clippedRect(grownRect(stage, kSmoothingReach), eye.all));
     return pixels;
   }

@@ -123,9 +123,9 @@ export class Link {
   }
 
   /** The number of the command, which its reply names; 0 where there is no connection. */
-  send(kind, argument) {
+  send(kind, argument, arm = 0) {
     if (this.socket?.readyState !== WebSocket.OPEN) return 0;
-    this.socket.send(command(kind, argument, ++this.sequence));
+    this.socket.send(command(kind, argument, ++this.sequence, arm));
     return this.sequence;
   }
 }

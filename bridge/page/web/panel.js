@@ -21,9 +21,28 @@ export function spanText(ms) {
 export const isStale = frame => frame !== null && frame.heartbeatNs > 0n &&
   Number(frame.takenNs - frame.heartbeatNs) / 1e6 > kStaleMs;
 
+/** What is urgent in a record, as {text, alarm}; null: nothing. */
+function alarmOf(record) {
+  if (record && record.flags & kFlagDeviceFault) {
+    const [name, meaning] = kFaults[record.fault] ?? ['unknown', ''];
+    return {text: `Fault ${name}: ${meaning}; ${kPhases[5][1]}.`, alarm: true};
+  }
+  if (record && record.flags & kFlagRefused) {
+    return {text: 'No free place for this tool here, so it feels nothing: lead it into air.', alarm: true};
+  }
+  return null;
+}
+/** Likewise what is not. */
+function adviceOf(record) {
+  if (record && record.flags & kFlagForbidden) return {text: 'Pressed on what may not be cut.', alarm: false};
+  if (record && record.flags & kFlagShaft) return {text: 'The shaft touches: it cuts nothing.', alarm: false};
+  return null;
+}
+const ofSecond = news => news && {...news, text: `Second arm: ${news.text}`};
+
 /** What is to be said large over the picture: {text, old, alarm}; null where there is nothing. `old`: by
  * how much the picture is, from `silentMs` since the servo's last sign of life. */
-export function bannerOf({record, frame, takenNs, ended, newRun, lost}, silentMs) {
+export function bannerOf({record, second, frame, takenNs, ended, newRun, lost}, silentMs) {
   const old = ` This picture is ${spanText(silentMs)} old.`;
   if (lost && takenNs !== null && !ended) return {text: 'No news from the bridge.', old, alarm: true};
   if (ended) {
@@ -32,16 +51,11 @@ export function bannerOf({record, frame, takenNs, ended, newRun, lost}, silentMs
       {text: 'The controller is gone: this is its last state.', old, alarm: true};
   }
   if (isStale(frame)) return {text: 'Stale: no news from the servo.', old, alarm: true};
-  if (record && record.flags & kFlagDeviceFault) {
-    const [name, meaning] = kFaults[record.fault] ?? ['unknown', ''];
-    return {text: `Fault ${name}: ${meaning}; ${kPhases[5][1]}.`, alarm: true};
-  }
-  if (record && record.flags & kFlagRefused) {
-    return {text: 'No free place for this tool here, so it feels nothing: lead it into air.', alarm: true};
-  }
+  const alarm = alarmOf(record) ?? ofSecond(alarmOf(second));
+  if (alarm) return alarm;
   if (frame?.lifecycle === Lifecycle.hold) return {text: 'Held: no cutting and no force.', alarm: false};
-  if (record && record.flags & kFlagForbidden) return {text: 'Pressed on what may not be cut.', alarm: false};
-  if (record && record.flags & kFlagShaft) return {text: 'The shaft touches: it cuts nothing.', alarm: false};
+  const advice = adviceOf(record) ?? ofSecond(adviceOf(second));
+  if (advice) return advice;
   if (newRun && performance.now() - newRun < kNewRunMs) return {text: 'A new run has begun.', alarm: false};
   return null;
 }
@@ -70,8 +84,17 @@ function showRows(rows) {
   });
 }
 
-/** `removed`: [[name, mm3]...]. */
-export function showFigures({record, tool, removed, late, servoHz, picturesHz, ageMs}) {
+/** Force, tool and state of the second arm. */
+function secondRows(second) {
+  if (!second?.record) return [];
+  const {commanded_force_n, fault, phase} = second.record;
+  const [state] = fault ? kFaults[fault] ?? ['fault'] : kPhases[phase] ?? ['–'];
+  return [['second arm', `${length(commanded_force_n).toFixed(2)} N`], ['its tool', second.tool ?? '–', true],
+    ['its state', state, true]];
+}
+
+/** `removed`: [[name, mm3]...]. `second`: {record, tool} of the second arm, if there is one. */
+export function showFigures({record, tool, second, removed, late, servoHz, picturesHz, ageMs}) {
   const force = record ? length(record.commanded_force_n) : 0;
   element('force').textContent = record ? `${force.toFixed(2)} N` : '–';
   const bar = element('bar');
@@ -80,6 +103,7 @@ export function showFigures({record, tool, removed, late, servoHz, picturesHz, a
   const mm3 = value => `${Math.abs(value) < 0.005 ? '0.00' : value.toFixed(2)} mm³`;
   const rows = [['tool', tool ?? '–'],
     ['depth', record ? `${record.penetration_mm.toFixed(2)} mm` : '–'],
+    ...secondRows(second),
     [late ? 'removed since joining' : 'removed', mm3(sum)]];
   for (const [name, value] of removed) if (Math.abs(value) >= 0.005) rows.push([name, mm3(value), true]);
   rows.push(['servo', servoHz ? `${servoHz.toFixed(0)} Hz` : '–'], ['pictures', `${picturesHz.toFixed(0)} /s`],

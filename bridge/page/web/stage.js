@@ -8,7 +8,7 @@ import {contextOf, enableExtensions, requireNoError} from './gl.js';
 import {Painter} from './layers.js';
 import {mix} from './math.js';
 import {sceneIn} from './scene.js';
-import {sameHand} from './tool.js';
+import {sameHands} from './tool.js';
 
 const kBudgetMs = 85;      // of one picture while things move: ten a second with some room
 const kRestMs = 250;       // without motion: the picture is drawn finely again
@@ -33,6 +33,8 @@ export class Stage {
     this.shown = 0;   // pictures
     this.moved = this.changed = -Infinity;
     this.stale = true;
+    this.hands = [];  // of each arm; null: it is not known where
+    this.drawn = [];  // those of the last picture
     canvas.addEventListener('webglcontextlost', event => {
       event.preventDefault();
       this.fail('The graphics card took the picture away, as it does when its memory is full; waiting for it.');
@@ -142,15 +144,15 @@ export class Stage {
       this.stale = true;
     }
     const boxes = this.painter.take();
-    const moves = !sameHand(this.hand, this.drawn);
+    const moves = !sameHands(this.hands, this.drawn);
     if (moves || boxes.length > 0) this.changed = now;
-    const hand = this.hand ?? null;
+    const {hands} = this;
     const eyes = this.look.stereo ? 2 : 1;
     const wide = Math.floor(width / eyes);
     const views = this.views(wide, height);
     const before = this.scale;
     this.chooseScale(eyes * wide * height, now, () => views.reduce((sum, view) =>
-      sum + this.painter.partsOf(view, hand, this.drawn, this.stale ? null : boxes, wide, height).pixels, 0));
+      sum + this.painter.partsOf(view, hands, this.drawn, this.stale ? null : boxes, wide, height).pixels, 0));
     if (!this.stale && !moves && this.scale === before && boxes.length === 0) {
       if (now - Math.max(this.moved, this.changed) > kRestMs) this.tell('at rest');
       return;
@@ -161,14 +163,14 @@ export class Stage {
     const began = performance.now();
     let pixels = 0;
     views.forEach((view, i) => {
-      pixels += this.painter.draw(i, view, hand, this.drawn, all ? null : boxes);
+      pixels += this.painter.draw(i, view, hands, this.drawn, all ? null : boxes);
     });
     this.painter.show(width, height);
     if (this.untaught === kUntaught) requireNoError(gl);  // the volumes are there now
     this.fence = {sync: gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0), began, pixels, all,
       ofAll: eyes * size[0] * size[1], painter: this.painter};
     gl.flush();
-    this.drawn = hand;
+    this.drawn = hands;
     this.stale = false;
     ++this.shown;
   }

@@ -16,6 +16,8 @@ export function handOf(record) {
 }
 
 export const sameHand = (a, b) => a === b || (a && b && JSON.stringify(a) === JSON.stringify(b));
+/** Of two lists, a hand for each arm. */
+export const sameHands = (a, b) => a.length === b.length && a.every((hand, arm) => sameHand(hand, b[arm]));
 
 export const poseOf = hand => rigid(hand.tip, hand.orientation);
 

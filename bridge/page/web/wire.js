@@ -87,6 +87,7 @@ const kFrame = [['flags', 'u32'], ['session', 'u64'], ['frame', 'u64'], ['tick',
 const kRecords = [['flags', 'u32'], ['session', 'u64'], ['ring', 'u32'], ['count', 'u32'],
   ['first', 'u64'], ['stride', 'u32'], ['rawBytes', 'u32'], ['payloadBytes', 'u32'],
   ['reserved', 'u32']];
+const kDirtyRing = 1, kPairsRing = 2;
 const kReply = [['sequence', 'u32'], ['status', 'u32'], ['index', 'u32']];
 
 function payload(cursor, head) {
@@ -128,10 +129,11 @@ const kReaders = {
   },
   [kRecordsMagic](cursor) {
     const message = {kind: 'records', ...cursor.all(kRecords)};
-    message.record = message.ring === 0 ? 'TickRecord' : 'DirtyRecord';
+    message.record = message.ring === kDirtyRing ? 'DirtyRecord' : 'TickRecord';
+    message.arms = message.ring === kPairsRing ? 2 : 1;  // records of a tick, the first arm's first
     const raw = payload(cursor, message);
     message.view = new DataView(raw.buffer, raw.byteOffset, raw.byteLength);
-    if (message.count * records[message.record].bytes !== raw.length) {
+    if (message.count * message.arms * records[message.record].bytes !== raw.length) {
       throw new Error('records: of no length');
     }
     return message;
@@ -158,5 +160,6 @@ function message(bytes, fields) {
   return view.buffer;
 }
 export const ack = (session, frame) => message(24, [kAckMagic, 0, session, frame]);
-export const command = (kind, argument, sequence) =>
-  message(16, [kCommandMagic, kind, argument, sequence]);
+/** Of an arm: 0 the first, 1 the second. */
+export const command = (kind, argument, sequence, arm = 0) =>
+  message(16, [kCommandMagic, kind + 0x10000 * arm, argument, sequence]);

@@ -86,19 +86,26 @@ class Client {
     if (type == "IMAGE") return take_image(header);
     if (type == "TRANSFORM") {
       const auto tool = body<igtl::TransformMessage>(header);
-      if (tool) tool->GetMatrix(tool_matrix);
-      ++poses;
-      return tool;
+      if (!tool) return false;
+      const bool is_first = header->GetDeviceName() == std::string("Tool");
+      if (!is_first) REQUIRE(header->GetDeviceName() == std::string("Tool 2"));
+      tool->GetMatrix(is_first ? tool_matrix : second_matrix);
+      ++(is_first ? poses : second_poses);
+      return true;
     }
     REQUIRE(type == "SENSOR");
     const auto sensor = body<igtl::SensorMessage>(header);
     if (!sensor) return false;
     REQUIRE(sensor->GetLength() == 3);
-    for (unsigned int i = 0; i < 3; ++i) force_n[i] = sensor->GetValue(i);
+    const bool is_first = header->GetDeviceName() == std::string("Force");
+    if (!is_first) REQUIRE(header->GetDeviceName() == std::string("Force 2"));
+    for (unsigned int i = 0; i < 3; ++i) {
+      (is_first ? force_n : second_force_n)[i] = sensor->GetValue(i);
+    }
     const igtl::Unit::Pointer unit = igtl::Unit::New();
     unit->Append(igtl::Unit::SI_DERIVED_NEWTON, 1);
     CHECK(sensor->GetUnit() == unit->Pack());
-    ++forces;
+    ++(is_first ? forces : second_forces);
     return true;
   }
   template <class Until>
@@ -111,9 +118,9 @@ class Client {
   }
 
   std::map<std::string, Picture> pictures;
-  igtl::Matrix4x4 tool_matrix{};
-  Place force_n{};
-  int poses = 0, forces = 0;
+  igtl::Matrix4x4 tool_matrix{}, second_matrix{};
+  Place force_n{}, second_force_n{};
+  int poses = 0, forces = 0, second_poses = 0, second_forces = 0;
 
  private:
   template <class Message>
@@ -247,6 +254,40 @@ TEST_CASE("volumes, tool and force lie in RAS as they lie in the scene") {
   CHECK(near({m[0][1], m[1][1], m[2][1]}, {1, 0, 0}));
   CHECK(near({m[0][2], m[1][2], m[2][2]}, {0, 0, 1}));
   CHECK(client.force_n == Place{-0.5, -0.25, -1});
+}
+
+TEST_CASE("a second arm has a tool and a force of its own name") {
+  const RuntimeFolder folder;
+  const NoiseVolume volume({8, 8, 8});
+  SegmentSpec spec = spec_of(volume);
+  SUBCASE("two arms") {
+    spec.arms = 2;
+  }
+  SUBCASE("one arm") {
+    spec.arms = 1;
+  }
+  SegmentWriter writer = SegmentWriter::create(spec);
+  const SegmentServer server("igtl", writer);
+  writer.begin_tick(1);
+  if (spec.arms == 2) {
+    writer.publish_state(record_at({-4, 5, 6}, {0, 0, 0, 1}, {0, 2, 0}), 1);
+  }
+  writer.publish_state(record_at({1, 2, 3}, {0, 0, 0, 1}, {0.5, 0.25, -1}));
+  writer.end_tick(1'000'000);
+  const IgtlOutput output(options_for("igtl"));
+  Client client(output.port());
+  client.take_until([&] { return client.poses > 3 && client.forces > 3; });
+  CHECK(near({client.tool_matrix[0][3], client.tool_matrix[1][3], client.tool_matrix[2][3]},
+             {-1, -2, 3}));
+  CHECK(client.force_n == Place{-0.5, -0.25, -1});
+  if (spec.arms == 1) {
+    CHECK(client.second_poses + client.second_forces == 0);
+    return;
+  }
+  client.take_until([&] { return client.second_poses > 2 && client.second_forces > 2; });
+  CHECK(near({client.second_matrix[0][3], client.second_matrix[1][3], client.second_matrix[2][3]},
+             {4, -5, 6}));
+  CHECK(client.second_force_n == Place{0, -2, 0});
 }
 
 TEST_CASE("labels come once a client and a run, beside their volume and where it lies") {

@@ -279,13 +279,14 @@ The server says hello first, and again for a new run; then frames, records and r
 acknowledgement for each frame that it has applied, and commands. What follows a head:
 
 * hello: the volumes' `VolumeDescriptor` ([segment](segment.md)). `off_labels` is 1 where there are labels; the other
-  offsets are 0. Flag {file.number('kMayCommand')}: this viewer may send commands.
+  offsets are 0. Flags: {file.number('kMayCommand')} this viewer may send commands, {file.number('kTwoArms')} the run has two arms.
 * frame: u64 version for each block, u32 number for each block, then the payload: the blocks. Flags: {file.number('kPacked')} packed,
   {file.number('kLastOfPass')} last of a pass (the volumes are then those of `tick`), {file.number('kRunEnded')} the controller has gone.
   Blocks are numbered: first the scene's text, {file.number('kTextBlockBytes')} bytes each; then the bricks' densities, {file.number('kDensityBlockBytes')} bytes each, of
   one volume after the other; then the bricks' labels, {file.number('kLabelBlockBytes')} bytes each.
 * records: `count` records of `ring` 0 (ticks) or 1 (dirty) as they lie in the segment; number i has the index
-  `first + i * stride`. Flag {file.number('kPacked')}: packed.
+  `first + i * stride`. Flag {file.number('kPacked')}: packed. A run of two arms has `ring` 2 in place of 0: each is the first arm's
+  record of a tick and, behind it, the second's.
 * command: `kind` {kinds}.
 * reply: `status` {replies.replace('`kCommandSlots`', str(command.number('kCommandSlots')))}.
 
