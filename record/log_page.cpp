@@ -61,7 +61,7 @@ with `units`, `description` and `valid` as attributes, and `codes` if its values
 second device's. `/scene` is the scene's JSON.
 
 A running controller can be plotted without a log: [Foxglove](second-machine.md) by the bridge, and PlotJuggler's UDP server
-(protocol JSON, timestamp from the message) by
+(protocol JSON, timestamp from the message; a second device is in `kerf_2`) by
 
     ./kerf record live --udp 127.0.0.1:9870
 

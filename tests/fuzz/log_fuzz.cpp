@@ -18,11 +18,17 @@
 
 /// The files of a recording, each as foreign bytes beside sound ones. By the first byte:
 /// 0 manifest.json, 1 scene.json, 2 ticks.npy, 3 rows of ticks behind a sound header, with sound
-/// checksums, 4 inputs before the log. Every reader gives a result, or one line.
+/// checksums, 4 inputs before the log, 5 such rows and the log of a second arm, by the second byte
+/// as it is or behind a sound header. Every reader gives a result, or one line.
 namespace {
 
 constexpr std::string_view kManifest = R"({"session_id": "0", "tick_ns": 1000000, "end_reason": "",
   "lost_ticks": 0, "missed_before_start": 0, "gaps": [], "volumes": [{"spacing_mm": [1, 1, 1]}]})";
+
+/// The same of a run with two devices.
+std::string manifest_of_two() {
+  return R"({"arms": 2, )" + std::string(kManifest.substr(1));
+}
 
 template <class Error, class Read>
 void must_read_or_explain(Read read) {
@@ -53,7 +59,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   static const kerf::test::TemporaryFolder folder;
   if (size == 0) return 0;
   const std::string_view bytes(reinterpret_cast<const char*>(data) + 1, size - 1);
-  const int kind = data[0] % 5;
+  const int kind = data[0] % 6;
   if (kind == 1) {
     must_read_or_explain<kerf::JsonError>([&] { static_cast<void>(kerf::source_in(bytes)); });
     must_read_or_explain<kerf::JsonError>(
@@ -67,8 +73,16 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         [] { kerf::for_each_input(folder.path(), 10, [](const kerf::TickRecord&) {}); });
     return 0;
   }
-  folder.write("manifest.json", kind == 0 ? bytes : kManifest);
-  folder.write("ticks.npy", kind == 2 ? std::string(bytes) : log_of(kind == 3 ? bytes : ""));
+  folder.write("manifest.json", kind == 0   ? std::string(bytes)
+                                : kind == 5 ? manifest_of_two()
+                                            : std::string(kManifest));
+  const bool rows = kind == 3 || kind == 5;
+  folder.write("ticks.npy", kind == 2 ? std::string(bytes) : log_of(rows ? bytes : ""));
+  if (kind == 5) {
+    const std::string_view second = bytes.substr(std::min<std::size_t>(1, bytes.size()));
+    const bool as_it_is = !bytes.empty() && bytes[0] % 2 != 0;
+    folder.write("ticks-2.npy", as_it_is ? std::string(second) : log_of(bytes));
+  }
   must_read_or_explain<kerf::RecordError>([] {
     const kerf::RecordSummary summary = kerf::summarise(folder.path());
     static_cast<void>(kerf::to_text(summary));
@@ -76,6 +90,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   });
   must_read_or_explain<kerf::RecordError>(
       [] { static_cast<void>(kerf::kept_summary(folder.path())); });
+  must_read_or_explain<kerf::RecordError>(
+      [] { static_cast<void>(kerf::summarise(folder.path(), {}, 1)); });
   must_read_or_explain<kerf::RecordError>(
       [] { static_cast<void>(kerf::summarise(folder.path(), {.from = 1, .until = 1000})); });
   must_read_or_explain<kerf::RecordError>(

@@ -3,6 +3,7 @@
 
     hdf5_test.py ROOT BIN
 Exit code 77: skipped, without h5py."""
+import json
 import pathlib
 import shutil
 import subprocess
@@ -21,6 +22,18 @@ def export(log, to, *options, code=0):
     done = subprocess.run([BIN / "kerf-record", "export", log, "--hdf5", to, *options], capture_output=True, text=True)
     assert done.returncode == code, done.stderr
     return done.stderr
+
+
+def crc32c(rows):
+    """The checksum of each row: of its bytes between seq and crc32c, all rows at once."""
+    table = np.arange(256, dtype=np.uint32)
+    for _ in range(8):
+        table = np.where(table & 1, (table >> 1) ^ np.uint32(0x82F63B78), table >> 1)
+    bytes_of = np.frombuffer(rows.tobytes(), np.uint8).reshape(len(rows), -1)[:, 8:-4]
+    crc = np.full(len(rows), 0xFFFFFFFF, np.uint32)
+    for column in bytes_of.T:
+        crc = table[(crc ^ column) & 0xFF] ^ (crc >> 8)
+    return crc ^ np.uint32(0xFFFFFFFF)
 
 
 class TestHdf5(unittest.TestCase):
@@ -61,6 +74,28 @@ class TestHdf5(unittest.TestCase):
         export(self.log, path, "--from", "999999")  # an old file is replaced
         with h5py.File(path, "r") as file:
             self.assertEqual(file["ticks/position_mm"].shape, (0, 3))
+
+    def test_a_second_arm_has_a_group_of_its_own(self):
+        two = self.folder / "two"
+        shutil.copytree(self.log, two)
+        rows = self.rows.copy()
+        rows["commanded_force_n"] *= 0.5
+        rows["crc32c"] = crc32c(rows)
+        header = (self.log / "ticks.npy").read_bytes()[:4096]
+        (two / "ticks-2.npy").write_bytes(header + rows.tobytes())
+        manifest = json.loads((two / "manifest.json").read_text())
+        (two / "manifest.json").write_text(json.dumps(manifest | {"arms": 2}))
+        path = self.folder / "two.h5"
+        export(two, path)
+        with h5py.File(path, "r") as file:
+            for group, expected in (("ticks", self.rows), ("ticks_2", rows)):
+                self.assertEqual(sorted(file[group]), sorted(rows.dtype.names))
+                for name in rows.dtype.names:
+                    np.testing.assert_array_equal(file[group][name][:], expected[name], name)
+        export(self.log, path)
+        with h5py.File(path, "r") as file:
+            self.assertNotIn("ticks_2", file)
+        self.assertIn("has no arm 2, the run had one device", export(self.log, path, "--arm", "2", code=2))
 
     def test_what_cannot_be(self):
         self.assertIn("--hdf5 writes no .npy", export(self.log, self.log / "ticks.npy", code=2))
