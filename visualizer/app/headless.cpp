@@ -114,7 +114,7 @@ class Pen {
 }  // namespace
 
 void write_contact_sheet(const std::filesystem::path& file, const SceneView& scene,
-                         std::span<const VolumeContent> contents, const std::optional<Hand>& hand) {
+                         std::span<const VolumeContent> contents, const Hands& hands) {
   constexpr int kMarginPx = 10;
   constexpr double kAspect = static_cast<double>(kTile.width) / kTile.height;
   constexpr double kNearer = 1.5;  // one tooth does not fill its box
@@ -126,8 +126,6 @@ void write_contact_sheet(const std::filesystem::path& file, const SceneView& sce
   camera.pan(0.0, -kLower);
   const View view = camera.view(kAspect, kReach * camera.radius_mm());
   const RenderTarget target({kFiner * kTile.width, kFiner * kTile.height});
-  std::optional<Hand> tool = hand;
-  if (tool) tool->force_n = glm::dvec3(0.0);  // an arrow would hide what is to be compared
 
   const auto kinds = renderer_kinds();
   const int rows = (static_cast<int>(kinds.size()) + kColumns - 1) / kColumns;
@@ -140,9 +138,11 @@ void write_contact_sheet(const std::filesystem::path& file, const SceneView& sce
     target.bind();
     glClearColor(kGrey, kGrey, kGrey, 1.0F);
     glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
-    if (tool) painter.hold(*tool);
+    painter.hold(hands);
     painter.draw_volumes(ScenePainter::Layer::opaque, view, target);
-    if (tool) painter.draw_tool(*tool, view, target);
+    for (const auto& hand : hands) {  // no arrow: it would hide what is to be compared
+      if (hand) painter.draw_tool(*hand, view, target);
+    }
     painter.draw_volumes(ScenePainter::Layer::translucent, view, target);
     const std::vector<std::uint8_t> tile = reduced(target.read_rgb());
     const int left = static_cast<int>(i) % kColumns * kTile.width;
@@ -255,9 +255,8 @@ void keep_results(const VisualizerOptions& options, Session& session, Picture& p
                   FrameReport& report) {
   if (options.mesh) export_surface(*options.mesh, session.scene(), session.contents());
   if (options.sheet) {
-    std::optional<Hand> hand;
-    if (session.latest()) hand = hand_of(*session.latest());
-    write_contact_sheet(*options.sheet, picture.shown_scene(), session.contents(), hand);
+    write_contact_sheet(*options.sheet, picture.shown_scene(), session.contents(),
+                        hands_of(session));
   }
   report.bricks_uploaded = picture.bricks_uploaded();
   report.clean_end = session.ended_cleanly();

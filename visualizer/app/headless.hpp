@@ -59,6 +59,6 @@ class FrameSchedule {
 /// with its name. Needs a current GL context. Throws FileError, and VisualizerError if a
 /// renderer cannot show the volumes.
 void write_contact_sheet(const std::filesystem::path& file, const SceneView& scene,
-                         std::span<const VolumeContent> contents, const std::optional<Hand>& hand);
+                         std::span<const VolumeContent> contents, const Hands& hands);
 
 }  // namespace kerf

@@ -3,6 +3,7 @@
 #include "visualizer/compose/picture_layers.hpp"
 
 #include <algorithm>
+#include <array>
 
 #include "visualizer/render/renderer.hpp"
 #include "visualizer/scene/camera.hpp"
@@ -28,11 +29,16 @@ std::vector<T> picked(std::span<const T> all, std::span<const std::size_t> which
 
 ScenePainter::ScenePainter(const std::string& choice, const SceneView& scene,
                            std::span<const VolumeContent> contents)
-    : volumes_(scene.volumes),
-      tool_(scene.voxel_tool ? std::optional<ToolVolume>(scene) : std::nullopt),
-      hand_(scene, scene.main_volume().radius_mm()) {
+    : volumes_(scene.volumes), hand_(scene, scene.main_volume().radius_mm()) {
   std::vector<std::string> kinds = renderer_of_each(choice, volumes_.size());
-  if (tool_) kinds.push_back(kinds.front());
+  if (scene.voxel_tool) {
+    SceneView before = scene;  // with the tools of the arms before
+    for (std::size_t arm = 0; arm < scene.arms; ++arm) {
+      tools_.emplace_back(before);
+      before = tools_.back().added_to(before);
+      kinds.push_back(kinds.front());
+    }
+  }
   std::vector<std::string> group_kinds;
   for (const std::string& kind : kinds) {
     const auto found = std::find(group_kinds.begin(), group_kinds.end(), kind);
@@ -44,8 +50,8 @@ ScenePainter::ScenePainter(const std::string& choice, const SceneView& scene,
     groups_[group].volumes.push_back(indices_.size());
     indices_.push_back({group, groups_[group].volumes.size() - 1});
   }
-  const SceneView whole = tool_ ? tool_->added_to(scene) : scene;
-  const std::vector<VolumeContent> all = with_tool(contents);
+  const SceneView whole = with_tools(scene);
+  const std::vector<VolumeContent> all = with_tools(contents);
   for (std::size_t g = 0; g < groups_.size(); ++g) {
     Group& group = groups_[g];
     SceneView part = whole;
@@ -55,15 +61,21 @@ ScenePainter::ScenePainter(const std::string& choice, const SceneView& scene,
   }
 }
 
-std::vector<VolumeContent> ScenePainter::with_tool(std::span<const VolumeContent> contents) const {
+std::vector<VolumeContent> ScenePainter::with_tools(std::span<const VolumeContent> contents) const {
   std::vector<VolumeContent> all(contents.begin(), contents.end());
-  if (tool_) all.push_back(tool_->content());
+  for (const ToolVolume& tool : tools_) all.push_back(tool.content());
   return all;
 }
 
+SceneView ScenePainter::with_tools(const SceneView& scene) const {
+  SceneView whole = scene;
+  for (const ToolVolume& tool : tools_) whole = tool.added_to(whole);
+  return whole;
+}
+
 void ScenePainter::set_opacities(const SceneView& scene, std::span<const VolumeContent> contents) {
-  const std::vector<VolumeContent> all = with_tool(contents);
-  const auto materials = tool_ ? tool_->added_to(scene).materials : scene.materials;
+  const std::vector<VolumeContent> all = with_tools(contents);
+  const auto materials = with_tools(scene).materials;
   for (const Group& group : groups_) {
     group.renderer->set_opacities(materials,
                                   picked(std::span<const VolumeContent>(all), group.volumes));
@@ -71,7 +83,7 @@ void ScenePainter::set_opacities(const SceneView& scene, std::span<const VolumeC
 }
 
 void ScenePainter::set_cut_open(bool open, std::span<const VolumeContent> contents) {
-  const std::vector<VolumeContent> all = with_tool(contents);
+  const std::vector<VolumeContent> all = with_tools(contents);
   for (const Group& group : groups_) {
     group.renderer->set_cut_open(open, picked(std::span<const VolumeContent>(all), group.volumes));
   }
@@ -85,14 +97,17 @@ void ScenePainter::update(std::size_t volume, const VolumeSnapshot& snapshot) {
   renderer_of(volume).update(indices_[volume].index, snapshot.density, snapshot.changed);
 }
 
-void ScenePainter::hold(const Hand& hand) {
-  if (!tool_) return;
-  Renderer& renderer = renderer_of(volumes_.size());
-  const std::size_t index = indices_.back().index;
-  if (const ChangedBricks changed = tool_->take(hand.tool); !changed.empty()) {
-    renderer.update(index, tool_->content().density, changed);
+void ScenePainter::hold(const Hands& hands) {
+  for (std::size_t arm = 0; arm < tools_.size(); ++arm) {
+    if (!hands[arm]) continue;
+    ToolVolume& tool = tools_[arm];
+    Renderer& renderer = renderer_of(volumes_.size() + arm);
+    const std::size_t index = indices_[volumes_.size() + arm].index;
+    if (const ChangedBricks changed = tool.take(hands[arm]->tool); !changed.empty()) {
+      renderer.update(index, tool.content().density, changed);
+    }
+    renderer.set_transform(index, tool.world_from_voxel(*hands[arm]));
   }
-  renderer.set_transform(index, tool_->world_from_voxel(hand));
 }
 
 void ScenePainter::draw_volumes(Layer layer, const View& view, const RenderTarget& target) {
@@ -104,7 +119,7 @@ void ScenePainter::draw_volumes(Layer layer, const View& view, const RenderTarge
 }
 
 void ScenePainter::draw_tool(const Hand& hand, const View& view, const RenderTarget& target) {
-  if (!tool_) hand_.draw_tool(hand, view, target);
+  if (tools_.empty()) hand_.draw_tool(hand, view, target);
 }
 
 bool ScenePainter::any(Layer layer) const {
@@ -118,13 +133,13 @@ bool ScenePainter::any(bool (Renderer::*property)() const noexcept) const {
 }
 
 bool ScenePainter::hand_is_opaque_volume() const {
-  return tool_ && layer_of(renderer_of(volumes_.size())) == Layer::opaque;
+  return !tools_.empty() && layer_of(renderer_of(volumes_.size())) == Layer::opaque;
 }
 
 std::vector<PixelRect> ScenePainter::bounds(const Hand& hand, const View& view,
                                             PictureSize size) const {
   std::vector<PixelRect> bounds = hand_.bounds(hand, view, size);
-  const auto corners = tool_ ? tool_->corners(hand) : std::nullopt;
+  const auto corners = tools_.empty() ? std::nullopt : tools_.front().corners(hand);  // of any arm
   if (corners) bounds.push_back(screen_bounds(*corners, view, size));
   return bounds;
 }
@@ -144,8 +159,10 @@ void ScenePainter::forget_changes() {
 
 namespace {
 
-bool has_moved(const std::optional<Hand>& from, const std::optional<Hand>& to) {
-  return from && to ? !from->rests_at(*to) : from.has_value() != to.has_value();
+bool have_moved(const Hands& from, const Hands& to) {
+  return !std::equal(from.begin(), from.end(), to.begin(), [](const auto& a, const auto& b) {
+    return a && b ? a->rests_at(*b) : a.has_value() == b.has_value();
+  });
 }
 
 RedrawTiles tiles_in(std::span<const PixelRect> parts, PictureSize size) {
@@ -163,7 +180,7 @@ int coarse_edge(double pixels, double most_pixels) {
 
 }  // namespace
 
-PictureLayers::Redraw PictureLayers::redraw(const View& view, const std::optional<Hand>& hand,
+PictureLayers::Redraw PictureLayers::redraw(const View& view, const Hands& hands,
                                             const ScenePainter& painter, double most_pixels) const {
   constexpr double kLeastProgress = 0.25;  // of the budget
   const PictureSize size = composite_.size();
@@ -172,23 +189,24 @@ PictureLayers::Redraw PictureLayers::redraw(const View& view, const std::optiona
   most_pixels = std::max(most_pixels, static_cast<double>(all.area()) / (kCoarsest * kCoarsest));
   const bool view_changed = shown_ && shown_->view != view;
   const bool anew = !shown_ || view_changed;
-  const FrameState now{view, view_changed || (shown_ && has_moved(shown_->hand, hand)), hand};
+  const FrameState now{view, view_changed || (shown_ && have_moved(shown_->hands, hands)), hands};
   RedrawTiles opaque(size), composite(size), late = later_;
   if (anew) {
     for (RedrawTiles* const tiles : {&opaque, &composite, &late}) tiles->mark(all);
   } else {
-    RedrawTiles of_hand(size);
-    if (hand != shown_->hand) {
-      for (const auto& one : {hand, shown_->hand}) {
+    RedrawTiles of_hands(size);
+    for (std::size_t arm = 0; arm < hands.size(); ++arm) {
+      if (hands[arm] == shown_->hands[arm]) continue;
+      for (const auto& one : {hands[arm], shown_->hands[arm]}) {
         if (!one) continue;
-        for (const PixelRect& part : painter.bounds(*one, view, size)) of_hand.mark(part);
+        for (const PixelRect& part : painter.bounds(*one, view, size)) of_hands.mark(part);
       }
     }
     painter.mark_redraw(Layer::opaque, opaque, view, opaque_);
-    if (painter.hand_is_opaque_volume()) opaque.mark(of_hand);
+    if (painter.hand_is_opaque_volume()) opaque.mark(of_hands);
     composite = opaque;
     painter.mark_redraw(Layer::translucent, composite, view, opaque_);
-    composite.mark(of_hand);
+    composite.mark(of_hands);
   }
   opaque.mark(composite.common(late));
   const bool translucent = painter.any(Layer::translucent);
@@ -238,7 +256,7 @@ std::vector<PixelRect> PictureLayers::draw(const Redraw& redraw, ScenePainter& p
   } else if (painter.any(&Renderer::coarse_while_moving)) {
     moved_.mark(drawn);
   }
-  if (now.hand) painter.hold(*now.hand);
+  painter.hold(now.hands);
   draw_coarse(redraw, painter, passes);
   draw_opaque(now, redraw.opaque, painter, passes);
   draw_composite(now, redraw.composite, painter);
@@ -287,18 +305,21 @@ void PictureLayers::draw_composite(const FrameState& now, std::span<const PixelR
   if (parts.empty()) return;
   composite_.restrict_to(parts);
   for (const PixelRect& part : parts) composite_.copy(opaque_, part);
-  const auto& [view, moving, hand] = now;
-  std::vector<PixelRect> of_hand;  // a mesh costs its vertices for each part
-  if (hand) {
-    of_hand = clipped(parts, united(painter.bounds(*hand, view, composite_.size())));
-    composite_.restrict_to(of_hand);
-    painter.draw_tool(*hand, view, composite_);
+  const auto& [view, moving, hands] = now;
+  std::array<std::vector<PixelRect>, kMaxArms> of_hand;  // a mesh costs its vertices for each part
+  for (std::size_t arm = 0; arm < hands.size(); ++arm) {
+    if (!hands[arm]) continue;
+    of_hand[arm] = clipped(parts, united(painter.bounds(*hands[arm], view, composite_.size())));
+    composite_.restrict_to(of_hand[arm]);
+    painter.draw_tool(*hands[arm], view, composite_);
   }
   composite_.restrict_to(parts);
   painter.draw_volumes(Layer::translucent, view, composite_);
-  if (!hand) return;
-  composite_.restrict_to(of_hand);
-  painter.draw_force(*hand, view, composite_);
+  for (std::size_t arm = 0; arm < hands.size(); ++arm) {
+    if (!hands[arm]) continue;
+    composite_.restrict_to(of_hand[arm]);
+    painter.draw_force(*hands[arm], view, composite_);
+  }
 }
 
 void ScreenPasses::draw_backdrop(const RenderTarget& target) {

@@ -16,12 +16,12 @@
 
 namespace kerf {
 
-/// Volumes and hand, drawn by the renderers that were chosen for the volumes.
+/// Volumes and hands, drawn by the renderers that were chosen for the volumes.
 ///
 /// Volumes with the same choice share a renderer, which mixes them if they intersect; across
 /// renderers the depth that all of them write and test decides which is in front. Opaque volumes
 /// come first, so that a tool which moves leaves them as they are; translucent ones come after the
-/// tool, which shines through them. A tool of voxels is one more volume, drawn as the first one is.
+/// tools, which shine through them. A tool of voxels is one more volume, drawn as the first one is.
 class ScenePainter {
  public:
   /// Opaque volumes lie under everything that moves, translucent ones over it.
@@ -38,14 +38,14 @@ class ScenePainter {
   void set_moving(bool moving);
   /// Follows the changes of the last poll in a volume.
   void update(std::size_t volume, const VolumeSnapshot& snapshot);
-  /// Puts a tool of voxels into the hand: before anything is drawn with it.
-  void hold(const Hand& hand);
+  /// Puts tools of voxels into the hands: before anything is drawn with them.
+  void hold(const Hands& hands);
 
-  /// Volumes, and among them a tool of voxels.
+  /// Volumes, and among them tools of voxels.
   void draw_volumes(Layer layer, const View& view, const RenderTarget& target);
   /// The tool as a mesh: after the opaque volumes, before the others.
   void draw_tool(const Hand& hand, const View& view, const RenderTarget& target);
-  /// The last of all.
+  /// The last of all; after it the next hand's.
   void draw_force(const Hand& hand, const View& view, const RenderTarget& target) {
     hand_.draw_force(hand, view, target);
   }
@@ -53,13 +53,13 @@ class ScenePainter {
   [[nodiscard]] bool any(Layer layer) const;
   /// Whether a renderer has a property, such as `&Renderer::coarse_while_moving`.
   [[nodiscard]] bool any(bool (Renderer::*property)() const noexcept) const;
-  /// True if the picture of the opaque volumes changes when the hand moves.
+  /// True if the picture of the opaque volumes changes when a hand moves.
   [[nodiscard]] bool hand_is_opaque_volume() const;
-  /// Rectangles of pixels that the hand may touch.
+  /// Rectangles of pixels that a hand may touch.
   [[nodiscard]] std::vector<PixelRect> bounds(const Hand& hand, const View& view,
                                               PictureSize size) const;
 
-  /// Marks the changes since `forget_changes` in the volumes of a layer, but for a tool of voxels.
+  /// Marks the changes since `forget_changes` in the volumes of a layer, but for tools of voxels.
   /// `kept` is the last picture of the opaque volumes.
   void mark_redraw(Layer layer, RedrawTiles& tiles, const View& view,
                    const RenderTarget& kept) const;
@@ -78,13 +78,15 @@ class ScenePainter {
   [[nodiscard]] Renderer& renderer_of(std::size_t volume) const {
     return *groups_[indices_[volume].group].renderer;
   }
-  /// Adds the tool of voxels if there is one.
-  [[nodiscard]] std::vector<VolumeContent> with_tool(std::span<const VolumeContent> contents) const;
+  /// Add the tools of voxels if there are some.
+  [[nodiscard]] std::vector<VolumeContent> with_tools(
+      std::span<const VolumeContent> contents) const;
+  [[nodiscard]] SceneView with_tools(const SceneView& scene) const;
 
   std::vector<VolumeView> volumes_;  ///< of the session
-  std::optional<ToolVolume> tool_;
+  std::vector<ToolVolume> tools_;    ///< of each arm; empty: they are meshes
   std::vector<Group> groups_;
-  std::vector<RendererIndex> indices_;  ///< by volume, the tool's last
+  std::vector<RendererIndex> indices_;  ///< by volume, the tools' last
   HandPainter hand_;
 };
 
@@ -104,7 +106,7 @@ class ScreenPasses {
 };
 
 /// The picture of one eye, kept from frame to frame in three layers: backdrop and opaque volumes;
-/// the composite with hand and translucent volumes; the composite with smoothed edges. So a hand
+/// the composite with hands and translucent volumes; the composite with smoothed edges. So a hand
 /// that moves over opaque volumes costs no volume.
 ///
 /// What changes is drawn at once if its volumes cover no more pixels than a budget. Else it is
@@ -116,8 +118,8 @@ class PictureLayers {
   /// What a picture shows beside the volumes.
   struct FrameState {
     View view;
-    bool moving = false;  ///< camera or hand have moved since the last picture
-    std::optional<Hand> hand;
+    bool moving = false;  ///< camera or a hand have moved since the last picture
+    Hands hands{};
   };
   /// The parts of two layers that must be drawn again, and with which state.
   struct Redraw {
@@ -134,9 +136,9 @@ class PictureLayers {
   explicit PictureLayers(PictureSize size)
       : opaque_(size), composite_(size), smooth_(size), moved_(size), later_(size) {}
 
-  /// What must be drawn again to show `view`, `hand` and the volumes, within about `most_pixels`.
-  [[nodiscard]] Redraw redraw(const View& view, const std::optional<Hand>& hand,
-                              const ScenePainter& painter, double most_pixels) const;
+  /// What must be drawn again to show `view`, `hands` and the volumes, within about `most_pixels`.
+  [[nodiscard]] Redraw redraw(const View& view, const Hands& hands, const ScenePainter& painter,
+                              double most_pixels) const;
   /// Draws it. Returns the parts of `seen` that changed.
   std::vector<PixelRect> draw(const Redraw& redraw, ScenePainter& painter, ScreenPasses& passes);
   /// Whether a part of `seen` is coarser than it will be, though nothing moves.

@@ -283,6 +283,13 @@ std::optional<Hand> hand_of(const TickRecord& record) {
               {f[0], f[1], f[2]}};
 }
 
+Hands hands_of(const Session& session) {
+  Hands hands;
+  if (session.latest()) hands[0] = hand_of(*session.latest());
+  if (session.second()) hands[1] = hand_of(*session.second());
+  return hands;
+}
+
 HandPainter::HandPainter(const SceneView& scene, double scale_mm) : scale_mm_(scale_mm) {
   for (const ToolView& tool : scene.tools) {
     const Mesh mesh = tool_mesh(tool);

@@ -15,6 +15,7 @@
 #include "visualizer/scene/camera.hpp"
 #include "visualizer/scene/pixel_rect.hpp"
 #include "visualizer/scene/scene_view.hpp"
+#include "visualizer/scene/session.hpp"
 
 namespace kerf {
 
@@ -110,6 +111,10 @@ struct Hand {
 /// The tip is the proxy's, if there is one: a tool that is held by the tooth's surface is drawn
 /// there, however deep the hand pushes. Nothing before docking, when its place is unknown.
 [[nodiscard]] std::optional<Hand> hand_of(const TickRecord& record);
+
+/// The hand of each arm, by its index; none: there is no such arm, or its place is unknown.
+using Hands = std::array<std::optional<Hand>, kMaxArms>;
+[[nodiscard]] Hands hands_of(const Session& session);
 
 /// Draws the tool and the arrow of its force.
 class HandPainter {

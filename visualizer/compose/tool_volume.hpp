@@ -26,14 +26,16 @@ struct GridPoints {
 [[nodiscard]] std::vector<float> facet_distances(const Facets& facets, const GridPoints& points,
                                                  double reach_mm);
 
-/// The tool in the hand as a volume of voxels: a volume of the scene like any other, which moves.
+/// The tool in the hand of an arm as a volume of voxels: a volume of the scene like any other,
+/// which moves.
 ///
 /// The density falls over two voxels across the tool's surface and is one half on it. One grid has
 /// room for every tool of the scene: another tool means other voxels. A voxel is as large as one of
 /// the main volume, or larger if a tool would be longer than 512 voxels.
 class ToolVolume {
  public:
-  /// Throws VisualizerError if the scene has no tool with an extent, or no room for a material.
+  /// Of the second arm, the scene to which that of the first is added: each has a material. Throws
+  /// VisualizerError if the scene has no tool with an extent, or no room for a material.
   explicit ToolVolume(const SceneView& scene);
 
   /// The scene with this volume as its last and with its material; the others keep their colours

@@ -230,6 +230,14 @@ void material_rows(const OverlayFigures& figures) {
   panel_row((std::to_string(score.size() - shown) + " others").c_str(), "%.2f mm3", others_mm3);
 }
 
+/// The second arm: force, tool and state, below each other.
+void second_arm_rows(const SecondArmFigures& second) {
+  panel_row("second arm", "%.2f N", second.force_n);
+  if (!second.tool.empty()) panel_row("", "%s", shortened(second.tool, kMostName).c_str());
+  panel_row("", "%s", shortened(second.state, kMostLabel).c_str(),
+            second.alarm ? kAlert : kValueColour);
+}
+
 }  // namespace
 
 const ImVec4& force_colour(double fraction) {
@@ -253,6 +261,7 @@ ImVec2 draw_figures(const OverlayFigures& figures) {
     if (!figures.tool.empty() && !listed) {
       panel_row("tool", "%s", shortened(figures.tool, kMostName).c_str());
     }
+    if (figures.second) second_arm_rows(*figures.second);
     panel_row(figures.removed_is_partial ? "since joining" : "removed", "%.2f mm3",
               figures.removed_mm3);
     if (figures.spindle) {
@@ -265,7 +274,8 @@ ImVec2 draw_figures(const OverlayFigures& figures) {
       panel_row(shortened("touched " + figures.forbidden, kMostLabel).c_str(), "%.0f ms",
                 figures.forbidden_ms, touched ? kAlert : kValueColour);
     }
-    const bool rates = !figures.slices && !plots && figures.score.size() <= kFewMaterials;
+    const bool has_room = figures.score.size() <= kFewMaterials && !figures.second;
+    const bool rates = !figures.slices && !plots && has_room;
     if (rates && figures.tick_rate_hz) panel_row("servo", "%.0f Hz", *figures.tick_rate_hz);
     if (rates && figures.frame_rate_hz) panel_row("picture", "%.0f /s", *figures.frame_rate_hz);
     if (rates && figures.data_age_ms) panel_row("data age", "%.1f ms", *figures.data_age_ms);

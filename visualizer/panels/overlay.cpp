@@ -34,6 +34,7 @@ void ForcePlot::add(const TickRecord& record) {
 OverlayFigures OverlayFigures::rounded() const {
   OverlayFigures shown = *this;
   shown.force_n = rounded_to(0.01, force_n);
+  if (second) shown.second->force_n = rounded_to(0.01, second->force_n);
   shown.removed_mm3 = rounded_to(0.01, removed_mm3);
   if (tick_rate_hz) shown.tick_rate_hz = rounded_to(1.0, *tick_rate_hz);
   if (frame_rate_hz) shown.frame_rate_hz = rounded_to(1.0, *frame_rate_hz);

@@ -71,11 +71,21 @@ struct SpindleFigures {
   friend bool operator==(const SpindleFigures&, const SpindleFigures&) noexcept = default;
 };
 
+/// The second arm, in short.
+struct SecondArmFigures {
+  double force_n = 0.0;
+  std::string tool;
+  std::string state;   ///< its phase, or its fault
+  bool alarm = false;  ///< it has a fault
+  friend bool operator==(const SecondArmFigures&, const SecondArmFigures&) noexcept = default;
+};
+
 /// The figures of the panel in the corner.
 struct OverlayFigures {
   double force_n = 0.0;
   double full_force_n = 3.3;  ///< end of the bar
   std::string tool;
+  std::optional<SecondArmFigures> second;  ///< none: there is one arm
   double removed_mm3 = 0.0;
   bool removed_is_partial = false;        ///< joined late: counted from then on
   std::vector<ScoreRow> score;            ///< of the scene's materials

@@ -6,10 +6,13 @@
 #include <array>
 #include <chrono>
 #include <cmath>
+#include <optional>
+#include <span>
 #include <string>
 
 #include <glm/gtc/matrix_access.hpp>
 
+#include "shared/segment/log_columns.hpp"
 #include "visualizer/gl/context.hpp"
 #include "visualizer/scene/appearance.hpp"
 #include "visualizer/sound/spindle_sound.hpp"
@@ -65,6 +68,53 @@ std::string state_words(const TickRecord& record) {
     default:
       return {};
   }
+}
+
+/// What a record has to say to who holds its arm.
+struct Advice {
+  std::string text;  ///< empty: nothing
+  bool alarm = false;
+};
+
+Advice advice_of(const TickRecord& record) {
+  if ((record.flags & kFlagRefused) != 0) {
+    return {"no free place for this tool here, so it feels nothing: lead it into air", true};
+  }
+  if (const std::string words = state_words(record); !words.empty()) {
+    return {words, record.fault != 0};
+  }
+  if ((record.flags & kFlagForbidden) != 0) return {"pressed on what may not be cut", true};
+  if ((record.flags & kFlagShaft) != 0) return {"the shaft touches: it cuts nothing", false};
+  return {};
+}
+
+/// Of both arms what is urgent, and of two equals the first arm's.
+Advice advice_of(const std::optional<TickRecord>& first, const std::optional<TickRecord>& second) {
+  const Advice of_first = first ? advice_of(*first) : Advice{};
+  const Advice of_second = second ? advice_of(*second) : Advice{};
+  const bool takes_second = of_second.alarm ? !of_first.alarm : of_first.text.empty();
+  if (of_second.text.empty() || !takes_second) return of_first;
+  return {"second arm: " + of_second.text, of_second.alarm};
+}
+
+/// The name of a code of docs/log.md.
+std::string name_of(std::span<const LogCode> codes, std::uint32_t value) {
+  const auto found =
+      std::ranges::find_if(codes, [&](const LogCode& code) { return code.value == value; });
+  return found == codes.end() ? std::to_string(value) : std::string(found->name);
+}
+
+std::string tool_name(const TickRecord& record, const SceneView& scene) {
+  return record.active_tool < scene.tools.size() ? scene.tools[record.active_tool].name : "";
+}
+
+SecondArmFigures second_arm_figures(const TickRecord& record, const SceneView& scene) {
+  const bool has_fault = record.fault != 0;
+  return {.force_n = glm::length(vec3(record.commanded_force_n)),
+          .tool = tool_name(record, scene),
+          .state =
+              has_fault ? name_of(log_faults(), record.fault) : name_of(log_phases(), record.phase),
+          .alarm = has_fault};
 }
 
 }  // namespace
@@ -232,8 +282,7 @@ Redrawn Picture::draw(const Session& session, const OverlayFigures& figures,
                       const RenderTarget& target) {
   const PictureSize size = eye_size(target.size());
   const std::vector<View> views = this->views(target.size());
-  std::optional<Hand> hand;
-  if (session.latest()) hand = hand_of(*session.latest());
+  const Hands hands = hands_of(session);
   if (eyes_.size() != views.size() || eyes_.front().seen().size() != size) {
     eyes_.clear();
     for (std::size_t eye = 0; eye < views.size(); ++eye) eyes_.emplace_back(size);
@@ -242,7 +291,7 @@ Redrawn Picture::draw(const Session& session, const OverlayFigures& figures,
   std::vector<PictureLayers::Redraw> redraws;
   const double most_each = most_pixels_ / static_cast<double>(views.size());
   for (std::size_t eye = 0; eye < views.size(); ++eye) {
-    redraws.push_back(eyes_[eye].redraw(views[eye], hand, *painter_, most_each));
+    redraws.push_back(eyes_[eye].redraw(views[eye], hands, *painter_, most_each));
   }
   painter_->forget_changes();
   const OverlayFigures panel = figures.rounded();
@@ -324,13 +373,14 @@ OverlayFigures overlay_figures(const Session& session) {
   OverlayFigures figures;
   if (const auto& record = session.latest()) {
     figures.force_n = glm::length(vec3(record->commanded_force_n));
-    if (record->active_tool < session.scene().tools.size()) {
-      figures.tool = session.scene().tools[record->active_tool].name;
-    }
+    figures.tool = tool_name(*record, session.scene());
     if (session.scene().has_spindle) {
       const ToolSound turning = tool_sound(*record);
       figures.spindle = {turning.turns_per_s * 60.0 / 1000.0, turning.load};
     }
+  }
+  if (session.second()) {
+    figures.second = second_arm_figures(*session.second(), session.scene());
   }
   figures.removed_mm3 = session.removed_mm3();
   figures.removed_is_partial = session.joined_late();
@@ -353,17 +403,10 @@ OverlayFigures overlay_figures(const Session& session) {
   } else if (figures.data_age_ms && *figures.data_age_ms > kStaleMs) {
     figures.banner = "stale: no news from the servo";
     figures.alarm = true;
-  } else if (const auto& record = session.latest(); record && (record->flags & kFlagRefused) != 0) {
-    figures.banner = "no free place for this tool here, so it feels nothing: lead it into air";
-    figures.alarm = true;
-  } else if (record && !state_words(*record).empty()) {
-    figures.banner = state_words(*record);
-    figures.alarm = record->fault != 0;
-  } else if (record && (record->flags & kFlagForbidden) != 0) {
-    figures.banner = "pressed on what may not be cut";
-    figures.alarm = true;
-  } else if (record && (record->flags & kFlagShaft) != 0) {
-    figures.banner = "the shaft touches: it cuts nothing";
+  } else {
+    const Advice advice = advice_of(session.latest(), session.second());
+    figures.banner = advice.text;
+    figures.alarm = advice.alarm;
   }
   return figures;
 }

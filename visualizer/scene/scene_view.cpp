@@ -152,6 +152,7 @@ const VolumeView& SceneView::main_volume() const {
 
 SceneView scene_view(const SegmentInfo& segment) {
   SceneView scene;
+  scene.arms = segment.arms;
   for (const SegmentVolumeInfo& info : segment.volumes) scene.volumes.push_back(volume_view(info));
   try {
     const Json text = Json::parse(segment.scene_json);

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -86,9 +87,10 @@ struct SceneView {
   std::vector<VolumeView> volumes;
   std::vector<ToolView> tools;
   std::vector<MaterialView> materials;
-  DeviceFrame device{};
+  DeviceFrame device{};                        ///< of the first arm
+  std::size_t arms = 1;                        ///< each with a tool of its own in the hand
   GradientFilter gradient = kDefaultGradient;  ///< by which its volumes are shaded
-  bool voxel_tool = false;                     ///< the tool is one volume more
+  bool voxel_tool = false;                     ///< the tool of each arm is one volume more
   bool has_spindle = false;                    ///< force cuts, and something turns the tool
 
   /// Of the boxes of all volumes.

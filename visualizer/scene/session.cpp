@@ -147,11 +147,18 @@ void Session::read_states() {
   TickRecord record;
   for (; next_state_ < head; ++next_state_) {
     if (reader.state_at(next_state_, record) != ReadState::ok) continue;
-    if (!armed_ && (record.flags & kFlagStarted) != 0) armed_ = record.tick;
-    if ((record.flags & kFlagReset) != 0) forbidden_ticks_ = 0;
-    if ((record.flags & kFlagForbidden) != 0) ++forbidden_ticks_;
+    std::uint32_t flags = record.flags;  // of all arms
+    if (const auto second = reader.second_of(record)) flags |= second->flags;
+    if (!armed_ && (flags & kFlagStarted) != 0) armed_ = record.tick;
+    if ((flags & kFlagReset) != 0) forbidden_ticks_ = 0;
+    if ((flags & kFlagForbidden) != 0) ++forbidden_ticks_;
   }
-  if (auto newest = reader.latest()) latest_ = newest;
+  const auto newest = reader.latest();
+  if (!newest) return;
+  const auto second = reader.second_of(*newest);
+  if (!second && reader.info().arms > 1) return;  // overwritten meanwhile: both stay of one tick
+  latest_ = newest;
+  second_ = second;
 }
 
 void Session::read_removals() {

@@ -68,7 +68,9 @@ class Session {
 
   /// The newest record; none before the first tick.
   [[nodiscard]] const std::optional<TickRecord>& latest() const noexcept { return latest_; }
-  /// Ticks since the device was armed; none before.
+  /// The second arm's record of the same tick; none with one arm.
+  [[nodiscard]] const std::optional<TickRecord>& second() const noexcept { return second_; }
+  /// Ticks since the device was armed, with two arms the first of both; none before.
   [[nodiscard]] std::optional<std::uint64_t> ticks_since_armed() const noexcept;
   [[nodiscard]] std::optional<double> tick_rate_hz() const;
   /// Since the session began or the volumes were reset.
@@ -77,7 +79,7 @@ class Session {
   [[nodiscard]] std::vector<double> removed_by_material_mm3() const {
     return removed_volume_.removed_mm3();
   }
-  /// How long what may not be cut was pressed upon, since then too.
+  /// How long what may not be cut was pressed upon, by any arm, since then too.
   [[nodiscard]] double forbidden_ms() const noexcept;
   /// Something had been cut before it joined, which `removed_by_material_mm3` lacks.
   [[nodiscard]] bool cut_before() const noexcept { return cut_before_; }
@@ -128,7 +130,7 @@ class Session {
   bool cut_before_;  ///< as reported before the first read of the volumes
   std::vector<VolumeSnapshot> snapshots_;
   RemovedVolume removed_volume_;
-  std::optional<TickRecord> latest_;
+  std::optional<TickRecord> latest_, second_;
   std::optional<Tick> armed_;
   std::uint64_t next_state_ = 0;  ///< index of the first record not read yet
   std::uint64_t next_removal_ = 0;

@@ -82,7 +82,7 @@ TEST_CASE("a contact sheet has a tile for every renderer, and each shows its own
   tooth.scene.tools = {{"ball", {{-1.0, 0.0}, {0.0, 1.0}, {1.0, 0.0}}, 1.0}};
   const VolumeContent content = tooth.content();
   const auto tiles = [&](const std::optional<Hand>& hand) {
-    write_contact_sheet(file, tooth.scene, {&content, 1}, hand);
+    write_contact_sheet(file, tooth.scene, {&content, 1}, {hand});
     const RgbPicture sheet = read_png(file).value();
     std::vector<std::vector<std::uint8_t>> all;
     constexpr int kColumns = 3;

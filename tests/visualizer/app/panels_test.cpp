@@ -118,6 +118,12 @@ TEST_CASE("panels cover at most a quarter of a window, and not its middle, whate
         const int side = slice_side(size, scale);
         if (slices) figures.slices = grey_slices(side);
         if (plot) figures.plot = some_plot();
+        if (slices == plot) {
+          figures.second = {.force_n = 2.34,
+                            .tool = "a round bur of some length",
+                            .state = "velocity_estimator",
+                            .alarm = true};
+        }
         std::vector<std::uint8_t> picture;
         const double fraction = covered(overlay, figures, size, &picture);
         // The slices with the edges of their panel are at the right.
@@ -128,6 +134,19 @@ TEST_CASE("panels cover at most a quarter of a window, and not its middle, whate
       }
     }
   }
+}
+
+TEST_CASE("a second arm has lines of its own, and none without one") {
+  const auto context = make_headless_context();
+  Overlay overlay;
+  OverlayFigures figures;
+  const double alone = covered(overlay, figures, kPlain);
+  figures.second = {.force_n = 1.0, .tool = "pin", .state = "in_hand", .alarm = false};
+  std::vector<std::uint8_t> calm, faulty;
+  CHECK(covered(overlay, figures, kPlain, &calm) > alone);
+  figures.second->alarm = true;
+  static_cast<void>(covered(overlay, figures, kPlain, &faulty));
+  CHECK(faulty != calm);
 }
 
 TEST_CASE("slices are as large as a third of the window holds, and none are too small to read") {

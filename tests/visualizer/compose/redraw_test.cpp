@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Partial redraw: the same pixels as drawing everything, for every renderer.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
 #include <random>
@@ -34,7 +35,8 @@ constexpr const char* kScene = R"({
 /// A controller in this process with two volumes that stand across each other.
 class Controller {
  public:
-  Controller() : writer_(SegmentWriter::create(spec())), server_("redraw", writer_) {
+  explicit Controller(std::size_t arms)
+      : arms_(arms), writer_(SegmentWriter::create(spec())), server_("redraw", writer_) {
     writer_.set_lifecycle(Lifecycle::run);
     move({});
   }
@@ -55,8 +57,8 @@ class Controller {
     if (!inside.empty()) writer_.publish_box(v, density, inside, removed);
     end();
   }
-  void move(const Hand& hand) {
-    hand_ = hand;
+  void move(const Hand& hand, std::size_t arm = 0) {
+    hands_[arm] = hand;
     begin();
     end();
   }
@@ -69,6 +71,7 @@ class Controller {
   SegmentSpec spec() {
     SegmentSpec spec;
     spec.scene_json = kScene;
+    spec.arms = arms_;
     for (std::size_t v = 0; v < 2; ++v) {
       const VoxelGrid& grid = writer_grid(v);
       std::vector<Density>& density = density_[v];
@@ -90,23 +93,27 @@ class Controller {
   }
   void begin() { writer_.begin_tick(++now_); }
   void end() {
-    TickRecord record{};
-    record.tick = now_;
-    record.flags = kFlagStarted;
-    for (int i = 0; i < 3; ++i) {
-      record.position_mm[i] = hand_.tip_mm[i];
-      record.commanded_force_n[i] = static_cast<float>(hand_.force_n[i]);
+    for (std::size_t arm = arms_; arm-- > 0;) {
+      const Hand& hand = hands_[arm];
+      TickRecord record{};
+      record.tick = now_;
+      record.flags = kFlagStarted;
+      for (int i = 0; i < 3; ++i) {
+        record.position_mm[i] = hand.tip_mm[i];
+        record.commanded_force_n[i] = static_cast<float>(hand.force_n[i]);
+      }
+      for (int i = 0; i < 4; ++i) record.orientation[i] = static_cast<float>(hand.orientation[i]);
+      record.active_tool = hand.tool;
+      writer_.publish_state(record, arm);
     }
-    for (int i = 0; i < 4; ++i) record.orientation[i] = static_cast<float>(hand_.orientation[i]);
-    record.active_tool = hand_.tool;
-    writer_.publish_state(record);
     writer_.end_tick(0);
   }
 
+  std::size_t arms_;
   std::vector<Density> density_[2];
   SegmentWriter writer_;
   SegmentServer server_;
-  Hand hand_;
+  std::array<Hand, kMaxArms> hands_;
   Tick now_ = 0;
 };
 
@@ -121,7 +128,7 @@ struct Run {
   RuntimeFolder folder;
   Controller controller;
   Session session{"redraw"};
-  Run() { session.poll(); }
+  explicit Run(std::size_t arms = 1) : controller(arms) { session.poll(); }
 };
 
 /// Whether `target`, which was drawn in parts, has the pixels of the whole picture.
@@ -133,12 +140,12 @@ bool equals_whole(Picture& picture, const Run& run, const RenderTarget& target,
   return seen == target.read_rgb();
 }
 
-/// Changes volumes, hand and camera at random, and compares each part that was drawn again with
+/// Changes volumes, hands and camera at random, and compares each part that was drawn again with
 /// drawing everything.
-void check_parts(const ViewSettings& settings, PictureSize size, int edits) {
+void check_parts(const ViewSettings& settings, PictureSize size, int edits, std::size_t arms = 1) {
   std::mt19937 random(3);
   const auto below = [&](int n) { return static_cast<int>(random() % static_cast<unsigned>(n)); };
-  Run run;
+  Run run(arms);
   Picture picture(run.session, settings, 4.0 / 3.0);
   const RenderTarget target(size);
   const OverlayFigures figures;
@@ -159,7 +166,7 @@ void check_parts(const ViewSettings& settings, PictureSize size, int edits) {
       hand.tip_mm = {below(20) - 10.0, below(16) - 6.0, below(12) - 4.0};
       hand.tool = static_cast<std::uint32_t>(below(2));
       if (below(2) == 0) hand.force_n = {0.1 * below(20), 0.3, -0.2};
-      run.controller.move(hand);
+      run.controller.move(hand, arms == 1 ? 0 : static_cast<std::size_t>(below(2)));
     }
     if (edit % 10 == 9) picture.camera().orbit(0.05, 0.01);
     run.session.poll();
@@ -182,7 +189,7 @@ void check_parts(const ViewSettings& settings, PictureSize size, int edits) {
   // One sees into the volume and the tool in it; of the other, what is hidden stays.
   const std::vector<std::string> kinds = renderer_of_each(settings.renderer, 2);
   const bool opaque = std::none_of(kinds.begin(), kinds.end(), is_translucent);
-  const bool wide = settings.stereo.on || settings.voxel_tool;
+  const bool wide = settings.stereo.on || settings.voxel_tool || arms > 1;
   CHECK(redrawn / parts < (wide ? 0.6 : opaque ? 0.08 : 0.2));
 }
 
@@ -365,6 +372,50 @@ TEST_CASE("so it does with a tool of voxels") {
   for (const std::string_view kind : renderer_kinds()) {
     CAPTURE(std::string(kind));
     check_parts({.renderer = std::string(kind), .voxel_tool = true}, {96, 72}, kEdits / 10);
+  }
+}
+
+TEST_CASE("so it does with two arms, their tools as meshes and as voxels") {
+  if (!have_gl()) return;
+  for (const std::string_view kind : renderer_kinds()) {
+    CAPTURE(std::string(kind));
+    for (const bool voxel_tool : {false, true}) {
+      check_parts({.renderer = std::string(kind), .voxel_tool = voxel_tool}, {96, 72}, kEdits / 5,
+                  2);
+    }
+  }
+}
+
+TEST_CASE("each of two arms is seen: a picture of both differs from that of either") {
+  if (!have_gl()) return;
+  for (const bool voxel_tool : {false, true}) {
+    CAPTURE(voxel_tool);
+    const RenderTarget target({160, 120});
+    const Hand left{.tip_mm = {-6.0, 9.0, 6.0}, .force_n = {0.0, 2.0, 0.0}};
+    const Hand right{.tip_mm = {6.0, 9.0, 6.0}, .tool = 1, .force_n = {0.0, 2.0, 0.0}};
+    const Hand away{.tip_mm = {500.0, 0.0, 0.0}};  // beside the picture
+    const auto drawn = [&](const Hand& first, const Hand& second, std::size_t arms) {
+      Run run(arms);
+      run.controller.move(first);
+      if (arms > 1) run.controller.move(second, 1);
+      run.session.poll();
+      Picture picture(run.session, {.renderer = "iso", .voxel_tool = voxel_tool}, 4.0 / 3.0);
+      static_cast<void>(picture.draw(run.session, {}, target));
+      return target.read_rgb();
+    };
+    const auto both = drawn(left, right, 2), swapped = drawn(right, left, 2);
+    const auto one = drawn(left, away, 2), other = drawn(away, right, 2);
+    const auto neither = drawn(away, away, 2);
+    CHECK(one == drawn(left, away, 1));
+    CHECK(both == swapped);
+    CHECK(one != neither);
+    CHECK(other != neither);
+    // Apart on the screen: each pixel is that of the arm that is there.
+    std::size_t wrong = 0;
+    for (std::size_t i = 0; i < both.size(); ++i) {
+      wrong += both[i] != (one[i] != neither[i] ? one[i] : other[i]) ? 1 : 0;
+    }
+    CHECK(wrong == 0);
   }
 }
 

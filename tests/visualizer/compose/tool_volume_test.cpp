@@ -216,7 +216,7 @@ TEST_CASE("of a tool of voxels and two volumes the nearest is seen, in every ren
       target.bind();
       glClearColor(0.0F, 0.0F, 0.0F, 1.0F);
       glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
-      painter.hold(hand);
+      painter.hold({hand});
       for (const auto layer : {ScenePainter::Layer::opaque, ScenePainter::Layer::translucent}) {
         painter.draw_volumes(layer, view, target);
       }
