@@ -29,7 +29,7 @@ class Demo:
         self.root = os.path.dirname(kerf)
         self.scene = self.find_scene(options.scene or "phantom")
         self.out = self.processes = None
-        self.controller = self.emulator = self.arm = self.recorder = self.window = self.pictures = self.bridge = None
+        self.controller = self.emulator = self.second = self.arm = self.recorder = self.window = self.pictures = self.bridge = None
         self.code_of_signal = None
         self.finishing = False  # the results are being kept: a signal is too late
 
@@ -67,6 +67,7 @@ class Demo:
     def run(self):
         """Returns the exit code."""
         has_sources = os.path.exists(os.path.join(self.root, "standin", "CMakeLists.txt"))
+        demo_options.choose_devices(self.options, self.scene)
         demo_options.choose_port(self.options, os.path.join(os.path.dirname(self.programs), "stand-in") if has_sources else "")
         demo_options.check(self.options)
         if self.options.out:
@@ -167,12 +168,17 @@ class Demo:
             firmware = pathlib.Path(processes.path("firmware"))
             firmware.write_bytes(pathlib.Path(self.kerf).read_bytes()[:1000])
             self.ask = ["--port", f"usb:{self.meet},firmware={firmware}"]
+        if options.second:
+            self.ask += ["--port", "socket:" + processes.path("device-2")]
         # The emulated motors are known; a scene has no torque scale, because a real device's is unknown.
-        described = subprocess.run([os.path.join(self.programs, "kerf-emulator"), "--personality", options.device, "--describe"],
+        self.ask += ["--torque-scale", ",".join(self.torque_scale(device) for device in (options.device, options.second) if device)]
+
+    def torque_scale(self, device):
+        described = subprocess.run([os.path.join(self.programs, "kerf-emulator"), "--personality", device, "--describe"],
                                    stdout=subprocess.PIPE, text=True, check=False)
         if described.returncode:
             sys.exit(1 if crashed("emulator", exit_code(described)) else 2)
-        self.ask += ["--torque-scale", described.stdout.strip().removeprefix("torque_scale=")]
+        return described.stdout.strip().removeprefix("torque_scale=")
 
     def start_bridge(self):
         """Before its controller. Each browser gets an address of its own, so `tail` prints those to come, too."""
@@ -201,8 +207,9 @@ class Demo:
         if options.virtual:
             os.mkfifo(processes.path("log-lead"))
             until += ["--until", processes.path("log-lead")]
+        device = [] if options.second not in ("", options.device) else ["--device", options.device]
         self.controller = processes.start("controller", [
-            "--scene", self.scene, *options.volume, "--device", options.device, *self.ask, "--seconds", options.seconds,
+            "--scene", self.scene, *options.volume, *device, *self.ask, "--seconds", options.seconds,
             *(["--rate", options.rate] if options.rate else []), "--name", self.name,
             *(["--virtual"] if options.virtual else []), *(["--pedal"] if options.mouse else []), *until, *(["--progress"] if sys.stdout.isatty() else []),
             "--emulator-args", self.told, "--report", os.path.join(self.results, "report.json"),
@@ -242,6 +249,11 @@ class Demo:
             self.emulator = None
         elif options.port == "arm":
             self.start_arm()
+        if options.second and self.emulator is not None:
+            self.second = processes.start("emulator", [
+                "--personality", options.second, "--front", "socket", "--socket", processes.path("device-2"),
+                *self.script_of("second_hand_script", told), "--unit-mm", told.get("second_hand_unit_mm", ""), *pace,
+                "--report", os.path.join(self.results, "emulator-2.json")], out="emulator-2.log", log="emulator-2.log")
 
     def start_arm(self):
         """The adapter to the vendor's library. kerf's stand-in for that finds the emulator by KERF_STAND_IN."""
@@ -262,7 +274,10 @@ class Demo:
             return ["--hand-socket", self.processes.path("hand"), *pedal]
         if self.options.hand:
             return ["--hand", self.options.hand]
-        script = told.get("hand_script", "")
+        return self.script_of("hand_script", told)
+
+    def script_of(self, name, told):
+        script = told.get(name, "")
         if script and not os.path.isfile(script):
             raise Refusal(f"--scene {self.scene}: its hand.script, {script}, is no file; copy the script there, or give --hand FILE")
         return ["--hand", script or os.path.join(self.root, "scenes", "hands", "cut_cavity.toml")]
@@ -349,7 +364,8 @@ class Demo:
         terminate(self.window)
         terminate(self.arm)  # before its emulator ends, which would be a lost device to it
         for name, process, seconds in (("window", self.window, 10), ("recorder", self.recorder, 10),
-                                       ("visualizer", self.pictures, 60), ("arm", self.arm, 5), ("emulator", self.emulator, 5)):
+                                       ("visualizer", self.pictures, 60), ("arm", self.arm, 5), ("emulator", self.emulator, 5),
+                                       ("emulator-2", self.second, 5)):
             if process is not None:
                 worst = processes.conclude(name, process, seconds)
                 failed = (1 if worst and name == "window" else worst) or failed

@@ -6,6 +6,7 @@ import os
 import re
 import shutil
 import socket
+import tomllib
 
 BUSES = {"omni": ("fw", "fw1"), "falcon": ("usb", "usb"), "woodenhaptics": ("hid", "hidraw0"),  # word of --port, its node
          "inverse3": ("ws", ""), "touch": ("arm", ""), "omega": ("arm", "")}  # no node: a service or a library of the vendor
@@ -32,7 +33,8 @@ class Options:
     rate: str = ""
     out: str = ""
     size: str = "640x480"
-    device: str = "omni"
+    device: str = ""  # by choose_devices
+    second: str = ""  # the other device of a scene with two; by choose_devices
     port: str = ""  # by choose_port
     library: str = ""  # for --port arm: in place of kerf's stand-in for the vendor's
     stand_in: bool = False  # that one is used
@@ -140,6 +142,29 @@ def growth(options, rate_hz):
     if options.out and seconds > 60:
         lines.append(f"--out {options.out}: its log grows by {60 * rate_hz * TICK_BYTES / 1e6:.0f} MB a minute")
     return lines
+
+
+def choose_devices(options, scene):
+    """Those of a scene with two devices; else the one of --device, or an Omni. A file that is no scene is left to the
+    controller, which says why."""
+    try:
+        with open(scene, "rb") as file:
+            held = tomllib.load(file).get("device")
+    except (OSError, tomllib.TOMLDecodeError):
+        held = None
+    devices = [one.get("personality", "omni") for one in held if isinstance(one, dict)] if isinstance(held, list) else []
+    if len(devices) == 2 and not options.device and all(one in BUSES for one in devices):
+        options.device, options.second = devices
+    else:
+        options.second = options.device if len(devices) == 2 else ""
+        options.device = options.device or "omni"
+    if not options.second:
+        return
+    if options.two_machines:
+        raise Refusal("--two-machines: not for a scene with two devices, whose emulators are on one; leave it out")
+    if options.port not in ("", "socket"):
+        raise Refusal(f"--port {options.port}: not for a scene with two devices; take socket, which is the default there")
+    options.port = "socket"
 
 
 def choose_port(options, stand_ins):

@@ -2,6 +2,7 @@
 #include "record/earlier_inputs.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cstdio>
 #include <exception>
 #include <span>
@@ -124,17 +125,25 @@ std::string EarlierInputs::keep(const fs::path& folder, Tick last) {
   return {};
 }
 
-void for_each_input(const fs::path& folder, Tick last,
-                    const std::function<void(const TickRecord&)>& visit, std::size_t arm) {
-  std::vector<TickInputs> rows;
+void for_each_input(const fs::path& folder, Tick last, std::size_t arms,
+                    const std::function<void(std::span<const TickRecord>)>& visit) {
+  std::array<std::vector<TickInputs>, kMaxArms> rows;
+  std::array<TickRecord, kMaxArms> tick;
   for (Tick first = 1; first <= last; first += EarlierInputs::kTicksAFile) {
-    const fs::path path = file_of(folder, arm, first);
     const std::size_t wanted = std::min<Tick>(last - first + 1, EarlierInputs::kTicksAFile);
-    if (!read_inputs(path, EarlierInputs::kTicksAFile, rows) && !read_inputs(path, wanted, rows)) {
+    for (std::size_t arm = 0; arm < arms; ++arm) {
+      const fs::path path = file_of(folder, arm, first);
+      if (read_inputs(path, EarlierInputs::kTicksAFile, rows[arm]) ||
+          read_inputs(path, wanted, rows[arm])) {
+        continue;
+      }
       throw RecordError(path.string() + ": the inputs from tick " + std::to_string(first) +
                         " on are missing or damaged; copy the recording again");
     }
-    for (std::size_t i = 0; i < wanted; ++i) visit(record_of(rows[i], first + i));
+    for (std::size_t i = 0; i < wanted; ++i) {
+      for (std::size_t arm = 0; arm < arms; ++arm) tick[arm] = record_of(rows[arm][i], first + i);
+      visit(std::span(tick).first(arms));
+    }
   }
 }
 

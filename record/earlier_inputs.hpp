@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <functional>
 #include <future>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -72,11 +73,11 @@ class EarlierInputs {
   std::future<void> writing_;     ///< of the file before; last, since it ends first
 };
 
-/// Calls `visit` for each tick from 1 to `last` in order, with the inputs of an arm that the
-/// recording in `folder` has; the other columns are 0. Throws `RecordError`, one line, for a file
-/// that is missing or damaged: up to there `visit` was called.
-void for_each_input(const std::filesystem::path& folder, Tick last,
-                    const std::function<void(const TickRecord&)>& visit, std::size_t arm = 0);
+/// Calls `visit` for each tick from 1 to `last` in order, with the inputs of each of `arms` that
+/// the recording in `folder` has; the other columns are 0. Throws `RecordError`, one line, for a
+/// file that is missing or damaged: up to there `visit` was called.
+void for_each_input(const std::filesystem::path& folder, Tick last, std::size_t arms,
+                    const std::function<void(std::span<const TickRecord>)>& visit);
 
 /// Copies the files with the inputs up to tick `last` from the recording in `from` to that in `to`,
 /// which has none, of all arms that it has. Throws FileError and leaves nothing.

@@ -45,13 +45,17 @@ ComparedRuns::ComparedRuns(std::uint64_t ticks, const Manifest& manifest) : mani
   }
 }
 
-void ComparedRuns::add(const TickRecord& recorded, const TickRecord& replayed) {
+void ComparedRuns::add(const ArmRecords& all_recorded, const ArmRecords& all_replayed) {
+  const TickRecord& recorded = all_recorded[0];
+  const TickRecord& replayed = all_replayed[0];
   seconds_ = static_cast<double>(recorded.tick) * manifest_.tick_ns * 1e-9;
   const double recorded_force_n = magnitude(recorded.commanded_force_n);
   const double replayed_force_n = magnitude(replayed.commanded_force_n);
   const double mm = proxies_apart_mm(recorded, replayed);
-  count_removed(recorded, manifest_, recorded_mm3_);
-  count_removed(replayed, manifest_, replayed_mm3_);
+  for (std::size_t arm = 0; arm < manifest_.arms; ++arm) {
+    count_removed(all_recorded[arm], manifest_, recorded_mm3_);
+    count_removed(all_replayed[arm], manifest_, replayed_mm3_);
+  }
   recorded_peak_n_ = std::max(recorded_peak_n_, recorded_force_n);
   replayed_peak_n_ = std::max(replayed_peak_n_, replayed_force_n);
   force_apart_n_ =

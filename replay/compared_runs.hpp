@@ -9,6 +9,7 @@
 
 #include "record/force_plot.hpp"
 #include "record/recording.hpp"
+#include "replay/replay_step.hpp"
 #include "shared/segment/layout.hpp"
 
 namespace kerf {
@@ -20,7 +21,8 @@ class ComparedRuns {
   /// `ticks`: number of the `add` calls to come, at most.
   ComparedRuns(std::uint64_t ticks, const Manifest& manifest);
 
-  void add(const TickRecord& recorded, const TickRecord& replayed);
+  /// Of two arms the forces and places are those of the first, the removed volumes of both.
+  void add(const ArmRecords& all_recorded, const ArmRecords& all_replayed);
 
   /// Both peaks and the largest differences, in two columns for people.
   [[nodiscard]] std::string text() const;

@@ -189,6 +189,15 @@ void check_same_counts(const std::string& recorded, const LoadedScene& scene) {
                       ", and the counts of the recording are of " + one_line(device) +
                       "; replay it with that device");
   }
+  const std::string second = was.contains("second_device")
+                                 ? was.at("second_device").at("personality").get<std::string>()
+                                 : "none";
+  const std::string now_second(scene.second ? word_of(scene.second->device.personality) : "none");
+  if (second != now_second) {
+    throw RecordError(scene.path + ": the second device is " + now_second +
+                      ", and in the recording it is " + one_line(second) +
+                      "; replay it with that one");
+  }
 }
 
 /// Of the ticks before the log a recording has the inputs.
@@ -242,10 +251,13 @@ RecordedRun load_run(const std::filesystem::path& folder, const ReplayChanges& c
 
 void step_earlier_ticks(RecordedRun& run, const std::filesystem::path& folder) {
   ReplayStep step(*run.servo, run.volume_chain);
-  for_each_input(folder, run.earlier_ticks(), [&](const TickRecord& inputs) {
+  const std::size_t arms = run.servo->arms();
+  for_each_input(folder, run.earlier_ticks(), arms, [&](std::span<const TickRecord> inputs) {
     constexpr Tick kOften = 1024;
-    if (inputs.tick % kOften == 0) end_if_asked(folder.string());
-    run.volume_chain = step(inputs).volume_hash;
+    if (inputs.front().tick % kOften == 0) end_if_asked(folder.string());
+    ArmRecords tick;
+    std::ranges::copy(inputs, tick.begin());
+    run.volume_chain = step(tick)[arms - 1].volume_hash;
   });
 }
 

@@ -35,38 +35,69 @@ std::string gap_text(Tick last, Tick next) {
 
 }  // namespace
 
-ReplayResult replay_ticks(RecordedRun& run, TickLogReader& log, Tick until,
+RecordedTicks::RecordedTicks(const std::filesystem::path& folder, std::size_t arms) {
+  for (std::size_t arm = 0; arm < arms; ++arm) {
+    const std::filesystem::path path = folder / tick_log_name(arm);
+    logs_.emplace_back(path);
+    if (logs_[arm].rows() >= rows()) continue;
+    throw RecordError(path.string() + ": " + std::to_string(logs_[arm].rows()) + " rows, and " +
+                      std::string(kTickLogName) + " has " + std::to_string(rows()) +
+                      "; copy the recording again");
+  }
+}
+
+void RecordedTicks::read(std::uint64_t first, std::vector<ArmRecords>& rows) {
+  rows.resize(TickLogReader::kChunkRows);
+  chunk_.resize(TickLogReader::kChunkRows);
+  std::size_t count = rows.size();
+  for (std::size_t arm = 0; arm < logs_.size(); ++arm) {
+    count = std::min(count, logs_[arm].read(first, chunk_));
+    for (std::size_t i = 0; i < count; ++i) rows[i][arm] = chunk_[i];
+  }
+  rows.resize(count);
+  if (logs_.size() == 1) return;
+  const auto apart =
+      std::ranges::find_if(rows, [](const ArmRecords& row) { return row[0].tick != row[1].tick; });
+  if (apart == rows.end()) return;
+  throw RecordError("tick " + std::to_string((*apart)[0].tick) + " of the first arm and tick " +
+                    std::to_string((*apart)[1].tick) +
+                    " of the second are in one row; copy the recording again");
+}
+
+ReplayResult replay_ticks(RecordedRun& run, RecordedTicks& log, Tick until,
                           const std::atomic<bool>& stop, const TickVisitor& visit) {
   ReplayResult result;
   result.last_tick = run.earlier_ticks();
   ReplayStep step(*run.servo, run.volume_chain);
-  std::vector<TickRecord> rows(TickLogReader::kChunkRows);
+  std::vector<ArmRecords> rows;
   for (std::uint64_t row = 0; row < log.rows();) {
-    std::size_t count = 0;
     try {
-      count = log.read(row, rows);
+      log.read(row, rows);
     } catch (const RecordError& error) {
       if (row == 0) throw;
       result.cut_short = error.what();
       return result;
     }
-    for (const TickRecord& recorded : std::span(rows).first(count)) {
-      if (recorded.tick > until) return result;
+    for (const ArmRecords& recorded : rows) {
+      const Tick tick = recorded[0].tick;
+      if (tick > until) return result;
       if (stop) {
         result.cut_short = "a signal stopped it";
         return result;
       }
-      if (recorded.tick != result.last_tick + 1) {
-        result.cut_short = gap_text(result.last_tick, recorded.tick);
+      if (tick != result.last_tick + 1) {
+        result.cut_short = gap_text(result.last_tick, tick);
         return result;
       }
-      const TickRecord replayed = step(recorded);
+      const ArmRecords replayed = step(recorded);
       ++result.ticks;
-      result.last_tick = recorded.tick;
-      result.output_hash = replayed.output_hash;
+      result.last_tick = tick;
+      for (std::size_t arm = 0; arm < kMaxArms; ++arm) {
+        result.output_hash[arm] = replayed[arm].output_hash;
+      }
       if (!visit(recorded, replayed)) return result;
     }
-    row += count;
+    row += rows.size();
   }
   if (log.rows() < log.counted()) {
     result.cut_short = "the log is cut after " + std::to_string(log.rows()) + " of " +
@@ -83,7 +114,10 @@ class ReplayLog {
   /// Before the first tick: it keeps the volumes of `run` as they are now.
   ReplayLog(const std::filesystem::path& out, const std::filesystem::path& from,
             const RecordedRun& run)
-      : out_(out), from_(from), log_(new_folder(out, from, run) / kTickLogName) {
+      : out_(new_folder(out, from, run)), from_(from) {
+    for (std::size_t arm = 0; arm < run.servo->arms(); ++arm) {
+      logs_.push_back(std::make_unique<TickLogWriter>(out_ / tick_log_name(arm)));
+    }
     for (std::size_t v = 0; v < run.scene.volumes.size(); ++v) {
       const std::vector<Label>& labels = run.scene.volumes[v].image.labels;
       const std::span<const Density> density = run.servo->density(v);
@@ -92,10 +126,12 @@ class ReplayLog {
     }
   }
 
-  void append(const TickRecord& record) { log_.append(record); }
+  void append(const ArmRecords& records) {
+    for (std::size_t arm = logs_.size(); arm-- > 0;) logs_[arm]->append(records[arm]);
+  }
 
   void close(const RecordedRun& run, const ReplayResult& result) {
-    log_.sync();
+    for (std::size_t arm = logs_.size(); arm-- > 0;) logs_[arm]->sync();
     std::ifstream file(from_ / kManifestName);
     Json manifest = Json::parse(std::string{std::istreambuf_iterator<char>(file), {}});
     manifest["replay_of"] = from_.string();
@@ -119,7 +155,7 @@ class ReplayLog {
   }
 
   std::filesystem::path out_, from_;
-  TickLogWriter log_;
+  std::vector<std::unique_ptr<TickLogWriter>> logs_;  ///< by arm
 };
 
 std::uint64_t volume_hash_of(const RecordedRun& run) {
@@ -140,52 +176,57 @@ void print_end(const ReplayResult& result, const RecordedRun& run, Tick from, bo
                 static_cast<unsigned long long>(result.last_tick + 1 -
                                                 std::min(first, result.last_tick + 1)));
   }
-  std::printf("output hash  %s\nvolume hash  %s\n%.1f s of the run in %.2f s\n",
-              hex64(result.output_hash).c_str(), hex64(volume_hash_of(run)).c_str(), run_s, wall_s);
+  for (std::size_t arm = 0; arm < run.servo->arms(); ++arm) {
+    std::printf("output hash  %s%s\n", hex64(result.output_hash[arm]).c_str(),
+                arm == 0 ? "" : " of the second arm");
+  }
+  std::printf("volume hash  %s\n%.1f s of the run in %.2f s\n", hex64(volume_hash_of(run)).c_str(),
+              run_s, wall_s);
 }
 
 void print_difference(const ReplayResult::Found& found, const RecordedRun& run) {
-  std::printf("tick %llu (%.3f s), %s: %s was %s, is %s\n",
+  std::printf("tick %llu (%.3f s), %s%s: %s was %s, is %s\n",
               static_cast<unsigned long long>(found.tick),
               static_cast<double>(found.tick) * run.manifest.tick_ns * 1e-9,
-              std::string(found.at.stage).c_str(), found.at.field.c_str(),
-              found.at.recorded.c_str(), found.at.replayed.c_str());
+              found.arm == 0 ? "" : "arm 2, ", std::string(found.at.stage).c_str(),
+              found.at.field.c_str(), found.at.recorded.c_str(), found.at.replayed.c_str());
 }
 
 Json json_of(const ReplayResult& result, const RecordedRun& run) {
   Json report = {{"ticks", result.ticks},
                  {"last_tick", result.last_tick},
-                 {"output_hash", hex64(result.output_hash)},
+                 {"output_hash", hex64(result.output_hash[0])},
                  {"volume_hash", hex64(volume_hash_of(run))},
                  {"cut_short", result.cut_short}};
+  if (run.servo->arms() > 1) report["second_output_hash"] = hex64(result.output_hash[1]);
   report["difference"] = nullptr;
   if (result.difference) {
-    const auto& [tick, at] = *result.difference;
-    report["difference"] = Json{{"tick", tick},
-                                {"stage", at.stage},
-                                {"field", at.field},
-                                {"recorded", at.recorded},
-                                {"replayed", at.replayed}};
+    const auto& [tick, arm, at] = *result.difference;
+    report["difference"] =
+        Json{{"tick", tick},      {"arm", arm + 1},          {"stage", at.stage},
+             {"field", at.field}, {"recorded", at.recorded}, {"replayed", at.replayed}};
   }
   return report;
 }
 
 /// Refuses a range in which nothing would be compared.
-void check_range(const ReplayOptions& options, TickLogReader& log) {
+void check_range(const ReplayOptions& options, RecordedTicks& log) {
   if (options.from > options.until) {
     throw RecordError("--from " + std::to_string(options.from) + " lies behind --until " +
                       std::to_string(options.until) + "; no tick would be compared");
   }
-  TickRecord first, last;
-  static_cast<void>(log.read(0, std::span(&first, 1)));
-  static_cast<void>(log.read(log.rows() - 1, std::span(&last, 1)));
-  if (options.from > last.tick) {
+  std::vector<ArmRecords> rows;
+  log.read(0, rows);
+  const Tick first = rows.front()[0].tick;
+  log.read(log.rows() - 1, rows);
+  const Tick last = rows.front()[0].tick;
+  if (options.from > last) {
     throw RecordError("--from " + std::to_string(options.from) + ": the recording ends at tick " +
-                      std::to_string(last.tick) + "; give an earlier one");
+                      std::to_string(last) + "; give an earlier one");
   }
-  if (options.until < first.tick) {
+  if (options.until < first) {
     throw RecordError("--until " + std::to_string(options.until) +
-                      ": the recording begins at tick " + std::to_string(first.tick) +
+                      ": the recording begins at tick " + std::to_string(first) +
                       "; give a later one");
   }
 }
@@ -195,7 +236,7 @@ void check_range(const ReplayOptions& options, TickLogReader& log) {
 int run_replay(const ReplayOptions& options, const std::atomic<bool>& stop) {
   check_outputs(recording_files(options.folder),
                 {{"--report", options.report, ".json"}, {"--plot", options.plot, ".svg"}});
-  TickLogReader log(options.folder / kTickLogName);
+  RecordedTicks log(options.folder, read_manifest(options.folder).arms);
   if (log.rows() == 0) {
     throw RecordError((options.folder / kTickLogName).string() + ": 0 rows; nothing to replay");
   }
@@ -210,12 +251,13 @@ int run_replay(const ReplayOptions& options, const std::atomic<bool>& stop) {
   std::optional<ReplayResult::Found> difference;
   const auto began = std::chrono::steady_clock::now();
   step_earlier_ticks(run, options.folder);
-  const auto visit = [&](const TickRecord& recorded, const TickRecord& replayed) {
+  const auto visit = [&](const ArmRecords& recorded, const ArmRecords& replayed) {
     if (copy) copy->append(replayed);
     compared.add(recorded, replayed);
-    if (difference || recorded.tick < options.from) return true;
-    if (const auto found = first_difference(recorded, replayed)) {
-      difference = {recorded.tick, *found};
+    if (difference || recorded[0].tick < options.from) return true;
+    for (std::size_t arm = 0; arm < run.servo->arms() && !difference; ++arm) {
+      const auto found = first_difference(recorded[arm], replayed[arm]);
+      if (found) difference = {recorded[arm].tick, arm, *found};
     }
     return changed || !difference;
   };

@@ -2,6 +2,7 @@
 #include "replay/replay_step.hpp"
 
 #include <cstddef>
+#include <span>
 
 #include "controller/loop/publisher.hpp"
 #include "shared/segment/writer.hpp"
@@ -25,8 +26,12 @@ void copy_times(const TickRecord& from, TickRecord& to) noexcept {
 
 }  // namespace
 
-ServoOutput give(CompiledScene& servo, const TickRecord& recorded) noexcept {
-  const TickCommands commands = commands_of(recorded);
+std::array<DeviceReport, kMaxArms> reports_of(const ArmRecords& recorded) noexcept {
+  return {report_of(recorded[0]), report_of(recorded[1])};
+}
+
+std::array<ServoOutput, kMaxArms> give(CompiledScene& servo, const ArmRecords& recorded) noexcept {
+  const TickCommands commands = commands_of(of_arms(recorded, servo));
   // As the loop does: the reader's command, then the restart after a stall, then the step.
   if (commands.command.kind != ServoCommand::Kind::none) {
     static_cast<void>(servo.apply(commands.command));
@@ -34,20 +39,27 @@ ServoOutput give(CompiledScene& servo, const TickRecord& recorded) noexcept {
   if (commands.fade_in) {
     static_cast<void>(servo.apply({.kind = ServoCommand::Kind::fade_in}));
   }
-  return servo.step(report_of(recorded));
+  const auto reports = reports_of(recorded);
+  std::array<ServoOutput, kMaxArms> outputs;
+  servo.step(of_arms(reports, servo), of_arms(outputs, servo));
+  return outputs;
 }
 
-TickRecord ReplayStep::operator()(const TickRecord& recorded) noexcept {
-  const ServoOutput output = give(servo_, recorded);
-  TickRecord record = record_of(report_of(recorded), commands_of(recorded), output);
+ArmRecords ReplayStep::operator()(const ArmRecords& recorded) noexcept {
+  const auto outputs = give(servo_, recorded);
   const auto hash_of = [&](std::size_t v, const VoxelBox& box) {
     return changed_box_hash(BrickGrid::of(servo_.grid(v)), servo_.density(v), box);
   };
-  put_changes(output, hash_of, volume_chain_, record);
-  record.penetration_mm = static_cast<float>(servo_.penetration_mm());
-  copy_times(recorded, record);
-  record.crc32c = tick_record_crc(record);
-  return record;
+  ArmRecords records{};
+  for (std::size_t arm = 0; arm < servo_.arms(); ++arm) {
+    TickRecord& record = records[arm];
+    record = record_of(report_of(recorded[arm]), commands_of(recorded[arm]), outputs[arm]);
+    put_changes(outputs[arm], hash_of, volume_chain_, record);
+    record.penetration_mm = static_cast<float>(servo_.penetration_mm(arm));
+    copy_times(recorded[arm], record);
+    record.crc32c = tick_record_crc(record);
+  }
+  return records;
 }
 
 }  // namespace kerf

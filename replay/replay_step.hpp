@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <span>
 
 #include "controller/plan/compile.hpp"
 #include "shared/numeric/fnv1a.hpp"
@@ -11,9 +13,27 @@
 
 namespace kerf {
 
-/// Gives the servo the commands and the report of a recorded tick, in the loop's order; returns its
-/// output.
-[[nodiscard]] ServoOutput give(CompiledScene& servo, const TickRecord& recorded) noexcept;
+/// The records of one tick, by arm.
+using ArmRecords = std::array<TickRecord, kMaxArms>;
+
+/// The records, reports or outputs of the arms that a servo has.
+template <class T>
+[[nodiscard]] std::span<T> of_arms(std::array<T, kMaxArms>& all, const Servo& servo) noexcept {
+  return std::span(all).first(servo.arms());
+}
+template <class T>
+[[nodiscard]] std::span<const T> of_arms(const std::array<T, kMaxArms>& all,
+                                         const Servo& servo) noexcept {
+  return std::span(all).first(servo.arms());
+}
+
+/// The reports in the records of a tick.
+[[nodiscard]] std::array<DeviceReport, kMaxArms> reports_of(const ArmRecords& recorded) noexcept;
+
+/// Gives the servo the commands and the reports of a recorded tick, in the loop's order; returns
+/// its outputs.
+[[nodiscard]] std::array<ServoOutput, kMaxArms> give(CompiledScene& servo,
+                                                     const ArmRecords& recorded) noexcept;
 
 /// Computes the ticks of a recording again, one after the other.
 class ReplayStep {
@@ -22,9 +42,9 @@ class ReplayStep {
   explicit ReplayStep(CompiledScene& servo, std::uint64_t volume_chain = kFnv1aBasis)
       : servo_(servo), volume_chain_(volume_chain) {}
 
-  /// Gives the servo what it was given in `recorded`; returns the record of the tick. Times are
+  /// Gives the servo what it was given in `recorded`; returns the records of the tick. Times are
   /// those of `recorded`.
-  [[nodiscard]] TickRecord operator()(const TickRecord& recorded) noexcept;
+  [[nodiscard]] ArmRecords operator()(const ArmRecords& recorded) noexcept;
 
  private:
   CompiledScene& servo_;

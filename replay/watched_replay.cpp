@@ -10,6 +10,7 @@
 #include <limits>
 #include <map>
 #include <memory>
+#include <span>
 #include <string>
 #include <thread>
 #include <utility>
@@ -105,9 +106,8 @@ Request request_of(const Command& command, bool is_paused) {
 /// The run between two ticks, at any of them.
 class WatchedRun {
  public:
-  WatchedRun(RecordedRun& run, TickLogReader& log, Tick until)
+  WatchedRun(RecordedRun& run, RecordedTicks& log, Tick until)
       : run_(run), log_(log), publisher_(*run.segment, *run.servo) {
-    rows_.resize(TickLogReader::kChunkRows);
     tick_ = before_log_ = run.earlier_ticks();
     last_tick_ = std::min<Tick>(before_log_ + log.rows(), until);  // without a gap
     ticks_a_snapshot_ = last_tick_ / snapshots_that_fit() + 1;
@@ -119,14 +119,18 @@ class WatchedRun {
 
   /// The next tick, published. False at the end, or before a gap or a damaged row.
   bool step() {
-    const TickRecord* const recorded = next_row();
+    const ArmRecords* const recorded = next_row();
     if (recorded == nullptr) return false;
-    ServoOutput output = step_servo(*recorded);
-    output.undoable = output.redoable = true;  // the keys of both go through the recording
+    auto outputs = step_servo(*recorded);
+    for (ServoOutput& output : outputs) {
+      output.undoable = output.redoable = true;  // the keys of both go through the recording
+    }
     const std::int64_t now = monotonic_ns();
     published_ = std::max(published_ + 1, tick_);
-    publisher_.publish(published_, report_of(*recorded), commands_of(*recorded), output,
-                       {.start_ns = now, .heartbeat_ns = now});
+    const auto reports = reports_of(*recorded);
+    publisher_.publish(
+        published_, of_arms(reports, *run_.servo), commands_of(of_arms(*recorded, *run_.servo)),
+        of_arms(std::as_const(outputs), *run_.servo), {.start_ns = now, .heartbeat_ns = now});
     return true;
   }
 
@@ -139,7 +143,7 @@ class WatchedRun {
       tick_ = at;
     }
     while (tick_ + 1 < tick) {
-      const TickRecord* const recorded = next_row();
+      const ArmRecords* const recorded = next_row();
       if (recorded == nullptr) break;
       static_cast<void>(step_servo(*recorded));
     }
@@ -157,20 +161,20 @@ class WatchedRun {
   }
 
   /// The row of the next tick; null if there is none.
-  [[nodiscard]] const TickRecord* next_row() {
+  [[nodiscard]] const ArmRecords* next_row() {
     if (tick_ >= last_tick_) return nullptr;
     const std::uint64_t at = tick_ - before_log_;
-    if (at < first_row_ || at >= first_row_ + count_) {
+    if (at < first_row_ || at >= first_row_ + rows_.size()) {
       first_row_ = at;
-      count_ = log_.read(first_row_, rows_);
+      log_.read(first_row_, rows_);
     }
-    const TickRecord& row = rows_[at - first_row_];
-    if (row.tick == tick_ + 1) return &row;
+    const ArmRecords& row = rows_[at - first_row_];
+    if (row[0].tick == tick_ + 1) return &row;
     last_tick_ = tick_;
     return nullptr;
   }
 
-  ServoOutput step_servo(const TickRecord& recorded) {
+  std::array<ServoOutput, kMaxArms> step_servo(const ArmRecords& recorded) {
     if (tick_ % ticks_a_snapshot_ == 0 && !snapshots_.contains(tick_)) {
       snapshots_[tick_] = run_.servo->keep();
     }
@@ -196,10 +200,10 @@ class WatchedRun {
   }
 
   RecordedRun& run_;
-  TickLogReader& log_;
+  RecordedTicks& log_;
   Publisher publisher_;
-  std::vector<TickRecord> rows_;
-  std::uint64_t first_row_ = 0, count_ = 0;
+  std::vector<ArmRecords> rows_;
+  std::uint64_t first_row_ = 0;
   Tick before_log_ = 0;  ///< the last tick before the log's first
   Tick tick_ = 0;        ///< of the recording
   Tick published_ = 0;   ///< of the segment, where ticks only grow: the same until a way back
@@ -321,13 +325,14 @@ class Watch {
 
 }  // namespace
 
-int watch_replay(const ReplayOptions& options, TickLogReader& log, const std::atomic<bool>& stop) {
+int watch_replay(const ReplayOptions& options, RecordedTicks& log, const std::atomic<bool>& stop) {
   RecordedRun run = load_run(options.folder, options.changes, kernels_named(options.kernels), true);
   step_earlier_ticks(run, options.folder);
   WatchedRun watched(run, log, options.until);
   const std::uint64_t rows = watched.last_tick();
   SegmentServer server(options.watch, *run.segment,
-                       {.tools = static_cast<std::uint32_t>(run.scene.tools.size())});
+                       {.tools = static_cast<std::uint32_t>(run.scene.tools.size()),
+                        .arms = static_cast<std::uint32_t>(run.servo->arms())});
   run.segment->set_lifecycle(Lifecycle::run);
   std::printf(
       "kerf visualizer --name %s shows it; space pauses, . steps, + and - change the speed, "

@@ -23,7 +23,7 @@ namespace kerf {
 ///
 /// Returns 0; 1 if ticks are missing in the recording, in front of which it stops. Throws as
 /// `run_replay`, and SegmentError if a controller of that name runs.
-[[nodiscard]] int watch_replay(const ReplayOptions& options, TickLogReader& log,
+[[nodiscard]] int watch_replay(const ReplayOptions& options, RecordedTicks& log,
                                const std::atomic<bool>& stop);
 
 inline constexpr std::size_t kMostSnapshots = 32, kSnapshotBytes = std::size_t{512} << 20;

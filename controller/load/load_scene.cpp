@@ -218,11 +218,22 @@ void apply_overrides(const SceneOverrides& overrides, Scene& scene) {
   scene.servo.rate_hz = overrides.rate_hz.value_or(scene.servo.rate_hz);
   scene.servo.numeric = overrides.numeric.value_or(scene.servo.numeric);
   scene.force.unchecked_gain = scene.force.unchecked_gain || overrides.unchecked_gain;
-  if (overrides.personality && *overrides.personality != scene.device.personality) {
-    scene.device.personality = *overrides.personality;
-    scene.device.torque_scale.reset();  // of another device's motors
+  const auto replace = [&](DeviceSettings& device,
+                           const std::optional<std::array<double, 3>>& torque_scale) {
+    if (overrides.personality && *overrides.personality != device.personality) {
+      device.personality = *overrides.personality;
+      device.torque_scale.reset();  // of another device's motors
+    }
+    if (torque_scale) device.torque_scale = torque_scale;
+  };
+  replace(scene.device, overrides.torque_scale);
+  if (overrides.second_torque_scale && !scene.second) {
+    refuse("--torque-scale", " has six numbers, and the scene has one [device]; give three");
   }
-  if (overrides.torque_scale) scene.device.torque_scale = overrides.torque_scale;
+  if (scene.second) {
+    replace(scene.second->device,
+            overrides.second_torque_scale ? overrides.second_torque_scale : overrides.torque_scale);
+  }
   settle_device(scene);
   if (scene.cut.pedal == CutPedal::automatic && overrides.pedal) {
     scene.cut.pedal = CutPedal::button;
@@ -335,6 +346,15 @@ void fit_to_volume(double written_mm, Scene& spec, LoadedScene& scene) {
   fit_cutting(grown, scale, scene);
 }
 
+/// Index of the tool that a device holds at the start. One that a fitted scene has left out, or
+/// `otherwise` beyond the list, is the first.
+std::size_t tool_held(const DeviceSettings& device, std::size_t otherwise,
+                      const std::vector<SceneTool>& tools) {
+  const auto named = std::ranges::find(tools, device.first_tool, &SceneTool::name);
+  if (named != tools.end()) return static_cast<std::size_t>(named - tools.begin());
+  return device.first_tool.empty() && otherwise < tools.size() ? otherwise : 0;
+}
+
 const ToolMesh* mesh_of(const std::string& tool, const RecordedInputs& recorded) {
   const auto found =
       std::ranges::find(recorded.meshes, tool, &std::pair<std::string, ToolMesh>::first);
@@ -392,6 +412,7 @@ LoadedScene load_parsed(Scene spec, const std::filesystem::path& path,
     }
   }
 
+  scene.active_tool = tool_held(scene.device, 0, scene.tools);
   if (fitted) {
     const double scale = scene.device.workspace_scale;
     const double weaker =
@@ -402,6 +423,13 @@ LoadedScene load_parsed(Scene spec, const std::filesystem::path& path,
   if (!spec.offset_given) {
     scene.device.offset_mm = first_surface_from_above(*std::find_if(
         scene.volumes.begin(), scene.volumes.end(), [](const SceneVolume& v) { return v.solid; }));
+  }
+  if (scene.second) {
+    DeviceSettings& second = scene.second->device;
+    scene.second_tool = tool_held(second, 1, scene.tools);
+    second.workspace_scale = scene.device.workspace_scale;
+    second.fit = scene.device.fit;
+    if (!scene.second->offset_given) second.offset_mm = scene.device.offset_mm;
   }
   return scene;
 }

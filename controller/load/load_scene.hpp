@@ -30,6 +30,7 @@ struct SceneOverrides {
   std::optional<NumericKind> numeric{};                        ///< --numeric
   std::optional<Personality> personality{};                    ///< --device; cancels torque_scale
   std::optional<std::array<double, 3>> torque_scale{};         ///< --torque-scale a,b,c
+  std::optional<std::array<double, 3>> second_torque_scale{};  ///< --torque-scale a,b,c,d,e,f
   std::optional<VoxelGrid> phantom_size{};  ///< every phantom, for tests and the lab
   bool unchecked_gain = false;              ///< --unchecked-gain
   bool pedal = false;                       ///< --pedal: `auto` of cut.pedal is `button`

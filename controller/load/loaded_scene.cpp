@@ -175,4 +175,18 @@ Point3 first_surface_from_above(const SceneVolume& volume) {
   return descend(density, above, (*voxel)[1], step_mm, volume.iso * (1 - 1e-9)).value_or(*voxel);
 }
 
+LoadedScene second_arm_of(const LoadedScene& scene) {
+  LoadedScene second;
+  static_cast<SceneSettings&>(second) = scene;
+  const SecondArm& arm = *scene.second;
+  second.device = arm.device;
+  second.limits = arm.limits;
+  second.hand_script = arm.hand_script;
+  second.hand_place = arm.hand_place;
+  second.second.reset();
+  second.tools = scene.tools;
+  second.active_tool = scene.second_tool;
+  return second;
+}
+
 }  // namespace kerf

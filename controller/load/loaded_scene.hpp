@@ -44,9 +44,22 @@ struct LoadedScene : SceneSettings {
   std::vector<SceneVolume> volumes;
   std::vector<SceneTool> tools;
   std::size_t active_tool = 0;
+  std::size_t second_tool = 0;           ///< of the second arm
   std::vector<VolumeSpec> volume_specs;  ///< as written in the file and on the command line
   std::vector<ToolSpec> tool_specs;      ///< the same, with the sizes in effect
 };
+
+[[nodiscard]] inline std::size_t arms_of(const SceneSettings& scene) noexcept {
+  return scene.second ? 2 : 1;
+}
+[[nodiscard]] inline const DeviceSettings& device_of(const SceneSettings& scene,
+                                                     std::size_t arm) noexcept {
+  return arm == 0 ? scene.device : scene.second->device;
+}
+
+/// The scene as its second arm has it, without the volumes: for all that depends on a device, and
+/// not on what it touches.
+[[nodiscard]] LoadedScene second_arm_of(const LoadedScene& scene);
 
 using Point3 = vec3::Vec;  ///< mm
 

@@ -106,6 +106,14 @@ std::string canonical_json(const LoadedScene& scene, SceneKeys keys) {
     Json object = table_json(table, parts, keys);
     if (!object.is_null()) root[table] = std::move(object);
   }
+  if (scene.second) {
+    SceneParts second = parts;
+    second.scene.device = scene.second->device;
+    second.scene.limits = scene.second->limits;
+    root["second_device"] = table_json("device", second, keys);
+    root["second_limits"] = table_json("limits", second, keys);
+    root["second_tool"] = scene.second_tool;
+  }
   for (const Material& material : scene.materials) {
     parts.material = material;
     root["materials"].push_back(table_json("material", parts, keys));
@@ -166,6 +174,7 @@ Json json_of(const SceneSource& source) {
   put_word(out, "numeric", given.numeric, kNumericWords);
   put_word(out, "device", given.personality, kPersonalityWords);
   put(out, "torque_scale", given.torque_scale);
+  put(out, "second_torque_scale", given.second_torque_scale);
   out["unchecked_gain"] = given.unchecked_gain;
   out["pedal"] = given.pedal;
   out["read_seconds"] = given.read_cpu_s;
@@ -269,6 +278,7 @@ SceneSource source_in(std::string_view json) {
   take_word(source, "numeric", given.numeric, kNumericWords);
   take_word(source, "device", given.personality, kPersonalityWords);
   take(source, "torque_scale", given.torque_scale);
+  take(source, "second_torque_scale", given.second_torque_scale);
   given.unchecked_gain = source.at("unchecked_gain").get<bool>();
   given.pedal = source.at("pedal").get<bool>();
   given.read_cpu_s = source.at("read_seconds").get<int>();

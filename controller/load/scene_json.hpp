@@ -24,6 +24,7 @@ namespace kerf {
 ///              [[y_mm, radius_mm]..] or mesh {points_mm [[x, y, z]..], triangles [[a, b, c]..]};
 ///              shaft, if one is felt: the outline of it and the handpiece, as profile}]
 ///   active_tool
+///   second_device, second_limits, second_tool  if there are two arms
 ///   materials [..], scene, device, force, cut, spindle, limits, servo  as the rows of the table of
 ///              keys say (`InJson`), of the models that the scene has
 [[nodiscard]] std::string canonical_json(const LoadedScene& scene, SceneKeys keys = scene_keys());

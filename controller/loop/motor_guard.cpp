@@ -25,17 +25,17 @@
 namespace kerf {
 namespace {
 
-std::atomic<DeviceDriver*> driven{nullptr};  // for signal handlers, which can only reach globals
-static_assert(std::atomic<DeviceDriver*>::is_always_lock_free);
+std::atomic<const Devices*> driven{nullptr};  // for signal handlers, which can only reach globals
+static_assert(std::atomic<const Devices*>::is_always_lock_free);
 
 /// An orderly end may take some ticks, and the force must end before.
 void on_stop() noexcept {
-  if (DeviceDriver* device = driven.load()) device->stay_released();
+  if (const Devices* devices = driven.load()) devices->stay_released();
 }
 
 void on_crash(int signal) {
-  if (DeviceDriver* device = driven.load()) {
-    static_cast<void>(device->release_for_good());  // one send(): signal-safe
+  if (const Devices* devices = driven.load()) {
+    static_cast<void>(devices->release_for_good());  // one send() each: signal-safe
     // The bus carries it in one of its next cycles, unless the process has ended before.
     const timespec cycles{0, 2'000'000};
     nanosleep(&cycles, nullptr);
@@ -60,15 +60,15 @@ void handle_crashes(void (*handler)(int)) noexcept {
 
 }  // namespace
 
-MotorGuard::MotorGuard(DeviceDriver& device) noexcept : device_(device) {
-  driven = &device;
+MotorGuard::MotorGuard(const Devices& devices) noexcept : devices_(devices) {
+  driven = &devices_;
   at_stop_signal(on_stop);
   handle_crashes(on_crash);
 }
 
 MotorGuard::~MotorGuard() {
   // The device may be slow to take packets; it gets 20 ms for this one.
-  for (int tries = 0; !device_.release_for_good() && tries < 20; ++tries) {
+  for (int tries = 0; !devices_.release_for_good() && tries < 20; ++tries) {
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }
   at_stop_signal(nullptr);
@@ -92,7 +92,7 @@ HandlerStack::~HandlerStack() {
 namespace {
 
 // For signal handlers, which can only reach globals.
-std::atomic<DeviceDriver*> guarded{nullptr};
+std::atomic<const Devices*> guarded{nullptr};
 std::atomic<std::atomic<bool>*> stop_of_loop{nullptr};
 std::atomic<bool> in_loop{false};
 std::atomic<int> first_unexpected{-1};
@@ -114,7 +114,7 @@ void on_call(int, siginfo_t* info, void* context) {
   if (!in_loop) return return_from_call(context, -EAGAIN);
   int none = -1;
   first_unexpected.compare_exchange_strong(none, info->si_syscall);
-  if (DeviceDriver* device = guarded) static_cast<void>(device->release_for_good());
+  if (const Devices* devices = guarded) static_cast<void>(devices->release_for_good());
   if (std::atomic<bool>* stop = stop_of_loop) *stop = true;
   return_from_call(context, -EPERM);
 }
@@ -143,8 +143,8 @@ std::initializer_list<int> calls_of(std::string_view port) {
 
 }  // namespace
 
-CallGuard::CallGuard(DeviceDriver& device, std::atomic<bool>& stop) noexcept {
-  guarded = &device;
+CallGuard::CallGuard(const Devices& devices, std::atomic<bool>& stop) noexcept : devices_(devices) {
+  guarded = &devices_;
   stop_of_loop = &stop;
   first_unexpected = -1;
   struct sigaction action {};
@@ -159,15 +159,17 @@ CallGuard::~CallGuard() {
   stop_of_loop = nullptr;
 }
 
-void CallGuard::enter(std::string_view port) {
+void CallGuard::enter(std::span<const std::string> ports) {
   const std::unique_ptr<void, decltype(&seccomp_release)> filter(seccomp_init(SCMP_ACT_TRAP),
                                                                  seccomp_release);
   int error = filter ? 0 : -ENOMEM;
-  for (const auto& calls : {kEverywhere, calls_of(port)}) {
+  const auto allow = [&](const std::initializer_list<int>& calls) {
     for (const int call : calls) {
       if (error == 0) error = seccomp_rule_add(filter.get(), SCMP_ACT_ALLOW, call, 0);
     }
-  }
+  };
+  allow(kEverywhere);
+  for (const std::string& port : ports) allow(calls_of(port));
   // To wake an I/O thread is quick; to wait for a lock is not.
   constexpr std::uint32_t kOperation = ~std::uint32_t{FUTEX_PRIVATE_FLAG};
   const scmp_arg_cmp wakes{1, SCMP_CMP_MASKED_EQ, kOperation, FUTEX_WAKE};

@@ -5,10 +5,10 @@
 #include <atomic>
 #include <csignal>
 #include <cstddef>
+#include <span>
 #include <string>
-#include <string_view>
 
-#include "controller/device/device_driver.hpp"
+#include "controller/device/devices.hpp"
 
 // Motors off however a run ends, and the guard against system calls in the loop.
 
@@ -27,16 +27,16 @@ class HandlerStack {
   stack_t before_{};
 };
 
-/// Switches the motors off on every way out while one of these lives: at its own end (return or
-/// exception), in the handler of signals that request the end, and on those that end a program at
-/// once (segmentation fault, stack overflow, abort, ...), after which the signal takes its usual
-/// course (shared/posix/stop_signals.hpp lists them). SIGKILL cannot be caught: then the device
-/// must notice.
+/// Switches the motors of all devices off on every way out while one of these lives: at its own end
+/// (return or exception), in the handler of signals that request the end, and on those that end a
+/// program at once (segmentation fault, stack overflow, abort, ...), after which the signal takes
+/// its usual course (shared/posix/stop_signals.hpp lists them). SIGKILL cannot be caught: then the
+/// device must notice.
 ///
 /// At most one per process; the servo thread calls `guard_stack` once.
 class MotorGuard {
  public:
-  explicit MotorGuard(DeviceDriver& device) noexcept;
+  explicit MotorGuard(const Devices& devices) noexcept;
   ~MotorGuard();
   MotorGuard(const MotorGuard&) = delete;
   MotorGuard& operator=(const MotorGuard&) = delete;
@@ -47,7 +47,7 @@ class MotorGuard {
 
  private:
   static constexpr std::size_t kStackBytes = 65536;
-  DeviceDriver& device_;
+  Devices devices_;
   alignas(16) std::array<std::byte, kStackBytes> stack_{};
 };
 
@@ -61,19 +61,22 @@ class MotorGuard {
 class CallGuard {
  public:
   /// `stop` ends the loop.
-  CallGuard(DeviceDriver& device, std::atomic<bool>& stop) noexcept;
+  CallGuard(const Devices& devices, std::atomic<bool>& stop) noexcept;
   ~CallGuard();
   CallGuard(const CallGuard&) = delete;
   CallGuard& operator=(const CallGuard&) = delete;
 
-  /// Servo thread, before the loop. `port` is that of `--port`, with `auto` resolved. Throws
+  /// Servo thread, before the loop. `ports` are those of `--port`, with `auto` resolved. Throws
   /// std::runtime_error with one line if the kernel has no such filter.
-  void enter(std::string_view port);
+  void enter(std::span<const std::string> ports);
   /// Servo thread, after the loop: further calls that are not allowed fail without other effect.
   void leave() noexcept;
 
   /// Name of the first unexpected call; empty if there was none. Not for signal handlers.
   [[nodiscard]] std::string unexpected() const;
+
+ private:
+  Devices devices_;
 };
 
 }  // namespace kerf

@@ -175,6 +175,17 @@ TickCommands commands_of(const TickRecord& record) noexcept {
           record.last_command};
 }
 
+TickCommands commands_of(std::span<const TickRecord> records) noexcept {
+  TickCommands commands = commands_of(records.front());
+  for (std::size_t arm = 1; arm < records.size(); ++arm) {
+    const ServoCommand own = commands_of(records[arm]).command;
+    if (own.kind != ServoCommand::Kind::select_tool) continue;  // all else is in every record
+    commands.command = own;
+    commands.command.arm = static_cast<std::uint32_t>(arm);
+  }
+  return commands;
+}
+
 SegmentSpec segment_spec(const LoadedScene& scene, const std::string& json, std::uint64_t hash) {
   SegmentSpec spec;
   spec.scene_json = json;
@@ -182,6 +193,7 @@ SegmentSpec segment_spec(const LoadedScene& scene, const std::string& json, std:
   spec.tick_ns = static_cast<std::uint32_t>(1'000'000'000 / scene.servo.rate_hz);
   spec.build_id = std::string("kerf-controller ") + KERF_VERSION;
   spec.mirror_updates = scene.cut.model != CutModel::none;
+  spec.arms = arms_of(scene);
   for (const SceneVolume& volume : scene.volumes) {
     SegmentVolumeSpec& v = spec.volumes.emplace_back();
     v.grid = volume.image.grid;
@@ -197,24 +209,30 @@ SegmentSpec segment_spec(const LoadedScene& scene, const std::string& json, std:
   return spec;
 }
 
-void Publisher::publish(Tick tick, const DeviceReport& report, const TickCommands& commands,
-                        const ServoOutput& output, const TickTiming& timing) noexcept {
-  TickRecord record = record_of(report, commands, output);
-  if (std::exchange(held_, output.held) != output.held) {
-    segment_.set_lifecycle(output.held ? Lifecycle::hold : Lifecycle::run);
+void Publisher::publish(Tick tick, std::span<const DeviceReport> reports,
+                        const TickCommands& commands, std::span<const ServoOutput> outputs,
+                        const TickTiming& timing) noexcept {
+  const bool held = outputs.front().held;
+  if (std::exchange(held_, held) != held) {
+    segment_.set_lifecycle(held ? Lifecycle::hold : Lifecycle::run);
   }
   segment_.begin_tick(tick);
-  publish_volumes(output, record);
-
-  record.tick = tick;
-  record.start_ns = static_cast<std::uint64_t>(timing.start_ns);
-  record.period_error_ns = saturate_i32(timing.late_ns);
-  record.execution_ns = static_cast<std::uint32_t>(timing.compute_ns);
-  record.missed_deadlines = static_cast<std::uint32_t>(timing.missed_deadlines);
-  record.lost_packets = static_cast<std::uint32_t>(timing.lost_packets);
-  record.refused_packets = static_cast<std::uint32_t>(timing.refused_packets);
-  record.penetration_mm = static_cast<float>(servo_.penetration_mm());
-  segment_.publish_state(record);
+  std::array<TickRecord, kMaxArms> records;
+  for (std::size_t a = 0; a < outputs.size(); ++a) {
+    TickRecord& record = records[a];
+    record = record_of(reports[a], commands_for(a, commands), outputs[a]);
+    publish_volumes(outputs[a], record);
+    record.tick = tick;
+    record.start_ns = static_cast<std::uint64_t>(timing.start_ns);
+    record.period_error_ns = saturate_i32(timing.late_ns);
+    record.execution_ns = static_cast<std::uint32_t>(timing.compute_ns);
+    record.missed_deadlines = static_cast<std::uint32_t>(timing.missed_deadlines);
+    record.lost_packets = static_cast<std::uint32_t>(timing.lost_packets[a]);
+    record.refused_packets = static_cast<std::uint32_t>(timing.refused_packets[a]);
+    record.penetration_mm = static_cast<float>(servo_.penetration_mm(a));
+  }
+  // The first arm last: a reader that sees its record finds those of the others.
+  for (std::size_t a = outputs.size(); a-- > 0;) segment_.publish_state(records[a], a);
   segment_.end_tick(static_cast<std::uint64_t>(timing.heartbeat_ns));
 }
 

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <string>
 
 #include "controller/load/loaded_scene.hpp"
@@ -21,8 +23,8 @@ struct TickTiming {
   std::int64_t late_ns = 0;
   std::int64_t compute_ns = 0;  ///< 0 in lock-step
   std::uint64_t missed_deadlines = 0;
-  std::uint64_t lost_packets = 0;
-  std::uint64_t refused_packets = 0;
+  std::array<std::uint64_t, kMaxArms> lost_packets{};
+  std::array<std::uint64_t, kMaxArms> refused_packets{};
 };
 
 /// What the servo was given in a tick besides the report: with it and the reports a run can be
@@ -33,13 +35,22 @@ struct TickCommands {
   std::uint32_t last_index = 0;  ///< `Command::index` of the last one so far
 };
 
-/// The record of a tick, as far as report, commands and output determine it: all but times,
-/// losses, hashes of volumes and penetration.
+/// The commands of a tick as an arm gets them: a tool of the other one is none.
+[[nodiscard]] inline TickCommands commands_for(std::size_t arm, TickCommands commands) noexcept {
+  const bool for_one = commands.command.kind == ServoCommand::Kind::select_tool;
+  if (for_one && commands.command.arm != arm) commands.command = {};
+  return commands;
+}
+
+/// The record of a tick of an arm, as far as report, commands and output determine it: all but
+/// times, losses, hashes of volumes and penetration.
 [[nodiscard]] TickRecord record_of(const DeviceReport& report, const TickCommands& commands,
                                    const ServoOutput& output) noexcept;
 /// The report in a record, and what `record_of` was given as commands.
 [[nodiscard]] DeviceReport report_of(const TickRecord& record) noexcept;
 [[nodiscard]] TickCommands commands_of(const TickRecord& record) noexcept;
+/// The same of a tick with the records of all arms.
+[[nodiscard]] TickCommands commands_of(std::span<const TickRecord> records) noexcept;
 
 /// Puts the boxes that changed into the record, and steps the chain of their hashes. `hash_of` a
 /// volume and its box gives the hash of the densities there.
@@ -81,8 +92,9 @@ class Publisher {
   Publisher(SegmentWriter& segment, const Servo& servo) noexcept
       : segment_(segment), servo_(servo) {}
 
-  void publish(Tick tick, const DeviceReport& report, const TickCommands& commands,
-               const ServoOutput& output, const TickTiming& timing) noexcept;
+  /// `reports` and `outputs` by arm.
+  void publish(Tick tick, std::span<const DeviceReport> reports, const TickCommands& commands,
+               std::span<const ServoOutput> outputs, const TickTiming& timing) noexcept;
 
  private:
   void publish_volumes(const ServoOutput& output, TickRecord& record) noexcept;

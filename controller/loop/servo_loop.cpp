@@ -2,7 +2,10 @@
 #include "controller/loop/servo_loop.hpp"
 
 #include <algorithm>
+#include <array>
 #include <bit>
+#include <cstddef>
+#include <span>
 
 #include "controller/loop/allocation_counter.hpp"
 #include "controller/loop/tick_source.hpp"
@@ -16,7 +19,7 @@ namespace {
 ServoCommand servo_command(const Command& command) noexcept {
   switch (command.kind) {
     case CommandKind::select_tool:
-      return {ServoCommand::Kind::select_tool, command.argument};
+      return {ServoCommand::Kind::select_tool, command.argument, command.arm};
     case CommandKind::hold:
       return {ServoCommand::Kind::hold, command.argument};
     case CommandKind::reset:
@@ -31,7 +34,44 @@ ServoCommand servo_command(const Command& command) noexcept {
   return {};
 }
 
-/// Statistics of the armed ticks; counts from before arming are subtracted.
+/// Statistics of the armed ticks of one arm.
+class ArmStatistics {
+ public:
+  explicit ArmStatistics(ArmRecord& record) noexcept : record_(record) {}
+
+  void count(Tick tick, const ServoOutput& output) noexcept {
+    if (output.fault != last_fault_ && output.fault != Fault::none) {
+      record_.faults.add(tick, fault_name(output.fault));
+    }
+    last_fault_ = output.fault;
+    if (!output.started) return;
+    is_gone_ = is_gone_ && output.stale;
+    stale_in_a_row_ = output.stale ? stale_in_a_row_ + 1 : 0;
+    record_.stale_ticks += output.stale && !is_gone_ ? 1 : 0;
+    record_.contact_ticks += output.contact ? 1 : 0;
+    record_.shaft_ticks += output.shaft ? 1 : 0;
+    record_.peak_force_n = std::max(record_.peak_force_n, vec3::length(output.force_n));
+    record_.absorbed_mj = output.absorbed_mj;
+    record_.port_minimum_mj = output.port_minimum_mj;
+    std::ranges::transform(output.energy_steps, record_.energy_mj.begin(), energy_mj_of_steps);
+    record_.output_hash = output.output_hash;
+  }
+
+  /// The device has gone: ticks without a report since then are no losses on the way, nor are those
+  /// until it comes back.
+  void lose_device() noexcept {
+    record_.stale_ticks -= stale_in_a_row_;
+    is_gone_ = true;
+  }
+
+ private:
+  ArmRecord& record_;
+  Fault last_fault_ = Fault::none;
+  std::uint64_t stale_in_a_row_ = 0;
+  bool is_gone_ = false;
+};
+
+/// Statistics of the armed ticks of a run; counts from before arming are subtracted.
 class RunStatistics {
  public:
   RunStatistics(RunRecord& record, const TickSource& clock) noexcept
@@ -41,67 +81,41 @@ class RunStatistics {
   struct Spent {
     std::int64_t late_ns, compute_ns, sent_ns, publish_ns;
   };
-  void count(Tick tick, const ServoOutput& output, const Spent& spent) noexcept {
-    if (output.fault != last_fault_ && output.fault != Fault::none) {
-      record_.add_fault(tick, fault_name(output.fault));
+  void count(Tick tick, std::span<const ServoOutput> outputs, const Spent& spent) noexcept {
+    for (std::size_t a = 0; a < outputs.size(); ++a) {
+      arms_[a].count(tick, outputs[a]);
+      follow(outputs[a].refused, last_refused_[a], "no_free_place", tick);
     }
-    last_fault_ = output.fault;
-    if (output.refused && !last_refused_) record_.add_event(tick, "no_free_place");
-    last_refused_ = output.refused;
-    if (output.resetting && !last_reset_) {
-      ++record_.resets;
-      record_.add_event(tick, "reset");
-    }
-    last_reset_ = output.resetting;
-    if (output.resetting) {
-      record_.removed_steps = {};
-      record_.forbidden_ticks = {};
-    }
-    if (output.undoing && !last_undo_) {
-      ++record_.undos;
-      record_.add_event(tick, "undo");
-    }
-    last_undo_ = output.undoing;
-    if (output.redoing && !last_redo_) {
-      ++record_.redos;
-      record_.add_event(tick, "redo");
-    }
-    last_redo_ = output.redoing;
-    for (std::size_t v = 0; v < kMaxVolumes; ++v) {
-      record_.removed_steps[v] -= output.returned_by_volume[v];
-    }
-    if (!output.started) return;
+    count_restores(tick, outputs.front());
+    if (std::ranges::none_of(outputs, &ServoOutput::started)) return;
     if (record_.ticks == 0) {
       record_.armed_at_tick = tick;
       start();
     }
     ++record_.ticks;
-    record_.stale_ticks += output.stale ? 1 : 0;
-    stale_in_a_row_ = output.stale ? stale_in_a_row_ + 1 : 0;
-    record_.contact_ticks += output.contact ? 1 : 0;
-    record_.shaft_ticks += output.shaft ? 1 : 0;
-    const double force_n = vec3::length(output.force_n);
-    record_.peak_force_n = std::max(record_.peak_force_n, force_n);
-    if (record_.first_force_ns == 0 && output.motors_on && force_n > 0) {
-      record_.first_force_ns = spent.sent_ns;
+    std::uint64_t forbidden = 0;
+    for (const ServoOutput& output : outputs) {
+      if (record_.first_force_ns == 0 && output.motors_on && vec3::length(output.force_n) > 0) {
+        record_.first_force_ns = spent.sent_ns;
+      }
+      for (std::size_t v = 0; v < kMaxVolumes; ++v) {
+        record_.removed_steps[v] += output.removed_by_volume[v];
+      }
+      forbidden |= output.forbidden_materials;
     }
-    for (std::size_t v = 0; v < kMaxVolumes; ++v) {
-      record_.removed_steps[v] += output.removed_by_volume[v];
+    for (; forbidden != 0; forbidden &= forbidden - 1) {
+      ++record_.forbidden_ticks[static_cast<std::size_t>(std::countr_zero(forbidden))];
     }
-    for (std::uint64_t left = output.forbidden_materials; left != 0; left &= left - 1) {
-      ++record_.forbidden_ticks[static_cast<std::size_t>(std::countr_zero(left))];
-    }
-    record_.absorbed_mj = output.absorbed_mj;
-    record_.port_minimum_mj = output.port_minimum_mj;
-    std::ranges::transform(output.energy_steps, record_.energy_mj.begin(), energy_mj_of_steps);
-    record_.output_hash = output.output_hash;
     record_.wake.record(spent.late_ns);
     record_.compute.record(spent.compute_ns);
     record_.publish.record(spent.publish_ns);
   }
 
-  /// The device has gone: ticks without a report since then are no losses on the way.
-  void forget_last_stale() noexcept { record_.stale_ticks -= stale_in_a_row_; }
+  /// The device of an arm has gone.
+  void lose(Tick tick, std::size_t arm) noexcept {
+    record_.arm(arm).faults.add(tick, "device_gone");
+    arms_[arm].lose_device();
+  }
 
   void start() noexcept {
     overruns_ = clock_.overruns();
@@ -117,37 +131,87 @@ class RunStatistics {
   }
 
  private:
+  /// Whether a state begins in this tick; then it is an event.
+  bool follow(bool now, bool& last, const char* name, Tick tick) noexcept {
+    const bool begins = now && !last;
+    last = now;
+    if (begins) record_.add_event(tick, name);
+    return begins;
+  }
+
+  /// The volumes are those of all arms, and what comes back to them is in the first output.
+  void count_restores(Tick tick, const ServoOutput& first) noexcept {
+    if (follow(first.resetting, last_reset_, "reset", tick)) ++record_.resets;
+    if (first.resetting) {
+      record_.removed_steps = {};
+      record_.forbidden_ticks = {};
+    }
+    if (follow(first.undoing, last_undo_, "undo", tick)) ++record_.undos;
+    if (follow(first.redoing, last_redo_, "redo", tick)) ++record_.redos;
+    for (std::size_t v = 0; v < kMaxVolumes; ++v) {
+      record_.removed_steps[v] -= first.returned_by_volume[v];
+    }
+  }
+
   RunRecord& record_;
   const TickSource& clock_;
-  Fault last_fault_ = Fault::none;
-  bool last_refused_ = false;
+  std::array<ArmStatistics, kMaxArms> arms_{ArmStatistics(record_), ArmStatistics(record_.second)};
+  std::array<bool, kMaxArms> last_refused_{};
   bool last_reset_ = false;
   bool last_undo_ = false;
-  std::uint64_t stale_in_a_row_ = 0;
   bool last_redo_ = false;
   std::uint64_t overruns_ = 0;
   std::uint64_t allocations_ = 0;
   ThreadFaults faults_;
 };
 
+/// Which devices have stopped sending.
+class SilentDevices {
+ public:
+  SilentDevices(std::size_t count, std::uint64_t gone_ticks) noexcept
+      : count_(count), gone_ticks_(gone_ticks) {}
+
+  /// After each tick. Returns whether no device is left; `lose` is called for each that goes.
+  bool follow(std::span<const DeviceReport> reports, const auto& lose) noexcept {
+    bool is_left = false;
+    for (std::size_t a = 0; a < count_; ++a) {
+      ticks_[a] = reports[a].fresh ? 0 : ticks_[a] + 1;
+      if (ticks_[a] == gone_ticks_) lose(a);
+      is_left = is_left || ticks_[a] < gone_ticks_;
+    }
+    return !is_left;
+  }
+
+ private:
+  std::size_t count_;
+  std::uint64_t gone_ticks_;
+  std::array<std::uint64_t, kMaxArms> ticks_{};
+};
+
 }  // namespace
 
-EndReason run_servo(TickSource& clock, DeviceDriver& device, Servo& servo, Publisher& eyes,
+EndReason run_servo(TickSource& clock, const Devices& devices, Servo& servo, Publisher& eyes,
                     SegmentServer& commands, const LoopLimits& limits, LoopSignals& signals,
                     RunRecord& record) noexcept {
   EndReason end = EndReason::stopped;
   TickCommands given;
-  std::uint64_t silent_ticks = 0;
   const CountedAllocations counted;
   RunStatistics books(record, clock);
   books.start();
+  SilentDevices silent(devices.size(), limits.gone_ticks);
+  std::array<DeviceReport, kMaxArms> all_reports;
+  std::array<ServoOutput, kMaxArms> all_outputs;
+  const auto reports = std::span(all_reports).first(devices.size());
+  const auto outputs = std::span(all_outputs).first(devices.size());
 
   for (Tick tick = 1; !signals.stop.load(std::memory_order_relaxed); ++tick) {
     TickTiming timing;
     timing.late_ns = clock.wait_next();
     timing.heartbeat_ns = monotonic_ns();
     timing.start_ns = clock.start_ns(tick);
-    const DeviceReport report = device.read();  // newest pose; never blocks
+    for (std::size_t a = 0; a < reports.size(); ++a) {
+      reports[a] = devices[a].read();  // newest pose; never blocks
+    }
     given.command = {};
     if (const auto command = commands.take_command()) {
       given.command = servo_command(*command);
@@ -158,37 +222,38 @@ EndReason run_servo(TickSource& clock, DeviceDriver& device, Servo& servo, Publi
     given.fade_in = stall != nullptr;
     if (given.fade_in) record.add_event(tick, stall);
     const std::int64_t in_hand_ns = monotonic_ns();
-    const ServoOutput output = servo.step(report);  // all physics, all limits
+    servo.step(reports, outputs);  // all physics, all limits
     const std::int64_t compute_ns = monotonic_ns() - in_hand_ns;
     timing.compute_ns = clock.takes_time() ? compute_ns : 0;
     timing.missed_deadlines = clock.overruns();
-    timing.lost_packets = device.lost();
-    timing.refused_packets = device.refused();
-    send_tick(output, signals, device);  // the device first,
+    for (std::size_t a = 0; a < reports.size(); ++a) {
+      timing.lost_packets[a] = devices[a].lost();
+      timing.refused_packets[a] = devices[a].refused();
+    }
+    send_tick(outputs, signals, devices);  // the devices first,
     const std::int64_t sent_ns = monotonic_ns();
-    eyes.publish(tick, report, given, output, timing);  // then the readers
-    books.count(tick, output, {timing.late_ns, compute_ns, sent_ns, monotonic_ns() - sent_ns});
+    eyes.publish(tick, reports, given, outputs, timing);  // then the readers
+    books.count(tick, outputs, {timing.late_ns, compute_ns, sent_ns, monotonic_ns() - sent_ns});
 
     signals.heartbeat.store(tick, std::memory_order_relaxed);
     signals.armed_ticks.store(record.ticks, std::memory_order_relaxed);
-    signals.waiting.store(waiting_for(report, output), std::memory_order_relaxed);
-    silent_ticks = report.fresh ? 0 : silent_ticks + 1;
+    for (std::size_t a = 0; a < reports.size(); ++a) {
+      signals.waiting[a].store(waiting_for(reports[a], outputs[a]), std::memory_order_relaxed);
+    }
     if (record.ticks >= limits.armed_ticks) {
       end = EndReason::ticks_done;
       break;
     }
-    if (silent_ticks >= limits.gone_ticks) {
-      record.add_fault(tick, "device_gone");
-      books.forget_last_stale();
+    if (silent.follow(reports, [&](std::size_t arm) { books.lose(tick, arm); })) {
       end = EndReason::device_gone;
       break;
     }
-    if (!output.started && tick >= limits.arming_ticks) {
+    if (record.ticks == 0 && tick >= limits.arming_ticks) {
       end = EndReason::never_armed;
       break;
     }
   }
-  device.release();  // motors off on the way out
+  devices.release();  // motors off on the way out
   books.finish();
   return end;
 }

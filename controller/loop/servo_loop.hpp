@@ -10,7 +10,7 @@
 #include <span>
 #include <thread>
 
-#include "controller/device/device_driver.hpp"
+#include "controller/device/devices.hpp"
 #include "controller/loop/publisher.hpp"
 #include "controller/loop/real_time.hpp"
 #include "controller/loop/tick_source.hpp"
@@ -47,34 +47,42 @@ struct EventList {
 /// Bits of `ServoOutput::forbidden_materials`.
 inline constexpr std::size_t kMostForbidden = 64;
 
-/// Statistics of a run. Fixed memory: the servo thread writes it, others read it after the end.
-struct RunRecord {
-  std::uint64_t ticks = 0;          ///< servo steps after arming; the counters below count these
-  std::uint64_t armed_at_tick = 0;  ///< tick of the segment and of the log that was the first
-  std::uint64_t overruns = 0;
+/// Statistics of one arm, from its own arming on.
+struct ArmRecord {
   std::uint64_t stale_ticks = 0;
   std::uint64_t contact_ticks = 0;
   std::uint64_t shaft_ticks = 0;  ///< shaft or handpiece touched
-  Histogram wake, compute, publish;
   double peak_force_n = 0;
-  std::int64_t first_force_ns = 0;  ///< time of the first sent force, CLOCK_MONOTONIC; 0: none
-  std::array<std::uint64_t, kMaxVolumes> removed_steps{};       ///< by volume, since the last reset
-  std::array<std::uint64_t, kMostForbidden> forbidden_ticks{};  ///< by material, since then too
-  std::uint64_t resets = 0;    ///< of the volumes; before arming too
-  std::uint64_t undos = 0;     ///< of the last stroke each
-  std::uint64_t redos = 0;     ///< likewise
   double absorbed_mj = 0;      ///< at the device port, + is taken from the hand
   double port_minimum_mj = 0;  ///< lowest value of it: below 0 the loop gave more than it took
   std::array<double, kEnergySources> energy_mj{};  ///< it by source
   std::uint64_t output_hash = 0;
+  EventList faults;  ///< as they latched; one makes the run a failure
+};
+
+/// Statistics of a run. Fixed memory: the servo thread writes it, others read it after the end.
+/// Inherits those of the first arm.
+struct RunRecord : ArmRecord {
+  ArmRecord second;                 ///< of the second arm, if there is one
+  std::uint64_t ticks = 0;          ///< since an arm was armed; the counters below count these
+  std::uint64_t armed_at_tick = 0;  ///< tick of the segment and of the log that was the first
+  std::uint64_t overruns = 0;
+  Histogram wake, compute, publish;
+  std::int64_t first_force_ns = 0;  ///< time of the first sent force, CLOCK_MONOTONIC; 0: none
+  std::array<std::uint64_t, kMaxVolumes> removed_steps{};       ///< by volume, since the last reset
+  std::array<std::uint64_t, kMostForbidden> forbidden_ticks{};  ///< by material, since then too
+  std::uint64_t resets = 0;  ///< of the volumes; before arming too
+  std::uint64_t undos = 0;   ///< of the last stroke each
+  std::uint64_t redos = 0;   ///< likewise
   std::uint64_t allocations = 0;
   ThreadFaults faults_of_pages;
 
-  EventList faults;  ///< as they latched; one makes the run a failure
   EventList events;  ///< of the loop; the run went on after each
 
   void add_event(std::uint64_t tick, const char* name) noexcept { events.add(tick, name); }
   void add_fault(std::uint64_t tick, const char* name) noexcept { faults.add(tick, name); }
+  [[nodiscard]] ArmRecord& arm(std::size_t index) noexcept { return index == 0 ? *this : second; }
+  [[nodiscard]] bool has_faults() const noexcept { return faults.count + second.faults.count > 0; }
 };
 
 /// Why the loop ended; `unexpected_call` is a stop by `--guard`.
@@ -88,17 +96,18 @@ enum class EndReason : std::uint8_t {
 
 struct LoopLimits {
   std::uint64_t armed_ticks = UINT64_MAX;   ///< servo steps after arming
-  std::uint64_t gone_ticks = 2000;          ///< without a report: 2 s
+  std::uint64_t gone_ticks = 2000;          ///< without a report of any device: 2 s
   std::uint64_t arming_ticks = UINT64_MAX;  ///< patience for the first docking
 };
 
 /// State that the loop shares with other threads.
 struct LoopSignals {
-  std::atomic<bool>& stop;                        ///< set by a signal
-  std::atomic<bool> stalled{false};               ///< the watchdog switched the motors off
-  std::atomic<std::uint64_t> heartbeat{0};        ///< ticks so far, for the watchdog
-  std::atomic<std::uint64_t> armed_ticks{0};      ///< for the progress bar
-  std::atomic<Waiting> waiting{Waiting::report};  ///< of the device, after the last tick
+  std::atomic<bool>& stop;                    ///< set by a signal
+  std::atomic<bool> stalled{false};           ///< the watchdog switched the motors off
+  std::atomic<std::uint64_t> heartbeat{0};    ///< ticks so far, for the watchdog
+  std::atomic<std::uint64_t> armed_ticks{0};  ///< for the progress bar
+  /// Of each device, after the last tick.
+  std::array<std::atomic<Waiting>, kMaxArms> waiting{Waiting::report, Waiting::report};
 };
 
 /// First step of a tick: restarts the force if the servo was stopped, detected by its watchdog, or
@@ -110,20 +119,22 @@ inline const char* recover(LoopSignals& signals, bool stood_still, Servo& servo)
   return watchdog_tripped ? "watchdog" : "stood_still";
 }
 
-/// Sends the output of a tick. If the tick itself was the stall, its output is dropped, and the
+/// Sends the outputs of a tick, by arm. If the tick itself was the stall, they are dropped, and the
 /// next one fades in.
-inline void send_tick(const ServoOutput& output, const LoopSignals& signals,
-                      DeviceDriver& device) noexcept {
+inline void send_tick(std::span<const ServoOutput> outputs, const LoopSignals& signals,
+                      const Devices& devices) noexcept {
   if (signals.stalled.load(std::memory_order_relaxed)) {
-    device.release();
-  } else {
-    device.command(output);
+    devices.release();
+    return;
   }
+  for (std::size_t a = 0; a < outputs.size(); ++a) devices[a].command(outputs[a]);
 }
 
-/// The loop around the servo step: time, device, step, device, publication, statistics. Runs on the
-/// calling thread until a limit is met or a stop is requested; the motors are off when it returns.
-EndReason run_servo(TickSource& clock, DeviceDriver& device, Servo& servo, Publisher& eyes,
+/// The loop around the servo step: time, devices, step, devices, publication, statistics. Runs on
+/// the calling thread until a limit is met or a stop is requested; the motors are off when it
+/// returns. A device that goes away is a fault of its arm alone, and ends the run if no other is
+/// left. `devices` has one for each arm of the servo.
+EndReason run_servo(TickSource& clock, const Devices& devices, Servo& servo, Publisher& eyes,
                     SegmentServer& commands, const LoopLimits& limits, LoopSignals& signals,
                     RunRecord& record) noexcept;
 
@@ -133,8 +144,8 @@ inline constexpr std::chrono::milliseconds kWatchdogPeriod{5};
 /// off, once per stall; the loop fades the force in again when it continues.
 class Watchdog {
  public:
-  Watchdog(const DeviceDriver& device, LoopSignals& signals) noexcept
-      : device_(device), signals_(signals) {}
+  Watchdog(const Devices& devices, LoopSignals& signals) noexcept
+      : devices_(devices), signals_(signals) {}
 
   /// Call once per `kWatchdogPeriod`.
   void look(std::int64_t now_ns) noexcept {
@@ -146,7 +157,7 @@ class Watchdog {
       return;
     }
     if (tripped_ || now_ns - last_change_ns_ < kStandstillNs) return;
-    static_cast<void>(device_.release());
+    static_cast<void>(devices_.release());
     tripped_ = true;
     ++trips_;
     signals_.stalled.store(true, std::memory_order_relaxed);
@@ -155,7 +166,7 @@ class Watchdog {
   [[nodiscard]] std::uint64_t trips() const noexcept { return trips_; }
 
  private:
-  const DeviceDriver& device_;
+  Devices devices_;
   LoopSignals& signals_;
   std::uint64_t last_heartbeat_ = 0;
   std::int64_t last_change_ns_ = 0;

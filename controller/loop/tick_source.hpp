@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <atomic>
+#include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <stdexcept>
@@ -13,7 +15,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "controller/device/device_driver.hpp"
+#include "controller/device/devices.hpp"
 #include "shared/posix/monotonic_clock.hpp"
 
 // Start of ticks: deadlines in real time, reports in lock-step, standstill and the gate of
@@ -170,16 +172,18 @@ class RealTimeTicks final : public TickSource {
   bool stood_still_ = false;
 };
 
-/// Virtual time: one tick per report, as fast as both processes run. After a device has been silent
-/// for two seconds of real time, ticks pass without a report until the next one comes. With a
-/// gate, each tick first waits until the gate allows it.
+/// Virtual time: one tick per report of each device, as fast as all processes run. After a device
+/// has been silent for two seconds of real time, ticks pass without a report of it until the next
+/// one comes. With a gate, each tick first waits until the gate allows it.
 class LockStepTicks final : public TickSource {
  public:
-  LockStepTicks(DeviceDriver& device, std::int64_t period_ns, TickGate* gate = nullptr) noexcept
-      : device_(device), period_ns_(period_ns), gate_(gate) {}
+  LockStepTicks(const Devices& devices, std::int64_t period_ns, TickGate* gate = nullptr) noexcept
+      : devices_(devices), period_ns_(period_ns), gate_(gate) {}
   std::int64_t wait_next() noexcept override {
     if (gate_ != nullptr) gate_->wait_for(++tick_);
-    silent_ = !device_.wait(silent_ ? 0 : kPatienceMs);
+    for (std::size_t a = 0; a < devices_.size(); ++a) {
+      silent_[a] = !devices_[a].wait(silent_[a] ? 0 : kPatienceMs);
+    }
     return 0;
   }
   [[nodiscard]] std::uint64_t overruns() const noexcept override { return 0; }
@@ -190,11 +194,11 @@ class LockStepTicks final : public TickSource {
 
  private:
   static constexpr int kPatienceMs = 2000;
-  DeviceDriver& device_;
+  Devices devices_;
   std::int64_t period_ns_;
   TickGate* gate_;
   std::uint64_t tick_ = 0;
-  bool silent_ = false;
+  std::array<bool, kMaxArms> silent_{};
 };
 
 }  // namespace kerf

@@ -60,11 +60,18 @@ class CompiledSceneOf final : public CompiledScene {
     }
     for (const SceneTool& tool : scene.tools) plan_tool_everywhere(scene, tool);
     state_.active_tool = static_cast<std::uint32_t>(scene.active_tool);
+    arms_.push_back({&plan_, &state_});
+    if (scene.second) plan_second(scene);
     for (const SceneVolume& volume : scene.volumes) grids_.push_back(volume.image.grid);
     costs_.arrays = memory_.arrays();
   }
 
-  void take(LoadedScene& scene) override { memory_.take(scene, plan_, state_); }
+  void take(LoadedScene& scene) override {
+    memory_.take(scene, plan_, state_);
+    if (!second_) return;
+    second_->plan.force_cut = plan_.force_cut;  // its labels lie in the memory
+    memory_.share(state_, second_->state);
+  }
   [[nodiscard]] const SceneCosts& costs() const noexcept override { return costs_; }
   [[nodiscard]] TickTime time_tick(std::size_t tick) override {
     const TickCost& cost = costs_.ticks[tick];
@@ -76,22 +83,25 @@ class CompiledSceneOf final : public CompiledScene {
   }
 
   [[nodiscard]] std::unique_ptr<ServoSnapshot> keep() const override {
-    return std::make_unique<SnapshotOf<N>>(memory_.keep(state_));
+    return std::make_unique<SnapshotOf<N>>(memory_.keep(arms_));
   }
   void restore(const ServoSnapshot& kept) override {
     const auto* same = dynamic_cast<const SnapshotOf<N>*>(&kept);
     if (same == nullptr) refuse_snapshot();
-    memory_.restore(*same, state_);
+    memory_.restore(*same, arms_);
   }
 
-  ServoOutput step(const DeviceReport& report) noexcept override {
-    return servo_step(plan_, state_, report);
+  [[nodiscard]] std::size_t arms() const noexcept override { return arms_.size(); }
+  using Servo::step;
+  void step(std::span<const DeviceReport> reports,
+            std::span<ServoOutput> outputs) noexcept override {
+    servo_step<N>(arms_, reports, outputs);
   }
   bool apply(const ServoCommand& command) noexcept override {
-    return apply_command(plan_, state_, command);
+    return apply_command<N>(arms_, command);
   }
-  [[nodiscard]] double penetration_mm() const noexcept override {
-    return kerf::penetration_mm(plan_, state_);
+  [[nodiscard]] double penetration_mm(std::size_t arm) const noexcept override {
+    return kerf::penetration_mm(*arms_[arm].plan, *arms_[arm].state);
   }
   [[nodiscard]] VoxelGrid grid(std::size_t scene_index) const noexcept override {
     return grids_[scene_index];
@@ -136,6 +146,22 @@ class CompiledSceneOf final : public CompiledScene {
     plan.samples = memory_.methods().samples_of(tool);
   }
 
+  /// The second arm has the plan of the first with a device of its own. Both hands have one scale,
+  /// so that all tools and volumes are the same for both.
+  void plan_second(const LoadedScene& scene) {
+    const LoadedScene of_arm = second_arm_of(scene);
+    second_ = std::make_unique<Second>();
+    ServoPlan<N>& plan = second_->plan;
+    plan = plan_;
+    plan.device = {};
+    plan_device(of_arm.device, plan);
+    plan_limits(of_arm, plan);
+    plan_laws(of_arm, plan);
+    second_->state.active_tool = static_cast<std::uint32_t>(of_arm.active_tool);
+    arms_.push_back({&plan, &second_->state});
+    costs_.arms = 2;
+  }
+
   /// Of one volume, rounded up.
   [[nodiscard]] std::uint64_t most_samples(const SweptTool<N>& tool) const {
     if (!plan_.contact.swept) return 0;
@@ -143,9 +169,16 @@ class CompiledSceneOf final : public CompiledScene {
     return (static_cast<std::uint64_t>(all) + plan_.volume_count - 1) / plan_.volume_count;
   }
 
+  struct Second {
+    ServoPlan<N> plan;
+    ServoState<N> state;
+  };
+
   ServoPlan<N> plan_;
   ServoState<N> state_;
-  std::vector<VoxelGrid> grids_;  ///< by volume of the scene
+  std::unique_ptr<Second> second_;  ///< of the second arm, if there is one
+  std::vector<Arm<N>> arms_;        ///< their addresses
+  std::vector<VoxelGrid> grids_;    ///< by volume of the scene
   ServoMemory<N> memory_;
   SceneCosts costs_;
 };
@@ -183,7 +216,7 @@ std::string us_text(double us) {
 double work_us(const SceneCosts& costs, std::size_t tool) {
   double us = 0;
   for (const TickCost& tick : costs.ticks) us += tick.tool == tool ? work_us(tick.stages) : 0;
-  return us;
+  return static_cast<double>(costs.arms) * us;
 }
 
 double work_budget_us(const LoadedScene& scene) {
@@ -211,8 +244,9 @@ std::string budget_error(const LoadedScene& scene, const SceneCosts& costs) {
   const StageCost* most = nullptr;
   for (const TickCost& tick : costs.ticks) {
     if (tick.tool != tool) continue;
-    parts += ", in " + scene.volumes[tick.volume].name + " " + us_text(work_us(tick.stages)) +
-             " by the method " + tick.variant() + " (" + tick.choice.why + ")";
+    parts += ", in " + scene.volumes[tick.volume].name + " " +
+             us_text(static_cast<double>(costs.arms) * work_us(tick.stages)) + " by the method " +
+             tick.variant() + " (" + tick.choice.why + ")";
     if (advice.empty()) advice = tick.choice.method->advice;
     for (const StageCost& stage : tick.stages) {
       if (most == nullptr || work_us(stage) > work_us(*most)) most = &stage;
@@ -227,11 +261,12 @@ std::string budget_error(const LoadedScene& scene, const SceneCosts& costs) {
   if (!fixed) advice = "fixed numbers";
   if (fixed && std::string_view(most->stage) == "queries") advice.clear();
   const std::string third = advice.empty() ? "" : ", or " + advice;
-  return scene.path + ": tool " + scene.tools[tool].name + ": up to " + us_text(sum_us) +
-         " us of work a tick, most of it " + most->stage + " (" + us_text(work_us(*most)) + ")" +
-         parts + ", above the " + us_text(budget_us) + " us that are half a tick at " +
-         std::to_string(scene.servo.rate_hz) + " Hz; use " +
-         (rate_hz == 0 ? "" : "--rate " + std::to_string(rate_hz) + " or lower, ") +
+  return scene.path + ": tool " + scene.tools[tool].name +
+         (costs.arms > 1 ? " in both hands" : "") + ": up to " + us_text(sum_us) +
+         " us of work a tick, most of it " + most->stage + " (" +
+         us_text(static_cast<double>(costs.arms) * work_us(*most)) + ")" + parts + ", above the " +
+         us_text(budget_us) + " us that are half a tick at " + std::to_string(scene.servo.rate_hz) +
+         " Hz; use " + (rate_hz == 0 ? "" : "--rate " + std::to_string(rate_hz) + " or lower, ") +
          (rate_hz != 0 && third.empty() ? "or " : "") + "a smaller tool" + others +
          (others.empty() ? "" : ")") + third;
 }

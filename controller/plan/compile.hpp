@@ -38,7 +38,8 @@ struct TickTime {
 
 /// Cost of a scene, known before its memory is allocated.
 struct SceneCosts {
-  std::vector<TickCost> ticks;  ///< by tool, then by solid volume
+  std::vector<TickCost> ticks;  ///< by tool, then by solid volume; of one arm
+  std::size_t arms = 1;
   std::vector<ArrayBytes> arrays;
   /// By tool: speed of the hand up to which it has no drag in air (air_speed.hpp). Empty for the
   /// paper's force.
@@ -105,7 +106,8 @@ class CompiledScene : public Servo {
 /// reference the other half is left for the device, the publication and other work of the core.
 inline constexpr double kBudgetRatio = 0.5;
 
-/// Work of one tick of a tool in all volumes: us on the reference machine.
+/// Work of one tick of a tool in all volumes, of all arms if each holds it: us on the reference
+/// machine.
 [[nodiscard]] double work_us(const SceneCosts& costs, std::size_t tool);
 
 /// The budget of a tick in the same unit.

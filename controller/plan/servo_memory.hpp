@@ -46,57 +46,75 @@ void restore_arrays(const Arrays& kept, Arrays& arrays) {
   for (std::size_t i = 0; i < kept.size(); ++i) std::ranges::copy(kept[i], arrays[i].begin());
 }
 
+/// Fractions of density steps that an arm still owes, by volume of the plan.
+template <class N>
+using ArmCarries = std::array<std::vector<RemovalCarry<N>>, kMaxVolumes>;
+
 /// The values and arrays of one servo.
 template <class N>
 struct SnapshotOf final : ServoSnapshot {
-  SnapshotOf(const ServoState<N>& of, std::vector<std::vector<Density>> density,
+  SnapshotOf(Arms<N> arms, const VolumeHistory& kept_history,
+             std::vector<std::vector<Density>> density,
              std::array<std::vector<Gradient<N>>, kMaxVolumes> gradient,
-             std::array<std::vector<RemovalCarry<N>>, kMaxVolumes> carry,
+             std::vector<ArmCarries<N>> carry,
              std::array<std::vector<std::uint64_t>, kMaxVolumes> blocks,
              std::vector<KeptBrick> stroke_pool,
              std::array<std::vector<std::uint32_t>, kMaxVolumes> stroke_bricks)
-      : state(of),
+      : history(kept_history),
         densities(std::move(density)),
         gradients(std::move(gradient)),
         carries(std::move(carry)),
         cut_blocks(std::move(blocks)),
         pool(std::move(stroke_pool)),
-        kept_in(std::move(stroke_bricks)) {}
+        kept_in(std::move(stroke_bricks)) {
+    for (const Arm<N>& arm : arms) states.push_back(*arm.state);
+  }
 
-  /// The kept values, with the memory of `here`.
-  [[nodiscard]] ServoState<N> state_in(const ServoState<N>& here) const {
-    ServoState<N> placed = state;
+  /// The kept values of an arm, with the memory of `here`.
+  [[nodiscard]] ServoState<N> state_in(const ServoState<N>& here, std::size_t arm) const {
+    ServoState<N> placed = states[arm];
     placed.volumes = here.volumes;
     placed.overlap = here.overlap;
     placed.gradient_scratch = here.gradient_scratch;
     placed.scratch = here.scratch;
-    placed.stroke.pool = here.stroke.pool;
-    placed.stroke.kept_in = here.stroke.kept_in;
+    placed.history = here.history;
     placed.contact.volumes = here.contact.volumes;
     placed.contact.shaft_volumes = here.contact.shaft_volumes;
     placed.force_cut.list = here.force_cut.list;
+    return placed;
+  }
+  [[nodiscard]] VolumeHistory history_in(const VolumeHistory& here) const {
+    VolumeHistory placed = history;
+    placed.stroke.pool = here.stroke.pool;
+    placed.stroke.kept_in = here.stroke.kept_in;
     return placed;
   }
 
   [[nodiscard]] double largest_carry() const override {
     double largest = 0;
     const auto count = [&](double voxels) { largest = std::max(largest, std::abs(voxels)); };
-    for (const auto& by_lane : carries) {
-      for (const auto owed : by_lane) {
-        count(static_cast<double>(owed) / (N::kIsFixed ? 65536.0 : 1.0) / kDensityMax);
+    for (const ArmCarries<N>& of_arm : carries) {
+      for (const auto& by_lane : of_arm) {
+        for (const auto owed : by_lane) {
+          count(static_cast<double>(owed) / (N::kIsFixed ? 65536.0 : 1.0) / kDensityMax);
+        }
       }
     }
     const double voxel = kDensityMax * (N::kIsFixed ? std::ldexp(1.0, kBudgetBits) : 1.0);
-    for (const auto& volume : state.force_cut.volume) {
-      for (const auto owed : volume.carry) count(static_cast<double>(owed) / voxel);
+    for (const ServoState<N>& state : states) {
+      for (const auto& volume : state.force_cut.volume) {
+        for (const auto owed : volume.carry) count(static_cast<double>(owed) / voxel);
+      }
     }
     return largest;
   }
 
-  ServoState<N> state;  ///< its pointers are those of the servo that was kept: see `state_in`
+  /// By arm; pointers are those of the servo that was kept: see `state_in`.
+  std::vector<ServoState<N>> states;
+  VolumeHistory history;
   std::vector<std::vector<Density>> densities;                  ///< by volume of the scene
   std::array<std::vector<Gradient<N>>, kMaxVolumes> gradients;  ///< by volume of the plan
-  std::array<std::vector<RemovalCarry<N>>, kMaxVolumes> carries;
+  std::vector<ArmCarries<N>> carries;                           ///< by arm
   std::array<std::vector<std::uint64_t>, kMaxVolumes> cut_blocks;
   std::vector<KeptBrick> pool;
   std::array<std::vector<std::uint32_t>, kMaxVolumes> kept_in;
@@ -253,7 +271,9 @@ template <class N>
 class ServoMemory {
  public:
   explicit ServoMemory(const LoadedScene& scene)
-      : cuts_(scene.cut.model != CutModel::none), methods_(scene.servo.kernel) {
+      : cuts_(scene.cut.model != CutModel::none),
+        carries_(arms_of(scene)),
+        methods_(scene.servo.kernel) {
     for (const SceneVolume& volume : scene.volumes) {
       volumes_.push_back({volume.name, volume.image.density.size() * sizeof(Density),
                           volume.image.labels.size() * sizeof(Label)});
@@ -282,7 +302,7 @@ class ServoMemory {
       const VolumePlan<N>& volume = plan.volumes[v];
       std::vector<Density>& density = densities_[volume.scene_index];
       gradients_[v].resize(lengths.gradients[v]);
-      carries_[v].resize(lengths.carry[v]);
+      for (ArmCarries<N>& of_arm : carries_) of_arm[v].resize(lengths.carry[v]);
       if (!gradients_[v].empty()) {
         refresh_gradients<N>(plan.kernel, volume.grid, density, volume.grid.box(), gradients_[v],
                              *scratch);
@@ -291,17 +311,17 @@ class ServoMemory {
         firsts_[v] = density;
         cut_blocks_[v].resize(BrickBlocks::of(volume.grid).count());
       }
-      state.volumes[v] = {density, gradients_[v], carries_[v], firsts_[v], cut_blocks_[v]};
+      state.volumes[v] = {density, gradients_[v], carries_[0][v], firsts_[v], cut_blocks_[v]};
       if (plan.contact.swept) {
         contact_.take(scene, scene.volumes[volume.scene_index], v, density, state.contact);
       }
     }
     if (cuts_) {
       pool_.resize(pool_size());
-      state.stroke.pool = pool_;
+      history_.stroke.pool = pool_;
       for (std::size_t v = 0; v < plan.volume_count; ++v) {
         kept_in_[v].resize(BrickGrid::of(plan.volumes[v].grid).count());
-        state.stroke.kept_in[v] = kept_in_[v];
+        history_.stroke.kept_in[v] = kept_in_[v];
       }
     }
     force_cut_.take(scene, plan, state.force_cut);
@@ -310,6 +330,16 @@ class ServoMemory {
     state.overlap.memory = overlap_;
     state.gradient_scratch = refresh_.data();
     state.scratch = methods_.scratch.view();
+    state.history = &history_;
+  }
+
+  /// Makes a second arm of the state of the first, after `take` and before the first step: the same
+  /// volumes and scratch, since the arms take turns, and fractions of its own.
+  void share(const ServoState<N>& first, ServoState<N>& second) {
+    const std::uint32_t tool = second.active_tool;
+    second = first;
+    second.active_tool = tool;
+    for (std::size_t v = 0; v < kMaxVolumes; ++v) second.volumes[v].carry = carries_[1][v];
   }
 
   [[nodiscard]] std::span<const Density> density(std::size_t scene_index) const noexcept {
@@ -317,20 +347,24 @@ class ServoMemory {
   }
 
   /// After `take`.
-  [[nodiscard]] SnapshotOf<N> keep(const ServoState<N>& state) const {
-    return {state, densities_, gradients_, carries_, cut_blocks_, pool_, kept_in_};
+  [[nodiscard]] SnapshotOf<N> keep(Arms<N> arms) const {
+    return {arms, history_, densities_, gradients_, carries_, cut_blocks_, pool_, kept_in_};
   }
   /// Copies the snapshot into the existing arrays. Their addresses do not change, because plan and
   /// state point to them. Throws std::invalid_argument if the snapshot is from another scene.
-  void restore(const SnapshotOf<N>& kept, ServoState<N>& state) {
+  void restore(const SnapshotOf<N>& kept, Arms<N> arms) {
+    if (kept.states.size() != arms.size()) refuse_snapshot();
     restore_arrays(kept.densities, densities_);
     restore_arrays(kept.gradients, gradients_);
-    restore_arrays(kept.carries, carries_);
+    for (std::size_t a = 0; a < arms.size(); ++a) restore_arrays(kept.carries[a], carries_[a]);
     restore_arrays(kept.cut_blocks, cut_blocks_);
     restore_arrays(kept.kept_in, kept_in_);
     if (kept.pool.size() != pool_.size()) refuse_snapshot();
     std::ranges::copy(kept.pool, pool_.begin());
-    state = kept.state_in(state);
+    history_ = kept.history_in(history_);
+    for (std::size_t a = 0; a < arms.size(); ++a) {
+      *arms[a].state = kept.state_in(*arms[a].state, a);
+    }
   }
 
   /// All arrays by name, with their sizes before `take`.
@@ -347,7 +381,7 @@ class ServoMemory {
     for (std::size_t v = 0; v < solids_.size(); ++v) {
       const auto& [name, grid] = solids_[v];
       add("gradient of " + name, lengths.gradients[v] * sizeof(Gradient<N>), false);
-      add("carry of " + name, lengths.carry[v] * sizeof(RemovalCarry<N>), false);
+      add("carry of " + name, carries_.size() * lengths.carry[v] * sizeof(RemovalCarry<N>), false);
       if (!cuts_) continue;
       add("first content of " + name, grid.voxel_count() * sizeof(Density), false);
       add("cut bricks of " + name, BrickBlocks::of(grid).count() * sizeof(std::uint64_t), false);
@@ -390,9 +424,10 @@ class ServoMemory {
   std::vector<std::vector<Density>> densities_;
   std::vector<std::pair<std::string, std::vector<ToolOffset>>> samples_;
   std::array<std::vector<Gradient<N>>, kMaxVolumes> gradients_;  ///< by volume of the plan
-  std::array<std::vector<RemovalCarry<N>>, kMaxVolumes> carries_;
-  std::array<std::vector<Density>, kMaxVolumes> firsts_;  ///< if the scene cuts, as the next
+  std::vector<ArmCarries<N>> carries_;                           ///< by arm
+  std::array<std::vector<Density>, kMaxVolumes> firsts_;         ///< if the scene cuts, as the next
   std::array<std::vector<std::uint64_t>, kMaxVolumes> cut_blocks_;
+  VolumeHistory history_;
   std::vector<KeptBrick> pool_;  ///< of the last strokes, as the next
   std::array<std::vector<std::uint32_t>, kMaxVolumes> kept_in_;
   std::vector<typename N::Weight> overlap_;

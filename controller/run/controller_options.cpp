@@ -79,16 +79,19 @@ void declare_scene_options(Arguments& app, ControllerOptions& options, Raw& raw)
   app.option("--device", raw.device, "what is held, instead of the scene's")
       .one_of(words_of(kPersonalityWords))
       .shown_as("NAME");
-  app.option("--torque-scale", raw.torque_scale,
-             "N mm at the joint per motor count, instead of the scene's")
-      .values(3, 3)
+  app.option(
+         "--torque-scale", raw.torque_scale,
+         "N mm at the joint per motor count, instead of the scene's; six numbers: of two devices")
+      .values(3, 6)
       .within(-kMaxTorqueScale, kMaxTorqueScale)
       .shown_as("A,B,C");
   app.option(
-         "--port", options.port,
+         "--port", options.ports,
          "where the device is: auto; fw, usb or hid, each [:NODE or :SERIAL]; usb also "
          "[,firmware=FILE]; ws[:[HOST:]PORT][,park=BUTTON][,device=ID], the Inverse3's service; "
-         "arm[:NAME] of kerf-arm; socket:PATH or udp:[ADDRESS:]PORT of kerf-emulator")
+         "arm[:NAME] of kerf-arm; socket:PATH or udp:[ADDRESS:]PORT of kerf-emulator; twice for "
+         "a scene with two devices, in their order")
+      .one_each()
       .shown_as("PORT");
   constexpr double kLongestS = 1e7;  // 115 days
   app.option("--seconds", options.seconds,
@@ -174,6 +177,10 @@ std::string wrong_with(const ControllerOptions& options, const Raw& raw) {
       return std::string(option) + ": a voxel edge is above 0 mm, for example 0.125";
     }
   }
+  if (raw.torque_scale.size() % 3 != 0) {
+    return "--torque-scale has " + std::to_string(raw.torque_scale.size()) +
+           " numbers; give three, or six for two devices";
+  }
   for (const double scale : raw.torque_scale) {
     if (std::abs(scale) < kMinTorqueScale) {
       return "--torque-scale is below 0.001 N mm per count; leave it out to keep the motors off";
@@ -182,7 +189,10 @@ std::string wrong_with(const ControllerOptions& options, const Raw& raw) {
   if (options.scene.empty() && !options.probe) {
     return "--scene is missing; try scenes/phantom.toml";
   }
-  if (options.probe && !options.port.empty() && options.scene.empty() && raw.device.empty()) {
+  if (options.probe && options.ports.size() > 1) {
+    return "--probe: looks at one device; give one --port";
+  }
+  if (options.probe && !options.ports.empty() && options.scene.empty() && raw.device.empty()) {
     return "--probe: which device? give --device, or a --scene that says it";
   }
   if (!options.until.empty() && (!options.virtual_time || options.guard)) {
@@ -190,11 +200,11 @@ std::string wrong_with(const ControllerOptions& options, const Raw& raw) {
            "out";
   }
   const bool runs = !options.check && !options.explain && !options.probe;
-  if (runs && options.port.empty()) {
+  if (runs && options.ports.empty()) {
     return "--port is missing; give auto, or socket:PATH, where kerf-emulator listens";
   }
   try {
-    if (!options.port.empty()) check_port(options.port);
+    for (const std::string& port : options.ports) check_port(port);
   } catch (const std::runtime_error& error) {
     return error.what();
   }
@@ -218,7 +228,10 @@ void override_scene(const Raw& raw, SceneOverrides& scene) {
   if (!raw.numeric.empty()) {
     scene.numeric = static_cast<NumericKind>(index_of(kNumericWords, raw.numeric));
   }
-  if (!raw.torque_scale.empty()) scene.torque_scale = three_of(raw.torque_scale);
+  if (const std::vector<double>& scale = raw.torque_scale; !scale.empty()) {
+    scene.torque_scale = std::array{scale[0], scale[1], scale[2]};
+    if (scale.size() == 6) scene.second_torque_scale = std::array{scale[3], scale[4], scale[5]};
+  }
   if (!raw.device.empty()) {
     scene.personality = static_cast<Personality>(index_of(kPersonalityWords, raw.device));
   }

@@ -15,9 +15,9 @@ namespace kerf {
 struct ControllerOptions {
   std::string scene;
   SceneOverrides overrides;
-  std::string port;               ///< as in open_port.hpp
-  std::optional<double> seconds;  ///< servo time after arming; none: until stopped
-  double wait_s = 60;             ///< servo time for the device to be taken in hand
+  std::vector<std::string> ports;  ///< as in open_port.hpp, one for each device of the scene
+  std::optional<double> seconds;   ///< servo time after arming; none: until stopped
+  double wait_s = 60;              ///< servo time for the device to be taken in hand
   std::string name = kDefaultName;
   bool virtual_time = false;
   std::vector<std::string> until;  ///< FIFOs with the tick up to which lock-step may go

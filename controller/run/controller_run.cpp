@@ -5,6 +5,7 @@
 #include <atomic>
 #include <chrono>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
@@ -20,6 +21,7 @@
 #include <vector>
 
 #include "controller/device/device_driver.hpp"
+#include "controller/device/devices.hpp"
 #include "controller/law/registry/law_registry.hpp"
 #include "controller/loop/motor_guard.hpp"
 #include "controller/loop/publisher.hpp"
@@ -51,13 +53,13 @@ namespace {
 /// Shared by the threads of a run.
 struct Run {
   const ControllerOptions& options;
-  const std::string& port;  ///< that of `--port`, with `auto` resolved
-  Personality personality;
+  const std::vector<std::string>& ports;  ///< those of `--port`, with `auto` resolved
+  const LoadedScene& scene;
   int rate_hz;
   SegmentWriter& segment;
   SegmentServer& server;
   Servo& servo;
-  DeviceDriver& device;
+  Devices devices;
   std::atomic<bool>& stop;
   RunReport& report;
 };
@@ -67,7 +69,7 @@ constexpr std::chrono::milliseconds kLookPeriod{5};
 /// A looping thread cannot be ended: the program ends, as in a crash, and logs why. Readers keep
 /// all ticks before it.
 [[noreturn]] void end_looping_servo(const Run& run, std::uint64_t tick) {
-  static_cast<void>(run.device.release_for_good());
+  static_cast<void>(run.devices.release_for_good());
   run.segment.set_lifecycle(Lifecycle::fault);
   log_error("the step after tick " + std::to_string(tick) + " did not end in " +
             std::to_string(StepWatchdog::kMostSeconds) +
@@ -78,27 +80,45 @@ constexpr std::chrono::milliseconds kLookPeriod{5};
   std::_Exit(1);
 }
 
+/// What a device waits for; of two, with which it is.
+std::string waits_of(const Run& run, std::size_t arm, Waiting waiting) {
+  const std::string text = text_of(device_of(run.scene, arm).personality, waiting);
+  if (text.empty() || run.devices.size() == 1) return text;
+  return "arm " + std::to_string(arm + 1) + ": " + text;
+}
+
+/// The same of the first that waits; empty if none does.
+std::string waits_of(const Run& run, const LoopSignals& signals) {
+  for (std::size_t arm = 0; arm < run.devices.size(); ++arm) {
+    std::string text = waits_of(run, arm, signals.waiting[arm].load(std::memory_order_relaxed));
+    if (!text.empty()) return text;
+  }
+  return "";
+}
+
 /// Main thread while the servo runs: draws the progress bar, logs what the device waits for, and
 /// checks for steps that do not end.
 void show_progress(const LoopSignals& signals, const std::atomic<bool>& ended, const Run& run,
                    StepWatchdog& step) {
   const ControllerOptions& options = run.options;
   const ProgressBar bar(options.progress);
-  WaitNotice teller;
+  std::array<WaitNotice, kMaxArms> tellers;
   while (!ended.load()) {
     if (step.look()) end_looping_servo(run, signals.heartbeat.load(std::memory_order_relaxed));
-    const Waiting waiting = signals.waiting.load(std::memory_order_relaxed);
-    const std::string waits = text_of(run.personality, waiting);
     const double servo_s =
         static_cast<double>(signals.heartbeat.load(std::memory_order_relaxed)) / run.rate_hz;
-    if (teller.look(waiting, monotonic_ns(), static_cast<std::int64_t>(servo_s * kNsPerSecond))) {
+    for (std::size_t arm = 0; arm < run.devices.size(); ++arm) {
+      const Waiting waiting = signals.waiting[arm].load(std::memory_order_relaxed);
+      const auto servo_ns = static_cast<std::int64_t>(servo_s * kNsPerSecond);
+      if (!tellers[arm].look(waiting, monotonic_ns(), servo_ns)) continue;
       bar.hide();
-      log_note(waits);
+      log_note(waits_of(run, arm, waiting));
     }
     const double done_s = static_cast<double>(signals.armed_ticks.load()) / run.rate_hz;
     char text[64];
     std::snprintf(text, sizeof text, "%.1f s", done_s);
-    bar.show(options.seconds ? done_s / *options.seconds : 0, done_s > 0 ? text : waits);
+    bar.show(options.seconds ? done_s / *options.seconds : 0,
+             done_s > 0 ? text : waits_of(run, signals));
     for (int i = 0; i < 10 && !ended.load(); ++i) std::this_thread::sleep_for(kLookPeriod);
   }
 }
@@ -136,10 +156,10 @@ EndReason serve(const Run& run, LoopSignals& signals, CallGuard* calls) {
   RealTimeTicks real_time(kNsPerSecond / run.rate_hz, options.real_time.spin_us * 1000);
   std::optional<TickGate> gate;
   if (!options.until.empty()) gate.emplace(options.until, run.stop);
-  LockStepTicks lock_step(run.device, kNsPerSecond / run.rate_hz, gate ? &*gate : nullptr);
+  LockStepTicks lock_step(run.devices, kNsPerSecond / run.rate_hz, gate ? &*gate : nullptr);
   TickSource& clock = options.virtual_time ? static_cast<TickSource&>(lock_step) : real_time;
-  if (calls != nullptr) calls->enter(run.port);
-  const EndReason end = run_servo(clock, run.device, run.servo, eyes, run.server,
+  if (calls != nullptr) calls->enter(run.ports);
+  const EndReason end = run_servo(clock, run.devices, run.servo, eyes, run.server,
                                   limits_of(options, run.rate_hz), signals, run.report.record);
   if (calls != nullptr) calls->leave();
   return end;
@@ -160,14 +180,14 @@ EndReason end_by(const CallGuard& calls, EndReason end, RunReport& report) {
 /// --strict.
 EndReason run_threads(const Run& run) {
   LoopSignals signals{run.stop};
-  Watchdog watchdog(run.device, signals);
+  Watchdog watchdog(run.devices, signals);
   std::atomic<bool> ended{false};
   EndReason end = EndReason::stopped;
   std::exception_ptr failure;
   std::optional<CallGuard> calls;
   {
-    MotorGuard guard(run.device);
-    if (run.options.guard) calls.emplace(run.device, run.stop);
+    MotorGuard guard(run.devices);
+    if (run.options.guard) calls.emplace(run.devices, run.stop);
     // The watchdog first: if the system has no thread for one of the two, no servo runs without it.
     std::jthread watching;
     if (!run.options.virtual_time) {
@@ -192,7 +212,7 @@ EndReason run_threads(const Run& run) {
     }
   }
   run.report.watchdog_trips = watchdog.trips();
-  run.report.waiting = text_of(run.personality, signals.waiting.load());
+  run.report.waiting = waits_of(run, signals);
   if (failure) std::rethrow_exception(failure);
   return calls ? end_by(*calls, end, run.report) : end;
 }
@@ -336,6 +356,10 @@ void look_at_scene(const ControllerOptions& options) {
   print_scene(scene, costs, margin);
   check_budget(options, scene, costs);
   check_gains(options, scene, margin);
+  if (!scene.second) return;
+  const LoadedScene second = second_arm_of(scene);
+  check_hand_script(second);
+  check_gains(options, second, gain_margin(second));
 }
 
 /// The run from the first packet of the device to the report.
@@ -344,10 +368,14 @@ int run_with_device(const ControllerOptions& options, std::int64_t began_ns, Run
   const LoadedScene& scene = start.planned.scene;
   CompiledScene& servo = *start.planned.servo;
   SegmentWriter& segment = start.segment;
-  const std::unique_ptr<DeviceDriver> driver = make_driver(
-      scene.device.personality, *start.port, scene.device.encoder_sign, scene.servo.rate_hz);
-  DeviceDriver& device = *driver;
-  device.start();
+  std::vector<std::unique_ptr<DeviceDriver>> drivers;
+  for (std::size_t arm = 0; arm < start.ports.size(); ++arm) {
+    const DeviceSettings& device = device_of(scene, arm);
+    drivers.push_back(make_driver(device.personality, *start.ports[arm], device.encoder_sign,
+                                  scene.servo.rate_hz));
+    drivers.back()->start();
+  }
+  const Devices devices(*drivers[0], drivers.size() > 1 ? drivers[1].get() : nullptr);
   if (!options.virtual_time) {
     report.missing_rights = lock_memory();
     if (!segment.locked() && report.missing_rights.empty()) {
@@ -358,24 +386,32 @@ int run_with_device(const ControllerOptions& options, std::int64_t began_ns, Run
 
   segment.set_lifecycle(Lifecycle::run);
   report.load_s = static_cast<double>(monotonic_ns() - began_ns) / 1e9;
-  const EndReason end =
-      run_threads({options, start.port_text, scene.device.personality, scene.servo.rate_hz, segment,
-                   start.server, servo, device, stop, report});
+  const EndReason end = run_threads({options, start.port_texts, scene, scene.servo.rate_hz, segment,
+                                     start.server, servo, devices, stop, report});
   if (!options.virtual_time) unlock_memory();
 
   const bool clean = end == EndReason::ticks_done || end == EndReason::stopped;
   segment.set_lifecycle(clean ? Lifecycle::clean_end : Lifecycle::fault);
   report.end = text_of(end);
-  name_law_faults(scene, report.record.faults);
-  explain_faults(report.record.faults, start.port_text);
+  for (std::size_t arm = 0; arm < devices.size(); ++arm) {
+    const EventList& faults = report.record.arm(arm).faults;
+    name_law_faults(scene, faults);
+    explain_faults(faults, start.port_texts[arm]);
+  }
   report.removed_mm3 = removed_mm3(scene, report.record);
   report.materials = scores_of(scene, servo, report.record);
   report.workspace_scale = scene.device.workspace_scale;
   report.tool = scene.tools[scene.active_tool].name;
   report.tool_mm = 2 * scene.tools[scene.active_tool].radius_mm;
-  report.lost_packets = device.lost();
-  report.refused_packets = device.refused();
-  report.link = start.port->counters();
+  report.lost_packets = devices[0].lost();
+  report.refused_packets = devices[0].refused();
+  report.link = start.ports[0]->counters();
+  if (report.second) {
+    const SceneTool& tool = scene.tools[scene.second_tool];
+    *report.second = {report.second->device, tool.name,
+                      2 * tool.radius_mm,    devices[1].lost(),
+                      devices[1].refused(),  start.ports[1]->counters()};
+  }
   if (const std::int64_t first_ns = report.record.first_force_ns; first_ns > 0) {
     report.start_to_force_ms = static_cast<double>(first_ns - began_ns) / 1e6;
   }
@@ -383,7 +419,7 @@ int run_with_device(const ControllerOptions& options, std::int64_t began_ns, Run
   std::fputs(summary(report).c_str(), stdout);
   if (!options.report.empty()) write_new_file(options.report, report_json(report));
   if (!options.final_volume.empty()) write_final(options, scene, servo);
-  return clean && report.record.faults.count == 0 ? 0 : 1;
+  return clean && !report.record.has_faults() ? 0 : 1;
 }
 
 /// Runs the controller from the scene to the report and returns the exit code: 0 on success, also

@@ -196,7 +196,7 @@ void print(const std::vector<SetupProblem>& lacks) {
 /// Opens the port; if that fails on a real bus, prints the possible reasons.
 std::unique_ptr<PacketPort> open_or_explain(const ControllerOptions& options, Personality kind,
                                             int rate_hz, const std::atomic<bool>& stop) {
-  const std::string port = resolve_port(options.port, kind);
+  const std::string port = resolve_port(options.ports.front(), kind);
   try {
     const LateNote waits(text_before_device(port));
     return open_port(port, {kind, false, rate_hz}, kPatienceMs, stop);
@@ -209,13 +209,13 @@ std::unique_ptr<PacketPort> open_or_explain(const ControllerOptions& options, Pe
 
 /// The end by a signal before a device has answered.
 int stopped_early(const ControllerOptions& options, Personality kind) {
-  const std::string waiting = text_before_device(options.port);
+  const std::string waiting = text_before_device(options.ports.front());
   tell_stopped_early(waiting);
   if (!options.report.empty()) {
     const Json json{{"program", "kerf-controller --probe"},
                     {"version", KERF_VERSION},
                     {"device", text_of(kind)},
-                    {"port", options.port},
+                    {"port", options.ports.front()},
                     {"waiting", waiting}};
     write_new_file(options.report, json.document());
   }
@@ -261,7 +261,7 @@ Json report_of(const ControllerOptions& options, const DeviceSettings& device,
   return {{"program", "kerf-controller --probe"},
           {"version", KERF_VERSION},
           {"device", text_of(device.personality)},
-          {"port", options.port},
+          {"port", options.ports.front()},
           {"seconds", seconds},
           {"reports", seen.reports},
           {"fresh_per_s", seconds > 0 ? static_cast<double>(seen.reports) / seconds : 0},
@@ -283,7 +283,7 @@ Json report_of(const ControllerOptions& options, const DeviceSettings& device,
 
 int run_probe(const ControllerOptions& options) {
   check_outputs({options.scene}, {{"--report", options.report, ".json"}});
-  if (options.port.empty()) return look_around(options);
+  if (options.ports.empty()) return look_around(options);
   const int rate_hz = options.overrides.rate_hz.value_or(kDefaultRateHz);
   const DeviceSettings device = device_of(options);
   std::atomic<bool>& stop = catch_stop_and_pause_signals();

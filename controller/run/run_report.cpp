@@ -14,7 +14,7 @@ Json percentiles(const Histogram& histogram) {
           {"max", histogram.max_us()}};
 }
 
-Json by_source(const RunRecord& record) {
+Json by_source(const ArmRecord& record) {
   Json list = Json::Members{};
   for (std::size_t i = 0; i < kEnergySources; ++i) {
     list[std::string(kEnergySourceNames[i])] = record.energy_mj[i] / 1000.0;
@@ -23,7 +23,7 @@ Json by_source(const RunRecord& record) {
 }
 
 /// The sources that did any work, in mJ.
-std::string energy_line(const RunRecord& record) {
+std::string energy_line(const ArmRecord& record) {
   std::string text = format("  energy     lowest %.3f mJ", record.port_minimum_mj);
   for (std::size_t i = 0; i < kEnergySources; ++i) {
     if (record.energy_mj[i] == 0) continue;
@@ -99,15 +99,56 @@ std::string lines(const char* kind, const EventList& events) {
 
 }  // namespace
 
+namespace {
+
+Json json_of(const std::vector<LinkCounter>& link) {
+  Json json = Json::Members{};
+  for (const LinkCounter& counter : link) json[counter.name] = counter.value;
+  return json;
+}
+
+Json second_json(const SecondArmReport& arm, const ArmRecord& r) {
+  return {{"device", arm.device},
+          {"tool", arm.tool},
+          {"stale_ticks", r.stale_ticks},
+          {"contact_ticks", r.contact_ticks},
+          {"shaft_ticks", r.shaft_ticks},
+          {"peak_force_n", r.peak_force_n},
+          {"energy_j", r.absorbed_mj / 1000.0},
+          {"port_minimum_j", r.port_minimum_mj / 1000.0},
+          {"energy_by_source_j", by_source(r)},
+          {"faults", list(r.faults)},
+          {"fault_count", r.faults.count},
+          {"lost_packets", arm.lost_packets},
+          {"refused_packets", arm.refused_packets},
+          {"link", json_of(arm.link)},
+          {"output_hash", hex64(r.output_hash)}};
+}
+
+std::string contact_line(const ArmRecord& r) {
+  return format("  contact    %llu ticks, peak force %.3f N, work of the hand %.3f mJ\n",
+                static_cast<unsigned long long>(r.contact_ticks), r.peak_force_n, r.absorbed_mj);
+}
+
+std::string second_lines(const SecondArmReport& arm, const ArmRecord& r) {
+  return format("\n  second arm %s with tool %s\n", arm.device.c_str(), arm.tool.c_str()) +
+         contact_line(r) + energy_line(r) +
+         format("  losses     %llu stale ticks, %llu packets lost\n",
+                static_cast<unsigned long long>(r.stale_ticks),
+                static_cast<unsigned long long>(arm.lost_packets)) +
+         format("  hash       output %s\n", hex64(r.output_hash).c_str()) +
+         lines("fault", r.faults) + "\n";
+}
+
+}  // namespace
+
 std::string report_json(const RunReport& report) {
   const RunRecord& r = report.record;
   Json missing = Json::List{};
   for (const MissingRight& right : report.missing_rights) {
     missing.push_back({{"what", right.what}, {"effect", right.effect}});
   }
-  Json link = Json::Members{};
-  for (const LinkCounter& counter : report.link) link[counter.name] = counter.value;
-  const Json json{
+  Json json{
       {"program", "kerf-controller"},
       {"version", KERF_VERSION},
       {"scene", report.scene},
@@ -151,13 +192,14 @@ std::string report_json(const RunReport& report) {
       {"watchdog_trips", report.watchdog_trips},
       {"lost_packets", report.lost_packets},
       {"refused_packets", report.refused_packets},
-      {"link", link},
+      {"link", json_of(report.link)},
       {"missing_rights", missing},
       {"load_s", report.load_s},
       {"start_to_force_ms", report.start_to_force_ms},
       {"volume_hash", hex64(report.volume_hash)},
       {"output_hash", hex64(r.output_hash)},
   };
+  if (report.second) json["second"] = second_json(*report.second, r.second);
   return json.document();
 }
 
@@ -174,9 +216,7 @@ std::string summary(const RunReport& report) {
   if (!report.virtual_time) text += line("wake-up", r.wake);
   text += line("compute", r.compute);
   text += line("publish", r.publish);
-  text += format("\n  contact    %llu ticks, peak force %.3f N, work of the hand %.3f mJ\n",
-                 static_cast<unsigned long long>(r.contact_ticks), r.peak_force_n, r.absorbed_mj);
-  text += energy_line(r);
+  text += "\n" + contact_line(r) + energy_line(r);
   if (r.shaft_ticks > 0) {
     text += format("  shaft      %llu ticks\n", static_cast<unsigned long long>(r.shaft_ticks));
   }
@@ -196,7 +236,9 @@ std::string summary(const RunReport& report) {
                  static_cast<long long>(r.faults_of_pages.major));
   text += format("  hashes     volume %s, output %s\n", hex64(report.volume_hash).c_str(),
                  hex64(r.output_hash).c_str());
-  return text + lines("fault", r.faults) + lines("event", r.events);
+  text += lines("fault", r.faults);
+  if (report.second) text += second_lines(*report.second, r.second);
+  return text + lines("event", r.events);
 }
 
 }  // namespace kerf

@@ -21,6 +21,16 @@ struct MaterialScore {
 };
 using MaterialScores = std::vector<MaterialScore>;
 
+/// What a report has of the second arm, beside its record.
+struct SecondArmReport {
+  std::string device;
+  std::string tool;    ///< at the start of the run
+  double tool_mm = 0;  ///< its width
+  std::uint64_t lost_packets = 0;
+  std::uint64_t refused_packets = 0;
+  std::vector<LinkCounter> link;  ///< of the port
+};
+
 /// The figures of a run.
 struct RunReport {
   RunRecord record;
@@ -44,6 +54,7 @@ struct RunReport {
   std::uint64_t lost_packets = 0;
   std::uint64_t refused_packets = 0;
   std::vector<LinkCounter> link;  ///< of the port
+  std::optional<SecondArmReport> second;
   std::uint64_t watchdog_trips = 0;
   std::uint64_t volume_hash = 0;
   std::uint64_t config_hash = 0;

@@ -62,6 +62,7 @@ constexpr int kPortPatienceMs = 5000;
 
 void warn_of_gains(const ControllerOptions& options, const LoadedScene& scene) {
   if (options.virtual_time) return;
+  if (scene.second) warn_of_gains(options, second_arm_of(scene));
   const GainMargin margin = gain_margin(scene, PlayFriction::where_it_decides);
   check_gains(options, scene, margin);
   const std::string warning = gain_warning(scene, margin);
@@ -69,10 +70,12 @@ void warn_of_gains(const ControllerOptions& options, const LoadedScene& scene) {
 }
 
 void warn_of_motors(const LoadedScene& scene) {
-  if (scene.device.torque_scale) return;
-  const auto kind = static_cast<std::size_t>(scene.device.personality);
-  log_warning("device.torque_scale is not set for " + std::string(kPersonalityWords[kind]) +
-              ": the motors stay off; measure it, and write device.personality beside it");
+  for (std::size_t arm = 0; arm < arms_of(scene); ++arm) {
+    if (device_of(scene, arm).torque_scale) continue;
+    log_warning("device.torque_scale is not set for " +
+                std::string(word_of(device_of(scene, arm).personality)) +
+                ": the motors stay off; measure it, and write device.personality beside it");
+  }
 }
 
 /// Prints the notes of reading volumes and meshes, and the choices for a volume without settings,
@@ -99,6 +102,10 @@ void tell_proposal(const LoadedScene& scene) {
 
 void tell_of_scene(const LoadedScene& scene, RunReport& report) {
   report.device = word_of(scene.device.personality);
+  if (scene.second) {
+    report.second.emplace();
+    report.second->device = word_of(scene.second->device.personality);
+  }
   report.numeric = word_of(scene.servo.numeric);
   report.velocity_estimator = scene.servo.velocity.name;
   report.rate_hz = scene.servo.rate_hz;
@@ -151,6 +158,30 @@ void check_options(const ControllerOptions& options, const LoadedScene& scene) {
   check_run_files(options, scene);
 }
 
+namespace {
+
+/// One port for each device, and no two the same.
+std::vector<std::string> ports_of(const ControllerOptions& options, const LoadedScene& scene) {
+  const std::vector<std::string>& given = options.ports;
+  if (given.size() != arms_of(scene)) {
+    const std::string count = std::to_string(given.size()) + " given";
+    throw std::runtime_error("--port: " + count +
+                             (scene.second ? ", and the scene has two [[device]]; give one for "
+                                             "each, in their order"
+                                           : ", and the scene has one [device]; give one"));
+  }
+  std::vector<std::string> ports;
+  for (std::size_t arm = 0; arm < given.size(); ++arm) {
+    ports.push_back(resolve_port(given[arm], device_of(scene, arm).personality));
+    if (arm == 0 || ports[arm] != ports[0]) continue;
+    throw std::runtime_error("--port " + given[arm] +
+                             ": is that of the first device too; name each one's own");
+  }
+  return ports;
+}
+
+}  // namespace
+
 void check_budget(const ControllerOptions& options, const LoadedScene& scene,
                   const SceneCosts& costs) {
   const std::string refusal = options.virtual_time ? "" : budget_error(scene, costs);
@@ -168,15 +199,20 @@ RunStart::RunStart(const ControllerOptions& options, const std::atomic<bool>& st
     : planned(checked_scene(options, report)),
       segment(new_segment(options, planned, report)),
       server(options.name, segment,
-             {.tools = static_cast<std::uint32_t>(planned.scene.tools.size())}),
-      port_text(resolve_port(options.port, planned.scene.device.personality)) {
+             {.tools = static_cast<std::uint32_t>(planned.scene.tools.size()),
+              .arms = static_cast<std::uint32_t>(arms_of(planned.scene))}),
+      port_texts(ports_of(options, planned.scene)) {
   LoadedScene& scene = planned.scene;
   planned.servo->take(scene);
-  report.waiting = text_before_device(port_text);
   try {
-    const LinkHello ours{scene.device.personality, options.virtual_time, scene.servo.rate_hz};
-    const LateNote waits(report.waiting);
-    port = open_port(port_text, ours, kPortPatienceMs, stop, io_thread_of(options.real_time));
+    for (std::size_t arm = 0; arm < port_texts.size(); ++arm) {
+      report.waiting = text_before_device(port_texts[arm]);
+      const LinkHello ours{device_of(scene, arm).personality, options.virtual_time,
+                           scene.servo.rate_hz};
+      const LateNote waits(report.waiting);
+      ports.push_back(
+          open_port(port_texts[arm], ours, kPortPatienceMs, stop, io_thread_of(options.real_time)));
+    }
   } catch (...) {
     if (stop) segment.set_lifecycle(Lifecycle::clean_end);
     throw;

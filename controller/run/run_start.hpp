@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "controller/device/port/packet_port.hpp"
 #include "controller/load/loaded_scene.hpp"
@@ -48,7 +49,7 @@ void check_gains(const ControllerOptions& options, const LoadedScene& scene,
                  const GainMargin& margin);
 
 /// The state of a run before the device's first packet, made in this order: the scene loaded,
-/// planned and checked, the segment for readers, the open port.
+/// planned and checked, the segment for readers, the open ports.
 ///
 /// All checks that can fail are here, before the device moves. Throws std::exception with one line,
 /// also if `stop` became true meanwhile. Then `report` has the facts of the scene so far, and its
@@ -59,8 +60,9 @@ struct RunStart {
   PlannedScene planned;
   SegmentWriter segment;
   SegmentServer server;
-  std::string port_text;  ///< that of `--port`, with `auto` resolved
-  std::unique_ptr<PacketPort> port;
+  // By arm:
+  std::vector<std::string> port_texts;  ///< those of `--port`, with `auto` resolved
+  std::vector<std::unique_ptr<PacketPort>> ports;
 };
 
 }  // namespace kerf

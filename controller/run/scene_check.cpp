@@ -50,7 +50,7 @@ std::vector<ToolWork> works_of(const CostReport& explanation) {
   std::vector<ToolWork> works;
   for (const ExplainedTick& tick : explanation.ticks) {
     if (works.empty() || works.back().tool != tick.tool) works.push_back({tick.tool, 0});
-    works.back().us += work_us(tick.most);
+    works.back().us += static_cast<double>(explanation.arms) * work_us(tick.most);
   }
   return works;
 }
@@ -85,7 +85,8 @@ std::string tick_text(const ExplainedTick& tick, double factor) {
 }
 
 std::string budget_text(const CostReport& e) {
-  std::string text = "\nbudget: work of one tool in all volumes, at most " +
+  std::string text = std::string("\nbudget: work of one tool in all volumes") +
+                     (e.arms > 1 ? ", in both hands" : "") + ", at most " +
                      format("%.1f us: half a tick at %d Hz\n", e.budget_us, e.rate_hz);
   for (const ToolWork& work : works_of(e)) {
     text += format("  %-36s%12.1f us%8.1f %%%8d Hz at most\n", work.tool.c_str(), work.us,
@@ -128,6 +129,7 @@ CostReport explain(const LoadedScene& scene, CompiledScene& servo, const Segment
                          .machine = processor_name(),
                          .rate_hz = scene.servo.rate_hz,
                          .budget_us = work_budget_us(scene),
+                         .arms = costs.arms,
                          .ticks = {},
                          .arrays = costs.arrays,
                          .gain = gain_margin(scene),
@@ -255,6 +257,7 @@ Scene as_written(const LoadedScene& scene) {
 std::vector<fs::path> files_read(const ControllerOptions& options, const Scene& scene) {
   const fs::path folder = fs::path(scene.path).parent_path();
   std::vector<fs::path> files{scene.path, scene.hand_script};
+  if (scene.second) files.emplace_back(scene.second->hand_script);
   for (std::size_t v = 0; v < scene.volumes.size(); ++v) {
     const bool from_command_line = v == 0 && options.overrides.volume_file;
     const fs::path file =
@@ -279,8 +282,15 @@ constexpr double kHandSpeedMmPerS = 1000;
 std::string hand_lines(const LoadedScene& scene) {
   char unit[64];
   std::snprintf(unit, sizeof unit, "%.9g", hand_unit_mm(scene));
-  return "hand_unit_mm=" + std::string(unit) + "\nhand_script=" + scene.hand_script +
-         "\nrate_hz=" + std::to_string(scene.servo.rate_hz) + "\n";
+  const std::string lines = "hand_unit_mm=" + std::string(unit) +
+                            "\nhand_script=" + scene.hand_script +
+                            "\nrate_hz=" + std::to_string(scene.servo.rate_hz) + "\n";
+  if (!scene.second) return lines;
+  const LoadedScene second = second_arm_of(scene);
+  std::snprintf(unit, sizeof unit, "%.9g", hand_unit_mm(second));
+  return lines + "device=" + std::string(word_of(scene.device.personality)) +
+         "\nsecond_device=" + std::string(word_of(second.device.personality)) +
+         "\nsecond_hand_unit_mm=" + unit + "\nsecond_hand_script=" + second.hand_script + "\n";
 }
 
 std::string air_lines(const LoadedScene& scene, const SceneCosts& costs) {
@@ -334,6 +344,11 @@ void print_scene(const LoadedScene& scene, const SceneCosts& costs, const GainMa
   const auto& o = scene.device.offset_mm;
   std::printf("workspace_scale=%g\noffset_mm=%g,%g,%g\n", scene.device.workspace_scale, o[0], o[1],
               o[2]);
+  if (scene.second) {
+    const auto& s = scene.second->device.offset_mm;
+    std::printf("second_offset_mm=%g,%g,%g\nsecond_tool=%s\n", s[0], s[1], s[2],
+                scene.tools[scene.second_tool].name.c_str());
+  }
   std::printf("force=%s\ncut=%s\n", std::string(word_of(scene.force.model)).c_str(),
               std::string(word_of(scene.cut.model)).c_str());
   std::printf("stiffness_at_device_n_per_mm=%g\n", margin.stiffness_n_per_mm);

@@ -31,6 +31,7 @@ struct CostReport {
   double machine_factor = 1;
   int rate_hz = 1000;
   double budget_us = 0;  ///< of work, for one tool in all volumes
+  std::size_t arms = 1;
   std::vector<ExplainedTick> ticks;
   std::vector<ArrayBytes> arrays;  ///< of the servo, then of the segment
   GainMargin gain;

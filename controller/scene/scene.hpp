@@ -132,6 +132,9 @@ struct DeviceSettings {
   std::optional<std::array<double, 3>> torque_scale;  ///< if empty, the motors stay off
   std::array<double, 3> dock_rad{0.0, 0.23, -0.37};
   std::optional<std::array<double, 3>> encoder_sign;  ///< 1 or -1 each; if empty, 1
+  /// In the hand at the start; if empty, the first tool, and of a second device the second.
+  std::string first_tool;
+  std::string tool_place;  ///< begins a complaint about it
 };
 
 /// [force]
@@ -181,6 +184,14 @@ struct ServoSettings {
   LawChoice velocity{LawKind::velocity, "foaw", {}};
 };
 
+/// The second [[device]] and [[hand]]: an arm of its own, with the scale of the first.
+struct SecondArm {
+  DeviceSettings device;
+  bool offset_given = false;  ///< else it has the first one's
+  LimitSettings limits;       ///< the scene's, and its device's where the scene has none
+  std::string hand_script, hand_place;
+};
+
 /// All settings of a scene but volumes and tools; the same before and after loading.
 struct SceneSettings {
   std::string path;
@@ -192,6 +203,7 @@ struct SceneSettings {
   SpindleSettings spindle;
   LimitSettings limits;
   ServoSettings servo;
+  std::optional<SecondArm> second;
   std::string hand_script;  ///< [hand] script, relative to the working directory; may be empty
   std::string hand_place;   ///< begins a complaint about it
 };

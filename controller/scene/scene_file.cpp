@@ -11,6 +11,8 @@
 #include <fstream>
 #include <ios>
 #include <iterator>
+#include <optional>
+#include <span>
 #include <string>
 #include <system_error>
 #include <utility>
@@ -238,6 +240,7 @@ Material& material_named(const SceneTable& table, const std::string& name,
 
 void finish_device(const SceneTable& table, Scene& scene) {
   scene.offset_given = table.has("offset_mm");
+  if (table.has("first_tool")) scene.device.tool_place = table.place("first_tool");
   for (const double sign : scene.device.encoder_sign.value_or(std::array{1.0, 1.0, 1.0})) {
     if (std::abs(sign) == 1) continue;
     refuse(
@@ -373,7 +376,105 @@ void refuse_empty(const Scene& scene) {
   }
 }
 
-Scene read_scene(const TomlNode& root, const std::filesystem::path& path, SceneKeys keys) {
+// Two arms: [[device]] twice, and [[hand]].
+
+constexpr std::string_view kArmTables[] = {"device", "hand"};
+/// Of the scene, not of one device: both hands are as large.
+constexpr const char* kSharedKeys[] = {"workspace_scale", "fit"};
+
+/// Leaves the first of each `[[device]]` and `[[hand]]` in the file, as if it stood alone, and
+/// returns the second ones; empty if there is none. Another form stays as it is, and is refused
+/// like that of any table.
+std::optional<TomlNode> take_second_arm(TomlNode& root, const std::string& file) {
+  TomlNode second;
+  for (const std::string_view name : kArmTables) {
+    if (root.find(name) == nullptr) continue;
+    TomlNode& list = entry_of(root, name);
+    const auto is_table = [](const TomlNode& node) { return node.form == TomlNode::Form::table; };
+    if (list.form != TomlNode::Form::array || list.entries.empty() ||
+        !std::ranges::all_of(list.entries, is_table)) {
+      continue;
+    }
+    if (list.entries.size() > 2) {
+      refuse(place_of(list, name, file), " has " + std::to_string(list.entries.size()) +
+                                             " entries; use at most 2: a scene has two arms");
+    }
+    if (list.entries.size() == 2) {
+      if (name == "hand" && second.entries.empty()) {
+        refuse(
+            file + ":" + std::to_string(list.entries[1].line) + ": hand",
+            " is of a second device, and there is one; write a second [[device]], or one [hand]");
+      }
+      second.entries.push_back(std::move(list.entries[1]));
+      second.entries.back().key = name;
+    }
+    TomlNode first = std::move(list.entries[0]);
+    first.key = list.key;
+    first.key_line = list.key_line;
+    first.key_column = list.key_column;
+    list = std::move(first);
+  }
+  if (second.entries.empty()) return std::nullopt;
+  return second;
+}
+
+/// The settings of a command line that a second arm has too.
+std::vector<KeyOverride> settings_of_arm(std::span<const KeyOverride> settings) {
+  std::vector<KeyOverride> own;
+  for (const KeyOverride& setting : settings) {
+    const std::size_t dot = setting.key.find('.');
+    const std::string_view table = std::string_view(setting.key).substr(0, dot);
+    const bool is_shared =
+        table == "device" &&
+        std::ranges::find(kSharedKeys, setting.key.substr(dot + 1)) != std::end(kSharedKeys);
+    if (std::ranges::find(kArmTables, table) != std::end(kArmTables) && !is_shared) {
+      own.push_back(setting);
+    }
+  }
+  return own;
+}
+
+/// The script of the tables' hand, from the scene's folder.
+void finish_hand(const SceneTables& tables, const std::filesystem::path& path, std::string& script,
+                 std::string& place) {
+  if (script.empty()) return;
+  script = (path.parent_path() / script).string();
+  place = tables.once("hand").place("script");
+}
+
+SecondArm read_second_arm(const TomlNode& root, const std::filesystem::path& path, SceneKeys keys) {
+  check_names(root, path.string(), keys);
+  const SceneTables tables{root, path.string(), keys};
+  SceneParts parts;
+  for (const std::string_view name : kArmTables) tables.once(name).read(parts);
+  for (const std::string_view name : kArmTables) tables.once(name).read_conditional(parts);
+  const SceneTable device = tables.once("device");
+  for (const char* key : kSharedKeys) {
+    if (!device.has(key)) continue;
+    refuse(device.place(key),
+           " is the scene's, and both hands have it; write it in the first "
+           "[[device]] alone");
+  }
+  finish_device(device, parts.scene);
+  finish_hand(tables, path, parts.scene.hand_script, parts.scene.hand_place);
+  return {.device = parts.scene.device,
+          .offset_given = parts.scene.offset_given,
+          .limits = {},
+          .hand_script = parts.scene.hand_script,
+          .hand_place = parts.scene.hand_place};
+}
+
+/// The tool that a device names has to be one of the scene.
+void check_tool_name(const DeviceSettings& device, const Scene& scene) {
+  std::vector<std::string_view> names;
+  for (const ToolSpec& tool : scene.tools) names.push_back(tool.name);
+  if (device.first_tool.empty() || std::ranges::find(names, device.first_tool) != names.end())
+    return;
+  refuse(device.tool_place, unknown_word(device.first_tool, names, "\""));
+}
+
+Scene read_scene(const TomlNode& root, const TomlNode* second, const std::filesystem::path& path,
+                 SceneKeys keys) {
   check_names(root, path.string(), keys);
   const SceneTables tables{root, path.string(), keys};
   SceneParts parts;
@@ -391,41 +492,42 @@ Scene read_scene(const TomlNode& root, const std::filesystem::path& path, SceneK
   choose_cut(tables.once("cut"), scene);
   for (const SceneTable& table : once) table.read_conditional(parts);
   finish_device(tables.once("device"), scene);
+  if (second != nullptr) {
+    scene.second = read_second_arm(*second, path, keys);
+    scene.second->limits = scene.limits;
+    check_tool_name(scene.second->device, scene);
+  }
+  check_tool_name(scene.device, scene);
   refuse_idle_coupling(tables.once("force"), scene.force);
   scene.limit_places = limit_places(tables.once("limits"));
   settle_device(scene);
   refuse_uncut(scene);
   refuse_unfelt(scene);
-  if (!scene.hand_script.empty()) {
-    scene.hand_script = (path.parent_path() / scene.hand_script).string();
-    scene.hand_place = tables.once("hand").place("script");
-  }
+  finish_hand(tables, path, scene.hand_script, scene.hand_place);
   return std::move(parts.scene);
 }
 
-}  // namespace
-
-void settle_device(Scene& scene) {
+/// `settle_device` of one arm.
+void settle_arm(const Scene& scene, const DeviceSettings& held, LimitSettings& limits) {
   // A motor count of a Cartesian device is 1 mN: a true force that is far from it is a slip.
   constexpr double kLeastShare = 0.1, kMostShare = 10;
-  for (const double share : scene.device.torque_scale.value_or(std::array{1.0, 1.0, 1.0})) {
-    if (!is_cartesian(scene.device.personality)) break;
+  for (const double share : held.torque_scale.value_or(std::array{1.0, 1.0, 1.0})) {
+    if (!is_cartesian(held.personality)) break;
     if (std::abs(share) >= kLeastShare && std::abs(share) <= kMostShare) continue;
     refuse(scene.path, ": device.torque_scale: " + number_text(share) + " is out of range for " +
-                           std::string(word_of(scene.device.personality)) +
+                           std::string(word_of(held.personality)) +
                            ", true newtons per commanded newton; use 0.1 to 10, 1 to begin with");
   }
-  const ForceFigures device = force_figures(scene.device.personality);
+  const ForceFigures device = force_figures(held.personality);
   const auto settle = [&](const std::string& place, double low, double high, double own,
                           double& value) {
     if (place.empty()) {
       value = own;
     } else if (value < low || value > high) {
-      refuse(place, " is out of range for " + std::string(word_of(scene.device.personality)) +
-                        "; use " + number_text(low) + " to " + number_text(high));
+      refuse(place, " is out of range for " + std::string(word_of(held.personality)) + "; use " +
+                        number_text(low) + " to " + number_text(high));
     }
   };
-  LimitSettings& limits = scene.limits;
   constexpr double kLeastN = 0.01;
   settle(scene.limit_places.force, kLeastN, device.peak_n, device.peak_n, limits.force_n);
   settle(scene.limit_places.continuous, kLeastN, std::min(limits.force_n, device.peak_n),
@@ -436,13 +538,22 @@ void settle_device(Scene& scene) {
          device.slew_n_per_ms, device.slew_n_per_ms, limits.slew_n_per_ms);
 }
 
+}  // namespace
+
+void settle_device(Scene& scene) {
+  settle_arm(scene, scene.device, scene.limits);
+  if (scene.second) settle_arm(scene, scene.second->device, scene.second->limits);
+}
+
 Scene parse_scene(std::string_view text, const std::filesystem::path& path, SceneKeys keys,
                   std::span<const KeyOverride> settings) {
   try {
     TomlNode root = parse_toml(text);
+    std::optional<TomlNode> second = take_second_arm(root, path.string());
     override_keys(settings, root);
+    if (second) override_keys(settings_of_arm(settings), *second);
     spell_out_burs(root, path.string());
-    return read_scene(root, path, keys);
+    return read_scene(root, second ? &*second : nullptr, path, keys);
   } catch (const TomlError& error) {
     refuse(path.string() + ":" + std::to_string(error.line) + ":" + std::to_string(error.column),
            std::string(": ") + error.what());

@@ -256,6 +256,9 @@ constexpr SceneKey kKeys[] = {
     {"device.encoder_sign", "", at<&DeviceSettings::encoder_sign>, between(-1, 1),
      "1 or -1 at each joint: which way its encoder counts, which differs between the makers' branches (docs/devices.md)",
      kWooden, {.default_text = "[1, 1, 1]"}},
+    {"device.first_tool", "", at<&DeviceSettings::first_tool>, {},
+     "name of the tool that it holds at the start; a command changes it",
+     {}, {.default_text = "the first; of a second device the second", .json = InJson::if_changed}},
 
     {"force.model", "", at<&ForceSettings::model>, one_of(kForceModelWords),
      "proxy: swept contact of the surface, coupled to the hand; paper: sum of gradients"},
@@ -337,15 +340,17 @@ constexpr SceneKey kKeys[] = {
 constexpr SceneTableRow kTables[] = {
     {"scene", 0, "The scene as a whole."},
     {"volume", kMaxVolumes, "What is touched, cut and seen."},
-    {"tool", kMaxTools, "The first tool is in the hand at the start; a command changes it."},
+    {"tool", kMaxTools, "What a hand can hold."},
     {"material", kMaxMaterials, "What a label of a volume stands for."},
-    {"device", 0, "What is held, and where it is in the scene."},
+    {"device", 0,
+     "What is held, and where it is in the scene. Written twice, as [[device]], it is two arms, "
+     "each with a tool of its own, in the same volumes (docs/devices.md)."},
     {"force", 0, "How a touch becomes a force."},
     {"cut", 0, "How material leaves (docs/cutting.md)."},
     {"spindle", 0, "What turns the tool where force cuts; an air turbine."},
     {"limits", 0, "What the hand is never given."},
     {"servo", 0, "The loop."},
-    {"hand", 0, "Of the emulator."},
+    {"hand", 0, "Of the emulator. [[hand]] twice: of two devices."},
 };
 
 }  // namespace

@@ -136,6 +136,11 @@ std::string settings_text(const Scene& scene, SceneKeys keys) {
     if (table == "tool") add_each(table, scene.tools, parts.tool);
     if (table == "material") add_each(table, scene.materials, parts.material);
     if (most_of(table) == 0) text += lines_of(table, parts, keys);
+    if (!scene.second || (table != "device" && table != "hand")) continue;
+    SceneParts second{.scene = scene, .volume = {}, .tool = {}, .material = {}};
+    second.scene.device = scene.second->device;
+    second.scene.hand_script = scene.second->hand_script;
+    text += lines_of(table, second, keys);
   }
   return text;
 }

@@ -10,6 +10,7 @@
 #include "shared/numeric/numbers.hpp"
 #include "shared/numeric/vec.hpp"
 #include "shared/volume/voxel_grid.hpp"
+#include "shared/wire/personality.hpp"
 
 // The interface of the servo: report and command in, output out.
 
@@ -52,6 +53,7 @@ struct ServoCommand {
   };
   Kind kind = Kind::none;
   std::uint32_t argument = 0;  ///< index of the tool; hold: 1 on, 0 off
+  std::uint32_t arm = 0;       ///< which gets the tool; all else is for both
 };
 
 inline constexpr double kContactThresholdN = 0.01;  ///< a tick with more force is a contact tick
@@ -177,9 +179,19 @@ class Servo {
  public:
   virtual ~Servo() = default;
 
-  [[nodiscard]] virtual ServoOutput step(const DeviceReport& report) noexcept = 0;
+  /// 1 or 2; constant.
+  [[nodiscard]] virtual std::size_t arms() const noexcept = 0;
+  /// One tick of all arms; both spans are as long.
+  virtual void step(std::span<const DeviceReport> reports,
+                    std::span<ServoOutput> outputs) noexcept = 0;
+  /// The same of a scene with one arm.
+  [[nodiscard]] ServoOutput step(const DeviceReport& report) noexcept {
+    ServoOutput output;
+    step(std::span(&report, 1), std::span(&output, 1));
+    return output;
+  }
   virtual bool apply(const ServoCommand& command) noexcept = 0;
-  [[nodiscard]] virtual double penetration_mm() const noexcept = 0;
+  [[nodiscard]] virtual double penetration_mm(std::size_t arm = 0) const noexcept = 0;
 
   [[nodiscard]] virtual VoxelGrid grid(std::size_t scene_index) const noexcept = 0;
 

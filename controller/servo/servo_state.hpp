@@ -110,6 +110,17 @@ struct StrokeState {
   }
 };
 
+/// What goes back in the volumes by command, and what can: one for all arms of a scene.
+struct VolumeHistory {
+  ResetState reset;
+  StrokeState stroke;
+
+  /// Nothing is cut then, and no hand gets a force.
+  [[nodiscard]] constexpr bool restores() const noexcept {
+    return reset.runs || stroke.motion != StrokeState::Motion::none;
+  }
+};
+
 /// Joint counters since the last calibration.
 struct EncoderState {
   std::array<std::int16_t, 3> last{};
@@ -129,8 +140,8 @@ struct GimbalFilter {
   std::array<std::int16_t, 4> orientation{0, 0, 0, 32767};  ///< quaternion x, y, z, w
 };
 
-/// Everything that changes from tick to tick. A run is a function of plan, first state, reports and
-/// commands; there is no other state.
+/// Everything of an arm that changes from tick to tick. A run is a function of plan, first state,
+/// reports and commands; there is no other state.
 template <class N>
 struct ServoState {
   using Real = typename N::Real;
@@ -147,14 +158,12 @@ struct ServoState {
   EncoderState encoders;
   GimbalFilter gimbal;
   std::uint32_t active_tool = 0;
-  bool pedal_down = true;  ///< in the last report; a plan without a pedal has it always
-  bool hold = false;       ///< by command: force 0, nothing is cut
-  ResetState reset;        ///< by command; a hold while it runs
-  StrokeState stroke;
-  [[nodiscard]] constexpr bool undoes() const noexcept {
-    return stroke.motion != StrokeState::Motion::none;
+  bool pedal_down = true;            ///< in the last report; a plan without a pedal has it always
+  bool hold = false;                 ///< by command: force 0, nothing is cut
+  VolumeHistory* history = nullptr;  ///< of the compiled scene; null only where nothing is stepped
+  [[nodiscard]] constexpr bool held() const noexcept {
+    return hold || (history != nullptr && history->restores());
   }
-  [[nodiscard]] constexpr bool held() const noexcept { return hold || reset.runs || undoes(); }
 
   JacobianTransposed<N> jacobian_t_mm;  ///< of the last good report
   DeviceVec<Real> tip_mm;               ///< device port
@@ -177,5 +186,17 @@ struct ServoState {
   EnergyLedger<N> ledger;
   std::uint64_t output_hash = kFnv1aBasis;
 };
+
+/// An arm of the scene: a device with a tool. Two arms have the same volumes, one after the other
+/// in each tick, and everything else of their own.
+template <class N>
+struct Arm {
+  const ServoPlan<N>* plan = nullptr;
+  ServoState<N>* state = nullptr;
+};
+
+/// All arms of a scene, at least one.
+template <class N>
+using Arms = std::span<const Arm<N>>;
 
 }  // namespace kerf

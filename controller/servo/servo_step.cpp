@@ -7,6 +7,7 @@
 #include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 
 #include "controller/kernel/sampling.hpp"
 #include "controller/servo/contact_force.hpp"
@@ -336,32 +337,48 @@ void cut(const ServoPlan<N>& plan, ServoState<N>& state, const ContactResult<N>&
   add_removed(done.removed, out);
 }
 
-/// Marks what was cut, or restores it while a reset, an undo or a redo runs: then nothing is cut.
+/// Whether the tool holds on to its stroke: by the pedal, or without one by contact.
 template <class N>
-void follow_cuts(const ServoPlan<N>& plan, ServoState<N>& state, ServoOutput& out) noexcept {
-  out.resetting = state.reset.runs;
-  if (out.resetting) return restore_some(plan, state, out.changed);
-  out.undoing = state.stroke.motion == StrokeState::Motion::undo;
-  out.redoing = state.stroke.motion == StrokeState::Motion::redo;
-  if (state.undoes()) return swap_some(plan, state, out);
-  for (std::size_t v = 0; v < plan.volume_count; ++v) {
-    const VolumePlan<N>& volume = plan.volumes[v];
-    mark_cut(volume.grid, out.changed[volume.scene_index], state.volumes[v].cut_blocks);
-  }
-  if (state.stroke.pool.empty()) return;
-  const bool touches = !(state.contact_n == DeviceVec<typename N::Real>{});
-  follow_stroke(plan.stroke_pause_ticks, out.removed_steps > 0,
-                plan.pedalled ? state.pedal_down : touches, state.stroke);
-  out.undoable = state.stroke.can_undo();
-  out.redoable = state.stroke.can_redo();
+bool holds_on(const Arm<N>& arm) noexcept {
+  const bool touches = !(arm.state->contact_n == DeviceVec<typename N::Real>{});
+  return arm.plan->pedalled ? arm.state->pedal_down : touches;
 }
 
-}  // namespace
-
+/// Marks what was cut, or restores it while a reset, an undo or a redo runs: then nothing is cut.
 template <class N>
-ServoOutput servo_step(const ServoPlan<N>& plan, ServoState<N>& state,
-                       const DeviceReport& report) noexcept {
-  ServoOutput out;
+void follow_cuts(Arms<N> arms, std::span<ServoOutput> outputs) noexcept {
+  VolumeHistory& history = *arms.front().state->history;
+  StrokeState& stroke = history.stroke;
+  for (ServoOutput& out : outputs) {
+    out.resetting = history.reset.runs;
+    out.undoing = stroke.motion == StrokeState::Motion::undo;
+    out.redoing = stroke.motion == StrokeState::Motion::redo;
+  }
+  if (history.reset.runs) return restore_some(arms, outputs.front().changed);
+  if (history.restores()) return swap_some(arms, outputs.front());
+  bool cuts = false, holds = false;
+  for (std::size_t a = 0; a < arms.size(); ++a) {
+    const ServoPlan<N>& plan = *arms[a].plan;
+    for (std::size_t v = 0; v < plan.volume_count; ++v) {
+      const VolumePlan<N>& volume = plan.volumes[v];
+      mark_cut(volume.grid, outputs[a].changed[volume.scene_index],
+               arms[a].state->volumes[v].cut_blocks);
+    }
+    cuts = cuts || outputs[a].removed_steps > 0;
+    holds = holds || holds_on(arms[a]);
+  }
+  if (stroke.pool.empty()) return;
+  follow_stroke(arms.front().plan->stroke_pause_ticks, cuts, holds, stroke);
+  for (ServoOutput& out : outputs) {
+    out.undoable = stroke.can_undo();
+    out.redoable = stroke.can_redo();
+  }
+}
+
+/// The tick of one arm up to its cut. Returns what it sensed.
+template <class N>
+Sensed<N> step_arm(const ServoPlan<N>& plan, ServoState<N>& state, const DeviceReport& report,
+                   ServoOutput& out) noexcept {
   if (report.fresh) state.pedal_down = !plan.pedalled || report.button1;
   const Sensed<N> sensed = sense(plan, state, report);
   ContactResult<N> contact;
@@ -374,11 +391,25 @@ ServoOutput servo_step(const ServoPlan<N>& plan, ServoState<N>& state,
   write_contact(contact, out);
   add_removed(contact.removed, out);
   cut(plan, state, contact, out);
-  follow_cuts(plan, state, out);
   if (sensed.usable) state.held_force_n = state.force_n;
   out.stale = !report.fresh;
-  write_output(plan, state, sensed, out);
-  return out;
+  return sensed;
+}
+
+}  // namespace
+
+template <class N>
+void servo_step(Arms<N> arms, std::span<const DeviceReport> reports,
+                std::span<ServoOutput> outputs) noexcept {
+  std::array<Sensed<N>, kMaxArms> sensed;
+  for (std::size_t a = 0; a < arms.size(); ++a) {
+    outputs[a] = {};
+    sensed[a] = step_arm(*arms[a].plan, *arms[a].state, reports[a], outputs[a]);
+  }
+  follow_cuts(arms, outputs);
+  for (std::size_t a = 0; a < arms.size(); ++a) {
+    write_output(*arms[a].plan, *arms[a].state, sensed[a], outputs[a]);
+  }
 }
 
 template <class N>
@@ -404,47 +435,60 @@ double penetration_mm(const ServoPlan<N>& plan, const ServoState<N>& state) noex
   return deepest_mm;
 }
 
+namespace {
+
 template <class N>
-bool apply_command(const ServoPlan<N>& plan, ServoState<N>& state,
-                   const ServoCommand& command) noexcept {
+bool select_tool(const Arm<N>& arm, std::uint32_t tool) noexcept {
+  ServoState<N>& state = *arm.state;
+  if (tool >= arm.plan->tool_count) return false;
+  if (tool == state.active_tool) return true;
+  state.active_tool = tool;
+  state.contact.proxy.search_again();  // the new tool may not fit where the old one was
+  state.force_cut.change_tool();
+  return true;
+}
+
+}  // namespace
+
+template <class N>
+bool apply_command(Arms<N> arms, const ServoCommand& command) noexcept {
+  const ServoPlan<N>& plan = *arms.front().plan;
+  VolumeHistory& history = *arms.front().state->history;
   switch (command.kind) {
     case ServoCommand::Kind::none:
     case ServoCommand::Kind::mark:
       return true;
     case ServoCommand::Kind::select_tool:
-      if (command.argument >= plan.tool_count) return false;
-      if (command.argument == state.active_tool) return true;
-      state.active_tool = command.argument;
-      state.contact.proxy.search_again();  // the new tool may not fit where the old one was
-      state.force_cut.change_tool();
-      return true;
+      return command.arm < arms.size() && select_tool(arms[command.arm], command.argument);
     case ServoCommand::Kind::fade_in:
-      restart_fade(state.supervisor);
-      state.force_n = {};  // the motors were off meanwhile
-      state.held_force_n = {};
-      state.ledger.send({});
+      for (const Arm<N>& arm : arms) {
+        restart_fade(arm.state->supervisor);
+        arm.state->force_n = {};  // the motors were off meanwhile
+        arm.state->held_force_n = {};
+        arm.state->ledger.send({});
+      }
       return true;
     case ServoCommand::Kind::hold:
-      state.hold = command.argument != 0;
+      for (const Arm<N>& arm : arms) arm.state->hold = command.argument != 0;
       return true;
     case ServoCommand::Kind::reset:
-      state.reset.runs = plan.cutting || plan.force_cut.on;
-      forget_strokes(state.stroke);  // their bricks are among those that were cut
+      history.reset.runs = plan.cutting || plan.force_cut.on;
+      forget_strokes(history.stroke);  // their bricks are among those that were cut
       return true;
     case ServoCommand::Kind::undo:
-      return !state.reset.runs && begin_undo(state.stroke);
+      return !history.reset.runs && begin_undo(history.stroke);
     case ServoCommand::Kind::redo:
-      return !state.reset.runs && begin_redo(state.stroke);
+      return !history.reset.runs && begin_redo(history.stroke);
   }
   return false;
 }
 
 // The three bundles, compiled once.
 #define KERF_INSTANTIATE(N)                                                              \
-  template ServoOutput servo_step<N>(const ServoPlan<N>&, ServoState<N>&,                \
-                                     const DeviceReport&) noexcept;                      \
+  template void servo_step<N>(Arms<N>, std::span<const DeviceReport>,                    \
+                              std::span<ServoOutput>) noexcept;                          \
   template double penetration_mm<N>(const ServoPlan<N>&, const ServoState<N>&) noexcept; \
-  template bool apply_command<N>(const ServoPlan<N>&, ServoState<N>&, const ServoCommand&) noexcept;
+  template bool apply_command<N>(Arms<N>, const ServoCommand&) noexcept;
 KERF_INSTANTIATE(FixedNumbers)
 KERF_INSTANTIATE(DoubleNumbers)
 #undef KERF_INSTANTIATE

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
+#include <span>
+
 #include "controller/servo/servo.hpp"
 #include "controller/servo/servo_plan.hpp"
 #include "controller/servo/servo_state.hpp"
@@ -15,9 +18,13 @@ namespace kerf {
 /// that was sent. A missing report holds the last force and then fades it; a pose that is not
 /// finite holds it for `not_finite_ticks`, then the motors go off. There is no contact and no cut
 /// meanwhile.
+///
+/// `reports` and `outputs` are by arm. The arms take their turns in this order: each meets the
+/// volumes as the one before has left them. What a reset or an undo restores is in the first
+/// output.
 template <class N>
-[[nodiscard]] ServoOutput servo_step(const ServoPlan<N>& plan, ServoState<N>& state,
-                                     const DeviceReport& report) noexcept;
+void servo_step(Arms<N> arms, std::span<const DeviceReport> reports,
+                std::span<ServoOutput> outputs) noexcept;
 
 /// How far the active tool reaches into the solid along the contact force of the last tick, in mm;
 /// 0 without contact. For the eyes only, so the real-time shell asks for it after the hand has its
@@ -27,7 +34,6 @@ template <class N>
 
 /// Applies a command between two ticks. An index out of range changes nothing: false.
 template <class N>
-bool apply_command(const ServoPlan<N>& plan, ServoState<N>& state,
-                   const ServoCommand& command) noexcept;
+bool apply_command(Arms<N> arms, const ServoCommand& command) noexcept;
 
 }  // namespace kerf

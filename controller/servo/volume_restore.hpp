@@ -109,35 +109,40 @@ VoxelBox restore_bricks(const ServoPlan<N>& plan, const VoxelGrid& grid, std::si
   return restored;
 }
 
-/// Clears the carry of a restored volume: one value for each lane of the widest tool.
+/// Clears the carry of a restored volume: one value for each lane of the widest tool, of each arm.
 template <class N>
-void forget_debts(ServoState<N>& state, std::size_t v) noexcept {
-  std::ranges::fill(state.volumes[v].carry, RemovalCarry<N>{});
-  state.force_cut.volume[v] = {};
+void forget_debts(Arms<N> arms, std::size_t v) noexcept {
+  for (const Arm<N>& arm : arms) {
+    std::ranges::fill(arm.state->volumes[v].carry, RemovalCarry<N>{});
+    arm.state->force_cut.volume[v] = {};
+  }
 }
 
-/// Ends a reset or an undo.
+/// Ends a reset or an undo: every tool stands, and has cut nothing of the restored content.
 template <class N>
-void end_restoring(ServoState<N>& state) noexcept {
-  state.force_cut.change_tool();  // it stands, and has cut nothing of the restored content
-  restart_fade(state.supervisor);
+void end_restoring(Arms<N> arms) noexcept {
+  for (const Arm<N>& arm : arms) {
+    arm.state->force_cut.change_tool();
+    restart_fade(arm.state->supervisor);
+  }
 }
 
 /// One tick of a reset that runs: bricks of one block; sets `changed` by volume of the scene. The
 /// last tick of a reset ends it.
 template <class N>
-void restore_some(const ServoPlan<N>& plan, ServoState<N>& state,
-                  std::array<VoxelBox, kMaxVolumes>& changed) noexcept {
-  ResetState& reset = state.reset;
+void restore_some(Arms<N> arms, std::array<VoxelBox, kMaxVolumes>& changed) noexcept {
+  const ServoPlan<N>& plan = *arms.front().plan;
+  ServoState<N>& state = *arms.front().state;
+  ResetState& reset = state.history->reset;
   for (int looks = kBlocksPerTick; looks > 0; --looks) {
     if (reset.volume == plan.volume_count) {
       reset = {};
-      end_restoring(state);
+      end_restoring(arms);
       return;
     }
     VolumeState<N>& volume = state.volumes[reset.volume];
     if (reset.block == volume.cut_blocks.size()) {
-      forget_debts(state, reset.volume);
+      forget_debts(arms, reset.volume);
       ++reset.volume;
       reset.block = 0;
     } else if (volume.cut_blocks[reset.block] == 0) {
@@ -204,7 +209,7 @@ void keep_bricks(const ServoPlan<N>& plan, ServoState<N>& state, std::size_t v,
                  const VoxelVec<typename N::Real>& centre_vox) noexcept {
   const VoxelGrid& grid = plan.volumes[v].grid;
   const std::array<std::int32_t, 3>& reach = plan.tools[state.active_tool].in_volume[v].reach_vox;
-  StrokeState& stroke = state.stroke;
+  StrokeState& stroke = state.history->stroke;
   const auto whole = [](typename N::Real at) {
     constexpr double kLimit = kPositionLimitVox;
     const double plain = as_double(at);
@@ -264,7 +269,7 @@ inline void forget_strokes(StrokeState& stroke) noexcept {
 }
 
 /// At the end of a tick without restoring: a cut begins or continues a stroke and drops those that
-/// were undone; a pause in which the tool does not `hold_on`, by contact or by the pedal, ends it.
+/// were undone; a pause in which no tool `holds_on`, by contact or by the pedal, ends it.
 inline void follow_stroke(std::uint32_t pause_ticks, bool cuts, bool holds_on,
                           StrokeState& stroke) noexcept {
   if (cuts && !stroke.open) {
@@ -335,14 +340,16 @@ VoxelBox swap_brick(const ServoPlan<N>& plan, KeptBrick& kept, ServoState<N>& st
 /// One tick of an undo or a redo that runs: bricks of one volume that are close to each other;
 /// writes them to `out`. The last tick ends it.
 template <class N>
-void swap_some(const ServoPlan<N>& plan, ServoState<N>& state, ServoOutput& out) noexcept {
+void swap_some(Arms<N> arms, ServoOutput& out) noexcept {
   constexpr std::int32_t kWidest = BrickBlocks::kEdge * kBrickEdge;  // as a block of a reset
-  StrokeState& stroke = state.stroke;
+  const ServoPlan<N>& plan = *arms.front().plan;
+  ServoState<N>& state = *arms.front().state;
+  StrokeState& stroke = state.history->stroke;
   Stroke& rest = stroke.moving;
   if (rest.begin == rest.end) {
     stroke.motion = StrokeState::Motion::none;
-    for (std::size_t v = 0; v < plan.volume_count; ++v) forget_debts(state, v);
-    end_restoring(state);
+    for (std::size_t v = 0; v < plan.volume_count; ++v) forget_debts(arms, v);
+    end_restoring(arms);
     return;
   }
   const auto last = [&]() -> KeptBrick& {

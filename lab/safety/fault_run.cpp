@@ -169,7 +169,8 @@ FaultOutcome run_faults(const FaultCase& subject, const FaultScript& as_written)
     if (!due || device.host_is_late()) continue;
     const DeviceReport report = loop.driver().read();
     static_cast<void>(recover(signals, standstill.stood_still(now_ns), loop.servo()));
-    send_tick(loop.servo().step(report), signals, loop.driver());
+    const ServoOutput output = loop.servo().step(report);
+    send_tick(std::span(&output, 1), signals, loop.driver());
     ++signals.heartbeat;
   }
   constexpr double kGraceMs = 50;

@@ -9,6 +9,7 @@
 
 #include "shared/numeric/energy_source.hpp"
 #include "shared/volume/checksum.hpp"
+#include "shared/wire/personality.hpp"
 
 namespace kerf {
 
@@ -40,7 +41,6 @@ inline constexpr std::uint64_t kSegmentMagic = [] {
 }();
 inline constexpr std::uint32_t kLayoutMajor = 1;
 inline constexpr std::uint32_t kLayoutMinor = 4;
-inline constexpr std::size_t kMaxArms = 2;  // devices of one scene, each with a ring of TickRecord
 inline constexpr std::uint32_t kStateSlots = 4096;  // 4.1 s at 1 kHz: as long as a reader may stop
 inline constexpr std::uint32_t kDirtySlots = 4096;
 inline constexpr std::uint64_t kMaxSceneBytes = std::uint64_t{1} << 26;  // a reader copies it whole

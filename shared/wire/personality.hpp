@@ -8,6 +8,9 @@
 
 namespace kerf {
 
+/// Devices of one scene, each an arm with a tool of its own.
+inline constexpr std::size_t kMaxArms = 2;
+
 /// Which device is held. The first three are joint-count devices: kerf reads their encoders and
 /// drives their motors. The others are Cartesian: a service or a library of the vendor stands
 /// between, which reports a pose and takes a force (shared/wire/cartesian.hpp).

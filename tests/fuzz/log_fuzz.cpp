@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
+#include <span>
 #include <string>
 #include <string_view>
 
@@ -69,8 +70,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if (kind == 4) {
     std::filesystem::create_directory(folder / "inputs");
     folder.write("inputs/000000000001.npy.gz", bytes);
-    must_read_or_explain<kerf::RecordError>(
-        [] { kerf::for_each_input(folder.path(), 10, [](const kerf::TickRecord&) {}); });
+    must_read_or_explain<kerf::RecordError>([] {
+      kerf::for_each_input(folder.path(), 10, 1, [](std::span<const kerf::TickRecord>) {});
+    });
     return 0;
   }
   folder.write("manifest.json", kind == 0   ? std::string(bytes)

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -38,8 +39,8 @@ bool same_inputs(const TickRecord& a, const TickRecord& b) {
 /// How many ticks of the recording are read, each as it was given.
 Tick ticks_read(const std::filesystem::path& folder, Tick last) {
   Tick read = 0;
-  for_each_input(folder, last, [&](const TickRecord& inputs) {
-    if (same_inputs(inputs, given_in(read + 1))) ++read;
+  for_each_input(folder, last, 1, [&](std::span<const TickRecord> inputs) {
+    if (same_inputs(inputs.front(), given_in(read + 1))) ++read;
   });
   return read;
 }
@@ -75,8 +76,7 @@ TEST_CASE("inputs are read back as they were given, up to any tick") {
   std::filesystem::create_directory(folder / "short");
   CHECK_THROWS_AS(copy_inputs(folder / "kept-15", folder / "short", 4 * kFile), FileError);
   CHECK(std::filesystem::is_empty(folder / "short"));
-  CHECK_THROWS_AS(for_each_input(folder / "kept-15", 3 * kFile, [](const TickRecord&) {}),
-                  RecordError);
+  CHECK_THROWS_AS(for_each_input(folder / "kept-15", 3 * kFile, 1, [](auto) {}), RecordError);
 }
 
 TEST_CASE("after a missing tick the inputs are not complete, and stay so") {

@@ -82,7 +82,7 @@ TEST_CASE("recorded inputs end in the recorded bits, on every instruction set") 
       std::uint32_t contact = 0, faults = 0;
       std::uint64_t removed = 0;
       for (const TickRecord& tick : inputs.ticks) {
-        last = step(tick);
+        last = step({tick})[0];
         contact += (last.flags & kFlagContact) != 0 ? 1 : 0;
         removed += last.removed;
         faults |= last.fault;

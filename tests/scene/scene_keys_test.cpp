@@ -199,6 +199,7 @@ TEST_CASE("every row: what it allows is read, both ends of its range too") {
       // The upper ends are those of the strongest device.
       if (key.name.starts_with("limits.")) lines.set("device.personality", "\"omega\"");
       if (key.name == "limits.slew_n_per_ms") lines.set("limits.force_n", "3.3");
+      if (key.name == "device.first_tool") lines.set("tool.name", value);
       if (value == in_quotes(kMeshShape)) lines.set("tool.file", "\"a.stl\"").drop("tool.size_vox");
       // Something must be solid.
       const std::string second = "[[volume]]\nname = \"second\"\nfile = \"phantom\"\n";
@@ -352,6 +353,7 @@ TEST_CASE("every table: one of another form is answered with the right one") {
                                   : " is not a table; write [" + table + "]";
     const std::string head = "x.toml:1: " + table + " = ";
     CHECK(error_of(table + " = 3\n") == head + "3" + says);
+    if (table == "device" || table == "hand") continue;  // a list of them is two arms
     CHECK(error_of((list ? "[" + table + "]" : "[[" + table + "]]") + "\n") ==
           head + (list ? "{..}" : "[{..}]") + says);
   }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The real servo loop on the socket port, beside an emulator: no allocation, no page fault, no
 // system call beyond clock and port. Each proof also meets the fault that it must catch.
+#include <array>
 #include <atomic>
 #include <cerrno>
 #include <cstddef>
@@ -215,7 +216,7 @@ Outcome run_loop(Seed seed, bool guarded = false) {
       outcome.uncounted = counter.why_not();
       const std::uint64_t before = port.receives + port.sends;
       if (calls)
-        calls->enter("socket:");
+        calls->enter(std::array<std::string, 1>{"socket:"});
       else
         counter.start();
       outcome.end = kerf::run_servo(clock, device, *servo, eyes, server, {.armed_ticks = 1500},

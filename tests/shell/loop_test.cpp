@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The loop around the servo: its clock, its gate, its watchdog, its end.
+#include <algorithm>
+#include <array>
 #include <atomic>
 #include <chrono>
 #include <cmath>
@@ -20,6 +22,7 @@
 #include <unistd.h>
 
 #include "controller/device/device_driver.hpp"
+#include "controller/device/devices.hpp"
 #include "controller/load/scene_json.hpp"
 #include "controller/loop/publisher.hpp"
 #include "controller/loop/servo_loop.hpp"
@@ -28,6 +31,7 @@
 #include "controller/run/run_start.hpp"
 #include "shared/posix/threads.hpp"
 #include "shared/segment/reader.hpp"
+#include "shared/wire/cartesian.hpp"
 #include "shared/wire/omni.hpp"
 #include "tests/servo/support.hpp"
 #include "tests/support/temporary_folder.hpp"
@@ -183,10 +187,10 @@ TEST_CASE("of a tick that stood still itself nothing is sent, and of the next on
   push.motors_on = true;
   push.motor_counts = {100, -200, 300};
   signals.stalled = true;  // the watchdog looked while the tick lasted
-  kerf::send_tick(push, signals, driver);
+  kerf::send_tick(std::span(&push, 1), signals, driver);
   CHECK(port.neutral == 1);
   signals.stalled = false;
-  kerf::send_tick(push, signals, driver);
+  kerf::send_tick(std::span(&push, 1), signals, driver);
   CHECK(port.neutral == 1);
 }
 
@@ -239,4 +243,112 @@ TEST_CASE("a device that says nothing for 2000 ticks ends the loop, and no motor
     CHECK(std::isnan(told->position_mm[i]));
     CHECK(std::isnan(told->velocity_mm_per_s[i]));
   }
+}
+
+namespace {
+
+/// A Touch that rests parked for 100 ticks, is then held still in the air, and after `ticks` in all
+/// is gone.
+struct HeldPort final : kerf::PacketPort {
+  explicit HeldPort(std::uint32_t ticks) : last(ticks) {}
+  std::size_t receive(std::span<std::uint8_t> packet) noexcept override {
+    given = !given;  // one a tick: the driver reads until nothing is left
+    if (!given || ++tick > last) return 0;
+    kerf::CartesianReport report;
+    report.number = tick;
+    report.parked = tick < 100;
+    report.position_um = {0, 50'000, 0};
+    report.homed = report.powered = true;
+    const auto bytes = kerf::encode(report);
+    std::ranges::copy(bytes, packet.begin());
+    return bytes.size();
+  }
+  bool send(std::span<const std::uint8_t>) noexcept override {
+    ++sent;
+    return takes;
+  }
+  bool closed() const noexcept override { return false; }
+  bool wait(int) noexcept override { return false; }
+
+  std::uint32_t last, tick = 0;
+  std::uint64_t sent = 0;
+  bool given = false, takes = true;
+};
+
+}  // namespace
+
+TEST_CASE(
+    "of two devices one that goes away is a fault of its arm alone, and the last ends the run") {
+  kerf::LoadedScene scene = kerf::test::half_space_scene(32);
+  scene.device.personality = kerf::Personality::touch;
+  scene.device.torque_scale = std::array{1.0, 1.0, 1.0};
+  scene.second = kerf::SecondArm{.device = scene.device,
+                                 .offset_given = true,
+                                 .limits = scene.limits,
+                                 .hand_script = {},
+                                 .hand_place = {}};
+  const auto servo = kerf::plan_scene(scene);
+  const std::string json = kerf::canonical_json(scene);
+  auto segment = kerf::SegmentWriter::create(kerf::segment_spec(scene, json, 0));
+  kerf::SegmentServer server("two-" + std::to_string(getpid()), segment, {.tools = 1, .arms = 2});
+  servo->take(scene);
+  constexpr std::uint32_t kFirstTicks = 500, kSecondTicks = 900;
+  HeldPort first(kFirstTicks), second(kSecondTicks);
+  const auto driver = kerf::make_driver(kerf::Personality::touch, first);
+  const auto other = kerf::make_driver(kerf::Personality::touch, second);
+  NoClock clock;
+  kerf::Publisher eyes(segment, *servo);
+  std::atomic<bool> stop{false};
+  kerf::LoopSignals signals{stop};
+  kerf::RunRecord record;
+  const kerf::LoopLimits limits{.arming_ticks = 10'000};
+  CHECK(kerf::run_servo(clock, {*driver, other.get()}, *servo, eyes, server, limits, signals,
+                        record) == kerf::EndReason::device_gone);
+  CHECK(signals.heartbeat == kSecondTicks + limits.gone_ticks);
+  const auto names = [](const kerf::EventList& faults) {
+    std::string list;
+    for (const auto& fault : faults.kept()) list += std::string(fault.name) + " ";
+    return list;
+  };
+  CHECK(names(record.faults) == "stale_input device_gone ");
+  CHECK(names(record.second.faults) == "stale_input device_gone ");
+  CHECK(record.faults.first[0].tick < record.second.faults.first[0].tick);
+  CHECK(record.stale_ticks == 0);  // those since it went are no losses
+  CHECK(record.second.stale_ticks == 0);
+  CHECK(record.has_faults());
+
+  // Every tick has a record of each arm, of the same tick.
+  const auto reader = kerf::SegmentReader::map(segment.fd());
+  CHECK(reader.info().arms == 2);
+  kerf::TickRecord a, b;
+  for (std::uint64_t i = 0; i < 1000; ++i) {
+    REQUIRE(reader.state_at(i, a) == kerf::ReadState::ok);
+    REQUIRE(reader.state_at(i, b, 1) == kerf::ReadState::ok);
+    REQUIRE(a.tick == b.tick);
+    REQUIRE((a.stale != 0) == (i >= kFirstTicks));
+    REQUIRE((b.stale != 0) == (i >= kSecondTicks));
+  }
+}
+
+TEST_CASE("every device is released, though one before it takes nothing") {
+  HeldPort first(0), second(0);
+  first.takes = false;
+  const auto driver = kerf::make_driver(kerf::Personality::touch, first);
+  const auto other = kerf::make_driver(kerf::Personality::touch, second);
+  const kerf::Devices devices(*driver, other.get());
+  CHECK_FALSE(devices.release());
+  CHECK(second.sent == 1);
+  CHECK_FALSE(devices.stay_released());
+  CHECK(second.sent == 2);
+  CHECK_FALSE(devices.release_for_good());
+  CHECK(second.sent > 2);
+
+  std::atomic<bool> stop{false};
+  kerf::LoopSignals signals{stop};
+  kerf::Watchdog watchdog(devices, signals);
+  signals.heartbeat = 1;
+  watchdog.look(1);
+  const std::uint64_t before = second.sent;
+  watchdog.look(25 * kMs);
+  CHECK(second.sent == before + 1);
 }

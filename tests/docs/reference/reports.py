@@ -43,6 +43,7 @@ REPORTS = [
         ("watchdog_trips", "", "how often the loop stood still for 20 ms, and the motors went off"),
         ("lost_packets, refused_packets", "", "of the device"),
         ("link", "", "counters of the port, below"),
+        ("second", "", "of the second of two arms: its `device`, the `tool` that it held at the start, and the figures above that an arm has of its own"),
         ("missing_rights", "", "what the start could not get: `what`, and its `effect`"),
         ("load_s", "s", "from the start to the first servo tick"),
         ("start_to_force_ms", "ms", "from the start to the first force that was sent; null: none was"),

@@ -2,6 +2,7 @@
 // --guard above real buses: the calls of the servo thread there are allowed, and no other.
 #include <atomic>
 #include <memory>
+#include <span>
 #include <string>
 #include <thread>
 
@@ -31,7 +32,7 @@ std::string unexpected_call(Personality personality, const std::string& text, bo
   kerf::CallGuard calls(*driver, stop);
   std::thread([&] {
     const kerf::HandlerStack handlers = motors.guard_stack();
-    calls.enter(text);
+    calls.enter(std::span(&text, 1));
     std::int64_t deadline_ns = kerf::monotonic_ns();
     for (int tick = 0; tick < 2000 && !stop && !port->closed(); ++tick) {
       if (!lockstep) deadline_ns += 1'000'000;
