@@ -84,11 +84,11 @@ void declare_scene_options(Arguments& app, ControllerOptions& options, Raw& raw)
       .values(3, 3)
       .within(-kMaxTorqueScale, kMaxTorqueScale)
       .shown_as("A,B,C");
-  app.option(
-         "--port", options.port,
-         "where the device is: auto; fw, usb or hid, each [:NODE or :SERIAL]; usb also "
-         "[,firmware=FILE]; ws[:[HOST:]PORT][,park=BUTTON][,device=ID], the Inverse3's service; "
-         "arm[:NAME] of kerf-arm; socket:PATH or udp:[ADDRESS:]PORT of kerf-emulator")
+  app.option("--port", options.port,
+             "where the device is: auto; fw, usb or hid, each [:NODE or :SERIAL]; usb also "
+             "[,firmware=FILE]; ws[:[HOST:]PORT][,park=BUTTON][,device=ID][,handle=ID], the "
+             "Inverse3's service; "
+             "arm[:NAME] of kerf-arm; socket:PATH or udp:[ADDRESS:]PORT of kerf-emulator")
       .shown_as("PORT");
   constexpr double kLongestS = 1e7;  // 115 days
   app.option("--seconds", options.seconds,
