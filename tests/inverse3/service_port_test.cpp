@@ -232,6 +232,21 @@ TEST_CASE("nobody, a silent program and one that speaks otherwise: one line, and
   }
 }
 
+TEST_CASE("a port that is taken is the fault of the option that named it") {
+  const Stranger there("");
+  Emulator emulator(std::make_unique<CartesianModel>(ServedService::as_service()), std::nullopt);
+  const FaultScript no_faults;
+  FaultyDevice device(emulator, no_faults);
+  const auto line = [&](const ServicePlace& place) {
+    return error_of([&] { ServiceFront(place, {}, device, [] {}); });
+  };
+  const std::string taken = std::to_string(there.port());
+  CHECK(line({taken, std::nullopt}).starts_with("--ws: " + taken + ": Address already in use"));
+  CHECK(
+      line({"0", there.port()}).starts_with("--ws-events: " + taken + ": Address already in use"));
+  CHECK(line({"0", std::uint16_t{0}}).empty());
+}
+
 TEST_CASE("an attempt to connect ends when it is asked to, however long it may take") {
   const Stranger silent("");
   constexpr int kVeryLongMs = 3'600'000;
