@@ -2,10 +2,10 @@
 #include "arm/dhd_arm.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <cstddef>
 
 #include "arm/arm_error.hpp"
+#include "arm/overseer.hpp"
 #include "shared/posix/stop_signals.hpp"
 #include "shared/posix/threads.hpp"
 
@@ -25,6 +25,29 @@ constexpr const char* kDhdErrors[] = {
     "device in use",   "invalid",       "no regulation"};
 constexpr std::size_t kKnownDhdErrors = std::size(kDhdErrors);
 
+/// Numbers that dhdGetSystemType returns, by the SDK's header; of two, the second is for the left
+/// hand.
+struct DeviceType {
+  int number;
+  const char* name;
+};
+constexpr DeviceType kDeviceTypes[] = {
+    {33, "omega.3"},   {34, "omega.6"},   {36, "omega.6"},    {35, "omega.7"},    {37, "omega.7"},
+    {60, "Falcon"},    {63, "delta.3"},   {81, "controller"}, {82, "controller"}, {91, "custom"},
+    {104, "sigma.7"},  {105, "sigma.7"},  {108, "lambda.7"},  {109, "lambda.7"},  {131, "lambda.6"},
+    {132, "lambda.6"}, {203, "lambda.3"}, {206, "sigma.3"}};
+constexpr int kOmega3 = 33, kFirstOmega = 33, kLastOmega = 37;
+
+constexpr bool is_omega(int type) noexcept {
+  return type >= kFirstOmega && type <= kLastOmega;
+}
+
+std::string described(int type) {
+  const auto* known = std::ranges::find(kDeviceTypes, type, &DeviceType::number);
+  return "type " + std::to_string(type) + ", " +
+         (known != std::end(kDeviceTypes) ? known->name : "a type that kerf does not know");
+}
+
 }  // namespace
 
 DhdArm::DhdArm(const Options& options, ArmExchange& exchange)
@@ -39,6 +62,7 @@ DhdArm::DhdArm(const Options& options, ArmExchange& exchange)
   library_.find("drdAutoInit", calls_.auto_init);
   library_.find("drdStop", calls_.stop_regulation);
   library_.find("dhdGetSystemName", calls_.get_system_name);
+  library_.find("dhdGetSystemType", calls_.get_system_type);
   library_.find("dhdErrorGetLast", calls_.error_get_last);
   library_.find("dhdErrorGetLastStr", calls_.error_get_last_str);
   library_.find("dhdEnableExpertMode", calls_.enable_expert_mode);
@@ -73,6 +97,7 @@ void DhdArm::open() {
   is_open_ = true;
   const char* const name = calls_.get_system_name(id_);
   facts_ = {{"library", library_.file()}, {"version", sdk}, {"model", name != nullptr ? name : ""}};
+  check_type();
   is_initialized_ = calls_.is_initialized(id_);
   if (!is_initialized_ && options_.initializes) {
     static_cast<void>(set_watchdog());  // so that the motion does not outlive this process
@@ -87,6 +112,20 @@ void DhdArm::open() {
     throw ArmError("dhdEnableForce: " + last_error() +
                    "; release the device's force button, and see the vendor's manual");
   }
+}
+
+void DhdArm::check_type() {
+  type_ = calls_.get_system_type(id_);
+  if (type_ <= 0) {
+    throw ArmError("device type " + std::to_string(type_) +
+                   ": none that the library knows; check cable and power, and install the SDK of "
+                   "this device");
+  }
+  facts_.emplace_back("type", described(type_));
+  if (is_omega(type_) || options_.is_peak_given) return;
+  throw ArmError("device of " + described(type_) +
+                 ": no omega, and kerf knows no limits of another; say which force in N it bears "
+                 "all the time by its data sheet: --peak N, at most 12");
 }
 
 bool DhdArm::set_watchdog() noexcept {
@@ -115,6 +154,7 @@ void DhdArm::close() {
 
 void DhdArm::run() noexcept {
   const BlockStopSignals to_the_main_thread;
+  Overseer::give_crash_stack();
   if (options_.priority > 0) {
     static_cast<void>(pin_to_core(options_.core >= 0 ? options_.core : allowed_cores().back()));
     static_cast<void>(set_fifo(options_.priority));
@@ -139,6 +179,7 @@ void DhdArm::frame() noexcept {
   std::optional<ArmReading> reading;
   if (calls_.get_position(&x_m, &y_m, &z_m, id_) >= 0) {
     unread_ = 0;
+    read_ns_ = exchange_.now_ns();
     if (initialized_look_-- <= 0) {
       initialized_look_ = kLookFrames;
       is_initialized_ = calls_.is_initialized(id_);
@@ -157,7 +198,10 @@ void DhdArm::frame() noexcept {
   } else {
     count_error();
     const auto code = static_cast<std::uint32_t>(calls_.error_get_last());
-    if (++unread_ >= static_cast<int>(std::ceil(kGoneS * options_.rate_hz))) {
+    constexpr auto kGoneNs = static_cast<std::int64_t>(kGoneS * kNsPerSecond);
+    const std::int64_t now_ns = exchange_.now_ns();
+    if (read_ns_ == 0) read_ns_ = now_ns;
+    if (++unread_ >= kFewestUnread && now_ns - read_ns_ >= kGoneNs) {
       exchange_.fail(std::max(code, 1U));
     }
   }
@@ -198,10 +242,24 @@ std::string DhdArm::last_error() const {
          (text != nullptr ? ": " + std::string(text) : "");
 }
 
-std::string DhdArm::warning() const {
-  if (has_watchdog_) return {};
-  return "the device takes no watchdog: if kerf-arm is killed or the machine stops, its force may "
-         "stay; keep a hand at its switch";
+std::vector<std::string> DhdArm::warnings() const {
+  std::vector<std::string> all;
+  if (!is_omega(type_)) {
+    all.push_back("device of " + described(type_) +
+                  ": no omega; its force is held below --peak alone, its axes and its parking "
+                  "button are taken for an omega.3's; check each without force first "
+                  "(docs/devices.md)");
+  } else if (type_ != kOmega3) {
+    all.push_back("device of " + described(type_) +
+                  ": its wrist and gripper are not read and get no force; it is taken for an "
+                  "omega.3");
+  }
+  if (!has_watchdog_) {
+    all.emplace_back(
+        "the device takes no watchdog: if kerf-arm is killed or the machine stops, its force may "
+        "stay; keep a hand at its switch");
+  }
+  return all;
 }
 
 std::string DhdArm::text_of(std::uint32_t failure) const {

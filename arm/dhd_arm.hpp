@@ -28,6 +28,7 @@ struct Calls {
   int (*auto_init)(char id);
   int (*stop_regulation)(bool leaves_force, char id);
   const char* (*get_system_name)(char id);
+  int (*get_system_type)(char id);
   int (*error_get_last)();  ///< of the calling thread
   const char* (*error_get_last_str)();
   int (*enable_expert_mode)();
@@ -42,8 +43,9 @@ struct Calls {
 
 }  // namespace dhd
 
-/// An omega.3 of Force Dimension, by libdrd.so.3. Other devices of theirs open too, with the limits
-/// and the range of an omega.3.
+/// An omega of Force Dimension, by libdrd.so.3: as an omega.3, whatever its wrist. Another device
+/// of theirs, as the Falcon, opens only if the user has said which force it bears; axes, buttons
+/// and range are those of an omega.3.
 ///
 /// A thread of its own runs the frames: position, buttons, one turn, force. The SDK's axes are x to
 /// the user, y right, z up, in m: kerf (x, y, z) = (y, z, x) mm.
@@ -57,14 +59,18 @@ class DhdArm final : public VendorArm {
     std::string library;  ///< empty: libdrd.so.3, libdrd.so
     int index = -1;       ///< of the device; -1: the SDK's default
     int rate_hz = 4000;
-    bool initializes = false;  ///< by a motion of its own, if it is not yet
-    int priority = 81;         ///< SCHED_FIFO; 0: none
-    int core = -1;             ///< -1: the last one
+    bool is_peak_given = false;  ///< the exchange's peak is the user's word for this device
+    bool initializes = false;    ///< by a motion of its own, if it is not yet
+    int priority = 81;           ///< SCHED_FIFO; 0: none
+    int core = -1;               ///< -1: the last one
   };
   /// Units of 125 us: 20 ms.
   static constexpr unsigned char kWatchdogUnits = 160;
-  /// The device is gone if no position could be read for so long.
+  /// The device is gone if no position could be read for so long, in at least kFewestUnread tries:
+  /// time and not a count of cycles, since a call may block, and a thread that stood still has not
+  /// tried.
   static constexpr double kGoneS = 0.1;
+  static constexpr int kFewestUnread = 3;
 
   /// Loads the library. Throws ArmError.
   DhdArm(const Options& options, ArmExchange& exchange);
@@ -74,7 +80,7 @@ class DhdArm final : public VendorArm {
   void stop() override;
   void close() override;
   [[nodiscard]] Facts facts() const override { return facts_; }
-  [[nodiscard]] std::string warning() const override;
+  [[nodiscard]] std::vector<std::string> warnings() const override;
   [[nodiscard]] std::string text_of(std::uint32_t failure) const override;
   [[nodiscard]] std::vector<std::pair<std::string, std::uint64_t>> errors() const override;
   [[nodiscard]] const char* notice() const noexcept override { return notice_.load(); }
@@ -86,6 +92,7 @@ class DhdArm final : public VendorArm {
 
  private:
   void run() noexcept;
+  void check_type();
   void follow_force_mode(ArmReading& reading) noexcept;
   [[nodiscard]] bool set_watchdog() noexcept;
   [[nodiscard]] std::string last_error() const;
@@ -97,11 +104,13 @@ class DhdArm final : public VendorArm {
   dhd::Calls calls_{};
   Facts facts_;
   char id_ = 0;
+  int type_ = 0;  ///< dhdGetSystemType
   bool is_open_ = false, has_watchdog_ = false;
   std::jthread thread_;
   std::atomic<const char*> notice_{""};
   // Of that thread, until `stop`.
-  int unread_ = 0;  ///< positions in a row that could not be read
+  int unread_ = 0;            ///< positions in a row that could not be read
+  std::int64_t read_ns_ = 0;  ///< when the last one was read, or the first try
   int initialized_look_ = 0, mode_look_ = 0;
   bool gives_force_ = true;
   bool is_initialized_ = false;

@@ -23,7 +23,7 @@ std::optional<std::array<double, 4>> orientation_of(const Vec3& x, const Vec3& y
   const Vec3 across{x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2],
                     x[0] * y[1] - x[1] * y[0]};
   if (!is(dot(x, x), 1) || !is(dot(y, y), 1) || !is(dot(z, z), 1) || !is(dot(x, y), 0) ||
-      !is(dot(across, z), 1)) {  // the last one excludes a mirror
+      !is(dot(y, z), 0) || !is(dot(z, x), 0) || !(dot(across, z) > 0)) {  // the last one: a mirror
     return std::nullopt;
   }
   // Of the four components the largest is found from the diagonal, the others from sums beside it
@@ -48,7 +48,6 @@ ArmExchange::ArmExchange(ArmPageAdapter& page, double peak_n, int rate_hz, Clock
     : page_(page),
       peak_n_(peak_n),
       command_life_ns_(kZeroNs - std::max<std::int64_t>(1'000'000, 1'000'000'000 / rate_hz)),
-      most_zero_frames_(std::max(kFewest, static_cast<std::uint64_t>(std::ceil(kZeroS * rate_hz)))),
       clock_(clock) {}
 
 std::array<double, 3> ArmExchange::turn(const std::optional<ArmReading>& reading) noexcept {
@@ -59,12 +58,19 @@ std::array<double, 3> ArmExchange::turn(const std::optional<ArmReading>& reading
   if (reading && !is_pose) ++counts_.unreadable;
   const bool is_let_go = is_let_go_.load();
   if (published_.load() > 0 && !is_let_go) force_n = commanded(begin_ns);
-  if (is_let_go) zero_frames_.fetch_add(1);
+  if (is_let_go) count_zero_frame(begin_ns);
   if (force_n != Vec3{}) ++counts_.forced;
   last_force_n_ = force_n;
   counts_.turn.record(clock_() - begin_ns);
   frames_.fetch_add(1);
   return force_n;
+}
+
+void ArmExchange::count_zero_frame(std::int64_t now_ns) noexcept {
+  constexpr auto kZeroForNs = static_cast<std::int64_t>(kZeroS * kNsPerSecond);
+  if (zero_frames_ == 0) zero_since_ns_ = now_ns;
+  zero_frames_ = std::min(zero_frames_ + 1, kFewest);
+  if (zero_frames_ == kFewest && now_ns - zero_since_ns_ >= kZeroForNs) is_finished_.store(true);
 }
 
 bool ArmExchange::publish(const ArmReading& reading, std::int64_t now_ns) noexcept {

@@ -23,8 +23,9 @@ struct ArmReading {
   bool powered = true;  ///< it can give a force
 };
 
-/// Rotation of a tool whose axes are the columns `x`, `y`, `z`. Nothing unless they are of length 1
-/// and perpendicular within 5 %.
+/// Rotation of a tool whose axes are the columns `x`, `y`, `z`. Nothing unless each of them has a
+/// squared length of 1 within 0.05, each two a dot product of 0 within 0.05 (3 degrees beside the
+/// right angle), and the three are right-handed.
 [[nodiscard]] std::optional<std::array<double, 4>> orientation_of(
     const std::array<double, 3>& x, const std::array<double, 3>& y,
     const std::array<double, 3>& z) noexcept;
@@ -44,9 +45,10 @@ class ArmExchange {
   /// is not known.
   [[nodiscard]] std::int64_t command_life_ns() const noexcept { return command_life_ns_; }
   static constexpr int kSlowestHz = 200;  // leaves three quarters of it
-  /// From `let_go` on, so many frames of zero force make the end, and at least kFewest.
+  /// From `let_go` on, frames of zero force over so long make the end, and at least kFewest: time
+  /// and not a count, since a library may have another rate than it was asked for.
   static constexpr double kZeroS = 0.02;
-  static constexpr std::uint64_t kFewest = 3;
+  static constexpr int kFewest = 3;
 
   ArmExchange(ArmPageAdapter& page, double peak_n, int rate_hz,
               Clock* clock = monotonic_ns) noexcept;
@@ -60,7 +62,7 @@ class ArmExchange {
   /// Zero force from the next frame on, for good.
   void let_go() noexcept { is_let_go_.store(true); }
   /// Whether enough frames of zero force have passed since.
-  [[nodiscard]] bool finished() const noexcept { return zero_frames_.load() >= most_zero_frames_; }
+  [[nodiscard]] bool finished() const noexcept { return is_finished_.load(); }
 
   /// The first failure stays: a code of the library, or one of these. Zero force from then on.
   enum : std::uint32_t { kStalled = 0xffff0001, kUnreadable, kSilent };
@@ -68,6 +70,8 @@ class ArmExchange {
   /// 0: none.
   [[nodiscard]] std::uint32_t failure() const noexcept { return failure_.load(); }
 
+  /// The time of the turns.
+  [[nodiscard]] std::int64_t now_ns() const noexcept { return clock_(); }
   /// Frames so far: the heartbeat.
   [[nodiscard]] std::uint64_t frames() const noexcept { return frames_.load(); }
   [[nodiscard]] std::uint64_t published() const noexcept { return published_.load(); }
@@ -85,17 +89,19 @@ class ArmExchange {
 
  private:
   [[nodiscard]] std::array<double, 3> commanded(std::int64_t now_ns) noexcept;
+  void count_zero_frame(std::int64_t now_ns) noexcept;
   [[nodiscard]] bool publish(const ArmReading& reading, std::int64_t now_ns) noexcept;
 
   ArmPageAdapter& page_;
   double peak_n_;
   std::int64_t command_life_ns_;
-  std::uint64_t most_zero_frames_;
   Clock* clock_;
-  std::atomic<bool> is_let_go_{false};
+  std::atomic<bool> is_let_go_{false}, is_finished_{false};
   std::atomic<std::uint32_t> failure_{0};
-  std::atomic<std::uint64_t> frames_{0}, published_{0}, zero_frames_{0};
+  std::atomic<std::uint64_t> frames_{0}, published_{0};
   std::array<double, 3> last_force_n_{};
+  int zero_frames_ = 0;  ///< since `let_go`
+  std::int64_t zero_since_ns_ = 0;
   Counts counts_;
 };
 

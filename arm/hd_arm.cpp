@@ -8,6 +8,7 @@
 #include <string_view>
 
 #include "arm/arm_error.hpp"
+#include "arm/overseer.hpp"
 
 namespace kerf {
 namespace {
@@ -65,6 +66,7 @@ std::string text_or_none(const char* text) {
 }
 
 std::uint32_t on_tick(void* arm) {
+  Overseer::give_crash_stack();
   return static_cast<HdArm*>(arm)->frame();
 }
 
@@ -138,11 +140,13 @@ void HdArm::open() {
 }
 
 void HdArm::start() {
-  scheduled_ = calls_.schedule_asynchronous(on_tick, this, kHighestPriority);
-  require_no_error("hdScheduleAsynchronous");
   is_started_ = true;
   calls_.start_scheduler();
   require_no_error("hdStartScheduler");
+  scheduled_ = calls_.schedule_asynchronous(on_tick, this, kHighestPriority);
+  is_scheduled_ = true;
+  require_no_error("hdScheduleAsynchronous");
+  owns_errors_.store(true, std::memory_order_release);
 }
 
 void HdArm::stop() {
@@ -150,7 +154,7 @@ void HdArm::stop() {
   is_started_ = false;
   calls_.stop_scheduler();
   // A callback that has ended by itself is not scheduled any more.
-  if (!has_ended_.load()) calls_.unschedule(scheduled_);
+  if (is_scheduled_ && !has_ended_.load()) calls_.unschedule(scheduled_);
 }
 
 void HdArm::close() {
@@ -164,6 +168,7 @@ std::uint32_t HdArm::frame() noexcept {
     has_ended_.store(true);
     return kDone;
   }
+  if (!owns_errors_.load(std::memory_order_acquire)) return kContinue;
   calls_.begin_frame(device_);
   std::optional<ArmReading> reading(std::in_place);
   const bool is_read = read(*reading);

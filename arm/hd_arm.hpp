@@ -58,6 +58,9 @@ struct Calls {
 /// A frame counts once kCleanFrames before it have had no error: the first ones after the start of
 /// the scheduler have none of the arm's readings. Calibration belongs to the frames as well:
 /// outside of the servo thread it never ended on a Touch.
+///
+/// HD has one stack of errors for all threads. The main thread pops it until `start` has seen that
+/// its calls were taken, the servo thread from then on: a callback that runs before does nothing.
 class HdArm final : public VendorArm {
  public:
   struct Options {
@@ -102,9 +105,10 @@ class HdArm final : public VendorArm {
   Facts facts_;
   std::uint32_t device_ = 0;
   unsigned long scheduled_ = 0;
-  bool is_open_ = false, is_started_ = false;
+  bool is_open_ = false, is_started_ = false, is_scheduled_ = false;
   std::uint32_t calibration_style_ = 0;
-  std::atomic<bool> has_ended_{false};  ///< the callback
+  std::atomic<bool> owns_errors_{false};  ///< the stack of errors is the servo thread's
+  std::atomic<bool> has_ended_{false};    ///< the callback
   std::atomic<const char*> notice_{""};
   // Of the servo thread, until `stop`.
   int clean_ = 0, unclean_ = 0;

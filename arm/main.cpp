@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <csignal>
 #include <iostream>
 
 #include <unistd.h>
@@ -9,7 +10,11 @@
 
 int main(int argc, char** argv) {
   const int code = kerf::run_program("kerf-arm", [&] {
-    return kerf::run_arm(argc, argv, kerf::catch_stop_and_pause_signals(), std::cout, std::cerr);
+    const std::atomic<bool>& stop = kerf::catch_stop_and_pause_signals();
+    // A device that is not closed in order may have to be unplugged, so QUIT asks for the end like
+    // the others. A library that does not return then is ended by the overseer.
+    std::signal(SIGQUIT, [](int) { static_cast<void>(std::raise(SIGTERM)); });
+    return kerf::run_arm(argc, argv, stop, std::cout, std::cerr);
   });
   // The vendor's library is loaded and may have threads: what it would do at an exit can only
   // crash.

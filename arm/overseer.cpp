@@ -1,8 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "arm/overseer.hpp"
 
+#include <algorithm>
+#include <array>
+#include <charconv>
 #include <csignal>
+#include <cstddef>
+#include <cstdlib>
 #include <cstring>
+#include <string_view>
 
 #include <unistd.h>
 
@@ -15,10 +21,29 @@ namespace {
 std::atomic<ArmPageAdapter*> page_of_crash{nullptr};
 const char* program_of_crash = "";
 
-constexpr const char* kCrashed =
-    "the vendor's library, or kerf-arm in it, has crashed; unplug the device, plug it in again, "
-    "and "
-    "see whether the vendor's own program runs";
+constexpr std::string_view kWayOut =
+    "; unplug the device, plug it in again, and see whether the vendor's own program runs";
+
+/// A line that a handler may put together: no memory is taken.
+class Line {
+ public:
+  Line& operator<<(std::string_view text) noexcept {
+    const std::size_t size = std::min(text.size(), bytes_.size() - 1 - size_);
+    std::copy_n(text.begin(), size, bytes_.begin() + static_cast<std::ptrdiff_t>(size_));
+    size_ += size;
+    return *this;
+  }
+  Line& operator<<(int number) noexcept {
+    std::array<char, 16> digits{};
+    const auto end = std::to_chars(digits.data(), digits.data() + digits.size(), number).ptr;
+    return *this << std::string_view(digits.data(), end);
+  }
+  [[nodiscard]] const char* text() const noexcept { return bytes_.data(); }
+
+ private:
+  std::array<char, 256> bytes_{};
+  std::size_t size_ = 0;
+};
 
 void print(const char* program, const char* reason, const char* text) noexcept {
   const char* const parts[] = {program, ": ", reason, reason[0] != 0 ? "; " : "", text, "\n"};
@@ -28,11 +53,48 @@ void print(const char* program, const char* reason, const char* text) noexcept {
 }
 
 /// The device keeps its last force, unless its own watchdog ends that: no call of a library that
-/// has crashed is safe.
-void on_crash(int) {
-  if (ArmPageAdapter* page = page_of_crash) page->set_state(ArmState::failed, kCrashed);
-  print(program_of_crash, "", kCrashed);
+/// has crashed, or is at its end, is safe.
+[[noreturn]] void end_by_the_library(const Line& line) {
+  if (ArmPageAdapter* page = page_of_crash) page->set_state(ArmState::failed, line.text());
+  print(program_of_crash, "", line.text());
   _exit(2);
+}
+
+void on_crash(int number) {
+  const char* const name = sigabbrev_np(number);
+  Line line;
+  line << "the vendor's library, or kerf-arm in it, has crashed (SIG" << (name ? name : "?") << ")"
+       << kWayOut;
+  end_by_the_library(line);
+}
+
+/// kerf-arm itself ends by _exit().
+void on_exit_of_library(int code, void*) {
+  if (page_of_crash == nullptr) return;
+  Line line;
+  line << "the vendor's library has ended the program by exit(" << code << ")" << kWayOut;
+  end_by_the_library(line);
+}
+
+void on_quick_exit_of_library() {
+  if (page_of_crash == nullptr) return;
+  Line line;
+  line << "the vendor's library has ended the program by quick_exit()" << kWayOut;
+  end_by_the_library(line);
+}
+
+/// Handlers run in the opposite order: called again after the library has added its own, so that
+/// those do not run before the line is out.
+void catch_exits() noexcept {
+  static_cast<void>(on_exit(on_exit_of_library, nullptr));
+  static_cast<void>(std::at_quick_exit(on_quick_exit_of_library));
+}
+
+void handle_crash(int number) noexcept {
+  struct sigaction action {};
+  action.sa_handler = on_crash;
+  action.sa_flags = SA_ONSTACK;
+  sigaction(number, &action, nullptr);
 }
 
 }  // namespace
@@ -41,9 +103,11 @@ Overseer::Overseer(const char* program, ArmPageAdapter& page, ArmExchange& excha
     : program_(program), page_(page), exchange_(exchange), limits_(limits) {
   page_of_crash = &page;
   program_of_crash = program;
+  give_crash_stack();
   for (const int number : crash_signals()) {
-    if (number != SIGQUIT) std::signal(number, on_crash);
+    if (number != SIGQUIT) handle_crash(number);
   }
+  catch_exits();
   thread_ = std::thread([this] { watch(); });
 }
 
@@ -53,7 +117,26 @@ Overseer::~Overseer() {
   page_of_crash = nullptr;
 }
 
+void Overseer::give_crash_stack() noexcept {
+  constexpr std::size_t kStackBytes = 32768;  // a signal's frame has up to 11 KiB of registers
+  alignas(16) static std::array<std::array<std::byte, kStackBytes>, kMostCrashStacks> stacks;
+  static std::atomic<int> taken{0};
+  thread_local bool has_looked = false;
+  if (has_looked) return;
+  has_looked = true;
+  stack_t before{};
+  const bool has_one = sigaltstack(nullptr, &before) == 0 && (before.ss_flags & SS_DISABLE) == 0;
+  if (has_one || taken.load() >= kMostCrashStacks) return;
+  const int place = taken.fetch_add(1);
+  if (place >= kMostCrashStacks) return;
+  stack_t own{};
+  own.ss_sp = stacks[static_cast<std::size_t>(place)].data();
+  own.ss_size = kStackBytes;
+  sigaltstack(&own, nullptr);
+}
+
 void Overseer::enter(Phase phase) noexcept {
+  if (phase == Phase::frames || phase == Phase::closing) catch_exits();
   looks_ = 0;
   phase_ = phase;
 }

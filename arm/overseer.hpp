@@ -15,9 +15,11 @@ namespace kerf {
 ///
 /// Time is counted in looks of this thread, kLookMs apart: a machine that stands still has no
 /// library that hangs. A call that opens or closes the device and does not return ends the program
-/// (after kMostClosingMs if a signal has asked for the end), and so does a crash in any thread: one
-/// line on standard error, exit code 2, and the page says `failed`. Frames that stop fail the
-/// exchange, and the program goes on to close the device.
+/// (after kMostClosingMs if a signal has asked for the end). So does a crash in any thread, and a
+/// library that calls exit() or quick_exit(): one line on standard error, exit code 2, and the page
+/// says `failed`. Frames that stop fail the exchange, and the program goes on to close the device.
+/// Out of reach: _exit() in the library, and a stack overflow in a thread without
+/// `give_crash_stack`, which end the program without a line.
 ///
 /// At most one per process. The page and the exchange outlive it.
 class Overseer {
@@ -35,6 +37,13 @@ class Overseer {
   ~Overseer();
   Overseer(const Overseer&) = delete;
   Overseer& operator=(const Overseer&) = delete;
+
+  /// Gives the calling thread a stack for the handler of a crash, so that it runs after a stack
+  /// overflow too, unless the thread has one. The constructor's thread has it; any other calls this
+  /// once or in each frame: only the first call of a thread does anything. Of kMostCrashStacks
+  /// threads in all. Neither allocates nor throws.
+  static void give_crash_stack() noexcept;
+  static constexpr int kMostCrashStacks = 8;
 
   /// What the main thread is about to do. `frames`: the vendor's thread runs; `over`: the library
   /// is not called any more.

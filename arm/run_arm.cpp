@@ -51,6 +51,10 @@ void declare(Arguments& app, ArmOptions& o) {
       .within(ArmExchange::kSlowestHz, 4000);
   app.flag("--auto-init", o.auto_init,
            "omega: if it is not initialised, let the SDK do so, which MOVES THE ARM");
+  app.option("--peak", o.peak_n,
+             "omega: highest force in N; needed for another device of Force Dimension: what it "
+             "bears all the time by its data sheet")
+      .within(0.1, force_figures(Personality::omega).peak_n);
   app.option("--priority", o.priority, "omega: SCHED_FIFO priority of its thread, 0: none")
       .within(0, 98)
       .shows_default();
@@ -77,8 +81,10 @@ void check(ArmOptions& o) {
   if (!is_touch && o.no_vendor_name) {
     throw ArmError("--no-vendor-name: of a touch; leave it out");
   }
-  if (is_touch && (o.index >= 0 || o.auto_init)) {
-    throw ArmError(std::string(o.auto_init ? "--auto-init" : "--index") +
+  if (is_touch && (o.index >= 0 || o.auto_init || o.peak_n)) {
+    throw ArmError(std::string(o.auto_init ? "--auto-init"
+                               : o.peak_n  ? "--peak"
+                                           : "--index") +
                    ": of an omega; leave it out");
   }
   constexpr double kMotionS = 60;
@@ -102,6 +108,7 @@ std::unique_ptr<VendorArm> load_arm(const ArmOptions& o, ArmExchange& exchange) 
   return std::make_unique<DhdArm>(DhdArm::Options{.library = o.library,
                                                   .index = o.index,
                                                   .rate_hz = rate_of(o),
+                                                  .is_peak_given = o.peak_n.has_value(),
                                                   .initializes = o.auto_init,
                                                   .priority = o.priority,
                                                   .core = o.cpu},
@@ -227,7 +234,8 @@ void warn_of_priority(const ArmOptions& o, std::ostream& err) {
 int serve_arm(const ArmOptions& o, const std::atomic<bool>& stop, std::ostream& out,
               std::ostream& err) {
   ArmPageAdapter page(o.name, o.personality, rate_of(o));
-  ArmExchange exchange(page, force_figures(o.personality).peak_n, rate_of(o));
+  const double peak_n = force_figures(o.personality).peak_n;
+  ArmExchange exchange(page, std::min(peak_n, o.peak_n.value_or(peak_n)), rate_of(o));
   Overseer overseer(kProgram, page, exchange,
                     {.opening_ms = static_cast<int>(o.opening_s * 1000), .stall_ms = o.stall_ms});
   std::unique_ptr<VendorArm> arm;
@@ -246,7 +254,7 @@ int serve_arm(const ArmOptions& o, const std::atomic<bool>& stop, std::ostream& 
     throw;
   }
   warn_of_priority(o, err);
-  if (const std::string lack = arm->warning(); !lack.empty()) {
+  for (const std::string& lack : arm->warnings()) {
     err << kProgram << ": warning: " << lack << std::endl;
   }
   const std::int64_t since_ns = monotonic_ns();

@@ -21,6 +21,7 @@ struct ArmOptions {
   int index = -1;
   int rate_hz = 0;  ///< 0: touch: the library's own; omega: 4000
   bool auto_init = false;
+  std::optional<double> peak_n;  ///< omega: below the device's own
   int priority = 81;
   int cpu = -1;
   int stall_ms = 100;

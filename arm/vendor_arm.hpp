@@ -28,8 +28,8 @@ class VendorArm {
   /// Names and versions that the library gives, for the report and the first line. After `open`.
   using Facts = std::vector<std::pair<std::string, std::string>>;
   [[nodiscard]] virtual Facts facts() const = 0;
-  /// A lack of this device that the user should know, in one line; empty: none. After `open`.
-  [[nodiscard]] virtual std::string warning() const { return {}; }
+  /// Lacks of this device that the user should know, a line each. After `open`.
+  [[nodiscard]] virtual std::vector<std::string> warnings() const { return {}; }
   /// What a failure of the exchange means, with a way out. Calls no library. Main thread.
   [[nodiscard]] virtual std::string text_of(std::uint32_t failure) const = 0;
   /// How often each error of the library was seen. After `stop`.

@@ -5,6 +5,7 @@ and reports what the program did with them (docs/stand-ins.md).
     python3 standin FOLDER_OF_PROGRAMS FOLDER_OF_LIBRARIES [OPTION...] -- COMMAND...
 
 Exit codes: that of the command; 1 if it succeeded and misused the device; 2 bad input or set-up."""
+import ctypes
 import dataclasses
 import json
 import os
@@ -22,10 +23,6 @@ import findings
 NAMES = {"libHD.so": ("libHD.so", "libHD.so.3.0", "libHD.so.3.4"),  # built library: the names that programs load
          "libdrd.so.3": ("libdrd.so", "libdrd.so.3", "libdhd.so", "libdhd.so.3")}
 RATES_HZ = {"touch": (1000, 1000), "omega": (4000, 1000)}  # in real time, in lock-step
-SWITCHES = {"missed": ("hold", "drop"), "stop": ("hold", "drop"), "excess": ("clamp", "cut"),
-            "before-enable": ("apply", "ignore"), "calibration": ("kept", "lost"), "handles": ("seen", "documented"),
-            "button0": ("parked", "hand"), "status": ("17", "16"), "hand": ("enabled", "pushed"),
-            "ramp": None, "stall": None}
 WITH_VALUE = ("--device", "--hand", "--fault", "--seconds", "--rate", "--on-silence", "--switch", "--report", "--junit")
 LINGER_S = 0.3  # three times the silence after which a device that drops its force does so
 GRACE_S = 5  # for a program that is asked to end
@@ -50,7 +47,7 @@ class Options:
     command: list = dataclasses.field(default_factory=list)
 
 
-def parse(words):
+def parse(words, libraries):
     """Throws Refusal at the first word that is wrong."""
     options, words = Options(), list(words)
     while words:
@@ -70,11 +67,23 @@ def parse(words):
             options.switches.append(value)
         else:
             setattr(options, name[2:].replace("-", "_"), value)
-    check(options)
+    check(options, libraries)
     return options
 
 
-def check(options):
+def refusal_of_switch(libraries, switch):
+    """What the libraries will say of it: they alone know the words and ranges. None: nothing."""
+    path = os.path.join(libraries, "libHD.so")
+    try:
+        ask = ctypes.CDLL(path).kerf_stand_in_refusal_of_switch
+    except (OSError, AttributeError):
+        raise Refusal(f"{path}: not built, or of another version; try ./kerf setup") from None
+    ask.argtypes, ask.restype = [ctypes.c_char_p], ctypes.c_char_p
+    line = ask(os.fsencode(switch))
+    return line and os.fsdecode(line)
+
+
+def check(options, libraries):
     if not options.command:
         raise Refusal("no command; write it behind --, as in ./kerf stand-in -- python3 program.py")
     if options.device not in RATES_HZ:
@@ -87,12 +96,8 @@ def check(options):
                          or options.lockstep and 8000 % int(options.rate)):
         raise Refusal(f"--rate {options.rate}: not a rate in Hz (in lock-step it divides 8000); take 1000")
     for switch in options.switches:
-        name, _, value = switch.partition("=")
-        if name not in SWITCHES or not value or SWITCHES[name] and value not in SWITCHES[name]:
-            known = ", ".join(f"{key}={'|'.join(words) if words else 'N'}" for key, words in SWITCHES.items())
-            raise Refusal(f"--switch {switch}: unknown; take one of {known}")
-        if SWITCHES[name] is None and not re.fullmatch(r"[0-9]{1,5}(\.[0-9]+)?", value):
-            raise Refusal(f"--switch {switch}: not a number; take {'50' if name == 'stall' else '0.2'}")
+        if refusal := refusal_of_switch(libraries, switch):
+            raise Refusal(f"--switch {switch}: {refusal}")
     for name, path in (("--hand", options.hand), ("--fault", options.fault)):
         if path and not os.path.isfile(path):
             raise Refusal(f"{name} {path}: no such file; name a script")
@@ -107,6 +112,8 @@ class Run:
     def __init__(self, programs, libraries, options):
         self.programs, self.libraries, self.options = programs, libraries, options
         parent = os.environ.get("TMPDIR") or "/tmp"
+        if "," in parent:  # it would end a path in KERF_STAND_IN
+            raise Refusal(f"TMPDIR {parent}: has a comma, which divides the libraries' settings; set it to another folder")
         try:
             self.folder = tempfile.mkdtemp(prefix="kerf-stand-in.", dir=parent)
         except OSError:
@@ -247,7 +254,7 @@ def run(programs, libraries, options):
 def main():
     programs, libraries, *words = sys.argv[1:]
     try:
-        return run(programs, libraries, parse(words))
+        return run(programs, libraries, parse(words, libraries))
     except (Refusal, ValueError) as refusal:
         print("kerf: stand-in: " + re.sub(r"[\x00-\x1f\x7f]", "?", str(refusal)), file=sys.stderr)
         return 2

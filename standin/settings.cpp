@@ -31,6 +31,19 @@ constexpr std::array kSwitches{
     Switch{"hand", "enabled", "pushed", &Settings::hand_waits},
 };
 
+/// A switch with a number.
+struct NumberSwitch {
+  std::string_view key;
+  double low, high;
+  void (*set)(Settings& settings, double value);
+};
+
+constexpr std::array kNumberSwitches{
+    NumberSwitch{"ramp", 0, 10, [](Settings& all, double s) { all.ramp_s = s; }},
+    NumberSwitch{"stall", 1, 60'000,
+                 [](Settings& all, double ms) { all.stall_ms = static_cast<int>(ms); }},
+};
+
 [[noreturn]] void refuse(std::string_view part, const std::string& remedy) {
   throw std::invalid_argument(std::string(kVariable) + ": '" + std::string(part) + "'; " + remedy);
 }
@@ -48,34 +61,59 @@ Personality device_of(std::string_view part, std::string_view value) {
   refuse(part, "take touch or omega");
 }
 
-void read(std::string_view part, Settings& settings) {
-  if (part == "lockstep") {
+/// `KEY=VALUE`.
+struct Part {
+  std::string_view whole, key, value;
+
+  explicit Part(std::string_view text) : whole(text), key(text.substr(0, text.find('='))) {
+    if (key.size() < text.size()) value = text.substr(key.size() + 1);
+  }
+};
+
+/// False if it is no switch.
+bool read_switch(const Part& part, Settings& settings) {
+  const auto* const words = std::ranges::find(kSwitches, part.key, &Switch::key);
+  if (words != kSwitches.end()) {
+    if (part.value != words->usual && part.value != words->other) {
+      refuse(part.whole, "take " + std::string(words->usual) + " or " + std::string(words->other));
+    }
+    settings.*words->member = part.value == words->other;
+    return true;
+  }
+  const auto* const number = std::ranges::find(kNumberSwitches, part.key, &NumberSwitch::key);
+  if (number == kNumberSwitches.end()) return false;
+  number->set(settings, number_within(part.whole, part.value, number->low, number->high));
+  return true;
+}
+
+std::string all_switches() {
+  std::string list;
+  for (const Switch& one : kSwitches) {
+    list +=
+        std::string(one.key) + '=' + std::string(one.usual) + '|' + std::string(one.other) + ", ";
+  }
+  for (const NumberSwitch& one : kNumberSwitches) {
+    list += std::string(one.key) + '=' + number_text(one.low) + ".." + number_text(one.high) + ", ";
+  }
+  return list.substr(0, list.size() - 2);
+}
+
+void read(std::string_view whole, Settings& settings) {
+  if (whole == "lockstep") {
     settings.lockstep = true;
     return;
   }
-  const std::size_t equals = part.find('=');
-  const std::string_view key = part.substr(0, equals);
-  const std::string_view value =
-      equals == std::string_view::npos ? std::string_view{} : part.substr(equals + 1);
-  const auto* found = std::find_if(kSwitches.begin(), kSwitches.end(),
-                                   [&](const Switch& one) { return one.key == key; });
-  if (found != kSwitches.end()) {
-    if (value != found->usual && value != found->other) {
-      refuse(part, "take " + std::string(found->usual) + " or " + std::string(found->other));
-    }
-    settings.*found->member = value == found->other;
-  } else if (key == "device") {
-    settings.device = device_of(part, value);
+  const Part part(whole);
+  if (read_switch(part, settings)) return;
+  const auto& [text, key, value] = part;
+  if (key == "device") {
+    settings.device = device_of(text, value);
   } else if (key == "rate") {
-    settings.rate_hz = static_cast<int>(number_within(part, value, 100, 8000));
+    settings.rate_hz = static_cast<int>(number_within(text, value, 100, 8000));
   } else if (key == "ledger" && !value.empty()) {
     settings.ledger = value;
-  } else if (key == "ramp") {
-    settings.ramp_s = number_within(part, value, 0, 10);
-  } else if (key == "stall") {
-    settings.stall_ms = static_cast<int>(number_within(part, value, 1, 60'000));
   } else {
-    refuse(part, "unknown; start the program by ./kerf stand-in -- COMMAND");
+    refuse(text, "unknown; start the program by ./kerf stand-in -- COMMAND");
   }
 }
 
@@ -95,6 +133,17 @@ Settings parse_settings(std::string_view text) {
     read(first, settings);
   }
   return settings;
+}
+
+std::string refusal_of_switch(std::string_view word) {
+  try {
+    Settings unused;
+    if (read_switch(Part(word), unused)) return {};
+    return "unknown; take one of " + all_switches();
+  } catch (const std::invalid_argument& error) {
+    const std::string_view line = error.what();  // the option itself is named by the caller
+    return std::string(line.substr(line.rfind("'; ") + 3));
+  }
 }
 
 Settings settings_of_environment() {

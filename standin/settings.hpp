@@ -40,8 +40,13 @@ struct Settings {
 ///     calibration=kept|lost  handles=seen|documented  button0=parked|hand  status=17|16
 ///     hand=enabled|pushed  ramp=SECONDS  stall=MS
 ///
+/// Their words and ranges are known here alone; ./kerf stand-in asks for them. A path has no comma.
 /// Throws std::invalid_argument with one line.
 [[nodiscard]] Settings parse_settings(std::string_view text);
+
+/// What is wrong with one SWITCH of the list, in one line after its name; empty: nothing. The rest
+/// of the list is none.
+[[nodiscard]] std::string refusal_of_switch(std::string_view word);
 
 /// Those of the environment; throws likewise, also if the variable is not set.
 [[nodiscard]] Settings settings_of_environment();

@@ -251,8 +251,10 @@ std::unique_ptr<ArmPageController> ArmPageController::open(const std::string& na
   }
   if (const auto found = word<std::uint32_t>(page->at(kAtDevice)).load();
       found != static_cast<std::uint32_t>(device)) {
-    const bool is_known = found < kPersonalityWords.size();
-    const std::string theirs(is_known ? kPersonalityWords[found] : "unknown device");
+    if (found >= kPersonalityWords.size()) {
+      throw ArmPageError(page->path_ + ": of another version; start the kerf-arm of this one");
+    }
+    const std::string theirs(kPersonalityWords[found]);
     throw ArmPageError("the kerf-arm named " + name + " is of a " + theirs +
                        ", and the controller wants a " + std::string(word_of(device)) +
                        "; take --device " + theirs + ", or another name");

@@ -139,7 +139,8 @@ using CommandBytes = std::array<std::uint8_t, kCommandBytes>;
 [[nodiscard]] inline std::int16_t packed_n(double newtons) noexcept {
   constexpr double kEnd = 32767;
   const double mn = newtons / kNewtonsPerCount;
-  return mn == mn ? static_cast<std::int16_t>(std::lround(std::clamp(mn, -kEnd, kEnd))) : 0;
+  return mn == mn ? static_cast<std::int16_t>(std::lround(std::clamp(mn, -kEnd, kEnd)))
+                  : std::int16_t{0};
 }
 
 }  // namespace cartesian

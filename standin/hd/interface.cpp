@@ -8,6 +8,7 @@
 #include <exception>
 #include <mutex>
 #include <optional>
+#include <string>
 #include <string_view>
 
 #include "standin/hd/error_stack.hpp"
@@ -274,6 +275,8 @@ KERF_STAND_IN_EXPORT void hdStartScheduler() {
   try {
     lib.scheduler.start(lib.lockstep(), lib.rate_hz);
   } catch (const std::exception&) {  // the system has no thread left
+    const std::lock_guard lock(lib.mutex);
+    if (lib.device) lib.device->run(false, lib.rate_hz);
     lib.refuse(kTimer);
   }
 }
@@ -340,3 +343,11 @@ KERF_STAND_IN_EXPORT double hdGetSchedulerTimeStamp() {
   return lib.lockstep() ? 0.0 : lib.scheduler.since_tick_s();
 }
 // NOLINTEND(readability-identifier-naming)
+
+// Not of the interface: ./kerf stand-in asks here what is wrong with a --switch. Null: nothing;
+// else a line, until the next call of the thread.
+KERF_STAND_IN_EXPORT const char* kerf_stand_in_refusal_of_switch(const char* word) {
+  thread_local std::string line;
+  line = kerf::standin::refusal_of_switch(word != nullptr ? word : "");
+  return line.empty() ? nullptr : line.c_str();
+}

@@ -130,28 +130,40 @@ void Touch::end_tick() noexcept {
   if (!had_frame_ && settings_.drop_without_frame) output_n_ = {};
   if (arm_.pose().parked) ticks_ = 0;  // it ramps after the dock, too
   ++ticks_;
+  has_ticked_ = true;
   send();
 }
 
 void Touch::send() noexcept {
+  is_forced_ = force_output_ && norm(output_n_) > kNothingN;
   arm_.command(output_n_, force_output_, calibrated_ && runs_);
 }
 
 void Touch::run(bool runs, int rate_hz) noexcept {
-  if (!runs && runs_ && force_output_ && norm(output_n_) > kNothingN) {
-    ledger_.add(Row::not_cleared);
+  // A scheduler without a tick has given no force; one from before it is a matter of `close`.
+  if (!runs && runs_ && has_ticked_ && is_forced_) {
+    count_not_cleared();
     if (settings_.drop_on_stop) {
       output_n_ = {};
       send();
     }
   }
-  if (runs && !runs_) ticks_ = 0;
+  if (runs && !runs_) {
+    ticks_ = 0;
+    has_ticked_ = is_counted_ = false;
+  }
   runs_ = runs;
   rate_hz_ = rate_hz;
 }
 
+void Touch::count_not_cleared() noexcept {
+  if (!is_counted_) ledger_.add(Row::not_cleared);
+  is_counted_ = true;
+}
+
 void Touch::close() noexcept {
   run(false, rate_hz_);
+  if (is_forced_) count_not_cleared();
   arm_.command({}, false, false);
   ledger_.set(Row::last_n, 0);
   ledger_.add(Row::closed);
@@ -182,7 +194,9 @@ void Touch::enable(Enum name, bool on) noexcept {
     limit = on ? (name == kVelocityLimit ? 1200 : 4) : HUGE_VAL;
   } else if (bool* which = capability(name)) {
     *which = on;
-    if (name == kForceOutput && !on) output_n_ = {};
+    if (name != kForceOutput || on) return;
+    output_n_ = {};
+    is_forced_ = false;  // by the program's word, whenever the next packet leaves
   }
 }
 

@@ -80,6 +80,7 @@ class Touch {
   [[nodiscard]] DeviceVec<double> wanted_force() noexcept;
   [[nodiscard]] DeviceVec<double> limited(DeviceVec<double> force_n) noexcept;
   void send() noexcept;
+  void count_not_cleared() noexcept;
   void push(Enum code) noexcept { errors_.push(code); }
 
   const standin::Settings& settings_;
@@ -92,6 +93,9 @@ class Touch {
   DeviceVec<double> output_n_;      ///< what is sent
   bool in_frame_ = false, had_frame_ = false, has_two_ = false;
   bool runs_ = false;
+  bool is_forced_ = false;   ///< by the newest packet
+  bool has_ticked_ = false;  ///< since the start of the scheduler
+  bool is_counted_ = false;  ///< its force, as not cleared
   int rate_hz_ = 1000;
   std::int64_t ticks_ = 0;  ///< since the start
   bool calibrated_;

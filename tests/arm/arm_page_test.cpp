@@ -2,6 +2,7 @@
 // The page between kerf-arm and a controller: its two ends, its locks, and foreign bytes in it.
 #include "shared/arm/arm_page.hpp"
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cstdint>
@@ -9,6 +10,8 @@
 #include <filesystem>
 #include <memory>
 #include <random>
+#include <span>
+#include <stdexcept>
 #include <string>
 #include <thread>
 #include <vector>
@@ -19,6 +22,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "controller/device/arm/arm_port.hpp"
 #include "tests/support/errors.hpp"
 #include "tests/support/temporary_folder.hpp"
 
@@ -399,24 +403,51 @@ TEST_CASE("page: foreign bytes anywhere lead to packets that are accepted or ref
   close(file);
 }
 
-TEST_CASE("page: random bytes under a live lock are one line or no adapter") {
+TEST_CASE("page: random bytes under a live lock are one line, by what they hold, or an arm") {
   const RuntimeFolder folder;
   ArmPageAdapter arm("touch", Personality::touch, 1000);
   const int file = open(kerf::ArmPage::path_of("touch").c_str(), O_RDWR);
+  const std::atomic<bool> stop{false};
   std::mt19937_64 random(7);
-  for (int round = 0; round < 300; ++round) {
+  constexpr std::size_t kDevice = 12, kStatus = 128, kState = 136;
+  constexpr std::uint8_t kTouch = static_cast<std::uint8_t>(Personality::touch);
+  int texts_with_breaks = 0;
+  for (int round = 0; round < 600; ++round) {
+    CAPTURE(round);
     std::array<std::uint8_t, 400> head;
     for (auto& byte : head) byte = static_cast<std::uint8_t>(random());
+    const char* says = ": of another version; start the kerf-arm of this one";
     if (round % 2 == 0) {  // a right magic and layout, and the rest random
       std::ranges::copy(
           std::array<std::uint8_t, 12>{'k', 'a', 'r', 'm', 'p', 'g', '1', 0, 1, 0, 0, 0},
           head.begin());
-      head[12] = static_cast<std::uint8_t>(random() % 8);
+      head[kDevice] = static_cast<std::uint8_t>(random() % 8);
       head[13] = head[14] = head[15] = 0;
+      head[kStatus] &= 0xfe;  // a text that nobody is writing
+      says = head[kDevice] >= kerf::kPersonalityWords.size() ? says : " is of a ";
+      if (round % 4 == 0) {  // and a state that may be one
+        head[kDevice] = kTouch;
+        std::fill_n(head.begin() + kState, 8, std::uint8_t{0});
+        head[kState] = static_cast<std::uint8_t>(random() % 6);
+      }
+      if (head[kDevice] == kTouch) {
+        const bool is_small = round % 4 == 0;
+        says = is_small && head[kState] == 0   ? " is not ready"
+               : is_small && head[kState] == 1 ? ""
+                                               : " has ended";
+        const auto text = std::span(head).subspan(144, 111);
+        const auto end = std::ranges::find(text, 0);
+        if (*says != 0 && std::find(text.begin(), end, '\n') != end) ++texts_with_breaks;
+      }
     }
     REQUIRE(pwrite(file, head.data(), head.size(), 0) == static_cast<ssize_t>(head.size()));
-    const std::string error = error_of<kerf::ArmPageError>([] { open_end(); });
-    CHECK(error.find('\n') == std::string::npos);
+    const std::string error =
+        error_of<std::runtime_error>([&] { kerf::ArmPort("touch", Personality::touch, 0, stop); });
+    CAPTURE(error);
+    CHECK(error.empty() == (*says == 0));
+    CHECK(error.find(says) != std::string::npos);
+    CHECK(std::ranges::none_of(error, [](char c) { return c >= 0 && c < ' '; }));
   }
+  CHECK(texts_with_breaks > 20);
   close(file);
 }

@@ -162,7 +162,19 @@ TEST_CASE("arm: every bad library is one line and exit code 2") {
       {"touch", "", {"--library", lacking + "/mock_hd_lacking/libHD.so"}, "lacks hdBeginFrame"},
       {"touch", "", {"--library", kOmegaLibrary}, "lacks hdInitDevice, "},
       {"touch", "hang_open", soon, "does not return from opening"},
-      {"touch", "crash_open", {}, "has crashed"},
+      {"touch", "crash_open", {}, "has crashed (SIGSEGV); unplug"},
+      {"touch", "overflow_open", {}, "has crashed (SIGSEGV); unplug"},
+      {"touch", "overflow=50", {}, "has crashed (SIGSEGV); unplug"},
+      {"touch", "exit_open", {}, "has ended the program by exit(0); unplug"},
+      {"touch", "exit=50", {}, "has ended the program by exit(7); unplug"},
+      {"touch", "quick_exit=50", {}, "has ended the program by quick_exit(); unplug"},
+      {"omega", "overflow=50", {}, "has crashed (SIGSEGV); unplug"},
+      {"omega", "exit_open", {}, "has ended the program by exit(0); unplug"},
+      {"omega", "exit=50", {}, "has ended the program by exit(7); unplug"},
+      {"omega", "type=60", {}, "device of type 60, Falcon: no omega"},
+      {"omega", "", {"--peak", "nan"}, "--peak"},
+      {"omega", "", {"--peak", "13"}, "--peak"},
+      {"touch", "", {"--peak", "2"}, "--peak: of an omega; leave it out"},
       {"touch", "init_error", {}, "cannot be opened (error 300"},
       {"touch", "garbage_handle", {}, "an invalid handle"},
       {"touch", "", {"--rate", "700"}, "--rate 700: not taken by the library (error 101"},
@@ -224,8 +236,14 @@ TEST_CASE("arm: without --library the loader's own search finds it, or names it"
 }
 
 TEST_CASE("arm: asked to end it gives zero force for 20 ms, then stops and closes the device") {
-  for (const char* const device : {"touch", "omega"}) {
+  struct Case {
+    const char* device;
+    int signal;
+  };
+  for (const auto& [device, number] : {Case{"touch", SIGTERM}, Case{"omega", SIGTERM},
+                                       Case{"touch", SIGQUIT}, Case{"omega", SIGQUIT}}) {
     CAPTURE(device);
+    CAPTURE(number);
     const bool is_touch = std::string(device) == "touch";
     Bench bench;
     const auto arm = bench.arm(device, "", {"--rate", "1000"});
@@ -233,11 +251,13 @@ TEST_CASE("arm: asked to end it gives zero force for 20 ms, then stops and close
     PushingChild controller(is_touch ? Personality::touch : Personality::omega);
     REQUIRE(eventually(
         [&] { return std::ranges::count_if(bench.frames(), &Frame::is_forced) > 20; }, 10s));
-    arm->signal(SIGTERM);
+    arm->signal(number);
     CHECK(arm->wait() == 0);
     const auto frames = bench.frames();
     const auto last_force = std::ranges::find_if(frames.rbegin(), frames.rend(), &Frame::is_forced);
-    CHECK(last_force - frames.rbegin() >= 20);
+    REQUIRE(last_force != frames.rend());
+    CHECK(frames.back().at_ns - last_force->at_ns >= 20'000'000);
+    CHECK(last_force - frames.rbegin() >= 3);
     CHECK(bench.last_call() == (is_touch ? "hdDisableDevice" : "drdClose"));
   }
 }

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <utility>
 
 #include <doctest/doctest.h>
 
@@ -76,13 +77,54 @@ TEST_CASE("exchange: a command from the future, without force or after letting g
   CHECK(link.exchange.turn(reading) == Force{});
   link.command({1000, 0, 0});
   link.exchange.let_go();
-  for (int frame = 0; frame < 19; ++frame) {
+  for (int ms = 0; ms < 20; ++ms, test_ns += kMs) {
     CHECK(link.exchange.turn(reading) == Force{});
     CHECK_FALSE(link.exchange.finished());
   }
   static_cast<void>(link.exchange.turn(reading));
   CHECK(link.exchange.finished());
   CHECK_FALSE(link.report()->powered);
+}
+
+TEST_CASE(
+    "exchange: the end is 20 ms of zero force, whatever the library's rate, and three frames") {
+  for (const int hz : {200, 500, 1000, 2000, 4000}) {
+    CAPTURE(hz);
+    Link link(Personality::touch);  // by its word of 1000
+    link.exchange.let_go();
+    const std::int64_t since_ns = test_ns;
+    int frames = 0;
+    for (; !link.exchange.finished(); ++frames, test_ns += kerf::kNsPerSecond / hz) {
+      CHECK(link.exchange.turn(ArmReading{}) == Force{});
+    }
+    CHECK(test_ns - since_ns == 20 * kMs + kerf::kNsPerSecond / hz);  // the last began after 20 ms
+    CHECK(frames == 20 * hz / 1000 + 1);
+  }
+  Link slow(Personality::touch);
+  slow.exchange.let_go();
+  for (int frame = 0; frame < 3; ++frame, test_ns += 100 * kMs) {
+    CHECK_FALSE(slow.exchange.finished());
+    static_cast<void>(slow.exchange.turn(ArmReading{}));
+  }
+  CHECK(slow.exchange.finished());
+}
+
+TEST_CASE("exchange: a command of any time that a page can hold, and its ends, gives no force") {
+  Link link(Personality::touch);
+  static_cast<void>(link.exchange.turn(ArmReading{}));
+  using Limits = std::numeric_limits<std::int64_t>;
+  const std::int64_t now_ns = test_ns;
+  for (const std::int64_t at_ns :
+       {Limits::min(), Limits::min() + 1, -now_ns, std::int64_t{-1}, std::int64_t{0},
+        now_ns + 2 * kMs, Limits::max() - now_ns, Limits::max() - 1, Limits::max()}) {
+    CAPTURE(at_ns);
+    test_ns = at_ns;
+    link.command({1000, 0, 0});
+    test_ns = now_ns;
+    CHECK(link.exchange.turn(ArmReading{}) == Force{});
+  }
+  link.command({1000, 0, 0});
+  CHECK(link.exchange.turn(ArmReading{}) == Force{1, 0, 0});
 }
 
 TEST_CASE("exchange: no force is above the device's peak, and its direction stays") {
@@ -159,4 +201,21 @@ TEST_CASE("orientation: each quarter turn, and no mirror") {
   CHECK_FALSE(kerf::orientation_of({}, {}, {}));
   CHECK_FALSE(kerf::orientation_of(x, x, z));
   CHECK_FALSE(kerf::orientation_of({kNaN, 0, 0}, y, z));
+  // Each pair out of square by 2.5 degrees, and by 3.5.
+  const auto leant = [](double degrees, int off, int towards) {
+    std::array<V, 3> axes{V{1, 0, 0}, V{0, 1, 0}, V{0, 0, 1}};
+    const double angle = degrees * 3.14159265 / 180;
+    V& axis = axes[static_cast<std::size_t>(off)];
+    axis[static_cast<std::size_t>(off)] = std::cos(angle);
+    axis[static_cast<std::size_t>(towards)] = std::sin(angle);
+    return kerf::orientation_of(axes[0], axes[1], axes[2]);
+  };
+  for (const auto& [off, towards] : {std::pair{0, 1}, {1, 0}, {1, 2}, {2, 1}, {2, 0}, {0, 2}}) {
+    CAPTURE(off);
+    CAPTURE(towards);
+    CHECK(leant(2.5, off, towards));
+    CHECK_FALSE(leant(3.5, off, towards));
+  }
+  CHECK_FALSE(kerf::orientation_of({1.03, 0, 0}, y, z));
+  CHECK(kerf::orientation_of({1.02, 0, 0}, y, z));
 }

@@ -59,12 +59,14 @@ TEST_CASE("hd: the order of calls from the start to the end") {
   Bench bench;
   bench.library.tick(kWarmUp + 1);
   bench.link.exchange.let_go();
-  bench.library.tick(30);  // 20 of them with zero force, then the callback ends
+  for (int i = 0; i < 30; ++i, test_ns += 1'000'000) {
+    bench.library.tick();  // 20 ms of zero force, then the callback ends
+  }
   CHECK(bench.link.exchange.finished());
   bench.arm.stop();
   bench.arm.close();
   CHECK(bench.library.calls() == Lines{"hdInitDevice Default Device", "hdEnable 4000",
-                                       "hdScheduleAsynchronous ffff", "hdStartScheduler",
+                                       "hdStartScheduler", "hdScheduleAsynchronous ffff",
                                        "hdStopScheduler", "hdDisableDevice"});
 }
 
@@ -74,7 +76,7 @@ TEST_CASE("hd: a callback that has not ended is taken out of the scheduler") {
   bench.arm.stop();
   bench.arm.close();
   CHECK(bench.library.calls() == Lines{"hdInitDevice Default Device", "hdEnable 4000",
-                                       "hdScheduleAsynchronous ffff", "hdStartScheduler",
+                                       "hdStartScheduler", "hdScheduleAsynchronous ffff",
                                        "hdStopScheduler", "hdUnschedule", "hdDisableDevice"});
 }
 
@@ -184,7 +186,7 @@ TEST_CASE("hd: a lost device, a fault of it or of its force end the force and fa
     bench.library.tick(1);
     CHECK(bench.library.force() == Force{});
     CHECK(bench.link.exchange.failure() == std::stoul(code, nullptr, 16));
-    bench.library.tick(25);
+    for (int i = 0; i < 25; ++i, test_ns += 1'000'000) bench.library.tick();
     CHECK(bench.link.exchange.finished());
     CHECK(bench.library.force() == Force{});
   }
@@ -227,6 +229,23 @@ TEST_CASE("hd: what cannot be opened is one line") {
                 "device 'Default Device': cannot be opened (error 300: error of the mock); "));
   CHECK(line("garbage_handle").find("an invalid handle") != std::string::npos);
   CHECK(line("start_error").starts_with("hdStartScheduler: error 304: "));
+  CHECK(line("schedule_error").starts_with("hdScheduleAsynchronous: error 501: "));
+}
+
+TEST_CASE("hd: errors of the start reach the main thread, however early the servo thread ticks") {
+  const auto line = [](const std::string& behaviour) {
+    Bench bench(behaviour + ",early_ticks", false);
+    return kerf::test::error_of([&] {
+      bench.arm.open();
+      bench.arm.start();
+    });
+  };
+  CHECK(line("start_error").starts_with("hdStartScheduler: error 304: "));
+  CHECK(line("schedule_error").starts_with("hdScheduleAsynchronous: error 501: "));
+  Bench bench("early_ticks");
+  CHECK(bench.link.exchange.frames() == 0);
+  bench.library.tick();
+  CHECK(bench.link.exchange.frames() == 1);
 }
 
 TEST_CASE("hd: a missing library and missing symbols are one line each") {

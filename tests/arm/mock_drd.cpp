@@ -54,6 +54,7 @@ int open_device() {
   Library& drd = library();
   if (drd.behaviour.has("hang_open")) kerf::mock::hang();
   if (drd.behaviour.has("crash_open")) kerf::mock::crash();
+  if (drd.behaviour.has("exit_open")) std::exit(0);
   if (drd.behaviour.has("init_error")) return fail(kErrorNoDevice);
   if (drd.open) return fail(kErrorInUse);
   drd.open = true;
@@ -113,10 +114,19 @@ void dhdGetSDKVersion(int* major, int* minor, int* release, int* revision) {
   *revision = 0;
 }
 int dhdGetSystemType(char id) {
-  return check(id) == 0 ? 33 : -1;
+  return check(id) == 0 ? static_cast<int>(library().behaviour.number("type", 33)) : -1;
 }
 const char* dhdGetSystemName(char id) {
   return check(id) == 0 && !library().behaviour.has("null_strings") ? "mock omega.3" : nullptr;
+}
+int dhdGetStatus(int* words, char id) {
+  constexpr int kForce = 5, kBrake = 6, kForceOffCause = 14, kVelocity = 2;
+  for (int i = 0; i < 17; ++i) words[i] = 0;
+  if (check(id) != 0) return -1;
+  words[kForce] = library().force_enabled ? 1 : 0;
+  words[kBrake] = 1 - words[kForce];
+  words[kForceOffCause] = words[kBrake] * kVelocity;
+  return 0;
 }
 int dhdErrorGetLast() {
   return last_error;
@@ -171,7 +181,9 @@ int dhdGetPosition(double* x, double* y, double* z, char id) {
   Library& drd = library();
   ++drd.cycle;
   if (drd.cycle == drd.behaviour.number("hang_callback", -1)) kerf::mock::hang();
-  if (drd.cycle == drd.behaviour.number("crash", -1)) kerf::mock::crash();
+  kerf::mock::end_process(drd.behaviour, drd.cycle);
+  // Too fast: the forces go off, and the motors brake.
+  if (drd.cycle == drd.behaviour.number("too_fast", -1)) drd.force_enabled = false;
   if (check(id) != 0) return -1;
   const Pose& pose = drd.pose();
   *x = pose.position[0];

@@ -86,6 +86,14 @@ struct Library {
     if (in_frame) record.add("frame left open");
   }
 
+  /// The servo thread, before the call that started or filled it returns.
+  void tick_at_once() {
+    if (!behaviour.has("early_ticks")) return;
+    std::thread([this] {
+      for (int i = 0; i < 8; ++i) step();
+    }).join();
+  }
+
   void serve() {
     sched_param high{};
     high.sched_priority = 85;
@@ -189,6 +197,8 @@ std::uint32_t hdInitDevice(const char* name) {
   hd.record.add("hdInitDevice %s", name != nullptr ? name : "NULL");
   if (hd.behaviour.has("hang_open")) kerf::mock::hang();
   if (hd.behaviour.has("crash_open")) kerf::mock::crash();
+  if (hd.behaviour.has("exit_open")) std::exit(0);
+  if (hd.behaviour.has("overflow_open")) kerf::mock::overflow();
   if (hd.behaviour.has("garbage_handle")) return 0x5a5a5a5a;
   if (hd.behaviour.has("init_error")) {
     hd.fail(0x300);
@@ -232,7 +242,7 @@ std::uint8_t hdIsEnabled(std::uint32_t what) {
 #ifndef KERF_MOCK_LACKS_FRAMES
 void hdBeginFrame(std::uint32_t device) {
   Library& hd = library();
-  if (hd.tick == hd.behaviour.number("crash", -1)) kerf::mock::crash();
+  kerf::mock::end_process(hd.behaviour, hd.tick);
   if (!knows(device)) return;
   if (hd.in_frame || hd.framed_tick == hd.tick) return hd.fail(kIllegalBegin);
   const long gone = hd.behaviour.number("vanish", -1), back = hd.behaviour.number("back", -1);
@@ -323,7 +333,9 @@ void hdUpdateCalibration(std::uint32_t style) {
 void hdStartScheduler() {
   Library& hd = library();
   hd.record.add("hdStartScheduler");
-  if (hd.behaviour.has("start_error")) return hd.fail(0x304);
+  if (hd.behaviour.has("start_error")) hd.fail(0x304);
+  hd.tick_at_once();
+  if (hd.behaviour.has("start_error")) return;
   hd.running = true;
   if (!hd.behaviour.has("manual") && !hd.behaviour.has("no_ticks")) {
     hd.servo = std::thread([&hd] { hd.serve(); });
@@ -342,8 +354,12 @@ void hdSetSchedulerRate(unsigned long hz) {
 unsigned long hdScheduleAsynchronous(Callback callback, void* data, std::uint16_t priority) {
   Library& hd = library();
   hd.record.add("hdScheduleAsynchronous %x", priority);
-  const std::lock_guard guard(hd.mutex);
-  hd.entries.push_back({hd.next_handle, callback, data, priority});
+  {
+    const std::lock_guard guard(hd.mutex);
+    hd.entries.push_back({hd.next_handle, callback, data, priority});
+  }
+  if (hd.behaviour.has("schedule_error")) hd.fail(0x501);
+  hd.tick_at_once();
   return hd.next_handle++;
 }
 void hdScheduleSynchronous(Callback callback, void* data, std::uint16_t) {

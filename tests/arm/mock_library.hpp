@@ -90,12 +90,17 @@ inline std::int64_t test_clock() noexcept {
 
 inline constexpr std::array<double, 9> kUpright{1, 0, 0, 0, 1, 0, 0, 0, 1};
 
+/// The same for a thread that runs by itself: each look takes half a millisecond.
+inline std::int64_t ticking_clock() noexcept {
+  return test_ns += 500'000;
+}
+
 /// A page with both its ends, and an exchange in the time of the test.
 struct Link {
-  explicit Link(Personality personality, int rate_hz = 1000)
+  explicit Link(Personality personality, int rate_hz = 1000, ArmExchange::Clock* clock = test_clock)
       : device(personality),
         page("test", personality, rate_hz),
-        exchange(page, force_figures(personality).peak_n, rate_hz, test_clock) {}
+        exchange(page, force_figures(personality).peak_n, rate_hz, clock) {}
 
   /// The controller's end, opened once there is an adapter that runs.
   ArmPageController& controller() {

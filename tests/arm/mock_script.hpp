@@ -136,4 +136,20 @@ class Record {
   std::abort();
 }
 
+/// Uses up the stack of its thread, which a compiler must not see.
+// NOLINTNEXTLINE(misc-no-recursion): it is to overflow
+[[gnu::noinline]] inline int overflow(const volatile int* above = nullptr) {
+  volatile int room[1024];
+  room[0] = above != nullptr ? *above + 1 : 1;
+  return room[0] > 0 ? overflow(room) + room[0] : 0;
+}
+
+/// Acts by the words that end this process: at `number`, in words such as crash=50.
+inline void end_process(const Behaviour& behaviour, long number) {
+  if (number == behaviour.number("crash", -1)) crash();
+  if (number == behaviour.number("overflow", -1)) overflow();
+  if (number == behaviour.number("exit", -1)) std::exit(7);
+  if (number == behaviour.number("quick_exit", -1)) std::quick_exit(7);
+}
+
 }  // namespace kerf::mock

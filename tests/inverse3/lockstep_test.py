@@ -23,9 +23,10 @@ def run(folder, profile, *words):
          "--hand", ROOT / "scenes/hands/touch.toml", "--report", its, *words], stdout=subprocess.PIPE, text=True)
     try:
         port = re.search(r"ws port (\d+)", emulator.stdout.readline())[1]
+        place = f"ws:{port}" + (",handle=40213" if profile == "3.5" else "")  # which has two
         done = subprocess.run(
             [PROGRAMS / "kerf-controller", "--scene", ROOT / "scenes/touch.toml", "--device", "inverse3", "--torque-scale", "1,1,1",
-             "--port", f"ws:{port}", "--virtual", "--seconds", "2", "--name", f"inverse3-{port}", "--report", mine],
+             "--port", place, "--virtual", "--seconds", "2", "--name", f"inverse3-{port}", "--report", mine],
             capture_output=True, text=True, timeout=300, check=False)
         emulator.wait(timeout=60)
     finally:

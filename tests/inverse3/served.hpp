@@ -45,9 +45,10 @@ class ServedService {
     return params;
   }
 
-  [[nodiscard]] inverse3::ServiceOptions options() const {
+  /// `more`: words of --port ws, each with its comma.
+  [[nodiscard]] inverse3::ServiceOptions options(const std::string& more = "") const {
     return inverse3::parse_service_port(":" + std::to_string(front_.port()) +
-                                        ",events=" + std::to_string(*front_.event_port()));
+                                        ",events=" + std::to_string(*front_.event_port()) + more);
   }
   /// The device at the end, once the thread has ended.
   const DeviceModel& end() {
@@ -66,6 +67,9 @@ class ServedService {
 };
 
 inline const std::atomic<bool> kNoStop{false};
+
+/// The handle of the emulated service's wireless kind, where it has both.
+inline const std::string kWireless = ",handle=40213";
 
 inline std::unique_ptr<inverse3::ServicePort> open(const inverse3::ServiceOptions& options,
                                                    bool lockstep = false) {

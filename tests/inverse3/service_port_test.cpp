@@ -38,19 +38,22 @@ TEST_CASE("--port ws: this machine's service by itself, or another place, button
   CHECK(plain.service.port == 10001);
   CHECK(plain.event_port == 10020);
   CHECK(plain.wanted.park.view().empty());
-  const ServiceOptions all = parse_service_port(":10.0.0.2:12,park=home,device=0A1C,events=13");
+  const ServiceOptions all =
+      parse_service_port(":10.0.0.2:12,park=home,device=0A1C,handle=51877,events=13");
   CHECK(all.service.host == "10.0.0.2");
   CHECK(all.service.port == 12);
   CHECK(all.event_port == 13);
   CHECK(all.wanted.park == "home");
   CHECK(all.wanted.device_id == "0A1C");
+  CHECK(all.wanted.handle_id == "51877");
+  CHECK(plain.wanted.handle_id.view().empty());
   CHECK(parse_service_port(":65535").service.port == 65535);
   CHECK(parse_service_port(":5000").event_port == 0);
   CHECK(parse_service_port(":[::1]:5000").service.host == "::1");
   CHECK(parse_service_port(",events=0").event_port == 0);
   for (const char* wrong :
        {":", ":0", ":65536", ":x", "::5", ":host:", ",", ",park", ",park=", ",park=a b",
-        ",colour=red", ",events=65536", ",events=x", ",device=\"", ":1,,"}) {
+        ",colour=red", ",events=65536", ",events=x", ",device=\"", ",handle=", ":1,,"}) {
     CAPTURE(wrong);
     CHECK(has(error_of([&] { static_cast<void>(parse_service_port(wrong)); }), "give ws alone"));
   }
@@ -71,7 +74,7 @@ TEST_CASE("each version of the service is understood: pose, parking button, forc
        {ServiceProfile::v3_4, ServiceProfile::v3_5, ServiceProfile::v3_5_wireless}) {
     CAPTURE(static_cast<int>(profile));
     ServedService service({.profile = profile});
-    const auto port = open(service.options());
+    const auto port = open(service.options(profile == ServiceProfile::v3_5 ? kWireless : ""));
     const CartesianReport armed = until_armed(*port);
     CHECK(armed.position_um == std::array<std::int32_t, 3>{0, 80'000, 0});
     CHECK(armed.orientation == std::array<std::int16_t, 4>{0, 0, 0, 32767});
@@ -111,7 +114,8 @@ TEST_CASE("a service before 3.1, or one that obeys other words than its version'
   CHECK(has(error_of([&] { open(old.options()); }),
             "version 3.0.7.0; needs the vendor's Inverse Service 3.1 or newer"));
   ServedService changed({.profile = ServiceProfile::v3_5, .claims = ServiceProfile::v3_4});
-  CHECK(has(error_of([&] { open(changed.options()); }), "stays idle under the force command"));
+  CHECK(has(error_of([&] { open(changed.options(kWireless)); }),
+            "stays idle under the force command"));
   ServedService changed_back({.profile = ServiceProfile::v3_4, .claims = ServiceProfile::v3_5});
   CHECK(has(error_of([&] { open(changed_back.options()); }), "stays idle under the force command"));
 }
@@ -121,6 +125,39 @@ TEST_CASE("a service whose forces are scaled or damped is refused at the start")
   // The settings change with the first client, so the second one finds them.
   static_cast<void>(error_of([&] { open(service.options()); }));
   CHECK(has(error_of([&] { open(service.options()); }), "scales every force by 0.5"));
+}
+
+TEST_CASE("a device that another program drives is refused, also if the force word is not obeyed") {
+  ServedService driven({.script = {{0, ServiceFault::driven}}});
+  CHECK(has(error_of([&] { open(driven.options()); }), "device 0A1C is not idle (force) before"));
+  ServedService deaf({.profile = ServiceProfile::v3_5_wireless,
+                      .claims = ServiceProfile::v3_4,
+                      .script = {{0, ServiceFault::driven}}});
+  CHECK(has(error_of([&] { open(deaf.options()); }), "is not idle"));
+}
+
+TEST_CASE("several handles are listed and refused without a name") {
+  ServedService both({.profile = ServiceProfile::v3_5});
+  CHECK(has(error_of([&] { open(both.options()); }),
+            "several handles are there: 51877, 40213; name the one of this device with handle=ID"));
+  ServedService third({.script = {{0, ServiceFault::third_handle}}});
+  CHECK(has(error_of([&] { open(third.options()); }), "several handles are there: 40999, 40213; "));
+  CHECK(until_armed(*open(third.options(kWireless))).parked);
+}
+
+TEST_CASE("what is wrong with the replies at the start is the line, not the connection") {
+  ServedService millimetres({.position_scale = 1000});
+  const std::string line = error_of([&] { open(millimetres.options()); });
+  CHECK(has(line,
+            "3 replies of the service in a row cannot be read: its position of the device is "
+            "280 m away, and no arm reaches 1 m: is it in millimetres?"));
+  CHECK_FALSE(has(line, "closed"));
+  // The list of the devices is not broken, and takes the first one.
+  constexpr ScriptedServiceFault kMalformed{1, ServiceFault::malformed};
+  ServedService broken({.script = {kMalformed, kMalformed, kMalformed, kMalformed}});
+  const std::string cut = error_of([&] { open(broken.options()); });
+  CHECK(
+      has(cut, "3 replies of the service in a row cannot be read: they are no JSON of a state; "));
 }
 
 // ---- other programs ----
@@ -195,6 +232,34 @@ TEST_CASE("nobody, a silent program and one that speaks otherwise: one line, and
   }
 }
 
+TEST_CASE("a port that is taken is the fault of the option that named it") {
+  const Stranger there("");
+  Emulator emulator(std::make_unique<CartesianModel>(ServedService::as_service()), std::nullopt);
+  const FaultScript no_faults;
+  FaultyDevice device(emulator, no_faults);
+  const auto line = [&](const ServicePlace& place) {
+    return error_of([&] { ServiceFront(place, {}, device, [] {}); });
+  };
+  const std::string taken = std::to_string(there.port());
+  CHECK(line({taken, std::nullopt}).starts_with("--ws: " + taken + ": Address already in use"));
+  CHECK(
+      line({"0", there.port()}).starts_with("--ws-events: " + taken + ": Address already in use"));
+  CHECK(line({"0", std::uint16_t{0}}).empty());
+}
+
+TEST_CASE("an attempt to connect ends when it is asked to, however long it may take") {
+  const Stranger silent("");
+  constexpr int kVeryLongMs = 3'600'000;
+  const std::atomic<bool> stop{true};
+  const inverse3::HostPort where{"127.0.0.1", silent.port()};
+  CHECK(has(error_of([&] {
+              static_cast<void>(inverse3::http_get(where, "/version", kVeryLongMs, stop));
+            }),
+            "asked to end before an answer to GET"));
+  CHECK(has(error_of([&] { inverse3::WebSocket(where, kVeryLongMs, stop); }),
+            "asked to end before an answer to the upgrade"));
+}
+
 TEST_CASE("a second client is turned away, and the first one goes on") {
   ServedService service;
   const auto port = open(service.options());
@@ -212,7 +277,7 @@ namespace {
 /// The reports of a run in lock-step, in which each command is one report.
 std::vector<CartesianReport> lock_step_run(ServiceProfile profile) {
   ServedService service({.profile = profile, .lockstep = true});
-  const auto port = open(service.options(), true);
+  const auto port = open(service.options(profile == ServiceProfile::v3_5 ? kWireless : ""), true);
   std::vector<CartesianReport> reports;
   for (int tick = 0; tick < 300; ++tick) {
     command(*port, static_cast<std::int16_t>(10 * tick));

@@ -6,8 +6,10 @@
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
+#include <initializer_list>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include <doctest/doctest.h>
 
@@ -47,6 +49,13 @@ struct Said {
   }
 };
 
+/// The same before kerf's first force.
+Said idle(Said said = {}) {
+  const bool is_old = said.mode.starts_with(R"("mode")");
+  said.mode = is_old ? R"("mode":"idle")" : R"("control_domain":"undefined","control_mode":"idle")";
+  return said;
+}
+
 CartesianCommand push(std::int16_t x_mn) {
   CartesianCommand command;
   command.force_on = true;
@@ -57,7 +66,7 @@ CartesianCommand push(std::int16_t x_mn) {
 /// A session at 1 kHz.
 struct Run {
   explicit Run(const Said& first = {}, ForceKey key = ForceKey::vector, const Wanted& wanted = {})
-      : session(wanted, key, first.state(), 0) {}
+      : session(wanted, key, idle(first).state(), 0) {}
 
   /// One turn: the force that was sent, and the report of the reply.
   std::array<double, 3> turn(const Said& said, const CartesianCommand& command = {}) {
@@ -95,18 +104,109 @@ TEST_CASE("the only device is taken; of several, the named one") {
   Said two;
   two.id = R"(0B2D"},{"device_id":"0A1C)";
   const auto open = [](const Said& first, const char* wanted) {
-    return error_of([&] { Session({ShortText(wanted), {}}, ForceKey::vector, first.state(), 0); });
+    return error_of(
+        [&] { Session({.device_id = ShortText(wanted)}, ForceKey::vector, first.state(), 0); });
   };
-  CHECK(open({}, "").empty());
-  CHECK(open({}, "0A1C").empty());
-  CHECK(has(open({}, "0B2D"), "no device 0B2D but 0A1C"));
+  CHECK(open(idle(), "").empty());
+  CHECK(open(idle(), "0A1C").empty());
+  CHECK(has(open(idle(), "0B2D"), "no device 0B2D but 0A1C; name one of these with device=ID"));
+  CHECK(has(error_of([&] {
+              Session({.device_id = ShortText("0B2D"), .is_again = true}, ForceKey::vector,
+                      idle().state(), 0);
+            }),
+            "no device 0B2D but 0A1C; connect that one again, or start kerf again for another"));
   CHECK(has(open(two, ""), "several devices are there: 0B2D, 0A1C; name one with device=ID"));
-  CHECK(open(two, "0A1C").empty());
+  CHECK(open(idle(two), "0A1C").empty());
   ServiceState none;
   CHECK(has(error_of([&] { Session({}, ForceKey::vector, none, 0); }), "no Inverse3; connect one"));
   Said odd;
   odd.id = "a b";
   CHECK(has(open(odd, ""), "no usable device_id"));
+}
+
+TEST_CASE("a device that another program drives proves nothing, and is refused with its state") {
+  struct {
+    const char* mode;
+    const char* says;
+  } const cases[] = {
+      {R"("control_domain":"cartesian","control_mode":"force")", "0A1C is not idle (force)"},
+      {R"("control_domain":"angular","control_mode":"position")", "0A1C is not idle (position)"},
+      {R"("mode":"force")", "0A1C is not idle (force)"},
+      {R"("control_domain":"cartesian")", "0A1C is not idle (cartesian)"},
+      {R"("mode":"a\nb")", "0A1C is not idle (?)"},
+      {R"("control_domain":"undefined","control_mode":"idle")", ""},
+      {R"("mode":"idle")", ""},
+      {"", ""}};
+  for (const auto& [mode, says] : cases) {
+    CAPTURE(mode);
+    Said said;
+    said.mode = mode;
+    const std::string error = error_of([&] { Session({}, ForceKey::vector, said.state(), 0); });
+    CHECK(error.empty() == (*says == 0));
+    CHECK(has(error, says));
+    CHECK((error.empty() || has(error, "; end that program")));
+  }
+}
+
+namespace {
+
+/// Handles by id, group "wireless_verse_grip"; a button is held, and `c` parks.
+std::string handles_of(std::initializer_list<std::pair<const char*, bool>> handles,
+                       const char* status = "") {
+  std::string list;
+  for (const auto& [id, is_held] : handles) {
+    list += std::string(list.empty() ? "" : ",") + R"({"device_id":")" + id +
+            R"(","state":{"buttons":{"c":)" + (is_held ? "true" : "false") + R"(}},"status":{)" +
+            status + "}}";
+  }
+  return R"("wireless_verse_grip":[)" + list + "]";
+}
+
+}  // namespace
+
+TEST_CASE("of several handles the named one counts; without a name they are listed and refused") {
+  Said two = idle();
+  two.handles = handles_of({{"7", false}, {"8", true}});
+  const auto open = [&](const Wanted& wanted) {
+    return error_of([&] { Session(wanted, ForceKey::vector, two.state(), 0); });
+  };
+  CHECK(
+      has(open({}), "several handles are there: 7, 8; name the one of this device with handle=ID"));
+  CHECK(open({.handle_id = ShortText("8")}).empty());
+  CHECK(open({.handle_id = ShortText("9")}).empty());  // it may wake up
+  two.handles = handles_of({{"7", false}, {"8", true}}, R"("connected":false)");
+  CHECK(open({}).empty());
+  for (const auto& [id, parked] : {std::pair{"7", false}, {"8", true}}) {
+    CAPTURE(id);
+    Said said;
+    said.handles = handles_of({{"7", false}, {"8", true}});
+    Run run(said, ForceKey::vector, {.handle_id = ShortText(id)});
+    run.turns(80, said);
+    CHECK(run.report->parked == parked);
+    CHECK((run.session.bar() == Bar::none) == parked);
+  }
+  Said said;
+  said.handles = handles_of({{"7", true}});
+  Run absent(said, ForceKey::vector, {.handle_id = ShortText("9")});
+  absent.turns(80, said);
+  CHECK(absent.session.bar() == Bar::no_handle);
+}
+
+TEST_CASE("a handle that comes later changes nothing; without the first one several are refused") {
+  Said one, two, others;
+  one.handles = handles_of({{"7", true}});
+  two.handles = handles_of({{"6", false}, {"7", true}, {"8", false}});
+  others.handles = handles_of({{"6", true}, {"8", true}});
+  Run run(one);
+  run.arm(one);
+  run.turns(100, two);
+  CHECK(run.session.bar() == Bar::none);
+  CHECK(run.report->parked);
+  run.turns(100, others);
+  CHECK(run.session.bar() == Bar::several_handles);
+  CHECK_FALSE(run.report->homed);
+  run.turns(100, two);
+  CHECK(run.session.bar() == Bar::none);
 }
 
 // ---- arming ----
@@ -326,6 +426,14 @@ TEST_CASE("a position that no arm has is not read: farther than 1 m, millimetres
     run.turn(said);
     CHECK_FALSE(run.report);
   }
+  Said wrong;
+  wrong.position = R"({"x":21.3,"y":-133.8,"z":87.1})";
+  run.turn(wrong);
+  CHECK(has(run.session.why_unread(),
+            "is 133.8 m away, and no arm reaches 1 m: is it in millimetres?"));
+  wrong.position = "{}";
+  run.turn(wrong);
+  CHECK(has(run.session.why_unread(), "its state has no position of the device"));
   Said far;
   far.position = R"({"x":0.99,"y":-0.13,"z":0.2})";
   run.turn(far);
@@ -357,10 +465,10 @@ TEST_CASE("an orientation that is none leaves the last one") {
 // ---- handle ----
 
 TEST_CASE("buttons by name: c parks, a and b are the first and second; a wired one's only parks") {
-  const auto seen = [](const char* handles, const char* park = "") {
+  const auto seen = [](const char* handles, const char* park = "", const char* handle = "") {
     Said said;
     said.handles = handles;
-    Run run(said, ForceKey::vector, {{}, ShortText(park)});
+    Run run(said, ForceKey::vector, {.park = ShortText(park), .handle_id = ShortText(handle)});
     run.turns(12, said);
     const CartesianReport& r = *run.report;
     return std::string(r.parked ? "p" : "-") + (r.button1 ? "1" : "-") + (r.button2 ? "2" : "-") +
@@ -381,8 +489,11 @@ TEST_CASE("buttons by name: c parks, a and b are the first and second; a wired o
   CHECK(seen(wireless(R"("button_0":true,"button_1":true)").c_str()) == "-12!");
   CHECK(seen(R"("verse_grip":[{"device_id":"5","state":{"button":true}}])") == "p--");
   CHECK(seen(R"("verse_grip":[{"device_id":"5","state":{"button":true}}],
-                "wireless_verse_grip":[{"device_id":"7","state":{"buttons":{"c":false}}}])") ==
-        "---");
+                "wireless_verse_grip":[{"device_id":"7","state":{"buttons":{"c":false}}}])",
+             "", "7") == "---");
+  CHECK(seen(R"("verse_grip":[{"device_id":"5","state":{"button":true}}],
+                "wireless_verse_grip":[{"device_id":"7","state":{"buttons":{"c":false}}}])",
+             "", "5") == "p--");
 }
 
 TEST_CASE("a handle that sleeps, goes or is another one bars the device; its pose is kept") {
@@ -428,6 +539,10 @@ TEST_CASE("a device that is not listed gives one last report without power, then
   CHECK(run.report->position_um == pose);
   run.turn(other, push(500));
   CHECK_FALSE(run.report);
+  CHECK(run.session.bar() == Bar::replaced);
+  ServiceState none;
+  REQUIRE(parse_state(R"({"inverse3":[]})", none));
+  CHECK_FALSE(run.session.take(none, 1000, run.now_ns));
   CHECK(run.session.bar() == Bar::gone);
   CHECK(run.turn({}, push(500)) == std::array{0.0, 0.0, 0.0});  // back, and barred
   CHECK_FALSE(run.report->homed);

@@ -54,6 +54,29 @@ TEST_CASE("every key of the settings is read") {
   CHECK_FALSE(standin::parse_settings("socket:s,missed=drop,missed=hold").drop_without_frame);
 }
 
+TEST_CASE(
+    "a switch alone is refused by the words and ranges of the list, and nothing else is one") {
+  for (const char* word :
+       {"missed=drop", "hand=pushed", "ramp=0", "ramp=10", "stall=1", "stall=60000"}) {
+    CAPTURE(word);
+    CHECK(standin::refusal_of_switch(word).empty());
+    CHECK(refusal_of(std::string("socket:s,") + word) == "accepted");
+  }
+  CHECK(standin::refusal_of_switch("missed=keep") == "take hold or drop");
+  CHECK(standin::refusal_of_switch("missed") == "take hold or drop");
+  CHECK(standin::refusal_of_switch("ramp=10.1") == "give a number from 0 to 10");
+  CHECK(standin::refusal_of_switch("ramp=x'; y") == "give a number from 0 to 10");
+  CHECK(standin::refusal_of_switch("stall=0.5") == "give a number from 1 to 60000");
+  CHECK(standin::refusal_of_switch("stall=60001") == "give a number from 1 to 60000");
+  for (const char* word : {"", "x", "lockstep", "rate=1000", "ledger=/l", "device=omega",
+                           "missed=drop,lockstep", "socket:s"}) {
+    CAPTURE(word);
+    CHECK_FALSE(standin::refusal_of_switch(word).empty());
+  }
+  CHECK(standin::refusal_of_switch("x").starts_with("unknown; take one of missed=hold|drop, "));
+  CHECK(standin::refusal_of_switch("x").ends_with(", ramp=0..10, stall=1..60000"));
+}
+
 TEST_CASE("wrong settings are refused in one line that names the part") {
   for (const char* text :
        {"", "udp:1", "socket:", "socket:s,", "socket:s,missed=keep", "socket:s,rate=0",

@@ -155,6 +155,30 @@ class Misuse(Case):
         self.expect("hd_client.py", "killed", ["force_at_end", "left_open"], code=137)
         self.expect("hd_client.py", "stall", ["stalls"])
 
+    def test_a_force_that_was_given_is_not_cleared_whoever_gave_it(self):
+        program = self.file("frames.py", """
+import ctypes, sys
+hd = ctypes.CDLL("libHD.so")
+device = hd.hdInitDevice(None)
+hd.hdEnable(0x4000)
+def frame(force):
+    hd.hdBeginFrame(device)
+    hd.hdSetDoublev(0x2700, (ctypes.c_double * 3)(force, 0, 0))
+    hd.hdEndFrame(device)
+exec(sys.argv[1])
+hd.hdDisableDevice(device)
+""")
+        start, stop = "hd.hdStartScheduler()", "hd.hdStopScheduler()"
+        for what, found in (("frame(1)", ["not_cleared"]), ("frame(1); frame(0)", []),
+                            ("frame(1); hd.hdDisable(0x4000)", []), (f"{start}; {stop}", []),
+                            (f"{start}; frame(1); {stop}", []),  # no tick came, so no force left
+                            (f"frame(1); {start}; {stop}", ["not_cleared"])):
+            with self.subTest(what=what):
+                code, report, said = self.run_command("/usr/bin/python3", "-B", program, what)
+                self.assertEqual((code, self.misuse(report)), (len(found), found), said)
+                if found:
+                    self.assertEqual([one["count"] for one in report["misuse"]], [1])
+
     def test_of_dhd(self):
         omega = ["--device", "omega"]
         for what, found in (("nan", "not_finite"), ("wrong_id", "bad_handles"), ("not_cleared", "not_cleared")):
@@ -319,10 +343,27 @@ class BadInput(Case):
     def test_every_wrong_option_is_one_line(self):
         for options in (["--device", "falcon"], ["--seconds", "x"], ["--rate", "3"], ["--rate", "3000"],
                         ["--on-silence", "kept"], ["--switch", "missed=both"], ["--switch", "x"], ["--switch", "stall=x"],
+                        ["--switch", "stall=0"], ["--switch", "stall=60001"], ["--switch", "ramp=11"], ["--switch", "lockstep"],
                         ["--hand", "/nowhere"], ["--report", "/nowhere/x"], ["--what"], ["--hand"]):
             with self.subTest(options=options):
                 done = subprocess.run([*COMMAND, *options, "--", "true"], capture_output=True, text=True, check=False)
                 self.assertEqual((done.returncode, done.stderr.count("\n")), (2, 1), done.stderr)
+
+    def test_the_range_of_a_switch_is_that_of_the_libraries(self):
+        for switch in ("stall=1", "stall=60000", "ramp=10", "ramp=0"):
+            with self.subTest(switch=switch):
+                code, report, said = self.run_command("true", options=["--switch", switch])
+                self.assertEqual((code, self.misuse(report)), (1, ["not_opened"]), said)
+                code, _, _, said = self.run_client("hd_client.py", "spring", 20, ["--switch", switch])
+                self.assertEqual(code, 0, said)
+
+    def test_a_comma_in_tmpdir_is_one_line(self):
+        folder = self.folder / "a,b"
+        folder.mkdir()
+        done = subprocess.run([*COMMAND, "--", "true"], capture_output=True, text=True, check=False,
+                              env={**os.environ, "TMPDIR": str(folder)})
+        self.assertEqual((done.returncode, done.stderr.count("\n")), (2, 1), done.stderr)
+        self.assertIn("comma", done.stderr)
 
     def test_a_hand_that_the_emulator_refuses_is_its_line(self):
         code, _, said = self.run_command("true", options=["--hand", self.file("bad.toml", "what = 1\n")])

@@ -40,6 +40,17 @@ constexpr std::uint64_t kFullStateTurns = 2000;  ///< between two requests for t
 constexpr const char* kNeeds =
     "needs the vendor's Inverse Service 3.1 or newer: systemctl status haply-inverse-service";
 
+// Why a connection is lost.
+constexpr const char* kClosed =
+    "the service has closed the connection; see systemctl status haply-inverse-service, and end "
+    "other programs that use it";
+constexpr const char* kSilent =
+    "the service has not replied for 100 ms; see what else this machine does, and systemctl status "
+    "haply-inverse-service";
+constexpr const char* kNoState =
+    "they are no JSON of a state; see which service it is by systemctl status "
+    "haply-inverse-service";
+
 /// A reason for which no later try can help.
 struct Refusal : std::runtime_error {
   using std::runtime_error::runtime_error;
@@ -48,8 +59,8 @@ struct Refusal : std::runtime_error {
 [[noreturn]] void refuse_text(std::string_view text) {
   throw std::runtime_error(
       "--port ws" + std::string(text) +
-      ": not [:[HOST:]PORT][,park=NAME][,device=ID][,events=PORT]; give ws alone for the service "
-      "of this machine");
+      ": not [:[HOST:]PORT][,park=NAME][,device=ID][,handle=ID][,events=PORT]; give ws alone for "
+      "the service of this machine");
 }
 
 std::optional<std::uint16_t> port_number(std::string_view text) {
@@ -124,6 +135,8 @@ ServiceOptions parse_service_port(std::string_view text) {
       options.wanted.park = value;
     } else if (name == "device") {
       options.wanted.device_id = value;
+    } else if (name == "handle") {
+      options.wanted.handle_id = value;
     } else if (const auto port = port_number(value.view()); name == "events" && port) {
       options.event_port = *port;
       has_events = true;
@@ -165,8 +178,8 @@ std::int64_t ServicePort::now_ns() const noexcept {
   return static_cast<std::int64_t>(turns_) * (kNsPerSecond / ours_.rate_hz);
 }
 
-ForceKey ServicePort::read_version() const {
-  const HttpAnswer answer = http_get(options_.service, "/version", kConnectMs);
+ForceKey ServicePort::read_version(const std::atomic<bool>& stop) const {
+  const HttpAnswer answer = http_get(options_.service, "/version", kConnectMs, stop);
   std::string version;
   LinkHello theirs{Personality::inverse3, false, ours_.rate_hz};
   try {
@@ -187,29 +200,38 @@ ForceKey ServicePort::read_version() const {
   return *number >= 305 ? ForceKey::vector : ForceKey::values;
 }
 
-void ServicePort::check_force_scale() const {
+/// At each connection: another client may have changed it since the last one. Later in a connection
+/// the echo shows it.
+void ServicePort::check_force_scale(const std::atomic<bool>& stop) {
   std::optional<double> scale;
   try {
     const HttpAnswer answer =
-        http_get(options_.service, "/settings/devices/force_scale", kConnectMs);
+        http_get(options_.service, "/settings/devices/force_scale", kConnectMs, stop);
     if (answer.status == 200) scale = setting_within(Json::parse(answer.body));
   } catch (const std::exception&) {  // settings are read where there are some
   }
   if (!scale) {
-    note("devices/force_scale of the service cannot be read; see in the vendor's Hub that it is 1");
+    note_once(
+        has_noted_scale_,
+        "devices/force_scale of the service cannot be read; see in the vendor's Hub that it is 1");
   } else if (*scale != 1) {
     throw Refusal("the service scales every force by " + number_text(*scale) +
                   "; set devices/force_scale to 1 in the vendor's Hub");
   }
 }
 
-std::unique_ptr<ServicePort::Connection> ServicePort::connect() const {
-  const ForceKey key = read_version();
-  if (key == ForceKey::vector) check_force_scale();
+std::unique_ptr<ServicePort::Connection> ServicePort::connect(const std::atomic<bool>& stop) {
+  const ForceKey key = read_version(stop);
+  if (key == ForceKey::vector) check_force_scale(stop);
   auto made = std::make_unique<Connection>();
-  made->service = std::make_unique<WebSocket>(options_.service, kConnectMs);
+  made->service = std::make_unique<WebSocket>(options_.service, kConnectMs, stop);
   // The service speaks first.
-  if (made->service->receive(monotonic_ns() + kConnectMs * kNsPerMs) != WebSocket::Got::text) {
+  const std::int64_t until_ns = monotonic_ns() + kConnectMs * kNsPerMs;
+  WebSocket::Got got{};
+  do {
+    got = made->service->receive(std::min(until_ns, monotonic_ns() + kLookNs));
+  } while (got == WebSocket::Got::nothing && !stop && monotonic_ns() < until_ns);
+  if (got != WebSocket::Got::text) {
     throw std::runtime_error(std::string("the service sends no list of its devices; ") + kNeeds);
   }
   ServiceState first;
@@ -221,10 +243,11 @@ std::unique_ptr<ServicePort::Connection> ServicePort::connect() const {
   if (options_.event_port != 0) {
     try {
       made->events = std::make_unique<WebSocket>(
-          HostPort{options_.service.host, options_.event_port}, kConnectMs);
+          HostPort{options_.service.host, options_.event_port}, kConnectMs, stop);
     } catch (const std::exception& error) {
-      note("no events of the service at port " + std::to_string(options_.event_port) + " (" +
-           error.what() + "): its own faults show only in the device's state");
+      note_once(has_noted_events_, "no events of the service at port " +
+                                       std::to_string(options_.event_port) + " (" + error.what() +
+                                       "): its own faults show only in the device's state");
     }
   }
   return made;
@@ -234,9 +257,10 @@ void ServicePort::connect_within(int patience_ms, const std::atomic<bool>& stop)
   const std::int64_t give_up_ns = monotonic_ns() + patience_ms * kNsPerMs;
   for (;;) {
     try {
-      connection_ = connect();
+      connection_ = connect(stop);
       // From now on it is this device, whatever else appears.
       options_.wanted.device_id = connection_->session->device_id();
+      options_.wanted.is_again = true;
       return;
     } catch (const Refusal& refusal) {
       throw std::runtime_error(place() + ": " + refusal.what());
@@ -260,8 +284,7 @@ void ServicePort::prove() {
     constexpr std::int64_t kPauseNs = 5 * kNsPerMs;
     if (!ours_.lockstep && turn > 0) sleep_until_ns(sent_ns_ + kPauseNs);
     if (play_turn() == Turn::lost) {
-      throw std::runtime_error(place() + ": the service closed the connection or does not reply; " +
-                               kNeeds);
+      throw std::runtime_error(place() + ": " + one_line(why_lost_));
     }
     const Bar bar = connection_->session->bar();
     if (is_final(bar)) throw std::runtime_error(place() + ": " + text_of(bar));
@@ -296,6 +319,10 @@ void ServicePort::note(const std::string& text) const noexcept {
   pollfd error_stream{STDERR_FILENO, POLLOUT, 0};
   if (poll(&error_stream, 1, 0) != 1 || (error_stream.revents & POLLOUT) == 0) return;
   std::fprintf(stderr, "kerf: warning: %s: %s\n", place().c_str(), one_line(text).c_str());
+}
+
+void ServicePort::note_once(bool& is_noted, const std::string& text) const noexcept {
+  if (!std::exchange(is_noted, true)) note(text);
 }
 
 /// One line for each new reason why the device may not push; the user's own doing needs none.
@@ -359,11 +386,14 @@ ServicePort::Turn ServicePort::play_turn() noexcept {
   for (int strays = 0;; ++strays) {
     const WebSocket::Got got = link.service->receive(0);
     if (got == WebSocket::Got::nothing) break;
-    if (got == WebSocket::Got::lost || strays == kMostStrays) return Turn::lost;
+    if (got == WebSocket::Got::lost) return lose(kClosed);
+    if (strays == kMostStrays) {
+      return lose("the service sends without being asked; end other programs at its port");
+    }
     ++strays_;
   }
   sent_ns_ = monotonic_ns();
-  if (!link.service->send(message, static_cast<int>(kDropNs / kNsPerMs))) return Turn::lost;
+  if (!link.service->send(message, static_cast<int>(kDropNs / kNsPerMs))) return lose(kClosed);
   outbox_.set_on_its_way(false);
   ++turns_;
   ++link.turns;
@@ -380,7 +410,7 @@ ServicePort::Turn ServicePort::await_reply(std::int64_t sent_ns) noexcept {
   for (std::size_t passed = 0;; ++passed) {
     const WebSocket::Got got =
         link.service->receive(sent_ns + limits[std::min<std::size_t>(passed, 2)]);
-    if (got == WebSocket::Got::lost) return Turn::lost;
+    if (got == WebSocket::Got::lost) return lose(kClosed);
     if (got != WebSocket::Got::nothing) {
       const auto took_us = static_cast<std::uint64_t>((monotonic_ns() - sent_ns) / 1000);
       longest_us_ = std::max<std::uint64_t>(longest_us_, took_us);
@@ -399,12 +429,24 @@ ServicePort::Turn ServicePort::await_reply(std::int64_t sent_ns) noexcept {
     }
     if (passed == 2) {
       ++lost_;
-      return Turn::lost;
+      return lose(kSilent);
     }
     take_events();
   }
+  return count_unread(kNoState);
+}
+
+ServicePort::Turn ServicePort::lose(const char* why) noexcept {
+  why_lost_ = why;
+  return Turn::lost;
+}
+
+ServicePort::Turn ServicePort::count_unread(const std::string& why) noexcept {
   ++unreadable_;
-  return ++link.unread >= kMostUnread ? Turn::lost : Turn::done;
+  if (++connection_->unread < kMostUnread) return Turn::done;
+  why_lost_ =
+      std::to_string(kMostUnread) + " replies of the service in a row cannot be read: " + why;
+  return Turn::lost;
 }
 
 ServicePort::Turn ServicePort::take_reply() noexcept {
@@ -417,11 +459,8 @@ ServicePort::Turn ServicePort::take_reply() noexcept {
   } catch (const std::bad_alloc&) {
     is_read = false;
   }
-  const bool is_of_no_use = !is_read || (!report && link.session->bar() != Bar::gone);
-  if (is_of_no_use) {
-    ++unreadable_;
-    return ++link.unread >= kMostUnread ? Turn::lost : Turn::done;
-  }
+  if (!is_read) return count_unread(kNoState);
+  if (!report && !is_absent(link.session->bar())) return count_unread(link.session->why_unread());
   link.unread = 0;
   note_bar();
   if (is_final(link.session->bar())) {
@@ -475,7 +514,8 @@ void ServicePort::drop() noexcept {
   noted_ = Bar::parking;
   backoff_ns_ = kFirstBackoffNs;
   retry_ns_ = monotonic_ns() + backoff_ns_;
-  note("the connection is lost; tried again for as long as the program waits");
+  noted_failure_.clear();
+  note("the connection is lost and tried again for as long as the program waits: " + why_lost_);
 }
 
 void ServicePort::reconnect() noexcept {
@@ -488,12 +528,16 @@ void ServicePort::reconnect() noexcept {
   }
   if (stop_ || monotonic_ns() < retry_ns_) return;
   try {
-    connection_ = connect();
+    connection_ = connect(stop_);
     ++reconnections_;
   } catch (const Refusal& refusal) {
     note(refusal.what());
     closed_ = true;
-  } catch (const std::exception&) {
+  } catch (const std::exception& error) {
+    if (!stop_ && noted_failure_ != error.what()) {
+      noted_failure_ = error.what();
+      note("not connected again yet: " + noted_failure_);
+    }
     backoff_ns_ = std::min(2 * backoff_ns_, kLongestBackoffNs);
     retry_ns_ = monotonic_ns() + backoff_ns_;
   }

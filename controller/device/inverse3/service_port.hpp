@@ -22,7 +22,8 @@
 
 namespace kerf::inverse3 {
 
-/// What follows "ws" in `--port ws[:[HOST:]PORT][,park=NAME][,device=ID][,events=PORT]`.
+/// What follows "ws" in `--port
+/// ws[:[HOST:]PORT][,park=NAME][,device=ID][,handle=ID][,events=PORT]`.
 struct ServiceOptions {
   HostPort service{"127.0.0.1", kServicePort};
   /// Port of the service's events; 0: none. Of another service port than the usual one there is
@@ -43,9 +44,10 @@ struct ServiceOptions {
 ///
 /// A reply that takes longer than 5 ms is counted; than 20 ms, and the next turn takes the force
 /// back; than 100 ms, and the connection is dropped. So it is for three messages in a row that
-/// cannot be read. A new connection is tried after 0.5, 1, 2 ... 10 s, and is barred like the first
-/// one until the parking button is held: but the servo gives a silent device up after 2 s. What
-/// cannot become right (`is_final`) closes the port, with one line on stderr.
+/// cannot be read. A new connection is tried after 0.5, 1, 2 ... 10 s; version, force_scale and an
+/// idle device are checked again, and it is barred like the first one until the parking button is
+/// held: but the servo gives a silent device up after 2 s. What cannot become right (`is_final`)
+/// closes the port, with one line on stderr.
 ///
 /// In lock-step, with kerf's emulated service, a turn is one period of the servo, whatever the
 /// machine's clock says.
@@ -56,7 +58,8 @@ class ServicePort final : public PacketPort {
   /// std::runtime_error with one line.
   ServicePort(const ServiceOptions& options, const LinkHello& ours, int patience_ms,
               const std::atomic<bool>& stop, IoThread io = {});
-  /// Turns without force for 20 ms, then closes.
+  /// Turns without force for 20 ms, then closes; an attempt to connect ends within 40 ms, but for
+  /// the look-up of a host's name.
   ~ServicePort() override;
   ServicePort(const ServicePort&) = delete;
   ServicePort& operator=(const ServicePort&) = delete;
@@ -85,17 +88,20 @@ class ServicePort final : public PacketPort {
   };
   enum class Turn : std::uint8_t { done, lost };
 
-  [[nodiscard]] std::unique_ptr<Connection> connect() const;
+  /// Ends soon after `stop`, by an exception.
+  [[nodiscard]] std::unique_ptr<Connection> connect(const std::atomic<bool>& stop);
   void connect_within(int patience_ms, const std::atomic<bool>& stop);
   void prove();
-  [[nodiscard]] ForceKey read_version() const;
-  void check_force_scale() const;
+  [[nodiscard]] ForceKey read_version(const std::atomic<bool>& stop) const;
+  void check_force_scale(const std::atomic<bool>& stop);
 
   void run() noexcept;
   [[nodiscard]] bool wait_for_turn() noexcept;
   [[nodiscard]] Turn play_turn() noexcept;
   [[nodiscard]] Turn await_reply(std::int64_t sent_ns) noexcept;
   [[nodiscard]] Turn take_reply() noexcept;
+  [[nodiscard]] Turn count_unread(const std::string& why) noexcept;
+  [[nodiscard]] Turn lose(const char* why) noexcept;
   void pass_on(const CartesianReport& report) noexcept;
   void take_events() noexcept;
   void drop() noexcept;
@@ -103,6 +109,7 @@ class ServicePort final : public PacketPort {
   void end() noexcept;
   void note_bar() noexcept;
   void note(const std::string& text) const noexcept;
+  void note_once(bool& is_noted, const std::string& text) const noexcept;
   /// Time of the turns.
   [[nodiscard]] std::int64_t now_ns() const noexcept;
   [[nodiscard]] std::string place() const;
@@ -117,6 +124,9 @@ class ServicePort final : public PacketPort {
   std::int64_t sent_ns_ = 0;  ///< the last message, by the machine's clock
   std::int64_t backoff_ns_ = 0, retry_ns_ = 0;
   Bar noted_ = Bar::parking;
+  bool has_noted_scale_ = false, has_noted_events_ = false;
+  std::string noted_failure_;  ///< of the newest attempt to connect again
+  std::string why_lost_;       ///< the connection, or its unreadable replies
   CartesianCommand command_;
   std::int64_t command_ns_ = 0;          ///< when it came, in time of the turns
   std::atomic<std::int64_t> put_ns_{0};  ///< when the newest command was given, by the clock

@@ -3,9 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <span>
 #include <string_view>
 
+#include "shared/text/text.hpp"
 #include "shared/wire/inverse3.hpp"
 #include "shared/wire/personality.hpp"
 
@@ -19,6 +21,9 @@ std::string text_of(Bar bar) {
       return "the device waits for the handle's parking button";
     case Bar::gone:
       return "the device is gone from the service's list; connect it again";
+    case Bar::replaced:
+      return "the service lists another device in place of this one; connect this one again, or "
+             "start kerf again for the other";
     case Bar::unpowered:
       return "the device has no 24 V supply; plug it in";
     case Bar::uncalibrated:
@@ -28,7 +33,11 @@ std::string text_of(Bar bar) {
     case Bar::proving:
       return "the device is asked whether it obeys the force command";
     case Bar::no_handle:
-      return "no handle is there, and it has the parking button; connect one and wake it";
+      return "no handle is there, or not the one of handle=ID, and it has the parking button; "
+             "connect it and wake it";
+    case Bar::several_handles:
+      return "several handles are there, and one of them has the parking button; name it with "
+             "handle=ID";
     case Bar::handle_asleep:
       return "the handle sleeps or is out of reach; wake it, then hold the parking button";
     case Bar::no_button:
@@ -68,17 +77,35 @@ const ArmState* arm_of(const ServiceState& state, const ShortText& id) noexcept 
   return found == all.end() ? nullptr : &*found;
 }
 
-/// Names for a message: what is not plain is not printed.
+/// Adds a name to a message: what is not plain is not printed.
+void add_name(std::string& list, const ShortText& id) {
+  if (!list.empty()) list += ", ";
+  list += id.is_plain() ? id.view() : "?";
+}
+
 std::string listed(std::span<const ArmState> arms) {
   std::string list;
-  for (const ArmState& arm : arms) {
-    list += (list.empty() ? "" : ", ") +
-            (arm.id.is_plain() ? std::string(arm.id.view()) : std::string("?"));
-  }
+  for (const ArmState& arm : arms) add_name(list, arm.id);
   return list;
 }
 
-ShortText chosen(const ShortText& wanted, const ServiceState& first) {
+/// What is not said counts as connected, as of a wired handle.
+bool is_connected(const HandleState& handle) noexcept {
+  return handle.connected.value_or(true);
+}
+
+void refuse_several_handles(const ServiceState& first) {
+  std::string list;
+  const auto all = first.all_handles();
+  for (const HandleState& handle : all) {
+    if (is_connected(handle)) add_name(list, handle.id);
+  }
+  if (std::ranges::count_if(all, is_connected) < 2) return;
+  throw std::runtime_error("several handles are there: " + list +
+                           "; name the one of this device with handle=ID");
+}
+
+ShortText chosen(const ShortText& wanted, bool is_again, const ServiceState& first) {
   const auto all = first.all_arms();
   if (wanted.view().empty() && all.size() > 1) {
     throw std::runtime_error("several devices are there: " + listed(all) +
@@ -86,11 +113,14 @@ ShortText chosen(const ShortText& wanted, const ServiceState& first) {
   }
   const ArmState* const arm =
       wanted.view().empty() ? (all.empty() ? nullptr : &all.front()) : arm_of(first, wanted);
+  if (!arm && all.empty()) {
+    throw std::runtime_error("the service has no Inverse3; connect one and power it");
+  }
   if (!arm) {
-    throw std::runtime_error(all.empty() ? "the service has no Inverse3; connect one and power it"
-                                         : "the service has no device " +
-                                               std::string(wanted.view()) + " but " + listed(all) +
-                                               "; name one of these with device=ID");
+    throw std::runtime_error("the service has no device " + std::string(wanted.view()) + " but " +
+                             listed(all) +
+                             (is_again ? "; connect that one again, or start kerf again for another"
+                                       : "; name one of these with device=ID"));
   }
   if (!arm->id.is_plain()) {
     throw std::runtime_error(
@@ -144,13 +174,30 @@ bool is_idle(const ArmState& arm) noexcept {
          (arm.mode.view().empty() && arm.domain.view().empty());
 }
 
+/// The words of its state, which may be anything.
+std::string mode_of(const ArmState& arm) {
+  const ShortText& word = arm.mode.view().empty() ? arm.domain : arm.mode;
+  return word.is_plain() ? std::string(word.view()) : "?";
+}
+
+void refuse_driven(const ArmState& arm) {
+  if (is_idle(arm)) return;
+  throw std::runtime_error("device " + std::string(arm.id.view()) + " is not idle (" +
+                           mode_of(arm) +
+                           ") before kerf's first force, so another program drives it and it could "
+                           "not be proven that kerf's command is obeyed; end that program");
+}
+
 }  // namespace
 
 Session::Session(const Wanted& wanted, ForceKey key, const ServiceState& first, std::int64_t now_ns)
-    : device_id_(chosen(wanted.device_id, first)),
+    : device_id_(chosen(wanted.device_id, wanted.is_again, first)),
       park_(wanted.park),
+      wanted_handle_(wanted.handle_id),
       key_(key),
       barred_until_ns_(now_ns + kBarNs) {
+  refuse_driven(*arm_of(first, device_id_));
+  if (wanted_handle_.view().empty()) refuse_several_handles(first);
   if (const Bar bar = bar_of_config(*arm_of(first, device_id_)); bar != Bar::none) bar_ = bar;
 }
 
@@ -242,27 +289,27 @@ Bar Session::bar_of_arm(const ArmState& arm, std::int64_t now_ns) noexcept {
   return bar_of_echo(arm, now_ns);
 }
 
-const HandleState* Session::handle_of(const ServiceState& state) noexcept {
+/// The wanted one, else the one so far, else the only one: as if the one before had been gone for a
+/// moment.
+const HandleState* Session::handle_of(const ServiceState& state, Bar& why) const noexcept {
   const auto all = state.all_handles();
-  const auto same =
-      std::ranges::find_if(all, [&](const HandleState& h) { return h.id == handle_id_.view(); });
-  if (!handle_id_.view().empty() && same != all.end()) return &*same;
-  // A new one: as if the old one had been gone for a moment. A handle of the air before a wired
-  // one.
-  const HandleState* best = nullptr;
-  for (const HandleState& handle : all) {
-    if (!handle.connected.value_or(true)) continue;
-    if (!best || (kHandleGroups[best->group] == "verse_grip" &&
-                  kHandleGroups[handle.group] != "verse_grip")) {
-      best = &handle;
-    }
-  }
-  return best;
+  const std::string_view id =
+      wanted_handle_.view().empty() ? handle_id_.view() : wanted_handle_.view();
+  const auto same = std::ranges::find_if(all, [&](const HandleState& h) { return h.id == id; });
+  if (!id.empty() && same != all.end()) return &*same;
+  why = Bar::no_handle;
+  if (!wanted_handle_.view().empty()) return nullptr;
+  const auto only = std::ranges::find_if(all, is_connected);
+  if (only == all.end()) return nullptr;
+  if (std::find_if(std::next(only), all.end(), is_connected) == all.end()) return &*only;
+  why = Bar::several_handles;
+  return nullptr;
 }
 
 Bar Session::take_handle(const ServiceState& state, CartesianReport& report) noexcept {
-  const HandleState* const handle = handle_of(state);
-  if (!handle) return Bar::no_handle;
+  Bar why = Bar::none;
+  const HandleState* const handle = handle_of(state, why);
+  if (!handle) return why;
   const bool is_new = !(handle->id == handle_id_.view());
   const bool is_first = handle_id_.view().empty();
   handle_id_ = handle->id;
@@ -295,6 +342,16 @@ Bar Session::take_handle(const ServiceState& state, CartesianReport& report) noe
   return is_new && !is_first ? Bar::handle_asleep : Bar::none;
 }
 
+std::string Session::why_unread() const {
+  const auto metres = whole(unread_m_);
+  if (!metres) return "its state has no position of the device; see the vendor's Hub";
+  double farthest = 0;
+  for (const double part : *metres) farthest = std::max(farthest, std::abs(part));
+  return "its position of the device is " + number_text(farthest) +
+         " m away, and no arm reaches 1 m: is it in millimetres? Report the service's version to "
+         "us (docs/devices.md); see the vendor's Hub";
+}
+
 CartesianReport Session::farewell(std::uint32_t number) const noexcept {
   CartesianReport report = last_;
   report.number = number;
@@ -307,14 +364,17 @@ std::optional<CartesianReport> Session::take(const ServiceState& state, std::uin
   const ArmState* const arm = arm_of(state, device_id_);
   if (!arm) {
     // One last report, so that the motors are off at once; then it is silent like its device.
-    const bool is_first = bar_ != Bar::gone;
-    raise(Bar::gone, now_ns);
+    const bool is_first = !is_absent(bar_);
+    raise(state.all_arms().empty() ? Bar::gone : Bar::replaced, now_ns);
     return is_first ? std::optional(farewell(number)) : std::nullopt;
   }
   CartesianReport report = last_;
   report.number = number;
   const auto position = position_um(*arm);
-  if (!position) return std::nullopt;
+  if (!position) {
+    unread_m_ = arm->position_m;
+    return std::nullopt;
+  }
   report.position_um = *position;
   const auto echoed = whole(arm->echoed_n).value_or(std::array<double, 3>{});
   const auto felt = kerf_from_service(echoed);

@@ -25,8 +25,10 @@ enum class Bar : std::uint8_t {
   unpowered,
   uncalibrated,
   not_ready,
-  proving,  ///< zero forces, until the service shows that it takes them
+  proving,   ///< zero forces, until the service shows that it takes them
+  replaced,  ///< gone, and another one is listed
   no_handle,
+  several_handles,
   handle_asleep,
   no_button,  ///< the handle has no button of the parking button's name
   echo,       ///< the service gives another force than was sent
@@ -41,13 +43,20 @@ enum class Bar : std::uint8_t {
 [[nodiscard]] constexpr bool is_final(Bar bar) noexcept {
   return bar >= Bar::unproven;
 }
+/// The service's list has not the device.
+[[nodiscard]] constexpr bool is_absent(Bar bar) noexcept {
+  return bar == Bar::gone || bar == Bar::replaced;
+}
 /// What it is and the way out, to follow a place.
 [[nodiscard]] std::string text_of(Bar bar);
 
 /// Which device of the service, and what its handle's buttons are.
 struct Wanted {
-  ShortText device_id;  ///< empty: the only one
-  ShortText park;  ///< name of the parking button; empty: `c`, or the only one of a wired handle
+  ShortText device_id{};  ///< empty: the only one
+  ShortText park{};  ///< name of the parking button; empty: `c`, or the only one of a wired handle
+  ShortText handle_id{};  ///< empty: the only one
+  /// The device is that of an earlier connection, not of the user's word.
+  bool is_again = false;
 };
 
 /// Turns of one connection: the force to send, then the reply. Times in ns of any clock that goes
@@ -59,7 +68,8 @@ struct Wanted {
 /// misses it, and lasts until the parking button is held afterwards.
 ///
 /// **Proof.** A service ignores a misspelt force command without an error, so no device is armed on
-/// the protocol's word: after kProofTurns zero forces its state must no longer be idle.
+/// the protocol's word: before its first force its state must be idle, and after kProofTurns zero
+/// forces no longer. A device that another program drives proves nothing, and is refused.
 ///
 /// **Echo.** Since 3.5 a state has the force that the device gives. On each axis it must lie within
 /// what was sent in the last kEchoWindowNs, give or take kEchoToleranceN; if it does not for longer
@@ -76,8 +86,8 @@ class Session {
   static constexpr std::int64_t kCommandNs = 20'000'000;
 
   /// `first` is the first message. Throws std::runtime_error with the reason and the way out if it
-  /// has not the wanted device, or several and none is wanted. If its configuration cannot be
-  /// borne, `bar` is final from the start.
+  /// has not the wanted device, several devices or handles and none is wanted, or a device that is
+  /// not idle. If its configuration cannot be borne, `bar` is final from the start.
   Session(const Wanted& wanted, ForceKey key, const ServiceState& first, std::int64_t now_ns);
 
   /// The force to send in this turn, N in the service's frame: that of the newest command, which
@@ -85,9 +95,12 @@ class Session {
   [[nodiscard]] std::array<double, 3> force_n(const CartesianCommand& command, std::int64_t came_ns,
                                               std::int64_t now_ns) noexcept;
   /// A reply. The report is for the servo; empty for a state that has no position of the device, or
-  /// one that cannot be: then nothing is learnt from it. `number` is that of the report.
+  /// one that cannot be: then nothing is learnt from it, and `why_unread` has the reason. `number`
+  /// is that of the report.
   [[nodiscard]] std::optional<CartesianReport> take(const ServiceState& state, std::uint32_t number,
                                                     std::int64_t now_ns) noexcept;
+  /// Why the newest state had no report, and a way out. Allocates.
+  [[nodiscard]] std::string why_unread() const;
   /// The last report of a connection that is lost: its last pose, from a device that may not push.
   [[nodiscard]] CartesianReport farewell(std::uint32_t number) const noexcept;
   /// Takes the force back for another reason. A final bar stays.
@@ -112,10 +125,10 @@ class Session {
   [[nodiscard]] Bar bar_of_echo(const ArmState& arm, std::int64_t now_ns) noexcept;
   [[nodiscard]] bool is_echo_near(const ArmState& arm, std::int64_t now_ns) const noexcept;
   [[nodiscard]] Bar take_handle(const ServiceState& state, CartesianReport& report) noexcept;
-  [[nodiscard]] const HandleState* handle_of(const ServiceState& state) noexcept;
+  [[nodiscard]] const HandleState* handle_of(const ServiceState& state, Bar& why) const noexcept;
   void settle(Bar present, bool parked, std::int64_t now_ns) noexcept;
 
-  ShortText device_id_, park_;
+  ShortText device_id_, park_, wanted_handle_;
   ForceKey key_;
   Bar bar_ = Bar::parking;
   std::int64_t barred_until_ns_ = 0;
@@ -125,7 +138,8 @@ class Session {
   std::size_t sent_count_ = 0;
   std::optional<double> force_gate_;
   ShortText handle_id_;
-  CartesianReport last_;  ///< its pose lasts while the device is gone
+  std::array<std::optional<double>, 3> unread_m_;  ///< the position that could not be
+  CartesianReport last_;                           ///< its pose lasts while the device is gone
 };
 
 /// A position or a vector of the service's frame in kerf's, and back: x = X, y = Z, z = -Y.

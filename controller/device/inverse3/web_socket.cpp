@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "controller/device/inverse3/web_socket.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <optional>
 #include <stdexcept>
@@ -58,32 +59,44 @@ std::int64_t after_ms(int timeout_ms) noexcept {
   return monotonic_ns() + timeout_ms * kNsPerMs;
 }
 
+/// Until when an operation may take, and what ends it before.
+struct Limit {
+  std::int64_t until_ns;
+  const std::atomic<bool>& stop;
+};
+
 /// Starts an operation with a handler of one error, and waits for it. Throws std::runtime_error.
 template <class Start>
-void await(asio::io_context& io, tcp::socket& socket, std::int64_t until_ns, const char* what,
+void await(asio::io_context& io, tcp::socket& socket, const Limit& limit, const char* what,
            const Start& start) {
+  constexpr std::int64_t kLookNs = 20 * kNsPerMs;
   std::optional<ErrorCode> result;
   start([&](ErrorCode error, auto&&...) { result = error; });
   Waiter waiter(io);
-  if (!waiter.until(until_ns, [&] { return result.has_value(); })) {
+  const auto is_done = [&] { return result.has_value(); };
+  bool has_come = false;
+  do {
+    has_come = waiter.until(std::min(limit.until_ns, monotonic_ns() + kLookNs), is_done);
+  } while (!has_come && !limit.stop && monotonic_ns() < limit.until_ns);
+  if (!has_come) {
     ErrorCode ignored;
     socket.close(ignored);  // ends the operation, which must not outlive `result`
     while (!result) {
       if (io.stopped()) io.restart();
       io.run_one();
     }
-    throw std::runtime_error(std::string("no answer to ") + what);
+    throw std::runtime_error((limit.stop ? "asked to end before an answer to " : "no answer to ") +
+                             std::string(what));
   }
   if (*result) throw std::runtime_error(std::string(what) + ": " + result->message());
 }
 
-void connect(asio::io_context& io, tcp::socket& socket, const HostPort& where,
-             std::int64_t until_ns) {
+void connect(asio::io_context& io, tcp::socket& socket, const HostPort& where, const Limit& limit) {
   ErrorCode error;
   tcp::resolver resolver(io);
   const auto found = resolver.resolve(where.host, std::to_string(where.port), error);
   if (error) throw std::runtime_error("no address of " + where.host + ": " + error.message());
-  await(io, socket, until_ns, "the connection",
+  await(io, socket, limit, "the connection",
         [&](auto done) { asio::async_connect(socket, found, done); });
   socket.set_option(tcp::no_delay(true));
 }
@@ -95,19 +108,20 @@ std::string host_header(const HostPort& where) {
 
 }  // namespace
 
-HttpAnswer http_get(const HostPort& where, const std::string& path, int timeout_ms) {
-  const std::int64_t until_ns = after_ms(timeout_ms);
+HttpAnswer http_get(const HostPort& where, const std::string& path, int timeout_ms,
+                    const std::atomic<bool>& stop) {
+  const Limit limit{after_ms(timeout_ms), stop};
   asio::io_context io(1);
   tcp::socket socket(io);
-  connect(io, socket, where, until_ns);
+  connect(io, socket, where, limit);
   http::request<http::empty_body> request(http::verb::get, path, 11);
   request.set(http::field::host, host_header(where));
   request.set(http::field::connection, "close");
-  await(io, socket, until_ns, "GET", [&](auto done) { http::async_write(socket, request, done); });
+  await(io, socket, limit, "GET", [&](auto done) { http::async_write(socket, request, done); });
   beast::flat_buffer buffer;
   http::response_parser<http::string_body> parser;
   parser.body_limit(kMostMessageBytes);
-  await(io, socket, until_ns, "GET",
+  await(io, socket, limit, "GET",
         [&](auto done) { http::async_read(socket, buffer, parser, done); });
   return {parser.get().result_int(), parser.get().body()};
 }
@@ -130,15 +144,15 @@ struct WebSocket::Connection {
   }
 };
 
-WebSocket::WebSocket(const HostPort& where, int timeout_ms)
+WebSocket::WebSocket(const HostPort& where, int timeout_ms, const std::atomic<bool>& stop)
     : connection_(std::make_unique<Connection>()) {
-  const std::int64_t until_ns = after_ms(timeout_ms);
+  const Limit limit{after_ms(timeout_ms), stop};
   Connection& c = *connection_;
-  connect(c.io, c.stream.next_layer(), where, until_ns);
+  connect(c.io, c.stream.next_layer(), where, limit);
   c.stream.read_message_max(kMostMessageBytes);
   c.stream.auto_fragment(false);
   c.stream.text(true);
-  await(c.io, c.stream.next_layer(), until_ns, "the upgrade to a WebSocket",
+  await(c.io, c.stream.next_layer(), limit, "the upgrade to a WebSocket",
         [&](auto done) { c.stream.async_handshake(host_header(where), "/", done); });
   c.begin_reading();
 }

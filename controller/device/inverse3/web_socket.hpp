@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <memory>
 #include <string>
@@ -23,15 +24,17 @@ struct HttpAnswer {
 };
 
 /// One GET on a connection of its own. Throws std::runtime_error with the reason, without a place:
-/// refused, no answer within the time, no HTTP.
-[[nodiscard]] HttpAnswer http_get(const HostPort& where, const std::string& path, int timeout_ms);
+/// refused, no answer within the time, no HTTP; and within 20 ms of `stop`. Only the name of a host
+/// is looked up without a limit of ours.
+[[nodiscard]] HttpAnswer http_get(const HostPort& where, const std::string& path, int timeout_ms,
+                                  const std::atomic<bool>& stop);
 
 /// One connection, text messages both ways; no pings and no compression of its own, and no delay of
 /// small packets. One thread. A message above `kMostMessageBytes` ends the connection.
 class WebSocket {
  public:
   /// Connects and upgrades. Throws std::runtime_error as `http_get`.
-  WebSocket(const HostPort& where, int timeout_ms);
+  WebSocket(const HostPort& where, int timeout_ms, const std::atomic<bool>& stop);
   /// Ends the connection at once, without a closing frame unless `close` was called.
   ~WebSocket();
   WebSocket(const WebSocket&) = delete;

@@ -16,7 +16,9 @@ constexpr const char* kDeviceId = "0A1C";
 constexpr const char* kOtherId = "0B2D";
 constexpr const char* kWiredId = "51877";
 constexpr const char* kWirelessId = "40213";
+constexpr const char* kThirdId = "40999";
 constexpr double kForceStepN = 0.014;
+constexpr std::array<std::int32_t, 3> kElsewhereUm{50'000, -20'000, 30'000};  ///< another arm's tip
 constexpr double kSecondClientN = 1.0;
 
 Json vec(double x, double y, double z) {
@@ -31,10 +33,11 @@ double rounded(double value, double step) {
 }
 
 /// Kerf's frame into that of the service: X to the right, Y away from the user, Z up.
-Json position(const std::array<std::int32_t, 3>& um) {
+/// In metres times `scale`.
+Json position(const std::array<std::int32_t, 3>& um, double scale) {
   constexpr double kStepsPerM = 1e5;  // of 10 um
-  const auto metres = [](double um_of_axis, double origin_m) {
-    return std::round((um_of_axis * 1e-6 + origin_m) * kStepsPerM) / kStepsPerM;
+  const auto metres = [scale](double um_of_axis, double origin_m) {
+    return scale * (std::round((um_of_axis * 1e-6 + origin_m) * kStepsPerM) / kStepsPerM);
   };
   return vec(metres(um[0], inverse3::kOriginM[0]), metres(-um[2], inverse3::kOriginM[1]),
              metres(um[1], inverse3::kOriginM[2]));
@@ -172,9 +175,9 @@ CartesianCommand ServiceDevice::command_in(std::string_view text) {
   return command;
 }
 
-std::string ServiceDevice::state_text(bool with_config) const {
+std::string ServiceDevice::state_text(bool with_config, double position_scale) const {
   const std::string id = has_other_id_ ? kOtherId : kDeviceId;
-  const auto entry = [&](const std::string& name) {
+  const auto entry = [&](const std::string& name, bool is_ours) {
     Json arm = {{"device_id", name}};
     if (with_config) {
       Json config = {{"type", "inverse3"}, {"handedness", "right"}};
@@ -190,28 +193,31 @@ std::string ServiceDevice::state_text(bool with_config) const {
       }
       arm["config"] = config;
     }
-    Json state = {{"cursor_position", position(report_.position_um)},
+    const auto at_um = is_ours ? report_.position_um : kElsewhereUm;
+    Json state = {{"cursor_position", position(at_um, position_scale * settings_.position_scale)},
                   {"cursor_velocity", velocity(velocity_mm_s_)}};
+    const bool is_driven = is_ours && (is_forced_ || is_driven_);
     // The word for a running force is a guess: the pages show "idle" alone.
     if (is_3_5()) {
-      state["current_cursor_force"] = force(report_.force_mn);
-      state["control_domain"] = is_forced_ ? "cartesian" : "undefined";
-      state["control_mode"] = is_forced_ ? "force" : "idle";
+      state["current_cursor_force"] =
+          force(is_ours ? report_.force_mn : std::array<std::int16_t, 3>{});
+      state["control_domain"] = is_driven ? "cartesian" : "undefined";
+      state["control_mode"] = is_driven ? "force" : "idle";
     } else {
-      state["mode"] = is_forced_ ? "force" : "idle";
+      state["mode"] = is_driven ? "force" : "idle";
     }
     arm["state"] = state;
-    const bool is_powered = is_powered_ && report_.powered;
+    const bool is_powered = is_ours && is_powered_ && report_.powered;
     arm["status"] = {{"calibrated", report_.homed},
-                     {"in_use", is_forced_},
+                     {"in_use", is_driven},
                      {"power_supply", is_powered},
                      {"ready", true},
                      {"started", true}};
     return arm;
   };
   Json arms = Json::List{};
-  if (has_second_arm_) arms.push_back(entry(kOtherId));
-  if (is_listed_) arms.push_back(entry(id));
+  if (has_second_arm_) arms.push_back(entry(kOtherId, false));
+  if (is_listed_) arms.push_back(entry(id, true));
   const Json turned = orientation(is_awake_ ? report_.orientation : held_orientation_);
   Json wired = Json::List{}, wireless = Json::List{};
   if (profile_ != ServiceProfile::v3_5_wireless) {
@@ -220,6 +226,13 @@ std::string ServiceDevice::state_text(bool with_config) const {
          {"state",
           Json{{"button", is_awake_ && report_.parked}, {"hall", 9}, {"orientation", turned}}},
          {"status", Json{{"error", 0}, {"awake", is_awake_}}}});
+  }
+  if (has_third_handle_) {
+    wireless.push_back(
+        {{"device_id", kThirdId},
+         {"state", Json{{"orientation", identity()},
+                        {"buttons", Json{{"a", false}, {"b", false}, {"c", false}}}}},
+         {"status", Json{{"connected", true}, {"awake", true}, {"ready", true}}}});
   }
   if (is_3_5()) {
     wireless.push_back(
@@ -261,8 +274,8 @@ ServiceMessage ServiceDevice::broken(const std::string& text) {
                                             std::string(1000, ']') + ",\"inverse3\":")};
     case 5:
       return {text, true};
-    case 6:  // millimetres; the keys are sorted, so x stands before y
-      return {replaced("\"cursor_position\":{\"x\":", "\"cursor_position\":{\"x\":1e308,\"was\":")};
+    case 6:
+      return {state_text(false, 1000)};  // millimetres
     case 7:  // a WebSocket's client ends the connection at this and the next
       return {replaced("\"inverse3\":", "\"name\":\"\xff\",\"inverse3\":")};
     default:
@@ -300,6 +313,12 @@ void ServiceDevice::begin(ServiceFault fault) {
       break;
     case ServiceFault::second_arm:
       has_second_arm_ = true;
+      break;
+    case ServiceFault::third_handle:
+      has_third_handle_ = true;
+      break;
+    case ServiceFault::driven:
+      is_driven_ = true;
       break;
     case ServiceFault::power_off:
     case ServiceFault::power_on:

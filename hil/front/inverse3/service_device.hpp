@@ -33,7 +33,9 @@ enum class ServiceFault : std::uint8_t {
   vanish,         ///< the device is not listed any more
   back,           ///< it is again
   other_id,       ///< it is listed under another id
-  second_arm,     ///< another Inverse3 is listed before it
+  second_arm,     ///< another Inverse3 is listed before it, elsewhere and without power
+  third_handle,   ///< another wireless handle is listed before the others, its button up
+  driven,         ///< another session drives the device, without force: it is never idle
   power_off,      ///< its 24 V supply fails
   power_on,       ///< and is back
   grip_sleep,     ///< the handle sleeps: its orientation stands still
@@ -42,10 +44,10 @@ enum class ServiceFault : std::uint8_t {
   reconfigure,    ///< another client has set damping, basis and force_scale
   event,          ///< ebrake_triggered at the event port
 };
-inline constexpr std::array<std::string_view, 16> kServiceFaultWords{
-    "malformed", "close",         "reset",       "half_open", "restart",  "vanish",
-    "back",      "other_id",      "second_arm",  "power_off", "power_on", "grip_sleep",
-    "grip_wake", "second_client", "reconfigure", "event"};
+inline constexpr std::array<std::string_view, 18> kServiceFaultWords{
+    "malformed", "close",      "reset",      "half_open",     "restart",     "vanish",
+    "back",      "other_id",   "second_arm", "third_handle",  "driven",      "power_off",
+    "power_on",  "grip_sleep", "grip_wake",  "second_client", "reconfigure", "event"};
 inline constexpr int kMalformedWays = 9;
 inline constexpr int kMalformedText = 7;  ///< the first so many are text of UTF-8, or binary
 
@@ -60,7 +62,8 @@ struct ServiceSettings {
   /// Version that it gives instead of its own: a service whose words changed without notice.
   std::optional<ServiceProfile> claims{};
   bool lockstep = false;
-  int rate_hz = 1000;  ///< in lock-step: a message is one period of it
+  int rate_hz = 1000;         ///< in lock-step: a message is one period of it
+  double position_scale = 1;  ///< 1000: positions are in millimetres, against the pages
   std::vector<ScriptedServiceFault> script{};
 };
 
@@ -110,7 +113,7 @@ class ServiceDevice {
   void take_packets();
   void follow(const CartesianReport& report) noexcept;
   [[nodiscard]] CartesianCommand command_in(std::string_view text);
-  [[nodiscard]] std::string state_text(bool with_config) const;
+  [[nodiscard]] std::string state_text(bool with_config, double position_scale = 1) const;
   [[nodiscard]] ServiceMessage broken(const std::string& text);
 
   ServiceSettings settings_;
@@ -129,6 +132,7 @@ class ServiceDevice {
 
   int malformed_left_ = 0, malformed_way_ = 0;
   bool is_listed_ = true, has_other_id_ = false, has_second_arm_ = false;
+  bool has_third_handle_ = false, is_driven_ = false;
   bool is_powered_ = true, is_awake_ = true;
   bool has_second_client_ = false, is_reconfigured_ = false;
   std::array<std::int16_t, 4> held_orientation_{};

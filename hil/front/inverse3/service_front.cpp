@@ -33,10 +33,15 @@ constexpr std::int64_t kMaxBehindNs = 100 * kNsPerMs;  // beyond this the past i
 constexpr std::int64_t kComesBackNs = 3000 * kNsPerMs;
 constexpr std::size_t kMostClientBytes = std::size_t{64} << 10;
 
+/// At `port`, which the option --ws-events gave, or else at that of `where`.
 tcp::acceptor listen_at(asio::io_context& io, const std::string& where,
                         std::optional<std::uint16_t> port) {
   UdpAddress address = resolve_udp(where);  // the text is the same for TCP
   const auto refuse = [&](const std::string& why) {
+    if (port) {
+      throw HilError("--ws-events: " + std::to_string(*port) + ": " + why +
+                     "; use a free port, or 0 for any");
+    }
     throw HilError("--ws: " + where + ": " + why +
                    "; use [ADDRESS:]PORT with an address of this machine and a free port");
   };

@@ -162,7 +162,9 @@ at `--front socket` and `udp`.
 {drawing(file, 'namespace kerf {')}
 
 The orientation is that of the tool: identity is a shaft that points up. A position of more than {number('kFarthestUm') // 1000} mm on an axis, or an orientation
-whose length is not 1 within 1 %, makes the packet none.
+whose length is not 1 within 1 %, makes the packet none. The force at 28 is what the sender knows: the emulator's is the one that its
+motors give; `kerf-arm`'s the one that it gave the library in the frame before, whatever the device made of it; the Inverse3's what
+the service reports since 3.5, and 0 before.
 
 | device | step of the servo, um | resolution, um | orientation | parked | workspace of the emulated one, mm | peak N, continuous N, N/ms |
 |---|---|---|---|---|---|---|
