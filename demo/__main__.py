@@ -245,7 +245,8 @@ class Demo:
 
     def start_arm(self):
         """The adapter to the vendor's library. kerf's stand-in for that finds the emulator by KERF_STAND_IN."""
-        os.environ["KERF_STAND_IN"] = f"socket:{self.meet},device={self.options.device},hand=pushed"
+        settings = f"socket:{self.meet},device={self.options.device},hand=pushed,priority=81"  # as the emulator
+        os.environ["KERF_STAND_IN"] = settings
         self.arm = self.processes.start("arm", [
             "--device", self.options.device, "--name", self.name, "--library", os.path.abspath(self.options.library),
             "--report", os.path.join(self.results, "arm.json")], out="arm.log", log="arm.log")

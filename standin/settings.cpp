@@ -68,6 +68,8 @@ void read(std::string_view part, Settings& settings) {
     settings.device = device_of(part, value);
   } else if (key == "rate") {
     settings.rate_hz = static_cast<int>(number_within(part, value, 100, 8000));
+  } else if (key == "priority") {
+    settings.priority = static_cast<int>(number_within(part, value, 0, 98));
   } else if (key == "ledger" && !value.empty()) {
     settings.ledger = value;
   } else if (key == "ramp") {
