@@ -119,9 +119,9 @@ FaultRow run_row(const Cell& cell, const NamedScript& named, std::uint32_t seed_
   for (std::uint32_t seed = seed_base; seed - seed_base < seeds; ++seed) {
     FaultScript script = named.script ? *named.script : random_faults(seed);
     script.seed = seed;
-    row.latches = script.latches;
     FaultOutcome outcome =
         run_faults({.scene = cell.scene, .hand = cell.hand, .by_service = cell.by_service}, script);
+    row.latches = outcome.demanded;
     const std::string name = "seed " + std::to_string(seed) + ": ";
     if (!outcome.inconclusive.empty()) row.inconclusive.push_back(name + outcome.inconclusive);
     for (std::string& line : outcome.violations) line.insert(0, name);

@@ -102,11 +102,12 @@ bool misleads(const DeviceFault& fault) {
   return false;
 }
 
-/// Returns true if this fault of a packet is another one behind a service: a reply that is lost, or
-/// comes after 100 ms, ends the connection, and the device must be parked again; one more reply
-/// than messages is dropped. So the latch that a script demands of a plain link need not come, and
-/// while a reply is out no message can take the force back.
-bool is_of_packets(const DeviceFault& fault) {
+/// Returns true if this fault is another one behind a service: a reply that is lost, or comes after
+/// 100 ms, ends the connection, and the device must be parked again; one more reply than messages
+/// is dropped; readings that stand still have an echo that is not the force that was sent. So the
+/// latch that a script demands of a plain link need not come, a second fault may meet no packet,
+/// and while a reply is out no message can take the force back.
+bool is_of_turns(const DeviceFault& fault) {
   switch (fault.kind) {
     case FaultKind::lose:
     case FaultKind::delay:
@@ -118,6 +119,7 @@ bool is_of_packets(const DeviceFault& fault) {
     case FaultKind::unplug:
     case FaultKind::replay:
     case FaultKind::hang_up:
+    case FaultKind::freeze:
       return true;
     case FaultKind::stick:
     case FaultKind::jump:
@@ -127,7 +129,6 @@ bool is_of_packets(const DeviceFault& fault) {
     case FaultKind::unhome:
     case FaultKind::noise:
     case FaultKind::host_late:
-    case FaultKind::freeze:
       break;
   }
   return false;
@@ -151,12 +152,12 @@ FaultScript shifted(FaultScript script) {
 
 /// One line if the run shows nothing: no contact, or a fault that never was.
 std::string inconclusive_line(const FaultScript& script, const FaultCase& subject,
-                              const FaultOutcome& outcome, std::uint64_t met) {
+                              const FaultOutcome& outcome, std::uint64_t met, bool one_is_enough) {
   if (!outcome.pushed) return "the motors never pushed at the tip";
   const auto due = std::ranges::count_if(script.faults, [&](const DeviceFault& fault) {
     return concerns(fault.kind, subject.scene.device.personality, subject.by_service);
   });
-  if (script.is_random ? met > 0 || due == 0 : met >= static_cast<std::uint64_t>(due)) return {};
+  if (one_is_enough ? met > 0 || due == 0 : met >= static_cast<std::uint64_t>(due)) return {};
   return std::to_string(met) + " of " + std::to_string(due) + " faults changed anything";
 }
 
@@ -187,7 +188,7 @@ FaultOutcome run_faults(const FaultCase& subject, const FaultScript& as_written)
   DirectPort wire(*served);
 
   FaultOutcome outcome;
-  const bool turns_fail = subject.by_service && std::ranges::any_of(script.faults, is_of_packets);
+  const bool turns_fail = subject.by_service && std::ranges::any_of(script.faults, is_of_turns);
   const bool trusted = !turns_fail && std::ranges::none_of(script.faults, misleads);
   SafetyMonitor contract(subject.scene, trusted, outcome);
   double time_ms = 0;
@@ -221,9 +222,10 @@ FaultOutcome run_faults(const FaultCase& subject, const FaultScript& as_written)
     ++signals.heartbeat;
   }
   constexpr double kGraceMs = 50;
-  contract.end(time_ms, turns_fail ? std::string() : script.latches,
-               first_push_ms + end_of(script) * 1000 + kGraceMs);
-  outcome.inconclusive = inconclusive_line(script, subject, outcome, device.met());
+  outcome.demanded = turns_fail ? std::string() : script.latches;
+  contract.end(time_ms, outcome.demanded, first_push_ms + end_of(script) * 1000 + kGraceMs);
+  outcome.inconclusive =
+      inconclusive_line(script, subject, outcome, device.met(), script.is_random || turns_fail);
   return outcome;
 }
 

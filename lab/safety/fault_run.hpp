@@ -39,6 +39,7 @@ struct FaultOutcome {
   double rms_n = 0;              ///< of the command, over 10 s
   double longest_alone_ms = 0;   ///< motors on without a newer packet
   double slowest_off_ms = 0;     ///< from the packet that switched the motors off to no torque
+  std::string demanded;          ///< of the words of FaultScript::latches; empty: none
   std::string latched = "none";  ///< the first fault that the reports amounted to
   double latch_ms = 0;           ///< from the newest fault of the script before that to it
   bool pushed = false;           ///< there was a force to go wrong
