@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A spring about the origin by CHAI3D's own classes, for any device that it finds, and what it read and sent.
+// A spring about the origin by CHAI3D's own classes, for any device that it finds, and what it read
+// and sent.
 //
 //     chai3d_spring SECONDS NEWTONS_PER_METRE
 #include <algorithm>
@@ -9,7 +10,7 @@
 #include <cstdlib>
 #include <thread>
 
-#include "chai3d.h"
+#include <chai3d.h>
 
 int main(int argc, char** argv) {
   using Clock = std::chrono::steady_clock;
@@ -53,7 +54,8 @@ int main(int argc, char** argv) {
     send();
   }
   device->getPosition(now);
-  std::printf("position_mm %g %g %g rms_n %g seconds %g work_mj %g\n", 1000 * now.x(), 1000 * now.y(),
-              1000 * now.z(), std::sqrt(square_seconds / seconds), seconds, 1000 * work_j);
+  std::printf("position_mm %g %g %g rms_n %g seconds %g work_mj %g\n", 1000 * now.x(),
+              1000 * now.y(), 1000 * now.z(), std::sqrt(square_seconds / seconds), seconds,
+              1000 * work_j);
   device->close();
 }
