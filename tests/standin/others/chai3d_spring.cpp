@@ -26,8 +26,11 @@ int main(int argc, char** argv) {
   const chai3d::cVector3d none(0, 0, 0);
   chai3d::cVector3d now, last, force = none;
   const auto send = [&] { device->setForceAndTorqueAndGripperForce(force, none, 0.0); };
-  for (int i = 0; i < 100; ++i) {  // the first frames
+  // The first frames; a pause of 32 ms without a force would end all forces, by the watchdog that
+  // CHAI3D sets.
+  for (int i = 0; i < 100; ++i) {
     std::this_thread::sleep_for(turn);
+    send();
     device->getPosition(last);
   }
   double work_j = 0, square_seconds = 0;  // by the clock: a turn on a busy machine may be long
