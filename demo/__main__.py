@@ -257,7 +257,8 @@ class Demo:
 
     def start_arm(self):
         """The adapter to the vendor's library. kerf's stand-in for that finds the emulator by KERF_STAND_IN."""
-        os.environ["KERF_STAND_IN"] = f"socket:{self.meet},device={self.options.device},hand=pushed"
+        settings = f"socket:{self.meet},device={self.options.device},hand=pushed,priority=81"  # as the emulator
+        os.environ["KERF_STAND_IN"] = settings
         self.arm = self.processes.start("arm", [
             "--device", self.options.device, "--name", self.name, "--library", os.path.abspath(self.options.library),
             "--report", os.path.join(self.results, "arm.json")], out="arm.log", log="arm.log")
@@ -316,6 +317,8 @@ class Demo:
         hand, or in which another scene was chosen. What fails later, as on a full disk, is reported in its own line, and the
         rest goes on. Returns the exit code of what ended the demo, and whether anything failed or was cut short."""
         processes, failed, cut = self.processes, 0, False
+        end = time.monotonic() + float(self.options.seconds)
+        closing_is_told = False
         while self.controller.poll() is None:
             time.sleep(0.1)
             if failed:
@@ -335,6 +338,10 @@ class Demo:
                 else:
                     cut = bool(worst) or cut
             leads = self.options.mouse or os.path.exists(processes.path("choice"))
+            if self.window is not None and not (leads or closing_is_told) and self.window.poll() == 0:
+                closing_is_told = True
+                if end - time.monotonic() > PATIENCE_S:
+                    say(f"kerf: demo: the window is closed; the hand works on to the end of its {self.options.seconds} s: Ctrl-C ends it")
             if self.window is not None and leads and self.window.poll() is not None:
                 failed = processes.conclude("window", self.window, 0) or failed
                 if failed and os.path.exists(processes.path("window-shows")):  # its screen is gone: keep the results so far

@@ -110,6 +110,8 @@ void read(std::string_view whole, Settings& settings) {
     settings.device = device_of(text, value);
   } else if (key == "rate") {
     settings.rate_hz = static_cast<int>(number_within(text, value, 100, 8000));
+  } else if (key == "priority") {
+    settings.priority = static_cast<int>(number_within(text, value, 0, 98));
   } else if (key == "ledger" && !value.empty()) {
     settings.ledger = value;
   } else {

@@ -19,6 +19,7 @@ struct Settings {
   Personality device = Personality::touch;
   bool lockstep = false;
   int rate_hz = 1000;  ///< of the servo thread (HD), of force commands (dhd)
+  int priority = 0;    ///< HD, in real time: SCHED_FIFO of the servo thread, if it may; 0: none
   std::string ledger;  ///< file of the counts; empty: none is kept
 
   bool drop_without_frame = false;  ///< a tick without a frame ends the force; else it is held
@@ -34,7 +35,8 @@ struct Settings {
   int stall_ms = 50;  ///< a callback (HD) or a pause with a force (dhd) above it stalls
 };
 
-/// Reads `socket:PATH[,device=touch|omega][,lockstep][,rate=HZ][,ledger=PATH][,SWITCH]...`:
+/// Reads
+/// `socket:PATH[,device=touch|omega][,lockstep][,rate=HZ][,priority=N][,ledger=PATH][,SWITCH]...`:
 ///
 ///     missed=hold|drop  stop=hold|drop  excess=clamp|cut  before-enable=apply|ignore
 ///     calibration=kept|lost  handles=seen|documented  button0=parked|hand  status=17|16

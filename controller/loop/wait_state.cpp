@@ -12,6 +12,10 @@ namespace kerf {
 namespace {
 
 constexpr std::int64_t kPatienceNs = 1'000'000'000;
+// A user who has parked the device knows what comes next; an emulated hand behind a vendor's
+// library or service, which do not show when the servo is ready, takes it 2 s after the first
+// packet.
+constexpr std::int64_t kHandPatienceNs = 2'500'000'000;
 constexpr std::size_t kKinds = 6;
 
 constexpr std::array<const char*, kKinds> kWaits{"",
@@ -93,7 +97,8 @@ bool WaitNotice::look(Waiting now, std::int64_t now_ns, std::int64_t servo_ns) n
   }
   const std::uint32_t bit = 1U << static_cast<unsigned>(now);
   const std::int64_t waited_ns = std::min(now_ns - since_ns_, servo_ns - since_servo_ns_);
-  if (now == Waiting::nothing || waited_ns < kPatienceNs || (told_ & bit) != 0) return false;
+  const std::int64_t patience_ns = now == Waiting::hand ? kHandPatienceNs : kPatienceNs;
+  if (now == Waiting::nothing || waited_ns < patience_ns || (told_ & bit) != 0) return false;
   told_ |= bit;
   return true;
 }

@@ -46,6 +46,7 @@ struct Cell {
   LoadedScene scene;
   HandScript hand;
   std::string device, model, numeric;
+  bool by_service = false;  ///< as in FaultCase
 };
 
 /// A cell, a script, all seeds.
@@ -102,7 +103,7 @@ Json figures_of(const FaultOutcome& worst) {
 bool applies(const NamedScript& named, const Cell& cell) {
   if (!named.script || named.script->faults.empty()) return true;
   return std::ranges::any_of(named.script->faults, [&](const DeviceFault& fault) {
-    return concerns(fault.kind, cell.scene.device.personality);
+    return concerns(fault.kind, cell.scene.device.personality, cell.by_service);
   });
 }
 
@@ -110,7 +111,7 @@ bool applies(const NamedScript& named, const Cell& cell) {
 FaultRow run_row(const Cell& cell, const NamedScript& named, std::uint32_t seed_base,
                  unsigned seeds) {
   FaultRow row;
-  row.device = cell.device;
+  row.device = cell.device + (cell.by_service ? ", ws" : "");
   row.model = cell.model;
   row.numeric = cell.numeric;
   row.script = named.name;
@@ -118,8 +119,9 @@ FaultRow run_row(const Cell& cell, const NamedScript& named, std::uint32_t seed_
   for (std::uint32_t seed = seed_base; seed - seed_base < seeds; ++seed) {
     FaultScript script = named.script ? *named.script : random_faults(seed);
     script.seed = seed;
-    row.latches = script.latches;
-    FaultOutcome outcome = run_faults({.scene = cell.scene, .hand = cell.hand}, script);
+    FaultOutcome outcome =
+        run_faults({.scene = cell.scene, .hand = cell.hand, .by_service = cell.by_service}, script);
+    row.latches = outcome.demanded;
     const std::string name = "seed " + std::to_string(seed) + ": ";
     if (!outcome.inconclusive.empty()) row.inconclusive.push_back(name + outcome.inconclusive);
     for (std::string& line : outcome.violations) line.insert(0, name);
@@ -209,6 +211,7 @@ Json Summary::json() const {
 constexpr std::array<int, 5> kAllRatesHz{250, 1000, 2000, 4000, 8000};
 const std::vector<std::string> kModelWords{"paper", "proxy"};     // as in ForceModel
 const std::vector<std::string> kNumericWords{"fixed", "double"};  // as in NumericKind
+const std::vector<std::string> kPortWords{"socket", "ws"};
 
 std::vector<NamedScript> scripts_in(const std::string& place) {
   std::vector<NamedScript> scripts;
@@ -257,6 +260,7 @@ class Command final : public LabCommand {
   std::string scene_ = "scenes/low_limits.toml", hand_ = "scenes/hands/touch.toml";
   std::string scripts_ = "hil/faults", report_;
   std::vector<std::string> devices_, rates_{"1000"}, models_{"proxy"}, numerics_{"fixed"};
+  std::string port_ = "socket";
   std::uint32_t seed_base_ = 1;
   unsigned seeds_ = 20;
   unsigned random_ = 1;
@@ -269,6 +273,10 @@ Command::Command(Arguments& program)
       .one_of(devices_)
       .split_at_commas()
       .shown_as("NAME,...");
+  app_.option("--port", port_,
+              "ws: an Inverse3 behind the emulated service of its vendor, turn by turn")
+      .one_of(kPortWords)
+      .shown_as("socket|ws [socket]");
   app_.option("--rate", rates_, "of the servo, Hz, each a divisor of 8000; all: 250 to 8000")
       .split_at_commas()
       .shown_as("HZ,... [1000]");
@@ -313,7 +321,12 @@ std::vector<Cell> Command::cells() const {
   const std::string place = find_scene_file(scene_);
   const HandScript script = read_hand_script(find_data_file(hand_));
   std::vector<Cell> cells;
+  const bool by_service = port_ == "ws";
+  if (by_service && !kHasService) {
+    throw HilError("--port ws: left out of this build; install libboost-dev, then build again");
+  }
   for (const std::string& device : devices_) {
+    if (by_service && device != word_of(Personality::inverse3)) continue;
     SceneOverrides overrides;
     overrides.personality = named<Personality>(device, kPersonalityWords);
     overrides.torque_scale = torque_scale_of(*overrides.personality);
@@ -327,7 +340,7 @@ std::vector<Cell> Command::cells() const {
         if (!hand.unit_mm) hand.unit_mm = hand_unit_mm(scene);
         for (const std::string& model : models_) {
           scene.force.model = named<ForceModel>(model, kModelWords);
-          cells.push_back({scene, hand, device, model, numeric});
+          cells.push_back({scene, hand, device, model, numeric, by_service});
         }
       }
     }

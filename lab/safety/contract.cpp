@@ -88,7 +88,9 @@ void SafetyMonitor::broken(double time_ms, const std::string& what) {
 }
 
 void SafetyMonitor::reported(double time_ms, std::span<const std::uint8_t> packet) {
-  const auto told = wire_.report(packet, time_ms - heard_ms_ > (kAnewTicks + 0.5) * tick_ms_);
+  // At 8 kHz these ticks are the 20 ms after which the silence is a fault: that comes first.
+  const double anew_ms = std::max((kAnewTicks + 0.5) * tick_ms_, kZeroMs + 1.5 * tick_ms_);
+  const auto told = wire_.report(packet, time_ms - heard_ms_ > anew_ms);
   if (!told) return;
   told_ = *told;
   fresh_ = true;

@@ -7,7 +7,9 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
+#include <string>
 #include <type_traits>
 
 #include "controller/device/device_driver.hpp"
@@ -19,6 +21,9 @@
 #include "hil/script/faulty_device.hpp"
 #include "lab/rig/virtual_loop.hpp"
 #include "lab/safety/contract.hpp"
+#ifdef KERF_LAB_HAS_SERVICE
+#include "lab/safety/service_link.hpp"
+#endif
 
 namespace kerf::faults {
 namespace {
@@ -60,6 +65,9 @@ std::unique_ptr<DeviceModel> model_of(const FaultCase& subject, std::uint32_t se
       params.on_silence = seed % 2 == 0 ? OnSilence::hold_torque : OnSilence::drop_torque;
     }
     if constexpr (std::is_same_v<decltype(params), OmniParams>) params.dock_rad = device.dock_rad;
+    if constexpr (std::is_same_v<decltype(params), CartesianParams>) {
+      params.on_request = subject.by_service;
+    }
     return make_model(params);
   });
 }
@@ -94,6 +102,38 @@ bool misleads(const DeviceFault& fault) {
   return false;
 }
 
+/// Returns true if this fault is another one behind a service: a reply that is lost, or comes after
+/// 100 ms, ends the connection, and the device must be parked again; one more reply than messages
+/// is dropped; readings that stand still have an echo that is not the force that was sent. So the
+/// latch that a script demands of a plain link need not come, a second fault may meet no packet,
+/// and while a reply is out no message can take the force back.
+bool is_of_turns(const DeviceFault& fault) {
+  switch (fault.kind) {
+    case FaultKind::lose:
+    case FaultKind::delay:
+    case FaultKind::duplicate:
+    case FaultKind::reorder:
+    case FaultKind::truncate:
+    case FaultKind::corrupt:
+    case FaultKind::silence:
+    case FaultKind::unplug:
+    case FaultKind::replay:
+    case FaultKind::hang_up:
+    case FaultKind::freeze:
+      return true;
+    case FaultKind::stick:
+    case FaultKind::jump:
+    case FaultKind::wander:
+    case FaultKind::park:
+    case FaultKind::chatter:
+    case FaultKind::unhome:
+    case FaultKind::noise:
+    case FaultKind::host_late:
+      break;
+  }
+  return false;
+}
+
 double end_of(const FaultScript& script) {
   double end_s = 0;
   for (const DeviceFault& fault : script.faults) {
@@ -111,19 +151,21 @@ FaultScript shifted(FaultScript script) {
 }
 
 /// One line if the run shows nothing: no contact, or a fault that never was.
-std::string inconclusive_line(const FaultScript& script, Personality personality,
-                              const FaultOutcome& outcome, std::uint64_t met) {
+std::string inconclusive_line(const FaultScript& script, const FaultCase& subject,
+                              const FaultOutcome& outcome, std::uint64_t met, bool one_is_enough) {
   if (!outcome.pushed) return "the motors never pushed at the tip";
-  const auto due = std::ranges::count_if(
-      script.faults, [&](const DeviceFault& fault) { return concerns(fault.kind, personality); });
-  if (script.is_random ? met > 0 || due == 0 : met >= static_cast<std::uint64_t>(due)) return {};
+  const auto due = std::ranges::count_if(script.faults, [&](const DeviceFault& fault) {
+    return concerns(fault.kind, subject.scene.device.personality, subject.by_service);
+  });
+  if (one_is_enough ? met > 0 || due == 0 : met >= static_cast<std::uint64_t>(due)) return {};
   return std::to_string(met) + " of " + std::to_string(due) + " faults changed anything";
 }
 
 }  // namespace
 
-bool concerns(FaultKind kind, Personality personality) noexcept {
-  const bool is_numbered = personality == Personality::omni || is_cartesian(personality);
+bool concerns(FaultKind kind, Personality personality, bool by_service) noexcept {
+  const bool is_numbered =
+      personality == Personality::omni || (is_cartesian(personality) && !by_service);
   if (kind == FaultKind::unhome) {
     return personality == Personality::falcon || is_cartesian(personality);
   }
@@ -138,10 +180,16 @@ FaultOutcome run_faults(const FaultCase& subject, const FaultScript& as_written)
   LoadedScene scene = subject.scene;  // the servo takes its volumes
   Emulator emulator(model_of(subject, script.seed), subject.hand);
   FaultyDevice device(emulator, script);
-  DirectPort wire(device);
+  PacketDevice* served = &device;
+#ifdef KERF_LAB_HAS_SERVICE
+  std::optional<ServiceLink> link;
+  if (subject.by_service) served = &link.emplace(device);
+#endif
+  DirectPort wire(*served);
 
   FaultOutcome outcome;
-  const bool trusted = std::ranges::none_of(script.faults, misleads);
+  const bool turns_fail = subject.by_service && std::ranges::any_of(script.faults, is_of_turns);
+  const bool trusted = !turns_fail && std::ranges::none_of(script.faults, misleads);
   SafetyMonitor contract(subject.scene, trusted, outcome);
   double time_ms = 0;
   WatchedPort port(wire, contract, time_ms);
@@ -155,7 +203,8 @@ FaultOutcome run_faults(const FaultCase& subject, const FaultScript& as_written)
   const auto cycles_per_look =
       static_cast<std::uint32_t>(cycles_of(std::chrono::duration<double>(kWatchdogPeriod).count()));
   double first_push_ms = -1;
-  const std::int64_t cycles = cycles_of(script.seconds);
+  // A service does not show a servo that is ready: the emulated hand begins 2 s later.
+  const std::int64_t cycles = cycles_of(script.seconds + (subject.by_service ? 2 : 0));
   for (std::int64_t cycle = 1; cycle <= cycles; ++cycle) {
     const bool due = loop.cycle();
     time_ms = static_cast<double>(cycle) * 1000 / kCyclesPerSecond;
@@ -174,8 +223,10 @@ FaultOutcome run_faults(const FaultCase& subject, const FaultScript& as_written)
     ++signals.heartbeat;
   }
   constexpr double kGraceMs = 50;
-  contract.end(time_ms, script.latches, first_push_ms + end_of(script) * 1000 + kGraceMs);
-  outcome.inconclusive = inconclusive_line(script, scene.device.personality, outcome, device.met());
+  outcome.demanded = turns_fail ? std::string() : script.latches;
+  contract.end(time_ms, outcome.demanded, first_push_ms + end_of(script) * 1000 + kGraceMs);
+  outcome.inconclusive =
+      inconclusive_line(script, subject, outcome, device.met(), script.is_random || turns_fail);
   return outcome;
 }
 

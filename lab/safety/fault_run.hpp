@@ -16,7 +16,15 @@ namespace kerf::faults {
 struct FaultCase {
   const LoadedScene& scene;  ///< its device is the one that is emulated
   const HandScript& hand;
+  bool by_service = false;  ///< an Inverse3 behind its emulated service: see ServiceLink
 };
+
+/// Whether this program was built with the Inverse3's service.
+#ifdef KERF_LAB_HAS_SERVICE
+inline constexpr bool kHasService = true;
+#else
+inline constexpr bool kHasService = false;
+#endif
 
 /// The findings of a run on the safety contract (docs/safety.md), by the wire, the emulated device
 /// and its clock.
@@ -31,14 +39,17 @@ struct FaultOutcome {
   double rms_n = 0;              ///< of the command, over 10 s
   double longest_alone_ms = 0;   ///< motors on without a newer packet
   double slowest_off_ms = 0;     ///< from the packet that switched the motors off to no torque
+  std::string demanded;          ///< of the words of FaultScript::latches; empty: none
   std::string latched = "none";  ///< the first fault that the reports amounted to
   double latch_ms = 0;           ///< from the newest fault of the script before that to it
   bool pushed = false;           ///< there was a force to go wrong
   bool pushed_again = false;     ///< and again after the last fault
 };
 
-/// Returns true if a device has the part that this kind of fault breaks.
-[[nodiscard]] bool concerns(FaultKind kind, Personality personality) noexcept;
+/// Returns true if a device has the part that this kind of fault breaks. `by_service`: as in
+/// FaultCase; such messages have no numbers.
+[[nodiscard]] bool concerns(FaultKind kind, Personality personality,
+                            bool by_service = false) noexcept;
 
 /// Plays `script` on `subject`, each seed at another moment of the hand's motion. The same
 /// arguments give the same outcome.

@@ -44,6 +44,9 @@ struct Library {
   [[nodiscard]] bool lockstep() const noexcept {
     return session.settings && session.settings->lockstep;
   }
+  [[nodiscard]] int priority() const noexcept {
+    return session.settings ? session.settings->priority : 0;
+  }
   void refuse(Enum code) noexcept { errors.push(code); }
 };
 
@@ -273,7 +276,7 @@ KERF_STAND_IN_EXPORT void hdStartScheduler() {
     if (lib.device) lib.device->run(true, lib.rate_hz);
   }
   try {
-    lib.scheduler.start(lib.lockstep(), lib.rate_hz);
+    lib.scheduler.start(lib.lockstep(), lib.rate_hz, lib.priority());
   } catch (const std::exception&) {  // the system has no thread left
     const std::lock_guard lock(lib.mutex);
     if (lib.device) lib.device->run(false, lib.rate_hz);

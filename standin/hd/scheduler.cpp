@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "shared/posix/monotonic_clock.hpp"
+#include "shared/posix/threads.hpp"
 
 namespace kerf::hd {
 
@@ -13,12 +14,15 @@ bool Scheduler::is_servo_thread() const noexcept {
   return servo_.load(std::memory_order_relaxed) == std::this_thread::get_id();
 }
 
-void Scheduler::start(bool lockstep, int rate_hz) {
+void Scheduler::start(bool lockstep, int rate_hz, int priority) {
   if (runs() || is_servo_thread()) return;
   if (thread_.joinable()) thread_.join();  // stopped by a callback of its own
   ends_ = false;
   runs_ = true;
-  thread_ = std::thread([this, lockstep, rate_hz] { serve(lockstep, rate_hz); });
+  thread_ = std::thread([this, lockstep, rate_hz, priority] {
+    if (!lockstep && priority > 0) static_cast<void>(set_fifo(priority));  // late ticks are counted
+    serve(lockstep, rate_hz);
+  });
 }
 
 void Scheduler::stop() {

@@ -32,7 +32,8 @@ class Scheduler {
   Scheduler(Tick tick, standin::Ledger& ledger, int stall_ms)
       : tick_(std::move(tick)), ledger_(ledger), stall_us_(std::int64_t{stall_ms} * 1000) {}
 
-  void start(bool lockstep, int rate_hz);
+  /// `priority`: as in Settings.
+  void start(bool lockstep, int rate_hz, int priority);
   void stop();
   [[nodiscard]] bool runs() const noexcept { return runs_.load(std::memory_order_relaxed); }
   [[nodiscard]] bool is_servo_thread() const noexcept;

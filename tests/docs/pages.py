@@ -5,7 +5,7 @@ import re
 
 # What a command of the pages begins with. A block of indented lines in which a line begins so is a shell's.
 HEADS = re.compile(r"(\./kerf|\.ci/\S+|hil/\S+\.sh|build/\S+|cat|cmake|cp|ctest|echo|export|grep|openssl|parallel|pip|podman|"
-                   r"python3|scp|sudo|venv/bin/\S+|wait|kerf-\S+ --socket)( |$)|([A-Z_]+=\S+ +)+build/")
+                   r"python3|scp|sudo|tests/\S+\.sh|venv/bin/\S+|wait|kerf-\S+ --socket)( |$)|([A-Z_]+=\S+ +)+build/")
 
 
 def all_pages(root):

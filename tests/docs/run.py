@@ -35,6 +35,7 @@ NOT_HERE = {
         "./kerf controller --scene scenes/phantom.toml --port socket", "./kerf controller --name tooth",
         "./kerf bridge serve", "./kerf bridge join"],
     "runs in the test own_law": ["own-law.md: "],
+    "fetches and builds programs of others": ["tests/standin/others/run.sh"],
     "runs in the tests packages and reader": ["./kerf package", "packages.md: cmake",
                                                 "packages.md: python3 -m venv", "venv/bin/pip install"],
     "needs a CT that does not come with kerf; the test examples_scenes brings it": [

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "lab/safety/fault_run.hpp"
 
+#include <utility>
+#include <vector>
+
 #include <doctest/doctest.h>
 
 #include "hil/device/falcon.hpp"
@@ -41,6 +44,18 @@ kerf::faults::FaultOutcome run_in_air() {
                                   {.faults = {}, .latches = "none"});
 }
 
+/// An Inverse3 behind its emulated service, whose hand comes down on a half-space and presses on.
+kerf::faults::FaultOutcome pressing_inverse3(std::vector<DeviceFault> faults, const char* latches) {
+  kerf::LoadedScene scene = kerf::test::half_space_scene();
+  scene.device.personality = Personality::inverse3;
+  scene.device.torque_scale = {1, 1, 1};
+  kerf::HandScript hand;
+  hand.start = {0, 4, 0};
+  hand.steps = {kerf::hand_move({0, -1, 0}, 0.4), kerf::hand_move({0, -1, 0}, 10)};
+  return kerf::faults::run_faults({.scene = scene, .hand = hand, .by_service = true},
+                                  {.faults = std::move(faults), .latches = latches});
+}
+
 }  // namespace
 
 TEST_CASE(
@@ -77,4 +92,29 @@ TEST_CASE("a run without contact, or whose fault never was, shows nothing and sa
   CHECK(never.inconclusive == "0 of 1 faults changed anything");
   const auto nothing_to_break = pressing_falcon({.kind = FaultKind::noise, .at_s = 0, .for_s = 1});
   CHECK(nothing_to_break.inconclusive.empty());  // a Falcon has no pots: the matrix leaves it out
+}
+
+TEST_CASE("a service passes a jump on as it is, and takes a lost reply for a lost connection" *
+          doctest::skip(!kerf::faults::kHasService)) {
+  const auto well = pressing_inverse3({}, "none");
+  CHECK(well.violation_count == 0);
+  CHECK(well.peak_n > 0.1);
+  CHECK(well.device_peak_n < well.peak_n + 0.02);  // steps of 14 mN
+
+  const auto jump = pressing_inverse3(
+      {{.kind = FaultKind::jump, .at_s = 0.2, .for_s = 0.1, .axis = 1, .counts = 2000}},
+      "overspeed");
+  CHECK(jump.violation_count == 0);
+  CHECK(jump.pushed);
+  CHECK(jump.latched == "overspeed");
+  CHECK(jump.inconclusive.empty());
+
+  // 10 ms on a plain link are a force held and let down; here the reply never comes.
+  const auto lost =
+      pressing_inverse3({{.kind = FaultKind::lose, .at_s = 0.2, .for_s = 0.01}}, "none");
+  CHECK(lost.violation_count == 0);
+  CHECK(lost.pushed);
+  CHECK(lost.latched == "stale_input");
+  CHECK(lost.demanded.empty());
+  CHECK_FALSE(lost.pushed_again);  // not parked again
 }

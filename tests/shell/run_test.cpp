@@ -80,6 +80,8 @@ TEST_CASE("a wait of a second is reported, each kind once until the force comes 
   wait(Waiting::parked, 60'000);
   REQUIRE(told.size() == 1);
   CHECK(told[0] == "waiting until parked: rest the stylus in the inkwell @2000");
+  wait(Waiting::hand, 2400);  // an emulated hand of a vendor's library waits for 2 s
+  CHECK(told.size() == 1);
   wait(Waiting::hand, 5000);
   CHECK(told.size() == 2);
   wait(Waiting::parked, 5000);  // again, without force in between

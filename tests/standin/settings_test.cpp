@@ -34,12 +34,13 @@ TEST_CASE("a socket alone is enough, and every unknown of a vendor has its first
 
 TEST_CASE("every key of the settings is read") {
   const auto settings = standin::parse_settings(
-      "socket:s,device=omega,lockstep,rate=4000,ledger=/l,missed=drop,stop=drop,excess=cut,"
+      "socket:s,device=omega,lockstep,rate=4000,priority=81,ledger=/l,missed=drop,stop=drop,excess=cut,"
       "before-enable=ignore,calibration=lost,handles=documented,button0=hand,status=16,ramp=0.5,"
       "stall=20");
   CHECK(settings.device == kerf::Personality::omega);
   CHECK(settings.lockstep);
   CHECK(settings.rate_hz == 4000);
+  CHECK(settings.priority == 81);
   CHECK(settings.ledger == "/l");
   CHECK(settings.drop_without_frame);
   CHECK(settings.drop_on_stop);

@@ -23,19 +23,11 @@ namespace {
 
 constexpr int kMostStrays = 64, kMostEvents = 16;  // in a turn: a flood cannot hold the force
 constexpr std::int64_t kNsPerMs = 1'000'000;
-constexpr std::int64_t kLateNs = 5 * kNsPerMs;
-constexpr std::int64_t kTakeBackNs = 20 * kNsPerMs;
-constexpr std::int64_t kDropNs = 100 * kNsPerMs;
-constexpr std::int64_t kTurnNs = 1 * kNsPerMs;   ///< longest pause between two turns
 constexpr std::int64_t kLookNs = 20 * kNsPerMs;  ///< longest delay of the end
 constexpr int kConnectMs = 1000;
 constexpr int kCloseMs = 100;
 constexpr int kLastMs = 20;
 constexpr int kLockStepPatienceMs = 2000;
-constexpr int kMostUnread = 3;
-constexpr std::int64_t kFirstBackoffNs = 500 * kNsPerMs;
-constexpr std::int64_t kLongestBackoffNs = 10'000 * kNsPerMs;
-constexpr std::uint64_t kFullStateTurns = 2000;  ///< between two requests for the configuration
 
 constexpr const char* kNeeds =
     "needs the vendor's Inverse Service 3.1 or newer: systemctl status haply-inverse-service";

@@ -53,6 +53,14 @@ struct ServiceOptions {
 /// machine's clock says.
 class ServicePort final : public PacketPort {
  public:
+  static constexpr std::int64_t kTurnNs = 1'000'000;  ///< longest pause between two turns
+  static constexpr std::int64_t kLateNs = 5'000'000, kTakeBackNs = 20'000'000;
+  static constexpr std::int64_t kDropNs = 100'000'000;
+  static constexpr int kMostUnread = 3;
+  static constexpr std::int64_t kFirstBackoffNs = 500'000'000;
+  static constexpr std::int64_t kLongestBackoffNs = 10'000'000'000;
+  static constexpr std::uint64_t kFullStateTurns = 2000;  ///< between two requests for all state
+
   /// Connects, proves the force command while the device is well, then starts the thread. Tries for
   /// `patience_ms` while no service answers or it has no device, or until `stop`. Throws
   /// std::runtime_error with one line.
