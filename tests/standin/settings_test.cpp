@@ -34,7 +34,8 @@ TEST_CASE("a socket alone is enough, and every unknown of a vendor has its first
 
 TEST_CASE("every key of the settings is read") {
   const auto settings = standin::parse_settings(
-      "socket:s,device=omega,lockstep,rate=4000,priority=81,ledger=/l,missed=drop,stop=drop,excess=cut,"
+      "socket:s,device=omega,lockstep,rate=4000,priority=81,ledger=/"
+      "l,missed=drop,stop=drop,excess=cut,"
       "before-enable=ignore,calibration=lost,handles=documented,button0=hand,status=16,ramp=0.5,"
       "stall=20");
   CHECK(settings.device == kerf::Personality::omega);

@@ -168,7 +168,8 @@ constexpr double kLeastFullDepthMm = 0.1;
 constexpr float kWide = 170.0F;
 constexpr double kOldMs = 250.0;  // later than this a picture no longer follows the hand
 // What keeps it small with any scene.
-constexpr std::size_t kMostMaterials = 4, kFewMaterials = 3, kMostLabel = 16, kMostName = 12;
+constexpr std::size_t kMostMaterials = 4, kMostBesideSecond = 2, kFewMaterials = 3, kMostLabel = 16,
+                      kMostName = 12;
 
 void force_bar(const OverlayFigures& figures) {
   const double fraction = std::clamp(figures.force_n / figures.full_force_n, 0.0, 1.0);
@@ -207,7 +208,8 @@ void curve(const char* label, const char* format, const std::vector<ForcePlot::P
 void material_rows(const OverlayFigures& figures) {
   const std::vector<ScoreRow>& score = figures.score;
   if (!score.empty() && figures.score_is_partial) panel_row("materials", "%s", "since joining");
-  const std::size_t shown = std::min(score.size(), kMostMaterials);
+  const std::size_t shown =
+      std::min(score.size(), figures.second ? kMostBesideSecond : kMostMaterials);
   for (std::size_t i = 0; i < shown; ++i) {
     const ScoreRow& material = score[i];
     ImGui::TableNextRow();
@@ -230,12 +232,11 @@ void material_rows(const OverlayFigures& figures) {
   panel_row((std::to_string(score.size() - shown) + " others").c_str(), "%.2f mm3", others_mm3);
 }
 
-/// The second arm: force, tool and state, below each other.
+/// The second arm: its force, and below it tool and state.
 void second_arm_rows(const SecondArmFigures& second) {
   panel_row("second arm", "%.2f N", second.force_n);
-  if (!second.tool.empty()) panel_row("", "%s", shortened(second.tool, kMostName).c_str());
-  panel_row("", "%s", shortened(second.state, kMostLabel).c_str(),
-            second.alarm ? kAlert : kValueColour);
+  panel_row(shortened(second.tool, kMostName).c_str(), "%s",
+            shortened(second.state, kMostName).c_str(), second.alarm ? kAlert : kValueColour);
 }
 
 }  // namespace
