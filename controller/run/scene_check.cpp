@@ -105,6 +105,7 @@ std::vector<ArrayBytes> segment_arrays(const SegmentPlan& plan, const LoadedScen
       {header.off_scene, "scene"},
       {header.off_state, "ring of ticks"},
       {header.off_dirty, header.dirty_slots > 1 ? "ring of changes" : "ring of changes (unused)"}};
+  if (header.off_state_2 != 0) parts.emplace_back(header.off_state_2, "ring of the second arm");
   for (std::size_t v = 0; v < plan.volumes.size(); ++v) {
     const VolumeDescriptor& volume = plan.volumes[v];
     const std::string& name = scene.volumes[v].name;

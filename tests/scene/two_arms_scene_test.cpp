@@ -108,8 +108,8 @@ TEST_CASE("what two arms cannot be is one line with its place") {
         "in the first [[device]] alone");
   CHECK(begins(error_of(kTwo + "fit = true\n"),
                "scenes/x.toml:18: device.fit = true is the scene's"));
-  CHECK(begins(error_of(kTwo + "persona = 1\n"),
-               "scenes/x.toml:18:1: device.persona is not a known key; did you mean"));
+  CHECK(begins(error_of(kTwo + "personalty = 1\n"),
+               "scenes/x.toml:18:1: device.personalty is not a known key; did you mean"));
   CHECK(begins(error_of(kTwo + "dock_rad = [0, 0, 0]\n"), "scenes/x.toml:18: device.dock_rad"));
   CHECK(begins(error_of(kTwo + "first_tool = \"bigg\"\n"),
                "scenes/x.toml:18: device.first_tool = \"bigg\" is unknown"));
@@ -164,10 +164,10 @@ TEST_CASE("options name both devices: one scale for both, or six numbers") {
 
 TEST_CASE("the JSON of a scene has the second arm, and that of one arm has nothing new") {
   const Json two = Json::parse(canonical_json(load(kTwo)));
-  CHECK(two.at("device").at("personality") == "omni");
-  CHECK(two.at("second_device").at("personality") == "omega");
-  CHECK(two.at("second_device").at("workspace_scale") == 2.0);
-  CHECK(two.at("second_limits").at("force_n") == 12.0);
-  CHECK(two.at("second_tool") == 1);
+  CHECK(two.at("device").at("personality").get<std::string>() == "omni");
+  CHECK(two.at("second_device").at("personality").get<std::string>() == "omega");
+  CHECK(two.at("second_device").at("workspace_scale").get<double>() == 2);
+  CHECK(two.at("second_limits").at("force_n").get<double>() == 12);
+  CHECK(two.at("second_tool").get<int>() == 1);
   CHECK_FALSE(has(canonical_json(load(kTools)), "second"));
 }
