@@ -127,7 +127,7 @@ broken() {
     grep -vE "^shared/(posix|segment|arm)/.*<$posix>" |
     grep -vE '^shared/posix/report_tool.cpp:.*<(spawn|sys/wait)\.h>' |
     grep -vE '^shared/posix/gzip_writer.cpp:.*<zlib\.h>' |
-    grep -vE '^controller/kernel/.*<(immintrin|arm_neon)\.h>'
+    grep -vE '^controller/kernel/.*<(immintrin|arm_neon|wasm_simd128)\.h>'
 
   # Each big library has one home; hidapi a second one, for what is no haptic device.
   includes '<libusb' "${programs[@]}" | grep -v '^controller/device/port/'
