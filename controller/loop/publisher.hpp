@@ -8,6 +8,7 @@
 #include "controller/load/loaded_scene.hpp"
 #include "controller/servo/servo.hpp"
 #include "shared/numeric/fnv1a.hpp"
+#include "shared/segment/command.hpp"
 #include "shared/segment/layout.hpp"
 #include "shared/segment/segment.hpp"
 #include "shared/segment/writer.hpp"
@@ -24,6 +25,9 @@ struct TickTiming {
   std::uint64_t lost_packets = 0;
   std::uint64_t refused_packets = 0;
 };
+
+/// A reader's command, valid or not, as the servo gets it; `none` for a kind that it lacks.
+[[nodiscard]] ServoCommand servo_command(const Command& command) noexcept;
 
 /// What the servo was given in a tick besides the report: with it and the reports a run can be
 /// repeated (replay/replay.hpp).
