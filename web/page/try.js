@@ -9,7 +9,7 @@ import {TabSocket} from './tab_socket.js';
 
 const element = id => document.getElementById(id);
 const wanted = new URLSearchParams(location.hash.slice(1));
-const state = {inputs: null, page: null, steering: null, worker: null, loads: false};
+const state = {inputs: null, page: null, steering: null, worker: null, shown: null};
 
 function refuse(text) {
   const line = element('missing');
@@ -28,7 +28,7 @@ function lack() {
 
 // -- Controls
 
-const slider = (id, label, low, high, step, value) => `<label>${label}
+const slider = (id, label, low, high, step, value) => `<label class="slider">${label}
   <input id="${id}" type="range" min="${low}" max="${high}" step="${step}" value="${value}"><output>${value}</output></label>`;
 const kControls = `<legend>This run, in your browser</legend>
   <label>scene <select id="scene"></select></label>
@@ -47,7 +47,7 @@ function addControls() {
   const fields = document.createElement('fieldset');
   fields.id = 'run';
   fields.innerHTML = kControls;
-  element('look').before(fields);
+  element('teaching').before(fields);
   element('scene').replaceChildren(...scenes.map(({name, title}) => new Option(title, name)));
   for (const id of ['scene', 'hand', 'stabiliser', 'rate']) element(id).addEventListener('change', start);
   for (const id of ['stiffness', 'damping']) {
@@ -81,8 +81,23 @@ async function textOf(path) {
   return answer.text();
 }
 
+/** The sliders show what the run has, until they are moved. */
+function showOwnValues({force, servo}) {
+  for (const [id, own] of [['stiffness', force.stiffness_n_per_mm], ['damping', force.damping_ns_per_mm]]) {
+    const input = element(id);
+    input.disabled = own === undefined;  // of another law, or of the paper's force
+    if (own === undefined || touched.has(id)) continue;
+    input.value = own;
+    input.nextElementSibling.textContent = own;
+  }
+  if (!touched.has('rate')) element('rate').value = servo.rate_hz;
+}
+
 async function start(event) {
-  if (event?.type === 'change') touched.add(event.target.id);
+  if (event?.type === 'change') {
+    if (event.target.id === 'scene') touched.clear();  // they were of the other scene
+    else if (event.target.id !== 'hand') touched.add(event.target.id);
+  }
   const {name, hand} = scenes.find(one => one.name === element('scene').value);
   const mine = element('hand').value === 'mine';
   element('finger-row').style.display = mine && matchMedia('(any-pointer: coarse)').matches ? '' : 'none';
@@ -136,13 +151,19 @@ const says = {
   down: ({down}) => TabSocket.take(down),
   facts: ({facts}) => {
     showFacts(facts);
+    const held = state.page.heldNow();
+    if (held !== state.shown && document.body.dataset.state === 'live') {
+      showOwnValues(held.sceneJson);
+      state.shown = held;
+    }
     document.body.dataset.timesRealTime = facts.times_real_time.toFixed(2);
     document.body.dataset.handLed = facts.hand_led;
   },
   done: ({done}) => {
-    showFacts({...done, times_real_time: Number(document.body.dataset.timesRealTime), us_a_tick: 0});
-    element('run-state').textContent = 'the run has ended';
-    Object.assign(document.body.dataset, {run: 'done', outputHash: done.output_hash, volumeHash: done.volume_hash});
+    showFacts(done);
+    element('run-state').textContent = 'the run has ended; its time is that of the steps alone';
+    Object.assign(document.body.dataset, {run: 'done', outputHash: done.output_hash, volumeHash: done.volume_hash,
+      timesRealTime: done.times_real_time.toFixed(2)});
   },
   failed: ({failed: text}) => state.page ? failed(text) : refuse(text),
 };

@@ -13,7 +13,7 @@ const kBehindMs = 100;  // of the servo's time: more is not made up for
 const kFactsMs = 200;
 
 let compiled = null, kerf = null;
-let run = null;  // {pace, mostArmed, dueTicks, lookedMs, factsMs, factsTicks, busyMs, steps, paused, ended}
+let run = null;  // {pace, mostArmed, dueTicks, lookedMs, factsMs, factsTicks, busyMs, allMs, steps, paused, ended}
 const now = () => performance.now();
 
 function post(messages) {
@@ -36,7 +36,7 @@ function open({open: inputs, pace = 1, mostArmed = 0}) {
   kerf = new KerfModule(compiled);
   kerf.open(inputs);
   const at = now();
-  run = {pace, mostArmed, dueTicks: 0, lookedMs: at, factsMs: at, factsTicks: 0, busyMs: 0, steps: 0, paused: false,
+  run = {pace, mostArmed, dueTicks: 0, lookedMs: at, factsMs: at, factsTicks: 0, busyMs: 0, allMs: 0, steps: 0, paused: false,
     ended: false};
   postMessage({opened: at - began});
   post(kerf.news());
@@ -64,6 +64,7 @@ function advance(began) {
     run.ended = made < asked;
   }
   run.busyMs += now() - began;
+  run.allMs += now() - began;
 }
 
 /** News go out without a step too: they are the sign of life that the page waits for. */
@@ -74,7 +75,10 @@ function slot() {
   post(kerf.news(run.ended));
   const ends = run.ended && !before;
   if (ends || (!run.ended && now() - run.factsMs >= kFactsMs)) tellFacts(now());
-  if (ends) postMessage({done: {...kerf.facts(), volume_hash: kerf.volumeHash()}});
+  if (!ends) return;
+  const facts = kerf.facts();
+  postMessage({done: {...facts, volume_hash: kerf.volumeHash(), times_real_time: 1000 * facts.ticks / facts.rate_hz / run.allMs,
+    us_a_tick: 1000 * run.allMs / facts.ticks}});
 }
 
 function turn() {
