@@ -73,7 +73,9 @@ KERF_EXPORT(armed_ticks) double armed_ticks() {
   return static_cast<double>(run->armed_ticks());
 }
 
-KERF_EXPORT(join_viewer) void join_viewer() { run->join(); }
+KERF_EXPORT(join_viewer) void join_viewer() {
+  run->join();
+}
 KERF_EXPORT(slot) void slot(int ended) {
   run->slot(ended != 0);
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The part of std::filesystem behind its header that libc++ of WebAssembly lacks (headers/filesystem): names are taken
-// apart as POSIX has them, and no file is there.
+// The part of std::filesystem behind its header that libc++ of WebAssembly lacks
+// (headers/filesystem): names are taken apart as POSIX has them, and no file is there.
 #include <filesystem>
 #include <system_error>
 
