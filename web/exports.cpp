@@ -5,6 +5,7 @@
 //
 // If one of them fails, an exception ends the instance (absent/exceptions.cpp): the worker then
 // makes a new one.
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>

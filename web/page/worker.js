@@ -26,7 +26,10 @@ function attempt(what) {
     what();
   } catch (problem) {
     kerf = run = null;
-    postMessage({failed: problem.message});
+    // A trap of the module has no words of its own; the memory of a tab is what runs out.
+    const trapped = problem instanceof WebAssembly.RuntimeError;
+    postMessage({failed: trapped ? `memory: none is left for this run, or the module has a fault (${problem.message}); ` +
+      'close other tabs, or take another scene' : problem.message});
   }
 }
 
