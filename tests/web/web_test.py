@@ -111,10 +111,21 @@ def says_what_is_wrong(page, address):
     check(page.until("document.body?.dataset.run === 'failed'", 60), 'a value out of range ends the run')
     said = page.evaluate("document.getElementById('run-state').textContent")
     check('stiffness_n_per_mm' in said and '100' in said, f'the page says why: {said}')
-    page.call('Page.addScriptToEvaluateOnNewDocument', source='delete globalThis.Worker')
-    page.go('about:blank')
-    page.go(f'{address}/#')
-    check(page.until("document.getElementById('missing')?.hidden === false", 20), 'a browser without workers is told')
+    # What a browser lacks, one thing more each time: the first of these that it misses is told.
+    missing = "document.getElementById('missing')"
+    for name, without, word in (
+            ('WebGL 2', "HTMLCanvasElement.prototype.getContext = (f => function (kind, ...more) {"
+                        " return kind === 'webgl2' ? null : f.call(this, kind, ...more); })(HTMLCanvasElement.prototype.getContext)", 'WebGL 2'),
+            ('workers', 'delete globalThis.Worker', 'workers'),
+            ('WebAssembly', 'delete globalThis.WebAssembly', 'WebAssembly')):
+        page.call('Page.addScriptToEvaluateOnNewDocument', source=without)
+        page.go('about:blank')
+        page.go(f'{address}/#scene=touch')
+        told = page.until(f"{missing}?.hidden === false", 30) and page.evaluate(f'{missing}.textContent')
+        check(told and word in told, f'a browser without {name}: {told}')
+        if name == 'WebGL 2':
+            check(page.until("document.body.dataset.run === 'runs' && document.getElementById('force').textContent !== '–'", 60),
+                  'the run goes on without a picture')
 
 
 def main():
