@@ -7,7 +7,7 @@
 #     .ci/check-headers.sh [ROOT]      another tree, for the check of this check
 set -euo pipefail
 cd "${1:-$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/..}"
-mapfile -t headers < <(find shared controller record hil standin lab visualizer bridge tests -name '*.hpp' | sort)
+mapfile -t headers < <(find shared controller record hil standin lab visualizer bridge web tests -name '*.hpp' | sort)
 
 # As in CMakeLists.txt; of each, the names by which a header shows that it needs it.
 needs='

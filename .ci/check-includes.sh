@@ -7,7 +7,8 @@ cd "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/.."
 
 # The rooms, from the lowest floor up: a room includes only what stands above it in this list, so no
 # two folders can include each other. The programs meet only in shared; but lab, which measures, also
-# includes controller, record and hil, and replay, which repeats a run, controller and record. A folder that is missing here is refused.
+# includes controller, record and hil, replay, which repeats a run, controller and record, and web, which is a whole demo in one
+# module, controller, hil and bridge. A folder that is missing here is refused.
 rooms='
 shared/numeric shared/volume shared/wire shared/text shared/posix shared/segment shared/arm
 
@@ -34,8 +35,10 @@ visualizer/scene visualizer/sound visualizer/gl visualizer/cast visualizer/cast/
 visualizer/redraw visualizer/render visualizer/compose visualizer/panels visualizer/picture visualizer/app visualizer/bench visualizer/monkey
 
 bridge/wire bridge/stream bridge/foxglove bridge/igtl bridge/page bridge/net bridge/join bridge/serve bridge
+
+web/absent web
 '
-programs=(shared controller record replay arm hil standin lab visualizer bridge)
+programs=(shared controller record replay arm hil standin lab visualizer bridge web)
 hash='^[[:space:]]*#[[:space:]]*include[[:space:]]*'
 
 # includes PATTERN PATH...: the lines below PATH... that include what matches PATTERN.
@@ -71,7 +74,7 @@ full_folders() {
 libm_calls() {
   grep -nE --include='*.[ch]pp' -r '\bstd::(sin|cos|tan|asin|acos|atan|atan2|sinh|cosh|tanh|exp|exp2|expm1|log|log2|log10|log1p|pow|cbrt|hypot|fma)\(' \
     shared/numeric shared/volume controller/kernel controller/law controller/servo controller/volume controller/tool \
-    controller/load controller/plan controller/scene | sed 's|$|   <- take it from shared/numeric/elementary.hpp|' || true
+    controller/load controller/plan controller/scene hil/device | sed 's|$|   <- take it from shared/numeric/elementary.hpp|' || true
 }
 
 # Each include of another room, against the list. What stands in quotes is of ours.
@@ -92,7 +95,8 @@ between_rooms() {
       p = program_of(from); q = program_of(to)
       if (!(to in floor)) why = "includes from no room"
       else if (p != q && q != "shared" && !(p == "lab" && q != "visualizer") &&
-          !(p == "replay" && (q == "controller" || q == "record"))) why = "the programs meet only in shared"
+          !(p == "replay" && (q == "controller" || q == "record")) &&
+          !(p == "web" && (q == "controller" || q == "hil" || q == "bridge"))) why = "the programs meet only in shared"
       else if (floor[to] + 0 > floor[from] + 0) why = "includes from a floor above"
       else next
       print $0 "   <- " why
@@ -127,7 +131,7 @@ broken() {
     grep -vE "^shared/(posix|segment|arm)/.*<$posix>" |
     grep -vE '^shared/posix/report_tool.cpp:.*<(spawn|sys/wait)\.h>' |
     grep -vE '^shared/posix/gzip_writer.cpp:.*<zlib\.h>' |
-    grep -vE '^controller/kernel/.*<(immintrin|arm_neon)\.h>'
+    grep -vE '^controller/kernel/.*<(immintrin|arm_neon|wasm_simd128)\.h>'
 
   # Each big library has one home; hidapi a second one, for what is no haptic device.
   includes '<libusb' "${programs[@]}" | grep -v '^controller/device/port/'

@@ -2,6 +2,11 @@
 #include "controller/kernel/kernel_set.hpp"
 
 namespace kerf {
+
+#ifdef KERF_WASM_KERNELS
+extern const KernelSet kSimd128Set;
+#endif
+
 namespace {
 
 // The fastest first; the sets of a machine are a tail of this list.
@@ -10,6 +15,8 @@ constexpr const KernelSet* kSets[] = {
     &kAvx512Set, &kAvx2Set,
 #elif defined(KERF_NEON_KERNELS)
     &kNeonSet,
+#elif defined(KERF_WASM_KERNELS)
+    &kSimd128Set,
 #endif
     &kScalarSet, nullptr};
 
@@ -22,7 +29,7 @@ std::size_t sets_beyond_this_machine() noexcept {
       __builtin_cpu_supports("avx512vnni") != 0;
   return has_avx512 ? 0 : 1;
 #else
-  return 0;  // NEON is part of every aarch64
+  return 0;  // NEON is part of every aarch64; a module with SIMD128 starts only where that is there
 #endif
 }
 

@@ -169,6 +169,24 @@ DeviceReport report_of(const TickRecord& record) noexcept {
 
 static_assert(static_cast<std::uint32_t>(ServoCommand::Kind::mark) == kCommandMark);
 
+ServoCommand servo_command(const Command& command) noexcept {
+  switch (command.kind) {
+    case CommandKind::select_tool:
+      return {ServoCommand::Kind::select_tool, command.argument, command.arm};
+    case CommandKind::hold:
+      return {ServoCommand::Kind::hold, command.argument};
+    case CommandKind::reset:
+      return {ServoCommand::Kind::reset, 0};
+    case CommandKind::undo:
+      return {ServoCommand::Kind::undo, 0};
+    case CommandKind::redo:
+      return {ServoCommand::Kind::redo, 0};
+    case CommandKind::mark:
+      return {ServoCommand::Kind::mark, 0};
+  }
+  return {};
+}
+
 TickCommands commands_of(const TickRecord& record) noexcept {
   return {{static_cast<ServoCommand::Kind>(record.command & kCommandKind), record.command_argument},
           (record.command & kCommandFadeIn) != 0,

@@ -10,6 +10,7 @@
 #include "controller/load/loaded_scene.hpp"
 #include "controller/servo/servo.hpp"
 #include "shared/numeric/fnv1a.hpp"
+#include "shared/segment/command.hpp"
 #include "shared/segment/layout.hpp"
 #include "shared/segment/segment.hpp"
 #include "shared/segment/writer.hpp"
@@ -26,6 +27,9 @@ struct TickTiming {
   std::array<std::uint64_t, kMaxArms> lost_packets{};
   std::array<std::uint64_t, kMaxArms> refused_packets{};
 };
+
+/// A reader's command, valid or not, as the servo gets it; `none` for a kind that it lacks.
+[[nodiscard]] ServoCommand servo_command(const Command& command) noexcept;
 
 /// What the servo was given in a tick besides the report: with it and the reports a run can be
 /// repeated (replay/replay.hpp).

@@ -16,24 +16,6 @@
 namespace kerf {
 namespace {
 
-ServoCommand servo_command(const Command& command) noexcept {
-  switch (command.kind) {
-    case CommandKind::select_tool:
-      return {ServoCommand::Kind::select_tool, command.argument, command.arm};
-    case CommandKind::hold:
-      return {ServoCommand::Kind::hold, command.argument};
-    case CommandKind::reset:
-      return {ServoCommand::Kind::reset, 0};
-    case CommandKind::undo:
-      return {ServoCommand::Kind::undo, 0};
-    case CommandKind::redo:
-      return {ServoCommand::Kind::redo, 0};
-    case CommandKind::mark:
-      return {ServoCommand::Kind::mark, 0};
-  }
-  return {};
-}
-
 /// Statistics of the armed ticks of one arm.
 class ArmStatistics {
  public:

@@ -12,6 +12,7 @@
 #include <iterator>
 #include <limits>
 #include <map>
+#include <optional>
 #include <set>
 #include <span>
 #include <system_error>
@@ -22,6 +23,7 @@
 #include "shared/numeric/elementary.hpp"
 #include "shared/numeric/linear_algebra.hpp"
 #include "shared/posix/error_text.hpp"
+#include "shared/text/text.hpp"
 
 namespace kerf {
 namespace {
@@ -267,18 +269,26 @@ class StlText {
     std::string_view word = next();
     if (word.starts_with('+')) word.remove_prefix(1);
     double value = 0;
+#ifdef __cpp_lib_to_chars
     const auto [end, fault] = std::from_chars(word.data(), word.data() + word.size(), value);
     // The error does not tell too large from too small; a number that is too small becomes 0.
     if (fault == std::errc::result_out_of_range)
       value = std::strtod(std::string(word).c_str(), nullptr);
     const bool number = fault != std::errc::invalid_argument && end == word.data() + word.size();
+#else  // libc++ 16, of WebAssembly
+    const std::optional<double> read = number_in(word);
+    value = read.value_or(0);
+    const bool number = read.has_value();
+#endif
     if (!number || std::abs(value) > std::numeric_limits<float>::max()) {
       const bool comma = word.find(',') != word.npos;
       complain(word, comma ? "a number with a decimal point" : "a number");
     }
     return static_cast<float>(value);
   }
-  void skip_line() { skip(std::min(rest_.find_first_of("\r\n"), rest_.size())); }
+  void skip_line() {
+    skip(std::min(rest_.find_first_of("\r\n"), rest_.size()));
+  }
 
   [[noreturn]] void complain(std::string_view word, std::string_view wanted) const {
     constexpr std::size_t kLongest = 40;

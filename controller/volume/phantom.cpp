@@ -4,12 +4,16 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <thread>
 #include <vector>
+#include <version>
 
 #include "controller/volume/file/volume_image.hpp"
 #include "controller/volume/windowing.hpp"
+#ifdef __cpp_lib_jthread
+#include <thread>
+
 #include "shared/posix/threads.hpp"
+#endif
 
 namespace kerf {
 namespace {
@@ -60,7 +64,11 @@ class Sampler {
   void sample_on_threads(const VoxelBox& box, int cuts) {
     if (cuts == 0) return sample(box, {});
     const Halves half(box);
+#ifdef __cpp_lib_jthread
     const std::jthread other = start_worker([&] { sample_on_threads(half.low, cuts - 1); });
+#else  // libc++ 16, of WebAssembly, which has one thread
+    sample_on_threads(half.low, cuts - 1);
+#endif
     sample_on_threads(half.high, cuts - 1);
   }
 

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <cstddef>
 
+#include "shared/numeric/quick_elementary.hpp"
+
 namespace kerf {
 namespace {
 
@@ -20,8 +22,8 @@ std::array<double, 4> composed(const std::array<double, 4>& a, const std::array<
 /// points straight ahead.
 std::array<double, 4> turned(const std::array<double, 3>& yaw_pitch_roll) {
   const auto about = [](std::size_t axis, double angle) {
-    std::array<double, 4> q{0, 0, 0, std::cos(angle / 2)};
-    q[axis] = std::sin(angle / 2);
+    std::array<double, 4> q{0, 0, 0, quick::cosine(angle / 2)};
+    q[axis] = quick::sine(angle / 2);
     return q;
   };
   return composed(composed(about(1, -yaw_pitch_roll[0]), about(0, yaw_pitch_roll[1])),

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "shared/numeric/quick_elementary.hpp"
+
 namespace kerf {
 namespace {
 
@@ -20,8 +22,8 @@ struct Leg {
   double length_mm;  ///< L
 
   Leg(std::size_t index, DeviceVec<double> tip_mm) noexcept
-      : cosine(std::cos(falcon::kLegAzimuthRad[index])),
-        sine(std::sin(falcon::kLegAzimuthRad[index])),
+      : cosine(quick::cosine(falcon::kLegAzimuthRad[index])),
+        sine(quick::sine(falcon::kLegAzimuthRad[index])),
         out(cosine * tip_mm.x + sine * tip_mm.y - falcon::kHipOutMm + falcon::kPlateOutMm),
         rise(tip_mm.z + falcon::kOriginDepthMm),
         across(cosine * tip_mm.y - sine * tip_mm.x - falcon::kHipAcrossMm + falcon::kPlateAcrossMm),
@@ -36,7 +38,7 @@ struct Leg {
     const double root = std::sqrt(std::max(0.0, square_of_root()));
     // The lower one of two angles, (-f - root) / (g - e), written so that it never divides by zero:
     // the grip is in front of the hips, f < 0.
-    return 2 * std::atan2(g() + e(), root - f());
+    return 2 * quick::arctangent(g() + e(), root - f());
   }
 
   // The loop of the leg is e cos t + f sin t + g = 0.
@@ -49,8 +51,8 @@ struct Leg {
 
   /// d t / d tip: minus the loop's derivative by the tip over that by t.
   [[nodiscard]] DeviceVec<double> gradient(double joint_rad) const noexcept {
-    const double knee_out = falcon::kThighMm * std::cos(joint_rad);
-    const double knee_rise = falcon::kThighMm * std::sin(joint_rad);
+    const double knee_out = falcon::kThighMm * quick::cosine(joint_rad);
+    const double knee_rise = falcon::kThighMm * quick::sine(joint_rad);
     const double reach = out - knee_out;
     const double lift = rise - knee_rise;
     const double by_across = length_mm * across / shin_mm;

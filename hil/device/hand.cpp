@@ -6,6 +6,8 @@
 #include <numbers>
 #include <utility>
 
+#include "shared/numeric/quick_elementary.hpp"
+
 namespace kerf {
 namespace {
 
@@ -43,7 +45,7 @@ double ReachCurve::least_seconds(double hand_rad_per_s) const noexcept {
     jerk = std::max(jerk, kRate * kRate * kRate * norm(d - c * 3.0 + b * 3.0 - a));
   }
   return std::max({speed / kMaxMmPerS, std::sqrt(acceleration / kMaxMmPerS2),
-                   std::cbrt(jerk / kSwingMm) / hand_rad_per_s});
+                   quick::cube_root(jerk / kSwingMm) / hand_rad_per_s});
 }
 
 ReachCurve reach_curve(const HandRoute& route, DeviceVec<double> from_mm,
@@ -121,13 +123,13 @@ DeviceVec<double> HandMotion::position(const Leg& leg, double progress) const no
           step.size[0] *
           minimum_jerk(std::min({1.0, kQuarters * progress, kQuarters * (1 - progress)}));
       return from_mm_ + sunk +
-             DeviceVec<double>{radius * std::cos(turn * step.turns), 0,
-                               radius * std::sin(turn * step.turns)};
+             DeviceVec<double>{radius * quick::cosine(turn * step.turns), 0,
+                               radius * quick::sine(turn * step.turns)};
     }
     case HandStep::Kind::zigzag:
       return from_mm_ + sunk +
-             DeviceVec<double>{0.5 * step.size[0] * std::sin(turn * step.turns), 0,
-                               0.5 * step.size[1] * std::sin(turn)};
+             DeviceVec<double>{0.5 * step.size[0] * quick::sine(turn * step.turns), 0,
+                               0.5 * step.size[1] * quick::sine(turn)};
   }
   return from_mm_;
 }

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "shared/numeric/quick_elementary.hpp"
+
 namespace kerf {
 namespace {
 
@@ -18,10 +20,10 @@ int wiper_count(std::size_t axis, double angle_rad) noexcept {
 }  // namespace
 
 DeviceVec<double> OmniArm::tip_mm(JointVec<double> q) const noexcept {
-  const double reach = links_.upper_mm * std::cos(q.y) + links_.forearm_mm * std::sin(q.z);
-  const double rise = links_.upper_mm * std::sin(q.y) - links_.forearm_mm * std::cos(q.z);
-  return {-std::sin(q.x) * reach, rise + links_.origin_height_mm,
-          std::cos(q.x) * reach - links_.origin_depth_mm};
+  const double reach = links_.upper_mm * quick::cosine(q.y) + links_.forearm_mm * quick::sine(q.z);
+  const double rise = links_.upper_mm * quick::sine(q.y) - links_.forearm_mm * quick::cosine(q.z);
+  return {-quick::sine(q.x) * reach, rise + links_.origin_height_mm,
+          quick::cosine(q.x) * reach - links_.origin_depth_mm};
 }
 
 JointVec<double> OmniArm::joints_rad(DeviceVec<double> tip_mm) const noexcept {
@@ -32,21 +34,21 @@ JointVec<double> OmniArm::joints_rad(DeviceVec<double> tip_mm) const noexcept {
   const double b = links_.forearm_mm;
   // The bend is the angle from the forearm's direction up to the thigh's (cosine rule).
   const double cos_bend = (reach * reach + rise * rise - a * a - b * b) / (2 * a * b);
-  const double bend = std::acos(std::clamp(cos_bend, -1.0, 1.0));
-  const double thigh =
-      std::atan2(rise, reach) + std::atan2(b * std::sin(bend), a + b * std::cos(bend));
-  return {std::atan2(-tip_mm.x, forward), thigh, thigh - bend + omni::kPi / 2};
+  const double bend = quick::arccosine(std::clamp(cos_bend, -1.0, 1.0));
+  const double thigh = quick::arctangent(rise, reach) +
+                       quick::arctangent(b * quick::sine(bend), a + b * quick::cosine(bend));
+  return {quick::arctangent(-tip_mm.x, forward), thigh, thigh - bend + omni::kPi / 2};
 }
 
 OmniArm::Jacobian OmniArm::jacobian(JointVec<double> q) const noexcept {
-  const double s1 = std::sin(q.x);
-  const double c1 = std::cos(q.x);
+  const double s1 = quick::sine(q.x);
+  const double c1 = quick::cosine(q.x);
   // How reach and rise follow the thigh and the forearm.
-  const double reach = links_.upper_mm * std::cos(q.y) + links_.forearm_mm * std::sin(q.z);
-  const double reach_by_thigh = -links_.upper_mm * std::sin(q.y);
-  const double reach_by_forearm = links_.forearm_mm * std::cos(q.z);
-  const double rise_by_thigh = links_.upper_mm * std::cos(q.y);
-  const double rise_by_forearm = links_.forearm_mm * std::sin(q.z);
+  const double reach = links_.upper_mm * quick::cosine(q.y) + links_.forearm_mm * quick::sine(q.z);
+  const double reach_by_thigh = -links_.upper_mm * quick::sine(q.y);
+  const double reach_by_forearm = links_.forearm_mm * quick::cosine(q.z);
+  const double rise_by_thigh = links_.upper_mm * quick::cosine(q.y);
+  const double rise_by_forearm = links_.forearm_mm * quick::sine(q.z);
   return {{{{-c1 * reach, -s1 * reach_by_thigh, -s1 * reach_by_forearm},
             {0.0, rise_by_thigh, rise_by_forearm},
             {-s1 * reach, c1 * reach_by_thigh, c1 * reach_by_forearm}}}};

@@ -10,6 +10,7 @@
 #include "hil/device/hand_script.hpp"
 #include "hil/device/packet_device.hpp"
 #include "hil/device/plant_params.hpp"
+#include "shared/numeric/quick_elementary.hpp"
 #include "shared/numeric/vec.hpp"
 
 /// The mechanics of all emulated arms: motors with lag and delay, rotors, tip mass, the
@@ -89,7 +90,8 @@ inline MotorChain::MotorChain(const PlantParams& params) noexcept
     : on_silence_(params.on_silence),
       silence_cycles_(params.silence_cycles),
       delay_(static_cast<std::size_t>(std::clamp(params.output_delay_cycles, 0, kMaxDelayCycles))),
-      lag_decay_(params.current_lag_s > 0 ? std::exp(-kStepS / params.current_lag_s) : 0.0) {}
+      lag_decay_(params.current_lag_s > 0 ? quick::exponential(-kStepS / params.current_lag_s)
+                                          : 0.0) {}
 
 inline void MotorChain::command(JointVec<double> torque_nmm) noexcept {
   wanted_nmm_ = torque_nmm;
@@ -204,8 +206,8 @@ class TipMass {
     constexpr double kMmPerM = 1000.0;
     const double speed_per_n = kMmPerM * step_s / mass_kg;
     const double exponent = viscous_ns_per_mm * speed_per_n;
-    decay_ = std::exp(-exponent);
-    gain_ = exponent > 0 ? speed_per_n * -std::expm1(-exponent) / exponent : speed_per_n;
+    decay_ = quick::exponential(-exponent);
+    gain_ = exponent > 0 ? speed_per_n * -quick::growth(-exponent) / exponent : speed_per_n;
     coulomb_drop_ = coulomb_n * gain_;
   }
 

@@ -3,13 +3,8 @@
 
 #include <array>
 #include <atomic>
-#include <cerrno>
 #include <cstring>
 #include <utility>
-
-#include <fcntl.h>
-#include <sys/mman.h>
-#include <sys/stat.h>
 
 #include "shared/segment/seqlock.hpp"
 #include "shared/volume/checksum.hpp"
@@ -55,30 +50,6 @@ VoxelMask place_brick(const Brick& brick, const VoxelBox& box, const VoxelGrid& 
 
 }  // namespace
 
-SegmentReader SegmentReader::map(int fd) {
-  const int seals = fcntl(fd, F_GET_SEALS);
-  if (seals < 0 || (seals & F_SEAL_SHRINK) == 0) {
-    throw SegmentError(
-        "segment: descriptor " + std::to_string(fd) +
-        " is not sealed against shrinking; expected the memory of a kerf-controller");
-  }
-  struct stat status {};
-  if (fstat(fd, &status) != 0 || status.st_size < static_cast<off_t>(sizeof(SegmentHeader))) {
-    throw SegmentError("segment: size = " + std::to_string(status.st_size) +
-                       "; expected at least one page of header");
-  }
-  const auto bytes = static_cast<std::size_t>(status.st_size);
-  void* const at = mmap(nullptr, bytes, PROT_READ, MAP_SHARED, fd, 0);
-  if (at == MAP_FAILED) {
-    throw SegmentError("segment: mmap of " + std::to_string(bytes >> 20) +
-                       " MiB: " + system_message(errno) + "; free memory");
-  }
-  // Owns the mapping from here, so a refusal unmaps it.
-  SegmentReader reader({static_cast<std::byte*>(at), bytes}, {});
-  reader.info_ = parse_segment(reader.bytes_);
-  return reader;
-}
-
 SegmentReader::SegmentReader(std::span<std::byte> bytes, SegmentInfo info) noexcept
     : bytes_(bytes), info_(std::move(info)) {}
 
@@ -89,10 +60,6 @@ SegmentReader& SegmentReader::operator=(SegmentReader&& other) noexcept {
   std::swap(bytes_, other.bytes_);
   std::swap(info_, other.info_);
   return *this;
-}
-
-SegmentReader::~SegmentReader() {
-  if (!bytes_.empty()) munmap(bytes_.data(), bytes_.size());
 }
 
 std::uint64_t SegmentReader::state_head(std::size_t arm) const noexcept {
@@ -240,10 +207,6 @@ std::uint64_t SegmentReader::read_brick(std::size_t volume, std::uint32_t id,
   const SegmentVolumeInfo& info = info_.volumes[volume];
   return copy_brick(bytes_.data() + info.off_versions + std::size_t{id} * sizeof(std::uint64_t),
                     bytes_.data() + info.off_bricks + std::size_t{id} * sizeof(Brick), out);
-}
-
-void SegmentReader::forget_pages() const noexcept {
-  madvise(bytes_.data(), bytes_.size(), MADV_DONTNEED);
 }
 
 }  // namespace kerf

@@ -3,18 +3,10 @@
 #include "shared/segment/segment.hpp"
 
 #include <algorithm>
-#include <cerrno>
 #include <cmath>
 #include <limits>
 #include <string>
-#include <utility>
 
-#include <fcntl.h>
-#include <sys/mman.h>
-#include <sys/random.h>
-#include <unistd.h>
-
-#include "shared/posix/error_text.hpp"
 #include "shared/segment/layout_table.hpp"
 #include "shared/volume/voxel_grid.hpp"
 
@@ -142,62 +134,6 @@ void lay_out(SegmentPlan& plan) {
     if (out.off_labels != 0) out.off_labels = place(std::uint64_t{out.nx} * out.ny * out.nz);
   }
   header.total_bytes = end;
-}
-
-SegmentMemory SegmentMemory::create(std::uint64_t bytes) {
-  const auto fail = [bytes](const char* call) {
-    return SegmentError("segment: " + std::string(call) + " of " + std::to_string(bytes >> 20) +
-                        " MiB: " + system_message(errno) + "; " +
-                        remedy_for(errno, "crop the volume or free shared memory"));
-  };
-  SegmentMemory memory;
-  memory.fd_ = memfd_create("kerf-segment", MFD_CLOEXEC | MFD_ALLOW_SEALING);
-  if (memory.fd_ < 0) throw fail("memfd_create");
-  // Reserving now turns a lack of memory into an error here instead of a SIGBUS in the servo.
-  errno = posix_fallocate(memory.fd_, 0, static_cast<off_t>(bytes));
-  if (errno != 0) {
-    throw fail("allocation");
-  }
-  const auto size = static_cast<std::size_t>(bytes);
-  void* const at =
-      mmap(nullptr, size, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_POPULATE, memory.fd_, 0);
-  if (at == MAP_FAILED) throw fail("mmap");
-  memory.bytes_ = {static_cast<std::byte*>(at), size};
-  memory.locked_ = mlock(at, size) == 0;
-  return memory;
-}
-
-SegmentMemory::SegmentMemory(SegmentMemory&& other) noexcept
-    : fd_(std::exchange(other.fd_, -1)),
-      locked_(other.locked_),
-      bytes_(std::exchange(other.bytes_, {})) {}
-
-SegmentMemory& SegmentMemory::operator=(SegmentMemory&& other) noexcept {
-  std::swap(fd_, other.fd_);
-  std::swap(locked_, other.locked_);
-  std::swap(bytes_, other.bytes_);
-  return *this;
-}
-
-SegmentMemory::~SegmentMemory() {
-  if (!bytes_.empty()) munmap(bytes_.data(), bytes_.size());
-  if (fd_ >= 0) close(fd_);
-}
-
-void SegmentMemory::seal() {
-  if (fcntl(fd_, F_ADD_SEALS, F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_FUTURE_WRITE | F_SEAL_SEAL) !=
-      0) {
-    throw SegmentError(std::string("segment: sealing: ") + system_message(errno) +
-                       "; Linux 5.1 or newer is needed");
-  }
-}
-
-std::uint64_t random_session_id() {
-  std::uint64_t id = 0;
-  while (id == 0) {
-    if (getrandom(&id, sizeof id, 0) != static_cast<ssize_t>(sizeof id)) id = 0;
-  }
-  return id;
 }
 
 }  // namespace kerf

@@ -22,8 +22,23 @@ namespace kerf {
 /// release store or an acquire load instead, which orders the same.
 namespace shared_words {
 
+#ifdef __cpp_lib_atomic_ref
+template <class Word>
+using AtomicWord = std::atomic_ref<Word>;
 static_assert(std::atomic_ref<std::uint64_t>::is_always_lock_free);
 static_assert(std::atomic_ref<std::uint32_t>::is_always_lock_free);
+#else  // libc++ 16, of WebAssembly, where writer and reader share one thread
+template <class Word>
+class AtomicWord {
+ public:
+  explicit AtomicWord(Word& word) noexcept : word_(word) {}
+  [[nodiscard]] Word load(std::memory_order) const noexcept { return word_; }
+  void store(Word value, std::memory_order) const noexcept { word_ = value; }
+
+ private:
+  Word& word_;
+};
+#endif
 
 #ifdef KERF_TSAN
 inline constexpr std::memory_order kDataStore = std::memory_order_release;
@@ -39,8 +54,8 @@ inline void fence(std::memory_order order) noexcept {
 
 /// The word at `at`, which is aligned and lies in the segment.
 template <class Word = std::uint64_t>
-[[nodiscard]] inline std::atomic_ref<Word> word(std::byte* at) noexcept {
-  return std::atomic_ref<Word>(*reinterpret_cast<Word*>(at));
+[[nodiscard]] inline AtomicWord<Word> word(std::byte* at) noexcept {
+  return AtomicWord<Word>(*reinterpret_cast<Word*>(at));
 }
 
 /// Writer: from here until `close` the data under `version` is not consistent.

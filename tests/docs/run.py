@@ -50,7 +50,8 @@ NOT_HERE = {
         "./kerf lab zwidth --rate", "./kerf lab zwidth --map", "./kerf lab zwidth --arm",
         "./kerf lab zwidth --stabiliser", "parallel ./kerf lab zwidth", "./kerf lab merge", "./kerf sweep"],
     "runs in the test docs_site": ["./kerf docs$"],
-    "installs packages and builds": ["./kerf setup$"],
+    "installs packages and builds": ["./kerf setup$", "./kerf page"],
+    "serves until it is ended; the test web has a server of its own": ["python3 -m http.server"],
     "measures for minutes; the tests of lab run parts of it": [
         "./kerf lab accuracy --page", "./kerf lab extremes", "./kerf lab zwidth --page", "./kerf lab faults --rate all"],
     "needs network namespaces; the test bridge_net does the same": ["./kerf demo --two-machines"],

@@ -18,6 +18,9 @@ const plot = new Plot(element('plot'));
 const now = {record: null, second: null, frame: null, ended: false, newRun: 0, earlier: null, takenNs: null, lost: false,
   beatMs: 0};  // the servo's last sign of life, by performance.now()
 let stage = null, scene = null, held = null;
+// For a page around this one, as web/page/try.js.
+export {now, stage};
+export const heldNow = () => held;
 
 function missing(text) {
   element('missing').hidden = text === '';

@@ -24,7 +24,8 @@ namespace {
 double price_ns(const UnitCosts& prices, std::string_view runs_it) noexcept {
   if (runs_it == "avx512") return prices.avx512;
   if (runs_it == "avx2") return prices.avx2;
-  if (runs_it == "neon") return prices.neon;
+  // As wide as NEON. A run in a browser is in lock-step, without a budget that a price could spend.
+  if (runs_it == "neon" || runs_it == "simd128") return prices.neon;
   if (runs_it == "scalar") return prices.scalar;
   return runs_it == "double" ? prices.float64 : 0;
 }

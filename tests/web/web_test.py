@@ -1,0 +1,159 @@
+# SPDX-License-Identifier: Apache-2.0
+"""kerf in a browser's tab beside kerf itself: the module under Node, then the page in headless Chromium with real pointers.
+
+    web_test.py ROOT BIN-FOLDER PAGE-FOLDER [--pictures FOLDER]
+
+PAGE-FOLDER is what ./kerf page wrote. Exit code 77: skipped, for want of it, of Node or of a browser."""
+import functools
+import http.server
+import json
+import os
+import pathlib
+import shutil
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+
+root, programs, folder = (pathlib.Path(word).resolve() for word in sys.argv[1:4])
+pictures = pathlib.Path(sys.argv[5]) if sys.argv[4:5] == ['--pictures'] else None
+sys.path.insert(0, str(root / 'tests/page'))
+from browser import Page, find_chromium  # noqa: E402
+
+SECONDS = 2
+SCENES = {'phantom': 'cut_cavity', 'touch': 'touch'}
+failures = []
+
+
+def check(holds, what):
+    print(('ok    ' if holds else 'FAILS ') + what, flush=True)
+    if not holds:
+        failures.append(what)
+
+
+def native(scene, seconds, *more):
+    """output_hash and volume_hash of ./kerf demo --virtual."""
+    with tempfile.TemporaryDirectory() as out:
+        subprocess.run([root / 'kerf', 'demo', '--headless', '--virtual', '--seconds', str(seconds), '--scene', scene,
+                        '--out', out + '/run', *more], check=True, stdout=subprocess.DEVNULL, env=os.environ | {'KERF_BIN': str(programs)})
+        report = json.loads(pathlib.Path(out, 'run/report.json').read_text())
+    return report['output_hash'], report['volume_hash']
+
+
+def in_node(scene, hand, seconds):
+    run = subprocess.run(['node', '--experimental-default-type=module', root / 'tests/web/run_module.js', folder / 'kerf.wasm', root,
+                          f'{scene}.toml', f'hands/{hand}.toml', str(seconds)], capture_output=True, text=True, check=False)
+    if run.returncode:
+        raise RuntimeError(run.stderr)
+    return json.loads(run.stdout)
+
+
+class Quiet(http.server.SimpleHTTPRequestHandler):
+    extensions_map = {**http.server.SimpleHTTPRequestHandler.extensions_map, '.wasm': 'application/wasm', '.js': 'text/javascript'}
+
+    def log_message(self, *_):
+        pass
+
+
+def has_the_bits_of_kerf(page, address, known):
+    """The same seed and script end in the hashes of ./kerf demo --virtual."""
+    page.go(f'{address}/#scene=phantom&seconds={SECONDS}&pace=0')
+    ended = page.until("['done', 'failed'].includes(document.body?.dataset.run)", 240)
+    check(ended, 'the run in the tab ends')
+    found = tuple(page.evaluate('[document.body.dataset.outputHash, document.body.dataset.volumeHash]'))
+    print(f'      in the tab {found[0]} {found[1]}\n      kerf demo  {known[0]} {known[1]}')
+    check(found == known, 'hashes in the tab are those of ./kerf demo --virtual')
+    check(page.evaluate("document.getElementById('run-figures').textContent").count(found[0]) == 1, 'the page shows it')
+
+
+def cuts_by_a_pointer(page, address, touch):
+    page.size(*((390, 844, True) if touch else (1280, 800)))
+    page.go('about:blank')
+    page.go(f'{address}/#scene=phantom&hand=mine')
+    check(page.until("document.body?.dataset.run === 'runs' && document.body.dataset.state === 'live'", 120), 'the tab has a run')
+    x, y, width, height = page.box('#picture')
+    middle = x + width / 2, y + height / 2
+    figure = "parseFloat([...document.querySelectorAll('#run-figures dt')].find(e => e.textContent === 'removed')?.nextSibling.textContent)"
+    led = "document.body.dataset.handLed === 'true'"
+    check(page.until(led, 90), 'the hand waits to be led')
+    before = page.evaluate(figure)
+    end = time.monotonic() + 60
+    at, down = 0, False
+    while time.monotonic() < end and not page.evaluate(figure) > before + 0.05:
+        at += 1
+        place = (middle[0] + 12 * ((at % 9) - 4) / 4, middle[1] + 10 * ((at % 5) - 2) / 2)
+        if touch:
+            page.touch('touchMove' if down else 'touchStart', place)
+        elif down:
+            page.mouse('mouseMoved', *place, button='left', buttons=1)
+        else:
+            page.mouse('mousePressed', *place, button='left', buttons=1, clickCount=1)
+        down = True
+        time.sleep(0.03)
+    removed = page.evaluate(figure)
+    if touch:
+        page.touch('touchEnd')
+    else:
+        page.mouse('mouseReleased', *middle, button='left')
+    name = 'a finger' if touch else 'the mouse'
+    check(removed > before, f'{name} cuts: {removed:.3f} mm3')
+    if pictures:
+        time.sleep(2)
+        pictures.mkdir(parents=True, exist_ok=True)
+        (pictures / f'{"phone" if touch else "desktop"}.png').write_bytes(page.picture())
+
+
+def says_what_is_wrong(page, address):
+    page.size(1280, 800)
+    page.go('about:blank')
+    page.go(f'{address}/#scene=touch&set=force.stiffness_n_per_mm%3D1000')
+    check(page.until("document.body?.dataset.run === 'failed'", 60), 'a value out of range ends the run')
+    said = page.evaluate("document.getElementById('run-state').textContent")
+    check('stiffness_n_per_mm' in said and '100' in said, f'the page says why: {said}')
+    # What a browser lacks, one thing more each time: the first of these that it misses is told.
+    missing = "document.getElementById('missing')"
+    for name, without, word in (
+            ('WebGL 2', "HTMLCanvasElement.prototype.getContext = (f => function (kind, ...more) {"
+                        " return kind === 'webgl2' ? null : f.call(this, kind, ...more); })(HTMLCanvasElement.prototype.getContext)", 'WebGL 2'),
+            ('workers', 'delete globalThis.Worker', 'workers'),
+            ('WebAssembly', 'delete globalThis.WebAssembly', 'WebAssembly')):
+        page.call('Page.addScriptToEvaluateOnNewDocument', source=without)
+        page.go('about:blank')
+        page.go(f'{address}/#scene=touch')
+        told = page.until(f"{missing}?.hidden === false", 30) and page.evaluate(f'{missing}.textContent')
+        check(told and word in told, f'a browser without {name}: {told}')
+        if name == 'WebGL 2':
+            check(page.until("document.body.dataset.run === 'runs' && document.getElementById('force').textContent !== '–'", 60),
+                  'the run goes on without a picture')
+
+
+def main():
+    chromium = find_chromium()
+    for there, name in ((chromium, 'chromium'), (shutil.which('node'), 'node'), ((folder / 'kerf.wasm').exists(), f'{folder}/kerf.wasm')):
+        if not there:
+            print(f'skipped: no {name}')
+            return 77
+    known = {scene: native(scene, SECONDS) for scene in SCENES}
+    for scene, hand in SCENES.items():
+        run = in_node(scene, hand, SECONDS)
+        check((run['output_hash'], run['volume_hash']) == known[scene],
+              f'{scene} under Node: {run["output_hash"]} {run["volume_hash"]}; {run["times_real_time"]:.2f} times real time')
+    server = http.server.ThreadingHTTPServer(('127.0.0.1', 0), functools.partial(Quiet, directory=folder))
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    address = f'http://127.0.0.1:{server.server_address[1]}'
+    with tempfile.TemporaryDirectory() as profile:
+        page = Page(chromium, profile)
+        try:
+            page.size(1280, 800)
+            has_the_bits_of_kerf(page, address, known['phantom'])
+            cuts_by_a_pointer(page, address, touch=False)
+            cuts_by_a_pointer(page, address, touch=True)
+            says_what_is_wrong(page, address)
+        finally:
+            page.close()
+    server.shutdown()
+    return 1 if failures else 0
+
+
+sys.exit(main())

@@ -1,0 +1,190 @@
+// SPDX-License-Identifier: Apache-2.0
+// The page without a bridge: a worker of this tab is controller, device and hand; what it sends is what a bridge sends, so
+// picture, panel and commands are the bridge's own page. Here are the controls of the run itself.
+//
+// In the address behind #: scene=NAME, hand=script or mine, seconds=S (then it ends and its hashes stand here), pace=0 (as
+// fast as it can), set=KEY=VALUE (may be given often).
+import {scenes} from './scenes.js';
+import {TabSocket} from './tab_socket.js';
+
+const element = id => document.getElementById(id);
+const wanted = new URLSearchParams(location.hash.slice(1));
+const state = {inputs: null, page: null, steering: null, worker: null, shown: null};
+
+function refuse(text) {
+  const line = element('missing');
+  Object.assign(line, {hidden: false, textContent: text});
+  element('state').textContent = 'not started';
+  document.body.dataset.state = 'trouble';
+}
+
+/** Why this browser cannot run kerf; '' where it can. */
+function lack() {
+  if (typeof WebAssembly !== 'object') return 'This browser has no WebAssembly, or it is switched off; use a newer one.';
+  if (typeof Worker !== 'function') return 'This browser has no workers; use a newer one.';
+  if (typeof BigInt !== 'function' || typeof WebAssembly.Global !== 'function') return 'This browser is too old; use a newer one.';
+  return '';
+}
+
+// -- Controls
+
+const slider = (id, label, low, high, step, value) => `<label class="slider">${label}
+  <input id="${id}" type="range" min="${low}" max="${high}" step="${step}" value="${value}"><output>${value}</output></label>`;
+const kControls = `<legend>This run, in your browser</legend>
+  <label>scene <select id="scene"></select></label>
+  <label>hand <select id="hand"><option value="script">a script</option><option value="mine">yours</option></select></label>
+  <label class="tick" id="finger-row"><input id="finger" type="checkbox" checked> a finger presses</label>
+  ${slider('stiffness', 'stiffness, N/mm', 0.1, 1.5, 0.05, 0.4)}
+  ${slider('damping', 'damping, N s/mm', 0, 0.005, 0.0005, 0.002)}
+  <label>stabiliser <select id="stabiliser"><option value="none">none</option><option>energy_bounding</option>
+    <option>passivity</option></select></label>
+  <label>rate <select id="rate"><option>500</option><option selected>1000</option><option>2000</option></select></label>
+  <div class="row"><button id="again" type="button">start again</button></div>
+  <p id="run-state" role="status"></p>
+  <dl id="run-figures"></dl>`;
+
+function addControls() {
+  const fields = document.createElement('fieldset');
+  fields.id = 'run';
+  fields.innerHTML = kControls;
+  element('teaching').before(fields);
+  element('scene').replaceChildren(...scenes.map(({name, title}) => new Option(title, name)));
+  for (const id of ['scene', 'hand', 'stabiliser', 'rate']) element(id).addEventListener('change', start);
+  for (const id of ['stiffness', 'damping']) {
+    const input = element(id);
+    input.addEventListener('input', () => input.nextElementSibling.textContent = input.value);
+    input.addEventListener('change', start);
+  }
+  element('finger').addEventListener('change', ({target}) => state.steering.fingersPress = target.checked);
+  element('again').addEventListener('click', start);
+  element('scene').value = scenes.some(({name}) => name === wanted.get('scene')) ? wanted.get('scene') : 'phantom';
+  element('hand').value = wanted.get('hand') === 'mine' ? 'mine' : 'script';
+  const keys = element('keys');
+  keys.insertAdjacentHTML('afterbegin', `<dt>hand yours: pointer, one finger</dt><dd>lead the tool</dd>
+    <dt>press</dt><dd>push and cut</dd><dt>wheel</dt><dd>tool nearer, farther</dd>
+    <dt>right or shift drag, two fingers</dt><dd>the view, as below</dd>`);
+}
+
+/** What differs from the scene's own values: a control that is not touched changes no bit. */
+const touched = new Set();
+function settings() {
+  const force = element('scene').value.startsWith('paper') ? [] : ['stiffness', 'damping'];
+  const keys = {stiffness: 'force.stiffness_n_per_mm', damping: 'force.damping_ns_per_mm',
+    stabiliser: 'force.stabiliser', rate: 'servo.rate_hz'};
+  const given = [...force, 'stabiliser', 'rate'].filter(id => touched.has(id)).map(id => `${keys[id]}=${element(id).value}`);
+  return [...given, ...wanted.getAll('set')];
+}
+
+async function textOf(path) {
+  const answer = await fetch(path);
+  if (!answer.ok) throw new Error(`${path}: ${answer.status}; serve the whole folder`);
+  return answer.text();
+}
+
+/** The sliders show what the run has, until they are moved. */
+function showOwnValues({force, servo}) {
+  for (const [id, own] of [['stiffness', force.stiffness_n_per_mm], ['damping', force.damping_ns_per_mm]]) {
+    const input = element(id);
+    input.disabled = own === undefined;  // of another law, or of the paper's force
+    if (own === undefined || touched.has(id)) continue;
+    input.value = own;
+    input.nextElementSibling.textContent = own;
+  }
+  if (!touched.has('rate')) element('rate').value = servo.rate_hz;
+}
+
+async function start(event) {
+  if (event?.type === 'change') {
+    if (event.target.id === 'scene') touched.clear();  // they were of the other scene
+    else if (event.target.id !== 'hand') touched.add(event.target.id);
+  }
+  const {name, hand} = scenes.find(one => one.name === element('scene').value);
+  const mine = element('hand').value === 'mine';
+  element('finger-row').style.display = mine && matchMedia('(any-pointer: coarse)').matches ? '' : 'none';
+  element('run-state').textContent = 'loading the scene';
+  document.body.dataset.run = 'loading';
+  try {
+    const scene = await textOf(`scenes/${name}.toml`);
+    const script = mine ? '' : await textOf(`scenes/hands/${hand}.toml`);
+    state.steering?.start(mine);
+    state.worker.postMessage({
+      open: {name: `scenes/${name}.toml`, scene, hand: script, pedal: mine, settings: settings()},
+      pace: Number(wanted.get('pace') ?? 1),
+      mostArmed: Math.round(Number(wanted.get('seconds') ?? 0) * Number(element('rate').value))});
+  } catch (problem) {
+    failed(problem.message);
+  }
+}
+
+function failed(text) {
+  element('run-state').textContent = text;
+  document.body.dataset.run = 'failed';
+  element('run-figures').replaceChildren();
+}
+
+// -- What the worker says
+
+function showFacts(facts) {
+  const number = (value, digits, unit) => `${value.toFixed(digits)} ${unit}`;
+  const rows = [['servo time', number(facts.armed_ticks / facts.rate_hz, 1, 's')],
+    ['times real time', facts.times_real_time.toFixed(2)],
+    ['a tick takes', number(facts.us_a_tick, 0, 'µs')],
+    ['removed', number(facts.removed_mm3, 3, 'mm³')],
+    ['energy taken', number(facts.absorbed_mj, 2, 'mJ')],
+    ...Object.entries(facts.energy_mj).filter(([, mj]) => Math.abs(mj) >= 0.005).map(([name, mj]) => [`· ${name}`, number(mj, 2, 'mJ')]),
+    ['output hash', facts.output_hash]];
+  if (facts.volume_hash) rows.push(['volume hash', facts.volume_hash]);
+  element('run-figures').replaceChildren(...rows.flatMap(([label, value]) => {
+    const pair = [document.createElement('dt'), document.createElement('dd')];
+    [pair[0].textContent, pair[1].textContent] = [label, value];
+    return pair;
+  }));
+}
+
+const says = {
+  ready: () => begin(),
+  opened: ({opened}) => {
+    element('run-state').textContent = `loaded in ${(opened / 1000).toFixed(1)} s`;
+    document.body.dataset.run = 'runs';
+    document.body.dataset.loadMs = Math.round(opened);
+  },
+  down: ({down}) => TabSocket.take(down),
+  facts: ({facts}) => {
+    showFacts(facts);
+    const held = state.page.heldNow();
+    if (held !== state.shown && document.body.dataset.state === 'live') {
+      showOwnValues(held.sceneJson);
+      state.shown = held;
+    }
+    document.body.dataset.timesRealTime = facts.times_real_time.toFixed(2);
+    document.body.dataset.handLed = facts.hand_led;
+  },
+  done: ({done}) => {
+    showFacts(done);
+    element('run-state').textContent = 'the run has ended; its time is that of the steps alone';
+    Object.assign(document.body.dataset, {run: 'done', outputHash: done.output_hash, volumeHash: done.volume_hash,
+      timesRealTime: done.times_real_time.toFixed(2)});
+  },
+  failed: ({failed: text}) => state.page ? failed(text) : refuse(text),
+};
+
+/** The module is there: the bridge's page begins, with a link to the worker. */
+async function begin() {
+  TabSocket.worker = state.worker;
+  globalThis.WebSocket = TabSocket;
+  const {Steering} = await import('./steering.js');
+  const page = state.page = await import('./kerf.js');
+  if (page.stage) state.steering = new Steering(page, state.worker);
+  addControls();
+  await start();
+}
+
+const why = lack();
+if (why) {
+  refuse(why);
+} else {
+  state.worker = new Worker(new URL('worker.js', import.meta.url), {type: 'module'});
+  state.worker.onerror = () => refuse('The worker of this page did not start: a browser with modules in workers is needed.');
+  state.worker.onmessage = ({data}) => Object.keys(data).forEach(kind => says[kind]?.(data));
+  document.addEventListener('visibilitychange', () => state.worker.postMessage({pause: document.hidden}));
+}

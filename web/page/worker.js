@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: Apache-2.0
+// The thread of the servo: steps a run at the pace of the clock, and posts what a bridge would send.
+//
+// In:  {open: inputs, pace, mostArmed}   another run; pace: seconds of the servo in one of the clock, 0: as fast as it can
+//      {up: ArrayBuffer} {join: true} {lead: [mm, rad, button]} {release: true} {pause: bool}
+// Out: {opened: ms} {down: ArrayBuffer} {facts} {failed: text} {done: facts with volume_hash}
+import {KerfModule} from './kerf_module.js';
+
+const kSlotMs = 1000 / 60;
+const kBusyMs = 12;     // of a slot; the rest is for messages
+const kBatch = 8;       // ticks between two looks at the clock
+const kBehindMs = 100;  // of the servo's time: more is not made up for
+const kFactsMs = 200;
+
+let compiled = null, kerf = null;
+let run = null;  // {pace, mostArmed, dueTicks, lookedMs, factsMs, factsTicks, busyMs, allMs, steps, paused, ended}
+const now = () => performance.now();
+
+function post(messages) {
+  for (const message of messages) postMessage({down: message}, [message]);
+}
+
+/** What throws ends the run with a line on the page, never the worker. */
+function attempt(what) {
+  try {
+    what();
+  } catch (problem) {
+    kerf = run = null;
+    // A trap of the module has no words of its own; the memory of a tab is what runs out.
+    const trapped = problem instanceof WebAssembly.RuntimeError;
+    postMessage({failed: trapped ? `memory: none is left for this run, or the module has a fault (${problem.message}); ` +
+      'close other tabs, or take another scene' : problem.message});
+  }
+}
+
+function open({open: inputs, pace = 1, mostArmed = 0}) {
+  kerf = null;  // before the next one is made: each takes some 100 MB
+  const began = now();
+  kerf = new KerfModule(compiled);
+  kerf.open(inputs);
+  const at = now();
+  run = {pace, mostArmed, dueTicks: 0, lookedMs: at, factsMs: at, factsTicks: 0, busyMs: 0, allMs: 0, steps: 0, paused: false,
+    ended: false};
+  postMessage({opened: at - began});
+  post(kerf.news());
+  tellFacts(at);
+}
+
+function tellFacts(at) {
+  const facts = kerf.facts();
+  const wall = at - run.factsMs;
+  postMessage({facts: {...facts, times_real_time: wall > 0 ? (facts.ticks - run.factsTicks) / facts.rate_hz / (wall / 1000) : 0,
+    us_a_tick: run.steps > 0 ? 1000 * run.busyMs / run.steps : 0}});
+  Object.assign(run, {factsMs: at, factsTicks: facts.ticks, busyMs: 0, steps: 0});
+}
+
+/** Steps for which the clock says it is time, as far as a slot has room. */
+function advance(began) {
+  const perMs = run.pace * kerf.rateHz / 1000;
+  run.dueTicks = Math.min(run.dueTicks + (began - run.lookedMs) * perMs, kBehindMs * perMs);
+  run.lookedMs = began;
+  while (!run.ended && (run.pace === 0 || run.dueTicks >= 1) && now() - began < kBusyMs) {
+    const asked = run.pace === 0 ? kBatch : Math.min(kBatch, Math.floor(run.dueTicks));
+    const made = kerf.step(asked, run.mostArmed);
+    run.dueTicks -= made;
+    run.steps += made;
+    run.ended = made < asked;
+  }
+  run.busyMs += now() - began;
+  run.allMs += now() - began;
+}
+
+/** News go out without a step too: they are the sign of life that the page waits for. */
+function slot() {
+  const began = now();
+  const before = run.ended;
+  if (!run.paused && !run.ended) advance(began);
+  post(kerf.news(run.ended));
+  const ends = run.ended && !before;
+  if (ends || (!run.ended && now() - run.factsMs >= kFactsMs)) tellFacts(now());
+  if (!ends) return;
+  const facts = kerf.facts();
+  postMessage({done: {...facts, volume_hash: kerf.volumeHash(), times_real_time: 1000 * facts.ticks / facts.rate_hz / run.allMs,
+    us_a_tick: 1000 * run.allMs / facts.ticks}});
+}
+
+function turn() {
+  const began = now();
+  if (run) attempt(slot);
+  const hurries = run?.pace === 0 && !run.paused && !run.ended;
+  setTimeout(turn, hurries ? 0 : Math.max(kSlotMs - (now() - began), 0));
+}
+
+const takes = {
+  open: message => open(message),
+  up: ({up}) => {
+    kerf.take(up);
+    post(kerf.waiting());
+  },
+  join: () => {
+    kerf.join();
+    post(kerf.news());
+  },
+  lead: ({lead}) => kerf.lead(...lead),
+  release: () => kerf.release(),
+  pause: ({pause}) => Object.assign(run, {paused: pause, lookedMs: now()}),
+};
+
+onmessage = ({data}) => {
+  const kind = Object.keys(takes).find(name => name in data);
+  if (kind === 'open' || kerf) attempt(() => takes[kind](data));
+};
+
+async function begin() {
+  try {
+    const answer = await fetch(new URL('kerf.wasm', import.meta.url));
+    if (!answer.ok) throw new Error(`kerf.wasm: ${answer.status}; serve the whole folder`);
+    const bytes = await answer.arrayBuffer();
+    if (!WebAssembly.validate(bytes)) throw new Error('This browser runs no WebAssembly with SIMD; use a newer one.');
+    compiled = await WebAssembly.compile(bytes);
+    postMessage({ready: true});
+    turn();
+  } catch (problem) {
+    postMessage({failed: problem.message});
+  }
+}
+begin();

@@ -1,0 +1,300 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "web/tab_run.hpp"
+
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <deque>
+#include <optional>
+#include <span>
+#include <sstream>
+#include <utility>
+#include <variant>
+
+#include "bridge/stream/run_snapshot.hpp"
+#include "bridge/stream/stream.hpp"
+#include "bridge/wire/messages.hpp"
+#include "bridge/wire/parse.hpp"
+#include "controller/device/device_driver.hpp"
+#include "controller/input/load_error.hpp"
+#include "controller/load/load_scene.hpp"
+#include "controller/load/scene_json.hpp"
+#include "controller/loop/publisher.hpp"
+#include "controller/plan/compile.hpp"
+#include "hil/device/emulator.hpp"
+#include "hil/hil_error.hpp"
+#include "hil/script/hand_script_file.hpp"
+#include "shared/numeric/energy_source.hpp"
+#include "shared/numeric/fnv1a.hpp"
+#include "shared/numeric/linear_algebra.hpp"
+#include "shared/posix/monotonic_clock.hpp"
+#include "shared/segment/command.hpp"
+#include "shared/segment/reader.hpp"
+#include "shared/segment/writer.hpp"
+#include "shared/text/json.hpp"
+#include "shared/text/text.hpp"
+#include "web/tab_port.hpp"
+
+namespace kerf::web {
+namespace {
+
+Personality personality_of(const std::string& word) {
+  const auto found = std::ranges::find(kPersonalityWords, word);
+  if (found == kPersonalityWords.end()) {
+    throw LoadError("device: " + one_line(word) + unknown_word(word, kPersonalityWords));
+  }
+  return static_cast<Personality>(found - kPersonalityWords.begin());
+}
+
+/// As `./kerf demo` hands it over: through the text that `kerf-emulator --describe` prints.
+std::array<double, 3> told_torque_scale(Personality personality) {
+  std::array<double, 3> scale = torque_scale_of(personality);
+  for (double& axis : scale) {
+    std::ostringstream text;
+    text << axis;
+    axis = std::strtod(text.str().c_str(), nullptr);
+  }
+  return scale;
+}
+
+/// Likewise: through `hand_unit_mm` of `--emulator-args`.
+double told_unit_mm(const LoadedScene& scene) {
+  char text[64];
+  std::snprintf(text, sizeof text, "%.9g", hand_unit_mm(scene));
+  return std::strtod(text, nullptr);
+}
+
+SceneSource source_of(const TabInputs& inputs) {
+  SceneSource source{inputs.scene_name, inputs.scene, {}};
+  for (const std::string& setting : inputs.settings) {
+    source.overrides.settings.push_back(parse_setting(setting));
+  }
+  source.overrides.personality = personality_of(inputs.device);
+  source.overrides.torque_scale = told_torque_scale(*source.overrides.personality);
+  source.overrides.pedal = inputs.pedal;
+  return source;
+}
+
+HandScript hand_of(const TabInputs& inputs, const LoadedScene& scene) {
+  HandScript script;  // one that only a user leads goes to its start
+  if (!inputs.hand.empty()) script = parse_hand_script(inputs.hand, "hand");
+  if (!script.unit_mm) script.unit_mm = told_unit_mm(scene);
+  return script;
+}
+
+std::unique_ptr<DeviceModel> model_of(Personality personality, const HandScript& script) {
+  return with_device_params(personality, [&](auto params) {
+    take_plant(script.plant, params);
+    return make_model(params);
+  });
+}
+
+/// A tab has one hand. Throws LoadError.
+LoadedScene one_armed(LoadedScene scene) {
+  if (!scene.second) return scene;
+  throw LoadError(scene.path +
+                  ": has two [[device]], and a tab has one hand; choose another scene");
+}
+
+/// The segment of the scene, with the JSON that readers get.
+SegmentWriter segment_of(const LoadedScene& scene, const SceneSource& source) {
+  const std::string json = canonical_json(scene);
+  const std::string with_source = json_with_source(json, scene, source);
+  return SegmentWriter::create(segment_spec(scene, with_source, fnv1a(json)), true);
+}
+
+}  // namespace
+
+/// In the order in which it is made: the densities move from the scene into the servo after the
+/// segment has copied them.
+struct TabRun::State {
+  explicit State(const TabInputs& inputs)
+      : source(source_of(inputs)),
+        scene(one_armed(load_scene(source))),
+        servo(plan_scene(scene)),
+        writer(segment_of(scene, source)),
+        emulator(model_of(scene.device.personality, hand_of(inputs, scene)),
+                 hand_of(inputs, scene)),
+        port(emulator, kCyclesPerSecond / scene.servo.rate_hz,
+             scene.device.personality == Personality::omni ||
+                 is_cartesian(scene.device.personality)),
+        driver(make_driver(scene.device.personality, port, scene.device.encoder_sign,
+                           scene.servo.rate_hz)),
+        reader(SegmentReader::map(writer.fd())),
+        snapshot(reader),
+        publisher(writer, *servo) {
+    for (const SceneVolume& volume : scene.volumes) {
+      const auto& h = volume.image.spacing_mm;
+      voxel_mm3.push_back(h[0] * h[1] * h[2]);
+    }
+    stream.emplace(snapshot, bridge::kMayCommand);
+    servo->take(scene);
+    driver->start();
+    writer.set_lifecycle(Lifecycle::run);
+  }
+
+  void step_once() noexcept {
+    ++tick;
+    TickTiming timing;
+    timing.heartbeat_ns = monotonic_ns();
+    timing.start_ns = static_cast<std::int64_t>(tick) * (kNsPerSecond / scene.servo.rate_hz);
+    const DeviceReport report = driver->read();
+    given.command = {};
+    if (!commands.empty()) {
+      given.command = servo_command(commands.front());
+      given.last_index = commands.front().index;
+      commands.pop_front();
+      static_cast<void>(servo->apply(given.command));
+    }
+    output = servo->step(report);
+    timing.lost_packets[0] = driver->lost();
+    timing.refused_packets[0] = driver->refused();
+    driver->command(output);
+    publisher.publish(tick, std::span(&report, 1), given, std::span(&output, 1), timing);
+    for (std::size_t v = 0; v < kMaxVolumes; ++v) {
+      if (output.resetting) removed_steps[v] = 0;
+      removed_steps[v] += output.removed_by_volume[v] - output.returned_by_volume[v];
+    }
+    if (output.started) ++armed_ticks;
+  }
+
+  void answer(const bridge::CommandMessage& asked) {
+    Command command;
+    command.kind = static_cast<CommandKind>(asked.kind);
+    command.argument = asked.argument;
+    command.arm = asked.arm;
+    const bool valid = is_valid(command, {.tools = static_cast<std::uint32_t>(scene.tools.size())});
+    bridge::ReplyMessage reply{bridge::kReplyMagic, asked.sequence, 0, 0};
+    if (!valid) {
+      reply.status = static_cast<std::uint32_t>(ReplyStatus::refused);
+    } else if (commands.size() >= kCommandSlots) {
+      reply.status = static_cast<std::uint32_t>(ReplyStatus::busy);
+    } else {
+      reply.index = command.index = ++last_index;
+      commands.push_back(command);
+    }
+    replies.push_back(reply);
+  }
+
+  SceneSource source;
+  LoadedScene scene;
+  std::unique_ptr<CompiledScene> servo;
+  SegmentWriter writer;
+  Emulator emulator;
+  TabPort port;
+  std::unique_ptr<DeviceDriver> driver;
+  SegmentReader reader;
+  bridge::RunSnapshot snapshot;
+  std::optional<bridge::Stream> stream;
+  Publisher publisher;
+
+  Tick tick = 0;
+  std::uint64_t armed_ticks = 0;
+  TickCommands given;
+  ServoOutput output;
+  std::array<std::uint64_t, kMaxVolumes> removed_steps{};
+  std::vector<double> voxel_mm3;
+  std::deque<Command> commands;
+  std::uint32_t last_index = 0;
+  std::deque<bridge::ReplyMessage> replies;
+};
+
+TabRun::TabRun(const TabInputs& inputs) : state_(std::make_unique<State>(inputs)) {}
+TabRun::~TabRun() = default;
+
+std::uint64_t TabRun::armed_ticks() const noexcept {
+  return state_->armed_ticks;
+}
+
+int TabRun::step(int ticks, std::uint64_t most_armed) noexcept {
+  int made = 0;
+  for (; made < ticks && state_->armed_ticks < most_armed; ++made) state_->step_once();
+  return made;
+}
+
+void TabRun::join() {
+  state_->stream.emplace(state_->snapshot, bridge::kMayCommand);
+}
+
+void TabRun::slot(bool ended) {
+  State& s = *state_;
+  const std::int64_t now_ns = monotonic_ns();
+  if (ended) s.writer.set_lifecycle(Lifecycle::clean_end);
+  s.snapshot.update(now_ns, false);
+  s.stream->note_changes();
+  s.stream->slot(now_ns, ended);
+}
+
+bool TabRun::next(std::vector<std::byte>& message) {
+  State& s = *state_;
+  if (!s.replies.empty()) {
+    const auto* bytes = reinterpret_cast<const std::byte*>(&s.replies.front());
+    message.assign(bytes, bytes + sizeof(bridge::ReplyMessage));
+    s.replies.pop_front();
+    return true;
+  }
+  return s.stream->next(monotonic_ns(), message);
+}
+
+bool TabRun::take(std::span<const std::byte> message) {
+  const auto parsed = bridge::parse_up(message);
+  if (!parsed) return false;
+  if (const auto* ack = std::get_if<bridge::AckMessage>(&*parsed)) {
+    return state_->stream->acked(*ack, monotonic_ns());
+  }
+  state_->answer(std::get<bridge::CommandMessage>(*parsed));
+  return true;
+}
+
+void TabRun::lead(const std::array<double, 3>& world_mm,
+                  const std::array<double, 3>& orientation_rad, bool button) noexcept {
+  const auto& device = state_->scene.device;
+  const auto axis = [&](std::size_t i) {
+    return (world_mm[i] - device.offset_mm[i]) / device.workspace_scale;
+  };
+  // Through the packet of a window, whose numbers are whole and within the limits.
+  const HandTarget target{.tip_mm = {axis(0), axis(1), axis(2)},
+                          .orientation_rad = orientation_rad,
+                          .button1 = button,
+                          .button2 = false,
+                          .park = false};
+  if (const auto sent = decode_hand_target(encode(target))) state_->emulator.set_target(*sent);
+}
+
+void TabRun::release() noexcept {
+  state_->emulator.release();
+}
+
+int TabRun::rate_hz() const noexcept {
+  return state_->scene.servo.rate_hz;
+}
+
+std::string TabRun::facts() const {
+  const State& s = *state_;
+  double removed_mm3 = 0;
+  for (std::size_t v = 0; v < s.voxel_mm3.size(); ++v) {
+    removed_mm3 += static_cast<double>(s.removed_steps[v]) / kDensityMax * s.voxel_mm3[v];
+  }
+  Json energy;
+  for (std::size_t i = 0; i < kEnergySources; ++i) {
+    energy[kEnergySourceNames[i]] = energy_mj_of_steps(s.output.energy_steps[i]);
+  }
+  const Json facts = {{"rate_hz", rate_hz()},
+                      {"ticks", s.tick},
+                      {"armed_ticks", s.armed_ticks},
+                      {"output_hash", hex64(s.output.output_hash)},
+                      {"fault", fault_name(s.output.fault)},
+                      {"phase", static_cast<int>(s.output.phase)},
+                      {"hand_led", s.emulator.accepts_target()},
+                      {"force_n", vec3::length(s.output.force_n)},
+                      {"removed_mm3", removed_mm3},
+                      {"absorbed_mj", s.output.absorbed_mj},
+                      {"energy_mj", std::move(energy)}};
+  return facts.canonical();
+}
+
+std::string TabRun::volume_hash() const {
+  return hex64(hash_of_volumes(*state_->servo, state_->scene.volumes.size()));
+}
+
+}  // namespace kerf::web
