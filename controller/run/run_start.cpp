@@ -111,12 +111,33 @@ void tell_of_scene(const LoadedScene& scene, RunReport& report) {
   report.rate_hz = scene.servo.rate_hz;
 }
 
+/// One port for each device, and no two the same.
+std::vector<std::string> ports_of(const ControllerOptions& options, const LoadedScene& scene) {
+  const std::vector<std::string>& given = options.ports;
+  if (given.size() != arms_of(scene)) {
+    const std::string count = std::to_string(given.size()) + " given";
+    throw std::runtime_error("--port: " + count +
+                             (scene.second ? ", and the scene has two [[device]]; give one for "
+                                             "each, in their order"
+                                           : ", and the scene has one [device]; give one"));
+  }
+  std::vector<std::string> ports;
+  for (std::size_t arm = 0; arm < given.size(); ++arm) {
+    ports.push_back(resolve_port(given[arm], device_of(scene, arm).personality));
+    if (arm == 0 || ports[arm] != ports[0]) continue;
+    throw std::runtime_error("--port " + given[arm] +
+                             ": is that of the first device too; name each one's own");
+  }
+  return ports;
+}
+
 PlannedScene checked_scene(const ControllerOptions& options, RunReport& report) {
   report.waiting = "loading " + options.scene;
   PlannedScene planned = load_and_plan(options);
   const LoadedScene& scene = planned.scene;
   tell_of_scene(scene, report);
   check_options(options, scene);
+  static_cast<void>(ports_of(options, scene));
   check_budget(options, scene, planned.servo->costs());
   warn_of_gains(options, scene);
   warn_of_motors(scene);
@@ -157,30 +178,6 @@ void check_options(const ControllerOptions& options, const LoadedScene& scene) {
   static_cast<void>(segment_socket(options.name));
   check_run_files(options, scene);
 }
-
-namespace {
-
-/// One port for each device, and no two the same.
-std::vector<std::string> ports_of(const ControllerOptions& options, const LoadedScene& scene) {
-  const std::vector<std::string>& given = options.ports;
-  if (given.size() != arms_of(scene)) {
-    const std::string count = std::to_string(given.size()) + " given";
-    throw std::runtime_error("--port: " + count +
-                             (scene.second ? ", and the scene has two [[device]]; give one for "
-                                             "each, in their order"
-                                           : ", and the scene has one [device]; give one"));
-  }
-  std::vector<std::string> ports;
-  for (std::size_t arm = 0; arm < given.size(); ++arm) {
-    ports.push_back(resolve_port(given[arm], device_of(scene, arm).personality));
-    if (arm == 0 || ports[arm] != ports[0]) continue;
-    throw std::runtime_error("--port " + given[arm] +
-                             ": is that of the first device too; name each one's own");
-  }
-  return ports;
-}
-
-}  // namespace
 
 void check_budget(const ControllerOptions& options, const LoadedScene& scene,
                   const SceneCosts& costs) {

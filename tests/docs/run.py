@@ -28,7 +28,8 @@ NOT_HERE = {
         "./kerf demo --hand mouse", "./kerf visualizer", "./kerf record grab", "./kerf record live", "./kerf replay once/log --watch"],
     "needs a device, or its kernel": [
         "cat /sys/kernel/realtime", "./kerf controller --probe",
-        "./kerf controller --scene mine.toml --device omni --port fw"],
+        "./kerf controller --scene mine.toml --device omni --port fw", "./kerf controller --scene scenes/two_arms.toml",
+        "./kerf arm"],
     "records or exports the run of a device": ["./kerf recorder", "./kerf record export"],
     "needs a second terminal or machine": [
         "./kerf emulator", "./kerf controller --scene scenes/touch.toml --torque-scale",
@@ -56,7 +57,7 @@ NOT_HERE = {
         "./kerf lab accuracy --page", "./kerf lab extremes", "./kerf lab zwidth --page", "./kerf lab faults --rate all"],
     "needs network namespaces; the test bridge_net does the same": ["./kerf demo --two-machines"],
     "names a program or an option, and is no whole command": [
-        "./kerf controller$", "./kerf lab$", "./kerf lab faults$", "./kerf volume import$", "./kerf controller --strict$",
+        "./kerf controller$", "./kerf lab$", "./kerf stand-in$", "./kerf lab faults$", "./kerf volume import$", "./kerf controller --strict$",
         "./kerf controller --rate HZ$", "./kerf controller --port udp:HOST:5000$", "./kerf controller --report FILE$",
         "./kerf controller --explain --report FILE$", "./kerf record info LOG"],
 }

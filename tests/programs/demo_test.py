@@ -22,6 +22,7 @@ import processes
 def checked(*words, display=""):
     with unittest.mock.patch.dict(os.environ, {"DISPLAY": display, "WAYLAND_DISPLAY": ""}):
         found = options.parse(words)
+        options.choose_devices(found, "")
         options.choose_port(found, "")
         options.check(found)
     return found

@@ -55,7 +55,8 @@ class TestTwoArms(unittest.TestCase):
         for name, arm in (("emulator.json", self.report), ("emulator-2.json", self.report["second"])):
             device = json.loads(pathlib.Path(self.out, name).read_text())
             self.assertLess(abs(device["peak_motor_force_n"] - arm["peak_force_n"]), 0.02, name)
-            self.assertLess(abs(device["motor_work_mj"] / (1000 * arm["energy_j"]) + 1), 0.2, name)
+            # Of opposite sign; the Touch's steps of 55 um are a third of the little work of its light hand.
+            self.assertLess(abs(device["motor_work_mj"] / (1000 * arm["energy_j"]) + 1), 0.5, name)
 
     def test_the_second_time_has_the_same_bits(self):
         with tempfile.TemporaryDirectory() as folder:
