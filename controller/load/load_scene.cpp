@@ -361,6 +361,34 @@ const ToolMesh* mesh_of(const std::string& tool, const RecordedInputs& recorded)
   return found == recorded.meshes.end() ? nullptr : &found->second;
 }
 
+/// How far the second device's origin lies from the first one's, mm of the hands; 0 unless the
+/// scene says both.
+Point3 arms_apart_mm(const Scene& spec) {
+  Point3 apart_mm{};
+  if (!spec.second || !spec.offset_given || !spec.second->offset_given) return apart_mm;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    apart_mm[axis] = (spec.second->device.offset_mm[axis] - spec.device.offset_mm[axis]) /
+                     spec.device.workspace_scale;
+  }
+  return apart_mm;
+}
+
+/// Gives the second arm its tool, the scale of the first, and its place: as written, or over the
+/// first one's; of a volume of the command line, which has its own size, as far from that as
+/// before.
+void finish_second_arm(const Point3& apart_mm, bool of_command_line, LoadedScene& scene) {
+  if (!scene.second) return;
+  DeviceSettings& second = scene.second->device;
+  scene.second_tool = tool_held(second, 1, scene.tools);
+  second.workspace_scale = scene.device.workspace_scale;
+  second.fit = scene.device.fit;
+  if (scene.second->offset_given && !of_command_line) return;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const double scene_mm = of_command_line ? apart_mm[axis] * second.workspace_scale : 0;
+    second.offset_mm[axis] = scene.device.offset_mm[axis] + scene_mm;
+  }
+}
+
 /// `first`: the image of the first volume, in place of its file.
 LoadedScene load_parsed(Scene spec, const std::filesystem::path& path,
                         const SceneOverrides& overrides, VolumeImage* first,
@@ -368,6 +396,7 @@ LoadedScene load_parsed(Scene spec, const std::filesystem::path& path,
   const double written_mm =
       spec.device.fit ? kPhantomVoxelMm : written_voxel_mm(spec.volumes.front());
   const std::optional<double> written_iso = spec.volumes.front().iso;
+  const Point3 apart_mm = arms_apart_mm(spec);
   apply_overrides(overrides, spec);
 
   LoadedScene scene;
@@ -424,13 +453,7 @@ LoadedScene load_parsed(Scene spec, const std::filesystem::path& path,
     scene.device.offset_mm = first_surface_from_above(*std::find_if(
         scene.volumes.begin(), scene.volumes.end(), [](const SceneVolume& v) { return v.solid; }));
   }
-  if (scene.second) {
-    DeviceSettings& second = scene.second->device;
-    scene.second_tool = tool_held(second, 1, scene.tools);
-    second.workspace_scale = scene.device.workspace_scale;
-    second.fit = scene.device.fit;
-    if (!scene.second->offset_given) second.offset_mm = scene.device.offset_mm;
-  }
+  finish_second_arm(apart_mm, overrides.volume_file.has_value(), scene);
   return scene;
 }
 

@@ -141,6 +141,17 @@ TEST_CASE("loaded, the second arm has the scale of the first and a tool of its o
   const LoadedScene none = load(kTools + "[[device]]\n[[device]]\n");
   CHECK(none.second->device.offset_mm == none.device.offset_mm);
 
+  // A volume of the command line has its own surface and scale: the hands stay as far apart.
+  const std::string apart =
+      kTools + "[[device]]\noffset_mm = [-2, 5, 0]\n[[device]]\noffset_mm = [4, 6, 0]\n";
+  const LoadedScene other = load(apart, {.volume_file = "phantom"});
+  const double scale = other.device.workspace_scale;
+  CHECK(scale != 1);
+  CHECK(other.device.offset_mm[0] != -2);
+  CHECK(other.second->device.offset_mm[0] - other.device.offset_mm[0] ==
+        doctest::Approx(6 * scale));
+  CHECK(other.second->device.offset_mm[1] - other.device.offset_mm[1] == doctest::Approx(scale));
+
   const LoadedScene second = second_arm_of(scene);
   CHECK_FALSE(second.second);
   CHECK(second.active_tool == 1);
