@@ -3,6 +3,7 @@
 import dataclasses
 import errno
 import os
+import pathlib
 import re
 import shutil
 import socket
@@ -148,12 +149,11 @@ def choose_devices(options, scene):
     """Those of a scene with two devices; else the one of --device, or an Omni. A file that is no scene is left to the
     controller, which says why."""
     try:
-        with open(scene, "rb") as file:
-            held = tomllib.load(file).get("device")
-    except (OSError, tomllib.TOMLDecodeError):
+        held = tomllib.loads(pathlib.Path(scene).read_text()).get("device") if os.path.isfile(scene) else None
+    except (OSError, ValueError, RecursionError):
         held = None
     devices = [one.get("personality", "omni") for one in held if isinstance(one, dict)] if isinstance(held, list) else []
-    if len(devices) == 2 and not options.device and all(one in BUSES for one in devices):
+    if len(devices) == 2 and not options.device and all(isinstance(one, str) and one in BUSES for one in devices):
         options.device, options.second = devices
     else:
         options.second = options.device if len(devices) == 2 else ""

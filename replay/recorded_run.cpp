@@ -255,7 +255,7 @@ void step_earlier_ticks(RecordedRun& run, const std::filesystem::path& folder) {
   for_each_input(folder, run.earlier_ticks(), arms, [&](std::span<const TickRecord> inputs) {
     constexpr Tick kOften = 1024;
     if (inputs.front().tick % kOften == 0) end_if_asked(folder.string());
-    ArmRecords tick;
+    ArmRecords tick{};
     std::ranges::copy(inputs, tick.begin());
     run.volume_chain = step(tick)[arms - 1].volume_hash;
   });

@@ -29,7 +29,10 @@ class Devices {
   bool stay_released() const noexcept {
     return each([](DeviceDriver& device) { return device.stay_released(); });
   }
+  /// The port of one may take its time over the last packet: the motors of the other are off
+  /// before.
   bool release_for_good() const noexcept {
+    if (count_ > 1) static_cast<void>(stay_released());
     return each([](DeviceDriver& device) { return device.release_for_good(); });
   }
 

@@ -231,6 +231,12 @@ void apply_overrides(const SceneOverrides& overrides, Scene& scene) {
     refuse("--torque-scale", " has six numbers, and the scene has one [device]; give three");
   }
   if (scene.second) {
+    const Personality first = scene.device.personality;
+    const bool same = overrides.personality || scene.second->device.personality == first;
+    if (overrides.torque_scale && !overrides.second_torque_scale && !same) {
+      refuse("--torque-scale",
+             " has three numbers, and the scene has two devices of different kinds; give six");
+    }
     replace(scene.second->device,
             overrides.second_torque_scale ? overrides.second_torque_scale : overrides.torque_scale);
   }

@@ -27,6 +27,7 @@ class ArmStatistics {
     }
     last_fault_ = output.fault;
     if (!output.started) return;
+    record_.in_use = true;
     is_gone_ = is_gone_ && output.stale;
     stale_in_a_row_ = output.stale ? stale_in_a_row_ + 1 : 0;
     record_.stale_ticks += output.stale && !is_gone_ ? 1 : 0;
@@ -153,13 +154,15 @@ class SilentDevices {
   SilentDevices(std::size_t count, std::uint64_t gone_ticks) noexcept
       : count_(count), gone_ticks_(gone_ticks) {}
 
+  [[nodiscard]] bool is_gone(std::size_t arm) const noexcept { return ticks_[arm] >= gone_ticks_; }
+
   /// After each tick. Returns whether no device is left; `lose` is called for each that goes.
   bool follow(std::span<const DeviceReport> reports, const auto& lose) noexcept {
     bool is_left = false;
     for (std::size_t a = 0; a < count_; ++a) {
       ticks_[a] = reports[a].fresh ? 0 : ticks_[a] + 1;
       if (ticks_[a] == gone_ticks_) lose(a);
-      is_left = is_left || ticks_[a] < gone_ticks_;
+      is_left = is_left || !is_gone(a);
     }
     return !is_left;
   }
@@ -220,7 +223,9 @@ EndReason run_servo(TickSource& clock, const Devices& devices, Servo& servo, Pub
     signals.heartbeat.store(tick, std::memory_order_relaxed);
     signals.armed_ticks.store(record.ticks, std::memory_order_relaxed);
     for (std::size_t a = 0; a < reports.size(); ++a) {
-      signals.waiting[a].store(waiting_for(reports[a], outputs[a]), std::memory_order_relaxed);
+      const Waiting waiting =
+          silent.is_gone(a) ? Waiting::gone : waiting_for(reports[a], outputs[a]);
+      signals.waiting[a].store(waiting, std::memory_order_relaxed);
     }
     if (record.ticks >= limits.armed_ticks) {
       end = EndReason::ticks_done;

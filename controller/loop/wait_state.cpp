@@ -71,13 +71,15 @@ Waiting waiting_for(const DeviceReport& report, const ServoOutput& output) noexc
 }
 
 const char* action_for(Personality personality, Waiting waiting) noexcept {
+  if (waiting == Waiting::gone) return "connect it again; the other one goes on";
   return kDeeds[static_cast<std::size_t>(personality)][static_cast<std::size_t>(waiting)];
 }
 
 std::string text_of(Personality personality, Waiting waiting) {
   if (waiting == Waiting::nothing) return "";
-  return std::string(kWaits[static_cast<std::size_t>(waiting)]) + ": " +
-         action_for(personality, waiting);
+  const char* const what =
+      waiting == Waiting::gone ? "the device went away" : kWaits[static_cast<std::size_t>(waiting)];
+  return std::string(what) + ": " + action_for(personality, waiting);
 }
 
 std::string text_before_device(const std::string& port) {

@@ -64,7 +64,8 @@ enum class Waiting : std::uint8_t {
   homing,   ///< its encoders have no meaning yet
   parked,   ///< not parked yet, or after a fault
   rest,     ///< parked, but it moves
-  hand      ///< calibrated and parked: the user has to take it
+  hand,     ///< calibrated and parked: the user has to take it
+  gone      ///< it says nothing any more, and another arm goes on
 };
 
 /// The state after a tick. Bounded, no clock: for the servo thread.

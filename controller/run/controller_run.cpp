@@ -294,7 +294,7 @@ void write_final(const ControllerOptions& options, const LoadedScene& scene, con
 }
 
 /// Warns with the names of faulty laws: the fault has only their kind.
-void name_law_faults(const LoadedScene& scene, const EventList& faults) {
+void name_law_faults(const LoadedScene& scene, const EventList& faults, const std::string& arm) {
   const std::array<std::pair<Fault, const LawChoice*>, 3> laws{
       {{Fault::force_law, &scene.force.law},
        {Fault::velocity_estimator, &scene.servo.velocity},
@@ -302,7 +302,7 @@ void name_law_faults(const LoadedScene& scene, const EventList& faults) {
   for (const EventList::Event& event : faults.kept()) {
     for (const auto& [fault, law] : laws) {
       if (event.name != std::string_view(fault_name(fault))) continue;
-      log_warning(std::string(kind_name(law->kind)) + " " + law->name +
+      log_warning(arm + std::string(kind_name(law->kind)) + " " + law->name +
                   " gave something that is no finite number at tick " + std::to_string(event.tick) +
                   ", and the motors went off; the lab tries it: law " + law->name);
     }
@@ -310,7 +310,7 @@ void name_law_faults(const LoadedScene& scene, const EventList& faults) {
 }
 
 /// Warns once of each fault whose name does not show the way out.
-void explain_faults(const EventList& faults, const std::string& port) {
+void explain_faults(const EventList& faults, const std::string& port, const std::string& arm) {
   const bool is_emulated = port.starts_with("socket:") || port.starts_with("udp:");
   const std::array<std::pair<Fault, const char*>, 2> why{
       {{Fault::wrong_dock,
@@ -328,7 +328,7 @@ void explain_faults(const EventList& faults, const std::string& port) {
         faults.kept(), std::string_view(fault_name(fault)),
         [](const EventList::Event& event) { return std::string_view(event.name); });
     if (first == faults.kept().end()) continue;
-    log_warning(std::string(first->name) + " at tick " + std::to_string(first->tick) + way_out);
+    log_warning(arm + first->name + " at tick " + std::to_string(first->tick) + way_out);
   }
 }
 
@@ -395,8 +395,9 @@ int run_with_device(const ControllerOptions& options, std::int64_t began_ns, Run
   report.end = text_of(end);
   for (std::size_t arm = 0; arm < devices.size(); ++arm) {
     const EventList& faults = report.record.arm(arm).faults;
-    name_law_faults(scene, faults);
-    explain_faults(faults, start.port_texts[arm]);
+    const std::string name = scene.second ? "arm " + std::to_string(arm + 1) + ": " : "";
+    name_law_faults(scene, faults, name);
+    explain_faults(faults, start.port_texts[arm], name);
   }
   report.removed_mm3 = removed_mm3(scene, report.record);
   report.materials = scores_of(scene, servo, report.record);

@@ -110,6 +110,7 @@ Json json_of(const std::vector<LinkCounter>& link) {
 Json second_json(const SecondArmReport& arm, const ArmRecord& r) {
   return {{"device", arm.device},
           {"tool", arm.tool},
+          {"in_use", r.in_use},
           {"stale_ticks", r.stale_ticks},
           {"contact_ticks", r.contact_ticks},
           {"shaft_ticks", r.shaft_ticks},
@@ -131,7 +132,8 @@ std::string contact_line(const ArmRecord& r) {
 }
 
 std::string second_lines(const SecondArmReport& arm, const ArmRecord& r) {
-  return format("\n  second arm %s with tool %s\n", arm.device.c_str(), arm.tool.c_str()) +
+  return format("\n  second arm %s with tool %s%s\n", arm.device.c_str(), arm.tool.c_str(),
+                r.in_use ? "" : ", never in use") +
          contact_line(r) + energy_line(r) +
          format("  losses     %llu stale ticks, %llu packets lost\n",
                 static_cast<unsigned long long>(r.stale_ticks),
@@ -216,6 +218,7 @@ std::string summary(const RunReport& report) {
   if (!report.virtual_time) text += line("wake-up", r.wake);
   text += line("compute", r.compute);
   text += line("publish", r.publish);
+  if (report.second && !r.in_use) text += "\n  first arm  never in use";
   text += "\n" + contact_line(r) + energy_line(r);
   if (r.shaft_ticks > 0) {
     text += format("  shaft      %llu ticks\n", static_cast<unsigned long long>(r.shaft_ticks));

@@ -72,7 +72,8 @@ void warn_of_gains(const ControllerOptions& options, const LoadedScene& scene) {
 void warn_of_motors(const LoadedScene& scene) {
   for (std::size_t arm = 0; arm < arms_of(scene); ++arm) {
     if (device_of(scene, arm).torque_scale) continue;
-    log_warning("device.torque_scale is not set for " +
+    log_warning((scene.second ? "arm " + std::to_string(arm + 1) + ": " : std::string()) +
+                "device.torque_scale is not set for " +
                 std::string(word_of(device_of(scene, arm).personality)) +
                 ": the motors stay off; measure it, and write device.personality beside it");
   }
@@ -123,7 +124,9 @@ std::vector<std::string> ports_of(const ControllerOptions& options, const Loaded
   }
   std::vector<std::string> ports;
   for (std::size_t arm = 0; arm < given.size(); ++arm) {
-    ports.push_back(resolve_port(given[arm], device_of(scene, arm).personality));
+    const Personality personality = device_of(scene, arm).personality;
+    ports.push_back(resolve_port(given[arm], personality));
+    if (ports[arm] == "arm") ports[arm] += ":" + std::string(word_of(personality));
     if (arm == 0 || ports[arm] != ports[0]) continue;
     throw std::runtime_error("--port " + given[arm] +
                              ": is that of the first device too; name each one's own");

@@ -464,6 +464,15 @@ SecondArm read_second_arm(const TomlNode& root, const std::filesystem::path& pat
           .hand_place = parts.scene.hand_place};
 }
 
+/// A motor's scale of one device is none of another's.
+void refuse_one_scale(const Scene& scene, std::span<const KeyOverride> settings) {
+  if (!scene.second || scene.second->device.personality == scene.device.personality) return;
+  if (std::ranges::find(settings, "device.torque_scale", &KeyOverride::key) == settings.end())
+    return;
+  refuse("--set device.torque_scale",
+         ": the scene has two devices of different kinds; write each one's in its [[device]]");
+}
+
 /// The tool that a device names has to be one of the scene.
 void check_tool_name(const DeviceSettings& device, const Scene& scene) {
   std::vector<std::string_view> names;
@@ -553,7 +562,9 @@ Scene parse_scene(std::string_view text, const std::filesystem::path& path, Scen
     override_keys(settings, root);
     if (second) override_keys(settings_of_arm(settings), *second);
     spell_out_burs(root, path.string());
-    return read_scene(root, second ? &*second : nullptr, path, keys);
+    Scene scene = read_scene(root, second ? &*second : nullptr, path, keys);
+    refuse_one_scale(scene, settings);
+    return scene;
   } catch (const TomlError& error) {
     refuse(path.string() + ":" + std::to_string(error.line) + ":" + std::to_string(error.column),
            std::string(": ") + error.what());

@@ -337,11 +337,13 @@ void cut(const ServoPlan<N>& plan, ServoState<N>& state, const ContactResult<N>&
   add_removed(done.removed, out);
 }
 
-/// Whether the tool holds on to its stroke: by the pedal, or without one by contact.
+/// Whether the tool holds on to its stroke: by the pedal of an arm at work, or without one by
+/// contact.
 template <class N>
 bool holds_on(const Arm<N>& arm) noexcept {
   const bool touches = !(arm.state->contact_n == DeviceVec<typename N::Real>{});
-  return arm.plan->pedalled ? arm.state->pedal_down : touches;
+  const bool pressed = arm.state->pedal_down && arm.state->supervisor.motors_on();
+  return arm.plan->pedalled ? pressed : touches;
 }
 
 /// Marks what was cut, or restores it while a reset, an undo or a redo runs: then nothing is cut.

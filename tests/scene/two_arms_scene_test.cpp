@@ -162,9 +162,19 @@ TEST_CASE("loaded, the second arm has the scale of the first and a tool of its o
 TEST_CASE("options name both devices: one scale for both, or six numbers") {
   SceneOverrides overrides;
   overrides.torque_scale = std::array{0.5, 0.5, 0.5};
+  // A motor's scale of one device is none of another's.
+  CHECK(test::error_of([&] { static_cast<void>(load(kTwo, overrides)); }) ==
+        "--torque-scale has three numbers, and the scene has two devices of different kinds; give "
+        "six");
+  CHECK(error_of(kTwo, {"device.torque_scale=[1,1,1]"}) ==
+        "--set device.torque_scale: the scene has two devices of different kinds; write each one's "
+        "in "
+        "its [[device]]");
+  overrides.personality = Personality::touch;
   const LoadedScene both = load(kTwo, overrides);
   CHECK(both.device.torque_scale == overrides.torque_scale);
   CHECK(both.second->device.torque_scale == overrides.torque_scale);
+  overrides.personality.reset();
   overrides.second_torque_scale = std::array{2.0, 2.0, 2.0};
   const LoadedScene each = load(kTwo, overrides);
   CHECK(each.device.torque_scale == overrides.torque_scale);
