@@ -102,7 +102,7 @@ constexpr void filter_plane(const GradientTaps& tap, const VoxelGrid& grid,
   const auto width = static_cast<std::size_t>(tile.hi.x - tile.lo.x);
   const auto height = static_cast<std::size_t>(tile.hi.y - tile.lo.y);
   const std::int32_t first_x = tile.lo.x - kGradientReach;
-  const std::int32_t from = std::max(first_x, 0);
+  const std::int32_t from = std::max(first_x, std::int32_t{0});
   const std::int32_t to = std::min(tile.hi.x + kGradientReach, grid.nx);
   const auto before = static_cast<std::size_t>(from - first_x);
   const auto count = static_cast<std::size_t>(to - from);

@@ -104,22 +104,27 @@ struct LawPlan {
   }
 };
 
+/// A tick of a law of class `Law`: what its plan points to.
+template <class Law, class In>
+requires LawOf<Law, In>
+[[nodiscard]] typename In::Output law_step(const LawPlan<In>& plan, LawMemory& memory,
+                                           const In& in) noexcept {
+  using State = typename Law::State;
+  if (!memory.begun) {
+    ::new (static_cast<void*>(memory.bytes.data())) State{};
+    memory.begun = true;
+  }
+  return std::launder(reinterpret_cast<const Law*>(plan.law.data()))
+      ->step(in, *std::launder(reinterpret_cast<State*>(memory.bytes.data())));
+}
+
 /// At load: the plan of one law with these settings.
 template <class Law, class In>
 requires LawOf<Law, In>
 [[nodiscard]] LawPlan<In> law_plan(const LawSetup& setup) {
-  using Plan = LawPlan<In>;
-  using State = typename Law::State;
-  Plan plan;
+  LawPlan<In> plan;
   ::new (static_cast<void*>(plan.law.data())) Law(setup);
-  plan.step = [](const Plan& of, LawMemory& memory, const In& in) noexcept -> typename In::Output {
-    if (!memory.begun) {
-      ::new (static_cast<void*>(memory.bytes.data())) State{};
-      memory.begun = true;
-    }
-    return std::launder(reinterpret_cast<const Law*>(of.law.data()))
-        ->step(in, *std::launder(reinterpret_cast<State*>(memory.bytes.data())));
-  };
+  plan.step = &law_step<Law, In>;
   return plan;
 }
 

@@ -174,7 +174,7 @@ class EnergyBounding {
   [[nodiscard]] Real bound(Energy budget_mj) const noexcept {
     if (!(budget_mj > Energy(0))) return Real(0);
     if constexpr (N::kIsFixed) {
-      const std::int64_t rate = std::max(n2_per_mj_.raw(), 1);
+      const std::int64_t rate = std::max(n2_per_mj_.raw(), std::int32_t{1});
       const std::int64_t square = std::min(budget_mj, INT64_MAX / rate) * rate >> 16;
       return Real::from_raw(saturate_i32(integer_sqrt(static_cast<std::uint64_t>(square))));
     } else {

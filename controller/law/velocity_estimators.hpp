@@ -41,7 +41,7 @@ class VelocityWindow {
   /// Adds the tip `gap` ticks after the last one. Missing positions between are interpolated, as if
   /// the hand had kept its speed. Writes at most kRing + 1 positions.
   constexpr void take(DeviceVec<Real> tip_mm, std::uint32_t gap) noexcept {
-    const std::int64_t ticks = std::max(gap, 1U);
+    const std::int64_t ticks = std::max<std::uint32_t>(gap, 1U);
     const DeviceVec<Real> from = ring_[static_cast<std::size_t>(newest_)];
     const auto between = [&](Real a, Real b, std::int64_t i) {
       const Wide part = (wide(b) - wide(a)) * Wide(i) / Wide(ticks);
@@ -197,9 +197,10 @@ class Foaw {
   using State = VelocityWindow<N>;
 
   explicit Foaw(const LawSetup& setup)
-      : plan_{.rate_hz = static_cast<std::int32_t>(setup.rate_hz()),
-              .stride = std::max(1, static_cast<std::int32_t>(setup.rate_hz()) / 1000),
-              .noise_mm = typename N::Real(setup.tip_noise_mm())} {}
+      : plan_{
+            .rate_hz = static_cast<std::int32_t>(setup.rate_hz()),
+            .stride = std::max<std::int32_t>(1, static_cast<std::int32_t>(setup.rate_hz()) / 1000),
+            .noise_mm = typename N::Real(setup.tip_noise_mm())} {}
 
   [[nodiscard]] DeviceVec<typename N::Real> step(const VelocityInput<N>& in,
                                                  State& window) const noexcept {

@@ -8,6 +8,7 @@
 #include <memory>
 #include <span>
 #include <string_view>
+#include <variant>
 #include <vector>
 
 #include "controller/input/load_error.hpp"
@@ -73,6 +74,10 @@ class CompiledSceneOf final : public CompiledScene {
     memory_.share(state_, second_->state);
   }
   [[nodiscard]] const SceneCosts& costs() const noexcept override { return costs_; }
+  [[nodiscard]] std::variant<Arms<FixedNumbers>, Arms<DoubleNumbers>> parts()
+      const noexcept override {
+    return Arms<N>(arms_);
+  }
   [[nodiscard]] TickTime time_tick(std::size_t tick) override {
     const TickCost& cost = costs_.ticks[tick];
     const WorstTick worst =

@@ -5,6 +5,7 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include "controller/kernel/kernel_set.hpp"
@@ -12,6 +13,7 @@
 #include "controller/plan/method/tool_method.hpp"
 #include "controller/plan/tables/sample_tables.hpp"
 #include "controller/servo/servo.hpp"
+#include "controller/servo/servo_state.hpp"
 
 // A loaded scene to a servo: plan, memory, costs and snapshot; and whether it fits the tick.
 
@@ -69,6 +71,11 @@ class CompiledScene : public Servo {
   /// Takes the volumes' densities over (they are empty in the scene afterwards) and allocates the
   /// rest. Once, before the first step; `scene` is the one that was compiled.
   virtual void take(LoadedScene& scene) = 0;
+
+  /// Plan and state of each arm as `servo_step` takes them, in the numbers of the scene: for a
+  /// program that steps them itself (docs/bare-metal.md). They point into this servo. After `take`.
+  [[nodiscard]] virtual std::variant<Arms<FixedNumbers>, Arms<DoubleNumbers>> parts()
+      const noexcept = 0;
 
   /// Density of volume `scene_index` before the first cut; empty if the scene does not cut. After
   /// `take`.

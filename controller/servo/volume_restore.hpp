@@ -80,7 +80,8 @@ inline constexpr int kBlocksPerTick = 1024;
 /// a fiftieth of a tick at 1 kHz, and 8 take as much of one at 8 kHz. If gradients are stored a
 /// brick takes 80 times as long: 25 us.
 [[nodiscard]] constexpr int bricks_per_tick(std::int32_t rate_hz, bool gradients) noexcept {
-  const int bricks = std::clamp(64 * 1000 / std::max(rate_hz, 1), 8, 64);
+  const int bricks = static_cast<int>(
+      std::clamp<std::int32_t>(64 * 1000 / std::max<std::int32_t>(rate_hz, 1), 8, 64));
   return gradients ? std::max(1, bricks / 32) : bricks;
 }
 

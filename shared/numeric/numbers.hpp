@@ -60,6 +60,10 @@ class Fixed {
   constexpr Fixed() noexcept = default;
   explicit constexpr Fixed(int whole) noexcept
       : raw_(saturate_i32(static_cast<std::int64_t>(whole) * (std::int64_t{1} << F))) {}
+  /// `std::int32_t` in newlib, the C library of processors without an operating system.
+  template <std::same_as<long> Long>
+  requires(sizeof(Long) == sizeof(int)) explicit constexpr Fixed(Long whole) noexcept
+      : Fixed(static_cast<int>(whole)) {}
   explicit constexpr Fixed(double value) noexcept : raw_(raw_from(value)) {}
   template <int G>
   explicit constexpr Fixed(Fixed<G> other) noexcept : raw_(raw_from(other)) {}

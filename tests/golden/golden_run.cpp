@@ -3,14 +3,17 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <utility>
 
 #include "controller/plan/compile.hpp"
 #include "controller/tool/tool_shapes.hpp"
+#include "shared/numeric/fnv1a.hpp"
+#include "shared/text/text.hpp"
 #include "shared/volume/checksum.hpp"
+#include "tests/golden/golden_hash.hpp"
 #include "tests/golden/golden_script.hpp"
-#include "tests/kernel/hash.hpp"
 
 namespace kerf::test {
 namespace {
@@ -21,6 +24,7 @@ SceneVolume blob(VoxelGrid grid, std::array<double, 3> spacing_mm, Pose pose) {
   volume.image.grid = grid;
   volume.image.spacing_mm = spacing_mm;
   volume.pose = pose;
+  volume.image.density.reserve(grid.voxel_count());
   std::uint32_t noise = 1;
   for (std::int32_t z = 0; z < grid.nz; ++z) {
     for (std::int32_t y = 0; y < grid.ny; ++y) {
@@ -84,6 +88,8 @@ SceneTool hook(std::int32_t side, double pitch_mm) {
   });
 }
 
+}  // namespace
+
 LoadedScene golden_scene(GoldenScene which, NumericKind numeric) {
   constexpr double kVoxelMm = 0.125;
   LoadedScene scene;
@@ -124,30 +130,6 @@ LoadedScene golden_scene(GoldenScene which, NumericKind numeric) {
   return scene;
 }
 
-void add(Hash& hash, const ServoOutput& out) {
-  const auto add_all = [&](const auto& numbers) {
-    for (const double number : numbers) hash.add(number);
-  };
-  add_all(out.gimbal_rad);
-  add_all(out.position_mm);
-  add_all(out.rotation);
-  add_all(out.velocity_mm_per_s);
-  add_all(out.force_n);
-  add_all(out.contact_n);
-  add_all(out.modification_n);
-  add_all(out.torque_n_mm);
-  hash.add(out.absorbed_mj);
-  for (const VoxelBox& box : out.changed) {
-    for (const std::int64_t edge : {box.lo.x, box.lo.y, box.lo.z, box.hi.x, box.hi.y, box.hi.z}) {
-      hash.add(edge);
-    }
-  }
-  hash.add(static_cast<std::uint64_t>(out.fault));
-  hash.add(out.output_hash);  // motor counts, removal, phase
-}
-
-}  // namespace
-
 GoldenRun golden_run(GoldenScene which, NumericKind numeric, const KernelSet& kernels) {
   const std::int32_t ticks = golden_ticks(which);
   LoadedScene scene = golden_scene(which, numeric);
@@ -157,19 +139,14 @@ GoldenRun golden_run(GoldenScene which, NumericKind numeric, const KernelSet& ke
 
   GoldenRun run;
   for (const TickCost& pair : servo->costs().ticks) run.methods.insert(pair.choice.method->step);
-  Hash hash, volume_hash;
+  GoldenHash hash(which);
+  std::uint64_t volume_hash = kFnv1aBasis;
   ServoOutput last;
   for (std::int32_t tick = 0; tick < ticks; ++tick) {
     servo->apply(scripted_command(tick, tools));
     const ServoOutput out = servo->step(scripted_report(tick));
-    add(hash, out);
-    if (which == GoldenScene::sweep) {
-      for (const double mm : out.proxy_offset_mm) hash.add(mm);
-      for (const double n_mm : out.tip_torque_n_mm) hash.add(n_mm);
-      for (const double part : {out.press_n, out.spindle_ratio, out.spindle_load}) hash.add(part);
-      hash.add(static_cast<std::uint64_t>(out.forbidden));
-    }
-    if (tick % 50 == 0) hash.add(servo->penetration_mm());
+    hash.add(out);
+    if (tick % kPenetrationTicks == 0) hash.add(servo->penetration_mm());
     run.forbidden_ticks += out.forbidden ? 1 : 0;
     run.contact_ticks += out.contact ? 1 : 0;
     run.late_contact_ticks += out.contact && tick >= ticks * 3 / 4 ? 1 : 0;
@@ -183,9 +160,11 @@ GoldenRun golden_run(GoldenScene which, NumericKind numeric, const KernelSet& ke
     for (std::size_t v = 0; v < volumes; ++v) run.removed_steps[v] += out.removed_by_volume[v];
     last = out;
   }
-  for (std::size_t v = 0; v < volumes; ++v) volume_hash.add(density_hash(servo->density(v)));
-  run.hash = hash.hex();
-  run.volume_hash = volume_hash.hex();
+  for (std::size_t v = 0; v < volumes; ++v) {
+    volume_hash = fnv1a_bytes(volume_hash, density_hash(servo->density(v)));
+  }
+  run.hash = hex64(hash.value());
+  run.volume_hash = hex64(volume_hash);
   return run;
 }
 

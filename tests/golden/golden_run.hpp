@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
 #include <set>
 #include <string>
@@ -9,22 +8,9 @@
 #include "controller/kernel/kernel_set.hpp"
 #include "controller/load/loaded_scene.hpp"
 #include "controller/servo/servo_plan.hpp"
+#include "tests/golden/golden_script.hpp"
 
 namespace kerf::test {
-
-/// Two volumes, one that the tools' lattices fit and one that none fits.
-enum class GoldenScene : std::uint8_t {
-  mill,  ///< cuts for 20 s: in fixed point the methods `aligned` and `splat`
-  feel,  ///< cuts nothing, turns tools without symmetry for 3 s: the method `gather`
-  sweep  ///< feels by the swept proxy and cuts by its force for 3 s: a ball, a shaft that turns
-};
-[[nodiscard]] constexpr const char* name_of(GoldenScene scene) noexcept {
-  constexpr const char* kNames[] = {"mill", "feel", "sweep"};
-  return kNames[static_cast<std::size_t>(scene)];
-}
-constexpr std::int32_t golden_ticks(GoldenScene scene) noexcept {
-  return scene == GoldenScene::mill ? 20'000 : 3'000;  // at 1 kHz
-}
 
 /// What a run ends in, and what it met on the way.
 struct GoldenRun {
@@ -37,6 +23,9 @@ struct GoldenRun {
   std::uint64_t removed_steps[2] = {};                           ///< by volume
   std::set<Method> methods;                                      ///< of all tools in all volumes
 };
+
+/// Made from integers alone, apart from the samples of `sweep`'s tools.
+[[nodiscard]] LoadedScene golden_scene(GoldenScene which, NumericKind numeric);
 
 /// A compiled scene in virtual time, under a hand that loses reports, runs into two faults and
 /// docks again, as far as the scene's ticks go.

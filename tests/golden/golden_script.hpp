@@ -8,8 +8,23 @@
 
 #include "controller/servo/servo.hpp"
 
-/// The hand of the golden run, in integers: joint counts, pots, gaps and commands by tick.
+/// The scenes of the golden run by name, and its hand in integers: joint counts, pots, gaps and
+/// commands by tick. No heap: bare metal runs it too.
 namespace kerf::test {
+
+/// Two volumes, one that the tools' lattices fit and one that none fits.
+enum class GoldenScene : std::uint8_t {
+  mill,  ///< cuts for 20 s: in fixed point the methods `aligned` and `splat`
+  feel,  ///< cuts nothing, turns tools without symmetry for 3 s: the method `gather`
+  sweep  ///< feels by the swept proxy and cuts by its force for 3 s: a ball, a shaft that turns
+};
+[[nodiscard]] constexpr const char* name_of(GoldenScene scene) noexcept {
+  constexpr const char* kNames[] = {"mill", "feel", "sweep"};
+  return kNames[static_cast<std::size_t>(scene)];
+}
+constexpr std::int32_t golden_ticks(GoldenScene scene) noexcept {
+  return scene == GoldenScene::mill ? 20'000 : 3'000;  // at 1 kHz
+}
 
 /// From the inkwell to the volumes and back, between two ticks.
 struct Outing {
@@ -47,7 +62,7 @@ constexpr DeviceReport scripted_report(std::int32_t tick) noexcept {
                                        [&](const Outing& o) { return tick < o.end; });
   const std::int32_t since = tick - outing.begin, left = outing.end - tick;
   const std::int32_t share =
-      std::clamp(std::min(since - kRestTicks, left - kRestTicks), 0, kTravelTicks);
+      std::clamp<std::int32_t>(std::min(since - kRestTicks, left - kRestTicks), 0, kTravelTicks);
   const auto noise = [tick](std::size_t from_bit, std::uint32_t largest) {
     const std::uint32_t bits = static_cast<std::uint32_t>(tick) * 2'654'435'761U;
     return static_cast<std::int32_t>(bits >> from_bit & largest);

@@ -46,12 +46,13 @@ struct CloseSamples {
       const Number from_low = std::max(Number(0), around[axis] - table.low[axis]);
       at[axis] = static_cast<std::int32_t>(std::min(
           from_low * kFine / table.edge, Number(kFine * (table.cells[axis] + kCloseRadius))));
-      from[axis] = std::max(0, at[axis] / kFine - kCloseRadius);
+      from[axis] = std::max(std::int32_t{0}, at[axis] / kFine - kCloseRadius);
       to[axis] = std::min(at[axis] / kFine + kCloseRadius + 1, table.cells[axis]);
     }
     const auto square_to = [&](std::size_t axis, std::int32_t cell) {  // of the distance to a cell
       const std::int32_t low = kFine * cell;
-      const std::int32_t gap = std::max({0, low - at[axis] - 1, at[axis] - low - kFine});
+      const std::int32_t gap =
+          std::max({std::int32_t{0}, low - at[axis] - 1, at[axis] - low - kFine});
       return gap * gap;
     };
     const std::int32_t square = (kFine * kCloseRadius) * (kFine * kCloseRadius);
@@ -402,7 +403,7 @@ template <class N>
   const Ratio cube = top * top * top, weight = cube * cube;
   auto of_wide = static_cast<Sum>(2 * kNarrow);
   if constexpr (N::kIsFixed) {
-    of_wide *= std::max(1, weight.raw());
+    of_wide *= std::max(std::int32_t{1}, weight.raw());
   } else {
     of_wide *= weight;
   }

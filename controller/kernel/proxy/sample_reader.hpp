@@ -236,7 +236,7 @@ class SampleReader {
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const auto place = place_at<N>(centre[axis], volume.places.offset_vox[axis][sample]);
       const auto low = static_cast<std::int32_t>(N::kIsFixed ? place / 65536 : place);
-      from[axis] = std::max(low - kIsoNear + 1, 0);
+      from[axis] = std::max(low - kIsoNear + 1, std::int32_t{0});
       to[axis] = std::min(low + kIsoNear + 1, end[axis]);
     }
     const DensityScale& scale = volume.field.scale;

@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: Apache-2.0
+// A golden scene, compiled, as assembler text for an image without an operating system: constants
+// for flash, the state of the servo for RAM. Runs on a 32-bit ARM with Linux, or under qemu-arm:
+// its structs have the same layout there.
+//     write_plan SCENE fixed|double >plan.s     SCENE: mill, feel or sweep
+#include <cstddef>
+#include <cstdio>
+#include <cstring>
+#include <memory>
+#include <string>
+#include <variant>
+
+#include "controller/kernel/kernel_set.hpp"
+#include "controller/plan/compile.hpp"
+#include "controller/servo/servo_plan.hpp"
+#include "controller/servo/servo_state.hpp"
+#include "examples/bare-metal/arena.hpp"
+#include "examples/bare-metal/laws.hpp"
+#include "examples/bare-metal/memory_image.hpp"
+#include "tests/golden/golden_run.hpp"
+
+namespace kerf::bare {
+namespace {
+
+using test::GoldenScene;
+
+/// The symbol of a law's step; ends the program for a law without one.
+template <class In>
+std::string symbol_of(const LawPlan<In>& plan) {
+  using Step = typename LawPlan<In>::Step;
+  const auto one = [&]<class Law>(const char* symbol, const char*& found) {
+    if constexpr (LawOf<Law, In>) {
+      const Step step = &law_step<Law, In>;
+      if (plan.step == step) found = symbol;
+    }
+  };
+  const char* found = nullptr;
+#define KERF_COMPARE(symbol, Law, Input)                      \
+  one.template operator()<Law<FixedNumbers>>(#symbol, found); \
+  one.template operator()<Law<DoubleNumbers>>(#symbol, found);
+  KERF_BARE_LAWS(KERF_COMPARE)
+#undef KERF_COMPARE
+  if (found == nullptr) {
+    std::fputs("write_plan: the scene has a law that laws.hpp does not list; add it there\n",
+               stderr);
+    std::exit(2);
+  }
+  return found;
+}
+
+template <class N>
+void name_words(const ServoPlan<N>& plan, MemoryImage& image) {
+  image.name_word(&plan.kernels, "_ZN4kerf10kScalarSetE");
+  image.name_word(&plan.taps, "kerf_taps");
+  image.add_constant(plan.taps, sizeof *plan.taps, "kerf_taps");
+  const auto law = [&](const auto& of) {
+    if (of.given()) image.name_word(&of.step, symbol_of(of));
+  };
+  law(plan.velocity);
+  law(plan.force_law);
+  law(plan.stabiliser);
+}
+
+template <class N>
+void add_volumes(const ServoPlan<N>& plan, const ServoState<N>& state, MemoryImage& image) {
+  for (std::size_t v = 0; v < plan.volume_count; ++v) {
+    const VolumeState<N>& volume = state.volumes[v];
+    image.make_volume(volume.density.data());
+    if (!volume.gradient.empty()) image.make_volume(volume.gradient.data());
+    if (!volume.first.empty()) image.make_first(volume.first.data(), volume.density.data());
+    if (!plan.contact.swept) continue;
+    const FreeSpaceMap& map = state.contact.volumes[v].field.free;
+    if (map.distance != nullptr) image.make_constant(map.distance);
+  }
+}
+
+template <class N>
+void write(const Arm<N>& arm, const Arena& first, const Arena& second) {
+  const ServoPlan<N>& plan = *arm.plan;
+  const ServoState<N>& state = *arm.state;
+  MemoryImage image(first, second);
+  image.add_root(&plan, sizeof plan, alignof(ServoPlan<N>), "kerf_plan");
+  image.add_root(&state, sizeof state, alignof(ServoState<N>), "kerf_state");
+  image.add_root(state.history, sizeof *state.history, alignof(VolumeHistory));
+  name_words(plan, image);
+  add_volumes(plan, state, image);
+  image.reach(&plan, true);
+  image.reach(&state, false);
+  image.write(stdout);
+  // What the image compares with its own layout before the first tick.
+  std::printf("\t.section .kerf_tables\n\t.balign 4\n\t.global kerf_layout\nkerf_layout:\n");
+  for (const std::size_t bytes : {sizeof plan, sizeof state, offsetof(ServoPlan<N>, rate_hz),
+                                  offsetof(ServoState<N>, output_hash)}) {
+    std::printf("\t.word %zu\n", bytes);
+  }
+}
+
+std::unique_ptr<CompiledScene> compiled_in(Arena* arena, GoldenScene which, NumericKind numeric) {
+  Arena::use(arena);
+  LoadedScene scene = test::golden_scene(which, numeric);
+  auto servo = compile(scene, kScalarSet);
+  Arena::use(nullptr);
+  return servo;
+}
+
+}  // namespace
+}  // namespace kerf::bare
+
+int main(int argc, char** argv) {
+  using namespace kerf;
+  using namespace kerf::bare;
+  if (argc != 3) {
+    std::fputs("write_plan: no scene and numbers; give, for example, mill fixed\n", stderr);
+    return 2;
+  }
+  GoldenScene which = GoldenScene::mill;
+  while (std::strcmp(test::name_of(which), argv[1]) != 0) {
+    if (which == GoldenScene::sweep) {
+      std::fprintf(stderr, "write_plan: %s: unknown scene; use mill, feel or sweep\n", argv[1]);
+      return 2;
+    }
+    which = static_cast<GoldenScene>(static_cast<int>(which) + 1);
+  }
+  const NumericKind numeric =
+      std::strcmp(argv[2], "double") == 0 ? NumericKind::float64 : NumericKind::fixed;
+  const auto warm = compiled_in(nullptr, which, numeric);  // what is made once, is made now
+  static Arena first, second;
+  const auto servo = compiled_in(&first, which, numeric);
+  const auto again = compiled_in(&second, which, numeric);
+  std::visit([&](const auto& arms) { write(arms[0], first, second); }, servo->parts());
+}
