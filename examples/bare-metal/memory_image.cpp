@@ -89,12 +89,10 @@ void MemoryImage::add_constant(const void* at, std::size_t bytes, std::string na
   constants_.push_back({static_cast<const std::byte*>(at), bytes, std::move(name)});
 }
 
-void MemoryImage::make_constant(const void* at) {
-  blocks_[block_at(offset_of(at))].is_constant = true;
-}
-
-void MemoryImage::make_volume(const void* at) {
-  blocks_[block_at(offset_of(at))].is_volume = true;
+void MemoryImage::make_volume(const void* at, bool constant) {
+  ImageBlock& block = blocks_[block_at(offset_of(at))];
+  block.is_volume = true;
+  block.is_constant = constant;
 }
 
 void MemoryImage::make_first(const void* at, const void* of) {
@@ -159,7 +157,7 @@ void MemoryImage::reach(const void* root, bool constant) {
 
 Room MemoryImage::room_of(const ImageBlock& block) const {
   if (block.first_of != 0) return Room::first;
-  if (block.is_constant) return Room::table;
+  if (block.is_constant) return block.is_volume ? Room::field : Room::table;
   if (block.is_volume) return Room::volume;
   const std::byte* begin = first_.begin() + block.offset;
   const bool zero =
@@ -236,6 +234,7 @@ void MemoryImage::write(std::FILE* out) const {
   });
   std::fputs("kerf_copies_end:\n", out);
   each(Room::state, ".kerf_state,\"aw\",%progbits", filled);
+  each(Room::field, ".kerf_first,\"a\",%progbits", filled);
   each(Room::volume, ".kerf_first,\"a\",%progbits", [&](const ImageBlock& block, std::size_t i) {
     std::fprintf(out, "\t.balign %zu\n.Lfirst%zu:\n", std::max<std::size_t>(block.align, 4), i);
     write_block(block, out);

@@ -20,7 +20,8 @@ enum class Room : std::uint8_t {
   state,    ///< changes: in RAM, its first value in flash
   volume,   ///< the same, of the size of a volume: start-up copies it by a list of its own
   scratch,  ///< changes, and is zero at first: takes no flash
-  first     ///< constant: the first content of a block of the room `volume`, in flash
+  field,    ///< constant, of the size of a volume: in flash, beside the volumes' first contents
+  first     ///< the first content of a block of the room `volume`, in flash
 };
 
 /// A block of the image. `bytes` of two copies, made in two arenas: a word that is the same in both
@@ -51,10 +52,8 @@ class MemoryImage {
   void name_word(const void* at, std::string symbol);
   /// What lies in no arena, and points nowhere: a constant of the program under a symbol.
   void add_constant(const void* at, std::size_t bytes, std::string name);
-  /// The block here is constant, though what changes points to it.
-  void make_constant(const void* at);
-  /// The block here is as large as a volume.
-  void make_volume(const void* at);
+  /// The block here is an array over the voxels of a volume, or their bricks; constant, or not.
+  void make_volume(const void* at, bool constant);
   /// A constant block with the content that a volume has at first: it is in flash once.
   void make_first(const void* at, const void* of);
   /// All that the root here points to, directly or not, is part of the image. Constants first: what

@@ -65,12 +65,13 @@ template <class N>
 void add_volumes(const ServoPlan<N>& plan, const ServoState<N>& state, MemoryImage& image) {
   for (std::size_t v = 0; v < plan.volume_count; ++v) {
     const VolumeState<N>& volume = state.volumes[v];
-    image.make_volume(volume.density.data());
-    if (!volume.gradient.empty()) image.make_volume(volume.gradient.data());
+    image.make_volume(volume.density.data(), false);
+    if (!volume.gradient.empty()) image.make_volume(volume.gradient.data(), false);
     if (!volume.first.empty()) image.make_first(volume.first.data(), volume.density.data());
-    if (!plan.contact.swept) continue;
     const FreeSpaceMap& map = state.contact.volumes[v].field.free;
-    if (map.distance != nullptr) image.make_constant(map.distance);
+    if (map.distance != nullptr) image.make_volume(map.distance, true);
+    const auto& labels = plan.force_cut.volume[v].labels;
+    if (!labels.empty()) image.make_volume(labels.data(), true);
   }
 }
 

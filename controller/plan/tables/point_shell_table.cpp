@@ -112,6 +112,10 @@ DenseSamples<N>::DenseSamples(std::span<const SurfaceSample> samples_units, doub
     }
   }
   first_.push_back(static_cast<std::int32_t>(offset_[0].size()));
+  for (std::size_t axis = 0; axis < 3; ++axis) {  // up to half of it is not used
+    offset_[axis].shrink_to_fit();
+    normal_[axis].shrink_to_fit();
+  }
 }
 
 template <class N>
