@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 # The golden run (tests/golden) and the recorded runs (tests/replay/inputs) on several compilers,
 # optimisation levels and processors, each with every kernel set that it runs; other processors under
-# qemu, WebAssembly under Node. Prints a table; fails where a hash is not the known one. Builds without any library.
+# qemu (a Cortex-M7 without an operating system, too), WebAssembly under Node. Prints a table; fails where a hash is not the known one. Builds without any library.
 #     .ci/check-determinism.sh [--all]      --all: every combination, a quarter of an hour
 set -euo pipefail
 cd "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/.."
@@ -55,8 +55,23 @@ check() {
   fi
   local status=0
   result=$("${run[@]}" "$name/bin/test_golden") || status=$?
-  # golden SCENE NUMBERS KERNELS HASH VOLUME_HASH SECONDS; double does not depend on the kernels.
-  awk -v compiler="$compiler" -v flags="$flags" -v processor="$processor" -v row="$row" '
+  rows "$processor" "$compiler" "$flags" <<<"$result"
+  if ((status)); then
+    grep -v '^golden ' <<<"$result" || true
+    return 1
+  fi
+  # The scenes that this build compiles, on a processor without an operating system.
+  if [[ $processor == arm ]]; then
+    result=$(.ci/check-bare-metal.sh) || status=$?
+    rows cortex-m7 arm-none-eabi-g++ -Os <<<"$result"
+    return "$status"
+  fi
+}
+
+# rows PROCESSOR COMPILER FLAGS: the table's rows of a golden run, from its lines
+# golden SCENE NUMBERS KERNELS HASH VOLUME_HASH SECONDS; double does not depend on the kernels.
+rows() {
+  awk -v compiler="$2" -v flags="$3" -v processor="$1" -v row="$row" '
     $1 != "golden" { next }
     $3 == "fixed" { line[++rows] = $0; next }
     { other[$2] = $5; other_seconds[$2] += $7 }
@@ -70,11 +85,7 @@ check() {
         other[scene] = "same run"
         other_seconds[scene] = 0
       }
-    }' <<<"$result"
-  if ((status)); then
-    grep -v '^golden ' <<<"$result" || true
-    return 1
-  fi
+    }'
 }
 
 # The levels of x86-64 that this machine runs, the highest last.

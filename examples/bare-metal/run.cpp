@@ -107,7 +107,7 @@ int run() noexcept {
   // The same in kilobytes as `size -A` of the image.
   Text line;
   line.add("golden ").add(test::name_of(kScene)).add(N::kIsFixed ? " fixed" : " double");
-  line.add(" cortex-m7 ").add_hex(end.hash).add(" ").add_hex(end.volume_hash).add("\n");
+  line.add(" scalar ").add_hex(end.hash).add(" ").add_hex(end.volume_hash).add("\n");
   write(line.text());
   Text sizes;
   sizes.add("bytes: code ").add(size(kerf_text_bytes)).add(", tables ");

@@ -1,16 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
-// A golden scene, compiled, as assembler text for an image without an operating system: constants
-// for flash, the state of the servo for RAM. Runs on a 32-bit ARM with Linux, or under qemu-arm:
-// its structs have the same layout there.
-//     write_plan SCENE fixed|double >plan.s     SCENE: mill, feel or sweep
+// A compiled scene as assembler text for an image without an operating system: constants for flash,
+// the state of the servo for RAM. Runs on a 32-bit ARM with Linux, or under qemu-arm: its structs
+// have the same layout there.
+//     write_plan SCENE.toml >plan.s
+//     write_plan mill|feel|sweep fixed|double >plan.s     the scenes of tests/golden
 #include <cstddef>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
+#include <exception>
 #include <memory>
+#include <optional>
 #include <string>
 #include <variant>
 
 #include "controller/kernel/kernel_set.hpp"
+#include "controller/load/load_scene.hpp"
 #include "controller/plan/compile.hpp"
 #include "controller/servo/servo_plan.hpp"
 #include "controller/servo/servo_state.hpp"
@@ -96,37 +101,67 @@ void write(const Arm<N>& arm, const Arena& first, const Arena& second) {
   }
 }
 
-std::unique_ptr<CompiledScene> compiled_in(Arena* arena, GoldenScene which, NumericKind numeric) {
+/// What the command line names.
+struct Wanted {
+  const char* file = nullptr;  ///< of a scene; null: a golden one
+  GoldenScene golden = GoldenScene::mill;
+  NumericKind numeric = NumericKind::fixed;
+
+  [[nodiscard]] LoadedScene scene() const {
+    return file != nullptr ? load_scene(file) : test::golden_scene(golden, numeric);
+  }
+};
+
+std::optional<Wanted> wanted(int argc, char** argv) {
+  if (argc == 2) return Wanted{argv[1], GoldenScene::mill, NumericKind::fixed};
+  if (argc != 3) return std::nullopt;
+  const bool in_double = std::strcmp(argv[2], "double") == 0;
+  if (!in_double && std::strcmp(argv[2], "fixed") != 0) return std::nullopt;
+  for (const GoldenScene one : {GoldenScene::mill, GoldenScene::feel, GoldenScene::sweep}) {
+    if (std::strcmp(test::name_of(one), argv[1]) != 0) continue;
+    return Wanted{nullptr, one, in_double ? NumericKind::float64 : NumericKind::fixed};
+  }
+  return std::nullopt;
+}
+
+std::unique_ptr<CompiledScene> compiled_in(Arena* arena, const Wanted& what) {
   Arena::use(arena);
-  LoadedScene scene = test::golden_scene(which, numeric);
+  LoadedScene scene = what.scene();
   auto servo = compile(scene, kScalarSet);
   Arena::use(nullptr);
   return servo;
+}
+
+int write_plan(int argc, char** argv) {
+  const std::optional<Wanted> what = wanted(argc, argv);
+  if (!what) {
+    std::fputs(
+        "write_plan: no scene; give SCENE.toml, or as mill fixed: mill, feel or sweep, fixed or "
+        "double\n",
+        stderr);
+    return 2;
+  }
+  const auto warm = compiled_in(nullptr, *what);  // what is made once, is made now
+  static Arena first, second;
+  const auto servo = compiled_in(&first, *what);
+  const auto again = compiled_in(&second, *what);
+  if (servo->arms() != 1) {
+    std::fputs("write_plan: the scene has two arms; an image steps one, leave one [[device]] out\n",
+               stderr);
+    return 2;
+  }
+  std::visit([&](const auto& arms) { write(arms[0], first, second); }, servo->parts());
+  return 0;
 }
 
 }  // namespace
 }  // namespace kerf::bare
 
 int main(int argc, char** argv) {
-  using namespace kerf;
-  using namespace kerf::bare;
-  if (argc != 3) {
-    std::fputs("write_plan: no scene and numbers; give, for example, mill fixed\n", stderr);
+  try {
+    return kerf::bare::write_plan(argc, argv);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "write_plan: %s\n", error.what());
     return 2;
   }
-  GoldenScene which = GoldenScene::mill;
-  while (std::strcmp(test::name_of(which), argv[1]) != 0) {
-    if (which == GoldenScene::sweep) {
-      std::fprintf(stderr, "write_plan: %s: unknown scene; use mill, feel or sweep\n", argv[1]);
-      return 2;
-    }
-    which = static_cast<GoldenScene>(static_cast<int>(which) + 1);
-  }
-  const NumericKind numeric =
-      std::strcmp(argv[2], "double") == 0 ? NumericKind::float64 : NumericKind::fixed;
-  const auto warm = compiled_in(nullptr, which, numeric);  // what is made once, is made now
-  static Arena first, second;
-  const auto servo = compiled_in(&first, which, numeric);
-  const auto again = compiled_in(&second, which, numeric);
-  std::visit([&](const auto& arms) { write(arms[0], first, second); }, servo->parts());
 }

@@ -36,6 +36,7 @@ NOT_HERE = {
         "./kerf controller --scene scenes/phantom.toml --port socket", "./kerf controller --name tooth",
         "./kerf bridge serve", "./kerf bridge join"],
     "runs in the test own_law": ["own-law.md: "],
+    "needs compilers for other processors; .ci/all determinism runs its images": ["bare-metal.md: "],
     "fetches and builds programs of others": ["tests/standin/others/run.sh"],
     "runs in the tests packages and reader": ["./kerf package", "packages.md: cmake",
                                                 "packages.md: python3 -m venv", "venv/bin/pip install"],
@@ -45,7 +46,7 @@ NOT_HERE = {
     "runs in the test docs_tutorial": ["tutorial.md: "],
     "needs a registry of images": ["podman "],
     "runs all tests, or many minutes": [
-        "./kerf test", "safety.md: ./kerf lab", "./kerf lab ranges", ".ci/check-determinism.sh", "./kerf bench",
+        "./kerf test", "safety.md: ./kerf lab", "./kerf lab ranges", ".ci/check-determinism.sh", ".ci/check-bare-metal.sh", "./kerf bench",
         "KERF_KILLS=", "KERF_WRITE_PAGE=", "./kerf lab ablate"],
     "holds a core for a minute; with other options it runs here or in the tests lab and examples_python": [
         "./kerf lab zwidth --rate", "./kerf lab zwidth --map", "./kerf lab zwidth --arm",
