@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstddef>
-#include <cstdint>
 #include <vector>
 
 // The heap of `write_plan`: all that `new` returns lies in one of two arenas, in blocks that are

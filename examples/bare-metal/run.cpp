@@ -104,7 +104,6 @@ int run() noexcept {
   start_count();
   const std::uint64_t loops = std::max(counts_of_loops(), std::uint32_t{1});
   const End end = step_all();
-  // The same in kilobytes as `size -A` of the image.
   Text line;
   line.add("golden ").add(test::name_of(kScene)).add(N::kIsFixed ? " fixed" : " double");
   line.add(" scalar ").add_hex(end.hash).add(" ").add_hex(end.volume_hash).add("\n");

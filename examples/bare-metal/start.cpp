@@ -59,7 +59,9 @@ void paint_stack() noexcept {
 /// What can go wrong in a loop that has no bug of its own: a stack that is too small, a write to
 /// flash, an instruction that the core lacks.
 [[noreturn, gnu::used]] void report_fault(std::uint32_t stack) noexcept {
-  const std::uint32_t status = reg(0xe000ed28), address = reg(0xe000ed38);
+  const std::uint32_t status = reg(0xe000ed28);  // CFSR
+  const std::uint32_t address =
+      reg((status & 1U << 7) != 0 ? 0xe000ed34 : 0xe000ed38);  // MMFAR, BFAR
   constexpr std::uint32_t kStacking = 1U << 12 | 1U << 4, kBusAddressValid = 1U << 15;
   const auto low = reinterpret_cast<std::uintptr_t>(kerf_stack_low);
   const bool below = (status & kBusAddressValid) != 0 && address < low && address + 0x10000 > low;
@@ -69,7 +71,7 @@ void paint_stack() noexcept {
     text.add(" bytes overflowed; give it more: --defsym=kerf_stack=BYTES\n");
   } else {
     text.add("bare-metal: fault ").add_hex(status).add(" at address ").add_hex(address);
-    text.add("; CFSR and BFAR of the Armv7-M manual, B3.2\n");
+    text.add("; CFSR and MMFAR or BFAR of the Armv7-M manual, B3.2\n");
   }
   write(text.text());
   finish(3);
