@@ -9,7 +9,7 @@ import {TabSocket} from './tab_socket.js';
 
 const element = id => document.getElementById(id);
 const wanted = new URLSearchParams(location.hash.slice(1));
-const state = {inputs: null, page: null, steering: null, worker: null, shown: null};
+const state = {ready: false, page: null, steering: null, worker: null, shown: null};
 
 function refuse(text) {
   const line = element('missing');
@@ -55,7 +55,7 @@ function addControls() {
     input.addEventListener('input', () => input.nextElementSibling.textContent = input.value);
     input.addEventListener('change', start);
   }
-  element('finger').addEventListener('change', ({target}) => state.steering.fingersPress = target.checked);
+  element('finger').addEventListener('change', ({target}) => state.steering && (state.steering.fingersPress = target.checked));
   element('again').addEventListener('click', start);
   element('scene').value = scenes.some(({name}) => name === wanted.get('scene')) ? wanted.get('scene') : 'phantom';
   element('hand').value = wanted.get('hand') === 'mine' ? 'mine' : 'script';
@@ -93,19 +93,20 @@ function showOwnValues({force, servo}) {
   if (!touched.has('rate')) element('rate').value = servo.rate_hz;
 }
 
+const isMine = () => element('hand').value === 'mine';
+
 async function start(event) {
   if (event?.type === 'change') {
     if (event.target.id === 'scene') touched.clear();  // they were of the other scene
     else if (event.target.id !== 'hand') touched.add(event.target.id);
   }
   const {name, hand} = scenes.find(one => one.name === element('scene').value);
-  const mine = element('hand').value === 'mine';
+  const mine = isMine();
   element('finger-row').style.display = mine && matchMedia('(any-pointer: coarse)').matches ? '' : 'none';
   element('run-state').textContent = 'loading the scene';
   document.body.dataset.run = 'loading';
   try {
-    const scene = await textOf(`scenes/${name}.toml`);
-    const script = mine ? '' : await textOf(`scenes/hands/${hand}.toml`);
+    const [scene, script] = await Promise.all([textOf(`scenes/${name}.toml`), mine ? '' : textOf(`scenes/hands/${hand}.toml`)]);
     state.steering?.start(mine);
     state.worker.postMessage({
       open: {name: `scenes/${name}.toml`, scene, hand: script, pedal: mine, settings: settings()},
@@ -142,7 +143,10 @@ function showFacts(facts) {
 }
 
 const says = {
-  ready: () => begin(),
+  ready: () => {
+    state.ready = true;
+    start();
+  },
   opened: ({opened}) => {
     element('run-state').textContent = `loaded in ${(opened / 1000).toFixed(1)} s`;
     document.body.dataset.run = 'runs';
@@ -151,7 +155,7 @@ const says = {
   down: ({down}) => TabSocket.take(down),
   facts: ({facts}) => {
     showFacts(facts);
-    const held = state.page.heldNow();
+    const held = state.page?.heldNow() ?? null;
     if (held !== state.shown && document.body.dataset.state === 'live') {
       showOwnValues(held.sceneJson);
       state.shown = held;
@@ -165,18 +169,18 @@ const says = {
     Object.assign(document.body.dataset, {run: 'done', outputHash: done.output_hash, volumeHash: done.volume_hash,
       timesRealTime: done.times_real_time.toFixed(2)});
   },
-  failed: ({failed: text}) => state.page ? failed(text) : refuse(text),
+  failed: ({failed: text}) => state.ready ? failed(text) : refuse(text),
 };
 
-/** The module is there: the bridge's page begins, with a link to the worker. */
+/** The bridge's page, with a link to the worker, which loads the scene meanwhile. */
 async function begin() {
   TabSocket.worker = state.worker;
   globalThis.WebSocket = TabSocket;
   const {Steering} = await import('./steering.js');
-  const page = state.page = await import('./kerf.js');
-  if (page.stage) state.steering = new Steering(page, state.worker);
-  addControls();
-  await start();
+  state.page = await import('./kerf.js');
+  if (!state.page.stage) return;
+  state.steering = new Steering(state.page, state.worker);
+  state.steering.start(isMine());
 }
 
 const why = lack();
@@ -187,4 +191,6 @@ if (why) {
   state.worker.onerror = () => refuse('The worker of this page did not start: a browser with modules in workers is needed.');
   state.worker.onmessage = ({data}) => Object.keys(data).forEach(kind => says[kind]?.(data));
   document.addEventListener('visibilitychange', () => state.worker.postMessage({pause: document.hidden}));
+  addControls();
+  begin();
 }

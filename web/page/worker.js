@@ -13,11 +13,15 @@ const kBehindMs = 100;  // of the servo's time: more is not made up for
 const kFactsMs = 200;
 
 let compiled = null, kerf = null;
+let joined = false;  // there is a viewer: the page's own modules may come after the run
 let run = null;  // {pace, mostArmed, dueTicks, lookedMs, factsMs, factsTicks, busyMs, allMs, steps, paused, ended}
 const now = () => performance.now();
 
 function post(messages) {
   for (const message of messages) postMessage({down: message}, [message]);
+}
+function postNews(ended = false) {
+  if (joined) post(kerf.news(ended));
 }
 
 /** What throws ends the run with a line on the page, never the worker. */
@@ -42,7 +46,7 @@ function open({open: inputs, pace = 1, mostArmed = 0}) {
   run = {pace, mostArmed, dueTicks: 0, lookedMs: at, factsMs: at, factsTicks: 0, busyMs: 0, allMs: 0, steps: 0, paused: false,
     ended: false};
   postMessage({opened: at - began});
-  post(kerf.news());
+  postNews();
   tellFacts(at);
 }
 
@@ -75,7 +79,7 @@ function slot() {
   const began = now();
   const before = run.ended;
   if (!run.paused && !run.ended) advance(began);
-  post(kerf.news(run.ended));
+  postNews(run.ended);
   const ends = run.ended && !before;
   if (ends || (!run.ended && now() - run.factsMs >= kFactsMs)) tellFacts(now());
   if (!ends) return;
@@ -98,8 +102,10 @@ const takes = {
     post(kerf.waiting());
   },
   join: () => {
+    joined = true;
+    if (!kerf) return;  // its first run greets it
     kerf.join();
-    post(kerf.news());
+    postNews();
   },
   lead: ({lead}) => kerf.lead(...lead),
   release: () => kerf.release(),
@@ -108,7 +114,7 @@ const takes = {
 
 onmessage = ({data}) => {
   const kind = Object.keys(takes).find(name => name in data);
-  if (kind === 'open' || kerf) attempt(() => takes[kind](data));
+  if (kind === 'open' || kind === 'join' || kerf) attempt(() => takes[kind](data));
 };
 
 async function begin() {
