@@ -13,10 +13,8 @@
 #include "controller/load/scene_json.hpp"
 #include "controller/loop/publisher.hpp"
 #include "controller/scene/scene_file.hpp"
-#include "record/earlier_inputs.hpp"
-#include "record/starting_volumes.hpp"
+#include "record/kept_volumes.hpp"
 #include "record/tick_log.hpp"
-#include "replay/replay_step.hpp"
 #include "shared/numeric/fnv1a.hpp"
 #include "shared/text/command_line.hpp"
 #include "shared/text/json.hpp"
@@ -249,16 +247,27 @@ RecordedRun load_run(const std::filesystem::path& folder, const ReplayChanges& c
   return run;
 }
 
+EarlierTicks::EarlierTicks(RecordedRun& run, const std::filesystem::path& folder)
+    : run_(run),
+      inputs_(folder, run.earlier_ticks(), run.servo->arms()),
+      step_(*run.servo, run.volume_chain) {}
+
+bool EarlierTicks::step() {
+  const std::span<const TickRecord> inputs = inputs_.next();
+  if (inputs.empty()) return false;
+  ArmRecords tick{};
+  std::ranges::copy(inputs, tick.begin());
+  run_.volume_chain = step_(tick)[inputs.size() - 1].volume_hash;
+  ++done_;
+  return true;
+}
+
 void step_earlier_ticks(RecordedRun& run, const std::filesystem::path& folder) {
-  ReplayStep step(*run.servo, run.volume_chain);
-  const std::size_t arms = run.servo->arms();
-  for_each_input(folder, run.earlier_ticks(), arms, [&](std::span<const TickRecord> inputs) {
-    constexpr Tick kOften = 1024;
-    if (inputs.front().tick % kOften == 0) end_if_asked(folder.string());
-    ArmRecords tick{};
-    std::ranges::copy(inputs, tick.begin());
-    run.volume_chain = step(tick)[arms - 1].volume_hash;
-  });
+  EarlierTicks ticks(run, folder);
+  constexpr Tick kOften = 1024;
+  while (ticks.step()) {
+    if (ticks.done() % kOften == 0) end_if_asked(folder.string());
+  }
 }
 
 const KernelSet& kernels_named(const std::string& name) {
