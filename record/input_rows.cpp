@@ -53,7 +53,7 @@ InputReader::InputReader(std::filesystem::path folder, Tick last, std::size_t ar
 
 std::span<const TickRecord> InputReader::next() {
   if (next_ > last_) return {};
-  const std::size_t row = (next_ - 1) % kInputsAFile;
+  const auto row = static_cast<std::size_t>((next_ - 1) % kInputsAFile);
   if (row == 0) read_file();
   for (std::size_t arm = 0; arm < arms_; ++arm) tick_[arm] = record_of(rows_[arm][row], next_);
   ++next_;
@@ -61,7 +61,7 @@ std::span<const TickRecord> InputReader::next() {
 }
 
 void InputReader::read_file() {
-  const std::size_t wanted = std::min<Tick>(last_ - next_ + 1, kInputsAFile);
+  const auto wanted = static_cast<std::size_t>(std::min<Tick>(last_ - next_ + 1, kInputsAFile));
   for (std::size_t arm = 0; arm < arms_; ++arm) {
     const std::filesystem::path path = inputs_file(folder_, arm, next_);
     if (read_inputs(path, kInputsAFile, rows_[arm]) || read_inputs(path, wanted, rows_[arm])) {

@@ -11,7 +11,7 @@
 #include "shared/posix/atomic_file.hpp"
 #include "shared/posix/error_text.hpp"
 #include "shared/posix/program.hpp"
-#include "shared/segment/layout.hpp"
+#include "shared/segment/layout_table.hpp"
 #include "shared/text/json.hpp"
 #include "shared/text/text.hpp"
 

@@ -40,6 +40,11 @@ bool WatchedRun::step() {
   return true;
 }
 
+void WatchedRun::rest() {
+  run_.segment->begin_tick(++published_);
+  run_.segment->end_tick(static_cast<std::uint64_t>(monotonic_ns()));
+}
+
 void WatchedRun::go(Tick tick) {
   begin_go(tick);
   while (!go_on(std::numeric_limits<int>::max())) {
@@ -85,7 +90,7 @@ const ArmRecords* WatchedRun::next_row() {
       return nullptr;
     }
   }
-  const ArmRecords& row = rows_[at - first_row_];
+  const ArmRecords& row = rows_[static_cast<std::size_t>(at - first_row_)];
   if (row[0].tick == tick_ + 1) return &row;
   end_here(gap_text(tick_, row[0].tick));
   return nullptr;
@@ -117,10 +122,7 @@ void WatchedRun::show_volumes() {
     segment.publish_box(v, run_.servo->density(v), all, 0, DirtyCause::load);
   }
   segment.end_tick(static_cast<std::uint64_t>(monotonic_ns()));
-  while (segment.waiting_bricks() > 0) {
-    segment.begin_tick(++published_);
-    segment.end_tick(static_cast<std::uint64_t>(monotonic_ns()));
-  }
+  while (segment.waiting_bricks() > 0) rest();
 }
 
 }  // namespace kerf

@@ -48,6 +48,9 @@ class WatchedRun {
   /// The next tick, published. False at the end, or before a gap or a damaged row.
   bool step();
 
+  /// A sign of life for the readers, without a step.
+  void rest();
+
   /// To `tick`, or as near as the recording goes; readers see the volumes of that tick.
   void go(Tick tick);
   /// The same in parts: between these two, `go_on` until it returns true. It steps `ticks` times at
