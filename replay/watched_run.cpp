@@ -19,8 +19,10 @@ WatchedRun::WatchedRun(RecordedRun& run, RecordedTicks& log, const Options& opti
       compares_(options.compares) {
   tick_ = compared_ = before_log_ = run.earlier_ticks();
   last_tick_ = std::min<Tick>(before_log_ + log.rows(), options.until);  // without a gap
-  ticks_a_snapshot_ = last_tick_ / snapshots_that_fit(options.snapshot_bytes) + 1;
-  snapshots_[before_log_] = run.servo->keep();
+  const auto& first = snapshots_[before_log_] = run.servo->keep();
+  const auto fit =
+      std::clamp<std::size_t>(options.snapshot_bytes / first->bytes(), 1, kMostSnapshots);
+  ticks_a_snapshot_ = last_tick_ / fit + 1;
 }
 
 bool WatchedRun::step() {
@@ -69,14 +71,6 @@ bool WatchedRun::go_on(int ticks) {
   show_volumes();
   step();
   return true;
-}
-
-std::uint64_t WatchedRun::snapshots_that_fit(std::size_t snapshot_bytes) const {
-  std::size_t bytes = 1;
-  for (std::size_t v = 0; v < run_.scene.volumes.size(); ++v) {
-    bytes += run_.servo->density(v).size_bytes();
-  }
-  return std::clamp<std::uint64_t>(snapshot_bytes / bytes, 1, kMostSnapshots);
 }
 
 const ArmRecords* WatchedRun::next_row() {

@@ -69,7 +69,6 @@ class WatchedRun {
   }
 
  private:
-  [[nodiscard]] std::uint64_t snapshots_that_fit(std::size_t snapshot_bytes) const;
   /// The row of the next tick; null if there is none.
   [[nodiscard]] const ArmRecords* next_row();
   void end_here(std::string why);
