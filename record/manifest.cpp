@@ -97,6 +97,10 @@ void write_manifest(const std::filesystem::path& folder, const SegmentInfo& info
   write_new_file(folder / kManifestName, manifest.document());
 }
 
+std::string not_a_manifest(const std::filesystem::path& folder) {
+  return (folder / kManifestName).string() + ": not a manifest of this version; record it again";
+}
+
 Manifest read_manifest(const std::filesystem::path& folder) {
   const std::filesystem::path path = folder / kManifestName;
   if (const std::string why = access_error(path); !why.empty()) {
@@ -130,7 +134,7 @@ Manifest read_manifest(const std::filesystem::path& folder) {
       out.voxel_mm3.push_back(spacing[0] * spacing[1] * spacing[2]);
     }
   } catch (const JsonError&) {
-    throw RecordError(path.string() + ": not a manifest of this version; record it again");
+    throw RecordError(not_a_manifest(folder));
   }
   if (out.arms == 0 || out.arms > kMaxArms) {
     throw RecordError(path.string() + ": arms = " + std::to_string(out.arms) +

@@ -99,6 +99,9 @@ void write_manifest(const std::filesystem::path& folder, const SegmentInfo& info
                     const RecordLosses& losses, std::uint64_t rows, std::string_view end_reason,
                     const ArmSummaries& summaries = {});
 
+/// The line for a manifest that is none.
+[[nodiscard]] std::string not_a_manifest(const std::filesystem::path& folder);
+
 /// Throws `RecordError` if it is missing or has no such values.
 [[nodiscard]] Manifest read_manifest(const std::filesystem::path& folder);
 

@@ -31,14 +31,11 @@ struct RecordedScene {
 };
 
 RecordedScene read_scene(const std::filesystem::path& folder) {
-  const std::filesystem::path path = folder / kSceneName;
   const std::string text = recorded_scene(folder);
   try {
     return {json_without_source(text), source_in(text), inputs_in(text)};
   } catch (const JsonError&) {
-    throw RecordError(path.string() +
-                      ": does not say, as this version does, what the scene was loaded from; copy "
-                      "the recording again, or record it with this version");
+    throw RecordError(scene_without_source(folder));
   }
 }
 
@@ -217,6 +214,12 @@ void check_begins_at_first_tick(const std::filesystem::path& folder, const Manif
 }
 
 }  // namespace
+
+std::string scene_without_source(const std::filesystem::path& folder) {
+  return (folder / kSceneName).string() +
+         ": does not say, as this version does, what the scene was loaded from; copy the recording "
+         "again, or record it with this version";
+}
 
 RecordedRun load_run(const std::filesystem::path& folder, const ReplayChanges& changes,
                      const KernelSet& kernels, bool with_segment) {

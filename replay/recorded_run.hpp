@@ -44,6 +44,9 @@ struct RecordedRun {
   std::optional<SegmentWriter> segment;  ///< with the volumes as they start; if it was asked for
 };
 
+/// The line for a scene.json that has no source.
+[[nodiscard]] std::string scene_without_source(const std::filesystem::path& folder);
+
 /// Loads the scene of the recording in `folder`, with `changes`: volumes and meshes as the
 /// recording has them, else from their files.
 ///

@@ -15,7 +15,7 @@
 #include "shared/posix/monotonic_clock.hpp"
 #include "shared/text/json.hpp"
 #include "shared/text/text.hpp"
-#include "web/absent/failure_place.hpp"
+#include "web/absent/parser_line.hpp"
 #include "web/tab_viewer.hpp"
 
 namespace kerf::web {
@@ -25,21 +25,23 @@ namespace {
 constexpr std::size_t kTabSnapshotBytes = std::size_t{128} << 20;
 
 Manifest manifest_in(const std::filesystem::path& folder) {
-  const FailurePlace place((folder / kManifestName).string() + ": not a manifest of this version",
-                           "record it again");
+  const ParserLine line(not_a_manifest(folder));
   return read_manifest(folder);
 }
 
 RecordedRun run_in(const std::filesystem::path& folder) {
-  const FailurePlace place((folder / kSceneName).string() + ": not a scene of this version",
-                           "replay it with the version of kerf that recorded it");
+  const ParserLine line(scene_without_source(folder));
   return load_run(folder, {}, kernels_named(""), true);
 }
 
 RecordedTicks log_in(const std::filesystem::path& folder, std::size_t arms) {
   RecordedTicks log(folder, arms);
-  if (log.rows() > 0) return log;
-  throw RecordError((folder / kTickLogName).string() + ": 0 rows; nothing to replay");
+  if (log.rows() == 0) {
+    throw RecordError((folder / kTickLogName).string() + ": 0 rows; nothing to replay");
+  }
+  std::vector<ArmRecords> rows;
+  log.read(0, rows);  // at least the first one is sound
+  return log;
 }
 
 }  // namespace

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // Replays recordings in kerf.wasm under Node, without a page, and prints one line of JSON for each:
-//   node --experimental-default-type=module tests/web/replay_module.js MODULE PATH...
-// PATH: a folder, as it would be dropped, or a file.
+//   node --experimental-default-type=module tests/web/replay_module.js MODULE MOST PATH...
+// MOST: bytes that a tab unpacks. PATH: a folder, as it would be dropped, or a file.
 import fs from 'node:fs';
 import path from 'node:path';
 import {KerfModule} from '../../web/page/kerf_module.js';
 import {readyRecording} from '../../web/page/log_files.js';
 
-const [module, ...dropped] = process.argv.slice(2);
+const [module, most, ...dropped] = process.argv.slice(2);
 const cpuMs = () => Object.values(process.cpuUsage()).reduce((sum, us) => sum + us / 1000, 0);
 const compiled = new WebAssembly.Module(fs.readFileSync(module));
 
@@ -43,7 +43,7 @@ function returnsTo(kerf, tick) {
 
 for (const one of dropped) {
   try {
-    const ready = await readyRecording(filesIn(one), async ({name}) => new Uint8Array(fs.readFileSync(name)), piecesOf);
+    const ready = await readyRecording(filesIn(one), async ({name}) => new Uint8Array(fs.readFileSync(name)), piecesOf, Number(most));
     const kerf = new KerfModule(compiled);
     kerf.openReplay(ready);
     const began = cpuMs();
@@ -54,7 +54,7 @@ for (const one of dropped) {
     const stepped = cpuMs();
     const facts = kerf.facts();
     const volume_hash = kerf.volumeHash();
-    console.log(JSON.stringify({...facts, volume_hash, messages, returns: returnsTo(kerf, Math.ceil(facts.tick / 3)),
+    console.log(JSON.stringify({...facts, volume_hash, messages, returns: returnsTo(kerf, Math.max(Math.ceil(facts.tick / 3), facts.first_tick)),
       times_real_time: facts.tick * facts.tick_ns / 1e6 / (stepped - began),
       memory_mib: kerf.calls.memory.buffer.byteLength / 2 ** 20}));
   } catch (problem) {

@@ -7,27 +7,36 @@
 #include <cstring>
 #include <exception>
 #include <string>
+#include <string_view>
 #include <typeinfo>
 #include <utility>
 
 #include "shared/text/json.hpp"
-#include "web/absent/failure_place.hpp"
+#include "web/absent/parser_line.hpp"
 
 namespace kerf::web {
 namespace {
 
-std::string place_text, remedy_text;  // of the FailurePlace that lives
+std::string parser_line;  // of the one that lives; empty: none
 
 }  // namespace
 
-FailurePlace::FailurePlace(std::string place, std::string remedy) {
-  place_text = std::move(place);
-  remedy_text = std::move(remedy);
+ParserLine::ParserLine(std::string line) {
+  parser_line = std::move(line);
 }
-FailurePlace::~FailurePlace() {
-  place_text.clear();
+ParserLine::~ParserLine() {
+  parser_line.clear();
 }
 
+namespace {
+
+/// JsonError, or what the library of JSON throws below it. All other exceptions are lines already.
+bool is_of_parser(const std::type_info& type) {
+  return type == typeid(JsonError) ||
+         std::string_view(type.name()).find("nlohmann") != std::string_view::npos;
+}
+
+}  // namespace
 }  // namespace kerf::web
 
 extern "C" {
@@ -42,12 +51,11 @@ void __cxa_free_exception(void* exception) {
   std::free(exception);
 }
 /// All exceptions of kerf and of the standard library derive from std::exception, as their first
-/// base. A parser's words need a place; all others of kerf are a line with one.
+/// base.
 [[noreturn]] void __cxa_throw(void* exception, std::type_info* type, void (*)(void*)) {
-  using kerf::web::place_text, kerf::web::remedy_text;
   std::string line = static_cast<const std::exception*>(exception)->what();
-  if (!place_text.empty() && *type == typeid(kerf::JsonError)) {
-    line = place_text + " (" + line + "); " + remedy_text;
+  if (!kerf::web::parser_line.empty() && kerf::web::is_of_parser(*type)) {
+    line = kerf::web::parser_line;
   }
   kerf_failed(line.data(), line.size());
 }

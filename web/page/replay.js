@@ -6,11 +6,11 @@ const kFastest = 64;
 const element = id => document.getElementById(id);
 const kWays = `<p id="replay-ways">Replay a recording: drop its folder on the page, or choose its
     <button id="choose-folder" type="button">folder</button> or <button id="choose-files" type="button">files</button></p>
-  <input id="folder-input" type="file" webkitdirectory hidden><input id="files-input" type="file" multiple hidden>
-  <div id="replay" hidden>
+  <input id="folder-input" type="file" webkitdirectory hidden><input id="files-input" type="file" multiple hidden>`;
+const kPlayer = `<div id="replay" hidden>
+    <label class="slider">tick <input id="replay-at" type="range" min="1" max="1" step="1" value="1"><output></output></label>
     <div class="row"><button id="replay-play" type="button">pause</button><button id="replay-step" type="button">one tick</button>
       <button id="replay-slower" type="button">slower</button><button id="replay-faster" type="button">faster</button></div>
-    <label class="slider">tick <input id="replay-at" type="range" min="1" max="1" step="1" value="1"><output></output></label>
     <p id="replay-found" role="status"></p>
     <button id="replay-there" type="button" hidden>go to the first difference</button>
   </div>`;
@@ -29,10 +29,11 @@ export function foundText({compared, difference, last_tick, cut_short, first_tic
 }
 
 export class ReplayControls {
-  /** `page`: {worker, refused(text)}. The controls stand before `place`. */
-  constructor(page, place) {
+  /** `page`: {worker, refused(text)}. The controls stand in its box `fields`. */
+  constructor(page, fields) {
     Object.assign(this, {page, facts: null, folder: '', holdsSlider: false});
-    place.insertAdjacentHTML('beforebegin', kWays);
+    fields.querySelector('legend').insertAdjacentHTML('afterend', kPlayer);
+    element('run-state').insertAdjacentHTML('beforebegin', kWays);
     const on = (id, kind, what) => element(id).addEventListener(kind, what);
     for (const kind of ['folder', 'files']) {
       const input = element(`${kind}-input`);

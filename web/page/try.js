@@ -56,7 +56,7 @@ function addControls() {
     input.addEventListener('input', () => input.nextElementSibling.textContent = input.value);
     input.addEventListener('change', start);
   }
-  state.replay = new ReplayControls({worker: state.worker, refused}, element('run-state'));
+  state.replay = new ReplayControls({worker: state.worker, refused}, fields);
   element('finger').addEventListener('change', ({target}) => state.steering.fingersPress = target.checked);
   element('again').addEventListener('click', start);
   element('scene').value = scenes.some(({name}) => name === wanted.get('scene')) ? wanted.get('scene') : 'phantom';
