@@ -4,12 +4,13 @@
 //
 // In the address behind #: scene=NAME, hand=script or mine, seconds=S (then it ends and its hashes stand here), pace=0 (as
 // fast as it can), set=KEY=VALUE (may be given often).
+import {ReplayControls} from './replay.js';
 import {scenes} from './scenes.js';
 import {TabSocket} from './tab_socket.js';
 
 const element = id => document.getElementById(id);
 const wanted = new URLSearchParams(location.hash.slice(1));
-const state = {ready: false, page: null, steering: null, worker: null, shown: null};
+const state = {ready: false, reads: false, page: null, steering: null, worker: null, shown: null, replay: null};
 
 function refuse(text) {
   const line = element('missing');
@@ -55,6 +56,7 @@ function addControls() {
     input.addEventListener('input', () => input.nextElementSibling.textContent = input.value);
     input.addEventListener('change', start);
   }
+  state.replay = new ReplayControls({worker: state.worker, refused}, fields);
   element('finger').addEventListener('change', ({target}) => state.steering && (state.steering.fingersPress = target.checked));
   element('again').addEventListener('click', start);
   element('scene').value = scenes.some(({name}) => name === wanted.get('scene')) ? wanted.get('scene') : 'phantom';
@@ -95,7 +97,11 @@ function showOwnValues({force, servo}) {
 
 const isMine = () => element('hand').value === 'mine';
 
+/** Before the module is there nothing is sent: the controls are read once it is. */
 async function start(event) {
+  if (!state.ready) return;
+  state.replay.close();
+  state.reads = false;
   if (event?.type === 'change') {
     if (event.target.id === 'scene') touched.clear();  // they were of the other scene
     else if (event.target.id !== 'hand') touched.add(event.target.id);
@@ -117,6 +123,12 @@ async function start(event) {
   }
 }
 
+/** What was dropped is no recording: the run goes on. */
+function refused(text) {
+  element('run-state').textContent = text;
+  document.body.dataset.refused = text;
+}
+
 function failed(text) {
   element('run-state').textContent = text;
   document.body.dataset.run = 'failed';
@@ -135,6 +147,10 @@ function showFacts(facts) {
     ...Object.entries(facts.energy_mj).filter(([, mj]) => Math.abs(mj) >= 0.005).map(([name, mj]) => [`· ${name}`, number(mj, 2, 'mJ')]),
     ['output hash', facts.output_hash]];
   if (facts.volume_hash) rows.push(['volume hash', facts.volume_hash]);
+  showRows(rows);
+}
+
+function showRows(rows) {
   element('run-figures').replaceChildren(...rows.flatMap(([label, value]) => {
     const pair = [document.createElement('dt'), document.createElement('dd')];
     [pair[0].textContent, pair[1].textContent] = [label, value];
@@ -145,7 +161,7 @@ function showFacts(facts) {
 const says = {
   ready: () => {
     state.ready = true;
-    start();
+    if (!state.reads) start();
   },
   opened: ({opened}) => {
     element('run-state').textContent = `loaded in ${(opened / 1000).toFixed(1)} s`;
@@ -169,6 +185,16 @@ const says = {
     Object.assign(document.body.dataset, {run: 'done', outputHash: done.output_hash, volumeHash: done.volume_hash,
       timesRealTime: done.times_real_time.toFixed(2)});
   },
+  refused: ({refused: text}) => refused(text),
+  reads: ({reads: folder}) => {
+    state.reads = true;
+    state.steering?.start(false);
+    state.replay.begin(folder);
+    element('finger-row').style.display = 'none';
+    element('run-state').textContent = `reads ${folder}`;
+    document.body.dataset.run = 'loading';
+  },
+  replayed: ({replayed}) => showRows(state.replay.show(replayed)),
   failed: ({failed: text}) => state.ready ? failed(text) : refuse(text),
 };
 
@@ -180,7 +206,7 @@ async function begin() {
   state.page = await import('./kerf.js');
   if (!state.page.stage) return;
   state.steering = new Steering(state.page, state.worker);
-  state.steering.start(isMine());
+  state.steering.start(isMine() && !state.reads);
 }
 
 const why = lack();
@@ -190,7 +216,9 @@ if (why) {
   state.worker = new Worker(new URL('worker.js', import.meta.url), {type: 'module'});
   state.worker.onerror = () => refuse('The worker of this page did not start: a browser with modules in workers is needed.');
   state.worker.onmessage = ({data}) => Object.keys(data).forEach(kind => says[kind]?.(data));
-  document.addEventListener('visibilitychange', () => state.worker.postMessage({pause: document.hidden}));
+  const tellHidden = () => state.worker.postMessage({pause: document.hidden});
+  document.addEventListener('visibilitychange', tellHidden);
+  if (document.hidden) tellHidden();
   addControls();
-  begin();
+  begin().catch(problem => refuse(`${problem.message}; load the page again`));
 }
