@@ -2,8 +2,6 @@
 #include "record/earlier_inputs.hpp"
 
 #include <algorithm>
-#include <array>
-#include <cstdio>
 #include <exception>
 #include <span>
 #include <system_error>
@@ -18,47 +16,19 @@ namespace {
 
 namespace fs = std::filesystem;
 
-fs::path file_of(const fs::path& folder, std::size_t arm, Tick first) {
-  char name[32];
-  std::snprintf(name, sizeof name, "%012llu.npy.gz", static_cast<unsigned long long>(first));
-  return folder / inputs_name(arm) / name;
-}
-
-std::string header_of(std::size_t rows) {
-  constexpr std::size_t kBytes = 256;
-  return npy_header(
-      "[('raw', '<i4', (11,)), ('stale', '<u4'), ('command', '<u4'), ('command_argument', '<u4'), "
-      "('last_command', '<u4')]",
-      std::to_string(rows) + ",", kBytes);
-}
-
-/// The columns that both have.
-template <class To, class From>
-void copy_columns(const From& from, To& to) {
-  std::ranges::copy(from.raw, to.raw);
-  to.stale = from.stale;
-  to.command = from.command;
-  to.command_argument = from.command_argument;
-  to.last_command = from.last_command;
-}
-
 TickInputs inputs_of(const TickRecord& record) {
   TickInputs out{};
-  copy_columns(record, out);
-  return out;
-}
-
-TickRecord record_of(const TickInputs& inputs, Tick tick) {
-  TickRecord out{};
-  out.seq = 2 * tick;
-  out.tick = tick;
-  copy_columns(inputs, out);
+  std::ranges::copy(record.raw, out.raw);
+  out.stale = record.stale;
+  out.command = record.command;
+  out.command_argument = record.command_argument;
+  out.last_command = record.last_command;
   return out;
 }
 
 void write_inputs(const fs::path& path, std::span<const TickInputs> rows) {
   AtomicFile file(path);
-  write_packed_npy(file, header_of(rows.size()), std::as_bytes(rows));
+  write_packed_npy(file, inputs_header(rows.size()), std::as_bytes(rows));
   file.commit();
 }
 
@@ -70,19 +40,12 @@ void make_inputs_folder(const fs::path& recording, std::size_t arm) {
                   (fault ? fault.message() : "there is one") + "; choose another --out");
 }
 
-/// Reads a file of exactly that many rows.
-bool read_inputs(const fs::path& path, std::size_t count, std::vector<TickInputs>& rows) {
-  rows.resize(count);
-  PackedNpyReader file(path, header_of(count));
-  return file.read(std::as_writable_bytes(std::span(rows))) && file.at_end();
-}
-
 }  // namespace
 
 EarlierInputs::EarlierInputs(fs::path folder, std::size_t arm)
     : folder_(std::move(folder)), arm_(arm) {
   make_inputs_folder(folder_, arm_);
-  rows_.reserve(kTicksAFile);
+  rows_.reserve(kInputsAFile);
 }
 
 void EarlierInputs::finish_writing() {
@@ -102,9 +65,9 @@ void EarlierInputs::add(const TickRecord& record) {
     if (next == 1) problem_ += "; start the flight recorder before the controller";
     return;
   }
-  if (rows_.size() == kTicksAFile) {
+  if (rows_.size() == kInputsAFile) {
     finish_writing();
-    writing_ = std::async(std::launch::async, [path = file_of(folder_, arm_, first_),
+    writing_ = std::async(std::launch::async, [path = inputs_file(folder_, arm_, first_),
                                                rows = rows_] { write_inputs(path, rows); });
     first_ = next;
     rows_.clear();
@@ -116,35 +79,13 @@ std::string EarlierInputs::keep(const fs::path& folder, Tick last) {
   finish_writing();
   if (!problem_.empty() || last == 0) return problem_;
   make_inputs_folder(folder, arm_);
-  for (Tick first = 1; first < first_ && first <= last; first += kTicksAFile) {
-    link_file(file_of(folder_, arm_, first), file_of(folder, arm_, first));
+  for (Tick first = 1; first < first_ && first <= last; first += kInputsAFile) {
+    link_file(inputs_file(folder_, arm_, first), inputs_file(folder, arm_, first));
   }
   if (first_ <= last) {
-    write_inputs(file_of(folder, arm_, first_), std::span(rows_).first(last - first_ + 1));
+    write_inputs(inputs_file(folder, arm_, first_), std::span(rows_).first(last - first_ + 1));
   }
   return {};
-}
-
-void for_each_input(const fs::path& folder, Tick last, std::size_t arms,
-                    const std::function<void(std::span<const TickRecord>)>& visit) {
-  std::array<std::vector<TickInputs>, kMaxArms> rows;
-  std::array<TickRecord, kMaxArms> tick;
-  for (Tick first = 1; first <= last; first += EarlierInputs::kTicksAFile) {
-    const std::size_t wanted = std::min<Tick>(last - first + 1, EarlierInputs::kTicksAFile);
-    for (std::size_t arm = 0; arm < arms; ++arm) {
-      const fs::path path = file_of(folder, arm, first);
-      if (read_inputs(path, EarlierInputs::kTicksAFile, rows[arm]) ||
-          read_inputs(path, wanted, rows[arm])) {
-        continue;
-      }
-      throw RecordError(path.string() + ": the inputs from tick " + std::to_string(first) +
-                        " on are missing or damaged; copy the recording again");
-    }
-    for (std::size_t i = 0; i < wanted; ++i) {
-      for (std::size_t arm = 0; arm < arms; ++arm) tick[arm] = record_of(rows[arm][i], first + i);
-      visit(std::span(tick).first(arms));
-    }
-  }
 }
 
 void copy_inputs(const fs::path& from, const fs::path& to, Tick last) {
@@ -153,8 +94,8 @@ void copy_inputs(const fs::path& from, const fs::path& to, Tick last) {
   for (std::size_t arm = 0; arm < kMaxArms && !fault; ++arm) {
     if (arm != 0 && !fs::exists(from / inputs_name(arm), ignored)) continue;
     make_inputs_folder(to, arm);
-    for (Tick first = 1; first <= last && !fault; first += EarlierInputs::kTicksAFile) {
-      fs::copy_file(file_of(from, arm, first), file_of(to, arm, first), fault);
+    for (Tick first = 1; first <= last && !fault; first += kInputsAFile) {
+      fs::copy_file(inputs_file(from, arm, first), inputs_file(to, arm, first), fault);
     }
   }
   if (!fault) return;

@@ -4,51 +4,23 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
-#include <functional>
 #include <future>
-#include <span>
 #include <string>
-#include <string_view>
 #include <vector>
 
+#include "record/input_rows.hpp"
 #include "shared/segment/layout.hpp"
 
-// What the servo was given before the first tick of a flight recording. A run is a function of its
-// scene and these, so that the recording replays although it has only the last minute: from the
-// run's first tick, by any build that computes the same bits.
-//
-//   inputs/000000000001.npy.gz   of the first arm, inputs-2/ of the second: rows of TickInputs,
-//   65,536 in each file but the last; its name is
-//                                the tick of the first row
-//
-// A tick is 60 bytes in memory and 3 to 8 in a file.
+// What the servo was given before a flight recording, as its recorder collects it
+// (record/input_rows.hpp).
 
 namespace kerf {
-
-inline constexpr std::string_view kInputsName = "inputs";  ///< of the first arm
-/// The folder of an arm's inputs.
-[[nodiscard]] inline std::string_view inputs_name(std::size_t arm) noexcept {
-  return arm == 0 ? kInputsName : "inputs-2";
-}
-
-/// The columns of a tick record that the servo reads.
-struct TickInputs {
-  std::int32_t raw[11];
-  std::uint32_t stale;
-  std::uint32_t command;
-  std::uint32_t command_argument;
-  std::uint32_t last_command;
-};
-
-static_assert(sizeof(TickInputs) == 60);
 
 /// Collects the inputs of an arm of a run from its first tick on, for recordings of its end. Memory
 /// for two files; each full one goes to the disk, in a thread beside the recorder, which must not
 /// wait.
 class EarlierInputs {
  public:
-  static constexpr std::size_t kTicksAFile = std::size_t{1} << 16;
-
   /// Its files go into `folder`/inputs, or inputs-2.
   explicit EarlierInputs(std::filesystem::path folder, std::size_t arm = 0);
 
@@ -72,12 +44,6 @@ class EarlierInputs {
   std::string problem_;           ///< why ticks are missing
   std::future<void> writing_;     ///< of the file before; last, since it ends first
 };
-
-/// Calls `visit` for each tick from 1 to `last` in order, with the inputs of each of `arms` that
-/// the recording in `folder` has; the other columns are 0. Throws `RecordError`, one line, for a
-/// file that is missing or damaged: up to there `visit` was called.
-void for_each_input(const std::filesystem::path& folder, Tick last, std::size_t arms,
-                    const std::function<void(std::span<const TickRecord>)>& visit);
 
 /// Copies the files with the inputs up to tick `last` from the recording in `from` to that in `to`,
 /// which has none, of all arms that it has. Throws FileError and leaves nothing.

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "record/recorder.hpp"
-#include "record/tick_log.hpp"
+#include "record/tick_log_writer.hpp"
 
 // The flight recorder: the last ticks of a run in memory of constant size, kept on request.
 

@@ -17,17 +17,6 @@ gzFile handle(void* file) noexcept {
 
 }  // namespace
 
-std::string npy_header(std::string_view type, std::string_view shape, std::size_t bytes) {
-  constexpr std::size_t kPreamble = 10;  // magic, version, length of the text
-  const std::size_t text = bytes - kPreamble;
-  std::string header = "\x93NUMPY";
-  header += {'\x01', '\0', static_cast<char>(text & 0xff), static_cast<char>(text >> 8)};
-  header += "{'descr': " + std::string(type) + ", 'fortran_order': False, 'shape': (" +
-            std::string(shape) + "), }";
-  header.resize(bytes - 1, ' ');
-  return header + '\n';
-}
-
 void write_packed_npy(AtomicFile& file, std::string_view header,
                       std::span<const std::byte> content) {
   constexpr int kFastest = 1;  // 3 % larger than the best on a CT

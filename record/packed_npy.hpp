@@ -5,19 +5,14 @@
 #include <filesystem>
 #include <memory>
 #include <span>
-#include <string>
 #include <string_view>
 
+#include "record/npy_header.hpp"
 #include "shared/posix/atomic_file.hpp"
 
 // Arrays beside a log as NumPy's format, packed: `np.load(gzip.open(path))`.
 
 namespace kerf {
-
-/// The header of an NPY file, version 1, padded to `bytes`. `type` and `shape` are Python texts, as
-/// "'<u2'" and "3, 4". The caller's texts fit.
-[[nodiscard]] std::string npy_header(std::string_view type, std::string_view shape,
-                                     std::size_t bytes);
 
 /// Writes header and content into `file` as gzip and closes it. Throws FileError.
 void write_packed_npy(AtomicFile& file, std::string_view header,

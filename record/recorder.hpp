@@ -9,7 +9,8 @@
 #include <string_view>
 #include <vector>
 
-#include "record/tick_log.hpp"
+#include "record/manifest.hpp"
+#include "record/tick_log_writer.hpp"
 #include "shared/segment/command.hpp"
 #include "shared/segment/connection.hpp"
 #include "shared/segment/reader.hpp"
@@ -17,19 +18,6 @@
 // The recorder: ring of ticks to log, and the run of kerf-recorder.
 
 namespace kerf {
-
-/// Ticks that were published and not recorded: the recorder stood still for longer than the ring.
-struct RecordGap {
-  std::uint64_t first_index = 0;
-  std::uint64_t count = 0;
-};
-
-/// What of a run a recording lacks.
-struct RecordLosses {
-  std::uint64_t missed_before_start = 0;  ///< published, and gone before the recorder came
-  std::uint64_t lost = 0;                 ///< published since, in no row
-  std::vector<RecordGap> gaps{};          ///< at most `Recorder::kMaxGaps`; `lost` counts on
-};
 
 /// Copies the state ring into a log or into memory, with two arms both: a tick of which one arm's
 /// record is lost is a gap of both. Losses are counted.

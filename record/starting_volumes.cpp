@@ -22,38 +22,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-template <class Voxel>
-constexpr std::string_view type_of() {
-  return sizeof(Voxel) == 1 ? "'|u1'" : "'<u2'";
-}
-
-template <class Voxel>
-std::string header_of(const VoxelGrid& grid) {
-  constexpr std::size_t kBytes = 128;
-  const std::string shape =
-      std::to_string(grid.nz) + ", " + std::to_string(grid.ny) + ", " + std::to_string(grid.nx);
-  return npy_header(type_of<Voxel>(), shape, kBytes);
-}
-
-fs::path density_path(const fs::path& folder, std::string_view hash) {
-  return folder / kVolumesName / (std::string(hash) + ".npy.gz");
-}
-fs::path labels_path(const fs::path& folder, std::string_view hash) {
-  return folder / kVolumesName / (std::string(hash) + "-labels.npy.gz");
-}
-
-/// Reads exactly such a file. Throws RecordError.
-template <class Voxel>
-std::vector<Voxel> read_voxels(const fs::path& path, const VoxelGrid& grid) {
-  PackedNpyReader file(path, header_of<Voxel>(grid));
-  std::vector<Voxel> voxels(file.is_sound() ? grid.voxel_count() : 0);
-  if (!file.read(std::as_writable_bytes(std::span(voxels))) || !file.at_end()) {
-    throw RecordError(path.string() +
-                      ": not the volume that scene.json names; copy the recording again");
-  }
-  return voxels;
-}
-
 /// One volume of a run: name and content hash as scene.json has them.
 struct NamedVolume {
   std::string name, hash;
@@ -72,11 +40,6 @@ std::vector<NamedVolume> volumes_in(std::string_view scene_json) {
     out.clear();
   }
   return out;
-}
-
-/// A hash is a part of a path, and scene.json of another machine may hold anything.
-bool is_hash(std::string_view text) {
-  return text.size() == 16 && text.find_first_not_of("0123456789abcdef") == std::string_view::npos;
 }
 
 /// Whether the recording in `folder` has that volume, whole.
@@ -99,10 +62,10 @@ void write_starting_volume(const fs::path& folder, std::string_view hash, const 
     throw RecordError(volumes.string() + ": no folder of its own; choose another --out");
   }
   AtomicFiles files;
-  write_packed_npy(files.add(density_path(folder, hash)), header_of<Density>(grid),
+  write_packed_npy(files.add(density_path(folder, hash)), volume_header(grid, sizeof(Density)),
                    std::as_bytes(density));
   if (!labels.empty()) {
-    write_packed_npy(files.add(labels_path(folder, hash)), header_of<Label>(grid),
+    write_packed_npy(files.add(labels_path(folder, hash)), volume_header(grid, sizeof(Label)),
                      std::as_bytes(labels));
   }
   files.commit();
@@ -137,7 +100,7 @@ void StartingVolumes::copy() {
   std::set<std::string> kept;
   for (std::size_t v = 0; v < infos.size() && v < named.size(); ++v) {
     const auto& [volume, hash] = named[v];
-    if (!is_hash(hash) || !kept.insert(hash).second) continue;
+    if (!is_volume_hash(hash) || !kept.insert(hash).second) continue;
     const std::vector<Density>& density = copies[v].density;
     const std::span<const Label> labels = reader.labels(v);
     const bool is_whole = hex64(volume_hash(density, labels)) == hash;
@@ -149,22 +112,6 @@ void StartingVolumes::copy() {
                           "reads its file again");
     }
   }
-}
-
-std::optional<VolumeContent> read_starting_volume(const fs::path& folder, std::string_view hash,
-                                                  const VoxelGrid& grid) {
-  const fs::path path = density_path(folder, hash);
-  std::error_code fault;
-  if (!is_hash(hash) || !fs::is_regular_file(path, fault)) return std::nullopt;
-  VolumeContent out;
-  out.density = read_voxels<Density>(path, grid);
-  if (fs::is_regular_file(labels_path(folder, hash), fault)) {
-    out.labels = read_voxels<Label>(labels_path(folder, hash), grid);
-  }
-  if (hex64(volume_hash(out.density, out.labels)) != hash) {
-    throw RecordError(path.string() + ": damaged, or without its labels; copy the recording again");
-  }
-  return out;
 }
 
 }  // namespace kerf

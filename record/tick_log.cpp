@@ -2,17 +2,12 @@
 #include "record/tick_log.hpp"
 
 #include <algorithm>
-#include <cerrno>
 #include <charconv>
 #include <string_view>
 #include <system_error>
 #include <utility>
 
-#include <fcntl.h>
-#include <sys/file.h>
-#include <unistd.h>
-
-#include "record/packed_npy.hpp"
+#include "record/npy_header.hpp"
 #include "shared/segment/layout_table.hpp"
 #include "shared/volume/checksum.hpp"
 
@@ -23,21 +18,6 @@ namespace {
 [[nodiscard]] std::string numpy_type(std::string_view type) {
   const std::uint32_t bytes = type_bytes(type);
   return std::string(bytes == 1 ? "|" : "<") + type.front() + std::to_string(bytes);
-}
-
-/// Writes all of `bytes` at `offset`; 0 or the error.
-[[nodiscard]] int write_at(int fd, const void* data, std::size_t bytes, std::uint64_t offset) {
-  const auto* at = static_cast<const char*>(data);
-  while (bytes > 0) {
-    const ssize_t written = pwrite(fd, at, bytes, static_cast<off_t>(offset));
-    if (written < 0 && errno == EINTR) continue;
-    if (written < 0) return errno;
-    if (written == 0) return ENOSPC;
-    at += written;
-    offset += static_cast<std::uint64_t>(written);
-    bytes -= static_cast<std::size_t>(written);
-  }
-  return 0;
 }
 
 }  // namespace
@@ -51,74 +31,6 @@ std::string tick_log_header(std::uint64_t rows) {
     columns += "), ";
   }
   return npy_header("[" + columns + "]", std::to_string(rows) + ",", kTickLogHeaderBytes);
-}
-
-TickLogWriter::TickLogWriter(std::filesystem::path path, Begin begin, std::uint64_t most_rows)
-    : path_(std::move(path)) {
-  std::error_code none;
-  const bool has_rows =
-      begin == Begin::after_last && std::filesystem::file_size(path_, none) >= kTickLogHeaderBytes;
-  if (has_rows) written_ = std::min(TickLogReader(path_).rows(), most_rows);
-  const int create = begin == Begin::new_file ? O_CREAT | O_EXCL : 0;
-  fd_ = open(path_.c_str(), O_WRONLY | O_CLOEXEC | create, 0666);
-  if (fd_ < 0 && errno == EEXIST) {
-    throw RecordError(path_.string() + ": holds a recording; choose another --out");
-  }
-  if (fd_ < 0) fail(errno);
-  if (flock(fd_, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK) {
-    close(std::exchange(fd_, -1));
-    throw RecordError(path_.string() + ": another recorder writes it; choose another --out");
-  }
-  const auto whole = static_cast<off_t>(kTickLogHeaderBytes + written_ * sizeof(TickRecord));
-  if (begin == Begin::after_last && ftruncate(fd_, whole) != 0) fail(errno);
-  buffer_.reserve(kBufferRows);
-  write_header();
-}
-
-TickLogWriter::~TickLogWriter() {
-  if (fd_ >= 0) close(fd_);
-}
-
-void TickLogWriter::append(const TickRecord& record) {
-  if (buffer_.size() == kBufferRows) flush();
-  buffer_.push_back(record);
-}
-
-void TickLogWriter::flush() {
-  const std::uint64_t offset = kTickLogHeaderBytes + written_ * sizeof(TickRecord);
-  const int error = write_at(fd_, buffer_.data(), buffer_.size() * sizeof(TickRecord), offset);
-  if (error != 0) fail(error);
-  written_ += buffer_.size();
-  buffer_.clear();
-}
-
-void TickLogWriter::sync() {
-  flush();
-  if (fdatasync(fd_) != 0) fail(errno);
-  write_header();
-  if (fdatasync(fd_) != 0) fail(errno);
-}
-
-void TickLogWriter::write_header() {
-  const std::string header = tick_log_header(written_);
-  const int error = write_at(fd_, header.data(), header.size(), 0);
-  if (error != 0) fail(error);
-}
-
-void TickLogWriter::fail(int error) {
-  if (fd_ >= 0) {
-    // Complete rows stay usable: cut the row that did not fit, count the others. The header is on a
-    // block that the file already has.
-    const auto whole = static_cast<off_t>(kTickLogHeaderBytes + written_ * sizeof(TickRecord));
-    const std::string header = tick_log_header(written_);
-    if (ftruncate(fd_, whole) == 0 && written_ > 0) {
-      static_cast<void>(write_at(fd_, header.data(), header.size(), 0));
-    }
-    buffer_.clear();
-  }
-  throw RecordError(path_.string() + ": cannot be written (" +
-                    std::generic_category().message(error) +
-                    "); make room or choose another --out");
 }
 
 namespace {
@@ -173,20 +85,32 @@ TickLogReader::TickLogReader(std::filesystem::path path) : path_(std::move(path)
   rows_ = bytes < kTickLogHeaderBytes ? 0 : (bytes - kTickLogHeaderBytes) / sizeof(TickRecord);
 }
 
-std::size_t TickLogReader::read(std::uint64_t first, std::span<TickRecord> rows) {
+std::size_t TickLogReader::read(std::uint64_t first, std::span<TickRecord> rows,
+                                std::string& problem) {
   const std::uint64_t left = rows_ - std::min(first, rows_);
   const auto count = static_cast<std::size_t>(std::min<std::uint64_t>(rows.size(), left));
   file_.clear();
   file_.seekg(static_cast<std::streamoff>(kTickLogHeaderBytes + first * sizeof(TickRecord)));
   file_.read(reinterpret_cast<char*>(rows.data()),
              static_cast<std::streamsize>(count * sizeof(TickRecord)));
-  if (!file_) throw RecordError(path_.string() + ": cannot be read; copy it again");
-  for (std::size_t i = 0; i < count; ++i) {
-    if (tick_record_crc(rows[i]) == rows[i].crc32c) continue;
-    if (i > 0) return i;
-    throw RecordError(path_.string() + ": row " + std::to_string(first) +
-                      " has a wrong checksum; copy it again");
+  if (!file_) {
+    problem = path_.string() + ": cannot be read; copy it again";
+    return 0;
   }
+  const auto sound = [](const TickRecord& row) { return tick_record_crc(row) == row.crc32c; };
+  const auto rest = std::ranges::find_if_not(rows.first(count), sound);
+  const auto good = static_cast<std::size_t>(rest - rows.begin());
+  if (good == 0 && count > 0) {
+    problem =
+        path_.string() + ": row " + std::to_string(first) + " has a wrong checksum; copy it again";
+  }
+  return good;
+}
+
+std::size_t TickLogReader::read(std::uint64_t first, std::span<TickRecord> rows) {
+  std::string problem;
+  const std::size_t count = read(first, rows, problem);
+  if (!problem.empty()) throw RecordError(problem);
   return count;
 }
 

@@ -36,52 +36,6 @@ inline constexpr std::size_t kTickLogHeaderBytes = 4096;
 /// The header of a log of `rows` rows: exactly `kTickLogHeaderBytes`.
 [[nodiscard]] std::string tick_log_header(std::uint64_t rows);
 
-/// Takes the ticks of a run in order, those of the first arm.
-class TickSink {
- public:
-  TickSink() = default;
-  virtual ~TickSink() = default;
-  TickSink(const TickSink&) = delete;
-  TickSink& operator=(const TickSink&) = delete;
-  virtual void append(const TickRecord& record) = 0;
-  /// With two arms, before `append` of the same tick: the second arm's. Default: ignores it.
-  virtual void append_second(const TickRecord& /*record*/) {}
-  /// After the last of several.
-  virtual void flush() {}
-};
-
-/// Writes one log. Not thread-safe. A failure throws `RecordError`; the file then has complete
-/// rows.
-class TickLogWriter final : public TickSink {
- public:
-  enum class Begin {
-    new_file,   ///< refuses a path that exists: a recording is never overwritten
-    after_last  ///< goes on behind the complete rows of a log; cuts an incomplete row, or header
-  };
-  /// Refuses a log that another process writes. `most_rows`: of those that `after_last` keeps.
-  explicit TickLogWriter(std::filesystem::path path, Begin begin = Begin::new_file,
-                         std::uint64_t most_rows = UINT64_MAX);
-  ~TickLogWriter() override;
-
-  /// Buffers a row; at most `kBufferRows` wait for `flush`.
-  void append(const TickRecord& record) override;
-  void flush() override;
-  /// Rows to the disk, then the header that counts them, then the header to the disk.
-  void sync();
-
-  [[nodiscard]] std::uint64_t rows() const noexcept { return written_ + buffer_.size(); }
-
- private:
-  [[noreturn]] void fail(int error);
-  void write_header();
-
-  static constexpr std::size_t kBufferRows = 64;
-  std::filesystem::path path_;
-  int fd_ = -1;
-  std::uint64_t written_ = 0;
-  std::vector<TickRecord> buffer_;
-};
-
 /// The remedy if `folder` holds no recording: names the one of a demo's folder, which is in `log`.
 [[nodiscard]] std::string way_to_recording(const std::filesystem::path& folder);
 
@@ -114,6 +68,10 @@ class TickLogReader {
   /// Reads rows from `first` on into `rows`; returns how many there are, less at the end and before
   /// a row whose checksum is wrong. Throws `RecordError` if that is the first one.
   [[nodiscard]] std::size_t read(std::uint64_t first, std::span<TickRecord> rows);
+
+  /// The same, but returns 0 and sets `problem` to the line. Leaves `problem` as it is otherwise.
+  [[nodiscard]] std::size_t read(std::uint64_t first, std::span<TickRecord> rows,
+                                 std::string& problem);
 
   /// The first row of `tick` or a later one, by bisection; `rows()` if there is none. No checksum
   /// is looked at: that of the row found is, by `read`.

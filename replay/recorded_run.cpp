@@ -13,10 +13,8 @@
 #include "controller/load/scene_json.hpp"
 #include "controller/loop/publisher.hpp"
 #include "controller/scene/scene_file.hpp"
-#include "record/earlier_inputs.hpp"
-#include "record/starting_volumes.hpp"
+#include "record/kept_volumes.hpp"
 #include "record/tick_log.hpp"
-#include "replay/replay_step.hpp"
 #include "shared/numeric/fnv1a.hpp"
 #include "shared/text/command_line.hpp"
 #include "shared/text/json.hpp"
@@ -33,14 +31,11 @@ struct RecordedScene {
 };
 
 RecordedScene read_scene(const std::filesystem::path& folder) {
-  const std::filesystem::path path = folder / kSceneName;
   const std::string text = recorded_scene(folder);
   try {
     return {json_without_source(text), source_in(text), inputs_in(text)};
   } catch (const JsonError&) {
-    throw RecordError(path.string() +
-                      ": does not say, as this version does, what the scene was loaded from; copy "
-                      "the recording again, or record it with this version");
+    throw RecordError(scene_without_source(folder));
   }
 }
 
@@ -220,6 +215,12 @@ void check_begins_at_first_tick(const std::filesystem::path& folder, const Manif
 
 }  // namespace
 
+std::string scene_without_source(const std::filesystem::path& folder) {
+  return (folder / kSceneName).string() +
+         ": does not say, as this version does, what the scene was loaded from; copy the recording "
+         "again, or record it with this version";
+}
+
 RecordedRun load_run(const std::filesystem::path& folder, const ReplayChanges& changes,
                      const KernelSet& kernels, bool with_segment) {
   RecordedRun run;
@@ -249,16 +250,27 @@ RecordedRun load_run(const std::filesystem::path& folder, const ReplayChanges& c
   return run;
 }
 
+EarlierTicks::EarlierTicks(RecordedRun& run, const std::filesystem::path& folder)
+    : run_(run),
+      inputs_(folder, run.earlier_ticks(), run.servo->arms()),
+      step_(*run.servo, run.volume_chain) {}
+
+bool EarlierTicks::step() {
+  const std::span<const TickRecord> inputs = inputs_.next();
+  if (inputs.empty()) return false;
+  ArmRecords tick{};
+  std::ranges::copy(inputs, tick.begin());
+  run_.volume_chain = step_(tick)[inputs.size() - 1].volume_hash;
+  ++done_;
+  return true;
+}
+
 void step_earlier_ticks(RecordedRun& run, const std::filesystem::path& folder) {
-  ReplayStep step(*run.servo, run.volume_chain);
-  const std::size_t arms = run.servo->arms();
-  for_each_input(folder, run.earlier_ticks(), arms, [&](std::span<const TickRecord> inputs) {
-    constexpr Tick kOften = 1024;
-    if (inputs.front().tick % kOften == 0) end_if_asked(folder.string());
-    ArmRecords tick{};
-    std::ranges::copy(inputs, tick.begin());
-    run.volume_chain = step(tick)[arms - 1].volume_hash;
-  });
+  EarlierTicks ticks(run, folder);
+  constexpr Tick kOften = 1024;
+  while (ticks.step()) {
+    if (ticks.done() % kOften == 0) end_if_asked(folder.string());
+  }
 }
 
 const KernelSet& kernels_named(const std::string& name) {

@@ -11,7 +11,9 @@
 #include "controller/load/loaded_scene.hpp"
 #include "controller/load/scene_json.hpp"
 #include "controller/plan/compile.hpp"
-#include "record/recording.hpp"
+#include "record/input_rows.hpp"
+#include "record/manifest.hpp"
+#include "replay/replay_step.hpp"
 #include "shared/numeric/fnv1a.hpp"
 #include "shared/segment/writer.hpp"
 
@@ -42,6 +44,9 @@ struct RecordedRun {
   std::optional<SegmentWriter> segment;  ///< with the volumes as they start; if it was asked for
 };
 
+/// The line for a scene.json that has no source.
+[[nodiscard]] std::string scene_without_source(const std::filesystem::path& folder);
+
 /// Loads the scene of the recording in `folder`, with `changes`: volumes and meshes as the
 /// recording has them, else from their files.
 ///
@@ -54,8 +59,24 @@ struct RecordedRun {
                                    bool with_segment = false);
 
 /// Steps the ticks before those of the log, of which a flight recording has the inputs alone; none
-/// in other recordings. Their results are in the hash chains of the first tick of the log. Throws
-/// `RecordError` if the inputs are damaged; a stop signal ends it as `end_if_asked` does.
+/// in other recordings. Their results are in the hash chains of the first tick of the log.
+class EarlierTicks {
+ public:
+  /// `run` outlives it.
+  EarlierTicks(RecordedRun& run, const std::filesystem::path& folder);
+  /// The next one; false if all are stepped. Throws `RecordError` if the inputs are damaged.
+  bool step();
+  /// Those that are stepped.
+  [[nodiscard]] Tick done() const noexcept { return done_; }
+
+ private:
+  RecordedRun& run_;
+  InputReader inputs_;
+  ReplayStep step_;
+  Tick done_ = 0;
+};
+
+/// All of them. Throws as `EarlierTicks::step`; a stop signal ends it as `end_if_asked` does.
 void step_earlier_ticks(RecordedRun& run, const std::filesystem::path& folder);
 
 /// The kernels of that name, as `kernel_sets` has them; the fastest if `name` is empty. Throws

@@ -17,7 +17,9 @@
 #include "record/earlier_inputs.hpp"
 #include "record/recording.hpp"
 #include "record/starting_volumes.hpp"
+#include "record/tick_log_writer.hpp"
 #include "replay/compared_runs.hpp"
+#include "replay/replayed_ticks.hpp"
 #include "replay/watched_replay.hpp"
 #include "shared/numeric/fnv1a.hpp"
 #include "shared/posix/atomic_file.hpp"
@@ -26,86 +28,6 @@
 #include "shared/volume/checksum.hpp"
 
 namespace kerf {
-namespace {
-
-std::string gap_text(Tick last, Tick next) {
-  return "ticks " + std::to_string(last + 1) + " to " + std::to_string(next - 1) +
-         " were not recorded; what the servo was given there is unknown";
-}
-
-}  // namespace
-
-RecordedTicks::RecordedTicks(const std::filesystem::path& folder, std::size_t arms) {
-  for (std::size_t arm = 0; arm < arms; ++arm) {
-    const std::filesystem::path path = folder / tick_log_name(arm);
-    logs_.emplace_back(path);
-    if (logs_[arm].rows() >= rows()) continue;
-    throw RecordError(path.string() + ": " + std::to_string(logs_[arm].rows()) + " rows, and " +
-                      std::string(kTickLogName) + " has " + std::to_string(rows()) +
-                      "; copy the recording again");
-  }
-}
-
-void RecordedTicks::read(std::uint64_t first, std::vector<ArmRecords>& rows) {
-  rows.resize(TickLogReader::kChunkRows);
-  chunk_.resize(TickLogReader::kChunkRows);
-  std::size_t count = rows.size();
-  for (std::size_t arm = 0; arm < logs_.size(); ++arm) {
-    count = std::min(count, logs_[arm].read(first, chunk_));
-    for (std::size_t i = 0; i < count; ++i) rows[i][arm] = chunk_[i];
-  }
-  rows.resize(count);
-  if (logs_.size() == 1) return;
-  const auto apart =
-      std::ranges::find_if(rows, [](const ArmRecords& row) { return row[0].tick != row[1].tick; });
-  if (apart == rows.end()) return;
-  throw RecordError("tick " + std::to_string((*apart)[0].tick) + " of the first arm and tick " +
-                    std::to_string((*apart)[1].tick) +
-                    " of the second are in one row; copy the recording again");
-}
-
-ReplayResult replay_ticks(RecordedRun& run, RecordedTicks& log, Tick until,
-                          const std::atomic<bool>& stop, const TickVisitor& visit) {
-  ReplayResult result;
-  result.last_tick = run.earlier_ticks();
-  ReplayStep step(*run.servo, run.volume_chain);
-  std::vector<ArmRecords> rows;
-  for (std::uint64_t row = 0; row < log.rows();) {
-    try {
-      log.read(row, rows);
-    } catch (const RecordError& error) {
-      if (row == 0) throw;
-      result.cut_short = error.what();
-      return result;
-    }
-    for (const ArmRecords& recorded : rows) {
-      const Tick tick = recorded[0].tick;
-      if (tick > until) return result;
-      if (stop) {
-        result.cut_short = "a signal stopped it";
-        return result;
-      }
-      if (tick != result.last_tick + 1) {
-        result.cut_short = gap_text(result.last_tick, tick);
-        return result;
-      }
-      const ArmRecords replayed = step(recorded);
-      ++result.ticks;
-      result.last_tick = tick;
-      for (std::size_t arm = 0; arm < kMaxArms; ++arm) {
-        result.output_hash[arm] = replayed[arm].output_hash;
-      }
-      if (!visit(recorded, replayed)) return result;
-    }
-    row += rows.size();
-  }
-  if (log.rows() < log.counted()) {
-    result.cut_short = "the log is cut after " + std::to_string(log.rows()) + " of " +
-                       std::to_string(log.counted()) + " rows";
-  }
-  return result;
-}
-
 namespace {
 
 /// The log of a replay, and beside it manifest and scene: a recording like any other.
@@ -184,14 +106,6 @@ void print_end(const ReplayResult& result, const RecordedRun& run, Tick from, bo
               run_s, wall_s);
 }
 
-void print_difference(const ReplayResult::Found& found, const RecordedRun& run) {
-  std::printf("tick %llu (%.3f s), %s%s: %s was %s, is %s\n",
-              static_cast<unsigned long long>(found.tick),
-              static_cast<double>(found.tick) * run.manifest.tick_ns * 1e-9,
-              found.arm == 0 ? "" : "arm 2, ", std::string(found.at.stage).c_str(),
-              found.at.field.c_str(), found.at.recorded.c_str(), found.at.replayed.c_str());
-}
-
 Json json_of(const ReplayResult& result, const RecordedRun& run) {
   Json report = {{"ticks", result.ticks},
                  {"last_tick", result.last_tick},
@@ -248,17 +162,14 @@ int run_replay(const ReplayOptions& options, const std::atomic<bool>& stop) {
   ComparedRuns compared(log.rows(), run.manifest);
   const bool changed = !options.changes.none();
 
-  std::optional<ReplayResult::Found> difference;
+  std::optional<DifferentTick> difference;
   const auto began = std::chrono::steady_clock::now();
   step_earlier_ticks(run, options.folder);
   const auto visit = [&](const ArmRecords& recorded, const ArmRecords& replayed) {
     if (copy) copy->append(replayed);
     compared.add(recorded, replayed);
     if (difference || recorded[0].tick < options.from) return true;
-    for (std::size_t arm = 0; arm < run.servo->arms() && !difference; ++arm) {
-      const auto found = first_difference(recorded[arm], replayed[arm]);
-      if (found) difference = {recorded[arm].tick, arm, *found};
-    }
+    difference = first_difference(recorded, replayed, run.servo->arms());
     return changed || !difference;
   };
   ReplayResult result = replay_ticks(run, log, options.until, stop, visit);
@@ -267,7 +178,7 @@ int run_replay(const ReplayOptions& options, const std::atomic<bool>& stop) {
 
   if (copy) copy->close(run, result);
   if (changed) std::fputs(compared.text().c_str(), stdout);
-  if (difference) print_difference(*difference, run);
+  if (difference) std::printf("%s\n", text_of(*difference, run.manifest.tick_ns).c_str());
   print_end(result, run, options.from, changed, wall.count());
   if (!result.cut_short.empty()) std::cout << "stopped: " << result.cut_short << '\n';
   if (!options.plot.empty()) compared.plot(options.plot);

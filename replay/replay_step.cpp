@@ -46,7 +46,11 @@ std::array<ServoOutput, kMaxArms> give(CompiledScene& servo, const ArmRecords& r
 }
 
 ArmRecords ReplayStep::operator()(const ArmRecords& recorded) noexcept {
-  const auto outputs = give(servo_, recorded);
+  return of(recorded, give(servo_, recorded));
+}
+
+ArmRecords ReplayStep::of(const ArmRecords& recorded,
+                          const std::array<ServoOutput, kMaxArms>& outputs) noexcept {
   const auto hash_of = [&](std::size_t v, const VoxelBox& box) {
     return changed_box_hash(BrickGrid::of(servo_.grid(v)), servo_.density(v), box);
   };

@@ -46,6 +46,10 @@ class ReplayStep {
   /// those of `recorded`.
   [[nodiscard]] ArmRecords operator()(const ArmRecords& recorded) noexcept;
 
+  /// The records alone, if the servo made its step by `give`, with these outputs.
+  [[nodiscard]] ArmRecords of(const ArmRecords& recorded,
+                              const std::array<ServoOutput, kMaxArms>& outputs) noexcept;
+
  private:
   CompiledScene& servo_;
   std::uint64_t volume_chain_;

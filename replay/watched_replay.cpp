@@ -2,25 +2,19 @@
 #include "replay/watched_replay.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cerrno>
 #include <chrono>
 #include <cstdint>
 #include <cstdio>
 #include <limits>
-#include <map>
-#include <memory>
-#include <span>
-#include <string>
 #include <thread>
 #include <utility>
-#include <vector>
 
 #include <poll.h>
 #include <termios.h>
 #include <unistd.h>
 
-#include "controller/loop/publisher.hpp"
+#include "replay/watched_run.hpp"
 #include "shared/posix/monotonic_clock.hpp"
 #include "shared/segment/server.hpp"
 
@@ -102,115 +96,6 @@ Request request_of(const Command& command, bool is_paused) {
   }
   return {};
 }
-
-/// The run between two ticks, at any of them.
-class WatchedRun {
- public:
-  WatchedRun(RecordedRun& run, RecordedTicks& log, Tick until)
-      : run_(run), log_(log), publisher_(*run.segment, *run.servo) {
-    tick_ = before_log_ = run.earlier_ticks();
-    last_tick_ = std::min<Tick>(before_log_ + log.rows(), until);  // without a gap
-    ticks_a_snapshot_ = last_tick_ / snapshots_that_fit() + 1;
-    snapshots_[before_log_] = run.servo->keep();
-  }
-
-  [[nodiscard]] Tick tick() const noexcept { return tick_; }
-  [[nodiscard]] Tick last_tick() const noexcept { return last_tick_; }
-
-  /// The next tick, published. False at the end, or before a gap or a damaged row.
-  bool step() {
-    const ArmRecords* const recorded = next_row();
-    if (recorded == nullptr) return false;
-    auto outputs = step_servo(*recorded);
-    for (ServoOutput& output : outputs) {
-      output.undoable = output.redoable = true;  // the keys of both go through the recording
-    }
-    const std::int64_t now = monotonic_ns();
-    published_ = std::max(published_ + 1, tick_);
-    const auto reports = reports_of(*recorded);
-    publisher_.publish(
-        published_, of_arms(reports, *run_.servo), commands_of(of_arms(*recorded, *run_.servo)),
-        of_arms(std::as_const(outputs), *run_.servo), {.start_ns = now, .heartbeat_ns = now});
-    return true;
-  }
-
-  /// To `tick`, or as near as the recording goes; readers see the volumes of that tick.
-  void go(Tick tick) {
-    tick = std::clamp<Tick>(tick, before_log_ + 1, std::max(last_tick_, before_log_ + 1));
-    const auto& [at, kept] = *std::prev(snapshots_.upper_bound(tick - 1));
-    if (tick <= tick_ || at > tick_) {
-      run_.servo->restore(*kept);
-      tick_ = at;
-    }
-    while (tick_ + 1 < tick) {
-      const ArmRecords* const recorded = next_row();
-      if (recorded == nullptr) break;
-      static_cast<void>(step_servo(*recorded));
-    }
-    show_volumes();
-    step();
-  }
-
- private:
-  [[nodiscard]] std::uint64_t snapshots_that_fit() const {
-    std::size_t bytes = 1;
-    for (std::size_t v = 0; v < run_.scene.volumes.size(); ++v) {
-      bytes += run_.servo->density(v).size_bytes();
-    }
-    return std::clamp<std::uint64_t>(kSnapshotBytes / bytes, 1, kMostSnapshots);
-  }
-
-  /// The row of the next tick; null if there is none.
-  [[nodiscard]] const ArmRecords* next_row() {
-    if (tick_ >= last_tick_) return nullptr;
-    const std::uint64_t at = tick_ - before_log_;
-    if (at < first_row_ || at >= first_row_ + rows_.size()) {
-      first_row_ = at;
-      log_.read(first_row_, rows_);
-    }
-    const ArmRecords& row = rows_[at - first_row_];
-    if (row[0].tick == tick_ + 1) return &row;
-    last_tick_ = tick_;
-    return nullptr;
-  }
-
-  std::array<ServoOutput, kMaxArms> step_servo(const ArmRecords& recorded) {
-    if (tick_ % ticks_a_snapshot_ == 0 && !snapshots_.contains(tick_)) {
-      snapshots_[tick_] = run_.servo->keep();
-    }
-    ++tick_;
-    return give(*run_.servo, recorded);
-  }
-
-  /// All bricks of all volumes, in as many ticks as that takes, without a record.
-  void show_volumes() {
-    SegmentWriter& segment = *run_.segment;
-    segment.begin_tick(++published_);
-    for (std::size_t v = 0; v < run_.scene.volumes.size(); ++v) {
-      const VoxelGrid& grid = run_.servo->grid(v);
-      const VoxelBox all{{0, 0, 0}, {grid.nx, grid.ny, grid.nz}};
-      if (run_.servo->first_density(v).empty()) continue;  // nothing cuts it
-      segment.publish_box(v, run_.servo->density(v), all, 0, DirtyCause::load);
-    }
-    segment.end_tick(static_cast<std::uint64_t>(monotonic_ns()));
-    while (segment.waiting_bricks() > 0) {
-      segment.begin_tick(++published_);
-      segment.end_tick(static_cast<std::uint64_t>(monotonic_ns()));
-    }
-  }
-
-  RecordedRun& run_;
-  RecordedTicks& log_;
-  Publisher publisher_;
-  std::vector<ArmRecords> rows_;
-  std::uint64_t first_row_ = 0;
-  Tick before_log_ = 0;  ///< the last tick before the log's first
-  Tick tick_ = 0;        ///< of the recording
-  Tick published_ = 0;   ///< of the segment, where ticks only grow: the same until a way back
-  Tick last_tick_ = 0;
-  Tick ticks_a_snapshot_ = 1;
-  std::map<Tick, std::unique_ptr<ServoSnapshot>> snapshots_;  ///< by the tick that was the last
-};
 
 /// The clock of the replay: how many ticks are due.
 class Pace {
@@ -328,7 +213,8 @@ class Watch {
 int watch_replay(const ReplayOptions& options, RecordedTicks& log, const std::atomic<bool>& stop) {
   RecordedRun run = load_run(options.folder, options.changes, kernels_named(options.kernels), true);
   step_earlier_ticks(run, options.folder);
-  WatchedRun watched(run, log, options.until);
+  WatchedRun watched(run, log,
+                     {.until = options.until, .compares = false, .snapshot_bytes = kSnapshotBytes});
   const std::uint64_t rows = watched.last_tick();
   SegmentServer server(options.watch, *run.segment,
                        {.tools = static_cast<std::uint32_t>(run.scene.tools.size()),

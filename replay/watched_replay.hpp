@@ -5,6 +5,7 @@
 #include <cstddef>
 
 #include "replay/replay.hpp"
+#include "replay/replayed_ticks.hpp"
 
 // A recorded run, shown: in real time, slower, faster, tick by tick, from any tick on.
 
@@ -17,15 +18,14 @@ namespace kerf {
 /// Keys on standard input, a terminal or a pipe: space pauses and goes on, `.` steps one tick, `+`
 /// and `-` double and halve the speed, `f` and `b` go a second forward and back, a number and `g`
 /// goes to that tick. A reader's `hold` pauses, its `reset` goes to the start, `undo` and `redo` a
-/// second back and forward: so the keys of the window and the page's buttons do. To go back it
-/// continues from a snapshot of the servo; at most `kMostSnapshots` are in memory, and at most
-/// `kSnapshotBytes` of them, but always one.
+/// second back and forward: so the keys of the window and the page's buttons do. See
+/// WatchedRun for the way back.
 ///
 /// Returns 0; 1 if ticks are missing in the recording, in front of which it stops. Throws as
 /// `run_replay`, and SegmentError if a controller of that name runs.
 [[nodiscard]] int watch_replay(const ReplayOptions& options, RecordedTicks& log,
                                const std::atomic<bool>& stop);
 
-inline constexpr std::size_t kMostSnapshots = 32, kSnapshotBytes = std::size_t{512} << 20;
+inline constexpr std::size_t kSnapshotBytes = std::size_t{512} << 20;  ///< of the whole replay
 
 }  // namespace kerf

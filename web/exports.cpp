@@ -8,7 +8,6 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
-#include <cstring>
 #include <limits>
 #include <memory>
 #include <span>
@@ -16,20 +15,25 @@
 #include <string_view>
 #include <vector>
 
+#include "web/exchange.hpp"
+#include "web/tab_replay.hpp"
 #include "web/tab_run.hpp"
 
 namespace {
 
+using kerf::web::leave;
 using kerf::web::TabInputs;
+using kerf::web::TabReplay;
 using kerf::web::TabRun;
 
-std::vector<std::byte> buffer;
+auto& buffer = kerf::web::exchange;
 std::unique_ptr<TabRun> run;
+std::unique_ptr<TabReplay> replay;  // one of both is open
 
-std::size_t put(std::string_view text) {
-  buffer.resize(text.size());
-  std::memcpy(buffer.data(), text.data(), text.size());
-  return text.size();
+/// What both have.
+template <class Use>
+auto with_open(const Use& use) {
+  return replay ? use(*replay) : use(*run);
 }
 
 }  // namespace
@@ -52,6 +56,7 @@ KERF_EXPORT(open_run) void open_run(std::size_t bytes) {
   constexpr std::size_t kFirst = 5;
   texts.resize(std::max(texts.size(), kFirst));
   run.reset();
+  replay.reset();
   run = std::make_unique<TabRun>(TabInputs{
       .scene_name = texts[0],
       .scene = texts[1],
@@ -68,25 +73,25 @@ KERF_EXPORT(step) int step(int ticks, double most_armed) {
                                          : std::numeric_limits<std::uint64_t>::max());
 }
 KERF_EXPORT(rate_hz) int rate_hz() {
-  return run->rate_hz();
+  return with_open([](auto& one) { return one.rate_hz(); });
 }
 KERF_EXPORT(armed_ticks) double armed_ticks() {
   return static_cast<double>(run->armed_ticks());
 }
 
 KERF_EXPORT(join_viewer) void join_viewer() {
-  run->join();
+  with_open([](auto& one) { one.join(); });
 }
 KERF_EXPORT(slot) void slot(int ended) {
-  run->slot(ended != 0);
+  with_open([=](auto& one) { one.slot(ended != 0); });
 }
 /// Length of the next message; 0 if none is due.
 KERF_EXPORT(next_message) std::size_t next_message() {
-  return run->next(buffer) ? buffer.size() : 0;
+  return with_open([](auto& one) { return one.next(buffer); }) ? buffer.size() : 0;
 }
 /// The buffer has a message of the viewer. Returns whether it is one.
 KERF_EXPORT(take_message) int take_message(std::size_t bytes) {
-  return run->take(std::span(buffer).first(bytes)) ? 1 : 0;
+  return with_open([=](auto& one) { return one.take(std::span(buffer).first(bytes)); }) ? 1 : 0;
 }
 
 KERF_EXPORT(lead) void lead(double x, double y, double z, double yaw, double pitch, int button) {
@@ -97,8 +102,26 @@ KERF_EXPORT(release) void release() {
 }
 
 KERF_EXPORT(facts) std::size_t facts() {
-  return put(run->facts());
+  return leave(with_open([](auto& one) { return one.facts(); }));
 }
 KERF_EXPORT(volume_hash) std::size_t volume_hash() {
-  return put(run->volume_hash());
+  return leave(with_open([](auto& one) { return one.volume_hash(); }));
+}
+
+/// The buffer has the name of a folder of the worker, with a recording. Replaces the run.
+KERF_EXPORT(open_replay) void open_replay(std::size_t bytes) {
+  const std::string folder(reinterpret_cast<const char*>(buffer.data()), bytes);
+  run.reset();
+  replay.reset();
+  replay = std::make_unique<TabReplay>(folder);
+}
+/// See TabReplay.
+KERF_EXPORT(replay_prepare) int replay_prepare(int ticks) {
+  return replay->prepare(ticks) ? 1 : 0;
+}
+KERF_EXPORT(replay_step) int replay_step(int ticks) {
+  return replay->step(ticks);
+}
+KERF_EXPORT(replay_go) void replay_go(double tick) {
+  replay->go(tick >= 1 ? static_cast<kerf::Tick>(tick) : 1);
 }

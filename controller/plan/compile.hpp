@@ -58,6 +58,9 @@ class ServoSnapshot {
   /// The largest fraction that cutting still owes, in full voxels: of a density step by overlap, of
   /// a voxel by force (docs/cutting.md).
   [[nodiscard]] virtual double largest_carry() const = 0;
+
+  /// Memory that it takes, about.
+  [[nodiscard]] virtual std::size_t bytes() const noexcept = 0;
 };
 
 /// A scene turned into plan and memory of the servo step, in the number type of the scene.

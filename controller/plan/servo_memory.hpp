@@ -109,6 +109,19 @@ struct SnapshotOf final : ServoSnapshot {
     return largest;
   }
 
+  [[nodiscard]] std::size_t bytes() const noexcept override {
+    std::size_t sum = sizeof *this + std::span(states).size_bytes() + std::span(pool).size_bytes();
+    const auto add = [&](const auto& arrays) {
+      for (const auto& array : arrays) sum += std::span(array).size_bytes();
+    };
+    add(densities);
+    add(gradients);
+    for (const ArmCarries<N>& of_arm : carries) add(of_arm);
+    add(cut_blocks);
+    add(kept_in);
+    return sum;
+  }
+
   /// By arm; pointers are those of the servo that was kept: see `state_in`.
   std::vector<ServoState<N>> states;
   VolumeHistory history;

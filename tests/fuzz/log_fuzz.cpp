@@ -10,7 +10,7 @@
 #include <string_view>
 
 #include "controller/load/scene_json.hpp"
-#include "record/earlier_inputs.hpp"
+#include "record/input_rows.hpp"
 #include "record/mcap_export.hpp"
 #include "record/recording.hpp"
 #include "shared/posix/atomic_file.hpp"

@@ -16,7 +16,7 @@ using namespace kerf::test;
 
 namespace {
 
-constexpr Tick kFile = EarlierInputs::kTicksAFile;
+constexpr Tick kFile = kInputsAFile;
 
 TickRecord given_in(Tick tick) {
   TickRecord record = made_up_tick(tick, 10'000);

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "record/tick_log.hpp"
-
 #include <csignal>
 #include <cstring>
 
@@ -8,6 +6,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "record/tick_log_writer.hpp"
 #include "shared/volume/checksum.hpp"
 #include "tests/record/record_support.hpp"
 

@@ -6,7 +6,38 @@
 #include <cstdlib>
 #include <cstring>
 #include <exception>
+#include <string>
+#include <string_view>
 #include <typeinfo>
+#include <utility>
+
+#include "shared/text/json.hpp"
+#include "web/absent/parser_line.hpp"
+
+namespace kerf::web {
+namespace {
+
+std::string parser_line;  // of the one that lives; empty: none
+
+}  // namespace
+
+ParserLine::ParserLine(std::string line) {
+  parser_line = std::move(line);
+}
+ParserLine::~ParserLine() {
+  parser_line.clear();
+}
+
+namespace {
+
+/// JsonError, or what the library of JSON throws below it. All other exceptions are lines already.
+bool is_of_parser(const std::type_info& type) {
+  return type == typeid(JsonError) ||
+         std::string_view(type.name()).find("nlohmann") != std::string_view::npos;
+}
+
+}  // namespace
+}  // namespace kerf::web
 
 extern "C" {
 
@@ -21,9 +52,12 @@ void __cxa_free_exception(void* exception) {
 }
 /// All exceptions of kerf and of the standard library derive from std::exception, as their first
 /// base.
-[[noreturn]] void __cxa_throw(void* exception, std::type_info*, void (*)(void*)) {
-  const char* const text = static_cast<const std::exception*>(exception)->what();
-  kerf_failed(text, std::strlen(text));
+[[noreturn]] void __cxa_throw(void* exception, std::type_info* type, void (*)(void*)) {
+  std::string line = static_cast<const std::exception*>(exception)->what();
+  if (!kerf::web::parser_line.empty() && kerf::web::is_of_parser(*type)) {
+    line = kerf::web::parser_line;
+  }
+  kerf_failed(line.data(), line.size());
 }
 
 }  // extern "C"

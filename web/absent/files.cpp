@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A tab has no files: its scenes are texts, and their volumes are phantoms. What loading asks of
-// files and of the system is answered with "there is none".
+// A tab has no files but those of a recording: its scenes are texts, and their volumes are
+// phantoms. What loading asks of other files and of the system is answered with "there is none".
 #include <string>
 
 #include "controller/input/load_error.hpp"
@@ -14,7 +14,10 @@ namespace kerf {
 namespace {
 
 [[noreturn]] void refuse_file(const std::string& path) {
-  throw LoadError(path + ": a browser's tab reads no files; take a scene of phantoms");
+  throw LoadError(
+      path +
+      ": a browser's tab does not read it; take a scene of phantoms, or a recording that has "
+      "its volumes");
 }
 
 }  // namespace

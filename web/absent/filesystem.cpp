@@ -1,8 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // The part of std::filesystem behind its header that libc++ of WebAssembly lacks
-// (headers/filesystem): names are taken apart as POSIX has them, and no file is there.
+// (headers/filesystem): names are taken apart as POSIX has them. Which files are there, the worker
+// answers (page/log_files.js): those of a recording, else none.
+#include <cerrno>
 #include <filesystem>
 #include <system_error>
+
+#include <sys/stat.h>
 
 _LIBCPP_BEGIN_NAMESPACE_FILESYSTEM
 namespace {
@@ -11,8 +15,11 @@ string_view last_part(string_view name) noexcept {
   return name.substr(name.rfind('/') + 1);  // npos + 1 is 0
 }
 
-error_code absent() noexcept {
-  return make_error_code(errc::no_such_file_or_directory);
+/// False, and the reason, if nothing is there.
+bool state_of(const path& name, struct stat& state, error_code* error) noexcept {
+  const bool is_there = stat(name.c_str(), &state) == 0;
+  if (error != nullptr) *error = is_there ? error_code() : error_code(errno, generic_category());
+  return is_there;
 }
 
 }  // namespace
@@ -59,16 +66,18 @@ path path::lexically_relative(const path&) const {
   return {};
 }
 
-file_status __status(const path&, error_code* error) {
-  if (error != nullptr) *error = absent();
-  return file_status(file_type::not_found);
+file_status __status(const path& name, error_code* error) {
+  struct stat state {};
+  if (!state_of(name, state, error)) return file_status(file_type::not_found);
+  return file_status(S_ISDIR(state.st_mode) ? file_type::directory : file_type::regular);
 }
 file_status __symlink_status(const path& name, error_code* error) {
   return __status(name, error);
 }
-uintmax_t __file_size(const path&, error_code* error) {
-  if (error != nullptr) *error = absent();
-  return static_cast<uintmax_t>(-1);
+uintmax_t __file_size(const path& name, error_code* error) {
+  struct stat state {};
+  if (!state_of(name, state, error)) return static_cast<uintmax_t>(-1);
+  return static_cast<uintmax_t>(state.st_size);
 }
 path __absolute(const path& name, error_code* error) {
   if (error != nullptr) error->clear();

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // kerf.wasm as an object of JavaScript: for the worker of the page, and for tests in Node.
+import {LogFiles} from './log_files.js';
 
-const kNoSuchCall = 52, kNoSuchFile = 8;  // ENOSYS and EBADF of WASI
+const kNoSuchCall = 52;  // ENOSYS of WASI
 const decoder = new TextDecoder(), encoder = new TextEncoder();
 
 /** One instance of the module: one run after the other. An error of a run ends the instance. */
@@ -13,7 +14,8 @@ export class KerfModule {
       imports[module] ??= {};
       imports[module][name] = () => kNoSuchCall;
     }
-    Object.assign(imports.wasi_snapshot_preview1, this.system());
+    this.files = new LogFiles(this);
+    Object.assign(imports.wasi_snapshot_preview1, this.system(), this.files.calls());
     imports.kerf.failed = (at, bytes) => {
       throw new Error(this.textAt(at, bytes));
     };
@@ -45,14 +47,13 @@ export class KerfModule {
         view().setUint32(written, bytes, true);
         return 0;
       },
-      // No environment, no folders.
+      // No environment.
       environ_sizes_get: (count, bytes) => {
         view().setUint32(count, 0, true);
         view().setUint32(bytes, 0, true);
         return 0;
       },
       environ_get: () => 0,
-      fd_prestat_get: () => kNoSuchFile,
       proc_exit: code => {
         throw new Error(`kerf.wasm: ended with ${code}; load the page again`);
       },
@@ -76,6 +77,23 @@ export class KerfModule {
     const bytes = encoder.encode(texts.map(text => `${text}\0`).join(''));
     this.bytesAt(this.calls.room(bytes.length), bytes.length).set(bytes);
     this.calls.open_run(bytes.length);
+  }
+  /** Loads a recording, as readyRecording returns it: see TabReplay. Throws an error with one line. */
+  openReplay({folder, files}) {
+    this.files.mount(files);
+    const bytes = encoder.encode(folder);
+    this.bytesAt(this.calls.room(bytes.length), bytes.length).set(bytes);
+    this.calls.open_replay(bytes.length);
+  }
+  /** Whether all is done that comes before a tick is shown; at most so many ticks of it. */
+  replayPrepare(ticks) {
+    return this.calls.replay_prepare(ticks) !== 0;
+  }
+  replayStep(ticks) {
+    return this.calls.replay_step(ticks);
+  }
+  replayGo(tick) {
+    this.calls.replay_go(tick);
   }
   /** Up to `ticks` steps, not beyond `mostArmed` armed ticks (0: no bound); how many were made. */
   step(ticks, mostArmed = 0) {

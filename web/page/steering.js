@@ -6,22 +6,30 @@ import {add, affineInverse, clamp, column, normalized, subtract, times, transfor
 
 const kRepeatMs = 80;       // a hand lets go of a target that is older than 250 ms
 const kWheelPixels = 100;   // of a notch
+const kStillMs = 1000;      // a mouse that hovers so long without a move has left the tool to others
 
 export class Steering {
   /** `page`: {stage, now, held()}; `worker` gets the targets. */
   constructor(page, worker) {
-    Object.assign(this, {page, worker, on: false, fingersPress: true, at: null, presses: false, depth: null});
+    Object.assign(this, {page, worker, on: false, fingersPress: true, at: null, presses: false, depth: null,
+      leader: null});  // {type, heldDown, atMs}: the kind of pointer that leads the tool
     const {canvas} = page.stage;
     // Before the stage's own listeners, which move the camera.
     const before = (kind, what) => canvas.parentElement.addEventListener(kind, event => {
-      if (this.on && event.target === canvas) what(event);
+      if (!this.on || event.target !== canvas) return;
+      if (!this.isLedByAnother(event)) return what(event);
+      // It leads neither the tool nor the camera.
+      if (event.pointerType === 'touch') this.countFinger(event);
+      event.preventDefault();
+      event.stopPropagation();
     }, {capture: true, passive: false});
     this.fingers = new Set();
     before('pointerdown', event => this.down(event));
     before('pointermove', event => this.move(event));
     for (const kind of ['pointerup', 'pointercancel']) before(kind, event => this.up(event));
     canvas.addEventListener('pointerleave', event => {
-      if (this.on && event.pointerType === 'mouse' && event.buttons === 0) this.letGo();
+      const leads = this.on && !this.isLedByAnother(event);
+      if (leads && event.pointerType === 'mouse' && event.buttons === 0) this.letGo();
     });
     canvas.addEventListener('contextmenu', event => this.on && event.preventDefault());
     before('wheel', event => this.wheel(event));
@@ -34,13 +42,24 @@ export class Steering {
     this.fingers.clear();
   }
 
+  /** A mouse and a finger at once: the first one leads until it goes. A wheel is a mouse's. */
+  isLedByAnother({pointerType = 'mouse'}) {
+    const {leader} = this;
+    if (!leader || leader.type === pointerType) return false;
+    return leader.type === 'touch' || leader.heldDown || performance.now() - leader.atMs < kStillMs;
+  }
+  countFinger({type, pointerId}) {
+    if (type === 'pointerdown') this.fingers.add(pointerId);
+    else if (type !== 'pointermove') this.fingers.delete(pointerId);
+  }
+
   /** By the camera: another button, shift, or more than one finger. */
   isOfCamera(event) {
     if (event.pointerType === 'touch') return this.fingers.size > 1;
     return event.shiftKey || (event.buttons & ~1) !== 0;
   }
   down(event) {
-    if (event.pointerType === 'touch') this.fingers.add(event.pointerId);
+    if (event.pointerType === 'touch') this.countFinger(event);
     if (this.isOfCamera(event)) return this.letGo();
     this.follow(event, event.pointerType === 'touch' ? this.fingersPress : true);
   }
@@ -50,9 +69,12 @@ export class Steering {
     this.follow(event, event.pointerType === 'touch' ? this.fingersPress : (event.buttons & 1) !== 0);
   }
   up(event) {
-    this.fingers.delete(event.pointerId);
-    if (event.pointerType === 'touch') return this.letGo();
+    if (event.pointerType === 'touch') {
+      this.countFinger(event);
+      return this.letGo();
+    }
     this.presses = false;
+    if (this.leader) Object.assign(this.leader, {heldDown: false, atMs: performance.now()});
     this.send();
   }
   wheel(event) {
@@ -66,9 +88,11 @@ export class Steering {
   follow(event, presses) {
     this.at = [event.offsetX, event.offsetY];
     this.presses = presses;
+    this.leader = {type: event.pointerType, heldDown: (event.buttons & 1) !== 0, atMs: performance.now()};
     this.send();
   }
   letGo() {
+    this.leader = null;
     if (!this.at) return;
     Object.assign(this, {at: null, presses: false, depth: null});
     this.worker.postMessage({release: true});

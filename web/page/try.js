@@ -4,12 +4,13 @@
 //
 // In the address behind #: scene=NAME, hand=script or mine, seconds=S (then it ends and its hashes stand here), pace=0 (as
 // fast as it can), set=KEY=VALUE (may be given often).
+import {ReplayControls} from './replay.js';
 import {scenes} from './scenes.js';
 import {TabSocket} from './tab_socket.js';
 
 const element = id => document.getElementById(id);
 const wanted = new URLSearchParams(location.hash.slice(1));
-const state = {inputs: null, page: null, steering: null, worker: null, shown: null};
+const state = {ready: false, reads: false, page: null, steering: null, worker: null, shown: null, replay: null};
 
 function refuse(text) {
   const line = element('missing');
@@ -55,7 +56,8 @@ function addControls() {
     input.addEventListener('input', () => input.nextElementSibling.textContent = input.value);
     input.addEventListener('change', start);
   }
-  element('finger').addEventListener('change', ({target}) => state.steering.fingersPress = target.checked);
+  state.replay = new ReplayControls({worker: state.worker, refused}, fields);
+  element('finger').addEventListener('change', ({target}) => state.steering && (state.steering.fingersPress = target.checked));
   element('again').addEventListener('click', start);
   element('scene').value = scenes.some(({name}) => name === wanted.get('scene')) ? wanted.get('scene') : 'phantom';
   element('hand').value = wanted.get('hand') === 'mine' ? 'mine' : 'script';
@@ -93,19 +95,24 @@ function showOwnValues({force, servo}) {
   if (!touched.has('rate')) element('rate').value = servo.rate_hz;
 }
 
+const isMine = () => element('hand').value === 'mine';
+
+/** Before the module is there nothing is sent: the controls are read once it is. */
 async function start(event) {
+  if (!state.ready) return;
+  state.replay.close();
+  state.reads = false;
   if (event?.type === 'change') {
     if (event.target.id === 'scene') touched.clear();  // they were of the other scene
     else if (event.target.id !== 'hand') touched.add(event.target.id);
   }
   const {name, hand} = scenes.find(one => one.name === element('scene').value);
-  const mine = element('hand').value === 'mine';
+  const mine = isMine();
   element('finger-row').style.display = mine && matchMedia('(any-pointer: coarse)').matches ? '' : 'none';
   element('run-state').textContent = 'loading the scene';
   document.body.dataset.run = 'loading';
   try {
-    const scene = await textOf(`scenes/${name}.toml`);
-    const script = mine ? '' : await textOf(`scenes/hands/${hand}.toml`);
+    const [scene, script] = await Promise.all([textOf(`scenes/${name}.toml`), mine ? '' : textOf(`scenes/hands/${hand}.toml`)]);
     state.steering?.start(mine);
     state.worker.postMessage({
       open: {name: `scenes/${name}.toml`, scene, hand: script, pedal: mine, settings: settings()},
@@ -114,6 +121,12 @@ async function start(event) {
   } catch (problem) {
     failed(problem.message);
   }
+}
+
+/** What was dropped is no recording: the run goes on. */
+function refused(text) {
+  element('run-state').textContent = text;
+  document.body.dataset.refused = text;
 }
 
 function failed(text) {
@@ -134,6 +147,10 @@ function showFacts(facts) {
     ...Object.entries(facts.energy_mj).filter(([, mj]) => Math.abs(mj) >= 0.005).map(([name, mj]) => [`· ${name}`, number(mj, 2, 'mJ')]),
     ['output hash', facts.output_hash]];
   if (facts.volume_hash) rows.push(['volume hash', facts.volume_hash]);
+  showRows(rows);
+}
+
+function showRows(rows) {
   element('run-figures').replaceChildren(...rows.flatMap(([label, value]) => {
     const pair = [document.createElement('dt'), document.createElement('dd')];
     [pair[0].textContent, pair[1].textContent] = [label, value];
@@ -142,7 +159,10 @@ function showFacts(facts) {
 }
 
 const says = {
-  ready: () => begin(),
+  ready: () => {
+    state.ready = true;
+    if (!state.reads) start();
+  },
   opened: ({opened}) => {
     element('run-state').textContent = `loaded in ${(opened / 1000).toFixed(1)} s`;
     document.body.dataset.run = 'runs';
@@ -151,7 +171,7 @@ const says = {
   down: ({down}) => TabSocket.take(down),
   facts: ({facts}) => {
     showFacts(facts);
-    const held = state.page.heldNow();
+    const held = state.page?.heldNow() ?? null;
     if (held !== state.shown && document.body.dataset.state === 'live') {
       showOwnValues(held.sceneJson);
       state.shown = held;
@@ -165,18 +185,28 @@ const says = {
     Object.assign(document.body.dataset, {run: 'done', outputHash: done.output_hash, volumeHash: done.volume_hash,
       timesRealTime: done.times_real_time.toFixed(2)});
   },
-  failed: ({failed: text}) => state.page ? failed(text) : refuse(text),
+  refused: ({refused: text}) => refused(text),
+  reads: ({reads: folder}) => {
+    state.reads = true;
+    state.steering?.start(false);
+    state.replay.begin(folder);
+    element('finger-row').style.display = 'none';
+    element('run-state').textContent = `reads ${folder}`;
+    document.body.dataset.run = 'loading';
+  },
+  replayed: ({replayed}) => showRows(state.replay.show(replayed)),
+  failed: ({failed: text}) => state.ready ? failed(text) : refuse(text),
 };
 
-/** The module is there: the bridge's page begins, with a link to the worker. */
+/** The bridge's page, with a link to the worker, which loads the scene meanwhile. */
 async function begin() {
   TabSocket.worker = state.worker;
   globalThis.WebSocket = TabSocket;
   const {Steering} = await import('./steering.js');
-  const page = state.page = await import('./kerf.js');
-  if (page.stage) state.steering = new Steering(page, state.worker);
-  addControls();
-  await start();
+  state.page = await import('./kerf.js');
+  if (!state.page.stage) return;
+  state.steering = new Steering(state.page, state.worker);
+  state.steering.start(isMine() && !state.reads);
 }
 
 const why = lack();
@@ -186,5 +216,9 @@ if (why) {
   state.worker = new Worker(new URL('worker.js', import.meta.url), {type: 'module'});
   state.worker.onerror = () => refuse('The worker of this page did not start: a browser with modules in workers is needed.');
   state.worker.onmessage = ({data}) => Object.keys(data).forEach(kind => says[kind]?.(data));
-  document.addEventListener('visibilitychange', () => state.worker.postMessage({pause: document.hidden}));
+  const tellHidden = () => state.worker.postMessage({pause: document.hidden});
+  document.addEventListener('visibilitychange', tellHidden);
+  if (document.hidden) tellHidden();
+  addControls();
+  begin().catch(problem => refuse(`${problem.message}; load the page again`));
 }

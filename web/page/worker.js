@@ -3,8 +3,12 @@
 //
 // In:  {open: inputs, pace, mostArmed}   another run; pace: seconds of the servo in one of the clock, 0: as fast as it can
 //      {up: ArrayBuffer} {join: true} {lead: [mm, rad, button]} {release: true} {pause: bool}
+//      {log: dropped files}           a recording in place of a run; {replay: what ReplayTurn takes}
 // Out: {opened: ms} {down: ArrayBuffer} {facts} {failed: text} {done: facts with volume_hash}
+//      {refused: text}: what was dropped is no recording, the run goes on; {reads: folder}; {replayed: facts}
 import {KerfModule} from './kerf_module.js';
+import {findRecording} from './log_files.js';
+import {readyFiles, ReplayTurn} from './replay_turn.js';
 
 const kSlotMs = 1000 / 60;
 const kBusyMs = 12;     // of a slot; the rest is for messages
@@ -13,11 +17,17 @@ const kBehindMs = 100;  // of the servo's time: more is not made up for
 const kFactsMs = 200;
 
 let compiled = null, kerf = null;
-let run = null;  // {pace, mostArmed, dueTicks, lookedMs, factsMs, factsTicks, busyMs, allMs, steps, paused, ended}
+let joined = false;  // there is a viewer: the page's own modules may come after the run
+let opening = 0;     // counts what was asked for: files are read meanwhile
+let hidden = false;  // a page that nobody sees
+let run = null;  // {turn} of a recording, or {pace, mostArmed, dueTicks, lookedMs, factsMs, factsTicks, busyMs, allMs, steps, paused, ended}
 const now = () => performance.now();
 
 function post(messages) {
   for (const message of messages) postMessage({down: message}, [message]);
+}
+function postNews(ended = false) {
+  if (joined) post(kerf.news(ended));
 }
 
 /** What throws ends the run with a line on the page, never the worker. */
@@ -34,16 +44,45 @@ function attempt(what) {
 }
 
 function open({open: inputs, pace = 1, mostArmed = 0}) {
+  ++opening;
   kerf = null;  // before the next one is made: each takes some 100 MB
   const began = now();
   kerf = new KerfModule(compiled);
   kerf.open(inputs);
   const at = now();
-  run = {pace, mostArmed, dueTicks: 0, lookedMs: at, factsMs: at, factsTicks: 0, busyMs: 0, allMs: 0, steps: 0, paused: false,
+  run = {pace, mostArmed, dueTicks: 0, lookedMs: at, factsMs: at, factsTicks: 0, busyMs: 0, allMs: 0, steps: 0, paused: hidden,
     ended: false};
   postMessage({opened: at - began});
-  post(kerf.news());
+  postNews();
   tellFacts(at);
+}
+
+async function openLog({log}) {
+  let folder, ready;
+  try {
+    ({folder} = findRecording(log));
+  } catch (problem) {
+    return postMessage({refused: problem.message});
+  }
+  const mine = ++opening;
+  const began = now();
+  kerf = run = null;  // a second recording ends the first
+  postMessage({reads: folder});
+  try {
+    ready = await readyFiles(log);
+    await begun;
+  } catch (problem) {
+    return mine === opening && postMessage({failed: problem.message});
+  }
+  if (mine !== opening || !compiled) return;
+  attempt(() => {
+    const next = new KerfModule(compiled);
+    next.openReplay(ready);
+    kerf = next;
+    run = {turn: new ReplayTurn(kerf, replayed => postMessage({replayed})), paused: hidden};
+    postMessage({opened: now() - began});
+    postNews();
+  });
 }
 
 function tellFacts(at) {
@@ -72,10 +111,14 @@ function advance(began) {
 
 /** News go out without a step too: they are the sign of life that the page waits for. */
 function slot() {
+  if (run.turn) {
+    run.turn.slot(run.paused);
+    return postNews();
+  }
   const began = now();
   const before = run.ended;
   if (!run.paused && !run.ended) advance(began);
-  post(kerf.news(run.ended));
+  postNews(run.ended);
   const ends = run.ended && !before;
   if (ends || (!run.ended && now() - run.factsMs >= kFactsMs)) tellFacts(now());
   if (!ends) return;
@@ -87,7 +130,7 @@ function slot() {
 function turn() {
   const began = now();
   if (run) attempt(slot);
-  const hurries = run?.pace === 0 && !run.paused && !run.ended;
+  const hurries = (run?.turn ? run.turn.hurries : run?.pace === 0 && !run.ended) && !run.paused;
   setTimeout(turn, hurries ? 0 : Math.max(kSlotMs - (now() - began), 0));
 }
 
@@ -98,17 +141,26 @@ const takes = {
     post(kerf.waiting());
   },
   join: () => {
+    joined = true;
+    if (!kerf) return;  // its first run greets it
     kerf.join();
-    post(kerf.news());
+    postNews();
   },
   lead: ({lead}) => kerf.lead(...lead),
   release: () => kerf.release(),
-  pause: ({pause}) => Object.assign(run, {paused: pause, lookedMs: now()}),
+  replay: ({replay}) => run.turn?.take(replay),
+  pause: ({pause}) => {
+    hidden = pause;
+    if (!run) return;
+    Object.assign(run, {paused: pause, lookedMs: now()});
+    run.turn?.lookAgain();
+  },
 };
 
 onmessage = ({data}) => {
+  if ('log' in data) return openLog(data);
   const kind = Object.keys(takes).find(name => name in data);
-  if (kind === 'open' || kerf) attempt(() => takes[kind](data));
+  if (kerf || ['open', 'join', 'pause'].includes(kind)) attempt(() => takes[kind](data));
 };
 
 async function begin() {
@@ -124,4 +176,4 @@ async function begin() {
     postMessage({failed: problem.message});
   }
 }
-begin();
+const begun = begin();

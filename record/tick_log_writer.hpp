@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <vector>
+
+#include "record/tick_log.hpp"
+#include "shared/segment/layout.hpp"
+
+// The tick log as a recorder writes it.
+
+namespace kerf {
+
+/// Takes the ticks of a run in order, those of the first arm.
+class TickSink {
+ public:
+  TickSink() = default;
+  virtual ~TickSink() = default;
+  TickSink(const TickSink&) = delete;
+  TickSink& operator=(const TickSink&) = delete;
+  virtual void append(const TickRecord& record) = 0;
+  /// With two arms, before `append` of the same tick: the second arm's. Default: ignores it.
+  virtual void append_second(const TickRecord& /*record*/) {}
+  /// After the last of several.
+  virtual void flush() {}
+};
+
+/// Writes one log. Not thread-safe. A failure throws `RecordError`; the file then has complete
+/// rows.
+class TickLogWriter final : public TickSink {
+ public:
+  enum class Begin {
+    new_file,   ///< refuses a path that exists: a recording is never overwritten
+    after_last  ///< goes on behind the complete rows of a log; cuts an incomplete row, or header
+  };
+  /// Refuses a log that another process writes. `most_rows`: of those that `after_last` keeps.
+  explicit TickLogWriter(std::filesystem::path path, Begin begin = Begin::new_file,
+                         std::uint64_t most_rows = UINT64_MAX);
+  ~TickLogWriter() override;
+
+  /// Buffers a row; at most `kBufferRows` wait for `flush`.
+  void append(const TickRecord& record) override;
+  void flush() override;
+  /// Rows to the disk, then the header that counts them, then the header to the disk.
+  void sync();
+
+  [[nodiscard]] std::uint64_t rows() const noexcept { return written_ + buffer_.size(); }
+
+ private:
+  [[noreturn]] void fail(int error);
+  void write_header();
+
+  static constexpr std::size_t kBufferRows = 64;
+  std::filesystem::path path_;
+  int fd_ = -1;
+  std::uint64_t written_ = 0;
+  std::vector<TickRecord> buffer_;
+};
+
+}  // namespace kerf

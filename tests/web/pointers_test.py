@@ -1,0 +1,123 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Mouse and finger at once, and a page in the background, in headless Chromium.
+
+    pointers_test.py ROOT PAGE-FOLDER
+
+PAGE-FOLDER is what ./kerf page wrote. Exit code 77: skipped, for want of it or of a browser."""
+import pathlib
+import sys
+import tempfile
+import time
+
+root, folder = (pathlib.Path(word).resolve() for word in sys.argv[1:3])
+sys.path.insert(0, str(root / 'tests/page'))
+from browser import Page, find_chromium  # noqa: E402
+from served import served  # noqa: E402
+
+# What the page asks of its worker: the names of the messages, and where the tool shall go.
+LISTEN = """globalThis.asked = [];
+  Worker.prototype.postMessage = (f => function (message, ...more) {
+    if ('lead' in message) asked.push(message.lead[0]);
+    else if ('release' in message) asked.push('release');
+    return f.call(this, message, ...more);
+  })(Worker.prototype.postMessage);"""
+failures = []
+
+
+def check(holds, what):
+    print(('ok    ' if holds else 'FAILS ') + what, flush=True)
+    if not holds:
+        failures.append(what)
+
+
+def asked(page):
+    """What was asked since the last time."""
+    return page.evaluate('asked.splice(0)')
+
+
+def apart(a, b):
+    return max(abs(x - y) for x, y in zip(a, b))
+
+
+def last_goal(messages):
+    return next((one for one in reversed(messages) if one != 'release'), None)
+
+
+def first_pointer_leads(page):
+    x, y, width, height = page.box('#picture')
+    left, right = ((x + width * part, y + height / 2) for part in (0.3, 0.7))
+    page.touch('touchStart', left)
+    time.sleep(0.3)
+    of_finger = last_goal(asked(page))
+    check(of_finger is not None, 'a finger leads the tool')
+    page.mouse('mouseMoved', *right)
+    page.mouse('mousePressed', *right, button='left', buttons=1, clickCount=1)
+    page.mouse('mouseMoved', right[0] + 5, right[1], button='left', buttons=1)
+    page.mouse('mouseReleased', right[0] + 5, right[1], button='left')
+    page.mouse('mouseWheel', *right, deltaX=0, deltaY=100)
+    time.sleep(0.3)
+    messages = asked(page)
+    # The tool itself moves meanwhile, and with it the depth of the finger's goal, by little.
+    check(messages and 'release' not in messages and all(apart(one, of_finger) < 3 for one in messages),
+          'a mouse beside it neither leads nor takes the tool away')
+    page.touch('touchEnd')
+    time.sleep(0.2)
+    check('release' in asked(page), 'the finger goes')
+    page.mouse('mousePressed', *right, button='left', buttons=1, clickCount=1)
+    time.sleep(0.3)
+    of_mouse = last_goal(asked(page))
+    check(of_mouse is not None and apart(of_mouse, of_finger) > 3, 'then the mouse leads, elsewhere')
+    page.touch('touchStart', left)
+    page.touch('touchMove', (left[0] + 5, left[1]))
+    time.sleep(1.3)  # a press that does not move is still one
+    messages = asked(page)
+    check(messages and 'release' not in messages and all(apart(one, of_mouse) < 3 for one in messages),
+          'a finger beside a pressed mouse does not lead')
+    page.mouse('mouseReleased', *right, button='left')
+    page.touch('touchEnd')
+    time.sleep(1.2)
+    asked(page)
+    page.touch('touchStart', left)
+    time.sleep(0.3)
+    check(apart(last_goal(asked(page)) or of_mouse, of_mouse) > 3, 'a mouse that stands still leaves the tool to a finger')
+    page.touch('touchEnd')
+
+
+def stands_still_when_hidden(page):
+    hide = "Object.defineProperty(document, 'hidden', {value: %s, configurable: true}); document.dispatchEvent(new Event('visibilitychange'))"
+    seconds = "parseFloat([...document.querySelectorAll('#run-figures dt')].find(e => e.textContent === 'servo time').nextSibling.textContent)"
+    page.evaluate(hide % 'true')
+    time.sleep(0.6)  # what was under way
+    before = page.evaluate(seconds)
+    time.sleep(4)
+    check(page.evaluate(seconds) == before, 'a run in the background stands still')
+    page.evaluate(hide % 'false')
+    began = time.monotonic()
+    check(page.until(f'{seconds} > {before}', 30), 'and goes on')
+    # No faster than the clock, but for the last figure's 0.2 s and its rounding.
+    gone = page.evaluate(seconds) - before
+    check(gone <= time.monotonic() - began + 0.5, f'without a burst: {gone:.1f} s')
+
+
+def main():
+    chromium = find_chromium()
+    for there, name in ((chromium, 'chromium'), ((folder / 'kerf.wasm').exists(), f'{folder}/kerf.wasm')):
+        if not there:
+            print(f'skipped: no {name}')
+            return 77
+    with tempfile.TemporaryDirectory() as profile, served(folder) as address:
+        page = Page(chromium, profile)
+        try:
+            page.call('Page.addScriptToEvaluateOnNewDocument', source=LISTEN)
+            page.size(1280, 800)
+            page.call('Emulation.setTouchEmulationEnabled', enabled=True)
+            page.go(f'{address}/#scene=touch&hand=mine')
+            check(page.until("document.body?.dataset.run === 'runs' && document.body.dataset.handLed === 'true'", 120), 'the hand waits to be led')
+            first_pointer_leads(page)
+            stands_still_when_hidden(page)
+        finally:
+            page.close()
+    return 1 if failures else 0
+
+
+sys.exit(main())

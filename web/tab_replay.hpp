@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "shared/segment/layout.hpp"
+
+namespace kerf::web {
+
+/// A recording, replayed in the tab: each tick is compared, the first time that it is reached, with
+/// the recorded one, as kerf-replay does, and published to the page. Its files are read as of any
+/// folder; the worker has them (web/page/log_files.js).
+///
+/// The order: construct; then in turn `prepare` until it returns true, `step`, `go`, and the
+/// messages of TabViewer. No call but the constructor takes long.
+class TabReplay {
+ public:
+  /// Reads manifest and scene, loads and plans it: a second or two. Throws RecordError, LoadError
+  /// or SegmentError, one line.
+  explicit TabReplay(const std::filesystem::path& folder);
+  ~TabReplay();
+  TabReplay(const TabReplay&) = delete;
+  TabReplay& operator=(const TabReplay&) = delete;
+
+  /// At most `ticks` of those that come before a tick is shown: in a flight recording the ticks
+  /// before its first one, later those on the way to the tick of `go`. Returns whether all are
+  /// done. Throws RecordError for damaged inputs.
+  [[nodiscard]] bool prepare(int ticks);
+
+  /// Shows the next `ticks`; less at the end of the recording, and at its first difference, which
+  /// is the last one then. Returns how many. After `prepare`.
+  int step(int ticks);
+
+  /// To that tick, by `prepare`. Before the first `prepare` is done it does nothing.
+  void go(Tick tick);
+
+  /// As of TabViewer. A slot without a step is a sign of life, too.
+  void join();
+  void slot(bool ended);
+  [[nodiscard]] bool next(std::vector<std::byte>& message);
+  bool take(std::span<const std::byte> message);
+
+  [[nodiscard]] int rate_hz() const noexcept;
+  /// JSON: tick_ns, tick, first_tick, last_tick, earlier_tick (of those before the first one),
+  /// goal (0: none), compared, difference (as kerf-replay prints it; null: none), cut_short (why
+  /// the recording ends before it was recorded to its end; empty: it does not), output_hash,
+  /// second_output_hash (of two arms), force_n, phase, fault. Cheap.
+  [[nodiscard]] std::string facts() const;
+  /// Hash of all volumes as kerf-replay prints it, 16 hex digits. Reads every voxel.
+  [[nodiscard]] std::string volume_hash() const;
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace kerf::web
