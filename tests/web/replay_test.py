@@ -172,20 +172,41 @@ def make_recordings(work, log):
     return some
 
 
+def replays_one_file(work, kerf):
+    """The MCAP of a recording is found to be what its folder is."""
+    names = []
+    for name, options in (('whole', ()), ('whole', ('--unpacked',)), ('another-report', ()), ('two-arms', ()), ('flight', ()),
+                          ('gap', ())):
+        names.append(f'{name}{"".join(options)}.mcap')
+        # It exits with 1 if the recording has a gap.
+        subprocess.run([programs / 'kerf-record', 'export', work / name, '--mcap', work / names[-1], *options], check=False,
+                       stdout=subprocess.DEVNULL)
+    for name, module in replayed_in_node(work, names).items():
+        folder_name = name.removesuffix('.mcap').removesuffix('--unpacked')
+        check(same_as_kerf(name, module, kerf[folder_name]), f'{name}: {module.get("failed") or module["difference"] or module["output_hash"]}')
+
+
 def says_its_own_lines(work, log):
     """What no program but the page meets, or says in other words."""
     some = Recordings(work, log)
     (some.copy('no-log') / 'ticks.npy').unlink()
     shutil.copytree(log, some.copy('two') / 'second')
-    for name, data in (('run.mcap', b'\x89MCAP0\r\n'), ('picture.png', b'\x89PNG')):
+    whole = (work / 'whole.mcap').read_bytes()
+    subprocess.run([programs / 'kerf-record', 'export', log, '--mcap', work / 'part.mcap', '--until', '100'], check=True, stdout=subprocess.DEVNULL)
+    some.names.append('part.mcap')
+    middle = len(whole) // 4
+    for name, data in (('foreign.mcap', b'\x89MCAP0\r\n' * 100), ('cut.mcap', whole[:-100]), ('empty.mcap', b''), ('picture.png', b'\x89PNG'),
+                       ('damaged.mcap', whole[:middle] + bytes(5000) + whole[middle + 5000:])):
         (work / name).write_bytes(data)
         some.names.append(name)
     words = {'no-log': 'no-log/manifest.json: ticks.npy is not beside it; drop the folder',
              'two': '2 recordings: two, two/second; drop one of them',
-             'run.mcap': 'run.mcap: MCAP has the ticks, and neither scene nor volumes; drop the folder',
+             'part.mcap': 'part.mcap: has ticks, and neither scene nor volumes; export the whole recording',
+             'damaged.mcap': 'damaged.mcap/ticks.npy: ',
+             **{f'{name}.mcap': f'{name}.mcap: cut, or no MCAP of kerf-record export; copy it again' for name in ('foreign', 'cut', 'empty')},
              'picture.png': 'picture.png: no recording; drop the folder'}
     for name, found in replayed_in_node(work, some.names).items():
-        failed = found.get('failed', 'nothing')
+        failed = found.get('failed') or found.get('cut_short') or 'nothing'
         check(failed.startswith(words[name]) and '\n' not in failed, f'{name}: {failed}')
     few = replayed_in_node(work, ['whole'], most=1 << 20)['whole'].get('failed', 'nothing')
     check('npy.gz: ' in few and few.endswith('too large for a tab; replay it with ./kerf replay'), f'1 MiB of memory: {few}')
@@ -307,6 +328,14 @@ def finds_a_difference(page, work, kerf):
     check(rests_at(page, 1501), 'and back to it')
 
 
+def replays_a_file(page, work, kerf):
+    """A fault report is one file."""
+    drop(page, work / 'whole.mcap')
+    check(page.until(f"document.getElementById('run-figures').textContent.startsWith('recordingwhole.mcap')", 60) and
+          rests_at(page, kerf['whole']['equal'], 120), f'a dropped MCAP is replayed: {page.evaluate(FOUND)}')
+    check(hashes(page) == (kerf['whole']['output_hash'], kerf['whole']['volume_hash']), 'to the same hashes')
+
+
 def says_what_is_wrong(page, work, kerf):
     for name in ('cut-in-the-header', 'other-byte-order', 'missing-start', 'other-scene', 'cut-volume', 'huge-volume'):
         drop(page, work / name)
@@ -350,6 +379,7 @@ def main():
         kerf = tells_the_same(work, some.names + ['two-arms'] + flight_recording(work))
         report = json.loads((work / 'demo/report.json').read_text())
         check(kerf['whole']['output_hash'] == report['output_hash'], 'the run had that hash, too')
+        replays_one_file(work, kerf)
         says_its_own_lines(work, work / 'demo/log')
         with served(folder) as address:
             page = Page(chromium, work / 'profile')
@@ -360,6 +390,7 @@ def main():
                 replays_a_folder(page, work, kerf)
                 stands_still_when_hidden(page)
                 finds_a_difference(page, work, kerf)
+                replays_a_file(page, work, kerf)
                 says_what_is_wrong(page, work, kerf)
                 replays_files_on_a_phone(page, address, work, kerf)
             finally:
