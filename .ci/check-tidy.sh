@@ -9,7 +9,7 @@ cd "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/.."
 cmake -B build/tidy -G Ninja -DCMAKE_BUILD_TYPE=Release -DCMAKE_CXX_COMPILER=clang++-16 -DCMAKE_EXPORT_COMPILE_COMMANDS=ON \
   -DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON -DKERF_JOIN_FILES=OFF --log-level=NOTICE
 # Kernels of another processor are not in the database.
-mapfile -t files < <(find shared controller visualizer hil arm -name '*.cpp' ! -path controller/kernel/sets/neon.cpp |
+mapfile -t files < <(find shared controller visualizer hil arm -name '*.cpp' ! -path controller/kernel/sets/neon.cpp ! -path controller/kernel/sets/simd128.cpp |
   grep -E "${1:-.}" | sort)
 printf '%s\0' "${files[@]}" |
   xargs -0 -n 1 -P "$(nproc)" clang-tidy-16 --quiet -p build/tidy --extra-arg=-Wno-unused-command-line-argument

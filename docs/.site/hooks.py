@@ -11,6 +11,7 @@ import tempfile
 
 from markdown.extensions.toc import slugify
 from mkdocs.structure.files import File
+from mkdocs.structure.nav import Link
 
 HERE = pathlib.Path(__file__).parent
 sys.path.insert(0, str(HERE))
@@ -27,6 +28,14 @@ def on_files(files, config):
     pathlib.Path(folder, "index.md").write_text(page, encoding="utf-8")
     files.append(File("index.md", folder, config["site_dir"], config["use_directory_urls"]))
     return files
+
+
+def on_nav(nav, config, **_):
+    """kerf itself, if ./kerf page has made it: `./kerf docs` copies it to try/."""
+    root = pathlib.Path(config["docs_dir"]).parent
+    if (root / "build/web/page/kerf.wasm").exists():
+        nav.items.insert(1, Link("Try it", "try/index.html"))
+    return nav
 
 
 ITEM = re.compile(r" *([*+-]|\d+\.) +(?=\S)")

@@ -10,7 +10,7 @@ import {TabSocket} from './tab_socket.js';
 
 const element = id => document.getElementById(id);
 const wanted = new URLSearchParams(location.hash.slice(1));
-const state = {inputs: null, page: null, steering: null, worker: null, shown: null, replay: null};
+const state = {ready: false, reads: false, page: null, steering: null, worker: null, shown: null, replay: null};
 
 function refuse(text) {
   const line = element('missing');
@@ -57,7 +57,7 @@ function addControls() {
     input.addEventListener('change', start);
   }
   state.replay = new ReplayControls({worker: state.worker, refused}, fields);
-  element('finger').addEventListener('change', ({target}) => state.steering.fingersPress = target.checked);
+  element('finger').addEventListener('change', ({target}) => state.steering && (state.steering.fingersPress = target.checked));
   element('again').addEventListener('click', start);
   element('scene').value = scenes.some(({name}) => name === wanted.get('scene')) ? wanted.get('scene') : 'phantom';
   element('hand').value = wanted.get('hand') === 'mine' ? 'mine' : 'script';
@@ -95,20 +95,24 @@ function showOwnValues({force, servo}) {
   if (!touched.has('rate')) element('rate').value = servo.rate_hz;
 }
 
+const isMine = () => element('hand').value === 'mine';
+
+/** Before the module is there nothing is sent: the controls are read once it is. */
 async function start(event) {
+  if (!state.ready) return;
   state.replay.close();
+  state.reads = false;
   if (event?.type === 'change') {
     if (event.target.id === 'scene') touched.clear();  // they were of the other scene
     else if (event.target.id !== 'hand') touched.add(event.target.id);
   }
   const {name, hand} = scenes.find(one => one.name === element('scene').value);
-  const mine = element('hand').value === 'mine';
+  const mine = isMine();
   element('finger-row').style.display = mine && matchMedia('(any-pointer: coarse)').matches ? '' : 'none';
   element('run-state').textContent = 'loading the scene';
   document.body.dataset.run = 'loading';
   try {
-    const scene = await textOf(`scenes/${name}.toml`);
-    const script = mine ? '' : await textOf(`scenes/hands/${hand}.toml`);
+    const [scene, script] = await Promise.all([textOf(`scenes/${name}.toml`), mine ? '' : textOf(`scenes/hands/${hand}.toml`)]);
     state.steering?.start(mine);
     state.worker.postMessage({
       open: {name: `scenes/${name}.toml`, scene, hand: script, pedal: mine, settings: settings()},
@@ -155,7 +159,10 @@ function showRows(rows) {
 }
 
 const says = {
-  ready: () => begin(),
+  ready: () => {
+    state.ready = true;
+    if (!state.reads) start();
+  },
   opened: ({opened}) => {
     element('run-state').textContent = `loaded in ${(opened / 1000).toFixed(1)} s`;
     document.body.dataset.run = 'runs';
@@ -164,7 +171,7 @@ const says = {
   down: ({down}) => TabSocket.take(down),
   facts: ({facts}) => {
     showFacts(facts);
-    const held = state.page.heldNow();
+    const held = state.page?.heldNow() ?? null;
     if (held !== state.shown && document.body.dataset.state === 'live') {
       showOwnValues(held.sceneJson);
       state.shown = held;
@@ -180,6 +187,7 @@ const says = {
   },
   refused: ({refused: text}) => refused(text),
   reads: ({reads: folder}) => {
+    state.reads = true;
     state.steering?.start(false);
     state.replay.begin(folder);
     element('finger-row').style.display = 'none';
@@ -187,18 +195,18 @@ const says = {
     document.body.dataset.run = 'loading';
   },
   replayed: ({replayed}) => showRows(state.replay.show(replayed)),
-  failed: ({failed: text}) => state.page ? failed(text) : refuse(text),
+  failed: ({failed: text}) => state.ready ? failed(text) : refuse(text),
 };
 
-/** The module is there: the bridge's page begins, with a link to the worker. */
+/** The bridge's page, with a link to the worker, which loads the scene meanwhile. */
 async function begin() {
   TabSocket.worker = state.worker;
   globalThis.WebSocket = TabSocket;
   const {Steering} = await import('./steering.js');
-  const page = state.page = await import('./kerf.js');
-  if (page.stage) state.steering = new Steering(page, state.worker);
-  addControls();
-  await start();
+  state.page = await import('./kerf.js');
+  if (!state.page.stage) return;
+  state.steering = new Steering(state.page, state.worker);
+  state.steering.start(isMine() && !state.reads);
 }
 
 const why = lack();
@@ -211,4 +219,6 @@ if (why) {
   const tellHidden = () => state.worker.postMessage({pause: document.hidden});
   document.addEventListener('visibilitychange', tellHidden);
   if (document.hidden) tellHidden();
+  addControls();
+  begin().catch(problem => refuse(`${problem.message}; load the page again`));
 }

@@ -17,6 +17,7 @@ const kBehindMs = 100;  // of the servo's time: more is not made up for
 const kFactsMs = 200;
 
 let compiled = null, kerf = null;
+let joined = false;  // there is a viewer: the page's own modules may come after the run
 let opening = 0;     // counts what was asked for: files are read meanwhile
 let hidden = false;  // a page that nobody sees
 let run = null;  // {turn} of a recording, or {pace, mostArmed, dueTicks, lookedMs, factsMs, factsTicks, busyMs, allMs, steps, paused, ended}
@@ -24,6 +25,9 @@ const now = () => performance.now();
 
 function post(messages) {
   for (const message of messages) postMessage({down: message}, [message]);
+}
+function postNews(ended = false) {
+  if (joined) post(kerf.news(ended));
 }
 
 /** What throws ends the run with a line on the page, never the worker. */
@@ -49,7 +53,7 @@ function open({open: inputs, pace = 1, mostArmed = 0}) {
   run = {pace, mostArmed, dueTicks: 0, lookedMs: at, factsMs: at, factsTicks: 0, busyMs: 0, allMs: 0, steps: 0, paused: hidden,
     ended: false};
   postMessage({opened: at - began});
-  post(kerf.news());
+  postNews();
   tellFacts(at);
 }
 
@@ -66,17 +70,18 @@ async function openLog({log}) {
   postMessage({reads: folder});
   try {
     ready = await readyFiles(log);
+    await begun;
   } catch (problem) {
     return mine === opening && postMessage({failed: problem.message});
   }
-  if (mine !== opening) return;
+  if (mine !== opening || !compiled) return;
   attempt(() => {
     const next = new KerfModule(compiled);
     next.openReplay(ready);
     kerf = next;
     run = {turn: new ReplayTurn(kerf, replayed => postMessage({replayed})), paused: hidden};
     postMessage({opened: now() - began});
-    post(kerf.news());
+    postNews();
   });
 }
 
@@ -108,12 +113,12 @@ function advance(began) {
 function slot() {
   if (run.turn) {
     run.turn.slot(run.paused);
-    return post(kerf.news());
+    return postNews();
   }
   const began = now();
   const before = run.ended;
   if (!run.paused && !run.ended) advance(began);
-  post(kerf.news(run.ended));
+  postNews(run.ended);
   const ends = run.ended && !before;
   if (ends || (!run.ended && now() - run.factsMs >= kFactsMs)) tellFacts(now());
   if (!ends) return;
@@ -136,8 +141,10 @@ const takes = {
     post(kerf.waiting());
   },
   join: () => {
+    joined = true;
+    if (!kerf) return;  // its first run greets it
     kerf.join();
-    post(kerf.news());
+    postNews();
   },
   lead: ({lead}) => kerf.lead(...lead),
   release: () => kerf.release(),
@@ -153,7 +160,7 @@ const takes = {
 onmessage = ({data}) => {
   if ('log' in data) return openLog(data);
   const kind = Object.keys(takes).find(name => name in data);
-  if (kind === 'open' || kind === 'pause' || kerf) attempt(() => takes[kind](data));
+  if (kerf || ['open', 'join', 'pause'].includes(kind)) attempt(() => takes[kind](data));
 };
 
 async function begin() {
@@ -169,4 +176,4 @@ async function begin() {
     postMessage({failed: problem.message});
   }
 }
-begin();
+const begun = begin();

@@ -97,6 +97,7 @@ struct Simd {
 
 #include "controller/kernel/sets/correlate_vector.hpp"
 #include "controller/kernel/sets/scalar_loops.hpp"
+#include "controller/kernel/sets/scalar_points.hpp"
 #include "controller/kernel/sets/set_table.hpp"
 
 namespace kerf {

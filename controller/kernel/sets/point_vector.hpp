@@ -8,9 +8,9 @@
 #include "controller/kernel/sets/box_vector.hpp"
 #include "controller/kernel/sets/set_common.hpp"
 
-// Sums of a point shell and of close samples for AVX2 and AVX-512, in the bits of point_sums.hpp;
-// `Simd` as in box_vector.hpp. Each sample fills a 32-bit lane. While densities are blended, its
-// two halves hold voxels x and x + 1.
+// Sums of a point shell and of close samples for AVX2, AVX-512 and SIMD128, in the bits of
+// point_sums.hpp; `Simd` as in box_vector.hpp. Each sample fills a 32-bit lane. While densities are
+// blended, its two halves hold voxels x and x + 1.
 
 namespace kerf {
 namespace {

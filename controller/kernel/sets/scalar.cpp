@@ -201,6 +201,7 @@ BoxCut cut(const TickBox& tool, const CutRate& rate, const VoxelGrid& grid, Dens
 }  // namespace kerf
 
 #include "controller/kernel/sets/scalar_loops.hpp"
+#include "controller/kernel/sets/scalar_points.hpp"
 #include "controller/kernel/sets/set_table.hpp"
 
 namespace kerf {

@@ -5,33 +5,15 @@
 #include <cstdint>
 
 #include "controller/kernel/kernel_set.hpp"
-#include "controller/kernel/point_shell/point_sums.hpp"
 #include "controller/kernel/sets/set_common.hpp"
 #include "shared/volume/voxel_grid.hpp"
 
-// Plain loops, which define the bits, for sets without vectors of their own: sums and densities of
-// a point shell, contact of the method `gather`, weights and losses of covered voxels. Internal
-// linkage, for the reason given at KernelSet.
+// Plain loops, which define the bits, for sets without vectors of their own: contact of the method
+// `gather`, weights and losses of covered voxels. Internal linkage, for the reason given at
+// KernelSet.
 
 namespace kerf {
 namespace {
-
-void sum_point_samples(const PointTable<FixedNumbers>& table,
-                       const PointPositions<FixedNumbers>& places, const std::int32_t (&centre)[3],
-                       const DensityField& field, PointSums<FixedNumbers>& sums) noexcept {
-  sums = point_sums<FixedNumbers>(table, places, centre, field);
-}
-
-void read_point_samples(const PointPositions<FixedNumbers>& places, std::int32_t count,
-                        const std::int32_t (&centre)[3], const DensityField& field,
-                        std::int32_t* density) noexcept {
-  read_points<FixedNumbers>(places, count, centre, field, density);
-}
-
-void sum_close_samples(const CloseSampleView<FixedNumbers>& look,
-                       CloseSums<FixedNumbers>& sums) noexcept {
-  sums = close_sums<FixedNumbers>(look);
-}
 
 /// `contact_sum` of a field of three 16-bit parts a voxel.
 void gather(const SampleTable& samples, const SamplePose& pose, const VoxelGrid& grid,

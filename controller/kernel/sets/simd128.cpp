@@ -29,7 +29,7 @@ struct Simd {
     return wasm_i64x2_extmul_low_i32x4(wasm_i32x4_shuffle(a, a, 0, 2, 0, 2),
                                        wasm_i32x4_shuffle(b, b, 0, 2, 0, 2));
   }
-  static V odd32(V a) noexcept { return wasm_i64x2_shr(a, 32); }
+  static V odd32(V a) noexcept { return wasm_u64x2_shr(a, 32); }
   static V multiply32(V a, V b) noexcept { return wasm_i32x4_mul(a, b); }
   static V multiply_high(V a, V b) noexcept {  // unsigned
     return wasm_i16x8_shuffle(wasm_u32x4_extmul_low_u16x8(a, b), wasm_u32x4_extmul_high_u16x8(a, b),
@@ -42,6 +42,42 @@ struct Simd {
   static V add32(V a, V b) noexcept { return wasm_i32x4_add(a, b); }
   static V sub32(V a, V b) noexcept { return wasm_i32x4_sub(a, b); }
   static V add64(V a, V b) noexcept { return wasm_i64x2_add(a, b); }
+  template <int kBits>
+  static V sra32(V a) noexcept {
+    return wasm_i32x4_shr(a, kBits);
+  }
+  template <int kBits>
+  static V srl32(V a) noexcept {
+    return wasm_u32x4_shr(a, kBits);
+  }
+  template <int kBits>
+  static V sll32(V a) noexcept {
+    return wasm_i32x4_shl(a, kBits);
+  }
+  template <int kBits>
+  static V srl16(V a) noexcept {
+    return wasm_u16x8_shr(a, kBits);
+  }
+  /// `n` is below 32, for the instruction takes it modulo 32.
+  static V srl32(V a, int n) noexcept { return wasm_u32x4_shr(a, static_cast<std::uint32_t>(n)); }
+  static V min32(V a, V b) noexcept { return wasm_i32x4_min(a, b); }
+  static V max32(V a, V b) noexcept { return wasm_i32x4_max(a, b); }
+  /// a0 b0 + a1 b1 in each 32 bits, signed halves.
+  static V multiply_pairs(V a, V b) noexcept { return wasm_i32x4_dot_i16x8(a, b); }
+  /// (a b + 2^14) / 2^15 in each 16 bits; a and b are not both -2^15.
+  static V multiply_round(V a, V b) noexcept { return wasm_i16x8_q15mulr_sat(a, b); }
+  static V low32(V a) noexcept { return bit_and(a, wasm_i64x2_const_splat(0xffffffff)); }
+  static bool any(V a) noexcept { return wasm_v128_any_true(a); }
+  /// 0, 1, 2, 3 in 32 bits each.
+  static V count32() noexcept { return wasm_i32x4_const(0, 1, 2, 3); }
+  /// The densities index and index + 1 of each of 4 indices.
+  static V load_pairs(const std::uint16_t* density, const std::uint32_t* index) noexcept {
+    const V one = wasm_v128_load32_zero(density + index[0]);
+    const V two = wasm_v128_load32_lane(density + index[1], one, 1);
+    const V three = wasm_v128_load32_lane(density + index[2], two, 2);
+    return wasm_v128_load32_lane(density + index[3], three, 3);
+  }
+
   static V times512(V a) noexcept { return wasm_i64x2_shl(a, 9); }
   // The instruction takes its count modulo 16.
   static V shift_left16(V a, int n) noexcept {
@@ -97,6 +133,7 @@ struct Simd {
 }  // namespace kerf
 
 #include "controller/kernel/sets/correlate_vector.hpp"
+#include "controller/kernel/sets/point_vector.hpp"
 #include "controller/kernel/sets/scalar_loops.hpp"
 #include "controller/kernel/sets/set_table.hpp"
 
