@@ -7,8 +7,8 @@ cd "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/.."
 
 # The rooms, from the lowest floor up: a room includes only what stands above it in this list, so no
 # two folders can include each other. The programs meet only in shared; but lab, which measures, also
-# includes controller, record and hil, replay, which repeats a run, controller and record, and web, which is a whole demo in one
-# module, controller, hil and bridge. A folder that is missing here is refused.
+# includes controller, record and hil, replay, which repeats a run, controller and record, and web, which is a whole demo and a
+# replay in one module, controller, record, replay, hil and bridge. A folder that is missing here is refused.
 rooms='
 shared/numeric shared/volume shared/wire shared/text shared/posix shared/segment shared/arm
 
@@ -96,7 +96,7 @@ between_rooms() {
       if (!(to in floor)) why = "includes from no room"
       else if (p != q && q != "shared" && !(p == "lab" && q != "visualizer") &&
           !(p == "replay" && (q == "controller" || q == "record")) &&
-          !(p == "web" && (q == "controller" || q == "hil" || q == "bridge"))) why = "the programs meet only in shared"
+          !(p == "web" && (q == "controller" || q == "record" || q == "replay" || q == "hil" || q == "bridge"))) why = "the programs meet only in shared"
       else if (floor[to] + 0 > floor[from] + 0) why = "includes from a floor above"
       else next
       print $0 "   <- " why
