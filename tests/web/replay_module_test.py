@@ -23,8 +23,8 @@ def check(holds, what):
         failures.append(what)
 
 
-def replayed_in_node(work, names, most=1 << 30):
-    run = subprocess.run(['node', '--experimental-default-type=module', root / 'tests/web/replay_module.js', folder / 'kerf.wasm', str(most),
+def replayed_in_node(work, names, most=1 << 30, options=()):
+    run = subprocess.run(['node', *options, '--experimental-default-type=module', root / 'tests/web/replay_module.js', folder / 'kerf.wasm', str(most),
                           *(work / name for name in names)], capture_output=True, text=True, check=False)
     lines = run.stdout.splitlines()
     if len(lines) != len(names):
@@ -88,6 +88,9 @@ def says_its_own_lines(work, log):
     for name, found in replayed_in_node(work, some.names).items():
         failed = found.get('failed') or found.get('cut_short') or 'nothing'
         check(failed.startswith(words[name]) and '\n' not in failed, f'{name}: {failed}')
+    for pages in (900, 1500, 2300):  # of 64 KiB: while it loads, while it plans, at a snapshot
+        failed = replayed_in_node(work, ['whole'], options=[f'--wasm-max-mem-pages={pages}'])['whole'].get('failed', 'nothing')
+        check(failed.startswith('memory: none is left for this run; close other tabs'), f'{pages / 16:.0f} MiB of memory: {failed}')
     few = replayed_in_node(work, ['whole'], most=1 << 20)['whole'].get('failed', 'nothing')
     check('npy.gz: ' in few and few.endswith('too large for a tab; replay it with ./kerf replay'), f'1 MiB of memory: {few}')
 

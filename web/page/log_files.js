@@ -140,6 +140,13 @@ export class LogFiles {
     this.files = files;
   }
 
+  /** Frees the files of all folders of that name. */
+  forget(folder) {
+    for (const path of [...this.files.keys()]) {
+      if (path.includes(`/${folder}/`)) this.files.delete(path);
+    }
+  }
+
   view() {
     return new DataView(this.module.calls.memory.buffer);
   }

@@ -120,6 +120,7 @@ export class ReplayControls {
       slider.nextElementSibling.textContent = `${tick} of ${last}, ${(tick * ns * 1e-9).toFixed(3)} s`;
     }
     const found = element('replay-found'), text = foundText(facts);
+    found.setAttribute('aria-live', playing ? 'off' : 'polite');  // each count would be read out
     if (found.textContent !== text) found.textContent = text;
     found.classList.toggle('differs', Boolean(facts.difference));
     element('replay-there').hidden = !facts.difference;
