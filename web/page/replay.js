@@ -9,8 +9,9 @@ const kWays = `<p id="replay-ways">Replay a recording: drop its folder on the pa
   <input id="folder-input" type="file" webkitdirectory hidden><input id="files-input" type="file" multiple hidden>`;
 const kPlayer = `<div id="replay" hidden>
     <label class="slider">tick <input id="replay-at" type="range" min="1" max="1" step="1" value="1"><output></output></label>
-    <div class="row"><button id="replay-play" type="button">pause</button><button id="replay-step" type="button">one tick</button>
-      <button id="replay-slower" type="button">slower</button><button id="replay-faster" type="button">faster</button></div>
+    <div class="row"><button id="replay-play" type="button">pause</button><button id="replay-step" type="button"
+      aria-label="one tick on">step</button><button id="replay-slower" type="button" aria-label="half as fast">½×</button>
+      <button id="replay-faster" type="button" aria-label="twice as fast">2×</button></div>
     <p id="replay-found" role="status"></p>
     <button id="replay-there" type="button" hidden>go to the first difference</button>
   </div>`;
