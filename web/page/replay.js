@@ -3,6 +3,9 @@
 import {chosenFiles, droppedFiles} from './dropped_files.js';
 
 const kFastest = 64;
+// A file that is dropped beside, or too early, must not take the place of the page.
+for (const kind of ['dragover', 'drop']) addEventListener(kind, event => event.preventDefault());
+
 const element = id => document.getElementById(id);
 const kWays = `<p id="replay-ways">Replay a recording: drop its folder on the page, or choose its
     <button id="choose-folder" type="button">folder</button> or <button id="choose-files" type="button">files</button></p>
@@ -62,14 +65,12 @@ export class ReplayControls {
     const marks = on => document.body.classList.toggle('drops', on);
     addEventListener('dragover', event => {
       if (!hasFiles(event)) return;
-      event.preventDefault();
       event.dataTransfer.dropEffect = 'copy';
       marks(true);
     });
     addEventListener('dragleave', event => event.relatedTarget === null && marks(false));
     addEventListener('drop', event => {
       if (!hasFiles(event)) return;
-      event.preventDefault();
       marks(false);
       const files = droppedFiles(event.dataTransfer);
       this.open(() => files);
