@@ -54,7 +54,10 @@ the file. Times are `start_ns`.
 | `/kerf/force` | `geometry_msgs/msg/WrenchStamped`: `commanded_force_n`, in frame `device`, and `tip_torque_n_mm` in N m | 100 Hz |
 | `/kerf/2/tick`, `/kerf/2/tip`, `/kerf/2/force` | of a second device, whose forces are in frame `device_2` | as above |
 
-Chunks are packed by LZ4, and `--unpacked` leaves them as they are.
+Chunks are packed by LZ4, and `--unpacked` leaves them as they are. The other files of the recording are attached, with the volumes
+as they were at the start, so the MCAP of a whole recording replays on kerf's page ([browser.md](browser.md)); with `--from` or
+`--until` it has the messages alone. `ticks.npy.head` is the header of the log, whose rows are the bytes of `/kerf/tick` behind the
+four of CDR.
 
 HDF5 opens in MATLAB (`h5read("run.h5", "/ticks/position_mm")`), Julia, R and h5py: one dataset per column, `/ticks/COLUMN`,
 with `units`, `description` and `valid` as attributes, and `codes` if its values are codes or bits. `/ticks_2` is a

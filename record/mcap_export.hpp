@@ -9,13 +9,19 @@
 namespace kerf {
 
 /// Writes the recording in `folder` as MCAP, for Foxglove, PlotJuggler and ROS 2: messages in CDR,
-/// whose definitions are in the file. Whole or not at all, in constant memory but for the index.
+/// whose definitions are in the file. Whole or not at all; memory for the index and the largest
+/// attachment.
 ///
 ///   /kerf/tick    kerf_msgs/msg/Tick            every column of every tick, in their order
 ///   /kerf/tip     geometry_msgs/msg/PoseStamped    the tool's tip in metres, from docking on
 ///   /kerf/force   geometry_msgs/msg/WrenchStamped  the commanded force, in the device's axes
 ///
 /// A second arm has /kerf/2/tick, /kerf/2/tip and /kerf/2/force, whose frame is device_2.
+///
+/// A whole recording has its other files, too, as attachments, so that it replays from this file
+/// alone (web/page/mcap_log.js): manifest.json, scene.json, volumes/, inputs/, and as
+/// ticks.npy.head, ticks-2.npy.head the headers of the logs, whose rows are the messages' bytes
+/// behind the four of CDR. A range of ticks has none.
 ///
 /// Tip and force come 100 times a second: the tick has all of them. Times are `start_ns`. Throws
 /// `RecordError`, or `FileError` if the file cannot be written.

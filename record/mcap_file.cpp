@@ -24,6 +24,8 @@ enum Opcode : std::uint8_t {
   chunk_record = 0x06,
   message_index = 0x07,
   chunk_index = 0x08,
+  attachment = 0x09,
+  attachment_index = 0x0a,
   statistics = 0x0b,
   summary_offset = 0x0e,
   data_end = 0x0f
@@ -164,6 +166,23 @@ void McapWriter::end_chunk() {
   index_.clear();
 }
 
+void McapWriter::attach(std::string_view name, std::string_view media_type, std::string_view data) {
+  end_chunk();
+  McapBytes bytes;
+  const std::size_t begun = bytes.begin(attachment);
+  bytes.number(begin_ns_);  // logged
+  bytes.number(begin_ns_);  // created
+  bytes.text(name);
+  bytes.text(media_type);
+  bytes.number(std::uint64_t{data.size()});
+  bytes.raw(data);
+  bytes.number(crc(std::string_view(bytes.bytes()).substr(begun)));
+  bytes.end(begun);
+  attachments_.push_back(
+      {written_, bytes.size(), data.size(), std::string(name), std::string(media_type)});
+  put(bytes.bytes());
+}
+
 void McapWriter::close() {
   end_chunk();
   McapBytes bytes;
@@ -195,8 +214,8 @@ void McapWriter::close() {
   bytes.number(messages);
   bytes.number(static_cast<std::uint16_t>(counts_.size()));  // schemas
   bytes.number(static_cast<std::uint32_t>(counts_.size()));  // channels
-  bytes.number(std::uint32_t{0});                            // attachments
-  bytes.number(std::uint32_t{0});                            // metadata
+  bytes.number(static_cast<std::uint32_t>(attachments_.size()));
+  bytes.number(std::uint32_t{0});  // metadata
   bytes.number(static_cast<std::uint32_t>(chunks_.size()));
   bytes.number(begin_ns_);
   bytes.number(end_ns_);
@@ -218,6 +237,19 @@ void McapWriter::close() {
     bytes.end(begun);
   }
   end_group(chunk_index, from);
+  from = bytes.size();
+  for (const IndexedAttachment& one : attachments_) {
+    begun = bytes.begin(attachment_index);
+    bytes.number(one.offset);
+    bytes.number(one.bytes);
+    bytes.number(begin_ns_);
+    bytes.number(begin_ns_);
+    bytes.number(one.data_bytes);
+    bytes.text(one.name);
+    bytes.text(one.media_type);
+    bytes.end(begun);
+  }
+  end_group(attachment_index, from);
 
   const std::uint64_t offsets_at = summary + bytes.size();
   bytes.raw(offsets.bytes());

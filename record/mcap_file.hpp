@@ -62,6 +62,9 @@ class McapWriter {
 
   void message(std::uint16_t channel, std::uint64_t time_ns, std::string_view data);
 
+  /// A file beside the messages, after the last of them; of the time of the first one.
+  void attach(std::string_view name, std::string_view media_type, std::string_view data);
+
   /// The last chunk, the index and the end.
   void close();
 
@@ -69,6 +72,10 @@ class McapWriter {
   struct IndexedChunk {
     std::uint64_t first_ns, last_ns, offset, bytes, packed, unpacked, index_bytes;
     std::map<std::uint16_t, std::uint64_t> index_offsets;
+  };
+  struct IndexedAttachment {
+    std::uint64_t offset, bytes, data_bytes;
+    std::string name, media_type;
   };
   void put(std::string_view bytes);
   void end_chunk();
@@ -82,6 +89,7 @@ class McapWriter {
   std::uint64_t first_ns_ = 0, last_ns_ = 0;  ///< of the chunk
   std::map<std::uint16_t, std::vector<std::pair<std::uint64_t, std::uint64_t>>> index_;  ///< of it
   std::vector<IndexedChunk> chunks_;
+  std::vector<IndexedAttachment> attachments_;
   std::string schemas_, channels_;  ///< their records
   std::map<std::uint16_t, std::uint64_t> counts_;
   std::uint64_t begin_ns_ = 0, end_ns_ = 0;

@@ -11,7 +11,6 @@
 #include "replay/recorded_run.hpp"
 #include "replay/replayed_ticks.hpp"
 #include "replay/watched_run.hpp"
-#include "shared/numeric/linear_algebra.hpp"
 #include "shared/posix/monotonic_clock.hpp"
 #include "shared/text/json.hpp"
 #include "shared/text/text.hpp"
@@ -50,7 +49,7 @@ struct TabReplay::State {
   explicit State(const std::filesystem::path& folder)
       : log(log_in(folder, manifest_in(folder).arms)),
         run(run_in(folder)),
-        viewer(*run.segment, 0),
+        viewer(*run.segment),
         earlier(std::in_place, run, folder) {
     run.segment->set_lifecycle(Lifecycle::run);
   }
@@ -132,7 +131,6 @@ std::string TabReplay::facts() const {
                 {"goal", s.goal}};
   if (!s.shown) return facts.canonical();
   const WatchedRun& shown = *s.shown;
-  const ServoOutput& output = shown.outputs()[0];
   facts["tick"] = shown.tick();
   facts["last_tick"] = shown.last_tick();
   facts["compared"] = shown.compared();
@@ -142,13 +140,10 @@ std::string TabReplay::facts() const {
     facts["difference_tick"] = shown.difference()->tick;
   }
   facts["cut_short"] = shown.cut_short();
-  facts["output_hash"] = hex64(output.output_hash);
+  facts["output_hash"] = hex64(shown.outputs()[0].output_hash);
   if (s.run.servo->arms() > 1) {
     facts["second_output_hash"] = hex64(shown.outputs()[1].output_hash);
   }
-  facts["force_n"] = vec3::length(output.force_n);
-  facts["phase"] = static_cast<int>(output.phase);
-  facts["fault"] = fault_name(output.fault);
   return facts.canonical();
 }
 

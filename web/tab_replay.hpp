@@ -49,7 +49,7 @@ class TabReplay {
   /// JSON: tick_ns, tick, first_tick, last_tick, earlier_tick (of those before the first one),
   /// goal (0: none), compared, difference (as kerf-replay prints it; null: none), cut_short (why
   /// the recording ends before it was recorded to its end; empty: it does not), output_hash,
-  /// second_output_hash (of two arms), force_n, phase, fault. Cheap.
+  /// second_output_hash (of two arms). Cheap.
   [[nodiscard]] std::string facts() const;
   /// Hash of all volumes as kerf-replay prints it, 16 hex digits. Reads every voxel.
   [[nodiscard]] std::string volume_hash() const;

@@ -5,16 +5,11 @@
 #include <cstdio>
 #include <cstdlib>
 #include <deque>
-#include <optional>
 #include <span>
 #include <sstream>
 #include <utility>
-#include <variant>
 
-#include "bridge/stream/run_snapshot.hpp"
-#include "bridge/stream/stream.hpp"
 #include "bridge/wire/messages.hpp"
-#include "bridge/wire/parse.hpp"
 #include "controller/device/device_driver.hpp"
 #include "controller/input/load_error.hpp"
 #include "controller/load/load_scene.hpp"
@@ -29,11 +24,11 @@
 #include "shared/numeric/linear_algebra.hpp"
 #include "shared/posix/monotonic_clock.hpp"
 #include "shared/segment/command.hpp"
-#include "shared/segment/reader.hpp"
 #include "shared/segment/writer.hpp"
 #include "shared/text/json.hpp"
 #include "shared/text/text.hpp"
 #include "web/tab_port.hpp"
+#include "web/tab_viewer.hpp"
 
 namespace kerf::web {
 namespace {
@@ -120,14 +115,12 @@ struct TabRun::State {
                  is_cartesian(scene.device.personality)),
         driver(make_driver(scene.device.personality, port, scene.device.encoder_sign,
                            scene.servo.rate_hz)),
-        reader(SegmentReader::map(writer.fd())),
-        snapshot(reader),
+        viewer(writer, [this](const bridge::CommandMessage& asked) { return answer(asked); }),
         publisher(writer, *servo) {
     for (const SceneVolume& volume : scene.volumes) {
       const auto& h = volume.image.spacing_mm;
       voxel_mm3.push_back(h[0] * h[1] * h[2]);
     }
-    stream.emplace(snapshot, bridge::kMayCommand);
     servo->take(scene);
     driver->start();
     writer.set_lifecycle(Lifecycle::run);
@@ -158,7 +151,7 @@ struct TabRun::State {
     if (output.started) ++armed_ticks;
   }
 
-  void answer(const bridge::CommandMessage& asked) {
+  bridge::ReplyMessage answer(const bridge::CommandMessage& asked) {
     Command command;
     command.kind = static_cast<CommandKind>(asked.kind);
     command.argument = asked.argument;
@@ -173,7 +166,7 @@ struct TabRun::State {
       reply.index = command.index = ++last_index;
       commands.push_back(command);
     }
-    replies.push_back(reply);
+    return reply;
   }
 
   SceneSource source;
@@ -183,9 +176,7 @@ struct TabRun::State {
   Emulator emulator;
   TabPort port;
   std::unique_ptr<DeviceDriver> driver;
-  SegmentReader reader;
-  bridge::RunSnapshot snapshot;
-  std::optional<bridge::Stream> stream;
+  TabViewer viewer;
   Publisher publisher;
 
   Tick tick = 0;
@@ -196,7 +187,6 @@ struct TabRun::State {
   std::vector<double> voxel_mm3;
   std::deque<Command> commands;
   std::uint32_t last_index = 0;
-  std::deque<bridge::ReplyMessage> replies;
 };
 
 TabRun::TabRun(const TabInputs& inputs) : state_(std::make_unique<State>(inputs)) {}
@@ -213,37 +203,16 @@ int TabRun::step(int ticks, std::uint64_t most_armed) noexcept {
 }
 
 void TabRun::join() {
-  state_->stream.emplace(state_->snapshot, bridge::kMayCommand);
+  state_->viewer.join();
 }
-
 void TabRun::slot(bool ended) {
-  State& s = *state_;
-  const std::int64_t now_ns = monotonic_ns();
-  if (ended) s.writer.set_lifecycle(Lifecycle::clean_end);
-  s.snapshot.update(now_ns, false);
-  s.stream->note_changes();
-  s.stream->slot(now_ns, ended);
+  state_->viewer.slot(ended);
 }
-
 bool TabRun::next(std::vector<std::byte>& message) {
-  State& s = *state_;
-  if (!s.replies.empty()) {
-    const auto* bytes = reinterpret_cast<const std::byte*>(&s.replies.front());
-    message.assign(bytes, bytes + sizeof(bridge::ReplyMessage));
-    s.replies.pop_front();
-    return true;
-  }
-  return s.stream->next(monotonic_ns(), message);
+  return state_->viewer.next(message);
 }
-
 bool TabRun::take(std::span<const std::byte> message) {
-  const auto parsed = bridge::parse_up(message);
-  if (!parsed) return false;
-  if (const auto* ack = std::get_if<bridge::AckMessage>(&*parsed)) {
-    return state_->stream->acked(*ack, monotonic_ns());
-  }
-  state_->answer(std::get<bridge::CommandMessage>(*parsed));
-  return true;
+  return state_->viewer.take(message);
 }
 
 void TabRun::lead(const std::array<double, 3>& world_mm,

@@ -27,7 +27,7 @@ struct TabInputs {
 /// inputs give the same bits as `./kerf demo --virtual`.
 ///
 /// The order: construct, then `step` and `slot` in turn; after `slot`, `next` until it returns
-/// false. Messages are those of bridge/wire/messages.hpp.
+/// false.
 class TabRun {
  public:
   /// Loads and plans the scene; a second or two for the default phantom. Throws LoadError or
@@ -42,15 +42,10 @@ class TabRun {
   /// Steps `ticks` times, but not beyond `most_armed` armed ticks. Returns the steps made.
   int step(int ticks, std::uint64_t most_armed = UINT64_MAX) noexcept;
 
-  /// The viewer begins anew: it gets the greeting, and all volumes again.
+  /// As of TabViewer.
   void join();
-  /// Takes what changed since the last slot, for the next messages. The page's bridge does so
-  /// sixty times a second. `ended`: no step follows.
   void slot(bool ended);
-  /// The next message to the viewer; false if none is due, or the viewer has yet to acknowledge.
   [[nodiscard]] bool next(std::vector<std::byte>& message);
-  /// A message of the viewer: an acknowledgement, or a command, which is answered by `next`. False
-  /// if it is neither.
   bool take(std::span<const std::byte> message);
 
   /// The hand follows a point of the world, mm, once its script has ended. `button` is the pedal.

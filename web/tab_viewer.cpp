@@ -5,7 +5,6 @@
 
 #include "bridge/wire/parse.hpp"
 #include "shared/posix/monotonic_clock.hpp"
-#include "shared/segment/command.hpp"
 
 namespace kerf::web {
 
@@ -31,9 +30,8 @@ bool TabViewer::take(std::span<const std::byte> message) {
   if (const auto* ack = std::get_if<bridge::AckMessage>(&*parsed)) {
     return stream_->acked(*ack, monotonic_ns());
   }
-  const auto refused = static_cast<std::uint32_t>(ReplyStatus::refused);
-  replies_.push_back(
-      {bridge::kReplyMagic, std::get<bridge::CommandMessage>(*parsed).sequence, refused, 0});
+  if (!answer_) return false;
+  replies_.push_back(answer_(std::get<bridge::CommandMessage>(*parsed)));
   return true;
 }
 

@@ -2,10 +2,11 @@
 #pragma once
 
 #include <cstddef>
-#include <cstdint>
 #include <deque>
+#include <functional>
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "bridge/stream/run_snapshot.hpp"
@@ -20,17 +21,22 @@ namespace kerf::web {
 /// run's own segment. Messages are those of bridge/wire/messages.hpp.
 class TabViewer {
  public:
-  /// `writer` outlives it. `flags`: of the greeting.
-  TabViewer(SegmentWriter& writer, std::uint32_t flags)
+  /// Takes a command; returns the reply.
+  using Answer = std::function<bridge::ReplyMessage(const bridge::CommandMessage&)>;
+
+  /// `writer` outlives it. With `answer` the viewer may send commands.
+  explicit TabViewer(SegmentWriter& writer, Answer answer = {})
       : writer_(writer),
-        flags_(flags),
+        answer_(std::move(answer)),
         reader_(SegmentReader::map(writer.fd())),
         snapshot_(reader_) {
     join();
   }
+  TabViewer(const TabViewer&) = delete;
+  TabViewer& operator=(const TabViewer&) = delete;
 
   /// The viewer begins anew: it gets the greeting, and all volumes again.
-  void join() { stream_.emplace(snapshot_, flags_); }
+  void join() { stream_.emplace(snapshot_, answer_ ? bridge::kMayCommand : 0); }
 
   /// Takes what changed since the last slot, for the next messages. The page's bridge does so
   /// sixty times a second. `ended`: no step follows.
@@ -39,13 +45,13 @@ class TabViewer {
   /// The next message to the viewer; false if none is due, or the viewer has yet to acknowledge.
   [[nodiscard]] bool next(std::vector<std::byte>& message);
 
-  /// A message of the viewer: an acknowledgement, or a command, which is refused. False if it is
-  /// neither.
+  /// A message of the viewer: an acknowledgement, or a command, which `next` answers. False if it
+  /// is neither.
   bool take(std::span<const std::byte> message);
 
  private:
   SegmentWriter& writer_;
-  std::uint32_t flags_;
+  Answer answer_;
   SegmentReader reader_;
   bridge::RunSnapshot snapshot_;
   std::optional<bridge::Stream> stream_;

@@ -32,7 +32,7 @@ struct TickTiming {
 [[nodiscard]] ServoCommand servo_command(const Command& command) noexcept;
 
 /// What the servo was given in a tick besides the report: with it and the reports a run can be
-/// repeated (replay/replay.hpp).
+/// repeated (replay/replayed_ticks.hpp).
 struct TickCommands {
   ServoCommand command;          ///< of a reader; `none` in most ticks
   bool fade_in = false;          ///< behind it, after a stall

@@ -125,3 +125,41 @@ TEST_CASE("the footer of an MCAP leads to its summary, whose checksum is right")
     CHECK(number_at<std::uint64_t>(statistics->content, 0) == messages);
   }
 }
+
+TEST_CASE("the index of an MCAP leads to its attachments, whose checksums are right") {
+  std::string file;
+  McapWriter writer([&](std::string_view part) { file += part; }, "", "test",
+                    McapWriter::Packing::lz4);
+  const std::uint16_t channel = writer.add({"/a", "A", "int32 x", "ros2msg", "cdr"});
+  writer.message(channel, 1234, "abcd");
+  writer.attach("scene.json", "application/json", "{}");
+  writer.attach("empty", "text/plain", "");
+  writer.close();
+  const auto all = records_of(file, kMagicBytes, file.size() - kMagicBytes);
+  std::vector<std::string_view> contents;
+  for (const Record& index : all) {
+    if (index.opcode != 0x0a) continue;
+    const auto at = number_at<std::uint64_t>(index.content, 0);
+    const auto found = std::ranges::find(all, at, &Record::offset);
+    REQUIRE(found != all.end());
+    REQUIRE(found->opcode == 0x09);
+    const std::string_view content = found->content;
+    CHECK(number_at<std::uint64_t>(index.content, 8) == 9 + content.size());
+    CHECK(number_at<std::uint64_t>(content, 0) == 1234);
+    const auto name = number_at<std::uint32_t>(content, 16);
+    const auto type = number_at<std::uint32_t>(content, 20 + name);
+    const std::size_t data = 24 + name + type;
+    const auto bytes = number_at<std::uint64_t>(content, data);
+    CHECK(number_at<std::uint64_t>(index.content, 32) == bytes);
+    const auto summed = content.substr(0, data + 8 + bytes);
+    CHECK(content.size() == summed.size() + 4);
+    CHECK(
+        number_at<std::uint32_t>(content, summed.size()) ==
+        crc32(0, reinterpret_cast<const Bytef*>(summed.data()), static_cast<uInt>(summed.size())));
+    contents.push_back(content.substr(data + 8, bytes));
+  }
+  CHECK(contents == std::vector<std::string_view>{"{}", ""});
+  const auto statistics = std::ranges::find(all, 0x0b, &Record::opcode);
+  REQUIRE(statistics != all.end());
+  CHECK(number_at<std::uint32_t>(statistics->content, 14) == 2);
+}

@@ -98,12 +98,27 @@ class TestMcap(unittest.TestCase):
         self.assertLess(found["bytesRead"], path.stat().st_size)
 
     def test_sizes(self):
-        plain, packed = self.folder / "plain.mcap", self.folder / "packed.mcap"
+        plain, packed, part = (self.folder / f"{name}.mcap" for name in ("plain", "packed", "part"))
         export(self.log, plain, "--unpacked")
         export(self.log, packed)
+        export(self.log, part, "--from", "1")
         npy = (self.log / "ticks.npy").stat().st_size
-        self.assertLess(plain.stat().st_size, 1.2 * npy)
-        self.assertLess(packed.stat().st_size, npy)
+        files = sum(path.stat().st_size for path in self.log.rglob("*.*") if path.name != "ticks.npy")
+        self.assertLess(plain.stat().st_size, 1.2 * npy + files)
+        self.assertLess(packed.stat().st_size, npy + files)
+        self.assertLess(part.stat().st_size, npy)
+
+    def test_the_other_files_are_attached(self):
+        path = self.folder / "attached.mcap"
+        export(self.log, path)
+        bytes_of = {str(file.relative_to(self.log)): file.read_bytes() for file in self.log.rglob("*") if file.is_file()}
+        bytes_of["ticks.npy.head"] = bytes_of.pop("ticks.npy")[:4096]
+        self.assertEqual(read(path)["attachments"], {name: len(content) for name, content in bytes_of.items()})
+        whole = path.read_bytes()
+        for name, content in bytes_of.items():
+            self.assertIn(content, whole, name)
+        export(self.log, path, "--from", "1", "--until", "100")  # a part does not replay
+        self.assertEqual(read(path)["attachments"], {})
 
     def test_what_cannot_be(self):
         self.assertIn("--mcap writes no .npy", export(self.log, self.log / "ticks.npy", code=2))

@@ -201,6 +201,11 @@ TEST_CASE("a row with a wrong checksum ends a log behind the sound rows before i
   CHECK(error_of([&] { static_cast<void>(reader.read(40, rows)); }).find("row 40 has a wrong") !=
         std::string::npos);
   CHECK(reader.read(41, rows) == 59);
+  std::string problem;
+  CHECK(reader.read(0, rows, problem) == 40);
+  CHECK(problem.empty());
+  CHECK(reader.read(40, rows, problem) == 0);
+  CHECK(problem.find("row 40 has a wrong") != std::string::npos);
   int visited = 0;
   CHECK_NOTHROW(reader.for_each([&](const TickRecord&) { ++visited; }, {.until = 40}));
   CHECK(visited == 40);

@@ -577,6 +577,7 @@ TEST_CASE("all repeat bit by bit from a snapshot in the middle, without the heap
       });
       auto& compiled = dynamic_cast<CompiledScene&>(*hand.servo);
       const std::unique_ptr<ServoSnapshot> kept = compiled.keep();
+      CHECK(kept->bytes() > compiled.density(0).size_bytes());
       std::uint64_t output = 0;
       without_heap([&] { output = hand.rest(at, 300).output_hash; });
       const std::uint64_t volume = hand.hash();

@@ -4,8 +4,6 @@
     web_test.py ROOT BIN-FOLDER PAGE-FOLDER [--pictures FOLDER]
 
 PAGE-FOLDER is what ./kerf page wrote. Exit code 77: skipped, for want of it, of Node or of a browser."""
-import functools
-import http.server
 import json
 import os
 import pathlib
@@ -13,8 +11,9 @@ import shutil
 import subprocess
 import sys
 import tempfile
-import threading
 import time
+
+from served import served
 
 root, programs, folder = (pathlib.Path(word).resolve() for word in sys.argv[1:4])
 pictures = pathlib.Path(sys.argv[5]) if sys.argv[4:5] == ['--pictures'] else None
@@ -47,13 +46,6 @@ def in_node(scene, hand, seconds):
     if run.returncode:
         raise RuntimeError(run.stderr)
     return json.loads(run.stdout)
-
-
-class Quiet(http.server.SimpleHTTPRequestHandler):
-    extensions_map = {**http.server.SimpleHTTPRequestHandler.extensions_map, '.wasm': 'application/wasm', '.js': 'text/javascript'}
-
-    def log_message(self, *_):
-        pass
 
 
 def has_the_bits_of_kerf(page, address, known):
@@ -139,10 +131,7 @@ def main():
         run = in_node(scene, hand, SECONDS)
         check((run['output_hash'], run['volume_hash']) == known[scene],
               f'{scene} under Node: {run["output_hash"]} {run["volume_hash"]}; {run["times_real_time"]:.2f} times real time')
-    server = http.server.ThreadingHTTPServer(('127.0.0.1', 0), functools.partial(Quiet, directory=folder))
-    threading.Thread(target=server.serve_forever, daemon=True).start()
-    address = f'http://127.0.0.1:{server.server_address[1]}'
-    with tempfile.TemporaryDirectory() as profile:
+    with tempfile.TemporaryDirectory() as profile, served(folder) as address:
         page = Page(chromium, profile)
         try:
             page.size(1280, 800)
@@ -152,7 +141,6 @@ def main():
             says_what_is_wrong(page, address)
         finally:
             page.close()
-    server.shutdown()
     return 1 if failures else 0
 
 

@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <exception>
+#include <new>
 #include <string>
 #include <string_view>
 #include <typeinfo>
@@ -61,3 +62,24 @@ void __cxa_free_exception(void* exception) {
 }
 
 }  // extern "C"
+
+namespace {
+
+/// That library's own `new` returns null without exceptions, and the memory of WebAssembly begins
+/// at address 0.
+void* given(void* memory) {
+  constexpr std::string_view kNone =
+      "memory: none is left for this run; close other tabs, or take a smaller scene or recording";
+  if (memory == nullptr) kerf_failed(kNone.data(), kNone.size());
+  return memory;
+}
+
+}  // namespace
+
+void* operator new(std::size_t size) {
+  return given(std::malloc(size == 0 ? 1 : size));
+}
+void* operator new(std::size_t size, std::align_val_t alignment) {
+  const auto to = static_cast<std::size_t>(alignment);
+  return given(std::aligned_alloc(to, (size + to) / to * to));
+}

@@ -84,6 +84,7 @@ export class KerfModule {
     const bytes = encoder.encode(folder);
     this.bytesAt(this.calls.room(bytes.length), bytes.length).set(bytes);
     this.calls.open_replay(bytes.length);
+    this.files.forget('volumes');  // the module has them, unpacked
   }
   /** Whether all is done that comes before a tick is shown; at most so many ticks of it. */
   replayPrepare(ticks) {

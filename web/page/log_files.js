@@ -2,11 +2,12 @@
 // The files of a recording in this tab: which of the dropped ones they are, and how kerf.wasm reads them, by the calls of
 // WASI. Ticks are read piece by piece from the user's file, so a long log takes no memory; the packed volumes and inputs
 // are unpacked at once.
+import {filesInMcap} from './mcap_log.js';
 
 export const kMostUnpacked = 2 ** 30;  // bytes of all of them: a tab has no more
 const kTicks = /^ticks(-2)?\.npy$/, kTexts = /^(manifest|scene)\.json$/;
 const kVolume = /^[0-9a-f]{16}(-labels)?\.npy\.gz$/, kInputs = /^\d{12}\.npy\.gz$/;
-const kHow = 'drop the folder of a recording, as DIR/log of ./kerf demo --out DIR';
+const kHow = 'drop the folder of a recording, as DIR/log of ./kerf demo --out DIR, or the MCAP of ./kerf record export';
 
 /** A file that is in memory. */
 export const ofBytes = bytes => ({size: bytes.length, read: (at, length) => bytes.subarray(at, at + length)});
@@ -29,7 +30,7 @@ function placeOf(path) {
 
 /**
  * Finds the recording among dropped files, each {path, ...}. Returns {folder, files: Map of place to file}. Throws an
- * error with one line.
+ * error with one line. Of an MCAP it returns {folder: its name, mcap: file}.
  */
 export function findRecording(dropped) {
   if (dropped.length === 0) throw new Error(`nothing was dropped that can be read; ${kHow}`);
@@ -39,10 +40,9 @@ export function findRecording(dropped) {
   }
   if (folders.length === 0) {
     const [{path}] = dropped;
-    const mcap = dropped.find(one => one.path.endsWith('.mcap'));
-    if (mcap) {
-      throw new Error(`${mcap.path}: MCAP has the ticks, and neither scene nor volumes; drop the folder that it was exported from`);
-    }
+    const mcaps = dropped.filter(one => one.path.endsWith('.mcap'));
+    if (mcaps.length === 1) return {folder: mcaps[0].path, mcap: mcaps[0]};
+    if (mcaps.length > 1) throw new Error(`${mcaps.length} MCAP files; drop one of them`);
     const manifest = dropped.find(one => nameOf(one.path) === 'manifest.json');
     if (manifest) throw new Error(`${manifest.path}: ticks.npy is not beside it; ${kHow}`);
     throw new Error(`${path}${dropped.length > 1 ? ` and ${dropped.length - 1} more` : ''}: no recording; ${kHow}`);
@@ -76,7 +76,7 @@ async function unpacked(bytes, most, name) {
     total += part.value.length;
     if (total > most) {
       await reader.cancel();
-      throw new Error(`${name}: more than ${kMostUnpacked / 2 ** 20} MiB unpacked, too large for a tab; replay it with ./kerf replay`);
+      throw new Error(`${name}: more than ${most} bytes unpacked, too large for a tab; replay it with ./kerf replay`);
     }
     parts.push(part.value);
   }
@@ -94,27 +94,32 @@ async function unpacked(bytes, most, name) {
  * Uint8Array, `piecesOf` gives {size, read}. Throws as `findRecording`.
  */
 export async function readyRecording(dropped, bytesOf, piecesOf, most = kMostUnpacked) {
-  const {folder, files} = findRecording(dropped);
+  const {folder, files, mcap} = findRecording(dropped);
   const ready = new Map();
   let left = most;
-  for (const [place, file] of files) {
+  for (const [place, file] of mcap ? ofMcap(mcap, piecesOf) : files) {
     const path = `${folder}/${place}`;
     if (kTicks.test(place)) {
-      ready.set(path, piecesOf(file));
+      ready.set(path, mcap ? file : piecesOf(file));
       continue;
     }
     if (file.size > left) throw new Error(`${path}: ${file.size} bytes, too large for a tab; replay it with ./kerf replay`);
     let bytes;
     try {
-      bytes = await bytesOf(file);
-    } catch {
-      throw new Error(`${path}: cannot be read; drop the folder again`);
+      bytes = mcap ? file.bytes() : await bytesOf(file);
+    } catch (problem) {
+      throw mcap ? problem : new Error(`${path}: cannot be read; drop the folder again`);
     }
     if (place.endsWith('.gz')) bytes = await unpacked(bytes, left, path);
     left -= bytes.length;
     ready.set(path, ofBytes(bytes));
   }
   return {folder, files: ready};
+}
+
+/** As findRecording has the files of a folder: those in an MCAP that belong to a recording. */
+function ofMcap(mcap, piecesOf) {
+  return [...filesInMcap(piecesOf(mcap), mcap.path)].filter(([place]) => placeOf(place) === place);
 }
 
 // -- WASI, preview 1: names of values and layouts as its documentation has them
@@ -133,6 +138,13 @@ export class LogFiles {
   /** Path without a leading slash to {size, read}. */
   mount(files) {
     this.files = files;
+  }
+
+  /** Frees the files of all folders of that name. */
+  forget(folder) {
+    for (const path of [...this.files.keys()]) {
+      if (path.includes(`/${folder}/`)) this.files.delete(path);
+    }
   }
 
   view() {

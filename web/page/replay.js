@@ -3,14 +3,18 @@
 import {chosenFiles, droppedFiles} from './dropped_files.js';
 
 const kFastest = 64;
+// A file that is dropped beside, or too early, must not take the place of the page.
+for (const kind of ['dragover', 'drop']) addEventListener(kind, event => event.preventDefault());
+
 const element = id => document.getElementById(id);
 const kWays = `<p id="replay-ways">Replay a recording: drop its folder on the page, or choose its
     <button id="choose-folder" type="button">folder</button> or <button id="choose-files" type="button">files</button></p>
   <input id="folder-input" type="file" webkitdirectory hidden><input id="files-input" type="file" multiple hidden>`;
 const kPlayer = `<div id="replay" hidden>
     <label class="slider">tick <input id="replay-at" type="range" min="1" max="1" step="1" value="1"><output></output></label>
-    <div class="row"><button id="replay-play" type="button">pause</button><button id="replay-step" type="button">one tick</button>
-      <button id="replay-slower" type="button">slower</button><button id="replay-faster" type="button">faster</button></div>
+    <div class="row"><button id="replay-play" type="button">pause</button><button id="replay-step" type="button"
+      aria-label="one tick on">step</button><button id="replay-slower" type="button" aria-label="half as fast">½×</button>
+      <button id="replay-faster" type="button" aria-label="twice as fast">2×</button></div>
     <p id="replay-found" role="status"></p>
     <button id="replay-there" type="button" hidden>go to the first difference</button>
   </div>`;
@@ -61,14 +65,12 @@ export class ReplayControls {
     const marks = on => document.body.classList.toggle('drops', on);
     addEventListener('dragover', event => {
       if (!hasFiles(event)) return;
-      event.preventDefault();
       event.dataTransfer.dropEffect = 'copy';
       marks(true);
     });
     addEventListener('dragleave', event => event.relatedTarget === null && marks(false));
     addEventListener('drop', event => {
       if (!hasFiles(event)) return;
-      event.preventDefault();
       marks(false);
       const files = droppedFiles(event.dataTransfer);
       this.open(() => files);
@@ -120,6 +122,7 @@ export class ReplayControls {
       slider.nextElementSibling.textContent = `${tick} of ${last}, ${(tick * ns * 1e-9).toFixed(3)} s`;
     }
     const found = element('replay-found'), text = foundText(facts);
+    found.setAttribute('aria-live', playing ? 'off' : 'polite');  // each count would be read out
     if (found.textContent !== text) found.textContent = text;
     found.classList.toggle('differs', Boolean(facts.difference));
     element('replay-there').hidden = !facts.difference;

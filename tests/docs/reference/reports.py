@@ -109,7 +109,7 @@ REPORTS = [
         ("largest_lag_ticks", "ticks", "how far it was behind at most"),
         ("end_reason", "", "`clean end`, `fault`, `stopped` or `controller gone`")]),
     ("Manifest of a log", "`manifest.json` beside `ticks.npy` ([the log](log.md)).",
-     [("record/recording.cpp", "void write_manifest(")], ["size_vox", "spacing_mm", "initial_hash", "first_index", "count"], [
+     [("record/manifest.cpp", "void write_manifest(")], ["size_vox", "spacing_mm", "initial_hash", "first_index", "count"], [
         ("kerf, compiler, flags, build_id", "", "version, compiler, its flags and build of the controller and the recorder"),
         ("cpu", "", "processor of the recorder"),
         ("abi_hash", "", "of the layout of a row"),
@@ -121,7 +121,7 @@ REPORTS = [
         ("gaps", "", "each with `first_index` and `count`"),
         ("arms", "", "2: the run had two devices, and there is `ticks-2.npy`; missing with one"),
         ("summary, summary_2", "", "what `record info` shows, of all rows, of the first and the second device; missing if the recorder was killed before")]),
-    ("Summary of a log", "`./kerf record info LOG --report FILE`.", [("record/recording.cpp", "void for_each_figure(")], [], [
+    ("Summary of a log", "`./kerf record info LOG --report FILE`.", [("record/manifest.cpp", "void for_each_figure(")], [], [
         ("rows, first_tick, last_tick, seconds", "", "what the log covers"),
         ("lost_ticks, missed_before_start, end_reason", "", "as above; `end_reason` of a log that was cut says after which row"),
         ("contact_ticks, shaft_ticks, stale_ticks, faults", "", "ticks of that kind, `stale_ticks` as in the report of the controller; faults that latched"),
@@ -168,7 +168,7 @@ def page(root, programs):
         there = set().union(*(Source(root, path).json_keys(name) for path, name in functions))
         if title == "Controller: what a scene costs":  # of a lambda within
             there |= {"operations", "work_us", "timed_operations", "predicted_us"}
-        if functions[0][0].endswith(("record/recording.cpp", "hil/program/program.cpp")):
+        if functions[0][0].endswith(("record/manifest.cpp", "hil/program/program.cpp")):
             there |= set(re.findall(r'\w\["([a-z_0-9]+)"\]', Source(root, functions[0][0]).body(functions[0][1])))
         same(functions[0][0], [key for row in rows for key in row[0].split(", ")] + inner, there)
         parts.append(f"## {title}\n\n{way}\n\n" + table(("key", "unit", "meaning"), [

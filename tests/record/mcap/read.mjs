@@ -22,7 +22,8 @@ const readable = {
 const decompressHandlers = { lz4: (buffer) => lz4.decompress(buffer) };
 const reader = await McapIndexedReader.Initialize({ readable, decompressHandlers });
 const readers = new Map();
-const out = { indexBytes: bytesRead, channels: {}, ticks: [], first: {}, statistics: undefined };
+const out = { indexBytes: bytesRead, channels: {}, ticks: [], first: {}, statistics: undefined, attachments: {} };
+for (const one of reader.attachmentIndexes) out.attachments[one.name] = Number(one.dataSize);
 for (const channel of reader.channelsById.values()) {
   const schema = reader.schemasById.get(channel.schemaId);
   const definition = parse(new TextDecoder().decode(schema.data), { ros2: true });

@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Recordings replayed by the module of a browser's tab, under Node, beside kerf-replay.
+
+    replay_module_test.py ROOT BIN-FOLDER PAGE-FOLDER
+
+PAGE-FOLDER is what ./kerf page wrote. Exit code 77: skipped, for want of it or of Node."""
+import json
+import pathlib
+import shutil
+import subprocess
+import sys
+import tempfile
+
+from recordings import demo, flight_recording, make_recordings, Recordings, replayed_by_kerf
+
+root, programs, folder = (pathlib.Path(word).resolve() for word in sys.argv[1:4])
+failures = []
+
+
+def check(holds, what):
+    print(('ok    ' if holds else 'FAILS ') + what, flush=True)
+    if not holds:
+        failures.append(what)
+
+
+def replayed_in_node(work, names, most=1 << 30, options=()):
+    run = subprocess.run(['node', *options, '--experimental-default-type=module', root / 'tests/web/replay_module.js', folder / 'kerf.wasm', str(most),
+                          *(work / name for name in names)], capture_output=True, text=True, check=False)
+    lines = run.stdout.splitlines()
+    if len(lines) != len(names):
+        raise RuntimeError(run.stderr)
+    return dict(zip(names, map(json.loads, lines)))
+
+
+def same_as_kerf(name, module, kerf):
+    if 'failed' in kerf or 'failed' in module:
+        return module.get('failed') == kerf.get('failed')
+    same = all(module.get(key) == kerf[key] for key in ('difference', 'cut_short', 'output_hash', 'second_output_hash', 'volume_hash'))
+    equal = str(module['compared'] + 1 - module['first_tick'])
+    return same and module['returns'] and (kerf['equal'] == equal if not kerf['difference'] else True)
+
+
+def tells_the_same(work, recordings):
+    """The module finds, tick for tick and word for word, what kerf-replay finds."""
+    kerf, module = replayed_by_kerf(programs, work, recordings), replayed_in_node(work, recordings)
+    for name in recordings:
+        told = module[name].get('failed') or module[name]['difference'] or module[name]['cut_short'] or \
+            f'{module[name]["compared"]} ticks, {module[name]["output_hash"]}, {module[name]["times_real_time"]:.1f} times real time'
+        check(same_as_kerf(name, module[name], kerf[name]), f'{name}: {told}')
+        if not same_as_kerf(name, module[name], kerf[name]):
+            print(f'      module {module[name]}\n      kerf   {kerf[name]}')
+    return kerf
+
+
+def replays_one_file(work, kerf):
+    """The MCAP of a recording is found to be what its folder is."""
+    names = []
+    for name, options in (('whole', ()), ('whole', ('--unpacked',)), ('another-report', ()), ('two-arms', ()), ('flight', ()),
+                          ('gap', ())):
+        names.append(f'{name}{"".join(options)}.mcap')
+        # It exits with 1 if the recording has a gap.
+        subprocess.run([programs / 'kerf-record', 'export', work / name, '--mcap', work / names[-1], *options], check=False,
+                       stdout=subprocess.DEVNULL)
+    for name, module in replayed_in_node(work, names).items():
+        folder_name = name.removesuffix('.mcap').removesuffix('--unpacked')
+        check(same_as_kerf(name, module, kerf[folder_name]), f'{name}: {module.get("failed") or module["difference"] or module["output_hash"]}')
+
+
+def says_its_own_lines(work, log):
+    """What no program but the page meets, or says in other words."""
+    some = Recordings(work, log)
+    (some.copy('no-log') / 'ticks.npy').unlink()
+    shutil.copytree(log, some.copy('two') / 'second')
+    whole = (work / 'whole.mcap').read_bytes()
+    subprocess.run([programs / 'kerf-record', 'export', log, '--mcap', work / 'part.mcap', '--until', '100'], check=True, stdout=subprocess.DEVNULL)
+    some.names.append('part.mcap')
+    middle = len(whole) // 4
+    for name, data in (('foreign.mcap', b'\x89MCAP0\r\n' * 100), ('cut.mcap', whole[:-100]), ('empty.mcap', b''), ('picture.png', b'\x89PNG'),
+                       ('damaged.mcap', whole[:middle] + bytes(5000) + whole[middle + 5000:])):
+        (work / name).write_bytes(data)
+        some.names.append(name)
+    words = {'no-log': 'no-log/manifest.json: ticks.npy is not beside it; drop the folder',
+             'two': '2 recordings: two, two/second; drop one of them',
+             'part.mcap': 'part.mcap: has ticks, and neither scene nor volumes; export the whole recording',
+             'damaged.mcap': 'damaged.mcap/ticks.npy: ',
+             **{f'{name}.mcap': f'{name}.mcap: cut, or no MCAP of kerf-record export; copy it again' for name in ('foreign', 'cut', 'empty')},
+             'picture.png': 'picture.png: no recording; drop the folder'}
+    for name, found in replayed_in_node(work, some.names).items():
+        failed = found.get('failed') or found.get('cut_short') or 'nothing'
+        check(failed.startswith(words[name]) and '\n' not in failed, f'{name}: {failed}')
+    for pages in (900, 1500, 2300):  # of 64 KiB: while it loads, while it plans, at a snapshot
+        failed = replayed_in_node(work, ['whole'], options=[f'--wasm-max-mem-pages={pages}'])['whole'].get('failed', 'nothing')
+        check(failed.startswith('memory: none is left for this run; close other tabs'), f'{pages / 16:.0f} MiB of memory: {failed}')
+    few = replayed_in_node(work, ['whole'], most=1 << 20)['whole'].get('failed', 'nothing')
+    check('npy.gz: ' in few and few.endswith('too large for a tab; replay it with ./kerf replay'), f'1 MiB of memory: {few}')
+
+
+def main():
+    for there, name in ((shutil.which('node'), 'node'), ((folder / 'kerf.wasm').exists(), f'{folder}/kerf.wasm')):
+        if not there:
+            print(f'skipped: no {name}')
+            return 77
+    with tempfile.TemporaryDirectory() as temporary:
+        work = pathlib.Path(temporary)
+        demo(root, programs, work / 'demo', 'phantom', 2)
+        demo(root, programs, work / 'arms', 'two_arms', 1)
+        (work / 'arms/log').rename(work / 'two-arms')
+        names = make_recordings(work, work / 'demo/log').names + ['two-arms'] + flight_recording(root, programs, work)
+        kerf = tells_the_same(work, names)
+        report = json.loads((work / 'demo/report.json').read_text())
+        check(kerf['whole']['output_hash'] == report['output_hash'], 'the run had that hash, too')
+        replays_one_file(work, kerf)
+        says_its_own_lines(work, work / 'demo/log')
+    return 1 if failures else 0
+
+
+sys.exit(main())
