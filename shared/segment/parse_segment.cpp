@@ -161,7 +161,7 @@ SegmentInfo parse_segment(std::span<std::byte> segment) {
   info.dirty_slots = header.dirty_slots;
   info.build_id.assign(header.build_id, strnlen(header.build_id, sizeof header.build_id));
   info.scene_json.assign(reinterpret_cast<const char*>(segment.data() + header.off_scene),
-                         header.scene_bytes);
+                         static_cast<std::size_t>(header.scene_bytes));
   for (std::size_t i = 0; i < header.volume_count; ++i) {
     VolumeDescriptor descriptor{};
     std::memcpy(&descriptor, segment.data() + header.off_volume_table + i * sizeof descriptor,
