@@ -50,7 +50,7 @@ fi
 
 # run IMAGE: one instruction takes 32 ns of virtual time, whatever the machine does.
 run() {
-  timeout 600 qemu-system-arm -M mps2-an500 -display none -monitor none -serial none -chardev stdio,id=host \
+  timeout 1800 qemu-system-arm -M mps2-an500 -display none -monitor none -serial none -chardev stdio,id=host \
     -semihosting-config enable=on,target=native,chardev=host -icount shift=5 -kernel "$images/bin/$1.elf" </dev/null
 }
 

@@ -7,7 +7,7 @@
 set -euo pipefail
 cd "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/.."
 folder=build/determinism
-row='%-22s %-20s %-7s %-5s %-7s %-16s %-16s %-16s %7s\n'
+row='%-22s %-20s %-9s %-5s %-7s %-16s %-16s %-16s %7s\n'
 
 # check PROCESSOR COMPILER FLAGS: builds, runs, prints the rows of the table; false if any differs.
 check() {
