@@ -75,9 +75,6 @@ KERF_EXPORT(step) int step(int ticks, double most_armed) {
 KERF_EXPORT(rate_hz) int rate_hz() {
   return with_open([](auto& one) { return one.rate_hz(); });
 }
-KERF_EXPORT(armed_ticks) double armed_ticks() {
-  return static_cast<double>(run->armed_ticks());
-}
 
 KERF_EXPORT(join_viewer) void join_viewer() {
   with_open([](auto& one) { one.join(); });
@@ -95,10 +92,10 @@ KERF_EXPORT(take_message) int take_message(std::size_t bytes) {
 }
 
 KERF_EXPORT(lead) void lead(double x, double y, double z, double yaw, double pitch, int button) {
-  run->lead({x, y, z}, {yaw, pitch, 0}, button != 0);
+  if (run) run->lead({x, y, z}, {yaw, pitch, 0}, button != 0);
 }
 KERF_EXPORT(release) void release() {
-  run->release();
+  if (run) run->release();
 }
 
 KERF_EXPORT(facts) std::size_t facts() {
@@ -121,6 +118,9 @@ KERF_EXPORT(replay_prepare) int replay_prepare(int ticks) {
 }
 KERF_EXPORT(replay_step) int replay_step(int ticks) {
   return replay->step(ticks);
+}
+KERF_EXPORT(replay_stopped) int replay_stopped() {
+  return replay->stopped() ? 1 : 0;
 }
 KERF_EXPORT(replay_go) void replay_go(double tick) {
   replay->go(tick >= 1 ? static_cast<kerf::Tick>(tick) : 1);

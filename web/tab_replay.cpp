@@ -20,7 +20,7 @@
 namespace kerf::web {
 namespace {
 
-/// A tab has less memory than a machine: it reaches a tick in ten steps of the recording instead.
+/// A tab has less memory than a machine: with fewer snapshots it steps more ticks on a way back.
 constexpr std::size_t kTabSnapshotBytes = std::size_t{128} << 20;
 
 Manifest manifest_in(const std::filesystem::path& folder) {
@@ -69,6 +69,7 @@ struct TabReplay::State {
   std::optional<EarlierTicks> earlier;  ///< until they are stepped
   std::optional<WatchedRun> shown;      ///< from then on
   Tick goal = 0;                        ///< the tick that `prepare` goes to; 0: none
+  bool stopped = false;
 };
 
 TabReplay::TabReplay(const std::filesystem::path& folder)
@@ -81,7 +82,9 @@ bool TabReplay::prepare(int ticks) {
     if (!s.earlier->step()) s.begin_ticks();
   }
   if (s.earlier) return false;
+  const bool had_difference = s.shown->difference().has_value();
   if (s.goal != 0 && s.shown->go_on(ticks)) s.goal = 0;
+  s.stopped = s.shown->difference().has_value() != had_difference;
   return s.goal == 0;
 }
 
@@ -89,11 +92,17 @@ int TabReplay::step(int ticks) {
   WatchedRun& shown = *state_->shown;
   const bool had_difference = shown.difference().has_value();
   int made = 0;
-  while (made < ticks && shown.step()) {
+  bool differs = false;
+  while (made < ticks && !differs && shown.step()) {
     ++made;
-    if (shown.difference().has_value() != had_difference) break;
+    differs = shown.difference().has_value() != had_difference;
   }
+  state_->stopped = differs || made < ticks;
   return made;
+}
+
+bool TabReplay::stopped() const noexcept {
+  return state_->stopped;
 }
 
 void TabReplay::go(Tick tick) {

@@ -35,6 +35,8 @@ class TabReplay {
   /// Shows the next `ticks`; less at the end of the recording, and at its first difference, which
   /// is the last one then. Returns how many. After `prepare`.
   int step(int ticks);
+  /// Whether the last `step` or `prepare` met the first difference, or `step` the end.
+  [[nodiscard]] bool stopped() const noexcept;
 
   /// To that tick, by `prepare`. Before the first `prepare` is done it does nothing.
   void go(Tick tick);

@@ -192,10 +192,6 @@ struct TabRun::State {
 TabRun::TabRun(const TabInputs& inputs) : state_(std::make_unique<State>(inputs)) {}
 TabRun::~TabRun() = default;
 
-std::uint64_t TabRun::armed_ticks() const noexcept {
-  return state_->armed_ticks;
-}
-
 int TabRun::step(int ticks, std::uint64_t most_armed) noexcept {
   int made = 0;
   for (; made < ticks && state_->armed_ticks < most_armed; ++made) state_->step_once();

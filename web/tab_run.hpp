@@ -37,9 +37,8 @@ class TabRun {
   TabRun(const TabRun&) = delete;
   TabRun& operator=(const TabRun&) = delete;
 
-  /// Servo ticks since the device was taken in hand, as the seconds of `./kerf demo` count.
-  [[nodiscard]] std::uint64_t armed_ticks() const noexcept;
-  /// Steps `ticks` times, but not beyond `most_armed` armed ticks. Returns the steps made.
+  /// Steps `ticks` times, but not beyond `most_armed` armed ticks: those since the device was taken
+  /// in hand, as the seconds of `./kerf demo` count. Returns the steps made.
   int step(int ticks, std::uint64_t most_armed = UINT64_MAX) noexcept;
 
   /// As of TabViewer.

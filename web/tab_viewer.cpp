@@ -5,6 +5,7 @@
 
 #include "bridge/wire/parse.hpp"
 #include "shared/posix/monotonic_clock.hpp"
+#include "shared/segment/command.hpp"
 
 namespace kerf::web {
 
@@ -30,8 +31,12 @@ bool TabViewer::take(std::span<const std::byte> message) {
   if (const auto* ack = std::get_if<bridge::AckMessage>(&*parsed)) {
     return stream_->acked(*ack, monotonic_ns());
   }
-  if (!answer_) return false;
-  replies_.push_back(answer_(std::get<bridge::CommandMessage>(*parsed)));
+  const auto& command = std::get<bridge::CommandMessage>(*parsed);
+  // Of a page that has not yet heard that this is a run without commands.
+  constexpr auto kRefused = static_cast<std::uint32_t>(ReplyStatus::refused);
+  replies_.push_back(
+      answer_ ? answer_(command)
+              : bridge::ReplyMessage{bridge::kReplyMagic, command.sequence, kRefused, 0});
   return true;
 }
 

@@ -45,8 +45,8 @@ class TabViewer {
   /// The next message to the viewer; false if none is due, or the viewer has yet to acknowledge.
   [[nodiscard]] bool next(std::vector<std::byte>& message);
 
-  /// A message of the viewer: an acknowledgement, or a command, which `next` answers. False if it
-  /// is neither.
+  /// A message of the viewer: an acknowledgement, or a command, which `next` answers, with a
+  /// refusal if there is no `answer`. False if it is neither.
   bool take(std::span<const std::byte> message);
 
  private:

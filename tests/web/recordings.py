@@ -76,6 +76,7 @@ def make_recordings(work, log):
     some.copy('whole')
     encoder = struct.unpack_from('<i', (log / 'ticks.npy').read_bytes(), HEADER + 1500 * ROW + 264)[0]
     some.with_rows('another-report', lambda rows: set_in_row(rows, 1501, 264, struct.pack('<i', encoder + 3)))
+    some.with_rows('another-state', lambda rows: set_in_row(rows, 1497, 172, struct.pack('<I', 12345)))
     some.with_rows('another-output', lambda rows: set_in_row(rows, 1600, 172, struct.pack('<I', 12345)))
 
     def drop_rows(rows):

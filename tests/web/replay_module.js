@@ -6,6 +6,7 @@ import fs from 'node:fs';
 import path from 'node:path';
 import {KerfModule} from '../../web/page/kerf_module.js';
 import {readyRecording} from '../../web/page/log_files.js';
+import {ReplayTurn} from '../../web/page/replay_turn.js';
 
 const [module, most, ...dropped] = process.argv.slice(2);
 const cpuMs = () => Object.values(process.cpuUsage()).reduce((sum, us) => sum + us / 1000, 0);
@@ -41,20 +42,33 @@ function returnsTo(kerf, tick) {
   return kerf.facts().output_hash === before && kerf.volumeHash() === volumes;
 }
 
+async function opened(one) {
+  const ready = await readyRecording(filesIn(one), async ({name}) => new Uint8Array(fs.readFileSync(name)), piecesOf, Number(most));
+  const kerf = new KerfModule(compiled);
+  kerf.openReplay(ready);
+  return kerf;
+}
+
+/** The tick at which the page's worker rests. */
+function restsAt(kerf) {
+  const turn = new ReplayTurn(kerf, () => {});
+  do turn.slot(false);
+  while (turn.playing);
+  return kerf.facts().tick;
+}
+
 for (const one of dropped) {
   try {
-    const ready = await readyRecording(filesIn(one), async ({name}) => new Uint8Array(fs.readFileSync(name)), piecesOf, Number(most));
-    const kerf = new KerfModule(compiled);
-    kerf.openReplay(ready);
+    const kerf = await opened(one);
     const began = cpuMs();
     while (!kerf.replayPrepare(256));
     let messages = 0;
-    do messages += kerf.news().length;
-    while (kerf.replayStep(64) === 64);
+    for (; !kerf.replayStopped; kerf.replayStep(64)) messages += kerf.news().length;
     const stepped = cpuMs();
     const facts = kerf.facts();
     const volume_hash = kerf.volumeHash();
-    console.log(JSON.stringify({...facts, volume_hash, messages, returns: returnsTo(kerf, Math.max(Math.ceil(facts.tick / 3), facts.first_tick)),
+    console.log(JSON.stringify({...facts, volume_hash, messages, rests_at: facts.difference ? restsAt(await opened(one)) : 0,
+      returns: returnsTo(kerf, Math.max(Math.ceil(facts.tick / 3), facts.first_tick)),
       times_real_time: facts.tick * facts.tick_ns / 1e6 / (stepped - began),
       memory_mib: kerf.calls.memory.buffer.byteLength / 2 ** 20}));
   } catch (problem) {

@@ -37,6 +37,8 @@ def same_as_kerf(name, module, kerf):
         return module.get('failed') == kerf.get('failed')
     same = all(module.get(key) == kerf[key] for key in ('difference', 'cut_short', 'output_hash', 'second_output_hash', 'volume_hash'))
     equal = str(module['compared'] + 1 - module['first_tick'])
+    # The worker stops there too, wherever in its batch of ticks it is.
+    same = same and (not module['difference'] or module['rests_at'] == module['difference_tick'])
     return same and module['returns'] and (kerf['equal'] == equal if not kerf['difference'] else True)
 
 

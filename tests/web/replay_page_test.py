@@ -143,8 +143,9 @@ def says_what_is_wrong(page, work, kerf):
     check(rests_at(page, kerf['whole']['equal'], 120), 'a sound one is replayed after them')
     drop(page, work / 'picture.png')
     check(page.until(f"{STATE_LINE}.startsWith('picture.png: no recording')", 30), f'a foreign file: {page.evaluate(STATE_LINE)}')
-    page.press('#replay-step')
-    check(page.evaluate(RESTS) == 'rests' and page.evaluate("document.body.dataset.state") == 'live', 'the replay is still there')
+    page.press('#replay-play')  # from its first tick again
+    check(page.until(f"{RESTS} === 'plays'", 30) and page.evaluate("document.body.dataset.state") == 'live', 'the replay is still there')
+    page.press('#replay-play')
 
 
 def replays_files_on_a_phone(page, address, work, kerf):

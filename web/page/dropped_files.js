@@ -4,16 +4,17 @@
 export const kMostFiles = 2000;
 
 const found = (path, file) => ({path, size: file.size, file});
-const tooMany = () => new Error(`more than ${kMostFiles} files; drop the folder of one recording alone`);
+const tooMany = () => new Error(`more than ${kMostFiles} files and folders; drop the folder of one recording alone`);
 const calls = (object, name) => new Promise((done, failed) => object[name](done, failed));
 
-async function walk(entry, out) {
-  if (out.length >= kMostFiles) throw tooMany();
+/** `seen` counts files and folders: one in another without an end has no file. */
+async function walk(entry, out, seen) {
+  if (++seen.entries > kMostFiles) throw tooMany();
   const path = entry.fullPath.replace(/^\//, '');
   if (entry.isFile) return out.push(found(path, await calls(entry, 'file')));
   const reader = entry.createReader();
   for (let some; (some = await calls(reader, 'readEntries')).length > 0;) {
-    for (const one of some) await walk(one, out);
+    for (const one of some) await walk(one, out, seen);
   }
 }
 
@@ -21,8 +22,8 @@ async function walk(entry, out) {
 export async function droppedFiles(transfer) {
   const entries = [...transfer.items].map(item => item.webkitGetAsEntry?.()).filter(Boolean);
   if (entries.length === 0) return chosenFiles(transfer.files);
-  const out = [];
-  for (const entry of entries) await walk(entry, out);
+  const out = [], seen = {entries: 0};
+  for (const entry of entries) await walk(entry, out, seen);
   return out;
 }
 

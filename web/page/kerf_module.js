@@ -84,7 +84,7 @@ export class KerfModule {
     const bytes = encoder.encode(folder);
     this.bytesAt(this.calls.room(bytes.length), bytes.length).set(bytes);
     this.calls.open_replay(bytes.length);
-    this.files.forget('volumes');  // the module has them, unpacked
+    this.files.forget(`${folder}/volumes/`);  // the module has them, unpacked
   }
   /** Whether all is done that comes before a tick is shown; at most so many ticks of it. */
   replayPrepare(ticks) {
@@ -92,6 +92,10 @@ export class KerfModule {
   }
   replayStep(ticks) {
     return this.calls.replay_step(ticks);
+  }
+  /** Whether the last step met the end or the first difference; the way to a tick, that difference. */
+  get replayStopped() {
+    return this.calls.replay_stopped() !== 0;
   }
   replayGo(tick) {
     this.calls.replay_go(tick);
@@ -102,9 +106,6 @@ export class KerfModule {
   }
   get rateHz() {
     return this.calls.rate_hz();
-  }
-  get armedTicks() {
-    return this.calls.armed_ticks();
   }
   /** The messages that are due to the viewer, as an array of ArrayBuffers; sixty times a second. */
   news(ended = false) {
@@ -121,7 +122,7 @@ export class KerfModule {
   take(buffer) {
     const bytes = new Uint8Array(buffer);
     this.bytesAt(this.calls.room(bytes.length), bytes.length).set(bytes);
-    if (!this.calls.take_message(bytes.length)) throw new Error('a message of the page: not understood');
+    if (!this.calls.take_message(bytes.length)) throw new Error('a message of the page: of no known kind; load the page again');
   }
   /** A viewer that begins anew. */
   join() {

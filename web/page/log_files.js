@@ -140,10 +140,10 @@ export class LogFiles {
     this.files = files;
   }
 
-  /** Frees the files of all folders of that name. */
+  /** Frees the files of a folder. */
   forget(folder) {
     for (const path of [...this.files.keys()]) {
-      if (path.includes(`/${folder}/`)) this.files.delete(path);
+      if (path.startsWith(folder)) this.files.delete(path);
     }
   }
 

@@ -2,7 +2,6 @@
 // A recording in the page: how it comes in, and the controls of its replay. The worker steps it (replay_turn.js).
 import {chosenFiles, droppedFiles} from './dropped_files.js';
 
-const kFastest = 64;
 // A file that is dropped beside, or too early, must not take the place of the page.
 for (const kind of ['dragover', 'drop']) addEventListener(kind, event => event.preventDefault());
 
@@ -33,7 +32,8 @@ export function foundText({compared, difference, last_tick, cut_short, first_tic
 }
 
 export class ReplayControls {
-  /** `page`: {worker, refused(text)}. The controls stand in its box `fields`. */
+  /** `page`: {worker, refused(text), ask()}; `ask` returns a function that says whether nothing was asked for since. The
+   *  controls stand in its box `fields`. */
   constructor(page, fields) {
     Object.assign(this, {page, facts: null, folder: '', holdsSlider: false});
     fields.querySelector('legend').insertAdjacentHTML('afterend', kPlayer);
@@ -49,8 +49,8 @@ export class ReplayControls {
     }
     on('replay-play', 'click', () => this.ask({play: !this.facts?.playing}));
     on('replay-step', 'click', () => this.ask({one: true}));
-    on('replay-slower', 'click', () => this.changeSpeed(0.5));
-    on('replay-faster', 'click', () => this.changeSpeed(2));
+    on('replay-slower', 'click', () => this.ask({faster: 0.5}));
+    on('replay-faster', 'click', () => this.ask({faster: 2}));
     on('replay-there', 'click', () => this.ask({play: false, go: this.facts.difference_tick}));
     on('replay-at', 'input', ({target}) => {
       this.holdsSlider = true;
@@ -78,8 +78,10 @@ export class ReplayControls {
   }
 
   async open(files) {
+    const isNewest = this.page.ask();
     try {
-      this.page.worker.postMessage({log: await files()});
+      const log = await files();
+      if (isNewest()) this.page.worker.postMessage({log});
     } catch (problem) {
       this.page.refused(problem.message || `${problem.name}: cannot be read; drop it again`);
     }
@@ -87,10 +89,6 @@ export class ReplayControls {
 
   ask(replay) {
     if (this.facts) this.page.worker.postMessage({replay});
-  }
-  changeSpeed(factor) {
-    const speed = (this.facts?.speed || 1) * factor;
-    this.ask({speed: Math.min(Math.max(speed, 1 / kFastest), kFastest)});
   }
 
   /** A recording is on its way. */
@@ -104,7 +102,7 @@ export class ReplayControls {
     element('again').textContent = 'start again';
     element('replay').hidden = true;
     element('run').classList.remove('replays');
-    delete document.body.dataset.replayTick;
+    for (const name of ['replayTick', 'replayState', 'replayFound', 'outputHash', 'volumeHash']) delete document.body.dataset[name];
   }
 
   /** Rows for the figures. */

@@ -1,18 +1,27 @@
 // SPDX-License-Identifier: Apache-2.0
 // A recording as the worker steps it: in parts of a slot, so that messages are heard, at the pace of the clock or as fast as
 // it can, to a tick and back.
-import {readyRecording} from './log_files.js';
+import {findRecording, readyRecording} from './log_files.js';
+import {filesInMcap} from './mcap_log.js';
 
 const kBusyMs = 12;     // of a slot; the rest is for messages
 const kBatch = 8;       // ticks between two looks at the clock
 const kBehindMs = 100;  // of the recording's time: more is not made up for
 const kFactsMs = 100;
+const kFastest = 64;
 const now = () => performance.now();
 
 const bytesOf = async ({file}) => new Uint8Array(await file.arrayBuffer());
 /** Read as it is needed: a log of an hour has 2 GB. */
 const piecesOf = ({file}) => ({size: file.size, read: (at, length) =>
   new Uint8Array(new FileReaderSync().readAsArrayBuffer(file.slice(at, at + length)))});
+
+/** What the recording among dropped files is called. Throws one line if there is none, or its MCAP has none. */
+export function recordingIn(dropped) {
+  const {folder, mcap} = findRecording(dropped);
+  if (mcap) filesInMcap(piecesOf(mcap), mcap.path);
+  return folder;
+}
 
 /** Of dropped files, each {path, size, file}; see readyRecording. */
 export const readyFiles = dropped => readyRecording(dropped, bytesOf, piecesOf);
@@ -33,9 +42,10 @@ export class ReplayTurn {
   }
 
   /** {play: bool}, {speed: seconds of the recording in one of the clock, 0: as fast as it can}, {one: true}: the next
-   *  tick alone, {go: tick}. */
-  take({play, speed, one, go}) {
+   *  tick alone, {go: tick}, {faster: factor}. */
+  take({play, speed, one, go, faster}) {
     if (speed !== undefined) this.speed = speed;
+    if (faster !== undefined) this.speed = Math.min(Math.max((this.speed || 1) * faster, 1 / kFastest), kFastest);
     if (play !== undefined) this.play(play);
     if (go !== undefined) this.go(go);
     if (one) {
@@ -78,17 +88,18 @@ export class ReplayTurn {
       if (!this.isReady) {
         this.isReady = this.kerf.replayPrepare(kBatch);
         this.moved = true;
+        if (this.isReady && this.kerf.replayStopped) this.end();
       } else {
         const asked = this.speed === 0 ? kBatch : Math.min(kBatch, Math.floor(this.dueTicks));
         if (!this.playing || asked === 0) return;
         const made = this.kerf.replayStep(asked);
         this.dueTicks -= made;
         this.moved = true;
-        if (made < asked) this.end();
+        if (this.kerf.replayStopped) this.end();
       }
     }
   }
-  /** At its end, or at the first difference. From here on it is looked at. */
+  /** At its end, or at the first difference. Played on, or again, at real time: for a person. */
   end() {
     this.playing = false;
     if (this.speed === 0) this.speed = 1;

@@ -10,7 +10,7 @@ import {TabSocket} from './tab_socket.js';
 
 const element = id => document.getElementById(id);
 const wanted = new URLSearchParams(location.hash.slice(1));
-const state = {ready: false, reads: false, page: null, steering: null, worker: null, shown: null, replay: null};
+const state = {ready: false, replays: false, asked: 0, page: null, steering: null, worker: null, shown: null, replay: null};
 
 function refuse(text) {
   const line = element('missing');
@@ -56,7 +56,7 @@ function addControls() {
     input.addEventListener('input', () => input.nextElementSibling.textContent = input.value);
     input.addEventListener('change', start);
   }
-  state.replay = new ReplayControls({worker: state.worker, refused}, fields);
+  state.replay = new ReplayControls({worker: state.worker, refused, ask}, fields);
   element('finger').addEventListener('change', ({target}) => state.steering && (state.steering.fingersPress = target.checked));
   element('again').addEventListener('click', start);
   element('scene').value = scenes.some(({name}) => name === wanted.get('scene')) ? wanted.get('scene') : 'phantom';
@@ -97,11 +97,18 @@ function showOwnValues({force, servo}) {
 
 const isMine = () => element('hand').value === 'mine';
 
+/** Counts what the user asks for. Returns whether this is still the newest. */
+function ask() {
+  const mine = ++state.asked;
+  return () => mine === state.asked;
+}
+
 /** Before the module is there nothing is sent: the controls are read once it is. */
 async function start(event) {
   if (!state.ready) return;
+  const isNewest = ask();
   state.replay.close();
-  state.reads = false;
+  state.replays = false;
   if (event?.type === 'change') {
     if (event.target.id === 'scene') touched.clear();  // they were of the other scene
     else if (event.target.id !== 'hand') touched.add(event.target.id);
@@ -113,23 +120,29 @@ async function start(event) {
   document.body.dataset.run = 'loading';
   try {
     const [scene, script] = await Promise.all([textOf(`scenes/${name}.toml`), mine ? '' : textOf(`scenes/hands/${hand}.toml`)]);
+    if (!isNewest()) return;
     state.steering?.start(mine);
+    state.page?.link.expectHello();
     state.worker.postMessage({
       open: {name: `scenes/${name}.toml`, scene, hand: script, pedal: mine, settings: settings()},
       pace: Number(wanted.get('pace') ?? 1),
       mostArmed: Math.round(Number(wanted.get('seconds') ?? 0) * Number(element('rate').value))});
   } catch (problem) {
-    failed(problem.message);
+    if (isNewest()) failed(problem.message);
   }
 }
 
-/** What was dropped is no recording: the run goes on. */
+/** What was dropped is no recording: the run goes on, or begins now, if the drop came before it. */
 function refused(text) {
+  const {run} = document.body.dataset;
+  if (run === undefined || (run === 'loading' && !state.replays)) start();
   element('run-state').textContent = text;
   document.body.dataset.refused = text;
 }
 
 function failed(text) {
+  state.replay.close();
+  state.replays = false;
   element('run-state').textContent = text;
   document.body.dataset.run = 'failed';
   element('run-figures').replaceChildren();
@@ -161,7 +174,7 @@ function showRows(rows) {
 const says = {
   ready: () => {
     state.ready = true;
-    if (!state.reads) start();
+    if (state.asked === 0) start();
   },
   opened: ({opened}) => {
     element('run-state').textContent = `loaded in ${(opened / 1000).toFixed(1)} s`;
@@ -187,14 +200,16 @@ const says = {
   },
   refused: ({refused: text}) => refused(text),
   reads: ({reads: folder}) => {
-    state.reads = true;
+    state.replays = true;
+    state.page?.link.expectHello();
     state.steering?.start(false);
     state.replay.begin(folder);
     element('finger-row').style.display = 'none';
     element('run-state').textContent = `reads ${folder}`;
     document.body.dataset.run = 'loading';
   },
-  replayed: ({replayed}) => showRows(state.replay.show(replayed)),
+  // One that was under way when a run was asked for is late.
+  replayed: ({replayed}) => state.replays && showRows(state.replay.show(replayed)),
   failed: ({failed: text}) => state.ready ? failed(text) : refuse(text),
 };
 
@@ -206,7 +221,7 @@ async function begin() {
   state.page = await import('./kerf.js');
   if (!state.page.stage) return;
   state.steering = new Steering(state.page, state.worker);
-  state.steering.start(isMine() && !state.reads);
+  state.steering.start(isMine() && !state.replays);
 }
 
 const why = lack();

@@ -7,8 +7,7 @@
 // Out: {opened: ms} {down: ArrayBuffer} {facts} {failed: text} {done: facts with volume_hash}
 //      {refused: text}: what was dropped is no recording, the run goes on; {reads: folder}; {replayed: facts}
 import {KerfModule} from './kerf_module.js';
-import {findRecording} from './log_files.js';
-import {readyFiles, ReplayTurn} from './replay_turn.js';
+import {readyFiles, recordingIn, ReplayTurn} from './replay_turn.js';
 
 const kSlotMs = 1000 / 60;
 const kBusyMs = 12;     // of a slot; the rest is for messages
@@ -19,7 +18,7 @@ const kFactsMs = 200;
 let compiled = null, kerf = null;
 let joined = false;  // there is a viewer: the page's own modules may come after the run
 let opening = 0;     // counts what was asked for: files are read meanwhile
-let hidden = false;  // a page that nobody sees
+let hidden = false;  // the page is in the background
 let run = null;  // {turn} of a recording, or {pace, mostArmed, dueTicks, lookedMs, factsMs, factsTicks, busyMs, allMs, steps, paused, ended}
 const now = () => performance.now();
 
@@ -58,9 +57,11 @@ function open({open: inputs, pace = 1, mostArmed = 0}) {
 }
 
 async function openLog({log}) {
+  await begun;
+  if (!compiled) return;  // the page says why
   let folder, ready;
   try {
-    ({folder} = findRecording(log));
+    folder = recordingIn(log);
   } catch (problem) {
     return postMessage({refused: problem.message});
   }
@@ -70,11 +71,10 @@ async function openLog({log}) {
   postMessage({reads: folder});
   try {
     ready = await readyFiles(log);
-    await begun;
   } catch (problem) {
     return mine === opening && postMessage({failed: problem.message});
   }
-  if (mine !== opening || !compiled) return;
+  if (mine !== opening) return;
   attempt(() => {
     const next = new KerfModule(compiled);
     next.openReplay(ready);

@@ -19,7 +19,7 @@ const now = {record: null, second: null, frame: null, ended: false, newRun: 0, e
   beatMs: 0};  // the servo's last sign of life, by performance.now()
 let stage = null, scene = null, held = null;
 // For a page around this one, as web/page/try.js.
-export {now, stage};
+export {link, now, stage};
 export const heldNow = () => held;
 
 function missing(text) {

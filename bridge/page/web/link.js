@@ -122,6 +122,11 @@ export class Link {
     this.on.reply(message);
   }
 
+  /** Another run is loaded behind the same socket: until its hello, silence is none. */
+  expectHello() {
+    this.greeted = false;
+  }
+
   /** The number of the command, which its reply names; 0 where there is no connection. */
   send(kind, argument, arm = 0) {
     if (this.socket?.readyState !== WebSocket.OPEN) return 0;
