@@ -7,8 +7,8 @@ the check or test named there notices. Nothing in the tree is touched.
         LIST: safety, kernels or includes; PATTERN picks the mutations whose line matches. One line for each mutation: what
         caught it, or SURVIVED. A run that is stopped goes on where it was, unless a source changed; --again starts anew.
     .ci/mutate.py --check
-        only whether each text stands exactly once in its file, each test case in tests/, and each safety rule in
-        docs/safety.md
+        only whether each text stands exactly once in its file, each test case in the folder of its program, and each safety
+        rule in docs/safety.md
 
 The list contact is for .ci/ablate.py, which measures what each constant of the contact is worth.
 
@@ -97,17 +97,20 @@ def read_table():
     return mutations
 
 
-def test_cases():
-    """The names of all test cases, as their sources have them, in one text."""
+def test_cases(program):
+    """The names of the test cases of a program, in lower case, as a set. Looked for in the folders whose CMakeLists.txt makes
+    it; another program of the same folder may have them."""
+    makes = re.compile(rf"kerf_test\(NAME {program.removeprefix('test_')}\b|add_executable\({program}\b")
+    lists = [file for top in ("tests", "standin") for file in (ROOT / top).rglob("CMakeLists.txt") if makes.search(file.read_text())]
     name = re.compile(r'TEST_CASE(?:_TEMPLATE|_FIXTURE)?\([^"()]*((?:"(?:[^"\\]|\\.)*"\s*)+)')
-    found = [name.findall(file.read_text()) for folder in ("tests", "standin") for file in (ROOT / folder).rglob("*.[ch]pp")]
+    found = [name.findall(file.read_text()) for made in lists for file in made.parent.rglob("*.[ch]pp")]
     return {re.sub(r'"\s*"', "", text.strip())[1:-1].replace('\\"', '"').lower() for texts in found for text in texts}
 
 
 def check(mutations):
     page = (ROOT / "docs/safety.md").read_text()
     names = set()
-    cases = test_cases()
+    cases = {}  # program: names
     for mutation in mutations:
         if mutation.name in names:
             raise Wrong(f"{mutation.name}: stands twice in {TABLE}; rename one")
@@ -115,9 +118,11 @@ def check(mutations):
         if mutation.list != "contact" and not re.match(r"test_|\.ci/|(omni|falcon|woodenhaptics) ", mutation.catcher):
             raise Wrong(f"{mutation.name}: '{mutation.catcher}' is no test, check or fault script; correct {TABLE}")
         program, _, pattern = mutation.catcher.partition(" ")
-        if mutation.object and program.startswith("test_") and not any(
-                fnmatch.filter(cases, one.lower()) for one in pattern.split(",")):
-            raise Wrong(f"{mutation.name}: '{mutation.catcher}' names no test case; correct {TABLE}")
+        if mutation.object and program.startswith("test_"):
+            if program not in cases:
+                cases[program] = test_cases(program)
+            if not all(fnmatch.filter(cases[program], one.lower()) for one in pattern.split(",")):
+                raise Wrong(f"{mutation.name}: '{mutation.catcher}' names no test case of {program}; correct {TABLE}")
         if mutation.list == "safety" and f"`{mutation.name}`" not in page:
             raise Wrong(f"{mutation.name}: stands nowhere in docs/safety.md; name its rule there")
         mutation.contents(ROOT)

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <fstream>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <system_error>
@@ -33,43 +35,62 @@ constexpr bool has_no_padding() {
 }
 static_assert(has_no_padding(), "mcap_export.hpp: the bytes of a message are those of a row");
 
-/// The regular files of a folder, by name; none if there is no such folder.
-std::vector<std::filesystem::path> files_in(const std::filesystem::path& folder) {
-  std::vector<std::filesystem::path> files;
+/// The bytes of a regular file; nothing if it is none, or cannot be read to its end.
+std::optional<std::string> content_of(const std::filesystem::path& path) {
   std::error_code fault;
-  for (const auto& entry : std::filesystem::directory_iterator(folder, fault)) {
-    if (entry.is_regular_file(fault)) files.push_back(entry.path());
-  }
-  std::ranges::sort(files);
-  return files;
+  if (!std::filesystem::is_regular_file(path, fault)) return std::nullopt;  // a pipe would block
+  std::ifstream file(path, std::ios::binary);
+  const std::uintmax_t bytes = std::filesystem::file_size(path, fault);
+  if (!file.is_open() || fault) return std::nullopt;
+  std::string content(static_cast<std::size_t>(bytes), '\0');
+  if (!file.read(content.data(), static_cast<std::streamsize>(bytes))) return std::nullopt;
+  return content;
 }
 
-/// What a replay needs besides the ticks.
-void attach_files(const std::filesystem::path& folder, const Manifest& manifest,
-                  McapWriter& writer) {
-  const auto attach = [&](const std::string& name, std::string_view type,
-                          const std::filesystem::path& file) {
-    writer.attach(name, type, text_in(file));
+/// What a replay needs besides the ticks. Returns a line for each file that is left out.
+std::vector<std::string> attach_files(const std::filesystem::path& folder, const Manifest& manifest,
+                                      McapWriter& writer) {
+  std::vector<std::string> left_out;
+  const auto leave_out = [&](const std::filesystem::path& path, const std::string& value) {
+    left_out.push_back(path.string() + ": " + value +
+                       ", so the MCAP is without it; copy the recording again");
+  };
+  const auto attach = [&](const std::string& name, std::string_view type) {
+    const std::optional<std::string> content = content_of(folder / name);
+    if (content) writer.attach(name, type, *content);
+    if (!content) leave_out(folder / name, "no file, or one that cannot be read");
   };
   for (const std::string_view name : {kManifestName, kSceneName}) {
-    attach(std::string(name), "application/json", folder / name);
+    attach(std::string(name), "application/json");
   }
   for (const std::string_view below : {kVolumesName, inputs_name(0), inputs_name(1)}) {
-    for (const std::filesystem::path& file : files_in(folder / below)) {
-      attach(std::string(below) + "/" + file.filename().string(), "application/gzip", file);
+    std::vector<std::string> names;
+    std::error_code fault;
+    for (const auto& entry : std::filesystem::directory_iterator(folder / below, fault)) {
+      names.push_back(std::string(below) + "/" + entry.path().filename().string());
     }
+    // A recording may have no such folder.
+    if (fault && fault != std::errc::no_such_file_or_directory) {
+      leave_out(folder / below, fault.message());
+    }
+    std::ranges::sort(names);
+    for (const std::string& name : names) attach(name, "application/gzip");
   }
   for (std::size_t arm = 0; arm < manifest.arms; ++arm) {
     const std::string name(tick_log_name(arm));
-    const std::uint64_t rows = TickLogReader(folder / name).rows();
+    const TickLogReader log(folder / name);
+    // A reader of a cut log reports the cut by the count; rows behind the count are complete.
+    const std::uint64_t rows = std::max(log.rows(), log.counted());
     writer.attach(name + ".head", "application/octet-stream", tick_log_header(rows));
   }
+  return left_out;
 }
 
 }  // namespace
 
-void export_mcap(const std::filesystem::path& folder, const std::filesystem::path& mcap,
-                 McapWriter::Packing packing, TickRange range) {
+std::vector<std::string> export_mcap(const std::filesystem::path& folder,
+                                     const std::filesystem::path& mcap, McapWriter::Packing packing,
+                                     TickRange range) {
   check_outputs(recording_files(folder), {{"--mcap", mcap, ".mcap"}});
   const Manifest manifest = read_manifest(folder);
   AtomicFile file(mcap);
@@ -95,10 +116,12 @@ void export_mcap(const std::filesystem::path& folder, const std::filesystem::pat
     write_arm(first, 0);
     if (second != nullptr) write_arm(*second, 1);
   });
-  if (range.is_whole()) attach_files(folder, manifest, writer);
+  std::vector<std::string> left_out;
+  if (range.is_whole()) left_out = attach_files(folder, manifest, writer);
   writer.close();
   file.close();
   file.commit();
+  return left_out;
 }
 
 }  // namespace kerf

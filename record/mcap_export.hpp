@@ -2,6 +2,8 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
+#include <vector>
 
 #include "record/mcap_file.hpp"
 #include "record/tick_log.hpp"
@@ -21,11 +23,14 @@ namespace kerf {
 /// A whole recording has its other files, too, as attachments, so that it replays from this file
 /// alone (web/page/mcap_log.js): manifest.json, scene.json, volumes/, inputs/, and as
 /// ticks.npy.head, ticks-2.npy.head the headers of the logs, whose rows are the messages' bytes
-/// behind the four of CDR. A range of ticks has none.
+/// behind the four of CDR; the count in them is that of the log, more than its rows if it was cut.
+/// A range of ticks has none. Returns one line, "place: value; remedy", for each file that is left
+/// out because it cannot be read.
 ///
 /// Tip and force come 100 times a second: the tick has all of them. Times are `start_ns`. Throws
 /// `RecordError`, or `FileError` if the file cannot be written.
-void export_mcap(const std::filesystem::path& folder, const std::filesystem::path& mcap,
-                 McapWriter::Packing packing, TickRange range = {});
+std::vector<std::string> export_mcap(const std::filesystem::path& folder,
+                                     const std::filesystem::path& mcap, McapWriter::Packing packing,
+                                     TickRange range = {});
 
 }  // namespace kerf

@@ -118,12 +118,17 @@ int run_record(int argc, char** argv) {
     export_hdf5(folder, hdf5, range);
   }
   if (!csv.empty()) export_csv(folder, csv, range, arm);
+  bool is_whole = true;
   if (!mcap.empty()) {
-    export_mcap(folder, mcap, unpacked ? McapWriter::Packing::none : McapWriter::Packing::lz4,
-                range);
+    const auto packing = unpacked ? McapWriter::Packing::none : McapWriter::Packing::lz4;
+    for (const std::string& line : export_mcap(folder, mcap, packing, range)) {
+      std::cerr << "kerf-record: " << line << '\n';
+      is_whole = false;
+    }
   }
   if (keep.chosen()) std::cout << grab(name).string() << ": kept\n";
-  if (table.chosen() && tell_of_cut(folder)) return 1;
+  if (table.chosen() && tell_of_cut(folder)) is_whole = false;
+  if (!is_whole) return 1;
   return live.chosen() ? send_live(live_to, catch_stop_signals()) : 0;
 }
 

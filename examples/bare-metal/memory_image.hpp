@@ -25,7 +25,7 @@ enum class Room : std::uint8_t {
 };
 
 /// A block of the image. `bytes` of two copies, made in two arenas: a word that is the same in both
-/// is a number; one that differs by the distance of the arenas is a pointer.
+/// counts as a number; one that differs by the distance of the arenas is a pointer.
 struct ImageBlock {
   std::size_t offset = 0, bytes = 0, align = 1;
   std::string name;          ///< a symbol; empty: only other blocks point here
@@ -38,8 +38,12 @@ struct ImageBlock {
 /// Writes what is reached from its roots as assembler text: every pointer by the name of a block,
 /// so that the linker of the image chooses the addresses. Needs no list of the structs' members.
 ///
-/// Errors end the program with one line: a word that is neither number nor pointer, a pointer to
-/// something that is no block.
+/// Errors end the program with one line: a word that differs between the arenas and is no pointer
+/// into them, or one to no block; in a root with a name, a word that is an address of this program
+/// and has no symbol (`name_word`). Not found: a pointer to memory that lies in no arena. It is the
+/// same in both copies, so it is written as a number, which means nothing in the image. Scenes must
+/// be made without such memory: what is made once and lives on belongs into an arena or
+/// `name_word`.
 class MemoryImage {
  public:
   MemoryImage(const Arena& first, const Arena& second);

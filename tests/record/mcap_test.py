@@ -120,6 +120,36 @@ class TestMcap(unittest.TestCase):
         export(self.log, path, "--from", "1", "--until", "100")  # a part does not replay
         self.assertEqual(read(path)["attachments"], {})
 
+    def test_a_file_that_cannot_be_read_is_left_out_with_a_line(self):
+        log, path = self.folder / "torn", self.folder / "torn.mcap"
+        shutil.copytree(self.log, log)
+        export(log, path)
+        (log / "scene.json").unlink()
+        volume = min((log / "volumes").iterdir())
+        volume.unlink()
+        volume.symlink_to("nothing")
+        why = "no file, or one that cannot be read, so the MCAP is without it; copy the recording again"
+        self.assertEqual(export(log, path, code=1), "".join(f"kerf-record: {file}: {why}\n" for file in (log / "scene.json", volume)))
+        names = read(path)["attachments"]
+        self.assertIn("manifest.json", names)
+        self.assertNotIn("scene.json", names)
+        self.assertNotIn(f"volumes/{volume.name}", names)
+        export(log, path, "--from", "1")  # a part has none of them
+        shutil.rmtree(log / "volumes")
+        (log / "scene.json").write_bytes((self.log / "scene.json").read_bytes())
+        export(log, path)  # a phantom has no need of them
+        (log / "volumes").write_bytes(b"")
+        self.assertIn(f"{log / 'volumes'}: Not a directory, so", export(log, path, code=1))
+
+    def test_the_header_of_a_cut_log_has_its_count(self):
+        log, path = self.folder / "cut", self.folder / "cut.mcap"
+        shutil.copytree(self.log, log)
+        with open(log / "ticks.npy", "r+b") as file:
+            header = file.read(4096)
+            file.truncate(4096 + 700 * self.rows.itemsize + 100)
+        self.assertIn(f"cut after 700 of {len(self.rows)} rows", export(log, path, code=1))
+        self.assertIn(header, path.read_bytes())
+
     def test_what_cannot_be(self):
         self.assertIn("--mcap writes no .npy", export(self.log, self.log / "ticks.npy", code=2))
         self.assertIn("cannot be read", export(self.folder / "none", self.folder / "x.mcap", code=2))

@@ -7,6 +7,7 @@ PAGE-FOLDER is what ./kerf page wrote. Exit code 77: skipped, for want of it or 
 import json
 import pathlib
 import shutil
+import struct
 import subprocess
 import sys
 import tempfile
@@ -58,9 +59,9 @@ def replays_one_file(work, kerf):
     """The MCAP of a recording is found to be what its folder is."""
     names = []
     for name, options in (('whole', ()), ('whole', ('--unpacked',)), ('another-report', ()), ('two-arms', ()), ('flight', ()),
-                          ('gap', ())):
+                          ('gap', ()), ('cut-in-a-row', ())):
         names.append(f'{name}{"".join(options)}.mcap')
-        # It exits with 1 if the recording has a gap.
+        # It exits with 1 if the recording is cut.
         subprocess.run([programs / 'kerf-record', 'export', work / name, '--mcap', work / names[-1], *options], check=False,
                        stdout=subprocess.DEVNULL)
     for name, module in replayed_in_node(work, names).items():
@@ -77,7 +78,22 @@ def says_its_own_lines(work, log):
     subprocess.run([programs / 'kerf-record', 'export', log, '--mcap', work / 'part.mcap', '--until', '100'], check=True, stdout=subprocess.DEVNULL)
     some.names.append('part.mcap')
     middle = len(whole) // 4
-    for name, data in (('foreign.mcap', b'\x89MCAP0\r\n' * 100), ('cut.mcap', whole[:-100]), ('empty.mcap', b''), ('picture.png', b'\x89PNG'),
+    start, = struct.unpack_from('<Q', whole, len(whole) - 28)  # of the summary; its last field but two
+
+    def first(opcode, begin):
+        """Where the first record of that kind is, from a record on."""
+        while whole[begin] != opcode:
+            begin += 9 + struct.unpack_from('<Q', whole, begin + 1)[0]
+        return begin
+
+    def patched(at, layout, value):
+        return whole[:at] + struct.pack(layout, value) + whole[at + struct.calcsize(layout):]
+    chunk, rows, files = first(6, 8), first(7, 8), first(10, start)
+    broken = {'no-summary': patched(len(whole) - 28, '<Q', 0), 'summary-outside': patched(len(whole) - 28, '<Q', len(whole)),
+              'odd-index': patched(rows + 11, '<I', 17), 'no-index': patched(rows, '<B', 15),
+              'many-rows': patched(rows + 11, '<I', 1 << 31), 'small-in-index': patched(files + 41, '<Q', 10)}
+    for name, data in (*((f'{name}.mcap', data) for name, data in broken.items()),
+                       ('huge-chunk.mcap', patched(chunk + 25, '<Q', 1 << 31)), ('foreign.mcap', b'\x89MCAP0\r\n' * 100), ('cut.mcap', whole[:-100]), ('empty.mcap', b''), ('picture.png', b'\x89PNG'),
                        ('damaged.mcap', whole[:middle] + bytes(5000) + whole[middle + 5000:])):
         (work / name).write_bytes(data)
         some.names.append(name)
@@ -85,7 +101,8 @@ def says_its_own_lines(work, log):
              'two': '2 recordings: two, two/second; drop one of them',
              'part.mcap': 'part.mcap: has ticks, and neither scene nor volumes; export the whole recording',
              'damaged.mcap': 'damaged.mcap/ticks.npy: ',
-             **{f'{name}.mcap': f'{name}.mcap: cut, or no MCAP of kerf-record export; copy it again' for name in ('foreign', 'cut', 'empty')},
+             'huge-chunk.mcap': 'huge-chunk.mcap/ticks.npy: ',
+             **{f'{name}.mcap': f'{name}.mcap: cut, or no MCAP of kerf-record export; copy it again' for name in ('foreign', 'cut', 'empty', *broken)},
              'picture.png': 'picture.png: no recording; drop the folder'}
     for name, found in replayed_in_node(work, some.names).items():
         failed = found.get('failed') or found.get('cut_short') or 'nothing'
@@ -95,6 +112,26 @@ def says_its_own_lines(work, log):
         check(failed.startswith('memory: none is left for this run; close other tabs'), f'{pages / 16:.0f} MiB of memory: {failed}')
     few = replayed_in_node(work, ['whole'], most=1 << 20)['whole'].get('failed', 'nothing')
     check('npy.gz: ' in few and few.endswith('too large for a tab; replay it with ./kerf replay'), f'1 MiB of memory: {few}')
+
+
+def refuses_broken_lz4():
+    """A block whose literals or match are behind its end, and a size that no chunk has."""
+    script = """
+const {unpackedLz4} = await import(process.argv[1]);
+const frame = block => new Uint8Array([4, 0x22, 0x4d, 0x18, 0x40, 0x40, 0, block.length, 0, 0, 0, ...block, 0, 0, 0, 0]);
+const found = (block, size) => {
+  try {
+    return [...unpackedLz4(frame(block), size)].join();
+  } catch {
+    return 'refused';
+  }
+};
+console.log(JSON.stringify([found([0x20, 7, 8], 2), found([0x10, 7, 1, 0, 0x10, 8], 6), found([0x50, 7, 8], 5), found([0xf0], 15),
+  found([0x10, 7, 1], 5), found([0x20, 7, 8], 2 ** 40)]));
+"""
+    run = subprocess.run(['node', '--experimental-default-type=module', '--input-type=module', '-e', script, root / 'web/page/mcap_log.js'], capture_output=True, text=True, check=False)
+    found = json.loads(run.stdout) if run.stdout else run.stderr
+    check(found == ['7,8', '7,7,7,7,7,8', *4 * ['refused']], f'blocks of LZ4: {found}')
 
 
 def main():
@@ -113,6 +150,7 @@ def main():
         check(kerf['whole']['output_hash'] == report['output_hash'], 'the run had that hash, too')
         replays_one_file(work, kerf)
         says_its_own_lines(work, work / 'demo/log')
+        refuses_broken_lz4()
     return 1 if failures else 0
 
 

@@ -11,6 +11,8 @@ const kTopics = {'/kerf/tick': 'ticks.npy', '/kerf/2/tick': 'ticks-2.npy'};
 const kMessageHead = 31, kCdrHead = 4;  // before the bytes of a row
 const kHeaderBytes = 4096;              // of a tick log
 const kKeptChunks = 2;                  // unpacked ones: of each arm
+const kMost = 64 * 2 ** 20;             // bytes of a chunk, or of the summary; kMcapChunkBytes of record/mcap_file.hpp is 1 MiB
+const kMostNames = 4096;                // bytes of an attachment beside its data
 const decoder = new TextDecoder();
 
 /** Numbers and texts of a record, in order. Throws behind its end. */
@@ -40,8 +42,9 @@ class Fields {
   }
 }
 
-/** A frame of LZ4 whose content has `size` bytes. */
+/** A frame of LZ4 whose content has `size` bytes. Throws if it has not, or if that is more than a chunk has. */
 export function unpackedLz4(bytes, size) {
+  if (!(size <= kMost)) throw new RangeError('too large');
   const fields = new Fields(bytes), out = new Uint8Array(size);
   if (fields.u32() !== 0x184d2204) throw new RangeError('no LZ4');
   const flags = bytes[fields.at];
@@ -75,10 +78,12 @@ function unpackBlock(block, out, to) {
   while (at < block.length) {
     const token = block[at++];
     const literals = length(token >> 4);
+    if (!(literals <= block.length - at)) throw new RangeError('cut');
     out.set(block.subarray(at, at + literals), to);
     at += literals;
     to += literals;
     if (at >= block.length) break;  // the last sequence has no match
+    if (block.length - at < 2) throw new RangeError('cut');
     const back = block[at] | block[at + 1] << 8;
     at += 2;
     const end = to + length(token & 15) + 4;
@@ -88,11 +93,11 @@ function unpackBlock(block, out, to) {
   return to;
 }
 
-/** The content of the record at `at`, of that kind. */
-function recordAt(file, at, opcode) {
+/** The content of the record at `at`, of that kind. Throws before it reads more than `most` bytes. */
+function recordAt(file, at, opcode, most = kMost) {
   const head = file.read(at, kRecord);
   const length = new Fields(head.subarray(1)).u64();
-  if (head[0] !== opcode || length > file.size - at) throw new RangeError('cut');
+  if (head[0] !== opcode || length > most || length > file.size - at) throw new RangeError('cut');
   const content = file.read(at + kRecord, length);
   if (content.length !== length) throw new RangeError('cut');
   return content;
@@ -105,6 +110,7 @@ function readSummary(file) {
     if (kMagic.some((byte, i) => file.read(at, kMagic.length)[i] !== byte)) throw new RangeError('cut');
   }
   const start = new Fields(recordAt(file, end, Opcode.footer)).u64();
+  if (!(start > 0 && start <= end && end - start <= kMost)) throw new RangeError('cut');  // 0: it has no summary
   const summary = new Fields(file.read(start, end - start));
   const found = {files: new Map(), chunks: [], attachments: []};
   while (summary.at < summary.bytes.length) {
@@ -131,13 +137,14 @@ function readSummary(file) {
   return found;
 }
 
-/** An attachment's bytes. */
-function attached(file, {at}) {
-  const record = new Fields(recordAt(file, at, Opcode.attachment));
+/** An attachment's bytes: as many as the index says, by which they are counted before they are read. */
+function attached(file, {at, size}) {
+  const record = new Fields(recordAt(file, at, Opcode.attachment, size + kMostNames));
   record.skip(16);
   record.text();
   record.text();
-  return record.take(record.u64());
+  if (record.u64() !== size) throw new RangeError('cut');
+  return record.take(size);
 }
 
 /** The rows that the messages of a channel are, behind the header of their log, as one file to read. */
@@ -147,13 +154,18 @@ class MessageRows {
     for (const {at, indexes} of chunks) {
       const index = indexes.get(channel);
       if (index === undefined) continue;
-      const head = new Fields(file.read(index + kRecord, 6));
+      const head = new Fields(file.read(index, kRecord + 6));
+      const [opcode] = head.take(1);
+      head.skip(8);  // its length
       head.u16();
       const count = head.u32() / 16;
+      const fits = Number.isInteger(count) && count * rowBytes <= kMost;  // each row is in the chunk
+      if (opcode !== Opcode.messageIndex || !fits) throw new RangeError('cut');
       this.chunks.push({at, index, first: this.rows, count});
       this.rows += count;
     }
     this.size = header.length + this.rows * rowBytes;
+    if (!Number.isSafeInteger(this.size)) throw new RangeError('cut');
   }
 
   /** The rows of a chunk, one behind the other. */
@@ -168,12 +180,14 @@ class MessageRows {
     const packed = record.take(record.u64());
     if (packing !== '' && packing !== 'lz4') throw new RangeError(packing);
     const bytes = packing === 'lz4' ? unpackedLz4(packed, size) : packed;
+    if (bytes.length !== size) throw new RangeError('cut');
     const index = new Fields(recordAt(this.file, chunk.index, Opcode.messageIndex));
     const rows = new Uint8Array(chunk.count * this.rowBytes);
     index.skip(6);
     for (let i = 0; i < chunk.count; ++i) {
       index.skip(8);  // its time
       const at = index.u64() + kMessageHead + kCdrHead;
+      if (at + this.rowBytes > size) throw new RangeError('cut');
       rows.set(bytes.subarray(at, at + this.rowBytes), i * this.rowBytes);
     }
     this.kept = [{chunk, rows}, ...this.kept].slice(0, kKeptChunks);
@@ -212,12 +226,15 @@ export function filesInMcap(file, path) {
   }
   const heads = new Map();
   for (const one of attachments) {
-    if (one.name.endsWith('.npy.head')) heads.set(one.name.slice(0, -'.head'.length), read(() => attached(file, one)));
-    else files.set(one.name, {size: one.size, bytes: () => read(() => attached(file, one))});
+    if (one.name.endsWith('.npy.head')) {
+      if (one.size === kHeaderBytes) heads.set(one.name.slice(0, -'.head'.length), read(() => attached(file, one)));
+    } else {
+      files.set(one.name, {size: one.size, bytes: () => read(() => attached(file, one))});
+    }
   }
   for (const [channel, name] of summary.files) {
     const header = heads.get(name);
-    if (!header || header.length !== kHeaderBytes) {
+    if (!header) {
       throw new Error(`${path}: the header of ${name} is missing; export it again`);
     }
     files.set(name, read(() => new MessageRows(file, header, chunks, channel, rowBytes(header))));
