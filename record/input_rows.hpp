@@ -17,9 +17,8 @@
 // scene and these, so that the recording replays although it has only the last minute: from the
 // run's first tick, by any build that computes the same bits.
 //
-//   inputs/000000000001.npy.gz   of the first arm, inputs-2/ of the second: rows of TickInputs,
-//   65,536 in each file but the last; its name is
-//                                the tick of the first row
+//   inputs/000000000001.npy.gz   of the first arm, inputs-2/ of the second: rows of TickInputs, in
+//                                each file but the last 65,536; the name is the first row's tick
 //
 // A tick is 60 bytes in memory and 3 to 8 in a file.
 

@@ -76,6 +76,7 @@ void* given(void* memory) {
 
 }  // namespace
 
+// Its nothrow forms call these too, so they also end the instance.
 void* operator new(std::size_t size) {
   return given(std::malloc(size == 0 ? 1 : size));
 }
