@@ -93,7 +93,7 @@ def says_its_own_lines(work, log):
               'odd-index': patched(rows + 11, '<I', 17), 'no-index': patched(rows, '<B', 15),
               'many-rows': patched(rows + 11, '<I', 1 << 31), 'small-in-index': patched(files + 41, '<Q', 10)}
     for name, data in (*((f'{name}.mcap', data) for name, data in broken.items()),
-                       ('huge-chunk.mcap', patched(chunk + 25, '<Q', 1 << 31)), ('foreign.mcap', b'\x89MCAP0\r\n' * 100), ('cut.mcap', whole[:-100]), ('empty.mcap', b''), ('picture.png', b'\x89PNG'),
+                       ('huge-chunk.mcap', patched(chunk + 25, '<Q', 1 << 31)), ('foreign.mcap', b'\x89MCAP0\r\n' * 100), ('cut.mcap', whole[:-100]), ('empty.mcap', b''), ('CAPITALS.MCAP', b''), ('picture.png', b'\x89PNG'),
                        ('damaged.mcap', whole[:middle] + bytes(5000) + whole[middle + 5000:])):
         (work / name).write_bytes(data)
         some.names.append(name)
@@ -103,6 +103,7 @@ def says_its_own_lines(work, log):
              'damaged.mcap': 'damaged.mcap/ticks.npy: ',
              'huge-chunk.mcap': 'huge-chunk.mcap/ticks.npy: ',
              **{f'{name}.mcap': f'{name}.mcap: cut, or no MCAP of kerf-record export; copy it again' for name in ('foreign', 'cut', 'empty', *broken)},
+             'CAPITALS.MCAP': 'CAPITALS.MCAP: cut, or no MCAP of kerf-record export; copy it again',
              'picture.png': 'picture.png: no recording; drop the folder'}
     for name, found in replayed_in_node(work, some.names).items():
         failed = found.get('failed') or found.get('cut_short') or 'nothing'

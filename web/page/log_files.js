@@ -40,7 +40,7 @@ export function findRecording(dropped) {
   }
   if (folders.length === 0) {
     const [{path}] = dropped;
-    const mcaps = dropped.filter(one => one.path.endsWith('.mcap'));
+    const mcaps = dropped.filter(one => /\.mcap$/i.test(one.path));
     if (mcaps.length === 1) return {folder: mcaps[0].path, mcap: mcaps[0]};
     if (mcaps.length > 1) throw new Error(`${mcaps.length} MCAP files; drop one of them`);
     const manifest = dropped.find(one => nameOf(one.path) === 'manifest.json');
