@@ -354,8 +354,11 @@ class BadInput(Case):
             with self.subTest(switch=switch):
                 code, report, said = self.run_command("true", options=["--switch", switch])
                 self.assertEqual((code, self.misuse(report)), (1, ["not_opened"]), said)
-                code, _, _, said = self.run_client("hd_client.py", "spring", 20, ["--switch", switch])
-                self.assertEqual(code, 0, said)
+                _, report, _, said = self.run_client("hd_client.py", "spring", 20, ["--switch", switch])
+                # A machine that pauses the client for a millisecond is a stall of stall=1, and no fault of the switch.
+                may = ["stalls"] if switch == "stall=1" else []
+                self.assertLessEqual(set(self.misuse(report)), set(may), said)
+                self.assertEqual(report["exit_code"], 0, said)
 
     def test_a_comma_in_tmpdir_is_one_line(self):
         folder = self.folder / "a,b"
