@@ -270,6 +270,8 @@ class ReleaseObjects:
         defines in several objects, tests among them, the first one counts."""
         commands = output_of("ninja", "-C", str(BUILD), "-t", "commands", f"bin/{target}").splitlines()
         command = [c for c in commands if re.search(f" -o bin/{target}( |$)", c)][-1]
+        if made.startswith("tests/") and f" {made} " not in command:
+            raise Wrong(f"{target} is not linked of {made}; correct the object in {TABLE}")
         command = re.sub(r"(?= \S+\.o )", lambda _: f" {here}/changed.o", command, count=1).replace(f" {made} ", " ", 1)
         return command.replace(f" -o bin/{target}", f" -o {here}/program", 1)
 

@@ -1,11 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 // The port while the emulated service, its link or its device goes wrong, and when it ends itself.
 // By the machine's clock: a label keeps them from busy machines.
+#include <sys/mman.h>
+#include <unistd.h>
+
 #include <array>
 #include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include <doctest/doctest.h>
@@ -47,9 +51,31 @@ CartesianReport pushed_until(PacketPort& port, const Wanted& wanted) {
 bool is_dead(const CartesianReport& report) {
   return !report.powered;
 }
-bool is_powered(const CartesianReport& report) {
-  return report.powered;
-}
+
+/// What this process says on its error stream, for as long as this stands.
+class SaidOnErrorStream {
+ public:
+  SaidOnErrorStream() : kept_(dup(STDERR_FILENO)), file_(memfd_create("said", MFD_CLOEXEC)) {
+    REQUIRE(dup2(file_, STDERR_FILENO) == STDERR_FILENO);
+  }
+  ~SaidOnErrorStream() {
+    dup2(kept_, STDERR_FILENO);
+    close(kept_);
+    close(file_);
+  }
+  SaidOnErrorStream(const SaidOnErrorStream&) = delete;
+  SaidOnErrorStream& operator=(const SaidOnErrorStream&) = delete;
+
+  [[nodiscard]] bool has(std::string_view words) const {
+    std::array<char, 4096> text;
+    const ssize_t size = pread(file_, text.data(), text.size(), 0);
+    return size > 0 && std::string_view(text.data(), static_cast<std::size_t>(size)).find(words) !=
+                           std::string_view::npos;
+  }
+
+ private:
+  int kept_, file_;
+};
 
 }  // namespace
 
@@ -216,7 +242,10 @@ TEST_CASE("without its supply a device has no force, and none when the supply co
 TEST_CASE("a calibration that is lost bars the device while it lasts") {
   ServedService service({}, script(FaultKind::unhome, 0.2));
   const auto port = open(service.options());
-  pushed_until(*port, is_powered);
+  const SaidOnErrorStream said;  // the reason: a busy machine may bar it for another
+  pushed_until(*port, [&](const CartesianReport& report) {
+    return report.powered && said.has("the service reports a fault");
+  });
   CHECK(counter(*port, "bars") >= 1);
   until_armed(*port);
 }
@@ -245,7 +274,10 @@ TEST_CASE("another session that pushes too is found by the echo") {
 TEST_CASE("a brake that the service reports at its event port bars the device") {
   ServedService service(with(ServiceFault::event));
   const auto port = open(service.options());
-  pushed_until(*port, is_powered);
+  const SaidOnErrorStream said;  // the reason: a busy machine may bar it for another
+  pushed_until(*port, [&](const CartesianReport& report) {
+    return report.powered && said.has("the service reports a fault");
+  });
   CHECK(counter(*port, "bars") >= 1);
   until_armed(*port);
 }
