@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The port while the emulated service, its link or its device goes wrong, and when it ends itself.
 // By the machine's clock: a label keeps them from busy machines.
-#include <sys/mman.h>
-#include <unistd.h>
-
 #include <array>
 #include <cstdint>
 #include <memory>
@@ -13,6 +10,8 @@
 #include <utility>
 
 #include <doctest/doctest.h>
+#include <sys/mman.h>
+#include <unistd.h>
 
 #include "hil/front/inverse3/service_device.hpp"
 #include "tests/inverse3/served.hpp"
