@@ -82,6 +82,10 @@ def replays_a_folder(page, work, kerf):
     check(hashes(page) != there, 'the hashes are those of the tick')
     page.evaluate(f'(() => {{ const {slide} }})()')
     check(rests_at(page, 700) and hashes(page) == there, 'and back to the same bits')
+    page.evaluate(f"(() => {{ const {slide}; for (let i = 0; i < 2; ++i) document.getElementById('replay-step').click(); }})()")
+    check(rests_at(page, 702), 'steps asked for on the way are made there')
+    page.evaluate(f'(() => {{ const {slide} }})()')
+    check(rests_at(page, 700) and hashes(page) == there, 'a new way drops none and adds none')
     for _ in range(3):
         page.press('#replay-slower')
     page.press('#replay-play')

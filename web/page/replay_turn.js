@@ -32,7 +32,7 @@ export class ReplayTurn {
   constructor(kerf, tell) {
     const at = now();
     Object.assign(this, {kerf, tell, playing: true, speed: 0, isReady: false, dueTicks: 0, lookedMs: at, factsMs: at,
-      factsTick: 0, moved: true});
+      factsTick: 0, moved: true, stepsDue: 0});
     this.perMs = kerf.rateHz / 1000;
   }
 
@@ -42,7 +42,7 @@ export class ReplayTurn {
   }
 
   /** {play: bool}, {speed: seconds of the recording in one of the clock, 0: as fast as it can}, {one: true}: the next
-   *  tick alone, {go: tick}, {faster: factor}. */
+   *  tick alone, after the way to a tick if it is on one, {go: tick}, {faster: factor}. */
   take({play, speed, one, go, faster}) {
     if (speed !== undefined) this.speed = speed;
     if (faster !== undefined) this.speed = Math.min(Math.max((this.speed || 1) * faster, 1 / kFastest), kFastest);
@@ -50,7 +50,8 @@ export class ReplayTurn {
     if (go !== undefined) this.go(go);
     if (one) {
       this.playing = false;
-      if (this.isReady) this.kerf.replayStep(1);
+      this.stepsDue += 1;
+      this.stepByHand();
     }
     this.moved = true;
     this.lookAgain();
@@ -63,6 +64,13 @@ export class ReplayTurn {
   go(tick) {
     this.kerf.replayGo(tick);
     this.isReady = false;
+    this.stepsDue = 0;
+  }
+  /** What was asked for on the way to a tick is done there. */
+  stepByHand() {
+    if (!this.isReady) return;
+    if (this.stepsDue > 0) this.kerf.replayStep(this.stepsDue);
+    this.stepsDue = 0;
   }
   /** The time until now counts for nothing: of a pause, a page in the background. */
   lookAgain() {
@@ -89,6 +97,7 @@ export class ReplayTurn {
         this.isReady = this.kerf.replayPrepare(kBatch);
         this.moved = true;
         if (this.isReady && this.kerf.replayStopped) this.end();
+        this.stepByHand();
       } else {
         const asked = this.speed === 0 ? kBatch : Math.min(kBatch, Math.floor(this.dueTicks));
         if (!this.playing || asked === 0) return;
@@ -102,6 +111,7 @@ export class ReplayTurn {
   /** At its end, or at the first difference. Played on, or again, at real time: for a person. */
   end() {
     this.playing = false;
+    this.stepsDue = 0;
     if (this.speed === 0) this.speed = 1;
   }
 
