@@ -8,6 +8,7 @@
 #include <csignal>
 #include <cstdio>
 #include <fstream>
+#include <future>
 #include <iostream>
 #include <optional>
 #include <string_view>
@@ -39,7 +40,11 @@ std::string fault_word(std::uint32_t fault) {
 void TickWindow::look_for_fault(const TickRecord& record, std::size_t arm) {
   const std::uint32_t before = std::exchange(faults_[arm], record.fault);
   if (record.fault == 0 || record.fault == before) return;
-  event_ = {(arm == 0 ? "" : "arm-2-") + fault_word(record.fault), record.tick};
+  add_event((arm == 0 ? "" : "arm-2-") + fault_word(record.fault), record.tick);
+}
+
+void TickWindow::add_event(std::string reason, Tick tick) {
+  if (events_.size() < kMostKept) events_.push_back({std::move(reason), tick});
 }
 
 void TickWindow::append_second(const TickRecord& record) {
@@ -50,18 +55,20 @@ void TickWindow::append_second(const TickRecord& record) {
 void TickWindow::append(const TickRecord& record) {
   rows_[end_++ % rows_.size()] = record;
   look_for_fault(record, 0);
-  if ((record.command & kCommandKind) == kCommandMark && event_.reason.empty()) {
-    event_ = {"mark", record.tick};
-  }
+  if ((record.command & kCommandKind) == kCommandMark) add_event("mark", record.tick);
 }
 
 TickWindow::Event TickWindow::take_event() {
-  return std::exchange(event_, {});
+  if (events_.empty()) return {};
+  Event event = std::move(events_.front());
+  events_.pop_front();
+  return event;
 }
 
 namespace {
 
 constexpr const char* kSuffix = ".flight";
+constexpr const char* kRunFolder = ".run-";
 
 /// Where a flight recorder says that it runs, and into which folder it writes.
 class FlightNotice {
@@ -107,7 +114,7 @@ std::string folder_name(const TickWindow::Event& event) {
 class RunStart {
  public:
   RunStart(const std::string& name, const std::filesystem::path& out, std::size_t arms)
-      : folder_(new_folder(out / (".run-" + name))), volumes_(name, folder_), inputs_(folder_) {
+      : folder_(new_folder(out / (kRunFolder + name))), volumes_(name, folder_), inputs_(folder_) {
     if (arms > 1) second_inputs_.emplace(folder_, 1);
   }
   ~RunStart() {
@@ -177,15 +184,15 @@ class FlightRecorder final : TickSink {
     bool ended = false;
     while (!ended) {
       ended = stop || has_ended(connection_);
-      if (lead_ && start_.has_volumes())
-        lead_->allow(recorder_.next() + reader().info().state_slots / 2);
-      const std::uint64_t got = recorder_.poll();
+      const std::uint64_t got = follow();
       // One that comes before the first tick waits for it.
       if (window_.end() > 0 && std::exchange(g_asked, 0) != 0) keep({"signal", newest()});
-      if (const TickWindow::Event event = window_.take_event(); !event.reason.empty()) keep(event);
+      keep_next();
       if (!ended && got < reader().info().state_slots / 8) std::this_thread::sleep_for(kPollPeriod);
     }
     recorder_.drain();
+    while (keep_next()) {
+    }
     const std::string_view reason = end_reason(reader(), stop);
     if (reason == kFault) keep({"end", newest()});
     if (reason == "controller gone") keep({"gone", newest()});
@@ -208,10 +215,35 @@ class FlightRecorder final : TickSink {
     return window_.end() == 0 ? 0 : window_[window_.end() - 1].tick;
   }
 
+  /// Takes what is new into the window, and lets a controller in lock-step go on. Returns the
+  /// ticks.
+  std::uint64_t follow() {
+    if (lead_ && start_.has_volumes()) {
+      lead_->allow(recorder_.next() + reader().info().state_slots / 2);
+    }
+    return recorder_.poll();
+  }
+
+  /// Follows the run while `slow`, which waits for the disk, has a thread of its own.
+  template <class Slow>
+  void follow_during(const Slow& slow) {
+    std::future<void> done = std::async(std::launch::async, slow);
+    while (done.wait_for(kPollPeriod) != std::future_status::ready) follow();
+    done.get();
+  }
+
+  /// Whether there was an event to keep.
+  bool keep_next() {
+    const TickWindow::Event event = window_.take_event();
+    if (event.reason.empty()) return false;
+    keep(event);
+    return true;
+  }
+
   void keep(const TickWindow::Event& event) {
     if (window_.end() == 0) return;
     const std::filesystem::path folder = out_ / folder_name(event);
-    if (std::filesystem::exists(folder)) return;  // a fault and a mark in the same tick
+    if (std::filesystem::exists(folder)) return;  // asked for twice in one tick
     if (kept_ >= kMostKept) {
       std::cerr << "kerf-recorder: " << folder.string() << ": not kept, " << kMostKept
                 << " recordings are; start the flight recorder again\n";
@@ -258,12 +290,10 @@ class FlightRecorder final : TickSink {
       }
       log.flush();
       if (second) second->flush();
-      recorder_.poll();
+      follow();
     }
-    log.sync();
-    if (second) second->sync();
     while (!start_.has_volumes()) {  // in the first seconds of a run
-      recorder_.poll();
+      follow();
       std::this_thread::sleep_for(kPollPeriod);
     }
     if (lacks.empty()) lacks = start_.keep_volumes(folder);
@@ -272,8 +302,12 @@ class FlightRecorder final : TickSink {
     ArmSummaries figures{summary.result(losses, reason)};
     if (second) figures.push_back(second_summary.result(losses, reason));
     losses.lost = figures.front().lost_ticks;
-    write_new_file(folder / kSceneName, reader().info().scene_json);
-    write_manifest(folder, reader().info(), losses, log.rows(), reason, figures);
+    follow_during([&] {
+      log.sync();
+      if (second) second->sync();
+      write_new_file(folder / kSceneName, reader().info().scene_json);
+      write_manifest(folder, reader().info(), losses, log.rows(), reason, figures);
+    });
     return lacks;
   }
 
@@ -306,6 +340,21 @@ int run_flight_recorder(const RecorderOptions& options, const std::atomic<bool>&
   return 0;
 }
 
+namespace {
+
+/// Whether a flight recorder is writing a recording into `out`: its folder is hidden until then.
+bool writes_into(const std::filesystem::path& out) {
+  std::error_code fault;
+  for (std::filesystem::directory_iterator entry(out, fault), end; !fault && entry != end;
+       entry.increment(fault)) {
+    const std::string file = entry->path().filename().string();
+    if (file.starts_with(".") && !file.starts_with(kRunFolder)) return true;
+  }
+  return false;
+}
+
+}  // namespace
+
 std::filesystem::path grab(const std::string& name) {
   SegmentConnection connection = connect_segment(name);
   std::ifstream notice(FlightNotice::file_of(name));
@@ -321,7 +370,8 @@ std::filesystem::path grab(const std::string& name) {
   }
   // The tick of the mark is in the record in which the command was applied.
   using Clock = std::chrono::steady_clock;
-  const auto deadline = Clock::now() + std::chrono::seconds(10);
+  constexpr auto kPatience = std::chrono::seconds(10);
+  auto deadline = Clock::now() + kPatience;
   const SegmentReader& reader = connection.reader();
   std::uint64_t next = reader.state_head();
   next -= std::min<std::uint64_t>(next, reader.info().state_slots / 2);
@@ -335,6 +385,7 @@ std::filesystem::path grab(const std::string& name) {
     }
     if (kept.empty() && reader.state_at(next, record) == ReadState::overrun) ++next;
     if (!kept.empty() && std::filesystem::exists(kept)) return kept;
+    if (writes_into(out)) deadline = Clock::now() + kPatience;  // of an earlier mark, perhaps
     std::this_thread::sleep_for(kPollPeriod);
   }
   throw SegmentError(out + ": the flight recorder kept nothing within 10 s; see its messages");

@@ -5,6 +5,7 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -15,6 +16,9 @@
 // The flight recorder: the last ticks of a run in memory of constant size, kept on request.
 
 namespace kerf {
+
+/// Recordings of one flight recorder.
+inline constexpr int kMostKept = 100;
 
 /// The newest ticks, at most `capacity` of them, of each arm. Allocates once.
 class TickWindow final : public TickSink {
@@ -38,8 +42,9 @@ class TickWindow final : public TickSink {
     return second_[i % second_.size()];
   }
 
-  /// The reason to keep the window, since the last call: a fault that began, of any arm, or a mark;
-  /// with its tick. Empty: none. A fault wins over a mark.
+  /// The oldest event that was not taken yet and is a reason to keep the window: the begin of a
+  /// fault of any arm, or a mark; and its tick. The reason is empty if there is none. At most
+  /// `kMostKept` wait; later ones are dropped.
   struct Event {
     std::string reason;
     Tick tick = 0;
@@ -48,28 +53,27 @@ class TickWindow final : public TickSink {
 
  private:
   void look_for_fault(const TickRecord& record, std::size_t arm);
+  void add_event(std::string reason, Tick tick);
 
   std::vector<TickRecord> rows_, second_;
   std::uint64_t end_ = 0;
   std::array<std::uint32_t, kMaxArms> faults_{};  // of each arm
-  Event event_;
+  std::deque<Event> events_;
 };
 
 /// Keeps the last `options.flight_s` of controller `options.name` in memory until it ends or
-/// `stop`. A fault, a mark, SIGUSR1 and an end that nobody asked for write them as a recording into
-/// `options.out`/TICK-REASON, which appears whole. It replays if the flight recorder saw the run
-/// from its first tick: then the recording has the inputs before its window, too
-/// (earlier_inputs.hpp), which meanwhile lie in `options.out`/.run-NAME. At most `kMostKept`
-/// recordings. Returns the exit code, 0. Bad input throws; a full disk is one line, and the
-/// recorder goes on.
+/// `stop`. On a fault, a mark, SIGUSR1 or an end of the run that was not requested, it writes them
+/// as a recording to `options.out`/TICK-REASON, which appears only when it is complete. The
+/// recording can be replayed if the flight recorder saw the run from its first tick: then it also
+/// has the inputs before its window (earlier_inputs.hpp), which meanwhile are in
+/// `options.out`/.run-NAME. At most `kMostKept` recordings. Returns the exit code, 0. Throws for
+/// bad input; reports a full disk in one line and goes on.
 [[nodiscard]] int run_flight_recorder(const RecorderOptions& options,
                                       const std::atomic<bool>& stop);
 
-inline constexpr int kMostKept = 100;
-
 /// Asks the flight recorder of controller `name` to keep its window, by a mark in the run. Returns
 /// the folder of the recording, once that is whole. Throws `SegmentError` if no controller or no
-/// flight recorder of that name runs, or if none keeps it within 10 s.
+/// flight recorder of that name runs, or if 10 s pass in which it writes none.
 [[nodiscard]] std::filesystem::path grab(const std::string& name);
 
 }  // namespace kerf

@@ -124,6 +124,32 @@ TEST_CASE("a flight recorder keeps the end of a run that nobody asked for; a sho
   }
 }
 
+TEST_CASE("each mark and each fault is an event of its own, the oldest first") {
+  TickWindow window(8);
+  const auto add = [&](Tick tick, std::uint32_t command, Fault fault) {
+    TickRecord record{};
+    record.tick = tick;
+    record.command = command;
+    record.fault = static_cast<std::uint32_t>(fault);
+    window.append(record);
+  };
+  const auto next = [&] {
+    const TickWindow::Event event = window.take_event();
+    return event.reason + " " + std::to_string(event.tick);
+  };
+  CHECK(next() == " 0");
+  add(1, kCommandMark, Fault::none);
+  add(2, kCommandMark, Fault::none);
+  add(3, kCommandMark, Fault::overspeed);
+  add(4, 0, Fault::overspeed);
+  for (const char* event : {"mark 1", "mark 2", "overspeed 3", "mark 3", " 0"}) {
+    CHECK(next() == event);
+  }
+  for (Tick tick = 5; tick < 2000; ++tick) add(tick, kCommandMark, Fault::none);
+  for (int i = 0; i < kMostKept; ++i) CHECK(next() == "mark " + std::to_string(5 + i));
+  CHECK(next() == " 0");
+}
+
 TEST_CASE("grab says what lacks: no controller, no flight recorder") {
   const RuntimeFolder folder;
   const auto error = [] { return error_of([] { static_cast<void>(grab("demo")); }); };
