@@ -47,8 +47,22 @@ std::optional<std::string> content_of(const std::filesystem::path& path) {
   return content;
 }
 
-/// What a replay needs besides the ticks. Returns a line for each file that is left out.
-std::vector<std::string> attach_files(const std::filesystem::path& folder, const Manifest& manifest,
+/// Rows by the header of each arm's log. A reader of a cut log reports the cut by the count; rows
+/// behind the count are complete.
+std::vector<std::uint64_t> counts_of_rows(const std::filesystem::path& folder,
+                                          const Manifest& manifest) {
+  std::vector<std::uint64_t> counts;
+  for (std::size_t arm = 0; arm < manifest.arms; ++arm) {
+    const TickLogReader log(folder / tick_log_name(arm));
+    counts.push_back(std::max(log.rows(), log.counted()));
+  }
+  return counts;
+}
+
+/// What a replay needs besides the ticks, whose `counts` were read before them. Returns a line for
+/// each file that is left out.
+std::vector<std::string> attach_files(const std::filesystem::path& folder,
+                                      const std::vector<std::uint64_t>& counts,
                                       McapWriter& writer) {
   std::vector<std::string> left_out;
   const auto leave_out = [&](const std::filesystem::path& path, const std::string& value) {
@@ -76,12 +90,9 @@ std::vector<std::string> attach_files(const std::filesystem::path& folder, const
     std::ranges::sort(names);
     for (const std::string& name : names) attach(name, "application/gzip");
   }
-  for (std::size_t arm = 0; arm < manifest.arms; ++arm) {
-    const std::string name(tick_log_name(arm));
-    const TickLogReader log(folder / name);
-    // A reader of a cut log reports the cut by the count; rows behind the count are complete.
-    const std::uint64_t rows = std::max(log.rows(), log.counted());
-    writer.attach(name + ".head", "application/octet-stream", tick_log_header(rows));
+  for (std::size_t arm = 0; arm < counts.size(); ++arm) {
+    writer.attach(std::string(tick_log_name(arm)) + ".head", "application/octet-stream",
+                  tick_log_header(counts[arm]));
   }
   return left_out;
 }
@@ -112,12 +123,14 @@ std::vector<std::string> export_mcap(const std::filesystem::path& folder,
                      messages.message(topic, record, arm));
     }
   };
+  // Before the messages: a recording that still grows has more rows afterwards.
+  const std::vector<std::uint64_t> counts = counts_of_rows(folder, manifest);
   for_each_tick(folder, manifest, range, [&](const TickRecord& first, const TickRecord* second) {
     write_arm(first, 0);
     if (second != nullptr) write_arm(*second, 1);
   });
   std::vector<std::string> left_out;
-  if (range.is_whole()) left_out = attach_files(folder, manifest, writer);
+  if (range.is_whole()) left_out = attach_files(folder, counts, writer);
   writer.close();
   file.close();
   file.commit();

@@ -31,13 +31,18 @@ RecordSummary summary_for_info(const std::filesystem::path& folder, TickRange ra
   return summarise(folder, range, arm);
 }
 
-/// Whether the log has fewer rows than its header counts; says so.
-bool tell_of_cut(const std::filesystem::path& folder) {
-  const TickLogReader log(folder / kTickLogName);
-  if (log.rows() >= log.counted()) return false;
-  std::cerr << "kerf-record: " << (folder / kTickLogName).string() << ": cut after " << log.rows()
-            << " of " << log.counted() << " rows; copy the recording again\n";
-  return true;
+/// Prints a line for each arm whose log has fewer rows than its header counts. Whether one has.
+bool report_cuts(const std::filesystem::path& folder) {
+  bool is_cut = false;
+  for (std::size_t arm = 0; arm < read_manifest(folder).arms; ++arm) {
+    const std::filesystem::path path = folder / tick_log_name(arm);
+    const TickLogReader log(path);
+    if (log.rows() >= log.counted()) continue;
+    std::cerr << "kerf-record: " << path.string() << ": cut after " << log.rows() << " of "
+              << log.counted() << " rows; copy the recording again\n";
+    is_cut = true;
+  }
+  return is_cut;
 }
 
 /// `info DIR`, `plot DIR --out FILE.svg`, `export DIR --csv FILE`, `--mcap FILE` or `--hdf5 FILE`,
@@ -127,7 +132,7 @@ int run_record(int argc, char** argv) {
     }
   }
   if (keep.chosen()) std::cout << grab(name).string() << ": kept\n";
-  if (table.chosen() && tell_of_cut(folder)) is_whole = false;
+  if ((table.chosen() || plot.chosen()) && report_cuts(folder)) is_whole = false;
   if (!is_whole) return 1;
   return live.chosen() ? send_live(live_to, catch_stop_signals()) : 0;
 }

@@ -154,7 +154,7 @@ std::string to_text(const RecordSummary& summary) {
   for (const auto& [name, value] : list.members()) {
     text << std::left << std::setw(20) << name;
     if (value.is_text()) {
-      text << value.get<std::string>();
+      text << one_line(value.get<std::string>());  // of a file, perhaps a foreign one
     } else if (value.is_fraction()) {
       text << std::setprecision(6) << value.get<double>();
     } else {

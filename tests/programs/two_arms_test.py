@@ -93,6 +93,22 @@ class TestTwoArms(unittest.TestCase):
         self.assertEqual(done.returncode, 1, done.stderr)
         self.assertIn("arm 2, ", done.stdout)
 
+    def test_a_cut_log_of_the_second_arm_is_reported_by_every_export_and_plot(self):
+        copy = os.path.join(self.folder.name, "cut")
+        shutil.copytree(self.log, copy)
+        with open(copy + "/ticks-2.npy", "r+b") as file:
+            file.truncate((os.path.getsize(copy + "/ticks-2.npy") + 4096) // 2)
+        record = PROGRAMS + "/kerf-record"
+        for words in (("export", copy, "--arm", "2", "--csv", copy + "/a.csv"), ("export", copy, "--mcap", copy + "/a.mcap"),
+                      ("plot", copy, "--arm", "2", "--out", copy + "/a.svg"), ("plot", copy, "--out", copy + "/b.svg")):
+            done = run(record, *words)
+            self.assertEqual(done.returncode, 1, done.stdout + done.stderr)
+            self.assertIn("ticks-2.npy: cut after ", done.stderr)
+            self.assertEqual(done.stderr.count("\n"), 1, done.stderr)
+        manifest = pathlib.Path(copy, "manifest.json")
+        manifest.write_text(manifest.read_text().replace('"end_reason": "', '"end_reason": "\\u001b[2J'))
+        self.assertNotIn("\x1b", run(record, "info", self.log).stdout + run(record, "info", copy).stdout)
+
     def test_wrong_numbers_of_ports_are_one_line(self):
         for ports, says in (([], "--port is missing"), (["socket:a"], "1 given, and the scene has two [[device]]"),
                             (["socket:a", "socket:a"], "is that of the first device too"),
