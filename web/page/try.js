@@ -126,7 +126,7 @@ async function start(event) {
     state.worker.postMessage({
       open: {name: `scenes/${name}.toml`, scene, hand: script, pedal: mine, settings: settings()},
       pace: Number(wanted.get('pace') ?? 1),
-      mostArmed: Math.round(Number(wanted.get('seconds') ?? 0) * Number(element('rate').value))});
+      seconds: Number(wanted.get('seconds') ?? 0)});
   } catch (problem) {
     if (isNewest()) failed(problem.message);
   }

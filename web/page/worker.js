@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The thread of the servo: steps a run at the pace of the clock, and posts what a bridge would send.
 //
-// In:  {open: inputs, pace, mostArmed}   another run; pace: seconds of the servo in one of the clock, 0: as fast as it can
+// In:  {open: inputs, pace, seconds}  another run; pace: seconds of the servo in one of the clock, 0: as fast as it can
 //      {up: ArrayBuffer} {join: true} {lead: [mm, rad, button]} {release: true} {pause: bool}
 //      {log: dropped files}           a recording in place of a run; {replay: what ReplayTurn takes}
 // Out: {opened: ms} {down: ArrayBuffer} {facts} {failed: text} {done: facts with volume_hash}
@@ -42,15 +42,15 @@ function attempt(what) {
   }
 }
 
-function open({open: inputs, pace = 1, mostArmed = 0}) {
+function open({open: inputs, pace = 1, seconds = 0}) {
   ++opening;
   kerf = null;  // before the next one is made: each takes some 100 MB
   const began = now();
   kerf = new KerfModule(compiled);
   kerf.open(inputs);
   const at = now();
-  run = {pace, mostArmed, dueTicks: 0, lookedMs: at, factsMs: at, factsTicks: 0, busyMs: 0, allMs: 0, steps: 0, paused: hidden,
-    ended: false};
+  run = {pace, mostArmed: Math.round(seconds * kerf.rateHz), dueTicks: 0, lookedMs: at, factsMs: at, factsTicks: 0,
+    busyMs: 0, allMs: 0, steps: 0, paused: hidden, ended: false};
   postMessage({opened: at - began});
   postNews();
   tellFacts(at);

@@ -109,6 +109,7 @@ export class Link {
   }
   frame(message) {
     if (!this.held) throw new Error('frame: before the hello');
+    if (!this.greeted) return;  // of an earlier connection: this one does not know its number
     this.clock.add(this.heard, message.sentNs);
     this.held.apply(message);
     this.socket.send(ack(message.session, message.frame));
@@ -116,7 +117,7 @@ export class Link {
     this.on.frame(this.held, message);
   }
   records(message) {
-    if (message.session === this.held?.hello.session) this.on.records(message);
+    if (this.greeted && message.session === this.held.hello.session) this.on.records(message);
   }
   reply(message) {
     this.on.reply(message);
