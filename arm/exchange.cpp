@@ -96,8 +96,8 @@ bool ArmExchange::publish(const ArmReading& reading, std::int64_t now_ns) noexce
 std::array<double, 3> ArmExchange::commanded(std::int64_t now_ns) noexcept {
   const auto newest = page_.newest();
   if (!newest || !newest->command.force_on) return {};
-  // One that was written during this turn is a little younger than it; a time from farther ahead is
-  // none.
+  // A command written during this exchange may be a little newer than `now_ns`; a time farther in
+  // the future is not valid.
   constexpr std::int64_t kAheadNs = 1'000'000;
   if (newest->at_ns <= now_ns - command_life_ns_ || newest->at_ns > now_ns + kAheadNs) {
     if (last_force_n_ != Vec3{}) ++counts_.expired;

@@ -23,40 +23,42 @@ struct ArmReading {
   bool powered = true;  ///< it can give a force
 };
 
-/// Rotation of a tool whose axes are the columns `x`, `y`, `z`. Nothing unless each of them has a
-/// squared length of 1 within 0.05, each two a dot product of 0 within 0.05 (3 degrees beside the
+/// Orientation of a tool whose axes are the columns `x`, `y`, `z`. Empty unless each column has a
+/// squared length of 1 within 0.05, each pair a dot product of 0 within 0.05 (3 degrees from the
 /// right angle), and the three are right-handed.
 [[nodiscard]] std::optional<std::array<double, 4>> orientation_of(
     const std::array<double, 3>& x, const std::array<double, 3>& y,
     const std::array<double, 3>& z) noexcept;
 
-/// One turn between a frame of the vendor's library and the page: the reading goes out, the force
-/// comes in.
+/// The exchange between the frames of a vendor's library and the page. In each frame one reading
+/// goes out and one force comes in.
 ///
-/// `turn` belongs to the thread of the frames; it never blocks, allocates or throws. The rest is
-/// for any thread, unless noted.
+/// `turn` is called by the thread of the frames only; it never blocks, allocates or throws. Any
+/// thread may call the rest, unless noted.
 class ArmExchange {
  public:
   using Clock = std::int64_t() noexcept;
 
-  /// The force is zero within so long of the last command, whatever has happened to the controller.
+  /// The force is zero at the latest this long after the last command, whatever has happened to the
+  /// controller.
   static constexpr std::int64_t kZeroNs = 20'000'000;
-  /// So a command has no force any more one frame earlier; at least 1 ms, for a library whose rate
-  /// is not known.
+  /// A command therefore expires one frame before `kZeroNs`, and at least 1 ms before it.
   [[nodiscard]] std::int64_t command_life_ns() const noexcept { return command_life_ns_; }
-  static constexpr int kSlowestHz = 200;  // leaves three quarters of it
-  /// From `let_go` on, frames of zero force over so long make the end, and at least kFewest: time
-  /// and not a count, since a library may have another rate than it was asked for.
+  /// Lowest frame rate: at this rate commands still live for three quarters of `kZeroNs`.
+  static constexpr int kSlowestHz = 200;
+  /// After `let_go` the exchange is finished once all frames over this time, and at least kFewest,
+  /// had zero force. A time, not a count, because a library may run at another rate than requested.
   static constexpr double kZeroS = 0.02;
   static constexpr int kFewest = 3;
 
   ArmExchange(ArmPageAdapter& page, double peak_n, int rate_hz,
               Clock* clock = monotonic_ns) noexcept;
 
-  /// The force of this frame, in N in kerf's frame: that of the newest command, at most the peak;
-  /// zero before the first reading, without a command that is young enough, and after `let_go`.
-  /// Always finite. Without a reading, or if it is no pose, no report is published, and the servo
-  /// decides how long its force stays: docs/safety.md, "report lost".
+  /// One exchange. Returns the force of this frame, in N in kerf's frame: that of the newest
+  /// command, at most the peak; zero before the first reading, without a command that has not
+  /// expired, and after `let_go`. Always finite. Without a reading, or if it is not a pose, no
+  /// report is published, and the servo decides how long its force stays: docs/safety.md, "report
+  /// lost".
   [[nodiscard]] std::array<double, 3> turn(const std::optional<ArmReading>& reading) noexcept;
 
   /// Zero force from the next frame on, for good.
@@ -70,7 +72,7 @@ class ArmExchange {
   /// 0: none.
   [[nodiscard]] std::uint32_t failure() const noexcept { return failure_.load(); }
 
-  /// The time of the turns.
+  /// The clock of the exchanges.
   [[nodiscard]] std::int64_t now_ns() const noexcept { return clock_(); }
   /// Frames so far: the heartbeat.
   [[nodiscard]] std::uint64_t frames() const noexcept { return frames_.load(); }
@@ -82,7 +84,7 @@ class ArmExchange {
     std::uint64_t forced = 0;      ///< frames with a force
     std::uint64_t expired = 0;     ///< times that a force ended because its command was too old
     std::uint64_t clamped = 0;     ///< frames whose force was above the peak
-    Histogram turn;                ///< duration of a turn
+    Histogram turn;                ///< duration of an exchange
     Histogram command_age;         ///< of the commands whose force was given
   };
   [[nodiscard]] const Counts& counts() const noexcept { return counts_; }

@@ -12,10 +12,10 @@
 
 namespace kerf {
 
-/// What kerf calls of the HD interface of OpenHaptics (3.0 and later), in our own words.
+/// The OpenHaptics HD functions (3.0 and later) that kerf calls, declared by kerf itself.
 ///
-/// C linkage. Handles, codes and words for "what" are 32 bits without a sign; a "priority" is 16
-/// bits. Vectors are arrays of the caller.
+/// C linkage. Device handles, error codes and parameter names (`what`) are unsigned 32-bit, a
+/// `priority` is unsigned 16-bit. Vectors are arrays of the caller.
 namespace hd {
 
 struct ErrorInfo {
@@ -55,12 +55,14 @@ struct Calls {
 /// servo thread; it never blocks. HD's axes are kerf's; its +z of the stylus is the shaft of the
 /// tool. The position is that of the gimbal's centre, where the force acts.
 ///
-/// A frame counts once kCleanFrames before it have had no error: the first ones after the start of
-/// the scheduler have none of the arm's readings. Calibration belongs to the frames as well:
-/// outside of the servo thread it never ended on a Touch.
+/// A frame's reading is used if the kCleanFrames frames before it had no error: the first frames
+/// after the start of the scheduler do not hold readings of the arm. Calibration is checked and
+/// updated in the frames as well. The notes of a public client report that on a Touch it did not
+/// complete outside the servo thread; kerf has not tested that. Inside a frame the scheduler, which
+/// an inkwell calibration needs, always runs, and the arm counts as not homed until it is done.
 ///
-/// HD has one stack of errors for all threads. The main thread pops it until `start` has seen that
-/// its calls were taken, the servo thread from then on: a callback that runs before does nothing.
+/// HD has one error stack for all threads. The main thread reads it until `start` has checked its
+/// calls; from then on only the servo thread does. Callbacks that run earlier return at once.
 class HdArm final : public VendorArm {
  public:
   struct Options {

@@ -7,19 +7,21 @@
 
 namespace kerf {
 
-/// A shared library that the user has installed, opened by name or path while the program runs.
-/// kerf ships none, and has no header of one.
+/// A vendor's shared library that the user has installed, opened by name or path at run time. kerf
+/// ships no such library and none of its headers.
 ///
-/// It stays loaded until the process ends: threads of its own may still run.
+/// It stays loaded until the process ends, because its own threads may still run.
 class VendorLibrary {
  public:
   /// Opens `path`; if it is empty, the first of `names` that the loader finds: in LD_LIBRARY_PATH,
-  /// the cache of ldconfig, /lib and /usr/lib. Lazily and for all, as programs do for which the
-  /// vendors' libraries are known to work. Throws ArmError, with `product` as what to install.
+  /// the cache of ldconfig, /lib and /usr/lib. With RTLD_LAZY | RTLD_GLOBAL, because the programs
+  /// with which the vendors' libraries are known to work open them so. Throws ArmError, which names
+  /// `product` as what to install.
   VendorLibrary(const std::string& path, std::initializer_list<const char*> names,
                 const char* product);
 
-  /// Sets `function` to the symbol; a missing one is remembered.
+  /// Sets `function` to the symbol's address. A missing symbol gives null and is kept for
+  /// `require_all`.
   template <class Function>
   void find(const char* symbol, Function*& function) {
     function = reinterpret_cast<Function*>(address_of(symbol));
@@ -27,7 +29,7 @@ class VendorLibrary {
   /// Throws ArmError with the names of all symbols that `find` has missed.
   void require_all() const;
 
-  /// The file that the loader took.
+  /// The file that the loader opened.
   [[nodiscard]] const std::string& file() const noexcept { return file_; }
 
  private:

@@ -11,13 +11,12 @@
 #include "record/input_rows.hpp"
 #include "shared/segment/layout.hpp"
 
-// What the servo was given before a flight recording, as its recorder collects it
-// (record/input_rows.hpp).
+// Collects the inputs of the servo before a flight recording (record/input_rows.hpp).
 
 namespace kerf {
 
-/// Collects the inputs of an arm of a run from its first tick on, for recordings of its end. Memory
-/// for two files; each full one goes to the disk, in a thread beside the recorder, which must not
+/// Collects the inputs of an arm from the first tick of a run on, for recordings of its end. Holds
+/// two files in memory. A thread writes each full one to the disk, because the recorder must not
 /// wait.
 class EarlierInputs {
  public:
@@ -28,9 +27,8 @@ class EarlierInputs {
   /// inputs are not complete any more.
   void add(const TickRecord& record);
 
-  /// Puts the inputs up to tick `last` into the recording in `folder`: full files as further names
-  /// of the same file, or copies. Returns why that is not possible; empty: it is done. Throws
-  /// FileError.
+  /// Puts the inputs up to tick `last` into the recording in `folder`; full files as hard links, or
+  /// copies. Returns why that is not possible; empty if it is done. Throws FileError.
   [[nodiscard]] std::string keep(const std::filesystem::path& folder, Tick last);
 
  private:
@@ -45,12 +43,11 @@ class EarlierInputs {
   std::future<void> writing_;     ///< of the file before; last, since it ends first
 };
 
-/// Copies the files with the inputs up to tick `last` from the recording in `from` to that in `to`,
-/// which has none, of all arms that it has. Throws FileError and leaves nothing.
+/// Copies the files with the inputs of all arms up to tick `last` from the recording in `from` to
+/// that in `to`, which has none. If it fails, removes the copies and throws FileError.
 void copy_inputs(const std::filesystem::path& from, const std::filesystem::path& to, Tick last);
 
-/// Gives the regular file `from` the further name `to`; copies it if the file system has no links.
-/// Throws FileError.
+/// Makes `to` a hard link to the regular file `from`, or a copy if that fails. Throws FileError.
 void link_file(const std::filesystem::path& from, const std::filesystem::path& to);
 
 }  // namespace kerf

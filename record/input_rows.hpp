@@ -13,9 +13,9 @@
 
 #include "shared/segment/layout.hpp"
 
-// What the servo was given before the first tick of a flight recording. A run is a function of its
-// scene and these, so that the recording replays although it has only the last minute: from the
-// run's first tick, by any build that computes the same bits.
+// The inputs of the servo before the first tick of a flight recording. A run is a function of its
+// scene and its inputs. So the recording can be replayed although it has only the last minute: from
+// the run's first tick, by any build that computes the same bits.
 //
 //   inputs/000000000001.npy.gz   of the first arm, inputs-2/ of the second: rows of TickInputs, in
 //                                each file but the last 65,536; the name is the first row's tick
@@ -72,8 +72,8 @@ class InputReader {
 };
 
 /// Calls `visit` for each tick from 1 to `last` in order, with the inputs of each of `arms` that
-/// the recording in `folder` has; the other columns are 0. Throws `RecordError`, one line, for a
-/// file that is missing or damaged: up to there `visit` was called.
+/// the recording in `folder` has; the other columns are 0. Throws `RecordError`, one line, at a
+/// missing or damaged file, after `visit` was called for the ticks before it.
 void for_each_input(const std::filesystem::path& folder, Tick last, std::size_t arms,
                     const std::function<void(std::span<const TickRecord>)>& visit);
 

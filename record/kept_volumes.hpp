@@ -10,11 +10,11 @@
 
 #include "shared/volume/voxel_grid.hpp"
 
-// The volumes of a run as they were at its start, beside its log: so a recording replays on a
-// machine that has none of the scene's files.
+// The volumes of a run as they were at its start, beside its log, so that a recording can be
+// replayed on a machine that has none of the scene's files.
 //
 //   volumes/HASH.npy.gz         densities, uint16 [z, y, x]; HASH: `density_hash` of scene.json,
-//                               which is `volume_hash`: labels count, too
+//                               which is `volume_hash`: it includes the labels
 //   volumes/HASH-labels.npy.gz  labels, uint8, of the same shape; only if the volume has some
 //
 // Two volumes of equal content are one file. NumPy: `np.load(gzip.open(path))`.

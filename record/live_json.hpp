@@ -15,8 +15,8 @@ namespace kerf {
 inline constexpr const char* kPlotJugglerUdp = "127.0.0.1:9870";
 
 /// One tick as a JSON object: `timestamp`, its start in seconds, and in `kerf` the columns of
-/// docs/log.md, arrays as arrays; those of a second arm in `kerf_2`. Left out are hashes and
-/// checksum, which are no quantities, and columns with a NaN, which JSON has not.
+/// docs/log.md, arrays as arrays; those of a second arm in `kerf_2`. It leaves out hashes and
+/// checksum, which are not quantities, and columns with a NaN, which JSON cannot represent.
 [[nodiscard]] std::string tick_json(const TickRecord& record, const TickRecord* second = nullptr);
 
 struct LiveOptions {
@@ -26,9 +26,9 @@ struct LiveOptions {
 };
 
 /// Sends a datagram for each tick of controller `options.name` from now on, until it ends or
-/// `stop`; a receiver may come and go. Reads the segment only: the servo does not notice. Returns
-/// the exit code, 0. Throws `SegmentError` if there is no such controller, UsageError for an
-/// impossible address.
+/// `stop`. A receiver may start and end at any time. It only reads the segment, so it does not
+/// affect the servo. Returns the exit code, 0. Throws `SegmentError` if there is no such
+/// controller, UsageError for an invalid address.
 [[nodiscard]] int send_live(const LiveOptions& options, const std::atomic<bool>& stop);
 
 }  // namespace kerf

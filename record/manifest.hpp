@@ -18,17 +18,18 @@ namespace kerf {
 
 class Json;
 
-/// Ticks that were published and not recorded: the recorder stood still for longer than the ring.
+/// Ticks that were published but not recorded, because the recorder paused for longer than the ring
+/// lasts.
 struct RecordGap {
   std::uint64_t first_index = 0;
   std::uint64_t count = 0;
 };
 
-/// What of a run a recording lacks.
+/// The ticks of a run that its recording lacks.
 struct RecordLosses {
-  std::uint64_t missed_before_start = 0;  ///< published, and gone before the recorder came
-  std::uint64_t lost = 0;                 ///< published since, in no row
-  std::vector<RecordGap> gaps{};          ///< at most `Recorder::kMaxGaps`; `lost` counts on
+  std::uint64_t missed_before_start = 0;  ///< overwritten before the recorder started
+  std::uint64_t lost = 0;                 ///< published after that, but in no row
+  std::vector<RecordGap> gaps{};          ///< at most `Recorder::kMaxGaps`; `lost` has all
 };
 
 inline constexpr std::string_view kTickLogName = "ticks.npy";
@@ -44,7 +45,7 @@ inline constexpr std::string_view kNoRoom = "no room";  ///< the disk was full
   return arm == 0 ? kTickLogName : "ticks-2.npy";
 }
 
-/// The files of a recording, of which none may become an output beside it.
+/// The files of a recording, which no other output may overwrite.
 [[nodiscard]] inline std::vector<std::filesystem::path> recording_files(
     const std::filesystem::path& folder) {
   return {folder / tick_log_name(0), folder / tick_log_name(1), folder / kManifestName,
@@ -60,11 +61,11 @@ struct RecordSummary {
   /// Published while recording, and in no row: by the sequence numbers of the rows, and after the
   /// last row by the manifest.
   std::uint64_t lost_ticks = 0;
-  std::uint64_t missed_before_start = 0;  ///< published and gone before the recorder came
+  std::uint64_t missed_before_start = 0;  ///< overwritten before the recorder started
   std::uint64_t contact_ticks = 0;
   std::uint64_t shaft_ticks = 0;  ///< shaft or handpiece touched
   std::uint64_t stale_ticks = 0;  ///< since the device was taken in hand, before it had gone
-  std::uint64_t faults = 0;       ///< changes of the fault code to another one than 0
+  std::uint64_t faults = 0;       ///< changes of the fault code to a value that is not 0
   std::uint32_t missed_deadlines = 0;
   std::uint32_t lost_packets = 0;
   std::uint32_t refused_packets = 0;
@@ -99,7 +100,7 @@ void write_manifest(const std::filesystem::path& folder, const SegmentInfo& info
                     const RecordLosses& losses, std::uint64_t rows, std::string_view end_reason,
                     const ArmSummaries& summaries = {});
 
-/// The line for a manifest that is none.
+/// The error line for a file that is not a manifest.
 [[nodiscard]] std::string not_a_manifest(const std::filesystem::path& folder);
 
 /// Throws `RecordError` if it is missing or has no such values.

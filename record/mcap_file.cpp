@@ -36,7 +36,7 @@ std::uint32_t crc(std::string_view bytes, std::uint32_t before = 0) {
       crc32(before, reinterpret_cast<const Bytef*>(bytes.data()), static_cast<uInt>(bytes.size())));
 }
 
-/// A map of numbers behind the length of its bytes.
+/// A map of integers, preceded by its length in bytes.
 void put_map(McapBytes& out, const std::map<std::uint16_t, std::uint64_t>& map) {
   out.number(
       static_cast<std::uint32_t>(map.size() * (sizeof(std::uint16_t) + sizeof(std::uint64_t))));

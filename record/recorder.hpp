@@ -19,15 +19,15 @@
 
 namespace kerf {
 
-/// Copies the state ring into a log or into memory, with two arms both: a tick of which one arm's
-/// record is lost is a gap of both. Losses are counted.
+/// Copies the state ring, or those of both arms, into a log or into memory. If a record of one arm
+/// is lost, the tick is a gap of both. Losses are counted.
 class Recorder {
  public:
   /// Starts at the oldest record that the ring still has.
   Recorder(const SegmentReader& reader, TickSink& sink);
 
-  /// Goes on at record `next`, with the losses of the recorder before; what the ring does not have
-  /// any more is a gap.
+  /// Continues at record `next`, with the losses of the previous recorder. Records that are no
+  /// longer in the ring are a gap.
   Recorder(const SegmentReader& reader, TickSink& sink, std::uint64_t next, RecordLosses losses);
 
   /// Appends the records published since the last call; returns their number. A torn record is read
@@ -40,13 +40,13 @@ class Recorder {
   /// Index of the record that is read next.
   [[nodiscard]] std::uint64_t next() const noexcept { return next_; }
   [[nodiscard]] const RecordLosses& losses() const noexcept { return losses_; }
-  /// Most waiting records of all polls.
+  /// Largest number of records that waited at a poll.
   [[nodiscard]] std::uint64_t largest_lag() const noexcept { return largest_lag_; }
 
   static constexpr std::size_t kMaxGaps = 4096;
 
  private:
-  /// The records of index `next_` into `first_` and `second_`, of all arms or of none.
+  /// Reads the records of index `next_` into `first_` and `second_`, for all arms or for none.
   [[nodiscard]] ReadState read_next() noexcept;
   void skip_to(std::uint64_t index);
   /// The first index that the ring has room for.
@@ -69,7 +69,7 @@ struct RecorderOptions {
   std::filesystem::path out;
   double wait_s = 10;  ///< for the controller to appear
   bool strict = false;
-  bool resume = false;  ///< goes on with the recording of the same run in `out`, if there is one
+  bool resume = false;  ///< continues the recording of the same run in `out`, if there is one
   std::string lead;     ///< FIFO of a controller in lock-step (--until), which then loses no tick
   double flight_s = 0;  ///< above 0: a flight recorder of as many seconds
   std::filesystem::path report;  ///< may be empty
@@ -84,7 +84,7 @@ struct RecorderOptions {
 
 /// Whether nothing more will be published.
 [[nodiscard]] bool has_ended(const SegmentConnection& connection) noexcept;
-/// Why, as manifest.json has it.
+/// The reason, as in manifest.json.
 [[nodiscard]] std::string_view end_reason(const SegmentReader& reader, bool stopped) noexcept;
 
 /// Records the controller `options.name` into the folder `options.out` until it ends or `stop`:

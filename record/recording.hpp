@@ -42,9 +42,9 @@ class SummaryBuilder {
 /// Throws `RecordError`, one line, if the recording has no such arm.
 void require_arm(const std::filesystem::path& folder, const Manifest& manifest, std::size_t arm);
 
-/// Calls `visit` for each row of `range` in order, with two arms with the second's row of the same
-/// tick; that is null with one arm, and behind the end of a log that was cut. Throws `RecordError`,
-/// also if the rows of both arms are not of one tick.
+/// Calls `visit` for each row of `range` in order, together with the second arm's row of the same
+/// tick. The latter is null with one arm, and after the end of a truncated log. Throws
+/// `RecordError`, also if the rows of both arms are not of one tick.
 void for_each_tick(const std::filesystem::path& folder, const Manifest& manifest, TickRange range,
                    const std::function<void(const TickRecord&, const TickRecord*)>& visit);
 
@@ -52,21 +52,20 @@ void for_each_tick(const std::filesystem::path& folder, const Manifest& manifest
 [[nodiscard]] RecordSummary summarise(const std::filesystem::path& folder, TickRange range = {},
                                       std::size_t arm = 0);
 
-/// The summary that the recorder left, without a look at the rows; none if it left none, or if the
+/// The summary that the recorder wrote, without reading the rows; none if it wrote none, or if the
 /// log has another number of rows. Throws `RecordError`.
 [[nodiscard]] std::optional<RecordSummary> kept_summary(const std::filesystem::path& folder,
                                                         std::size_t arm = 0);
 
-/// Two columns for people.
+/// The summary as text in two columns.
 [[nodiscard]] std::string to_text(const RecordSummary& summary);
 
 /// The same figures as JSON.
 [[nodiscard]] std::string to_json(const RecordSummary& summary);
 
 /// Writes the rows of an arm of the recording in `folder` as CSV, whole or not at all: one column
-/// per number
-/// (`position_mm_0` ...), floats in the shortest form that reads back to the same bits. Throws
-/// `RecordError`, or `FileError` if the file cannot be written.
+/// per number (`position_mm_0` ...), floats in the shortest form that reads back to the same bits.
+/// Throws `RecordError`, or `FileError` if the file cannot be written.
 void export_csv(const std::filesystem::path& folder, const std::filesystem::path& csv,
                 TickRange range = {}, std::size_t arm = 0);
 

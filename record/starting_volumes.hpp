@@ -17,16 +17,16 @@
 
 namespace kerf {
 
-/// Copies the volumes of controller `name` into `folder`, beside the recorder, which must not wait:
-/// in a thread and with a connection of its own.
+/// Copies the volumes of controller `name` into `folder`, in its own thread and with its own
+/// connection, because the recorder must not wait.
 class StartingVolumes {
  public:
   StartingVolumes(std::string name, std::filesystem::path folder);
 
-  /// Whether the volumes are copied into memory, or could not be: from here on they may be cut.
+  /// Whether the volumes were copied into memory, or cannot be: from now on they may be cut.
   [[nodiscard]] bool copied() const noexcept { return copied_; }
 
-  /// Whether nothing more is done.
+  /// Whether all work has ended.
   [[nodiscard]] bool done() const noexcept { return done_; }
 
   /// Waits until the files are complete. Returns one line for each volume that has none, and why.

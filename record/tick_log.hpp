@@ -36,7 +36,8 @@ inline constexpr std::size_t kTickLogHeaderBytes = 4096;
 /// The header of a log of `rows` rows: exactly `kTickLogHeaderBytes`.
 [[nodiscard]] std::string tick_log_header(std::uint64_t rows);
 
-/// The remedy if `folder` holds no recording: names the one of a demo's folder, which is in `log`.
+/// The remedy if `folder` holds no recording. If it is a demo's folder, names the recording in its
+/// folder `log`.
 [[nodiscard]] std::string way_to_recording(const std::filesystem::path& folder);
 
 /// Ticks of a log, both ends included.
@@ -56,13 +57,13 @@ class TickLogReader {
  public:
   static constexpr std::size_t kChunkRows = 1024;  ///< that `for_each` reads at a time
 
-  /// Throws `RecordError` if the file has another layout or ends in its header. One that was cut
-  /// later, at any byte, has the complete rows before the cut.
+  /// Throws `RecordError` if the file has another layout or ends in its header. A file that is
+  /// truncated after the header, at any byte, has its complete rows.
   explicit TickLogReader(std::filesystem::path path);
 
   /// Complete rows in the file, also those beyond the count of the header.
   [[nodiscard]] std::uint64_t rows() const noexcept { return rows_; }
-  /// As the header has them: more than `rows()` if the file was cut.
+  /// Rows by the header: more than `rows()` if the file was truncated.
   [[nodiscard]] std::uint64_t counted() const noexcept { return counted_; }
 
   /// Reads rows from `first` on into `rows`; returns how many there are, less at the end and before
@@ -73,8 +74,8 @@ class TickLogReader {
   [[nodiscard]] std::size_t read(std::uint64_t first, std::span<TickRecord> rows,
                                  std::string& problem);
 
-  /// The first row of `tick` or a later one, by bisection; `rows()` if there is none. No checksum
-  /// is looked at: that of the row found is, by `read`.
+  /// The first row of `tick` or a later one, by bisection; `rows()` if there is none. Checks no
+  /// checksum; `read` checks that of the row found.
   [[nodiscard]] std::uint64_t row_of(Tick tick);
 
   /// Calls `visit` for each row of `range` in order. Throws as `read`.

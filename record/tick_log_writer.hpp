@@ -13,15 +13,16 @@
 
 namespace kerf {
 
-/// Takes the ticks of a run in order, those of the first arm.
+/// Receives the ticks of a run in order.
 class TickSink {
  public:
   TickSink() = default;
   virtual ~TickSink() = default;
   TickSink(const TickSink&) = delete;
   TickSink& operator=(const TickSink&) = delete;
+  /// The next tick of the first arm.
   virtual void append(const TickRecord& record) = 0;
-  /// With two arms, before `append` of the same tick: the second arm's. Default: ignores it.
+  /// With two arms: the second arm's record, before `append` of the same tick. Ignored by default.
   virtual void append_second(const TickRecord& /*record*/) {}
   /// After the last of several.
   virtual void flush() {}
@@ -33,9 +34,9 @@ class TickLogWriter final : public TickSink {
  public:
   enum class Begin {
     new_file,   ///< refuses a path that exists: a recording is never overwritten
-    after_last  ///< goes on behind the complete rows of a log; cuts an incomplete row, or header
+    after_last  ///< appends after the complete rows of a log; removes an incomplete row or header
   };
-  /// Refuses a log that another process writes. `most_rows`: of those that `after_last` keeps.
+  /// Refuses a log that another process writes. `after_last` keeps at most `most_rows` rows.
   explicit TickLogWriter(std::filesystem::path path, Begin begin = Begin::new_file,
                          std::uint64_t most_rows = UINT64_MAX);
   ~TickLogWriter() override;

@@ -56,7 +56,7 @@ inline void append_number(const TickRecord& record, const LayoutField& field, st
   visit_number(record, field, element, [&](auto value) { append_number(value, text); });
 }
 
-/// Whether it is a number, and no NaN or infinity.
+/// Whether the number is neither NaN nor infinite.
 [[nodiscard]] inline bool is_finite(const TickRecord& record, const LayoutField& field,
                                     std::uint32_t element) {
   bool finite = true;

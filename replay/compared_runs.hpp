@@ -14,20 +14,20 @@
 
 namespace kerf {
 
-/// How a run and its replay part: forces, places of the tool as it is felt, removed volumes. For a
-/// replay with changes, and for one in other numbers.
+/// Compares a run and its replay: forces, positions of the proxy, removed volumes. For a replay
+/// with changes or with another number type.
 class ComparedRuns {
  public:
   /// `ticks`: number of the `add` calls to come, at most.
   ComparedRuns(std::uint64_t ticks, const Manifest& manifest);
 
-  /// Of two arms the forces and places are those of the first, the removed volumes of both.
+  /// With two arms, forces and positions are those of the first, removed volumes those of both.
   void add(const ArmRecords& all_recorded, const ArmRecords& all_replayed);
 
-  /// Both peaks and the largest differences, in two columns for people.
+  /// Both peaks and the largest differences, as text in two columns.
   [[nodiscard]] std::string text() const;
 
-  /// Draws three panels over time as SVG: both commanded forces, the distance between both places,
+  /// Draws three panels over time as SVG: both commanded forces, the distance of both positions,
   /// both removed volumes. The file appears whole or not at all. Throws `RecordError` for a replay
   /// of no tick, `ReportError` or `FileError`.
   void plot(const std::filesystem::path& svg);

@@ -21,7 +21,7 @@
 
 namespace kerf {
 
-/// What a replay changes: all empty repeats the run as it was.
+/// What a replay changes; if all are empty, the run is repeated as it was.
 struct ReplayChanges {
   std::vector<std::string> settings{};           ///< `table.key=VALUE`
   std::optional<std::filesystem::path> scene{};  ///< in place of the recorded one
@@ -41,32 +41,34 @@ struct RecordedRun {
   std::string scene_json;  ///< the same with its source
   std::unique_ptr<CompiledScene> servo;
   std::uint64_t volume_chain = kFnv1aBasis;  ///< of the ticks before those of the log
-  std::optional<SegmentWriter> segment;  ///< with the volumes as they start; if it was asked for
+  std::optional<SegmentWriter> segment;      ///< with the volumes at the start; if requested
 };
 
-/// The line for a scene.json that has no source.
+/// The error line for a scene.json that has no source.
 [[nodiscard]] std::string scene_without_source(const std::filesystem::path& folder);
 
-/// Loads the scene of the recording in `folder`, with `changes`: volumes and meshes as the
-/// recording has them, else from their files.
+/// Loads the scene of the recording in `folder`, with `changes`. Volumes and meshes come from the
+/// recording if it has them, else from their files.
 ///
-/// Without changes the loaded scene must be the recorded one to the bit; else throws `RecordError`,
-/// one line that names the first key or volume that differs. With changes rate and device stay.
-/// Throws `RecordError` too if the recording neither begins at the run's first tick nor has the
-/// inputs before its own, LoadError if the scene cannot be loaded.
+/// Without changes the loaded scene must be equal to the recorded one to the bit; otherwise throws
+/// `RecordError`, one line that names the first key or volume that differs. With changes, only the
+/// rate and the devices must be the recorded ones. Throws `RecordError` too if the recording
+/// neither begins at the run's first tick nor has the inputs before its own, LoadError if the scene
+/// cannot be loaded.
 [[nodiscard]] RecordedRun load_run(const std::filesystem::path& folder,
                                    const ReplayChanges& changes, const KernelSet& kernels,
                                    bool with_segment = false);
 
-/// Steps the ticks before those of the log, of which a flight recording has the inputs alone; none
-/// in other recordings. Their results are in the hash chains of the first tick of the log.
+/// Steps the ticks before those of the log. A flight recording has only their inputs; other
+/// recordings have no such ticks. Their results are in the hash chains of the log's first tick.
 class EarlierTicks {
  public:
   /// `run` outlives it.
   EarlierTicks(RecordedRun& run, const std::filesystem::path& folder);
-  /// The next one; false if all are stepped. Throws `RecordError` if the inputs are damaged.
+  /// Steps the next one; returns false if there is none. Throws `RecordError` if the inputs are
+  /// damaged.
   bool step();
-  /// Those that are stepped.
+  /// Number of ticks stepped so far.
   [[nodiscard]] Tick done() const noexcept { return done_; }
 
  private:
@@ -76,7 +78,7 @@ class EarlierTicks {
   Tick done_ = 0;
 };
 
-/// All of them. Throws as `EarlierTicks::step`; a stop signal ends it as `end_if_asked` does.
+/// Steps all of them. Throws as `EarlierTicks::step`; a stop signal ends it as `end_if_asked` does.
 void step_earlier_ticks(RecordedRun& run, const std::filesystem::path& folder);
 
 /// The kernels of that name, as `kernel_sets` has them; the fastest if `name` is empty. Throws

@@ -26,8 +26,8 @@ struct ReplayOptions {
   std::string watch;             ///< shown as the controller of this name; may be empty
 };
 
-/// Replays the recording and prints what it found. Returns the exit code: 0; 1 if a tick differs
-/// although nothing was changed, or if ticks are left. Bad input throws, one line.
+/// Replays the recording and prints the result. Returns the exit code: 0; 1 if a tick differs
+/// although nothing was changed, or if not all ticks were replayed. Throws for bad input, one line.
 [[nodiscard]] int run_replay(const ReplayOptions& options, const std::atomic<bool>& stop);
 
 }  // namespace kerf

@@ -42,11 +42,11 @@ class ReplayStep {
   explicit ReplayStep(CompiledScene& servo, std::uint64_t volume_chain = kFnv1aBasis)
       : servo_(servo), volume_chain_(volume_chain) {}
 
-  /// Gives the servo what it was given in `recorded`; returns the records of the tick. Times are
+  /// Steps the servo with the inputs in `recorded`; returns the records of the tick. Times are
   /// those of `recorded`.
   [[nodiscard]] ArmRecords operator()(const ArmRecords& recorded) noexcept;
 
-  /// The records alone, if the servo made its step by `give`, with these outputs.
+  /// Only makes the records, after a step of the servo by `give`, which returned `outputs`.
   [[nodiscard]] ArmRecords of(const ArmRecords& recorded,
                               const std::array<ServoOutput, kMaxArms>& outputs) noexcept;
 

@@ -21,14 +21,14 @@
 
 namespace kerf {
 
-/// The first field of a tick that a replay computes otherwise.
+/// The first field of a tick for which a replay computes another value.
 struct DifferentTick {
   Tick tick = 0;
   std::size_t arm = 0;
   TickDifference at;
 };
 
-/// Of the first arm that differs; empty if the records of both are equal.
+/// The first difference of the first arm that differs; empty if the records of all arms are equal.
 [[nodiscard]] std::optional<DifferentTick> first_difference(const ArmRecords& recorded,
                                                             const ArmRecords& replayed,
                                                             std::size_t arms);
@@ -42,7 +42,7 @@ struct ReplayResult {
   Tick last_tick = 0;
   std::array<std::uint64_t, kMaxArms> output_hash{};  ///< after it
   std::optional<DifferentTick> difference;            ///< the first one
-  std::string cut_short;  ///< why ticks of the recording are left; empty: none are
+  std::string cut_short;  ///< why not all ticks were replayed; empty if they were
 };
 
 /// The logs of a recording, read side by side: ticks.npy, and ticks-2.npy of a second arm.
@@ -59,8 +59,8 @@ class RecordedTicks {
   /// The same, but returns the line; `rows` is empty then. Empty: they were read.
   [[nodiscard]] std::string try_read(std::uint64_t first, std::vector<ArmRecords>& rows);
 
-  /// Why a replay that came to the last row is no whole one: the header counts more rows. Empty
-  /// if it does not.
+  /// Why a replay that reached the last row is incomplete: the header counts more rows. Empty if it
+  /// does not.
   [[nodiscard]] std::string cut_at_end() const;
 
  private:
@@ -68,15 +68,15 @@ class RecordedTicks {
   std::vector<TickRecord> chunk_;
 };
 
-/// Why a replay ends behind tick `last` if the next row is of tick `next`, a later one.
+/// Why a replay ends after tick `last` if the next row is of a later tick, `next`.
 [[nodiscard]] std::string gap_text(Tick last, Tick next);
 
 /// Takes a recorded tick and the same one computed again; returns whether to go on.
 using TickVisitor = std::function<bool(const ArmRecords& recorded, const ArmRecords& replayed)>;
 
 /// Gives the servo the reports and commands of the log's ticks, in order, up to tick `until`,
-/// and hands each tick to `visit`. A gap ends it: what the servo was given there is unknown. So
-/// do `stop` and a row whose checksum is wrong. Throws `RecordError` if that is the first one.
+/// and passes each tick to `visit`. It ends at a gap, because the servo's inputs there are unknown,
+/// on `stop`, and at a row whose checksum is wrong. Throws `RecordError` if that is the first row.
 /// After `step_earlier_ticks`.
 [[nodiscard]] ReplayResult replay_ticks(RecordedRun& run, RecordedTicks& log, Tick until,
                                         const std::atomic<bool>& stop, const TickVisitor& visit);

@@ -7,7 +7,7 @@
 
 #include "shared/segment/layout.hpp"
 
-// A tick as it was recorded beside the same tick computed again.
+// Compares a recorded tick with the same tick computed again.
 
 namespace kerf {
 
@@ -18,8 +18,8 @@ struct TickDifference {
   std::string recorded, replayed;
 };
 
-/// Compares all that report, commands and earlier ticks determine, bit by bit: every column but
-/// the inputs themselves, times, losses on the way and checksums. Empty if all are equal.
+/// Compares, bit by bit, everything that report, commands and earlier ticks determine: all columns
+/// except the inputs themselves, times, lost packets and checksums. Empty if all are equal.
 [[nodiscard]] std::optional<TickDifference> first_difference(const TickRecord& recorded,
                                                              const TickRecord& replayed);
 

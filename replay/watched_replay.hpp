@@ -17,12 +17,12 @@ namespace kerf {
 ///
 /// Keys on standard input, a terminal or a pipe: space pauses and goes on, `.` steps one tick, `+`
 /// and `-` double and halve the speed, `f` and `b` go a second forward and back, a number and `g`
-/// goes to that tick. A reader's `hold` pauses, its `reset` goes to the start, `undo` and `redo` a
-/// second back and forward: so the keys of the window and the page's buttons do. See
-/// WatchedRun for the way back.
+/// go to that tick. A reader's `hold` pauses, its `reset` goes to the start, its `undo` and `redo`
+/// go a second back and forward; so the keys of the window and the page's buttons do the same. See
+/// WatchedRun for how it goes back.
 ///
-/// Returns 0; 1 if ticks are missing in the recording, in front of which it stops. Throws as
-/// `run_replay`, and SegmentError if a controller of that name runs.
+/// Returns 0; 1 if the recording lacks ticks, before which it stops. Throws as `run_replay`, and
+/// SegmentError if a controller of that name runs.
 [[nodiscard]] int watch_replay(const ReplayOptions& options, RecordedTicks& log,
                                const std::atomic<bool>& stop);
 

@@ -18,12 +18,12 @@
 
 namespace kerf {
 
-/// A recorded run between two of its ticks, at any of them, published as a controller does. To go
-/// back it continues from a snapshot of the servo; at most `kMostSnapshots` are in memory, and at
-/// most `snapshot_bytes` of them, but always one.
+/// A recorded run that can go to any of its ticks, and publishes like a controller. To go back it
+/// restores a snapshot of the servo and steps on from there. At most `kMostSnapshots` are in
+/// memory, with at most `snapshot_bytes` in all, but always one.
 ///
-/// Ticks of the recording go up and down, those of the segment only grow: they are the same until
-/// the first way back. One thread. Nothing here throws but for want of memory.
+/// Ticks of the recording go up and down, those of the segment only grow: they are equal until it
+/// first goes back. One thread. Throws only if memory runs out.
 class WatchedRun {
  public:
   static constexpr std::size_t kMostSnapshots = 32;
@@ -38,27 +38,27 @@ class WatchedRun {
   WatchedRun(RecordedRun& run, RecordedTicks& log, const Options& options);
 
   [[nodiscard]] Tick tick() const noexcept { return tick_; }
-  /// The first tick of the log, and the last one that can be shown: less once a gap or a damaged
-  /// row was met.
+  /// The first tick of the log, and the last one that can be shown: an earlier one after a gap or a
+  /// damaged row was found.
   [[nodiscard]] Tick first_tick() const noexcept { return before_log_ + 1; }
   [[nodiscard]] Tick last_tick() const noexcept { return last_tick_; }
-  /// Why there is no tick behind `last_tick`; empty if the recording ends there, or none was tried.
+  /// Why there is no tick after `last_tick`; empty if the recording ends there, or none was tried.
   [[nodiscard]] const std::string& cut_short() const noexcept { return cut_short_; }
 
-  /// The next tick, published. False at the end, or before a gap or a damaged row.
+  /// Steps and publishes the next tick. False at the end, or before a gap or a damaged row.
   bool step();
 
-  /// A sign of life for the readers, without a step.
+  /// Publishes an empty tick, as a sign of life for the readers.
   void rest();
 
-  /// To `tick`, or as near as the recording goes; readers see the volumes of that tick.
+  /// Goes to `tick`, or as near as the recording allows; readers see the volumes of that tick.
   void go(Tick tick);
-  /// The same in parts: between these two, `go_on` until it returns true. It steps `ticks` times at
-  /// most.
+  /// The same in parts: after `begin_go`, call `go_on` until it returns true. Each call steps at
+  /// most `ticks` times.
   void begin_go(Tick tick);
   [[nodiscard]] bool go_on(int ticks);
 
-  /// The last tick up to which all were compared, and what was found; nothing behind it is.
+  /// All ticks up to this one were compared. After the first difference none is compared any more.
   [[nodiscard]] Tick compared() const noexcept { return compared_; }
   [[nodiscard]] const std::optional<DifferentTick>& difference() const noexcept {
     return difference_;

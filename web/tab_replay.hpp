@@ -32,8 +32,8 @@ class TabReplay {
   /// done. Throws RecordError for damaged inputs.
   [[nodiscard]] bool prepare(int ticks);
 
-  /// Shows the next `ticks`; less at the end of the recording, and at its first difference, which
-  /// is the last one then. Returns how many. After `prepare`.
+  /// Publishes up to `ticks` ticks and returns how many. Stops at the end of the recording, or
+  /// after the first tick that differs. Call only after `prepare` has returned true.
   int step(int ticks);
   /// Whether the last `step` or `prepare` met the first difference, or `step` the end.
   [[nodiscard]] bool stopped() const noexcept;

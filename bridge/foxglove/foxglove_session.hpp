@@ -22,7 +22,7 @@ inline constexpr std::size_t kMaxFoxgloveUpBytes = 4 * 1024;  ///< client to ser
 /// under two names. Empty: none of them.
 [[nodiscard]] std::string_view foxglove_protocol(std::string_view offered) noexcept;
 
-/// What goes to a client: a whole WebSocket message.
+/// A whole WebSocket message to a client.
 struct FoxgloveMessage {
   bool is_text = false;  ///< JSON; else binary
   std::string bytes;
@@ -31,14 +31,13 @@ struct FoxgloveMessage {
 /// The Foxglove WebSocket protocol towards one client
 /// (https://github.com/foxglove/ws-protocol): the channels of `ros_channels`, with the clock of the
 /// servo (capability `time`). Those of a second arm are advertised when the first run that has one
-/// comes, and stay. It only sends: all that would change something here is answered with
-/// a status of level 2. Without a network: the caller takes the next message whenever it can send
-/// one.
+/// comes, and stay. It only sends: a request that would change something is answered with a status
+/// of level 2. It uses no network: the caller takes the next message whenever it can send one.
 ///
-/// Nothing is queued but answers, `kMostAnswers` of them: ticks are read from the segment when they
-/// are sent. Ticks older than `kBehindNs` are left out, and the client gets a status at most every
-/// `kToldNs`: over a slow link it gets evenly fewer, a little late. Of a servo that is faster than
-/// 1 kHz so many ticks are left out that 1,000 a second remain.
+/// Only answers are queued, at most `kMostAnswers`: ticks are read from the segment when they are
+/// sent. Ticks older than `kBehindNs` are left out, and the client gets a status about that at most
+/// every `kToldNs`: over a slow link it gets evenly fewer ticks, a little late. Of a servo faster
+/// than 1 kHz, 1,000 ticks a second are sent.
 ///
 /// One thread.
 class FoxgloveSession {
@@ -50,8 +49,8 @@ class FoxgloveSession {
   /// `controller`: its name, as the client shows it.
   explicit FoxgloveSession(std::string controller);
 
-  /// A message of the client, at most `kMaxFoxgloveUpBytes`. Whatever is wrong with it becomes a
-  /// status; beyond `kMostAnswers` that wait the status is left out.
+  /// A message of the client, at most `kMaxFoxgloveUpBytes`. Errors in it are answered with a
+  /// status, unless `kMostAnswers` wait already.
   void hear(bool is_text, std::string_view message);
 
   /// The next message, if there is one. `run`: nullptr while there is no controller; the same for
@@ -69,8 +68,8 @@ class FoxgloveSession {
   void greet(const SegmentReader* run);
   /// Sends once what the run is doing.
   void follow(const SegmentReader* run, bool ended);
-  /// Whether the client wants a channel, by its place among those of all arms, and the tick has a
-  /// message of it.
+  /// Whether the client has subscribed to a channel, by its index among those of all arms, and the
+  /// tick has a message of it.
   [[nodiscard]] bool is_wanted(std::size_t channel) const noexcept;
   [[nodiscard]] std::size_t channels() const noexcept { return arms_ * kRosTopics; }
   [[nodiscard]] bool next_of_tick(FoxgloveMessage& out);

@@ -12,8 +12,8 @@
 
 namespace kerf::bridge {
 
-/// OpenIGTLink's device name of each volume: its name in the scene, at most 20 bytes, each another;
-/// "volume 1" and so on if the scene's text has none.
+/// OpenIGTLink's device name of each volume: its name in the scene, at most 20 bytes, all
+/// different; "volume 1" and so on if the scene's text has none.
 [[nodiscard]] std::vector<std::string> device_names(const SegmentInfo& segment);
 
 /// Of the labels of volumes of these names: "NAME labels", by the same rules.
@@ -25,13 +25,13 @@ using IgtlBytes = std::shared_ptr<const std::vector<std::byte>>;
 /// The library counts an image's bytes in 31 bits.
 [[nodiscard]] bool fits_an_image(const VoxelGrid& grid) noexcept;
 
-/// `part` of a volume as IMAGE with the volume's size and place: 16 bits a voxel. OpenIGTLink's
+/// `part` of a volume as IMAGE with the volume's size and pose: 16 bits a voxel. OpenIGTLink's
 /// origin is the middle of the image, between the centres of its corner voxels. `part` is not empty
 /// and lies in the volume, whose density is `linear`.
 [[nodiscard]] IgtlBytes image_message(const std::string& device, const SegmentVolumeInfo& volume,
                                       const std::vector<Density>& linear, const VoxelBox& part);
 
-/// All labels of a volume as IMAGE of the same size and place: 8 bits a voxel.
+/// All labels of a volume as IMAGE of the same size and pose: 8 bits a voxel.
 [[nodiscard]] IgtlBytes label_message(const std::string& device, const SegmentVolumeInfo& volume,
                                       std::span<const Label> linear);
 

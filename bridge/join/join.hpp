@@ -23,10 +23,10 @@ struct JoinOptions {
   std::uint64_t most_mib = 2048;      ///< a larger segment is refused
 };
 
-/// Keeps the local segment `name` equal to the far one until `stop`; after each loss of the
-/// connection it connects again. Reports on `out` each change, one line each, and at the end the
-/// age of the picture. Throws `BridgeError` or `SegmentError` if another try cannot help (a wrong
-/// token, a certificate that is refused, a name in use), and if nothing came within `wait_s`.
+/// Keeps the local segment `name` equal to the remote one until `stop`; reconnects after each loss
+/// of the connection. Reports each change on `out` in one line, and at the end the age of the
+/// picture. Throws `BridgeError` or `SegmentError` if another try cannot help (a wrong token, a
+/// certificate that is refused, a name in use), or if nothing came within `wait_s`.
 int run_join(const JoinOptions& options, const std::atomic<bool>& stop, std::ostream& out);
 
 }  // namespace kerf::bridge

@@ -10,8 +10,8 @@
 
 namespace kerf::bridge {
 
-/// TLS 1.3 of one end of a connection: its own certificate, and what it demands of the other's.
-/// The functions below fill it once, before the first connection, and throw `BridgeError`.
+/// TLS 1.3 settings of one peer: its own certificate, and what it requires of the other peer's. The
+/// functions below fill them once, before the first connection, and throw `BridgeError`.
 using Tls = std::shared_ptr<SSL_CTX>;
 
 /// Without a certificate; verifies none.
@@ -27,7 +27,7 @@ void show_certificate(SSL_CTX* tls, const std::filesystem::path& certificate,
 /// Shows a certificate made now for `hosts` (names and addresses), which no CA has signed.
 void show_self_signed(SSL_CTX* tls, const std::vector<std::string>& hosts);
 
-/// Lets no client in without a certificate that a CA of this PEM file has signed (`--client-ca`).
+/// Refuses clients without a certificate that a CA of this PEM file has signed (`--client-ca`).
 void require_client_certificate(SSL_CTX* tls, const std::filesystem::path& ca);
 
 /// SHA-256 of a certificate: hex in capitals, a colon between bytes. Empty if OpenSSL has no
@@ -38,12 +38,12 @@ void require_client_certificate(SSL_CTX* tls, const std::filesystem::path& ca);
 /// The DNS names of the certificate that `tls` shows.
 [[nodiscard]] std::vector<std::string> dns_names_of(const SSL_CTX* tls);
 
-/// What join demands of the server's certificate: a CA of the file `ca` has signed it for this
-/// host, or it has the fingerprint that was given. Without either it is refused, and the refusal
-/// names the fingerprint seen. One connection at a time.
+/// What join requires of the server's certificate: a CA of the file `ca` has signed it for this
+/// host, or it has the given fingerprint. Otherwise it is refused, and the refusal names the
+/// fingerprint seen. One connection at a time.
 class CertificateCheck {
  public:
-  /// Throws `BridgeError` if the fingerprint is none, or both are given.
+  /// Throws `BridgeError` if the fingerprint is not valid, or both are given.
   CertificateCheck(std::string host, std::filesystem::path ca, const std::string& fingerprint);
   CertificateCheck(const CertificateCheck&) = delete;
   CertificateCheck& operator=(const CertificateCheck&) = delete;
@@ -54,7 +54,7 @@ class CertificateCheck {
   void begin(SSL* connection);
   /// After a handshake that failed: one line; empty: the certificate was not the reason.
   [[nodiscard]] const std::string& refusal() const noexcept { return refusal_; }
-  /// It demands one certificate, by its fingerprint.
+  /// Whether it requires one certificate, by its fingerprint.
   [[nodiscard]] bool is_pinned() const noexcept { return !fingerprint_.empty(); }
 
  private:

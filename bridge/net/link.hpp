@@ -59,7 +59,7 @@ class LinkHandler {
   std::unique_ptr<Any> held_;
 };
 
-/// The first buffers of a sequence, at most eight. A read or write may be shorter than asked for.
+/// The first buffers of a sequence, at most eight: a read or write may be shorter than requested.
 template <class Buffer>
 class LinkBuffers {
  public:
@@ -130,8 +130,8 @@ class Link {
   bool reads_ = true;
 };
 
-/// Reads and forgets until the peer closes, or for a second: a socket that is closed with unread
-/// bytes is reset, and what was sent last may be lost on its way. Only without another reader.
+/// Reads and discards until the peer closes, or for a second. A socket that is closed with unread
+/// bytes is reset, and the peer may lose what was sent last. Only without another reader.
 asio::awaitable<void> linger(beast::tcp_stream& stream);
 
 // After the closing frame of a WebSocket the connection is closed at once, without TLS's own close

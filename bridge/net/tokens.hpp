@@ -17,11 +17,11 @@ using Digest = std::array<unsigned char, 32>;
 /// What the holder of a token may do.
 enum class Right { none, look, command };
 
-/// Who may look and who may command. Tokens have 16 to 128 letters, digits, '-' and '_'.
+/// The tokens and their rights. Tokens have 16 to 128 letters, digits, '-' and '_'.
 class Tokens {
  public:
-  /// One token a line; '#' starts a comment. Throws `BridgeError` if the file is not to be read,
-  /// is open to others, or has no token or a bad one.
+  /// Adds the tokens of a file, one per line; '#' starts a comment. Throws `BridgeError` if the
+  /// file cannot be read, is open to others, or has no token or an invalid one.
   void add_file(const std::filesystem::path& file, const char* option, Right right);
   void add(std::string_view token, Right right);
 
@@ -79,7 +79,8 @@ class OneTimeToken {
 [[nodiscard]] std::string_view host_name(std::string_view host) noexcept;
 
 /// Whether `host`, without port, is a name of this server: an address, "localhost" or one of
-/// `names`. Any other name could come from a foreign page whose name server returns our address.
+/// `names`. Any other name could come from a foreign page whose name server returns this address
+/// (DNS rebinding).
 [[nodiscard]] bool is_own_host(std::string_view host, const std::vector<std::string>& names);
 
 /// Whether the page that opens a WebSocket was loaded from here: the origin is empty (no browser),

@@ -13,8 +13,9 @@ struct PageFile {
   std::string_view bytes;
 };
 
-/// All of the page, for the life of the program. No script or style stands inside of the HTML: the
-/// server forbids it (Content-Security-Policy), as well as anything from another address.
+/// All files of the page, valid as long as the program runs. The HTML has no inline script or
+/// style, because the server forbids them (Content-Security-Policy), as well as anything from
+/// another address.
 [[nodiscard]] std::span<const PageFile> page_files() noexcept;
 
 }  // namespace kerf::bridge

@@ -91,7 +91,7 @@ std::string_view text(beast::string_view view) {
   return {view.data(), view.size()};
 }
 
-/// Of all headers that offer some, in their order.
+/// First known Foxglove subprotocol that the request offers; empty if there is none.
 std::string_view foxglove_protocol_of(const Request& request) {
   const auto [begin, end] = request.equal_range(http::field::sec_websocket_protocol);
   for (auto header = begin; header != end; ++header) {

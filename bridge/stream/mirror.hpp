@@ -100,21 +100,21 @@ class RemoteCommand {
   std::optional<Reply> reply_;  // to the last command
 };
 
-/// A message does not fit the state of this viewer. A new connection helps: it starts from nothing,
-/// and readers keep their picture meanwhile. One line.
+/// A message does not match the state of this viewer. The remedy is a new connection: it starts
+/// from nothing, and meanwhile readers keep their picture. One line.
 struct StreamOutOfSync : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
 /// The receiving end of a bridge without its network: messages in, a local segment out.
 ///
-/// A run's first pass goes straight into a segment that no reader has yet; with its last frame the
-/// segment gets the name, and the one of an earlier run goes. Later passes wait in private memory
-/// and are published at once when they are whole, so readers see the state of one tick or the one
-/// before it, however slow the link is. Beyond the segment it holds 16 bytes a block and the pass
-/// under way.
+/// The first pass of a run is written directly to a segment that no reader has yet. With its last
+/// frame the segment gets the name, and that of an earlier run is removed. Later passes wait in
+/// private memory and are published at once when they are complete, so readers always see the state
+/// of one tick, however slow the link is. Besides the segment it needs 16 bytes per block, and
+/// memory for the present pass.
 ///
-/// One thread, but for `Answer`, which the segment server's thread calls.
+/// One thread, except `Answer`, which the segment server's thread calls.
 class Mirror {
  public:
   /// Throws `SegmentError` if `name` cannot be used or another controller has it. A segment of
@@ -124,18 +124,18 @@ class Mirror {
   Mirror& operator=(const Mirror&) = delete;
   ~Mirror();
 
-  /// First message of a connection, or a new run's. All that is held of a stream is void. Throws
-  /// `WireError` if it does not hold, `SegmentError` if it is of another layout, too large or
-  /// there is no memory.
+  /// First message of a connection or of a new run. Discards the state of the stream so far. Throws
+  /// `WireError` if the message is not valid, `SegmentError` if the run has another layout or is
+  /// too large, or if there is no memory.
   const HelloMessage& hello(std::span<const std::byte> message, std::int64_t now_ns,
                             std::int64_t round_trip_ns);
 
-  /// Applies a frame; what it returns is to be sent back. Throws `WireError` or `StreamOutOfSync`,
-  /// and `SegmentError` if the name was taken in the meantime.
+  /// Applies a frame; returns the answer to send. Throws `WireError` or `StreamOutOfSync`, and
+  /// `SegmentError` if the name is in use meanwhile.
   AckMessage frame(std::span<const std::byte> message, std::int64_t now_ns,
                    std::int64_t round_trip_ns);
 
-  /// Applies records; what is not above the last index is known already. Throws `WireError`.
+  /// Applies records; ignores those that are not above the last index. Throws `WireError`.
   void records(std::span<const std::byte> message);
 
   /// True from the first whole pass of a connection until the next greeting.
@@ -154,7 +154,7 @@ class Mirror {
     std::uint64_t version;
     std::size_t at;  // in the bytes of its frame
   };
-  struct Part {  // what of one frame waits for the end of its pass
+  struct Part {  // blocks of one frame that wait for the end of its pass
     std::vector<Waiting> blocks;
     std::vector<std::byte> bytes;
   };

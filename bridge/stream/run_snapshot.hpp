@@ -28,15 +28,15 @@ class RunSnapshot {
   /// The reader outlives this. Allocates the volumes' bricks, 1 KiB each.
   explicit RunSnapshot(const SegmentReader& reader);
 
-  /// Takes what changed; at most 4 passes over the versions. `writer_gone`: the last publication
-  /// will never be completed, so what there is of it counts.
+  /// Reads what changed; at most 4 passes over the versions. `writer_gone`: the last publication
+  /// will never be completed, so it is taken as it is.
   void update(std::int64_t now_ns, bool writer_gone);
 
   /// True if the last `update` found the volumes of one tick; only then a pass may begin.
   [[nodiscard]] bool whole() const noexcept { return whole_; }
   [[nodiscard]] Tick tick() const noexcept { return tick_; }
   [[nodiscard]] std::int64_t taken_ns() const noexcept { return taken_ns_; }
-  /// Blocks that the last `update` changed; some may stand twice.
+  /// Blocks that the last `update` changed; some may be listed twice.
   [[nodiscard]] std::span<const std::uint32_t> changed() const noexcept { return changed_; }
 
   [[nodiscard]] const SegmentReader& reader() const noexcept { return reader_; }
@@ -44,7 +44,7 @@ class RunSnapshot {
 
   /// 0: never read whole.
   [[nodiscard]] std::uint64_t version(std::uint32_t id) const noexcept;
-  /// Block `id` at its version of now stays readable until `unpin`. At most `kMaxStreams` pins.
+  /// Keeps the present version of block `id` readable until `unpin`. At most `kMaxStreams` pins.
   void pin(std::uint32_t id) noexcept;
   void unpin(std::uint32_t id, std::uint64_t version) noexcept;
   /// Copies a block that is pinned at `version`.
@@ -67,7 +67,7 @@ class RunSnapshot {
   void copy_text(std::uint32_t block, std::span<std::byte> out) const noexcept;
   void copy_labels(const BlockPlane& plane, std::uint32_t brick,
                    std::span<std::byte> out) const noexcept;
-  /// Place of a density block among all; negative or too large for the others.
+  /// Whether a block is one of density. (The difference of unsigned numbers wraps for lower ones.)
   [[nodiscard]] bool is_density(std::uint32_t id) const noexcept {
     return id - first_density_ < versions_.size();
   }

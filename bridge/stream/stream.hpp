@@ -15,32 +15,35 @@
 
 namespace kerf::bridge {
 
-/// What a link has shown to deliver, and how many bytes may be under way on it.
+/// The measured delivery rate of a link, and the window: how many bytes may be in flight on it.
 ///
-/// The rate of an ack is what was acknowledged since its frame was sent, over that time; the
-/// highest of the last `kSamples` counts, since a sender with little to say delivers less than the
-/// link could. Twice rate times round trip is under way when the link is full and acks come in
-/// clumps; one frame more starts it. The round trip is the kernel's least one, because that of an
-/// ack contains the sending time of its frame, and would let a queue grow that it then measures.
+/// Each ack gives a delivery rate: the bytes acknowledged since its frame was sent, over the time
+/// since the last ack before that sending. The maximum of the last `kSamples` is used, because an
+/// idle sender underestimates the link. Window = twice the bandwidth-delay product plus one frame:
+/// twice, because acks arrive in bursts; the frame allows the first measurement. The round trip is
+/// the kernel's minimum RTT: an ack's own RTT includes the frame's sending time and would measure
+/// the queue it creates.
 ///
-/// Bytes, not frames: a packed frame is a quarter of a plain one, and a window of so many frames
-/// would be as much smaller, just when the link is what holds a pass up.
+/// The window counts bytes, not frames: a packed frame has a quarter of the bytes of a plain one,
+/// so a window in frames would shrink by as much, just when the link limits a pass.
 ///
-/// `now_ns` never falls. One thread.
+/// `now_ns` never decreases. One thread.
 class LinkRate {
  public:
   static constexpr std::size_t kSamples = 32;
-  /// One frame is applied while the next is on its way, however large they are.
+  /// Frames that are always allowed in flight, whatever their size: one is applied while the next
+  /// arrives.
   static constexpr std::size_t kLeastFrames = 2;
-  /// Until a program has its turn on a processor, applies a frame and answers. It counts on a quick
-  /// link only, whose join is a sixth shorter for it; at 4 Mbit/s it is 1 KiB of the window.
+  /// Allowance for the receiver to be scheduled, apply a frame and answer. It matters on fast links
+  /// only (a join takes a sixth less time); at 4 Mbit/s it adds 1 KiB to the window.
   static constexpr std::int64_t kTurnNs = 1'000'000;
-  /// Of which a link of more than 13 MB/s at a round trip of 40 ms waits for acks.
+  /// Upper limit of the window. At a round trip of 40 ms it limits links faster than 13 MB/s, which
+  /// then wait for acks.
   static constexpr std::size_t kMostBytes = 32 * kMaxRawBytes;
 
   void set_round_trip(std::int64_t least_ns) noexcept { round_trip_ns_ = least_ns; }
 
-  /// What is sent beside frames.
+  /// Counts bytes that are sent outside frames.
   void sent(std::size_t bytes) noexcept { bytes_sent_ += bytes; }
   void sent_frame(std::uint64_t frame, std::size_t bytes, std::int64_t now_ns);
   /// All frames up to `frame` have been applied.
@@ -74,11 +77,11 @@ class LinkRate {
 /// If the link is too slow for all of them, every n-th is sent, and always the newest.
 class RecordBatches {
  public:
-  /// The reader outlives this. `ring` is one that a run of so many arms has.
+  /// The reader outlives this. `ring` must be one that a run with this number of arms has.
   RecordBatches(const SegmentReader& reader, Ring ring) noexcept : reader_(reader), ring_(ring) {}
 
-  /// Of what was published since, at most `records` (and 1 at least) are to go out until the next
-  /// call.
+  /// Plans to send at most `records` (at least 1) of the records published since then, until the
+  /// next call.
   void plan(std::uint64_t records) noexcept;
   [[nodiscard]] bool waiting() const noexcept { return next_ < end_; }
 
@@ -105,20 +108,20 @@ class RecordBatches {
 /// Interval at which a pass may begin and records are sent.
 inline constexpr std::int64_t kSlotNs = 16'666'667;
 
-/// The messages to one viewer of one run: the greeting, then passes in frames, and records. Without
-/// a network: the caller takes the next message whenever it can send one.
+/// The messages to one viewer of one run: the greeting, then passes in frames, and records. It uses
+/// no network: the caller takes the next message whenever it can send one.
 ///
-/// Volumes and records share the link. While a pass is under way the link is what holds it up, and
-/// records take at most `kRecordShare` of what it delivers; else they take what they need.
+/// Volumes and records use the same link. During a pass the link is the bottleneck, and records
+/// take at most `kRecordShare` of its rate; otherwise they take what they need.
 ///
 /// One thread. The snapshot outlives this.
 class Stream {
  public:
-  /// Of the delivered bytes. A quarter is a state every 4 ms on 4 Mbit/s, and lets a pass take a
-  /// third longer at most.
+  /// Fraction of the delivered bytes for records during a pass. A quarter is one state every 4 ms
+  /// at 4 Mbit/s, and makes a pass at most a third longer.
   static constexpr double kRecordShare = 0.25;
-  /// The bridge may be late by so many slots (133 ms), and all records still go; a link that falls
-  /// further behind gets fewer, so that those it gets are new.
+  /// If the bridge is late by up to this many slots (133 ms), all records are still sent; a link
+  /// that falls further behind gets fewer, so that those it gets are recent.
   static constexpr std::uint64_t kSlotsBehind = 8;
 
   /// `flags` of the greeting.
@@ -135,7 +138,8 @@ class Stream {
   /// The next message, if there is one and the link has credit for it.
   bool next(std::int64_t now_ns, std::vector<std::byte>& out);
 
-  /// False if the viewer answers what it was never sent. An ack of another run is passed over.
+  /// False if the viewer acknowledges a frame that was never sent. An ack of another run is
+  /// ignored.
   [[nodiscard]] bool acked(const AckMessage& ack, std::int64_t now_ns);
 
   /// The kernel's least round trip.
@@ -176,7 +180,7 @@ class Stream {
   std::int64_t pass_taken_ns_ = 0, slot_ns_ = 0;
   std::uint64_t frame_ = 0, set_hash_ = 0;
 
-  double record_bytes_ = 0;  // that records may take yet, while a pass is under way
+  double record_bytes_ = 0;  // that records may still take during the pass
 
   LinkRate link_;
   PackChoice pack_choice_;

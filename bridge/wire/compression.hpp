@@ -25,7 +25,7 @@ namespace kerf::bridge {
 /// message is packed in any case, so that they follow the content.
 class PackChoice {
  public:
-  /// `bytes_per_s`: what the link delivers; 0: unknown, taken for slow.
+  /// `bytes_per_s`: the rate of the link; 0: unknown, treated as slow.
   [[nodiscard]] bool pays(double bytes_per_s) noexcept {
     if (++asked_ % 32 == 0) return true;
     return bytes_per_s * ns_per_byte_ * 1e-9 < 1 - 1 / ratio_;

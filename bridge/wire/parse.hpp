@@ -44,8 +44,8 @@ class FrameParser {
     std::span<const std::byte> bytes;
   };
 
-  /// Viewer's side. `blocks()` holds until the next call, and with it `message`. Throws `WireError`
-  /// and then keeps nothing.
+  /// Viewer's side. `blocks()` is valid until the next call, and while `message` is. If it throws
+  /// `WireError`, there are no blocks.
   FrameHead parse(std::span<const std::byte> message);
   [[nodiscard]] std::span<const Block> blocks() const noexcept { return blocks_; }
   [[nodiscard]] const BlockPlan& plan() const noexcept { return plan_; }

@@ -193,8 +193,8 @@ constexpr void weigh_again(CoveredVoxels<N>& covered) noexcept {
 
 namespace detail {
 
-/// Takes `wanted` steps, at most what is covered, from a voxel; returns how many whole ones left.
-/// Sets `full` if the voxel had less left.
+/// Removes `wanted` steps, at most what is covered, from a voxel; returns how many whole steps that
+/// were. Sets `full` if the voxel had less left.
 template <class N>
 constexpr Density take_from(CoveredVoxel<N>& voxel, typename BudgetPerWeight<N>::Steps wanted,
                             std::uint16_t tick_phase, Density& rho, bool& full) noexcept {
@@ -323,7 +323,7 @@ inline void weigh_again(CoveredGroups& covered) noexcept {
 // along the press. For a ball that is ahead(j) with w = R. For the flank, the end and the rim of
 // another tool w is one unit, half of the ramp of a face.
 
-/// A tool's rim radius over w, 1 of a ball; at most.
+/// Largest ratio of a tool's rim radius to w; 1 for a ball.
 inline constexpr double kSteepest = 64;
 
 /// A contact of a tool, seen from its centre.
@@ -368,7 +368,7 @@ template <class N>
   return form;
 }
 
-/// The form that counts every covered voxel fully.
+/// The form with which every covered voxel has weight 1.
 template <class N>
 [[nodiscard]] constexpr AheadForm<typename N::Sum> everywhere() noexcept {
   return {N::kIsFixed ? typename N::Sum(1 << 20) : typename N::Sum(1), {}};

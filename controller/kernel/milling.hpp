@@ -154,8 +154,8 @@ template <class N>
   return sum;
 }
 
-/// Fractions of a density step that removal still owes, one per lane (x from the tool's lowest cell
-/// on): slow cutting would otherwise round to nothing. Fixed: 16 fraction bits.
+/// Fractions of a density step that were not removed yet, one per lane (x from the tool's lowest
+/// cell on). Without them slow cutting would round to zero. Fixed: 16 fraction bits.
 template <class N>
 using RemovalCarry = std::conditional_t<N::kIsFixed, std::uint16_t, typename N::Sum>;
 
@@ -195,9 +195,9 @@ template <class N>
 
 }  // namespace detail
 
-/// rho_j -= rho_j f(c_j) for every voxel of the overlap, f the fraction of `rate`; whole steps
-/// leave the volume, the rest waits in `carry` and joins the next voxel of the lane. Rows in z, y,
-/// x order.
+/// rho_j -= rho_j f(c_j) for every voxel of the overlap, f the fraction of `rate`. Whole steps are
+/// removed from the volume; the rest is added to `carry`, for the next voxel of the lane. Rows in
+/// z, y, x order.
 ///
 /// Fixed: f = c m >> 15, then rho f 2^-exponent with 16 fraction bits, cut off below; at most
 /// 0xffff0000 + 0xffff, so 32 unsigned bits hold it and the decrease never exceeds the density.

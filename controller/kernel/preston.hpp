@@ -17,7 +17,7 @@ namespace kerf {
 // Material that cannot be cut carries its part of the force and stays. With several volumes the sum
 // of o v is over all of them: `CoveredWeights::whole`.
 
-/// How force cuts one volume; constant during a run. Indexed by label; without labels all is at 0.
+/// Constants of cutting one volume by force. Indexed by label; without labels, entry 0 is used.
 template <class N>
 struct PrestonPlan {
   ByMaterial<ForceRate<N>> rate{};
@@ -64,7 +64,7 @@ class PrestonTick {
       budget_[m] = fed + state_.carry[m] / kCarryTicks;
       state_.carry[m] += fed;
     });
-    // The others take once what voxels at their limit cannot lose; the rest waits.
+    // What voxels at their limit cannot lose is given to the others once; the rest waits.
     if (spend(out.removed)) {
       weigh_again(covered_);
       spend(out.removed);
@@ -79,7 +79,8 @@ class PrestonTick {
 
  private:
   static constexpr CutBudget<N> kStep = N::kIsFixed ? CutBudget<N>(1 << kBudgetBits) : 1;
-  /// The carry is spent over so many ticks: all at once, it would swing with the rounding.
+  /// The carry is spent over this many ticks: if it were spent at once, it would oscillate with the
+  /// rounding.
   static constexpr CutBudget<N> kCarryTicks = 16;
   static constexpr CutBudget<N> kFullVoxel = CutBudget<N>(65535) * kStep;
 
@@ -90,7 +91,7 @@ class PrestonTick {
     }
   }
 
-  /// Takes the budgets from the volume. True when some voxel had less to give than its part.
+  /// Removes the budgets from the volume. Returns whether a voxel had less left than its part.
   constexpr bool spend(Removed& removed) noexcept {
     ByMaterial<BudgetPerWeight<N>> price{};
     each_material([&](std::size_t m) { price[m] = {budget_[m], covered_.weight[m]}; });

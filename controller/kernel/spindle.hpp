@@ -41,7 +41,7 @@ struct SpindleState {
   typename N::Real load{};
 };
 
-inline constexpr int kMaxSpindleLoad = 100;  ///< a larger load counts as that
+inline constexpr int kMaxSpindleLoad = 100;  ///< larger loads are clamped to it
 
 /// One tick under a torque >= 0. The speed approaches omega_free (1 - load), the equilibrium of
 /// motor and load, and stays at 0 if the load exceeds the stall torque: friction brakes and never

@@ -136,7 +136,8 @@ void check_labels(const VolumeImage& image, std::size_t materials) {
 
 static_assert(kMostDenoise == kMostPasses);
 
-/// Refuses images whose noise cannot be separated from their steps.
+/// Refuses to denoise a label map, or an image with so few grey levels that noise cannot be
+/// distinguished from quantisation.
 void refuse_steps(Denoise passes, const VolumeImage& image) {
   const std::string begin = "denoise: " + std::to_string(static_cast<int>(passes));
   if (is_label_map(image.grid, image.density)) {

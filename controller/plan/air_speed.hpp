@@ -21,11 +21,11 @@ namespace kerf {
 // a flat wall, if no sample of the tool reads density that contact counts. In a cavity hardly wider
 // than the tool more samples are near the solid, and the speed may be lower.
 
-/// No hand turns a tool faster: five turns a second.
+/// Fastest rotation of a tool by a hand: five revolutions per second.
 inline constexpr double kFastestTurnRadPerS = 30;
 
-/// The edges of a cube that stands on a corner: unit vectors at right angles, whose sum lies along
-/// `up`, turned about it by any angle.
+/// The edges of a cube that stands on a corner: orthogonal unit vectors whose sum lies along `up`,
+/// rotated about it by `angle_rad`.
 [[nodiscard]] inline std::array<std::array<double, 3>, 3> edges_about(
     const std::array<double, 3>& up, double angle_rad) {
   const std::array<double, 3> other =

@@ -15,7 +15,8 @@
 #include "controller/servo/servo.hpp"
 #include "controller/servo/servo_state.hpp"
 
-// A loaded scene to a servo: plan, memory, costs and snapshot; and whether it fits the tick.
+// From a loaded scene to a servo: plan, memory, costs, snapshot, and whether a tick has time for
+// it.
 
 namespace kerf {
 
@@ -71,8 +72,8 @@ class CompiledScene : public Servo {
  public:
   [[nodiscard]] virtual const SceneCosts& costs() const noexcept = 0;
 
-  /// Takes the volumes' densities over (they are empty in the scene afterwards) and allocates the
-  /// rest. Once, before the first step; `scene` is the one that was compiled.
+  /// Moves the volumes' densities out of `scene`, which is the one that was compiled, and allocates
+  /// the rest. Call it once, before the first step.
   virtual void take(LoadedScene& scene) = 0;
 
   /// Plan and state of each arm as `servo_step` takes them, in the numbers of the scene: for a
@@ -85,9 +86,8 @@ class CompiledScene : public Servo {
   [[nodiscard]] virtual std::span<const Density> first_density(
       std::size_t scene_index) const noexcept = 0;
 
-  /// `costs().ticks[tick]` as the servo step computes it, at its worst (worst_tick.hpp). Cuts
-  /// if the scene does: only for a servo that will not be stepped. After `take`; takes 250
-  /// ticks.
+  /// Times `costs().ticks[tick]` in the worst case of the servo step (worst_tick.hpp), over 250
+  /// ticks. If the scene cuts, this does, too: use a servo that will not be stepped. After `take`.
   [[nodiscard]] virtual TickTime time_tick(std::size_t tick) = 0;
 
   /// All that the last tick hands to the next, copied. After `take`, between two ticks.
@@ -116,14 +116,13 @@ class CompiledScene : public Servo {
 /// reference the other half is left for the device, the publication and other work of the core.
 inline constexpr double kBudgetRatio = 0.5;
 
-/// Work of one tick of a tool in all volumes, of all arms if each holds it: us on the reference
-/// machine.
+/// Work of one tick in all volumes, if every arm has this tool: us on the reference machine.
 [[nodiscard]] double work_us(const SceneCosts& costs, std::size_t tool);
 
 /// The budget of a tick in the same unit.
 [[nodiscard]] double work_budget_us(const LoadedScene& scene);
 
-/// The highest rate with room for so much work, at most kMaxRateHz; 0 if that is below kMinRateHz.
+/// The highest rate whose budget covers this work, at most kMaxRateHz; 0 if it is below kMinRateHz.
 [[nodiscard]] int highest_rate_hz(double work_us);
 
 /// The tool whose tick costs most over all volumes. It decides for the scene, since a command may

@@ -10,14 +10,14 @@
 // boundary of a sampled wall (docs/theory.md 5.7), at the scene's rate, with the figures of its
 // device (controller/stability) and without a hand that damps it.
 //
-// The criterion is a swing that grows. It is soon wider than the 0.1 mm in which the coupling's
-// damper comes in, and than the steps of the encoder, so that the damper acts fully and the
-// velocity window is down to one interval: the backward difference of the exact loop. A swing
-// within both is a hum that friction stops. The paper's force has no damper, so only friction makes
-// it stable at all: its margin is that with friction, and it is never refused.
+// The criterion is an oscillation that grows. It soon exceeds the 0.1 mm over which the coupling's
+// damper sets in, and the steps of the encoder. Then the damper acts fully, and the velocity window
+// has one interval: the backward difference of the exact loop. A smaller oscillation is a hum that
+// friction stops. The paper's force has no damper, so only friction makes it stable at all: its
+// margin is that with friction, and it is never refused.
 //
-// A force law has the margin of its worst length. The low-pass of `difference`
-// counts, another estimator counts as a bare difference, and a stabiliser is left out.
+// A force law has the margin of its worst length. The low-pass of `difference` is included, any
+// other estimator is treated as a plain difference, and a stabiliser is ignored.
 
 namespace kerf {
 
@@ -44,8 +44,8 @@ struct GainMargin {
 
 enum class PlayFriction : std::uint8_t { where_it_decides, always };
 
-/// Friction is simulated, not computed: some 10 ms, up to 0.4 s at 8 kHz. If it does not decide and
-/// the caller does not request it, its boundary stays 0.
+/// Friction is simulated, not computed, which takes some 10 ms, up to 0.4 s at 8 kHz. If friction
+/// does not decide and the caller does not request it, its boundary is 0.
 [[nodiscard]] GainMargin gain_margin(const LoadedScene& scene,
                                      PlayFriction friction = PlayFriction::always);
 
@@ -56,12 +56,12 @@ enum class PlayFriction : std::uint8_t { where_it_decides, always };
 /// One line with the highest safe stiffness; empty above kSafeMargin.
 [[nodiscard]] std::string gain_warning(const LoadedScene& scene, const GainMargin& margin);
 
-/// Why the scene may move no device: unstable without friction, and `force.unchecked_gain` is not
-/// set. Empty if it may.
+/// Why the scene must not drive a device: it is unstable without friction, and
+/// `force.unchecked_gain` is not set. Empty if it may.
 [[nodiscard]] std::string gain_error(const LoadedScene& scene, const GainMargin& margin);
 
-/// Why a real device does not get these gains, stable or not: they are above the largest known safe
-/// values for it. Empty if it does.
+/// Why a real device must not get these gains, even if they are stable: they are above the largest
+/// known safe values for it. Empty if it may.
 [[nodiscard]] std::string device_limit_error(const LoadedScene& scene);
 
 }  // namespace kerf

@@ -108,9 +108,9 @@ inline std::int32_t motor_count_end(Personality personality) {
   return static_cast<std::int32_t>(force_figures(personality).peak_n / cartesian::kNewtonsPerCount);
 }
 
-/// Largest distance of a tip from the position that its encoders, rounded to whole counts, give:
-/// half a count of one joint with the whole arm. The Omni's 0.056 mm is its data sheet's 0.055. Of
-/// a Cartesian device half of its resolution.
+/// Largest error of the tip from encoders that are rounded to whole counts: half a count of one
+/// joint with the whole arm. For the Omni that is 0.056 mm, in its data sheet 0.055. For a
+/// Cartesian device, half of its resolution.
 inline double tip_noise_mm(Personality personality) {
   if (const auto figures = cartesian::figures(personality)) return figures->quantum_um / 2000.0;
   switch (personality) {
@@ -124,21 +124,22 @@ inline double tip_noise_mm(Personality personality) {
   return wooden::kRadPerCount[1] * (wooden::kUpperLinkMm + wooden::kForearmMm) / 2;
 }
 
-/// How far from its first calibration a joint may rest parked: the play of a stylus in its inkwell,
-/// 3 mm at the wrist, and twice the 10 mrad within which a hand holds WoodenHaptics in its home
-/// pose. A Falcon has no dock: its button is held anywhere.
+/// Largest distance from its first calibration at which a joint that is parked at rest is
+/// calibrated: the play of a stylus in its inkwell, 3 mm at the wrist, and twice the 10 mrad within
+/// which a hand holds WoodenHaptics in its home pose. A Falcon has no dock: its button may be held
+/// at any pose.
 inline constexpr double kDockPlayRad = 0.025;
-/// The same of a Cartesian device with an inkwell: those 3 mm.
+/// The same for a Cartesian device with an inkwell: those 3 mm.
 inline constexpr double kDockPlayMm = 3;
 
-/// How far the counters of an axis at rest may move: two counts of an encoder; of a Cartesian
-/// device two steps of its resolution.
+/// How far the counter of an axis at rest may move: two counts of an encoder, or two steps of the
+/// resolution of a Cartesian device.
 inline std::int32_t rest_counts(Personality personality) {
   const auto figures = cartesian::figures(personality);
   return figures ? std::max(2, 2 * figures->quantum_um / figures->step_um) : 2;
 }
 
-/// How far from its first calibration a joint may rest parked.
+/// The same in counts; `anywhere` for a device without a dock.
 inline std::int32_t dock_counts(Personality personality, double per_count, std::int32_t anywhere) {
   const auto figures = cartesian::figures(personality);
   const bool has_dock = figures ? figures->has_dock : personality != Personality::falcon;

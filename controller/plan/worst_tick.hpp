@@ -69,8 +69,8 @@ template <class N>
   return best;
 }
 
-/// A turn that makes the box around any tool nearly as large as it gets: the tool's axis along the
-/// diagonal of the volume.
+/// A rotation that makes the box around any tool nearly as large as possible: the tool's axis lies
+/// along the diagonal of the volume.
 template <class N>
 [[nodiscard]] constexpr Rotation<N> widest_rotation() {
   using U = typename N::Unit;
@@ -78,7 +78,7 @@ template <class N>
   return {{{{U(a), U(b), U(c)}, {U(-a), U(b), U(c)}, {U(0), U(b), U(-2 * c)}}}};
 }
 
-/// A tick as `WorstCaseDriver` met it.
+/// The ticks that `WorstCaseDriver` measured.
 struct WorstTick {
   double median_us = 0, p99_us = 0;
   VoxelIndex box;             ///< that held the tool's cells, in low corners
@@ -116,8 +116,8 @@ class WorstCaseDriver {
     at_.planes.fill({relabel<DeviceSpace>(at_.normal), {}, Real(1)});
   }
 
-  /// The swept proxy gets stuck on what lies in its way, and that differs by tool: it comes from a
-  /// corner and from above, and the way that reads more counts.
+  /// The swept proxy may get stuck on its way, which depends on the tool. So it approaches from a
+  /// corner and from above, and the approach that reads more samples counts.
   WorstTick time() {
     if (!plan_->contact.swept) return time_here(kTicks);
     const double away = 2.0 * (size_.x + size_.y + size_.z);
@@ -162,7 +162,8 @@ class WorstCaseDriver {
 
   static constexpr Rotation<N> kWidest = widest_rotation<N>();
 
-  /// World place of `vox` in volume `v`: inverse of `voxel_from_world`, whose rows are orthogonal.
+  /// World position of `vox` in volume `v`: inverse of `voxel_from_world`, whose rows are
+  /// orthogonal.
   [[nodiscard]] Place world(const std::array<double, 3>& vox) const {
     const VolumePlan<N>& volume = plan_->volumes[v_];
     std::array<double, 3> mm{};
@@ -177,8 +178,8 @@ class WorstCaseDriver {
 
   [[nodiscard]] Place hand(int i) const {
     if (!plan_->contact.swept) return world({dense_.x + 0.002 * i, dense_.y + 0.3, dense_.z + 0.4});
-    // Nearly half a turn a tick: each jump leads across, by about a diameter, and from another
-    // side.
+    // Nearly half a revolution per tick: each jump crosses the circle, by about its diameter, from
+    // another side.
     constexpr double kJumpVox = 15, kTurn = 3.0;
     const double angle = kTurn * i;
     return world({dense_.x + kJumpVox * cosine(angle), dense_.y + kJumpVox * sine(angle),

@@ -26,7 +26,8 @@ struct ContactResult {
   using Unit = typename N::Unit;
 
   DeviceVec<Real> contact_n;
-  /// Of the cutting: by overlap the modification force, by force the friction of the last cut.
+  /// Force of the cutting: the modification force if overlap cuts, else the friction of the last
+  /// cut.
   DeviceVec<Real> modification_n;
   DeviceVec<Real> spring_n, friction_n;        ///< parts of `contact_n`; the rest is damping
   std::array<Removed, kMaxVolumes> removed{};  ///< by overlap; by volume of the scene
@@ -48,15 +49,15 @@ struct ContactResult {
   std::size_t plane_count = 0;
 };
 
-/// A position of the world in a volume.
+/// The world position `at_mm` in voxels of a volume.
 template <class N>
 [[nodiscard]] VoxelVec<typename N::Real> voxel_position(const VolumePlan<N>& volume,
                                                         WorldVec<typename N::Real> at_mm) noexcept {
   return volume.voxel_from_world * (at_mm - volume.position_mm);
 }
 
-/// Samples of the active tool in one volume. A tool that is round, or that does not turn, has the
-/// same samples in every orientation of the stylus.
+/// Samples of the active tool in one volume. A tool that is round, or that does not rotate with the
+/// stylus, has the same samples in every orientation.
 template <class N>
 [[nodiscard]] ToolPose<N> tool_pose(const VolumePlan<N>& volume, const ToolPlan<N>& tool,
                                     const ToolInVolume<N>& in_volume,
@@ -85,9 +86,9 @@ template <class N>
 }
 
 /// One tick: the proxy of the active tool follows the hand, and the force law pulls the hand to the
-/// proxy (docs/theory.md 4, 5.1). `rotation` turns the tool, unless it is a ball without a shaft or
-/// keeps the world's axes. Servo thread; at most 32 queries; writes `state.contact` and
-/// `state.force_law`. The force of a law may not be finite.
+/// proxy (docs/theory.md 4, 5.1). `rotation` orients the tool, unless it is a ball without a shaft
+/// or keeps the world's axes. Servo thread; at most 32 queries; writes `state.contact` and
+/// `state.force_law`. A force law can return a force that is not finite.
 template <class N>
 [[nodiscard]] ContactResult<N> proxy_force(const ServoPlan<N>& plan, ServoState<N>& state,
                                            WorldVec<typename N::Real> tip_mm,

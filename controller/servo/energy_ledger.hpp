@@ -12,7 +12,7 @@
 
 namespace kerf {
 
-/// What the force of one tick is made of, at the device port. The rest of the force that is sent
+/// Components of the force of one tick, at the device port. The rest of the force that is sent
 /// belongs to `EnergySource::hold`.
 template <class N>
 struct ForceParts {
@@ -27,8 +27,8 @@ struct ForceParts {
 /// Work at the device port since the start of the run, in mJ: + is taken from the hand.
 ///
 /// A force is held from one tick to the next, so W += -F(n-1) . (x(n) - x(n-1)) is exact whatever
-/// the hand does in between (Hannaford and Ryu 2002). `lowest_mj` is their passivity observer:
-/// below 0 the loop has given more than it ever took.
+/// the hand does in between (Hannaford and Ryu 2002). The sum is their passivity observer;
+/// `lowest_mj` is its minimum so far: below 0 the loop had given more energy than it had taken.
 ///
 /// Servo thread; no heap, no branch on energies, 30 products a tick.
 template <class N>
@@ -48,13 +48,13 @@ class EnergyLedger {
     lowest_mj_ = std::min(lowest_mj_, total_mj_);
   }
 
-  /// Splits the work of the last `move` by the parts of the force that was sent before it; `now`
-  /// are those of the force that is sent next. Once after each `move`.
+  /// Splits the work of the last `move` by the components of the force that was sent before it;
+  /// `now` are those of the force that is sent next. Call it once after each `move`.
   ///
-  /// The spring is booked at the mean of its two ends: for a linear one that is exactly what it
-  /// stores. The half difference that the hold makes out of that is the leak. Over a gap every part
-  /// is booked as if the hand had moved evenly under it and each of its ticks had been sampled;
-  /// what the motors gave instead is the hold's.
+  /// The spring is booked with the mean of its forces at both ends; for a linear spring that is
+  /// exactly the energy that it stores. The hold keeps the first force instead: the difference is
+  /// booked as leak. Over a gap of several ticks, each component is booked as if the hand had moved
+  /// uniformly and every tick had been sampled; the rest of the motors' work is booked as hold.
   constexpr void split(const ForceParts<N>& now) noexcept {
     std::array<Energy, kEnergySources> part{};
     const auto of = [&](EnergySource source) -> Energy& { return part[index(source)]; };

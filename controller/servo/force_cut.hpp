@@ -10,8 +10,8 @@
 
 namespace kerf {
 
-// Cutting because of the force that the hand feels, in the same tick: after all limits, since what
-// the hand does not feel must not cut (docs/theory.md 6.1).
+// Cutting by the force that the hand feels, in the same tick. It uses the force after all limits,
+// because a force that the hand does not feel must not cut (docs/theory.md 6.1).
 
 /// What one tick cut.
 template <class N>
@@ -21,8 +21,8 @@ struct ForceCut {
   std::array<Removed, kMaxVolumes> removed{};  ///< by volume of the scene
 };
 
-/// Friction of the last cut at the device port, for the tool as it is held now. By
-/// x_scene = s x_device power is kept: F_device = s F_scene.
+/// Friction of the last cut at the device port, for the present orientation of the tool. With
+/// x_scene = s x_device both sides have the same power if F_device = s F_scene.
 template <class N>
 [[nodiscard]] DeviceVec<typename N::Real> friction_of_last_cut(const ServoPlan<N>& plan,
                                                                const ServoState<N>& state,
@@ -34,13 +34,14 @@ template <class N>
                                WorldVec<typename N::Real> centre_mm,
                                const ContactResult<N>& at) noexcept;
 
-/// One tick of the spindle, and of what it cuts where the tool touches. `sent_n` is the force that
-/// the hand feels; the head's share of its normal part, over the workspace scale, presses in the
-/// scene, by F_device = s F_scene. Friction is left out of it: it is made of that force and would
-/// feed on itself. The spindle is switched on while `runs`; where it stands, or the pedal is up,
-/// nothing is cut and nothing rubs.
+/// One tick of the spindle and of the cut at the contact. `sent_n` is the force that the hand
+/// feels. The head's fraction of its normal component, over the workspace scale, is the normal
+/// force in the scene (F_device = s F_scene). Friction is left out: it is computed from that force
+/// and would feed back into itself. The spindle is switched on while `runs`. If it stands still, or
+/// the pedal is up, nothing is cut and there is no friction.
 ///
-/// The force of this tick decides about this cut; the cut's friction is felt from the next tick on.
+/// The force of this tick makes this tick's cut; the hand feels the cut's friction from the next
+/// tick on.
 /// Servo thread; no heap. Work: the tool's box in each volume, and the voxels in it.
 template <class N>
 [[nodiscard]] ForceCut<N> cut_by_sent_force(const ServoPlan<N>& plan, ServoState<N>& state,

@@ -13,7 +13,7 @@ namespace kerf {
 template <class N>
 struct ForceLimits {
   typename N::Real peak_n;             ///< |F| never above it
-  typename N::Real continuous_n;       ///< RMS that the motors bear for ever
+  typename N::Real continuous_n;       ///< RMS that the motors can give continuously
   typename N::Real slew_n_per_tick;    ///< |dF| per tick, but see `limited_force`
   typename N::Ratio thermal_per_tick;  ///< T / thermal time constant
 };
@@ -56,7 +56,7 @@ constexpr void heat_up(const ForceLimits<N>& limits, ThermalState<N>& state,
   }
 }
 
-/// The part of `v` that `wanted` still has along it: between 0 and `v`.
+/// `v`, shortened to the component of `wanted` along it: between 0 and `v`.
 template <class Real>
 [[nodiscard]] constexpr DeviceVec<Real> fallen(DeviceVec<Real> v, DeviceVec<Real> wanted) noexcept {
   const Real length = norm(v);
@@ -67,21 +67,22 @@ template <class Real>
   return clamped(v, left);
 }
 
-/// `to` if it is within `most` of `from`, else the point at that distance on the way to it.
+/// `to` if it is within `most` of `from`, else the point at distance `most` from `from` towards it.
 template <class Real>
 [[nodiscard]] constexpr DeviceVec<Real> within_step(DeviceVec<Real> to, DeviceVec<Real> from,
                                                     Real most) noexcept {
   return norm(to - from) > most ? from + clamped(to - from, most) : to;
 }
 
-/// Clamps the wanted force to peak and thermal limit, then its step from the force of the last
-/// tick; heats the winding by what is left, the force to send.
+/// Returns the force to send: `wanted_n` clamped to the peak and the thermal limit, then limited in
+/// its change from `last_n`, the force of the last tick. Adds its heat to the winding.
 ///
-/// A hand that `leaves`, moving with the force of the last tick, is given energy by it: then that
-/// force may fall along its own direction at once, and the step counts from where it fell to. Both
-/// together change the force by no more than the slew or the last force, whichever is larger:
-/// |F - F'| <= max(slew, |F'|), the bound of every tick. A force that is scaled to the motors'
-/// range or switched off keeps it too, as a point between F and 0.
+/// If the hand `leaves`, that is, moves with the force of the last tick, that force gives it
+/// energy. Then it may fall along its own direction at once, and the slew limit counts from the
+/// fallen force. Both together change the force F' of the last tick by no more than the slew or F'
+/// itself, whichever is larger: |F - F'| <= max(slew, |F'|), the bound of every tick. A force that
+/// is later scaled to the motors' range or switched off keeps this bound, because it lies between F
+/// and 0.
 template <class N>
 [[nodiscard]] constexpr DeviceVec<typename N::Real> limited_force(
     const ForceLimits<N>& limits, ThermalState<N>& thermal, DeviceVec<typename N::Real> wanted_n,

@@ -61,7 +61,7 @@ template <class N>
   return {{{{U(1), U(0), U(0)}, {U(0), U(1), U(0)}, {U(0), U(0), U(1)}}}};
 }
 
-/// Right-handed turn about the x axis.
+/// Right-handed rotation about the x axis.
 template <class N>
 [[nodiscard]] constexpr Rotation<N> rotation_x(typename N::Angle angle) noexcept {
   using U = typename N::Unit;
@@ -69,7 +69,7 @@ template <class N>
   return {{{{U(1), U(0), U(0)}, {U(0), c, -s}, {U(0), s, c}}}};
 }
 
-/// Right-handed turn about the y axis.
+/// Right-handed rotation about the y axis.
 template <class N>
 [[nodiscard]] constexpr Rotation<N> rotation_y(typename N::Angle angle) noexcept {
   using U = typename N::Unit;
@@ -77,7 +77,7 @@ template <class N>
   return {{{{c, U(0), s}, {U(0), U(1), U(0)}, {-s, U(0), c}}}};
 }
 
-/// First `b`, then `a`.
+/// The rotation by `b`, then by `a`.
 template <class N>
 [[nodiscard]] constexpr Rotation<N> compose(const Rotation<N>& a, const Rotation<N>& b) noexcept {
   Rotation<N> product;
@@ -90,8 +90,8 @@ template <class N>
   return product;
 }
 
-/// Takes a force in N at the tip to the joint torques in N mm that make it: J^T, one row per joint,
-/// entries in mm.
+/// Maps a force in N at the tip to the joint torques in N mm that produce it: J^T, one row per
+/// joint, entries in mm.
 template <class N>
 using JacobianTransposed = Transform<typename N::Real, JointSpace, DeviceSpace>;
 
@@ -108,8 +108,8 @@ struct ForwardKinematics {
 template <class N>
 struct SerialArm {
   typename N::Real thigh_mm, forearm_mm;  ///< link lengths
-  typename N::Real origin_height_mm;      ///< the device's origin lies so far below the shoulder
-  typename N::Real origin_depth_mm;       ///< and so far in front of it
+  typename N::Real origin_height_mm;      ///< of the shoulder above the device's origin
+  typename N::Real origin_depth_mm;       ///< of the shoulder behind it
 };
 
 /// Joint angles in rad: turret (left positive), thigh above the horizontal, and the forearm
@@ -186,10 +186,10 @@ template <class N>
   return compose<N>(compose<N>(arm, wrist), rotation_y<N>(gimbal[2]));
 }
 
-// The delta arm: three legs around the z axis that carry one grip without turning it. Falcon.
+// The delta arm: three legs around the z axis that carry one grip without rotating it. Falcon.
 
-/// In the form of Stamper's thesis. In the plane of a leg (u outward, w = z) the arm of length
-/// `crank_mm` turns by t from u; from its end, the knee, a parallelogram reaches the grip:
+/// In the form of Stamper's thesis. In the plane of a leg (u outward, w = z) the crank of length
+/// `crank_mm` is rotated by t from u; from its end, the knee, a parallelogram reaches the grip:
 ///
 ///     knee = (hub + a cos t, a sin t)     D = |(u, w) - knee|     (D - h)^2 + (v + side)^2 = b^2
 ///
@@ -336,8 +336,8 @@ template <class N>
   return pose;
 }
 
-/// The turn of a quaternion x, y, z, w of any length, divided by its square, so that whole numbers
-/// lose nothing before the last division. A quaternion of zeros turns nothing.
+/// The rotation by a quaternion x, y, z, w of any length. It divides by the squared length at the
+/// end, so that integers are exact until then. The identity for a quaternion of zeros.
 template <class N>
 [[nodiscard]] constexpr Rotation<N> rotation_of(
     const std::array<std::int16_t, 4>& quaternion) noexcept {

@@ -26,12 +26,12 @@ struct VolumeTick {
   [[nodiscard]] const ToolInVolume<N>& in_volume() const noexcept { return tool().in_volume[v]; }
   [[nodiscard]] const VoxelGrid& grid() const noexcept { return plan.volumes[v].grid; }
   [[nodiscard]] VolumeState<N>& memory() const noexcept { return state.volumes[v]; }
-  /// By overlap, whatever the force; a pedal that is up prevents it.
+  /// Whether the tool cuts by overlap, which needs no force. False while the pedal is up.
   [[nodiscard]] bool cuts() const noexcept { return plan.cutting && state.pedal_down; }
 };
 
-/// The forces of one volume at the device port, along the gradient: the hand gets the negative; and
-/// the removal in it.
+/// The forces of one volume at the device port, and the removal in it. The forces point along the
+/// gradient; the hand gets their negative.
 template <class N>
 struct VolumeForces {
   DeviceVec<typename N::Real> contact_n, modification_n;
@@ -57,11 +57,11 @@ struct CoverList {
   }
 };
 
-/// The steps of the methods; method_step.cpp instantiates each for the numbers that it serves.
-/// Servo thread; no heap.
+/// The steps of the methods; method_step.cpp instantiates each for the number types that it
+/// supports. Servo thread; no heap.
 ///
-/// `contact_and_cut`: contact, unless the proxy gives it; then the modification force and the
-/// removal, if overlap cuts. `cover`: the covered voxels, for a cut by force.
+/// `contact_and_cut` computes the contact force, unless the proxy does; then, if overlap cuts, the
+/// modification force and the removal. `cover` lists the covered voxels, for a cut by force.
 #define KERF_STEP(name, Step, serves)                                                       \
   template <class N>                                                                        \
   struct Step {                                                                             \
@@ -76,8 +76,8 @@ KERF_METHODS(KERF_STEP)
 template <class N, class Work>
 decltype(auto) by_method(Method method, Work&& work) noexcept {
   switch (method) {
-// NOLINTBEGIN(bugprone-macro-parentheses,bugprone-branch-clone): a template's name; cases that do
-// not serve
+// NOLINTBEGIN(bugprone-macro-parentheses,bugprone-branch-clone): a template's name; cases without
+// support for N
 #define KERF_CASE(name, Step, serves)             \
   case Method::name:                              \
     if constexpr (serves) return work(Step<N>{}); \
@@ -86,7 +86,7 @@ decltype(auto) by_method(Method method, Work&& work) noexcept {
 #undef KERF_CASE
     // NOLINTEND(bugprone-macro-parentheses,bugprone-branch-clone)
   }
-  return work(GatherStep<N>{});  // serves always
+  return work(GatherStep<N>{});  // supports all number types
 }
 
 }  // namespace kerf

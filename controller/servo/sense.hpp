@@ -29,22 +29,23 @@ struct DevicePose {
   std::array<typename N::Angle, 3> gimbal{};  ///< yaw, pitch, roll
 };
 
-/// One tick without a fresh report. If the servo is faster than the device the last report remains
-/// valid, and with it a rest, for as long as a force would be held.
+/// One tick without a fresh report. If the servo is faster than the device, the last report, and
+/// with it a rest, remains valid for as long as a force is held.
 inline void follow_silence(const SafetyTiming& timing, EncoderState& encoders) noexcept {
   encoders.silent_ticks += encoders.silent_ticks <= timing.hold_ticks ? 1U : 0U;
   const bool rests = encoders.rest_ticks > 0 && encoders.silent_ticks <= timing.hold_ticks;
   encoders.rest_ticks = rests ? std::min(encoders.rest_ticks + 1, timing.rest_ticks) : 0;
 }
 
-/// A rest that is long enough for a calibration, in this report.
+/// Whether this report completes a rest that is long enough for a calibration, and where.
 enum class Rest : std::uint8_t {
   none,
-  docked,    ///< where the first one was, or it is the first: calibrated
-  elsewhere  ///< a false sign of parking, or counts that were lost: nothing changes
+  docked,    ///< at the pose of the first calibration, or this is the first: calibrated
+  elsewhere  ///< a false parked bit, or lost counts: nothing changes
 };
 
-/// Whether a rest with these counts is where the first calibration was; a first one is.
+/// Whether these counts are those of the first calibration, within `dock_counts`. The first call
+/// stores them and returns true.
 [[nodiscard]] inline bool fits_dock(const std::array<std::int16_t, 3>& count,
                                     const std::array<std::int32_t, 3>& dock_counts,
                                     EncoderState& encoders) noexcept {
@@ -56,12 +57,12 @@ enum class Rest : std::uint8_t {
   return true;
 }
 
-/// One tick of the encoders, followed over the wrap at 16 bits. Parked at rest for `rest_ticks` and
-/// homed, at the dock, the counters start again, from 0 or from the device's absolute counts: that
-/// is the calibration. A report that is not fresh has no rest.
+/// One tick of the encoders, unwrapped beyond 16 bits. If the device is homed and has been parked
+/// at rest at its dock for `rest_ticks`, it is calibrated: the counters restart from 0, or from the
+/// device's absolute counts. Returns `Rest::none` for a report that is not fresh.
 ///
-/// During a rest no counter moves farther than `rest_counts` from its first value; on a device with
-/// absolute encoders, which a hand may hold still, none moves farther from one report to the next.
+/// At rest, no counter moves farther than `rest_counts` from its first value. On a device with
+/// absolute encoders, which a hand may hold, the limit is from one report to the next.
 template <class N>
 inline Rest follow_encoders(const DeviceReport& report, const DevicePlan<N>& device,
                             const SafetyTiming& timing, EncoderState& encoders) noexcept {
@@ -101,7 +102,7 @@ inline Rest follow_encoders(const DeviceReport& report, const DevicePlan<N>& dev
       static_cast<std::int16_t>(report.wiper_a[2]), static_cast<std::int16_t>(report.wiper_b[0])};
 }
 
-/// Adds a reading; `samples`, 1 to kMaxGimbalSamples, make up the sum.
+/// Adds a reading to the sum over the last `samples` readings, 1 to kMaxGimbalSamples.
 inline void follow_gimbal(const DeviceReport& report, std::size_t samples,
                           GimbalFilter& filter) noexcept {
   auto& oldest = filter.ring[filter.next];
@@ -173,7 +174,7 @@ template <class N>
 /// Motion of the tip since it was last known.
 struct TipMotion {
   bool overspeed = false;  ///< faster than the limit
-  bool leaves = false;     ///< with the force of the last tick
+  bool leaves = false;     ///< moves along the force of the last tick
 };
 
 /// Updates the tip. The energy ledger books the motion at the mean of the forces that were sent
@@ -212,7 +213,7 @@ template <class N>
 struct Sensed {
   DevicePose<N> pose;
   bool usable = false;  ///< a fresh report with a finite pose
-  bool leaves = false;  ///< the hand moves with the force of the last tick
+  bool leaves = false;  ///< the hand moves along the force of the last tick
   bool docked = false;  ///< parked at rest: calibrated in this tick
   WorldVec<typename N::Real> tip_mm;
   DeviceVec<typename N::Real> velocity_mm_per_s;
@@ -241,7 +242,7 @@ template <class N>
   state.tip_ticks += state.tip_ticks < UINT32_MAX ? 1U : 0U;
   if (sensed.usable) {
     state.jacobian_t_mm = sensed.pose.arm.jacobian_t_mm;
-    // The device rests, perhaps at another position than its counters showed so far.
+    // Calibration may change the counters, and so the tip, although the device rests.
     if (sensed.docked) state.velocity.begin_anew();
     const TipMotion motion = move_tip(plan, state, sensed.pose);
     seen.overspeed = motion.overspeed && !report.parked;

@@ -23,10 +23,10 @@ namespace kerf {
 /// (shared/wire/cartesian.hpp), and the orientation as a quaternion of 16-bit numbers: x, y, z in
 /// `wiper_a`, w in `wiper_b[0]`.
 ///
-/// `parked` is the sign that the hand is not at work: the stylus sits in the inkwell (Omni), the
+/// `parked` means that the device is not in use: the stylus is in the inkwell (Omni, Touch), the
 /// centre button of the grip is held (Falcon), the arm has not left the home pose since its
-/// calibration button was pressed (WoodenHaptics), the stylus sits in the inkwell (Touch), a button
-/// is held (Inverse3, omega). Parked at rest calibrates; motors stay off while parked.
+/// calibration button was pressed (WoodenHaptics), or a button is held (Inverse3, omega). Parking
+/// at rest calibrates the device; motors stay off while it is parked.
 struct DeviceReport {
   bool fresh = false;                      ///< false: nothing arrived since the last tick
   std::array<std::int16_t, 3> encoder{};   ///< counts, wrap at 16 bits
@@ -46,14 +46,14 @@ struct ServoCommand {
     select_tool,
     hold,
     fade_in,  ///< force starts again from 0: after a stall of the servo
-    reset,    ///< the volumes' first content, over several ticks; at once if nothing is cut
-    undo,     ///< the volumes before the last stroke, likewise; refused if there is none
-    redo,     ///< the stroke that was undone last again, likewise
-    mark      ///< nothing: a place in the log
+    reset,    ///< restores the volumes' first content, over several ticks; no-op without cutting
+    undo,     ///< restores the content before the last stroke, likewise; refused without one
+    redo,     ///< repeats the stroke that was undone last, likewise
+    mark      ///< changes nothing: marks a tick in the log
   };
   Kind kind = Kind::none;
   std::uint32_t argument = 0;  ///< index of the tool; hold: 1 on, 0 off
-  std::uint32_t arm = 0;       ///< which gets the tool; all else is for both
+  std::uint32_t arm = 0;       ///< that gets the tool; other kinds are for all arms
 };
 
 inline constexpr double kContactThresholdN = 0.01;  ///< a tick with more force is a contact tick
@@ -148,7 +148,7 @@ struct ServoOutput {
   std::array<double, 3> velocity_mm_per_s{};   ///< device port, as estimated
   std::array<double, 3> force_n{};             ///< sent to the hand, device port
   std::array<double, 3> contact_n{};           ///< part of it before limits, device port
-  std::array<double, 3> modification_n{};      ///< and of the cutting: reaction, or friction
+  std::array<double, 3> modification_n{};      ///< part from cutting: reaction, or friction
   std::array<double, 3> torque_n_mm{};         ///< motor torques
   std::array<double, 3> proxy_offset_mm{};     ///< from the tip to the proxy's, in the scene
   std::array<double, 3> tip_torque_n_mm{};     ///< of contact and cutting about the tip
@@ -156,7 +156,7 @@ struct ServoOutput {
   std::uint32_t plane_count = 0;  ///< of the planes that hold the tool
   double absorbed_mj = 0;         ///< SUM -F_sent . dx of the run; + = taken from the hand
   double port_minimum_mj = 0;     ///< lowest value of it so far
-  /// `absorbed_mj` by source, in steps of 2^-32 mJ: exact in fixed, and their sum is.
+  /// `absorbed_mj` by source, in steps of 2^-32 mJ; exact in fixed point, as is their sum.
   std::array<std::int64_t, kEnergySources> energy_steps{};
 
   double press_n = 0;        ///< normal force that cuts, in the scene
@@ -171,7 +171,7 @@ struct ServoOutput {
   std::uint64_t output_hash = 0;                                ///< chain over all ticks
 };
 
-/// A compiled scene that can be stepped, whatever numbers it computes in.
+/// A compiled scene that can be stepped, whatever its number type.
 ///
 /// `compile` makes one. `step`, `apply` and `penetration_mm` belong to the servo thread and are the
 /// functions of servo_step.hpp; the rest is constant, or may be read while no step runs.
@@ -181,10 +181,10 @@ class Servo {
 
   /// 1 or 2; constant.
   [[nodiscard]] virtual std::size_t arms() const noexcept = 0;
-  /// One tick of all arms; both spans are as long.
+  /// One tick of all arms; both spans have one element for each arm.
   virtual void step(std::span<const DeviceReport> reports,
                     std::span<ServoOutput> outputs) noexcept = 0;
-  /// The same of a scene with one arm.
+  /// The same for a scene with one arm.
   [[nodiscard]] ServoOutput step(const DeviceReport& report) noexcept {
     ServoOutput output;
     step(std::span(&report, 1), std::span(&output, 1));

@@ -31,7 +31,7 @@
 
 namespace kerf {
 
-/// Turns an exact sum of weighted gradients (voxel axes; docs/theory.md 7) into a force at the
+/// Converts an exact sum of weighted gradients (voxel axes; docs/theory.md 7) to a force at the
 /// device port (N): one matrix that holds pressure, sample volume, voxel size, rotation and
 /// workspace scale.
 ///
@@ -44,7 +44,8 @@ struct SumToForce {
 /// Fixed point: F = SUM_k mantissa[i][k] * (sum[k] >> pre_shift) >> post_shift, in Q15.16 N.
 ///
 /// `pre_shift` is chosen at load so that the largest possible sum keeps 38 bits; with 22-bit
-/// mantissas three products stay below 2^62. The sum itself is never cut: it saturates once, here.
+/// mantissas three products stay below 2^62. The exact sum is not limited before: it saturates only
+/// here.
 template <>
 struct SumToForce<FixedNumbers> {
   std::array<std::array<std::int32_t, 3>, 3> mantissa{};
@@ -77,13 +78,13 @@ template <class N>
   }
 }
 
-/// The methods: ways to compute contact and cut of one tool in one volume. A method is a line here,
-/// a step (method_step.cpp) and a part for load time (as
-/// controller/plan/method/method_splat.cpp): two places, because the loop includes nothing that
-/// allocates. All else comes from this list.
+/// The methods: ways to compute contact and cut of one tool in one volume. A method has a line
+/// here, a step (method_step.cpp) and a load-time part (such as
+/// controller/plan/method/method_splat.cpp). The two parts are separate because the loop includes
+/// nothing that allocates. Everything else is generated from this list.
 ///
-/// A line: the name, the class of the step, and a condition on the numbers `N`. The order is that
-/// of preference: the first whose condition holds is taken; that of the last one always holds.
+/// A line has the name, the class of the step, and a condition on the number type `N`. The order is
+/// by preference: the first method whose condition holds is taken; the last one's always holds.
 #define KERF_METHODS(METHOD)                                                                \
   /* The swept proxy alone: no sums, and nothing is cut. */                                 \
   METHOD(surface, SurfaceStep, true)                                                        \
@@ -108,7 +109,7 @@ inline constexpr int kAnglePerCountBits = 40;
 template <class N>
 struct JointPlan {
   typename N::Angle home_rad;          ///< where the count is 0; not of a Cartesian device
-  AnglePerCount<N> angle_per_count{};  ///< signed: the encoder's sense
+  AnglePerCount<N> angle_per_count{};  ///< signed by the encoder's direction
   /// Motor counts per torque, signed; of a Cartesian device, per force along an axis in N.
   typename N::Real counts_per_n_mm{};
 };
@@ -121,13 +122,14 @@ template <class N>
 struct DevicePlan {
   Personality personality = Personality::omni;
   std::array<JointPlan<N>, 3> joints{};
-  /// Encoders are absolute once the device is `homed`; else they count from the pose in which it
-  /// was parked at rest.
+  /// True: encoders are absolute once the device is `homed`. False: they count from the pose in
+  /// which it was parked at rest.
   bool absolute_encoders = false;
   static constexpr std::int32_t kNoDock = 1 << 15;
   /// Jitter of an encoder at an edge: how far a counter moves during a rest (sense.hpp).
   std::int32_t rest_counts = 2;
-  /// How far from its first calibration a joint may rest parked; `kNoDock`: anywhere.
+  /// Largest distance from the first calibration at which parking at rest calibrates a joint,
+  /// counts; `kNoDock`: any.
   std::array<std::int32_t, 3> dock_counts{kNoDock, kNoDock, kNoDock};
   SerialArm<N> serial{};  ///< of the Omni and WoodenHaptics
   DeltaArm<N> delta{};    ///< of the Falcon
@@ -157,13 +159,13 @@ struct SweptTool {
   ProxyPlan<N> proxy;
 };
 
-/// The tool cuts kCutAdvance inside of the surface that it rests on, so that its groove leaves it
-/// play (docs/theory.md 6.3); units of contact space. While it covers less than its force would cut
-/// it reaches deeper, up to kDeepestAdvance, and then slowly back.
+/// The tool cuts kCutAdvance deeper than the surface that it rests on, so that its groove leaves it
+/// play (docs/theory.md 6.3); units of contact space. While it covers less than its force would
+/// cut, the advance grows, up to kDeepestAdvance; afterwards it slowly returns.
 ///
-/// It may cover less because its inner samples end inside of its surface, by up to a pitch
-/// (SampleLattice::cover): its rims then rest on voxels that they cover little. A ball that is
-/// given by its radius has samples at its surface at six poles alone.
+/// It may cover less because its inner samples end below its surface, by up to a pitch
+/// (SampleLattice::cover): its rims then rest on voxels that they hardly cover. A ball that is
+/// given by its radius has samples on its surface at its six poles only.
 inline constexpr double kCutAdvance = 0.25, kDeepestAdvance = 1;
 
 /// Cutting by force; constant during a run. Arrays: by index of the plan's volumes.
@@ -226,7 +228,7 @@ struct ToolPlan {
   SampleTable samples;  ///< the same for the methods `gather` and `splat` in fixed point
   /// A round tool has the same samples in every orientation: they keep the volume's axes.
   bool round = false;
-  bool turns = true;              ///< with the stylus; else the tool keeps the world's axes
+  bool turns = true;              ///< rotates with the stylus; else keeps the world's axes
   typename N::Real rim_mm{};      ///< largest radius about the shaft
   typename N::Ratio steepness{};  ///< of its contacts' loads (covered_voxels.hpp)
   SweptTool<N> swept;             ///< for the swept proxy
@@ -262,7 +264,7 @@ struct ServoPlan {
   typename N::Real speed_limit_mm_per_tick{};
   std::int32_t rate_hz = 1000;
   bool pedalled = false;                   ///< nothing is cut without button 1
-  std::uint32_t stroke_pause_ticks = 250;  ///< without contact, or pedal; the stroke is over
+  std::uint32_t stroke_pause_ticks = 250;  ///< without contact, or pedal: ends the stroke
 };
 
 }  // namespace kerf

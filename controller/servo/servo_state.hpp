@@ -51,11 +51,12 @@ template <class N>
 struct ForceCutState {
   typename N::Real advance{kCutAdvance};
   SpindleState<N> spindle;
-  Vec<typename N::Real, ToolSpace> friction_n;  ///< of the next tick, force in the scene
+  Vec<typename N::Real, ToolSpace> friction_n;  ///< for the next tick, force in the scene
   std::array<PrestonState<N>, kMaxVolumes> volume{};
   std::array<std::span<CoveredEntry<N>>, kMaxVolumes> list{};  ///< scratch of one tick
 
-  /// A new tool stands still and has cut nothing; the budgets of the materials stay.
+  /// Resets the state for a new tool, which stands still and has cut nothing. Keeps the budgets of
+  /// the materials.
   constexpr void change_tool() noexcept {
     advance = typename N::Real(kCutAdvance);
     spindle = {};
@@ -85,7 +86,8 @@ struct Stroke {
 
 /// The last strokes, and bricks that may belong to the next (volume_restore.hpp). `pool` is a ring;
 /// indices in it only grow. An undo and a redo swap the bricks of a stroke with the volume's, so
-/// the entries of a stroke that is done are its past, those of an undone one its future.
+/// the entries of a done stroke hold the content before it, those of an undone stroke the content
+/// after it.
 struct StrokeState {
   enum class Motion : std::uint8_t { none, undo, redo };
 
@@ -95,12 +97,12 @@ struct StrokeState {
   std::uint32_t generation = 1;
   std::array<Stroke, kUndoLevels> strokes{};  ///< oldest first: `done`, then those undone, to `all`
   std::size_t done = 0, all = 0;
-  std::uint64_t from = 0, end = 0;  ///< of the stroke that continues, or waiting for one
-  bool open = false;                ///< it continues
-  bool lost = false;                ///< it is longer than its room; or would be, if it begins now
-  std::uint32_t quiet_ticks = 0;    ///< since the last contact; or since the pedal is up
-  Motion motion = Motion::none;     ///< what runs now, of
-  Stroke moving{};                  ///< the rest of this stroke
+  std::uint64_t from = 0, end = 0;  ///< of the open stroke; else, saved for the next one
+  bool open = false;                ///< a stroke has begun and not ended
+  bool lost = false;                ///< it is longer than its room, or would be if it began now
+  std::uint32_t quiet_ticks = 0;    ///< since the last contact, or since the pedal went up
+  Motion motion = Motion::none;     ///< undo or redo that runs now
+  Stroke moving{};                  ///< what is left of its stroke
 
   [[nodiscard]] constexpr bool can_undo() const noexcept {
     return motion == Motion::none && (open ? !lost : done > 0);
@@ -110,12 +112,12 @@ struct StrokeState {
   }
 };
 
-/// What goes back in the volumes by command, and what can: one for all arms of a scene.
+/// State of reset, undo and redo of the volumes; one for all arms of a scene.
 struct VolumeHistory {
   ResetState reset;
   StrokeState stroke;
 
-  /// Nothing is cut then, and no hand gets a force.
+  /// Whether one of them runs. Meanwhile nothing is cut, and no hand gets a force.
   [[nodiscard]] constexpr bool restores() const noexcept {
     return reset.runs || stroke.motion != StrokeState::Motion::none;
   }
@@ -127,12 +129,12 @@ struct EncoderState {
   std::array<std::int32_t, 3> unwrapped{};            ///< counts from home, beyond 16 bits
   std::array<std::int16_t, 3> rest_from{};            ///< reading with which the rest began
   std::optional<std::array<std::int16_t, 3>> dock{};  ///< reading of the first calibration
-  std::uint32_t rest_ticks = 0;                       ///< since it is parked and no joint turns
+  std::uint32_t rest_ticks = 0;                       ///< parked without a motion of a joint
   std::uint32_t silent_ticks = 0;                     ///< since the last report
 };
 
-/// Sliding sum over the gimbal readings of the last 20 ms: the pots' low bits are noise. Of a
-/// Cartesian device, the newest orientation.
+/// Sliding sum over the gimbal readings of the last 20 ms, because the pots' low bits are noise.
+/// For a Cartesian device, the newest orientation.
 struct GimbalFilter {
   std::array<std::array<std::uint16_t, 6>, kMaxGimbalSamples> ring{};
   std::array<std::uint32_t, 6> sum{};
@@ -158,9 +160,9 @@ struct ServoState {
   EncoderState encoders;
   GimbalFilter gimbal;
   std::uint32_t active_tool = 0;
-  bool pedal_down = true;            ///< in the last report; a plan without a pedal has it always
+  bool pedal_down = true;            ///< in the last report; always true without a pedal
   bool hold = false;                 ///< by command: force 0, nothing is cut
-  VolumeHistory* history = nullptr;  ///< of the compiled scene; null only where nothing is stepped
+  VolumeHistory* history = nullptr;  ///< of the compiled scene; null only if nothing is stepped
   [[nodiscard]] constexpr bool held() const noexcept {
     return hold || (history != nullptr && history->restores());
   }
@@ -170,10 +172,10 @@ struct ServoState {
   Rotation<N> rotation = identity_rotation<N>();
   bool tip_known = false;             ///< false before the first report
   std::uint32_t tip_ticks = 0;        ///< since the last tip
-  DeviceVec<Real> force_sum_n;        ///< sent in these ticks
-  DeviceVec<Real> moved_mm;           ///< to this tip, from the last one
-  std::uint32_t moved_ticks = 1;      ///< in so many ticks
-  DeviceVec<Real> velocity_mm_per_s;  ///< there
+  DeviceVec<Real> force_sum_n;        ///< sum of the forces sent in these ticks
+  DeviceVec<Real> moved_mm;           ///< from the last tip to this one
+  std::uint32_t moved_ticks = 1;      ///< ticks that this took
+  DeviceVec<Real> velocity_mm_per_s;  ///< at this tip
   LawMemory velocity;
   LawMemory force_law;
   LawMemory stabiliser;
@@ -187,8 +189,8 @@ struct ServoState {
   std::uint64_t output_hash = kFnv1aBasis;
 };
 
-/// An arm of the scene: a device with a tool. Two arms have the same volumes, one after the other
-/// in each tick, and everything else of their own.
+/// An arm of the scene: a device with a tool. Two arms use the same volumes, one after the other in
+/// each tick; everything else is separate.
 template <class N>
 struct Arm {
   const ServoPlan<N>* plan = nullptr;

@@ -17,25 +17,25 @@ struct SafetyTiming {
 
   std::uint32_t sparse_share = 20;  ///< see `sparse_ticks`
 
-  /// So many ticks in which the force falls for want of reports are a fault; 1 / `sparse_share` of
-  /// the ticks in which it does not are taken off. Twice `zero_ticks`: of gaps of 19 ms in a row
-  /// the fourth latches, and a single one is forgotten after 0.3 s. A device that reports each 7 ms
-  /// latches after 0.4 s; one that keeps within `hold_ticks` never.
+  /// Limit of a count of the ticks in which the force falls because reports are missing; each other
+  /// tick reduces it by 1 / `sparse_share`. At the limit the fault latches. Twice `zero_ticks`: of
+  /// gaps of 19 ms in a row the fourth latches, and a single gap is forgotten after 0.3 s. A device
+  /// that reports every 7 ms latches after 0.4 s, one that reports within `hold_ticks` never.
   [[nodiscard]] constexpr std::uint32_t sparse_ticks() const noexcept { return 2 * zero_ticks; }
 };
 
 /// What the supervisor saw in this tick.
 struct SafetyInputs {
   bool fresh = false;
-  bool parked = false;      ///< the device says so in this report
-  bool calibrated = false;  ///< and has rested there for `rest_ticks`
-  bool misplaced = false;   ///< it has, but elsewhere than in its first calibration
-  bool homed = true;        ///< its encoders have a meaning
+  bool parked = false;      ///< as the device reports it
+  bool calibrated = false;  ///< parked at rest for `rest_ticks`
+  bool misplaced = false;   ///< the same, but at another pose than in its first calibration
+  bool homed = true;        ///< the encoder counts are valid
   bool finite = true;
   bool overspeed = false;
 };
 
-/// State machine in front of the motors. Motors are on only while it says so; a fault latches until
+/// State machine of the motors. They are on in `ramping` and `active` only; a fault latches until
 /// the device has been parked at rest again.
 ///
 ///   off --report--> calibrating --rest--> armed --taken--> ramping --fade in--> active
@@ -44,9 +44,10 @@ struct SafetyInputs {
 ///                     '---- homing lost --+-------------------+-------------------'
 ///                                         '-- rest -- fault <-- any fault, of either
 ///
-/// The parked bit alone switches the motors off, but only rest calibrates and clears: one corrupt
-/// packet must neither move the tip nor forgive a fault. A rest elsewhere than in the first
-/// calibration is a fault of its own: a false sign of parking would move the world.
+/// The parked bit alone switches the motors off, but only parking at rest calibrates and clears a
+/// fault, because one corrupt packet must do neither. Parking at rest at another pose than in the
+/// first calibration is itself a fault: with a false parked bit, a calibration there would shift
+/// the scene.
 struct Supervisor {
   Phase phase = Phase::off;
   Fault fault = Fault::none;
@@ -61,14 +62,14 @@ struct Supervisor {
   }
 };
 
-/// Latches a fault; also one that shows only after the force was computed.
+/// Latches a fault, also one that is found only after the force was computed.
 constexpr void latch(Fault fault, Supervisor& s) noexcept {
   s.fault = fault;
   s.phase = Phase::fault;
 }
 
-/// Books a tick with motors on: reports that come again and again just before the force is zero
-/// would shake the hand with it.
+/// Counts a tick with motors on. Reports that arrive again and again just before the force is zero
+/// would shake the hand.
 constexpr void count_sparse(const SafetyTiming& timing, Supervisor& s) noexcept {
   if (s.stale_ticks > timing.hold_ticks) {
     s.sparse += timing.sparse_share;
@@ -124,14 +125,14 @@ constexpr void supervise(const SafetyTiming& timing, const SafetyInputs& in,
   if (s.phase == Phase::ramping && ++s.fade_ticks >= timing.fade_in_ticks) s.phase = Phase::active;
 }
 
-/// Fades the force in again, where it was in.
+/// Starts the fade-in again, if the motors are on.
 constexpr void restart_fade(Supervisor& s) noexcept {
   if (!s.motors_on()) return;
   s.phase = Phase::ramping;
   s.fade_ticks = 0;
 }
 
-/// Share of the held force that is left after `stale_ticks` without a report, as numerator over
+/// Fraction of the held force that is left after `stale_ticks` without a report, as numerator over
 /// `zero_ticks - hold_ticks`: all of it up to hold_ticks, none from zero_ticks on.
 [[nodiscard]] constexpr std::uint32_t stale_fraction(const SafetyTiming& timing,
                                                      std::uint32_t stale_ticks) noexcept {

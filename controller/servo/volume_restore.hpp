@@ -73,12 +73,12 @@ inline void mark_cut(const VoxelGrid& grid, const VoxelBox& cut,
   }
 }
 
-/// Blocks that a tick may check for a cut: 8 KiB of words.
+/// Most blocks that a tick checks for a cut: 8 KiB of words.
 inline constexpr int kBlocksPerTick = 1024;
 
-/// Bricks that a tick may restore; the mirror copies as many again. 64 take 20 us with cold caches,
-/// a fiftieth of a tick at 1 kHz, and 8 take as much of one at 8 kHz. If gradients are stored a
-/// brick takes 80 times as long: 25 us.
+/// Most bricks that a tick restores; the mirror also copies each of them. 64 take 20 us with cold
+/// caches, a fiftieth of a tick at 1 kHz, and 8 take the same fraction of a tick at 8 kHz. If
+/// gradients are stored, a brick takes 80 times as long: 25 us.
 [[nodiscard]] constexpr int bricks_per_tick(std::int32_t rate_hz, bool gradients) noexcept {
   const int bricks = static_cast<int>(
       std::clamp<std::int32_t>(64 * 1000 / std::max<std::int32_t>(rate_hz, 1), 8, 64));
@@ -119,7 +119,8 @@ void forget_debts(Arms<N> arms, std::size_t v) noexcept {
   }
 }
 
-/// Ends a reset or an undo: every tool stands, and has cut nothing of the restored content.
+/// Ends a reset, undo or redo: resets the cutting state of every tool, and fades the force in
+/// again.
 template <class N>
 void end_restoring(Arms<N> arms) noexcept {
   for (const Arm<N>& arm : arms) {
@@ -128,8 +129,8 @@ void end_restoring(Arms<N> arms) noexcept {
   }
 }
 
-/// One tick of a reset that runs: bricks of one block; sets `changed` by volume of the scene. The
-/// last tick of a reset ends it.
+/// One tick of a running reset: restores bricks of one block, and sets `changed` by volume of the
+/// scene. The last tick ends the reset.
 template <class N>
 void restore_some(Arms<N> arms, std::array<VoxelBox, kMaxVolumes>& changed) noexcept {
   const ServoPlan<N>& plan = *arms.front().plan;
@@ -184,15 +185,15 @@ inline void keep_within(std::size_t room, StrokeState& stroke) noexcept {
   while (stroke.all > 0 && stroke.end - stroke.strokes[0].begin > room) forget_oldest(stroke);
 }
 
-/// Notes that a brick of the next cut finds no room: the stroke that continues is lost, with all
-/// before it, or the one that may begin in this tick.
+/// Called if a brick of the next cut has no room. The open stroke and all before it are lost; if
+/// none is open, the stroke that may begin in this tick is lost.
 inline void lose_stroke(StrokeState& stroke) noexcept {
   stroke.lost = true;
   if (stroke.open) stroke.done = stroke.all = 0;
 }
 
-/// The next entry of the pool, for which the oldest strokes make room; null, and the stroke is
-/// lost, if it has no room of its own left.
+/// Returns the next entry of the pool, and drops the oldest strokes to make room for it. If the
+/// stroke itself has used up its room, it is lost, and the result is null.
 inline KeptBrick* entry_for_brick(StrokeState& stroke) noexcept {
   const std::size_t pool = stroke.pool.size(), room = stroke_room(pool);
   if (stroke.end - stroke.from >= (stroke.open ? room : pool - room)) {
@@ -203,8 +204,8 @@ inline KeptBrick* entry_for_brick(StrokeState& stroke) noexcept {
   return &stroke.pool[static_cast<std::size_t>(stroke.end++ % pool)];
 }
 
-/// Keeps the bricks around a tool at `centre_vox`, each once a stroke. Copies at most the bricks of
-/// the tool's box, of which the cut that follows weighs every voxel.
+/// Saves the bricks around a tool at `centre_vox`, each once per stroke. Copies at most the bricks
+/// of the tool's box; the cut that follows visits each voxel of that box anyway.
 template <class N>
 void keep_bricks(const ServoPlan<N>& plan, ServoState<N>& state, std::size_t v,
                  const VoxelVec<typename N::Real>& centre_vox) noexcept {
@@ -247,7 +248,7 @@ void keep_bricks(const ServoPlan<N>& plan, ServoState<N>& state, std::size_t v,
   }
 }
 
-/// Ends the stroke that continues: bricks that are saved from now on belong to the next one.
+/// Ends the open stroke: bricks that are saved from now on belong to the next one.
 inline void close_stroke(StrokeState& stroke) noexcept {
   if (!stroke.lost) {
     if (stroke.done == kUndoLevels) forget_oldest(stroke);
@@ -269,8 +270,9 @@ inline void forget_strokes(StrokeState& stroke) noexcept {
   forget_waiting(stroke);
 }
 
-/// At the end of a tick without restoring: a cut begins or continues a stroke and drops those that
-/// were undone; a pause in which no tool `holds_on`, by contact or by the pedal, ends it.
+/// Called at the end of a tick that restores nothing. A cut begins a stroke, which drops the undone
+/// ones, or continues it. `pause_ticks` without a cut and without a tool that `holds_on`, by
+/// contact or by the pedal, end it.
 inline void follow_stroke(std::uint32_t pause_ticks, bool cuts, bool holds_on,
                           StrokeState& stroke) noexcept {
   if (cuts && !stroke.open) {
@@ -287,8 +289,8 @@ inline void follow_stroke(std::uint32_t pause_ticks, bool cuts, bool holds_on,
   if (stroke.quiet_ticks >= pause_ticks) close_stroke(stroke);
 }
 
-/// Starts to undo the last stroke, even if it is not over. Returns false if there is none, or it
-/// was too long.
+/// Starts to undo the last stroke, even if it has not ended. Returns false if there is none, or if
+/// it was too long.
 inline bool begin_undo(StrokeState& stroke) noexcept {
   if (!stroke.can_undo()) return false;
   if (stroke.open) {
@@ -301,7 +303,7 @@ inline bool begin_undo(StrokeState& stroke) noexcept {
   return true;
 }
 
-/// Starts to cut the stroke again that was undone last. Returns false if there is none.
+/// Starts to repeat the stroke that was undone last. Returns false if there is none.
 inline bool begin_redo(StrokeState& stroke) noexcept {
   if (!stroke.can_redo()) return false;
   forget_waiting(stroke);
@@ -310,8 +312,8 @@ inline bool begin_redo(StrokeState& stroke) noexcept {
   return true;
 }
 
-/// Swaps one brick with the volume's. Returns its box; adds what comes back to `returned`, what
-/// goes to `removed`.
+/// Swaps a saved brick with that of the volume. Returns its box; adds the density that comes back
+/// to `returned`, and the density that goes to `removed`.
 template <class N>
 VoxelBox swap_brick(const ServoPlan<N>& plan, KeptBrick& kept, ServoState<N>& state,
                     std::uint64_t& returned, std::uint64_t& removed) noexcept {
@@ -338,8 +340,8 @@ VoxelBox swap_brick(const ServoPlan<N>& plan, KeptBrick& kept, ServoState<N>& st
   return box;
 }
 
-/// One tick of an undo or a redo that runs: bricks of one volume that are close to each other;
-/// writes them to `out`. The last tick ends it.
+/// One tick of a running undo or redo: swaps bricks of one volume that are close to each other, and
+/// reports their box in `out`. The last tick ends it.
 template <class N>
 void swap_some(Arms<N> arms, ServoOutput& out) noexcept {
   constexpr std::int32_t kWidest = BrickBlocks::kEdge * kBrickEdge;  // as a block of a reset

@@ -35,13 +35,13 @@ class ErrorStats {
   std::size_t count_ = 0;
 };
 
-/// Errors of a method. Forces are shares of p0 pi R^2, works shares of the work that goes to
-/// and fro on the way.
+/// Errors of a method. Forces are relative to p0 pi R^2. Loop work is |SUM dW| relative to
+/// SUM |dW| along the loop.
 struct ContactErrors {
   ErrorStats theory;         ///< |F - F_theory|
-  ErrorStats direction_deg;  ///< between the two, if theory has a tenth of full scale
+  ErrorStats direction_deg;  ///< between the two, if theory has at least a tenth of full scale
   ErrorStats normal_deg;     ///< of one sample at the voxels on the face, against the true normal
-  ErrorStats sample_loop;    ///< closed loops of one sample about a place on the face
+  ErrorStats sample_loop;    ///< closed loops of one sample about a point on the face
   ErrorStats tool_loop;      ///< the same of the whole tool, about the contact
   ErrorStats step;           ///< |dF| per kStepMm along the face
 };

@@ -47,7 +47,7 @@ struct ContactChoice {
   friend bool operator==(const ContactChoice&, const ContactChoice&) = default;
 };
 
-/// Returns true if the servo has it, in its kernels or templates; else it is the lab's plain code.
+/// Whether it is code of the servo, its kernels or templates; if not, it is plain code of the lab.
 [[nodiscard]] bool is_servos(const ContactChoice& choice);
 
 /// A round tool, sampled as a scene's tool of this radius and pitch would be.
@@ -59,8 +59,8 @@ struct BallTool {
 };
 [[nodiscard]] BallTool ball_tool(double radius_mm, double pitch_mm);
 
-/// A choice at work on one volume, which it refers to. Sums are of the density's gradient over the
-/// samples, in full densities per voxel edge; places in voxels.
+/// A choice applied to one volume, which must outlive it. Sums are of the density's gradient over
+/// the samples, in full densities per voxel edge; positions in voxels.
 class ContactMethod {
  public:
   ContactMethod() = default;
@@ -79,8 +79,8 @@ class ContactMethod {
                                                             const AnalyticVolume& volume,
                                                             const BallTool& tool);
 
-/// Contact force at a place in mm over p0 pi R^2, the largest that the ball can feel on a flat:
-/// F = -p0 a^3 SUM grad_mm, a the pitch.
+/// Contact force at a position in mm, relative to p0 pi R^2, the largest force of the ball on a
+/// flat: F = -p0 a^3 SUM grad_mm, a the pitch.
 [[nodiscard]] Point force_share(const ContactMethod& method, const AnalyticVolume& volume,
                                 const BallTool& tool, Point centre_mm);
 

@@ -20,7 +20,7 @@ struct Figure {
   std::string unit;
 };
 
-/// A knob in one position, all others at the servo's.
+/// One value of one parameter of the contact; all others have the servo's values.
 struct Entry {
   std::string knob, value;
   /// The servo without the method `aligned`: one measurement, in each knob.

@@ -47,7 +47,7 @@ struct Shape {
 /// Enamel of full density around a dentin of 0.6.
 [[nodiscard]] Shape layered_ball(Point centre, double radius_mm, double enamel_mm);
 
-/// A shape in voxels, antialiased over one voxel edge. The place (0, 0, 0) mm is the centre of the
+/// A shape in voxels, antialiased over one voxel edge. The point (0, 0, 0) mm is the centre of the
 /// voxel with index n / 2 along each axis.
 struct AnalyticVolume {
   VoxelGrid grid;
@@ -63,7 +63,7 @@ struct AnalyticVolume {
 
 /// The `i`-th of `count` directions that cover the sphere evenly (Fibonacci lattice).
 [[nodiscard]] Point spread_direction(std::size_t i, std::size_t count);
-/// The `i`-th place of an even cover of the cube from -1 to 1 (Halton sequence, bases 2, 3, 5).
+/// The `i`-th point of an even cover of the cube from -1 to 1 (Halton sequence, bases 2, 3, 5).
 [[nodiscard]] Point spread_place(std::size_t i);
 
 /// The ball at a position in which it dips into a shape.

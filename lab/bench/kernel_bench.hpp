@@ -26,7 +26,7 @@ struct KernelRow {
 };
 
 /// Times the servo's kernels against the paper's form on 256 x 256 x 161 voxels, in this process on
-/// this core. `told` hears each row as it is ready. Takes about a minute.
+/// this core. Calls `told` with each row when it is ready. Takes about a minute.
 [[nodiscard]] std::vector<KernelRow> bench_kernels(
     const std::function<void(const KernelRow&)>& add_row);
 
@@ -37,9 +37,9 @@ struct KernelRow {
 [[nodiscard]] std::vector<KernelRow> bench_layout(
     const std::function<void(const KernelRow&)>& add_row);
 
-/// Times one query of the swept contact, and one turn of its tool, on 256 x 256 x 161 voxels, in
-/// this process on this core. The paper has no such thing: ratios divide the plain loop's time.
-/// Takes some seconds.
+/// Times one query of the swept contact, and one rotation of its tool, on 256 x 256 x 161 voxels,
+/// in this process on this core. The paper has neither: ratios are relative to the plain loop's
+/// time. Takes some seconds.
 [[nodiscard]] std::vector<KernelRow> bench_queries(
     const std::function<void(const KernelRow&)>& add_row);
 

@@ -10,7 +10,7 @@
 
 namespace kerf::two_machines {
 
-/// One row of the table: a link, a load, and the goals of the bridge there.
+/// One row of the table: a link, a load, and the goals of the bridge for them.
 struct Case {
   std::string name;
   LinkSettings link;
@@ -35,7 +35,7 @@ struct CaseResult {
 [[nodiscard]] std::vector<Case> table_cases();
 [[nodiscard]] std::vector<Case> quick_cases();
 
-/// Joins over the case's link, looks for `seconds`, then holds still and compares.
+/// Joins over the case's link, measures for `seconds`, then stops milling and compares.
 [[nodiscard]] CaseResult run_case(const Case& what, const BridgeFiles& files, double seconds);
 
 /// Sudden ends of either side while the volume is milled, one after the other.
@@ -57,14 +57,13 @@ struct StoppedResult {
 [[nodiscard]] StoppedResult run_stopped(const BridgeFiles& files, double seconds,
                                         std::int32_t layers);
 
-/// What publishing a tick costs the servo, in pairs of turns without and with a bridge and a
-/// viewer.
+/// What publishing a tick costs the servo, in pairs of runs without and with a bridge and a viewer.
 struct PublishResult {
-  /// Of one figure over the turns, us.
+  /// Of one figure over the runs, us.
   struct Spread {
     double least = 0, median = 0, most = 0;
   };
-  int pairs = 0;   ///< of turns; fewer than asked for: a viewer did not join
+  int pairs = 0;   ///< of runs; fewer than requested if a viewer did not join
   int slower = 0;  ///< of them, in which p99 was larger with the bridge
   Spread alone_p50, alone_p99, bridged_p50, bridged_p99;
 };

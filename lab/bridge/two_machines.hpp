@@ -19,7 +19,7 @@
 
 #include "lab/run/child_process.hpp"
 
-/// Two machines on this one: network namespaces, a bad link between them, and a bridge over it.
+/// Two emulated machines: network namespaces, an impaired link between them, and a bridge over it.
 namespace kerf::two_machines {
 
 /// The behaviour of a link, the same for each direction.
@@ -30,8 +30,8 @@ struct LinkSettings {
   std::uint64_t seed = 1;  ///< the same losses for the same packets
 };
 
-/// One direction of a link, in its caller's time: it loses packets, sends them one after the other
-/// at its rate from a queue of 100 ms, which drops the excess, and then it delays.
+/// One direction of a link, in its caller's time. It loses packets, sends the others one after
+/// another at its rate from a queue of 100 ms, which drops the excess, and then delays them.
 class Link {
  public:
   using Packet = std::vector<std::byte>;
@@ -54,13 +54,13 @@ class Link {
     return true;
   }
 
-  /// The time at which the next packet comes out; empty if none is on its way.
+  /// The time at which the next packet arrives; empty if none is in flight.
   [[nodiscard]] std::optional<std::int64_t> next_ns() const {
     if (queue_.empty()) return std::nullopt;
     return queue_.front().due_ns;
   }
 
-  /// The next packet that is out by `now_ns`.
+  /// The next packet that has arrived by `now_ns`.
   [[nodiscard]] std::optional<Packet> take(std::int64_t now_ns) {
     if (queue_.empty() || queue_.front().due_ns > now_ns) return std::nullopt;
     Packet out = std::move(queue_.front().packet);
@@ -101,16 +101,16 @@ class File {
 /// Exit code if this machine forbids network namespaces, as ctest knows it.
 inline constexpr int kSkipped = 77;
 
-/// Two networks of their own, as two machines have them, and a link between. The link forwards
-/// packets, so TCP sees losses, delays and rates as from a real one. Everything else (processor,
-/// memory, files, clocks) is this machine's. Goes with its owner.
+/// Two separate networks, like those of two machines, and a link between them. The link forwards
+/// packets, so TCP sees losses, delays and rates as on a real one. Everything else (processor,
+/// memory, files, clocks) is this machine's. The destructor removes it.
 class TwoNetworks {
  public:
   static constexpr const char* kNearAddress = "10.77.0.1";
   static constexpr const char* kFarAddress = "10.77.0.2";
   enum class Side { near, far };
 
-  /// To be made before the process has a second thread. Throws `NoNamespaces`.
+  /// Construct it before the process has a second thread. Throws `NoNamespaces`.
   explicit TwoNetworks(const LinkSettings& settings);
   ~TwoNetworks();
   TwoNetworks(const TwoNetworks&) = delete;
@@ -145,8 +145,8 @@ class TwoNetworks {
   std::thread relay_;
 };
 
-/// Once, before the first `TwoNetworks` and a second thread: the right to make namespaces, if this
-/// user has it only in a user namespace of its own. Throws `NoNamespaces`.
+/// Gets the right to make namespaces, if this user has it only in a user namespace of its own. Call
+/// it once, before the first `TwoNetworks` and a second thread. Throws `NoNamespaces`.
 void enter_user_namespace();
 
 /// Sleeps; throws `HilError` if a signal asks for the end, so that all that was started ends.
@@ -193,8 +193,8 @@ class BridgePair {
   std::unique_ptr<sweep::Child> serve_;
 };
 
-/// Of a process: seconds of processor time so far, and MiB that it has for itself alone (not what
-/// it maps of a segment).
+/// Cost of a process: seconds of processor time so far, and MiB of private memory (without the
+/// mapped segment).
 struct ProcessCost {
   double cpu_s = 0;
   double own_mib = 0;

@@ -66,9 +66,9 @@ class MilledVolume {
   std::thread servo_;
 };
 
-/// A reader of the far segment that polls every 2 ms for the newest state of one tick. Its age is
-/// the time since the near segment had that tick: both are in this process, so no clock has to be
-/// trusted.
+/// A reader of the far segment that polls every 2 ms for the newest state of one tick. The age of
+/// that state is the time since the near segment had its tick; both are in this process, so one
+/// clock serves.
 class FarViewer {
  public:
   /// Waits for the segment `name` until it is there.

@@ -10,7 +10,8 @@
 namespace kerf::sweep {
 
 /// One demo in lock-step, as `./kerf demo --virtual` runs it: kerf-controller and kerf-emulator,
-/// two processes over a socket. So its bits are the demo's, and the end of a run ends no other.
+/// two processes over a socket. So its results are equal to the demo's to the bit, and a run that
+/// ends or fails does not affect another one.
 struct CellJob {
   std::string scene;
   std::string device;                         ///< empty: one of the settings says it
@@ -20,19 +21,19 @@ struct CellJob {
   std::string name;                           ///< of the controller; no other may have it
 };
 
-/// What a run gave: a column of the table each, in the order of `result_columns`; numbers and
-/// hashes of the programs' reports, empty if a run did not come to its report. Nothing in it
-/// depends on time.
+/// The results of a run, one for each column of the table, in the order of `result_columns`:
+/// numbers and hashes from the programs' reports; empty if a run ended before its report. Nothing
+/// in them depends on time.
 struct CellResult {
   int exit = 0;
   std::vector<std::string> values;
-  std::string message;  ///< why it failed; empty: it did not
+  std::string message;  ///< why it failed; empty if it did not
 };
 
 [[nodiscard]] const std::vector<std::string>& result_columns();
 
-/// The one line with which the emulator refuses the options of `job`; empty: it takes them. Its
-/// files go to `folder`, which exists.
+/// The line with which the emulator refuses the options of `job`; empty if it accepts them. Its
+/// files are written to `folder`, which exists.
 [[nodiscard]] std::string emulator_refusal(const CellJob& job, const std::filesystem::path& folder,
                                            const std::atomic<bool>& stop);
 

@@ -31,9 +31,9 @@ struct HandRun {
   std::uint64_t faults = 0;  ///< ticks in which one was latched
 };
 
-/// `scene` is for an Omni; its torques are set to those of the emulated unit. The same arguments
-/// give the same run, but for its times; it has at least one tick. Throws HilError if the hand
-/// does not get to its script.
+/// `scene` is for an Omni; its torque scale is set to that of the emulated unit. The same arguments
+/// give the same run, except for its times; it has at least one tick. Throws HilError if the hand
+/// does not reach the start of its script.
 [[nodiscard]] HandRun run_hand(LoadedScene scene, const HandScript& hand, double seconds);
 
 /// Force above a frequency, over the mean force, in windows of 128 ticks wholly in contact.
@@ -44,7 +44,7 @@ struct Chatter {
 };
 [[nodiscard]] Chatter chatter_of(const HandRun& run, double cutoff_hz);
 
-/// Force faster than a hand moves is chatter from here on.
+/// From this frequency on, a change of the force is chatter, because no hand moves as fast.
 inline constexpr double kChatterHz = 150;
 
 /// scenes/NAME.toml with the phantom of this effort. Throws LoadError if it cannot be read.
@@ -60,8 +60,8 @@ inline constexpr double kChatterHz = 150;
 struct Press {
   double depth_mm, paper_n, proxy_n;
 };
-/// At an update rate: the speed of a straight stroke from which on a hand can get through the face
-/// without one tick of force. Up to 10 m/s: there the supervisor stops every hand.
+/// For an update rate, the lowest speed at which a straight stroke can pass the face without one
+/// tick of force. Up to 10 m/s, where the supervisor stops every hand.
 struct Loss {
   double rate_hz;
   std::optional<double> paper_mm_per_s, proxy_mm_per_s;

@@ -65,14 +65,14 @@ void measure_slides(const Effort& effort, const RowSink& add_row);
 void measure_edge_slides(const Effort& effort, const RowSink& add_row);
 /// The contact's normal if the iso is not half of full density.
 void measure_isos(const Effort& effort, const RowSink& add_row);
-/// Tools that are no balls, on flats, in any pose.
+/// Tools that are not balls, on flats, in any pose.
 void measure_shapes(const Effort& effort, const RowSink& add_row);
 /// Their part that slides over a bump of 40 units, and the one that rests on sharp edges.
 void measure_shape_slides(const Effort& effort, const RowSink& add_row);
 void measure_shape_edges(const Effort& effort, const RowSink& add_row);
 /// F11: removal by force in the whole servo, and the force on the hand. Few cases at any effort.
 void measure_cutting(const Effort& effort, const RowSink& add_row);
-/// Random search for positions at which a pressing tool stops cutting, or soft material holds it.
+/// Random search for positions at which a pressing tool stops cutting, or is held by soft material.
 void measure_traps(const Effort& effort, const RowSink& add_row);
 /// Time of a tick.
 void measure_ticks(const Effort& effort, const RowSink& add_row);
@@ -102,9 +102,9 @@ struct WorstCase {
   Density iso;
 };
 
-/// Solids that cost a query or a sweep much: flat, sharp, hollow, hardly wider than the tool,
-/// noisy, and tissue with contact everywhere and solid nowhere; and the tooth of a CT, if `data`
-/// has it. Throws LoadError if that cannot be read.
+/// Solids for which a query or a sweep is expensive: flat, sharp, hollow, hardly wider than the
+/// tool, noisy, and tissue with contact everywhere and solid nowhere; and the tooth of a CT, if
+/// `data` has it. Throws LoadError if that cannot be read.
 [[nodiscard]] std::vector<WorstCase> worst_cases(const std::filesystem::path& data);
 
 /// The costliest tick that was found.

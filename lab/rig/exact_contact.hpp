@@ -81,18 +81,19 @@ class ShaftTouch {
         to_volume_(matrix_of(volume.pose.orientation)),
         voxel_mm_(*std::ranges::min_element(volume.image.spacing_mm)) {}
 
-  /// The least load of the head, 0..1 of the press, if the hand presses the tool along `press`: the
-  /// part that no contact of the shaft without friction can bear. By Moreau's decomposition that is
-  /// the longest part of the press along a direction that the shaft leaves free; at an edge a
-  /// direction says more than a normal. A direction is free if the shaft may move one voxel along
-  /// it and gets deeper nowhere; within that tolerance, the added depth is no load of the head. 1
-  /// if it touches nothing. `rotation` row-major, world from tool.
+  /// Smallest fraction of the press (0..1) that the head must carry if the hand presses the tool
+  /// along `press`, because no frictionless contact of the shaft can. By Moreau's decomposition
+  /// this is the largest component of the press along a direction in which the shaft is free,
+  /// meaning that it can move one voxel without penetrating deeper. (Directions also describe the
+  /// contact at an edge, where a normal does not.) A small extra depth, up to `kDeeperVox`, is
+  /// tolerated and subtracted. 1 if the shaft touches nothing. `rotation` row-major, world from
+  /// tool.
   [[nodiscard]] double least_head_share(const SceneTool& tool, Point centre_mm,
                                         const std::array<double, 9>& rotation, Point press) const {
     const std::vector<Place> places = places_of(tool, centre_mm, rotation);
     const Point down = unit(press);
     double share = 0;
-    for (int i = 0; i < kWays; ++i) {  // over the half sphere about it
+    for (int i = 0; i < kWays; ++i) {  // over the half sphere about `down`
       const double along = 1 - static_cast<double>(i) / kWays;
       if (along <= share) break;
       const double deeper = deeper_along(places, way_about(down, along, i), along - share);
@@ -102,24 +103,24 @@ class ShaftTouch {
   }
 
  private:
-  /// A contact rests within so much of the iso-surface (docs/theory.md 3.6), in the finest voxels:
-  /// so much is the shaft grown.
+  /// The shaft is enlarged by this, in the finest voxels: a contact rests within this distance of
+  /// the iso-surface (docs/theory.md 3.6).
   static constexpr double kNearVox = 0.15;
-  /// As deep as a wedged tool may be (docs/theory.md 4.2), in the finest voxels. If it gets so
-  /// much deeper the shaft is held.
+  /// Depth that a wedged tool may have (docs/theory.md 4.2), in the finest voxels. A direction in
+  /// which the shaft penetrates deeper by more than this is not free.
   static constexpr double kDeeperVox = 0.05;
-  /// Density rises by so much a voxel in the ramp of a face of two.
+  /// Rise of the density per voxel in the ramp of a face that is two voxels wide.
   static constexpr double kRamp = kDensityMax / 2.0;
   static constexpr int kWays = 10000;  ///< 1.5 degrees apart over a half sphere
 
-  /// A place of the shaft's surface near the solid, and the density that it may have after a way
+  /// A point of the shaft's surface near the solid, and the density that it may have after a move
   /// without being deeper.
   struct Place {
     Point at;
     double most;
   };
 
-  /// The i-th way, so far along `down`.
+  /// The i-th direction to test; its component along `down` is `along`.
   [[nodiscard]] static Point way_about(Point down, double along, int i) {
     const Point x = unit(cross(down, std::abs(down[0]) < 0.7 ? Point{1, 0, 0} : Point{0, 1, 0}));
     const Point y = cross(down, x);
@@ -128,8 +129,8 @@ class ShaftTouch {
     return along * down + across * std::cos(angle) * x + across * std::sin(angle) * y;
   }
 
-  /// How much deeper the shaft gets by one voxel along a way, in voxels; 1 if that is more than
-  /// `most` or than the way may cost.
+  /// How much deeper the shaft gets by moving one voxel along `way`, in voxels; 1 if this exceeds
+  /// `most` or `kDeeperVox`.
   [[nodiscard]] double deeper_along(const std::vector<Place>& places, Point way,
                                     double most) const {
     const double end = std::min(most, kDeeperVox);

@@ -209,7 +209,8 @@ constexpr PartWords kSweepWords{
     .not_opened = "",
     .not_written = "cannot be written; make room, then give the same command again"};
 
-/// The part in a folder that is made for it. Throws `HilError` if the folder has a finished sweep.
+/// Path of the partial results in `folder`, which is created. Throws `HilError` if that fails, or
+/// if the folder holds a finished sweep.
 std::filesystem::path part_in(const std::filesystem::path& folder) {
   std::error_code error;
   std::filesystem::create_directories(folder, error);

@@ -40,9 +40,9 @@
 /// Each side holds a lock on a byte of the file, which ends with its process: one adapter and one
 /// controller at a time. The file of a killed adapter is used again, by a new session.
 ///
-/// Whoever reads checks what it reads: no content of the page can do more than send a packet that
-/// its decoder accepts or refuses. The file must not be cut while it is mapped (SIGBUS, as for any
-/// mapped file); only its owner can.
+/// Each side checks what it reads: no content of the page can do more than send a packet that
+/// its decoder accepts or refuses. The file must not be truncated while it is mapped (SIGBUS, as
+/// for any mapped file); only its owner can do that.
 namespace kerf {
 
 /// A page that cannot be made, taken or trusted. One line: "place: value; remedy".
@@ -51,7 +51,7 @@ class ArmPageError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// What an adapter is at. `closing` and `failed` are the end of its session.
+/// State of an adapter. `closing` and `failed` are the end of its session.
 enum class ArmState : std::uint8_t { starting, running, closing, failed };
 inline constexpr std::array<std::string_view, 4> kArmStateWords{"starting", "running", "closing",
                                                                 "failed"};
@@ -106,11 +106,11 @@ class ArmPageAdapter final : public ArmPage {
   /// Makes the page of `name`, or takes over that of a dead adapter. Throws ArmPageError with one
   /// line if a live adapter has it, or if there is no file.
   ArmPageAdapter(const std::string& name, Personality device, int rate_hz);
-  /// The file goes, unless the process was killed.
+  /// Removes the file. (If the process is killed, it stays.)
   ~ArmPageAdapter();
 
-  /// A session that has ended stays so. Text beyond kTextBytes - 1 is cut; of two threads that
-  /// write one at the same moment, one text is left out.
+  /// A session that has ended never returns to an earlier state. Text beyond kTextBytes - 1 is
+  /// truncated; if two threads write at the same moment, one text is dropped.
   void set_state(ArmState state, std::string_view text) noexcept;
   /// Adds a report; gives it the next number, from 1 on. Wait-free.
   void publish(CartesianReport report, std::int64_t now_ns) noexcept;
@@ -127,7 +127,7 @@ class ArmPageAdapter final : public ArmPage {
 /// handler.
 class ArmPageController final : public ArmPage {
  public:
-  /// What was found in place of an adapter that runs.
+  /// Why there is no running adapter.
   enum class Absence : std::uint8_t { no_adapter, starting, over };
 
   /// Opens the page of `name`, takes its lock and leaves no command on it. If no adapter runs, the
@@ -145,7 +145,7 @@ class ArmPageController final : public ArmPage {
   /// Reports that were overwritten before they were taken.
   [[nodiscard]] std::uint64_t overrun() const noexcept { return overrun_; }
 
-  /// False if all places are in hand of other threads. Wait-free.
+  /// False if all places are in use by other threads. Wait-free.
   bool send(const cartesian::CommandBytes& packet, std::int64_t now_ns) noexcept;
 
   /// Whether the session has ended, by its state or by another one in its place.

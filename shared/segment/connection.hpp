@@ -8,8 +8,8 @@
 #include "shared/segment/command.hpp"
 #include "shared/segment/reader.hpp"
 
-// The path of a controller's socket, and the reader's end of the connection. The rest is in common
-// with the server.
+// The path of a controller's socket, and the reader's end of the connection. The server uses the
+// rest of this file, too.
 
 namespace kerf {
 
@@ -24,7 +24,7 @@ namespace kerf {
 /// The connection of a reader to a controller. One thread.
 class SegmentConnection {
  public:
-  SegmentConnection(int socket, SegmentReader reader) noexcept;  ///< takes `socket` over
+  SegmentConnection(int socket, SegmentReader reader) noexcept;  ///< takes ownership of `socket`
   SegmentConnection(SegmentConnection&& other) noexcept;
   SegmentConnection& operator=(SegmentConnection&& other) noexcept;
   ~SegmentConnection();
@@ -73,7 +73,7 @@ class OwnedFd {
   int fd_ = -1;
 };
 
-/// A lock that dies with its holder, even by SIGKILL: `NAME.lock` beside the socket.
+/// A lock that ends with its process, even by SIGKILL: `NAME.lock` beside the socket.
 class NameLock {
  public:
   /// Throws `SegmentError` if a live process holds the name.

@@ -41,7 +41,7 @@ inline constexpr std::uint64_t kSegmentMagic = [] {
 }();
 inline constexpr std::uint32_t kLayoutMajor = 1;
 inline constexpr std::uint32_t kLayoutMinor = 4;
-inline constexpr std::uint32_t kStateSlots = 4096;  // 4.1 s at 1 kHz: as long as a reader may stop
+inline constexpr std::uint32_t kStateSlots = 4096;  // 4.1 s at 1 kHz: longest pause of a reader
 inline constexpr std::uint32_t kDirtySlots = 4096;
 inline constexpr std::uint64_t kMaxSceneBytes = std::uint64_t{1} << 26;  // a reader copies it whole
 inline constexpr std::uint32_t kMaxBricks = 1U << 21;  // of one volume: 1024^3 voxels, 2 GiB
@@ -139,7 +139,7 @@ struct TickRecord {
   float proxy_offset_mm[3];
   std::int16_t dac_counts[3];
   std::uint16_t phase;    ///< of the servo's safety
-  std::uint32_t removed;  ///< density units taken away in this tick; in an undo: given back
+  std::uint32_t removed;  ///< density units removed in this tick; in an undo: restored
   double port_energy_j;   ///< work that the loop took from the hand since the start of the run
   double port_minimum_j;  ///< its lowest value so far: below 0 the loop gave more than it took
   float joint_torque_n_mm[3];
@@ -153,7 +153,7 @@ struct TickRecord {
   std::uint32_t last_command;   ///< Command::index of the last one applied; 0: none yet
   float tip_torque_n_mm[3];
   float spindle_ratio;
-  std::int32_t raw[11];  ///< as they came: kRaw... below
+  std::int32_t raw[11];  ///< as received from the device: kRaw... below
   float press_n;         ///< normal force that cuts, in the scene
   // By `EnergySource`, in mJ with 32 fraction bits. Their sum is `port_energy_j`.
   std::int64_t energy_spring;
@@ -183,7 +183,7 @@ struct TickRecord {
   return record.seq / 2 - 1;
 }
 
-/// The checksum that a tick record carries: of all bytes between its sequence number and it.
+/// The checksum of a tick record: of all bytes between its sequence number and its checksum.
 [[nodiscard]] inline std::uint32_t tick_record_crc(const TickRecord& record) noexcept {
   constexpr std::size_t kFirst = offsetof(TickRecord, tick);
   return crc32c(
@@ -199,21 +199,21 @@ inline constexpr std::uint32_t kFlagDeviceFault = 1U << 6;
 inline constexpr std::uint32_t kFlagMotorsOn = 1U << 7;
 inline constexpr std::uint32_t kFlagParked = 1U << 8;
 inline constexpr std::uint32_t kFlagStarted = 1U << 9;
-inline constexpr std::uint32_t kFlagForbidden = 1U << 10;  ///< pressed on what may not be cut
-inline constexpr std::uint32_t kFlagRefused = 1U << 11;    ///< the tool has no free place
+inline constexpr std::uint32_t kFlagForbidden = 1U << 10;  ///< pressed on a forbidden material
+inline constexpr std::uint32_t kFlagRefused = 1U << 11;    ///< no free position near the hand
 inline constexpr std::uint32_t kFlagShaft = 1U << 12;      ///< pressed with shaft or handpiece
-inline constexpr std::uint32_t kFlagReset = 1U << 13;      ///< volumes go back to what they were
-inline constexpr std::uint32_t kFlagUndo = 1U << 14;       ///< the last stroke is undone
-inline constexpr std::uint32_t kFlagUndoable = 1U << 15;   ///< it can be
-inline constexpr std::uint32_t kFlagRedo = 1U << 16;       ///< an undone stroke is cut again
-inline constexpr std::uint32_t kFlagRedoable = 1U << 17;   ///< it can be
+inline constexpr std::uint32_t kFlagReset = 1U << 13;      ///< a reset of the volumes runs
+inline constexpr std::uint32_t kFlagUndo = 1U << 14;       ///< an undo runs
+inline constexpr std::uint32_t kFlagUndoable = 1U << 15;   ///< an undo is possible
+inline constexpr std::uint32_t kFlagRedo = 1U << 16;       ///< a redo runs
+inline constexpr std::uint32_t kFlagRedoable = 1U << 17;   ///< a redo is possible
 inline constexpr std::uint32_t kFlagPedal = 1U << 18;      ///< nothing is cut without button 1
 
-/// Bits of `command`: the kind of the command, as `ServoCommand` has it, and behind it a restart of
+/// Bits of `command`: the kind of the command, as in `ServoCommand`, and one bit for a restart of
 /// the force after a stall of the servo.
 inline constexpr std::uint32_t kCommandKind = 0xff;
 inline constexpr std::uint32_t kCommandFadeIn = 1U << 8;
-inline constexpr std::uint32_t kCommandMark = 7;  ///< a kind: a place in the log, nothing else
+inline constexpr std::uint32_t kCommandMark = 7;  ///< a kind: only marks a tick in the log
 
 inline constexpr std::size_t kRawEncoder = 0;  ///< first of 3
 inline constexpr std::size_t kRawPot = 3;      ///< first of 6

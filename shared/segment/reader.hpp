@@ -67,7 +67,7 @@ enum class ReadState : std::uint8_t {
   ok,
   not_yet,  ///< the index is not published
   overrun,  ///< the slot holds a later record: the reader was too slow
-  busy,     ///< never came whole within the tries; the writer may have died in it
+  busy,     ///< no consistent copy within the tries; the writer may have died while writing
 };
 
 /// A read-only view of a segment. Never waits and never writes; each call has a bounded number of
@@ -87,8 +87,8 @@ class SegmentReader {
 
   // Arms: 0 is the first, and an arm that the segment does not have has no records.
 
-  /// The newest tick record of an arm that came whole; none before the first one. Two calls may be
-  /// of two ticks: `second_of` is of one.
+  /// The newest tick record of an arm that could be read consistently; none before the first one.
+  /// Two calls may return records of different ticks; `second_of` returns one of the same tick.
   [[nodiscard]] std::optional<TickRecord> latest(std::size_t arm = 0) const noexcept;
   /// The second arm's record of the tick of `first`, a record of the first arm; none with one arm,
   /// or if it is no longer in the ring.
@@ -114,9 +114,9 @@ class SegmentReader {
   /// copy. If the result is `consistent`, the density is exactly the volume of `tick`.
   void update(std::size_t volume, VolumeSnapshot& snapshot) const;
 
-  // For a reader that keeps bricks instead, of several volumes at one tick. Between `epoch` and
-  // `unchanged_since` it reads what changed; if both are even and equal, its bricks are of that
-  // tick.
+  // For a reader that keeps bricks instead, of several volumes at one tick. It calls `epoch`, reads
+  // what changed, and calls `unchanged_since`. If the epoch is even and did not change, all bricks
+  // are of its tick.
 
   /// Version word of the whole publication.
   [[nodiscard]] std::uint64_t epoch() const noexcept;

@@ -23,18 +23,19 @@ struct MirrorSpec {
   std::uint64_t start_ns = 0;
   std::uint32_t tick_ns = 0;
   std::uint32_t scene_bytes = 0;
-  std::string build_id;                   ///< cut to 63 characters
+  std::string build_id;                   ///< truncated to 63 characters
   std::size_t arms = 1;                   ///< 1..kMaxArms
-  std::vector<VolumeDescriptor> volumes;  ///< off_labels not 0: has labels; no other offset counts
+  std::vector<VolumeDescriptor> volumes;  ///< off_labels not 0: has labels; other offsets unused
   std::uint64_t most_bytes = std::uint64_t{1} << 31;  ///< a larger segment is refused
 };
 
-/// The writer of a segment that repeats another machine's: same session, text, bricks, versions and
-/// records, so that every reader runs on it unchanged. Outside the servo; one thread.
+/// The writer of a copy of another machine's segment: same session, text, bricks, versions and
+/// records, so that every reader works on it unchanged. Outside the servo; one thread.
 ///
 /// The order is put_scene and put_labels (before a reader has the segment), then for each state of
-/// the volume begin_pass, put_brick (0 or more), end_pass. Readers see a pass whole or know that
-/// they do not. Data for a brick or record that the segment does not have is a `SegmentError`.
+/// the volumes begin_pass, put_brick (0 or more), end_pass. Readers see a complete pass or detect
+/// that it is not complete. Data for a brick or record that the segment does not have is a
+/// `SegmentError`.
 class ReplicaWriter {
  public:
   /// Checks `spec`, which may be hostile, before it asks for memory. Throws `SegmentError`.
@@ -50,12 +51,12 @@ class ReplicaWriter {
   /// The labels of a brick, x fastest; those beyond the far faces are dropped.
   void put_labels(std::size_t volume, std::uint32_t brick, std::span<const std::byte> labels);
 
-  /// From here on no reader takes the volumes for those of one tick.
+  /// From now on readers do not treat the volumes as those of one tick.
   void begin_pass(Tick tick) noexcept;
   /// `version` is even and above the brick's last one; `densities` are 1024 bytes.
   void put_brick(std::size_t volume, std::uint32_t brick, std::uint64_t version,
                  std::span<const std::byte> densities);
-  /// The volumes are those of `tick`.
+  /// From now on the volumes are those of `tick`.
   void end_pass(Tick tick) noexcept;
 
   /// A record of a ring; `seq` and the checksum are filled in. An index that is not above the last

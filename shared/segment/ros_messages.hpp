@@ -9,7 +9,7 @@
 
 #include "shared/segment/layout.hpp"
 
-// Tick records as messages of ROS 2, for programs that know nothing of kerf: Foxglove, PlotJuggler.
+// Tick records as ROS 2 messages, for programs that do not know kerf: Foxglove, PlotJuggler.
 
 namespace kerf {
 
@@ -39,8 +39,8 @@ class RosMessages {
  public:
   explicit RosMessages(std::uint64_t tick_ns) noexcept;
 
-  /// Whether a tick has a message of this topic: tip and force come 100 times a second, since the
-  /// tick has all of them, and no tip before docking.
+  /// Whether a tick has a message of this topic. Tip and force are sent only 100 times a second,
+  /// because the messages of `ros_tick` have all values. There is no tip before docking.
   [[nodiscard]] bool has(RosTopic topic, const TickRecord& record) const noexcept;
   /// The message, of an arm's record; valid until the next call.
   [[nodiscard]] std::string_view message(RosTopic topic, const TickRecord& record,

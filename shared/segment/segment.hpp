@@ -14,7 +14,7 @@
 #include "shared/segment/layout.hpp"
 #include "shared/volume/brick_grid.hpp"
 
-// A segment before its writer: errors, what it is made from, the plan of its parts, its memory.
+// What a segment's writer starts from: errors, the content at tick 0, the layout plan, the memory.
 
 namespace kerf {
 
@@ -54,7 +54,7 @@ struct SegmentSpec {
   std::string scene_json;
   std::uint64_t config_hash = 0;
   std::uint32_t tick_ns = 1'000'000;
-  std::string build_id;        ///< cut to 63 characters
+  std::string build_id;        ///< truncated to 63 characters
   std::size_t arms = 1;        ///< 1..kMaxArms; each has a ring of tick records
   bool mirror_updates = true;  ///< false if nothing is cut: no dirty ring and no brick updates
 };
@@ -69,7 +69,7 @@ struct SegmentPlan {
 /// Checks `spec` and lays it out. Throws `SegmentError`.
 [[nodiscard]] SegmentPlan plan_segment(const SegmentSpec& spec);
 
-/// Cuts `build_id` to the room in the header.
+/// Sets `build_id` in the header, truncated to the room there.
 void set_build_id(SegmentHeader& header, std::string_view build_id);
 
 /// Fills the constant fields and all offsets, from the sizes of the volumes (`off_labels` not 0:
@@ -89,7 +89,7 @@ class SegmentMemory {
   SegmentMemory& operator=(SegmentMemory&& other) noexcept;
   ~SegmentMemory();
 
-  /// From here on no process can resize it, and no other can map it writable or write it.
+  /// From now on no process can resize it, and no other process can map it writable or write it.
   void seal();
 
   [[nodiscard]] int fd() const noexcept { return fd_; }

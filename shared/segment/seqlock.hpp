@@ -12,14 +12,14 @@
 
 namespace kerf {
 
-/// The one protocol by which data crosses the segment: a seqlock in the form with fences (Boehm).
+/// The protocol of all data that changes in the segment: a seqlock with fences (Boehm).
 ///
 ///     writer   version = odd (relaxed); fence(release); words (relaxed); version = even (release)
 ///     reader   v = version (acquire); words (relaxed); fence(acquire); version (relaxed) == v?
 ///
-/// Every shared word goes through `atomic_ref`, so there is no data race to begin with; the fences
-/// order data against version. ThreadSanitizer knows no fences: under KERF_TSAN each data word is a
-/// release store or an acquire load instead, which orders the same.
+/// Every shared word is accessed through `atomic_ref`, so there is no data race; the fences order
+/// data against version. ThreadSanitizer does not support fences: under KERF_TSAN each data word is
+/// a release store or an acquire load instead, which gives the same order.
 namespace shared_words {
 
 #ifdef __cpp_lib_atomic_ref
@@ -113,8 +113,8 @@ struct RecordRing {
     shared_words::word(head).store(++published, std::memory_order_release);
   }
 
-  /// Continues at `index`, which grows; the records between are never written. Their slots get the
-  /// version of the next round being written, which readers report as `ReadState::overrun`.
+  /// Continues at `index`, if that is ahead. The records in between are never written: their slots
+  /// get the odd version of the next round, which readers report as `ReadState::overrun`.
   void skip_to(std::uint64_t index) noexcept {
     if (index <= published) return;
     const std::uint64_t round = mask + 1;

@@ -16,17 +16,18 @@
 namespace kerf {
 
 /// Bricks copied into the mirror per tick, over all volumes: 64^3 voxels, 512 KiB. A 16^3 tool
-/// touches 27; what is beyond waits for the next ticks, so a whole-volume reset cannot cost a
-/// deadline.
+/// touches 27. Further bricks wait for the next ticks, so that a reset of a whole volume cannot
+/// miss a deadline.
 inline constexpr std::uint32_t kMaxBricksPerTick = 512;
 
-/// Hash of the densities in a box that changed, which lies in the volume `linear`; 0 if it touches
-/// more than kMaxBricksPerTick bricks.
+/// Hash of the densities in a changed box of the volume `linear`; 0 if the box touches more than
+/// kMaxBricksPerTick bricks.
 [[nodiscard]] std::uint64_t changed_box_hash(const BrickGrid& bricks,
                                              std::span<const Density> linear,
                                              const VoxelBox& box) noexcept;
 
-/// The one writer of a segment: a sealed memfd, mapped, populated, the volumes in it as tick 0.
+/// The only writer of a segment: owns a sealed memfd, mapped and populated, with the volumes of
+/// tick 0.
 ///
 /// `create` and the destructor run outside the servo. The members marked *servo* are called by one
 /// thread: wait-free, no system call, no allocation; they write the segment and never read it. The
@@ -52,9 +53,9 @@ class SegmentWriter {
   /// *Servo.* Ticks grow and start at 1; a tick that does not grow counts as the last one plus 1.
   void begin_tick(Tick tick) noexcept;
 
-  /// *Servo.* `linear` is the whole volume, x fastest; it is read in `end_tick`, and in later ones
-  /// while bricks wait, so it outlives the writer. Records the box in the dirty ring.
-  /// Returns the hash of the densities in the box, as the record has it; 0 if it is too large.
+  /// *Servo.* `linear` is the whole volume, x fastest. `end_tick` reads it, and later ones do while
+  /// bricks wait, so it must outlive the writer. Records the box in the dirty ring. Returns the
+  /// hash of the densities in the box, as in the record; 0 if the box is too large.
   std::uint64_t publish_box(std::size_t volume, std::span<const Density> linear,
                             const VoxelBox& changed, std::uint32_t removed,
                             DirtyCause cause = DirtyCause::milling) noexcept;

@@ -65,7 +65,7 @@ int with_pose(char id, const Use& use) noexcept {
   });
 }
 
-/// Writes where the caller asks for it.
+/// Writes unless `out` is null.
 template <class T>
 void give(T* out, T value) noexcept {
   if (out != nullptr) *out = value;

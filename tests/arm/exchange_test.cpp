@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// One turn between a vendor's frame and the page, in the time of the test.
+// The exchange between a vendor's frame and the page, in the time of the test.
 #include <array>
 #include <cmath>
 #include <cstdint>

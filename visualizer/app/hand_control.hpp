@@ -72,7 +72,7 @@ class PointerHand {
   bool spent_ = false;  ///< the press that is held has ended
 };
 
-/// What a SpaceMouse of 3Dconnexion holds: six axes and the first button.
+/// State of a SpaceMouse of 3Dconnexion: six axes and the first button.
 ///
 /// x points right, y to the user, z down; the rotations are right-handed about them. An axis gives
 /// how far the cap is pushed, -1 to 1; the cap springs back, and then gives 0.
@@ -81,29 +81,31 @@ struct SpaceMouseState {
   bool button = false;
 };
 
-/// Takes an input report as it comes from hidraw, its identity first; false, and `state` as it was,
-/// if it is none. There are two layouts, of numbers of 16 bits, the lower byte first:
+/// Parses a hidraw input report that starts with its report ID. If it is not one of the reports
+/// below, returns false and leaves `state` unchanged. There are two layouts, of 16-bit
+/// little-endian numbers:
 ///
 ///     1 x y z, 2 rx ry rz      7 bytes each
 ///     1 x y z rx ry rz         13 bytes
 ///     3 buttons                2 to 8 bytes, a bit for each
 ///
-/// A number beyond +-350, which is where the cap ends, counts as that.
+/// A number is clamped to +-350, the end of the cap's travel.
 bool take_report(std::span<const std::uint8_t> report, SpaceMouseState& state) noexcept;
 
-/// Adds what a SpaceMouse holds, if one is connected, to what keys and a gamepad hold: the cap
-/// moves and tilts the hand, its first button presses. Never waits. One thread.
+/// Adds the state of a SpaceMouse, if one is connected, to that of keys and gamepad: the cap moves
+/// and tilts the hand, its first button presses. Never waits. One thread.
 class SpaceMouse {
  public:
-  /// Puts the next report into the bytes; its size, 0 if none has come, negative once the device
-  /// is gone.
+  /// Writes the next report into the bytes. Returns its size, 0 if there is none, or a negative
+  /// number once the device is gone.
   using Read = std::function<int(std::span<std::uint8_t>)>;
 
   /// The first one that is connected now; it is not looked for again.
   SpaceMouse();
   explicit SpaceMouse(Read read) : read_(std::move(read)) {}
 
-  /// Once a frame. What the user has to know, once: it cannot be opened, or was drawn out.
+  /// Once a frame. Returns each problem that the user has to know once: the device cannot be
+  /// opened, or was unplugged.
   [[nodiscard]] std::optional<std::string> step(HeldControls& held);
 
  private:

@@ -34,7 +34,7 @@ class GlContext {
   [[nodiscard]] virtual ContextKind kind() const noexcept = 0;
 
  protected:
-  /// For whoever has made a context, once it is current.
+  /// Derived classes call this once the context is current.
   static void watch_for_faults();
 };
 
@@ -49,11 +49,11 @@ class GlContext {
 /// reset the GPU: nothing that the context holds can be drawn any more.
 void throw_if_context_is_lost();
 
-/// Gets GL's message about an error, of undefined behaviour, or of anything of high severity, on
-/// the thread of the call that did it and before that returns.
+/// Called with GL debug messages about errors, undefined behaviour or high severity, synchronously
+/// on the calling thread.
 using GlFaultHandler = void (*)(const std::string& text);
-/// Contexts made from now on are debug contexts that report to `handler`; none: ordinary ones
-/// again. For tests: it slows every call.
+/// From now on, new contexts are debug contexts that report to `handler`, or ordinary contexts if
+/// `handler` is null. For tests: it slows every call.
 void report_gl_faults(GlFaultHandler handler) noexcept;
 [[nodiscard]] bool gl_faults_are_reported() noexcept;
 

@@ -10,7 +10,7 @@
 
 namespace kerf {
 
-/// A picture off the screen: RGBA8 colour and 32-bit float depth.
+/// An off-screen picture: RGBA8 colour and 32-bit float depth.
 class RenderTarget {
  public:
   explicit RenderTarget(PictureSize size);
@@ -28,9 +28,10 @@ class RenderTarget {
   void restrict_to(std::span<const PixelRect> parts);
   void restrict_to(const PixelRect& part) { restrict_to({&part, 1}); }
 
-  /// Makes it the place to draw, with its whole size as the viewport and its bounds as the scissor.
+  /// Binds the framebuffer, with the whole size as the viewport and the bounds as the scissor.
   void bind() const;
-  /// Calls `draw` for each part, which is the scissor meanwhile; the bounds are again afterwards.
+  /// Calls `draw` once per part with the scissor set to it, then sets the scissor back to the
+  /// bounds.
   template <class Draw>
   void for_parts(const Draw& draw) const {
     for_parts(parts_, draw);
@@ -47,19 +48,19 @@ class RenderTarget {
   /// Draws one triangle over each of `parts`, with the program in use.
   void cover(std::span<const PixelRect> parts) const;
   void cover() const { cover(parts_); }
-  /// Takes colour and depth of `part` over from a target of the same size.
+  /// Copies colour and depth of `part` from a target of the same size.
   void copy(const RenderTarget& from, const PixelRect& part) const;
-  /// Takes the colour of `part` of another target over, to the same place or to one `right` pixels
-  /// farther right; all of it must fit.
+  /// Copies the colour of `part` of another target to the same pixels of this one, or to those
+  /// `right` pixels farther right; all of it must fit.
   void copy_colour(const RenderTarget& from, const PixelRect& part, int right = 0) const;
-  /// Takes the colours of `parts` over from a smaller picture of the same, filtered. Leaves the
-  /// scissor at the last part.
+  /// Upscales `parts` from a smaller image of the same picture, with filtering. Leaves the scissor
+  /// at the last part.
   void enlarge(const RenderTarget& from, std::span<const PixelRect> parts) const;
   /// RGB, 3 bytes per pixel, first row at the top. Waits until the picture is complete.
   [[nodiscard]] std::vector<std::uint8_t> read_rgb() const;
   /// Window depth 0..1, first row at the top.
   [[nodiscard]] std::vector<float> read_depth() const;
-  /// The same of `part`, which lies inside, first row at the bottom.
+  /// Window depth 0..1 of `part`, which lies inside the picture; first row at the bottom.
   [[nodiscard]] std::vector<float> read_depth(const PixelRect& part) const;
 
  private:

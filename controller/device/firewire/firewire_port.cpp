@@ -25,9 +25,11 @@ constexpr std::uint8_t kStreams = 0x08;  // of the control register
 constexpr std::array<std::uint8_t, 4> kModeBytes{0x00, 0x00, 0x0F, 0xF8};  // as on the bus
 
 // In ticks.
-constexpr int kRetryTurns = 20;  // an answer that does not come
-constexpr int kSilentTurns = 8;  // a stream that is armed and yet silent: before forces have faded
-constexpr int kYieldTurns = 3;   // neutral packets before a stream stops
+// A refused or unanswered request is repeated after this many ticks.
+constexpr int kRetryTicks = 20;
+// An active stream silent for this many ticks is set up again, before the force has faded.
+constexpr int kSilentTurns = 8;
+constexpr int kYieldTurns = 3;  // neutral packets before a stream stops
 constexpr std::uint32_t kHousekeepingTurns = 64;
 
 constexpr int kConnectMs = 4000;  // a recent bus reset alone holds allocations back for a second
@@ -165,7 +167,7 @@ void FirewirePort::tend() noexcept {
     case State::claiming:
       if (!refused_ && listen_.channel >= 0 && talk_.channel >= 0 && open_streams()) {
         arm();
-      } else if (refused_ && turns_ >= kRetryTurns) {
+      } else if (refused_ && turns_ >= kRetryTicks) {
         yield();
         claim();
       }
@@ -175,7 +177,7 @@ void FirewirePort::tend() noexcept {
         state_ = State::streaming;
         muted_ = false;
         turns_ = 0;
-      } else if (stale_ || turns_ >= kRetryTurns) {
+      } else if (stale_ || turns_ >= kRetryTicks) {
         renew();
       }
       break;
@@ -211,7 +213,7 @@ void FirewirePort::yield() noexcept {
   listen_ = talk_ = {};
 }
 
-/// A context dies only with its open, so both files are opened again.
+/// An isochronous context is freed only when its file is closed, so both files are reopened.
 bool FirewirePort::open_streams() noexcept {
   refused_ = true;  // until all steps succeed
   for (FirewireFile* file : {&received_, &transmitted_}) {

@@ -7,7 +7,7 @@
 #include <string>
 #include <string_view>
 
-// A client of HTTP and WebSocket in plain words: Boost.Beast stands behind it, in one source file.
+// A small client of HTTP and WebSocket. Only its source file includes Boost.Beast.
 
 namespace kerf::inverse3 {
 
@@ -23,14 +23,15 @@ struct HttpAnswer {
   std::string body;
 };
 
-/// One GET on a connection of its own. Throws std::runtime_error with the reason, without a place:
-/// refused, no answer within the time, no HTTP; and within 20 ms of `stop`. Only the name of a host
-/// is looked up without a limit of ours.
+/// One GET on a connection of its own. Throws std::runtime_error with the reason (refused, timeout,
+/// not HTTP) but without the address, or within 20 ms after `stop` is set. Name resolution alone
+/// has no timeout.
 [[nodiscard]] HttpAnswer http_get(const HostPort& where, const std::string& path, int timeout_ms,
                                   const std::atomic<bool>& stop);
 
-/// One connection, text messages both ways; no pings and no compression of its own, and no delay of
-/// small packets. One thread. A message above `kMostMessageBytes` ends the connection.
+/// One connection, text messages in both directions. It sends no pings, compresses nothing, and
+/// sends small packets at once (TCP_NODELAY). One thread. A message above `kMostMessageBytes` ends
+/// the connection.
 class WebSocket {
  public:
   /// Connects and upgrades. Throws std::runtime_error as `http_get`.
@@ -44,8 +45,8 @@ class WebSocket {
   [[nodiscard]] bool send(std::string_view text, int timeout_ms) noexcept;
 
   enum class Got : std::uint8_t { text, binary, nothing, lost };
-  /// Waits until `until_ns` of CLOCK_MONOTONIC for a message, which `message` returns then. In the
-  /// past: takes one that is there.
+  /// Waits for a message until `until_ns` of CLOCK_MONOTONIC; `message` then returns it. If
+  /// `until_ns` is in the past, takes only a message that has already arrived.
   [[nodiscard]] Got receive(std::int64_t until_ns) noexcept;
   /// The last one, until the next `receive`.
   [[nodiscard]] std::string_view message() const noexcept;

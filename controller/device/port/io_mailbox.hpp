@@ -14,7 +14,7 @@
 #include "shared/posix/threads.hpp"
 
 // Between the servo and the I/O thread of a port: core and priority of that thread, packets in both
-// directions, and the turn on a half-duplex line.
+// directions, and when the host may send on a half-duplex line.
 //
 // The packets pass without a lock, a system call or an allocation: the writer of a slot publishes
 // it with release, the reader checks it with acquire, and the other way round for an empty slot.
@@ -35,24 +35,26 @@ inline void become(const IoThread& io) noexcept {
   static_cast<void>(set_fifo(io.priority));
 }
 
-/// The turn on a half-duplex line, where a device answers each command once. A command that waits
-/// for its turn can be replaced by a newer one; in the buffer of the device it could only grow old.
+/// When the host may send on a half-duplex line, where a device answers each command once: after
+/// all answers, or after kPatienceNs without one. A command that waits in the host can be replaced
+/// by a newer one; in the buffer of the device it would only become outdated.
 ///
-/// Times in ns of any clock that goes forward. One thread.
+/// Times in ns of any clock that never goes back. One thread.
 class Turns {
  public:
-  /// An answer that takes longer counts as lost, and the host has the turn again.
+  /// An answer that takes longer counts as lost, and the host may send again.
   static constexpr std::int64_t kPatienceNs = 4'000'000;
 
+  /// Whether the host may send.
   [[nodiscard]] bool ours(std::int64_t now_ns) const noexcept {
     return unanswered_ == 0 || now_ns >= answer_due_ns_;
   }
-  /// A command has left, in its turn or out of it.
+  /// A command was sent, whether the host was allowed to or not.
   void sent(std::int64_t now_ns) noexcept {
     unanswered_ = ours(now_ns) ? 1 : unanswered_ + 1;
     answer_due_ns_ = now_ns + kPatienceNs;
   }
-  /// An answer has come; or a command is known not to have arrived.
+  /// An answer has arrived, or a command is known not to have arrived.
   void answered() noexcept { unanswered_ = std::max(unanswered_ - 1, 0); }
 
  private:
@@ -60,7 +62,7 @@ class Turns {
   std::int64_t answer_due_ns_ = 0;
 };
 
-/// A packet between the threads; one longer than kMaxBytes is cut.
+/// A packet between the threads; one longer than kMaxBytes is truncated.
 struct MailboxPacket {
   static constexpr std::size_t kMaxBytes = 64;
 

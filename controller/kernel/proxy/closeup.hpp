@@ -18,7 +18,7 @@
 
 namespace kerf {
 
-/// The contact of a tool that is no ball is refined while it is at most so deep, or so high. At an
+/// The contact of a tool that is not a ball is refined if its depth is within +-kCloseDepth. At an
 /// edge the samples of the point shell report the tool up to 0.4 units higher than it is.
 inline constexpr double kCloseDepth = 0.4;  ///< units
 
@@ -34,8 +34,8 @@ struct CloseSamples {
   PointNumber<N> middle[3] = {}, radius{};
   std::int32_t count = 0;
 
-  /// Copies the samples of the cells within kCloseRadius of the offset `around`; of too many,
-  /// kMostClose of them, evenly spread.
+  /// Copies the samples of the cells within kCloseRadius of the offset `around`; at most kMostClose
+  /// of them, evenly spread.
   constexpr void take(const CloseTable<N>& table, const PointNumber<N> (&around)[3]) noexcept {
     constexpr std::int32_t kFine = 16;  // steps of a cell
     using Number = PointNumber<N>;

@@ -233,8 +233,9 @@ constexpr void keep(ConstraintSet<N>& constraints, const ConstraintSet<N>& older
   }
 }
 
-/// Adds the planes of a position that turned out too deep, `displacement` ahead, that also hold the
-/// tool at its current position, to 0.02 units. Returns whether there was one.
+/// Adds constraint planes found at a rejected trial position, `displacement` from here: those that
+/// the trial reaches or violates and that the current position satisfies, each within 0.02 units.
+/// Returns whether one was added.
 template <class N>
 [[nodiscard]] constexpr bool add_blocking_planes(
     ConstraintSet<N>& constraints, const Contacts<N>& seen,
@@ -254,8 +255,8 @@ template <class N>
 }
 
 /// Curvature of the solid around a tool in a bowl or a slot hardly wider than itself. The positions
-/// that its centre may take form a hollow; over a step `moved` the normal turns by (across . moved)
-/// / radius along `across`. Radius 0: no bowl, or unknown.
+/// that its centre may take form a hollow; over a step `moved` the normal rotates by
+/// (across . moved) / radius along `across`. Radius 0: no bowl, or unknown.
 template <class N>
 struct Curve {
   ContactVec<typename N::Unit> across{};
@@ -275,12 +276,13 @@ class CurvatureEstimate {
   using Real = typename N::Real;
   using Unit = typename N::Unit;
   using Position = ContactVec<Real>;
-  using Turn = ContactVec<Unit>;  ///< of a normal: far less than a unit
+  using Turn = ContactVec<Unit>;  ///< rotation of a normal: its change, far less than 1
 
  public:
-  /// Learns from the deepest planes of two positions, the second `moved` from the first. Unlike
-  /// planes are two walls, or one is met by the head and one by the shaft: all is forgotten.
-  /// Normals that diverge are a bump: its steps only fall short, and are not eased.
+  /// Updates the estimate from the deepest planes of two positions, the second `moved` from the
+  /// first. If the normals differ by more than 45 degrees, or one plane was met by the head and the
+  /// other by the shaft, these are two walls: the estimate is reset. On a convex surface no
+  /// curvature is stored, because uncorrected steps there are only too short.
   constexpr void learn(const Contacts<N>& before, const Contacts<N>& after,
                        Position moved) noexcept {
     constexpr double kTelling = 0.01;  // units: over less, noise rotates a normal as much
@@ -308,8 +310,8 @@ class CurvatureEstimate {
     if (turn_ < Unit(kNoise)) forget();
   }
 
-  /// Newton's step with this curvature: `step`, shortened so that it ends where the load presses
-  /// straight.
+  /// Newton step with the estimated curvature: `step`, reduced so that at its end the load is along
+  /// the surface normal.
   [[nodiscard]] constexpr Position eased(Position step, Real load) const noexcept {
     if (!first_.known() || load <= Real(0)) return step;
     const Unit p = fraction<N>(load, load + first_.radius);
@@ -354,7 +356,7 @@ class CurvatureEstimate {
 
   Curve<N> first_, second_;  ///< of the estimate
   Curve<N> last_;            ///< of the last step alone
-  Unit turn_{};              ///< of the normal over it
+  Unit turn_{};              ///< rotation of the normal over the last step
 };
 
 }  // namespace kerf

@@ -25,8 +25,8 @@ struct PointMeans {
   Ratio top{};                   ///< the largest r
 };
 
-/// How one volume lies in contact space: place q is at voxel_from_contact * q + origin_vox. A
-/// voxel's edge is at least one unit, so no entry of the matrix is above 1.
+/// Transform of contact space to one volume: position q is at voxel_from_contact * q + origin_vox.
+/// A voxel's edge is at least one unit, so no entry of the matrix is above 1.
 template <class N>
 struct ContactFrame {
   Transform<typename N::Ratio, VoxelSpace, ContactSpace> voxel_from_contact{};
@@ -45,7 +45,7 @@ template <class N>
   }
 }
 
-/// Turns an offset from the tool's axes to those of the world.
+/// Rotates an offset from the tool's axes to those of the world.
 template <class N>
 [[nodiscard]] constexpr ContactVec<typename N::Ratio> turned_offset(
     const typename N::Ratio (&offset)[3], const RotationRows<N>& rotation) noexcept {
@@ -57,7 +57,7 @@ template <class N>
   return {turned(rotation[0]), turned(rotation[1]), turned(rotation[2])};
 }
 
-/// All means of a query; `rotation` takes the mean offset from the tool's axes to the world's.
+/// All means of a query; `rotation` rotates the mean offset from the tool's axes to the world's.
 template <class N>
 [[nodiscard]] constexpr PointMeans<N> point_means(const PointSums<N>& sums,
                                                   const DensityScale& scale,
@@ -93,7 +93,7 @@ template <class N>
   return means;
 }
 
-/// The direction of a vector; 0 where it is too short to have one.
+/// The direction of a vector; 0 if it is too short to have one.
 template <class N>
 [[nodiscard]] constexpr ContactVec<typename N::Unit> direction(
     ContactVec<typename N::Ratio> v) noexcept {
@@ -136,7 +136,8 @@ template <class N>
   const Ratio e = fall_of(means, round);
   const Ratio factor =
       Ratio(1) + (round ? static_cast<Ratio>(0.209) * std::min(e, Ratio(1)) : e / Ratio(7));
-  // A lone spike has few samples and hardly moves the mean: it may not stand far above it unseen.
+  // A single spike has few samples and hardly changes the mean, so the height is at least that of
+  // the highest sample less kSpike.
   constexpr auto kSpike = static_cast<Ratio>(0.2);
   return std::max(factor * means.density, means.top - kSpike);
 }
@@ -152,7 +153,7 @@ template <class Ratio>
   return std::clamp(slope, Ratio(kFlattestSlope), Ratio(kSteepestSlope));
 }
 
-/// 0 where `value` is `from` or above, 1 where it is `to` or below, linear between; `to` < `from`.
+/// 0 if `value` is `from` or above, 1 if it is `to` or below, linear between; `to` < `from`.
 template <class N>
 [[nodiscard]] constexpr typename N::Unit falling_ramp(typename N::Unit value, double from,
                                                       double to) noexcept {
@@ -213,8 +214,8 @@ template <class N>
 }
 
 /// The constraint plane of one volume's contact, by the samples of the point shell alone. `reach`
-/// of the tool is in units. A closer look corrects it near rest (contact_refinement.hpp). Its
-/// normal is 0 where the tool feels the same all round.
+/// of the tool is in units. contact_refinement.hpp corrects it near rest. Its normal is 0 if the
+/// density is the same all round the tool.
 template <class N>
 [[nodiscard]] constexpr ConstraintPlane<N> plane_of(const PointMeans<N>& means,
                                                     typename N::Real reach, bool round) noexcept {

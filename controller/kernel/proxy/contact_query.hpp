@@ -242,14 +242,16 @@ template <class N>
 ///
 /// A query is one of each part at the same pose; their planes are merged like those of several
 /// volumes: the deepest three stay. Planes of shaft and handpiece are marked. A tool with a shaft
-/// rotates, whatever its head; the samples of a ball stay, so its contact is the same as without.
+/// has an orientation even if its head is a ball. The samples of a ball head are not rotated, so
+/// its contact is the same with and without a shaft.
 ///
 /// The work of a tick is counted in samples (`query_work`), since a query among noise or soft
 /// tissue costs twice that of one at a face. One budget serves all parts. Once it is spent, queries
-/// return `no_normal` without reading, and a sweep stays at its last position. With a shaft a query
-/// begins only if the work of the last one is left, and returns `no_normal` if a part has more
-/// samples near it than are left. The first query after a rotation is always answered, then without
-/// refinement. Servo thread; no heap.
+/// return `no_normal` without reading, and a sweep stays at its last position. With a shaft, a
+/// query also starts only if the remaining budget covers the cost of the previous query in this
+/// tick. It returns `no_normal` if a part has more nearby samples than the budget allows. The first
+/// query after a rotation is always answered, but without refinement if the budget is short. Servo
+/// thread; no heap.
 template <class N>
 class ContactQuery {
   using Real = typename N::Real;
@@ -300,8 +302,8 @@ class ContactQuery {
   [[nodiscard]] std::int64_t spent() const noexcept { return budget_.spent(); }
   /// See ContactField.
   [[nodiscard]] bool half_spent() const noexcept { return budget_.half_spent(); }
-  /// Whether the work of the costliest query of the head is left, and with a shaft that of the last
-  /// query.
+  /// Whether the remaining budget covers the most expensive query of the head and, with a shaft,
+  /// the cost of the previous query in this tick.
   [[nodiscard]] bool may_query() const noexcept {
     return head_.may_query() && budget_.left() >= last_;
   }
@@ -370,9 +372,10 @@ class ContactQuery {
   PartQuery<N> head_;
   std::size_t shaft_parts_;
   std::array<std::optional<Part>, kMaxShaftParts> part_;
-  bool head_turns_;
-  std::int64_t last_ = 0;  ///< work of the last query with a shaft; the maximum: it was given up
-  bool turned_ = false;    ///< and not queried since
+  bool head_turns_;  ///< whether `orient` rotates the samples of the head
+  /// Cost of the previous query with a shaft; INT64_MAX if that query was abandoned.
+  std::int64_t last_ = 0;
+  bool turned_ = false;  ///< the tool was rotated, and not queried since
 };
 
 }  // namespace kerf

@@ -15,14 +15,14 @@
 #include "shared/numeric/numbers.hpp"
 #include "shared/volume/voxel_grid.hpp"
 
-// Corrects the plane of a contact near rest: by a closer look, and from the middle of a face's
-// ramp.
+// Corrects the plane of a contact near rest: by a refinement with more samples, and by a query at
+// the middle of a face's ramp.
 
 namespace kerf {
 
-/// The closer look at one volume near rest (docs/theory.md 3.5): at the cap of a ball, or at the
-/// close samples of another tool and a patch of the volume. It corrects the plane from the point
-/// shell. It lives within one query, with the tool's centre at `at`.
+/// Refinement of a contact with one volume near rest (docs/theory.md 3.5). It reads the cap of a
+/// ball, or the close samples of another tool and a patch of the volume, and corrects the plane
+/// from the point shell. It is valid during one query, with the tool's centre at `at`.
 template <class N>
 class ContactRefinement {
  public:
@@ -48,8 +48,8 @@ class ContactRefinement {
   }
 
  private:
-  /// Corrects the plane of a tool that is no ball: by the close samples around the peak, then by a
-  /// patch of the volume around the position that they find. The normal is that of the smoother one
+  /// Corrects the plane of a tool that is not a ball: by the close samples around the peak, then by
+  /// a patch of the volume around the position that they find. The normal is that of the smoother
   /// of the two surfaces.
   void refine_shape(ConstraintPlane<N>& plane) const noexcept {
     if (points_.close.first == nullptr) return;
@@ -58,7 +58,7 @@ class ContactRefinement {
     PointNumber<N> peak[3] = {};
     peak_offset(sums_, fall_of(means_, false), peak);
     const Closeup<N> seen = reader_.closeup_at(volume_, at_, peak);
-    // If the tool touches at two positions the peak from two means may be at neither.
+    // If the tool touches at two positions, the peak from two means may be at neither of them.
     if (seen.height <= Ratio(0)) return;
     const auto offset = turned_offset<N>(seen.offset, reader_.rows());
     const ContactVec<Real> arm{multiply<Real>(offset.x, points_.reach),
@@ -79,10 +79,10 @@ class ContactRefinement {
                           multiply<Ratio>(means_.gradient.z, facing.z));
     const Unit facing_share(std::clamp(along / steep, Ratio(0), Ratio(1)));
     const Unit alike = Unit(1) - falling_ramp<N>(facing_share, kAlike, kUnlike);
-    // Then the depth of the point shell counts, but not so much less than that of the closer look
-    // that a step from an allowed position would end beyond the middle of the thinnest wall
-    // (docs/theory.md 4.2). The closer look uses the slope of its face: in the tool's own gradient
-    // the faces cancel.
+    // Then the depth of the point shell is used, limited from below by the refined depth less
+    // `less`: otherwise a step from an allowed position could end beyond the middle of the thinnest
+    // wall (docs/theory.md 4.2). The refined depth uses the slope of its face, because in the
+    // tool's own gradient the faces cancel.
     const auto less = static_cast<Real>(1 - SweepRules::kStep - SweepRules::kWedged);
     const Ratio own = peak_height(means_, false), highest = std::max(seen.height, means_.top),
                 slope = slope_along(means_, plane.normal, false);

@@ -126,8 +126,8 @@ struct Orientation {
 template <class N>
 using RotationRows = std::array<std::array<typename N::Unit, 3>, 3>;
 
-/// First `b`, then `a`. Fixed: four roundings a component; a step of Newton's method keeps the
-/// length at 1, whatever the number of products.
+/// The rotation by `b`, then by `a`. Fixed: four roundings per component; a Newton step keeps the
+/// length at 1 after any number of products.
 template <class N>
 [[nodiscard]] constexpr Orientation<N> compose(const Orientation<N>& a,
                                                const Orientation<N>& b) noexcept {
@@ -159,8 +159,8 @@ template <class N>
 }
 
 /// The quaternion of a rotation matrix, by the largest of the four components (Shepperd 1978),
-/// which is at least 1/2: no division by a small number. Any other matrix gives any quaternion, no
-/// fault.
+/// which is at least 1/2, so that it never divides by a small number. The result for any other
+/// matrix is an arbitrary quaternion, not an error.
 template <class N>
 [[nodiscard]] constexpr Orientation<N> orientation_of(const RotationRows<N>& rows) noexcept {
   using Unit = typename N::Unit;

@@ -10,16 +10,16 @@
 
 namespace kerf {
 
-/// Whether the proxy has a position, and if not whether one is still searched for.
+/// Whether the proxy has a position; if not, whether the search for one continues.
 enum class ProxyStatus : std::uint8_t { searching, placed, refused };
 
-/// Searches a free position for the proxy (docs/theory.md 4.7): in 26 directions, one unit farther
-/// out after all were tried. If nothing is free within kReach the tool is refused until its own
-/// goal is free.
+/// Searches a free position for the proxy (docs/theory.md 4.7): in 26 directions at one distance,
+/// then one unit farther out. If no position within kReach is free, the tool is refused until its
+/// own goal is free.
 ///
-/// For a tool that replaces another the search is around the old position, not around the goal, and
-/// stays on its side of every wall: a direction in which the tool's centre left the solid, or began
-/// outside of it, ends where the centre would enter the solid again.
+/// For a tool that replaces another, the search is around the old position, not around the goal,
+/// and stays on the same side of every wall: a direction in which the tool's centre has left the
+/// solid, or began outside it, ends before the centre would enter the solid again.
 ///
 /// At most 14 queries a tick, and no more than the budget of the tick allows: the next tick
 /// continues. Only the surface of the tool is tested: solid wholly inside of the tool does not
@@ -116,8 +116,8 @@ struct ProxyPlan {
   typename N::Real ramp_per_tick{};
 };
 
-/// The state from tick to tick. A fresh state searches a position at the goal: it is made when the
-/// device is parked at rest, or has lost its home.
+/// The state from tick to tick. A new state searches a position at the goal. It is made when the
+/// device is parked at rest, or is no longer homed.
 template <class N>
 struct ProxyState {
   ProxyPose<N> pose;
@@ -146,10 +146,10 @@ struct ProxyContact {
   ProxyStatus status = ProxyStatus::searching;
   ProxyPose<N> pose;
   ContactVec<typename N::Real> spring{};  ///< from goal to proxy, units: force over stiffness
-  /// Of the press of the head, out of the solid; 0 in air.
+  /// Direction of the press of the head, out of the solid; 0 in air.
   ContactVec<typename N::Unit> normal{};
-  /// Of the press of the whole tool, and the load of the head over it, at most 1: the same as
-  /// `normal`, and 1, unless the shaft presses.
+  /// Direction of the press of the whole tool, and the head's load relative to that press, at most
+  /// 1. Without a press of the shaft, they are `normal` and 1.
   ContactVec<typename N::Unit> press{};
   typename N::Unit head_fraction{1};
   /// Load of shaft and handpiece over the length of the spring, at most 1.
@@ -165,17 +165,17 @@ struct ProxyContact {
   bool turned = true;  ///< the tool has the orientation of the goal
 };
 
-/// No tool gets deeper than this by moving: beyond it the solid has changed, and the search starts
-/// again.
+/// No tool gets deeper than this by moving. If it is deeper, the solid has changed, and the search
+/// starts again.
 inline constexpr double kLostDepth = 1;  // units
 
 /// Sets normal and moment arm of the contact: the sum of the loads, and its moment over the length
 /// of the spring (docs/theory.md 5.3). Friction acts at the points of the loads.
 ///
 /// The part of the spring beyond the loads and the friction cone is carried by planes that this
-/// tick did not meet (docs/theory.md 4.5). So a tool at rest always has a normal, since forces
-/// balance there. A tool that is still `moving` is not held. Such planes count as the head's: it
-/// cuts only the voxels that it covers.
+/// tick did not meet (docs/theory.md 4.5). So a tool at rest, where forces balance, always has a
+/// normal. A tool that is still `moving` is not held by such planes. They count as planes of the
+/// head, which is safe because it cuts only the voxels that it covers.
 template <class N>
 constexpr void add_loads(const SweepResult<N>& swept, typename N::Unit friction, bool moving,
                          ProxyContact<N>& contact) noexcept {
@@ -208,7 +208,7 @@ constexpr void add_loads(const SweepResult<N>& swept, typename N::Unit friction,
   const Real held = multiply<Real>(friction, norm(pressed));
   if (rubbed > held && !moving)
     pressed = pressed + part_of<N>(along_faces, fraction<N>(rubbed - held, rubbed));
-  // If the shaft presses, less than the tolerance of a position is no press of the head.
+  // If the shaft presses, a press of the head below the tolerance of a position is ignored.
   const ContactVec<Real> head = pressed - on_shaft;
   const Real by_head = norm(head);
   if (shaft_load <= Real(0) || by_head >= Real(SweepRules::kTolerance)) {
@@ -222,7 +222,7 @@ constexpr void add_loads(const SweepResult<N>& swept, typename N::Unit friction,
   const Real on_head = whole - shaft_load;
   if (on_head > Real(1e-3)) contact.head_arm = head_arm * (whole / on_head);
   contact.shaft_fraction = fraction<N>(std::min(shaft_load, length), length);
-  // If shaft and head press against each other, both bear more than the press of the hand.
+  // If the loads of shaft and head oppose each other, each may exceed the press of the hand.
   const Real together = norm(pressed);
   const bool presses = by_head >= Real(SweepRules::kTolerance);
   if (!presses || by_head < together) {

@@ -17,7 +17,7 @@ namespace kerf {
 ///                     bound, at most |m|; 0 if unknown
 ///   orient(o)         sets the orientation of the tool for all queries from now on
 ///   is_solid(q)       whether the position is in the solid
-///   half_spent()      whether half of the tick's work is spent: the rest is the move's
+///   half_spent()      whether half of the tick's work is spent: the rest is kept for the move
 ///   may_query()       whether the tick's work allows another query
 template <class F, class N>
 concept ContactField = requires(F field, ContactVec<typename N::Real> q,
@@ -33,13 +33,13 @@ concept ContactField = requires(F field, ContactVec<typename N::Real> q,
 /// Constants of the sweep (docs/theory.md 4.2 and after); lengths in units of contact space.
 struct SweepRules {
   static constexpr std::int32_t kMaxQueries = 32;
-  /// No rotation begins after so many queries, pushes included; the rest is the move's.
+  /// No rotation begins after this many queries, pushes included; the rest is kept for the move.
   static constexpr std::int32_t kMaxRotationQueries = 12;
   static constexpr double kTolerance = 0.01;  ///< a position this deep is allowed
-  /// The same of a rotation. It leaves the move some play: else an inverted cone with a shaft stops
-  /// between plates (rows `traps`, --seed 15590).
+  /// The same for a rotation. It leaves the move some play; otherwise an inverted cone with a shaft
+  /// stops between plates (rows `traps`, --seed 15590).
   static constexpr double kTurnTolerance = 0.005;
-  static constexpr double kArrived = 0.004;  ///< no shorter displacement is tried
+  static constexpr double kArrived = 0.004;  ///< shorter displacements are not tried
   /// Longest displacement of any sample between two queries. The middle of the thinnest wall, 2
   /// units, is one unit deep: beyond it density falls again, and its gradient leads onward.
   static constexpr double kStep = 0.875;
@@ -47,23 +47,24 @@ struct SweepRules {
   /// % at the worst position of a noisy valley (tests/servo/force_cut_test.cpp).
   static constexpr double kGain = 0.001;
   static constexpr double kResidual = 0.8;  ///< fraction of the displacement that a step may leave
-  /// A next step shorter than this fraction of a failed one is tried whole. Without it the force of
-  /// `cutting, milling into the GE tooth, 16 bits` steps by 1.5 % instead of 0.3.
+  /// A next step shorter than this fraction of a failed one is not shortened. Without it the force
+  /// of `cutting, milling into the GE tooth, 16 bits` steps by 1.5 % instead of 0.3.
   static constexpr double kEased = 0.5;
   static constexpr double kShrink = 0.4;  ///< of a failed step, for the next try
-  /// Fraction of a step below which the proxy lags instead. A groove of the tool's own leaves it a
-  /// play of hundredths of a unit, and longer steps only meet the other wall.
+  /// Fraction of a step below which the proxy stops and lags. In a groove that the tool itself has
+  /// cut, its play is hundredths of a unit, and longer steps only meet the other wall.
   static constexpr double kShortest = 0.02;
   static constexpr double kPush = 0.5;  ///< longest correction of one push
   /// The tool may be this deep in one wall if a push out of it leads into another. The depths of
-  /// two opposite faces differ by some hundredths between positions, and a tool that is rotated
-  /// until both hold it would stay whatever the hand does: 4 % of the tools that spin askew in
-  /// slots did, with 0.03 still one in a thousand. It may also be this deep if a tick has no query
-  /// left for a push before it kept any step: else it would stay, too.
+  /// two opposite faces differ by some hundredths between positions. Without this rule, a tool that
+  /// is rotated until both faces hold it is stuck whatever the hand does: that happened to 4 % of
+  /// the tools that spin askew in slots, and with 0.03 to one in a thousand. The tool may also be
+  /// this deep if a tick has no query left for a push before it kept any step; otherwise it would
+  /// be stuck, too.
   static constexpr double kWedged = 0.05;
-  /// No step ends farther from the goal than the nearest position of the tick by more than this.
-  /// With more a tool at rest wanders about on noise. With less than two kTolerance, by which
-  /// allowed positions differ in depth, a slot without play does not let the tool out.
+  /// No step ends farther from the goal than the nearest position of the tick by more than this. If
+  /// it is larger, a tool at rest wanders on noise. If it is below two kTolerance, by which allowed
+  /// positions differ in depth, a tool cannot leave a slot without play.
   static constexpr double kAstray = 0.03;
 };
 
@@ -93,32 +94,32 @@ struct SweepResult {
   bool no_normal = false;  ///< nothing to push against: the start rule is needed
 };
 
-/// Memory of the sweep from tick to tick, while the tool and the solid stay.
+/// Memory of the sweep from tick to tick, as long as tool and solid are the same.
 template <class N>
 struct SweepMemory {
-  /// Of the solid around the tool in its orientation. Estimated anew in each tick, its first step
-  /// would have an error of the noise of a normal times the spring: deep in a bore of its own a
-  /// tool would jump by a unit in a tick.
+  /// Of the solid around the tool in its orientation. If it were estimated anew in each tick, the
+  /// error of a tick's first step would be the noise of a normal times the spring: deep in a bore
+  /// of its own size, a tool would jump by a unit in a tick.
   CurvatureEstimate<N> curvature;
   std::int32_t stuck_ticks = 0;  ///< ticks in a row that found no step
 };
 
 /// One tick of the proxy (docs/theory.md 4.2, 4.6): it moves from a pose that the solid allows
-/// towards a goal, first the orientation, then the centre. When its queries or its attempts are
-/// spent it lags. It never jumps, so a wall of 2 units holds it at any speed.
+/// towards a goal, first in orientation, then in position. When its queries or its attempts are
+/// spent, it lags. It never jumps, so a wall of 2 units holds it at any speed.
 ///
-/// If the work of a tick is spent before any step was kept, the next tick would try the same in
-/// vain. So it does not rotate, and its first step is kShrink of the last one's, down to kShortest:
-/// each length is the first try of one tick. Then it starts again with whole steps.
+/// If the work of a tick is spent before any step was kept, the next tick would fail in the same
+/// way. So it does not rotate, and its first step is kShrink times that of the last tick, down to
+/// kShortest: each length is the first try of one tick. Then it starts again with whole steps.
 ///
-/// From an allowed position the tool goes at most kAstray farther from its goal: in a groove of its
-/// own shape planes that change from query to query would lead it on and on.
+/// From an allowed position the tool goes at most kAstray farther from its goal. In a groove of its
+/// own shape, planes that change from query to query would otherwise lead it farther and farther.
 ///
 /// At most kMaxQueries calls of `query`. Coordinates within +-kContactLimit.
 ///
-/// Limits: a loose bit of material less than 1.5 units across may slip in between the samples. A
-/// bit that is wholly inside of the tool has no contact until the tool leaves it; from 2 units on
-/// it may then hold the tool. The tool may not find its way into a slot without any play.
+/// Limits: a loose fragment less than 1.5 units across may pass between the samples. A fragment
+/// that is wholly inside the tool has no contact until the tool leaves it; if it is at least 2
+/// units across it may then hold the tool. The tool may fail to enter a slot without any play.
 template <class N, ContactField<N> Field>
 class ProxySweep {
   using Real = typename N::Real;
@@ -152,7 +153,7 @@ class ProxySweep {
     Contacts<N> contacts;
     ConstraintSet<N> planes;
     Contacts<N> first;
-    bool allowed = false;  ///< the tool may go there
+    bool allowed = false;  ///< the solid allows the tool at `centre`
   };
   enum class Trying { orient, move };
 
@@ -163,11 +164,12 @@ class ProxySweep {
   [[nodiscard]] constexpr bool queries_left() const noexcept {
     return queries_ < SweepRules::kMaxQueries;
   }
-  /// Not deeper than a wedged tool may be: it need not get out.
+  /// Whether the tool is not deeper than a wedged tool may be, so that it need not get out.
   [[nodiscard]] static constexpr bool allows_rest(const Contacts<N>& contacts) noexcept {
     return !contacts.no_normal && contacts.depth <= Real(SweepRules::kWedged);
   }
-  /// Within the tolerance, or not deeper than the tool is if it is too deep already.
+  /// Whether the depth is within the tolerance or, if the tool is too deep already, not above its
+  /// present depth.
   [[nodiscard]] constexpr bool allows(const Contacts<N>& contacts, Real tolerance) const noexcept {
     return !contacts.no_normal && contacts.depth <= std::max(tolerance, here_.depth);
   }
@@ -179,9 +181,9 @@ class ProxySweep {
     Real length;
   };
 
-  /// Coulomb's friction (docs/theory.md 4.5): across the pressing direction the tool sticks while
-  /// its displacement is at most friction times the load, and else slides that much less. There is
-  /// no friction towards the planes.
+  /// Coulomb's friction (docs/theory.md 4.5): across the pressing direction the tool sticks if its
+  /// displacement is at most friction times the load; otherwise it slides less by that amount.
+  /// There is no friction towards the planes.
   [[nodiscard]] constexpr Route route(const ConstraintSet<N>& planes,
                                       Position displacement) const noexcept {
     const ConstrainedMove<N> slide = constrained_move(planes, displacement);
@@ -281,10 +283,10 @@ class ProxySweep {
     return onward;
   }
 
-  /// Moves towards `goal` while steps are found that the solid allows and that are progress: the
-  /// displacement that is left under all known planes shrinks to kResidual, or the goal comes
-  /// nearer. By the distance to the goal alone the proxy would stick in creases and cycle in
-  /// grooves. Returns the constrained move of the last position.
+  /// Moves towards `goal` as long as steps are found that the solid allows and that are progress:
+  /// the displacement that is left under all known planes shrinks to kResidual of it, or the goal
+  /// comes nearer. With the distance to the goal alone, the proxy would stick in creases and cycle
+  /// in grooves. Returns the constrained move of the last position.
   constexpr ConstrainedMove<N> move_to(Position goal) noexcept {
     Unit shrink = first_step();
     Route onward = eased_route(held_by_, goal - pose_.centre);
@@ -351,7 +353,7 @@ class ProxySweep {
   Contacts<N> here_{};
   ConstraintSet<N> held_by_{};
   std::int32_t queries_ = 0;
-  bool kept_ = false;  ///< a step of the move
+  bool kept_ = false;  ///< the move has kept a step
 };
 
 }  // namespace kerf

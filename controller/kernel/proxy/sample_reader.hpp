@@ -14,7 +14,7 @@
 #include "controller/kernel/proxy/proxy_sweep.hpp"
 #include "shared/numeric/numbers.hpp"
 
-// Reads the samples of a tool in volumes and counts the work, which a tick has a budget for.
+// Reads the samples of a tool in volumes, and counts that work against the budget of a tick.
 
 namespace kerf {
 
@@ -28,7 +28,7 @@ struct QueryWork {
   static constexpr std::int64_t kQueryOverhead = 128;  ///< fixed cost of reading a shell
   static constexpr std::int64_t kCloseSamples = 2;     ///< cost of one sample of a closeup
 
-  /// Cost of one step in the free-space map: each waits for the result of the last one.
+  /// Cost of one step in the free-space map. Each step needs the result of the last one.
   static constexpr std::int64_t kFreeStep = 12;
   /// Cost of finding whether a group is in free space. Without it the costliest tick of an
   /// inverted cone with a handpiece takes 98 us, not 66 (rows `ticks`).
@@ -36,11 +36,11 @@ struct QueryWork {
   /// Cost of finding whether a voxel near a sample reaches the iso.
   static constexpr std::int64_t kIsoTest = 27;
 
-  std::int64_t query = 0;   ///< one query at most: all samples in every volume
-  std::int64_t closer = 0;  ///< its refinements at most
-  std::int64_t orient = 0;  ///< to transform all samples
+  std::int64_t query = 0;   ///< most of one query: all samples in every volume
+  std::int64_t closer = 0;  ///< most of its refinements
+  std::int64_t orient = 0;  ///< transformation of all samples
   std::int64_t head = 0;    ///< query and orient of the head alone; 0: no shaft
-  std::int64_t near = 0;    ///< extra of a query, not part of the budget that it needs to begin
+  std::int64_t near = 0;    ///< extra of a query; not required for it to begin
 
   /// Adds the work of one more part; begins with the head. `query`, `orient` and `near` are sums;
   /// `closer` is that of the head and the first part added, the minimum that a query needs to
@@ -56,10 +56,12 @@ struct QueryWork {
   [[nodiscard]] constexpr std::int64_t budget() const noexcept {
     return std::max(kTickSamples, kLeastQueries * (head > 0 ? head : query + orient));
   }
-  /// Limit of the work for fruitless marches through free space; beyond it no group tries one.
+  /// Limit of the work for marches through free space that find no free path. Once it is reached,
+  /// no group tries one.
   [[nodiscard]] constexpr std::int64_t most_wasted() const noexcept { return budget() / 8; }
-  /// Upper bound of a tick of a sweep: the budget, and one query after the rotations, whose last
-  /// ones may reach into the half of the move. A tool of few samples runs out of queries first.
+  /// Upper bound of a tick of a sweep: the budget, and one query after the rotations, the last of
+  /// which may use work of the move's half. A tool of few samples reaches the limit of queries
+  /// first.
   [[nodiscard]] constexpr std::int64_t most() const noexcept {
     const std::int64_t after = 8 * (query + closer) > budget() ? orient + query : 0;
     return std::min(budget() + after + 2 * near,
@@ -114,7 +116,7 @@ class QueryBudget {
 template <class N>
 struct PointShell {
   PointTable<N> table;
-  CloseTable<N> close;         ///< none of a ball
+  CloseTable<N> close;         ///< empty for a ball
   typename N::Real reach{};    ///< units from the centre to the farthest sample
   std::int32_t step_bits = 0;  ///< fraction bits of PointStep's rows: reach 2^step_bits < 2^16
 };
@@ -148,7 +150,7 @@ class SampleReader {
 
   [[nodiscard]] QueryBudget& budget() const noexcept { return budget_; }
 
-  /// A number as point tables have it.
+  /// Converts to the number type of point tables.
   [[nodiscard]] static PointNumber<N> number_of(Real x) noexcept {
     if constexpr (N::kIsFixed) {
       return x.raw();
@@ -156,7 +158,7 @@ class SampleReader {
       return x;
     }
   }
-  /// A position of contact space in voxels of a volume.
+  /// Converts a position of contact space to voxels of a volume.
   [[nodiscard]] static VoxelVec<Real> voxel_position(const ContactVolume<N>& volume,
                                                      ContactVec<Real> q) noexcept {
     return volume.frame.voxel_from_contact * q + volume.frame.origin_vox;
@@ -267,7 +269,7 @@ class SampleReader {
   }
 
  private:
-  /// The matrix that takes a tool's offsets to voxels; `rows` turns them to the world's axes.
+  /// The matrix that maps a tool's offsets to voxels; `rows` rotates them to the world's axes.
   [[nodiscard]] static PointStep<N> step_of(const PointShell<N>& points,
                                             const RotationRows<N>& rows,
                                             const ContactFrame<N>& frame) noexcept {

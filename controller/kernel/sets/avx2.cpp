@@ -23,8 +23,8 @@ struct Simd {
   static V set32(int a) noexcept { return _mm256_set1_epi32(a); }
   static V pair16(int a, int b) noexcept { return set32((a & 0xffff) | b * 65536); }
 
-  /// sum += a0 b0 + a1 b1 in each 32 bits. As text: around the intrinsics, g++ 12 spills a sum,
-  /// and its way through memory then sets the pace of the loop.
+  /// sum += a0 b0 + a1 b1 in each 32 bits. As inline assembly, because with intrinsics g++ 12
+  /// spills a sum, and the store and reload then limit the loop.
   static void multiply_add(V& sum, V a, V b) noexcept {
     V product;
     __asm__("vpmaddwd %3, %2, %1\n\tvpaddd %1, %0, %0"
@@ -51,8 +51,8 @@ struct Simd {
   static V times512(V a) noexcept { return _mm256_slli_epi64(a, 9); }
   static V shift_left16(V a, int n) noexcept { return _mm256_sll_epi16(a, _mm_cvtsi32_si128(n)); }
   static V shift_right16(V a, int n) noexcept { return _mm256_srl_epi16(a, _mm_cvtsi32_si128(n)); }
-  /// 32-bit entries by 2^16, towards minus infinity.
-  static V halved32(V a) noexcept { return _mm256_srai_epi32(a, 16); }
+  /// Divides 32-bit entries by 2^16, rounding towards minus infinity.
+  static V upper16_of_32(V a) noexcept { return _mm256_srai_epi32(a, 16); }
   template <int kBits>
   static V sra32(V a) noexcept {
     return _mm256_srai_epi32(a, kBits);

@@ -21,7 +21,8 @@ struct Simd {
   static V set32(int a) noexcept { return _mm512_set1_epi32(a); }
   static V pair16(int a, int b) noexcept { return set32((a & 0xffff) | b * 65536); }
 
-  /// sum += a0 b0 + a1 b1 in each 32 bits. As text: around the intrinsic, g++ 12 copies each sum.
+  /// sum += a0 b0 + a1 b1 in each 32 bits. As inline assembly, because with the intrinsic g++ 12
+  /// copies each sum.
   static void multiply_add(V& sum, V a, V b) noexcept {
     __asm__("vpdpwssd %2, %1, %0" : "+v"(sum) : "v"(a), "v"(b));
   }
@@ -45,8 +46,8 @@ struct Simd {
   static V times512(V a) noexcept { return _mm512_slli_epi64(a, 9); }
   static V shift_left16(V a, int n) noexcept { return _mm512_sll_epi16(a, _mm_cvtsi32_si128(n)); }
   static V shift_right16(V a, int n) noexcept { return _mm512_srl_epi16(a, _mm_cvtsi32_si128(n)); }
-  /// 32-bit entries by 2^16, towards minus infinity.
-  static V halved32(V a) noexcept { return _mm512_srai_epi32(a, 16); }
+  /// Divides 32-bit entries by 2^16, rounding towards minus infinity.
+  static V upper16_of_32(V a) noexcept { return _mm512_srai_epi32(a, 16); }
   template <int kBits>
   static V sra32(V a) noexcept {
     return _mm512_srai_epi32(a, kBits);

@@ -84,7 +84,7 @@ void gather(const SampleTable& samples, const SamplePose& pose, const VoxelGrid&
         Simd::add_cell(pair, field + std::ptrdiff_t{3} * at[i], row, plane, weights[i]);
         Simd::add_cell(pair, field + std::ptrdiff_t{3} * at[i + 1], row, plane, weights[i + 1]);
         low = Simd::add32(low, Simd::bit_and(pair, low_half));
-        high = Simd::add32(high, Simd::halved32(pair));
+        high = Simd::add32(high, Simd::upper16_of_32(pair));
       }
     }
     alignas(64) std::int32_t part_low[kLanes / 2], part_high[kLanes / 2];

@@ -32,8 +32,9 @@ template <class N>
 template <class N>
 class DenseSamples {
  public:
-  /// `samples_units`: from the tool's centre, none farther than `reach`; contact units. A cell with
-  /// more than kMostInCell keeps so many, evenly chosen. Without samples there is no table.
+  /// `samples_units`: from the tool's centre, none farther than `reach`; contact units. Of a cell
+  /// with more than kMostInCell samples that many are kept, evenly chosen. Without samples there is
+  /// no table.
   DenseSamples(std::span<const SurfaceSample> samples_units, double reach);
 
   [[nodiscard]] CloseTable<N> table() const noexcept;

@@ -131,7 +131,8 @@ class Tiff {
     refuse_unreadable(path_, reason);
   }
 
-  /// Refuses a strip or tile that gives fewer bytes, or one that a decoder warns of: they fill up.
+  /// Refuses a strip or tile that is too short, or that a decoder warns about: some decoders fill
+  /// in missing data and only warn.
   void decode(std::size_t wanted, tmsize_t got) const {
     if (got != static_cast<tmsize_t>(wanted) || warning_[0] != '\0') complain();
   }
@@ -162,7 +163,8 @@ class Tiff {
   Message error_{}, warning_{};
 };
 
-/// Whether the page is of its own: NewSubfileType of TIFF 6.0, section 8, and of DNG 1.7.
+/// Whether the page is a full image, not a reduced copy, mask, depth map or enhanced version
+/// (NewSubfileType of TIFF 6.0, section 8, and of DNG 1.7).
 bool is_slice(Tiff& file) {
   constexpr std::uint32_t kDepthMap = 8, kEnhanced = 16;
   constexpr std::uint32_t kNone = FILETYPE_REDUCEDIMAGE | FILETYPE_MASK | kDepthMap | kEnhanced;
