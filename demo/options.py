@@ -135,7 +135,7 @@ TICK_BYTES = 496  # a row of the log, of one arm
 def table_of(scene):
     """The scene's TOML. A file that is no scene is left to the controller, which says why: nothing is known of it here."""
     try:
-        return tomllib.loads(pathlib.Path(scene).read_text()) if os.path.isfile(scene) else {}
+        return tomllib.loads(pathlib.Path(scene).read_text(encoding="utf-8")) if os.path.isfile(scene) else {}
     except (OSError, ValueError, RecursionError):
         return {}
 

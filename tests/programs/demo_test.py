@@ -97,6 +97,15 @@ class TestOptions(unittest.TestCase):
                     self.assertEqual(options.expected_rate_hz(checked(*words), str(scene)), rate_hz)
             self.assertEqual(options.expected_rate_hz(checked(), folder), 1000)
 
+    def test_a_scene_is_read_in_any_locale(self):
+        words = "import sys, options\nfound = options.parse([])\noptions.choose_devices(found, sys.argv[1])\nprint(found.second)"
+        with tempfile.NamedTemporaryFile(suffix=".toml") as scene:
+            scene.write('title = "\u00e4"\n[[device]]\n[[device]]\npersonality = "touch"\n'.encode())
+            scene.flush()
+            done = subprocess.run([sys.executable, "-B", "-c", words, scene.name], capture_output=True, text=True, check=False,
+                                  cwd=sys.path[0], env={**os.environ, "LC_ALL": "C", "PYTHONCOERCECLOCALE": "0", "PYTHONUTF8": "0"})
+        self.assertEqual(done.stdout, "touch\n", done.stderr)
+
     def test_the_next_demo_gets_all_but_the_scene(self):
         found = checked("--scene", "a.toml", "--volume", "b.nrrd", "--set", "x=1", "--set", "y=2", "--stereo", "--rate", "500")
         self.assertEqual(found.again, ["--set", "x=1", "--set", "y=2", "--stereo", "--rate", "500"])
