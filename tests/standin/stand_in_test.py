@@ -315,6 +315,61 @@ assert hd.hdInitDevice(None) == 0  # once more
 hd.hdDisableDevice(0)
 """
 
+# Stops and starts while calls wait and callbacks run.
+RESTART = """
+import ctypes, threading
+hd = ctypes.CDLL('libHD.so')
+hd.hdScheduleAsynchronous.restype = ctypes.c_ulong
+hd.hdGetError.restype = type('Error', (ctypes.Structure,), {'_fields_': [(name, ctypes.c_uint) for name in 'abc']})
+kind = ctypes.CFUNCTYPE(ctypes.c_uint, ctypes.c_void_p)
+hd.hdInitDevice(None)
+hd.hdEnable(0x4000)
+
+calls, began = [0], threading.Event()
+
+def endless(_data):
+    calls[0] += 1
+    began.set()
+    return 1
+
+endless = kind(endless)
+done = kind(lambda _data: 0)
+caller = threading.Thread(target=lambda: hd.hdScheduleSynchronous(endless, None, 9))
+hd.hdStartScheduler()
+caller.start()
+began.wait()
+hd.hdStopScheduler()
+caller.join()
+count = calls[0]
+hd.hdStartScheduler()
+hd.hdScheduleSynchronous(done, None, 0)  # of the lowest priority: after all others of its tick
+assert calls[0] == count, 'called after its caller had returned'
+
+errors, stopped, returned = [], threading.Event(), threading.Event()
+
+def stop(_data):
+    hd.hdStopScheduler()
+    hd.hdStartScheduler()  # cannot be: this is the last tick
+    errors.append(hd.hdGetError().a)
+    stopped.set()
+    returned.wait(0.5)  # a start by another thread waits for this tick, so it has not returned
+    return 0
+
+stop = kind(stop)
+hd.hdScheduleAsynchronous(stop, None, 1)
+stopped.wait()
+hd.hdStartScheduler()
+returned.set()
+assert errors == [0x102], errors
+began.clear()
+handle = hd.hdScheduleAsynchronous(endless, None, 1)
+assert began.wait(20), 'the scheduler does not run'
+hd.hdUnschedule(ctypes.c_ulong(handle))
+assert hd.hdGetError().a == 0
+hd.hdStopScheduler()
+hd.hdDisableDevice(0)
+"""
+
 
 class Scheduler(Case):
     def test_callbacks_run_by_priority_and_calls_return_when_they_should(self):
@@ -322,6 +377,10 @@ class Scheduler(Case):
                                               options=["--switch", "calibration=lost"])
         self.assertEqual(report["exit_code"], 0, said)
         self.assertEqual((code, self.misuse(report)), (1, ["bad_handles", "ends_refused"]), said)
+
+    def test_a_stop_ends_the_calls_that_wait_and_a_start_begins_anew(self):
+        code, report, said = self.run_command("/usr/bin/python3", "-B", self.file("restart.py", RESTART))
+        self.assertEqual((code, report["misuse"]), (0, []), said)
 
 
 class Names(unittest.TestCase):
