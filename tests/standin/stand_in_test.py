@@ -11,6 +11,7 @@ import pathlib
 import subprocess
 import sys
 import tempfile
+import time
 import unittest
 import xml.etree.ElementTree
 
@@ -195,6 +196,39 @@ hd.hdDisableDevice(device)
         for words, code in ((["false"], 1), (["sh", "-c", "exit 7"], 7), (["true"], 1)):
             got, report, said = self.run_command(*words)
             self.assertEqual((got, self.misuse(report)), (code, ["not_opened"]), said)
+
+    def test_a_program_behind_a_shell_is_ended_with_it(self):
+        program = self.file("behind.py", """
+import ctypes, os, signal, sys, time
+def end(number, _frame):
+    with open(sys.argv[1] + ".signal", "w") as file: file.write(str(number))
+    raise KeyboardInterrupt
+for number in signal.SIGINT, signal.SIGTERM: signal.signal(number, end)
+hd = ctypes.CDLL("libHD.so")
+hd.hdInitDevice(None)
+callback = ctypes.CFUNCTYPE(ctypes.c_uint, ctypes.c_void_p)(lambda _data: 1)
+hd.hdStartScheduler()
+hd.hdScheduleAsynchronous(callback, None, 1)
+try:
+    os.mkdir(sys.argv[1])
+    time.sleep(60)
+finally:
+    time.sleep(0.5)  # longer than its shell
+    hd.hdStopScheduler()
+    hd.hdDisableDevice(0)
+    os.rmdir(sys.argv[1])
+""")
+        runs, by, report = self.folder / "runs", self.folder / "runs.signal", self.folder / "report.json"
+        command = ["sh", "-c", '"$@"; true', "sh", "/usr/bin/python3", "-B", program, str(runs)]
+        code, found, said = self.run_command(*command, options=["--rate", "100", "--seconds", "20"])  # 2000 ticks
+        self.assertEqual((code, self.misuse(found), runs.exists(), by.read_text()), (0, [], False, "2"), said)
+        running = subprocess.Popen([*COMMAND, "--report", report, "--", *command], stderr=subprocess.DEVNULL)
+        while not runs.exists() and running.poll() is None:
+            time.sleep(0.02)
+        running.terminate()
+        self.assertEqual(running.wait(60), 143)
+        found = set(self.misuse(json.loads(report.read_text())))
+        self.assertEqual((found - {"stalls"}, runs.exists(), by.read_text()), (set(), False, "15"))  # the machine may be busy
 
     def test_a_program_for_another_device_is_told(self):
         code, report, _, said = self.run_client("hd_client.py", "spring", 10, ["--device", "omega"])
