@@ -100,7 +100,8 @@ class Demo:
     def run_programs(self):
         options = self.options
         if self.out:
-            self.out.open(float(options.seconds))
+            rate_hz = demo_options.expected_rate_hz(options, self.scene)
+            self.out.open(float(options.seconds) * demo_options.log_bytes_per_s(options, rate_hz))
             self.results, keep_open = self.out.results, (self.out.lock,)
         else:
             self.results, keep_open = None, ()

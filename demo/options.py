@@ -129,7 +129,30 @@ def is_compressed(video):
     return video.endswith((".mp4", ".mkv"))
 
 
-TICK_BYTES = 496  # a row of the log
+TICK_BYTES = 496  # a row of the log, of one arm
+
+
+def table_of(scene):
+    """The scene's TOML. A file that is no scene is left to the controller, which says why: nothing is known of it here."""
+    try:
+        return tomllib.loads(pathlib.Path(scene).read_text(encoding="utf-8")) if os.path.isfile(scene) else {}
+    except (OSError, ValueError, RecursionError):
+        return {}
+
+
+def expected_rate_hz(options, scene):
+    """Of the servo, before its controller runs, which refuses what is no rate."""
+    held = table_of(scene).get("servo")
+    rates = [held.get("rate_hz")] if isinstance(held, dict) else []
+    rates += [word.partition("=")[2] for word in options.volume if word.startswith("servo.rate_hz=")]
+    try:
+        return min(int([1000, *rates, *filter(None, [options.rate])][-1]), 8000)
+    except (OverflowError, TypeError, ValueError):
+        return 1000
+
+
+def log_bytes_per_s(options, rate_hz):
+    return TICK_BYTES * rate_hz * (2 if options.second else 1)
 
 
 def growth(options, rate_hz):
@@ -141,17 +164,13 @@ def growth(options, rate_hz):
         way = "a name that ends in .mp4 compresses it" if shutil.which("ffmpeg") else "ffmpeg would compress it, apt-get install ffmpeg"
         lines.append(f"--record {options.record}: raw, {1.5 * width * height * 60 / 1e6:.0f} MB a second; {way}")
     if options.out and seconds > 60:
-        lines.append(f"--out {options.out}: its log grows by {60 * rate_hz * TICK_BYTES / 1e6:.0f} MB a minute")
+        lines.append(f"--out {options.out}: its log grows by {60 * log_bytes_per_s(options, rate_hz) / 1e6:.0f} MB a minute")
     return lines
 
 
 def choose_devices(options, scene):
-    """Those of a scene with two devices; else the one of --device, or an Omni. A file that is no scene is left to the
-    controller, which says why."""
-    try:
-        held = tomllib.loads(pathlib.Path(scene).read_text()).get("device") if os.path.isfile(scene) else None
-    except (OSError, ValueError, RecursionError):
-        held = None
+    """Those of a scene with two devices; else the one of --device, or an Omni."""
+    held = table_of(scene).get("device")
     devices = [one.get("personality", "omni") for one in held if isinstance(one, dict)] if isinstance(held, list) else []
     if len(devices) == 2 and not options.device and all(isinstance(one, str) and one in BUSES for one in devices):
         options.device, options.second = devices

@@ -18,7 +18,7 @@ import time
 from options import Refusal
 
 OWN = ".kerf-demo"
-KIB_A_SECOND, KIB_AT_LEAST = 384, 16384  # 384 bytes a tick; pictures, plot and volume
+KIB_AT_LEAST = 16384  # pictures, plot and volume; the log comes on top
 RESERVE_BYTES = 65536  # for the list of the results, even on a disk that is full by then
 BY_KEYS = re.compile(r"kerf-[0-9]{4}\.(png|y4m|mp4|toml|ply)")  # names that the window's keys give
 KINDS = ((stat.S_ISREG, "f"), (stat.S_ISLNK, "l"), (stat.S_ISFIFO, "p"), (stat.S_ISSOCK, "s"), (stat.S_ISBLK, "b"),
@@ -94,8 +94,8 @@ class OutFolder:
         for one in reversed(missing):
             os.mkdir(one)
 
-    def open(self, seconds):
-        """Takes the lock and makes an empty folder for the results."""
+    def open(self, log_bytes):
+        """Takes the lock and makes an empty folder for the results, among them a log of that size."""
         try:
             self.make(self.place)
         except OSError:
@@ -116,7 +116,7 @@ class OutFolder:
             pathlib.Path(self.own, "reserve").write_bytes(bytes(RESERVE_BYTES))
         except OSError:
             raise self.refusal("cannot be written; name another folder") from None
-        needed_kib = int(KIB_AT_LEAST + seconds * KIB_A_SECOND)
+        needed_kib = int(KIB_AT_LEAST + log_bytes / 1024)
         room = os.statvfs(self.results)
         free_kib = room.f_bavail * room.f_frsize // 1024
         if free_kib < needed_kib:

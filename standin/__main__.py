@@ -26,6 +26,7 @@ RATES_HZ = {"touch": (1000, 1000), "omega": (4000, 1000)}  # in real time, in lo
 WITH_VALUE = ("--device", "--hand", "--fault", "--seconds", "--rate", "--on-silence", "--switch", "--report", "--junit")
 LINGER_S = 0.3  # three times the silence after which a device that drops its force does so
 GRACE_S = 5  # for a program that is asked to end
+PR_SET_CHILD_SUBREAPER = 36  # of <linux/prctl.h>
 
 
 class Refusal(Exception):
@@ -120,6 +121,7 @@ class Run:
             raise Refusal(f"{parent}: cannot be written; set TMPDIR to a folder that can") from None
         self.emulator = self.command = None
         self.limited = False  # ended by --seconds
+        self.signalled = False  # by a terminal or another program
 
     def path(self, *names):
         return os.path.join(self.folder, *names)
@@ -172,6 +174,7 @@ class Run:
 
     def run_command(self):
         """Returns its exit code as a shell has it; 0 if --seconds ended it and it went at the first request."""
+        ctypes.CDLL(None).prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)  # a process whose parent has ended becomes our child
         try:
             self.command = subprocess.Popen(self.options.command, env=self.environment())
         except OSError as error:
@@ -187,28 +190,60 @@ class Run:
                 raise Refusal(f"kerf-emulator ended (exit code {self.emulator.returncode}) before the program; start it again")
             if gone or limit is not None and time.monotonic() >= limit:
                 self.ask_to_end(GRACE_S if gone else 0)
+        if self.signalled:
+            self.ask_to_end(GRACE_S)  # the rest of it
         code = self.command.returncode
         if self.limited and code in (0, 130, -signal.SIGINT):
             return 0
         return code if code >= 0 else 128 - code
 
     def pass_on(self, number, _frame):
-        # A terminal has sent its own signals to the command, too.
-        if number != signal.SIGINT and self.command.poll() is None:
-            self.command.send_signal(number)
+        self.signalled = True
+        if number != signal.SIGINT:  # a terminal has sent it to the command, too
+            self.send(number)
+
+    def processes(self):
+        """(process, its group) of all that the command consists of and that run, a parent before its children."""
+        children = {}
+        for name in filter(str.isdigit, os.listdir("/proc")):
+            try:
+                state, parent, group = pathlib.Path("/proc", name, "stat").read_bytes().rpartition(b") ")[2].split()[:3]
+            except OSError:  # it has ended
+                continue
+            if state not in b"ZX":
+                children.setdefault(int(parent), []).append((int(name), int(group)))
+        found, parents = [], [os.getpid()]
+        for parent in parents:
+            below = [child for child in children.get(parent, []) if child[0] != self.emulator.pid]
+            found += below
+            parents += [process for process, _ in below]
+        return found
+
+    def send(self, number):
+        """SIGINT as Ctrl-C in a terminal: a shell waits for its child and does not pass it on; a wrapper with a group of its own
+        does. Any other signal to each process."""
+        for process, group in self.processes():
+            if number != signal.SIGINT or group == os.getpgrp() or process == self.command.pid:
+                try:
+                    os.kill(process, number)
+                except OSError:  # it has ended, or belongs to another user
+                    pass
 
     def ask_to_end(self, patience_s):
-        """After some time in which it may end by itself."""
+        """After some time in which it may end by itself. Returns once all of its processes have."""
         requests = [(number, GRACE_S) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGKILL)]
         for number, patience in [(None, patience_s), *requests]:
             if number is not None:
-                self.limited = number == signal.SIGINT
-                self.command.send_signal(number)
-            try:
-                self.command.wait(patience)
+                if self.command.poll() is None:
+                    self.limited = number == signal.SIGINT
+                self.send(number)
+            end = time.monotonic() + patience
+            while self.command.poll() is None or self.processes():
+                if time.monotonic() >= end:
+                    break
+                time.sleep(0.02)
+            else:
                 return
-            except subprocess.TimeoutExpired:
-                continue
 
     def emulator_report(self):
         if self.emulator.poll() is None:
@@ -220,10 +255,12 @@ class Run:
             raise Refusal("kerf-emulator left no report, so nothing is known of the device; start it again") from None
 
     def end(self):
-        for process in (self.command, self.emulator):
-            if process is not None and process.poll() is None:
-                process.kill()
-                process.wait()
+        if self.command is not None and self.command.poll() is None:
+            self.send(signal.SIGKILL)
+            self.command.wait()
+        if self.emulator is not None and self.emulator.poll() is None:
+            self.emulator.kill()
+            self.emulator.wait()
         shutil.rmtree(self.folder, ignore_errors=True)
 
 

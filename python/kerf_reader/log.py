@@ -21,7 +21,7 @@ def _rows_of(file):
 
 def _words_of(file):
     try:
-        words = json.loads(file.read_text())
+        words = json.loads(file.read_text(encoding="utf-8"))
     except ValueError:
         raise ValueError(f"{file}: no JSON, or the file was cut; give the folder of another recording") from None
     if not isinstance(words, dict):

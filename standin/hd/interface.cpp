@@ -271,6 +271,10 @@ KERF_STAND_IN_EXPORT Boolean hdDeploymentLicense(const char* /*vendor*/, const c
 
 KERF_STAND_IN_EXPORT void hdStartScheduler() {
   Library& lib = library();
+  if (lib.scheduler.is_servo_thread() && lib.scheduler.stops()) {
+    return lib.refuse(kInvalidOperation);
+  }
+  lib.scheduler.finish_stop();  // the device stops before it runs again
   {
     const std::lock_guard lock(lib.mutex);
     if (lib.device) lib.device->run(true, lib.rate_hz);
@@ -310,9 +314,7 @@ KERF_STAND_IN_EXPORT void hdScheduleSynchronous(Callback callback, void* data,
   if (!lib.scheduler.runs() || lib.scheduler.is_servo_thread()) {
     return lib.scheduler.run_here(callback, data);
   }
-  const Ulong handle = lib.scheduler.add(callback, data, priority);
-  if (handle == 0) return lib.refuse(kSchedulerFull);
-  lib.scheduler.wait(handle);
+  if (!lib.scheduler.run_there(callback, data, priority)) lib.refuse(kSchedulerFull);
 }
 
 KERF_STAND_IN_EXPORT Ulong hdScheduleAsynchronous(Callback callback, void* data,

@@ -15,7 +15,9 @@ bool Scheduler::is_servo_thread() const noexcept {
 }
 
 void Scheduler::start(bool lockstep, int rate_hz, int priority) {
-  if (runs() || is_servo_thread()) return;
+  if (is_servo_thread()) return;
+  const std::lock_guard lock(starts_);
+  if (runs()) return;
   if (thread_.joinable()) thread_.join();  // stopped by a callback of its own
   ends_ = false;
   runs_ = true;
@@ -25,13 +27,21 @@ void Scheduler::start(bool lockstep, int rate_hz, int priority) {
   });
 }
 
+void Scheduler::finish_stop() {
+  if (is_servo_thread()) return;
+  const std::lock_guard lock(starts_);
+  if (ends_ && thread_.joinable()) thread_.join();
+}
+
 void Scheduler::stop() {
+  std::unique_lock starts(starts_, std::defer_lock);
+  if (!is_servo_thread()) starts.lock();
   {
     const std::lock_guard lock(mutex_);  // or the servo thread could miss it before it waits
     ends_ = true;
   }
   changed_.notify_all();
-  if (!is_servo_thread() && thread_.joinable()) thread_.join();
+  if (starts && thread_.joinable()) thread_.join();
 }
 
 void Scheduler::serve(bool lockstep, int rate_hz) {
@@ -111,6 +121,15 @@ void Scheduler::run_here(Callback callback, void* data) {
   }
 }
 
+bool Scheduler::run_there(Callback callback, void* data, std::uint16_t priority) {
+  const Ulong handle = add(callback, data, priority);
+  if (handle == 0) return false;
+  std::unique_lock lock(mutex_);
+  wait(lock, handle);
+  erase(handle);
+  return true;
+}
+
 bool Scheduler::remove(Ulong handle) {
   std::unique_lock lock(mutex_);
   if (!contains(handle)) return false;
@@ -127,6 +146,10 @@ bool Scheduler::has(Ulong handle) {
 
 void Scheduler::wait(Ulong handle) {
   std::unique_lock lock(mutex_);
+  wait(lock, handle);
+}
+
+void Scheduler::wait(std::unique_lock<std::mutex>& lock, Ulong handle) {
   changed_.wait(lock, [&] { return !contains(handle) || !runs(); });
 }
 

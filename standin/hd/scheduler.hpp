@@ -32,16 +32,25 @@ class Scheduler {
   Scheduler(Tick tick, standin::Ledger& ledger, int stall_ms)
       : tick_(std::move(tick)), ledger_(ledger), stall_us_(std::int64_t{stall_ms} * 1000) {}
 
-  /// `priority`: as in Settings.
+  /// `priority`: as in Settings. Nothing if it runs.
   void start(bool lockstep, int rate_hz, int priority);
+  /// Returns once a stop that has begun is over; not from a callback, in whose tick it takes
+  /// effect.
+  void finish_stop();
   void stop();
   [[nodiscard]] bool runs() const noexcept { return runs_.load(std::memory_order_relaxed); }
   [[nodiscard]] bool is_servo_thread() const noexcept;
+  /// Whether this tick is the last one, because of a stop.
+  [[nodiscard]] bool stops() const noexcept { return runs() && ends_; }
 
   /// Returns a handle, 0 if there are too many.
   [[nodiscard]] Ulong add(Callback callback, void* data, std::uint16_t priority);
   /// Runs it in ticks of the caller until it is done: before the start, or from a callback.
   void run_here(Callback callback, void* data);
+  /// Runs it in ticks of the servo thread until it is done, or the scheduler has stopped: then it
+  /// is never called again, because `data` may end with the caller. Returns false if there are too
+  /// many.
+  [[nodiscard]] bool run_there(Callback callback, void* data, std::uint16_t priority);
   /// Returns once no callback of that handle runs any more; false if there is none.
   bool remove(Ulong handle);
   [[nodiscard]] bool has(Ulong handle);
@@ -63,11 +72,13 @@ class Scheduler {
   void run_callbacks();
   [[nodiscard]] bool contains(Ulong handle) const noexcept;  ///< with the lock
   void erase(Ulong handle) noexcept;                         ///< likewise
+  void wait(std::unique_lock<std::mutex>& lock, Ulong handle);
 
   Tick tick_;
   standin::Ledger& ledger_;
   std::int64_t stall_us_;
-  std::thread thread_;
+  std::mutex starts_;   ///< held by a start and by a stop, not by one of a callback
+  std::thread thread_;  ///< guarded by `starts_`
   std::atomic<std::thread::id> servo_{};
   std::atomic<bool> runs_{false}, ends_{false};
   std::atomic<std::int64_t> tick_began_ns_{0};

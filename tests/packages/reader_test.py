@@ -96,6 +96,16 @@ assert segment.labels() is None and density.max() == 65535 and density.min() == 
 refused(lambda: Segment("nobody"), SegmentError, ["nobody.sock", "start kerf-controller with this name first"])
 refused(lambda: Segment("../x"), SegmentError, ["no name of a controller"])
 refused(lambda: Log("nowhere"), ValueError, ["nowhere", "give the folder"])
+
+# In a locale of another encoding: kerf's files are UTF-8 in each.
+of_log = pathlib.Path("log/scene.json").read_bytes()
+pathlib.Path("log/scene.json").write_text('{"title": "Zahn \u00e4"}', encoding="utf-8")
+done = subprocess.run([sys.executable, "-c", "import sys; sys.path[:0] = sys.argv[1:]; import kerf_reader\n"
+                       "print(ascii(kerf_reader.Log('log').scene['title']))", *sys.path], capture_output=True, text=True,
+                      env={**os.environ, "LC_ALL": "C", "PYTHONCOERCECLOCALE": "0", "PYTHONUTF8": "0"})
+assert done.stdout == "'Zahn \\xe4'\n", done.stderr
+pathlib.Path("log/scene.json").write_bytes(of_log)
+
 os.mkdir("empty")
 refused(lambda: Log("empty"), ValueError, ["empty/ticks.npy: No such file", "give the folder"])
 whole = pathlib.Path("log/ticks.npy").read_bytes()

@@ -2,6 +2,7 @@
 """The parts of `./kerf demo`: options, the folder of --out, processes. .ci/check-kerf.sh runs whole demos.
 
     demo_test.py ROOT"""
+import contextlib
 import os
 import pathlib
 import signal
@@ -76,9 +77,34 @@ class TestOptions(unittest.TestCase):
                 "--out o: its log grows by 60 MB a minute"])
             self.assertEqual(options.growth(checked("--record", "v.mp4", "--seconds", "60", "--out", "o"), 1000), [])
             self.assertEqual(options.growth(checked("--record", "/dev/null"), 1000), [])
+            two = checked("--seconds", "61", "--out", "o")
+            two.second = "touch"
+            self.assertEqual(options.growth(two, 2000), ["--out o: its log grows by 119 MB a minute"])
         with unittest.mock.patch.object(options.shutil, "which", return_value=None), \
                 self.assertRaisesRegex(options.Refusal, "--record v.mp4: no ffmpeg"):
             checked("--record", "v.mp4")
+
+    def test_the_rate_is_known_before_the_controller_runs(self):
+        with tempfile.TemporaryDirectory() as folder:
+            scene = pathlib.Path(folder, "scene.toml")
+            for text, words, rate_hz in [("", [], 1000), ("[servo]\nrate_hz = 4000", [], 4000), ("[servo", [], 1000),
+                                         ("servo = 1", [], 1000), ("[servo]\nrate_hz = 'x'", [], 1000), ("[servo]\nrate_hz = inf", [], 1000),
+                                         ("[servo]\nrate_hz = 4000", ["--set", "servo.rate_hz=500", "--set", "servo.rate_hz=2000"], 2000),
+                                         ("[servo]\nrate_hz = 4000", ["--set", "servo.rate_hz=500", "--rate", "8000"], 8000),
+                                         ("", ["--rate", "fast"], 1000), ("", ["--rate", "10000000"], 8000)]:
+                scene.write_text(text)
+                with self.subTest(text=text, words=words):
+                    self.assertEqual(options.expected_rate_hz(checked(*words), str(scene)), rate_hz)
+            self.assertEqual(options.expected_rate_hz(checked(), folder), 1000)
+
+    def test_a_scene_is_read_in_any_locale(self):
+        words = "import sys, options\nfound = options.parse([])\noptions.choose_devices(found, sys.argv[1])\nprint(found.second)"
+        with tempfile.NamedTemporaryFile(suffix=".toml") as scene:
+            scene.write('title = "\u00e4"\n[[device]]\n[[device]]\npersonality = "touch"\n'.encode())
+            scene.flush()
+            done = subprocess.run([sys.executable, "-B", "-c", words, scene.name], capture_output=True, text=True, check=False,
+                                  cwd=sys.path[0], env={**os.environ, "LC_ALL": "C", "PYTHONCOERCECLOCALE": "0", "PYTHONUTF8": "0"})
+        self.assertEqual(done.stdout, "touch\n", done.stderr)
 
     def test_the_next_demo_gets_all_but_the_scene(self):
         found = checked("--scene", "a.toml", "--volume", "b.nrrd", "--set", "x=1", "--set", "y=2", "--stereo", "--rate", "500")
@@ -189,11 +215,22 @@ class TestOutFolder(unittest.TestCase):
         folder = out_folder.OutFolder(str(self.out))
         self.addCleanup(folder.close)
         with self.assertRaisesRegex(options.Refusal, "MiB free and"):
-            folder.open(1e12)
+            folder.open(1e15)
         with self.assertRaisesRegex(options.Refusal, "control character"):
             out_folder.OutFolder("a\nb")
         with self.assertRaisesRegex(options.Refusal, "cannot be created"):
             out_folder.OutFolder("/dev/null/x").open(1)
+
+    def test_the_room_is_that_of_the_log_by_seconds_rate_and_arms(self):
+        a_gib = os.statvfs_result((4096, 4096, 2**18, 2**18, 2**18, 0, 0, 0, 0, 255))
+        for rate_hz, second, needed_mib in ((2000, "", 0), (2000, "touch", 1151), (8000, "", 2286)):
+            log_bytes = 600 * options.log_bytes_per_s(options.Options(second=second), rate_hz)
+            folder = out_folder.OutFolder(str(self.out))
+            refused = self.assertRaisesRegex(options.Refusal, f": 1024 MiB free and {needed_mib} needed")
+            with self.subTest(rate_hz=rate_hz, second=second), unittest.mock.patch.object(out_folder.os, "statvfs", return_value=a_gib):
+                with refused if needed_mib else contextlib.nullcontext():
+                    folder.open(log_bytes)
+            folder.close()
 
 
 class TestProcesses(unittest.TestCase):

@@ -11,6 +11,7 @@ import pathlib
 import subprocess
 import sys
 import tempfile
+import time
 import unittest
 import xml.etree.ElementTree
 
@@ -196,6 +197,39 @@ hd.hdDisableDevice(device)
             got, report, said = self.run_command(*words)
             self.assertEqual((got, self.misuse(report)), (code, ["not_opened"]), said)
 
+    def test_a_program_behind_a_shell_is_ended_with_it(self):
+        program = self.file("behind.py", """
+import ctypes, os, signal, sys, time
+def end(number, _frame):
+    with open(sys.argv[1] + ".signal", "w") as file: file.write(str(number))
+    raise KeyboardInterrupt
+for number in signal.SIGINT, signal.SIGTERM: signal.signal(number, end)
+hd = ctypes.CDLL("libHD.so")
+hd.hdInitDevice(None)
+callback = ctypes.CFUNCTYPE(ctypes.c_uint, ctypes.c_void_p)(lambda _data: 1)
+hd.hdStartScheduler()
+hd.hdScheduleAsynchronous(callback, None, 1)
+try:
+    os.mkdir(sys.argv[1])
+    time.sleep(60)
+finally:
+    time.sleep(0.5)  # longer than its shell
+    hd.hdStopScheduler()
+    hd.hdDisableDevice(0)
+    os.rmdir(sys.argv[1])
+""")
+        runs, by, report = self.folder / "runs", self.folder / "runs.signal", self.folder / "report.json"
+        command = ["sh", "-c", '"$@"; true', "sh", "/usr/bin/python3", "-B", program, str(runs)]
+        code, found, said = self.run_command(*command, options=["--rate", "100", "--seconds", "20"])  # 2000 ticks
+        self.assertEqual((code, self.misuse(found), runs.exists(), by.read_text()), (0, [], False, "2"), said)
+        running = subprocess.Popen([*COMMAND, "--report", report, "--", *command], stderr=subprocess.DEVNULL)
+        while not runs.exists() and running.poll() is None:
+            time.sleep(0.02)
+        running.terminate()
+        self.assertEqual(running.wait(60), 143)
+        found = set(self.misuse(json.loads(report.read_text())))
+        self.assertEqual((found - {"stalls"}, runs.exists(), by.read_text()), (set(), False, "15"))  # the machine may be busy
+
     def test_a_program_for_another_device_is_told(self):
         code, report, _, said = self.run_client("hd_client.py", "spring", 10, ["--device", "omega"])
         self.assertEqual((code, self.misuse(report)), (1, ["not_opened"]))
@@ -315,6 +349,61 @@ assert hd.hdInitDevice(None) == 0  # once more
 hd.hdDisableDevice(0)
 """
 
+# Stops and starts while calls wait and callbacks run.
+RESTART = """
+import ctypes, threading
+hd = ctypes.CDLL('libHD.so')
+hd.hdScheduleAsynchronous.restype = ctypes.c_ulong
+hd.hdGetError.restype = type('Error', (ctypes.Structure,), {'_fields_': [(name, ctypes.c_uint) for name in 'abc']})
+kind = ctypes.CFUNCTYPE(ctypes.c_uint, ctypes.c_void_p)
+hd.hdInitDevice(None)
+hd.hdEnable(0x4000)
+
+calls, began = [0], threading.Event()
+
+def endless(_data):
+    calls[0] += 1
+    began.set()
+    return 1
+
+endless = kind(endless)
+done = kind(lambda _data: 0)
+caller = threading.Thread(target=lambda: hd.hdScheduleSynchronous(endless, None, 9))
+hd.hdStartScheduler()
+caller.start()
+began.wait()
+hd.hdStopScheduler()
+caller.join()
+count = calls[0]
+hd.hdStartScheduler()
+hd.hdScheduleSynchronous(done, None, 0)  # of the lowest priority: after all others of its tick
+assert calls[0] == count, 'called after its caller had returned'
+
+errors, stopped, returned = [], threading.Event(), threading.Event()
+
+def stop(_data):
+    hd.hdStopScheduler()
+    hd.hdStartScheduler()  # cannot be: this is the last tick
+    errors.append(hd.hdGetError().a)
+    stopped.set()
+    returned.wait(0.5)  # a start by another thread waits for this tick, so it has not returned
+    return 0
+
+stop = kind(stop)
+hd.hdScheduleAsynchronous(stop, None, 1)
+stopped.wait()
+hd.hdStartScheduler()
+returned.set()
+assert errors == [0x102], errors
+began.clear()
+handle = hd.hdScheduleAsynchronous(endless, None, 1)
+assert began.wait(20), 'the scheduler does not run'
+hd.hdUnschedule(ctypes.c_ulong(handle))
+assert hd.hdGetError().a == 0
+hd.hdStopScheduler()
+hd.hdDisableDevice(0)
+"""
+
 
 class Scheduler(Case):
     def test_callbacks_run_by_priority_and_calls_return_when_they_should(self):
@@ -322,6 +411,10 @@ class Scheduler(Case):
                                               options=["--switch", "calibration=lost"])
         self.assertEqual(report["exit_code"], 0, said)
         self.assertEqual((code, self.misuse(report)), (1, ["bad_handles", "ends_refused"]), said)
+
+    def test_a_stop_ends_the_calls_that_wait_and_a_start_begins_anew(self):
+        code, report, said = self.run_command("/usr/bin/python3", "-B", self.file("restart.py", RESTART))
+        self.assertEqual((code, report["misuse"]), (0, []), said)
 
 
 class Names(unittest.TestCase):
