@@ -18,8 +18,10 @@ namespace kerf {
 /// Keys on standard input, a terminal or a pipe: space pauses and goes on, `.` steps one tick, `+`
 /// and `-` double and halve the speed, `f` and `b` go a second forward and back, a number and `g`
 /// goes to that tick. A reader's `hold` pauses, its `reset` goes to the start, `undo` and `redo` a
-/// second back and forward: so the keys of the window and the page's buttons do. See
-/// WatchedRun for the way back.
+/// second back and forward: so the keys of the window and the page's buttons do. They are taken on
+/// the way to a tick, too, and count from that tick. See WatchedRun for the way back.
+///
+/// A speed that the machine does not reach is the one that it reaches.
 ///
 /// Returns 0; 1 if ticks are missing in the recording, in front of which it stops. Throws as
 /// `run_replay`, and SegmentError if a controller of that name runs.

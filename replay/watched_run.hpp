@@ -51,10 +51,8 @@ class WatchedRun {
   /// A sign of life for the readers, without a step.
   void rest();
 
-  /// To `tick`, or as near as the recording goes; readers see the volumes of that tick.
-  void go(Tick tick);
-  /// The same in parts: between these two, `go_on` until it returns true. It steps `ticks` times at
-  /// most.
+  /// To `tick`, or as near as the recording goes, in parts: after `begin_go`, `go_on` until it
+  /// returns true; readers see the volumes of that tick then. It steps `ticks` times at most.
   void begin_go(Tick tick);
   [[nodiscard]] bool go_on(int ticks);
 
