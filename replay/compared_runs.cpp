@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <span>
 #include <utility>
 
 #include "record/tick_log.hpp"
@@ -31,14 +32,16 @@ double proxies_apart_mm(const TickRecord& a, const TickRecord& b) {
   return std::isfinite(squares) ? std::sqrt(squares) : 0;  // before docking no place is known
 }
 
-void count_removed(const TickRecord& record, const Manifest& manifest, double& mm3) {
+void count_removed(const TickRecord& record, std::span<const double> voxel_mm3, double& mm3) {
   if ((record.flags & kFlagReset) != 0) mm3 = 0;
-  mm3 += removed_mm3(record, manifest.voxel_mm3);
+  mm3 += removed_mm3(record, voxel_mm3);
 }
 
 }  // namespace
 
-ComparedRuns::ComparedRuns(std::uint64_t ticks, const Manifest& manifest) : manifest_(manifest) {
+ComparedRuns::ComparedRuns(std::uint64_t ticks, const Manifest& manifest,
+                           std::vector<double> replayed_voxel_mm3)
+    : manifest_(manifest), replayed_voxel_mm3_(std::move(replayed_voxel_mm3)) {
   for (const std::string_view name :
        {"recorded_n", "replayed_n", "apart_mm", "recorded_mm3", "replayed_mm3"}) {
     curves_.push_back({name, Envelope(ticks, kMaxPoints)});
@@ -53,8 +56,8 @@ void ComparedRuns::add(const ArmRecords& all_recorded, const ArmRecords& all_rep
   const double replayed_force_n = magnitude(replayed.commanded_force_n);
   const double mm = proxies_apart_mm(recorded, replayed);
   for (std::size_t arm = 0; arm < manifest_.arms; ++arm) {
-    count_removed(all_recorded[arm], manifest_, recorded_mm3_);
-    count_removed(all_replayed[arm], manifest_, replayed_mm3_);
+    count_removed(all_recorded[arm], manifest_.voxel_mm3, recorded_mm3_);
+    count_removed(all_replayed[arm], replayed_voxel_mm3_, replayed_mm3_);
   }
   recorded_peak_n_ = std::max(recorded_peak_n_, recorded_force_n);
   replayed_peak_n_ = std::max(replayed_peak_n_, replayed_force_n);

@@ -18,8 +18,10 @@ namespace kerf {
 /// with changes or with another number type.
 class ComparedRuns {
  public:
-  /// `ticks`: number of the `add` calls to come, at most.
-  ComparedRuns(std::uint64_t ticks, const Manifest& manifest);
+  /// `ticks`: number of the `add` calls to come, at most. `replayed_voxel_mm3`: by volume; the
+  /// recorded ones are in `manifest`.
+  ComparedRuns(std::uint64_t ticks, const Manifest& manifest,
+               std::vector<double> replayed_voxel_mm3);
 
   /// With two arms, forces and positions are those of the first, removed volumes those of both.
   void add(const ArmRecords& all_recorded, const ArmRecords& all_replayed);
@@ -41,6 +43,7 @@ class ComparedRuns {
   void draw(Name curve, double value) { curves_[curve].envelope.add(seconds_, value); }
 
   Manifest manifest_;
+  std::vector<double> replayed_voxel_mm3_;
   std::vector<Curve> curves_;  ///< by `Name`
   double seconds_ = 0;         ///< of the last tick
   double recorded_peak_n_ = 0, replayed_peak_n_ = 0, force_apart_n_ = 0, apart_mm_ = 0;

@@ -215,6 +215,15 @@ void check_begins_at_first_tick(const std::filesystem::path& folder, const Manif
 
 }  // namespace
 
+std::vector<double> voxel_mm3_of(const LoadedScene& scene) {
+  std::vector<double> out;
+  for (const SceneVolume& volume : scene.volumes) {
+    const auto& mm = volume.image.spacing_mm;
+    out.push_back(mm[0] * mm[1] * mm[2]);
+  }
+  return out;
+}
+
 std::string scene_without_source(const std::filesystem::path& folder) {
   return (folder / kSceneName).string() +
          ": does not say, as this version does, what the scene was loaded from; copy the recording "

@@ -44,6 +44,9 @@ struct RecordedRun {
   std::optional<SegmentWriter> segment;      ///< with the volumes at the start; if requested
 };
 
+/// Of each volume.
+[[nodiscard]] std::vector<double> voxel_mm3_of(const LoadedScene& scene);
+
 /// The error line for a scene.json that has no source.
 [[nodiscard]] std::string scene_without_source(const std::filesystem::path& folder);
 

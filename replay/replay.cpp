@@ -2,6 +2,7 @@
 #include "replay/replay.hpp"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <cstddef>
@@ -11,6 +12,7 @@
 #include <iterator>
 #include <memory>
 #include <span>
+#include <string_view>
 #include <vector>
 
 #include "controller/loop/publisher.hpp"
@@ -39,17 +41,24 @@ class ReplayLog {
       : out_(new_folder(out, from, run)), from_(from) {
     for (std::size_t arm = 0; arm < run.servo->arms(); ++arm) {
       logs_.push_back(std::make_unique<TickLogWriter>(out_ / tick_log_name(arm)));
+      summaries_.emplace_back(run.manifest.tick_ns, voxel_mm3_of(run.scene));
     }
     for (std::size_t v = 0; v < run.scene.volumes.size(); ++v) {
       const std::vector<Label>& labels = run.scene.volumes[v].image.labels;
       const std::span<const Density> density = run.servo->density(v);
-      write_starting_volume(out, hex64(volume_hash(density, labels)), run.servo->grid(v), density,
-                            labels);
+      const VoxelGrid& grid = run.servo->grid(v);
+      write_starting_volume(out, hex64(volume_hash(density, labels)), grid, density, labels);
+      volumes_.push_back({{"size_vox", std::array{grid.nx, grid.ny, grid.nz}},
+                          {"spacing_mm", run.scene.volumes[v].image.spacing_mm},
+                          {"initial_hash", hex64(density_hash(density))}});
     }
   }
 
   void append(const ArmRecords& records) {
-    for (std::size_t arm = logs_.size(); arm-- > 0;) logs_[arm]->append(records[arm]);
+    for (std::size_t arm = logs_.size(); arm-- > 0;) {
+      logs_[arm]->append(records[arm]);
+      summaries_[arm].add(records[arm]);
+    }
   }
 
   void close(const RecordedRun& run, const ReplayResult& result) {
@@ -58,10 +67,16 @@ class ReplayLog {
     Json manifest = Json::parse(std::string{std::istreambuf_iterator<char>(file), {}});
     manifest["replay_of"] = from_.string();
     manifest["config_hash"] = hex64(fnv1a(run.canonical));
+    manifest["volumes"] = volumes_;
     manifest["rows"] = result.ticks;
     manifest["lost_ticks"] = 0;
     manifest["gaps"] = Json::List{};
-    manifest["end_reason"] = "replayed";
+    manifest["end_reason"] = kReplayed;
+    const RecordLosses losses{.missed_before_start = run.earlier_ticks()};
+    for (std::size_t arm = 0; arm < summaries_.size(); ++arm) {
+      manifest[arm == 0 ? "summary" : "summary_2"] =
+          figures_of(summaries_[arm].result(losses, kReplayed));
+    }
     write_new_file(out_ / kSceneName, run.scene_json);
     write_new_file(out_ / kManifestName, manifest.document());
   }
@@ -76,8 +91,12 @@ class ReplayLog {
     return out;
   }
 
+  static constexpr std::string_view kReplayed = "replayed";
+
   std::filesystem::path out_, from_;
+  Json volumes_ = Json::List{};                       ///< as the manifest has them
   std::vector<std::unique_ptr<TickLogWriter>> logs_;  ///< by arm
+  std::vector<SummaryBuilder> summaries_;             ///< likewise
 };
 
 std::uint64_t volume_hash_of(const RecordedRun& run) {
@@ -132,16 +151,16 @@ void check_range(const ReplayOptions& options, RecordedTicks& log) {
   std::vector<ArmRecords> rows;
   log.read(0, rows);
   const Tick first = rows.front()[0].tick;
-  log.read(log.rows() - 1, rows);
-  const Tick last = rows.front()[0].tick;
-  if (options.from > last) {
-    throw RecordError("--from " + std::to_string(options.from) + ": the recording ends at tick " +
-                      std::to_string(last) + "; give an earlier one");
-  }
   if (options.until < first) {
     throw RecordError("--until " + std::to_string(options.until) +
                       ": the recording begins at tick " + std::to_string(first) +
                       "; give a later one");
+  }
+  if (!log.try_read(log.rows() - 1, rows).empty()) return;  // the replay stops before it
+  const Tick last = rows.front()[0].tick;
+  if (options.from > last) {
+    throw RecordError("--from " + std::to_string(options.from) + ": the recording ends at tick " +
+                      std::to_string(last) + "; give an earlier one");
   }
 }
 
@@ -159,7 +178,7 @@ int run_replay(const ReplayOptions& options, const std::atomic<bool>& stop) {
   RecordedRun run = load_run(options.folder, options.changes, kernels_named(options.kernels));
   std::optional<ReplayLog> copy;
   if (!options.out.empty()) copy.emplace(options.out, options.folder, run);
-  ComparedRuns compared(log.rows(), run.manifest);
+  ComparedRuns compared(log.rows(), run.manifest, voxel_mm3_of(run.scene));
   const bool changed = !options.changes.none();
 
   std::optional<DifferentTick> difference;

@@ -130,9 +130,11 @@ class Watch {
   Watch(WatchedRun& run, SegmentWriter& segment, std::uint32_t tick_ns)
       : run_(run), segment_(segment), tick_ns_(tick_ns), pace_(tick_ns) {}
 
-  void run(SegmentServer& server, const std::atomic<bool>& stop) {
+  /// Goes to `from` first, if that is not 0.
+  void run(SegmentServer& server, Tick from, const std::atomic<bool>& stop) {
     Keys keys;
     pace_.start(monotonic_ns());
+    if (from != 0) go(from);
     print_state();
     while (!stop) {
       Request request = keys.next();
@@ -142,24 +144,50 @@ class Watch {
       }
       if (request.kind == Request::Kind::quit) return;
       if (request.kind != Request::Kind::none) answer(request);
-      const std::uint64_t due = is_paused_ ? 0 : pace_.due(monotonic_ns());
-      for (std::uint64_t i = 0; i < due && !is_paused_; ++i) {
-        if (!run_.step()) pause(true);
+      if (goal_ != 0) {
+        go_on();
+        continue;
       }
+      if (!is_paused_) step_due(stop);
       std::this_thread::sleep_for(std::chrono::milliseconds(is_paused_ ? 10 : 1));
     }
   }
 
  private:
+  /// In parts of a batch: keys, commands and a signal are heard in between.
+  void go(Tick tick) {
+    goal_ = std::max(std::min(tick, run_.last_tick()), run_.first_tick());
+    run_.begin_go(goal_);
+  }
+  void go_on() {
+    constexpr int kBatch = 256;
+    if (!run_.go_on(kBatch)) return;
+    goal_ = 0;
+    pace_.start(monotonic_ns());
+    print_state();
+  }
+
+  /// For `kBusyNs` at most. A machine that is behind then does not make up for it: else each batch
+  /// would be longer than the one before.
+  void step_due(const std::atomic<bool>& stop) {
+    constexpr std::int64_t kBusyNs = 10'000'000;
+    const std::int64_t began = monotonic_ns();
+    for (std::uint64_t due = pace_.due(began); due > 0 && !is_paused_ && !stop; --due) {
+      if (!run_.step()) pause(true);
+      if (monotonic_ns() - began > kBusyNs) return pace_.start(monotonic_ns());
+    }
+  }
+
   void answer(const Request& request) {
     const auto second = static_cast<Tick>(1e9 / tick_ns_);
-    const Tick now = run_.tick();
+    const Tick now = goal_ != 0 ? goal_ : run_.tick();
     switch (request.kind) {
       case Request::Kind::pause:
         pause(!is_paused_);
         return;
       case Request::Kind::step:
         pause(true, false);
+        if (goal_ != 0) return go(now + 1);
         run_.step();
         break;
       case Request::Kind::faster:
@@ -169,14 +197,11 @@ class Watch {
         pace_.change(0.5, monotonic_ns());
         break;
       case Request::Kind::forward:
-        run_.go(now + second);
-        break;
+        return go(now + second);
       case Request::Kind::back:
-        run_.go(now > second ? now - second : 1);
-        break;
+        return go(now > second ? now - second : 1);
       case Request::Kind::go:
-        run_.go(std::max<Tick>(request.tick, 1));
-        break;
+        return go(request.tick);
       case Request::Kind::none:
       case Request::Kind::quit:
         return;
@@ -192,7 +217,9 @@ class Watch {
     if (prints) print_state();
   }
 
+  /// On the way to a tick it prints nothing: there it will.
   void print_state() const {
+    if (goal_ != 0) return;
     std::printf("tick %llu of %llu (%.3f s), speed %g%s\n",
                 static_cast<unsigned long long>(run_.tick()),
                 static_cast<unsigned long long>(run_.last_tick()),
@@ -205,6 +232,7 @@ class Watch {
   SegmentWriter& segment_;
   std::uint32_t tick_ns_;
   Pace pace_;
+  Tick goal_ = 0;  ///< the tick that `go_on` goes to; 0: none
   bool is_paused_ = false;
 };
 
@@ -224,10 +252,8 @@ int watch_replay(const ReplayOptions& options, RecordedTicks& log, const std::at
       "kerf visualizer --name %s shows it; space pauses, . steps, + and - change the speed, "
       "f and b go a second on and back, 1600g goes to tick 1600, q quits\n",
       options.watch.c_str());
-  if (const Tick from = std::max(options.from, run.earlier_ticks() + 1); from > 1) {
-    watched.go(from);
-  }
-  Watch(watched, *run.segment, run.manifest.tick_ns).run(server, stop);
+  const Tick from = std::max(options.from, watched.first_tick());
+  Watch(watched, *run.segment, run.manifest.tick_ns).run(server, from > 1 ? from : 0, stop);
   run.segment->set_lifecycle(Lifecycle::clean_end);
   if (watched.last_tick() == rows) return 0;
   std::printf("tick %llu is not in the recording; it was shown until there\n",

@@ -18,8 +18,9 @@ namespace kerf {
 /// Keys on standard input, a terminal or a pipe: space pauses and goes on, `.` steps one tick, `+`
 /// and `-` double and halve the speed, `f` and `b` go a second forward and back, a number and `g`
 /// go to that tick. A reader's `hold` pauses, its `reset` goes to the start, its `undo` and `redo`
-/// go a second back and forward; so the keys of the window and the page's buttons do the same. See
-/// WatchedRun for how it goes back.
+/// go a second back and forward; so the keys of the window and the page's buttons do the same. They
+/// are taken on the way to a tick, too, and count from that tick. See WatchedRun for how it goes
+/// back. A speed that the machine does not reach is the highest that it reaches.
 ///
 /// Returns 0; 1 if the recording lacks ticks, before which it stops. Throws as `run_replay`, and
 /// SegmentError if a controller of that name runs.

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <iterator>
-#include <limits>
 #include <utility>
 
 #include "shared/posix/monotonic_clock.hpp"
@@ -45,12 +44,6 @@ bool WatchedRun::step() {
 void WatchedRun::rest() {
   run_.segment->begin_tick(++published_);
   run_.segment->end_tick(static_cast<std::uint64_t>(monotonic_ns()));
-}
-
-void WatchedRun::go(Tick tick) {
-  begin_go(tick);
-  while (!go_on(std::numeric_limits<int>::max())) {
-  }
 }
 
 void WatchedRun::begin_go(Tick tick) {

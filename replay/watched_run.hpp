@@ -51,10 +51,9 @@ class WatchedRun {
   /// Publishes an empty tick, as a sign of life for the readers.
   void rest();
 
-  /// Goes to `tick`, or as near as the recording allows; readers see the volumes of that tick.
-  void go(Tick tick);
-  /// The same in parts: after `begin_go`, call `go_on` until it returns true. Each call steps at
-  /// most `ticks` times.
+  /// Goes to `tick`, or as near as the recording goes, in parts: after `begin_go`, call `go_on`
+  /// until it returns true; then readers see the volumes of that tick. It steps at most `ticks`
+  /// times.
   void begin_go(Tick tick);
   [[nodiscard]] bool go_on(int ticks);
 

@@ -4,8 +4,10 @@
     replay_test.py ROOT BIN LIBM     LIBM: a C library with other last bits (next_libm.cpp)"""
 import gzip
 import json
+import math
 import os
 import pathlib
+import re
 import shutil
 import socket
 import struct
@@ -307,6 +309,36 @@ class TestReplay(unittest.TestCase):
         self.assertIn("the counts of the recording are of omni",
                       replay(self.log, "--set", "device.personality=falcon", code=2))
 
+    def test_other_voxels_are_counted_by_their_own_size(self):
+        found = replay(self.log, "--set", "volume.size=[128,128,80]", "--out", out := self.run_folder / "coarse")
+        recorded_mm3, replayed_mm3 = map(float, re.search(r"removed +([0-9.]+) +([0-9.]+) mm3", found).groups())
+        volume, = json.loads((out / "scene.json").read_text())["volumes"]
+        voxel_mm3 = math.prod(volume["spacing_mm"])
+        self.assertGreater(voxel_mm3, 4 * math.prod(json.loads((self.log / "scene.json").read_text())["volumes"][0]["spacing_mm"]))
+        rows = self.rows(out)
+        removed = sum(struct.unpack_from("<I", rows, at + 172)[0] for at in range(HEADER, len(rows), self.row)) / 65535 * voxel_mm3
+        self.assertGreater(removed, 0.01)
+        self.assertAlmostEqual(recorded_mm3, self.report["removed_mm3"], 3)
+        self.assertAlmostEqual(replayed_mm3, removed, 3)
+
+    def test_a_recording_of_a_replay_has_the_figures_of_the_replay(self):
+        was = json.loads((self.log / "manifest.json").read_text())
+        for name, options, same in (("same", (), True), ("softer", ("--set", "force.stiffness_n_per_mm=0.2"), True),
+                                    ("coarser", ("--set", "volume.size=[128,128,80]"), False),
+                                    ("shorter", ("--until", "1500"), True)):
+            out, report = self.run_folder / name, self.run_folder / f"{name}.json"
+            replay(self.log, *options, "--out", out)
+            subprocess.run([BIN / "kerf-record", "info", out, "--report", report], check=True, stdout=subprocess.DEVNULL)
+            manifest, figures = json.loads((out / "manifest.json").read_text()), json.loads(report.read_text())
+            self.assertEqual(manifest["summary"], figures)
+            self.assertEqual(figures["end_reason"], "replayed")
+            self.assertEqual(figures["rows"], manifest["rows"])
+            volume, = json.loads((out / "scene.json").read_text())["volumes"]
+            self.assertEqual([manifest["volumes"][0][key] for key in ("size_vox", "spacing_mm")],
+                             [volume["grid"], volume["spacing_mm"]])
+            self.assertEqual(manifest["volumes"] == was["volumes"], same)
+            self.assertEqual(figures["peak_force_n"] == was["summary"]["peak_force_n"], name == "same")
+
     def test_gaps_and_cuts(self):
         log = self.copy()
         rows = self.rows(log)
@@ -323,6 +355,12 @@ class TestReplay(unittest.TestCase):
         sound = replay(log, code=1)
         self.assertIn("700 ticks, each equal", sound)
         self.assertIn("row 700 has a wrong checksum", sound)
+        (log / "ticks.npy").write_bytes(rows[:-50] + b"xyz" + rows[-47:])
+        last = (len(rows) - HEADER) // self.row - 1
+        self.assertIn("5 ticks, each equal", replay(log, "--until", "5"))
+        sound = replay(log, code=1)
+        self.assertIn(f"{last} ticks, each equal", sound)
+        self.assertIn(f"row {last} has a wrong checksum", sound)
 
     def watch(self, log, *options):
         name = f"watched-{self.run_folder.name}"
@@ -369,6 +407,26 @@ class TestReplay(unittest.TestCase):
         self.assertEqual(recorder.wait(timeout=20), 0)
         seen = self.ticks(out)[-(6 + len(was) - 1990):]
         self.assertEqual(seen, [was[tick - 1] for tick in [1000, 1001, 1, 1001, len(was), *range(1990, len(was) + 1)]])
+
+    def test_a_watched_replay_takes_keys_on_the_way_to_a_tick(self):
+        """All keys are there before the replay is: what it prints does not depend on time."""
+        def printed(keys, *options):
+            file = self.run_folder / "keys"
+            file.write_text(keys)
+            with file.open() as lines:
+                done = subprocess.run([BIN / "kerf-replay", self.log, "--watch", f"keyed-{self.run_folder.name}", *options],
+                                      stdin=lines, capture_output=True, text=True, timeout=60)
+            self.assertEqual((done.returncode, done.stderr), (0, ""))
+            return done.stdout
+
+        self.assertNotIn("tick 1990 of", printed(" 1990gq"))
+        self.assertNotIn("tick 1990 of", printed("q", "--from", "1990"))
+        _, watched, told = self.watch(self.log)
+        told(" ", "paused")
+        self.assertIn("tick 1501 of", told("1500g.", "tick 1501"))
+        self.assertIn("tick 501 of", told("1gf.b1500gb.", "tick 501"))
+        watched.communicate("q", timeout=20)
+        self.assertEqual(watched.returncode, 0)
 
     def test_ticks_are_sent_as_json_and_a_receiver_may_go(self):
         receiver = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
