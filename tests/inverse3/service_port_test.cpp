@@ -280,14 +280,14 @@ std::vector<CartesianReport> lock_step_run(ServiceProfile profile) {
   const auto port = open(service.options(profile == ServiceProfile::v3_5 ? kWireless : ""), true);
   std::vector<CartesianReport> reports;
   for (int tick = 0; tick < 300; ++tick) {
-    command(*port, static_cast<std::int16_t>(10 * tick));
-    REQUIRE(port->wait(5000));
+    REQUIRE(port->wait(5000));  // the first report is there before the first command
     std::array<std::uint8_t, 65> packet;
     const std::size_t size = port->receive(packet);
     const auto report = decode_cartesian_report(std::span(packet).first(size));
     REQUIRE(report);
     CHECK(port->receive(packet) == 0);
     reports.push_back(*report);
+    command(*port, static_cast<std::int16_t>(10 * tick));
   }
   return reports;
 }
