@@ -342,15 +342,24 @@ int run_flight_recorder(const RecorderOptions& options, const std::atomic<bool>&
 
 namespace {
 
-/// Whether a flight recorder is writing a recording into `out`: its folder is hidden until then.
-bool writes_into(const std::filesystem::path& out) {
+/// Bytes of the recordings in `out` that are not whole yet: their folders are hidden. They grow
+/// while a flight recorder writes; those that a killed one has left do not.
+std::uintmax_t unfinished_bytes(const std::filesystem::path& out) {
+  std::uintmax_t bytes = 0;
   std::error_code fault;
-  for (std::filesystem::directory_iterator entry(out, fault), end; !fault && entry != end;
-       entry.increment(fault)) {
-    const std::string file = entry->path().filename().string();
-    if (file.starts_with(".") && !file.starts_with(kRunFolder)) return true;
+  for (std::filesystem::directory_iterator folder(out, fault), end; !fault && folder != end;
+       folder.increment(fault)) {
+    const std::string name = folder->path().filename().string();
+    if (!name.starts_with(".") || name.starts_with(kRunFolder)) continue;
+    std::error_code gone;
+    for (std::filesystem::directory_iterator file(folder->path(), gone); !gone && file != end;
+         file.increment(gone)) {
+      std::error_code unknown;
+      const std::uintmax_t size = file->file_size(unknown);
+      if (!unknown) bytes += size;
+    }
   }
-  return false;
+  return bytes;
 }
 
 }  // namespace
@@ -376,6 +385,7 @@ std::filesystem::path grab(const std::string& name) {
   std::uint64_t next = reader.state_head();
   next -= std::min<std::uint64_t>(next, reader.info().state_slots / 2);
   std::filesystem::path kept;
+  std::uintmax_t written = unfinished_bytes(out);
   while (Clock::now() < deadline) {
     TickRecord record;
     for (; kept.empty() && reader.state_at(next, record) == ReadState::ok; ++next) {
@@ -385,7 +395,9 @@ std::filesystem::path grab(const std::string& name) {
     }
     if (kept.empty() && reader.state_at(next, record) == ReadState::overrun) ++next;
     if (!kept.empty() && std::filesystem::exists(kept)) return kept;
-    if (writes_into(out)) deadline = Clock::now() + kPatience;  // of an earlier mark, perhaps
+    // It may still write the recording of an earlier mark.
+    const std::uintmax_t before = std::exchange(written, unfinished_bytes(out));
+    if (written != before) deadline = Clock::now() + kPatience;
     std::this_thread::sleep_for(kPollPeriod);
   }
   throw SegmentError(out + ": the flight recorder kept nothing within 10 s; see its messages");

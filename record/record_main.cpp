@@ -34,7 +34,8 @@ RecordSummary summary_for_info(const std::filesystem::path& folder, TickRange ra
 /// Prints a line for each arm whose log has fewer rows than its header counts. Whether one has.
 bool report_cuts(const std::filesystem::path& folder) {
   bool is_cut = false;
-  for (std::size_t arm = 0; arm < read_manifest(folder).arms; ++arm) {
+  const std::size_t arms = read_manifest(folder).arms;
+  for (std::size_t arm = 0; arm < arms; ++arm) {
     const std::filesystem::path path = folder / tick_log_name(arm);
     const TickLogReader log(path);
     if (log.rows() >= log.counted()) continue;

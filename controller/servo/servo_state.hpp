@@ -102,7 +102,7 @@ struct StrokeState {
   bool lost = false;                ///< it is longer than its room, or would be if it began now
   std::uint32_t quiet_ticks = 0;    ///< since the last contact, or since the pedal went up
   Motion motion = Motion::none;     ///< undo or redo that runs now
-  Stroke moving{};                  ///< what is left of its stroke
+  Stroke moving{};                  ///< the rest of its stroke
 
   [[nodiscard]] constexpr bool can_undo() const noexcept {
     return motion == Motion::none && (open ? !lost : done > 0);

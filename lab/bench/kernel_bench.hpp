@@ -26,7 +26,7 @@ struct KernelRow {
 };
 
 /// Times the servo's kernels against the paper's form on 256 x 256 x 161 voxels, in this process on
-/// this core. Calls `told` with each row when it is ready. Takes about a minute.
+/// this core. Calls `add_row` with each row when it is ready. Takes about a minute.
 [[nodiscard]] std::vector<KernelRow> bench_kernels(
     const std::function<void(const KernelRow&)>& add_row);
 
