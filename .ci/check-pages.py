@@ -5,13 +5,14 @@
     .ci/check-pages.py                  prints each stale page with the command that renews it; exit code 1 if there is one
     .ci/check-pages.py --stamp PAGE...  after a page was made anew: writes the hash of its sources as its last line
 
-A page ends with <!-- made by: COMMAND; sources: HASH -->. The hash is over the contents of the sources, in the order of
-their paths, without the paths, so a renamed file alone makes no page stale. Pages that a test makes again and compares
+A page ends with <!-- made by: COMMAND; sources: HASH -->. The hash is over the code of the sources, without their paths and
+comments: neither a renamed file nor another comment makes a page stale. Pages that a test makes again and compares
 (scene-keys, script-keys, reports, segment, wire, log, errors) need no hash."""
 import hashlib
 import pathlib
 import re
 import sys
+import tokenize
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 RIG = ["lab/rig/*"]
@@ -26,6 +27,9 @@ PAGES = {
     "docs/pictures.md": ("./kerf bench pictures --page docs/pictures.md", ["visualizer/bench/*", "lab/report/pictures.py"]),
     "docs/second-machine.md": ("./kerf bench bridge --page docs/second-machine.md", ["lab/bridge/*"]),
 }
+# A number comes before a character: 1'000 has no text in it.
+CPP_TOKEN = re.compile(r"""(?P<kept>R"(?P<end>[^(]*)\(.*?\)(?P=end)"|"(?:\\.|[^"\\])*"|\b[0-9][\w.']*|'(?:\\.|[^'\\])*')"""
+                       r"""|(?://[^\n]*\n|/\*.*?\*/|\s)+""", re.DOTALL)
 STAMP = re.compile(r"\n*<!-- made by: (.*); sources: ([0-9a-f]{16}) -->\n*\Z")
 
 
@@ -40,11 +44,18 @@ def sources(globs):
     return sorted(found - left_out)
 
 
+def code_of(file):
+    """What a file does: its code without comments, and with one space for each gap."""
+    if file.suffix == ".py":
+        with tokenize.open(file) as text:
+            tokens = tokenize.generate_tokens(text.readline)
+            return "\n".join(f"{token.type} {token.string}" for token in tokens if token.type not in (tokenize.COMMENT, tokenize.NL))
+    return CPP_TOKEN.sub(lambda found: found["kept"] or " ", file.read_text(encoding="utf-8"))
+
+
 def hash_of(globs):
-    total = hashlib.sha256()
-    for file in sources(globs):
-        total.update(hashlib.sha256(file.read_bytes()).digest())
-    return total.hexdigest()[:16]
+    codes = sorted(code_of(file) for file in sources(globs))
+    return hashlib.sha256("\0".join(codes).encode()).hexdigest()[:16]
 
 
 def stamp(page):
