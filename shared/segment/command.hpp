@@ -6,57 +6,57 @@
 #include <cstdint>
 #include <iterator>
 
-// Commands of a reader to the controller, and the answers.
+// Commands from a reader to the controller, and the replies.
 
 namespace kerf {
 
 /// Default of `--name`: the name of a controller and its segment.
 inline constexpr const char* kDefaultName = "kerf";
 
-/// Kinds of commands.
+/// Kind of a command.
 enum class CommandKind : std::uint32_t {
-  select_tool = 1,  ///< argument: index into the scene's tools; for one arm
-  hold = 2,         ///< argument: 1 stops cutting and force, 0 goes on
-  reset = 3,        ///< argument: 0; the volumes go back to their first content
-  undo = 4,         ///< argument: 0; the volumes go back to their content before the last stroke
-  redo = 5,         ///< argument: 0; the stroke that was undone last is cut again
-  mark = 6,  ///< argument: 0; changes nothing: a place in the log, which a flight recorder keeps
+  select_tool = 1,  ///< argument: index of the tool in the scene; for the arm in `arm`
+  hold = 2,         ///< argument: 1 stops cutting and force, 0 resumes
+  reset = 3,        ///< argument: 0; restores the volumes of tick 0
+  undo = 4,         ///< argument: 0; restores the volumes as they were before the last stroke
+  redo = 5,         ///< argument: 0; repeats the stroke that was undone last
+  mark = 6,  ///< argument: 0; marks the tick in the log; a flight recorder then saves its window
 };
 
-/// One command: a message of fixed size over the socket, validated outside the servo, applied by
-/// the servo at a tick boundary, logged as an input.
+/// One command, a message of fixed size over the socket. It is validated outside the servo, applied
+/// by the servo between two ticks, and logged as an input.
 struct Command {
   CommandKind kind = CommandKind::hold;
   std::uint32_t index = 0;  ///< set by the server: 1, 2, ... in order of acceptance
   std::uint32_t argument = 0;
-  std::uint32_t arm = 0;  ///< select_tool: 0 the first arm, 1 the second; else 0: for all arms
-  double value[4] = {};   ///< for kinds that carry numbers; finite
+  std::uint32_t arm = 0;  ///< select_tool: 0 the first, 1 the second; other kinds: 0, act on both
+  double value[4] = {};   ///< finite; no kind uses it yet
   std::uint64_t reserved1[2] = {};
 };
 static_assert(sizeof(Command) == 64);
 
 enum class ReplyStatus : std::uint32_t {
   accepted = 0,  ///< queued; applied within `kCommandSlots` ticks
-  busy = 1,      ///< queue full: try again
-  refused = 2,   ///< unknown kind, argument out of range or value not finite
+  busy = 1,      ///< queue full, or a bridge waits for another one or for the controller: try again
+  refused = 2,   ///< unknown kind, argument out of range, value not finite, or no right to command
 };
 
-/// The immediate answer of the server.
+/// The immediate reply of the server to a command.
 struct Reply {
   ReplyStatus status = ReplyStatus::refused;
-  std::uint32_t index = 0;  ///< `Command::index`, as TickRecord::last_command will show it
+  std::uint32_t index = 0;  ///< `Command::index`, for TickRecord::last_command; 0 if not accepted
 };
 static_assert(sizeof(Reply) == 8);
 
 inline constexpr std::uint32_t kCommandSlots = 64;
 
-/// Limits of the arguments, by the scene; checked before the queue.
+/// Limits of the arguments in this scene; checked before a command is queued.
 struct CommandLimits {
   std::uint32_t tools = 1;
   std::uint32_t arms = 1;
 };
 
-/// Whether `command` may go to the servo.
+/// True if `command` may be queued for the servo.
 [[nodiscard]] inline bool is_valid(const Command& command, const CommandLimits& limits) noexcept {
   if (!std::all_of(std::begin(command.value), std::end(command.value),
                    [](double v) { return std::isfinite(v); })) {

@@ -77,7 +77,7 @@ int connect_to(int fd, const std::string& path) {
   return connect(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0 ? 0 : errno;
 }
 
-/// What to do if no controller has the name: those that run are named, such as a demo's.
+/// The remedy if no controller has the name; lists those that run, such as a demo's.
 std::string way_to_a_controller() {
   constexpr std::size_t kMost = 8;
   std::vector<std::string> names;
@@ -85,7 +85,8 @@ std::string way_to_a_controller() {
   for (const auto& entry : std::filesystem::directory_iterator(segment_folder(), error)) {
     const std::filesystem::path& path = entry.path();
     if (path.extension() != ".sock" || !is_name(path.stem().native())) continue;
-    // Another type of socket: refused either way, and the listener does not notice.
+    // A socket of another type: connect() always fails, with EPROTOTYPE if a controller listens,
+    // which does not notice.
     const OwnedFd asking(socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0));
     if (connect_to(asking.get(), path.native()) == EPROTOTYPE)
       names.push_back(path.stem().string());
@@ -149,7 +150,7 @@ namespace {
 
 constexpr timeval kAnswerTimeout{2, 0};  // the server's thread is never busy for long
 
-/// Receives HELLO and the one descriptor beside it.
+/// Receives the hello and the descriptor passed with it.
 [[nodiscard]] OwnedFd receive_segment(int socket, const std::string& path) {
   SegmentHello hello;
   iovec part{&hello, sizeof hello};

@@ -8,17 +8,17 @@
 #include "shared/segment/command.hpp"
 #include "shared/segment/reader.hpp"
 
-// The path of a controller's socket, and the reader's end of the connection. The server uses the
-// rest of this file, too.
+// The path of a controller's socket, the reader's end of the connection, and what the server needs
+// of both.
 
 namespace kerf {
 
-/// `$XDG_RUNTIME_DIR/kerf`, else `/tmp/kerf-$UID`; made with mode 0700 if it is missing. Throws
-/// `SegmentError` if it belongs to another user, is a link or is open to others.
+/// `$XDG_RUNTIME_DIR/kerf`, else `/tmp/kerf-$UID`; created with mode 0700 if it is missing.
+/// Throws `SegmentError` if it belongs to another user, is a link or is open to others.
 [[nodiscard]] std::string segment_folder();
 
-/// Path of the socket of controller `name`: 1..64 of letters, digits, '.', '_', '-', and no leading
-/// dot. Throws `SegmentError` for another name.
+/// Path of the socket of controller `name`, which is 1 to 64 letters, digits, '.', '_' or '-' and
+/// does not start with a dot. Throws `SegmentError` for any other name.
 [[nodiscard]] std::string segment_socket(std::string_view name);
 
 /// The connection of a reader to a controller. One thread.
@@ -34,8 +34,8 @@ class SegmentConnection {
   /// False once the controller has gone; the segment stays readable. Never waits.
   [[nodiscard]] bool alive() const noexcept;
 
-  /// Waits at most 2 s for the answer of the server's thread (not of the servo). Throws
-  /// `SegmentError` if the controller has gone or does not answer.
+  /// Waits at most 2 s for the reply of the server's thread (not of the servo). Throws
+  /// `SegmentError` if the controller has gone or does not reply.
   Reply send(const Command& command);
 
  private:
@@ -43,12 +43,12 @@ class SegmentConnection {
   SegmentReader reader_;
 };
 
-/// Connects to controller `name` and maps its segment. Throws `SegmentError` if there is none; the
-/// message names those that run.
+/// Connects to controller `name` and maps its segment. Throws `SegmentAbsent` if no such controller
+/// runs (the message names those that do), `SegmentError` on any other failure.
 [[nodiscard]] SegmentConnection connect_segment(std::string_view name);
 
-/// First message of the server; the memfd is passed with it. After it the client sends `Command`s,
-/// and the server answers each with one `Reply`.
+/// First message of the server, which passes the memfd with it. Then the client sends `Command`s,
+/// and the server replies to each with one `Reply`.
 struct SegmentHello {
   std::uint64_t magic = 0;
   std::uint32_t layout_major = 0;
@@ -73,7 +73,8 @@ class OwnedFd {
   int fd_ = -1;
 };
 
-/// A lock that ends with its process, even by SIGKILL: `NAME.lock` beside the socket.
+/// Lock on a controller's name: the file `NAME.lock` beside the socket. The kernel releases it when
+/// the process ends, even by SIGKILL.
 class NameLock {
  public:
   /// Throws `SegmentError` if a live process holds the name.

@@ -13,20 +13,21 @@
 
 namespace kerf {
 
-// The shared segment byte by byte: the controller writes it (on a second machine `kerf-bridge
-// join`, replica_writer.hpp), and readers map it read-only.
+// The shared memory segment, byte by byte. The controller writes it (on a second machine
+// `kerf-bridge join` does, replica_writer.hpp); readers map it read-only.
 //
-//     0                 SegmentHeader, one page; a hot word has a 64-byte line of its own
+//     0                 SegmentHeader, one page
 //     off_volume_table  one VolumeDescriptor per volume
 //     off_scene         canonical scene, JSON text
 //     off_state         ring of TickRecord, slot = index mod state_slots
-//     off_state_2       ring of the second arm; 0: there is one arm
+//     off_state_2       the same ring of the second arm; 0 if there is one arm
 //     off_dirty         ring of DirtyRecord, slot = index mod dirty_slots
 //     per volume        u64 version per brick | 512 densities per brick | labels (optional)
 //
-// Little-endian, natural alignment, offsets instead of pointers. `layout_table.hpp` lists every
-// field as (name, offset, type); the table is checked against these structs and hashed into
-// `kAbiHash`, so a program built with another layout refuses the segment instead of misreading it.
+// Little-endian, natural alignment; byte offsets from the start instead of pointers.
+// `layout_table.hpp` lists every field as (name, offset, type); the table is checked against these
+// structs and hashed into `kAbiHash`, so a program built with another layout refuses the segment
+// instead of misreading it.
 
 static_assert(std::endian::native == std::endian::little,
               "the segment and the log are little-endian and written as they lie in memory; a "
@@ -43,14 +44,14 @@ inline constexpr std::uint32_t kLayoutMajor = 1;
 inline constexpr std::uint32_t kLayoutMinor = 4;
 inline constexpr std::uint32_t kStateSlots = 4096;  // 4.1 s at 1 kHz: longest pause of a reader
 inline constexpr std::uint32_t kDirtySlots = 4096;
-inline constexpr std::uint64_t kMaxSceneBytes = std::uint64_t{1} << 26;  // a reader copies it whole
-inline constexpr std::uint32_t kMaxBricks = 1U << 21;  // of one volume: 1024^3 voxels, 2 GiB
+inline constexpr std::uint64_t kMaxSceneBytes = std::uint64_t{1} << 26;  // readers copy all of it
+inline constexpr std::uint32_t kMaxBricks = 1U << 21;  // per volume: 1024^3 voxels, 2 GiB
 
 /// State of the run. Every value from `clean_end` on is final.
 enum class Lifecycle : std::uint32_t { init = 0, run = 1, hold = 2, clean_end = 3, fault = 4 };
 
-/// A version word, of a brick or of the whole publication: odd while tick `t` is being written,
-/// even when it is complete. 0 means "never seen", so tick 0 is published as 2.
+/// Version word of a brick, or of all volumes together (`SegmentHeader::epoch`): odd while tick `t`
+/// is being written, even once it is complete. 0 means "no version yet", so tick 0 has version 2.
 [[nodiscard]] constexpr std::uint64_t stable_version(Tick tick) noexcept {
   return 2 * tick + 2;
 }
@@ -61,17 +62,18 @@ enum class Lifecycle : std::uint32_t { init = 0, run = 1, hold = 2, clean_end = 
   return version < 2 ? 0 : version / 2 - 1;
 }
 
-/// Page 0. Everything before `state_head` is written once, before the magic.
+/// Page 0. All fields before `state_head` are written once, before the magic. Each later field has
+/// a 64-byte line of its own; `lifecycle` shares that of `heartbeat_ns`.
 struct SegmentHeader {
-  std::uint64_t magic;  ///< stored last (release), read first (acquire)
-  std::uint32_t layout_major;
-  std::uint32_t layout_minor;
-  std::uint64_t abi_hash;
-  std::uint64_t session_id;  ///< random; a restarted controller has another
-  std::uint64_t total_bytes;
-  std::uint64_t config_hash;
-  std::uint64_t start_ns;  ///< CLOCK_MONOTONIC when the segment was made; 0 in lock-step
-  std::uint32_t tick_ns;
+  std::uint64_t magic;         ///< stored last (release), read first (acquire)
+  std::uint32_t layout_major;  ///< `kLayoutMajor`; a reader refuses any other value
+  std::uint32_t layout_minor;  ///< `kLayoutMinor`; likewise
+  std::uint64_t abi_hash;      ///< `kAbiHash`, over the layout; likewise
+  std::uint64_t session_id;    ///< random, not 0; each start of the controller has a new one
+  std::uint64_t total_bytes;   ///< size of the segment
+  std::uint64_t config_hash;   ///< of the scene with all its settings
+  std::uint64_t start_ns;      ///< CLOCK_MONOTONIC when the segment was made; 0 in lock-step
+  std::uint32_t tick_ns;       ///< period of the servo
   std::uint32_t volume_count;
   std::uint64_t off_state;
   std::uint64_t off_dirty;
@@ -82,16 +84,16 @@ struct SegmentHeader {
   std::uint32_t dirty_record_bytes;
   std::uint64_t off_scene;
   std::uint64_t scene_bytes;
-  std::uint64_t off_state_2;  ///< of the second arm's ring of ticks; 0 with one arm
+  std::uint64_t off_state_2;  ///< ring of the second arm's tick records; 0 if there is one arm
   char build_id[64];          ///< for messages only, zero-terminated
   std::uint64_t reserved1[8];
   std::uint64_t state_head;  ///< tick records published so far
   std::uint64_t pad_state[7];
   std::uint64_t dirty_head;  ///< dirty records published so far
   std::uint64_t pad_dirty[7];
-  std::uint64_t epoch;  ///< version word of the whole publication
+  std::uint64_t epoch;  ///< version word of all volumes together; odd while changed bricks wait
   std::uint64_t pad_epoch[7];
-  std::uint64_t heartbeat_ns;  ///< CLOCK_MONOTONIC of the last finished tick
+  std::uint64_t heartbeat_ns;  ///< CLOCK_MONOTONIC at the end of the last tick
   std::uint32_t lifecycle;
   std::uint32_t pad_life;
   std::uint64_t pad_heartbeat[6];
@@ -112,50 +114,50 @@ struct VolumeDescriptor {
   double origin_mm[3];
   std::uint64_t off_versions;
   std::uint64_t off_bricks;
-  std::uint64_t initial_hash;  ///< `density_hash` of the first content
+  std::uint64_t initial_hash;  ///< `density_hash` of the content at tick 0
   std::uint32_t material;
   std::uint32_t iso;
   float orientation[4];      ///< quaternion x, y, z, w: voxel axes to world
-  std::uint64_t off_labels;  ///< 0: none; else u8 per voxel, linear, x fastest, never changes
+  std::uint64_t off_labels;  ///< u8 per voxel, x fastest, constant; 0 if there are no labels
 };
 
 /// Input, contact and output of one arm in one servo tick. World mm for the tip; forces in N at the
 /// device port. `log_columns.cpp` has each field's unit, meaning and validity (docs/log.md).
 struct TickRecord {
-  std::uint64_t seq;  ///< filled by the writer: 2 * index + 1 while writing, + 2 when valid
+  std::uint64_t seq;  ///< of record i: 2 i + 1 while it is written, then 2 i + 2; set by the writer
   std::uint64_t tick;
-  std::uint64_t start_ns;  ///< CLOCK_MONOTONIC
+  std::uint64_t start_ns;  ///< of the tick, CLOCK_MONOTONIC; in lock-step tick * tick_ns
   std::int32_t period_error_ns;
   std::uint32_t execution_ns;
   std::uint32_t flags;  ///< kFlag... below
   std::uint32_t missed_deadlines;
-  std::int32_t encoder_counts[6];  ///< joints 0..2: unwrapped since docking; gimbal 3..5: mrad
-  double position_mm[3];           ///< NaN before docking
-  float orientation[4];            ///< quaternion x, y, z, w: tool to world; NaN before docking
-  float velocity_mm_per_s[3];      ///< NaN until first taken in hand
+  std::int32_t encoder_counts[6];  ///< 0..2: joints, unwrapped since docking; 3..5: gimbal, mrad
+  double position_mm[3];           ///< NaN in the phases off and calibrating
+  float orientation[4];            ///< quaternion x, y, z, w: tool to world; NaN likewise
+  float velocity_mm_per_s[3];      ///< NaN likewise, and until the user first takes the tool
   float commanded_force_n[3];
   float contact_force_n[3];
   float modification_force_n[3];
   float proxy_offset_mm[3];
   std::int16_t dac_counts[3];
-  std::uint16_t phase;    ///< of the servo's safety
-  std::uint32_t removed;  ///< density units removed in this tick; in an undo: restored
-  double port_energy_j;   ///< work that the loop took from the hand since the start of the run
-  double port_minimum_j;  ///< its lowest value so far: below 0 the loop gave more than it took
+  std::uint16_t phase;    ///< `Phase` of the servo
+  std::uint32_t removed;  ///< density units removed in this tick; in an undo, restored
+  double port_energy_j;   ///< energy that the loop took from the hand since the start of the run
+  double port_minimum_j;  ///< its lowest value so far; below 0 the loop gave more than it took
   float joint_torque_n_mm[3];
-  std::uint32_t refused_packets;  ///< since the start
-  std::uint64_t volume_hash;      ///< chained over ticks
-  std::uint64_t output_hash;
-  std::uint16_t dirty_lo[3];
-  std::uint16_t dirty_hi[3];
-  std::uint32_t lost_packets;   ///< since the start
-  std::uint32_t dirty_volumes;  ///< bit v: volume v changed in this tick
-  std::uint32_t last_command;   ///< Command::index of the last one applied; 0: none yet
+  std::uint32_t refused_packets;  ///< since the start: no report, or an old one
+  std::uint64_t volume_hash;      ///< chained over all changed boxes since the start
+  std::uint64_t output_hash;      ///< chained over all outputs since the start
+  std::uint16_t dirty_lo[3];      ///< first voxel of the changed box of the first changed volume
+  std::uint16_t dirty_hi[3];      ///< its end, exclusive
+  std::uint32_t lost_packets;     ///< since the start
+  std::uint32_t dirty_volumes;    ///< bit v: volume v changed in this tick
+  std::uint32_t last_command;     ///< `Command::index` of the newest that the servo took; 0: none
   float tip_torque_n_mm[3];
   float spindle_ratio;
-  std::int32_t raw[11];  ///< as received from the device: kRaw... below
+  std::int32_t raw[11];  ///< as received from the device; kRaw... below
   float press_n;         ///< normal force that cuts, in the scene
-  // By `EnergySource`, in mJ with 32 fraction bits. Their sum is `port_energy_j`.
+  // One field for each `EnergySource`, in steps of 2^-32 mJ. Their sum is `port_energy_j`.
   std::int64_t energy_spring;
   std::int64_t energy_damping;
   std::int64_t energy_friction;
@@ -169,16 +171,17 @@ struct TickRecord {
   std::uint32_t fault;
   std::uint32_t stale;
   float penetration_mm;
-  std::uint32_t plane_count;       ///< of the planes that hold the tool, at most 3
+  std::uint32_t plane_count;       ///< contact planes that hold the tool, at most 3
   float plane_load_n[3];           ///< along each normal, before any limit, at the device port
-  float plane_normal[9];           ///< x, y, z of each plane: out of the solid
-  float plane_arm_mm[9];           ///< likewise: from the tool's centre to the contact
-  std::uint32_t command;           ///< kCommand... below: applied before this tick's step
-  std::uint32_t command_argument;  ///< its argument: index of the tool; hold: 1 on, 0 off
-  std::uint32_t crc32c;            ///< filled by the writer, over bytes 8 up to this one
+  float plane_normal[9];           ///< x, y, z of each, out of the solid
+  float plane_arm_mm[9];           ///< x, y, z of each: from the tool's centre to the contact
+  std::uint32_t command;           ///< applied before this tick's step; kCommand... below
+  std::uint32_t command_argument;  ///< of that command: index of the tool; hold: 1 on, 0 off
+  std::uint32_t crc32c;            ///< of all bytes from `tick` up to here; set by the writer
 };
 
-/// The index of a published record in its ring. With two arms index i of both rings is one tick.
+/// The index of a published record in its ring. With two arms, index i of both rings is the
+/// same tick.
 [[nodiscard]] inline std::uint64_t record_index(const TickRecord& record) noexcept {
   return record.seq / 2 - 1;
 }
@@ -192,28 +195,28 @@ struct TickRecord {
 
 inline constexpr std::uint32_t kFlagButton1 = 1U << 0;
 inline constexpr std::uint32_t kFlagButton2 = 1U << 1;
-inline constexpr std::uint32_t kFlagContact = 1U << 2;
-inline constexpr std::uint32_t kFlagClamped = 1U << 4;  ///< some limit of the force acted
-inline constexpr std::uint32_t kFlagStaleInput = 1U << 5;
-inline constexpr std::uint32_t kFlagDeviceFault = 1U << 6;
+inline constexpr std::uint32_t kFlagContact = 1U << 2;      ///< commanded force above 0.01 N
+inline constexpr std::uint32_t kFlagClamped = 1U << 4;      ///< a limit of the force acted
+inline constexpr std::uint32_t kFlagStaleInput = 1U << 5;   ///< no fresh report in this tick
+inline constexpr std::uint32_t kFlagDeviceFault = 1U << 6;  ///< a fault of any kind is latched
 inline constexpr std::uint32_t kFlagMotorsOn = 1U << 7;
-inline constexpr std::uint32_t kFlagParked = 1U << 8;
-inline constexpr std::uint32_t kFlagStarted = 1U << 9;
-inline constexpr std::uint32_t kFlagForbidden = 1U << 10;  ///< pressed on a forbidden material
+inline constexpr std::uint32_t kFlagParked = 1U << 8;      ///< as the device reports
+inline constexpr std::uint32_t kFlagStarted = 1U << 9;     ///< taken in hand at least once
+inline constexpr std::uint32_t kFlagForbidden = 1U << 10;  ///< presses on a forbidden material
 inline constexpr std::uint32_t kFlagRefused = 1U << 11;    ///< no free position near the hand
-inline constexpr std::uint32_t kFlagShaft = 1U << 12;      ///< pressed with shaft or handpiece
-inline constexpr std::uint32_t kFlagReset = 1U << 13;      ///< a reset of the volumes runs
-inline constexpr std::uint32_t kFlagUndo = 1U << 14;       ///< an undo runs
-inline constexpr std::uint32_t kFlagUndoable = 1U << 15;   ///< an undo is possible
-inline constexpr std::uint32_t kFlagRedo = 1U << 16;       ///< a redo runs
-inline constexpr std::uint32_t kFlagRedoable = 1U << 17;   ///< a redo is possible
-inline constexpr std::uint32_t kFlagPedal = 1U << 18;      ///< nothing is cut without button 1
+inline constexpr std::uint32_t kFlagShaft = 1U << 12;  ///< shaft or handpiece presses on the solid
+inline constexpr std::uint32_t kFlagReset = 1U << 13;  ///< a reset of the volumes is in progress
+inline constexpr std::uint32_t kFlagUndo = 1U << 14;   ///< an undo is in progress
+inline constexpr std::uint32_t kFlagUndoable = 1U << 15;  ///< an undo is possible
+inline constexpr std::uint32_t kFlagRedo = 1U << 16;      ///< a redo is in progress
+inline constexpr std::uint32_t kFlagRedoable = 1U << 17;  ///< a redo is possible
+inline constexpr std::uint32_t kFlagPedal = 1U << 18;     ///< cuts only while button 1 is pressed
 
-/// Bits of `command`: the kind of the command, as in `ServoCommand`, and one bit for a restart of
-/// the force after a stall of the servo.
+/// Bits of `TickRecord::command`: a `ServoCommand::Kind` (not a `CommandKind`), and one bit that is
+/// set if the force fades in again after a stall of the servo.
 inline constexpr std::uint32_t kCommandKind = 0xff;
 inline constexpr std::uint32_t kCommandFadeIn = 1U << 8;
-inline constexpr std::uint32_t kCommandMark = 7;  ///< a kind: only marks a tick in the log
+inline constexpr std::uint32_t kCommandMark = 7;  ///< a kind; only marks the tick in the log
 
 inline constexpr std::size_t kRawEncoder = 0;  ///< first of 3
 inline constexpr std::size_t kRawPot = 3;      ///< first of 6
@@ -223,22 +226,23 @@ inline constexpr std::size_t kRawDeviceCounter = 10;
 /// Why a box of voxels changed.
 enum class DirtyCause : std::uint16_t { milling = 0, load = 1, reset = 2, undo = 3, redo = 4 };
 
-/// One changed box. A hint and a history: volume correctness never depends on it.
+/// One changed box of voxels, as a hint and for the history. Readers do not need it to find changed
+/// bricks: the version words are enough.
 struct DirtyRecord {
   std::uint64_t seq;
   std::uint64_t tick;
-  std::uint64_t time_ns;  ///< CLOCK_MONOTONIC of the tick before: the servo reads no clock for this
+  std::uint64_t time_ns;  ///< CLOCK_MONOTONIC at the end of the previous tick
   std::uint16_t lo[3];
-  std::uint16_t hi[3];    ///< half-open
-  std::uint32_t removed;  ///< by an undo: given back
+  std::uint16_t hi[3];    ///< exclusive
+  std::uint32_t removed;  ///< density units; by an undo: restored
   std::uint16_t volume;
   std::uint16_t cause;
-  std::uint32_t bricks;    ///< bricks the box touches
-  std::uint64_t box_hash;  ///< `box_hash` of the densities in the box; 0 if it is too large
+  std::uint32_t bricks;    ///< number of bricks that the box touches
+  std::uint64_t box_hash;  ///< of the densities in the box; 0 if it touches more than 512 bricks
   std::uint64_t reserved0;
 };
 
-/// The column of each `EnergySource` in a tick record, in mJ with 32 fraction bits.
+/// The field of each `EnergySource` in a tick record, in steps of 2^-32 mJ.
 inline constexpr std::array<std::int64_t TickRecord::*, kEnergySources> kEnergyColumns = {
     &TickRecord::energy_spring,  &TickRecord::energy_damping,   &TickRecord::energy_friction,
     &TickRecord::energy_cutting, &TickRecord::energy_limits,    &TickRecord::energy_hold,

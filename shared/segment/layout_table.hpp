@@ -12,7 +12,8 @@
 
 namespace kerf {
 
-/// One field of one record: the text that the ABI hash covers, and the recorder's column.
+/// One field of one record. The stated part is what `kAbiHash` covers and the recorder writes; the
+/// actual part is the compiler's.
 struct LayoutField {
   std::string_view record;
   std::string_view name;
@@ -44,7 +45,7 @@ template <class T>
 
 }  // namespace layout_detail
 
-/// Bytes of one element of a type text; 0 for an unknown one.
+/// Bytes of one element of type `type`, e.g. "u32"; 0 if it is unknown.
 [[nodiscard]] constexpr std::uint32_t type_bytes(std::string_view type) noexcept {
   if (type == "char" || type == "u8") return 1;
   if (type == "u16" || type == "i16") return 2;
@@ -53,15 +54,15 @@ template <class T>
   return 0;
 }
 
-// The stated numbers are the contract; the compiler's numbers are beside them, so
-// that the assertions below can compare. Only a macro reaches offsetof by name.
+// The stated numbers are the contract. The assertions below compare them with the compiler's. Only
+// a macro can pass a field's name to offsetof.
 // clang-format off
 #define KERF_FIELD(RECORD, NAME, OFFSET, TYPE, COUNT)                                  \
   LayoutField{#RECORD, #NAME, OFFSET, TYPE, COUNT, offsetof(RECORD, NAME),             \
               sizeof(RECORD::NAME), layout_detail::type_text<decltype(RECORD::NAME)>()}
 // clang-format on
 
-/// Every field of every record, in order, without holes: the one place where offsets are fixed.
+/// Every field of every record, in order, without holes. Offsets are fixed here and nowhere else.
 inline constexpr std::array kLayoutTable = {
     KERF_FIELD(SegmentHeader, magic, 0x000, "u64", 1),
     KERF_FIELD(SegmentHeader, layout_major, 0x008, "u32", 1),

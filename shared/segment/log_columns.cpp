@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The table of a log's columns. A new field of a tick record is one row here; then
+// The table of a log's columns. A new field of a tick record needs one row here; then run
 // `./kerf record columns > docs/log.md`.
 #include "shared/segment/log_columns.hpp"
 
@@ -16,7 +16,7 @@ constexpr std::string_view kContact = "in a tick with contact; else 0";
 constexpr std::string_view kPreston = "with cut.model = \"preston\"; else 0";
 constexpr std::string_view kChange = "where dirty_volumes is not 0";
 
-// A row: column, unit, meaning, when it is valid.
+// Each row: column, unit, meaning, condition under which it is valid.
 // clang-format off
 constexpr LogColumn kColumns[] = {
     {"seq", "", "twice the number of records published before this one, + 2: a step of more than 2 "
@@ -137,7 +137,7 @@ constexpr LogCode kFaults[] = {
     {8, "sparse_input", "reports came too seldom for too long"},
 };
 
-/// Each field of a tick record has its row, in its order.
+/// True if each field of a tick record has a row, in the same order.
 constexpr bool covers_all() {
   std::size_t row = 0;
   for (const LayoutField& field : kLayoutTable) {

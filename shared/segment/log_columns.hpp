@@ -7,13 +7,13 @@
 
 namespace kerf {
 
-/// Meaning of a column of a tick log, a field of `TickRecord`. Name, type and count are those of
-/// `layout_table.hpp`, in its order; the compiler checks that every column has its row here.
+/// Meaning of one column of a tick log, which is a field of `TickRecord`. Type and count are in
+/// `layout_table.hpp`; the compiler checks that both have the same names in the same order.
 struct LogColumn {
   std::string_view name;
-  std::string_view unit;  ///< if empty, a plain number
+  std::string_view unit;  ///< empty: a plain number
   std::string_view meaning;
-  std::string_view valid = {};  ///< condition; if empty, in every row
+  std::string_view valid = {};  ///< in which rows it is valid; empty: in all
 };
 
 /// One bit of the column `flags`, or one value of a column that is a code.

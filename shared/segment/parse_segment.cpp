@@ -16,7 +16,7 @@
 namespace kerf {
 namespace {
 
-constexpr std::uint64_t kMaxRingSlots = 1U << 20;  // 17 min at 1 kHz; bounds what a reader trusts
+constexpr std::uint64_t kMaxRingSlots = 1U << 20;  // 17 min at 1 kHz; no header may claim more
 
 [[noreturn]] void refuse(const std::string& field, const std::string& value,
                          const std::string& expected) {
@@ -28,7 +28,8 @@ void require(bool holds, const std::string& field, Number value, const std::stri
   if (!holds) refuse(field, std::to_string(value), expected);
 }
 
-/// True where `count` elements from `offset` lie behind the header, aligned, inside `total` bytes.
+/// True if `count` elements from `offset` on lie behind the header, aligned to 8 bytes, within
+/// `total` bytes.
 [[nodiscard]] bool inside(std::uint64_t offset, std::uint64_t count, std::uint64_t element_bytes,
                           std::uint64_t total) noexcept {
   if (offset < sizeof(SegmentHeader) || offset > total || offset % 8 != 0) return false;

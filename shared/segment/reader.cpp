@@ -14,12 +14,12 @@ namespace {
 
 namespace words = shared_words;
 
-constexpr int kMaxTries = 64;  // copies of one brick or record before the old one is kept
-constexpr int kMaxPasses = 4;  // over the versions in one update; 2 are the most ever seen needed
+constexpr int kMaxTries = 64;  // to copy one brick or record
+constexpr int kMaxPasses = 4;  // over the versions in one update; 2 is the most seen so far
 
 using Brick = std::array<Density, kBrickVoxels>;
 
-/// The version under which `brick` came whole, or 0.
+/// Copies a brick and returns its version; 0 if no try gave a consistent copy.
 [[nodiscard]] std::uint64_t copy_brick(std::byte* version, std::byte* content,
                                        std::span<Density, kBrickVoxels> brick) noexcept {
   for (int i = 0; i < kMaxTries; ++i) {
@@ -31,7 +31,7 @@ using Brick = std::array<Density, kBrickVoxels>;
   return 0;
 }
 
-/// Copies a brick into the volume `linear`; returns which voxels have another density since.
+/// Copies a brick into the volume `linear`; returns the voxels whose density changed.
 VoxelMask place_brick(const Brick& brick, const VoxelBox& box, const VoxelGrid& grid,
                       std::span<Density> linear) {
   VoxelMask changed{};

@@ -16,7 +16,7 @@
 
 namespace kerf {
 
-/// The constant part of a segment on another machine. Times are of the local CLOCK_MONOTONIC.
+/// The constant part of another machine's segment. Times are of the local CLOCK_MONOTONIC.
 struct MirrorSpec {
   std::uint64_t session_id = 0;
   std::uint64_t config_hash = 0;
@@ -25,17 +25,17 @@ struct MirrorSpec {
   std::uint32_t scene_bytes = 0;
   std::string build_id;                   ///< truncated to 63 characters
   std::size_t arms = 1;                   ///< 1..kMaxArms
-  std::vector<VolumeDescriptor> volumes;  ///< off_labels not 0: has labels; other offsets unused
+  std::vector<VolumeDescriptor> volumes;  ///< off_labels: 0 if no labels; other offsets unused
   std::uint64_t most_bytes = std::uint64_t{1} << 31;  ///< a larger segment is refused
 };
 
-/// The writer of a copy of another machine's segment: same session, text, bricks, versions and
-/// records, so that every reader works on it unchanged. Outside the servo; one thread.
+/// Writes a local copy of another machine's segment: same session, scene text, bricks, versions and
+/// records, so that every reader works on it unchanged. Not for the servo; one thread.
 ///
 /// The order is put_scene and put_labels (before a reader has the segment), then for each state of
 /// the volumes begin_pass, put_brick (0 or more), end_pass. Readers see a complete pass or detect
-/// that it is not complete. Data for a brick or record that the segment does not have is a
-/// `SegmentError`.
+/// that it is not complete. Text, labels and bricks outside the segment throw `SegmentError`; a
+/// record of an arm that it does not have is ignored.
 class ReplicaWriter {
  public:
   /// Checks `spec`, which may be hostile, before it asks for memory. Throws `SegmentError`.
@@ -47,24 +47,26 @@ class ReplicaWriter {
   [[nodiscard]] std::uint64_t total_bytes() const noexcept { return header_.total_bytes; }
   [[nodiscard]] const std::vector<VolumeDescriptor>& volumes() const noexcept { return volumes_; }
 
+  /// Bytes of the scene text from `offset` on.
   void put_scene(std::uint64_t offset, std::span<const std::byte> text);
-  /// The labels of a brick, x fastest; those beyond the far faces are dropped.
+  /// The 512 labels of a brick, x fastest; those beyond the far faces are ignored.
   void put_labels(std::size_t volume, std::uint32_t brick, std::span<const std::byte> labels);
 
-  /// From now on readers do not treat the volumes as those of one tick.
+  /// From now on, readers see that the volumes are not those of one tick.
   void begin_pass(Tick tick) noexcept;
   /// `version` is even and above the brick's last one; `densities` are 1024 bytes.
   void put_brick(std::size_t volume, std::uint32_t brick, std::uint64_t version,
                  std::span<const std::byte> densities);
-  /// From now on the volumes are those of `tick`.
+  /// From now on, the volumes are those of `tick`.
   void end_pass(Tick tick) noexcept;
 
-  /// A record of a ring; `seq` and the checksum are filled in. An index that is not above the last
-  /// one is ignored, and those left out read as `ReadState::overrun`. With two arms the second's
-  /// record of a tick comes before the first's, as in `SegmentWriter`.
+  /// Appends a record to a ring; sets `seq` and, in a tick record, `crc32c`. An index that is not
+  /// above the last one is ignored; skipped indices read as `ReadState::overrun`. With two arms,
+  /// put the second's record of a tick before the first's, as in `SegmentWriter`.
   void put_record(std::uint64_t index, const TickRecord& record, std::size_t arm = 0) noexcept;
   void put_record(std::uint64_t index, const DirtyRecord& record) noexcept;
 
+  /// Sets `SegmentHeader::heartbeat_ns`.
   void beat(std::uint64_t heartbeat_ns) noexcept;
   void set_lifecycle(Lifecycle lifecycle) noexcept;
 

@@ -11,7 +11,7 @@
 namespace kerf {
 namespace {
 
-/// Writes a message in CDR into a buffer: little-endian, each number at a multiple of its size.
+/// Writes a message in CDR into a buffer: little-endian, each number aligned to its size.
 class CdrWriter {
  public:
   explicit CdrWriter(std::string& bytes) : bytes_(bytes) {
@@ -27,7 +27,7 @@ class CdrWriter {
     bytes_ += value;
     bytes_ += '\0';
   }
-  /// `count` numbers of `each` bytes.
+  /// `count` numbers of `each` bytes per number.
   void numbers(const std::byte* values, std::size_t each, std::size_t count) {
     align(each);
     bytes_.append(reinterpret_cast<const char*>(values), each * count);
@@ -73,14 +73,14 @@ std::string wrench_definition() {
                 kVectorDefinition);
 }
 
-/// The name of a number in a definition of ROS 2: f64 is float64, u16 is uint16.
+/// The name of a number type in a ROS 2 definition: f64 is float64, u16 is uint16.
 std::string ros_type(std::string_view type) {
   const char kind = type.front();
   const std::string bits(type.substr(1));
   return (kind == 'f' ? "float" : kind == 'u' ? "uint" : "int") + bits;
 }
 
-/// A line for each column: type, name, unit and meaning.
+/// One line per column: type, name, unit and meaning.
 std::string tick_definition() {
   std::string text = "# A tick of kerf: docs/log.md\n";
   auto column = log_columns().begin();

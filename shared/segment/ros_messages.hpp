@@ -13,36 +13,37 @@
 
 namespace kerf {
 
-inline constexpr std::string_view kRosEncoding = "cdr";            ///< of the messages
-inline constexpr std::string_view kRosSchemaEncoding = "ros2msg";  ///< of their definitions
+inline constexpr std::string_view kRosEncoding = "cdr";            ///< of the messages' bytes
+inline constexpr std::string_view kRosSchemaEncoding = "ros2msg";  ///< of the message definitions
 
-/// A topic, and what its messages are.
+/// A topic, and the type of its messages.
 struct RosChannel {
   std::string_view topic;
-  std::string_view schema;  ///< name of the message's type
-  std::string definition;   ///< of the type and of all that it consists of
+  std::string_view schema;  ///< name of the message type
+  std::string definition;   ///< of the type and of all types that it contains
 };
 
-/// The channels of a run, each known by its place in `ros_channels`:
+/// The channels of an arm; the enumerator is the index in the result of `ros_channels`:
 ///
 ///     /kerf/tick    kerf_msgs/msg/Tick              every column of docs/log.md, in their order
-///     /kerf/tip     geometry_msgs/msg/PoseStamped   the tool's tip in metres, in frame "scene"
-///     /kerf/force   geometry_msgs/msg/WrenchStamped the commanded force in frame "device"
+///     /kerf/tip     geometry_msgs/msg/PoseStamped   tip in m and orientation, in frame "scene"
+///     /kerf/force   geometry_msgs/msg/WrenchStamped commanded force in N and tip torque in N m, in
+///                                                   frame "device"
 ///
-/// Of the second arm: /kerf/2/tick, /kerf/2/tip, /kerf/2/force, with frame "device_2". Stamps are
-/// `start_ns`.
+/// The second arm has /kerf/2/tick, /kerf/2/tip and /kerf/2/force, the last in frame "device_2".
+/// Stamps are `start_ns`.
 enum RosTopic : std::uint8_t { ros_tick, ros_tip, ros_force, kRosTopics };
 [[nodiscard]] std::array<RosChannel, kRosTopics> ros_channels(std::size_t arm = 0);
 
-/// The messages of a run whose ticks take `tick_ns`.
+/// Makes the messages of a run with ticks of `tick_ns`.
 class RosMessages {
  public:
   explicit RosMessages(std::uint64_t tick_ns) noexcept;
 
-  /// Whether a tick has a message of this topic. Tip and force are sent only 100 times a second,
-  /// because the messages of `ros_tick` have all values. There is no tip before docking.
+  /// True if a tick has a message of this topic. Tip and force have about 100 messages per second;
+  /// `ros_tick` has all values of each tick. There is no tip while the position is unknown.
   [[nodiscard]] bool has(RosTopic topic, const TickRecord& record) const noexcept;
-  /// The message, of an arm's record; valid until the next call.
+  /// The message for the record of an arm; valid until the next call.
   [[nodiscard]] std::string_view message(RosTopic topic, const TickRecord& record,
                                          std::size_t arm = 0);
 

@@ -14,17 +14,17 @@
 #include "shared/segment/layout.hpp"
 #include "shared/volume/brick_grid.hpp"
 
-// What a segment's writer starts from: errors, the content at tick 0, the layout plan, the memory.
+// For a segment's writer: errors, the content at tick 0, the layout plan, the memory.
 
 namespace kerf {
 
-/// A segment that cannot be made, reached or trusted. One line: "place: value; remedy".
+/// A segment cannot be made, reached or trusted. One line: "place: value; remedy".
 class SegmentError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-/// No controller of that name answers (yet): the caller may try again, unlike after any other
+/// No controller of that name answers. The caller may try again, unlike after any other
 /// SegmentError.
 class SegmentAbsent : public SegmentError {
  public:
@@ -36,7 +36,7 @@ class SegmentAbsent : public SegmentError {
   return std::generic_category().message(error);
 }
 
-/// One volume, as readers see it at tick 0.
+/// One volume at tick 0.
 struct SegmentVolumeSpec {
   VoxelGrid grid;  ///< each edge 1..65535
   std::array<double, 3> spacing_mm{1, 1, 1};
@@ -45,7 +45,7 @@ struct SegmentVolumeSpec {
   std::uint32_t material = 0;
   std::uint32_t iso = 32768;
   std::span<const Density> density;  ///< copied by `create`
-  std::span<const Label> labels;     ///< empty, or one per voxel; copied by `create`
+  std::span<const Label> labels;     ///< one per voxel, or none; copied by `create`
 };
 
 /// The content of a segment at tick 0.
@@ -56,31 +56,31 @@ struct SegmentSpec {
   std::uint32_t tick_ns = 1'000'000;
   std::string build_id;        ///< truncated to 63 characters
   std::size_t arms = 1;        ///< 1..kMaxArms; each has a ring of tick records
-  bool mirror_updates = true;  ///< false if nothing is cut: no dirty ring and no brick updates
+  bool mirror_updates = true;  ///< false: nothing is cut, so no brick updates; 1 dirty slot
 };
 
-/// Offsets of all parts: the static header and the descriptors, complete except for the magic, the
-/// session, the start time and the content hashes.
+/// The static header and the volume descriptors with all offsets. Magic, session, start time and
+/// content hashes are still missing.
 struct SegmentPlan {
   SegmentHeader header{};
   std::vector<VolumeDescriptor> volumes;
 };
 
-/// Checks `spec` and lays it out. Throws `SegmentError`.
+/// Checks `spec` and plans its layout. Throws `SegmentError`.
 [[nodiscard]] SegmentPlan plan_segment(const SegmentSpec& spec);
 
-/// Sets `build_id` in the header, truncated to the room there.
+/// Sets `build_id` in the header, truncated to 63 characters.
 void set_build_id(SegmentHeader& header, std::string_view build_id);
 
-/// Fills the constant fields and all offsets, from the sizes of the volumes (`off_labels` not 0:
-/// has labels), the size of the scene, the arms (`off_state_2` not 0: two) and the slots of the
-/// dirty ring.
+/// Sets the constant fields and all offsets. Input: the sizes of the volumes, `off_labels` of each
+/// (not 0 if it has labels), `scene_bytes`, `off_state_2` (not 0 if there are two arms) and
+/// `dirty_slots`.
 void lay_out(SegmentPlan& plan);
 
-/// Checks a plan that is laid out, by the rules of `parse_segment`. Throws `SegmentError`.
+/// Checks a plan after `lay_out` by the rules of `parse_segment`. Throws `SegmentError`.
 void check_plan(const SegmentPlan& plan);
 
-/// A memfd, mapped writable only by this process, populated, and locked if the limits allow it.
+/// A memfd, mapped and populated; locked in memory if the limits allow it.
 class SegmentMemory {
  public:
   /// Throws `SegmentError` if there is no memory for `bytes`.
@@ -89,7 +89,8 @@ class SegmentMemory {
   SegmentMemory& operator=(SegmentMemory&& other) noexcept;
   ~SegmentMemory();
 
-  /// From now on no process can resize it, and no other process can map it writable or write it.
+  /// From now on no process can resize it, map it writable or write to it; this mapping stays
+  /// writable. Throws `SegmentError`.
   void seal();
 
   [[nodiscard]] int fd() const noexcept { return fd_; }

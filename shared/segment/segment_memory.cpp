@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the operating system gives a segment: its memory, the mapping of a reader, random numbers.
-// The page in the browser has its own (web/absent).
+// The parts of a segment that need the operating system: memory, a reader's mapping, random
+// numbers. The page in the browser has its own version (web/absent).
 #include <cerrno>
 #include <string>
 #include <utility>
@@ -26,7 +26,7 @@ SegmentMemory SegmentMemory::create(std::uint64_t bytes) {
   SegmentMemory memory;
   memory.fd_ = memfd_create("kerf-segment", MFD_CLOEXEC | MFD_ALLOW_SEALING);
   if (memory.fd_ < 0) throw fail("memfd_create");
-  // Reserving now turns a lack of memory into an error here instead of a SIGBUS in the servo.
+  // Reserved now, so that a lack of memory is an error here and not a SIGBUS in the servo.
   errno = posix_fallocate(memory.fd_, 0, static_cast<off_t>(bytes));
   if (errno != 0) {
     throw fail("allocation");
@@ -91,7 +91,7 @@ SegmentReader SegmentReader::map(int fd) {
     throw SegmentError("segment: mmap of " + std::to_string(bytes >> 20) +
                        " MiB: " + system_message(errno) + "; free memory");
   }
-  // Owns the mapping from here, so a refusal unmaps it.
+  // Owns the mapping from here on, so an exception unmaps it.
   SegmentReader reader({static_cast<std::byte*>(at), bytes}, {});
   reader.info_ = parse_segment(reader.bytes_);
   return reader;

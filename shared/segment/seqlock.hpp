@@ -12,7 +12,7 @@
 
 namespace kerf {
 
-/// The protocol of all data that changes in the segment: a seqlock with fences (Boehm).
+/// The protocol for all data in the segment that changes: a seqlock with fences (Boehm).
 ///
 ///     writer   version = odd (relaxed); fence(release); words (relaxed); version = even (release)
 ///     reader   v = version (acquire); words (relaxed); fence(acquire); version (relaxed) == v?
@@ -27,7 +27,7 @@ template <class Word>
 using AtomicWord = std::atomic_ref<Word>;
 static_assert(std::atomic_ref<std::uint64_t>::is_always_lock_free);
 static_assert(std::atomic_ref<std::uint32_t>::is_always_lock_free);
-#else  // libc++ 16, of WebAssembly, where writer and reader share one thread
+#else  // libc++ 16 for WebAssembly, where writer and reader run in one thread
 template <class Word>
 class AtomicWord {
  public:
@@ -52,13 +52,13 @@ inline void fence(std::memory_order order) noexcept {
 }
 #endif
 
-/// The word at `at`, which is aligned and lies in the segment.
+/// The word at `at`, an aligned address in the segment.
 template <class Word = std::uint64_t>
 [[nodiscard]] inline AtomicWord<Word> word(std::byte* at) noexcept {
   return AtomicWord<Word>(*reinterpret_cast<Word*>(at));
 }
 
-/// Writer: from here until `close` the data under `version` is not consistent.
+/// Writer: from here until `close`, the data under `version` is inconsistent.
 inline void open(std::byte* version, std::uint64_t odd) noexcept {
   word(version).store(odd, std::memory_order_relaxed);
   fence(std::memory_order_release);
@@ -77,8 +77,8 @@ inline void store(std::byte* to, const void* from, std::size_t bytes) noexcept {
   }
 }
 
-/// Reader: copies `bytes` (a multiple of 8) out of the segment; consistent only if `unchanged`
-/// returns true after it.
+/// Reader: copies `bytes` (a multiple of 8) out of the segment. The copy is consistent only if
+/// `unchanged` then returns true.
 inline void load(void* to, std::byte* from, std::size_t bytes) noexcept {
   auto* target = static_cast<std::byte*>(to);
   for (std::size_t i = 0; i < bytes; i += 8) {
@@ -87,7 +87,7 @@ inline void load(void* to, std::byte* from, std::size_t bytes) noexcept {
   }
 }
 
-/// Reader: whether nothing was written under `version` since it was loaded (acquire) as `seen`.
+/// Reader: true if nothing was written under `version` since its load (acquire) returned `seen`.
 [[nodiscard]] inline bool unchanged(std::byte* version, std::uint64_t seen) noexcept {
   fence(std::memory_order_acquire);
   return word(version).load(std::memory_order_relaxed) == seen;
@@ -95,8 +95,8 @@ inline void load(void* to, std::byte* from, std::size_t bytes) noexcept {
 
 }  // namespace shared_words
 
-/// The writer's side of a ring of records in the segment, with a private counter: the segment is
-/// never read back. Record i lies in slot i mod slots under the version 2 i + 2. One thread.
+/// The writer's side of a ring of records in the segment. Its counter is private: the segment is
+/// never read back. Record i lies in slot i mod slots and has version 2 i + 2. One thread.
 template <class Record>
 struct RecordRing {
   std::byte* slots = nullptr;
@@ -113,8 +113,9 @@ struct RecordRing {
     shared_words::word(head).store(++published, std::memory_order_release);
   }
 
-  /// Continues at `index`, if that is ahead. The records in between are never written: their slots
-  /// get the odd version of the next round, which readers report as `ReadState::overrun`.
+  /// Sets the index of the next record, unless it would decrease. Skipped records are never
+  /// written: their slots get the odd version of the next round, which readers report as
+  /// `ReadState::overrun`.
   void skip_to(std::uint64_t index) noexcept {
     if (index <= published) return;
     const std::uint64_t round = mask + 1;
@@ -125,8 +126,8 @@ struct RecordRing {
   }
 };
 
-/// The rings of tick records of the segment at `base`, one for each arm; the second has no slots if
-/// there is one arm.
+/// The rings of tick records of the segment at `base`, one per arm. If there is one arm, `slots` of
+/// the second is null.
 [[nodiscard]] inline std::array<RecordRing<TickRecord>, kMaxArms> tick_rings(
     std::byte* base, const SegmentHeader& header) noexcept {
   std::array<RecordRing<TickRecord>, kMaxArms> rings;

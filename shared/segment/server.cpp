@@ -34,8 +34,8 @@
 namespace kerf {
 namespace {
 
-/// A queue of `N` items between one thread that pushes and one that takes. Wait-free on both sides;
-/// a full queue refuses.
+/// A queue of `N` items from one thread that pushes to one that takes. Both are wait-free; `push`
+/// returns false if the queue is full.
 template <class T, std::uint32_t N>
 class SpscQueue {
   static_assert(std::has_single_bit(N));
@@ -58,8 +58,8 @@ class SpscQueue {
   }
 
  private:
-  // Both counters wrap; their difference is the fill. Each has its own cache line, so that the line
-  // of the taker changes only when it takes.
+  // Both counters wrap; their difference is the number of items. Each has its own cache line, so
+  // that a push does not invalidate the line that `take` writes.
   alignas(64) std::atomic<std::uint32_t> head_{0};
   alignas(64) std::atomic<std::uint32_t> tail_{0};
   std::array<T, N> items_{};
@@ -72,9 +72,9 @@ class Listener {
     sockaddr_un address{};
     address.sun_family = AF_UNIX;
     std::copy(path_.begin(), path_.end(), address.sun_path);
-    unlink(path_.c_str());  // of a dead controller: the name lock is ours
+    unlink(path_.c_str());  // left by a dead controller: we hold the name lock
     fd_ = OwnedFd(socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
-    constexpr mode_t kOwnerAlone = S_IRUSR | S_IWUSR;  // bind() makes the file with these rights
+    constexpr mode_t kOwnerAlone = S_IRUSR | S_IWUSR;  // bind() creates the file with these rights
     if (fd_.get() < 0 || fchmod(fd_.get(), kOwnerAlone) != 0 ||
         bind(fd_.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0 ||
         listen(fd_.get(), SOMAXCONN) != 0) {
@@ -93,7 +93,7 @@ class Listener {
   OwnedFd fd_;
 };
 
-/// The memfd opened again, read-only, for readers: they cannot map it writable.
+/// Opens the memfd again, read-only: readers cannot map it writable.
 [[nodiscard]] OwnedFd reopen_read_only(int memfd) {
   const std::string path = "/proc/self/fd/" + std::to_string(memfd);
   OwnedFd fd(open(path.c_str(), O_RDONLY | O_CLOEXEC));
@@ -144,7 +144,7 @@ struct SegmentServer::State {
         hello{kSegmentMagic, kLayoutMajor, kLayoutMinor, kAbiHash, session_id},
         limits(command_limits),
         others(std::move(others_answer)) {
-    polled.reserve(2 + kMaxPeers);  // not in the thread, which could not report that it failed
+    polled.reserve(2 + kMaxPeers);  // here, because the thread could not report a failure
     peers.reserve(kMaxPeers);
     thread = std::thread([this] { serve(); });
   }
@@ -178,14 +178,14 @@ struct SegmentServer::State {
   void admit() {
     OwnedFd peer(accept4(listener.get(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK));
     if (peer.get() < 0 && (errno == EMFILE || errno == ENFILE)) {
-      usleep(10'000);  // the caller still waits in the queue: do not spin until a file is free
+      usleep(10'000);  // the client stays in the backlog: do not spin until a descriptor is free
     }
     if (peer.get() < 0 || peers.size() >= kMaxPeers || other_user_at(peer.get())) return;
     if (send_hello(peer.get(), hello, segment.get())) peers.push_back(std::move(peer));
   }
 
-  /// Answers one message of one peer; returns false if the peer has gone or does not read its
-  /// answer.
+  /// Replies to one message of a peer; returns false if the peer has gone or does not read the
+  /// reply.
   bool answer(int peer) noexcept {
     Command command;
     const ssize_t length = recv(peer, &command, sizeof command, MSG_DONTWAIT | MSG_TRUNC);
@@ -211,7 +211,7 @@ struct SegmentServer::State {
   OwnedFd stop;
   SegmentHello hello;
   CommandLimits limits;
-  Answer others;  // if not empty, it gets the commands in place of the queue
+  Answer others;  // if set, it gets the commands instead of the queue
   std::vector<pollfd> polled;
   std::vector<OwnedFd> peers;
   std::uint32_t accepted = 0;

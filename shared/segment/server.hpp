@@ -14,29 +14,29 @@
 
 namespace kerf {
 
-/// Hands the segment of one controller to readers, and their commands to its servo.
+/// Gives readers the segment of one controller, and queues their commands for its servo.
 ///
-/// Owns a thread of normal priority that serves a SOCK_SEQPACKET socket: peers of this user (or
-/// root) get HELLO and the memfd, read-only; their commands are checked and queued. At most
-/// `kMaxPeers` at a time. The writer outlives the server.
+/// Owns a thread of normal priority that serves a SOCK_SEQPACKET socket. A peer of this user or
+/// root gets a `SegmentHello` and the memfd, read-only; its commands are checked and queued. Other
+/// users, and peers above `kMaxPeers`, are disconnected. The writer outlives the server.
 class SegmentServer {
  public:
   static constexpr std::size_t kMaxPeers = 32;
 
-  /// Throws `SegmentError` if another live controller has the name; replaces the socket of a dead
-  /// one.
+  /// Throws `SegmentError` if another live controller has the name, or if the socket cannot be
+  /// made. Replaces the socket of a dead controller.
   SegmentServer(std::string_view name, const SegmentWriter& writer, CommandLimits limits = {});
 
-  /// For the segment `memfd` of another writer: `answer` handles each command, whose content is
-  /// unchecked. The server's thread calls it; while it waits, at most 2 s, no other reader is
-  /// served. It must not throw.
+  /// For the segment `memfd` of another writer. The server's thread calls `answer` with each
+  /// command, unchecked. No other reader is served until it returns, so it must return within 2 s,
+  /// the time that a reader waits for a reply. It must not throw.
   using Answer = std::function<Reply(const Command&)>;
   SegmentServer(std::string_view name, int memfd, std::uint64_t session_id, Answer answer);
   ~SegmentServer();
   SegmentServer(const SegmentServer&) = delete;
   SegmentServer& operator=(const SegmentServer&) = delete;
 
-  /// Servo thread. Wait-free, no system call; take at most one per tick.
+  /// Servo thread. Wait-free, no system call. The servo takes at most one per tick.
   [[nodiscard]] std::optional<Command> take_command() noexcept;
 
   [[nodiscard]] const std::string& socket_path() const noexcept;

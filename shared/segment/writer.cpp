@@ -19,7 +19,7 @@ namespace {
 
 namespace words = shared_words;
 
-/// The servo's side of one volume: the destination of its bricks, and those that wait.
+/// One volume of the servo: where its bricks lie in the segment, and which ones wait.
 struct MirroredVolume {
   BrickGrid bricks;
   std::byte* versions = nullptr;
@@ -54,11 +54,11 @@ struct SegmentWriter::State {
   SegmentMemory memory;
   SegmentHeader header;  // as written, with offsets and session
   std::vector<MirroredVolume> volumes;
-  std::array<RecordRing<TickRecord>, kMaxArms> ticks;  // of each arm; without slots: no such arm
+  std::array<RecordRing<TickRecord>, kMaxArms> ticks;  // per arm; `slots` null: no such arm
   RecordRing<DirtyRecord> boxes;
   Tick tick = 0;
   std::uint64_t last_end_ns = 0;
-  std::size_t first_volume = 0;  // served first in this tick; goes round
+  std::size_t first_volume = 0;  // copied first in this tick; round-robin
   bool mirror_updates = true;
 
   [[nodiscard]] std::byte* hot(std::size_t offset) const noexcept {
@@ -99,7 +99,7 @@ SegmentWriter SegmentWriter::create(const SegmentSpec& spec, bool virtual_time) 
                               .dirty = BrickSet(spec.mirror_updates ? bricks : BrickGrid{})});
     for (std::uint32_t id = 0; id < bricks.count(); ++id)
       state->volumes.back().copy(id, source.grid.box(), 0);
-    state->volumes.back().linear = {};  // the source may go after `create`
+    state->volumes.back().linear = {};  // the source need not outlive `create`
     std::copy(source.labels.begin(), source.labels.end(),
               reinterpret_cast<Label*>(base + descriptor.off_labels));
     std::memcpy(base + header.off_volume_table + i * sizeof descriptor, &descriptor,

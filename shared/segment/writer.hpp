@@ -16,8 +16,8 @@
 namespace kerf {
 
 /// Bricks copied into the mirror per tick, over all volumes: 64^3 voxels, 512 KiB. A 16^3 tool
-/// touches 27. Further bricks wait for the next ticks, so that a reset of a whole volume cannot
-/// miss a deadline.
+/// touches 27. Further bricks wait for the next ticks, so that even a reset of a whole volume does
+/// not miss a deadline.
 inline constexpr std::uint32_t kMaxBricksPerTick = 512;
 
 /// Hash of the densities in a changed box of the volume `linear`; 0 if the box touches more than
@@ -26,8 +26,8 @@ inline constexpr std::uint32_t kMaxBricksPerTick = 512;
                                              std::span<const Density> linear,
                                              const VoxelBox& box) noexcept;
 
-/// The only writer of a segment: owns a sealed memfd, mapped and populated, with the volumes of
-/// tick 0.
+/// The only writer of a segment. Owns a sealed memfd, mapped and populated, which starts with the
+/// volumes of tick 0.
 ///
 /// `create` and the destructor run outside the servo. The members marked *servo* are called by one
 /// thread: wait-free, no system call, no allocation; they write the segment and never read it. The
@@ -36,7 +36,7 @@ inline constexpr std::uint32_t kMaxBricksPerTick = 512;
 class SegmentWriter {
  public:
   /// Throws `SegmentError` if a volume is empty, too large or does not match its spans, or if
-  /// memory cannot be allocated. `virtual_time`: the run has no clock, and begins at 0 ns.
+  /// memory cannot be allocated. `virtual_time`: lock-step; `start_ns` is 0.
   [[nodiscard]] static SegmentWriter create(const SegmentSpec& spec, bool virtual_time = false);
 
   SegmentWriter(SegmentWriter&&) noexcept;
@@ -50,30 +50,32 @@ class SegmentWriter {
   /// False if the lock limit is below `total_bytes()`: the servo can then meet a page fault.
   [[nodiscard]] bool locked() const noexcept;
 
-  /// *Servo.* Ticks grow and start at 1; a tick that does not grow counts as the last one plus 1.
+  /// *Servo.* Ticks increase from 1 on. A tick that is not above the last one is taken as the last
+  /// one plus 1.
   void begin_tick(Tick tick) noexcept;
 
-  /// *Servo.* `linear` is the whole volume, x fastest. `end_tick` reads it, and later ones do while
-  /// bricks wait, so it must outlive the writer. Records the box in the dirty ring. Returns the
-  /// hash of the densities in the box, as in the record; 0 if the box is too large.
+  /// *Servo.* Records a changed box in the dirty ring and marks its bricks. `linear` is the whole
+  /// volume, x fastest. `end_tick` reads it in this tick and, while bricks wait, in later ones, so
+  /// it must outlive the writer. Returns the `box_hash` of the record; 0 if the box is too large or
+  /// empty, or if the segment has no such volume or no updates.
   std::uint64_t publish_box(std::size_t volume, std::span<const Density> linear,
                             const VoxelBox& changed, std::uint32_t removed,
                             DirtyCause cause = DirtyCause::milling) noexcept;
 
-  /// *Servo.* Appends to the state ring of `arm`; `seq` and `crc32c` are filled in. With two arms
-  /// each tick publishes both, arm 1 before arm 0: a reader that sees an index in the first ring
-  /// then finds it in the second. An arm that the segment does not have is ignored.
+  /// *Servo.* Appends a record to the ring of `arm`; sets `seq` and `crc32c`. With two arms each
+  /// tick publishes both, arm 1 before arm 0, so that a reader finds each index of the first ring
+  /// in the second too. An arm that the segment does not have is ignored.
   void publish_state(const TickRecord& record, std::size_t arm = 0) noexcept;
 
-  /// *Servo.* Copies the changed bricks, each once, and closes the tick. While bricks wait, the
-  /// epoch stays odd: readers then know that the mirror is not yet the volume of one tick.
-  /// `now_ns`: CLOCK_MONOTONIC, in lock-step too: the heartbeat.
+  /// *Servo.* Copies the changed bricks, each once, and ends the tick. While bricks wait, the epoch
+  /// stays odd, so that readers know that the bricks are not all of one tick. `now_ns` becomes the
+  /// heartbeat: CLOCK_MONOTONIC, in lock-step too.
   void end_tick(std::uint64_t now_ns) noexcept;
 
-  /// Any one thread at a time.
+  /// Any thread, but one at a time.
   void set_lifecycle(Lifecycle lifecycle) noexcept;
 
-  /// *Servo.* Bricks that wait for later ticks.
+  /// *Servo.* Number of bricks that wait for later ticks.
   [[nodiscard]] std::uint32_t waiting_bricks() const noexcept;
 
  private:
