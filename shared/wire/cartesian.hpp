@@ -13,28 +13,29 @@
 #include "shared/wire/little_endian.hpp"
 #include "shared/wire/personality.hpp"
 
-// Cartesian devices: pose in, force out. Figures of each, and kerf's own packets for all of them.
+// Cartesian devices: they report a pose and take a force. Figures of each, and kerf's own packets.
 
 /// Figures of a Cartesian device.
 ///
-/// Frame of the device, for all: x right, y up, z to the user; mm. Who talks to a vendor's service
-/// or library turns its axes into these.
+/// Frame of all these devices: x right, y up, z to the user; mm. The code that calls a vendor's
+/// service or library converts the vendor's axes.
 namespace kerf::cartesian {
 
 struct Figures {
-  int step_um;     ///< of a count in the servo: 16 bits of them hold the workspace
-  int quantum_um;  ///< resolution that the vendor states
+  int step_um;     ///< length of one count in the servo; 16-bit counts cover the workspace
+  int quantum_um;  ///< resolution by the vendor
   bool has_wrist;  ///< reports an orientation
-  bool has_dock;   ///< is parked at one place alone: an inkwell
-  /// Workspace of the vendor's data sheet, or larger, about the origin of the device's frame.
+  bool has_dock;   ///< is parked in an inkwell only; if false, anywhere, by a button
+  /// Workspace of the data sheet, or a larger one, in the device's frame.
   std::array<double, 3> low_mm, high_mm;
   std::array<double, 3> rest_mm;  ///< where the emulated one is parked
 };
 
-/// Inverse3 (510 x 460 x 230 mm, 10 um): the origin is ours, kInverse3OriginM in front of the
-/// service's. Touch (0.055 mm): the vendor's frame; its inkwell lies where all joint angles are 0.
-/// omega.3 (a cylinder of 160 mm and 110 mm along z, 10 um): the vendor's origin.
-/// Empty for a joint-count device.
+/// nullopt for a joint-count device.
+///
+///     Inverse3  510 x 460 x 230 mm, 10 um; origin at inverse3::kOriginM of the service's frame
+///     Touch     55 um; the vendor's origin; in the inkwell all joint angles are 0
+///     omega.3   160 mm in diameter, 110 mm along z, 10 um; the vendor's origin
 [[nodiscard]] constexpr std::optional<Figures> figures(Personality personality) noexcept {
   switch (personality) {
     case Personality::inverse3:
@@ -51,7 +52,7 @@ struct Figures {
   return std::nullopt;
 }
 
-/// A motor count of the servo: a force along one axis.
+/// One motor count of the servo is this force along one axis.
 inline constexpr double kNewtonsPerCount = 0.001;
 
 inline constexpr std::size_t kReportBytes = 40;
@@ -59,7 +60,7 @@ inline constexpr std::size_t kCommandBytes = 16;
 inline constexpr std::uint32_t kReportMark = 0x3172636B;   // "kcr1": the last byte is the version
 inline constexpr std::uint32_t kCommandMark = 0x3163636B;  // "kcc1"
 
-/// A position farther away on any axis is none of a device: metres read as millimetres, or worse.
+/// A position beyond this on any axis is invalid, for instance because of a wrong unit.
 inline constexpr int kFarthestUm = 1'000'000;
 inline constexpr double kQuaternionOne = 32767;
 
@@ -72,12 +73,12 @@ inline constexpr double kQuaternionOne = 32767;
 ///      4  u32     number of the report, from 1      4  i16 x3  force in mN; x, y, z
 ///      8  i32 x3  position in um; x, y, z          10  u8      1 = force on
 ///     20  i16 x4  orientation x, y, z, w / 32767   11  u8      0 asks the user, 1 ready, 2 fault
-///     28  i16 x3  force that it gives, in mN       12  u32     number of the newest report read
-///     34  u8      1 first, 2 second button
-///     35  u8      1 parked, 2 homed, 4 powered
+///     28  i16 x3  force that it exerts, in mN      12  u32     number of the newest report read
+///     34  u8      bits: 1 first, 2 second button
+///     35  u8      bits: 1 parked, 2 homed, 4 powered
 ///     36  u32     age of the pose when it was sent, in us; 0 = unknown
 ///
-/// The orientation is that of the tool: identity is a shaft that points up. Any thread; nothing
+/// The orientation is that of the tool; at identity its shaft points up. Any thread; no function
 /// allocates, blocks or throws.
 namespace kerf {
 
@@ -89,8 +90,8 @@ struct CartesianReport {
   std::array<std::int16_t, 3> force_mn{};
   bool button1 = false, button2 = false;
   bool parked = false;
-  bool homed = false;    ///< its position is absolute
-  bool powered = false;  ///< it can give a force
+  bool homed = false;    ///< the position is absolute
+  bool powered = false;  ///< the device can exert a force
   std::uint32_t age_us = 0;
 
   friend constexpr bool operator==(const CartesianReport&,
@@ -104,7 +105,7 @@ struct CartesianCommand {
   std::array<std::int16_t, 3> force_mn{};
   bool force_on = false;
   Light light = Light::asks;
-  std::uint32_t answers = 0;
+  std::uint32_t answers = 0;  ///< number of the newest report read
 
   friend constexpr bool operator==(const CartesianCommand&,
                                    const CartesianCommand&) noexcept = default;
@@ -115,7 +116,7 @@ namespace cartesian {
 using ReportBytes = std::array<std::uint8_t, kReportBytes>;
 using CommandBytes = std::array<std::uint8_t, kCommandBytes>;
 
-/// A quaternion of any length but 0, as the packet has it. Not finite, or 0: nothing.
+/// A quaternion, normalised, in the packet's format; nullopt if it is zero or not finite.
 [[nodiscard]] inline std::optional<std::array<std::int16_t, 4>> packed_orientation(
     const std::array<double, 4>& xyzw) noexcept {
   const double square =
@@ -129,13 +130,13 @@ using CommandBytes = std::array<std::uint8_t, kCommandBytes>;
   return packed;
 }
 
-/// A length in mm as the packet has it. Not finite, or farther than kFarthestUm: nothing.
+/// A coordinate in the packet's format; nullopt if it is not finite or beyond kFarthestUm.
 [[nodiscard]] inline std::optional<std::int32_t> packed_mm(double mm) noexcept {
   if (!(std::abs(mm) <= kFarthestUm / 1000.0)) return std::nullopt;
   return static_cast<std::int32_t>(std::lround(mm * 1000.0));
 }
 
-/// A force in N as the packet has it: not finite becomes 0, a larger one the end of the range.
+/// A force component in the packet's format: NaN becomes 0, and larger values the end of the range.
 [[nodiscard]] inline std::int16_t packed_n(double newtons) noexcept {
   constexpr double kEnd = 32767;
   const double mn = newtons / kNewtonsPerCount;
@@ -161,8 +162,8 @@ using CommandBytes = std::array<std::uint8_t, kCommandBytes>;
   return bytes;
 }
 
-/// Nothing unless these are the 40 bytes of a report with a position within kFarthestUm and an
-/// orientation whose length is 1 within 1 %.
+/// nullopt unless `bytes` is a report of 40 bytes with a position within kFarthestUm and an
+/// orientation of length 1 within 1 %.
 [[nodiscard]] constexpr std::optional<CartesianReport> decode_cartesian_report(
     std::span<const std::uint8_t> bytes) noexcept {
   if (bytes.size() != cartesian::kReportBytes ||
@@ -205,7 +206,7 @@ using CommandBytes = std::array<std::uint8_t, kCommandBytes>;
   return bytes;
 }
 
-/// Nothing unless these are the 16 bytes of a command.
+/// nullopt unless `bytes` is a command of 16 bytes.
 [[nodiscard]] constexpr std::optional<CartesianCommand> decode_cartesian_command(
     std::span<const std::uint8_t> bytes) noexcept {
   if (bytes.size() != cartesian::kCommandBytes ||

@@ -15,18 +15,18 @@
 #include "shared/wire/little_endian.hpp"
 #include "shared/wire/personality.hpp"
 
-// Messages on kerf's own links to the emulator: hello, lock-step turn, and the target of its hand.
+// Messages on kerf's own links to the emulator: hello, lock-step turn, target of the emulated hand.
 
 namespace kerf {
 
-/// Setup of one side of kerf's own links (SEQPACKET, UDP). The controller sends it first, and the
-/// emulator answers with its own; packets of the device before that answer are void. A host other
-/// than kerf sends none and is served all the same: no packet of a device has this length. Real
-/// buses carry no hello.
+/// Settings of one side of kerf's own links (SEQPACKET, UDP). The controller sends its hello first,
+/// and the emulator answers with its own; the controller drops the device's packets before that
+/// answer. A host that sends no hello is served too: no packet of a device has the length of a
+/// hello, so the two cannot be confused. Real buses carry no hello.
 struct LinkHello {
   Personality personality{};
   bool lockstep = false;
-  int rate_hz = 1000;  ///< of the servo; of an emulator in real time, its polling rate
+  int rate_hz = 1000;  ///< of the servo; of an emulator in real time, that of its packets
   friend bool operator==(const LinkHello&, const LinkHello&) noexcept = default;
 };
 
@@ -44,7 +44,7 @@ inline constexpr std::array<std::uint8_t, 8> kHelloMagic{'k', 'e', 'r', 'f', 0, 
   return bytes;
 }
 
-/// Nothing for any other packet.
+/// nullopt for any other packet.
 [[nodiscard]] constexpr std::optional<LinkHello> decode_hello(
     std::span<const std::uint8_t> bytes) noexcept {
   if (bytes.size() != kHelloBytes) return std::nullopt;
@@ -61,8 +61,8 @@ inline constexpr std::array<std::uint8_t, 8> kHelloMagic{'k', 'e', 'r', 'f', 0, 
   return hello;
 }
 
-/// Why the two cannot work together, and what to change, for the messages of both; empty if they
-/// can. In real time each side keeps its own rate.
+/// One line for the user of either program: why the two settings do not fit, and what to change.
+/// Empty if they fit. In real time the rates may differ.
 [[nodiscard]] inline std::string discord(const LinkHello& controller, const LinkHello& emulator) {
   const auto word = [](const LinkHello& hello) { return std::string(word_of(hello.personality)); };
   const auto hz = [](const LinkHello& hello) { return std::to_string(hello.rate_hz); };
@@ -88,19 +88,19 @@ inline constexpr std::array<std::uint8_t, 8> kHelloMagic{'k', 'e', 'r', 'f', 0, 
 }
 
 /// All packets of a device in one tick of a lock-step run, as one datagram: the magic, then each
-/// packet after a byte with its length. A turn without packets keeps both sides running if a fault
-/// withholds packets.
+/// packet behind a byte with its length. If a fault withholds packets, a turn without packets keeps
+/// both sides running.
 ///
-/// No packet of a device supported here begins with the magic.
+/// No packet of a supported device begins with the magic.
 class Turn {
  public:
   static constexpr std::array<std::uint8_t, 8> kMagic{'k', 'e', 'r', 'f', 0, 't', 'n', 1};
-  /// The longest turn: room for 15 of the longest packets, more than a device sends in a tick.
+  /// Longest turn: room for 15 packets of 64 bytes, more than a device sends in a tick.
   static constexpr std::size_t kMostBytes = 1024;
 
   Turn() noexcept { std::copy(kMagic.begin(), kMagic.end(), bytes_.begin()); }
 
-  /// Returns false if there is no room, or the packet is empty or longer than 255 bytes.
+  /// Appends a packet. Returns false if there is no room, or if it is empty or above 255 bytes.
   bool add(std::span<const std::uint8_t> packet) noexcept {
     if (packet.empty() || packet.size() > 255 || size_ + 1 + packet.size() > kMostBytes)
       return false;
@@ -117,8 +117,8 @@ class Turn {
   [[nodiscard]] static bool is_turn(std::span<const std::uint8_t> bytes) noexcept {
     return bytes.size() >= kMagic.size() && std::equal(kMagic.begin(), kMagic.end(), bytes.begin());
   }
-  /// Removes the first packet of `rest`, the bytes after the magic, and returns it; empty at the
-  /// end, or if a length leads beyond the end.
+  /// Removes the first packet from `rest`, the bytes after the magic, and returns it. Empty at the
+  /// end, or if a packet's length exceeds `rest`.
   [[nodiscard]] static std::span<const std::uint8_t> next(
       std::span<const std::uint8_t>& rest) noexcept {
     if (rest.empty() || rest.size() - 1 < rest[0]) return {};
@@ -132,20 +132,19 @@ class Turn {
   std::size_t size_ = kMagic.size();
 };
 
-/// Target of the emulated hand when a user leads it: a window sends one to kerf-emulator
-/// (`--hand-socket`) in each frame, one a packet. Whole numbers, so that every packet of the right
-/// length is a position within the limits below. `GuidedHand` decides how the hand follows it, and
-/// when targets stop.
+/// Target of the emulated hand when a user guides it. A window sends one per frame to kerf-emulator
+/// (`--hand-socket`), each in a packet of its own. The packet holds integers and the receiver
+/// clamps them, so a target is always finite and within the limits below. `GuidedHand` moves the
+/// hand towards it, and handles targets that stop.
 struct HandTarget {
   DeviceVec<double> tip_mm;                 ///< in steps of 1 um, each axis up to kMaxTargetMm
-  std::array<double, 3> orientation_rad{};  ///< as of `HandGoal`, up to kMaxTargetRad each
+  std::array<double, 3> orientation_rad{};  ///< as in `HandGoal`, up to kMaxTargetRad each
   bool button1 = false, button2 = false;
-  bool park = false;  ///< go to the rest pose, stay there a moment, and come back
+  bool park = false;  ///< go to the rest pose, stay there a moment, come back
   friend bool operator==(const HandTarget&, const HandTarget&) noexcept = default;
 };
 
-inline constexpr double kMaxTargetMm =
-    500;  ///< from the device's origin: no arm of these is longer
+inline constexpr double kMaxTargetMm = 500;  ///< from the device's origin; no arm is longer
 inline constexpr double kMaxTargetRad = std::numbers::pi / 3;  ///< a wrist bends no further
 
 inline constexpr std::size_t kHandTargetBytes = 36;
@@ -153,13 +152,13 @@ using HandTargetBytes = std::array<std::uint8_t, kHandTargetBytes>;
 // The last byte is the version.
 inline constexpr std::array<std::uint8_t, 8> kHandTargetMagic{'k', 'e', 'r', 'f', 0, 'h', 'w', 1};
 
-/// The first message of the emulator to a client that connects: the version, and whether the client
-/// may lead the hand. One client leads at a time; another gets `taken`, and its connection closes.
+/// First message of the emulator to a new client: the version, and whether the client may guide the
+/// hand. Only one client may at a time; any other gets `taken`, and its connection is closed.
 enum class HandGreeting : std::uint8_t { yours, taken };
 using HandGreetingBytes = std::array<std::uint8_t, 9>;
 
 [[nodiscard]] inline HandTargetBytes encode(const HandTarget& target) noexcept {
-  constexpr double kSteps = 1e6;  // urad per rad; mm become um with a thousandth of it
+  constexpr double kSteps = 1e6;  // urad per rad; um per mm is a thousandth of it
   const auto steps = [](double value, double most, double per_unit) {
     const double within = value == value ? std::clamp(value, -most, most) : 0.0;
     return static_cast<std::uint32_t>(static_cast<std::int32_t>(std::lround(within * per_unit)));
@@ -176,7 +175,7 @@ using HandGreetingBytes = std::array<std::uint8_t, 9>;
   return bytes;
 }
 
-/// Nothing for a packet of another kind or version. Numbers are clamped to the limits.
+/// nullopt for a packet of another kind or version. Clamps numbers to the limits.
 [[nodiscard]] inline std::optional<HandTarget> decode_hand_target(
     std::span<const std::uint8_t> bytes) noexcept {
   if (bytes.size() != kHandTargetBytes ||
@@ -207,7 +206,7 @@ using HandGreetingBytes = std::array<std::uint8_t, 9>;
   return bytes;
 }
 
-/// Nothing for another version.
+/// nullopt for another version.
 [[nodiscard]] inline std::optional<HandGreeting> decode_hand_greeting(
     std::span<const std::uint8_t> bytes) noexcept {
   if (bytes.size() != HandGreetingBytes{}.size() ||

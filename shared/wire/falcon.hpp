@@ -14,59 +14,59 @@
 /// Geometry, encoders and motors.
 ///
 /// mm, rad and counts. Frame of the device: x right, y up, z to the user; its origin lies on the
-/// axis of the three legs, kOriginDepthMm in front of the plane of their hips. The letters are
-/// those of Stamper's thesis on this kind of delta arm. One leg, in its own frame (u away from the
-/// axis, v across, w = towards the user), with p the grip counted from the hips' plane:
+/// axis of the three legs, kOriginDepthMm in front of the plane of their hips. Letters as in
+/// Stamper's thesis on this kind of delta arm. One leg, in its own frame (u away from the axis, v
+/// across, w towards the user); p is the position of the grip relative to the plane of the hips:
 ///
 ///     (u, v, w) = Rz(-azimuth) p - (r, s, 0)
 ///     knee  = a (cos t1, sin t1) in the plane of u and w
 ///     shin  = from the knee over d + e + b sin t3 in that plane to (u + c, w)
 ///     cos t3 = (v + f) / b
 ///
-/// t1 is the joint that is measured and driven.
+/// t1 is the joint that has the encoder and the motor.
 ///
-/// Source: the open driver libnifalcon, which measured one device. Its count of zero is "about" 35
-/// degrees, so the angle of zero differs between units.
+/// Source: the open driver libnifalcon, whose authors measured one device. By them a count of zero
+/// is "about" 35 degrees, so that angle differs between units.
 namespace kerf::falcon {
 
 inline constexpr double kPi = std::numbers::pi;
 inline constexpr double kRadPerDegree = kPi / 180.0;
 
 // Legs.
-inline constexpr double kThighMm = 60.0;         ///< a
-inline constexpr double kShinMm = 102.5;         ///< b
-inline constexpr double kPlateOutMm = 14.43;     ///< c: centre of the grip to a shin, along u
-inline constexpr double kShinEndMm = 11.25;      ///< d
-inline constexpr double kKneeEndMm = 11.25;      ///< e
-inline constexpr double kPlateAcrossMm = -25.0;  ///< f: the same along v
+inline constexpr double kThighMm = 60.0;      ///< a
+inline constexpr double kShinMm = 102.5;      ///< b
+inline constexpr double kPlateOutMm = 14.43;  ///< c: from the centre of the grip to a shin, along u
+inline constexpr double kShinEndMm = 11.25;   ///< d
+inline constexpr double kKneeEndMm = 11.25;   ///< e
+inline constexpr double kPlateAcrossMm = -25.0;  ///< f: the same, along v
 inline constexpr double kHipOutMm = 40.0;        ///< r
 inline constexpr double kHipAcrossMm = -23.09;   ///< s
 inline constexpr std::array<double, 3> kLegAzimuthRad{
     // about z, from x towards y
     105.0 * kRadPerDegree, -15.0 * kRadPerDegree, -135.0 * kRadPerDegree};
-/// Device z = 0 is p.z = 125 mm: a ball of kReachMm around it has no pose near a singular one.
+/// Device z = 0 is p.z = 125 mm: no pose within kReachMm of it is near a singular one.
 inline constexpr double kOriginDepthMm = 125.0;
 inline constexpr double kReachMm = 55.0;
 
 // Joint encoders: t1 = kZeroRad + kRadPerCount * count, once homed.
-inline constexpr double kShaftMm = 14.25;       ///< motor shaft, where the encoder sits
-inline constexpr double kThighWheelMm = 110.0;  ///< that it drives
+inline constexpr double kShaftMm = 14.25;  ///< diameter of the motor shaft, which has the encoder
+inline constexpr double kThighWheelMm = 110.0;  ///< diameter of the wheel that it drives
 inline constexpr int kShaftCountsPerRev = 4 * 320;
 inline constexpr double kCountsPerRev = kShaftCountsPerRev * kThighWheelMm / kShaftMm;
 inline constexpr double kRadPerCount = 2.0 * kPi / kCountsPerRev;
 inline constexpr double kZeroRad = 35.0 * kRadPerDegree;
 
-// Motors: signed counts. A positive one turns the thigh towards smaller t1 (the open driver negates
-// J^T F). Torque per count is unknown: the open driver's factor of 1e4 would mean 0.1 N mm.
+// Motors: signed counts. A positive count turns the thigh towards smaller t1 (the open driver
+// negates J^T F). Torque per count is unknown; by the open driver's factor of 1e4 it is 0.1 N mm.
 inline constexpr int kMotorCountMax = 4096;
 inline constexpr int kMotorSign = -1;
 inline constexpr double kOpenDriverNmmPerCount = 0.1;
 
-// Sold as.
+// Stated by the maker.
 inline constexpr double kMaxForceN = 8.9;
 
 // Packets.
-inline constexpr std::size_t kPacketBytes = 16;  ///< both ways
+inline constexpr std::size_t kPacketBytes = 16;  ///< in both directions
 
 }  // namespace kerf::falcon
 
@@ -80,11 +80,12 @@ inline constexpr std::size_t kPacketBytes = 16;  ///< both ways
 ///     14  'A'          spare
 ///     15  '>'
 ///
-/// The device sends one report for each command of the host. Any thread; nothing allocates, blocks
-/// or throws.
+/// The device sends one report for each command of the host. Any thread; no function allocates,
+/// blocks or throws.
 namespace kerf {
 
-/// Device to host. Raw counts; a count has no meaning before its axis is homed, and jumps then.
+/// Device to host. Raw counts; homing an axis makes its count jump, and before that the count has
+/// no absolute meaning.
 struct FalconReport {
   std::array<std::int16_t, 3> encoder{};
   std::uint8_t buttons = 0;  ///< falcon::kButton...; the upper four bits stay zero
@@ -129,7 +130,7 @@ inline constexpr std::uint8_t kBias = 0x41;   ///< 'A'
 inline constexpr std::size_t kInfoAt = 13;
 inline constexpr std::size_t kSpareAt = 14;
 
-/// Frame, numbers and info of either packet.
+/// Makes either packet from its numbers and info.
 [[nodiscard]] constexpr PacketBytes pack(const std::array<std::int16_t, 3>& numbers,
                                          unsigned info) noexcept {
   PacketBytes bytes{};
@@ -149,8 +150,8 @@ struct Unpacked {
   unsigned info = 0;
 };
 
-/// Nothing unless these are 16 bytes from '<' to '>' with twelve nibbles, an info of at most
-/// `max_info` and the spare byte.
+/// nullopt unless `bytes` has 16 bytes from '<' to '>' with twelve valid nibbles, an info of at
+/// most `max_info` and the spare byte.
 [[nodiscard]] constexpr std::optional<Unpacked> unpack(std::span<const std::uint8_t> bytes,
                                                        unsigned max_info) noexcept {
   if (bytes.size() != kPacketBytes || bytes[0] != kBegin || bytes[15] != kEnd) return std::nullopt;
@@ -170,7 +171,7 @@ struct Unpacked {
   return packet;
 }
 
-/// Device side. Nothing unless these are the 16 bytes of a command.
+/// Device side. nullopt unless `bytes` is a command of 16 bytes.
 [[nodiscard]] constexpr std::optional<FalconCommand> decode_command(
     std::span<const std::uint8_t> bytes) noexcept {
   const auto packet = unpack(bytes, kInfoHoming | kInfoGreen | kInfoBlue | kInfoRed);
@@ -180,7 +181,7 @@ struct Unpacked {
                        has(kInfoRed)};
 }
 
-/// Host side. Nothing unless these are the 16 bytes of a report.
+/// Host side. nullopt unless `bytes` is a report of 16 bytes.
 [[nodiscard]] constexpr std::optional<FalconReport> decode_report(
     std::span<const std::uint8_t> bytes) noexcept {
   const auto packet = unpack(bytes, 0x7F);
@@ -222,11 +223,11 @@ struct Unpacked {
 
 namespace kerf::falcon {
 
-/// Finds packets, '<' to '>', in a serial stream that comes in pieces of any size. For host and
-/// device; one thread; no allocation.
+/// Finds packets, '<' to '>', in a serial stream. For host and device; one thread; no allocation.
 class Framer {
  public:
-  /// True if this byte ends a packet; `packet` then returns it until the next call.
+  /// Takes the next byte of the stream. Returns true if it ends a packet, which `packet` returns
+  /// until the next call.
   [[nodiscard]] bool take(std::uint8_t byte) noexcept {
     if (byte == kBegin) {  // never inside a packet, whose bytes are 'A' and above
       strays_ += size_;
@@ -252,14 +253,14 @@ class Framer {
   std::uint64_t strays_ = 0;
 };
 
-// USB: an FTDI FT232R (full speed) in front of a signal processor, to which the host sends the
+// USB: an FTDI FT232R (full speed) and behind it a signal processor, to which the host uploads the
 // firmware after every power-up.
 //
 // Start: purge, kBoot settings, RTS low, DTR low then high, send kBootHello, expect
-// kBootHelloReply (up to kBootTries answers, some with a leading zero), DTR low, kUploadDivisor,
-// send kUploadBegin and expect it back, then the firmware in chunks of kUploadChunk bytes, each
-// byte echoed; then the settings of kRun. Source: libnifalcon. The firmware itself is not part of
-// this project.
+// kBootHelloReply (within kBootTries answers, some with a leading zero), DTR low, kUploadDivisor,
+// send kUploadBegin and expect it back, then the firmware in chunks of kUploadChunk bytes, of which
+// each byte is echoed; then the kRun settings. Source: libnifalcon. The firmware itself is not part
+// of this project.
 
 inline constexpr std::uint16_t kVendorId = 0x0403;
 inline constexpr std::uint16_t kProductId = 0xCB48;
@@ -287,7 +288,7 @@ inline constexpr std::uint16_t kFtdiRtsLow = 0x0200;
 inline constexpr std::uint16_t kFtdiNoFlowControl = 0;
 inline constexpr std::uint16_t kFtdi8N1 = 0x0008;
 
-// Settings while the device boots, while it takes its firmware, and while it runs.
+// Settings while the device boots, during the upload of the firmware, and while it runs.
 inline constexpr std::uint16_t kBootLatencyMs = 16;
 inline constexpr std::uint16_t kBootDivisor = 0x4138;  ///< 9600 baud
 inline constexpr std::uint16_t kUploadDivisor = 0x15;  ///< about 140 kbaud

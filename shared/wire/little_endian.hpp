@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <span>
 
-/// Little-endian numbers in a packet, on every host. The caller makes sure that the bytes are
-/// there.
+/// Little-endian numbers in a packet, on hosts of any byte order. The caller makes sure that the
+/// bytes exist.
 namespace kerf::wire {
 
 [[nodiscard]] constexpr std::uint16_t get_u16(std::span<const std::uint8_t> bytes,

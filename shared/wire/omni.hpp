@@ -14,13 +14,13 @@
 
 /// Link lengths, scales and the pose in the inkwell.
 ///
-/// mm, rad and counts. Frame of the device: x right, y up, z to the user; the point is the gimbal
-/// centre. Joints are absolute: q1 turret, q2 thigh, q3 forearm against the base (its motor and its
-/// encoder work through a parallel linkage). With r = L1 cos q2 + L2 sin q3:
+/// mm, rad and counts. Frame of the device: x right, y up, z to the user; the tip is the centre of
+/// the gimbal. Joints are absolute: q1 turret, q2 thigh, q3 forearm against the base (its motor and
+/// its encoder work through a parallel linkage). With r = L1 cos q2 + L2 sin q3:
 ///
 ///     x = -sin q1 r      y = L1 sin q2 - L2 cos q3 + Cy      z = cos q1 r - Cz
 ///
-/// Link offsets and the pose in the inkwell differ between units: these are defaults of a
+/// Link offsets and the pose in the inkwell differ between units; these are the defaults of a
 /// configuration.
 namespace kerf::omni {
 
@@ -31,8 +31,8 @@ inline constexpr std::uint32_t kVendorOui = 0x000B99;  ///< SensAble, in the con
 // Links.
 inline constexpr double kUpperLinkMm = 133.35;    ///< L1
 inline constexpr double kForearmMm = 133.35;      ///< L2
-inline constexpr double kOriginHeightMm = 23.35;  ///< Cy: the frame is this far below the shoulder
-inline constexpr double kOriginDepthMm = 168.35;  ///< Cz: and in front of it
+inline constexpr double kOriginHeightMm = 23.35;  ///< Cy: the origin is this far below the shoulder
+inline constexpr double kOriginDepthMm = 168.35;  ///< Cz: and this far in front of it
 inline constexpr std::array<double, 3> kDockRad{0.0, 0.23, -0.37};  ///< q in the inkwell
 
 // Joint encoders: q_i = dock_i + sign_i * kRadPerCount * (count_i - count in the inkwell).
@@ -40,7 +40,7 @@ inline constexpr int kCountsPerRev = 15000;
 inline constexpr double kRadPerCount = 2.0 * kPi / kCountsPerRev;
 inline constexpr std::array<int, 3> kEncoderSign{1, -1, 1};
 
-// Gimbal: with r = A / (A + B), angle_i = slope_i * r + offset_i; order yaw, pitch, roll.
+// Gimbal: angle_i = slope_i * r + offset_i with r = A / (A + B); order yaw, pitch, roll.
 inline constexpr std::array<double, 3> kGimbalSlopeRad{5.48, -5.28, 4.76};
 inline constexpr std::array<double, 3> kGimbalOffsetRad{-2.74, 2.64, -2.38};
 inline constexpr int kPotNoiseBits = 5;  ///< the lowest bits of each pot are noise
@@ -71,11 +71,11 @@ inline constexpr int kBusCyclesPerSecond = 8000;
 ///                                         32  u32     packet counter
 ///                                         40  u32     a second counter at half the rate
 ///
-/// Little-endian on every host. Any thread; nothing allocates, blocks or throws. Bytes that are not
-/// listed have no known meaning: written as zero, ignored when read.
+/// Little-endian. Any thread; no function allocates, blocks or throws. Bytes that are not listed
+/// have no known meaning: they are written as zero and ignored when read.
 namespace kerf {
 
-/// Device to host. Raw counts: no calibration, no filter.
+/// Device to host. Raw counts, without calibration or filter.
 struct OmniReport {
   std::array<std::int16_t, 3> encoder{};
   std::array<std::uint16_t, 3> pot_a{};  ///< yaw, pitch, roll
@@ -92,7 +92,7 @@ struct OmniReport {
 struct OmniCommand {
   enum class Light : std::uint8_t { off = 0, slow_flash = 1, fast_flash = 2, steady = 3 };
 
-  /// Joint torques in DAC counts about zero, kMotorCountMin..kMotorCountMax; encoding saturates.
+  /// Joint torques in signed DAC counts, kMotorCountMin..kMotorCountMax; `encode` saturates.
   std::array<std::int16_t, 3> motor{};
   bool motors_on = false;
   Light light = Light::off;  ///< of the inkwell
@@ -115,7 +115,7 @@ inline constexpr std::uint8_t kButton1Up = 0x01;
 inline constexpr std::uint8_t kButton2Up = 0x02;
 inline constexpr std::uint8_t kUndocked = 0x04;
 
-// Words with the same value in every trace.
+// Words that have the same value in every recorded trace.
 inline constexpr std::uint16_t kReportMark = 0x001E;
 inline constexpr std::uint16_t kReportFlags = 0x1007;
 inline constexpr std::uint16_t kReportFw = 0x5746;
@@ -135,8 +135,8 @@ inline constexpr std::uint16_t kReportFw = 0x5746;
   return bytes;
 }
 
-/// Device side. Nothing unless these are the 16 bytes of a command: a motor word above 12 bits,
-/// another status pattern or a non-zero tail is refused.
+/// Device side. nullopt unless `bytes` is a command of 16 bytes: motor words of 12 bits, the known
+/// status pattern and zeros at the end.
 [[nodiscard]] constexpr std::optional<OmniCommand> decode_command(
     std::span<const std::uint8_t> bytes) noexcept {
   if (bytes.size() != omni::kCommandBytes) return std::nullopt;
@@ -174,7 +174,7 @@ inline constexpr std::uint16_t kReportFw = 0x5746;
   return bytes;
 }
 
-/// Host side. Nothing unless these are 44 bytes with the words that every trace has.
+/// Host side. nullopt unless `bytes` has 44 bytes with the words that every trace has.
 [[nodiscard]] constexpr std::optional<OmniReport> decode_report(
     std::span<const std::uint8_t> bytes) noexcept {
   if (bytes.size() != omni::kReportBytes) return std::nullopt;

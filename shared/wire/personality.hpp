@@ -8,12 +8,12 @@
 
 namespace kerf {
 
-/// Devices of one scene, each an arm with a tool of its own.
+/// Most devices of one scene; each is an arm with a tool of its own.
 inline constexpr std::size_t kMaxArms = 2;
 
-/// Which device is held. The first three are joint-count devices: kerf reads their encoders and
-/// drives their motors. The others are Cartesian: a service or a library of the vendor stands
-/// between, which reports a pose and takes a force (shared/wire/cartesian.hpp).
+/// Kind of device. The first three are joint-count devices: kerf reads their encoders and drives
+/// their motors. The others are Cartesian: the vendor's service or library reports a pose and takes
+/// a force (shared/wire/cartesian.hpp).
 enum class Personality : std::uint8_t { omni, falcon, woodenhaptics, inverse3, touch, omega };
 
 inline constexpr std::array<std::string_view, 6> kPersonalityWords{
@@ -27,16 +27,15 @@ inline constexpr std::array<std::string_view, 6> kPersonalityWords{
   return personality >= Personality::inverse3;
 }
 
-/// What a device may give at most, and what a scene that says nothing takes: N, N (RMS over time)
-/// and N/ms. `peak_n` is also the highest value that a scene may set.
+/// Force limits of a device, the defaults of a scene. No scene may set a force above `peak_n`.
 ///
-/// The Omni's: data sheet. Falcon and WoodenHaptics can give more (8.9 N and 5 N by their makers),
-/// but kerf has only been tested with the Omni's on them. Inverse3: product page. Touch: the
-/// vendor's configuration file. omega.3: product page, continuous. The slew rises with the peak:
-/// from no force to the peak in 6.6 ms, as the Omni's.
+/// Sources: Omni, data sheet; Inverse3, product page; Touch, the vendor's configuration file;
+/// omega.3, the continuous force of the product page. Falcon and WoodenHaptics can exert more (8.9
+/// N and 5 N by their makers), but kerf has only been tested with the Omni's limits on them. The
+/// slew rate is in proportion to the peak: 6.6 ms from zero to the peak.
 struct ForceFigures {
   double peak_n = 3.3;
-  double continuous_n = 0.88;
+  double continuous_n = 0.88;  ///< RMS over time
   double slew_n_per_ms = 0.5;
 };
 
