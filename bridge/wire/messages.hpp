@@ -12,26 +12,27 @@
 
 namespace kerf::bridge {
 
-/// The protocol of a bridge and its viewer, version 1, byte by byte.
+/// The protocol between a bridge and its viewers, version 1, byte by byte.
 ///
 ///     server to viewer   HelloMessage (first, and again for a new run), FrameHead + blocks,
 ///                        RecordsHead + records, ReplyMessage
-///     viewer to server   AckMessage (one per frame, once it is applied), CommandMessage
+///     viewer to server   AckMessage (for each frame, once it is applied), CommandMessage
 ///
 /// Each is one binary WebSocket message of at most `kMaxMessageBytes`, little-endian, naturally
 /// aligned. Times are CLOCK_MONOTONIC of the server's machine, in ns.
 ///
-/// A *pass* holds the changes between two snapshots of the segment, in one or more *frames*. After
-/// the last frame of a pass, a viewer with the set hash of that frame holds exactly the volumes of
-/// `tick`. If nothing changed, the pass is one empty frame: the sign of life.
+/// A *pass* is the changes between two snapshots of the segment, in one or more *frames*. After the
+/// last frame of a pass, a viewer whose set hash equals that of the frame holds exactly the volumes
+/// of `tick`. If nothing changed, the pass is one empty frame, which shows that the server is
+/// alive.
 
 inline constexpr std::uint32_t kProtocol = 1;
 inline constexpr std::size_t kMaxMessageBytes = 20 * 1024;  ///< server to viewer
-inline constexpr std::size_t kMaxRawBytes = 16 * 1024;      ///< of a frame's blocks, of records
+inline constexpr std::size_t kMaxRawBytes = 16 * 1024;      ///< payload, unpacked
 inline constexpr std::size_t kMaxUpBytes = 256;             ///< viewer to server
-inline constexpr const char* kBridgePath = "/bridge";       ///< of the WebSocket
+inline constexpr const char* kBridgePath = "/bridge";       ///< path of the WebSocket
 
-/// Four characters as they lie in memory.
+/// Four characters in memory order.
 [[nodiscard]] constexpr std::uint32_t magic(const char (&text)[5]) noexcept {
   std::uint32_t value = 0;
   for (std::size_t i = 4; i-- > 0;) value = value << 8 | static_cast<unsigned char>(text[i]);
@@ -45,12 +46,12 @@ inline constexpr std::uint32_t kAckMagic = magic("KBA1");
 inline constexpr std::uint32_t kCommandMagic = magic("KBC1");
 
 inline constexpr std::uint32_t kMayCommand = 1;  ///< HelloMessage::flags
-inline constexpr std::uint32_t kTwoArms = 2;     ///< HelloMessage::flags: Ring::pairs, not ticks
-inline constexpr std::uint32_t kPacked = 1;      ///< of frames and records: one LZ4 block
+inline constexpr std::uint32_t kTwoArms = 2;  ///< HelloMessage::flags: Ring::pairs instead of ticks
+inline constexpr std::uint32_t kPacked = 1;   ///< of frames and records: LZ4 payload
 inline constexpr std::uint32_t kLastOfPass = 2;  ///< FrameHead::flags
 inline constexpr std::uint32_t kRunEnded = 4;    ///< FrameHead::flags: the controller has gone
 
-/// Reason for which a connection is closed.
+/// WebSocket status code with which the server closes a connection.
 enum class CloseCode : std::uint16_t {
   no_token = 4001,
   too_slow = 4002,
@@ -58,20 +59,20 @@ enum class CloseCode : std::uint16_t {
   too_many = 4004,
 };
 
-/// The constants of a run; the viewer discards all that it holds. `volume_count` descriptors of the
-/// segment follow; in them `off_labels` is 1 if there are labels, and the other offsets are 0.
+/// The constants of a run. The viewer discards all blocks that it holds. `volume_count` times
+/// `VolumeDescriptor` follows, with `off_labels` 1 if there are labels, and all other offsets 0.
 struct HelloMessage {
   std::uint32_t magic;
-  std::uint32_t protocol;
-  std::uint64_t session;
+  std::uint32_t protocol;  ///< version of this protocol
+  std::uint64_t session;   ///< of the run: `SegmentHeader::session_id`
   std::uint64_t config_hash;
-  std::uint64_t abi_hash;
-  std::uint32_t layout_major;
-  std::uint32_t layout_minor;
+  std::uint64_t abi_hash;      ///< of the layout; a viewer that reads records needs the same one
+  std::uint32_t layout_major;  ///< likewise
+  std::uint32_t layout_minor;  ///< likewise
   std::uint32_t tick_ns;
   std::uint32_t flags;
-  std::int64_t server_ns;  ///< now
-  std::uint64_t start_ns;  ///< of the run
+  std::int64_t server_ns;  ///< when the message was written
+  std::uint64_t start_ns;  ///< of the run; 0 in lock-step
   std::uint32_t volume_count;
   std::uint32_t record_bytes;  ///< sizeof(TickRecord)
   std::uint32_t dirty_bytes;   ///< sizeof(DirtyRecord)
@@ -80,16 +81,16 @@ struct HelloMessage {
 };
 static_assert(sizeof(HelloMessage) == 144);
 
-/// Then u64 version[blocks], u32 id[blocks], and the payload: the blocks in that order.
+/// u64 version[blocks], u32 id[blocks] and the payload follow: the blocks in that order.
 struct FrameHead {
   std::uint32_t magic;
   std::uint32_t flags;
   std::uint64_t session;
-  std::uint64_t frame;  ///< 1, 2, ...
-  std::uint64_t tick;
+  std::uint64_t frame;    ///< 1, 2, ... since the hello
+  std::uint64_t tick;     ///< of the pass
   std::int64_t taken_ns;  ///< when the snapshot of the pass was taken
   std::int64_t heartbeat_ns;
-  std::uint64_t set_hash;  ///< of all that the viewer holds after this frame
+  std::uint64_t set_hash;  ///< over all blocks that the viewer holds after this frame
   std::uint32_t lifecycle;
   std::uint32_t blocks;
   std::uint32_t raw_bytes;
@@ -99,11 +100,11 @@ struct FrameHead {
 static_assert(sizeof(FrameHead) == 80);
 inline constexpr std::size_t kBlockEntryBytes = sizeof(std::uint64_t) + sizeof(std::uint32_t);
 
-/// A run of two arms has `pairs` in place of `ticks`: each is the first arm's record of a tick and
-/// behind it the second's.
+/// A run of two arms has `pairs` instead of `ticks`: the first arm's record of a tick, then the
+/// second's of the same tick.
 enum class Ring : std::uint32_t { ticks = 0, dirty = 1, pairs = 2 };
 
-/// Then the payload: `count` records of the ring as they lie in the segment. Record i has the index
+/// The payload follows: `count` records of the ring as in the segment. Record i has the index
 /// `first + i * stride`. On a slow link the stride is above 1; the newest record is always sent.
 struct RecordsHead {
   std::uint32_t magic;
@@ -124,6 +125,7 @@ static_assert(sizeof(RecordsHead) == 48);
                                : sizeof(TickRecord);
 }
 
+/// Reply to one command.
 struct ReplyMessage {
   std::uint32_t magic;
   std::uint32_t sequence;  ///< of the command
@@ -132,6 +134,7 @@ struct ReplyMessage {
 };
 static_assert(sizeof(ReplyMessage) == 16);
 
+/// Sent when a frame has been applied.
 struct AckMessage {
   std::uint32_t magic;
   std::uint32_t reserved;
@@ -140,18 +143,19 @@ struct AckMessage {
 };
 static_assert(sizeof(AckMessage) == 24);
 
+/// `Command` of a viewer.
 struct CommandMessage {
   std::uint32_t magic;
   std::uint16_t kind;  ///< CommandKind
-  std::uint16_t arm;   ///< of `select_tool`: 0 the first, 1 the second; else 0
+  std::uint16_t arm;   ///< of `select_tool`: 0 the first, 1 the second; other kinds: 0
   std::uint32_t argument;
-  std::uint32_t sequence;  ///< chosen by the viewer
+  std::uint32_t sequence;  ///< chosen by the viewer; the reply repeats it
 };
 static_assert(sizeof(CommandMessage) == 16);
 
-/// The part of one held block in a set hash; the hash is their sum mod 2^64 over all held blocks,
-/// so it does not depend on the order, and a new version costs one difference. Two sets of versions
-/// with one hash are as unlikely as two equal random 64-bit numbers.
+/// Contribution of one held block to the set hash, which is the sum of all contributions mod 2^64.
+/// So the order of blocks does not matter, and a new version of a block changes one term. Different
+/// sets have equal hashes as rarely as two random 64-bit numbers are equal.
 [[nodiscard]] constexpr std::uint64_t block_hash(std::uint32_t id, std::uint64_t version,
                                                  std::uint64_t session) noexcept {
   std::uint64_t z = (version ^ session) * 0x9e3779b97f4a7c15 + id * 0xd1342543de82ef95 + 1;
@@ -160,7 +164,7 @@ static_assert(sizeof(CommandMessage) == 16);
   return z ^ (z >> 31);
 }
 
-/// `hash` after block `id` went from version `old` (0: not held) to `version`.
+/// The set hash after block `id` changes from version `old` (0: not held) to `version`.
 [[nodiscard]] constexpr std::uint64_t with_block(std::uint64_t hash, std::uint32_t id,
                                                  std::uint64_t old, std::uint64_t version,
                                                  std::uint64_t session) noexcept {
@@ -170,34 +174,34 @@ static_assert(sizeof(CommandMessage) == 16);
 
 inline constexpr std::size_t kTextBlockBytes = 1024;
 inline constexpr std::size_t kDensityBlockBytes = 1024;  ///< a brick: 512 densities, x fastest
-inline constexpr std::size_t kLabelBlockBytes = 512;     ///< the labels of a brick, likewise
-inline constexpr std::uint64_t kConstantVersion = 2;     ///< of text and labels
+inline constexpr std::size_t kLabelBlockBytes = 512;     ///< labels of a brick, u8, x fastest
+inline constexpr std::uint64_t kConstantVersion = 2;     ///< version of text and label blocks
 
 enum class BlockKind : std::uint8_t { text, density, labels };
 
-/// Blocks of one kind with numbers that follow each other.
+/// Consecutive blocks of one kind.
 struct BlockPlane {
   BlockKind kind;
-  std::uint32_t volume;  ///< of density and labels
-  std::uint32_t first;   ///< number of its first block
+  std::uint32_t volume;  ///< for density and labels
+  std::uint32_t first;   ///< number of the first block
   std::uint32_t count;
   [[nodiscard]] std::size_t block_bytes() const noexcept {
     return kind == BlockKind::labels ? kLabelBlockBytes : kDensityBlockBytes;
   }
 };
 
-/// How all that a viewer holds is numbered: scene text (the last block padded with zeros), then
-/// each volume's density, then the labels of each volume that has them. Within a volume the number
-/// is that of the brick (BrickGrid).
+/// Numbers of all blocks that a viewer holds, in this order: scene text (the last block is padded
+/// with zeros), the densities of each volume, the labels of each volume that has them. Bricks of a
+/// volume are in the order of `BrickGrid`.
 class BlockPlan {
  public:
   BlockPlan() = default;
-  /// `volumes`: bricks per volume and whether `off_labels` is not 0.
+  /// Uses `brick_count` and `off_labels` (0: no labels) of `volumes`.
   BlockPlan(std::uint32_t scene_bytes, std::span<const VolumeDescriptor> volumes);
 
   [[nodiscard]] const std::vector<BlockPlane>& planes() const noexcept { return planes_; }
   [[nodiscard]] std::uint32_t count() const noexcept { return count_; }
-  /// `id` is below `count()`.
+  /// The plane that contains block `id`, which is below `count()`.
   [[nodiscard]] const BlockPlane& plane_of(std::uint32_t id) const noexcept;
 
  private:

@@ -33,7 +33,7 @@ void require(bool holds, const char* what, std::uint64_t value, const char* expe
   }
 }
 
-/// The head of a message of one kind.
+/// Checks and returns the head of a message of one kind.
 template <class Head>
 [[nodiscard]] Head head_of(Bytes message, std::uint32_t magic) {
   require(message.size() <= kMaxMessageBytes, "size", message.size(), "at most 20 KiB");
@@ -43,7 +43,7 @@ template <class Head>
   return head;
 }
 
-/// The payload of a message, decoded into `scratch` if it is packed.
+/// The payload of a message; unpacked into `scratch` if `packed`.
 [[nodiscard]] Bytes decoded(Bytes payload, bool packed, std::size_t raw_bytes,
                             std::span<std::byte, kMaxRawBytes> scratch) {
   require(raw_bytes <= kMaxRawBytes, "raw_bytes", raw_bytes, "at most 16 KiB");

@@ -14,10 +14,10 @@
 
 namespace kerf::bridge {
 
-// Checked parsers for both directions. The bytes may be hostile: each count is bounded before it is
-// used, and what is allocated does not depend on them beyond `kMaxMessageBytes`.
+// Checked parsers for both directions. The bytes may be hostile: each count is checked before use,
+// and a message cannot make a parser allocate more than a small multiple of `kMaxMessageBytes`.
 
-/// A message is not valid; one line: field, value, what was expected.
+/// A message is not valid. One line: field, value, expected value.
 struct WireError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
@@ -28,24 +28,24 @@ struct ParsedHello {
   std::vector<VolumeDescriptor> volumes;
 };
 
-/// Viewer's side. Checks sizes, grids, spacings; not `abi_hash`, which a viewer that reads no
-/// records need not share: the others call `require_same_layout`. Throws `WireError`.
+/// Viewer's side. Checks sizes, grids and poses. Does not check `abi_hash`: only viewers that read
+/// records need the same one, and they call `require_same_layout`. Throws `WireError`.
 [[nodiscard]] ParsedHello parse_hello(std::span<const std::byte> message);
 
-/// A frame, its blocks decoded.
+/// Parses frames and unpacks their blocks.
 class FrameParser {
  public:
-  /// Of the run that `hello` opened.
+  /// For frames of the run of `hello`.
   explicit FrameParser(const ParsedHello& hello);
 
   struct Block {
     std::uint32_t id;       ///< below `plan().count()`
-    std::uint64_t version;  ///< even, not 0; of text and labels `kConstantVersion`
+    std::uint64_t version;  ///< even, not 0; `kConstantVersion` for text and labels
     std::span<const std::byte> bytes;
   };
 
-  /// Viewer's side. `blocks()` is valid until the next call, and while `message` is. If it throws
-  /// `WireError`, there are no blocks.
+  /// Viewer's side. `blocks()` is valid until the next call, and only as long as `message`. Throws
+  /// `WireError`; `blocks()` is then empty.
   FrameHead parse(std::span<const std::byte> message);
   [[nodiscard]] std::span<const Block> blocks() const noexcept { return blocks_; }
   [[nodiscard]] const BlockPlan& plan() const noexcept { return plan_; }
@@ -57,23 +57,23 @@ class FrameParser {
   std::array<std::byte, kMaxRawBytes> raw_;
 };
 
-/// Records of one ring, decoded.
+/// Records of one ring, unpacked.
 struct ParsedRecords {
   RecordsHead head;
   std::span<const std::byte> bytes;  ///< in `message` or in `scratch`
 };
 
-/// Viewer's side. Throws `WireError`.
+/// Viewer's side. Unpacks into `scratch` if needed. Throws `WireError`.
 [[nodiscard]] ParsedRecords parse_records(std::span<const std::byte> message, std::uint64_t session,
                                           std::span<std::byte, kMaxRawBytes> scratch);
 
 /// Viewer's side. Throws `WireError`.
 [[nodiscard]] ReplyMessage parse_reply(std::span<const std::byte> message);
 
-/// First word of a message; 0 if it has none.
+/// First word of a message; 0 if it is shorter.
 [[nodiscard]] std::uint32_t magic_of(std::span<const std::byte> message) noexcept;
 
-/// Server's side: a viewer's message, or nothing if it is neither.
+/// Server's side: a viewer's message; nullopt if it is neither.
 [[nodiscard]] std::optional<std::variant<AckMessage, CommandMessage>> parse_up(
     std::span<const std::byte> message) noexcept;
 
