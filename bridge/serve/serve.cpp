@@ -69,7 +69,7 @@ struct HostPort {
   std::uint16_t port = 0;
 };
 
-/// `HOST:PORT`, IPv6 in brackets.
+/// Parses `HOST:PORT`, with an IPv6 address in brackets.
 HostPort parse_listen(const std::string& text) {
   const auto refuse = [&text](const char* why) {
     return BridgeError("--listen " + text + ": " + why + "; give HOST:PORT, as 127.0.0.1:7400");
@@ -99,7 +99,7 @@ HostPort parse_listen(const std::string& text) {
   return out;
 }
 
-/// The addresses of a server that listens at `host`: `host`, or all of this machine.
+/// The addresses of a server that listens on `host`: `host`, or all addresses of this machine.
 [[nodiscard]] std::vector<std::string> reached_at(const std::string& host) {
   if (host != "0.0.0.0" && host != "::") return {host};
   std::vector<std::string> out = own_addresses();
@@ -109,7 +109,7 @@ HostPort parse_listen(const std::string& text) {
   return out;
 }
 
-/// Empty on loopback, unless a file asks for TLS there too.
+/// Empty (no TLS) on loopback, unless a certificate or a CA is given.
 [[nodiscard]] Tls tls_of(const ServeOptions& options, const std::string& host) {
   if (is_loopback(host) && options.certificate.empty() && options.client_ca.empty()) return nullptr;
   Tls tls = new_tls();
@@ -122,7 +122,7 @@ HostPort parse_listen(const std::string& text) {
   return tls;
 }
 
-/// Where the server can be reached: at the proxy's address, or at those of `--listen`.
+/// The server's public addresses: that of the proxy, else those of `--listen`.
 [[nodiscard]] std::vector<BridgeAddress> places_of(const ServerSetup& setup, std::uint16_t port) {
   if (setup.public_url) return {*setup.public_url};
   std::vector<BridgeAddress> out;
@@ -132,7 +132,7 @@ HostPort parse_listen(const std::string& text) {
   return out;
 }
 
-/// The page's address for one browser. The QR code is for a browser of another machine.
+/// Prints the page's addresses for one browser. The QR code is for a browser on another machine.
 void print_pages(const ServerSetup& setup, std::uint16_t port, const std::string& page_token,
                  bool qr) {
   std::string for_others;
@@ -168,7 +168,7 @@ int run_serve(const ServeOptions& options, const std::atomic<bool>& stop) {
   setup.host = at.host;
   setup.port = at.port;
   setup.name = options.name;
-  static_assert(kMostViewers <= RunSnapshot::kMaxStreams);  // each pins a block once
+  static_assert(kMostViewers <= RunSnapshot::kMaxStreams);  // each stream pins a block at most once
   setup.max_viewers = static_cast<std::size_t>(options.max_viewers);
   setup.dedicated_link = options.dedicated_link;
   if (options.token_file.empty()) {
@@ -208,7 +208,7 @@ int run_serve(const ServeOptions& options, const std::atomic<bool>& stop) {
               << " SHA-256 " << fingerprint_of(setup.tls.get()) << '\n';
   }
   print_addresses(setup, port, server.page_token(), options.qr);
-  // Without its addresses a server is of no use.
+  // A server is of no use if its addresses could not be printed.
   if (const std::string why = stdout_error(std::cout); !why.empty()) throw BridgeError(why);
   server.run(stop);
   return 0;

@@ -22,8 +22,8 @@
 namespace kerf::bridge {
 namespace {
 
-// Connections that are no viewers yet: room for several windows of a browser, six each, and a bound
-// for one that opens connections to keep others out.
+// Limits for connections that are not viewers yet, in all and per host: enough for several browser
+// windows with six connections each, but one host cannot take all.
 constexpr std::size_t kMaxHandshakes = 128;
 constexpr std::ptrdiff_t kMaxHandshakesOfOne = 32;
 constexpr std::int64_t kRetryNs = kNsPerSecond / 10;
@@ -37,7 +37,7 @@ tcp::endpoint resolve(asio::io_context& io, const std::string& host, std::uint16
   if (error || found.empty()) {
     throw BridgeError(place + error.message() + "; give an address of this machine (ip address)");
   }
-  // A machine's own name may also resolve to loopback.
+  // The machine's own name may resolve to loopback too, so another address is preferred.
   const auto outside = std::find_if(found.begin(), found.end(), [](const auto& one) {
     return !one.endpoint().address().is_loopback();
   });
@@ -88,7 +88,7 @@ Server::Impl::Impl(ServerSetup setup)
 
 Server::Impl::~Impl() {
   helper_.join();
-  // Viewers live as long as `io_`, longer than the snapshot that their streams read.
+  // `io_` keeps viewers alive after the snapshot is destroyed, so their streams must end first.
   for (const std::shared_ptr<Viewer>& viewer : viewers_) viewer->stream.reset();
 }
 
@@ -106,7 +106,7 @@ asio::awaitable<void> Server::Impl::accept_all() {
   for (;;) {
     ErrorCode error;
     tcp::socket socket = co_await acceptor_.async_accept(quiet(error));
-    if (error) {  // no descriptor is left, or the peer has closed already
+    if (error) {  // no free descriptor, or the peer has already closed
       pause.expires_after(std::chrono::milliseconds(50));
       co_await pause.async_wait(quiet(error));
       continue;
@@ -119,8 +119,8 @@ asio::awaitable<void> Server::Impl::accept_all() {
 
 namespace {
 
-/// What counts as one host: an IPv4 address, or the first 64 bits of an IPv6 address, since one
-/// machine may use all addresses of such a network.
+/// Identifies a host for the limits: its IPv4 address, or the first 64 bits of its IPv6 address,
+/// because one machine may use all addresses of such a network.
 asio::ip::address_v6::bytes_type host_of(const asio::ip::address& address) {
   asio::ip::address_v6::bytes_type bytes{};
   if (address.is_v4())
@@ -134,10 +134,11 @@ asio::ip::address_v6::bytes_type host_of(const asio::ip::address& address) {
 
 }  // namespace
 
-/// If all slots are taken, the oldest connection of the host with most of them is closed, so a host
-/// that opens many and sends nothing keeps no other out. A connection that waits for the answer to
-/// a wrong token is closed last, and never for another one of its own host: so each slot of a host
-/// tries one token per second at most.
+/// Returns false if the newcomer must be refused. If all slots are taken, closes the oldest
+/// connection of the host that has the most, so that a host with many idle connections does not
+/// keep others out; if the newcomer's host has its maximum, closes the oldest of that host. A
+/// connection that waits for the reply to a wrong token is closed last, and
+/// never in favour of its own host: so each slot of a host tries at most one token per second.
 bool Server::Impl::make_room(const asio::ip::address& newcomer) {
   const auto held_by = [&](const asio::ip::address& address) {
     return std::ranges::count(handshakes_, host_of(address),
@@ -167,7 +168,7 @@ asio::awaitable<void> Server::Impl::clock(const std::atomic<bool>& stop) {
   using Clock = std::chrono::steady_clock;
   asio::steady_timer timer(io_);
   for (auto at = Clock::now(); !stop; at += std::chrono::nanoseconds(kSlotNs)) {
-    at = std::max(at, Clock::now() - std::chrono::nanoseconds(kSlotNs));  // no rush after a sleep
+    at = std::max(at, Clock::now() - std::chrono::nanoseconds(kSlotNs));  // no burst after a sleep
     timer.expires_at(at);
     ErrorCode error;
     co_await timer.async_wait(quiet(error));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Connections of the server that are not yet viewers: TLS, and the pages over HTTP.
+// Connections that are not viewers yet: TLS handshake, HTTP requests, and the page's files.
 #include <algorithm>
 #include <chrono>
 #include <iostream>
@@ -21,10 +21,10 @@ namespace {
 
 namespace http = beast::http;
 
-constexpr auto kReplyTime = std::chrono::seconds(30);  // 200 KB over 64 kbit/s
+constexpr auto kReplyTime = std::chrono::seconds(30);  // enough for 200 KB at 64 kbit/s
 constexpr std::uint32_t kMaxHeaderBytes = 8 * 1024;
 
-/// One answer to a request for a page.
+/// Reply to one HTTP request.
 struct HttpReply {
   int status = 200;
   std::string_view content_type = "text/plain; charset=utf-8";
@@ -32,7 +32,7 @@ struct HttpReply {
   std::string cookie;  ///< value of Set-Cookie; empty: none
   bool keep_alive = true;
   bool head_only = false;  ///< the request was a HEAD
-  std::string location{};  ///< of a redirection; empty: none
+  std::string location{};  ///< target of a redirect; empty: none
 };
 
 std::string_view reason(int status) noexcept {
@@ -70,8 +70,8 @@ constexpr std::string_view kHeaders =
     "X-Content-Type-Options: nosniff\r\n"
     "X-Frame-Options: DENY\r\n";
 
-/// The bytes of a reply. Its headers forbid all that the page does not need: scripts, styles and
-/// connections of other hosts or inside of the HTML, frames around the page, guessing of its type.
+/// The text of a reply. Its headers forbid what the page does not need: inline scripts and styles,
+/// content and connections of other hosts, framing by other pages, guessing of content types.
 std::string http_text(const HttpReply& reply) {
   std::string text = "HTTP/1.1 " + std::to_string(reply.status) + " ";
   text += reason(reply.status);
@@ -91,7 +91,7 @@ std::string_view text(beast::string_view view) {
   return {view.data(), view.size()};
 }
 
-/// First known Foxglove subprotocol that the request offers; empty if there is none.
+/// The first Foxglove subprotocol of the request that kerf knows; empty if there is none.
 std::string_view foxglove_protocol_of(const Request& request) {
   const auto [begin, end] = request.equal_range(http::field::sec_websocket_protocol);
   for (auto header = begin; header != end; ++header) {
@@ -119,14 +119,14 @@ asio::awaitable<void> Server::Impl::handshake(WebSocket& ws, beast::flat_buffer&
   link.next_layer().expires_after(std::chrono::nanoseconds(setup_.handshake_ns));
   in.commit(co_await link.next_layer().async_read_some(in.prepare(kMaxHeaderBytes), quiet(error)));
   if (error) co_return;
-  constexpr char kTlsHandshake = 22;  // the first byte of every client's first message
+  constexpr char kTlsHandshake = 22;  // first byte of a TLS client's first message
   done = *static_cast<const char*>(in.data().data()) == kTlsHandshake;
   if (!done) {
     const std::string reply = http_text({400, "text/plain; charset=utf-8",
                                          "This port speaks TLS only: open it with https:// (a "
                                          "page) or wss:// (kerf bridge join).\n",
                                          "", false});
-    link.next_layer().socket().send(asio::buffer(reply), 0, error);  // an empty queue has room
+    link.next_layer().socket().send(asio::buffer(reply), 0, error);  // fits the empty send buffer
     co_return;
   }
   const std::size_t used =
@@ -134,15 +134,15 @@ asio::awaitable<void> Server::Impl::handshake(WebSocket& ws, beast::flat_buffer&
   in.consume(used);
   done = !error;
   if (done) co_return;
-  // A client without the certificate that is asked for has sent its request already. It is read, so
-  // that the alert reaches the client before a reset does.
+  // A client without the required certificate has already sent its request. Reads it, because a
+  // socket closed with unread bytes is reset, and the client might lose the alert.
   in.clear();
   link.next_layer().socket().shutdown(tcp::socket::shutdown_send, error);
   co_await link.next_layer().async_read_some(in.prepare(kMaxHeaderBytes), quiet(error));
 }
 
-/// First the token of the address, then the cookie, then the one-time token: a browser that has a
-/// cookie does not use up the one-time token.
+/// Checks for a viewer's token, then for the cookie, then for the one-time token, so that a browser
+/// with a cookie does not use up the one-time token.
 Server::Impl::Credentials Server::Impl::credentials_of(const Request& request) const {
   const Tokens& tokens = setup_.tokens;
   const std::string_view asked = query_value(text(request.target()), "token");
@@ -160,8 +160,9 @@ Server::Impl::Credentials Server::Impl::credentials_of(const Request& request) c
   return {Right::none, !asked.empty() || !kept.empty(), false, {}};
 }
 
-/// The path that is asked for. A proxy may have removed its own path already, or not; empty: it is
-/// the proxy's path itself, without the slash that relative addresses of the page need.
+/// The path of a request, without the proxy's prefix, which the proxy may have removed or not.
+/// Empty if the path is the prefix without the final slash, which the page's relative addresses
+/// need.
 std::string_view Server::Impl::route_of(const Request& request) const {
   std::string_view route = path_of(text(request.target()));
   const std::string_view path =
@@ -171,14 +172,14 @@ std::string_view Server::Impl::route_of(const Request& request) const {
   return rest.empty() || rest.starts_with('/') ? rest : route;
 }
 
-/// Whether it opens a socket of Foxglove's protocol. Its client is a page from elsewhere, or a
-/// program that has no cookies: the token in the address counts alone, and so its origin does not
-/// matter.
+/// True if the request opens a WebSocket of Foxglove's protocol. Its client is a page of another
+/// origin, or a program without cookies, so only the token in the address counts, and the origin is
+/// not checked.
 bool Server::Impl::is_foxglove(const Request& request) const {
   return beast::websocket::is_upgrade(request) && route_of(request) == kFoxglovePath;
 }
 
-/// Whether it came to the address of `--public-url`, as far as the proxy reports it.
+/// True if the request was sent to the address of `--public-url`, by its `Host`.
 bool Server::Impl::is_public(const Request& request) const {
   return setup_.public_url &&
          is_own_origin(setup_.public_url->origin(), text(request[http::field::host]),
@@ -206,7 +207,7 @@ std::string Server::Impl::page_text(const Request& request, const Credentials& s
     return http_text(reply);
   }
   if (!shown.cookie.empty() && !reply.head_only) {
-    // Without a Path it is good for the folder that the browser sees, behind any proxy.
+    // Without `Path` the cookie applies to the folder that the browser sees, behind any proxy.
     const bool secure = tls_ || (is_public(request) && setup_.public_url->secure);
     reply.cookie = cookie_name() + "=" + shown.cookie + "; HttpOnly; SameSite=Strict" +
                    (secure ? "; Secure" : "");
@@ -288,7 +289,7 @@ asio::awaitable<void> Server::Impl::talk_http(std::unique_ptr<WebSocket> ws,
     }
     const Credentials shown = credentials_of(request);
     if (shown.right == Right::none && shown.secret) {
-      // It keeps its slot meanwhile, so one host tries 32 tokens per second at most.
+      // The connection keeps its slot, so one host can try at most 32 tokens per second.
       slot.is_guess = true;
       say_at_most_once_a_second("a wrong token from " + slot.from().to_string());
       asio::steady_timer wait(io_, std::chrono::nanoseconds(setup_.wrong_token_ns));

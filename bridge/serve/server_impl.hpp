@@ -28,36 +28,36 @@
 
 namespace kerf::bridge {
 
-/// One viewer: its socket, what it may do, and its stream while there is a run; or a client of
-/// Foxglove's protocol, with a session from its beginning to its end.
+/// One viewer: its socket, its right, and its stream while there is a run. Or a Foxglove client,
+/// which has a session instead of a stream.
 struct Viewer {
   Viewer(std::unique_ptr<WebSocket> socket, Right its_right)
       : ws(std::move(socket)), wake(ws->get_executor()), right(its_right) {}
 
   std::unique_ptr<WebSocket> ws;
-  asio::steady_timer wake;  ///< cancelled whenever there may be something to send
+  asio::steady_timer wake;  ///< cancelled to wake the writer
   Right right;
   std::unique_ptr<Stream> stream;
   std::optional<FoxgloveSession> foxglove;
   std::deque<ReplyMessage> replies;
   std::int64_t heard_ns = 0;
-  std::int64_t measured_ns = 0;      ///< when the round trip was read
-  int message_credit = 0;            ///< messages that it may still send
-  std::int64_t byte_credit = 0;      ///< bytes that it may still send, with TLS
-  std::uint64_t received_bytes = 0;  ///< from it, when `byte_credit` was updated
-  bool commanding = false;           ///< the controller has a command of it
-  bool writing = false;              ///< a message to a Foxglove client is under way
-  bool reading = false;              ///< `read_viewer` runs: Beast's reader has the socket
-  bool gone = false;                 ///< its socket is closed
-  std::optional<CloseCode> closing;  ///< it is to be closed with this code
-  std::int64_t close_by_ns = 0;      ///< then the socket is closed
+  std::int64_t measured_ns = 0;      ///< when the round trip was last read
+  int message_credit = 0;            ///< messages that the viewer may still send
+  std::int64_t byte_credit = 0;      ///< bytes that it may still send, including TLS
+  std::uint64_t received_bytes = 0;  ///< received when `byte_credit` was last updated
+  bool commanding = false;           ///< one of its commands waits for the controller
+  bool writing = false;              ///< a message to a Foxglove client is being sent
+  bool reading = false;              ///< `read_viewer` runs, so Beast reads the socket
+  bool gone = false;                 ///< the socket is closed
+  std::optional<CloseCode> closing;  ///< it will be closed with this code
+  std::int64_t close_by_ns = 0;      ///< latest time to close the socket then
 
   [[nodiscard]] int fd() { return ws->next_layer().next_layer().socket().native_handle(); }
 };
 
 using Request = beast::http::request<beast::http::empty_body>;
 
-/// One thread runs all of it, except calls that may wait for the controller: `helper_` runs those.
+/// All in one thread, except calls that may wait for the controller: these run on `helper_`.
 class Server::Impl {
  public:
   explicit Impl(ServerSetup setup);
@@ -72,12 +72,12 @@ class Server::Impl {
  private:
   using Void = asio::awaitable<void>;
   class HandshakeSlot;
-  /// The rights of a request, and where they come from.
+  /// The right of a request, and where it comes from.
   struct Credentials {
     Right right = Right::none;
-    bool secret = false;    ///< it has a token or a cookie, right or wrong
-    bool one_time = false;  ///< its right is that of the one-time token
-    std::string cookie;     ///< for the browser to keep; empty: none
+    bool secret = false;    ///< the request has a token or a cookie, valid or not
+    bool one_time = false;  ///< the right comes from the one-time token
+    std::string cookie;     ///< to set in the browser; empty: none
   };
 
   // server.cpp
@@ -95,7 +95,7 @@ class Server::Impl {
   Void talk_http(std::unique_ptr<WebSocket> ws, beast::flat_buffer& in);
   Void refuse(Link& link, int status, std::string_view text, bool head_only);
   void say_at_most_once_a_second(const std::string& text);
-  /// With the port, since browsers keep cookies by host alone.
+  /// Includes the port, because browsers do not separate cookies by port.
   [[nodiscard]] std::string cookie_name() const { return "kerf" + std::to_string(port()); }
   [[nodiscard]] Credentials credentials_of(const Request& request) const;
   [[nodiscard]] std::string_view route_of(const Request& request) const;
@@ -104,7 +104,7 @@ class Server::Impl {
   [[nodiscard]] std::string page_text(const Request& request, const Credentials& shown);
 
   // server_viewer.cpp
-  /// `foxglove`: the sub-protocol of Foxglove that was agreed; empty: a viewer of kerf.
+  /// `foxglove`: the agreed subprotocol; empty for a viewer of kerf.
   Void view(std::unique_ptr<WebSocket> ws, const Request& request, Right right,
             std::string_view foxglove, HandshakeSlot& slot);
   Void read_viewer(std::shared_ptr<Viewer> viewer);
@@ -121,8 +121,8 @@ class Server::Impl {
 
   ServerSetup setup_;
   OneTimeToken page_token_;
-  // Used by coroutines of `io_`, so it must outlive it.
-  std::list<HandshakeSlot*> handshakes_;  // the oldest first
+  // Coroutines of `io_` use it, so it must outlive `io_`.
+  std::list<HandshakeSlot*> handshakes_;  // oldest first
   asio::io_context io_{1};
   std::optional<asio::ssl::context> tls_;
   tcp::acceptor acceptor_;
@@ -130,16 +130,16 @@ class Server::Impl {
 
   std::unique_ptr<SegmentConnection> connection_;
   std::unique_ptr<RunSnapshot> snapshot_;
-  std::optional<SegmentConnection> command_link_;  // of `helper_` alone
+  std::optional<SegmentConnection> command_link_;  // used by `helper_` only
   bool connecting_ = false;
-  bool ended_ = true;  ///< at the last clock: there is no controller, or it has gone
+  bool ended_ = true;  ///< at the last clock tick there was no live controller
   std::int64_t next_try_ns_ = 0, bbr_restarted_ns_ = 0, warned_ns_ = 0;
   std::string said_;
 
   std::list<std::shared_ptr<Viewer>> viewers_;
 };
 
-/// One of the limited slots for connections that are not yet viewers. The stream outlives it.
+/// One of the limited slots for connections that are not viewers yet. The stream outlives it.
 class Server::Impl::HandshakeSlot {
  public:
   HandshakeSlot(Impl& server, beast::tcp_stream& stream) : server_(server), stream_(stream) {
@@ -153,11 +153,11 @@ class Server::Impl::HandshakeSlot {
   void release() { server_.handshakes_.remove(this); }
   void evict() {
     release();
-    stream_.close();  // its coroutine ends with an error
+    stream_.close();  // ends its coroutine with an error
   }
   [[nodiscard]] const asio::ip::address& from() const { return from_; }
 
-  bool is_guess = false;  ///< it waits for the answer to a wrong token
+  bool is_guess = false;  ///< the client waits for the reply to a wrong token
 
  private:
   Impl& server_;

@@ -21,7 +21,7 @@ namespace {
 
 namespace websocket = beast::websocket;
 
-/// Commands of viewers. Only the local user may undo a stroke.
+/// True for the commands that viewers may send. Undo, redo and mark are for local readers only.
 bool is_for_viewers(CommandKind kind) noexcept {
   return kind == CommandKind::select_tool || kind == CommandKind::hold ||
          kind == CommandKind::reset;
@@ -29,11 +29,11 @@ bool is_for_viewers(CommandKind kind) noexcept {
 
 constexpr std::int64_t kGoodbyeNs = kNsPerSecond;
 constexpr std::int64_t kMeasureNs = kNsPerSecond / 4;
-constexpr int kMessageCredit = 64;  // beside one ack per frame: a second of commands or pings
-// With the masked head of a WebSocket frame and the bytes that TLS 1.3 adds to a record.
+constexpr int kMessageCredit = 64;  // besides one ack per frame: a second of commands or pings
+// Plus the masked head of a WebSocket frame, and what TLS 1.3 adds to a record.
 constexpr std::int64_t kMessageBytes = kMaxUpBytes + 14 + 22;
-// After a stall of the link all acks come at once. Fragments without payload are no messages, so
-// only this limit bounds them.
+// Large, because after a stall of the link all acks come at once. It is the only limit on fragments
+// without payload, which do not count as messages.
 constexpr std::int64_t kByteCredit = 1 << 20;
 constexpr std::size_t kMaxReplies = 16;
 
@@ -90,7 +90,7 @@ asio::awaitable<void> Server::Impl::view(std::unique_ptr<WebSocket> ws, const Re
   if (viewer->closing) {
     viewer->ws->next_layer().next_layer().expires_after(std::chrono::nanoseconds(kGoodbyeNs));
     co_await write_viewer(viewer);
-    slot.release();  // before its stream ends
+    slot.release();  // before its TCP stream ends
     co_return;
   }
   slot.release();
@@ -111,7 +111,7 @@ asio::awaitable<void> Server::Impl::view(std::unique_ptr<WebSocket> ws, const Re
 }
 
 void Server::Impl::open_stream(Viewer& viewer) {
-  if (viewer.foxglove) return;  // it reads the ring of ticks alone, at any time
+  if (viewer.foxglove) return;  // reads the ring of ticks only, without a stream
   if (!snapshot_) snapshot_ = std::make_unique<RunSnapshot>(connection_->reader());
   viewer.stream =
       std::make_unique<Stream>(*snapshot_, viewer.right == Right::command ? kMayCommand : 0);
@@ -155,9 +155,9 @@ asio::awaitable<void> Server::Impl::write_viewer(std::shared_ptr<Viewer> viewer)
   viewer->ws->next_layer().next_layer().socket().close(error);
 }
 
-/// Beast's own close reads while `read_viewer` does: a message in fragments then ends the program
-/// by an assertion of Beast (1.74, `read_size_hint_pmd`). So the reader ends first, nothing that
-/// the viewer sends afterwards is looked at, and the close frame goes out without Beast.
+/// Beast's `async_close` would read at the same time as `read_viewer`; a fragmented message then
+/// triggers an assertion in Beast (1.74, `read_size_hint_pmd`). So this stops the reader first,
+/// ignores what the viewer sends afterwards, and writes the close frame itself.
 asio::awaitable<void> Server::Impl::say_goodbye(Viewer& viewer) {
   Link& link = viewer.ws->next_layer();
   ErrorCode error;
@@ -238,7 +238,7 @@ void Server::Impl::command(const std::shared_ptr<Viewer>& viewer, const CommandM
       if (!command_link_ || !command_link_->alive()) command_link_ = connect_segment(setup_.name);
       reply = command_link_->send(wish);
     } catch (const SegmentError&) {
-      command_link_.reset();  // without a controller the answer is busy
+      command_link_.reset();  // without a controller the reply is busy
     }
     asio::post(io_, [from, sequence, reply] {
       const std::shared_ptr<Viewer> back = from.lock();

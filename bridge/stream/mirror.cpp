@@ -19,7 +19,7 @@ Reply RemoteCommand::request(const Command& command) noexcept {
     return {link_ == Link::down ? ReplyStatus::busy : ReplyStatus::refused, 0};
   }
   const auto kind = static_cast<std::uint32_t>(command.kind);
-  constexpr std::uint32_t kMost = 0xffff;  // of the message's fields; no such kind, no such arm
+  constexpr std::uint32_t kMost = 0xffff;  // fields of 16 bits; no kind or arm is above
   if (kind > kMost || command.arm > kMost) return {ReplyStatus::refused, 0};
   to_send_ = CommandMessage{kCommandMagic, static_cast<std::uint16_t>(kind),
                             static_cast<std::uint16_t>(command.arm), command.argument, ++sequence_};
@@ -36,7 +36,7 @@ std::optional<CommandMessage> RemoteCommand::take() {
 
 void RemoteCommand::answer(const ReplyMessage& reply) {
   const std::lock_guard lock(mutex_);
-  if (reply.sequence != sequence_) return;  // `request` no longer waits for it
+  if (reply.sequence != sequence_) return;  // of an earlier command: `request` gave up
   const bool known = reply.status <= static_cast<std::uint32_t>(ReplyStatus::refused);
   reply_ =
       Reply{known ? static_cast<ReplyStatus>(reply.status) : ReplyStatus::refused, reply.index};
@@ -47,7 +47,7 @@ void RemoteCommand::set_link(Link link) {
   const std::lock_guard lock(mutex_);
   link_ = link;
   if (link == Link::open) return;
-  reply_ = Reply{};  // no answer comes any more
+  reply_ = Reply{};  // no reply will come
   reply_->status = ReplyStatus::busy;
   answered_.notify_one();
 }
@@ -58,7 +58,7 @@ namespace {
   return (hello.head.flags & kTwoArms) != 0 ? 2 : 1;
 }
 
-/// True if both are the same run of the same scene: what is in its segment stays true.
+/// True if both are the same run of the same scene, so that its segment stays valid.
 [[nodiscard]] bool same_run(const ParsedHello& a, const ParsedHello& b) noexcept {
   return a.head.session == b.head.session && a.head.scene_bytes == b.head.scene_bytes &&
          a.volumes.size() == b.volumes.size() && arms_of(a) == arms_of(b) &&
@@ -66,7 +66,7 @@ namespace {
                      a.volumes.size() * sizeof(VolumeDescriptor)) == 0;
 }
 
-/// Its ticks then have no time of any clock.
+/// Lock-step: the times of its ticks are of no clock.
 [[nodiscard]] bool is_lockstep(const ParsedHello& hello) noexcept {
   return hello.head.start_ns == 0;
 }
@@ -93,7 +93,7 @@ template <class Record>
 
 }  // namespace
 
-/// A segment of this machine and what is in it.
+/// A local segment and the versions of its blocks.
 struct Mirror::LocalSegment {
   LocalSegment(ParsedHello run, ReplicaWriter made)
       : hello(std::move(run)),
@@ -111,7 +111,7 @@ struct Mirror::LocalSegment {
 Mirror::Mirror(std::string name, std::uint64_t most_bytes, SegmentServer::Answer answer)
     : name_(std::move(name)), most_bytes_(most_bytes), answer_(std::move(answer)) {
   static_cast<void>(segment_socket(name_));
-  const NameLock free_now(name_);  // reports at the start that the name is taken
+  const NameLock free_now(name_);  // throws now if the name is taken
 }
 
 Mirror::~Mirror() = default;
@@ -211,7 +211,7 @@ void Mirror::publish(const FrameHead& head) {
     }
   }
   writer.end_pass(head.tick);
-  std::vector<Part>().swap(waiting_);  // a long pass gives its memory back
+  std::vector<Part>().swap(waiting_);  // frees the memory of a long pass
   blocks_waiting_ = 0;
   writer.set_lifecycle(head.lifecycle <= static_cast<std::uint32_t>(Lifecycle::fault)
                            ? static_cast<Lifecycle>(head.lifecycle)
@@ -219,13 +219,13 @@ void Mirror::publish(const FrameHead& head) {
   taken_ns_ = clock_.local(head.taken_ns);
   joined_ = true;
   ++passes_;
-  if (next_) {  // the earlier run's name is free before the new one takes it
+  if (next_) {  // the earlier run releases the name before the new one takes it
     shown_.reset();
     shown_ = std::move(next_);
   }
   ended_ = (head.flags & kRunEnded) != 0;
   if (ended_) {
-    shown_->server.reset();  // as when a controller goes: readers keep what they have
+    shown_->server.reset();  // as when a controller ends: readers keep what they have
   } else if (!shown_->server) {
     shown_->server.emplace(name_, shown_->writer.fd(), shown_->writer.session_id(), answer_);
   }
@@ -249,7 +249,7 @@ void Mirror::records(std::span<const std::byte> message) {
       writer.put_record(index, record);
       continue;
     }
-    for (std::size_t arm = arms; arm-- > 0;) {  // the second's first, as a controller publishes
+    for (std::size_t arm = arms; arm-- > 0;) {  // the second arm first, as a controller does
       auto record = record_at<TickRecord>(in.bytes, i * arms + arm);
       if (!is_lockstep(*hello_)) record.start_ns = clock_.local(record.start_ns);
       writer.put_record(index, record, arm);

@@ -10,7 +10,7 @@
 namespace kerf::bridge {
 namespace {
 
-constexpr int kMaxPasses = 4;  // as SegmentReader::update; 2 are the most ever seen needed
+constexpr int kMaxPasses = 4;  // as SegmentReader::update; 2 is the most seen so far
 
 }  // namespace
 
@@ -60,9 +60,9 @@ void RunSnapshot::update(std::int64_t now_ns, bool writer_gone) {
     const bool all = read_changed();
     whole_ = (all && epoch % 2 == 0 && reader_.unchanged_since(epoch)) || writer_gone;
     if (!whole_) continue;
-    // An odd epoch was cut short: the tick before it is the last that was complete.
+    // An odd epoch was not completed: the last complete tick is the one before.
     tick_ = tick_of_version(epoch - epoch % 2);
-    if (taken_ns_ == 0) reader_.forget_pages();  // once all has been read
+    if (taken_ns_ == 0) reader_.forget_pages();  // after the first complete copy
     taken_ns_ = now_ns;
   }
 }

@@ -14,25 +14,25 @@
 
 namespace kerf::bridge {
 
-/// The volumes of a run at one tick, one copy for the streams of all viewers.
+/// The volumes of a run at one tick: one copy for the streams of all viewers.
 ///
-/// A stream in the middle of a pass needs the bricks as they were when the pass began, while this
-/// copy advances to the next tick for the others. So a stream pins the blocks that it has yet to
-/// send, and `update` keeps the old content of a pinned brick before it reads the new one. A pass
-/// is then exactly the volumes of its tick. Memory: the bricks that changed during a pass, in the
+/// A stream in the middle of a pass needs the bricks as they were when the pass began, but this
+/// copy advances to the next tick for other streams. So a stream pins the blocks that it has yet to
+/// send, and `update` saves the content of a pinned brick before it overwrites it. A pass is then
+/// exactly the volumes of its tick. Extra memory: the bricks that changed during a pass, in the
 /// worst case one volume per stream.
 ///
 /// One thread.
 class RunSnapshot {
  public:
-  /// The reader outlives this. Allocates the volumes' bricks, 1 KiB each.
+  /// `reader` outlives this. Allocates 1 KiB per brick of the volumes.
   explicit RunSnapshot(const SegmentReader& reader);
 
-  /// Reads what changed; at most 4 passes over the versions. `writer_gone`: the last publication
-  /// will never be completed, so it is taken as it is.
+  /// Copies the changed bricks; at most 4 passes over the versions. `writer_gone`: an unfinished
+  /// last tick will never be completed, so its bricks are taken as they are.
   void update(std::int64_t now_ns, bool writer_gone);
 
-  /// True if the last `update` found the volumes of one tick; only then a pass may begin.
+  /// True if the last `update` got the volumes of one tick; only then may a pass begin.
   [[nodiscard]] bool whole() const noexcept { return whole_; }
   [[nodiscard]] Tick tick() const noexcept { return tick_; }
   [[nodiscard]] std::int64_t taken_ns() const noexcept { return taken_ns_; }
@@ -42,9 +42,10 @@ class RunSnapshot {
   [[nodiscard]] const SegmentReader& reader() const noexcept { return reader_; }
   [[nodiscard]] const BlockPlan& plan() const noexcept { return plan_; }
 
-  /// 0: never read whole.
+  /// Version of a block; 0 if it was never read completely.
   [[nodiscard]] std::uint64_t version(std::uint32_t id) const noexcept;
-  /// Keeps the present version of block `id` readable until `unpin`. At most `kMaxStreams` pins.
+  /// Keeps the current version of block `id` readable until `unpin`. At most `kMaxStreams` pins per
+  /// block.
   void pin(std::uint32_t id) noexcept;
   void unpin(std::uint32_t id, std::uint64_t version) noexcept;
   /// Copies a block that is pinned at `version`.
@@ -52,7 +53,7 @@ class RunSnapshot {
 
   static constexpr std::size_t kMaxStreams = 255;
 
-  /// Bricks that are kept aside.
+  /// Number of saved bricks.
   [[nodiscard]] std::size_t kept() const noexcept { return kept_.size(); }
 
  private:
@@ -67,7 +68,7 @@ class RunSnapshot {
   void copy_text(std::uint32_t block, std::span<std::byte> out) const noexcept;
   void copy_labels(const BlockPlane& plane, std::uint32_t brick,
                    std::span<std::byte> out) const noexcept;
-  /// Whether a block is one of density. (The difference of unsigned numbers wraps for lower ones.)
+  /// True for a density block. For lower ids the unsigned difference wraps to a large number.
   [[nodiscard]] bool is_density(std::uint32_t id) const noexcept {
     return id - first_density_ < versions_.size();
   }
@@ -85,7 +86,8 @@ class RunSnapshot {
   std::int64_t taken_ns_ = 0;
 };
 
-/// The static part of a run as the greeting has it: `off_labels` 1 if there are labels.
+/// The volume descriptors for the hello: `off_labels` is 1 if there are labels, other offsets are
+/// 0.
 [[nodiscard]] std::vector<VolumeDescriptor> describe_volumes(const SegmentInfo& info);
 
 }  // namespace kerf::bridge

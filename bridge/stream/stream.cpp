@@ -59,7 +59,7 @@ void RecordBatches::plan(std::uint64_t records) noexcept {
   if (head == 0) return;
   if (!started_) next_ = head - 1;
   started_ = true;
-  // What the writer is about to overwrite is left to it.
+  // Skips the oldest quarter of the ring, which the writer may overwrite soon.
   next_ = std::max(next_, head - std::min(head, slots - slots / 4));
   const std::uint64_t waiting = end_ - std::min(end_, next_);
   if (waiting == 0) return;
@@ -67,7 +67,7 @@ void RecordBatches::plan(std::uint64_t records) noexcept {
   const std::uint64_t stride = (waiting + most - 1) / most;
   stride_ = static_cast<std::uint32_t>(
       std::min<std::uint64_t>(stride, std::numeric_limits<std::uint32_t>::max()));
-  next_ += (waiting - 1) % stride_;  // the last of them is the newest
+  next_ += (waiting - 1) % stride_;  // so that the last one is the newest
 }
 
 bool RecordBatches::read(std::uint64_t index, std::vector<std::byte>& out) const {
@@ -223,7 +223,7 @@ void Stream::begin_pass() {
   pass_due_ = false;
   pass_.clear();
   sent_of_pass_ = 0;
-  if (!snapshot_.whole()) return;  // a sign of life, and no news
+  if (!snapshot_.whole()) return;  // then an empty frame with the previous tick
   opened_ = true;
   pass_tick_ = snapshot_.tick();
   pass_taken_ns_ = snapshot_.taken_ns();

@@ -15,30 +15,28 @@
 
 namespace kerf::bridge {
 
-/// The measured delivery rate of a link, and the window: how many bytes may be in flight on it.
+/// Measures the delivery rate of a link and limits the bytes in flight to a window.
 ///
-/// Each ack gives a delivery rate: the bytes acknowledged since its frame was sent, over the time
-/// since the last ack before that sending. The maximum of the last `kSamples` is used, because an
-/// idle sender underestimates the link. Window = twice the bandwidth-delay product plus one frame:
-/// twice, because acks arrive in bursts; the frame allows the first measurement. The round trip is
-/// the kernel's minimum RTT: an ack's own RTT includes the frame's sending time and would measure
-/// the queue it creates.
+/// Each ack gives one sample of the rate: the bytes acknowledged since its frame was sent, divided
+/// by the time since the last ack before that. The rate is the maximum of the last `kSamples`,
+/// because samples of an idle sender are too low. Window = twice the bandwidth-delay product plus
+/// one frame: twice, because acks arrive in bursts; one frame, so that the first measurement is
+/// possible. The delay is the kernel's minimum RTT. The RTT of an ack would include the time to
+/// send the frame, and so the queue that the window itself creates.
 ///
-/// The window counts bytes, not frames: a packed frame has a quarter of the bytes of a plain one,
-/// so a window in frames would shrink by as much, just when the link limits a pass.
+/// The window counts bytes, not frames. A packed frame has a quarter of the bytes of a plain one,
+/// so a window in frames would shrink to a quarter just when the link limits a pass.
 ///
 /// `now_ns` never decreases. One thread.
 class LinkRate {
  public:
   static constexpr std::size_t kSamples = 32;
-  /// Frames that are always allowed in flight, whatever their size: one is applied while the next
-  /// arrives.
+  /// Frames that are always allowed in flight, of any size: one is applied while the next arrives.
   static constexpr std::size_t kLeastFrames = 2;
-  /// Allowance for the receiver to be scheduled, apply a frame and answer. It matters on fast links
-  /// only (a join takes a sixth less time); at 4 Mbit/s it adds 1 KiB to the window.
+  /// Added to the round trip: time for the receiver to be scheduled, apply a frame and reply. It
+  /// matters on fast links only (a join takes a sixth less time); at 4 Mbit/s it adds 1 KiB.
   static constexpr std::int64_t kTurnNs = 1'000'000;
-  /// Upper limit of the window. At a round trip of 40 ms it limits links faster than 13 MB/s, which
-  /// then wait for acks.
+  /// Upper limit of the window. With a round trip of 40 ms it limits the rate to 13 MB/s.
   static constexpr std::size_t kMostBytes = 32 * kMaxRawBytes;
 
   void set_round_trip(std::int64_t least_ns) noexcept { round_trip_ns_ = least_ns; }
@@ -53,9 +51,9 @@ class LinkRate {
     return flight_.size() < kLeastFrames || flight_.back().bytes_with - bytes_acked_ < window();
   }
   [[nodiscard]] bool waits_for_ack() const noexcept { return !flight_.empty(); }
-  /// Bytes.
+  /// Bytes that may be in flight.
   [[nodiscard]] std::size_t window() const noexcept;
-  /// 0: nothing was acknowledged yet.
+  /// 0 before the first ack.
   [[nodiscard]] double bytes_per_s() const noexcept;
 
  private:
@@ -73,24 +71,24 @@ class LinkRate {
   std::int64_t acked_ns_ = 0, round_trip_ns_ = 0;
 };
 
-/// The records of one ring, in messages of at most `kMaxRawBytes`, from the newest at the start on.
-/// If the link is too slow for all of them, every n-th is sent, and always the newest.
+/// Sends the records of one ring in messages of at most `kMaxRawBytes`, starting with the newest at
+/// the first `plan`. If the link is too slow for all, sends every n-th, and always the newest.
 class RecordBatches {
  public:
-  /// The reader outlives this. `ring` must be one that a run with this number of arms has.
+  /// `reader` outlives this. `ring` is `pairs` for two arms, `ticks` for one, or `dirty`.
   RecordBatches(const SegmentReader& reader, Ring ring) noexcept : reader_(reader), ring_(ring) {}
 
-  /// Plans to send at most `records` (at least 1) of the records published since then, until the
-  /// next call.
+  /// Selects what to send until the next call: at most `records` (at least 1) of the records that
+  /// are not sent yet.
   void plan(std::uint64_t records) noexcept;
   [[nodiscard]] bool waiting() const noexcept { return next_ < end_; }
 
-  /// The next message, packed if that pays on a link of `bytes_per_s`. False, and `out` is
-  /// empty, if the records were overwritten meanwhile.
+  /// Writes the next message to `out`, packed if that is faster on a link of `bytes_per_s`. Returns
+  /// false, with `out` empty, if the records have been overwritten.
   bool write(double bytes_per_s, std::vector<std::byte>& out);
 
   [[nodiscard]] Ring ring() const noexcept { return ring_; }
-  /// Raw bytes per packed one.
+  /// Raw bytes per packed byte.
   [[nodiscard]] double ratio() const noexcept { return pack_choice_.ratio(); }
 
  private:
@@ -105,48 +103,47 @@ class RecordBatches {
   std::vector<std::byte> raw_;
 };
 
-/// Interval at which a pass may begin and records are sent.
+/// Interval at which passes may begin and records are sent: 60 Hz.
 inline constexpr std::int64_t kSlotNs = 16'666'667;
 
-/// The messages to one viewer of one run: the greeting, then passes in frames, and records. It uses
-/// no network: the caller takes the next message whenever it can send one.
+/// Makes the messages to one viewer of one run: the hello, then frames and records. Uses no
+/// network: the caller calls `next` whenever it can send a message.
 ///
-/// Volumes and records use the same link. During a pass the link is the bottleneck, and records
-/// take at most `kRecordShare` of its rate; otherwise they take what they need.
+/// Volumes and records share the link. During a pass, which uses all of the link, records get at
+/// most the fraction `kRecordShare` of its rate; at other times all records are sent.
 ///
 /// One thread. The snapshot outlives this.
 class Stream {
  public:
-  /// Fraction of the delivered bytes for records during a pass. A quarter is one state every 4 ms
-  /// at 4 Mbit/s, and makes a pass at most a third longer.
+  /// Fraction of the delivery rate for records during a pass. A quarter allows one tick record
+  /// every 4 ms at 4 Mbit/s, and makes a pass at most a third longer.
   static constexpr double kRecordShare = 0.25;
-  /// If the bridge is late by up to this many slots (133 ms), all records are still sent; a link
-  /// that falls further behind gets fewer, so that those it gets are recent.
+  /// All records are sent while at most this many slots (133 ms) of them wait. If more wait, some
+  /// are skipped, so that those that are sent are recent.
   static constexpr std::uint64_t kSlotsBehind = 8;
 
-  /// `flags` of the greeting.
+  /// `flags`: of the hello; `kTwoArms` is added if needed.
   Stream(RunSnapshot& snapshot, std::uint32_t flags);
   ~Stream();
   Stream(const Stream&) = delete;
   Stream& operator=(const Stream&) = delete;
 
-  /// After each `RunSnapshot::update`, for every stream.
+  /// Call for every stream after each `RunSnapshot::update`.
   void note_changes();
-  /// Every `kSlotNs`, after that. `ended`: the controller has gone.
+  /// Call every `kSlotNs`, after `note_changes`. `ended`: the controller has gone.
   void slot(std::int64_t now_ns, bool ended);
 
-  /// The next message, if there is one and the link has credit for it.
+  /// Writes the next message to `out`. False if there is none, or no credit for a frame.
   bool next(std::int64_t now_ns, std::vector<std::byte>& out);
 
-  /// False if the viewer acknowledges a frame that was never sent. An ack of another run is
-  /// ignored.
+  /// Applies an ack; ignores one of another run. False if its frame was never sent.
   [[nodiscard]] bool acked(const AckMessage& ack, std::int64_t now_ns);
 
-  /// The kernel's least round trip.
+  /// The kernel's minimum RTT.
   void set_round_trip(std::int64_t least_ns) noexcept { link_.set_round_trip(least_ns); }
 
   [[nodiscard]] const LinkRate& link() const noexcept { return link_; }
-  /// True while blocks of the pass have yet to be sent.
+  /// True while a pass has blocks that are not sent yet.
   [[nodiscard]] bool in_pass() const noexcept { return sent_of_pass_ < pass_.size(); }
 
  private:
@@ -160,19 +157,19 @@ class Stream {
   bool next_frame(std::int64_t now_ns, std::vector<std::byte>& out);
   void begin_pass();
   void write_frame(std::int64_t now_ns, std::vector<std::byte>& out);
-  /// Takes entries of the pass into `raw_`, up to `kMaxRawBytes`. Returns how many.
+  /// Copies the next blocks of the pass to `raw_`, up to `kMaxRawBytes`. Returns their number.
   std::size_t take_blocks();
 
   RunSnapshot& snapshot_;
   std::uint32_t flags_;
   std::uint64_t session_;
   bool greeted_ = false, ended_ = false, pass_due_ = false, opened_ = false;
-  // Ticks, dirty boxes and frames in round-robin order, so that none of them can fill a slow link.
+  // Ticks, dirty boxes and frames take turns, so that none of them can fill a slow link.
   static constexpr int kSources = 3;
   int next_source_ = 0;
 
-  std::vector<std::uint64_t> held_;     // version by block, 0: none
-  std::vector<std::uint32_t> waiting_;  // for the next pass
+  std::vector<std::uint64_t> held_;     // version per block; 0: not sent yet
+  std::vector<std::uint32_t> waiting_;  // blocks for the next pass
   std::vector<bool> is_waiting_;
   std::vector<Entry> pass_;
   std::size_t sent_of_pass_ = 0;
@@ -180,7 +177,7 @@ class Stream {
   std::int64_t pass_taken_ns_ = 0, slot_ns_ = 0;
   std::uint64_t frame_ = 0, set_hash_ = 0;
 
-  double record_bytes_ = 0;  // that records may still take during the pass
+  double record_bytes_ = 0;  // budget of records during a pass
 
   LinkRate link_;
   PackChoice pack_choice_;
