@@ -13,7 +13,7 @@ namespace kerf {
 namespace {
 
 constexpr int kSdkMajor = 3;
-constexpr int kSaturated = 2;  // a result, no error
+constexpr int kSaturated = 2;  // a result, not an error
 constexpr int kExpertModeDisabled = 9;
 constexpr double kMmPerM = 1000;
 
@@ -25,8 +25,8 @@ constexpr const char* kDhdErrors[] = {
     "device in use",   "invalid",       "no regulation"};
 constexpr std::size_t kKnownDhdErrors = std::size(kDhdErrors);
 
-/// Numbers that dhdGetSystemType returns, by the SDK's header; of two, the second is for the left
-/// hand.
+/// Values of dhdGetSystemType, from the SDK's header. Of two with one name, the second is the
+/// left-hand version.
 struct DeviceType {
   int number;
   const char* name;
@@ -73,7 +73,7 @@ DhdArm::DhdArm(const Options& options, ArmExchange& exchange)
   library_.find("dhdSetForce", calls_.set_force);
   library_.find("dhdGetButton", calls_.get_button);
   library_.require_all();
-  library_.find("dhdGetStatus", calls_.get_status);  // without it the mode is not seen
+  library_.find("dhdGetStatus", calls_.get_status);  // optional: without it the mode is unknown
 }
 
 void DhdArm::open() {
@@ -102,7 +102,7 @@ void DhdArm::open() {
   if (!is_initialized_ && options_.initializes) {
     static_cast<void>(set_watchdog());  // so that the motion does not outlive this process
     if (calls_.auto_init(id_) < 0) throw ArmError("--auto-init: " + last_error());
-    // Without it the SDK would go on regulating; its force stays ours.
+    // Ends the SDK's own regulation; the force stays enabled.
     if (calls_.stop_regulation(true, id_) < 0) throw ArmError("--auto-init: " + last_error());
     is_initialized_ = calls_.is_initialized(id_);
   }
@@ -131,7 +131,7 @@ void DhdArm::check_type() {
 bool DhdArm::set_watchdog() noexcept {
   if (calls_.set_watchdog(kWatchdogUnits, id_) >= 0) return true;
   if (calls_.error_get_last() != kExpertModeDisabled) return false;
-  // Of the whole process, so no longer than for this call.
+  // Expert mode is process-wide, so it is on for this call only.
   if (calls_.enable_expert_mode() < 0) return false;
   const bool is_set = calls_.set_watchdog(kWatchdogUnits, id_) >= 0;
   static_cast<void>(calls_.disable_expert_mode());
@@ -163,7 +163,8 @@ void DhdArm::run() noexcept {
   std::int64_t next_ns = monotonic_ns();
   while (!exchange_.finished()) {
     frame();
-    // Missed cycles are left out: this thread stands above the servo, and has to sleep.
+    // Skips missed cycles: this thread has a higher priority than the servo by default, so it must
+    // sleep.
     const std::int64_t late_ns = std::max<std::int64_t>(monotonic_ns() - next_ns, 0);
     next_ns += (late_ns / period_ns + 1) * period_ns;
     sleep_until_ns(next_ns);
@@ -172,7 +173,7 @@ void DhdArm::run() noexcept {
 }
 
 void DhdArm::frame() noexcept {
-  constexpr int kLookFrames = 256;  // how often the state is read that seldom changes
+  constexpr int kLookFrames = 256;  // between two reads of state that seldom changes
   double x_m = 0;
   double y_m = 0;
   double z_m = 0;
@@ -206,7 +207,7 @@ void DhdArm::frame() noexcept {
     }
   }
   const auto force_n = exchange_.turn(reading);
-  // Back into the SDK's axes.
+  // In the SDK's axes.
   const int result = calls_.set_force(force_n[2], force_n[0], force_n[1], id_);
   if (result < 0) {
     count_error();
@@ -215,9 +216,10 @@ void DhdArm::frame() noexcept {
   }
 }
 
-/// A device that left the force mode (its force button, its velocity threshold, its watchdog) would
-/// give the whole force in one step when it comes back. So it counts as without power, and force
-/// begins anew from its parking button, held while the mode is back.
+/// A device can leave the force mode by its force button, velocity threshold or watchdog. If it
+/// came back during contact, it would exert the full force at once. So outside the force mode the
+/// reading is `powered = false`, and the mode is enabled again only while the parking button is
+/// held.
 void DhdArm::follow_force_mode(ArmReading& reading) noexcept {
   constexpr int kLookFrames = 16;
   constexpr std::size_t kForceMode = 5;

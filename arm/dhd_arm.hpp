@@ -13,10 +13,11 @@
 
 namespace kerf {
 
-/// What kerf calls of Force Dimension's SDK (3.x), in our own words: libdrd has it all.
+/// The functions of Force Dimension's SDK (3.x) that kerf calls, declared by kerf itself. libdrd
+/// has all of them.
 ///
-/// C linkage. The last argument, the device's ID, has a default in C++ alone and is always given.
-/// Results below 0 are errors.
+/// C linkage. A last argument `id` is the device; only the SDK's C++ header has a default for it,
+/// so kerf always passes it. Results below 0 are errors.
 namespace dhd {
 
 struct Calls {
@@ -38,37 +39,37 @@ struct Calls {
   int (*get_position)(double* x_m, double* y_m, double* z_m, char id);
   int (*set_force)(double x_n, double y_n, double z_n, char id);
   int (*get_button)(int index, char id);
-  int (*get_status)(int* words, char id);  ///< null if the library has none
+  int (*get_status)(int* words, char id);  ///< null if the library does not have it
 };
 
 }  // namespace dhd
 
-/// An omega of Force Dimension, by libdrd.so.3: as an omega.3, whatever its wrist. Another device
-/// of theirs, as the Falcon, opens only if the user has said which force it bears; axes, buttons
-/// and range are those of an omega.3.
+/// An omega of Force Dimension, through libdrd.so.3. Every omega is used as an omega.3, without its
+/// wrist. Another device of the vendor, such as a Falcon, opens only if the user has given its peak
+/// force; kerf assumes the axes, buttons and range of an omega.3.
 ///
-/// A thread of its own runs the frames: position, buttons, one turn, force. The SDK's axes are x to
-/// the user, y right, z up, in m: kerf (x, y, z) = (y, z, x) mm.
+/// A separate thread runs the frames: position, buttons, one `ArmExchange::turn`, force. The SDK's
+/// axes are x to the user, y right, z up, in m: kerf (x, y, z) = (y, z, x) mm.
 ///
-/// The device has no dock: it is parked while button 0 is held, and button 1 is kerf's first
-/// button. Its own watchdog switches the force off 20 ms after the last command if the firmware
-/// takes it; its velocity threshold stays as the vendor has set it.
+/// The device has no dock: it is parked while button 0 is held. Button 1 is kerf's first button. If
+/// the firmware supports it, the device's own watchdog switches the force off 20 ms after the last
+/// command. The velocity threshold stays as the vendor has set it.
 class DhdArm final : public VendorArm {
  public:
   struct Options {
     std::string library;  ///< empty: libdrd.so.3, libdrd.so
-    int index = -1;       ///< of the device; -1: the SDK's default
+    int index = -1;       ///< of the device; -1: the SDK's choice
     int rate_hz = 4000;
-    bool is_peak_given = false;  ///< the exchange's peak is the user's word for this device
-    bool initializes = false;    ///< by a motion of its own, if it is not yet
+    bool is_peak_given = false;  ///< the user has given the peak force of this device
+    bool initializes = false;    ///< if needed; this moves the arm
     int priority = 81;           ///< SCHED_FIFO; 0: none
-    int core = -1;               ///< -1: the last one
+    int core = -1;               ///< of the thread; -1: the last one
   };
-  /// Units of 125 us: 20 ms.
+  /// In units of 125 us: 20 ms.
   static constexpr unsigned char kWatchdogUnits = 160;
-  /// The device is gone if no position could be read for so long, in at least kFewestUnread tries:
-  /// time and not a count of cycles, since a call may block, and a thread that stood still has not
-  /// tried.
+  /// The device is lost if no position could be read for kGoneS, in at least kFewestUnread tries. A
+  /// time, because a call may block; and a number of tries, because a thread that did not run has
+  /// not tried.
   static constexpr double kGoneS = 0.1;
   static constexpr int kFewestUnread = 3;
 
@@ -84,10 +85,10 @@ class DhdArm final : public VendorArm {
   [[nodiscard]] std::string text_of(std::uint32_t failure) const override;
   [[nodiscard]] std::vector<std::pair<std::string, std::uint64_t>> errors() const override;
   [[nodiscard]] const char* notice() const noexcept override { return notice_.load(); }
-  /// Whether the device's own watchdog is set. After `open`.
+  /// True if the device's own watchdog is set. After `open`.
   [[nodiscard]] bool has_watchdog() const noexcept { return has_watchdog_; }
 
-  /// One cycle. The thread of the frames alone.
+  /// One frame. Only the thread of the frames calls it.
   void frame() noexcept;
 
  private:
@@ -108,14 +109,14 @@ class DhdArm final : public VendorArm {
   bool is_open_ = false, has_watchdog_ = false;
   std::jthread thread_;
   std::atomic<const char*> notice_{""};
-  // Of that thread, until `stop`.
-  int unread_ = 0;            ///< positions in a row that could not be read
-  std::int64_t read_ns_ = 0;  ///< when the last one was read, or the first try
+  // Used by that thread only, until `stop`.
+  int unread_ = 0;            ///< consecutive positions that could not be read
+  std::int64_t read_ns_ = 0;  ///< when the last one was read; before that, the first try
   int initialized_look_ = 0, mode_look_ = 0;
   bool gives_force_ = true;
   bool is_initialized_ = false;
   std::uint64_t saturated_ = 0;
-  std::array<std::uint64_t, 24> error_counts_{};  ///< by the SDK's number, the last one: any other
+  std::array<std::uint64_t, 24> error_counts_{};  ///< per SDK error number; then any other
 };
 
 }  // namespace kerf

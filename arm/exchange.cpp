@@ -23,11 +23,11 @@ std::optional<std::array<double, 4>> orientation_of(const Vec3& x, const Vec3& y
   const Vec3 across{x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2],
                     x[0] * y[1] - x[1] * y[0]};
   if (!is(dot(x, x), 1) || !is(dot(y, y), 1) || !is(dot(z, z), 1) || !is(dot(x, y), 0) ||
-      !is(dot(y, z), 0) || !is(dot(z, x), 0) || !(dot(across, z) > 0)) {  // the last one: a mirror
+      !is(dot(y, z), 0) || !is(dot(z, x), 0) || !(dot(across, z) > 0)) {  // the last: left-handed
     return std::nullopt;
   }
-  // Of the four components the largest is found from the diagonal, the others from sums beside it
-  // (Shepperd, J. Guidance and Control 1, 1978).
+  // The largest of the four components comes from the diagonal, the others from sums and
+  // differences off it (Shepperd, J. Guidance and Control 1, 1978).
   const double trace = x[0] + y[1] + z[2];
   std::array<double, 4> q;
   if (trace > std::max({x[0], y[1], z[2]})) {
@@ -96,8 +96,8 @@ bool ArmExchange::publish(const ArmReading& reading, std::int64_t now_ns) noexce
 std::array<double, 3> ArmExchange::commanded(std::int64_t now_ns) noexcept {
   const auto newest = page_.newest();
   if (!newest || !newest->command.force_on) return {};
-  // A command written during this exchange may be a little newer than `now_ns`; a time farther in
-  // the future is not valid.
+  // A command written during this exchange may be slightly newer than `now_ns`. A later time is
+  // invalid.
   constexpr std::int64_t kAheadNs = 1'000'000;
   if (newest->at_ns <= now_ns - command_life_ns_ || newest->at_ns > now_ns + kAheadNs) {
     if (last_force_n_ != Vec3{}) ++counts_.expired;

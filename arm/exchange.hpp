@@ -12,80 +12,81 @@
 
 namespace kerf {
 
-/// What a vendor's library reports in one frame, in kerf's frame and units: x right, y up, z to the
-/// user, mm; orientation of the tool as x, y, z, w.
+/// The report of a vendor's library in one frame, in kerf's axes and units: x right, y up, z to the
+/// user, mm; orientation of the tool as quaternion x, y, z, w.
 struct ArmReading {
   std::array<double, 3> position_mm{};
   std::array<double, 4> orientation{0, 0, 0, 1};
   bool button1 = false, button2 = false;
   bool parked = false;
   bool homed = false;
-  bool powered = true;  ///< it can give a force
+  bool powered = true;  ///< the device can exert a force
 };
 
-/// Orientation of a tool whose axes are the columns `x`, `y`, `z`. Empty unless each column has a
-/// squared length of 1 within 0.05, each pair a dot product of 0 within 0.05 (3 degrees from the
+/// Orientation of a tool with the axes `x`, `y`, `z`, as a quaternion. nullopt unless each axis has
+/// a squared length of 1 within 0.05, each pair a dot product of 0 within 0.05 (3 degrees from a
 /// right angle), and the three are right-handed.
 [[nodiscard]] std::optional<std::array<double, 4>> orientation_of(
     const std::array<double, 3>& x, const std::array<double, 3>& y,
     const std::array<double, 3>& z) noexcept;
 
-/// The exchange between the frames of a vendor's library and the page. In each frame one reading
-/// goes out and one force comes in.
+/// The exchange between the frames of a vendor's library and the page: in each frame it publishes
+/// one reading and returns one force.
 ///
-/// `turn` is called by the thread of the frames only; it never blocks, allocates or throws. Any
-/// thread may call the rest, unless noted.
+/// Only the thread of the frames calls `turn`, which never blocks, allocates or throws. Any thread
+/// may call the rest, unless noted.
 class ArmExchange {
  public:
   using Clock = std::int64_t() noexcept;
 
-  /// The force is zero at the latest this long after the last command, whatever has happened to the
-  /// controller.
+  /// The force is zero at most this long after the last command, even if the controller has
+  /// crashed.
   static constexpr std::int64_t kZeroNs = 20'000'000;
-  /// A command therefore expires one frame before `kZeroNs`, and at least 1 ms before it.
+  /// Life of a command: `kZeroNs` minus one frame or 1 ms, whichever is longer.
   [[nodiscard]] std::int64_t command_life_ns() const noexcept { return command_life_ns_; }
-  /// Lowest frame rate: at this rate commands still live for three quarters of `kZeroNs`.
+  /// Lowest frame rate; with it a command lives for three quarters of `kZeroNs`.
   static constexpr int kSlowestHz = 200;
-  /// After `let_go` the exchange is finished once all frames over this time, and at least kFewest,
-  /// had zero force. A time, not a count, because a library may run at another rate than requested.
+  /// After `let_go` the exchange is finished once frames of zero force have run for this time, and
+  /// at least kFewest of them. A time, because a library may run at another rate than requested.
   static constexpr double kZeroS = 0.02;
   static constexpr int kFewest = 3;
 
   ArmExchange(ArmPageAdapter& page, double peak_n, int rate_hz,
               Clock* clock = monotonic_ns) noexcept;
 
-  /// One exchange. Returns the force of this frame, in N in kerf's frame: that of the newest
-  /// command, at most the peak; zero before the first reading, without a command that has not
-  /// expired, and after `let_go`. Always finite. Without a reading, or if it is not a pose, no
-  /// report is published, and the servo decides how long its force stays: docs/safety.md, "report
-  /// lost".
+  /// One exchange. Returns the force of this frame in N, in kerf's axes: that of the newest
+  /// command, scaled down to the peak. Zero before the first valid reading, if there is no command
+  /// or it has expired, and after `let_go`. Always finite. If `reading` is empty or not a valid
+  /// pose, publishes no report; the servo then decides how long its force stays (docs/safety.md,
+  /// "report lost").
   [[nodiscard]] std::array<double, 3> turn(const std::optional<ArmReading>& reading) noexcept;
 
-  /// Zero force from the next frame on, for good.
+  /// Zero force from the next frame on. Cannot be undone.
   void let_go() noexcept { is_let_go_.store(true); }
-  /// Whether enough frames of zero force have passed since.
+  /// True after enough frames of zero force since then.
   [[nodiscard]] bool finished() const noexcept { return is_finished_.load(); }
 
-  /// The first failure stays: a code of the library, or one of these. Zero force from then on.
+  /// Reports a failure: a code of the library, or one of these. The first one is kept. Also calls
+  /// `let_go`.
   enum : std::uint32_t { kStalled = 0xffff0001, kUnreadable, kSilent };
   void fail(std::uint32_t code) noexcept;
-  /// 0: none.
+  /// 0 if there is none.
   [[nodiscard]] std::uint32_t failure() const noexcept { return failure_.load(); }
 
-  /// The clock of the exchanges.
+  /// The clock that the exchange uses.
   [[nodiscard]] std::int64_t now_ns() const noexcept { return clock_(); }
-  /// Frames so far: the heartbeat.
+  /// Number of frames so far, as a heartbeat.
   [[nodiscard]] std::uint64_t frames() const noexcept { return frames_.load(); }
   [[nodiscard]] std::uint64_t published() const noexcept { return published_.load(); }
 
-  /// Once the frames have ended.
+  /// To be read after the frames have ended.
   struct Counts {
-    std::uint64_t unreadable = 0;  ///< readings that are no pose
-    std::uint64_t forced = 0;      ///< frames with a force
-    std::uint64_t expired = 0;     ///< times that a force ended because its command was too old
-    std::uint64_t clamped = 0;     ///< frames whose force was above the peak
+    std::uint64_t unreadable = 0;  ///< readings that are not a valid pose
+    std::uint64_t forced = 0;      ///< frames with a force other than zero
+    std::uint64_t expired = 0;     ///< times that a force ended because its command expired
+    std::uint64_t clamped = 0;     ///< frames whose command was above the peak
     Histogram turn;                ///< duration of an exchange
-    Histogram command_age;         ///< of the commands whose force was given
+    Histogram command_age;         ///< of the commands that were used
   };
   [[nodiscard]] const Counts& counts() const noexcept { return counts_; }
 

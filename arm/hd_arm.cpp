@@ -13,9 +13,9 @@
 namespace kerf {
 namespace {
 
-// The numbers of the interface, by their documented meaning.
+// Constants of the interface, from its documentation.
 constexpr std::uint32_t kNoDevice = 0xffffffff;
-constexpr std::uint32_t kHighestHandle = 1024;  // after a failed start a larger one came back
+constexpr std::uint32_t kHighestHandle = 1024;  // a failed start has returned a larger one
 constexpr std::uint32_t kButtons = 0x2000, kInkwellSwitch = 0x2002;
 constexpr std::uint32_t kTransform = 0x2052, kForce = 0x2700;
 constexpr std::uint32_t kVersion = 0x2500, kModel = 0x2501, kDriver = 0x2502, kVendor = 0x2503,
@@ -33,8 +33,8 @@ struct ErrorName {
   const char* name;
   Effect effect;
 };
-// Warm motors and the library's own limits of force, impulse and speed lower the force for a while,
-// and the readings are right.
+// `none`: warm motors and the library's own limits of force, impulse and speed lower the force for
+// a while; the readings stay valid.
 constexpr ErrorName kHdErrors[] = {
     {0x100, "invalid enum", Effect::spoils},
     {0x101, "invalid value", Effect::spoils},
@@ -60,7 +60,7 @@ constexpr ErrorName kHdErrors[] = {
 };
 constexpr std::size_t kKnownHdErrors = std::size(kHdErrors);
 
-/// A text that the library may leave out.
+/// A text of the library; empty if it is null.
 std::string text_or_none(const char* text) {
   return text != nullptr ? text : "";
 }
@@ -70,7 +70,7 @@ std::uint32_t on_tick(void* arm) {
   return static_cast<HdArm*>(arm)->frame();
 }
 
-/// A comma as the decimal mark breaks the vendor's driver, wherever it takes its locale from.
+/// The vendor's driver fails with a decimal comma, so this sets the point, in the environment too.
 void set_decimal_point() {
   // NOLINTBEGIN(concurrency-mt-unsafe): start
   if (std::getenv("LC_ALL") != nullptr) setenv("LC_ALL", "C", 1);
@@ -127,7 +127,7 @@ void HdArm::open() {
   int style = 0;
   calls_.get_integerv(kCalibrationStyle, &style);
   calibration_style_ = static_cast<std::uint32_t>(style);
-  pop_errors();  // what the library cannot say of itself does no harm
+  pop_errors();  // a missing fact does no harm
   calls_.enable(kForceOutput);
   require_no_error("hdEnable of the force");
   if (options_.rate_hz > 0) {
@@ -153,7 +153,7 @@ void HdArm::stop() {
   if (!is_started_) return;
   is_started_ = false;
   calls_.stop_scheduler();
-  // A callback that has ended by itself is not scheduled any more.
+  // A callback that has ended is no longer scheduled.
   if (is_scheduled_ && !has_ended_.load()) calls_.unschedule(scheduled_);
 }
 
@@ -191,9 +191,9 @@ std::uint32_t HdArm::frame() noexcept {
 }
 
 bool HdArm::read(ArmReading& reading) noexcept {
-  std::array<double, 16> m{};  // by columns
+  std::array<double, 16> m{};  // column-major
   int buttons = 0;
-  std::uint8_t is_out = 1;  // of the inkwell
+  std::uint8_t is_out = 1;  // out of the inkwell
   calls_.get_doublev(kTransform, m.data());
   calls_.get_integerv(kButtons, &buttons);
   calls_.get_booleanv(kInkwellSwitch, &is_out);
@@ -202,7 +202,7 @@ bool HdArm::read(ArmReading& reading) noexcept {
     return false;
   }
   reading.position_mm = {m[12], m[13], m[14]};
-  // The tool's axes in HD's of the stylus: x is x, y (the shaft) is z, z is -y: Rx(90 degrees).
+  // The tool's axes from those of HD's stylus: x is x, y (the shaft) is z, z is -y: Rx(90 degrees).
   const auto orientation =
       orientation_of({m[0], m[1], m[2]}, {m[8], m[9], m[10]}, {-m[4], -m[5], -m[6]});
   if (!orientation) return false;
@@ -210,7 +210,7 @@ bool HdArm::read(ArmReading& reading) noexcept {
   reading.button1 = (buttons & 1) != 0;
   reading.button2 = (buttons & 2) != 0;
   reading.parked = is_out == 0;
-  // The first frames may have an inkwell's switch that was never read.
+  // In the first frames the inkwell switch may not have been read yet.
   reading.homed = clean_ >= kCleanFrames && follow_calibration(reading.parked);
   return true;
 }
@@ -220,7 +220,7 @@ bool HdArm::follow_calibration(bool is_docked) noexcept {
   if (calibrated_look_-- > 0) return is_calibrated_;
   const std::uint32_t state = calls_.check_calibration();
   is_calibrated_ = state == kCalibrationOk;
-  // Not yet calibrated, its first good frame counts at once: only an update takes its time.
+  // Checks in every frame until it is calibrated; after an update or a success less often.
   calibrated_look_ = is_calibrated_ ? kLookFrames : 0;
   const bool by_inkwell = (calibration_style_ & kStyleInkwell) != 0;
   const bool by_itself = (calibration_style_ & kStyleAuto) != 0;
@@ -287,7 +287,7 @@ std::string HdArm::text_of(std::uint32_t failure) const {
     default:
       break;
   }
-  // In our own words: the library that has failed is not called for them.
+  // The texts are kerf's: a library that has failed is not called.
   const auto* known = std::ranges::find(kHdErrors, failure, &ErrorName::code);
   char code[16];
   std::snprintf(code, sizeof code, "error %x", failure);

@@ -49,30 +49,31 @@ struct Calls {
 
 }  // namespace hd
 
-/// A Touch, Touch X or Omni by libHD.so.
+/// A Touch, Touch X or Omni, through libHD.so.
 ///
 /// One asynchronous callback of the highest priority runs a frame in each tick of the library's
-/// servo thread; it never blocks. HD's axes are kerf's; its +z of the stylus is the shaft of the
-/// tool. The position is that of the gimbal's centre, where the force acts.
+/// servo thread; it never blocks. HD's axes are kerf's; +z of the stylus is the shaft of the tool.
+/// The position is the centre of the gimbal, where the force acts.
 ///
-/// A frame's reading is used if the kCleanFrames frames before it had no error: the first frames
-/// after the start of the scheduler do not hold readings of the arm. Calibration is checked and
-/// updated in the frames as well. The notes of a public client report that on a Touch it did not
-/// complete outside the servo thread; kerf has not tested that. Inside a frame the scheduler, which
-/// an inkwell calibration needs, always runs, and the arm counts as not homed until it is done.
+/// A reading is used if the last kCleanFrames frames before it were valid, because the first frames
+/// after the start of the scheduler do not contain readings of the arm. Frames also check and
+/// update the calibration: by the notes of a public client, calibration of a Touch did not complete
+/// outside the servo thread, which kerf has not tested. An inkwell calibration needs a running
+/// scheduler, which a frame always has. Until the calibration is complete, the arm counts as not
+/// homed.
 ///
 /// HD has one error stack for all threads. The main thread reads it until `start` has checked its
-/// calls; from then on only the servo thread does. Callbacks that run earlier return at once.
+/// calls, then only the servo thread. Callbacks before that return at once.
 class HdArm final : public VendorArm {
  public:
   struct Options {
     std::string library;      ///< empty: libHD.so
-    bool has_name = true;     ///< else the library chooses
+    bool has_name = true;     ///< false: the library chooses a device
     std::string device_name;  ///< as in the vendor's set-up
     int rate_hz = 0;          ///< 0: the library's own
   };
   static constexpr int kCleanFrames = 3;
-  /// Frames with errors in a row that make a failure.
+  /// Consecutive frames with an error or an invalid orientation that count as a failure.
   static constexpr int kMostUnclean = 1000;
 
   /// Loads the library. Throws ArmError.
@@ -87,12 +88,12 @@ class HdArm final : public VendorArm {
   [[nodiscard]] std::vector<std::pair<std::string, std::uint64_t>> errors() const override;
   [[nodiscard]] const char* notice() const noexcept override { return notice_.load(); }
 
-  /// One tick of the servo thread. Returns the word that goes on or ends the callback.
+  /// One tick of the servo thread. Returns HD's code to continue or to end the callback.
   [[nodiscard]] std::uint32_t frame() noexcept;
 
  private:
-  /// Takes all errors from the library's stack and counts them; returns the newest that spoils a
-  /// frame, or 0. One that means a lost device fails the exchange.
+  /// Takes all errors from the library's stack and counts them. Returns the newest one that makes a
+  /// frame invalid, or 0. An error that means a lost device fails the exchange.
   std::uint32_t pop_errors() noexcept;
   void require_no_error(const char* call);
   [[nodiscard]] bool read(ArmReading& reading) noexcept;
@@ -109,15 +110,15 @@ class HdArm final : public VendorArm {
   unsigned long scheduled_ = 0;
   bool is_open_ = false, is_started_ = false, is_scheduled_ = false;
   std::uint32_t calibration_style_ = 0;
-  std::atomic<bool> owns_errors_{false};  ///< the stack of errors is the servo thread's
-  std::atomic<bool> has_ended_{false};    ///< the callback
+  std::atomic<bool> owns_errors_{false};  ///< the servo thread reads the error stack
+  std::atomic<bool> has_ended_{false};    ///< of the callback
   std::atomic<const char*> notice_{""};
-  // Of the servo thread, until `stop`.
+  // Used by the servo thread only, until `stop`.
   int clean_ = 0, unclean_ = 0;
   std::uint32_t unclean_code_ = 0;
   int calibrated_look_ = 0;
   bool is_calibrated_ = false;
-  std::array<std::uint64_t, 24> error_counts_{};  ///< by kHdErrors, the last one: any other
+  std::array<std::uint64_t, 24> error_counts_{};  ///< per entry of kHdErrors; then any other
 };
 
 }  // namespace kerf

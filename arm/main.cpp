@@ -11,13 +11,12 @@
 int main(int argc, char** argv) {
   const int code = kerf::run_program("kerf-arm", [&] {
     const std::atomic<bool>& stop = kerf::catch_stop_and_pause_signals();
-    // A device that is not closed in order may have to be unplugged, so QUIT asks for the end like
-    // the others. A library that does not return then is ended by the overseer.
+    // A device that is not closed properly may have to be unplugged, so QUIT requests the end as
+    // the other signals do. If the library then does not return, the overseer ends the program.
     std::signal(SIGQUIT, [](int) { static_cast<void>(std::raise(SIGTERM)); });
     return kerf::run_arm(argc, argv, stop, std::cout, std::cerr);
   });
-  // The vendor's library is loaded and may have threads: what it would do at an exit can only
-  // crash.
+  // The vendor's library is loaded and may have running threads, so its exit handlers could crash.
   std::cout.flush();
   _exit(code);
 }

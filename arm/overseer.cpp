@@ -17,14 +17,14 @@
 namespace kerf {
 namespace {
 
-// For the handler.
+// For the signal handler.
 std::atomic<ArmPageAdapter*> page_of_crash{nullptr};
 const char* program_of_crash = "";
 
 constexpr std::string_view kWayOut =
     "; unplug the device, plug it in again, and see whether the vendor's own program runs";
 
-/// A line that a handler may put together: no memory is taken.
+/// A line of text that a signal handler may compose: it does not allocate.
 class Line {
  public:
   Line& operator<<(std::string_view text) noexcept {
@@ -52,8 +52,8 @@ void print(const char* program, const char* reason, const char* text) noexcept {
   }
 }
 
-/// The device keeps its last force, unless its own watchdog ends that: no call of a library that
-/// has crashed, or is at its end, is safe.
+/// Does not stop the device, because no call of a library that has crashed or exits is safe. The
+/// device keeps its last force unless its own watchdog ends that.
 [[noreturn]] void end_by_the_library(const Line& line) {
   if (ArmPageAdapter* page = page_of_crash) page->set_state(ArmState::failed, line.text());
   print(program_of_crash, "", line.text());
@@ -68,7 +68,7 @@ void on_crash(int number) {
   end_by_the_library(line);
 }
 
-/// kerf-arm itself ends by _exit().
+/// Only a library can cause this: kerf-arm itself ends by _exit().
 void on_exit_of_library(int code, void*) {
   if (page_of_crash == nullptr) return;
   Line line;
@@ -83,8 +83,8 @@ void on_quick_exit_of_library() {
   end_by_the_library(line);
 }
 
-/// Handlers run in the opposite order: called again after the library has added its own, so that
-/// those do not run before the line is out.
+/// Exit handlers run in reverse order. So this is called again after the library may have added its
+/// own, to print the line before those run.
 void catch_exits() noexcept {
   static_cast<void>(on_exit(on_exit_of_library, nullptr));
   static_cast<void>(std::at_quick_exit(on_quick_exit_of_library));
@@ -118,7 +118,7 @@ Overseer::~Overseer() {
 }
 
 void Overseer::give_crash_stack() noexcept {
-  constexpr std::size_t kStackBytes = 32768;  // a signal's frame has up to 11 KiB of registers
+  constexpr std::size_t kStackBytes = 32768;  // a signal frame has up to 11 KiB of registers
   alignas(16) static std::array<std::array<std::byte, kStackBytes>, kMostCrashStacks> stacks;
   static std::atomic<int> taken{0};
   thread_local bool has_looked = false;
@@ -147,7 +147,7 @@ void Overseer::set_reason(const std::string& reason) {
 
 void Overseer::watch() {
   const BlockStopSignals to_the_main_thread;
-  int asked_ms = 0;  // since a signal has asked for the end
+  int asked_ms = 0;  // since a signal requested the end
   while (!stop_) {
     sleep_until_ns(monotonic_ns() + kLookMs * std::int64_t{1'000'000});
     const int ms = (looks_.fetch_add(1) + 1) * kLookMs;
@@ -178,7 +178,7 @@ void Overseer::look_at_frames() {
   const std::uint64_t frames = exchange_.frames();
   still_looks_ = frames == last_frames_ ? still_looks_ + 1 : 0;
   last_frames_ = frames;
-  // Before the first frame the main thread waits.
+  // The main thread watches the time to the first frame.
   if (frames == 0 || exchange_.finished() || still_looks_ * kLookMs < limits_.stall_ms) return;
   exchange_.fail(ArmExchange::kStalled);
   page_.set_state(ArmState::failed, "the vendor's library has stopped its frames");

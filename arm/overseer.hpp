@@ -11,15 +11,19 @@
 
 namespace kerf {
 
-/// Watches, from a thread of its own, over a vendor's library that may hang or crash.
+/// Watches a vendor's library, which may hang or crash, from a separate thread.
 ///
-/// Time is counted in looks of this thread, kLookMs apart: a machine that stands still has no
-/// library that hangs. A call that opens or closes the device and does not return ends the program
-/// (after kMostClosingMs if a signal has asked for the end). So does a crash in any thread, and a
-/// library that calls exit() or quick_exit(): one line on standard error, exit code 2, and the page
-/// says `failed`. Frames that stop fail the exchange, and the program goes on to close the device.
-/// Out of reach: _exit() in the library, and a stack overflow in a thread without
-/// `give_crash_stack`, which end the program without a line.
+/// Ends the program with one line on standard error, exit code 2 and the page's state `failed` if
+///
+///     the device does not open within `opening_ms`, or kMostClosingMs after a signal to end
+///     the device does not close within kMostClosingMs
+///     any thread crashes
+///     the library calls exit() or quick_exit()
+///
+/// If frames stop for `stall_ms`, fails the exchange; the main thread then closes the device.
+/// Time is counted in periods of this thread, kLookMs long, so that a machine that was
+/// suspended is not taken for a library that hangs. Not caught: _exit() in the library, and a stack
+/// overflow in a thread without `give_crash_stack`; both end the program without a line.
 ///
 /// At most one per process. The page and the exchange outlive it.
 class Overseer {
@@ -32,24 +36,24 @@ class Overseer {
     int stall_ms = 100;
   };
 
-  /// `program`: what each line begins with.
+  /// `program`: the first word of each line.
   Overseer(const char* program, ArmPageAdapter& page, ArmExchange& exchange, Limits limits);
   ~Overseer();
   Overseer(const Overseer&) = delete;
   Overseer& operator=(const Overseer&) = delete;
 
-  /// Gives the calling thread a stack for the handler of a crash, so that it runs after a stack
-  /// overflow too, unless the thread has one. The constructor's thread has it; any other calls this
-  /// once or in each frame: only the first call of a thread does anything. Of kMostCrashStacks
-  /// threads in all. Neither allocates nor throws.
+  /// Gives the calling thread an alternate stack for the crash handler, which then runs after a
+  /// stack overflow too. Does nothing if the thread has one, or after its first call, so it may be
+  /// called in each frame. The constructor calls it for its own thread. At most kMostCrashStacks
+  /// threads get one. Neither allocates nor throws.
   static void give_crash_stack() noexcept;
   static constexpr int kMostCrashStacks = 8;
 
-  /// What the main thread is about to do. `frames`: the vendor's thread runs; `over`: the library
-  /// is not called any more.
+  /// What the main thread does next. `frames`: the vendor's thread runs; `over`: the library is no
+  /// longer called.
   enum class Phase : std::uint8_t { opening, frames, closing, over };
   void enter(Phase phase) noexcept;
-  /// What the line about a hang while closing says first: the failure that led there.
+  /// The failure that led to closing; the line about a hang while closing begins with it.
   void set_reason(const std::string& reason);
 
  private:
@@ -61,9 +65,9 @@ class Overseer {
   ArmPageAdapter& page_;
   ArmExchange& exchange_;
   Limits limits_;
-  std::string reason_;  ///< before the phase `closing`
+  std::string reason_;  ///< set before the phase `closing`
   std::atomic<Phase> phase_{Phase::opening};
-  std::atomic<int> looks_{0};  ///< in this phase
+  std::atomic<int> looks_{0};  ///< periods in this phase
   std::uint64_t last_frames_ = 0;
   int still_looks_ = 0;
   std::atomic<bool> stop_{false};

@@ -26,7 +26,7 @@ namespace kerf {
 namespace {
 
 constexpr const char* kProgram = "kerf-arm";
-constexpr int kUsualHz = 1000;       // of HD's scheduler
+constexpr int kUsualHz = 1000;       // of the scheduler of HD
 constexpr int kUsualOmegaHz = 4000;  // of Force Dimension's devices
 
 void declare(Arguments& app, ArmOptions& o) {
@@ -129,7 +129,7 @@ Json times_of(const Histogram& times) {
           {"max", times.max_us()}};
 }
 
-/// Once the frames have ended.
+/// Call after the frames have ended.
 Json report_of(const ArmOptions& o, const VendorArm& arm, const ArmExchange& exchange,
                double seconds, const std::string& failure) {
   Json facts = Json::Members{};
@@ -161,7 +161,7 @@ void nap() {
   sleep_until_ns(monotonic_ns() + kNapNs);
 }
 
-/// What the parts of a run share.
+/// The parts of a run.
 struct Run {
   const ArmOptions& options;
   const std::atomic<bool>& stop;
@@ -171,7 +171,7 @@ struct Run {
   VendorArm& arm;
 };
 
-/// Until the first report, a failure, or the end of patience.
+/// Waits for the first report, a failure or `stop`; after `opening_s` fails the exchange.
 void await_first_report(const Run& run) {
   const std::int64_t give_up_ns =
       monotonic_ns() + std::llround(run.options.opening_s * kNsPerSecond);
@@ -184,7 +184,8 @@ void await_first_report(const Run& run) {
   }
 }
 
-/// Frames run on their own; this tells what the user has to do. Returns at the end.
+/// Prints what the user has to do while the frames run. Returns on a failure, `stop` or the end of
+/// `--seconds`.
 void serve(const Run& run, std::int64_t since_ns) {
   const char* told = "";
   const auto is_over = [&] {
@@ -201,7 +202,8 @@ void serve(const Run& run, std::int64_t since_ns) {
   }
 }
 
-/// Zero force, then the end of the frames and of the device. Returns the text of a failure.
+/// Sets zero force, then ends the frames and closes the device. Returns the text of a failure, or
+/// "".
 std::string let_go(const Run& run, Overseer& overseer) {
   run.exchange.let_go();
   const std::uint32_t code = run.exchange.failure();
@@ -209,7 +211,7 @@ std::string let_go(const Run& run, Overseer& overseer) {
   overseer.set_reason(failure);
   run.page.set_state(failure.empty() ? ArmState::closing : ArmState::failed,
                      failure.empty() ? "kerf-arm is asked to end" : failure);
-  constexpr int kNaps = 40;  // ten times as long as the frames of zero force take
+  constexpr int kNaps = 40;  // ten times as long as the frames of zero force normally take
   for (int i = 0; i < kNaps && !run.exchange.finished(); ++i) nap();
   overseer.enter(Overseer::Phase::closing);
   run.arm.stop();
@@ -218,7 +220,7 @@ std::string let_go(const Run& run, Overseer& overseer) {
   return failure;
 }
 
-/// Tries the priority on a thread of its own, since a trial takes it.
+/// Tries the priority on a separate thread, because the trial changes it.
 void warn_of_priority(const ArmOptions& o, std::ostream& err) {
   if (o.personality != Personality::omega || o.priority == 0) return;
   int error = 0;

@@ -14,14 +14,14 @@ namespace kerf {
 struct ArmOptions {
   std::string device;
   Personality personality{};
-  std::string name;     ///< empty: the word of the device
-  std::string library;  ///< empty: by the loader
+  std::string name;     ///< of the page; empty: that of the device
+  std::string library;  ///< empty: the loader searches
   std::string vendor_name = "Default Device";
   bool no_vendor_name = false;
   int index = -1;
   int rate_hz = 0;  ///< 0: touch: the library's own; omega: 4000
   bool auto_init = false;
-  std::optional<double> peak_n;  ///< omega: below the device's own
+  std::optional<double> peak_n;  ///< omega: limit below the device's own
   int priority = 81;
   int cpu = -1;
   int stall_ms = 100;
@@ -30,12 +30,12 @@ struct ArmOptions {
   std::string report;
 };
 
-/// `kerf-arm`: opens a device by its vendor's library and exchanges poses and forces with a
-/// controller by a shared page, until `stop`. Outlives its controllers: without one the force is
-/// zero, and the device stays open.
+/// `kerf-arm`: opens a device through its vendor's library and exchanges poses and forces with a
+/// controller through a shared page, until `stop`. While there is no controller, the force is zero
+/// and the device stays open.
 ///
-/// Returns the exit code: 0 ended as asked, 2 bad input, or a library or device that failed, with
-/// one line on `err`.
+/// Returns the exit code: 0 after a requested end; 2, with one line on `err`, after bad input or a
+/// failure of the library or device.
 [[nodiscard]] int run_arm(int argc, const char* const* argv, const std::atomic<bool>& stop,
                           std::ostream& out, std::ostream& err);
 

@@ -25,7 +25,7 @@ VendorLibrary::VendorLibrary(const std::string& path, std::initializer_list<cons
   constexpr int kMode = RTLD_LAZY | RTLD_GLOBAL;
   std::string error;
   if (!path.empty()) {
-    // Without a slash the loader would search for it.
+    // The loader searches for a name without a slash instead of opening it.
     const std::string file = path.find('/') == std::string::npos ? "./" + path : path;
     handle_ = dlopen(file.c_str(), kMode);
     if (handle_ == nullptr) error = loader_error();
@@ -51,7 +51,7 @@ void* VendorLibrary::address_of(const char* symbol) {
 
 void VendorLibrary::require_all() const {
   if (missing_.empty()) return;
-  constexpr std::size_t kMost = 8;  // of another library altogether, all are missing
+  constexpr std::size_t kMost = 8;  // in a different library all are missing
   std::string list;
   for (std::size_t i = 0; i < std::min(missing_.size(), kMost); ++i) {
     list += (i > 0 ? ", " : "") + missing_[i];

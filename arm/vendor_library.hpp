@@ -13,20 +13,20 @@ namespace kerf {
 /// It stays loaded until the process ends, because its own threads may still run.
 class VendorLibrary {
  public:
-  /// Opens `path`; if it is empty, the first of `names` that the loader finds: in LD_LIBRARY_PATH,
-  /// the cache of ldconfig, /lib and /usr/lib. With RTLD_LAZY | RTLD_GLOBAL, because the programs
-  /// with which the vendors' libraries are known to work open them so. Throws ArmError, which names
-  /// `product` as what to install.
+  /// Opens `path`; if it is empty, the first of `names` that the loader finds in LD_LIBRARY_PATH,
+  /// the cache of ldconfig, /lib or /usr/lib. Uses RTLD_LAZY | RTLD_GLOBAL, as the programs with
+  /// which the vendors' libraries are known to work. If that fails, throws ArmError, which asks the
+  /// user to install `product`.
   VendorLibrary(const std::string& path, std::initializer_list<const char*> names,
                 const char* product);
 
-  /// Sets `function` to the symbol's address. A missing symbol gives null and is kept for
-  /// `require_all`.
+  /// Sets `function` to the address of the symbol, or to null if it is missing; `require_all` then
+  /// reports it.
   template <class Function>
   void find(const char* symbol, Function*& function) {
     function = reinterpret_cast<Function*>(address_of(symbol));
   }
-  /// Throws ArmError with the names of all symbols that `find` has missed.
+  /// Throws ArmError with the names of symbols that `find` did not find: eight, then their number.
   void require_all() const;
 
   /// The file that the loader opened.
