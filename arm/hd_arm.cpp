@@ -180,6 +180,7 @@ std::uint32_t HdArm::frame() noexcept {
   if (error == 0 && is_read) {
     clean_ = std::min(clean_ + 1, kCleanFrames);
     unclean_ = 0;
+    unclean_code_ = 0;
     return kContinue;
   }
   clean_ = 0;

@@ -75,7 +75,9 @@ namespace {
                                  std::uint64_t most_bytes) {
   return {.session_id = hello.head.session,
           .config_hash = hello.head.config_hash,
-          .start_ns = is_lockstep(hello) ? 0 : clock.local(hello.head.start_ns),
+          // 0 would say lock-step. A run may be older than this machine, whose clock began later.
+          .start_ns =
+              is_lockstep(hello) ? 0 : std::max<std::uint64_t>(clock.local(hello.head.start_ns), 1),
           .tick_ns = hello.head.tick_ns,
           .scene_bytes = hello.head.scene_bytes,
           .build_id = hello.head.build_id,

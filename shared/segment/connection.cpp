@@ -181,16 +181,25 @@ constexpr timeval kAnswerTimeout{2, 0};  // the server's thread is never busy fo
   return segment;
 }
 
+/// For the present `errno`.
+[[nodiscard]] SegmentError no_answer() {
+  return SegmentError(std::string("command: no answer of the controller: ") +
+                      system_message(errno) + "; is it still running?");
+}
+
 }  // namespace
 
 SegmentConnection::SegmentConnection(int socket, SegmentReader reader) noexcept
     : socket_(socket), reader_(std::move(reader)) {}
 
 SegmentConnection::SegmentConnection(SegmentConnection&& other) noexcept
-    : socket_(std::exchange(other.socket_, -1)), reader_(std::move(other.reader_)) {}
+    : socket_(std::exchange(other.socket_, -1)),
+      awaited_(other.awaited_),
+      reader_(std::move(other.reader_)) {}
 
 SegmentConnection& SegmentConnection::operator=(SegmentConnection&& other) noexcept {
   std::swap(socket_, other.socket_);
+  std::swap(awaited_, other.awaited_);
   std::swap(reader_, other.reader_);
   return *this;
 }
@@ -207,13 +216,21 @@ bool SegmentConnection::alive() const noexcept {
 }
 
 Reply SegmentConnection::send(const Command& command) {
-  Reply reply;
+  while (awaited_ > 0) receive();
   if (::send(socket_, &command, sizeof command, MSG_NOSIGNAL) !=
-          static_cast<ssize_t>(sizeof command) ||
-      recv(socket_, &reply, sizeof reply, 0) != static_cast<ssize_t>(sizeof reply)) {
-    throw SegmentError(std::string("command: no answer of the controller: ") +
-                       system_message(errno) + "; is it still running?");
+      static_cast<ssize_t>(sizeof command)) {
+    throw no_answer();
   }
+  ++awaited_;
+  return receive();
+}
+
+Reply SegmentConnection::receive() {
+  Reply reply;
+  if (recv(socket_, &reply, sizeof reply, 0) != static_cast<ssize_t>(sizeof reply)) {
+    throw no_answer();
+  }
+  --awaited_;
   return reply;
 }
 

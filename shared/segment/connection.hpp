@@ -35,11 +35,16 @@ class SegmentConnection {
   [[nodiscard]] bool alive() const noexcept;
 
   /// Waits at most 2 s for the reply of the server's thread (not of the servo). Throws
-  /// `SegmentError` if the controller has gone or does not reply.
+  /// `SegmentError` if the controller has gone or does not reply. After that, the next call waits
+  /// for the late reply first, again at most 2 s, and throws without sending if none comes.
   Reply send(const Command& command);
 
  private:
+  /// Receives the oldest reply that has not come.
+  Reply receive();
+
   int socket_ = -1;
+  int awaited_ = 0;  ///< replies that have not come: each command has one, in order
   SegmentReader reader_;
 };
 

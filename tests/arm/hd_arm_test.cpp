@@ -201,6 +201,13 @@ TEST_CASE("hd: a device that never gives a clean frame is a failure with its err
   CHECK(bench.arm.text_of(0x401).find("401") != std::string::npos);
 }
 
+TEST_CASE("hd: an error that is over is not the reason for a later failure") {
+  Bench bench("error=104@10");
+  bench.library.tick(20);
+  for (int i = 0; i < HdArm::kMostUnclean; ++i) bench.at({}, {});
+  CHECK(bench.link.exchange.failure() == kerf::ArmExchange::kUnreadable);
+}
+
 TEST_CASE("hd: calibration is asked for in the inkwell alone, in the servo thread") {
   Bench bench("needs_update");
   bench.library.tick(kWarmUp);  // in the inkwell, by readings that are not to be trusted yet

@@ -246,6 +246,16 @@ TEST_CASE("clocks that differ by hours: local readers see local times") {
   }
 }
 
+TEST_CASE("a run that is older than this machine is no run in lock-step") {
+  FarEnd far;
+  Sender sender(7);
+  sender.hello.server_ns = far.now_ns + 30 * kHourNs;
+  sender.hello.start_ns = 1;
+  far.greet(sender);
+  far.apply(sender.whole_pass(3));
+  CHECK(connect_segment("far").reader().info().start_ns == 1);
+}
+
 TEST_CASE("a run in lock-step has no clock: its ticks keep their times on the far side") {
   FarEnd far;
   Sender sender(7);

@@ -4,6 +4,7 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <future>
 #include <limits>
 #include <string>
 
@@ -185,6 +186,27 @@ TEST_CASE("commands arrive in order; the 65th that nobody takes gets BUSY, later
   }
   REQUIRE(server.take_command());
   CHECK(!server.take_command());
+}
+
+TEST_CASE("a reply that comes too late is not taken for that of the next command") {
+  const RuntimeFolder folder;
+  const NoiseVolume volume({8, 8, 8});
+  const SegmentWriter writer = SegmentWriter::create(spec_of(volume));
+  std::promise<void> go_on;
+  // Of a server that hangs at the first command: it refuses the first and accepts all others.
+  const SegmentServer server("demo", writer.fd(), 1, [&](const Command& command) -> Reply {
+    if (command.argument != 0) return {ReplyStatus::accepted, command.argument};
+    go_on.get_future().wait();
+    return {ReplyStatus::refused, 0};
+  });
+  SegmentConnection connection = connect_segment("demo");
+  CHECK_THROWS_AS(connection.send(select(0)), SegmentError);
+  SegmentConnection moved = std::move(connection);
+  go_on.set_value();
+  const Reply second = moved.send(select(7));
+  CHECK(second.status == ReplyStatus::accepted);
+  CHECK(second.index == 7);
+  CHECK(moved.send(select(8)).index == 8);
 }
 
 TEST_CASE("commands outside the limits are refused before they reach the servo") {
