@@ -5,7 +5,7 @@ the check or test named there notices. Nothing in the tree is touched.
 
     .ci/mutate.py LIST [PATTERN] [--jobs N] [--again]
         LIST: safety, kernels or includes; PATTERN picks the mutations whose line matches. One line for each mutation: what
-        caught it, or SURVIVED. A run that is stopped goes on where it was, unless a source changed; --again starts anew.
+        caught it, SURVIVED, or the instruction set that this processor lacks. A run that is stopped goes on where it was, unless a source changed; --again starts anew.
     .ci/mutate.py --check
         only whether each text stands exactly once in its file, each test case in the folder of its program, and each safety
         rule in docs/safety.md
@@ -21,6 +21,7 @@ import concurrent.futures
 import contextlib
 import dataclasses
 import fnmatch
+import functools
 import hashlib
 import os
 import pathlib
@@ -39,6 +40,9 @@ BUILD = ROOT / "build/release"
 LISTS = ("safety", "kernels", "includes", "contact")
 
 
+# What controller/kernel/kernel_set.cpp asks of the processor for each set.
+SETS = {"avx2": {"avx2"}, "avx512": {"avx512f", "avx512bw", "avx512vl", "avx512dq", "avx512_vnni"}}
+
 RUNNING = set()  # processes, which end with this one
 
 
@@ -53,6 +57,11 @@ class Mutation:
     edits: list  # of (file, old, new); an empty `old` adds `new` as the last line, to a new file too
     catcher: str
     object: str = ""  # regular expression: which object of the release build holds what is broken
+
+    def lacking(self):
+        """The instruction set of the changed file, if this processor lacks it: its tests then cannot notice."""
+        stem = pathlib.Path(self.edits[0][0]).stem
+        return stem if stem in SETS and not SETS[stem] <= processor_flags() else ""
 
     def contents(self, root):
         """The changed files: path and new content."""
@@ -152,6 +161,13 @@ def end(process):
 
 def output_of(*command):
     return subprocess.run(command, cwd=ROOT, check=True, capture_output=True, text=True).stdout
+
+
+@functools.cache
+def processor_flags():
+    """As Linux names them; none on another architecture."""
+    found = re.search(r"^flags\s*:(.*)", pathlib.Path("/proc/cpuinfo").read_text(), re.MULTILINE)
+    return set(found[1].split()) if found else set()
 
 
 def tracked():
@@ -372,12 +388,17 @@ def judge(name, mutations, jobs, again):
     if again:
         shutil.rmtree(done, ignore_errors=True)
     done.mkdir(parents=True, exist_ok=True)
-    survived, wrong = [], []
+    survived, unseen, wrong = [], [], []
 
     def tell(mutation, caught):
-        if not caught:
+        verdict = caught
+        if not caught and mutation.lacking():
+            unseen.append(mutation.name)
+            verdict = f"not seen: this processor has no {mutation.lacking()}"
+        elif not caught:
             survived.append(mutation.name)
-        print(f"{mutation.name:<30} {mutation.catcher.split(': ')[0]:<42} {caught or 'SURVIVED'}", flush=True)
+            verdict = "SURVIVED"
+        print(f"{mutation.name:<30} {mutation.catcher.split(': ')[0]:<42} {verdict}", flush=True)
 
     for mutation in mutations:
         if (done / mutation.key()).exists():
@@ -403,7 +424,8 @@ def judge(name, mutations, jobs, again):
                 tell(futures[future], caught and caught[0])
     if wrong:
         raise Wrong("\nmutate: ".join(sorted(wrong)))
-    print(f"mutate: {name}: {len(mutations)} mutations, {len(survived)} survived")
+    print(f"mutate: {name}: {len(mutations)} mutations, {len(survived)} survived"
+          + (f", {len(unseen)} cannot be seen on this processor" if unseen else ""))
     return len(survived)
 
 
