@@ -52,10 +52,13 @@ from tick to tick, and stays within %s and %s degrees of the normal.
 GROUPS = [
     ("walls", "Walls", """\
 A hand makes random steps of 0.1 to 10 m/s at a tilted wall. The cylinder and the bur of `scenes/fluted_bur.toml` are
-also rotated at random. There is no supervisor."""),
+also rotated at random. There is no supervisor. If a tick has no query left for a push, the tool may stay 0.05 voxels deep
+by its samples (`kWedged` of the sweep). A mesh stands out a little between its samples, so in a few of a million ticks a
+bur can sink deeper than 0.05 voxels."""),
     ("air", "In air", """\
 A tool moves to and fro along tilted walls, so near and so fast that the hand moves 5 to 80 voxels in a
-tick. `--check` prints the speed up to which a scene is free of drag at any distance (docs/theory.md 4.2)."""),
+tick. `--check` prints the speed up to which a scene is free of drag at any distance (docs/theory.md 4.2). The sweep tries
+no displacement below 0.004 voxels, so a spring of at most this length can stay: 0.03 mN at 0.02 mm and 0.4 N/mm."""),
     ("rests", "Where a ball comes to rest", """\
 Offsets from the ideal solid at random tilts. On edges from the volume's own iso-surface, since trilinear density
 has no sharp edge."""),

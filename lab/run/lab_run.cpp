@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "controller/kernel/kernel_set.hpp"
 #include "hil/hil_error.hpp"
 #include "shared/posix/atomic_file.hpp"
 #include "shared/posix/program.hpp"
@@ -44,7 +45,8 @@ int pin_lab(int core) {
 
 std::string lab_provenance() {
   return today() + ", " + processor_name() + ", " + kCompiler +
-         " " KERF_FLAGS " (kernels of an instruction set always -O3).";
+         " " KERF_FLAGS " (kernels of an instruction set always -O3), fastest kernels: " +
+         (*kernel_sets())->name + ".";
 }
 
 std::string page_number(double value) {

@@ -40,7 +40,8 @@ template <class Before, class Tick>
 /// last that it may use. Returns the core. Throws `HilError`.
 int pin_lab(int core);
 
-/// Day, processor, compiler and its flags of a run, for the page that it writes. One line.
+/// Day, processor, compiler with its flags, and fastest kernels of a run, for the page that it
+/// writes. One line.
 [[nodiscard]] std::string lab_provenance();
 
 /// Three digits, or all before the point: how pages show their figures.
