@@ -111,8 +111,9 @@ struct LoopSignals {
   std::array<std::atomic<Waiting>, kMaxArms> waiting{Waiting::report, Waiting::report};
 };
 
-/// First step of a tick: restarts the force if the servo was stopped, detected by its watchdog, or
-/// by the clock if the watchdog was stopped too. Returns the name of the detector, or nullptr.
+/// Before the step of a tick, if the servo has stood still: fades the force in again from 0. Its
+/// watchdog detects that, or the clock if the watchdog stood still too. Returns the name of the
+/// detector, or nullptr.
 inline const char* recover(LoopSignals& signals, bool stood_still, Servo& servo) noexcept {
   const bool watchdog_tripped = signals.stalled.exchange(false, std::memory_order_relaxed);
   if (!watchdog_tripped && !stood_still) return nullptr;

@@ -485,7 +485,7 @@ bool apply_command(Arms<N> arms, const ServoCommand& command) noexcept {
   return false;
 }
 
-// The three bundles, compiled once.
+// For both bundles of number types, compiled once.
 #define KERF_INSTANTIATE(N)                                                              \
   template void servo_step<N>(Arms<N>, std::span<const DeviceReport>,                    \
                               std::span<ServoOutput>) noexcept;                          \
