@@ -136,8 +136,8 @@ inline void send_tick(std::span<const ServoOutput> outputs, const LoopSignals& s
 /// the calling thread until a limit is met or a stop is requested; the motors are off when it
 /// returns. A device that goes away is a fault of its arm alone, and ends the run if no other is
 /// left. `devices` has one for each arm of the servo.
-EndReason run_servo(TickSource& clock, const Devices& devices, Servo& servo, Publisher& eyes,
-                    SegmentServer& commands, const LoopLimits& limits, LoopSignals& signals,
+EndReason run_servo(TickSource& clock, const Devices& devices, Servo& servo, Publisher& publisher,
+                    SegmentServer& server, const LoopLimits& limits, LoopSignals& signals,
                     RunRecord& record) noexcept;
 
 inline constexpr std::chrono::milliseconds kWatchdogPeriod{5};
