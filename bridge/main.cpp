@@ -16,7 +16,7 @@ namespace {
 using namespace kerf;
 using namespace kerf::bridge;
 
-/// The program's own certificate.
+/// Adds the options of the program's own certificate.
 template <class Options>
 void add_certificate(Arguments& command, Options& options, const char* meaning) {
   Option certificate = command.option("--cert", options.certificate, meaning).shown_as("FILE");
@@ -78,7 +78,7 @@ void add_join(CommandLine& app, JoinOptions& options) {
       .shows_default();
 }
 
-/// What earlier versions had, with its successor.
+/// Refuses a command and an option of earlier versions; the message names what replaces them.
 void refuse_former(std::span<const char* const> words) {
   if (words.size() > 1 && std::string_view(words[1]) == "make-identity") {
     throw BridgeError("make-identity is gone; make PEM files with openssl: docs/second-machine.md");

@@ -18,7 +18,7 @@
 namespace kerf {
 namespace {
 
-// The one list of figures: text, JSON and what is read back all come from it.
+// The only list of figures: text, JSON and the reader all use it.
 template <class Summary, class Visit>
 void for_each_figure(Summary& s, Visit visit) {
   visit("rows", s.rows);
@@ -108,7 +108,7 @@ Manifest read_manifest(const std::filesystem::path& folder) {
   }
   std::error_code fault;
   std::ifstream file;
-  if (std::filesystem::is_regular_file(path, fault)) file.open(path);  // a pipe would be waited for
+  if (std::filesystem::is_regular_file(path, fault)) file.open(path);  // opening a pipe would block
   if (!file.is_open()) {
     throw RecordError(path.string() + ": cannot be read; " + way_to_recording(folder));
   }

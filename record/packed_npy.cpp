@@ -33,7 +33,7 @@ void PackedNpyReader::Close::operator()(void* file) const noexcept {
 
 PackedNpyReader::PackedNpyReader(const std::filesystem::path& path, std::string_view header) {
   std::error_code fault;
-  if (!std::filesystem::is_regular_file(path, fault)) return;  // a pipe would be waited for
+  if (!std::filesystem::is_regular_file(path, fault)) return;  // opening a pipe would block
   file_.reset(gzopen(path.c_str(), "rb"));
   std::string found(header.size(), '\0');
   if (!read(std::as_writable_bytes(std::span(found))) || found != header) file_.reset();

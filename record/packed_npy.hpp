@@ -21,14 +21,14 @@ void write_packed_npy(AtomicFile& file, std::string_view header,
 /// Reads such a file piece by piece.
 class PackedNpyReader {
  public:
-  /// The file must be a regular one and begin with `header`: else nothing can be read.
+  /// If the file is not a regular one, or does not begin with `header`, `is_sound` is false.
   PackedNpyReader(const std::filesystem::path& path, std::string_view header);
 
-  /// Whether the file began so and was read well up to here.
+  /// Whether the file began with `header` and every read so far succeeded.
   [[nodiscard]] bool is_sound() const noexcept { return file_ != nullptr; }
   /// Fills `content` with the next bytes; false if there are not as many.
   [[nodiscard]] bool read(std::span<std::byte> content);
-  /// Whether the file ends here, sound to its last byte.
+  /// Whether the file ends here. False if its checksum is wrong; a missing one is not noticed.
   [[nodiscard]] bool at_end();
 
  private:

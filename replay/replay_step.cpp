@@ -12,7 +12,7 @@
 namespace kerf {
 namespace {
 
-/// What belongs to the machine of the run: so a replay's log has the time axis of the run.
+/// Copies what the machine of the run determined, so that a replay's log has the run's time axis.
 void copy_times(const TickRecord& from, TickRecord& to) noexcept {
   to.seq = from.seq;
   to.tick = from.tick;

@@ -17,7 +17,7 @@ WatchedRun::WatchedRun(RecordedRun& run, RecordedTicks& log, const Options& opti
       records_(*run.servo, run.volume_chain),
       compares_(options.compares) {
   tick_ = compared_ = before_log_ = run.earlier_ticks();
-  last_tick_ = std::min<Tick>(before_log_ + log.rows(), options.until);  // without a gap
+  last_tick_ = std::min<Tick>(before_log_ + log.rows(), options.until);  // if the log has no gap
   const auto& first = snapshots_[before_log_] = run.servo->keep();
   const auto fit =
       std::clamp<std::size_t>(options.snapshot_bytes / first->bytes(), 1, kMostSnapshots);

@@ -92,7 +92,7 @@ class WatchedRun {
   std::string cut_short_;
   std::array<ServoOutput, kMaxArms> outputs_{};
   Tick ticks_a_snapshot_ = 1;
-  std::map<Tick, std::unique_ptr<ServoSnapshot>> snapshots_;  ///< by the tick that was the last
+  std::map<Tick, std::unique_ptr<ServoSnapshot>> snapshots_;  ///< by the last tick that was stepped
 };
 
 }  // namespace kerf

@@ -47,7 +47,7 @@ class TabRun {
   [[nodiscard]] bool next(std::vector<std::byte>& message);
   bool take(std::span<const std::byte> message);
 
-  /// The hand follows a point of the world, mm, once its script has ended. `button` is the pedal.
+  /// Once its script has ended, the hand follows a point of the world, mm. `button` is the pedal.
   void lead(const std::array<double, 3>& world_mm, const std::array<double, 3>& orientation_rad,
             bool button) noexcept;
   /// The user is gone: the hand holds, then withdraws.

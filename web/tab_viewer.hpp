@@ -17,8 +17,8 @@
 
 namespace kerf::web {
 
-/// The page's side of a run in this tab: what a bridge would send to its one viewer, out of the
-/// run's own segment. Messages are those of bridge/wire/messages.hpp.
+/// Serves the page from the segment of the run in this tab, as `kerf-bridge` serves one viewer,
+/// with the same messages (bridge/wire/messages.hpp). One thread.
 class TabViewer {
  public:
   /// Takes a command; returns the reply.

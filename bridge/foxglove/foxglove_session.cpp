@@ -26,8 +26,8 @@ constexpr std::array<std::string_view, 10> kRefused{"advertise",
                                                     "fetchAsset",
                                                     "playbackControl"};
 
-/// Of a channel in messages: its place in `ros_channels` of the first arm, then of the second,
-/// from 1.
+/// The id of a channel in messages: 1 + its index among the channels of the first arm, then of the
+/// second.
 constexpr std::uint32_t id_of(std::size_t channel) noexcept {
   return static_cast<std::uint32_t>(channel + 1);
 }
@@ -51,7 +51,7 @@ void put(std::string& bytes, Number value) {
   bytes.append(reinterpret_cast<const char*>(&value), sizeof value);
 }
 
-/// `text`, cut where it is long, in quotes and on one line.
+/// At most the first 40 bytes of `text`, in quotes and on one line.
 std::string quoted_start(std::string_view text) {
   constexpr std::size_t kMost = 40;
   return '"' + escaped(text.substr(0, kMost)) + (text.size() > kMost ? "...\"" : "\"");
@@ -231,7 +231,7 @@ bool FoxgloveSession::next_of_tick(FoxgloveMessage& out) {
 bool FoxgloveSession::take_tick(std::int64_t now_ns, const SegmentReader& run) {
   const std::uint64_t head = run.state_head();
   if (std::ranges::none_of(subscriptions_, [](const auto& id) { return id.has_value(); })) {
-    index_ = head;  // who subscribes gets what comes from then on
+    index_ = head;  // a subscription starts with the next tick
     return false;
   }
   if (index_ + most_behind_ < head) {

@@ -34,10 +34,11 @@ struct FoxgloveMessage {
 /// comes, and stay. It only sends: a request that would change something is answered with a status
 /// of level 2. It uses no network: the caller takes the next message whenever it can send one.
 ///
-/// Only answers are queued, at most `kMostAnswers`: ticks are read from the segment when they are
-/// sent. Ticks older than `kBehindNs` are left out, and the client gets a status about that at most
-/// every `kToldNs`: over a slow link it gets evenly fewer ticks, a little late. Of a servo faster
-/// than 1 kHz, 1,000 ticks a second are sent.
+/// Texts (status, server info, lists of channels) are queued; a status is dropped while
+/// `kMostAnswers` texts wait. Ticks are read from the segment when they are sent: those more than
+/// `kBehindNs` behind the newest are left out, and a status reports their number, at most every
+/// `kToldNs`. So over a slow link the client gets evenly fewer ticks, a little late. Of a servo
+/// above 1 kHz every n-th tick is sent, at least 1,000 a second.
 ///
 /// One thread.
 class FoxgloveSession {

@@ -23,7 +23,7 @@ namespace {
 
 constexpr std::size_t kNameBytes = 20;
 
-/// The first bytes of a name that are whole characters of UTF-8.
+/// The first `most` bytes of a name, or fewer, so that no UTF-8 character is cut.
 std::string first_bytes(const std::string& name, std::size_t most) {
   if (name.size() <= most) return name;
   std::size_t end = most;

@@ -22,12 +22,12 @@ namespace kerf::bridge {
 /// One packed message; several clients may wait for the same.
 using IgtlBytes = std::shared_ptr<const std::vector<std::byte>>;
 
-/// The library counts an image's bytes in 31 bits.
+/// Whether all densities fit into one IMAGE: the library counts its bytes in 31 bits.
 [[nodiscard]] bool fits_an_image(const VoxelGrid& grid) noexcept;
 
 /// `part` of a volume as IMAGE with the volume's size and pose: 16 bits a voxel. OpenIGTLink's
 /// origin is the middle of the image, between the centres of its corner voxels. `part` is not empty
-/// and lies in the volume, whose density is `linear`.
+/// and lies in the volume; `linear` has the densities of all its voxels, x fastest.
 [[nodiscard]] IgtlBytes image_message(const std::string& device, const SegmentVolumeInfo& volume,
                                       const std::vector<Density>& linear, const VoxelBox& part);
 

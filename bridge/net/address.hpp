@@ -40,9 +40,9 @@ struct BridgeAddress {
   [[nodiscard]] std::string origin() const;
 };
 
-/// Reads `wss://HOST[:PORT][PATH][?token=TOKEN]`; without a port it is 7400. https:// and http://
-/// mean wss:// and ws://, since a browser shows them, and their usual port, which it leaves out.
-/// Throws `BridgeError`, also for ws:// to another machine.
+/// Reads `wss://HOST[:PORT][PATH][?token=TOKEN]`. https:// and http:// are read as wss:// and
+/// ws://, because users copy them from a browser. Default port: 7400; 443 for https and 80 for
+/// http. Throws `BridgeError`, also if ws:// or http:// names another machine.
 [[nodiscard]] BridgeAddress parse_address(std::string_view text);
 
 /// Reads `https://HOST[:PORT][PATH]` of serve's `--public-url`. Throws `BridgeError`.

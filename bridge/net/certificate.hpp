@@ -17,10 +17,10 @@ using Tls = std::shared_ptr<SSL_CTX>;
 /// Without a certificate; verifies none.
 [[nodiscard]] Tls new_tls();
 
-/// Shows the first certificate of `certificate`, with those after it as its chain up to a CA, and
-/// proves it with `key`. Both are PEM files: options `--cert` and `--key` of serve and join.
-/// Refuses a key that is open to other users, has a password or belongs to another certificate, and
-/// a certificate that has ended or not begun.
+/// Presents the first certificate of `certificate`, with those after it as its chain, and its
+/// private key `key`: PEM files, the options `--cert` and `--key` of serve and join. Throws if the
+/// key is open to other users, has a password or does not match, or if the certificate is expired
+/// or not yet valid.
 void show_certificate(SSL_CTX* tls, const std::filesystem::path& certificate,
                       const std::filesystem::path& key);
 

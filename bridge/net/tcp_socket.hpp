@@ -6,9 +6,10 @@
 
 namespace kerf::bridge {
 
-/// Sets the options of a viewer's socket: no delay for small messages, few unsent bytes, so that
-/// data is new when it leaves, keepalive, and BBR, which works on links with loss. The kernel
-/// chooses the size of the send buffer: a small one makes joins over links with loss slow.
+/// Sets TCP_NODELAY, keepalive, BBR (fast on links that lose packets) and a small
+/// TCP_NOTSENT_LOWAT, so that data is fresh when it leaves. The send buffer keeps the kernel's
+/// size: a small one slows down a join over a link with loss. Options that the kernel lacks stay
+/// unset.
 void tune_socket(int fd) noexcept;
 
 /// Restarts BBR before it probes for the round trip, with four packets under way: the picture is

@@ -78,9 +78,9 @@ class OneTimeToken {
 /// A Host header without its port, and IPv6 without its brackets.
 [[nodiscard]] std::string_view host_name(std::string_view host) noexcept;
 
-/// Whether `host`, without port, is a name of this server: an address, "localhost" or one of
-/// `names`. Any other name could come from a foreign page whose name server returns this address
-/// (DNS rebinding).
+/// Whether a request with this Host header, without its port, may be answered: any IP address,
+/// "localhost" or one of `names`. Any other name could be a DNS rebinding attack: a foreign page
+/// whose name server returns this machine's address.
 [[nodiscard]] bool is_own_host(std::string_view host, const std::vector<std::string>& names);
 
 /// Whether the page that opens a WebSocket was loaded from here: the origin is empty (no browser),

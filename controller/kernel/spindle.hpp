@@ -59,7 +59,7 @@ constexpr void turn_spindle(const SpindlePlan<N>& plan, bool on, typename N::Rea
   state.ratio += (resting - state.ratio) * plan.approach;
 }
 
-/// Friction of the rotating tool on hand and spindle: F_t = mu F_n against omega x arm
+/// Friction of the rotating tool on hand and spindle: F_t = mu F_n against omega x lever
 /// (docs/theory.md 6.5). Made by `cutting_friction`.
 template <class N>
 struct FrictionPlan {
@@ -90,7 +90,7 @@ class CuttingFriction {
     const Real length = std::max(norm(Vec<Real, ToolSpace>{x, Real(0), z}), Real(1));
     // Against the motion: the force of the tooth on the tool.
     force_n_ = force_n_ - Vec<Real, ToolSpace>{x / length, Real(0), z / length} * friction_n;
-    rims_n_ += friction_n * Real(drag.arm);
+    rims_n_ += friction_n * Real(drag.lever_ratio);
   }
 
   [[nodiscard]] constexpr Vec<Real, ToolSpace> force_n() const noexcept { return force_n_; }

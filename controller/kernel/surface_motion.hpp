@@ -149,20 +149,21 @@ struct SurfaceDrag {
   /// Direction along the tool's x and z: shorter than 1 if the contact lies around the axis, longer
   /// (below 2) if a tool of few voxels covers some beyond its rim.
   typename N::Unit x{}, z{};
-  typename N::Unit arm{};  ///< distance from the axis over the rim radius, kSpeedFloor to 1
+  typename N::Unit lever_ratio{};  ///< distance from the axis over the rim radius, kSpeedFloor to 1
 };
 
-/// The drag of a ball. `normal`: direction of the load, out of the solid. `arm`: mean distance of
-/// the contact from the axis, over the rim radius. For any distribution of the load, SUM load_i
-/// arm_i is -R times the load, so omega x arm is known without it. Most voxels that a ball covers
-/// in its own bore carry no load, and they change sides when the ball moves by a tenth of a voxel.
+/// The drag of a ball. `normal`: direction of the load, out of the solid. `lever_ratio`: mean
+/// distance of the contact from the axis, over the rim radius. For any distribution of the load,
+/// SUM load_i lever_i is -R times the load, so omega x lever is known without it. Most voxels that
+/// a ball covers in its own bore carry no load, and they change sides when the ball moves by a
+/// tenth of a voxel.
 template <class N>
 [[nodiscard]] constexpr SurfaceDrag<N> ball_drag(Vec<typename N::Unit, ToolSpace> normal,
-                                                 typename N::Unit arm) noexcept {
+                                                 typename N::Unit lever_ratio) noexcept {
   using Unit = typename N::Unit;
   const Unit from_axis = norm(Vec<Unit, ToolSpace>{normal.x, Unit(0), normal.z});
-  const Unit mean = std::max(arm, from_axis);
-  return {normal.z / mean, -normal.x / mean, arm};
+  const Unit mean = std::max(lever_ratio, from_axis);
+  return {normal.z / mean, -normal.x / mean, lever_ratio};
 }
 
 namespace detail {
@@ -186,7 +187,7 @@ class DragSums {
   constexpr void add(const Row& row, typename SpindleFrame<N>::Place first,
                      typename SpindleFrame<N>::Place step) noexcept {
     if (!(row.weight > 0)) return;
-    // omega x arm with omega along -y.
+    // omega x lever with omega along -y.
     x_ -= moment(row, first.z, step.z);
     z_ += moment(row, first.x, step.x);
     weight_ += row.weight;

@@ -134,8 +134,9 @@ class VelocityWindow {
 ///
 ///   v = y + (dx / T - y) T / (T + tau)
 ///
-/// This is the estimator of the analytic limits of stability. Its quantum without a filter is one
-/// encoder count over T. After a gap of k ticks dx / (k T) has stood for k of them.
+/// Without the filter its resolution is one encoder count / T. After a gap of k ticks the mean
+/// velocity dx / (k T) passes the filter k times. The analytic limits of stability assume this
+/// estimator.
 template <class N>
 class Difference {
  public:

@@ -29,8 +29,9 @@ namespace kerf {
 ///              keys say (`InJson`), of the models that the scene has
 [[nodiscard]] std::string canonical_json(const LoadedScene& scene, SceneKeys keys = scene_keys());
 
-/// What a scene was loaded from: loaded again, and its volumes and meshes being the same, it is the
-/// same to the bit. A run carries it in the JSON of its scene, as `source`, so a recording has it.
+/// What a scene was loaded from. If its volumes and meshes have not changed, loading it again gives
+/// the same scene, bit by bit. A run has it in the JSON of its scene, as `source`, so a recording
+/// has it too.
 struct SceneSource {
   std::filesystem::path path;  ///< absolute; files that the text names lie beside it
   std::string text;            ///< of the scene file
@@ -44,8 +45,8 @@ struct SceneSource {
 /// As `load_scene` of its path. Throws LoadError.
 [[nodiscard]] LoadedScene load_scene(const SceneSource& source, RecordedInputs recorded = {});
 
-/// `canonical_json` of the scene that was loaded from `source`, and in it the source as `source`,
-/// with the materials that were proposed for its first volume.
+/// `canonical`, the `canonical_json` of a scene, with one more member `source`: what the scene was
+/// loaded from, and the materials that were proposed for its first volume.
 [[nodiscard]] std::string json_with_source(const std::string& canonical, const LoadedScene& scene,
                                            const SceneSource& source);
 

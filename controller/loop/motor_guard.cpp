@@ -28,7 +28,7 @@ namespace {
 std::atomic<const Devices*> driven{nullptr};  // for signal handlers, which can only reach globals
 static_assert(std::atomic<const Devices*>::is_always_lock_free);
 
-/// An orderly end may take some ticks, and the force must end before.
+/// Motors off at once: the orderly end may take some ticks.
 void on_stop() noexcept {
   if (const Devices* devices = driven.load()) devices->stay_released();
 }
@@ -36,7 +36,7 @@ void on_stop() noexcept {
 void on_crash(int signal) {
   if (const Devices* devices = driven.load()) {
     static_cast<void>(devices->release_for_good());  // one send() each: signal-safe
-    // The bus carries it in one of its next cycles, unless the process has ended before.
+    // The bus carries it in one of its next cycles, unless the process ends first.
     const timespec cycles{0, 2'000'000};
     nanosleep(&cycles, nullptr);
   }

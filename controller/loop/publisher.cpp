@@ -129,7 +129,7 @@ TickRecord record_of(const DeviceReport& report, const TickCommands& commands,
     const PlaneLoad<DoubleNumbers>& plane = output.planes[i];
     record.plane_load_n[i] = static_cast<float>(plane.load_n);
     std::ranges::copy(floats(as_doubles(plane.normal)), record.plane_normal + 3 * i);
-    std::ranges::copy(floats(as_doubles(plane.arm_mm)), record.plane_arm_mm + 3 * i);
+    std::ranges::copy(floats(as_doubles(plane.lever_mm)), record.plane_arm_mm + 3 * i);
   }
   std::ranges::copy(output.motor_counts, record.dac_counts);
   record.removed = static_cast<std::uint32_t>(std::accumulate(

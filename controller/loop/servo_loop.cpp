@@ -175,15 +175,15 @@ class SilentDevices {
 
 }  // namespace
 
-EndReason run_servo(TickSource& clock, const Devices& devices, Servo& servo, Publisher& eyes,
-                    SegmentServer& commands, const LoopLimits& limits, LoopSignals& signals,
+EndReason run_servo(TickSource& clock, const Devices& devices, Servo& servo, Publisher& publisher,
+                    SegmentServer& server, const LoopLimits& limits, LoopSignals& signals,
                     RunRecord& record) noexcept {
   EndReason end = EndReason::stopped;
-  TickCommands given;
+  TickCommands commands;
   const CountedAllocations counted;
-  RunStatistics books(record, clock);
-  books.start();
-  SilentDevices silent(devices.size(), limits.gone_ticks);
+  RunStatistics statistics(record, clock);
+  statistics.start();
+  SilentDevices silent_devices(devices.size(), limits.gone_ticks);
   std::array<DeviceReport, kMaxArms> all_reports;
   std::array<ServoOutput, kMaxArms> all_outputs;
   const auto reports = std::span(all_reports).first(devices.size());
@@ -197,15 +197,15 @@ EndReason run_servo(TickSource& clock, const Devices& devices, Servo& servo, Pub
     for (std::size_t a = 0; a < reports.size(); ++a) {
       reports[a] = devices[a].read();  // newest pose; never blocks
     }
-    given.command = {};
-    if (const auto command = commands.take_command()) {
-      given.command = servo_command(*command);
-      given.last_index = command->index;
-      if (!servo.apply(given.command)) record.add_event(tick, "refused_command");
+    commands.command = {};
+    if (const auto command = server.take_command()) {
+      commands.command = servo_command(*command);
+      commands.last_index = command->index;
+      if (!servo.apply(commands.command)) record.add_event(tick, "refused_command");
     }
     const char* const stall = recover(signals, clock.stood_still(), servo);
-    given.fade_in = stall != nullptr;
-    if (given.fade_in) record.add_event(tick, stall);
+    commands.fade_in = stall != nullptr;
+    if (commands.fade_in) record.add_event(tick, stall);
     const std::int64_t in_hand_ns = monotonic_ns();
     servo.step(reports, outputs);  // all physics, all limits
     const std::int64_t compute_ns = monotonic_ns() - in_hand_ns;
@@ -217,21 +217,22 @@ EndReason run_servo(TickSource& clock, const Devices& devices, Servo& servo, Pub
     }
     send_tick(outputs, signals, devices);  // the devices first,
     const std::int64_t sent_ns = monotonic_ns();
-    eyes.publish(tick, reports, given, outputs, timing);  // then the readers
-    books.count(tick, outputs, {timing.late_ns, compute_ns, sent_ns, monotonic_ns() - sent_ns});
+    publisher.publish(tick, reports, commands, outputs, timing);  // then the readers
+    statistics.count(tick, outputs,
+                     {timing.late_ns, compute_ns, sent_ns, monotonic_ns() - sent_ns});
 
     signals.heartbeat.store(tick, std::memory_order_relaxed);
     signals.armed_ticks.store(record.ticks, std::memory_order_relaxed);
     for (std::size_t a = 0; a < reports.size(); ++a) {
       const Waiting waiting =
-          silent.is_gone(a) ? Waiting::gone : waiting_for(reports[a], outputs[a]);
+          silent_devices.is_gone(a) ? Waiting::gone : waiting_for(reports[a], outputs[a]);
       signals.waiting[a].store(waiting, std::memory_order_relaxed);
     }
     if (record.ticks >= limits.armed_ticks) {
       end = EndReason::ticks_done;
       break;
     }
-    if (silent.follow(reports, [&](std::size_t arm) { books.lose(tick, arm); })) {
+    if (silent_devices.follow(reports, [&](std::size_t arm) { statistics.lose(tick, arm); })) {
       end = EndReason::device_gone;
       break;
     }
@@ -241,7 +242,7 @@ EndReason run_servo(TickSource& clock, const Devices& devices, Servo& servo, Pub
     }
   }
   devices.release();  // motors off on the way out
-  books.finish();
+  statistics.finish();
   return end;
 }
 

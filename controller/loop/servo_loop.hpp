@@ -111,8 +111,9 @@ struct LoopSignals {
   std::array<std::atomic<Waiting>, kMaxArms> waiting{Waiting::report, Waiting::report};
 };
 
-/// First step of a tick: restarts the force if the servo was stopped, detected by its watchdog, or
-/// by the clock if the watchdog was stopped too. Returns the name of the detector, or nullptr.
+/// Before the step of a tick, if the servo has stood still: fades the force in again from 0. Its
+/// watchdog detects that, or the clock if the watchdog stood still too. Returns the name of the
+/// detector, or nullptr.
 inline const char* recover(LoopSignals& signals, bool stood_still, Servo& servo) noexcept {
   const bool watchdog_tripped = signals.stalled.exchange(false, std::memory_order_relaxed);
   if (!watchdog_tripped && !stood_still) return nullptr;
@@ -135,8 +136,8 @@ inline void send_tick(std::span<const ServoOutput> outputs, const LoopSignals& s
 /// the calling thread until a limit is met or a stop is requested; the motors are off when it
 /// returns. A device that goes away is a fault of its arm alone, and ends the run if no other is
 /// left. `devices` has one for each arm of the servo.
-EndReason run_servo(TickSource& clock, const Devices& devices, Servo& servo, Publisher& eyes,
-                    SegmentServer& commands, const LoopLimits& limits, LoopSignals& signals,
+EndReason run_servo(TickSource& clock, const Devices& devices, Servo& servo, Publisher& publisher,
+                    SegmentServer& server, const LoopLimits& limits, LoopSignals& signals,
                     RunRecord& record) noexcept;
 
 inline constexpr std::chrono::milliseconds kWatchdogPeriod{5};

@@ -152,14 +152,14 @@ EndReason serve(const Run& run, LoopSignals& signals, CallGuard* calls) {
     auto& all = run.report.missing_rights;
     all.insert(all.end(), missing.begin(), missing.end());
   }
-  Publisher eyes(run.segment, run.servo);
+  Publisher publisher(run.segment, run.servo);
   RealTimeTicks real_time(kNsPerSecond / run.rate_hz, options.real_time.spin_us * 1000);
   std::optional<TickGate> gate;
   if (!options.until.empty()) gate.emplace(options.until, run.stop);
   LockStepTicks lock_step(run.devices, kNsPerSecond / run.rate_hz, gate ? &*gate : nullptr);
   TickSource& clock = options.virtual_time ? static_cast<TickSource&>(lock_step) : real_time;
   if (calls != nullptr) calls->enter(run.ports);
-  const EndReason end = run_servo(clock, run.devices, run.servo, eyes, run.server,
+  const EndReason end = run_servo(clock, run.devices, run.servo, publisher, run.server,
                                   limits_of(options, run.rate_hz), signals, run.report.record);
   if (calls != nullptr) calls->leave();
   return end;

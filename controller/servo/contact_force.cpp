@@ -53,7 +53,7 @@ void list_planes(const ContactPlan<N>& contact, const ProxyContact<N>& proxy,
     if (proxy.part[i] <= Real(0)) continue;
     const ConstraintPlane<N>& plane = proxy.planes.plane[i];
     out.planes[out.plane_count++] = {relabel<DeviceSpace>(plane.normal),
-                                     at_device(contact, plane.arm), proxy.part[i] * force_n,
+                                     at_device(contact, plane.lever), proxy.part[i] * force_n,
                                      plane.on_shaft};
   }
 }
@@ -114,7 +114,7 @@ ContactResult<N> proxy_force(const ServoPlan<N>& plan, ServoState<N>& state,
   out.normal = relabel<WorldSpace>(proxy.normal);
   out.press = relabel<WorldSpace>(proxy.press);
   out.head_fraction = proxy.head_fraction;
-  out.head_arm_mm = at_device(contact, proxy.head_arm);
+  out.head_lever_mm = at_device(contact, proxy.head_lever);
   list_planes(contact, proxy, force_n, out);
   return out;
 }
@@ -129,7 +129,7 @@ ContactResult<N> contact_and_cut(const ServoPlan<N>& plan, ServoState<N>& state,
     out = proxy_force(plan, state, tip_mm, rotation, velocity_mm_per_s);
     if (plan.force_cut.on) {
       out.modification_n = friction_of_last_cut(plan, state, out);
-      out.tip_torque_n_mm = out.tip_torque_n_mm + cross(out.head_arm_mm, out.modification_n);
+      out.tip_torque_n_mm = out.tip_torque_n_mm + cross(out.head_lever_mm, out.modification_n);
     }
     if (!plan.cutting) return out;
   }

@@ -44,7 +44,7 @@ struct ContactResult {
   WorldVec<Unit> normal{};                        ///< out of the solid, of the head; 0 in air
   WorldVec<Unit> press{};                         ///< the same of the whole tool
   Unit head_fraction{1};                          ///< of the force along `press`
-  DeviceVec<Real> head_arm_mm{};                  ///< from its centre to the load of the head
+  DeviceVec<Real> head_lever_mm{};                ///< from its centre to the load of the head
   std::array<PlaneLoad<N>, kMaxPlanes> planes{};
   std::size_t plane_count = 0;
 };

@@ -109,11 +109,12 @@ void find_loads(const ServoPlan<N>& plan, const ServoState<N>& state,
   for (std::size_t i = 0; i < at.plane_count; ++i) {
     const PlaneLoad<N>& plane = at.planes[i];
     if (plane.on_shaft) continue;
-    const Real arm_mm =
-        along<N>(relabel<ContactSpace>(plane.normal), relabel<ContactSpace>(plane.arm_mm)) *
+    const Real lever_mm =
+        along<N>(relabel<ContactSpace>(plane.normal), relabel<ContactSpace>(plane.lever_mm)) *
         plan.workspace_scale;
     const LoadPlane<N> bears{relabel<WorldSpace>(plane.normal),
-                             tool.round ? Ratio(-1) : Ratio(arm_mm / tool.rim_mm), tool.steepness};
+                             tool.round ? Ratio(-1) : Ratio(lever_mm / tool.rim_mm),
+                             tool.steepness};
     shares.add(plane.load_n, [&](std::size_t v) {
       return contact_form<N>(voxel_position(plan.volumes[v], centre_mm),
                              tool.in_volume[v].rims_from_voxel, bears);
@@ -201,7 +202,8 @@ CuttingFriction<N> press_on_volumes(const ServoPlan<N>& plan, ServoState<N>& sta
         multiply<Real>(unit_fraction_of<N>(covered.borne[v], covered.whole), cut.normal_force_n);
     if (drive > 0) keep_bricks(plan, state, v, voxel_position(plan.volumes[v], centre_mm));
     const SurfaceDrag<N>& drag = covered.in[v].drag;
-    friction.add(rules.friction, press_n, tool.round ? ball_drag<N>(normal, drag.arm) : drag);
+    friction.add(rules.friction, press_n,
+                 tool.round ? ball_drag<N>(normal, drag.lever_ratio) : drag);
     const PrestonOutcome<N> out = cut_by_force(volume, drive, state.volumes[v].density,
                                                state.force_cut.volume[v], covered.in[v]);
     cut.removed[plan.volumes[v].scene_index] = out.removed;

@@ -140,7 +140,8 @@ template <class N>
   }
 }
 
-/// Forward kinematics of the filtered counts. A device without a gimbal never turns the tool.
+/// Forward kinematics from the unwrapped joint counts and the gimbal's averaged readings, or the
+/// orientation that a Cartesian device reports. Without a gimbal the tool never turns.
 template <class N>
 [[nodiscard]] DevicePose<N> device_pose(const DevicePlan<N>& device, const EncoderState& encoders,
                                         const GimbalFilter& gimbal) noexcept {

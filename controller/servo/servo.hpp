@@ -110,10 +110,10 @@ enum class Fault : std::uint32_t {
 /// A plane that the tool presses on, with its load; at the device port.
 template <class N>
 struct PlaneLoad {
-  DeviceVec<typename N::Unit> normal{};  ///< out of the solid
-  DeviceVec<typename N::Real> arm_mm{};  ///< from the tool's centre to the contact
-  typename N::Real load_n{};             ///< along the normal, before any limit
-  bool on_shaft = false;                 ///< on shaft or handpiece
+  DeviceVec<typename N::Unit> normal{};    ///< out of the solid
+  DeviceVec<typename N::Real> lever_mm{};  ///< from the tool's centre to the contact
+  typename N::Real load_n{};               ///< along the normal, before any limit
+  bool on_shaft = false;                   ///< on shaft or handpiece
 };
 inline constexpr std::size_t kMaxPlaneLoads = 3;
 

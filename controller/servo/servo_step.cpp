@@ -135,7 +135,7 @@ void write_contact(const ContactResult<N>& contact, ServoOutput& out) noexcept {
   out.shaft = contact.shaft_force_n > typename N::Real(kContactThresholdN);
   for (std::size_t i = 0; i < contact.plane_count; ++i) {
     const PlaneLoad<N>& plane = contact.planes[i];
-    out.planes[i] = {to_double(plane.normal), to_double(plane.arm_mm), as_double(plane.load_n),
+    out.planes[i] = {to_double(plane.normal), to_double(plane.lever_mm), as_double(plane.load_n),
                      plane.on_shaft};
   }
   out.plane_count = static_cast<std::uint32_t>(contact.plane_count);
@@ -313,7 +313,7 @@ void drive(const ServoPlan<N>& plan, ServoState<N>& state, ForceRequest<N>& want
 /// With a usable report: splits the work since the last one, and keeps the parts of the force that
 /// was sent.
 template <class N>
-void book(ServoState<N>& state, const ForceRequest<N>& wanted, bool motors_on) noexcept {
+void update_energy(ServoState<N>& state, const ForceRequest<N>& wanted, bool motors_on) noexcept {
   ForceParts<N> parts = wanted.parts;
   state.ledger.split(parts);
   if (!motors_on) return state.ledger.send({});
@@ -389,7 +389,7 @@ Sensed<N> step_arm(const ServoPlan<N>& plan, ServoState<N>& state, const DeviceR
   state.proxy_offset_mm = contact.proxy_offset_mm;
   drive(plan, state, wanted, sensed, out);
   state.force_sum_n = state.force_sum_n + state.force_n;
-  if (sensed.usable) book(state, wanted, out.motors_on);
+  if (sensed.usable) update_energy(state, wanted, out.motors_on);
   write_contact(contact, out);
   add_removed(contact.removed, out);
   cut(plan, state, contact, out);
@@ -485,7 +485,7 @@ bool apply_command(Arms<N> arms, const ServoCommand& command) noexcept {
   return false;
 }
 
-// The three bundles, compiled once.
+// For both bundles of number types, compiled once.
 #define KERF_INSTANTIATE(N)                                                              \
   template void servo_step<N>(Arms<N>, std::span<const DeviceReport>,                    \
                               std::span<ServoOutput>) noexcept;                          \

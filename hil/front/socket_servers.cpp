@@ -22,7 +22,7 @@
 namespace kerf {
 namespace {
 
-constexpr const char* kUnborn = ".new";  // name until the socket listens
+constexpr const char* kUnborn = ".new";  // ending of its name until the socket listens
 
 sockaddr_un address_of(const std::string& path) {
   sockaddr_un address{};
@@ -37,8 +37,8 @@ int with_address(const sockaddr_un& address, Call&& call) {
   return call(reinterpret_cast<const sockaddr*>(&address), socklen_t{sizeof address});
 }
 
-/// Returns true if a process listens at `path`. Connects with another socket type: that is refused
-/// either way, and the listener does not notice.
+/// Returns true if a process listens at `path`. Connects with another socket type, which no
+/// listener notices: the error is ECONNREFUSED only if there is none.
 bool is_live(const std::string& path) {
   const int fd = socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
   if (fd < 0) return true;  // not proven stale: leave it alone
@@ -71,8 +71,8 @@ void check_path(const std::string& path, const std::string& option) {
   }
 }
 
-constexpr std::int64_t kGoneNs = 2'000'000'000;  // silence of a host that has left
-constexpr int kMaxStrangers = 64;                // datagrams of others, thrown away in one call
+constexpr std::int64_t kGoneNs = 2'000'000'000;  // after such a silence the host has left
+constexpr int kMaxStrangers = 64;                // datagrams of other senders that a call discards
 
 // The sockets API takes every address as a sockaddr.
 sockaddr* generic(sockaddr_storage& address) {
@@ -131,14 +131,14 @@ SeqpacketServer::SeqpacketServer(std::string path, const char* option)
     : path_(std::move(path)), option_(option) {
   check_path(path_, option_);
   const std::string unborn = path_ + kUnborn;
-  if (is_socket(unborn)) unlink(unborn.c_str());  // of an emulator that was killed
+  if (is_socket(unborn)) unlink(unborn.c_str());  // left by an emulator that was killed
   fd_ = socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0);
   const sockaddr_un address = address_of(unborn);
   const auto bind_here = [this](const sockaddr* a, socklen_t size) { return bind(fd_, a, size); };
-  // One waits while one is served.
   constexpr mode_t kOwnerAlone = S_IRUSR | S_IWUSR;  // bind() makes the file with these rights
   const bool bound =
       fd_ >= 0 && fchmod(fd_, kOwnerAlone) == 0 && with_address(address, bind_here) == 0;
+  // One client may wait while another is served.
   const bool ready =
       bound && listen(fd_, 1) == 0 && std::rename(unborn.c_str(), path_.c_str()) == 0;
   if (ready) return;
@@ -160,7 +160,8 @@ std::optional<SeqpacketLink> SeqpacketServer::accept(const std::atomic<bool>& st
   while (readable_within(fd_, patience_ns, stop)) {
     errno = 0;
     if (auto link = accept_waiting()) return link;
-    if (errno == EMFILE || errno == ENFILE) {  // the client goes on waiting
+    // The client stays queued, and accept would fail for ever.
+    if (errno == EMFILE || errno == ENFILE) {
       throw HilError(std::string(option_) + ": " + path_ + ": " +
                      std::generic_category().message(errno) + "; " + remedy_for(errno, ""));
     }

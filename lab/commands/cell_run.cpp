@@ -68,7 +68,7 @@ std::string device_of(const CellJob& job) {
   return set.empty() ? "omni" : set;
 }
 
-/// Of a word that names none, which the programs refuse, the first.
+/// The personality of that name. If there is none, the first: the programs refuse the name later.
 Personality personality_of(const std::string& word) {
   const auto found = std::ranges::find(kPersonalityWords, word);
   return static_cast<Personality>(
@@ -77,11 +77,10 @@ Personality personality_of(const std::string& word) {
 
 /// The verdict of `LimitCycleDetector` on the contacts of a run of the whole servo, tick by tick.
 ///
-/// A watch of the detector is `kSeconds` long; one begins every `kApartS` while the tool touches,
-/// so that each hold of the hand of 0.6 s or more has one of its own. The coordinate is the
-/// penetration, 0 in air: a tool that jumps off the solid swings, too. The energy that the motors
-/// give is what goes below the least energy of the port so far: a spring that returns what the hand
-/// stored gives none.
+/// A detector watches for `kSeconds`; one begins every `kApartS` while the tool touches, so that
+/// one lies completely in each hold of the hand of 0.6 s or more. Its coordinate is the
+/// penetration, 0 in air: a tool that jumps off the solid swings too. Its energy is -1 times the
+/// least energy of the port so far: a spring that returns what the hand stored gives none.
 class ContactSwing {
  public:
   static constexpr double kSeconds = 0.5, kApartS = 0.1;
@@ -96,7 +95,7 @@ class ContactSwing {
   void take(const TickRecord& record) {
     constexpr std::uint32_t kTouches = kFlagContact | kFlagStarted;
     if ((record.flags & kTouches) == kTouches && record.tick >= next_tick_) {
-      // Not ended before its time, whatever is held: `settled` is its whole length.
+      // `settled` is the whole length, so that no watch ends early.
       watches_.emplace_back(LimitCycleDetector::Ticks{ticks_, ticks_, ticks_}, step_mm_, kPushN);
       next_tick_ = record.tick + std::max<std::uint64_t>(1, apart_);
     }
@@ -252,7 +251,7 @@ const std::vector<Column>& columns() {
       all.push_back({std::string(source) + "_j", false, energy_of_source});
     }
     const std::vector<Column> rest{
-        {kSwingColumn, false},  // not of the report: added to it
+        {kSwingColumn, false},  // not in the report: added by this program
         {"fault_count", false}, {"config_hash", false},       {"volume_hash", false},
         {"output_hash", false}, {"peak_motor_force_n", true}, {"injected", true, changed_by_faults},
     };

@@ -104,8 +104,9 @@ std::string law_text(const LawRow& row, const std::string& settings) {
   return "{ name = " + quoted(row.name) + settings + " }";
 }
 
-/// Every law of the kind that this program knows: as it is, with each setting at each of its ends,
-/// and with all of them there at once.
+/// Every law of the kind that this program knows: with default settings, with each setting at its
+/// lowest and at its highest value, and with all settings at the lowest or all at the highest. Out
+/// of range: values just beyond, inf, -inf, nan, and an unknown name.
 void add_laws(LawKind kind, KeyLevels& levels) {
   for (const LawRow* row : known_laws(kind)) {
     add(law_text(*row, ""), levels.ends);

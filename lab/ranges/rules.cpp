@@ -29,7 +29,7 @@ const char* not_finite(const ServoOutput& out) {
     return std::ranges::all_of(values, [](double x) { return std::isfinite(x); });
   };
   for (const PlaneLoad<DoubleNumbers>& plane : out.planes) {
-    if (!all_finite(plane.normal) || !all_finite(plane.arm_mm) || !std::isfinite(plane.load_n)) {
+    if (!all_finite(plane.normal) || !all_finite(plane.lever_mm) || !std::isfinite(plane.load_n)) {
       return "a plane";
     }
   }

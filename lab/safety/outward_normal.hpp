@@ -9,23 +9,23 @@
 
 namespace kerf::faults {
 
-/// The direction out of the solid, from the voxels alone: from the middle of the voxels that a ball
-/// of the tool's radius covers, to the ball's own middle. For a scene of one volume that nothing is
-/// cut from, felt with a ball. `scene` outlives it.
+/// The direction out of the solid, from the voxels alone: from the mean position of the solid
+/// voxels that a ball covers to the ball's centre. The ball's radius is that of the tool and one
+/// voxel. For a scene with one volume, a ball as tool and no cutting. `scene` outlives it.
 class OutwardNormal {
  public:
   explicit OutwardNormal(const LoadedScene& scene);
 
-  /// Of length 1, at a tip of the device; empty if the ball covers nothing, or its own middle, or
-  /// if the scene is another one.
+  /// Of length 1, at a tip of the device. Empty if the ball covers nothing, if the mean position is
+  /// within a tenth of the radius of its centre, or if the scene is not of that kind.
   [[nodiscard]] std::optional<DeviceVec<double>> at(DeviceVec<double> tip_mm) const;
 
   /// The ball covers nothing there.
   [[nodiscard]] bool is_free(DeviceVec<double> tip_mm) const { return covered(tip_mm).voxels == 0; }
 
-  /// The distance that a ball may move at once, device mm, so that the voxels it covers there show
-  /// the way by which it came: its radius. From farther off it may have passed through the solid,
-  /// and the way out at that place is the one on the other side.
+  /// The ball's radius, device mm: the longest step after which the direction still points back to
+  /// where the ball came from. After a longer one it may have passed through the solid, and the
+  /// direction is that of the other side.
   [[nodiscard]] double reach_mm() const { return radius_mm_ / scene_.device.workspace_scale; }
 
  private:
@@ -36,7 +36,7 @@ class OutwardNormal {
   [[nodiscard]] Covered covered(DeviceVec<double> tip_mm) const;
 
   const LoadedScene& scene_;
-  const SceneVolume* volume_ = nullptr;  ///< none: another scene
+  const SceneVolume* volume_ = nullptr;  ///< null: a scene of another kind
   double radius_mm_ = 0;
   std::array<double, 9> axes_{};  ///< world from volume, row-major
 };

@@ -26,7 +26,7 @@ std::int64_t ServiceLink::now_ns() const noexcept {
   return cycle_ * kCycleNs;
 }
 
-/// The service greets a client with its devices, which takes it a cycle.
+/// The service greets a client with the state of its devices, which takes one cycle.
 void ServiceLink::connect() {
   const std::string first = service_.greet();
   ++cycle_;
@@ -39,7 +39,7 @@ void ServiceLink::connect() {
       backoff_ns_ = ServicePort::kFirstBackoffNs;
       return;
     }
-  } catch (const std::runtime_error&) {  // the device is not listed
+  } catch (const std::runtime_error&) {  // thrown if the device is not listed
   }
   retry_ns_ = now_ns() + backoff_ns_;
   backoff_ns_ = std::min(2 * backoff_ns_, ServicePort::kLongestBackoffNs);
@@ -73,7 +73,7 @@ void ServiceLink::cycle() {
 
 void ServiceLink::play_turn() {
   while (service_.next_reply()) {
-  }  // what came unasked belongs to no turn
+  }  // discards what the service sent unasked
   const bool takes_back = std::exchange(takes_back_, false);
   const auto force_n =
       session_->force_n(takes_back ? CartesianCommand{} : command_, command_ns_, now_ns());

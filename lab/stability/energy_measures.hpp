@@ -20,8 +20,9 @@ struct LoopWork {
   double most_share = 0;   ///< that `share` may have
 };
 
-/// Two laps on each of six tilted circles of 0.375 mm about places on a ball of 3 mm, with a ball
-/// of 1 mm pressed 0.6 mm into it and nothing cut; the arm's counts are the hand's places.
+/// A ball tool of radius 1 mm, pressed 0.6 mm into a ball of radius 3 mm, goes round six tilted
+/// circles of radius 0.375 mm, two laps each; the second lap counts. Nothing is cut. No mechanics:
+/// the encoder counts are those of the hand's position.
 [[nodiscard]] std::vector<LoopWork> closed_loops();
 
 /// Time added to each tick in contact.

@@ -52,7 +52,7 @@ std::string failure_text() {
            remedy_for(error.code().value(), "check the path and its rights");
   } catch (const std::ios_base::failure& error) {
     return "a file: " + error.code().message() + "; check its disk, or copy it again";
-  } catch (const std::system_error& error) {  // of the library itself: no thread
+  } catch (const std::system_error& error) {  // of std::thread: none could be started
     return "threads: " + error.code().message() + "; raise ulimit -u, or TasksMax of the service";
   } catch (const std::exception& error) {
     return escaped(error.what());
@@ -63,7 +63,7 @@ std::string stdout_error(std::ostream& out) {
   errno = 0;
   if (out.flush() || reader_left()) return {};
   int error = errno;
-  // A write that failed before, and is forgotten: one more byte fails for the same reason.
+  // An earlier write failed and its errno is lost: one more byte fails for the same reason.
   if (error == 0 && ::write(STDOUT_FILENO, "\n", 1) < 0) error = errno;
   const std::string reason =
       error != 0 ? std::generic_category().message(error) : "cannot be written";

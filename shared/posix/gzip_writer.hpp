@@ -8,7 +8,7 @@
 
 namespace kerf {
 
-/// Packs bytes into a file as gzip. Failures are those of `AtomicFile::write`; std::bad_alloc.
+/// Packs bytes into a file as gzip. Throws as `AtomicFile::write` does, and std::bad_alloc.
 class GzipWriter {
  public:
   /// `level`: 1 is the fastest, 9 the smallest. `file` outlives it.

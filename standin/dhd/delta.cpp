@@ -13,10 +13,10 @@ using standin::Row;
 
 namespace {
 
-constexpr double kTickS = 0.001;  // of the regulator in real time
+constexpr double kTickS = 0.001;  // period of the regulator in real time
 constexpr double kNothingN = 1e-9;
-constexpr double kArrivedMm = 1;  // the spring stops this close against friction
-// For a tip of some 0.3 kg with its hand: 10 Hz, damped to 0.7.
+constexpr double kArrivedMm = 1;  // friction may stop the spring this far from its goal
+// For a tip of about 0.3 kg, hand included: 9 Hz, damping ratio 0.6.
 constexpr double kStiffnessNPerMm = 1.0;
 constexpr double kDampingNsPerMm = 0.02;
 

@@ -211,10 +211,10 @@ TEST_CASE_TEMPLATE("a turned cylinder rests on rim, side and face", N, FixedNumb
     const Contacts<N> felt = rig.at(centre + offset * n);
     REQUIRE(felt.count == 1);
     CHECK(degrees_between(normal_of(felt.plane[0]), n) < 0.6);
-    // The arm leads to the contact: as deep along n as the tool reaches.
-    const Point arm{double(felt.plane[0].arm.x), double(felt.plane[0].arm.y),
-                    double(felt.plane[0].arm.z)};
-    CHECK(dot(arm, n) == doctest::Approx(-support).epsilon(0.08));
+    // The lever leads to the contact: as deep along n as the tool reaches.
+    const Point lever{double(felt.plane[0].lever.x), double(felt.plane[0].lever.y),
+                      double(felt.plane[0].lever.z)};
+    CHECK(dot(lever, n) == doctest::Approx(-support).epsilon(0.08));
   }
   CHECK(std::abs(mean) < 0.02);
 }
@@ -309,7 +309,8 @@ TEST_CASE_TEMPLATE("either face of a thin tool touches a bump where it is, with 
         const Contacts<N> felt = rig.field().query(place_of<N>(centre));
         REQUIRE(felt.count == 1);
         turned = std::max(turned, degrees_between(normal_of(felt.plane[0]), up));
-        beside = std::max(beside, length(axes.to_tool(point_of<N>(felt.plane[0].arm)) - touching));
+        beside =
+            std::max(beside, length(axes.to_tool(point_of<N>(felt.plane[0].lever)) - touching));
       }
       CAPTURE(axis);
       CAPTURE(sign);
@@ -338,11 +339,11 @@ TEST_CASE_TEMPLATE("a face that lies on a flat is held in its middle, on noise t
       for (int i = 0; i < 200; ++i) {
         const Contacts<N> felt = rig.field().query(place_of<N>(top + 8.0 * up + 0.01 * i * axes.x));
         REQUIRE(felt.count == 1);
-        const Point arm = axes.to_tool(point_of<N>(felt.plane[0].arm));
+        const Point lever = axes.to_tool(point_of<N>(felt.plane[0].lever));
         turned = std::max(turned, degrees_between(normal_of(felt.plane[0]), up));
-        beside = std::max(beside, length(arm - Point{0, -8, 0}));
-        if (i > 0) steps = std::max(steps, length(arm - last));
-        last = arm;
+        beside = std::max(beside, length(lever - Point{0, -8, 0}));
+        if (i > 0) steps = std::max(steps, length(lever - last));
+        last = lever;
       }
       CAPTURE(noise);
       CHECK(turned < (noise > 0 ? 0.5 : 0.2));

@@ -37,7 +37,7 @@ struct Cut {
   }
   friend bool operator==(const Cut& a, const Cut& b) {
     return a.same_but_for_drag(b) && a.drag.x == b.drag.x && a.drag.z == b.drag.z &&
-           a.drag.arm == b.drag.arm;
+           a.drag.lever_ratio == b.drag.lever_ratio;
   }
 };
 
@@ -264,7 +264,7 @@ TEST_CASE("a long thin tool of any step along its rows weighs the same in groups
       CHECK(grouped.weight == plain.weight);
       CHECK(grouped.drag.x == plain.drag.x);
       CHECK(grouped.drag.z == plain.drag.z);
-      CHECK(grouped.drag.arm == plain.drag.arm);
+      CHECK(grouped.drag.lever_ratio == plain.drag.lever_ratio);
       CHECK(plain.list.size() > 600);
     }
   }

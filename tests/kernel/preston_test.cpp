@@ -291,7 +291,7 @@ TEST_CASE("fixed point cuts what double cuts, to a step of the voxel and a milli
               .epsilon(1e-6));
     CHECK(std::abs(double(a.drag.x) - b.drag.x) < 5e-4);
     CHECK(std::abs(double(a.drag.z) - b.drag.z) < 5e-4);
-    CHECK(std::abs(double(a.drag.arm) - b.drag.arm) < 5e-4);
+    CHECK(std::abs(double(a.drag.lever_ratio) - b.drag.lever_ratio) < 5e-4);
   }
 }
 

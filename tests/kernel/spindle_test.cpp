@@ -114,23 +114,23 @@ TEST_CASE_TEMPLATE("friction pulls against the surface's motion, and not at the 
   const auto side = outcome(Axis::y, {27.3, 20, 20});
   CHECK(std::abs(double(side.x)) < 0.01);
   CHECK(double(side.z) < -0.95);
-  CHECK(double(side.arm) > 0.9);
+  CHECK(double(side.lever_ratio) > 0.9);
   const auto at_side = friction(side);
   CHECK(std::abs(double(at_side.force_n().z) + 0.5 * 2 * double(side.z)) < 1e-4);
-  CHECK(std::abs(double(at_side.torque_n_mm(typename N::Real(0.5))) - 0.5 * double(side.arm)) <
-        1e-4);
+  CHECK(std::abs(double(at_side.torque_n_mm(typename N::Real(0.5))) -
+                 0.5 * double(side.lever_ratio)) < 1e-4);
   // With the axis along x the pole touches: the surface moves all ways around, slowly.
   const auto pole = outcome(Axis::x, {27.3, 20, 20});
   CHECK(std::hypot(double(pole.x), double(pole.z)) < 0.01);
-  CHECK(double(pole.arm) < 0.5);
+  CHECK(double(pole.lever_ratio) < 0.5);
   // What a ball covers agrees with what its load alone tells.
   using Unit = typename N::Unit;
-  const auto by_load = [](double x, double y, Unit arm) {
-    return ball_drag<N>({Unit(x), Unit(y), Unit(0)}, arm);
+  const auto by_load = [](double x, double y, Unit lever_ratio) {
+    return ball_drag<N>({Unit(x), Unit(y), Unit(0)}, lever_ratio);
   };
-  CHECK(std::abs(double(by_load(1, 0, side.arm).x)) < 1e-6);
-  CHECK(std::abs(double(by_load(1, 0, side.arm).z - side.z)) < 0.05);
-  CHECK(by_load(0, 1, pole.arm).z == Unit(0));
+  CHECK(std::abs(double(by_load(1, 0, side.lever_ratio).x)) < 1e-6);
+  CHECK(std::abs(double(by_load(1, 0, side.lever_ratio).z - side.z)) < 0.05);
+  CHECK(by_load(0, 1, pole.lever_ratio).z == Unit(0));
   CHECK(std::abs(double(by_load(-0.6, 0.8, Unit(0.6)).z) - 1) < 1e-6);
   CHECK(std::abs(double(by_load(-0.6, 0.8, Unit(0.8)).z) - 0.75) < 1e-6);  // all round its bore
 }

@@ -60,12 +60,12 @@ TEST_CASE("the planes' loads make the force, and their moments its torque") {
         for (std::size_t i = 0; i < out.plane_count; ++i) {
           const double load_n = out.planes[i].load_n;
           const Point normal = as_doubles(out.planes[i].normal);
-          const Point arm_mm = as_doubles(out.planes[i].arm_mm);
+          const Point lever_mm = as_doubles(out.planes[i].lever_mm);
           CHECK(length(normal) == doctest::Approx(1).epsilon(1e-4));
           CHECK(load_n > 0);
-          CHECK(dot(arm_mm, normal) == doctest::Approx(-kRadiusMm / scale).epsilon(0.02));
+          CHECK(dot(lever_mm, normal) == doctest::Approx(-kRadiusMm / scale).epsilon(0.02));
           force = sum_of(force, load_n, normal);
-          torque = sum_of(torque, load_n, cross(arm_mm, normal));
+          torque = sum_of(torque, load_n, cross(lever_mm, normal));
         }
         const double force_n = length(out.contact_n);
         CHECK(length(sum_of(force, -1, out.contact_n)) < 0.01 * force_n);

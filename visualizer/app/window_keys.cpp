@@ -24,7 +24,7 @@
 namespace kerf {
 namespace {
 
-/// kerf-0001 and so on in `folder`, which is made if it is missing.
+/// The first free name of kerf-0001, kerf-0002 and so on in `folder`, which is made if missing.
 std::filesystem::path unused_file(const std::filesystem::path& folder, const char* ending) {
   make_folder(folder);
   for (int i = 1;; ++i) {
@@ -202,7 +202,7 @@ Notice toggle_film(const VisualizerOptions& options, PictureSize size, std::opti
   if (film) {
     const VideoFile& file = film->file();
     const std::string path = file.path(), frames = std::to_string(file.frames());
-    film.reset();  // now it is whole
+    film.reset();  // completes the file
     std::error_code fault;
     const auto bytes = std::filesystem::file_size(path, fault);
     return {"video: " + path + ": " + frames + " frames" +

@@ -13,9 +13,10 @@ namespace kerf {
 
 namespace {
 
-// Lengths are fractions of the tooth's height; the root tips are at z = 0, x is its width.
 constexpr double kHeightMm = 22.4;
+// Densities, 0 to 1.
 constexpr double kEnamel = 0.9, kDentin = 0.6, kIso = 0.3;
+// Lengths as fractions of the height; root tips at z = 0, width along x.
 constexpr double kEnamelThickness = 0.045, kEnamelFrom = 0.55;
 constexpr double kSmoothing = 0.05;
 

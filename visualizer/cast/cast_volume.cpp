@@ -17,10 +17,10 @@ namespace kerf {
 
 namespace {
 
-constexpr float kMost = 0.996F;  // opacity: 1 has no finite extinction
+constexpr float kMost = 0.996F;  // opacity; an opacity of 1 has no finite extinction
 constexpr double kBorder = 1.0;  // voxels of air around the volume: voxel v is at v + 1
 
-/// Samples below show nothing.
+/// Samples of a lower density show nothing.
 Density least_visible(CastMode mode, const VolumeView& volume, const TransferFunction& transfer) {
   if (mode == CastMode::iso) return volume.iso;
   return static_cast<Density>(std::max(1.0, std::floor(transfer.empty * kDensityMax)));
@@ -102,7 +102,7 @@ void CastVolume::take_cells(const VoxelBox& cells) {
   });
   const auto first = static_cast<std::ptrdiff_t>(outer_cells_.size());
   for (const auto& [x, y, z, face] : cells_.boundary_faces(near)) outer_cells_.push_back({x, y, z});
-  // The faces of a cell come together.
+  // The faces of a cell follow each other.
   outer_cells_.erase(std::unique(outer_cells_.begin() + first, outer_cells_.end()),
                      outer_cells_.end());
   body_ = {};
@@ -123,13 +123,13 @@ bool CastVolume::near_plane_is_inside(const View& view, const glm::dmat4& world_
     }
   }
   const VoxelGrid& grid = cells_.grid();
-  const auto index = [](double at, std::int32_t size) {  // one beyond is as good as any
+  const auto index = [](double at, std::int32_t size) {  // all indices outside are alike
     return static_cast<std::int32_t>(std::clamp(std::floor(at), -2.0, size + 1.0));
   };
   const VoxelBox around =
       VoxelBox{{index(low.x, grid.nx), index(low.y, grid.ny), index(low.z, grid.nz)},
                {index(high.x, grid.nx) + 1, index(high.y, grid.ny) + 1, index(high.z, grid.nz) + 1}}
-          .grown(1)  // the kernels compute with 24 bits
+          .grown(1)  // the kernels compute in float
           .clipped(body_);
   for (std::int32_t z = around.lo.z; z < around.hi.z; ++z) {
     for (std::int32_t y = around.lo.y; y < around.hi.y; ++y) {
@@ -185,7 +185,7 @@ CastEye cast_eye(const View& view, std::int32_t width, std::int32_t height) {
   const double span_mm = view.far_mm - view.near_mm;
   eye.depth_far = static_cast<float>(view.far_mm / span_mm);
   eye.depth_slope = static_cast<float>(view.far_mm * view.near_mm / span_mm);
-  // A plane goes over by the transposed inverse.
+  // A plane is transformed by the transposed inverse.
   const glm::dvec4 plane =
       glm::transpose(glm::affineInverse(view.eye_from_world)) * view.clip_plane;
   for (int i = 0; i < 4; ++i) eye.clip_plane[i] = static_cast<float>(plane[i]);

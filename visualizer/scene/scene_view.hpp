@@ -19,7 +19,8 @@
 
 namespace kerf {
 
-/// One volume as the eye needs it: voxel (i, j, k) stands at `world_from_voxel * (i, j, k, 1)`.
+/// One volume as the visualizer needs it. Voxel (i, j, k) stands at
+/// `world_from_voxel * (i, j, k, 1)`.
 struct VolumeView {
   std::string name;
   BrickGrid bricks;

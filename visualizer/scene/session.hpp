@@ -44,7 +44,8 @@ class RemovedVolume {
   std::vector<Volume> volumes_;
 };
 
-/// One run of a controller as the eye follows it: a connection and private copies of the volumes.
+/// One run of a controller as the visualizer sees it: a connection and private copies of the
+/// volumes.
 ///
 /// State-based: `poll` brings everything up to the present however long ago the last one was, so
 /// late join, a slow picture and a restarted visualizer are one case. Never waits for the

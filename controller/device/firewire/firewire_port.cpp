@@ -24,15 +24,14 @@ constexpr std::uint64_t kMode20010 = 0x20010;
 constexpr std::uint8_t kStreams = 0x08;  // of the control register
 constexpr std::array<std::uint8_t, 4> kModeBytes{0x00, 0x00, 0x0F, 0xF8};  // as on the bus
 
-// In ticks.
-// A refused or unanswered request is repeated after this many ticks.
+// These four in ticks. A refused or unanswered request is repeated after kRetryTicks, and a stream
+// that was silent for kSilentTurns is set up again, before the force has faded.
 constexpr int kRetryTicks = 20;
-// An active stream silent for this many ticks is set up again, before the force has faded.
 constexpr int kSilentTurns = 8;
-constexpr int kYieldTurns = 3;  // neutral packets before a stream stops
+constexpr int kYieldTurns = 3;  // of neutral packets before a stream stops
 constexpr std::uint32_t kHousekeepingTurns = 64;
 
-constexpr int kConnectMs = 4000;  // a recent bus reset alone holds allocations back for a second
+constexpr int kConnectMs = 4000;  // after a bus reset the kernel delays allocations by a second
 constexpr std::chrono::milliseconds kFewCycles{2};
 
 const omni::CommandBytes kNeutral = encode(OmniCommand{});
@@ -48,7 +47,8 @@ FirewirePort::FirewirePort(const FirewireOptions& options, int patience_ms,
 
 FirewirePort::~FirewirePort() {
   transmitter_.send(transmitted_, kNeutral);
-  std::this_thread::sleep_for(kFewCycles);  // it leaves before the device gets the command to stop
+  // The packet leaves before the device gets the command to stop.
+  std::this_thread::sleep_for(kFewCycles);
   if (const auto control = requests_.read_byte(kControl)) {
     requests_.write(kControl, static_cast<std::uint8_t>(*control & ~kStreams), 0);
     static_cast<void>(requests_.ready(kFirewireAnswerMs));

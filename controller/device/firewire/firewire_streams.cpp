@@ -165,7 +165,7 @@ void FirewireTransmitter::take(std::span<const std::uint8_t> event) noexcept {
   delay(wrapped(cycle - static_cast<std::int64_t>(sent_out_ - 1)));
 }
 
-/// Takes a lead over when it is later than the one that is known.
+/// Takes over a lead that is later than the known one.
 void FirewireTransmitter::delay(std::int32_t lead) noexcept {
   const std::int32_t known = lead_.load(std::memory_order_relaxed);
   if (known < 0 || cycles_between(known, lead) > 0) lead_ = lead;

@@ -179,9 +179,8 @@ struct DensityField {
 ///   w_g  of gradients: w; for balls 3 w - w / r, half the derivative of their peak at the iso,
 ///        times SUM w
 ///   w_x  of offsets: w; for balls w r. Trilinear values are too high at the edge of the density,
-///   in
-///        bands with a normal near an axis of the voxels; with w this would tilt the normal of a
-///        ball
+///        in bands with a normal near an axis of the voxels; with w this would tilt the normal of
+///        a ball
 ///
 /// In fixed r is Q15, weights are Q24, gradients are in the volume's densities over 2, offsets in
 /// Q0.15. All sums are exact, |sum| < 2^53, so no order and no instruction set matters.

@@ -26,7 +26,7 @@ template <class N>
 struct ConstraintPlane {
   ContactVec<typename N::Unit> normal{};  ///< out of the solid, length 1
   typename N::Real depth{};               ///< units; above 0: the tool is in too deep
-  ContactVec<typename N::Real> arm{};     ///< from the tool's centre to the contact, units
+  ContactVec<typename N::Real> lever{};   ///< from the tool's centre to the contact, units
   bool on_shaft = false;                  ///< met by shaft or handpiece (contact_query.hpp)
 
   friend constexpr bool operator==(const ConstraintPlane&,

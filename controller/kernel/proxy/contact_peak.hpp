@@ -224,8 +224,8 @@ template <class N>
   ConstraintPlane<N> plane;
   plane.normal = round ? ball_normal<N>(means, downhill) : downhill;
   plane.depth = depth_of<N>(peak_height(means, round), slope_along(means, plane.normal, round));
-  plane.arm = {multiply<Real>(means.offset.x, reach), multiply<Real>(means.offset.y, reach),
-               multiply<Real>(means.offset.z, reach)};
+  plane.lever = {multiply<Real>(means.offset.x, reach), multiply<Real>(means.offset.y, reach),
+                 multiply<Real>(means.offset.z, reach)};
   return plane;
 }
 

@@ -181,10 +181,10 @@ class PartQuery {
     ContactVolume<N> seen = volume;
     for (int look = 0; look < kMidRampQueries; ++look) {
       if (plane.normal == ContactVec<Unit>{} || !may_query()) return;
-      const auto arm = points_.table.round ? times<N>(-plane.normal, points_.reach) : plane.arm;
+      const auto lever = points_.table.round ? times<N>(-plane.normal, points_.reach) : plane.lever;
       const auto middle = ramp_middle<N>([&](Real below) {
         budget().spend(QueryWork::kFreeStep);
-        return Reader::density_at(volume, q + arm - times<N>(plane.normal, below));
+        return Reader::density_at(volume, q + lever - times<N>(plane.normal, below));
       });
       if (middle.level == 0 || !may_query()) return;
       seen.field.scale = density_scale(middle.level);
@@ -196,7 +196,7 @@ class PartQuery {
       const Unit alike = dot(found.normal, plane.normal);
       if (alike <= Unit(0)) return;
       plane.normal = found.normal;
-      plane.arm = found.arm;
+      plane.lever = found.lever;
       if (alike > Unit(kMidwayAlike)) return;
     }
   }
@@ -327,7 +327,7 @@ class ContactQuery {
       if (!of_part.no_normal) of_part = part.query.query(at, refined && !short_of_work);
       for (std::size_t i = 0; i < static_cast<std::size_t>(of_part.count); ++i) {
         ConstraintPlane<N> plane = of_part.plane[i];
-        plane.arm = plane.arm + part.from_head;
+        plane.lever = plane.lever + part.from_head;
         plane.on_shaft = true;
         insert(contacts, plane);
       }

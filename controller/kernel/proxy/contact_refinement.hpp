@@ -61,10 +61,10 @@ class ContactRefinement {
     // If the tool touches at two positions, the peak from two means may be at neither of them.
     if (seen.height <= Ratio(0)) return;
     const auto offset = turned_offset<N>(seen.offset, reader_.rows());
-    const ContactVec<Real> arm{multiply<Real>(offset.x, points_.reach),
-                               multiply<Real>(offset.y, points_.reach),
-                               multiply<Real>(offset.z, points_.reach)};
-    const VoxelVec<Real> middle = at_ + volume_.frame.voxel_from_contact * arm;
+    const ContactVec<Real> lever{multiply<Real>(offset.x, points_.reach),
+                                 multiply<Real>(offset.y, points_.reach),
+                                 multiply<Real>(offset.z, points_.reach)};
+    const VoxelVec<Real> middle = at_ + volume_.frame.voxel_from_contact * lever;
     // The first patch is inclined, as its normal is that of the middle.
     Patch<N> patch = patch_at(middle, plane.normal);
     patch = patch_at(middle, direction<N>(-patch.gradient));
@@ -89,7 +89,7 @@ class ContactRefinement {
     plane.depth = std::max(depth_of<N>(own + multiply<Ratio>(alike, highest - own), slope),
                            depth_of<N>(highest, std::max(slope, slope_of_face(steep))) - less);
     const Unit counts = alike * narrowness<N>(sums_, means_.top);
-    plane.arm = plane.arm + part_of<N>(arm - plane.arm, counts);
+    plane.lever = plane.lever + part_of<N>(lever - plane.lever, counts);
     const auto own_normal = direction<N>(-turned_offset<N>(seen.normal, reader_.rows()));
     const auto smoother = between<N>(facing, own_normal, smoothness<N>(seen.spread, patch.spread));
     plane.normal = between<N>(plane.normal, smoother, counts);

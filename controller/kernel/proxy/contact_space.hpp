@@ -101,17 +101,17 @@ template <class N>
   return {v.x / length, v.y / length, v.z / length};
 }
 
-/// Moment of a unit force along `direction` that acts at `arm`: a moment arm in units.
+/// Moment of a unit force along `direction` that acts at `lever`: a moment arm in units.
 template <class N>
 [[nodiscard]] constexpr ContactVec<typename N::Real> moment(
-    ContactVec<typename N::Real> arm, ContactVec<typename N::Unit> direction) noexcept {
+    ContactVec<typename N::Real> lever, ContactVec<typename N::Unit> direction) noexcept {
   using Real = typename N::Real;
   const auto part = [](Real a, typename N::Unit p, Real b, typename N::Unit q) {
     return multiply<Real>(p, a) - multiply<Real>(q, b);
   };
-  return {part(arm.y, direction.z, arm.z, direction.y),
-          part(arm.z, direction.x, arm.x, direction.z),
-          part(arm.x, direction.y, arm.y, direction.x)};
+  return {part(lever.y, direction.z, lever.z, direction.y),
+          part(lever.z, direction.x, lever.x, direction.z),
+          part(lever.x, direction.y, lever.y, direction.x)};
 }
 
 /// Orientation of a tool, from its own axes to those of the world: a unit quaternion.

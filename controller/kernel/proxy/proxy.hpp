@@ -157,7 +157,7 @@ struct ProxyContact {
   /// Torque about the tool's centre over the force's length, units.
   ContactVec<typename N::Real> moment_arm{};
   /// From the tool's centre to the middle of the head's loads, units.
-  ContactVec<typename N::Real> head_arm{};
+  ContactVec<typename N::Real> head_lever{};
   /// The planes that hold the tool, and the load of each over the length of the spring.
   ConstraintSet<N> planes{};
   std::array<typename N::Real, kMaxPlanes> part{};
@@ -182,12 +182,12 @@ constexpr void add_loads(const SweepResult<N>& swept, typename N::Unit friction,
   using Real = typename N::Real;
   const Real length = norm(contact.spring);
   if (length < Real(1e-3)) return;
-  ContactVec<Real> pressed{}, on_shaft{}, arm{}, head_arm{};
+  ContactVec<Real> pressed{}, on_shaft{}, lever{}, head_lever{};
   Real whole(0), shaft_load(0);
   for (std::size_t i = 0; i < swept.planes.count; ++i) whole = whole + swept.slide.load[i];
   const bool loaded = whole >= Real(1e-3);
   if (!loaded && moving) return;
-  if (!loaded && swept.planes.count > 0) arm = head_arm = swept.planes.plane[0].arm;
+  if (!loaded && swept.planes.count > 0) lever = head_lever = swept.planes.plane[0].lever;
   if (loaded) contact.planes = swept.planes;
   for (std::size_t i = 0; loaded && i < swept.planes.count; ++i) {
     const ConstraintPlane<N>& plane = swept.planes.plane[i];
@@ -197,11 +197,12 @@ constexpr void add_loads(const SweepResult<N>& swept, typename N::Unit friction,
       on_shaft = on_shaft + times<N>(plane.normal, load);
       shaft_load = shaft_load + load;
     } else {
-      head_arm = head_arm + part_of<N>(plane.arm, fraction<N>(load, whole));
+      head_lever = head_lever + part_of<N>(plane.lever, fraction<N>(load, whole));
     }
-    arm = arm + part_of<N>(plane.arm, fraction<N>(load, whole));
+    lever = lever + part_of<N>(plane.lever, fraction<N>(load, whole));
     contact.part[i] = load / length;
-    contact.moment_arm = contact.moment_arm + moment<N>(plane.arm, plane.normal) * contact.part[i];
+    contact.moment_arm =
+        contact.moment_arm + moment<N>(plane.lever, plane.normal) * contact.part[i];
   }
   const ContactVec<Real> along_faces = contact.spring - pressed;
   const Real rubbed = norm(along_faces);
@@ -214,13 +215,13 @@ constexpr void add_loads(const SweepResult<N>& swept, typename N::Unit friction,
   if (shaft_load <= Real(0) || by_head >= Real(SweepRules::kTolerance)) {
     contact.normal = direction_of<N>(head);
   }
-  contact.moment_arm = contact.moment_arm + moment<N>(arm, direction_of<N>(along_faces)) *
+  contact.moment_arm = contact.moment_arm + moment<N>(lever, direction_of<N>(along_faces)) *
                                                 (std::min(rubbed, length) / length);
-  contact.head_arm = head_arm;
+  contact.head_lever = head_lever;
   contact.press = direction_of<N>(pressed);
   if (shaft_load <= Real(0)) return;
   const Real on_head = whole - shaft_load;
-  if (on_head > Real(1e-3)) contact.head_arm = head_arm * (whole / on_head);
+  if (on_head > Real(1e-3)) contact.head_lever = head_lever * (whole / on_head);
   contact.shaft_fraction = fraction<N>(std::min(shaft_load, length), length);
   // If the loads of shaft and head oppose each other, each may exceed the press of the hand.
   const Real together = norm(pressed);

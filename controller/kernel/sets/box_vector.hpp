@@ -18,8 +18,8 @@ using V = Simd::V;
 
 constexpr std::int16_t kAir = -32768;  ///< density 0 after re-centring
 
-/// Visible to the optimiser only: accumulators in an array stay in registers when every loop over
-/// them is gone before they are placed.
+/// Unrolls a loop completely: accumulators in an array stay in registers only if no loop over them
+/// is left when the compiler assigns registers. Changes no result.
 #if defined(__clang__)
 #define KERF_UNROLL _Pragma("clang loop unroll(full)")
 #else

@@ -39,7 +39,7 @@ std::uint64_t press_operations(const AlignedTable& table) {
 }
 
 /// A tool that is round or does not turn, on the volume's lattice: a correlation of the density
-/// with one table, which volumes that it is turned alike in share.
+/// with one table. Volumes in which the tool has the same orientation share a table.
 class AlignedMethod final : public ToolMethod {
  public:
   constexpr AlignedMethod() noexcept : ToolMethod(Method::aligned, "aligned", "") {}

@@ -8,7 +8,7 @@
 namespace kerf {
 namespace {
 
-//                         avx512  avx2  neon  scalar  float  double
+//                        avx512 avx2 neon scalar double
 constexpr UnitCosts kContact{0.2, 0.3, 1, 3, 2};
 constexpr UnitCosts kOverlap{0, 0, 0, 0, 1.1};
 constexpr UnitCosts kModification{0, 0, 0, 0, 0.5};

@@ -26,7 +26,7 @@ constexpr double kRightAngle = std::numbers::pi / 2;
 /// Cells along one axis: with floors at both ends, a span of E voxels may reach one cell more than
 /// E + 1.
 std::int32_t cells_of(double span_vox) {
-  constexpr double kRounding = 1e-6;  // of the steps: it must not lose a cell
+  constexpr double kRounding = 1e-6;  // of the span, which must not lose a cell
   return static_cast<std::int32_t>(std::floor(span_vox + kRounding)) + 2;
 }
 
@@ -67,7 +67,7 @@ class Spans {
   static constexpr std::size_t kAngles = 1024;
   static constexpr double kStep = kRightAngle / kAngles;
   std::array<double, kAngles + 1> by_angle_{};
-  std::array<double, kAngles> least_cosine_{};  ///< For which i is the nearest of the angles.
+  std::array<double, kAngles> least_cosine_{};  ///< of the cosines to which angle i is nearest
   double diameter_ = 0;
 };
 

@@ -27,7 +27,7 @@ namespace kerf {
 /// generation.
 class FirewireClient : public std::enable_shared_from_this<FirewireClient> {
  public:
-  /// `node`: whose file it is, kOmniNodeId or kHostNodeId.
+  /// `node`: the node whose file it is, kOmniNodeId or kHostNodeId.
   FirewireClient(FirewireBus& bus, std::uint32_t node)
       : bus_(bus), node_(node), next_handle_(bus.settings().abi_version > 5 ? 1 : 0) {}
   ~FirewireClient();
@@ -47,7 +47,7 @@ class FirewireClient : public std::enable_shared_from_this<FirewireClient> {
   /// The lowest isochronous channel that it holds; -1 if none.
   [[nodiscard]] std::int32_t lowest_channel() const noexcept;
   [[nodiscard]] std::uint32_t node() const noexcept { return node_; }
-  /// From now on everything is ENODEV.
+  /// From now on every call returns ENODEV.
   void shut_down() noexcept { gone_ = true; }
   [[nodiscard]] bool gone() const noexcept { return gone_; }
 

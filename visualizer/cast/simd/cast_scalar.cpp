@@ -5,7 +5,7 @@
 
 #include "visualizer/cast/cast_kernels.hpp"
 
-// One ray at a time, for any machine: what the packets are compared with.
+// One ray at a time, for any machine: the reference for the packets of the other sets.
 
 namespace kerf {
 namespace {
@@ -30,7 +30,7 @@ struct Simd {
   static F from_bits(I a) noexcept { return __builtin_bit_cast(F, a); }
   static I high_half(I a) noexcept { return a >> 16 & 0xffff; }
   static F sqrt(F a) noexcept { return __builtin_sqrtf(a); }
-  /// b if a is not a number, here and in `max`.
+  /// If a is NaN, `min` and `max` return b.
   static F min(F a, F b) noexcept { return a < b ? a : b; }
   static F max(F a, F b) noexcept { return a > b ? a : b; }
 
