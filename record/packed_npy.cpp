@@ -54,7 +54,11 @@ bool PackedNpyReader::read(std::span<std::byte> content) {
 
 bool PackedNpyReader::at_end() {
   char beyond = 0;
-  return file_ != nullptr && gzread(handle(file_.get()), &beyond, 1) == 0;
+  if (file_ == nullptr || gzread(handle(file_.get()), &beyond, 1) != 0) return false;
+  int status =
+      Z_OK;  // Z_BUF_ERROR: the file ends within its checksum, which gzread takes for an end
+  static_cast<void>(gzerror(handle(file_.get()), &status));
+  return status == Z_OK;
 }
 
 }  // namespace kerf

@@ -28,7 +28,7 @@ class PackedNpyReader {
   [[nodiscard]] bool is_sound() const noexcept { return file_ != nullptr; }
   /// Fills `content` with the next bytes; false if there are not as many.
   [[nodiscard]] bool read(std::span<std::byte> content);
-  /// Whether the file ends here. False if its checksum is wrong; a missing one is not noticed.
+  /// Whether the file ends here, complete. False if its checksum is wrong or cut off.
   [[nodiscard]] bool at_end();
 
  private:
