@@ -42,8 +42,6 @@ class ArmExchange {
   /// The force is zero at the latest this long after the last command, whatever has happened to the
   /// controller.
   static constexpr std::int64_t kZeroNs = 20'000'000;
-  /// A command therefore expires one frame before `kZeroNs`, and at least 1 ms before it.
-  [[nodiscard]] std::int64_t command_life_ns() const noexcept { return command_life_ns_; }
   /// Lowest frame rate: at this rate commands still live for three quarters of `kZeroNs`.
   static constexpr int kSlowestHz = 200;
   /// After `let_go` the exchange is finished once all frames over this time, and at least kFewest,
@@ -96,6 +94,7 @@ class ArmExchange {
 
   ArmPageAdapter& page_;
   double peak_n_;
+  /// A command expires one frame before `kZeroNs`, and at least 1 ms before it.
   std::int64_t command_life_ns_;
   Clock* clock_;
   std::atomic<bool> is_let_go_{false}, is_finished_{false};

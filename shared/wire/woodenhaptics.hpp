@@ -51,9 +51,6 @@ inline constexpr std::array<double, 3> kTorqueNmmPerA2015{25.9, 25.9, 25.9};
 inline constexpr int kMaxMilliamps = 2000;        ///< cap of the makers' host
 inline constexpr int kAmplifierMilliamps = 3000;  ///< at full duty of the firmware
 
-/// The makers' limit.
-inline constexpr double kMaxForceN = 5.0;
-
 /// After so long without a report of the host the firmware switches the amplifiers off.
 inline constexpr double kWatchdogS = 0.5;
 
