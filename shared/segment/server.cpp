@@ -230,8 +230,5 @@ SegmentServer::~SegmentServer() = default;
 std::optional<Command> SegmentServer::take_command() noexcept {
   return state_->commands.take();
 }
-const std::string& SegmentServer::socket_path() const noexcept {
-  return state_->path;
-}
 
 }  // namespace kerf
