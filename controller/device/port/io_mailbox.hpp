@@ -6,6 +6,7 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 
 #include <poll.h>
@@ -85,24 +86,17 @@ class SpscRing {
  public:
   /// The writer. False if the reader is kPlaces behind: the packet is lost then.
   bool put(std::span<const std::uint8_t> packet) noexcept {
-    const std::size_t end = end_.load(std::memory_order_relaxed);
-    if (end - begin_.load(std::memory_order_acquire) == kPlaces) return false;
-    places_[end % kPlaces].assign(packet);
-    end_.store(end + 1, std::memory_order_release);
-    return true;
+    MailboxPacket copy;
+    copy.assign(packet);
+    return packets_.push(copy);
   }
   /// The reader. Size of the oldest packet; 0 when there is none.
   [[nodiscard]] std::size_t take(std::span<std::uint8_t> out) noexcept {
-    const std::size_t begin = begin_.load(std::memory_order_relaxed);
-    if (begin == end_.load(std::memory_order_acquire)) return 0;
-    const std::size_t size = places_[begin % kPlaces].copy_to(out);
-    begin_.store(begin + 1, std::memory_order_release);
-    return size;
+    const std::optional<MailboxPacket> packet = packets_.take();
+    return packet ? packet->copy_to(out) : 0;
   }
   /// Any thread.
-  [[nodiscard]] bool empty() const noexcept {
-    return begin_.load(std::memory_order_acquire) == end_.load(std::memory_order_acquire);
-  }
+  [[nodiscard]] bool empty() const noexcept { return packets_.empty(); }
   /// The reader: sleeps until there is a packet; false after so many milliseconds, or once `closed`
   /// with nothing left.
   [[nodiscard]] bool wait(int milliseconds, const std::atomic<bool>& closed) const noexcept {
@@ -117,9 +111,8 @@ class SpscRing {
 
  private:
   static constexpr std::int64_t kPollNs = 50'000;
-  static constexpr std::size_t kPlaces = 64;
-  std::array<MailboxPacket, kPlaces> places_{};
-  std::atomic<std::size_t> begin_{0}, end_{0};
+  static constexpr std::uint32_t kPlaces = 64;
+  SpscQueue<MailboxPacket, kPlaces> packets_;
 };
 
 /// The next command: any thread and any signal handler writes, one reader takes the newest, and
