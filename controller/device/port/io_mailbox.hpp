@@ -10,7 +10,9 @@
 #include <span>
 
 #include <poll.h>
+#include <unistd.h>
 
+#include "controller/device/port/packet_port.hpp"
 #include "shared/posix/monotonic_clock.hpp"
 #include "shared/posix/threads.hpp"
 
@@ -202,6 +204,33 @@ class LatestCommand {
   std::atomic<std::uint64_t> next_ticket_{kFree + 1};
   std::atomic<bool> on_its_way_{false};
   std::uint64_t newest_taken_ = kFree;  ///< of the reader: older packets came too late
+};
+
+/// A port whose packets pass through these mailboxes, to and from I/O threads of its own.
+class MailboxPort : public PacketPort {
+ public:
+  [[nodiscard]] std::size_t receive(std::span<std::uint8_t> out) noexcept final {
+    return inbox_.take(out);
+  }
+  bool send_last(std::span<const std::uint8_t> packet) noexcept final {
+    if (gettid() == sender_id_) return false;  // no thread is left to send it
+    return outbox_.send_and_wait([&] { return send_now(packet); }, kLastPacketMs);
+  }
+  [[nodiscard]] bool closed() const noexcept final {
+    return closed_.load(std::memory_order_relaxed);
+  }
+  [[nodiscard]] bool wait(int milliseconds) noexcept final {
+    return inbox_.wait(milliseconds, closed_);
+  }
+
+ protected:
+  static constexpr int kLastPacketMs = 20;
+
+  SpscRing inbox_;
+  LatestCommand outbox_;
+  std::atomic<bool> closed_{false};  ///< no report comes any more
+  std::atomic<bool> stop_{false};
+  std::atomic<int> sender_id_{0};  ///< of the thread that sends
 };
 
 }  // namespace kerf
