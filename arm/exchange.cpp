@@ -5,14 +5,13 @@
 #include <cmath>
 #include <cstddef>
 
+#include "shared/numeric/linear_algebra.hpp"
+
 namespace kerf {
 namespace {
 
-using Vec3 = std::array<double, 3>;
-
-double dot(const Vec3& a, const Vec3& b) noexcept {
-  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
+using Vec3 = vec3::Vec;
+using vec3::dot;
 
 }  // namespace
 
@@ -20,8 +19,7 @@ std::optional<std::array<double, 4>> orientation_of(const Vec3& x, const Vec3& y
                                                     const Vec3& z) noexcept {
   constexpr double kWithin = 0.05;
   const auto is = [](double value, double wanted) { return std::abs(value - wanted) <= kWithin; };
-  const Vec3 across{x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2],
-                    x[0] * y[1] - x[1] * y[0]};
+  const Vec3 across = vec3::cross(x, y);
   if (!is(dot(x, x), 1) || !is(dot(y, y), 1) || !is(dot(z, z), 1) || !is(dot(x, y), 0) ||
       !is(dot(y, z), 0) || !is(dot(z, x), 0) || !(dot(across, z) > 0)) {  // the last: left-handed
     return std::nullopt;

@@ -42,8 +42,6 @@ class ArmExchange {
   /// The force is zero at most this long after the last command, even if the controller has
   /// crashed.
   static constexpr std::int64_t kZeroNs = 20'000'000;
-  /// Life of a command: `kZeroNs` minus one frame or 1 ms, whichever is longer.
-  [[nodiscard]] std::int64_t command_life_ns() const noexcept { return command_life_ns_; }
   /// Lowest frame rate; with it a command lives for three quarters of `kZeroNs`.
   static constexpr int kSlowestHz = 200;
   /// After `let_go` the exchange is finished once frames of zero force have run for this time, and
@@ -97,6 +95,7 @@ class ArmExchange {
 
   ArmPageAdapter& page_;
   double peak_n_;
+  /// A command expires one frame before `kZeroNs`, and at least 1 ms before it.
   std::int64_t command_life_ns_;
   Clock* clock_;
   std::atomic<bool> is_let_go_{false}, is_finished_{false};

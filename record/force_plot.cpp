@@ -32,16 +32,6 @@ struct Curve {
   }
 };
 
-[[nodiscard]] Json json_of(Curve& curve) {
-  Json times = Json::List{};
-  Json values = Json::List{};
-  for (const Envelope::Point& point : curve.envelope.points()) {
-    times.push_back(point.x);
-    values.push_back(point.y);
-  }
-  return {{"name", curve.name}, {"s", std::move(times)}, {"values", std::move(values)}};
-}
-
 /// `{end_s, curves: [{name, s, values}], sources: [...]}`, the sources of energy that did any work.
 /// With two arms the curves of the first have commanded_2 and penetration_2 of the second.
 [[nodiscard]] Json curves_of(const std::filesystem::path& folder, TickRange range,
@@ -98,14 +88,14 @@ struct Curve {
   Json sources = Json::List{};
   for (std::size_t i = 0; i < curves.size(); ++i) {
     if (i < first_source) {
-      parts.push_back(json_of(curves[i]));
+      parts.push_back(json_of(curves[i].name, curves[i].envelope));
     } else if (!curves[i].is_zero) {
-      sources.push_back(json_of(curves[i]));
+      sources.push_back(json_of(curves[i].name, curves[i].envelope));
     }
   }
   if (arm == 0 && manifest.arms > 1) {
-    parts.push_back(json_of(second_force));
-    parts.push_back(json_of(second_depth));
+    parts.push_back(json_of(second_force.name, second_force.envelope));
+    parts.push_back(json_of(second_depth.name, second_depth.envelope));
   }
   return {{"end_s", end_s + manifest.tick_ns * 1e-9},
           {"curves", std::move(parts)},
@@ -113,6 +103,16 @@ struct Curve {
 }
 
 }  // namespace
+
+Json json_of(std::string_view name, Envelope& envelope) {
+  Json times = Json::List{};
+  Json values = Json::List{};
+  for (const Envelope::Point& point : envelope.points()) {
+    times.push_back(point.x);
+    values.push_back(point.y);
+  }
+  return {{"name", name}, {"s", std::move(times)}, {"values", std::move(values)}};
+}
 
 void plot_forces(const std::filesystem::path& folder, const std::filesystem::path& svg,
                  TickRange range, std::size_t arm) {

@@ -4,9 +4,11 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <string_view>
 #include <vector>
 
 #include "record/tick_log.hpp"
+#include "shared/text/json.hpp"
 
 // The forces of a recording as a plot.
 
@@ -61,5 +63,8 @@ class Envelope {
   Point low_, high_;
   std::vector<Point> points_;
 };
+
+/// `{name, s, values}` of a finished curve over seconds.
+[[nodiscard]] Json json_of(std::string_view name, Envelope& envelope);
 
 }  // namespace kerf

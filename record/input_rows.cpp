@@ -72,10 +72,4 @@ void InputReader::read_file() {
   }
 }
 
-void for_each_input(const std::filesystem::path& folder, Tick last, std::size_t arms,
-                    const std::function<void(std::span<const TickRecord>)>& visit) {
-  InputReader reader(folder, last, arms);
-  for (auto tick = reader.next(); !tick.empty(); tick = reader.next()) visit(tick);
-}
-
 }  // namespace kerf

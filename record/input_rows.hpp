@@ -5,7 +5,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
-#include <functional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -70,11 +69,5 @@ class InputReader {
   std::array<std::vector<TickInputs>, kMaxArms> rows_;  ///< of the file with `next_`
   std::array<TickRecord, kMaxArms> tick_{};
 };
-
-/// Calls `visit` for each tick from 1 to `last` in order, with the inputs of each of `arms` that
-/// the recording in `folder` has; the other columns are 0. Throws `RecordError`, one line, at a
-/// missing or damaged file, after `visit` was called for the ticks before it.
-void for_each_input(const std::filesystem::path& folder, Tick last, std::size_t arms,
-                    const std::function<void(std::span<const TickRecord>)>& visit);
 
 }  // namespace kerf

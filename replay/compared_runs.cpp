@@ -86,16 +86,7 @@ std::string ComparedRuns::text() const {
 void ComparedRuns::plot(const std::filesystem::path& svg) {
   if (seconds_ == 0) throw RecordError(svg.string() + ": no tick was replayed; nothing to plot");
   Json curves = Json::List{};
-  for (Curve& curve : curves_) {
-    Json times = Json::List{};
-    Json values = Json::List{};
-    for (const Envelope::Point& point : curve.envelope.points()) {
-      times.push_back(point.x);
-      values.push_back(point.y);
-    }
-    curves.push_back(
-        {{"name", curve.name}, {"s", std::move(times)}, {"values", std::move(values)}});
-  }
+  for (Curve& curve : curves_) curves.push_back(json_of(curve.name, curve.envelope));
   const Json data = {{"end_s", seconds_}, {"curves", std::move(curves)}};
   write_new_file(svg, make_report({"recording", "replay"}, data.canonical()));
 }

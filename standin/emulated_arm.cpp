@@ -4,17 +4,16 @@
 #include <algorithm>
 #include <cerrno>
 #include <cmath>
-#include <cstring>
 #include <stdexcept>
 #include <string>
 #include <system_error>
 
 #include <poll.h>
 #include <sys/socket.h>
-#include <sys/un.h>
 #include <unistd.h>
 
 #include "shared/posix/monotonic_clock.hpp"
+#include "shared/posix/sockets.hpp"
 #include "shared/wire/emulator_link.hpp"
 
 namespace kerf::standin {
@@ -48,14 +47,12 @@ EmulatedArm::~EmulatedArm() {
 }
 
 void EmulatedArm::connect_to(const std::string& path) {
-  sockaddr_un address{};
-  address.sun_family = AF_UNIX;
-  if (path.size() >= sizeof address.sun_path) {
+  if (path.size() >= sizeof(sockaddr_un::sun_path)) {
     throw std::runtime_error(path + ": a socket path has at most " +
-                             std::to_string(sizeof address.sun_path - 1) +
+                             std::to_string(sizeof(sockaddr_un::sun_path) - 1) +
                              " bytes; use a shorter one");
   }
-  std::memcpy(address.sun_path, path.c_str(), path.size() + 1);
+  const sockaddr_un address = unix_address(path);
   fd_ = socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0);
   // NOLINTNEXTLINE(cppcoreguidelines-pro-type-reinterpret-cast): the sockets API asks for it
   if (fd_ < 0 || connect(fd_, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {

@@ -77,18 +77,20 @@ KERF_EXPORT(rate_hz) int rate_hz() {
 }
 
 KERF_EXPORT(join_viewer) void join_viewer() {
-  with_open([](auto& one) { one.join(); });
+  with_open([](auto& one) { one.viewer().join(); });
 }
 KERF_EXPORT(slot) void slot(int ended) {
-  with_open([=](auto& one) { one.slot(ended != 0); });
+  replay ? replay->slot(ended != 0) : run->viewer().slot(ended != 0);
 }
 /// Length of the next message; 0 if none is due.
 KERF_EXPORT(next_message) std::size_t next_message() {
-  return with_open([](auto& one) { return one.next(buffer); }) ? buffer.size() : 0;
+  return with_open([](auto& one) { return one.viewer().next(buffer); }) ? buffer.size() : 0;
 }
 /// The buffer has a message of the viewer. Returns whether it is one.
 KERF_EXPORT(take_message) int take_message(std::size_t bytes) {
-  return with_open([=](auto& one) { return one.take(std::span(buffer).first(bytes)); }) ? 1 : 0;
+  return with_open([=](auto& one) { return one.viewer().take(std::span(buffer).first(bytes)); })
+             ? 1
+             : 0;
 }
 
 KERF_EXPORT(lead) void lead(double x, double y, double z, double yaw, double pitch, int button) {

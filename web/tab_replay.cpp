@@ -15,7 +15,6 @@
 #include "shared/text/json.hpp"
 #include "shared/text/text.hpp"
 #include "web/absent/parser_line.hpp"
-#include "web/tab_viewer.hpp"
 
 namespace kerf::web {
 namespace {
@@ -112,18 +111,12 @@ void TabReplay::go(Tick tick) {
   s.goal = tick;
 }
 
-void TabReplay::join() {
-  state_->viewer.join();
+TabViewer& TabReplay::viewer() noexcept {
+  return state_->viewer;
 }
 void TabReplay::slot(bool ended) {
   if (state_->shown) state_->shown->rest();
   state_->viewer.slot(ended);
-}
-bool TabReplay::next(std::vector<std::byte>& message) {
-  return state_->viewer.next(message);
-}
-bool TabReplay::take(std::span<const std::byte> message) {
-  return state_->viewer.take(message);
 }
 
 int TabReplay::rate_hz() const noexcept {

@@ -1,14 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <cstddef>
 #include <filesystem>
 #include <memory>
-#include <span>
 #include <string>
-#include <vector>
 
 #include "shared/segment/layout.hpp"
+#include "web/tab_viewer.hpp"
 
 namespace kerf::web {
 
@@ -41,11 +39,9 @@ class TabReplay {
   /// To that tick, by `prepare`. Before the first `prepare` is done it does nothing.
   void go(Tick tick);
 
-  /// As of TabViewer. A slot without a step is a sign of life, too.
-  void join();
+  [[nodiscard]] TabViewer& viewer() noexcept;
+  /// In place of the viewer's. A slot without a step is a sign of life, too.
   void slot(bool ended);
-  [[nodiscard]] bool next(std::vector<std::byte>& message);
-  bool take(std::span<const std::byte> message);
 
   [[nodiscard]] int rate_hz() const noexcept;
   /// JSON: tick_ns, tick, first_tick, last_tick, earlier_tick (of those before the first one),

@@ -28,7 +28,6 @@
 #include "shared/text/json.hpp"
 #include "shared/text/text.hpp"
 #include "web/tab_port.hpp"
-#include "web/tab_viewer.hpp"
 
 namespace kerf::web {
 namespace {
@@ -198,17 +197,8 @@ int TabRun::step(int ticks, std::uint64_t most_armed) noexcept {
   return made;
 }
 
-void TabRun::join() {
-  state_->viewer.join();
-}
-void TabRun::slot(bool ended) {
-  state_->viewer.slot(ended);
-}
-bool TabRun::next(std::vector<std::byte>& message) {
-  return state_->viewer.next(message);
-}
-bool TabRun::take(std::span<const std::byte> message) {
-  return state_->viewer.take(message);
+TabViewer& TabRun::viewer() noexcept {
+  return state_->viewer;
 }
 
 void TabRun::lead(const std::array<double, 3>& world_mm,

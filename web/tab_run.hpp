@@ -2,13 +2,13 @@
 #pragma once
 
 #include <array>
-#include <cstddef>
 #include <cstdint>
 #include <memory>
-#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
+
+#include "web/tab_viewer.hpp"
 
 namespace kerf::web {
 
@@ -41,11 +41,7 @@ class TabRun {
   /// in hand, as the seconds of `./kerf demo` count. Returns the steps made.
   int step(int ticks, std::uint64_t most_armed = UINT64_MAX) noexcept;
 
-  /// As of TabViewer.
-  void join();
-  void slot(bool ended);
-  [[nodiscard]] bool next(std::vector<std::byte>& message);
-  bool take(std::span<const std::byte> message);
+  [[nodiscard]] TabViewer& viewer() noexcept;
 
   /// Once its script has ended, the hand follows a point of the world, mm. `button` is the pedal.
   void lead(const std::array<double, 3>& world_mm, const std::array<double, 3>& orientation_rad,

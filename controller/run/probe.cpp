@@ -89,10 +89,6 @@ namespace {
 constexpr int kPatienceMs = 2000;
 constexpr int kDefaultRateHz = 1000;
 
-std::string text_of(Personality personality) {
-  return std::string(word_of(personality));
-}
-
 /// The device as the scene describes it; without a scene, with the defaults of its kind.
 DeviceSettings device_of(const ControllerOptions& options) {
   DeviceSettings device;
@@ -108,7 +104,7 @@ DeviceSettings device_of(const ControllerOptions& options) {
 /// Adds the next steps of a start that the device itself still needs.
 void add_lacks_of_device(const DeviceSettings& device, const ProbeView::Seen& seen,
                          std::uint64_t refused, std::vector<SetupProblem>& lacks) {
-  const std::string name = text_of(device.personality);
+  const std::string name(word_of(device.personality));
   if (seen.reports == 0 && refused > 0) {
     lacks.push_back({name + ": not one of " + std::to_string(refused) + " packets is its report",
                      "check --device and the firmware; docs/wire.md has the bytes"});
@@ -214,7 +210,7 @@ int stopped_early(const ControllerOptions& options, Personality kind) {
   if (!options.report.empty()) {
     const Json json{{"program", "kerf-controller --probe"},
                     {"version", KERF_VERSION},
-                    {"device", text_of(kind)},
+                    {"device", word_of(kind)},
                     {"port", options.ports.front()},
                     {"waiting", waiting}};
     write_new_file(options.report, json.document());
@@ -229,8 +225,9 @@ int look_around(const ControllerOptions& options) {
   lacks.insert(lacks.end(), rights.begin(), rights.end());
   Json devices = Json::List{};
   for (const DeviceNode& node : nodes) {
-    std::printf("found    %s at %s\n", text_of(node.personality).c_str(), node.path.c_str());
-    devices.push_back({{"device", text_of(node.personality)},
+    std::printf("found    %s at %s\n", std::string(word_of(node.personality)).c_str(),
+                node.path.c_str());
+    devices.push_back({{"device", word_of(node.personality)},
                        {"node", node.path},
                        {"usable", node.open_error == 0}});
   }
@@ -260,7 +257,7 @@ Json report_of(const ControllerOptions& options, const DeviceSettings& device,
   const double seconds = static_cast<double>(seen.ticks) / rate_hz;
   return {{"program", "kerf-controller --probe"},
           {"version", KERF_VERSION},
-          {"device", text_of(device.personality)},
+          {"device", word_of(device.personality)},
           {"port", options.ports.front()},
           {"seconds", seconds},
           {"reports", seen.reports},

@@ -107,7 +107,7 @@ Json json_of(const std::vector<LinkCounter>& link) {
   return json;
 }
 
-Json second_json(const SecondArmReport& arm, const ArmRecord& r) {
+Json second_json(const ArmReport& arm, const ArmRecord& r) {
   return {{"device", arm.device},
           {"tool", arm.tool},
           {"in_use", r.in_use},
@@ -131,7 +131,7 @@ std::string contact_line(const ArmRecord& r) {
                 static_cast<unsigned long long>(r.contact_ticks), r.peak_force_n, r.absorbed_mj);
 }
 
-std::string second_lines(const SecondArmReport& arm, const ArmRecord& r) {
+std::string second_lines(const ArmReport& arm, const ArmRecord& r) {
   return format("\n  second arm %s with tool %s%s\n", arm.device.c_str(), arm.tool.c_str(),
                 r.in_use ? "" : ", never in use") +
          contact_line(r) + energy_line(r) +

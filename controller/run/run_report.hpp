@@ -21,8 +21,8 @@ struct MaterialScore {
 };
 using MaterialScores = std::vector<MaterialScore>;
 
-/// What a report has of the second arm, beside its record.
-struct SecondArmReport {
+/// What a report has of each arm, beside its record.
+struct ArmReport {
   std::string device;
   std::string tool;    ///< at the start of the run
   double tool_mm = 0;  ///< its width
@@ -31,13 +31,12 @@ struct SecondArmReport {
   std::vector<LinkCounter> link;  ///< of the port
 };
 
-/// The figures of a run.
-struct RunReport {
+/// The figures of a run. Inherits those of the first arm.
+struct RunReport : ArmReport {
   RunRecord record;
   std::string end;      ///< why the run ended
   std::string waiting;  ///< the event that the run waited for at its end; may be empty
   std::string scene;
-  std::string device;
   std::string numeric;
   std::string velocity_estimator;
   int rate_hz = 1000;
@@ -49,12 +48,7 @@ struct RunReport {
   double removed_mm3 = 0;
   MaterialScores materials;  ///< in the scene's order
   double workspace_scale = 1;
-  std::string tool;    ///< at the start of the run
-  double tool_mm = 0;  ///< its width
-  std::uint64_t lost_packets = 0;
-  std::uint64_t refused_packets = 0;
-  std::vector<LinkCounter> link;  ///< of the port
-  std::optional<SecondArmReport> second;
+  std::optional<ArmReport> second;
   std::uint64_t watchdog_trips = 0;
   std::uint64_t volume_hash = 0;
   std::uint64_t config_hash = 0;

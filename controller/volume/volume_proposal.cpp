@@ -50,9 +50,10 @@ class ValueScale {
   [[nodiscard]] double value(double density) const {
     return range_.lo + (range_.hi - range_.lo) * density / kDensityMax;
   }
-  [[nodiscard]] std::size_t bin(double value) const {
+  [[nodiscard]] Density density(double value) const {
     return nearest_density((value - range_.lo) / (range_.hi - range_.lo) * kDensityMax);
   }
+  [[nodiscard]] std::size_t bin(double value) const { return density(value); }
 
  private:
   Window range_;
@@ -184,14 +185,6 @@ class Densities {
   std::uint64_t total_ = 0;
 };
 
-double value_of(Window range, double density) {
-  return range.lo + (range.hi - range.lo) * density / kDensityMax;
-}
-
-Density density_in(Window range, double value) {
-  return nearest_density((value - range.lo) / (range.hi - range.lo) * kDensityMax);
-}
-
 /// Which of the solid parts stay; each if `all`.
 std::vector<bool> parts_to_keep(const SolidParts& solid, const BodyMask& body, bool all) {
   const auto parts = solid.parts();
@@ -258,8 +251,8 @@ Window window_around(const VolumeImage& image, Window range, Density skin, Densi
   const double lo = around.total() == 0 ? 0 : static_cast<double>(around.at_share(0.5));
   const double widest = lo + (iso - lo) / kLeastIsoDensity;
   const double top = static_cast<double>(solid.at_share(kMostSolid));
-  return {value_of(range, lo),
-          value_of(range, std::clamp(top, iso + 1.0, std::max(widest, iso + 1.0)))};
+  const ValueScale scale(range);
+  return {scale.value(lo), scale.value(std::clamp(top, iso + 1.0, std::max(widest, iso + 1.0)))};
 }
 
 std::vector<ProposedMaterial> materials_of(const VolumeProposal& proposal) {
@@ -274,9 +267,10 @@ std::vector<ProposedMaterial> materials_of(const VolumeProposal& proposal) {
 }
 
 void change_window(Window range, Window window, VolumeImage& image) {
+  const ValueScale from(range), to(window);
   std::vector<Density> table(65536);
   for (std::size_t d = 0; d < table.size(); ++d) {
-    table[d] = density_in(window, value_of(range, static_cast<double>(d)));
+    table[d] = to.density(from.value(static_cast<double>(d)));
   }
   for (Density& d : image.density) d = table[d];
 }
@@ -291,8 +285,9 @@ ProposedVolume propose_volume(VolumeImage image, Window range, const ProposalWis
   VolumeProposal proposal;
   proposal.surface = choose_surface(image, range);
   proposal.iso = wishes.iso.value_or(proposal.surface.iso);
-  const Density iso = density_in(range, proposal.iso);
-  const Density skin = density_in(range, std::min(proposal.surface.skin, proposal.iso));
+  const ValueScale scale(range);
+  const Density iso = scale.density(proposal.iso);
+  const Density skin = scale.density(std::min(proposal.surface.skin, proposal.iso));
   {
     const SolidParts solid(image.grid, image.density, iso);
     const bool all = proposal.iso <= range.lo;

@@ -11,7 +11,6 @@
 #include <netinet/in.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
-#include <sys/un.h>
 #include <unistd.h>
 
 #include "hil/hil_error.hpp"
@@ -23,13 +22,6 @@ namespace kerf {
 namespace {
 
 constexpr const char* kUnborn = ".new";  // ending of its name until the socket listens
-
-sockaddr_un address_of(const std::string& path) {
-  sockaddr_un address{};
-  address.sun_family = AF_UNIX;
-  std::memcpy(address.sun_path, path.c_str(), path.size() + 1);
-  return address;
-}
 
 template <class Call>
 int with_address(const sockaddr_un& address, Call&& call) {
@@ -43,7 +35,7 @@ bool is_live(const std::string& path) {
   const int fd = socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
   if (fd < 0) return true;  // not proven stale: leave it alone
   const int result = with_address(
-      address_of(path), [fd](const sockaddr* a, socklen_t size) { return connect(fd, a, size); });
+      unix_address(path), [fd](const sockaddr* a, socklen_t size) { return connect(fd, a, size); });
   const bool refused = result != 0 && errno == ECONNREFUSED;
   close(fd);
   return !refused;
@@ -133,7 +125,7 @@ SeqpacketServer::SeqpacketServer(std::string path, const char* option)
   const std::string unborn = path_ + kUnborn;
   if (is_socket(unborn)) unlink(unborn.c_str());  // left by an emulator that was killed
   fd_ = socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0);
-  const sockaddr_un address = address_of(unborn);
+  const sockaddr_un address = unix_address(unborn);
   const auto bind_here = [this](const sockaddr* a, socklen_t size) { return bind(fd_, a, size); };
   constexpr mode_t kOwnerAlone = S_IRUSR | S_IWUSR;  // bind() makes the file with these rights
   const bool bound =

@@ -79,10 +79,6 @@ std::size_t known_at(const char* option, const std::string& value,
   throw HilError(std::string(option) + ": " + value + unknown_word(value, known));
 }
 
-std::string word(Personality personality) {
-  return std::string(word_of(personality));
-}
-
 void check_front(const EmulatorOptions& o) {
   constexpr std::array<std::string_view, 6> kFronts{"socket", "udp",   "websocket",
                                                     "fuse",   "usbip", "uhid"};
@@ -122,7 +118,7 @@ void check_front(const EmulatorOptions& o) {
   const auto speaks_for = [&](const char* front, Personality device) {
     if (o.front == front && o.personality != device) {
       throw HilError(std::string("--front ") + front + ": not for " + o.device +
-                     "; use --personality " + word(device) + ", or another front");
+                     "; use --personality " + std::string(word_of(device)) + ", or another front");
     }
   };
   speaks_for("usbip", Personality::falcon);
@@ -160,7 +156,8 @@ void check_device(const EmulatorOptions& o) {
   const auto belongs_to = [&](bool given, const char* option, Personality owner) {
     if (given && o.personality != owner) {
       throw HilError(std::string(option) + ": " + o.device +
-                     " has no such thing; leave it out, or use --personality " + word(owner));
+                     " has no such thing; leave it out, or use --personality " +
+                     std::string(word_of(owner)));
     }
   };
   belongs_to(o.pot_noise, "--pot-noise", Personality::omni);

@@ -25,10 +25,6 @@ bool counts_are_set(const std::array<std::int16_t, 3>& count) {
   return count != std::array<std::int16_t, 3>{};
 }
 
-bool is_finite(DeviceVec<double> v) {
-  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
-}
-
 }  // namespace
 
 DeviceWire::DeviceWire(Personality personality, const std::array<double, 3>& dock_rad)
@@ -193,7 +189,7 @@ std::optional<ArmPose> DeviceWire::pose(const EncoderCounts& count) const {
       pose.tip_mm = {q[0], q[1], q[2]};
       break;
   }
-  return is_finite(pose.tip_mm) ? std::optional(pose) : std::nullopt;
+  return all_finite(pose.tip_mm) ? std::optional(pose) : std::nullopt;
 }
 
 double DeviceWire::turned_rad(const EncoderCounts& a, const EncoderCounts& b) const noexcept {

@@ -72,66 +72,47 @@ std::unique_ptr<DeviceModel> model_of(const FaultCase& subject, std::uint32_t se
   });
 }
 
-/// Returns true if the motors' true force need not follow the commands under this script: a sensor
-/// shows another pose than the true one, or commands do not arrive.
-bool misleads(const DeviceFault& fault) {
-  switch (fault.kind) {
-    case FaultKind::stick:
-    case FaultKind::jump:
-    case FaultKind::wander:
-    case FaultKind::corrupt:
-    case FaultKind::unplug:
-    case FaultKind::host_late:
-    case FaultKind::replay:
-    case FaultKind::freeze:
-      return true;
-    case FaultKind::lose:
-    case FaultKind::delay:
-    case FaultKind::duplicate:
-    case FaultKind::reorder:
-    case FaultKind::truncate:
-      return fault.of_commands;
-    case FaultKind::park:
-    case FaultKind::chatter:
-    case FaultKind::unhome:
-    case FaultKind::noise:
-    case FaultKind::silence:
-    case FaultKind::hang_up:
-      break;
-  }
-  return false;
-}
+/// What a fault does to the checks of the contract.
+struct Effect {
+  /// The motors' true force need not follow the commands under this script: a sensor shows another
+  /// pose than the true one, or commands do not arrive.
+  bool misleads = false;
+  /// This fault is another one behind a service: a reply that is lost, or comes after 100 ms, ends
+  /// the connection, and the device must be parked again; one more reply than messages is dropped;
+  /// readings that stand still have an echo that is not the force that was sent. So the latch that
+  /// a script demands of a plain link need not come, a second fault may meet no packet, and while a
+  /// reply is out no message can take the force back.
+  bool of_turns = false;
+};
 
-/// Returns true if this fault is another one behind a service: a reply that is lost, or comes after
-/// 100 ms, ends the connection, and the device must be parked again; one more reply than messages
-/// is dropped; readings that stand still have an echo that is not the force that was sent. So the
-/// latch that a script demands of a plain link need not come, a second fault may meet no packet,
-/// and while a reply is out no message can take the force back.
-bool is_of_turns(const DeviceFault& fault) {
+Effect effect_of(const DeviceFault& fault) {
   switch (fault.kind) {
+    case FaultKind::stick:
+    case FaultKind::jump:
+    case FaultKind::wander:
+    case FaultKind::host_late:
+      return {true, false};
+    case FaultKind::corrupt:
+    case FaultKind::unplug:
+    case FaultKind::replay:
+    case FaultKind::freeze:
+      return {true, true};
     case FaultKind::lose:
     case FaultKind::delay:
     case FaultKind::duplicate:
     case FaultKind::reorder:
     case FaultKind::truncate:
-    case FaultKind::corrupt:
+      return {fault.of_commands, true};
     case FaultKind::silence:
-    case FaultKind::unplug:
-    case FaultKind::replay:
     case FaultKind::hang_up:
-    case FaultKind::freeze:
-      return true;
-    case FaultKind::stick:
-    case FaultKind::jump:
-    case FaultKind::wander:
+      return {false, true};
     case FaultKind::park:
     case FaultKind::chatter:
     case FaultKind::unhome:
     case FaultKind::noise:
-    case FaultKind::host_late:
       break;
   }
-  return false;
+  return {};
 }
 
 double end_of(const FaultScript& script) {
@@ -188,8 +169,10 @@ FaultOutcome run_faults(const FaultCase& subject, const FaultScript& as_written)
   DirectPort wire(*served);
 
   FaultOutcome outcome;
-  const bool turns_fail = subject.by_service && std::ranges::any_of(script.faults, is_of_turns);
-  const bool trusted = !turns_fail && std::ranges::none_of(script.faults, misleads);
+  const bool turns_fail =
+      subject.by_service && std::ranges::any_of(script.faults, &Effect::of_turns, effect_of);
+  const bool trusted =
+      !turns_fail && std::ranges::none_of(script.faults, &Effect::misleads, effect_of);
   SafetyMonitor contract(subject.scene, trusted, outcome);
   double time_ms = 0;
   WatchedPort port(wire, contract, time_ms);

@@ -123,7 +123,6 @@ void ServiceLink::drop() {
   pass_on(session_->farewell(number_ + 1));
   session_.reset();
   is_waiting_ = false;
-  ++drops_;
   retry_ns_ = now_ns() + backoff_ns_;
 }
 

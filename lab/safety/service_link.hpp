@@ -34,8 +34,6 @@ class ServiceLink final : public PacketDevice {
   [[nodiscard]] std::span<const std::uint8_t> next_packet() noexcept override;
 
   [[nodiscard]] std::uint64_t turns() const noexcept { return turns_; }
-  /// Connections that were given up.
-  [[nodiscard]] std::uint64_t drops() const noexcept { return drops_; }
 
  private:
   [[nodiscard]] std::int64_t now_ns() const noexcept;
@@ -59,7 +57,7 @@ class ServiceLink final : public PacketDevice {
   bool is_late_ = false;     ///< this reply is
   int unread_ = 0;           ///< replies in a row that could not be read
   std::uint32_t number_ = 0;
-  std::uint64_t turns_ = 0, drops_ = 0;
+  std::uint64_t turns_ = 0;
   std::deque<cartesian::ReportBytes> reports_;
   cartesian::ReportBytes handed_out_{};
 };

@@ -45,14 +45,6 @@ constexpr std::string_view kEndings[] = {".nrrd", ".nhdr", ".mha", ".mhd", ".nii
                                          ".npy",  ".npz",  ".csv", ".svg", ".png",  ".md",
                                          ".stl",  ".ply",  ".y4m", ".pem", ".h5",   ".mcap"};
 
-std::string ending_of(const fs::path& path) {
-  std::string ending = path.extension().string();
-  std::ranges::transform(ending, ending.begin(), [](char c) {
-    return 'A' <= c && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  });
-  return ending;
-}
-
 fs::path place_of(const fs::path& path) {
   std::error_code fault;
   const fs::path place = fs::weakly_canonical(fs::absolute(path), fault);
@@ -90,6 +82,14 @@ void refuse_input(const OutputFile& output, const fs::path& input) {
 }
 
 }  // namespace
+
+std::string ending_of(const fs::path& path) {
+  std::string ending = path.extension().string();
+  std::ranges::transform(ending, ending.begin(), [](char c) {
+    return 'A' <= c && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  });
+  return ending;
+}
 
 std::string text_in(const std::filesystem::path& path) {
   std::error_code fault;

@@ -20,6 +20,9 @@ class FileError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+/// The extension of a file in lower case, with its dot; empty if it has none.
+[[nodiscard]] std::string ending_of(const std::filesystem::path& path);
+
 /// The bytes of a file; none if it cannot be read, or is a pipe or device, which might block. Reads
 /// in blocks: byte by byte, a file of 60 MB would take five seconds under a sanitizer.
 [[nodiscard]] std::string text_in(const std::filesystem::path& path);

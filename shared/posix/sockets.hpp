@@ -1,16 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <charconv>
 #include <cstdint>
 #include <cstring>
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <system_error>
 
 #include <netdb.h>
 #include <sys/socket.h>
+#include <sys/un.h>
 #include <unistd.h>
 
 // Addresses for UDP, and the user behind a Unix socket.
@@ -63,6 +66,14 @@ struct UdpAddress {
   const std::unique_ptr<addrinfo, FreeAddresses> list(found);
   address.bytes = list->ai_addrlen;
   std::memcpy(&address.storage, list->ai_addr, list->ai_addrlen);
+  return address;
+}
+
+/// The address of the Unix socket at `path`, which is shorter than `sun_path`.
+[[nodiscard]] inline sockaddr_un unix_address(std::string_view path) noexcept {
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  std::copy(path.begin(), path.end(), address.sun_path);
   return address;
 }
 

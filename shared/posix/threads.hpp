@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <atomic>
+#include <bit>
 #include <cerrno>
 #include <cstddef>
 #include <cstdint>
 #include <ctime>
+#include <optional>
 #include <system_error>
 #include <thread>
 #include <utility>
@@ -14,7 +17,8 @@
 #include <pthread.h>
 #include <sched.h>
 
-// Cores and priority of threads, worker threads, and a watchdog for a step that never ends.
+// Cores and priority of threads, worker threads, a queue between two threads, and a watchdog for a
+// step that never ends.
 
 namespace kerf {
 
@@ -69,6 +73,42 @@ template <class Work>
     return {};
   }
 }
+
+/// A queue of `N` items between one thread that pushes and one that takes. Wait-free on both sides;
+/// a full queue refuses.
+template <class T, std::uint32_t N>
+class SpscQueue {
+  static_assert(std::has_single_bit(N));
+
+ public:
+  [[nodiscard]] bool push(const T& item) noexcept {
+    const std::uint32_t tail = tail_.load(std::memory_order_relaxed);
+    if (tail - head_.load(std::memory_order_acquire) == N) return false;
+    items_[tail & (N - 1)] = item;
+    tail_.store(tail + 1, std::memory_order_release);
+    return true;
+  }
+
+  [[nodiscard]] std::optional<T> take() noexcept {
+    const std::uint32_t head = head_.load(std::memory_order_relaxed);
+    if (head == tail_.load(std::memory_order_acquire)) return std::nullopt;
+    const T item = items_[head & (N - 1)];
+    head_.store(head + 1, std::memory_order_release);
+    return item;
+  }
+
+  /// Any thread.
+  [[nodiscard]] bool empty() const noexcept {
+    return head_.load(std::memory_order_acquire) == tail_.load(std::memory_order_acquire);
+  }
+
+ private:
+  // Both counters wrap; their difference is the fill. Each has its own cache line, so that the line
+  // of the taker changes only when it takes.
+  alignas(64) std::atomic<std::uint32_t> head_{0};
+  alignas(64) std::atomic<std::uint32_t> tail_{0};
+  std::array<T, N> items_{};
+};
 
 /// Detects, from another thread, a step that does not end, as an endless loop in a law of the user.
 /// It measures the CPU time of the watched thread, so neither waiting nor a busy machine counts.

@@ -18,10 +18,10 @@
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/time.h>
-#include <sys/un.h>
 #include <unistd.h>
 
 #include "shared/posix/error_text.hpp"
+#include "shared/posix/sockets.hpp"
 #include "shared/segment/layout.hpp"
 #include "shared/segment/server.hpp"
 
@@ -70,10 +70,8 @@ bool is_name(std::string_view name) {
 
 /// Connects `fd` to the socket at `path`; returns 0, or the error.
 int connect_to(int fd, const std::string& path) {
-  sockaddr_un address{};
-  address.sun_family = AF_UNIX;
-  if (path.size() >= sizeof address.sun_path) return ENAMETOOLONG;
-  std::copy(path.begin(), path.end(), address.sun_path);
+  if (path.size() >= sizeof(sockaddr_un::sun_path)) return ENAMETOOLONG;
+  const sockaddr_un address = unix_address(path);
   return connect(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0 ? 0 : errno;
 }
 

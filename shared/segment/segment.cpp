@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <string>
+#include <utility>
 
 #include "shared/segment/layout_table.hpp"
 #include "shared/volume/voxel_grid.hpp"
@@ -134,6 +135,18 @@ void lay_out(SegmentPlan& plan) {
     if (out.off_labels != 0) out.off_labels = place(std::uint64_t{out.nx} * out.ny * out.nz);
   }
   header.total_bytes = end;
+}
+
+SegmentMemory::SegmentMemory(SegmentMemory&& other) noexcept
+    : fd_(std::exchange(other.fd_, -1)),
+      locked_(other.locked_),
+      bytes_(std::exchange(other.bytes_, {})) {}
+
+SegmentMemory& SegmentMemory::operator=(SegmentMemory&& other) noexcept {
+  std::swap(fd_, other.fd_);
+  std::swap(locked_, other.locked_);
+  std::swap(bytes_, other.bytes_);
+  return *this;
 }
 
 }  // namespace kerf

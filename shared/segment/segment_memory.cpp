@@ -3,7 +3,6 @@
 // numbers. The page in the browser has its own version (web/absent).
 #include <cerrno>
 #include <string>
-#include <utility>
 
 #include <fcntl.h>
 #include <sys/mman.h>
@@ -38,18 +37,6 @@ SegmentMemory SegmentMemory::create(std::uint64_t bytes) {
   memory.bytes_ = {static_cast<std::byte*>(at), size};
   memory.locked_ = mlock(at, size) == 0;
   return memory;
-}
-
-SegmentMemory::SegmentMemory(SegmentMemory&& other) noexcept
-    : fd_(std::exchange(other.fd_, -1)),
-      locked_(other.locked_),
-      bytes_(std::exchange(other.bytes_, {})) {}
-
-SegmentMemory& SegmentMemory::operator=(SegmentMemory&& other) noexcept {
-  std::swap(fd_, other.fd_);
-  std::swap(locked_, other.locked_);
-  std::swap(bytes_, other.bytes_);
-  return *this;
 }
 
 SegmentMemory::~SegmentMemory() {

@@ -3,9 +3,7 @@
 #include "shared/segment/server.hpp"
 
 #include <algorithm>
-#include <array>
 #include <atomic>
-#include <bit>
 #include <cerrno>
 #include <cstdint>
 #include <cstring>
@@ -22,56 +20,23 @@
 #include <sys/eventfd.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
-#include <sys/un.h>
 #include <unistd.h>
 
 #include "shared/posix/error_text.hpp"
 #include "shared/posix/sockets.hpp"
 #include "shared/posix/stop_signals.hpp"
+#include "shared/posix/threads.hpp"
 #include "shared/segment/connection.hpp"
 #include "shared/segment/layout_table.hpp"
 
 namespace kerf {
 namespace {
 
-/// A queue of `N` items from one thread that pushes to one that takes. Both are wait-free; `push`
-/// returns false if the queue is full.
-template <class T, std::uint32_t N>
-class SpscQueue {
-  static_assert(std::has_single_bit(N));
-
- public:
-  [[nodiscard]] bool push(const T& item) noexcept {
-    const std::uint32_t tail = tail_.load(std::memory_order_relaxed);
-    if (tail - head_.load(std::memory_order_acquire) == N) return false;
-    items_[tail & (N - 1)] = item;
-    tail_.store(tail + 1, std::memory_order_release);
-    return true;
-  }
-
-  [[nodiscard]] std::optional<T> take() noexcept {
-    const std::uint32_t head = head_.load(std::memory_order_relaxed);
-    if (head == tail_.load(std::memory_order_acquire)) return std::nullopt;
-    const T item = items_[head & (N - 1)];
-    head_.store(head + 1, std::memory_order_release);
-    return item;
-  }
-
- private:
-  // Both counters wrap; their difference is the number of items. Each has its own cache line, so
-  // that a push does not invalidate the line that `take` writes.
-  alignas(64) std::atomic<std::uint32_t> head_{0};
-  alignas(64) std::atomic<std::uint32_t> tail_{0};
-  std::array<T, N> items_{};
-};
-
 /// The socket at `path` to which readers connect; the destructor removes the path.
 class Listener {
  public:
   explicit Listener(std::string path) : path_(std::move(path)) {
-    sockaddr_un address{};
-    address.sun_family = AF_UNIX;
-    std::copy(path_.begin(), path_.end(), address.sun_path);
+    const sockaddr_un address = unix_address(path_);
     unlink(path_.c_str());  // left by a dead controller: we hold the name lock
     fd_ = OwnedFd(socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
     constexpr mode_t kOwnerAlone = S_IRUSR | S_IWUSR;  // bind() creates the file with these rights
@@ -229,9 +194,6 @@ SegmentServer::~SegmentServer() = default;
 
 std::optional<Command> SegmentServer::take_command() noexcept {
   return state_->commands.take();
-}
-const std::string& SegmentServer::socket_path() const noexcept {
-  return state_->path;
 }
 
 }  // namespace kerf

@@ -39,8 +39,6 @@ class SegmentServer {
   /// Servo thread. Wait-free, no system call. The servo takes at most one per tick.
   [[nodiscard]] std::optional<Command> take_command() noexcept;
 
-  [[nodiscard]] const std::string& socket_path() const noexcept;
-
  private:
   struct State;
   std::unique_ptr<State> state_;

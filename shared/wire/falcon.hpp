@@ -62,9 +62,6 @@ inline constexpr int kMotorCountMax = 4096;
 inline constexpr int kMotorSign = -1;
 inline constexpr double kOpenDriverNmmPerCount = 0.1;
 
-// Stated by the maker.
-inline constexpr double kMaxForceN = 8.9;
-
 // Packets.
 inline constexpr std::size_t kPacketBytes = 16;  ///< in both directions
 

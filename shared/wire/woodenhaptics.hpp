@@ -51,9 +51,6 @@ inline constexpr std::array<double, 3> kTorqueNmmPerA2015{25.9, 25.9, 25.9};
 inline constexpr int kMaxMilliamps = 2000;        ///< limit in the makers' host software
 inline constexpr int kAmplifierMilliamps = 3000;  ///< at full duty of the firmware
 
-/// Limit stated by the makers.
-inline constexpr double kMaxForceN = 5.0;
-
 /// The firmware switches the amplifiers off after this time without a report from the host.
 inline constexpr double kWatchdogS = 0.5;
 

@@ -116,6 +116,5 @@ inline constexpr Enum kInkwellStyle = 4;
 
 inline constexpr Uint kDone = 0;  ///< a callback is not called again
 inline constexpr Uint kWaitForEnd = 1;
-inline constexpr std::uint16_t kDefaultPriority = 0x7FFF;
 
 }  // namespace kerf::hd

@@ -2,7 +2,6 @@
 #include "standin/hd/touch.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 #include "shared/wire/personality.hpp"
 
@@ -14,10 +13,6 @@ namespace {
 
 constexpr double kVelocityWindowS = 0.01;  // the vendor's filter is not known
 constexpr double kNothingN = 1e-9;
-
-[[nodiscard]] bool is_finite(DeviceVec<double> v) noexcept {
-  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
-}
 
 }  // namespace
 
@@ -92,7 +87,7 @@ DeviceVec<double> Touch::wanted_force() noexcept {
   const DeviceVec<double> force_n = wanted_.joint_torque_mnm
                                         ? force_of_torques(now_.joints, *wanted_.joint_torque_mnm)
                                         : wanted_.force_n;
-  if (is_finite(force_n)) return force_n;
+  if (all_finite(force_n)) return force_n;
   ledger_.add(Row::not_finite);
   push(kInvalidValue);
   return {};

@@ -5,7 +5,6 @@
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
-#include <span>
 #include <string>
 #include <string_view>
 
@@ -71,7 +70,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     std::filesystem::create_directory(folder / "inputs");
     folder.write("inputs/000000000001.npy.gz", bytes);
     must_read_or_explain<kerf::RecordError>([] {
-      kerf::for_each_input(folder.path(), 10, 1, [](std::span<const kerf::TickRecord>) {});
+      kerf::InputReader reader(folder.path(), 10, 1);
+      while (!reader.next().empty()) {
+      }
     });
     return 0;
   }

@@ -8,6 +8,7 @@
 
 #include <doctest/doctest.h>
 
+#include "record/input_rows.hpp"
 #include "shared/numeric/energy_source.hpp"
 #include "shared/segment/connection.hpp"
 #include "tests/segment/segment_support.hpp"
@@ -51,6 +52,15 @@ template <class Call>
   record.energy_leak = record.energy_spring / -2;
   record.flags = press > 0.01F ? kFlagContact : 0;
   return record;
+}
+
+/// Calls `visit` for each tick from 1 to `last` in order, with the inputs of each of `arms` that
+/// the recording in `folder` has. Throws `RecordError` at a missing or damaged file, after `visit`
+/// was called for the ticks before it.
+template <class Visit>
+void for_each_input(const std::filesystem::path& folder, Tick last, std::size_t arms, Visit visit) {
+  InputReader reader(folder, last, arms);
+  for (auto tick = reader.next(); !tick.empty(); tick = reader.next()) visit(tick);
 }
 
 inline void publish_tick(SegmentWriter& writer, const TickRecord& record) {

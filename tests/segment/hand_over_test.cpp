@@ -90,7 +90,7 @@ TEST_CASE("the descriptor that a reader gets is read-only") {
   const int link = socket(AF_UNIX, SOCK_SEQPACKET, 0);
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
-  std::copy(server.socket_path().begin(), server.socket_path().end(), address.sun_path);
+  std::ranges::copy(segment_socket("demo"), address.sun_path);
   REQUIRE(connect(link, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0);
   char message[64];
   iovec part{message, sizeof message};

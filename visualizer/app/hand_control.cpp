@@ -7,15 +7,14 @@
 #include <cerrno>
 #include <cmath>
 #include <cstddef>
-#include <cstring>
 #include <memory>
 #include <utility>
 
 #include <hidapi/hidapi.h>
 #include <sys/socket.h>
-#include <sys/un.h>
 #include <unistd.h>
 
+#include "shared/posix/sockets.hpp"
 #include "visualizer/scene/visualizer_error.hpp"
 
 namespace kerf {
@@ -199,13 +198,6 @@ namespace {
 constexpr auto kTryPause = std::chrono::milliseconds(500);
 constexpr auto kPatience = std::chrono::seconds(3);  // an emulator that starts beside the window
 
-sockaddr_un address_of(const std::string& path) {
-  sockaddr_un address{};
-  address.sun_family = AF_UNIX;
-  std::memcpy(address.sun_path, path.c_str(), path.size() + 1);
-  return address;
-}
-
 }  // namespace
 
 HandLink::HandLink(std::string path) : path_(std::move(path)) {
@@ -228,7 +220,7 @@ void HandLink::leave() noexcept {
 void HandLink::connect() noexcept {
   fd_ = socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
   if (fd_ < 0) return;
-  const sockaddr_un address = address_of(path_);
+  const sockaddr_un address = unix_address(path_);
   if (::connect(fd_, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) leave();
 }
 

@@ -13,6 +13,7 @@
 
 #include <imgui.h>
 
+#include "shared/posix/atomic_file.hpp"
 #include "visualizer/panels/figure_panels.hpp"
 #include "visualizer/render/renderer.hpp"
 
@@ -27,14 +28,6 @@ constexpr std::array<std::string_view, 9> kVolumes{".nrrd", ".nhdr", ".mha",  ".
                                                    ".gz",   ".tif",  ".tiff", ".dcm"};
 constexpr std::string_view kScene = ".toml";
 constexpr int kMostLooked = 100'000;  // in a folder of more the rest is left out
-
-std::string ending_of(const fs::path& file) {
-  std::string ending = file.extension().string();
-  std::ranges::transform(ending, ending.begin(), [](char c) {
-    return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  });
-  return ending;
-}
 
 bool is_volume(const fs::path& file) {
   return std::ranges::find(kVolumes, ending_of(file)) != kVolumes.end();

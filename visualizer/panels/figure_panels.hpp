@@ -35,12 +35,6 @@ inline constexpr float kPlainLetters = 13.0F;
   return 12.0F * unit_px();
 }
 
-/// Of the panel between Begin and End.
-[[nodiscard]] inline float area_of_panel() {
-  const ImVec2 size = ImGui::GetWindowSize();
-  return size.x * size.y;
-}
-
 /// A name of the scene, which may be of any length, in at most `most` letters.
 [[nodiscard]] inline std::string shortened(const std::string& name, std::size_t most) {
   return name.size() <= most ? name : name.substr(0, most - 2) + "..";

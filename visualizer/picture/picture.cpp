@@ -3,7 +3,6 @@
 #include "visualizer/picture/picture.hpp"
 
 #include <algorithm>
-#include <array>
 #include <chrono>
 #include <cmath>
 #include <optional>
@@ -44,13 +43,17 @@ glm::dvec3 direction_of(const ClipPlane& plane) {
   return axis;
 }
 
+/// The name of a code of docs/log.md.
+std::string name_of(std::span<const LogCode> codes, std::uint32_t value) {
+  const auto found =
+      std::ranges::find_if(codes, [&](const LogCode& code) { return code.value == value; });
+  return found == codes.end() ? std::to_string(value) : std::string(found->name);
+}
+
 /// What stands between the hand and its force, and what to do; empty: nothing.
 std::string state_words(const TickRecord& record) {
   // Phases and faults as docs/log.md lists them.
   constexpr std::uint16_t kCalibrating = 1, kArmed = 2, kFault = 5;
-  constexpr std::array<const char*, 9> kFaults{"none",       "stale_input", "not_finite",
-                                               "overspeed",  "force_law",   "velocity_estimator",
-                                               "stabiliser", "wrong_dock",  "sparse_input"};
   constexpr std::uint32_t kWrongDock = 7;
   switch (record.phase) {
     case kCalibrating:
@@ -63,7 +66,7 @@ std::string state_words(const TickRecord& record) {
                "or "
                "start again if it lies there";
       }
-      return std::string("fault ") + (record.fault < kFaults.size() ? kFaults[record.fault] : "") +
+      return "fault " + name_of(log_faults(), record.fault) +
              ": the motors are off; park the device at rest (a hand led by the pointer: k)";
     default:
       return {};
@@ -95,13 +98,6 @@ Advice advice_of(const std::optional<TickRecord>& first, const std::optional<Tic
   const bool takes_second = of_second.alarm ? !of_first.alarm : of_first.text.empty();
   if (of_second.text.empty() || !takes_second) return of_first;
   return {"second arm: " + of_second.text, of_second.alarm};
-}
-
-/// The name of a code of docs/log.md.
-std::string name_of(std::span<const LogCode> codes, std::uint32_t value) {
-  const auto found =
-      std::ranges::find_if(codes, [&](const LogCode& code) { return code.value == value; });
-  return found == codes.end() ? std::to_string(value) : std::string(found->name);
 }
 
 std::string tool_name(const TickRecord& record, const SceneView& scene) {

@@ -27,15 +27,6 @@ using BoxCorners = std::array<glm::dvec3, 8>;
   return corners;
 }
 
-/// The paper's equation (1): window depth, 0 at the near and 1 at the far plane, of a point
-/// `eye_mm` away along the view axis. Every renderer writes this, so that volumes, meshes and the
-/// tool hide one another as they should.
-[[nodiscard]] constexpr double window_depth(double eye_mm, double near_mm, double far_mm) noexcept {
-  const double f = far_mm;
-  const double n = near_mm;
-  return ((f + n) / (f - n) - 2.0 * f * n / ((f - n) * eye_mm) + 1.0) / 2.0;
-}
-
 /// What one picture is seen through. Eye space: x right, y up, the camera looks along -z, in mm.
 struct View {
   glm::dmat4 eye_from_world{1.0};

@@ -7,6 +7,7 @@
 #include <thread>
 #include <utility>
 
+#include "shared/posix/monotonic_clock.hpp"
 #include "shared/posix/stop_signals.hpp"
 
 namespace kerf {
@@ -85,11 +86,7 @@ constexpr auto kAttachPause = std::chrono::milliseconds(20);
 constexpr std::uint64_t kRateSpan = 500;  // ticks; half a second at 1 kHz
 
 double now_ns() {
-  using std::chrono::nanoseconds;
-  // The steady clock is CLOCK_MONOTONIC, the one that the segment's times come from.
-  return std::chrono::duration<double, std::nano>(
-             std::chrono::steady_clock::now().time_since_epoch())
-      .count();
+  return static_cast<double>(monotonic_ns());
 }
 
 double voxel_mm3(const VolumeView& volume) {

@@ -5,7 +5,6 @@
 #include <cstddef>
 #include <map>
 #include <memory>
-#include <utility>
 
 #include <unistd.h>
 
@@ -36,18 +35,6 @@ SegmentMemory SegmentMemory::create(std::uint64_t bytes) {
   memory.bytes_ = {own.bytes.get(), size};
   memory.locked_ = true;
   return memory;
-}
-
-SegmentMemory::SegmentMemory(SegmentMemory&& other) noexcept
-    : fd_(std::exchange(other.fd_, -1)),
-      locked_(other.locked_),
-      bytes_(std::exchange(other.bytes_, {})) {}
-
-SegmentMemory& SegmentMemory::operator=(SegmentMemory&& other) noexcept {
-  std::swap(fd_, other.fd_);
-  std::swap(locked_, other.locked_);
-  std::swap(bytes_, other.bytes_);
-  return *this;
 }
 
 SegmentMemory::~SegmentMemory() {

@@ -26,7 +26,6 @@ constexpr std::int64_t kNsPerMs = 1'000'000;
 constexpr std::int64_t kLookNs = 20 * kNsPerMs;  ///< longest delay of the end
 constexpr int kConnectMs = 1000;
 constexpr int kCloseMs = 100;
-constexpr int kLastMs = 20;
 constexpr int kLockStepPatienceMs = 2000;
 
 constexpr const char* kNeeds =
@@ -301,11 +300,6 @@ bool ServicePort::send(std::span<const std::uint8_t> packet) noexcept {
   return true;
 }
 
-bool ServicePort::send_last(std::span<const std::uint8_t> packet) noexcept {
-  if (gettid() == thread_id_) return false;  // no thread is left to send it
-  return outbox_.send_and_wait([&] { return send(packet); }, kLastMs);
-}
-
 /// Left out if the terminal or pipe takes nothing: no force may wait for its reader.
 void ServicePort::note(const std::string& text) const noexcept {
   pollfd error_stream{STDERR_FILENO, POLLOUT, 0};
@@ -329,7 +323,7 @@ void ServicePort::note_bar() noexcept {
 
 void ServicePort::run() noexcept {
   block_signals();  // an interrupted call would look like a service that is gone
-  thread_id_ = gettid();
+  sender_id_ = gettid();
   become(io_);
   while (!stop_ && !closed()) {
     if (!connection_) {
@@ -537,7 +531,7 @@ void ServicePort::reconnect() noexcept {
 
 /// The last turns have no force.
 void ServicePort::end() noexcept {
-  const std::int64_t until_ns = monotonic_ns() + kLastMs * kNsPerMs;
+  const std::int64_t until_ns = monotonic_ns() + kLastPacketMs * kNsPerMs;
   while (connection_ && monotonic_ns() < until_ns) {
     connection_->takes_back = true;
     if (play_turn() == Turn::lost) {

@@ -17,7 +17,6 @@
 #include "controller/device/inverse3/session.hpp"
 #include "controller/device/inverse3/web_socket.hpp"
 #include "controller/device/port/io_mailbox.hpp"
-#include "controller/device/port/packet_port.hpp"
 #include "shared/wire/emulator_link.hpp"
 
 namespace kerf::inverse3 {
@@ -51,7 +50,7 @@ struct ServiceOptions {
 ///
 /// In lock-step, with kerf's emulated service, a turn is one period of the servo, whatever the
 /// machine's clock says.
-class ServicePort final : public PacketPort {
+class ServicePort final : public MailboxPort {
  public:
   static constexpr std::int64_t kTurnNs = 1'000'000;  ///< longest pause between two turns
   static constexpr std::int64_t kLateNs = 5'000'000, kTakeBackNs = 20'000'000;
@@ -72,17 +71,7 @@ class ServicePort final : public PacketPort {
   ServicePort(const ServicePort&) = delete;
   ServicePort& operator=(const ServicePort&) = delete;
 
-  [[nodiscard]] std::size_t receive(std::span<std::uint8_t> out) noexcept override {
-    return inbox_.take(out);
-  }
   bool send(std::span<const std::uint8_t> packet) noexcept override;
-  bool send_last(std::span<const std::uint8_t> packet) noexcept override;
-  [[nodiscard]] bool closed() const noexcept override {
-    return closed_.load(std::memory_order_relaxed);
-  }
-  [[nodiscard]] bool wait(int milliseconds) noexcept override {
-    return inbox_.wait(milliseconds, closed_);
-  }
   [[nodiscard]] std::vector<LinkCounter> counters() const override;
 
  private:
@@ -139,12 +128,7 @@ class ServicePort final : public PacketPort {
   std::int64_t command_ns_ = 0;          ///< when it came, in time of the turns
   std::atomic<std::int64_t> put_ns_{0};  ///< when the newest command was given, by the clock
 
-  std::atomic<bool> closed_{false};
-  SpscRing inbox_;
-  LatestCommand outbox_;
   sem_t raised_{};  ///< once per command, and once to stop
-  std::atomic<bool> stop_{false};
-  std::atomic<int> thread_id_{0};
   /// In the order of `counters`.
   std::atomic<std::uint64_t> packets_{0}, overflow_{0}, commands_{0}, late_{0}, lost_{0},
       unreadable_{0}, strays_{0}, bars_{0}, reconnections_{0}, longest_us_{0};

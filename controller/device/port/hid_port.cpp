@@ -16,7 +16,6 @@
 #include <sys/ioctl.h>
 #include <unistd.h>
 
-#include "controller/device/port/packet_port.hpp"
 #include "shared/posix/error_text.hpp"
 #include "shared/posix/stop_signals.hpp"
 #include "shared/wire/woodenhaptics.hpp"
@@ -25,7 +24,6 @@ namespace kerf {
 namespace {
 
 constexpr int kReadMs = 20;  // then the thread checks whether it must end
-constexpr int kLastPacketMs = 20;
 constexpr SoughtDevice kSought{.name = "WoodenHaptics arm (1234:0006 or 16c0:0486)",
                                .port = "hid",
                                .emulation = "--device woodenhaptics --port hid"};
@@ -163,11 +161,6 @@ bool HidPort::send(std::span<const std::uint8_t> packet) noexcept {
   return true;
 }
 
-bool HidPort::send_last(std::span<const std::uint8_t> packet) noexcept {
-  if (gettid() == writer_id_) return false;  // no thread is left to send it
-  return outbox_.send_and_wait([&] { return send(packet); }, kLastPacketMs);
-}
-
 void HidPort::read_reports() noexcept {
   block_signals();  // an interrupted call would look like a device that is gone
   become(io_);
@@ -182,7 +175,7 @@ void HidPort::read_reports() noexcept {
 
 void HidPort::write_commands() noexcept {
   block_signals();
-  writer_id_ = gettid();
+  sender_id_ = gettid();
   become(io_);
   while (!stop_ || !outbox_.empty()) {
     while (sem_wait(&raised_) != 0) {

@@ -13,7 +13,6 @@
 #include <semaphore.h>
 
 #include "controller/device/port/io_mailbox.hpp"
-#include "controller/device/port/packet_port.hpp"
 
 struct hid_device_;
 
@@ -27,7 +26,7 @@ namespace kerf {
 /// reads and another writes, always the newest packet. The servo touches only their mailboxes and,
 /// in `send`, a semaphore, which any thread and any signal handler may raise. A device that is
 /// unplugged closes the port.
-class HidPort final : public PacketPort {
+class HidPort final : public MailboxPort {
  public:
   /// `where`: a node (/dev/hidraw0), a serial number, or empty for the only arm. Tries for
   /// `patience_ms` while none is there, or until `stop`. Throws std::runtime_error with one line.
@@ -37,17 +36,7 @@ class HidPort final : public PacketPort {
   HidPort(const HidPort&) = delete;
   HidPort& operator=(const HidPort&) = delete;
 
-  [[nodiscard]] std::size_t receive(std::span<std::uint8_t> out) noexcept override {
-    return inbox_.take(out);
-  }
   bool send(std::span<const std::uint8_t> packet) noexcept override;
-  bool send_last(std::span<const std::uint8_t> packet) noexcept override;
-  [[nodiscard]] bool closed() const noexcept override {
-    return closed_.load(std::memory_order_relaxed);
-  }
-  [[nodiscard]] bool wait(int milliseconds) noexcept override {
-    return inbox_.wait(milliseconds, closed_);
-  }
   [[nodiscard]] std::vector<LinkCounter> counters() const override;
 
  private:
@@ -58,16 +47,11 @@ class HidPort final : public PacketPort {
 
   IoThread io_;  ///< of both threads
   hid_device_* device_ = nullptr;
-  std::size_t packet_bytes_ = 0;     ///< of this firmware; shorter packets are filled up
-  std::atomic<bool> closed_{false};  ///< set by the first thread that sees the end
-  std::atomic<bool> gone_{false};    ///< and a packet after it could not be sent
-  SpscRing inbox_;
-  LatestCommand outbox_;
-  sem_t raised_{};                                       ///< once per packet, and once to stop
+  std::size_t packet_bytes_ = 0;   ///< of this firmware; shorter packets are filled up
+  std::atomic<bool> gone_{false};  ///< a packet after the end could not be sent
+  sem_t raised_{};                 ///< once per packet, and once to stop
   std::atomic<std::uint64_t> packets_{0}, overflow_{0};  ///< as UsbLinkStats
   std::atomic<std::uint64_t> commands_{0};               ///< packets that the kernel has sent
-  std::atomic<bool> stop_{false};
-  std::atomic<int> writer_id_{0};
   std::thread reader_, writer_;
 };
 

@@ -6,10 +6,13 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 
 #include <poll.h>
+#include <unistd.h>
 
+#include "controller/device/port/packet_port.hpp"
 #include "shared/posix/monotonic_clock.hpp"
 #include "shared/posix/threads.hpp"
 
@@ -85,24 +88,17 @@ class SpscRing {
  public:
   /// The writer. False if the reader is kPlaces behind: the packet is lost then.
   bool put(std::span<const std::uint8_t> packet) noexcept {
-    const std::size_t end = end_.load(std::memory_order_relaxed);
-    if (end - begin_.load(std::memory_order_acquire) == kPlaces) return false;
-    places_[end % kPlaces].assign(packet);
-    end_.store(end + 1, std::memory_order_release);
-    return true;
+    MailboxPacket copy;
+    copy.assign(packet);
+    return packets_.push(copy);
   }
   /// The reader. Size of the oldest packet; 0 when there is none.
   [[nodiscard]] std::size_t take(std::span<std::uint8_t> out) noexcept {
-    const std::size_t begin = begin_.load(std::memory_order_relaxed);
-    if (begin == end_.load(std::memory_order_acquire)) return 0;
-    const std::size_t size = places_[begin % kPlaces].copy_to(out);
-    begin_.store(begin + 1, std::memory_order_release);
-    return size;
+    const std::optional<MailboxPacket> packet = packets_.take();
+    return packet ? packet->copy_to(out) : 0;
   }
   /// Any thread.
-  [[nodiscard]] bool empty() const noexcept {
-    return begin_.load(std::memory_order_acquire) == end_.load(std::memory_order_acquire);
-  }
+  [[nodiscard]] bool empty() const noexcept { return packets_.empty(); }
   /// The reader: sleeps until there is a packet; false after so many milliseconds, or once `closed`
   /// with nothing left.
   [[nodiscard]] bool wait(int milliseconds, const std::atomic<bool>& closed) const noexcept {
@@ -117,9 +113,8 @@ class SpscRing {
 
  private:
   static constexpr std::int64_t kPollNs = 50'000;
-  static constexpr std::size_t kPlaces = 64;
-  std::array<MailboxPacket, kPlaces> places_{};
-  std::atomic<std::size_t> begin_{0}, end_{0};
+  static constexpr std::uint32_t kPlaces = 64;
+  SpscQueue<MailboxPacket, kPlaces> packets_;
 };
 
 /// The next command: any thread and any signal handler writes, one reader takes the newest, and
@@ -209,6 +204,33 @@ class LatestCommand {
   std::atomic<std::uint64_t> next_ticket_{kFree + 1};
   std::atomic<bool> on_its_way_{false};
   std::uint64_t newest_taken_ = kFree;  ///< of the reader: older packets came too late
+};
+
+/// A port whose packets pass through these mailboxes, to and from I/O threads of its own.
+class MailboxPort : public PacketPort {
+ public:
+  [[nodiscard]] std::size_t receive(std::span<std::uint8_t> out) noexcept final {
+    return inbox_.take(out);
+  }
+  bool send_last(std::span<const std::uint8_t> packet) noexcept final {
+    if (gettid() == sender_id_) return false;  // no thread is left to send it
+    return outbox_.send_and_wait([&] { return send_now(packet); }, kLastPacketMs);
+  }
+  [[nodiscard]] bool closed() const noexcept final {
+    return closed_.load(std::memory_order_relaxed);
+  }
+  [[nodiscard]] bool wait(int milliseconds) noexcept final {
+    return inbox_.wait(milliseconds, closed_);
+  }
+
+ protected:
+  static constexpr int kLastPacketMs = 20;
+
+  SpscRing inbox_;
+  LatestCommand outbox_;
+  std::atomic<bool> closed_{false};  ///< no report comes any more
+  std::atomic<bool> stop_{false};
+  std::atomic<int> sender_id_{0};  ///< of the thread that sends
 };
 
 }  // namespace kerf

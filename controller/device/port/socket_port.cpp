@@ -3,14 +3,12 @@
 
 #include <cerrno>
 #include <chrono>
-#include <cstring>
 #include <stdexcept>
 #include <system_error>
 #include <thread>
 
 #include <poll.h>
 #include <sys/socket.h>
-#include <sys/un.h>
 #include <unistd.h>
 
 #include "shared/posix/error_text.hpp"
@@ -20,19 +18,16 @@ namespace kerf {
 
 SocketPort::SocketPort(const std::filesystem::path& path, int patience_ms,
                        const std::atomic<bool>& stop) {
-  sockaddr_un address{};
-  address.sun_family = AF_UNIX;
   const std::string text = path.string();
   if (text.empty()) {
     throw std::runtime_error("--port socket: no path; name the one of kerf-emulator --socket");
   }
-  if (text.size() >= sizeof address.sun_path) {
+  if (text.size() >= sizeof(sockaddr_un::sun_path)) {
     throw std::runtime_error("--port socket:" + text + ": a socket path has at most " +
-                             std::to_string(sizeof address.sun_path - 1) +
+                             std::to_string(sizeof(sockaddr_un::sun_path) - 1) +
                              " bytes; use a shorter one");
   }
-  std::memcpy(address.sun_path, text.c_str(), text.size() + 1);
-
+  const sockaddr_un address = unix_address(text);
   const auto give_up = std::chrono::steady_clock::now() + std::chrono::milliseconds(patience_ms);
   for (;;) {
     fd_ = socket(AF_UNIX, SOCK_SEQPACKET | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);

@@ -14,7 +14,6 @@
 #include <libusb-1.0/libusb.h>
 #include <unistd.h>
 
-#include "controller/device/port/packet_port.hpp"
 #include "shared/posix/error_text.hpp"
 #include "shared/posix/monotonic_clock.hpp"
 #include "shared/posix/stop_signals.hpp"
@@ -35,7 +34,6 @@ constexpr std::int64_t kReplyNs = 2'000'000;   // later the servo sends no answe
 constexpr std::int64_t kEventsNs = 2'000'000;  // a working chip ends a transfer each ms
 constexpr std::int64_t kCloseNs = 500'000'000;
 constexpr int kMostFailures = 100;
-constexpr int kLastPacketMs = 20;
 constexpr SoughtDevice kSought{
     .name = "Falcon (0403:cb48)", .port = "usb", .emulation = "--device falcon --port usb"};
 
@@ -277,11 +275,6 @@ bool UsbPort::send_now(std::span<const std::uint8_t> packet) noexcept {
   return is_put;
 }
 
-bool UsbPort::send_last(std::span<const std::uint8_t> packet) noexcept {
-  if (gettid() == thread_id_) return false;  // the I/O thread itself cannot send it
-  return outbox_.send_and_wait([&] { return send_now(packet); }, kLastPacketMs);
-}
-
 UsbLinkStats UsbPort::stats() const noexcept {
   return {packets_, overflow_, strays_, commands_, failures_};
 }
@@ -298,7 +291,7 @@ std::vector<LinkCounter> UsbPort::counters() const {
 
 void UsbPort::run() noexcept {
   block_signals();
-  thread_id_ = gettid();
+  sender_id_ = gettid();
   become(io_);
   for (Transfer& read : reads_) submit(read);
   while (!gone_ && !stop_) {

@@ -14,7 +14,6 @@
 
 #include "controller/device/port/falcon_boot.hpp"
 #include "controller/device/port/io_mailbox.hpp"
-#include "controller/device/port/packet_port.hpp"
 #include "shared/wire/falcon.hpp"
 
 // The Falcon over libusb: finds and opens it, starts its firmware, and moves packets on a thread of
@@ -88,7 +87,7 @@ struct UsbLinkStats {
 /// The destructor sends the waiting packets, for 20 ms at most. `send_last`, for the handler of a
 /// crash, waits until its packet is sent; that fails only if the I/O thread itself has crashed, or
 /// on SIGKILL.
-class UsbPort final : public PacketPort {
+class UsbPort final : public MailboxPort {
  public:
   /// Finds the device, claims it, starts its firmware. Retries for `patience_ms` while none is
   /// connected, or until `stop`. Throws std::runtime_error with one line.
@@ -98,20 +97,10 @@ class UsbPort final : public PacketPort {
   UsbPort(const UsbPort&) = delete;
   UsbPort& operator=(const UsbPort&) = delete;
 
-  [[nodiscard]] std::size_t receive(std::span<std::uint8_t> out) noexcept override {
-    return inbox_.take(out);
-  }
   bool send(std::span<const std::uint8_t> packet) noexcept override {
     return !gone_.load(std::memory_order_relaxed) && outbox_.put(packet);
   }
   bool send_now(std::span<const std::uint8_t> packet) noexcept override;
-  bool send_last(std::span<const std::uint8_t> packet) noexcept override;
-  [[nodiscard]] bool closed() const noexcept override {
-    return closed_.load(std::memory_order_relaxed);
-  }
-  [[nodiscard]] bool wait(int milliseconds) noexcept override {
-    return inbox_.wait(milliseconds, closed_);
-  }
 
   [[nodiscard]] std::vector<LinkCounter> counters() const override;
 
@@ -139,13 +128,8 @@ class UsbPort final : public PacketPort {
   void handle_events(std::int64_t ns) noexcept;
 
   std::unique_ptr<UsbFalcon> device_;
-  SpscRing inbox_;
-  LatestCommand outbox_;
-  std::atomic<bool> closed_{false};  ///< no report comes any more
-  std::atomic<bool> gone_{false};    ///< and no command leaves: unplugged
-  std::atomic<bool> stop_{false};
+  std::atomic<bool> gone_{false};   ///< no command leaves: unplugged
   std::atomic<bool> hurry_{false};  ///< send the waiting command out of turn
-  std::atomic<int> thread_id_{0};
   std::atomic<std::uint64_t> packets_{0}, overflow_{0}, strays_{0}, commands_{0}, failures_{0};
 
   // I/O thread only.

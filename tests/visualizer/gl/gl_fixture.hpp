@@ -30,6 +30,15 @@ struct TestVolume {
 /// Voxels of `spacing_mm` with the middle of the grid at `centre_mm`.
 [[nodiscard]] glm::dmat4 centred(VoxelGrid grid, glm::dvec3 spacing_mm, glm::dvec3 centre_mm = {});
 
+/// The paper's equation (1): window depth, 0 at the near and 1 at the far plane, of a point
+/// `eye_mm` away along the view axis. Every renderer writes this, so that volumes, meshes and the
+/// tool hide one another as they should.
+[[nodiscard]] constexpr double window_depth(double eye_mm, double near_mm, double far_mm) noexcept {
+  const double f = far_mm;
+  const double n = near_mm;
+  return ((f + n) / (f - n) - 2.0 * f * n / ((f - n) * eye_mm) + 1.0) / 2.0;
+}
+
 /// Distance along the view axis; the inverse of equation (1).
 [[nodiscard]] double eye_distance_mm(double window_depth, const View& view);
 
