@@ -34,6 +34,7 @@ TEST_CASE("a packed array that lacks any of its last bytes is not complete") {
   for (std::size_t i = 0; i < content.size(); ++i) content[i] = std::byte(i * i % 251);
   AtomicFile file(path);
   write_packed_npy(file, kHeader, content);
+  file.commit();
   CHECK(is_complete(path));
   const auto bytes = std::filesystem::file_size(path);
   for (std::uintmax_t cut = 1; cut < bytes; ++cut) {
