@@ -43,16 +43,20 @@ const char* remedy_for(int error, const char* usual) noexcept {
 }
 
 std::string failure_text() {
+  constexpr const char* kNoMemory =
+      "memory: none is left; take a smaller volume, free memory, or raise ulimit -v";
   try {
     throw;
   } catch (const std::bad_alloc&) {
-    return "memory: none is left; take a smaller volume, free memory, or raise ulimit -v";
+    return kNoMemory;
   } catch (const std::filesystem::filesystem_error& error) {
     return escaped(error.path1().string()) + ": " + error.code().message() + "; " +
            remedy_for(error.code().value(), "check the path and its rights");
   } catch (const std::ios_base::failure& error) {
     return "a file: " + error.code().message() + "; check its disk, or copy it again";
-  } catch (const std::system_error& error) {  // of std::thread: none could be started
+  } catch (const std::system_error& error) {
+    if (error.code() == std::errc::not_enough_memory) return kNoMemory;  // of mmap
+    // Of std::thread or fork: none could be started.
     return "threads: " + error.code().message() + "; raise ulimit -u, or TasksMax of the service";
   } catch (const std::exception& error) {
     return escaped(error.what());

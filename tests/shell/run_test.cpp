@@ -412,6 +412,8 @@ TEST_CASE("a failure is one line with a way out") {
             .ends_with("; take a smaller volume, free memory, or raise ulimit -v"));
   CHECK(failure_of(std::system_error(EAGAIN, std::generic_category())) ==
         "threads: Resource temporarily unavailable; raise ulimit -u, or TasksMax of the service");
+  CHECK(failure_of(std::system_error(ENOMEM, std::generic_category(), "mmap")) ==
+        failure_of(std::bad_alloc()));
   CHECK(failure_of(std::ios_base::failure("read", {EIO, std::generic_category()})) ==
         "a file: Input/output error; check its disk, or copy it again");
   const auto code = [](int error) { return std::error_code(error, std::generic_category()); };
