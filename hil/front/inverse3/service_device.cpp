@@ -155,6 +155,7 @@ CartesianCommand ServiceDevice::command_in(std::string_view text) {
         wants_full_state_ || find(&message, {"session", "force_render_full_state"}) != nullptr;
     const Json* const arms = find(&message, {"inverse3"});
     if (!arms) return command;
+    // NOLINTNEXTLINE(clang-analyzer-core.NullDereference): it takes the next element for null
     for (const Json& arm : *arms) {
       const Json* const id = find(&arm, {"device_id"});
       if (!id || !id->is_text() || id->get<std::string>() != (has_other_id_ ? kOtherId : kDeviceId))
@@ -175,24 +176,26 @@ CartesianCommand ServiceDevice::command_in(std::string_view text) {
   return command;
 }
 
+Json ServiceDevice::arm_config(const std::string& name) const {
+  Json config = {{"type", "inverse3"}, {"handedness", "right"}};
+  config["device_info"] = {{"major_version", 7}, {"minor_version", 2}, {"id", name}};
+  config["gravity_compensation"] = {{"enabled", true}, {"scaling_factor", 1.0}};
+  if (is_3_5()) {
+    config["preset"] = "defaults";
+    config["basis"] = {{"permutation", is_reconfigured_ ? "XZ-Y" : "XYZ"}};
+    config["mount"] = {
+        {"position", vec(0, 0, 0)}, {"rotation", identity()}, {"scale", vec(1, 1, 1)}};
+    config["filters"] = {{"force_gate", Json{{"gain", 0.3}}},
+                         {"damping", Json{{"scalar", is_reconfigured_ ? 1.0 : 0.0}}}};
+  }
+  return config;
+}
+
 std::string ServiceDevice::state_text(bool with_config, double position_scale) const {
   const std::string id = has_other_id_ ? kOtherId : kDeviceId;
   const auto entry = [&](const std::string& name, bool is_ours) {
     Json arm = {{"device_id", name}};
-    if (with_config) {
-      Json config = {{"type", "inverse3"}, {"handedness", "right"}};
-      config["device_info"] = {{"major_version", 7}, {"minor_version", 2}, {"id", name}};
-      config["gravity_compensation"] = {{"enabled", true}, {"scaling_factor", 1.0}};
-      if (is_3_5()) {
-        config["preset"] = "defaults";
-        config["basis"] = {{"permutation", is_reconfigured_ ? "XZ-Y" : "XYZ"}};
-        config["mount"] = {
-            {"position", vec(0, 0, 0)}, {"rotation", identity()}, {"scale", vec(1, 1, 1)}};
-        config["filters"] = {{"force_gate", Json{{"gain", 0.3}}},
-                             {"damping", Json{{"scalar", is_reconfigured_ ? 1.0 : 0.0}}}};
-      }
-      arm["config"] = config;
-    }
+    if (with_config) arm["config"] = arm_config(name);
     const auto at_um = is_ours ? report_.position_um : kElsewhereUm;
     Json state = {{"cursor_position", position(at_um, position_scale * settings_.position_scale)},
                   {"cursor_velocity", velocity(velocity_mm_s_)}};

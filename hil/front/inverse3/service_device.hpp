@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "hil/device/packet_device.hpp"
+#include "shared/text/json.hpp"
 #include "shared/wire/cartesian.hpp"
 
 /// The emulated Inverse Service without its sockets: an Inverse3 and its handle as messages of
@@ -113,6 +114,7 @@ class ServiceDevice {
   void take_packets();
   void follow(const CartesianReport& report) noexcept;
   [[nodiscard]] CartesianCommand command_in(std::string_view text);
+  [[nodiscard]] Json arm_config(const std::string& name) const;
   [[nodiscard]] std::string state_text(bool with_config, double position_scale = 1) const;
   [[nodiscard]] ServiceMessage broken(const std::string& text);
 
