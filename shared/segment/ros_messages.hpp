@@ -32,7 +32,8 @@ struct RosChannel {
 ///
 /// The second arm has /kerf/2/tick, /kerf/2/tip and /kerf/2/force, the last in frame "device_2".
 /// Stamps are `start_ns`.
-enum RosTopic : std::uint8_t { ros_tick, ros_tip, ros_force, kRosTopics };
+enum RosTopic : std::uint8_t { ros_tick, ros_tip, ros_force };
+inline constexpr std::size_t kRosTopics = 3;
 [[nodiscard]] std::array<RosChannel, kRosTopics> ros_channels(std::size_t arm = 0);
 
 /// Makes the messages of a run with ticks of `tick_ns`.
