@@ -13,7 +13,8 @@ namespace kerf {
 /// DeviceDriver says: what switches motors off is for any thread and any signal handler.
 class Devices {
  public:
-  Devices(DeviceDriver& first) noexcept : drivers_{&first} {}  // one arm, the usual case
+  Devices(DeviceDriver& first) noexcept  // NOLINT(google-explicit-constructor): the usual case
+      : drivers_{&first} {}
   /// `second` may be null: one arm.
   Devices(DeviceDriver& first, DeviceDriver* second) noexcept
       : drivers_{&first, second}, count_(second == nullptr ? 1 : 2) {}

@@ -182,6 +182,32 @@ void check_overrides(const SceneOverrides& overrides) {
   }
 }
 
+/// Kind and torque scale of one device or of both.
+void replace_devices(const SceneOverrides& overrides, Scene& scene) {
+  const auto replace = [&](DeviceSettings& device,
+                           const std::optional<std::array<double, 3>>& torque_scale) {
+    if (overrides.personality && *overrides.personality != device.personality) {
+      device.personality = *overrides.personality;
+      device.torque_scale.reset();  // of another device's motors
+    }
+    if (torque_scale) device.torque_scale = torque_scale;
+  };
+  replace(scene.device, overrides.torque_scale);
+  if (overrides.second_torque_scale && !scene.second) {
+    refuse("--torque-scale", " has six numbers, and the scene has one [device]; give three");
+  }
+  if (scene.second) {
+    const Personality first = scene.device.personality;
+    const bool same = overrides.personality || scene.second->device.personality == first;
+    if (overrides.torque_scale && !overrides.second_torque_scale && !same) {
+      refuse("--torque-scale",
+             " has three numbers, and the scene has two devices of different kinds; give six");
+    }
+    replace(scene.second->device,
+            overrides.second_torque_scale ? overrides.second_torque_scale : overrides.torque_scale);
+  }
+}
+
 void apply_overrides(const SceneOverrides& overrides, Scene& scene) {
   check_overrides(overrides);
   VolumeSpec& first = scene.volumes.front();
@@ -218,28 +244,7 @@ void apply_overrides(const SceneOverrides& overrides, Scene& scene) {
   scene.servo.rate_hz = overrides.rate_hz.value_or(scene.servo.rate_hz);
   scene.servo.numeric = overrides.numeric.value_or(scene.servo.numeric);
   scene.force.unchecked_gain = scene.force.unchecked_gain || overrides.unchecked_gain;
-  const auto replace = [&](DeviceSettings& device,
-                           const std::optional<std::array<double, 3>>& torque_scale) {
-    if (overrides.personality && *overrides.personality != device.personality) {
-      device.personality = *overrides.personality;
-      device.torque_scale.reset();  // of another device's motors
-    }
-    if (torque_scale) device.torque_scale = torque_scale;
-  };
-  replace(scene.device, overrides.torque_scale);
-  if (overrides.second_torque_scale && !scene.second) {
-    refuse("--torque-scale", " has six numbers, and the scene has one [device]; give three");
-  }
-  if (scene.second) {
-    const Personality first = scene.device.personality;
-    const bool same = overrides.personality || scene.second->device.personality == first;
-    if (overrides.torque_scale && !overrides.second_torque_scale && !same) {
-      refuse("--torque-scale",
-             " has three numbers, and the scene has two devices of different kinds; give six");
-    }
-    replace(scene.second->device,
-            overrides.second_torque_scale ? overrides.second_torque_scale : overrides.torque_scale);
-  }
+  replace_devices(overrides, scene);
   settle_device(scene);
   if (scene.cut.pedal == CutPedal::automatic && overrides.pedal) {
     scene.cut.pedal = CutPedal::button;
@@ -395,6 +400,24 @@ void finish_second_arm(const Point3& apart_mm, bool of_command_line, LoadedScene
   }
 }
 
+void load_tools(const Scene& spec, const std::filesystem::path& folder,
+                const SceneOverrides& overrides, const RecordedInputs& recorded, bool fitted,
+                LoadedScene& scene) {
+  const SolidExtent touched = touched_volumes(scene.volumes);
+  for (const ToolSpec& tool : spec.tools) {
+    try {
+      scene.tools.push_back(
+          load_tool(tool, touched, {folder, overrides.read_cpu_s, mesh_of(tool.name, recorded)}));
+      scene.tool_specs.push_back(tool);
+      scene.tool_specs.back().size.pitch_mm = scene.tools.back().pitch_mm;
+      scene.tool_specs.back().size.radius_mm = scene.tools.back().radius_mm;
+    } catch (const LoadError&) {
+      // A spare tool may not fit the volume to which the scene was fitted.
+      if (!fitted || scene.tools.empty()) throw;
+    }
+  }
+}
+
 /// `first`: the image of the first volume, in place of its file.
 LoadedScene load_parsed(Scene spec, const std::filesystem::path& path,
                         const SceneOverrides& overrides, VolumeImage* first,
@@ -433,20 +456,7 @@ LoadedScene load_parsed(Scene spec, const std::filesystem::path& path,
     }
     if (!scene.volumes.front().image.labels.empty()) add_proposed_materials(scene);
   }
-  const SolidExtent touched = touched_volumes(scene.volumes);
-  for (const ToolSpec& tool : spec.tools) {
-    try {
-      scene.tools.push_back(load_tool(
-          tool, touched, {path.parent_path(), overrides.read_cpu_s, mesh_of(tool.name, recorded)}));
-      scene.tool_specs.push_back(tool);
-      scene.tool_specs.back().size.pitch_mm = scene.tools.back().pitch_mm;
-      scene.tool_specs.back().size.radius_mm = scene.tools.back().radius_mm;
-    } catch (const LoadError&) {
-      // A spare tool may not fit the volume to which the scene was fitted.
-      if (!fitted || scene.tools.empty()) throw;
-    }
-  }
-
+  load_tools(spec, path.parent_path(), overrides, recorded, fitted, scene);
   scene.active_tool = tool_held(scene.device, 0, scene.tools);
   if (fitted) {
     const double scale = scene.device.workspace_scale;

@@ -173,6 +173,24 @@ class SilentDevices {
   std::array<std::uint64_t, kMaxArms> ticks_{};
 };
 
+/// Applies at most one command of a reader.
+void take_command(SegmentServer& server, Servo& servo, Tick tick, TickCommands& commands,
+                  RunRecord& record) noexcept {
+  commands.command = {};
+  const auto command = server.take_command();
+  if (!command) return;
+  commands.command = servo_command(*command);
+  commands.last_index = command->index;
+  if (!servo.apply(commands.command)) record.add_event(tick, "refused_command");
+}
+
+void count_packets(const Devices& devices, TickTiming& timing) noexcept {
+  for (std::size_t a = 0; a < devices.size(); ++a) {
+    timing.lost_packets[a] = devices[a].lost();
+    timing.refused_packets[a] = devices[a].refused();
+  }
+}
+
 }  // namespace
 
 EndReason run_servo(TickSource& clock, const Devices& devices, Servo& servo, Publisher& publisher,
@@ -197,12 +215,7 @@ EndReason run_servo(TickSource& clock, const Devices& devices, Servo& servo, Pub
     for (std::size_t a = 0; a < reports.size(); ++a) {
       reports[a] = devices[a].read();  // newest pose; never blocks
     }
-    commands.command = {};
-    if (const auto command = server.take_command()) {
-      commands.command = servo_command(*command);
-      commands.last_index = command->index;
-      if (!servo.apply(commands.command)) record.add_event(tick, "refused_command");
-    }
+    take_command(server, servo, tick, commands, record);
     const char* const stall = recover(signals, clock.stood_still(), servo);
     commands.fade_in = stall != nullptr;
     if (commands.fade_in) record.add_event(tick, stall);
@@ -211,10 +224,7 @@ EndReason run_servo(TickSource& clock, const Devices& devices, Servo& servo, Pub
     const std::int64_t compute_ns = monotonic_ns() - in_hand_ns;
     timing.compute_ns = clock.takes_time() ? compute_ns : 0;
     timing.missed_deadlines = clock.overruns();
-    for (std::size_t a = 0; a < reports.size(); ++a) {
-      timing.lost_packets[a] = devices[a].lost();
-      timing.refused_packets[a] = devices[a].refused();
-    }
+    count_packets(devices, timing);
     send_tick(outputs, signals, devices);  // the devices first,
     const std::int64_t sent_ns = monotonic_ns();
     publisher.publish(tick, reports, commands, outputs, timing);  // then the readers

@@ -79,6 +79,32 @@ std::size_t known_at(const char* option, const std::string& value,
   throw HilError(std::string(option) + ": " + value + unknown_word(value, known));
 }
 
+/// Of the front's bus, and of lock-step on it.
+void check_rate(const EmulatorOptions& o) {
+  const bool is_omni = o.personality == Personality::omni || is_cartesian(o.personality);
+  const bool is_usb = o.front == "usbip" || o.front == "uhid" || (o.front == "fuse" && !is_omni);
+  if (is_usb && o.lockstep) {
+    throw HilError("--lockstep: the USB front runs by its own clock; use --front socket");
+  }
+  const int fastest = is_omni ? kCyclesPerSecond : kUsbFramesPerSecond;
+  if (o.rate_hz < 1 || fastest % o.rate_hz != 0) {
+    throw HilError("--rate: " + std::to_string(o.rate_hz) + " does not divide " +
+                   std::to_string(fastest) + ", the rate of the bus; use such as 500 or 1000");
+  }
+  if (!o.lockstep && o.rate_hz != EmulatorOptions{}.rate_hz) {
+    throw HilError(
+        "--rate: the device runs by its own clock; give --lockstep too, or leave it out");
+  }
+  if (o.lockstep && o.packet_cycles != EmulatorOptions{}.packet_cycles) {
+    throw HilError("--packet-cycles: lock-step looks at the host once a tick; leave it out");
+  }
+  if (o.lockstep && !o.fault.empty() && (o.front == "fuse" || o.front == "websocket")) {
+    throw HilError("--fault: in lock-step a " +
+                   std::string(o.front == "fuse" ? "node" : "service") +
+                   " has no way to say that nothing came; use --front socket or udp");
+  }
+}
+
 void check_front(const EmulatorOptions& o) {
   constexpr std::array<std::string_view, 6> kFronts{"socket", "udp",   "websocket",
                                                     "fuse",   "usbip", "uhid"};
@@ -128,28 +154,7 @@ void check_front(const EmulatorOptions& o) {
     throw HilError("--front fuse: the bytes of " + o.device +
                    " are its vendor's secret; use --front socket or udp");
   }
-  const bool is_omni = o.personality == Personality::omni || is_cartesian(o.personality);
-  const bool is_usb = o.front == "usbip" || o.front == "uhid" || (o.front == "fuse" && !is_omni);
-  if (is_usb && o.lockstep) {
-    throw HilError("--lockstep: the USB front runs by its own clock; use --front socket");
-  }
-  const int fastest = is_omni ? kCyclesPerSecond : kUsbFramesPerSecond;
-  if (o.rate_hz < 1 || fastest % o.rate_hz != 0) {
-    throw HilError("--rate: " + std::to_string(o.rate_hz) + " does not divide " +
-                   std::to_string(fastest) + ", the rate of the bus; use such as 500 or 1000");
-  }
-  if (!o.lockstep && o.rate_hz != EmulatorOptions{}.rate_hz) {
-    throw HilError(
-        "--rate: the device runs by its own clock; give --lockstep too, or leave it out");
-  }
-  if (o.lockstep && o.packet_cycles != EmulatorOptions{}.packet_cycles) {
-    throw HilError("--packet-cycles: lock-step looks at the host once a tick; leave it out");
-  }
-  if (o.lockstep && !o.fault.empty() && (o.front == "fuse" || o.front == "websocket")) {
-    throw HilError("--fault: in lock-step a " +
-                   std::string(o.front == "fuse" ? "node" : "service") +
-                   " has no way to say that nothing came; use --front socket or udp");
-  }
+  check_rate(o);
 }
 
 void check_device(const EmulatorOptions& o) {
