@@ -101,7 +101,8 @@ On 256 x 256 x 161 voxels. The costliest tick of each tool is searched among tho
 noisy solids, in a slot with a play of 0.1 voxels, in tissue just below the iso and, if its data are present, at the GE
 tooth; with goals near and far, and from the start search. The ticks that took longest are repeated from the same
 state, and the fastest repetition counts. The row names the solid at which the tick was found. Times are of the machine
-named above; on a slower one the paper's tick beside them is slower too."""),
+named above. The limits are for a processor with AVX-512; on another, or a slower one, the paper's tick beside them is
+slower too."""),
     ("hands", "Hands", """\
 An emulated Omni, its driver and the whole servo in virtual time, with `scenes/touch.toml`; `groove` and `cut_cavity`
 have `[cut] model = "preston"`. Force above 150 Hz is the rms over windows of 0.128 s that are wholly in contact. One
