@@ -3,12 +3,14 @@
 """Whether the pages that a command makes are older than the sources that make them:
 
     .ci/check-pages.py                  prints each stale page with the command that renews it; exit code 1 if there is one
-    .ci/check-pages.py --stamp PAGE...  after a page was made anew: writes the hash of its sources as its last line
+    .ci/check-pages.py --stamp PAGE...  after a page was made anew: writes the hash of its sources as its last line; also if
+                                        no change of them can move a figure, and the commit says why
 
 A page ends with <!-- made by: COMMAND; sources: HASH -->. The hash is over the code of the sources, without their paths and
 comments: neither a renamed file nor another comment makes a page stale. Pages that a test makes again and compares
 (scene-keys, script-keys, reports, segment, wire, log, errors) need no hash."""
 import hashlib
+import io
 import pathlib
 import re
 import sys
@@ -45,12 +47,17 @@ def sources(globs):
 
 
 def code_of(file):
-    """What a file does: its code without comments, and with one space for each gap."""
-    if file.suffix == ".py":
-        with tokenize.open(file) as text:
-            tokens = tokenize.generate_tokens(text.readline)
-            return "\n".join(f"{token.type} {token.string}" for token in tokens if token.type not in (tokenize.COMMENT, tokenize.NL))
-    return CPP_TOKEN.sub(lambda found: found["kept"] or " ", file.read_text(encoding="utf-8"))
+    """What a file does: its code without comments, and with a space only between two words."""
+    text = file.read_text(encoding="utf-8")
+    if file.suffix != ".py":
+        text = CPP_TOKEN.sub(lambda found: found["kept"] or "\0", text)
+        return re.sub(r"(?<=\w)\0(?=\w)", " ", text).replace("\0", "")
+    lines = text.splitlines()
+    for token in tokenize.generate_tokens(io.StringIO(text).readline):
+        if token.type == tokenize.COMMENT:
+            row, column = token.start
+            lines[row - 1] = lines[row - 1][:column]
+    return "\n".join(line.rstrip() for line in lines if line.strip())
 
 
 def hash_of(globs):

@@ -420,7 +420,8 @@ def judge(name, mutations, jobs, again):
                 except Wrong as error:
                     wrong.append(str(error))
                     continue
-                (done / futures[future].key()).write_text(caught[0] if caught else "")
+                if caught or not futures[future].lacking():  # another processor may see it
+                    (done / futures[future].key()).write_text(caught[0] if caught else "")
                 tell(futures[future], caught and caught[0])
     if wrong:
         raise Wrong("\nmutate: ".join(sorted(wrong)))

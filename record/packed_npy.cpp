@@ -55,8 +55,8 @@ bool PackedNpyReader::read(std::span<std::byte> content) {
 bool PackedNpyReader::at_end() {
   char beyond = 0;
   if (file_ == nullptr || gzread(handle(file_.get()), &beyond, 1) != 0) return false;
-  int status =
-      Z_OK;  // Z_BUF_ERROR: the file ends within its checksum, which gzread takes for an end
+  // Z_BUF_ERROR: the file ends within its checksum, which gzread takes for an end.
+  int status = Z_OK;
   static_cast<void>(gzerror(handle(file_.get()), &status));
   return status == Z_OK;
 }

@@ -145,7 +145,7 @@ struct TickRecord {
   double port_energy_j;   ///< energy that the loop took from the hand since the start of the run
   double port_minimum_j;  ///< its lowest value so far; below 0 the loop gave more than it took
   float joint_torque_n_mm[3];
-  std::uint32_t refused_packets;  ///< since the start: no report, or an old one
+  std::uint32_t refused_packets;  ///< since the start: none, old, or repeated under force
   std::uint64_t volume_hash;      ///< chained over all changed boxes since the start
   std::uint64_t output_hash;      ///< chained over all outputs since the start
   std::uint16_t dirty_lo[3];      ///< first voxel of the changed box of the first changed volume

@@ -46,7 +46,7 @@ constexpr LogColumn kColumns[] = {
     {"port_minimum_j", "J", "its lowest value so far; below 0 the loop gave more than it took"},
     {"joint_torque_n_mm", "N mm", "motor torques about the joints, of commanded_force_n",
      "0 while the motors are off"},
-    {"refused_packets", "packet", "since the start: no report, or an old one"},
+    {"refused_packets", "packet", "since the start: no report, an old one, or one that repeats under force"},
     {"volume_hash", "", "hash chained over all changed boxes since the start"},
     {"output_hash", "", "hash chained over what the servo put out since the start"},
     {"dirty_lo", "voxel", "first voxel of the box that changed, in the first volume that did", kChange},

@@ -72,7 +72,8 @@ def segment(root, programs):
         stated.setdefault(record, []).append((int(at, 0), name, kind, int(count)))
     told = {"TickRecord": log_columns(root)}
     parts = [f"## `{name}`\n\n{what}{struct_table(file, name, stated[name], told.get(name))}\n" for name, what in (
-        ("SegmentHeader", "At byte 0, one page. Each word that changes has a line of 64 bytes of its own. "),
+        ("SegmentHeader", "At byte 0, one page. Each word that changes has a line of 64 bytes of its own; `lifecycle` shares that of "
+                          "`heartbeat_ns`. "),
         ("VolumeDescriptor", "At `off_volume_table`, one for each volume. `origin_mm` is the place of the centre of voxel "
                              "(0, 0, 0) in the world. "),
         ("TickRecord", "At `off_state`: a ring, slot = index mod `state_slots`. [The log](log.md) has the same rows, and "
