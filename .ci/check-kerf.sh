@@ -487,7 +487,7 @@ mkdir -p "$lab/no-qemu" "$lab/tools" "$lab/tree/.ci" "$lab/tree/build/release"
 ln -s /usr/bin/* "$lab/no-qemu"
 rm -f "$lab"/no-qemu/{qemu-system-x86_64,busybox}
 cp "$root/kerf" "$lab/tree"
-cp "$root"/.ci/{later-tests.sh,tiers.txt} "$lab/tree/.ci"
+cp "$root"/.ci/{later-tests.sh,progress.sh,tiers.txt} "$lab/tree/.ci"
 touch "$lab/tree/CMakeLists.txt"  # its sources
 printf '#!/bin/sh\n' | tee "$lab/tools/ninja" >"$lab/tree/.ci/packages.sh"
 printf '#!/bin/sh\nmkdir -p build/release/Testing/Temporary\necho "$GUEST" >build/release/Testing/Temporary/LastTest.log\nexit $CTEST\n' \
