@@ -233,11 +233,15 @@ std::string gain_error(const LoadedScene& scene, const GainMargin& margin) {
 std::string device_limit_error(const LoadedScene& scene) {
   if (scene.force.model == ForceModel::paper) return {};
   const DeviceFigures device = device_figures(scene.device.personality);
+  const std::string authority =
+      device.gains_from.empty()
+          ? "the most that kerf assumes for " + device_word(scene) + ", as nothing is published"
+          : "the most that " + std::string(device.gains_from) + " has for " + device_word(scene);
   const auto refused = [&](const std::string& what, double value, double most) {
-    return scene.path + format(
-                            ": force.%s = %.6g is above %.6g, the most that is known to be safe "
-                            "on %s; lower it, use --virtual, or say --unchecked-gain",
-                            what.c_str(), value, most, device_word(scene).c_str());
+    return scene.path +
+           format(": force.%s = %.6g is above %.6g, %s; ", what.c_str(), value, most,
+                  authority.c_str()) +
+           "lower it, use --virtual, or say --unchecked-gain";
   };
   double stiffness = scene.force.stiffness_n_per_mm, damping = scene.force.damping_ns_per_mm;
   std::string of_law;

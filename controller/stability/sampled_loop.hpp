@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <string_view>
+
 #include "shared/wire/personality.hpp"
 
 // The model of one axis of a device on a virtual wall, the figures of each device, and the limits
@@ -53,27 +55,30 @@ struct DeviceFigures {
   /// From the reading of the encoders to the moment at which its force acts: bus and controller of
   /// the device. Assumed until measured: 2 ms, two frames of a bus of 1 kHz.
   double delay_s;
-  /// Up to here a real port accepts gains without a confirmation.
+  /// Up to here a real port accepts gains without a confirmation: what `gains_from` publishes.
   double highest_stiffness_n_per_mm;
   double highest_damping_ns_per_mm;
+  std::string_view gains_from;  ///< empty: no source has gains of this device, both are assumed
 };
 
 [[nodiscard]] constexpr DeviceFigures device_figures(Personality personality) noexcept {
+  constexpr std::string_view kChai3d = "CHAI3D 3.3.0";
   switch (personality) {
-    case Personality::omni:  // data sheet; gains: CHAI3D's caps of this device
-      return {0.045, 0.0002, 0.26, 0.055, 0.002, 0.7, 0.005};
-    case Personality::falcon:  // mass, friction: the emulator's; quantum: a count of a leg; CHAI3D
-      return {0.12, 0.0002, 0.3, 0.038, 0.002, 3.0, 0.02};
-    case Personality::inverse3:  // stiffness, step: the vendor's claims; the rest: assumed
-      return {0.2, 0.0002, 0.1, 0.01, 0.002, 1.0, 0.01};
-    case Personality::touch:  // as the Omni, whose mechanics it has
-      return {0.045, 0.0002, 0.26, 0.055, 0.002, 0.7, 0.005};
-    case Personality::omega:  // gains: CHAI3D's caps of the omega.3; mass, friction: assumed
-      return {0.2, 0.0002, 0.1, 0.01, 0.002, 5.0, 0.04};
-    case Personality::woodenhaptics:  // likewise; no cap is published: CHAI3D's of any other device
+    case Personality::omni:  // data sheet; gains: CPhantomDevices.cpp, "PHANTOM Omni"
+      return {0.045, 0.0002, 0.26, 0.055, 0.002, 0.7, 0.005, kChai3d};
+    case Personality::falcon:  // mass, friction: the emulator's; quantum: a count of a leg; gains:
+      return {0.12, 0.0002, 0.3, 0.038, 0.002, 3.0, 0.02, kChai3d};  // CDeltaDevices.cpp, "Falcon"
+    case Personality::inverse3:  // step: the vendor's claim; all else: assumed
+      return {0.2, 0.0002, 0.1, 0.01, 0.002, 1.0, 0.01, {}};
+    case Personality::touch:  // as the Omni, whose mechanics it has; gains: the row "Touch" there
+      return {0.045, 0.0002, 0.26, 0.055, 0.002, 0.4, 0.004, kChai3d};
+    case Personality::omega:  // gains: CDeltaDevices.cpp, "omega.3"; mass, friction: assumed
+      return {0.2, 0.0002, 0.1, 0.01, 0.002, 5.0, 0.03, kChai3d};
+    case Personality::woodenhaptics:  // mass, friction: the emulator's
       break;
   }
-  return {0.2, 0.0002, 0.2, 0.118, 0.002, 1.0, 0.02};
+  // Gains: CWoodenDevice.cpp, default_woody(), of WoodenHaptics/woody-experimental, 23f74fda.
+  return {0.2, 0.0002, 0.2, 0.118, 0.002, 1.0, 0.008, "its open driver"};
 }
 
 /// The loop of that device at a rate, without a hand: a light grip is the worst case, since the
