@@ -64,20 +64,20 @@ struct DeviceFigures {
 [[nodiscard]] constexpr DeviceFigures device_figures(Personality personality) noexcept {
   constexpr std::string_view kChai3d = "CHAI3D 3.3.0";
   switch (personality) {
-    case Personality::omni:  // data sheet; gains: CPhantomDevices.cpp, "PHANTOM Omni"
+    case Personality::omni:  // data sheet; gains: CPhantomDevices, "PHANTOM Omni"
       return {0.045, 0.0002, 0.26, 0.055, 0.002, 0.7, 0.005, kChai3d};
     case Personality::falcon:  // mass, friction: the emulator's; quantum: a count of a leg; gains:
-      return {0.12, 0.0002, 0.3, 0.038, 0.002, 3.0, 0.02, kChai3d};  // CDeltaDevices.cpp, "Falcon"
+      return {0.12, 0.0002, 0.3, 0.038, 0.002, 3.0, 0.02, kChai3d};  // CDeltaDevices, "Falcon"
     case Personality::inverse3:  // step: the vendor's claim; all else: assumed
       return {0.2, 0.0002, 0.1, 0.01, 0.002, 1.0, 0.01, {}};
     case Personality::touch:  // as the Omni, whose mechanics it has; gains: the row "Touch" there
       return {0.045, 0.0002, 0.26, 0.055, 0.002, 0.4, 0.004, kChai3d};
-    case Personality::omega:  // gains: CDeltaDevices.cpp, "omega.3"; mass, friction: assumed
+    case Personality::omega:  // gains: CDeltaDevices, "omega.3"; mass, friction: assumed
       return {0.2, 0.0002, 0.1, 0.01, 0.002, 5.0, 0.03, kChai3d};
     case Personality::woodenhaptics:  // mass, friction: the emulator's
       break;
   }
-  // Gains: CWoodenDevice.cpp, default_woody(), of WoodenHaptics/woody-experimental, 23f74fda.
+  // Gains: CWoodenDevice, default_woody(), of WoodenHaptics/woody-experimental, 23f74fda.
   return {0.2, 0.0002, 0.2, 0.118, 0.002, 1.0, 0.008, "its open driver"};
 }
 

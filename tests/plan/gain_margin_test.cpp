@@ -230,7 +230,7 @@ TEST_CASE("no device takes gains above those of the source that docs/devices.md 
     char gains[40];
     std::snprintf(gains, sizeof gains, " | 2 | %g | %g | ", stiffness, damping);
     CHECK(has(line, gains));
-    CHECK(has(line, row.device == Personality::inverse3 ? "nobody's" : ".cpp`, "));
+    CHECK(has(line, row.device == Personality::inverse3 ? "nobody's" : "`, "));
   }
 }
 
