@@ -486,7 +486,7 @@ expect 'nor of a heading that is none of a command' offers '' Environment ''
 mkdir -p "$lab/no-qemu" "$lab/tools" "$lab/tree/.ci" "$lab/tree/build/release"
 ln -s /usr/bin/* "$lab/no-qemu"
 rm -f "$lab"/no-qemu/{qemu-system-x86_64,busybox}
-cp "$root/kerf" "$lab/tree"
+cp -r "$root/kerf" "$root/cli" "$lab/tree"
 cp "$root"/.ci/{later-tests.sh,progress.sh,tiers.txt} "$lab/tree/.ci"
 touch "$lab/tree/CMakeLists.txt"  # its sources
 printf '#!/bin/sh\n' | tee "$lab/tools/ninja" >"$lab/tree/.ci/packages.sh"
@@ -494,6 +494,8 @@ printf '#!/bin/sh\nmkdir -p build/release/Testing/Temporary\necho "$GUEST" >buil
   >"$lab/tools/ctest"
 chmod +x "$lab"/tools/* "$lab/tree/.ci/packages.sh"
 touch "$lab/tree/build/release/configured.log"
+printf '%s:INTERNAL=%s\n' CMAKE_HOME_DIRECTORY "$lab/tree" CMAKE_CACHEFILE_DIR "$lab/tree/build/release" \
+  >"$lab/tree/build/release/CMakeCache.txt"
 # tests_give CODE GUEST CTEST: the exit code of `kerf test` where the test in a guest printed GUEST and
 # ctest ended with CTEST.
 tests_give() {

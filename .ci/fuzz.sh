@@ -13,7 +13,10 @@ seconds=${1:-20}
   exit 2
 }
 build=build/asan
-if [[ ! -e $build/build.ninja ]]; then cmake --preset asan --log-level=NOTICE; fi
+# shellcheck source=cli/build_folder.sh
+source cli/build_folder.sh
+own_folder "$PWD" "$PWD/$build"
+if [[ ! -e $build/CMakeCache.txt || -n ${anew[*]} ]]; then cmake --preset asan "${anew[@]}" --log-level=NOTICE; fi
 targets=(fuzzers)
 if (($# > 1)); then targets=("${@:2}") && targets=("${targets[@]/#/fuzz_}"); fi
 cmake --build "$build" --target "${targets[@]}" >/dev/null

@@ -2,6 +2,9 @@
 # shellcheck shell=bash
 # Sourced by .ci/run and .ci/all: a timed stage, a build that takes warnings as errors, and the tests of each tier.
 
+# shellcheck source=cli/build_folder.sh
+source cli/build_folder.sh
+
 # Real volumes, if they lie beside the checkout.
 if [[ -z ${KERF_DATA:-} && -d ../shared/data ]]; then
   KERF_DATA=$(cd ../shared/data && pwd)
@@ -46,7 +49,8 @@ joined() { stage "$beside_name" finish_beside; }
 
 # build_strictly PRESET [TARGET...]: warnings are errors. A cache is worth it only if it outlives this run.
 build_strictly() {
-  cmake --preset "$1" -DKERF_WERROR=ON ${CCACHE_DIR:+-DKERF_CCACHE=ON} --log-level=NOTICE &&
+  own_folder "$PWD" "$PWD/build/$1"  # a cache of another checkout
+  cmake --preset "$1" "${anew[@]}" -DKERF_WERROR=ON ${CCACHE_DIR:+-DKERF_CCACHE=ON} --log-level=NOTICE &&
     cmake --build --preset "$1" ${2:+--target} "${@:2}"
 }
 

@@ -69,6 +69,7 @@ install(DIRECTORY ${completion}/ DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-compl
 # ./kerf looks for all else beside itself, and finds that it is installed.
 set(share ${CMAKE_INSTALL_DATADIR}/kerf)
 install(PROGRAMS kerf DESTINATION ${share})
+install(DIRECTORY cli DESTINATION ${share})
 install(DIRECTORY demo DESTINATION ${share} PATTERN __pycache__ EXCLUDE)
 install(PROGRAMS .ci/doctor.sh DESTINATION ${share}/.ci)
 install(CODE "file(CREATE_LINK ../${share}/kerf
