@@ -9,7 +9,10 @@ cd "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/.."
 flags=(-std=c++20 -mcpu=cortex-m7 -mthumb -mfpu=fpv5-d16 -mfloat-abi=hard -fno-exceptions -fno-rtti -ffp-contract=off
   -Wall -Wextra -Wconversion -Wpedantic -Werror)
 if [[ ${1:-} == --compile ]]; then
-  command -v arm-none-eabi-g++ >/dev/null || exit 77
+  if ! command -v arm-none-eabi-g++ >/dev/null; then
+    echo 'skipped: no arm-none-eabi-g++; .ci/packages.sh all installs it'
+    exit 77
+  fi
   for source in controller/servo/*.cpp controller/kernel/sets/scalar.cpp shared/volume/checksum.cpp examples/bare-metal/run.cpp; do
     arm-none-eabi-g++ "${flags[@]}" -fsyntax-only -I. -DKERF_SCENE=mill -DKERF_NUMBERS=FixedNumbers "$source"
   done

@@ -487,11 +487,23 @@ mkdir -p "$lab/no-qemu" "$lab/tools" "$lab/tree/.ci" "$lab/tree/build/release"
 ln -s /usr/bin/* "$lab/no-qemu"
 rm -f "$lab"/no-qemu/{qemu-system-x86_64,busybox}
 cp -r "$root/kerf" "$root/cli" "$lab/tree"
-cp "$root"/.ci/{later-tests.sh,progress.sh,tiers.txt} "$lab/tree/.ci"
+cp "$root"/.ci/{later-tests.sh,progress.sh,tests.sh,tiers.txt} "$lab/tree/.ci"
 touch "$lab/tree/CMakeLists.txt"  # its sources
 printf '#!/bin/sh\n' | tee "$lab/tools/ninja" >"$lab/tree/.ci/packages.sh"
-printf '#!/bin/sh\nmkdir -p build/release/Testing/Temporary\necho "$GUEST" >build/release/Testing/Temporary/LastTest.log\nexit $CTEST\n' \
-  >"$lab/tools/ctest"
+# It knows three tests: one prints $GUEST and is skipped if that is a reason, of two a part is skipped for $PART, if anything.
+cat >"$lab/tools/ctest" <<'PROGRAM'
+#!/usr/bin/env bash
+echo "$*" >"$LAB/ctest"
+mkdir -p build/release/Testing/Temporary
+{
+  printf '1/3 Testing: hil_guest\n1/3 Test: hil_guest\n%s\n' "$GUEST"
+  for name in load kills; do printf '2/3 Testing: %s\n2/3 Test: %s\n%s\n' "$name" "$name" "${PART:-[doctest] skipped: 0}"; done
+} >build/release/Testing/Temporary/LastTest.log
+if [[ $GUEST == skipped:* ]]; then
+  printf 'The following tests did not run:\n\t  1 - hil_guest (Skipped)\n' | tee build/release/Testing/tests.log
+fi
+exit "$CTEST"
+PROGRAM
 chmod +x "$lab"/tools/* "$lab/tree/.ci/packages.sh"
 touch "$lab/tree/build/release/configured.log"
 printf '%s:INTERNAL=%s\n' CMAKE_HOME_DIRECTORY "$lab/tree" CMAKE_CACHEFILE_DIR "$lab/tree/build/release" \
@@ -510,10 +522,18 @@ expect 'a guest needs QEMU, and one command installs it' \
 expect 'the doctor' with PATH="$lab/no-qemu" kerf_gives 0 doctor
 expect 'says what lacks' says '^warn  QEMU  *no qemu-system-x86_64 busybox$'
 expect 'and the command' says '.ci/packages.sh guest installs what lacks$'
+lack="skipped: ${lack#guest: }"
 expect 'tests end' tests_give 0 "$lack" 0
-expect 'with the same words' ends_with "kerf: test: hil_guest was skipped: ${lack#guest: }"
+expect 'with the same words' ends_with "kerf: test: hil_guest was skipped: ${lack#skipped: }"
+expect 'on all cores' grep -q -- "--parallel $(nproc) " "$lab/ctest"
+expect 'those of each change' grep -q -- ' -E .*packages' "$lab/ctest"
 expect 'failed ones too' tests_give 1 "$lack" 8
-expect 'with the same words' ends_with "kerf: test: hil_guest was skipped: ${lack#guest: }"
+expect 'with the same words' ends_with "kerf: test: hil_guest was skipped: ${lack#skipped: }"
+expect 'tests that lack the same' with PART='x.cpp:9: MESSAGE: skipped: no room' tests_give 0 "$lack" 0
+expect 'have one line' ends_with 'kerf: test: part of load, part of kills was skipped: no room'
+expect 'beside that of another reason' says "^kerf: test: hil_guest was skipped: ${lack#skipped: }\$"
+expect 'a test that is skipped without a word' tests_give 0 'skipped:' 0
+expect 'has a line too' ends_with 'kerf: test: hil_guest was skipped: its output does not say why'
 expect 'with a guest' tests_give 0 '[doctest] Status: SUCCESS!' 0
 expect 'nothing is said' ends_with ''
 

@@ -71,7 +71,7 @@ def tutorial():
             os.symlink(root / name, pathlib.Path(scratch) / name)
         for number, line, _ in pages.commands(page):
             if "python3" in line and not importlib.util.find_spec("matplotlib"):
-                print(f"skipped, no matplotlib: {line}")
+                print(f"skipped: no matplotlib for a command of the tutorial: {line}")
                 continue
             done = subprocess.run(["bash", "-c", line], cwd=scratch, env=environment, capture_output=True, text=True)
             print(f"{'ok' if done.returncode == 0 else 'FAILED'}: {line}")

@@ -201,7 +201,7 @@ def faults_of_formulas(site):
 
 def main():
     if not shutil.which("mkdocs"):
-        print("no mkdocs; apt-get install mkdocs")
+        print("skipped: no mkdocs; apt-get install mkdocs")
         return 77
     with tempfile.TemporaryDirectory() as folder:
         site = pathlib.Path(folder) / "site"
@@ -212,7 +212,7 @@ def main():
         if chromium:
             wrong += [*faults_of_search(site, chromium), *faults_of_looks(site, chromium)]
     print(*wrong, sep="\n")
-    print(f"{len(SEARCHES)} searches, {len(wrong)} wrong" if chromium else "no chromium: nothing was searched for")
+    print(f"{len(SEARCHES)} searches, {len(wrong)} wrong" if chromium else "skipped: no chromium to search in")
     return 1 if wrong else 0 if chromium else 77
 
 

@@ -9,7 +9,7 @@ for python in python3 /usr/bin/python3 ''; do
   if [[ -n $python ]] && "$python" -c 'import numpy, matplotlib' 2>/dev/null; then break; fi
 done
 if [[ -z $python ]]; then
-  echo 'python: numpy or matplotlib is missing; apt-get install python3-numpy python3-matplotlib'
+  echo 'skipped: numpy or matplotlib is missing; apt-get install python3-numpy python3-matplotlib'
   exit 77
 fi
 work=$(mktemp -d)

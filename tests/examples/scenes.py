@@ -50,7 +50,7 @@ def main(root, bin_folder):
             if not environment.get("KERF_DATA"):
                 missing += [word for word in words if "KERF_DATA" in word]
             if missing:
-                print(f"{scene.name}: left out, for want of {missing[0]}")
+                print(f"skipped: {scene.name}: {missing[0]} is missing")
                 continue
             for line in first:
                 subprocess.run(["bash", "-c", line], cwd=folder, env=environment, check=True)

@@ -16,6 +16,7 @@
 #include "lab/rig/tool_meshes.hpp"
 #include "tests/scene/support.hpp"
 #include "tests/support/property.hpp"
+#include "tests/support/real_data.hpp"
 #include "tests/tool/stl_support.hpp"
 
 using namespace kerf;
@@ -427,18 +428,13 @@ TEST_CASE("a tool with more surface than contact can read is reported with the s
 }
 
 TEST_CASE("real volumes load with any scene, by their size in voxels") {
-  const char* data = std::getenv("KERF_DATA");
-  if (data == nullptr) {
-    MESSAGE(
-        "skipped without KERF_DATA: ge_tooth_16bit/tooth.nhdr, ct_spine_pelvis/example_ct.nii.gz");
-    return;
-  }
   const auto scene_path = std::filesystem::path(KERF_SCENES_DIR) / "phantom.toml";
   for (const std::string file :
        {"ge_tooth_16bit/tooth.nhdr", "ct_spine_pelvis/example_ct.nii.gz"}) {
     CAPTURE(file);
     SceneOverrides overrides;
-    overrides.volume_file = std::filesystem::path(data) / file;
+    overrides.volume_file = test::real_data(file);
+    if (!overrides.volume_file.has_value()) continue;
     const LoadedScene scene = load_scene(scene_path, overrides);
     CHECK(scene.tools.at(0).offsets.size() == 2176);
     MESSAGE(file << ": scale " << scene.device.workspace_scale << ", iso " << scene.volumes[0].iso

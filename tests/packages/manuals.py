@@ -76,5 +76,5 @@ for name in names:
         check(name, page, [command], options)
         checked += len(options)
     checked += len(options_in(help_text))
-print('\n'.join(wrong) or f'manuals: {len(names)} pages, {checked} options' + ('' if roff else '; no groff has read them'))
+print('\n'.join(wrong) or f'manuals: {len(names)} pages, {checked} options' + ('' if roff else '\nskipped: no groff to read them'))
 sys.exit(1 if wrong else 0 if roff else 77)

@@ -77,7 +77,7 @@ rm "$home/data/kerf/scenes/spine/ct-labels.nrrd"  # of a tooth's materials
 
 for tool in dpkg-shlibdeps file; do
   command -v "$tool" >/dev/null && continue
-  echo "packages: no Debian package was made, for want of $tool; all else is fine" >&2
+  echo "skipped: the Debian package: no $tool; all else is fine" >&2
   exit 77
 done
 (cd "$1" && cpack -B "$home/packages" >"$home/cpack.log" 2>&1) || { cat "$home/cpack.log" && fail 'cpack'; }
@@ -103,6 +103,6 @@ for field in Maintainer Description; do
 done
 dpkg-deb -f "$package" Depends | grep -q 'libgdcm3' || fail "$package: does not ask for its libraries"
 if [[ -n ${skipped:-} ]]; then
-  echo "packages: $skipped; all else is fine" >&2
+  echo "skipped: $skipped; all else is fine" >&2
   exit 77
 fi

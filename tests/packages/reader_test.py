@@ -19,7 +19,7 @@ try:
 except ImportError as lack:
     if sys.executable != "/usr/bin/python3" and os.path.exists("/usr/bin/python3"):  # Debian's own has them
         os.execv("/usr/bin/python3", ["/usr/bin/python3", *sys.argv])
-    print(f"reader: {lack}; apt-get install python3-numpy python3-setuptools python3-venv python3-wheel")
+    print(f"skipped: {lack}; apt-get install python3-numpy python3-setuptools python3-venv python3-wheel")
     sys.exit(77)
 
 home = tempfile.TemporaryDirectory()

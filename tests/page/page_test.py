@@ -207,7 +207,7 @@ CASES = [shows_what_the_visualizer_shows, is_turned_by_mouse_fingers_and_keys, i
 def main():
     chromium = find_chromium()
     if not chromium:
-        print('page: there is no browser; apt-get install chromium')
+        print('skipped: no browser; apt-get install chromium')
         return 77
     with tempfile.TemporaryDirectory(prefix='kerf-page-') as work:
         rig = Rig(sys.argv[1], work)

@@ -239,5 +239,5 @@ class Report(unittest.TestCase):
 
 if __name__ == "__main__":
     if not CAN_PLOT:
-        print("report: no matplotlib, so no plot is tried; apt-get install python3-matplotlib")
+        print("skipped: no matplotlib; apt-get install python3-matplotlib")
     unittest.main(argv=sys.argv[:1])

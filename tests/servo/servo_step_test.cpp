@@ -146,7 +146,7 @@ TEST_CASE("ten seconds of cutting never touch the heap") {
   scene.cut.model = CutModel::preston;
   ArmedServo armed(scene);
 #ifdef KERF_SANITIZED
-  MESSAGE("skipped under sanitizers: the allocation counter");
+  MESSAGE("skipped: under sanitizers, the allocation counter");
 #endif
   const std::uint64_t before = CountedAllocations::total();
   double sum_n = 0;

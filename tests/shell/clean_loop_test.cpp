@@ -249,12 +249,12 @@ TEST_CASE("the loop is clean: no allocation, no page fault, one call per sleep a
     CHECK(clean.record.faults_of_pages.minor == 0);
     CHECK(clean.record.faults_of_pages.major == 0);
   } else {
-    MESSAGE("page faults: skipped, no right to lock memory");
+    MESSAGE("skipped: page faults of the loop: no right to lock memory");
   }
   if (clean.uncounted.empty()) {
     CHECK(clean.calls == clean.expected_calls);
   } else {
-    MESSAGE("system calls: skipped, " << clean.uncounted);
+    MESSAGE("skipped: system calls of the loop: " << clean.uncounted);
   }
 }
 

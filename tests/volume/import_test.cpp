@@ -17,6 +17,7 @@
 #include "controller/volume/windowing.hpp"
 #include "controller/volume_tool/import_command.hpp"
 #include "tests/case_count.hpp"
+#include "tests/support/real_data.hpp"
 #include "tests/support/voxels.hpp"
 #include "tests/volume/volume_files.hpp"
 
@@ -359,19 +360,15 @@ TEST_CASE("each real scan is imported at first try") {
     std::vector<std::string> words;  ///< that the options need, or that the answer has
     double least, most;              ///< of the surface, in values of the file
   };
-  const char* data = std::getenv("KERF_DATA");
   for (const Scan& scan :
        kinds({Scan{"ge_tooth_8bit/tooth.mhd", {"--override-spacing", "0.125"}, 70, 110},
               Scan{"ge_tooth_16bit/tooth.nhdr", {"--override-spacing", "0.125"}, 550, 750},
               Scan{"ct_spine_pelvis/example_ct.nii.gz", {}, 120, 400}})) {
-    if (data == nullptr || !std::filesystem::exists(std::filesystem::path(data) / scan.file)) {
-      MESSAGE("skipped: " << std::string(scan.file)
-                          << " is not there (KERF_DATA names the folder)");
-      continue;
-    }
+    const auto file = real_data(scan.file);
+    if (!file.has_value()) continue;
     CAPTURE(scan.file);
     const TemporaryFolder folder;
-    const std::string path = (std::filesystem::path(data) / scan.file).string();
+    const std::string path = file->string();
     std::vector<std::string> arguments{"import", path, "--out", (folder / "out.nrrd").string()};
     if (!scan.words.empty()) CHECK(run(arguments).code == 2);  // 1 mm for a tooth
     arguments.insert(arguments.end(), scan.words.begin(), scan.words.end());

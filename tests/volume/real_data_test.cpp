@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <cstdlib>
-#include <optional>
+#include "tests/support/real_data.hpp"
 
 #include <doctest/doctest.h>
 
@@ -10,18 +9,9 @@
 #include "tests/volume/volume_files.hpp"
 
 using namespace kerf;
+using kerf::test::real_data;
 
 namespace {
-
-/// The file below $KERF_DATA; none, with a message, where it is not there.
-std::optional<std::filesystem::path> data(const std::string& name) {
-  const char* folder = std::getenv("KERF_DATA");
-  if (folder != nullptr && std::filesystem::exists(std::filesystem::path(folder) / name)) {
-    return std::filesystem::path(folder) / name;
-  }
-  MESSAGE("skipped: " << name << " is not there (KERF_DATA names the folder)");
-  return std::nullopt;
-}
 
 double in_values(Density d, Window window) {
   return window.lo + (window.hi - window.lo) * d / kDensityMax;
@@ -30,7 +20,7 @@ double in_values(Density d, Window window) {
 }  // namespace
 
 TEST_CASE("the 16-bit CT tooth: big-endian, detached, and Otsu parts dentin from air") {
-  const auto path = data("ge_tooth_16bit/tooth.nhdr");
+  const auto path = real_data("ge_tooth_16bit/tooth.nhdr");
   if (!path) return;
   const SourceVolume v = read_volume(*path);
   CHECK(v.grid == VoxelGrid{103, 94, 161});
@@ -53,7 +43,7 @@ TEST_CASE("the 16-bit CT tooth: big-endian, detached, and Otsu parts dentin from
 }
 
 TEST_CASE("the 8-bit CT tooth: MetaImage") {
-  const auto path = data("ge_tooth_8bit/tooth.mhd");
+  const auto path = real_data("ge_tooth_8bit/tooth.mhd");
   if (!path) return;
   const SourceVolume v = read_volume(*path);
   CHECK(v.grid == VoxelGrid{140, 120, 161});
@@ -62,7 +52,7 @@ TEST_CASE("the 8-bit CT tooth: MetaImage") {
 }
 
 TEST_CASE("the CT of spine and pelvis: NIfTI in HU; bone from a window that begins at 0 HU") {
-  const auto path = data("ct_spine_pelvis/example_ct.nii.gz");
+  const auto path = real_data("ct_spine_pelvis/example_ct.nii.gz");
   if (!path) return;
   const SourceVolume v = read_volume(*path);
   CHECK(v.grid == VoxelGrid{122, 101, 112});
@@ -88,7 +78,7 @@ TEST_CASE("the noise of the real scans, and the passes that it takes") {
   for (const Scan& scan : {Scan{"ge_tooth_16bit/tooth.nhdr", 5.33, 0.0104, 1},
                            Scan{"ge_tooth_8bit/tooth.mhd", 1.11, 0.0063, 0},
                            Scan{"ct_spine_pelvis/example_ct.nii.gz", 15.3, 0.0153, 1}}) {
-    const auto path = data(scan.file);
+    const auto path = real_data(scan.file);
     if (!path) continue;
     const SourceVolume v = read_volume(*path);
     const VolumeImage image = apply_window(v, range_window(v));

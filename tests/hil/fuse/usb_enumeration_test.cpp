@@ -152,7 +152,7 @@ void in_private_sysfs(Work work) {
       FAIL_CHECK(error.what());
     }
   });
-  WARN(ran);  // the log shows that it was skipped
+  if (!ran) MESSAGE("skipped: no right to a private /sys");
 }
 
 }  // namespace

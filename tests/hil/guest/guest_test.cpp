@@ -11,6 +11,7 @@
 #include <optional>
 #include <sstream>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -79,10 +80,16 @@ struct Guest {
     words.insert(words.begin(), KERF_GUEST);
     return words;
   }
-  /// Its exit code; if not 0, its output is printed.
+  /// Its exit code; if not 0, its output is printed: "guest: REASON" if something is missing.
   int wait() {
     const int code = process.wait();
-    if (code != 0) std::printf("%s", process.output().c_str());
+    const std::string text = process.output();
+    const std::string_view from = "guest: ";
+    if (code == kSkipped && text.starts_with(from)) {
+      std::printf("skipped: %s", text.c_str() + from.size());
+    } else if (code != 0) {
+      std::printf("%s", text.c_str());
+    }
     return code;
   }
 

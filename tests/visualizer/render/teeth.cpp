@@ -2,8 +2,6 @@
 #include "tests/visualizer/render/teeth.hpp"
 
 #include <cmath>
-#include <cstdlib>
-#include <filesystem>
 #include <utility>
 
 #include <doctest/doctest.h>
@@ -12,6 +10,7 @@
 #include "controller/volume/file/volume_io.hpp"
 #include "controller/volume/phantom.hpp"
 #include "controller/volume/windowing.hpp"
+#include "tests/support/real_data.hpp"
 #include "tests/visualizer/gl/gl_fixture.hpp"
 
 namespace kerf::test {
@@ -56,19 +55,14 @@ Tooth phantom(VoxelGrid grid, bool labelled) {
 }
 
 std::optional<Tooth> ct_tooth() {
-  const char* folder = std::getenv("KERF_DATA");
-  const auto file =
-      std::filesystem::path(folder != nullptr ? folder : "") / "ge_tooth_16bit" / "tooth.nhdr";
-  if (!std::filesystem::exists(file)) {
-    MESSAGE("skipped: ge_tooth_16bit/tooth.nhdr is not there (KERF_DATA names the folder)");
-    return std::nullopt;
-  }
+  const auto file = real_data("ge_tooth_16bit/tooth.nhdr");
+  if (!file.has_value()) return std::nullopt;
   ReadOptions options;
   options.override_spacing_mm = {0.125, 0.125, 0.125};
   constexpr double kAir = 391.0;
   constexpr double kMost = 1300.0;
   constexpr double kIso = 620.0;
-  return Tooth(apply_window(read_volume(file, options), {kAir, kMost}),
+  return Tooth(apply_window(read_volume(*file, options), {kAir, kMost}),
                (kIso - kAir) / (kMost - kAir), false);
 }
 

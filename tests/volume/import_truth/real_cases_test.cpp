@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // The small files of $KERF_DATA/import-cases (its README): situations of public trackers.
-#include <cstdlib>
 #include <filesystem>
 
 #include <doctest/doctest.h>
 
+#include "tests/support/real_data.hpp"
 #include "tests/volume/import_truth/check.hpp"
 #include "tests/volume/volume_files.hpp"
 
@@ -13,14 +13,9 @@ using namespace kerf::test;
 
 namespace {
 
-/// The folder; empty, with a message, if it is not there.
+/// Empty, with a message, if it is not there.
 std::filesystem::path case_folder() {
-  const char* data = std::getenv("KERF_DATA");
-  const std::filesystem::path folder =
-      std::filesystem::path(data == nullptr ? "" : data) / "import-cases";
-  if (data != nullptr && std::filesystem::exists(folder)) return folder;
-  MESSAGE("skipped: import-cases is not there (KERF_DATA names the folder above it)");
-  return {};
+  return real_data("import-cases").value_or(std::filesystem::path());
 }
 
 /// 20 x 16 x 12 voxels of 0.5 x 0.5 x 0.7 mm that are numbered from 0, x fastest.
