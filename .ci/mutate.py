@@ -4,7 +4,7 @@
 the check or test named there notices. Nothing in the tree is touched.
 
     .ci/mutate.py LIST [PATTERN] [--jobs N] [--again]
-        LIST: safety, kernels or includes; PATTERN picks the mutations whose line matches. One line for each mutation: what
+        LIST: safety, kernels, includes or page; PATTERN picks the mutations whose line matches. One line for each mutation: what
         caught it, SURVIVED, or the instruction set that this processor lacks. A run that is stopped goes on where it was, unless a source changed; --again starts anew.
     .ci/mutate.py --check
         only whether each text stands exactly once in its file, each test case in the folder of its program, and each safety
@@ -37,7 +37,8 @@ import threading
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 TABLE = ".ci/mutations.txt"
 BUILD = ROOT / "build/release"
-LISTS = ("safety", "kernels", "includes", "contact")
+LISTS = ("safety", "kernels", "includes", "page", "contact")
+PAGE_TEST = "tests/page/script_test.py"
 
 
 # What controller/kernel/kernel_set.cpp asks of the processor for each set.
@@ -124,7 +125,7 @@ def check(mutations):
         if mutation.name in names:
             raise Wrong(f"{mutation.name}: stands twice in {TABLE}; rename one")
         names.add(mutation.name)
-        if mutation.list != "contact" and not re.match(r"test_|\.ci/|(omni|falcon|woodenhaptics) ", mutation.catcher):
+        if mutation.list != "contact" and not re.match(rf"test_|\.ci/|{PAGE_TEST}: |(omni|falcon|woodenhaptics) ", mutation.catcher):
             raise Wrong(f"{mutation.name}: '{mutation.catcher}' is no test, check or fault script; correct {TABLE}")
         program, _, pattern = mutation.catcher.partition(" ")
         if mutation.object and program.startswith("test_"):
@@ -297,7 +298,7 @@ class TreeCopy:
 
     def __init__(self, folder, mutations):
         self.folder, self.mine, self.made = folder, threading.local(), 0
-        self.builds = any(not m.catcher.startswith(".ci/") for m in mutations)
+        self.builds = not all(m.catcher.startswith((".ci/", PAGE_TEST)) for m in mutations)
 
     def tree(self):
         if not hasattr(self.mine, "tree"):
@@ -340,7 +341,7 @@ class TreeCopy:
                     folder = folder.parent
 
     def noticed(self, catcher, tree):
-        if catcher.startswith(".ci/"):  # CHECK: what it has to print
+        if catcher.startswith((".ci/", PAGE_TEST)):  # CHECK: what it has to print
             script, _, reason = catcher.partition(": ")
             code, text = run([tree / script], self.log(), tree, timeout=300)
             said = next((line for line in text.splitlines() if reason in line), None)
@@ -382,7 +383,7 @@ def judge(name, mutations, jobs, again):
     """Tries mutations of one list; returns how many survived."""
     sources = hashlib.sha256()
     for file in tracked():
-        if re.search(r"\.([ch]pp|cmake|sh|toml)$|CMakeLists.txt$", file):
+        if re.search(r"\.([ch]pp|cmake|sh|toml|m?js)$|CMakeLists.txt$", file):
             sources.update((ROOT / file).read_bytes())
     done = ROOT / "build/mutate" / f"{name}-{sources.hexdigest()[:12]}"
     if again:
@@ -432,7 +433,7 @@ def judge(name, mutations, jobs, again):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("list", nargs="?", choices=LISTS[:3])
+    parser.add_argument("list", nargs="?", choices=LISTS[:-1])
     parser.add_argument("pattern", nargs="?", default="")
     parser.add_argument("--check", action="store_true")
     parser.add_argument("--jobs", type=int)

@@ -82,8 +82,7 @@ export class Steering {
     event.preventDefault();
     event.stopPropagation();
     const pixels = event.deltaMode === 0 ? event.deltaY : event.deltaY * 33;
-    this.depth -= pixels / kWheelPixels * kWheelMm * this.scale();
-    this.send();
+    this.send(-pixels / kWheelPixels * kWheelMm * this.scale());
   }
   follow(event, presses) {
     this.at = [event.offsetX, event.offsetY];
@@ -101,8 +100,8 @@ export class Steering {
   scale() {
     return this.page.heldNow()?.sceneJson?.device?.workspace_scale ?? 1;
   }
-  /** The target of the hand for where the pointer is. */
-  send() {
+  /** The target of the hand for where the pointer is, and so much deeper than before. */
+  send(deeperMm = 0) {
     const {stage, now} = this.page;
     if (!this.at || !stage.scene || !now.record || !Number.isFinite(now.record.position_mm[0])) return;
     const {clientWidth: wide, clientHeight: high} = stage.canvas;
@@ -110,8 +109,8 @@ export class Steering {
     const tool = add(now.record.position_mm, now.record.proxy_offset_mm);
     const toolDepth = -transform(view.eyeFromWorld, tool)[2];
     if (!(toolDepth > 0)) return;  // a tool behind the eye is not led
-    this.depth = clamp(this.depth ?? toolDepth, 2 * view.near,
-      Math.max(this.depth ?? toolDepth, toolDepth + kMostAheadMm * this.scale()));
+    const before = this.depth ?? toolDepth;
+    this.depth = clamp(before + deeperMm, 2 * view.near, Math.max(before, toolDepth + kMostAheadMm * this.scale()));
     const half = view.tanHalfHeight * this.depth;
     const seen = [(2 * this.at[0] / wide - 1) * half * view.aspect, (1 - 2 * this.at[1] / high) * half, -this.depth];
     const back = affineInverse(view.eyeFromWorld);

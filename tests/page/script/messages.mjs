@@ -1,18 +1,6 @@
-# SPDX-License-Identifier: Apache-2.0
-"""The page's modules of messages, without a browser: both arms of a run with two devices come through.
-
-    modules_test.py ROOT
-Exit code 77: skipped, without node or cmake."""
-import pathlib
-import shutil
-import subprocess
-import sys
-import tempfile
-
-ROOT = pathlib.Path(sys.argv[1]).resolve()
-
-# Messages as bridge/wire/messages.hpp has them, by hand: not by the module that is tested.
-SCRIPT = r"""
+// SPDX-License-Identifier: Apache-2.0
+// Messages as bridge/wire/messages.hpp has them, by hand: not by the module that is tested. Both arms of a run with two
+// devices come through.
 import assert from 'node:assert/strict';
 import {kRecordsMagic, kTwoArms, records} from './constants.js';
 import {command, read, recordAt} from './wire.js';
@@ -59,17 +47,3 @@ assert.ok(sameHands([hand(1), hand(2)], [hand(1), hand(2)]));
 assert.ok(!sameHands([hand(1), hand(2)], [hand(1), hand(3)]));
 assert.ok(!sameHands([hand(1)], [hand(1), null]));
 assert.ok(!sameHands([hand(1), null], [hand(1), hand(2)]));
-"""
-
-if not shutil.which("node") or not shutil.which("cmake"):
-    print("skipped: needs node and cmake")
-    sys.exit(77)
-with tempfile.TemporaryDirectory() as temporary:
-    folder = pathlib.Path(temporary)
-    for file in (ROOT / "bridge/page/web").glob("*.js"):
-        shutil.copy(file, folder)
-    (folder / "package.json").write_text('{"type": "module"}')
-    subprocess.run(["cmake", f"-DOUTPUT={folder / 'constants.js'}", f"-DROOT={ROOT}", "-P", ROOT / "bridge/page/constants.cmake"], check=True)
-    (folder / "shaders.js").write_text("export const head = '', shaders = {};  // nothing is drawn")
-    (folder / "test.mjs").write_text(SCRIPT)
-    sys.exit(subprocess.run(["node", "test.mjs"], cwd=folder).returncode)
