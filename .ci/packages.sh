@@ -20,7 +20,7 @@ if command -v dpkg-query >/dev/null; then
   done < <(dpkg-query -W -f '${db:Status-Status} ${Package}\n')
   while read -r group name _; do
     if [[ " $* " != *" $group "* || -n ${installed[$name]:-} ]]; then continue; fi
-    if [[ $name == npm ]] && command -v npm >/dev/null; then continue; fi  # node of its own project brings it
+    if [[ $name == npm || $name == nodejs ]] && command -v "${name/nodejs/node}" >/dev/null; then continue; fi  # node of its own project
     missing+=("$name")
   done <"$list"
 elif [[ -z $only_print ]]; then
