@@ -7,6 +7,7 @@
 set -euo pipefail
 cd "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/.."
 folder=build/determinism
+clang=clang++-$(cmake/clang-version.sh)
 row='%-22s %-20s %-9s %-5s %-7s %-16s %-16s %-16s %7s\n'
 
 # check PROCESSOR COMPILER FLAGS: builds, runs, prints the rows of the table; false if any differs.
@@ -101,9 +102,9 @@ list() {
   if [[ ${1:-} != --all ]]; then  # beside g++ -O2 and clang -O2, which the other tests build with
     echo s390x s390x-linux-gnu-g++ -O2
     echo arm arm-linux-gnueabihf-g++ -O2
-    echo wasm32 clang++-16 -O2
+    echo wasm32 "$clang" -O2
     echo aarch64 aarch64-linux-gnu-g++ -O2
-    echo x86_64 clang++-16 -O3 -march=x86-64
+    echo x86_64 "$clang" -O3 -march=x86-64
     echo x86_64 g++ -O3 "-march=$(levels | tail -n 1)"
     return
   fi
@@ -112,7 +113,7 @@ list() {
     echo aarch64 aarch64-linux-gnu-g++ "$optimise"
   done
   for optimise in -O0 -O2 -O3; do
-    for compiler in g++ clang++-16; do
+    for compiler in g++ "$clang"; do
       for level in $(levels); do echo x86_64 "$compiler" "$optimise" "-march=$level"; done
     done
   done

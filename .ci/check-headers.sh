@@ -6,7 +6,8 @@
 # includes itself; what the text has shown to be included is precompiled here, too: a quarter of the time.
 #     .ci/check-headers.sh [ROOT]      another tree, for the check of this check
 set -euo pipefail
-cd "${1:-$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/..}"
+here=$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")
+cd "${1:-$here/..}"
 mapfile -t headers < <(find shared controller record hil standin lab visualizer bridge web tests -name '*.hpp' | sort)
 
 # As in CMakeLists.txt; of each, the names by which a header shows that it needs it.
@@ -61,7 +62,7 @@ fi
 
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
-compiler="clang++-16 -std=c++20 -I. $(pkg-config --cflags epoxy imgui glfw3) $(printf -- '-isystem %s ' /usr/include/gdcm-*)"
+compiler="clang++-$("$here/../cmake/clang-version.sh") -std=c++20 -I. $(pkg-config --cflags epoxy imgui glfw3) $(printf -- '-isystem %s ' /usr/include/gdcm-*)"
 compiler+=" -DBOOST_ASIO_HAS_CO_AWAIT -DBOOST_ASIO_HAS_STD_COROUTINE"  # as bridge/CMakeLists.txt
 awk 'BEGIN { print "#define KERF_VERSION \"\"" } NF { print "#include <" $1 ">" }' <<<"$needs" >"$work/standard.hpp"
 # Templates that it asks for are made here, not again for each header.

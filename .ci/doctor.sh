@@ -18,30 +18,100 @@ row() {
   }
 }
 
-missing=()
-installed=''
+# What this kerf is called, and whether a clone or an installed one.
+me=./kerf
 if [[ ! -e $root/CMakeLists.txt ]]; then
-  installed=1  # its package asked for what it needs
+  me=kerf
   bin=${KERF_BIN:-$(readlink -m "$root/../../bin")}
-else
-  mapfile -t missing < <("$root/.ci/packages.sh" --missing build)
 fi
-if [[ -n $installed ]]; then
-  row ok kerf "$("$bin/kerf-controller" --version), installed"
-elif ((${#missing[@]} == 0)); then
-  row ok packages 'all that the build needs'
-elif ((EUID == 0)) || command -v sudo >/dev/null; then
-  row warn packages "missing: ${missing[*]}" './kerf setup installs them'
+built() { [[ -x $bin/kerf-controller ]]; }
+
+# shellcheck source=/dev/null
+system=$(. /etc/os-release 2>/dev/null && echo "${ID:-} ${VERSION_ID:-}" && echo "${PRETTY_NAME:-${ID:-}}") || true
+case ${system%%$'\n'*} in
+  'debian 12' | 'debian 13') row ok system "${system#*$'\n'}" ;;
+  *) row warn system "${system#*$'\n'}" 'kerf was tried on Debian 12 and 13: docs/packages.md; elsewhere the Containerfile runs it' ;;
+esac
+
+right=$("$root/.ci/packages.sh" --right 2>/dev/null) || right=none  # how this user installs packages
+
+# packages: those of the build, and whether this user can install what is missing. Without them ./kerf demo does not start,
+# unless KERF_BIN names built programs.
+packages() {
+  local missing grave=fail
+  if ! command -v dpkg-query >/dev/null; then
+    row warn packages 'unknown: there is no dpkg' 'what .ci/packages.txt names must be installed by hand'
+    return
+  fi
+  mapfile -t missing < <("$root/.ci/packages.sh" --missing build)
+  if ((${#missing[@]} == 0)); then
+    row ok packages 'all that the build needs'
+    return
+  fi
+  if [[ -n ${KERF_BIN:-} ]]; then grave=warn; fi
+  case $right in
+    root | sudo) row warn packages "missing: ${missing[*]}" './kerf setup installs them' ;;
+    password)
+      if { : </dev/tty; } 2>/dev/null; then
+        row warn packages "missing: ${missing[*]}" './kerf setup installs them; sudo asks for your password'
+      else
+        row "$grave" packages "missing: ${missing[*]}" 'sudo asks for a password: start ./kerf setup on a terminal'
+      fi
+      ;;
+    refused)
+      row "$grave" packages "missing: ${missing[*]}" "sudo does not let $(id -un) install packages: ask who may"
+      ;;
+    none) row "$grave" packages "missing: ${missing[*]}" 'not root and no sudo: ask who may install packages' ;;
+  esac
+}
+
+# tools: what builds kerf. Where dpkg is, packages brings them.
+tools() {
+  local tool lack=()
+  for tool in cmake ninja g++ pkg-config; do
+    command -v "$tool" >/dev/null || lack+=("$tool")
+  done
+  if ((${#lack[@]} == 0)); then
+    row ok compiler "$(g++ --version | head -n 1)"
+  elif command -v dpkg-query >/dev/null; then
+    row warn compiler "missing: ${lack[*]}" 'comes with the packages'
+  else
+    row fail compiler "missing: ${lack[*]}" 'install them, or use the Containerfile'
+  fi
+}
+
+# programs: those of a demo, where kerf is installed.
+programs() {
+  local name lack=()
+  for name in controller emulator visualizer recorder record; do
+    [[ -x $bin/kerf-$name ]] || lack+=("kerf-$name")
+  done
+  if ((${#lack[@]})); then
+    row fail kerf "installed, without ${lack[*]} in $bin" 'install the package kerf again: docs/packages.md'
+  else
+    row ok kerf "$("$bin/kerf-controller" --version 2>&1 | head -n 1), installed"
+  fi
+  if [[ ! -x /usr/bin/python3 ]]; then row fail python3 'no /usr/bin/python3' 'install the package python3: the demo is written in it'; fi
+}
+
+if [[ $me == kerf ]]; then
+  programs
 else
-  row fail packages "missing: ${missing[*]}" 'not root and no sudo: ask who may install packages'
+  packages
+  tools
 fi
 
-if [[ -n $installed ]]; then
-  true
-elif command -v g++ >/dev/null; then
-  row ok compiler "$(g++ --version | head -n 1)"
-else
-  row warn compiler none './kerf setup installs g++'
+for folder in "${TMPDIR:-/tmp}" /dev/shm; do
+  if [[ ! -d $folder || ! -w $folder ]]; then
+    row fail "$folder" 'no folder that can be written' 'a demo keeps its sockets and volumes there: make it, or for the first set TMPDIR'
+  fi
+done
+if [[ $me != kerf && -z ${KERF_BIN:-} ]]; then
+  for folder in "$root/build" "$root"; do  # the first one that is there
+    [[ -e $folder ]] || continue
+    if [[ ! -w $folder ]]; then row fail "${folder##*/}" "$folder: cannot be written" "give $(id -un) the rights, or make a clone of your own"; fi
+    break
+  done
 fi
 
 cores=$(nproc)
@@ -59,7 +129,7 @@ case $throttle in
 esac
 
 # Devices, rights to them and real-time rights: the controller's own look around.
-if [[ -x $bin/kerf-controller ]]; then
+if built; then
   while read -r kind text; do
     case $kind in
       found) row ok device "$text" ;;
@@ -70,7 +140,7 @@ if [[ -x $bin/kerf-controller ]]; then
     esac
   done < <("$bin/kerf-controller" --probe 2>&1)
 else
-  row warn device 'not looked for' './kerf setup builds the program that looks, and asks for rights'
+  row warn device 'not looked for' 'kerf-controller looks for it: not there yet'
 fi
 
 if [[ -r /dev/fuse && -w /dev/fuse ]]; then
@@ -79,19 +149,22 @@ else
   row warn FUSE 'no access to /dev/fuse' 'device nodes cannot be emulated; the socket port can'
 fi
 
-if [[ -n $installed ]]; then
+if [[ $me == kerf ]]; then
   true  # no tests
-elif lack=$("$root/hil/guest/guest.sh" lacks); then
+elif reason=$("$root/hil/guest/guest.sh" lacks); then
   row ok QEMU "$(qemu-system-x86_64 --version | sed -n '1s/.*version \([0-9.]*\).*/\1/p')"
 else
-  lack=${lack#guest: }
-  row warn QEMU "${lack%%; *}" "hil_guest is skipped; ${lack#*; }"
+  reason=${reason#guest: }
+  if [[ $right == refused || $right == none ]]; then way=''; else way="; ${reason#*; }"; fi
+  row warn QEMU "${reason%%; *}" "the test hil_guest is skipped$way"
 fi
 
-libraries=$(dpkg-query -W -f '${Package} ${Version}\n' libusb-1.0-0-dev libhidapi-dev \
-  libseccomp-dev libgdcm-dev 2>/dev/null | sed -E 's/(-dev)? ([0-9]+:)?([0-9.]+).*/ \3/' |
-  paste -sd ',' | sed 's/,/, /g') || true
-if [[ -z $installed ]]; then row ok libraries "${libraries:-unknown: this is not Debian}"; fi
+if [[ $me != kerf ]] && command -v dpkg-query >/dev/null; then
+  libraries=$(dpkg-query -W -f '${db:Status-Status} ${Package} ${Version}\n' libusb-1.0-0-dev libhidapi-dev \
+    libseccomp-dev libgdcm-dev 2>/dev/null | sed -nE 's/^installed //; T; s/(-dev)? ([0-9]+:)?([0-9.]+).*/ \3/p' |
+    paste -sd ',' | sed 's/,/, /g') || true
+  if [[ -n $libraries ]]; then row ok libraries "$libraries"; fi
+fi
 
 if [[ -n ${DISPLAY:-}${WAYLAND_DISPLAY:-} ]]; then
   row ok display "${WAYLAND_DISPLAY:-$DISPLAY}"
@@ -100,7 +173,9 @@ else
 fi
 
 data=${KERF_DATA:-$root/../shared/data}
-if [[ -d $data ]]; then
+if [[ $me == kerf ]]; then
+  true  # no tests
+elif [[ -d $data ]]; then
   row ok KERF_DATA "$(cd "$data" && pwd)"
 else
   row warn KERF_DATA 'not set' 'tests skip the real volumes'
@@ -109,19 +184,23 @@ fi
 free_mib=$(df -Pm "$root" | awk 'NR == 2 { print $4 }')
 if ((free_mib >= 4096)); then
   row ok disk "$((free_mib / 1024)) GiB free"
-elif [[ -x $bin/kerf-controller ]] && ((free_mib >= 256)); then
+elif built && ((free_mib >= 256)); then
   row warn disk "$free_mib MiB free" 'long logs may fill it'
+elif built; then
+  row fail disk "$free_mib MiB free" 'a demo and its pictures take 256 MiB: make room'
 else
   row fail disk "$free_mib MiB free" 'packages and build take 4 GiB: make room'
 fi
 
-if [[ ! -x $bin/kerf-controller ]]; then
+if ((impossible)); then
+  row fail demo 'cannot run: see above'
+  exit 1
+elif ! built; then
   row warn demo 'not built' './kerf setup builds it'
-  exit "$impossible"
-fi
-if [[ ${1:-} != --demo ]]; then
-  row ok demo 'built; ./kerf doctor --demo tries it and OpenGL (some seconds)'
-  exit "$impossible"
+  exit 0
+elif [[ ${1:-} != --demo ]]; then
+  row ok demo "$([[ $me == kerf ]] && echo installed || echo built); $me doctor --demo tries it and OpenGL (some seconds)"
+  exit 0
 fi
 
 # The proof: a second of the demo, in lock-step so that no right is needed.
