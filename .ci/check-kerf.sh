@@ -487,7 +487,7 @@ mkdir -p "$lab/no-qemu" "$lab/tools" "$lab/tree/.ci" "$lab/tree/build/release"
 ln -s /usr/bin/* "$lab/no-qemu"
 rm -f "$lab"/no-qemu/{qemu-system-x86_64,busybox}
 cp -r "$root/kerf" "$root/cli" "$lab/tree"
-cp "$root"/.ci/{later-tests.sh,progress.sh,tests.sh,tiers.txt} "$lab/tree/.ci"
+cp "$root"/.ci/{later-tests.sh,tests.sh,tiers.txt} "$lab/tree/.ci"
 touch "$lab/tree/CMakeLists.txt"  # its sources
 printf '#!/bin/sh\n' | tee "$lab/tools/ninja" >"$lab/tree/.ci/packages.sh"
 # It knows three tests: one prints $GUEST and is skipped if that is a reason, of two a part is skipped for $PART, if anything.

@@ -79,8 +79,8 @@ case $(right) in
     ;;
 esac
 
-# shellcheck source=.ci/progress.sh
-source "$here/progress.sh"
+# shellcheck source=cli/progress.sh
+source "$here/../cli/progress.sh"
 log=$(mktemp) || {
   echo "packages: TMPDIR=${TMPDIR:-/tmp}: cannot be written; make it, or name another folder" >&2
   exit 2

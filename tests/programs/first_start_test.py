@@ -27,6 +27,7 @@ STAND_INS = {
     umount /usr/bin/python3 2>/dev/null || true ;;
 esac""",
     "cmake": """case $* in *--preset*) echo 'Preset CMake variables:'; echo '-- The compiler'; mkdir -p build/release
+      printf '%s:INTERNAL=%s\\n' CMAKE_HOME_DIRECTORY "$PWD" CMAKE_CACHEFILE_DIR "$PWD/build/release" >build/release/CMakeCache.txt
       printf 'build bin/kerf-%s: x\\n' controller emulator visualizer recorder record >build/release/build.ninja ;; esac""",
     "ninja": """case $* in *recompact*|*restat*) exit 0 ;; esac
 ran=$LAB/ran-$(echo "$*" | cksum | tr ' ' -)
@@ -61,7 +62,8 @@ class Lab:
         for name in ["kerf", "CMakePresets.json", "cmake/clang-version.sh", "hil/guest/guest.sh",
                      *(str(path.relative_to(root)) for path in (root / ".ci").iterdir() if path.is_file())]:
             shutil.copy2(root / name, self.tree / name)
-        shutil.copytree(root / "demo", self.tree / "demo")
+        for name in ("demo", "cli"):
+            shutil.copytree(root / name, self.tree / name)
         (self.tree / "CMakeLists.txt").touch()  # a clone
         self.tools = folder / "tools"
         self.tools.mkdir()
@@ -176,6 +178,7 @@ def installed(lab):
     (share / ".ci").mkdir(parents=True)
     (prefix / "bin").mkdir()
     shutil.copy2(lab.tree / "kerf", share)
+    shutil.copytree(lab.tree / "cli", share / "cli")
     shutil.copy2(lab.tree / ".ci/doctor.sh", share / ".ci")
     (prefix / "bin/kerf").symlink_to("../share/kerf/kerf")
     programs = [prefix / "bin" / f"kerf-{name}" for name in ("controller", "emulator", "visualizer", "recorder", "record")]
