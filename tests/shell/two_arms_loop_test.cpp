@@ -1,0 +1,328 @@
+// SPDX-License-Identifier: Apache-2.0
+// The loop around two devices: whatever happens to either, the run with both exchanged is the same.
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <memory>
+#include <set>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <doctest/doctest.h>
+#include <unistd.h>
+
+#include "controller/device/device_driver.hpp"
+#include "controller/device/devices.hpp"
+#include "controller/load/scene_json.hpp"
+#include "controller/loop/publisher.hpp"
+#include "controller/loop/servo_loop.hpp"
+#include "controller/loop/tick_source.hpp"
+#include "controller/plan/compile.hpp"
+#include "shared/segment/reader.hpp"
+#include "shared/segment/server.hpp"
+#include "shared/wire/cartesian.hpp"
+#include "tests/servo/two_arms_support.hpp"
+
+using namespace kerf;
+using namespace kerf::test;
+
+namespace {
+
+constexpr std::uint64_t kGoneTicks = 300, kMostTicks = 1800;
+
+/// Docks, takes the tool, and cuts a groove.
+Hand works(int tick) {
+  if (tick < 100) return {.parked = true};
+  return stroke(tick - 250);
+}
+Hand silent_within(int tick, int from, int to) {
+  Hand hand = works(tick);
+  hand.silent = tick >= from && tick < to;
+  return hand;
+}
+
+struct Course {
+  const char* name;
+  Hand (*at)(int tick);
+};
+const std::array kCourses{
+    Course{"works", works},
+    Course{"never reports", [](int) { return Hand{.silent = true}; }},
+    Course{"stays parked", [](int) { return Hand{.parked = true}; }},
+    Course{"has no power", [](int) { return Hand{.parked = true, .homed = false}; }},
+    Course{"is not parked", [](int) { return Hand{}; }},
+    Course{"comes late",
+           [](int tick) { return tick < 1000 ? Hand{.silent = true} : works(tick - 1000); }},
+    Course{"goes at work", [](int tick) { return silent_within(tick, 700, 100'000); }},
+    Course{"goes early", [](int tick) { return silent_within(tick, 400, 100'000); }},
+    Course{"goes and comes back", [](int tick) { return silent_within(tick, 500, 1100); }},
+    Course{"misses some",
+           [](int tick) { return silent_within(tick, tick / 50 * 50, tick / 50 * 50 + 4); }},
+    Course{"jumps",
+           [](int tick) {
+             Hand hand = works(tick);
+             if (tick == 600) hand.at[0] += 40;
+             return hand;
+           }},
+};
+
+/// An omega or a Touch that plays a course, one packet a tick; each 64th comes with one that is
+/// none. Counts what it is sent.
+class CoursePort final : public PacketPort {
+ public:
+  explicit CoursePort(const Course& course) : course_(course) {}
+  std::size_t receive(std::span<std::uint8_t> packet) noexcept override {
+    if (std::exchange(given_, false)) return 0;
+    const Hand hand = course_.at(tick++);
+    if (hand.silent) return 0;
+    given_ = true;
+    if (tick % 64 == 0) return 1;  // no report: the driver reads on, and finds no other
+    CartesianReport report;
+    report.number = static_cast<std::uint32_t>(tick);
+    report.parked = hand.parked;
+    for (std::size_t i = 0; i < 3; ++i) {
+      report.position_um[i] = static_cast<std::int32_t>(hand.at[i] * 1000);
+    }
+    report.homed = true;
+    report.powered = hand.homed;
+    const auto bytes = encode(report);
+    std::ranges::copy(bytes, packet.begin());
+    return bytes.size();
+  }
+  bool send(std::span<const std::uint8_t> packet) noexcept override {
+    const auto command = decode_cartesian_command(packet);
+    sent.push_back(command ? *command : CartesianCommand{});
+    return true;
+  }
+  bool closed() const noexcept override { return false; }
+  bool wait(int milliseconds) noexcept override {
+    waits.push_back(milliseconds);
+    return !course_.at(tick).silent;
+  }
+
+  int tick = 0;
+  std::vector<CartesianCommand> sent;
+  std::vector<int> waits;
+
+ private:
+  const Course& course_;
+  bool given_ = false;
+};
+
+/// Ticks as fast as they go, with stalls that the watchdog or the clock finds.
+struct StallingClock final : TickSource {
+  explicit StallingClock(LoopSignals& of) : signals(of) {}
+  std::int64_t wait_next() noexcept override {
+    ++tick;
+    if (tick == 520) signals.stalled = true;
+    return 0;
+  }
+  [[nodiscard]] std::uint64_t overruns() const noexcept override { return 0; }
+  [[nodiscard]] std::int64_t start_ns(std::uint64_t of) const noexcept override {
+    return static_cast<std::int64_t>(of) * 1'000'000;
+  }
+  [[nodiscard]] bool takes_time() const noexcept override { return false; }
+  [[nodiscard]] bool stood_still() const noexcept override { return tick == 800; }
+
+  LoopSignals& signals;
+  std::uint64_t tick = 0;
+};
+
+/// A run of the loop, and all that it leaves.
+struct LoopRun {
+  LoopRun(LoadedScene scene, const Course& first, const Course& second)
+      : ports{CoursePort(first), CoursePort(second)} {
+    std::array drivers{make_driver(scene.device.personality, ports[0]),
+                       make_driver(scene.second->device.personality, ports[1])};
+    const auto servo = plan_scene(scene);
+    const std::string json = canonical_json(scene);
+    auto segment = SegmentWriter::create(segment_spec(scene, json, 0));
+    SegmentServer server("loop-" + std::to_string(getpid()), segment, {.tools = 2, .arms = 2});
+    servo->take(scene);
+    Publisher eyes(segment, *servo);
+    std::atomic<bool> stop{false};
+    LoopSignals signals{stop};
+    StallingClock clock(signals);
+    const LoopLimits limits{
+        .armed_ticks = 1200, .gone_ticks = kGoneTicks, .arming_ticks = kMostTicks};
+    end = run_servo(clock, {*drivers[0], drivers[1].get()}, *servo, eyes, server, limits, signals,
+                    record);
+    ticks = signals.heartbeat;
+    for (std::size_t arm = 0; arm < kMaxArms; ++arm) waiting[arm] = signals.waiting[arm];
+    const SegmentReader reader = SegmentReader::map(segment.fd());
+    for (std::uint64_t i = 0; i < reader.state_head(); ++i) {
+      auto& records = published.emplace_back();
+      for (std::size_t arm = 0; arm < kMaxArms; ++arm) {
+        REQUIRE(reader.state_at(i, records[arm], arm) == ReadState::ok);
+        REQUIRE(records[arm].tick == i + 1);
+        // Of both arms, in the order of the arms; and of the time.
+        records[arm].volume_hash = 0;
+        records[arm].crc32c = 0;
+      }
+    }
+    VolumeSnapshot snapshot;
+    reader.update(0, snapshot);
+    const auto density = servo->density(0);
+    is_published_whole = std::ranges::equal(snapshot.density, density);
+    volume_hash = density_hash(density);
+  }
+
+  std::array<CoursePort, kMaxArms> ports;
+  RunRecord record;
+  EndReason end{};
+  std::uint64_t ticks = 0, volume_hash = 0;
+  std::array<Waiting, kMaxArms> waiting{};
+  std::vector<std::array<TickRecord, kMaxArms>> published;
+  bool is_published_whole = false;
+};
+
+std::multiset<std::string> texts(const EventList& events) {
+  std::multiset<std::string> out;
+  for (const auto& event : events.kept()) {
+    out.insert(std::to_string(event.tick) + " " + event.name);
+  }
+  return out;
+}
+
+void check_same(const ArmRecord& a, const ArmRecord& b) {
+  CHECK(a.in_use == b.in_use);
+  CHECK(a.stale_ticks == b.stale_ticks);
+  CHECK(a.contact_ticks == b.contact_ticks);
+  CHECK(a.shaft_ticks == b.shaft_ticks);
+  CHECK(a.peak_force_n == b.peak_force_n);
+  CHECK(a.absorbed_mj == b.absorbed_mj);
+  CHECK(a.port_minimum_mj == b.port_minimum_mj);
+  CHECK(a.energy_mj == b.energy_mj);
+  CHECK(a.output_hash == b.output_hash);
+  CHECK(texts(a.faults) == texts(b.faults));
+}
+
+/// The end that two courses have, from the courses alone.
+std::uint64_t last_tick(const Course& one, const Course& other) {
+  std::uint64_t silent_one = 0, silent_other = 0;
+  for (std::uint64_t tick = 1; tick <= kMostTicks; ++tick) {
+    silent_one = one.at(static_cast<int>(tick) - 1).silent ? silent_one + 1 : 0;
+    silent_other = other.at(static_cast<int>(tick) - 1).silent ? silent_other + 1 : 0;
+    if (std::min(silent_one, silent_other) >= kGoneTicks) return tick;
+  }
+  return kMostTicks;
+}
+
+LoadedScene cutting_scene() {
+  LoadedScene scene = two_armed(kCutKinds[0], 1.5);
+  scene.tools[0] = ball(8);
+  scene.second->limits.slew_n_per_ms = 0.3;
+  return scene;
+}
+
+}  // namespace
+
+TEST_CASE("two devices that are exchanged make the same run, whatever happens to either") {
+  const LoadedScene scene = cutting_scene();
+  const auto compare = [&](const Course& one, const Course& other) {
+    CAPTURE(std::string(one.name));
+    CAPTURE(std::string(other.name));
+    const LoopRun ahead(scene, one, other), behind(exchanged(scene), other, one);
+    CHECK(ahead.end == behind.end);
+    CHECK(ahead.ticks == behind.ticks);
+    // A run ends when its time is up, or both devices are gone, never by one of them.
+    if (ahead.end == EndReason::device_gone) CHECK(ahead.ticks == last_tick(one, other));
+    if (ahead.end == EndReason::ticks_done) CHECK(ahead.ticks < last_tick(one, other));
+    for (std::size_t arm = 0; arm < kMaxArms; ++arm) {
+      CAPTURE(arm);
+      RunRecord a = ahead.record, b = behind.record;
+      check_same(a.arm(arm), b.arm(1 - arm));
+      CHECK(ahead.waiting[arm] == behind.waiting[1 - arm]);
+      CHECK(ahead.ports[arm].sent == behind.ports[1 - arm].sent);
+      REQUIRE(ahead.published.size() == behind.published.size());
+      for (std::size_t i = 0; i < ahead.published.size(); ++i) {
+        REQUIRE(std::memcmp(&ahead.published[i][arm], &behind.published[i][1 - arm],
+                            sizeof(TickRecord)) == 0);
+      }
+    }
+    CHECK(ahead.record.ticks == behind.record.ticks);
+    CHECK(ahead.record.armed_at_tick == behind.record.armed_at_tick);
+    CHECK(ahead.record.removed_steps == behind.record.removed_steps);
+    CHECK(ahead.record.has_faults() == behind.record.has_faults());
+    CHECK((ahead.record.first_force_ns > 0) == (behind.record.first_force_ns > 0));
+    CHECK(texts(ahead.record.events) == texts(behind.record.events));
+    CHECK(ahead.volume_hash == behind.volume_hash);
+    CHECK(ahead.is_published_whole);
+    CHECK(behind.is_published_whole);
+  };
+  for (std::size_t one = 0; one < kCourses.size(); ++one) {
+    compare(kCourses[one], kCourses[0]);
+    const std::size_t other = (4 * one + 7) % kCourses.size();
+    if (other != 0) compare(kCourses[one], kCourses[other]);
+  }
+}
+
+TEST_CASE("one device at work is a run, whichever it is") {
+  const LoadedScene scene = cutting_scene();
+  for (const std::size_t other : {1U, 2U, 3U, 4U}) {
+    for (const bool is_second : {false, true}) {
+      const Course& idle = kCourses[other];
+      CAPTURE(std::string(idle.name));
+      CAPTURE(is_second);
+      const LoopRun run(scene, is_second ? idle : kCourses[0], is_second ? kCourses[0] : idle);
+      CHECK(run.end == EndReason::ticks_done);
+      CHECK(run.record.ticks == 1200);
+      CHECK(run.record.armed_at_tick == 101);
+      CHECK(run.record.first_force_ns > 0);
+      RunRecord record = run.record;
+      CHECK(record.arm(is_second ? 1 : 0).in_use);
+      CHECK(record.arm(is_second ? 1 : 0).contact_ticks > 200);
+      CHECK_FALSE(record.arm(is_second ? 0 : 1).in_use);
+      CHECK(run.record.removed_steps[0] > 0);
+      CHECK(run.waiting[is_second ? 1 : 0] == Waiting::nothing);
+      CHECK(run.waiting[is_second ? 0 : 1] != Waiting::nothing);
+    }
+  }
+}
+
+TEST_CASE("of a tick that stood still itself no device gets anything, of the next one each") {
+  std::array<CoursePort, kMaxArms> ports{CoursePort(kCourses[0]), CoursePort(kCourses[0])};
+  const auto first = make_driver(Personality::omega, ports[0]);
+  const auto second = make_driver(Personality::touch, ports[1]);
+  const Devices devices(*first, second.get());
+  std::array<ServoOutput, kMaxArms> outputs;
+  for (ServoOutput& out : outputs) {
+    out.motors_on = true;
+    out.motor_counts = {100, -200, 300};
+  }
+  outputs[1].motor_counts = {1, 2, 3};
+  std::atomic<bool> stop{false};
+  LoopSignals signals{stop};
+  signals.stalled = true;
+  send_tick(outputs, signals, devices);
+  for (const CoursePort& port : ports) {
+    REQUIRE(port.sent.size() == 1);
+    CHECK_FALSE(port.sent[0].force_on);
+  }
+  signals.stalled = false;
+  send_tick(outputs, signals, devices);
+  for (std::size_t arm = 0; arm < kMaxArms; ++arm) {
+    REQUIRE(ports[arm].sent.size() == 2);
+    CHECK(ports[arm].sent[1].force_on);
+    CHECK(ports[arm].sent[1].force_mn == outputs[arm].motor_counts);
+  }
+}
+
+TEST_CASE("in lock-step each device is waited for, and a silent one alone no longer") {
+  for (const std::size_t silent : {0U, 1U}) {
+    CAPTURE(silent);
+    std::array<CoursePort, kMaxArms> ports{CoursePort(kCourses[silent == 0 ? 1 : 0]),
+                                           CoursePort(kCourses[silent == 1 ? 1 : 0])};
+    const auto first = make_driver(Personality::omega, ports[0]);
+    const auto second = make_driver(Personality::touch, ports[1]);
+    LockStepTicks ticks({*first, second.get()}, 1'000'000);
+    for (int tick = 0; tick < 4; ++tick) CHECK(ticks.wait_next() == 0);
+    CHECK(ports[silent].waits == std::vector{2000, 0, 0, 0});
+    CHECK(ports[1 - silent].waits == std::vector{2000, 2000, 2000, 2000});
+  }
+}
