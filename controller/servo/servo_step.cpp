@@ -467,6 +467,7 @@ bool apply_command(Arms<N> arms, const ServoCommand& command) noexcept {
         restart_fade(arm.state->supervisor);
         arm.state->force_n = {};  // the motors were off meanwhile
         arm.state->held_force_n = {};
+        arm.state->force_sum_n = {};
         arm.state->ledger.send({});
       }
       return true;
