@@ -173,7 +173,6 @@ void DhdArm::run() noexcept {
 }
 
 void DhdArm::frame() noexcept {
-  constexpr int kLookFrames = 256;  // between two reads of state that seldom changes
   double x_m = 0;
   double y_m = 0;
   double z_m = 0;
@@ -181,21 +180,15 @@ void DhdArm::frame() noexcept {
   if (calls_.get_position(&x_m, &y_m, &z_m, id_) >= 0) {
     unread_ = 0;
     read_ns_ = exchange_.now_ns();
-    if (initialized_look_-- <= 0) {
-      initialized_look_ = kLookFrames;
-      is_initialized_ = calls_.is_initialized(id_);
-      notice_.store(is_initialized_ ? ""
-                                    : "not initialised: run the vendor's HapticInit, or "
-                                      "kerf-arm --auto-init, which moves the arm");
-    }
+    look_at_states();
     reading = ArmReading{.position_mm = {kMmPerM * y_m, kMmPerM * z_m, kMmPerM * x_m},
                          .orientation = {0, 0, 0, 1},
                          .button1 = calls_.get_button(1, id_) > 0,
                          .button2 = false,
                          .parked = calls_.get_button(0, id_) > 0,
                          .homed = is_initialized_,
-                         .powered = true};
-    follow_force_mode(*reading);
+                         .powered = gives_force_};
+    if (!gives_force_ && reading->parked) static_cast<void>(calls_.enable_force(1, id_));
   } else {
     count_error();
     const auto code = static_cast<std::uint32_t>(calls_.error_get_last());
@@ -220,16 +213,17 @@ void DhdArm::frame() noexcept {
 /// came back during contact, it would exert the full force at once. So outside the force mode the
 /// reading is `powered = false`, and the mode is enabled again only while the parking button is
 /// held.
-void DhdArm::follow_force_mode(ArmReading& reading) noexcept {
-  constexpr int kLookFrames = 16;
+void DhdArm::look_at_states() noexcept {
   constexpr std::size_t kForceMode = 5;
-  if (calls_.get_status != nullptr && mode_look_-- <= 0) {
-    mode_look_ = kLookFrames;
-    std::array<int, 32> status{};  // 17 words as of SDK 3.17
-    if (calls_.get_status(status.data(), id_) >= 0) gives_force_ = status[kForceMode] != 0;
-  }
-  if (!gives_force_ && reading.parked) static_cast<void>(calls_.enable_force(1, id_));
-  reading.powered = gives_force_;
+  if (looked_ns_ && read_ns_ - *looked_ns_ < kLookNs) return;
+  looked_ns_ = read_ns_;
+  is_initialized_ = calls_.is_initialized(id_);
+  notice_.store(is_initialized_ ? ""
+                                : "not initialised: run the vendor's HapticInit, or "
+                                  "kerf-arm --auto-init, which moves the arm");
+  if (calls_.get_status == nullptr) return;
+  std::array<int, 32> status{};  // 17 words as of SDK 3.17
+  if (calls_.get_status(status.data(), id_) >= 0) gives_force_ = status[kForceMode] != 0;
 }
 
 void DhdArm::count_error() noexcept {

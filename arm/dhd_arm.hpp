@@ -4,6 +4,7 @@
 #include <array>
 #include <atomic>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <thread>
 
@@ -65,6 +66,11 @@ class DhdArm final : public VendorArm {
     int priority = 81;           ///< SCHED_FIFO; 0: none
     int core = -1;               ///< of the thread; -1: the last one
   };
+  /// Between two looks at states that seldom change: initialised, force mode. By the clock, so that
+  /// it holds at every rate. Shorter than the 5 ms for which the servo holds a force without a
+  /// report, so that a lost state is seen no later than a lost report. Whether these calls cost a
+  /// transfer is not published; position and buttons are read in each frame.
+  static constexpr std::int64_t kLookNs = 4'000'000;
   /// In units of 125 us: 20 ms.
   static constexpr unsigned char kWatchdogUnits = 160;
   /// The device is lost if no position could be read for kGoneS, in at least kFewestUnread tries. A
@@ -94,7 +100,7 @@ class DhdArm final : public VendorArm {
  private:
   void run() noexcept;
   void check_type();
-  void follow_force_mode(ArmReading& reading) noexcept;
+  void look_at_states() noexcept;
   [[nodiscard]] bool set_watchdog() noexcept;
   [[nodiscard]] std::string last_error() const;
   void count_error() noexcept;
@@ -112,7 +118,7 @@ class DhdArm final : public VendorArm {
   // Used by that thread only, until `stop`.
   int unread_ = 0;            ///< consecutive positions that could not be read
   std::int64_t read_ns_ = 0;  ///< when the last one was read; before that, the first try
-  int initialized_look_ = 0, mode_look_ = 0;
+  std::optional<std::int64_t> looked_ns_;  ///< at the states, last
   bool gives_force_ = true;
   bool is_initialized_ = false;
   std::uint64_t saturated_ = 0;

@@ -54,8 +54,10 @@ std::array<double, 3> ArmExchange::turn(const std::optional<ArmReading>& reading
   const bool is_pose = reading && publish(*reading, begin_ns);
   if (is_pose) published_.fetch_add(1);
   if (reading && !is_pose) ++counts_.unreadable;
+  // At once, and not only when the controller has seen it.
+  if (reading) is_homed_ = reading->homed;
   const bool is_let_go = is_let_go_.load();
-  if (published_.load() > 0 && !is_let_go) force_n = commanded(begin_ns);
+  if (is_homed_ && published_.load() > 0 && !is_let_go) force_n = commanded(begin_ns);
   if (is_let_go) count_zero_frame(begin_ns);
   if (force_n != Vec3{}) ++counts_.forced;
   last_force_n_ = force_n;

@@ -53,10 +53,10 @@ class ArmExchange {
               Clock* clock = monotonic_ns) noexcept;
 
   /// One exchange. Returns the force of this frame in N, in kerf's axes: that of the newest
-  /// command, scaled down to the peak. Zero before the first valid reading, if there is no command
-  /// or it has expired, and after `let_go`. Always finite. If `reading` is empty or not a valid
-  /// pose, publishes no report; the servo then decides how long its force stays (docs/safety.md,
-  /// "report lost").
+  /// command, scaled down to the peak. Zero before the first valid reading, if the newest reading
+  /// is not homed, if there is no command or it has expired, and after `let_go`. Always finite. If
+  /// `reading` is empty or not a valid pose, publishes no report; the servo then decides how long
+  /// its force stays (docs/safety.md, "report lost").
   [[nodiscard]] std::array<double, 3> turn(const std::optional<ArmReading>& reading) noexcept;
 
   /// Zero force from the next frame on. Cannot be undone.
@@ -102,7 +102,8 @@ class ArmExchange {
   std::atomic<std::uint32_t> failure_{0};
   std::atomic<std::uint64_t> frames_{0}, published_{0};
   std::array<double, 3> last_force_n_{};
-  int zero_frames_ = 0;  ///< since `let_go`
+  bool is_homed_ = false;  ///< by the newest reading
+  int zero_frames_ = 0;    ///< since `let_go`
   std::int64_t zero_since_ns_ = 0;
   Counts counts_;
 };

@@ -217,28 +217,26 @@ bool HdArm::read(ArmReading& reading) noexcept {
 }
 
 bool HdArm::follow_calibration(bool is_docked) noexcept {
-  constexpr int kLookFrames = 100;
-  if (calibrated_look_-- > 0) return is_calibrated_;
   const std::uint32_t state = calls_.check_calibration();
-  is_calibrated_ = state == kCalibrationOk;
-  // Checks in every frame until it is calibrated; after an update or a success less often.
-  calibrated_look_ = is_calibrated_ ? kLookFrames : 0;
+  if (state == kCalibrationOk) {
+    notice_.store("");
+    return true;
+  }
   const bool by_inkwell = (calibration_style_ & kStyleInkwell) != 0;
   const bool by_itself = (calibration_style_ & kStyleAuto) != 0;
-  if (is_calibrated_) {
-    notice_.store("");
-  } else if (by_inkwell && !is_docked) {
+  if (by_inkwell && !is_docked) {
     notice_.store("not calibrated: put the stylus into the inkwell");
   } else if (by_inkwell || by_itself) {
     notice_.store("calibrating");
-    if (state == kNeedsUpdate) {
+    const std::int64_t now_ns = exchange_.now_ns();
+    if (state == kNeedsUpdate && !(updated_ns_ && now_ns - *updated_ns_ < kUpdateNs)) {
+      updated_ns_ = now_ns;
       calls_.update_calibration(by_inkwell ? kStyleInkwell : kStyleAuto);
-      calibrated_look_ = kLookFrames;
     }
   } else {
     notice_.store("not calibrated: calibrate it with the vendor's own program");
   }
-  return is_calibrated_;
+  return false;
 }
 
 std::uint32_t HdArm::pop_errors() noexcept {

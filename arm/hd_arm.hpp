@@ -4,6 +4,7 @@
 #include <array>
 #include <atomic>
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include "arm/exchange.hpp"
@@ -56,11 +57,12 @@ struct Calls {
 /// The position is the centre of the gimbal, where the force acts.
 ///
 /// A reading is used if the last kCleanFrames frames before it were valid, because the first frames
-/// after the start of the scheduler do not contain readings of the arm. Frames also check and
-/// update the calibration: by the notes of a public client, calibration of a Touch did not complete
-/// outside the servo thread, which kerf has not tested. An inkwell calibration needs a running
-/// scheduler, which a frame always has. Until the calibration is complete, the arm counts as not
-/// homed.
+/// after the start of the scheduler do not contain readings of the arm. Each of these frames checks
+/// the calibration, as public clients of the library do in theirs at 1 kHz: without it the arm
+/// counts as not homed, and the force is zero in that frame. Frames also update it, at most every
+/// kUpdateNs: by the notes of a public client, calibration of a Touch did not complete outside the
+/// servo thread, which kerf has not tested. An inkwell calibration needs a running scheduler, which
+/// a frame always has.
 ///
 /// HD has one error stack for all threads. The main thread reads it until `start` has checked its
 /// calls, then only the servo thread. Callbacks before that return at once.
@@ -75,6 +77,7 @@ class HdArm final : public VendorArm {
   static constexpr int kCleanFrames = 3;
   /// Consecutive frames with an error or an invalid orientation that count as a failure.
   static constexpr int kMostUnclean = 1000;
+  static constexpr std::int64_t kUpdateNs = 100'000'000;
 
   /// Loads the library. Throws ArmError.
   HdArm(const Options& options, ArmExchange& exchange);
@@ -116,8 +119,7 @@ class HdArm final : public VendorArm {
   // Used by the servo thread only, until `stop`.
   int clean_ = 0, unclean_ = 0;
   std::uint32_t unclean_code_ = 0;
-  int calibrated_look_ = 0;
-  bool is_calibrated_ = false;
+  std::optional<std::int64_t> updated_ns_;        ///< the last update of the calibration
   std::array<std::uint64_t, 24> error_counts_{};  ///< per entry of kHdErrors; then any other
 };
 

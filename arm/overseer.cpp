@@ -8,10 +8,14 @@
 #include <cstddef>
 #include <cstdlib>
 #include <cstring>
+#include <ctime>
 #include <string_view>
 
 #include <unistd.h>
 
+#include "arm/arm_error.hpp"
+#include "arm/guard.hpp"
+#include "shared/posix/monotonic_clock.hpp"
 #include "shared/posix/stop_signals.hpp"
 
 namespace kerf {
@@ -20,9 +24,6 @@ namespace {
 // For the signal handler.
 std::atomic<ArmPageAdapter*> page_of_crash{nullptr};
 const char* program_of_crash = "";
-
-constexpr std::string_view kWayOut =
-    "; unplug the device, plug it in again, and see whether the vendor's own program runs";
 
 /// A line of text that a signal handler may compose: it does not allocate.
 class Line {
@@ -57,6 +58,7 @@ void print(const char* program, const char* reason, const char* text) noexcept {
 [[noreturn]] void end_by_the_library(const Line& line) {
   if (ArmPageAdapter* page = page_of_crash) page->set_state(ArmState::failed, line.text());
   print(program_of_crash, "", line.text());
+  end_is_told();
   _exit(2);
 }
 
@@ -64,7 +66,7 @@ void on_crash(int number) {
   const char* const name = sigabbrev_np(number);
   Line line;
   line << "the vendor's library, or kerf-arm in it, has crashed (SIG" << (name ? name : "?") << ")"
-       << kWayOut;
+       << kUnplug;
   end_by_the_library(line);
 }
 
@@ -72,14 +74,14 @@ void on_crash(int number) {
 void on_exit_of_library(int code, void*) {
   if (page_of_crash == nullptr) return;
   Line line;
-  line << "the vendor's library has ended the program by exit(" << code << ")" << kWayOut;
+  line << "the vendor's library has ended the program by exit(" << code << ")" << kUnplug;
   end_by_the_library(line);
 }
 
 void on_quick_exit_of_library() {
   if (page_of_crash == nullptr) return;
   Line line;
-  line << "the vendor's library has ended the program by quick_exit()" << kWayOut;
+  line << "the vendor's library has ended the program by quick_exit()" << kUnplug;
   end_by_the_library(line);
 }
 
@@ -90,24 +92,30 @@ void catch_exits() noexcept {
   static_cast<void>(std::at_quick_exit(on_quick_exit_of_library));
 }
 
-void handle_crash(int number) noexcept {
+/// Handlers are of the whole process, so the library may have set its own.
+void take_handlers(const sigset_t& ends) noexcept {
+  for (const int number : {SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGTSTP}) {
+    if (sigismember(&ends, number) == 1) ask_by(number);
+  }
   struct sigaction action {};
   action.sa_handler = on_crash;
   action.sa_flags = SA_ONSTACK;
-  sigaction(number, &action, nullptr);
+  for (const int number : crash_signals()) {
+    if (number != SIGQUIT) sigaction(number, &action, nullptr);
+  }
 }
 
 }  // namespace
 
 Overseer::Overseer(const char* program, ArmPageAdapter& page, ArmExchange& exchange, Limits limits)
-    : program_(program), page_(page), exchange_(exchange), limits_(limits) {
+    : program_(program), page_(page), exchange_(exchange), limits_(limits), ends_(ends_of_user()) {
   page_of_crash = &page;
   program_of_crash = program;
   give_crash_stack();
-  for (const int number : crash_signals()) {
-    if (number != SIGQUIT) handle_crash(number);
-  }
+  take_handlers(ends_);
   catch_exits();
+  // Blocked in every thread that comes later, the library's too, they wait for `watch`.
+  pthread_sigmask(SIG_BLOCK, &ends_, &before_);
   thread_ = std::thread([this] { watch(); });
 }
 
@@ -115,6 +123,7 @@ Overseer::~Overseer() {
   stop_ = true;
   thread_.join();
   page_of_crash = nullptr;
+  pthread_sigmask(SIG_SETMASK, &before_, nullptr);
 }
 
 void Overseer::give_crash_stack() noexcept {
@@ -137,6 +146,7 @@ void Overseer::give_crash_stack() noexcept {
 
 void Overseer::enter(Phase phase) noexcept {
   if (phase == Phase::frames || phase == Phase::closing) catch_exits();
+  take_handlers(ends_);
   looks_ = 0;
   phase_ = phase;
 }
@@ -149,7 +159,8 @@ void Overseer::watch() {
   const BlockStopSignals to_the_main_thread;
   int asked_ms = 0;  // since a signal requested the end
   while (!stop_) {
-    sleep_until_ns(monotonic_ns() + kLookMs * std::int64_t{1'000'000});
+    take_signals();
+    take_handlers(ends_);
     const int ms = (looks_.fetch_add(1) + 1) * kLookMs;
     switch (phase_.load()) {
       case Phase::opening:
@@ -174,6 +185,17 @@ void Overseer::watch() {
   }
 }
 
+/// For one period.
+void Overseer::take_signals() noexcept {
+  const std::int64_t until_ns = monotonic_ns() + kLookMs * std::int64_t{1'000'000};
+  for (;;) {
+    const std::int64_t left_ns = until_ns - monotonic_ns();
+    if (left_ns <= 0) return;
+    const timespec left{0, left_ns};
+    if (sigtimedwait(&ends_, nullptr, &left) > 0) request_stop();
+  }
+}
+
 void Overseer::look_at_frames() {
   const std::uint64_t frames = exchange_.frames();
   still_looks_ = frames == last_frames_ ? still_looks_ + 1 : 0;
@@ -187,6 +209,7 @@ void Overseer::look_at_frames() {
 void Overseer::end(const char* text) {
   page_.set_state(ArmState::failed, text);
   print(program_, phase_.load() == Phase::closing ? reason_.c_str() : "", text);
+  end_is_told();
   _exit(2);
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <atomic>
+#include <csignal>
 #include <cstdint>
 #include <string>
 #include <thread>
@@ -22,8 +23,15 @@ namespace kerf {
 ///
 /// If frames stop for `stall_ms`, fails the exchange; the main thread then closes the device.
 /// Time is counted in periods of this thread, kLookMs long, so that a machine that was
-/// suspended is not taken for a library that hangs. Not caught: _exit() in the library, and a stack
-/// overflow in a thread without `give_crash_stack`; both end the program without a line.
+/// suspended is not taken for a library that hangs.
+///
+/// A library may set, ignore or block the signals by which a user ends the program
+/// (`ends_of_user`). So they are blocked in the calling thread and in all that come later, and this
+/// thread takes them by sigwait: no handler, SIG_IGN or mask of the library matters then. For a
+/// thread that unblocks them the handlers are kerf's again in each period, those of a crash too.
+/// What no handler sees (_exit() in the library, a stack overflow in a thread without
+/// `give_crash_stack`, a crash within a period of a handler that was reset) is left to
+/// `run_guarded`.
 ///
 /// At most one per process. The page and the exchange outlive it.
 class Overseer {
@@ -58,6 +66,7 @@ class Overseer {
 
  private:
   void watch();
+  void take_signals() noexcept;
   void look_at_frames();
   [[noreturn]] void end(const char* text);
 
@@ -65,7 +74,8 @@ class Overseer {
   ArmPageAdapter& page_;
   ArmExchange& exchange_;
   Limits limits_;
-  std::string reason_;  ///< set before the phase `closing`
+  sigset_t ends_, before_{};  ///< signals; mask of the thread that made this
+  std::string reason_;        ///< set before the phase `closing`
   std::atomic<Phase> phase_{Phase::opening};
   std::atomic<int> looks_{0};  ///< periods in this phase
   std::uint64_t last_frames_ = 0;

@@ -39,15 +39,6 @@ void let_ask(int signal) noexcept {
   if (overrides || before.sa_handler != SIG_IGN) on(signal, ask_to_stop);
 }
 
-/// Those that ask for an end.
-sigset_t asking_signals() noexcept {
-  sigset_t asking;
-  sigemptyset(&asking);
-  for (const int signal : kAsks) sigaddset(&asking, signal);
-  for (int signal = SIGRTMIN; signal <= SIGRTMAX; ++signal) sigaddset(&asking, signal);
-  return asking;
-}
-
 }  // namespace
 
 std::atomic<bool>& catch_stop_signals() noexcept {
@@ -69,8 +60,34 @@ void make_signals_of_writes_errors() noexcept {
   for (const int signal : {SIGPIPE, SIGXFSZ}) on(signal, SIG_IGN);
 }
 
+void ask_by(int signal) noexcept {
+  on(signal, ask_to_stop);
+}
+
 bool stop_requested() noexcept {
   return stop_asked.load();
+}
+
+void request_stop() noexcept {
+  ask_to_stop(0);
+}
+
+sigset_t asking_signals() noexcept {
+  sigset_t asking;
+  sigemptyset(&asking);
+  for (const int signal : kAsks) sigaddset(&asking, signal);
+  for (int signal = SIGRTMIN; signal <= SIGRTMAX; ++signal) sigaddset(&asking, signal);
+  return asking;
+}
+
+sigset_t ends_of_user() noexcept {
+  sigset_t ends;
+  sigemptyset(&ends);
+  for (const int signal : {SIGINT, SIGTERM, SIGQUIT, SIGTSTP}) sigaddset(&ends, signal);
+  struct sigaction hup {};
+  sigaction(SIGHUP, nullptr, &hup);
+  if (hup.sa_handler != SIG_IGN) sigaddset(&ends, SIGHUP);
+  return ends;
 }
 
 void at_stop_signal(void (*act)() noexcept) noexcept {

@@ -33,8 +33,19 @@ std::atomic<bool>& catch_stop_and_pause_signals() noexcept;
 /// signal may end at once.
 void make_signals_of_writes_errors() noexcept;
 
+/// `signal` asks for the end from now on, whatever its handler was. Any thread.
+void ask_by(int signal) noexcept;
+
 /// Whether a signal asked for the end.
 [[nodiscard]] bool stop_requested() noexcept;
+/// Asks for the end as such a signal does, for a thread that takes signals by sigwait. Any thread.
+void request_stop() noexcept;
+
+/// The signals of the first kind.
+[[nodiscard]] sigset_t asking_signals() noexcept;
+/// INT, TERM, HUP, QUIT and TSTP: those by which a user ends a program that must not be paused. HUP
+/// only if it is not ignored now (nohup).
+[[nodiscard]] sigset_t ends_of_user() noexcept;
 
 /// Calls `act` first thing in the handler of every signal that asks for the end; nullptr: nothing.
 /// It may do only what a signal handler may, and must not wait.

@@ -103,6 +103,13 @@ struct Bench {
   int logs = 0;
 };
 
+/// Kills the process that has the library, which is the child of kerf-arm, or kerf-arm if it has
+/// none yet.
+void kill_library(const Process& arm) {
+  const pid_t child = arm.child();
+  kill(child > 0 ? child : arm.pid(), SIGKILL);
+}
+
 [[nodiscard]] bool runs(const Process& arm) {
   return arm.output().find(" at arm:") != std::string::npos;
 }
@@ -165,6 +172,13 @@ TEST_CASE("arm: every bad library is one line and exit code 2") {
       {"touch", "crash_open", {}, "has crashed (SIGSEGV); unplug"},
       {"touch", "overflow_open", {}, "has crashed (SIGSEGV); unplug"},
       {"touch", "overflow=50", {}, "has crashed (SIGSEGV); unplug"},
+      {"touch", "resets_crash,crash_open", {}, "has crashed (SIGSEGV); unplug"},
+      {"touch", "resets_crash,crash=50", {}, "has crashed (SIGSEGV); unplug"},
+      {"touch", "overflow_elsewhere=50", {}, "has crashed (SIGSEGV); unplug"},
+      {"touch", "leave=50", {}, "has ended the program by _exit(7); unplug"},
+      {"omega", "resets_crash,crash_open", {}, "has crashed (SIGSEGV); unplug"},
+      {"omega", "resets_crash,overflow_elsewhere=50", {}, "has crashed (SIGSEGV); unplug"},
+      {"omega", "leave=50", {}, "has ended the program by _exit(7); unplug"},
       {"touch", "exit_open", {}, "has ended the program by exit(0); unplug"},
       {"touch", "exit=50", {}, "has ended the program by exit(7); unplug"},
       {"touch", "quick_exit=50", {}, "has ended the program by quick_exit(); unplug"},
@@ -235,30 +249,62 @@ TEST_CASE("arm: without --library the loader's own search finds it, or names it"
   CHECK(report.at("failure").is_null());
 }
 
-TEST_CASE("arm: asked to end it gives zero force for 20 ms, then stops and closes the device") {
+namespace {
+
+/// Ends a kerf-arm under force by `end`, and checks that the library got zero force for 20 ms and
+/// then closed the device.
+template <class End>
+void check_orderly_end(const std::string& device, const std::string& behaviour, const End& end) {
+  CAPTURE(device);
+  CAPTURE(behaviour);
+  const bool is_touch = device == "touch";
+  Bench bench;
+  const auto arm = bench.arm(device, behaviour, {"--rate", "1000"});
+  REQUIRE(eventually([&] { return runs(*arm); }, 10s));
+  PushingChild controller(is_touch ? Personality::touch : Personality::omega);
+  REQUIRE(eventually([&] { return std::ranges::count_if(bench.frames(), &Frame::is_forced) > 20; },
+                     10s));
+  end(*arm);
+  const std::string last = is_touch ? "hdDisableDevice" : "drdClose";
+  REQUIRE(eventually([&] { return bench.last_call() == last; }, 10s));
+  const auto frames = bench.frames();
+  const auto last_force = std::ranges::find_if(frames.rbegin(), frames.rend(), &Frame::is_forced);
+  REQUIRE(last_force != frames.rend());
+  CHECK(frames.back().at_ns - last_force->at_ns >= 20'000'000);
+  CHECK(last_force - frames.rbegin() >= 3);
+}
+
+}  // namespace
+
+TEST_CASE(
+    "arm: asked to end it gives zero force for 20 ms, then closes, whatever the library does with "
+    "signals") {
   struct Case {
     const char* device;
-    int signal;
+    const char* behaviour;
   };
-  for (const auto& [device, number] : {Case{"touch", SIGTERM}, Case{"omega", SIGTERM},
-                                       Case{"touch", SIGQUIT}, Case{"omega", SIGQUIT}}) {
-    CAPTURE(device);
-    CAPTURE(number);
-    const bool is_touch = std::string(device) == "touch";
-    Bench bench;
-    const auto arm = bench.arm(device, "", {"--rate", "1000"});
-    REQUIRE(eventually([&] { return runs(*arm); }, 10s));
-    PushingChild controller(is_touch ? Personality::touch : Personality::omega);
-    REQUIRE(eventually(
-        [&] { return std::ranges::count_if(bench.frames(), &Frame::is_forced) > 20; }, 10s));
-    arm->signal(number);
-    CHECK(arm->wait() == 0);
-    const auto frames = bench.frames();
-    const auto last_force = std::ranges::find_if(frames.rbegin(), frames.rend(), &Frame::is_forced);
-    REQUIRE(last_force != frames.rend());
-    CHECK(frames.back().at_ns - last_force->at_ns >= 20'000'000);
-    CHECK(last_force - frames.rbegin() >= 3);
-    CHECK(bench.last_call() == (is_touch ? "hdDisableDevice" : "drdClose"));
+  for (const auto& [device, behaviour] :
+       {Case{"touch", ""}, Case{"touch", "sets_signals"}, Case{"touch", "ignores_signals"},
+        Case{"touch", "blocks_signals"}, Case{"touch", "sets_signals,unblocks_signals"},
+        Case{"touch", "ignores_signals,unblocks_signals"}, Case{"omega", ""},
+        Case{"omega", "sets_signals,unblocks_signals"},
+        Case{"omega", "ignores_signals,blocks_signals"}}) {
+    for (const int number : {SIGINT, SIGTERM, SIGHUP, SIGQUIT}) {
+      CAPTURE(number);
+      check_orderly_end(device, behaviour, [&](Process& arm) {
+        arm.signal(number);
+        CHECK(arm.wait() == 0);
+      });
+    }
+  }
+}
+
+TEST_CASE("arm: kerf-arm killed by its own number still gives zero force and closes the device") {
+  for (const char* const device : {"touch", "omega"}) {
+    check_orderly_end(device, "", [](Process& arm) {
+      arm.signal(SIGKILL);
+      CHECK(arm.wait() == 128 + SIGKILL);
+    });
   }
 }
 
@@ -301,14 +347,17 @@ TEST_CASE("arm: zero force within 20 ms of a controller's end, stop or crash; th
   MESSAGE("longest force after an end, in frames of 1 ms: " << longest);
 }
 
-TEST_CASE("arm: a killed adapter closes the port after a second; the next one is there at once") {
+TEST_CASE(
+    "arm: if the process with the library is killed, the port closes after a second; the next one "
+    "is there at once") {
   Bench bench;
   const std::atomic<bool> stop{false};
   auto arm = bench.arm("touch", "");
   auto port = std::make_unique<ArmPort>("touch", Personality::touch, 10'000, stop);
   CHECK(port->wait(1000));
-  arm->signal(SIGKILL);
-  CHECK(arm->wait() == 128 + SIGKILL);
+  kill_library(*arm);
+  CHECK(arm->wait() == 2);
+  CHECK(arm->output().find("kerf-arm: killed, so the device was not closed") != std::string::npos);
   std::array<std::uint8_t, kerf::cartesian::kReportBytes> packet;
   while (port->receive(packet) > 0) {
   }
@@ -338,8 +387,8 @@ TEST_CASE("arm: killed at any moment, the next adapter is there at once") {
   for (std::size_t i = 0; i < kills; ++i) {
     const auto arm = bench.arm("touch", "");
     std::this_thread::sleep_for(std::chrono::microseconds(random() % 100'000));
-    arm->signal(SIGKILL);
-    CHECK(arm->wait() == 128 + SIGKILL);
+    kill_library(*arm);
+    CHECK(arm->wait() != 0);
   }
   const auto arm = bench.arm("touch", "");
   const std::atomic<bool> stop{false};
@@ -372,7 +421,7 @@ TEST_CASE("arm: a killed adapter is a lost device to a running controller") {
         return !all.empty() && all.back().tick > 3000;
       },
       30s));
-  arm->signal(SIGKILL);
+  kill_library(*arm);
   REQUIRE(controller.ends_within(20s));
   CAPTURE(controller.output());
   CHECK(controller.wait() == 1);

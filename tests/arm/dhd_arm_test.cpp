@@ -158,7 +158,7 @@ TEST_CASE("dhd: the arm never moves by itself without a watchdog, and has it aft
 }
 
 TEST_CASE("dhd: a device that brakes has no power until its parking button is held") {
-  constexpr int kLookFrames = 17;  // the mode is read each so many
+  constexpr int kLookFrames = 5;  // the mode is read each 4 ms
   Bench bench("too_fast=100");
   bench.cycle(99);
   CHECK(bench.link.report()->powered);
@@ -179,6 +179,28 @@ TEST_CASE("dhd: a device that brakes has no power until its parking button is he
   bench.cycle(kLookFrames);
   const auto back = bench.link.report();
   CHECK((back->powered && back->parked));
+}
+
+TEST_CASE(
+    "dhd: an initialisation that is lost ends the force within 4 ms and a frame, at any rate") {
+  for (const int rate_hz : {200, 1000, 4000}) {
+    for (int lost = 20; lost < 300; lost += 23) {
+      CAPTURE(rate_hz);
+      CAPTURE(lost);
+      Bench bench("uncalibrated=" + std::to_string(lost), {.rate_hz = rate_hz});
+      bench.cycle();
+      const auto push = [&] {
+        bench.link.command({1000, 0, 0});
+        bench.cycle();
+      };
+      for (int cycle = 2; cycle < lost; ++cycle) push();
+      CHECK(bench.library.force() == Force{0, 1, 0});
+      const std::int64_t since_ns = test_ns;
+      while (bench.library.force() != Force{} && test_ns - since_ns < 100'000'000) push();
+      CHECK(test_ns - since_ns <= DhdArm::kLookNs + bench.period_ns);
+      CHECK_FALSE(bench.link.report()->homed);
+    }
+  }
 }
 
 TEST_CASE("dhd: a device that is no omega opens only with a force that it bears") {

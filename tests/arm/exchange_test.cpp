@@ -21,6 +21,7 @@ namespace {
 
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr std::int64_t kMs = 1'000'000;
+constexpr ArmReading kHomed{.homed = true};
 
 }  // namespace
 
@@ -47,7 +48,7 @@ TEST_CASE("exchange: a reading goes out as a report, with the force of the frame
 
 TEST_CASE("exchange: a command gives its force for less than 20 ms, whoever has stopped") {
   Link link(Personality::touch);
-  const ArmReading reading;
+  const ArmReading reading = kHomed;
   static_cast<void>(link.exchange.turn(reading));
   link.command({1000, 0, 0});
   const std::int64_t sent_ns = test_ns;
@@ -65,7 +66,7 @@ TEST_CASE("exchange: a command gives its force for less than 20 ms, whoever has 
 
 TEST_CASE("exchange: a command from the future, without force or after letting go gives none") {
   Link link(Personality::touch);
-  const ArmReading reading;
+  const ArmReading reading = kHomed;
   static_cast<void>(link.exchange.turn(reading));
   test_ns += 2 * kMs;
   link.command({1000, 0, 0});
@@ -95,7 +96,7 @@ TEST_CASE(
     const std::int64_t since_ns = test_ns;
     int frames = 0;
     for (; !link.exchange.finished(); ++frames, test_ns += kerf::kNsPerSecond / hz) {
-      CHECK(link.exchange.turn(ArmReading{}) == Force{});
+      CHECK(link.exchange.turn(kHomed) == Force{});
     }
     CHECK(test_ns - since_ns == 20 * kMs + kerf::kNsPerSecond / hz);  // the last began after 20 ms
     CHECK(frames == 20 * hz / 1000 + 1);
@@ -104,14 +105,14 @@ TEST_CASE(
   slow.exchange.let_go();
   for (int frame = 0; frame < 3; ++frame, test_ns += 100 * kMs) {
     CHECK_FALSE(slow.exchange.finished());
-    static_cast<void>(slow.exchange.turn(ArmReading{}));
+    static_cast<void>(slow.exchange.turn(kHomed));
   }
   CHECK(slow.exchange.finished());
 }
 
 TEST_CASE("exchange: a command of any time that a page can hold, and its ends, gives no force") {
   Link link(Personality::touch);
-  static_cast<void>(link.exchange.turn(ArmReading{}));
+  static_cast<void>(link.exchange.turn(kHomed));
   using Limits = std::numeric_limits<std::int64_t>;
   const std::int64_t now_ns = test_ns;
   for (const std::int64_t at_ns :
@@ -121,17 +122,17 @@ TEST_CASE("exchange: a command of any time that a page can hold, and its ends, g
     test_ns = at_ns;
     link.command({1000, 0, 0});
     test_ns = now_ns;
-    CHECK(link.exchange.turn(ArmReading{}) == Force{});
+    CHECK(link.exchange.turn(kHomed) == Force{});
   }
   link.command({1000, 0, 0});
-  CHECK(link.exchange.turn(ArmReading{}) == Force{1, 0, 0});
+  CHECK(link.exchange.turn(kHomed) == Force{1, 0, 0});
 }
 
 TEST_CASE("exchange: no force is above the device's peak, and its direction stays") {
   Link touch(Personality::touch);
-  static_cast<void>(touch.exchange.turn(ArmReading{}));
+  static_cast<void>(touch.exchange.turn(kHomed));
   touch.command({32767, -32768, 32767});
-  const Force force = touch.exchange.turn(ArmReading{});
+  const Force force = touch.exchange.turn(kHomed);
   CHECK(std::hypot(force[0], force[1], force[2]) == doctest::Approx(3.3));
   CHECK(force[0] == doctest::Approx(1.905).epsilon(0.001));
   CHECK(force[1] == doctest::Approx(-1.905).epsilon(0.001));
@@ -141,9 +142,9 @@ TEST_CASE("exchange: no force is above the device's peak, and its direction stay
 TEST_CASE("exchange: a reading that is no pose is not published") {
   Link link(Personality::touch);
   static_cast<void>(link.controller());
-  static_cast<void>(link.exchange.turn(ArmReading{}));
+  static_cast<void>(link.exchange.turn(kHomed));
   CHECK(link.report().has_value());
-  ArmReading bad;
+  ArmReading bad = kHomed;
   for (const double value : {kNaN, 1e308, -1e308, 1000.5, HUGE_VAL}) {
     bad.position_mm = {0, value, 0};
     static_cast<void>(link.exchange.turn(bad));
@@ -164,18 +165,28 @@ TEST_CASE("exchange: before the first reading there is no force") {
   Link link(Personality::omega);
   link.command({1000, 0, 0});
   CHECK(link.exchange.turn(std::nullopt) == Force{});
-  CHECK(link.exchange.turn(ArmReading{}) == Force{1, 0, 0});
+  CHECK(link.exchange.turn(kHomed) == Force{1, 0, 0});
   CHECK(link.exchange.turn(std::nullopt) == Force{1, 0, 0});  // the servo decides how long
+}
+
+TEST_CASE("exchange: a reading that is not homed ends the force in its own frame") {
+  Link link(Personality::touch);
+  static_cast<void>(link.exchange.turn(kHomed));
+  link.command({1000, 0, 0});
+  CHECK(link.exchange.turn(kHomed) == Force{1, 0, 0});
+  CHECK(link.exchange.turn(ArmReading{}) == Force{});
+  CHECK(link.exchange.turn(std::nullopt) == Force{});
+  CHECK(link.exchange.turn(kHomed) == Force{1, 0, 0});
 }
 
 TEST_CASE("exchange: the first failure stays, and ends the force") {
   Link link(Personality::touch);
-  static_cast<void>(link.exchange.turn(ArmReading{}));
+  static_cast<void>(link.exchange.turn(kHomed));
   link.command({1000, 0, 0});
   link.exchange.fail(0x302);
   link.exchange.fail(0x300);
   CHECK(link.exchange.failure() == 0x302);
-  CHECK(link.exchange.turn(ArmReading{}) == Force{});
+  CHECK(link.exchange.turn(kHomed) == Force{});
 }
 
 TEST_CASE("orientation: each quarter turn, and no mirror") {

@@ -223,6 +223,25 @@ TEST_CASE("hd: calibration is asked for in the inkwell alone, in the servo threa
   CHECK(std::string(bench.arm.notice()).empty());
 }
 
+TEST_CASE("hd: a calibration that is lost ends the force in the frame that sees it, at each tick") {
+  for (int lost = 20; lost < 140; lost += 7) {
+    CAPTURE(lost);
+    Bench bench("uncalibrated=" + std::to_string(lost));
+    bench.library.tick(kWarmUp);
+    bench.library.pose({}, kUpright, 0, false);
+    for (int tick = kWarmUp + 1; tick < lost; ++tick, test_ns += 1'000'000) {
+      bench.link.command({1000, 0, 0});
+      bench.library.tick();
+    }
+    CHECK(bench.library.force() == Force{1, 0, 0});
+    CHECK(bench.link.report()->homed);
+    bench.link.command({1000, 0, 0});
+    bench.library.tick();
+    CHECK(bench.library.force() == Force{});
+    CHECK_FALSE(bench.link.report()->homed);
+  }
+}
+
 TEST_CASE("hd: what cannot be opened is one line") {
   const auto line = [](const std::string& behaviour) {
     Bench bench(behaviour, false);

@@ -52,6 +52,7 @@ int check(char id) {
 
 int open_device() {
   Library& drd = library();
+  kerf::mock::take_signals(drd.behaviour);
   if (drd.behaviour.has("hang_open")) kerf::mock::hang();
   if (drd.behaviour.has("crash_open")) kerf::mock::crash();
   if (drd.behaviour.has("exit_open")) std::exit(0);
@@ -96,6 +97,8 @@ int drdClose(char id) {
   return 0;
 }
 bool drdIsInitialized(char id) {
+  const long lost = library().behaviour.number("uncalibrated", -1);
+  if (lost >= 0 && library().cycle >= lost) return false;
   return check(id) == 0 && !library().behaviour.has("not_homed");
 }
 int drdAutoInit(char id) {
@@ -179,7 +182,7 @@ int dhdSetForceAndGripperForce(double x, double y, double z, double, char id) {
 
 int dhdGetPosition(double* x, double* y, double* z, char id) {
   Library& drd = library();
-  ++drd.cycle;
+  if (++drd.cycle == 1) kerf::mock::take_signals(drd.behaviour);
   if (drd.cycle == drd.behaviour.number("hang_callback", -1)) kerf::mock::hang();
   kerf::mock::end_process(drd.behaviour, drd.cycle);
   // Too fast: the forces go off, and the motors brake.

@@ -72,6 +72,7 @@ struct Library {
     if (now == behaviour.moment("error")) {
       fail(static_cast<std::uint32_t>(std::stoul(hex_of("error"), nullptr, 16)));
     }
+    if (now == behaviour.number("uncalibrated", -1)) calibrated = false;
     std::vector<Entry> due;
     {
       const std::lock_guard guard(mutex);
@@ -98,6 +99,7 @@ struct Library {
     sched_param high{};
     high.sched_priority = 85;
     static_cast<void>(pthread_setschedparam(pthread_self(), SCHED_FIFO, &high));
+    kerf::mock::take_signals(behaviour);
     std::int64_t next_ns = kerf::monotonic_ns();
     const auto first_ms = behaviour.number("late_start", 0);
     next_ns += first_ms * 1'000'000;
@@ -195,6 +197,7 @@ void kerf_mock_pose(const double* position, const double* rotation, int buttons,
 std::uint32_t hdInitDevice(const char* name) {
   Library& hd = library();
   hd.record.add("hdInitDevice %s", name != nullptr ? name : "NULL");
+  kerf::mock::take_signals(hd.behaviour);
   if (hd.behaviour.has("hang_open")) kerf::mock::hang();
   if (hd.behaviour.has("crash_open")) kerf::mock::crash();
   if (hd.behaviour.has("exit_open")) std::exit(0);

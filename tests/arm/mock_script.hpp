@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <csignal>
 #include <cstdarg>
 #include <cstdint>
 #include <cstdio>
@@ -12,6 +13,7 @@
 #include <sstream>
 #include <string>
 #include <string_view>
+#include <thread>
 #include <vector>
 
 #include <fcntl.h>
@@ -144,12 +146,34 @@ class Record {
   return room[0] > 0 ? overflow(room) + room[0] : 0;
 }
 
+/// Acts by the words about signals, in the calling thread: sets_signals, ignores_signals (whole
+/// process), blocks_signals, unblocks_signals (this thread), resets_crash.
+inline void take_signals(const Behaviour& behaviour) {
+  constexpr std::array kEnds{SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGTSTP};
+  sigset_t ends;
+  sigemptyset(&ends);
+  for (const int number : kEnds) {
+    sigaddset(&ends, number);
+    if (behaviour.has("sets_signals")) std::signal(number, [](int) {});
+    if (behaviour.has("ignores_signals")) std::signal(number, SIG_IGN);
+  }
+  if (behaviour.has("blocks_signals")) pthread_sigmask(SIG_BLOCK, &ends, nullptr);
+  if (behaviour.has("unblocks_signals")) pthread_sigmask(SIG_UNBLOCK, &ends, nullptr);
+  if (!behaviour.has("resets_crash")) return;
+  for (const int number : {SIGSEGV, SIGABRT}) std::signal(number, SIG_DFL);
+}
+
 /// Acts by the words that end this process: at `number`, in words such as crash=50.
 inline void end_process(const Behaviour& behaviour, long number) {
   if (number == behaviour.number("crash", -1)) crash();
   if (number == behaviour.number("overflow", -1)) overflow();
   if (number == behaviour.number("exit", -1)) std::exit(7);
   if (number == behaviour.number("quick_exit", -1)) std::quick_exit(7);
+  if (number == behaviour.number("leave", -1)) _exit(7);
+  // In a thread that kerf-arm does not know.
+  if (number == behaviour.number("overflow_elsewhere", -1)) {
+    std::thread([] { overflow(); }).join();
+  }
 }
 
 }  // namespace kerf::mock

@@ -78,6 +78,14 @@ class Process {
     return std::filesystem::read_symlink(link, gone).string();
   }
 
+  [[nodiscard]] pid_t pid() const { return pid_; }
+  /// The first process that it has started, or -1.
+  [[nodiscard]] pid_t child() const {
+    const std::string id = std::to_string(pid_);
+    const std::string children = text_of("/proc/" + id + "/task/" + id + "/children");
+    return children.empty() ? -1 : std::stoi(children);
+  }
+
   /// Exit code, or 128 + signal.
   int wait() {
     if (!code_) take_end(0);

@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "arm/guard.hpp"
+
+#include <atomic>
+#include <cerrno>
+#include <csignal>
+#include <cstdio>
+#include <iostream>
+#include <new>
+#include <stdexcept>
+#include <string>
+#include <system_error>
+
+#include <sys/mman.h>
+#include <sys/prctl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "arm/arm_error.hpp"
+#include "shared/posix/stop_signals.hpp"
+
+namespace kerf {
+namespace {
+
+/// In memory that both processes share; null outside run_guarded.
+std::atomic<std::atomic<bool>*> told{nullptr};
+static_assert(std::atomic<bool>::is_always_lock_free);
+
+constexpr int kFailed = 2;
+
+void share_the_mark() {
+  void* const page = mmap(nullptr, sizeof(std::atomic<bool>), PROT_READ | PROT_WRITE,
+                          MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+  if (page == MAP_FAILED) throw std::runtime_error("no memory to guard the vendor's library");
+  told.store(new (page) std::atomic<bool>(false));
+}
+
+/// Prints the line of an end that the child could not report; its exit code.
+int code_of_end(const char* program, int status) {
+  if (WIFEXITED(status) && *told.load()) return WEXITSTATUS(status);
+  std::string line;
+  if (WIFEXITED(status)) {
+    line = "the vendor's library has ended the program by _exit(" +
+           std::to_string(WEXITSTATUS(status)) + ")";
+  } else if (WTERMSIG(status) == SIGKILL) {
+    line = "killed, so the device was not closed and may keep its last force";
+  } else {
+    const char* const name = sigabbrev_np(WTERMSIG(status));
+    line = "the vendor's library, or kerf-arm in it, has crashed (SIG" +
+           std::string(name != nullptr ? name : "?") + ")";
+  }
+  std::fprintf(stderr, "%s: %s%s\n", program, line.c_str(), kUnplug);
+  return kFailed;
+}
+
+/// Passes signals on until the child has ended.
+int watch(const char* program, pid_t child, const sigset_t& watched) {
+  for (;;) {
+    siginfo_t info{};
+    const int number = sigwaitinfo(&watched, &info);
+    int status = 0;
+    if (waitpid(child, &status, WNOHANG) == child) return code_of_end(program, status);
+    // A terminal has sent its signal to the child, too.
+    if (number > 0 && number != SIGCHLD && info.si_code <= 0) kill(child, number);
+  }
+}
+
+[[noreturn]] void be_the_child(const std::function<int()>& work, const sigset_t& before,
+                               pid_t parent) {
+  prctl(PR_SET_PDEATHSIG, SIGTERM);
+  if (getppid() != parent) static_cast<void>(raise(SIGTERM));  // it has ended before that
+  // Those that ask for the end wait until there is a handler.
+  const sigset_t ends = ends_of_user();
+  sigset_t waiting;
+  sigorset(&waiting, &before, &ends);
+  pthread_sigmask(SIG_SETMASK, &waiting, nullptr);
+  const int code = work();
+  std::cout.flush();
+  end_is_told();
+  // The vendor's library is loaded and may have running threads, so its exit handlers could crash.
+  _exit(code);
+}
+
+}  // namespace
+
+int run_guarded(const char* program, const std::function<int()>& work) {
+  share_the_mark();
+  static_cast<void>(
+      std::signal(SIGCHLD, SIG_DFL));  // if it is ignored, nothing is left to wait for
+  const sigset_t asking = asking_signals(), ends = ends_of_user();
+  sigset_t watched;
+  sigorset(&watched, &asking, &ends);
+  if (sigismember(&ends, SIGHUP) == 0) sigdelset(&watched, SIGHUP);  // nohup
+  sigaddset(&watched, SIGCHLD);
+  sigset_t before;
+  pthread_sigmask(SIG_BLOCK, &watched, &before);
+  const pid_t parent = getpid();
+  const pid_t child = fork();
+  if (child < 0) {
+    const int error = errno;
+    pthread_sigmask(SIG_SETMASK, &before, nullptr);
+    throw std::runtime_error("no second process to guard the vendor's library (" +
+                             std::generic_category().message(error) +
+                             "); end other programs, or raise ulimit -u");
+  }
+  if (child == 0) be_the_child(work, before, parent);
+  const int code = watch(program, child, watched);
+  pthread_sigmask(SIG_SETMASK, &before, nullptr);
+  return code;
+}
+
+void end_is_told() noexcept {
+  if (std::atomic<bool>* const mark = told.load()) mark->store(true);
+}
+
+}  // namespace kerf
