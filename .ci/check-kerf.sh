@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
 # ./kerf itself, with stand-ins for the programs: exit codes, what is kept, and that no process and
-# no temporary file survives any way out. Builds nothing; takes a minute. tests/demo has the parts of a demo alone.
+# no temporary file survives any way out. Builds nothing; takes a minute. tests/script has what is
+# typed and the help, tests/programs/demo_test.py the parts of a demo alone.
 set -euo pipefail
 root=$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/..
 lab=$(mktemp -d)
@@ -278,12 +279,13 @@ expect 'a screen that goes away ends it too' \
 expect 'in words' says 'the X server is gone; way out'
 expect 'with what was done until then' test -e "$lab/out/report.json"
 expect 'and leaves nothing behind' nothing_survives
+touch other.toml
 expect 'a scene that the window chose is the next demo' \
-  with DISPLAY=:99 with CHOICE=/else/other.toml kerf_gives 0 demo --seconds 5 --stereo --scene "$root/scenes/wall.toml"
+  with DISPLAY=:99 with CHOICE=$lab/other.toml kerf_gives 0 demo --seconds 5 --stereo --scene "$root/scenes/wall.toml"
 expect 'with the first one before it' called '^controller.*--scene .*wall.toml'
-expect 'in its place' called '^controller.*--scene /else/other.toml'
+expect 'in its place' called "^controller.*--scene $lab/other.toml"
 expect 'and all else as it was' test "$(grep -c '^visualizer.*--stereo' "$lab/calls")" = 2
-expect 'which is told' says '^kerf: demo: /else/other.toml$'
+expect 'which is told' says "^kerf: demo: $lab/other.toml\$"
 rm "$lab/chosen"
 expect 'a volume likewise' \
   with DISPLAY=:99 with CHOICE=/else/ct.nrrd kerf_gives 0 demo --seconds 5 --hand mouse --out "$lab/out"
@@ -431,25 +433,11 @@ expect 'and then there is room' kerf_gives 0 demo --seconds 1 --out out
 expect 'a wrong option is one line' kerf_gives 2 demo --size $'1\n2'
 expect 'of it' one_line 'kerf: demo: --size 1?2: not WIDTHxHEIGHT in pixels, 1 to 8192 each; take 640x480'
 expect 'and comes before programs that are not there' with KERF_BIN=/nowhere kerf_gives 2 demo --fast
-expect 'in its words' one_line 'kerf: demo: --fast: unknown; see ./kerf --help'
-expect 'help is that of all' kerf_gives 0 demo --seconds 1 --help
-expect 'on the standard output' says '^demo:  --scene FILE'
-expect 'a test needs a pattern' kerf_gives 2 test -R ''
-expect 'as it says' one_line 'kerf: test: -R: no value; see ./kerf --help'
-expect 'an unknown program is refused' kerf_gives 2 polish
-expect 'and the known ones are listed' one_line "kerf: polish: unknown; known are \
-setup demo test bench sweep doctor stand-in docs package bridge controller emulator lab record recorder visualizer"
-# What the script has a case for, but lab, which is a program too.
-expect 'all of them' test "$(sed -n '/^case $command/,/^esac/s/^  \([a-z]*\)).*/\1/p' "$root/kerf" | grep -vx lab | sort)" == \
-  "$("$root/kerf" --help | sed -n 's|^  \./kerf \([a-z]*\) .*|\1|p' | sort)"
-expect 'the help names the programs that are installed' test \
-  "$("$root/kerf" --help | sed -n 's|.* any program: \(.*\);|\1|p')" == \
-  "$(sed -n '/^set(programs/,/^endforeach/p' "$root/cmake/install.cmake" | grep -o 'kerf-[a-z]*' | sed 's/kerf-//' | sort | paste -sd ' ')"
+expect 'in its words' one_line 'kerf: demo: --fast: unknown; see ./kerf demo --help'
+expect 'help is that of the command' kerf_gives 0 demo --seconds 1 --help
+expect 'on the standard output' says '^  --scene FILE'
 expect 'a program runs by its short name' kerf_gives 0 record plot --out "$lab/plot.svg"
 expect 'with its arguments' called "^record plot --out $lab/plot.svg"
-expect 'help is fine' kerf_gives 0 --help
-expect 'of a command too' kerf_gives 0 bench --help
-expect 'and is that of all' says '--device D'
 printf '#!/bin/sh\necho "found    omni at /dev/fw1"\necho "missing  /dev/fw1: Permission denied"\necho "         the cure"\n' \
   >"$lab/look"
 chmod +x "$lab/look" && ln -sf ../look "$lab/bin/kerf-controller"
@@ -457,30 +445,6 @@ expect 'the doctor tells what the controller finds' kerf_gives 0 doctor
 expect 'a device' says '^ok .* omni at /dev/fw1'
 expect 'and what is missing' says '^warn  /dev/fw1 .*Permission denied'
 expect 'with its cure' says '^ *the cure'
-expect 'an unknown option of the doctor is refused' kerf_gives 2 doctor --fast
-
-# offers ANSWER WORD...: what Tab offers for the last of these words behind ./kerf, each once.
-offers() {
-  local wanted=$1
-  shift
-  offered=$(bash -c '. "$0"; COMP_WORDS=("$@") COMP_CWORD=$(($# - 1)); _kerf "$1" "${!#}" "${*: -2:1}"; echo "${COMPREPLY[*]}"' \
-    "$root/cmake/kerf-completion.sh" "$root/kerf" "$@")
-  echo "$offered" >"$lab/said"
-  [[ $(tr ' ' '\n' <<<"$offered" | LC_ALL=C sort | paste -sd ' ') == "$wanted" ]]
-}
-expect 'Tab offers commands and programs' \
-  offers 'arm bench bridge controller demo docs doctor emulator lab package record recorder replay setup stand-in sweep test visualizer volume' ''
-expect 'or those that begin so' offers 'docs doctor' 'do'
-expect 'what a bench can measure' offers 'bridge kernels pictures safety stability' bench ''
-expect 'or what begins so' offers 'kernels' bench k
-expect 'the option of the doctor' offers '--demo' doctor ''
-expect 'each option once' offers '--help --jobs --out --seconds --set' sweep --
-expect 'those of a test' offers '--junit --preset -R' test -
-expect 'those of a demo' offers '--scene --seconds --serve --set --sheet --size --spacing --stereo' demo --s
-expect 'what the bridge can do' offers '--help join serve' bridge ''
-expect 'and the lab' offers 'law' lab la
-expect 'nothing of what has no options' offers '' docs ''
-expect 'nor of a heading that is none of a command' offers '' Environment ''
 
 # A machine without QEMU, and tests that a stand-in runs in a tree of their own.
 mkdir -p "$lab/no-qemu" "$lab/tools" "$lab/tree/.ci" "$lab/tree/build/release"

@@ -53,12 +53,13 @@ foreach(program ${programs})
     DEPENDS ${program} VERBATIM)
   list(APPEND manuals ${pages}/${program}.1 ${completion}/${program})
 endforeach()
+file(GLOB help CONFIGURE_DEPENDS cli/help/*.txt)
 add_custom_command(OUTPUT ${pages}/kerf.1 ${completion}/kerf
   COMMAND cmake/kerf-manual.sh ${PROJECT_VERSION} > ${pages}/kerf.1
-  COMMAND cmake -E copy cmake/kerf-completion.sh ${completion}/kerf
+  COMMAND cmake -E copy cli/completion.sh ${completion}/kerf
   WORKING_DIRECTORY ${PROJECT_SOURCE_DIR}
-  DEPENDS ${PROJECT_SOURCE_DIR}/kerf ${PROJECT_SOURCE_DIR}/cmake/kerf-manual.sh
-    ${PROJECT_SOURCE_DIR}/cmake/kerf-completion.sh VERBATIM)
+  DEPENDS ${PROJECT_SOURCE_DIR}/kerf ${PROJECT_SOURCE_DIR}/cmake/kerf-manual.sh ${PROJECT_SOURCE_DIR}/cli/help.sh
+    ${PROJECT_SOURCE_DIR}/cli/completion.sh ${help} VERBATIM)
 add_custom_target(manuals ALL DEPENDS ${manuals} ${pages}/kerf.1)
 install(DIRECTORY ${pages}/ DESTINATION ${CMAKE_INSTALL_MANDIR}/man1)
 # As Debian's policy has it (12.1, 12.7).

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# kerf-manual.sh VERSION: the man page of ./kerf from its --help.
+# kerf-manual.sh VERSION: the man page of ./kerf from its help and that of its commands.
 set -euo pipefail
 cat <<HEAD
 .TH KERF 1 "" "kerf $1" "kerf"
@@ -12,7 +12,17 @@ kerf \- feel, mill and see a tooth
 .SH COMMANDS
 .nf
 HEAD
-./kerf --help | tail -n +3 | sed 's|\./kerf|kerf|g; s/\\/\\e/g; s/-/\\-/g; s/^\([.'"'"']\)/\\\&\1/'
+# As an installed kerf has it.
+# shellcheck disable=SC2034  # for help.sh
+root=. me=kerf
+# shellcheck source=cli/help.sh
+source cli/help.sh
+{
+  first_screen | tail -n +3
+  for command in $(commands); do
+    if [[ -e cli/help/$command.txt ]]; then printf '\n' && cat "cli/help/$command.txt"; fi
+  done
+} | sed 's|\./kerf|kerf|g; s/\\/\\e/g; s/-/\\-/g; s/^\([.'"'"']\)/\\\&\1/'
 cat <<'FOOT'
 .fi
 .SH SEE ALSO

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The options of `./kerf demo`: `./kerf --help` has their meaning."""
+"""The options of `./kerf demo`: `./kerf demo --help` has their meaning."""
 import dataclasses
 import errno
 import os
@@ -69,9 +69,9 @@ def parse(words):
                 options.look.append(name)
             continue
         if name not in WITH_VALUE:
-            raise Refusal(f"{name}: unknown; see ./kerf --help")
+            raise Refusal(f"{name}: unknown; see ./kerf demo --help")
         if not words or not words[0] or words[0].startswith("--"):
-            raise Refusal(f"{name}: no value; see ./kerf --help")
+            raise Refusal(f"{name}: no value; see ./kerf demo --help")
         if name in given and name != "--set":
             raise Refusal(f"{name}: stands there twice; give it once")
         given.add(name)

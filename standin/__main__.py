@@ -60,9 +60,9 @@ def parse(words, libraries):
             options.lockstep = True
             continue
         if name not in WITH_VALUE:
-            raise Refusal(f"{name}: unknown; write -- before the command, and see ./kerf --help")
+            raise Refusal(f"{name}: unknown; write -- before the command, and see ./kerf stand-in --help")
         if not words or not words[0] or words[0].startswith("--"):
-            raise Refusal(f"{name}: no value; see ./kerf --help")
+            raise Refusal(f"{name}: no value; see ./kerf stand-in --help")
         value = words.pop(0)
         if name == "--switch":
             options.switches.append(value)

@@ -30,8 +30,8 @@ def help_of(*command):
 
 def known_options(words):
     """Options of `./kerf WORDS...`: those of kerf itself, or of a program and its subcommand."""
-    if words[0] in ("demo", "test", "bench", "doctor", "setup", "docs", "page", "package", "sweep", "stand-in"):
-        text = help_of(root / "kerf") + (help_of(bin_folder / "kerf-lab", "sweep") if words[0] == "sweep" else "")
+    if words[0] in ("demo", "test", "bench", "completion", "doctor", "setup", "docs", "page", "package", "sweep", "stand-in"):
+        text = help_of(root / "kerf", words[0]) + (help_of(bin_folder / "kerf-lab", "sweep") if words[0] == "sweep" else "")
         text += help_of(bin_folder / "kerf-lab", "ranges") + help_of(bin_folder / "kerf-lab", "faults")
         text += help_of(bin_folder / "kerf-lab", "bench") + help_of(bin_folder / "kerf-visualizer")
     elif words[:2] == ["lab", "ablate"]:

@@ -48,7 +48,7 @@ grep -qE '^tick [0-9]+: tip -?[0-9.]+ -?[0-9.]+ -?[0-9.]+ mm, force 0\.[0-9]*[1-
   fail "watch: $(cat "$home/watched")"
 [[ $("$home/segment-reader/build/watch" nobody 2>&1) == 'watch: --name nobody: '* ]] || fail 'watch: saw nobody'
 
-[[ $(kerf --version) == "kerf-controller "* ]] || fail "kerf --version: $(kerf --version)"
+[[ $(kerf --version) == "kerf "[0-9]* ]] || fail "kerf --version: $(kerf --version)"
 (cd "$home" && kerf demo --virtual --seconds 1 --scene "$scenes/wall.toml" --out demo >/dev/null) ||
   fail 'kerf demo: failed where kerf is installed'
 [[ -s $home/demo/forces.svg && -s $home/demo/frame-0012.png ]] || fail 'kerf demo: made no pictures'
@@ -59,6 +59,7 @@ for command in test 'bench safety'; do  # whole, or nothing
   [[ $(kerf $command 2>&1) == "kerf: $command: this kerf is installed; "* ]] || fail "kerf $command: runs without sources"
 done
 ! kerf --help | grep -q '\./kerf' || fail 'kerf --help: speaks of ./kerf'
+! kerf --help | grep -q 'kerf setup' || fail 'kerf --help: lists what needs a clone'
 kerf --help | grep -q 'bench safety need a clone' || fail 'kerf --help: does not say what needs a clone'
 for scene in touch touch.toml scenes/touch.toml; do  # from any folder, by its name
   (cd "$home" && kerf controller --check --scene $scene 2>/dev/null) | grep -qx "scene=$scenes/touch.toml" ||
@@ -73,7 +74,7 @@ spine() { kerf controller --check --scene spine/spine.toml 2>&1; }
 mkdir -p "$home/data/kerf/scenes/spine" && kerf volume phantom --size 64x64x64 --out "$home/data/kerf/scenes/spine/ct.nrrd" >/dev/null
 rm "$home/data/kerf/scenes/spine/ct-labels.nrrd"  # of a tooth's materials
 [[ $(spine) == *'volume=spine '* ]] || fail "kerf: a CT in the user's folder: $(spine)"
-[[ $(cd "$home" && kerf demo --fast 2>&1) == 'kerf: demo: --fast: unknown; see kerf --help' ]] || fail 'kerf demo: speaks of ./kerf'
+[[ $(cd "$home" && kerf demo --fast 2>&1) == 'kerf: demo: --fast: unknown; see kerf demo --help' ]] || fail 'kerf demo: speaks of ./kerf'
 
 for tool in dpkg-shlibdeps file; do
   command -v "$tool" >/dev/null && continue

@@ -21,7 +21,7 @@ expect() {
 first=$lab/first
 mkdir -p "$first/.ci" "$first/cmake"
 cp -r "$root/kerf" "$root/cli" "$root/CMakePresets.json" "$first"
-cp "$root"/.ci/{progress.sh,stages.sh} "$first/.ci"
+cp "$root/.ci/stages.sh" "$first/.ci"
 printf '#!/bin/sh\n' >"$first/.ci/packages.sh"
 cp "$root/tests/join_files.sh" "$first/.ci"
 chmod +x "$first/.ci/packages.sh"

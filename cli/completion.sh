@@ -1,16 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
 # shellcheck shell=bash
-# Completion of kerf (and of ./kerf) in bash: its commands, options and their words as its own help has them; behind
-# the name of a program, what that program offers.
+# Completion of kerf (and of ./kerf) in bash: its commands, options and their words as its own help has them. An installed program
+# offers its own words behind its name.
 
 # _kerf_values OPTION WORD: in COMPREPLY what may follow an option, whose help (one line each) comes in. Returns 1 if
 # the option takes no value.
 _kerf_values() {
   local option=$1 word=$2 line name words='' home=${COMP_WORDS[0]}
-  line=$(grep -E -- "(^| )$option [A-Z]" | head -n 1)
-  [[ -n $line ]] || return 1
+  line=$(grep -E -- "^ +([^ ]*,)?$option [^ ]" | head -n 1)
   line=${line#*"$option "}
   name=${line%% *}
+  [[ -n $name && $name != @(Excludes|Needs): ]] || return 1
   case $name in
     FILE | PATH | DIR)
       compopt -o filenames 2>/dev/null
@@ -24,14 +24,17 @@ _kerf_values() {
       ;;
     *)
       compopt +o default 2>/dev/null
-      words=$(grep -oP '([a-z][a-z0-9-]*, )+[a-z][a-z0-9-]* or [a-z][a-z0-9-]*' <<<"$line" | head -n 1)
+      words=$(grep -oP '^[^ ]*:\{\K[^}]*' <<<"$line" | tr ',' ' ')
+      if [[ -z $words ]]; then
+        words=$(grep -oP '([a-z][a-z0-9-]*, )+[a-z][a-z0-9-]* or [a-z][a-z0-9-]*' <<<"$line" | head -n 1)
+      fi
       mapfile -t COMPREPLY < <(compgen -W "$(sed 's/, / /g; s/ or / /' <<<"$words")" -- "$word")
       ;;
   esac
 }
 
 _kerf() {
-  local command=${COMP_WORDS[1]:-} help
+  local command=${COMP_WORDS[1]:-} sub=${COMP_WORDS[2]:-} help
   if ((COMP_CWORD > 1)) && type "kerf-$command" &>/dev/null; then
     _completion_loader "kerf-$command" 2>/dev/null || true
     if declare -F "_kerf_$command" >/dev/null; then
@@ -41,16 +44,18 @@ _kerf() {
       return
     fi
   fi
-  help=$("$1" --help 2>/dev/null)
-  if ((COMP_CWORD == 1)); then
-    help=$(grep -oP '^  (\./)?kerf (\K[a-z-]+|NAME.* any program: \K[a-z ]+)' <<<"$help")
+  if ((COMP_CWORD == 1)) || [[ $command == help ]]; then
+    help=$("$1" --help 2>/dev/null | grep -oP '^  (\./)?kerf (\K[a-z-]+|NAME.* any program: \K[a-z ]+)')
+    if ((COMP_CWORD > 2)); then help=''; fi
   else
-    # A command's part of the help goes to the next heading. There words stand behind the heading or below them,
-    # options anywhere; what is further to the right belongs to the line before.
-    help=$(awk -v heading="$command:" '/^[^ ]/ { mine = $1 == heading } mine' <<<"$help" |
-      sed -E ':a; N; $!ba; s/\n {15,}/ /g')
+    # What is further to the right belongs to the line before.
+    if ((COMP_CWORD > 2)) && [[ $sub == [a-z]* ]]; then help=$("$1" help "$command" "$sub" 2>/dev/null); fi
+    help=$(if [[ -n $help ]]; then echo "$help"; else "$1" help "$command" 2>/dev/null; fi | sed -E ':a; N; $!ba; s/\n {15,}/ /g')
     if [[ $3 == -* ]] && _kerf_values "$3" "$2" <<<"$help"; then return; fi
-    help=$(grep -oP '^([a-z-]+: +| {7,8})\K[a-z][a-z-]*|(?<= )--?[A-Za-z][a-z-]*' <<<"$help" | sort -u)
+    help=$({
+      grep -oP '^ +(--?[A-Za-z][^ ]*)' <<<"$help" | tr ',' '\n'
+      if ((COMP_CWORD == 2)); then sed -n '/ommands:$/,/^$/s/^  \([a-z][a-z-]*\)  .*/\1/p' <<<"$help"; fi
+    } | sort -u)
   fi
   mapfile -t COMPREPLY < <(compgen -W "$help" -- "$2")
 }
