@@ -10,8 +10,8 @@ shift
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
 
-# Copies and fills of memory; what __builtin_cpu_supports reads.
-allowed='mem(cpy|move|set|cmp)|__cpu_model|__cpu_features2|__cpu_indicator_init'
+# Copies and fills of memory; what kernel_sets() reads at load, of processor and environment.
+allowed='mem(cpy|move|set|cmp)|__cpu_model|__cpu_features2|__cpu_indicator_init|getenv'
 # Where the linker puts addresses, and the stack check that a distribution may switch on.
 allowed+='|_GLOBAL_OFFSET_TABLE_|__stack_chk_fail'
 

@@ -371,8 +371,8 @@ extern const KernelSet kAvx512Set;
 extern const KernelSet kNeonSet;
 #endif
 
-/// Kernels that this machine can run, the fastest first; ends with nullptr, holds at least one.
-/// Load time.
+/// Kernels that this machine can run and that are not hidden (shared/numeric/hidden_set.hpp), the
+/// fastest first; ends with nullptr, holds at least one. Load time.
 [[nodiscard]] const KernelSet* const* kernel_sets() noexcept;
 
 }  // namespace kerf

@@ -13,6 +13,7 @@
 #include "shared/text/text.hpp"
 #include "tests/golden/golden_hash.hpp"
 #include "tests/golden/golden_run.hpp"
+#include "tests/support/sets_to_run.hpp"
 
 using namespace kerf;
 using namespace kerf::test;
@@ -59,7 +60,7 @@ void check_felt(const GoldenRun& run) {
 }  // namespace
 
 TEST_CASE("20 s of milling in fixed point end in the known bits on every instruction set") {
-  for (auto set = kernel_sets(); *set != nullptr; ++set) {
+  for (auto set = sets_to_run(); *set != nullptr; ++set) {
     const GoldenRun run = printed_run(GoldenScene::mill, NumericKind::fixed, **set);
     CAPTURE(std::string((*set)->name));
     check_end(run, GoldenScene::mill, NumericKind::fixed);
@@ -76,7 +77,7 @@ TEST_CASE("20 s of milling in double end in the known bits") {
 }
 
 TEST_CASE("3 s of feeling in fixed point end in the known bits on every instruction set") {
-  for (auto set = kernel_sets(); *set != nullptr; ++set) {
+  for (auto set = sets_to_run(); *set != nullptr; ++set) {
     const GoldenRun run = printed_run(GoldenScene::feel, NumericKind::fixed, **set);
     CAPTURE(std::string((*set)->name));
     check_end(run, GoldenScene::feel, NumericKind::fixed);
@@ -94,7 +95,7 @@ TEST_CASE("3 s of feeling in double end in the known bits") {
 // In fixed point alone: a sine of the processor's own library puts the tools' samples where they
 // are, and only rounding makes them the same everywhere.
 TEST_CASE("3 s of cutting by the proxy's force end in the known bits on every instruction set") {
-  for (auto set = kernel_sets(); *set != nullptr; ++set) {
+  for (auto set = sets_to_run(); *set != nullptr; ++set) {
     const GoldenRun run = printed_run(GoldenScene::sweep, NumericKind::fixed, **set);
     CAPTURE(std::string((*set)->name));
     check_end(run, GoldenScene::sweep, NumericKind::fixed);

@@ -15,6 +15,7 @@
 #include "controller/plan/tables/sample_tables.hpp"
 #include "tests/kernel/definitions.hpp"
 #include "tests/kernel/support.hpp"
+#include "tests/support/sets_to_run.hpp"
 
 namespace kerf::test {
 
@@ -205,7 +206,7 @@ class AlignedRig {
 inline std::vector<AlignedRig> rigs_for(std::span<const ToolOffset> offsets,
                                         const ExactTaps& taps = kExactFarid) {
   std::vector<AlignedRig> rigs;
-  for (auto set = kernel_sets(); *set != nullptr; ++set) rigs.emplace_back(offsets, taps, **set);
+  for (auto set = sets_to_run(); *set != nullptr; ++set) rigs.emplace_back(offsets, taps, **set);
   return rigs;
 }
 

@@ -11,6 +11,7 @@
 
 #include "tests/case_count.hpp"
 #include "tests/kernel/aligned_support.hpp"
+#include "tests/support/sets_to_run.hpp"
 
 using namespace kerf;
 using namespace kerf::test;
@@ -311,7 +312,7 @@ TEST_CASE("a table is widened as seldom as its largest half allows, every 127 ch
 
 // A table that no tool has: every half as large as it can be, against air, chunk after chunk.
 TEST_CASE("lanes hold 127 chunks of the widest products and not one more, on every list length") {
-  for (auto set = kernel_sets(); *set != nullptr; ++set) {
+  for (auto set = sets_to_run(); *set != nullptr; ++set) {
     const KernelSet& kernels = **set;
     const auto lanes = static_cast<std::size_t>(kernels.lanes);
     for (const bool fused : {false, true}) {

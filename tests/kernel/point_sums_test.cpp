@@ -20,6 +20,7 @@
 #include "controller/plan/tables/point_shell_table.hpp"
 #include "tests/case_count.hpp"
 #include "tests/kernel/contact_support.hpp"
+#include "tests/support/sets_to_run.hpp"
 
 using namespace kerf;
 using namespace kerf::test;
@@ -120,7 +121,7 @@ TEST_CASE("every instruction set sums a point point_shell to the bit, wherever i
                   .read;
           felt += truth.weight != 0 ? 1 : 0;
           skipped += kind == 4 && truth.weight == 0 ? 1 : 0;
-          for (auto set = kernel_sets(); *set != nullptr; ++set) {
+          for (auto set = sets_to_run(); *set != nullptr; ++set) {
             (*set)->transform_points(point_shell.table, step, memory.places());
             Sums sums;
             sums.weight = sums.square = sums.high = sums.top = -1;  // left over from before
@@ -153,7 +154,7 @@ TEST_CASE("the largest point point_shell deep in the densest volume stays within
     const TestVolume volume = made_of(grid, [&](std::int32_t x, auto, auto) -> Density {
       return striped && x % 2 == 0 ? 0 : 65535;
     });
-    for (auto set = kernel_sets(); *set != nullptr; ++set) {
+    for (auto set = sets_to_run(); *set != nullptr; ++set) {
       TransformedShell<FixedNumbers> memory;
       memory.hold(point_shell);
       PointStep<FixedNumbers> step;
@@ -182,7 +183,7 @@ TEST_CASE("a volume without a cell is not felt") {
   const PointShell<FixedNumbers> point_shell = tool.point_shell();
   for (const VoxelGrid grid : {VoxelGrid{1, 5, 5}, {5, 1, 5}, {5, 5, 1}}) {
     const TestVolume volume = filled(grid, 65535);
-    for (auto set = kernel_sets(); *set != nullptr; ++set) {
+    for (auto set = sets_to_run(); *set != nullptr; ++set) {
       TransformedShell<FixedNumbers> memory;
       memory.hold(point_shell);
       RandomNumbers random(1);
@@ -204,7 +205,7 @@ TEST_CASE("beside a volume that is solid to its border nothing is read") {
   const FreeBrickMap map(grid, volume.density, 1);
   const DensityField field{grid, volume.density.data(), density_scale(32768), map.bricks()};
   RandomNumbers random(6);
-  for (auto set = kernel_sets(); *set != nullptr; ++set) {
+  for (auto set = sets_to_run(); *set != nullptr; ++set) {
     TransformedShell<FixedNumbers> memory;
     memory.hold(point_shell);
     (*set)->transform_points(point_shell.table, any_step(point_shell, random), memory.places());
@@ -228,7 +229,7 @@ TEST_CASE("at the end of the places that there are nothing is felt and nothing r
   constexpr std::int32_t kEnd = std::numeric_limits<std::int32_t>::max();
   for (const std::int32_t x : {kEnd, kEnd - 65536, kEnd - point_shell.table.reach, -kEnd}) {
     CAPTURE(x);
-    for (auto set = kernel_sets(); *set != nullptr; ++set) {
+    for (auto set = sets_to_run(); *set != nullptr; ++set) {
       TransformedShell<FixedNumbers> memory;
       memory.hold(point_shell);
       RandomNumbers random(1);
@@ -333,7 +334,7 @@ TEST_CASE("every instruction set sums close samples to the bit") {
     const auto look = samples->fade(samples->table());
     const auto truth = close_sums<FixedNumbers>(look);
     felt += truth.low.weight > 0 ? 1 : 0;
-    for (auto set = kernel_sets(); *set != nullptr; ++set) {
+    for (auto set = sets_to_run(); *set != nullptr; ++set) {
       CloseSums<FixedNumbers> sums;
       sums.top = -1;  // left over from before
       sums.low.weight = sums.high.density = -1;

@@ -13,6 +13,7 @@
 #include "controller/plan/tables/sample_tables.hpp"
 #include "tests/kernel/aligned_support.hpp"
 #include "tests/kernel/preston_support.hpp"
+#include "tests/support/sets_to_run.hpp"
 
 using namespace kerf;
 using namespace kerf::test;
@@ -111,7 +112,7 @@ TEST_CASE("every method and instruction set cuts the same by force, inside and a
   BoxMemory memory;
   memory.hold({9, 7, 8}, true);
   std::vector<AlignedTool> tables;
-  for (auto set = kernel_sets(); *set != nullptr; ++set)
+  for (auto set = sets_to_run(); *set != nullptr; ++set)
     tables.emplace_back(tool, kExactFarid, **set);
   Cutter<N> cutter(20);
   std::mt19937 random(11);
@@ -126,7 +127,7 @@ TEST_CASE("every method and instruction set cuts the same by force, inside and a
       const Cut truth = press.by_list(cutter.overlap);
       cuts += truth.removed.density_steps != 0 ? 1 : 0;
       exhausted += truth.lost > 0 ? 1 : 0;
-      for (auto set = kernel_sets(); *set != nullptr; ++set) {
+      for (auto set = sets_to_run(); *set != nullptr; ++set) {
         INFO(std::string((*set)->name), ", fill ", fill, ", case ", i);
         std::vector<Density> density = volume.density;
         const AlignedTable& table = tables[static_cast<std::size_t>(set - kernel_sets())].table();
@@ -194,7 +195,7 @@ TEST_CASE("what materials bear of a press is the same in groups, on every instru
                     ? 1
                     : 0;
       }
-      for (auto set = kernel_sets(); *set != nullptr; ++set) {
+      for (auto set = sets_to_run(); *set != nullptr; ++set) {
         INFO(std::string((*set)->name), ", fill ", fill, ", case ", i);
         const AlignedTool table(tool, kExactFarid, **set);
         std::vector<Density> density = volume.density;
@@ -249,7 +250,7 @@ TEST_CASE("a long thin tool of any step along its rows weighs the same in groups
   const auto pose = pose_of({(31 << 16) + 7, (4 << 16) + 99, 4 << 16});
   std::vector<CoveredVoxel<N>> list(60'000);
   std::vector<CoveredGroup> groups(1000);
-  for (auto set = kernel_sets(); *set != nullptr; ++set) {
+  for (auto set = sets_to_run(); *set != nullptr; ++set) {
     const AlignedTool table(tool, kExactFarid, **set);
     std::vector<Density> density = volume.density;
     const AlignedTick tick(**set, table.table(), memory.view(), grid, density, pose);

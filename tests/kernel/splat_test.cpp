@@ -13,6 +13,7 @@
 #include "tests/case_count.hpp"
 #include "tests/kernel/aligned_support.hpp"
 #include "tests/kernel/definitions.hpp"
+#include "tests/support/sets_to_run.hpp"
 
 using namespace kerf;
 using namespace kerf::test;
@@ -104,7 +105,7 @@ TEST_CASE("splatting gives the bits of the definition for any tool in any pose")
             by_definition(rig, volume, field, pose, volume_ratio, rate, carry, cutter.overlap);
         felt += truth.contact == SumVec<FixedNumbers>{} ? 0 : 1;
         cut_away += truth.removed.density_steps != 0 ? 1 : 0;
-        for (auto set = kernel_sets(); *set != nullptr; ++set) {
+        for (auto set = sets_to_run(); *set != nullptr; ++set) {
           const bool same = rig.run(**set, taps, volume, pose, volume_ratio, rate, carry) == truth;
           if (!same) {
             INFO(tool.offsets.size(), " samples, ", std::string((*set)->name), ", fill ", fill,
@@ -155,7 +156,7 @@ TEST_CASE("splatting far outside, or with too few lanes to carry, does nothing")
     pose.centre_vox = {Q16::from_raw(x), Q16::from_raw(y), Q16::from_raw(z)};
     return pose;
   };
-  for (auto set = kernel_sets(); *set != nullptr; ++set) {
+  for (auto set = sets_to_run(); *set != nullptr; ++set) {
     const auto nothing = [&](const ToolPose<FixedNumbers>& pose, std::size_t lanes) {
       const std::vector<std::uint16_t> carry(lanes, 65535);
       const AlignedOutcome out =
@@ -179,7 +180,7 @@ TEST_CASE("what the tallest box loses is counted in full") {
   memory.hold(box.size, true);
   const BoxScratch scratch = memory.view();
   const std::int32_t rows = (box.size.y + 1) * (box.size.z + 1);
-  for (auto set = kernel_sets(); *set != nullptr; ++set) {
+  for (auto set = sets_to_run(); *set != nullptr; ++set) {
     std::vector<Density> density(grid.voxel_count(), 65535);
     (*set)->copy_box(box, grid, density.data(), {4, 4, 4}, scratch);
     std::int16_t* ratio = scratch.ratio + kRatioRowPad;
@@ -229,7 +230,7 @@ int count_not_zero(const VoxelGrid& grid, const Field& field, std::span<const To
                    const SampleTable& samples, const ToolPose<FixedNumbers>& pose) {
   const std::span<const Gradient<FixedNumbers>> voxels(field.data(), grid.voxel_count());
   const auto truth = contact_sum<FixedNumbers>(grid, voxels, tool, pose);
-  for (auto set = kernel_sets(); *set != nullptr; ++set) {
+  for (auto set = sets_to_run(); *set != nullptr; ++set) {
     const bool same = gathered_contact(**set, samples, grid, voxels, pose) == truth;
     if (!same) {
       INFO(std::string((*set)->name), ", ", tool.size(), " samples");

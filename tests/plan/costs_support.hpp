@@ -4,7 +4,10 @@
 #include <array>
 #include <cmath>
 #include <cstdlib>
+#include <vector>
 
+#include "controller/kernel/kernel_set.hpp"
+#include "controller/kernel/kernel_shapes.hpp"
 #include "controller/plan/method/lattice.hpp"
 #include "controller/tool/tool_shapes.hpp"
 #include "tests/servo/support.hpp"
@@ -20,6 +23,22 @@ inline SceneTool shape(const char* name, double radius_mm, double length_mm) {
 /// All voxels full: every stage does all that it ever does.
 inline SceneVolume full_block(int edge) {
   return volume_of(edge, kVoxelMm, [](double, double, double) { return -1.0; });
+}
+
+/// Every set that kerf has, on every processor, without its functions: a plan that called one of
+/// them would crash.
+inline const std::vector<KernelSet>& planned_sets() {
+  static const std::vector<KernelSet> kSets = [] {
+    std::vector<KernelSet> sets;
+    for (const KernelShape& shape : kKernelShapes) {
+      KernelSet& set = sets.emplace_back();
+      set.name = shape.name;
+      set.lanes = shape.lanes;
+      set.can_fuse = shape.can_fuse;
+    }
+    return sets;
+  }();
+  return kSets;
 }
 
 /// A random turn, from a random quaternion.

@@ -13,8 +13,10 @@
 #include "controller/plan/compile.hpp"
 #include "replay/replay_step.hpp"
 #include "shared/text/text.hpp"
+#include "tests/support/sets_to_run.hpp"
 
 using namespace kerf;
+using namespace kerf::test;
 
 namespace {
 
@@ -73,7 +75,7 @@ TEST_CASE("recorded inputs end in the recorded bits, on every instruction set") 
     REQUIRE(inputs.ticks.size() > 3000);
     const LoadedScene scene = load_scene(std::string(KERF_SCENES) + "/" + inputs.scene + ".toml",
                                          {.torque_scale = std::array{0.05, 0.05, 0.05}});
-    for (auto set = kernel_sets(); *set != nullptr; ++set) {
+    for (auto set = sets_to_run(); *set != nullptr; ++set) {
       CAPTURE(std::string((*set)->name));
       LoadedScene own = scene;
       const auto servo = compile(own, **set);

@@ -189,12 +189,12 @@ TEST_CASE("a tick of two arms allocates nothing") {
 TEST_CASE("a scene whose tools fit the budget once and not twice is refused for two hands") {
   LoadedScene scene = two_armed(kCutKinds[0]);
   const double one_us =
-      work_us(compile(*std::make_unique<LoadedScene>(alone(scene, 0)))->costs(), 0);
+      work_us(plan_scene(alone(scene, 0), kScalarSet)->costs(), 0);  // of every processor
   scene.servo.rate_hz = static_cast<int>(0.75e6 * kBudgetRatio / one_us);
   REQUIRE(scene.servo.rate_hz <= kMaxRateHz);
-  const auto single = plan_scene(alone(scene, 0));
+  const auto single = plan_scene(alone(scene, 0), kScalarSet);
   CHECK(budget_error(alone(scene, 0), single->costs()).empty());
-  const auto both = plan_scene(scene);
+  const auto both = plan_scene(scene, kScalarSet);
   const std::string error = budget_error(scene, both->costs());
   CHECK(error.find("in both hands") != std::string::npos);
 }

@@ -8,6 +8,8 @@
 #include <cpuid.h>
 #endif
 
+#include "shared/numeric/hidden_set.hpp"
+
 namespace kerf {
 namespace {
 
@@ -28,12 +30,13 @@ Sets sets_of_this_machine() noexcept {
   Sets sets{};
   std::size_t count = 0;
 #if defined(KERF_X86_CAST)
-  if (__builtin_cpu_supports("avx512f") != 0 && __builtin_cpu_supports("avx512dq") != 0) {
+  if (__builtin_cpu_supports("avx512f") != 0 && __builtin_cpu_supports("avx512dq") != 0 &&
+      !hidden_set("avx512")) {
     const bool quickly = gathers_quickly();
     sets[count++] = quickly ? &kCastAvx512Gather : &kCastAvx512;
     sets[count++] = quickly ? &kCastAvx512 : &kCastAvx512Gather;
   }
-  if (__builtin_cpu_supports("avx2") != 0) sets[count++] = &kCastAvx2;
+  if (__builtin_cpu_supports("avx2") != 0 && !hidden_set("avx2")) sets[count++] = &kCastAvx2;
 #endif
   sets[count] = &kCastScalar;
   return sets;

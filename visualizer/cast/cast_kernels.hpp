@@ -98,7 +98,8 @@ struct CastKernels {
   bool (*shading_touches)(const RedrawJob& job, const PixelRect& rect);
 };
 
-/// What this machine can run, the fastest first; ends with the scalar set and a null.
+/// What this machine can run and is not hidden (shared/numeric/hidden_set.hpp), the fastest first;
+/// ends with the scalar set and a null.
 [[nodiscard]] const CastKernels* const* cast_kernels() noexcept;
 
 extern const CastKernels kCastAvx512;

@@ -198,6 +198,6 @@ struct Simd {
 
 namespace kerf {
 
-const KernelSet kAvx2Set = the_set("avx2", false);
+const KernelSet kAvx2Set = the_set<kAvx2Shape>();
 
 }  // namespace kerf

@@ -182,6 +182,6 @@ struct Simd {
 
 namespace kerf {
 
-const KernelSet kAvx512Set = the_set("avx512", true);
+const KernelSet kAvx512Set = the_set<kAvx512Shape>();
 
 }  // namespace kerf

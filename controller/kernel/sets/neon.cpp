@@ -102,6 +102,6 @@ struct Simd {
 
 namespace kerf {
 
-const KernelSet kNeonSet = the_set("neon", false);
+const KernelSet kNeonSet = the_set<kNeonShape>();
 
 }  // namespace kerf

@@ -206,6 +206,6 @@ BoxCut cut(const TickBox& tool, const CutRate& rate, const VoxelGrid& grid, Dens
 
 namespace kerf {
 
-const KernelSet kScalarSet = the_set("scalar", false);
+const KernelSet kScalarSet = the_set<kScalarShape>();
 
 }  // namespace kerf

@@ -5,6 +5,7 @@
 #include <cstring>
 
 #include "controller/kernel/kernel_set.hpp"
+#include "controller/kernel/kernel_shapes.hpp"
 #include "controller/kernel/sets/splat_loops.hpp"
 
 // The end of every set: weighing and cutting of the covered voxels, with the bits of
@@ -204,10 +205,12 @@ void take_steps(const CoverSpend& spend, CoveredGroup* list, std::int32_t count,
 }
 
 /// The functions of this set and those that are the same for all sets.
-constexpr KernelSet the_set(const char* name, bool can_fuse) noexcept {
-  return {name,
+template <const KernelShape& kShape>
+constexpr KernelSet the_set() noexcept {
+  static_assert(kShape.lanes == kLanes);
+  return {kShape.name,
           kLanes,
-          can_fuse,
+          kShape.can_fuse,
           copy_box,
           correlate,
           press,

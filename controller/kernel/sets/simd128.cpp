@@ -141,6 +141,6 @@ namespace kerf {
 
 // For kernel_set.cpp, and nothing else.
 extern const KernelSet kSimd128Set;
-const KernelSet kSimd128Set = the_set("simd128", false);
+const KernelSet kSimd128Set = the_set<kSimd128Shape>();
 
 }  // namespace kerf

@@ -4,11 +4,14 @@
 #include <array>
 #include <atomic>
 #include <cmath>
+#include <cstdio>
 #include <random>
+#include <string_view>
 
 #include <doctest/doctest.h>
 #include <glm/gtc/matrix_transform.hpp>
 
+#include "shared/numeric/hidden_set.hpp"
 #include "tests/visualizer/gl/gl_fixture.hpp"
 #include "tests/visualizer/render/exact_body.hpp"
 #include "tests/visualizer/render/renderer_fixture.hpp"
@@ -21,6 +24,13 @@ using namespace kerf::test;
 namespace {
 
 constexpr PictureSize kSize{101, 83};  // no multiple of a packet, a block or a tile
+
+/// Whether rays are cast with the instructions of that set, with gathers or without.
+bool has_set(std::string_view name) {
+  const CastKernels* const* set = cast_kernels();
+  while (*set != nullptr && !std::string_view((*set)->name).starts_with(name)) ++set;
+  return *set != nullptr;
+}
 
 struct Cast {
   CastPicture picture;
@@ -140,6 +150,14 @@ TEST_CASE("N12: depth and normals of a ball and a torus are of second order in t
 }
 
 TEST_CASE("every instruction set gives the bits of one ray at a time") {
+  for (const char* name : {"avx512", "avx2"}) {
+    const bool here = has_set(name);
+    CHECK(!(here && hidden_set(name)));
+    if (!here) {
+      std::printf("skipped: kernels of %s: not on this processor, or hidden by KERF_HIDE_SETS\n",
+                  name);
+    }
+  }
   const Heap a(7);
   Heap b(8);
   b.volume.view.world_from_voxel =
