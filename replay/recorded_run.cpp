@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "controller/input/load_error.hpp"
+#include "controller/kernel/kernel_shapes.hpp"
 #include "controller/load/load_scene.hpp"
 #include "controller/load/scene_json.hpp"
 #include "controller/loop/publisher.hpp"
@@ -283,12 +284,20 @@ void step_earlier_ticks(RecordedRun& run, const std::filesystem::path& folder) {
 }
 
 const KernelSet& kernels_named(const std::string& name) {
-  std::string known;
+  std::string here;
   for (const KernelSet* const* set = kernel_sets(); *set != nullptr; ++set) {
     if (name.empty() || name == (*set)->name) return **set;
-    known += std::string(known.empty() ? "" : ", ") + (*set)->name;
+    here += std::string(here.empty() ? "" : ", ") + (*set)->name;
   }
-  throw UsageError("--kernels " + one_line(name) + ": not on this machine; use one of " + known);
+  std::string all;
+  for (const KernelShape& shape : kKernelShapes) {
+    if (name == shape.name) {
+      throw UsageError("--kernels " + name +
+                       ": not on this processor, or hidden by KERF_HIDE_SETS; use one of " + here);
+    }
+    all += std::string(all.empty() ? "" : ", ") + shape.name;
+  }
+  throw UsageError("--kernels " + one_line(name) + ": unknown; use one of " + all);
 }
 
 }  // namespace kerf

@@ -85,7 +85,8 @@ class EarlierTicks {
 void step_earlier_ticks(RecordedRun& run, const std::filesystem::path& folder);
 
 /// The kernels of that name, as `kernel_sets` has them; the fastest if `name` is empty. Throws
-/// UsageError with those of this machine.
+/// UsageError: with all sets if there is none of that name, with those of this machine if it lacks
+/// that one.
 [[nodiscard]] const KernelSet& kernels_named(const std::string& name);
 
 }  // namespace kerf

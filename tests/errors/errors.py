@@ -72,7 +72,8 @@ class Runner:
         environment = {
             'PATH': f'{self.programs}:{self.root}:/usr/sbin:/usr/bin:/sbin:/bin', 'HOME': folder, 'LC_ALL': 'C.UTF-8',
             'KERF_BIN': str(self.programs), 'TMPDIR': f'{folder}/private', 'XDG_RUNTIME_DIR': f'{folder}/private',
-            'HERE': str(HERE), 'LOG': f'{self.shared}/log', 'MPLCONFIGDIR': f'{self.shared}/fonts'}
+            'HERE': str(HERE), 'LOG': f'{self.shared}/log', 'MPLCONFIGDIR': f'{self.shared}/fonts',
+            'KERF_HIDE_SETS': os.environ.get('KERF_HIDE_SETS', '')}
         # Root without its power over files: what a user has no rights to, it has none to either.
         user = ['setpriv', '--bounding-set=-dac_override,-dac_read_search', '--inh-caps=-all']
         shell = subprocess.Popen(
