@@ -2,8 +2,18 @@
 """The part of docs/performance.md on kernels. JSON of `kerf bench kernels --report`:
 
     provenance                  day, machine and compiler of the run
-    rows, queries, layout       rows {name, numeric, isa, ns_p50, ns_p99, ratio, bytes}"""
+    rows, queries, layout       rows {name, numeric, isa, ns_p50, ns_p99, ratio, bytes}
+
+A machine measures only the instruction sets that it has. Rows of the others stay as the page had them, with the day and
+machine that they are of."""
+import pathlib
+import re
+
 import text
+
+SETS = ("avx512", "avx2", "neon")  # `scalar` runs everywhere
+PROVENANCE = re.compile(r"^\d{4}-\d\d-\d\d, .*$", re.MULTILINE)
+KEPT = re.compile(r"^Rows of `(\w+)` are of another machine: (.*)$", re.MULTILINE)
 
 ABOUT = """\
 # Performance
@@ -19,6 +29,7 @@ kept from tick to tick.
 * `reference` is the plain fixed-point code with stored gradients.
 * `scalar`, `avx2` and `avx512` are the servo's kernels, which all give the same bits: the method `aligned` for tools
   that are not rotated, and for tools in any pose (`any`) the method `gather` for contact and `splat` for milling.
+  A machine that lacks a set leaves its rows as they were; a line then says which machine they are of.
 * `bytes` is the memory of the tick beyond two bytes a voxel.
 
 """
@@ -43,12 +54,47 @@ divides the linear copy. The others are one tool in volumes of three sizes; the 
 """
 
 
-def table_of(rows):
-    return text.table(["tick", "numbers", "kernel", ">p50 us", ">p99 us", ">ratio", ">bytes"],
-                      [[row["name"], row["numeric"], row["isa"], f"{row['ns_p50'] / 1e3:.2f}", f"{row['ns_p99'] / 1e3:.2f}",
-                        f"{row['ratio']:.3g}", str(row["bytes"])] for row in rows])
+class Before:
+    """The page as it was: the rows of sets that a run did not measure."""
+
+    def __init__(self, page, data):
+        measured = {row["isa"] for key in ("rows", "queries", "layout") for row in data[key]}
+        origin = PROVENANCE.search(page)
+        origins = dict.fromkeys(SETS, origin[0] if origin else "") | dict(KEPT.findall(page))
+        self.rows, self.origins = {}, {}  # rows by tick, all kernels of a tick in their order
+        for line in page.splitlines():
+            cells = line.strip("| ").split(" | ")
+            if line.startswith("| ") and len(cells) == 7:
+                self.rows.setdefault(cells[0], []).append(cells)
+                if cells[2] in SETS and cells[2] not in measured:
+                    self.origins[cells[2]] = origins[cells[2]]
+
+    def provenance(self):
+        return "".join(f"\n\nRows of `{name}` are of another machine: {origin}" for name, origin in self.origins.items())
+
+    def added_to(self, rows):
+        """`rows`, cells each, with the kept ones of the same ticks, in the order of the page."""
+        ticks = {}
+        for row in rows:
+            ticks.setdefault(row[0], []).append(row)
+        for tick, found in ticks.items():
+            before = self.rows.get(tick, [])
+            order = [cells[2] for cells in before]
+            found += [cells for cells in before if cells[2] in self.origins]
+            found.sort(key=lambda cells: order.index(cells[2]) if cells[2] in order else len(order))
+        return [row for found in ticks.values() for row in found]
 
 
-def page(data):
-    return (ABOUT + data["provenance"] + "\n\n" + table_of(text.rows_of(data)) + QUERIES + table_of(data["queries"]) + LAYOUT
-            + table_of(data["layout"]))
+def table_of(rows, before):
+    return text.table(["tick", "numbers", "kernel", ">p50 us", ">p99 us", ">ratio", ">bytes"], before.added_to(
+        [[row["name"], row["numeric"], row["isa"], f"{row['ns_p50'] / 1e3:.2f}", f"{row['ns_p99'] / 1e3:.2f}",
+          f"{row['ratio']:.3g}", str(row["bytes"])] for row in rows]))
+
+
+def page(data, file=""):
+    """`file`: the page as it was; it need not be there."""
+    old = pathlib.Path(file)
+    head, rows = ABOUT + data["provenance"], text.rows_of(data)
+    before = Before(old.read_text(encoding="utf-8") if old.is_file() else "", data)
+    return (head + before.provenance() + "\n\n" + table_of(rows, before) + QUERIES + table_of(data["queries"], before) + LAYOUT
+            + table_of(data["layout"], before))

@@ -3,6 +3,7 @@
 pictures --report`:
 
     day, processor, gl_renderer, cores, width, height       of the run
+    cast_set                    instruction set of the rays of `cast` and `cast-blend`
     rows                        {renderer, gradient, volume, tool, cropped, partial, fps, cpu_ms}: volume as 256x256x161, tool
                                 voxels across, 0: none
     gradients                   {gradient, angle_deg, noisy_angle_deg, p99_deg, milled_angle_deg, milled_p99_deg}"""
@@ -114,7 +115,7 @@ def gradient_table(data):
 
 def machine(data):
     return (f"{data['day']}, {data['processor']}, {data['cores']} core(s) used, {data['width']}x{data['height']} pixels, "
-            f"gl: {data['gl_renderer']}.\n\n")
+            f"gl: {data['gl_renderer']}; cast: `{data['cast_set']}`.\n\n")
 
 
 def page(data):

@@ -78,7 +78,7 @@ def picture(renderer, tool, partial, wall_ms):
             "partial": partial, "fps": 1000 / wall_ms, "cpu_ms": 2 * wall_ms}
 
 
-PICTURES = {"day": "a day", "processor": "a processor", "gl_renderer": "a driver", "cores": 2, "width": 512, "height": 512,
+PICTURES = {"day": "a day", "processor": "a processor", "gl_renderer": "a driver", "cores": 2, "cast_set": "avx2", "width": 512, "height": 512,
             "rows": [picture("iso", 0, False, 50), picture("iso", 16, False, 40), picture("iso", 16, True, 4),
                      picture("cast", 0, False, 8)],
             "gradients": [{"gradient": "adaptive", "angle_deg": 0.5, "noisy_angle_deg": 1.25, "p99_deg": 1, "milled_angle_deg": 2,
@@ -138,7 +138,7 @@ PAGES = [
                                       "| bare | 2 | none | 1.50 | 30 | 0.50 | 0.010 | 0.00 | -0.100 |"], "loops"),
     (("energy", "tables"), ENERGY, [], ["## The time they take"], "loops"),
     (("pictures", "page"), PICTURES, [], ["| iso | 256x256x161 | 20.0 | - | 25.0 | - | 250 | 100 | 80.0 | 8.0 | GPU iso 6 / 6 |",
-                                          "| adaptive | 0.50 | 1.00 | 1.25 | 2.00 | 3.00 | 100 | 80.0 | 8.0 |", "gl: a driver"], "rows"),
+                                          "| adaptive | 0.50 | 1.00 | 1.25 | 2.00 | 3.00 | 100 | 80.0 | 8.0 |", "gl: a driver; cast: `avx2`."], "rows"),
     (("pictures", "tables"), PICTURES, [], ["| cast | 256x256x161 | 125 | - | - | - | - | 16.0 | - | - | - |"], "rows"),
     (("pictures", "summary"), PICTURES, [], ["| iso | 20.0 | 250 | 100 | 8.0 | 1/10.0 | GPU iso 6 / 6 |"], "rows"),
     (("contact", "page"), CONTACT, ["a.svg", "b.svg"],
@@ -179,6 +179,40 @@ class Report(unittest.TestCase):
             out = self.good(words, data, more, parts)
             for gap in ("  us", " at  ", "|NO", "nan", "None"):
                 self.assertNotIn(gap, out, words)
+
+    def test_rows_of_instruction_sets_that_a_machine_lacks_stay_with_their_origin(self):
+        def measured(day, *sets, us=2):
+            rows = [{**KERNEL, "isa": isa, "ns_p50": 1e3 * us} for isa in ("paper", *sets, "scalar")]
+            layout = [{**rows[1], "name": "contact/ball16/128x128x80"}]
+            queries = [{**row, "name": "contact/query"} for row in reversed(rows)]
+            return {"provenance": f"{day}, a machine.", "rows": rows, "queries": queries, "layout": layout}
+
+        def kernels(page):
+            return [line.split(" | ")[2:4] for line in page.splitlines() if line.startswith("| contact")]
+
+        with tempfile.TemporaryDirectory() as folder:
+            file = pathlib.Path(folder, "performance.md")
+
+            def regenerate(data):
+                part = run(["kernels", "page", str(file)], data)
+                file.write_text(f"<!-- begin kernels -->\n{part}<!-- end kernels -->\n\n| iso | 1 | 2 | 3 | 4 | 5 | 6 |\n", encoding="utf-8")
+                return part
+
+            whole = regenerate(measured("2026-01-01", "avx512", "avx2"))
+            self.assertEqual(whole, run(["kernels", "page"], measured("2026-01-01", "avx512", "avx2")))
+            for day in ("2026-02-02", "2026-03-03"):
+                part = regenerate(measured(day, "avx2", us=3))
+                self.assertIn(f"\n{day}, a machine.\n\nRows of `avx512` are of another machine: 2026-01-01, a machine.\n\n| tick", part)
+                times = {"paper": "3.00", "avx512": "2.00", "avx2": "3.00", "scalar": "3.00"}
+                order = [*times, *reversed(times)]
+                self.assertEqual(kernels(part)[:8], [[name, times[name]] for name in order])
+                self.assertEqual(sorted(kernels(part)[8:]), [["avx2", "3.00"], ["avx512", "2.00"]])
+            self.assertIn("Rows of `avx2` are of another machine: 2026-03-03, a machine.\n\n| tick", regenerate(measured("2026-04-04", "avx512")))
+            again = measured("2026-05-05", "avx512", "avx2", us=5)
+            self.assertNotIn("another machine", regenerate(again))
+            self.assertEqual([cells[1] for cells in kernels(file.read_text(encoding="utf-8"))], 9 * ["5.00"])
+            # A tick that is no longer measured goes, whatever its set.
+            self.assertNotIn("128x128x80", regenerate({**measured("2026-06-06", "avx2"), "layout": [{**KERNEL, "name": "copy"}]}))
 
     @unittest.skipUnless(CAN_PLOT, "no matplotlib")
     def test_a_plot_is_svg(self):

@@ -19,6 +19,7 @@
 #include "shared/text/json.hpp"
 #include "visualizer/app/run.hpp"
 #include "visualizer/bench/bench_tooth.hpp"
+#include "visualizer/cast/cast_kernels.hpp"
 #include "visualizer/gl/context.hpp"
 #include "visualizer/redraw/redraw_tiles.hpp"
 #include "visualizer/render/iso_renderer.hpp"
@@ -303,6 +304,7 @@ std::string picture_report(const PictureFigures& figures) {
                     {"gl_renderer", figures.gl_renderer},
                     {"processor", processor_name()},
                     {"cores", figures.cores},
+                    {"cast_set", cast_kernels()[0]->name},
                     {"width", figures.size.width},
                     {"height", figures.size.height},
                     {"rows", std::move(rows)},

@@ -8,6 +8,7 @@
 #include "tests/visualizer/gl/gl_fixture.hpp"
 #include "visualizer/bench/bench_tooth.hpp"
 #include "visualizer/bench/picture_bench.hpp"
+#include "visualizer/cast/cast_kernels.hpp"
 
 using namespace kerf;
 
@@ -73,6 +74,7 @@ TEST_CASE("the bench's report has a row for each kind of frame") {
                                .cores = 2};
   const auto report = test::read_json(picture_report(figures));
   CHECK(report["gl_renderer"] == "a driver");
+  CHECK(report["cast_set"] == cast_kernels()[0]->name);
   CHECK(report["rows"].size() == 3);
   CHECK(report["rows"][1]["volume"] == "256x256x161");
   CHECK(report["rows"][1]["gradient"] == "adaptive");
