@@ -103,6 +103,7 @@ bool drdIsInitialized(char id) {
 }
 int drdAutoInit(char id) {
   library().record.add("drdAutoInit");
+  if (library().behaviour.has("hang_init")) kerf::mock::hang();
   return check(id);
 }
 int drdStop(bool leaves_force, char id) {
@@ -164,6 +165,8 @@ int dhdSetVelocityThreshold(unsigned int threshold, char id) {
 #ifndef KERF_MOCK_LACKS_FORCE
 int dhdEnableForce(unsigned char on, char id) {
   library().record.add("dhdEnableForce %u", on);
+  if (on != 0 && library().behaviour.has("hang_start")) kerf::mock::hang();
+  if (on == 0 && library().behaviour.has("hang_stop")) kerf::mock::hang();
   if (check(id) != 0) return -1;
   library().force_enabled = on != 0;
   return 0;

@@ -336,6 +336,7 @@ void hdUpdateCalibration(std::uint32_t style) {
 void hdStartScheduler() {
   Library& hd = library();
   hd.record.add("hdStartScheduler");
+  if (hd.behaviour.has("hang_start")) kerf::mock::hang();
   if (hd.behaviour.has("start_error")) hd.fail(0x304);
   hd.tick_at_once();
   if (hd.behaviour.has("start_error")) return;
@@ -347,6 +348,7 @@ void hdStartScheduler() {
 void hdStopScheduler() {
   Library& hd = library();
   hd.record.add("hdStopScheduler");
+  if (hd.behaviour.has("hang_stop")) kerf::mock::hang();
   hd.running = false;
   if (hd.servo.joinable()) hd.servo.join();
 }

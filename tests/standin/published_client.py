@@ -42,6 +42,11 @@ class HdProgram:
         self.hd.hdGetDoublev(name, out)
         return list(out)
 
+    def scaled_gimbal(self, scale):
+        out = Sixteen()
+        self.hd.hdScaleGimbalAngles(ctypes.c_double(scale), ctypes.c_double(scale), ctypes.c_double(scale), out)
+        return list(out)
+
     def write(self, name, *values):
         self.hd.hdSetDoublev(name, (ctypes.c_double * len(values))(*values))
 
@@ -62,7 +67,7 @@ class HdProgram:
         self.frames.append(self.frame(lambda: {
             "position": self.read(0x2050), "velocity": self.read(0x2051), "turning": self.read(0x2053),
             "transform": self.read(0x2052, Sixteen), "joints": self.read(0x2100), "gimbal": self.read(0x2150),
-            "last_position": self.read(0x2250), "last_velocity": self.read(0x2251), "last_joints": self.read(0x2300)}
+            "scaled": self.scaled_gimbal(0.5), "last_position": self.read(0x2250), "last_velocity": self.read(0x2251), "last_joints": self.read(0x2300)}
             | self.act(tick)))
         self.frames[-1]["errors"] = self.errors()
         return 0 if tick + 1 >= TICKS else 1

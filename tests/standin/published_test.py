@@ -139,9 +139,11 @@ class Hd(Published):
     def test_the_transform_is_the_chain_of_the_wrist_at_the_position(self):
         for at in self.moving:
             frame = self.frames[at]
-            j, g, transform = frame["joints"], frame["gimbal"], frame["transform"]
-            chain = product(about("y", -j[0]), about("x", -j[2]), about("y", g[0]), about("x", -g[1]), about("z", -g[2]))
-            self.near(sum(rotation_of(transform), []), sum(chain, []), 1e-5)  # a quaternion of 16 bits
+            j, transform = frame["joints"], frame["transform"]
+            for scale, told in ((1, transform), (0.5, frame["scaled"])):  # as it is, and by hdScaleGimbalAngles
+                g = [scale * angle for angle in frame["gimbal"]]
+                chain = product(about("y", -j[0]), about("x", -j[2]), about("y", g[0]), about("x", -g[1]), about("z", -g[2]))
+                self.near(sum(rotation_of(told), []), sum(chain, []), 1e-5)  # a quaternion of 16 bits
             self.assertEqual([transform[3], transform[7], transform[11], transform[15]], [0, 0, 0, 1])
             self.assertEqual(transform[12:15], frame["position"])
 
