@@ -4,6 +4,7 @@
 #include <array>
 #include <charconv>
 #include <cstddef>
+#include <limits>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -25,13 +26,22 @@ class LoadError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Six digits, for computed values that are not written down again.
-[[nodiscard]] inline std::string short_text(double value) {
-  constexpr int kDigits = 6;
+/// Six digits or another number, for computed values that are not written down again.
+[[nodiscard]] inline std::string short_text(double value, int digits = 6) {
   std::array<char, 32> buffer{};
   const auto end = std::to_chars(buffer.data(), buffer.data() + buffer.size(), value,
-                                 std::chars_format::general, kDigits);
+                                 std::chars_format::general, digits);
   return {buffer.data(), end.ptr};
+}
+
+/// A value that is refused because of `limit`: six digits, or as many as make the two differ.
+[[nodiscard]] inline std::string text_beside(double value, double limit) {
+  int digits = 6;
+  while (digits < std::numeric_limits<double>::max_digits10 && value != limit &&
+         short_text(value, digits) == short_text(limit, digits)) {
+    ++digits;
+  }
+  return short_text(value, digits);
 }
 
 /// `0.0001 to 100000`: without exponents.

@@ -29,9 +29,9 @@ namespace {
 
 void check_side(const ToolSpec& spec, double side_vox, const char* side, const char* way_out) {
   if (side_vox <= kMaxToolSide) return;
-  refuse(spec.size_place, " makes a tool of " + short_text(side_vox) + " samples along " + side +
-                              ", above the limit of " + std::to_string(kMaxToolSide) + "; " +
-                              way_out);
+  refuse(spec.size_place, " makes a tool of " + text_beside(side_vox, kMaxToolSide) +
+                              " samples along " + side + ", above the limit of " +
+                              std::to_string(kMaxToolSide) + "; " + way_out);
 }
 
 /// The spindle turns about x = z = 0.
@@ -53,7 +53,8 @@ SceneTool load_shape(const ToolSpec& spec, const ToolSize& size, double voxel_mm
                                 "); use a larger radius or a finer volume");
   }
   if (size.size_vox && *size.size_vox * size.pitch_mm < voxel_mm * (1 - 1e-9)) {
-    refuse(spec.size_place, " makes a tool of " + short_text(*size.size_vox * size.pitch_mm) +
+    refuse(spec.size_place, " makes a tool of " +
+                                text_beside(*size.size_vox * size.pitch_mm, voxel_mm) +
                                 " mm, below a voxel (" + short_text(voxel_mm) +
                                 "); use a larger one or a larger pitch_mm");
   }
@@ -145,7 +146,7 @@ SceneTool load_tool(const ToolSpec& spec, const SolidExtent& touched, const Mesh
   tool.shaft = tool_shaft(spec.shaft, tool.length_mm);
   const double side_mm = std::max(2 * tool.radius_mm, tool.length_mm);
   if (side_mm > touched.side_mm) {
-    refuse(spec.size_place, " makes a tool of " + short_text(side_mm) + " mm" +
+    refuse(spec.size_place, " makes a tool of " + text_beside(side_mm, touched.side_mm) + " mm" +
                                 (tool.length_mm > 2 * tool.radius_mm ? " (its length)" : "") +
                                 ", larger than the volume (" + short_text(touched.side_mm) +
                                 " mm); use a smaller " +
@@ -350,8 +351,8 @@ void fit_to_volume(double written_mm, Scene& spec, LoadedScene& scene) {
   }
   if (scale > kMaxWorkspaceScale) {
     refuse(scene.volume_specs.front().where,
-           ": the box needs a workspace scale of " + short_text(scale) + ", above the limit of " +
-               number_text(kMaxWorkspaceScale) + "; check its spacing");
+           ": the box needs a workspace scale of " + text_beside(scale, kMaxWorkspaceScale) +
+               ", above the limit of " + number_text(kMaxWorkspaceScale) + "; check its spacing");
   }
   scene.device.workspace_scale = scale;
   fit_cutting(grown, scale, scene);

@@ -195,7 +195,7 @@ void check_place(const VolumeSpec& spec, const SceneVolume& volume) {
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const double reach_mm = std::max(-box.lo_mm[axis], box.hi_mm[axis]);
     if (reach_mm <= kLargestWorldMm) continue;  // not so for NaN
-    refuse(spec.where, ": the volume reaches " + short_text(reach_mm) +
+    refuse(spec.where, ": the volume reaches " + text_beside(reach_mm, kLargestWorldMm) +
                            " mm from the origin; keep it within " + number_text(kLargestWorldMm) +
                            ", check position_mm and spacing_mm");
   }

@@ -148,7 +148,7 @@ void make_unit(const SceneTable& table, std::array<double, 4>& q) {
   const double length = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
   if (std::abs(length - 1) > kTolerance) {
     refuse(table.place("pose.orientation"),
-           " has length " + short_text(length) + "; write a unit quaternion [x, y, z, w]");
+           " has length " + text_beside(length, 1) + "; write a unit quaternion [x, y, z, w]");
   }
   for (double& component : q) component /= length;
 }

@@ -210,6 +210,46 @@ TEST_CASE("several times in one file are several volumes, of which one is chosen
   CHECK(has(refusal_of(folder, enhanced(between)), "2 DICOM series"));
 }
 
+TEST_CASE("stacks of one file that form one regular grid are one volume, others are named so") {
+  const TemporaryFolder folder;
+  const auto stacked = [](const std::vector<int>& stack_of_slice) {
+    std::vector<Frame> frames;
+    for (std::size_t k = 0; k < stack_of_slice.size(); ++k) {
+      frames.push_back(frame(static_cast<int>(k)));
+      frames.back().stack = std::to_string(stack_of_slice[k]);
+    }
+    std::ranges::stable_sort(frames, {}, &Frame::stack);
+    return frames;
+  };
+  const std::vector<float> five = counting<float>();
+  for (const std::vector<int>& stacks :
+       {std::vector{1, 2, 1, 2, 1}, std::vector{1, 1, 1, 2, 2}, std::vector{2, 1, 1, 2, 1}}) {
+    const SourceVolume v = read(folder, enhanced(stacked(stacks)));
+    CHECK(v.spacing_mm == std::array<double, 3>{0.25, 0.5, 2});
+    CHECK(same_values(v, five));
+    CHECK(has(v.note, "joined of 2 stacks (StackID), whose slices form one regular grid"));
+  }
+  // Each regular, but not together: a slice is missing, or the second lies 0.5 mm too high.
+  std::vector<Frame> gap = stacked({1, 2, 1, 2, 1, 2, 1, 2}), high = gap;
+  gap.erase(gap.begin() + 3);
+  for (std::size_t i = 4; i < 8; ++i) high[i].z = std::to_string(102.5 + 4 * double(i - 4));
+  for (const auto& frames : {gap, high}) {
+    CHECK(has(refusal_of(folder, enhanced(frames)),
+              "; the stacks of a series form no regular grid together"));
+  }
+  CHECK(read(folder, enhanced(high), "StackID 2").values[0] == 12);
+  // Two times of two stacks: two volumes, not four.
+  std::vector<Frame> twice;
+  for (const std::uint32_t time : {1U, 2U}) {
+    for (Frame each : stacked({1, 2, 1, 2, 1})) {
+      each.time = time;
+      twice.push_back(each);
+    }
+  }
+  CHECK(has(refusal_of(folder, enhanced(twice)), "2 DICOM series; choose one"));
+  CHECK(same_values(read(folder, enhanced(twice), "2"), five));
+}
+
 TEST_CASE("frames of several files are one volume, or one in each file") {
   const TemporaryFolder parts, copies;
   parts.write("a.dcm", dicom(enhanced({frame(4), frame(0)})));

@@ -192,14 +192,43 @@ TEST_CASE("a NIfTI's qfac of -1 mirrors, 0 does not, and a broken qform is refus
   check_numbered(read(with({})), plain(1));
   check_numbered(read(with({{kQfac, f32({0})}})), plain(1));
   check_numbered(read(with({{kQfac, f32({-1})}})), plain(-1));
-  // Of float32, a little longer than 1.
-  check_numbered(read(with({{kQuatern, f32({0, 0, 1.0000001F})}})), along_lps);
+  // Of float32, longer than 1 by what its computation can reach: squares of 1.0000005 and 1.000001,
+  // and not that of 1.0000014.
+  constexpr float kEpsilon = std::numeric_limits<float>::epsilon();
+  for (const float z : {1 + kEpsilon, 1 + 4 * kEpsilon}) {
+    const SourceVolume v = read(with({{kQuatern, f32({0, 0, z})}}));
+    check_numbered(v, along_lps);
+    CHECK(has(v.note, "its quaternion, longer than 1 by rounding (b^2 + c^2 + d^2 = 1.00000"));
+    CHECK(has(v.note, "), is scaled to 1"));
+  }
+  CHECK(has(refusal_of(with({{kQuatern, f32({0, 0, 1 + 6 * kEpsilon})}})),
+            "its quaternion (0, 0, 1) has b^2 + c^2 + d^2 = 1.000001"));
   CHECK(has(refusal_of(with({{kQfac, f32({-2})}})), "pixdim[0] = -2 is neither 1 nor -1"));
-  CHECK(
-      has(refusal_of(with({{kQuatern, f32({1, 1, 0})}})), "quaternion (1, 1, 0) is longer than 1"));
+  CHECK(has(refusal_of(with({{kQuatern, f32({1, 1, 0})}})),
+            "quaternion (1, 1, 0) has b^2 + c^2 + d^2 = 2"));
   CHECK(has(refusal_of(with({{kPixdim, f32({-1})}})), "pixdim[1] = -1 is no spacing"));
   CHECK(has(refusal_of(with({{kQform, i16(9)}})), "qform_code = 9 is none of NIfTI"));
   CHECK(has(refusal_of(with({{kPixdim, f32({0})}})), "spacing along x is not in the file"));
+}
+
+TEST_CASE("a form of a NIfTI that is not used is not judged") {
+  const auto beside_sform = [](const Patch& broken) {
+    return file({{kSform, i16(1)}, {kQform, i16(1)}, broken});
+  };
+  for (const Patch& broken :
+       {Patch{kQuatern, f32({0, 0, 1.000001F})}, Patch{kQuatern, f32({1, 1, 0})},
+        Patch{kQuatern, f32({NAN, 0, 0})}, Patch{kQfac, f32({-2})}, Patch{kQform, i16(9)}}) {
+    check_numbered(read(beside_sform(broken)), along_lps);
+  }
+  // Nor an sform and a quaternion without their codes.
+  check_numbered(read(file({{kQform, i16(1)},
+                            {kQuatern, f32({0, 0, 1})},
+                            {kSform, i16(0)},
+                            {kSrow, f32({NAN, 0, 0, 0})}})),
+                 along_lps);
+  CHECK(read(file({{kSform, i16(0)}, {kQuatern, f32({1, 1, 1})}})).grid == kSmall);
+  // A code that is none of NIfTI leaves open what counts.
+  CHECK(has(refusal_of(file({{kSform, i16(9)}})), "sform_code = 9 is none of NIfTI"));
 }
 
 TEST_CASE("a NIfTI whose sform differs from pixdim has the sform's spacing, and says so") {
@@ -207,6 +236,8 @@ TEST_CASE("a NIfTI whose sform differs from pixdim has the sform's spacing, and 
   check_numbered(v, along_lps);
   CHECK(v.note == "its sform has a spacing of 1 2 3 mm and counts, its pixdim has 1 1 1 mm");
   CHECK(read(file({{kPixdim, f32({1, 2.0000002F, 3})}})).note.empty());
+  CHECK(read(file({{kPixdim, f32({1, 2.000004F, 3})}})).note ==
+        "its sform has a spacing of 1 2 3 mm and counts, its pixdim has 1 2.000004 3 mm");
   CHECK(has(refusal_of(file({{kSrow, f32({0})}})), "its sform has an axis without length"));
   CHECK(has(refusal_of(file({{kSrow, f32({NAN})}})), "its sform has an axis without length"));
   CHECK(has(refusal_of(file({{kSrow + 4, f32({0.5F})}})), "not at right angles"));

@@ -54,6 +54,9 @@ struct DicomFrame {
   std::vector<std::pair<std::string, std::string>> marks;
 };
 
+/// The mark of frames that belong together in space.
+inline constexpr const char* kStackMark = "StackID";
+
 /// How the values of all frames of a file are stored.
 struct StoredPixels {
   std::int64_t columns = 0, rows = 0;

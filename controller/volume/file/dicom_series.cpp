@@ -62,11 +62,11 @@ constexpr std::string_view kSureMarks[] = {"PatientID",
                                            "FrameOfReferenceUID",
                                            "TemporalPositionIndex",
                                            "TemporalPositionIdentifier",
-                                           "StackID",
                                            "EchoNumbers",
                                            "EffectiveEchoTime",
                                            "ReferencedSegmentNumber",
-                                           "DiffusionBValue"};
+                                           "DiffusionBValue",
+                                           kStackMark};
 
 bool overlap(const std::vector<Stack>& parts) {
   for (const Stack& a : parts) {
@@ -81,7 +81,8 @@ bool overlap(const std::vector<Stack>& parts) {
 }
 
 /// A series that holds several volumes, such as times or echoes, as these: by the first marks that
-/// leave one slice at each position. As one, if there are none such.
+/// leave one slice at each position. As one, if there are none such. Stacks are parts of space
+/// (PS3.3 C.7.6.16.2.2), not other acquisitions: they stay one volume if they form a regular grid.
 std::vector<Stack> split(const Stack& whole, int marks_left = 3) {
   const bool twice = doubled(whole) != 0;
   for (const auto& [mark, text] : whole.slices.front().frame->marks) {
@@ -91,6 +92,7 @@ std::vector<Stack> split(const Stack& whole, int marks_left = 3) {
     const bool stacks =
         std::ranges::all_of(parts, [](const Stack& part) { return part.slices.size() > 1; });
     if (parts.size() < 2 || !stacks || (!twice && !overlap(parts))) continue;
+    if (mark == kStackMark && !twice && is_regular(whole)) continue;
     std::vector<Stack> all;
     bool clean = true;
     for (const Stack& part : parts) {
@@ -180,6 +182,10 @@ std::size_t chosen_stack(const fs::path& path, const std::vector<Stack>& all,
   }
   if (named == 0) throw LoadError(found + " of one slice each; name a folder of a whole series");
   if (left > 0) list += ", and " + std::to_string(left) + " others";
+  if (std::ranges::any_of(
+          fit, [&](std::size_t i) { return all[i].part.find(kStackMark) != std::string::npos; })) {
+    list += "; the stacks of a series form no regular grid together";
+  }
   throw LoadError(
       found + (wanted.empty() ? "" : ", and --series " + one_line(wanted) + " is not one of them") +
       "; choose one with ./kerf volume import --series:" + list);
@@ -261,6 +267,15 @@ void note_mixed(const Stack& stack, Note& note) {
   }
 }
 
+/// Names stacks (PS3.3 C.7.6.16.2.2) that were joined to one grid.
+void note_joined(const Stack& stack, Note& note) {
+  std::set<std::string> stacks;
+  for (const DicomSlice& slice : stack.slices) stacks.insert(mark_of(slice, kStackMark));
+  if (stacks.size() < 2) return;
+  note.add("joined of " + std::to_string(stacks.size()) + " stacks (" + kStackMark +
+           "), whose slices form one regular grid");
+}
+
 UntrustedHeader whole_claim_of(const fs::path& path, const std::vector<Stack>& all,
                                const Stack& stack, Note& note) {
   try {
@@ -325,6 +340,7 @@ void read_dicom(const fs::path& path, const std::vector<fs::path>& files, const 
   }
   check_one_body(stack);
   note_mixed(stack, note);
+  note_joined(stack, note);
   UntrustedHeader claim = whole_claim_of(path, all, stack, note);
   const DicomValues values = values_of(stack.slices);
   for (const DicomSlice& slice : stack.slices) {

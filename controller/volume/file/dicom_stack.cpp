@@ -359,4 +359,14 @@ UntrustedHeader claim_of(const fs::path& path, const Stack& stack, Note& note) {
   return claim;
 }
 
+bool is_regular(const Stack& stack) {
+  try {
+    Note unused;
+    static_cast<void>(claim_of({}, stack, unused));
+    return true;
+  } catch (const LoadError&) {
+    return false;
+  }
+}
+
 }  // namespace kerf::volume

@@ -56,6 +56,9 @@ class Note {
   std::vector<std::string> sentences_;
 };
 
+/// Whether the slices, of which none may be at the position of another, are one regular grid.
+[[nodiscard]] bool is_regular(const Stack& stack);
+
 /// The frame of the volume; `path` begins messages. Throws LoadError for what is not one even
 /// stack.
 [[nodiscard]] UntrustedHeader claim_of(const std::filesystem::path& path, const Stack& stack,

@@ -192,20 +192,35 @@ Three spacings_of(const fs::path& path, const Nifti& h) {
   return edges;
 }
 
-/// Method 2 of nifti1.h.
+/// By how much b^2 + c^2 + d^2 is above 1; the rotation's cosine a would be a root of a negative.
+double quaternion_excess(const Nifti& h) {
+  const auto [b, c, d] = h.quatern;
+  return b * b + c * c + d * d - 1;
+}
+
+/// The largest excess that rounding makes if a program computes the quaternion in float32 from the
+/// entries r of a rotation matrix, as nifti1.h does in double: s = 1 + r11 - (r22 + r33),
+/// b = sqrt(s) / 2, c = (r12 + r21) / (4 b), d = (r13 + r31) / (4 b), with b the largest. Let
+/// u = 2^-24. The error of s is 3 u from its entries and 8 u from its sums, that of b is
+/// e = 11 u / (8 b) + u, that of c is u / b + e c / b + u. So the sum of squares has the error
+/// 2 (e / b + (c + d) (u / b + u)), at most 18.1 u at b = c = d = 1 / sqrt(3); rounded up to 20 u.
+constexpr double kQuaternionRounding = 10 * std::numeric_limits<float>::epsilon();
+
+/// Method 2 of nifti1.h. A quaternion that rounding has made too long is scaled to length 1.
 Placing qform_of(const fs::path& path, const Nifti& h) {
   const auto [b, c, d] = h.quatern;
-  // As nibabel has it: three steps of the float32 that the header has.
-  constexpr double kRounding = 3 * std::numeric_limits<float>::epsilon();
-  const double rest = 1 - (b * b + c * c + d * d), qfac = h.pixdim[0];
-  if (!(rest >= -kRounding)) {
+  const double excess = quaternion_excess(h), qfac = h.pixdim[0];
+  if (!(excess <= kQuaternionRounding)) {
     refuse_header(path, "its quaternion (" + short_text(b) + ", " + short_text(c) + ", " +
-                            short_text(d) + ") is longer than 1");
+                            short_text(d) +
+                            ") has b^2 + c^2 + d^2 = " + text_beside(1 + excess, 1) +
+                            ", and rounding reaches " + text_beside(1 + kQuaternionRounding, 1));
   }
   if (!(qfac >= 0) && qfac != -1) {
     refuse_header(path, "pixdim[0] = " + short_text(qfac) + " is neither 1 nor -1");
   }
-  const double a = std::sqrt(std::max(rest, 0.0)), scale = 1 / std::sqrt(1 - std::min(rest, 0.0));
+  const double a = std::sqrt(std::max(-excess, 0.0));
+  const double scale = 1 / std::sqrt(1 + std::max(excess, 0.0));
   const Matrix3 turn = rotation_of({scale * b, scale * c, scale * d, scale * a});
   Three edges = spacings_of(path, h);
   if (qfac < 0) edges[2] = -edges[2];
@@ -241,8 +256,10 @@ double apart(const Nifti& h, const Placing& a, const Placing& b) {
   return most;
 }
 
-std::string mm_text(const Three& mm) {
-  return short_text(mm[0]) + " " + short_text(mm[1]) + " " + short_text(mm[2]) + " mm";
+/// With as many digits as make the two differ.
+std::string mm_text(const Three& mm, const Three& beside) {
+  return text_beside(mm[0], beside[0]) + " " + text_beside(mm[1], beside[1]) + " " +
+         text_beside(mm[2], beside[2]) + " mm";
 }
 
 double mm_of_unit(const fs::path& path, const Nifti& h, UntrustedHeader& claim) {
@@ -261,15 +278,28 @@ double mm_of_unit(const fs::path& path, const Nifti& h, UntrustedHeader& claim) 
   }
 }
 
+/// Notes a qform that puts voxels elsewhere than the sform, which counts. One that is broken is not
+/// used, so it is no fault of the file.
+void note_other_place(const fs::path& path, const Nifti& h, const Placing& sform, double unit,
+                      UntrustedHeader& claim) {
+  try {
+    const double mm = unit * apart(h, sform, qform_of(path, h));
+    const double edge = *std::ranges::min_element(claim.spacing_mm);
+    if (mm <= edge / 2) return;  // each voxel is nearest to its own in the other
+    add_note(claim, "its sform counts, which is up to " + short_text(mm) + " mm from its qform");
+  } catch (const LoadError&) {
+  }
+}
+
 /// Sets spacing, origin and axes of the claim, and notes which of the header's ways they follow.
 void place(const fs::path& path, const Nifti& h, UntrustedHeader& claim) {
-  for (const auto& [name, code] :
-       {std::pair{"qform_code", h.qform_code}, std::pair{"sform_code", h.sform_code}}) {
-    if (code >= 0 && code <= NIFTI_XFORM_TEMPLATE_OTHER) continue;
+  const auto is_used = [&](const char* name, std::int64_t code) {
+    if (code >= 0 && code <= NIFTI_XFORM_TEMPLATE_OTHER) return code > 0;
     refuse_header(path, std::string(name) + " = " + std::to_string(code) + " is none of NIfTI");
-  }
+  };
   const double unit = mm_of_unit(path, h, claim);
-  const bool sform = h.sform_code > 0, qform = h.qform_code > 0;
+  const bool sform = is_used("sform_code", h.sform_code);
+  const bool qform = !sform && is_used("qform_code", h.qform_code);  // else nothing is read of it
   const Placing at = sform ? sform_of(path, h) : qform ? qform_of(path, h) : pixdim_of(path, h);
   Three header_mm{};
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -289,16 +319,15 @@ void place(const fs::path& path, const Nifti& h, UntrustedHeader& claim) {
     return header_mm[axis] != 0 && !(std::abs(std::abs(header_mm[axis]) - mm) <= kRounding * mm);
   });
   if (sform && contradicts) {
-    add_note(claim, "its sform has a spacing of " + mm_text(claim.spacing_mm) +
-                        " and counts, its pixdim has " + mm_text(header_mm));
+    add_note(claim, "its sform has a spacing of " + mm_text(claim.spacing_mm, header_mm) +
+                        " and counts, its pixdim has " + mm_text(header_mm, claim.spacing_mm));
   }
-  if (sform && qform) {
-    const double mm = unit * apart(h, at, qform_of(path, h));
-    const double edge = *std::ranges::min_element(claim.spacing_mm);
-    if (!(mm <= edge / 2)) {  // else each voxel is nearest to its own in the other
-      add_note(claim, "its sform counts, which is up to " + short_text(mm) + " mm from its qform");
-    }
+  constexpr double kStored = std::numeric_limits<float>::epsilon();  // of b, c and d themselves
+  if (const double excess = quaternion_excess(h); qform && excess > kStored) {
+    add_note(claim, "its quaternion, longer than 1 by rounding (b^2 + c^2 + d^2 = " +
+                        text_beside(1 + excess, 1) + "), is scaled to 1");
   }
+  if (sform && h.qform_code > 0) note_other_place(path, h, at, unit, claim);
 }
 
 /// The other file of a pair, packed if only that is there. `end`: .hdr or .img.

@@ -76,6 +76,12 @@ TEST_CASE("each numbered file of the import cases is right, or refused by name")
                          v.origin_mm = {-1, -2, 3};
                        }},
                       {"n1b_slope_zero.nii", ""},
+                      {"t4/sform_beside_long_quaternion.nii", ""},
+                      {"t4/quaternion_long.nii", "",
+                       [](Numbered& v) {
+                         v.origin_mm = {1, 2, 3};
+                       }},
+                      {"t4/three_stacks.dcm", ""},
                       {"t10_reduced_first.tif", "", nullptr, true},
                       {"t11_reduced_first.tif", "",
                        [](Numbered& v) {
