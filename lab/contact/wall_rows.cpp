@@ -110,7 +110,6 @@ void measure_walls(const Effort& effort, const RowSink& add_row) {
 }
 
 void measure_air(const Effort& effort, const RowSink& add_row) {
-  constexpr double kNPerMm = 0.4;
   struct Flight {
     double rate_hz, voxel_mm, m_per_s, gap_mm;
   };
@@ -125,7 +124,8 @@ void measure_air(const Effort& effort, const RowSink& add_row) {
                            {250, 0.05, 1, 0.5},
                            {1000, 0.02, 1, 0.25},
                            {1000, 0.1, 1, 0.14},
-                           {8000, 0.02, 1, 0.03}}) {
+                           {8000, 0.02, 1, 0.03},
+                           {1000, 0.25, 0.6, 0.25}}) {
     for (const Subject& tool :
          {Subject{"ball", "ball", 0.4, 0.8, 0}, Subject{"cylinder", "cylinder", 0.4, 0.8, 0},
           Subject{"turning cylinder", "cylinder", 0.4, 0.8, 30},
@@ -136,18 +136,13 @@ void measure_air(const Effort& effort, const RowSink& add_row) {
                                         .radius_mm = tool.radius_mm / at.voxel_mm,
                                         .length_mm = length}));
       const AirFlight flight{1000 * at.m_per_s / at.rate_hz / at.voxel_mm, at.gap_mm / at.voxel_mm,
-                             tool.turn_rad_per_s / at.rate_hz};
+                             tool.turn_rad_per_s / at.rate_hz, at.voxel_mm, 1 / at.rate_hz};
       Flown flown;
       for (const AirWall& wall : walls) fly<FixedNumbers>(made, wall, flight, 100, random, flown);
       char name[128];
       std::snprintf(name, sizeof name, "%s, %g Hz, voxels of %g mm, %g m/s, %g mm beside a wall",
                     tool.name, at.rate_hz, at.voxel_mm, at.m_per_s, at.gap_mm);
-      add_row({"air",
-               std::string(name) + ": force",
-               flown.longest_spring * at.voxel_mm * kNPerMm,
-               "N",
-               0,
-               {}});
+      add_row({"air", std::string(name) + ": force", flown.force_n, "N", 0, {}});
     }
   }
 }

@@ -56,9 +56,10 @@ also rotated at random. There is no supervisor. If a tick has no query left for 
 by its samples (`kWedged` of the sweep). A mesh stands out a little between its samples, so in a few of a million ticks a
 bur can sink deeper than 0.05 voxels."""),
     ("air", "In air", """\
-A tool moves to and fro along tilted walls, so near and so fast that the hand moves 5 to 80 voxels in a
-tick. `--check` prints the speed up to which a scene is free of drag at any distance (docs/theory.md 4.2). The sweep tries
-no displacement below 0.004 voxels, so a spring of at most this length can stay: 0.03 mN at 0.02 mm and 0.4 N/mm."""),
+A tool moves to and fro along tilted walls, so near and so fast that the hand moves 2.4 to 80 voxels in a
+tick. `--check` prints the speed up to which a scene is free of drag at any distance (docs/theory.md 4.2). The force is that of
+the coupling with 0.4 N/mm and the hand's velocity, the larger one of no damping and of 1 N s/mm, the ends of what a scene may have: a
+spring of a thousandth of a voxel that is left in air would be newtons."""),
     ("rests", "Where a ball comes to rest", """\
 Offsets from the ideal solid at random tilts. On edges from the volume's own iso-surface, since trilinear density
 has no sharp edge."""),

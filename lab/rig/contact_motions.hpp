@@ -7,6 +7,8 @@
 #include <functional>
 #include <vector>
 
+#include "controller/law/virtual_coupling.hpp"
+#include "controller/scene/scene.hpp"
 #include "lab/rig/contact_rig.hpp"
 #include "lab/rig/geometry.hpp"
 
@@ -31,14 +33,32 @@ struct AirFlight {
   double units_per_tick = 1;  ///< a long tick makes a path that leaves the volume
   double gap_units = 1;       ///< from the wall's iso-surface
   double turn_rad = 0;        ///< in each tick, about any axis; the gap is then the whole sphere's
+  double unit_mm = 0.1, period_s = 0.001;  ///< of the force alone
 };
 
 /// The largest contact there: none, if all is well.
 struct Flown {
   int ticks = 0;
   double longest_spring = 0;  ///< units
+  /// Of the coupling with 0.4 N/mm, without damping and with the most that a scene may have.
+  double force_n = 0;
   int most_queries = 0;
 };
+
+/// Adds what the coupling makes of a spring, from the hand to the proxy, and a motion of the hand.
+template <class N>
+void add_air_force(const AirFlight& flight, Point spring, Point moved, Flown& flown) {
+  const auto at_device = [](Point p, double scale) {
+    using Real = typename N::Real;
+    return DeviceVec<typename N::Real>{Real(p[0] * scale), Real(p[1] * scale), Real(p[2] * scale)};
+  };
+  for (const double damping : {0.0, kMaxDampingNsPerMm}) {
+    const VirtualCoupling<N> coupling{typename N::Ratio(0.4), typename N::Unit(damping)};
+    const auto force = virtual_coupling_force(coupling, at_device(spring, flight.unit_mm),
+                                              at_device(moved, flight.unit_mm / flight.period_s));
+    flown.force_n = std::max(flown.force_n, double(norm(force)));
+  }
+}
 
 template <class N>
 void fly(const SampledTool& tool, const AirWall& wall, const AirFlight& flight, int ticks,
@@ -64,16 +84,20 @@ void fly(const SampledTool& tool, const AirWall& wall, const AirFlight& flight, 
   for (int i = 0; i < 20; ++i)
     static_cast<void>(guided.tick(far, orientation));  // it takes time to turn
   guided.start(wall.frame.at(at, height, 0));
+  Point last = wall.frame.at(at, height, 0);
   for (int i = 0; i <= ticks; ++i) {
     const Point hand = wall.frame.at(at, height, 0);
     // The hand, as the numbers of the sweep have it.
     const Point hand_felt = point_of<N>(place_of<N>(hand));
     static_cast<void>(guided.tick(hand, orientation));
+    const Point spring = guided.proxy() - hand_felt;
     if (i > 0) {
       ++flown.ticks;
-      flown.longest_spring = std::max(flown.longest_spring, length(guided.proxy() - hand_felt));
+      add_air_force<N>(flight, spring, hand - last, flown);
+      flown.longest_spring = std::max(flown.longest_spring, length(spring));
       flown.most_queries = std::max(flown.most_queries, guided.swept().queries);
     }
+    last = hand;
     if (std::abs(at + way) > half) way = -way;
     at += way;
     if (flight.turn_rad > 0)

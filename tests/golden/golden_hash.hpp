@@ -76,7 +76,7 @@ struct GoldenEnd {
     case GoldenScene::sweep:
       break;
   }
-  return fixed ? GoldenEnd{0x40185c8f4b6a4662, 0x42b4f24ec554b65d} : GoldenEnd{};
+  return fixed ? GoldenEnd{0x2fdc5a1b388ea9eb, 0x42b4f24ec554b65d} : GoldenEnd{};
 }
 
 }  // namespace kerf::test

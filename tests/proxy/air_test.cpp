@@ -95,3 +95,24 @@ TEST_CASE_TEMPLATE("the speed that a scene is told to be free of drag up to is s
     }
   }
 }
+
+TEST_CASE_TEMPLATE(
+    "in air the damper has nothing to multiply, whatever the wrist does over a plane", N,
+    FixedNumbers, DoubleNumbers) {
+  // Voxels of 0.25 mm, 600 mm/s, 1 kHz.
+  const auto walls = tilted_walls();
+  for (const SceneTool& made : kTools) {
+    const SampledTool tool(made);
+    CAPTURE(made.name);
+    CAPTURE(made.radius_mm);
+    for (const double turn_rad : {0.0, 0.01, 0.03, 0.1}) {
+      for (const double gap : {0.3, 1.0, 2.0, 4.0, 8.0}) {
+        CAPTURE(turn_rad);
+        CAPTURE(gap);
+        const Flown flown = flown_at<N>(tool, walls, {2.4, gap, turn_rad, 0.25, 0.001}, cases(200));
+        CHECK(flown.longest_spring == 0);
+        CHECK(flown.force_n == 0);
+      }
+    }
+  }
+}

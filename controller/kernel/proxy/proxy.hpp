@@ -185,7 +185,7 @@ constexpr void add_loads(const SweepResult<N>& swept, typename N::Unit friction,
   ContactVec<Real> pressed{}, on_shaft{}, lever{}, head_lever{};
   Real whole(0), shaft_load(0);
   for (std::size_t i = 0; i < swept.planes.count; ++i) whole = whole + swept.slide.load[i];
-  const bool loaded = whole >= Real(1e-3);
+  const bool loaded = whole >= Real(SweepRules::kLeastLoad);
   if (!loaded && moving) return;
   if (!loaded && swept.planes.count > 0) lever = head_lever = swept.planes.plane[0].lever;
   if (loaded) contact.planes = swept.planes;

@@ -40,6 +40,8 @@ struct SweepRules {
   /// stops between plates (rows `traps`, --seed 15590).
   static constexpr double kTurnTolerance = 0.005;
   static constexpr double kArrived = 0.004;  ///< shorter displacements are not tried
+  /// A smaller load of all planes together bears nothing: the tool is at its goal then.
+  static constexpr double kLeastLoad = 0.001;
   /// Longest displacement of any sample between two queries. The middle of the thinnest wall, 2
   /// units, is one unit deep: beyond it density falls again, and its gradient leads onward.
   static constexpr double kStep = 0.875;
@@ -174,6 +176,13 @@ class ProxySweep {
     return !contacts.no_normal && contacts.depth <= std::max(tolerance, here_.depth);
   }
 
+  /// Whether planes hold the tool back: their loads together reach kLeastLoad.
+  [[nodiscard]] static constexpr bool bears(const ConstrainedMove<N>& slide) noexcept {
+    Real whole(0);
+    for (const Real load : slide.load) whole = whole + load;
+    return whole >= Real(SweepRules::kLeastLoad);
+  }
+
   /// The next displacement from a position.
   struct Route {
     ConstrainedMove<N> slide;  ///< under the planes alone
@@ -287,6 +296,11 @@ class ProxySweep {
   /// the displacement that is left under all known planes shrinks to kResidual of it, or the goal
   /// comes nearer. With the distance to the goal alone, the proxy would stick in creases and cycle
   /// in grooves. Returns the constrained move of the last position.
+  ///
+  /// A displacement below kArrived that no plane opposes ends on the goal, without a query: it is
+  /// at most kLeastLoad deep in the known planes, and less than kTolerance in any other. What were
+  /// left of it would be a spring in air, which the coupling's damper multiplies by the hand's
+  /// speed.
   constexpr ConstrainedMove<N> move_to(Position goal) noexcept {
     Unit shrink = first_step();
     Route onward = eased_route(held_by_, goal - pose_.centre);
@@ -329,6 +343,7 @@ class ProxySweep {
         if (shrink < Unit(SweepRules::kShortest)) break;
       }
     }
+    if (!here_.no_normal && onward.length < enough && !bears(onward.slide)) pose_.centre = goal;
     memory_.curvature.forget_noise();
     const bool vain = !kept_ && onward.length >= enough && !field_.may_query();
     memory_.stuck_ticks = vain ? memory_.stuck_ticks + 1 : 0;
