@@ -24,7 +24,10 @@ if [[ ! -e $root/CMakeLists.txt ]]; then
   me=kerf
   bin=${KERF_BIN:-$(readlink -m "$root/../../bin")}
 fi
-built() { [[ -x $bin/kerf-controller ]]; }
+# shellcheck source=cli/build_folder.sh
+source "$root/cli/build_folder.sh"
+# Programs of this clone: those that came with a copy of another one are built anew.
+built() { [[ -x $bin/kerf-controller ]] && { [[ $me == kerf || -n ${KERF_BIN:-} ]] || ! made_for "$root" "${bin%/bin}" >/dev/null; }; }
 
 # shellcheck source=/dev/null
 system=$(. /etc/os-release 2>/dev/null && echo "${ID:-} ${VERSION_ID:-}" && echo "${PRETTY_NAME:-${ID:-}}") || true
@@ -109,7 +112,12 @@ done
 if [[ $me != kerf && -z ${KERF_BIN:-} ]]; then
   for folder in "$root/build" "$root"; do  # the first one that is there
     [[ -e $folder ]] || continue
-    if [[ ! -w $folder ]]; then row fail "${folder##*/}" "$folder: cannot be written" "give $(id -un) the rights, or make a clone of your own"; fi
+    if [[ -w $folder ]]; then break; fi
+    if built; then
+      row warn "${folder##*/}" "$folder: cannot be written" 'what is built runs, as long as it is up to date'
+    else
+      row fail "${folder##*/}" "$folder: cannot be written" "give $(id -un) the rights, or make a copy of your own"
+    fi
     break
   done
 fi

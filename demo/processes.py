@@ -2,6 +2,7 @@
 """The programs of a demo as processes: started, watched, ended."""
 import os
 import pathlib
+import resource
 import shutil
 import signal
 import subprocess
@@ -35,11 +36,22 @@ def exit_code(process):
     return 128 - code if code < 0 else code
 
 
+def memory_limit_mib():
+    """Of each process (ulimit -v); None without one."""
+    limit = resource.getrlimit(resource.RLIMIT_AS)[0]
+    return None if limit == resource.RLIM_INFINITY else limit >> 20
+
+
 def crashed(name, code):
     """Reports an end that is not one of kerf's own exit codes, in one line, and returns whether it is one."""
     if code <= 2:
         return False
-    complain(f"kerf: demo: {name}: ended " + (f"by signal {code - 128}" if code > 128 else f"with exit code {code}"))
+    how = f"by signal {code - 128}" if code > 128 else f"with exit code {code}"
+    limit = memory_limit_mib()
+    if limit is None:
+        complain(f"kerf: demo: {name}: ended {how}")
+    else:  # a library that gets no memory may end a program in any way
+        complain(f"kerf: demo: {name}: ended at a memory limit of {limit} MiB ({how}); raise it: ulimit -v")
     return True
 
 
@@ -83,6 +95,9 @@ class Processes:
         except OSError:
             lines = []
         line = lines[-1] if lines else f"kerf: demo: {name}: ended without a word"
+        limit = memory_limit_mib()
+        if limit is not None and "ulimit" not in line:
+            line += f"; memory is limited to {limit} MiB, which may be the reason: ulimit -v"
         complain(line.replace(*self.shown))
 
     def conclude(self, name, process, seconds):
