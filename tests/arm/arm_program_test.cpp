@@ -12,6 +12,7 @@
 #include <memory>
 #include <optional>
 #include <random>
+#include <span>
 #include <sstream>
 #include <string>
 #include <thread>
@@ -215,19 +216,33 @@ TEST_CASE("arm: every bad library is one line and exit code 2") {
       {"omega", "crash=50", {}, "has crashed"},
       {"omega", "vanish=50", {}, "cannot be read any more (error 2"},
   };
-  for (const Case& bad : cases) {
-    CAPTURE(bad.device);
-    CAPTURE(bad.behaviour);
-    Bench bench;
-    const auto arm = bench.arm(bad.device, bad.behaviour, bad.more);
-    REQUIRE(arm->ends_within(20s));
-    CHECK(arm->wait() == 2);
-    std::string said = arm->output();
-    CAPTURE(said);
-    if (runs(*arm)) said.erase(0, said.find('\n') + 1);
-    CHECK(said.starts_with("kerf-arm: "));
-    CHECK(std::ranges::count(said, '\n') == 1);
-    CHECK(said.find(bad.says) != std::string::npos);
+  // Each waits for a time of its own, so some of them run side by side.
+  constexpr std::size_t kTogether = 16;
+  for (std::span<const Case> left(cases); !left.empty();) {
+    const std::span<const Case> now = left.first(std::min(kTogether, left.size()));
+    left = left.subspan(now.size());
+    std::vector<std::unique_ptr<Bench>> benches;
+    std::vector<std::unique_ptr<Process>> arms;
+    for (const Case& bad : now) {
+      benches.push_back(std::make_unique<Bench>());
+      arms.push_back(benches.back()->arm(bad.device, bad.behaviour, bad.more));
+    }
+    for (std::size_t i = 0; i < now.size(); ++i) {
+      const Case& bad = now[i];
+      CAPTURE(bad.device);
+      CAPTURE(bad.behaviour);
+      REQUIRE(arms[i]->ends_within(20s));
+      CHECK(arms[i]->wait() == 2);
+      std::string said = arms[i]->output();
+      CAPTURE(said);
+      // What it opened, and that this machine gives no real time, may stand before.
+      if (said.starts_with("kerf-arm: warning: no right to SCHED_FIFO"))
+        said.erase(0, said.find('\n') + 1);
+      if (runs(*arms[i])) said.erase(0, said.find('\n') + 1);
+      CHECK(said.starts_with("kerf-arm: "));
+      CHECK(std::ranges::count(said, '\n') == 1);
+      CHECK(said.find(bad.says) != std::string::npos);
+    }
   }
 }
 

@@ -56,6 +56,8 @@ void publish(TestController& controller, Tick from, Tick to) {
 
 }  // namespace
 
+TEST_SUITE_BEGIN("network");
+
 TEST_CASE("Foxglove's socket needs a token in its address, and no origin or cookie counts") {
   const TestBridge bridge;
   const auto answer = [&bridge](const std::string& target, const std::string& head) {
@@ -182,3 +184,5 @@ TEST_CASE("a Foxglove client that sends too much or too often is closed") {
   CHECK(often->close_code == static_cast<int>(CloseCode::not_understood));
   CHECK(opened(bridge.port()));
 }
+
+TEST_SUITE_END();

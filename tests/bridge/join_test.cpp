@@ -20,6 +20,8 @@ using namespace kerf::test;
 
 namespace fs = std::filesystem;
 
+TEST_SUITE_BEGIN("network");
+
 TEST_CASE("join tells at once what keeps it from a picture, and gives up where it is asked to") {
   const TestBridge bridge;  // without a controller
   const std::string place = "127.0.0.1:" + std::to_string(bridge.port());
@@ -93,3 +95,5 @@ TEST_CASE("a token that a restarted bridge does not know ends the join, also aft
   CHECK(restarted);
   CHECK(end == place + ": the token is not one of its own; take the wss:// address it prints");
 }
+
+TEST_SUITE_END();

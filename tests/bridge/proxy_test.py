@@ -7,6 +7,7 @@ or not.
     proxy_test.py FOLDER_OF_PROGRAMS"""
 import http.client
 import os
+import pathlib
 import re
 import select
 import socket
@@ -16,6 +17,9 @@ import sys
 import tempfile
 import threading
 import time
+
+sys.path.insert(0, str(pathlib.Path(__file__).parent.parent / "support"))
+import lack
 
 NAME, PATH, TOKEN = "lab.example", "/rooms/kerf", "a-token-of-the-proxy-test"
 
@@ -132,4 +136,5 @@ def main():
     print("proxy_test: fine")
 
 
+lack.need_network()
 main()

@@ -38,6 +38,8 @@ bool has(const std::string& text, const std::string& part) {
 
 }  // namespace
 
+TEST_SUITE_BEGIN("network");
+
 TEST_CASE("tokens come from files that nobody else reads") {
   const TemporaryFolder folder;
   const fs::path file = folder / "tokens";
@@ -96,3 +98,5 @@ TEST_CASE("targets, cookies and hosts come apart as browsers put them together")
   CHECK(!is_own_origin("http://a:1", "a:1", true));
   CHECK(!is_own_origin("https://a:12", "a:1", true));
 }
+
+TEST_SUITE_END();

@@ -35,6 +35,8 @@ int code_of(RawClient& client) {
 
 }  // namespace
 
+TEST_SUITE_BEGIN("network");
+
 TEST_CASE("a viewer holds the volume, and what is cut while it looks") {
   TestController controller;
   const TestBridge bridge;
@@ -462,3 +464,5 @@ TEST_CASE("a port that is taken and an address of nobody are told in one line") 
   setup.host = "no such host";
   CHECK(has(why(setup), "give an address of this machine"));
 }
+
+TEST_SUITE_END();

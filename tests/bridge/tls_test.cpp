@@ -83,6 +83,8 @@ bool has(const std::string& text, const std::string& part) {
 
 }  // namespace
 
+TEST_SUITE_BEGIN("network");
+
 TEST_CASE("a server shows its certificate over TLS 1.3 alone") {
   const Lab lab;
   ServerSetup setup;
@@ -210,3 +212,5 @@ TEST_CASE("a fingerprint is 64 hex digits, with colons or without, and excludes 
   }
   CHECK_THROWS_AS(CertificateCheck("host", "ca.pem", plain), BridgeError);
 }
+
+TEST_SUITE_END();

@@ -84,6 +84,8 @@ std::string words_of_message(const Head& head) {
 
 }  // namespace
 
+TEST_SUITE_BEGIN("network");
+
 TEST_CASE("join ends at a server of another kind, and tries again where that may change") {
   const std::string which = "; is it a kerf-bridge serve?";
   CHECK(words_of_answer("HTTP/1.1 200 OK") == "answers 200" + which);
@@ -131,3 +133,5 @@ TEST_CASE("join outlives whatever frames a server sends before, in and after its
   CHECK(words(frame(0, "no message before")).ends_with("; trying again"));
   CHECK(words(websocket_frame(2, "masked", true, true)).ends_with("; trying again"));
 }
+
+TEST_SUITE_END();

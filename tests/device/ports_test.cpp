@@ -163,7 +163,8 @@ TEST_CASE("a socket on which no process listens is one line that names the way o
 
 // ---- UDP ----
 
-TEST_CASE("over UDP packets keep their borders both ways, and the end shows on both sides") {
+TEST_CASE("over UDP packets keep their borders both ways, and the end shows on both sides" *
+          doctest::test_suite("network")) {
   kerf::UdpServer server("0");
   std::optional<kerf::UdpPort> port;
   port.emplace(std::to_string(server.port()), 0, kGoOn);
@@ -195,7 +196,7 @@ TEST_CASE("over UDP packets keep their borders both ways, and the end shows on b
   }
 }
 
-TEST_CASE("over UDP a device that is killed closes the port") {
+TEST_CASE("over UDP a device that is killed closes the port" * doctest::test_suite("network")) {
   std::optional<kerf::UdpServer> server;
   server.emplace("0");
   kerf::UdpPort port(std::to_string(server->port()), 0, kGoOn);
@@ -284,7 +285,8 @@ void check_off(const std::vector<kerf::OmniCommand>& commands) {
 
 }  // namespace
 
-TEST_CASE("however the device ends the link, all that it hears from then on is: motors off") {
+TEST_CASE("however the device ends the link, all that it hears from then on is: motors off" *
+          doctest::test_suite("network")) {
   struct {
     bool udp;
     void (*end)(int peer);
@@ -312,7 +314,8 @@ TEST_CASE("however the device ends the link, all that it hears from then on is: 
   }
 }
 
-TEST_CASE("over UDP the refusal of a packet does not cost the next one, which is: motors off") {
+TEST_CASE("over UDP the refusal of a packet does not cost the next one, which is: motors off" *
+          doctest::test_suite("network")) {
   for (const bool by_watchdog : {false, true}) {
     TorqueLink link(true);
     link.tick();

@@ -240,7 +240,8 @@ TEST_CASE("a thread without the right to real time gets a message, and goes on")
   CHECK(absent_core.find("no right to core 1000") == 0);
 }
 
-TEST_CASE("over UDP an empty datagram begins a session and ends it") {
+TEST_CASE("over UDP an empty datagram begins a session and ends it" *
+          doctest::test_suite("network")) {
   AtPort served(true, omni());
   FakeHost& host = served.host;
   host.send(Bytes{});
@@ -256,7 +257,8 @@ TEST_CASE("over UDP an empty datagram begins a session and ends it") {
 }
 
 TEST_CASE(
-    "over UDP the first packet of a host counts, and a Falcon answers each one, only its own") {
+    "over UDP the first packet of a host counts, and a Falcon answers each one, only its own" *
+    doctest::test_suite("network")) {
   AtPort served(true, falcon());
   FakeHost& host = served.host;
   FakeHost stranger(served.server().port());
@@ -275,7 +277,8 @@ TEST_CASE(
   CHECK(served.emulator().stats().reports == 50);
 }
 
-TEST_CASE("in real time over UDP packets come by themselves, until the host is silent for 2 s") {
+TEST_CASE("in real time over UDP packets come by themselves, until the host is silent for 2 s" *
+          doctest::test_suite("network")) {
   AtPort served(false, omni());
   const std::int64_t last_sent_ns = kerf::monotonic_ns();
   served.host.send(Bytes{});
@@ -287,7 +290,8 @@ TEST_CASE("in real time over UDP packets come by themselves, until the host is s
   CHECK(served.stats().cycles < 10 * kerf::kCyclesPerSecond);
 }
 
-TEST_CASE("a UDP address that cannot be served is refused in one line") {
+TEST_CASE("a UDP address that cannot be served is refused in one line" *
+          doctest::test_suite("network")) {
   const UdpServer taken("0");
   for (const std::string& where :
        {std::to_string(taken.port()), std::string("203.0.113.1:0"), std::string("port"),
@@ -340,7 +344,8 @@ struct Meeting {
 
 }  // namespace
 
-TEST_CASE("a hello is answered, the device's last packet follows, and each one again") {
+TEST_CASE("a hello is answered, the device's last packet follows, and each one again" *
+          doctest::test_suite("network")) {
   Meeting m;
   const Bytes first{1, 2, 3};
   const Bytes last{4, 5};

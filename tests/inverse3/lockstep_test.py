@@ -13,6 +13,10 @@ import unittest
 
 PROGRAMS, ROOT = (pathlib.Path(word).resolve() for word in sys.argv[1:3])
 del sys.argv[1:3]
+sys.path.insert(0, str(ROOT / "tests/support"))
+import lack
+
+lack.need_network()
 
 
 def run(folder, profile, *words):

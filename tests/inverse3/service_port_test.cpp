@@ -69,7 +69,8 @@ TEST_CASE("auto is the service for an Inverse3, and a port of the service is for
 
 // ---- versions ----
 
-TEST_CASE("each version of the service is understood: pose, parking button, force and echo") {
+TEST_CASE("each version of the service is understood: pose, parking button, force and echo" *
+          doctest::test_suite("network")) {
   for (const ServiceProfile profile :
        {ServiceProfile::v3_4, ServiceProfile::v3_5, ServiceProfile::v3_5_wireless}) {
     CAPTURE(static_cast<int>(profile));
@@ -91,7 +92,8 @@ TEST_CASE("each version of the service is understood: pose, parking button, forc
   }
 }
 
-TEST_CASE("a force acts along the axis that it has in kerf's frame") {
+TEST_CASE("a force acts along the axis that it has in kerf's frame" *
+          doctest::test_suite("network")) {
   ServedService service;
   const auto port = open(service.options());
   until_armed(*port);
@@ -109,7 +111,8 @@ TEST_CASE("a force acts along the axis that it has in kerf's frame") {
   CHECK(report->force_mn == command.force_mn);
 }
 
-TEST_CASE("a service before 3.1, or one that obeys other words than its version's, is refused") {
+TEST_CASE("a service before 3.1, or one that obeys other words than its version's, is refused" *
+          doctest::test_suite("network")) {
   ServedService old({.profile = ServiceProfile::v3_0});
   CHECK(has(error_of([&] { open(old.options()); }),
             "version 3.0.7.0; needs the vendor's Inverse Service 3.1 or newer"));
@@ -120,14 +123,16 @@ TEST_CASE("a service before 3.1, or one that obeys other words than its version'
   CHECK(has(error_of([&] { open(changed_back.options()); }), "stays idle under the force command"));
 }
 
-TEST_CASE("a service whose forces are scaled or damped is refused at the start") {
+TEST_CASE("a service whose forces are scaled or damped is refused at the start" *
+          doctest::test_suite("network")) {
   ServedService service({.script = {{0, ServiceFault::reconfigure}}});
   // The settings change with the first client, so the second one finds them.
   static_cast<void>(error_of([&] { open(service.options()); }));
   CHECK(has(error_of([&] { open(service.options()); }), "scales every force by 0.5"));
 }
 
-TEST_CASE("a device that another program drives is refused, also if the force word is not obeyed") {
+TEST_CASE("a device that another program drives is refused, also if the force word is not obeyed" *
+          doctest::test_suite("network")) {
   ServedService driven({.script = {{0, ServiceFault::driven}}});
   CHECK(has(error_of([&] { open(driven.options()); }), "device 0A1C is not idle (force) before"));
   ServedService deaf({.profile = ServiceProfile::v3_5_wireless,
@@ -136,7 +141,8 @@ TEST_CASE("a device that another program drives is refused, also if the force wo
   CHECK(has(error_of([&] { open(deaf.options()); }), "is not idle"));
 }
 
-TEST_CASE("several handles are listed and refused without a name") {
+TEST_CASE("several handles are listed and refused without a name" *
+          doctest::test_suite("network")) {
   ServedService both({.profile = ServiceProfile::v3_5});
   CHECK(has(error_of([&] { open(both.options()); }),
             "several handles are there: 51877, 40213; name the one of this device with handle=ID"));
@@ -145,7 +151,8 @@ TEST_CASE("several handles are listed and refused without a name") {
   CHECK(until_armed(*open(third.options(kWireless))).parked);
 }
 
-TEST_CASE("what is wrong with the replies at the start is the line, not the connection") {
+TEST_CASE("what is wrong with the replies at the start is the line, not the connection" *
+          doctest::test_suite("network")) {
   ServedService millimetres({.position_scale = 1000});
   const std::string line = error_of([&] { open(millimetres.options()); });
   CHECK(has(line,
@@ -247,7 +254,8 @@ TEST_CASE("a port that is taken is the fault of the option that named it") {
   CHECK(line({"0", std::uint16_t{0}}).empty());
 }
 
-TEST_CASE("an attempt to connect ends when it is asked to, however long it may take") {
+TEST_CASE("an attempt to connect ends when it is asked to, however long it may take" *
+          doctest::test_suite("network")) {
   const Stranger silent("");
   constexpr int kVeryLongMs = 3'600'000;
   const std::atomic<bool> stop{true};
@@ -260,7 +268,8 @@ TEST_CASE("an attempt to connect ends when it is asked to, however long it may t
             "asked to end before an answer to the upgrade"));
 }
 
-TEST_CASE("a second client is turned away, and the first one goes on") {
+TEST_CASE("a second client is turned away, and the first one goes on" *
+          doctest::test_suite("network")) {
   ServedService service;
   const auto port = open(service.options());
   until_armed(*port);
@@ -294,7 +303,8 @@ std::vector<CartesianReport> lock_step_run(ServiceProfile profile) {
 
 }  // namespace
 
-TEST_CASE("in lock-step a command is a report, the same in each run") {
+TEST_CASE("in lock-step a command is a report, the same in each run" *
+          doctest::test_suite("network")) {
   const auto first = lock_step_run(ServiceProfile::v3_5_wireless);
   CHECK(first == lock_step_run(ServiceProfile::v3_5_wireless));
   CHECK(first == lock_step_run(ServiceProfile::v3_5));
@@ -308,7 +318,8 @@ TEST_CASE("in lock-step a command is a report, the same in each run") {
   CHECK(old == first);
 }
 
-TEST_CASE("a port that ends takes its force back by its last message") {
+TEST_CASE("a port that ends takes its force back by its last message" *
+          doctest::test_suite("network")) {
   ServedService service({.lockstep = true});
   auto port = open(service.options(), true);
   std::optional<CartesianReport> report;
@@ -323,7 +334,8 @@ TEST_CASE("a port that ends takes its force back by its last message") {
   CHECK(norm(service.end().motor_force_n()) == 0.0);
 }
 
-TEST_CASE("a port by the clock and a service in lock-step do not fit, nor the other way round") {
+TEST_CASE("a port by the clock and a service in lock-step do not fit, nor the other way round" *
+          doctest::test_suite("network")) {
   ServedService lockstep({.lockstep = true});
   CHECK(has(error_of([&] { open(lockstep.options()); }), "the emulator runs in lock-step"));
   ServedService real;

@@ -17,6 +17,8 @@ import unittest
 
 MODE, ROOT, PROGRAMS = sys.argv[1], *(str(pathlib.Path(word).resolve()) for word in sys.argv[2:4])
 del sys.argv[1:4]
+sys.path.insert(0, ROOT + "/tests/support")
+import lack
 
 
 def demo(*words):
@@ -61,6 +63,9 @@ class TestLockStep(unittest.TestCase):
         self.mills("--device", "omega")
 
     def test_inverse3_by_its_service(self):
+        if not lack.has_network():
+            print("skipped: " + lack.NETWORK)
+            return
         self.mills("--device", "inverse3", "--port", "ws")
 
 

@@ -117,7 +117,8 @@ TEST_CASE("little memory: one line that names the way out and exit 2") {
 #endif
 }
 
-TEST_CASE("no thread left: one line that names the way out and exit 2, never a hang") {
+TEST_CASE("no thread left: one line that names the way out and exit 2, never a hang" *
+          doctest::test_suite("network")) {
   if (geteuid() != 0) {
     MESSAGE("skipped: a limit of threads needs a user with no other process; run as root");
     return;

@@ -143,7 +143,7 @@ TEST_CASE(
   }
 }
 
-TEST_CASE("over UDP they are told alike") {
+TEST_CASE("over UDP they are told alike" * doctest::test_suite("network")) {
   const Place place;
   Process emulator({kBin + "/kerf-emulator", "--front", "udp", "--udp", "0", "--priority", "0"},
                    place.folder / "emulator.log");

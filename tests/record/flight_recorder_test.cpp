@@ -13,9 +13,11 @@
 #include "record/recording.hpp"
 #include "shared/segment/server.hpp"
 #include "tests/record/record_support.hpp"
+#include "tests/support/process.hpp"
 
 using namespace kerf;
 using namespace kerf::test;
+using namespace std::chrono_literals;
 
 namespace {
 
@@ -103,8 +105,9 @@ TEST_CASE("a flight recorder keeps the ticks before a fault, a mark and a signal
   CHECK(kept_summary(marked).has_value());
 
   flight.fault(Fault::overspeed);
-  flight.wait_for(flight.now() + 50);
+  CHECK(eventually([&] { return flight.kept().size() >= 2; }, 20s));
   std::raise(SIGUSR1);
+  CHECK(eventually([&] { return flight.kept().size() >= 3; }, 20s));
   flight.wait_for(flight.now() + 50);
   CHECK(flight.kept() == std::vector<std::string>{"mark", "overspeed", "signal"});
   flight.fault(Fault::none);

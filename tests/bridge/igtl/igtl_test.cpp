@@ -221,7 +221,8 @@ bool near(const Place& a, const Place& b) {
 
 }  // namespace
 
-TEST_CASE("volumes, tool and force lie in RAS as they lie in the scene") {
+TEST_CASE("volumes, tool and force lie in RAS as they lie in the scene" *
+          doctest::test_suite("network")) {
   const RuntimeFolder folder;
   NoiseVolume first({12, 9, 7}), second({8, 8, 8}, 2);
   SegmentSpec spec = spec_of(first);
@@ -256,7 +257,7 @@ TEST_CASE("volumes, tool and force lie in RAS as they lie in the scene") {
   CHECK(client.force_n == Place{-0.5, -0.25, -1});
 }
 
-TEST_CASE("a second arm has a tool and a force of its own name") {
+TEST_CASE("a second arm has a tool and a force of its own name" * doctest::test_suite("network")) {
   const RuntimeFolder folder;
   const NoiseVolume volume({8, 8, 8});
   SegmentSpec spec = spec_of(volume);
@@ -290,7 +291,8 @@ TEST_CASE("a second arm has a tool and a force of its own name") {
   CHECK(client.second_force_n == Place{0, -2, 0});
 }
 
-TEST_CASE("labels come once a client and a run, beside their volume and where it lies") {
+TEST_CASE("labels come once a client and a run, beside their volume and where it lies" *
+          doctest::test_suite("network")) {
   const RuntimeFolder folder;
   NoiseVolume tooth({12, 9, 7}), bare({8, 8, 8}, 2);
   for (std::size_t i = 0; i < tooth.density.size(); ++i) {
@@ -306,7 +308,8 @@ TEST_CASE("labels come once a client and a run, beside their volume and where it
     SegmentWriter writer = SegmentWriter::create(spec);
     const SegmentServer server("igtl", writer);
     publish_tick(writer, 1, record_at({1, 2, 3}, {0, 0, 0, 1}, {0, 0, 0}));
-    Client late(output.port());
+    early.take_until([&] { return early.pictures["tooth labels"].whole == life + 1; });
+    Client late(output.port());  // of this run alone
     for (Client* const client : {&early, &late}) {
       const int runs = client == &early ? life + 1 : 1;
       client->take_until([&] { return client->pictures["tooth labels"].whole == runs; });
@@ -331,7 +334,7 @@ TEST_CASE("labels come once a client and a run, beside their volume and where it
   }
 }
 
-TEST_CASE("an unknown pose is not sent, and the force is") {
+TEST_CASE("an unknown pose is not sent, and the force is" * doctest::test_suite("network")) {
   const RuntimeFolder folder;
   const NoiseVolume volume({8, 8, 8});
   SegmentWriter writer = SegmentWriter::create(spec_of(volume));
@@ -344,7 +347,8 @@ TEST_CASE("an unknown pose is not sent, and the force is") {
   CHECK(client.poses == 0);
 }
 
-TEST_CASE("a client rebuilds what is milled and what is reset, from parts, equal by hash") {
+TEST_CASE("a client rebuilds what is milled and what is reset, from parts, equal by hash" *
+          doctest::test_suite("network")) {
   const RuntimeFolder folder;
   LoadedScene scene = half_space_scene(64);
   scene.cut.model = CutModel::preston;
@@ -388,7 +392,8 @@ TEST_CASE("a client rebuilds what is milled and what is reset, from parts, equal
   client.take_until([&] { return tooth.density == first; });
 }
 
-TEST_CASE("a client that reads nothing is dropped, and one that chatters is not heard") {
+TEST_CASE("a client that reads nothing is dropped, and one that chatters is not heard" *
+          doctest::test_suite("network")) {
   const RuntimeFolder folder;
   const NoiseVolume volume({208, 208, 208});  // more than sockets hold
   SegmentWriter writer = SegmentWriter::create(spec_of(volume));
@@ -411,7 +416,7 @@ TEST_CASE("a client that reads nothing is dropped, and one that chatters is not 
   CHECK(deaf.pictures.empty());
 }
 
-TEST_CASE("one client too many is let out again") {
+TEST_CASE("one client too many is let out again" * doctest::test_suite("network")) {
   const RuntimeFolder folder;
   const NoiseVolume volume({8, 8, 8});
   SegmentWriter writer = SegmentWriter::create(spec_of(volume));
@@ -434,7 +439,8 @@ TEST_CASE("one client too many is let out again") {
   for (auto& client : clients) CHECK(client->take());
 }
 
-TEST_CASE("a controller may come late, go, and come again with other volumes") {
+TEST_CASE("a controller may come late, go, and come again with other volumes" *
+          doctest::test_suite("network")) {
   const RuntimeFolder folder;
   const IgtlOutput output(options_for("igtl"));
   Client client(output.port());
@@ -448,7 +454,8 @@ TEST_CASE("a controller may come late, go, and come again with other volumes") {
   }
 }
 
-TEST_CASE("the port is free again at once, and one in use is one line") {
+TEST_CASE("the port is free again at once, and one in use is one line" *
+          doctest::test_suite("network")) {
   const RuntimeFolder folder;
   const NoiseVolume volume({8, 8, 8});
   SegmentWriter writer = SegmentWriter::create(spec_of(volume));
