@@ -52,7 +52,7 @@ def check():
                 if not match:
                     continue
                 words = shlex.split(match[1])
-                if words[0].startswith("-") or words[0].isupper():
+                if words[0].startswith("-") or words[0].isupper() or words[0] == "help":
                     continue
                 checked += 1
                 known = known_options(words)

@@ -56,9 +56,9 @@ for name in names:
         if 'kerf setup' in plain or './kerf' in plain:
             wrong.append('kerf.1: is of a clone')
         # What is typed behind `kerf`, and what bash offers then; behind an option no other options.
-        for words, offer in [(['demo', '--sec'], ['--seconds']), (['demo', '--device', ''], ['omni', 'falcon', 'woodenhaptics']),
+        for words, offer in [(['demo', '--sec'], ['--seconds']), (['demo', '--device', 'o'], ['omni', 'omega']),
                              (['demo', '--renderer', 'cast'], ['cast', 'cast-blend']), (['demo', '--port', 'u'], ['usb']),
-                             (['demo', '--gradient', 'f'], ['farid5']), (['demo', '--scene', 'two'], ['two_teeth']),
+                             (['demo', '--gradient', 'f'], ['farid5']), (['demo', '--scene', 'two'], ['two_arms', 'two_teeth']),
                              (['demo', '--scene', 'scenes/wal'], ['scenes/wall.toml']), (['demo', '--hand', 'mo'], ['mouse']),
                              (['demo', '--volume', 'sce'], ['scenes']), (['demo', '--seconds', ''], []),
                              (['demo', '--mute', '--sec'], ['--seconds']), (['test', '--preset', 'a'], ['asan'])]:
