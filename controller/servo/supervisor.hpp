@@ -81,11 +81,9 @@ constexpr void count_sparse(const SafetyTiming& timing, Supervisor& s) noexcept 
 /// One tick of the state machine. Bounded, no clock.
 constexpr void supervise(const SafetyTiming& timing, const SafetyInputs& in,
                          Supervisor& s) noexcept {
-  const auto count = [](bool bad, std::uint32_t& ticks) {
-    ticks = bad ? ticks + (ticks < UINT32_MAX ? 1U : 0U) : 0;
-  };
-  count(!in.fresh, s.stale_ticks);
-  count(!in.finite, s.not_finite_ticks);
+  const auto one_more = [](std::uint32_t ticks) { return ticks + (ticks < UINT32_MAX ? 1U : 0U); };
+  s.stale_ticks = in.fresh ? 0 : one_more(s.stale_ticks);
+  s.not_finite_ticks = in.finite ? 0 : one_more(s.not_finite_ticks);
 
   if (in.fresh) {
     if (s.phase == Phase::off) s.phase = Phase::calibrating;

@@ -3,6 +3,7 @@
 #include <atomic>
 #include <chrono>
 #include <fstream>
+#include <sstream>
 #include <thread>
 
 #include "controller/servo/servo.hpp"
@@ -319,4 +320,97 @@ TEST_CASE("a datagram has the second arm's columns beside the first's") {
   const std::string one = tick_json(first);
   CHECK(one.find("kerf_2") == std::string::npos);
   CHECK(tick_json(first, &first).starts_with(one.substr(0, one.size() - 1)));
+}
+
+namespace {
+
+/// What a reader gets of one arm of a recording.
+struct ArmViews {
+  std::string log, csv, kept, scanned;
+};
+
+/// Records a run whose arms make these ticks.
+template <class First, class Second>
+std::array<ArmViews, 2> views_of(const First& first, const Second& second, std::string& live) {
+  TwoArms run;
+  for (Tick tick = 1; tick <= 1200; ++tick) publish_pair(run.writer, first(tick), second(tick));
+  record(run);
+  const std::filesystem::path folder = run.folder / "log";
+  std::array<ArmViews, 2> views;
+  for (std::size_t arm = 0; arm < 2; ++arm) {
+    const auto text = [](const RecordSummary& summary) {
+      std::ostringstream out;
+      out << summary.peak_force_n << ' ' << summary.faults << ' ' << summary.contact_ticks << ' '
+          << summary.rows << ' ' << summary.stale_ticks;
+      return out.str();
+    };
+    views[arm].log = file_text(folder / tick_log_name(arm));
+    export_csv(folder, run.folder / "arm.csv", {}, arm);
+    views[arm].csv = file_text(run.folder / "arm.csv");
+    views[arm].kept = text(*kept_summary(folder, arm));
+    views[arm].scanned = text(summarise(folder, {}, arm));
+  }
+  const TickRecord one = first(77), other = second(77);
+  live = tick_json(one, &other);
+  return views;
+}
+
+}  // namespace
+
+TEST_CASE("of arms that are exchanged each has the same log, summary, table and datagram") {
+  // One works and faults twice; the other is idle, lost, parked and held in turn.
+  const auto works = [](Tick tick) {
+    TickRecord record = made_up_tick(tick, 1200);
+    record.flags |= kFlagStarted;
+    record.fault = tick % 500 > 470 ? static_cast<std::uint32_t>(Fault::overspeed) : 0;
+    return record;
+  };
+  const auto idles = [](Tick tick) {
+    TickRecord record{};
+    record.tick = tick;
+    record.start_ns = 0;
+    record.stale = tick > 300 && tick < 600 ? 1 : 0;
+    record.flags = tick > 700 ? kFlagParked : 0;
+    record.phase = static_cast<std::uint16_t>(tick / 300);
+    record.raw[0] = static_cast<std::int32_t>(tick);
+    record.active_tool = 1;
+    return record;
+  };
+  std::string live, crossed_live;
+  const auto ahead = views_of(works, idles, live), crossed = views_of(idles, works, crossed_live);
+  for (std::size_t arm = 0; arm < 2; ++arm) {
+    CAPTURE(arm);
+    CHECK(ahead[arm].log.size() > 1200 * sizeof(TickRecord));
+    CHECK(ahead[arm].log == crossed[1 - arm].log);
+    CHECK(ahead[arm].csv == crossed[1 - arm].csv);
+    CHECK(ahead[arm].kept == crossed[1 - arm].kept);
+    CHECK(ahead[arm].scanned == crossed[1 - arm].scanned);
+    CHECK(ahead[arm].kept == ahead[arm].scanned);
+  }
+  CHECK(ahead[0].kept != ahead[1].kept);
+  const auto read_live = read_json(live), read_crossed = read_json(crossed_live);
+  CHECK(read_live["kerf"] == read_crossed["kerf_2"]);
+  CHECK(read_live["kerf_2"] == read_crossed["kerf"]);
+  CHECK(read_live["kerf"] != read_live["kerf_2"]);
+}
+
+TEST_CASE("a window of ticks finds each fault of either arm, and each again after it was cleared") {
+  for (const bool in_second : {false, true}) {
+    CAPTURE(in_second);
+    TickWindow window(4096, 2);
+    for (Tick tick = 1; tick <= 100; ++tick) {
+      TickRecord at_fault = made_up_tick(tick, 1000), well = at_fault;
+      const bool has_fault = (tick >= 10 && tick < 20) || (tick >= 50 && tick < 60);
+      at_fault.fault = has_fault ? static_cast<std::uint32_t>(Fault::overspeed) : 0;
+      if (tick >= 55 && tick < 60) at_fault.fault = static_cast<std::uint32_t>(Fault::wrong_dock);
+      window.append_second(in_second ? at_fault : well);
+      window.append(in_second ? well : at_fault);
+    }
+    std::string events;
+    for (auto event = window.take_event(); !event.reason.empty(); event = window.take_event()) {
+      events += std::to_string(event.tick) + " " + event.reason + " ";
+    }
+    const std::string arm = in_second ? "arm-2-" : "";
+    CHECK(events == "10 " + arm + "overspeed 50 " + arm + "overspeed 55 " + arm + "wrong_dock ");
+  }
 }

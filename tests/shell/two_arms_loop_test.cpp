@@ -135,7 +135,8 @@ struct StallingClock final : TickSource {
 
 /// A run of the loop, and all that it leaves.
 struct LoopRun {
-  LoopRun(LoadedScene scene, const Course& first, const Course& second)
+  LoopRun(LoadedScene scene, const Course& first, const Course& second,
+          std::uint64_t armed_ticks = 1200)
       : ports{CoursePort(first), CoursePort(second)} {
     std::array drivers{make_driver(scene.device.personality, ports[0]),
                        make_driver(scene.second->device.personality, ports[1])};
@@ -149,7 +150,7 @@ struct LoopRun {
     LoopSignals signals{stop};
     StallingClock clock(signals);
     const LoopLimits limits{
-        .armed_ticks = 1200, .gone_ticks = kGoneTicks, .arming_ticks = kMostTicks};
+        .armed_ticks = armed_ticks, .gone_ticks = kGoneTicks, .arming_ticks = kMostTicks};
     end = run_servo(clock, {*drivers[0], drivers[1].get()}, *servo, eyes, server, limits, signals,
                     record);
     ticks = signals.heartbeat;
@@ -211,6 +212,20 @@ std::uint64_t last_tick(const Course& one, const Course& other) {
     if (std::min(silent_one, silent_other) >= kGoneTicks) return tick;
   }
   return kMostTicks;
+}
+
+/// Ticks without a report since the tool was taken, but for those in `gone`, from the records.
+std::uint64_t stale_ticks_of(const LoopRun& run, std::size_t arm,
+                             const std::vector<std::array<std::uint64_t, 2>>& gone) {
+  std::uint64_t count = 0;
+  for (const auto& records : run.published) {
+    const TickRecord& record = records[arm];
+    const bool is_gone = std::ranges::any_of(gone, [&](const auto& from_to) {
+      return record.tick > from_to[0] && record.tick <= from_to[1];
+    });
+    if ((record.flags & kFlagStarted) != 0 && !is_gone) count += record.stale;
+  }
+  return count;
 }
 
 LoadedScene cutting_scene() {
@@ -282,6 +297,105 @@ TEST_CASE("one device at work is a run, whichever it is") {
       CHECK(run.waiting[is_second ? 1 : 0] == Waiting::nothing);
       CHECK(run.waiting[is_second ? 0 : 1] != Waiting::nothing);
     }
+  }
+}
+
+TEST_CASE("a device that goes twice is gone twice, and what it loses between is counted") {
+  const LoadedScene scene = cutting_scene();
+  const Course twice{"goes twice", [](int tick) {
+                       Hand hand = works(tick);
+                       const auto within = [&](int from, int ticks) {
+                         return tick >= from && tick < from + ticks;
+                       };
+                       hand.silent = within(400, 400) || within(950, 4) || within(1000, 400) ||
+                                     within(1500, 3);
+                       if (within(820, 80) || within(1410, 80)) hand = {.parked = true};
+                       return hand;
+                     }};
+  for (const std::size_t arm : {0U, 1U}) {
+    CAPTURE(arm);
+    const LoopRun run(scene, arm == 0 ? twice : kCourses[0], arm == 1 ? twice : kCourses[0], 1500);
+    CHECK(run.end == EndReason::ticks_done);
+    RunRecord record = run.record;
+    std::string faults;
+    for (const auto& event : record.arm(arm).faults.kept()) {
+      faults += std::to_string(event.tick) + " " + event.name + " ";
+    }
+    CHECK(faults == "420 stale_input 700 device_gone 1020 stale_input 1300 device_gone ");
+    // Each 64th packet is none, and two gaps have seven ticks. The first number after a long gap is
+    // not believed: the device is not back before the next.
+    CHECK(record.arm(arm).stale_ticks == stale_ticks_of(run, arm, {{400, 801}, {1000, 1401}}));
+    CHECK(record.arm(1 - arm).stale_ticks == stale_ticks_of(run, 1 - arm, {}));
+    CHECK(record.arm(1 - arm).faults.count == 0);
+    CHECK(record.has_faults());
+    CHECK(run.waiting[arm] == Waiting::nothing);
+  }
+}
+
+TEST_CASE("a command is read back from the records of both arms, whichever got it") {
+  using enum ServoCommand::Kind;
+  for (const std::uint32_t arm : {0U, 1U}) {
+    for (const auto kind : {none, select_tool, hold, reset, undo, redo, mark}) {
+      for (const bool fade_in : {false, true}) {
+        CAPTURE(static_cast<int>(kind));
+        const TickCommands given{
+            {kind, kind == select_tool || kind == hold ? 1U : 0U, kind == select_tool ? arm : 0},
+            fade_in,
+            7};
+        std::array<TickRecord, kMaxArms> records{};
+        for (std::size_t a = 0; a < kMaxArms; ++a) {
+          records[a] = record_of({}, commands_for(a, given), {});
+          // A tool of the other arm is none; all else, a stall too, is in both.
+          const bool is_mine = kind != select_tool || a == arm;
+          CHECK((records[a].command & kCommandKind) ==
+                (is_mine ? static_cast<std::uint32_t>(kind) : 0U));
+          CHECK(((records[a].command & kCommandFadeIn) != 0) == fade_in);
+          CHECK(records[a].last_command == 7);
+        }
+        const TickCommands read = commands_of(records);
+        CHECK(read.command.kind == given.command.kind);
+        CHECK(read.command.argument == given.command.argument);
+        CHECK(read.command.arm == given.command.arm);
+        CHECK(read.fade_in == fade_in);
+        CHECK(read.last_index == 7);
+      }
+    }
+  }
+}
+
+TEST_CASE("the loop stands still once for each stall, however many come") {
+  StandstillWatch watch;
+  std::int64_t now_ns = 1000;
+  CHECK_FALSE(watch.stood_still(now_ns));
+  for (int cycle = 0; cycle < 3; ++cycle) {
+    for (int i = 0; i < 100; ++i) CHECK_FALSE(watch.stood_still(now_ns += kStandstillNs - 1));
+    CHECK(watch.stood_still(now_ns += kStandstillNs));
+    CHECK_FALSE(watch.stood_still(now_ns += 1'000'000));
+  }
+}
+
+TEST_CASE("the watchdog measures each standstill from the last tick, not from the first") {
+  std::array<CoursePort, kMaxArms> ports{CoursePort(kCourses[0]), CoursePort(kCourses[0])};
+  const auto first = make_driver(Personality::omega, ports[0]);
+  const auto second = make_driver(Personality::touch, ports[1]);
+  std::atomic<bool> stop{false};
+  LoopSignals signals{stop};
+  Watchdog watchdog({*first, second.get()}, signals);
+  std::int64_t now_ns = 0;
+  std::size_t stalls = 0;
+  for (int cycle = 0; cycle < 4; ++cycle) {
+    for (int i = 0; i < 50; ++i) {
+      ++signals.heartbeat;
+      watchdog.look(now_ns += 15'000'000);
+      watchdog.look(now_ns += 4'000'000);  // 19 ms after the tick is no standstill
+      CHECK(watchdog.trips() == stalls);
+    }
+    ++signals.heartbeat;
+    watchdog.look(now_ns += 5'000'000);
+    for (int i = 0; i < 20; ++i) watchdog.look(now_ns += 5'000'000);
+    CHECK(watchdog.trips() == ++stalls);
+    for (const CoursePort& port : ports) CHECK(port.sent.size() == stalls);
+    CHECK(signals.stalled.exchange(false));
   }
 }
 
