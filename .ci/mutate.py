@@ -34,6 +34,8 @@ import sys
 import tempfile
 import threading
 
+import resets
+
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 TABLE = ".ci/mutations.txt"
 BUILD = ROOT / "build/release"
@@ -139,11 +141,11 @@ def check(mutations):
         mutation.contents(ROOT)
 
 
-def run(command, log, cwd=ROOT, timeout=None):
+def run(command, log, cwd=ROOT, timeout=None, **variables):
     """Runs a command (a list, or a line for the shell); returns its exit code, 124 after the time-out, and its output."""
     with open(log, "wb") as out:
         process = subprocess.Popen(command, cwd=cwd, shell=isinstance(command, str), stdin=subprocess.DEVNULL, stdout=out,
-                                   stderr=subprocess.STDOUT, start_new_session=True)
+                                   stderr=subprocess.STDOUT, start_new_session=True, env={**os.environ, **variables})
         RUNNING.add(process)
         try:
             code = process.wait(timeout)
@@ -229,11 +231,11 @@ class ReleaseObjects:
         first = catcher.split()[0]
         return first if first.startswith("test_") else "kerf-lab"
 
-    def noticed(self, program, catcher, log):
-        """What the program finds; nothing if it passes."""
+    def noticed(self, program, catcher, log, left_out=-1):
+        """What the program finds, with a reset left out if it has switches; nothing if it passes."""
         first, *rest = catcher.split()
         if first.startswith("test_"):
-            code, text = run([program, "-tc=" + " ".join(rest), "-aa=1"], log, timeout=200)
+            code, text = run([program, "-tc=" + " ".join(rest), "-aa=1"], log, timeout=200, KERF_LEFT_OUT=str(left_out))
             if re.search(r"test cases: *0 ", text):
                 raise Wrong(f"'{catcher}' names no test case; correct {TABLE}")
             return code and failed_case(code, text)
@@ -260,37 +262,42 @@ class ReleaseObjects:
             made = self.object_of(mutation, file)
             if not made:
                 raise Wrong(f"{mutation.name}: no object {mutation.object} of the build reads {file}; correct {TABLE}")
-            for command in (self.compile(file, made, here), self.link(self.target(mutation.catcher), made, here)):
+            for command in (self.compile([file], made, here, "changed.o"),
+                            self.link(self.target(mutation.catcher), {made: "changed.o"}, here)):
                 code, text = run(command, here / "build.log", cwd=BUILD)
                 if code:
                     raise Wrong(f"{mutation.name}: does not build: {first_error(text)}")
             return self.noticed(str(here / "program"), mutation.catcher, here / "log")
 
     @staticmethod
-    def compile(file, made, here):
-        """The object's own command, with the changed file before that of the tree."""
+    def compile(files, made, here, out, level="-O0"):
+        """The object's own command, with the changed files before those of the tree."""
         command = output_of("ninja", "-C", str(BUILD), "-t", "commands", made).splitlines()[-1]
         source, over = pathlib.Path(command.split(" -c ")[-1]), here / "over"
-        if source == ROOT / file:
-            source = over / file
-        elif source != BUILD and BUILD in source.parents:  # files joined into one: the changed one in its position
-            joined = over / "joined.cpp"
-            joined.write_text(source.read_text().replace(f"{ROOT / file}", f"{over / file}"))
+        if source.is_relative_to(ROOT) and str(source.relative_to(ROOT)) in files:
+            source = over / source.relative_to(ROOT)
+        elif source != BUILD and BUILD in source.parents:  # files joined into one: the changed ones in their position
+            joined = over / f"joined_{out}.cpp"
+            text = source.read_text()
+            for file in files:
+                text = text.replace(f"{ROOT / file}", f"{over / file}")
+            joined.write_text(text)
             source = joined
         command = re.sub(f" -I{ROOT}(?= )", f" -I{over} -I{ROOT}", command)
-        command = re.sub(r" -O[0-3]", " -O0", command)
+        command = re.sub(r" -O[0-3]", f" {level}", command)
         command = re.sub(r" -Werror| -Winvalid-pch| -fpch-preprocess| -include [^ ]*pch[^ ]*", "", command)
-        return f"{command.split(' -MD ')[0]} -o {here}/changed.o -c {source}"
+        return f"{command.split(' -MD ')[0]} -o {here}/{out} -c {source}"
 
     @staticmethod
     def link(target, made, here):
-        """The target's own command without the right object, and with the changed one before all others: of what a header
-        defines in several objects, tests among them, the first one counts."""
+        """The target's own command without the right objects, the keys of `made`, and with the changed ones before all others:
+        of what a header defines in several objects, tests among them, the first one counts."""
         commands = output_of("ninja", "-C", str(BUILD), "-t", "commands", f"bin/{target}").splitlines()
         command = [c for c in commands if re.search(f" -o bin/{target}( |$)", c)][-1]
-        if made.startswith("tests/") and f" {made} " not in command:
-            raise Wrong(f"{target} is not linked of {made}; correct the object in {TABLE}")
-        command = re.sub(r"(?= \S+\.o )", lambda _: f" {here}/changed.o", command, count=1).replace(f" {made} ", " ", 1)
+        for right, changed in made.items():
+            if right.startswith("tests/") and f" {right} " not in command:
+                raise Wrong(f"{target} is not linked of {right}; correct the object in {TABLE}")
+            command = re.sub(r"(?= \S+\.o )", lambda _: f" {here}/{changed}", command, count=1).replace(f" {right} ", " ", 1)
         return command.replace(f" -o bin/{target}", f" -o {here}/program", 1)
 
 
@@ -366,6 +373,59 @@ class TreeCopy:
         return None
 
 
+def judge_resets(pattern, jobs):
+    """Leaves out each reset of .ci/resets.txt in turn; returns how many survived. One program after the other is linked of objects
+    with a switch at each."""
+    try:
+        states = resets.read_table(ROOT)
+    except ValueError as wrong:
+        raise Wrong(wrong) from None
+    survived = tried = 0
+    for program in sorted({state.program for state in states}):
+        mine = [state for state in states if state.program == program]
+        sources = resets.Sources(ROOT, mine)
+        chosen = [(number, r) for number, r in enumerate(sources.resets) if re.search(pattern, f"{r.name} {r.file} {r.state.cases}")]
+        if not chosen:
+            continue
+        with tempfile.TemporaryDirectory(prefix="kerf-resets.") as name, ending(concurrent.futures.ThreadPoolExecutor(jobs)) as pool:
+            here = pathlib.Path(name)
+            release = ReleaseObjects(here, [Mutation("resets", program, [], f"{program} {mine[0].cases}")])
+            build_switched(release, program, sources, mine, here)
+
+            def notice(number, reset):
+                return release.noticed(str(here / "program"), f"{program} {reset.state.cases}", here / f"{number}.log", number)
+
+            for cases in sorted({reset.state.cases for _, reset in chosen}):
+                if found := notice(-1, next(r for _, r in chosen if r.state.cases == cases)):
+                    raise Wrong(f"'{program} {cases}' fails with nothing left out: {found}; correct that first")
+            futures = {pool.submit(notice, number, reset): reset for number, reset in chosen}
+            for future in concurrent.futures.as_completed(futures):
+                reset, caught = futures[future], future.result()
+                tried, survived = tried + 1, survived + (not caught)
+                print(f"{reset.name:<34} {reset.file}:{reset.line:<5} {caught or 'SURVIVED'}", flush=True)
+    if not tried:
+        raise Wrong(f"{pattern}: no reset matches")
+    print(f"mutate: resets: {tried} resets left out, {survived} survived")
+    return survived
+
+
+def build_switched(release, program, sources, states, here):
+    for file, text in sources.changed.items():
+        (here / "over" / file).parent.mkdir(parents=True, exist_ok=True)
+        (here / "over" / file).write_text(text)
+    made = {}
+    for file in sources.changed:
+        for wanted in sorted({wanted for state in states for wanted in state.objects}):
+            found = release.object_of(Mutation("", "", [], "", wanted), file)
+            if found and found not in made:
+                made[found] = f"{len(made)}.o"
+    commands = [release.compile(list(sources.changed), right, here, changed, "-O1") for right, changed in made.items()]
+    for command in (*commands, release.link(program, made, here)):
+        code, text = run(command, here / "build.log", cwd=BUILD)
+        if code:
+            raise Wrong(f"{program}: does not build with switches: {first_error(text)}")
+
+
 @contextlib.contextmanager
 def ending(pool):
     """If this program is stopped, no process of it goes on."""
@@ -434,7 +494,7 @@ def judge(name, mutations, jobs, again):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("list", nargs="?", choices=LISTS[:-1])
+    parser.add_argument("list", nargs="?", choices=[*LISTS[:-1], "resets"])
     parser.add_argument("pattern", nargs="?", default="")
     parser.add_argument("--check", action="store_true")
     parser.add_argument("--jobs", type=int)
@@ -447,6 +507,8 @@ def main():
     if options.check:
         print(f"mutate: {len(mutations)} mutations, each text stands once")
         return 0
+    if options.list == "resets":
+        return 1 if judge_resets(options.pattern, options.jobs or os.cpu_count()) else 0
     mine = [m for m in mutations if m.list == options.list and re.search(options.pattern, repr(m))]
     if not mine:
         raise Wrong(f"{options.pattern}: no mutation of {options.list} matches")
