@@ -4,6 +4,7 @@
 #include <csignal>
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <optional>
 #include <thread>
 #include <utility>
@@ -227,27 +228,35 @@ TEST_CASE("--guard finds nothing to say about the program's own loop") {
 }
 
 TEST_CASE("--probe shows each device, and its motors never push") {
+  // Side by side: each takes 5 s, so that a busy machine has time for homing and calibration.
+  struct Probed {
+    explicit Probed(const std::string& device)
+        : emulator({kBin + "/kerf-emulator", "--personality", device, "--socket", socket, "--hand",
+                    kScenes + "/hands/touch.toml", "--report", (folder / "emulator.json").string()},
+                   folder / "emulator.log"),
+          probe({kBin + "/kerf-controller", "--probe", "--device", device, "--port",
+                 "socket:" + socket, "--torque-scale", "1,1,1", "--seconds", "5", "--report",
+                 (folder / "probe.json").string()},
+                folder / "probe.log") {}
+    TemporaryFolder folder;
+    std::string socket = (folder / "port").string();
+    Process emulator, probe;
+  };
+  std::map<std::string, Probed> all;
   for (const std::string device : {"omni", "falcon", "woodenhaptics"}) {
+    all.try_emplace(device, device);
+  }
+  for (auto& [device, one] : all) {
     CAPTURE(device);
-    const TemporaryFolder folder;
-    const std::string socket = (folder / "port").string();
-    Process emulator(
-        {kBin + "/kerf-emulator", "--personality", device, "--socket", socket, "--hand",
-         kScenes + "/hands/touch.toml", "--report", (folder / "emulator.json").string()},
-        folder / "emulator.log");
-    Process probe({kBin + "/kerf-controller", "--probe", "--device", device, "--port",
-                   "socket:" + socket, "--torque-scale", "1,1,1", "--seconds", "2.5", "--report",
-                   (folder / "probe.json").string()},
-                  folder / "probe.log");
-    REQUIRE(probe.wait() == 0);
-    CHECK(emulator.wait() == 0);
-    CHECK(probe.output().find("tip ") != std::string::npos);
-    const auto seen = kerf::test::read_json_file(folder / "probe.json");
+    REQUIRE(one.probe.wait() == 0);
+    CHECK(one.emulator.wait() == 0);
+    CHECK(one.probe.output().find("tip ") != std::string::npos);
+    const auto seen = kerf::test::read_json_file(one.folder / "probe.json");
     CHECK(seen["reports"] > 1000);
     CHECK(seen["lost_packets"] == 0);
     CHECK(seen["homed"] == true);
     CHECK(seen["calibrated"] == true);
-    const auto told = kerf::test::read_json_file(folder / "emulator.json");
+    const auto told = kerf::test::read_json_file(one.folder / "emulator.json");
     CHECK(told["commands_received"] > 100);
     CHECK(told["peak_motor_force_n"] == 0.0);
   }

@@ -158,15 +158,17 @@ TEST_CASE("a path with control characters is told on one line, and moves no curs
   const std::string socket = (folder / "a\nb\x1b[31m").string();
   const std::string told = (folder / "a\\nb\\x1b[31m").string();
   {
-    Process emulator({kBin + "/kerf-emulator", "--socket", socket}, folder / "log");
+    Process emulator({kBin + "/kerf-emulator", "--socket", socket, "--priority", "0"},
+                     folder / "log");
     REQUIRE(eventually([&] { return std::filesystem::exists(socket); }, 10s));
     emulator.signal(SIGTERM);
     CHECK(emulator.wait() == 0);
     CHECK(emulator.output() == "kerf-emulator: omni at " + told + "\n");
   }
   {
-    Process nowhere({kBin + "/kerf-emulator", "--socket", (folder / "no\n/port").string()},
-                    folder / "log");
+    Process nowhere(
+        {kBin + "/kerf-emulator", "--socket", (folder / "no\n/port").string(), "--priority", "0"},
+        folder / "log");
     CHECK(nowhere.wait() == 2);
     CHECK(nowhere.output().starts_with(
         "kerf-emulator: --socket: " + (folder / "no\\n/port").string() + ": "));
