@@ -29,8 +29,9 @@ cat >"$clone/CMakeLists.txt" <<'PROJECT'
 cmake_minimum_required(VERSION 3.25)
 project(kerf VERSION 0.1.0 LANGUAGES CXX)
 set(CMAKE_RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/bin)
+file(GLOB sources CONFIGURE_DEPENDS *.cpp)  # so that ninja looks for new files first, as it does for kerf
 foreach(name controller emulator visualizer recorder record volume)
-  add_executable(kerf-${name} main.cpp)
+  add_executable(kerf-${name} ${sources})
 endforeach()
 PROJECT
 # Asked for more than two words it falls, as a library without memory lets it.
