@@ -44,7 +44,8 @@ case $name in
     trap 'stop=1' TERM
     touch "$LAB/segment"
     printf 'hand_unit_mm=2\nhand_script=%s/hand.toml\nrate_hz=%s\n' "$LAB" "${RATE_HZ:-500}" \
-      >"${option[--emulator-args]}"
+      >"${option[--emulator-args]}.part"
+    mv "${option[--emulator-args]}.part" "${option[--emulator-args]}"  # at once, as the controller does
     until grep -q '^emulator.*--hand' "$LAB/calls" || ((stop)); do sleep 0.02; done
     for ((i = 0; i < 10 * option[--seconds] && !stop; ++i)); do sleep 0.03; done
     # As on a disk that the recording has filled.
