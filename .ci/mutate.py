@@ -128,7 +128,7 @@ def check(mutations):
         if mutation.name in names:
             raise Wrong(f"{mutation.name}: stands twice in {TABLE}; rename one")
         names.add(mutation.name)
-        if mutation.list != "contact" and not re.match(rf"test_|\.ci/|{PAGE_TEST}: |(omni|falcon|woodenhaptics) ", mutation.catcher):
+        if mutation.list != "contact" and not re.match(rf"test_|\.ci/|{PAGE_TEST}: |(omni|falcon|woodenhaptics|inverse3|touch|omega) ", mutation.catcher):
             raise Wrong(f"{mutation.name}: '{mutation.catcher}' is no test, check or fault script; correct {TABLE}")
         program, _, pattern = mutation.catcher.partition(" ")
         if mutation.object and program.startswith("test_"):

@@ -20,13 +20,6 @@ bool pushes(const ServoOutput& sent) noexcept {
          std::ranges::any_of(sent.motor_counts, [](std::int16_t count) { return count != 0; });
 }
 
-/// Whether two reports are of the same readings.
-bool is_same(const DeviceReport& a, const DeviceReport& b) noexcept {
-  return a.encoder == b.encoder && a.wiper_a == b.wiper_a && a.wiper_b == b.wiper_b &&
-         a.button1 == b.button1 && a.button2 == b.button2 && a.parked == b.parked &&
-         a.homed == b.homed;
-}
-
 }  // namespace
 
 DeviceReport DeviceDriver::read() noexcept {
@@ -48,9 +41,10 @@ DeviceReport DeviceDriver::read() noexcept {
   return last_;
 }
 
-/// Once the readings count as standing still, that lasts while the force fades too.
+/// Only the position counts: gimbal and buttons have sensors of their own, which may go on without
+/// it. Once it counts as standing still, that lasts while the force fades too.
 void DeviceDriver::follow_change(const DeviceReport& before) noexcept {
-  const bool changed = last_.fresh && !is_same(last_, before);
+  const bool changed = last_.fresh && last_.encoder != before.encoder;
   const bool is_still = still_reads_ >= most_still_reads_;
   if (changed || !(pushing_ || (forcing_ && is_still))) {
     still_reads_ = 0;

@@ -45,16 +45,17 @@ class DeviceDriver {
     most_still_reads_ = static_cast<std::uint32_t>(kStillS * rate_hz);
   }
 
-  /// A device without a number in its packets may repeat an old one for ever. After so long under
-  /// torque without any change of a reading its reports are not fresh, until one changes or the
-  /// motors are off.
+  /// A device without a number in its packets may repeat an old one without end. After so long
+  /// under torque without a change of its position its reports are not fresh, until the position
+  /// changes or the motors are off. An orientation or a button that changes proves nothing about
+  /// the position, which has a sensor of its own.
   ///
   /// No shorter, since an arm may truly stand still: its friction (0.2 to 0.3 N) hides the tremor
   /// of the hand that holds it (0.1 mm on a grip of 0.5 N/mm), until the hand's force drifts by as
   /// much, and a weight is measured at an arm that rests for two seconds (docs/devices.md). Such an
   /// arm answers the fading force by a motion, or loses it.
   static constexpr double kStillS = 3.0;
-  /// For a measurement, whose emulated hand may stand still under force for ever.
+  /// For a measurement, whose emulated hand may stand still under force without end.
   void allow_stillness() noexcept { most_still_reads_ = UINT32_MAX; }
 
   /// Sends the motor counts of this tick, with the lights of the phase. On a half-duplex link a
@@ -105,7 +106,7 @@ class DeviceDriver {
   bool pushing_ = false;  ///< and a motor with torque
   DeviceReport last_;
   std::uint64_t refused_ = 0;
-  std::uint32_t still_reads_ = 0;  ///< under torque, in which no reading has changed
+  std::uint32_t still_reads_ = 0;  ///< under torque, in which the position has not changed
   std::uint32_t most_still_reads_ = static_cast<std::uint32_t>(kStillS * 1000);
 };
 
@@ -176,9 +177,9 @@ class OmniDriver final : public DeviceDriver {
 
 /// A Cartesian device: numbered reports of a pose in kerf's own packets, whoever makes them. Old
 /// ones are refused; but the numbers are those of an adapter, which counts on if its device stands
-/// still, so readings that stand still under force are no reports here too. A position that 16 bits
-/// of counts cannot hold is refused, so nothing wraps. An unpowered device counts as not homed: its
-/// motors stay off.
+/// still, so a position that stands still under force is no report here too. A position that 16
+/// bits of counts cannot hold is refused, so nothing wraps. An unpowered device counts as not
+/// homed: its motors stay off.
 class CartesianDriver final : public DeviceDriver {
  public:
   CartesianDriver(PacketPort& port, int step_um) noexcept : DeviceDriver(port), step_um_(step_um) {}

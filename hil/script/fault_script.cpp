@@ -28,6 +28,11 @@ bool has_ms(FaultKind kind) {
   return kind == FaultKind::delay || kind == FaultKind::host_late || kind == FaultKind::replay;
 }
 
+bool lasts(FaultKind kind) {
+  return kind != FaultKind::host_late && kind != FaultKind::hang_up && kind != FaultKind::closing &&
+         kind != FaultKind::half_close && kind != FaultKind::both_closed;
+}
+
 DeviceFault fault_of(const ScriptTable& table) {
   table.allow_only({"kind", "packets", "at_s", "for_s", "every", "axis", "counts", "ms"});
   if (!table.has("kind")) table.fail(": no kind; add one, for example kind = \"lose\"");
@@ -43,7 +48,7 @@ DeviceFault fault_of(const ScriptTable& table) {
   only_if(is_of_axis(fault.kind), "axis");
   only_if(has_counts(fault.kind), "counts");
   only_if(has_ms(fault.kind), "ms");
-  only_if(fault.kind != FaultKind::host_late && fault.kind != FaultKind::hang_up, "for_s");
+  only_if(lasts(fault.kind), "for_s");
   fault.of_commands =
       table.word("packets", "reports", std::array<std::string_view, 2>{"reports", "commands"}) ==
       "commands";

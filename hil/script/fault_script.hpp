@@ -12,31 +12,42 @@ namespace kerf {
 
 /// A kind of fault. Names in fault files are those of `kFaultWords`.
 enum class FaultKind : std::uint8_t {
-  lose,       ///< packets vanish
-  delay,      ///< packets come `ms` late
-  duplicate,  ///< packets come twice
-  reorder,    ///< a packet comes after its successor
-  truncate,   ///< packets end early, at a random byte
-  corrupt,    ///< one random bit of a packet is wrong
-  stick,      ///< the encoder of `axis` stands still
-  jump,       ///< it is off by `counts`
-  wander,     ///< it is off by a random walk of steps up to `counts`
-  park,       ///< the device reports that it is parked
-  chatter,    ///< it reports so at random
-  unhome,     ///< the device reports that it is not homed (Falcon)
-  noise,      ///< the low bits of the gimbal pots are noise (Omni)
-  silence,    ///< the device sends nothing, and still receives
-  unplug,     ///< it neither sends nor receives
-  host_late,  ///< the host stands still for `ms`
-  replay,     ///< the packets of `ms` ago come again instead of new ones (Omni: they are numbered)
-  freeze,     ///< every reading stands still (Falcon, WoodenHaptics)
-  hang_up,    ///< the device ends the link for good, and still receives
+  lose,        ///< packets vanish
+  delay,       ///< packets come `ms` late
+  duplicate,   ///< packets come twice
+  reorder,     ///< a packet comes after its successor
+  truncate,    ///< packets end early, at a random byte
+  corrupt,     ///< one random bit of a packet is wrong
+  stick,       ///< the encoder of `axis` stands still
+  jump,        ///< it is off by `counts`
+  wander,      ///< it is off by a random walk of steps up to `counts`
+  park,        ///< the device reports that it is parked
+  chatter,     ///< it reports so at random
+  unhome,      ///< the device reports that it is not homed (Falcon)
+  noise,       ///< the low bits of the gimbal pots are noise (Omni)
+  silence,     ///< the device sends nothing, and still receives
+  unplug,      ///< it neither sends nor receives
+  host_late,   ///< the host stands still for `ms`
+  replay,      ///< the packets of `ms` ago come again instead of new ones (Omni: they are numbered)
+  freeze,      ///< every reading stands still (Falcon, WoodenHaptics)
+  hang_up,     ///< the device ends the link for good, and still receives
+  still,       ///< the position stands still while the gimbal turns (Cartesian)
+  unreadable,  ///< no reply of the service can be read (Inverse3 by `--port ws`)
+  closing,     ///< the service sends a closing frame (Inverse3 by `--port ws`)
+  half_close,  ///< it ends its side of the link, and reads on (Inverse3 by `--port ws`)
+  both_closed,  ///< it ends both sides of the link (Inverse3 by `--port ws`)
 };
 
-inline constexpr std::array<std::string_view, 19> kFaultWords{
-    "lose",   "delay",     "duplicate", "reorder", "truncate", "corrupt", "stick",
-    "jump",   "wander",    "park",      "chatter", "unhome",   "noise",   "silence",
-    "unplug", "host_late", "replay",    "freeze",  "hang_up"};
+inline constexpr std::array<std::string_view, 24> kFaultWords{
+    "lose",    "delay",   "duplicate",  "reorder",   "truncate",   "corrupt",
+    "stick",   "jump",    "wander",     "park",      "chatter",    "unhome",
+    "noise",   "silence", "unplug",     "host_late", "replay",     "freeze",
+    "hang_up", "still",   "unreadable", "closing",   "half_close", "both_closed"};
+
+/// A fault of the service and its link, which packets cannot show: ServiceLink plays it.
+[[nodiscard]] constexpr bool is_of_service(FaultKind kind) noexcept {
+  return kind >= FaultKind::unreadable;
+}
 
 /// The start of a script's clock; words in fault files are those of `kFaultClockWords`.
 enum class FaultClock : std::uint8_t {
@@ -96,7 +107,7 @@ struct FaultScript {
 /// The same from text; `place` names it in errors.
 [[nodiscard]] FaultScript parse_fault_script(std::string_view text, const std::string& place);
 
-/// Three to six faults of any kind but the last three, each of 20 to 320 ms (a late host: 1 to 100
+/// Three to six faults of any kind before `replay`, each of 20 to 320 ms (a late host: 1 to 100
 /// ms), within two seconds, by `seed`.
 [[nodiscard]] FaultScript random_faults(std::uint32_t seed);
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 #include <utility>
 
 #include "hil/device/packet_device.hpp"
@@ -125,6 +126,22 @@ void hold_cartesian(std::span<const std::uint8_t> held, std::vector<std::uint8_t
   packet.assign(bytes.begin(), bytes.end());
 }
 
+/// Puts the position of a held report of a Cartesian device into `packet`, whose orientation turns
+/// to and fro by 0.2 rad about z within a second. Nothing for another device.
+void hold_position(std::span<const std::uint8_t> held, std::vector<std::uint8_t>& packet,
+                   std::int64_t cycle) {
+  auto now = decode_cartesian_report(packet);
+  const auto then = decode_cartesian_report(held);
+  if (!now || !then) return;
+  const double half_rad =
+      0.1 * std::sin(2 * std::numbers::pi * static_cast<double>(cycle) / kCyclesPerSecond);
+  now->position_um = then->position_um;
+  now->orientation =
+      cartesian::packed_orientation({0, 0, std::sin(half_rad), std::cos(half_rad)}).value();
+  const auto bytes = encode(*now);
+  packet.assign(bytes.begin(), bytes.end());
+}
+
 std::int16_t wrapped(int count) {
   return static_cast<std::int16_t>(static_cast<std::uint16_t>(count));
 }
@@ -159,6 +176,17 @@ bool FaultyDevice::hung_up() const noexcept {
   return std::ranges::any_of(faults_, [](const Running& running) {
     return running.fault.kind == FaultKind::hang_up && running.begun;
   });
+}
+
+std::optional<FaultyDevice::ServiceChange> FaultyDevice::take_service_change() noexcept {
+  for (Running& running : faults_) {
+    if (!is_of_service(running.fault.kind) || !running.begun) continue;
+    if (!std::exchange(running.begin_told, true)) return ServiceChange{running.fault.kind, true};
+    if (running.ended || runs(running)) continue;
+    running.ended = true;
+    return ServiceChange{running.fault.kind, false};
+  }
+  return std::nullopt;
 }
 
 std::uint64_t FaultyDevice::met() const noexcept {
@@ -254,7 +282,7 @@ void FaultyDevice::break_sensors(Bytes& packet) {
     std::int16_t& count = readings->encoder[static_cast<std::size_t>(fault.axis)];
     if (!runs(running)) {
       running.stuck_at = count;
-      if (fault.kind == FaultKind::freeze) running.held = packet;
+      if (fault.kind == FaultKind::freeze || fault.kind == FaultKind::still) running.held = packet;
       continue;
     }
     changed = true;
@@ -266,6 +294,10 @@ void FaultyDevice::break_sensors(Bytes& packet) {
       case FaultKind::freeze:
         hold_cartesian(running.held, packet);
         readings = readings_of(running.held, step_um).value_or(*readings);
+        break;
+      case FaultKind::still:
+        hold_position(running.held, packet, cycle_);
+        readings = readings_of(packet, step_um).value_or(*readings);
         break;
       case FaultKind::jump:
         count = wrapped(count + fault.counts);
@@ -313,7 +345,8 @@ void FaultyDevice::step_clock() noexcept {
     if (running.begun || !runs(running)) continue;
     running.begun = true;
     running.begun_at = cycle_;
-    running.changed = running.fault.kind == FaultKind::host_late ? 1 : 0;
+    const FaultKind kind = running.fault.kind;
+    running.changed = kind == FaultKind::host_late || is_of_service(kind) ? 1 : 0;
     ++begun_;
   }
 }

@@ -36,6 +36,12 @@ class FaultyDevice final : public PacketDevice {
 
   /// Returns true if a fault makes the host stand still now; the caller keeps it from running then.
   [[nodiscard]] bool host_is_late() const noexcept;
+  /// A fault of a service (`is_of_service`) that has begun or ended in the last cycles, each once.
+  struct ServiceChange {
+    FaultKind kind{};
+    bool begins = true;
+  };
+  [[nodiscard]] std::optional<ServiceChange> take_service_change() noexcept;
   /// Faults that have begun.
   [[nodiscard]] std::uint64_t begun() const noexcept { return begun_; }
   /// Faults that have changed something: a packet, a reading, the host's time.
@@ -51,12 +57,14 @@ class FaultyDevice final : public PacketDevice {
     DeviceFault fault;
     std::int64_t from = 0, to = 0;  ///< cycles of the script's clock
     bool begun = false;
+    bool ended = false;  ///< of a service, and that was told
+    bool begin_told = false;
     std::int64_t begun_at = 0;  ///< cycle of the device
     std::uint64_t changed = 0;
     int packets = 0;            ///< of its stream since it began
     std::int16_t stuck_at = 0;  ///< of `stick`
     int off_by = 0;             ///< of `wander`
-    Bytes held{};               ///< of `freeze`: the last packet before it
+    Bytes held{};               ///< of `freeze` and `still`: the last packet before it
   };
   /// A packet on its way.
   struct Due {

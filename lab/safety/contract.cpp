@@ -72,6 +72,10 @@ void SafetyMonitor::fault_begins(double time_ms) noexcept {
   if (outcome_.latched == fault_name(Fault::none)) begun_ms_ = time_ms;
 }
 
+void SafetyMonitor::service_fails(double time_ms) noexcept {
+  if (service_failed_ms_ < 0) service_failed_ms_ = time_ms;
+}
+
 void SafetyMonitor::check(bool kept, double time_ms, const char* rule, double value, double limit) {
   if (kept) return;
   char line[128];
@@ -353,6 +357,10 @@ void SafetyMonitor::cycle(double time_ms, const DeviceMoment& device) {
   const double force_n = norm(device.motor_force_n);
   outcome_.device_peak_n = std::max(outcome_.device_peak_n, force_n);
   outcome_.pushed = outcome_.pushed || force_n > kPushN;
+  if (told_.parked && told_.homed) service_failed_ms_ = -1;
+  const double failed_ms = service_failed_ms_ < 0 ? 0 : time_ms - service_failed_ms_;
+  check(failed_ms <= kZeroMs + kCycleMs || force_n < kStepN, time_ms,
+        "force of the motors, ms after the service failed", failed_ms, kZeroMs);
   if (!trusted_ || !zero_is_known_ || !zero_is_true_) return;
   const double limit_n = limits_.force_n * kDeviceShare + kStepN;
   check(force_n <= limit_n, time_ms, "force of the motors in N", force_n, limit_n);

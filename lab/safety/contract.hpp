@@ -43,6 +43,9 @@ class SafetyMonitor {
   void cycle(double time_ms, const DeviceMoment& device);
   /// Something goes wrong. The time to a latched fault counts from the newest one before it.
   void fault_begins(double time_ms) noexcept;
+  /// A service or its link has shown that the connection ends: called again while it is so. The
+  /// motors are off after kZeroMs, until the device was parked anew.
+  void service_fails(double time_ms) noexcept;
   /// The run is over; `latches` as in FaultScript, `faults_end_ms` when the last fault was over.
   void end(double time_ms, const std::string& latches, double faults_end_ms);
 
@@ -117,6 +120,7 @@ class SafetyMonitor {
   bool docked_ = true;
   double begun_ms_ = 0;
   double last_push_ms_ = -1;
+  double service_failed_ms_ = -1;  ///< since then; negative: it has not, or was parked anew
 };
 
 }  // namespace kerf::faults

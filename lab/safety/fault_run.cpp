@@ -90,6 +90,7 @@ Effect effect_of(const DeviceFault& fault) {
     case FaultKind::stick:
     case FaultKind::jump:
     case FaultKind::wander:
+    case FaultKind::still:
     case FaultKind::host_late:
       return {true, false};
     case FaultKind::corrupt:
@@ -105,6 +106,10 @@ Effect effect_of(const DeviceFault& fault) {
       return {fault.of_commands, true};
     case FaultKind::silence:
     case FaultKind::hang_up:
+    case FaultKind::unreadable:
+    case FaultKind::closing:
+    case FaultKind::half_close:
+    case FaultKind::both_closed:
       return {false, true};
     case FaultKind::park:
     case FaultKind::chatter:
@@ -152,6 +157,8 @@ bool concerns(FaultKind kind, Personality personality, bool by_service) noexcept
   }
   if (kind == FaultKind::noise) return personality == Personality::omni;
   if (kind == FaultKind::replay) return is_numbered;
+  if (is_of_service(kind)) return by_service;
+  if (kind == FaultKind::still) return is_cartesian(personality);
   if (kind == FaultKind::freeze) return personality != Personality::omni;
   return true;
 }
@@ -164,7 +171,7 @@ FaultOutcome run_faults(const FaultCase& subject, const FaultScript& as_written)
   PacketDevice* served = &device;
 #ifdef KERF_LAB_HAS_SERVICE
   std::optional<ServiceLink> link;
-  if (subject.by_service) served = &link.emplace(device);
+  if (subject.by_service) served = &link.emplace(device, script.seed);
 #endif
   DirectPort wire(*served);
 
@@ -193,6 +200,9 @@ FaultOutcome run_faults(const FaultCase& subject, const FaultScript& as_written)
     time_ms = static_cast<double>(cycle) * 1000 / kCyclesPerSecond;
     if (device.begun() > outcome.faults_begun) contract.fault_begins(time_ms);
     outcome.faults_begun = device.begun();
+#ifdef KERF_LAB_HAS_SERVICE
+    if (link && link->has_failed()) contract.service_fails(time_ms);
+#endif
     contract.cycle(time_ms, {emulator.model().motor_force_n(), emulator.model().docked()});
     if (first_push_ms < 0 && outcome.pushed) first_push_ms = time_ms;
     const auto now_ns = static_cast<std::int64_t>(time_ms * 1e6);

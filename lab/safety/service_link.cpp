@@ -12,14 +12,29 @@ namespace {
 
 constexpr std::int64_t kCycleNs = 1'000'000'000 / kCyclesPerSecond;
 
+ServiceFault fault_of(const FaultyDevice::ServiceChange& change) {
+  switch (change.kind) {
+    case FaultKind::closing:
+      return ServiceFault::close;
+    case FaultKind::half_close:
+      return ServiceFault::half_close;
+    case FaultKind::both_closed:
+      return ServiceFault::fin;
+    default:
+      return change.begins ? ServiceFault::unreadable : ServiceFault::readable;
+  }
+}
+
 }  // namespace
 
-using inverse3::Bar;
+using inverse3::ForceKey;
 using inverse3::ServicePort;
+using inverse3::TurnGame;
 
-ServiceLink::ServiceLink(PacketDevice& device) : service_({}, device) {
+ServiceLink::ServiceLink(FaultyDevice& device, std::uint32_t seed)
+    : device_(device), service_({.first_way = static_cast<int>(seed % kMalformedWays)}, device) {
   connect();
-  if (!session_) throw std::runtime_error("the emulated service lists no device");
+  if (!game_) throw std::runtime_error("the emulated service lists no device");
 }
 
 std::int64_t ServiceLink::now_ns() const noexcept {
@@ -31,12 +46,15 @@ void ServiceLink::connect() {
   const std::string first = service_.greet();
   ++cycle_;
   command_ = {};
-  has_news_ = is_waiting_ = takes_back_ = false;
-  unread_ = 0;
+  has_news_ = is_waiting_ = false;
+  inverse3::ServiceState state;
   try {
-    if (parse_state(first, state_)) {
-      session_.emplace(inverse3::Wanted{}, inverse3::ForceKey::vector, state_, now_ns());
-      backoff_ns_ = ServicePort::kFirstBackoffNs;
+    if (parse_state(first, state)) {
+      const inverse3::Wanted wanted{.device_id = device_id_,
+                                    .is_again = !device_id_.view().empty()};
+      game_.emplace(wanted, ForceKey::vector, state, now_ns());
+      device_id_ = game_->session().device_id();
+      began_ns_ = now_ns();
       return;
     }
   } catch (const std::runtime_error&) {  // thrown if the device is not listed
@@ -47,21 +65,40 @@ void ServiceLink::connect() {
 
 void ServiceLink::receive(std::span<const std::uint8_t> packet) noexcept {
   const auto command = decode_cartesian_command(packet);
-  if (!command || !session_) return;
+  if (!command || !game_) return;
   command_ = *command;
   command_ns_ = now_ns();
   has_news_ = true;
 }
 
 void ServiceLink::advance(int cycles) noexcept {
+  has_failed_ = false;
   for (int i = 0; i < cycles; ++i) cycle();
 }
 
+/// A reply that cannot be read does not end a connection by itself: three of them do.
+void ServiceLink::begin_faults() {
+  while (const auto change = device_.take_service_change()) {
+    if (!change->begins && change->kind != FaultKind::unreadable) continue;  // of a moment
+    service_.begin(fault_of(*change));
+    has_failed_ = has_failed_ || change->begins;
+  }
+  const auto fault = service_.take_link_fault();
+  if (fault && game_) drop(*fault != ServiceFault::fin);
+}
+
 void ServiceLink::cycle() {
-  if (session_ && service_.hung_up()) drop();
-  if (!session_ && !service_.hung_up() && now_ns() >= retry_ns_) return connect();
+  begin_faults();
+  if (game_ && service_.hung_up()) drop(true);
+  if (std::exchange(owes_word_, false)) {
+    inverse3::MessageBuffer buffer;
+    service_.receive(inverse3::last_word(device_id_, ForceKey::vector, buffer));
+    ++cycle_;
+    return;
+  }
+  if (!game_ && !service_.hung_up() && now_ns() >= retry_ns_) return connect();
   const bool is_due =
-      session_ && !is_waiting_ && (has_news_ || now_ns() - sent_ns_ >= ServicePort::kTurnNs);
+      game_ && !is_waiting_ && (has_news_ || now_ns() - sent_ns_ >= TurnGame::kTurnNs);
   if (is_due) {
     play_turn();
   } else {
@@ -74,43 +111,27 @@ void ServiceLink::cycle() {
 void ServiceLink::play_turn() {
   while (service_.next_reply()) {
   }  // discards what the service sent unasked
-  const bool takes_back = std::exchange(takes_back_, false);
-  const auto force_n =
-      session_->force_n(takes_back ? CartesianCommand{} : command_, command_ns_, now_ns());
-  const auto extra = turns_ % ServicePort::kFullStateTurns == 1 ? inverse3::Extra::full_state
-                                                                : inverse3::Extra::none;
-  inverse3::MessageBuffer buffer;
   sent_ns_ = now_ns();
-  has_news_ = is_late_ = false;
+  has_news_ = false;
   is_waiting_ = true;
   ++turns_;
-  service_.receive(force_message(session_->device_id(), session_->key(), force_n, extra, buffer));
+  inverse3::MessageBuffer buffer;
+  service_.receive(game_->next(command_, command_ns_, now_ns(), now_ns(), buffer));
 }
 
 void ServiceLink::await_reply() {
-  const auto reply = service_.next_reply();
-  const std::int64_t took_ns = now_ns() - sent_ns_;
-  if (took_ns >= ServicePort::kTakeBackNs && !std::exchange(is_late_, true)) {
-    takes_back_ = true;
-    session_->raise(Bar::stalled, now_ns());
-  }
-  if (reply) {
-    take(*reply);
-  } else if (took_ns >= ServicePort::kDropNs) {
-    drop();
+  if (const auto reply = service_.next_reply()) return take(*reply);
+  while (now_ns() >= game_->look_ns()) {
+    if (game_->look(now_ns(), now_ns()) == TurnGame::Wait::lost) return drop(true);
   }
 }
 
 void ServiceLink::take(const ServiceMessage& reply) {
   is_waiting_ = false;
   std::optional<CartesianReport> report;
-  const bool is_read = !reply.is_binary && parse_state(reply.text, state_);
-  if (is_read) report = session_->take(state_, number_ + 1, now_ns());
-  if (!is_read || (!report && session_->bar() != Bar::gone)) {
-    if (++unread_ >= ServicePort::kMostUnread) drop();
-    return;
-  }
-  unread_ = 0;
+  const std::string_view text = reply.is_binary ? std::string_view() : reply.text;
+  const auto read = game_->take(text, number_ + 1, now_ns(), now_ns(), report);
+  if (read == TurnGame::Reply::lost) drop(true);
   if (report) pass_on(*report);
 }
 
@@ -119,11 +140,16 @@ void ServiceLink::pass_on(const CartesianReport& report) {
   reports_.push_back(encode(report));
 }
 
-void ServiceLink::drop() {
-  pass_on(session_->farewell(number_ + 1));
-  session_.reset();
+/// As `ServicePort::drop`.
+void ServiceLink::drop(bool carries_a_word) {
+  pass_on(game_->session().farewell(number_ + 1));
+  game_.reset();
   is_waiting_ = false;
-  retry_ns_ = now_ns() + backoff_ns_;
+  owes_word_ = carries_a_word;
+  const bool was_short = now_ns() - began_ns_ < ServicePort::kFirstBackoffNs;
+  backoff_ns_ = ServicePort::kFirstBackoffNs;
+  retry_ns_ = now_ns() + (was_short ? backoff_ns_ : 0);
+  if (was_short) backoff_ns_ *= 2;
 }
 
 std::span<const std::uint8_t> ServiceLink::next_packet() noexcept {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The drivers above a bus in memory.
 #include <array>
+#include <cmath>
 #include <cstdint>
 
 #include <doctest/doctest.h>
@@ -431,4 +432,50 @@ TEST_CASE(
   CHECK_FALSE(next());
   report.position_um[1] = 10;
   CHECK(next());
+}
+
+TEST_CASE("cartesian: a gimbal that turns and buttons that are pressed are no life of a position") {
+  for (const kerf::Personality kind :
+       {kerf::Personality::inverse3, kerf::Personality::touch, kerf::Personality::omega}) {
+    CAPTURE(static_cast<int>(kind));
+    // Two arms: the second one moves, and is not taken for the first.
+    const int step_um = kerf::cartesian::figures(kind)->step_um;
+    Bench<kerf::CartesianDriver> still(step_um), moving(step_um);
+    kerf::CartesianReport report;
+    report.homed = report.powered = true;
+    const auto next = [&](auto& arm, int tick, bool moves) {
+      ++report.number;
+      const double half_rad = 0.001 * (tick % 200);
+      report.orientation =
+          kerf::cartesian::packed_orientation({0, 0, std::sin(half_rad), std::cos(half_rad)})
+              .value();
+      report.button1 = tick % 3 == 0;
+      report.position_um = {0, moves ? step_um * (tick % 2) : 0, 0};
+      arm.port.push(kerf::encode(report));
+      arm.driver.command(forcing({100, 0, 0}));
+      return arm.driver.read().fresh;
+    };
+    constexpr int kTicks = 3000;  // kStillS at 1 kHz
+    int fresh = 0, other = 0;
+    for (int tick = 0; tick < kTicks + 20; ++tick) {
+      fresh += next(still, tick, false) ? 1 : 0;
+      other += next(moving, tick, true) ? 1 : 0;
+    }
+    CHECK(fresh == kTicks);
+    CHECK(other == kTicks + 20);
+    CHECK(still.driver.refused() == 20);
+    CHECK(next(still, 1, true));
+  }
+}
+
+TEST_CASE("falcon: buttons that are pressed are no life of a position") {
+  Falcon falcon;
+  int fresh = 0;
+  for (int tick = 0; tick < 3020; ++tick) {
+    falcon.driver.command(forcing({1, 0, 0}));
+    const auto buttons = static_cast<std::uint8_t>(tick % 2 == 0 ? kerf::falcon::kButtonPlus : 0);
+    fresh +=
+        falcon.receive({.encoder = {5, 6, 7}, .buttons = buttons, .homed = kHomed}).fresh ? 1 : 0;
+  }
+  CHECK(fresh == 3001);  // the first one moves
 }

@@ -50,6 +50,11 @@ class ServedService {
     return inverse3::parse_service_port(":" + std::to_string(front_.port()) +
                                         ",events=" + std::to_string(*front_.event_port()) + more);
   }
+  /// Of all clients, once the thread has ended.
+  const std::vector<ClientRecord>& records() {
+    end();
+    return front_.records();
+  }
   /// The device at the end, once the thread has ended.
   const DeviceModel& end() {
     stop_ = true;

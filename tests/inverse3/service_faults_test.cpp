@@ -82,7 +82,8 @@ TEST_SUITE_BEGIN("network");
 
 TEST_CASE("a connection that ends is made anew, and the device has to be parked again") {
   for (const ServiceFault fault :
-       {ServiceFault::close, ServiceFault::reset, ServiceFault::half_open, ServiceFault::restart}) {
+       {ServiceFault::close, ServiceFault::going_away, ServiceFault::half_close, ServiceFault::fin,
+        ServiceFault::reset, ServiceFault::half_open, ServiceFault::restart}) {
     CAPTURE(kServiceFaultWords[static_cast<std::size_t>(fault)]);
     ServedService service(with(fault));
     const auto port = open(service.options());
@@ -96,6 +97,98 @@ TEST_CASE("a connection that ends is made anew, and the device has to be parked 
     CHECK(until_armed(*port).powered);
     CHECK_FALSE(port->closed());
   }
+}
+
+namespace {
+
+/// Pushes until the service fails and the port is on a new connection; the record of the first.
+ClientRecord record_of(const ServiceSettings& settings) {
+  ServedService service(settings);
+  auto port =
+      open(service.options(settings.profile == ServiceProfile::v3_5 ? kWireless : std::string()));
+  until_armed(*port);
+  std::int16_t x_mn = 1000;
+  const std::int64_t give_up_ns = monotonic_ns() + 10 * kNsPerSecond;
+  while (counter(*port, "reconnections") == 0 && monotonic_ns() < give_up_ns) {
+    command(*port, x_mn);
+    static_cast<void>(newest(*port));
+    sleep_until_ns(monotonic_ns() + 1'000'000);
+  }
+  REQUIRE(counter(*port, "reconnections") >= 1);
+  port.reset();
+  return service.records().front();
+}
+
+}  // namespace
+
+TEST_CASE("zero force is the last message on a connection whose service closes or ends its side") {
+  for (const ServiceFault fault :
+       {ServiceFault::close, ServiceFault::going_away, ServiceFault::half_close}) {
+    for (const ServiceProfile profile :
+         {ServiceProfile::v3_4, ServiceProfile::v3_5, ServiceProfile::v3_5_wireless}) {
+      CAPTURE(kServiceFaultWords[static_cast<std::size_t>(fault)]);
+      CAPTURE(static_cast<int>(profile));
+      const ClientRecord record = record_of(with(fault, profile));
+      CHECK(record.failed_ns > 0);
+      CHECK_FALSE(record.pushes_at_end);
+      CHECK(record.let_go_ns > record.failed_ns);
+      MESSAGE("from the bad sign to zero force, us: " << (record.let_go_ns - record.failed_ns) /
+                                                             1000);
+    }
+  }
+}
+
+TEST_CASE("zero force is the last message after replies that cannot be read, whatever is wrong") {
+  for (int way = 0; way < kMalformedWays; ++way) {
+    CAPTURE(way);
+    const ClientRecord record = record_of(
+        {.script = {{kSoon, ServiceFault::unreadable}, {kSoon + 800, ServiceFault::readable}},
+         .first_way = way});
+    CHECK(record.failed_ns > 0);
+    CHECK_FALSE(record.pushes_at_end);
+    CHECK(record.let_go_ns > record.failed_ns);
+    MESSAGE("from the bad sign to zero force, us: " << (record.let_go_ns - record.failed_ns) /
+                                                           1000);
+  }
+}
+
+TEST_CASE("after a silent service, too, zero force is the last message") {
+  ServiceSettings settings;
+  ServedService service(settings, script(FaultKind::silence, 0.3));
+  auto port = open(service.options());
+  pushed_until(*port, is_dead);
+  port.reset();
+  CHECK_FALSE(service.records().front().pushes_at_end);
+}
+
+TEST_CASE("a force that a lost connection left behind is taken back by the next one") {
+  for (const ServiceFault fault : {ServiceFault::fin, ServiceFault::reset}) {
+    CAPTURE(kServiceFaultWords[static_cast<std::size_t>(fault)]);
+    ServedService service(with(fault));
+    auto port = open(service.options());
+    const CartesianReport barred = pushed_until(*port, is_dead);
+    const CartesianReport first =
+        until(*port, 1000, [&](const CartesianReport& r) { return r.number > barred.number; });
+    CHECK(first.force_mn[0] == 0);
+    CHECK_FALSE(first.homed);
+    until_armed(*port);  // it is proven anew
+    port.reset();
+    REQUIRE(service.records().size() == 2);
+    CHECK(service.records()[0].pushes_at_end);  // nothing could be carried
+  }
+}
+
+TEST_CASE("a device that another program drives after a lost connection is not armed") {
+  ServedService service(
+      {.script = {{kSoon, ServiceFault::driven}, {kSoon + 80, ServiceFault::reset}}});
+  const auto port = open(service.options());
+  const SaidOnErrorStream said;
+  const CartesianReport barred = pushed_until(*port, is_dead);
+  until(*port, 0, [&](const CartesianReport& r) {
+    CHECK_FALSE(r.homed);
+    return r.number > barred.number + 200;
+  });
+  CHECK(said.has("the device is not idle since the connection was lost"));
 }
 
 TEST_CASE("a reply that is late is counted; after 20 ms the force is taken back") {

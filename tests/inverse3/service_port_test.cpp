@@ -239,6 +239,41 @@ TEST_CASE("nobody, a silent program and one that speaks otherwise: one line, and
   }
 }
 
+TEST_CASE("each status of an answer has the remedy of its own") {
+  struct Case {
+    const char* status;
+    const char* says;
+  };
+  for (const auto& [status, says] :
+       {Case{
+            "503 Service Unavailable",
+            "the service is in use (HTTP 503: in use); end the other program that uses the device"},
+        Case{"429 Too Many Requests", "takes no more requests now (HTTP 429: in use); end other"},
+        Case{"401 Unauthorized", "asks for a login (HTTP 401: in use), as no Inverse Service does"},
+        Case{"403 Forbidden", "asks for a login (HTTP 403: in use), as no Inverse Service does"},
+        Case{"407 Proxy Authentication Required", "asks for a login (HTTP 407: in use)"},
+        Case{"404 Not Found", "has no such address (HTTP 404: in use); needs the vendor's"},
+        Case{"302 Found", "sends elsewhere (HTTP 302: in use), so another program answers there"},
+        Case{"500 Internal Server Error", "has an error of its own (HTTP 500: in use); systemctl"},
+        Case{"502 Bad Gateway", "has an error of its own (HTTP 502: in use); systemctl"},
+        Case{"400 Bad Request", "does not take the request (HTTP 400: in use); needs the"}}) {
+    CAPTURE(status);
+    const std::string body = R"({"ok":false,"error":"in use"})";
+    const Stranger stranger(std::string("HTTP/1.1 ") + status + "\r\nContent-Length: " +
+                            std::to_string(body.size()) + "\r\n\r\n" + body);
+    const std::string line = refusal_of(stranger.port());
+    CAPTURE(line);
+    CHECK(has(line, says));
+    CHECK_FALSE(has(line, "\n"));
+    CHECK(has(line, "needs the vendor's") ==
+          (std::string(says).find("needs the") != std::string::npos));
+  }
+  // Of the upgrade, after a version that is one.
+  ServedService none({.profile = ServiceProfile::v3_0, .claims = ServiceProfile::v3_5});
+  CHECK(has(error_of([&] { open(none.options()); }),
+            "the service has no such address (HTTP 404: not found); needs the vendor's"));
+}
+
 TEST_CASE("a port that is taken is the fault of the option that named it") {
   const Stranger there("");
   Emulator emulator(std::make_unique<CartesianModel>(ServedService::as_service()), std::nullopt);
@@ -273,7 +308,9 @@ TEST_CASE("a second client is turned away, and the first one goes on" *
   ServedService service;
   const auto port = open(service.options());
   until_armed(*port);
-  CHECK_FALSE(error_of([&] { open(service.options()); }).empty());
+  const std::string line = error_of([&] { open(service.options()); });
+  CHECK(has(line, "the service is in use (HTTP 503: in use); end the other program"));
+  CHECK_FALSE(has(line, "needs the vendor's"));
   const std::uint64_t before = counter(*port, "packets");
   until_counted(*port, "packets", before + 20);
   CHECK_FALSE(port->closed());

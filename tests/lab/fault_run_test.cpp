@@ -118,3 +118,19 @@ TEST_CASE("a service passes a jump on as it is, and takes a lost reply for a los
   CHECK(lost.demanded.empty());
   CHECK_FALSE(lost.pushed_again);  // not parked again
 }
+
+TEST_CASE("whatever a service does to its link, what kerf has sent ends the force within 20 ms" *
+          doctest::skip(!kerf::faults::kHasService)) {
+  for (const FaultKind kind :
+       {FaultKind::unreadable, FaultKind::closing, FaultKind::half_close, FaultKind::both_closed}) {
+    for (const double at_s : {0.2, 0.2001, 0.7}) {
+      CAPTURE(static_cast<int>(kind));
+      const auto outcome = pressing_inverse3({{.kind = kind, .at_s = at_s, .for_s = 0.5}}, "");
+      for (const std::string& violation : outcome.violations) MESSAGE(violation);
+      CHECK(outcome.violation_count == 0);
+      CHECK(outcome.pushed);
+      CHECK(outcome.inconclusive.empty());
+      CHECK_FALSE(outcome.pushed_again);  // not parked again
+    }
+  }
+}

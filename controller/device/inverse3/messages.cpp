@@ -360,4 +360,11 @@ std::string_view force_message(const ShortText& device_id, ForceKey key,
   return out.text();
 }
 
+std::string_view probe_message(const ShortText& device_id, MessageBuffer& buffer) noexcept {
+  Writer out(buffer);
+  out << R"({"inverse3":[{"device_id":")" << device_id.view()
+      << R"(","commands":{"probe_position":{}}}]})";
+  return out.text();
+}
+
 }  // namespace kerf::inverse3

@@ -117,4 +117,8 @@ using MessageBuffer = std::array<char, 384>;
                                              const std::array<double, 3>& force_n, Extra extra,
                                              MessageBuffer& buffer) noexcept;
 
+/// A message without a force, by which the device falls idle; as `force_message`.
+[[nodiscard]] std::string_view probe_message(const ShortText& device_id,
+                                             MessageBuffer& buffer) noexcept;
+
 }  // namespace kerf::inverse3

@@ -12,9 +12,9 @@
 #include <poll.h>
 #include <unistd.h>
 
+#include "controller/device/inverse3/service_answers.hpp"
 #include "shared/posix/monotonic_clock.hpp"
 #include "shared/posix/stop_signals.hpp"
-#include "shared/text/json.hpp"
 #include "shared/text/text.hpp"
 #include "shared/wire/cartesian.hpp"
 
@@ -25,27 +25,12 @@ constexpr int kMostStrays = 64, kMostEvents = 16;  // in a turn: a flood cannot 
 constexpr std::int64_t kNsPerMs = 1'000'000;
 constexpr std::int64_t kLookNs = 20 * kNsPerMs;  ///< longest delay of the end
 constexpr int kConnectMs = 1000;
-constexpr int kCloseMs = 100;
+constexpr int kCloseMs = 100, kDroppedCloseMs = 20;
 constexpr int kLockStepPatienceMs = 2000;
 
-constexpr const char* kNeeds =
-    "needs the vendor's Inverse Service 3.1 or newer: systemctl status haply-inverse-service";
-
-// Why a connection is lost.
 constexpr const char* kClosed =
     "the service has closed the connection; see systemctl status haply-inverse-service, and end "
     "other programs that use it";
-constexpr const char* kSilent =
-    "the service has not replied for 100 ms; see what else this machine does, and systemctl status "
-    "haply-inverse-service";
-constexpr const char* kNoState =
-    "they are no JSON of a state; see which service it is by systemctl status "
-    "haply-inverse-service";
-
-/// A reason for which no later try can help.
-struct Refusal : std::runtime_error {
-  using std::runtime_error::runtime_error;
-};
 
 [[noreturn]] void refuse_text(std::string_view text) {
   throw std::runtime_error(
@@ -71,36 +56,6 @@ HostPort host_port(std::string_view text, std::string_view whole) {
   if (!host.empty()) out.host = host;
   out.port = *port;
   return out;
-}
-
-/// "3.5.0.0" as 305; nothing for another text.
-std::optional<int> version_of(std::string_view text) {
-  int parts[2]{};
-  for (int& part : parts) {
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), part);
-    if (error != std::errc{} || part < 0 || part > 99) return std::nullopt;
-    text.remove_prefix(static_cast<std::size_t>(end - text.data()));
-    if (&part == parts && !text.starts_with('.')) return std::nullopt;
-    if (!text.empty()) text.remove_prefix(1);
-  }
-  return parts[0] * 100 + parts[1];
-}
-
-/// The number in the answer to a setting, whose envelope is not documented: alone, or as a member
-/// of one of these names.
-std::optional<double> setting_within(const Json& value) {
-  return value.visit([&](const auto& held) -> std::optional<double> {
-    using T = std::decay_t<decltype(held)>;
-    if constexpr (std::is_same_v<T, double> || std::is_same_v<T, std::int64_t> ||
-                  std::is_same_v<T, std::uint64_t>) {
-      return static_cast<double>(held);
-    } else if constexpr (std::is_same_v<T, Json::Members>) {
-      for (const char* name : {"value", "force_scale", "devices/force_scale", "data"}) {
-        if (value.contains(name)) return setting_within(value.at(name));
-      }
-    }
-    return std::nullopt;
-  });
 }
 
 }  // namespace
@@ -164,31 +119,13 @@ std::string ServicePort::place() const {
   return "--port ws:" + options_.service.host + ":" + std::to_string(options_.service.port);
 }
 
+std::int64_t ServicePort::wait_ns() const noexcept {
+  return ours_.lockstep ? 0 : monotonic_ns();
+}
+
 std::int64_t ServicePort::now_ns() const noexcept {
   if (!ours_.lockstep) return monotonic_ns();
   return static_cast<std::int64_t>(turns_) * (kNsPerSecond / ours_.rate_hz);
-}
-
-ForceKey ServicePort::read_version(const std::atomic<bool>& stop) const {
-  const HttpAnswer answer = http_get(options_.service, "/version", kConnectMs, stop);
-  std::string version;
-  LinkHello theirs{Personality::inverse3, false, ours_.rate_hz};
-  try {
-    const Json json = Json::parse(answer.body);
-    version = json.at("project_version").get<std::string>();
-    if (json.contains("kerf_emulator")) {  // the emulated service says how it runs
-      theirs.lockstep = json.at("kerf_emulator").at("lockstep").get<bool>();
-      theirs.rate_hz = json.at("kerf_emulator").at("rate_hz").get<int>();
-    }
-  } catch (const JsonError&) {
-    throw Refusal("what answers there gives no version of an Inverse Service (HTTP " +
-                  std::to_string(answer.status) + "); " + kNeeds);
-  }
-  const std::string reason = discord(ours_, theirs);
-  if (!reason.empty()) throw Refusal(reason);
-  const auto number = version_of(version);
-  if (!number || *number < 301) throw Refusal("version " + one_line(version) + "; " + kNeeds);
-  return *number >= 305 ? ForceKey::vector : ForceKey::values;
 }
 
 /// At each connection: another client may have changed it since the last one. Later in a connection
@@ -196,10 +133,9 @@ ForceKey ServicePort::read_version(const std::atomic<bool>& stop) const {
 void ServicePort::check_force_scale(const std::atomic<bool>& stop) {
   std::optional<double> scale;
   try {
-    const HttpAnswer answer =
-        http_get(options_.service, "/settings/devices/force_scale", kConnectMs, stop);
-    if (answer.status == 200) scale = setting_within(Json::parse(answer.body));
-  } catch (const std::exception&) {  // settings are read where there are some
+    scale = force_scale_of(
+        http_get(options_.service, "/settings/devices/force_scale", kConnectMs, stop));
+  } catch (const std::runtime_error&) {  // settings are read where there are some
   }
   if (!scale) {
     note_once(
@@ -212,25 +148,39 @@ void ServicePort::check_force_scale(const std::atomic<bool>& stop) {
 }
 
 std::unique_ptr<ServicePort::Connection> ServicePort::connect(const std::atomic<bool>& stop) {
-  const ForceKey key = read_version(stop);
+  const ForceKey key =
+      force_key_of(http_get(options_.service, "/version", kConnectMs, stop), ours_);
+  std::unique_ptr<WebSocket> service;
+  try {
+    service = std::make_unique<WebSocket>(options_.service, kConnectMs, stop);
+  } catch (const UpgradeRefused& refused) {
+    throw_status("the service", refused.answer());
+  }
+  // Kerf's force may still act since the last connection, so whatever ends this one takes it back.
+  MessageBuffer buffer;
+  if (options_.wanted.is_again) {
+    service->set_last_word(last_word(options_.wanted.device_id, key, buffer));
+  }
   if (key == ForceKey::vector) check_force_scale(stop);
-  auto made = std::make_unique<Connection>();
-  made->service = std::make_unique<WebSocket>(options_.service, kConnectMs, stop);
   // The service speaks first.
   const std::int64_t until_ns = monotonic_ns() + kConnectMs * kNsPerMs;
   WebSocket::Got got{};
   do {
-    got = made->service->receive(std::min(until_ns, monotonic_ns() + kLookNs));
+    got = service->receive(std::min(until_ns, monotonic_ns() + kLookNs));
   } while (got == WebSocket::Got::nothing && !stop && monotonic_ns() < until_ns);
   if (got != WebSocket::Got::text) {
     throw std::runtime_error(std::string("the service sends no list of its devices; ") + kNeeds);
   }
   ServiceState first;
-  if (!parse_state(made->service->message(), first)) {
+  if (!parse_state(service->message(), first)) {
     throw std::runtime_error(std::string("the list of the devices cannot be read; ") + kNeeds);
   }
-  made->session = std::make_unique<Session>(options_.wanted, key, first, now_ns());
-  if (is_final(made->session->bar())) throw Refusal(text_of(made->session->bar()));
+  auto made = std::make_unique<Connection>(
+      Connection{std::move(service), {}, TurnGame(options_.wanted, key, first, now_ns())});
+  Session& session = made->turns.session();
+  if (is_final(session.bar())) throw Refusal(text_of(session.bar()));
+  made->service->set_last_word(last_word(session.device_id(), key, buffer));
+  made->began_ns = monotonic_ns();
   if (options_.event_port != 0) {
     try {
       made->events = std::make_unique<WebSocket>(
@@ -250,7 +200,7 @@ void ServicePort::connect_within(int patience_ms, const std::atomic<bool>& stop)
     try {
       connection_ = connect(stop);
       // From now on it is this device, whatever else appears.
-      options_.wanted.device_id = connection_->session->device_id();
+      options_.wanted.device_id = connection_->turns.session().device_id();
       options_.wanted.is_again = true;
       return;
     } catch (const Refusal& refusal) {
@@ -277,7 +227,7 @@ void ServicePort::prove() {
     if (play_turn() == Turn::lost) {
       throw std::runtime_error(place() + ": " + one_line(why_lost_));
     }
-    const Bar bar = connection_->session->bar();
+    const Bar bar = connection_->turns.session().bar();
     if (is_final(bar)) throw std::runtime_error(place() + ": " + text_of(bar));
     if (bar != Bar::proving && bar != Bar::parking) break;
   }
@@ -313,7 +263,7 @@ void ServicePort::note_once(bool& is_noted, const std::string& text) const noexc
 
 /// One line for each new reason why the device may not push; the user's own doing needs none.
 void ServicePort::note_bar() noexcept {
-  const Bar bar = connection_->session->bar();
+  const Bar bar = connection_->turns.session().bar();
   if (bar == Bar::none) noted_ = Bar::parking;  // the next one is news again
   if (bar == noted_ || bar == Bar::none || bar == Bar::parking || bar == Bar::proving) return;
   noted_ = bar;
@@ -338,7 +288,7 @@ void ServicePort::run() noexcept {
 
 /// False if there is nothing to do yet.
 bool ServicePort::wait_for_turn() noexcept {
-  const std::int64_t pause_ns = ours_.lockstep ? kLookNs : kTurnNs;
+  const std::int64_t pause_ns = ours_.lockstep ? kLookNs : TurnGame::kTurnNs;
   const std::int64_t due_ns = ours_.lockstep ? monotonic_ns() + pause_ns : sent_ns_ + pause_ns;
   const timespec until{due_ns / kNsPerSecond, due_ns % kNsPerSecond};
   while (outbox_.empty() && !stop_) {
@@ -350,7 +300,6 @@ bool ServicePort::wait_for_turn() noexcept {
 ServicePort::Turn ServicePort::play_turn() noexcept {
   Connection& link = *connection_;
   take_events();
-  CartesianCommand neutral;
   std::array<std::uint8_t, MailboxPacket::kMaxBytes> packet;
   const std::size_t size = outbox_.take(packet);
   if (const auto command = decode_cartesian_command(std::span(packet).first(size))) {
@@ -358,16 +307,10 @@ ServicePort::Turn ServicePort::play_turn() noexcept {
     command_ns_ = ours_.lockstep ? now_ns() : put_ns_.load(std::memory_order_relaxed);
     ++commands_;
   }
-  const bool takes_back = std::exchange(link.takes_back, false);
-  const auto force_n =
-      link.session->force_n(takes_back ? neutral : command_, command_ns_, now_ns());
-  const bool names_itself = link.turns == 0 && link.session->key() == ForceKey::vector;
-  const Extra extra = names_itself                        ? Extra::profile
-                      : link.turns % kFullStateTurns == 1 ? Extra::full_state
-                                                          : Extra::none;
+  sent_ns_ = monotonic_ns();
   MessageBuffer buffer;
   const std::string_view message =
-      force_message(link.session->device_id(), link.session->key(), force_n, extra, buffer);
+      link.turns.next(command_, command_ns_, wait_ns(), now_ns(), buffer);
   // What came unasked since the last reply belongs to no turn.
   for (int strays = 0;; ++strays) {
     const WebSocket::Got got = link.service->receive(0);
@@ -378,78 +321,50 @@ ServicePort::Turn ServicePort::play_turn() noexcept {
     }
     ++strays_;
   }
-  sent_ns_ = monotonic_ns();
-  if (!link.service->send(message, static_cast<int>(kDropNs / kNsPerMs))) return lose(kClosed);
+  constexpr int kSendMs = static_cast<int>(TurnGame::kDropNs / kNsPerMs);
+  if (!link.service->send(message, kSendMs)) return lose(kClosed);
   outbox_.set_on_its_way(false);
   ++turns_;
-  ++link.turns;
-  return await_reply(sent_ns_);
+  return await_reply();
 }
 
-ServicePort::Turn ServicePort::await_reply(std::int64_t sent_ns) noexcept {
+ServicePort::Turn ServicePort::await_reply() noexcept {
   Connection& link = *connection_;
-  const std::array<std::int64_t, 3> limits =
-      ours_.lockstep ? std::array<std::int64_t, 3>{kLockStepPatienceMs * kNsPerMs,
-                                                   kLockStepPatienceMs * kNsPerMs,
-                                                   kLockStepPatienceMs * kNsPerMs}
-                     : std::array{kLateNs, kTakeBackNs, kDropNs};
-  for (std::size_t passed = 0;; ++passed) {
-    const WebSocket::Got got =
-        link.service->receive(sent_ns + limits[std::min<std::size_t>(passed, 2)]);
+  for (;;) {
+    const std::int64_t look_ns =
+        ours_.lockstep ? sent_ns_ + kLockStepPatienceMs * kNsPerMs : link.turns.look_ns();
+    const WebSocket::Got got = link.service->receive(look_ns);
     if (got == WebSocket::Got::lost) return lose(kClosed);
     if (got != WebSocket::Got::nothing) {
-      const auto took_us = static_cast<std::uint64_t>((monotonic_ns() - sent_ns) / 1000);
+      const auto took_us = static_cast<std::uint64_t>((monotonic_ns() - sent_ns_) / 1000);
       longest_us_ = std::max<std::uint64_t>(longest_us_, took_us);
-      if (got == WebSocket::Got::binary) break;
-      // This thread itself may have been held up; then the reply was there on waking up.
-      if (!ours_.lockstep && monotonic_ns() - sent_ns > kTakeBackNs && passed < 2) {
-        link.takes_back = true;
-        link.session->raise(Bar::stalled, now_ns());
-      }
-      return take_reply();
+      return take_reply(got == WebSocket::Got::text ? link.service->message() : std::string_view());
     }
-    if (passed == 0) ++late_;
-    if (passed == 1) {
-      link.takes_back = true;
-      link.session->raise(Bar::stalled, now_ns());
-    }
-    if (passed == 2) {
+    const auto wait =
+        ours_.lockstep ? TurnGame::Wait::lost : link.turns.look(monotonic_ns(), now_ns());
+    if (wait == TurnGame::Wait::late) ++late_;
+    if (wait == TurnGame::Wait::lost) {
       ++lost_;
-      return lose(kSilent);
+      return lose(link.turns.why_lost());
     }
     take_events();
   }
-  return count_unread(kNoState);
 }
 
-ServicePort::Turn ServicePort::lose(const char* why) noexcept {
+ServicePort::Turn ServicePort::lose(const std::string& why) noexcept {
   why_lost_ = why;
   return Turn::lost;
 }
 
-ServicePort::Turn ServicePort::count_unread(const std::string& why) noexcept {
-  ++unreadable_;
-  if (++connection_->unread < kMostUnread) return Turn::done;
-  why_lost_ =
-      std::to_string(kMostUnread) + " replies of the service in a row cannot be read: " + why;
-  return Turn::lost;
-}
-
-ServicePort::Turn ServicePort::take_reply() noexcept {
-  Connection& link = *connection_;
+ServicePort::Turn ServicePort::take_reply(std::string_view text) noexcept {
+  TurnGame& turns = connection_->turns;
   std::optional<CartesianReport> report;
-  bool is_read = false;
-  try {
-    is_read = parse_state(link.service->message(), state_);
-    if (is_read) report = link.session->take(state_, number_ + 1, now_ns());
-  } catch (const std::bad_alloc&) {
-    is_read = false;
-  }
-  if (!is_read) return count_unread(kNoState);
-  if (!report && !is_absent(link.session->bar())) return count_unread(link.session->why_unread());
-  link.unread = 0;
+  const TurnGame::Reply reply = turns.take(text, number_ + 1, wait_ns(), now_ns(), report);
+  if (reply != TurnGame::Reply::read) ++unreadable_;
+  if (reply == TurnGame::Reply::lost) return lose(turns.why_lost());
+  if (reply == TurnGame::Reply::unread) return Turn::done;
   note_bar();
-  if (is_final(link.session->bar())) {
+  if (is_final(turns.session().bar())) {
     closed_ = true;
     return Turn::done;
   }
@@ -480,26 +395,34 @@ void ServicePort::take_events() noexcept {
     } catch (const std::bad_alloc&) {
       continue;
     }
-    const bool is_ours =
-        event.device_id.view().empty() || event.device_id == link.session->device_id().view();
+    const bool is_ours = event.device_id.view().empty() ||
+                         event.device_id == link.turns.session().device_id().view();
     const bool is_fault = event.name == "device-disconnected" ||
                           event.safety_type == "ebrake_triggered" ||
                           event.safety_type == "stall_detected";
     if (is_ours && is_fault) {
-      link.session->raise(Bar::event, now_ns());
+      link.turns.session().raise(Bar::event, now_ns());
       note_bar();
     }
   }
 }
 
-/// The connection is of no use. The servo hears of it at once, not only by the silence.
+/// The connection is of no use: its last word first. The servo hears of it at once, not only by the
+/// silence. The next attempt is made at once, since the device may still have kerf's force; but not
+/// if the connection was a short one, as of a service that ends each of them.
 void ServicePort::drop() noexcept {
-  pass_on(connection_->session->farewell(number_ + 1));
+  Connection& link = *connection_;
+  link.service->say_last_word();
+  pass_on(link.turns.session().farewell(number_ + 1));
+  link.service->close(WebSocket::Why::protocol, kDroppedCloseMs);
+  const std::int64_t now_ns = monotonic_ns();
+  const bool was_short = now_ns - link.began_ns < kFirstBackoffNs;
   connection_.reset();
   command_ = {};
   noted_ = Bar::parking;
   backoff_ns_ = kFirstBackoffNs;
-  retry_ns_ = monotonic_ns() + backoff_ns_;
+  retry_ns_ = was_short ? now_ns + backoff_ns_ : now_ns;
+  if (was_short) backoff_ns_ *= 2;
   noted_failure_.clear();
   note("the connection is lost and tried again for as long as the program waits: " + why_lost_);
 }
@@ -524,25 +447,24 @@ void ServicePort::reconnect() noexcept {
       noted_failure_ = error.what();
       note("not connected again yet: " + noted_failure_);
     }
-    backoff_ns_ = std::min(2 * backoff_ns_, kLongestBackoffNs);
     retry_ns_ = monotonic_ns() + backoff_ns_;
+    backoff_ns_ = std::min(2 * backoff_ns_, kLongestBackoffNs);
   }
 }
 
-/// The last turns have no force.
+/// The last turns have no force; in lock-step the last word alone is the last turn.
 void ServicePort::end() noexcept {
   const std::int64_t until_ns = monotonic_ns() + kLastPacketMs * kNsPerMs;
-  while (connection_ && monotonic_ns() < until_ns) {
-    connection_->takes_back = true;
+  while (connection_ && !ours_.lockstep && monotonic_ns() < until_ns) {
+    connection_->turns.take_back();
     if (play_turn() == Turn::lost) {
       connection_.reset();
       break;
     }
-    if (ours_.lockstep) break;
-    sleep_until_ns(sent_ns_ + kTurnNs);
+    sleep_until_ns(sent_ns_ + TurnGame::kTurnNs);
   }
   outbox_.set_on_its_way(false);
-  if (connection_) connection_->service->close(kCloseMs);
+  if (connection_) connection_->service->close(WebSocket::Why::in_order, kCloseMs);
   closed_ = true;
 }
 

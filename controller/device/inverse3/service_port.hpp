@@ -14,7 +14,7 @@
 
 #include <semaphore.h>
 
-#include "controller/device/inverse3/session.hpp"
+#include "controller/device/inverse3/turn_game.hpp"
 #include "controller/device/inverse3/web_socket.hpp"
 #include "controller/device/port/io_mailbox.hpp"
 #include "shared/wire/emulator_link.hpp"
@@ -42,8 +42,11 @@ struct ServiceOptions {
 /// handler may raise.
 ///
 /// A reply that takes longer than 5 ms is counted; than 20 ms, and the next turn takes the force
-/// back; than 100 ms, and the connection is dropped. So it is for three messages in a row that
-/// cannot be read. A new connection is tried after 0.5, 1, 2 ... 10 s; version, force_scale and an
+/// back; than 100 ms, and the connection is dropped. So it is after three messages in a row that
+/// cannot be read, and when the service has sent a closing frame or ended its side of the link.
+/// Whatever ends a connection, zero force is the last message on it (`TurnGame`).
+///
+/// A new connection is tried at once, then after 0.5, 1, 2 ... 10 s; version, force_scale and an
 /// idle device are checked again, and it is barred like the first one until the parking button is
 /// held: but the servo gives a silent device up after 2 s. What cannot become right (`is_final`)
 /// closes the port, with one line on stderr.
@@ -52,13 +55,8 @@ struct ServiceOptions {
 /// machine's clock says.
 class ServicePort final : public MailboxPort {
  public:
-  static constexpr std::int64_t kTurnNs = 1'000'000;  ///< longest pause between two turns
-  static constexpr std::int64_t kLateNs = 5'000'000, kTakeBackNs = 20'000'000;
-  static constexpr std::int64_t kDropNs = 100'000'000;
-  static constexpr int kMostUnread = 3;
   static constexpr std::int64_t kFirstBackoffNs = 500'000'000;
   static constexpr std::int64_t kLongestBackoffNs = 10'000'000'000;
-  static constexpr std::uint64_t kFullStateTurns = 2000;  ///< between two requests for all state
 
   /// Connects, proves the force command while the device is well, then starts the thread. Tries for
   /// `patience_ms` while no service answers or it has no device, or until `stop`. Throws
@@ -78,10 +76,8 @@ class ServicePort final : public MailboxPort {
   /// A service that answers, its events, and what was agreed.
   struct Connection {
     std::unique_ptr<WebSocket> service, events;
-    std::unique_ptr<Session> session;
-    std::uint64_t turns = 0;
-    int unread = 0;           ///< replies in a row that could not be read
-    bool takes_back = false;  ///< the next turn is without force
+    TurnGame turns;
+    std::int64_t began_ns = 0;
   };
   enum class Turn : std::uint8_t { done, lost };
 
@@ -89,16 +85,14 @@ class ServicePort final : public MailboxPort {
   [[nodiscard]] std::unique_ptr<Connection> connect(const std::atomic<bool>& stop);
   void connect_within(int patience_ms, const std::atomic<bool>& stop);
   void prove();
-  [[nodiscard]] ForceKey read_version(const std::atomic<bool>& stop) const;
   void check_force_scale(const std::atomic<bool>& stop);
 
   void run() noexcept;
   [[nodiscard]] bool wait_for_turn() noexcept;
   [[nodiscard]] Turn play_turn() noexcept;
-  [[nodiscard]] Turn await_reply(std::int64_t sent_ns) noexcept;
-  [[nodiscard]] Turn take_reply() noexcept;
-  [[nodiscard]] Turn count_unread(const std::string& why) noexcept;
-  [[nodiscard]] Turn lose(const char* why) noexcept;
+  [[nodiscard]] Turn await_reply() noexcept;
+  [[nodiscard]] Turn take_reply(std::string_view text) noexcept;
+  [[nodiscard]] Turn lose(const std::string& why) noexcept;
   void pass_on(const CartesianReport& report) noexcept;
   void take_events() noexcept;
   void drop() noexcept;
@@ -107,6 +101,8 @@ class ServicePort final : public MailboxPort {
   void note_bar() noexcept;
   void note(const std::string& text) const noexcept;
   void note_once(bool& is_noted, const std::string& text) const noexcept;
+  /// Time of the wait for a reply; stands still in lock-step.
+  [[nodiscard]] std::int64_t wait_ns() const noexcept;
   /// Time of the turns.
   [[nodiscard]] std::int64_t now_ns() const noexcept;
   [[nodiscard]] std::string place() const;
@@ -115,7 +111,6 @@ class ServicePort final : public MailboxPort {
   LinkHello ours_;
   IoThread io_;
   std::unique_ptr<Connection> connection_;
-  ServiceState state_;        ///< of the newest message
   std::uint32_t number_ = 0;  ///< of the newest report
   std::uint64_t turns_ = 0;   ///< of all connections
   std::int64_t sent_ns_ = 0;  ///< the last message, by the machine's clock

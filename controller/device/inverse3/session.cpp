@@ -30,6 +30,9 @@ std::string text_of(Bar bar) {
       return "the device is not calibrated; hold the grip on the inkwell until its light is solid";
     case Bar::not_ready:
       return "the device is not ready by its service; see the vendor's Hub";
+    case Bar::driven:
+      return "the device is not idle since the connection was lost, and kerf takes its own force "
+             "back first; if that lasts, end the other program that drives it";
     case Bar::proving:
       return "the device is asked whether it obeys the force command";
     case Bar::no_handle:
@@ -196,7 +199,8 @@ Session::Session(const Wanted& wanted, ForceKey key, const ServiceState& first, 
       wanted_handle_(wanted.handle_id),
       key_(key),
       barred_until_ns_(now_ns + kBarNs) {
-  refuse_driven(*arm_of(first, device_id_));
+  was_idle_ = is_idle(*arm_of(first, device_id_));
+  if (!wanted.is_again) refuse_driven(*arm_of(first, device_id_));
   if (wanted_handle_.view().empty()) refuse_several_handles(first);
   if (const Bar bar = bar_of_config(*arm_of(first, device_id_)); bar != Bar::none) bar_ = bar;
 }
@@ -280,6 +284,10 @@ Bar Session::bar_of_arm(const ArmState& arm, std::int64_t now_ns) noexcept {
   if (!arm.power_supply.value_or(false)) return Bar::unpowered;
   if (!arm.calibrated.value_or(false)) return Bar::uncalibrated;
   if (!arm.ready.value_or(true)) return Bar::not_ready;
+  if (!was_idle_) {
+    was_idle_ = is_idle(arm);
+    if (!was_idle_) return Bar::driven;
+  }
   if (!is_proven()) {
     // Its device is well, so by now it had to take the force.
     if (++proof_turns_ < kProofTurns) return Bar::proving;

@@ -25,6 +25,7 @@ enum class Bar : std::uint8_t {
   unpowered,
   uncalibrated,
   not_ready,
+  driven,    ///< after a lost connection: not idle, perhaps by kerf's own last force
   proving,   ///< zero forces, until the service shows that it takes them
   replaced,  ///< gone, and another one is listed
   no_handle,
@@ -69,7 +70,9 @@ struct Wanted {
 ///
 /// **Proof.** A service ignores a misspelt force command without an error, so no device is armed on
 /// the protocol's word: before its first force its state must be idle, and after kProofTurns zero
-/// forces no longer. A device that another program drives proves nothing, and is refused.
+/// forces no longer. A device that another program drives proves nothing, and is refused. After a
+/// lost connection the force that it still gives may be kerf's own: the first message takes it
+/// back, and the next ones have no force, until the device is idle.
 ///
 /// **Echo.** Since 3.5 a state has the force that the device gives. On each axis it must lie within
 /// what was sent in the last kEchoWindowNs, give or take kEchoToleranceN; if it does not for longer
@@ -86,8 +89,10 @@ class Session {
   static constexpr std::int64_t kCommandNs = 20'000'000;
 
   /// `first` is the first message. Throws std::runtime_error with the reason and the way out if it
-  /// has not the wanted device, several devices or handles and none is wanted, or a device that is
-  /// not idle. If its configuration cannot be borne, `bar` is final from the start.
+  /// has not the wanted device, several devices or handles and none is wanted, or for the first
+  /// time
+  /// (`Wanted::is_again`) a device that is not idle. If its configuration cannot be borne, `bar` is
+  /// final from the start.
   Session(const Wanted& wanted, ForceKey key, const ServiceState& first, std::int64_t now_ns);
 
   /// The force to send in this turn, N in the service's frame: that of the newest command, which
@@ -109,6 +114,8 @@ class Session {
   /// The most important present reason.
   [[nodiscard]] Bar bar() const noexcept { return bar_; }
   [[nodiscard]] bool is_proven() const noexcept { return proof_turns_ > kProofTurns; }
+  /// Messages are without a force now, to see whether the device falls idle.
+  [[nodiscard]] bool is_probing() const noexcept { return !was_idle_ && sent_count_ > 0; }
   [[nodiscard]] const ShortText& device_id() const noexcept { return device_id_; }
   [[nodiscard]] ForceKey key() const noexcept { return key_; }
   /// Gain of the service's force gate, if it has said so.
@@ -132,6 +139,7 @@ class Session {
   ForceKey key_;
   Bar bar_ = Bar::parking;
   std::int64_t barred_until_ns_ = 0;
+  bool was_idle_ = true;  ///< of this connection
   int proof_turns_ = 0;
   std::optional<std::int64_t> echo_off_since_ns_;
   std::array<Sent, 256> sent_{};  ///< ring; 20 ms at 8 kHz are 160

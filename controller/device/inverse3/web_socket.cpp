@@ -2,16 +2,24 @@
 #include "controller/device/inverse3/web_socket.hpp"
 
 #include <algorithm>
+#include <array>
+#include <cerrno>
 #include <chrono>
+#include <cstring>
 #include <optional>
+#include <random>
 #include <stdexcept>
+#include <utility>
 
+#include <boost/asio/buffers_iterator.hpp>
 #include <boost/asio/connect.hpp>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/beast/core.hpp>
 #include <boost/beast/http.hpp>
 #include <boost/beast/websocket.hpp>
+#include <poll.h>
+#include <sys/socket.h>
 
 #include "shared/posix/monotonic_clock.hpp"
 #include "shared/wire/inverse3.hpp"
@@ -126,18 +134,110 @@ HttpAnswer http_get(const HostPort& where, const std::string& path, int timeout_
   return {parser.get().result_int(), parser.get().body()};
 }
 
+namespace {
+
+/// A text message as one masked frame (RFC 6455, 5.2).
+std::string frame_of(std::string_view text, std::uint32_t mask) {
+  constexpr char kWholeText = '\x81';
+  constexpr std::size_t kMask = 0x80, kShort = 126;
+  std::string frame{kWholeText};
+  if (text.size() < kShort) {
+    frame += static_cast<char>(kMask | text.size());
+  } else {
+    frame += static_cast<char>(kMask | kShort);
+    frame += static_cast<char>(text.size() >> 8);
+    frame += static_cast<char>(text.size() & 0xff);
+  }
+  std::array<char, 4> key;
+  std::memcpy(key.data(), &mask, key.size());
+  frame.append(key.data(), key.size());
+  for (std::size_t i = 0; i < text.size(); ++i) frame += static_cast<char>(text[i] ^ key[i % 4]);
+  return frame;
+}
+
+/// The socket under the stream. Text messages leave by `send`, whole, so that at any moment the
+/// next byte is that of a new frame; the stream writes its handshake and control frames. Before the
+/// first closing frame of these the last word leaves.
+class Line {
+ public:
+  using next_layer_type = tcp::socket;
+  using executor_type = tcp::socket::executor_type;
+  explicit Line(asio::io_context& io) : socket_(io) {}
+
+  [[nodiscard]] tcp::socket& next_layer() noexcept { return socket_; }
+  [[nodiscard]] const tcp::socket& next_layer() const noexcept { return socket_; }
+  [[nodiscard]] executor_type get_executor() noexcept { return socket_.get_executor(); }
+  template <class Buffers, class Handler>
+  auto async_read_some(const Buffers& buffers, Handler&& handler) {
+    return socket_.async_read_some(buffers, std::forward<Handler>(handler));
+  }
+  template <class Buffers, class Handler>
+  auto async_write_some(const Buffers& buffers, Handler&& handler) {
+    constexpr char kClosing = '\x88';
+    const auto first = asio::buffers_begin(buffers);
+    if (first != asio::buffers_end(buffers) && *first == kClosing) say_last_word();
+    return socket_.async_write_some(buffers, std::forward<Handler>(handler));
+  }
+
+  void set_last_word(std::string_view text) {
+    last_word_ = text.empty() ? std::string() : frame_of(text, static_cast<std::uint32_t>(mask_()));
+  }
+  [[nodiscard]] bool has_ended() const noexcept { return has_ended_; }
+  void say_last_word() noexcept {
+    if (std::exchange(has_ended_, true) || last_word_.empty()) return;
+    // One call: a socket that does not take these bytes at once cannot carry them any more.
+    static_cast<void>(::send(socket_.native_handle(), last_word_.data(), last_word_.size(),
+                             MSG_DONTWAIT | MSG_NOSIGNAL));
+  }
+  bool send(std::string_view text, std::int64_t until_ns) {
+    if (has_ended_) return false;
+    const std::string frame = frame_of(text, static_cast<std::uint32_t>(mask_()));
+    for (std::string_view left = frame; !left.empty();) {
+      const ssize_t size =
+          ::send(socket_.native_handle(), left.data(), left.size(), MSG_DONTWAIT | MSG_NOSIGNAL);
+      if (size > 0) {
+        left.remove_prefix(static_cast<std::size_t>(size));
+        continue;
+      }
+      const std::int64_t left_ms = (until_ns - monotonic_ns()) / kNsPerMs;
+      if ((errno != EAGAIN && errno != EINTR) || left_ms <= 0) {
+        has_ended_ = true;  // in the midst of a frame
+        return false;
+      }
+      pollfd room{socket_.native_handle(), POLLOUT, 0};
+      poll(&room, 1, static_cast<int>(left_ms));
+    }
+    return true;
+  }
+
+ private:
+  tcp::socket socket_;
+  std::mt19937 mask_{std::random_device{}()};
+  std::string last_word_;   ///< as a frame
+  bool has_ended_ = false;  ///< no message leaves any more
+};
+
+template <class Handler>
+void async_teardown(beast::role_type role, Line& line, Handler&& handler) {
+  websocket::async_teardown(role, line.next_layer(), std::forward<Handler>(handler));
+}
+
+}  // namespace
+
 struct WebSocket::Connection {
   asio::io_context io{1};
-  websocket::stream<tcp::socket, false> stream{io};  // false: no compression
+  websocket::stream<Line, false> stream{io};  // false: no compression
   beast::flat_buffer buffer;
   bool is_reading = false;
   std::optional<ErrorCode> read;  ///< how the last reading ended
 
+  Line& line() noexcept { return stream.next_layer(); }
   void begin_reading() {
     buffer.clear();
     read.reset();
     is_reading = true;
     stream.async_read(buffer, [this](ErrorCode error, std::size_t) {
+      if (error) line().say_last_word();  // the peer has ended its side
       read = error;
       is_reading = false;
     });
@@ -148,29 +248,35 @@ WebSocket::WebSocket(const HostPort& where, int timeout_ms, const std::atomic<bo
     : connection_(std::make_unique<Connection>()) {
   const Limit limit{after_ms(timeout_ms), stop};
   Connection& c = *connection_;
-  connect(c.io, c.stream.next_layer(), where, limit);
+  connect(c.io, c.line().next_layer(), where, limit);
   c.stream.read_message_max(kMostMessageBytes);
-  c.stream.auto_fragment(false);
-  c.stream.text(true);
-  await(c.io, c.stream.next_layer(), limit, "the upgrade to a WebSocket",
-        [&](auto done) { c.stream.async_handshake(host_header(where), "/", done); });
+  websocket::response_type answer;
+  answer.result(0U);  // until there is one
+  try {
+    await(c.io, c.line().next_layer(), limit, "the upgrade to a WebSocket",
+          [&](auto done) { c.stream.async_handshake(answer, host_header(where), "/", done); });
+  } catch (const std::runtime_error&) {
+    if (answer.result_int() != 0) throw UpgradeRefused({answer.result_int(), answer.body()});
+    throw;
+  }
   c.begin_reading();
 }
 
-WebSocket::~WebSocket() = default;
+WebSocket::~WebSocket() {
+  say_last_word();
+}
+
+void WebSocket::set_last_word(std::string_view text) {
+  connection_->line().set_last_word(text);
+}
+
+void WebSocket::say_last_word() noexcept {
+  connection_->line().say_last_word();
+}
 
 bool WebSocket::send(std::string_view text, int timeout_ms) noexcept {
-  Connection& c = *connection_;
   try {
-    // Shared: after the time is over the operation may end later than this call.
-    const auto sent = std::make_shared<std::optional<ErrorCode>>();
-    c.stream.async_write(asio::buffer(text.data(), text.size()),
-                         [sent](ErrorCode error, std::size_t) { *sent = error; });
-    Waiter waiter(c.io);
-    if (waiter.until(after_ms(timeout_ms), [&] { return sent->has_value(); })) return !**sent;
-    ErrorCode ignored;
-    c.stream.next_layer().close(ignored);
-    return false;
+    return connection_->line().send(text, after_ms(timeout_ms));
   } catch (...) {
     return false;
   }
@@ -184,8 +290,9 @@ WebSocket::Got WebSocket::receive(std::int64_t until_ns) noexcept {
       c.begin_reading();
     }
     Waiter waiter(c.io);
-    if (!waiter.until(until_ns, [&] { return !c.is_reading; })) return Got::nothing;
-    if (*c.read) return Got::lost;
+    const auto is_over = [&] { return !c.is_reading || c.line().has_ended(); };
+    if (!waiter.until(until_ns, is_over)) return Got::nothing;
+    if (c.is_reading || *c.read) return Got::lost;
     return c.stream.got_text() ? Got::text : Got::binary;
   } catch (...) {
     return Got::lost;
@@ -197,12 +304,14 @@ std::string_view WebSocket::message() const noexcept {
   return {static_cast<const char*>(bytes.data()), bytes.size()};
 }
 
-void WebSocket::close(int timeout_ms) noexcept {
+void WebSocket::close(Why why, int timeout_ms) noexcept {
   Connection& c = *connection_;
   try {
     const std::int64_t until_ns = after_ms(timeout_ms);
+    say_last_word();
     auto closed = std::make_shared<bool>(false);
-    c.stream.async_close(websocket::close_code::normal, [closed](ErrorCode) { *closed = true; });
+    c.stream.async_close(static_cast<websocket::close_code>(why),
+                         [closed](ErrorCode) { *closed = true; });
     Waiter waiter(c.io);
     waiter.until(until_ns, [&] { return *closed; });
   } catch (...) {  // the destructor ends the connection

@@ -82,18 +82,20 @@ std::optional<std::array<std::int16_t, 3>> kerf_mn(const Json& vector) {
 }  // namespace
 
 ServiceDevice::ServiceDevice(const ServiceSettings& settings, PacketDevice& device)
-    : settings_(settings), device_(device), profile_(settings.profile) {
+    : settings_(settings),
+      device_(device),
+      profile_(settings.profile),
+      malformed_way_(settings.first_way) {
   std::ranges::stable_sort(settings_.script, {}, &ScriptedServiceFault::cycle);
 }
 
 std::string ServiceDevice::greet() {
   ++session_;
   replies_.clear();
-  is_forced_ = false;
   wants_full_state_ = false;
   link_fault_.reset();
-  // The device answers commands alone, and the list has a state, too.
-  device_.receive(encode(CartesianCommand{}));
+  // The device answers commands alone, and the list has a state, too. Its force stays.
+  device_.receive(encode(command_));
   advance(settings_.lockstep ? kCyclesPerSecond / settings_.rate_hz : 1);
   take_packets();
   replies_.clear();
@@ -101,7 +103,8 @@ std::string ServiceDevice::greet() {
 }
 
 void ServiceDevice::receive(std::string_view text) {
-  device_.receive(encode(command_in(text)));
+  take_command(text);
+  device_.receive(encode(command_));
   advance(settings_.lockstep ? kCyclesPerSecond / settings_.rate_hz : 1);
   take_packets();
 }
@@ -120,7 +123,9 @@ void ServiceDevice::take_packets() {
     std::string text = state_text(std::exchange(wants_full_state_, false));
     // A fault script may have broken the packet: so is the message.
     if (!report) text.resize(text.size() / 2);
-    replies_.push_back(malformed_left_ > 0 ? broken(text) : ServiceMessage{std::move(text)});
+    const bool is_broken = is_unreadable_ || malformed_left_ > 0;
+    replies_.push_back(is_broken ? broken(text) : ServiceMessage{std::move(text)});
+    replies_.back().is_broken = is_broken || !report;
   }
 }
 
@@ -146,17 +151,16 @@ void ServiceDevice::follow(const CartesianReport& report) noexcept {
   report_cycle_ = cycle_;
 }
 
-CartesianCommand ServiceDevice::command_in(std::string_view text) {
-  is_forced_ = false;
+void ServiceDevice::take_command(std::string_view text) {
   CartesianCommand command;
+  bool is_forced = false;
   try {
     const Json message = Json::parse(text);
     wants_full_state_ =
         wants_full_state_ || find(&message, {"session", "force_render_full_state"}) != nullptr;
     const Json* const arms = find(&message, {"inverse3"});
-    if (!arms) return command;
     // NOLINTNEXTLINE(clang-analyzer-core.NullDereference): it takes the next element for null
-    for (const Json& arm : *arms) {
+    for (const Json& arm : arms ? *arms : Json(Json::List{})) {
       const Json* const id = find(&arm, {"device_id"});
       if (!id || !id->is_text() || id->get<std::string>() != (has_other_id_ ? kOtherId : kDeviceId))
         continue;
@@ -165,15 +169,17 @@ CartesianCommand ServiceDevice::command_in(std::string_view text) {
           find(&arm, {"commands", "set_cursor_force", is_3_5() ? "vector" : "values"});
       const auto mn = vector ? kerf_mn(*vector) : std::nullopt;
       if (!mn) continue;
-      is_forced_ = true;
+      is_forced = true;
       command.force_mn = *mn;
     }
-  } catch (const JsonError&) {  // what the service replies to bad JSON is not known: its state
+  } catch (const JsonError&) {
+    return;  // what the service does on bad JSON is not known: the force stays, its state goes out
   }
+  is_forced_ = is_forced;
   if (has_second_client_) command.force_mn[0] += static_cast<std::int16_t>(1000 * kSecondClientN);
   // A force of zero shows no host: the hand would take it for one that is ready.
   command.force_on = is_powered_ && is_listed_ && command.force_mn != std::array<std::int16_t, 3>{};
-  return command;
+  command_ = command;
 }
 
 Json ServiceDevice::arm_config(const std::string& name) const {
@@ -254,7 +260,7 @@ std::string ServiceDevice::state_text(bool with_config, double position_scale) c
 }
 
 ServiceMessage ServiceDevice::broken(const std::string& text) {
-  --malformed_left_;
+  malformed_left_ = std::max(malformed_left_ - 1, 0);
   const auto replaced = [&](std::string_view what, const std::string& by) {
     std::string out = text;
     if (const std::size_t at = out.find(what); at != std::string::npos) {
@@ -279,7 +285,11 @@ ServiceMessage ServiceDevice::broken(const std::string& text) {
       return {text, true};
     case 6:
       return {state_text(false, 1000)};  // millimetres
-    case 7:  // a WebSocket's client ends the connection at this and the next
+    case 7:
+      return {replaced(kPosition, R"("cursor_position":{"x":null,"y":0,"z":0},"was":{)")};
+    case 8:
+      return {replaced(kPosition, R"("cursor_position":{"x":1e300,"y":0,"z":0},"was":{)")};
+    case 9:  // a WebSocket's client ends the connection at this and the next
       return {replaced("\"inverse3\":", "\"name\":\"\xff\",\"inverse3\":")};
     default:
       return {replaced("{\"inverse3\"",
@@ -299,8 +309,15 @@ void ServiceDevice::begin(ServiceFault fault) {
     case ServiceFault::malformed:
       ++malformed_left_;
       break;
+    case ServiceFault::unreadable:
+    case ServiceFault::readable:
+      is_unreadable_ = fault == ServiceFault::unreadable;
+      break;
     case ServiceFault::restart:
     case ServiceFault::close:
+    case ServiceFault::going_away:
+    case ServiceFault::half_close:
+    case ServiceFault::fin:
     case ServiceFault::reset:
     case ServiceFault::half_open:
       link_fault_ = fault;

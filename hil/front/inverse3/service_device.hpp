@@ -24,11 +24,17 @@ enum class ServiceProfile : std::uint8_t { v3_4, v3_5, v3_5_wireless, v3_0 };
 inline constexpr std::array<std::string_view, 4> kServiceProfileWords{"3.4", "3.5", "3.5-wireless",
                                                                       "3.0"};
 
-/// Faults of the service and its link, beside those of a fault script.
+/// Faults of the service and its link, beside those of a fault script. None takes a force back:
+/// what a real service does with the force of a client that is gone is not known.
 enum class ServiceFault : std::uint8_t {
   malformed,      ///< the next reply cannot be read: each time in another way of kMalformedWays
-  close,          ///< the connection is closed in order (1000)
-  reset,          ///< it is reset
+  unreadable,     ///< no reply can be read from now on, likewise
+  readable,       ///< they can again
+  close,          ///< the service sends a closing frame (1000), and reads until the client's
+  going_away,     ///< the same with 1001
+  half_close,     ///< it ends its side of the link (FIN), and reads until the client's end
+  fin,            ///< it ends both sides: nothing can be carried any more
+  reset,          ///< the connection is reset
   half_open,      ///< the service neither reads nor writes on it any more
   restart,        ///< reset, and the service is back as the other of the versions 3.4 and 3.5
   vanish,         ///< the device is not listed any more
@@ -45,12 +51,13 @@ enum class ServiceFault : std::uint8_t {
   reconfigure,    ///< another client has set damping, basis and force_scale
   event,          ///< ebrake_triggered at the event port
 };
-inline constexpr std::array<std::string_view, 18> kServiceFaultWords{
-    "malformed", "close",      "reset",      "half_open",     "restart",     "vanish",
-    "back",      "other_id",   "second_arm", "third_handle",  "driven",      "power_off",
-    "power_on",  "grip_sleep", "grip_wake",  "second_client", "reconfigure", "event"};
-inline constexpr int kMalformedWays = 9;
-inline constexpr int kMalformedText = 7;  ///< the first so many are text of UTF-8, or binary
+inline constexpr std::array<std::string_view, 23> kServiceFaultWords{
+    "malformed",  "unreadable", "readable",      "close",       "going_away", "half_close",
+    "fin",        "reset",      "half_open",     "restart",     "vanish",     "back",
+    "other_id",   "second_arm", "third_handle",  "driven",      "power_off",  "power_on",
+    "grip_sleep", "grip_wake",  "second_client", "reconfigure", "event"};
+inline constexpr int kMalformedWays = 11;
+inline constexpr int kMalformedText = 9;  ///< the first so many are text of UTF-8, or binary
 
 /// A fault at a bus cycle (125 us) of the device, from the first client on.
 struct ScriptedServiceFault {
@@ -66,20 +73,23 @@ struct ServiceSettings {
   int rate_hz = 1000;         ///< in lock-step: a message is one period of it
   double position_scale = 1;  ///< 1000: positions are in millimetres, against the pages
   std::vector<ScriptedServiceFault> script{};
+  int first_way = 0;  ///< of kMalformedWays, in which a reply cannot be read
 };
 
 /// One message or HTTP answer of the service.
 struct ServiceMessage {
   std::string text;
   bool is_binary = false;
+  bool is_broken = false;  ///< cannot be read
 };
 
 /// The device behind the service, for one client. The packets between are those of
 /// shared/wire/cartesian.hpp, so that a fault script acts as on any other front; the device answers
 /// each command with one. The caller keeps the time. One thread; allocates.
 ///
-/// Commands last one message: one without a force for the device takes the force back. A member of
-/// another version's name is ignored without an error. Forces have steps of 14 mN.
+/// Commands last one message: one without a force for the device takes the force back. Nothing else
+/// does: the force stays for as long as no message comes, on this connection and the next. A
+/// member of another version's name is ignored without an error. Forces have steps of 14 mN.
 class ServiceDevice {
  public:
   /// `device` outlives it.
@@ -95,11 +105,15 @@ class ServiceDevice {
   /// The replies that are due now, one by one.
   [[nodiscard]] std::optional<ServiceMessage> next_reply();
 
-  /// A fault of the link that has begun: `close`, `reset`, `half_open` or `restart`, once each.
+  /// Begins a fault now.
+  void begin(ServiceFault fault);
+  /// A fault of the link that has begun, `close` to `restart`, once each.
   [[nodiscard]] std::optional<ServiceFault> take_link_fault();
   /// A message for the event port.
   [[nodiscard]] std::optional<std::string> take_event();
   [[nodiscard]] bool hung_up() const noexcept { return device_.hung_up(); }
+  /// The last message had a force other than zero.
+  [[nodiscard]] bool is_pushed() const noexcept { return command_.force_on; }
 
   /// The body for a GET; empty: there is no such path.
   [[nodiscard]] std::optional<std::string> get(std::string_view path) const;
@@ -110,10 +124,9 @@ class ServiceDevice {
  private:
   [[nodiscard]] bool is_3_5() const noexcept { return profile_ >= ServiceProfile::v3_5; }
   void begin_faults();
-  void begin(ServiceFault fault);
   void take_packets();
   void follow(const CartesianReport& report) noexcept;
-  [[nodiscard]] CartesianCommand command_in(std::string_view text);
+  void take_command(std::string_view text);
   [[nodiscard]] Json arm_config(const std::string& name) const;
   [[nodiscard]] std::string state_text(bool with_config, double position_scale = 1) const;
   [[nodiscard]] ServiceMessage broken(const std::string& text);
@@ -128,11 +141,13 @@ class ServiceDevice {
   CartesianReport report_;  ///< the newest that the device gave
   std::int64_t report_cycle_ = 0;
   std::array<double, 3> velocity_mm_s_{};  ///< kerf's frame, low-passed
-  bool is_forced_ = false;                 ///< the last message had a force
+  CartesianCommand command_;               ///< of the last message
+  bool is_forced_ = false;                 ///< it had a force
   bool wants_full_state_ = false;
   std::deque<ServiceMessage> replies_;
 
   int malformed_left_ = 0, malformed_way_ = 0;
+  bool is_unreadable_ = false;
   bool is_listed_ = true, has_other_id_ = false, has_second_arm_ = false;
   bool has_third_handle_ = false, is_driven_ = false;
   bool is_powered_ = true, is_awake_ = true;

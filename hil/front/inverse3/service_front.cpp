@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "hil/front/inverse3/service_front.hpp"
 
+#include <algorithm>
+#include <array>
 #include <chrono>
+#include <cstdint>
 #include <cstring>
 #include <deque>
 #include <utility>
@@ -9,6 +12,7 @@
 
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/write.hpp>
 #include <boost/beast/core.hpp>
 #include <boost/beast/http.hpp>
 #include <boost/beast/websocket.hpp>
@@ -79,6 +83,7 @@ struct Client : std::enable_shared_from_this<Client> {
   Stream stream;
   beast::flat_buffer buffer;
   std::deque<ServiceMessage> outgoing;
+  std::size_t number = 0;  ///< of its record
 };
 
 /// One request of HTTP.
@@ -187,25 +192,38 @@ struct ServiceFront::State {
     has_left = false;
     if (began_ns == 0) began_ns = monotonic_ns();
     catch_up();
+    client->number = records.size();
+    records.emplace_back();
     client->send({service->greet()});
-    read();
+    read(client);
   }
 
-  void read() {
-    client->stream.async_read(client->buffer, [this, who = client](ErrorCode error, std::size_t) {
-      if (client != who) return;
+  void read(const std::shared_ptr<Client>& who) {
+    who->stream.async_read(who->buffer, [this, who](ErrorCode error, std::size_t) {
+      const bool is_ended = std::ranges::find(ended, who) != ended.end();
+      if (client != who && !is_ended) return;
       if (error) {
+        std::erase(ended, who);
+        if (client != who) return;
         const bool in_order = error == websocket::error::closed &&
-                              client->stream.reason().code == websocket::close_code::normal;
+                              who->stream.reason().code == websocket::close_code::normal;
         has_left = has_left || in_order;
         return lose();
       }
-      const auto bytes = client->buffer.cdata();
+      const auto bytes = who->buffer.cdata();
       catch_up();
       service->receive({static_cast<const char*>(bytes.data()), bytes.size()});
-      client->buffer.clear();
+      who->buffer.clear();
+      ClientRecord& its = records[who->number];
+      its.pushes_at_end = service->is_pushed();
+      if (its.pushes_at_end) its.let_go_ns = 0;
+      if (!its.pushes_at_end && its.failed_ns != 0 && its.let_go_ns == 0) {
+        its.let_go_ns = monotonic_ns();
+      }
+      while (is_ended && service->next_reply()) {
+      }  // no reply on a side that has ended
       flush();
-      if (client == who) read();
+      read(who);
     });
   }
 
@@ -213,6 +231,7 @@ struct ServiceFront::State {
     while (client) {
       auto reply = service->next_reply();
       if (!reply) break;
+      if (reply->is_broken) note_failure(*client);
       client->send(std::move(*reply));
       ++sent;
     }
@@ -223,17 +242,42 @@ struct ServiceFront::State {
     if (client && service->hung_up()) break_link(ServiceFault::close);
   }
 
+  void note_failure(const Client& who) {
+    std::int64_t& failed_ns = records[who.number].failed_ns;
+    if (failed_ns == 0) failed_ns = monotonic_ns();
+  }
+
   void break_link(ServiceFault fault) {
     if (!client) return;
     const std::shared_ptr<Client> who = client;
-    if (fault == ServiceFault::half_open) {
-      silent.push_back(who);
-    } else if (fault == ServiceFault::close) {
-      who->stream.async_close(websocket::close_code::normal, [who](ErrorCode) {});
-    } else {
-      ErrorCode ignored;
-      who->stream.next_layer().set_option(tcp::socket::linger(true, 0), ignored);
-      who->stream.next_layer().close(ignored);
+    note_failure(*who);
+    ErrorCode ignored;
+    tcp::socket& socket = who->stream.next_layer();
+    switch (fault) {
+      case ServiceFault::half_open:
+        silent.push_back(who);
+        break;
+      case ServiceFault::close:
+      case ServiceFault::going_away: {
+        // Not by the stream, which would not read on.
+        const bool in_order = fault == ServiceFault::close;
+        const std::array<std::uint8_t, 4> frame{0x88, 2, 0x03,
+                                                static_cast<std::uint8_t>(in_order ? 0xE8 : 0xE9)};
+        asio::write(socket, asio::buffer(frame), ignored);
+        ended.push_back(who);
+        break;
+      }
+      case ServiceFault::half_close:
+        socket.shutdown(tcp::socket::shutdown_send, ignored);
+        ended.push_back(who);
+        break;
+      case ServiceFault::fin:
+        socket.close(ignored);
+        break;
+      default:
+        socket.set_option(tcp::socket::linger(true, 0), ignored);
+        socket.close(ignored);
+        break;
     }
     lose();
   }
@@ -266,8 +310,10 @@ struct ServiceFront::State {
   std::shared_ptr<Client> client;
   std::vector<std::shared_ptr<Client>> readers;  ///< of events
   std::vector<std::shared_ptr<Client>> silent;   ///< half-open: theirs stay open
-  bool has_left = false;                         ///< the last client, in order
-  std::int64_t began_ns = 0;                     ///< cycle 0 of `service`; 0: no client yet
+  std::vector<std::shared_ptr<Client>> ended;    ///< the service's side has ended; it reads on
+  std::vector<ClientRecord> records;
+  bool has_left = false;      ///< the last client, in order
+  std::int64_t began_ns = 0;  ///< cycle 0 of `service`; 0: no client yet
   std::int64_t lost_ns = 0;
   std::int64_t past_cycles = 0;  ///< of services before this one
   std::uint64_t sent = 0, resyncs = 0;
@@ -288,6 +334,10 @@ std::optional<std::uint16_t> ServiceFront::event_port() const noexcept {
   ErrorCode ignored;
   if (!state_->event_acceptor) return std::nullopt;
   return state_->event_acceptor->local_endpoint(ignored).port();
+}
+
+const std::vector<ClientRecord>& ServiceFront::records() const noexcept {
+  return state_->records;
 }
 
 void ServiceFront::serve(const ServeLimits& limits, bool stay, FrontStats& stats) {

@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "hil/front/inverse3/service_device.hpp"
 #include "hil/front/serving.hpp"
@@ -16,6 +17,14 @@ namespace kerf {
 struct ServicePlace {
   std::string where = "0";                  ///< [ADDRESS:]PORT; of 127.0.0.1, 0: any free one
   std::optional<std::uint16_t> event_port;  ///< at the same address; none: no events
+};
+
+/// What a client did about the first bad sign of the service on its connection: a reply that cannot
+/// be read, a closing frame, the end of its side. Times of CLOCK_MONOTONIC in ns; 0: never.
+struct ClientRecord {
+  std::int64_t failed_ns = 0;
+  std::int64_t let_go_ns = 0;  ///< the first message without force since then
+  bool pushes_at_end = false;  ///< the last message had a force
 };
 
 /// The emulated Inverse Service at a TCP port: HTTP and one WebSocket client at a time, whom a
@@ -33,6 +42,9 @@ class ServiceFront {
 
   [[nodiscard]] std::uint16_t port() const noexcept;
   [[nodiscard]] std::optional<std::uint16_t> event_port() const noexcept;
+
+  /// Of every client of the WebSocket so far. Not while `serve` runs.
+  [[nodiscard]] const std::vector<ClientRecord>& records() const noexcept;
 
   /// Serves until the limit or a stop, and without `stay` until a client has left in order, or none
   /// has come back for 3 s. One thread.

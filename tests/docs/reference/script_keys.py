@@ -75,7 +75,7 @@ def faults(root):
         ("kind", "below", "needed", "what goes wrong"),
         ("packets", "`reports`, `commands`", "`reports`", "whose packets: the device's, or the host's"),
         ("at_s", f"0 to {seconds} s", "0", "when it begins, by the clock"),
-        ("for_s", f"0 to {seconds} s", "0: once", "how long it lasts; not of `host_late`, `hang_up`"),
+        ("for_s", f"0 to {seconds} s", "0: once", "how long it lasts; not of `host_late`, `hang_up`, `closing`, `half_close`, `both_closed`"),
         ("every", f"1 to {int(file.number('kMaxEvery'))}", "1", "each so-many-th packet, the first one included"),
         ("axis", "0, 1, 2", "0", "which encoder"),
         ("counts", f"-{counts} to {counts}, not 0", "needed", "how far the encoder is off"),
@@ -98,7 +98,8 @@ def faults(root):
     code = lambda rows: [(f"`{row[0]}`", *row[1:]) for row in rows]
     return f"""## Faults
 
-`--fault FILE` of `./kerf emulator`, and `--scripts` of `./kerf lab faults`. `hil/faults` has examples.
+`--fault FILE` of `./kerf emulator`, and `--scripts` of `./kerf lab faults`. `hil/faults` has examples. `unreadable` and the kinds
+below it are played by `./kerf lab faults --port ws` alone; the emulated service has them as `--bus-fault` ([wire](wire.md)).
 
 {table(heads, code(top))}
 

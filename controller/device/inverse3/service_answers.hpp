@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <stdexcept>
+#include <string>
+
+#include "controller/device/inverse3/messages.hpp"
+#include "controller/device/inverse3/web_socket.hpp"
+#include "shared/wire/emulator_link.hpp"
+
+// What the HTTP answers of a service mean, with the way out.
+
+namespace kerf::inverse3 {
+
+inline constexpr const char* kNeeds =
+    "needs the vendor's Inverse Service 3.1 or newer: systemctl status haply-inverse-service";
+
+/// A reason for which no later try can help.
+struct Refusal : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+/// Throws for an answer whose status is no success, with the remedy of that status: a Refusal, or
+/// std::runtime_error if a later try may meet another answer (503, in use). `who` begins the text.
+[[noreturn]] void throw_status(const std::string& who, const HttpAnswer& answer);
+
+/// The answer to /version. Throws as `throw_status`; a Refusal if it has no version, one before
+/// 3.1, or is kerf's emulated service that does not fit `ours`.
+[[nodiscard]] ForceKey force_key_of(const HttpAnswer& answer, const LinkHello& ours);
+
+/// The answer to /settings/devices/force_scale; empty if it has none.
+[[nodiscard]] std::optional<double> force_scale_of(const HttpAnswer& answer);
+
+}  // namespace kerf::inverse3
