@@ -384,7 +384,8 @@ def judge_resets(pattern, jobs):
     for program in sorted({state.program for state in states}):
         mine = [state for state in states if state.program == program]
         sources = resets.Sources(ROOT, mine)
-        chosen = [(number, r) for number, r in enumerate(sources.resets) if re.search(pattern, f"{r.name} {r.file} {r.state.cases}")]
+        chosen = [(number, r) for number, r in enumerate(sources.resets)
+                  if re.search(pattern, f"{r.name} {r.file} {r.state.cases}") and (r.file, r.name) not in r.state.untried]
         if not chosen:
             continue
         with tempfile.TemporaryDirectory(prefix="kerf-resets.") as name, ending(concurrent.futures.ThreadPoolExecutor(jobs)) as pool:
@@ -504,6 +505,7 @@ def main():
         parser.error("give a LIST or --check")
     mutations = read_table()
     check(mutations)
+    resets.read_table(ROOT)
     if options.check:
         print(f"mutate: {len(mutations)} mutations, each text stands once")
         return 0

@@ -44,6 +44,7 @@ class State:
     members: list  # names under which other structs hold it whole
     is_law: bool  # begun anew in the memory of a law
     fields: list = dataclasses.field(default_factory=list)
+    untried: set = dataclasses.field(default_factory=set)  # files and names of resets that change nothing
 
 
 @dataclasses.dataclass
@@ -88,6 +89,11 @@ def read_table(root):
     states = []
     for line in (root / TABLE).read_text().splitlines():
         if not line or line.startswith("#"):
+            continue
+        if line.startswith("no "):
+            name, file, _ = line.removeprefix("no ").split(" @ ")
+            for state in states:
+                state.untried |= {(file, name)} if name.startswith(f"{state.struct}.") else set()
             continue
         struct, header, sources, objects, catcher = line.split(" @ ")
         program, _, cases = catcher.partition(" ")

@@ -11,6 +11,8 @@
 
 #include <doctest/doctest.h>
 
+#include "controller/law/law.hpp"
+#include "controller/law/registry/law_registry.hpp"
 #include "controller/loop/publisher.hpp"
 #include "tests/servo/two_arms_support.hpp"
 
@@ -168,6 +170,8 @@ void check_all(const LoadedScene& scene) {
         REQUIRE(again.out[arm].changed == fresh.out[arm].changed);
         REQUIRE(again.out[arm].samples_read == fresh.out[arm].samples_read);
         in_contact += again.out[arm].contact ? 1 : 0;
+        // In the air the proxy is at the hand from the first tick on.
+        if (tick < 150) REQUIRE(length(again.out[arm].proxy_offset_mm) < 1e-3);
       }
     }
     CHECK(in_contact > 300);
@@ -246,21 +250,86 @@ TEST_CASE("a hold leaves no trace: the force comes back as to a hand that never 
       pressed.step(stroke(tick), stroke(tick));
       came.step(stroke(tick), stroke(tick));
     }
-    hold(1);
-    for (int tick = 0; tick < 300; ++tick) {
-      pressed.step(stroke(200), stroke(200));
-      came.step(stroke(200), stroke(200));
-      for (const ServoOutput& out : pressed.out) REQUIRE(length(out.force_n) <= 0.51);
-    }
-    hold(0);
-    for (int tick = 200; tick < 500; ++tick) {
-      pressed.step(stroke(tick), stroke(tick));
-      came.step(stroke(tick), stroke(tick));
-      for (std::size_t arm = 0; arm < kMaxArms; ++arm) {
-        REQUIRE(pressed.out[arm].force_n == came.out[arm].force_n);
-        REQUIRE(pressed.out[arm].velocity_mm_per_s == came.out[arm].velocity_mm_per_s);
+    for (int from = 200; from < 600; from += 200) {  // two cycles
+      CAPTURE(from);
+      hold(1);
+      for (int tick = 0; tick < 300; ++tick) {
+        pressed.step(stroke(from), stroke(from));
+        came.step(stroke(from), stroke(from));
+        for (const ServoOutput& out : pressed.out) REQUIRE(length(out.force_n) <= 0.51);
+      }
+      hold(0);
+      for (int tick = 0; tick < 200; ++tick) {
+        pressed.step(stroke(from + tick), stroke(from + tick));
+        came.step(stroke(from + tick), stroke(from + tick));
+        for (std::size_t arm = 0; arm < kMaxArms; ++arm) {
+          REQUIRE(pressed.out[arm].force_n == came.out[arm].force_n);
+          REQUIRE(pressed.out[arm].velocity_mm_per_s == came.out[arm].velocity_mm_per_s);
+          // The spring of a proxy grows by 0.1 N a ms, from nothing on.
+          if (kind.cut == CutModel::preston) {
+            REQUIRE(length(pressed.out[arm].contact_n) <= 0.1 * (tick + 1) + 0.02);
+          }
+        }
       }
     }
     CHECK(length(pressed.out[0].force_n) > 0.03);
   }
+}
+
+namespace {
+
+/// A law that begins anew gives the bits of one that has never run, whatever it was fed before.
+template <template <class> class In, class N, class MakeInput>
+void check_begins_anew(const LawChoice& choice, const MakeInput& input) {
+  using Output = typename In<N>::Output;
+  const LawPlan<In<N>> plan = plan_law<In, N>(choice, {.rate_hz = 1000, .tip_noise_mm = 0.01});
+  LawMemory used;
+  for (int cycle = 0; cycle < 3; ++cycle) {
+    for (int i = 0; i < 300; ++i) static_cast<void>(plan(used, input(i, true)));
+    used.begin_anew();
+    LawMemory fresh;
+    for (int i = 0; i < 300; ++i) {
+      CAPTURE(i);
+      const Output again = plan(used, input(i, false)), first = plan(fresh, input(i, false));
+      REQUIRE((again.x == first.x && again.y == first.y && again.z == first.z));
+    }
+    used.begin_anew();
+  }
+}
+
+template <class N>
+void check_laws() {
+  using Real = typename N::Real;
+  const auto wave = [](int i, double by) {
+    return DeviceVec<Real>{Real(by * std::sin(0.1 * i)), Real(by * std::cos(0.07 * i)), Real(0)};
+  };
+  // Active at first, which leaves a deficit; then quiet.
+  const auto stabiliser = [&](int i, bool active) {
+    StabiliserInput<N> in;
+    in.wanted_n = wave(i, active ? 2 : 0.5);
+    in.sent_n = wave(i - 1, active ? 2 : 0.5);
+    in.moved_mm = wave(i + 5, active ? 0.5 : 0.01);
+    in.velocity_mm_per_s = wave(i + 5, active ? 500 : 10);
+    in.taken_mj = static_cast<typename N::Energy>((active ? -1.0 - 0.05 * i : 0.001 * i) *
+                                                  (N::kIsFixed ? kEnergyStepsPerMj : 1));
+    in.contact = i > 20;
+    return in;
+  };
+  for (const char* const name : {"passivity", "energy_bounding"}) {
+    CAPTURE(std::string(name));
+    check_begins_anew<StabiliserInput, N>({LawKind::stabiliser, name, {}}, stabiliser);
+  }
+  const auto tip = [&](int i, bool active) {
+    return VelocityInput<N>{wave(i, active ? 50 : 1), active && i % 9 == 0 ? 7U : 1U,
+                            !active && i == 0};
+  };
+  check_begins_anew<VelocityInput, N>({LawKind::velocity, "foaw", {}}, tip);
+  check_begins_anew<VelocityInput, N>({LawKind::velocity, "difference", {{"tau_ms", 20.0}}}, tip);
+}
+
+}  // namespace
+
+TEST_CASE("a law that begins anew remembers nothing of what it was fed before") {
+  check_laws<FixedNumbers>();
+  check_laws<DoubleNumbers>();
 }
