@@ -108,3 +108,35 @@ TEST_CASE("a second run by a new detector has the verdict of the first") {
   CHECK(first.given_mj == again.given_mj);
   CHECK(first.given_mj == doctest::Approx(0.05 * kLimit / 2).epsilon(0.01));
 }
+
+TEST_CASE("a drift after a swing turns no more") {
+  const LimitCycle run = verdict_on(
+      0.05,
+      [](std::int64_t tick) {
+        return tick < kLimit / 2 - 100 ? square(tick, 30) : 0.5 + 1e-4 * double(tick);
+      },
+      no_energy);
+  CHECK_FALSE(run.swings);
+  CHECK(run.undecided);
+}
+
+TEST_CASE("where the energy begins does not count, in a run of any length, and at rest") {
+  for (const double offset_mj : {-100.0, 0.0, 100.0}) {
+    CAPTURE(offset_mj);
+    for (const std::int64_t first : {std::int64_t{500}, kLimit}) {
+      LimitCycleDetector detector({.limit = kLimit, .first = first, .settled = kSettled}, 0.05, 1);
+      for (std::int64_t tick = 0;; ++tick) {
+        if (detector.take(square(tick, 40), offset_mj + 0.01 * double(tick), false)) break;
+      }
+      const double whole_mj = 0.01 * double(kLimit - 1);
+      CHECK(detector.verdict().port_minimum_mj == doctest::Approx(-whole_mj));
+      CHECK(detector.verdict().given_mj ==
+            doctest::Approx(first == kLimit ? whole_mj : whole_mj / 2).epsilon(0.01));
+    }
+    const LimitCycle rest = verdict_on(
+        0.05, [](std::int64_t) { return 2.0; },
+        [&](std::int64_t tick) { return offset_mj + (tick > 0 ? 3 : 0); });
+    CHECK(rest.rests());
+    CHECK(rest.port_minimum_mj == -3);
+  }
+}
