@@ -110,14 +110,18 @@ TEST_CASE("a second run by a new detector has the verdict of the first") {
 }
 
 TEST_CASE("a drift after a swing turns no more") {
-  const LimitCycle run = verdict_on(
-      0.05,
-      [](std::int64_t tick) {
-        return tick < kLimit / 2 - 100 ? square(tick, 30) : 0.5 + 1e-4 * double(tick);
-      },
-      no_energy);
-  CHECK_FALSE(run.swings);
-  CHECK(run.undecided);
+  for (const double mm_per_tick : {9e-5, -9e-5}) {  // within what the swing reached
+    CAPTURE(mm_per_tick);
+    const LimitCycle run = verdict_on(
+        0.05,
+        [&](std::int64_t tick) {
+          const std::int64_t drifted = tick - kLimit / 2 + 100;
+          return drifted < 0 ? square(tick, 30) : 0.5 + mm_per_tick * double(drifted - kLimit / 4);
+        },
+        no_energy);
+    CHECK_FALSE(run.swings);
+    CHECK(run.undecided);
+  }
 }
 
 TEST_CASE("where the energy begins does not count, in a run of any length, and at rest") {
