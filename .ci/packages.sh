@@ -3,6 +3,8 @@
 # Installs those Debian packages of the named groups of packages.txt that are missing. Without a
 # missing one it prints nothing and never calls apt.
 #     .ci/packages.sh [--missing] GROUP...      --missing: print their names only, install nothing
+#     .ci/packages.sh --unchanged FILE          ends with 0 if no package came or went since FILE was written, and the list is the
+#                                               same: then all are still there
 #     .ci/packages.sh --right                   how this user installs: root, sudo, password (sudo asks for one),
 #                                               refused (by sudo) or none (no sudo)
 set -euo pipefail
@@ -28,6 +30,10 @@ has_terminal() { { : </dev/tty; } 2>/dev/null; }
 only_print=
 case ${1:-} in
   --right) right && exit ;;
+  --unchanged)
+    [[ $2 -nt /var/lib/dpkg/status && $2 -nt $list ]] && exit
+    exit 1
+    ;;
   --missing)
     only_print=1
     shift

@@ -5,6 +5,7 @@ visualizer and bridge together, and keeps their results.
     python3 demo FOLDER_OF_PROGRAMS PATH_OF_KERF [OPTION...]
 
 Exit codes: 0 fine; 1 ran, and a check failed or a program crashed; 2 bad input or set-up; 130, 143 stopped by a signal."""
+import importlib.util
 import os
 import pathlib
 import re
@@ -407,9 +408,12 @@ class Demo:
         """Draws the plot and publishes the results, as many as there are. Returns the exit code."""
         options, processes = self.options, self.processes
         if self.out and (self.has_log() or code != 2 and os.path.exists(os.path.join(self.results, "report.json"))):
-            plot = processes.start("record", ["plot", os.path.join(self.results, "log"), "--out", os.path.join(self.results, "forces.svg")],
-                                   out="record.log", log="record.log")
-            if processes.conclude("record", plot, 30) or code:
+            failed = False
+            if self.can_plot():
+                plot = processes.start("record", ["plot", os.path.join(self.results, "log"), "--out", os.path.join(self.results, "forces.svg")],
+                                       out="record.log", log="record.log")
+                failed = processes.conclude("record", plot, 30)
+            if failed or code:
                 code = code if code > 2 else 1
             line, in_place = self.out.publish()
             if in_place:
@@ -420,6 +424,14 @@ class Demo:
         elif not self.out and options.headless and code == 0:
             say(f"kept {' '.join(filter(None, (options.sheet, options.record)))} alone: --out DIR keeps pictures, plot, report and log")
         return code
+
+    @staticmethod
+    def can_plot():
+        """An installed kerf does without what draws plots (cmake/package.cmake)."""
+        if importlib.util.find_spec("matplotlib"):
+            return True
+        complain("kerf: demo: forces.svg is not drawn: no matplotlib; apt-get install python3-matplotlib")
+        return False
 
     def next_demo(self, path):
         """Another demo replaces this one, with the scene or volume that the window chose."""
