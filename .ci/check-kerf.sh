@@ -334,6 +334,10 @@ expect 'and is led from picture to picture' called '^controller.*--virtual --unt
 expect 'by the visualizer' called '^visualizer.*--lead .*/lead '
 expect 'the second demo replaces the first' kerf_gives 0 demo --seconds 1 --out "$lab/out"
 expect 'and leaves nothing else' kept "$all"
+mkdir "$lab/bare" && echo 'import sys; sys.modules["matplotlib"] = None' >"$lab/bare/sitecustomize.py"
+expect 'without matplotlib a demo runs' with PYTHONPATH="$lab/bare" kerf_gives 0 demo --seconds 1 --out "$lab/out"
+expect 'and says that it draws no plot' says '^kerf: demo: forces.svg is not drawn: no matplotlib; '
+expect 'which is all that is missing' kept "${all/out\/forces.svg /}"
 
 expect 'a failed check is told' \
   with FAIL_controller=1 kerf_gives 1 demo --seconds 1 --out "$lab/out"
