@@ -94,7 +94,7 @@ FaultScript random_faults(std::uint32_t seed) {
   const auto below = [&](std::uint32_t end) { return static_cast<int>(random() % end); };
   FaultScript script;
   script.seed = seed;
-  script.is_random = true;
+  script.hides = true;
   const int count = 3 + below(4);
   for (int i = 0; i < count; ++i) {
     DeviceFault fault;

@@ -78,9 +78,9 @@ struct FaultScript {
   std::vector<DeviceFault> faults;  ///< empty: all goes well
   std::uint32_t seed = 1;
   FaultClock clock = FaultClock::push;
-  std::string latches{};   ///< of kLatchWords; empty: chance or the device decides
-  double seconds = 4;      ///< that a lab plays it
-  bool is_random = false;  ///< by `random_faults`: one fault may hide another
+  std::string latches{};  ///< of kLatchWords; empty: chance or the device decides
+  double seconds = 4;     ///< that a lab plays it
+  bool hides = false;     ///< one fault may keep another from changing anything: of `random_faults`
 };
 
 /// Reads a fault script, TOML of at most 1 MiB and 1000 faults.

@@ -11,6 +11,7 @@
 #include <mutex>
 #include <optional>
 #include <ostream>
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -28,18 +29,13 @@
 #include "lab/run/grid_run.hpp"
 #include "lab/run/lab_command.hpp"
 #include "lab/run/lab_run.hpp"
+#include "lab/safety/fault_pairs.hpp"
 #include "lab/safety/fault_run.hpp"
 #include "shared/posix/program.hpp"
 #include "shared/text/json.hpp"
 
 namespace kerf::faults {
 namespace {
-
-/// A script under the name of its file; none: faults at random, other ones for each seed.
-struct NamedScript {
-  std::string name;
-  std::optional<FaultScript> script;
-};
 
 /// One device in one scene.
 struct Cell {
@@ -99,12 +95,17 @@ Json figures_of(const FaultOutcome& worst) {
           {"slowest_off_ms", worst.slowest_off_ms}};
 }
 
-/// Returns true if this script breaks a part that the cell's device has, or has no faults.
+/// Returns true if this script breaks a part that the cell's device has, or has no faults; of a
+/// pair each one.
 bool applies(const NamedScript& named, const Cell& cell) {
   if (!named.script || named.script->faults.empty()) return true;
-  return std::ranges::any_of(named.script->faults, [&](const DeviceFault& fault) {
+  const auto concern = [&](const DeviceFault& fault) {
     return concerns(fault.kind, cell.scene.device.personality, cell.by_service);
-  });
+  };
+  const std::span all(named.script->faults);
+  const std::size_t first = std::min(named.second_from, all.size());
+  return std::ranges::any_of(all.first(first), concern) &&
+         (first == all.size() || std::ranges::any_of(all.subspan(first), concern));
 }
 
 /// Seeds `seed_base` to `seed_base + seeds - 1`. The same arguments give the same row.
@@ -117,10 +118,11 @@ FaultRow run_row(const Cell& cell, const NamedScript& named, std::uint32_t seed_
   row.script = named.name;
   row.rate_hz = cell.scene.servo.rate_hz;
   for (std::uint32_t seed = seed_base; seed - seed_base < seeds; ++seed) {
-    FaultScript script = named.script ? *named.script : random_faults(seed);
-    script.seed = seed;
-    FaultOutcome outcome =
-        run_faults({.scene = cell.scene, .hand = cell.hand, .by_service = cell.by_service}, script);
+    FaultOutcome outcome = run_faults({.scene = cell.scene,
+                                       .hand = cell.hand,
+                                       .by_service = cell.by_service,
+                                       .stop_s = named.stop_s},
+                                      played(named, seed));
     row.latches = outcome.demanded;
     const std::string name = "seed " + std::to_string(seed) + ": ";
     if (!outcome.inconclusive.empty()) row.inconclusive.push_back(name + outcome.inconclusive);
@@ -217,12 +219,14 @@ std::vector<NamedScript> scripts_in(const std::string& place) {
   std::vector<NamedScript> scripts;
   std::error_code error;
   if (std::filesystem::is_regular_file(place, error)) {
-    scripts.push_back({std::filesystem::path(place).stem().string(), read_fault_script(place)});
+    scripts.push_back(
+        {.name = std::filesystem::path(place).stem().string(), .script = read_fault_script(place)});
     return scripts;
   }
   for (const auto& entry : std::filesystem::directory_iterator(place, error)) {
     if (entry.path().extension() != ".toml") continue;
-    scripts.push_back({entry.path().stem().string(), read_fault_script(entry.path())});
+    scripts.push_back(
+        {.name = entry.path().stem().string(), .script = read_fault_script(entry.path())});
   }
   if (scripts.empty()) {
     throw HilError("--scripts: " + place + ": no fault scripts there; name hil/faults or a file");
@@ -264,6 +268,7 @@ class Command final : public LabCommand {
   std::uint32_t seed_base_ = 1;
   unsigned seeds_ = 20;
   unsigned random_ = 1;
+  std::string pairs_;
 };
 
 Command::Command(Arguments& program)
@@ -296,6 +301,10 @@ Command::Command(Arguments& program)
   app_.option("--random", random_, "1: faults at random as well, another set for each seed")
       .within(0, 1)
       .shows_default();
+  app_.option("--pairs", pairs_,
+              "two scripts at once, and each with a signal that asks the controller to end: of "
+              "PARTS parts of all pairs this one; 1/1: all")
+      .shown_as("PART/PARTS");
   app_.option("--scene", scene_, "what is touched").shows_default();
   app_.option("--hand", hand_, "how").shows_default();
   app_.option("--report", report_, "write the figures as JSON").shown_as("FILE");
@@ -351,7 +360,13 @@ std::vector<Cell> Command::cells() const {
 int Command::run(std::ostream& out) const {
   const LabOutput report("--report", report_, ".json");
   auto scripts = scripts_in(find_data_file(scripts_));
-  if (random_ != 0) scripts.push_back({"at random", std::nullopt});
+  if (!pairs_.empty()) {
+    const auto share = pair_share_of(pairs_);
+    if (!share) throw HilError("--pairs: " + pairs_ + ": not a part of parts; use such as 3/40");
+    scripts = pairs_of(scripts, *share);
+  } else if (random_ != 0) {
+    scripts.push_back({.name = "at random"});
+  }
   const std::vector<Cell> all = cells();
   struct Job {
     const Cell* cell;

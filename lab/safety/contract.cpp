@@ -31,6 +31,7 @@ constexpr double kSpeedStepMm = 0.2;
 constexpr double kPushN = 0.05;
 // A force may have turned about as fast as it may rise; longer inward is no slew.
 constexpr double kTurnMs = 20;
+constexpr double kJumpMm = 1;  // from one report to the next: no hand does so
 constexpr std::size_t kMaxListed = 4;
 
 /// From the start of a fault at the device until the motors must be off for `name`. A fault that
@@ -147,6 +148,11 @@ void SafetyMonitor::follow_report(double time_ms) {
   moved_mm_ = {};
   if (told_pose) {
     if (before) moved_mm_ = told_pose->tip_mm - before->tip_mm;
+    if (norm(moved_mm_) > kJumpMm) {
+      jumped_from_mm_ = before->tip_mm;
+    } else if (jumped_from_mm_ && norm(told_pose->tip_mm - *jumped_from_mm_) < kJumpMm) {
+      jumped_from_mm_.reset();
+    }
     pose_ = told_pose;
     pose_ms_ = time_ms;
     if (norm(moved_mm_) > outward_.reach_mm()) {
@@ -266,7 +272,9 @@ void SafetyMonitor::check_state(const Command& command) {
     check(std::abs(int{count}) <= wire_.count_end(), command.time_ms, "a motor's counts",
           std::abs(int{count}), wire_.count_end());
   }
-  if (command.asked.off() || off_ == Off::no_reason) return;
+  if (command.asked.off()) return;
+  if (ended_ms_ >= 0) return broken(command.time_ms, "motors on after a signal to end");
+  if (off_ == Off::no_reason) return;
   constexpr std::array<const char*, 4> kWhy{"motors on before calibration",
                                             "motors on while parked", "motors on without homing",
                                             "motors on after a fault"};
@@ -318,8 +326,8 @@ void SafetyMonitor::check_change(const Command& command) {
 /// What was sent after the last report, turned and weakened by nothing.
 void SafetyMonitor::check_hold(const Command& command) {
   // Reports that stand still are none, though they were heard.
-  const bool holds = !fresh_ && !stands_still_ && !begins_anew_ && off_ == Off::no_reason &&
-                     command.time_ms - heard_ms_ <= kHoldMs;
+  const bool holds = !fresh_ && !stands_still_ && !begins_anew_ && ended_ms_ < 0 &&
+                     off_ == Off::no_reason && command.time_ms - heard_ms_ <= kHoldMs;
   const double off_by_n = norm(command.force_n - held_n_);
   check(!holds || off_by_n <= kStepN, command.time_ms, "change of a held force, in N", off_by_n,
         kStepN);
@@ -328,7 +336,10 @@ void SafetyMonitor::check_hold(const Command& command) {
 void SafetyMonitor::check_direction(const Command& command) {
   const bool pushes = norm(command.force_n) > kPushN;
   const auto out = pushes && way_in_is_known_ ? outward_.at(pose_->tip_mm) : std::nullopt;
-  const bool inward = out && dot(*out, command.force_n) < 0;
+  // Deep in the solid after a jump, out is the way back.
+  const bool is_back =
+      jumped_from_mm_ && dot(*jumped_from_mm_ - pose_->tip_mm, command.force_n) > 0;
+  const bool inward = out && dot(*out, command.force_n) < 0 && !is_back;
   if (!inward) {
     inward_since_ms_ = -1;
     return;
@@ -347,6 +358,10 @@ void SafetyMonitor::heat_until(double time_ms) {
 void SafetyMonitor::cycle(double time_ms, const DeviceMoment& device) {
   docked_ = device.docked;
   const double alone_ms = time_ms - last_.time_ms;
+  if (ended_ms_ >= 0 && time_ms - ended_ms_ <= kOffMs + kCycleMs) {
+    check(last_.asked.off() || time_ms - ended_ms_ <= kOffMs, time_ms,
+          "motors on, ms after a signal to end", time_ms - ended_ms_, kOffMs);
+  }
   if (!last_.asked.off()) {
     outcome_.longest_alone_ms = std::max(outcome_.longest_alone_ms, alone_ms);
     if (alone_ms > kWatchdogMs + kCycleMs && !silence_told_) {

@@ -35,6 +35,8 @@ class SafetyMonitor {
   void listened(double time_ms) noexcept { listened_ms_ = time_ms; }
   /// A packet of the device that the host has taken.
   void reported(double time_ms, std::span<const std::uint8_t> packet);
+  /// A signal has asked the controller to end: the motors go off, for good.
+  void asked_to_end(double time_ms) noexcept { ended_ms_ = time_ms; }
   /// The host knows that the device has ended its side of the link.
   void link_ended() noexcept { link_ended_ = true; }
   /// A packet that the host has sent.
@@ -82,18 +84,20 @@ class SafetyMonitor {
   DeviceWire wire_;
   OutwardNormal outward_;
 
-  ObservedReport told_;           ///< the newest report
-  bool fresh_ = false;            ///< it came since the last command
-  double heard_ms_ = 0;           ///< when
-  double listened_ms_ = 0;        ///< the host last asked for one
-  std::optional<ArmPose> pose_;   ///< that was told last
-  double pose_ms_ = 0;            ///< when
-  DeviceVec<double> moved_mm_;    ///< from the pose before to that
-  bool had_no_pose_ = false;      ///< in some report
+  ObservedReport told_;                              ///< the newest report
+  bool fresh_ = false;                               ///< it came since the last command
+  double heard_ms_ = 0;                              ///< when
+  double listened_ms_ = 0;                           ///< the host last asked for one
+  std::optional<ArmPose> pose_;                      ///< that was told last
+  double pose_ms_ = 0;                               ///< when
+  DeviceVec<double> moved_mm_;                       ///< from the pose before to that
+  std::optional<DeviceVec<double>> jumped_from_mm_;  ///< the tip; until it is there again
+  bool had_no_pose_ = false;                         ///< in some report
   double no_pose_since_ms_ = -1;  ///< reports tell of none since; negative: they do
   EncoderCounts rest_count_{};
   double rest_since_ms_ = -1;  ///< parked and still; negative: it is not
   bool link_ended_ = false;
+  double ended_ms_ = -1;       ///< a signal asked for the end then; negative: none has
   ObservedReport still_;       ///< without a number in its packets: what it has told ...
   double still_since_ms_ = 0;  ///< ... since then, under torque
   bool stands_still_ = false;  ///< for longer than reports that stand still are believed

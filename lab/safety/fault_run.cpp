@@ -128,11 +128,15 @@ double end_of(const FaultScript& script) {
   return end_s;
 }
 
-/// The same faults at another moment of the hand's motion, up to 0.1 s later.
-FaultScript shifted(FaultScript script) {
+/// By how much the faults of a seed are later in the hand's motion, below 100 ms.
+double later_ms(const FaultScript& script) {
   constexpr std::uint32_t kPrime = 7919, kMs = 100;
-  const double later_s = (script.seed * kPrime % kMs) / 1000.0;
-  for (DeviceFault& fault : script.faults) fault.at_s += later_s;
+  return script.seed * kPrime % kMs;
+}
+
+/// The same faults at another moment of the hand's motion.
+FaultScript shifted(FaultScript script) {
+  for (DeviceFault& fault : script.faults) fault.at_s += later_ms(script) / 1000;
   return script;
 }
 
@@ -193,6 +197,7 @@ FaultOutcome run_faults(const FaultCase& subject, const FaultScript& as_written)
   const auto cycles_per_look =
       static_cast<std::uint32_t>(cycles_of(std::chrono::duration<double>(kWatchdogPeriod).count()));
   double first_push_ms = -1;
+  bool is_asked_to_end = false, has_ended = false;
   // A service does not show a servo that is ready: the emulated hand begins 2 s later.
   const std::int64_t cycles = cycles_of(script.seconds + (subject.by_service ? 2 : 0));
   for (std::int64_t cycle = 1; cycle <= cycles; ++cycle) {
@@ -206,6 +211,13 @@ FaultOutcome run_faults(const FaultCase& subject, const FaultScript& as_written)
     contract.cycle(time_ms, {emulator.model().motor_force_n(), emulator.model().docked()});
     if (first_push_ms < 0 && outcome.pushed) first_push_ms = time_ms;
     const auto now_ns = static_cast<std::int64_t>(time_ms * 1e6);
+    if (!is_asked_to_end && subject.stop_s && first_push_ms >= 0 &&
+        time_ms >= first_push_ms + later_ms(script) + *subject.stop_s * 1000) {
+      is_asked_to_end = true;
+      contract.asked_to_end(time_ms);
+      loop.driver().stay_released();
+    }
+    if (has_ended) continue;
     if ((static_cast<std::uint64_t>(cycle) + script.seed) % cycles_per_look == 0)
       watchdog.look(now_ns);
     if (!due || device.host_is_late()) continue;
@@ -214,12 +226,17 @@ FaultOutcome run_faults(const FaultCase& subject, const FaultScript& as_written)
     const ServoOutput output = loop.servo().step(report);
     send_tick(std::span(&output, 1), signals, loop.driver());
     ++signals.heartbeat;
+    if (!is_asked_to_end) continue;
+    has_ended = true;
+    loop.driver().release_for_good();
   }
   constexpr double kGraceMs = 50;
-  outcome.demanded = turns_fail ? std::string() : script.latches;
+  // Of faults that may hide each other only this is demanded: if they amount to none, it goes on.
+  const bool hides_more = script.hides && outcome.latched != fault_name(Fault::none);
+  outcome.demanded = turns_fail || hides_more ? std::string() : script.latches;
   contract.end(time_ms, outcome.demanded, first_push_ms + end_of(script) * 1000 + kGraceMs);
   outcome.inconclusive =
-      inconclusive_line(script, subject, outcome, device.met(), script.is_random || turns_fail);
+      inconclusive_line(script, subject, outcome, device.met(), script.hides || turns_fail);
   return outcome;
 }
 

@@ -17,6 +17,9 @@ struct FaultCase {
   const LoadedScene& scene;  ///< its device is the one that is emulated
   const HandScript& hand;
   bool by_service = false;  ///< an Inverse3 behind its emulated service: see ServiceLink
+  /// So long after the first push a signal asks the controller to end, as in its MotorGuard: the
+  /// motors go off for good, the tick under way is the last one.
+  std::optional<double> stop_s{};
 };
 
 /// Whether this program was built with the Inverse3's service.

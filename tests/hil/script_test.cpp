@@ -105,7 +105,7 @@ TEST_CASE("a fault script is read whole") {
   CHECK(script.seed == 7);
   CHECK(script.latches == "overspeed");
   CHECK(script.seconds == 4);
-  CHECK_FALSE(script.is_random);
+  CHECK_FALSE(script.hides);
   REQUIRE(script.faults.size() == 3);
   CHECK(script.faults[0].kind == FaultKind::lose);
   CHECK(script.faults[0].of_commands);

@@ -306,3 +306,31 @@ TEST_CASE("a force into the solid is seen, whatever the motors' signs are") {
   CHECK(outward.is_free({0, 3 * radius_mm, 0}));
   CHECK_FALSE(outward.is_free({0, radius_mm / 2, 0}));
 }
+
+TEST_CASE("after a signal to end the motors go off within 2 ms, and no later packet is another") {
+  const auto ask = [](Watched& run) {
+    run.push_up_to(2);
+    run.contract.asked_to_end(run.ms);
+  };
+  Watched well;
+  ask(well);
+  well.tick(0, false);
+  for (int i = 0; i < 50; ++i) well.tick(0, false);
+  CHECK(well.outcome.violation_count == 0);
+
+  Watched again;
+  ask(again);
+  again.tick(0, false);
+  again.tick(0.2);
+  REQUIRE(again.outcome.violation_count == 1);
+  CHECK(again.outcome.violations[0].find("motors on after a signal to end") != std::string::npos);
+
+  Watched silent;
+  ask(silent);
+  for (int i = 0; i < 3 * 8; ++i) {
+    silent.ms += 0.125;
+    silent.contract.cycle(silent.ms, {{0, 2, 0}, false});
+  }
+  REQUIRE(silent.outcome.violation_count > 0);
+  CHECK(silent.outcome.violations[0].find("ms after a signal to end") != std::string::npos);
+}

@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "lab/safety/fault_pairs.hpp"
+
+#include <cstddef>
+#include <map>
+#include <string>
+#include <vector>
+
+#include <doctest/doctest.h>
+
+#include "hil/device/falcon.hpp"
+#include "lab/safety/fault_run.hpp"
+#include "tests/servo/support.hpp"
+
+using kerf::DeviceFault;
+using kerf::FaultKind;
+using kerf::FaultScript;
+using kerf::faults::NamedScript;
+using kerf::faults::pair_share_of;
+using kerf::faults::pairs_of;
+
+namespace {
+
+NamedScript named(const char* name, FaultKind kind, const char* latches) {
+  return {.name = name,
+          .script = FaultScript{.faults = {{.kind = kind, .at_s = 0.2, .for_s = 0.03, .ms = 30}},
+                                .latches = latches}};
+}
+
+const std::vector<NamedScript> kScripts{
+    {.name = "all_well", .script = FaultScript{.faults = {}, .latches = "none", .seconds = 14}},
+    named("lost", FaultKind::lose, "stale_input"),
+    named("parked", FaultKind::park, "none"),
+    named("late", FaultKind::host_late, "none")};
+
+}  // namespace
+
+TEST_CASE("every pair of scripts with faults is in one part, and each script with the signal") {
+  for (const std::size_t parts : {1, 2, 3, 7, 40}) {
+    std::map<std::string, int> count;
+    for (std::size_t part = 1; part <= parts; ++part) {
+      for (const NamedScript& pair : pairs_of(kScripts, {part, parts})) ++count[pair.name];
+    }
+    const std::map<std::string, int> wanted{{"all_well+asked_to_end", 1},
+                                            {"lost+asked_to_end", 1},
+                                            {"parked+asked_to_end", 1},
+                                            {"late+asked_to_end", 1},
+                                            {"lost+parked", 1},
+                                            {"lost+late", 1},
+                                            {"parked+late", 1}};
+    CHECK(count == wanted);
+  }
+}
+
+TEST_CASE("a pair has both scripts' faults, and demands that it goes on only where both do") {
+  for (const NamedScript& pair : pairs_of(kScripts, {1, 1})) {
+    CAPTURE(pair.name);
+    const FaultScript& script = *pair.script;
+    CHECK(pair.stop_s.has_value() == pair.name.ends_with("+asked_to_end"));
+    CHECK(script.latches == (pair.name == "parked+late" ? "none" : ""));
+    if (pair.stop_s) continue;
+    REQUIRE(script.faults.size() == 2);
+    bool is_earlier = false, is_later = false;
+    for (unsigned seed = 1; seed <= 5; ++seed) {
+      const FaultScript seen = played(pair, seed);
+      CHECK(seen.faults[0].at_s == 0.2);
+      is_earlier = is_earlier || seen.faults[1].at_s < 0.2;
+      is_later = is_later || seen.faults[1].at_s > 0.2;
+    }
+    CHECK((is_earlier && is_later));
+  }
+}
+
+TEST_CASE("a share is PART/PARTS, from the first to the last part") {
+  const auto share = pair_share_of("3/40");
+  REQUIRE(share);
+  CHECK((share->part == 3 && share->parts == 40));
+  for (const char* const wrong :
+       {"", "3", "3/", "/40", "0/40", "41/40", "3/40 ", "-1/4", "a/b", "3/4/5"}) {
+    CAPTURE(wrong);
+    CHECK_FALSE(pair_share_of(wrong));
+  }
+}
+
+TEST_CASE("a signal that asks for the end ends all force, whatever else goes wrong") {
+  kerf::LoadedScene scene = kerf::test::half_space_scene();
+  scene.device.personality = kerf::Personality::falcon;
+  scene.device.torque_scale = kerf::FalconParams().torque_scale();
+  scene.servo.numeric = kerf::NumericKind::float64;
+  kerf::HandScript hand;
+  hand.start = {0, 4, 0};
+  hand.steps = {kerf::hand_move({0, -1, 0}, 0.4), kerf::hand_move({0, -1, 0}, 10)};
+  for (const NamedScript& pair : pairs_of(kScripts, {1, 1})) {
+    if (!pair.stop_s) continue;
+    CAPTURE(pair.name);
+    const auto outcome = kerf::faults::run_faults(
+        {.scene = scene, .hand = hand, .stop_s = pair.stop_s}, played(pair, 2));
+    for (const std::string& violation : outcome.violations) MESSAGE(violation);
+    CHECK(outcome.violation_count == 0);
+    CHECK(outcome.pushed);
+    if (!pair.script->faults.empty())
+      CHECK_FALSE(outcome.pushed_again);  // else it counts from 0.05 s
+  }
+}
