@@ -104,7 +104,7 @@ size() {
   LC_ALL=C apt-get -y --print-uris --no-install-recommends install "${missing[@]}" 2>/dev/null | awk -v named="${#missing[@]}" '
     / newly installed/ { for (i = 2; i <= NF; ++i) if ($i == "newly") all = $(i - 1) }
     /^Need to get / { size = $4; unit = $5; sub("/.*", "", unit) }
-    END { printf "%d packages", named; if (all > named) printf " and %d that they need", all - named
+    END { printf "%d package%s", named, named == 1 ? "" : "s"; if (all > named) printf " and %d that they need", all - named
       if (size != "") printf ", %s %s", size, unit }'
 }
 first=${KERF_DONE:-0} end=${KERF_END:-100}

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <doctest/doctest.h>
@@ -28,7 +29,7 @@ const std::vector<Entry>& small_study() {
   return entries;
 }
 
-const Entry& entry(const std::string& knob, const std::string& value) {
+const Entry& entry(std::string_view knob, std::string_view value) {
   const auto& entries = small_study();
   const auto found = std::find_if(entries.begin(), entries.end(), [&](const Entry& e) {
     return e.knob == knob && e.value == value;
