@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <sstream>
 #include <system_error>
@@ -19,6 +20,19 @@
 
 namespace kerf {
 namespace {
+
+/// Writes a default as `=3` with every CLI11; from 2.4 on it writes ` [3] `.
+class HelpText : public CLI::Formatter {
+ public:
+  std::string make_option_opts(const CLI::Option* option) const override {
+    std::string text = CLI::Formatter::make_option_opts(option);
+    const std::string bracketed = " [" + option->get_default_str() + "] ";
+    if (const auto at = text.find(bracketed); at != std::string::npos) {
+      text.replace(at, bracketed.size(), "=" + option->get_default_str());
+    }
+    return text;
+  }
+};
 
 /// In place of CLI::Range, which accepts "nan" in any range and repeats the type.
 CLI::Validator range(double lowest, double highest) {
@@ -397,6 +411,7 @@ bool Arguments::chosen() const {
 CommandLine::CommandLine(const std::string& about, const std::string& program,
                          const std::string& version)
     : Arguments(nullptr), owned_(std::make_unique<CLI::App>(about, program)) {
+  owned_->formatter(std::make_shared<HelpText>());
   app_ = owned_.get();
   app_->set_version_flag("--version", version);
 }
