@@ -48,6 +48,8 @@ class SafetyMonitor {
   /// A service or its link has shown that the connection ends: called again while it is so. The
   /// motors are off after kZeroMs, until the device was parked anew.
   void service_fails(double time_ms) noexcept;
+  /// The host has ended a connection that could carry a message, and the last one had a force.
+  void service_left_pushing(double time_ms) { broken(time_ms, "a connection ended with a force"); }
   /// The run is over; `latches` as in FaultScript, `faults_end_ms` when the last fault was over.
   void end(double time_ms, const std::string& latches, double faults_end_ms);
 

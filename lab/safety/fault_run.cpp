@@ -207,6 +207,7 @@ FaultOutcome run_faults(const FaultCase& subject, const FaultScript& as_written)
     outcome.faults_begun = device.begun();
 #ifdef KERF_LAB_HAS_SERVICE
     if (link && link->has_failed()) contract.service_fails(time_ms);
+    if (link && link->has_left_pushing()) contract.service_left_pushing(time_ms);
 #endif
     contract.cycle(time_ms, {emulator.model().motor_force_n(), emulator.model().docked()});
     if (first_push_ms < 0 && outcome.pushed) first_push_ms = time_ms;

@@ -72,7 +72,7 @@ void ServiceLink::receive(std::span<const std::uint8_t> packet) noexcept {
 }
 
 void ServiceLink::advance(int cycles) noexcept {
-  has_failed_ = false;
+  has_failed_ = has_left_pushing_ = false;
   for (int i = 0; i < cycles; ++i) cycle();
 }
 
@@ -93,6 +93,7 @@ void ServiceLink::cycle() {
   if (std::exchange(owes_word_, false)) {
     inverse3::MessageBuffer buffer;
     service_.receive(inverse3::last_word(device_id_, ForceKey::vector, buffer));
+    has_left_pushing_ = service_.is_pushed();
     ++cycle_;
     return;
   }

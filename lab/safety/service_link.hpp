@@ -38,6 +38,9 @@ class ServiceLink final : public PacketDevice {
   [[nodiscard]] std::uint64_t turns() const noexcept { return turns_; }
   /// A fault of the service has begun that ends its connection, in the last call of `advance`.
   [[nodiscard]] bool has_failed() const noexcept { return has_failed_; }
+  /// A connection that could still carry a message has ended with a force, in the last call of
+  /// `advance`. The next connection takes it back so soon that the motors alone would not show it.
+  [[nodiscard]] bool has_left_pushing() const noexcept { return has_left_pushing_; }
 
  private:
   [[nodiscard]] std::int64_t now_ns() const noexcept;
@@ -60,7 +63,7 @@ class ServiceLink final : public PacketDevice {
   bool has_news_ = false;    ///< a command that no message had yet
   bool is_waiting_ = false;  ///< for a reply
   bool owes_word_ = false;   ///< the last one of a connection that is given up
-  bool has_failed_ = false;
+  bool has_failed_ = false, has_left_pushing_ = false;
   std::uint32_t number_ = 0;
   std::uint64_t turns_ = 0;
   std::deque<cartesian::ReportBytes> reports_;
