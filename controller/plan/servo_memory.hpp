@@ -142,7 +142,9 @@ class ContactMemory {
   PointShell<N> hold_point_shell(const LoadedScene& scene, const SceneTool& tool) {
     const double unit_mm = contact_unit_mm(scene);
     const auto samples = named(scene, [&] { return surface_samples(tool, unit_mm); });
-    return hold(tool.name, unit_mm, {samples, close_samples(tool, unit_mm)}, tool.round, places_);
+    const auto close = close_samples(tool, unit_mm);
+    return hold(tool.name, unit_mm, {samples, close}, tool.round, places_,
+                support_deficit_mm(tool.mesh, close));
   }
 
   /// The same for the parts behind the tool's head.
@@ -209,15 +211,17 @@ class ContactMemory {
   }
 
   PointShell<N> hold(const std::string& name, double unit_mm, PartSamples mm, bool round,
-                     std::vector<TransformedShell<N>>& places) {
+                     std::vector<TransformedShell<N>>& places, double deficit_mm = 0) {
     for (auto& at : mm.samples) {
       for (double& x : at) x /= unit_mm;
     }
     for (SurfaceSample& sample : mm.close) {
       for (double& x : sample.at) x /= unit_mm;
     }
-    const auto& held =
-        tools_.emplace_back(name, PointShellTable<N>(mm.samples, round, mm.close)).second;
+    const auto& held = tools_
+                           .emplace_back(name, PointShellTable<N>(mm.samples, round, mm.close,
+                                                                  deficit_mm / unit_mm))
+                           .second;
     for (TransformedShell<N>& in_volume : places) in_volume.hold(held.point_shell());
     return held.point_shell();
   }

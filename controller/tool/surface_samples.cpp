@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <numbers>
 #include <span>
 #include <sstream>
@@ -211,6 +212,20 @@ PartSamples part_samples(const SceneTool& tool, const ToolPart& part, double uni
 std::vector<SurfaceSample> close_samples(const SceneTool& tool, double unit_mm) {
   if (tool.round) return {};
   return samples_apart(tool, profile_of(tool), kClosePitch * unit_mm, kNearlyEven);
+}
+
+double support_deficit_mm(const ToolMesh& mesh, std::span<const SurfaceSample> close) {
+  constexpr int kDirections = 1500;
+  double deficit = 0;
+  if (mesh.triangles.empty()) return deficit;
+  for (const Point& u : fibonacci_ball(1, kDirections)) {
+    const auto along = [&](const Point& p) { return u[0] * p[0] + u[1] * p[1] + u[2] * p[2]; };
+    double surface = std::numeric_limits<double>::lowest(), samples = surface;
+    for (const Point& corner : mesh.points_mm) surface = std::max(surface, along(corner));
+    for (const SurfaceSample& sample : close) samples = std::max(samples, along(sample.at));
+    deficit = std::max(deficit, surface - samples);
+  }
+  return deficit;
 }
 
 }  // namespace kerf

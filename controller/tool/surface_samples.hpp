@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <span>
 #include <vector>
 
 #include "controller/tool/tool_mesh.hpp"
@@ -66,6 +67,12 @@ inline constexpr double kMostReach = 1024;
 /// Samples kClosePitch units apart of a tool that is not a ball, made in the same way, to refine a
 /// contact. None for a ball. Load time.
 [[nodiscard]] std::vector<SurfaceSample> close_samples(const SceneTool& tool, double unit_mm);
+
+/// How far a mesh reaches beyond its close samples, in mm: the largest difference of the two
+/// supports (the farthest point along a direction) over 1500 directions. A depth that is read at
+/// the samples is that much less than the mesh's, at most. 0 without triangles: the other shapes
+/// have samples on their rims and points. Load time: 20 ms for 10,000 samples.
+[[nodiscard]] double support_deficit_mm(const ToolMesh& mesh, std::span<const SurfaceSample> close);
 
 /// Both for a part behind the head of `tool`, in mm from the middle of the part.
 /// Throws LoadError for a part that is too large or too long for its unit. Load time.

@@ -53,8 +53,7 @@ GROUPS = [
     ("walls", "Walls", """\
 A hand makes random steps of 0.1 to 10 m/s at a tilted wall. The cylinder and the bur of `scenes/fluted_bur.toml` are
 also rotated at random. There is no supervisor. If a tick has no query left for a push, the tool may stay 0.05 voxels deep
-by its samples (`kWedged` of the sweep). A mesh stands out a little between its samples, so in a few of a million ticks a
-bur can sink deeper than 0.05 voxels."""),
+(`kWedged` of the sweep), less what a mesh reaches beyond its samples: 0.03 voxels of the bur (docs/theory.md 4.2)."""),
     ("air", "In air", """\
 A tool moves to and fro along tilted walls, so near and so fast that the hand moves 2.4 to 80 voxels in a
 tick. `--check` prints the speed up to which a scene is free of drag at any distance (docs/theory.md 4.2). The force is that of

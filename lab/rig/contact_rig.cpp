@@ -6,7 +6,7 @@ namespace kerf::extremes {
 template <class N>
 ContactRig<N>::ContactRig(const SampledTool& tool, const KernelSet& kernels)
     : kernels_(kernels),
-      tool_(tool.samples, tool.round, tool.close),
+      tool_(tool.samples, tool.round, tool.close, tool.deficit),
       points_(tool_.point_shell()) {}
 
 template <class N>

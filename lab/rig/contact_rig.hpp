@@ -33,10 +33,14 @@ inline constexpr Density kIso = 32768;
 struct SampledTool {
   std::vector<Point> samples;
   std::vector<SurfaceSample> close;
+  double deficit = 0;
   bool round = false;
 
   SampledTool(const SceneTool& tool)  // NOLINT(google-explicit-constructor): a tool is one
-      : samples(surface_samples(tool, 1.0)), close(close_samples(tool, 1.0)), round(tool.round) {}
+      : samples(surface_samples(tool, 1.0)),
+        close(close_samples(tool, 1.0)),
+        deficit(support_deficit_mm(tool.mesh, close)),
+        round(tool.round) {}
 };
 
 /// A volume whose voxels are units, at the origin of contact space.
@@ -139,7 +143,7 @@ class ShaftRig {
  public:
   ShaftRig(const SceneTool& tool, const std::vector<const Body*>& bodies, Density iso = kIso) {
     const SampledTool head(tool);
-    shells_.emplace_back(head.samples, head.round, head.close);
+    shells_.emplace_back(head.samples, head.round, head.close, head.deficit);
     head_ = shells_.back().point_shell();
     double reach = double(head_.reach);
     for (const ToolPart& part : shaft_parts(tool)) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cmath>
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -8,6 +9,7 @@
 
 #include "lab/contact/hands.hpp"
 #include "lab/contact/rows.hpp"
+#include "lab/rig/contact_motions.hpp"
 #include "lab/rig/contact_rig.hpp"
 #include "lab/rig/exact_contact.hpp"
 #include "tests/json.hpp"
@@ -63,6 +65,41 @@ TEST_CASE("a head that is wedged against its own shaft between two walls goes on
   const LabAnswer answer = lab("extremes --only traps --presses 23 --seed 5");
   CAPTURE(answer.out);
   CHECK(answer.code == 0);
+}
+
+TEST_CASE("the tick that sank the bur deepest into a wall ends within the depth of a wedged tool") {
+  // Tick 51 at the 380th wall of the rows `walls`: with its work spent the sweep kept a position
+  // whose samples were 0.0395 deep, and a corner of the mesh between them 0.0551.
+  using N = kerf::FixedNumbers;
+  const auto raw = [](auto number, std::int32_t value) {
+    return decltype(number)::from_raw(value);
+  };
+  const auto orientation = [&](std::int32_t w, std::int32_t x, std::int32_t y, std::int32_t z) {
+    const N::Unit unit{};
+    return kerf::Orientation<N>{raw(unit, x), raw(unit, y), raw(unit, z), raw(unit, w)};
+  };
+  const Point up{0.54171018016247141, 0.61352605527651227, -0.5745745036156622};
+  const Point place{32.195366719343276, 32.253210462003516, 32.789943098137485};
+  const Body wall = blurred({66, 66, 66}, [&](Point p) { return dot(p - place, up); });
+  const kerf::SceneTool bur = shipped_bur();
+  const SampledTool tool(bur);
+  CHECK(tool.deficit > 0.02);
+  ContactRig<N> rig(tool, wall);
+  const N::Real unit{};
+  kerf::ProxyPose<N> pose{{raw(unit, 2121136), raw(unit, 2628807), raw(unit, 1551254)},
+                          orientation(779782352, -132531184, -590145065, 423113787)};
+  kerf::SweepMemory<N> memory;
+  rig.field().begin_tick();
+  const auto swept =
+      kerf::ProxySweep<N, kerf::ContactQuery<N>>(rig.field(), pose, memory, {}, rig.rotation_step())
+          .tick({{raw(unit, 1289941), raw(unit, 1631051), raw(unit, 2457233)},
+                 orientation(739924823, 757505406, -81374689, 158102751)});
+  const ShakenTool shape{.round = false, .mesh = &bur};
+  const double below = shape.reach_below<N>(pose.orientation, up);
+  const double sunk = below - dot(point_of<N>(pose.centre) - place, up);
+  CAPTURE(double(swept.depth));
+  CHECK(sunk < kerf::SweepRules::kWedged);
+  CHECK(sunk > -2);  // it came to the wall
 }
 
 TEST_CASE("the paper's force ends inside of a wall and can be passed; the proxy's does not") {

@@ -40,6 +40,7 @@ struct CountedField {
   }
   [[nodiscard]] bool half_spent() const { return field.half_spent(); }
   [[nodiscard]] bool may_query() const { return field.may_query(); }
+  [[nodiscard]] typename N::Real deficit() const { return field.deficit(); }
   [[nodiscard]] bool is_solid(ContactVec<typename N::Real> q) const { return field.is_solid(q); }
   typename N::Real free_distance(ContactVec<typename N::Real> q,
                                  ContactVec<typename N::Real> move) const {
@@ -251,4 +252,45 @@ TEST_CASE_TEMPLATE("a far goal is bounded work and a finite force", N, FixedNumb
       }
     }
   }
+}
+
+namespace {
+
+/// A slot from x = 0.2 on that is narrower than the tool: both walls are `depth` deep in it.
+template <class N>
+struct NarrowSlot : kerf::test::PlainField<N> {
+  using typename kerf::test::PlainField<N>::Real;
+
+  Contacts<N> query(ContactVec<Real> at) const {
+    if (at.x < Real(0.2)) return {};
+    Contacts<N> contacts = kerf::test::one_plane<N>({0, 1, 0}, depth);
+    insert(contacts, kerf::test::one_plane<N>({0, -1, 0}, depth).plane[0]);
+    return contacts;
+  }
+  [[nodiscard]] Real deficit() const { return Real(beyond); }
+
+  double depth = 0, beyond = 0;
+};
+
+}  // namespace
+
+TEST_CASE_TEMPLATE("a wedged tool moves on while the deepest point of its surface is allowed", N,
+                   FixedNumbers, DoubleNumbers) {
+  const auto moves = [](double depth, double deficit) {
+    NarrowSlot<N> slot;
+    slot.depth = depth;
+    slot.beyond = deficit;
+    ProxyPose<N> pose;
+    SweepMemory<N> memory;
+    static_cast<void>(
+        ProxySweep<N, NarrowSlot<N>>(slot, pose, memory, {}, {}).tick(pose_of<N>({0.5, 0, 0})));
+    return double(pose.centre.x) > 0.2;
+  };
+  for (const double deficit : {0.0, 0.01, 0.03}) {
+    CAPTURE(deficit);
+    CHECK(moves(SweepRules::kWedged - deficit - 0.001, deficit));
+    CHECK_FALSE(moves(SweepRules::kWedged - deficit + 0.001, deficit));
+  }
+  // Of coarse samples the tolerance of any position is left.
+  CHECK(moves(0.009, 1));
 }

@@ -13,7 +13,8 @@ namespace kerf::test {
 
 using namespace extremes;
 
-/// Answers that most fields share: no budget, no free way, air. A field hides those of its own.
+/// Answers that most fields share: no budget, no free way, air, samples that reach as far as the
+/// surface. A field hides those of its own.
 template <class N>
 struct PlainField {
   using Real = typename N::Real;
@@ -21,6 +22,7 @@ struct PlainField {
 
   [[nodiscard]] bool half_spent() const { return false; }
   [[nodiscard]] bool may_query() const { return true; }
+  [[nodiscard]] Real deficit() const { return {}; }
   [[nodiscard]] bool is_solid(Place) const { return false; }
   [[nodiscard]] Real free_distance(Place, Place) const { return {}; }
   void orient(const Orientation<N>&) const {}

@@ -489,6 +489,26 @@ TEST_CASE("a rim that bends has a sample in each corner") {
   CHECK(farthest < 0.03);
 }
 
+TEST_CASE("a mesh reaches beyond its close samples by at most what is told, along any direction") {
+  const SceneTool bur = mesh_of_units("t", fluted_bur(32));
+  const auto close = close_samples(bur, 1);
+  const double told = support_deficit_mm(bur.mesh, close);
+  CHECK(told > 0.002);
+  CHECK(told < 0.1);
+  CHECK(support_deficit_mm({}, close) == 0);
+  double most = 0;
+  for (int i = 0; i < 2000; ++i) {  // great circles that no direction of the search follows
+    const double angle = 2 * std::numbers::pi * i / 400, lean = std::floor(i / 400.0);
+    const ToolMesh::Point u{std::cos(angle), std::sin(angle) * std::cos(lean),
+                            std::sin(angle) * std::sin(lean)};
+    double surface = -1e9, samples = -1e9;
+    for (const auto& p : bur.mesh.points_mm) surface = std::max(surface, vec3::dot(u, p));
+    for (const SurfaceSample& sample : close) samples = std::max(samples, vec3::dot(u, sample.at));
+    most = std::max(most, surface - samples);
+  }
+  CHECK(most < told + 0.005);
+}
+
 TEST_CASE("a thin blade has samples on both of its sides") {
   const auto blade = extremes::loft({-8, 8}, 4, [](double y, double angle) {
     return extremes::Point{8 * std::round(std::cos(angle)), y, 0.2 * std::round(std::sin(angle))};

@@ -268,9 +268,11 @@ class ContactQuery {
         budget_(work_.budget()),
         head_(kernels, head, volumes, budget_),
         shaft_parts_(shaft.count),
-        head_turns_(shaft.count == 0 || !head.table.round) {
+        head_turns_(shaft.count == 0 || !head.table.round),
+        deficit_(head.deficit) {
     for (std::size_t i = 0; i < shaft_parts_; ++i) {
       const ShaftPart<N>& part = shaft.part[i];
+      deficit_ = std::max(deficit_, part.point_shell.deficit);
       part_[i].emplace(Part{
           {kernels, part.point_shell, shaft_volumes[i], budget_}, part.up, ContactVec<Real>{}});
     }
@@ -307,6 +309,9 @@ class ContactQuery {
   [[nodiscard]] bool may_query() const noexcept {
     return head_.may_query() && budget_.left() >= last_;
   }
+
+  /// See ContactField; the largest of all parts.
+  [[nodiscard]] Real deficit() const noexcept { return deficit_; }
 
   /// Contacts of the tool with the centre of its head at `q`.
   [[nodiscard]] Contacts<N> query(ContactVec<Real> q) noexcept {
@@ -373,6 +378,7 @@ class ContactQuery {
   std::size_t shaft_parts_;
   std::array<std::optional<Part>, kMaxShaftParts> part_;
   bool head_turns_;  ///< whether `orient` rotates the samples of the head
+  Real deficit_;
   /// Cost of the previous query with a shaft; INT64_MAX if that query was abandoned.
   std::int64_t last_ = 0;
   bool turned_ = false;  ///< the tool was rotated, and not queried since

@@ -45,7 +45,8 @@ class StartSearch {
   constexpr ProxyStatus tick(Field& field, const ProxyPose<N>& goal, ProxyPose<N>& pose) noexcept {
     field.orient(goal.orientation);
     const Position middle = replaces_ && !refused() ? around_ : goal.centre;
-    if (is_free(field, middle, replaces_ ? SweepRules::kWedged : SweepRules::kTolerance)) {
+    constexpr auto kTolerance = Real(SweepRules::kTolerance);
+    if (is_free(field, middle, replaces_ ? wedged_depth<N>(field.deficit()) : kTolerance)) {
       pose = {middle, goal.orientation};
       return ProxyStatus::placed;
     }
@@ -60,7 +61,7 @@ class StartSearch {
       const Position centre = middle + step(direction);
       if (!leads_on(field, direction, middle, centre)) continue;
       ++queries;
-      if (is_free(field, centre, SweepRules::kTolerance)) {
+      if (is_free(field, centre, kTolerance)) {
         pose = {centre, goal.orientation};
         return ProxyStatus::placed;
       }
@@ -72,10 +73,9 @@ class StartSearch {
   static constexpr int kDirections = 27, kQueries = 13;
 
   template <ContactField<N> Field>
-  [[nodiscard]] static constexpr bool is_free(Field& field, Position centre,
-                                              double depth) noexcept {
+  [[nodiscard]] static constexpr bool is_free(Field& field, Position centre, Real depth) noexcept {
     const Contacts<N> contacts = field.query(centre);
-    return !contacts.no_normal && contacts.depth <= static_cast<Real>(depth);
+    return !contacts.no_normal && contacts.depth <= depth;
   }
   /// Whether this direction still leads out of the solid at `centre`, one unit after the last.
   template <ContactField<N> Field>

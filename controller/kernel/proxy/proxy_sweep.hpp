@@ -19,6 +19,7 @@ namespace kerf {
 ///   is_solid(q)       whether the position is in the solid
 ///   half_spent()      whether half of the tick's work is spent: the rest is kept for the move
 ///   may_query()       whether the tick's work allows another query
+///   deficit()         units that the tool's surface reaches beyond its samples, at most
 template <class F, class N>
 concept ContactField = requires(F field, ContactVec<typename N::Real> q,
                                 Orientation<N> orientation) {
@@ -28,6 +29,7 @@ concept ContactField = requires(F field, ContactVec<typename N::Real> q,
   { field.is_solid(q) } -> std::convertible_to<bool>;
   { field.half_spent() } -> std::convertible_to<bool>;
   { field.may_query() } -> std::convertible_to<bool>;
+  { field.deficit() } -> std::convertible_to<typename N::Real>;
 };
 
 /// Constants of the sweep (docs/theory.md 4.2 and after); lengths in units of contact space.
@@ -62,13 +64,22 @@ struct SweepRules {
   /// is rotated until both faces hold it is stuck whatever the hand does: that happened to 4 % of
   /// the tools that spin askew in slots, and with 0.03 to one in a thousand. The tool may also be
   /// this deep if a tick has no query left for a push before it kept any step; otherwise it would
-  /// be stuck, too.
+  /// be stuck, too. It is the depth of the tool's surface; its samples may be less deep
+  /// (wedged_depth).
   static constexpr double kWedged = 0.05;
   /// No step ends farther from the goal than the nearest position of the tick by more than this. If
   /// it is larger, a tool at rest wanders on noise. If it is below two kTolerance, by which allowed
   /// positions differ in depth, a tool cannot leave a slot without play.
   static constexpr double kAstray = 0.03;
 };
+
+/// How deep a wedged tool may be by its samples, so that no point of its surface is deeper than
+/// kWedged: less by what the surface reaches beyond them (docs/theory.md 4.2).
+template <class N>
+[[nodiscard]] constexpr typename N::Real wedged_depth(typename N::Real deficit) noexcept {
+  using Real = typename N::Real;
+  return std::max(Real(SweepRules::kTolerance), Real(SweepRules::kWedged) - deficit);
+}
 
 /// Sine of half the largest rotation theta of one step (docs/theory.md 4.6): a sample `reach` units
 /// from the centre, reach >= 1, moves by kStep at most, as theta / 2 <= 1.0472 sin(theta / 2).
@@ -137,7 +148,8 @@ class ProxySweep {
         pose_(pose),
         memory_(memory),
         friction_(friction),
-        rotation_step_(rotation_step) {}
+        rotation_step_(rotation_step),
+        wedged_(wedged_depth<N>(field.deficit())) {}
 
   constexpr SweepResult<N> tick(const ProxyPose<N>& goal) noexcept {
     here_ = turn_to(goal.orientation);
@@ -167,8 +179,8 @@ class ProxySweep {
     return queries_ < SweepRules::kMaxQueries;
   }
   /// Whether the tool is not deeper than a wedged tool may be, so that it need not get out.
-  [[nodiscard]] static constexpr bool allows_rest(const Contacts<N>& contacts) noexcept {
-    return !contacts.no_normal && contacts.depth <= Real(SweepRules::kWedged);
+  [[nodiscard]] constexpr bool allows_rest(const Contacts<N>& contacts) const noexcept {
+    return !contacts.no_normal && contacts.depth <= wedged_;
   }
   /// Whether the depth is within the tolerance or, if the tool is too deep already, not above its
   /// present depth.
@@ -365,6 +377,7 @@ class ProxySweep {
   SweepMemory<N>& memory_;
   Unit friction_;
   Unit rotation_step_;
+  Real wedged_;  ///< depth that a wedged tool may have
   Contacts<N> here_{};
   ConstraintSet<N> held_by_{};
   std::int32_t queries_ = 0;

@@ -119,6 +119,7 @@ struct PointShell {
   CloseTable<N> close;         ///< empty for a ball
   typename N::Real reach{};    ///< units from the centre to the farthest sample
   std::int32_t step_bits = 0;  ///< fraction bits of PointStep's rows: reach 2^step_bits < 2^16
+  typename N::Real deficit{};  ///< units that the surface reaches beyond its samples, at most
 };
 
 /// One solid volume, and memory for the positions of the tool's samples in it, which belongs to the

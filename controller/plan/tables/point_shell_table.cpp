@@ -140,9 +140,11 @@ std::size_t DenseSamples<N>::bytes() const noexcept {
 
 template <class N>
 PointShellTable<N>::PointShellTable(std::span<const Point> samples_units, bool round,
-                                    std::span<const SurfaceSample> close_units)
+                                    std::span<const SurfaceSample> close_units,
+                                    double deficit_units)
     : count_(samples_units.size()),
       reach_(reach_of(samples_units, close_units)),
+      deficit_(deficit_units),
       round_(round),
       close_(close_units, reach_) {
   assert(!samples_units.empty() && samples_units.size() <= kMaxShellPoints);
@@ -184,6 +186,7 @@ PointShell<N> PointShellTable<N>::point_shell() const noexcept {
   point_shell.table.round = round_;
   point_shell.close = close_.table();
   point_shell.reach = typename N::Real(reach_);
+  point_shell.deficit = typename N::Real(deficit_);
   // No voxel's edge is shorter than a unit; a little for roundings.
   const double longest = reach_ + rounding();
   point_shell.table.reach =

@@ -55,9 +55,9 @@ class PointShellTable {
  public:
   /// `samples_units`: from the tool's centre, in contact units; they are sorted into compact
   /// groups. `round`: they are those of a ball. `close_units`: the close samples of another shape;
-  /// without them its contacts are not refined.
+  /// without them its contacts are not refined. `deficit_units`: support_deficit_mm of these.
   PointShellTable(std::span<const std::array<double, 3>> samples_units, bool round,
-                  std::span<const SurfaceSample> close_units = {});
+                  std::span<const SurfaceSample> close_units = {}, double deficit_units = 0);
 
   [[nodiscard]] PointShell<N> point_shell() const noexcept;
   [[nodiscard]] std::size_t bytes() const noexcept;
@@ -70,7 +70,7 @@ class PointShellTable {
   std::array<std::vector<PointNumber<N>>, 3> offset_, middle_;
   std::vector<std::uint8_t> needed_;
   std::size_t count_;
-  double reach_;
+  double reach_, deficit_;
   bool round_;
   DenseSamples<N> close_;
 };
