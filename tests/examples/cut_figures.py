@@ -56,11 +56,12 @@ class Cut:
         self.x, self.z, self.y = (
             corner[axis] + (sign * step * np.arange(size))[::sign]
             for axis, sign, step, size in zip((0, 2, 1), signs, self.spacing_mm, self.first.shape))
-        self.names = [material["name"] for material in log.scene["materials"]]
+        self.materials = log.scene["materials"]
+        self.names = [material["name"] for material in self.materials]
 
     def lost_mm3(self):
-        """For each voxel the part of it that was solid and is gone."""
-        part = np.where(self.first >= self.iso, 1 - self.now / np.maximum(self.first, 1.0), 0)
+        """Of each voxel the solid that is gone, as docs/cutting.md defines it."""
+        part = np.where(self._solid(), 1 - self.now / np.maximum(self.first, 1.0), 0)
         return part * np.prod(self.spacing_mm)
 
     def removed_mm3(self):
@@ -72,8 +73,14 @@ class Cut:
 
     def material_mm3(self, name):
         """At the start."""
-        solid = (self.labels == self.names.index(name)) & (self.first >= self.iso)
-        return float(solid.sum() * np.prod(self.spacing_mm))
+        return float((self._solid() & (self.labels == self.names.index(name))).sum() * np.prod(self.spacing_mm))
+
+    def _solid(self):
+        """A label also makes a solid of what is softer than the surface, from the density of its material."""
+        shows = np.array([int(material["iso"] * 65535) for material in self.materials])
+        at_least = self.iso if self.labels is None else np.where(
+            self.labels > 0, np.minimum(self.iso, shows[self.labels]), self.iso)
+        return self.first >= at_least
 
     def _top_mm(self, voxels):
         solid = voxels >= self.iso
