@@ -16,8 +16,9 @@ from mkdocs.structure.nav import Link
 HERE = pathlib.Path(__file__).parent
 sys.path.insert(0, str(HERE))
 import formulas
-# Formats of the one font for browsers that are older than ten years.
+# Formats of the theme's fonts for browsers that are older than ten years.
 OLD_FONTS = (".eot", ".svg", ".ttf", ".otf", ".woff")
+FONTS = ("fonts", "webfonts")  # their folder in Debian 12, and since Debian 13
 
 
 def on_files(files, config):
@@ -136,6 +137,23 @@ def prose(line, name, docs):
     return with_links(with_formulas(line) if name in IN_TEXT else line, docs)
 
 
+def with_newest_fonts(site):
+    """Leaves each font of the theme in one format, WOFF2, and says so in its styles."""
+    def newest(sources):
+        kept = re.search(r"url\([^)]*\.woff2[^)]*\) *format\([^)]*\)", sources[0])
+        return f"src:{kept[0]}{sources['end']}" if kept else ""
+
+    fonts = [file for name in FONTS for file in (site / name).glob("*")]
+    assert any(file.suffix == ".woff2" for file in fonts), f"{site}: the theme's fonts are elsewhere"
+    for file in fonts:
+        if file.suffix in OLD_FONTS:
+            file.unlink()
+    for style in (site / "css").glob("*.css"):
+        text = style.read_text(encoding="utf-8")
+        if "@font-face" in text:
+            style.write_text(re.sub(r"src:[^;}]*(?P<end>;?)", newest, text), encoding="utf-8")
+
+
 def on_post_build(config):
     site = pathlib.Path(config["site_dir"])
     search = site / "search"
@@ -150,13 +168,6 @@ def on_post_build(config):
     (search / "index.js").write_text(f"const searchIndex = {words};\n", encoding="utf-8")
     (search / "main.js").write_text((HERE / "search.js").read_text(encoding="utf-8"), encoding="utf-8")
     (site / "css" / "kerf.css").write_text((HERE / "kerf.css").read_text(encoding="utf-8"), encoding="utf-8")
-    for file in (site / "fonts").iterdir():
-        if file.suffix in OLD_FONTS:
-            file.unlink()
-    style = site / "css" / "font-awesome.min.css"
-    face = "src:url('../fonts/fontawesome-webfont.woff2') format('woff2');"
-    text, count = re.subn(r"src:url\('\.\./fonts/fontawesome-webfont\.eot[^;]*;src:[^;]*;", face, style.read_text(encoding="utf-8"))
-    assert count == 1, f"{style}: its font is named otherwise"
-    style.write_text(text, encoding="utf-8")
-    for name in ("sitemap.xml", "sitemap.xml.gz"):  # for servers
-        (site / name).unlink(missing_ok=True)
+    with_newest_fonts(site)
+    for file in (*site.glob("sitemap.xml*"), *site.glob("*/*.map")):  # for servers, and for the theme's authors
+        file.unlink()

@@ -2,7 +2,8 @@
 // Searches searchIndex: [place, page, title, text] of each section. First come those that have the most of the words; then
 // a word in a title counts most. Messages to wrong input come last among those that have as many.
 'use strict';
-{
+// The script comes before what it searches in since mkdocs 1.6.
+document.addEventListener('DOMContentLoaded', () => {
   const input = document.getElementById('mkdocs-search-query');
   const results = document.getElementById('mkdocs-search-results');
   const kMost = 30, kBefore = 60, kExcerpt = 200;  // results; characters of an excerpt
@@ -58,4 +59,4 @@
     input.value = asked;
     search();
   }
-}
+});
