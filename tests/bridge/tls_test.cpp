@@ -4,11 +4,16 @@
 #include <cctype>
 #include <cstdlib>
 #include <filesystem>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include <doctest/doctest.h>
+#include <openssl/bio.h>
+#include <openssl/evp.h>
+#include <openssl/pem.h>
 #include <openssl/ssl.h>
+#include <openssl/x509.h>
 
 #include "bridge/net/address.hpp"
 #include "bridge/net/certificate.hpp"
@@ -32,10 +37,28 @@ struct Lab {
     REQUIRE(std::system(command.c_str()) == 0);  // NOLINT(concurrency-mt-unsafe)
   }
   /// NAME.pem by its CA, with the other files of a server.
-  void sign(const std::string& name, const std::string& host, int days = 2) const {
+  void sign(const std::string& name, const std::string& host) const {
     run("openssl req -new -key key.pem -subj /CN=x -addext subjectAltName=" + host +
-        " | openssl x509 -req -CA ca.pem -CAkey ca-key.pem -copy_extensions copy -days " +
-        std::to_string(days) + " -out " + name + ".pem");
+        " | openssl x509 -req -CA ca.pem -CAkey ca-key.pem -copy_extensions copy -days 2 -out " +
+        name + ".pem");
+  }
+  /// old.pem: a certificate as it would be a day after its end, signed by a key. The programs
+  /// `openssl` of Debian 12 and 13 share no option for that.
+  void age(const char* certificate, const char* key) const {
+    const Bio in = open(certificate, "r"), key_in = open(key, "r"), out = open("old.pem", "w");
+    const std::unique_ptr<X509, decltype(&X509_free)> old(
+        PEM_read_bio_X509(in.get(), nullptr, nullptr, nullptr), &X509_free);
+    const std::unique_ptr<EVP_PKEY, decltype(&EVP_PKEY_free)> by(
+        PEM_read_bio_PrivateKey(key_in.get(), nullptr, nullptr, nullptr), &EVP_PKEY_free);
+    constexpr long kDay = 86400;  // s
+    X509_gmtime_adj(X509_getm_notBefore(old.get()), -2 * kDay);
+    X509_gmtime_adj(X509_getm_notAfter(old.get()), -kDay);
+    REQUIRE(X509_sign(old.get(), by.get(), EVP_sha256()) > 0);
+    REQUIRE(PEM_write_bio_X509(out.get(), old.get()) == 1);
+  }
+  using Bio = std::unique_ptr<BIO, decltype(&BIO_free)>;
+  [[nodiscard]] Bio open(const char* file, const char* mode) const {
+    return {BIO_new_file((*this / file).c_str(), mode), &BIO_free};
   }
   [[nodiscard]] std::filesystem::path operator/(const char* name) const { return folder / name; }
   TemporaryFolder folder;
@@ -123,7 +146,7 @@ TEST_CASE("join verifies the server's certificate: its CA, host, time or fingerp
   const Lab lab, foreign;
   lab.sign("other-host", "IP:127.0.0.2");
   lab.sign("named", "DNS:lab-pc");
-  lab.sign("old", "IP:127.0.0.1", -1);
+  lab.age("cert.pem", "ca-key.pem");
   lab.run("cat cert.pem ca.pem >chain.pem; cat " + (foreign / "ca.pem").string() +
           " ca.pem >cas.pem");
   const TestController controller;
@@ -171,7 +194,7 @@ TEST_CASE("join verifies the server's certificate: its CA, host, time or fingerp
 
 TEST_CASE("with --client-ca a viewer needs a certificate of that CA, and its token") {
   const Lab lab, foreign;
-  lab.run("openssl x509 -in viewer.pem -signkey viewer-key.pem -days -1 -out old.pem");
+  lab.age("viewer.pem", "viewer-key.pem");
   const TestController controller;
   const Tls tls = server_tls(lab);
   require_client_certificate(tls.get(), lab / "ca.pem");
