@@ -3,7 +3,7 @@
 
     end_s                       end of the time axis
     curves, sources             lists of {name, s, values}: times in s with the values there. Curves are contact,
-                                modification and commanded (N), penetration (mm), removed (mm3) and port (mJ), and with two
+                                modification and commanded (N), penetration (mm), removed (density over full, mm3) and port (mJ), and with two
                                 arms commanded_2 and penetration_2 of the second; sources
                                 are those of energy that did any work (mJ)"""
 import figure as fig
@@ -32,7 +32,7 @@ def forces(data):
     depth.set_ylabel("penetration (mm)")
     removed = depth.twinx()
     removed.spines["right"].set_visible(True)
-    lines.append(draw(removed, "removed", fig.RED, "removed volume", 1.8))
+    lines.append(draw(removed, "removed", fig.RED, "removed density", 1.8))
     removed.set_ylabel("removed (mm³)")
     for axes in (force, depth, removed):
         low, high = axes.dataLim.intervaly

@@ -41,6 +41,8 @@ a cell has the worst verdict of all.
   one encoder step, and its travel does not fall in all of eight windows. A creep does not reverse, so it is no swing.
 * A cell is *active* if in both halves of the last half the motors give more energy than a push over one encoder step
   takes.
+* A cell is *arithmetic* if only rounding of fixed numbers keeps a motion up: the loop has no encoder steps, the travel
+  is below 1 µm, and the same runs rest in double. It counts as stable.
 * Any other cell is *undecided*.
 * A run ends when its rest is proven, else after 60 s, and later if mass and damping make its motion slower than that. A
   swing with friction and encoder steps is chaotic: one run in a hundred stops only after 3 to 45 s. `--seconds` makes
@@ -123,7 +125,7 @@ no rows.
 |---|---|---|
 | loop, device, damping_ns_per_mm, rate_hz, delay_periods, quantum_mm, friction_n, viscous_ns_per_mm, mass_kg, estimator, filter_ms, hand, mode_hz, numeric, law, stabiliser, limits | in the name | value of each axis, given or standard |
 | stiffness_n_per_mm | N/mm | K of the cell |
-| swings, active, undecided | 0 or 1 | a run shows it; a cell with three zeros is proven to rest |
+| swings, active, undecided, arithmetic | 0 or 1 | a run shows it; a cell with four zeros is proven to rest |
 | travel_mm | mm | peak to peak in the last half of a run, the largest of all runs; 0: held by friction |
 | given_mj | mJ | energy that the motors gave in that half |
 | port_minimum_mj | mJ | lowest energy of the device port in a run that begins at 0 |
@@ -144,7 +146,7 @@ no rows.
 | re_entry_from_n_per_mm, re_entry_to_n_per_mm | cells above the first crossing that rest again; null: none |
 | undecided_from_n_per_mm | lowest K at which a run is undecided; null: none |
 | analytic | exact_n_per_mm, passive_n_per_mm, quantum_n_per_mm: bounds of the linear loop, 0: nothing is stable, null: for another loop; exact_holds, passive_holds: whether this column's loop is the one of the bound |
-| cells | swings, active, undecided, travel_mm, given_mj, port_minimum_mj of each stiffness |
+| cells | swings, active, undecided, arithmetic, travel_mm, given_mj, port_minimum_mj of each stiffness |
 
 """
 

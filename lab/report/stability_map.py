@@ -7,7 +7,7 @@
     seconds, seed, seeds, whole_arm    of the hits
     columns                     {axes, by_travel, by_energy, undecided_from_n_per_mm, analytic, cells}: the value of each
                                 axis as a text; by each rule the lowest and the highest first crossing of the seeds, null
-                                with a reason; cells {swings, active, undecided}, an empty list: not measured
+                                with a reason; cells {swings, active, undecided, arithmetic}, an empty list: not measured
 
 portraits (`--portraits`) reads the same without mapped, varied and columns, and with
 
@@ -32,6 +32,7 @@ AXES = {
 LOOPS = {"ideal": "the loop of the theory: linear, exact numbers", "kerf": "the loop of kerf: friction, encoder steps, its own force"}
 
 RESTS, ACTIVE, SWINGS, UNDECIDED, NONE = "#CFE8DC", "#F7E3A1", "#F0B79B", "#B8B4DC", "#D9D9D9"
+ARITHMETIC = "#9CCFE0"
 HITS = {"push": "#0072B2", "50 mm/s": "#D55E00", "200 mm/s": "#009E73", "slide": "#CC79A7", "corner": "#E69F00"}
 MOST_NUMBERS = 14  # a side: more do not fit into the cells
 
@@ -170,6 +171,11 @@ def map(data):
     return fig.svg(picture)
 
 
+def colour_of(cell):
+    verdicts = (("swings", SWINGS), ("active", ACTIVE), ("undecided", UNDECIDED), ("arithmetic", ARITHMETIC))
+    return next((colour for name, colour in verdicts if cell[name]), RESTS)
+
+
 def draw_verdicts(axes, columns, x, y, key):
     """Rectangles of one verdict each, and the boundaries as lines over them."""
     import figure as fig
@@ -177,8 +183,7 @@ def draw_verdicts(axes, columns, x, y, key):
     lines = []
     for column in sorted(columns, key=lambda column: x.values.index(column["axes"][key])):
         i = x.values.index(column["axes"][key])
-        colours = [SWINGS if cell["swings"] else ACTIVE if cell["active"] else UNDECIDED if cell["undecided"] else RESTS
-                   for cell in column["cells"]]
+        colours = [colour_of(cell) for cell in column["cells"]]
         colours = colours or [NONE] * len(y.places)
         start = 0
         for k in range(1, len(colours) + 1):
@@ -258,7 +263,9 @@ def draw_legend(picture, columns, stiffness, top):
     patches = [(RESTS, "comes to rest: proven"), (ACTIVE, "travel small or falling, but the wall goes on giving energy"),
                (SWINGS, "swings on (a limit cycle, or worse)"), (UNDECIDED, "undecided: neither rest nor swing is proven"),
                (NONE, "not stable even without a wall, or not measured")]
-    groups = [[Patch(color=colour, label=label) for colour, label in (patches if stiffness else patches[3:])]]
+    if any(cell["arithmetic"] for column in columns for cell in column["cells"]):
+        patches.insert(3, (ARITHMETIC, "rests, but for rounding of fixed numbers: below 1 µm, rests in double"))
+    groups = [[Patch(color=colour, label=label) for colour, label in (patches if stiffness else patches[-2:])]]
     if stiffness:
         def is_seen(values):
             return any(stiffness[0] <= (value or 0) <= stiffness[-1] for value in values)

@@ -134,7 +134,27 @@ class ColumnRun {
                                           place_of_hit, ticks_));
       if (worst.worst()) break;
     }
-    return worst;
+    return is_arithmetic(worst, stiffness, limit_s)
+               ? LimitCycle{.arithmetic = true,
+                            .travel_mm = worst.travel_mm,
+                            .given_mj = worst.given_mj,
+                            .port_minimum_mj = worst.port_minimum_mj}
+               : worst;
+  }
+
+  /// Whether a motion that does not rest is that of fixed numbers alone: without encoder steps, too
+  /// small for any encoder, and at rest in double.
+  bool is_arithmetic(const LimitCycle& fixed, double stiffness, double limit_s) {
+    constexpr double kFinestStepMm = 1e-3;  // a tenth of the omega's (docs/devices.md)
+    if (fixed.rests() || fixed.travel_mm > kFinestStepMm || spec_.arm ||
+        subject_.numeric != NumericKind::fixed || subject_.loop.quantum_mm > 0) {
+      return false;
+    }
+    LoopCase exact = subject_;
+    exact.numeric = NumericKind::float64;
+    return std::ranges::all_of(kHitsMmPerS, [&](double hit_mm_per_s) {
+      return hit_one_axis(exact, stiffness, hit_mm_per_s, limit_s, 0, ticks_).rests();
+    });
   }
 
   const MapSpec& spec_;

@@ -18,7 +18,7 @@
 namespace kerf::zwidth {
 namespace {
 
-constexpr int kFormat = 3;  ///< of a part file
+constexpr int kFormat = 4;  ///< of a part file
 constexpr grid::PartWords kPartWords{
     .option = "--part",
     .busy = "another run is at work on it; wait for that, or name another file",
@@ -43,8 +43,8 @@ StabilityBoundary crossing_in(const Json& json) {
 std::string line_of(std::size_t index, const Column& column) {
   Json cells = Json::List{};
   for (const LimitCycle& cell : column.cells) {
-    cells.push_back(Json::List{cell.swings, cell.active, cell.undecided, cell.travel_mm,
-                               cell.given_mj, cell.port_minimum_mj});
+    cells.push_back(Json::List{cell.swings, cell.active, cell.undecided, cell.arithmetic,
+                               cell.travel_mm, cell.given_mj, cell.port_minimum_mj});
   }
   return Json{{"column", index},
               {"cells", std::move(cells)},
@@ -59,8 +59,8 @@ void take_line(const std::string& line, Part& part) {
   Column column;
   for (const Json& cell : json.at("cells")) {
     column.cells.push_back({cell.at(0).get<bool>(), cell.at(1).get<bool>(), cell.at(2).get<bool>(),
-                            cell.at(3).get<double>(), cell.at(4).get<double>(),
-                            cell.at(5).get<double>()});
+                            cell.at(3).get<bool>(), cell.at(4).get<double>(),
+                            cell.at(5).get<double>(), cell.at(6).get<double>()});
   }
   column.swing = crossing_in(json.at("swing"));
   column.energy = crossing_in(json.at("energy"));
@@ -360,7 +360,8 @@ std::string no_crossing(const Column& column, double n_per_mm) {
 std::string csv_of(const Part& part) {
   std::string text;
   each_axis([&](AxisId, const AxisKind& kind) { text += column_name(kind) + ","; });
-  text += "stiffness_n_per_mm,swings,active,undecided,travel_mm,given_mj,port_minimum_mj\n";
+  text +=
+      "stiffness_n_per_mm,swings,active,undecided,arithmetic,travel_mm,given_mj,port_minimum_mj\n";
   const std::vector<Assignment> columns = part.spec.columns();
   for (const auto& [index, column] : part.columns) {
     std::string head;
@@ -368,9 +369,9 @@ std::string csv_of(const Part& part) {
     for (std::size_t i = 0; i < column.cells.size(); ++i) {
       const LimitCycle& cell = column.cells[i];
       text += head + number_text(part.spec.stiffness_n_per_mm[i]) + (cell.swings ? ",1" : ",0") +
-              (cell.active ? ",1" : ",0") + (cell.undecided ? ",1," : ",0,") +
-              number_text(cell.travel_mm) + "," + number_text(cell.given_mj) + "," +
-              number_text(cell.port_minimum_mj) + "\n";
+              (cell.active ? ",1" : ",0") + (cell.undecided ? ",1" : ",0") +
+              (cell.arithmetic ? ",1," : ",0,") + number_text(cell.travel_mm) + "," +
+              number_text(cell.given_mj) + "," + number_text(cell.port_minimum_mj) + "\n";
     }
   }
   return text;
@@ -396,6 +397,7 @@ std::string json_of(const Part& part) {
       cells.push_back({{"swings", cell.swings},
                        {"active", cell.active},
                        {"undecided", cell.undecided},
+                       {"arithmetic", cell.arithmetic},
                        {"travel_mm", cell.travel_mm},
                        {"given_mj", cell.given_mj},
                        {"port_minimum_mj", cell.port_minimum_mj}});

@@ -160,9 +160,11 @@ double slowest_swing_s(const LoopCase& subject, double stiffness_n_per_mm) {
   const double n_per_m = 1000 * (stiffness_n_per_mm + loop.hand.stiffness_n_per_mm);
   const double period_s = 2 * std::numbers::pi * std::sqrt(mass_kg / n_per_m);
   const double delay_s = loop.delay_s + loop.period_s;
-  const double flight_s = 2 * LimitSettings().force_n * delay_s / subject.push_n;
+  const double let_go_s = 2 * LimitSettings().force_n * delay_s / subject.push_n;
+  constexpr double kFastestMPerS = kHitsMmPerS.back() / 1000;
+  const double thrown_s = 2 * mass_kg * kFastestMPerS / subject.push_n;
   constexpr double kLeastS = 0.25;
-  return std::max(kLeastS, period_s + flight_s);
+  return std::max(kLeastS, period_s + std::max(let_go_s, thrown_s));
 }
 
 LimitCycleDetector::Ticks hit_ticks(const LoopCase& subject, double stiffness_n_per_mm,

@@ -15,9 +15,10 @@ namespace kerf::zwidth {
 inline constexpr std::array<double, 3> kHitsMmPerS{0, 50, 200};
 inline constexpr double kStartMm = 0.1;
 
-/// The slowest motion of a hit, s: the period of the spring and the mass, with the flight behind a
-/// delay. Let go with the most force for all of the delay, the tip flies until the push has taken
-/// the same impulse back. Never below 0.25 s.
+/// The slowest motion of a hit, s: the period of the spring and the mass, with the longer of two
+/// flights. Let go with the most force for all of the delay, or thrown back as fast as the fastest
+/// hit, the tip flies until the push has taken the same impulse back (a hand's spring would turn it
+/// back sooner). Never below 0.25 s.
 [[nodiscard]] double slowest_swing_s(const LoopCase& subject, double stiffness_n_per_mm);
 
 /// The same for a run of this limit, as ticks. `remembered_s` is how long an earlier motion of a

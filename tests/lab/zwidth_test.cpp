@@ -237,6 +237,55 @@ TEST_CASE("no cell that rests travels more than one encoder step in the last hal
   CHECK(resting > 15);
 }
 
+namespace {
+
+/// The verdict of a map on one cell of kerf's loop without friction.
+LimitCycle frictionless_cell(const std::vector<std::pair<AxisId, const char*>>& more,
+                             double stiffness) {
+  MapSpec spec;
+  spec.stiffness_n_per_mm = {stiffness};
+  spec.seeds = 1;
+  Assignment values;
+  values[index_of(AxisId::friction)] = "0";
+  for (const auto& [axis, value] : more) values[index_of(axis)] = value;
+  StepCounter ticks;
+  return measure_column(spec, values, ticks).cells.at(0);
+}
+
+}  // namespace
+
+TEST_CASE("a heavy device that bounces ever less is no swing") {
+  // 14 kg fly for 11 s between two bounces, far longer than the period of the spring.
+  for (const char* damping : {"0.002", "0.01"}) {
+    const LimitCycle seen =
+        frictionless_cell({{AxisId::mass, "14"}, {AxisId::damping, damping}}, 1);
+    CAPTURE(std::string(damping));
+    CHECK_FALSE(seen.swings);
+    CHECK_FALSE(seen.active);
+    CHECK(seen.undecided);
+  }
+  CHECK(frictionless_cell({{AxisId::mass, "14"}, {AxisId::damping, "0.002"}}, 3).swings);
+}
+
+TEST_CASE("what fixed numbers alone keep up, without encoder steps, is arithmetic") {
+  const auto cell = [](double stiffness, const char* numeric) {
+    return frictionless_cell(
+        {{AxisId::quantum, "0"}, {AxisId::damping, "0"}, {AxisId::numeric, numeric}}, stiffness);
+  };
+  for (const double stiffness : {0.24, 0.29}) {
+    const LimitCycle fixed = cell(stiffness, "fixed");
+    CAPTURE(stiffness);
+    CHECK(cell(stiffness, "double").rests());
+    CHECK(fixed.arithmetic);
+    CHECK_FALSE((fixed.swings || fixed.active || fixed.undecided));
+    CHECK(fixed.travel_mm > 1e-4);
+    CHECK(fixed.travel_mm < 1e-3);
+  }
+  // A swing of both is one, whatever the numbers.
+  CHECK(cell(0.45, "fixed").swings);
+  CHECK(cell(0.45, "double").swings);
+}
+
 TEST_CASE("the first swing is the lowest of all seeds, as an independent simulation has it") {
   // Of docs/theory.md alone: closed-form motion, five speeds and five phases, runs of 60 s, K in
   // steps of 3 %.
