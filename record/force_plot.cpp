@@ -58,7 +58,7 @@ struct Curve {
     if (first_tick == 0) first_tick = record.tick;
     end_s = static_cast<double>(record.tick - first_tick) * manifest.tick_ns * 1e-9;
     if ((record.flags & kFlagReset) != 0) removed = 0;
-    removed += removed_mm3(record, manifest.voxel_mm3);
+    removed += removed_density_mm3(record, manifest.voxel_mm3);
     if (record.stale != 0) return;  // without contact; the curves continue at the next tick
     const std::array values{magnitude(record.contact_force_n),
                             magnitude(record.modification_force_n),

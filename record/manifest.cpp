@@ -36,7 +36,7 @@ void for_each_figure(Summary& s, Visit visit) {
   visit("refused_packets", s.refused_packets);
   visit("peak_force_n", s.peak_force_n);
   visit("deepest_mm", s.deepest_mm);
-  visit("removed_mm3", s.removed_mm3);
+  visit("removed_density_mm3", s.removed_density_mm3);
   visit("port_energy_mj", s.port_energy_mj);
   visit("port_minimum_mj", s.port_minimum_mj);
   for (std::size_t i = 0; i < kEnergySources; ++i) {

@@ -71,9 +71,9 @@ struct RecordSummary {
   std::uint32_t refused_packets = 0;
   double peak_force_n = 0;
   double deepest_mm = 0;
-  double removed_mm3 = 0;      ///< since the last reset
-  double port_energy_mj = 0;   ///< taken from the hand up to the last row
-  double port_minimum_mj = 0;  ///< its lowest value of the run: below 0 the loop gave energy
+  double removed_density_mm3 = 0;  ///< since the last reset
+  double port_energy_mj = 0;       ///< taken from the hand up to the last row
+  double port_minimum_mj = 0;      ///< its lowest value of the run: below 0 the loop gave energy
   std::array<double, kEnergySources> energy_mj{};  ///< `port_energy_mj` by source
   std::string end_reason;
 };

@@ -57,8 +57,8 @@ void SummaryBuilder::add(const TickRecord& record) {
   out_.refused_packets = std::max(out_.refused_packets, record.refused_packets);
   out_.peak_force_n = std::max(out_.peak_force_n, magnitude(record.commanded_force_n));
   out_.deepest_mm = std::max(out_.deepest_mm, double{record.penetration_mm});
-  if ((record.flags & kFlagReset) != 0) out_.removed_mm3 = 0;
-  out_.removed_mm3 += removed_mm3(record, voxel_mm3_);
+  if ((record.flags & kFlagReset) != 0) out_.removed_density_mm3 = 0;
+  out_.removed_density_mm3 += removed_density_mm3(record, voxel_mm3_);
   out_.port_energy_mj = record.port_energy_j * 1000;
   out_.port_minimum_mj = record.port_minimum_j * 1000;
   for (std::size_t i = 0; i < kEnergySources; ++i) {

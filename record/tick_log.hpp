@@ -92,10 +92,10 @@ class TickLogReader {
                    double{vector[2]} * vector[2]);
 }
 
-/// Volume removed in one tick: density units over full density, times the voxel of the changed
+/// Density removed in one tick: its units over full density, times the voxel of the changed
 /// volume (the first one, if a tick changed several). Negative for an undo.
-[[nodiscard]] inline double removed_mm3(const TickRecord& record,
-                                        std::span<const double> voxel_mm3) noexcept {
+[[nodiscard]] inline double removed_density_mm3(const TickRecord& record,
+                                                std::span<const double> voxel_mm3) noexcept {
   if (record.removed == 0 || voxel_mm3.empty()) return 0;
   const auto changed = static_cast<std::size_t>(std::countr_zero(record.dirty_volumes));
   const double voxel = voxel_mm3[changed < voxel_mm3.size() ? changed : 0];

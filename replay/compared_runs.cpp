@@ -34,7 +34,7 @@ double proxies_apart_mm(const TickRecord& a, const TickRecord& b) {
 
 void count_removed(const TickRecord& record, std::span<const double> voxel_mm3, double& mm3) {
   if ((record.flags & kFlagReset) != 0) mm3 = 0;
-  mm3 += removed_mm3(record, voxel_mm3);
+  mm3 += removed_density_mm3(record, voxel_mm3);
 }
 
 }  // namespace
@@ -76,7 +76,7 @@ std::string ComparedRuns::text() const {
   std::snprintf(lines, sizeof lines,
                 "                 recorded    replayed\n"
                 "peak force       %8.4f    %8.4f N\n"
-                "removed          %8.4f    %8.4f mm3\n"
+                "removed density  %8.4f    %8.4f mm3\n"
                 "at most apart    %8.4f N, %.4f mm between the places of the tool\n",
                 recorded_peak_n_, replayed_peak_n_, recorded_mm3_, replayed_mm3_, force_apart_n_,
                 apart_mm_);

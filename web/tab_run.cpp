@@ -226,9 +226,9 @@ int TabRun::rate_hz() const noexcept {
 
 std::string TabRun::facts() const {
   const State& s = *state_;
-  double removed_mm3 = 0;
+  double removed_density_mm3 = 0;
   for (std::size_t v = 0; v < s.voxel_mm3.size(); ++v) {
-    removed_mm3 += static_cast<double>(s.removed_steps[v]) / kDensityMax * s.voxel_mm3[v];
+    removed_density_mm3 += static_cast<double>(s.removed_steps[v]) / kDensityMax * s.voxel_mm3[v];
   }
   Json energy;
   for (std::size_t i = 0; i < kEnergySources; ++i) {
@@ -242,7 +242,7 @@ std::string TabRun::facts() const {
                       {"phase", static_cast<int>(s.output.phase)},
                       {"hand_led", s.emulator.accepts_target()},
                       {"force_n", vec3::length(s.output.force_n)},
-                      {"removed_mm3", removed_mm3},
+                      {"removed_density_mm3", removed_density_mm3},
                       {"absorbed_mj", s.output.absorbed_mj},
                       {"energy_mj", std::move(energy)}};
   return facts.canonical();

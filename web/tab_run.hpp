@@ -50,8 +50,8 @@ class TabRun {
   void release() noexcept;
 
   [[nodiscard]] int rate_hz() const noexcept;
-  /// JSON: rate_hz, ticks, armed_ticks, armed, output_hash, fault, phase, force_n, removed_mm3,
-  /// energy_mj by source, absorbed_mj, hand_led. Cheap.
+  /// JSON: rate_hz, ticks, armed_ticks, armed, output_hash, fault, phase, force_n,
+  /// removed_density_mm3, energy_mj by source, absorbed_mj, hand_led. Cheap.
   [[nodiscard]] std::string facts() const;
   /// Hash of all volumes as in the report of a run, 16 hex digits. Reads every voxel.
   [[nodiscard]] std::string volume_hash() const;

@@ -12,6 +12,7 @@
 #include <exception>
 #include <filesystem>
 #include <memory>
+#include <numeric>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -233,7 +234,8 @@ const char* text_of(EndReason end) {
   return "the device was never taken in hand";
 }
 
-double removed_mm3(const LoadedScene& scene, const RunRecord& record) {
+/// Density that was taken away, over full density.
+double removed_density_mm3(const LoadedScene& scene, const RunRecord& record) {
   double mm3 = 0;
   for (std::size_t v = 0; v < scene.volumes.size(); ++v) {
     const auto& h = scene.volumes[v].image.spacing_mm;
@@ -242,21 +244,8 @@ double removed_mm3(const LoadedScene& scene, const RunRecord& record) {
   return mm3;
 }
 
-/// Whether a voxel of the material can be at the surface, or within. With labels every material
-/// can.
-bool is_felt(const LoadedScene& scene, const MaterialRule& rule, std::size_t material) {
-  return std::ranges::any_of(scene.volumes, [&](const SceneVolume& volume) {
-    if (!volume.image.labels.empty()) return true;
-    for (std::uint32_t density = volume.iso; density <= kDensityMax; ++density) {
-      if (rule.of(Label{0}, static_cast<Density>(density)) == material) return true;
-    }
-    return false;
-  });
-}
-
-/// Scores of each material of the scene, since the last reset.
-MaterialScores scores_of(const LoadedScene& scene, const CompiledScene& servo,
-                         const RunRecord& record) {
+/// Solid that is gone, by index of the scene's materials.
+std::vector<double> removed_mm3(const LoadedScene& scene, const CompiledScene& servo) {
   std::vector<double> isos;
   for (const Material& material : scene.materials) isos.push_back(material.iso);
   const MaterialRule rule(isos);
@@ -264,17 +253,24 @@ MaterialScores scores_of(const LoadedScene& scene, const CompiledScene& servo,
   for (std::size_t v = 0; v < scene.volumes.size(); ++v) {
     StepsByMaterial steps;
     const VolumeImage& image = scene.volumes[v].image;
-    add_removed(rule, servo.first_density(v), servo.density(v), image.labels, steps);
+    add_removed(rule, scene.volumes[v].iso, servo.first_density(v), servo.density(v), image.labels,
+                steps);
     const auto& h = image.spacing_mm;
     for (std::size_t m = 0; m < steps.size(); ++m) {
       removed[m] += static_cast<double>(steps[m]) / kDensityMax * h[0] * h[1] * h[2];
     }
   }
+  return removed;
+}
+
+/// Scores of each material of the scene, since the last reset.
+MaterialScores scores_of(const LoadedScene& scene, const std::vector<double>& removed,
+                         const RunRecord& record) {
   MaterialScores scores;
   for (std::size_t m = 0; m < scene.materials.size(); ++m) {
     if (m == 0 && removed[0] == 0) continue;  // "none": no voxel of it
     const Material& material = scene.materials[m];
-    scores.push_back({material.name, removed[m], std::nullopt, is_felt(scene, rule, m)});
+    scores.push_back({material.name, removed[m]});
     if (!material.forbidden) continue;
     scores.back().forbidden_ms =
         static_cast<double>(record.forbidden_ticks[m]) * 1000 / scene.servo.rate_hz;
@@ -399,8 +395,10 @@ int run_with_device(const ControllerOptions& options, std::int64_t began_ns, Run
     name_law_faults(scene, faults, name);
     explain_faults(faults, start.port_texts[arm], name);
   }
-  report.removed_mm3 = removed_mm3(scene, report.record);
-  report.materials = scores_of(scene, servo, report.record);
+  report.removed_density_mm3 = removed_density_mm3(scene, report.record);
+  const std::vector<double> removed = removed_mm3(scene, servo);
+  report.removed_mm3 = std::accumulate(removed.begin(), removed.end(), 0.0);
+  report.materials = scores_of(scene, removed, report.record);
   report.workspace_scale = scene.device.workspace_scale;
   report.tool = scene.tools[scene.active_tool].name;
   report.tool_mm = 2 * scene.tools[scene.active_tool].radius_mm;

@@ -46,15 +46,14 @@ Json forbidden_of(const MaterialScores& materials) {
   return list;
 }
 
-/// Removed volume by material, and the time in contact with forbidden material. Removal below the
-/// surface belongs to the material that was cut and gives no force.
+/// Removed volume by material, and the time in contact with forbidden material.
 std::string score_lines(const MaterialScores& materials) {
   constexpr double kSeenMm3 = 0.0005;  // else the line would say 0.000
-  std::string removed, unfelt, touched;
+  std::string removed, touched;
   for (const MaterialScore& one : materials) {
     if (one.removed_mm3 >= kSeenMm3) {
-      std::string& list = one.felt ? removed : unfelt;
-      list += format("%s%s %.3f", list.empty() ? "" : ", ", one.name.c_str(), one.removed_mm3);
+      removed +=
+          format("%s%s %.3f", removed.empty() ? "" : ", ", one.name.c_str(), one.removed_mm3);
     }
     if (one.forbidden_ms.value_or(0) > 0) {
       touched +=
@@ -63,7 +62,6 @@ std::string score_lines(const MaterialScores& materials) {
   }
   std::string text;
   if (!removed.empty()) text += "  of these   " + removed + " mm3\n";
-  if (!unfelt.empty()) text += "  not felt   " + unfelt + " mm3, below the surface\n";
   if (!touched.empty()) text += "  forbidden  touched: " + touched + "\n";
   return text;
 }
@@ -180,6 +178,7 @@ std::string report_json(const RunReport& report) {
       {"peak_force_n", r.peak_force_n},
       {"removed_mm3", report.removed_mm3},
       {"removed_mm3_by_material", removed_of(report.materials)},
+      {"removed_density_mm3", report.removed_density_mm3},
       {"forbidden_ms", forbidden_of(report.materials)},
       {"resets", r.resets},
       {"undos", r.undos},

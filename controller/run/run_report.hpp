@@ -17,7 +17,6 @@ struct MaterialScore {
   std::string name;
   double removed_mm3 = 0;
   std::optional<double> forbidden_ms{};  ///< of touch; empty if it may be cut
-  bool felt = true;                      ///< false: all of it lies below the surface
 };
 using MaterialScores = std::vector<MaterialScore>;
 
@@ -45,8 +44,9 @@ struct RunReport : ArmReport {
   bool guarded = false;         ///< --guard
   std::string unexpected_call;  ///< that it blocked; empty if none
   std::vector<MissingRight> missing_rights;
-  double removed_mm3 = 0;
-  MaterialScores materials;  ///< in the scene's order
+  double removed_mm3 = 0;          ///< solid that is gone (`solid_gone`)
+  double removed_density_mm3 = 0;  ///< density that was taken away, over full density
+  MaterialScores materials;        ///< in the scene's order
   double workspace_scale = 1;
   std::optional<ArmReport> second;
   std::uint64_t watchdog_trips = 0;

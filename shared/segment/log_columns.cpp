@@ -41,7 +41,7 @@ constexpr LogColumn kColumns[] = {
      "with force.model = \"proxy\", in contact; else 0"},
     {"dac_counts", "count", "signed motor commands, 0 is no torque", "0 while the motors are off"},
     {"phase", "", "code, below: where the safety of the loop stands"},
-    {"removed", "1/65535 voxel", "density taken away in this tick, all volumes"},
+    {"removed", "1/65535 voxel", "density taken away in this tick by this arm, all volumes"},
     {"port_energy_j", "J", "energy taken from the hand since the start: SUM -F.dx at the device, F the "
      "mean force sent since the last report"},
     {"port_minimum_j", "J", "its lowest value so far; below 0 the loop gave more than it took"},

@@ -13,7 +13,7 @@
 
 namespace kerf {
 
-/// Amounts of density by the index of their material; a full voxel is kDensityMax steps.
+/// Parts of voxels by the index of their material; a whole voxel is kDensityMax steps.
 using StepsByMaterial = std::vector<std::uint64_t>;
 
 /// Returns the material of a voxel: that of its label; without a label, the densest material whose
@@ -32,6 +32,9 @@ class MaterialRule {
       const double from = by_density_.empty() ? 0.0 : std::clamp(iso, 0.0, 1.0) * kDensityMax;
       by_density_.emplace_back(from, material);
     }
+    for (const double iso : isos) {
+      shows_from_.push_back(static_cast<Density>(std::clamp(iso, 0.0, 1.0) * kDensityMax));
+    }
   }
 
   [[nodiscard]] std::size_t count() const noexcept { return count_; }
@@ -45,20 +48,39 @@ class MaterialRule {
     return material;
   }
 
+  /// The first density from which a voxel is solid, in a volume with its surface at `iso`. A label
+  /// also makes a solid of softer material, such as pulp, from the density at which that shows.
+  [[nodiscard]] Density solid_from(Label label, Density iso) const noexcept {
+    return label > 0 && label < count_ ? std::min(iso, shows_from_[label]) : iso;
+  }
+
  private:
   std::size_t count_;
   std::vector<std::pair<double, std::size_t>> by_density_;  ///< from the softest
+  std::vector<Density> shows_from_;                         ///< by material
 };
 
-/// Adds to `removed` the density that a volume has lost since the start; `labels` may be empty.
-inline void add_removed(const MaterialRule& rule, std::span<const Density> first,
+/// The part of a voxel's solid that is gone, in steps of 1 / kDensityMax, rounded: 1 - now / first.
+/// A voxel was solid if its first density reaches `solid_from`; nothing is gone of the others,
+/// which are air and tissue below the surface. Cutting takes a part of the density that a voxel
+/// has, so one of which a tool covered the part r has lost the part r, whatever its density was.
+[[nodiscard]] constexpr std::uint32_t solid_gone(Density first, Density now,
+                                                 Density solid_from) noexcept {
+  if (first < solid_from || now >= first) return 0;
+  constexpr std::uint32_t kWhole = 65535;  // kDensityMax; products below fit in 32 bits
+  return (static_cast<std::uint32_t>(first - now) * kWhole + first / 2U) / first;
+}
+
+/// Adds to `removed` the solid of a volume with its surface at `iso` that is gone since the start;
+/// `labels` may be empty.
+inline void add_removed(const MaterialRule& rule, Density iso, std::span<const Density> first,
                         std::span<const Density> now, std::span<const Label> labels,
                         StepsByMaterial& removed) {
   removed.resize(rule.count());
   for (std::size_t i = 0; i < first.size(); ++i) {
-    if (now[i] >= first[i]) continue;
-    removed[rule.of(labels.empty() ? Label{0} : labels[i], first[i])] +=
-        static_cast<std::uint64_t>(first[i] - now[i]);
+    const Label label = labels.empty() ? Label{0} : labels[i];
+    const std::uint32_t gone = solid_gone(first[i], now[i], rule.solid_from(label, iso));
+    if (gone > 0) removed[rule.of(label, first[i])] += gone;
   }
 }
 

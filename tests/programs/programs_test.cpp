@@ -191,7 +191,7 @@ TEST_CASE("a reader resets the volumes: the mirror follows, and the report count
   }
   CHECK(boxes > 0);
   const auto& h = reader.info().volumes[0].spacing_mm;
-  CHECK(report["removed_mm3"].get<double>() ==
+  CHECK(report["removed_density_mm3"].get<double>() ==
         doctest::Approx(removed / kerf::kDensityMax * h[0] * h[1] * h[2]));
 }
 

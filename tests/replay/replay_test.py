@@ -312,14 +312,14 @@ class TestReplay(unittest.TestCase):
 
     def test_other_voxels_are_counted_by_their_own_size(self):
         found = replay(self.log, "--set", "volume.size=[128,128,80]", "--out", out := self.run_folder / "coarse")
-        recorded_mm3, replayed_mm3 = map(float, re.search(r"removed +([0-9.]+) +([0-9.]+) mm3", found).groups())
+        recorded_mm3, replayed_mm3 = map(float, re.search(r"removed density +([0-9.]+) +([0-9.]+) mm3", found).groups())
         volume, = json.loads((out / "scene.json").read_text())["volumes"]
         voxel_mm3 = math.prod(volume["spacing_mm"])
         self.assertGreater(voxel_mm3, 4 * math.prod(json.loads((self.log / "scene.json").read_text())["volumes"][0]["spacing_mm"]))
         rows = self.rows(out)
         removed = sum(struct.unpack_from("<I", rows, at + 172)[0] for at in range(HEADER, len(rows), self.row)) / 65535 * voxel_mm3
         self.assertGreater(removed, 0.01)
-        self.assertAlmostEqual(recorded_mm3, self.report["removed_mm3"], 3)
+        self.assertAlmostEqual(recorded_mm3, self.report["removed_density_mm3"], 3)
         self.assertAlmostEqual(replayed_mm3, removed, 3)
 
     def test_a_recording_of_a_replay_has_the_figures_of_the_replay(self):

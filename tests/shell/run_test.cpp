@@ -156,17 +156,16 @@ TEST_CASE("an event is no fault, and more of them than fit hide none") {
   CHECK(text.find("fault      watchdog") == std::string::npos);
 }
 
-TEST_CASE("a volume removed below the surface has a line of its own, with the scale of a scan") {
+TEST_CASE("a scan has a line of its scale beside the removed volume") {
   RunReport report;
-  report.removed_mm3 = 55252.953;
-  report.materials = {{"soft tissue", 44295.239, {}, false}, {"bone", 10957.714}};
+  report.removed_mm3 = 10957.714;
+  report.materials = {{"soft tissue", 0.0}, {"bone", 10957.714}};
   CHECK(summary(report).find("  scale ") == std::string::npos);
   report.workspace_scale = 4.4625;
   report.tool = "ball 16";
   report.tool_mm = 48;
   CHECK(summary(report).find(
-            "  removed    55252.953 mm3\n  of these   bone 10957.714 mm3\n"
-            "  not felt   soft tissue 44295.239 mm3, below the surface\n"
+            "  removed    10957.714 mm3\n  of these   bone 10957.714 mm3\n"
             "  scale      1 mm of the hand is 4.46 mm here, where tool ball 16 is 48 mm wide\n") !=
         std::string::npos);
 }

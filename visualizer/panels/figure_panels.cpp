@@ -263,7 +263,7 @@ ImVec2 draw_figures(const OverlayFigures& figures) {
       panel_row("tool", "%s", shortened(figures.tool, kMostName).c_str());
     }
     if (figures.second) second_arm_rows(*figures.second);
-    panel_row(figures.removed_is_partial ? "since joining" : "removed", "%.2f mm3",
+    panel_row(figures.score_is_partial ? "since joining" : "removed", "%.2f mm3",
               figures.removed_mm3);
     if (figures.spindle) {
       panel_row("spindle", "%.0f krpm", figures.spindle->krpm);

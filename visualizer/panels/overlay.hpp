@@ -87,7 +87,6 @@ struct OverlayFigures {
   std::string tool;
   std::optional<SecondArmFigures> second;  ///< none: there is one arm
   double removed_mm3 = 0.0;
-  bool removed_is_partial = false;        ///< joined late: counted from then on
   std::vector<ScoreRow> score;            ///< of the scene's materials
   bool score_is_partial = false;          ///< something was cut before this one joined
   std::string forbidden;                  ///< which of them may not be cut; empty: none

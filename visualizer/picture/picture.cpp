@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <numeric>
 #include <optional>
 #include <span>
 #include <string>
@@ -378,8 +379,8 @@ OverlayFigures overlay_figures(const Session& session) {
   if (session.second()) {
     figures.second = second_arm_figures(*session.second(), session.scene());
   }
-  figures.removed_mm3 = session.removed_mm3();
-  figures.removed_is_partial = session.joined_late();
+  const std::vector<double> removed = session.removed_by_material_mm3();
+  figures.removed_mm3 = std::accumulate(removed.begin(), removed.end(), 0.0);
   figures.score_is_partial = session.cut_before();
   for (const MaterialView& material : session.scene().materials) {
     if (!material.forbidden) continue;

@@ -23,25 +23,18 @@ MaterialRule rule_of(const SceneView& scene) {
 }  // namespace
 
 RemovedVolume::RemovedVolume(const SceneView& scene, std::span<const VolumeContent> contents)
-    : materials_(rule_of(scene).count()) {
-  const MaterialRule rule = rule_of(scene);
+    : rule_(rule_of(scene)) {
   for (std::size_t v = 0; v < scene.volumes.size(); ++v) {
     const VolumeView& view = scene.volumes[v];
     const auto& [density, labels] = contents[v];
     Volume& volume = volumes_.emplace_back();
     volume.bricks = view.bricks;
-    volume.step_mm3 = std::abs(glm::determinant(glm::dmat3(view.world_from_voxel))) / kDensityMax;
-    volume.material.resize(density.size());
-    for (std::size_t i = 0; i < density.size(); ++i) {
-      const Label label = labels.empty() ? Label{0} : labels[i];
-      volume.material[i] = static_cast<Label>(rule.of(label, density[i]));
-    }
-    volume.held.resize(volume.bricks.count() * materials_);
-    volume.fullest.resize(volume.held.size());
-    volume.removed.resize(materials_);
-    for (std::uint32_t brick = 0; brick < volume.bricks.count(); ++brick) {
-      count(volume, density, brick);
-    }
+    volume.iso = view.iso;
+    volume.voxel_mm3 = std::abs(glm::determinant(glm::dmat3(view.world_from_voxel)));
+    volume.fullest.assign(density.begin(), density.end());
+    volume.labels.assign(labels.begin(), labels.end());
+    volume.gone.resize(volume.bricks.count() * rule_.count());
+    volume.removed.resize(rule_.count());
   }
 }
 
@@ -52,29 +45,33 @@ void RemovedVolume::update(std::size_t volume, std::span<const Density> density,
 
 void RemovedVolume::count(Volume& volume, std::span<const Density> density,
                           std::uint32_t brick) const {
-  std::uint32_t* const held = &volume.held[brick * materials_];
-  std::uint32_t* const fullest = &volume.fullest[brick * materials_];
-  for (std::size_t m = 0; m < materials_; ++m) volume.removed[m] -= fullest[m] - held[m];
-  std::fill_n(held, materials_, 0U);
+  const std::size_t materials = rule_.count();
+  std::uint32_t* const gone = &volume.gone[brick * materials];
+  for (std::size_t m = 0; m < materials; ++m) volume.removed[m] -= gone[m];
+  std::fill_n(gone, materials, 0U);
   const VoxelBox box = volume.bricks.voxels(brick);
   for (std::int32_t z = box.lo.z; z < box.hi.z; ++z) {
     for (std::int32_t y = box.lo.y; y < box.hi.y; ++y) {
       const std::size_t row = volume.bricks.grid.index(box.lo.x, y, z);
       const auto wide = static_cast<std::size_t>(box.hi.x - box.lo.x);
-      for (std::size_t i = row; i < row + wide; ++i) held[volume.material[i]] += density[i];
+      for (std::size_t i = row; i < row + wide; ++i) {
+        Density& fullest = volume.fullest[i];
+        fullest = std::max(fullest, density[i]);
+        const Label label = volume.labels.empty() ? Label{0} : volume.labels[i];
+        const std::uint32_t part =
+            solid_gone(fullest, density[i], rule_.solid_from(label, volume.iso));
+        if (part > 0) gone[rule_.of(label, fullest)] += part;
+      }
     }
   }
-  for (std::size_t m = 0; m < materials_; ++m) {
-    fullest[m] = std::max(fullest[m], held[m]);
-    volume.removed[m] += fullest[m] - held[m];
-  }
+  for (std::size_t m = 0; m < materials; ++m) volume.removed[m] += gone[m];
 }
 
 std::vector<double> RemovedVolume::removed_mm3() const {
-  std::vector<double> sums(materials_);
+  std::vector<double> sums(rule_.count());
   for (const Volume& volume : volumes_) {
-    for (std::size_t m = 0; m < materials_; ++m) {
-      sums[m] += static_cast<double>(volume.removed[m]) * volume.step_mm3;
+    for (std::size_t m = 0; m < sums.size(); ++m) {
+      sums[m] += static_cast<double>(volume.removed[m]) / kDensityMax * volume.voxel_mm3;
     }
   }
   return sums;
@@ -87,10 +84,6 @@ constexpr std::uint64_t kRateSpan = 500;  // ticks; half a second at 1 kHz
 
 double now_ns() {
   return static_cast<double>(monotonic_ns());
-}
-
-double voxel_mm3(const VolumeView& volume) {
-  return std::abs(glm::determinant(glm::dmat3(volume.world_from_voxel)));
 }
 
 }  // namespace
@@ -162,26 +155,13 @@ void Session::read_removals() {
   const SegmentReader& reader = connection_.reader();
   const std::uint64_t head = reader.dirty_head();
   const std::uint64_t slots = reader.info().dirty_slots;
-  if (head - next_removal_ > slots) {
-    next_removal_ = head - slots;
-    joined_late_ = true;
-  }
+  if (head - next_removal_ > slots) next_removal_ = head - slots;
   DirtyRecord record;
   for (; next_removal_ < head; ++next_removal_) {
-    if (reader.dirty_at(next_removal_, record) != ReadState::ok) {
-      joined_late_ = true;  // overrun while reading: something is not counted
-      continue;
-    }
+    if (reader.dirty_at(next_removal_, record) != ReadState::ok) continue;  // overrun meanwhile
     if (record.volume >= scene_.volumes.size()) continue;
-    // Over all volumes, though a record names one: nothing is cut while a reset runs.
-    if (record.cause == static_cast<std::uint16_t>(DirtyCause::reset)) removed_mm3_ = 0;
-    const double mm3 = record.removed / kDensityMax * voxel_mm3(scene_.volumes[record.volume]);
-    if (record.cause == static_cast<std::uint16_t>(DirtyCause::undo)) {
-      removed_mm3_ = std::max(removed_mm3_ - mm3, 0.0);  // one that joined late saw less go
-      continue;
-    }
+    if (record.cause == static_cast<std::uint16_t>(DirtyCause::undo)) continue;
     if (record.removed > 0) on_the_way_.push_back(record);
-    removed_mm3_ += mm3;
   }
 }
 

@@ -15,9 +15,10 @@
 
 namespace kerf {
 
-/// How much of each material has been removed, brick by brick: the most that a brick has held since
-/// this was made, less what it holds now. Material that comes back is no longer counted, also if a
-/// reset restores what had been removed before. Memory: a byte for each voxel.
+/// How much solid of each material is gone (`solid_gone`), brick by brick: of a voxel, against the
+/// most that it has held since this was made. Material that comes back is no longer counted, also
+/// if a reset restores what had been removed before. Memory: two bytes for each voxel, three with
+/// labels.
 class RemovedVolume {
  public:
   RemovedVolume(const SceneView& scene, std::span<const VolumeContent> contents);
@@ -31,16 +32,17 @@ class RemovedVolume {
  private:
   struct Volume {
     BrickGrid bricks;
-    double step_mm3 = 0.0;               ///< of a step of density in a voxel
-    std::vector<Label> material;         ///< by voxel
-    std::vector<std::uint32_t> held;     ///< steps by brick and material
-    std::vector<std::uint32_t> fullest;  ///< the most of them so far
-    std::vector<std::int64_t> removed;   ///< steps by material
+    Density iso = 0;
+    double voxel_mm3 = 0.0;
+    std::vector<Density> fullest;       ///< by voxel
+    std::vector<Label> labels;          ///< by voxel; may be empty
+    std::vector<std::uint32_t> gone;    ///< by brick and material; kDensityMax is a voxel
+    std::vector<std::int64_t> removed;  ///< sums by material
   };
-  /// Counts the materials of a brick again; the difference to its fullest state is removed.
+  /// Counts a brick again.
   void count(Volume& volume, std::span<const Density> density, std::uint32_t brick) const;
 
-  std::size_t materials_;
+  MaterialRule rule_;
   std::vector<Volume> volumes_;
 };
 
@@ -74,9 +76,8 @@ class Session {
   /// Ticks since the device was armed, with two arms the first of both; none before.
   [[nodiscard]] std::optional<std::uint64_t> ticks_since_armed() const noexcept;
   [[nodiscard]] std::optional<double> tick_rate_hz() const;
-  /// Since the session began or the volumes were reset.
-  [[nodiscard]] double removed_mm3() const noexcept { return removed_mm3_; }
-  /// The same by index of the scene's materials, but since this one joined.
+  /// Removed volume by index of the scene's materials, since this one joined or the volumes were
+  /// reset.
   [[nodiscard]] std::vector<double> removed_by_material_mm3() const {
     return removed_volume_.removed_mm3();
   }
@@ -84,7 +85,6 @@ class Session {
   [[nodiscard]] double forbidden_ms() const noexcept;
   /// Something had been cut before it joined, which `removed_by_material_mm3` lacks.
   [[nodiscard]] bool cut_before() const noexcept { return cut_before_; }
-  [[nodiscard]] bool joined_late() const noexcept { return joined_late_; }
   [[nodiscard]] std::optional<double> data_age_ms() const;
   /// When the oldest of the ticks began that removed material whose bricks came with a `poll` since
   /// the last call. None if no such tick; what was removed before the session began does not
@@ -137,9 +137,7 @@ class Session {
   std::uint64_t next_removal_ = 0;
   std::vector<DirtyRecord> on_the_way_;  ///< removals whose bricks no snapshot holds yet
   std::optional<std::uint64_t> oldest_removal_ns_;
-  double removed_mm3_ = 0.0;
   std::uint64_t forbidden_ticks_ = 0;
-  bool joined_late_ = false;
   double attach_ms_ = 0.0;
 };
 

@@ -155,7 +155,7 @@ function showFacts(facts) {
   const rows = [['servo time', number(facts.armed_ticks / facts.rate_hz, 1, 's')],
     ['times real time', facts.times_real_time.toFixed(2)],
     ['a tick takes', number(facts.us_a_tick, 0, 'µs')],
-    ['removed', number(facts.removed_mm3, 3, 'mm³')],
+    ['density removed', number(facts.removed_density_mm3, 3, 'mm³')],
     ['energy taken', number(facts.absorbed_mj, 2, 'mJ')],
     ...Object.entries(facts.energy_mj).filter(([, mj]) => Math.abs(mj) >= 0.005).map(([name, mj]) => [`· ${name}`, number(mj, 2, 'mJ')]),
     ['output hash', facts.output_hash]];

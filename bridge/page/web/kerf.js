@@ -3,7 +3,7 @@
 import {CommandKind, kLastOfPass, kMayCommand, kRunEnded, kTwoArms, records, ReplyStatus} from './constants.js';
 import {Link} from './link.js';
 import {bannerOf, isStale, LookControls, Plot, showBanner, showFigures} from './panel.js';
-import {materialOf, sceneView} from './scene.js';
+import {materialOf, solidFrom, sceneView} from './scene.js';
 import {listen, Stage} from './stage.js';
 import {handOf} from './tool.js';
 import {recordAt} from './wire.js';
@@ -93,6 +93,7 @@ const look = new LookControls(stage);
 function begin() {
   scene = sceneView(held);
   scene.materialOf = materialOf(scene.materials);
+  scene.solidFrom = solidFrom(scene.materials);
   for (const choice of ['tool', 'tool2']) {
     element(choice).replaceChildren(...scene.tools.map((tool, i) => new Option(tool.name, i)));
   }
@@ -106,8 +107,8 @@ function removedByMaterial() {
   const names = ['no material', ...scene.materials.slice(1).map(one => one.name)];
   const mm3 = new Array(names.length).fill(0);
   for (const view of scene.volumes) {
-    const units = view.volume.removedUnits(scene.materialOf, names.length);
-    units.forEach((value, m) => mm3[m] += value / 65535 * view.voxelMm3);
+    const voxels = view.volume.removedVoxels(scene.materialOf, names.length, label => scene.solidFrom(label, view.iso));
+    voxels.forEach((value, m) => mm3[m] += value * view.voxelMm3);
   }
   const rows = names.map((name, m) => [name, mm3[m]]);
   return [...rows.slice(1), rows[0]];

@@ -45,6 +45,12 @@ export function sceneIn(scene, {iso, opacities}) {
     materials: scene.materials.map(one => ({...one, opacity: opacities[one.name]}))};
 }
 
+/** The density from which a voxel is solid, by label and the volume's iso: as `MaterialRule::solid_from`. */
+export function solidFrom(materials) {
+  return (label, iso) => label > 0 && label < materials.length ?
+    Math.min(iso, Math.trunc(materials[label].iso * kFull)) : iso;
+}
+
 /** The material of a voxel by its label, else by its density: which counts what is removed. */
 export function materialOf(materials) {
   const byIso = materials.map((material, index) => ({iso: material.iso * kFull, index})).slice(1)

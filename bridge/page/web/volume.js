@@ -98,8 +98,9 @@ export class Volume {
     this.listeners.delete(listener);
   }
 
-  /** Density units that are gone since each brick came, by material; `materialOf(label, density)`. */
-  removedUnits(materialOf, materials) {
+  /** Voxels of solid that are gone since each brick came, by material; `materialOf(label, density)`. As `solid_gone` in
+      shared/volume/material.hpp: a voxel was solid from the density `solidFrom(label)`, and has lost 1 - now / first. */
+  removedVoxels(materialOf, materials, solidFrom) {
     for (const id of this.changed) {
       const gone = new Float64Array(materials), first = this.first.get(id);
       this.rows(id, (from, at, count) => {
@@ -107,14 +108,15 @@ export class Volume {
           const was = first[from + i], lost = was - this.density[at + i];
           // A reset gives back what was gone before this page came.
           if (lost < 0) first[from + i] = this.density[at + i];
-          if (lost > 0) gone[materialOf(this.labels ? this.labels[at + i] : 0, was)] += lost;
+          const label = this.labels ? this.labels[at + i] : 0;
+          if (lost > 0 && was >= solidFrom(label)) gone[materialOf(label, was)] += lost / was;
         }
       });
       this.removed.set(id, gone);
     }
     if (this.changed.size > 0 || !this.sums) {
       this.sums = new Float64Array(materials);
-      for (const gone of this.removed.values()) gone.forEach((units, m) => this.sums[m] += units);
+      for (const gone of this.removed.values()) gone.forEach((voxels, m) => this.sums[m] += voxels);
     }
     this.changed.clear();
     return this.sums;

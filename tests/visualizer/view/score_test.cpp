@@ -23,6 +23,7 @@ SceneView scene_of(std::vector<MaterialView> materials) {
   scene.materials = std::move(materials);
   VolumeView& volume = scene.volumes.emplace_back();
   volume.bricks = BrickGrid::of(kGrid);
+  volume.iso = 26'214;  // dentin's 0.4
   volume.world_from_voxel[0][0] = volume.world_from_voxel[1][1] = 0.5;
   volume.world_from_voxel[2][2] = 2.0;
   return scene;
@@ -56,8 +57,8 @@ TEST_CASE("the score counts by label, or else by the density that a voxel had at
     removed_volume.update(0, density, all_bricks(scene));
     const auto removed = removed_volume.removed_mm3();
     CHECK(removed[0] == 0);
-    CHECK(removed[1] == doctest::Approx(40'000 / kDensityMax * kVoxelMm3));
-    CHECK(removed[2] == doctest::Approx(30'000 / kDensityMax * kVoxelMm3));
+    CHECK(removed[1] == doctest::Approx(2.0 / 3 * kVoxelMm3).epsilon(1e-4));
+    CHECK(removed[2] == doctest::Approx(kVoxelMm3));
     density[hard] = 60'000;
     density[soft] = 30'000;
     removed_volume.update(0, density, all_bricks(scene));
@@ -79,7 +80,7 @@ TEST_CASE("a score that joined late counts nothing for what a reset gives back")
     density[at] = 0;
     removed_volume.update(0, density, all_bricks(scene));
   }
-  CHECK(removed_volume.removed_mm3()[1] == doctest::Approx(2 * 60'000 / kDensityMax * kVoxelMm3));
+  CHECK(removed_volume.removed_mm3()[1] == doctest::Approx(2 * kVoxelMm3));
 }
 
 TEST_CASE("three sections show what lies in their planes through the tip, and where that is") {
