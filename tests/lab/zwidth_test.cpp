@@ -606,7 +606,7 @@ TEST_CASE("parts that make no map are refused in one line, and nothing is lost")
     refused("merge " + b + " " + c, "is no part of a whole");
   }
   std::string more = kept;
-  more.replace(more.find("\"cells\":[["), 10, "\"cells\":[[true,true,false,0,0,0],[");
+  more.replace(more.find("\"cells\":[["), 10, "\"cells\":[[true,true,false,false,0,0,0],[");
   std::ofstream(b, std::ios::binary) << more;
   refused("merge " + b + " " + c, "cells for ");
   std::ofstream(b, std::ios::binary) << "hello\n";
@@ -720,7 +720,7 @@ TEST_CASE("a law of the user's own gets its map, on one axis and with the whole 
     std::string all;
     for (std::string line; std::getline(in, line);) {
       std::size_t at = line.size();
-      for (int comma = 0; comma < 6; ++comma) at = line.rfind(',', at - 1);
+      for (int comma = 0; comma < 7; ++comma) at = line.rfind(',', at - 1);
       all += line.substr(at) + "\n";
     }
     return all;

@@ -122,7 +122,7 @@ class TestReplay(unittest.TestCase):
         self.assertIn("each equal to the last bit", found)
         self.assertIn(self.report["output_hash"], found)
         self.assertIn(self.report["volume_hash"], found)
-        self.assertGreater(self.report["removed_mm3"], 0.01)  # else it proves less
+        self.assertGreater(self.report["removed_density_mm3"], 0.01)  # else it proves less
 
     def test_the_scalar_kernels_give_the_same_bits(self):
         self.assertIn(self.report["output_hash"], replay(self.log, "--kernels", "scalar"))
