@@ -118,11 +118,15 @@ class Run:
         self.removed, self.depth_mm = {}, 0
         if side:
             self.cut = Cut(out, log)
-            self.removed = {material: mm3 for material, mm3 in self.cut.removed_mm3().items() if mm3 >= 0.05}
+            gone_mm3 = self.cut.removed_mm3()
+            told_mm3 = report["removed_mm3_by_material"]
+            self.removed = {material: mm3 for material, mm3 in gone_mm3.items() if mm3 >= 0.05}
             self.depth_mm = float((self.cut.depth_mm() if side == "above" else self.cut.side_depth_mm()).max())
         elif log["removed"].any():
             self.removed = {"something": 0}
         self.broken = [claim.__doc__ or f"number {number}" for number, claim in enumerate(claims, 1) if not claim(self)]
+        if side and any(abs(told_mm3[material] - mm3) > 1e-3 for material, mm3 in gone_mm3.items()):
+            self.broken.append(f"the report has {told_mm3}, the volumes have lost {gone_mm3}")
         if report["fault_count"]:
             self.broken.append(f"faults {report['faults']}")
 

@@ -46,7 +46,8 @@ TEST_CASE("the summary counts what was recorded") {
   CHECK(summary.seconds == doctest::Approx(1.0));
   CHECK(summary.lost_ticks == 0);
   CHECK(summary.peak_force_n == doctest::Approx(3.0));
-  CHECK(summary.removed_density_mm3 == doctest::Approx(500 * 0.125));  // 500 ticks, one full voxel each
+  CHECK(summary.removed_density_mm3 ==
+        doctest::Approx(500 * 0.125));  // 500 ticks, one full voxel each
   CHECK(summary.contact_ticks > 900);
   CHECK(summary.port_energy_mj == doctest::Approx(1));
   CHECK(summary.port_minimum_mj == doctest::Approx(-2));
