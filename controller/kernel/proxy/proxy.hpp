@@ -45,8 +45,8 @@ class StartSearch {
   constexpr ProxyStatus tick(Field& field, const ProxyPose<N>& goal, ProxyPose<N>& pose) noexcept {
     field.orient(goal.orientation);
     const Position middle = replaces_ && !refused() ? around_ : goal.centre;
-    constexpr auto kTolerance = Real(SweepRules::kTolerance);
-    if (is_free(field, middle, replaces_ ? wedged_depth<N>(field.deficit()) : kTolerance)) {
+    const auto tolerance = Real(SweepRules::kTolerance);
+    if (is_free(field, middle, replaces_ ? wedged_depth<N>(field.deficit()) : tolerance)) {
       pose = {middle, goal.orientation};
       return ProxyStatus::placed;
     }
@@ -61,7 +61,7 @@ class StartSearch {
       const Position centre = middle + step(direction);
       if (!leads_on(field, direction, middle, centre)) continue;
       ++queries;
-      if (is_free(field, centre, kTolerance)) {
+      if (is_free(field, centre, tolerance)) {
         pose = {centre, goal.orientation};
         return ProxyStatus::placed;
       }
