@@ -59,6 +59,9 @@ test('the figures are those of each arm\'s newest record', () => {
   assert.deepEqual([more['second arm'], more['its tool'], more['its state']], ['1.00 N', 'ball 1 mm', 'ramping']);
   assert.equal(element('second').hidden, false);
   assert.deepEqual(['tool', 'tool2'].map(id => element(id).value), [1, 0]);
+  for (const id of ['tool', 'tool2']) {
+    assert.deepEqual(element(id).children.map(one => [one.textContent, one.value]), [['ball 1 mm', '0'], ['fissure', '1']]);
+  }
   assert.equal(banner(), '');
 });
 
@@ -136,6 +139,38 @@ test('an arrow for each arm, from its own tool, drawn where its force points', (
   });
   const tools = gl.draws.filter(one => one.u_colour[0] === 0.6);
   assert.equal(tools.length, 2);
+});
+
+test('an arm whose place is unknown is not drawn, the other one is, whichever it is', () => {
+  for (const idle of [0, 1]) {
+    const hands = [0, 1].map(arm => ({force: [0, 1, 0], place: arm === idle ? [NaN, 0, 0] : [4 + 2 * arm, 2, 2]}));
+    run(100, ...hands);
+    assert.deepEqual([stage.hands[idle], stage.hands[1 - idle]?.tip], [null, hands[1 - idle].place]);
+    draw();
+    gl.draws.length = 0;
+    hands[1 - idle].place = [4, 2, 2.001];
+    run(10, ...hands);
+    draw();
+    const drawn = [0.6, 0.75].map(grey => gl.draws.filter(one => one.u_opacity === 1 && one.u_colour[0] === grey).length);
+    assert.deepEqual(drawn, [1, 2], 'a tool, an arrow of two parts');
+  }
+});
+
+test('a hand is drawn anew where it was and where it is, that of either arm', () => {
+  const [view] = stage.views(800, 600);
+  const hand = x => ({tip: [x, 2, 2], orientation: [0, 0, 0, 1], tool: 0, force: [0, 0, 0]});
+  const redrawn = (hands, before) => stage.painter.partsOf(view, hands, before, [], 800, 600).stage;
+  const whole = redrawn([hand(6)], [hand(7)]);
+  for (const [now, before] of [[[hand(1), hand(6)], [hand(1), hand(7)]], [[hand(6), hand(1)], [hand(7), hand(1)]],
+    [[null, hand(6)], [null, hand(7)]], [[hand(6), null], [hand(7), null]]]) {
+    assert.deepEqual(redrawn(now, before), whole);
+  }
+  for (const other of [hand(1), null]) {
+    for (const [a, b] of [[[other, null], [other, hand(7)]], [[null, other], [hand(7), other]]]) {
+      assert.deepEqual(redrawn(a, b), redrawn([null], [hand(7)]), 'it goes');
+      assert.deepEqual(redrawn(b, a), redrawn([hand(7)], [null]), 'it comes');
+    }
+  }
 });
 
 test('commands go to the arm that was meant, each is answered by its own number', () => {
