@@ -92,6 +92,23 @@ TEST_CASE("a wait of a second is reported, each kind once until the force comes 
   CHECK(told.size() == 3);
 }
 
+TEST_CASE("each wait begins anew, by the clock and in ticks, whichever of them runs faster") {
+  constexpr std::int64_t kFastMs = 5000, kSlowMs = 800;
+  for (const bool ticks_run_faster : {false, true}) {
+    CAPTURE(ticks_run_faster);
+    WaitNotice teller;
+    std::int64_t now_ms = 0, servo_ms = 0;
+    for (int cycle = 0; cycle < 2; ++cycle) {
+      for (const Waiting waiting : {Waiting::parked, Waiting::rest, Waiting::nothing}) {
+        CHECK_FALSE(teller.look(waiting, now_ms * kMs, servo_ms * kMs));
+        now_ms += ticks_run_faster ? kSlowMs : kFastMs;
+        servo_ms += ticks_run_faster ? kFastMs : kSlowMs;
+        CHECK_FALSE(teller.look(waiting, now_ms * kMs, servo_ms * kMs));
+      }
+    }
+  }
+}
+
 TEST_CASE("while no tick comes in lock-step nothing is reported: the machine is busy") {
   WaitNotice teller;
   for (std::int64_t now_ns = 0; now_ns < 60'000 * kMs; now_ns += 50 * kMs) {
