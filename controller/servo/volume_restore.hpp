@@ -266,7 +266,6 @@ inline void forget_strokes(StrokeState& stroke) noexcept {
   stroke.done = stroke.all = 0;
   stroke.open = false;
   stroke.motion = StrokeState::Motion::none;
-  stroke.from = stroke.end;
   forget_waiting(stroke);
 }
 
@@ -279,7 +278,6 @@ inline void follow_stroke(std::uint32_t pause_ticks, bool cuts, bool holds_on,
     stroke.open = true;
     stroke.all = stroke.done;
     if (stroke.lost) lose_stroke(stroke);
-    stroke.quiet_ticks = 0;
   }
   if (!stroke.open) {
     if (stroke.lost) forget_waiting(stroke);

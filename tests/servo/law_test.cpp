@@ -219,6 +219,9 @@ TEST_CASE("what the overlap removes in the tick in which a law fails is counted,
   static_cast<void>(armed.settled(0, 1.2, 0));
   const ServoOutput out = armed.step(0, 0.6, 0);
   REQUIRE(out.fault == Fault::force_law);
+  CHECK(length(out.contact_n) == 0);  // of what the law gave nothing is told
+  CHECK(length(out.proxy_offset_mm) == 0);
+  CHECK(armed.servo->penetration_mm() == 0);
   std::uint64_t gone = 0;
   for (std::size_t i = 0; i < before.size(); ++i) gone += before[i] - density[i];
   CHECK(gone > 0);

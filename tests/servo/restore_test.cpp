@@ -186,12 +186,15 @@ TEST_CASE("after a reset or an undo the tool feels and cuts as if nothing had be
 }
 
 TEST_CASE("a stroke goes on while its tool lifts for less than the pause, and ends after it") {
-  for (const int away_ms : {20, 600}) {
+  for (const int away_ms : {20, 130, 600}) {
     CAPTURE(away_ms);
     CuttingHand hand(cut_scene(kCutKinds[0]));
     const Place end = hand.press(-0.6), lifted{end[0], end[1] + 3, end[2]};
     const Place beside{end[0] + 0.6, end[1], end[2]};
     hand.lead(end, lifted, 20);
+    hand.rest(lifted, away_ms);
+    hand.lead(lifted, beside, 200);
+    hand.lead(beside, lifted, 20);  // and a second time
     hand.rest(lifted, away_ms);
     hand.lead(lifted, beside, 200);
     hand.lead(beside, kAbove, 100);
@@ -491,6 +494,14 @@ TEST_CASE("a reset forgets the last stroke, and ends an undo that runs") {
   hand.rest(kAbove, 1);
   hand.restore(kReset);
   CHECK_FALSE(hand.servo->apply(kUndo));
+  CHECK(hand.hash() == hand.first);
+  // Nor does an undo go on that has not begun: it would bring back what is below an older stroke.
+  hand.stroke(0.0);
+  hand.stroke(0.0);
+  REQUIRE(hand.servo->apply(kUndo));
+  hand.restore(kReset);
+  CHECK_FALSE(hand.servo->apply(kUndo));
+  hand.rest(kAbove, 50);
   CHECK(hand.hash() == hand.first);
 }
 

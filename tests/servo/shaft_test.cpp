@@ -164,6 +164,41 @@ TEST_CASE("a ball with a shaft turns with the stylus: it is told and drawn turne
   }
 }
 
+TEST_CASE("a shaft in a slot does not turn with the stylus: its own orientation is told") {
+  LoadedScene shafted = upright_scene([](double, double y, double z) {
+    return std::max(1 - std::abs(z), std::abs(y - 2.5) - 0.5);
+  });
+  shafted.tools[0].turns = true;
+  shafted.cut.model = CutModel::none;
+  LoadedScene bare = shafted;
+  bare.tools[0].shaft = {};
+  ArmedServo with(shafted, {12, 0, 0}), without(bare, {12, 0, 0});
+  /// Largest difference of an element of the orientations that are told.
+  const auto lag = [&](double x) {
+    const auto a = with.settled(x, 0, 0).rotation, b = without.settled(x, 0, 0).rotation;
+    double most = 0;
+    for (std::size_t i = 0; i < 9; ++i) most = std::max(most, std::abs(a[i] - b[i]));
+    return most;
+  };
+  const auto turn = [&](const std::array<double, 3>& rad) {
+    for (ArmedServo* servo : {&with, &without}) servo->arm.turn_wrist(rad);
+  };
+  constexpr std::array kUpright{0.0, 0.85, 0.0};
+  for (int cycle = 0; cycle < 2; ++cycle) {
+    turn(kUpright);
+    CHECK(lag(12) < 1e-4);  // in air both follow the stylus
+    for (double x = 12; x > -1; x -= 0.5) static_cast<void>(lag(x));
+    double held = 0;
+    for (const auto& rad : {std::array{0.0, 0.0, 0.0}, {0.0, 1.4, 0.0}}) {
+      turn(rad);
+      held = std::max(held, lag(0));
+    }
+    CHECK(held > 0.05);
+    turn(kUpright);
+    for (double x = 0; x < 12; x += 0.5) static_cast<void>(lag(x));
+  }
+}
+
 TEST_CASE("a shaft comes and goes with its tool, and is pushed out with a ramp") {
   for (const auto numeric : {NumericKind::fixed, NumericKind::float64}) {
     CAPTURE(static_cast<int>(numeric));

@@ -7,10 +7,13 @@
 #include <cstddef>
 #include <cstdint>
 #include <string>
+#include <utility>
 #include <variant>
 
 #include <doctest/doctest.h>
 
+#include "controller/kernel/proxy/proxy.hpp"
+#include "tests/proxy/support.hpp"
 #include "tests/servo/two_arms_support.hpp"
 
 using namespace kerf;
@@ -156,5 +159,144 @@ TEST_CASE("a tool that takes over stays on its side of a wall, and its force gro
     REQUIRE(bench.servo->apply({.kind = ServoCommand::Kind::select_tool, .argument = 0}));
     bench.step(below);
     CHECK(length(out.contact_n) == doctest::Approx(before_n).epsilon(0.01));
+  }
+}
+
+namespace {
+
+/// A point in a bowl about the origin, solid beyond 5 units.
+template <class N>
+auto bowl() {
+  const auto face = [](extremes::Point at) {
+    return std::pair(5 - extremes::length(at), -1 * extremes::unit(at));
+  };
+  return SolidField<N, decltype(face)>(0, face);
+}
+
+template <class N>
+ProxyContact<N> led(ProxyState<N>& state, auto& field, const extremes::Point& goal) {
+  return follow({.rotation_step = {}, .ramp_per_tick = typename N::Real(1)}, state, field,
+                {extremes::place_of<N>(goal), {}});
+}
+
+}  // namespace
+
+TEST_CASE_TEMPLATE("a proxy that is sought anew has forgotten the solid that it slid on", N,
+                   FixedNumbers, DoubleNumbers) {
+  auto field = bowl<N>();
+  ProxyState<N> slid;
+  for (int tick = 0; tick < 200; ++tick) {
+    static_cast<void>(led(slid, field, {9 * std::sin(0.1 * tick), -9 * std::cos(0.1 * tick), 0}));
+    if (tick % 10 != 9) continue;
+    ProxyState<N> again = slid, fresh;
+    fresh.pose = slid.pose;
+    fresh.valid = true;
+    for (ProxyState<N>* state : {&again, &fresh}) state->search_again();
+    for (int more = 1; more < 10; ++more) {
+      const double angle = 0.1 * (tick + more);
+      const extremes::Point goal{9 * std::sin(angle), -9 * std::cos(angle), 0.2 * more};
+      CAPTURE(tick);
+      CAPTURE(more);
+      REQUIRE(led(again, field, goal).spring == led(fresh, field, goal).spring);
+      REQUIRE(again.pose == fresh.pose);
+    }
+  }
+}
+
+// Out of a slanted face the pushes of that tick lead aside; the search goes in 26 directions.
+TEST_CASE_TEMPLATE("where the solid grows over a tool it is sought from the place that it had", N,
+                   FixedNumbers, DoubleNumbers) {
+  FlatField<N> floor({0, 1, 0});
+  ProxyState<N> state;
+  for (int tick = 0; tick < 20; ++tick) static_cast<void>(led(state, floor, {0, -1, 0}));
+  REQUIRE(state.valid);
+  const extremes::Point slanted = extremes::unit(extremes::Point{1, 2, 0});
+  FlatField<N> grown(slanted, -40 * slanted);
+  static_cast<void>(led(state, grown, {4, -1, 1}));
+  REQUIRE_FALSE(state.valid);
+  for (int tick = 0; tick < 200 && !state.valid; ++tick) {
+    static_cast<void>(led(state, grown, {4, -1, 1}));
+  }
+  REQUIRE(state.valid);
+  const extremes::Point at = extremes::point_of<N>(state.pose.centre);
+  CHECK(at[0] > 25);
+  CHECK(std::abs(at[1] - at[0]) < 0.1);
+}
+
+TEST_CASE("what a proxy has learned of a bowl is forgotten when its device rests parked") {
+  for (const NumericKind numeric : {NumericKind::fixed, NumericKind::float64}) {
+    LoadedScene scene = alone(two_armed(kCutKinds[0], 0), 0);
+    scene.servo.numeric = numeric;
+    scene.cut.model = CutModel::none;
+    scene.volumes[0] = volume_of(48, kVoxelMm, [](double x, double y, double z) {
+      return 2 - length(Place{x, y, z});
+    });
+    scene.tools = {ball(16)};
+    const Hand dock{.at = {0, -0.99, 0}, .parked = true}, taken{.at = dock.at};
+    Bench wandered(scene), rested(scene);
+    const auto step = [&](const Hand& one, const Hand& other) {
+      wandered.step(one);
+      rested.step(other);
+    };
+    for (int tick = 0; tick < kDockTicks; ++tick) step(dock, dock);
+    for (int cycle = 0; cycle < 2; ++cycle) {
+      for (double angle = 0.8; angle > 0; angle -= 0.1) {
+        step({.at = {1.4 * std::sin(angle), -1.4 * std::cos(angle), 0}}, taken);
+      }
+      for (int tick = 0; tick < 2 * kDockTicks; ++tick) step(dock, dock);
+      for (int tick = 0; tick < 20; ++tick) {
+        const Hand presses{.at = {0.05 * tick, -1.2, 0.02 * tick}};
+        step(presses, presses);
+        CAPTURE(tick);
+        REQUIRE(wandered.out[0].proxy_offset_mm == rested.out[0].proxy_offset_mm);
+      }
+      CHECK(length(rested.out[0].proxy_offset_mm) > 0.1);
+    }
+  }
+}
+
+TEST_CASE("the torques do the work of the force in the pose of each tick, not of an earlier one") {
+  for (const NumericKind numeric : {NumericKind::fixed, NumericKind::float64}) {
+    LoadedScene scene = half_space_scene(96);
+    scene.servo.numeric = numeric;
+    ArmedServo armed(scene, {-4, 5, 4});
+    const OmniArm arm;
+    for (int at = -4; at <= 4; ++at) {
+      CAPTURE(at);
+      const ServoOutput out = armed.settled(at, 0.5, -at);
+      REQUIRE(length(out.force_n) > 0.2);
+      // Of 1 mm along the force: its length, and the torques times the turns of the joints.
+      const auto end = [&](double mm) {
+        const double part = mm / length(out.force_n);
+        return arm.joints_rad(
+            {at + part * out.force_n[0], 0.5 + part * out.force_n[1], -at + part * out.force_n[2]});
+      };
+      const JointVec<double> turned = end(0.5) - end(-0.5);
+      const double work_mj = turned.x * out.torque_n_mm[0] + turned.y * out.torque_n_mm[1] +
+                             turned.z * out.torque_n_mm[2];
+      CHECK(work_mj == doctest::Approx(length(out.force_n)).epsilon(0.005));
+    }
+  }
+}
+
+TEST_CASE("a tool that has left the solid is no longer in it, whichever arm") {
+  for (const CutKind& kind : kCutKinds) {
+    CAPTURE(std::string(kind.name));
+    LoadedScene scene = two_armed(kind);
+    scene.cut.model = CutModel::none;
+    Bench bench(scene);
+    bench.dock();
+    for (int cycle = 0; cycle < 2; ++cycle) {
+      for (std::size_t arm = 0; arm < kMaxArms; ++arm) {
+        CAPTURE(arm);
+        for (int tick = 0; tick < 181; ++tick) bench.step(stroke(tick), stroke(tick));
+        for (std::size_t a = 0; a < kMaxArms; ++a) REQUIRE(bench.servo->penetration_mm(a) > 0.1);
+        for (int tick = 0; tick < 30; ++tick) {
+          bench.step(arm == 0 ? Hand{} : stroke(180), arm == 1 ? Hand{} : stroke(180));
+        }
+        CHECK(bench.servo->penetration_mm(arm) < 1e-6);
+        CHECK(bench.servo->penetration_mm(1 - arm) > 0.1);
+      }
+    }
   }
 }

@@ -69,6 +69,11 @@ bool is_legal(const Supervisor& before, Phase after, const SafetyInputs& in) {
 TEST_CASE("motors stay off until the device was parked and taken in hand") {
   CHECK_FALSE(after({{kFree, 1000}}).motors_on());
   CHECK_FALSE(after({{kRested, 1000}}).motors_on());
+  CHECK(after({{kSilent, 1000}}).phase == Phase::off);
+  CHECK(after({{kSilent, 10}, {kFree, 1}}).phase == Phase::calibrating);
+  CHECK_FALSE(after({{kFree, 1000}, {kRested, 1000}}).started);
+  CHECK(after({{kRested, 1}, {kFree, 1}}).started);
+  CHECK(after({{kRested, 1}, {kFree, 1}, {kSilent, 1000}}).started);  // for good
   CHECK(after({{kRested, 1}, {kFree, 1}}).phase == Phase::ramping);
   CHECK(after({{kRested, 1}, {kFree, 150}}).phase == Phase::active);
 }
@@ -162,6 +167,8 @@ TEST_CASE("too fast, or not finite for more than 2 ms, ends the motors at once")
   const SafetyInputs nan{.fresh = true, .finite = false};
   CHECK(after({{kRested, 1}, {kFree, 150}, {nan, 2}}).motors_on());
   CHECK(after({{kRested, 1}, {kFree, 150}, {nan, 3}}).fault == Fault::not_finite);
+  CHECK(after({{kRested, 1}, {kFree, 150}, {nan, 2}, {kFree, 1}, {nan, 2}, {kFree, 1}, {nan, 2}})
+            .motors_on());
 }
 
 TEST_CASE("every reachable state and input: only legal transitions, no motors with a fault") {
