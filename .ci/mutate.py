@@ -376,16 +376,11 @@ class TreeCopy:
 def judge_resets(pattern, jobs):
     """Leaves out each reset of .ci/resets.txt in turn; returns how many survived. One program after the other is linked of objects
     with a switch at each."""
-    try:
-        states = resets.read_table(ROOT)
-    except ValueError as wrong:
-        raise Wrong(wrong) from None
     survived = tried = 0
-    for program in sorted({state.program for state in states}):
-        mine = [state for state in states if state.program == program]
-        sources = resets.Sources(ROOT, mine)
+    for program, sources in read_resets().items():
+        mine = sources.states
         chosen = [(number, r) for number, r in enumerate(sources.resets)
-                  if re.search(pattern, f"{r.name} {r.file} {r.state.cases}") and (r.file, r.name) not in r.state.untried]
+                  if re.search(pattern, f"{r.name} {r.file} {r.state.cases}") and not r.untried()]
         if not chosen:
             continue
         with tempfile.TemporaryDirectory(prefix="kerf-resets.") as name, ending(concurrent.futures.ThreadPoolExecutor(jobs)) as pool:
@@ -408,6 +403,13 @@ def judge_resets(pattern, jobs):
         raise Wrong(f"{pattern}: no reset matches")
     print(f"mutate: resets: {tried} resets left out, {survived} survived")
     return survived
+
+
+def read_resets():
+    try:
+        return resets.read_programs(ROOT)
+    except ValueError as wrong:
+        raise Wrong(wrong) from None
 
 
 def build_switched(release, program, sources, states, here):
@@ -505,7 +507,7 @@ def main():
         parser.error("give a LIST or --check")
     mutations = read_table()
     check(mutations)
-    resets.read_table(ROOT)
+    read_resets()
     if options.check:
         print(f"mutate: {len(mutations)} mutations, each text stands once")
         return 0

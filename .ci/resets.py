@@ -44,7 +44,7 @@ class State:
     members: list  # names under which other structs hold it whole
     is_law: bool  # begun anew in the memory of a law
     fields: list = dataclasses.field(default_factory=list)
-    untried: set = dataclasses.field(default_factory=set)  # files and names of resets that change nothing
+    untried: set = dataclasses.field(default_factory=set)  # resets that change nothing: name, file and text of the line
 
 
 @dataclasses.dataclass
@@ -53,7 +53,12 @@ class Reset:
     name: str
     file: str
     line: int
+    text: str  # of the line
     state: State
+
+    def untried(self):
+        """The line of the table that says why it is not left out, or None."""
+        return next((no for no in self.state.untried if no[:2] == (self.name, self.file) and no[2] in self.text), None)
 
 
 def fields_of(text, struct):
@@ -91,9 +96,9 @@ def read_table(root):
         if not line or line.startswith("#"):
             continue
         if line.startswith("no "):
-            name, file, _ = line.removeprefix("no ").split(" @ ")
+            name, file, text, _ = line.removeprefix("no ").split(" @ ")
             for state in states:
-                state.untried |= {(file, name)} if name.startswith(f"{state.struct}.") else set()
+                state.untried |= {(name, file, text)} if name.startswith(f"{state.struct}.") else set()
             continue
         struct, header, sources, objects, catcher = line.split(" @ ")
         program, _, cases = catcher.partition(" ")
@@ -106,6 +111,13 @@ def read_table(root):
     return states
 
 
+def read_programs(root):
+    """By program: its lines of the table, and their sources with switches."""
+    states = read_table(root)
+    programs = sorted({state.program for state in states})
+    return {program: Sources(root, [state for state in states if state.program == program]) for program in programs}
+
+
 class Sources:
     """Files with a switch before each reset."""
 
@@ -114,6 +126,9 @@ class Sources:
         self.changed = {}
         for file in sorted({source for state in states for source in state.sources}):
             self.changed[file] = self.switched(file)
+        used = {reset.untried() for reset in self.resets}
+        for no in sorted({no for state in states for no in state.untried} - used):
+            raise ValueError(f"no {' @ '.join(no)}: there is no such reset; correct {TABLE}")
 
     def switched(self, file):
         text = (self.root / file).read_text()
@@ -128,7 +143,7 @@ class Sources:
             line = text.count("\n", 0, begin) + 1
             for state, field in zip(states, fields):
                 new = new.replace("@", f"kerf_left_out({len(self.resets)})", 1)
-                self.resets.append(Reset(f"{state.struct}.{field}", file, line, state))
+                self.resets.append(Reset(f"{state.struct}.{field}", file, line, text.splitlines()[line - 1], state))
             whole = whole[:begin] + new + whole[end:]
         return SWITCH + self.without_constants(whole)
 
