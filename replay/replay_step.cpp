@@ -32,10 +32,12 @@ std::array<DeviceReport, kMaxArms> reports_of(const ArmRecords& recorded) noexce
 
 std::array<ServoOutput, kMaxArms> give(CompiledScene& servo, const ArmRecords& recorded) noexcept {
   const TickCommands commands = commands_of(of_arms(recorded, servo));
-  // As the loop does: the reader's command, then the restart after a stall, then the step.
+  // As the loop does: the reader's command, the ticks that were missed, then the restart after a
+  // stall, then the step.
   if (commands.command.kind != ServoCommand::Kind::none) {
     static_cast<void>(servo.apply(commands.command));
   }
+  tell_missed(commands.missed, servo);
   if (commands.fade_in) {
     static_cast<void>(servo.apply({.kind = ServoCommand::Kind::fade_in}));
   }

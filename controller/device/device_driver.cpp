@@ -278,6 +278,9 @@ bool WoodenDriver::take(std::span<const std::uint8_t> packet, DeviceReport& repo
   seen_ = true;
   packet_bytes_.store(packet.size(), std::memory_order_relaxed);
   button_ = said->calibrate;
+  button_reports_ = button_ ? button_reports_ + 1 : 0;
+  constexpr std::uint32_t kReportsPerSet = 64;
+  set_due_ = button_ && (set_due_ || button_reports_ % kReportsPerSet == 1);
   counts_ = said->encoder;
   joints_ = turned({counts_[0], counts_[1], counts_[2]});
   const bool in_pose = near_home(joints_, kHomeCounts);
@@ -298,7 +301,8 @@ bool WoodenDriver::take(std::span<const std::uint8_t> packet, DeviceReport& repo
 
 std::size_t WoodenDriver::compose(const ServoOutput& output, Packet& packet) noexcept {
   WoodenCommand command{.milliamps = turned(output.motor_counts), .set_encoders = {}};
-  if (button_) {
+  if (button_ && (!homed_ || set_due_)) {
+    set_due_ = false;
     // The device also releases the button when its encoders are set.
     auto& counts = command.set_encoders.emplace(counts_);
     if (!homed_) {

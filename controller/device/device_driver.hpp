@@ -226,7 +226,12 @@ class WoodenDriver final : public DeviceDriver {
   /// After the first report the size of the device's own packets: another one is refused. The
   /// watchdog and signal handlers read it.
   std::atomic<std::size_t> packet_bytes_{wooden::kPacketBytes};
-  bool button_ = false;                   ///< of the newest report
+  bool button_ = false;  ///< of the newest report
+  /// Reports with the button in a row. Once homed, the encoders are set to what they are in the
+  /// first and then in each 64th alone, to release the button: a set takes back what the arm moved
+  /// meanwhile, and makes an error of a reading last.
+  std::uint32_t button_reports_ = 0;
+  bool set_due_ = false;
   std::array<std::int16_t, 6> counts_{};  ///< of the newest report
   Counts joints_{};                       ///< of a, b, c in the joints' sense
   bool set_sent_ = false;  ///< encoders were set to home since the button was pressed

@@ -107,8 +107,8 @@ TickRecord record_of(const DeviceReport& report, const TickCommands& commands,
                      const ServoOutput& output) noexcept {
   TickRecord record{};
   put_raw(report, record);
-  record.command =
-      static_cast<std::uint32_t>(commands.command.kind) | (commands.fade_in ? kCommandFadeIn : 0);
+  record.command = static_cast<std::uint32_t>(commands.command.kind) |
+                   (commands.fade_in ? kCommandFadeIn : 0) | commands.missed << kCommandMissedShift;
   record.command_argument = commands.command.argument;
   record.last_command = commands.last_index;
   record.flags = flags_of(report, output);
@@ -190,6 +190,7 @@ ServoCommand servo_command(const Command& command) noexcept {
 TickCommands commands_of(const TickRecord& record) noexcept {
   return {{static_cast<ServoCommand::Kind>(record.command & kCommandKind), record.command_argument},
           (record.command & kCommandFadeIn) != 0,
+          record.command >> kCommandMissedShift,
           record.last_command};
 }
 

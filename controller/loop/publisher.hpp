@@ -36,8 +36,15 @@ struct TickTiming {
 struct TickCommands {
   ServoCommand command;          ///< of a reader; `none` in most ticks
   bool fade_in = false;          ///< behind it, after a stall
+  std::uint32_t missed = 0;      ///< ticks that were skipped before this one, at most kMostMissed
   std::uint32_t last_index = 0;  ///< `Command::index` of the last one so far
 };
+
+/// Tells the servo how many ticks were skipped before this one, if any were.
+inline void tell_missed(std::uint32_t missed, Servo& servo) noexcept {
+  if (missed == 0) return;
+  static_cast<void>(servo.apply({.kind = ServoCommand::Kind::missed, .argument = missed}));
+}
 
 /// The commands of a tick as an arm gets them: a tool of the other one is none.
 [[nodiscard]] inline TickCommands commands_for(std::size_t arm, TickCommands commands) noexcept {

@@ -6,6 +6,7 @@
 #include <bit>
 #include <cstddef>
 #include <span>
+#include <utility>
 
 #include "controller/loop/allocation_counter.hpp"
 #include "controller/loop/tick_source.hpp"
@@ -148,6 +149,21 @@ class RunStatistics {
   ThreadFaults faults_;
 };
 
+/// Ticks that were skipped, from one tick to the next.
+class MissedTicks {
+ public:
+  explicit MissedTicks(std::uint64_t overruns) noexcept : overruns_(overruns) {}
+
+  /// Once per tick, with the clock's count.
+  [[nodiscard]] std::uint32_t next(std::uint64_t overruns) noexcept {
+    const std::uint64_t missed = overruns - std::exchange(overruns_, overruns);
+    return static_cast<std::uint32_t>(std::min<std::uint64_t>(missed, kMostMissed));
+  }
+
+ private:
+  std::uint64_t overruns_;
+};
+
 /// Which devices have stopped sending.
 class SilentDevices {
  public:
@@ -201,6 +217,7 @@ EndReason run_servo(TickSource& clock, const Devices& devices, Servo& servo, Pub
   const CountedAllocations counted;
   RunStatistics statistics(record, clock);
   statistics.start();
+  MissedTicks missed(clock.overruns());
   SilentDevices silent_devices(devices.size(), limits.gone_ticks);
   std::array<DeviceReport, kMaxArms> all_reports;
   std::array<ServoOutput, kMaxArms> all_outputs;
@@ -216,6 +233,8 @@ EndReason run_servo(TickSource& clock, const Devices& devices, Servo& servo, Pub
       reports[a] = devices[a].read();  // newest pose; never blocks
     }
     take_command(server, servo, tick, commands, record);
+    commands.missed = missed.next(clock.overruns());
+    tell_missed(commands.missed, servo);
     const char* const stall = recover(signals, clock.stood_still(), servo);
     commands.fade_in = stall != nullptr;
     if (commands.fade_in) record.add_event(tick, stall);

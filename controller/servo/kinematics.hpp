@@ -100,6 +100,7 @@ template <class N>
 struct ForwardKinematics {
   DeviceVec<typename N::Real> tip_mm;
   JacobianTransposed<N> jacobian_t_mm;
+  bool closes = true;  ///< false: no position of the arm has these angles
 };
 
 // The serial arm: a turret that carries a thigh and a forearm in one plane. Omni and WoodenHaptics.
@@ -212,6 +213,12 @@ namespace delta {
 /// everywhere in the workspace (tests/servo/delta_arm_test.cpp), one more is room.
 inline constexpr int kSteps = 6;
 
+/// Largest error of a leg's length at the end. A count of an encoder moves a knee by 0.038 mm; in
+/// the workspace less than 0.002 mm is left (tests/servo/delta_arm_test.cpp).
+inline constexpr double kMostExcessMm = 1.0 / 32;
+/// No crank turns as far, either way: beyond it lies the same pose by a whole turn more.
+inline constexpr double kMostCrankRad = 3.0;
+
 /// a / b in the format of a unit vector.
 template <class N>
 [[nodiscard]] constexpr typename N::Unit ratio(typename N::Real a, typename N::Real b) noexcept {
@@ -230,6 +237,7 @@ template <class N>
 struct Leg {
   DeviceVec<typename N::Unit> rod;
   typename N::Real excess_mm;
+  typename N::Real along_mm;  ///< of the parallelogram in the leg's plane; not above 0: folded
 };
 
 template <class N>
@@ -254,7 +262,8 @@ template <class N>
   return {{azimuth.cosine * rod_out - azimuth.sine * rod_across,
            azimuth.sine * rod_out + azimuth.cosine * rod_across,
            in_plane * ratio<N>(up_from_knee, distance)},
-          length - arm.parallelogram_mm};
+          length - arm.parallelogram_mm,
+          along};
 }
 
 /// The vectors g_i with g_i . rod_j = 1 where i = j, else 0.
@@ -281,10 +290,12 @@ template <class N>
 }  // namespace delta
 
 /// Tip and Jacobian for three crank angles in rad, by Newton's method with a fixed number of steps.
-/// Angles that no grip can have give any finite position (fixed point) or NaN (floating point).
+/// Angles that no grip can have give any position, or NaN in floating point, and do not close: the
+/// legs are too long or too short there, or a knee is bent the other way.
 template <class N>
 [[nodiscard]] constexpr ForwardKinematics<N> delta_arm_pose(
     const DeltaArm<N>& arm, const std::array<typename N::Angle, 3>& angles) noexcept {
+  using Angle = typename N::Angle;
   using Real = typename N::Real;
   using Unit = typename N::Unit;
   std::array<SineCosine<N>, 3> crank;
@@ -314,6 +325,12 @@ template <class N>
     const Unit out = arm.azimuth[i].cosine * legs[i].rod.x + arm.azimuth[i].sine * legs[i].rod.y;
     const Unit along_motion = crank[i].cosine * legs[i].rod.z - crank[i].sine * out;
     const Real arm_mm = multiply<Real>(along_motion, arm.crank_mm);
+    const Real excess_mm = legs[i].excess_mm;
+    constexpr Real kMost = Real(delta::kMostExcessMm);
+    constexpr Angle kEnd(delta::kMostCrankRad);
+    pose.closes = pose.closes && along_motion > Unit(0) && legs[i].along_mm > Real(0) &&
+                  excess_mm <= kMost && excess_mm >= -kMost && angles[i] <= kEnd &&
+                  angles[i] >= -kEnd;
     pose.jacobian_t_mm.row[i] = {multiply<Real>(dual[i].x, arm_mm),
                                  multiply<Real>(dual[i].y, arm_mm),
                                  multiply<Real>(dual[i].z, arm_mm)};

@@ -37,6 +37,13 @@ inline void follow_silence(const SafetyTiming& timing, EncoderState& encoders) n
   encoders.rest_ticks = rests ? std::min(encoders.rest_ticks + 1, timing.rest_ticks) : 0;
 }
 
+/// The same of ticks that the host skipped.
+inline void miss_ticks(const SafetyTiming& timing, std::uint32_t ticks,
+                       EncoderState& encoders) noexcept {
+  const std::uint32_t counted = std::min(ticks, timing.hold_ticks + 1);
+  for (std::uint32_t i = 0; i < counted; ++i) follow_silence(timing, encoders);
+}
+
 /// Whether this report completes a rest that is long enough for a calibration, and where.
 enum class Rest : std::uint8_t {
   none,
@@ -237,7 +244,7 @@ template <class N>
   }
   Sensed<N> sensed;
   sensed.pose = device_pose(plan.device, state.encoders, state.gimbal);
-  seen.finite = all_finite(sensed.pose.arm.tip_mm);
+  seen.finite = all_finite(sensed.pose.arm.tip_mm) && sensed.pose.arm.closes;
   sensed.usable = seen.fresh && seen.finite;
   sensed.docked = seen.calibrated;
   state.tip_ticks += state.tip_ticks < UINT32_MAX ? 1U : 0U;

@@ -49,10 +49,11 @@ struct ServoCommand {
     reset,    ///< restores the volumes' first content, over several ticks; no-op without cutting
     undo,     ///< restores the content before the last stroke, likewise; refused without one
     redo,     ///< repeats the stroke that was undone last, likewise
-    mark      ///< changes nothing: marks a tick in the log
+    mark,     ///< changes nothing: marks a tick in the log
+    missed    ///< ticks that the host skipped before this one: without a report, for all arms
   };
   Kind kind = Kind::none;
-  std::uint32_t argument = 0;  ///< index of the tool; hold: 1 on, 0 off
+  std::uint32_t argument = 0;  ///< index of the tool; hold: 1 on, 0 off; missed: ticks
   std::uint32_t arm = 0;       ///< that gets the tool; other kinds are for all arms
 };
 
@@ -73,7 +74,7 @@ enum class Phase : std::uint8_t {
 enum class Fault : std::uint32_t {
   none = 0,
   stale_input = 1,  ///< no report for 20 ms
-  not_finite = 2,   ///< NaN after kinematics for more than 2 ms
+  not_finite = 2,   ///< no finite pose, or counts of none, for more than 2 ms
   overspeed = 3,    ///< tip faster than the limit
   // A law of the scene gave a value that is not finite:
   force_law = 4,

@@ -471,6 +471,12 @@ bool apply_command(Arms<N> arms, const ServoCommand& command) noexcept {
         arm.state->ledger.send({});
       }
       return true;
+    case ServoCommand::Kind::missed:
+      for (const Arm<N>& arm : arms) {
+        miss_ticks(command.argument, arm.state->supervisor);
+        miss_ticks(arm.plan->timing, command.argument, arm.state->encoders);
+      }
+      return true;
     case ServoCommand::Kind::hold:
       for (const Arm<N>& arm : arms) arm.state->hold = command.argument != 0;
       return true;

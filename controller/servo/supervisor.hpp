@@ -123,6 +123,16 @@ constexpr void supervise(const SafetyTiming& timing, const SafetyInputs& in,
   if (s.phase == Phase::ramping && ++s.fade_ticks >= timing.fade_in_ticks) s.phase = Phase::active;
 }
 
+/// Ticks that the host skipped. What silence and a pose that is none may last is time, so that a
+/// stall of the host makes neither longer.
+constexpr void miss_ticks(std::uint32_t ticks, Supervisor& s) noexcept {
+  const auto later = [ticks](std::uint32_t count) {
+    return count + (ticks < UINT32_MAX - count ? ticks : UINT32_MAX - count);
+  };
+  s.stale_ticks = later(s.stale_ticks);
+  if (s.not_finite_ticks > 0) s.not_finite_ticks = later(s.not_finite_ticks);
+}
+
 /// Starts the fade-in again, if the motors are on.
 constexpr void restart_fade(Supervisor& s) noexcept {
   if (!s.motors_on()) return;

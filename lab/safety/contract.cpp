@@ -289,8 +289,12 @@ void SafetyMonitor::check_size(const Command& command) {
   const double silent_ms = command.time_ms - heard_ms_;
   const double left_n =
       norm(held_n_) * std::clamp((kZeroMs - silent_ms) / (kZeroMs - kHoldMs), 0.0, 1.0);
-  check(fresh_ || now_n <= left_n + kStepN, command.time_ms, "force without reports in N", now_n,
-        left_n);
+  // A host that was late in the silence catches up no faster than the slew allows.
+  catches_up_ = !fresh_ && (catches_up_ || command.time_ms - last_.time_ms > 1.5 * tick_ms_);
+  const double least_n = norm(last_.force_n) - limits_.slew_n_per_ms * command.tick_ms;
+  const double may_be_n = catches_up_ ? std::max(left_n, least_n) : left_n;
+  check(fresh_ || now_n <= may_be_n + kStepN, command.time_ms, "force without reports in N", now_n,
+        may_be_n);
 
   // Two ticks: the first one has its share already, and a stall may end one before.
   const double faded_ms = command.time_ms - may_push_since_ms_ + 2 * tick_ms_;

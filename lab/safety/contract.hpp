@@ -117,6 +117,7 @@ class SafetyMonitor {
 
   Command last_;
   DeviceVec<double> held_n_;  ///< sent after the last report
+  bool catches_up_ = false;   ///< the host was late since the last report
   double heat_n2_ = 0;
   bool way_in_is_known_ = true;  ///< false: a jump of the tip may have gone through the solid
   double inward_since_ms_ = -1;  ///< the force points into the solid; negative: it does not

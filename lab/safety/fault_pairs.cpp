@@ -9,7 +9,15 @@ namespace kerf::faults {
 namespace {
 
 constexpr std::string_view kAskedToEnd = "asked_to_end";
-constexpr double kStopS = 0.21;  // most scripts begin at 0.2 s
+constexpr double kStopS = 0.21;       // of a script without faults, or by another clock
+constexpr double kStopAfterS = 0.01;  // a fault has begun: held, on its way, or not yet seen
+
+/// When the signal comes, from the first push on: soon after the first fault.
+double stop_of(const FaultScript& script) {
+  if (script.faults.empty() || script.clock != FaultClock::push) return kStopS;
+  const auto first = std::ranges::min_element(script.faults, {}, &DeviceFault::at_s);
+  return first->at_s + kStopAfterS;
+}
 
 NamedScript pair_of(const NamedScript& first, const NamedScript& second) {
   NamedScript pair = first;
@@ -28,7 +36,7 @@ NamedScript pair_of(const NamedScript& first, const NamedScript& second) {
 NamedScript with_signal(const NamedScript& named) {
   NamedScript pair = named;
   pair.name += "+" + std::string(kAskedToEnd);
-  pair.stop_s = kStopS;
+  pair.stop_s = stop_of(*named.script);
   pair.script->hides = true;
   pair.script->latches.clear();
   return pair;

@@ -31,7 +31,8 @@ struct PairShare {
 /// Reads "PART/PARTS", such as 3/40; nullopt for another text.
 [[nodiscard]] std::optional<PairShare> pair_share_of(std::string_view text) noexcept;
 
-/// The share of all pairs of the scripts that have faults, and of the signal with each of them.
+/// The share of all pairs of the scripts that have faults, and of the signal with each of them, 10
+/// ms after its first fault.
 /// Every pair is in exactly one part.
 [[nodiscard]] std::vector<NamedScript> pairs_of(const std::vector<NamedScript>& scripts,
                                                 PairShare share);

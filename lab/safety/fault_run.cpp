@@ -11,9 +11,11 @@
 #include <span>
 #include <string>
 #include <type_traits>
+#include <utility>
 
 #include "controller/device/device_driver.hpp"
 #include "controller/device/port/packet_port.hpp"
+#include "controller/loop/publisher.hpp"
 #include "controller/loop/servo_loop.hpp"
 #include "controller/loop/tick_source.hpp"
 #include "hil/device/emulator.hpp"
@@ -140,13 +142,17 @@ FaultScript shifted(FaultScript script) {
   return script;
 }
 
-/// One line if the run shows nothing: no contact, or a fault that never was.
+/// One line if the run shows nothing: no contact, or a fault that never was. A Falcon reports only
+/// what it is asked for, so that after a signal to end nothing may be left to change: then a fault
+/// that has begun before is enough.
 std::string inconclusive_line(const FaultScript& script, const FaultCase& subject,
-                              const FaultOutcome& outcome, std::uint64_t met, bool one_is_enough) {
+                              const FaultOutcome& outcome, std::uint64_t met, bool one_is_enough,
+                              std::uint64_t begun_before_end) {
   if (!outcome.pushed) return "the motors never pushed at the tip";
   const auto due = std::ranges::count_if(script.faults, [&](const DeviceFault& fault) {
     return concerns(fault.kind, subject.scene.device.personality, subject.by_service);
   });
+  if (subject.stop_s && begun_before_end > 0) return {};
   if (one_is_enough ? met > 0 || due == 0 : met >= static_cast<std::uint64_t>(due)) return {};
   return std::to_string(met) + " of " + std::to_string(due) + " faults changed anything";
 }
@@ -198,6 +204,8 @@ FaultOutcome run_faults(const FaultCase& subject, const FaultScript& as_written)
       static_cast<std::uint32_t>(cycles_of(std::chrono::duration<double>(kWatchdogPeriod).count()));
   double first_push_ms = -1;
   bool is_asked_to_end = false, has_ended = false;
+  std::uint32_t missed = 0;  // ticks
+  std::uint64_t begun_before_end = 0;
   // A service does not show a servo that is ready: the emulated hand begins 2 s later.
   const std::int64_t cycles = cycles_of(script.seconds + (subject.by_service ? 2 : 0));
   for (std::int64_t cycle = 1; cycle <= cycles; ++cycle) {
@@ -215,14 +223,20 @@ FaultOutcome run_faults(const FaultCase& subject, const FaultScript& as_written)
     if (!is_asked_to_end && subject.stop_s && first_push_ms >= 0 &&
         time_ms >= first_push_ms + later_ms(script) + *subject.stop_s * 1000) {
       is_asked_to_end = true;
+      begun_before_end = device.begun();
       contract.asked_to_end(time_ms);
       loop.driver().stay_released();
     }
     if (has_ended) continue;
     if ((static_cast<std::uint64_t>(cycle) + script.seed) % cycles_per_look == 0)
       watchdog.look(now_ns);
-    if (!due || device.host_is_late()) continue;
+    if (!due) continue;
+    if (device.host_is_late()) {
+      ++missed;
+      continue;
+    }
     const DeviceReport report = loop.driver().read();
+    tell_missed(std::exchange(missed, 0), loop.servo());
     static_cast<void>(recover(signals, standstill.stood_still(now_ns), loop.servo()));
     const ServoOutput output = loop.servo().step(report);
     send_tick(std::span(&output, 1), signals, loop.driver());
@@ -236,8 +250,8 @@ FaultOutcome run_faults(const FaultCase& subject, const FaultScript& as_written)
   const bool hides_more = script.hides && outcome.latched != fault_name(Fault::none);
   outcome.demanded = turns_fail || hides_more ? std::string() : script.latches;
   contract.end(time_ms, outcome.demanded, first_push_ms + end_of(script) * 1000 + kGraceMs);
-  outcome.inconclusive =
-      inconclusive_line(script, subject, outcome, device.met(), script.hides || turns_fail);
+  outcome.inconclusive = inconclusive_line(script, subject, outcome, device.met(),
+                                           script.hides || turns_fail, begun_before_end);
   return outcome;
 }
 

@@ -212,11 +212,14 @@ inline constexpr std::uint32_t kFlagRedo = 1U << 16;      ///< a redo is in prog
 inline constexpr std::uint32_t kFlagRedoable = 1U << 17;  ///< a redo is possible
 inline constexpr std::uint32_t kFlagPedal = 1U << 18;     ///< cuts only while button 1 is pressed
 
-/// Bits of `TickRecord::command`: a `ServoCommand::Kind` (not a `CommandKind`), and one bit that is
-/// set if the force fades in again after a stall of the servo.
+/// Bits of `TickRecord::command`: a `ServoCommand::Kind` (not a `CommandKind`), one bit that is
+/// set if the force fades in again after a stall of the servo, and above kCommandMissedShift how
+/// many ticks the servo missed before this one.
 inline constexpr std::uint32_t kCommandKind = 0xff;
 inline constexpr std::uint32_t kCommandFadeIn = 1U << 8;
-inline constexpr std::uint32_t kCommandMark = 7;  ///< a kind; only marks the tick in the log
+inline constexpr unsigned kCommandMissedShift = 16;
+inline constexpr std::uint32_t kMostMissed = 0xffff;  ///< more count as these: 8 s at 8 kHz
+inline constexpr std::uint32_t kCommandMark = 7;      ///< a kind; only marks the tick in the log
 
 inline constexpr std::size_t kRawEncoder = 0;  ///< first of 3
 inline constexpr std::size_t kRawPot = 3;      ///< first of 6

@@ -117,6 +117,9 @@ constexpr LogCode kCommands[] = {
     {kCommandMark, "mark", "changes nothing: a place in the log"},
     {kCommandFadeIn, "restart",
      "added to the others: the force fades in after a stall of the servo"},
+    {1U << kCommandMissedShift, "missed",
+     "added to the others, times the ticks that the servo missed before this one, at most 65535: a "
+     "silence of the device lasts so much longer"},
 };
 constexpr LogCode kPhases[] = {
     {0, "off", "no report has come yet"},
@@ -129,7 +132,7 @@ constexpr LogCode kPhases[] = {
 constexpr LogCode kFaults[] = {
     {0, "none", ""},
     {1, "stale_input", "no report for 20 ms"},
-    {2, "not_finite", "NaN after kinematics for more than 2 ms"},
+    {2, "not_finite", "no finite pose, or none that a Falcon has, for more than 2 ms"},
     {3, "overspeed", "tip faster than the limit"},
     {4, "force_law", "the scene's force law gave what is no number"},
     {5, "velocity_estimator", "the scene's velocity estimator gave what is no number"},

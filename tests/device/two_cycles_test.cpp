@@ -158,6 +158,36 @@ TEST_CASE("wooden: home, leave, home again: each time as the first time") {
   }
 }
 
+TEST_CASE("wooden: a button far from home sets the encoders once, and again if it stays") {
+  test::FakePort port;
+  WoodenDriver driver(port);
+  const auto sets = [&](std::array<std::int16_t, 3> encoder, bool button) {
+    port.push(
+        encode(WoodenReport{.encoder = {encoder[0], encoder[1], encoder[2]}, .calibrate = button}));
+    static_cast<void>(driver.read());
+    driver.command({});
+    return wooden::decode_command(port.sent.back()).value().set_encoders;
+  };
+  static_cast<void>(sets({0, 0, 6000}, true));
+  static_cast<void>(sets({0, 0, 6000}, false));
+  // Readings that are off by 8 counts, of an arm that is set to them: each set adds 8 more.
+  for (int press = 0; press < 2; ++press) {
+    CAPTURE(press);
+    std::int16_t off = 0;
+    int count = 0;
+    for (int i = 0; i < 64; ++i) {
+      const auto set = sets({static_cast<std::int16_t>(2000 + off + 8), 0, 6000}, true);
+      if (!set) continue;
+      ++count;
+      CHECK((*set)[0] == 2000 + off + 8);
+      off = static_cast<std::int16_t>(off + 8);
+    }
+    CHECK(count == 1);
+    CHECK(sets({2008, 0, 6000}, true));  // the set was lost
+    CHECK_FALSE(sets({2008, 0, 6000}, false));
+  }
+}
+
 TEST_CASE("a device that lets go sends out of turn each time it lets go, and no other time") {
   test::FakePort port;
   FalconDriver driver(port);

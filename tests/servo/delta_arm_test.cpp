@@ -129,6 +129,46 @@ TEST_CASE_TEMPLATE("the Jacobian is right, by differences of the closed form", N
   CHECK(places > 1000);
 }
 
+TEST_CASE_TEMPLATE("a pose closes everywhere in the workspace, and for no other angles", N,
+                   FixedNumbers, DoubleNumbers) {
+  const int places = over_the_workspace([&](const Point& tip, const auto& angles) {
+    CAPTURE(tip[0]);
+    CAPTURE(tip[1]);
+    CAPTURE(tip[2]);
+    REQUIRE(pose_at<N>(angles).closes);
+    for (std::size_t i = 0; i < 3; ++i) {
+      for (const double turns : {-1, 1}) {
+        auto turned = angles;
+        turned[i] += turns * 2 * falcon::kPi;
+        REQUIRE_FALSE(pose_at<N>(turned).closes);
+      }
+    }
+  });
+  CHECK(places > 1000);
+  int closed = 0;
+  for (double a = -7.9; a <= 7.9; a += 0.37) {
+    for (double b = -7.9; b <= 7.9; b += 0.37) {
+      for (double c = -7.9; c <= 7.9; c += 0.37) {
+        const auto pose = pose_at<N>({a, b, c});
+        if (!pose.closes) continue;
+        ++closed;
+        CAPTURE(a);
+        CAPTURE(b);
+        CAPTURE(c);
+        const auto back =
+            angles_at({double(pose.tip_mm.x), double(pose.tip_mm.y), double(pose.tip_mm.z)});
+        REQUIRE(back);
+        for (std::size_t i = 0; i < 3; ++i) {
+          const double off_rad =
+              std::remainder((*back)[i] - std::array{a, b, c}[i], 2 * falcon::kPi);
+          CHECK(std::abs(off_rad) < 2e-2);  // near a singular pose
+        }
+      }
+    }
+  }
+  CHECK(closed > 50);
+}
+
 TEST_CASE("angles that no grip can have give a finite place in fixed point") {
   for (const double a : {-7.9, -2.0, 0.0, 1.0, 3.0, 7.9}) {
     for (const double b : {-7.9, 0.0, 2.0, 7.9}) {

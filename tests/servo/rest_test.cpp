@@ -169,3 +169,16 @@ TEST_CASE("silence alone never calibrates") {
   for (int i = 0; i < 16; ++i) static_cast<void>(resting.tick());  // two reports
   for (int i = 0; i < 8000; ++i) REQUIRE(resting.tick(false) == Phase::calibrating);
 }
+
+TEST_CASE("a rest goes on over 5 ms that the host missed, and starts again after more") {
+  for (const std::uint32_t missed : {1U, 4U, 5U, 6U, 19U}) {
+    CAPTURE(missed);
+    RestingServo resting(1000);
+    for (int i = 0; i < 30; ++i) REQUIRE(resting.tick() != Phase::armed);
+    REQUIRE(resting.servo->apply({ServoCommand::Kind::missed, missed}));
+    int ticks = 0;
+    while (resting.tick() != Phase::armed && ++ticks < 1000) {
+    }
+    CHECK(ticks == (missed <= 5 ? 20 - static_cast<int>(missed) : 49));
+  }
+}

@@ -115,6 +115,35 @@ TEST_CASE("missing reports: tolerated for less than 20 ms, then a latched fault"
   CHECK(after({{kRested, 1}, {kFree, 150}, {kSilent, 20}, {kFree, 500}}).phase == Phase::fault);
 }
 
+TEST_CASE("ticks that the host missed in a silence are silent ones") {
+  for (int before = 0; before <= 20; ++before) {
+    for (std::uint32_t missed = 1; missed <= 25; ++missed) {
+      CAPTURE(before);
+      CAPTURE(missed);
+      Supervisor late = after({{kRested, 1}, {kFree, 150}, {kSilent, before}});
+      miss_ticks(missed, late);
+      supervise(kTiming, kSilent, late);
+      const int ticks = before + static_cast<int>(missed) + 1;
+      const Supervisor looked = after({{kRested, 1}, {kFree, 150}, {kSilent, ticks}});
+      CHECK(late.stale_ticks == looked.stale_ticks);
+      CHECK(late.fault == looked.fault);
+      supervise(kTiming, kFree, late);
+      CHECK(late.stale_ticks == 0);
+    }
+  }
+  Supervisor none = after({{kRested, 1}, {kFree, 150}, {{.fresh = true, .finite = false}, 1}});
+  miss_ticks(1, none);
+  supervise(kTiming, {.fresh = true, .finite = false}, none);
+  CHECK(none.fault == Fault::not_finite);
+  // Ticks before the first such pose are none of it, and no count wraps.
+  Supervisor well = after({{kRested, 1}, {kFree, 150}});
+  miss_ticks(UINT32_MAX, well);
+  miss_ticks(UINT32_MAX, well);
+  CHECK(well.stale_ticks == UINT32_MAX);
+  supervise(kTiming, {.fresh = true, .finite = false}, well);
+  CHECK(well.motors_on());
+}
+
 TEST_CASE("reports that come too seldom for too long are a fault; a single gap is forgiven") {
   const auto fault_after = [](int period, int pause, int periods) {
     Supervisor s = after({{kRested, 1}, {kFree, 150}});

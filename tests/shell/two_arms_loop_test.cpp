@@ -338,9 +338,11 @@ TEST_CASE("a command is read back from the records of both arms, whichever got i
     for (const auto kind : {none, select_tool, hold, reset, undo, redo, mark}) {
       for (const bool fade_in : {false, true}) {
         CAPTURE(static_cast<int>(kind));
+        const std::uint32_t missed = fade_in ? kMostMissed : 3;
         const TickCommands given{
             {kind, kind == select_tool || kind == hold ? 1U : 0U, kind == select_tool ? arm : 0},
             fade_in,
+            missed,
             7};
         std::array<TickRecord, kMaxArms> records{};
         for (std::size_t a = 0; a < kMaxArms; ++a) {
@@ -357,6 +359,7 @@ TEST_CASE("a command is read back from the records of both arms, whichever got i
         CHECK(read.command.argument == given.command.argument);
         CHECK(read.command.arm == given.command.arm);
         CHECK(read.fade_in == fade_in);
+        CHECK(read.missed == missed);
         CHECK(read.last_index == 7);
       }
     }
