@@ -206,7 +206,8 @@ TEST_CASE("with --client-ca a viewer needs a certificate of that CA, and its tok
   }
   attempt.options.certificate = foreign / "viewer.pem";
   attempt.options.key = foreign / "viewer-key.pem";
-  CHECK(attempt.ends().starts_with("refuses the certificate of --cert (tlsv1 alert unknown ca)"));
+  // The Boost of Debian 13 adds the library's name, "(SSL routines)".
+  CHECK(attempt.ends().starts_with("refuses the certificate of --cert (tlsv1 alert unknown ca"));
   attempt.options.certificate = lab / "viewer.pem";
   attempt.options.key = lab / "viewer-key.pem";
   CHECK(attempt.ends() == "joined");
