@@ -329,9 +329,13 @@ void SafetyMonitor::check_change(const Command& command) {
 
 /// What was sent after the last report, turned and weakened by nothing.
 void SafetyMonitor::check_hold(const Command& command) {
-  // Reports that stand still are none, though they were heard.
-  const bool holds = !fresh_ && !stands_still_ && !begins_anew_ && ended_ms_ < 0 &&
-                     off_ == Off::no_reason && command.time_ms - heard_ms_ <= kHoldMs;
+  // Reports that stand still are none, though they were heard. A pose that is none may have
+  // latched.
+  const bool may_be_latched =
+      no_pose_since_ms_ >= 0 && command.time_ms - no_pose_since_ms_ >= kNotFiniteMs - 1e-6;
+  const bool holds = !fresh_ && !stands_still_ && !may_be_latched && !begins_anew_ &&
+                     ended_ms_ < 0 && off_ == Off::no_reason &&
+                     command.time_ms - heard_ms_ <= kHoldMs;
   const double off_by_n = norm(command.force_n - held_n_);
   check(!holds || off_by_n <= kStepN, command.time_ms, "change of a held force, in N", off_by_n,
         kStepN);
