@@ -324,6 +324,28 @@ TEST_CASE("a stroke that is longer than the pool is told, and the next one can b
   CHECK(stroke.can_undo());
 }
 
+TEST_CASE("what was saved for a stroke that an undo came before is no part of the next one") {
+  StrokeState stroke;
+  std::vector<KeptBrick> pool(8);
+  stroke.pool = pool;
+  const auto stroke_of = [&](std::size_t bricks) {
+    for (std::size_t i = 0; i < bricks; ++i) REQUIRE(entry_for_brick(stroke) != nullptr);
+    follow_stroke(1, true, true, stroke);
+    close_stroke(stroke);
+  };
+  stroke_of(1);
+  // A tool that touches and does not cut: two bricks wait, then more than there is room for.
+  for (const int waiting : {2, 20}) {
+    for (int i = 0; i < waiting; ++i) static_cast<void>(entry_for_brick(stroke));
+    REQUIRE(begin_undo(stroke));
+    stroke.motion = StrokeState::Motion::none;  // the bricks are back
+    stroke_of(1);
+    // They had the content from before the undo, which an undo of this stroke would bring back.
+    CHECK(stroke.strokes[0].end - stroke.strokes[0].begin == 1);
+    CHECK(stroke.can_undo());
+  }
+}
+
 TEST_CASE("twenty strokes are undone and cut again bit by bit; the next cut drops what is undone") {
   for (const CutKind& kind : {kCutKinds[0], kCutKinds[2], kCutKinds[4]}) {
     CAPTURE(std::string(kind.name));
