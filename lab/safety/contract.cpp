@@ -148,10 +148,13 @@ void SafetyMonitor::follow_report(double time_ms) {
   moved_mm_ = {};
   if (told_pose) {
     if (before) moved_mm_ = told_pose->tip_mm - before->tip_mm;
-    if (norm(moved_mm_) > kJumpMm) {
-      jumped_from_mm_ = before->tip_mm;
-    } else if (jumped_from_mm_ && norm(told_pose->tip_mm - *jumped_from_mm_) < kJumpMm) {
+    // A jump is over where the tip is near that place again, by a jump back too, or is free.
+    const double near_mm = std::max(kJumpMm, norm(moved_mm_) / 2);
+    if (jumped_from_mm_ && (norm(told_pose->tip_mm - *jumped_from_mm_) < near_mm ||
+                            outward_.is_free(told_pose->tip_mm))) {
       jumped_from_mm_.reset();
+    } else if (!jumped_from_mm_ && norm(moved_mm_) > kJumpMm) {
+      jumped_from_mm_ = before->tip_mm;
     }
     pose_ = told_pose;
     pose_ms_ = time_ms;

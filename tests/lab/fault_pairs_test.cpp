@@ -124,14 +124,17 @@ TEST_CASE("counts that no Falcon has are a fault also when they begin while it i
   hand.steps = {kerf::hand_move({0, -1, 0}, 0.4), kerf::hand_move({0, -1, 0}, 10)};
   for (const auto numeric : {kerf::NumericKind::fixed, kerf::NumericKind::float64}) {
     scene.servo.numeric = numeric;
-    const FaultScript script{
-        .faults = {{.kind = FaultKind::park, .at_s = 0.2, .for_s = 0.03},
-                   {.kind = FaultKind::jump, .at_s = 0.21, .for_s = 0.3, .counts = 28000}},
-        .hides = true};
-    const auto outcome = kerf::faults::run_faults({.scene = scene, .hand = hand}, script);
-    for (const std::string& violation : outcome.violations) MESSAGE(violation);
-    CHECK(outcome.latched == "not_finite");
-    CHECK(outcome.violation_count == 0);
+    for (const int counts : {28000, 12000, 9881, -9881}) {  // the last ones: a whole turn
+      CAPTURE(counts);
+      const FaultScript script{
+          .faults = {{.kind = FaultKind::park, .at_s = 0.2, .for_s = 0.03},
+                     {.kind = FaultKind::jump, .at_s = 0.21, .for_s = 0.3, .counts = counts}},
+          .hides = true};
+      const auto outcome = kerf::faults::run_faults({.scene = scene, .hand = hand}, script);
+      for (const std::string& violation : outcome.violations) MESSAGE(violation);
+      CHECK(outcome.latched == "not_finite");
+      CHECK(outcome.violation_count == 0);
+    }
   }
 }
 
