@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# slices.sh KERF_LAB: the day's part of the tests that only .ci/all runs as a whole: the fault matrix, random presses, and the
-# ends of scene keys. UTC; KERF_FAULT_DAY=20260131 repeats a day.
+# slices.sh KERF_LAB: the day's part of the tests that only .ci/all runs as a whole: the fault matrix, pairs of faults, random
+# presses, and the ends of scene keys. UTC; KERF_FAULT_DAY=20260131 repeats a day.
 set -euo pipefail
 lab=$1
 day=${KERF_FAULT_DAY:-$(date -u +%Y%m%d)}
@@ -14,6 +14,7 @@ devices=(omni falcon woodenhaptics) rates=(250 500 2000 4000 8000) models=(proxy
 part faults --seeds 1 --seed-base "$((1 + day % 8))"
 part faults --seeds 1 --seed-base "$day" --device "${devices[day / 3 % 3]}" --rate "${rates[day % 5]}" \
   --model "${models[day % 2]}" --numeric "${numerics[day / 2 % 2]}"
+part faults --pairs "$((1 + day % 40))/40" --seeds 1
 # Twenty presses a scene: two of the twenty scenes of the test `traps`.
 part extremes --only traps --presses 40 --seed "$((15580 + 2 * (day % 10)))"
 part ranges --combinations 10 --seed "$day" --numeric "${numerics[day / 2 % 2]}"
