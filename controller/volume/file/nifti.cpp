@@ -212,9 +212,9 @@ Placing qform_of(const fs::path& path, const Nifti& h) {
   const double excess = quaternion_excess(h), qfac = h.pixdim[0];
   if (!(excess <= kQuaternionRounding)) {
     refuse_header(path, "its quaternion (" + short_text(b) + ", " + short_text(c) + ", " +
-                            short_text(d) +
-                            ") has b^2 + c^2 + d^2 = " + text_beside(1 + excess, 1) +
-                            ", and rounding reaches " + text_beside(1 + kQuaternionRounding, 1));
+                            short_text(d) + ") has b^2 + c^2 + d^2 above 1 by " +
+                            text_beside(excess, kQuaternionRounding) + ", and rounding reaches " +
+                            text_beside(kQuaternionRounding, excess));
   }
   if (!(qfac >= 0) && qfac != -1) {
     refuse_header(path, "pixdim[0] = " + short_text(qfac) + " is neither 1 nor -1");
