@@ -114,15 +114,22 @@ class CoursePort final : public PacketPort {
   bool given_ = false;
 };
 
+/// Ticks that the clock skips before one tick.
+struct Skip {
+  std::uint64_t before = 0, ticks = 0;
+};
+
 /// Ticks as fast as they go, with stalls that the watchdog or the clock finds.
 struct StallingClock final : TickSource {
-  explicit StallingClock(LoopSignals& of) : signals(of) {}
+  StallingClock(LoopSignals& of, const Skip& skipped) : signals(of), skip(skipped) {}
   std::int64_t wait_next() noexcept override {
     ++tick;
     if (tick == 520) signals.stalled = true;
     return 0;
   }
-  [[nodiscard]] std::uint64_t overruns() const noexcept override { return 0; }
+  [[nodiscard]] std::uint64_t overruns() const noexcept override {
+    return tick >= skip.before ? skip.ticks : 0;
+  }
   [[nodiscard]] std::int64_t start_ns(std::uint64_t of) const noexcept override {
     return static_cast<std::int64_t>(of) * 1'000'000;
   }
@@ -130,13 +137,14 @@ struct StallingClock final : TickSource {
   [[nodiscard]] bool stood_still() const noexcept override { return tick == 800; }
 
   LoopSignals& signals;
+  Skip skip;
   std::uint64_t tick = 0;
 };
 
 /// A run of the loop, and all that it leaves.
 struct LoopRun {
   LoopRun(LoadedScene scene, const Course& first, const Course& second,
-          std::uint64_t armed_ticks = 1200)
+          std::uint64_t armed_ticks = 1200, const Skip& skip = {})
       : ports{CoursePort(first), CoursePort(second)} {
     std::array drivers{make_driver(scene.device.personality, ports[0]),
                        make_driver(scene.second->device.personality, ports[1])};
@@ -148,7 +156,7 @@ struct LoopRun {
     Publisher eyes(segment, *servo);
     std::atomic<bool> stop{false};
     LoopSignals signals{stop};
-    StallingClock clock(signals);
+    StallingClock clock(signals, skip);
     const LoopLimits limits{
         .armed_ticks = armed_ticks, .gone_ticks = kGoneTicks, .arming_ticks = kMostTicks};
     end = run_servo(clock, {*drivers[0], drivers[1].get()}, *servo, eyes, server, limits, signals,
@@ -296,6 +304,34 @@ TEST_CASE("one device at work is a run, whichever it is") {
       CHECK(run.record.removed_steps[0] > 0);
       CHECK(run.waiting[is_second ? 1 : 0] == Waiting::nothing);
       CHECK(run.waiting[is_second ? 0 : 1] != Waiting::nothing);
+    }
+  }
+}
+
+TEST_CASE("ticks that the clock skips make no silence longer, and stand in the log of both arms") {
+  const LoadedScene scene = cutting_scene();
+  const Course& silent = kCourses[7];  // from its 401st tick on; stale after 20 ms
+  struct Row {
+    std::uint64_t skipped, stale_at;
+  };
+  for (const Row& row : {Row{0, 420}, Row{7, 413}, Row{100'000, 405}}) {
+    for (const std::size_t arm : {0U, 1U}) {
+      CAPTURE(row.skipped);
+      CAPTURE(arm);
+      const LoopRun run(scene, arm == 0 ? silent : kCourses[0], arm == 1 ? silent : kCourses[0],
+                        600, {405, row.skipped});
+      RunRecord record = run.record;
+      REQUIRE(record.arm(arm).faults.count > 0);
+      CHECK(record.arm(arm).faults.kept()[0].tick == row.stale_at);
+      CHECK(record.arm(1 - arm).faults.count == 0);
+      for (const auto& records : run.published) {
+        const std::uint64_t missed =
+            records[0].tick == 405 ? std::min<std::uint64_t>(row.skipped, kMostMissed) : 0;
+        for (const TickRecord& one : records) {
+          const std::uint32_t logged = one.command >> kCommandMissedShift;
+          REQUIRE(logged == missed);
+        }
+      }
     }
   }
 }
