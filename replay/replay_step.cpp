@@ -37,7 +37,7 @@ std::array<ServoOutput, kMaxArms> give(CompiledScene& servo, const ArmRecords& r
   if (commands.command.kind != ServoCommand::Kind::none) {
     static_cast<void>(servo.apply(commands.command));
   }
-  tell_missed(commands.missed, servo);
+  apply_missed(commands.missed, servo);
   if (commands.fade_in) {
     static_cast<void>(servo.apply({.kind = ServoCommand::Kind::fade_in}));
   }

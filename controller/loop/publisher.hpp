@@ -40,8 +40,8 @@ struct TickCommands {
   std::uint32_t last_index = 0;  ///< `Command::index` of the last one so far
 };
 
-/// Tells the servo how many ticks were skipped before this one, if any were.
-inline void tell_missed(std::uint32_t missed, Servo& servo) noexcept {
+/// Applies to the servo that so many ticks were skipped before this one; 0 changes nothing.
+inline void apply_missed(std::uint32_t missed, Servo& servo) noexcept {
   if (missed == 0) return;
   static_cast<void>(servo.apply({.kind = ServoCommand::Kind::missed, .argument = missed}));
 }

@@ -234,7 +234,7 @@ EndReason run_servo(TickSource& clock, const Devices& devices, Servo& servo, Pub
     }
     take_command(server, servo, tick, commands, record);
     commands.missed = missed.next(clock.overruns());
-    tell_missed(commands.missed, servo);
+    apply_missed(commands.missed, servo);
     const char* const stall = recover(signals, clock.stood_still(), servo);
     commands.fade_in = stall != nullptr;
     if (commands.fade_in) record.add_event(tick, stall);

@@ -236,7 +236,7 @@ FaultOutcome run_faults(const FaultCase& subject, const FaultScript& as_written)
       continue;
     }
     const DeviceReport report = loop.driver().read();
-    tell_missed(std::exchange(missed, 0), loop.servo());
+    apply_missed(std::exchange(missed, 0), loop.servo());
     static_cast<void>(recover(signals, standstill.stood_still(now_ns), loop.servo()));
     const ServoOutput output = loop.servo().step(report);
     send_tick(std::span(&output, 1), signals, loop.driver());
