@@ -19,7 +19,7 @@ controller/plan/tables controller/plan/method controller/plan controller/volume_
 controller/device/port controller/device/firewire controller/device/arm controller/device/inverse3 controller/device
 controller/loop controller/run controller
 
-record
+record record/export
 
 replay
 
@@ -150,8 +150,8 @@ broken() {
     grep -vE '^controller/volume/file/(foreign_invesalius|voxel_files).cpp:'
   includes '<(nifti/|tiff)' "${programs[@]}" | grep -vE '^controller/volume/file/(nifti|tiff)\.cpp:'
   includes '<(boost|openssl)/' "${programs[@]}" | grep -vE '^(bridge/(net|join|serve)/|controller/device/inverse3/web_socket.cpp|hil/front/inverse3/service_front.cpp)'
-  includes '<lz4' "${programs[@]}" | grep -vE '^(bridge/wire/compression|record/mcap_file).cpp:'
-  includes '<hdf5' "${programs[@]}" | grep -v '^record/hdf5_export.cpp:'
+  includes '<lz4' "${programs[@]}" | grep -vE '^(bridge/wire/compression|record/export/mcap_file).cpp:'
+  includes '<hdf5' "${programs[@]}" | grep -v '^record/export/hdf5_export.cpp:'
   includes '<igtl' "${programs[@]}" | grep -v '^bridge/igtl/'
   includes '<qrencode' "${programs[@]}" | grep -v '^bridge/serve/serve.cpp:'
 }

@@ -9,8 +9,8 @@
 #include <string_view>
 
 #include "controller/load/scene_json.hpp"
+#include "record/export/mcap_export.hpp"
 #include "record/input_rows.hpp"
-#include "record/mcap_export.hpp"
 #include "record/recording.hpp"
 #include "shared/posix/atomic_file.hpp"
 #include "shared/text/json.hpp"

@@ -4,7 +4,7 @@
 #include <doctest/doctest.h>
 
 #include "controller/servo/servo.hpp"
-#include "record/log_page.hpp"
+#include "record/export/log_page.hpp"
 #include "tests/record/record_support.hpp"
 
 using namespace kerf;

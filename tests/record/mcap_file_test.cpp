@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The bytes of an MCAP against its specification, read by hand; mcap_test.py has the readers of its
 // project.
-#include "record/mcap_file.hpp"
+#include "record/export/mcap_file.hpp"
 
 #include <algorithm>
 #include <cstddef>

@@ -8,10 +8,10 @@
 
 #include "controller/servo/servo.hpp"
 #include "record/earlier_inputs.hpp"
+#include "record/export/live_json.hpp"
+#include "record/export/mcap_export.hpp"
 #include "record/flight_recorder.hpp"
 #include "record/force_plot.hpp"
-#include "record/live_json.hpp"
-#include "record/mcap_export.hpp"
 #include "record/recorder.hpp"
 #include "record/recording.hpp"
 #include "shared/posix/report_tool.hpp"

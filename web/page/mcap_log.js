@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A recording as one file: the MCAP of `kerf-record export`, whose messages are the rows of its log, and whose attachments
-// are its other files (record/mcap_export.hpp). Read by its index, chunk by chunk, so a long one takes no memory. Layouts:
+// are its other files (record/export/mcap_export.hpp). Read by its index, chunk by chunk, so a long one takes no memory. Layouts:
 // https://mcap.dev/spec, https://github.com/lz4/lz4/blob/dev/doc.
 
 const kMagic = [0x89, 0x4d, 0x43, 0x41, 0x50, 0x30, 0x0d, 0x0a];
@@ -11,7 +11,7 @@ const kTopics = {'/kerf/tick': 'ticks.npy', '/kerf/2/tick': 'ticks-2.npy'};
 const kMessageHead = 31, kCdrHead = 4;  // before the bytes of a row
 const kHeaderBytes = 4096;              // of a tick log
 const kKeptChunks = 2;                  // unpacked ones: of each arm
-const kMost = 64 * 2 ** 20;             // bytes of a chunk, or of the summary; kMcapChunkBytes of record/mcap_file.hpp is 1 MiB
+const kMost = 64 * 2 ** 20;             // bytes of a chunk, or of the summary; kMcapChunkBytes of record/export/mcap_file.hpp is 1 MiB
 const kMostNames = 4096;                // bytes of an attachment beside its data
 const decoder = new TextDecoder();
 

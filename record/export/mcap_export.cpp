@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "record/mcap_export.hpp"
+#include "record/export/mcap_export.hpp"
 
 #include <algorithm>
 #include <cstddef>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "record/log_page.hpp"
+#include "record/export/log_page.hpp"
 
 #include <cstddef>
 #include <span>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "record/live_json.hpp"
+#include "record/export/live_json.hpp"
 
 #include <algorithm>
 #include <array>

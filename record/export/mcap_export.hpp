@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "record/mcap_file.hpp"
+#include "record/export/mcap_file.hpp"
 #include "record/tick_log.hpp"
 
 namespace kerf {

@@ -3,12 +3,12 @@
 #include <iostream>
 #include <string>
 
+#include "record/export/hdf5_export.hpp"
+#include "record/export/live_json.hpp"
+#include "record/export/log_page.hpp"
+#include "record/export/mcap_export.hpp"
 #include "record/flight_recorder.hpp"
 #include "record/force_plot.hpp"
-#include "record/hdf5_export.hpp"
-#include "record/live_json.hpp"
-#include "record/log_page.hpp"
-#include "record/mcap_export.hpp"
 #include "record/recording.hpp"
 #include "shared/posix/atomic_file.hpp"
 #include "shared/posix/program.hpp"

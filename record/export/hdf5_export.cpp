@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "record/hdf5_export.hpp"
+#include "record/export/hdf5_export.hpp"
 
 #include <algorithm>
 #include <array>
