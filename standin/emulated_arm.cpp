@@ -156,7 +156,7 @@ void EmulatedArm::command(DeviceVec<double> force_n, bool on, bool ready) noexce
     refresh();  // finds the end
     return;
   }
-  ledger_.record_force_n(on ? norm(force_n) : 0.0);
+  ledger_.set(Row::last_n, on ? norm(force_n) : 0.0);
   if (!lockstep_) return;
   ++silent_ticks_;
   static_cast<void>(take(kPatienceMs));

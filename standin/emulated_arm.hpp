@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -23,6 +24,11 @@ struct Pose {
   DeviceVec<double> applied_n;                    ///< force that the device gives
   bool button1 = false, button2 = false, parked = false;
 };
+
+/// The length of any finite force: its square may be too large for a double.
+[[nodiscard]] inline double length_of(DeviceVec<double> force_n) noexcept {
+  return std::hypot(force_n.x, force_n.y, force_n.z);
+}
 
 /// The connection to an emulated Cartesian device, in real time or in lock-step, and the newest
 /// poses. One thread at a time.

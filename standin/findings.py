@@ -2,6 +2,7 @@
 """What a program did with a stand-in: read from the ledger of the libraries and the report of the emulator, written as JSON
 and JUnit."""
 import json
+import math
 import struct
 from xml.sax.saxutils import escape, quoteattr
 
@@ -16,10 +17,14 @@ MISUSE = {  # rows of the ledger, and what each one means
     "bad_handles": "a call for a device that is not open",
     "bad_schedules": "a callback was unscheduled that is not scheduled",
     "not_finite": "a force that is not a finite number",
+    "output_off": "forces while the output was off",
     "not_cleared": "the scheduler stopped, or the device was closed, with a force",
     "stalls": "a callback, or a pause while a force was on, lasted too long",
 }
 NOTES = {
+    "output_off": MISUSE["output_off"],
+    "before_enable": "forces before dhdEnableForce: given here, perhaps not by a device",
+    "after_trip": "forces after the device had switched its motors off",
     "excess": "forces above the device's limit",
     "impulses": "steps of the force above the limit",
     "too_fast": "ticks above the limit of speed",
@@ -57,6 +62,11 @@ def percentile_us(periods, fraction):
     return None
 
 
+def finite(value):
+    """None, which JSON has, for a sum that no double holds."""
+    return value if math.isfinite(value) else None
+
+
 def findings(counts, periods, emulator, run):
     """The report as a dictionary. `run`: command, exit code, device and the like, which go in unchanged."""
     commands = counts.get("commands", 0)
@@ -74,8 +84,8 @@ def findings(counts, periods, emulator, run):
         "seconds": emulator.get("seconds"),
         "force": {
             "commands": commands,
-            "peak_n": counts.get("peak_n", 0.0),
-            "rms_n": (counts["square_sum_n2"] / commands) ** 0.5 if commands else 0.0,
+            "peak_n": finite(counts.get("peak_n", 0.0)),
+            "rms_n": finite((counts["square_sum_n2"] / commands) ** 0.5 if commands else 0.0),
             "given_peak_n": emulator.get("peak_motor_force_n"),
             "given_rms_n": emulator.get("rms_motor_force_n"),
             "given_at_end_n": emulator.get("final_motor_force_n"),
@@ -119,17 +129,24 @@ def write_junit(path, report):
         file.write("</testsuite>\n")
 
 
+def newtons(value):
+    return "unknown" if value is None else f"{value:.2f} N" if value < 1e6 else f"{value:.3g} N"
+
+
 def summary(report):
     """Lines for a person."""
     force, late = report["force"], report["deadlines"]
     work = report["energy"]["given_mj"]
-    yield (f"force: {force['commands']} commands, peak {force['peak_n']:.2f} N, RMS {force['rms_n']:.2f} N"
-           + (f"; given to the hand: {work:.1f} mJ" if work is not None else ""))
+    yield (f"force: {force['commands']} commands, peak {newtons(force['peak_n'])}, RMS {newtons(force['rms_n'])}; given: peak "
+           f"{newtons(force['given_peak_n'])}, RMS {newtons(force['given_rms_n'])}"
+           + (f", {work:.1f} mJ" if work is not None else ""))
     period = late["period_us"]
     if period["p50"] is not None:
         yield (f"deadlines: {late['ticks']} ticks, {late['missed_ticks']} missed; period p50 {period['p50']} us, "
                f"p99 {period['p99']} us, max {period['max']:.0f} us")
+    misused = {one["what"] for one in report["misuse"]}
     for one in report["notes"]:
-        yield f"note: {one['count']} {one['meaning']}"
+        if one["what"] not in misused:
+            yield f"note: {one['count']} {one['meaning']}"
     for one in report["misuse"]:
         yield f"misuse: {one['what']}: {one['count']} x {one['meaning']}"

@@ -11,12 +11,34 @@
 namespace kerf::standin {
 namespace {
 
-constexpr std::array<std::string_view, kRows> kNames{
-    "opened",        "closed",           "ticks",          "missed_ticks", "commands",
-    "frames",        "frames_not_ended", "begins_refused", "ends_refused", "set_outside_frame",
-    "bad_handles",   "bad_schedules",    "not_finite",     "not_cleared",  "stalls",
-    "excess",        "impulses",         "too_fast",       "lost_link",    "watchdog",
-    "square_sum_n2", "peak_n",           "last_n",         "longest_us",   "longest_period_us"};
+constexpr std::array<std::string_view, kRows> kNames{"opened",
+                                                     "closed",
+                                                     "ticks",
+                                                     "missed_ticks",
+                                                     "commands",
+                                                     "frames",
+                                                     "frames_not_ended",
+                                                     "begins_refused",
+                                                     "ends_refused",
+                                                     "set_outside_frame",
+                                                     "bad_handles",
+                                                     "bad_schedules",
+                                                     "not_finite",
+                                                     "output_off",
+                                                     "before_enable",
+                                                     "after_trip",
+                                                     "not_cleared",
+                                                     "stalls",
+                                                     "excess",
+                                                     "impulses",
+                                                     "too_fast",
+                                                     "lost_link",
+                                                     "watchdog",
+                                                     "square_sum_n2",
+                                                     "peak_n",
+                                                     "last_n",
+                                                     "longest_us",
+                                                     "longest_period_us"};
 
 constexpr bool is_number(Row row) noexcept {
   return row >= Row::square_sum_n2;
@@ -85,7 +107,6 @@ void Ledger::record_force_n(double force_n) noexcept {
   add(Row::commands);
   sum(Row::square_sum_n2, force_n * force_n);
   raise_to(Row::peak_n, force_n);
-  set(Row::last_n, force_n);
 }
 
 std::uint64_t Ledger::count(Row row) const noexcept {

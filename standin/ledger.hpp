@@ -19,7 +19,7 @@ enum class Row : std::uint8_t {
   closed,             ///< by the program
   ticks,              ///< of the servo thread (HD), force commands (dhd)
   missed_ticks,       ///< deadlines that the servo thread did not meet by a period or more
-  commands,           ///< packets with a force that were sent
+  commands,           ///< forces that the program commanded
   frames,             ///< that were ended
   frames_not_ended,   ///< open at the end of their tick
   begins_refused,     ///< a second frame in a tick, or in a frame
@@ -28,6 +28,9 @@ enum class Row : std::uint8_t {
   bad_handles,        ///< of a device (HD), IDs (dhd)
   bad_schedules,      ///< handles of callbacks that are not scheduled
   not_finite,         ///< forces
+  output_off,         ///< forces while the program had the output off
+  before_enable,      ///< forces before dhdEnableForce that were given all the same
+  after_trip,         ///< forces after the device had switched its motors off by itself
   not_cleared,        ///< scheduler stopped or device closed with a force
   stalls,             ///< callbacks (HD) or pauses with a force (dhd) longer than allowed
   excess,             ///< forces above the limit of the device
@@ -38,7 +41,7 @@ enum class Row : std::uint8_t {
   // numbers
   square_sum_n2,      ///< of the force of all commands
   peak_n,             ///< of a command
-  last_n,             ///< of the newest command; 0 after a close
+  last_n,             ///< of the newest packet; 0 after a close
   longest_us,         ///< callback
   longest_period_us,  ///< between two ticks
   end
@@ -73,7 +76,7 @@ class Ledger {
     word(row).store(std::bit_cast<std::uint64_t>(value), std::memory_order_relaxed);
   }
   void record_period_us(std::int64_t us) noexcept;
-  /// A command with this force.
+  /// The program commands this force, whatever becomes of it.
   void record_force_n(double force_n) noexcept;
 
   [[nodiscard]] std::uint64_t count(Row row) const noexcept;

@@ -9,6 +9,7 @@
 
 namespace kerf::dhd {
 
+using standin::length_of;
 using standin::Row;
 
 namespace {
@@ -86,11 +87,18 @@ int Delta::set_force(DeviceVec<double> force_n) noexcept {
     force_n_ = {};
     return kFailed;
   }
-  if (mode_ == Mode::idle && !settings_.force_needs_enable) set_mode(Mode::force, Cause::none);
-  if (most_n >= 0 && norm(force_n) > most_n) force_n = force_n * (most_n / norm(force_n));
+  const double wanted_n = length_of(force_n);
+  const bool is_force = wanted_n > kNothingN;
+  ledger_.record_force_n(wanted_n);
+  if (mode_ == Mode::idle && !settings_.force_needs_enable) {
+    set_mode(Mode::force, Cause::none);
+    enabled_by_force_ = true;
+  }
+  if (enabled_by_force_ && is_force) ledger_.add(Row::before_enable);
+  if (most_n >= 0 && wanted_n > most_n) force_n = force_n * (most_n / wanted_n);
   const double peak_n = force_figures(Personality::omega).peak_n;
   int result = kOk;
-  if (const double length = norm(force_n); length > peak_n) {
+  if (const double length = length_of(force_n); length > peak_n) {
     ledger_.add(Row::excess);
     force_n = settings_.cut_excess ? DeviceVec<double>{} : force_n * (peak_n / length);
     result = kSaturated;
@@ -104,7 +112,11 @@ int Delta::set_force(DeviceVec<double> force_n) noexcept {
       set_mode(Mode::brake, Cause::velocity);
     }
   }
-  if (!gives_force()) force_n = {};
+  if (!gives_force()) {
+    const bool by_device = cause_ == Cause::watchdog || cause_ == Cause::velocity;
+    if (is_force) ledger_.add(by_device ? Row::after_trip : Row::output_off);
+    force_n = {};
+  }
   note_command(force_n);
   send(force_n);
   return result;
@@ -113,6 +125,7 @@ int Delta::set_force(DeviceVec<double> force_n) noexcept {
 void Delta::set_mode(Mode mode, Cause cause) noexcept {
   mode_ = mode;
   cause_ = cause;
+  enabled_by_force_ = false;
   if (mode != Mode::force) force_n_ = {};
 }
 
@@ -185,7 +198,9 @@ void Delta::step_regulator(double dt_s) noexcept {
               arm_.velocity(0.005).value_or(DeviceVec<double>{}) * kDampingNsPerMm;
   }
   const double peak_n = force_figures(Personality::omega).peak_n;
-  if (const double wanted = norm(force_n); wanted > peak_n) force_n = force_n * (peak_n / wanted);
+  const double wanted_n = length_of(force_n);
+  ledger_.record_force_n(wanted_n);
+  if (wanted_n > peak_n) force_n = force_n * (peak_n / wanted_n);
   note_command(force_n);
   send(force_n);
 }

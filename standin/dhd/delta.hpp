@@ -101,6 +101,7 @@ class Delta {
   standin::EmulatedArm arm_;
   Mode mode_ = Mode::idle;
   Cause cause_ = Cause::none;
+  bool enabled_by_force_ = false;  ///< and not by the program's word
   DeviceVec<double> force_n_;
   std::int64_t commanded_ns_ = 0, read_ns_ = 0;
   double period_s_ = 0;  ///< between commands, smoothed

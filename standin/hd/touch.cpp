@@ -75,6 +75,9 @@ void Touch::end_frame() noexcept {
   had_frame_ = true;
   ledger_.add(Row::frames);
   last_force_n_ = wanted_force();
+  const double wanted_n = standin::length_of(last_force_n_);
+  ledger_.record_force_n(wanted_n);
+  if (!force_output_ && wanted_n > kNothingN) ledger_.add(Row::output_off);
   output_n_ = force_output_ ? limited(last_force_n_) : DeviceVec<double>{};
   if (!runs_) send();
 }
@@ -94,7 +97,7 @@ DeviceVec<double> Touch::wanted_force() noexcept {
 }
 
 DeviceVec<double> Touch::limited(DeviceVec<double> force_n) noexcept {
-  const double length = norm(force_n);
+  const double length = standin::length_of(force_n);
   const double most_n = force_figures(Personality::touch).peak_n;
   if (norm(now_.velocity) > velocity_limit_) {
     ledger_.add(Row::too_fast);

@@ -80,6 +80,7 @@ def main():
     what, count, out = sys.argv[1], int(sys.argv[2]), sys.argv[3]
     if dhd.dhdOpen() < 0:
         sys.exit("dhdOpen: " + dhd.dhdErrorGetLastStr().decode())
+    dhd.dhdEnableForce(ctypes.c_ubyte(1), ANY)
     report = {"name": dhd.dhdGetSystemName(ANY).decode(), "type": dhd.dhdGetSystemType(ANY)}
     if what == "watchdog":  # the firmware ends a force whose program is silent
         dhd.dhdEnableExpertMode()

@@ -236,6 +236,92 @@ finally:
         self.assertIn("take ./kerf stand-in --device touch", said)
 
 
+# Forces of a small program, in words of its own for HD and dhd: what it commands, and what the device gives, are two figures.
+FRAMES = """
+import ctypes, sys
+hd = ctypes.CDLL("libHD.so")
+device = hd.hdInitDevice(None)
+def frames(force, count=40):
+    for _ in range(count):
+        hd.hdBeginFrame(device)
+        hd.hdSetDoublev(0x2700, (ctypes.c_double * 3)(force, 0, 0))
+        hd.hdEndFrame(device)
+exec(sys.argv[1])
+frames(0, 1)
+hd.hdDisableDevice(device)
+"""
+FORCES = """
+import ctypes, sys
+dhd = ctypes.CDLL("libdrd.so.3")
+dhd.dhdSetForce.argtypes = [ctypes.c_double] * 3 + [ctypes.c_byte]
+dhd.dhdSleep.argtypes = [ctypes.c_double]
+dhd.dhdOpen()
+def forces(force, count=40):
+    for _ in range(count): dhd.dhdSetForce(force, 0, 0, -1)
+exec(sys.argv[1])
+dhd.dhdStop(-1)
+dhd.dhdClose(-1)
+"""
+
+
+class Forces(Case):
+    def expect(self, text, what, commanded, given, misuse=(), notes=(), options=()):
+        """`commanded`: number of forces, peak, RMS. `misuse`, `notes`: name to count."""
+        with self.subTest(what=what, options=options):
+            code, report, said = self.run_command("/usr/bin/python3", "-B", self.file("program.py", text), what, options=options)
+            force, misuse, notes = report["force"], dict(misuse), dict(notes)
+            self.assertEqual(force["commands"], commanded[0], said)
+            self.close(force["peak_n"], commanded[1], 1e-6)
+            self.close(force["rms_n"], commanded[2], 1e-6)
+            self.assertLess(abs(force["given_peak_n"] - given), 0.002, said)
+            self.assertEqual({one["what"]: one["count"] for one in report["misuse"]}, misuse, said)
+            self.assertEqual({one["what"]: one["count"] for one in report["notes"]}, {**misuse, **notes}, said)
+            self.assertEqual(code, 1 if misuse else 0, said)
+            failed = {case.get("name"): case.find("failure").get("message") for case in
+                      xml.etree.ElementTree.parse(self.folder / "report.xml").iter("testcase") if case.find("failure") is not None}
+            self.assertEqual(failed, {name: f"{count} x forces while the output was off" for name, count in misuse.items()})
+            for count in misuse.values():
+                self.assertEqual(said.count(f"{count} x forces while the output was off"), 1, said)
+
+    def test_what_hd_is_commanded_and_what_it_gives_are_two_figures(self):
+        def rms(newtons):  # 40 frames, and one of no force before the end
+            return newtons * math.sqrt(40 / 41)
+        enable, disable = "hd.hdEnable(0x4000)", "hd.hdDisable(0x4000)"
+        self.expect(FRAMES, "frames(1)", (41, 1, rms(1)), 0, {"output_off": 40})
+        self.expect(FRAMES, f"{enable}; frames(1)", (41, 1, rms(1)), 1)
+        # Every force beyond 4 N is also a step of more than 4 N, from none: 3.3 N after the clamp is not.
+        self.expect(FRAMES, f"{enable}; frames(5)", (41, 5, rms(5)), 3.3, {}, {"excess": 40})
+        self.expect(FRAMES, f"{enable}; frames(5)", (41, 5, rms(5)), 0, {}, {"excess": 40}, ["--switch", "excess=cut"])
+        self.expect(FRAMES, f"{enable}; frames(1, 20); {disable}; frames(1, 20)", (41, 1, rms(1)), 1, {"output_off": 20})
+        self.expect(FRAMES, f"{disable}; frames(0)", (41, 0, 0), 0)
+
+    def test_what_dhd_is_commanded_and_what_it_gives_are_two_figures(self):
+        omega = ["--device", "omega"]
+        on, stop, ignore = "dhd.dhdEnableForce(1, -1)", "dhd.dhdStop(-1)", ["--switch", "before-enable=ignore"]
+        self.expect(FORCES, f"{on}; forces(20)", (40, 20, 20), 12, {}, {"excess": 40}, omega)
+        self.expect(FORCES, f"{on}; forces(2)", (40, 2, 2), 2, {}, {}, omega)
+        self.expect(FORCES, f"{on}; forces(2); {stop}; forces(2)", (80, 2, 2), 2, {"output_off": 40}, {}, omega)
+        self.expect(FORCES, f"{on}; dhd.dhdEnableForce(0, -1); forces(2)", (40, 2, 2), 0, {"output_off": 40}, {}, omega)
+        # dhdEnableForce forgotten: no document says whether the force is given
+        self.expect(FORCES, "forces(2)", (40, 2, 2), 0, {"output_off": 40}, {}, omega + ignore)
+        self.expect(FORCES, "forces(2)", (40, 2, 2), 2, {}, {"before_enable": 40}, omega)
+        self.expect(FORCES, "forces(0)", (40, 0, 0), 0, {}, {}, omega + ignore)
+        # a limit of the program's own, and a device that stops by itself
+        limit = "dhd.dhdSetMaxForce.argtypes = [ctypes.c_double, ctypes.c_byte]; dhd.dhdSetMaxForce(1.5, -1)"
+        self.expect(FORCES, f"{on}; {limit}; forces(5)", (40, 5, 5), 1.5, {}, {}, omega)
+        trip = "dhd.dhdEnableExpertMode(); dhd.dhdSetWatchdog(ctypes.c_ubyte(160), -1); forces(1); dhd.dhdSleep(0.2)"
+        self.expect(FORCES, f"{on}; {trip}; forces(1)", (80, 1, 1), 1, {}, {"watchdog": 1, "after_trip": 40}, omega)
+
+    def test_a_sum_that_no_number_holds_is_none_in_json(self):
+        for name, text, what, options in (("HD", FRAMES, "hd.hdEnable(0x4000); frames(1e200)", []),
+                                          ("dhd", FORCES, "forces(1e200)", ["--device", "omega"])):
+            with self.subTest(name=name):
+                _, report, said = self.run_command("/usr/bin/python3", "-B", self.file("program.py", text), what, options=options)
+                self.assertEqual((report["force"]["peak_n"], report["force"]["rms_n"]), (1e200, None), said)
+                self.assertNotRegex((self.folder / "report.json").read_text(), "Infinity|NaN")
+                self.assertIn("peak 1e+200 N, RMS unknown", said)
+
+
 class Unknowns(Case):
     """What no document says about a vendor's device, both ways."""
 
@@ -251,9 +337,9 @@ class Unknowns(Case):
         rms = {}
         for way in ("hold", "drop"):
             _, report, _, _ = self.run_client("hd_client.py", "open_frame", 50, ["--switch", f"missed={way}"])
-            rms[way] = report["force"]["rms_n"]
-        self.close(rms["hold"], 1.5 * math.sqrt(50 / 51), 0.002)  # the last command of 51 closes the device
-        self.close(rms["drop"], 1.5 * math.sqrt(45 / 51), 0.002)  # one tick of ten has no frame
+            rms[way] = report["force"]["given_rms_n"]
+            self.close(report["force"]["rms_n"], 1.5, 0.002)  # of the frames that were ended
+        self.close(rms["drop"], rms["hold"] * math.sqrt(45 / 50), 0.002)  # one tick of ten has no frame
 
     def test_an_excess_is_clamped_or_cut(self):
         pull = self.file("pull.py", """
