@@ -31,19 +31,29 @@ constexpr int kPatienceMs = 5000;  // a loaded machine, or an emulator that ends
 
 }  // namespace
 
-EmulatedArm::EmulatedArm(const Settings& settings, Ledger& ledger)
+EmulatedArm::EmulatedArm(const Settings& settings, const DeviceSettings& device, Ledger& ledger)
     : ledger_(ledger), hand_waits_(settings.hand_waits), lockstep_(settings.lockstep) {
   try {
-    connect_to(settings.socket);
-    agree(settings);
+    connect_to(device.socket);
+    agree(device);
   } catch (...) {
     if (fd_ >= 0) close(fd_);
     throw;
   }
 }
 
+EmulatedArm::EmulatedArm(const Settings& settings, const Pose& still, Ledger& ledger) noexcept
+    : ledger_(ledger),
+      closed_(true),
+      is_still_(true),
+      hand_waits_(settings.hand_waits),
+      lockstep_(settings.lockstep) {
+  history_[newest_] = still;
+  known_ = 1;
+}
+
 EmulatedArm::~EmulatedArm() {
-  close(fd_);
+  if (fd_ >= 0) close(fd_);
 }
 
 void EmulatedArm::connect_to(const std::string& path) {
@@ -62,8 +72,8 @@ void EmulatedArm::connect_to(const std::string& path) {
   }
 }
 
-void EmulatedArm::agree(const Settings& settings) {
-  const LinkHello ours{settings.device, settings.lockstep, settings.rate_hz};
+void EmulatedArm::agree(const DeviceSettings& device) {
+  const LinkHello ours{device.kind, lockstep_, device.rate_hz};
   const HelloBytes hello = encode(ours);
   bool is_agreed =
       send(fd_, hello.data(), hello.size(), MSG_NOSIGNAL) == static_cast<ssize_t>(hello.size());
@@ -78,14 +88,14 @@ void EmulatedArm::agree(const Settings& settings) {
                             : std::nullopt;
     if (!theirs) continue;  // a report from before the answer
     if (const std::string reason = discord(ours, *theirs); !reason.empty()) {
-      throw std::runtime_error(settings.socket + ": " + reason);
+      throw std::runtime_error(device.socket + ": " + reason);
     }
     report_hz_ = theirs->rate_hz;
     is_answered = true;
   }
   while (is_agreed && known_ == 0 && !closed_) is_agreed = take(kPatienceMs);
   if (is_agreed && known_ > 0) return;
-  throw std::runtime_error(settings.socket +
+  throw std::runtime_error(device.socket +
                            ": the emulator serves another program, or has ended; end that "
                            "program, or start this one by ./kerf stand-in -- COMMAND");
 }
@@ -195,6 +205,7 @@ DeviceVec<double> EmulatedArm::angular_velocity(double window_s) const noexcept 
 }
 
 bool EmulatedArm::lost() noexcept {
+  if (is_still_) return false;
   const double silent_s = lockstep_
                               ? silent_ticks_ / report_hz_
                               : static_cast<double>(monotonic_ns() - heard_ns_) / kNsPerSecond;

@@ -38,7 +38,9 @@ struct Pose {
 class EmulatedArm {
  public:
   /// Connects and receives the first report. Throws std::runtime_error with one line.
-  EmulatedArm(const Settings& settings, Ledger& ledger);
+  EmulatedArm(const Settings& settings, const DeviceSettings& device, Ledger& ledger);
+  /// No arm, but one pose for ever; commands go nowhere.
+  EmulatedArm(const Settings& settings, const Pose& still, Ledger& ledger) noexcept;
   EmulatedArm(const EmulatedArm&) = delete;
   EmulatedArm& operator=(const EmulatedArm&) = delete;
   ~EmulatedArm();
@@ -64,7 +66,7 @@ class EmulatedArm {
 
  private:
   void connect_to(const std::string& path);
-  void agree(const Settings& settings);
+  void agree(const DeviceSettings& device);
   /// Takes in one datagram: a report, or a turn of them. Returns whether there was one.
   bool take(int timeout_ms) noexcept;
   void take_packet(std::span<const std::uint8_t> bytes) noexcept;
@@ -75,7 +77,8 @@ class EmulatedArm {
   Ledger& ledger_;
   int fd_ = -1;
   bool closed_ = false;
-  bool hand_waits_;  ///< until the first force
+  bool is_still_ = false;  ///< it is no arm
+  bool hand_waits_;        ///< until the first force
   bool lockstep_;
   double report_hz_ = 1000;
   std::array<Pose, kHistory> history_{};

@@ -30,6 +30,7 @@ NOTES = {
     "too_fast": "ticks above the limit of speed",
     "lost_link": "times that the device was gone",
     "watchdog": "expiries of the watchdog",
+    "in_use": "times that a program opened the device while another one used it",
 }
 
 

@@ -38,6 +38,7 @@ enum class Row : std::uint8_t {
   too_fast,           ///< ticks above the limit of speed
   lost_link,          ///< times that the device was found to be gone
   watchdog,           ///< expiries (dhd)
+  in_use,             ///< times that a program opened a device of another one
   // numbers
   square_sum_n2,      ///< of the force of all commands
   peak_n,             ///< of a command

@@ -31,6 +31,9 @@ constexpr std::array kSwitches{
     Switch{"hand", "enabled", "pushed", &Settings::hand_waits},
 };
 
+constexpr std::string_view kInUseKey = "in-use";
+constexpr std::array<std::string_view, 3> kInUseWords{"timer", "value", "pose"};  // as InUse
+
 /// A switch with a number.
 struct NumberSwitch {
   std::string_view key;
@@ -80,6 +83,12 @@ bool read_switch(const Part& part, Settings& settings) {
     settings.*words->member = part.value == words->other;
     return true;
   }
+  if (part.key == kInUseKey) {
+    const auto* const word = std::ranges::find(kInUseWords, part.value);
+    if (word == kInUseWords.end()) refuse(part.whole, "take timer, value or pose");
+    settings.in_use = static_cast<InUse>(word - kInUseWords.begin());
+    return true;
+  }
   const auto* const number = std::ranges::find(kNumberSwitches, part.key, &NumberSwitch::key);
   if (number == kNumberSwitches.end()) return false;
   number->set(settings, number_within(part.whole, part.value, number->low, number->high));
@@ -92,10 +101,30 @@ std::string all_switches() {
     list +=
         std::string(one.key) + '=' + std::string(one.usual) + '|' + std::string(one.other) + ", ";
   }
+  list += std::string(kInUseKey) + "=timer|value|pose, ";
   for (const NumberSwitch& one : kNumberSwitches) {
     list += std::string(one.key) + '=' + number_text(one.low) + ".." + number_text(one.high) + ", ";
   }
   return list.substr(0, list.size() - 2);
+}
+
+constexpr std::string_view kSocket = "socket:";
+
+/// A part that belongs to the device whose socket came last. False if it is none.
+bool read_of_device(const Part& part, DeviceSettings& device) {
+  const auto& [text, key, value] = part;
+  if (key == "device") {
+    device.kind = device_of(text, value);
+  } else if (key == "rate") {
+    device.rate_hz = static_cast<int>(number_within(text, value, 100, 8000));
+  } else if (key == "ledger" && !value.empty()) {
+    device.ledger = value;
+  } else if (key == "name" && !value.empty()) {
+    device.name = value;
+  } else {
+    return false;
+  }
+  return true;
 }
 
 void read(std::string_view whole, Settings& settings) {
@@ -103,37 +132,64 @@ void read(std::string_view whole, Settings& settings) {
     settings.lockstep = true;
     return;
   }
+  if (whole.starts_with(kSocket) && whole.size() > kSocket.size()) {
+    if (settings.devices.size() == kMostDevices) {
+      refuse(whole, "a program has at most " + std::to_string(kMostDevices) + " devices");
+    }
+    settings.devices.emplace_back().socket = whole.substr(kSocket.size());
+    return;
+  }
   const Part part(whole);
-  if (read_switch(part, settings)) return;
+  if (read_switch(part, settings) || read_of_device(part, settings.devices.back())) return;
   const auto& [text, key, value] = part;
-  if (key == "device") {
-    settings.device = device_of(text, value);
-  } else if (key == "rate") {
-    settings.rate_hz = static_cast<int>(number_within(text, value, 100, 8000));
-  } else if (key == "priority") {
+  if (key == "priority") {
     settings.priority = static_cast<int>(number_within(text, value, 0, 98));
-  } else if (key == "ledger" && !value.empty()) {
+  } else if (key == "program" && !value.empty()) {
     settings.ledger = value;
   } else {
     refuse(text, "unknown; start the program by ./kerf stand-in -- COMMAND");
   }
 }
 
+/// Gives names to devices without one, and checks what holds between devices of a kind.
+void finish(Settings& settings) {
+  std::array<int, kPersonalityWords.size()> numbers{};
+  for (DeviceSettings& device : settings.devices) {
+    const int number = ++numbers[static_cast<std::size_t>(device.kind)];
+    if (device.name.empty()) {
+      device.name = kDefaultDevice;
+      if (number > 1) device.name += ' ' + std::to_string(number);
+    }
+    for (const DeviceSettings& other : settings.devices) {
+      if (&other == &device) break;
+      if (other.kind != device.kind) continue;
+      if (other.name == device.name) {
+        refuse("name=" + device.name, "two devices of a kind have it; give each its own");
+      }
+      if (device.kind == Personality::touch && other.rate_hz != device.rate_hz) {
+        refuse("rate=" + std::to_string(device.rate_hz),
+               "one servo thread serves all of a program");
+      }
+    }
+  }
+  if (settings.ledger.empty()) settings.ledger = settings.devices.front().ledger;
+}
+
 }  // namespace
 
 Settings parse_settings(std::string_view text) {
-  constexpr std::string_view kSocket = "socket:";
   Settings settings;
   std::string_view first = text.substr(0, text.find(','));
   if (!first.starts_with(kSocket) || first.size() == kSocket.size()) {
     refuse(first, "begin with socket:PATH, the socket of kerf-emulator");
   }
-  settings.socket = first.substr(kSocket.size());
+  read(first, settings);
   while (first.size() < text.size()) {
     text.remove_prefix(first.size() + 1);
     first = text.substr(0, text.find(','));
     read(first, settings);
   }
+  finish(settings);
   return settings;
 }
 

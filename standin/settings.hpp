@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "shared/wire/personality.hpp"
 
@@ -12,15 +15,33 @@ namespace kerf::standin {
 
 inline constexpr const char* kVariable = "KERF_STAND_IN";
 
+/// Most devices of one program: DHD_MAX_DEVICE of earlier dhd headers, the only limit that a vendor
+/// has published.
+inline constexpr std::size_t kMostDevices = 4;
+
+/// The name of HD's default device.
+inline constexpr std::string_view kDefaultDevice = "Default Device";
+
+/// One emulated device.
+struct DeviceSettings {
+  std::string socket;  ///< path of the socket that its kerf-emulator serves
+  Personality kind = Personality::touch;
+  std::string name;    ///< HD: by which it is opened; none twice of a kind
+  int rate_hz = 1000;  ///< of the servo thread (HD; one for all), of force commands (dhd)
+  std::string ledger;  ///< file of its counts; empty: none is kept
+};
+
+/// What a second process gets that opens a device of HD: it was seen to be any of the three.
+enum class InUse : std::uint8_t { timer, value, pose };
+
 /// The members with a default of false or 0 from `drop_without_frame` on are switches for what no
 /// document says about the vendor's library; both values are legitimate readings.
 struct Settings {
-  std::string socket;  ///< path of the socket that kerf-emulator serves
-  Personality device = Personality::touch;
+  std::vector<DeviceSettings> devices;  ///< 1 to kMostDevices, in the order of their numbers
+  std::string ledger;  ///< file of what belongs to no device: calls for unknown ones, the servo
+                       ///< thread of HD; empty: none is kept
   bool lockstep = false;
-  int rate_hz = 1000;  ///< of the servo thread (HD), of force commands (dhd)
-  int priority = 0;    ///< HD, in real time: SCHED_FIFO of the servo thread, if it may; 0: none
-  std::string ledger;  ///< file of the counts; empty: none is kept
+  int priority = 0;  ///< HD, in real time: SCHED_FIFO of the servo thread, if it may; 0: none
 
   bool drop_without_frame = false;  ///< a tick without a frame ends the force; else it is held
   bool drop_on_stop = false;        ///< so does the end of the scheduler
@@ -31,18 +52,22 @@ struct Settings {
   bool hand_buttons = false;        ///< omega: button 0 is the hand's; else "parked"
   bool short_status = false;        ///< dhdGetStatus writes 16 words, as before SDK 3.16; else 17
   bool hand_waits = false;          ///< the hand begins with the first force, or after 2 s
-  double ramp_s = 0;  ///< HD: the force rises within so long after a start; 0 = at once
-  int stall_ms = 50;  ///< a callback (HD) or a pause with a force (dhd) above it stalls
+  double ramp_s = 0;            ///< HD: the force rises within so long after a start; 0 = at once
+  int stall_ms = 50;            ///< a callback (HD) or a pause with a force (dhd) above it stalls
+  InUse in_use = InUse::timer;  ///< HD
 };
 
 /// Reads
-/// `socket:PATH[,device=touch|omega][,lockstep][,rate=HZ][,priority=N][,ledger=PATH][,SWITCH]...`:
+/// `DEVICE[,DEVICE]...[,lockstep][,priority=N][,program=PATH][,SWITCH]...`, a device being
+/// `socket:PATH[,device=touch|omega][,name=NAME][,rate=HZ][,ledger=PATH]`, and SWITCH
 ///
 ///     missed=hold|drop  stop=hold|drop  excess=clamp|cut  before-enable=apply|ignore
 ///     calibration=kept|lost  handles=seen|documented  button0=parked|hand  status=17|16
-///     hand=enabled|pushed  ramp=SECONDS  stall=MS
+///     hand=enabled|pushed  in-use=timer|value|pose  ramp=SECONDS  stall=MS
 ///
-/// Their words and ranges are known here alone; ./kerf stand-in asks for them. A path has no comma.
+/// `program` is the ledger of no device; without it that of the first. A device without a name is
+/// called as HD's default one, the second of its kind with a 2 behind it. The switches' words and
+/// ranges are known here alone; ./kerf stand-in asks for them. Paths and names have no comma.
 /// Throws std::invalid_argument with one line.
 [[nodiscard]] Settings parse_settings(std::string_view text);
 

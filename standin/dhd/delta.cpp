@@ -23,11 +23,13 @@ constexpr double kDampingNsPerMm = 0.02;
 
 }  // namespace
 
-Delta::Delta(const standin::Settings& settings, standin::Ledger& ledger)
+Delta::Delta(const standin::Settings& settings, standin::Device& device)
     : is_initialised(!settings.uncalibrated),
       settings_(settings),
-      ledger_(ledger),
-      arm_(settings, ledger) {
+      device_(device),
+      ledger_(device.ledger),
+      arm_(settings, device.settings, ledger_),
+      slots_(kNsPerSecond / device.settings.rate_hz) {
   ledger_.add(Row::opened);
 }
 
@@ -72,6 +74,14 @@ void Delta::note_command(DeviceVec<double> force_n) noexcept {
   }
   commanded_ns_ = now;
   force_n_ = force_n;
+}
+
+std::int64_t Delta::take_slot_ns() noexcept {
+  if (lockstep()) return 0;
+  const Slots::Slot slot = slots_.take(monotonic_ns());
+  if (counts_misses_) ledger_.add(Row::missed_ticks, static_cast<std::uint64_t>(slot.missed));
+  counts_misses_ = true;
+  return slot.at_ns;
 }
 
 void Delta::send(DeviceVec<double> force_n) noexcept {
@@ -126,7 +136,9 @@ void Delta::set_mode(Mode mode, Cause cause) noexcept {
   mode_ = mode;
   cause_ = cause;
   enabled_by_force_ = false;
-  if (mode != Mode::force) force_n_ = {};
+  if (mode == Mode::force) return;
+  force_n_ = {};
+  counts_misses_ = false;
 }
 
 int Delta::apply() noexcept {
@@ -154,7 +166,7 @@ void Delta::tick() noexcept {
     set_mode(Mode::brake, Cause::watchdog);
     send({});
   } else if (regulates_) {
-    step_regulator(lockstep() ? 1.0 / settings_.rate_hz : kTickS);
+    step_regulator(lockstep() ? 1.0 / device_.settings.rate_hz : kTickS);
   } else if (lockstep()) {
     send(force_n_);
   }
@@ -164,6 +176,7 @@ bool Delta::start() noexcept {
   if (!is_initialised) return false;
   if (!lockstep()) arm_.refresh();
   regulates_ = true;
+  counts_misses_ = false;
   set_mode(Mode::force, Cause::none);
   goal_mm_ = target_mm_ = pose().tip_mm;
   return true;

@@ -7,8 +7,10 @@
 
 #include "shared/numeric/vec.hpp"
 #include "standin/dhd/numbers.hpp"
+#include "standin/dhd/slots.hpp"
 #include "standin/emulated_arm.hpp"
 #include "standin/ledger.hpp"
+#include "standin/session.hpp"
 #include "standin/settings.hpp"
 
 namespace kerf::dhd {
@@ -29,7 +31,7 @@ class Delta {
   enum class Cause : std::uint8_t { none, button, velocity, watchdog, software };
 
   /// Throws std::runtime_error with one line.
-  Delta(const standin::Settings& settings, standin::Ledger& ledger);
+  Delta(const standin::Settings& settings, standin::Device& device);
 
   /// The newest pose. kFailed if the device is gone.
   [[nodiscard]] int read() noexcept;
@@ -40,6 +42,9 @@ class Delta {
   }
   [[nodiscard]] unsigned buttons() const noexcept;
 
+  /// In real time: takes the next slot for a force command, and returns when that may leave, ns. In
+  /// lock-step 0. Slots that passed while forces were on are counted.
+  [[nodiscard]] std::int64_t take_slot_ns() noexcept;
   /// Sends a force. kOk, kSaturated, or kFailed if the device is gone or the force is not finite.
   [[nodiscard]] int set_force(DeviceVec<double> force_n) noexcept;
   [[nodiscard]] DeviceVec<double> force_n() const noexcept { return force_n_; }
@@ -67,6 +72,7 @@ class Delta {
   [[nodiscard]] bool regulates() const noexcept { return regulates_; }
   [[nodiscard]] bool moves() const noexcept;
 
+  [[nodiscard]] standin::Device& device() const noexcept { return device_; }
   [[nodiscard]] bool lockstep() const noexcept { return arm_.lockstep(); }
   [[nodiscard]] double time_s() const noexcept { return arm_.time_s(); }
   [[nodiscard]] double command_khz() const noexcept;
@@ -97,6 +103,7 @@ class Delta {
   void step_regulator(double dt_s) noexcept;
 
   const standin::Settings& settings_;
+  standin::Device& device_;
   standin::Ledger& ledger_;
   standin::EmulatedArm arm_;
   Mode mode_ = Mode::idle;
@@ -105,6 +112,8 @@ class Delta {
   DeviceVec<double> force_n_;
   std::int64_t commanded_ns_ = 0, read_ns_ = 0;
   double period_s_ = 0;  ///< between commands, smoothed
+  Slots slots_;
+  bool counts_misses_ = false;  ///< forces are on since the last slot
 
   bool regulates_ = false;
   DeviceVec<double> goal_mm_, target_mm_;

@@ -11,8 +11,7 @@ using namespace kerf::dhd;  // NOLINT(google-build-using-namespace): the interfa
 namespace {
 
 int set_force(double x, double y, double z, char id) {
-  library().pace();
-  return with_arm(id, [&](Delta& arm) {
+  return with_slot(id, [&](Delta& arm) {
     const int result = arm.set_force(from_dhd(x, y, z));
     if (result != kFailed) return result;
     return fail(std::isfinite(x + y + z) ? kCommunication : kInvalid);

@@ -57,8 +57,7 @@ void give_jacobian(double* out) {
 
 int set_torques(double a, double b, double c, char id) {
   if (!library().is_expert) return fail(kExpertOnly);
-  library().pace();
-  return with_arm(id, [&](Delta& arm) {
+  return with_slot(id, [&](Delta& arm) {
     const int result = arm.set_force(from_dhd(a / kLeverM, b / kLeverM, c / kLeverM));
     return result == kFailed ? fail(kCommunication) : result;
   });

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "standin/dhd/library.hpp"
 
+#include <algorithm>
 #include <array>
 #include <exception>
 #include <thread>
@@ -56,49 +57,110 @@ Library& library() {
   return *kOne;
 }
 
-int Library::open() noexcept {
-  const std::lock_guard lock(mutex);
-  if (device) return 0;
-  try {
-    if (!session.is_for(Personality::omega, "libdrd")) return fail(kNoDevice);
-    device.emplace(*session.settings, *session.ledger);
-    return 0;
-  } catch (const std::exception& error) {
-    standin::complain("libdrd", error.what());
+int Library::open_device(standin::Device& device) noexcept {
+  std::optional<Delta>& place = open[device.number];
+  if (!place) {
+    if (!device.claim.take()) {
+      device.ledger.add(standin::Row::in_use);
+      return fail(kInUse);
+    }
+    try {
+      place.emplace(*session.settings, device);
+    } catch (const std::exception& error) {
+      device.claim.give_back();
+      standin::complain("libdrd", error.what());
+      return fail(kNoDevice);
+    }
   }
-  return fail(kNoDevice);
+  make_default(static_cast<char>(device.number));
+  return static_cast<int>(device.number);
 }
 
-int Library::close() noexcept {
+int Library::open_first() noexcept {
   const std::lock_guard lock(mutex);
-  device->close();
-  device.reset();
-  return kOk;
+  if (!session.has_devices()) return fail(kNoDevice);
+  for (standin::Device& device : session.devices) {
+    if (!open[device.number] && !device.claim.is_with_another()) return open_device(device);
+  }
+  return fail(kInUse);
 }
 
-void Library::pace() noexcept {
-  if (!session.settings || lockstep()) return;
-  const std::int64_t period_ns = kNsPerSecond / session.settings->rate_hz;
-  const std::int64_t now_ns = monotonic_ns();
-  std::int64_t slot_ns = next_slot_ns_;
-  if (slot_ns > now_ns) sleep_until_ns(slot_ns);
-  next_slot_ns_ = std::max(slot_ns, now_ns) + period_ns;
+int Library::open_index(char index) noexcept {
+  if (is_default(index)) return open_first();
+  const std::lock_guard lock(mutex);
+  if (!session.has_devices()) return fail(kNoDevice);
+  const auto number = static_cast<std::size_t>(static_cast<unsigned char>(index));
+  return number < session.devices.size() ? open_device(session.devices[number]) : fail(kBadIndex);
+}
+
+int Library::close(char id) noexcept {
+  return with_arm(id, [&](Delta& arm) {
+    standin::Device& device = arm.device();
+    arm.close();
+    open[device.number].reset();
+    std::erase(opened_, static_cast<char>(device.number));
+    device.claim.give_back();  // once the connection is closed
+    return kOk;
+  });
+}
+
+int Library::available() const noexcept {
+  return static_cast<int>(std::ranges::count_if(session.devices, [&](const auto& device) {
+    return !open[device.number] && !device.claim.is_with_another();
+  }));
+}
+
+Delta* Library::find(char id) noexcept {
+  if (is_default(id) && !opened_.empty()) id = opened_.back();
+  const auto place = static_cast<std::size_t>(static_cast<unsigned char>(id));
+  return place < open.size() && open[place] ? &*open[place] : nullptr;
+}
+
+int Library::select(char id) noexcept {
+  return with_arm(id, [&](Delta& arm) {
+    make_default(static_cast<char>(arm.device().number));
+    return kOk;
+  });
+}
+
+int Library::default_id() noexcept {
+  return with_arm(-1, [](Delta& arm) { return static_cast<int>(arm.device().number); });
+}
+
+void Library::make_default(char id) {
+  std::erase(opened_, id);
+  opened_.push_back(id);
+}
+
+double Library::time_s() const noexcept {
+  double latest_s = 0;
+  for (const auto& arm : open) {
+    if (arm) latest_s = std::max(latest_s, arm->time_s());
+  }
+  return latest_s;
+}
+
+bool Library::tick_all() noexcept {
+  const std::lock_guard lock(mutex);
+  bool is_needed = false;
+  for (auto& arm : open) {
+    if (!arm || !arm->needs_ticks()) continue;
+    arm->tick();
+    is_needed = true;
+  }
+  if (!is_needed) ticks_ = false;
+  return is_needed;
 }
 
 void Library::keep_ticking() noexcept {
   if (lockstep() || ticks_.exchange(true)) return;
   const auto serve = [this] {
     constexpr std::int64_t kPeriodNs = kNsPerSecond / 1000;
-    for (std::int64_t deadline_ns = monotonic_ns();;) {
+    std::int64_t deadline_ns = monotonic_ns();
+    do {
       deadline_ns = std::max(deadline_ns + kPeriodNs, monotonic_ns());
       sleep_until_ns(deadline_ns);
-      const std::lock_guard lock(mutex);
-      if (!device || !device->needs_ticks()) {
-        ticks_ = false;
-        return;
-      }
-      device->tick();
-    }
+    } while (tick_all());
   };
   try {
     std::thread(serve).detach();  // the library outlives it

@@ -1,16 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <atomic>
 #include <cstdint>
 #include <mutex>
 #include <optional>
+#include <vector>
 
+#include "shared/posix/monotonic_clock.hpp"
 #include "standin/dhd/delta.hpp"
 #include "standin/dhd/numbers.hpp"
 #include "standin/session.hpp"
 
-/// The state of the dhd/drd stand-in: one device under ID 0, the error of each thread.
+/// The state of the dhd/drd stand-in: devices by ID, the error of each thread.
 namespace kerf::dhd {
 
 /// The error of the calling thread. Returns kFailed.
@@ -20,38 +23,69 @@ int fail(int code) noexcept;
 [[nodiscard]] const char* text_of(int code) noexcept;
 
 struct Library {
-  standin::Session session{"libdrd"};
-  std::recursive_mutex mutex;  ///< guards the device
-  std::optional<Delta> device;
-  std::atomic<bool> is_expert{false};  ///< of the whole process
+  standin::Session session{"libdrd", Personality::omega};
+  std::recursive_mutex mutex;                                    ///< guards the devices
+  std::array<std::optional<Delta>, standin::kMostDevices> open;  ///< by ID: the device's number
+  std::atomic<bool> is_expert{false};                            ///< of the whole process
 
-  /// Opens the device unless it is open, and returns its ID, 0; else kFailed.
-  int open() noexcept;
-  int close() noexcept;
-  [[nodiscard]] bool lockstep() const noexcept {
-    return session.settings && session.settings->lockstep;
-  }
-  /// Waits for the slot of the next force command, in real time.
-  void pace() noexcept;
-  /// Lets the watchdog and the regulator run from now on, in real time.
+  /// The first device that no program has open. Each open: the ID, which becomes the default one;
+  /// or kFailed.
+  int open_first() noexcept;
+  /// A device by its number, also one that this program has open; -1: the first.
+  int open_index(char index) noexcept;
+  int close(char id) noexcept;
+  /// Devices that no program has open.
+  [[nodiscard]] int available() const noexcept;
+
+  /// -1 stands for the default device: the one that was opened or selected last and is still open.
+  /// Null if there is none.
+  [[nodiscard]] Delta* find(char id) noexcept;
+  /// Makes it the default one.
+  int select(char id) noexcept;
+  [[nodiscard]] int default_id() noexcept;
+
+  [[nodiscard]] bool lockstep() const noexcept { return session.lockstep(); }
+  /// In lock-step: time of the device that is ahead of the others, s.
+  [[nodiscard]] double time_s() const noexcept;
+  /// Lets the watchdogs and the regulators run from now on, in real time.
   void keep_ticking() noexcept;
 
  private:
-  std::atomic<std::int64_t> next_slot_ns_{0};
+  int open_device(standin::Device& device) noexcept;
+  void make_default(char id);
+  [[nodiscard]] bool tick_all() noexcept;
+
+  std::vector<char> opened_;  ///< IDs, the default one last
   std::atomic<bool> ticks_{false};
 };
 
 [[nodiscard]] Library& library();
+[[nodiscard]] constexpr bool is_default(char id) noexcept {
+  return id == static_cast<char>(-1);
+}
 
-/// Calls `use(device)`, whose result it returns, under the lock; kFailed and an error without an
-/// open device, or for another ID. -1 stands for the default device.
+/// Calls `use(device)`, whose result it returns, under the lock; kFailed and an error if no such
+/// device is open.
 template <class Use>
 int with_arm(char id, const Use& use) noexcept {
   Library& lib = library();
   const std::lock_guard lock(lib.mutex);
-  if (lib.device && (id == 0 || id == static_cast<char>(-1))) return use(*lib.device);
+  if (Delta* const arm = lib.find(id)) return use(*arm);
   lib.session.ledger->add(standin::Row::bad_handles);
   return fail(kNoDevice);
+}
+
+/// As `with_arm` for a force command: in real time it first waits for a slot of the device.
+template <class Use>
+int with_slot(char id, const Use& use) noexcept {
+  std::int64_t slot_ns = 0;
+  const int found = with_arm(id, [&](Delta& arm) {
+    slot_ns = arm.take_slot_ns();
+    return kOk;
+  });
+  if (found != kOk) return found;
+  if (slot_ns > 0) sleep_until_ns(slot_ns);  // without the lock
+  return with_arm(id, use);
 }
 
 /// As `with_arm` with a pose that has just been read; its result is that of the reading.

@@ -42,7 +42,7 @@ inline constexpr int kSaturated = 2;  ///< a force above what the motors give
 inline constexpr int kFailed = -1;
 
 inline constexpr int kOmega3 = 33;
-inline constexpr int kSerialNumber = 1;
+inline constexpr int kFirstSerialNumber = 1;
 inline constexpr std::size_t kStatusWords = 17;
 inline constexpr std::size_t kMostDof = 8;
 inline constexpr std::array<int, 4> kSdkVersion{3, 17, 5, 0};  ///< whose names the library has

@@ -15,11 +15,6 @@ using namespace kerf::dhd;  // NOLINT(google-build-using-namespace): the interfa
 
 namespace {
 
-bool is_there() {
-  const Library& lib = library();
-  return lib.session.settings && lib.session.settings->device == kerf::Personality::omega;
-}
-
 bool is_open(char id) {
   return with_arm(id, [](Delta&) { return kOk; }) == kOk;
 }
@@ -27,36 +22,39 @@ bool is_open(char id) {
 }  // namespace
 
 KERF_STAND_IN_EXPORT int dhdOpen() {
-  return library().open();
+  return library().open_first();
 }
 KERF_STAND_IN_EXPORT int dhdOpenID(char index) {
-  return index == 0 || index == static_cast<char>(-1) ? library().open() : fail(kBadIndex);
+  return library().open_index(index);
 }
 KERF_STAND_IN_EXPORT int dhdOpenSerial(int serial) {
-  return serial == kSerialNumber ? library().open() : fail(kNoDevice);
+  const int number = serial - kFirstSerialNumber;
+  const bool is_there =
+      number >= 0 && static_cast<std::size_t>(number) < library().session.devices.size();
+  return is_there ? library().open_index(static_cast<char>(number)) : fail(kNoDevice);
 }
 KERF_STAND_IN_EXPORT int dhdOpenType(int type) {
-  return type == kOmega3 ? library().open() : fail(kNoDevice);
+  return type == kOmega3 ? library().open_first() : fail(kNoDevice);
 }
 KERF_STAND_IN_EXPORT int dhdClose(char id) {
-  return with_arm(id, [](Delta&) { return library().close(); });
+  return library().close(id);
 }
 KERF_STAND_IN_EXPORT int dhdGetDeviceCount() {
-  return is_there() ? 1 : 0;
+  return static_cast<int>(library().session.devices.size());
 }
 KERF_STAND_IN_EXPORT int dhdGetAvailableCount() {
   const std::lock_guard lock(library().mutex);
-  return is_there() && !library().device ? 1 : 0;
+  return library().available();
 }
 KERF_STAND_IN_EXPORT int dhdSetDevice(char id) {
-  return is_open(id) ? kOk : kFailed;
+  return library().select(id);
 }
 KERF_STAND_IN_EXPORT int dhdGetDeviceID() {
-  return is_open(0) ? 0 : kFailed;
+  return library().default_id();
 }
 KERF_STAND_IN_EXPORT int dhdGetSerialNumber(std::uint16_t* serial, char id) {
-  return with_arm(id, [&](Delta&) {
-    give(serial, std::uint16_t{kSerialNumber});
+  return with_arm(id, [&](Delta& arm) {
+    give(serial, static_cast<std::uint16_t>(kFirstSerialNumber + arm.device().number));
     return kOk;
   });
 }
@@ -137,11 +135,11 @@ KERF_STAND_IN_EXPORT int dhdSetComModePriority(int /*priority*/, char id) {
 /// The vendor's own simulator has nothing to do with this one.
 KERF_STAND_IN_EXPORT void dhdEnableSimulator(bool /*on*/) {}
 
-// Time. In lock-step it is the device's, and a sleep moves it.
+// Time. In lock-step each device has its own, and a sleep moves all of them.
 KERF_STAND_IN_EXPORT double dhdGetTime() {
   Library& lib = library();
   const std::lock_guard lock(lib.mutex);
-  if (lib.lockstep()) return lib.device ? lib.device->time_s() : 0;
+  if (lib.lockstep()) return lib.time_s();
   return static_cast<double>(kerf::monotonic_ns()) / kerf::kNsPerSecond;
 }
 KERF_STAND_IN_EXPORT void dhdSleep(double seconds) {
@@ -154,9 +152,11 @@ KERF_STAND_IN_EXPORT void dhdSleep(double seconds) {
     return;
   }
   const std::lock_guard lock(lib.mutex);
-  if (!lib.device) return;
-  const double until_s = lib.device->time_s() + seconds;
-  while (lib.device->time_s() < until_s && lib.device->read() >= 0) lib.device->tick();
+  for (auto& arm : lib.open) {
+    if (!arm) continue;
+    const double until_s = arm->time_s() + seconds;
+    while (arm->time_s() < until_s && arm->read() >= 0) arm->tick();
+  }
 }
 
 // The keyboard.

@@ -26,14 +26,13 @@ bool is_true(char id, bool (Delta::*what)() const noexcept) {
 }
 
 /// One tick of the regulator: the next one in real time, one of the device's in lock-step.
-void wait_for_tick() {
+void wait_for_tick(char id) {
   Library& lib = library();
   if (!lib.lockstep()) {
     kerf::sleep_until_ns(kerf::monotonic_ns() + kerf::kNsPerSecond / 1000);
     return;
   }
-  const std::lock_guard lock(lib.mutex);
-  if (lib.device) lib.device->tick();
+  static_cast<void>(with_arm(id, [](Delta& arm) { return arm.tick(), kOk; }));
 }
 
 int move_to(double x, double y, double z, bool waits, char id) {
@@ -47,7 +46,7 @@ int move_to(double x, double y, double z, bool waits, char id) {
     return kOk;
   });
   while (sent == kOk && waits && is_true(id, &Delta::moves)) {
-    wait_for_tick();
+    wait_for_tick(id);
     const int in_time = with_robot(id, [&](Delta& arm) {
       if (arm.read() < 0) return fail(kCommunication);
       return arm.time_s() - began_s < patience_s ? kOk : fail(kTimeout);
@@ -86,19 +85,19 @@ int initialise(char id) {
 }  // namespace
 
 KERF_STAND_IN_EXPORT int drdOpen() {
-  return library().open();
+  return library().open_first();
 }
 KERF_STAND_IN_EXPORT int drdOpenID(char index) {
-  return index == 0 || index == static_cast<char>(-1) ? library().open() : fail(kBadIndex);
+  return library().open_index(index);
 }
 KERF_STAND_IN_EXPORT int drdSetDevice(char id) {
-  return with_arm(id, [](Delta&) { return kOk; });
+  return library().select(id);
 }
 KERF_STAND_IN_EXPORT int drdGetDeviceID() {
-  return with_arm(0, [](Delta&) { return 0; });
+  return library().default_id();
 }
 KERF_STAND_IN_EXPORT int drdClose(char id) {
-  return with_arm(id, [](Delta&) { return library().close(); });
+  return library().close(id);
 }
 KERF_STAND_IN_EXPORT bool drdIsSupported(char id) {
   return with_arm(id, [](Delta&) { return kOk; }) == kOk;
@@ -174,8 +173,8 @@ KERF_STAND_IN_EXPORT int drdMoveTo(double* p, bool waits, char id) {
 KERF_STAND_IN_EXPORT int drdHold(char id) {
   return with_robot(id, [](Delta& arm) { return arm.hold(), kOk; });
 }
-KERF_STAND_IN_EXPORT void drdWaitForTick(char /*id*/) {
-  wait_for_tick();
+KERF_STAND_IN_EXPORT void drdWaitForTick(char id) {
+  wait_for_tick(id);
 }
 KERF_STAND_IN_EXPORT double drdGetCtrlFreq(char id) {
   double khz = kFailed;

@@ -15,7 +15,7 @@ class ErrorStack {
  public:
   static constexpr std::size_t kMost = 1024;
 
-  void push(Enum code, Handle device = kTheDevice) noexcept {
+  void push(Enum code, Handle device) noexcept {
     const std::lock_guard lock(mutex_);
     errors_[next_++ % kMost] = {code, 0, device};
     if (size_ < kMost) ++size_;

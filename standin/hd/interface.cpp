@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <exception>
 #include <mutex>
@@ -22,32 +23,53 @@ namespace {
 
 using standin::Row;
 
-/// All state of the library. `mutex` guards the device; no callback runs while it is held.
+/// All state of the library. `mutex` guards the devices; no callback runs while it is held.
 struct Library {
-  standin::Session session{"libHD"};
+  standin::Session session{"libHD", Personality::touch};
   ErrorStack errors;
   std::recursive_mutex mutex;
-  std::optional<Touch> device;
+  std::array<std::optional<Touch>, standin::kMostDevices> open;  ///< by handle
+  std::atomic<Handle> current;
   int rate_hz = 1000;
   Scheduler scheduler;
 
   Library()
-      : scheduler({[this] { tick(&Touch::begin_tick); }, [this] { tick(&Touch::end_tick); }},
+      : current(without_device()),
+        scheduler({[this] { each(&Touch::begin_tick); }, [this] { each(&Touch::end_tick); }},
                   *session.ledger, session.settings ? session.settings->stall_ms : 50) {
-    if (session.settings) rate_hz = session.settings->rate_hz;
+    if (!session.devices.empty()) rate_hz = session.devices.front().settings.rate_hz;
   }
 
-  void tick(void (Touch::*what)() noexcept) {
+  void each(void (Touch::*what)() noexcept) {
     const std::lock_guard lock(mutex);
-    if (device) ((*device).*what)();
+    for (auto& touch : open) {
+      if (touch) ((*touch).*what)();
+    }
   }
-  [[nodiscard]] bool lockstep() const noexcept {
-    return session.settings && session.settings->lockstep;
+  void run(bool runs) {
+    const std::lock_guard lock(mutex);
+    for (auto& touch : open) {
+      if (touch) touch->run(runs, rate_hz);
+    }
   }
+  /// Null if there is none.
+  [[nodiscard]] Touch* find(Handle handle) noexcept {
+    return handle < open.size() && open[handle] ? &*open[handle] : nullptr;
+  }
+  /// The current device if there is none. A client in use runs only if it is the handle that it
+  /// gets later.
+  [[nodiscard]] Handle without_device() const noexcept {
+    const bool is_documented = session.settings && session.settings->documented_handles;
+    for (const auto& touch : open) {
+      if (touch) return kNoDevice;
+    }
+    return is_documented ? kNoDevice : kFirstDevice;
+  }
+  [[nodiscard]] bool lockstep() const noexcept { return session.lockstep(); }
   [[nodiscard]] int priority() const noexcept {
     return session.settings ? session.settings->priority : 0;
   }
-  void refuse(Enum code) noexcept { errors.push(code); }
+  void refuse(Enum code) noexcept { errors.push(code, current); }
 };
 
 Library& library() {
@@ -55,25 +77,27 @@ Library& library() {
   return *kOne;
 }
 
-/// Calls `use(device)` under the lock; without an open device an error, and `otherwise`.
+/// Calls `use(device)` under the lock; without that device an error, and `otherwise`.
+template <class Result, class Use>
+Result with_handle(Handle handle, Result otherwise, const Use& use) {
+  Library& lib = library();
+  const std::lock_guard lock(lib.mutex);
+  if (Touch* const touch = lib.find(handle)) return use(*touch);
+  lib.session.ledger->add(Row::bad_handles);
+  lib.errors.push(kBadHandle, handle);
+  return otherwise;
+}
+template <class Use>
+void with_handle(Handle handle, const Use& use) {
+  with_handle(handle, 0, [&](Touch& device) { return use(device), 0; });
+}
+
+/// The same for the current device.
 template <class Result, class Use>
 Result with_device(Result otherwise, const Use& use) {
   Library& lib = library();
   const std::lock_guard lock(lib.mutex);
-  if (lib.device) return use(*lib.device);
-  lib.session.ledger->add(Row::bad_handles);
-  lib.refuse(kBadHandle);
-  return otherwise;
-}
-
-/// The same for a handle that the caller names.
-template <class Use>
-void with_handle(Handle handle, const Use& use) {
-  Library& lib = library();
-  const std::lock_guard lock(lib.mutex);
-  if (lib.device && handle == kTheDevice) return use(*lib.device);
-  lib.session.ledger->add(Row::bad_handles);
-  lib.errors.push(kBadHandle, handle);
+  return with_handle(lib.current, otherwise, use);
 }
 
 template <class T>
@@ -105,9 +129,54 @@ void set(Enum name, const T* in, unsigned type) {
   });
 }
 
-bool is_the_device(const char* name) {
-  return name == nullptr || std::string_view(name) == "Default Device" ||
-         std::string_view(name) == "Default PHANToM";
+/// The device of that name, else the first one under the names of a default. Null, after a line, if
+/// there is none.
+standin::Device* device_named(const char* given) {
+  standin::Session& session = library().session;
+  if (!session.has_devices()) return nullptr;
+  const std::string_view name = given != nullptr ? given : standin::kDefaultDevice;
+  std::string all;
+  for (standin::Device& device : session.devices) {
+    if (device.settings.name == name) return &device;
+    all += ", \"" + device.settings.name + '"';
+  }
+  if (name == standin::kDefaultDevice || name == "Default PHANToM") return &session.devices.front();
+  standin::complain("libHD", std::string(name) + ": no such device; open NULL" + all);
+  return nullptr;
+}
+
+/// The handle, or an error.
+struct Opened {
+  Handle handle = kNoDevice;
+  Enum error = kDeviceFault;
+};
+
+Opened open_device(const char* name) {
+  Library& lib = library();
+  standin::Device* const device = device_named(name);
+  if (device == nullptr) return {};
+  for (const auto& touch : lib.open) {
+    if (touch && &touch->device() == device) return {kNoDevice, kAlreadyOpen};
+  }
+  Handle handle = 0;
+  while (lib.open[handle]) ++handle;  // a place is free: not all devices are open
+  const bool is_locked_out = !device->claim.take();
+  if (is_locked_out) {
+    device->ledger.add(Row::in_use);
+    standin::complain("libHD", device->settings.name + ": in use by another program");
+    const standin::InUse in_use = lib.session.settings->in_use;
+    if (in_use == standin::InUse::timer) return {kNoDevice, kTimer};
+    if (in_use == standin::InUse::value) return {kNoDevice, kInvalidValue};
+  }
+  try {
+    lib.open[handle].emplace(*lib.session.settings, *device, lib.errors, handle, is_locked_out);
+  } catch (const std::exception& error) {
+    device->claim.give_back();
+    standin::complain("libHD", error.what());
+    return {};
+  }
+  lib.open[handle]->run(lib.scheduler.runs(), lib.rate_hz);
+  return {handle, kSuccess};
 }
 
 }  // namespace
@@ -121,50 +190,41 @@ using namespace kerf::hd;  // NOLINT(google-build-using-namespace): the interfac
 KERF_STAND_IN_EXPORT Handle hdInitDevice(const char* name) {
   Library& lib = library();
   const std::lock_guard lock(lib.mutex);
-  if (lib.device) {
-    lib.refuse(kAlreadyOpen);
-    return kNoDevice;
+  const Opened opened = open_device(name);
+  if (opened.error == kSuccess) {
+    lib.current = opened.handle;
+  } else {
+    lib.errors.push(opened.error, kNoDevice);
   }
-  try {
-    if (lib.session.is_for(kerf::Personality::touch, "libHD")) {
-      if (is_the_device(name)) {
-        lib.device.emplace(*lib.session.settings, *lib.session.ledger, lib.errors);
-        lib.device->run(lib.scheduler.runs(), lib.rate_hz);
-        return kTheDevice;
-      }
-      kerf::standin::complain("libHD", std::string(name) +
-                                           ": no such device; open NULL, "
-                                           "\"Default Device\" or "
-                                           "\"Default PHANToM\"");
-    }
-  } catch (const std::exception& error) {
-    kerf::standin::complain("libHD", error.what());
-  }
-  lib.errors.push(kDeviceFault, kNoDevice);
-  return kNoDevice;
+  return opened.handle;
 }
 
 KERF_STAND_IN_EXPORT void hdDisableDevice(Handle handle) {
-  with_handle(handle, [](Touch& device) {
+  with_handle(handle, [&](Touch& device) {
+    Library& lib = library();
+    kerf::standin::Claim& claim = device.device().claim;
     device.close();
-    library().device.reset();
+    lib.open[handle].reset();
+    claim.give_back();  // once the connection is closed
+    if (lib.current == handle) lib.current = lib.without_device();
   });
 }
 
 KERF_STAND_IN_EXPORT void hdMakeCurrentDevice(Handle handle) {
-  with_handle(handle, [](Touch&) {});
+  with_handle(handle, [&](Touch&) { library().current = handle; });
 }
 
 KERF_STAND_IN_EXPORT Handle hdGetCurrentDevice() {
   Library& lib = library();
   const std::lock_guard lock(lib.mutex);
-  // A client in use runs only if this equals the handle that it gets later.
-  const bool is_documented = lib.session.settings && lib.session.settings->documented_handles;
-  return lib.device || !is_documented ? kTheDevice : kNoDevice;
+  return lib.current.load();
 }
 
 KERF_STAND_IN_EXPORT void hdBeginFrame(Handle handle) {
-  with_handle(handle, [](Touch& device) { device.begin_frame(); });
+  with_handle(handle, [&](Touch& device) {
+    library().current = handle;
+    device.begin_frame();
+  });
 }
 
 KERF_STAND_IN_EXPORT void hdEndFrame(Handle handle) {
@@ -274,16 +334,12 @@ KERF_STAND_IN_EXPORT void hdStartScheduler() {
   if (lib.scheduler.is_servo_thread() && lib.scheduler.stops()) {
     return lib.refuse(kInvalidOperation);
   }
-  lib.scheduler.finish_stop();  // the device stops before it runs again
-  {
-    const std::lock_guard lock(lib.mutex);
-    if (lib.device) lib.device->run(true, lib.rate_hz);
-  }
+  lib.scheduler.finish_stop();  // the devices stop before they run again
+  lib.run(true);
   try {
     lib.scheduler.start(lib.lockstep(), lib.rate_hz, lib.priority());
   } catch (const std::exception&) {  // the system has no thread left
-    const std::lock_guard lock(lib.mutex);
-    if (lib.device) lib.device->run(false, lib.rate_hz);
+    lib.run(false);
     lib.refuse(kTimer);
   }
 }
@@ -291,8 +347,7 @@ KERF_STAND_IN_EXPORT void hdStartScheduler() {
 KERF_STAND_IN_EXPORT void hdStopScheduler() {
   Library& lib = library();
   lib.scheduler.stop();
-  const std::lock_guard lock(lib.mutex);
-  if (lib.device) lib.device->run(false, lib.rate_hz);
+  lib.run(false);
 }
 
 KERF_STAND_IN_EXPORT void hdSetSchedulerRate(Ulong hertz) {

@@ -25,7 +25,7 @@ struct ErrorInfo {
 static_assert(sizeof(ErrorInfo) == 12);
 
 inline constexpr Handle kNoDevice = 0xFFFFFFFF;
-inline constexpr Handle kTheDevice = 0;
+inline constexpr Handle kFirstDevice = 0;
 
 enum Error : Enum {
   kSuccess = 0,

@@ -14,14 +14,29 @@ namespace {
 constexpr double kVelocityWindowS = 0.01;  // the vendor's filter is not known
 constexpr double kNothingN = 1e-9;
 
+/// The pose with all joints at 0.
+[[nodiscard]] standin::Pose pose_of_zeros() noexcept {
+  constexpr double kHalf =
+      0.70710678118654752;  // a stylus along -z: kerf's tool turned by 90 degrees
+  standin::Pose pose;
+  pose.tip_mm = {0, kShoulderYMm - kLinkMm, kShoulderZMm + kLinkMm};
+  pose.orientation = {kHalf, 0, 0, kHalf};
+  return pose;
+}
+
 }  // namespace
 
-Touch::Touch(const standin::Settings& settings, standin::Ledger& ledger, ErrorStack& errors)
+Touch::Touch(const standin::Settings& settings, standin::Device& device, ErrorStack& errors,
+             Handle handle, bool is_locked_out)
     : settings_(settings),
-      ledger_(ledger),
+      device_(device),
+      ledger_(device.ledger),
       errors_(errors),
-      arm_(settings, ledger),
-      rate_hz_(settings.rate_hz),
+      handle_(handle),
+      serial_("KERF" + std::to_string(device.number)),
+      arm_(is_locked_out ? standin::EmulatedArm(settings, pose_of_zeros(), ledger_)
+                         : standin::EmulatedArm(settings, device.settings, ledger_)),
+      rate_hz_(device.settings.rate_hz),
       calibrated_(!settings.uncalibrated) {
   ledger_.add(Row::opened);
 }

@@ -12,6 +12,7 @@
 #include "standin/hd/numbers.hpp"
 #include "standin/hd/touch_kinematics.hpp"
 #include "standin/ledger.hpp"
+#include "standin/session.hpp"
 #include "standin/settings.hpp"
 
 /// The open device of the HD stand-in: frames, force, limits, parameters.
@@ -36,15 +37,17 @@ struct Readings {
   Transform16 transform{};
 };
 
-/// A Touch behind kerf-emulator. Every error goes to the stack; nothing throws after the
-/// constructor. One thread at a time; only in lock-step does `end_tick` wait.
+/// A Touch behind kerf-emulator. Every error goes to the stack, with the handle; nothing throws
+/// after the constructor. One thread at a time; only in lock-step does `end_tick` wait.
 ///
 /// A frame: `begin_frame` samples, sets act on the frame, `end_frame` fixes its force; the packet
 /// leaves at the end of the tick, or at once without a scheduler. The force of a frame begins at 0.
 class Touch {
  public:
-  /// Throws std::runtime_error with one line.
-  Touch(const standin::Settings& settings, standin::Ledger& ledger, ErrorStack& errors);
+  /// `is_locked_out`: another process has the device, and this one sees the pose with all joints at
+  /// 0. Throws std::runtime_error with one line.
+  Touch(const standin::Settings& settings, standin::Device& device, ErrorStack& errors,
+        Handle handle, bool is_locked_out);
 
   void begin_tick() noexcept;
   /// A frame that is still open is thrown away and counted.
@@ -55,6 +58,7 @@ class Touch {
   void run(bool runs, int rate_hz) noexcept;
   /// The motors go off.
   void close() noexcept;
+  [[nodiscard]] standin::Device& device() const noexcept { return device_; }
 
   void enable(Enum capability, bool on) noexcept;
   [[nodiscard]] bool is_enabled(Enum capability) noexcept;
@@ -81,11 +85,14 @@ class Touch {
   [[nodiscard]] DeviceVec<double> limited(DeviceVec<double> force_n) noexcept;
   void send() noexcept;
   void count_not_cleared() noexcept;
-  void push(Enum code) noexcept { errors_.push(code); }
+  void push(Enum code) noexcept { errors_.push(code, handle_); }
 
   const standin::Settings& settings_;
+  standin::Device& device_;
   standin::Ledger& ledger_;
   ErrorStack& errors_;
+  Handle handle_;
+  std::string serial_;
   standin::EmulatedArm arm_;
 
   Readings now_, before_;

@@ -213,7 +213,7 @@ const char* Touch::text(Enum name) noexcept {
     case kDriverVersion:
       return "kerf " KERF_VERSION;
     case kSerial:
-      return "KERF0";
+      return serial_.c_str();
     default:
       break;
   }

@@ -3,6 +3,7 @@
 
 #include <stdexcept>
 #include <string>
+#include <tuple>
 
 #include <doctest/doctest.h>
 
@@ -23,10 +24,12 @@ std::string refusal_of(const std::string& text) {
 
 TEST_CASE("a socket alone is enough, and every unknown of a vendor has its first word then") {
   const auto settings = standin::parse_settings("socket:/tmp/a b/device");
-  CHECK(settings.socket == "/tmp/a b/device");
-  CHECK(settings.device == kerf::Personality::touch);
+  REQUIRE(settings.devices.size() == 1);
+  CHECK(settings.devices[0].socket == "/tmp/a b/device");
+  CHECK(settings.devices[0].kind == kerf::Personality::touch);
+  CHECK(settings.devices[0].name == "Default Device");
   CHECK_FALSE(settings.lockstep);
-  CHECK(settings.rate_hz == 1000);
+  CHECK(settings.devices[0].rate_hz == 1000);
   CHECK(settings.ledger.empty());
   CHECK_FALSE(settings.drop_without_frame);
   CHECK_FALSE(settings.uncalibrated);
@@ -37,12 +40,13 @@ TEST_CASE("every key of the settings is read") {
       "socket:s,device=omega,lockstep,rate=4000,priority=81,ledger=/"
       "l,missed=drop,stop=drop,excess=cut,"
       "before-enable=ignore,calibration=lost,handles=documented,button0=hand,status=16,ramp=0.5,"
-      "stall=20");
-  CHECK(settings.device == kerf::Personality::omega);
+      "stall=20,in-use=pose");
+  CHECK(settings.devices[0].kind == kerf::Personality::omega);
   CHECK(settings.lockstep);
-  CHECK(settings.rate_hz == 4000);
+  CHECK(settings.devices[0].rate_hz == 4000);
   CHECK(settings.priority == 81);
-  CHECK(settings.ledger == "/l");
+  CHECK(settings.devices[0].ledger == "/l");
+  CHECK(settings.ledger == "/l");  // of a single device: what belongs to none, too
   CHECK(settings.drop_without_frame);
   CHECK(settings.drop_on_stop);
   CHECK(settings.cut_excess);
@@ -53,18 +57,50 @@ TEST_CASE("every key of the settings is read") {
   CHECK(settings.short_status);
   CHECK(settings.ramp_s == 0.5);
   CHECK(settings.stall_ms == 20);
+  CHECK(settings.in_use == standin::InUse::pose);
   CHECK_FALSE(standin::parse_settings("socket:s,missed=drop,missed=hold").drop_without_frame);
+}
+
+TEST_CASE("each socket begins a device, with the keys behind it as its own") {
+  const auto settings = standin::parse_settings(
+      "socket:/a,name=Left Device,ledger=/la,socket:/b,ledger=/lb,lockstep,socket:/c,device=omega,"
+      "rate=4000,socket:/d,device=omega,program=/l,stop=drop");
+  REQUIRE(settings.devices.size() == 4);
+  const auto& [a, b, c, d] =
+      std::tie(settings.devices[0], settings.devices[1], settings.devices[2], settings.devices[3]);
+  CHECK((a.socket == "/a" && a.name == "Left Device" && a.ledger == "/la"));
+  CHECK((b.socket == "/b" && b.name == "Default Device 2" && b.ledger == "/lb"));
+  CHECK((c.kind == kerf::Personality::omega && c.rate_hz == 4000 && c.name == "Default Device"));
+  CHECK((d.kind == kerf::Personality::omega && d.rate_hz == 1000 && d.name == "Default Device 2"));
+  CHECK(settings.ledger == "/l");
+  CHECK(settings.lockstep);
+  CHECK(settings.drop_on_stop);
+}
+
+TEST_CASE("devices that one program cannot have are refused by the part that says so") {
+  CHECK(refusal_of("socket:a,socket:b,socket:c,socket:d") == "accepted");
+  CHECK(refusal_of("socket:a,socket:b,socket:c,socket:d,socket:e") ==
+        "KERF_STAND_IN: 'socket:e'; a program has at most 4 devices");
+  const char* const twice =
+      "KERF_STAND_IN: 'name=L'; two devices of a kind have it; give each its own";
+  CHECK(refusal_of("socket:a,name=L,socket:b,name=L") == twice);
+  CHECK(refusal_of("socket:a,name=L,socket:b,device=omega,name=L") == "accepted");
+  CHECK(refusal_of("socket:a,socket:b,name=Default Device") != "accepted");
+  CHECK(refusal_of("socket:a,rate=500,socket:b,rate=1000") ==
+        "KERF_STAND_IN: 'rate=1000'; one servo thread serves all of a program");
+  CHECK(refusal_of("socket:a,device=omega,rate=500,socket:b,device=omega") == "accepted");
 }
 
 TEST_CASE(
     "a switch alone is refused by the words and ranges of the list, and nothing else is one") {
-  for (const char* word :
-       {"missed=drop", "hand=pushed", "ramp=0", "ramp=10", "stall=1", "stall=60000"}) {
+  for (const char* word : {"missed=drop", "hand=pushed", "in-use=value", "ramp=0", "ramp=10",
+                           "stall=1", "stall=60000"}) {
     CAPTURE(word);
     CHECK(standin::refusal_of_switch(word).empty());
     CHECK(refusal_of(std::string("socket:s,") + word) == "accepted");
   }
   CHECK(standin::refusal_of_switch("missed=keep") == "take hold or drop");
+  CHECK(standin::refusal_of_switch("in-use=yes") == "take timer, value or pose");
   CHECK(standin::refusal_of_switch("missed") == "take hold or drop");
   CHECK(standin::refusal_of_switch("ramp=10.1") == "give a number from 0 to 10");
   CHECK(standin::refusal_of_switch("ramp=x'; y") == "give a number from 0 to 10");
@@ -83,7 +119,8 @@ TEST_CASE("wrong settings are refused in one line that names the part") {
   for (const char* text :
        {"", "udp:1", "socket:", "socket:s,", "socket:s,missed=keep", "socket:s,rate=0",
         "socket:s,rate=nan", "socket:s,device=falcon", "socket:s,ledger=", "socket:s,stall=1e9",
-        "socket:s,what=ever", "socket:s,lockstep=1"}) {
+        "socket:s,what=ever",
+        "socket:s,name=", "socket:s,program=", "socket:s,socket:", "socket:s,lockstep=1"}) {
     CAPTURE(text);
     const std::string line = refusal_of(text);
     CHECK(line.starts_with("KERF_STAND_IN: '"));

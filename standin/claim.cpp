@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "standin/claim.hpp"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+namespace kerf::standin {
+namespace {
+
+[[nodiscard]] struct flock whole_file() noexcept {
+  struct flock lock {};
+  lock.l_type = F_WRLCK;
+  lock.l_whence = SEEK_SET;
+  return lock;
+}
+
+[[nodiscard]] int open_lock(const std::string& path) noexcept {
+  return open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600);
+}
+
+}  // namespace
+
+bool Claim::take() noexcept {
+  if (fd_ >= 0) return true;
+  fd_ = open_lock(path_);
+  struct flock lock = whole_file();
+  // A lock of the open file, not of the process: another copy of the library here asks, too.
+  if (fd_ < 0 || fcntl(fd_, F_OFD_SETLK, &lock) == 0) return true;
+  give_back();
+  return false;
+}
+
+void Claim::give_back() noexcept {
+  if (fd_ >= 0) close(fd_);
+  fd_ = -1;
+}
+
+bool Claim::is_with_another() const noexcept {
+  if (fd_ >= 0) return false;
+  const int fd = open_lock(path_);
+  if (fd < 0) return false;
+  struct flock lock = whole_file();
+  const bool is_held = fcntl(fd, F_OFD_GETLK, &lock) == 0 && lock.l_type != F_UNLCK;
+  close(fd);
+  return is_held;
+}
+
+}  // namespace kerf::standin
