@@ -17,6 +17,7 @@
 #include <utility>
 
 #include "record/earlier_inputs.hpp"
+#include "record/log_clock.hpp"
 #include "record/recording.hpp"
 #include "record/starting_volumes.hpp"
 #include "shared/posix/atomic_file.hpp"
@@ -175,6 +176,7 @@ class FlightRecorder final : TickSink {
         capacity_(static_cast<std::uint64_t>(
             std::ceil(options.flight_s * 1e9 / reader().info().tick_ns))),
         window_(capacity_ + reader().info().state_slots, reader().info().arms),
+        watch_(reader().info().start_ns == 0),
         start_(options.name, options.out, reader().info().arms),
         recorder_(reader(), *this) {
     if (!options.lead.empty()) lead_.emplace(options.lead);
@@ -221,7 +223,17 @@ class FlightRecorder final : TickSink {
     if (lead_ && start_.has_volumes()) {
       lead_->allow(recorder_.next() + reader().info().state_slots / 2);
     }
+    if (const auto pair = watch_.take(read_clocks())) keep_pair(*pair);
     return recorder_.poll();
+  }
+
+  /// Keeps the pairs from the last one before the window on.
+  void keep_pair(const ClockPair& pair) {
+    const auto window_ns = static_cast<std::int64_t>(window_.capacity()) * reader().info().tick_ns;
+    pairs_.push_back(pair);
+    while (pairs_.size() > 1 && pairs_[1].monotonic_ns < pair.monotonic_ns - window_ns) {
+      pairs_.erase(pairs_.begin());
+    }
   }
 
   /// Follows the run while `slow`, which waits for the disk, has a thread of its own.
@@ -302,10 +314,12 @@ class FlightRecorder final : TickSink {
     ArmSummaries figures{summary.result(losses, reason)};
     if (second) figures.push_back(second_summary.result(losses, reason));
     losses.lost = figures.front().lost_ticks;
+    const std::vector<ClockPair> pairs = pairs_;  // `follow` adds to them meanwhile
     follow_during([&] {
       log.sync();
       if (second) second->sync();
       write_new_file(folder / kSceneName, reader().info().scene_json);
+      write_clock(folder, pairs);
       write_manifest(folder, reader().info(), losses, log.rows(), reason, figures);
     });
     return lacks;
@@ -315,6 +329,8 @@ class FlightRecorder final : TickSink {
   const SegmentConnection& connection_;
   std::uint64_t capacity_;  ///< of a recording
   TickWindow window_;
+  ClockWatch watch_;
+  std::vector<ClockPair> pairs_;
   RunStart start_;
   Recorder recorder_;
   std::optional<TickLead> lead_;

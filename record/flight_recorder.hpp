@@ -29,6 +29,8 @@ class TickWindow final : public TickSink {
   void append_second(const TickRecord& record) override;
   void append(const TickRecord& record) override;
 
+  /// Ticks that it holds at most.
+  [[nodiscard]] std::size_t capacity() const noexcept { return rows_.size(); }
   /// Rows so far: row `i` of all is there if `first() <= i < end()`.
   [[nodiscard]] std::uint64_t end() const noexcept { return end_; }
   [[nodiscard]] std::uint64_t first() const noexcept {

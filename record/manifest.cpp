@@ -77,6 +77,7 @@ void write_manifest(const std::filesystem::path& folder, const SegmentInfo& info
   manifest["tick_ns"] = info.tick_ns;
   manifest["start_ns"] = info.start_ns;
   manifest["scene"] = kSceneName;
+  if (std::filesystem::exists(folder / kClockName)) manifest["clock"] = kClockName;
   for (const SegmentVolumeInfo& volume : info.volumes) {
     manifest["volumes"].push_back(
         {{"size_vox", std::array{volume.grid.nx, volume.grid.ny, volume.grid.nz}},
@@ -125,6 +126,7 @@ Manifest read_manifest(const std::filesystem::path& folder) {
       out.losses.gaps.push_back(
           {gap.at("first_index").get<std::uint64_t>(), gap.at("count").get<std::uint64_t>()});
     }
+    out.has_clock = json.contains("clock");
     if (json.contains("arms")) out.arms = json.at("arms").get<std::size_t>();
     for (const char* const key : {"summary", "summary_2"}) {
       if (json.contains(key)) out.summaries.push_back(summary_of(json.at(key)));

@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "record/log_clock.hpp"
 #include "shared/numeric/energy_source.hpp"
 #include "shared/segment/reader.hpp"
 
@@ -49,7 +50,7 @@ inline constexpr std::string_view kNoRoom = "no room";  ///< the disk was full
 [[nodiscard]] inline std::vector<std::filesystem::path> recording_files(
     const std::filesystem::path& folder) {
   return {folder / tick_log_name(0), folder / tick_log_name(1), folder / kManifestName,
-          folder / kSceneName};
+          folder / kSceneName, folder / kClockName};
 }
 
 /// The figures of one recording.
@@ -91,11 +92,12 @@ struct Manifest {
   std::vector<double> voxel_mm3;  ///< per volume
   std::string session_id;         ///< of the run, as 16 hexadecimal digits
   std::string end_reason;
+  bool has_clock = false;  ///< names clock.npy: log_clock.hpp
   RecordLosses losses;     ///< until the last loss that the recorder wrote down
   ArmSummaries summaries;  ///< of all rows
 };
 
-/// Writes manifest.json, whole or not at all.
+/// Writes manifest.json, whole or not at all. It names clock.npy if that is in `folder`.
 void write_manifest(const std::filesystem::path& folder, const SegmentInfo& info,
                     const RecordLosses& losses, std::uint64_t rows, std::string_view end_reason,
                     const ArmSummaries& summaries = {});

@@ -10,6 +10,7 @@
 #include <thread>
 #include <utility>
 
+#include "record/log_clock.hpp"
 #include "record/recording.hpp"
 #include "record/starting_volumes.hpp"
 #include "record/tick_log.hpp"
@@ -259,6 +260,7 @@ class Recording {
       : out_(options.out),
         connection_(connection),
         logs_(out_, begin, reader().info()),
+        clock_(out_, reader().info().start_ns == 0),
         recorder_(begin.next ? Recorder(reader(), logs_, *begin.next, begin.losses)
                              : Recorder(reader(), logs_)),
         whole_(logs_.rows() == 0),
@@ -283,6 +285,7 @@ class Recording {
         std::cerr << "kerf-recorder: GAP: " << more << " ticks overwritten before they were read\n";
         manifest(kStillRunning);
       }
+      clock_.follow();
       if (Clock::now() >= next_sync) {
         logs_.sync();
         next_sync = Clock::now() + kSyncPeriod;
@@ -312,6 +315,7 @@ class Recording {
   std::filesystem::path out_;
   const SegmentConnection& connection_;
   ArmLogs logs_;
+  ClockWriter clock_;
   Recorder recorder_;
   bool whole_;  ///< all rows went through `logs_`
   std::optional<TickLead> lead_;

@@ -165,8 +165,11 @@ std::string to_text(const RecordSummary& summary) {
   return text.str();
 }
 
-std::string to_json(const RecordSummary& summary) {
-  return figures_of(summary).document();
+std::string to_json(const RecordSummary& summary, std::string_view date) {
+  Json figures = figures_of(summary);
+  figures["date"] = nullptr;
+  if (!date.empty()) figures["date"] = date;
+  return figures.document();
 }
 
 void export_csv(const std::filesystem::path& folder, const std::filesystem::path& csv,

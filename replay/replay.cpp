@@ -17,6 +17,7 @@
 
 #include "controller/loop/publisher.hpp"
 #include "record/earlier_inputs.hpp"
+#include "record/log_clock.hpp"
 #include "record/recording.hpp"
 #include "record/starting_volumes.hpp"
 #include "record/tick_log_writer.hpp"
@@ -88,6 +89,7 @@ class ReplayLog {
     check_new_folder(out);
     make_recording_folder(out);
     copy_inputs(from, out, run.earlier_ticks());
+    if (run.manifest.has_clock) write_clock(out, read_clock(from, true).pairs());
     return out;
   }
 

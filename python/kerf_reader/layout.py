@@ -42,6 +42,8 @@ TICK = np.dtype([
     ("plane_normal", "<f4", 9), ("plane_arm_mm", "<f4", 9), ("command", "<u4"), ("command_argument", "<u4"),
     ("crc32c", "<u4")])
 
+CLOCK = np.dtype([("monotonic_ns", "<i8"), ("utc_ns", "<i8"), ("within_ns", "<u4"), ("crc32c", "<u4")])  # of clock.npy
+
 STARTED = 1 << 9  # of `flags`: taken in hand at least once
 FINAL = 3         # the first `lifecycle` that ends a run
 BRICK = 8         # voxels along its edge

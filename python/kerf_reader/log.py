@@ -4,17 +4,17 @@ import pathlib
 
 import numpy as np
 
-from .layout import STARTED, TICK
+from .layout import CLOCK, STARTED, TICK
 
 
-def _rows_of(file):
+def _rows_of(file, kind=TICK):
     try:
         rows = np.load(file, mmap_mode="r")
     except (ValueError, EOFError, OverflowError):  # each release of NumPy has its own words
         size = file.stat().st_size
         what = "is empty" if size == 0 else f"{size} bytes are no table of NumPy, or the file was cut"
         raise ValueError(f"{file}: {what}; record it again, or give the folder of another recording") from None
-    if getattr(rows, "dtype", None) != TICK or rows.ndim != 1:
+    if getattr(rows, "dtype", None) != kind or rows.ndim != 1:
         raise ValueError(f"{file}: no ticks of this version of kerf; give the folder of a recording, or use its kerf_reader")
     return rows
 
@@ -33,7 +33,8 @@ class Log:
     """What kerf-recorder wrote into `folder`; docs/log.md tells each column.
 
     ticks: one row for each tick, read from the disk as it is used. second: of a run with two devices the second's rows,
-    row i of the same tick as row i of ticks; else None. scene, manifest: as dictionaries."""
+    row i of the same tick as row i of ticks; else None. scene, manifest: as dictionaries. clock: readings of CLOCK_MONOTONIC
+    and UTC at one moment; None in logs of earlier versions."""
 
     def __init__(self, folder):
         folder = pathlib.Path(folder)
@@ -41,6 +42,7 @@ class Log:
             self.ticks = _rows_of(folder / "ticks.npy")
             self.manifest = _words_of(folder / "manifest.json")
             self.scene = _words_of(folder / "scene.json")
+            self.clock = _rows_of(folder / "clock.npy", CLOCK) if "clock" in self.manifest else None
             self.second = _rows_of(folder / "ticks-2.npy") if self.manifest.get("arms") == 2 else None
         except OSError as error:
             below = folder / "log"  # of --out of a demo
@@ -65,6 +67,14 @@ class Log:
     def seconds(self):
         """Time of each row since the first one."""
         return (self.ticks["tick"] - self.ticks["tick"][:1]) * self.tick_s
+
+    @property
+    def utc(self):
+        """Date of each row, as datetime64[ns]; of lock-step runs in virtual time from the date of the start on."""
+        if self.clock is None or len(self.clock) == 0:
+            raise ValueError("the log has no date: clock.npy is missing; use seconds")
+        offset_ns = self.clock["utc_ns"][-1] - self.clock["monotonic_ns"][-1]
+        return (self.ticks["start_ns"].astype(np.int64) + offset_ns).view("datetime64[ns]")
 
     @property
     def started(self):

@@ -176,14 +176,25 @@ std::vector<Column> columns_in(hid_t group) {
   return out;
 }
 
+/// The column of times, which no log has.
+constexpr LayoutField kTimeField{"", "time_ns", offsetof(TickRecord, start_ns), "i64", 1, 0, 0, ""};
+
+LogColumn time_column(const LogClock& clock) {
+  if (!clock.has_date()) return {"time_ns", "ns", "start_ns: when the tick began, CLOCK_MONOTONIC"};
+  return {"time_ns", "ns", "when the tick began: UTC, since 1970-01-01, without leap seconds"};
+}
+
 void write_ticks(hid_t file, const char* name, const std::filesystem::path& path,
-                 TickLogReader& log, TickRange range) {
+                 TickLogReader& log, TickRange range, const LogClock& clock) {
   const Handle group(H5Gcreate2(file, name, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), H5Gclose);
   std::vector<Column> columns = columns_in(group);
+  Column times(group, kTimeField, time_column(clock));
   std::vector<TickRecord> rows;
   hsize_t written = 0;
   const auto flush = [&] {
     for (Column& column : columns) column.append(rows, written);
+    for (TickRecord& row : rows) row.start_ns += static_cast<std::uint64_t>(clock.offset_ns());
+    times.append(rows, written);
     written += rows.size();
     rows.clear();
   };
@@ -212,7 +223,8 @@ void write_scene(hid_t file, const std::filesystem::path& folder) {
 }
 
 void write_file(const std::filesystem::path& path, const std::filesystem::path& folder,
-                const Manifest& manifest, std::span<TickLogReader> logs, TickRange range) {
+                const Manifest& manifest, std::span<TickLogReader> logs, TickRange range,
+                const LogClock& clock) {
   // The last library that reads it: h5py and MATLAB from 2015 on.
   const Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
   checked(H5Pset_libver_bounds(access, H5F_LIBVER_EARLIEST, H5F_LIBVER_V18));
@@ -221,9 +233,10 @@ void write_file(const std::filesystem::path& path, const std::filesystem::path& 
   put_number(file, "tick_ns", manifest.tick_ns);
   put_text(file, "session_id", manifest.session_id);
   put_text(file, "end_reason", manifest.end_reason);
+  put_text(file, "clock", clock.has_date() ? "UTC" : "CLOCK_MONOTONIC");
   write_scene(file, folder);
-  write_ticks(file, "ticks", path, logs[0], range);
-  if (logs.size() > 1) write_ticks(file, "ticks_2", path, logs[1], range);
+  write_ticks(file, "ticks", path, logs[0], range, clock);
+  if (logs.size() > 1) write_ticks(file, "ticks_2", path, logs[1], range, clock);
   checked(H5Fflush(file, H5F_SCOPE_GLOBAL));  // a full disk is reported here, not by the release
 }
 
@@ -252,7 +265,7 @@ class PartFile {
 }  // namespace
 
 void export_hdf5(const std::filesystem::path& folder, const std::filesystem::path& hdf5,
-                 TickRange range) {
+                 TickRange range, const LogClock& clock) {
   check_outputs(recording_files(folder), {{"--hdf5", hdf5, ".h5"}});
   if (is_stream(hdf5)) {
     throw RecordError(hdf5.string() + ": HDF5 is no stream; give the name of a file");
@@ -268,7 +281,7 @@ void export_hdf5(const std::filesystem::path& folder, const std::filesystem::pat
   const PartFile part(hdf5);
   std::error_code fault;
   try {
-    write_file(part.path(), folder, manifest, logs, range);
+    write_file(part.path(), folder, manifest, logs, range, clock);
     std::filesystem::rename(part.path(), hdf5, fault);
     if (!fault) return;
   } catch (const Hdf5Failure&) {  // NOLINT(bugprone-empty-catch): reported below

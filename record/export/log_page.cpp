@@ -23,6 +23,7 @@ manifest is then 2.
 |---|---|
 | `ticks.npy` | one row for each tick, the columns below, for NumPy as it is |
 | `ticks-2.npy` | of a run with two devices: the second's, in the same columns. Row i of both is the same tick; a tick that was lost is in neither |
+| `clock.npy` | the date: one row at the start, one a minute, and one after UTC was set; [below](#the-date) |
 | `manifest.json` | length of a tick, voxels, versions, compiler and processor, losses of the recorder and where they lie, how the run ended |
 | `scene.json` | the scene as it was loaded, every setting; `source` is what it was loaded from |
 | `volumes/HASH.npy.gz` | the densities of a volume as the run began, `[z, y, x]`; `HASH-labels.npy.gz`: its labels. HASH is `density_hash` in `scene.json`, of both |
@@ -37,6 +38,19 @@ Three lines of NumPy read it (`python/` is a reader with more, `examples/python/
 `log["position_mm"]` is an array of rows x 3. World millimetres, newtons at the device port, little-endian.
 `./kerf replay DIR/log` runs it again ([replay](replay.md)). `info` counts as lost what was published and is in no row, so the
 manifest says the same; a recorder that was killed leaves a manifest that says `running`, and all rows.
+
+## The date
+
+Rows have the time of CLOCK_MONOTONIC, which begins anew at each boot. Each row of `clock.npy` has both clocks of one moment: `monotonic_ns`
+and `utc_ns` (since 1970-01-01, negative before), both read within `within_ns`, and `crc32c` of these. The last row dates all ticks:
+
+    clock = np.load("DIR/log/clock.npy")
+    utc_ns = log["start_ns"].astype("i8") + (clock["utc_ns"] - clock["monotonic_ns"])[-1]
+    print(utc_ns.view("datetime64[ns]")[0])
+
+`info` prints the first tick's date, and one line if UTC was set in the run: ticks before that have the date which the clock would have
+shown if it had been set already, so dates do not run back. In lock-step time is virtual: tick 0 has the date at which the recorder
+began, and each tick is one tick's length later, however long it took. Logs of earlier versions have no date.
 
 ## The energy from the other columns
 
@@ -67,7 +81,8 @@ a step of `position_mm` (2^-16 mm) is more than a step of the device, and the re
     ./kerf record export DIR/log --csv run.csv
 
 MCAP opens in Foxglove and its open forks, in PlotJuggler and with ROS 2 (`ros2 bag`); the definitions of the messages are in
-the file. Times are `start_ns`.
+the file. Times are UTC; `--time monotonic` gives `start_ns`, and a log without date has no other (one line says so). A date before 1970
+or after 2038-01-19 is refused, since ROS 2 has none. The column `start_ns` stays as it is.
 
 | topic | message | rate |
 |---|---|---|
@@ -83,7 +98,8 @@ four of CDR.
 
 HDF5 opens in MATLAB (`h5read("run.h5", "/ticks/position_mm")`), Julia, R and h5py: one dataset per column, `/ticks/COLUMN`,
 with `units`, `description` and `valid` as attributes, and `codes` if its values are codes or bits. `/ticks_2` is a
-second device's. `/scene` is the scene's JSON.
+second device's. `/scene` is the scene's JSON. `/ticks/time_ns` is each row's time, UTC or with `--time monotonic` `start_ns`;
+the file's attribute `clock` says which.
 
 A running controller can be plotted without a log: [Foxglove](second-machine.md) by the bridge, and PlotJuggler's UDP server
 (protocol JSON, timestamp from the message; a second device is in `kerf_2`) by

@@ -59,10 +59,16 @@ std::vector<std::uint64_t> counts_of_rows(const std::filesystem::path& folder,
   return counts;
 }
 
+std::string no_such_time(const std::filesystem::path& folder, std::int64_t time_ns) {
+  return (folder / kClockName).string() + ": " + date_text(time_ns) +
+         " is no date of an MCAP for " +
+         "ROS 2, which has 1970 to 2038-01-19; give --time monotonic";
+}
+
 /// What a replay needs besides the ticks, whose `counts` were read before them. Returns a line for
 /// each file that is left out.
 std::vector<std::string> attach_files(const std::filesystem::path& folder,
-                                      const std::vector<std::uint64_t>& counts,
+                                      const std::vector<std::uint64_t>& counts, bool has_clock,
                                       McapWriter& writer) {
   std::vector<std::string> left_out;
   const auto leave_out = [&](const std::filesystem::path& path, const std::string& value) {
@@ -77,6 +83,7 @@ std::vector<std::string> attach_files(const std::filesystem::path& folder,
   for (const std::string_view name : {kManifestName, kSceneName}) {
     attach(std::string(name), "application/json");
   }
+  if (has_clock) attach(std::string(kClockName), "application/octet-stream");
   for (const std::string_view below : {kVolumesName, inputs_name(0), inputs_name(1)}) {
     std::vector<std::string> names;
     std::error_code fault;
@@ -101,7 +108,7 @@ std::vector<std::string> attach_files(const std::filesystem::path& folder,
 
 std::vector<std::string> export_mcap(const std::filesystem::path& folder,
                                      const std::filesystem::path& mcap, McapWriter::Packing packing,
-                                     TickRange range) {
+                                     TickRange range, const LogClock& clock) {
   check_outputs(recording_files(folder), {{"--mcap", mcap, ".mcap"}});
   const Manifest manifest = read_manifest(folder);
   AtomicFile file(mcap);
@@ -115,11 +122,15 @@ std::vector<std::string> export_mcap(const std::filesystem::path& folder,
                       std::string(kRosSchemaEncoding), std::string(kRosEncoding)}));
     }
   }
-  RosMessages messages(manifest.tick_ns);
+  RosMessages messages(manifest.tick_ns, clock.offset_ns());
+  std::uint64_t last_ns = 0;
   const auto write_arm = [&](const TickRecord& record, std::size_t arm) {
+    const std::int64_t time_ns = messages.time_ns(record);
+    if (time_ns < 0 || time_ns >= kRosTimeEndNs) throw RecordError(no_such_time(folder, time_ns));
+    last_ns = std::max(last_ns, static_cast<std::uint64_t>(time_ns));
     for (const RosTopic topic : {ros_tick, ros_tip, ros_force}) {
       if (!messages.has(topic, record)) continue;
-      writer.message(channels[arm * kRosTopics + topic], record.start_ns,
+      writer.message(channels[arm * kRosTopics + topic], last_ns,
                      messages.message(topic, record, arm));
     }
   };
@@ -130,7 +141,7 @@ std::vector<std::string> export_mcap(const std::filesystem::path& folder,
     if (second != nullptr) write_arm(*second, 1);
   });
   std::vector<std::string> left_out;
-  if (range.is_whole()) left_out = attach_files(folder, counts, writer);
+  if (range.is_whole()) left_out = attach_files(folder, counts, manifest.has_clock, writer);
   writer.close();
   file.close();
   file.commit();

@@ -9,6 +9,7 @@
 #include "record/export/mcap_export.hpp"
 #include "record/flight_recorder.hpp"
 #include "record/force_plot.hpp"
+#include "record/log_clock.hpp"
 #include "record/recording.hpp"
 #include "shared/posix/atomic_file.hpp"
 #include "shared/posix/program.hpp"
@@ -29,6 +30,29 @@ RecordSummary summary_for_info(const std::filesystem::path& folder, TickRange ra
     if (const auto kept = kept_summary(folder, arm)) return *kept;
   }
   return summarise(folder, range, arm);
+}
+
+/// The date of the first row of `range`; empty if there is none.
+std::string date_of(const std::filesystem::path& folder, TickRange range, const LogClock& clock) {
+  TickLogReader log(folder / tick_log_name(0));
+  TickRecord first;
+  if (!clock.has_date() || log.read(log.row_of(range.from), std::span(&first, 1)) == 0) return {};
+  return date_text(static_cast<std::int64_t>(first.start_ns) + clock.offset_ns());
+}
+
+std::string shown(const std::string& date, const LogClock& clock) {
+  if (!clock.has_date()) return "none";
+  if (date.empty()) return "none: no tick";
+  return date + (clock.is_virtual() ? ", of ticks in virtual time" : "");
+}
+
+/// Prints what is to be said of the dates. Whether clock.npy is sound.
+bool report_clock(const std::filesystem::path& folder, const LogClock& clock) {
+  if (!clock.problem().empty()) std::cerr << "kerf-record: " << clock.problem() << '\n';
+  if (const std::string set = clock.set_in_the_run(); !set.empty()) {
+    std::cerr << "kerf-record: " << (folder / kClockName).string() << ": " << set << '\n';
+  }
+  return clock.problem().empty();
 }
 
 /// Prints a line for each arm whose log has fewer rows than its header counts. Whether one has.
@@ -55,6 +79,7 @@ int run_record(int argc, char** argv) {
   std::filesystem::path svg;
   std::filesystem::path csv, mcap, hdf5;
   bool unpacked = false, scan = false;
+  std::string time = "epoch";
   TickRange range;
   std::size_t arm = 1;
   std::string name = kDefaultName;
@@ -82,6 +107,12 @@ int run_record(int argc, char** argv) {
   table.option("--csv", csv, "as CSV").shown_as("FILE");
   table.option("--mcap", mcap, "as MCAP, for Foxglove, PlotJuggler and ROS 2").shown_as("FILE");
   table.option("--hdf5", hdf5, "as HDF5, for MATLAB, Julia and h5py").shown_as("FILE");
+  table
+      .option(
+          "--time", time,
+          "of MCAP and HDF5: epoch is UTC since 1970, monotonic the time since the machine started")
+      .one_of({"epoch", "monotonic"})
+      .shows_default();
   table.flag("--unpacked", unpacked, "the MCAP without LZ4, for readers that have none");
   Arguments keep = app.command("grab", "a running flight recorder keeps the ticks until now");
   keep.option("--name", name, "name of the controller").shows_default();
@@ -100,13 +131,18 @@ int run_record(int argc, char** argv) {
                      std::to_string(range.until) + "; no tick lies between them");
   }
   --arm;  // from here on an index
+  bool is_whole = true;
   if (columns.chosen()) std::cout << log_page();
   if (info.chosen()) {
     check_outputs(recording_files(folder), {{"--report", report, ".json"}});
     const RecordSummary summary = summary_for_info(folder, range, arm, scan);
-    if (read_manifest(folder).arms > 1) std::cout << "arm                 " << arm + 1 << " of 2\n";
-    std::cout << to_text(summary);
-    if (!report.empty()) write_new_file(report, to_json(summary));
+    const Manifest manifest = read_manifest(folder);
+    const LogClock clock = read_clock(folder, manifest.has_clock);
+    const std::string date = date_of(folder, range, clock);
+    if (manifest.arms > 1) std::cout << "arm                 " << arm + 1 << " of 2\n";
+    std::cout << "date                " << shown(date, clock) << '\n' << to_text(summary);
+    is_whole = report_clock(folder, clock);
+    if (!report.empty()) write_new_file(report, to_json(summary, date));
   }
   if (plot.chosen()) {
     plot_forces(folder, svg, range, arm);
@@ -119,15 +155,23 @@ int run_record(int argc, char** argv) {
     check_distinct({{"--csv", csv, ".csv"}, {"--mcap", mcap, ".mcap"}, {"--hdf5", hdf5, ".h5"}});
   }
   if (table.chosen() && arm != 0) require_arm(folder, read_manifest(folder), arm);
+  LogClock clock;
+  if (time == "epoch" && !(hdf5.empty() && mcap.empty())) {
+    clock = read_clock(folder, read_manifest(folder).has_clock);
+    if (!clock.has_date()) {
+      std::cerr << "kerf-record: " << folder.string()
+                << ": no date: monotonic; recordings of this version have one\n";
+    }
+    is_whole = report_clock(folder, clock);
+  }
   if (!hdf5.empty()) {
     static_cast<void>(catch_stop_signals());  // leaves no half file
-    export_hdf5(folder, hdf5, range);
+    export_hdf5(folder, hdf5, range, clock);
   }
   if (!csv.empty()) export_csv(folder, csv, range, arm);
-  bool is_whole = true;
   if (!mcap.empty()) {
     const auto packing = unpacked ? McapWriter::Packing::none : McapWriter::Packing::lz4;
-    for (const std::string& line : export_mcap(folder, mcap, packing, range)) {
+    for (const std::string& line : export_mcap(folder, mcap, packing, range, clock)) {
       std::cerr << "kerf-record: " << line << '\n';
       is_whole = false;
     }

@@ -103,21 +103,22 @@ void put_tick(const TickRecord& record, CdrWriter message) {
   }
 }
 
-void put_header(std::uint64_t time_ns, std::string_view frame, CdrWriter& message) {
-  constexpr std::uint64_t kNsPerS = 1'000'000'000;
-  message.number(static_cast<std::int32_t>(time_ns / kNsPerS));
-  message.number(static_cast<std::uint32_t>(time_ns % kNsPerS));
+void put_header(std::int64_t time_ns, std::string_view frame, CdrWriter& message) {
+  constexpr std::int64_t kNsPerS = 1'000'000'000;
+  const std::int64_t ns = (time_ns % kNsPerS + kNsPerS) % kNsPerS;  // counts up before 1970, too
+  message.number(static_cast<std::int32_t>((time_ns - ns) / kNsPerS));
+  message.number(static_cast<std::uint32_t>(ns));
   message.text(frame);
 }
 
-void put_tip(const TickRecord& record, CdrWriter message) {
-  put_header(record.start_ns, "scene", message);
+void put_tip(const TickRecord& record, std::int64_t time_ns, CdrWriter message) {
+  put_header(time_ns, "scene", message);
   for (const double mm : record.position_mm) message.number(mm / 1000);
   for (const float part : record.orientation) message.number(double{part});
 }
 
-void put_force(const TickRecord& record, std::size_t arm, CdrWriter message) {
-  put_header(record.start_ns, arm == 0 ? "device" : "device_2", message);
+void put_force(const TickRecord& record, std::int64_t time_ns, std::size_t arm, CdrWriter message) {
+  put_header(time_ns, arm == 0 ? "device" : "device_2", message);
   for (const float n : record.commanded_force_n) message.number(double{n});
   for (const float n_mm : record.tip_torque_n_mm) message.number(double{n_mm} / 1000);
 }
@@ -134,9 +135,14 @@ std::array<RosChannel, kRosTopics> ros_channels(std::size_t arm) {
            {topics[ros_force], "geometry_msgs/msg/WrenchStamped", wrench_definition()}}};
 }
 
-RosMessages::RosMessages(std::uint64_t tick_ns) noexcept {
+RosMessages::RosMessages(std::uint64_t tick_ns, std::int64_t offset_ns) noexcept
+    : offset_ns_(offset_ns) {
   constexpr std::uint64_t kViewNs = 10'000'000;
   ticks_a_view_ = std::max<std::uint64_t>(1, kViewNs / std::max<std::uint64_t>(1, tick_ns));
+}
+
+std::int64_t RosMessages::time_ns(const TickRecord& record) const noexcept {
+  return static_cast<std::int64_t>(record.start_ns + static_cast<std::uint64_t>(offset_ns_));
 }
 
 bool RosMessages::has(RosTopic topic, const TickRecord& record) const noexcept {
@@ -148,8 +154,8 @@ bool RosMessages::has(RosTopic topic, const TickRecord& record) const noexcept {
 std::string_view RosMessages::message(RosTopic topic, const TickRecord& record, std::size_t arm) {
   const CdrWriter out(cdr_);
   if (topic == ros_tick) put_tick(record, out);
-  if (topic == ros_tip) put_tip(record, out);
-  if (topic == ros_force) put_force(record, arm, out);
+  if (topic == ros_tip) put_tip(record, time_ns(record), out);
+  if (topic == ros_force) put_force(record, time_ns(record), arm, out);
   return cdr_;
 }
 

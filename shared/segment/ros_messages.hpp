@@ -31,15 +31,21 @@ struct RosChannel {
 ///                                                   frame "device"
 ///
 /// The second arm has /kerf/2/tick, /kerf/2/tip and /kerf/2/force, the last in frame "device_2".
-/// Stamps are `start_ns`.
+/// Stamps are `start_ns`, or that with an offset.
 enum RosTopic : std::uint8_t { ros_tick, ros_tip, ros_force };
 inline constexpr std::size_t kRosTopics = 3;
 [[nodiscard]] std::array<RosChannel, kRosTopics> ros_channels(std::size_t arm = 0);
 
-/// Makes the messages of a run with ticks of `tick_ns`.
+/// Stamps have whole seconds in 32 bits: this time and later ones, of 2038, cannot be one.
+inline constexpr std::int64_t kRosTimeEndNs = (std::int64_t{1} << 31) * 1'000'000'000;
+
+/// Makes the messages of a run with ticks of `tick_ns`, whose stamps are `start_ns` + `offset_ns`.
 class RosMessages {
  public:
-  explicit RosMessages(std::uint64_t tick_ns) noexcept;
+  explicit RosMessages(std::uint64_t tick_ns, std::int64_t offset_ns = 0) noexcept;
+
+  /// The stamp of a record's messages.
+  [[nodiscard]] std::int64_t time_ns(const TickRecord& record) const noexcept;
 
   /// True if a tick has a message of this topic. Tip and force have about 100 messages per second;
   /// `ros_tick` has all values of each tick. There is no tip while the position is unknown.
@@ -50,6 +56,7 @@ class RosMessages {
 
  private:
   std::uint64_t ticks_a_view_;
+  std::int64_t offset_ns_;
   std::string cdr_;
 };
 

@@ -50,6 +50,7 @@ def refused(what, kind, words):
 
 
 assert kerf_reader.__file__.startswith(home.name)
+began = time.time()
 quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
 emulator = subprocess.Popen([programs / "kerf-emulator", "--socket", "socket", "--hand", root / "scenes/hands/touch.toml"], **quiet)
 recorder = subprocess.Popen([programs / "kerf-recorder", "--name", "reader", "--out", "log"], **quiet)
@@ -84,6 +85,10 @@ assert last["tick"] == log["tick"][-1] and len(seen) > 2000
 both, mine, of_log = np.intersect1d(seen["tick"], log["tick"], return_indices=True)
 assert len(both) > 2000 and seen[mine].tobytes() == log.ticks[of_log].tobytes()
 assert 1900 < log.started.sum() <= 2001 and abs(log.seconds[-1] - (len(log) - 1) * log.tick_s) < 1e-9
+
+at = log.utc[0].astype("i8") / 1e9
+assert began <= at <= time.time(), (began, at)
+assert (np.diff(log.utc) / np.timedelta64(1, "ns") == np.diff(log["start_ns"].astype("i8"))).all()
 
 header, _, data = pathlib.Path("final.nrrd").read_bytes().partition(b"\n\n")
 if b"encoding: gz" in header:

@@ -15,7 +15,7 @@ import numpy as np
 
 ROOT, BIN = (pathlib.Path(sys.argv.pop(1)).resolve() for _ in range(2))
 sys.path.insert(0, str(ROOT / "tests/record"))
-from lockstep_run import record
+from lockstep_run import record, set_clock
 
 
 def export(log, to, *options, code=0):
@@ -54,7 +54,7 @@ class TestHdf5(unittest.TestCase):
         export(self.log, path)
         with h5py.File(path, "r") as file:
             ticks = file["ticks"]
-            self.assertEqual(sorted(ticks), sorted(self.rows.dtype.names))
+            self.assertEqual(sorted(ticks), sorted([*self.rows.dtype.names, "time_ns"]))
             for name in self.rows.dtype.names:
                 self.assertEqual(ticks[name].dtype, self.rows[name].dtype, name)
                 np.testing.assert_array_equal(ticks[name][:], self.rows[name], name)
@@ -65,6 +65,47 @@ class TestHdf5(unittest.TestCase):
             self.assertEqual(file.attrs["tick_ns"], 1_000_000)
             self.assertEqual(file["scene"][()].decode(), (self.log / "scene.json").read_text())
         self.assertLess(path.stat().st_size, (self.log / "ticks.npy").stat().st_size)
+
+    def test_times_are_utc_or_monotonic(self):
+        log, path = self.folder / "dated", self.folder / "dated.h5"
+        shutil.copytree(self.log, log)
+        start_ns, hour = self.rows["start_ns"].astype("i8"), 3600 * 10**9
+        for utc_ns in (1795960147910139031, -hour, 2**31 * 10**9):  # now, 1969, 2038
+            set_clock(log, (0, utc_ns))
+            for options, offset, clock in (((), utc_ns, b"UTC"), (("--time", "monotonic"), 0, b"CLOCK_MONOTONIC")):
+                self.assertEqual(export(log, path, *options), "")
+                with h5py.File(path, "r") as file:
+                    self.assertEqual(file["ticks/time_ns"].dtype, np.int64)
+                    np.testing.assert_array_equal(file["ticks/time_ns"][:], start_ns + offset)
+                    np.testing.assert_array_equal(file["ticks/start_ns"][:], self.rows["start_ns"])
+                    self.assertEqual(file.attrs["clock"], clock)
+        set_clock(log)
+        self.assertEqual(export(log, path), f"kerf-record: {log}: no date: monotonic; recordings of this version have one\n")
+        with h5py.File(path, "r") as file:
+            np.testing.assert_array_equal(file["ticks/time_ns"][:], start_ns)
+            self.assertEqual(file.attrs["clock"], b"CLOCK_MONOTONIC")
+
+    def test_info_has_the_date(self):
+        log, report = self.folder / "info", self.folder / "info.json"
+        shutil.copytree(self.log, log)
+        hour = 3600 * 10**9
+
+        def date(*options, code=0):
+            done = subprocess.run([BIN / "kerf-record", "info", log, "--report", report, *options], capture_output=True, text=True)
+            self.assertEqual(done.returncode, code)
+            return done.stdout.splitlines()[0].split(None, 1)[1], json.loads(report.read_text())["date"], done.stderr
+
+        set_clock(log, (0, -hour))
+        of_first = "1969-12-31T23:00:00.001000Z"
+        self.assertEqual(date(), (of_first + ", of ticks in virtual time", of_first, ""))
+        self.assertEqual(date("--from", "1500")[1], "1969-12-31T23:00:01.500000Z")
+        set_clock(log, (7, hour + 7), (8, 9), (9, 10))
+        words = f"kerf-record: {log}/clock.npy: UTC was set in the run, by -3600.000 s; dates are those of the clock as it was at the end\n"
+        self.assertEqual(date(), ("1970-01-01T00:00:00.001000Z",) * 2 + (words,))
+        (log / "clock.npy").write_bytes((log / "clock.npy").read_bytes()[:-1])
+        self.assertEqual(date(code=1)[2], f"kerf-record: {log}/clock.npy: cut after 2 of 3 rows; copy it again\n" + words)
+        set_clock(log)
+        self.assertEqual(date(), ("none", None, ""))
 
     def test_a_range_and_no_rows(self):
         path = self.folder / "part.h5"
@@ -89,7 +130,7 @@ class TestHdf5(unittest.TestCase):
         export(two, path)
         with h5py.File(path, "r") as file:
             for group, expected in (("ticks", self.rows), ("ticks_2", rows)):
-                self.assertEqual(sorted(file[group]), sorted(rows.dtype.names))
+                self.assertEqual(sorted(file[group]), sorted([*rows.dtype.names, "time_ns"]))
                 for name in rows.dtype.names:
                     np.testing.assert_array_equal(file[group][name][:], expected[name], name)
         export(self.log, path)

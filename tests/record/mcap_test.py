@@ -15,7 +15,7 @@ import numpy as np
 
 ROOT, BIN, BUILD = (pathlib.Path(sys.argv.pop(1)).resolve() for _ in range(3))
 sys.path.insert(0, str(ROOT / "tests/record"))
-from lockstep_run import record
+from lockstep_run import record, set_clock
 
 
 def get_readers():
@@ -49,6 +49,8 @@ class TestMcap(unittest.TestCase):
         record(ROOT, BIN, cls.folder, ROOT / "scenes/touch.toml", 4)
         cls.log = cls.folder / "log"
         cls.rows = np.load(cls.log / "ticks.npy")
+        clock = np.load(cls.log / "clock.npy")
+        cls.offset_ns = int((clock["utc_ns"] - clock["monotonic_ns"])[-1])
 
     @classmethod
     def tearDownClass(cls):
@@ -69,7 +71,7 @@ class TestMcap(unittest.TestCase):
             np.testing.assert_array_equal(np.array([tick[2] for tick in ticks], dtype=np.float32), self.rows["commanded_force_n"])
             self.assertEqual([int(tick[3]) for tick in ticks], self.rows["output_hash"].tolist())
             self.assertEqual([tick[4] for tick in ticks], self.rows["crc32c"].tolist())
-            self.assertEqual([tick[5] for tick in ticks], self.rows["start_ns"].tolist())
+            self.assertEqual([int(tick[5]) for tick in ticks], (self.rows["start_ns"].astype("i8") + self.offset_ns).tolist())
 
     def test_poses_and_wrenches_are_those_of_ros(self):
         path = self.folder / "views.mcap"
@@ -84,7 +86,7 @@ class TestMcap(unittest.TestCase):
         self.assertEqual(channels["/kerf/tip"]["count"], len(known))
         self.assertEqual(channels["/kerf/force"]["count"], np.count_nonzero(self.rows["tick"] % 10 == 0))
         self.assertEqual(pose["header"]["frame_id"], "scene")
-        self.assertEqual(int(pose["header"]["stamp"]["sec"]) * 10**9 + int(pose["header"]["stamp"]["nanosec"]), known["start_ns"][0])
+        self.assertEqual(int(pose["header"]["stamp"]["sec"]) * 10**9 + int(pose["header"]["stamp"]["nanosec"]), int(known["start_ns"][0]) + self.offset_ns)
         np.testing.assert_array_equal([pose["pose"]["position"][axis] for axis in "xyz"], known["position_mm"][0] / 1000)
         wrench = found["first"]["/kerf/force"]
         self.assertEqual(wrench["header"]["frame_id"], "device")
@@ -94,8 +96,54 @@ class TestMcap(unittest.TestCase):
         path = self.folder / "seek.mcap"
         export(self.log, path)
         found = read(path, 3.5)
-        self.assertEqual(found["ticks"][0][0], 3500)
+        self.assertEqual(found["ticks"][0][0], 3501)  # the first message is of tick 1
         self.assertLess(found["bytesRead"], path.stat().st_size)
+
+    def times(self, log, *options, said=""):
+        """Of the messages of a tick; of the first stamp of a tip."""
+        path = self.folder / "times.mcap"
+        self.assertEqual(export(log, path, *options), said and f"kerf-record: {said}\n")
+        found = read(path)
+        stamp = found["first"]["/kerf/tip"]["header"]["stamp"]
+        return np.array([int(tick[5]) for tick in found["ticks"]]), stamp["sec"] * 10**9 + stamp["nanosec"]
+
+    def test_times_are_utc_or_monotonic(self):
+        log, path = self.folder / "dated", self.folder / "dated.mcap"
+        shutil.copytree(self.log, log)
+        start_ns = self.rows["start_ns"].astype("i8")
+        tip_ns = int(start_ns[np.isfinite(self.rows["position_mm"][:, 0]) & (self.rows["tick"] % 10 == 0)][0])
+        hour = 3600 * 10**9
+        set_clock(log, (5, hour), (2 * 10**9, 2 * hour))  # UTC was set on by an hour, or nearly
+        words = f"{log}/clock.npy: UTC was set in the run, by +3598.000 s; dates are those of the clock as it was at the end"
+        for options, offset, said in (((), 2 * hour - 2 * 10**9, words), (("--time", "epoch"), 2 * hour - 2 * 10**9, words),
+                                      (("--time", "monotonic"), 0, "")):
+            ticks, tip = self.times(log, *options, said=said)
+            np.testing.assert_array_equal(ticks, start_ns + offset)
+            self.assertEqual(tip, tip_ns + offset)
+        set_clock(log, (5, 2 * hour), (2 * 10**9, hour))  # and back
+        ticks, _ = self.times(log, said=words.replace("+3598.000", "-3602.000"))
+        np.testing.assert_array_equal(ticks, start_ns + hour - 2 * 10**9)
+        for utc_ns, date in ((-hour, "1969-12-31T23:00:00.001000Z"), ((2**31 - 2) * 10**9, "2038-01-19T03:14:08.000000Z")):
+            set_clock(log, (0, utc_ns))
+            self.assertEqual(export(log, path, code=2), f"kerf-record: {log}/clock.npy: {date} is no date of an MCAP for ROS 2, "
+                             "which has 1970 to 2038-01-19; give --time monotonic\n")
+            self.assertFalse(path.exists())
+        set_clock(log)
+        ticks, _ = self.times(log, said=f"{log}: no date: monotonic; recordings of this version have one")
+        np.testing.assert_array_equal(ticks, start_ns)
+
+    def test_a_damaged_clock_is_told(self):
+        log, path = self.folder / "unclear", self.folder / "unclear.mcap"
+        shutil.copytree(self.log, log)
+        clock = log / "clock.npy"
+        whole = clock.read_bytes()
+        clock.write_bytes(whole[:260] + b"x" + whole[261:])
+        said = f"kerf-record: {log}: no date: monotonic; recordings of this version have one\nkerf-record: {clock}: "
+        self.assertEqual(export(log, path, code=1), said + "row 0 has a wrong checksum; copy it again\n")
+        self.assertEqual([int(tick[5]) for tick in read(path)["ticks"]], self.rows["start_ns"].tolist())
+        clock.unlink()
+        self.assertIn("no such file, and the manifest names it; copy it again\n", export(log, path, code=1))
+        export(log, path, "--time", "monotonic", code=1)  # it cannot be attached
 
     def test_sizes(self):
         plain, packed, part = (self.folder / f"{name}.mcap" for name in ("plain", "packed", "part"))

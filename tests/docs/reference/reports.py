@@ -116,13 +116,15 @@ REPORTS = [
         ("abi_hash", "", "of the layout of a row"),
         ("session_id, config_hash", "", "of the run; of its settings"),
         ("tick_ns, start_ns", "ns", "length of a tick; when the run began, CLOCK_MONOTONIC; 0 in lock-step"),
-        ("scene", "", "file with the scene"),
+        ("scene, clock", "", "file with the scene; file with the date, missing if there is none"),
         ("volumes", "", "each with `size_vox`, `spacing_mm`, `initial_hash`"),
         ("rows, lost_ticks, missed_before_start, end_reason", "", "as above; `end_reason` is `running` until the end, `no room` if the disk was full"),
         ("gaps", "", "each with `first_index` and `count`"),
         ("arms", "", "2: the run had two devices, and there is `ticks-2.npy`; missing with one"),
         ("summary, summary_2", "", "what `record info` shows, of all rows, of the first and the second device; missing if the recorder was killed before")]),
-    ("Summary of a log", "`./kerf record info LOG --report FILE`.", [("record/manifest.cpp", "void for_each_figure(")], [], [
+    ("Summary of a log", "`./kerf record info LOG --report FILE`.",
+     [("record/manifest.cpp", "void for_each_figure("), ("record/recording.cpp", "std::string to_json(")], [], [
+        ("date", "", "of the first tick, UTC; null: the log has none"),
         ("rows, first_tick, last_tick, seconds", "", "what the log covers"),
         ("lost_ticks, missed_before_start, end_reason", "", "as above; `end_reason` of a log that was cut says after which row"),
         ("contact_ticks, shaft_ticks, stale_ticks, faults", "", "ticks of that kind, `stale_ticks` as in the report of the controller; faults that latched"),

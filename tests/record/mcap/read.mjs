@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Reads an MCAP with the readers of its own project, by the index alone, and prints what a test compares, as JSON:
-//     node read.mjs FILE.mcap [SECONDS]      SECONDS: where to seek to
+//     node read.mjs FILE.mcap [SECONDS]      SECONDS: behind the first message, where to seek to
 import { open } from 'node:fs/promises';
 import { McapIndexedReader, McapStreamReader } from '@mcap/core';
 import { parse } from '@foxglove/rosmsg';
@@ -31,7 +31,7 @@ for (const channel of reader.channelsById.values()) {
   out.channels[channel.topic] = { schema: schema.name, encoding: channel.messageEncoding, count: 0 };
 }
 out.statistics = { messages: Number(reader.statistics.messageCount), chunks: reader.chunkIndexes.length };
-const startTime = seek === undefined ? undefined : BigInt(Math.round(Number(seek) * 1e9));
+const startTime = seek === undefined ? undefined : reader.statistics.messageStartTime + BigInt(Math.round(Number(seek) * 1e9));
 for await (const message of reader.readMessages({ startTime })) {
   const { topic } = reader.channelsById.get(message.channelId);
   out.channels[topic].count += 1;
@@ -39,7 +39,7 @@ for await (const message of reader.readMessages({ startTime })) {
   const value = readers.get(message.channelId).readMessage(message.data);
   if (topic === '/kerf/tick') {
     out.ticks.push([Number(value.tick), Array.from(value.position_mm), Array.from(value.commanded_force_n),
-      value.output_hash.toString(), value.crc32c, Number(message.logTime)]);
+      value.output_hash.toString(), value.crc32c, message.logTime.toString()]);
     if (seek !== undefined) break;
   } else if (!(topic in out.first)) {
     out.first[topic] = value;
