@@ -12,6 +12,7 @@
 #include <ios>
 #include <iterator>
 #include <optional>
+#include <ranges>
 #include <span>
 #include <string>
 #include <system_error>
@@ -20,6 +21,7 @@
 #include <vector>
 
 #include "controller/input/load_error.hpp"
+#include "controller/law/registry/law_registry.hpp"
 #include "controller/scene/scene.hpp"
 #include "controller/scene/scene_presets.hpp"
 #include "controller/scene/scene_table.hpp"
@@ -82,6 +84,20 @@ TomlNode& entry_of(TomlNode& table, std::string_view key) {
   return entry;
 }
 
+/// Keys of the coupling, which have no effect beside a force law.
+constexpr std::string_view kCouplingKeys[] = {"stiffness_n_per_mm", "damping_ns_per_mm"};
+bool is_of_coupling(std::string_view key) {
+  return std::ranges::find(kCouplingKeys, key) != std::end(kCouplingKeys);
+}
+
+/// Whether it puts a law in the place of the coupling.
+bool replaces_coupling(const KeyOverride& setting) {
+  if (setting.key != "force.law") return false;
+  const TomlNode node = value_node(setting);
+  const auto* word = std::get_if<std::string>(&node.value);
+  return word == nullptr || *word != default_law(LawKind::force)->name;
+}
+
 }  // namespace
 
 KeyOverride parse_setting(std::string_view text, SceneKeys keys) {
@@ -103,7 +119,22 @@ KeyOverride parse_setting(std::string_view text, SceneKeys keys) {
   return {std::string(key), std::string(text.substr(equals + 1))};
 }
 
+void drop_replaced(std::vector<KeyOverride>& earlier, const KeyOverride& later) {
+  const bool law = replaces_coupling(later);
+  std::erase_if(earlier, [&](const KeyOverride& one) {
+    constexpr std::string_view kTable = "force.";
+    return one.key == later.key || one.key.starts_with(later.key + ".") ||
+           (law && one.key.starts_with(kTable) && is_of_coupling(one.key.substr(kTable.size())));
+  });
+}
+
 void override_keys(std::span<const KeyOverride> settings, TomlNode& root) {
+  const auto last_first = std::views::reverse(settings);
+  const auto law = std::ranges::find(last_first, "force.law", &KeyOverride::key);
+  if (law != last_first.end() && replaces_coupling(*law)) {
+    std::erase_if(entry_of(root, "force").entries,
+                  [](const TomlNode& entry) { return is_of_coupling(entry.key); });
+  }
   // A law is there before its settings, in whatever order they come.
   std::vector<KeyOverride> in_order(settings.begin(), settings.end());
   std::ranges::stable_partition(in_order, [](const KeyOverride& setting) {
@@ -288,7 +319,7 @@ void refuse_unfelt(const Scene& scene) {
 /// A law replaces the coupling, so the keys of the coupling have no effect.
 void refuse_idle_coupling(const SceneTable& table, const ForceSettings& force) {
   if (force.law.name.empty()) return;
-  for (const char* key : {"stiffness_n_per_mm", "damping_ns_per_mm"}) {
+  for (const std::string_view key : kCouplingKeys) {
     if (table.has(key)) {
       refuse(table.place(key), " is of the coupling, and force.law is in its place; leave it out");
     }

@@ -5,6 +5,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "controller/scene/scene.hpp"
 #include "controller/scene/scene_keys.hpp"
@@ -23,8 +24,13 @@ struct KeyOverride {
 /// Reads `table.key=VALUE`; throws LoadError for another form or a key that no scene has.
 [[nodiscard]] KeyOverride parse_setting(std::string_view text, SceneKeys keys = scene_keys());
 
+/// Removes from `earlier` what `later` leaves without a meaning: the same key; if that chooses a
+/// law, the settings of the law before it; for a force law also the coupling's own keys.
+void drop_replaced(std::vector<KeyOverride>& earlier, const KeyOverride& later);
+
 /// Replaces the values of the file by the settings, in order; every `[[table]]` of the file gets
-/// the value of its key. The values are checked with the scene. Throws LoadError.
+/// the value of its key. A force law among the settings takes the place of the coupling, whose keys
+/// in the file are dropped. The values are checked with the scene. Throws LoadError.
 void override_keys(std::span<const KeyOverride> settings, TomlNode& root);
 
 /// Reads TOML text. `settings` replace values of it. No file is opened: `path` appears in messages

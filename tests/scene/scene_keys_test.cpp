@@ -247,6 +247,44 @@ TEST_CASE("a law that is unknown, or has no such setting, has its answer") {
             .find(" is of the model proxy; leave it out") != std::string::npos);
 }
 
+TEST_CASE("a force law on the command line takes the place of the coupling and its keys") {
+  const auto scene = [](std::vector<KeyOverride> settings) {
+    return parse_scene(
+        "[[volume]]\nfile = \"phantom\"\n[[tool]]\nshape = \"ball\"\nsize_vox = 16\n"
+        "[force]\nstiffness_n_per_mm = 0.4\ndamping_ns_per_mm = 0.001\n",
+        "x.toml", scene_keys(), settings);
+  };
+  CHECK(scene({{"force.law", "nothing"}}).force.law.name == "nothing");
+  CHECK(scene({{"force.law.share", "1"}, {"force.law", "nothing"}}).force.law.settings.size() == 1);
+  CHECK(scene({{"force.law", "{ name = \"nothing\" }"}}).force.law.name == "nothing");
+  for (const char* word : {"coupling", "\"coupling\""}) {  // its keys stay
+    CHECK(scene({{"force.law", word}}).force.stiffness_n_per_mm == 0.4);
+  }
+  CHECK(test::error_of([&] {
+          static_cast<void>(scene({{"force.stiffness_n_per_mm", "1"}, {"force.law", "nothing"}}));
+        }) ==
+        "x.toml: --set force.stiffness_n_per_mm = 1 is of the coupling, and force.law is in its "
+        "place; leave it out");
+}
+
+TEST_CASE("a later setting drops the earlier ones that it leaves without a meaning") {
+  const auto left = [](const KeyOverride& later) {
+    std::vector<KeyOverride> earlier{{"force.stiffness_n_per_mm", "0.4"},
+                                     {"force.law.share", "1"},
+                                     {"force.law", "nothing"},
+                                     {"servo.velocity.tau_ms", "1"}};
+    drop_replaced(earlier, later);
+    std::string keys;
+    for (const KeyOverride& one : earlier) keys += one.key + ' ';
+    return keys;
+  };
+  CHECK(left({"force.law", "calm"}) == "servo.velocity.tau_ms ");
+  CHECK(left({"force.law", "coupling"}) == "force.stiffness_n_per_mm servo.velocity.tau_ms ");
+  CHECK(left({"servo.velocity", "foaw"}) == "force.stiffness_n_per_mm force.law.share force.law ");
+  CHECK(left({"force.law.share", "0"}) ==
+        "force.stiffness_n_per_mm force.law servo.velocity.tau_ms ");
+}
+
 TEST_CASE("every row: its default is allowed") {
   SceneParts defaults;
   for (const SceneKey& key : scene_keys()) {

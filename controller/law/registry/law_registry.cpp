@@ -63,11 +63,12 @@ const LawRow& find_law(LawKind kind, std::string_view name) {
   const std::vector<const LawRow*> rows = known_laws(kind);
   const auto found = std::ranges::find(rows, name, &LawRow::name);
   if (found != rows.end()) return **found;
+  const char* elsewhere =
+      first_own_law != nullptr ? "" : "; yours is in the programs built with it (docs/own-law.md)";
   if (rows.empty()) {
-    throw LawError(" is unknown: this program has no " + std::string(kind_name(kind)) +
-                   "; link one to it (docs/own-law.md)");
+    throw LawError(" is unknown: this program has no " + std::string(kind_name(kind)) + elsewhere);
   }
-  throw LawError(unknown_word(name, names_of(rows), "\""));
+  throw LawError(unknown_word(name, names_of(rows), "\"") + elsewhere);
 }
 
 std::string setting_problem(const LawRow& row, std::string_view setting, double value) {
