@@ -25,7 +25,7 @@ function(kerf_libraries out folder)
 endfunction()
 
 set(libraries kerf_options)
-foreach(part shared controller record hil lab)
+foreach(part shared controller record replay hil lab)
   kerf_libraries(more ${PROJECT_SOURCE_DIR}/${part})
   list(APPEND libraries ${more})
 endforeach()
@@ -92,11 +92,12 @@ set(headers ${CMAKE_INSTALL_INCLUDEDIR}/kerf)
 install(TARGETS ${libraries} EXPORT kerf
   ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR}/kerf INCLUDES DESTINATION ${headers})
 install(EXPORT kerf NAMESPACE kerf:: DESTINATION ${package} FILE kerf-targets.cmake)
-install(DIRECTORY shared controller record hil lab DESTINATION ${headers}
+install(DIRECTORY shared controller record replay hil lab DESTINATION ${headers}
   FILES_MATCHING PATTERN *.hpp)
 # What each program compiles for itself: a main, and the allocator that counts.
-install(FILES controller/main.cpp DESTINATION ${CMAKE_INSTALL_DATADIR}/kerf/controller)
-install(FILES lab/main.cpp DESTINATION ${CMAKE_INSTALL_DATADIR}/kerf/lab)
+foreach(program controller lab replay)
+  install(FILES ${program}/main.cpp DESTINATION ${CMAKE_INSTALL_DATADIR}/kerf/${program})
+endforeach()
 install(FILES controller/loop/allocation_counter.cpp DESTINATION ${CMAKE_INSTALL_DATADIR}/kerf)
 
 foreach(port usb hid)  # what these need, the project needs, too

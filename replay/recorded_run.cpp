@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <iterator>
 #include <span>
 #include <string_view>
 #include <utility>
@@ -159,12 +160,12 @@ void check_same(const std::filesystem::path& folder, const std::string& recorded
 
 SceneSource changed(SceneSource source, const ReplayChanges& changes) {
   if (changes.scene) source = read_source(*changes.scene, source.overrides);
+  std::vector<KeyOverride> settings;
   for (const std::string& text : changes.settings) {
-    const KeyOverride setting = parse_setting(text);
-    auto& all = source.overrides.settings;
-    std::erase_if(all, [&](const KeyOverride& one) { return one.key == setting.key; });
-    all.push_back(setting);
+    settings.push_back(parse_setting(text));
+    drop_replaced(source.overrides.settings, settings.back());
   }
+  std::ranges::copy(settings, std::back_inserter(source.overrides.settings));
   if (changes.numeric) source.overrides.numeric = changes.numeric;
   return source;
 }
@@ -272,6 +273,7 @@ bool EarlierTicks::step() {
   std::ranges::copy(inputs, tick.begin());
   run_.volume_chain = step_(tick)[inputs.size() - 1].volume_hash;
   ++done_;
+  ++*run_.steps;
   return true;
 }
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <atomic>
+#include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -42,6 +44,9 @@ struct RecordedRun {
   std::unique_ptr<CompiledScene> servo;
   std::uint64_t volume_chain = kFnv1aBasis;  ///< of the ticks before those of the log
   std::optional<SegmentWriter> segment;      ///< with the volumes at the start; if requested
+  /// Counts steps of the servo, for a thread that watches them (StepGuard).
+  std::unique_ptr<std::atomic<std::uint64_t>> steps =
+      std::make_unique<std::atomic<std::uint64_t>>(0);
 };
 
 /// Of each volume.

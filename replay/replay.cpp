@@ -11,6 +11,7 @@
 #include <iostream>
 #include <iterator>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string_view>
 #include <vector>
@@ -23,6 +24,7 @@
 #include "record/tick_log_writer.hpp"
 #include "replay/compared_runs.hpp"
 #include "replay/replayed_ticks.hpp"
+#include "replay/step_guard.hpp"
 #include "replay/watched_replay.hpp"
 #include "shared/numeric/fnv1a.hpp"
 #include "shared/posix/atomic_file.hpp"
@@ -185,6 +187,7 @@ int run_replay(const ReplayOptions& options, const std::atomic<bool>& stop) {
 
   std::optional<DifferentTick> difference;
   const auto began = std::chrono::steady_clock::now();
+  std::optional<StepGuard> guard(run);
   step_earlier_ticks(run, options.folder);
   const auto visit = [&](const ArmRecords& recorded, const ArmRecords& replayed) {
     if (copy) copy->append(replayed);
@@ -194,6 +197,7 @@ int run_replay(const ReplayOptions& options, const std::atomic<bool>& stop) {
     return changed || !difference;
   };
   ReplayResult result = replay_ticks(run, log, options.until, stop, visit);
+  guard.reset();
   result.difference = difference;
   const std::chrono::duration<double> wall = std::chrono::steady_clock::now() - began;
 

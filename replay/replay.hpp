@@ -30,4 +30,8 @@ struct ReplayOptions {
 /// although nothing was changed, or if not all ticks were replayed. Throws for bad input, one line.
 [[nodiscard]] int run_replay(const ReplayOptions& options, const std::atomic<bool>& stop);
 
+/// `kerf-replay`: the whole program, for its main and for that of a project with laws of its own.
+/// Returns the exit code: as `run_replay`, and 2 for bad input.
+[[nodiscard]] int run_replay_program(int argc, char** argv);
+
 }  // namespace kerf

@@ -97,6 +97,7 @@ ReplayResult replay_ticks(RecordedRun& run, RecordedTicks& log, Tick until,
         return result;
       }
       const ArmRecords replayed = step(recorded);
+      ++*run.steps;
       ++result.ticks;
       result.last_tick = tick;
       for (std::size_t arm = 0; arm < kMaxArms; ++arm) {

@@ -2,6 +2,7 @@
 #include "replay/watched_replay.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <cerrno>
 #include <chrono>
 #include <cstdint>
@@ -14,6 +15,7 @@
 #include <termios.h>
 #include <unistd.h>
 
+#include "replay/step_guard.hpp"
 #include "replay/watched_run.hpp"
 #include "shared/posix/monotonic_clock.hpp"
 #include "shared/segment/server.hpp"
@@ -130,13 +132,14 @@ class Watch {
   Watch(WatchedRun& run, SegmentWriter& segment, std::uint32_t tick_ns)
       : run_(run), segment_(segment), tick_ns_(tick_ns), pace_(tick_ns) {}
 
-  /// Goes to `from` first, if that is not 0.
-  void run(SegmentServer& server, Tick from, const std::atomic<bool>& stop) {
+  /// Goes to `from` first, if that is not 0. `turns` grows while it waits, too.
+  void run(SegmentServer& server, Tick from, const std::atomic<bool>& stop,
+           std::atomic<std::uint64_t>& turns) {
     Keys keys;
     pace_.start(monotonic_ns());
     if (from != 0) go(from);
     print_state();
-    while (!stop) {
+    for (; !stop; ++turns) {
       Request request = keys.next();
       if (const auto command = server.take_command();
           command && request.kind == Request::Kind::none) {
@@ -240,6 +243,7 @@ class Watch {
 
 int watch_replay(const ReplayOptions& options, RecordedTicks& log, const std::atomic<bool>& stop) {
   RecordedRun run = load_run(options.folder, options.changes, kernels_named(options.kernels), true);
+  const StepGuard guard(run);
   step_earlier_ticks(run, options.folder);
   WatchedRun watched(run, log,
                      {.until = options.until, .compares = false, .snapshot_bytes = kSnapshotBytes});
@@ -253,7 +257,8 @@ int watch_replay(const ReplayOptions& options, RecordedTicks& log, const std::at
       "f and b go a second on and back, 1600g goes to tick 1600, q quits\n",
       options.watch.c_str());
   const Tick from = std::max(options.from, watched.first_tick());
-  Watch(watched, *run.segment, run.manifest.tick_ns).run(server, from > 1 ? from : 0, stop);
+  Watch(watched, *run.segment, run.manifest.tick_ns)
+      .run(server, from > 1 ? from : 0, stop, *run.steps);
   run.segment->set_lifecycle(Lifecycle::clean_end);
   if (watched.last_tick() == rows) return 0;
   std::printf("tick %llu is not in the recording; it was shown until there\n",

@@ -93,6 +93,7 @@ void WatchedRun::step_servo(const ArmRecords& recorded) {
     snapshots_[tick_] = run_.servo->keep();
   }
   outputs_ = give(*run_.servo, recorded);
+  ++*run_.steps;
   ++tick_;
   if (!compares_ || difference_ || tick_ != compared_ + 1) return;
   difference_ = first_difference(recorded, records_.of(recorded, outputs_), run_.servo->arms());

@@ -25,8 +25,40 @@ lines=$(cat ./* | wc -l)
 cmake --install "$1" --prefix "$home/kerf" >"$home/install.log"
 HOME=$home CMAKE_BUILD_PARALLEL_LEVEL=2 bash -euo pipefail "$home/steps.sh"
 
-# A law that loops only after some seconds passes every trial. Its programs end with one line, by themselves.
+# The run of the page, with one law more of each kind: as it was, and as it would have been with another one.
 export PATH=$home/kerf/bin:$PATH CMAKE_PREFIX_PATH=$home/kerf
+cp "$root/tests/programs/laws/others.cpp" .
+sed -i 's/SOURCES hardening_spring.cpp/& others.cpp/' CMakeLists.txt
+cmake --build build --parallel 2 >"$home/build.log" || { cat "$home/build.log" >&2 && exit 1; }
+complain() {
+  echo "own_law: $*" >&2
+  exit 1
+}
+replays() {  # replays WORD PROGRAM OPTION...
+  local said
+  said=$("${@:2}" 2>&1) || [[ $said == kerf-replay:* ]] || complain "${*:2}: $said"
+  [[ $said == *"$1"* ]] || complain "${*:2}: says nothing of \"$1\": $said"
+}
+replays 'each equal to the last bit' build/own-replay hard/log
+KERF_BIN=build/own replays 'each equal to the last bit' kerf replay hard/log
+replays 'N, 0.0000 mm between the places' build/own-replay hard/log --law half_spring
+replays 'pose: velocity_mm_per_s' build/own-replay hard/log --estimator standing_hand
+replays '0.0000 N' build/own-replay hard/log --stabiliser no_force
+replays '--set force.law = "half_spin" is unknown; did you mean "half_spring"? known: half_spring, hardening_spring; none: "coupling"' \
+  build/own-replay hard/log --law half_spin
+replays 'is unknown; known: difference, foaw, standing_hand' build/own-replay hard/log --estimator x
+replays 'is unknown; known: energy_bounding, no_force, passivity; none: "none"' build/own-replay hard/log --stabiliser x
+replays 'is unknown: this program has no force law; yours is in the programs built with it (docs/own-law.md)' kerf-replay hard/log
+# A run that has another one of each kind; and one without, whose scene sets the coupling.
+KERF_BIN=build/own kerf demo --scene hard.toml --set force.law.hardening_n_per_mm3=0.02 --set servo.velocity=standing_hand \
+  --set force.stabiliser=no_force --headless --virtual --seconds 1 --out three >"$home/demo.log" || complain "$(cat "$home/demo.log")"
+replays 'each equal to the last bit' build/own-replay three/log
+replays 'N, 0.0000 mm between the places' build/own-replay three/log --law half_spring --stabiliser none
+kerf demo --scene touch --headless --virtual --seconds 4 --out touched >"$home/demo.log" || complain "$(cat "$home/demo.log")"
+replays 'between the places' build/own-replay touched/log --law half_spring --out asked
+replays 'each equal to the last bit' build/own-replay asked
+
+# A law that loops only after some seconds passes every trial. Its programs end with one line, by themselves.
 sed -i -e 's|struct State {};.*|struct State { int steps = 0; };|' \
   -e 's|State&) const noexcept {|State\& state) const noexcept {\n    if (++state.steps > 2500) for (volatile int i = 0; i == 0;) {}|' \
   hardening_spring.cpp
@@ -42,6 +74,7 @@ ends_itself() {  # ends_itself CODE COMMAND...
   }
 }
 ends_itself 2 build/own-lab zwidth --law hardening_spring --damping 0,0.01 --stiffness 0.05:9:5
+ends_itself 2 build/own-replay touched/log --law hardening_spring
 ends_itself 2 build/own-lab zwidth --law hardening_spring --portraits p.svg --cells 9:0 --seconds 60
 kerf-emulator --socket late --lockstep --hand "$home/kerf/share/kerf/scenes/hands/touch.toml" --unit-mm 0.125 &
 ends_itself 1 build/own-controller --scene hard.toml --port socket:late --virtual --seconds 20 \

@@ -310,6 +310,24 @@ class TestReplay(unittest.TestCase):
         self.assertIn("the counts of the recording are of omni",
                       replay(self.log, "--set", "device.personality=falcon", code=2))
 
+    def test_another_law_is_named_or_refused_with_the_known_names(self):
+        for name, word in (("--law", "coupling"), ("--estimator", "difference"), ("--stabiliser", "passivity")):
+            self.assertIn("places of the tool", replay(self.log, name, word))
+        yours = "; yours is in the programs built with it (docs/own-law.md)"
+        for name, key, known in (("--law", "force.law", f': this program has no force law{yours}; none: "coupling"'),
+                                 ("--estimator", "servo.velocity", f"; known: difference, foaw{yours}"),
+                                 ("--stabiliser", "force.stabiliser",
+                                  f'; known: energy_bounding, passivity{yours}; none: "none"')):
+            self.assertEqual(replay(self.log, name, "x", code=2),
+                             f'kerf-replay: {self.scene}: --set {key} = "x" is unknown{known}\n')
+
+    def test_a_recorded_setting_of_a_law_goes_with_the_law(self):
+        folder = self.run_folder / "set"
+        folder.mkdir()
+        record(ROOT, BIN, folder, self.scene, 1, "--set", "servo.velocity=difference", "--set", "servo.velocity.tau_ms=1")
+        self.assertIn("each equal", replay(folder / "log"))
+        self.assertIn("places of the tool", replay(folder / "log", "--estimator", "foaw"))
+
     def test_other_voxels_are_counted_by_their_own_size(self):
         found = replay(self.log, "--set", "volume.size=[128,128,80]", "--out", out := self.run_folder / "coarse")
         recorded_mm3, replayed_mm3 = map(float, re.search(r"removed density +([0-9.]+) +([0-9.]+) mm3", found).groups())

@@ -2,6 +2,7 @@
 #include <iostream>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "controller/scene/scene.hpp"
 #include "replay/replay.hpp"
@@ -15,8 +16,7 @@ namespace {
 constexpr const char* kAbout =
     "Runs a recording again, tick by tick, without device and clock.\n\n"
     "Each tick is compared with the recorded one, to the last bit. With another scene, setting, "
-    "law "
-    "or arithmetic it shows what would have been felt: the hand moves as it did, the volumes "
+    "law or arithmetic it shows what would have been felt: the hand moves as it did, the volumes "
     "start as they were.";
 
 /// False if help or version was requested, and printed.
@@ -24,7 +24,7 @@ bool parse_replay(int argc, char** argv, ReplayOptions& options) {
   CommandLine app(kAbout, "kerf-replay", KERF_VERSION);
   app.footer(
       "\nExit codes: 0 fine, 1 a tick differs or the recording has a gap, 2 bad input or set-up.");
-  std::string numeric, scene, law;
+  std::string numeric, scene, law, estimator, stabiliser;
   app.option("DIR", options.folder, "folder of a recording").required();
   app.option("--from", options.from, "the first tick that is compared").shown_as("TICK");
   app.option("--until", options.until, "the last tick that is replayed")
@@ -37,6 +37,10 @@ bool parse_replay(int argc, char** argv, ReplayOptions& options) {
       .one_each()
       .shown_as("KEY=VALUE");
   app.option("--law", law, "another force law: --set force.law=NAME").shown_as("NAME");
+  app.option("--estimator", estimator, "another estimator: --set servo.velocity=NAME")
+      .shown_as("NAME");
+  app.option("--stabiliser", stabiliser, "another stabiliser: --set force.stabiliser=NAME")
+      .shown_as("NAME");
   app.option("--scene", scene, "another scene, on the recorded hand").shown_as("FILE");
   app.option("--numeric", numeric, "other numbers of the loop").one_of({"fixed", "double"});
   app.option("--out", options.out, "folder for a recording of the replay").shown_as("DIR");
@@ -51,7 +55,11 @@ bool parse_replay(int argc, char** argv, ReplayOptions& options) {
   if (!options.watch.empty() && compares) {
     throw UsageError("--watch: compares nothing; leave --out, --plot and --report out");
   }
-  if (!law.empty()) options.changes.settings.push_back("force.law=" + law);
+  const std::pair<const char*, const std::string&> laws[] = {
+      {"force.law=", law}, {"servo.velocity=", estimator}, {"force.stabiliser=", stabiliser}};
+  for (const auto& [key, name] : laws) {
+    if (!name.empty()) options.changes.settings.push_back(key + name);
+  }
   if (!scene.empty()) options.changes.scene = find_scene_file(scene);
   if (!numeric.empty()) {
     options.changes.numeric = numeric == "double" ? NumericKind::float64 : NumericKind::fixed;
@@ -60,12 +68,13 @@ bool parse_replay(int argc, char** argv, ReplayOptions& options) {
 }
 
 }  // namespace
-}  // namespace kerf
 
-int main(int argc, char** argv) {
-  return kerf::run_program("kerf-replay", [&] {
-    kerf::ReplayOptions options;
-    if (!kerf::parse_replay(argc, argv, options)) return 0;
-    return kerf::run_replay(options, kerf::catch_stop_signals());
+int run_replay_program(int argc, char** argv) {
+  return run_program("kerf-replay", [&] {
+    ReplayOptions options;
+    if (!parse_replay(argc, argv, options)) return 0;
+    return run_replay(options, catch_stop_signals());
   });
 }
+
+}  // namespace kerf
