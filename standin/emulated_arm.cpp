@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <string>
 #include <system_error>
+#include <utility>
 
 #include <poll.h>
 #include <sys/socket.h>
@@ -31,8 +32,12 @@ constexpr int kPatienceMs = 5000;  // a loaded machine, or an emulator that ends
 
 }  // namespace
 
-EmulatedArm::EmulatedArm(const Settings& settings, const DeviceSettings& device, Ledger& ledger)
-    : ledger_(ledger), hand_waits_(settings.hand_waits), lockstep_(settings.lockstep) {
+EmulatedArm::EmulatedArm(const Settings& settings, const DeviceSettings& device, Ledger& ledger,
+                         Follow follow)
+    : ledger_(ledger),
+      follow_(std::move(follow)),
+      hand_waits_(settings.hand_waits),
+      lockstep_(settings.lockstep) {
   try {
     connect_to(device.socket);
     agree(device);
@@ -131,6 +136,7 @@ void EmulatedArm::take_packet(std::span<const std::uint8_t> bytes) noexcept {
   if (!report) return;
   const auto newer = static_cast<std::int32_t>(report->number - pose().number);
   if (known_ > 0 && newer <= 0) return;  // repeated, or overtaken
+  const double dt_s = known_ > 0 ? newer / report_hz_ : 0;
   heard_ns_ = monotonic_ns();
   silent_ticks_ = 0;
   newest_ = (newest_ + 1) % kHistory;
@@ -148,6 +154,7 @@ void EmulatedArm::take_packet(std::span<const std::uint8_t> bytes) noexcept {
   pose.button1 = report->button1;
   pose.button2 = report->button2;
   pose.parked = report->parked;
+  if (follow_) follow_(pose, dt_s);
 }
 
 void EmulatedArm::command(DeviceVec<double> force_n, bool on, bool ready) noexcept {

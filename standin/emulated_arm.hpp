@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <span>
 
@@ -37,8 +38,13 @@ struct Pose {
 /// waits for the report of the next tick, so the speed of the program changes nothing.
 class EmulatedArm {
  public:
+  /// Called with each report in its turn, `dt_s` of the device's clock after the one before (0 for
+  /// the first): what a device keeps of its own, and may put into the pose. Does not throw.
+  using Follow = std::function<void(Pose& now, double dt_s)>;
+
   /// Connects and receives the first report. Throws std::runtime_error with one line.
-  EmulatedArm(const Settings& settings, const DeviceSettings& device, Ledger& ledger);
+  EmulatedArm(const Settings& settings, const DeviceSettings& device, Ledger& ledger,
+              Follow follow = {});
   /// No arm, but one pose for ever; commands go nowhere.
   EmulatedArm(const Settings& settings, const Pose& still, Ledger& ledger) noexcept;
   EmulatedArm(const EmulatedArm&) = delete;
@@ -75,6 +81,7 @@ class EmulatedArm {
   static constexpr std::size_t kHistory = 1024;
 
   Ledger& ledger_;
+  Follow follow_;
   int fd_ = -1;
   bool closed_ = false;
   bool is_still_ = false;  ///< it is no arm

@@ -31,6 +31,7 @@ NOTES = {
     "lost_link": "times that the device was gone",
     "watchdog": "expiries of the watchdog",
     "in_use": "times that a program opened the device while another one used it",
+    "warm": "times that a motor came to be warm",
 }
 
 

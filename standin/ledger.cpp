@@ -12,12 +12,12 @@ namespace kerf::standin {
 namespace {
 
 constexpr std::array<std::string_view, kRows> kNames{
-    "opened",      "closed",           "ticks",          "missed_ticks",     "commands",
-    "frames",      "frames_not_ended", "begins_refused", "ends_refused",     "set_outside_frame",
-    "bad_handles", "bad_schedules",    "not_finite",     "output_off",       "before_enable",
-    "after_trip",  "not_cleared",      "stalls",         "excess",           "impulses",
-    "too_fast",    "lost_link",        "watchdog",       "in_use",           "square_sum_n2",
-    "peak_n",      "last_n",           "longest_us",     "longest_period_us"};
+    "opened",        "closed",           "ticks",          "missed_ticks", "commands",
+    "frames",        "frames_not_ended", "begins_refused", "ends_refused", "set_outside_frame",
+    "bad_handles",   "bad_schedules",    "not_finite",     "output_off",   "before_enable",
+    "after_trip",    "not_cleared",      "stalls",         "excess",       "impulses",
+    "too_fast",      "lost_link",        "watchdog",       "in_use",       "warm",
+    "square_sum_n2", "peak_n",           "last_n",         "longest_us",   "longest_period_us"};
 
 constexpr bool is_number(Row row) noexcept {
   return row >= Row::square_sum_n2;

@@ -13,6 +13,7 @@ namespace {
 
 constexpr double kVelocityWindowS = 0.01;  // the vendor's filter is not known
 constexpr double kNothingN = 1e-9;
+constexpr double kCooled = 0.9;  // of the temperature of a warm motor: until then it is one error
 
 /// The pose with all joints at 0.
 [[nodiscard]] standin::Pose pose_of_zeros() noexcept {
@@ -35,10 +36,21 @@ Touch::Touch(const standin::Settings& settings, standin::Device& device, ErrorSt
       handle_(handle),
       serial_("KERF" + std::to_string(device.number)),
       arm_(is_locked_out ? standin::EmulatedArm(settings, pose_of_zeros(), ledger_)
-                         : standin::EmulatedArm(settings, device.settings, ledger_)),
+                         : standin::EmulatedArm(
+                               settings, device.settings, ledger_,
+                               [this](standin::Pose& now, double dt_s) { follow(now, dt_s); })),
       rate_hz_(device.settings.rate_hz),
       calibrated_(!settings.uncalibrated) {
   ledger_.add(Row::opened);
+}
+
+void Touch::follow(standin::Pose& now, double dt_s) noexcept {
+  const Angles joints = joint_angles(now.tip_mm);
+  heat_.heat_up(joints, now.applied_n, dt_s);
+  if (heat_.hottest() >= 1) is_warm_ = true;
+  if (heat_.hottest() < kCooled) is_warm_ = false;
+  wrist_.follow(stylus_rotation(now.orientation), joints, dt_s);
+  now.orientation = tool_orientation(joints, wrist_.angles());
 }
 
 Readings Touch::sampled() const noexcept {
@@ -47,10 +59,10 @@ Readings Touch::sampled() const noexcept {
   readings.velocity = arm_.velocity(kVelocityWindowS).value_or(DeviceVec<double>{});
   readings.angular_velocity = arm_.angular_velocity(kVelocityWindowS);
   readings.buttons = (readings.pose.button1 ? 1U : 0U) | (readings.pose.button2 ? 2U : 0U);
-  const Matrix3 rotation = stylus_rotation(readings.pose.orientation);
   readings.joints = joint_angles(readings.pose.tip_mm);
-  readings.gimbal = gimbal_angles(rotation, readings.joints);
-  readings.transform = transform_of(rotation, readings.pose.tip_mm);
+  readings.gimbal = wrist_.angles();
+  readings.transform =
+      transform_of(wrist_rotation(readings.joints, readings.gimbal), readings.pose.tip_mm);
   return readings;
 }
 
@@ -73,6 +85,11 @@ void Touch::begin_frame() noexcept {
   }
   if (!arm_.lockstep()) arm_.refresh();
   if (arm_.lost()) push(kCommunication);
+  if (is_warm_ && !was_warm_) {
+    ledger_.add(Row::warm);
+    push(kWarmMotors);
+  }
+  was_warm_ = is_warm_;
   in_frame_ = true;
   before_ = now_;
   now_ = sampled();

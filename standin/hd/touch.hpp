@@ -4,13 +4,16 @@
 #include <array>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 
 #include "shared/numeric/vec.hpp"
 #include "standin/emulated_arm.hpp"
 #include "standin/hd/error_stack.hpp"
+#include "standin/hd/motor_heat.hpp"
 #include "standin/hd/numbers.hpp"
 #include "standin/hd/touch_kinematics.hpp"
+#include "standin/hd/wrist.hpp"
 #include "standin/ledger.hpp"
 #include "standin/session.hpp"
 #include "standin/settings.hpp"
@@ -21,9 +24,8 @@ namespace kerf::hd {
 /// The types in which a parameter may be read or written.
 enum Types : unsigned { kBool = 1, kInt = 2, kFloat = 4, kDouble = 8, kLong = 16 };
 
-/// The values of a parameter, and the types in which they are given.
+/// The values of a parameter.
 struct Values {
-  unsigned types = 0;
   std::size_t count = 0;
   std::array<double, 16> value{};
 };
@@ -77,9 +79,13 @@ class Touch {
   [[nodiscard]] Transform16 with_scaled_gimbal(const Angles& scale) const noexcept;
 
  private:
+  static constexpr std::size_t kMotors = 3;
+
+  void follow(standin::Pose& now, double dt_s) noexcept;
   [[nodiscard]] Readings sampled() const noexcept;
-  [[nodiscard]] std::optional<Values> reading(Enum name, const Readings& from) const noexcept;
-  [[nodiscard]] std::optional<Values> figure(Enum name) const noexcept;
+  struct Parameter;
+  [[nodiscard]] static std::span<const Parameter> parameters() noexcept;
+  [[nodiscard]] static const Parameter* parameter(Enum name) noexcept;
   [[nodiscard]] bool* capability(Enum name) noexcept;
   [[nodiscard]] DeviceVec<double> wanted_force() noexcept;
   [[nodiscard]] DeviceVec<double> limited(DeviceVec<double> force_n) noexcept;
@@ -93,6 +99,10 @@ class Touch {
   ErrorStack& errors_;
   Handle handle_;
   std::string serial_;
+  // What each report moves and heats; the arm receives the first one when it is made.
+  Wrist wrist_;
+  MotorHeat heat_;
+  bool is_warm_ = false, was_warm_ = false;  ///< now; in the frame before
   standin::EmulatedArm arm_;
 
   Readings now_, before_;

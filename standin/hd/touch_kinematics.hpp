@@ -7,6 +7,7 @@
 #include <cstddef>
 
 #include "shared/numeric/vec.hpp"
+#include "shared/wire/omni.hpp"
 
 /// Angles and transform of a Touch from its pose, and forces from joint torques.
 ///
@@ -82,12 +83,64 @@ inline constexpr double kShoulderZMm = -168.35;
                  product(about_x(-gimbal[1]), about_z(-gimbal[2])));
 }
 
-/// The gimbal angles (right +, up -, clockwise +) that turn the wrist to `rotation`.
-[[nodiscard]] inline Angles gimbal_angles(const Matrix3& rotation, const Angles& joints) noexcept {
+/// The rotation of the stylus as seen from the end of an arm with these joints.
+[[nodiscard]] inline Matrix3 wrist_frame(const Matrix3& rotation, const Angles& joints) noexcept {
+  return product(product(about_x(joints[2]), about_y(joints[0])), rotation);
+}
+
+/// The gimbal angles (right +, up -, clockwise +) of a rotation in the frame of the wrist; pitch
+/// within a quarter turn, where it jumps from one end to the other.
+[[nodiscard]] inline Angles angles_of(const Matrix3& m) noexcept {
   // Ry(a) Rx(b) Rz(c) has sin b = -m12, tan a = m02 / m22, tan c = m10 / m11.
-  const Matrix3 m = product(product(about_x(joints[2]), about_y(joints[0])), rotation);
   return {std::atan2(m[0][2], m[2][2]), std::asin(std::clamp(m[1][2], -1.0, 1.0)),
           -std::atan2(m[1][0], m[1][1])};
+}
+
+/// kerf's orientation of the tool (x, y, z, w) that these joints and gimbal angles give it: the
+/// inverse of `stylus_rotation` of `wrist_rotation`.
+[[nodiscard]] inline std::array<double, 4> tool_orientation(const Angles& joints,
+                                                            const Angles& gimbal) noexcept {
+  std::array<double, 4> q{0, 0, 0, 1};
+  const auto turn = [&](std::size_t axis, double angle) {  // about an axis of the turned frame
+    const double c = std::cos(angle / 2), s = std::sin(angle / 2);
+    const std::size_t next = (axis + 1) % 3, last = (axis + 2) % 3;
+    const std::array<double, 4> p = q;
+    q[axis] = p[axis] * c + p[3] * s;
+    q[next] = p[next] * c + p[last] * s;
+    q[last] = p[last] * c - p[next] * s;
+    q[3] = p[3] * c - p[axis] * s;
+  };
+  turn(1, -joints[0]);
+  turn(0, -joints[2]);
+  turn(1, gimbal[0]);
+  turn(0, -gimbal[1]);
+  turn(2, -gimbal[2]);
+  turn(0, std::acos(0.0));  // from the stylus to the tool
+  return q;
+}
+
+/// Six counts as the encoders have them: the joints, 0 in the inkwell, with the scale and the signs
+/// of the Omni's; yaw, pitch and roll in 12 bits about the middle, of 0.0735 degrees by a client.
+[[nodiscard]] inline std::array<double, 6> encoder_counts(const Angles& joints,
+                                                          const Angles& gimbal) noexcept {
+  constexpr double kGimbalMiddle = 2048, kGimbalRad = 0.0735 * omni::kPi / 180;
+  std::array<double, 6> counts{};
+  for (std::size_t i = 0; i < 3; ++i) {
+    counts[i] = omni::kEncoderSign[i] * std::round(joints[i] / omni::kRadPerCount);
+    counts[3 + i] = kGimbalMiddle + std::round(gimbal[i] / kGimbalRad);
+  }
+  return counts;
+}
+
+/// The joint torques in N mm, or mNm, for a force in N at the tip: J^T f.
+[[nodiscard]] inline Angles torques_of_force(const Angles& joints,
+                                             DeviceVec<double> force_n) noexcept {
+  const double c1 = std::cos(joints[0]), s1 = std::sin(joints[0]);
+  const double c2 = std::cos(joints[1]), s2 = std::sin(joints[1]);
+  const double c3 = std::cos(joints[2]), s3 = std::sin(joints[2]);
+  const double side = -c1 * force_n.x - s1 * force_n.z, ahead = -s1 * force_n.x + c1 * force_n.z;
+  return {kLinkMm * (c2 + s3) * side, kLinkMm * (c2 * force_n.y - s2 * ahead),
+          kLinkMm * (s3 * force_n.y + c3 * ahead)};
 }
 
 /// The force in N at the tip for joint torques in mNm: solves J^T f = torque. At a singular pose 0.

@@ -1,5 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <array>
 #include <initializer_list>
+#include <span>
 
 #include "shared/wire/cartesian.hpp"
 #include "shared/wire/personality.hpp"
@@ -12,168 +15,168 @@ namespace {
 
 constexpr unsigned kReal = kFloat | kDouble;
 constexpr unsigned kWhole = kInt | kLong;
+constexpr unsigned kAny = kReal | kWhole;  // clients read these as doubles and as ints
+constexpr auto kFigures = *cartesian::figures(Personality::touch);
+constexpr ForceFigures kForces = force_figures(Personality::touch);
 
-[[nodiscard]] Values values(unsigned types, std::initializer_list<double> list) noexcept {
-  Values made{types, list.size(), {}};
-  std::size_t i = 0;
-  for (const double value : list) made.value[i++] = value;
-  return made;
+using Out = std::span<double>;
+
+void give(Out out, std::initializer_list<double> list) noexcept {
+  std::copy(list.begin(), list.end(), out.begin());
 }
-[[nodiscard]] Values values(DeviceVec<double> v) noexcept {
-  return values(kReal, {v.x, v.y, v.z});
+void give(Out out, DeviceVec<double> v) noexcept {
+  give(out, {v.x, v.y, v.z});
 }
-[[nodiscard]] Values values(const Angles& a) noexcept {
-  return values(kReal, {a[0], a[1], a[2]});
-}
-[[nodiscard]] Values box(const std::array<double, 3>& low, const std::array<double, 3>& high) {
-  return values(kReal, {low[0], low[1], low[2], high[0], high[1], high[2]});
+template <std::size_t N>
+void give(Out out, const std::array<double, N>& all) noexcept {
+  std::copy(all.begin(), all.end(), out.begin());
 }
 
-/// Parameters that the vendor's library has and the stand-in has not: no document says what they
-/// hold, or a Touch has no part for them.
-[[nodiscard]] bool is_left_out(Enum name) noexcept {
-  switch (name) {
-    case kEncoders:
-    case kEncoders + kLastOffset:
-    case kPinch:
-    case kLastPinch:
-    case kJacobian:
-    case kJacobian + kLastOffset:
-    case kMotorDac:
-    case kLastMotorDac:
-    case kSafetySwitch:
-    case kJointReferences:
-      return true;
-    default:
-      return false;
-  }
+/// Belongs to the force of a frame.
+bool is_force(Enum name) noexcept {
+  return name == kForce || name == kTorque || name == kJointTorque || name == kGimbalTorque;
 }
 
 }  // namespace
 
-std::optional<Values> Touch::reading(Enum name, const Readings& from) const noexcept {
-  switch (name) {
-    case kButtons:
-      return values(kWhole | kReal, {static_cast<double>(from.buttons)});
-    case kPosition:
-      return values(from.pose.tip_mm);
-    case kVelocity:
-      return values(from.velocity);
-    case kAngularVelocity:
-      return values(from.angular_velocity);
-    case kJointAngles:
-      return values(from.joints);
-    case kGimbalAngles:
-      return values(from.gimbal);
-    case kTransform:
-      return Values{kReal, from.transform.size(), from.transform};
-    default:
-      return std::nullopt;
-  }
+/// A parameter: what it holds, how many numbers, and who may read and write it.
+struct Touch::Parameter {
+  Enum name;
+  std::size_t count;  ///< numbers of a read and of a write; 0: the stand-in has none
+  unsigned reads, writes;
+  bool has_last;  ///< at kLastOffset: of the frame before
+  void (*read)(const Touch& touch, const Readings& from, Out out);
+};
+
+/// All of the interface but its texts. Without a `read`, no document says what they hold, or a
+/// Touch has no part for them.
+std::span<const Touch::Parameter> Touch::parameters() noexcept {
+  using T = const Touch&;
+  using R = const Readings&;
+  constexpr auto kNothing = [](T, R, Out out) { give(out, DeviceVec<double>{}); };
+  static constexpr std::array kAll{
+      // of a frame
+      Parameter{kButtons, 1, kAny, 0, true,
+                [](T, R from, Out out) { give(out, {static_cast<double>(from.buttons)}); }},
+      Parameter{kInkwellSwitch, 1, kBool, 0, true,
+                [](T, R from, Out out) { give(out, {from.pose.parked ? 0.0 : 1.0}); }},
+      Parameter{kSafetySwitch, 0, kBool, 0, true, nullptr},
+      Parameter{kEncoders, 6, kLong, 0, true,
+                [](T, R from, Out out) { give(out, encoder_counts(from.joints, from.gimbal)); }},
+      Parameter{kPinch, 0, kReal, 0, false, nullptr},
+      Parameter{kLastPinch, 0, kReal, 0, false, nullptr},
+      Parameter{kPosition, 3, kReal, 0, true,
+                [](T, R from, Out out) { give(out, from.pose.tip_mm); }},
+      Parameter{kVelocity, 3, kReal, 0, true, [](T, R from, Out out) { give(out, from.velocity); }},
+      Parameter{kTransform, 16, kReal, 0, true,
+                [](T, R from, Out out) { give(out, from.transform); }},
+      Parameter{kAngularVelocity, 3, kReal, 0, true,
+                [](T, R from, Out out) { give(out, from.angular_velocity); }},
+      Parameter{kJacobian, 0, kReal, 0, true, nullptr},
+      Parameter{kJointAngles, 3, kReal, 0, true,
+                [](T, R from, Out out) { give(out, from.joints); }},
+      Parameter{kGimbalAngles, 3, kReal, 0, true,
+                [](T, R from, Out out) { give(out, from.gimbal); }},
+      // what the program sets
+      Parameter{kForce, 3, kReal, kReal, false,
+                [](T touch, R, Out out) {
+                  give(out, touch.in_frame_ ? touch.wanted_.force_n : touch.last_force_n_);
+                }},
+      Parameter{kLastForce, 3, kReal, 0, false,
+                [](T touch, R, Out out) { give(out, touch.last_force_n_); }},
+      Parameter{kTorque, 3, kReal, kReal, false, kNothing},
+      Parameter{kJointTorque, 3, kReal, kReal, false, kNothing},
+      Parameter{kGimbalTorque, 3, kReal, kReal, false, kNothing},
+      Parameter{kLastTorque, 3, kReal, 0, false, kNothing},
+      Parameter{kLastJointTorque, 3, kReal, 0, false, kNothing},
+      Parameter{kLastGimbalTorque, 3, kReal, 0, false, kNothing},
+      Parameter{kMotorDac, 3, kLong, kLong, false, nullptr},
+      Parameter{kLastMotorDac, 0, kLong, 0, false, nullptr},
+      Parameter{kStatusLight, 1, 0, kInt, false, nullptr},
+      Parameter{kVelocityLimit, 1, kReal, kReal, false,
+                [](T touch, R, Out out) { give(out, {touch.velocity_limit_}); }},
+      Parameter{kImpulseLimit, 1, kReal, kReal, false,
+                [](T touch, R, Out out) { give(out, {touch.impulse_limit_n_}); }},
+      Parameter{kRampingRate, 1, kReal, kReal, false,
+                [](T touch, R, Out out) { give(out, {touch.ramping_rate_}); }},
+      // of the device
+      Parameter{kFirmwareVersion, 1, kAny, 0, false, [](T, R, Out out) { give(out, {1}); }},
+      Parameter{kMaxWorkspace, 6, kReal, 0, false,
+                [](T, R, Out out) {
+                  give(out.first(3), kFigures.low_mm);
+                  give(out.last(3), kFigures.high_mm);
+                }},
+      Parameter{kUsableWorkspace, 6, kReal, 0, false,  // 160 x 120 x 70: data sheet
+                [](T, R, Out out) {
+                  give(out, {-80, -60, -35, 80, 60, 35});
+                }},
+      Parameter{kTabletopOffset, 1, kAny, 0, false,  // our own: its inkwell
+                [](T, R, Out out) { give(out, {-kFigures.rest_mm[1]}); }},
+      Parameter{kInputDof, 1, kWhole, 0, false, [](T, R, Out out) { give(out, {6}); }},
+      Parameter{kOutputDof, 1, kWhole, 0, false, [](T, R, Out out) { give(out, {kMotors}); }},
+      Parameter{kCalibrationStyle, 1, kWhole, 0, false,
+                [](T, R, Out out) { give(out, {kInkwellStyle}); }},
+      Parameter{kUpdateRate, 1, kAny, 0, false,
+                [](T touch, R, Out out) { give(out, {static_cast<double>(touch.rate_hz_)}); }},
+      Parameter{kInstantaneousRate, 1, kAny, 0, false,
+                [](T touch, R, Out out) { give(out, {static_cast<double>(touch.rate_hz_)}); }},
+      Parameter{kMaxStiffness, 1, kReal, 0, false,  // of the vendor's configuration file
+                [](T, R, Out out) { give(out, {0.5}); }},
+      Parameter{kMaxDamping, 1, kReal, 0, false,  // likewise
+                [](T, R, Out out) { give(out, {0.003}); }},
+      Parameter{kMaxForce, 1, kReal, 0, false, [](T, R, Out out) { give(out, {kForces.peak_n}); }},
+      Parameter{kContinuousForce, 1, kReal, 0, false,
+                [](T, R, Out out) { give(out, {kForces.continuous_n}); }},
+      Parameter{kMotorTemperature, kMotors, kReal, 0, false,
+                [](T touch, R, Out out) { give(out, touch.heat_.temperatures()); }},
+      Parameter{kMaxTorqueStiffness, 0, kReal, 0, false, nullptr},
+      Parameter{kMaxTorqueDamping, 0, kReal, 0, false, nullptr},
+      Parameter{kMaxTorque, 0, kReal, 0, false, nullptr},
+      Parameter{kContinuousTorque, 0, kReal, 0, false, nullptr},
+      Parameter{kJointReferences, 0, kReal, 0, false, nullptr},
+  };
+  return kAll;
 }
 
-std::optional<Values> Touch::figure(Enum name) const noexcept {
-  constexpr unsigned kAny = kReal | kWhole;  // clients read these as doubles and as ints
-  constexpr auto kFigures = *cartesian::figures(Personality::touch);
-  constexpr ForceFigures kForces = force_figures(Personality::touch);
-  switch (name) {
-    case kInkwellSwitch:
-      return values(kBool, {arm_.pose().parked ? 0.0 : 1.0});
-    case kMaxWorkspace:
-      return box(kFigures.low_mm, kFigures.high_mm);
-    case kUsableWorkspace:
-      return box({-80, -60, -35}, {80, 60, 35});  // 160 x 120 x 70: data sheet
-    case kTabletopOffset:
-      return values(kAny, {-kFigures.rest_mm[1]});  // our own: its inkwell
-    case kFirmwareVersion:
-      return values(kAny, {1});
-    case kInputDof:
-      return values(kWhole, {6});
-    case kOutputDof:
-      return values(kWhole, {3});
-    case kCalibrationStyle:
-      return values(kWhole, {double{kInkwellStyle}});
-    case kUpdateRate:
-    case kInstantaneousRate:
-      return values(kAny, {static_cast<double>(rate_hz_)});
-    case kMaxStiffness:
-      return values(kReal, {0.5});  // of the vendor's configuration file
-    case kMaxForce:
-      return values(kReal, {kForces.peak_n});
-    case kContinuousForce:
-      return values(kReal, {kForces.continuous_n});
-    case kMaxDamping:
-      return values(kReal, {0.003});  // as kMaxStiffness
-    case kMotorTemperature:
-      return values(kReal, {0});  // the emulated motors stay cold
-    case kVelocityLimit:
-      return values(kReal, {velocity_limit_});
-    case kImpulseLimit:
-      return values(kReal, {impulse_limit_n_});
-    case kRampingRate:
-      return values(kReal, {ramping_rate_});
-    case kForce: {
-      const DeviceVec<double> set_n = in_frame_ ? wanted_.force_n : last_force_n_;
-      return values(set_n);
-    }
-    case kLastForce:
-      return values(last_force_n_);
-    case kTorque:
-    case kLastTorque:
-    case kGimbalTorque:
-    case kLastGimbalTorque:
-    case kJointTorque:
-    case kLastJointTorque:
-      return values(DeviceVec<double>{});  // none that the stand-in gives
-    default:
-      return std::nullopt;
-  }
+const Touch::Parameter* Touch::parameter(Enum name) noexcept {
+  const auto all = parameters();
+  const auto found = std::find_if(all.begin(), all.end(), [&](const Parameter& one) {
+    return one.name == name || (one.has_last && one.name + kLastOffset == name);
+  });
+  return found == all.end() ? nullptr : &*found;
 }
 
 std::optional<Values> Touch::read(Enum name, unsigned type) noexcept {
-  std::optional<Values> found = figure(name);
-  if (!found) found = reading(name, now_);
-  if (!found && name >= kLastOffset) found = reading(name - kLastOffset, before_);
-  if (!found) {
-    push(is_left_out(name) ? kInvalidOperation : kInvalidEnum);
-  } else if ((found->types & type) == 0) {
+  const Parameter* const found = parameter(name);
+  if (found == nullptr || found->reads == 0) {
+    push(kInvalidEnum);
+  } else if (found->read == nullptr) {
+    push(kInvalidOperation);
+  } else if ((found->reads & type) == 0) {
     push(kInvalidType);
-    found.reset();
+  } else {
+    Values values{.count = found->count, .value = {}};
+    // The switch of the inkwell is read outside a frame, too.
+    const Readings newest = name == kInkwellSwitch ? sampled() : Readings{};
+    const Readings& from = name != found->name ? before_ : name == kInkwellSwitch ? newest : now_;
+    found->read(*this, from, std::span(values.value).first(found->count));
+    return values;
   }
-  return found;
+  return std::nullopt;
 }
 
 std::size_t Touch::writes(Enum name, unsigned type) noexcept {
-  unsigned types = kReal;
-  std::size_t count = 1;
-  switch (name) {
-    case kForce:
-    case kTorque:
-    case kJointTorque:
-    case kGimbalTorque:
-      count = 3;
-      if (!in_frame_) {
-        ledger_.add(standin::Row::set_outside_frame);
-        push(kFrameError);
-        return 0;
-      }
-      break;
-    case kMotorDac:
-      types = kLong;
-      break;
-    case kVelocityLimit:
-    case kImpulseLimit:
-    case kRampingRate:
-      break;
-    case kStatusLight:
-      types = kInt;
-      break;
-    default:
-      push(kInvalidEnum);
-      return 0;
+  const Parameter* const found = parameter(name);
+  if (found == nullptr || found->name != name || found->writes == 0) {
+    push(kInvalidEnum);
+  } else if (is_force(name) && !in_frame_) {
+    ledger_.add(standin::Row::set_outside_frame);
+    push(kFrameError);
+  } else if ((found->writes & type) == 0) {
+    push(kInvalidType);
+  } else {
+    return found->count;
   }
-  if ((types & type) != 0) return count;
-  push(kInvalidType);
   return 0;
 }
 

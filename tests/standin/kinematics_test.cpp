@@ -56,19 +56,6 @@ TEST_CASE("an upright tool has the stylus axis of HD upwards, and its tip below 
   CHECK(std::abs(turned[0][0] - 1) < kTiny);
 }
 
-TEST_CASE("gimbal angles turn the wrist to its transform again") {
-  for (const std::array<double, 4>& q :
-       {std::array<double, 4>{0, 0, 0, 1}, {0.1, 0.2, -0.3, 0.927}, {-0.4, 0.1, 0.2, 0.889}}) {
-    const double length = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
-    const Matrix3 r = stylus_rotation({q[0] / length, q[1] / length, q[2] / length, q[3] / length});
-    const Angles joints = joint_angles({20, 10, -15});
-    const Matrix3 again = wrist_rotation(joints, gimbal_angles(r, joints));
-    for (std::size_t i = 0; i < 3; ++i) {
-      for (std::size_t j = 0; j < 3; ++j) CHECK(std::abs(again[i][j] - r[i][j]) < 1e-9);
-    }
-  }
-}
-
 TEST_CASE("joint torques do the work of their force") {
   const DeviceVec<double> p{30, 20, 10};
   const Angles joints = joint_angles(p);

@@ -424,7 +424,7 @@ assert order == ['low', 'high', 'high', 'low', 'high', 'low'], order
 assert hd.hdCheckCalibration() == 0x5000
 hd.hdStopScheduler()
 assert len(calls) == count
-for get, name, error in (hd.hdGetIntegerv, 0x2050, 0x103), (hd.hdGetDoublev, 0x1234, 0x100), (hd.hdGetLongv, 0x2010, 0x102):
+for get, name, error in (hd.hdGetIntegerv, 0x2050, 0x103), (hd.hdGetDoublev, 0x1234, 0x100), (hd.hdGetLongv, 0x2750, 0x102):
     get(name, (ctypes.c_double * 16)())
     assert hd.hdGetError().a == error
 hd.hdBeginFrame(1)
