@@ -3,19 +3,16 @@
 
 #include <algorithm>
 #include <array>
-#include <cerrno>
 #include <cstddef>
 #include <cstdint>
+#include <cstdio>
 #include <span>
 #include <string>
 #include <string_view>
-#include <system_error>
 #include <utility>
 #include <vector>
 
-#include <fcntl.h>
 #include <hdf5.h>
-#include <unistd.h>
 
 #include "record/recording.hpp"
 #include "record/tick_text.hpp"
@@ -64,11 +61,16 @@ hid_t type_of(std::string_view type) {
   return type == "f32" ? H5T_IEEE_F32LE : H5T_IEEE_F64LE;
 }
 
-/// UTF-8 of `bytes` bytes; the library has none of 0 bytes.
-Handle text_type(std::size_t bytes) {
+bool is_ascii(std::string_view text) {
+  return std::ranges::all_of(text, [](char byte) { return (byte & 0x80) == 0; });
+}
+
+/// Of a text, or of texts that are padded to one length. ASCII unless `all` has other characters:
+/// some readers have no UTF-8. The library has no type of 0 bytes.
+Handle text_type(std::size_t bytes, std::string_view all) {
   Handle type(H5Tcopy(H5T_C_S1), H5Tclose);
   checked(H5Tset_size(type, std::max<std::size_t>(bytes, 1)));
-  checked(H5Tset_cset(type, H5T_CSET_UTF8));
+  checked(H5Tset_cset(type, is_ascii(all) ? H5T_CSET_ASCII : H5T_CSET_UTF8));
   checked(H5Tset_strpad(type, H5T_STR_NULLPAD));
   return type;
 }
@@ -82,8 +84,8 @@ void put_attribute(hid_t object, const char* name, hid_t type, const Handle& spa
 void put_text(hid_t object, const char* name, std::string_view text) {
   constexpr std::size_t kMost = 4096;  // the library has no attributes above 64 KiB
   const std::string ended(text.substr(0, kMost));
-  put_attribute(object, name, text_type(ended.size()), Handle(H5Screate(H5S_SCALAR), H5Sclose),
-                ended.c_str());
+  put_attribute(object, name, text_type(ended.size(), ended),
+                Handle(H5Screate(H5S_SCALAR), H5Sclose), ended.c_str());
 }
 
 void put_number(hid_t object, const char* name, std::uint64_t number) {
@@ -105,16 +107,20 @@ void put_codes(hid_t object, std::span<const LogCode> codes) {
     all += line;
   }
   const hsize_t count = lines.size();
-  put_attribute(object, "codes", text_type(longest),
+  put_attribute(object, "codes", text_type(longest, all),
                 Handle(H5Screate_simple(1, &count, nullptr), H5Sclose), all.data());
 }
 
-std::span<const LogCode> codes_of(std::string_view column) {
-  if (column == "flags") return log_flags();
-  if (column == "command") return log_commands();
-  if (column == "phase") return log_phases();
-  if (column == "fault") return log_faults();
-  return {};
+/// What a column means, with all its codes or bits.
+std::string description_of(const LogColumn& column) {
+  std::string text(column.meaning);
+  const char* before = "; ";
+  for (const LogCode& code : log_codes(column.name)) {
+    text += before + std::to_string(code.value) + " " + std::string(code.name);
+    if (!code.meaning.empty()) text += " (" + std::string(code.meaning) + ")";
+    before = ", ";
+  }
+  return text;
 }
 
 /// One column of the log as a dataset that grows.
@@ -123,9 +129,9 @@ class Column {
   Column(hid_t group, const LayoutField& field, const LogColumn& meaning)
       : field_(field), dataset_(create(group, field), H5Dclose) {
     put_text(dataset_, "units", meaning.unit);
-    put_text(dataset_, "description", meaning.meaning);
+    put_text(dataset_, "description", description_of(meaning));
     put_text(dataset_, "valid", meaning.valid.empty() ? "in every row" : meaning.valid);
-    if (const auto codes = codes_of(field.name); !codes.empty()) put_codes(dataset_, codes);
+    if (const auto codes = log_codes(field.name); !codes.empty()) put_codes(dataset_, codes);
   }
 
   /// Adds the column of `rows` behind the `before` rows that it has.
@@ -208,26 +214,60 @@ void write_ticks(hid_t file, const char* name, const std::filesystem::path& path
   if (!rows.empty()) flush();
 }
 
+/// `json`, which is valid, in ASCII: characters beyond it stand in strings only, and become
+/// escapes. Octave reads no UTF-8, and then nothing of the file.
+std::string ascii_json(std::string_view json) {
+  std::string out;
+  const auto escape = [&](std::uint32_t unit) {
+    std::array<char, 16> text{};
+    std::snprintf(text.data(), text.size(), "\\u%04x", unit);
+    out += text.data();
+  };
+  for (std::size_t at = 0; at < json.size();) {
+    const auto first = static_cast<std::uint8_t>(json[at++]);
+    if (first < 0x80) {
+      out += static_cast<char>(first);
+      continue;
+    }
+    const int more = first >= 0xf0 ? 3 : first >= 0xe0 ? 2 : 1;  // bytes of the character
+    std::uint32_t point = first & (0x3fU >> more);
+    for (int i = 0; i < more && at < json.size(); ++i) {
+      point = point << 6 | (static_cast<std::uint8_t>(json[at++]) & 0x3fU);
+    }
+    if (point < 0x10000) {
+      escape(point);
+    } else {  // in UTF-16, as JSON has it
+      escape(0xd800 + ((point - 0x10000) >> 10));
+      escape(0xdc00 + ((point - 0x10000) & 0x3ff));
+    }
+  }
+  return out;
+}
+
 void write_scene(hid_t file, const std::filesystem::path& folder) {
-  const std::string scene = recorded_scene(folder);
+  std::string scene = recorded_scene(folder);
   try {
     static_cast<void>(Json::parse(scene));
   } catch (const JsonError&) {
     throw RecordError((folder / kSceneName).string() + ": no JSON; copy the recording again");
   }
-  const Handle type = text_type(scene.size());
+  scene = ascii_json(scene);
+  const Handle type = text_type(scene.size(), scene);
   const Handle space(H5Screate(H5S_SCALAR), H5Sclose);
   const Handle dataset(
       H5Dcreate2(file, "scene", type, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), H5Dclose);
   checked(H5Dwrite(dataset, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, scene.c_str()));
 }
 
-void write_file(const std::filesystem::path& path, const std::filesystem::path& folder,
-                const Manifest& manifest, std::span<TickLogReader> logs, TickRange range,
-                const LogClock& clock) {
+/// Writes `path`, which is there and has the name `hdf5` for people.
+void write_file(const std::filesystem::path& path, const std::filesystem::path& hdf5,
+                const std::filesystem::path& folder, const Manifest& manifest,
+                std::span<TickLogReader> logs, TickRange range, const LogClock& clock) {
   // The last library that reads it: h5py and MATLAB from 2015 on.
   const Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
   checked(H5Pset_libver_bounds(access, H5F_LIBVER_EARLIEST, H5F_LIBVER_V18));
+  // Its other drivers resolve links in a name, and a file without a name has only one in /proc.
+  checked(H5Pset_fapl_stdio(access));
   const Handle file(H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, access), H5Fclose);
   put_text(file, "kerf", KERF_VERSION);
   put_number(file, "tick_ns", manifest.tick_ns);
@@ -235,32 +275,10 @@ void write_file(const std::filesystem::path& path, const std::filesystem::path& 
   put_text(file, "end_reason", manifest.end_reason);
   put_text(file, "clock", clock.has_date() ? "UTC" : "CLOCK_MONOTONIC");
   write_scene(file, folder);
-  write_ticks(file, "ticks", path, logs[0], range, clock);
-  if (logs.size() > 1) write_ticks(file, "ticks_2", path, logs[1], range, clock);
+  write_ticks(file, "ticks", hdf5, logs[0], range, clock);
+  if (logs.size() > 1) write_ticks(file, "ticks_2", hdf5, logs[1], range, clock);
   checked(H5Fflush(file, H5F_SCOPE_GLOBAL));  // a full disk is reported here, not by the release
 }
-
-/// The name under which the file is written, new in its folder: the library opens files by name
-/// only.
-class PartFile {
- public:
-  explicit PartFile(const std::filesystem::path& whole)
-      : path_(whole.string() + ".new-" + std::to_string(getpid())) {
-    const int fd = open(path_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-    if (fd < 0) throw RecordError(whole.string() + not_written(errno));
-    close(fd);
-  }
-  ~PartFile() {
-    std::error_code none;  // usually it has its own name by now
-    std::filesystem::remove(path_, none);
-  }
-  PartFile(const PartFile&) = delete;
-  PartFile& operator=(const PartFile&) = delete;
-  [[nodiscard]] const std::filesystem::path& path() const noexcept { return path_; }
-
- private:
-  std::filesystem::path path_;
-};
 
 }  // namespace
 
@@ -270,7 +288,6 @@ void export_hdf5(const std::filesystem::path& folder, const std::filesystem::pat
   if (is_stream(hdf5)) {
     throw RecordError(hdf5.string() + ": HDF5 is no stream; give the name of a file");
   }
-  check_new_file(hdf5);
   const Manifest manifest = read_manifest(folder);
   std::vector<TickLogReader> logs;
   for (std::size_t arm = 0; arm < manifest.arms; ++arm) {
@@ -278,16 +295,15 @@ void export_hdf5(const std::filesystem::path& folder, const std::filesystem::pat
   }
   H5dont_atexit();  // after a full disk its clean-up at exit crashes (1.10.8)
   H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);  // else it prints its own stack
-  const PartFile part(hdf5);
-  std::error_code fault;
+  AtomicFile file(hdf5);
   try {
-    write_file(part.path(), folder, manifest, logs, range, clock);
-    std::filesystem::rename(part.path(), hdf5, fault);
-    if (!fault) return;
-  } catch (const Hdf5Failure&) {  // NOLINT(bugprone-empty-catch): reported below
+    write_file(file.open_path(), hdf5, folder, manifest, logs, range, clock);
+  } catch (const Hdf5Failure&) {
+    throw RecordError(hdf5.string() +
+                      ": cannot be written; is the disk full? free space, or choose another one");
   }
-  throw RecordError(hdf5.string() +
-                    ": cannot be written; is the disk full? free space, or choose another one");
+  file.close();
+  file.commit();
 }
 
 }  // namespace kerf

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "record/export/log_page.hpp"
 
+#include <algorithm>
 #include <cstddef>
 #include <span>
 #include <string_view>
@@ -96,10 +97,11 @@ as they were at the start, so the MCAP of a whole recording replays on kerf's pa
 `--until` it has the messages alone. `ticks.npy.head` is the header of the log, whose rows are the bytes of `/kerf/tick` behind the
 four of CDR.
 
-HDF5 opens in MATLAB (`h5read("run.h5", "/ticks/position_mm")`), Julia, R and h5py: one dataset per column, `/ticks/COLUMN`,
-with `units`, `description` and `valid` as attributes, and `codes` if its values are codes or bits. `/ticks_2` is a
-second device's. `/scene` is the scene's JSON. `/ticks/time_ns` is each row's time, UTC or with `--time monotonic` `start_ns`;
-the file's attribute `clock` says which.
+HDF5 opens in MATLAB (`h5read("run.h5", "/ticks/position_mm")`), Octave (`load -hdf5 run.h5`), Julia, R and h5py: one dataset per
+column, `/ticks/COLUMN`, with `units`, `description` and `valid` as attributes, and `codes` if its values are codes or bits, which
+`description` has too. Programs that store by columns, as MATLAB, Octave and Julia, have `position_mm` as 3 x rows. `/ticks_2` is
+a second device's. `/scene` is the scene's JSON, in ASCII: other characters are `\uXXXX`. `/ticks/time_ns` is each row's time, UTC
+or with `--time monotonic` `start_ns`; the file's attribute `clock` says which.
 
 A running controller can be plotted without a log: [Foxglove](second-machine.md) by the bridge, and PlotJuggler's UDP server
 (protocol JSON, timestamp from the message; a second device is in `kerf_2`) by
@@ -119,9 +121,13 @@ This page is made from the table in `shared/segment/log_columns.cpp` by
 std::string page_row(const LayoutField& field, const LogColumn& column) {
   std::string type(field.type);
   if (field.count > 1) type += " x " + std::to_string(field.count);
+  std::string meaning(column.meaning);
+  if (!log_codes(column.name).empty()) {  // "bits" or "code: ...", with a table on the page
+    meaning.insert(std::min(meaning.find(':'), meaning.size()), ", below");
+  }
   return "| `" + std::string(column.name) + "` | " + type + " | " + std::string(column.unit) +
-         " | " + std::string(column.meaning) + " | " +
-         (column.valid.empty() ? "always" : std::string(column.valid)) + " |\n";
+         " | " + meaning + " | " + (column.valid.empty() ? "always" : std::string(column.valid)) +
+         " |\n";
 }
 
 std::string codes(std::string_view title, std::string_view number, std::span<const LogCode> list) {

@@ -106,7 +106,7 @@ int run_record(int argc, char** argv) {
   add_arm(table, "of a run with two devices, the one of the CSV; MCAP and HDF5 have both");
   table.option("--csv", csv, "as CSV").shown_as("FILE");
   table.option("--mcap", mcap, "as MCAP, for Foxglove, PlotJuggler and ROS 2").shown_as("FILE");
-  table.option("--hdf5", hdf5, "as HDF5, for MATLAB, Julia and h5py").shown_as("FILE");
+  table.option("--hdf5", hdf5, "as HDF5, for MATLAB, Octave, Julia and h5py").shown_as("FILE");
   table
       .option(
           "--time", time,

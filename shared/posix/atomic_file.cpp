@@ -188,6 +188,10 @@ void AtomicFile::write(const void* data, std::size_t size) {
   }
 }
 
+fs::path AtomicFile::open_path() const {
+  return nameless_ ? fs::path(open_file(fd_)) : temporary_;
+}
+
 void AtomicFile::close() {
   const bool stored = ::fsync(fd_) == 0 || errno == EINVAL || errno == EROFS;  // pipes cannot
   const int error = errno;

@@ -55,6 +55,9 @@ class AtomicFile {
   AtomicFile& operator=(const AtomicFile&) = delete;
 
   void write(const void* data, std::size_t size);
+  /// Where a library that opens files by name writes it, before `close`: in /proc while it has no
+  /// name. Not of a stream.
+  [[nodiscard]] std::filesystem::path open_path() const;
   /// Ends writing, on the disk. Some file systems report a full disk only here.
   void close();
   /// After `close`: gives it the temporary name. `commit` does that if the caller has not.

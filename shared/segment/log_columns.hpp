@@ -24,6 +24,8 @@ struct LogCode {
 };
 
 [[nodiscard]] std::span<const LogColumn> log_columns();
+/// The bits or codes of a column; empty if it has none.
+[[nodiscard]] std::span<const LogCode> log_codes(std::string_view column);
 [[nodiscard]] std::span<const LogCode> log_flags();
 [[nodiscard]] std::span<const LogCode> log_commands();
 [[nodiscard]] std::span<const LogCode> log_phases();

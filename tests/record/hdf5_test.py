@@ -1,14 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The HDF5 of a recording, read by h5py.
+"""The HDF5 of a recording, read by h5py, and by Octave if that is there.
 
     hdf5_test.py ROOT BIN
 Exit code 77: skipped, without h5py."""
 import json
+import os
 import pathlib
 import shutil
 import subprocess
 import sys
 import tempfile
+import time
 import unittest
 
 import numpy as np
@@ -41,7 +43,8 @@ class TestHdf5(unittest.TestCase):
     def setUpClass(cls):
         cls.temporary = tempfile.TemporaryDirectory()
         cls.folder = pathlib.Path(cls.temporary.name)
-        record(ROOT, BIN, cls.folder, ROOT / "scenes/touch.toml", 4)
+        cls.scene = shutil.copy(ROOT / "scenes/touch.toml", cls.folder / "Zähne 🦷.toml")  # its name is in scene.json
+        record(ROOT, BIN, cls.folder, cls.scene, 4)
         cls.log = cls.folder / "log"
         cls.rows = np.load(cls.log / "ticks.npy")
 
@@ -63,8 +66,53 @@ class TestHdf5(unittest.TestCase):
             self.assertEqual(ticks["position_mm"].attrs["units"], b"mm")
             self.assertIn(b"4 contact:", [code[:10] for code in ticks["flags"].attrs["codes"]])
             self.assertEqual(file.attrs["tick_ns"], 1_000_000)
-            self.assertEqual(file["scene"][()].decode(), (self.log / "scene.json").read_text())
+            scene = file["scene"][()].decode("ascii")
+            self.assertEqual(json.loads(scene), json.loads((self.log / "scene.json").read_text()))
+            self.assertIn("Z\\u00e4hne \\ud83e\\uddb7.toml", scene)
+            self.assertEqual(h5py.check_string_dtype(file["scene"].dtype).encoding, "ascii")
         self.assertLess(path.stat().st_size, (self.log / "ticks.npy").stat().st_size)
+
+    def test_descriptions_have_their_codes_and_bits(self):
+        path = self.folder / "codes.h5"
+        export(self.log, path)
+        with h5py.File(path, "r") as file:
+            of = {name: column.attrs["description"].decode("ascii") for name, column in file["ticks"].items()}
+            for name in ("flags", "command", "phase", "fault"):
+                for code in file["ticks"][name].attrs["codes"]:
+                    number, meaning = code.decode().split(": ", 1) if b": " in code else (code.decode()[:-1], "")
+                    self.assertIn(number.rstrip(":") + (f" ({meaning})" if meaning else ""), of[name])
+        self.assertIn("bits; 1 button 1 (pressed), 2 button 2 (pressed), 4 contact (", of["flags"])
+        self.assertIn("code: why there is no force; 0 none, 1 stale_input (no report for 20 ms), ", of["fault"])
+        self.assertFalse([text for text in of.values() if ", below" in text])
+
+    @unittest.skipUnless(shutil.which("octave-cli"), "no octave-cli: apt-get install --no-install-recommends octave")
+    def test_octave_loads_all_of_it(self):
+        path, script = self.folder / "octave.h5", self.folder / "read.m"
+        script.write_text("""s = load("-hdf5", argv(){1});
+printf("%s\\n", s.scene);
+for f = fieldnames(s.ticks)'
+  v = s.ticks.(f{1});
+  printf("%s %d %d", f{1}, size(v));
+  if any(strcmp(class(v), {"int64", "uint64"})) v = typecast(v(:), "uint32"); end  % it prints no large numbers
+  if isa(v, "double") printf(" %.17g", v); else printf(" %d", v); end
+  printf("\\n");
+end
+""")
+        export(self.log, path)
+        done = subprocess.run(["octave-cli", "--no-gui", "--quiet", "--no-history", script, path], capture_output=True, text=True)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        scene, *lines = done.stdout.splitlines()
+        self.assertEqual(json.loads(scene), json.loads((self.log / "scene.json").read_text()))
+        found = {line.split()[0]: line.split()[1:] for line in lines}
+        self.assertEqual(sorted(found), sorted([*self.rows.dtype.names, "time_ns"]))
+        for name in self.rows.dtype.names:
+            values = self.rows[name]
+            count = values.size // len(values)
+            self.assertEqual(found[name][:2], [str(count), str(len(values))], name)
+            halves = values.dtype.kind in "iu" and values.dtype.itemsize == 8
+            kind = "<u4" if halves else values.dtype
+            printed = np.array(found[name][2:], dtype=float if values.dtype.kind == "f" else "i8").astype(kind)
+            np.testing.assert_array_equal(printed.view(values.dtype) if halves else printed, values.ravel(), name)
 
     def test_times_are_utc_or_monotonic(self):
         log, path = self.folder / "dated", self.folder / "dated.h5"
@@ -162,6 +210,20 @@ class TestHdf5(unittest.TestCase):
         self.assertIn(f"cut after 193 of {len(self.rows)} rows", export(cut, self.folder / "cut.h5", code=1))
         with h5py.File(self.folder / "cut.h5", "r") as file:
             self.assertEqual(len(file["ticks/tick"]), 193)
+
+    def test_a_killed_export_leaves_nothing(self):
+        folder = self.folder / "killed"
+        folder.mkdir()
+        try:
+            os.close(os.open(folder, os.O_TMPFILE | os.O_WRONLY))
+        except OSError:
+            self.skipTest("a file system whose files all have names")
+        for i in range(12):
+            export_it = subprocess.Popen([BIN / "kerf-record", "export", self.log, "--hdf5", folder / "x.h5"])
+            time.sleep(i * 0.005)
+            export_it.kill()
+            export_it.wait()
+            self.assertEqual([path for path in folder.iterdir() if path.name != "x.h5"], [])
 
     def test_a_full_disk_leaves_nothing(self):
         full = self.folder / "full"
