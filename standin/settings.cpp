@@ -28,6 +28,7 @@ constexpr std::array kSwitches{
     Switch{"handles", "seen", "documented", &Settings::documented_handles},
     Switch{"button0", "parked", "hand", &Settings::hand_buttons},
     Switch{"status", "17", "16", &Settings::short_status},
+    Switch{"emulate-button", "accept", "refuse", &Settings::refuses_emulation},
     Switch{"hand", "enabled", "pushed", &Settings::hand_waits},
 };
 

@@ -51,6 +51,7 @@ struct Settings {
   bool documented_handles = false;  ///< HD: no current device before init, by the documents
   bool hand_buttons = false;        ///< omega: button 0 is the hand's; else "parked"
   bool short_status = false;        ///< dhdGetStatus writes 16 words, as before SDK 3.16; else 17
+  bool refuses_emulation = false;   ///< dhdEmulateButton without a gripper fails
   bool hand_waits = false;          ///< the hand begins with the first force, or after 2 s
   double ramp_s = 0;            ///< HD: the force rises within so long after a start; 0 = at once
   int stall_ms = 50;            ///< a callback (HD) or a pause with a force (dhd) above it stalls
@@ -63,7 +64,8 @@ struct Settings {
 ///
 ///     missed=hold|drop  stop=hold|drop  excess=clamp|cut  before-enable=apply|ignore
 ///     calibration=kept|lost  handles=seen|documented  button0=parked|hand  status=17|16
-///     hand=enabled|pushed  in-use=timer|value|pose  ramp=SECONDS  stall=MS
+///     emulate-button=accept|refuse  hand=enabled|pushed  in-use=timer|value|pose  ramp=SECONDS
+///     stall=MS
 ///
 /// `program` is the ledger of no device; without it that of the first. A device without a name is
 /// called as HD's default one, the second of its kind with a 2 behind it. The switches' words and

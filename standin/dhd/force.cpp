@@ -65,14 +65,16 @@ KERF_STAND_IN_EXPORT int dhdGetForce(double* x, double* y, double* z, char id) {
 }
 KERF_STAND_IN_EXPORT int dhdGetForceAndTorque(double* x, double* y, double* z, double* tx,
                                               double* ty, double* tz, char id) {
-  give({}, tx, ty, tz);
-  return dhdGetForce(x, y, z, id);
+  const int result = dhdGetForce(x, y, z, id);
+  if (result >= 0) give({}, tx, ty, tz);
+  return result;
 }
 KERF_STAND_IN_EXPORT int dhdGetForceAndTorqueAndGripperForce(double* x, double* y, double* z,
                                                              double* tx, double* ty, double* tz,
                                                              double* grip, char id) {
-  give(grip, 0.0);
-  return dhdGetForceAndTorque(x, y, z, tx, ty, tz, id);
+  const int result = dhdGetForceAndTorque(x, y, z, tx, ty, tz, id);
+  if (result >= 0) give(grip, 0.0);
+  return result;
 }
 
 KERF_STAND_IN_EXPORT int dhdEnableForce(unsigned char on, char id) {

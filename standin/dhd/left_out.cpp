@@ -34,7 +34,6 @@ int expert_only() {
 
 // An omega.3 has no wrist, no gripper and no locks.
 KERF_ABSENT(dhdConfigGripperVelocity)
-KERF_ABSENT(dhdEmulateButton)
 KERF_ABSENT(dhdEnableGripperForce)
 KERF_ABSENT(dhdGetGripperAngleDeg)
 KERF_ABSENT(dhdGetGripperAngleRad)

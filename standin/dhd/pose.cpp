@@ -113,6 +113,14 @@ KERF_STAND_IN_EXPORT unsigned dhdGetButtonMask(char id) {
   return mask;
 }
 
+/// A gripper as a button: an arm without one has none to press, and no document says whether it
+/// then refuses.
+KERF_STAND_IN_EXPORT int dhdEmulateButton(unsigned char /*on*/, char id) {
+  return with_arm(id, [](Delta&) {
+    return library().session.settings->refuses_emulation ? fail(kNotAvailable) : kOk;
+  });
+}
+
 /// Power, connected, started, reset, idle, force, brake, torque, wrist, error, gravity, time guard,
 /// wrist initialised, redundancy, cause of no force, locks, axes checked.
 KERF_STAND_IN_EXPORT int dhdGetStatus(int* status, char id) {

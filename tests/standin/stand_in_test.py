@@ -362,6 +362,21 @@ dhd.dhdStop(-1); dhd.dhdClose(-1)
         self.assertEqual((code, [one["what"] for one in report["notes"]]), (0, ["watchdog"]), said)
         self.assertEqual((program["status"][5], program["status"][6], program["status"][14]), (0, 1, 3))  # force, brake, cause
 
+    def test_a_button_of_no_gripper_is_accepted_or_refused(self):
+        program = self.file("button.py", """
+import ctypes, sys
+dhd = ctypes.CDLL("libdrd.so.3")
+dhd.dhdOpen()
+told = [dhd.dhdEmulateButton(ctypes.c_ubyte(on), ctypes.c_byte(-1)) for on in (1, 0)]
+told.append(dhd.dhdErrorGetLast() if told[0] else dhd.dhdGetButtonMask(ctypes.c_byte(-1)))  # parked, and no other button
+dhd.dhdClose(ctypes.c_byte(-1))
+sys.exit(told != eval(sys.argv[1]))
+""")
+        for way, told in (("accept", [0, 0, 1]), ("refuse", [-1, -1, 6])):
+            options = ["--device", "omega", "--switch", f"emulate-button={way}"]
+            code, _, said = self.run_command("/usr/bin/python3", "-B", program, str(told), options=options)
+            self.assertEqual(code, 0, said)
+
     def test_a_device_that_goes_is_an_error_of_the_program(self):
         gone = ["--fault", str(ROOT / "hil/faults/gone.toml")]
         code, report, program, said = self.run_client("hd_client.py", "spring", 4000, gone)
