@@ -6,7 +6,6 @@ and reports what the program did with them (docs/stand-ins.md).
 
 Exit codes: that of the command; 1 if it succeeded and misused the device; 2 bad input or set-up."""
 import ctypes
-import dataclasses
 import json
 import os
 import pathlib
@@ -19,96 +18,17 @@ import tempfile
 import time
 
 import findings
+from options import Refusal, parse
 
 NAMES = {"libHD.so": ("libHD.so", "libHD.so.3.0", "libHD.so.3.4"),  # built library: the names that programs load
          "libdrd.so.3": ("libdrd.so", "libdrd.so.3", "libdhd.so", "libdhd.so.3")}
-RATES_HZ = {"touch": (1000, 1000), "omega": (4000, 1000)}  # in real time, in lock-step
-WITH_VALUE = ("--device", "--hand", "--fault", "--seconds", "--rate", "--on-silence", "--switch", "--report", "--junit")
 LINGER_S = 0.3  # three times the silence after which a device that drops its force does so
 GRACE_S = 5  # for a program that is asked to end
 PR_SET_CHILD_SUBREAPER = 36  # of <linux/prctl.h>
 
 
-class Refusal(Exception):
-    """Bad input or set-up: `place: value; remedy`. Exit code 2."""
-
-
-@dataclasses.dataclass
-class Options:
-    device: str = "touch"
-    hand: str = ""
-    fault: str = ""
-    seconds: str = ""
-    rate: str = ""
-    on_silence: str = "hold"
-    report: str = ""
-    junit: str = ""
-    lockstep: bool = False
-    switches: list = dataclasses.field(default_factory=list)
-    command: list = dataclasses.field(default_factory=list)
-
-
-def parse(words, libraries):
-    """Throws Refusal at the first word that is wrong."""
-    options, words = Options(), list(words)
-    while words:
-        name = words.pop(0)
-        if name == "--":
-            options.command = words
-            break
-        if name == "--lockstep":
-            options.lockstep = True
-            continue
-        if name not in WITH_VALUE:
-            raise Refusal(f"{name}: unknown; write -- before the command, and see ./kerf stand-in --help")
-        if not words or not words[0] or words[0].startswith("--"):
-            raise Refusal(f"{name}: no value; see ./kerf stand-in --help")
-        value = words.pop(0)
-        if name == "--switch":
-            options.switches.append(value)
-        else:
-            setattr(options, name[2:].replace("-", "_"), value)
-    check(options, libraries)
-    return options
-
-
-def refusal_of_switch(libraries, switch):
-    """What the libraries will say of it: they alone know the words and ranges. None: nothing."""
-    path = os.path.join(libraries, "libHD.so")
-    try:
-        ask = ctypes.CDLL(path).kerf_stand_in_refusal_of_switch
-    except (OSError, AttributeError):
-        raise Refusal(f"{path}: not built, or of another version; try ./kerf setup") from None
-    ask.argtypes, ask.restype = [ctypes.c_char_p], ctypes.c_char_p
-    line = ask(os.fsencode(switch))
-    return line and os.fsdecode(line)
-
-
-def check(options, libraries):
-    if not options.command:
-        raise Refusal("no command; write it behind --, as in ./kerf stand-in -- python3 program.py")
-    if options.device not in RATES_HZ:
-        raise Refusal(f"--device {options.device}: unknown; take touch or omega")
-    if options.on_silence not in ("hold", "drop"):
-        raise Refusal(f"--on-silence {options.on_silence}: unknown; take hold or drop")
-    if options.seconds and (not re.fullmatch(r"[0-9]{1,6}(\.[0-9]+)?", options.seconds) or float(options.seconds) < 0.01):
-        raise Refusal(f"--seconds {options.seconds}: not a number of seconds; take 10")
-    if options.rate and (not re.fullmatch(r"[0-9]{3,4}", options.rate) or not 100 <= int(options.rate) <= 8000
-                         or options.lockstep and 8000 % int(options.rate)):
-        raise Refusal(f"--rate {options.rate}: not a rate in Hz (in lock-step it divides 8000); take 1000")
-    for switch in options.switches:
-        if refusal := refusal_of_switch(libraries, switch):
-            raise Refusal(f"--switch {switch}: {refusal}")
-    for name, path in (("--hand", options.hand), ("--fault", options.fault)):
-        if path and not os.path.isfile(path):
-            raise Refusal(f"{name} {path}: no such file; name a script")
-    for name, path in (("--report", options.report), ("--junit", options.junit)):
-        if path and not os.path.isdir(os.path.dirname(os.path.abspath(path))):
-            raise Refusal(f"{name} {path}: no such folder; create it first")
-
-
 class Run:
-    """One command, its emulator, and a private folder for both. `end` leaves nothing behind."""
+    """One command, an emulator for each device, and a private folder for them. `end` leaves nothing behind."""
 
     def __init__(self, programs, libraries, options):
         self.programs, self.libraries, self.options = programs, libraries, options
@@ -119,16 +39,21 @@ class Run:
             self.folder = tempfile.mkdtemp(prefix="kerf-stand-in.", dir=parent)
         except OSError:
             raise Refusal(f"{parent}: cannot be written; set TMPDIR to a folder that can") from None
-        self.emulator = self.command = None
+        self.emulators, self.command = [], None
         self.limited = False  # ended by --seconds
         self.signalled = False  # by a terminal or another program
 
     def path(self, *names):
         return os.path.join(self.folder, *names)
 
+    def devices(self):
+        """(number, device): the number is in the names of the device's files."""
+        return enumerate(self.options.devices)
+
     @property
-    def rate_hz(self):
-        return int(self.options.rate) if self.options.rate else RATES_HZ[self.options.device][self.options.lockstep]
+    def ledger(self):
+        """Of what belongs to no device; a single device has it, too."""
+        return self.path("ledger" if len(self.options.devices) > 1 else "ledger-0")
 
     def place_libraries(self):
         """Under every name that programs load, in the layout of a library path and of the vendor's SDK."""
@@ -144,8 +69,10 @@ class Run:
 
     def environment(self):
         options = self.options
-        told = [f"socket:{self.path('device')}", f"device={options.device}", f"rate={self.rate_hz}",
-                f"ledger={self.path('ledger')}", *["lockstep"] * options.lockstep]
+        told = [f"program={self.ledger}", *["lockstep"] * options.lockstep]
+        for number, device in reversed([*self.devices()]):
+            told = [f"socket:{self.path(f'device-{number}')}", f"device={device.kind}", f"name={device.name}",
+                    f"rate={device.rate_hz(options.lockstep)}", f"ledger={self.path(f'ledger-{number}')}", *told]
         if options.on_silence == "drop":
             told += ["missed=drop", "stop=drop"]
         paths = [self.path("lib"), os.environ.get("LD_LIBRARY_PATH", "")]
@@ -153,22 +80,28 @@ class Run:
                 "LD_LIBRARY_PATH": ":".join(filter(None, paths)),
                 **{name: self.path("sdk") for name in ("FDSDK", "FORCEDIM_SDK", "FORCE_DIMENSION_SDK")}}
 
-    def start_emulator(self):
-        options = self.options
-        hand = options.hand or os.path.join(os.path.dirname(os.path.abspath(__file__)), "hand.toml")
-        pace = ["--lockstep", "--rate", str(self.rate_hz)] if options.lockstep else \
-            ["--packet-cycles", str(max(1, 8000 // max(self.rate_hz, 2000)))]
+    def start_emulators(self):
+        for number, device in self.devices():
+            self.start_emulator(number, device)
+
+    def start_emulator(self, number, device):
+        options, place = self.options, self.path(f"device-{number}")
+        rate_hz = device.rate_hz(options.lockstep)
+        hand = device.hand or os.path.join(os.path.dirname(os.path.abspath(__file__)), "hand.toml")
+        pace = ["--lockstep", "--rate", str(rate_hz)] if options.lockstep else \
+            ["--packet-cycles", str(max(1, 8000 // max(rate_hz, 2000)))]
         limit = ["--seconds", options.seconds] if options.lockstep and options.seconds else []
-        words = ["--personality", options.device, "--front", "socket", "--socket", self.path("device"), "--hand", hand, "--stay",
-                 "--linger", str(LINGER_S), "--report", self.path("emulator.json"), *pace, *limit,
-                 *(["--fault", options.fault] if options.fault else []), *["--drop-torque"] * (options.on_silence == "drop")]
-        with open(self.path("emulator.log"), "wb") as log:
-            self.emulator = subprocess.Popen(
+        words = ["--personality", device.kind, "--front", "socket", "--socket", place, "--hand", hand, "--stay",
+                 "--linger", str(LINGER_S), "--report", place + ".json", *pace, *limit,
+                 *(["--fault", device.fault] if device.fault else []), *["--drop-torque"] * (options.on_silence == "drop")]
+        with open(place + ".log", "wb") as log:
+            emulator = subprocess.Popen(
                 ["setpriv", "--pdeathsig", "TERM", os.path.join(self.programs, "kerf-emulator"), *words],
                 stdin=subprocess.DEVNULL, stdout=log, stderr=log, start_new_session=True)
-        while not os.path.exists(self.path("device")):
-            if self.emulator.poll() is not None:
-                lines = pathlib.Path(self.path("emulator.log")).read_text(errors="replace").splitlines()
+        self.emulators.append(emulator)
+        while not os.path.exists(place):
+            if emulator.poll() is not None:
+                lines = pathlib.Path(place + ".log").read_text(errors="replace").splitlines()
                 raise Refusal(lines[-1].removeprefix("kerf-emulator: ") if lines else "kerf-emulator: ended without a word")
             time.sleep(0.005)
 
@@ -184,10 +117,10 @@ class Run:
         limit = time.monotonic() + float(self.options.seconds) if self.options.seconds and not self.options.lockstep else None
         while self.command.poll() is None:
             time.sleep(0.02)
-            gone = self.emulator.poll() is not None  # in lock-step its time is over
-            if gone and not (self.options.lockstep and self.options.seconds and self.emulator.returncode == 0):
+            gone = [emulator for emulator in self.emulators if emulator.poll() is not None]  # in lock-step its time is over
+            if gone and not (self.options.lockstep and self.options.seconds and gone[0].returncode == 0):
                 self.ask_to_end(0)
-                raise Refusal(f"kerf-emulator ended (exit code {self.emulator.returncode}) before the program; start it again")
+                raise Refusal(f"kerf-emulator ended (exit code {gone[0].returncode}) before the program; start it again")
             if gone or limit is not None and time.monotonic() >= limit:
                 self.ask_to_end(GRACE_S if gone else 0)
         if self.signalled:
@@ -212,9 +145,9 @@ class Run:
                 continue
             if state not in b"ZX":
                 children.setdefault(int(parent), []).append((int(name), int(group)))
-        found, parents = [], [os.getpid()]
+        found, parents, own = [], [os.getpid()], [emulator.pid for emulator in self.emulators]
         for parent in parents:
-            below = [child for child in children.get(parent, []) if child[0] != self.emulator.pid]
+            below = [child for child in children.get(parent, []) if child[0] not in own]
             found += below
             parents += [process for process, _ in below]
         return found
@@ -245,12 +178,14 @@ class Run:
             else:
                 return
 
-    def emulator_report(self):
-        if self.emulator.poll() is None:
-            self.emulator.terminate()
+    def emulator_reports(self):
+        for emulator in self.emulators:
+            if emulator.poll() is None:
+                emulator.terminate()
         try:
-            self.emulator.wait(10)
-            return json.loads(pathlib.Path(self.path("emulator.json")).read_text())
+            for emulator in self.emulators:
+                emulator.wait(10)
+            return [json.loads(pathlib.Path(self.path(f"device-{number}.json")).read_text()) for number, _ in self.devices()]
         except (OSError, ValueError, subprocess.TimeoutExpired):
             raise Refusal("kerf-emulator left no report, so nothing is known of the device; start it again") from None
 
@@ -258,9 +193,10 @@ class Run:
         if self.command is not None and self.command.poll() is None:
             self.send(signal.SIGKILL)
             self.command.wait()
-        if self.emulator is not None and self.emulator.poll() is None:
-            self.emulator.kill()
-            self.emulator.wait()
+        for emulator in self.emulators:
+            if emulator.poll() is None:
+                emulator.kill()
+                emulator.wait()
         shutil.rmtree(self.folder, ignore_errors=True)
 
 
@@ -268,15 +204,17 @@ def run(programs, libraries, options):
     run = Run(programs, libraries, options)
     try:
         run.place_libraries()
-        run.start_emulator()
+        run.start_emulators()
         code = run.run_command()
-        emulator = run.emulator_report()
-        counts, periods = findings.read_ledger(run.path("ledger"))
+        emulators = run.emulator_reports()
+        program = findings.read_ledger(run.ledger)
+        devices = [findings.of_device(device, device.rate_hz(options.lockstep), findings.read_ledger(run.path(f"ledger-{number}")),
+                                      program, emulators[number]) for number, device in run.devices()]
     finally:
         run.end()
-    report = findings.findings(counts, periods, emulator, {
-        "command": options.command, "exit_code": code, "device": options.device, "lockstep": options.lockstep,
-        "rate_hz": run.rate_hz, "on_silence": options.on_silence, "switches": options.switches})
+    report = findings.findings(devices, program, {
+        "command": options.command, "exit_code": code, "lockstep": options.lockstep, "on_silence": options.on_silence,
+        "switches": options.switches})
     for path, write in ((options.report, findings.write_json), (options.junit, findings.write_junit)):
         if path:
             try:
@@ -299,4 +237,5 @@ def main():
         return 130
 
 
-sys.exit(main())
+if __name__ == "__main__":
+    sys.exit(main())

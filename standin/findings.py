@@ -21,6 +21,7 @@ MISUSE = {  # rows of the ledger, and what each one means
     "not_cleared": "the scheduler stopped, or the device was closed, with a force",
     "stalls": "a callback, or a pause while a force was on, lasted too long",
 }
+OF_NO_DEVICE = ("bad_handles", "bad_schedules")
 NOTES = {
     "output_off": MISUSE["output_off"],
     "before_enable": "forces before dhdEnableForce: given here, perhaps not by a device",
@@ -69,20 +70,36 @@ def finite(value):
     return value if math.isfinite(value) else None
 
 
-def findings(counts, periods, emulator, run):
-    """The report as a dictionary. `run`: command, exit code, device and the like, which go in unchanged."""
+def rows_of(counts, meanings):
+    return [{"what": name, "count": counts[name], "meaning": meaning} for name, meaning in meanings.items() if counts.get(name)]
+
+
+def deadlines(counts, periods):
+    return {
+        "ticks": counts.get("ticks", 0),
+        "missed_ticks": counts.get("missed_ticks", 0),
+        "period_us": {"p50": percentile_us(periods, 0.5), "p99": percentile_us(periods, 0.99),
+                      "max": counts.get("longest_period_us") if sum(periods) else None},
+        "longest_callback_us": counts.get("longest_us", 0.0),
+    }
+
+
+def of_device(device, rate_hz, ledger, program, emulator):
+    """The findings of one device. `program`: the ledger of what belongs to no device, with HD's servo thread, which all share."""
+    counts, _ = ledger
     commands = counts.get("commands", 0)
-    misuse = [{"what": name, "count": counts[name], "meaning": meaning}
-              for name, meaning in MISUSE.items() if counts.get(name)]
+    misuse = rows_of(counts, MISUSE)
     opened, closed = counts.get("opened", 0), counts.get("closed", 0)
     if opened > closed:
         misuse.append({"what": "left_open", "count": opened - closed, "meaning": "the program ended without closing the device"})
     if opened > closed and counts.get("last_n", 0) > HOUSE_KEEPING_N:
         misuse.append({"what": "force_at_end", "count": 1, "meaning": "the program ended with a force"})
     if not opened:
-        misuse.append({"what": "not_opened", "count": 1, "meaning": "the program opened no device of the stand-in"})
+        misuse.append({"what": "not_opened", "count": 1, "meaning": "the program did not open the device"})
     return {
-        **run,
+        "device": device.kind,
+        "name": device.name,
+        "rate_hz": rate_hz,
         "seconds": emulator.get("seconds"),
         "force": {
             "commands": commands,
@@ -93,19 +110,28 @@ def findings(counts, periods, emulator, run):
             "given_at_end_n": emulator.get("final_motor_force_n"),
         },
         "energy": {"given_mj": emulator.get("motor_work_mj")},
-        "deadlines": {
-            "ticks": counts.get("ticks", 0),
-            "missed_ticks": counts.get("missed_ticks", 0),
-            "period_us": {"p50": percentile_us(periods, 0.5), "p99": percentile_us(periods, 0.99),
-                          "max": counts.get("longest_period_us") if sum(periods) else None},
-            "longest_callback_us": counts.get("longest_us", 0.0),
-        },
+        "deadlines": deadlines(*(program if device.kind == "touch" else ledger)),
         "misuse": misuse,
-        "notes": [{"what": name, "count": counts[name], "meaning": meaning}
-                  for name, meaning in NOTES.items() if counts.get(name)],
+        "notes": rows_of(counts, NOTES),
         "final_tip_mm": emulator.get("final_tip_mm"),
         "report_hash": emulator.get("report_hash"),
     }
+
+
+def label(device):
+    return f"{device['device']} {device['name']}"
+
+
+def findings(devices, program, run):
+    """The report as a dictionary: of a single device its findings, of several a list of them, with all misuse and notes at the
+    top, too. `run`: command, exit code and the like, which go in unchanged."""
+    if len(devices) == 1:
+        return {**run, **devices[0]}
+    together = {}
+    for key, meanings in (("misuse", MISUSE), ("notes", NOTES)):
+        together[key] = rows_of(program[0], meanings)
+        together[key] += [{"of": label(device), **one} for device in devices for one in device[key]]
+    return {**run, **together, "devices": devices}
 
 
 def write_json(path, report):
@@ -114,21 +140,41 @@ def write_json(path, report):
         file.write("\n")
 
 
-def write_junit(path, report):
-    """One case for the command, one for each kind of misuse."""
-    found = {one["what"]: one for one in report["misuse"]}
-    cases = [("command", f"exit code {report['exit_code']}" if report["exit_code"] else "")]
-    for name in [*MISUSE, "left_open", "force_at_end", "not_opened"]:
-        one = found.get(name)
-        cases.append((name, f"{one['count']} x {one['meaning']}" if one else ""))
+def suite(name, cases):
+    """`cases`: (name, why it failed or nothing)."""
     failed = sum(bool(why) for _, why in cases)
+    yield f'<testsuite name={quoteattr(name)} tests="{len(cases)}" failures="{failed}" errors="0" skipped="0">\n'
+    for case, why in cases:
+        yield f'  <testcase classname={quoteattr(name.removeprefix("kerf "))} name={quoteattr(case)}'
+        yield f'><failure message={quoteattr(why)}>{escape(why)}</failure></testcase>\n' if why else "/>\n"
+    yield "</testsuite>\n"
+
+
+def junit(report):
+    """One case for the command, and for each kind of misuse; of several devices a suite for each."""
+    command = ("command", f"exit code {report['exit_code']}" if report["exit_code"] else "")
+
+    def cases(found, names):
+        why = {one["what"]: f"{one['count']} x {one['meaning']}" for one in found}
+        return [(name, why.get(name, "")) for name in names]
+
+    of_devices = [*MISUSE, "left_open", "force_at_end", "not_opened"]
+    if "devices" not in report:
+        yield from suite("kerf stand-in", [command, *cases(report["misuse"], of_devices)])
+        return
+    yield "<testsuites>\n"
+    of_none = [one for one in report["misuse"] if "of" not in one]
+    yield from suite("kerf stand-in", [command, *cases(of_none, [*OF_NO_DEVICE, "stalls"])])  # a callback stalls all devices
+    for device in report["devices"]:
+        names = [name for name in of_devices if name not in OF_NO_DEVICE]
+        yield from suite("kerf stand-in " + label(device), cases(device["misuse"], names))
+    yield "</testsuites>\n"
+
+
+def write_junit(path, report):
     with open(path, "w", encoding="utf-8") as file:
-        file.write('<?xml version="1.0" encoding="UTF-8"?>\n'
-                   f'<testsuite name="kerf stand-in" tests="{len(cases)}" failures="{failed}" errors="0" skipped="0">\n')
-        for name, why in cases:
-            file.write(f'  <testcase classname="stand-in" name={quoteattr(name)}')
-            file.write(f'><failure message={quoteattr(why)}>{escape(why)}</failure></testcase>\n' if why else "/>\n")
-        file.write("</testsuite>\n")
+        file.write('<?xml version="1.0" encoding="UTF-8"?>\n')
+        file.writelines(junit(report))
 
 
 def newtons(value):
@@ -137,18 +183,20 @@ def newtons(value):
 
 def summary(report):
     """Lines for a person."""
-    force, late = report["force"], report["deadlines"]
-    work = report["energy"]["given_mj"]
-    yield (f"force: {force['commands']} commands, peak {newtons(force['peak_n'])}, RMS {newtons(force['rms_n'])}; given: peak "
-           f"{newtons(force['given_peak_n'])}, RMS {newtons(force['given_rms_n'])}"
-           + (f", {work:.1f} mJ" if work is not None else ""))
-    period = late["period_us"]
-    if period["p50"] is not None:
-        yield (f"deadlines: {late['ticks']} ticks, {late['missed_ticks']} missed; period p50 {period['p50']} us, "
-               f"p99 {period['p99']} us, max {period['max']:.0f} us")
-    misused = {one["what"] for one in report["misuse"]}
+    for device in report.get("devices", [report]):
+        of = f"{label(device)}: " if "devices" in report else ""
+        force, late = device["force"], device["deadlines"]
+        work = device["energy"]["given_mj"]
+        yield (f"{of}force: {force['commands']} commands, peak {newtons(force['peak_n'])}, RMS {newtons(force['rms_n'])}; given: peak "
+               f"{newtons(force['given_peak_n'])}, RMS {newtons(force['given_rms_n'])}"
+               + (f", {work:.1f} mJ" if work is not None else ""))
+        period = late["period_us"]
+        if period["p50"] is not None:
+            yield (f"{of}deadlines: {late['ticks']} ticks, {late['missed_ticks']} missed; period p50 {period['p50']} us, "
+                   f"p99 {period['p99']} us, max {period['max']:.0f} us")
+    misused = {(one.get("of"), one["what"]) for one in report["misuse"]}
     for one in report["notes"]:
-        if one["what"] not in misused:
-            yield f"note: {one['count']} {one['meaning']}"
+        if (one.get("of"), one["what"]) not in misused:
+            yield f"note: {one['of'] + ': ' if 'of' in one else ''}{one['count']} {one['meaning']}"
     for one in report["misuse"]:
-        yield f"misuse: {one['what']}: {one['count']} x {one['meaning']}"
+        yield f"misuse: {one['of'] + ': ' if 'of' in one else ''}{one['what']}: {one['count']} x {one['meaning']}"

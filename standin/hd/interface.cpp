@@ -1,104 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
-// The 36 functions of the HD interface, over Touch and Scheduler. Names and shapes are facts of the
-// interface; the bodies are ours.
+// The 36 functions of the HD interface, over Library. Names and shapes are facts of the interface;
+// the bodies are ours.
 
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <cmath>
 #include <exception>
 #include <mutex>
-#include <optional>
 #include <string>
-#include <string_view>
 
-#include "standin/hd/error_stack.hpp"
-#include "standin/hd/numbers.hpp"
-#include "standin/hd/scheduler.hpp"
-#include "standin/hd/touch.hpp"
-#include "standin/session.hpp"
+#include "standin/hd/library.hpp"
 
 namespace kerf::hd {
 namespace {
 
 using standin::Row;
-
-/// All state of the library. `mutex` guards the devices; no callback runs while it is held.
-struct Library {
-  standin::Session session{"libHD", Personality::touch};
-  ErrorStack errors;
-  std::recursive_mutex mutex;
-  std::array<std::optional<Touch>, standin::kMostDevices> open;  ///< by handle
-  std::atomic<Handle> current;
-  int rate_hz = 1000;
-  Scheduler scheduler;
-
-  Library()
-      : current(without_device()),
-        scheduler({[this] { each(&Touch::begin_tick); }, [this] { each(&Touch::end_tick); }},
-                  *session.ledger, session.settings ? session.settings->stall_ms : 50) {
-    if (!session.devices.empty()) rate_hz = session.devices.front().settings.rate_hz;
-  }
-
-  void each(void (Touch::*what)() noexcept) {
-    const std::lock_guard lock(mutex);
-    for (auto& touch : open) {
-      if (touch) ((*touch).*what)();
-    }
-  }
-  void run(bool runs) {
-    const std::lock_guard lock(mutex);
-    for (auto& touch : open) {
-      if (touch) touch->run(runs, rate_hz);
-    }
-  }
-  /// Null if there is none.
-  [[nodiscard]] Touch* find(Handle handle) noexcept {
-    return handle < open.size() && open[handle] ? &*open[handle] : nullptr;
-  }
-  /// The current device if there is none. A client in use runs only if it is the handle that it
-  /// gets later.
-  [[nodiscard]] Handle without_device() const noexcept {
-    const bool is_documented = session.settings && session.settings->documented_handles;
-    for (const auto& touch : open) {
-      if (touch) return kNoDevice;
-    }
-    return is_documented ? kNoDevice : kFirstDevice;
-  }
-  [[nodiscard]] bool lockstep() const noexcept { return session.lockstep(); }
-  [[nodiscard]] int priority() const noexcept {
-    return session.settings ? session.settings->priority : 0;
-  }
-  void refuse(Enum code) noexcept { errors.push(code, current); }
-};
-
-Library& library() {
-  static auto* const kOne = new Library;  // never destroyed: see Session
-  return *kOne;
-}
-
-/// Calls `use(device)` under the lock; without that device an error, and `otherwise`.
-template <class Result, class Use>
-Result with_handle(Handle handle, Result otherwise, const Use& use) {
-  Library& lib = library();
-  const std::lock_guard lock(lib.mutex);
-  if (Touch* const touch = lib.find(handle)) return use(*touch);
-  lib.session.ledger->add(Row::bad_handles);
-  lib.errors.push(kBadHandle, handle);
-  return otherwise;
-}
-template <class Use>
-void with_handle(Handle handle, const Use& use) {
-  with_handle(handle, 0, [&](Touch& device) { return use(device), 0; });
-}
-
-/// The same for the current device.
-template <class Result, class Use>
-Result with_device(Result otherwise, const Use& use) {
-  Library& lib = library();
-  const std::lock_guard lock(lib.mutex);
-  return with_handle(lib.current, otherwise, use);
-}
 
 template <class T>
 void get(Enum name, T* out, unsigned type) {
@@ -129,56 +45,6 @@ void set(Enum name, const T* in, unsigned type) {
   });
 }
 
-/// The device of that name, else the first one under the names of a default. Null, after a line, if
-/// there is none.
-standin::Device* device_named(const char* given) {
-  standin::Session& session = library().session;
-  if (!session.has_devices()) return nullptr;
-  const std::string_view name = given != nullptr ? given : standin::kDefaultDevice;
-  std::string all;
-  for (standin::Device& device : session.devices) {
-    if (device.settings.name == name) return &device;
-    all += ", \"" + device.settings.name + '"';
-  }
-  if (name == standin::kDefaultDevice || name == "Default PHANToM") return &session.devices.front();
-  standin::complain("libHD", std::string(name) + ": no such device; open NULL" + all);
-  return nullptr;
-}
-
-/// The handle, or an error.
-struct Opened {
-  Handle handle = kNoDevice;
-  Enum error = kDeviceFault;
-};
-
-Opened open_device(const char* name) {
-  Library& lib = library();
-  standin::Device* const device = device_named(name);
-  if (device == nullptr) return {};
-  for (const auto& touch : lib.open) {
-    if (touch && &touch->device() == device) return {kNoDevice, kAlreadyOpen};
-  }
-  Handle handle = 0;
-  while (lib.open[handle]) ++handle;  // a place is free: not all devices are open
-  const bool is_locked_out = !device->claim.take();
-  if (is_locked_out) {
-    device->ledger.add(Row::in_use);
-    standin::complain("libHD", device->settings.name + ": in use by another program");
-    const standin::InUse in_use = lib.session.settings->in_use;
-    if (in_use == standin::InUse::timer) return {kNoDevice, kTimer};
-    if (in_use == standin::InUse::value) return {kNoDevice, kInvalidValue};
-  }
-  try {
-    lib.open[handle].emplace(*lib.session.settings, *device, lib.errors, handle, is_locked_out);
-  } catch (const std::exception& error) {
-    device->claim.give_back();
-    standin::complain("libHD", error.what());
-    return {};
-  }
-  lib.open[handle]->run(lib.scheduler.runs(), lib.rate_hz);
-  return {handle, kSuccess};
-}
-
 }  // namespace
 }  // namespace kerf::hd
 
@@ -188,26 +54,11 @@ using namespace kerf::hd;  // NOLINT(google-build-using-namespace): the interfac
 // Devices and frames.
 
 KERF_STAND_IN_EXPORT Handle hdInitDevice(const char* name) {
-  Library& lib = library();
-  const std::lock_guard lock(lib.mutex);
-  const Opened opened = open_device(name);
-  if (opened.error == kSuccess) {
-    lib.current = opened.handle;
-  } else {
-    lib.errors.push(opened.error, kNoDevice);
-  }
-  return opened.handle;
+  return library().open_device(name);
 }
 
 KERF_STAND_IN_EXPORT void hdDisableDevice(Handle handle) {
-  with_handle(handle, [&](Touch& device) {
-    Library& lib = library();
-    kerf::standin::Claim& claim = device.device().claim;
-    device.close();
-    lib.open[handle].reset();
-    claim.give_back();  // once the connection is closed
-    if (lib.current == handle) lib.current = lib.without_device();
-  });
+  library().close(handle);
 }
 
 KERF_STAND_IN_EXPORT void hdMakeCurrentDevice(Handle handle) {
@@ -215,9 +66,7 @@ KERF_STAND_IN_EXPORT void hdMakeCurrentDevice(Handle handle) {
 }
 
 KERF_STAND_IN_EXPORT Handle hdGetCurrentDevice() {
-  Library& lib = library();
-  const std::lock_guard lock(lib.mutex);
-  return lib.current.load();
+  return library().current;
 }
 
 KERF_STAND_IN_EXPORT void hdBeginFrame(Handle handle) {

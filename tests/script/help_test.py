@@ -52,7 +52,7 @@ import options  # noqa: E402
 taken = {**{name: False for name in options.FLAGS}, **{name: True for name in options.WITH_VALUE}}
 if options_of_help("demo") != taken:
     wrong.append(f"cli/help/demo.txt and demo/options.py differ in {set(options_of_help('demo').items()) ^ set(taken.items())}")
-source = (root / "standin" / "__main__.py").read_text(encoding="utf-8")
+source = (root / "standin" / "options.py").read_text(encoding="utf-8")
 taken = {name: True for name in re.findall(r'"(--[a-z-]+)"', re.search(r"^WITH_VALUE = \((.*?)\)", source, re.M | re.S)[1])}
 taken |= {"--" + name: False for name in re.findall(r"^            options\.([a-z]+) = True", source, re.M)}
 if options_of_help("stand-in") != taken:
