@@ -76,6 +76,7 @@ install(PROGRAMS .ci/doctor.sh DESTINATION ${share}/.ci)
 install(CODE "file(CREATE_LINK ../${share}/kerf
   \"\$ENV{DESTDIR}\${CMAKE_INSTALL_PREFIX}/${CMAKE_INSTALL_BINDIR}/kerf\" SYMBOLIC)")
 install(DIRECTORY scenes DESTINATION ${share} PATTERN "ct.*" EXCLUDE PATTERN .gitignore EXCLUDE)  # who has a CT keeps it
+install(DIRECTORY ros DESTINATION ${share})  # for a workspace of ROS 2
 install(DIRECTORY hil/faults DESTINATION ${share}/hil)
 install(DIRECTORY lab/report DESTINATION ${share}/lab PATTERN __pycache__ EXCLUDE)
 install(DIRECTORY docs/ DESTINATION ${CMAKE_INSTALL_DOCDIR} PATTERN .site EXCLUDE)  # the make of the site

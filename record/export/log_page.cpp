@@ -91,6 +91,12 @@ or after 2038-01-19 is refused, since ROS 2 has none. The column `start_ns` stay
 | `/kerf/tip` | `geometry_msgs/msg/PoseStamped`: the tool's tip in metres, in frame `scene`; from docking on | 100 Hz |
 | `/kerf/force` | `geometry_msgs/msg/WrenchStamped`: `commanded_force_n`, in frame `device`, and `tip_torque_n_mm` in N m | 100 Hz |
 | `/kerf/2/tick`, `/kerf/2/tip`, `/kerf/2/force` | of a second device, whose forces are in frame `device_2` | as above |
+| `/tf` | `tf2_msgs/msg/TFMessage`: where `device` and, from docking on, `tip` are in `scene`; of a second device `device_2`, `tip_2` | 100 Hz |
+
+The device's axes are parallel to the scene's, and its origin lies at `device.offset_mm`. The file is of the profile `ros2` of
+[MCAP's registry](https://mcap.dev/spec/registry): each channel says the quality of service that its publisher offers. For programs of
+ROS 2 that use `/kerf/tick`, copy `ros/kerf_msgs` (installed: `share/kerf/ros/kerf_msgs`) into a workspace's `src/`, `colcon build`, and
+`ros2 bag play run.mcap`; its constants (`FLAGS_CONTACT`, `FAULT_OVERSPEED`) are the bits and codes below.
 
 Chunks are packed by LZ4, and `--unpacked` leaves them as they are. The other files of the recording are attached, with the volumes
 as they were at the start, so the MCAP of a whole recording replays on kerf's page ([browser.md](browser.md)); with `--from` or

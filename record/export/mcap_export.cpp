@@ -2,6 +2,7 @@
 #include "record/export/mcap_export.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <fstream>
@@ -18,6 +19,7 @@
 #include "shared/posix/atomic_file.hpp"
 #include "shared/segment/layout_table.hpp"
 #include "shared/segment/ros_messages.hpp"
+#include "shared/text/json.hpp"
 
 namespace kerf {
 namespace {
@@ -65,12 +67,31 @@ std::string no_such_time(const std::filesystem::path& folder, std::int64_t time_
          "ROS 2, which has 1970 to 2038-01-19; give --time monotonic";
 }
 
-/// What a replay needs besides the ticks, whose `counts` were read before them. Returns a line for
+using Places = std::vector<std::array<double, 3>>;
+
+/// Where the devices are in the scene, in mm. None, and a line, if scene.json has not all of them.
+Places device_places(const std::filesystem::path& folder, std::size_t arms,
+                     std::vector<std::string>& left_out) {
+  Places places;
+  try {
+    const Json scene = Json::parse(recorded_scene(folder));
+    for (const char* const device : {"device", "second_device"}) {
+      if (places.size() == arms) break;
+      places.push_back(scene.at(device).at("offset_mm").get<std::array<double, 3>>());
+    }
+    return places;
+  } catch (const JsonError&) {    // NOLINT(bugprone-empty-catch): reported below
+  } catch (const RecordError&) {  // NOLINT(bugprone-empty-catch): likewise
+  }
+  left_out.push_back((folder / kSceneName).string() +
+                     ": no device.offset_mm, so the MCAP has no /tf; copy the recording again");
+  return {};
+}
+
+/// What a replay needs besides the ticks, whose `counts` were read before them. Adds a line for
 /// each file that is left out.
-std::vector<std::string> attach_files(const std::filesystem::path& folder,
-                                      const std::vector<std::uint64_t>& counts, bool has_clock,
-                                      McapWriter& writer) {
-  std::vector<std::string> left_out;
+void attach_files(const std::filesystem::path& folder, const std::vector<std::uint64_t>& counts,
+                  bool has_clock, McapWriter& writer, std::vector<std::string>& left_out) {
   const auto leave_out = [&](const std::filesystem::path& path, const std::string& value) {
     left_out.push_back(path.string() + ": " + value +
                        ", so the MCAP is without it; copy the recording again");
@@ -101,7 +122,6 @@ std::vector<std::string> attach_files(const std::filesystem::path& folder,
     writer.attach(std::string(tick_log_name(arm)) + ".head", "application/octet-stream",
                   tick_log_header(counts[arm]));
   }
-  return left_out;
 }
 
 }  // namespace
@@ -114,14 +134,21 @@ std::vector<std::string> export_mcap(const std::filesystem::path& folder,
   AtomicFile file(mcap);
   McapWriter writer([&](std::string_view bytes) { file.write(bytes.data(), bytes.size()); }, "ros2",
                     "kerf " KERF_VERSION, packing);
+  const auto add = [&](const RosChannel& one) {
+    return writer.add({std::string(one.topic),
+                       std::string(one.schema),
+                       one.definition,
+                       std::string(kRosSchemaEncoding),
+                       std::string(kRosEncoding),
+                       {{"offered_qos_profiles", std::string(kRosQos)}}});
+  };
   std::vector<std::uint16_t> channels;  // of the first arm by topic, then of the second
   for (std::size_t arm = 0; arm < manifest.arms; ++arm) {
-    for (const RosChannel& one : ros_channels(arm)) {
-      channels.push_back(
-          writer.add({std::string(one.topic), std::string(one.schema), one.definition,
-                      std::string(kRosSchemaEncoding), std::string(kRosEncoding)}));
-    }
+    for (const RosChannel& one : ros_channels(arm)) channels.push_back(add(one));
   }
+  const std::uint16_t frames = add(ros_frames_channel());
+  std::vector<std::string> left_out;
+  const Places devices_mm = device_places(folder, manifest.arms, left_out);
   RosMessages messages(manifest.tick_ns, clock.offset_ns());
   std::uint64_t last_ns = 0;
   const auto write_arm = [&](const TickRecord& record, std::size_t arm) {
@@ -133,6 +160,9 @@ std::vector<std::string> export_mcap(const std::filesystem::path& folder,
       writer.message(channels[arm * kRosTopics + topic], last_ns,
                      messages.message(topic, record, arm));
     }
+    if (arm < devices_mm.size() && messages.has(ros_force, record)) {
+      writer.message(frames, last_ns, messages.frames(record, arm, devices_mm[arm]));
+    }
   };
   // Before the messages: a recording that still grows has more rows afterwards.
   const std::vector<std::uint64_t> counts = counts_of_rows(folder, manifest);
@@ -140,8 +170,7 @@ std::vector<std::string> export_mcap(const std::filesystem::path& folder,
     write_arm(first, 0);
     if (second != nullptr) write_arm(*second, 1);
   });
-  std::vector<std::string> left_out;
-  if (range.is_whole()) left_out = attach_files(folder, counts, manifest.has_clock, writer);
+  if (range.is_whole()) attach_files(folder, counts, manifest.has_clock, writer, left_out);
   writer.close();
   file.close();
   file.commit();

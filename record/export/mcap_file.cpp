@@ -92,7 +92,12 @@ std::uint16_t McapWriter::add(const Channel& channel) {
   bytes.number(id);  // of the schema
   bytes.text(channel.topic);
   bytes.text(channel.encoding);
-  bytes.number(std::uint32_t{0});  // no metadata
+  McapBytes metadata;
+  for (const auto& [key, value] : channel.metadata) {
+    metadata.text(key);
+    metadata.text(value);
+  }
+  bytes.text(metadata.bytes());  // a map, preceded by its length in bytes
   bytes.end(begun);
   channels_ += bytes.bytes();
   counts_[id] = 0;

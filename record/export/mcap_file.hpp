@@ -56,6 +56,7 @@ class McapWriter {
     std::string schema;      ///< its name
     std::string definition;  ///< in `schema_encoding`
     std::string schema_encoding, encoding;
+    std::map<std::string, std::string> metadata{};
   };
   /// Returns the channel's number. Each channel has a schema of its own.
   std::uint16_t add(const Channel& channel);

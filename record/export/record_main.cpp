@@ -14,6 +14,7 @@
 #include "shared/posix/atomic_file.hpp"
 #include "shared/posix/program.hpp"
 #include "shared/posix/stop_signals.hpp"
+#include "shared/segment/ros_messages.hpp"
 #include "shared/text/command_line.hpp"
 
 namespace kerf {
@@ -124,7 +125,9 @@ int run_record(int argc, char** argv) {
   live.option("--every", live_to.every, "one datagram for so many ticks")
       .within(1, 100'000)
       .shows_default();
-  const Arguments columns = app.command("columns", "what each column of a log says, as a page");
+  Arguments columns = app.command("columns", "what each column of a log says, as a page");
+  bool as_msg = false;
+  columns.flag("--msg", as_msg, "as the message kerf_msgs/msg/Tick of ROS 2");
   if (!app.parse(argc, argv, std::cout)) return 0;
   if (range.from > range.until) {
     throw UsageError("--from " + std::to_string(range.from) + " lies behind --until " +
@@ -132,7 +135,7 @@ int run_record(int argc, char** argv) {
   }
   --arm;  // from here on an index
   bool is_whole = true;
-  if (columns.chosen()) std::cout << log_page();
+  if (columns.chosen()) std::cout << (as_msg ? ros_channels()[ros_tick].definition : log_page());
   if (info.chosen()) {
     check_outputs(recording_files(folder), {{"--report", report, ".json"}});
     const RecordSummary summary = summary_for_info(folder, range, arm, scan);

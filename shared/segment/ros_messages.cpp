@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <span>
 
 #include "shared/segment/layout_table.hpp"
 #include "shared/segment/log_columns.hpp"
@@ -49,6 +50,8 @@ constexpr std::string_view kHeaderDefinition =
 constexpr std::string_view kTimeDefinition = "builtin_interfaces/Time\nint32 sec\nuint32 nanosec";
 constexpr std::string_view kVectorDefinition =
     "geometry_msgs/Vector3\nfloat64 x\nfloat64 y\nfloat64 z";
+constexpr std::string_view kQuaternionDefinition =
+    "geometry_msgs/Quaternion\nfloat64 x\nfloat64 y\nfloat64 z\nfloat64 w";
 
 template <class... Parts>
 std::string joined(std::string_view first, Parts... parts) {
@@ -62,8 +65,7 @@ std::string pose_definition() {
                 kTimeDefinition,
                 "geometry_msgs/Pose\ngeometry_msgs/Point position\ngeometry_msgs/Quaternion "
                 "orientation",
-                "geometry_msgs/Point\nfloat64 x\nfloat64 y\nfloat64 z",
-                "geometry_msgs/Quaternion\nfloat64 x\nfloat64 y\nfloat64 z\nfloat64 w");
+                "geometry_msgs/Point\nfloat64 x\nfloat64 y\nfloat64 z", kQuaternionDefinition);
 }
 
 std::string wrench_definition() {
@@ -80,13 +82,37 @@ std::string ros_type(std::string_view type) {
   return (kind == 'f' ? "float" : kind == 'u' ? "uint" : "int") + bits;
 }
 
-/// One line per column: type, name, unit and meaning.
+std::string frames_definition() {
+  return joined("geometry_msgs/TransformStamped[] transforms",
+                "geometry_msgs/TransformStamped\nstd_msgs/Header header\nstring child_frame_id\n"
+                "geometry_msgs/Transform transform",
+                kHeaderDefinition, kTimeDefinition,
+                "geometry_msgs/Transform\ngeometry_msgs/Vector3 translation\n"
+                "geometry_msgs/Quaternion rotation",
+                kVectorDefinition, kQuaternionDefinition);
+}
+
+/// The name of a constant: of FLAGS "button 1" is FLAGS_BUTTON_1.
+std::string constant_name(std::string_view column, std::string_view code) {
+  std::string name = std::string(column) + "_" + std::string(code);
+  for (char& c : name) c = c == ' ' ? '_' : 'a' <= c && c <= 'z' ? static_cast<char>(c - 32) : c;
+  return name;
+}
+
+/// One line per column: type, name, unit and meaning; before it one for each of its codes or bits.
 std::string tick_definition() {
-  std::string text = "# A tick of kerf: docs/log.md\n";
+  std::string text =
+      "# A tick of kerf's servo. docs/log.md has the same columns; made by `kerf record columns "
+      "--msg`.\n";
   auto column = log_columns().begin();
   for (const LayoutField& field : kLayoutTable) {
     if (field.record != "TickRecord") continue;
     const std::string many = field.count > 1 ? "[" + std::to_string(field.count) + "]" : "";
+    for (const LogCode& code : log_codes(field.name)) {
+      text += ros_type(field.type) + " " + constant_name(field.name, code.name) + "=" +
+              std::to_string(code.value) +
+              (code.meaning.empty() ? "" : "  # " + std::string(code.meaning)) + "\n";
+    }
     const std::string unit = column->unit.empty() ? "" : std::string(column->unit) + ": ";
     text += ros_type(field.type) + many + " " + std::string(field.name) + "  # " + unit +
             std::string(column->meaning) + "\n";
@@ -123,7 +149,20 @@ void put_force(const TickRecord& record, std::int64_t time_ns, std::size_t arm, 
   for (const float n_mm : record.tip_torque_n_mm) message.number(double{n_mm} / 1000);
 }
 
+/// A frame in the scene.
+void put_frame(std::int64_t time_ns, std::string_view name, std::span<const double, 3> at_mm,
+               std::span<const float, 4> rotation, CdrWriter& message) {
+  put_header(time_ns, "scene", message);
+  message.text(name);
+  for (const double mm : at_mm) message.number(mm / 1000);
+  for (const float part : rotation) message.number(double{part});
+}
+
 }  // namespace
+
+RosChannel ros_frames_channel() {
+  return {"/tf", "tf2_msgs/msg/TFMessage", frames_definition()};
+}
 
 std::array<RosChannel, kRosTopics> ros_channels(std::size_t arm) {
   constexpr std::array<std::array<std::string_view, kRosTopics>, kMaxArms> kTopics{
@@ -156,6 +195,20 @@ std::string_view RosMessages::message(RosTopic topic, const TickRecord& record, 
   if (topic == ros_tick) put_tick(record, out);
   if (topic == ros_tip) put_tip(record, time_ns(record), out);
   if (topic == ros_force) put_force(record, time_ns(record), arm, out);
+  return cdr_;
+}
+
+std::string_view RosMessages::frames(const TickRecord& record, std::size_t arm,
+                                     const std::array<double, 3>& device_mm) {
+  CdrWriter out(cdr_);
+  const bool has_tip = has(ros_tip, record);
+  out.number(std::uint32_t{has_tip ? 2U : 1U});
+  constexpr std::array<float, 4> kParallel{0, 0, 0, 1};
+  put_frame(time_ns(record), arm == 0 ? "device" : "device_2", device_mm, kParallel, out);
+  if (has_tip) {
+    put_frame(time_ns(record), arm == 0 ? "tip" : "tip_2", record.position_mm, record.orientation,
+              out);
+  }
   return cdr_;
 }
 

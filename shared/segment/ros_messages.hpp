@@ -31,10 +31,37 @@ struct RosChannel {
 ///                                                   frame "device"
 ///
 /// The second arm has /kerf/2/tick, /kerf/2/tip and /kerf/2/force, the last in frame "device_2".
-/// Stamps are `start_ns`, or that with an offset.
+/// The definition of kerf_msgs/msg/Tick is ros/kerf_msgs/msg/Tick.msg, a package for ROS 2. Stamps
+/// are `start_ns`, or that with an offset.
 enum RosTopic : std::uint8_t { ros_tick, ros_tip, ros_force };
 inline constexpr std::size_t kRosTopics = 3;
 [[nodiscard]] std::array<RosChannel, kRosTopics> ros_channels(std::size_t arm = 0);
+
+/// The channel of the frames of all arms:
+///
+///     /tf           tf2_msgs/msg/TFMessage           where "device" and "tip" are in "scene"; of
+///     the
+///                                                   second arm "device_2" and "tip_2"
+[[nodiscard]] RosChannel ros_frames_channel();
+
+/// What a publisher of these topics offers: reliable, volatile, the last 100 kept. YAML, as rosbag2
+/// reads it from a recording; numbers are of rmw/types.h, which each of its releases takes.
+inline constexpr std::string_view kRosQos = R"(- history: 1
+  depth: 100
+  reliability: 1
+  durability: 2
+  deadline:
+    sec: 9223372036
+    nsec: 854775807
+  lifespan:
+    sec: 9223372036
+    nsec: 854775807
+  liveliness: 1
+  liveliness_lease_duration:
+    sec: 9223372036
+    nsec: 854775807
+  avoid_ros_namespace_conventions: false
+)";
 
 /// Stamps have whole seconds in 32 bits: this time and later ones, of 2038, cannot be one.
 inline constexpr std::int64_t kRosTimeEndNs = (std::int64_t{1} << 31) * 1'000'000'000;
@@ -53,6 +80,12 @@ class RosMessages {
   /// The message for the record of an arm; valid until the next call.
   [[nodiscard]] std::string_view message(RosTopic topic, const TickRecord& record,
                                          std::size_t arm = 0);
+
+  /// The message of `ros_frames_channel` for the record of an arm, as often as `ros_force`. The
+  /// device's axes are parallel to the scene's; its origin is at `device_mm` in the scene, the
+  /// scene's `device.offset_mm`. The tip is missing while its position is unknown.
+  [[nodiscard]] std::string_view frames(const TickRecord& record, std::size_t arm,
+                                        const std::array<double, 3>& device_mm);
 
  private:
   std::uint64_t ticks_a_view_;

@@ -12,6 +12,7 @@ import tempfile
 import unittest
 
 import numpy as np
+import yaml
 
 ROOT, BIN, BUILD = (pathlib.Path(sys.argv.pop(1)).resolve() for _ in range(3))
 sys.path.insert(0, str(ROOT / "tests/record"))
@@ -80,7 +81,7 @@ class TestMcap(unittest.TestCase):
         channels = found["channels"]
         self.assertEqual({topic: channel["schema"] for topic, channel in channels.items()},
                          {"/kerf/tick": "kerf_msgs/msg/Tick", "/kerf/tip": "geometry_msgs/msg/PoseStamped",
-                          "/kerf/force": "geometry_msgs/msg/WrenchStamped"})
+                          "/kerf/force": "geometry_msgs/msg/WrenchStamped", "/tf": "tf2_msgs/msg/TFMessage"})
         pose = found["first"]["/kerf/tip"]
         known = self.rows[np.isfinite(self.rows["position_mm"][:, 0]) & (self.rows["tick"] % 10 == 0)]
         self.assertEqual(channels["/kerf/tip"]["count"], len(known))
@@ -91,6 +92,44 @@ class TestMcap(unittest.TestCase):
         wrench = found["first"]["/kerf/force"]
         self.assertEqual(wrench["header"]["frame_id"], "device")
         self.assertEqual(set(wrench["wrench"]), {"force", "torque"})
+
+    def test_the_device_and_the_tip_have_frames_in_the_scene(self):
+        path = self.folder / "frames.mcap"
+        export(self.log, path)
+        found = read(path)
+        self.assertEqual(found["channels"]["/tf"]["count"], found["channels"]["/kerf/force"]["count"])
+        scene = json.loads((self.log / "scene.json").read_text())
+        (device,) = found["first"]["/tf"]["transforms"]  # before docking there is no tip
+        self.assertEqual((device["header"]["frame_id"], device["child_frame_id"]), ("scene", "device"))
+        self.assertEqual(found["first"]["/kerf/force"]["header"], device["header"] | {"frame_id": "device"})
+        place, turn = device["transform"]["translation"], device["transform"]["rotation"]
+        self.assertEqual([place[axis] for axis in "xyz"], [mm / 1000 for mm in scene["device"]["offset_mm"]])
+        self.assertEqual(turn, {"x": 0, "y": 0, "z": 0, "w": 1})
+        _, tip = found["last"]["/tf"]["transforms"]
+        pose = found["last"]["/kerf/tip"]
+        self.assertEqual((tip["header"], tip["child_frame_id"]), (pose["header"], "tip"))
+        self.assertEqual(tip["transform"], {"translation": pose["pose"]["position"], "rotation": pose["pose"]["orientation"]})
+
+    def test_it_is_of_the_profile_ros2(self):
+        """The rules of https://mcap.dev/spec/registry, of rosbag2 for the quality of service, and of ROS 2 for messages' names."""
+        path = self.folder / "profile.mcap"
+        export(self.log, path)
+        found = read(path)
+        self.assertEqual((found["profile"], found["backwards"]), ("ros2", 0))
+        for topic, channel in found["channels"].items():
+            self.assertEqual((channel["encoding"], channel["schemaEncoding"]), ("cdr", "ros2msg"), topic)
+            self.assertRegex(channel["schema"], r"^[a-z][a-z0-9_]*/msg/[A-Z][A-Za-z0-9]*$")
+            lines = channel["definition"].splitlines()
+            rules = [i for i, line in enumerate(lines) if line.startswith("===")]
+            self.assertEqual({lines[i] for i in rules}, {"=" * 80} if rules else set())
+            for i in rules:
+                self.assertRegex(lines[i + 1], r"^MSG: [a-z][a-z0-9_]*/[A-Z][A-Za-z0-9]*$")
+            self.assertEqual(list(channel["metadata"]), ["offered_qos_profiles"])
+            (offered,) = yaml.safe_load(channel["metadata"]["offered_qos_profiles"])
+            no_end = {"sec": 2**63 // 10**9, "nsec": (2**63 - 1) % 10**9}
+            self.assertEqual(offered, {"history": 1, "depth": 100, "reliability": 1, "durability": 2, "deadline": no_end, "lifespan": no_end,
+                                       "liveliness": 1, "liveliness_lease_duration": no_end, "avoid_ros_namespace_conventions": False})
+        self.assertEqual(found["channels"]["/kerf/tick"]["definition"], (ROOT / "ros/kerf_msgs/msg/Tick.msg").read_text())
 
     def test_a_reader_seeks_by_the_index(self):
         path = self.folder / "seek.mcap"
@@ -152,7 +191,7 @@ class TestMcap(unittest.TestCase):
         export(self.log, part, "--from", "1")
         npy = (self.log / "ticks.npy").stat().st_size
         files = sum(path.stat().st_size for path in self.log.rglob("*.*") if path.name != "ticks.npy")
-        self.assertLess(plain.stat().st_size, 1.2 * npy + files)
+        self.assertLess(plain.stat().st_size, 1.25 * npy + files)  # 100 times a second /tf, too
         self.assertLess(packed.stat().st_size, npy + files)
         self.assertLess(part.stat().st_size, npy)
 
@@ -177,12 +216,13 @@ class TestMcap(unittest.TestCase):
         volume.unlink()
         volume.symlink_to("nothing")
         why = "no file, or one that cannot be read, so the MCAP is without it; copy the recording again"
-        self.assertEqual(export(log, path, code=1), "".join(f"kerf-record: {file}: {why}\n" for file in (log / "scene.json", volume)))
+        no_place = f"kerf-record: {log / 'scene.json'}: no device.offset_mm, so the MCAP has no /tf; copy the recording again\n"
+        self.assertEqual(export(log, path, code=1), no_place + "".join(f"kerf-record: {file}: {why}\n" for file in (log / "scene.json", volume)))
         names = read(path)["attachments"]
         self.assertIn("manifest.json", names)
         self.assertNotIn("scene.json", names)
         self.assertNotIn(f"volumes/{volume.name}", names)
-        export(log, path, "--from", "1")  # a part has none of them
+        self.assertEqual(export(log, path, "--from", "1", code=1), no_place)  # a part has no attachments
         shutil.rmtree(log / "volumes")
         (log / "scene.json").write_bytes((self.log / "scene.json").read_bytes())
         export(log, path)  # a phantom has no need of them

@@ -22,13 +22,15 @@ const readable = {
 const decompressHandlers = { lz4: (buffer) => lz4.decompress(buffer) };
 const reader = await McapIndexedReader.Initialize({ readable, decompressHandlers });
 const readers = new Map();
-const out = { indexBytes: bytesRead, channels: {}, ticks: [], first: {}, statistics: undefined, attachments: {} };
+const out = { profile: reader.header.profile, indexBytes: bytesRead, channels: {}, ticks: [], first: {}, last: {}, statistics: undefined, attachments: {} };
 for (const one of reader.attachmentIndexes) out.attachments[one.name] = Number(one.dataSize);
 for (const channel of reader.channelsById.values()) {
   const schema = reader.schemasById.get(channel.schemaId);
-  const definition = parse(new TextDecoder().decode(schema.data), { ros2: true });
+  const text = new TextDecoder().decode(schema.data);
+  const definition = parse(text, { ros2: true });
   readers.set(channel.id, new MessageReader(definition));
-  out.channels[channel.topic] = { schema: schema.name, encoding: channel.messageEncoding, count: 0 };
+  out.channels[channel.topic] = { schema: schema.name, encoding: channel.messageEncoding, count: 0,
+    schemaEncoding: schema.encoding, definition: text, metadata: Object.fromEntries(channel.metadata) };
 }
 out.statistics = { messages: Number(reader.statistics.messageCount), chunks: reader.chunkIndexes.length };
 const startTime = seek === undefined ? undefined : reader.statistics.messageStartTime + BigInt(Math.round(Number(seek) * 1e9));
@@ -41,13 +43,16 @@ for await (const message of reader.readMessages({ startTime })) {
     out.ticks.push([Number(value.tick), Array.from(value.position_mm), Array.from(value.commanded_force_n),
       value.output_hash.toString(), value.crc32c, message.logTime.toString()]);
     if (seek !== undefined) break;
-  } else if (!(topic in out.first)) {
-    out.first[topic] = value;
+  } else {
+    out.first[topic] ??= value;
+    out.last[topic] = value;
   }
 }
 out.bytesRead = bytesRead;
-// The stream reader checks the checksum of each chunk, and that nothing but records is there.
+// The stream reader checks the checksum of each chunk, and that nothing but records is there; it has them as they lie in the file.
 if (seek === undefined) {
+  let last = 0n;
+  out.backwards = 0;
   const stream = new McapStreamReader({ validateCrcs: true, decompressHandlers });
   const size = (await file.stat()).size;
   const chunk = new Uint8Array(1 << 20);
@@ -58,6 +63,10 @@ if (seek === undefined) {
     for (;;) {
       const record = stream.nextRecord();
       if (record === undefined) break;
+      if (record.type === 'Message') {
+        if (record.logTime < last) out.backwards += 1;
+        last = record.logTime;
+      }
       out.records = (out.records ?? 0) + 1;
     }
   }
