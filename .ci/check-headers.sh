@@ -62,7 +62,7 @@ fi
 
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
-compiler="clang++-$("$here/../cmake/clang-version.sh") -std=c++20 -I. $(pkg-config --cflags epoxy imgui glfw3) $(printf -- '-isystem %s ' /usr/include/gdcm-*)"
+compiler="clang++-$("$here/../cmake/clang-version.sh") -std=c++20 -I. -Istandin/include $(pkg-config --cflags epoxy imgui glfw3) $(printf -- '-isystem %s ' /usr/include/gdcm-*)"
 compiler+=" -DBOOST_ASIO_HAS_CO_AWAIT -DBOOST_ASIO_HAS_STD_COROUTINE"  # as bridge/CMakeLists.txt
 awk 'BEGIN { print "#define KERF_VERSION \"\"" } NF { print "#include <" $1 ">" }' <<<"$needs" >"$work/standard.hpp"
 # Templates that it asks for are made here, not again for each header.

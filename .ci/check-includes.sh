@@ -56,7 +56,8 @@ rooms_and_folders() {
     -path ./tests -prune -o -path ./examples -prune -o -name '*.[ch]pp' -printf '%P\n' | sed 's|/*[^/]*$||' | sort -u)
   comm -13 <(echo "$known") <(echo "$folders") | sed 's|$|/   <- no room of that name|'
   comm -23 <(echo "$known") <(echo "$folders") | sed 's|$|/   <- a room without C++|'
-  find "${programs[@]}" tests -regextype egrep -regex '.*\.(c|h|cc|hh|cxx|hxx|c\+\+|h\+\+|inl|ipp|tpp)' \
+  # Headers for other people's programs have the names that those programs include.
+  find "${programs[@]}" tests -path standin/include -prune -o -regextype egrep -regex '.*\.(c|h|cc|hh|cxx|hxx|c\+\+|h\+\+|inl|ipp|tpp)' \
     -printf '%p   <- C++ ends in .cpp or .hpp\n'
 }
 

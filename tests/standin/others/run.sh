@@ -4,7 +4,7 @@
 # and sent with the mechanics of the emulator. By hand, not in a change: it fetches their sources, and needs their packages.
 #
 #     tests/standin/others/run.sh chai3d FOLDER      CHAI3D 3.3 and a Force Dimension omega.3, in real time
-#     tests/standin/others/run.sh phantom FOLDER     after chai3d: CHAI3D and a Touch; $OPENHAPTICS_INCLUDE has HD/ and HDU/
+#     tests/standin/others/run.sh phantom FOLDER     after chai3d: CHAI3D and a Touch, with the stand-in's headers of HD and HDU
 #     tests/standin/others/run.sh pyhaptic FOLDER    after chai3d: pyhaptic and an omega.3, in lock-step
 #
 # FOLDER keeps sources and builds; what lies there already is not fetched again. CHAI3D's tree has headers and an archive of the
@@ -45,7 +45,7 @@ case $what in
     compare "$folder/chai3d.json" "$folder/chai3d.txt" zxy
     ;;
   phantom)
-    g++ -O1 -std=gnu++14 -w -DLINUX -DGLEW_STATIC -fPIC -shared -I"${OPENHAPTICS_INCLUDE:?names the folder of HD/ and HDU/}" \
+    g++ -O1 -std=gnu++14 -w -DLINUX -DGLEW_STATIC -fPIC -shared -I"$root/standin/include" \
       -I"$folder/chai3d/src" -I"$folder/chai3d/externals/Eigen" -I"$folder/chai3d/externals/glew/include" \
       -I"$folder/chai3d/externals/DHD/include" "$folder/chai3d/extras/hdPhantom/hdPhantom.cpp" -o "$folder/libhdPhantom.so" \
       -L"$libraries" -lHD
