@@ -201,6 +201,8 @@ class FlightRecorder final : TickSink {
   }
 
   [[nodiscard]] int kept() const noexcept { return kept_; }
+  /// Why a recording was not kept, the last one; empty: all were.
+  [[nodiscard]] const std::string& failure() const noexcept { return failure_; }
 
  private:
   void append_second(const TickRecord& record) override {
@@ -272,7 +274,8 @@ class FlightRecorder final : TickSink {
       std::cout << folder.string() << ": kept" << (lacks.empty() ? "" : "; " + lacks) << std::endl;
     } catch (const std::runtime_error& error) {
       std::filesystem::remove_all(partial, ignored);
-      std::cerr << "kerf-recorder: " << error.what() << '\n';
+      failure_ = error.what();
+      std::cerr << "kerf-recorder: " << failure_ << '\n';
     }
   }
 
@@ -335,6 +338,7 @@ class FlightRecorder final : TickSink {
   Recorder recorder_;
   std::optional<TickLead> lead_;
   int kept_ = 0;
+  std::string failure_;
 };
 
 }  // namespace
@@ -352,8 +356,10 @@ int run_flight_recorder(const RecorderOptions& options, const std::atomic<bool>&
   std::cout << "the last " << options.flight_s << " s are in memory, " << std::lround(bytes / 1e6)
             << " MB" << std::endl;
   recorder.run(stop);
-  std::cout << recorder.kept() << " recordings kept in " << options.out.string() << '\n';
-  return 0;
+  std::cout << recorder.kept() << " recordings kept in " << options.out.string() << std::endl;
+  if (recorder.failure().empty()) return 0;
+  std::cerr << "kerf-recorder: " << recorder.failure() << '\n';  // again: it may be hours ago
+  return 1;
 }
 
 namespace {

@@ -68,8 +68,9 @@ class TickWindow final : public TickSink {
 /// as a recording to `options.out`/TICK-REASON, which appears only when it is complete. The
 /// recording can be replayed if the flight recorder saw the run from its first tick: then it also
 /// has the inputs before its window (earlier_inputs.hpp), which meanwhile are in
-/// `options.out`/.run-NAME. At most `kMostKept` recordings. Returns the exit code, 0. Throws for
-/// bad input; reports a full disk in one line and goes on.
+/// `options.out`/.run-NAME. At most `kMostKept` recordings. Throws for bad input. Reports a
+/// recording that cannot be written, as on a full disk, in one line, and goes on. Returns the exit
+/// code: 0, or 1 after that line again if there was such a recording.
 [[nodiscard]] int run_flight_recorder(const RecorderOptions& options,
                                       const std::atomic<bool>& stop);
 

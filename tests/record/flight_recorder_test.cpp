@@ -5,9 +5,14 @@
 #include <atomic>
 #include <chrono>
 #include <csignal>
+#include <cstdio>
 #include <string>
 #include <thread>
 #include <vector>
+
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include "controller/servo/servo.hpp"
 #include "record/recording.hpp"
@@ -125,6 +130,39 @@ TEST_CASE("a flight recorder keeps the end of a run that nobody asked for; a sho
     CHECK(summary.rows == flight.now());
     CHECK(summary.missed_before_start == 0);
   }
+}
+
+TEST_CASE("a flight recorder that could not keep a recording says so again at its end, and fails") {
+  const RuntimeFolder folder;
+  const NoiseVolume volume({8, 8, 8});
+  SegmentWriter writer = SegmentWriter::create(spec_of(volume));
+  const SegmentServer server("demo", writer);
+  const auto said = folder / "said";
+  const pid_t recorder = fork();
+  if (recorder == 0) {
+    const rlimit room{.rlim_cur = 64 << 10, .rlim_max = 64 << 10};  // of a file: as a full disk
+    std::signal(SIGXFSZ, SIG_IGN);
+    if (freopen(said.c_str(), "w", stderr) != nullptr && setrlimit(RLIMIT_FSIZE, &room) == 0) {
+      execl(KERF_TEST_BIN "/kerf-recorder", "kerf-recorder", "--name", "demo", "--flight", "1",
+            "--out", (folder / "flight").c_str(), nullptr);
+    }
+    _exit(127);
+  }
+  CHECK(eventually([&] { return std::filesystem::exists(folder / "flight/.run-demo"); }, 20s));
+  for (Tick tick = 1; tick <= 600; ++tick) {
+    TickRecord record = made_up_tick(tick, 600);
+    record.fault = tick == 500 ? static_cast<std::uint32_t>(Fault::overspeed) : 0;
+    publish_tick(writer, record);
+  }
+  CHECK(eventually([&] { return file_text(said).ends_with('\n'); }, 20s));
+  const std::string line = file_text(said);
+  CHECK(line.ends_with("cannot be written (File too large); make room or choose another --out\n"));
+  writer.set_lifecycle(Lifecycle::clean_end);
+  int status = -1;
+  REQUIRE(waitpid(recorder, &status, 0) == recorder);
+  CHECK(WIFEXITED(status));
+  CHECK(WEXITSTATUS(status) == 1);
+  CHECK(file_text(said) == line + line);
 }
 
 TEST_CASE("each mark and each fault is an event of its own, the oldest first") {

@@ -10,7 +10,7 @@ SILENT = {
     "kerf-bridge": "never",
     "kerf-emulator": "never",
     "kerf-record": "never",
-    "kerf-recorder": "`--strict`, and ticks were lost",
+    "kerf-recorder": "`--strict`, and ticks were lost; `--flight`, and a recording could not be written",
     "kerf-volume": "never",
 }
 
