@@ -27,7 +27,7 @@ arm
 
 hil hil/device hil/front hil/front/fuse hil/front/firewire hil/front/usb hil/front/inverse3 hil/script hil/program
 
-standin standin/hd standin/dhd
+standin standin/hd standin/dhd standin/wheel
 
 lab/run lab/rig lab/accuracy lab/bench lab/stability lab/contact lab/safety lab/ranges lab/commands lab/bridge lab
 

@@ -25,6 +25,12 @@ NAMES = {"libHD.so": ("libHD.so", "libHD.so.3.0", "libHD.so.3.4"),  # built libr
 LINGER_S = 0.3  # three times the silence after which a device that drops its force does so
 GRACE_S = 5  # for a program that is asked to end
 PR_SET_CHILD_SUBREAPER = 36  # of <linux/prctl.h>
+CALLED = "./kerf stand-in"  # the wheel is called otherwise (wheel/)
+
+
+def say(line):
+    who = "kerf: stand-in" if CALLED.startswith("./") else CALLED
+    print(f"{who}: {line.replace('./kerf stand-in', CALLED)}", file=sys.stderr)
 
 
 class Run:
@@ -222,20 +228,20 @@ def run(programs, libraries, options):
             except OSError as error:
                 raise Refusal(f"{path}: cannot be written ({error.strerror}); name another file") from None
     for line in findings.summary(report):
-        print("kerf: stand-in: " + line, file=sys.stderr)
+        say(line)
     return code or int(bool(report["misuse"]))
 
 
-def main():
-    programs, libraries, *words = sys.argv[1:]
+def main(arguments):
+    programs, libraries, *words = arguments
     try:
         return run(programs, libraries, parse(words, libraries))
     except (Refusal, ValueError) as refusal:
-        print("kerf: stand-in: " + re.sub(r"[\x00-\x1f\x7f]", "?", str(refusal)), file=sys.stderr)
+        say(re.sub(r"[\x00-\x1f\x7f]", "?", str(refusal)))
         return 2
     except KeyboardInterrupt:
         return 130
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(main(sys.argv[1:]))
