@@ -213,7 +213,10 @@ void Delta::step_regulator(double dt_s) noexcept {
   const double peak_n = force_figures(Personality::omega).peak_n;
   const double wanted_n = length_of(force_n);
   ledger_.record_force_n(wanted_n);
-  if (wanted_n > peak_n) force_n = force_n * (peak_n / wanted_n);
+  if (wanted_n > peak_n) {
+    if (!regulates_position) ledger_.add(Row::excess);  // the program's own force, not a spring's
+    force_n = force_n * (peak_n / wanted_n);
+  }
   note_command(force_n);
   send(force_n);
 }

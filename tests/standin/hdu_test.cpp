@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The vectors, matrices and quaternions of the HDU headers, against formulas written again here.
-#include <array>
+#include <algorithm>
 #include <cmath>
-#include <cstddef>
 #include <random>
 #include <sstream>
 

@@ -262,6 +262,11 @@ class Forces(Case):
         self.expect(FORCES, f"{on}; forces(2)", (40, 2, 2), 2, {}, {}, omega)
         self.expect(FORCES, f"{on}; forces(2); {stop}; forces(2)", (80, 2, 2), 2, {"output_off": 40}, {}, omega)
         self.expect(FORCES, f"{on}; dhd.dhdEnableForce(0, -1); forces(2)", (40, 2, 2), 0, {"output_off": 40}, {}, omega)
+        # through the regulator of drd: a force of the program's own
+        drd = "dhd.drdStart(-1); dhd.drdRegulatePos(ctypes.c_bool(False), -1); force = dhd.drdSetForceAndTorqueAndGripperForce"
+        drd += "; force.argtypes = [ctypes.c_double] * 7 + [ctypes.c_byte]; force(20, 0, 0, 0, 0, 0, 0, -1)"
+        self.expect(FORCES, f"{drd}; [dhd.drdWaitForTick(-1) for _ in range(40)]; dhd.drdStop(ctypes.c_bool(True), -1)",
+                    (40, 20, 20), 12, {}, {"excess": 40}, omega)
         # dhdEnableForce forgotten: no document says whether the force is given
         self.expect(FORCES, "forces(2)", (40, 2, 2), 0, {"output_off": 40}, {}, omega + ignore)
         self.expect(FORCES, "forces(2)", (40, 2, 2), 2, {}, {"before_enable": 40}, omega)
