@@ -139,6 +139,7 @@ TEST_CASE("HDU's quaternions turn as their matrices do, at every angle") {
     const hduMatrix m = hduMatrix::createRotation(axis, angle);
     hduQuaternion q(m);
     CHECK(std::abs(q.magnitude() - 1) < 1e-12);
+    CHECK(q.s() >= 0);  // so that it changes its sign nowhere but at half a turn
     hduMatrix again;
     q.toRotMatrix(again);
     CHECK(off(again, m) < 1e-12);

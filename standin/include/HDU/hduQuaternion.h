@@ -14,7 +14,7 @@ class hduQuaternion {
   hduQuaternion(double s, const hduVector3Dd& v) : s_(s), v_(v) {}
   /* About an axis of any length but 0, by the right hand, rad. */
   hduQuaternion(const hduVector3Dd& axis, double angle) { fromAxisAngle(axis, angle); }
-  /* Of the matrix of a rotation. */
+  /* Of the matrix of a rotation; of its two quaternions that with s >= 0. */
   explicit hduQuaternion(const hduMatrix& m) {
     /* The largest of the four numbers first: nothing is divided by a small one. */
     const double four[4] = {1 + m[0][0] + m[1][1] + m[2][2], 1 + m[0][0] - m[1][1] - m[2][2],
@@ -39,6 +39,7 @@ class hduQuaternion {
       s_ = z * part;
       v_.set(xz * part, yz * part, twice / 2);
     }
+    if (s_ < 0) *this = hduQuaternion(-s_, -v_);
   }
 
   double s() const { return s_; }
