@@ -17,6 +17,8 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include "shared/numeric/hidden_set.hpp"
+
 namespace {
 
 constexpr int kSkipped = 77;
@@ -37,6 +39,11 @@ bool reaches_itself() {
 }  // namespace
 
 int main(int argc, char** argv) {
+  if (const std::string_view name = kerf::unknown_hidden_set(); !name.empty()) {
+    std::printf("KERF_HIDE_SETS: no instruction set has the name %.*s\n",
+                static_cast<int>(name.size()), name.data());
+    return 2;
+  }
   doctest::Context context(argc, argv);
   const auto& all = doctest::detail::getRegisteredTests();
   const auto networked = std::ranges::count_if(all, [](const doctest::detail::TestCase& one) {

@@ -11,6 +11,7 @@
 #include <iostream>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <system_error>
 
 #include <fcntl.h>
@@ -18,6 +19,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "shared/numeric/hidden_set.hpp"
 #include "shared/posix/error_text.hpp"
 
 namespace kerf {
@@ -40,6 +42,16 @@ void check_stack() {
                            std::to_string(kLeastStackBytes >> 10));
 }
 
+void check_hidden_sets() {
+  const std::string_view name = unknown_hidden_set();
+  if (name.empty()) return;
+  std::string known;
+  for (const std::string_view one : kHideableSets)
+    known += (known.empty() ? "" : ", ") + std::string(one);
+  throw std::runtime_error("KERF_HIDE_SETS: no instruction set has the name " + std::string(name) +
+                           "; there are " + known);
+}
+
 }  // namespace
 
 int run_program(const char* program, const std::function<int()>& work) {
@@ -48,6 +60,7 @@ int run_program(const char* program, const std::function<int()>& work) {
   std::signal(SIGXFSZ, SIG_IGN);
   try {
     check_stack();
+    check_hidden_sets();
     const int code = work();
     const std::string why = stdout_error(std::cout);
     if (why.empty()) return code;

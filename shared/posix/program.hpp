@@ -23,6 +23,7 @@ inline constexpr unsigned long long kLeastStackBytes = 1 << 20;
 ///   private folders and what lies in these belong to the user alone;
 /// - a file that may not grow any more (`ulimit -f`) is an error of the write, not a signal;
 /// - a stack of less than kLeastStackBytes is refused, because it would end in a crash;
+/// - a name in KERF_HIDE_SETS that no instruction set has is refused, as it would hide nothing;
 /// - an exception becomes one line on standard error, after `program`, and exit code 2;
 /// - if standard output could not be written, a line on standard error, and 2 instead of 0.
 [[nodiscard]] int run_program(const char* program, const std::function<int()>& work);

@@ -4,6 +4,7 @@
 #include <cstdlib>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include <doctest/doctest.h>
@@ -88,6 +89,31 @@ TEST_CASE("a hidden set is not run, the others stay in their order, scalar alway
   const Hidden hidden("avx512,avx2,neon");
   CHECK(names_here() == without(vectors));
   CHECK(all.back() == "scalar");
+}
+
+TEST_CASE("a name that no instruction set has is found, and every set has a name") {
+  for (const KernelSet* set : kBuiltSets) {
+    CAPTURE(std::string(set->name));
+    const Hidden hidden(set->name);
+    CHECK(unknown_hidden_set().empty());
+  }
+  for (const char* const fine : {"", ",", " , ", "avx512,avx2 neon", "scalar,,neon,"}) {
+    CAPTURE(std::string(fine));
+    const Hidden hidden(fine);
+    CHECK(unknown_hidden_set().empty());
+  }
+  for (const auto& [names, unknown] : {std::pair{"avx51", "avx51"},
+                                       {"avx512,avx", "avx"},
+                                       {"sse1 avx2", "sse1"},
+                                       {"avx2;neon", "avx2;neon"},
+                                       {"AVX2", "AVX2"},
+                                       {", neon2 ,x", "neon2"}}) {
+    CAPTURE(std::string(names));
+    const Hidden hidden(names);
+    CHECK(unknown_hidden_set() == unknown);
+  }
+  const Hidden none(nullptr);
+  CHECK(unknown_hidden_set().empty());
 }
 
 TEST_CASE("every set has the shape by which scenes are planned for it on other processors") {
