@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -32,6 +33,26 @@ const std::vector<NamedScript> kScripts{
     named("lost", FaultKind::lose, "stale_input"),
     named("parked", FaultKind::park, "none"),
     named("late", FaultKind::host_late, "none")};
+
+/// A Falcon above a half space, whose hand comes down in 0.4 s and presses on.
+struct PressedFalcon {
+  PressedFalcon() {
+    scene.device.personality = kerf::Personality::falcon;
+    scene.device.torque_scale = kerf::FalconParams().torque_scale();
+    hand.start = {0, 4, 0};
+    hand.steps = {kerf::hand_move({0, -1, 0}, 0.4), kerf::hand_move({0, -1, 0}, 10)};
+  }
+  [[nodiscard]] kerf::faults::FaultOutcome run(const FaultScript& script,
+                                               std::optional<double> stop_s = {}) const {
+    auto outcome =
+        kerf::faults::run_faults({.scene = scene, .hand = hand, .stop_s = stop_s}, script);
+    for (const std::string& violation : outcome.violations) MESSAGE(violation);
+    return outcome;
+  }
+
+  kerf::LoadedScene scene = kerf::test::half_space_scene();
+  kerf::HandScript hand;
+};
 
 }  // namespace
 
@@ -72,66 +93,47 @@ TEST_CASE("a pair has both scripts' faults, and demands that it goes on only whe
 }
 
 TEST_CASE("the signal comes when a fault has begun, however late that is") {
-  kerf::LoadedScene scene = kerf::test::half_space_scene();
-  scene.device.personality = kerf::Personality::falcon;
-  scene.device.torque_scale = kerf::FalconParams().torque_scale();
-  kerf::HandScript hand;
-  hand.start = {0, 4, 0};
-  hand.steps = {kerf::hand_move({0, -1, 0}, 0.4), kerf::hand_move({0, -1, 0}, 10)};
+  const PressedFalcon falcon;
   for (const double at_s : {0.05, 0.3, 0.8}) {
     const NamedScript hung{
         .name = "hung_up",
         .script = FaultScript{.faults = {{.kind = FaultKind::hang_up, .at_s = at_s}}}};
     const NamedScript pair = pairs_of({hung}, {1, 1}).at(0);
     CHECK(pair.stop_s.value() == doctest::Approx(at_s + 0.01));
-    const auto outcome = kerf::faults::run_faults(
-        {.scene = scene, .hand = hand, .stop_s = pair.stop_s}, played(pair, 1));
+    const auto outcome = falcon.run(played(pair, 1), pair.stop_s);
     CHECK(outcome.inconclusive.empty());
     CHECK(outcome.violation_count == 0);
     // Without a fault before the end it shows nothing.
-    const auto early = kerf::faults::run_faults(
-        {.scene = scene, .hand = hand, .stop_s = at_s - 0.01}, played(pair, 1));
+    const auto early = falcon.run(played(pair, 1), at_s - 0.01);
     CHECK_FALSE(early.inconclusive.empty());
   }
 }
 
 TEST_CASE("a silence is no longer for a host that is late in it") {
-  kerf::LoadedScene scene = kerf::test::half_space_scene();
-  scene.device.personality = kerf::Personality::falcon;
-  scene.device.torque_scale = kerf::FalconParams().torque_scale();
-  kerf::HandScript hand;
-  hand.start = {0, 4, 0};
-  hand.steps = {kerf::hand_move({0, -1, 0}, 0.4), kerf::hand_move({0, -1, 0}, 10)};
+  const PressedFalcon falcon;
   for (const double late_ms : {1, 3, 7, 12, 19, 30}) {
     CAPTURE(late_ms);
     const FaultScript script{
         .faults = {{.kind = FaultKind::unplug, .at_s = 0.2, .for_s = 3600},
                    {.kind = FaultKind::host_late, .at_s = 0.202, .ms = late_ms}},
         .latches = "stale_input"};
-    const auto outcome = kerf::faults::run_faults({.scene = scene, .hand = hand}, script);
-    for (const std::string& violation : outcome.violations) MESSAGE(violation);
+    const auto outcome = falcon.run(script);
     CHECK(outcome.violation_count == 0);
     CHECK(outcome.inconclusive.empty());
   }
 }
 
 TEST_CASE("counts that no Falcon has are a fault also when they begin while it is parked") {
-  kerf::LoadedScene scene = kerf::test::half_space_scene();
-  scene.device.personality = kerf::Personality::falcon;
-  scene.device.torque_scale = kerf::FalconParams().torque_scale();
-  kerf::HandScript hand;
-  hand.start = {0, 4, 0};
-  hand.steps = {kerf::hand_move({0, -1, 0}, 0.4), kerf::hand_move({0, -1, 0}, 10)};
+  PressedFalcon falcon;
   for (const auto numeric : {kerf::NumericKind::fixed, kerf::NumericKind::float64}) {
-    scene.servo.numeric = numeric;
+    falcon.scene.servo.numeric = numeric;
     for (const int counts : {28000, 12000, 9881, -9881}) {  // the last ones: a whole turn
       CAPTURE(counts);
       const FaultScript script{
           .faults = {{.kind = FaultKind::park, .at_s = 0.2, .for_s = 0.03},
                      {.kind = FaultKind::jump, .at_s = 0.21, .for_s = 0.3, .counts = counts}},
           .hides = true};
-      const auto outcome = kerf::faults::run_faults({.scene = scene, .hand = hand}, script);
-      for (const std::string& violation : outcome.violations) MESSAGE(violation);
+      const auto outcome = falcon.run(script);
       CHECK(outcome.latched == "not_finite");
       CHECK(outcome.violation_count == 0);
     }
@@ -150,19 +152,12 @@ TEST_CASE("a share is PART/PARTS, from the first to the last part") {
 }
 
 TEST_CASE("a signal that asks for the end ends all force, whatever else goes wrong") {
-  kerf::LoadedScene scene = kerf::test::half_space_scene();
-  scene.device.personality = kerf::Personality::falcon;
-  scene.device.torque_scale = kerf::FalconParams().torque_scale();
-  scene.servo.numeric = kerf::NumericKind::float64;
-  kerf::HandScript hand;
-  hand.start = {0, 4, 0};
-  hand.steps = {kerf::hand_move({0, -1, 0}, 0.4), kerf::hand_move({0, -1, 0}, 10)};
+  PressedFalcon falcon;
+  falcon.scene.servo.numeric = kerf::NumericKind::float64;
   for (const NamedScript& pair : pairs_of(kScripts, {1, 1})) {
     if (!pair.stop_s) continue;
     CAPTURE(pair.name);
-    const auto outcome = kerf::faults::run_faults(
-        {.scene = scene, .hand = hand, .stop_s = pair.stop_s}, played(pair, 2));
-    for (const std::string& violation : outcome.violations) MESSAGE(violation);
+    const auto outcome = falcon.run(played(pair, 2), pair.stop_s);
     CHECK(outcome.violation_count == 0);
     CHECK(outcome.pushed);
     if (!pair.script->faults.empty())
