@@ -29,24 +29,25 @@ export const hello = (flags, atNs, session = kSession) => message(144 + 128, [['
 
 const u64 = x => BigInt.asUintN(64, x);
 /** Of one block in the sum over all that is held. */
-function mixed(id, version) {
-  let z = u64((version ^ kSession) * 0x9e3779b97f4a7c15n + BigInt(id) * 0xd1342543de82ef95n + 1n);
+function mixed(id, version, session) {
+  let z = u64((version ^ session) * 0x9e3779b97f4a7c15n + BigInt(id) * 0xd1342543de82ef95n + 1n);
   z = u64((z ^ z >> 30n) * 0xbf58476d1ce4e5b9n);
   z = u64((z ^ z >> 27n) * 0x94d049bb133111ebn);
   return z ^ z >> 31n;
 }
 
-/** A bridge that remembers what it has sent. */
+/** A bridge that remembers what it has sent of one run. */
 export class Bridge {
   frames = 0;
   versions = new Map();
+  constructor(session = kSession) { this.session = session; }
 
   /** `blocks`: [id, bytes of 1024]; `ageMs`: of the servo's last sign of life. */
   frame(blocks, {tick, atNs, ageMs = 0, lifecycle = 1, ended = false}) {
     for (const [id] of blocks) this.versions.set(id, BigInt(2 * tick + 2));
-    const hash = u64([...this.versions].reduce((sum, [id, version]) => sum + mixed(id, version), 0n));
+    const hash = u64([...this.versions].reduce((sum, [id, version]) => sum + mixed(id, version, this.session), 0n));
     const raw = 1024 * blocks.length, head = 80 + 12 * blocks.length;
-    const buffer = message(head + raw, [['text', 0, 'KBF1'], ['u32', 4, 2 | (ended ? 4 : 0)], ['u64', 8, kSession, ++this.frames, tick, atNs,
+    const buffer = message(head + raw, [['text', 0, 'KBF1'], ['u32', 4, 2 | (ended ? 4 : 0)], ['u64', 8, this.session, ++this.frames, tick, atNs,
       atNs - BigInt(ageMs * 1e6), hash], ['u32', 56, lifecycle, blocks.length, raw, raw], ['u64', 72, atNs],
       ...blocks.map(([id], i) => ['u64', 80 + 8 * i, this.versions.get(id)]),
       ...blocks.map(([id], i) => ['u32', 80 + 8 * blocks.length + 4 * i, id])]);
@@ -64,9 +65,9 @@ export function sceneBlock() {
 }
 
 /** Records of ticks: of each tick one, or of two arms a pair. */
-export function records(ticks) {
+export function records(ticks, session = kSession) {
   const arms = ticks[0].length, bytes = 496 * arms * ticks.length;
-  return message(48 + bytes, [['text', 0, 'KBS1'], ['u64', 8, kSession], ['u32', 16, arms === 2 ? 2 : 0, ticks.length], ['u64', 24, 1n],
+  return message(48 + bytes, [['text', 0, 'KBS1'], ['u64', 8, session], ['u32', 16, arms === 2 ? 2 : 0, ticks.length], ['u64', 24, 1n],
     ['u32', 32, 1, bytes, bytes, 0], ...ticks.flat().flatMap((record, i) => {
       const at = 48 + 496 * i, {tick, startNs, flags = 0, place = [0, 0, 0], force = [0, 0, 0], proxy = [0, 0, 0], phase = 4, tool = 0, fault = 0, depth = 0} = record;
       return [['u64', at + 8, tick, startNs], ['u32', at + 32, flags], ['f64', at + 64, ...place], ['f32', at + 88, 0, 0, 0, 1],

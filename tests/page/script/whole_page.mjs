@@ -171,6 +171,22 @@ test('a hand is drawn anew where it was and where it is, that of either arm', ()
       assert.deepEqual(redrawn(b, a), redrawn([hand(7)], [null]), 'it comes');
     }
   }
+  assert.deepEqual(redrawn([hand(1)], [hand(1), hand(7)]), redrawn([null], [hand(7)]), 'the next run has one arm');
+  assert.deepEqual(redrawn([hand(1), hand(7)], [hand(1)]), redrawn([hand(7)], [null]), 'it has a second one again');
+});
+
+test('a choice of tool that is open stays as it is, that of the other arm follows its arm', () => {
+  for (const [open, other] of [['tool', 'tool2'], ['tool2', 'tool']]) {
+    run(300, {tool: 0}, {tool: 0});
+    document.activeElement = element(open);
+    element(open).value = '1';
+    element(other).value = 'another';
+    run(300, {tool: 0}, {tool: 0});
+    assert.deepEqual([element(open).value, element(other).value], ['1', 0]);
+    document.activeElement = document.body;
+    run(300, {tool: 1}, {tool: 1});
+    assert.deepEqual([element(open).value, element(other).value], [1, 1]);
+  }
 });
 
 test('commands go to the arm that was meant, each is answered by its own number', () => {
@@ -270,4 +286,12 @@ test('after three silent seconds it joins again, and a run of one arm has no sec
   pass(300);
   assert.equal(element('force').textContent, '–');
   assert.equal(figures()['second arm'], undefined);
+  const one = new Bridge(78n);
+  assert.equal(element('second').hidden, false);  // of the run before, which is shown until this one is here
+  next.take(records([[{tick: 1, startNs: 1_000_000n, force: [0, 2, 0], place: [4, 2, 2]}]], 78n));
+  next.take(one.frame([[0, sceneBlock()], [1, densities(65535)], [2, densities(40000)]], {tick: 1, atNs: nowNs()}));
+  pass(300);
+  assert.equal(element('second').hidden, true);
+  assert.equal(element('force').textContent, '2.00 N');
+  assert.equal(stage.hands.length, 1);
 });
