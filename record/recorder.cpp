@@ -17,7 +17,6 @@
 #include "shared/posix/atomic_file.hpp"
 #include "shared/posix/tick_lead.hpp"
 #include "shared/segment/connection.hpp"
-#include "shared/text/command_line.hpp"
 #include "shared/text/json.hpp"
 #include "shared/text/text.hpp"
 
@@ -119,43 +118,6 @@ std::string_view end_reason(const SegmentReader& reader, bool stopped) noexcept 
   return stopped ? "stopped" : "controller gone";
 }
 
-bool parse_options(int argc, char** argv, RecorderOptions& options) {
-  CommandLine app("Logs every tick of a running kerf-controller into a folder.", "kerf-recorder",
-                  KERF_VERSION);
-  app.option("--name", options.name, "name of the controller").shows_default();
-  app.option("--out", options.out, "folder for ticks, scene, manifest and volumes").required();
-  app.option("--wait", options.wait_s, "seconds to wait for the controller")
-      .within(0, 86400)
-      .shows_default();
-  app.flag("--resume", options.resume,
-           "go on with the recording of the same run in --out, after its recorder was killed");
-  app.option(
-         "--flight", options.flight_s,
-         "keep only the last SECONDS, in memory; each fault, SIGUSR1, kerf-record grab and key f "
-         "of the window write them as a recording into --out, with what a replay needs")
-      .within(1, kMostFlightS)
-      .shown_as("SECONDS");
-  app.option("--lead", options.lead,
-             "lead a controller in lock-step (its --until), so that no tick is lost")
-      .shown_as("FIFO");
-  app.flag("--strict", options.strict, "exit 1 if ticks were lost");
-  app.option("--report", options.report, "write the figures as JSON");
-  if (!app.parse(argc, argv, std::cout)) return false;
-  if (options.resume && options.flight_s > 0) {
-    throw UsageError(
-        "--resume: a flight recorder has nothing to go on with; leave one of both out");
-  }
-  if (options.flight_s > 0 && (options.strict || !options.report.empty())) {
-    throw UsageError("--strict, --report: are of a whole run; leave them out beside --flight");
-  }
-  if (!options.lead.empty()) {
-    if (const std::string why = TickLead::problem_with(options.lead); !why.empty()) {
-      throw UsageError(why);
-    }
-  }
-  return true;
-}
-
 namespace {
 
 /// What a recorder begins with: nothing, or the logs of the one before.
@@ -165,12 +127,13 @@ struct Beginning {
   RecordLosses losses{};
   std::uint64_t rows = 0;  ///< that the logs of all arms have; further ones are read again
   bool may_go_on = false;  ///< --resume
+  std::uint64_t rows_a_part = UINT64_MAX;  ///< of each file of the log
 };
 
 /// The log of one arm, summed up as it grows.
 struct SummedLog {
   SummedLog(const std::filesystem::path& path, const Beginning& begin, const SegmentInfo& info)
-      : file(path, begin.file, begin.rows), summary(info) {}
+      : file(path, begin.file, begin.rows, begin.rows_a_part), summary(info) {}
   void append(const TickRecord& record) {
     file.append(record);
     summary.add(record);
@@ -221,10 +184,13 @@ class ArmLogs final : public TickSink {
 };
 
 [[nodiscard]] Beginning beginning_in(const RecorderOptions& options, const SegmentReader& reader) {
-  if (!options.resume || !std::filesystem::exists(options.out / kTickLogName)) {
-    return {.may_go_on = options.resume};
+  Beginning begin{.may_go_on = options.resume};
+  if (!options.split.empty()) {
+    begin.rows_a_part = static_cast<std::uint64_t>(
+        std::llround(split_s(options.split) * 1e9 / reader.info().tick_ns));
   }
-  Beginning begin{.file = TickLogWriter::Begin::after_last, .may_go_on = true};
+  if (!options.resume || !std::filesystem::exists(options.out / kTickLogName)) return begin;
+  begin.file = TickLogWriter::Begin::after_last;
   // Killed between the file's first byte and its manifest: without rows.
   constexpr std::uintmax_t kOneRow = kTickLogHeaderBytes + sizeof(TickRecord);
   std::error_code none;
@@ -347,7 +313,8 @@ int run_recorder(const RecorderOptions& options, const std::atomic<bool>& stop) 
   const double bytes_per_s = 1e9 / static_cast<double>(reader.info().tick_ns) *
                              static_cast<double>(reader.info().arms * sizeof(TickRecord));
   std::cout << options.out.string() << (begin.next ? " goes on, and" : "") << " grows by "
-            << std::lround(60 * bytes_per_s / 1e6) << " MB a minute" << std::endl;
+            << std::lround(60 * bytes_per_s / 1e6) << " MB a minute"
+            << (options.split.empty() ? "" : ", in a new file each " + options.split) << std::endl;
   try {
     recording.run(stop);
   } catch (const RecordError&) {

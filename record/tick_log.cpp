@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <iterator>
 #include <string_view>
 #include <system_error>
 #include <utility>
@@ -66,34 +67,84 @@ std::string way_to_recording(const std::filesystem::path& folder) {
   return "give " + (is_below ? below.string() : "the folder of a recording");
 }
 
+std::filesystem::path part_of_log(const std::filesystem::path& path, std::size_t part) {
+  if (part == 1) return path;
+  std::string number = std::to_string(part);
+  constexpr std::size_t kDigits = 4;
+  number.insert(0, kDigits - std::min(kDigits, number.size()), '0');
+  return path.string() + "." + number;
+}
+
 TickLogReader::TickLogReader(std::filesystem::path path) : path_(std::move(path)) {
+  static_cast<void>(add_part(path_));
+  const auto is_there = [&](std::size_t part) {
+    std::error_code fault;
+    return std::filesystem::is_regular_file(part_of_log(path_, part), fault);
+  };
+  // The last one has no header yet if its recorder was killed as it began it.
+  std::size_t part = 2;
+  while (is_there(part) && add_part(part_of_log(path_, part))) ++part;
+  if (is_there(part + 1)) {
+    throw RecordError(part_of_log(path_, part).string() + ": missing, or cut in its header, and " +
+                      part_of_log(path_, part + 1).filename().string() +
+                      " is there; copy the recording again");
+  }
+}
+
+bool TickLogReader::add_part(const std::filesystem::path& path) {
   std::error_code fault;
-  const bool is_file =
-      std::filesystem::is_regular_file(path_, fault);  // a pipe would be waited for
-  if (is_file) file_.open(path_, std::ios::binary);
-  if (!file_.is_open()) {
-    throw RecordError(path_.string() + ": cannot be read; " +
-                      way_to_recording(path_.parent_path()));
+  const bool is_file = std::filesystem::is_regular_file(path, fault);  // a pipe would be waited for
+  std::ifstream file;
+  if (is_file) file.open(path, std::ios::binary);
+  if (!file.is_open()) {
+    throw RecordError(path.string() + ": cannot be read; " + way_to_recording(path.parent_path()));
   }
   std::string header(kTickLogHeaderBytes, '\0');
-  file_.read(header.data(), static_cast<std::streamsize>(header.size()));
-  header.resize(static_cast<std::size_t>(file_.gcount()));
-  counted_ = rows_of(header, path_.string());
-  file_.clear();
-  file_.seekg(0, std::ios::end);
-  const auto bytes = static_cast<std::uint64_t>(file_.tellg());
-  rows_ = bytes < kTickLogHeaderBytes ? 0 : (bytes - kTickLogHeaderBytes) / sizeof(TickRecord);
+  file.read(header.data(), static_cast<std::streamsize>(header.size()));
+  header.resize(static_cast<std::size_t>(file.gcount()));
+  if (!parts_.empty() && header.size() < kTickLogHeaderBytes) return false;
+  counted_ += rows_of(header, path.string());
+  file.clear();
+  file.seekg(0, std::ios::end);
+  const auto bytes = static_cast<std::uint64_t>(file.tellg());
+  const std::uint64_t rows =
+      bytes < kTickLogHeaderBytes ? 0 : (bytes - kTickLogHeaderBytes) / sizeof(TickRecord);
+  parts_.push_back({path, rows_, rows});
+  rows_ += rows;
+  file_ = std::move(file);
+  open_ = parts_.size() - 1;
+  return true;
+}
+
+bool TickLogReader::read_raw(std::uint64_t first, std::span<TickRecord> rows) {
+  while (!rows.empty()) {
+    const auto behind = std::ranges::upper_bound(parts_, first, {}, &Part::first);
+    const auto& part = *std::prev(behind);
+    const auto which = static_cast<std::size_t>(std::prev(behind) - parts_.begin());
+    if (first - part.first >= part.rows) return false;
+    if (which != std::exchange(open_, which)) {
+      file_.close();
+      file_.open(part.path, std::ios::binary);
+    }
+    const auto count = static_cast<std::size_t>(
+        std::min<std::uint64_t>(rows.size(), part.first + part.rows - first));
+    file_.clear();
+    file_.seekg(static_cast<std::streamoff>(kTickLogHeaderBytes +
+                                            (first - part.first) * sizeof(TickRecord)));
+    file_.read(reinterpret_cast<char*>(rows.data()),
+               static_cast<std::streamsize>(count * sizeof(TickRecord)));
+    if (!file_) return false;
+    first += count;
+    rows = rows.subspan(count);
+  }
+  return true;
 }
 
 std::size_t TickLogReader::read(std::uint64_t first, std::span<TickRecord> rows,
                                 std::string& problem) {
   const std::uint64_t left = rows_ - std::min(first, rows_);
   const auto count = static_cast<std::size_t>(std::min<std::uint64_t>(rows.size(), left));
-  file_.clear();
-  file_.seekg(static_cast<std::streamoff>(kTickLogHeaderBytes + first * sizeof(TickRecord)));
-  file_.read(reinterpret_cast<char*>(rows.data()),
-             static_cast<std::streamsize>(count * sizeof(TickRecord)));
-  if (!file_) {
+  if (!read_raw(first, rows.first(count))) {
     problem = path_.string() + ": cannot be read; copy it again";
     return 0;
   }
@@ -119,13 +170,11 @@ std::uint64_t TickLogReader::row_of(Tick tick) {
                 end = rows_;  // rows before `below` are earlier, those from `end` are not
   while (below < end) {
     const std::uint64_t middle = below + (end - below) / 2;
-    Tick there = 0;
-    file_.clear();
-    file_.seekg(static_cast<std::streamoff>(kTickLogHeaderBytes + middle * sizeof(TickRecord) +
-                                            offsetof(TickRecord, tick)));
-    file_.read(reinterpret_cast<char*>(&there), sizeof there);
-    if (!file_) throw RecordError(path_.string() + ": cannot be read; copy it again");
-    (there < tick ? below : end) = there < tick ? middle + 1 : middle;
+    TickRecord there;
+    if (!read_raw(middle, std::span(&there, 1))) {
+      throw RecordError(path_.string() + ": cannot be read; copy it again");
+    }
+    (there.tick < tick ? below : end) = there.tick < tick ? middle + 1 : middle;
   }
   return below;
 }

@@ -27,7 +27,9 @@ class RecordError : public std::runtime_error {
 };
 
 /// The log of a run: an NPY file of `TickRecord` rows behind a header of fixed size, so that it can
-/// be extended and opens directly in NumPy (`np.load(path, mmap_mode="r")["position_mm"]`).
+/// be extended and opens directly in NumPy (`np.load(path, mmap_mode="r")["position_mm"]`). A log
+/// that was split goes on in further files of the same form, which sort behind it: ticks.npy,
+/// ticks.npy.0002, ticks.npy.0003 and so on.
 ///
 /// The column table is generated from `layout_table.hpp`. The row count in the header is updated at
 /// every `sync`; later rows are complete, too.
@@ -35,6 +37,10 @@ inline constexpr std::size_t kTickLogHeaderBytes = 4096;
 
 /// The header of a log of `rows` rows: exactly `kTickLogHeaderBytes`.
 [[nodiscard]] std::string tick_log_header(std::uint64_t rows);
+
+/// File `part` of the log at `path`, from 1 on: the first is `path` itself.
+[[nodiscard]] std::filesystem::path part_of_log(const std::filesystem::path& path,
+                                                std::size_t part);
 
 /// The remedy if `folder` holds no recording. If it is a demo's folder, names the recording in its
 /// folder `log`.
@@ -52,19 +58,28 @@ struct TickRange {
   return record_index(record);
 }
 
-/// Reads one log, row by row, with constant memory.
+/// Reads one log, row by row, with constant memory; all its files as one.
 class TickLogReader {
  public:
+  /// One file of the log.
+  struct Part {
+    std::filesystem::path path;
+    std::uint64_t first = 0;  ///< row
+    std::uint64_t rows = 0;   ///< that are complete
+  };
+
   static constexpr std::size_t kChunkRows = 1024;  ///< that `for_each` reads at a time
 
-  /// Throws `RecordError` if the file has another layout or ends in its header. A file that is
-  /// truncated after the header, at any byte, has its complete rows.
+  /// Throws `RecordError` if a file has another layout, the first ends in its header, or one before
+  /// the last is missing. A file that is truncated after the header, at any byte, has its complete
+  /// rows.
   explicit TickLogReader(std::filesystem::path path);
 
-  /// Complete rows in the file, also those beyond the count of the header.
+  /// Complete rows in the files, also those beyond the count of the header.
   [[nodiscard]] std::uint64_t rows() const noexcept { return rows_; }
-  /// Rows by the header: more than `rows()` if the file was truncated.
+  /// Rows by the headers: more than `rows()` if a file was truncated.
   [[nodiscard]] std::uint64_t counted() const noexcept { return counted_; }
+  [[nodiscard]] std::span<const Part> parts() const noexcept { return parts_; }
 
   /// Reads rows from `first` on into `rows`; returns how many there are, less at the end and before
   /// a row whose checksum is wrong. Throws `RecordError` if that is the first one.
@@ -82,8 +97,16 @@ class TickLogReader {
   void for_each(const std::function<void(const TickRecord&)>& visit, TickRange range = {});
 
  private:
+  /// Opens a file of the log, whose rows are then known. False, and it is none, if it ends in its
+  /// header.
+  [[nodiscard]] bool add_part(const std::filesystem::path& path);
+  /// Reads rows as they are; false if a file cannot be read.
+  [[nodiscard]] bool read_raw(std::uint64_t first, std::span<TickRecord> rows);
+
   std::filesystem::path path_;
+  std::vector<Part> parts_;
   std::ifstream file_;
+  std::size_t open_ = 0;  ///< which part `file_` is
   std::uint64_t rows_ = 0, counted_ = 0;
 };
 

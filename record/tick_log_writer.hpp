@@ -37,8 +37,10 @@ class TickLogWriter final : public TickSink {
     after_last  ///< appends after the complete rows of a log; removes an incomplete row or header
   };
   /// Refuses a log that another process writes. `after_last` keeps at most `most_rows` rows.
+  /// `rows_a_part`: splits the log into files of as many rows.
   explicit TickLogWriter(std::filesystem::path path, Begin begin = Begin::new_file,
-                         std::uint64_t most_rows = UINT64_MAX);
+                         std::uint64_t most_rows = UINT64_MAX,
+                         std::uint64_t rows_a_part = UINT64_MAX);
   ~TickLogWriter() override;
 
   /// Buffers a row; at most `kBufferRows` wait for `flush`.
@@ -52,10 +54,20 @@ class TickLogWriter final : public TickSink {
  private:
   [[noreturn]] void fail(int error);
   void write_header();
+  /// Opens the files of a log to append behind its rows.
+  void go_on(std::uint64_t most_rows);
+  /// Ends the file that grows, and begins the next one.
+  void begin_part();
+  /// Rows of the file that grows, without those that wait.
+  [[nodiscard]] std::uint64_t rows_of_part() const noexcept { return written_ - first_; }
 
   static constexpr std::size_t kBufferRows = 64;
   std::filesystem::path path_;
-  int fd_ = -1;
+  std::uint64_t rows_a_part_;
+  int lock_ = -1;            ///< the first file, as long as this lasts
+  int fd_ = -1;              ///< the file that grows; perhaps the same
+  std::size_t part_ = 1;     ///< which
+  std::uint64_t first_ = 0;  ///< its first row
   std::uint64_t written_ = 0;
   std::vector<TickRecord> buffer_;
 };

@@ -8,15 +8,32 @@ from .layout import CLOCK, STARTED, TICK
 
 
 def _rows_of(file, kind=TICK):
+    """All complete rows, also those that the header of a recorder that was killed does not count."""
+    size = file.stat().st_size
     try:
-        rows = np.load(file, mmap_mode="r")
+        with file.open("rb") as head:
+            np.lib.format.read_magic(head)
+            shape, _, dtype = np.lib.format.read_array_header_1_0(head)
+            rows = (size - head.tell()) // max(dtype.itemsize, 1)
+            if rows < np.prod(shape, dtype=object):
+                raise ValueError
+            offset = head.tell()
     except (ValueError, EOFError, OverflowError):  # each release of NumPy has its own words
-        size = file.stat().st_size
         what = "is empty" if size == 0 else f"{size} bytes are no table of NumPy, or the file was cut"
         raise ValueError(f"{file}: {what}; record it again, or give the folder of another recording") from None
-    if getattr(rows, "dtype", None) != kind or rows.ndim != 1:
+    if dtype != kind or len(shape) != 1:
         raise ValueError(f"{file}: no ticks of this version of kerf; give the folder of a recording, or use its kerf_reader")
-    return rows
+    return np.memmap(file, kind, "r", offset, rows) if rows else np.empty(0, kind)
+
+
+def _all_rows_of(file):
+    """Of a log that was split, too: file, then file.0002 and so on."""
+    parts = [file, *sorted(path for path in file.parent.glob(f"{file.name}.*") if path.suffix[1:].isdecimal())]
+    for number, path in enumerate(parts[1:], start=2):
+        if path.name != f"{file.name}.{number:04}":
+            raise ValueError(f"{file}.{number:04}: missing, and a later file of the log is there; copy the recording again")
+    rows = [_rows_of(path) for path in parts]
+    return rows[0] if len(rows) == 1 else np.concatenate(rows)
 
 
 def _words_of(file):
@@ -32,18 +49,18 @@ def _words_of(file):
 class Log:
     """What kerf-recorder wrote into `folder`; docs/log.md tells each column.
 
-    ticks: one row for each tick, read from the disk as it is used. second: of a run with two devices the second's rows,
+    ticks: one row for each tick, read from the disk as it is used; of a log that was split, from memory. second: of a run with two devices the second's rows,
     row i of the same tick as row i of ticks; else None. scene, manifest: as dictionaries. clock: readings of CLOCK_MONOTONIC
     and UTC at one moment; None in logs of earlier versions."""
 
     def __init__(self, folder):
         folder = pathlib.Path(folder)
         try:
-            self.ticks = _rows_of(folder / "ticks.npy")
+            self.ticks = _all_rows_of(folder / "ticks.npy")
             self.manifest = _words_of(folder / "manifest.json")
             self.scene = _words_of(folder / "scene.json")
             self.clock = _rows_of(folder / "clock.npy", CLOCK) if "clock" in self.manifest else None
-            self.second = _rows_of(folder / "ticks-2.npy") if self.manifest.get("arms") == 2 else None
+            self.second = _all_rows_of(folder / "ticks-2.npy") if self.manifest.get("arms") == 2 else None
         except OSError as error:
             below = folder / "log"  # of --out of a demo
             way = below if (below / "ticks.npy").is_file() else "the folder of a recording"

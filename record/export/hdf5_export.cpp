@@ -75,6 +75,13 @@ Handle text_type(std::size_t bytes, std::string_view all) {
   return type;
 }
 
+/// Without the time of the export: the same log gives the same bytes.
+Handle dataset_properties() {
+  Handle properties(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
+  checked(H5Pset_obj_track_times(properties, false));
+  return properties;
+}
+
 void put_attribute(hid_t object, const char* name, hid_t type, const Handle& space,
                    const void* data) {
   const Handle attribute(H5Acreate2(object, name, type, space, H5P_DEFAULT, H5P_DEFAULT), H5Aclose);
@@ -161,7 +168,7 @@ class Column {
     const std::array<hsize_t, 2> size{0, field.count}, most{H5S_UNLIMITED, field.count};
     const std::array<hsize_t, 2> chunk{TickLogReader::kChunkRows, field.count};
     const Handle space(H5Screate_simple(rank(field), size.data(), most.data()), H5Sclose);
-    const Handle layout(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
+    const Handle layout = dataset_properties();
     checked(H5Pset_chunk(layout, rank(field), chunk.data()));
     checked(H5Pset_shuffle(layout));
     checked(H5Pset_deflate(layout, kDeflate));
@@ -255,7 +262,8 @@ void write_scene(hid_t file, const std::filesystem::path& folder) {
   const Handle type = text_type(scene.size(), scene);
   const Handle space(H5Screate(H5S_SCALAR), H5Sclose);
   const Handle dataset(
-      H5Dcreate2(file, "scene", type, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), H5Dclose);
+      H5Dcreate2(file, "scene", type, space, H5P_DEFAULT, dataset_properties(), H5P_DEFAULT),
+      H5Dclose);
   checked(H5Dwrite(dataset, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, scene.c_str()));
 }
 

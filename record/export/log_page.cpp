@@ -23,6 +23,7 @@ manifest is then 2.
 | file | what |
 |---|---|
 | `ticks.npy` | one row for each tick, the columns below, for NumPy as it is |
+| `ticks.npy.0002` ... | of a recorder with `--split`: the rows that follow |
 | `ticks-2.npy` | of a run with two devices: the second's, in the same columns. Row i of both is the same tick; a tick that was lost is in neither |
 | `clock.npy` | the date: one row at the start, one a minute, and one after UTC was set; [below](#the-date) |
 | `manifest.json` | length of a tick, voxels, versions, compiler and processor, losses of the recorder and where they lie, how the run ended |
@@ -39,6 +40,19 @@ Three lines of NumPy read it (`python/` is a reader with more, `examples/python/
 `log["position_mm"]` is an array of rows x 3. World millimetres, newtons at the device port, little-endian.
 `./kerf replay DIR/log` runs it again ([replay](replay.md)). `info` counts as lost what was published and is in no row, so the
 manifest says the same; a recorder that was killed leaves a manifest that says `running`, and all rows.
+
+NumPy reads the rows that the header counts. The recorder counts each 200 ms, when it makes sure that they are on the disk, so a log that
+grows, or whose recorder was killed, has up to 200 ms of complete rows more, which `info`, `replay`, `export` and `kerf_reader` read.
+`kerf recorder --split 10m` begins a new file each ten minutes: `ticks.npy.0002`, `ticks.npy.0003` and so on; all of these read them as
+one log. So NumPy reads all rows of any log:
+
+    from pathlib import Path
+    def rows(path):
+        with open(path, "rb") as file:
+            np.lib.format.read_magic(file)
+            dtype = np.lib.format.read_array_header_1_0(file)[2]
+        return np.fromfile(path, dtype, offset=4096)  # behind the header; without a row that was cut
+    log = np.concatenate([rows(path) for path in sorted(Path("DIR/log").glob("ticks.npy*"))])
 
 ## The date
 

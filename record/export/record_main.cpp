@@ -25,9 +25,9 @@ namespace {
 RecordSummary summary_for_info(const std::filesystem::path& folder, TickRange range,
                                std::size_t arm, bool scan) {
   constexpr std::uintmax_t kLarge = std::uintmax_t{256} << 20;
-  std::error_code none;
-  const std::uintmax_t bytes = std::filesystem::file_size(folder / tick_log_name(arm), none);
-  if (!scan && range.is_whole() && !none && bytes > kLarge) {
+  const std::filesystem::path path = folder / tick_log_name(arm);
+  const auto is_large = [&] { return TickLogReader(path).rows() * sizeof(TickRecord) > kLarge; };
+  if (!scan && range.is_whole() && std::filesystem::is_regular_file(path) && is_large()) {
     if (const auto kept = kept_summary(folder, arm)) return *kept;
   }
   return summarise(folder, range, arm);

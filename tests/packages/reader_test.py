@@ -125,7 +125,7 @@ for foreign in (np.zeros(3), np.zeros(3, [("tick", "<u8")]), np.zeros((2, 2), la
     refused(lambda: Log("log"), ValueError, ["log/ticks.npy: no ticks of this version", "give the folder"])
 np.savez("log/ticks.npz", foreign)
 pathlib.Path("log/ticks.npz").rename("log/ticks.npy")
-refused(lambda: Log("log"), ValueError, ["log/ticks.npy: no ticks of this version"])
+refused(lambda: Log("log"), ValueError, ["log/ticks.npy: ", "bytes are no table of NumPy"])
 for length in (0, 5, 100, 5000, len(whole) - 1):
     pathlib.Path("log/ticks.npy").write_bytes(whole[:length])
     refused(lambda: Log("log"), ValueError, ["log/ticks.npy: ", "cut" if length else "is empty", "give the folder"])

@@ -31,12 +31,12 @@ def set_clock(log, *pairs):
     (log / "manifest.json").write_text(json.dumps(manifest))
 
 
-def record(root, programs, folder, scene, seconds, *options, flight=False, fault=None):
-    """Runs a scene with the hand of scenes/touch.toml; the log is `folder`/log. With `flight` a flight recorder of a second
-    is beside the recorder, with `folder`/flights. Returns the controller's report."""
+def record(root, programs, folder, scene, seconds, *options, flight=False, fault=None, recorder=()):
+    """Runs a scene with the hand of scenes/touch.toml; the log is `folder`/log, of a recorder with the options `recorder`. With
+    `flight` a flight recorder of a second is beside it, with `folder`/flights. Returns the controller's report."""
     report, device = folder / "report.json", folder / "device"
     name = f"recorded-{folder.name}"
-    recorders = {"log": []} | ({"flights": ["--flight", "1"]} if flight else {})
+    recorders = {"log": list(recorder)} | ({"flights": ["--flight", "1"]} if flight else {})
     others, leads = [], []
     for out, own in recorders.items():
         os.mkfifo(lead := folder / f"lead-{out}")

@@ -5,7 +5,7 @@
 import {filesInMcap} from './mcap_log.js';
 
 export const kMostUnpacked = 2 ** 30;  // bytes of all of them; the one that is being unpacked is in memory twice
-const kTicks = /^ticks(-2)?\.npy$/, kTexts = /^(manifest|scene)\.json$/;
+const kTicks = /^ticks(-2)?\.npy(\.\d{4,})?$/, kTexts = /^(manifest|scene)\.json$/;
 const kVolume = /^[0-9a-f]{16}(-labels)?\.npy\.gz$/, kInputs = /^\d{12}\.npy\.gz$/;
 const kHow = 'drop the folder of a recording, as DIR/log of ./kerf demo --out DIR, or the MCAP of ./kerf record export';
 
