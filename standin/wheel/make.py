@@ -13,6 +13,7 @@ import os
 import pathlib
 import platform
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -55,12 +56,12 @@ def asked_of_glibc(path):
 def entry_time():
     """(year, month, day, hour, minute, second) of every entry; a zip begins with 1980."""
     seconds = os.environ.get("SOURCE_DATE_EPOCH", "")
-    if not seconds:
-        done = subprocess.run(["git", "-C", ROOT, "log", "-1", "--format=%ct"], capture_output=True, text=True, check=False)
-        seconds = done.stdout.strip() if done.returncode == 0 else "0"
-    if not re.fullmatch(r"[0-9]{1,11}", seconds):
+    if not seconds and shutil.which("git"):
+        command = ["git", "-C", ROOT, "log", "-1", "--format=%ct"]
+        seconds = subprocess.run(command, capture_output=True, text=True, check=False).stdout.strip()
+    if not re.fullmatch(r"[0-9]{0,11}", seconds):
         raise Refusal(f"SOURCE_DATE_EPOCH={seconds}: not a number of seconds; unset it, or take 1700000000")
-    return max((1980, 1, 1, 0, 0, 0), time.gmtime(int(seconds))[:6])
+    return max((1980, 1, 1, 0, 0, 0), time.gmtime(int(seconds or "0"))[:6])
 
 
 def stripped(path):

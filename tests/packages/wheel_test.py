@@ -59,6 +59,12 @@ first = made("first", SOURCE_DATE_EPOCH="1700000000", TZ="Asia/Tokyo")
 os.umask(0o022)
 wheel = made("second", SOURCE_DATE_EPOCH="1700000000")
 assert first.name == wheel.name and first.read_bytes() == wheel.read_bytes(), "the same files give other bytes"
+# From an archive of the sources, on a machine without git.
+(home / "tools").mkdir()
+for tool in ("readelf", "strip"):
+    (home / "tools" / tool).symlink_to(shutil.which(tool))
+with zipfile.ZipFile(made("third", PATH=str(home / "tools"))) as file:
+    assert {entry.date_time for entry in file.infolist()} == {(1980, 1, 1, 0, 0, 0)}
 refused = subprocess.run([sys.executable, "-B", root / "standin/wheel/make.py", version, libraries, emulator, home / "none"],
                          env={**environment, "SOURCE_DATE_EPOCH": "today"}, capture_output=True, text=True)
 assert refused.returncode == 2 and refused.stderr.startswith("wheel: SOURCE_DATE_EPOCH=today: "), refused.stderr
