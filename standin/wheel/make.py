@@ -54,14 +54,14 @@ def asked_of_glibc(path):
 
 
 def entry_time():
-    """(year, month, day, hour, minute, second) of every entry; a zip begins with 1980."""
+    """(year, month, day, hour, minute, second) of every entry; a zip has the years from 1980 to 2107."""
     seconds = os.environ.get("SOURCE_DATE_EPOCH", "")
     if not seconds and shutil.which("git"):
         command = ["git", "-C", ROOT, "log", "-1", "--format=%ct"]
         seconds = subprocess.run(command, capture_output=True, text=True, check=False).stdout.strip()
     if not re.fullmatch(r"[0-9]{0,11}", seconds):
         raise Refusal(f"SOURCE_DATE_EPOCH={seconds}: not a number of seconds; unset it, or take 1700000000")
-    return max((1980, 1, 1, 0, 0, 0), time.gmtime(int(seconds or "0"))[:6])
+    return min(max((1980, 1, 1, 0, 0, 0), time.gmtime(int(seconds or "0"))[:6]), (2107, 12, 31, 23, 59, 58))
 
 
 def stripped(path):

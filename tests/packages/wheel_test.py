@@ -65,6 +65,7 @@ for tool in ("readelf", "strip"):
     (home / "tools" / tool).symlink_to(shutil.which(tool))
 with zipfile.ZipFile(made("third", PATH=str(home / "tools"))) as file:
     assert {entry.date_time for entry in file.infolist()} == {(1980, 1, 1, 0, 0, 0)}
+made("far", SOURCE_DATE_EPOCH="99999999999")  # beyond the years of a zip
 refused = subprocess.run([sys.executable, "-B", root / "standin/wheel/make.py", version, libraries, emulator, home / "none"],
                          env={**environment, "SOURCE_DATE_EPOCH": "today"}, capture_output=True, text=True)
 assert refused.returncode == 2 and refused.stderr.startswith("wheel: SOURCE_DATE_EPOCH=today: "), refused.stderr
