@@ -52,6 +52,7 @@ TomlNode value_node(const KeyOverride& setting) {
         one_line(std::holds_alternative<double>(node.value) ? setting.value : written(node.value));
   }
   node.line = node.key_line = 0;
+  for (TomlNode& entry : node.entries) entry.line = entry.key_line = 0;
   return node;
 }
 

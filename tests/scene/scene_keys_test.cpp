@@ -265,6 +265,9 @@ TEST_CASE("a force law on the command line takes the place of the coupling and i
         }) ==
         "x.toml: --set force.stiffness_n_per_mm = 1 is of the coupling, and force.law is in its "
         "place; leave it out");
+  CHECK(test::error_of([&] {
+          static_cast<void>(scene({{"force.law", "{ name = \"nothing\", shares = 1 }"}}));
+        }) == "x.toml: --set force.law.shares = 1 is unknown; did you mean share? known: share");
 }
 
 TEST_CASE("a later setting drops the earlier ones that it leaves without a meaning") {
