@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "record/recording.hpp"
+#include "record/scene_facts.hpp"
 #include "record/tick_log.hpp"
 #include "shared/posix/atomic_file.hpp"
 #include "shared/posix/report_tool.hpp"
@@ -36,7 +37,7 @@ struct Curve {
 /// With two arms the curves of the first have commanded_2 and penetration_2 of the second.
 [[nodiscard]] Json curves_of(const std::filesystem::path& folder, TickRange range,
                              std::size_t arm) {
-  const Manifest manifest = read_manifest(folder);
+  const Manifest manifest = read_facts(folder);
   require_arm(folder, manifest, arm);
   TickLogReader log(folder / tick_log_name(arm));
   if (log.rows() == 0) {

@@ -5,8 +5,11 @@
 #include <cmath>
 #include <fstream>
 #include <iterator>
+#include <optional>
 #include <system_error>
+#include <utility>
 
+#include "record/manifest_seal.hpp"
 #include "record/tick_log.hpp"
 #include "shared/posix/atomic_file.hpp"
 #include "shared/posix/error_text.hpp"
@@ -45,13 +48,29 @@ void for_each_figure(Summary& s, Visit visit) {
   visit("end_reason", s.end_reason);
 }
 
-/// The opposite of `figures_of`. Throws JsonError.
-[[nodiscard]] RecordSummary summary_of(const Json& list) {
+/// The opposite of `figures_of`; nothing if a figure is missing, as in those of earlier versions.
+/// Throws JsonError.
+[[nodiscard]] std::optional<RecordSummary> summary_of(const Json& list) {
   RecordSummary out;
+  bool has_all = true;
   for_each_figure(out, [&]<class Value>(const std::string& name, Value& value) {
-    value = list.at(name).get<Value>();
+    if (list.contains(name)) {
+      value = list.at(name).get<Value>();
+    } else {
+      has_all = false;
+    }
   });
-  return out;
+  return has_all ? std::optional(out) : std::nullopt;
+}
+
+/// The remedy for a manifest that is not there.
+std::string way_to_manifest(const std::filesystem::path& folder) {
+  std::error_code fault;
+  if (!std::filesystem::is_regular_file(folder / kTickLogName, fault) ||
+      !std::filesystem::is_regular_file(folder / kSceneName, fault)) {
+    return way_to_recording(folder);
+  }
+  return "kerf record check " + folder.string() + " --repair makes it of scene and ticks";
 }
 
 }  // namespace
@@ -85,6 +104,12 @@ void write_manifest(const std::filesystem::path& folder, const SegmentInfo& info
          {"initial_hash", hex64(volume.initial_hash)}});
   }
   if (info.arms > 1) manifest["arms"] = info.arms;
+  write_with_end(folder, std::move(manifest), losses, rows, end_reason, summaries);
+}
+
+void write_with_end(const std::filesystem::path& folder, Json manifest, const RecordLosses& losses,
+                    std::uint64_t rows, std::string_view end_reason,
+                    const ArmSummaries& summaries) {
   manifest["rows"] = rows;
   manifest["lost_ticks"] = losses.lost;
   manifest["missed_before_start"] = losses.missed_before_start;
@@ -95,14 +120,18 @@ void write_manifest(const std::filesystem::path& folder, const SegmentInfo& info
   manifest["end_reason"] = end_reason;
   if (!summaries.empty()) manifest["summary"] = figures_of(summaries[0]);
   if (summaries.size() > 1) manifest["summary_2"] = figures_of(summaries[1]);
-  write_new_file(folder / kManifestName, manifest.document());
+  manifest["files"] = checksums_of(folder, is_final(end_reason));
+  write_new_file(folder / kManifestName, sealed(manifest));
 }
 
 std::string not_a_manifest(const std::filesystem::path& folder) {
-  return (folder / kManifestName).string() + ": not a manifest of this version; record it again";
+  return (folder / kManifestName).string() +
+         ": not a manifest of this version; copy the recording again, or kerf record check "
+         "--repair "
+         "makes it anew";
 }
 
-Manifest read_manifest(const std::filesystem::path& folder) {
+std::string manifest_text(const std::filesystem::path& folder) {
   const std::filesystem::path path = folder / kManifestName;
   if (const std::string why = access_error(path); !why.empty()) {
     throw RecordError(path.string() + why);
@@ -111,11 +140,16 @@ Manifest read_manifest(const std::filesystem::path& folder) {
   std::ifstream file;
   if (std::filesystem::is_regular_file(path, fault)) file.open(path);  // opening a pipe would block
   if (!file.is_open()) {
-    throw RecordError(path.string() + ": cannot be read; " + way_to_recording(folder));
+    throw RecordError(path.string() + ": cannot be read; " + way_to_manifest(folder));
   }
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+Manifest read_manifest(const std::filesystem::path& folder) {
+  const std::filesystem::path path = folder / kManifestName;
+  const std::string text = manifest_text(folder);
   Manifest out;
   try {
-    const std::string text{std::istreambuf_iterator<char>(file), {}};
     const Json json = Json::parse(text);
     out.tick_ns = json.at("tick_ns").get<std::uint32_t>();
     out.end_reason = json.at("end_reason").get<std::string>();
@@ -129,7 +163,8 @@ Manifest read_manifest(const std::filesystem::path& folder) {
     out.has_clock = json.contains("clock");
     if (json.contains("arms")) out.arms = json.at("arms").get<std::size_t>();
     for (const char* const key : {"summary", "summary_2"}) {
-      if (json.contains(key)) out.summaries.push_back(summary_of(json.at(key)));
+      if (!json.contains(key)) continue;
+      if (auto figures = summary_of(json.at(key))) out.summaries.push_back(std::move(*figures));
     }
     for (const Json& volume : json.at("volumes")) {
       const auto spacing = volume.at("spacing_mm").get<std::array<double, 3>>();

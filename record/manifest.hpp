@@ -40,6 +40,12 @@ inline constexpr std::string_view kStillRunning = "running";
 inline constexpr std::string_view kFault = "fault";     ///< the run did not end as it was asked to
 inline constexpr std::string_view kNoRoom = "no room";  ///< the disk was full
 
+/// Whether the recorder wrote a manifest after its last row, so that rows and losses are those of
+/// the whole recording. Else the rows say more than the manifest.
+[[nodiscard]] inline bool is_final(std::string_view end_reason) noexcept {
+  return end_reason != kStillRunning && end_reason != kNoRoom;
+}
+
 /// The log of an arm: ticks.npy of the first, ticks-2.npy of the second. Both have the same rows:
 /// row i is of one tick. A recorder that was killed may leave some more rows in the second.
 [[nodiscard]] inline std::string_view tick_log_name(std::size_t arm) noexcept {
@@ -97,15 +103,23 @@ struct Manifest {
   ArmSummaries summaries;  ///< of all rows
 };
 
-/// Writes manifest.json, whole or not at all. It names clock.npy if that is in `folder`.
+/// Writes manifest.json, whole or not at all, with its checksum and those of the files beside it
+/// (record/manifest_seal.hpp). It names clock.npy if that is in `folder`.
 void write_manifest(const std::filesystem::path& folder, const SegmentInfo& info,
                     const RecordLosses& losses, std::uint64_t rows, std::string_view end_reason,
                     const ArmSummaries& summaries = {});
 
+/// Adds rows, losses, end, figures and checksums to a manifest that has all else, and writes it.
+void write_with_end(const std::filesystem::path& folder, Json manifest, const RecordLosses& losses,
+                    std::uint64_t rows, std::string_view end_reason, const ArmSummaries& summaries);
+
 /// The error line for a file that is not a manifest.
 [[nodiscard]] std::string not_a_manifest(const std::filesystem::path& folder);
 
-/// Throws `RecordError` if it is missing or has no such values.
+/// The text of manifest.json in `folder`. Throws `RecordError` if it cannot be read.
+[[nodiscard]] std::string manifest_text(const std::filesystem::path& folder);
+
+/// What it says, as it stands there. Throws `RecordError` if it is missing or has no such values.
 [[nodiscard]] Manifest read_manifest(const std::filesystem::path& folder);
 
 /// The text of scene.json in `folder`. Throws `RecordError`, also if it is larger than any scene.

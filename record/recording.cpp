@@ -115,28 +115,6 @@ void for_each_tick(const std::filesystem::path& folder, const Manifest& manifest
       range);
 }
 
-RecordSummary summarise(const std::filesystem::path& folder, TickRange range, std::size_t arm) {
-  const Manifest manifest = read_manifest(folder);
-  require_arm(folder, manifest, arm);
-  TickLogReader log(folder / tick_log_name(arm));
-  SummaryBuilder builder(manifest.tick_ns, manifest.voxel_mm3);
-  RecordLosses losses = manifest.losses;
-  std::uint64_t before_range = 0;
-  log.for_each(
-      [&](const TickRecord& record) {
-        if (builder.rows() == 0) before_range = index_of(record);
-        builder.add(record);
-      },
-      range);
-  if (!range.is_whole()) losses = {.missed_before_start = before_range};
-  RecordSummary out = builder.result(losses, manifest.end_reason);
-  if (log.rows() < log.counted()) {
-    out.end_reason = "cut after " + std::to_string(log.rows()) + " of " +
-                     std::to_string(log.counted()) + " rows";
-  }
-  return out;
-}
-
 std::optional<RecordSummary> kept_summary(const std::filesystem::path& folder, std::size_t arm) {
   const Manifest manifest = read_manifest(folder);
   require_arm(folder, manifest, arm);

@@ -48,10 +48,6 @@ void require_arm(const std::filesystem::path& folder, const Manifest& manifest, 
 void for_each_tick(const std::filesystem::path& folder, const Manifest& manifest, TickRange range,
                    const std::function<void(const TickRecord&, const TickRecord*)>& visit);
 
-/// Reads the rows of an arm of the recording in `folder`. Throws `RecordError`.
-[[nodiscard]] RecordSummary summarise(const std::filesystem::path& folder, TickRange range = {},
-                                      std::size_t arm = 0);
-
 /// The summary that the recorder wrote, without reading the rows; none if it wrote none, or if the
 /// log has another number of rows. Throws `RecordError`.
 [[nodiscard]] std::optional<RecordSummary> kept_summary(const std::filesystem::path& folder,

@@ -75,6 +75,22 @@ std::filesystem::path part_of_log(const std::filesystem::path& path, std::size_t
   return path.string() + "." + number;
 }
 
+std::string why_unsound(const TickRecord& row) {
+  if (tick_record_crc(row) != row.crc32c) return "has a wrong checksum";
+  if (row.seq >= 2 && row.seq % 2 == 0 && row.seq / 2 <= row.tick) return {};
+  return "has seq " + std::to_string(row.seq) + ", which is not of tick " +
+         std::to_string(row.tick);
+}
+
+std::string why_out_of_order(const TickRecord& before, const TickRecord& row) {
+  const std::uint64_t rests_before = before.tick - before.seq / 2;
+  const std::uint64_t rests = row.tick - row.seq / 2;
+  if (row.seq > before.seq && rests >= rests_before) return {};  // so is its tick
+  return "(tick " + std::to_string(row.tick) + ", seq " + std::to_string(row.seq) +
+         ") cannot follow tick " + std::to_string(before.tick) + ", seq " +
+         std::to_string(before.seq);
+}
+
 TickLogReader::TickLogReader(std::filesystem::path path) : path_(std::move(path)) {
   static_cast<void>(add_part(path_));
   const auto is_there = [&](std::size_t part) {
@@ -103,14 +119,15 @@ bool TickLogReader::add_part(const std::filesystem::path& path) {
   file.read(header.data(), static_cast<std::streamsize>(header.size()));
   header.resize(static_cast<std::size_t>(file.gcount()));
   if (!parts_.empty() && header.size() < kTickLogHeaderBytes) return false;
-  counted_ += rows_of(header, path.string());
+  const std::uint64_t counted = rows_of(header, path.string());
   file.clear();
   file.seekg(0, std::ios::end);
   const auto bytes = static_cast<std::uint64_t>(file.tellg());
-  const std::uint64_t rows =
-      bytes < kTickLogHeaderBytes ? 0 : (bytes - kTickLogHeaderBytes) / sizeof(TickRecord);
-  parts_.push_back({path, rows_, rows});
+  const std::uint64_t behind = bytes - std::min<std::uint64_t>(bytes, kTickLogHeaderBytes);
+  const std::uint64_t rows = behind / sizeof(TickRecord);
+  parts_.push_back({path, rows_, rows, counted, behind % sizeof(TickRecord)});
   rows_ += rows;
+  counted_ += counted;
   file_ = std::move(file);
   open_ = parts_.size() - 1;
   return true;
@@ -144,16 +161,26 @@ std::size_t TickLogReader::read(std::uint64_t first, std::span<TickRecord> rows,
                                 std::string& problem) {
   const std::uint64_t left = rows_ - std::min(first, rows_);
   const auto count = static_cast<std::size_t>(std::min<std::uint64_t>(rows.size(), left));
-  if (!read_raw(first, rows.first(count))) {
+  TickRecord before;
+  bool has_before = first > 0 && count > 0;
+  if ((has_before && !read_raw(first - 1, std::span(&before, 1))) ||
+      !read_raw(first, rows.first(count))) {
     problem = path_.string() + ": cannot be read; copy it again";
     return 0;
   }
-  const auto sound = [](const TickRecord& row) { return tick_record_crc(row) == row.crc32c; };
-  const auto rest = std::ranges::find_if_not(rows.first(count), sound);
-  const auto good = static_cast<std::size_t>(rest - rows.begin());
+  // One that is damaged itself says nothing of the next.
+  has_before = has_before && why_unsound(before).empty();
+  std::string why;
+  std::size_t good = 0;
+  for (; good < count; ++good) {
+    why = why_unsound(rows[good]);
+    if (why.empty() && has_before) why = why_out_of_order(before, rows[good]);
+    if (!why.empty()) break;
+    before = rows[good];
+    has_before = true;
+  }
   if (good == 0 && count > 0) {
-    problem =
-        path_.string() + ": row " + std::to_string(first) + " has a wrong checksum; copy it again";
+    problem = path_.string() + ": row " + std::to_string(first) + " " + why + "; copy it again";
   }
   return good;
 }

@@ -58,14 +58,27 @@ struct TickRange {
   return record_index(record);
 }
 
+/// Why `row` cannot be a row that was recorded: its checksum, or a `seq` that is not of its tick.
+/// Empty if it can.
+///
+/// The checksum covers all bytes but those of `seq`. In a controller's run `seq` is twice `tick`. A
+/// watched replay rests at some ticks, which have no record: there it is less.
+[[nodiscard]] std::string why_unsound(const TickRecord& row);
+
+/// Why `row` cannot follow `before`, if both are sound: rows that are doubled, exchanged or of
+/// another run. Empty if it can: ticks may be lost between two rows, and a watched replay may rest.
+[[nodiscard]] std::string why_out_of_order(const TickRecord& before, const TickRecord& row);
+
 /// Reads one log, row by row, with constant memory; all its files as one.
 class TickLogReader {
  public:
   /// One file of the log.
   struct Part {
     std::filesystem::path path;
-    std::uint64_t first = 0;  ///< row
-    std::uint64_t rows = 0;   ///< that are complete
+    std::uint64_t first = 0;       ///< row
+    std::uint64_t rows = 0;        ///< that are complete
+    std::uint64_t counted = 0;     ///< rows by its header
+    std::uint64_t bytes_left = 0;  ///< behind its last complete row: less than a row has
   };
 
   static constexpr std::size_t kChunkRows = 1024;  ///< that `for_each` reads at a time
@@ -82,7 +95,8 @@ class TickLogReader {
   [[nodiscard]] std::span<const Part> parts() const noexcept { return parts_; }
 
   /// Reads rows from `first` on into `rows`; returns how many there are, less at the end and before
-  /// a row whose checksum is wrong. Throws `RecordError` if that is the first one.
+  /// a row that is unsound or cannot follow the one before it. Throws `RecordError` if that is the
+  /// first one.
   [[nodiscard]] std::size_t read(std::uint64_t first, std::span<TickRecord> rows);
 
   /// The same, but returns 0 and sets `problem` to the line. Leaves `problem` as it is otherwise.
@@ -90,7 +104,7 @@ class TickLogReader {
                                  std::string& problem);
 
   /// The first row of `tick` or a later one, by bisection; `rows()` if there is none. Checks no
-  /// checksum; `read` checks that of the row found.
+  /// row; `read` checks the one found.
   [[nodiscard]] std::uint64_t row_of(Tick tick);
 
   /// Calls `visit` for each row of `range` in order. Throws as `read`.

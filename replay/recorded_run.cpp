@@ -215,6 +215,15 @@ void check_begins_at_first_tick(const std::filesystem::path& folder, const Manif
                     std::to_string(first.tick) + "; copy the recording again");
 }
 
+std::vector<double> voxel_mm3_of(const InputsInJson& recorded) {
+  std::vector<double> out;
+  for (const std::optional<SceneVolume>& volume : recorded.inputs.volumes) {
+    const auto& mm = volume->image.spacing_mm;
+    out.push_back(mm[0] * mm[1] * mm[2]);
+  }
+  return out;
+}
+
 }  // namespace
 
 std::vector<double> voxel_mm3_of(const LoadedScene& scene) {
@@ -253,6 +262,8 @@ RecordedRun load_run(const std::filesystem::path& folder, const ReplayChanges& c
                         ": has no rate or no device; copy the recording again");
     }
   }
+  run.manifest.tick_ns = static_cast<std::uint32_t>(1'000'000'000 / run.scene.servo.rate_hz);
+  run.manifest.voxel_mm3 = voxel_mm3_of(recorded.inputs);
   if (with_segment) {
     const std::uint64_t hash = fnv1a(run.canonical);
     run.segment = SegmentWriter::create(segment_spec(run.scene, run.scene_json, hash));

@@ -34,7 +34,7 @@ struct ReplayChanges {
 
 /// The scene of a recording, planned; it may be stepped from the run's first tick on.
 struct RecordedRun {
-  Manifest manifest;
+  Manifest manifest;  ///< with length of a tick and voxels of the scene that was recorded
   /// Ticks of the run before the first one of the log.
   [[nodiscard]] Tick earlier_ticks() const noexcept { return manifest.losses.missed_before_start; }
 

@@ -7,9 +7,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdio>
-#include <fstream>
 #include <iostream>
-#include <iterator>
 #include <memory>
 #include <optional>
 #include <span>
@@ -17,6 +15,7 @@
 #include <vector>
 
 #include "controller/loop/publisher.hpp"
+#include "record/check/recording_check.hpp"
 #include "record/earlier_inputs.hpp"
 #include "record/log_clock.hpp"
 #include "record/recording.hpp"
@@ -66,22 +65,18 @@ class ReplayLog {
 
   void close(const RecordedRun& run, const ReplayResult& result) {
     for (std::size_t arm = logs_.size(); arm-- > 0;) logs_[arm]->sync();
-    std::ifstream file(from_ / kManifestName);
-    Json manifest = Json::parse(std::string{std::istreambuf_iterator<char>(file), {}});
+    Json manifest = Json::parse(manifest_text(from_));
     manifest["replay_of"] = from_.string();
     manifest["config_hash"] = hex64(fnv1a(run.canonical));
+    manifest["tick_ns"] = run.manifest.tick_ns;
     manifest["volumes"] = volumes_;
-    manifest["rows"] = result.ticks;
-    manifest["lost_ticks"] = 0;
-    manifest["gaps"] = Json::List{};
-    manifest["end_reason"] = kReplayed;
     const RecordLosses losses{.missed_before_start = run.earlier_ticks()};
-    for (std::size_t arm = 0; arm < summaries_.size(); ++arm) {
-      manifest[arm == 0 ? "summary" : "summary_2"] =
-          figures_of(summaries_[arm].result(losses, kReplayed));
+    ArmSummaries figures;
+    for (const SummaryBuilder& builder : summaries_) {
+      figures.push_back(builder.result(losses, kReplayed));
     }
     write_new_file(out_ / kSceneName, run.scene_json);
-    write_new_file(out_ / kManifestName, manifest.document());
+    write_with_end(out_, std::move(manifest), losses, result.ticks, kReplayed, figures);
   }
 
  private:
@@ -173,12 +168,20 @@ void check_range(const ReplayOptions& options, RecordedTicks& log) {
 int run_replay(const ReplayOptions& options, const std::atomic<bool>& stop) {
   check_outputs(recording_files(options.folder),
                 {{"--report", options.report, ".json"}, {"--plot", options.plot, ".svg"}});
-  RecordedTicks log(options.folder, read_manifest(options.folder).arms);
+  const CheckedRecording checked = check_recording(options.folder, {.until = options.until});
+  RecordedTicks log(options.folder, checked.manifest.arms);
   if (log.rows() == 0) {
     throw RecordError((options.folder / kTickLogName).string() + ": 0 rows; nothing to replay");
   }
   check_range(options, log);
-  if (!options.watch.empty()) return watch_replay(options, log, stop);
+  // What contradicts itself in the recording is reported behind what the replay found.
+  const auto exit_code = [&](int code) {
+    for (const std::string& problem : checked.problems) {
+      std::cerr << "kerf-replay: " << problem << '\n';
+    }
+    return checked.problems.empty() ? code : 1;
+  };
+  if (!options.watch.empty()) return exit_code(watch_replay(options, log, stop));
   RecordedRun run = load_run(options.folder, options.changes, kernels_named(options.kernels));
   std::optional<ReplayLog> copy;
   if (!options.out.empty()) copy.emplace(options.out, options.folder, run);
@@ -208,7 +211,7 @@ int run_replay(const ReplayOptions& options, const std::atomic<bool>& stop) {
   if (!result.cut_short.empty()) std::cout << "stopped: " << result.cut_short << '\n';
   if (!options.plot.empty()) compared.plot(options.plot);
   if (!options.report.empty()) write_new_file(options.report, json_of(result, run).document());
-  return (difference && !changed) || !result.cut_short.empty() ? 1 : 0;
+  return exit_code((difference && !changed) || !result.cut_short.empty() ? 1 : 0);
 }
 
 }  // namespace kerf

@@ -27,7 +27,8 @@ struct ReplayOptions {
 };
 
 /// Replays the recording and prints the result. Returns the exit code: 0; 1 if a tick differs
-/// although nothing was changed, or if not all ticks were replayed. Throws for bad input, one line.
+/// although nothing was changed, if not all ticks were replayed, or if the recording contradicts
+/// itself (check_recording). Throws for bad input, one line.
 [[nodiscard]] int run_replay(const ReplayOptions& options, const std::atomic<bool>& stop);
 
 /// `kerf-replay`: the whole program, for its main and for that of a project with laws of its own.

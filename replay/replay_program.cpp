@@ -23,7 +23,8 @@ constexpr const char* kAbout =
 bool parse_replay(int argc, char** argv, ReplayOptions& options) {
   CommandLine app(kAbout, "kerf-replay", KERF_VERSION);
   app.footer(
-      "\nExit codes: 0 fine, 1 a tick differs or the recording has a gap, 2 bad input or set-up.");
+      "\nExit codes: 0 fine, 1 a tick differs, or the recording has a gap or contradicts itself, 2 "
+      "bad input or set-up.");
   std::string numeric, scene, law, estimator, stabiliser;
   app.option("DIR", options.folder, "folder of a recording").required();
   app.option("--from", options.from, "the first tick that is compared").shown_as("TICK");

@@ -286,12 +286,7 @@ SceneSource source_in(std::string_view json) {
 }
 
 std::string json_without_source(std::string_view json) {
-  const Json scene = Json::parse(json);
-  Json::Members rest;
-  for (const Json::Member& member : scene.members()) {
-    if (member.key != kSource) rest.push_back(member);
-  }
-  return Json(std::move(rest)).canonical();
+  return Json::parse(json).without(kSource).canonical();
 }
 
 }  // namespace kerf

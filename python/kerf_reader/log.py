@@ -4,6 +4,7 @@ import pathlib
 
 import numpy as np
 
+from .check import problems
 from .layout import CLOCK, STARTED, TICK
 
 
@@ -37,10 +38,22 @@ def _all_rows_of(file):
 
 
 def _words_of(file):
+    twice = []
+
+    def members(pairs):
+        words = {}
+        for name, value in pairs:
+            if name in words:
+                twice.append(name)
+            words[name] = value
+        return words
+
     try:
-        words = json.loads(file.read_text(encoding="utf-8"))
+        words = json.loads(file.read_text(encoding="utf-8"), object_pairs_hook=members)
     except ValueError:
         raise ValueError(f"{file}: no JSON, or the file was cut; give the folder of another recording") from None
+    if twice:
+        raise ValueError(f'{file}: "{twice[0]}" stands twice in it; copy the recording again')
     if not isinstance(words, dict):
         raise ValueError(f"{file}: no table of names and values; give the folder of another recording")
     return words
@@ -49,11 +62,12 @@ def _words_of(file):
 class Log:
     """What kerf-recorder wrote into `folder`; docs/log.md tells each column.
 
-    ticks: one row for each tick, read from the disk as it is used; of a log that was split, from memory. second: of a run with two devices the second's rows,
-    row i of the same tick as row i of ticks; else None. scene, manifest: as dictionaries. clock: readings of CLOCK_MONOTONIC
-    and UTC at one moment; None in logs of earlier versions."""
+    ticks: one row for each tick, read from the disk as it is used; of a log that was split, from memory. second: of a run with
+    two devices the second's rows, row i of the same tick as row i of ticks; else None. scene, manifest: as dictionaries. clock:
+    readings of CLOCK_MONOTONIC and UTC at one moment; None in logs of earlier versions. Reads all rows once and compares what
+    `kerf record info` does; what is damaged raises ValueError. check=False opens a long log at once, as it is."""
 
-    def __init__(self, folder):
+    def __init__(self, folder, check=True):
         folder = pathlib.Path(folder)
         try:
             self.ticks = _all_rows_of(folder / "ticks.npy")
@@ -68,6 +82,17 @@ class Log:
         tick_ns = self.manifest.get("tick_ns")
         if type(tick_ns) is not int or tick_ns <= 0:
             raise ValueError(f"{folder / 'manifest.json'}: tick_ns: not a positive number; give the folder of another recording")
+        if check:
+            self._check(folder)
+
+    def _check(self, folder):
+        logs = [self.ticks] if self.second is None else [self.ticks, self.second]
+        try:
+            found = next(problems(folder, self.manifest, self.scene, logs, self.clock), None)
+        except (AttributeError, KeyError, TypeError):  # another shape than that of any recorder
+            found = f"{folder}: manifest.json and scene.json are not those of a recording; give the folder of another one"
+        if found:
+            raise ValueError(found)
 
     def __len__(self):
         return len(self.ticks)

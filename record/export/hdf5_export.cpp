@@ -15,6 +15,7 @@
 #include <hdf5.h>
 
 #include "record/recording.hpp"
+#include "record/scene_facts.hpp"
 #include "record/tick_text.hpp"
 #include "shared/posix/atomic_file.hpp"
 #include "shared/posix/stop_signals.hpp"
@@ -296,7 +297,7 @@ void export_hdf5(const std::filesystem::path& folder, const std::filesystem::pat
   if (is_stream(hdf5)) {
     throw RecordError(hdf5.string() + ": HDF5 is no stream; give the name of a file");
   }
-  const Manifest manifest = read_manifest(folder);
+  const Manifest manifest = read_facts(folder);
   std::vector<TickLogReader> logs;
   for (std::size_t arm = 0; arm < manifest.arms; ++arm) {
     logs.emplace_back(folder / tick_log_name(arm));

@@ -26,7 +26,7 @@ manifest is then 2.
 | `ticks.npy.0002` ... | of a recorder with `--split`: the rows that follow |
 | `ticks-2.npy` | of a run with two devices: the second's, in the same columns. Row i of both is the same tick; a tick that was lost is in neither |
 | `clock.npy` | the date: one row at the start, one a minute, and one after UTC was set; [below](#the-date) |
-| `manifest.json` | length of a tick, voxels, versions, compiler and processor, losses of the recorder and where they lie, how the run ended |
+| `manifest.json` | length of a tick, voxels, versions, compiler and processor, losses of the recorder and where they lie, how the run ended, checksums ([reports](reports.md)) |
 | `scene.json` | the scene as it was loaded, every setting; `source` is what it was loaded from |
 | `volumes/HASH.npy.gz` | the densities of a volume as the run began, `[z, y, x]`; `HASH-labels.npy.gz`: its labels. HASH is `density_hash` in `scene.json`, of both |
 | `inputs/TICK.npy.gz` | of a flight recording: what the servo was given in the ticks before the log, from tick 1 on; 65,536 rows a file, named by its first tick; `inputs-2/` of a second device |
@@ -66,6 +66,33 @@ and `utc_ns` (since 1970-01-01, negative before), both read within `within_ns`, 
 `info` prints the first tick's date, and one line if UTC was set in the run: ticks before that have the date which the clock would have
 shown if it had been set already, so dates do not run back. In lock-step time is virtual: tick 0 has the date at which the recorder
 began, and each tick is one tick's length later, however long it took. Logs of earlier versions have no date.
+## Whether it is whole
+
+    ./kerf record check DIR/log
+
+compares all that the files say twice, and all checksums, and says of each contradiction where it is, what stands there and what to
+do; exit code 1. `info`, `plot`, `export` and `./kerf replay` compare the same, but for the files in `volumes/` and `inputs/`, and
+end with 1 as well. A row that is damaged or out of order ends what they read; an export then writes nothing.
+
+| fact | source | compared with it |
+|---|---|---|
+| length of a tick, arms, voxels, settings | `scene.json` | `tick_ns`, `arms`, `volumes`, `config_hash` of the manifest |
+| ticks, losses, figures | the rows | `rows`, `lost_ticks`, `missed_before_start`, `gaps`, `summary` |
+| content of the volumes | `volumes/` | `density_hash` of the scene, `initial_hash` |
+| all else, as session, versions, end | `manifest.json` | `crc32`, its last member: zlib's CRC-32 of all bytes before the comma in front of it |
+| bytes of the other files | themselves | `files` of the manifest: their CRC-32; until the recorder ends only that of `scene.json` |
+
+`crc32c` covers all of a row but `seq`. In a run `seq` is twice `tick`; only in a log of a watched replay, which rests at ticks without a
+record, it is less, and the difference never falls. So `seq` and `tick` rise from row to row, and a bit of `seq` that changed is found by
+its own row, by the next one, or by the losses in the manifest.
+
+`np.load` compares nothing. It does not see rows that are damaged, doubled, exchanged or of another run, nor a manifest of another log;
+`kerf_reader.Log` compares what `info` does and raises `ValueError`, but for `config_hash` and the figures of the summary, for which it
+has the two CRC-32. What no reader sees: the last rows of a log whose recorder was killed, if they were cut off behind the count of the
+header, and in logs of earlier versions, which have no `crc32`, the facts that only the manifest has.
+
+A `manifest.json` that is lost or wrong is made anew by `./kerf record check DIR/log --repair` from scene and rows; the old one stays as
+`manifest-old.json`. What only that said is taken from it, or unknown.
 
 ## The energy from the other columns
 

@@ -15,6 +15,7 @@
 #include "record/input_rows.hpp"
 #include "record/kept_volumes.hpp"
 #include "record/recording.hpp"
+#include "record/scene_facts.hpp"
 #include "record/tick_log.hpp"
 #include "shared/posix/atomic_file.hpp"
 #include "shared/segment/layout_table.hpp"
@@ -130,7 +131,7 @@ std::vector<std::string> export_mcap(const std::filesystem::path& folder,
                                      const std::filesystem::path& mcap, McapWriter::Packing packing,
                                      TickRange range, const LogClock& clock) {
   check_outputs(recording_files(folder), {{"--mcap", mcap, ".mcap"}});
-  const Manifest manifest = read_manifest(folder);
+  const Manifest manifest = read_facts(folder);
   AtomicFile file(mcap);
   McapWriter writer([&](std::string_view bytes) { file.write(bytes.data(), bytes.size()); }, "ros2",
                     "kerf " KERF_VERSION, packing);

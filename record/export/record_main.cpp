@@ -3,6 +3,7 @@
 #include <iostream>
 #include <string>
 
+#include "record/check/check_command.hpp"
 #include "record/export/hdf5_export.hpp"
 #include "record/export/live_json.hpp"
 #include "record/export/log_page.hpp"
@@ -20,17 +21,16 @@
 namespace kerf {
 namespace {
 
-/// A small log is read whole, with its checksums. Of a large one the recorder's own figures are
-/// shown, at once.
-RecordSummary summary_for_info(const std::filesystem::path& folder, TickRange range,
-                               std::size_t arm, bool scan) {
+/// How much of a recording is read before it is shown. A small log is read whole, with its
+/// checksums. Of a large one the recorder's own figures are shown, at once.
+CheckDepth depth_for_info(const std::filesystem::path& folder, TickRange range, std::size_t arm,
+                          bool scan) {
   constexpr std::uintmax_t kLarge = std::uintmax_t{256} << 20;
   const std::filesystem::path path = folder / tick_log_name(arm);
   const auto is_large = [&] { return TickLogReader(path).rows() * sizeof(TickRecord) > kLarge; };
-  if (!scan && range.is_whole() && std::filesystem::is_regular_file(path) && is_large()) {
-    if (const auto kept = kept_summary(folder, arm)) return *kept;
-  }
-  return summarise(folder, range, arm);
+  const bool has_figures = !scan && range.is_whole() && std::filesystem::is_regular_file(path) &&
+                           is_large() && kept_summary(folder, arm);
+  return has_figures ? CheckDepth::facts : CheckDepth::rows;
 }
 
 /// The date of the first row of `range`; empty if there is none.
@@ -47,34 +47,20 @@ std::string shown(const std::string& date, const LogClock& clock) {
   return date + (clock.is_virtual() ? ", of ticks in virtual time" : "");
 }
 
-/// Prints what is to be said of the dates. Whether clock.npy is sound.
-bool report_clock(const std::filesystem::path& folder, const LogClock& clock) {
-  if (!clock.problem().empty()) std::cerr << "kerf-record: " << clock.problem() << '\n';
+/// Prints what is to be said of sound dates.
+void report_clock(const std::filesystem::path& folder, const LogClock& clock) {
   if (const std::string set = clock.set_in_the_run(); !set.empty()) {
     std::cerr << "kerf-record: " << (folder / kClockName).string() << ": " << set << '\n';
   }
-  return clock.problem().empty();
-}
-
-/// Prints a line for each arm whose log has fewer rows than its header counts. Whether one has.
-bool report_cuts(const std::filesystem::path& folder) {
-  bool is_cut = false;
-  const std::size_t arms = read_manifest(folder).arms;
-  for (std::size_t arm = 0; arm < arms; ++arm) {
-    const std::filesystem::path path = folder / tick_log_name(arm);
-    const TickLogReader log(path);
-    if (log.rows() >= log.counted()) continue;
-    std::cerr << "kerf-record: " << path.string() << ": cut after " << log.rows() << " of "
-              << log.counted() << " rows; copy the recording again\n";
-    is_cut = true;
-  }
-  return is_cut;
 }
 
 /// `info DIR`, `plot DIR --out FILE.svg`, `export DIR --csv FILE`, `--mcap FILE` or `--hdf5 FILE`,
-/// `grab`, `live`, `columns`. Bad input throws.
+/// `check DIR`, `grab`, `live`, `columns`. Bad input throws.
 int run_record(int argc, char** argv) {
   CommandLine app("Looks at what kerf-recorder wrote.", "kerf-record", KERF_VERSION);
+  app.footer(
+      "\nExit codes: 0 fine, 1 the recording contradicts itself or is not whole, 2 bad input or "
+      "set-up.");
   std::filesystem::path folder;
   std::filesystem::path report;
   std::filesystem::path svg;
@@ -115,6 +101,12 @@ int run_record(int argc, char** argv) {
       .one_of({"epoch", "monotonic"})
       .shows_default();
   table.flag("--unpacked", unpacked, "the MCAP without LZ4, for readers that have none");
+  Arguments all =
+      app.command("check", "compare all that a recording says twice, and its checksums");
+  bool repair = false;
+  all.option("DIR", folder, "folder of a recording").required();
+  all.flag("--repair", repair,
+           "make manifest.json anew from scene and ticks if it is lost or wrong");
   Arguments keep = app.command("grab", "a running flight recorder keeps the ticks until now");
   keep.option("--name", name, "name of the controller").shows_default();
   LiveOptions live_to{.name = kDefaultName};
@@ -134,38 +126,47 @@ int run_record(int argc, char** argv) {
                      std::to_string(range.until) + "; no tick lies between them");
   }
   --arm;  // from here on an index
-  bool is_whole = true;
-  if (columns.chosen()) std::cout << (as_msg ? ros_channels()[ros_tick].definition : log_page());
-  if (info.chosen()) {
-    check_outputs(recording_files(folder), {{"--report", report, ".json"}});
-    const RecordSummary summary = summary_for_info(folder, range, arm, scan);
-    const Manifest manifest = read_manifest(folder);
-    const LogClock clock = read_clock(folder, manifest.has_clock);
-    const std::string date = date_of(folder, range, clock);
-    if (manifest.arms > 1) std::cout << "arm                 " << arm + 1 << " of 2\n";
-    std::cout << "date                " << shown(date, clock) << '\n' << to_text(summary);
-    is_whole = report_clock(folder, clock);
-    if (!report.empty()) write_new_file(report, to_json(summary, date));
-  }
-  if (plot.chosen()) {
-    plot_forces(folder, svg, range, arm);
-    if (!is_stream(svg)) std::cout << svg.string() << ": written\n";
-  }
+  if (all.chosen()) return run_check(folder, repair);
   if (table.chosen() && csv.empty() && mcap.empty() && hdf5.empty()) {
     throw UsageError("export: as what? give --csv FILE, --mcap FILE or --hdf5 FILE");
   }
   if (table.chosen()) {
     check_distinct({{"--csv", csv, ".csv"}, {"--mcap", mcap, ".mcap"}, {"--hdf5", hdf5, ".h5"}});
   }
-  if (table.chosen() && arm != 0) require_arm(folder, read_manifest(folder), arm);
+  CheckedRecording checked;
+  if (info.chosen() || plot.chosen() || table.chosen()) {
+    check_outputs(recording_files(folder), {{"--report", report, ".json"}});
+    const CheckDepth depth =
+        info.chosen() ? depth_for_info(folder, range, arm, scan) : CheckDepth::rows;
+    checked = check_recording(folder, range, depth);
+    require_arm(folder, checked.manifest, arm);
+    if (!checked.rows_readable) return report_problems(checked);
+  }
+  bool is_whole = true;
+  if (columns.chosen()) std::cout << (as_msg ? ros_channels()[ros_tick].definition : log_page());
+  if (info.chosen()) {
+    const ArmSummaries& figures =
+        checked.summaries.empty() ? checked.manifest.summaries : checked.summaries;
+    const RecordSummary& summary = figures[arm];
+    const LogClock clock = read_clock(folder, checked.manifest.has_clock);
+    const std::string date = date_of(folder, range, clock);
+    if (checked.manifest.arms > 1) std::cout << "arm                 " << arm + 1 << " of 2\n";
+    std::cout << "date                " << shown(date, clock) << '\n' << to_text(summary);
+    report_clock(folder, clock);
+    if (!report.empty()) write_new_file(report, to_json(summary, date));
+  }
+  if (plot.chosen()) {
+    plot_forces(folder, svg, range, arm);
+    if (!is_stream(svg)) std::cout << svg.string() << ": written\n";
+  }
   LogClock clock;
   if (time == "epoch" && !(hdf5.empty() && mcap.empty())) {
-    clock = read_clock(folder, read_manifest(folder).has_clock);
+    clock = read_clock(folder, checked.manifest.has_clock);
     if (!clock.has_date()) {
       std::cerr << "kerf-record: " << folder.string()
                 << ": no date: monotonic; recordings of this version have one\n";
     }
-    is_whole = report_clock(folder, clock);
+    report_clock(folder, clock);
   }
   if (!hdf5.empty()) {
     static_cast<void>(catch_stop_signals());  // leaves no half file
@@ -180,8 +181,7 @@ int run_record(int argc, char** argv) {
     }
   }
   if (keep.chosen()) std::cout << grab(name).string() << ": kept\n";
-  if ((table.chosen() || plot.chosen()) && report_cuts(folder)) is_whole = false;
-  if (!is_whole) return 1;
+  if (report_problems(checked) != 0 || !is_whole) return 1;
   return live.chosen() ? send_live(live_to, catch_stop_signals()) : 0;
 }
 

@@ -75,7 +75,7 @@ constexpr LogCode kFaults[] = {
 // Each row: column, unit, meaning, condition under which it is valid.
 constexpr LogColumn kColumns[] = {
     {"seq", "", "twice the number of records published before this one, + 2: a step of more than 2 "
-     "is a gap"},
+     "is a gap. Twice `tick`, but in a watched replay"},
     {"tick", "tick", "count of servo steps since the start of the controller, from 1"},
     {"start_ns", "ns", "when the tick began, CLOCK_MONOTONIC; in lock-step `tick` times the manifest's `tick_ns`"},
     {"period_error_ns", "ns", "how late it began, after its deadline", "0 in lock-step"},

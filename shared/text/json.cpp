@@ -2,6 +2,7 @@
 #include "shared/text/json.hpp"
 
 #include <algorithm>
+#include <set>
 
 #include <nlohmann/json.hpp>
 
@@ -138,6 +139,14 @@ const Json::Members& Json::members() const {
   return held<Members>(value_, "an object");
 }
 
+Json Json::without(std::string_view key) const {
+  Members rest;
+  for (const Member& member : members()) {
+    if (member.key != key) rest.push_back(member);
+  }
+  return rest;
+}
+
 const Json::List& Json::values(std::size_t size) const {
   const List& list = held<List>(value_, "a list");
   if (size == 0 || list.size() == size) return list;
@@ -204,6 +213,22 @@ Json Json::parse(std::string_view text) {
   } catch (const ordered_json::exception&) {
     throw JsonError("a number out of range");
   }
+}
+
+std::optional<std::string> doubled_key(std::string_view text) {
+  std::optional<std::string> found;
+  std::vector<std::set<std::string>> open;  // the names of each object that has not ended
+  using Event = ordered_json::parse_event_t;
+  const auto follow = [&](int, Event event, const ordered_json& value) {
+    if (event == Event::object_start) open.emplace_back();
+    if (event == Event::object_end) open.pop_back();
+    if (event == Event::key && !open.back().insert(value.get<std::string>()).second && !found) {
+      found = value.get<std::string>();
+    }
+    return true;
+  };
+  const ordered_json parsed = ordered_json::parse(text, follow, false);
+  return parsed.is_discarded() ? std::nullopt : found;
 }
 
 }  // namespace kerf

@@ -83,6 +83,8 @@ class Json {
   [[nodiscard]] const Json* end() const;
   /// Of an object.
   [[nodiscard]] const Members& members() const;
+  /// The object without the member of that name, if it has one.
+  [[nodiscard]] Json without(std::string_view key) const;
 
   /// bool, a number, std::string, or std::array or std::vector of these. A whole number must be
   /// written as one, and fit.
@@ -104,6 +106,7 @@ class Json {
   /// One line with sorted keys: the same for the same content.
   [[nodiscard]] std::string canonical() const;
 
+  /// Of a name that stands twice in an object it takes one value: `doubled_key` finds it.
   [[nodiscard]] static Json parse(std::string_view text);
 
  private:
@@ -120,6 +123,10 @@ class Json {
 
   Value value_;
 };
+
+/// The first name that stands twice in one object of `text`; none if there is no such name, or if
+/// the text is no JSON.
+[[nodiscard]] std::optional<std::string> doubled_key(std::string_view text);
 
 struct Json::Member {
   std::string key;

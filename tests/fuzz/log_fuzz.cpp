@@ -9,6 +9,7 @@
 #include <string_view>
 
 #include "controller/load/scene_json.hpp"
+#include "record/check/recording_check.hpp"
 #include "record/export/mcap_export.hpp"
 #include "record/input_rows.hpp"
 #include "record/recording.hpp"

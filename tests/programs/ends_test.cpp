@@ -9,6 +9,7 @@
 
 #include <doctest/doctest.h>
 
+#include "record/check/recording_check.hpp"
 #include "record/recording.hpp"
 #include "tests/json.hpp"
 #include "tests/programs/pair.hpp"

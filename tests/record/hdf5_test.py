@@ -151,7 +151,7 @@ end
         words = f"kerf-record: {log}/clock.npy: UTC was set in the run, by -3600.000 s; dates are those of the clock as it was at the end\n"
         self.assertEqual(date(), ("1970-01-01T00:00:00.001000Z",) * 2 + (words,))
         (log / "clock.npy").write_bytes((log / "clock.npy").read_bytes()[:-1])
-        self.assertEqual(date(code=1)[2], f"kerf-record: {log}/clock.npy: cut after 2 of 3 rows; copy it again\n" + words)
+        self.assertEqual(date(code=1)[2], words + f"kerf-record: {log}/clock.npy: cut after 2 of 3 rows; copy it again\n")
         set_clock(log)
         self.assertEqual(date(), ("none", None, ""))
 
@@ -175,7 +175,9 @@ end
         manifest = json.loads((two / "manifest.json").read_text())
         (two / "manifest.json").write_text(json.dumps(manifest | {"arms": 2}))
         path = self.folder / "two.h5"
-        export(two, path)
+        scene = json.loads((two / "scene.json").read_text())
+        (two / "scene.json").write_text(json.dumps(scene | {"second_device": scene["device"]}))
+        self.assertIn("config_hash is ", export(two, path, code=1))  # the run had one device
         with h5py.File(path, "r") as file:
             for group, expected in (("ticks", self.rows), ("ticks_2", rows)):
                 self.assertEqual(sorted(file[group]), sorted([*rows.dtype.names, "time_ns"]))
@@ -196,8 +198,9 @@ end
         with open(damaged / "ticks.npy", "r+b") as file:
             file.seek(4096 + 700 * self.rows.dtype.itemsize + 100)
             file.write(b"x")
-        self.assertIn("row 700 has a wrong checksum", export(damaged, none, code=2))
+        self.assertIn("row 700 has a wrong checksum", export(damaged, none, code=1))
         self.assertIn("no.such", export(self.log, self.folder / "no.such/x.h5", code=2))
+        shutil.copy(self.log / "ticks.npy", damaged)
         (damaged / "scene.json").write_bytes(b"\xff\xfe")
         self.assertIn("no JSON", export(damaged, none, code=2))
         self.assertEqual(list(self.folder.glob("*.new-*")) + list(self.folder.glob("none*")), [])

@@ -4,6 +4,13 @@ import json
 import os
 import struct
 import subprocess
+import zlib
+
+
+def sealed(manifest):
+    """The text of a manifest with its checksum, as a recorder writes it."""
+    text = json.dumps({key: value for key, value in manifest.items() if key != "crc32"}, indent=2)[:-2]
+    return f'{text},\n  "crc32": "{zlib.crc32(text.encode()):08x}"\n}}\n'
 
 
 def crc32c(data):
@@ -19,6 +26,7 @@ def set_clock(log, *pairs):
     """clock.npy of (monotonic_ns, utc_ns); without pairs the log is one of a version that had none."""
     path, manifest = log / "clock.npy", json.loads((log / "manifest.json").read_text())
     manifest.pop("clock", None)
+    manifest["files"].pop("clock.npy", None)
     if pairs:
         manifest["clock"] = "clock.npy"
         rows = [struct.pack("<qqI", *pair, 40) for pair in pairs]
@@ -26,9 +34,10 @@ def set_clock(log, *pairs):
         count = b"(%d,), }" % len(pairs)
         header = (header[:header.index(b"'shape': ") + 9] + count).ljust(255) + b"\n"
         path.write_bytes(header + b"".join(row + struct.pack("<I", crc32c(row)) for row in rows))
+        manifest["files"]["clock.npy"] = f"{zlib.crc32(path.read_bytes()):08x}"
     else:
         path.unlink()
-    (log / "manifest.json").write_text(json.dumps(manifest))
+    (log / "manifest.json").write_text(sealed(manifest))
 
 
 def record(root, programs, folder, scene, seconds, *options, flight=False, fault=None, recorder=()):

@@ -217,12 +217,16 @@ class TestMcap(unittest.TestCase):
         volume.symlink_to("nothing")
         why = "no file, or one that cannot be read, so the MCAP is without it; copy the recording again"
         no_place = f"kerf-record: {log / 'scene.json'}: no device.offset_mm, so the MCAP has no /tf; copy the recording again\n"
-        self.assertEqual(export(log, path, code=1), no_place + "".join(f"kerf-record: {file}: {why}\n" for file in (log / "scene.json", volume)))
+        told = export(log, path, code=1)
+        self.assertIn(no_place, told)
+        for file in (log / "scene.json", volume):
+            self.assertIn(f"kerf-record: {file}: {why}\n", told)
         names = read(path)["attachments"]
         self.assertIn("manifest.json", names)
         self.assertNotIn("scene.json", names)
         self.assertNotIn(f"volumes/{volume.name}", names)
-        self.assertEqual(export(log, path, "--from", "1", code=1), no_place)  # a part has no attachments
+        # A part has no attachments; what the manifest repeats of the scene cannot be compared.
+        self.assertIn("scene.json: cannot be read; ", export(log, path, "--from", "1", code=1))
         shutil.rmtree(log / "volumes")
         (log / "scene.json").write_bytes((self.log / "scene.json").read_bytes())
         export(log, path)  # a phantom has no need of them

@@ -8,6 +8,7 @@
 
 #include <doctest/doctest.h>
 
+#include "record/check/recording_check.hpp"
 #include "record/input_rows.hpp"
 #include "shared/numeric/energy_source.hpp"
 #include "shared/segment/connection.hpp"
@@ -37,6 +38,7 @@ template <class Call>
 /// A tick of a made-up run: a slow press with a spike, cutting for the second half.
 [[nodiscard]] inline TickRecord made_up_tick(Tick tick, Tick ticks) {
   TickRecord record{};
+  record.seq = 2 * tick;
   record.tick = tick;
   const double phase = static_cast<double>(tick) / static_cast<double>(ticks);
   const float press = static_cast<float>(2.0 * phase * (1.0 - phase) * 4.0);

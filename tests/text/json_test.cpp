@@ -10,6 +10,7 @@
 
 #include <doctest/doctest.h>
 
+using kerf::doubled_key;
 using kerf::Json;
 using kerf::JsonError;
 
@@ -137,4 +138,12 @@ TEST_CASE("text that is no JSON is refused, and none can exhaust the stack") {
   };
   CHECK(error_of([&] { return Json::parse(nested(60)); }) == "no error");
   CHECK(error_of([&] { return Json::parse(nested(100'000)); }) == "nested too deep");
+}
+
+TEST_CASE("a name that stands twice in one object is found, at any depth") {
+  CHECK(doubled_key(R"({"a": 1, "b": {"a": 2}, "c": [{"a": 1}, {"a": 2}]})") == std::nullopt);
+  CHECK(doubled_key(R"({"rows": 1, "b": 2, "rows": 1})") == "rows");
+  CHECK(doubled_key(R"({"a": [{"b": {"c": 1, "\u0063": 2}}]})") == "c");
+  CHECK(doubled_key(R"({"a": 1, "a": )") == std::nullopt);  // no JSON
+  CHECK(doubled_key("[1, 2]") == std::nullopt);
 }

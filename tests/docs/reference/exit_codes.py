@@ -9,7 +9,6 @@ SILENT = {
     "kerf-arm": "never",
     "kerf-bridge": "never",
     "kerf-emulator": "never",
-    "kerf-record": "never",
     "kerf-recorder": "`--strict`, and ticks were lost; `--flight`, and a recording could not be written",
     "kerf-volume": "never",
 }

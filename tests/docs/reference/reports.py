@@ -110,7 +110,7 @@ REPORTS = [
         ("largest_lag_ticks", "ticks", "how far it was behind at most"),
         ("end_reason", "", "`clean end`, `fault`, `stopped` or `controller gone`")]),
     ("Manifest of a log", "`manifest.json` beside `ticks.npy` ([the log](log.md)).",
-     [("record/manifest.cpp", "void write_manifest(")], ["size_vox", "spacing_mm", "initial_hash", "first_index", "count"], [
+     [("record/manifest.cpp", "void write_manifest("), ("record/manifest.cpp", "void write_with_end(")], ["size_vox", "spacing_mm", "initial_hash", "first_index", "count"], [
         ("kerf, compiler, flags, build_id", "", "version, compiler, its flags and build of the controller and the recorder"),
         ("cpu", "", "processor of the recorder"),
         ("abi_hash", "", "of the layout of a row"),
@@ -118,10 +118,12 @@ REPORTS = [
         ("tick_ns, start_ns", "ns", "length of a tick; when the run began, CLOCK_MONOTONIC; 0 in lock-step"),
         ("scene, clock", "", "file with the scene; file with the date, missing if there is none"),
         ("volumes", "", "each with `size_vox`, `spacing_mm`, `initial_hash`"),
-        ("rows, lost_ticks, missed_before_start, end_reason", "", "as above; `end_reason` is `running` until the end, `no room` if the disk was full"),
+        ("rows, lost_ticks, missed_before_start, end_reason", "", "as above; `end_reason` is `running` until the end, `no room` if the disk was full, `unknown` if the manifest was made anew"),
         ("gaps", "", "each with `first_index` and `count`"),
         ("arms", "", "2: the run had two devices, and there is `ticks-2.npy`; missing with one"),
-        ("summary, summary_2", "", "what `record info` shows, of all rows, of the first and the second device; missing if the recorder was killed before")]),
+        ("summary, summary_2", "", "what `record info` shows, of all rows, of the first and the second device; missing if the recorder was killed before"),
+        ("files", "", "CRC-32 of the other files, by name, 8 hexadecimal digits; of `scene.json` alone until the recorder ends. Behind all, "
+         "`crc32`: of this file, up to the comma before that member ([the log](log.md))")]),
     ("Summary of a log", "`./kerf record info LOG --report FILE`.",
      [("record/manifest.cpp", "void for_each_figure("), ("record/recording.cpp", "std::string to_json(")], [], [
         ("date", "", "of the first tick, UTC; null: the log has none"),

@@ -1,0 +1,138 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What `kerf record info` compares of a log, in NumPy: each function yields lines "place: value; remedy"."""
+import zlib
+
+import numpy as np
+
+ENDS_LATER = ("running", "no room")  # an end_reason: rows and losses of the manifest are not those of the whole log
+CHUNK = 1 << 14                      # rows at a time, so that a long log needs little memory
+
+
+def _crc_tables():
+    byte = np.arange(256, dtype=np.uint32)
+    for _ in range(8):
+        byte = byte >> 1 ^ np.where(byte & 1, np.uint32(0x82F63B78), np.uint32(0))
+    two = np.arange(1 << 16, dtype=np.uint32)
+    low = byte[two & 0xFF]
+    return low >> 8 ^ byte[(low ^ two >> 8) & 0xFF]
+
+
+def _crc32c(rows, first):
+    """Of each row the checksum of its bytes from `first` up to its checksum, two at a time."""
+    table = _crc_tables()
+    words = np.ascontiguousarray(rows).view("<u2").reshape(len(rows), -1).T
+    crc = np.full(len(rows), 0xFFFFFFFF, np.uint32)
+    for word in np.ascontiguousarray(words[first // 2:-2]):
+        crc = crc >> 16 ^ table[(crc ^ word) & 0xFFFF]
+    return ~crc
+
+
+def _row_problems(file, rows):
+    """The first row that is damaged, or cannot follow the one before it."""
+    last = None
+    for first in range(0, len(rows), CHUNK):
+        part = rows[first:first + CHUNK]
+        crc = _crc32c(part, 8) == part["crc32c"]
+        tick, seq = part["tick"], part["seq"]
+        of_tick = (seq >= 2) & (seq % 2 == 0) & (seq // 2 <= tick)
+        rests = tick - seq // 2  # ticks of a watched replay without a record
+        before = (np.r_[seq[:1] if last is None else last[0], seq[:-1]], np.r_[rests[:1] if last is None else last[1], rests[:-1]])
+        follows = (seq > before[0]) & (rests >= before[1])
+        follows[:1] |= last is None
+        wrong = np.flatnonzero(~(crc & of_tick & follows))
+        if len(wrong):
+            row = wrong[0]
+            why = "has a wrong checksum" if not crc[row] else f"has seq {seq[row]}, which is not of tick {tick[row]}" \
+                if not of_tick[row] else f"(tick {tick[row]}, seq {seq[row]}) cannot follow seq {before[0][row]}"
+            yield f"{file}: row {first + row} {why}; copy it again"
+            return
+        last = seq[-1], rests[-1]
+
+
+def _size_problems(file, rows, manifest):
+    """A file may have more rows than its header counts, and a part of one: it is then of a recorder that was killed."""
+    if manifest.get("end_reason") in ENDS_LATER:
+        return
+    for part in sorted(path for path in file.parent.glob(f"{file.name}*") if path.suffix[1:].isdecimal() or path == file):
+        with part.open("rb") as head:
+            np.lib.format.read_magic(head)
+            (count,), _, dtype = np.lib.format.read_array_header_1_0(head)
+            behind = part.stat().st_size - head.tell() - count * dtype.itemsize
+        if behind:
+            yield f"{part}: {behind} bytes behind its last row; copy the recording again"
+    if manifest.get("rows", len(rows)) != len(rows):
+        yield f"{file}: {len(rows)} rows, and {manifest['rows']} by manifest.json; copy the recording again"
+
+
+def _loss_problems(file, rows, manifest):
+    if not len(rows):
+        return
+    index = rows["seq"] // 2 - 1
+    missed = manifest.get("missed_before_start", 0)
+    holes = int(index[-1]) + 1 - missed - len(rows)
+    behind = sum(gap["count"] for gap in manifest.get("gaps", []) if gap["first_index"] > index[-1])
+    lost = manifest.get("lost_ticks", holes + behind)
+    if index[0] < missed or (manifest.get("end_reason") not in ENDS_LATER and lost < holes + behind):
+        yield f"{file}: missed_before_start is {missed} and lost_ticks {lost}, and its rows say another; copy the recording again"
+
+
+def _scene_problems(file, manifest, scene):
+    """The scene is the source of what the manifest repeats."""
+    facts = {}
+    if "rate_hz" in scene.get("servo", {}):
+        facts["tick_ns"] = 10**9 // scene["servo"]["rate_hz"]
+    if "device" in scene:
+        facts["arms"] = 2 if "second_device" in scene else 1
+    of_manifest = {"arms": 1, **manifest}
+    facts = [(key, of_manifest.get(key), value) for key, value in facts.items()]
+    of_scene, volumes = scene.get("volumes", []), manifest.get("volumes", [])
+    if of_scene and len(of_scene) != len(volumes):
+        facts.append(("volumes", len(volumes), len(of_scene)))
+    for number, (has, volume) in enumerate(zip(volumes, of_scene)):
+        facts += [(f"volumes[{number}].{key}", has.get(key), volume.get(name)) for key, name in (("size_vox", "grid"),
+                                                                                               ("spacing_mm", "spacing_mm"))]
+    for key, value, wanted in facts:
+        if value != wanted:
+            yield f"{file}: {key} is {value}, and {wanted} by scene.json; copy the recording again"
+
+
+def _text_problems(folder, manifest):
+    """The checksums of manifest.json, scene.json and clock.npy; logs of earlier versions have none."""
+    text = (folder / "manifest.json").read_bytes()
+    before, seal, digits = text.rpartition(b',\n  "crc32": "')
+    if (seal or "files" in manifest) and digits != b'%08x"\n}\n' % zlib.crc32(before):
+        yield f"{folder / 'manifest.json'}: its checksum is wrong: it was changed after the recorder wrote it; copy the recording again"
+    for name in ("scene.json", "clock.npy"):
+        wanted = manifest.get("files", {}).get(name)
+        if wanted is not None and wanted != (crc := f"{zlib.crc32((folder / name).read_bytes()):08x}"):
+            yield f"{folder / name}: its checksum is {crc}, and {wanted} in manifest.json; copy the recording again"
+
+
+def _time_problems(file, rows, manifest, tick_ns):
+    """In lock-step the time of a tick follows from its number."""
+    if manifest.get("start_ns") == 0 and (rows["start_ns"] != rows["tick"] * np.uint64(tick_ns)).any():
+        yield f"{file}: start_ns is 0, as in lock-step, and ticks began at other times; copy the recording again"
+
+
+def _clock_problems(file, clock):
+    if (_crc32c(clock, 0) != clock["crc32c"]).any() or (np.diff(clock["monotonic_ns"]) <= 0).any():
+        yield f"{file}: a row has a wrong checksum, or is not later than the one before; copy it again"
+
+
+def problems(folder, manifest, scene, logs, clock):
+    """Of the log in `folder`, whose arms have the rows `logs`; clock: None in logs without dates."""
+    file = folder / "manifest.json"
+    yield from _scene_problems(file, manifest, scene)
+    for arm, rows in enumerate(logs):
+        path = folder / ("ticks.npy", "ticks-2.npy")[arm]
+        yield from _size_problems(path, rows, manifest)
+        yield from _row_problems(path, rows)
+    if len(logs) > 1:
+        both = min(map(len, logs))
+        if (logs[0]["seq"][:both] != logs[1]["seq"][:both]).any():
+            yield f"{folder / 'ticks-2.npy'}: its rows are not of the ticks of ticks.npy; copy the recording again"
+    yield from _loss_problems(file, logs[0], manifest)
+    yield from _time_problems(file, logs[0], manifest, manifest["tick_ns"])
+    if clock is not None:
+        yield from _clock_problems(folder / "clock.npy", clock)
+    yield from _text_problems(folder, manifest)

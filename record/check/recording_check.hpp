@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "record/manifest.hpp"
+#include "record/tick_log.hpp"
+
+// Whether a recording is as its recorder wrote it: `kerf record info`, `export`, `plot`, `check`
+// and `kerf replay` all ask here.
+
+namespace kerf {
+
+/// What is read: manifest.json, scene.json and the headers; the rows, too; and all other files.
+enum class CheckDepth { facts, rows, files };
+
+/// A recording, and all that contradicts itself in it.
+struct CheckedRecording {
+  Manifest manifest;       ///< as `read_facts`
+  ArmSummaries summaries;  ///< of the rows in the range, up to the first one that is damaged
+  /// One line each: "place: value; remedy".
+  std::vector<std::string> problems;
+  bool in_manifest = false;   ///< one of them is in manifest.json, which can be made again
+  bool rows_readable = true;  ///< up to the end of the range
+};
+
+/// Compares all that a recording says twice, and all checksums.
+///
+/// Each fact has one source: the scene has length of a tick, voxels and arms, the rows have ticks,
+/// losses and figures, the manifest has the rest, under its own checksum. Losses and figures are
+/// compared if `range` is the whole recording. A recorder that was killed, or that still runs,
+/// leaves fewer rows in the manifest than in the log, and possibly a part of a row: that is no
+/// problem.
+///
+/// Throws `RecordError` if the folder holds no recording: no manifest, or no log of this version.
+[[nodiscard]] CheckedRecording check_recording(const std::filesystem::path& folder,
+                                               TickRange range = {},
+                                               CheckDepth depth = CheckDepth::rows);
+
+/// The figures of an arm. Throws `RecordError` if a row in the range is damaged.
+[[nodiscard]] RecordSummary summarise(const std::filesystem::path& folder, TickRange range = {},
+                                      std::size_t arm = 0);
+
+/// Writes manifest.json anew from scene and rows, and what of the old one can be read. An old one
+/// is kept as manifest-old.json, and if there is one of that name, it stays. Throws `RecordError`
+/// if scene.json or the log cannot be read, `FileError` if the folder cannot be written.
+void repair_manifest(const std::filesystem::path& folder);
+
+}  // namespace kerf

@@ -1,0 +1,336 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A recording that contradicts itself is told, by every reader alike; a lost manifest is made again.
+
+    check_test.py ROOT BIN [EDITS [SEED]]"""
+import json
+import os
+import pathlib
+import random
+import re
+import shutil
+import struct
+import subprocess
+import sys
+import tempfile
+import unittest
+
+ROOT, BIN = (pathlib.Path(sys.argv.pop(1)).resolve() for _ in range(2))
+EDITS = int(sys.argv.pop(1)) if len(sys.argv) > 1 and sys.argv[1].isdigit() else 200
+SEED = int(sys.argv.pop(1)) if len(sys.argv) > 1 and sys.argv[1].isdigit() else 68
+sys.path[:0] = [str(ROOT / "tests/record"), str(ROOT / "python")]
+from lockstep_run import record, sealed
+try:
+    import kerf_reader
+except ImportError:
+    kerf_reader = None  # no NumPy
+
+HEADER, ROW = 4096, 496
+
+
+def run(program, *arguments):
+    """Exit code, standard output, standard error."""
+    done = subprocess.run([BIN / program, *arguments], capture_output=True, text=True, timeout=120)
+    return done.returncode, done.stdout, done.stderr
+
+
+def check(log, *options):
+    return run("kerf-record", "check", log, *options)
+
+
+def figures(log):
+    """What info and replay print of a log, without what depends on the machine."""
+    return run("kerf-record", "info", log)[:2] + (re.sub(r"in [0-9.]+ s", "", run("kerf-replay", log)[1]),)
+
+
+class TestCheck(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        """A run whose device is silent for a while: its log, and a flight recording with the inputs before it."""
+        cls.temporary = tempfile.TemporaryDirectory()
+        cls.folder = pathlib.Path(cls.temporary.name)
+        (cls.folder / "silence.toml").write_text('latches = "stale_input"\n[[fault]]\nkind = "silence"\nat_s = 1.4\nfor_s = 0.3\n')
+        record(ROOT, BIN, cls.folder, ROOT / "scenes/phantom.toml", 2.5, flight=True, fault=cls.folder / "silence.toml")
+        cls.log = cls.folder / "log"
+        cls.flight, = (cls.folder / "flights").iterdir()
+        cls.manifest = json.loads((cls.log / "manifest.json").read_text())
+        cls.rows = (cls.log / "ticks.npy").read_bytes()
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.temporary.cleanup()
+
+    def copy(self, of=None):
+        copy = pathlib.Path(tempfile.mkdtemp(dir=self.folder)) / "log"
+        shutil.copytree(of or self.log, copy)
+        return copy
+
+    def with_manifest(self, change, seal=True):
+        log = self.copy()
+        manifest = json.loads(json.dumps(self.manifest))
+        change(manifest)
+        (log / "manifest.json").write_text(sealed(manifest) if seal else json.dumps(manifest, indent=2))
+        return log
+
+    def with_ticks(self, data):
+        log = self.copy()
+        (log / "ticks.npy").write_bytes(data)
+        return log
+
+    def row(self, number):
+        return self.rows[HEADER + number * ROW:HEADER + (number + 1) * ROW]
+
+    def assert_told(self, log, words, reader=None):
+        """By all programs, with exit code 1; and raised by the reader in Python, with its own words if they are others."""
+        out = log.parent / "out.csv"
+        for program, *arguments in (("kerf-record", "info", log), ("kerf-record", "export", log, "--csv", out),
+                                    ("kerf-record", "check", log), ("kerf-replay", log)):
+            code, _, said = run(program, *arguments)
+            self.assertEqual(code, 1, (program, arguments, said))
+            self.assertIn(words, said)
+        if kerf_reader:
+            with self.assertRaises(ValueError) as raised:
+                kerf_reader.Log(log)
+            self.assertIn(reader or words, str(raised.exception))
+
+    def test_sound_recordings_are_sound_to_all(self):
+        for log in (self.log, self.flight):
+            self.assertEqual(check(log), (0, f"{log}: all files agree, and all checksums are right\n", ""))
+            self.assertEqual(run("kerf-record", "info", log)[0], 0)
+            if kerf_reader:
+                self.assertGreater(len(kerf_reader.Log(log)), 500)
+        again = self.folder / "replayed"
+        self.assertEqual(run("kerf-replay", self.log, "--out", again)[0], 0)
+        self.assertEqual(check(again)[0], 0, check(again))
+
+    def test_what_the_manifest_says_against_scene_and_rows_is_told_by_all(self):
+        def volume(**members):
+            return lambda manifest: manifest["volumes"][0].update(members)
+
+        def put(**members):
+            return lambda manifest: manifest.update(members)
+        wrong = "is {}, and {} by "
+        for change, words, reader in (
+                (volume(spacing_mm=[0.925] * 3), "volumes[0].spacing_mm is [0.925,0.925,0.925], and ", "volumes[0].spacing_mm is"),
+                (volume(size_vox=[1, 2, 3]), "volumes[0].size_vox is [1,2,3], and ", "volumes[0].size_vox is"),
+                (put(tick_ns=9000000), "tick_ns " + wrong.format(9000000, 1000000) + "scene.json", None),
+                (put(rows=-1), "rows is -1, and ", "by manifest.json"),
+                (put(rows=10**23), "rows is 9.999999999999999e+22, and ", "by manifest.json"),
+                (put(rows=str(self.manifest["rows"])), f"rows is \"{self.manifest['rows']}\", and ", "by manifest.json"),
+                (put(arms=2), "arms is 2, and 1 by scene.json", "No such file"),
+                (put(config_hash="00" * 8), 'config_hash is "0000000000000000", and "', ""),
+                (put(session_id="other"), 'session_id is "other", and not 16 hex', ""),
+                (put(lost_ticks=3), "lost_ticks is 3, and 0 by its rows", ""),
+                (put(gaps=[{"first_index": 5, "count": 2}], lost_ticks=2), "gaps has 2 records from index 5", ""),
+                (put(start_ns=0, tick_ns=500000), "tick_ns " + wrong.format(500000, 1000000) + "scene.json", None),
+                (put(end_reason="stopped"), 'summary.end_reason is "clean end"', ""),
+                (lambda manifest: manifest["summary"].update(peak_force_n=77.5), "summary.peak_force_n is 77.5, and ", ""),
+                (lambda manifest: manifest["summary"].update(rows=1), "summary.rows is 1, and ", ""),
+                (lambda manifest: manifest["volumes"].append(manifest["volumes"][0]), "volumes has 2 volumes, and scene.json 1",
+                 "volumes is 2, and 1"),
+                (lambda manifest: manifest["files"].update({"scene.json": "00000000"}), "scene.json: its checksum is ", None)):
+            with self.subTest(words):
+                log = self.with_manifest(change)
+                if reader == "":  # the reader has no scene in canonical form and no figures: the seal covers these
+                    code, _, said = check(log)
+                    self.assertEqual((code, words in said), (1, True), said)
+                    log = self.with_manifest(change, seal=False)
+                self.assert_told(log, words, reader or None if reader != "" else "its checksum is wrong")
+
+    def test_facts_that_nothing_else_says_are_under_the_checksum_of_the_manifest(self):
+        text = (self.log / "manifest.json").read_text()
+        for key in ("kerf", "compiler", "cpu", "build_id", "abi_hash", "session_id", "end_reason"):
+            with self.subTest(key):
+                log = self.copy()
+                changed = re.sub(rf'"{key}": "(.)', lambda match: match[0][:-1] + ("b" if match[1] != "b" else "c"), text, count=1)
+                (log / "manifest.json").write_text(changed)
+                self.assert_told(log, "its checksum is wrong")
+        log = self.copy()
+        (log / "manifest.json").write_text(text.replace('  "rows":', '  "rows": 7,\n  "rows":', 1))
+        self.assert_told(log, '"rows" stands twice in it')
+        scene = (self.log / "scene.json").read_text()
+        (log := self.copy()).joinpath("scene.json").write_text('{"servo":{},' + scene[1:])
+        self.assertIn('"servo" stands twice in it', check(log)[2])
+
+    def test_the_figures_of_info_come_from_scene_and_rows(self):
+        was = run("kerf-record", "info", self.log)[1]
+        for change in ({"tick_ns": 9000000}, {"volumes": [{**self.manifest["volumes"][0], "spacing_mm": [0.925] * 3}]}):
+            self.assertEqual(run("kerf-record", "info", self.with_manifest(lambda manifest: manifest.update(change)))[1], was)
+
+    def test_rows_that_are_damaged_doubled_exchanged_or_appended_are_told_by_all(self):
+        rows, at = self.rows, HEADER + 700 * ROW
+        flipped = bytearray(rows)
+        flipped[at + 5] ^= 8  # of seq: 8,796,093,022,208 records
+        small = bytearray(rows)
+        small[at] ^= 8
+        other = struct.pack("<Q", 2) + self.row(0)[8:]
+        count = (len(rows) - HEADER) // ROW
+        longer = rows[:HEADER].replace(b"%d,)" % count, b"%d,)" % (count + 1)) + rows[HEADER:]
+        for data, words in ((flipped, "row 700 has seq 8796093"), (small, "row 700 (tick 701, seq 1394) cannot follow tick 700"),
+                            (rows[:at] + self.row(699) + rows[at:], "row 700 (tick 700, seq 1400) cannot follow tick 700"),
+                            (rows[:at] + self.row(701) + self.row(700) + rows[at + 2 * ROW:], "row 701 (tick 701, seq 1402) cannot"),
+                            (longer + other, f"row {count} (tick 1, seq 2) cannot follow tick {count}, seq"),
+                            (longer + self.row(count - 1), f"row {count} (tick {count}, seq {2 * count}) cannot follow")):
+            with self.subTest(words):
+                log = self.with_ticks(data)
+                out = log.parent / "out.csv"
+                for arguments in (("info", log), ("export", log, "--csv", out), ("check", log)):
+                    code, _, said = run("kerf-record", *arguments)
+                    self.assertEqual((code, words in said, out.exists()), (1, True, False), said)
+                code, said, wrong = run("kerf-replay", log)
+                self.assertEqual((code, words in wrong, "stopped: " in said), (1, True, True), wrong)
+                if kerf_reader:
+                    with self.assertRaises(ValueError) as raised:
+                        kerf_reader.Log(log)
+                    self.assertRegex(str(raised.exception), rf"{words.split(' cannot')[0].split(' has')[0].split(' (')[0]}[ :]|bytes behind|rows, and")
+
+    def test_a_range_before_the_damage_is_sound(self):
+        data = bytearray(self.rows)
+        data[HEADER + 700 * ROW + 100] ^= 1
+        log = self.with_ticks(data)
+        self.assertEqual(run("kerf-record", "info", log, "--until", "700")[0], 0)
+        self.assertEqual(run("kerf-record", "info", log, "--until", "701")[0], 1)
+
+    def killed(self):
+        """A log as a recorder that was killed leaves it: more rows than header and manifest say, and a part of one."""
+        def started(manifest):
+            del manifest["summary"]
+            manifest.update(rows=0, end_reason="running", files={"scene.json": manifest["files"]["scene.json"]})
+        log = self.with_manifest(started)
+        count = (len(self.rows) - HEADER) // ROW
+        header = self.rows[:HEADER].replace(b"(%d,)" % count, b"(200,)")
+        (log / "ticks.npy").write_bytes(header + b" " * (HEADER - len(header) - 1) + b"\n" + self.rows[HEADER:-100]
+                                        if len(header) == HEADER else header[:-1] + b" " * (HEADER - len(header)) + b"\n" + self.rows[HEADER:-100])
+        return log, count - 1
+
+    def test_a_killed_recorder_leaves_a_sound_log(self):
+        log, rows = self.killed()
+        self.assertEqual(check(log)[0], 0, check(log))
+        code, said, wrong = run("kerf-record", "info", log)
+        self.assertEqual((code, wrong), (0, ""))
+        self.assertRegex(said, rf"rows +{rows}\n")
+        code, said, wrong = run("kerf-replay", log)
+        self.assertEqual((code, wrong), (0, ""), said)
+        self.assertIn(f"{rows} ticks, each equal", said)
+        if kerf_reader:
+            self.assertGreaterEqual(len(kerf_reader.Log(log)), 200)
+
+    def test_a_lost_or_wrong_manifest_is_made_anew(self):
+        was = figures(self.log)
+        for how in ("lost", "no JSON", "wrong", "foreign"):
+            with self.subTest(how):
+                log = self.copy()
+                path = log / "manifest.json"
+                path.unlink()
+                if how != "lost":
+                    path.write_text({"no JSON": "{", "wrong": sealed({**self.manifest, "tick_ns": 5, "lost_ticks": 9}), "foreign": "[]"}[how])
+                code, _, said = check(log)
+                self.assertEqual(code, 1)
+                self.assertIn("--repair", said)
+                if how == "lost":
+                    code, _, said = run("kerf-record", "info", log)
+                    self.assertEqual((code, "--repair" in said), (2, True), said)
+                code, said, wrong = check(log, "--repair")
+                self.assertEqual((code, wrong), (0, ""))
+                self.assertIn("manifest.json: made anew", said)
+                self.assertEqual(figures(log)[0], 0)
+                self.assertEqual(figures(log)[1].replace("unknown", "clean end"), was[1])
+                self.assertEqual(figures(log)[2], was[2])
+                if kerf_reader:
+                    kerf_reader.Log(log)
+                self.assertEqual((log / "manifest-old.json").exists(), how != "lost")
+                self.assertNotIn("made anew", check(log, "--repair")[1])  # there is nothing left to repair
+        log = self.copy(self.flight)
+        (log / "manifest.json").unlink()
+        self.assertEqual(check(log, "--repair")[0], 0)
+        self.assertEqual(figures(log)[2], figures(self.flight)[2])
+
+    def test_what_cannot_be_repaired_says_why(self):
+        log = self.copy()
+        (log / "manifest.json").unlink()
+        (log / "scene.json").unlink()
+        code, _, said = check(log, "--repair")
+        self.assertEqual((code, said.count("\n")), (2, 1), said)
+        self.assertIn("scene.json: cannot be read", said)
+        code, _, said = check(self.folder)
+        self.assertEqual((code, said.count("\n")), (2, 1), said)
+        self.assertIn(f"ticks.npy: cannot be read; give {self.log}", said)
+
+    def test_a_log_on_a_disk_that_cannot_be_written(self):
+        log = self.copy()
+        disk = log.parent
+        if subprocess.run(["mount", "--bind", "-r", disk, disk], stderr=subprocess.DEVNULL).returncode:
+            self.skipTest("no right to mount")
+        try:
+            self.assertEqual(figures(log), figures(self.log))
+            self.assertEqual(check(log, "--repair")[0], 0)
+            self.assertEqual(run("kerf-record", "export", log, "--csv", self.folder / "from-there.csv")[0], 0)
+        finally:
+            subprocess.run(["umount", disk], check=True)
+        (log / "manifest.json").unlink()
+        subprocess.run(["mount", "--bind", "-r", disk, disk], check=True)
+        try:
+            code, _, said = check(log, "--repair")
+            self.assertEqual((code, said.count("\n")), (2, 1), said)
+            self.assertIn("manifest.json: cannot be written (Read-only file system); ", said)
+        finally:
+            subprocess.run(["umount", disk], check=True)
+
+    def edit(self, log, dice):
+        """Changes one file of a log somehow; returns how."""
+        files = sorted(path for path in log.rglob("*") if path.is_file())
+        path = dice.choice(files)
+        data = bytearray(path.read_bytes())
+        how = dice.choice(["bit", "byte", "cut", "double", "swap", "drop", "append", "number", "files", "gone"])
+        at = dice.randrange(len(data))
+        size = dice.choice([1, 4, 8, ROW, dice.randrange(1, 3000)])
+        at = HEADER + (at - HEADER) // ROW * ROW if size == ROW and path.suffix == ".npy" and at > HEADER else at
+        if how == "bit":
+            data[at] ^= 1 << dice.randrange(8)
+        elif how == "byte":
+            data[at] = dice.randrange(256)
+        elif how == "cut":
+            del data[at:]
+        elif how == "double":
+            data[at:at] = data[at:at + size]
+        elif how == "swap":
+            data[at:at + 2 * size] = data[at + size:at + 2 * size] + data[at:at + size]
+        elif how == "drop":
+            del data[at:at + size]
+        elif how == "append":
+            data += data[at:at + size]
+        elif how == "number":
+            numbers = list(re.finditer(rb"\d+", data)) if path.suffix == ".json" else []
+            if numbers:
+                number = dice.choice(numbers)
+                data[number.start():number.end()] = str(dice.choice([0, 9, 10**23, int(number[0]) + 1])).encode()
+        elif how == "files":
+            other = dice.choice(files)
+            data, _ = bytearray(other.read_bytes()), other.write_bytes(data)
+        if how == "gone":
+            path.unlink()
+        else:
+            path.write_bytes(data)
+        return f"{path.relative_to(log)}: {how} at {at}, {size}"
+
+    def test_each_of_many_random_edits_is_found_or_has_no_effect(self):
+        dice = random.Random(SEED)
+        was = {log: figures(log) for log in (self.log, self.flight)}
+        found = 0
+        for number in range(EDITS):
+            of = dice.choice([self.log, self.flight])
+            log = self.copy(of)
+            how = self.edit(log, dice)
+            code, said, wrong = check(log)
+            with self.subTest(number=number, how=how, said=said + wrong):
+                if code == 0:
+                    self.assertEqual(figures(log), was[of])
+                    continue
+                found += 1
+                # Each line has a place, a value and a way out.
+                self.assertTrue(wrong and all(re.match(r"kerf-record: .+: .+; .+", line) for line in wrong.splitlines()), wrong)
+            shutil.rmtree(log.parent)
+        self.assertGreater(found, 0.8 * EDITS)
+
+
+if __name__ == "__main__":
+    unittest.main()
