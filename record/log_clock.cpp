@@ -158,6 +158,10 @@ LogClock read_clock(const std::filesystem::path& folder, bool is_named) {
   if (!std::filesystem::is_regular_file(path, none)) {
     return LogClock({}, damaged(path, "no such file, and the manifest names it"));
   }
+  constexpr std::uintmax_t kMostBytes = 64 << 20;  // five years of minutes
+  if (std::filesystem::file_size(path, none) > kMostBytes) {
+    return LogClock({}, damaged(path, "larger than the clock of any run"));
+  }
   const std::string text = text_in(path);
   const auto counted = rows_of(std::string_view(text).substr(0, kClockHeaderBytes));
   if (!counted) return LogClock({}, damaged(path, "not the clock of a recording of this version"));

@@ -75,6 +75,20 @@ std::string way_to_manifest(const std::filesystem::path& folder) {
 
 }  // namespace
 
+std::vector<std::filesystem::path> recording_files(const std::filesystem::path& folder) {
+  std::vector<std::filesystem::path> files{folder / kManifestName, folder / kSceneName,
+                                           folder / kClockName};
+  for (std::size_t arm = 0; arm < kMaxArms; ++arm) {
+    const std::filesystem::path log = folder / tick_log_name(arm);
+    std::error_code fault;
+    files.push_back(log);
+    for (std::size_t part = 2; std::filesystem::exists(part_of_log(log, part), fault); ++part) {
+      files.push_back(part_of_log(log, part));
+    }
+  }
+  return files;
+}
+
 Json figures_of(const RecordSummary& summary) {
   Json list;
   for_each_figure(summary, [&](const std::string& name, const auto& value) { list[name] = value; });

@@ -53,11 +53,8 @@ inline constexpr std::string_view kNoRoom = "no room";  ///< the disk was full
 }
 
 /// The files of a recording, which no other output may overwrite.
-[[nodiscard]] inline std::vector<std::filesystem::path> recording_files(
-    const std::filesystem::path& folder) {
-  return {folder / tick_log_name(0), folder / tick_log_name(1), folder / kManifestName,
-          folder / kSceneName, folder / kClockName};
-}
+[[nodiscard]] std::vector<std::filesystem::path> recording_files(
+    const std::filesystem::path& folder);
 
 /// The figures of one recording.
 struct RecordSummary {

@@ -109,6 +109,9 @@ TEST_CASE("no bit of clock.npy changes, and no byte is lost, without a word") {
   const std::int64_t far = std::numeric_limits<std::int64_t>::min();
   write_clock(folder.path(), std::vector<ClockPair>{sealed({1, far, 0, 0})});
   CHECK_FALSE(read_clock(folder.path(), true).has_date());
+  std::filesystem::resize_file(path, std::uintmax_t{1} << 40);  // on no block of the disk
+  CHECK(read_clock(folder.path(), true).problem() ==
+        path.string() + ": larger than the clock of any run; copy it again");
   std::filesystem::remove(path);
   CHECK_FALSE(read_clock(folder.path(), true).problem().empty());
   CHECK(read_clock(folder.path(), false).problem().empty());  // of an earlier version

@@ -145,6 +145,9 @@ TEST_CASE("a recorder splits by the time of the run, and goes on with --resume")
     if (tick % 1500 == 0) CHECK(run_recorder(options, stop) == 0);
   }
   CHECK(rows_of_parts(folder / "log/ticks.npy") == Counts{1000, 1000, 1000, 1000, 500});
+  CHECK(error_of([&] {
+          export_csv(folder / "log", folder / "log/ticks.npy.0003");
+        }).find("is a file of this run itself") != std::string::npos);
   const RecordSummary summary = summarise(folder / "log");
   CHECK(summary.rows == 4500);
   CHECK(summary.lost_ticks == 0);

@@ -70,6 +70,17 @@ def set_in_row(rows, tick, offset, data):
     rows[at + ROW - 4:at + ROW] = struct.pack('<I', crc32c(rows[at + 8:at + ROW - 4]))
 
 
+def split_log(log, rows):
+    """Its rows in files of so many."""
+    ticks = log / 'ticks.npy'
+    data = ticks.read_bytes()
+    for part, at in enumerate(range(HEADER, len(data), rows * ROW), start=1):
+        these = data[at:at + rows * ROW]
+        header = re.sub(rb"\((\d+),\), } *\n$", b"(%d,), }" % (len(these) // ROW), data[:HEADER])
+        path = ticks if part == 1 else log / f'ticks.npy.{part:04}'
+        path.write_bytes(header.ljust(HEADER - 1) + b'\n' + these)
+
+
 def make_recordings(work, log):
     """Of each a name that says what it is."""
     some = Recordings(work, log)
@@ -83,6 +94,8 @@ def make_recordings(work, log):
         del rows[HEADER + 700 * ROW:HEADER + 709 * ROW]
     some.with_rows('gap', drop_rows)
     some.with_file('cut-in-a-row', 'ticks.npy', lambda data: data[:HEADER + 700 * ROW + 100])
+    split_log(some.copy('split'), 1000)
+    (some.copy('part-missing') / 'ticks.npy.0003').write_bytes(b'')
     some.with_file('no-rows', 'ticks.npy', lambda data: data[:HEADER])
     some.with_file('cut-in-the-header', 'ticks.npy', lambda data: data[:1000])
     some.with_file('empty-log', 'ticks.npy', lambda data: b'')
