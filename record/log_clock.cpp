@@ -45,11 +45,13 @@ std::string clock_header(std::size_t rows) {
       std::to_string(rows) + ",", kClockHeaderBytes);
 }
 
-/// Whether the difference of both times fits into 64 bits, with the checksum that it says.
-bool is_sound(const ClockPair& pair) noexcept {
-  constexpr std::int64_t kMostNs = std::int64_t{1} << 62;  // 146 years
-  return sealed(pair).crc32c == pair.crc32c && pair.monotonic_ns >= 0 &&
-         pair.monotonic_ns < kMostNs && pair.utc_ns >= -kMostNs;
+/// Whether a clock can have shown it: Linux refuses to set a date after 2232, so that 30 years of
+/// uptime fit into 64 bits. No date before 1823, so that differences fit, too.
+bool is_possible(const ClockPair& pair) noexcept {
+  constexpr std::int64_t kMostNs = std::int64_t{1} << 62, kLastNs = 8'277'292'036 * kNsPerSecond;
+  constexpr std::int64_t kUptimeNs = std::numeric_limits<std::int64_t>::max() - kLastNs;
+  return pair.monotonic_ns >= 0 && pair.monotonic_ns <= kUptimeNs && pair.utc_ns >= -kMostNs &&
+         pair.utc_ns <= kLastNs;
 }
 
 std::string bytes_of(std::span<const ClockPair> pairs) {
@@ -169,10 +171,13 @@ LogClock read_clock(const std::filesystem::path& folder, bool is_named) {
   std::copy_n(text.data() + kClockHeaderBytes, pairs.size() * sizeof(ClockPair),
               reinterpret_cast<char*>(pairs.data()));
   for (std::size_t i = 0; i < pairs.size(); ++i) {
-    const bool is_later = i == 0 || pairs[i].monotonic_ns > pairs[i - 1].monotonic_ns;
-    if (is_sound(pairs[i]) && is_later) continue;
-    const char* const what =
-        is_sound(pairs[i]) ? " is not later than the row before" : " has a wrong checksum";
+    const char* what = nullptr;
+    if (i > 0 && pairs[i].monotonic_ns <= pairs[i - 1].monotonic_ns) {
+      what = " is not later than the row before";
+    }
+    if (!is_possible(pairs[i])) what = " has a time that no clock shows";
+    if (sealed(pairs[i]).crc32c != pairs[i].crc32c) what = " has a wrong checksum";
+    if (what == nullptr) continue;
     pairs.resize(i);
     return LogClock(std::move(pairs), damaged(path, "row " + std::to_string(i) + what));
   }

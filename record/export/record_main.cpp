@@ -163,8 +163,9 @@ int run_record(int argc, char** argv) {
   if (time == "epoch" && !(hdf5.empty() && mcap.empty())) {
     clock = read_clock(folder, checked.manifest.has_clock);
     if (!clock.has_date()) {
-      std::cerr << "kerf-record: " << folder.string()
-                << ": no date: monotonic; recordings of this version have one\n";
+      std::cerr << "kerf-record: " << folder.string() << ": no date: monotonic"
+                << (checked.manifest.has_clock ? "" : "; recordings of this version have one")
+                << '\n';
     }
     report_clock(folder, clock);
   }

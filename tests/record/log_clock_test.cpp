@@ -106,9 +106,15 @@ TEST_CASE("no bit of clock.npy changes, and no byte is lost, without a word") {
   write_clock(folder.path(), std::vector<ClockPair>{pairs[1], pairs[0]});
   CHECK(read_clock(folder.path(), true).problem() ==
         path.string() + ": row 1 is not later than the row before; copy it again");
-  const std::int64_t far = std::numeric_limits<std::int64_t>::min();
-  write_clock(folder.path(), std::vector<ClockPair>{sealed({1, far, 0, 0})});
-  CHECK_FALSE(read_clock(folder.path(), true).has_date());
+  constexpr std::int64_t kLast = std::numeric_limits<std::int64_t>::max();
+  for (const ClockPair& pair :
+       {ClockPair{1, -kLast, 0, 0}, {1, kLast, 0, 0}, {kLast, 1, 0, 0}, {-1, 1, 0, 0}}) {
+    write_clock(folder.path(), std::vector<ClockPair>{pairs[0], sealed(pair)});
+    const LogClock clock = read_clock(folder.path(), true);
+    CHECK(clock.problem() ==
+          path.string() + ": row 1 has a time that no clock shows; copy it again");
+    CHECK(clock.pairs().size() == 1);
+  }
   std::filesystem::resize_file(path, std::uintmax_t{1} << 40);  // on no block of the disk
   CHECK(read_clock(folder.path(), true).problem() ==
         path.string() + ": larger than the clock of any run; copy it again");
