@@ -22,8 +22,8 @@
 #include "record/starting_volumes.hpp"
 #include "record/tick_log_writer.hpp"
 #include "replay/compared_runs.hpp"
+#include "replay/own_laws.hpp"
 #include "replay/replayed_ticks.hpp"
-#include "replay/step_guard.hpp"
 #include "replay/watched_replay.hpp"
 #include "shared/numeric/fnv1a.hpp"
 #include "shared/posix/atomic_file.hpp"
@@ -182,7 +182,7 @@ int run_replay(const ReplayOptions& options, const std::atomic<bool>& stop) {
     return checked.problems.empty() ? code : 1;
   };
   if (!options.watch.empty()) return exit_code(watch_replay(options, log, stop));
-  RecordedRun run = load_run(options.folder, options.changes, kernels_named(options.kernels));
+  RecordedRun run = load_tried_run(options);
   std::optional<ReplayLog> copy;
   if (!options.out.empty()) copy.emplace(options.out, options.folder, run);
   ComparedRuns compared(log.rows(), run.manifest, voxel_mm3_of(run.scene));

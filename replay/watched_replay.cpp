@@ -15,7 +15,7 @@
 #include <termios.h>
 #include <unistd.h>
 
-#include "replay/step_guard.hpp"
+#include "replay/own_laws.hpp"
 #include "replay/watched_run.hpp"
 #include "shared/posix/monotonic_clock.hpp"
 #include "shared/segment/server.hpp"
@@ -242,7 +242,7 @@ class Watch {
 }  // namespace
 
 int watch_replay(const ReplayOptions& options, RecordedTicks& log, const std::atomic<bool>& stop) {
-  RecordedRun run = load_run(options.folder, options.changes, kernels_named(options.kernels), true);
+  RecordedRun run = load_tried_run(options, true);
   const StepGuard guard(run);
   step_earlier_ticks(run, options.folder);
   WatchedRun watched(run, log,

@@ -58,6 +58,13 @@ kerf demo --scene touch --headless --virtual --seconds 4 --out touched >"$home/d
 replays 'between the places' build/own-replay touched/log --law half_spring --out asked
 replays 'each equal to the last bit' build/own-replay asked
 
+# A law that crashes is told before the first tick.
+cp hardening_spring.cpp "$home" && sed -i 's|const Real d = norm.*|&\n    if (d != Real(0)) __builtin_trap();|' hardening_spring.cpp
+cmake --build build --target own-replay >"$home/build.log" || { cat "$home/build.log" >&2 && exit 1; }
+replays 'force law hardening_spring ended the program by signal' build/own-replay touched/log --law hardening_spring --out none
+[[ ! -e none ]] || complain 'a replay that was refused leaves its --out'
+cp "$home/hardening_spring.cpp" .
+
 # A law that loops only after some seconds passes every trial. Its programs end with one line, by themselves.
 sed -i -e 's|struct State {};.*|struct State { int steps = 0; };|' \
   -e 's|State&) const noexcept {|State\& state) const noexcept {\n    if (++state.steps > 2500) for (volatile int i = 0; i == 0;) {}|' \
