@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
-# The files that a user installs by hand: udev rules and systemd units. Ids agree with the drivers,
-# every rule has the form that udev reads (its own `verify` is newer than Debian 12), systemd finds
-# nothing to say about the units, and only the bridge starts again by itself.
+# The files that a user or a package installs: udev rules, the devices for which a desktop proposes kerf, systemd units.
+# Ids agree with the drivers, every rule has the form that udev reads (its own `verify` is newer than Debian 12), systemd
+# and AppStream find nothing to say, and only the bridge starts again by itself.
 set -euo pipefail
 cd "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")/.."
 rules=controller/device/60-kerf.rules
@@ -32,6 +32,19 @@ for firmware in Mbed Teensy; do
   expect_ids "$(constant woodenhaptics.hpp "k${firmware}VendorId")" \
     "$(constant woodenhaptics.hpp "k${firmware}ProductId")"
 done
+
+# The metainfo has each USB and HID device of the rules, but the SpaceMouse: nobody plugs it in for kerf.
+metainfo=controller/device/kerf.metainfo.xml
+while IFS= read -r line; do
+  [[ $line =~ idVendor\}==\"([0-9a-f]{4})\"(.*idProduct\}==\"([0-9a-f]{4})\")? ]] || continue
+  id=v${BASH_REMATCH[1]^^}p${BASH_REMATCH[3]^^}
+  [[ $line != *hidraw* ]] || id=v0000${BASH_REMATCH[1]^^}p0000${BASH_REMATCH[3]^^}
+  case $id in v0000256F* | v0000046D*) continue ;; esac
+  grep -q ":[^<]*$id" "$metainfo" || complain "$metainfo: no modalias with $id, which $rules has"
+done <"$rules"
+if command -v appstreamcli >/dev/null; then
+  found=$(appstreamcli validate --no-net "$metainfo" 2>&1) || complain "$metainfo: $found"
+fi
 
 grep -qx 'Restart=no' "${units[0]}" || complain "${units[0]}: a fault waits for a person: Restart=no"
 grep -qx 'Restart=on-failure' "${units[1]}" || complain "${units[1]}: a bridge that died starts again: Restart=on-failure"

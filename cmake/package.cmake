@@ -30,7 +30,7 @@ set(CPACK_DEBIAN_KERF_PACKAGE_SUGGESTS "python3-matplotlib, ffmpeg, udev, bash-c
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_NAME kerf-dev)
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS
-  "kerf (= ${PROJECT_VERSION}), cmake, g++, pkg-config, libgdcm-dev, libpng-dev, libtiff-dev, zlib1g-dev, libarchive-dev, libexpat1-dev, liblz4-dev, libusb-1.0-0-dev, libhidapi-dev, libseccomp-dev")
+  "kerf (= ${PROJECT_VERSION}), cmake, g++, pkgconf, libgdcm-dev, libpng-dev, libtiff-dev, zlib1g-dev, libarchive-dev, libexpat1-dev, liblz4-dev, libusb-1.0-0-dev, libhidapi-dev, libseccomp-dev")
 # The changelog of a package in Debian's form, which leads to the one for users.
 string(TIMESTAMP day "%a, %d %b %Y %H:%M:%S +0000" UTC)
 foreach(package kerf kerf-dev)
