@@ -95,7 +95,7 @@ for file in bin/kerf bin/kerf-controller share/man/man1/kerf-controller.1.gz sha
   share/metainfo/kerf.metainfo.xml; do
   grep -qxF "./usr/$file" "$home/files" || fail "$package: lacks /usr/$file"
 done
-! grep -qE '\.(hpp|a)$' "$home/files" || fail "$package: has what belongs into kerf-dev"
+! grep -v '^./usr/share/doc/kerf/examples/' "$home/files" | grep -qE '\.(hpp|a)$' || fail "$package: has what belongs into kerf-dev"
 dpkg-deb -c "$home"/packages/kerf-dev_*.deb >"$home/files-dev"
 grep -q ' ./usr/share/doc/kerf-dev/copyright$' "$home/files-dev" || fail 'kerf-dev: lacks a copyright'
 for field in Maintainer Description; do
