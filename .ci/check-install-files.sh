@@ -34,7 +34,7 @@ for firmware in Mbed Teensy; do
 done
 
 # The metainfo has each USB and HID device of the rules, but the SpaceMouse: nobody plugs it in for kerf.
-metainfo=controller/device/kerf.metainfo.xml
+metainfo=controller/device/invalid.kerf.kerf.metainfo.xml
 while IFS= read -r line; do
   [[ $line =~ idVendor\}==\"([0-9a-f]{4})\"(.*idProduct\}==\"([0-9a-f]{4})\")? ]] || continue
   id=v${BASH_REMATCH[1]^^}p${BASH_REMATCH[3]^^}
