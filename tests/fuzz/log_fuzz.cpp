@@ -7,11 +7,13 @@
 #include <filesystem>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "controller/load/scene_json.hpp"
 #include "record/check/recording_check.hpp"
 #include "record/export/mcap_export.hpp"
 #include "record/input_rows.hpp"
+#include "record/log_clock.hpp"
 #include "record/recording.hpp"
 #include "shared/posix/atomic_file.hpp"
 #include "shared/text/json.hpp"
@@ -20,7 +22,8 @@
 /// The files of a recording, each as foreign bytes beside sound ones. By the first byte:
 /// 0 manifest.json, 1 scene.json, 2 ticks.npy, 3 rows of ticks behind a sound header, with sound
 /// checksums, 4 inputs before the log, 5 such rows and the log of a second arm, by the second byte
-/// as it is or behind a sound header. Every reader gives a result, or one line.
+/// as it is or behind a sound header. 255: clock.npy, by the second byte as it is, or as pairs with
+/// sound checksums. Every reader gives a result, or one line.
 namespace {
 
 constexpr std::string_view kManifest = R"({"session_id": "0", "tick_ns": 1000000, "end_reason": "",
@@ -31,13 +34,16 @@ std::string manifest_of_two() {
   return R"({"arms": 2, )" + std::string(kManifest.substr(1));
 }
 
+void must_be_a_line(std::string_view line) {
+  if (line.empty() || line.size() > 1000 || line.find('\n') != line.npos) std::abort();
+}
+
 template <class Error, class Read>
 void must_read_or_explain(Read read) {
   try {
     read();
   } catch (const Error& error) {
-    const std::string_view line = error.what();
-    if (line.empty() || line.size() > 1000 || line.find('\n') != line.npos) std::abort();
+    must_be_a_line(error.what());
   }
 }
 
@@ -54,12 +60,31 @@ std::string log_of(std::string_view bytes) {
   return log;
 }
 
+void read_foreign_clock(const kerf::test::TemporaryFolder& folder, std::string_view bytes) {
+  if (!bytes.empty() && bytes[0] % 2 != 0) {
+    folder.write("clock.npy", std::string(bytes.substr(1)));
+  } else {
+    std::vector<kerf::ClockPair> pairs(bytes.size() / sizeof(kerf::ClockPair));
+    bytes.copy(reinterpret_cast<char*>(pairs.data()), pairs.size() * sizeof(kerf::ClockPair));
+    for (kerf::ClockPair& pair : pairs) pair = kerf::sealed(pair);
+    kerf::write_clock(folder.path(), pairs);
+  }
+  const kerf::LogClock clock = kerf::read_clock(folder.path(), true);
+  if (!clock.problem().empty()) must_be_a_line(clock.problem());
+  if (const std::string set = clock.set_in_the_run(); !set.empty()) must_be_a_line(set);
+  must_be_a_line(kerf::date_text(clock.offset_ns()));
+}
+
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   static const kerf::test::TemporaryFolder folder;
   if (size == 0) return 0;
   const std::string_view bytes(reinterpret_cast<const char*>(data) + 1, size - 1);
+  if (data[0] == 255) {
+    read_foreign_clock(folder, bytes);
+    return 0;
+  }
   const int kind = data[0] % 6;
   if (kind == 1) {
     must_read_or_explain<kerf::JsonError>([&] { static_cast<void>(kerf::source_in(bytes)); });

@@ -92,7 +92,7 @@ fi
 dpkg-deb -c "$package" | awk '{ print $6 }' >"$home/files"
 for file in bin/kerf bin/kerf-controller share/man/man1/kerf-controller.1.gz share/doc/kerf/copyright share/doc/kerf/changelog.gz share/kerf/scenes/phantom.toml \
   share/kerf/lab/report/__main__.py share/doc/kerf/tutorial.md share/bash-completion/completions/kerf-lab lib/udev/rules.d/60-kerf.rules \
-  share/metainfo/invalid.kerf.kerf.metainfo.xml; do
+  share/metainfo/invalid.kerf.kerf.metainfo.xml share/kerf/ros/kerf_msgs/package.xml; do
   grep -qxF "./usr/$file" "$home/files" || fail "$package: lacks /usr/$file"
 done
 ! grep -v '^./usr/share/doc/kerf/examples/' "$home/files" | grep -qE '\.(hpp|a)$' || fail "$package: has what belongs into kerf-dev"
