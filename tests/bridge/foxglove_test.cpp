@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <cstdint>
 #include <cstring>
 #include <limits>
@@ -205,6 +206,16 @@ TEST_CASE("a second arm's channels come with its run, and its messages with each
   client.take(&one);
   CHECK(client.data.size() == 22);
   CHECK(client.data.back().id == 1);
+  const auto advertised = [&] {
+    return std::ranges::count_if(client.texts,
+                                 [](const ReadJson& text) { return text["op"] == "advertise"; });
+  };
+  CHECK(advertised() == 2);
+  client.take(&two);  // nor does one with two have to say them again
+  two.tick();
+  client.take(&two);
+  CHECK(client.data.size() == 24);
+  CHECK(advertised() == 2);
 }
 
 TEST_CASE("tip and force come a hundred times a second, the tip from docking on") {

@@ -28,11 +28,16 @@ inline void use_own_sockets() {
 
 /// A controller of a small volume that does nothing by itself.
 struct TestController {
-  explicit TestController(std::uint32_t seed = 1)
+  explicit TestController(std::uint32_t seed = 1, std::uint32_t arms = 1)
       : volume({50, 41, 33}, seed),
-        writer(SegmentWriter::create(spec_of(volume))),
-        server((use_own_sockets(), "bridge-test"), writer, CommandLimits{2}) {
+        writer(SegmentWriter::create(spec(arms))),
+        server((use_own_sockets(), "bridge-test"), writer, CommandLimits{2, arms}) {
     writer.set_lifecycle(Lifecycle::run);
+  }
+  [[nodiscard]] SegmentSpec spec(std::size_t arms) const {
+    SegmentSpec out = spec_of(volume);
+    out.arms = arms;
+    return out;
   }
   NoiseVolume volume;
   SegmentWriter writer;

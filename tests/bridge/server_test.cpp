@@ -380,6 +380,25 @@ TEST_CASE("only who may command reaches the controller, and with what is valid")
   CHECK(!controller.server.take_command().has_value());
 }
 
+TEST_CASE(
+    "a command for the second arm reaches the controller as such, for a third one it is refused") {
+  TestController controller(1, 2);
+  const TestBridge bridge;
+  TestViewer teacher(bridge.port(), kCommand);
+  REQUIRE(teacher.until_whole());
+  CHECK(teacher.far.hello->head.flags == (kMayCommand | kTwoArms));
+  for (const auto arm : std::initializer_list<std::uint16_t>{1, 0, 2}) {
+    CAPTURE(arm);
+    const std::size_t before = teacher.far.replies.size();
+    teacher.client.send_value(CommandMessage{
+        kCommandMagic, static_cast<std::uint16_t>(CommandKind::select_tool), arm, 1, 40U + arm});
+    REQUIRE(teacher.follow([&] { return teacher.far.replies.size() > before; }));
+    const std::optional<Command> taken = controller.server.take_command();
+    REQUIRE(taken.has_value() == (arm < 2));
+    if (taken) CHECK(taken->arm == arm);
+  }
+}
+
 TEST_CASE("connections that say nothing, or one letter a second, end by themselves") {
   const TestController controller;
   ServerSetup setup;

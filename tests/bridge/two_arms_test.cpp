@@ -52,10 +52,10 @@ struct Line {
       CHECK(message.size() <= kMaxMessageBytes);
       switch (magic_of(message)) {
         case kHelloMagic:
-          mirror.hello(message, now_ns, 0);
+          mirror.hello(message, now_ns + ahead_ns, 0);
           break;
         case kFrameMagic: {
-          const AckMessage ack = mirror.frame(message, now_ns, 0);
+          const AckMessage ack = mirror.frame(message, now_ns + ahead_ns, 0);
           CHECK(stream.acked(ack, now_ns));
           break;
         }
@@ -72,6 +72,7 @@ struct Line {
   Stream stream{snapshot, 0};
   Tick tick = 0;
   std::int64_t now_ns = 1'000'000'000;
+  std::int64_t ahead_ns = 0;  ///< of the far machine's clock
 };
 
 }  // namespace
@@ -79,6 +80,7 @@ struct Line {
 TEST_CASE("the far segment has both arms: every tick of the near one, the same index for both") {
   const RuntimeFolder folder;
   Line line(2);
+  line.ahead_ns = 7'000'000'000;
   Mirror mirror("far", 1 << 30, refuse);
   line.publish(3);
   line.slot(mirror);
@@ -99,6 +101,8 @@ TEST_CASE("the far segment has both arms: every tick of the near one, the same i
       REQUIRE(line.reader.state_at(i, near_record, arm) == ReadState::ok);
       REQUIRE(far.reader().state_at(i, far_record, arm) == ReadState::ok);
       CHECK(far_record.tick == near_record.tick);
+      CHECK(far_record.start_ns ==
+            near_record.start_ns + static_cast<std::uint64_t>(line.ahead_ns));
       CHECK(far_record.position_mm[0] == (arm == 0 ? 1 : -1) * static_cast<double>(i + 1));
     }
   }
@@ -144,6 +148,19 @@ TEST_CASE("the greeting says how many arms there are; one arm is sent as it alwa
     const ParsedRecords records = parse_records(message, line.reader.info().session_id, scratch);
     CHECK(records.head.ring == (arms == 2 ? 2U : 0U));
     CHECK(records.bytes.size() == arms * sizeof(TickRecord));
+  }
+}
+
+TEST_CASE("a greeting of the same session with another number of arms is another run") {
+  const RuntimeFolder folder;
+  Mirror mirror("far", 1 << 30, refuse);
+  for (const std::size_t arms : {1U, 2U, 1U}) {
+    CAPTURE(arms);
+    bridge::test::Sender sender(7);
+    sender.hello.flags = arms == 2 ? kTwoArms : 0;
+    mirror.hello(sender.greeting(), 1, 0);
+    for (const auto& message : sender.whole_pass(5)) mirror.frame(message, 2, 0);
+    CHECK(connect_segment("far").reader().info().arms == arms);
   }
 }
 

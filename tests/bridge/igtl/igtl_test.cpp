@@ -291,6 +291,30 @@ TEST_CASE("a second arm has a tool and a force of its own name" * doctest::test_
   CHECK(client.second_force_n == Place{0, -2, 0});
 }
 
+TEST_CASE("an arm that is nowhere yet has no tool, the other one has, whichever it is" *
+          doctest::test_suite("network")) {
+  const RuntimeFolder folder;
+  const NoiseVolume volume({8, 8, 8});
+  SegmentSpec spec = spec_of(volume);
+  spec.arms = 2;
+  for (const std::size_t lost : {0U, 1U}) {
+    CAPTURE(lost);
+    SegmentWriter writer = SegmentWriter::create(spec);
+    const SegmentServer server("igtl", writer);
+    writer.begin_tick(1);
+    for (const std::size_t arm : {1U, 0U}) {
+      const double x = arm == lost ? std::numeric_limits<double>::quiet_NaN() : 4;
+      writer.publish_state(record_at({x, 5, 6}, {0, 0, 0, 1}, {0, 2, 0}), arm);
+    }
+    writer.end_tick(1'000'000);
+    const IgtlOutput output(options_for("igtl"));
+    Client client(output.port());
+    client.take_until([&] { return client.forces > 3 && client.second_forces > 3; });
+    CHECK((client.poses > 0) == (lost == 1));
+    CHECK((client.second_poses > 0) == (lost == 0));
+  }
+}
+
 TEST_CASE("labels come once a client and a run, beside their volume and where it lies" *
           doctest::test_suite("network")) {
   const RuntimeFolder folder;

@@ -147,6 +147,19 @@ TEST_CASE("a second arm has lines of its own, and none without one") {
   figures.second->alarm = true;
   static_cast<void>(covered(overlay, figures, kPlain, &faulty));
   CHECK(faulty != calm);
+  figures.second->alarm = false;
+  const SecondArmFigures before = *figures.second;
+  for (const auto& other : {SecondArmFigures{2.5, "pin", "in_hand", false},
+                            SecondArmFigures{1.0, "ball", "in_hand", false},
+                            SecondArmFigures{1.0, "pin", "armed", false}}) {
+    figures.second = other;
+    std::vector<std::uint8_t> shown;
+    static_cast<void>(covered(overlay, figures, kPlain, &shown));
+    CHECK(shown != calm);
+  }
+  figures.second = before;
+  static_cast<void>(covered(overlay, figures, kPlain, &faulty));
+  CHECK(faulty == calm);
 }
 
 TEST_CASE("slices are as large as a third of the window holds, and none are too small to read") {

@@ -100,6 +100,29 @@ TEST_CASE("a session has both arms' records of one tick, and both hands") {
   CHECK(hands_of(session)[1]);
 }
 
+TEST_CASE("a tick of which one record is missing is not shown: both arms stay at the one before") {
+  Run run;
+  Session session("two");
+  run.publish(at(1, 0), at(-1, 1));
+  session.poll();
+  run.publish(at(2, 0));  // the second one's has been overwritten meanwhile
+  session.poll();
+  REQUIRE(session.latest());
+  REQUIRE(session.second());
+  CHECK(session.latest()->tick == 1);
+  CHECK(session.second()->tick == 1);
+}
+
+TEST_CASE("the force of each arm is rounded to what its line shows") {
+  OverlayFigures figures;
+  figures.force_n = 1.236;
+  CHECK(!figures.rounded().second);
+  figures.second = {.force_n = 2.344, .tool = "pin", .state = "in_hand", .alarm = false};
+  CHECK(figures.rounded().force_n == doctest::Approx(1.24));
+  CHECK(figures.rounded().second->force_n == doctest::Approx(2.34));
+  CHECK(figures.rounded().second->tool == "pin");
+}
+
 TEST_CASE("with one arm there is no second record, hand or line") {
   Run run(1);
   run.publish(at(1, 0));
@@ -166,6 +189,10 @@ TEST_CASE("what may not be cut counts once a tick, whichever arm presses on it")
   run.publish(at(1, 0), at(1, 0));
   session.poll();
   CHECK(session.forbidden_ms() == doctest::Approx(3));
+  presses.flags |= kFlagReset;  // of the volumes, in the tick of a press: that one counts already
+  run.publish(at(1, 0), presses);
+  session.poll();
+  CHECK(session.forbidden_ms() == doctest::Approx(1));
 }
 
 TEST_CASE("a run counts as armed from the first arm that is taken in hand") {
