@@ -21,6 +21,7 @@
 #include "controller/tool/tool_shapes.hpp"
 #include "shared/posix/atomic_file.hpp"
 #include "shared/posix/error_text.hpp"
+#include "shared/text/text.hpp"
 #include "tests/json.hpp"
 #include "tests/support/temporary_folder.hpp"
 
@@ -154,6 +155,91 @@ TEST_CASE(
   const std::string text = summary(report);
   CHECK(text.find("  of these   enamel 2.100 mm3\n") != std::string::npos);
   CHECK(text.find("  forbidden  touched: pulp 121 ms\n") != std::string::npos);
+}
+
+TEST_CASE(
+    "of two arms report and summary have each one's own figures, and which was never in use") {
+  RunReport report;
+  report.device = "omni";
+  report.lost_packets = 1;
+  report.second = ArmReport{"touch", "flame", 1.2, 21, 22, {{"bus_resets", 23}}};
+  const auto fill = [](ArmRecord& arm, std::uint64_t n) {
+    arm.in_use = true;
+    arm.stale_ticks = n;
+    arm.contact_ticks = 10 * n;
+    arm.shaft_ticks = 100 * n;
+    arm.peak_force_n = 0.5 * static_cast<double>(n);
+    arm.absorbed_mj = 1000.0 * static_cast<double>(n);
+    arm.port_minimum_mj = -1000.0 * static_cast<double>(n);
+    arm.energy_mj[0] = 2000.0 * static_cast<double>(n);
+    arm.output_hash = 0xa0 + n;
+  };
+  fill(report.record, 3);
+  fill(report.record.second, 4);
+  report.record.second.faults.add(7, "overspeed");
+  const auto first = kerf::test::read_json(report_json(report));
+  const auto second = first["second"];
+  CHECK(second["device"] == "touch");
+  CHECK(second["tool"] == "flame");
+  CHECK(second["lost_packets"] == 21);
+  CHECK(second["refused_packets"] == 22);
+  CHECK(second["link"]["bus_resets"] == 23);
+  CHECK(first["fault_count"] == 0);
+  CHECK(second["fault_count"] == 1);
+  CHECK(second["faults"][0]["name"] == "overspeed");
+  for (const auto& [arm, n] : {std::pair{first, 3}, {second, 4}}) {
+    CHECK(arm["stale_ticks"] == n);
+    CHECK(arm["contact_ticks"] == 10 * n);
+    CHECK(arm["shaft_ticks"] == 100 * n);
+    CHECK(arm["peak_force_n"] == 0.5 * n);
+    CHECK(arm["energy_j"] == 1.0 * n);
+    CHECK(arm["port_minimum_j"] == -1.0 * n);
+    CHECK(arm["energy_by_source_j"][kEnergySourceNames[0]] == 2.0 * n);
+    CHECK(arm["output_hash"] == hex64(0xa0U + static_cast<unsigned>(n)));
+  }
+  CHECK(second["in_use"].get<bool>());
+  const auto has = [&](const char* text) {
+    return summary(report).find(text) != std::string::npos;
+  };
+  CHECK(has("  contact    30 ticks, peak force 1.500 N, work of the hand 3000.000 mJ\n"));
+  CHECK(
+      has("\n  second arm touch with tool flame\n"
+          "  contact    40 ticks, peak force 2.000 N, work of the hand 4000.000 mJ\n"
+          "  energy     lowest -4000.000 mJ"));
+  CHECK(
+      has("  losses     4 stale ticks, 21 packets lost\n  hash       output 00000000000000a4\n"
+          "  fault      overspeed at tick 7\n"));
+  CHECK_FALSE(has("never in use"));
+  report.record.in_use = false;
+  CHECK(has("first arm  never in use"));
+  CHECK_FALSE(has("flame, never in use"));
+  report.record.in_use = true;
+  report.record.second.in_use = false;
+  CHECK(has("second arm touch with tool flame, never in use\n"));
+  CHECK_FALSE(has("first arm"));
+}
+
+TEST_CASE("the emulator of each arm gets the script, and the unit, of its own hand") {
+  LoadedScene scene;
+  scene.tools = {make_tool("ball 1 mm", "ball", {.pitch_mm = 0.1, .radius_mm = 0.5}),
+                 make_tool("ball 4 mm", "ball", {.pitch_mm = 0.1, .radius_mm = 2})};
+  scene.hand_script = "first.toml";
+  scene.device.personality = Personality::omega;
+  const std::string alone = hand_lines(scene);
+  scene.second.emplace();
+  scene.second_tool = 1;
+  scene.second->device.personality = Personality::falcon;
+  scene.second->hand_script = "second.toml";
+  const std::string lines = hand_lines(scene);
+  CHECK(lines.starts_with(alone));
+  CHECK(alone.find("hand_script=first.toml\n") != std::string::npos);
+  const auto number_at = [](const std::string& text, const std::string& key) {
+    return std::stod(text.substr(text.find('\n' + key) + key.size() + 1));
+  };
+  CHECK(number_at('\n' + lines, "second_hand_unit_mm=") ==
+        doctest::Approx(4 * number_at('\n' + lines, "hand_unit_mm=")));
+  CHECK(lines.find("\ndevice=omega\nsecond_device=falcon\n") != std::string::npos);
+  CHECK(lines.ends_with("\nsecond_hand_script=second.toml\n"));
 }
 
 TEST_CASE("an event is no fault, and more of them than fit hide none") {
