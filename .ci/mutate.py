@@ -4,7 +4,7 @@
 the check or test named there notices. Nothing in the tree is touched.
 
     .ci/mutate.py LIST [PATTERN] [--jobs N] [--again]
-        LIST: safety, kernels, devices, includes, page or resets (.ci/resets.py); PATTERN picks the mutations whose line matches. One line for each mutation: what
+        LIST: safety, kernels, devices, arms, includes, page or resets (.ci/resets.py); PATTERN picks the mutations whose line matches. One line for each mutation: what
         caught it, SURVIVED, or the instruction set that this processor lacks. A run that is stopped goes on where it was, unless a source changed; --again starts anew.
     .ci/mutate.py --check
         only whether each text stands exactly once in its file, each test case in the folder of its program, and each safety
@@ -39,7 +39,7 @@ import resets
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 TABLE = ".ci/mutations.txt"
 BUILD = ROOT / "build/release"
-LISTS = ("safety", "kernels", "devices", "includes", "page", "contact")
+LISTS = ("safety", "kernels", "devices", "arms", "includes", "page", "contact")
 PAGE_TEST = "tests/page/script_test.py"
 
 
