@@ -40,12 +40,20 @@ def native(scene, seconds, *more):
     return report['output_hash'], report['volume_hash']
 
 
-def in_node(scene, hand, seconds):
-    run = subprocess.run(['node', '--experimental-default-type=module', root / 'tests/web/run_module.js', folder / 'kerf.wasm', root,
-                          f'{scene}.toml', f'hands/{hand}.toml', str(seconds)], capture_output=True, text=True, check=False)
+def in_node(script, *words):
+    run = subprocess.run(['node', '--experimental-default-type=module', root / 'tests/web' / script, folder / 'kerf.wasm', root, *words],
+                         capture_output=True, text=True, check=False)
     if run.returncode:
         raise RuntimeError(run.stderr)
     return json.loads(run.stdout)
+
+
+def has_one_arm():
+    """A scene of two devices is refused with what to do, and so is a command for a second arm."""
+    found = in_node('commands_module.js')
+    check(found['refused'] is not None and 'a tab has one hand; choose another scene' in found['refused'], f'two arms: {found["refused"]}')
+    wanted = {'arm 0, tool 1': 0, 'arm 1, tool 1': 2, 'arm 0, tool 99': 2, 'arm 0, tool 0': 0}
+    check(found['answers'] == wanted, f'commands: {found["answers"]}')
 
 
 def has_the_bits_of_kerf(page, address, known):
@@ -128,9 +136,10 @@ def main():
             return 77
     known = {scene: native(scene, SECONDS) for scene in SCENES}
     for scene, hand in SCENES.items():
-        run = in_node(scene, hand, SECONDS)
+        run = in_node('run_module.js', f'{scene}.toml', f'hands/{hand}.toml', str(SECONDS))
         check((run['output_hash'], run['volume_hash']) == known[scene],
               f'{scene} under Node: {run["output_hash"]} {run["volume_hash"]}; {run["times_real_time"]:.2f} times real time')
+    has_one_arm()
     with tempfile.TemporaryDirectory() as profile, served(folder) as address:
         page = Page(chromium, profile)
         try:
