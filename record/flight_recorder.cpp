@@ -171,7 +171,8 @@ class RunStart {
 class FlightRecorder final : TickSink {
  public:
   FlightRecorder(const RecorderOptions& options, const SegmentConnection& connection)
-      : out_(options.out),
+      : name_(options.name),
+        out_(options.out),
         connection_(connection),
         capacity_(static_cast<std::uint64_t>(
             std::ceil(options.flight_s * 1e9 / reader().info().tick_ns))),
@@ -257,26 +258,36 @@ class FlightRecorder final : TickSink {
   void keep(const TickWindow::Event& event) {
     if (window_.end() == 0) return;
     const std::filesystem::path folder = out_ / folder_name(event);
-    if (std::filesystem::exists(folder)) return;  // asked for twice in one tick
+    if (folder == last_kept_) return;  // asked for twice in one tick
+    if (std::filesystem::exists(folder)) {
+      fail(folder.string() +
+           ": not kept, a recording of another run has that name; choose another --out");
+      return;
+    }
     if (kept_ >= kMostKept) {
       std::cerr << "kerf-recorder: " << folder.string() << ": not kept, " << kMostKept
                 << " recordings are; start the flight recorder again\n";
       return;
     }
     // Beside its name until it is whole.
-    const std::filesystem::path partial = out_ / ("." + folder.filename().string());
+    const std::filesystem::path partial = out_ / ("." + name_ + "-" + folder.filename().string());
     std::error_code ignored;
     std::filesystem::remove_all(partial, ignored);
     try {
       const std::string lacks = write(partial, event);
       std::filesystem::rename(partial, folder);
       ++kept_;
+      last_kept_ = folder;
       std::cout << folder.string() << ": kept" << (lacks.empty() ? "" : "; " + lacks) << std::endl;
     } catch (const std::runtime_error& error) {
       std::filesystem::remove_all(partial, ignored);
-      failure_ = error.what();
-      std::cerr << "kerf-recorder: " << failure_ << '\n';
+      fail(error.what());
     }
+  }
+
+  void fail(std::string line) {
+    failure_ = std::move(line);
+    std::cerr << "kerf-recorder: " << failure_ << '\n';
   }
 
   /// The ticks until now, with all that a replay needs. Goes on polling: the window has room for
@@ -328,7 +339,8 @@ class FlightRecorder final : TickSink {
     return lacks;
   }
 
-  std::filesystem::path out_;
+  std::string name_;  ///< of the controller
+  std::filesystem::path out_, last_kept_;
   const SegmentConnection& connection_;
   std::uint64_t capacity_;  ///< of a recording
   TickWindow window_;

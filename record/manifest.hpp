@@ -42,7 +42,7 @@ inline constexpr std::string_view kNoRoom = "no room";  ///< the disk was full
 
 /// Whether the recorder wrote a manifest after its last row, so that rows and losses are those of
 /// the whole recording. Else the rows say more than the manifest.
-[[nodiscard]] inline bool is_final(std::string_view end_reason) noexcept {
+[[nodiscard]] inline bool is_of_whole_log(std::string_view end_reason) noexcept {
   return end_reason != kStillRunning && end_reason != kNoRoom;
 }
 

@@ -6,8 +6,10 @@
 
 #include "record/tick_log.hpp"
 #include "shared/numeric/fnv1a.hpp"
+#include "shared/segment/layout.hpp"
 #include "shared/text/json.hpp"
 #include "shared/text/text.hpp"
+#include "shared/volume/brick_grid.hpp"
 
 namespace kerf {
 namespace {
@@ -32,7 +34,14 @@ bool has(const Read& read) {
   }
 }
 
-bool is_positive(const SceneFacts::Volume& volume) {
+/// Whether there can be such a volume: a scene may be foreign, and its size is allocated.
+bool is_possible(const SceneFacts::Volume& volume) {
+  constexpr std::uint64_t kMost = std::uint64_t{kMaxBricks} * kBrickVoxels;
+  std::uint64_t voxels = 1;
+  for (const std::int32_t edge : volume.size_vox) {
+    if (edge < 1 || static_cast<std::uint64_t>(edge) > kMost / voxels) return false;
+    voxels *= static_cast<std::uint64_t>(edge);
+  }
   return std::ranges::all_of(volume.spacing_mm,
                              [](double mm) { return std::isfinite(mm) && mm > 0; });
 }
@@ -51,7 +60,7 @@ SceneFacts scene_facts(std::string_view scene_json) {
   const bool has_volumes = has([&] {
     for (const Json& volume : scene.at("volumes")) out.volumes.push_back(volume_in(volume));
   });
-  if (!has_volumes || !std::ranges::all_of(out.volumes, is_positive)) out.volumes.clear();
+  if (!has_volumes || !std::ranges::all_of(out.volumes, is_possible)) out.volumes.clear();
   return out;
 }
 

@@ -26,7 +26,7 @@ struct SceneFacts {
   };
   std::optional<std::uint32_t> tick_ns;  ///< none without a rate
   std::optional<std::size_t> arms;       ///< none without a device
-  std::vector<Volume> volumes;           ///< empty if one of them is incomplete
+  std::vector<Volume> volumes;           ///< empty if one of them is incomplete or impossible
   std::string config_hash;  ///< of the scene without its source, as 16 hexadecimal digits
 };
 

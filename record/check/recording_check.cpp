@@ -8,36 +8,25 @@
 #include <system_error>
 #include <utility>
 
+#include "record/check/file_check.hpp"
+#include "record/check/findings.hpp"
 #include "record/check/losses.hpp"
-#include "record/input_rows.hpp"
 #include "record/kept_volumes.hpp"
-#include "record/manifest_seal.hpp"
 #include "record/recording.hpp"
 #include "record/scene_facts.hpp"
 #include "shared/text/json.hpp"
 #include "shared/text/text.hpp"
-#include "shared/volume/checksum.hpp"
 
 namespace kerf {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::string_view kCopyAgain = "; copy the recording again";
-
-/// A short form of a value, on one line.
-std::string shown(const Json& value) {
-  constexpr std::size_t kMost = 60;
-  const std::string text = value.canonical();
-  return one_line(text.size() > kMost ? text.substr(0, kMost) + "..." : text);
-}
-
 class Check {
  public:
-  Check(const fs::path& folder, TickRange range) : folder_(folder), range_(range) {
-    out_.manifest = read_manifest(folder);
-    text_ = manifest_text(folder);
-    json_ = Json::parse(text_);
+  Check(const fs::path& folder, TickRange range)
+      : folder_(folder), range_(range), findings_(folder) {
+    out_.manifest = findings_.manifest();
   }
 
   void facts() {
@@ -69,7 +58,8 @@ class Check {
     for (const SummaryBuilder& builder : figures) {
       out_.summaries.push_back(builder.result(known, out_.manifest.end_reason));
     }
-    if (range_.is_whole() && out_.rows_readable) {
+    // Of rows that are missing at the end nothing follows for the manifest.
+    if (range_.is_whole() && out_.rows_readable && !is_cut_) {
       check_losses(losses);
       check_figures();
     }
@@ -80,45 +70,19 @@ class Check {
     }
   }
 
-  void files() {
-    check_listed_files();
-    check_volumes();
-    check_inputs();
-  }
+  void files() { check_files(scene_, logs_.size(), findings_); }
 
-  /// Behind what is said of a member: the checksum covers all of them, also those that nothing else
-  /// says.
-  void seal() {
-    const Seal seal = seal_of(text_);
-    if (seal == Seal::broken || (seal == Seal::none && json_.contains("files"))) {
-      add_to_manifest("its checksum is wrong: it was changed after the recorder wrote it");
-    }
-  }
+  void manifest_text() { findings_.check_manifest_text(); }
 
-  [[nodiscard]] CheckedRecording result() && { return std::move(out_); }
+  [[nodiscard]] CheckedRecording result() && {
+    out_.problems = findings_.problems();
+    out_.in_manifest = findings_.in_manifest();
+    return std::move(out_);
+  }
 
  private:
-  void add(const fs::path& name, const std::string& what, std::string_view remedy = kCopyAgain) {
-    out_.problems.push_back((folder_ / name).string() + ": " + what + std::string(remedy));
-  }
-  void add_to_manifest(const std::string& what) {
-    out_.in_manifest = true;
-    add(kManifestName, what,
-        "; copy the recording again, or kerf record check --repair makes it anew");
-  }
-
-  /// Compares a member of the manifest, if it is there, with what it follows from.
-  template <class Value>
-  void compare(const Json& object, std::string_view key, const std::string& shown_key,
-               const Value& wanted, std::string_view source) {
-    if (!object.contains(key)) return;
-    const Json value = Json(wanted);
-    if (object.at(key).canonical() == value.canonical()) return;
-    add_to_manifest(shown_key + " is " + shown(object.at(key)) + ", and " + shown(value) + " by " +
-                    std::string(source));
-  }
-
-  [[nodiscard]] bool is_final() const { return kerf::is_final(out_.manifest.end_reason); }
+  [[nodiscard]] bool is_final() const { return is_of_whole_log(out_.manifest.end_reason); }
+  [[nodiscard]] const Json& json() const { return findings_.json(); }
 
   static std::string cut_text(const TickLogReader::Part& part) {
     return "cut after " + std::to_string(part.rows) + " of " + std::to_string(part.counted) +
@@ -126,67 +90,66 @@ class Check {
   }
 
   void check_members() {
-    if (const auto twice = doubled_key(text_)) {
-      add_to_manifest("\"" + one_line(*twice) + "\" stands twice in it");
-    }
-    compare(json_, "scene", "scene", kSceneName, "the name of that file");
-    if (json_.contains("session_id") && !is_volume_hash(out_.manifest.session_id)) {
-      add_to_manifest("session_id is " + shown(json_.at("session_id")) +
-                      ", and not 16 hexadecimal digits");
+    findings_.compare(json(), "scene", "scene", kSceneName, "the name of that file");
+    if (json().contains("session_id") && !is_volume_hash(out_.manifest.session_id)) {
+      findings_.add_to_manifest("session_id is " + shown(json().at("session_id")) +
+                                ", and not 16 hexadecimal digits");
     }
   }
 
   void check_scene() {
-    SceneFacts scene;
     try {
       const std::string text = recorded_scene(folder_);
-      scene = scene_facts(text);
+      scene_ = scene_facts(text);
       if (const auto twice = doubled_key(text)) {
-        add(kSceneName, "\"" + one_line(*twice) + "\" stands twice in it");
+        findings_.add(kSceneName, "\"" + one_line(*twice) + "\" stands twice in it");
       }
-      check_listed(std::string(kSceneName));
+      findings_.compare_file(std::string(kSceneName));
     } catch (const RecordError& error) {
-      out_.problems.push_back(error.what());
+      findings_.add_line(error.what());
       return;
     } catch (const JsonError&) {
-      add(kSceneName, "no JSON");
+      findings_.add(kSceneName, "no JSON");
       return;
     }
-    compare(json_, "config_hash", "config_hash", scene.config_hash, "scene.json");
-    if (scene.arms) compare(json_, "arms", "arms", *scene.arms, "scene.json");
-    if (scene.arms == 2 && !json_.contains("arms")) {
-      add_to_manifest("arms is missing, and 2 by scene.json");
+    findings_.compare(json(), "config_hash", "config_hash", scene_.config_hash, "scene.json");
+    if (scene_.arms) findings_.compare(json(), "arms", "arms", *scene_.arms, "scene.json");
+    if (scene_.arms == 2 && !json().contains("arms")) {
+      findings_.add_to_manifest("arms is missing, and 2 by scene.json");
     }
-    if (scene.tick_ns) {
-      compare(json_, "tick_ns", "tick_ns", *scene.tick_ns, "scene.json's servo.rate_hz");
+    if (scene_.tick_ns) {
+      findings_.compare(json(), "tick_ns", "tick_ns", *scene_.tick_ns,
+                        "scene.json's servo.rate_hz");
     }
-    check_volume_facts(scene);
-    take_facts(scene, out_.manifest);
-    volumes_ = std::move(scene.volumes);
+    check_volume_facts();
+    take_facts(scene_, out_.manifest);
   }
 
-  void check_volume_facts(const SceneFacts& scene) {
-    if (scene.volumes.empty()) return;
-    const Json& volumes = json_.at("volumes");
-    if (volumes.size() != scene.volumes.size()) {
-      add_to_manifest("volumes has " + std::to_string(volumes.size()) +
-                      " volumes, and scene.json " + std::to_string(scene.volumes.size()));
+  void check_volume_facts() {
+    if (scene_.volumes.empty()) return;
+    const Json& volumes = json().at("volumes");
+    if (volumes.size() != scene_.volumes.size()) {
+      findings_.add_to_manifest("volumes has " + std::to_string(volumes.size()) +
+                                " volumes, and scene.json " +
+                                std::to_string(scene_.volumes.size()));
       return;
     }
     for (std::size_t v = 0; v < volumes.size(); ++v) {
       const std::string place = "volumes[" + std::to_string(v) + "].";
-      const SceneFacts::Volume& of_scene = scene.volumes[v];
-      compare(volumes.at(v), "size_vox", place + "size_vox", of_scene.size_vox, "scene.json");
-      compare(volumes.at(v), "spacing_mm", place + "spacing_mm", of_scene.spacing_mm, "scene.json");
+      const SceneFacts::Volume& of_scene = scene_.volumes[v];
+      findings_.compare(volumes.at(v), "size_vox", place + "size_vox", of_scene.size_vox,
+                        "scene.json");
+      findings_.compare(volumes.at(v), "spacing_mm", place + "spacing_mm", of_scene.spacing_mm,
+                        "scene.json");
     }
   }
 
   void check_clock() {
     const LogClock clock = read_clock(folder_, out_.manifest.has_clock);
     if (!clock.problem().empty()) {
-      out_.problems.push_back(clock.problem());
+      findings_.add_line(clock.problem());
     } else if (is_final()) {
-      check_listed(std::string(kClockName));
+      findings_.compare_file(std::string(kClockName));
     }
   }
 
@@ -195,11 +158,12 @@ class Check {
     const Manifest& manifest = out_.manifest;
     const bool has_figures = !manifest.summaries.empty();
     if (manifest.end_reason == kStillRunning && has_figures) {
-      add_to_manifest("end_reason is \"running\", and it has the figures of the end");
+      findings_.add_to_manifest("end_reason is \"running\", and it has the figures of the end");
     }
     if (has_figures && manifest.summaries.size() != manifest.arms) {
-      add_to_manifest("arms is " + std::to_string(manifest.arms) + ", and it has figures of " +
-                      std::to_string(manifest.summaries.size()));
+      findings_.add_to_manifest("arms is " + std::to_string(manifest.arms) +
+                                ", and it has figures of " +
+                                std::to_string(manifest.summaries.size()));
     }
   }
 
@@ -209,32 +173,33 @@ class Check {
     for (const TickLogReader::Part& part : log.parts()) {
       const fs::path file = part.path.filename();
       if (part.rows < part.counted) {
-        add(file, cut_text(part));
+        findings_.add(file, cut_text(part));
+        is_cut_ = true;
       } else if (is_final() && part.rows != part.counted) {
-        add(file, std::to_string(part.counted) + " rows by its header, and it has " +
-                      std::to_string(part.rows));
+        findings_.add(file, std::to_string(part.counted) + " rows by its header, and it has " +
+                                std::to_string(part.rows));
       } else if (is_final() && part.bytes_left != 0) {
-        add(file, std::to_string(part.bytes_left) + " bytes behind its last row");
+        findings_.add(file, std::to_string(part.bytes_left) + " bytes behind its last row");
       }
     }
     if (arm > 0 && log.rows() < logs_.front().rows()) {
-      add(name, std::to_string(log.rows()) + " rows, and " + std::string(kTickLogName) + " has " +
-                    std::to_string(logs_.front().rows()));
+      findings_.add(name, std::to_string(log.rows()) + " rows, and " + std::string(kTickLogName) +
+                              " has " + std::to_string(logs_.front().rows()));
     }
-    if (!json_.contains("rows")) return;
+    if (!json().contains("rows") || is_cut_) return;
     if (is_final()) {
-      compare(json_, "rows", "rows", log.rows(), name);
+      findings_.compare(json(), "rows", "rows", log.rows(), name);
       return;
     }
     try {
-      if (json_.at("rows").get<std::uint64_t>() <= log.rows() ||
+      if (json().at("rows").get<std::uint64_t>() <= log.rows() ||
           out_.manifest.end_reason == kNoRoom) {
         return;
       }
     } catch (const JsonError&) {  // NOLINT(bugprone-empty-catch): it is no number of rows
     }
-    add_to_manifest("rows is " + shown(json_.at("rows")) + ", and " + std::string(name) + " has " +
-                    std::to_string(log.rows()));
+    findings_.add_to_manifest("rows is " + shown(json().at("rows")) + ", and " + std::string(name) +
+                              " has " + std::to_string(log.rows()));
   }
 
   /// Calls `visit` with the rows of each tick in the range, of all arms, up to the first that is
@@ -257,7 +222,7 @@ class Check {
         for (std::size_t arm = 0; arm < logs_.size(); ++arm) tick[arm] = chunks[arm][i];
         if (logs_.size() > 1 && tick[0].seq != tick[1].seq) {
           problem = (folder_ / tick_log_name(1)).string() + ": row " + std::to_string(row + i) +
-                    " is not of the tick of ticks.npy" + std::string(kCopyAgain);
+                    " is not of the tick of ticks.npy" + "; copy the recording again";
         } else {
           visit(std::span<const TickRecord>(tick).first(logs_.size()));
           if (tick[0].tick == range_.until) return;
@@ -265,7 +230,7 @@ class Check {
       }
       if (count == 0 && problem.empty()) return;  // the end of the shorter log, told by its size
       if (!problem.empty()) {
-        out_.problems.push_back(problem);
+        findings_.add_line(problem);
         out_.rows_readable = false;
       }
       row += count;
@@ -274,103 +239,40 @@ class Check {
 
   /// In lock-step no clock runs, and the time of a tick follows from its number.
   void check_time(const TickRecord& row) {
-    const bool is_lockstep = json_.contains("start_ns") && json_.at("start_ns").canonical() == "0";
+    const bool is_lockstep =
+        json().contains("start_ns") && json().at("start_ns").canonical() == "0";
     if (!is_lockstep || time_told_ || row.start_ns == row.tick * out_.manifest.tick_ns) return;
     time_told_ = true;
-    add_to_manifest("start_ns is 0, as in lock-step, and tick " + std::to_string(row.tick) +
-                    " began at " + std::to_string(row.start_ns) + " ns");
+    findings_.add_to_manifest("start_ns is 0, as in lock-step, and tick " +
+                              std::to_string(row.tick) + " began at " +
+                              std::to_string(row.start_ns) + " ns");
   }
 
   void check_losses(const LossesOfRows& losses) {
     const std::string why = losses.why_not(out_.manifest.losses, is_final());
-    if (!why.empty()) add_to_manifest(why);
+    if (!why.empty()) findings_.add_to_manifest(why);
   }
 
+  /// The first figure that differs: others follow from the same rows.
   void check_figures() {
     for (std::size_t arm = 0; arm < out_.summaries.size(); ++arm) {
       const std::string name = arm == 0 ? "summary" : "summary_2";
-      if (!json_.contains(name)) continue;
+      if (!json().contains(name)) continue;
       const Json of_rows = figures_of(out_.summaries[arm]);
       for (const auto& [key, value] : of_rows.members()) {
-        compare(json_.at(name), key, name + "." + key, value,
-                key == "end_reason" ? "end_reason" : "the rows");
+        const char* const source = key == "end_reason" ? "end_reason" : "the rows";
+        if (!findings_.compare(json().at(name), key, name + "." + key, value, source)) break;
       }
-    }
-  }
-
-  /// Compares a file with its checksum in the manifest, if that has one.
-  void check_listed(const std::string& name) {
-    if (!json_.contains("files") || !json_.at("files").contains(name)) return;
-    const std::string is = crc32_of_file(folder_ / name);
-    const Json& was = json_.at("files").at(name);
-    if (is.empty()) {
-      add(name, "cannot be read, and manifest.json has its checksum");
-    } else if (was.canonical() != Json(is).canonical()) {
-      add(name, "its checksum is " + is + ", and " + shown(was) + " in manifest.json");
-    }
-  }
-
-  void check_listed_files() {
-    if (!json_.contains("files") || !is_final()) return;
-    for (const auto& [name, sum] : json_.at("files").members()) {
-      if (name != kSceneName && name != kClockName && is_name_of_file(name)) check_listed(name);
-    }
-    for (const std::string& name : names_of_files(folder_, true)) {
-      if (json_.at("files").contains(name)) continue;
-      add(one_line(name), "manifest.json does not list it", "; remove it");
-    }
-  }
-
-  /// The manifest may be foreign, and name any file.
-  static bool is_name_of_file(const fs::path& name) {
-    return name.is_relative() && std::ranges::find(name, "..") == name.end();
-  }
-
-  /// Volumes by the hash that is their name; `initial_hash` is another one of the densities alone.
-  void check_volumes() {
-    for (std::size_t v = 0; v < volumes_.size(); ++v) {
-      const SceneFacts::Volume& volume = volumes_[v];
-      const auto [nx, ny, nz] = volume.size_vox;
-      constexpr int kMost = 1 << 16;
-      if (std::ranges::any_of(volume.size_vox, [](int n) { return n < 1 || n > kMost; })) {
-        add(kSceneName, "volumes[" + std::to_string(v) + "].grid is no size of a volume");
-        continue;
-      }
-      std::optional<VolumeContent> content;
-      try {
-        content = read_starting_volume(folder_, volume.density_hash, {nx, ny, nz});
-      } catch (const RecordError& error) {
-        out_.problems.push_back(error.what());
-      }
-      const Json& volumes = json_.at("volumes");
-      if (!content || v >= volumes.size()) continue;
-      compare(volumes.at(v), "initial_hash", "volumes[" + std::to_string(v) + "].initial_hash",
-              hex64(density_hash(content->density)),
-              density_path({}, volume.density_hash).string());
-    }
-  }
-
-  /// The inputs of the ticks before the log, if there are any.
-  void check_inputs() {
-    std::error_code fault;
-    if (!fs::is_directory(folder_ / kInputsName, fault)) return;
-    try {
-      InputReader inputs(folder_, out_.manifest.losses.missed_before_start, logs_.size());
-      while (!inputs.next().empty()) {
-      }
-    } catch (const RecordError& error) {
-      out_.problems.push_back(error.what());
     }
   }
 
   fs::path folder_;
   TickRange range_;
+  Findings findings_;
   CheckedRecording out_;
-  std::string text_;  ///< of the manifest
-  Json json_;         ///< the same, parsed
-  std::vector<SceneFacts::Volume> volumes_;
+  SceneFacts scene_;
   std::vector<TickLogReader> logs_;  ///< by arm
-  bool time_told_ = false;
+  bool is_cut_ = false, time_told_ = false;
 };
 
 }  // namespace
@@ -379,7 +281,7 @@ CheckedRecording check_recording(const fs::path& folder, TickRange range, CheckD
   Check check(folder, range);
   check.facts();
   if (depth != CheckDepth::facts) check.rows();
-  check.seal();
+  check.manifest_text();
   if (depth == CheckDepth::files) check.files();
   return std::move(check).result();
 }

@@ -143,7 +143,7 @@ void repair_manifest(const fs::path& folder) {
     if (arm == 0) first = std::move(facts);
   }
   manifest["start_ns"] = first.start_ns;
-  if (!is_final(end_reason)) figures.clear();
+  if (!is_of_whole_log(end_reason)) figures.clear();
   keep_old(folder);
   write_with_end(folder, std::move(manifest), first.losses, first.rows, end_reason, figures);
 }

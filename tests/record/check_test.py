@@ -45,11 +45,15 @@ def figures(log):
 class TestCheck(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        """A run whose device is silent for a while: its log, and a flight recording with the inputs before it."""
+        """A run whose device is silent for a while: its log, and a flight recording with the inputs before it. And a log of
+        several files."""
         cls.temporary = tempfile.TemporaryDirectory()
         cls.folder = pathlib.Path(cls.temporary.name)
         (cls.folder / "silence.toml").write_text('latches = "stale_input"\n[[fault]]\nkind = "silence"\nat_s = 1.4\nfor_s = 0.3\n')
         record(ROOT, BIN, cls.folder, ROOT / "scenes/phantom.toml", 2.5, flight=True, fault=cls.folder / "silence.toml")
+        (cls.folder / "other").mkdir()
+        record(ROOT, BIN, cls.folder / "other", ROOT / "scenes/wall.toml", 1.5, recorder=("--split", "1s"))
+        cls.split = cls.folder / "other/log"
         cls.log = cls.folder / "log"
         cls.flight, = (cls.folder / "flights").iterdir()
         cls.manifest = json.loads((cls.log / "manifest.json").read_text())
@@ -93,7 +97,8 @@ class TestCheck(unittest.TestCase):
             self.assertIn(reader or words, str(raised.exception))
 
     def test_sound_recordings_are_sound_to_all(self):
-        for log in (self.log, self.flight):
+        self.assertEqual(len(list(self.split.glob("ticks.npy*"))), 2)
+        for log in (self.log, self.flight, self.split):
             self.assertEqual(check(log), (0, f"{log}: all files agree, and all checksums are right\n", ""))
             self.assertEqual(run("kerf-record", "info", log)[0], 0)
             if kerf_reader:
@@ -189,6 +194,16 @@ class TestCheck(unittest.TestCase):
         log = self.with_ticks(data)
         self.assertEqual(run("kerf-record", "info", log, "--until", "700")[0], 0)
         self.assertEqual(run("kerf-record", "info", log, "--until", "701")[0], 1)
+
+    def test_a_cut_log_is_told_in_one_line_and_its_manifest_stays(self):
+        log = self.with_ticks(self.rows[:HEADER + 700 * ROW + 100])
+        count = (len(self.rows) - HEADER) // ROW
+        line = f"kerf-record: {log / 'ticks.npy'}: cut after 700 of {count} rows; copy the recording again\n"
+        self.assertEqual(check(log, "--repair"), (1, "", line))
+        self.assertEqual((log / "manifest.json").read_bytes(), (self.log / "manifest.json").read_bytes())
+        code, said, wrong = run("kerf-record", "info", log)
+        self.assertEqual((code, wrong), (1, line))
+        self.assertIn(f"cut after 700 of {count} rows", said)
 
     def killed(self):
         """A log as a recorder that was killed leaves it: more rows than header and manifest say, and a part of one."""
@@ -314,10 +329,10 @@ class TestCheck(unittest.TestCase):
 
     def test_each_of_many_random_edits_is_found_or_has_no_effect(self):
         dice = random.Random(SEED)
-        was = {log: figures(log) for log in (self.log, self.flight)}
+        was = {log: figures(log) for log in (self.log, self.flight, self.split)}
         found = 0
         for number in range(EDITS):
-            of = dice.choice([self.log, self.flight])
+            of = dice.choice(list(was))
             log = self.copy(of)
             how = self.edit(log, dice)
             code, said, wrong = check(log)

@@ -200,3 +200,34 @@ TEST_CASE("grab says what lacks: no controller, no flight recorder") {
   const SegmentServer server("demo", writer);
   CHECK(error().find("no flight recorder runs") != std::string::npos);
 }
+
+TEST_CASE("a flight recorder does not pass over a recording of another run that has its name") {
+  for (const bool is_taken : {false, true}) {
+    CAPTURE(is_taken);
+    const RuntimeFolder folder;
+    const std::filesystem::path kept = folder / "flight/000000000500-overspeed";
+    if (is_taken) std::filesystem::create_directories(kept);
+    const NoiseVolume volume({8, 8, 8});
+    SegmentWriter writer = SegmentWriter::create(spec_of(volume));
+    const SegmentServer server("demo", writer);
+    const std::atomic<bool> stop{false};
+    int code = -1;
+    std::thread recorder([&] {
+      RecorderOptions options;
+      options.name = "demo";
+      options.out = folder / "flight";
+      options.flight_s = 0.2;
+      code = run_flight_recorder(options, stop);
+    });
+    CHECK(eventually([&] { return std::filesystem::exists(folder / "flight/.run-demo"); }, 20s));
+    for (Tick tick = 1; tick <= 600; ++tick) {
+      TickRecord record = made_up_tick(tick, 600);
+      record.fault = tick == 500 ? static_cast<std::uint32_t>(Fault::overspeed) : 0;
+      publish_tick(writer, record);
+    }
+    writer.set_lifecycle(Lifecycle::clean_end);
+    recorder.join();
+    CHECK(code == (is_taken ? 1 : 0));
+    CHECK(std::filesystem::exists(kept / kTickLogName) == !is_taken);
+  }
+}

@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "record/check/file_check.hpp"
+
+#include <algorithm>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <system_error>
+
+#include "record/input_rows.hpp"
+#include "record/kept_volumes.hpp"
+#include "record/manifest_seal.hpp"
+#include "record/tick_log.hpp"
+#include "shared/text/text.hpp"
+#include "shared/volume/checksum.hpp"
+
+namespace kerf {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A manifest may be foreign, and name any file.
+bool is_below(const fs::path& name) {
+  return name.is_relative() && std::ranges::find(name, "..") == name.end();
+}
+
+void check_listed_files(Findings& findings) {
+  const Json::Members& files = findings.files();
+  if (files.empty() || !is_of_whole_log(findings.manifest().end_reason)) return;
+  for (const auto& [name, sum] : files) {
+    // The facts of these two are compared by each reader.
+    if (name != kSceneName && name != kClockName && is_below(name)) findings.compare_file(name);
+  }
+  for (const std::string& name : names_of_files(findings.folder(), true)) {
+    if (std::ranges::find(files, name, &Json::Member::key) != files.end()) continue;
+    findings.add(one_line(name), "manifest.json does not list it", "; remove it");
+  }
+}
+
+/// Of the densities of a volume the manifest has another hash than the scene.
+void check_volume(const SceneFacts::Volume& volume, std::size_t number, Findings& findings) {
+  const auto [nx, ny, nz] = volume.size_vox;
+  std::optional<VolumeContent> content;
+  try {
+    content = read_starting_volume(findings.folder(), volume.density_hash, {nx, ny, nz});
+  } catch (const RecordError& error) {
+    findings.add_line(error.what());
+  }
+  const Json& volumes = findings.json().at("volumes");
+  if (!content || number >= volumes.size()) return;
+  findings.compare(
+      volumes.at(number), "initial_hash", "volumes[" + std::to_string(number) + "].initial_hash",
+      hex64(density_hash(content->density)), density_path({}, volume.density_hash).string());
+}
+
+void check_inputs(std::size_t arms, Findings& findings) {
+  std::error_code fault;
+  if (!fs::is_directory(findings.folder() / kInputsName, fault)) return;
+  try {
+    InputReader inputs(findings.folder(), findings.manifest().losses.missed_before_start, arms);
+    while (!inputs.next().empty()) {
+    }
+  } catch (const RecordError& error) {
+    findings.add_line(error.what());
+  }
+}
+
+}  // namespace
+
+void check_files(const SceneFacts& scene, std::size_t arms, Findings& findings) {
+  check_listed_files(findings);
+  for (std::size_t v = 0; v < scene.volumes.size(); ++v)
+    check_volume(scene.volumes[v], v, findings);
+  check_inputs(arms, findings);
+}
+
+}  // namespace kerf

@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+
+#include "record/check/findings.hpp"
+#include "record/scene_facts.hpp"
+
+namespace kerf {
+
+/// Compares the files beside log and scene: those that the manifest lists with their checksums, the
+/// volumes of `scene` with their hashes, the inputs of the ticks before the log with their length.
+void check_files(const SceneFacts& scene, std::size_t arms, Findings& findings);
+
+}  // namespace kerf

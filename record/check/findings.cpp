@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "record/check/findings.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "record/manifest_seal.hpp"
+#include "shared/text/text.hpp"
+
+namespace kerf {
+
+std::string shown(const Json& value) {
+  constexpr std::size_t kMost = 60;
+  const std::string text = value.canonical();
+  return one_line(text.size() > kMost ? text.substr(0, kMost) + "..." : text);
+}
+
+Findings::Findings(std::filesystem::path folder)
+    : folder_(std::move(folder)),
+      text_(manifest_text(folder_)),
+      manifest_(read_manifest(folder_)),
+      json_(Json::parse(text_)) {
+  try {
+    if (json_.contains("files")) files_ = json_.at("files").members();
+  } catch (const JsonError&) {
+    add_to_manifest("files is " + shown(json_.at("files")) + ", and has no checksums by name");
+  }
+}
+
+void Findings::add(const std::filesystem::path& name, const std::string& what,
+                   std::string_view remedy) {
+  add_line((folder_ / name).string() + ": " + what + std::string(remedy));
+}
+
+void Findings::add_to_manifest(const std::string& what) {
+  in_manifest_ = true;
+  add(kManifestName, what,
+      "; copy the recording again, or kerf record check --repair makes it anew");
+}
+
+bool Findings::compare(const Json& object, std::string_view key, const std::string& shown_key,
+                       const Json& wanted, std::string_view source) {
+  if (!object.contains(key) || object.at(key).canonical() == wanted.canonical()) return true;
+  add_to_manifest(shown_key + " is " + shown(object.at(key)) + ", and " + shown(wanted) + " by " +
+                  std::string(source));
+  return false;
+}
+
+void Findings::compare_file(const std::string& name) {
+  const auto listed = std::ranges::find(files_, name, &Json::Member::key);
+  if (listed == files_.end()) return;
+  const std::string is = crc32_of_file(folder_ / name);
+  if (is.empty()) {
+    add(one_line(name), "cannot be read, and manifest.json has its checksum");
+  } else if (listed->value.canonical() != Json(is).canonical()) {
+    add(one_line(name),
+        "its checksum is " + is + ", and " + shown(listed->value) + " in manifest.json");
+  }
+}
+
+void Findings::check_manifest_text() {
+  if (const auto twice = doubled_key(text_)) {
+    add_to_manifest("\"" + one_line(*twice) + "\" stands twice in it");
+  }
+  const Seal seal = seal_of(text_);
+  if (seal == Seal::broken || (seal == Seal::none && json_.contains("files"))) {
+    add_to_manifest("its checksum is wrong: it was changed after the recorder wrote it");
+  }
+}
+
+}  // namespace kerf

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "record/manifest.hpp"
+#include "shared/text/json.hpp"
+
+namespace kerf {
+
+/// What is wrong in a recording, as it is found: lines "place: value; remedy". Knows the manifest,
+/// with which most is compared.
+class Findings {
+ public:
+  /// Reads manifest.json. Throws `RecordError` as `read_manifest`.
+  explicit Findings(std::filesystem::path folder);
+
+  [[nodiscard]] const std::filesystem::path& folder() const noexcept { return folder_; }
+  [[nodiscard]] const Json& json() const noexcept { return json_; }  ///< of the manifest
+  [[nodiscard]] const Manifest& manifest() const noexcept { return manifest_; }
+  [[nodiscard]] const std::vector<std::string>& problems() const noexcept { return problems_; }
+  [[nodiscard]] bool in_manifest() const noexcept { return in_manifest_; }
+
+  void add_line(std::string line) { problems_.push_back(std::move(line)); }
+  /// Of a file of the folder.
+  void add(const std::filesystem::path& name, const std::string& what,
+           std::string_view remedy = "; copy the recording again");
+  void add_to_manifest(const std::string& what);
+
+  /// Compares member `key` of an object of the manifest with what it follows from. True if it is as
+  /// it should be, or missing. `shown_key`: with the keys above it.
+  bool compare(const Json& object, std::string_view key, const std::string& shown_key,
+               const Json& wanted, std::string_view source);
+
+  /// The checksums of the other files, by name; empty in manifests of earlier versions.
+  [[nodiscard]] const Json::Members& files() const noexcept { return files_; }
+  /// Compares a file with its checksum in the manifest, if that has one.
+  void compare_file(const std::string& name);
+
+  /// What is wrong with the manifest's own text: its checksum, names that stand twice. After what
+  /// is said of its members, since the checksum covers all of them.
+  void check_manifest_text();
+
+ private:
+  std::filesystem::path folder_;
+  std::string text_;  ///< of the manifest
+  Manifest manifest_;
+  Json json_;
+  Json::Members files_;
+  std::vector<std::string> problems_;
+  bool in_manifest_ = false;
+};
+
+/// A value of a manifest for a message: short, on one line.
+[[nodiscard]] std::string shown(const Json& value);
+
+}  // namespace kerf
