@@ -35,7 +35,7 @@ bool has(const Read& read) {
 }
 
 /// Whether there can be such a volume: a scene may be foreign, and its size is allocated.
-bool is_possible(const SceneFacts::Volume& volume) {
+bool is_possible_volume(const SceneFacts::Volume& volume) {
   constexpr std::uint64_t kMost = std::uint64_t{kMaxBricks} * kBrickVoxels;
   std::uint64_t voxels = 1;
   for (const std::int32_t edge : volume.size_vox) {
@@ -60,7 +60,7 @@ SceneFacts scene_facts(std::string_view scene_json) {
   const bool has_volumes = has([&] {
     for (const Json& volume : scene.at("volumes")) out.volumes.push_back(volume_in(volume));
   });
-  if (!has_volumes || !std::ranges::all_of(out.volumes, is_possible)) out.volumes.clear();
+  if (!has_volumes || !std::ranges::all_of(out.volumes, is_possible_volume)) out.volumes.clear();
   return out;
 }
 
