@@ -83,14 +83,16 @@ cp -r "$work/log" "$work/free"
 cp -r "$work/log" "$work/idle"
 cp -r "$work/log" "$work/cut"
 cp -r "$work/log" "$work/empty"
-"$python" - "$work" <<'PY'
+PYTHONPATH=$root/python "$python" - "$work" <<'PY'
 import sys
 import numpy as np
+from kerf_reader.check import _crc32c
 for name in ("free", "idle"):
     rows = np.load(f"{sys.argv[1]}/{name}/ticks.npy")
     rows["commanded_force_n"] = 0
     if name == "idle":
         rows["velocity_mm_per_s"] = np.nan
+    rows["crc32c"] = _crc32c(rows, 8)
     np.save(f"{sys.argv[1]}/{name}/ticks.npy", rows)
 PY
 truncate -s -100 "$work/cut/ticks.npy"
