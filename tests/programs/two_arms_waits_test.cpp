@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What a run of two devices says of the one that it waits for.
+#include <array>
 #include <chrono>
 #include <csignal>
 #include <string>

@@ -19,6 +19,7 @@
 #include "controller/run/run_report.hpp"
 #include "controller/run/scene_check.hpp"
 #include "controller/tool/tool_shapes.hpp"
+#include "shared/numeric/energy_source.hpp"
 #include "shared/posix/atomic_file.hpp"
 #include "shared/posix/error_text.hpp"
 #include "shared/text/text.hpp"
