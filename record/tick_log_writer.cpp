@@ -81,10 +81,9 @@ TickLogWriter::~TickLogWriter() {
 void TickLogWriter::begin_part() {
   sync();
   const int next =
-      open(part_of_log(path_, part_ + 1).c_str(), O_WRONLY | O_CLOEXEC | O_CREAT | O_TRUNC, 0666);
+      open(part_of_log(path_, ++part_).c_str(), O_WRONLY | O_CLOEXEC | O_CREAT | O_TRUNC, 0666);
   if (next < 0) fail(errno);
   if (const int before = std::exchange(fd_, next); before != lock_) close(before);
-  ++part_;
   first_ = written_;
   write_header();
 }
@@ -128,7 +127,7 @@ void TickLogWriter::fail(int error) {
     }
     buffer_.clear();
   }
-  throw RecordError(path_.string() + ": cannot be written (" +
+  throw RecordError(part_of_log(path_, part_).string() + ": cannot be written (" +
                     std::generic_category().message(error) +
                     "); make room or choose another --out");
 }

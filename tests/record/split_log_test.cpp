@@ -121,6 +121,19 @@ TEST_CASE("files of a log that are missing or of another one are told") {
         part_of_log(path, 2).string() + ": of a recording; choose another --out");
 }
 
+TEST_CASE("a file that cannot be begun is named, and the rows before it stay") {
+  const RuntimeFolder folder;
+  const std::filesystem::path path = folder / "ticks.npy";
+  TickLogWriter log(path, kNew, UINT64_MAX, kRowsAPart);
+  std::filesystem::create_directory(part_of_log(path, 2));
+  CHECK(error_of([&] {
+          while (log.rows() < kRows) log.append(row(log.rows()));
+        }) == part_of_log(path, 2).string() +
+                  ": cannot be written (Is a directory); make room or choose another --out");
+  CHECK(rows_of_parts(path) == Counts{1000});
+  CHECK(sound_rows(path) == 1000);
+}
+
 TEST_CASE("a recorder splits by the time of the run, and goes on with --resume") {
   CHECK(split_s("90s") == 90);
   CHECK(split_s("10m") == 600);
