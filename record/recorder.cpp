@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "record/log_clock.hpp"
+#include "record/losses_of_rows.hpp"
 #include "record/recording.hpp"
 #include "record/starting_volumes.hpp"
 #include "record/tick_log.hpp"
@@ -183,6 +184,18 @@ class ArmLogs final : public TickSink {
   std::optional<SummedLog> first_, second_;
 };
 
+/// The losses before and between the first `rows` rows of a log.
+[[nodiscard]] RecordLosses losses_in(TickLogReader& log, std::uint64_t rows, std::uint64_t first) {
+  LossesOfRows losses(first);
+  std::vector<TickRecord> chunk(TickLogReader::kChunkRows);
+  while (losses.rows() < rows) {
+    const std::uint64_t left = std::min<std::uint64_t>(rows - losses.rows(), chunk.size());
+    const std::size_t count = log.read(losses.rows(), std::span(chunk).first(left));
+    for (const TickRecord& record : std::span(chunk).first(count)) losses.add(record);
+  }
+  return losses.as_losses(Recorder::kMaxGaps);
+}
+
 [[nodiscard]] Beginning beginning_in(const RecorderOptions& options, const SegmentReader& reader) {
   Beginning begin{.may_go_on = options.resume};
   if (!options.split.empty()) {
@@ -214,6 +227,11 @@ class ArmLogs final : public TickSink {
     TickRecord last;
     static_cast<void>(log.read(begin.rows - 1, std::span(&last, 1)));
     begin.next = index_of(last) + 1;
+    // Killed between rows behind a gap and the manifest with the gap; or it has gaps behind the
+    // last row, which are read again.
+    if (*begin.next - begin.rows != begin.losses.missed_before_start + begin.losses.lost) {
+      begin.losses = losses_in(log, begin.rows, begin.losses.missed_before_start);
+    }
   }
   return begin;
 }

@@ -10,8 +10,8 @@
 
 #include "record/check/file_check.hpp"
 #include "record/check/findings.hpp"
-#include "record/check/losses.hpp"
 #include "record/kept_volumes.hpp"
+#include "record/losses_of_rows.hpp"
 #include "record/recording.hpp"
 #include "record/scene_facts.hpp"
 #include "shared/text/json.hpp"
@@ -249,7 +249,8 @@ class Check {
   }
 
   void check_losses(const LossesOfRows& losses) {
-    const std::string why = losses.why_not(out_.manifest.losses, is_final());
+    const std::string why =
+        losses.why_not(out_.manifest.losses, is_final(), logs_.front().counted());
     if (!why.empty()) findings_.add_to_manifest(why);
   }
 

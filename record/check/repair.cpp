@@ -5,9 +5,9 @@
 #include <system_error>
 #include <vector>
 
-#include "record/check/losses.hpp"
 #include "record/check/recording_check.hpp"
 #include "record/kept_volumes.hpp"
+#include "record/losses_of_rows.hpp"
 #include "record/manifest_seal.hpp"
 #include "record/recorder.hpp"
 #include "record/recording.hpp"

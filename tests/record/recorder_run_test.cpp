@@ -190,6 +190,16 @@ TEST_CASE(
     CHECK(manifest["gaps"][0]["first_index"] == 200);
     CHECK(manifest["gaps"][0]["count"] == 50);
     CHECK(summarise(folder / "log").lost_ticks == 50);
+    // Killed between the rows behind the gap and the manifest: the rows say it.
+    Json before_gap = Json::parse(file_text(folder / "log/manifest.json"));
+    before_gap["lost_ticks"] = 0;
+    before_gap["gaps"] = Json::List{};
+    std::ofstream(folder / "log/manifest.json") << before_gap.document();
+    publish(10);
+    CHECK(run_recorder(options, stop) == 0);
+    CHECK(kerf::test::read_json_file(folder / "log/manifest.json")["lost_ticks"] == 50);
+    CHECK(kerf::test::read_json_file(folder / "log/manifest.json")["gaps"][0]["first_index"] ==
+          200);
     const TickLogWriter other(folder / "log/ticks.npy", TickLogWriter::Begin::after_last);
     CHECK(error_of([&] {
             static_cast<void>(run_recorder(options, stop));

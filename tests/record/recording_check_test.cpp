@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "record/check/losses.hpp"
+#include "record/losses_of_rows.hpp"
 #include "record/manifest_seal.hpp"
 #include "record/recorder.hpp"
 #include "record/tick_log_writer.hpp"
@@ -82,8 +82,9 @@ TEST_CASE("a seq that another row could have is found by its neighbours, or by t
   const RecordLosses said{.lost = 27, .gaps = {{2, 27}}};
   LossesOfRows losses(0);
   for (const TickRecord& record : rows) losses.add(record);
-  CHECK(losses.why_not(said, true).find("gaps has 27 records from index 2") != std::string::npos);
-  CHECK_FALSE(losses.why_not(said, false).empty());
+  CHECK(losses.why_not(said, true, 3).find("gaps has 27 records from index 2") !=
+        std::string::npos);
+  CHECK_FALSE(losses.why_not(said, false, 0).empty());
 }
 
 TEST_CASE("rows that are doubled, exchanged or of another run end a log, in one line") {
@@ -120,9 +121,9 @@ TEST_CASE("the recording of a watched replay, which rests at ticks without a rec
 
 TEST_CASE("losses follow from the rows: a manifest that says others is refused") {
   const LossesOfRows losses = losses_of(4, {7, 8, 20});  // indices 4, 5 and 8 to 18 are lost
-  const auto why = [&](RecordLosses said, bool is_final = true) {
+  const auto why = [&](RecordLosses said, bool is_final = true, std::uint64_t counted = 0) {
     said.missed_before_start = 4;
-    return losses.why_not(said, is_final);
+    return losses.why_not(said, is_final, counted);
   };
   CHECK(why({.lost = 13, .gaps = {{4, 2}, {8, 11}}}).empty());
   CHECK(why({.lost = 13}).empty());  // a flight recorder lists none
@@ -131,10 +132,15 @@ TEST_CASE("losses follow from the rows: a manifest that says others is refused")
   CHECK(why({.lost = 13, .gaps = {{4, 3}}}).find("gaps has 3 records from index 4") == 0);
   CHECK(why({.lost = 13, .gaps = {{UINT64_MAX, 1}}}).find("lost_ticks is 13, and 14") == 0);
   CHECK(why({.lost = 13, .gaps = {{8, UINT64_MAX}}}).find("gaps has") == 0);
-  // A recorder that was killed had not written all of them down.
+  // A recorder that was killed may not have written down those before rows that it had not counted.
   CHECK(why({.lost = 2, .gaps = {{4, 2}}}, false).empty());
+  CHECK(why({.lost = 2, .gaps = {{4, 2}}}, false, 2).empty());
+  CHECK(why({.lost = 2, .gaps = {{4, 2}}}, false, 3) ==
+        "gaps lacks 11 records from index 8, which are in no row");
+  CHECK(why({.lost = 13, .gaps = {{4, 2}, {8, 4}, {12, 7}}}, false, 3).empty());
+  CHECK(why({}, false, 1).find("gaps lacks 2 records from index 4") == 0);
   CHECK(why({.lost = 3, .gaps = {{4, 3}}}, false).find("gaps has") == 0);
-  CHECK(losses_of(7, {7}).why_not({.missed_before_start = 7}, false) ==
+  CHECK(losses_of(7, {7}).why_not({.missed_before_start = 7}, false, 0) ==
         "missed_before_start is 7, and its first row is of an earlier record");
   const RecordLosses made = losses.as_losses(1);
   CHECK(made.lost == 13);

@@ -21,8 +21,13 @@ class LossesOfRows {
   void add(const TickRecord& row);
 
   /// Why a manifest cannot say `said`; empty if it can. If `is_final`, all losses are in it, also
-  /// those behind the last row; else, of a recorder that was killed, some may be missing.
-  [[nodiscard]] std::string why_not(const RecordLosses& said, bool is_final) const;
+  /// those behind the last row. Else, of a recorder that was killed, those before row `counted`
+  /// are: it writes them down before it counts the rows behind them in the header.
+  [[nodiscard]] std::string why_not(const RecordLosses& said, bool is_final,
+                                    std::uint64_t counted) const;
+
+  /// Rows so far.
+  [[nodiscard]] std::uint64_t rows() const noexcept { return rows_; }
 
   /// The same losses as a manifest has them, at most so many gaps.
   [[nodiscard]] RecordLosses as_losses(std::size_t most_gaps) const;
@@ -30,8 +35,9 @@ class LossesOfRows {
  private:
   std::uint64_t first_, next_;   ///< index of the first row, and of the next one
   bool begins_earlier_ = false;  ///< the first row is of a record before `first`
-  std::uint64_t lost_ = 0;
-  std::vector<RecordGap> gaps_;  ///< in order
+  std::uint64_t rows_ = 0, lost_ = 0;
+  std::vector<RecordGap> gaps_;          ///< in order
+  std::vector<std::uint64_t> gap_rows_;  ///< the row behind each
 };
 
 }  // namespace kerf

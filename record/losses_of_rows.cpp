@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "record/check/losses.hpp"
+#include "record/losses_of_rows.hpp"
 
 #include <algorithm>
 
@@ -19,12 +19,15 @@ void LossesOfRows::add(const TickRecord& row) {
   begins_earlier_ = begins_earlier_ || index < next_;  // at the first row only
   if (index > next_) {
     gaps_.push_back({next_, index - next_});
+    gap_rows_.push_back(rows_);
     lost_ += index - next_;
   }
   next_ = index + 1;
+  ++rows_;
 }
 
-std::string LossesOfRows::why_not(const RecordLosses& said, bool is_final) const {
+std::string LossesOfRows::why_not(const RecordLosses& said, bool is_final,
+                                  std::uint64_t counted) const {
   if (begins_earlier_) {
     return "missed_before_start is " + std::to_string(said.missed_before_start) +
            ", and its first row is of an earlier record";
@@ -43,6 +46,14 @@ std::string LossesOfRows::why_not(const RecordLosses& said, bool is_final) const
   }
   const bool may_lack = said.gaps.size() == Recorder::kMaxGaps;  // of those behind the last row
   const std::uint64_t lost = lost_ + behind;
+  for (std::size_t i = 0; !is_final && !may_lack && i < gaps_.size() && gap_rows_[i] < counted;
+       ++i) {
+    std::uint64_t listed = 0;
+    for (const RecordGap& gap : said.gaps) listed += holds(gaps_[i], gap) ? gap.count : 0;
+    if (listed != gaps_[i].count) {
+      return "gaps lacks " + text_of(gaps_[i]) + ", which are in no row";
+    }
+  }
   if (!is_final || said.lost == lost || (may_lack && said.lost > lost)) return {};
   return "lost_ticks is " + std::to_string(said.lost) + ", and " + std::to_string(lost) +
          " by its rows";
