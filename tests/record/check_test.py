@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A recording that contradicts itself is told, by every reader alike; a lost manifest is made again.
 
-    check_test.py ROOT BIN [EDITS [SEED]]"""
+    check_test.py ROOT BIN [EDITS [SEED]] [TEST]"""
 import json
 import os
 import pathlib
