@@ -203,13 +203,14 @@ std::string recorded_scene(const std::filesystem::path& folder) {
   const std::filesystem::path path = folder / kSceneName;
   std::error_code fault;
   const std::uintmax_t bytes = std::filesystem::file_size(path, fault);
-  if (fault || !std::filesystem::is_regular_file(path, fault)) {
+  std::ifstream file;
+  if (!fault && std::filesystem::is_regular_file(path, fault)) file.open(path, std::ios::binary);
+  if (!file.is_open()) {
     throw RecordError(path.string() + ": cannot be read; " + way_to_recording(folder));
   }
   if (bytes > kMaxSceneBytes) {
     throw RecordError(path.string() + ": larger than any scene; copy the recording again");
   }
-  std::ifstream file(path, std::ios::binary);
   return {std::istreambuf_iterator<char>(file), {}};
 }
 
