@@ -287,7 +287,8 @@ class Recording {
 
   void manifest(std::string_view reason) const {
     ArmSummaries summaries;
-    if (whole_ && reason != kStillRunning) summaries = logs_.summaries(recorder_.losses(), reason);
+    // On a full disk, rows were summed up that are not in the log.
+    if (whole_ && is_of_whole_log(reason)) summaries = logs_.summaries(recorder_.losses(), reason);
     write_manifest(out_, reader().info(), recorder_.losses(), logs_.rows(), reason, summaries);
   }
   [[nodiscard]] std::uint64_t rows() const noexcept { return logs_.rows(); }

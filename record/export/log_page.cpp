@@ -66,13 +66,13 @@ and `utc_ns` (since 1970-01-01, negative before), both read within `within_ns`, 
 `info` prints the first tick's date, and one line if UTC was set in the run: ticks before that have the date which the clock would have
 shown if it had been set already, so dates do not run back. In lock-step time is virtual: tick 0 has the date at which the recorder
 began, and each tick is one tick's length later, however long it took. Logs of earlier versions have no date.
+
 ## Whether it is whole
 
-    ./kerf record check DIR/log
-
-compares all that the files say twice, and all checksums, and says of each contradiction where it is, what stands there and what to
-do; exit code 1. `info`, `plot`, `export` and `./kerf replay` compare the same, but for the files in `volumes/` and `inputs/`, and
-end with 1 as well. A row that is damaged or out of order ends what they read; an export then writes nothing.
+`./kerf record check DIR/log` compares all that the files say twice, and all checksums, and says of each contradiction where it is,
+what stands there and what to do; exit code 1. `info`, `plot`, `export` and `./kerf replay` compare the same, but for the files in
+`volumes/` and `inputs/`, and end with 1 as well. A row that is damaged or out of order ends what they read; an export then writes
+nothing.
 
 | fact | source | compared with it |
 |---|---|---|

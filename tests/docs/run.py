@@ -60,7 +60,8 @@ NOT_HERE = {
     "names a program or an option, and is no whole command": [
         "./kerf controller$", "./kerf lab$", "./kerf stand-in$", "./kerf lab faults$", "./kerf volume import$", "./kerf controller --strict$",
         "./kerf controller --rate HZ$", "./kerf controller --port udp:HOST:5000$", "./kerf controller --report FILE$",
-        "./kerf controller --explain --report FILE$", "./kerf record info LOG"],
+        "./kerf controller --explain --report FILE$", "./kerf record info LOG", "./kerf replay$"],
+    "runs a program of the reader's own": ["./kerf stand-in --device touch --vendor-name Left"],
 }
 # What stands for a reader's own file, within text.
 OWN = (("import PATH", "import ct/ --out own.nrrd"), ("info FILE", "info tooth.nrrd"), ("--volume FILE", "--volume tooth.nrrd"),
