@@ -1,11 +1,25 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What `kerf record info` compares of a log, in NumPy: each function yields lines "place: value; remedy"."""
+"""What `kerf record info` compares of a log, in NumPy: each function but the first two yields lines "place: value; remedy"."""
+import stat
 import zlib
 
 import numpy as np
 
 ENDS_LATER = ("running", "no room")  # an end_reason: rows and losses of the manifest are not those of the whole log
 CHUNK = 1 << 14                      # rows at a time, so that a long log needs little memory
+
+
+def opened(file):
+    """To read its bytes. A pipe is refused: to open it would wait for a writer."""
+    if not stat.S_ISREG(file.stat().st_mode):
+        raise ValueError(f"{file}: no regular file; copy the recording again")
+    return file.open("rb")
+
+
+def parts_of(file):
+    """Of a log that was split, too: file, then file.0002 and so on, by number: file.10000 is behind file.1001."""
+    parts = {path: path.name[len(file.name) + 1:] for path in file.parent.glob(f"{file.name}.*")}
+    return [file, *sorted((path for path, number in parts.items() if number.isdecimal()), key=lambda path: int(parts[path]))]
 
 
 def _crc_tables():
@@ -53,8 +67,8 @@ def _size_problems(file, rows, manifest):
     """A file may have more rows than its header counts, and a part of one: it is then of a recorder that was killed."""
     if manifest.get("end_reason") in ENDS_LATER:
         return
-    for part in sorted(path for path in file.parent.glob(f"{file.name}*") if path.suffix[1:].isdecimal() or path == file):
-        with part.open("rb") as head:
+    for part in parts_of(file):
+        with opened(part) as head:
             np.lib.format.read_magic(head)
             (count,), _, dtype = np.lib.format.read_array_header_1_0(head)
             behind = part.stat().st_size - head.tell() - count * dtype.itemsize
@@ -80,7 +94,11 @@ def _scene_problems(file, manifest, scene):
     """The scene is the source of what the manifest repeats."""
     facts = {}
     if "rate_hz" in scene.get("servo", {}):
-        facts["tick_ns"] = 10**9 // scene["servo"]["rate_hz"]
+        rate_hz = scene["servo"]["rate_hz"]
+        if not rate_hz > 0:
+            yield f"{file.with_name('scene.json')}: servo.rate_hz is {rate_hz}, and not above 0; copy the recording again"
+            return
+        facts["tick_ns"] = 10**9 // rate_hz
     if "device" in scene:
         facts["arms"] = 2 if "second_device" in scene else 1
     of_manifest = {"arms": 1, **manifest}
@@ -98,13 +116,17 @@ def _scene_problems(file, manifest, scene):
 
 def _text_problems(folder, manifest):
     """The checksums of manifest.json, scene.json and clock.npy; logs of earlier versions have none."""
-    text = (folder / "manifest.json").read_bytes()
+    def bytes_of(name):
+        with opened(folder / name) as file:
+            return file.read()
+
+    text = bytes_of("manifest.json")
     before, seal, digits = text.rpartition(b',\n  "crc32": "')
     if (seal or "files" in manifest) and digits != b'%08x"\n}\n' % zlib.crc32(before):
         yield f"{folder / 'manifest.json'}: its checksum is wrong: it was changed after the recorder wrote it; copy the recording again"
     for name in ("scene.json", "clock.npy"):
         wanted = manifest.get("files", {}).get(name)
-        if wanted is not None and wanted != (crc := f"{zlib.crc32((folder / name).read_bytes()):08x}"):
+        if wanted is not None and wanted != (crc := f"{zlib.crc32(bytes_of(name)):08x}"):
             yield f"{folder / name}: its checksum is {crc}, and {wanted} in manifest.json; copy the recording again"
 
 

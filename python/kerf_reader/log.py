@@ -4,32 +4,33 @@ import pathlib
 
 import numpy as np
 
-from .check import problems
+from .check import opened, parts_of, problems
 from .layout import CLOCK, STARTED, TICK
 
 
 def _rows_of(file, kind=TICK):
     """All complete rows, also those that the header of a recorder that was killed does not count."""
-    size = file.stat().st_size
-    try:
-        with file.open("rb") as head:
-            np.lib.format.read_magic(head)
-            shape, _, dtype = np.lib.format.read_array_header_1_0(head)
+    with opened(file) as head:
+        size = file.stat().st_size
+        try:
+            version = np.lib.format.read_magic(head)
+            shape, by_columns, dtype = np.lib.format.read_array_header_1_0(head)
             rows = (size - head.tell()) // max(dtype.itemsize, 1)
             if rows < np.prod(shape, dtype=object):
                 raise ValueError
             offset = head.tell()
-    except (ValueError, EOFError, OverflowError):  # each release of NumPy has its own words
-        what = "is empty" if size == 0 else f"{size} bytes are no table of NumPy, or the file was cut"
-        raise ValueError(f"{file}: {what}; record it again, or give the folder of another recording") from None
-    if dtype != kind or len(shape) != 1:
+        except OSError:
+            raise
+        except Exception:  # each release of NumPy has its own, of which some are of its parser
+            what = "is empty" if size == 0 else f"{size} bytes are no table of NumPy, or the file was cut"
+            raise ValueError(f"{file}: {what}; record it again, or give the folder of another recording") from None
+    if dtype != kind or len(shape) != 1 or by_columns or version != (1, 0):
         raise ValueError(f"{file}: no ticks of this version of kerf; give the folder of a recording, or use its kerf_reader")
     return np.memmap(file, kind, "r", offset, rows) if rows else np.empty(0, kind)
 
 
 def _all_rows_of(file):
-    """Of a log that was split, too: file, then file.0002 and so on."""
-    parts = [file, *sorted(path for path in file.parent.glob(f"{file.name}.*") if path.suffix[1:].isdecimal())]
+    parts = parts_of(file)
     for number, path in enumerate(parts[1:], start=2):
         if path.name != f"{file.name}.{number:04}":
             raise ValueError(f"{file}.{number:04}: missing, and a later file of the log is there; copy the recording again")
@@ -38,6 +39,8 @@ def _all_rows_of(file):
 
 
 def _words_of(file):
+    with opened(file) as bytes_of:
+        text = bytes_of.read()
     twice = []
 
     def members(pairs):
@@ -49,8 +52,8 @@ def _words_of(file):
         return words
 
     try:
-        words = json.loads(file.read_text(encoding="utf-8"), object_pairs_hook=members)
-    except ValueError:
+        words = json.loads(text.decode(), object_pairs_hook=members)
+    except (ValueError, RecursionError):
         raise ValueError(f"{file}: no JSON, or the file was cut; give the folder of another recording") from None
     if twice:
         raise ValueError(f'{file}: "{twice[0]}" stands twice in it; copy the recording again')
@@ -89,7 +92,9 @@ class Log:
         logs = [self.ticks] if self.second is None else [self.ticks, self.second]
         try:
             found = next(problems(folder, self.manifest, self.scene, logs, self.clock), None)
-        except (AttributeError, KeyError, TypeError):  # another shape than that of any recorder
+        except OSError as error:
+            found = f"{error.filename}: {error.strerror}; copy the recording again"
+        except (ArithmeticError, AttributeError, KeyError, RecursionError, TypeError):  # another shape than that of any recorder
             found = f"{folder}: manifest.json and scene.json are not those of a recording; give the folder of another one"
         if found:
             raise ValueError(found)

@@ -52,7 +52,8 @@ one log. So NumPy reads all rows of any log:
             np.lib.format.read_magic(file)
             dtype = np.lib.format.read_array_header_1_0(file)[2]
         return np.fromfile(path, dtype, offset=4096)  # behind the header; without a row that was cut
-    log = np.concatenate([rows(path) for path in sorted(Path("DIR/log").glob("ticks.npy*"))])
+    parts = sorted(Path("DIR/log").glob("ticks.npy*"), key=lambda path: (len(path.name), path.name))  # .10000 is behind .9999
+    log = np.concatenate([rows(path) for path in parts])
 
 ## The date
 

@@ -95,6 +95,10 @@ class TestLogFiles(unittest.TestCase):
             run("kerf-record", "export", whole, f"--{form}", one)
             self.assertEqual(split.read_bytes(), one.read_bytes(), form)
         self.assertIn(f"{len(rows)} ticks, each equal to the last bit", run("kerf-replay", log))
+        for number in ("0004", "0005"):  # by number and not by text
+            shutil.copy(log / f"ticks.npy.{number}", whole / f"ticks.npy.{'9999' if number == '0004' else '10000'}")
+        shutil.copy(parts[0], whole / "ticks.npy")
+        self.assertEqual(all_rows(whole).tobytes(), np.concatenate([rows[:1000], rows[3000:]]).tobytes())
         parts[2].unlink()
         done = subprocess.run([BIN / "kerf-record", "info", log], capture_output=True, text=True)
         self.assertEqual((done.returncode, done.stderr), (2, f"kerf-record: {parts[2]}: missing, or cut in its header, and ticks.npy.0004 is there; "

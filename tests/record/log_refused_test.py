@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What kerf_reader refuses with its line, and neither waits for nor leaves to an error of Python: files that are none, texts and headers
+of another shape. What all readers tell alike is in check_test.py.
+
+    log_refused_test.py ROOT BIN"""
+import json
+import os
+import pathlib
+import shutil
+import struct
+import subprocess
+import sys
+import tempfile
+import unittest
+
+ROOT, BIN = (pathlib.Path(sys.argv.pop(1)).resolve() for _ in range(2))
+sys.path[:0] = [str(ROOT / "tests/record"), str(ROOT / "python")]
+from kerf_reader import Log
+from lockstep_run import record, sealed
+
+HEADER = 4096
+
+
+class TestLogRefused(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.temporary = tempfile.TemporaryDirectory()
+        cls.folder = pathlib.Path(cls.temporary.name)
+        record(ROOT, BIN, cls.folder, ROOT / "scenes/wall.toml", 0.5)
+        cls.log = cls.folder / "log"
+        cls.manifest = json.loads((cls.log / "manifest.json").read_text())
+        cls.rows = (cls.log / "ticks.npy").read_bytes()
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.temporary.cleanup()
+
+    def copy(self):
+        copy = pathlib.Path(tempfile.mkdtemp(dir=self.folder)) / "log"
+        shutil.copytree(self.log, copy)
+        return copy
+
+    def test_refuses_texts_of_another_shape(self):
+        scene = json.loads((self.log / "scene.json").read_text())
+        rates = [(rate, "scene.json: servo.rate_hz is .*; copy") for rate in (0, -0.0, False, -1000, float("nan"))]
+        for rate, words in [*rates, ("1000", "are not those of a recording; give"), (float("inf"), "tick_ns is 1000000, and 0.0 by")]:
+            (log := self.copy()).joinpath("scene.json").write_text(json.dumps({**scene, "servo": {"rate_hz": rate}}))
+            with self.subTest(rate=rate), self.assertRaisesRegex(ValueError, words):
+                Log(log)
+        for name in ("manifest.json", "scene.json"):
+            for text in ("[" * 100000, '{"a":' * 100000):
+                (log := self.copy()).joinpath(name).write_text(text)
+                with self.subTest(name), self.assertRaisesRegex(ValueError, f"{name}: no JSON, .*; give the folder"):
+                    Log(log)
+        # So large that no number of NumPy holds it, and a scene that says no rate.
+        (log := self.copy()).joinpath("scene.json").write_text("{}")
+        (log / "manifest.json").write_text(json.dumps({**self.manifest, "tick_ns": 10**30, "start_ns": 0}))
+        with self.assertRaisesRegex(ValueError, "are not those of a recording; give"):
+            Log(log)
+
+    def test_refuses_what_is_no_regular_file(self):
+        names = ("manifest.json", "scene.json", "clock.npy", "ticks.npy", "ticks.npy.0002")
+        logs = {name: self.copy() for name in names}
+        logs["clock of the checksums"] = self.copy()
+        without = {key: value for key, value in self.manifest.items() if key != "clock"}
+        (logs["clock of the checksums"] / "manifest.json").write_text(sealed(without))
+        for name, log in logs.items():
+            path = log / (name if name in names else "clock.npy")
+            path.unlink(missing_ok=True)
+            os.mkfifo(path)
+        # In a process of its own: one that waits for a writer waits for ever.
+        lines = "\n".join(("import sys", "sys.path.insert(0, sys.argv[1])", "import kerf_reader", "for log in sys.argv[2:]:", "    try:",
+                           "        kerf_reader.Log(log)", "    except ValueError as error:", "        print(error)"))
+        done = subprocess.run([sys.executable, "-B", "-c", lines, ROOT / "python", *logs.values()], capture_output=True,
+                              text=True, timeout=60)
+        wanted = [f"{log / (name if name in names else 'clock.npy')}: no regular file; copy the recording again"
+                  for name, log in logs.items()]
+        self.assertEqual(done.stdout.splitlines(), wanted, done.stderr)
+
+    def test_refuses_headers_that_the_programs_refuse(self):
+        text = self.rows[10:HEADER]
+        of_version_2 = b"\x93NUMPY\x02\0" + struct.pack("<I", len(text) - 2) + text[:-3] + b"\n"
+        for header, reader in ((self.rows[:6] + b"\x02" + self.rows[7:HEADER], "no ticks of this version of kerf; give"),
+                               (of_version_2, "; record it again, or give the folder"),
+                               (self.rows[:HEADER].replace(b"'fortran_order': False", b"'fortran_order': True "), "no ticks of this version"),
+                               (self.rows[:10] + b"{'descr': [".ljust(HEADER - 11) + b"\n", "; record it again, or give the folder"),
+                               (self.rows[:10] + (b"[" * 4000).ljust(HEADER - 11) + b"\n", "; record it again, or give the folder")):
+            with self.subTest(header[:20]):
+                self.assertEqual(len(header), HEADER)
+                (log := self.copy()).joinpath("ticks.npy").write_bytes(header + self.rows[HEADER:])
+                self.assertEqual(subprocess.run([BIN / "kerf-record", "info", log], capture_output=True).returncode, 2)
+                with self.assertRaisesRegex(ValueError, f"ticks.npy: .*{reader}"):
+                    Log(log)
+
+    def test_takes_parts_by_number(self):
+        log = self.copy()
+        for number in [*range(2, 10001), 10002]:
+            (log / f"ticks.npy.{number:04}").touch()
+        with self.assertRaisesRegex(ValueError, "ticks.npy.10001: missing, and a later file"):
+            Log(log)
+
+
+if __name__ == "__main__":
+    unittest.main()
