@@ -4,10 +4,13 @@
 #include <string>
 #include <utility>
 
+#include <sys/types.h>
+
 namespace kerf::standin {
 
 /// The right of one process to use a device: a lock on a file beside the device's socket. It ends
-/// with the process, however that ends; a child by `fork` keeps its parent's. One thread at a time.
+/// with the process, however that ends, but a child by `fork` keeps it for its parent until that
+/// gives it back. What the child gives back stays the parent's. One thread at a time.
 ///
 /// If the file cannot be made, every process may use the device, and the emulator serves the first.
 class Claim {
@@ -25,6 +28,7 @@ class Claim {
  private:
   std::string path_;
   int fd_ = -1;
+  pid_t taker_ = -1;  ///< the process that took it, if fd_ is open
 };
 
 }  // namespace kerf::standin

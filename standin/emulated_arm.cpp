@@ -58,7 +58,10 @@ EmulatedArm::EmulatedArm(const Settings& settings, const Pose& still, Ledger& le
 }
 
 EmulatedArm::~EmulatedArm() {
-  if (fd_ >= 0) close(fd_);
+  if (fd_ < 0) return;
+  // A child by `fork` has the socket too: the emulator would go on with a client that has closed.
+  if (opener_ == getpid()) shutdown(fd_, SHUT_RDWR);
+  close(fd_);
 }
 
 void EmulatedArm::connect_to(const std::string& path) {

@@ -9,6 +9,8 @@
 #include <optional>
 #include <span>
 
+#include <unistd.h>
+
 #include "shared/numeric/vec.hpp"
 #include "shared/wire/cartesian.hpp"
 #include "standin/ledger.hpp"
@@ -83,6 +85,7 @@ class EmulatedArm {
   Ledger& ledger_;
   Follow follow_;
   int fd_ = -1;
+  pid_t opener_ = getpid();
   bool closed_ = false;
   bool is_still_ = false;  ///< it is no arm
   bool hand_waits_;        ///< until the first force

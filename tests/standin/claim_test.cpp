@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "standin/claim.hpp"
 
+#include <csignal>
 #include <filesystem>
 #include <string>
 
@@ -51,4 +52,25 @@ TEST_CASE("where no file can be made, every process may use the device") {
   Claim claim("/nowhere/at/all");
   CHECK(claim.take());
   CHECK_FALSE(claim.is_with_another());
+}
+
+TEST_CASE("a child keeps nothing that its parent gave back, and gives back nothing of its parent") {
+  const std::string path =
+      (std::filesystem::temp_directory_path() / ("forked-" + std::to_string(getpid()))).string();
+  Claim mine(path), other(path);
+  CHECK(mine.take());
+  CHECK_FALSE(elsewhere([&] {
+    mine.give_back();
+    return !other.is_with_another();
+  }));
+  CHECK_FALSE(other.take());
+  const pid_t child = fork();
+  if (child == 0) {
+    for (;;) pause();
+  }
+  mine.give_back();
+  CHECK(other.take());
+  kill(child, SIGKILL);
+  waitpid(child, nullptr, 0);
+  std::filesystem::remove(path);
 }

@@ -217,6 +217,27 @@ dhd.dhdClose(0)
 assert told("dhd.dhdClose(0)") == "2 1 0 0 -1 -1".split()
 dhd.dhdClose(1)
 """
+# A child by fork has all open files of its parent, and sleeps while the parent closes and opens its devices.
+FORKED = HD + DHD.replace("def position(", "def position_m(") + """
+def child(work):
+    number = os.fork()
+    if number == 0:
+        work()
+        os._exit(0)
+    return number
+assert (hd.hdInitDevice(None), dhd.dhdOpen()) == (0, 0)
+asleep = child(lambda: time.sleep(600))
+for _ in range(2):
+    hd.hdDisableDevice(0)
+    assert dhd.dhdClose(0) == 0
+    got = hd.hdInitDevice(None), error()[0], dhd.dhdOpen(), dhd.dhdErrorGetLast()
+    if got != (0, 0, 0, 0): break
+os.kill(asleep, 9)
+os.waitpid(asleep, 0)
+assert got == (0, 0, 0, 0), got
+hd.hdDisableDevice(0)
+dhd.dhdClose(0)
+"""
 BOTH = HD + DHD.replace("def position(", "def position_m(") + """
 touch, omega = hd.hdInitDevice(None), dhd.dhdOpen()
 assert (touch, omega, dhd.dhdGetDeviceCount()) == (0, 0, 1)
@@ -366,6 +387,10 @@ class Omegas(Devices):
 
     def test_a_device_takes_its_rate_of_commands_from_all_threads_together(self):
         code, report, told, said = self.run_program(SLOTS, options=["--device", "omega", "--rate", "100"], lockstep=False)
+    def test_a_child_by_fork_keeps_no_device_that_its_parent_has_closed(self):
+        code, report, _, said = self.run_program(FORKED, options=["--device", "touch", "--device", "omega"])
+        self.assertEqual((code, report["misuse"], report["notes"]), (0, [], []), said)
+
         self.assertEqual((code, report["misuse"]), (0, []), said)
         self.assertLessEqual(told["sent"], told["most"])
         least, most = told["slots"]  # of the second part
