@@ -34,6 +34,7 @@ NOTES = {
     "in_use": "times that a program opened the device while another one used it",
     "warm": "times that a motor came to be warm",
 }
+OF_ONE = {"forces": "force", "steps": "step", "ticks": "tick", "times": "time", "expiries": "expiry"}  # the notes' first words
 
 
 def read_ledger(path):
@@ -181,6 +182,11 @@ def newtons(value):
     return "unknown" if value is None else f"{value:.2f} N" if value < 1e6 else f"{value:.3g} N"
 
 
+def counted(note):
+    count, (what, rest) = note["count"], note["meaning"].split(" ", 1)
+    return f"{count} {OF_ONE[what] if count == 1 else what} {rest}"
+
+
 def summary(report):
     """Lines for a person."""
     for device in report.get("devices", [report]):
@@ -197,6 +203,6 @@ def summary(report):
     misused = {(one.get("of"), one["what"]) for one in report["misuse"]}
     for one in report["notes"]:
         if (one.get("of"), one["what"]) not in misused:
-            yield f"note: {one['of'] + ': ' if 'of' in one else ''}{one['count']} {one['meaning']}"
+            yield f"note: {one['of'] + ': ' if 'of' in one else ''}{counted(one)}"
     for one in report["misuse"]:
         yield f"misuse: {one['of'] + ': ' if 'of' in one else ''}{one['what']}: {one['count']} x {one['meaning']}"

@@ -356,6 +356,7 @@ class Touches(Devices):
             with self.subTest(word=word):
                 code, report, _, said = self.run_program(SECOND_HD, ask, json.dumps(wanted), options=["--switch", f"in-use={word}"])
                 self.assertEqual((code, [one["what"] for one in report["notes"]]), (0, ["in_use"]), said)
+                self.assertIn("note: 1 time that a program opened the device", said)
                 self.assertEqual(report["force"]["given_peak_n"], 0)
         self.assertEqual(self.run_program(SECOND_HD, ask, json.dumps([0xFFFFFFFF, 0x304, None]))[0], 0)
 
@@ -377,6 +378,7 @@ class Omegas(Devices):
         self.assertEqual((report["exit_code"], {(one["of"], one["what"]) for one in report["misuse"]}),
                          (0, {("omega omega.3 2", "left_open")}), said)  # the one that was killed
         self.assertEqual([(one["of"], one["what"], one["count"]) for one in report["notes"]], [("omega omega.3", "in_use", 2)])
+        self.assertIn("note: omega omega.3: 2 times that a program", said)
 
     def test_one_program_has_a_touch_and_an_omega(self):
         code, report, _, said = self.run_program(BOTH, options=["--device", "touch", "--device", "omega"])
