@@ -2,6 +2,7 @@
 """The options of `./kerf stand-in`, checked against each other and against what the libraries take."""
 import ctypes
 import dataclasses
+import itertools
 import os
 import re
 
@@ -102,17 +103,25 @@ def check_device(device, lockstep):
             raise Refusal(f"{name} {path}: no such file; name a script")
 
 
+def free_name(kind, number, given):
+    """The usual one of the device of that number, or of the next number whose name no device of the kind has."""
+    names = (NAMES[kind] + (f" {at}" if at > 1 else "") for at in itertools.count(number))
+    return next(name for name in names if (kind, name) not in given)
+
+
 def check_devices(options):
     """Each, and all of a kind together. Devices without a name get one."""
     if len(options.devices) > MOST_DEVICES:
         raise Refusal(f"--device {options.devices[MOST_DEVICES].kind}: number {MOST_DEVICES + 1}; a program has at most "
                       f"{MOST_DEVICES} devices")
     of_kind = {}
+    given = {(device.kind, device.name) for device in options.devices}
     for device in options.devices:
         check_device(device, options.lockstep)
         others = of_kind.setdefault(device.kind, [])
         if not device.name:
-            device.name = NAMES[device.kind] + (f" {len(others) + 1}" if others else "")
+            device.name = free_name(device.kind, len(others) + 1, given)
+            given.add((device.kind, device.name))
         for other in others:
             if other.name == device.name:
                 raise Refusal(f"--vendor-name {device.name}: two devices of one kind have it; give each its own")

@@ -387,12 +387,12 @@ class Omegas(Devices):
         self.assertEqual((touch["force"]["peak_n"], omega["force"]["peak_n"]), (0.5, 1.5))
         self.assertEqual((touch["deadlines"]["ticks"], omega["deadlines"]["ticks"]), (201, 203))  # with the one that enables and the one that stops
 
-    def test_a_device_takes_its_rate_of_commands_from_all_threads_together(self):
-        code, report, told, said = self.run_program(SLOTS, options=["--device", "omega", "--rate", "100"], lockstep=False)
     def test_a_child_by_fork_keeps_no_device_that_its_parent_has_closed(self):
         code, report, _, said = self.run_program(FORKED, options=["--device", "touch", "--device", "omega"])
         self.assertEqual((code, report["misuse"], report["notes"]), (0, [], []), said)
 
+    def test_a_device_takes_its_rate_of_commands_from_all_threads_together(self):
+        code, report, told, said = self.run_program(SLOTS, options=["--device", "omega", "--rate", "100"], lockstep=False)
         self.assertEqual((code, report["misuse"]), (0, []), said)
         self.assertLessEqual(told["sent"], told["most"])
         least, most = told["slots"]  # of the second part
@@ -401,12 +401,26 @@ class Omegas(Devices):
         self.assertLessEqual(slots, told["most"] + most)
 
 
+class Names(Case):
+    def test_a_device_without_a_name_gets_the_next_that_no_device_of_its_kind_has(self):
+        touch, named = ["--device", "touch"], lambda name: ["--vendor-name", name]
+        for options, names in (([*touch, *named("Default Device 2"), *touch], ["Default Device 2", "Default Device 3"]),
+                               ([*touch, *touch, *named("Default Device")], ["Default Device 2", "Default Device"]),
+                               ([*touch, *touch, *touch, *named("Default Device 2")],
+                                ["Default Device", "Default Device 3", "Default Device 2"]),
+                               ([*touch, *named("Left"), *touch, "--device", "omega", *named("Default Device 2")],
+                                ["Left", "Default Device 2", "Default Device 2"]),
+                               (["--device", "omega", *named("omega.3 2"), "--device", "omega"], ["omega.3 2", "omega.3 3"])):
+            with self.subTest(options=options):
+                _, report, said = self.run_command("true", options=options)
+                self.assertEqual([device["name"] for device in report["devices"]] if report else None, names, said)
+
+
 class BadInput(Case):
     def test_devices_that_cannot_be_together_are_one_line(self):
         for options, word in ((["--device", "touch"] * 5, "at most 4 devices"),
                               (["--vendor-name", "L", "--device", "touch", "--device", "touch"], "--vendor-name L: two devices"),
                               ([*TOUCHES[:4], *TOUCHES[:4]], "--vendor-name Left: two devices"),
-                              (["--device", "touch", "--device", "touch", "--vendor-name", "Default Device"], "two devices"),
                               (["--device", "touch", "--vendor-name", "a,b"], "comma"),
                               (["--device", "touch", "--vendor-name", "a\nb"], "cannot be printed"),
                               (["--device", "touch", "--device", "touch", "--rate", "500"], "one servo thread"),
