@@ -134,7 +134,8 @@ void write_with_end(const std::filesystem::path& folder, Json manifest, const Re
   manifest["end_reason"] = end_reason;
   if (!summaries.empty()) manifest["summary"] = figures_of(summaries[0]);
   if (summaries.size() > 1) manifest["summary_2"] = figures_of(summaries[1]);
-  manifest["files"] = checksums_of(folder, is_of_whole_log(end_reason));
+  manifest["files"] =
+      checksums_of(folder, is_of_whole_log(end_reason) || end_reason == kUnknownEnd);
   write_new_file(folder / kManifestName, sealed(manifest));
 }
 

@@ -39,11 +39,14 @@ inline constexpr std::string_view kSceneName = "scene.json";
 inline constexpr std::string_view kStillRunning = "running";
 inline constexpr std::string_view kFault = "fault";     ///< the run did not end as it was asked to
 inline constexpr std::string_view kNoRoom = "no room";  ///< the disk was full
+/// The manifest was made anew, and nothing says how the run ended: its recorder may have been
+/// killed.
+inline constexpr std::string_view kUnknownEnd = "unknown";
 
 /// Whether the recorder wrote a manifest after its last row, so that rows and losses are those of
 /// the whole recording. Else the rows say more than the manifest.
 [[nodiscard]] inline bool is_of_whole_log(std::string_view end_reason) noexcept {
-  return end_reason != kStillRunning && end_reason != kNoRoom;
+  return end_reason != kStillRunning && end_reason != kNoRoom && end_reason != kUnknownEnd;
 }
 
 /// The log of an arm: ticks.npy of the first, ticks-2.npy of the second. Both have the same rows:

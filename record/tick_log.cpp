@@ -91,6 +91,25 @@ std::string why_out_of_order(const TickRecord& before, const TickRecord& row) {
          std::to_string(before.seq);
 }
 
+namespace {
+
+/// The name of a file of this log behind that of number `part`; empty if there is none.
+std::string part_behind(const std::filesystem::path& path, std::size_t part) {
+  const std::string begin = path.filename().string() + ".";
+  std::error_code fault;
+  for (std::filesystem::directory_iterator at(path.parent_path() / ".", fault), end;
+       !fault && at != end; at.increment(fault)) {
+    const std::string name = at->path().filename().string();
+    if (!name.starts_with(begin)) continue;
+    std::size_t number = 0;
+    std::from_chars(name.data() + begin.size(), name.data() + name.size(), number);
+    if (number > part && part_of_log(path, number).filename() == name) return name;
+  }
+  return {};
+}
+
+}  // namespace
+
 TickLogReader::TickLogReader(std::filesystem::path path) : path_(std::move(path)) {
   static_cast<void>(add_part(path_));
   const auto is_there = [&](std::size_t part) {
@@ -100,10 +119,10 @@ TickLogReader::TickLogReader(std::filesystem::path path) : path_(std::move(path)
   // The last one has no header yet if its recorder was killed as it began it.
   std::size_t part = 2;
   while (is_there(part) && add_part(part_of_log(path_, part))) ++part;
-  if (is_there(part + 1)) {
+  const std::string later = part_behind(path_, part);
+  if (!later.empty()) {
     throw RecordError(part_of_log(path_, part).string() + ": missing, or cut in its header, and " +
-                      part_of_log(path_, part + 1).filename().string() +
-                      " is there; copy the recording again");
+                      later + " is there; copy the recording again");
   }
 }
 

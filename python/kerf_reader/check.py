@@ -5,7 +5,7 @@ import zlib
 
 import numpy as np
 
-ENDS_LATER = ("running", "no room")  # an end_reason: rows and losses of the manifest are not those of the whole log
+ENDS_LATER = ("running", "no room", "unknown")  # an end_reason: rows and losses of the manifest are not those of the whole log
 CHUNK = 1 << 14                      # rows at a time, so that a long log needs little memory
 
 

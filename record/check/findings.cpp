@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "record/manifest_seal.hpp"
 #include "shared/text/text.hpp"
 
 namespace kerf {
@@ -18,6 +17,7 @@ std::string shown(const Json& value) {
 Findings::Findings(std::filesystem::path folder)
     : folder_(std::move(folder)),
       text_(manifest_text(folder_)),
+      seal_(seal_of(text_)),
       manifest_(read_manifest(folder_)),
       json_(Json::parse(text_)) {
   try {
@@ -33,6 +33,7 @@ void Findings::add(const std::filesystem::path& name, const std::string& what,
 }
 
 void Findings::add_to_manifest(const std::string& what) {
+  if (seal_ == Seal::whole) return add(kManifestName, what);
   in_manifest_ = true;
   add(kManifestName, what,
       "; copy the recording again, or kerf record check --repair makes it anew");
@@ -62,8 +63,7 @@ void Findings::check_manifest_text() {
   if (const auto twice = doubled_key(text_)) {
     add_to_manifest("\"" + one_line(*twice) + "\" stands twice in it");
   }
-  const Seal seal = seal_of(text_);
-  if (seal == Seal::broken || (seal == Seal::none && json_.contains("files"))) {
+  if (seal_ == Seal::broken || (seal_ == Seal::none && json_.contains("files"))) {
     add_to_manifest("its checksum is wrong: it was changed after the recorder wrote it");
   }
 }

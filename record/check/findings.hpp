@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "record/manifest.hpp"
+#include "record/manifest_seal.hpp"
 #include "shared/text/json.hpp"
 
 namespace kerf {
@@ -28,6 +29,8 @@ class Findings {
   /// Of a file of the folder.
   void add(const std::filesystem::path& name, const std::string& what,
            std::string_view remedy = "; copy the recording again");
+  /// The manifest is to blame, unless its own checksum is right: then it is as the recorder wrote
+  /// it, what differs from it was changed, and making it anew would hide that.
   void add_to_manifest(const std::string& what);
 
   /// Compares member `key` of an object of the manifest with what it follows from. True if it is as
@@ -47,6 +50,7 @@ class Findings {
  private:
   std::filesystem::path folder_;
   std::string text_;  ///< of the manifest
+  Seal seal_;
   Manifest manifest_;
   Json json_;
   Json::Members files_;

@@ -75,7 +75,7 @@ RowFacts row_facts(const fs::path& path, const Manifest& scene, std::string_view
 /// How the run ended: only the old manifest says it.
 std::string end_of(const Json& old) {
   const bool says_it = old.contains("end_reason") && old.at("end_reason").is_text();
-  return says_it ? old.at("end_reason").get<std::string>() : "unknown";
+  return says_it ? old.at("end_reason").get<std::string>() : std::string(kUnknownEnd);
 }
 
 /// The first manifest that is replaced stays beside it.

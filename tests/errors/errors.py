@@ -78,6 +78,7 @@ class Runner:
             'PATH': f'{self.programs}:{self.root}:/usr/sbin:/usr/bin:/sbin:/bin', 'HOME': folder, 'LC_ALL': 'C.UTF-8',
             'KERF_BIN': str(self.programs), 'TMPDIR': f'{folder}/private', 'XDG_RUNTIME_DIR': f'{folder}/private',
             'HERE': str(HERE), 'LOG': f'{self.shared}/log', 'MPLCONFIGDIR': f'{self.shared}/fonts',
+            'MESA_SHADER_CACHE_DISABLE': 'true',  # else llvmpipe of Debian 13 leaves files in HOME
             'KERF_HIDE_SETS': os.environ.get('KERF_HIDE_SETS', '')}
         # Root without its power over files: what a user has no rights to, it has none to either.
         user = ['setpriv', '--bounding-set=-dac_override,-dac_read_search', '--inh-caps=-all']
@@ -102,6 +103,7 @@ class Runner:
         said = (private / 'said').read_text(errors='replace').rstrip('\n').replace(folder, 'DIR')
         said = re.sub(r'process \d+', 'process N', said)
         said = re.sub(r'ended on .* GMT', 'ended on DAY', said)
+        said = re.sub(r'(screen cannot be opened) \((X11: Failed to open|Failed to detect)[^)]*\)', r'\1 (REASON)', said)
         said = re.sub(r'the recording ends at tick \d+', 'the recording ends at tick N', said)  # it runs by the clock
         # A note of another process, and no answer: on a busy machine it comes before the answer or after it.
         said = re.sub(r'^kerf-controller: waiting for .*\n?', '', said, flags=re.M)

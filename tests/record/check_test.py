@@ -237,7 +237,7 @@ class TestCheck(unittest.TestCase):
                 path = log / "manifest.json"
                 path.unlink()
                 if how != "lost":
-                    path.write_text({"no JSON": "{", "wrong": sealed({**self.manifest, "tick_ns": 5, "lost_ticks": 9}), "foreign": "[]"}[how])
+                    path.write_text({"no JSON": "{", "wrong": json.dumps({**self.manifest, "tick_ns": 5, "lost_ticks": 9}), "foreign": "[]"}[how])
                 code, _, said = check(log)
                 self.assertEqual(code, 1)
                 self.assertIn("--repair", said)
@@ -258,6 +258,39 @@ class TestCheck(unittest.TestCase):
         (log / "manifest.json").unlink()
         self.assertEqual(check(log, "--repair")[0], 0)
         self.assertEqual(figures(log)[2], figures(self.flight)[2])
+
+    def test_a_killed_recorder_may_lose_its_manifest(self):
+        log, rows = self.killed()
+        (log / "manifest.json").unlink()
+        code, said, wrong = check(log, "--repair")
+        self.assertEqual((code, wrong), (0, ""), said)
+        self.assertRegex(run("kerf-record", "info", log)[1], rf"rows +{rows}\n")
+
+    def test_a_manifest_that_is_right_hides_no_change_of_other_files(self):
+        def scene(log):
+            text = (log / "scene.json").read_text()
+            (log / "scene.json").write_text(text.replace('"stiffness_n_per_mm":', '"stiffness_n_per_mm":1'))
+
+        def last_row(log):
+            count = (len(self.rows) - HEADER) // ROW
+            header = self.rows[:HEADER].replace(b"(%d,)" % count, b"(%d,)" % (count - 1))
+            (log / "ticks.npy").write_bytes(header + self.rows[HEADER:-ROW])
+
+        for change in (scene, last_row):
+            with self.subTest(change.__name__):
+                log = self.copy()
+                change(log)
+                before = (log / "manifest.json").read_bytes()
+                code, said, wrong = check(log, "--repair")
+                self.assertEqual(code, 1)
+                self.assertNotIn("made anew", said + wrong)
+                self.assertEqual((log / "manifest.json").read_bytes(), before)
+
+    def test_a_part_of_a_log_behind_lost_ones_is_told(self):
+        for log in (self.copy(), self.killed()[0]):
+            shutil.copy(log / "ticks.npy", log / "ticks.npy.0004")
+            self.assertIn("ticks.npy.0002: missing, or cut in its header, and ticks.npy.0004 is there", check(log)[2])
+            self.assertNotEqual(run("kerf-record", "info", log)[0], 0)
 
     def test_what_cannot_be_repaired_says_why(self):
         log = self.copy()

@@ -145,7 +145,7 @@ fi
 
 ((failures == 0)) || exit 1
 if [[ -n ${skipped:-} ]]; then
-  echo "clones: $skipped; all else is fine" >&2
+  echo "skipped: $skipped; all else is fine" >&2
   exit 77
 fi
 echo 'clones: fine'

@@ -251,13 +251,17 @@ WebSocket::WebSocket(const HostPort& where, int timeout_ms, const std::atomic<bo
   connect(c.io, c.line().next_layer(), where, limit);
   c.stream.read_message_max(kMostMessageBytes);
   websocket::response_type answer;
-  answer.result(0U);  // until there is one
+  ErrorCode error;  // alone says whether there is an answer: Boost sets a status of its own before
   try {
-    await(c.io, c.line().next_layer(), limit, "the upgrade to a WebSocket",
-          [&](auto done) { c.stream.async_handshake(answer, host_header(where), "/", done); });
+    await(c.io, c.line().next_layer(), limit, "the upgrade to a WebSocket", [&](auto done) {
+      c.stream.async_handshake(answer, host_header(where), "/", [&error, done](ErrorCode result) {
+        error = result;
+        done(result);
+      });
+    });
   } catch (const std::runtime_error&) {
-    if (answer.result_int() != 0) throw UpgradeRefused({answer.result_int(), answer.body()});
-    throw;
+    if (error != websocket::error::upgrade_declined) throw;
+    throw UpgradeRefused({answer.result_int(), answer.body()});
   }
   c.begin_reading();
 }
