@@ -19,7 +19,7 @@ controller/plan/tables controller/plan/method controller/plan controller/volume_
 controller/device/port controller/device/firewire controller/device/arm controller/device/inverse3 controller/device
 controller/loop controller/run controller
 
-record record/check record/export
+record record/check record/run record/export
 
 replay
 

@@ -4,18 +4,15 @@
 #include <atomic>
 #include <chrono>
 #include <cstdint>
-#include <filesystem>
 #include <string>
 #include <string_view>
-#include <vector>
 
 #include "record/manifest.hpp"
 #include "record/tick_log_writer.hpp"
-#include "shared/segment/command.hpp"
 #include "shared/segment/connection.hpp"
 #include "shared/segment/reader.hpp"
 
-// The recorder: ring of ticks to log, and the run of kerf-recorder.
+// How the programs of this folder follow a run: connection, ring of ticks to a log, end.
 
 namespace kerf {
 
@@ -61,39 +58,15 @@ class Recorder {
 };
 
 inline constexpr std::chrono::milliseconds kPollPeriod{5};
-inline constexpr double kMostFlightS = 3600;
 
-/// Options of kerf-recorder.
-struct RecorderOptions {
-  std::string name = kDefaultName;
-  std::filesystem::path out;
-  double wait_s = 10;  ///< for the controller to appear
-  bool strict = false;
-  bool resume = false;  ///< continues the recording of the same run in `out`, if there is one
-  std::string lead;     ///< FIFO of a controller in lock-step (--until), which then loses no tick
-  double flight_s = 0;  ///< above 0: a flight recorder of as many seconds
-  std::string split;    ///< run time of each file of the log, as "10m"; empty: one file
-  std::filesystem::path report;  ///< may be empty
-};
-
-/// Seconds of a text as "90s", "10m" or "2h", from 1 s to 24 h. Throws `UsageError`.
-[[nodiscard]] double split_s(const std::string& text);
-
-/// False if help or version was requested, and printed. Throws `UsageError`.
-[[nodiscard]] bool parse_options(int argc, char** argv, RecorderOptions& options);
-
-/// Waits for controller `options.name` and connects. Throws `SegmentError` if none comes in time.
-[[nodiscard]] SegmentConnection connect_within(const RecorderOptions& options,
+/// Waits for controller `name` and connects. Throws `SegmentError` if none comes within `wait_s` or
+/// before `stop`.
+[[nodiscard]] SegmentConnection connect_within(const std::string& name, double wait_s,
                                                const std::atomic<bool>& stop);
 
 /// Whether nothing more will be published.
 [[nodiscard]] bool has_ended(const SegmentConnection& connection) noexcept;
 /// The reason, as in manifest.json.
 [[nodiscard]] std::string_view end_reason(const SegmentReader& reader, bool stopped) noexcept;
-
-/// Records the controller `options.name` into the folder `options.out` until it ends or `stop`:
-/// ticks.npy (ticks-2.npy of a second arm), clock.npy, scene.json, manifest.json. Returns the exit
-/// code: 0, or 1 under `strict` if ticks were lost. Bad input and a full disk throw.
-[[nodiscard]] int run_recorder(const RecorderOptions& options, const std::atomic<bool>& stop);
 
 }  // namespace kerf

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "record/flight_recorder.hpp"
+#include "record/run/flight_recorder.hpp"
 
 #include <algorithm>
 #include <atomic>
@@ -16,6 +16,8 @@
 
 #include "controller/servo/servo.hpp"
 #include "record/recording.hpp"
+#include "record/run/flight_notice.hpp"
+#include "record/run/tick_window.hpp"
 #include "shared/segment/server.hpp"
 #include "tests/record/record_support.hpp"
 #include "tests/support/process.hpp"

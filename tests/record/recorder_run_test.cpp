@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "record/run/recorder_run.hpp"
+
 #include <array>
 #include <chrono>
 #include <csignal>
@@ -9,7 +11,6 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "record/recorder.hpp"
 #include "record/recording.hpp"
 #include "record/tick_log.hpp"
 #include "shared/segment/server.hpp"

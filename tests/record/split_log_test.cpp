@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <vector>
 
-#include "record/recorder.hpp"
 #include "record/recording.hpp"
+#include "record/run/recorder_run.hpp"
 #include "record/tick_log_writer.hpp"
 #include "shared/segment/server.hpp"
 #include "shared/text/command_line.hpp"

@@ -103,7 +103,7 @@ REPORTS = [
         ("command_age_us", "us", "of the commands whose force was given, likewise"),
         ("errors", "", "how often each error of the library was seen, by name"),
         ("failure", "", "why it ended; null: it was asked to")]),
-    ("Recorder", "`./kerf recorder --report FILE`.", [("record/recorder.cpp", "void write_report(")], [], [
+    ("Recorder", "`./kerf recorder --report FILE`.", [("record/run/recorder_run.cpp", "void write_report(")], [], [
         ("rows", "", "ticks in the log"),
         ("lost_ticks, gaps", "", "ticks that were overwritten before they were read; in how many places"),
         ("missed_before_start", "", "ticks published before the recorder came, and gone"),

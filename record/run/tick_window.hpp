@@ -2,18 +2,17 @@
 #pragma once
 
 #include <array>
-#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <deque>
-#include <filesystem>
 #include <string>
 #include <vector>
 
-#include "record/recorder.hpp"
 #include "record/tick_log_writer.hpp"
+#include "shared/segment/layout.hpp"
 
-// The flight recorder: the last ticks of a run in memory of constant size, kept on request.
+// The memory of a flight recorder: the last ticks of a run, and what in them is a reason to keep
+// them.
 
 namespace kerf {
 
@@ -62,21 +61,5 @@ class TickWindow final : public TickSink {
   std::array<std::uint32_t, kMaxArms> faults_{};  // of each arm
   std::deque<Event> events_;
 };
-
-/// Keeps the last `options.flight_s` of controller `options.name` in memory until it ends or
-/// `stop`. On a fault, a mark, SIGUSR1 or an end of the run that was not requested, it writes them
-/// as a recording to `options.out`/TICK-REASON, which appears only when it is complete. The
-/// recording can be replayed if the flight recorder saw the run from its first tick: then it also
-/// has the inputs before its window (earlier_inputs.hpp), which meanwhile are in
-/// `options.out`/.run-NAME. At most `kMostKept` recordings. Throws for bad input. Reports a
-/// recording that cannot be written, as on a full disk, in one line, and goes on. Returns the exit
-/// code: 0, or 1 after that line again if there was such a recording.
-[[nodiscard]] int run_flight_recorder(const RecorderOptions& options,
-                                      const std::atomic<bool>& stop);
-
-/// Asks the flight recorder of controller `name` to keep its window, by a mark in the run. Returns
-/// the folder of the recording, once that is whole. Throws `SegmentError` if no controller or no
-/// flight recorder of that name runs, or if 10 s pass in which it writes none.
-[[nodiscard]] std::filesystem::path grab(const std::string& name);
 
 }  // namespace kerf

@@ -1,13 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "record/flight_recorder.hpp"
+#include "record/run/flight_recorder.hpp"
 
 #include <algorithm>
-#include <array>
 #include <chrono>
 #include <cmath>
 #include <csignal>
-#include <cstdio>
-#include <fstream>
 #include <future>
 #include <iostream>
 #include <optional>
@@ -16,83 +13,19 @@
 #include <thread>
 #include <utility>
 
-#include "record/earlier_inputs.hpp"
 #include "record/log_clock.hpp"
+#include "record/recorder.hpp"
 #include "record/recording.hpp"
-#include "record/starting_volumes.hpp"
+#include "record/run/flight_notice.hpp"
+#include "record/run/run_start.hpp"
+#include "record/run/tick_window.hpp"
 #include "shared/posix/atomic_file.hpp"
 #include "shared/posix/tick_lead.hpp"
 #include "shared/segment/connection.hpp"
 #include "shared/segment/layout.hpp"
-#include "shared/segment/log_columns.hpp"
 
 namespace kerf {
 namespace {
-
-std::string fault_word(std::uint32_t fault) {
-  for (const LogCode& code : log_faults()) {
-    if (code.value == fault) return std::string(code.name);
-  }
-  return "fault-" + std::to_string(fault);
-}
-
-}  // namespace
-
-void TickWindow::look_for_fault(const TickRecord& record, std::size_t arm) {
-  const std::uint32_t before = std::exchange(faults_[arm], record.fault);
-  if (record.fault == 0 || record.fault == before) return;
-  add_event((arm == 0 ? "" : "arm-2-") + fault_word(record.fault), record.tick);
-}
-
-void TickWindow::add_event(std::string reason, Tick tick) {
-  if (events_.size() < kMostKept) events_.push_back({std::move(reason), tick});
-}
-
-void TickWindow::append_second(const TickRecord& record) {
-  second_[end_ % second_.size()] = record;
-  look_for_fault(record, 1);
-}
-
-void TickWindow::append(const TickRecord& record) {
-  rows_[end_++ % rows_.size()] = record;
-  look_for_fault(record, 0);
-  if ((record.command & kCommandKind) == kCommandMark) add_event("mark", record.tick);
-}
-
-TickWindow::Event TickWindow::take_event() {
-  if (events_.empty()) return {};
-  Event event = std::move(events_.front());
-  events_.pop_front();
-  return event;
-}
-
-namespace {
-
-constexpr const char* kSuffix = ".flight";
-constexpr const char* kRunFolder = ".run-";
-
-/// Where a flight recorder says that it runs, and into which folder it writes.
-class FlightNotice {
- public:
-  FlightNotice(const std::string& name, const std::filesystem::path& out)
-      : lock_(name + kSuffix), path_(file_of(name)) {
-    write_new_file(path_, std::filesystem::absolute(out).string());
-  }
-  ~FlightNotice() {
-    std::error_code gone;
-    std::filesystem::remove(path_, gone);
-  }
-  FlightNotice(const FlightNotice&) = delete;
-  FlightNotice& operator=(const FlightNotice&) = delete;
-
-  static std::filesystem::path file_of(const std::string& name) {
-    return segment_folder() + "/" + name + kSuffix;
-  }
-
- private:
-  NameLock lock_;
-  std::filesystem::path path_;
-};
 
 volatile std::sig_atomic_t g_asked = 0;
 
@@ -102,71 +35,6 @@ void catch_requests() noexcept {
   action.sa_flags = SA_RESTART;
   sigaction(SIGUSR1, &action, nullptr);
 }
-
-/// A folder that sorts by time: TICK-REASON.
-std::string folder_name(const TickWindow::Event& event) {
-  std::array<char, 24> tick{};
-  std::snprintf(tick.data(), tick.size(), "%012llu", static_cast<unsigned long long>(event.tick));
-  return std::string(tick.data()) + "-" + event.reason;
-}
-
-/// The start of the run, for recordings of its end: volumes and inputs, in a hidden folder that
-/// lasts as long as the flight recorder.
-class RunStart {
- public:
-  RunStart(const std::string& name, const std::filesystem::path& out, std::size_t arms)
-      : folder_(new_folder(out / (kRunFolder + name))), volumes_(name, folder_), inputs_(folder_) {
-    if (arms > 1) second_inputs_.emplace(folder_, 1);
-  }
-  ~RunStart() {
-    static_cast<void>(volumes_.finish());
-    std::error_code ignored;
-    std::filesystem::remove_all(folder_, ignored);
-  }
-  RunStart(const RunStart&) = delete;
-  RunStart& operator=(const RunStart&) = delete;
-
-  void add_second(const TickRecord& record) { second_inputs_->add(record); }
-  void add(const TickRecord& record) { inputs_.add(record); }
-
-  /// Whether the volumes are on the disk, or will not be.
-  [[nodiscard]] bool has_volumes() const noexcept { return volumes_.done(); }
-
-  /// Puts the inputs up to tick `last` into the recording in `folder`. Returns why it cannot be
-  /// replayed; empty: it can. Throws FileError.
-  [[nodiscard]] std::string keep_inputs(const std::filesystem::path& folder, Tick last) {
-    std::string problem = inputs_.keep(folder, last);
-    if (problem.empty() && second_inputs_) problem = second_inputs_->keep(folder, last);
-    return problem.empty() ? "" : "cannot be replayed: " + problem;
-  }
-
-  /// The same with the volumes, after `has_volumes`. Returns what a replay lacks.
-  [[nodiscard]] std::string keep_volumes(const std::filesystem::path& folder) {
-    std::error_code fault;
-    const std::filesystem::path from = folder_ / kVolumesName;
-    for (std::filesystem::directory_iterator file(from, fault), end; !fault && file != end;
-         file.increment(fault)) {
-      std::filesystem::create_directory(folder / kVolumesName, fault);
-      link_file(file->path(), folder / kVolumesName / file->path().filename());
-    }
-    std::string lacks;
-    for (const std::string& problem : volumes_.finish()) lacks += "; " + problem;
-    return lacks.empty() ? "" : lacks.substr(2);
-  }
-
- private:
-  static std::filesystem::path new_folder(const std::filesystem::path& folder) {
-    std::error_code ignored;
-    std::filesystem::remove_all(folder, ignored);  // of one that was killed
-    make_recording_folder(folder);
-    return folder;
-  }
-
-  std::filesystem::path folder_;
-  StartingVolumes volumes_;
-  EarlierInputs inputs_;
-  std::optional<EarlierInputs> second_inputs_;
-};
 
 class FlightRecorder final : TickSink {
  public:
@@ -178,7 +46,7 @@ class FlightRecorder final : TickSink {
             std::ceil(options.flight_s * 1e9 / reader().info().tick_ns))),
         window_(capacity_ + reader().info().state_slots, reader().info().arms),
         watch_(reader().info().start_ns == 0),
-        start_(options.name, options.out, reader().info().arms),
+        start_(options.name, options.out / run_folder(options.name), reader().info().arms),
         recorder_(reader(), *this) {
     if (!options.lead.empty()) lead_.emplace(options.lead);
   }
@@ -257,7 +125,7 @@ class FlightRecorder final : TickSink {
 
   void keep(const TickWindow::Event& event) {
     if (window_.end() == 0) return;
-    const std::filesystem::path folder = out_ / folder_name(event);
+    const std::filesystem::path folder = out_ / flight_folder(event);
     if (folder == last_kept_) return;  // asked for twice in one tick
     if (std::filesystem::exists(folder)) {
       fail(folder.string() +
@@ -358,7 +226,7 @@ class FlightRecorder final : TickSink {
 int run_flight_recorder(const RecorderOptions& options, const std::atomic<bool>& stop) {
   catch_requests();  // else one that comes too early stops the recorder
   check_new_folder(options.out);
-  const SegmentConnection connection = connect_within(options, stop);
+  const SegmentConnection connection = connect_within(options.name, options.wait_s, stop);
   make_recording_folder(options.out);
   const FlightNotice notice(options.name, options.out);
   FlightRecorder recorder(options, connection);
@@ -372,69 +240,6 @@ int run_flight_recorder(const RecorderOptions& options, const std::atomic<bool>&
   if (recorder.failure().empty()) return 0;
   std::cerr << "kerf-recorder: " << recorder.failure() << '\n';  // again: it may be hours ago
   return 1;
-}
-
-namespace {
-
-/// Bytes of the recordings in `out` that are not whole yet: their folders are hidden. They grow
-/// while a flight recorder writes; those that a killed one has left do not.
-std::uintmax_t unfinished_bytes(const std::filesystem::path& out) {
-  std::uintmax_t bytes = 0;
-  std::error_code fault;
-  for (std::filesystem::directory_iterator folder(out, fault), end; !fault && folder != end;
-       folder.increment(fault)) {
-    const std::string name = folder->path().filename().string();
-    if (!name.starts_with(".") || name.starts_with(kRunFolder)) continue;
-    std::error_code gone;
-    for (std::filesystem::directory_iterator file(folder->path(), gone); !gone && file != end;
-         file.increment(gone)) {
-      std::error_code unknown;
-      const std::uintmax_t size = file->file_size(unknown);
-      if (!unknown) bytes += size;
-    }
-  }
-  return bytes;
-}
-
-}  // namespace
-
-std::filesystem::path grab(const std::string& name) {
-  SegmentConnection connection = connect_segment(name);
-  std::ifstream notice(FlightNotice::file_of(name));
-  std::string out;
-  if (!std::getline(notice, out)) {
-    throw SegmentError(
-        "--name " + name +
-        ": no flight recorder runs; start kerf-recorder --flight 60 --out DIR first");
-  }
-  const Reply reply = connection.send({.kind = CommandKind::mark});
-  if (reply.status != ReplyStatus::accepted) {
-    throw SegmentError("--name " + name + ": the controller took no mark; try again");
-  }
-  // The tick of the mark is in the record in which the command was applied.
-  using Clock = std::chrono::steady_clock;
-  constexpr auto kPatience = std::chrono::seconds(10);
-  auto deadline = Clock::now() + kPatience;
-  const SegmentReader& reader = connection.reader();
-  std::uint64_t next = reader.state_head();
-  next -= std::min<std::uint64_t>(next, reader.info().state_slots / 2);
-  std::filesystem::path kept;
-  std::uintmax_t written = unfinished_bytes(out);
-  while (Clock::now() < deadline) {
-    TickRecord record;
-    for (; kept.empty() && reader.state_at(next, record) == ReadState::ok; ++next) {
-      const bool marked = (record.command & kCommandKind) == kCommandMark;
-      if (!marked || record.last_command != reply.index) continue;
-      kept = std::filesystem::path(out) / folder_name({"mark", record.tick});
-    }
-    if (kept.empty() && reader.state_at(next, record) == ReadState::overrun) ++next;
-    if (!kept.empty() && std::filesystem::exists(kept)) return kept;
-    // It may still write the recording of an earlier mark.
-    const std::uintmax_t before = std::exchange(written, unfinished_bytes(out));
-    if (written != before) deadline = Clock::now() + kPatience;
-    std::this_thread::sleep_for(kPollPeriod);
-  }
-  throw SegmentError(out + ": the flight recorder kept nothing within 10 s; see its messages");
 }
 
 }  // namespace kerf

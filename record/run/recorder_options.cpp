@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "record/run/recorder_options.hpp"
+
 #include <charconv>
 #include <iostream>
 #include <string>
 #include <string_view>
 #include <system_error>
 
-#include "record/recorder.hpp"
 #include "shared/posix/tick_lead.hpp"
 #include "shared/text/command_line.hpp"
 #include "shared/text/text.hpp"

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "record/flight_recorder.hpp"
-#include "record/recorder.hpp"
+#include "record/run/flight_recorder.hpp"
+#include "record/run/recorder_options.hpp"
+#include "record/run/recorder_run.hpp"
 #include "shared/posix/program.hpp"
 #include "shared/posix/stop_signals.hpp"
 
