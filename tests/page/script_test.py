@@ -12,7 +12,7 @@ import sys
 import tempfile
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-HELPERS = {"bridge_end", "fake_page", "figures"}
+HELPERS = {"bridge_end", "fake_page", "figures", "steered"}
 
 
 

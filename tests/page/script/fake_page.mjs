@@ -54,6 +54,7 @@ export class Element {
       preventDefault() { event.prevented = true; }, stopPropagation() { event.stopped = true; }};
     const path = [];
     for (let at = this; at; at = at.parentElement) path.push(at);
+    if (this !== view) path.push(view);
     const run = (one, capture) => {
       if (event.stopped && one !== run.at) return;
       run.at = one;
@@ -67,6 +68,9 @@ export class Element {
   }
   getContext(kind) { return kind === '2d' ? this.pen ??= new Pen() : this.gl ??= fakeGl(); }
 }
+
+/** The window: the end of each event's way. */
+export const view = new Element('window');
 
 /** A 2D context: what was written, and the corners of the newest line. */
 class Pen {
@@ -142,7 +146,7 @@ export function documentOf(html) {
   }
   const root = new Element('html');
   root.append(body);
-  return {body, documentElement: root, activeElement: body,
+  return {body, documentElement: root, hidden: false, addEventListener: (...more) => root.addEventListener(...more), activeElement: body,
     getElementById: id => body.all().find(one => one.id === id) ?? null,
     querySelector: () => body.all().find(one => one.type === 'radio' && one.checked),
     createElement: tag => new Element(tag)};
@@ -165,7 +169,7 @@ export function openPage(html) {
     constructor(text, value) { super('option'), Object.assign(this, {textContent: text, value: String(value)}); }
   });
   give('getComputedStyle', () => style);
-  give('addEventListener', () => {});
+  give('addEventListener', (...more) => view.addEventListener(...more));
   give('requestAnimationFrame', what => frames.push(what));
   give('setInterval', (what, ms) => intervals.push({what, ms, due: clock.ms + ms}));
   give('setTimeout', (what, ms) => timeouts.push({what, due: clock.ms + ms}));

@@ -2,31 +2,10 @@
 // Pointer, wheel and fingers to the place that the emulated hand shall take.
 import assert from 'node:assert/strict';
 import test from 'node:test';
-import {clock, Element, openPage, pass} from './fake_page.mjs';
-import {ballScene, near, seenAt} from './figures.mjs';
+import {clock, pass} from './fake_page.mjs';
+import {near, seenAt} from './figures.mjs';
+import {rig} from './steered.mjs';
 
-openPage('<body></body>');
-const {OrbitCamera} = await import('./camera.js');
-const {Steering} = await import('./steering.js');
-
-/** A page whose camera looks along -z at a tool in the origin, from 60 mm. */
-function rig({scale = 1, tool = [0, 0, 0]} = {}) {
-  const parent = new Element('section'), canvas = Object.assign(new Element('canvas'), {clientWidth: 800, clientHeight: 600});
-  parent.append(canvas);
-  const camera = new OrbitCamera();
-  camera.frame(ballScene().corners, 4 / 3);
-  Object.assign(camera, {yaw: 0, pitch: 0, target: [0, 0, 0], distance: 60});
-  const stage = {canvas, scene: {}, views: (wide, high) => [camera.view(wide / high, 55)], moved: 0};
-  canvas.addEventListener('pointermove', () => ++stage.moved);
-  canvas.addEventListener('wheel', () => ++stage.moved);
-  const sent = [];
-  const now = {record: {position_mm: tool, proxy_offset_mm: [0, 0, 0]}};
-  const steering = new Steering({stage, now, heldNow: () => ({sceneJson: {device: {workspace_scale: scale}}})},
-    {postMessage: message => sent.push(message)});
-  steering.start(true);
-  const fire = (kind, x, y, more = {}) => canvas.fire(kind, {pointerType: 'mouse', pointerId: 1, offsetX: x, offsetY: y, ...more});
-  return {canvas, camera, stage, sent, now, steering, fire, goal: () => sent.at(-1).lead[0]};
-}
 /** Lengths in the plane of the tool: 60 mm away 600 pixels are 2 * 60 * tan(14 degrees). */
 const mmPerPixel = 2 * 60 * Math.tan(14 * Math.PI / 180) / 600;
 
@@ -85,36 +64,38 @@ test('the picture\'s own wheel and drags are the camera\'s: with shift, ctrl, an
   const before = sent.length;
   fire('wheel', 400, 300, {deltaY: 100, shiftKey: true});
   fire('wheel', 400, 300, {deltaY: 100, ctrlKey: true});
+  assert.equal(sent.length, before);
   fire('pointermove', 450, 300, {shiftKey: true, buttons: 1});
   fire('pointermove', 450, 300, {buttons: 2});
-  assert.equal(sent.length, before);
+  assert.deepEqual(sent.slice(before), [{release: true}]);
   assert.equal(stage.moved, 4);
   fire('pointermove', 460, 300);
   fire('wheel', 460, 300, {deltaY: 100});
   assert.equal(stage.moved, 4, 'what leads the tool moves no camera');
 });
 
-test('one finger leads and presses, a second one lets go and moves the view; fingers that do not press lead only', () => {
+test('one finger leads, and presses once it is alone for 120 ms; fingers that do not press lead only', () => {
   const {fire, sent, steering, goal} = rig();
-  const finger = (kind, id, x, y) => fire(kind, x, y, {pointerType: 'touch', pointerId: id, buttons: 1});
+  const finger = (kind, id, x, y) => fire(kind, x, y, {pointerType: 'touch', pointerId: id, buttons: 1, isPrimary: true});
   finger('pointerdown', 1, 400, 300);
+  near(goal(), [0, 0, 0], 1e-9);
+  pass(110);
+  near(goal(), [0, 0, 0], 1e-9);
+  pass(10);
   near(goal(), [0, 0, -3], 1e-9);
-  finger('pointerdown', 2, 500, 300);
-  assert.deepEqual(sent.at(-1), {release: true});
-  const before = sent.length;
-  finger('pointermove', 2, 510, 300);
-  assert.equal(sent.length, before);
-  finger('pointerup', 2, 510, 300);
+  assert.equal(sent.at(-1).lead[2], true);
   finger('pointerup', 1, 400, 300);
+  assert.deepEqual(sent.at(-1), {release: true});
   steering.fingersPress = false;
   finger('pointerdown', 3, 400, 300);
+  pass(400);
   near(goal(), [0, 0, 0], 1e-9);
   assert.equal(sent.at(-1).lead[2], false);
 });
 
 test('the first of mouse and finger leads, a mouse that hovers until it stood still for a second', () => {
   const {fire, sent} = rig();
-  const touch = {pointerType: 'touch', pointerId: 7, buttons: 1};
+  const touch = {pointerType: 'touch', pointerId: 7, buttons: 1, isPrimary: true};
   fire('pointermove', 500, 300);
   const before = sent.length;
   clock.ms += 900;
