@@ -207,6 +207,16 @@ void count_packets(const Devices& devices, TickTiming& timing) noexcept {
   }
 }
 
+/// Reports the end of a tick to the watchdog, and of each device what it waits for.
+void signal_tick(LoopSignals& signals, Tick tick, std::span<const DeviceReport> reports,
+                 std::span<const ServoOutput> outputs, const SilentDevices& silent) noexcept {
+  signals.heartbeat.store(tick, std::memory_order_relaxed);
+  for (std::size_t a = 0; a < reports.size(); ++a) {
+    const Waiting waiting = silent.is_gone(a) ? Waiting::gone : waiting_for(reports[a], outputs[a]);
+    signals.waiting[a].store(waiting, std::memory_order_relaxed);
+  }
+}
+
 }  // namespace
 
 EndReason run_servo(TickSource& clock, const Devices& devices, Servo& servo, Publisher& publisher,
@@ -250,13 +260,8 @@ EndReason run_servo(TickSource& clock, const Devices& devices, Servo& servo, Pub
     statistics.count(tick, outputs,
                      {timing.late_ns, compute_ns, sent_ns, monotonic_ns() - sent_ns});
 
-    signals.heartbeat.store(tick, std::memory_order_relaxed);
+    signal_tick(signals, tick, reports, outputs, silent_devices);
     signals.armed_ticks.store(record.ticks, std::memory_order_relaxed);
-    for (std::size_t a = 0; a < reports.size(); ++a) {
-      const Waiting waiting =
-          silent_devices.is_gone(a) ? Waiting::gone : waiting_for(reports[a], outputs[a]);
-      signals.waiting[a].store(waiting, std::memory_order_relaxed);
-    }
     if (record.ticks >= limits.armed_ticks) {
       end = EndReason::ticks_done;
       break;

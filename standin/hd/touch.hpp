@@ -4,7 +4,6 @@
 #include <array>
 #include <cstdint>
 #include <optional>
-#include <span>
 #include <string>
 
 #include "shared/numeric/vec.hpp"
@@ -84,7 +83,7 @@ class Touch {
   void follow(standin::Pose& now, double dt_s) noexcept;
   [[nodiscard]] Readings sampled() const noexcept;
   struct Parameter;
-  [[nodiscard]] static std::span<const Parameter> parameters() noexcept;
+  struct Parameters;
   [[nodiscard]] static const Parameter* parameter(Enum name) noexcept;
   [[nodiscard]] bool* capability(Enum name) noexcept;
   [[nodiscard]] DeviceVec<double> wanted_force() noexcept;

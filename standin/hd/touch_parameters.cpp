@@ -50,10 +50,10 @@ struct Touch::Parameter {
 
 /// All of the interface but its texts. Without a `read`, no document says what they hold, or a
 /// Touch has no part for them.
-std::span<const Touch::Parameter> Touch::parameters() noexcept {
+struct Touch::Parameters {
   using T = const Touch&;
   using R = const Readings&;
-  constexpr auto kNothing = [](T, R, Out out) { give(out, DeviceVec<double>{}); };
+  static constexpr auto kNothing = [](T, R, Out out) { give(out, DeviceVec<double>{}); };
   static constexpr std::array kAll{
       // of a frame
       Parameter{kButtons, 1, kAny, 0, true,
@@ -122,7 +122,7 @@ std::span<const Touch::Parameter> Touch::parameters() noexcept {
                 [](T touch, R, Out out) { give(out, {static_cast<double>(touch.rate_hz_)}); }},
       Parameter{kMaxStiffness, 1, kReal, 0, false,  // of the vendor's configuration file
                 [](T, R, Out out) { give(out, {0.5}); }},
-      Parameter{kMaxDamping, 1, kReal, 0, false,  // likewise
+      Parameter{kMaxDamping, 1, kReal, 0, false,  // of the same file
                 [](T, R, Out out) { give(out, {0.003}); }},
       Parameter{kMaxForce, 1, kReal, 0, false, [](T, R, Out out) { give(out, {kForces.peak_n}); }},
       Parameter{kContinuousForce, 1, kReal, 0, false,
@@ -135,15 +135,13 @@ std::span<const Touch::Parameter> Touch::parameters() noexcept {
       Parameter{kContinuousTorque, 0, kReal, 0, false, nullptr},
       Parameter{kJointReferences, 0, kReal, 0, false, nullptr},
   };
-  return kAll;
-}
+};
 
 const Touch::Parameter* Touch::parameter(Enum name) noexcept {
-  const auto all = parameters();
-  const auto found = std::find_if(all.begin(), all.end(), [&](const Parameter& one) {
+  const auto found = std::ranges::find_if(Parameters::kAll, [&](const Parameter& one) {
     return one.name == name || (one.has_last && one.name + kLastOffset == name);
   });
-  return found == all.end() ? nullptr : &*found;
+  return found == Parameters::kAll.end() ? nullptr : &*found;
 }
 
 std::optional<Values> Touch::read(Enum name, unsigned type) noexcept {

@@ -55,6 +55,16 @@ Json orientation(const std::array<std::int16_t, 4>& xyzw) {
       {"w", xyzw[3] / kOne}, {"x", xyzw[0] / kOne}, {"y", -xyzw[2] / kOne}, {"z", xyzw[1] / kOne}};
 }
 
+/// The message of the event port that the brake has engaged.
+std::string brake_event() {
+  const Json event = {{"name", "device-safety-triggered"},
+                      {"category", "device"},
+                      {"level", "error"},
+                      {"data", Json{{"device_id", kDeviceId}, {"safety_type", "ebrake_triggered"}}},
+                      {"message", "brake engaged"}};
+  return event.canonical();
+}
+
 /// A member of a member of an object; nothing if there is none.
 const Json* find(const Json* from, std::initializer_list<std::string_view> path) {
   for (const std::string_view name : path) {
@@ -323,10 +333,8 @@ void ServiceDevice::begin(ServiceFault fault) {
       link_fault_ = fault;
       break;
     case ServiceFault::vanish:
-      is_listed_ = false;
-      break;
     case ServiceFault::back:
-      is_listed_ = true;
+      is_listed_ = fault == ServiceFault::back;
       break;
     case ServiceFault::other_id:
       has_other_id_ = true;
@@ -357,16 +365,9 @@ void ServiceDevice::begin(ServiceFault fault) {
     case ServiceFault::reconfigure:
       is_reconfigured_ = true;
       break;
-    case ServiceFault::event: {
-      const Json event = {
-          {"name", "device-safety-triggered"},
-          {"category", "device"},
-          {"level", "error"},
-          {"data", Json{{"device_id", kDeviceId}, {"safety_type", "ebrake_triggered"}}},
-          {"message", "brake engaged"}};
-      events_.push_back(event.canonical());
+    case ServiceFault::event:
+      events_.push_back(brake_event());
       break;
-    }
   }
 }
 
