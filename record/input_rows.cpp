@@ -67,8 +67,8 @@ void InputReader::read_file() {
     if (read_inputs(path, kInputsAFile, rows_[arm]) || read_inputs(path, wanted, rows_[arm])) {
       continue;
     }
-    throw RecordError(path.string() + ": the inputs from tick " + std::to_string(next_) +
-                      " on are missing or damaged; copy the recording again");
+    throw DamagedRecording(path.string() + ": the inputs from tick " + std::to_string(next_) +
+                           " on are missing or damaged; copy the recording again");
   }
 }
 

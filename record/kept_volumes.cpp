@@ -15,14 +15,14 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Reads exactly such a file. Throws RecordError.
+/// Reads exactly such a file. Throws DamagedRecording.
 template <class Voxel>
 std::vector<Voxel> read_voxels(const fs::path& path, const VoxelGrid& grid) {
   PackedNpyReader file(path, volume_header(grid, sizeof(Voxel)));
   std::vector<Voxel> voxels(file.is_sound() ? grid.voxel_count() : 0);
   if (!file.read(std::as_writable_bytes(std::span(voxels))) || !file.at_end()) {
-    throw RecordError(path.string() +
-                      ": not the volume that scene.json names; copy the recording again");
+    throw DamagedRecording(path.string() +
+                           ": not the volume that scene.json names; copy the recording again");
   }
   return voxels;
 }
@@ -58,7 +58,8 @@ std::optional<VolumeContent> read_starting_volume(const fs::path& folder, std::s
     out.labels = read_voxels<Label>(labels_path(folder, hash), grid);
   }
   if (hex64(volume_hash(out.density, out.labels)) != hash) {
-    throw RecordError(path.string() + ": damaged, or without its labels; copy the recording again");
+    throw DamagedRecording(path.string() +
+                           ": damaged, or without its labels; copy the recording again");
   }
   return out;
 }

@@ -21,6 +21,9 @@
 namespace kerf {
 namespace {
 
+constexpr std::string_view kWayToNewManifest =
+    "; copy the recording again, or kerf record check --repair makes it anew";
+
 // The only list of figures: text, JSON and the reader all use it.
 template <class Summary, class Visit>
 void for_each_figure(Summary& s, Visit visit) {
@@ -140,10 +143,8 @@ void write_with_end(const std::filesystem::path& folder, Json manifest, const Re
 }
 
 std::string not_a_manifest(const std::filesystem::path& folder) {
-  return (folder / kManifestName).string() +
-         ": not a manifest of this version; copy the recording again, or kerf record check "
-         "--repair "
-         "makes it anew";
+  return (folder / kManifestName).string() + ": not a manifest of this version" +
+         std::string(kWayToNewManifest);
 }
 
 std::string manifest_text(const std::filesystem::path& folder) {
@@ -155,48 +156,109 @@ std::string manifest_text(const std::filesystem::path& folder) {
   std::ifstream file;
   if (std::filesystem::is_regular_file(path, fault)) file.open(path);  // opening a pipe would block
   if (!file.is_open()) {
-    throw RecordError(path.string() + ": cannot be read; " + way_to_manifest(folder));
+    refuse_recording(folder, path.string() + ": cannot be read; " + way_to_manifest(folder));
   }
   return {std::istreambuf_iterator<char>(file), {}};
 }
 
+std::string shown(const Json& value) {
+  constexpr std::size_t kMost = 60;
+  const std::string text = value.canonical();
+  return one_line(text.size() > kMost ? text.substr(0, kMost) + "..." : text);
+}
+
+namespace {
+
+/// Reads the members of a manifest. One of another kind is named.
+class Members {
+ public:
+  Members(const std::filesystem::path& folder, const Json& json) : folder_(folder), json_(json) {}
+
+  /// Calls `read` with a member. `kind`: what it has to be.
+  template <class Read>
+  void take(std::string_view key, std::string_view kind, const Read& read) const {
+    std::string is = "missing";
+    if (json_.contains(key)) {
+      try {
+        if (read(json_.at(key))) return;
+      } catch (const JsonError&) {  // NOLINT(bugprone-empty-catch): refused below
+      }
+      is = shown(json_.at(key));
+    }
+    refuse_recording(folder_, (folder_ / kManifestName).string() + ": " + std::string(key) +
+                                  " is " + is + ", and not " + std::string(kind) +
+                                  std::string(kWayToNewManifest));
+  }
+  /// The same, if it has the member.
+  template <class Read>
+  void take_if_there(std::string_view key, std::string_view kind, const Read& read) const {
+    if (json_.contains(key)) take(key, kind, read);
+  }
+  template <class Value>
+  void take(std::string_view key, std::string_view kind, Value& value) const {
+    take(key, kind, [&](const Json& member) {
+      value = member.get<Value>();
+      return true;
+    });
+  }
+
+ private:
+  const std::filesystem::path& folder_;
+  const Json& json_;
+};
+
+RecordGap gap_of(const Json& json) {
+  return {json.at("first_index").get<std::uint64_t>(), json.at("count").get<std::uint64_t>()};
+}
+
+double voxel_of(const Json& volume) {
+  const auto mm = volume.at("spacing_mm").get<std::array<double, 3>>();
+  return mm[0] * mm[1] * mm[2];
+}
+
+}  // namespace
+
 Manifest read_manifest(const std::filesystem::path& folder) {
-  const std::filesystem::path path = folder / kManifestName;
   const std::string text = manifest_text(folder);
-  Manifest out;
+  Json json;
   try {
-    const Json json = Json::parse(text);
-    out.tick_ns = json.at("tick_ns").get<std::uint32_t>();
-    out.end_reason = json.at("end_reason").get<std::string>();
-    out.session_id = json.at("session_id").get<std::string>();
-    out.losses.lost = json.at("lost_ticks").get<std::uint64_t>();
-    out.losses.missed_before_start = json.at("missed_before_start").get<std::uint64_t>();
-    for (const Json& gap : json.at("gaps")) {
-      out.losses.gaps.push_back(
-          {gap.at("first_index").get<std::uint64_t>(), gap.at("count").get<std::uint64_t>()});
-    }
-    out.has_clock = json.contains("clock");
-    if (json.contains("arms")) out.arms = json.at("arms").get<std::size_t>();
-    for (const char* const key : {"summary", "summary_2"}) {
-      if (!json.contains(key)) continue;
-      if (auto figures = summary_of(json.at(key))) out.summaries.push_back(std::move(*figures));
-    }
-    for (const Json& volume : json.at("volumes")) {
-      const auto spacing = volume.at("spacing_mm").get<std::array<double, 3>>();
-      out.voxel_mm3.push_back(spacing[0] * spacing[1] * spacing[2]);
-    }
+    json = Json::parse(text);
+    static_cast<void>(json.members());
   } catch (const JsonError&) {
-    throw RecordError(not_a_manifest(folder));
+    refuse_recording(folder, not_a_manifest(folder));
   }
-  if (out.arms == 0 || out.arms > kMaxArms) {
-    throw RecordError(path.string() + ": arms = " + std::to_string(out.arms) +
-                      "; this version knows 1 and 2; use the kerf that recorded it");
+  Manifest out;
+  const Members members(folder, json);
+  members.take("tick_ns", "a whole number of ns above 0",
+               [&](const Json& member) { return (out.tick_ns = member.get<std::uint32_t>()) > 0; });
+  members.take("end_reason", "a text", out.end_reason);
+  members.take("session_id", "a text", out.session_id);
+  members.take("lost_ticks", "a number of ticks", out.losses.lost);
+  members.take("missed_before_start", "a number of ticks", out.losses.missed_before_start);
+  members.take("gaps", "a list of gaps with first_index and count", [&](const Json& gaps) {
+    for (const Json& gap : gaps) out.losses.gaps.push_back(gap_of(gap));
+    return true;
+  });
+  out.has_clock = json.contains("clock");
+  members.take_if_there("start_ns", "a time in ns", [](const Json& member) {
+    static_cast<void>(member.get<std::uint64_t>());
+    return true;
+  });
+  members.take_if_there("arms", "1 or 2, which this version knows", [&](const Json& member) {
+    out.arms = member.get<std::size_t>();
+    return out.arms > 0 && out.arms <= kMaxArms;
+  });
+  for (const char* const key : {"summary", "summary_2"}) {
+    members.take_if_there(key, "a table of figures", [&](const Json& member) {
+      if (auto figures = summary_of(member)) out.summaries.push_back(std::move(*figures));
+      return true;
+    });
   }
-  const auto positive = [](double mm3) { return std::isfinite(mm3) && mm3 > 0; };
-  if (out.tick_ns == 0 || out.voxel_mm3.empty() ||
-      !std::all_of(out.voxel_mm3.begin(), out.voxel_mm3.end(), positive)) {
-    throw RecordError(path.string() + ": tick or spacing is not positive; record it again");
-  }
+  members.take("volumes", "a list of volumes with a spacing_mm above 0", [&](const Json& volumes) {
+    for (const Json& volume : volumes) out.voxel_mm3.push_back(voxel_of(volume));
+    const auto positive = [](double mm3) { return std::isfinite(mm3) && mm3 > 0; };
+    return !out.voxel_mm3.empty() && std::ranges::all_of(out.voxel_mm3, positive);
+  });
   return out;
 }
 
@@ -207,10 +269,10 @@ std::string recorded_scene(const std::filesystem::path& folder) {
   std::ifstream file;
   if (!fault && std::filesystem::is_regular_file(path, fault)) file.open(path, std::ios::binary);
   if (!file.is_open()) {
-    throw RecordError(path.string() + ": cannot be read; " + way_to_recording(folder));
+    refuse_recording(folder, path.string() + ": cannot be read; " + way_to_recording(folder));
   }
   if (bytes > kMaxSceneBytes) {
-    throw RecordError(path.string() + ": larger than any scene; copy the recording again");
+    refuse_recording(folder, path.string() + ": larger than any scene; copy the recording again");
   }
   return {std::istreambuf_iterator<char>(file), {}};
 }

@@ -113,13 +113,17 @@ void write_manifest(const std::filesystem::path& folder, const SegmentInfo& info
 void write_with_end(const std::filesystem::path& folder, Json manifest, const RecordLosses& losses,
                     std::uint64_t rows, std::string_view end_reason, const ArmSummaries& summaries);
 
+/// A value of a manifest for a message: short, on one line.
+[[nodiscard]] std::string shown(const Json& value);
+
 /// The error line for a file that is not a manifest.
 [[nodiscard]] std::string not_a_manifest(const std::filesystem::path& folder);
 
 /// The text of manifest.json in `folder`. Throws `RecordError` if it cannot be read.
 [[nodiscard]] std::string manifest_text(const std::filesystem::path& folder);
 
-/// What it says, as it stands there. Throws `RecordError` if it is missing or has no such values.
+/// What it says, as it stands there. Throws `RecordError` (of a recording `DamagedRecording`) if it
+/// is missing, or a member is missing or of another kind, which it names.
 [[nodiscard]] Manifest read_manifest(const std::filesystem::path& folder);
 
 /// The text of scene.json in `folder`. Throws `RecordError`, also if it is larger than any scene.

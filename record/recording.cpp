@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iomanip>
+#include <iostream>
 #include <sstream>
 #include <string>
 #include <string_view>
@@ -12,6 +13,7 @@
 #include "record/tick_log.hpp"
 #include "record/tick_text.hpp"
 #include "shared/posix/atomic_file.hpp"
+#include "shared/posix/program.hpp"
 #include "shared/segment/layout.hpp"
 #include "shared/text/json.hpp"
 #include "shared/text/text.hpp"
@@ -24,6 +26,17 @@ void make_recording_folder(const std::filesystem::path& folder) {
   if (error) {
     throw RecordError(folder.string() + ": " + error.message() + "; choose another --out");
   }
+}
+
+int run_on_recordings(const char* program, const std::function<int()>& work) {
+  return run_program(program, [&] {
+    try {
+      return work();
+    } catch (const DamagedRecording& damaged) {
+      std::cerr << program << ": " << damaged.what() << '\n';
+      return 1;
+    }
+  });
 }
 
 SummaryBuilder::SummaryBuilder(std::uint32_t tick_ns, std::vector<double> voxel_mm3)
@@ -106,8 +119,9 @@ void for_each_tick(const std::filesystem::path& folder, const Manifest& manifest
         }
         const TickRecord* const other = row < end ? &chunk[row - begin] : nullptr;
         if (other != nullptr && other->seq != first.seq) {
-          throw RecordError((folder / tick_log_name(1)).string() + ": row " + std::to_string(row) +
-                            " is not of the tick of ticks.npy; copy the recording again");
+          throw DamagedRecording((folder / tick_log_name(1)).string() + ": row " +
+                                 std::to_string(row) +
+                                 " is not of the tick of ticks.npy; copy the recording again");
         }
         visit(first, other);
         ++row;

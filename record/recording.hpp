@@ -21,6 +21,9 @@ namespace kerf {
 /// Makes the folder of a new recording. Throws `RecordError`.
 void make_recording_folder(const std::filesystem::path& folder);
 
+/// `run_program` of a program that reads recordings: one that is damaged ends it with exit code 1.
+[[nodiscard]] int run_on_recordings(const char* program, const std::function<int()>& work);
+
 /// Sums up rows that come in order.
 class SummaryBuilder {
  public:

@@ -43,8 +43,8 @@ namespace {
   if (header.size() < kTickLogHeaderBytes) {
     const std::string_view fixed = std::string_view(header).substr(0, at);
     if (tick_log_header(0).starts_with(fixed)) {
-      throw RecordError(path + ": " + std::to_string(header.size()) +
-                        " bytes, cut before its first tick; record it again");
+      throw DamagedRecording(path + ": " + std::to_string(header.size()) +
+                             " bytes, cut before its first tick; record it again");
     }
   }
   std::uint64_t rows = 0;
@@ -53,18 +53,26 @@ namespace {
     std::from_chars(digits, header.data() + header.size(), rows);
   }
   if (header.size() < kTickLogHeaderBytes || header != tick_log_header(rows)) {
-    throw RecordError(path + ": not a tick log of this version; record it again");
+    throw DamagedRecording(path + ": not a tick log of this version; record it again");
   }
   return rows;
 }
 
 }  // namespace
 
+bool is_recording(const std::filesystem::path& folder) {
+  std::error_code fault;
+  return std::filesystem::is_regular_file(folder / "ticks.npy", fault);
+}
+
 std::string way_to_recording(const std::filesystem::path& folder) {
   const std::filesystem::path below = folder / "log";
-  std::error_code fault;
-  const bool is_below = std::filesystem::is_regular_file(below / "ticks.npy", fault);
-  return "give " + (is_below ? below.string() : "the folder of a recording");
+  return "give " + (is_recording(below) ? below.string() : "the folder of a recording");
+}
+
+void refuse_recording(const std::filesystem::path& folder, const std::string& line) {
+  if (is_recording(folder)) throw DamagedRecording(line);
+  throw RecordError(line);
 }
 
 std::filesystem::path part_of_log(const std::filesystem::path& path, std::size_t part) {
@@ -121,8 +129,9 @@ TickLogReader::TickLogReader(std::filesystem::path path) : path_(std::move(path)
   while (is_there(part) && add_part(part_of_log(path_, part))) ++part;
   const std::string later = part_behind(path_, part);
   if (!later.empty()) {
-    throw RecordError(part_of_log(path_, part).string() + ": missing, or cut in its header, and " +
-                      later + " is there; copy the recording again");
+    throw DamagedRecording(part_of_log(path_, part).string() +
+                           ": missing, or cut in its header, and " + later +
+                           " is there; copy the recording again");
   }
 }
 
@@ -132,7 +141,8 @@ bool TickLogReader::add_part(const std::filesystem::path& path) {
   std::ifstream file;
   if (is_file) file.open(path, std::ios::binary);
   if (!file.is_open()) {
-    throw RecordError(path.string() + ": cannot be read; " + way_to_recording(path.parent_path()));
+    refuse_recording(path.parent_path(),
+                     path.string() + ": cannot be read; " + way_to_recording(path.parent_path()));
   }
   std::string header(kTickLogHeaderBytes, '\0');
   file.read(header.data(), static_cast<std::streamsize>(header.size()));
@@ -207,7 +217,7 @@ std::size_t TickLogReader::read(std::uint64_t first, std::span<TickRecord> rows,
 std::size_t TickLogReader::read(std::uint64_t first, std::span<TickRecord> rows) {
   std::string problem;
   const std::size_t count = read(first, rows, problem);
-  if (!problem.empty()) throw RecordError(problem);
+  if (!problem.empty()) throw DamagedRecording(problem);
   return count;
 }
 
@@ -218,7 +228,7 @@ std::uint64_t TickLogReader::row_of(Tick tick) {
     const std::uint64_t middle = below + (end - below) / 2;
     TickRecord there;
     if (!read_raw(middle, std::span(&there, 1))) {
-      throw RecordError(path_.string() + ": cannot be read; copy it again");
+      throw DamagedRecording(path_.string() + ": cannot be read; copy it again");
     }
     (there.tick < tick ? below : end) = there.tick < tick ? middle + 1 : middle;
   }

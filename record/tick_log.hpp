@@ -26,6 +26,13 @@ class RecordError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+/// Files of a recording that are lost or damaged, or contradict each other: exit code 1 of a
+/// program that reads recordings. Any other `RecordError` is bad input, 2.
+class DamagedRecording : public RecordError {
+ public:
+  using RecordError::RecordError;
+};
+
 /// The log of a run: an NPY file of `TickRecord` rows behind a header of fixed size, so that it can
 /// be extended and opens directly in NumPy (`np.load(path, mmap_mode="r")["position_mm"]`). A log
 /// that was split goes on in further files of the same form, which sort behind it: ticks.npy,
@@ -45,6 +52,13 @@ inline constexpr std::size_t kTickLogHeaderBytes = 4096;
 /// The remedy if `folder` holds no recording. If it is a demo's folder, names the recording in its
 /// folder `log`.
 [[nodiscard]] std::string way_to_recording(const std::filesystem::path& folder);
+
+/// Whether `folder` is a recording, sound or not: one has a file ticks.npy.
+[[nodiscard]] bool is_recording(const std::filesystem::path& folder);
+
+/// For what is wrong in `folder`: throws `DamagedRecording` if that is a recording, else
+/// `RecordError`.
+[[noreturn]] void refuse_recording(const std::filesystem::path& folder, const std::string& line);
 
 /// Ticks of a log, both ends included.
 struct TickRange {

@@ -37,7 +37,7 @@ RecordedScene read_scene(const std::filesystem::path& folder) {
   try {
     return {json_without_source(text), source_in(text), inputs_in(text)};
   } catch (const JsonError&) {
-    throw RecordError(scene_without_source(folder));
+    throw DamagedRecording(scene_without_source(folder));
   }
 }
 
@@ -210,9 +210,9 @@ void check_begins_at_first_tick(const std::filesystem::path& folder, const Manif
   TickRecord first;
   static_cast<void>(TickLogReader(folder / kTickLogName).read(0, std::span(&first, 1)));
   if (first.tick == missed + 1) return;
-  throw RecordError((folder / kManifestName).string() + ": " + std::to_string(missed) +
-                    " ticks are before the log, and it begins at tick " +
-                    std::to_string(first.tick) + "; copy the recording again");
+  throw DamagedRecording((folder / kManifestName).string() + ": " + std::to_string(missed) +
+                         " ticks are before the log, and it begins at tick " +
+                         std::to_string(first.tick) + "; copy the recording again");
 }
 
 std::vector<double> voxel_mm3_of(const InputsInJson& recorded) {
@@ -258,8 +258,8 @@ RecordedRun load_run(const std::filesystem::path& folder, const ReplayChanges& c
     try {
       check_same_counts(recorded.canonical, run.scene);
     } catch (const JsonError&) {
-      throw RecordError((folder / kSceneName).string() +
-                        ": has no rate or no device; copy the recording again");
+      throw DamagedRecording((folder / kSceneName).string() +
+                             ": has no rate or no device; copy the recording again");
     }
   }
   run.manifest.tick_ns = static_cast<std::uint32_t>(1'000'000'000 / run.scene.servo.rate_hz);

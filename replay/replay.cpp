@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdio>
+#include <exception>
 #include <iostream>
 #include <memory>
 #include <optional>
@@ -165,23 +166,17 @@ void check_range(const ReplayOptions& options, RecordedTicks& log) {
 
 }  // namespace
 
-int run_replay(const ReplayOptions& options, const std::atomic<bool>& stop) {
-  check_outputs(recording_files(options.folder),
-                {{"--report", options.report, ".json"}, {"--plot", options.plot, ".svg"}});
-  const CheckedRecording checked = check_recording(options.folder, {.until = options.until});
+namespace {
+
+/// The replay of a recording that was checked. Returns the exit code, without what the check found.
+int replay_checked(const ReplayOptions& options, const CheckedRecording& checked,
+                   const std::atomic<bool>& stop) {
   RecordedTicks log(options.folder, checked.manifest.arms);
   if (log.rows() == 0) {
     throw RecordError((options.folder / kTickLogName).string() + ": 0 rows; nothing to replay");
   }
   check_range(options, log);
-  // What contradicts itself in the recording is reported behind what the replay found.
-  const auto exit_code = [&](int code) {
-    for (const std::string& problem : checked.problems) {
-      std::cerr << "kerf-replay: " << problem << '\n';
-    }
-    return checked.problems.empty() ? code : 1;
-  };
-  if (!options.watch.empty()) return exit_code(watch_replay(options, log, stop));
+  if (!options.watch.empty()) return watch_replay(options, log, stop);
   RecordedRun run = load_tried_run(options);
   std::optional<ReplayLog> copy;
   if (!options.out.empty()) copy.emplace(options.out, options.folder, run);
@@ -211,7 +206,26 @@ int run_replay(const ReplayOptions& options, const std::atomic<bool>& stop) {
   if (!result.cut_short.empty()) std::cout << "stopped: " << result.cut_short << '\n';
   if (!options.plot.empty()) compared.plot(options.plot);
   if (!options.report.empty()) write_new_file(options.report, json_of(result, run).document());
-  return exit_code((difference && !changed) || !result.cut_short.empty() ? 1 : 0);
+  return (difference && !changed) || !result.cut_short.empty() ? 1 : 0;
+}
+
+}  // namespace
+
+int run_replay(const ReplayOptions& options, const std::atomic<bool>& stop) {
+  check_outputs(recording_files(options.folder),
+                {{"--report", options.report, ".json"}, {"--plot", options.plot, ".svg"}});
+  const CheckedRecording checked = check_recording(options.folder, {.until = options.until});
+  if (checked.problems.empty()) return replay_checked(options, checked, stop);
+  try {
+    static_cast<void>(replay_checked(options, checked, stop));
+  } catch (const std::exception& error) {  // of the scene's reader, too
+    throw DamagedRecording(error.what());
+  }
+  // What contradicts itself in the recording is reported behind what the replay found.
+  for (const std::string& problem : checked.problems) {
+    std::cerr << "kerf-replay: " << problem << '\n';
+  }
+  return 1;
 }
 
 }  // namespace kerf

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "controller/scene/scene.hpp"
+#include "record/recording.hpp"
 #include "replay/replay.hpp"
 #include "shared/posix/program.hpp"
 #include "shared/posix/stop_signals.hpp"
@@ -23,8 +24,9 @@ constexpr const char* kAbout =
 bool parse_replay(int argc, char** argv, ReplayOptions& options) {
   CommandLine app(kAbout, "kerf-replay", KERF_VERSION);
   app.footer(
-      "\nExit codes: 0 fine, 1 a tick differs, or the recording has a gap or contradicts itself, 2 "
-      "bad input or set-up.");
+      "\nExit codes: 0 fine, 1 a tick differs, or the recording has a gap, is damaged or "
+      "contradicts "
+      "itself, 2 bad input or set-up.");
   std::string numeric, scene, law, estimator, stabiliser;
   app.option("DIR", options.folder, "folder of a recording").required();
   app.option("--from", options.from, "the first tick that is compared").shown_as("TICK");
@@ -71,7 +73,7 @@ bool parse_replay(int argc, char** argv, ReplayOptions& options) {
 }  // namespace
 
 int run_replay_program(int argc, char** argv) {
-  return run_program("kerf-replay", [&] {
+  return run_on_recordings("kerf-replay", [&] {
     ReplayOptions options;
     if (!parse_replay(argc, argv, options)) return 0;
     return run_replay(options, catch_stop_signals());

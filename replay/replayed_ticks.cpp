@@ -37,9 +37,9 @@ RecordedTicks::RecordedTicks(const std::filesystem::path& folder, std::size_t ar
     const std::filesystem::path path = folder / tick_log_name(arm);
     logs_.emplace_back(path);
     if (logs_[arm].rows() >= rows()) continue;
-    throw RecordError(path.string() + ": " + std::to_string(logs_[arm].rows()) + " rows, and " +
-                      std::string(kTickLogName) + " has " + std::to_string(rows()) +
-                      "; copy the recording again");
+    throw DamagedRecording(path.string() + ": " + std::to_string(logs_[arm].rows()) +
+                           " rows, and " + std::string(kTickLogName) + " has " +
+                           std::to_string(rows()) + "; copy the recording again");
   }
 }
 
@@ -66,7 +66,7 @@ std::string RecordedTicks::try_read(std::uint64_t first, std::vector<ArmRecords>
 
 void RecordedTicks::read(std::uint64_t first, std::vector<ArmRecords>& rows) {
   const std::string problem = try_read(first, rows);
-  if (!problem.empty()) throw RecordError(problem);
+  if (!problem.empty()) throw DamagedRecording(problem);
 }
 
 std::string RecordedTicks::cut_at_end() const {
@@ -83,7 +83,7 @@ ReplayResult replay_ticks(RecordedRun& run, RecordedTicks& log, Tick until,
   std::vector<ArmRecords> rows;
   for (std::uint64_t row = 0; row < log.rows();) {
     result.cut_short = log.try_read(row, rows);
-    if (row == 0 && rows.empty()) throw RecordError(result.cut_short);
+    if (row == 0 && rows.empty()) throw DamagedRecording(result.cut_short);
     if (rows.empty()) return result;
     for (const ArmRecords& recorded : rows) {
       const Tick tick = recorded[0].tick;

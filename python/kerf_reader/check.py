@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What `kerf record info` compares of a log, in NumPy: each function but the first two yields lines "place: value; remedy"."""
+import json
 import stat
 import zlib
 
@@ -65,7 +66,9 @@ def _row_problems(file, rows):
 
 def _size_problems(file, rows, manifest):
     """A file may have more rows than its header counts, and a part of one: it is then of a recorder that was killed."""
-    if manifest.get("end_reason") in ENDS_LATER:
+    if manifest["end_reason"] in ENDS_LATER:
+        if "rows" in manifest and manifest["end_reason"] != "no room" and not (_is_count(manifest["rows"]) and manifest["rows"] <= len(rows)):
+            yield f"{file}: {len(rows)} rows, and {manifest['rows']} by manifest.json; copy the recording again"
         return
     for part in parts_of(file):
         with opened(part) as head:
@@ -88,6 +91,38 @@ def _loss_problems(file, rows, manifest):
     lost = manifest.get("lost_ticks", holes + behind)
     if index[0] < missed or (manifest.get("end_reason") not in ENDS_LATER and lost < holes + behind):
         yield f"{file}: missed_before_start is {missed} and lost_ticks {lost}, and its rows say another; copy the recording again"
+
+
+def _is_count(value, least=0):
+    return type(value) is int and least <= value < 1 << 64
+
+
+def _is_voxel(volume):
+    sides = volume.get("spacing_mm") if isinstance(volume, dict) else None
+    return isinstance(sides, list) and len(sides) == 3 and all(type(side) in (int, float) for side in sides) \
+        and 0 < np.prod(np.array(sides, float)) < np.inf
+
+
+def _member_problems(file, manifest):
+    """A member that is missing, or of another kind than that of any recorder."""
+    def is_text(value):
+        return isinstance(value, str)
+
+    def are_gaps(gaps):
+        return isinstance(gaps, list) and all(isinstance(gap, dict) and _is_count(gap.get("first_index")) and _is_count(gap.get("count"))
+                                              for gap in gaps)
+
+    kinds = {"tick_ns": ("a whole number of ns above 0", lambda value: _is_count(value, 1) and value < 1 << 32), "end_reason": ("a text", is_text),
+             "session_id": ("a text", is_text), "lost_ticks": ("a number of ticks", _is_count),
+             "missed_before_start": ("a number of ticks", _is_count), "gaps": ("a list of gaps with first_index and count", are_gaps),
+             "start_ns": ("a time in ns", _is_count), "arms": ("1 or 2, which this version knows", lambda value: type(value) is int and value in (1, 2)),
+             "volumes": ("a list of volumes with a spacing_mm above 0",
+                         lambda volumes: isinstance(volumes, list) and volumes and all(map(_is_voxel, volumes)))}
+    for key, (kind, fits) in kinds.items():
+        optional = key in ("start_ns", "arms")  # logs of earlier versions, or of one arm, lack them
+        if not fits(manifest[key]) if key in manifest else not optional:
+            shown = json.dumps(manifest[key], separators=(",", ":"))[:60] if key in manifest else "missing"
+            yield f"{file}: {key} is {shown}, and not {kind}; copy the recording again"
 
 
 def _scene_problems(file, manifest, scene):
@@ -144,6 +179,7 @@ def _clock_problems(file, clock):
 def problems(folder, manifest, scene, logs, clock):
     """Of the log in `folder`, whose arms have the rows `logs`; clock: None in logs without dates."""
     file = folder / "manifest.json"
+    yield from _member_problems(file, manifest)
     yield from _scene_problems(file, manifest, scene)
     for arm, rows in enumerate(logs):
         path = folder / ("ticks.npy", "ticks-2.npy")[arm]

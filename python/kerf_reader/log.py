@@ -38,6 +38,10 @@ def _all_rows_of(file):
     return rows[0] if len(rows) == 1 else np.concatenate(rows)
 
 
+def _no_json(word):
+    raise ValueError(f"{word} is no JSON")
+
+
 def _words_of(file):
     with opened(file) as bytes_of:
         text = bytes_of.read()
@@ -52,7 +56,7 @@ def _words_of(file):
         return words
 
     try:
-        words = json.loads(text.decode(), object_pairs_hook=members)
+        words = json.loads(text.decode(), object_pairs_hook=members, parse_constant=_no_json)
     except (ValueError, RecursionError):
         raise ValueError(f"{file}: no JSON, or the file was cut; give the folder of another recording") from None
     if twice:
@@ -82,9 +86,6 @@ class Log:
             below = folder / "log"  # of --out of a demo
             way = below if (below / "ticks.npy").is_file() else "the folder of a recording"
             raise ValueError(f"{error.filename}: {error.strerror}; give {way}") from None
-        tick_ns = self.manifest.get("tick_ns")
-        if type(tick_ns) is not int or tick_ns <= 0:
-            raise ValueError(f"{folder / 'manifest.json'}: tick_ns: not a positive number; give the folder of another recording")
         if check:
             self._check(folder)
 

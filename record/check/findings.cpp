@@ -8,12 +8,6 @@
 
 namespace kerf {
 
-std::string shown(const Json& value) {
-  constexpr std::size_t kMost = 60;
-  const std::string text = value.canonical();
-  return one_line(text.size() > kMost ? text.substr(0, kMost) + "..." : text);
-}
-
 Findings::Findings(std::filesystem::path folder)
     : folder_(std::move(folder)),
       text_(manifest_text(folder_)),

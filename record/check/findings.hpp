@@ -58,7 +58,4 @@ class Findings {
   bool in_manifest_ = false;
 };
 
-/// A value of a manifest for a message: short, on one line.
-[[nodiscard]] std::string shown(const Json& value);
-
 }  // namespace kerf

@@ -291,7 +291,7 @@ CheckedRecording check_recording(const fs::path& folder, TickRange range, CheckD
 RecordSummary summarise(const fs::path& folder, TickRange range, std::size_t arm) {
   CheckedRecording checked = check_recording(folder, range);
   require_arm(folder, checked.manifest, arm);
-  if (!checked.rows_readable) throw RecordError(checked.problems.back());
+  if (!checked.rows_readable) throw DamagedRecording(checked.problems.back());
   return std::move(checked.summaries[arm]);
 }
 

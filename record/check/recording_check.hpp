@@ -35,7 +35,8 @@ struct CheckedRecording {
 /// leaves fewer rows in the manifest than in the log, and possibly a part of a row: that is no
 /// problem.
 ///
-/// Throws `RecordError` if the folder holds no recording: no manifest, or no log of this version.
+/// Throws `DamagedRecording` if nothing can be compared: manifest or log are lost, or have another
+/// form; `RecordError` if the folder holds no recording.
 [[nodiscard]] CheckedRecording check_recording(const std::filesystem::path& folder,
                                                TickRange range = {},
                                                CheckDepth depth = CheckDepth::rows);
@@ -43,6 +44,10 @@ struct CheckedRecording {
 /// The figures of an arm. Throws `RecordError` if a row in the range is damaged.
 [[nodiscard]] RecordSummary summarise(const std::filesystem::path& folder, TickRange range = {},
                                       std::size_t arm = 0);
+
+/// Whether the manifest is lost, or to blame for what is wrong. Throws `RecordError` if the folder
+/// is no recording.
+[[nodiscard]] bool has_wrong_manifest(const std::filesystem::path& folder);
 
 /// Writes manifest.json anew from scene and rows, and what of the old one can be read. An old one
 /// is kept as manifest-old.json, and if there is one of that name, it stays. Throws `RecordError`

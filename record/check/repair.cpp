@@ -106,6 +106,15 @@ Json volumes_of(const fs::path& folder, const SceneFacts& scene) {
 
 }  // namespace
 
+bool has_wrong_manifest(const fs::path& folder) {
+  try {
+    static_cast<void>(read_manifest(folder));
+  } catch (const DamagedRecording&) {
+    return true;
+  }
+  return check_recording(folder).in_manifest;
+}
+
 void repair_manifest(const fs::path& folder) {
   SceneFacts scene;
   Manifest by_scene;
@@ -114,7 +123,7 @@ void repair_manifest(const fs::path& folder) {
   } catch (const JsonError&) {
   }
   if (!scene.tick_ns || !scene.arms || scene.volumes.empty()) {
-    throw RecordError(
+    throw DamagedRecording(
         (folder / kSceneName).string() +
         ": has no rate, device or volumes, so no manifest can be made of it; copy the "
         "recording again");

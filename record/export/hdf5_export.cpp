@@ -257,7 +257,7 @@ void write_scene(hid_t file, const std::filesystem::path& folder) {
   try {
     static_cast<void>(Json::parse(scene));
   } catch (const JsonError&) {
-    throw RecordError((folder / kSceneName).string() + ": no JSON; copy the recording again");
+    throw DamagedRecording((folder / kSceneName).string() + ": no JSON; copy the recording again");
   }
   scene = ascii_json(scene);
   const Handle type = text_type(scene.size(), scene);

@@ -71,9 +71,12 @@ began, and each tick is one tick's length later, however long it took. Logs of e
 ## Whether it is whole
 
 `./kerf record check DIR/log` compares all that the files say twice, and all checksums, and says of each contradiction where it is,
-what stands there and what to do; exit code 1. `info`, `plot`, `export` and `./kerf replay` compare the same, but for the files in
-`volumes/` and `inputs/`, and end with 1 as well. A row that is damaged or out of order ends what they read; an export then writes
-nothing.
+what stands there and what to do. `info`, `plot`, `export` and `./kerf replay` compare the same, but for the files in `volumes/` and
+`inputs/`. A row that is damaged or out of order ends what they read; an export then writes nothing.
+
+A folder with a file `ticks.npy` is a recording. Whatever is wrong in it, a file that is lost, damaged, of another form or against
+another one, ends all of these with exit code 1. They end with 2 for a folder that is none, for wrong arguments, and where the rights to
+read or write are missing.
 
 | fact | source | compared with it |
 |---|---|---|

@@ -3,7 +3,7 @@
 #include <iostream>
 #include <string>
 
-#include "record/check/check_command.hpp"
+#include "record/check/recording_check.hpp"
 #include "record/export/hdf5_export.hpp"
 #include "record/export/live_json.hpp"
 #include "record/export/log_page.hpp"
@@ -20,6 +20,28 @@
 
 namespace kerf {
 namespace {
+
+/// Prints the problems of a recording, a line each. The exit code: 1 if there are any, else 0.
+int report_problems(const CheckedRecording& checked) {
+  for (const std::string& problem : checked.problems) {
+    std::cerr << "kerf-record: " << problem << '\n';
+  }
+  return checked.problems.empty() ? 0 : 1;
+}
+
+/// `check DIR`: with `repair` first makes the manifest anew if that is lost or wrong.
+int run_check(const std::filesystem::path& folder, bool repair) {
+  static_cast<void>(TickLogReader(folder / kTickLogName));  // else there is nothing to check
+  if (repair && has_wrong_manifest(folder)) {
+    repair_manifest(folder);
+    std::cout << (folder / kManifestName).string() << ": made anew\n";
+  }
+  const CheckedRecording checked = check_recording(folder, {}, CheckDepth::files);
+  if (checked.problems.empty()) {
+    std::cout << folder.string() << ": all files agree, and all checksums are right\n";
+  }
+  return report_problems(checked);
+}
 
 /// A command that reads a recording, or a part of one.
 class ReadingCommand {
@@ -254,8 +276,8 @@ class OtherCommands {
 int run_record(int argc, char** argv) {
   CommandLine app("Looks at what kerf-recorder wrote.", "kerf-record", KERF_VERSION);
   app.footer(
-      "\nExit codes: 0 fine, 1 the recording contradicts itself or is not whole, 2 bad input or "
-      "set-up.");
+      "\nExit codes: 0 fine, 1 the recording is damaged, contradicts itself or is not whole, 2 bad "
+      "input or set-up.");
   const InfoCommand info(app);
   const PlotCommand plot(app);
   const ExportCommand table(app);
@@ -272,5 +294,5 @@ int run_record(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   kerf::make_signals_of_writes_errors();
-  return kerf::run_program("kerf-record", [&] { return kerf::run_record(argc, argv); });
+  return kerf::run_on_recordings("kerf-record", [&] { return kerf::run_record(argc, argv); });
 }

@@ -101,7 +101,7 @@ class TestLogFiles(unittest.TestCase):
         self.assertEqual(all_rows(whole).tobytes(), np.concatenate([rows[:1000], rows[3000:]]).tobytes())
         parts[2].unlink()
         done = subprocess.run([BIN / "kerf-record", "info", log], capture_output=True, text=True)
-        self.assertEqual((done.returncode, done.stderr), (2, f"kerf-record: {parts[2]}: missing, or cut in its header, and ticks.npy.0004 is there; "
+        self.assertEqual((done.returncode, done.stderr), (1, f"kerf-record: {parts[2]}: missing, or cut in its header, and ticks.npy.0004 is there; "
                                                           "copy the recording again\n"))
         with self.assertRaisesRegex(ValueError, "ticks.npy.0003: missing, and a later file of the log is there"):
             Log(log)

@@ -42,8 +42,8 @@ class TestLogRefused(unittest.TestCase):
 
     def test_refuses_texts_of_another_shape(self):
         scene = json.loads((self.log / "scene.json").read_text())
-        rates = [(rate, "scene.json: servo.rate_hz is .*; copy") for rate in (0, -0.0, False, -1000, float("nan"))]
-        for rate, words in [*rates, ("1000", "are not those of a recording; give"), (float("inf"), "tick_ns is 1000000, and 0.0 by")]:
+        rates = [(rate, "scene.json: servo.rate_hz is .*; copy") for rate in (0, -0.0, False, -1000)]
+        for rate, words in [*rates, ("1000", "are not those of a recording; give"), (float("inf"), "no JSON"), (float("nan"), "no JSON")]:
             (log := self.copy()).joinpath("scene.json").write_text(json.dumps({**scene, "servo": {"rate_hz": rate}}))
             with self.subTest(rate=rate), self.assertRaisesRegex(ValueError, words):
                 Log(log)
@@ -55,7 +55,7 @@ class TestLogRefused(unittest.TestCase):
         # So large that no number of NumPy holds it, and a scene that says no rate.
         (log := self.copy()).joinpath("scene.json").write_text("{}")
         (log / "manifest.json").write_text(json.dumps({**self.manifest, "tick_ns": 10**30, "start_ns": 0}))
-        with self.assertRaisesRegex(ValueError, "are not those of a recording; give"):
+        with self.assertRaisesRegex(ValueError, "tick_ns is 10*, and not a whole number of ns above 0; copy"):
             Log(log)
 
     def test_refuses_what_is_no_regular_file(self):
@@ -88,7 +88,7 @@ class TestLogRefused(unittest.TestCase):
             with self.subTest(header[:20]):
                 self.assertEqual(len(header), HEADER)
                 (log := self.copy()).joinpath("ticks.npy").write_bytes(header + self.rows[HEADER:])
-                self.assertEqual(subprocess.run([BIN / "kerf-record", "info", log], capture_output=True).returncode, 2)
+                self.assertEqual(subprocess.run([BIN / "kerf-record", "info", log], capture_output=True).returncode, 1)
                 with self.assertRaisesRegex(ValueError, f"ticks.npy: .*{reader}"):
                     Log(log)
 

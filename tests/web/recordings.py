@@ -145,7 +145,7 @@ def replayed_by_kerf(programs, work, names):
     found = {}
     for name in names:
         done = subprocess.run([programs / 'kerf-replay', name], cwd=work, capture_output=True, text=True, check=False)
-        if done.returncode == 2:
+        if not done.stdout:  # it was not replayed
             found[name] = {'failed': done.stderr.strip().removeprefix('kerf-replay: ')}
             continue
 
