@@ -2,14 +2,15 @@
 #include <iostream>
 #include <optional>
 #include <string>
-#include <utility>
 
+#include "controller/law/registry/law_registry.hpp"
 #include "controller/scene/scene.hpp"
 #include "record/recording.hpp"
 #include "replay/replay.hpp"
 #include "shared/posix/program.hpp"
 #include "shared/posix/stop_signals.hpp"
 #include "shared/text/command_line.hpp"
+#include "shared/text/text.hpp"
 
 namespace kerf {
 namespace {
@@ -19,6 +20,26 @@ constexpr const char* kAbout =
     "Each tick is compared with the recorded one, to the last bit. With another scene, setting, "
     "law or arithmetic it shows what would have been felt: the hand moves as it did, the volumes "
     "start as they were.";
+
+/// An option that stands for the setting of a law.
+struct LawOption {
+  const char* option;
+  LawKind kind;
+  const char* setting;
+  const std::string& name;
+};
+
+/// The setting. Throws `UsageError` for an unknown name; a name with settings, which is a table, is
+/// checked with the scene.
+std::string setting_of(const LawOption& law) {
+  if (law.name.find_first_of("{\"'") != std::string::npos) return law.setting + law.name;
+  try {
+    static_cast<void>(law_by_word(law.kind, law.name));
+  } catch (const LawError& error) {
+    throw UsageError(std::string(law.option) + ' ' + one_line(law.name) + error.what());
+  }
+  return law.setting + law.name;
+}
 
 /// False if help or version was requested, and printed.
 bool parse_replay(int argc, char** argv, ReplayOptions& options) {
@@ -58,10 +79,11 @@ bool parse_replay(int argc, char** argv, ReplayOptions& options) {
   if (!options.watch.empty() && compares) {
     throw UsageError("--watch: compares nothing; leave --out, --plot and --report out");
   }
-  const std::pair<const char*, const std::string&> laws[] = {
-      {"force.law=", law}, {"servo.velocity=", estimator}, {"force.stabiliser=", stabiliser}};
-  for (const auto& [key, name] : laws) {
-    if (!name.empty()) options.changes.settings.push_back(key + name);
+  for (const LawOption& one :
+       {LawOption{"--law", LawKind::force, "force.law=", law},
+        LawOption{"--estimator", LawKind::velocity, "servo.velocity=", estimator},
+        LawOption{"--stabiliser", LawKind::stabiliser, "force.stabiliser=", stabiliser}}) {
+    if (!one.name.empty()) options.changes.settings.push_back(setting_of(one));
   }
   if (!scene.empty()) options.changes.scene = find_scene_file(scene);
   if (!numeric.empty()) {

@@ -17,12 +17,6 @@
 namespace kerf {
 namespace {
 
-/// What a scene writes for no law of this kind; empty: such a kind has always one by name.
-std::string_view default_law_word(LawKind kind) {
-  if (const LawRow* row = default_law(kind)) return row->name;
-  return kind == LawKind::stabiliser ? "none" : "";
-}
-
 /// Takes the value of a key into its slot, if it is of that type and allowed.
 struct Take {
   const SceneKey& key;
@@ -67,20 +61,18 @@ struct Take {
     if (text == nullptr) {
       refuse(place, " does not say which; write { name = \"..\" } and what it sets");
     }
-    if (!is_table && *text == default_law_word(into->kind)) {
-      *into = {into->kind, "", {}};
-      return;
-    }
     const auto place_below = [&](const TomlNode& entry) {
       return place_of(entry, std::string(key.name) + "." + one_line(entry.key), file);
     };
     const LawRow* row = nullptr;
     try {
-      row = &find_law(into->kind, *text);
+      row = is_table ? &find_law(into->kind, *text) : law_by_word(into->kind, *text);
     } catch (const LawError& error) {
-      if (is_table) refuse(place_below(*name), error.what());
-      const std::string word(default_law_word(into->kind));
-      refuse(place, error.what() + (word.empty() ? "" : "; none: \"" + word + '"'));
+      refuse(is_table ? place_below(*name) : place, error.what());
+    }
+    if (row == nullptr) {
+      *into = {into->kind, "", {}};
+      return;
     }
     *into = {into->kind, *text, {}};
     for (const TomlNode& entry : node.entries) {

@@ -44,7 +44,7 @@ KERF_BIN=build/own replays 'each equal to the last bit' kerf replay hard/log
 replays 'N, 0.0000 mm between the places' build/own-replay hard/log --law half_spring
 replays 'pose: velocity_mm_per_s' build/own-replay hard/log --estimator standing_hand
 replays '0.0000 N' build/own-replay hard/log --stabiliser no_force
-replays '--set force.law = "half_spin" is unknown; did you mean "half_spring"? known: half_spring, hardening_spring; none: "coupling"' \
+replays '--law half_spin is unknown; did you mean "half_spring"? known: half_spring, hardening_spring; none: "coupling"' \
   build/own-replay hard/log --law half_spin
 replays 'is unknown; known: difference, foaw, standing_hand' build/own-replay hard/log --estimator x
 replays 'is unknown; known: energy_bounding, no_force, passivity; none: "none"' build/own-replay hard/log --stabiliser x

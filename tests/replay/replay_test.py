@@ -318,8 +318,10 @@ class TestReplay(unittest.TestCase):
                                  ("--estimator", "servo.velocity", f"; known: difference, foaw{yours}"),
                                  ("--stabiliser", "force.stabiliser",
                                   f'; known: energy_bounding, passivity{yours}; none: "none"')):
-            self.assertEqual(replay(self.log, name, "x", code=2),
+            self.assertEqual(replay(self.log, name, "x", code=2), f"kerf-replay: {name} x is unknown{known}\n")
+            self.assertEqual(replay(self.log, "--set", f"{key}=x", code=2),
                              f'kerf-replay: {self.scene}: --set {key} = "x" is unknown{known}\n')
+        self.assertIn('--set servo.velocity.name = "x" is unknown', replay(self.log, "--estimator", '{name = "x"}', code=2))
 
     def test_a_recorded_setting_of_a_law_goes_with_the_law(self):
         folder = self.run_folder / "set"

@@ -28,6 +28,12 @@ std::vector<std::string_view> names_of(const std::vector<const LawRow*>& rows) {
   return names;
 }
 
+/// What a scene writes for no law of this kind; empty: such a kind has always one by name.
+std::string_view default_word(LawKind kind) noexcept {
+  if (const LawRow* row = default_law(kind)) return row->name;
+  return kind == LawKind::stabiliser ? "none" : "";
+}
+
 }  // namespace
 
 std::string_view kind_name(LawKind kind) noexcept {
@@ -69,6 +75,17 @@ const LawRow& find_law(LawKind kind, std::string_view name) {
     throw LawError(" is unknown: this program has no " + std::string(kind_name(kind)) + elsewhere);
   }
   throw LawError(unknown_word(name, names_of(rows), "\"") + elsewhere);
+}
+
+const LawRow* law_by_word(LawKind kind, std::string_view word) {
+  const std::string_view by_default = default_word(kind);
+  if (word == by_default) return nullptr;
+  try {
+    return &find_law(kind, word);
+  } catch (const LawError& error) {
+    if (by_default.empty()) throw;
+    throw LawError(error.what() + ("; none: \"" + std::string(by_default) + '"'));
+  }
 }
 
 std::string setting_problem(const LawRow& row, std::string_view setting, double value) {

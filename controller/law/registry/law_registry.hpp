@@ -41,6 +41,10 @@ struct LawError : std::runtime_error {
 /// Throws LawError with the known names for one that is unknown.
 [[nodiscard]] const LawRow& find_law(LawKind kind, std::string_view name);
 
+/// The law that a scene chooses by one word: null for the word that stands for the default of the
+/// kind. Throws LawError with the known names and that word.
+[[nodiscard]] const LawRow* law_by_word(LawKind kind, std::string_view word);
+
 /// The problem with a value of a setting, as text after `setting = value`; empty if there is none.
 [[nodiscard]] std::string setting_problem(const LawRow& row, std::string_view setting,
                                           double value);
