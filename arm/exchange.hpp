@@ -66,7 +66,8 @@ class ArmExchange {
 
   /// Reports a failure: a code of the library, or one of these. The first one is kept. Also calls
   /// `let_go`.
-  enum : std::uint32_t { kStalled = 0xffff0001, kUnreadable, kSilent };
+  static constexpr std::uint32_t kStalled = 0xffff0001, kUnreadable = 0xffff0002,
+                                 kSilent = 0xffff0003;
   void fail(std::uint32_t code) noexcept;
   /// 0 if there is none.
   [[nodiscard]] std::uint32_t failure() const noexcept { return failure_.load(); }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Runs all cases; without those of the suite "network" if this process cannot reach its own
-// machine, which it then prints.
+// Runs all cases, with signals as a terminal's shell gives them; without those of the suite
+// "network" if this process cannot reach its own machine, which it then prints.
 #define DOCTEST_CONFIG_IMPLEMENT
 #ifdef KERF_SANITIZED
 #define DOCTEST_CONFIG_NO_POSIX_SIGNALS  // the sanitizer tells more of a crash: the line
@@ -9,6 +9,7 @@
 
 #ifdef __linux__
 #include <algorithm>
+#include <csignal>
 #include <cstdio>
 #include <string_view>
 
@@ -36,9 +37,19 @@ bool reaches_itself() {
   return reached;
 }
 
+/// Under nohup SIGHUP is ignored, in a background job of a script SIGINT and SIGQUIT, and children
+/// inherit that: what is said of signals here would then be said of the caller.
+void take_signals_by_default() {
+  for (int number = 1; number <= SIGRTMAX; ++number) std::signal(number, SIG_DFL);
+  sigset_t none;
+  sigemptyset(&none);
+  sigprocmask(SIG_SETMASK, &none, nullptr);
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
+  take_signals_by_default();
   if (const std::string_view name = kerf::unknown_hidden_set(); !name.empty()) {
     std::printf("KERF_HIDE_SETS: no instruction set has the name %.*s\n",
                 static_cast<int>(name.size()), name.data());

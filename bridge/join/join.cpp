@@ -58,7 +58,7 @@ constexpr auto kConnectPatience = 1500ms;  // a lost SYN comes again after 1 s
 constexpr auto kGreetingPatience = 10s;    // TLS and HTTP over a slow link
 
 [[noreturn]] void throw_no_tls(const CertificateCheck& check, const ErrorCode& error) {
-  if (const std::string reason = check.refusal(); !reason.empty()) {
+  if (const std::string& reason = check.refusal(); !reason.empty()) {
     if (check.is_pinned()) throw Outdated(reason);
     throw Hopeless(reason);
   }

@@ -213,8 +213,8 @@ namespace {
 }
 
 [[nodiscard]] int index_of_check() {
-  static const int index = SSL_get_ex_new_index(0, nullptr, nullptr, nullptr, nullptr);
-  return index;
+  static const int kIndex = SSL_get_ex_new_index(0, nullptr, nullptr, nullptr, nullptr);
+  return kIndex;
 }
 
 }  // namespace

@@ -241,7 +241,7 @@ struct Column {
 constexpr const char* kSwingColumn = "swing";
 
 const std::vector<Column>& columns() {
-  static const std::vector<Column> list = [] {
+  static const std::vector<Column> kColumns = [] {
     std::vector<Column> all{
         {"ticks", false},       {"contact_ticks", false}, {"shaft_ticks", false},
         {"stale_ticks", false}, {"lost_packets", false},  {"peak_force_n", false},
@@ -258,7 +258,7 @@ const std::vector<Column>& columns() {
     all.insert(all.end(), rest.begin(), rest.end());
     return all;
   }();
-  return list;
+  return kColumns;
 }
 
 CellResult result_of(int exit, const std::filesystem::path& folder, const std::string& last_line,
@@ -293,12 +293,12 @@ CellResult result_of(int exit, const std::filesystem::path& folder, const std::s
 }  // namespace
 
 const std::vector<std::string>& result_columns() {
-  static const std::vector<std::string> names = [] {
+  static const std::vector<std::string> kNames = [] {
     std::vector<std::string> list;
     for (const Column& column : columns()) list.push_back(column.name);
     return list;
   }();
-  return names;
+  return kNames;
 }
 
 std::string emulator_refusal(const CellJob& job, const std::filesystem::path& folder,

@@ -175,12 +175,12 @@ constexpr std::pair<std::string_view, const char*> kInnerEnds[] = {
 
 /// The scene that the keys change.
 const KeyTexts& base() {
-  static const KeyTexts texts{{"volume.file", "\"solid.nrrd\""},
-                              {"tool.shape", "\"ball\""},
-                              {"tool.radius_mm", "1.0"},
-                              {"material.name", "\"enamel\""},
-                              {"device.torque_scale", "[0.342, 0.342, 0.342]"}};
-  return texts;
+  static const KeyTexts kTexts{{"volume.file", "\"solid.nrrd\""},
+                               {"tool.shape", "\"ball\""},
+                               {"tool.radius_mm", "1.0"},
+                               {"material.name", "\"enamel\""},
+                               {"device.torque_scale", "[0.342, 0.342, 0.342]"}};
+  return kTexts;
 }
 
 /// The value that decides a condition: the scene's, the base's, or the default.

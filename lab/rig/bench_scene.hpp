@@ -44,14 +44,14 @@ template <class Depth>
 /// A ball of 40 voxels in the middle.
 [[nodiscard]] inline std::vector<Density> ball_in(const VoxelGrid& grid) {
   return densities(grid, [&](double x, double y, double z) {
-    return 40 - std::hypot(x - grid.nx / 2, y - grid.ny / 2, z - grid.nz * 0.5);
+    return 40 - std::hypot(x - grid.nx * 0.5, y - grid.ny * 0.5, z - grid.nz * 0.5);
   });
 }
 
 /// Around that ball, dipping 2 voxels into it.
 [[nodiscard]] inline Place around(const VoxelGrid& grid, int size, int i, int count) {
   const double angle = 2 * std::numbers::pi * i / count, radius = 40 + size * 0.5 - 2;
-  return {grid.nx / 2 + radius * std::cos(angle), grid.ny / 2 + radius * std::sin(angle),
+  return {grid.nx * 0.5 + radius * std::cos(angle), grid.ny * 0.5 + radius * std::sin(angle),
           grid.nz * 0.5};
 }
 

@@ -195,9 +195,7 @@ void SafetyMonitor::follow_report(double time_ms) {
 void SafetyMonitor::follow_silence(double time_ms) {
   if (off_ != Off::no_reason) return;
   constexpr double kRounding = 1e-6;
-  if (link_ended_) {
-    must_stay_off(fault_name(Fault::stale_input));
-  } else if (listened_ms_ - heard_ms_ > kZeroMs + kRounding) {
+  if (link_ended_ || listened_ms_ - heard_ms_ > kZeroMs + kRounding) {
     must_stay_off(fault_name(Fault::stale_input));
   } else if (no_pose_since_ms_ >= 0 &&
              time_ms - no_pose_since_ms_ > kNotFiniteMs + tick_ms_ + kRounding) {

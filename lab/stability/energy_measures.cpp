@@ -236,6 +236,7 @@ Feel feel_of(const PortLoop& loop, const PortLoopRun& run) {
   const auto touch = std::ranges::find_if(run.at_mm, [](double y) { return y < 0; });
   const auto first = static_cast<std::size_t>(touch - run.at_mm.begin());
   const auto let_go = static_cast<std::size_t>(loop.let_go_s * loop.rate_hz);
+  const std::size_t settled = let_go * 3 / 4;
   double low_mm = 1e9, high_mm = -1e9;
   for (std::size_t i = first; i < run.at_mm.size(); ++i) {
     if (run.force_n[i] >= loop.push_n / 2) {
@@ -244,10 +245,10 @@ Feel feel_of(const PortLoop& loop, const PortLoopRun& run) {
     if (i >= let_go && run.at_mm[i] > 0.06) {  // an encoder's step is no contact any more
       feel.air_n = std::max(feel.air_n, std::abs(run.force_n[i]));
     }
-    if (i < let_go * 3 / 4 || i >= let_go) continue;
+    if (i < settled || i >= let_go) continue;
     low_mm = std::min(low_mm, run.at_mm[i]);
     high_mm = std::max(high_mm, run.at_mm[i]);
-    feel.depth_mm -= run.at_mm[i] / static_cast<double>(let_go - let_go * 3 / 4);
+    feel.depth_mm -= run.at_mm[i] / static_cast<double>(let_go - settled);
   }
   feel.swing_mm = high_mm - low_mm;
   return feel;

@@ -206,7 +206,7 @@ std::string column_name(const AxisKind& kind) {
 }  // namespace
 
 const std::string& this_program() {
-  static const std::string hash = [] {
+  static const std::string kHash = [] {
     const std::string bytes = text_in("/proc/self/exe");
     if (bytes.empty()) {
       throw HilError(
@@ -215,7 +215,7 @@ const std::string& this_program() {
     }
     return hex64(fnv1a(bytes));
   }();
-  return hash;
+  return kHash;
 }
 
 std::string part_text(const Part& part) {

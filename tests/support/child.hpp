@@ -15,14 +15,12 @@ inline constexpr int kThrown = 98;           ///< exit code of a child whose bod
 inline constexpr int kKilledBySignal = 128;  ///< plus the signal's number, as a shell reports it
 
 /// Runs `body` in a forked process, which ends without destructors of the parent's objects. The
-/// exit code is the result of `body` (0 if it returns void). SIGHUP ends it, also if the tests run
-/// under nohup. Returns the process id.
+/// exit code is the result of `body` (0 if it returns void). Returns the process id.
 template <class Body>
 [[nodiscard]] pid_t start_child(const Body& body) {
   const pid_t child = fork();
   if (child < 0) throw std::runtime_error("fork failed");
   if (child > 0) return child;
-  std::signal(SIGHUP, SIG_DFL);
   int code = 0;
   try {
     if constexpr (std::is_void_v<std::invoke_result_t<const Body&>>) {
