@@ -87,4 +87,18 @@ path __weakly_canonical(const path& name, error_code* error) {
   return __absolute(name, error);
 }
 
+/// The worker answers for each file by its name and has no list of them: a folder is one that
+/// cannot be read. So a part that is missing in the middle of a split log is not seen here.
+directory_iterator::directory_iterator(const path& /*name*/, error_code* error,
+                                       directory_options /*options*/) {
+  if (error != nullptr) *error = error_code(ENOTSUP, generic_category());
+}
+directory_iterator& directory_iterator::__increment(error_code* error) {
+  if (error != nullptr) *error = error_code(ENOTSUP, generic_category());
+  return *this;
+}
+const directory_entry& directory_iterator::__dereference() const {
+  __builtin_unreachable();  // there is no first entry
+}
+
 _LIBCPP_END_NAMESPACE_FILESYSTEM
