@@ -26,6 +26,11 @@ SeenPoint deeper(const SeenPoint& seen, double by_mm, double least_mm, double mo
   return {seen.pixel, std::clamp(seen.depth_mm + by_mm, least_mm, std::max(least_mm, most_mm))};
 }
 
+bool moves_view(const WindowInput& input) {
+  return input.of_view || input.zoom != 0.0 || input.turn_right != 0.0 || input.turn_up != 0.0 ||
+         input.move_right != 0.0 || input.move_up != 0.0;
+}
+
 }  // namespace
 
 void PointerHand::step(const WindowInput& input, bool over_panel, const View& view,
@@ -36,7 +41,7 @@ void PointerHand::step(const WindowInput& input, bool over_panel, const View& vi
   by_pad_ = held.by_pad || (by_pad_ && !input.hovers);
   leads_ = input.hovers || by_pad_;
   const bool down = input.pointer.down || held.pedal;
-  spent_ = down && (spent_ || input.left || !points);
+  spent_ = down && (spent_ || input.left || !points || moves_view(input));
   const bool by_pointer = down && !spent_;
   pedal_ = by_pointer || held.press;
   press_mm_ = glm::dvec3(0.0);

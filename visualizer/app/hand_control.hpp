@@ -30,9 +30,9 @@ namespace kerf {
 ///
 /// The pedal is down while the left button, the space bar, or a pad's or SpaceMouse's button is. A
 /// press of button or bar ends when the pointer is no longer over the window or comes over a panel,
-/// when the goal jumps, and on `end_press`; it does not go on when the pointer comes back: it is to
-/// be pressed anew. Lengths below
-/// are mm of the hand: of the world, times the scene's scale.
+/// when the view moves or a button that moves it is down, when the goal jumps, and on `end_press`;
+/// it does not go on when the pointer comes back: it is to be pressed anew. Lengths below are mm of
+/// the hand: of the world, times the scene's scale.
 class PointerHand {
  public:
   static constexpr double kWheelMm = 0.25;   ///< a notch

@@ -193,6 +193,8 @@ WindowInput Window::poll() {
   input_.hovers = cursor_known_ && is_over();
   input_.left = input_.left || !input_.hovers;
   if (down_[GLFW_MOUSE_BUTTON_LEFT]) input_.pointer.down = true;
+  input_.of_view = input_.of_view || down_[GLFW_MOUSE_BUTTON_RIGHT] ||
+                   down_[GLFW_MOUSE_BUTTON_MIDDLE] || (input_.pointer.down && has_shift(handle_));
   float density = 1.0F;
   glfwGetWindowContentScale(handle_, &density, nullptr);
   input_.density = static_cast<double>(density);
@@ -228,6 +230,8 @@ void Window::on_key(GLFWwindow* handle, int key, int scancode, int action, int m
   Window& window = window_of(handle);
   if (key == GLFW_KEY_SPACE && action != GLFW_REPEAT) window.pedal_ = action == GLFW_PRESS;
   if (action != GLFW_PRESS) return;
+  const bool shift = key == GLFW_KEY_LEFT_SHIFT || key == GLFW_KEY_RIGHT_SHIFT;
+  if (shift && window.down_[GLFW_MOUSE_BUTTON_LEFT]) window.input_.of_view = true;
   const char letter = letter_of(key, scancode);
   const bool redo = (letter == 'z' && (mods & GLFW_MOD_SHIFT) != 0) ||
                     (letter == 'y' && (mods & GLFW_MOD_CONTROL) != 0);
@@ -271,8 +275,9 @@ void Window::on_button(GLFWwindow* handle, int button, int action, int /*mods*/)
   Window& window = window_of(handle);
   const auto at = static_cast<std::size_t>(button);
   if (at < window.down_.size()) window.down_[at] = action == GLFW_PRESS;
+  if (action != GLFW_PRESS) return;
   // A click may be over before the next `poll`.
-  if (button == GLFW_MOUSE_BUTTON_LEFT && action == GLFW_PRESS) window.input_.pointer.down = true;
+  (button == GLFW_MOUSE_BUTTON_LEFT ? window.input_.pointer.down : window.input_.of_view) = true;
 }
 
 void Window::on_scroll(GLFWwindow* handle, double /*x*/, double y) {

@@ -35,6 +35,7 @@ struct WindowInput {
   double wheel = 0.0;
   double zoom = 0.0;       ///< the wheel with control
   double plane = 0.0;      ///< with shift
+  bool of_view = false;    ///< the right or the middle button was down, or shift with the left one
   HeldControls held;       ///< now
   bool hovers = false;     ///< the pointer is over the window, and nothing lies between
   bool left = false;       ///< it was elsewhere in between, or the window was not visible

@@ -43,8 +43,8 @@ export class Steering {
       addEventListener(kind, event => event.pointerType === 'touch' && this.finger(event), {capture: true});
     }
     canvas.addEventListener('pointerleave', event => {
-      const leads = this.on && !this.isLedByAnother(event);
-      if (leads && event.pointerType !== 'touch' && event.buttons === 0) this.letGo();
+      if (!this.on || event.pointerType === 'touch' || this.isLedByAnother(event)) return;
+      event.buttons ? this.spend(event.pointerType) : this.letGo();  // a pointer that is captured does not leave
     });
     canvas.addEventListener('contextmenu', event => this.on && event.preventDefault());
     addEventListener('keydown', ({key}) => {

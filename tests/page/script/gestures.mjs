@@ -86,6 +86,14 @@ const gestures = {
     user.sees(false, 200);
     user.up(kLeft);
   },
+  'the pointer leaves in a press, since it was never captured': user => {
+    user.down(kLeft);
+    user.point('pointerleave');
+    user.sees(false, 300);
+    user.move(420, 300);
+    user.sees(false, 200);
+    user.up(kLeft);
+  },
   'a press is cancelled': user => {
     user.down(kLeft);
     user.point('pointercancel', {buttons: 0});

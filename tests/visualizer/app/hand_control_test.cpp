@@ -152,9 +152,9 @@ TEST_CASE(
   }
 }
 
-TEST_CASE("a press ends whatever takes the pointer away, and does not go on when it is back") {
+TEST_CASE("a press ends whatever takes the pointer or the view, and does not go on after it") {
   for (const bool by_bar : {false, true}) {
-    for (const int way : {0, 1, 2, 3, 4, 5}) {
+    for (const int way : {0, 1, 2, 3, 4, 5, 6, 7, 8, 9}) {
       CAPTURE(way);
       Bench bench;
       const auto pressed = [&] {
@@ -173,6 +173,10 @@ TEST_CASE("a press ends whatever takes the pointer away, and does not go on when
       if (way == 1) away.left = true;     // it was outside, and is back, within one frame
       if (way == 4) bench.hand.come();
       if (way == 5) bench.hand.end_press();
+      if (way == 6) away.of_view = true;  // a second button, or shift; nothing has moved yet
+      if (way == 7) away.turn_up = 0.01;
+      if (way == 8) away.move_right = 0.01;
+      if (way == 9) away.zoom = 1.0;
       const glm::dvec3 tool_mm = bench.tool_mm;
       if (way == 3) bench.tool_mm = {0.0, 1e4, 1e4};  // the tool is behind the eye
       bench.frame(way == 3 ? at(tool.pixel.x, tool.pixel.y) : away, way == 2);

@@ -175,6 +175,11 @@ TEST_CASE("a press ends with whatever takes the pointer or the window away, and 
       {"along the edge and out", "mousemove 240 359 mousemove 240 400", "mousemove 240 150"},
       {"another window lies there", "mousemove 400 120", "mousemove 240 150"},
       {"a panel", "mousemove 60 330", "mousemove 240 150"},
+      {"the right button, up again", "mousedown 3 sleep 0.1 mouseup 3", "mousemove 240 151"},
+      {"the right button, up after the left one", "mousedown 3 sleep 0.1 mouseup 1",
+       "mousemove 241 151 sleep 0.1 mouseup 3"},
+      {"the middle button", "mousedown 2", "mouseup 2"},
+      {"shift, and no motion", "keydown shift sleep 0.1", "keyup shift mousemove 240 151"},
       {"another window has the focus", find + "windowfocus sleep 0.2", ""},
       {"taken off the screen", find + "windowunmap", find + "windowmap sleep 0.3"},
   };
