@@ -9,6 +9,8 @@
 #include <cmath>
 #include <cstdio>
 #include <ctime>
+#include <fstream>
+#include <iterator>
 #include <limits>
 #include <system_error>
 
@@ -156,15 +158,18 @@ std::string LogClock::set_in_the_run() const {
 LogClock read_clock(const std::filesystem::path& folder, bool is_named) {
   const std::filesystem::path path = folder / kClockName;
   std::error_code none;
-  if (!is_named && !std::filesystem::exists(path, none)) return {};
-  if (!std::filesystem::is_regular_file(path, none)) {
+  if (!std::filesystem::exists(path, none)) {
+    if (!is_named) return {};
     return LogClock({}, damaged(path, "no such file, and the manifest names it"));
   }
-  constexpr std::uintmax_t kMostBytes = 64 << 20;  // five years of minutes
-  if (std::filesystem::file_size(path, none) > kMostBytes) {
+  if (!std::filesystem::is_regular_file(path, none)) {
+    return LogClock({}, damaged(path, "no regular file"));
+  }
+  if (std::filesystem::file_size(path, none) > kMostClockBytes) {
     return LogClock({}, damaged(path, "larger than the clock of any run"));
   }
-  const std::string text = text_in(path);
+  std::ifstream file = open_recorded(path, way_to_recording(folder));
+  const std::string text{std::istreambuf_iterator<char>(file), {}};
   const auto counted = rows_of(std::string_view(text).substr(0, kClockHeaderBytes));
   if (!counted) return LogClock({}, damaged(path, "not the clock of a recording of this version"));
   std::vector<ClockPair> pairs((text.size() - kClockHeaderBytes) / sizeof(ClockPair));

@@ -20,6 +20,10 @@ inline constexpr std::string_view kClockName = "clock.npy";
 /// The header of clock.npy; its count of rows is written after each row, as in a tick log.
 inline constexpr std::size_t kClockHeaderBytes = 256;
 
+/// No clock.npy is larger: a row of 24 bytes a minute for five years. The ticks of such a run have
+/// 78 TB at 1 kHz.
+inline constexpr std::uintmax_t kMostClockBytes = std::uintmax_t{64} << 20;
+
 /// One row of clock.npy, little-endian.
 struct ClockPair {
   std::int64_t monotonic_ns;  ///< CLOCK_MONOTONIC; in lock-step 0, the time of tick 0

@@ -148,16 +148,8 @@ std::string not_a_manifest(const std::filesystem::path& folder) {
 }
 
 std::string manifest_text(const std::filesystem::path& folder) {
-  const std::filesystem::path path = folder / kManifestName;
-  if (const std::string why = access_error(path); !why.empty()) {
-    throw RecordError(path.string() + why);
-  }
-  std::error_code fault;
-  std::ifstream file;
-  if (std::filesystem::is_regular_file(path, fault)) file.open(path);  // opening a pipe would block
-  if (!file.is_open()) {
-    refuse_recording(folder, path.string() + ": cannot be read; " + way_to_manifest(folder));
-  }
+  std::ifstream file =
+      open_recorded(folder / kManifestName, way_to_manifest(folder), kMostManifestBytes);
   return {std::istreambuf_iterator<char>(file), {}};
 }
 
@@ -263,17 +255,7 @@ Manifest read_manifest(const std::filesystem::path& folder) {
 }
 
 std::string recorded_scene(const std::filesystem::path& folder) {
-  const std::filesystem::path path = folder / kSceneName;
-  std::error_code fault;
-  const std::uintmax_t bytes = std::filesystem::file_size(path, fault);
-  std::ifstream file;
-  if (!fault && std::filesystem::is_regular_file(path, fault)) file.open(path, std::ios::binary);
-  if (!file.is_open()) {
-    refuse_recording(folder, path.string() + ": cannot be read; " + way_to_recording(folder));
-  }
-  if (bytes > kMaxSceneBytes) {
-    refuse_recording(folder, path.string() + ": larger than any scene; copy the recording again");
-  }
+  std::ifstream file = open_recorded(folder / kSceneName, way_to_recording(folder), kMaxSceneBytes);
   return {std::istreambuf_iterator<char>(file), {}};
 }
 

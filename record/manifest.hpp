@@ -36,6 +36,9 @@ struct RecordLosses {
 inline constexpr std::string_view kTickLogName = "ticks.npy";
 inline constexpr std::string_view kManifestName = "manifest.json";
 inline constexpr std::string_view kSceneName = "scene.json";
+/// No manifest.json is larger: 4,096 gaps in less than 1 MiB, and the checksums, in 35 bytes each,
+/// of the files of a log that was split each second for 20 days.
+inline constexpr std::uintmax_t kMostManifestBytes = std::uintmax_t{64} << 20;
 inline constexpr std::string_view kStillRunning = "running";
 inline constexpr std::string_view kFault = "fault";     ///< the run did not end as it was asked to
 inline constexpr std::string_view kNoRoom = "no room";  ///< the disk was full

@@ -14,6 +14,12 @@
 
 namespace kerf {
 
+/// No such file with `bytes` of content is larger: what deflate cannot pack it stores, with 5 bytes
+/// for each 16 KiB; header and gzip need less than a page.
+[[nodiscard]] constexpr std::uintmax_t most_packed_bytes(std::uintmax_t bytes) noexcept {
+  return bytes + bytes / 1024 + 4096;
+}
+
 /// Writes header and content into `file` as gzip and closes it. Throws FileError.
 void write_packed_npy(AtomicFile& file, std::string_view header,
                       std::span<const std::byte> content);

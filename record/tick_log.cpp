@@ -2,6 +2,7 @@
 #include "record/tick_log.hpp"
 
 #include <algorithm>
+#include <cerrno>
 #include <charconv>
 #include <iterator>
 #include <string_view>
@@ -9,6 +10,7 @@
 #include <utility>
 
 #include "record/npy_header.hpp"
+#include "shared/posix/error_text.hpp"
 #include "shared/segment/layout_table.hpp"
 #include "shared/volume/checksum.hpp"
 
@@ -66,6 +68,10 @@ bool is_recording(const std::filesystem::path& folder) {
 }
 
 std::string way_to_recording(const std::filesystem::path& folder) {
+  std::error_code fault;
+  if (is_recording(folder) || std::filesystem::exists(folder / "manifest.json", fault)) {
+    return "copy the recording again";
+  }
   const std::filesystem::path below = folder / "log";
   return "give " + (is_recording(below) ? below.string() : "the folder of a recording");
 }
@@ -73,6 +79,32 @@ std::string way_to_recording(const std::filesystem::path& folder) {
 void refuse_recording(const std::filesystem::path& folder, const std::string& line) {
   if (is_recording(folder)) throw DamagedRecording(line);
   throw RecordError(line);
+}
+
+std::ifstream open_recorded(const std::filesystem::path& path, const std::string& way,
+                            std::uintmax_t most_bytes) {
+  if (const std::string why = access_error(path); !why.empty()) {
+    throw RecordError(path.string() + why);
+  }
+  const auto refuse = [&](const std::string& why) {
+    refuse_recording(path.parent_path(), path.string() + ": " + why);
+  };
+  std::error_code fault;
+  if (!std::filesystem::exists(path, fault)) refuse("cannot be read; " + way);
+  if (!std::filesystem::is_regular_file(path, fault)) {  // opening a pipe would wait for its writer
+    refuse("no regular file; copy the recording again");
+  }
+  if (std::filesystem::file_size(path, fault) > most_bytes) {
+    refuse("larger than that of any recording; copy the recording again");
+  }
+  std::ifstream file(path, std::ios::binary);
+  if (!file.is_open()) {
+    const int error = errno;
+    throw RecordError(path.string() + ": cannot be read (" +
+                      std::generic_category().message(error) + "); " +
+                      remedy_for(error, "check its rights"));
+  }
+  return file;
 }
 
 std::filesystem::path part_of_log(const std::filesystem::path& path, std::size_t part) {
@@ -136,14 +168,7 @@ TickLogReader::TickLogReader(std::filesystem::path path) : path_(std::move(path)
 }
 
 bool TickLogReader::add_part(const std::filesystem::path& path) {
-  std::error_code fault;
-  const bool is_file = std::filesystem::is_regular_file(path, fault);  // a pipe would be waited for
-  std::ifstream file;
-  if (is_file) file.open(path, std::ios::binary);
-  if (!file.is_open()) {
-    refuse_recording(path.parent_path(),
-                     path.string() + ": cannot be read; " + way_to_recording(path.parent_path()));
-  }
+  std::ifstream file = open_recorded(path, way_to_recording(path.parent_path()));
   std::string header(kTickLogHeaderBytes, '\0');
   file.read(header.data(), static_cast<std::streamsize>(header.size()));
   header.resize(static_cast<std::size_t>(file.gcount()));

@@ -49,16 +49,22 @@ inline constexpr std::size_t kTickLogHeaderBytes = 4096;
 [[nodiscard]] std::filesystem::path part_of_log(const std::filesystem::path& path,
                                                 std::size_t part);
 
-/// The remedy if `folder` holds no recording. If it is a demo's folder, names the recording in its
-/// folder `log`.
-[[nodiscard]] std::string way_to_recording(const std::filesystem::path& folder);
-
 /// Whether `folder` is a recording, sound or not: one has a file ticks.npy.
 [[nodiscard]] bool is_recording(const std::filesystem::path& folder);
+
+/// The remedy if a file of the recording in `folder` is missing. If that is no recording but a
+/// demo's folder, names the recording in its folder `log`.
+[[nodiscard]] std::string way_to_recording(const std::filesystem::path& folder);
 
 /// For what is wrong in `folder`: throws `DamagedRecording` if that is a recording, else
 /// `RecordError`.
 [[noreturn]] void refuse_recording(const std::filesystem::path& folder, const std::string& line);
+
+/// Opens a file of a recording. Refuses the recording if the file is missing, for which `way` is
+/// the remedy, or a folder, a pipe or a device, or larger than `most_bytes`. Without the right to
+/// read it throws `RecordError`.
+[[nodiscard]] std::ifstream open_recorded(const std::filesystem::path& path, const std::string& way,
+                                          std::uintmax_t most_bytes = UINTMAX_MAX);
 
 /// Ticks of a log, both ends included.
 struct TickRange {

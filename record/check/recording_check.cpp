@@ -105,7 +105,7 @@ class Check {
         findings_.add(kSceneName, "\"" + one_line(*twice) + "\" stands twice in it");
       }
       findings_.compare_file(std::string(kSceneName));
-    } catch (const RecordError& error) {
+    } catch (const DamagedRecording& error) {
       findings_.add_line(error.what());
       return;
     } catch (const JsonError&) {

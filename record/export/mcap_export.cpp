@@ -6,7 +6,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <fstream>
-#include <optional>
 #include <string>
 #include <string_view>
 #include <system_error>
@@ -14,6 +13,7 @@
 
 #include "record/input_rows.hpp"
 #include "record/kept_volumes.hpp"
+#include "record/packed_npy.hpp"
 #include "record/recording.hpp"
 #include "record/scene_facts.hpp"
 #include "record/tick_log.hpp"
@@ -38,16 +38,20 @@ constexpr bool has_no_padding() {
 }
 static_assert(has_no_padding(), "mcap_export.hpp: the bytes of a message are those of a row");
 
-/// The bytes of a regular file; nothing if it is none, or cannot be read to its end.
-std::optional<std::string> content_of(const std::filesystem::path& path) {
+/// Reads a regular file of at most `most` bytes into `content`. Returns why that is not possible,
+/// else nothing.
+const char* read_into(std::string& content, const std::filesystem::path& path,
+                      std::uintmax_t most) {
+  constexpr const char* kUnreadable = "no file, or one that cannot be read";
   std::error_code fault;
-  if (!std::filesystem::is_regular_file(path, fault)) return std::nullopt;  // a pipe would block
+  if (!std::filesystem::is_regular_file(path, fault)) return kUnreadable;  // a pipe would block
   std::ifstream file(path, std::ios::binary);
   const std::uintmax_t bytes = std::filesystem::file_size(path, fault);
-  if (!file.is_open() || fault) return std::nullopt;
-  std::string content(static_cast<std::size_t>(bytes), '\0');
-  if (!file.read(content.data(), static_cast<std::streamsize>(bytes))) return std::nullopt;
-  return content;
+  if (!file.is_open() || fault) return kUnreadable;
+  if (bytes > most) return "larger than that of any recording";
+  content.resize(static_cast<std::size_t>(bytes));
+  const bool is_read = bool(file.read(content.data(), static_cast<std::streamsize>(bytes)));
+  return is_read ? nullptr : kUnreadable;
 }
 
 /// Rows by the header of each arm's log. A reader of a cut log reports the cut by the count; rows
@@ -82,7 +86,7 @@ Places device_places(const std::filesystem::path& folder, std::size_t arms,
     }
     return places;
   } catch (const JsonError&) {    // NOLINT(bugprone-empty-catch): reported below
-  } catch (const RecordError&) {  // NOLINT(bugprone-empty-catch): likewise
+  } catch (const RecordError&) {  // NOLINT(bugprone-empty-catch): reported below
   }
   left_out.push_back((folder / kSceneName).string() +
                      ": no device.offset_mm, so the MCAP has no /tf; copy the recording again");
@@ -97,15 +101,19 @@ void attach_files(const std::filesystem::path& folder, const std::vector<std::ui
     left_out.push_back(path.string() + ": " + value +
                        ", so the MCAP is without it; copy the recording again");
   };
-  const auto attach = [&](const std::string& name, std::string_view type) {
-    const std::optional<std::string> content = content_of(folder / name);
-    if (content) writer.attach(name, type, *content);
-    if (!content) leave_out(folder / name, "no file, or one that cannot be read");
+  const auto attach = [&](const std::string& name, std::string_view type, std::uintmax_t most) {
+    std::string content;
+    if (const char* const why = read_into(content, folder / name, most)) {
+      leave_out(folder / name, why);
+    } else {
+      writer.attach(name, type, content);
+    }
   };
-  for (const std::string_view name : {kManifestName, kSceneName}) {
-    attach(std::string(name), "application/json");
-  }
-  if (has_clock) attach(std::string(kClockName), "application/octet-stream");
+  attach(std::string(kManifestName), "application/json", kMostManifestBytes);
+  attach(std::string(kSceneName), "application/json", kMaxSceneBytes);
+  if (has_clock) attach(std::string(kClockName), "application/octet-stream", kMostClockBytes);
+  constexpr std::uintmax_t kMostVolumeBytes =
+      most_packed_bytes(std::uintmax_t{kMaxBricks} * kBrickVoxels * sizeof(Density));
   for (const std::string_view below : {kVolumesName, inputs_name(0), inputs_name(1)}) {
     std::vector<std::string> names;
     std::error_code fault;
@@ -117,7 +125,10 @@ void attach_files(const std::filesystem::path& folder, const std::vector<std::ui
       leave_out(folder / below, fault.message());
     }
     std::ranges::sort(names);
-    for (const std::string& name : names) attach(name, "application/gzip");
+    const std::uintmax_t most = below == kVolumesName
+                                    ? kMostVolumeBytes
+                                    : most_packed_bytes(kInputsAFile * sizeof(TickInputs));
+    for (const std::string& name : names) attach(name, "application/gzip", most);
   }
   for (std::size_t arm = 0; arm < counts.size(); ++arm) {
     writer.attach(std::string(tick_log_name(arm)) + ".head", "application/octet-stream",

@@ -4,7 +4,9 @@
     mcap_test.py ROOT BIN BUILD      BUILD: folder for the readers
 Exit code 77: skipped, without node, npm or its registry."""
 import json
+import os
 import pathlib
+import resource
 import shutil
 import subprocess
 import sys
@@ -232,6 +234,21 @@ class TestMcap(unittest.TestCase):
         export(log, path)  # a phantom has no need of them
         (log / "volumes").write_bytes(b"")
         self.assertIn(f"{log / 'volumes'}: Not a directory, so", export(log, path, code=1))
+
+    def test_a_file_that_is_larger_than_that_of_any_recording_is_left_out(self):
+        log, path = self.folder / "large", self.folder / "large.mcap"
+        shutil.copytree(self.log, log)
+        files = [log / "clock.npy", min((log / "volumes").iterdir())]
+        for file in files:
+            os.truncate(file, 1 << 40)  # on no block of the disk
+        done = subprocess.run([BIN / "kerf-record", "export", log, "--mcap", path, "--time", "monotonic"], capture_output=True, text=True,
+                              preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (4 << 30, 4 << 30)))
+        self.assertEqual(done.returncode, 1, done.stderr)
+        for file in files:
+            self.assertIn(f"{file}: larger than that of any recording, so the MCAP is without it", done.stderr)
+        names = read(path)["attachments"]
+        self.assertNotIn("clock.npy", names)
+        self.assertIn("scene.json", names)
 
     def test_the_header_of_a_cut_log_has_its_count(self):
         log, path = self.folder / "cut", self.folder / "cut.mcap"

@@ -2,6 +2,7 @@
 #include <cstdlib>
 
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include "record/force_plot.hpp"
 #include "record/recording.hpp"
@@ -173,20 +174,91 @@ TEST_CASE("views of a folder that is no recording are refused and leave no file"
   }
 }
 
-TEST_CASE("a pipe or a device in the place of a recording's file is refused, not waited for") {
-  const RuntimeFolder folder;
-  record(folder / "log", 100);
-  for (const char* const name : {"manifest.json", "ticks.npy"}) {
-    CAPTURE(name);
-    std::filesystem::rename(folder / "log" / name, folder / "kept");
-    const std::string pipe = (folder / "log" / name).string();
-    REQUIRE(mkfifo(pipe.c_str(), 0600) == 0);
-    CHECK(error_of([&] { static_cast<void>(summarise(folder / "log")); }) ==
-          pipe + ": cannot be read; give the folder of a recording");
-    std::filesystem::remove(pipe);
-    std::filesystem::rename(folder / "kept", pipe);
+namespace {
+
+constexpr const char* kSingleFiles[] = {"manifest.json", "ticks.npy", "scene.json", "clock.npy"};
+
+/// With all files of `kSingleFiles`.
+void record_with_all(const std::filesystem::path& folder) {
+  record(folder, 100);
+  write_new_file(folder / "scene.json", "{}");
+  const ClockPair pair = sealed({.monotonic_ns = 1, .utc_ns = 2, .within_ns = 3, .crc32c = 0});
+  write_clock(folder, std::span(&pair, 1));
+}
+
+/// The line about `path` of a check of its recording; empty if there is none.
+std::string line_about(const std::filesystem::path& path) {
+  std::vector<std::string> lines;
+  try {
+    lines = check_recording(path.parent_path()).problems;
+  } catch (const DamagedRecording& refused) {
+    lines.push_back(refused.what());
+  } catch (const RecordError& refused) {
+    lines.push_back(std::string("bad input: ") + refused.what());
   }
-  CHECK(summarise(folder / "log").rows == 100);
+  const auto found = std::ranges::find_if(
+      lines, [&](const std::string& line) { return line.find(path.string()) != line.npos; });
+  return found == lines.end() ? "" : *found;
+}
+
+}  // namespace
+
+TEST_CASE("a pipe or a folder in the place of a recording's file is refused, not waited for") {
+  const RuntimeFolder folder;
+  record_with_all(folder / "log");
+  for (const char* const name : kSingleFiles) {
+    CAPTURE(name);
+    const std::filesystem::path path = folder / "log" / name;
+    CHECK(line_about(path).find("no regular file") == std::string::npos);
+    std::filesystem::rename(path, folder / "kept");
+    const std::string wanted = path.string() + ": no regular file; copy ";
+    REQUIRE(mkfifo(path.c_str(), 0600) == 0);
+    CHECK(line_about(path).find(wanted) != std::string::npos);
+    std::filesystem::remove(path);
+    std::filesystem::create_directory(path);
+    CHECK(line_about(path).find(wanted) != std::string::npos);
+    std::filesystem::remove(path);
+    std::filesystem::rename(folder / "kept", path);
+  }
+  std::filesystem::remove(folder / "log/scene.json");
+  CHECK(
+      line_about(folder / "log/scene.json").ends_with("cannot be read; copy the recording again"));
+}
+
+TEST_CASE("a file of a recording without the right to read it is bad input, and no damage") {
+  const RuntimeFolder folder;
+  record_with_all(folder / "log");
+  using std::filesystem::perms;
+  for (const auto& above : {folder.path(), folder / "log"}) {
+    std::filesystem::permissions(above, perms::owner_all | perms::group_exec | perms::others_exec);
+  }
+  constexpr uid_t kNobody = 65534;
+  const bool is_root = geteuid() == 0;  // who may read everything
+  for (const char* const name : kSingleFiles) {
+    CAPTURE(name);
+    const std::filesystem::path path = folder / "log" / name;
+    std::filesystem::permissions(path, perms::none);
+    if (is_root) REQUIRE(seteuid(kNobody) == 0);
+    const std::string line = line_about(path);
+    if (is_root) REQUIRE(seteuid(0) == 0);
+    CHECK(line ==
+          "bad input: " + path.string() + ": cannot be read (Permission denied); check its rights");
+    std::filesystem::permissions(path, perms::owner_all | perms::group_read | perms::others_read);
+  }
+}
+
+TEST_CASE("a file of a recording that is larger than any is refused, not read") {
+  const RuntimeFolder folder;
+  record_with_all(folder / "log");
+  for (const char* const name : {"manifest.json", "scene.json", "clock.npy"}) {
+    CAPTURE(name);
+    const std::filesystem::path path = folder / "log" / name;
+    std::filesystem::copy(path, folder / "kept");
+    std::filesystem::resize_file(path, std::uintmax_t{1} << 40);  // on no block of the disk
+    CHECK(line_about(path).starts_with(path.string() + ": larger than "));
+    std::filesystem::remove(path);
+    std::filesystem::rename(folder / "kept", path);
+  }
 }
 
 TEST_CASE("the plot is an SVG with its panels and every curve that is not zero") {
