@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <iostream>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -239,6 +240,32 @@ void Server::Impl::say_at_most_once_a_second(const std::string& text) {
   std::cerr << "kerf-bridge: " << escaped(text) << '\n';
 }
 
+/// The refusal of a request that no token would help: it is unclear, for another host, neither GET
+/// nor HEAD, or a WebSocket of another origin's page.
+std::optional<Server::Impl::Refusal> Server::Impl::refusal_of(const Request& request) const {
+  const std::string_view host = text(request[http::field::host]);
+  if (request.count(http::field::host) > 1 || request.count(http::field::origin) > 1) {
+    return Refusal{400, "This names its host or its origin twice.\n"};
+  }
+  if (!is_own_host(host_name(host), setup_.host_names)) {
+    return Refusal{421,
+                   "Open this machine by its address or its own name; if a proxy has another: kerf "
+                   "bridge serve --public-url.\n"};
+  }
+  const bool is_read = request.method() == http::verb::get || request.method() == http::verb::head;
+  if (!is_read || !request.target().starts_with('/')) {
+    return Refusal{405, "Only GET and HEAD are answered here.\n"};
+  }
+  const std::string proxy = setup_.public_url ? setup_.public_url->origin() : std::string();
+  if (beast::websocket::is_upgrade(request) && !is_foxglove(request) &&
+      !is_own_origin(text(request[http::field::origin]), host, tls_.has_value(), proxy)) {
+    return Refusal{403,
+                   "A page from elsewhere may not look in here; if it came through a proxy: kerf "
+                   "bridge serve --public-url.\n"};
+  }
+  return std::nullopt;
+}
+
 asio::awaitable<void> Server::Impl::refuse(Link& link, int status, std::string_view why,
                                            bool head_only) {
   ErrorCode error;
@@ -263,29 +290,9 @@ asio::awaitable<void> Server::Impl::talk_http(std::unique_ptr<WebSocket> ws,
     if (error == http::error::end_of_stream || error == beast::error::timeout) co_return;
     if (error) co_return co_await refuse(link, 400, "This is no request for a page.\n", false);
     const Request& request = parser.get();
-    const std::string_view host = text(request[http::field::host]);
     const bool head = request.method() == http::verb::head;
-    if (request.count(http::field::host) > 1 || request.count(http::field::origin) > 1) {
-      co_return co_await refuse(link, 400, "This names its host or its origin twice.\n", head);
-    }
-    if (!is_own_host(host_name(host), setup_.host_names)) {
-      co_return co_await refuse(link, 421,
-                                "Open this machine by its address or its own name; if a proxy has "
-                                "another: kerf bridge serve --public-url.\n",
-                                head);
-    }
-    if ((request.method() != http::verb::get && !head) || !request.target().starts_with('/')) {
-      co_return co_await refuse(link, 405, "Only GET and HEAD are answered here.\n", head);
-    }
-    const bool upgrade = beast::websocket::is_upgrade(request);
-    const std::string proxy = setup_.public_url ? setup_.public_url->origin() : std::string();
-    const bool foxglove = is_foxglove(request);
-    if (upgrade && !foxglove &&
-        !is_own_origin(text(request[http::field::origin]), host, tls_.has_value(), proxy)) {
-      co_return co_await refuse(link, 403,
-                                "A page from elsewhere may not look in here; if it came through a "
-                                "proxy: kerf bridge serve --public-url.\n",
-                                head);
+    if (const std::optional<Refusal> refusal = refusal_of(request)) {
+      co_return co_await refuse(link, refusal->status, refusal->why, head);
     }
     const Credentials shown = credentials_of(request);
     if (shown.right == Right::none && shown.secret) {
@@ -296,11 +303,11 @@ asio::awaitable<void> Server::Impl::talk_http(std::unique_ptr<WebSocket> ws,
       co_await wait.async_wait(quiet(error));
       slot.is_guess = false;
     }
-    if (upgrade && route_of(request) == kBridgePath) {
+    if (beast::websocket::is_upgrade(request) && route_of(request) == kBridgePath) {
       const Request upgrade_request = parser.release();
       co_return co_await view(std::move(ws), upgrade_request, shown.right, {}, slot);
     }
-    if (foxglove) {
+    if (is_foxglove(request)) {
       if (shown.right == Right::none) {
         co_return co_await refuse(link, 401,
                                   "Foxglove needs a token: the wss:// address that kerf bridge "

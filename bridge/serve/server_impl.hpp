@@ -79,6 +79,11 @@ class Server::Impl {
     bool one_time = false;  ///< the right comes from the one-time token
     std::string cookie;     ///< to set in the browser; empty: none
   };
+  /// The reply to a request that is refused.
+  struct Refusal {
+    int status;
+    std::string_view why;  ///< a constant text
+  };
 
   // server.cpp
   Void accept_all();
@@ -93,6 +98,7 @@ class Server::Impl {
   Void connection(tcp::socket socket);
   Void handshake(WebSocket& ws, beast::flat_buffer& in, bool& done);
   Void talk_http(std::unique_ptr<WebSocket> ws, beast::flat_buffer& in);
+  [[nodiscard]] std::optional<Refusal> refusal_of(const Request& request) const;
   Void refuse(Link& link, int status, std::string_view text, bool head_only);
   void say_at_most_once_a_second(const std::string& text);
   /// Includes the port, because browsers do not separate cookies by port.
