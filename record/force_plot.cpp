@@ -4,8 +4,10 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "record/recording.hpp"
@@ -33,8 +35,72 @@ struct Curve {
   }
 };
 
-/// `{end_s, curves: [{name, s, values}], sources: [...]}`, the sources of energy that did any work.
-/// With two arms the curves of the first have commanded_2 and penetration_2 of the second.
+/// The curves of an arm, and of a second one its commanded force and penetration, from their ticks
+/// in order. `manifest` outlives it.
+class ForceCurves {
+ public:
+  ForceCurves(const Manifest& manifest, std::uint64_t rows) : manifest_(manifest) {
+    const Envelope empty(rows, kMaxPoints);
+    for (const std::string_view name :
+         {"contact", "modification", "commanded", "penetration", "removed", "port"}) {
+      curves_.push_back({name, empty});
+    }
+    for (const std::string_view name : kEnergySourceNames) sources_.push_back({name, empty});
+    for (const std::string_view name : {"commanded_2", "penetration_2"}) {
+      second_.push_back({name, empty});
+    }
+  }
+
+  void add(const TickRecord& record) {
+    if (first_tick_ == 0) first_tick_ = record.tick;
+    end_s_ = static_cast<double>(record.tick - first_tick_) * manifest_.tick_ns * 1e-9;
+    if ((record.flags & kFlagReset) != 0) removed_ = 0;
+    removed_ += removed_density_mm3(record, manifest_.voxel_mm3);
+    if (record.stale != 0) return;  // without contact; the curves continue at the next tick
+    const std::array values{magnitude(record.contact_force_n),
+                            magnitude(record.modification_force_n),
+                            magnitude(record.commanded_force_n),
+                            double{record.penetration_mm},
+                            removed_,
+                            record.port_energy_j * 1000};
+    for (std::size_t i = 0; i < values.size(); ++i) curves_[i].add(end_s_, values[i]);
+    for (std::size_t i = 0; i < kEnergySources; ++i) {
+      sources_[i].add(end_s_, energy_mj_of_steps(record.*kEnergyColumns[i]));
+    }
+  }
+  /// The second arm's record of the tick that was added last.
+  void add_second(const TickRecord& second) {
+    if (second.stale != 0) return;
+    second_[0].add(end_s_, magnitude(second.commanded_force_n));
+    second_[1].add(end_s_, double{second.penetration_mm});
+  }
+
+  /// `{end_s, curves: [{name, s, values}], sources: [...]}` after the last tick; the sources of
+  /// energy that did any work.
+  [[nodiscard]] Json json(bool with_second) {
+    Json curves = Json::List{};
+    for (Curve& curve : curves_) curves.push_back(json_of(curve.name, curve.envelope));
+    if (with_second) {
+      for (Curve& curve : second_) curves.push_back(json_of(curve.name, curve.envelope));
+    }
+    Json sources = Json::List{};
+    for (Curve& curve : sources_) {
+      if (!curve.is_zero) sources.push_back(json_of(curve.name, curve.envelope));
+    }
+    return {{"end_s", end_s_ + manifest_.tick_ns * 1e-9},
+            {"curves", std::move(curves)},
+            {"sources", std::move(sources)}};
+  }
+
+ private:
+  const Manifest& manifest_;
+  std::vector<Curve> curves_, sources_, second_;
+  double removed_ = 0, end_s_ = 0;
+  std::uint64_t first_tick_ = 0;
+};
+
+/// The curves of an arm as `ForceCurves::json` has them; those of the first of two arms with those
+/// of the second.
 [[nodiscard]] Json curves_of(const std::filesystem::path& folder, TickRange range,
                              std::size_t arm) {
   const Manifest manifest = read_facts(folder);
@@ -43,64 +109,16 @@ struct Curve {
   if (log.rows() == 0) {
     throw RecordError((folder / tick_log_name(arm)).string() + ": 0 rows; nothing to plot");
   }
-  const Envelope empty(log.rows(), kMaxPoints);
-  std::vector<Curve> curves;
-  for (const std::string_view name :
-       {"contact", "modification", "commanded", "penetration", "removed", "port"}) {
-    curves.push_back({name, empty});
-  }
-  const std::size_t first_source = curves.size();
-  for (const std::string_view name : kEnergySourceNames) curves.push_back({name, empty});
-  Curve second_force{"commanded_2", empty}, second_depth{"penetration_2", empty};
-  double removed = 0;
-  double end_s = 0;
-  std::uint64_t first_tick = 0;
-  const auto add = [&](const TickRecord& record) {
-    if (first_tick == 0) first_tick = record.tick;
-    end_s = static_cast<double>(record.tick - first_tick) * manifest.tick_ns * 1e-9;
-    if ((record.flags & kFlagReset) != 0) removed = 0;
-    removed += removed_density_mm3(record, manifest.voxel_mm3);
-    if (record.stale != 0) return;  // without contact; the curves continue at the next tick
-    const std::array values{magnitude(record.contact_force_n),
-                            magnitude(record.modification_force_n),
-                            magnitude(record.commanded_force_n),
-                            double{record.penetration_mm},
-                            removed,
-                            record.port_energy_j * 1000};
-    for (std::size_t i = 0; i < values.size(); ++i) curves[i].add(end_s, values[i]);
-    for (std::size_t i = 0; i < kEnergySources; ++i) {
-      curves[first_source + i].add(end_s, energy_mj_of_steps(record.*kEnergyColumns[i]));
-    }
-  };
-  const auto add_second = [&](const TickRecord& second) {
-    if (second.stale != 0) return;
-    second_force.add(end_s, magnitude(second.commanded_force_n));
-    second_depth.add(end_s, double{second.penetration_mm});
-  };
+  ForceCurves curves(manifest, log.rows());
   if (arm == 0) {
     for_each_tick(folder, manifest, range, [&](const TickRecord& first, const TickRecord* second) {
-      add(first);
-      if (second != nullptr) add_second(*second);
+      curves.add(first);
+      if (second != nullptr) curves.add_second(*second);
     });
   } else {
-    log.for_each(add, range);
+    log.for_each([&](const TickRecord& record) { curves.add(record); }, range);
   }
-  Json parts = Json::List{};
-  Json sources = Json::List{};
-  for (std::size_t i = 0; i < curves.size(); ++i) {
-    if (i < first_source) {
-      parts.push_back(json_of(curves[i].name, curves[i].envelope));
-    } else if (!curves[i].is_zero) {
-      sources.push_back(json_of(curves[i].name, curves[i].envelope));
-    }
-  }
-  if (arm == 0 && manifest.arms > 1) {
-    parts.push_back(json_of(second_force.name, second_force.envelope));
-    parts.push_back(json_of(second_depth.name, second_depth.envelope));
-  }
-  return {{"end_s", end_s + manifest.tick_ns * 1e-9},
-          {"curves", std::move(parts)},
-          {"sources", std::move(sources)}};
+  return curves.json(arm == 0 && manifest.arms > 1);
 }
 
 }  // namespace

@@ -188,32 +188,9 @@ void McapWriter::attach(std::string_view name, std::string_view media_type, std:
   put(bytes.bytes());
 }
 
-void McapWriter::close() {
-  end_chunk();
+std::string McapWriter::statistics_record() const {
   McapBytes bytes;
-  std::size_t begun = bytes.begin(data_end);
-  bytes.number(std::uint32_t{0});  // no checksum over all of the data: each chunk has its own
-  bytes.end(begun);
-  put(bytes.bytes());
-
-  const std::uint64_t summary = written_;
-  McapBytes offsets;
-  bytes.clear();
-  const auto end_group = [&](std::uint8_t opcode, std::size_t from) {
-    if (bytes.size() == from) return;
-    const std::size_t start = offsets.begin(summary_offset);
-    offsets.number(opcode);
-    offsets.number(summary + from);
-    offsets.number(std::uint64_t{bytes.size() - from});
-    offsets.end(start);
-  };
-  bytes.raw(schemas_);
-  end_group(schema, 0);
-  std::size_t from = bytes.size();
-  bytes.raw(channels_);
-  end_group(channel_record, from);
-  from = bytes.size();
-  begun = bytes.begin(statistics);
+  const std::size_t begun = bytes.begin(statistics);
   std::uint64_t messages = 0;
   for (const auto& [id, count] : counts_) messages += count;
   bytes.number(messages);
@@ -226,10 +203,13 @@ void McapWriter::close() {
   bytes.number(end_ns_);
   put_map(bytes, counts_);
   bytes.end(begun);
-  end_group(statistics, from);
-  from = bytes.size();
+  return bytes.bytes();
+}
+
+std::string McapWriter::chunk_records() const {
+  McapBytes bytes;
   for (const IndexedChunk& chunk : chunks_) {
-    begun = bytes.begin(chunk_index);
+    const std::size_t begun = bytes.begin(chunk_index);
     bytes.number(chunk.first_ns);
     bytes.number(chunk.last_ns);
     bytes.number(chunk.offset);
@@ -241,10 +221,13 @@ void McapWriter::close() {
     bytes.number(chunk.unpacked);
     bytes.end(begun);
   }
-  end_group(chunk_index, from);
-  from = bytes.size();
+  return bytes.bytes();
+}
+
+std::string McapWriter::attachment_records() const {
+  McapBytes bytes;
   for (const IndexedAttachment& one : attachments_) {
-    begun = bytes.begin(attachment_index);
+    const std::size_t begun = bytes.begin(attachment_index);
     bytes.number(one.offset);
     bytes.number(one.bytes);
     bytes.number(begin_ns_);
@@ -254,7 +237,35 @@ void McapWriter::close() {
     bytes.text(one.media_type);
     bytes.end(begun);
   }
-  end_group(attachment_index, from);
+  return bytes.bytes();
+}
+
+void McapWriter::close() {
+  end_chunk();
+  McapBytes bytes;
+  const std::size_t begun = bytes.begin(data_end);
+  bytes.number(std::uint32_t{0});  // no checksum over all of the data: each chunk has its own
+  bytes.end(begun);
+  put(bytes.bytes());
+
+  // The summary: groups of records, and where each group begins.
+  const std::uint64_t summary = written_;
+  McapBytes offsets;
+  bytes.clear();
+  const auto add_group = [&](std::uint8_t opcode, std::string_view records) {
+    if (records.empty()) return;
+    const std::size_t start = offsets.begin(summary_offset);
+    offsets.number(opcode);
+    offsets.number(summary + bytes.size());
+    offsets.number(std::uint64_t{records.size()});
+    offsets.end(start);
+    bytes.raw(records);
+  };
+  add_group(schema, schemas_);
+  add_group(channel_record, channels_);
+  add_group(statistics, statistics_record());
+  add_group(chunk_index, chunk_records());
+  add_group(attachment_index, attachment_records());
 
   const std::uint64_t offsets_at = summary + bytes.size();
   bytes.raw(offsets.bytes());

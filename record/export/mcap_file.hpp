@@ -81,6 +81,10 @@ class McapWriter {
   void put(std::string_view bytes);
   void end_chunk();
   [[nodiscard]] std::string packed() const;
+  // Of the summary at the file's end:
+  [[nodiscard]] std::string statistics_record() const;
+  [[nodiscard]] std::string chunk_records() const;       ///< one for each chunk
+  [[nodiscard]] std::string attachment_records() const;  ///< one for each attachment
   [[nodiscard]] std::string_view packing_name() const noexcept;
 
   ByteSink sink_;
