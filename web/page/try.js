@@ -2,15 +2,17 @@
 // The page without a bridge: a worker of this tab is controller, device and hand; what it sends is what a bridge sends, so
 // picture, panel and commands are the bridge's own page. Here are the controls of the run itself.
 //
-// In the address behind #: scene=NAME, hand=script or mine, seconds=S (then it ends and its hashes stand here), pace=0 (as
-// fast as it can), set=KEY=VALUE (may be given often).
+// In the address behind #, and written there as the controls change: scene=NAME, hand=script or mine, seconds=S (then it ends
+// and its hashes stand here), pace=0 (as fast as it can), set=KEY=VALUE (may be given often); and the look (address.js).
+import {address} from './address.js';
 import {ReplayControls} from './replay.js';
+import {controlKeys, runKeys, runPairs} from './run_keys.js';
 import {scenes} from './scenes.js';
 import {TabSocket} from './tab_socket.js';
 
 const element = id => document.getElementById(id);
-const wanted = new URLSearchParams(location.hash.slice(1));
-const state = {ready: false, replays: false, asked: 0, page: null, steering: null, worker: null, shown: null, replay: null};
+const state = {ready: false, replays: false, asked: 0, page: null, steering: null, worker: null, shown: null, replay: null,
+  sets: new Map(), seconds: 0, pace: 1};  // sets: what differs from the scene's own values, by key
 
 function refuse(text) {
   const line = element('missing');
@@ -59,22 +61,36 @@ function addControls() {
   state.replay = new ReplayControls({worker: state.worker, refused, ask}, fields);
   element('finger').addEventListener('change', ({target}) => state.steering && (state.steering.fingersPress = target.checked));
   element('again').addEventListener('click', start);
-  element('scene').value = scenes.some(({name}) => name === wanted.get('scene')) ? wanted.get('scene') : 'phantom';
-  element('hand').value = wanted.get('hand') === 'mine' ? 'mine' : 'script';
   const keys = element('keys');
   keys.insertAdjacentHTML('afterbegin', `<dt>hand yours: pointer, one finger</dt><dd>lead the tool</dd>
     <dt>press</dt><dd>push and cut</dd><dt>wheel</dt><dd>tool nearer, farther</dd>
     <dt>right or shift drag, two fingers</dt><dd>the view, as below</dd>`);
 }
 
-/** What differs from the scene's own values: a control that is not touched changes no bit. */
-const touched = new Set();
-function settings() {
-  const force = element('scene').value.startsWith('paper') ? [] : ['stiffness', 'damping'];
-  const keys = {stiffness: 'force.stiffness_n_per_mm', damping: 'force.damping_ns_per_mm',
-    stabiliser: 'force.stabiliser', rate: 'servo.rate_hz'};
-  const given = [...force, 'stabiliser', 'rate'].filter(id => touched.has(id)).map(id => `${keys[id]}=${element(id).value}`);
-  return [...given, ...wanted.getAll('set')];
+// -- The address
+
+const run = () => ({scene: element('scene').value, hand: element('hand').value, sets: state.sets, seconds: state.seconds, pace: state.pace});
+const runText = () => JSON.stringify(runPairs(run()));
+
+/** Another address: a run begins if it is not the one that is here. */
+function take({scene = 'phantom', hand = 'script', set = [], seconds = 0, pace = 1}) {
+  const before = runText();
+  element('scene').value = scene;
+  element('hand').value = hand;
+  Object.assign(state, {sets: new Map(set), seconds, pace});
+  if (document.body.dataset.run === 'refused' || runText() !== before) start();
+}
+/** Nothing runs then. */
+function refuseAddress(why) {
+  element('missing').hidden = !why;
+  if (!why) return;
+  ask();
+  state.worker.postMessage({close: true});
+  state.page?.link.expectHello();
+  state.steering?.start(false);
+  failed(why);
+  refuse(why);
+  document.body.dataset.run = 'refused';
 }
 
 async function textOf(path) {
@@ -88,11 +104,15 @@ function showOwnValues({force, servo}) {
   for (const [id, own] of [['stiffness', force.stiffness_n_per_mm], ['damping', force.damping_ns_per_mm]]) {
     const input = element(id);
     input.disabled = own === undefined;  // of another law, or of the paper's force
-    if (own === undefined || touched.has(id)) continue;
+    if (own === undefined) continue;
     input.value = own;
     input.nextElementSibling.textContent = own;
   }
-  if (!touched.has('rate')) element('rate').value = servo.rate_hz;
+  for (const [id, own] of [['rate', servo.rate_hz], ['stabiliser', state.sets.get(controlKeys.stabiliser) ?? 'none']]) {
+    const choice = element(id);
+    if (![...choice.children].some(({value}) => value === String(own))) choice.append(new Option(own, own));
+    choice.value = own;
+  }
 }
 
 const isMine = () => element('hand').value === 'mine';
@@ -105,14 +125,18 @@ function ask() {
 
 /** Before the module is there nothing is sent: the controls are read once it is. */
 async function start(event) {
-  if (!state.ready) return;
+  const {target} = event ?? {};
+  if (target && address.refused) address.refuse('');
+  if (target?.id === 'scene') {
+    state.sets.clear();  // they were of the other scene
+    if (state.page?.stage) state.page.stage.wanted = null;
+  } else if (target?.id in controlKeys) {
+    state.sets.set(controlKeys[target.id], target.value);
+  }
+  if (!state.ready || address.refused) return;
   const isNewest = ask();
   state.replay.close();
   state.replays = false;
-  if (event?.type === 'change') {
-    if (event.target.id === 'scene') touched.clear();  // they were of the other scene
-    else if (event.target.id !== 'hand') touched.add(event.target.id);
-  }
   const {name, hand} = scenes.find(one => one.name === element('scene').value);
   const mine = isMine();
   element('finger-row').style.display = mine && matchMedia('(any-pointer: coarse)').matches ? '' : 'none';
@@ -124,9 +148,9 @@ async function start(event) {
     state.steering?.start(mine);
     state.page?.link.expectHello();
     state.worker.postMessage({
-      open: {name: `scenes/${name}.toml`, scene, hand: script, pedal: mine, settings: settings()},
-      pace: Number(wanted.get('pace') ?? 1),
-      seconds: Number(wanted.get('seconds') ?? 0)});
+      open: {name: `scenes/${name}.toml`, scene, hand: script, pedal: mine,
+        settings: [...state.sets].map(([key, value]) => `${key}=${value}`)},
+      pace: state.pace, seconds: state.seconds});
   } catch (problem) {
     if (isNewest()) failed(problem.message);
   }
@@ -174,7 +198,7 @@ function showRows(rows) {
 const says = {
   ready: () => {
     state.ready = true;
-    if (state.asked === 0) start();
+    if (state.asked === 0 || document.body.dataset.run === 'refused') start();
   },
   opened: ({opened}) => {
     element('run-state').textContent = `loaded in ${(opened / 1000).toFixed(1)} s`;
@@ -200,6 +224,7 @@ const says = {
   },
   refused: ({refused: text}) => refused(text),
   reads: ({reads: folder}) => {
+    if (address.refused) address.refuse('');
     state.replays = true;
     state.page?.link.expectHello();
     state.steering?.start(false);
@@ -219,6 +244,7 @@ async function begin() {
   globalThis.WebSocket = TabSocket;
   const {Steering} = await import('./steering.js');
   state.page = await import('./kerf.js');
+  if (address.refused) refuse(address.refused);  // the link has said since that it waits
   if (!state.page.stage) return;
   state.steering = new Steering(state.page, state.worker);
   state.steering.start(isMine() && !state.replays);
@@ -235,5 +261,8 @@ if (why) {
   document.addEventListener('visibilitychange', tellHidden);
   if (document.hidden) tellHidden();
   addControls();
+  Object.assign(address, {keys: {...runKeys, ...address.keys}, parts: [() => runPairs(run()), ...address.parts],
+    hearers: [take, ...address.hearers], refusers: [refuseAddress, ...address.refusers]});
+  address.read();
   begin().catch(problem => refuse(`${problem.message}; load the page again`));
 }

@@ -3,6 +3,7 @@
 //
 // In:  {open: inputs, pace, seconds}  another run; pace: seconds of the servo in one of the clock, 0: as fast as it can
 //      {up: ArrayBuffer} {join: true} {lead: [mm, rad, button]} {release: true} {pause: bool}
+//      {close: true}                  nothing runs any more
 //      {log: dropped files}           a recording in place of a run; {replay: what ReplayTurn takes}
 // Out: {opened: ms} {down: ArrayBuffer} {facts} {failed: text} {done: facts with volume_hash}
 //      {refused: text}: what was dropped is no recording, the run goes on; {reads: folder}; {replayed: facts}
@@ -49,7 +50,7 @@ function open({open: inputs, pace = 1, seconds = 0}) {
   kerf = new KerfModule(compiled);
   kerf.open(inputs);
   const at = now();
-  run = {pace, mostArmed: Math.round(seconds * kerf.rateHz), dueTicks: 0, lookedMs: at, factsMs: at, factsTicks: 0,
+  run = {pace, mostArmed: seconds > 0 ? Math.max(Math.round(seconds * kerf.rateHz), 1) : 0, dueTicks: 0, lookedMs: at, factsMs: at, factsTicks: 0,
     busyMs: 0, allMs: 0, steps: 0, paused: hidden, ended: false};
   postMessage({opened: at - began});
   postNews();
@@ -148,6 +149,10 @@ const takes = {
   },
   lead: ({lead}) => kerf.lead(...lead),
   release: () => kerf.release(),
+  close: () => {
+    ++opening;
+    kerf = run = null;
+  },
   replay: ({replay}) => run.turn?.take(replay),
   pause: ({pause}) => {
     hidden = pause;

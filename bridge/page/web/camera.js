@@ -41,6 +41,12 @@ export class OrbitCamera {
     }
   }
 
+  /** From here; as near and as far as the wheel goes. */
+  look({yaw, pitch, distance, target}) {
+    Object.assign(this, {yaw, pitch: clamp(pitch, -kMaxPitchRad, kMaxPitchRad), target});
+    this.distance = clamp(distance, kNearest * this.radius, kFarthest * this.radius);
+  }
+
   /** Drags, in heights of the picture. */
   orbit(right, up) {
     this.yaw -= right * Math.PI;

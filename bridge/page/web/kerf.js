@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The page: the bridge's news go to the stage and the panel, the user's wishes to both and back.
+import {address, copyLink} from './address.js';
 import {CommandKind, kLastOfPass, kMayCommand, kRunEnded, kTwoArms, records, ReplyStatus} from './constants.js';
 import {Link} from './link.js';
 import {bannerOf, isStale, LookControls, Plot, showBanner, showFigures} from './panel.js';
@@ -22,7 +23,11 @@ let stage = null, scene = null, held = null;
 export {link, now, stage};
 export const heldNow = () => held;
 
-function missing(text) {
+let trouble = '';
+/** Why there is no picture; ''. */
+function missing(why) {
+  trouble = why;
+  const text = address.refused || trouble;
   element('missing').hidden = text === '';
   element('missing').textContent = text;
   element('picture').classList.toggle('gone', text !== '');
@@ -99,7 +104,7 @@ function begin() {
   }
   element('second').hidden = !(held.hello.flags & kTwoArms);
   stage?.setScene(scene);
-  look.begin(scene);
+  element('copied').textContent = look.begin(scene);
 }
 
 /** mm3 by material, in the order of the scene; what has none last. */
@@ -177,4 +182,10 @@ if (stage) {
     t: () => toggled('stereo')});
 }
 // A token in the address has done its work once the page is here: a cookie holds it.
-if (location.search) history.replaceState(null, '', location.pathname);
+if (location.search) history.replaceState(null, '', location.pathname + location.hash);
+address.refusers.push(() => missing(trouble));
+address.hearers.push(values => look.take(values));
+address.parts.push(() => look.pairs());
+address.start();
+element('copy').addEventListener('click', () => copyLink(element('link'), element('copied'),
+  'scene' in address.keys ? '' : '; another browser needs the token of the bridge too'));

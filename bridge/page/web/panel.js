@@ -3,6 +3,7 @@
 // panel: a renderer for each volume, iso value, opacity of each material, clip plane, stereo.
 import {kFaults, kFlagDeviceFault, kFlagForbidden, kFlagRefused, kFlagShaft, kFullForceN, kIsoRange,
   kLeastFullDepthMm, kLeastFullForceN, kOpacityRange, kPhases, kSpanS, kStaleMs, Lifecycle} from './constants.js';
+import {viewOf} from './address.js';
 import {length} from './math.js';
 import {mainVolume} from './scene.js';
 import {defaultOpacity} from './transfer_function.js';
@@ -212,11 +213,38 @@ export class LookControls {
     element('home').addEventListener('click', () => stage?.home());
   }
 
-  /** Of a scene that is shown from now on. */
+  /** The look of an address: what it does not name is as at the start. */
+  take({show = [], iso = null, opacity = {}, clip = null, stereo = false, view = null}) {
+    const {axis, at} = clip ?? {axis: 2, at: 0.5};
+    element('clip').checked = clip !== null;
+    for (const choice of document.querySelectorAll('input[name="axis"]')) choice.checked = Number(choice.value) === axis;
+    element('place').value = at;
+    element('plane').hidden = clip === null;
+    element('stereo').checked = stereo;
+    this.stage?.setLook({kinds: show, iso, opacities: opacity, clip: {on: clip !== null, axis, at}, stereo});
+    if (this.scene) this.begin(this.scene);
+    this.stage?.showFrom(view && viewOf(view));
+  }
+  /** The look as pairs of an address. */
+  pairs() {
+    if (!this.stage) return [];
+    const {look: {kinds, iso, opacities, clip, stereo}, viewText} = this.stage;
+    const all = {view: viewText, show: kinds.some(kind => kind !== 'iso') ? kinds.join() : '', iso: iso ?? '',
+      opacity: Object.entries(opacities).map(([name, value]) => `${name}:${value}`).join(),
+      clip: clip.on ? `${'xyz'[clip.axis]}:${clip.at}` : '', stereo: stereo ? 'on' : ''};
+    return Object.entries(all).filter(([, text]) => text !== '').map(([name, text]) => [name, String(text)]);
+  }
+
+  /** Of a scene that is shown from now on. Returns what is wrong with its look; ''. */
   begin(scene) {
     this.scene = scene;
-    if (!this.stage) return;
+    if (!this.stage) return '';
     const {look} = this.stage;
+    const names = scene.materials.slice(1).map(({name}) => name);
+    const strange = Object.keys(look.opacities).filter(name => !names.includes(name));
+    if (strange.length > 0) {
+      this.stage.setLook({opacities: Object.fromEntries(Object.entries(look.opacities).filter(([name]) => names.includes(name)))});
+    }
     const choices = scene.volumes.map(({name}, v) => {
       const row = document.createElement('label'), choice = document.createElement('select');
       choice.id = v === 0 ? 'renderer' : `renderer${v}`;
@@ -238,6 +266,7 @@ export class LookControls {
         this.stage.setLook({opacities: {...this.stage.look.opacities, [name]: Number(opacityAt(at).toFixed(3))}}));
     }).slice(1));
     this.show();
+    return strange.length > 0 ? `opacity of ${strange[0]}: no such material here; there are ${names.join(', ')}` : '';
   }
 
   chosen() {

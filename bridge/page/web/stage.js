@@ -2,6 +2,7 @@
 // When and how finely pictures are drawn: only what changed, one at a time, coarser while things
 // move where the machine would fall below ten pictures a second. What a pixel costs is learned by
 // small pictures first.
+import {viewText} from './address.js';
 import {eyeViews, OrbitCamera} from './camera.js';
 import {kToolRoom} from './constants.js';
 import {contextOf, enableExtensions, requireNoError} from './gl.js';
@@ -35,6 +36,8 @@ export class Stage {
     this.stale = true;
     this.hands = [];  // of each arm; null: it is not known where
     this.drawn = [];  // those of the last picture
+    this.wanted = null;   // the view that the next scene begins with; null: its first one
+    this.firstView = '';  // as the address has it
     canvas.addEventListener('webglcontextlost', event => {
       event.preventDefault();
       this.fail('The graphics card took the picture away, as it does when its memory is full; waiting for it.');
@@ -58,12 +61,29 @@ export class Stage {
   setScene(scene) {
     const same = this.scene && String(this.scene.corners) === String(scene.corners);
     this.scene = scene;
+    const {wanted} = this;
     if (!same) this.home();
+    if (wanted) this.camera.look(wanted);
     this.rebuild();
   }
   home() {
-    if (this.scene) this.camera.frame(this.scene.corners, this.aspect);
+    if (this.scene) {
+      this.camera.frame(this.scene.corners, this.aspect);
+      this.firstView = viewText(this.camera);
+    }
     this.touch();
+  }
+  /** From here, now and when the next scene comes, unless the camera is moved before; null: the first view. */
+  showFrom(wanted) {
+    this.home();
+    if (wanted && this.scene) this.camera.look(wanted);
+    this.wanted = wanted;
+  }
+  /** The view as the address has it; '' for the first one. */
+  get viewText() {
+    const now = this.wanted ?? (this.scene ? this.camera : null);
+    const text = now ? viewText(now) : '';
+    return text === this.firstView ? '' : text;
   }
   /** The renderer of a volume: iso or blend. */
   kindOf(volume) {
@@ -110,6 +130,7 @@ export class Stage {
   /** Camera or look are others now. */
   touch() {
     this.stale = true;
+    this.wanted = null;
     this.moved = performance.now();
     this.tell('moving');
   }

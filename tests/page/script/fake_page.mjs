@@ -24,6 +24,23 @@ export class Element {
       if (!['class', 'style'].includes(name)) this[name] = ['hidden', 'checked'].includes(name) ? true : value;
     }
   }
+  set innerHTML(html) { this.replaceChildren(...elementsOf(html)); }
+  insertAdjacentHTML(where, html) {
+    if (where === 'afterbegin') this.children.unshift(...elementsOf(html, this));
+    else this.beside(where === 'afterend' ? 1 : 0, elementsOf(html, this.parentElement));
+  }
+  before(one) {
+    one.parentElement = this.parentElement;
+    this.beside(0, [one]);
+  }
+  beside(after, more) {
+    const {children} = this.parentElement;
+    children.splice(children.indexOf(this) + after, 0, ...more);
+  }
+  get nextElementSibling() { return this.parentElement.children[this.parentElement.children.indexOf(this) + 1]; }
+  querySelector(tag) { return this.querySelectorAll(tag)[0] ?? null; }
+  focus() {}
+  select() {}
   get firstChild() { return this.children[0]; }
   get lastChild() { return this.children.at(-1); }
   append(...more) {
@@ -36,6 +53,7 @@ export class Element {
   replaceChildren(...more) {
     this.children = [];
     this.append(...more);
+    if (this.tagName === 'SELECT') this.value = more[0]?.value ?? '';
   }
   remove() {
     const {parentElement} = this;
@@ -129,12 +147,12 @@ export class FakeSocket {
   close() { this.readyState = FakeSocket.CLOSED; }
 }
 
-/** A document of the tags of `html` that have an end or are void; texts are left out. */
-export function documentOf(html) {
-  const body = new Element('body');
-  const open = [body];
+/** Elements of the tags of `html` that have an end or are void; texts are left out. They are `parent`'s. */
+function elementsOf(html, parent = null) {
+  const top = new Element('template');
+  const open = [top];
   const empty = ['input', 'meta', 'link'];
-  for (const [, end, tag, words] of html.split('<body>')[1].split('</body>')[0].matchAll(/<(\/?)([a-z0-9]+)([^>]*)>/g)) {
+  for (const [, end, tag, words] of html.matchAll(/<(\/?)([a-z0-9]+)([^>]*)>/g)) {
     if (end) {
       if (open.at(-1).tagName === tag.toUpperCase()) open.pop();
       continue;
@@ -144,11 +162,19 @@ export function documentOf(html) {
     open.at(-1).append(element);
     if (!empty.includes(tag)) open.push(element);
   }
+  for (const one of top.children) one.parentElement = parent;
+  return top.children;
+}
+
+export function documentOf(html) {
+  const body = new Element('body');
+  body.append(...elementsOf(html.split('<body>')[1].split('</body>')[0]));
   const root = new Element('html');
   root.append(body);
   return {body, documentElement: root, hidden: false, addEventListener: (...more) => root.addEventListener(...more), activeElement: body,
     getElementById: id => body.all().find(one => one.id === id) ?? null,
     querySelector: () => body.all().find(one => one.type === 'radio' && one.checked),
+    querySelectorAll: () => body.all().filter(one => one.name === 'axis'),
     createElement: tag => new Element(tag)};
 }
 
@@ -162,7 +188,7 @@ export function openPage(html) {
   give('window', globalThis);
   give('devicePixelRatio', 1);
   give('location', {href: 'http://tooth.example:8000/view/', search: '', pathname: '/view/', hash: ''});
-  give('history', {replaceState() {}});
+  give('history', {replaceState(state, title, to) { location.hash = to.startsWith('#') ? to : ''; }});
   give('WebSocket', FakeSocket);
   give('ResizeObserver', class { observe() {} });
   give('Option', class extends Element {
