@@ -66,6 +66,11 @@ inline constexpr std::size_t kTickLogHeaderBytes = 4096;
 [[nodiscard]] std::ifstream open_recorded(const std::filesystem::path& path, const std::string& way,
                                           std::uintmax_t most_bytes = UINTMAX_MAX);
 
+/// As "1 tick" and "2 ticks".
+[[nodiscard]] inline std::string ticks_text(std::uint64_t count) {
+  return std::to_string(count) + (count == 1 ? " tick" : " ticks");
+}
+
 /// Ticks of a log, both ends included.
 struct TickRange {
   Tick from = 0;

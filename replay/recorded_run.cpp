@@ -203,16 +203,18 @@ void check_begins_at_first_tick(const std::filesystem::path& folder, const Manif
   if (missed == 0) return;
   std::error_code none;
   if (!std::filesystem::is_directory(folder / kInputsName, none)) {
-    throw RecordError(folder.string() + ": the first " + std::to_string(missed) +
-                      " ticks of the run are not in it; start the recorder before the controller, "
-                      "as ./kerf demo does");
+    throw RecordError(
+        folder.string() + ": the first " +
+        (missed == 1 ? "tick of the run is" : ticks_text(missed) + " of the run are") +
+        " not in it; start the recorder before the controller, as ./kerf demo does");
   }
   TickRecord first;
   static_cast<void>(TickLogReader(folder / kTickLogName).read(0, std::span(&first, 1)));
   if (first.tick == missed + 1) return;
-  throw DamagedRecording((folder / kManifestName).string() + ": " + std::to_string(missed) +
-                         " ticks are before the log, and it begins at tick " +
-                         std::to_string(first.tick) + "; copy the recording again");
+  throw DamagedRecording((folder / kManifestName).string() + ": " + ticks_text(missed) +
+                         (missed == 1 ? " is" : " are") +
+                         " before the log, and it begins at tick " + std::to_string(first.tick) +
+                         "; copy the recording again");
 }
 
 std::vector<double> voxel_mm3_of(const InputsInJson& recorded) {

@@ -108,14 +108,13 @@ void print_end(const ReplayResult& result, const RecordedRun& run, Tick from, bo
   const double run_s =
       static_cast<double>(run.earlier_ticks() + result.ticks) * run.manifest.tick_ns * 1e-9;
   if (run.earlier_ticks() > 0) {
-    std::printf("%llu ticks before the log, by their inputs\n",
-                static_cast<unsigned long long>(run.earlier_ticks()));
+    std::printf("%s before the log, by their inputs\n", ticks_text(run.earlier_ticks()).c_str());
   }
   if (!result.difference && !changed) {
     const Tick first = std::max<Tick>(from, run.earlier_ticks() + 1);
-    std::printf("%llu ticks, each equal to the last bit\n",
-                static_cast<unsigned long long>(result.last_tick + 1 -
-                                                std::min(first, result.last_tick + 1)));
+    const std::uint64_t compared = result.last_tick + 1 - std::min(first, result.last_tick + 1);
+    std::printf("%s, %s to the last bit\n", ticks_text(compared).c_str(),
+                compared == 1 ? "equal" : "each equal");
   }
   for (std::size_t arm = 0; arm < run.servo->arms(); ++arm) {
     std::printf("output hash  %s%s\n", hex64(result.output_hash[arm]).c_str(),

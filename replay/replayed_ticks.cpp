@@ -28,8 +28,10 @@ std::string text_of(const DifferentTick& found, std::uint32_t tick_ns) {
 }
 
 std::string gap_text(Tick last, Tick next) {
-  return "ticks " + std::to_string(last + 1) + " to " + std::to_string(next - 1) +
-         " were not recorded; what the servo was given there is unknown";
+  const std::string ticks = next == last + 2 ? "tick " + std::to_string(last + 1) + " was"
+                                             : "ticks " + std::to_string(last + 1) + " to " +
+                                                   std::to_string(next - 1) + " were";
+  return ticks + " not recorded; what the servo was given there is unknown";
 }
 
 RecordedTicks::RecordedTicks(const std::filesystem::path& folder, std::size_t arms) {

@@ -105,8 +105,8 @@ void put_codes(hid_t object, std::span<const LogCode> codes) {
   std::vector<std::string> lines;
   std::size_t longest = 1;
   for (const LogCode& code : codes) {
-    lines.push_back(std::to_string(code.value) + " " + std::string(code.name) + ": " +
-                    std::string(code.meaning));
+    lines.push_back(std::to_string(code.value) + " " + std::string(code.name) +
+                    (code.meaning.empty() ? "" : ": " + std::string(code.meaning)));
     longest = std::max(longest, lines.back().size());
   }
   std::string all;

@@ -116,7 +116,7 @@ int send_live(const LiveOptions& options, const std::atomic<bool>& stop) {
     recorder.poll();
     if (!ended) std::this_thread::sleep_for(kPollPeriod);
   }
-  std::cout << sink.sent() << " ticks sent, " << sink.lost() << " not taken, "
+  std::cout << ticks_text(sink.sent()) << " sent, " << sink.lost() << " not taken, "
             << recorder.losses().lost << " lost\n";
   return 0;
 }

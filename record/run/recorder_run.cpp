@@ -53,7 +53,8 @@ class Recording {
       const std::uint64_t lost = recorder_.losses().lost;
       const std::uint64_t got = recorder_.poll();
       if (const std::uint64_t more = recorder_.losses().lost - lost; more > 0) {
-        std::cerr << "kerf-recorder: GAP: " << more << " ticks overwritten before they were read\n";
+        std::cerr << "kerf-recorder: GAP: " << ticks_text(more)
+                  << " overwritten before they were read\n";
         manifest(kStillRunning);
       }
       clock_.follow();
@@ -135,8 +136,8 @@ int run_recorder(const RecorderOptions& options, const std::atomic<bool>& stop) 
   recording.manifest(reason);
   const Recorder& recorder = recording.recorder();
   if (!options.report.empty()) write_report(options.report, recorder, recording.rows(), reason);
-  std::cout << "recorded " << recording.rows() << " ticks, lost " << recorder.losses().lost << " ("
-            << reason << ")\n";
+  std::cout << "recorded " << ticks_text(recording.rows()) << ", lost " << recorder.losses().lost
+            << " (" << reason << ")\n";
   return options.strict && recorder.losses().lost != 0 ? 1 : 0;
 }
 

@@ -79,8 +79,9 @@ class TestHdf5(unittest.TestCase):
             of = {name: column.attrs["description"].decode("ascii") for name, column in file["ticks"].items()}
             for name in ("flags", "command", "phase", "fault"):
                 for code in file["ticks"][name].attrs["codes"]:
-                    number, meaning = code.decode().split(": ", 1) if b": " in code else (code.decode()[:-1], "")
-                    self.assertIn(number.rstrip(":") + (f" ({meaning})" if meaning else ""), of[name])
+                    self.assertFalse(code.rstrip().endswith(b":"), code)
+                    number, _, meaning = code.decode().partition(": ")
+                    self.assertIn(number + (f" ({meaning})" if meaning else ""), of[name])
         self.assertIn("bits; 1 button 1 (pressed), 2 button 2 (pressed), 4 contact (", of["flags"])
         self.assertIn("code: why there is no force; 0 none, 1 stale_input (no report for 20 ms), ", of["fault"])
         self.assertFalse([text for text in of.values() if ", below" in text])

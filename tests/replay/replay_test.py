@@ -42,7 +42,7 @@ def replay(log, *options, code=0, libm=None):
     environment = {**os.environ, "LD_PRELOAD": str(libm)} if libm else None
     done = subprocess.run([BIN / "kerf-replay", log, *options], capture_output=True, text=True, env=environment)
     assert done.returncode == code, f"{done.returncode}: {done.stdout}{done.stderr}"
-    if code == 2:
+    if code == 2 or (code == 1 and not done.stdout):  # nothing was replayed
         assert done.stderr.count("\n") == 1, done.stderr
         return done.stderr
     return done.stdout
@@ -175,7 +175,7 @@ class TestReplay(unittest.TestCase):
         self.assertEqual([*(folder / "victim").iterdir()], [])
         self.assertEqual([path.name for path in (folder / "linked").iterdir()], ["inputs"])
         (kept / "manifest.json").write_text(json.dumps({**manifest, "missed_before_start": before + 1}))
-        self.assertIn(f"{before + 1} ticks are before the log, and it begins at tick {before + 1};", replay(kept, code=2))
+        self.assertIn(f"{before + 1} ticks are before the log, and it begins at tick {before + 1};", replay(kept, code=1))
         (kept / "manifest.json").write_text(json.dumps(manifest))
         # Watched from its first tick on, with the volumes of then.
         _, watched, told = self.watch(kept)
@@ -189,15 +189,15 @@ class TestReplay(unittest.TestCase):
         for damaged in (inputs.read_bytes()[:-20], gzip.compress(sound[:-60]), gzip.compress(sound + b"x"), gzip.compress(sound[256:]), b""):
             inputs.unlink()
             inputs.write_bytes(damaged)
-            self.assertIn("inputs from tick 1 on are missing or damaged", replay(kept, code=2))
+            self.assertIn("inputs from tick 1 on are missing or damaged", replay(kept, code=1))
         wrong = bytearray(sound)
         wrong[256 + 60 * (before - 1)] ^= 64  # an encoder count of the last of these ticks
         inputs.write_bytes(gzip.compress(wrong))
         self.assertIn(f"tick {before + 1} (", replay(kept, code=1))
         inputs.unlink()
-        self.assertIn("inputs from tick 1 on are missing", replay(kept, code=2))
+        self.assertIn("inputs from tick 1 on are missing", replay(kept, code=1))
         (kept / "inputs").rmdir()
-        self.assertIn(f"the first {before} ticks of the run are not in it", replay(kept, code=2))
+        self.assertIn(f"the first {before} ticks of the run are not in it", replay(kept, code=1))
 
     def test_the_scene_file_may_have_gone(self):
         text = self.scene.read_text()
@@ -239,7 +239,7 @@ class TestReplay(unittest.TestCase):
         for damaged in (sound[:100], sound[:-12], gzip.compress(gzip.decompress(sound) + b"x"),
                         gzip.compress(gzip.decompress(sound)[:-1] + b"x"), labels.read_bytes(), b""):
             density.write_bytes(damaged)
-            self.assertIn("copy the recording again", replay(folder / "own/log", code=2))
+            self.assertIn("copy the recording again", replay(folder / "own/log", code=1))
         density.unlink()
         self.assertIn("ball.nrrd", replay(folder / "own/log", code=2))
 
@@ -251,7 +251,7 @@ class TestReplay(unittest.TestCase):
         def refused(why, **changed):
             (log / "scene.json").write_text(json.dumps({**scene, **changed}))
             for options in ((), ("--set", "force.friction=0.1")):
-                self.assertIn(why, replay(log, *options, code=2))
+                self.assertIn(why, replay(log, *options, code=1))
 
         mesh = {"points_mm": [], "triangles": []}
         refused("loaded from", volumes=[])
@@ -291,7 +291,7 @@ class TestReplay(unittest.TestCase):
         self.assertIn("1599 ticks, each equal", replay(log, "--until", "1599"))
         self.assertIn("100 ticks, each equal", replay(log, "--from", "1500", "--until", "1599"))
         self.assertIn("no tick would be compared", replay(log, "--from", "1600", "--until", "1599", code=2))
-        self.assertIn("the recording ends at tick ", replay(log, "--from", "999999", code=2))
+        self.assertIn("the recording ends at tick ", replay(log, "--from", "999999", code=1))
         self.assertIn("--until", replay(log, "--until", "0", code=2))
 
     def test_what_if(self):
@@ -367,12 +367,14 @@ class TestReplay(unittest.TestCase):
         at = HEADER + 700 * self.row
         (log / "ticks.npy").write_bytes(rows[:at] + rows[at + 9 * self.row:])
         self.assertIn("stopped: ticks 701 to 709 were not recorded", replay(log, code=1))
+        (log / "ticks.npy").write_bytes(rows[:at] + rows[at + self.row:])
+        self.assertIn("stopped: tick 701 was not recorded", replay(log, code=1))
         (log / "ticks.npy").write_bytes(rows[:at + 100])
         cut = replay(log, code=1)
         self.assertIn("700 ticks, each equal", cut)
         self.assertRegex(cut, r"stopped: the log is cut after 700 of \d+ rows")
         (log / "ticks.npy").write_bytes(rows[:HEADER])
-        self.assertIn("0 rows; nothing to replay", replay(log, code=2))
+        self.assertIn("0 rows; nothing to replay", replay(log, code=1))
         (log / "ticks.npy").write_bytes(rows[:at + 50] + b"x" + rows[at + 51:])
         sound = replay(log, code=1)
         self.assertIn("700 ticks, each equal", sound)
@@ -501,12 +503,12 @@ class TestReplay(unittest.TestCase):
         for key, value, place in [("force", {**scene["force"], "stiffness_n_per_mm": 0.123}, "force.stiffness_n_per_mm is 0.123 in "),
                                   ("volumes", [{**scene["volumes"][0], "density_hash": "00"}], 'the content of volumes[0] has hash "00" in')]:
             (log / "scene.json").write_text(json.dumps({**scene, key: value}))
-            self.assertIn(place, replay(log, code=2))
+            self.assertIn(place, replay(log, code=1))
         del scene["source"]
         (log / "scene.json").write_text(json.dumps(scene))
-        self.assertIn("what the scene was loaded from", replay(log, code=2))
+        self.assertIn("what the scene was loaded from", replay(log, code=1))
         (log / "scene.json").write_text("[" * 100000)
-        self.assertIn("scene.json", replay(log, code=2))
+        self.assertIn("scene.json", replay(log, code=1))
 
     def test_no_recording(self):
         self.assertIn("give the folder of a recording", replay(self.run_folder / "none", code=2))
@@ -514,7 +516,10 @@ class TestReplay(unittest.TestCase):
         log = self.copy()
         manifest = json.loads((log / "manifest.json").read_text())
         (log / "manifest.json").write_text(json.dumps({**manifest, "missed_before_start": 12}))
-        self.assertIn("the first 12 ticks of the run are not in it", replay(log, code=2))
+        self.assertIn("the first 12 ticks of the run are not in it", replay(log, code=1))
+        (log / "manifest.json").write_text(json.dumps({**manifest, "missed_before_start": 1}))
+        self.assertIn("the first tick of the run is not in it", replay(log, code=1))
+        self.assertTrue(replay(self.log, "--until", "1").startswith("1 tick, equal to the last bit\n"))
 
 
 if __name__ == "__main__":
