@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #version 450 core
-// Direction of the density gradient, per voxel edge.
+// Direction of the density gradient in texture coordinates.
 
 #ifdef GL_ES
 
@@ -20,17 +20,18 @@ vec3 gradient_at(vec3 p) {
     vec3 side = vec3((corner & 1) * 2 - 1, (corner & 2) - 1, (corner & 4) / 2 - 1);
     sum += side * density_of(texture(u_density, p + side * d));
   }
-  return sum;
+  return sum * u_texels;
 }
 
 #else
 
-uniform sampler3D u_gradient;  // of each voxel (visualizer/cast/gradient_rows.hpp)
+uniform sampler3D u_gradient;   // of each voxel (visualizer/cast/gradient_rows.hpp)
+uniform vec3 u_gradient_scale;  // to texture coordinates
 
 vec3 gradient_at(vec3 p) {
   const float kLeast = 1e-6;  // less is the rounding of none
   vec3 gradient = textureLod(u_gradient, p, 0.0).xyz - 32768.0 / 65535.0;
-  return dot(gradient, gradient) > kLeast * kLeast ? gradient : vec3(0.0);
+  return dot(gradient, gradient) > kLeast * kLeast ? gradient * u_gradient_scale : vec3(0.0);
 }
 
 #endif

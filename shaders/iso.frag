@@ -118,7 +118,7 @@ void main() {
 
   vec3 to_eye = -normalize(eye_direction);
   // A gradient in texture coordinates goes to the eye's millimetres by the transposed Jacobian.
-  vec3 slope = transpose(mat3(u_texture_from_eye)) * (gradient_at(p) * u_texels);
+  vec3 slope = transpose(mat3(u_texture_from_eye)) * gradient_at(p);
   vec3 normal = dot(slope, slope) > 0.0 ? -normalize(slope) : to_eye;
   if (dot(normal, to_eye) < 0.0) normal = normalize(normal - 1.02 * dot(normal, to_eye) * to_eye);
   vec3 inward = mat3(u_texture_from_eye) * -normal;

@@ -37,59 +37,65 @@ constexpr double kLeastFacing = 0.342;  // sine of 20 degrees
 constexpr double kRim = 5.0;            // voxels of a hollow that belong to its rim
 constexpr PictureSize kSize{256, 256};
 
-/// A volume with voxels of 1 mm around the origin, and the eye.
+/// A volume with voxels of 1 x 1 x `thick` mm around the origin, and the eye.
 struct BallStage {
   SceneView scene;
   View view;
   glm::dvec3 towards{};  ///< the eye, of length 1
 
-  BallStage() {
+  explicit BallStage(int thick = 1) {
     VolumeView& volume = scene.volumes.emplace_back();
-    volume.bricks = BrickGrid::of({kSide, kSide, kSide});
-    volume.world_from_voxel = glm::translate(glm::dmat4(1.0), glm::dvec3(-0.5 * (kSide - 1)));
+    volume.bricks = BrickGrid::of({kSide, kSide, kSide / thick});
+    const glm::dvec3 edges_mm(1.0, 1.0, thick);
+    const glm::dvec3 first_mm = -0.5 * (glm::dvec3(kSide, kSide, kSide) - edges_mm);
+    volume.world_from_voxel = glm::scale(glm::translate(glm::dmat4(1.0), first_mm), edges_mm);
     OrbitCamera camera;
     camera.frame(scene.corners(), 1.0);
     view = camera.view(1.0, 2.0 * kSide);
     towards = glm::normalize(glm::dvec3(glm::row(view.eye_from_world, 2)));
   }
-};
 
-/// `fraction(at)` of full density at each voxel, 0..1.
-template <class Fraction>
-std::vector<Density> filled(const Fraction& fraction) {
-  std::vector<Density> density;
-  for (int i = 0; i < kSide * kSide * kSide; ++i) {
-    const glm::dvec3 at(i % kSide, i / kSide % kSide, i / kSide / kSide);
-    const double value = std::clamp(fraction(at - 0.5 * (kSide - 1)), 0.0, 1.0);
-    density.push_back(static_cast<Density>(std::lround(value * kDensityMax)));
+  /// `fraction(at)` of full density at each voxel, 0..1.
+  template <class Fraction>
+  [[nodiscard]] std::vector<Density> filled(const Fraction& fraction) const {
+    const VolumeView& volume = scene.volumes.front();
+    std::vector<Density> density;
+    for_each_voxel(volume.bricks.grid.box(), [&](int x, int y, int z) {
+      const glm::dvec3 at(volume.world_from_voxel * glm::dvec4(x, y, z, 1.0));
+      const double value = std::clamp(fraction(at), 0.0, 1.0);
+      density.push_back(static_cast<Density>(std::lround(value * kDensityMax)));
+    });
+    return density;
   }
-  return density;
-}
+};
 
 /// A border is antialiased over two voxels.
 double antialiased(double distance) {
   return std::clamp(0.5 - 0.5 * distance, 0.0, 1.0);
 }
 
-std::vector<Density> ball(double noise) {
+std::vector<Density> ball(const BallStage& stage, double noise) {
   std::mt19937 random(1);
-  return filled([&](const glm::dvec3& at) {
+  const glm::dvec3 edges_mm = stage.scene.volumes.front().edges_mm();
+  return stage.filled([&](const glm::dvec3& at) {
     // A sum of twelve has the variance 1 and, unlike the library's, the same bits everywhere.
     double normal = 0.0;
     for (int k = 0; k < 12 && noise > 0.0; ++k) {
       normal += static_cast<double>(random()) * 0x1p-32 - 0.5;
     }
-    return antialiased(glm::length(at) - kRadius) + noise * normal;
+    // Two voxels along the normal.
+    const double voxels = glm::length(glm::normalize(at) * edges_mm);
+    return antialiased((glm::length(at) - kRadius) / voxels) + noise * normal;
   });
 }
 
 /// Half a ball milled out of a block. A tool that stays takes voxels of overlap c down to exp(-k
 /// c): those that it covers by more than a little are empty, all others full (docs/theory.md 7.5).
-std::vector<Density> hollow(const glm::dvec3& towards) {
+std::vector<Density> hollow(const BallStage& stage) {
   constexpr double kDwell = 30.0;
-  return filled([&](const glm::dvec3& at) {
+  return stage.filled([&](const glm::dvec3& at) {
     const double overlap = std::clamp(0.5 - (glm::length(at) - kRadius), 0.0, 1.0);
-    return std::min(antialiased(glm::dot(at, towards)), std::exp(-kDwell * overlap));
+    return std::min(antialiased(glm::dot(at, stage.towards)), std::exp(-kDwell * overlap));
   });
 }
 
@@ -140,15 +146,19 @@ Angles angles_of(BallStage stage, GradientFilter gradient, const std::vector<Den
 
 std::vector<GradientRow> measure_gradients() {
   const BallStage stage;
-  const std::vector<Density> clean = ball(0.0), noisy = ball(kNoise);
-  const std::vector<Density> milled = hollow(stage.towards);
+  const std::vector<Density> clean = ball(stage, 0.0), noisy = ball(stage, kNoise);
+  const std::vector<Density> milled = hollow(stage);
+  const BallStage of_5(5), of_10(10);
+  const std::vector<Density> thick_5 = ball(of_5, 0.0), thick_10 = ball(of_10, 0.0);
   std::vector<GradientRow> rows;
   for (std::size_t i = 0; i < kGradientNames.size(); ++i) {
     const auto gradient = static_cast<GradientFilter>(i);
     const Angles of_ball = angles_of(stage, gradient, clean, false);
     const Angles of_hollow = angles_of(stage, gradient, milled, true);
     rows.push_back({gradient, of_ball.rms, angles_of(stage, gradient, noisy, false).rms,
-                    of_ball.p99, of_hollow.rms, of_hollow.p99});
+                    of_ball.p99, of_hollow.rms, of_hollow.p99,
+                    angles_of(of_5, gradient, thick_5, false).p99,
+                    angles_of(of_10, gradient, thick_10, false).p99});
   }
   return rows;
 }
@@ -298,7 +308,9 @@ std::string picture_report(const PictureFigures& figures) {
                          {"noisy_angle_deg", row.noisy_angle_deg},
                          {"p99_deg", row.p99_deg},
                          {"milled_angle_deg", row.milled_angle_deg},
-                         {"milled_p99_deg", row.milled_p99_deg}});
+                         {"milled_p99_deg", row.milled_p99_deg},
+                         {"thick_5_p99_deg", row.thick_5_p99_deg},
+                         {"thick_10_p99_deg", row.thick_10_p99_deg}});
   }
   const Json report{{"day", today()},
                     {"gl_renderer", figures.gl_renderer},

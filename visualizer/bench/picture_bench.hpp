@@ -32,11 +32,14 @@ struct GradientRow {
   double p99_deg = 0.0;           ///< of 99 of 100 pixels of the ball
   double milled_angle_deg = 0.0;  ///< both in a hollow that a ball milled
   double milled_p99_deg = 0.0;
+  double thick_5_p99_deg = 0.0;  ///< on a ball in voxels of 1 x 1 x 5, and of 1 x 1 x 10
+  double thick_10_p99_deg = 0.0;
 };
 
 /// Measures each on an analytic ball of 28 voxels radius whose border is antialiased over two, as
 /// tools and teeth are, in the shader's own normals; without noise, and with the 1.5 % of full
-/// density that a CT of dentin has; and in a hollow as a ball leaves it that stays. Pixels seen at
+/// density that a CT of dentin has; in a hollow as a ball leaves it that stays;
+/// and on a ball in thick voxels. Pixels seen at
 /// less than 20 degrees, and the rim of the hollow, do not count. Needs a current GL context.
 [[nodiscard]] std::vector<GradientRow> measure_gradients();
 

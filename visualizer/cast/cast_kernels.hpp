@@ -29,6 +29,7 @@ struct CastGradient {
   const std::uint16_t* entries = nullptr;  ///< four for each voxel
   std::int32_t row = 0, plane = 0;         ///< in voxels
   float last[3] = {};                      ///< a hair before the far side of the border
+  float per_edge[3] = {1.0F, 1.0F, 1.0F};  ///< `GradientPlan::per_edge`
 };
 
 /// One volume as the cast kernels see it: plain pointers, because their files are compiled for
@@ -108,11 +109,11 @@ extern const CastKernels kCastAvx2;
 extern const CastKernels kCastScalar;
 
 /// The footprint of a ray: a voxel farther from the ray than this, on any axis, has no part in the
-/// ray's colour. In half voxel edges. It includes half an edge of slack, for rounding and because
-/// rays are tested at discrete points.
+/// ray's colour. In half voxel edges, by axis. It includes half an edge of slack, for rounding and
+/// because rays are tested at discrete points.
 struct RayFootprint {
-  int along = 0;   ///< before the ray's end
-  int at_end = 0;  ///< at the ray's end; 0: as before it. Else both are odd, or both even
+  int along[3] = {};   ///< before the ray's end
+  int at_end[3] = {};  ///< at the ray's end; 0: as before it. Else both are odd, or both even
 };
 
 /// Marks of the cells of a `RedrawJob`.

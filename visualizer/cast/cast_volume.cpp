@@ -46,7 +46,7 @@ CastVolume::CastVolume(const VolumeView& volume, const CastContent& content, Cas
       transfer_(content.transfer),
       iso_(static_cast<float>(volume.iso / kDensityMax)),
       density_(checked(volume)),
-      gradient_(filter, volume.bricks.grid, content.density),
+      gradient_(GradientPlan(filter, volume.edges_mm()), volume.bricks.grid, content.density),
       cells_(volume.bricks.grid, content.density, least_visible(mode, volume, content.transfer),
              kCastCellVox) {
   set_materials(content.transfer.materials);

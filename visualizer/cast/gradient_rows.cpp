@@ -23,9 +23,9 @@ std::size_t GradientRows::entry_count(const VoxelGrid& grid) noexcept {
          static_cast<std::size_t>(grid.nz + 3);
 }
 
-GradientRows::GradientRows(GradientFilter filter, const VoxelGrid& grid,
+GradientRows::GradientRows(const GradientPlan& plan, const VoxelGrid& grid,
                            std::span<const Density> density)
-    : filter_(filter), grid_(grid), entries_(entry_count(grid), kNone) {
+    : plan_(plan), grid_(grid), entries_(entry_count(grid), kNone) {
   constexpr std::int32_t kThick = 16;  // a layer is worked out by one thread
   const auto layers = static_cast<std::uint32_t>((grid.nz + kThick - 1) / kThick);
   TilePool().run(layers, [&](std::uint32_t layer) {
@@ -38,7 +38,7 @@ GradientRows::GradientRows(GradientFilter filter, const VoxelGrid& grid,
 
 void GradientRows::fill(const VoxelBox& box, std::span<const Density> density,
                         std::vector<glm::vec3>& gradients) {
-  fill_gradients(filter_, grid_, density, box, gradients);
+  fill_gradients(plan_, grid_, density, box, gradients);
   const CastGradient rows = view();
   const glm::vec3* from = gradients.data();
   const std::int32_t wide = box.hi.x - box.lo.x;
@@ -53,7 +53,7 @@ void GradientRows::fill(const VoxelBox& box, std::span<const Density> density,
 
 VoxelBox GradientRows::update(const VoxelBox& box, std::span<const Density> density) {
   if (box.empty()) return {};
-  const VoxelBox around = box.grown(gradient_reach(filter_)).clipped(grid_.box());
+  const VoxelBox around = plan_.around(box).clipped(grid_.box());
   fill(around, density, gradients_);
   return around;
 }
@@ -74,6 +74,7 @@ CastGradient GradientRows::view() const noexcept {
   const std::int32_t extent[3] = {grid_.nx, grid_.ny, grid_.nz};
   for (int axis = 0; axis < 3; ++axis) {
     // The last cell of voxels ends at extent + 1; its far side belongs to no cell.
+    view.per_edge[axis] = plan_.per_edge[axis];
     view.last[axis] = std::nextafter(static_cast<float>(extent[axis] + 1), 0.0F);
   }
   return view;

@@ -23,7 +23,7 @@ class GradientRows {
   static constexpr Entry kNone{32768, 32768, 32768, 0};
 
   /// Throws std::bad_alloc.
-  GradientRows(GradientFilter filter, const VoxelGrid& grid, std::span<const Density> density);
+  GradientRows(const GradientPlan& plan, const VoxelGrid& grid, std::span<const Density> density);
 
   /// What a volume of this extent takes.
   [[nodiscard]] static std::size_t entry_count(const VoxelGrid& grid) noexcept;
@@ -32,6 +32,7 @@ class GradientRows {
   /// the voxels whose gradients may have.
   VoxelBox update(const VoxelBox& box, std::span<const Density> density);
 
+  [[nodiscard]] const GradientPlan& plan() const noexcept { return plan_; }
   /// Of a voxel, or of the border.
   [[nodiscard]] glm::vec3 at(const VoxelIndex& voxel) const noexcept;
   /// As the kernels take it; good as long as this object.
@@ -42,7 +43,7 @@ class GradientRows {
   void fill(const VoxelBox& box, std::span<const Density> density,
             std::vector<glm::vec3>& gradients);
 
-  GradientFilter filter_;
+  GradientPlan plan_;
   VoxelGrid grid_;
   std::vector<Entry> entries_;
   std::vector<glm::vec3> gradients_;  ///< of the last box

@@ -237,14 +237,17 @@ void mark_triangles(std::span<const FineTriangle> triangles, const KeptPicture& 
   }
 }
 
-ChangedCells::ChangedCells(std::span<const VoxelBox> voxels, const RayFootprint& footprint)
-    : reach_(std::max(footprint.along, footprint.at_end)) {
+ChangedCells::ChangedCells(std::span<const VoxelBox> voxels, const RayFootprint& footprint) {
+  for (int axis = 0; axis < 3; ++axis) {
+    reach_[axis] = std::max(footprint.along[axis], footprint.at_end[axis]);
+  }
   const VoxelBox all = united(voxels);
   first_ = all.lo;
-  low_ = glm::dvec3(first_.x, first_.y, first_.z) - 0.5 * reach_;
+  low_ =
+      glm::dvec3(first_.x, first_.y, first_.z) - 0.5 * glm::dvec3(reach_[0], reach_[1], reach_[2]);
   const VoxelIndex extent = all.extent();
-  const int more = reach_ - 1;  // voxel centres at both ends
-  grid_ = {extent.x + more, extent.y + more, extent.z + more};
+  // Voxel centres at both ends.
+  grid_ = {extent.x + reach_[0] - 1, extent.y + reach_[1] - 1, extent.z + reach_[2] - 1};
   marks_.resize(grid_.voxel_count() + sizeof(std::uint32_t));
   // The nearer ones last: they lie within the others.
   for (const VoxelBox& box : voxels) mark(box, footprint.at_end, kChangedAtEnd);
@@ -255,15 +258,15 @@ glm::dvec3 ChangedCells::high() const noexcept {
   return low_ + glm::dvec3(grid_.nx, grid_.ny, grid_.nz);
 }
 
-void ChangedCells::mark(const VoxelBox& voxels, int reach, std::uint8_t marks) {
-  if (reach == 0) return;
-  const int inset = (reach_ - reach) / 2;
-  const VoxelIndex lo{voxels.lo.x - first_.x + inset, voxels.lo.y - first_.y + inset,
-                      voxels.lo.z - first_.z + inset};
+void ChangedCells::mark(const VoxelBox& voxels, const int (&reach)[3], std::uint8_t marks) {
+  if (reach[0] == 0) return;
+  const auto inset = [&](int axis) { return (reach_[axis] - reach[axis]) / 2; };
+  const VoxelIndex lo{voxels.lo.x - first_.x + inset(0), voxels.lo.y - first_.y + inset(1),
+                      voxels.lo.z - first_.z + inset(2)};
   const VoxelIndex extent = voxels.extent();
-  for (std::int32_t z = lo.z; z < lo.z + extent.z - 1 + reach; ++z) {
-    for (std::int32_t y = lo.y; y < lo.y + extent.y - 1 + reach; ++y) {
-      std::fill_n(&marks_[grid_.index(lo.x, y, z)], extent.x - 1 + reach, marks);
+  for (std::int32_t z = lo.z; z < lo.z + extent.z - 1 + reach[2]; ++z) {
+    for (std::int32_t y = lo.y; y < lo.y + extent.y - 1 + reach[1]; ++y) {
+      std::fill_n(&marks_[grid_.index(lo.x, y, z)], extent.x - 1 + reach[0], marks);
     }
   }
 }
@@ -365,8 +368,12 @@ void mark_rays(std::span<const VoxelBox> changed, const RayFootprint& footprint,
   };
   for (const std::vector<VoxelBox>& together : clusters_of(changed)) {
     if (const auto& [lo, hi] = together.front(); voxels_in({lo, hi}) > kMaxClusterVoxels) {
-      const double around_vox = 0.5 * std::max(footprint.along, footprint.at_end) + taps_vox;
-      tiles.mark(pixels_around({lo.x, lo.y, lo.z}, {hi.x, hi.y, hi.z}, around_vox));
+      glm::dvec3 reach;
+      for (int axis = 0; axis < 3; ++axis) {
+        reach[axis] = 0.5 * std::max(footprint.along[axis], footprint.at_end[axis]);
+      }
+      tiles.mark(pixels_around(glm::dvec3(lo.x, lo.y, lo.z) - reach,
+                               glm::dvec3(hi.x, hi.y, hi.z) + reach, taps_vox));
       continue;
     }
     const ChangedCells cells(together, footprint);

@@ -93,10 +93,10 @@ class ChangedCells {
   void put(RedrawJob& job) const;
 
  private:
-  void mark(const VoxelBox& voxels, int reach, std::uint8_t marks);
+  void mark(const VoxelBox& voxels, const int (&reach)[3], std::uint8_t marks);
 
   VoxelIndex first_;  ///< the lowest changed voxel
-  int reach_;         ///< the larger of the footprint's two, in half voxel edges
+  int reach_[3];      ///< the larger of the footprint's two, in half voxel edges
   glm::dvec3 low_;
   VoxelGrid grid_;
   std::vector<std::uint8_t> marks_;

@@ -18,7 +18,7 @@ VolumeOnGpu::VolumeOnGpu(const VolumeView& volume, const VolumeContent& content,
                          int max_texture_size, bool skip_empty, GradientFilter gradient)
     : solid_(volume, content, max_texture_size),
       cells_(volume, content.density, skip_empty ? volume.iso : Density{0}),
-      gradient_(gradient, volume.bricks.grid, content.density),
+      gradient_(GradientPlan(gradient, volume.edges_mm()), volume.bricks.grid, content.density),
       gradient_texture_(volume.bricks.grid, kGradientTexel, GradientRows::kNone.data()) {
   gradient_texture_.upload_from(gradient_.data(), volume.bricks.grid.box(), kBorder);
 }
@@ -42,6 +42,8 @@ void VolumeOnGpu::bind(const GlProgram& program, const View& view) const {
   solid_.bind(program, view);
   cells_.bind(2);
   gradient_texture_.bind(3);
+  program.set("u_gradient_scale",
+              gradient_.plan().per_edge * glm::vec3(texels_of(solid_.bricks().grid)));
 }
 
 IsoRenderer::IsoRenderer(const SceneView& scene, std::span<const VolumeContent> contents,

@@ -54,9 +54,7 @@ const Kind& find_kind(std::string_view name) {
 
 // A density is interpolated between two voxels (1 edge), and so are gradients. A sample within
 // takes its material from 1.5 edges up the gradient (translucent_sample.frag).
-constexpr int kGradientVox = gradient_reach(GradientFilter::adaptive) + 1;  // of the widest
-constexpr RayFootprint kSurfaceFootprint{.along = 3, .at_end = 2 * kGradientVox + 1};
-constexpr RayFootprint kTranslucentFootprint{.along = 2 * kGradientVox + 1};
+constexpr int kAlongSurface = 3;
 
 }  // namespace
 
@@ -64,15 +62,23 @@ void Renderer::mark_redraw(std::size_t volume, const KeptPicture& kept, RedrawTi
   std::vector<VoxelBox> boxes;
   changed_[volume].for_each_box(kept.volume.bricks,
                                 [&](const VoxelBox& box) { boxes.push_back(box); });
-  mark_rays(boxes, footprint(), !translucent(), surface_gradient(volume), kept, tiles);
+  mark_rays(boxes, footprint(kept.volume), !translucent(), surface_gradient(volume), kept, tiles);
 }
 
 void Renderer::forget_changes() {
   for (ChangedBricks& volume : changed_) volume.clear();
 }
 
-RayFootprint Renderer::footprint() const noexcept {
-  return translucent() ? kTranslucentFootprint : kSurfaceFootprint;
+RayFootprint Renderer::footprint(const VolumeView& volume) const {
+  const VoxelIndex reach = GradientPlan(GradientFilter::adaptive, volume.edges_mm()).reach();
+  const std::int32_t widest[3] = {reach.x, reach.y, reach.z};  // of all filters
+  RayFootprint made;
+  for (int axis = 0; axis < 3; ++axis) {
+    const int gradients = 2 * (widest[axis] + 1) + 1;
+    made.along[axis] = translucent() ? gradients : kAlongSurface;
+    made.at_end[axis] = translucent() ? 0 : gradients;
+  }
+  return made;
 }
 
 std::unique_ptr<Renderer> make_renderer(std::string_view kind, const SceneView& scene,

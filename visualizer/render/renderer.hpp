@@ -54,8 +54,8 @@ class Renderer {
   /// Draws over what is in `target`, under its depth test, within its part. Opaque things come
   /// first: some renderers look through.
   virtual void draw(const View& view, const RenderTarget& target) = 0;
-  /// A ray whose footprint holds no changed voxel keeps its colour.
-  [[nodiscard]] RayFootprint footprint() const noexcept;
+  /// A ray whose footprint holds no changed voxel of a volume keeps its colour.
+  [[nodiscard]] RayFootprint footprint(const VolumeView& volume) const;
   /// Lets what lies behind a surface shine through, so that it must be drawn before.
   [[nodiscard]] virtual bool translucent() const noexcept { return false; }
 

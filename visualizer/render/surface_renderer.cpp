@@ -112,7 +112,7 @@ void SurfaceRenderer::mark_redraw(std::size_t volume, const KeptPicture& kept,
   const Volume& of = volumes_[volume];
   mark_triangles(of.changed, kept, tiles);
   if (!of.changed_box.empty())
-    mark_rays({&of.changed_box, 1}, footprint(), true, nullptr, kept, tiles);
+    mark_rays({&of.changed_box, 1}, footprint(kept.volume), true, nullptr, kept, tiles);
   if (caps_) Renderer::mark_redraw(volume, kept, tiles);
 }
 

@@ -41,7 +41,7 @@ TranslucentVolume::TranslucentVolume(const VolumeView& volume, const VolumeConte
     : bricks_((check_extent(volume, max_texture_size), volume.bricks)),
       has_labels_(!content.labels.empty()),
       transfer_(transfer),
-      gradient_(gradient),
+      gradient_(gradient, volume.edges_mm()),
       world_from_texture_(kerf::world_from_texture(volume.world_from_voxel, volume.bricks.grid)),
       edge_mm_(shortest_edge_mm(volume.world_from_voxel)),
       voxels_(bricks_.grid, kTexel, &kAirTexel),
@@ -68,7 +68,7 @@ void TranslucentVolume::update_bricks(std::span<const Density> density,
   for (const ChangedBrick& one : changed) {
     const VoxelBox box = ChangedBricks::bounds(one, bricks_);
     if (box.empty()) continue;
-    upload(density, box.grown(gradient_reach(gradient_)).clipped(bricks_.grid.box()));
+    upload(density, gradient_.around(box).clipped(bricks_.grid.box()));
     if (!material_texels_) continue;
     const VoxelBox brick = bricks_.voxels(one.id);
     // A voxel without a label has the material of its density.
@@ -159,7 +159,8 @@ void TranslucentVolumes::bind(const GlProgram& program, const View& view) const 
     program.set(element("u_texture_from_eye", v), glm::mat4(texture_from_eye));
     // A gradient per voxel edge goes to the eye's millimetres by the transposed Jacobian.
     glm::dmat3 eye_from_gradient = glm::transpose(glm::dmat3(texture_from_eye));
-    for (int axis = 0; axis < 3; ++axis) eye_from_gradient[axis] *= volume.texels()[axis];
+    const glm::dvec3 scale = volume.texels() * glm::dvec3(volume.gradient().per_edge);
+    for (int axis = 0; axis < 3; ++axis) eye_from_gradient[axis] *= scale[axis];
     program.set(element("u_eye_from_gradient", v), glm::mat3(eye_from_gradient));
   }
   glBindTextureUnit(free_unit() - 1, by_density_.id());

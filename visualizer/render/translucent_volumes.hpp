@@ -45,6 +45,7 @@ class TranslucentVolume {
   }
   /// s0 of the transfer function in mm: the shortest edge of a voxel.
   [[nodiscard]] double edge_mm() const noexcept { return edge_mm_; }
+  [[nodiscard]] const GradientPlan& gradient() const noexcept { return gradient_; }
   [[nodiscard]] const CellsOnGpu& cells() const noexcept { return cells_; }
 
  private:
@@ -53,7 +54,7 @@ class TranslucentVolume {
   BrickGrid bricks_;
   bool has_labels_;
   TransferFunction transfer_;
-  GradientFilter gradient_;
+  GradientPlan gradient_;
   glm::dmat4 world_from_texture_;
   double edge_mm_;
   VoxelTexture voxels_;

@@ -99,11 +99,11 @@ MaterialTexel texel_of(const glm::vec4& material) noexcept {
 
 }  // namespace
 
-void fill_gradient_texels(GradientFilter kind, const VoxelGrid& grid,
+void fill_gradient_texels(const GradientPlan& plan, const VoxelGrid& grid,
                           std::span<const Density> density, const VoxelBox& box,
                           std::vector<GradientTexel>& texels) {
   std::vector<glm::vec3> gradients;
-  fill_gradients(kind, grid, density, box, gradients);
+  fill_gradients(plan, grid, density, box, gradients);
   texels.clear();
   texels.reserve(gradients.size());
   auto gradient = gradients.begin();

@@ -75,7 +75,7 @@ struct GradientTexel {
 inline constexpr GradientTexel kAirTexel{128, 128, 128, 0};
 
 /// Fills `texels` for `box` out of a whole volume: `fill_gradients` and the densities.
-void fill_gradient_texels(GradientFilter kind, const VoxelGrid& grid,
+void fill_gradient_texels(const GradientPlan& plan, const VoxelGrid& grid,
                           std::span<const Density> density, const VoxelBox& box,
                           std::vector<GradientTexel>& texels);
 

@@ -125,6 +125,11 @@ glm::dmat4 rigid(const glm::dvec3& position_mm, const glm::dvec4& q) {
   return pose;
 }
 
+glm::dvec3 VolumeView::edges_mm() const {
+  return {glm::length(world_from_voxel[0]), glm::length(world_from_voxel[1]),
+          glm::length(world_from_voxel[2])};
+}
+
 BoxCorners VolumeView::corners() const {
   const VoxelGrid& n = bricks.grid;
   return box_corners(glm::dvec3(-0.5), {n.nx - 0.5, n.ny - 0.5, n.nz - 0.5}, world_from_voxel);

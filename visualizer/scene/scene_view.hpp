@@ -28,6 +28,8 @@ struct VolumeView {
   Density iso = 32768;
   bool solid = true;
 
+  /// Of its voxels.
+  [[nodiscard]] glm::dvec3 edges_mm() const;
   /// Its box in the world, with the half voxel around.
   [[nodiscard]] BoxCorners corners() const;
   /// Half the diagonal of that box.

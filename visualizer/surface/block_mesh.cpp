@@ -341,6 +341,7 @@ void dress(SurfaceVertex& vertex, const SurfaceSource& source, VoxelIndex start,
   (axis == 0 ? end.x : axis == 1 ? end.y : end.z) += 1;
   const glm::vec3 high_slope = source.gradient->at(end);
   const glm::vec3 slope =
+      source.gradient->plan().per_edge *
       glm::mix(low_slope, high_slope, static_cast<float>(along) / float{kFinePerVoxel});
   const float length = std::sqrt(glm::dot(slope, slope));
   glm::vec3 outward(0.0F);
@@ -427,11 +428,19 @@ BlockMesh extract_block(const SurfaceSource& source, VoxelIndex block) {
   return mesh;
 }
 
+VoxelBox coloured_around(const VoxelBox& changed, const GradientRows& gradient) {
+  return gradient.plan().around(changed).grown(1);  // a vertex lies between two voxels
+}
+
+VoxelBox shaded_around(const VoxelBox& changed, const GradientRows& gradient) {
+  return coloured_around(changed, gradient).united(changed.grown(VertexShading::kAoReachVox));
+}
+
 ChangedMeshCells update_shading(const SurfaceSource& source, VoxelIndex block,
                                 const VoxelBox& changed, BlockMesh& mesh) {
   const VoxelIndex start = block_start(block);
-  const VoxelBox colours = changed.grown(VertexShading::kColourReachVox);
-  const VoxelBox all = changed.grown(VertexShading::kAoReachVox);
+  const VoxelBox colours = coloured_around(changed, *source.gradient);
+  const VoxelBox all = shaded_around(changed, *source.gradient);
   std::optional<Neighbourhood> near;
   ChangedMeshCells cells;
   for (SurfaceVertex& vertex : mesh.vertices) {

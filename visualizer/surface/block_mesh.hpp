@@ -117,6 +117,10 @@ class ChangedMeshCells {
 /// and no triangle has a side of length zero.
 [[nodiscard]] BlockMesh extract_block(const SurfaceSource& source, VoxelIndex block);
 
+/// The voxels around a change on which the colour, or the whole look, of a vertex depends.
+[[nodiscard]] VoxelBox coloured_around(const VoxelBox& changed, const GradientRows& gradient);
+[[nodiscard]] VoxelBox shaded_around(const VoxelBox& changed, const GradientRows& gradient);
+
 /// Brings the mesh of a block up to date after a change of densities in `changed` that touches none
 /// of the block's own voxels: positions stay, and the vertices that depend on `changed` are
 /// computed again. The result is that of `extract_block`. Returns the cells whose colours changed.

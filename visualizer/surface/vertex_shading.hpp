@@ -15,8 +15,7 @@ namespace kerf {
 /// `inward` is the step of one voxel edge from the surface into the solid, along the normal.
 class VertexShading {
  public:
-  /// A voxel farther from a point than this has no influence on its shading.
-  static constexpr int kColourReachVox = gradient_reach(GradientFilter::adaptive) + 1;
+  /// A voxel farther from a point than this has no influence on its ambient occlusion.
   static constexpr int kAoReachVox = 13;
 
   VertexShading(const std::vector<MaterialView>& materials, Density iso);

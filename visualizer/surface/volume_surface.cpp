@@ -47,7 +47,7 @@ VolumeSurface::VolumeSurface(const VolumeView& volume, const std::vector<Materia
       iso_(std::max(volume.iso, Density{1})),
       inverse_square_spacing_(inverse_square_spacing(volume.world_from_voxel)),
       shading_(materials, iso_),
-      gradient_(gradient, bricks_.grid, density),
+      gradient_(GradientPlan(gradient, volume.edges_mm()), bricks_.grid, density),
       labels_(labels.begin(), labels.end()),
       meshes_(blocks_.voxel_count()),
       work_(blocks_.voxel_count(), Work::none) {
@@ -89,7 +89,7 @@ std::span<const std::uint32_t> VolumeSurface::update(std::span<const Density> de
     all = all.united(box);
     gradient_.update(box, density);
     mark(blocks_on(box), Work::mesh);
-    mark(blocks_on(box.grown(VertexShading::kAoReachVox)), Work::shading);
+    mark(blocks_on(shaded_around(box, gradient_)), Work::shading);
   }
   std::sort(marked_.begin(), marked_.end());
   different_.clear();
@@ -268,7 +268,8 @@ void export_surface(const std::filesystem::path& file, const SceneView& scene,
   for (std::size_t i = 0; i < scene.volumes.size(); ++i) {
     const VolumeView& volume = scene.volumes[i];
     if (some_solid ? !volume.solid : i != 0) continue;
-    mesh.append(VolumeSurface(volume, scene.materials, contents[i].density, contents[i].labels),
+    mesh.append(VolumeSurface(volume, scene.materials, contents[i].density, contents[i].labels,
+                              scene.gradient),
                 volume.world_from_voxel);
   }
   write_new_file(file, format.bytes(mesh));

@@ -67,11 +67,12 @@ TEST_CASE("the bench's report has a row for each kind of frame") {
   };
   const std::vector<PictureRow> rows{row("iso", 0, false, 50.0), row("iso", 16, true, 4.0),
                                      row("cast", 0, false, 8.0)};
-  const PictureFigures figures{.rows = rows,
-                               .gradients = {{GradientFilter::corners, 0.5, 1.25, 2.5, 3.0, 4.5}},
-                               .gl_renderer = "a driver",
-                               .size = {512, 512},
-                               .cores = 2};
+  const PictureFigures figures{
+      .rows = rows,
+      .gradients = {{GradientFilter::corners, 0.5, 1.25, 2.5, 3.0, 4.5, 5.5, 6.5}},
+      .gl_renderer = "a driver",
+      .size = {512, 512},
+      .cores = 2};
   const auto report = test::read_json(picture_report(figures));
   CHECK(report["gl_renderer"] == "a driver");
   CHECK(report["cast_set"] == cast_kernels()[0]->name);
@@ -83,6 +84,8 @@ TEST_CASE("the bench's report has a row for each kind of frame") {
   CHECK(report["rows"][1]["fps"].get<double>() == doctest::Approx(250.0));
   CHECK(report["gradients"][0]["noisy_angle_deg"] == 1.25);
   CHECK(report["gradients"][0]["milled_p99_deg"] == 4.5);
+  CHECK(report["gradients"][0]["thick_5_p99_deg"] == 5.5);
+  CHECK(report["gradients"][0]["thick_10_p99_deg"] == 6.5);
 }
 
 TEST_CASE("each program replaces its own part of a page and leaves the others") {
@@ -107,6 +110,9 @@ TEST_CASE("the default gradient shades balls and milled hollows within 3 degrees
     const bool is_default = row.gradient == kDefaultGradient;
     CHECK((row.p99_deg < 1.0) == (is_default || row.gradient == GradientFilter::farid5));
     CHECK((row.milled_p99_deg < 3.0) == is_default);
+    CAPTURE(row.thick_10_p99_deg);
+    CHECK((row.thick_10_p99_deg < 3.0) == is_default);
+    if (is_default) CHECK(row.thick_5_p99_deg < 1.5);
     CHECK((row.noisy_angle_deg < 0.5) == (is_default || row.gradient == GradientFilter::farid5));
   }
 }

@@ -20,7 +20,7 @@ namespace {
 
 constexpr PictureSize kSize{61, 47};  // no multiple of a packet
 constexpr VoxelGrid kGrid{40, 36, 32};
-constexpr RayFootprint kReach{.along = 3, .at_end = 5};
+constexpr RayFootprint kReach{.along = {3, 3, 3}, .at_end = {5, 5, 5}};
 
 /// A ball whose surface looks into a hollow, seen by an eye 60 voxel edges, here mm, away.
 struct LoadedScene {
@@ -37,7 +37,7 @@ struct LoadedScene {
       const double fraction = std::clamp(0.5 - 0.5 * std::max(outside, hollow), 0.0, 1.0);
       density.push_back(static_cast<Density>(fraction * kDensityMax));
     });
-    gradient.emplace(kDefaultGradient, kGrid, density);
+    gradient.emplace(GradientPlan(kDefaultGradient), kGrid, density);
     view.aspect = static_cast<double>(kSize.width) / kSize.height;
     for (int y = 0; y < kSize.height; ++y) {
       for (int x = 0; x < kSize.width; ++x) {

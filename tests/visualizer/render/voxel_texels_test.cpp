@@ -10,6 +10,8 @@ using namespace kerf;
 
 namespace {
 
+const GradientPlan kCorners(GradientFilter::corners);
+
 const std::vector<MaterialView> kTwo{
     {"none", 0.0, {0, 0, 0}}, {"hard", 0.8, {1, 1, 1}}, {"soft", 0.2, {0, 0, 1}}};
 
@@ -23,7 +25,7 @@ TEST_CASE(
     density.push_back(static_cast<Density>(30000 + 2000 * x - 1500 * y + 500 * z));
   });
   std::vector<GradientTexel> texels;
-  fill_gradient_texels(GradientFilter::corners, grid, density, {{1, 1, 1}, {8, 7, 6}}, texels);
+  fill_gradient_texels(kCorners, grid, density, {{1, 1, 1}, {8, 7, 6}}, texels);
   // A step over two edges counts as g = 1: 127 * 2 * 2000 / 65535 = 7.75, and so on.
   for (const GradientTexel& texel : texels) {
     CHECK(texel.x == 128 + 8);
@@ -40,12 +42,12 @@ TEST_CASE("a box alone gives the texels that the whole volume gives there") {
     const auto density = *rc::gen::container<std::vector<Density>>(grid.voxel_count(),
                                                                    rc::gen::arbitrary<Density>());
     std::vector<GradientTexel> whole;
-    fill_gradient_texels(GradientFilter::corners, grid, density, grid.box(), whole);
+    fill_gradient_texels(kCorners, grid, density, grid.box(), whole);
     const VoxelIndex lo{*rc::gen::inRange(0, grid.nx), *rc::gen::inRange(0, grid.ny),
                         *rc::gen::inRange(0, grid.nz)};
     const VoxelBox box = VoxelBox{lo, {lo.x + 3, lo.y + 2, lo.z + 4}}.clipped(grid.box());
     std::vector<GradientTexel> part;
-    fill_gradient_texels(GradientFilter::corners, grid, density, box, part);
+    fill_gradient_texels(kCorners, grid, density, box, part);
     std::size_t at = 0;
     for_each_voxel(
         box, [&](int x, int y, int z) { RC_ASSERT(part[at++] == whole[grid.index(x, y, z)]); });
@@ -56,7 +58,7 @@ TEST_CASE("a box alone gives the texels that the whole volume gives there") {
 TEST_CASE("air is the air of the shell around a volume") {
   std::vector<GradientTexel> texels;
   const std::vector<Density> air(8, 0);
-  fill_gradient_texels(GradientFilter::corners, {2, 2, 2}, air, {{0, 0, 0}, {2, 2, 2}}, texels);
+  fill_gradient_texels(kCorners, {2, 2, 2}, air, {{0, 0, 0}, {2, 2, 2}}, texels);
   for (const GradientTexel& texel : texels) CHECK(texel == kAirTexel);
 }
 

@@ -23,6 +23,8 @@ namespace fs = std::filesystem;
 
 namespace {
 
+const GradientPlan kCorners(GradientFilter::corners);
+
 const std::vector<MaterialView> kTooth{{"none", 0.0, {0, 0, 0}},
                                        {"enamel", 0.81, {1, 1, 1}},
                                        {"dentin", 0.45, {0, 1, 0}},
@@ -82,7 +84,7 @@ TEST_CASE("no density below the lowest that is seen is seen after it was rounded
     const auto density = *rc::gen::inRange<Density>(0, 65535);
     std::vector<GradientTexel> texel;
     const std::vector<Density> volume{density};
-    fill_gradient_texels(GradientFilter::corners, {1, 1, 1}, volume, {{0, 0, 0}, {1, 1, 1}}, texel);
+    fill_gradient_texels(kCorners, {1, 1, 1}, volume, {{0, 0, 0}, {1, 1, 1}}, texel);
     if (density < made.lowest_seen()) RC_ASSERT(made.presence(texel[0].density / 255.0) == 0.0);
   }));
 }

@@ -27,22 +27,23 @@ std::vector<Density> random_density(const VoxelGrid& grid) {
 /// As the taps say, voxel by voxel.
 glm::dvec3 plain_gradient(GradientFilter kind, const VoxelGrid& grid,
                           const std::vector<Density>& density, VoxelIndex at) {
-  const FilterTaps taps = gradient_taps(kind);
+  const AxisTaps taps = GradientPlan(kind).voxel[0];
   glm::dvec3 sum(0.0);
-  for (int z = 0; z < 15; ++z) {
-    for (int y = 0; y < 15; ++y) {
-      for (int x = 0; x < 15; ++x) {
-        const VoxelIndex v{at.x + x - 7, at.y + y - 7, at.z + z - 7};
+  for (int z = -taps.reach; z <= taps.reach; ++z) {
+    for (int y = -taps.reach; y <= taps.reach; ++y) {
+      for (int x = -taps.reach; x <= taps.reach; ++x) {
+        const VoxelIndex v{at.x + x, at.y + y, at.z + z};
         if (!grid.contains(v)) continue;
-        const auto smooth = [&](int i) { return double{taps.smooth[static_cast<std::size_t>(i)]}; };
-        const auto slope = [&](int i) { return double{taps.slope[static_cast<std::size_t>(i)]}; };
+        const auto place = [](int i) { return static_cast<std::size_t>(AxisTaps::kMiddle + i); };
+        const auto smooth = [&](int i) { return double{taps.smooth[place(i)]}; };
+        const auto slope = [&](int i) { return double{taps.slope[place(i)]}; };
         sum += static_cast<double>(density[grid.index(v.x, v.y, v.z)]) *
                glm::dvec3(slope(x) * smooth(y) * smooth(z), smooth(x) * slope(y) * smooth(z),
                           smooth(x) * smooth(y) * slope(z));
       }
     }
   }
-  return sum / double{taps.divisor};
+  return sum / (0.5 * taps.slope_sum * taps.smooth_sum * taps.smooth_sum * kDensityMax);
 }
 
 }  // namespace
@@ -55,7 +56,7 @@ TEST_CASE("every gradient of a linear field is that of the field, a step over tw
   });
   for (const GradientFilter kind : kAll) {
     std::vector<glm::vec3> gradients;
-    fill_gradients(kind, grid, density, {{7, 7, 7}, {12, 11, 10}}, gradients);
+    fill_gradients(GradientPlan(kind), grid, density, {{7, 7, 7}, {12, 11, 10}}, gradients);
     for (const glm::vec3& g : gradients) {
       const glm::dvec3 off = glm::dvec3(g) - glm::dvec3(2000, -1500, 500) / kDensityMax;
       CHECK(glm::length(off) < 1e-6);
@@ -71,12 +72,12 @@ TEST_CASE("a gradient is the sum of its taps, with air around, and has the same 
     const GradientFilter kind =
         *rc::gen::elementOf(std::vector<GradientFilter>(std::begin(kAll), std::end(kAll)));
     std::vector<glm::vec3> whole;
-    fill_gradients(kind, grid, density, grid.box(), whole);
+    fill_gradients(GradientPlan(kind), grid, density, grid.box(), whole);
     const VoxelIndex lo{*rc::gen::inRange(0, grid.nx), *rc::gen::inRange(0, grid.ny),
                         *rc::gen::inRange(0, grid.nz)};
     const VoxelBox box = VoxelBox{lo, {lo.x + 3, lo.y + 2, lo.z + 4}}.clipped(grid.box());
     std::vector<glm::vec3> part;
-    fill_gradients(kind, grid, density, box, part);
+    fill_gradients(GradientPlan(kind), grid, density, box, part);
     std::size_t at = 0;
     for_each_voxel(box, [&](int x, int y, int z) {
       RC_ASSERT(part[at] == whole[grid.index(x, y, z)]);
@@ -96,13 +97,13 @@ TEST_CASE("a gradient depends on no voxel beyond its reach") {
     std::vector<Density> density(kGrid.voxel_count());
     density[kGrid.index(7, 7, 7)] = 60'000;
     std::vector<glm::vec3> gradients;
-    fill_gradients(kind, kGrid, density, kGrid.box(), gradients);
+    fill_gradients(GradientPlan(kind), kGrid, density, kGrid.box(), gradients);
     VoxelBox reached;
     for (int i = 0; i < static_cast<int>(gradients.size()); ++i) {
       if (gradients[static_cast<std::size_t>(i)] == glm::vec3(0.0F)) continue;
       reached = reached.with({i % 15, i / 15 % 15, i / 225});
     }
-    CHECK(reached == VoxelBox{{7, 7, 7}, {8, 8, 8}}.grown(gradient_reach(kind)));
+    CHECK(reached == VoxelBox{{7, 7, 7}, {8, 8, 8}}.grown(GradientPlan(kind).voxel[0].reach));
   }
 }
 
@@ -114,8 +115,8 @@ TEST_CASE("the adaptive gradient keeps an edge as sharp as farid5, and its lengt
     density.push_back(x < 20 && y < 20 && z < 20 ? 65'535 : 0);
   });
   std::vector<glm::vec3> narrow, adaptive;
-  fill_gradients(GradientFilter::farid5, kGrid, density, kGrid.box(), narrow);
-  fill_gradients(GradientFilter::adaptive, kGrid, density, kGrid.box(), adaptive);
+  fill_gradients(GradientPlan(GradientFilter::farid5), kGrid, density, kGrid.box(), narrow);
+  fill_gradients(GradientPlan(GradientFilter::adaptive), kGrid, density, kGrid.box(), adaptive);
   for (std::size_t i = 0; i < narrow.size(); ++i) {
     REQUIRE(glm::length(adaptive[i]) == doctest::Approx(glm::length(narrow[i])).epsilon(1e-4));
   }

@@ -80,7 +80,8 @@ inline Material lit_material(const CastJob& job, const CastVolumeJob& volume, Ve
   const F x = clamped((size - flat) * Simd::set(1.0F / 0.08F));
   const M lights = Simd::both(noticeable, Simd::less(zero, x));
   if (!Simd::any(lights)) return {dim, material.extinction};
-  const Vec3 unit = -normalized(transformed_back(volume.from_eye, gradient));
+  const Vec3 unit =
+      -normalized(transformed_back(volume.from_eye, per_edge(volume.gradient, gradient)));
   const Vec3 normal = select(Simd::less(dot(unit, vectors.to_eye), zero), -unit, unit);
   const F surface = x * x * (Simd::set(3.0F) - Simd::set(2.0F) * x);
   const Vec3 bright = mix(dim, lit(job, material.rgb, normal, vectors, Simd::set(1.0F)), surface);

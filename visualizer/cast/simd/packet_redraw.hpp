@@ -128,7 +128,8 @@ inline bool packet_shading_touches(const RedrawJob& job, const Packet& packet) {
   M known = Simd::but_not(near, on_face);
   known = Simd::but_not(known, Simd::less(dot(gradient, gradient), least_slope * least_slope));
   if (Simd::any(Simd::but_not(near, known))) return true;
-  const Vec3 inward = facing_of(job.from_eye, gradient, -normalized(eye)).inward;
+  const Vec3 inward =
+      facing_of(job.from_eye, per_edge(job.gradient, gradient), -normalized(eye)).inward;
   for (const float reach_vox : kShadingTapsVox) {
     if (any_marked(job, p - Simd::set(reach_vox) * inward, known, kChangedAlong)) return true;
   }

@@ -61,7 +61,13 @@ inline F density_at(const CastVolumeJob& volume, Vec3 p) {
   return density_in(volume, cell_place(volume, p));
 }
 
-/// The density gradient per voxel edge, trilinear. One load of 64 bits brings all of a voxel's.
+/// Per voxel edge, of a gradient as it is stored.
+inline Vec3 per_edge(const CastGradient& field, Vec3 gradient) {
+  return {Simd::set(field.per_edge[0]) * gradient.x, Simd::set(field.per_edge[1]) * gradient.y,
+          Simd::set(field.per_edge[2]) * gradient.z};
+}
+
+/// The density gradient as it is stored, trilinear. One load of 64 bits brings all of a voxel's.
 inline Vec3 gradient_at(const CastGradient& field, Vec3 p) {
   const CellSample cell = cell_place(field, p);
   const auto row_at = [&](std::int32_t step) {
@@ -288,7 +294,8 @@ struct SurfacePoint {
 inline SurfacePoint surface_point(const CastVolumeJob& volume, const VolumeRays& rays, F t,
                                   Vec3 to_eye) {
   const Vec3 p = rays.origin + t * rays.direction;
-  const Facing facing = facing_of(volume.from_eye, gradient_at(volume.gradient, p), to_eye);
+  const Facing facing = facing_of(
+      volume.from_eye, per_edge(volume.gradient, gradient_at(volume.gradient, p)), to_eye);
   return {p, facing.inward, facing.normal};
 }
 
