@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cerrno>
 #include <charconv>
 #include <chrono>
 #include <cmath>
@@ -111,35 +110,31 @@ std::optional<ClockPair> ClockWatch::take(const ClockPair& now) {
 }
 
 ClockWriter::ClockWriter(const std::filesystem::path& folder, bool is_virtual)
-    : path_(folder / kClockName), is_virtual_(is_virtual), watch_(is_virtual) {
-  if (std::filesystem::exists(path_)) rows_ = read_clock(folder, true).pairs().size();
-  if (rows_ == 0) {
-    const ClockPair first = *watch_.take(read_clocks());
-    write_clock(folder, std::span(&first, 1));
-    rows_ = 1;
+    : folder_(folder), is_virtual_(is_virtual), watch_(is_virtual) {
+  const LogClock before = read_clock(folder, false);
+  pairs_.assign(before.pairs().begin(), before.pairs().end());
+  if (pairs_.empty()) {
+    pairs_.push_back(*watch_.take(read_clocks()));
+    write_clock(folder_, pairs_);
   }
-  file_.open(path_, std::ios::binary | std::ios::in | std::ios::out);
   follow();
 }
 
-void ClockWriter::follow() {
-  if (is_virtual_) return;  // it has its only pair
-  if (const auto pair = watch_.take(read_clocks())) append(*pair);
+bool ClockWriter::follow() {
+  if (is_virtual_) return false;  // it has its only pair
+  const auto pair = watch_.take(read_clocks());
+  if (!pair) return false;
+  pairs_.push_back(*pair);
+  write_clock(folder_, pairs_);
+  return true;
 }
 
-void ClockWriter::append(const ClockPair& pair) {
-  const std::string header = clock_header(rows_ + 1);
-  // The header is the last: a recorder that is killed between both has a row more than it counts.
-  file_.seekp(static_cast<std::streamoff>(kClockHeaderBytes + rows_ * sizeof pair));
-  file_.write(reinterpret_cast<const char*>(&pair), sizeof pair).flush();
-  file_.seekp(0);
-  file_.write(header.data(), static_cast<std::streamsize>(header.size())).flush();
-  if (!file_) throw RecordError(path_.string() + not_written(errno));
-  ++rows_;
+std::string clock_bytes(std::span<const ClockPair> pairs) {
+  return clock_header(pairs.size()) + bytes_of(pairs);
 }
 
 void write_clock(const std::filesystem::path& folder, std::span<const ClockPair> pairs) {
-  write_new_file(folder / kClockName, clock_header(pairs.size()) + bytes_of(pairs));
+  write_new_file(folder / kClockName, clock_bytes(pairs));
 }
 
 std::string LogClock::set_in_the_run() const {

@@ -4,7 +4,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
-#include <fstream>
 #include <optional>
 #include <span>
 #include <string>
@@ -17,7 +16,7 @@
 namespace kerf {
 
 inline constexpr std::string_view kClockName = "clock.npy";
-/// The header of clock.npy; its count of rows is written after each row, as in a tick log.
+/// The header of clock.npy.
 inline constexpr std::size_t kClockHeaderBytes = 256;
 
 /// No clock.npy is larger: a row of 24 bytes a minute for five years. The ticks of such a run have
@@ -60,25 +59,25 @@ class ClockWatch {
   std::optional<ClockPair> last_;
 };
 
-/// clock.npy of a recorder, as it grows.
+/// clock.npy of a recorder, as it grows: with each row a new file, whole or not at all.
 class ClockWriter {
  public:
   /// Makes the file with the first pair, or goes on behind the sound pairs of the recorder before.
   /// Throws FileError.
   ClockWriter(const std::filesystem::path& folder, bool is_virtual);
 
-  /// At each poll: appends a pair if one is due. Throws `RecordError`.
-  void follow();
+  /// At each poll: appends a pair if one is due. Whether it did. Throws FileError.
+  bool follow();
 
  private:
-  void append(const ClockPair& pair);
-
-  std::filesystem::path path_;
-  std::fstream file_;
-  std::size_t rows_ = 0;
+  std::filesystem::path folder_;
+  std::vector<ClockPair> pairs_;
   bool is_virtual_;
   ClockWatch watch_;
 };
+
+/// The bytes of clock.npy with these rows.
+[[nodiscard]] std::string clock_bytes(std::span<const ClockPair> pairs);
 
 /// Writes clock.npy, whole or not at all. Throws FileError.
 void write_clock(const std::filesystem::path& folder, std::span<const ClockPair> pairs);

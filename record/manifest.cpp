@@ -83,9 +83,9 @@ std::vector<std::filesystem::path> recording_files(const std::filesystem::path& 
                                            folder / kClockName};
   for (std::size_t arm = 0; arm < kMaxArms; ++arm) {
     const std::filesystem::path log = folder / tick_log_name(arm);
-    std::error_code fault;
     files.push_back(log);
-    for (std::size_t part = 2; std::filesystem::exists(part_of_log(log, part), fault); ++part) {
+    const std::size_t parts = files_of_log(log);
+    for (std::size_t part = 2; part <= parts; ++part) {
       files.push_back(part_of_log(log, part));
     }
   }
@@ -100,7 +100,7 @@ Json figures_of(const RecordSummary& summary) {
 
 void write_manifest(const std::filesystem::path& folder, const SegmentInfo& info,
                     const RecordLosses& losses, std::uint64_t rows, std::string_view end_reason,
-                    const ArmSummaries& summaries) {
+                    const ArmSummaries& summaries, const Json* files) {
   Json manifest;
   manifest["kerf"] = KERF_VERSION;
   manifest["compiler"] = __VERSION__;
@@ -121,12 +121,13 @@ void write_manifest(const std::filesystem::path& folder, const SegmentInfo& info
          {"initial_hash", hex64(volume.initial_hash)}});
   }
   if (info.arms > 1) manifest["arms"] = info.arms;
-  write_with_end(folder, std::move(manifest), losses, rows, end_reason, summaries);
+  write_with_end(folder, std::move(manifest), losses, rows, end_reason, summaries, files);
 }
 
 void write_with_end(const std::filesystem::path& folder, Json manifest, const RecordLosses& losses,
-                    std::uint64_t rows, std::string_view end_reason,
-                    const ArmSummaries& summaries) {
+                    std::uint64_t rows, std::string_view end_reason, const ArmSummaries& summaries,
+                    const Json* files) {
+  manifest["parts"] = files_of_log(folder / kTickLogName);
   manifest["rows"] = rows;
   manifest["lost_ticks"] = losses.lost;
   manifest["missed_before_start"] = losses.missed_before_start;
@@ -137,8 +138,7 @@ void write_with_end(const std::filesystem::path& folder, Json manifest, const Re
   manifest["end_reason"] = end_reason;
   if (!summaries.empty()) manifest["summary"] = figures_of(summaries[0]);
   if (summaries.size() > 1) manifest["summary_2"] = figures_of(summaries[1]);
-  manifest["files"] =
-      checksums_of(folder, is_of_whole_log(end_reason) || end_reason == kUnknownEnd);
+  manifest["files"] = files == nullptr ? checksums_of(folder) : *files;
   write_new_file(folder / kManifestName, sealed(manifest));
 }
 
@@ -239,6 +239,13 @@ Manifest read_manifest(const std::filesystem::path& folder) {
   members.take_if_there("arms", "1 or 2, which this version knows", [&](const Json& member) {
     out.arms = member.get<std::size_t>();
     return out.arms > 0 && out.arms <= kMaxArms;
+  });
+  members.take_if_there("parts", "a number of files above 0", [&](const Json& member) {
+    return (out.parts = member.get<std::size_t>()) > 0;
+  });
+  members.take_if_there("repaired_by", "a text", [&](const Json& member) {
+    out.repaired_by = member.get<std::string>();
+    return true;
   });
   for (const char* const key : {"summary", "summary_2"}) {
     members.take_if_there(key, "a table of figures", [&](const Json& member) {

@@ -101,20 +101,24 @@ struct Manifest {
   std::vector<double> voxel_mm3;  ///< per volume
   std::string session_id;         ///< of the run, as 16 hexadecimal digits
   std::string end_reason;
-  bool has_clock = false;  ///< names clock.npy: log_clock.hpp
-  RecordLosses losses;     ///< until the last loss that the recorder wrote down
-  ArmSummaries summaries;  ///< of all rows
+  bool has_clock = false;   ///< names clock.npy: log_clock.hpp
+  std::size_t parts = 1;    ///< files of the log that had begun when it was written
+  std::string repaired_by;  ///< version of kerf that made it anew; empty: as its recorder wrote it
+  RecordLosses losses;      ///< until the last loss that the recorder wrote down
+  ArmSummaries summaries;   ///< of all rows
 };
 
 /// Writes manifest.json, whole or not at all, with its checksum and those of the files beside it
-/// (record/manifest_seal.hpp). It names clock.npy if that is in `folder`.
+/// (record/manifest_seal.hpp): all that are there, or `files`, of a recorder that still runs. It
+/// names clock.npy if that is in `folder`, and counts the files of the log.
 void write_manifest(const std::filesystem::path& folder, const SegmentInfo& info,
                     const RecordLosses& losses, std::uint64_t rows, std::string_view end_reason,
-                    const ArmSummaries& summaries = {});
+                    const ArmSummaries& summaries = {}, const Json* files = nullptr);
 
 /// Adds rows, losses, end, figures and checksums to a manifest that has all else, and writes it.
 void write_with_end(const std::filesystem::path& folder, Json manifest, const RecordLosses& losses,
-                    std::uint64_t rows, std::string_view end_reason, const ArmSummaries& summaries);
+                    std::uint64_t rows, std::string_view end_reason, const ArmSummaries& summaries,
+                    const Json* files = nullptr);
 
 /// A value of a manifest for a message: short, on one line.
 [[nodiscard]] std::string shown(const Json& value);

@@ -5,6 +5,7 @@
 #include <array>
 #include <fstream>
 #include <system_error>
+#include <utility>
 #include <vector>
 
 #include <zlib.h>
@@ -33,8 +34,7 @@ std::uint32_t crc32_of(std::uint32_t crc, const void* data, std::size_t bytes) {
 }
 
 std::string seal_text(std::string_view text) {
-  return std::string(kBeforeSeal) + hex32(crc32_of(0, text.data(), text.size())) +
-         std::string(kBehindSeal);
+  return std::string(kBeforeSeal) + crc32_of_bytes(text) + std::string(kBehindSeal);
 }
 
 }  // namespace
@@ -52,25 +52,37 @@ std::string crc32_of_file(const fs::path& path) {
   return file.eof() ? hex32(crc) : std::string();
 }
 
-std::vector<std::string> names_of_files(const fs::path& folder, bool all) {
-  std::vector<std::string> names{std::string(kSceneName)};
-  if (!all) return names;
-  std::error_code none;
-  if (fs::exists(folder / kClockName, none)) names.emplace_back(kClockName);
-  for (const std::string_view below : {kVolumesName, inputs_name(0), inputs_name(1)}) {
-    std::error_code fault;
-    for (fs::directory_iterator file(folder / below, fault), end; !fault && file != end;
-         file.increment(fault)) {
-      names.push_back(std::string(below) + "/" + file->path().filename().string());
-    }
+std::string crc32_of_bytes(std::string_view bytes) {
+  return hex32(crc32_of(0, bytes.data(), bytes.size()));
+}
+
+std::vector<std::string> names_below(const fs::path& folder, std::string_view below) {
+  std::vector<std::string> names;
+  std::error_code fault;
+  for (fs::directory_iterator file(folder / below, fault), end; !fault && file != end;
+       file.increment(fault)) {
+    names.push_back(std::string(below) + "/" + file->path().filename().string());
   }
   std::ranges::sort(names);
   return names;
 }
 
-Json checksums_of(const fs::path& folder, bool all) {
+std::vector<std::string> names_of_files(const fs::path& folder) {
+  std::vector<std::string> names;
+  std::error_code none;
+  for (const std::string_view name : {kClockName, kSceneName}) {
+    if (fs::exists(folder / name, none)) names.emplace_back(name);
+  }
+  for (const std::string_view below : {inputs_name(0), inputs_name(1), kVolumesName}) {
+    for (std::string& name : names_below(folder, below)) names.push_back(std::move(name));
+  }
+  std::ranges::sort(names);
+  return names;
+}
+
+Json checksums_of(const fs::path& folder) {
   Json files = Json::Members{};
-  for (const std::string& name : names_of_files(folder, all)) {
+  for (const std::string& name : names_of_files(folder)) {
     files[name] = crc32_of_file(folder / name);
   }
   return files;

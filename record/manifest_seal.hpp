@@ -16,14 +16,19 @@ namespace kerf {
 /// The checksum of a regular file's bytes, as 8 hexadecimal digits; empty if it cannot be read.
 [[nodiscard]] std::string crc32_of_file(const std::filesystem::path& path);
 
-/// The names in `folder` of the files of a recording that `checksums_of` has: scene.json, and with
-/// `all` clock.npy and what is in volumes/, inputs/ and inputs-2/. In order.
-[[nodiscard]] std::vector<std::string> names_of_files(const std::filesystem::path& folder,
-                                                      bool all);
+/// The same of bytes.
+[[nodiscard]] std::string crc32_of_bytes(std::string_view bytes);
 
-/// Their checksums, by name: the member `files` of a manifest. A recorder that still runs has no
-/// volumes yet; it leaves `all` out.
-[[nodiscard]] Json checksums_of(const std::filesystem::path& folder, bool all);
+/// The names in `folder` of the files below a folder of a recording, as "volumes/NAME". In order.
+[[nodiscard]] std::vector<std::string> names_below(const std::filesystem::path& folder,
+                                                   std::string_view below);
+
+/// The names of the files of a recording that `checksums_of` has, if they are there: scene.json,
+/// clock.npy and what is in volumes/, inputs/ and inputs-2/. In order.
+[[nodiscard]] std::vector<std::string> names_of_files(const std::filesystem::path& folder);
+
+/// Their checksums, by name: the member `files` of a manifest.
+[[nodiscard]] Json checksums_of(const std::filesystem::path& folder);
 
 /// The text of manifest.json: `manifest` with a last member, `crc32`, the checksum of all bytes
 /// before the comma in front of it.

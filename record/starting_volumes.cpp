@@ -8,6 +8,7 @@
 #include <system_error>
 #include <utility>
 
+#include "record/manifest_seal.hpp"
 #include "record/packed_npy.hpp"
 #include "record/tick_log.hpp"
 #include "shared/posix/atomic_file.hpp"
@@ -86,6 +87,9 @@ void StartingVolumes::run() {
     problems_.push_back(std::string("the volumes are not kept beside the log: ") + error.what());
   }
   copied_ = true;
+  for (const std::string& name : names_below(folder_, kVolumesName)) {
+    checksums_[name] = crc32_of_file(folder_ / name);
+  }
   done_ = true;
 }
 

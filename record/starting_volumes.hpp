@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "record/kept_volumes.hpp"
+#include "shared/text/json.hpp"
 #include "shared/volume/voxel_grid.hpp"
 
 // The volumes of a run as they were at its start (record/kept_volumes.hpp), copied from it.
@@ -29,6 +30,9 @@ class StartingVolumes {
   /// Whether all work has ended.
   [[nodiscard]] bool done() const noexcept { return done_; }
 
+  /// After `done`: the checksums of the files, by name, as a manifest has them.
+  [[nodiscard]] const Json& checksums() const noexcept { return checksums_; }
+
   /// Waits until the files are complete. Returns one line for each volume that has none, and why.
   [[nodiscard]] const std::vector<std::string>& finish();
 
@@ -39,6 +43,7 @@ class StartingVolumes {
   std::string name_;
   std::filesystem::path folder_;
   std::vector<std::string> problems_;
+  Json checksums_ = Json::Members{};
   std::atomic<bool> copied_{false}, done_{false};
   std::jthread thread_;  // last: it uses the members above
 };

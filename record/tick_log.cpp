@@ -62,6 +62,13 @@ namespace {
 
 }  // namespace
 
+std::size_t files_of_log(const std::filesystem::path& path) {
+  std::size_t files = 1;
+  std::error_code fault;
+  while (std::filesystem::is_regular_file(part_of_log(path, files + 1), fault)) ++files;
+  return files;
+}
+
 bool is_recording(const std::filesystem::path& folder) {
   std::error_code fault;
   return std::filesystem::is_regular_file(folder / "ticks.npy", fault);
@@ -137,15 +144,17 @@ namespace {
 std::string part_behind(const std::filesystem::path& path, std::size_t part) {
   const std::string begin = path.filename().string() + ".";
   std::error_code fault;
+  std::size_t next = 0;  // the first of them
   for (std::filesystem::directory_iterator at(path.parent_path() / ".", fault), end;
        !fault && at != end; at.increment(fault)) {
     const std::string name = at->path().filename().string();
     if (!name.starts_with(begin)) continue;
     std::size_t number = 0;
     std::from_chars(name.data() + begin.size(), name.data() + name.size(), number);
-    if (number > part && part_of_log(path, number).filename() == name) return name;
+    if (number <= part || part_of_log(path, number).filename() != name) continue;
+    next = next == 0 ? number : std::min(next, number);
   }
-  return {};
+  return next == 0 ? std::string() : part_of_log(path, next).filename().string();
 }
 
 }  // namespace

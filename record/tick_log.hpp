@@ -49,6 +49,9 @@ inline constexpr std::size_t kTickLogHeaderBytes = 4096;
 [[nodiscard]] std::filesystem::path part_of_log(const std::filesystem::path& path,
                                                 std::size_t part);
 
+/// How many files the log at `path` has, without one behind a file that is missing.
+[[nodiscard]] std::size_t files_of_log(const std::filesystem::path& path);
+
 /// Whether `folder` is a recording, sound or not: one has a file ticks.npy.
 [[nodiscard]] bool is_recording(const std::filesystem::path& folder);
 

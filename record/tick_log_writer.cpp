@@ -107,6 +107,7 @@ void TickLogWriter::sync() {
   if (fdatasync(fd_) != 0) fail(errno);
   write_header();
   if (fdatasync(fd_) != 0) fail(errno);
+  synced_ = written_;
 }
 
 void TickLogWriter::write_header() {

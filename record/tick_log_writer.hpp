@@ -50,6 +50,10 @@ class TickLogWriter final : public TickSink {
   void sync();
 
   [[nodiscard]] std::uint64_t rows() const noexcept { return written_ + buffer_.size(); }
+  /// Rows that are on the disk, and counted by the headers.
+  [[nodiscard]] std::uint64_t synced() const noexcept { return synced_; }
+  /// Files that have begun.
+  [[nodiscard]] std::size_t parts() const noexcept { return part_; }
 
  private:
   [[noreturn]] void fail(int error);
@@ -68,7 +72,7 @@ class TickLogWriter final : public TickSink {
   int fd_ = -1;              ///< the file that grows; perhaps the same
   std::size_t part_ = 1;     ///< which
   std::uint64_t first_ = 0;  ///< its first row
-  std::uint64_t written_ = 0;
+  std::uint64_t written_ = 0, synced_ = 0;
   std::vector<TickRecord> buffer_;
 };
 

@@ -1,11 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """What `kerf record info` compares of a log, in NumPy: each function but the first two yields lines "place: value; remedy"."""
 import json
+import re
 import stat
 import zlib
 
 import numpy as np
 
+from .layout import CLOCK, TICK
+
+HEADER_BYTES = {TICK: 4096, CLOCK: 256}
 ENDS_LATER = ("running", "no room", "unknown")  # an end_reason: rows and losses of the manifest are not those of the whole log
 CHUNK = 1 << 14                      # rows at a time, so that a long log needs little memory
 
@@ -18,9 +22,34 @@ def opened(file):
 
 
 def parts_of(file):
-    """Of a log that was split, too: file, then file.0002 and so on, by number: file.10000 is behind file.1001."""
-    parts = {path: path.name[len(file.name) + 1:] for path in file.parent.glob(f"{file.name}.*")}
-    return [file, *sorted((path for path, number in parts.items() if number.isdecimal()), key=lambda path: int(parts[path]))]
+    """The files of a log, also of one that was split: file, then file.0002 and so on. Not one that is cut in its header behind them: the
+    recorder was killed as it began it."""
+    numbers = {path.name[len(file.name) + 1:] for path in file.parent.glob(f"{file.name}.*")}
+    numbers = sorted(int(number) for number in numbers if re.fullmatch("[0-9]{4,}", number) and f"{int(number):04}" == number and int(number) > 1)
+    parts = [file]
+    for number in numbers:
+        part = file.with_name(f"{file.name}.{number:04}")
+        before = file.with_name(f"{file.name}.{len(parts) + 1:04}")
+        if part != before:
+            raise ValueError(f"{before}: missing, or cut in its header, and {part.name} is there; copy the recording again")
+        if is_begun(part):
+            parts.append(part)
+    return parts
+
+
+def is_begun(part):
+    """Whether it has a whole header; what is no regular file is refused when it is read."""
+    status = part.stat()
+    return not stat.S_ISREG(status.st_mode) or status.st_size >= HEADER_BYTES[TICK]
+
+
+def header_of(kind, rows):
+    """The header that a recorder writes for so many rows of TICK or CLOCK."""
+    columns = ["(" + ", ".join(map(repr, column)) + ")" for column in kind.descr]
+    descr = "[" + (", ".join(columns) if kind == CLOCK else "".join(column + ", " for column in columns)) + "]"
+    size = HEADER_BYTES[kind]
+    text = f"{{'descr': {descr}, 'fortran_order': False, 'shape': ({rows},), }}"
+    return b"\x93NUMPY\1\0" + (size - 10).to_bytes(2, "little") + text.ljust(size - 11).encode() + b"\n"
 
 
 def _crc_tables():
@@ -66,11 +95,19 @@ def _row_problems(file, rows):
 
 def _size_problems(file, rows, manifest):
     """A file may have more rows than its header counts, and a part of one: it is then of a recorder that was killed."""
+    files = 1
+    while file.with_name(f"{file.name}.{files + 1:04}").is_file():
+        files += 1
+    if files < (parts := manifest.get("parts", files)):
+        yield f"{file}.{files + 1:04}: missing, and the recorder had begun {parts} files of this log; copy the recording again"
     if manifest["end_reason"] in ENDS_LATER:
         if "rows" in manifest and manifest["end_reason"] != "no room" and not (_is_count(manifest["rows"]) and manifest["rows"] <= len(rows)):
             yield f"{file}: {len(rows)} rows, and {manifest['rows']} by manifest.json; copy the recording again"
         return
-    for part in parts_of(file):
+    if files > len(read := parts_of(file)) or files > parts:
+        what = "cut in its header" if files <= parts else f"no file of this log, which has {parts}"
+        yield f"{file}.{min(len(read), parts) + 1:04}: {what}; copy the recording again"
+    for part in read:
         with opened(part) as head:
             np.lib.format.read_magic(head)
             (count,), _, dtype = np.lib.format.read_array_header_1_0(head)
@@ -115,11 +152,12 @@ def _member_problems(file, manifest):
     kinds = {"tick_ns": ("a whole number of ns above 0", lambda value: _is_count(value, 1) and value < 1 << 32), "end_reason": ("a text", is_text),
              "session_id": ("a text", is_text), "lost_ticks": ("a number of ticks", _is_count),
              "missed_before_start": ("a number of ticks", _is_count), "gaps": ("a list of gaps with first_index and count", are_gaps),
-             "start_ns": ("a time in ns", _is_count), "arms": ("1 or 2, which this version knows", lambda value: type(value) is int and value in (1, 2)),
+             "start_ns": ("a time in ns", _is_count), "parts": ("a number of files above 0", lambda value: _is_count(value, 1)), "repaired_by": ("a text", is_text),
+             "arms": ("1 or 2, which this version knows", lambda value: type(value) is int and value in (1, 2)),
              "volumes": ("a list of volumes with a spacing_mm above 0",
                          lambda volumes: isinstance(volumes, list) and volumes and all(map(_is_voxel, volumes)))}
     for key, (kind, fits) in kinds.items():
-        optional = key in ("start_ns", "arms")  # logs of earlier versions, or of one arm, lack them
+        optional = key in ("start_ns", "arms", "parts", "repaired_by")  # logs of earlier versions, or of one arm, lack them
         if not fits(manifest[key]) if key in manifest else not optional:
             shown = json.dumps(manifest[key], separators=(",", ":"))[:60] if key in manifest else "missing"
             yield f"{file}: {key} is {shown}, and not {kind}; copy the recording again"
@@ -161,7 +199,13 @@ def _text_problems(folder, manifest):
         yield f"{folder / 'manifest.json'}: its checksum is wrong: it was changed after the recorder wrote it; copy the recording again"
     for name in ("scene.json", "clock.npy"):
         wanted = manifest.get("files", {}).get(name)
-        if wanted is not None and wanted != (crc := f"{zlib.crc32(bytes_of(name)):08x}"):
+        if wanted is None or wanted == (crc := f"{zlib.crc32(content := bytes_of(name)):08x}"):
+            continue
+        # A recorder that was killed had written the row of the clock, but not yet its checksum.
+        rows = (len(content) - HEADER_BYTES[CLOCK]) // CLOCK.itemsize
+        before = header_of(CLOCK, rows - 1) + content[HEADER_BYTES[CLOCK]:-CLOCK.itemsize]
+        is_ahead = name == "clock.npy" and manifest["end_reason"] in ENDS_LATER and rows > 1 and content.startswith(header_of(CLOCK, rows))
+        if not is_ahead or wanted != f"{zlib.crc32(before):08x}":
             yield f"{folder / name}: its checksum is {crc}, and {wanted} in manifest.json; copy the recording again"
 
 

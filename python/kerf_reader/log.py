@@ -4,7 +4,7 @@ import pathlib
 
 import numpy as np
 
-from .check import opened, parts_of, problems
+from .check import HEADER_BYTES, header_of, opened, parts_of, problems
 from .layout import CLOCK, STARTED, TICK
 
 
@@ -13,8 +13,8 @@ def _rows_of(file, kind=TICK):
     with opened(file) as head:
         size = file.stat().st_size
         try:
-            version = np.lib.format.read_magic(head)
-            shape, by_columns, dtype = np.lib.format.read_array_header_1_0(head)
+            np.lib.format.read_magic(head)
+            shape, _, dtype = np.lib.format.read_array_header_1_0(head)
             rows = (size - head.tell()) // max(dtype.itemsize, 1)
             if rows < np.prod(shape, dtype=object):
                 raise ValueError
@@ -24,17 +24,15 @@ def _rows_of(file, kind=TICK):
         except Exception:  # each release of NumPy has its own, of which some are of its parser
             what = "is empty" if size == 0 else f"{size} bytes are no table of NumPy, or the file was cut"
             raise ValueError(f"{file}: {what}; record it again, or give the folder of another recording") from None
-    if dtype != kind or len(shape) != 1 or by_columns or version != (1, 0):
+        head.seek(0)
+        is_ours = len(shape) == 1 and head.read(HEADER_BYTES[kind]) == header_of(kind, shape[0])
+    if not is_ours:
         raise ValueError(f"{file}: no ticks of this version of kerf; give the folder of a recording, or use its kerf_reader")
     return np.memmap(file, kind, "r", offset, rows) if rows else np.empty(0, kind)
 
 
 def _all_rows_of(file):
-    parts = parts_of(file)
-    for number, path in enumerate(parts[1:], start=2):
-        if path.name != f"{file.name}.{number:04}":
-            raise ValueError(f"{file}.{number:04}: missing, and a later file of the log is there; copy the recording again")
-    rows = [_rows_of(path) for path in parts]
+    rows = [_rows_of(path) for path in parts_of(file)]
     return rows[0] if len(rows) == 1 else np.concatenate(rows)
 
 

@@ -5,7 +5,10 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <system_error>
+#include <utility>
+#include <vector>
 
 #include "record/input_rows.hpp"
 #include "record/kept_volumes.hpp"
@@ -24,16 +27,49 @@ bool is_below(const fs::path& name) {
   return name.is_relative() && std::ranges::find(name, "..") == name.end();
 }
 
-void check_listed_files(Findings& findings) {
+void check_listed_files(const SceneFacts& scene, bool is_final, Findings& findings) {
   const Json::Members& files = findings.files();
-  if (files.empty() || !is_of_whole_log(findings.manifest().end_reason)) return;
+  if (files.empty()) return;
   for (const auto& [name, sum] : files) {
     // The facts of these two are compared by each reader.
     if (name != kSceneName && name != kClockName && is_below(name)) findings.compare_file(name);
   }
-  for (const std::string& name : names_of_files(findings.folder(), true)) {
-    if (std::ranges::find(files, name, &Json::Member::key) != files.end()) continue;
+  std::vector<std::string> others;  // that a recorder which was killed had not listed yet
+  for (const SceneFacts::Volume& volume : scene.volumes) {
+    others.push_back(density_path({}, volume.density_hash));
+    others.push_back(labels_path({}, volume.density_hash));
+  }
+  if (is_final) others.clear();
+  for (const std::string& name : names_of_files(findings.folder())) {
+    if (name == kSceneName || name == kClockName ||
+        std::ranges::find(others, name) != others.end() ||
+        std::ranges::find(files, name, &Json::Member::key) != files.end()) {
+      continue;
+    }
     findings.add(one_line(name), "manifest.json does not list it", "; remove it");
+  }
+}
+
+/// Files with the name of a log that are none of this recording's.
+void check_other_logs(std::size_t arms, Findings& findings) {
+  const std::vector<fs::path> known = recording_files(findings.folder());
+  const auto is_of_log = [&](std::string_view name) {
+    return name.starts_with(kTickLogName) || name.starts_with(tick_log_name(1));
+  };
+  std::vector<std::string> others;
+  std::error_code fault;
+  for (fs::directory_iterator file(findings.folder(), fault), end; !fault && file != end;
+       file.increment(fault)) {
+    std::string name = file->path().filename().string();
+    const bool is_known = std::ranges::find(known, file->path()) != known.end() &&
+                          (arms > 1 || !name.starts_with(tick_log_name(1)));
+    if (is_of_log(name) && !is_known) others.push_back(std::move(name));
+  }
+  std::ranges::sort(others);
+  for (const std::string& name : others) {
+    findings.add(one_line(name),
+                 "no file of this log, of " + std::to_string(arms) + (arms == 1 ? " arm" : " arms"),
+                 "; remove it");
   }
 }
 
@@ -67,8 +103,9 @@ void check_inputs(std::size_t arms, Findings& findings) {
 
 }  // namespace
 
-void check_files(const SceneFacts& scene, std::size_t arms, Findings& findings) {
-  check_listed_files(findings);
+void check_files(const SceneFacts& scene, std::size_t arms, bool is_final, Findings& findings) {
+  check_listed_files(scene, is_final, findings);
+  check_other_logs(arms, findings);
   for (std::size_t v = 0; v < scene.volumes.size(); ++v)
     check_volume(scene.volumes[v], v, findings);
   check_inputs(arms, findings);

@@ -10,6 +10,7 @@ namespace kerf {
 
 /// Compares the files beside log and scene: those that the manifest lists with their checksums, the
 /// volumes of `scene` with their hashes, the inputs of the ticks before the log with their length.
-void check_files(const SceneFacts& scene, std::size_t arms, Findings& findings);
+/// Names those that no recording has. `is_final`: a recorder ended it, so the manifest lists all.
+void check_files(const SceneFacts& scene, std::size_t arms, bool is_final, Findings& findings);
 
 }  // namespace kerf

@@ -41,6 +41,11 @@ bool Findings::compare(const Json& object, std::string_view key, const std::stri
   return false;
 }
 
+bool Findings::lists(std::string_view name, std::string_view checksum) const {
+  const auto listed = std::ranges::find(files_, name, &Json::Member::key);
+  return listed != files_.end() && listed->value.canonical() == Json(checksum).canonical();
+}
+
 void Findings::compare_file(const std::string& name) {
   const auto listed = std::ranges::find(files_, name, &Json::Member::key);
   if (listed == files_.end()) return;

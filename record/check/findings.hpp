@@ -40,6 +40,8 @@ class Findings {
 
   /// The checksums of the other files, by name; empty in manifests of earlier versions.
   [[nodiscard]] const Json::Members& files() const noexcept { return files_; }
+  /// Whether the manifest has this checksum of a file.
+  [[nodiscard]] bool lists(std::string_view name, std::string_view checksum) const;
   /// Compares a file with its checksum in the manifest, if that has one.
   void compare_file(const std::string& name);
 

@@ -12,8 +12,10 @@
 #include "record/check/findings.hpp"
 #include "record/kept_volumes.hpp"
 #include "record/losses_of_rows.hpp"
+#include "record/manifest_seal.hpp"
 #include "record/recording.hpp"
 #include "record/scene_facts.hpp"
+#include "shared/posix/atomic_file.hpp"
 #include "shared/text/json.hpp"
 #include "shared/text/text.hpp"
 
@@ -36,6 +38,7 @@ class Check {
     check_end();
     for (std::size_t arm = 0; arm < out_.manifest.arms; ++arm) {
       logs_.emplace_back(folder_ / tick_log_name(arm));
+      check_parts(logs_.back(), arm);
       check_size(logs_.back(), arm);
     }
   }
@@ -70,7 +73,7 @@ class Check {
     }
   }
 
-  void files() { check_files(scene_, logs_.size(), findings_); }
+  void files() { check_files(scene_, logs_.size(), is_final(), findings_); }
 
   void manifest_text() { findings_.check_manifest_text(); }
 
@@ -148,8 +151,30 @@ class Check {
     const LogClock clock = read_clock(folder_, out_.manifest.has_clock);
     if (!clock.problem().empty()) {
       findings_.add_line(clock.problem());
-    } else if (is_final()) {
-      findings_.compare_file(std::string(kClockName));
+      return;
+    }
+    // The recorder writes the row first, and then its checksum.
+    const std::span<const ClockPair> rows = clock.pairs();
+    const bool is_a_row_ahead =
+        !is_final() && rows.size() > 1 && text_in(folder_ / kClockName) == clock_bytes(rows) &&
+        findings_.lists(kClockName, crc32_of_bytes(clock_bytes(rows.first(rows.size() - 1))));
+    if (!is_a_row_ahead) findings_.compare_file(std::string(kClockName));
+  }
+
+  /// The files of an arm's log by the manifest, which counts each as it begins.
+  void check_parts(const TickLogReader& log, std::size_t arm) {
+    const fs::path name = tick_log_name(arm);
+    const std::size_t files = files_of_log(folder_ / name), read = log.parts().size();
+    // Of an earlier version it counts none.
+    const std::size_t parts = json().contains("parts") ? out_.manifest.parts : read;
+    if (files < parts) {
+      findings_.add(part_of_log(name, files + 1), "missing, and the recorder had begun " +
+                                                      std::to_string(parts) + " files of this log");
+    } else if (files > parts && is_final()) {
+      findings_.add(part_of_log(name, parts + 1),
+                    "no file of this log, which has " + std::to_string(parts), "; remove it");
+    } else if (files > read && is_final()) {
+      findings_.add(part_of_log(name, read + 1), "cut in its header");
     }
   }
 

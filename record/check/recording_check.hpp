@@ -49,9 +49,10 @@ struct CheckedRecording {
 /// is no recording.
 [[nodiscard]] bool has_wrong_manifest(const std::filesystem::path& folder);
 
-/// Writes manifest.json anew from scene and rows, and what of the old one can be read. An old one
-/// is kept as manifest-old.json, and if there is one of that name, it stays. Throws `RecordError`
-/// if scene.json or the log cannot be read, `FileError` if the folder cannot be written.
+/// Writes manifest.json anew from scene and rows. What only the old one said (session, versions,
+/// how the run ended) is unknown then: nothing proves it. The old one is kept as manifest-old.json,
+/// and if there is one of that name, it stays. Throws `RecordError` if scene.json or the log cannot
+/// be read, `FileError` if the folder cannot be written.
 void repair_manifest(const std::filesystem::path& folder);
 
 }  // namespace kerf

@@ -8,9 +8,7 @@
 #include "record/check/recording_check.hpp"
 #include "record/kept_volumes.hpp"
 #include "record/losses_of_rows.hpp"
-#include "record/manifest_seal.hpp"
 #include "record/recorder.hpp"
-#include "record/recording.hpp"
 #include "record/scene_facts.hpp"
 #include "shared/posix/atomic_file.hpp"
 #include "shared/text/json.hpp"
@@ -24,32 +22,15 @@ namespace fs = std::filesystem;
 
 constexpr std::string_view kOldName = "manifest-old.json";
 
-/// Members of the old manifest whose value may be kept: nothing else says it.
-constexpr std::string_view kOnlyThere[] = {"kerf",     "compiler", "flags",      "cpu",
-                                           "build_id", "abi_hash", "session_id", "replay_of"};
-
-Json old_manifest(const fs::path& folder) {
-  try {
-    Json json = Json::parse(manifest_text(folder));
-    static_cast<void>(json.members());
-    return json;
-  } catch (const RecordError&) {
-  } catch (const JsonError&) {
-  }
-  return Json::Members{};
-}
-
 /// What the rows say, up to the first that is damaged.
 struct RowFacts {
   std::uint64_t rows = 0;
   std::uint64_t start_ns = 0;  ///< 0 in lock-step
   RecordLosses losses;
-  RecordSummary figures;
 };
 
-RowFacts row_facts(const fs::path& path, const Manifest& scene, std::string_view end_reason) {
+RowFacts row_facts(const fs::path& path, std::uint32_t tick_ns) {
   TickLogReader log(path);
-  SummaryBuilder figures(scene.tick_ns, scene.voxel_mm3);
   std::optional<LossesOfRows> losses;
   RowFacts out;
   out.rows = log.rows();
@@ -60,22 +41,14 @@ RowFacts row_facts(const fs::path& path, const Manifest& scene, std::string_view
     for (const TickRecord& record : std::span(chunk).first(count)) {
       if (!losses) {
         losses.emplace(record_index(record));
-        out.start_ns = record.start_ns == record.tick * scene.tick_ns ? 0 : record.start_ns;
+        out.start_ns = record.start_ns == record.tick * tick_ns ? 0 : record.start_ns;
       }
       losses->add(record);
-      figures.add(record);
     }
     row += count;
   }
   if (losses) out.losses = losses->as_losses(Recorder::kMaxGaps);
-  out.figures = figures.result(out.losses, end_reason);
   return out;
-}
-
-/// How the run ended: only the old manifest says it.
-std::string end_of(const Json& old) {
-  const bool says_it = old.contains("end_reason") && old.at("end_reason").is_text();
-  return says_it ? old.at("end_reason").get<std::string>() : std::string(kUnknownEnd);
 }
 
 /// The first manifest that is replaced stays beside it.
@@ -117,7 +90,6 @@ bool has_wrong_manifest(const fs::path& folder) {
 
 void repair_manifest(const fs::path& folder) {
   SceneFacts scene;
-  Manifest by_scene;
   try {
     scene = scene_facts(recorded_scene(folder));
   } catch (const JsonError&) {
@@ -128,13 +100,9 @@ void repair_manifest(const fs::path& folder) {
         ": has no rate, device or volumes, so no manifest can be made of it; copy the "
         "recording again");
   }
-  take_facts(scene, by_scene);
-  const Json old = old_manifest(folder);
+  // What only the old one said is not proved: its own checksum is wrong.
   Json manifest = Json::Members{};
   manifest["session_id"] = "0000000000000000";  // of no run
-  for (const std::string_view key : kOnlyThere) {
-    if (old.contains(key)) manifest[key] = old.at(key);
-  }
   manifest["repaired_by"] = KERF_VERSION;
   manifest["config_hash"] = scene.config_hash;
   manifest["tick_ns"] = *scene.tick_ns;
@@ -142,19 +110,14 @@ void repair_manifest(const fs::path& folder) {
   std::error_code none;
   if (fs::exists(folder / kClockName, none)) manifest["clock"] = kClockName;
   manifest["volumes"] = volumes_of(folder, scene);
-  if (by_scene.arms > 1) manifest["arms"] = by_scene.arms;
-  const std::string end_reason = end_of(old);
-  RowFacts first;
-  ArmSummaries figures;
-  for (std::size_t arm = 0; arm < by_scene.arms; ++arm) {
-    RowFacts facts = row_facts(folder / tick_log_name(arm), by_scene, end_reason);
-    figures.push_back(facts.figures);
-    if (arm == 0) first = std::move(facts);
+  if (*scene.arms > 1) {
+    manifest["arms"] = *scene.arms;
+    static_cast<void>(TickLogReader(folder / tick_log_name(1)));  // else it is not whole
   }
-  manifest["start_ns"] = first.start_ns;
-  if (!is_of_whole_log(end_reason)) figures.clear();
+  const RowFacts facts = row_facts(folder / kTickLogName, *scene.tick_ns);
+  manifest["start_ns"] = facts.start_ns;
   keep_old(folder);
-  write_with_end(folder, std::move(manifest), first.losses, first.rows, end_reason, figures);
+  write_with_end(folder, std::move(manifest), facts.losses, facts.rows, kUnknownEnd, {});
 }
 
 }  // namespace kerf

@@ -84,7 +84,8 @@ read or write are missing.
 | ticks, losses, figures | the rows | `rows`, `lost_ticks`, `missed_before_start`, `gaps`, `summary` |
 | content of the volumes | `volumes/` | `density_hash` of the scene, `initial_hash` |
 | all else, as session, versions, end | `manifest.json` | `crc32`, its last member: zlib's CRC-32 of all bytes before the comma in front of it |
-| bytes of the other files | themselves | `files` of the manifest: their CRC-32; until the recorder ends only that of `scene.json` |
+| bytes of the other files | themselves | `files` of the manifest: their CRC-32, of each since it was whole |
+| which files there are | the folder | `parts` of the manifest: files of the log that had begun; `files` |
 
 `crc32c` covers all of a row but `seq`. In a run `seq` is twice `tick`; only in a log of a watched replay, which rests at ticks without a
 record, it is less, and the difference never falls. So `seq` and `tick` rise from row to row, and a bit of `seq` that changed is found by
@@ -97,7 +98,12 @@ missing behind the count of the header, which are cut off, or lost ticks; and in
 facts that only the manifest has.
 
 A `manifest.json` that is lost or wrong is made anew by `./kerf record check DIR/log --repair` from scene and rows; the old one stays as
-`manifest-old.json`. What only that said is taken from it, or unknown.
+`manifest-old.json`. What only that said (session, versions, how the run ended) is unknown then, since nothing proves it, and `info` says
+who made the manifest anew.
+
+A recorder writes the manifest again when the volumes are on the disk, a file of the log begins or `clock.npy` gets a row, so a log whose
+recorder was killed is compared like any other. `check` also names each file in `volumes/`, `inputs/` or with the name of a log that is
+none of this recording.
 
 ## The energy from the other columns
 

@@ -17,6 +17,7 @@
 #include "shared/posix/stop_signals.hpp"
 #include "shared/segment/ros_messages.hpp"
 #include "shared/text/command_line.hpp"
+#include "shared/text/text.hpp"
 
 namespace kerf {
 namespace {
@@ -107,6 +108,9 @@ class InfoCommand : public ReadingCommand {
     const RecordSummary& summary = figures[arm()];
     const LogClock clock = read_clock(folder_, checked.manifest.has_clock);
     const std::string date = first_date(clock);
+    if (const std::string& by = checked.manifest.repaired_by; !by.empty()) {
+      std::cout << "manifest            made anew by kerf " << one_line(by) << '\n';
+    }
     if (checked.manifest.arms > 1) std::cout << "arm                 " << arm() + 1 << " of 2\n";
     std::cout << "date                " << shown(date, clock) << '\n' << to_text(summary);
     report_clock(folder_, clock);

@@ -59,6 +59,10 @@ class ArmLogs final : public TickSink {
     first_->file.sync();
   }
   [[nodiscard]] std::uint64_t rows() const noexcept { return first_->file.rows(); }
+  /// Rows that no power cut takes away any more.
+  [[nodiscard]] std::uint64_t synced() const noexcept { return first_->file.synced(); }
+  /// Files that each arm's log has begun.
+  [[nodiscard]] std::size_t parts() const noexcept { return first_->file.parts(); }
   /// Of each arm.
   [[nodiscard]] ArmSummaries summaries(const RecordLosses& losses, std::string_view reason) const;
 

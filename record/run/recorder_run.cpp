@@ -5,10 +5,13 @@
 #include <cmath>
 #include <iostream>
 #include <optional>
+#include <stdexcept>
 #include <string_view>
 #include <thread>
+#include <utility>
 
 #include "record/log_clock.hpp"
+#include "record/manifest_seal.hpp"
 #include "record/recorder.hpp"
 #include "record/recording.hpp"
 #include "record/run/arm_logs.hpp"
@@ -52,12 +55,14 @@ class Recording {
         lead_->allow(recorder_.next() + reader().info().state_slots / 2);
       const std::uint64_t lost = recorder_.losses().lost;
       const std::uint64_t got = recorder_.poll();
-      if (const std::uint64_t more = recorder_.losses().lost - lost; more > 0) {
+      const std::uint64_t more = recorder_.losses().lost - lost;
+      if (more > 0) {
         std::cerr << "kerf-recorder: GAP: " << ticks_text(more)
                   << " overwritten before they were read\n";
+      }
+      if (const bool is_dated = clock_.follow(); is_dated || more > 0 || has_new_files()) {
         manifest(kStillRunning);
       }
-      clock_.follow();
       if (Clock::now() >= next_sync) {
         logs_.sync();
         next_sync = Clock::now() + kSyncPeriod;
@@ -74,15 +79,40 @@ class Recording {
   }
 
   void manifest(std::string_view reason) const {
+    if (!is_of_whole_log(reason)) {
+      const Json files = files_so_far();
+      const std::uint64_t rows = reason == kStillRunning ? logs_.synced() : logs_.rows();
+      write_manifest(out_, reader().info(), recorder_.losses(), rows, reason, {}, &files);
+      return;
+    }
     ArmSummaries summaries;
     // On a full disk, rows were summed up that are not in the log.
-    if (whole_ && is_of_whole_log(reason)) summaries = logs_.summaries(recorder_.losses(), reason);
+    if (whole_) summaries = logs_.summaries(recorder_.losses(), reason);
     write_manifest(out_, reader().info(), recorder_.losses(), logs_.rows(), reason, summaries);
   }
   [[nodiscard]] std::uint64_t rows() const noexcept { return logs_.rows(); }
   [[nodiscard]] const Recorder& recorder() const noexcept { return recorder_; }
 
  private:
+  /// Whether the manifest lacks files that have begun since it was written.
+  [[nodiscard]] bool has_new_files() {
+    const bool has_volumes = volumes_.done();
+    const std::size_t parts = logs_.parts();
+    return std::exchange(lists_volumes_, has_volumes) != has_volumes ||
+           std::exchange(listed_parts_, parts) != parts;
+  }
+
+  /// The checksums of the files that are whole. That of clock.npy is of its rows until now.
+  [[nodiscard]] Json files_so_far() const {
+    Json files = Json::Members{};
+    for (const std::string_view name : {kClockName, kSceneName}) {
+      files[name] = crc32_of_file(out_ / name);
+    }
+    if (!volumes_.done()) return files;
+    for (const auto& [name, checksum] : volumes_.checksums().members()) files[name] = checksum;
+    return files;
+  }
+
   [[nodiscard]] const SegmentReader& reader() const noexcept { return connection_.reader(); }
 
   std::filesystem::path out_;
@@ -93,6 +123,8 @@ class Recording {
   bool whole_;  ///< all rows went through `logs_`
   std::optional<TickLead> lead_;
   StartingVolumes volumes_;
+  bool lists_volumes_ = false;  ///< in the manifest
+  std::size_t listed_parts_ = 1;
 };
 
 void write_report(const std::filesystem::path& path, const Recorder& recorder, std::uint64_t rows,
@@ -124,7 +156,7 @@ int run_recorder(const RecorderOptions& options, const std::atomic<bool>& stop) 
             << (options.split.empty() ? "" : ", in a new file each " + options.split) << std::endl;
   try {
     recording.run(stop);
-  } catch (const RecordError&) {
+  } catch (const std::runtime_error&) {  // RecordError or FileError
     // The rows so far stay readable. The manifest of a full disk may stay that of the beginning.
     try {
       recording.manifest(kNoRoom);

@@ -298,7 +298,13 @@ class TestCheck(unittest.TestCase):
                 self.assertEqual((code, wrong), (0, ""))
                 self.assertIn("manifest.json: made anew", said)
                 self.assertEqual(figures(log)[0], 0)
-                self.assertEqual(figures(log)[1].replace("unknown", "clean end"), was[1])
+                anew, info = figures(log)[1].split("\n", 1)
+                self.assertRegex(anew, r"^manifest +made anew by kerf [0-9.]+")
+                self.assertEqual(info.replace("unknown", "clean end"), was[1])
+                # What only the old one said is not proved.
+                manifest = json.loads(path.read_text())
+                self.assertEqual((manifest["session_id"], manifest["end_reason"]), ("0" * 16, "unknown"))
+                self.assertFalse({"kerf", "compiler", "build_id", "abi_hash", "summary"} & manifest.keys())
                 self.assertEqual(figures(log)[2], was[2])
                 if kerf_reader:
                     kerf_reader.Log(log)

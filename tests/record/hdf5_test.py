@@ -203,7 +203,7 @@ end
         self.assertIn("no.such", export(self.log, self.folder / "no.such/x.h5", code=2))
         shutil.copy(self.log / "ticks.npy", damaged)
         (damaged / "scene.json").write_bytes(b"\xff\xfe")
-        self.assertIn("no JSON", export(damaged, none, code=2))
+        self.assertIn("no JSON", export(damaged, none, code=1))
         self.assertEqual(list(self.folder.glob("*.new-*")) + list(self.folder.glob("none*")), [])
 
     def test_a_cut_log_gives_what_it_has_and_says_so(self):

@@ -2,8 +2,10 @@
 """A run that tests record: controller, emulator and recorder in lock-step."""
 import json
 import os
+import signal
 import struct
 import subprocess
+import time
 import zlib
 
 
@@ -64,3 +66,38 @@ def record(root, programs, folder, scene, seconds, *options, flight=False, fault
         program.wait(timeout=60)
     assert controller.returncode == 0 or fault
     return json.loads(report.read_text())
+
+
+def record_killed(root, programs, folder, scene, hands, *recorder, parts=1, rows=1500):
+    """The log, `folder`/log, of a recorder that is killed in a run, after its manifest has the volumes, its log at least so many files and
+    that one some rows. hands: of an Omni, or of an Omni and a Touch, each with options of its emulator."""
+    name, log = f"killed-{folder.name}", folder / "log"
+    os.mkfifo(lead := folder / "lead")
+    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    others = [subprocess.Popen([programs / "kerf-recorder", "--name", name, "--out", log, "--lead", lead, *recorder], **quiet)]
+    ports = []
+    for number, hand in enumerate(hands):
+        device = folder / f"device-{number}"
+        ports += ["--port", f"socket:{device}"]
+        others.append(subprocess.Popen([programs / "kerf-emulator", "--lockstep", "--rate", "1000", "--socket", device, "--hand",
+                                        root / "scenes/hands" / hand, *hands[hand]], **quiet))
+    others.append(subprocess.Popen([programs / "kerf-controller", "--scene", scene, "--virtual", "--until", lead, "--name", name,
+                                    "--seconds", "1000", "--torque-scale", ",".join(["0.05,0.05,0.05", "1,1,1"][:len(hands)]), *ports], **quiet))
+    last = log / ("ticks.npy" if parts == 1 else f"ticks.npy.{parts:04}")
+    try:
+        give_up = time.monotonic() + 20
+        while time.monotonic() < give_up and others[0].poll() is None:
+            try:
+                lists = json.loads((log / "manifest.json").read_text())
+                if last.stat().st_size > 4096 + 496 * rows and len(lists["files"]) > 2:
+                    others[-1].send_signal(signal.SIGSTOP)  # the run: the recorder writes down what there is
+                    if lists["parts"] == len(list(log.glob("ticks.npy*"))):
+                        break
+            except (OSError, ValueError):
+                pass
+            time.sleep(0.001)
+    finally:
+        for program in others:
+            program.kill()
+            program.wait()
+    return log

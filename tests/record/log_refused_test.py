@@ -94,10 +94,15 @@ class TestLogRefused(unittest.TestCase):
 
     def test_takes_parts_by_number(self):
         log = self.copy()
-        for number in [*range(2, 10001), 10002]:
-            (log / f"ticks.npy.{number:04}").touch()
-        with self.assertRaisesRegex(ValueError, "ticks.npy.10001: missing, and a later file"):
+        count = (len(self.rows) - HEADER) // 496
+        (log / "ticks.npy.0002").write_bytes(self.rows[:HEADER].replace(b"(%d,), }" % count, b"(0,), }".ljust(len(str(count)) + 6)))
+        for number in [*range(3, 10001), 10002]:
+            os.link(log / "ticks.npy.0002", log / f"ticks.npy.{number:04}")
+        line = f"{log / 'ticks.npy.10001'}: missing, or cut in its header, and ticks.npy.10002 is there; copy the recording again"
+        with self.assertRaises(ValueError) as raised:
             Log(log)
+        done = subprocess.run([BIN / "kerf-record", "info", log], capture_output=True, text=True)
+        self.assertEqual((str(raised.exception), done.stderr), (line, f"kerf-record: {line}\n"))
 
 
 if __name__ == "__main__":

@@ -118,11 +118,14 @@ REPORTS = [
         ("tick_ns, start_ns", "ns", "length of a tick; when the run began, CLOCK_MONOTONIC; 0 in lock-step"),
         ("scene, clock", "", "file with the scene; file with the date, missing if there is none"),
         ("volumes", "", "each with `size_vox`, `spacing_mm`, `initial_hash`"),
-        ("rows, lost_ticks, missed_before_start, end_reason", "", "as above; `end_reason` is `running` until the end, `no room` if the disk was full, `unknown` if the manifest was made anew"),
+        ("rows, lost_ticks, missed_before_start, end_reason", "", "as above; `end_reason` is `running` until the end, `no room` if the disk was full, `unknown` if the manifest was made anew. Such a one has "
+         "`repaired_by`, the version of kerf that made it, no versions of controller and recorder, and 0 for `session_id`"),
+        ("parts", "", "files of the log of each device that had begun; above 1 with `--split`"),
         ("gaps", "", "each with `first_index` and `count`"),
         ("arms", "", "2: the run had two devices, and there is `ticks-2.npy`; missing with one"),
         ("summary, summary_2", "", "what `record info` shows, of all rows, of the first and the second device; missing if the recorder was killed before"),
-        ("files", "", "CRC-32 of the other files, by name, 8 hexadecimal digits; of `scene.json` alone until the recorder ends. Behind all, "
+        ("files", "", "CRC-32 of the other files, by name, 8 hexadecimal digits; until the recorder ends of those that are whole, and of `clock.npy` "
+         "as it was when the manifest was written. Behind all, "
          "`crc32`: of this file, up to the comma before that member ([the log](log.md))")]),
     ("Summary of a log", "`./kerf record info LOG --report FILE`.",
      [("record/manifest.cpp", "void for_each_figure("), ("record/recording.cpp", "std::string to_json(")], [], [
