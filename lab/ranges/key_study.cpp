@@ -107,6 +107,16 @@ struct KeyFactors {
     }
     return out;
   }
+  /// The factors of covering rows, in which a key stands only if its condition is met. Refers to
+  /// this object.
+  [[nodiscard]] Factors of_rows() const {
+    return {.level_counts = level_counts,
+            .rare = rare,
+            .deciding = deciding,
+            .may = [this](const Levels& row, std::size_t factor, int) {
+              return counts(*rows[factor]->levels.key, texts(row));
+            }};
+  }
   /// Gives up the key that a refusal names, else a key by chance of `turn`. Returns false if
   /// nothing is left.
   bool give_up(const std::string& refusal, std::size_t turn, Levels& row) const {
@@ -242,12 +252,7 @@ std::vector<KeyRow> study_keys(const StudySize& effort, const StudyEvents& event
 PairRows study_pairs(const std::vector<KeyRow>& keys, const StudySize& effort,
                      const StudyEvents& events) {
   const KeyFactors factors(keys);
-  const Factors all{.level_counts = factors.level_counts,
-                    .rare = factors.rare,
-                    .deciding = factors.deciding,
-                    .may = [&](const Levels& row, std::size_t factor, int) {
-                      return counts(*factors.rows[factor]->levels.key, factors.texts(row));
-                    }};
+  const Factors all = factors.of_rows();
   const SceneFolder folder;
   PairRows out;
   PairTable table(factors.level_counts);

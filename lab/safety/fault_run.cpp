@@ -122,6 +122,53 @@ Effect effect_of(const DeviceFault& fault) {
   return {};
 }
 
+/// The controller's loop with its guards; their clock is the emulator's.
+class GuardedLoop {
+ public:
+  explicit GuardedLoop(VirtualLoop& loop) : loop_(loop), watchdog_(loop.driver(), signals_) {}
+
+  /// From here on the motors are off, and the next tick is the last one.
+  void ask_to_end() {
+    is_asked_to_end_ = true;
+    loop_.driver().stay_released();
+  }
+  [[nodiscard]] bool is_asked_to_end() const { return is_asked_to_end_; }
+  [[nodiscard]] bool has_ended() const { return has_ended_; }
+
+  /// The watchdog's look, if one is due at this bus cycle, counted from any.
+  void look(std::uint64_t cycle, std::int64_t now_ns) {
+    if (cycle % cycles_per_look_ == 0) watchdog_.look(now_ns);
+  }
+
+  /// A tick that is due; a late host misses it.
+  void tick(std::int64_t now_ns, bool host_is_late) {
+    if (host_is_late) {
+      ++missed_;
+      return;
+    }
+    const DeviceReport report = loop_.driver().read();
+    apply_missed(std::exchange(missed_, 0), loop_.servo());
+    static_cast<void>(recover(signals_, standstill_.stood_still(now_ns), loop_.servo()));
+    const ServoOutput output = loop_.servo().step(report);
+    send_tick(std::span(&output, 1), signals_, loop_.driver());
+    ++signals_.heartbeat;
+    if (!is_asked_to_end_) return;
+    has_ended_ = true;
+    loop_.driver().release_for_good();
+  }
+
+ private:
+  VirtualLoop& loop_;
+  std::atomic<bool> stop_{false};
+  LoopSignals signals_{stop_};
+  Watchdog watchdog_;
+  StandstillWatch standstill_;
+  std::uint64_t cycles_per_look_ =
+      static_cast<std::uint64_t>(cycles_of(std::chrono::duration<double>(kWatchdogPeriod).count()));
+  std::uint32_t missed_ = 0;  ///< ticks
+  bool is_asked_to_end_ = false, has_ended_ = false;
+};
+
 double end_of(const FaultScript& script) {
   double end_s = 0;
   for (const DeviceFault& fault : script.faults) {
@@ -195,16 +242,8 @@ FaultOutcome run_faults(const FaultCase& subject, const FaultScript& as_written)
   WatchedPort port(wire, contract, time_ms);
   VirtualLoop loop(scene, wire, port);
 
-  // The guards of the controller's loop; their clock is the emulator's.
-  std::atomic<bool> stop{false};
-  LoopSignals signals{stop};
-  Watchdog watchdog(loop.driver(), signals);
-  StandstillWatch standstill;
-  const auto cycles_per_look =
-      static_cast<std::uint32_t>(cycles_of(std::chrono::duration<double>(kWatchdogPeriod).count()));
+  GuardedLoop controller(loop);
   double first_push_ms = -1;
-  bool is_asked_to_end = false, has_ended = false;
-  std::uint32_t missed = 0;  // ticks
   std::uint64_t begun_before_end = 0;
   // A service does not show a servo that is ready: the emulated hand begins 2 s later.
   const std::int64_t cycles = cycles_of(script.seconds + (subject.by_service ? 2 : 0));
@@ -220,30 +259,15 @@ FaultOutcome run_faults(const FaultCase& subject, const FaultScript& as_written)
     contract.cycle(time_ms, {emulator.model().motor_force_n(), emulator.model().docked()});
     if (first_push_ms < 0 && outcome.pushed) first_push_ms = time_ms;
     const auto now_ns = static_cast<std::int64_t>(time_ms * 1e6);
-    if (!is_asked_to_end && subject.stop_s && first_push_ms >= 0 &&
+    if (!controller.is_asked_to_end() && subject.stop_s && first_push_ms >= 0 &&
         time_ms >= first_push_ms + later_ms(script) + *subject.stop_s * 1000) {
-      is_asked_to_end = true;
       begun_before_end = device.begun();
       contract.asked_to_end(time_ms);
-      loop.driver().stay_released();
+      controller.ask_to_end();
     }
-    if (has_ended) continue;
-    if ((static_cast<std::uint64_t>(cycle) + script.seed) % cycles_per_look == 0)
-      watchdog.look(now_ns);
-    if (!due) continue;
-    if (device.host_is_late()) {
-      ++missed;
-      continue;
-    }
-    const DeviceReport report = loop.driver().read();
-    apply_missed(std::exchange(missed, 0), loop.servo());
-    static_cast<void>(recover(signals, standstill.stood_still(now_ns), loop.servo()));
-    const ServoOutput output = loop.servo().step(report);
-    send_tick(std::span(&output, 1), signals, loop.driver());
-    ++signals.heartbeat;
-    if (!is_asked_to_end) continue;
-    has_ended = true;
-    loop.driver().release_for_good();
+    if (controller.has_ended()) continue;
+    controller.look(static_cast<std::uint64_t>(cycle) + script.seed, now_ns);
+    if (due) controller.tick(now_ns, device.host_is_late());
   }
   constexpr double kGraceMs = 50;
   // Of faults that may hide each other only this is demanded: if they amount to none, it goes on.
