@@ -66,71 +66,103 @@ struct NoStabiliser {
   }
 };
 
-/// Runs the loop with the servo's own ledger, limits, velocity and order of the output stage
-/// (docs/theory.md 5.4); the device between two ticks by its exact solution.
+/// The servo's side of a `PortLoop`: the servo's own ledger, limits, velocity and order of the
+/// output stage (docs/theory.md 5.4). `loop` and `stabiliser` outlive it.
 template <class N, class Stabiliser>
-[[nodiscard]] PortLoopRun run_port_loop(const PortLoop& loop, const Stabiliser& stabiliser) {
+class PortServo {
+ public:
   using Real = typename N::Real;
-  const auto up = [](double y) { return DeviceVec<Real>{Real(0), static_cast<Real>(y), Real(0)}; };
-  const auto mj = [](typename N::Energy energy) {
+
+  PortServo(const PortLoop& loop, const Stabiliser& stabiliser)
+      : loop_(loop),
+        stabiliser_(stabiliser),
+        limits_{.peak_n = Real(3.3),
+                .continuous_n = Real(0.88),
+                .slew_n_per_tick = Real(500 / loop.rate_hz),
+                .thermal_per_tick = typename N::Ratio(0.1 / loop.rate_hz)},
+        velocity_{.rate_hz = static_cast<std::int32_t>(loop.rate_hz),
+                  .stride = std::max(1, static_cast<std::int32_t>(loop.rate_hz) / 1000),
+                  .noise_mm = Real(loop.quantum_mm / 2)},
+        last_mm_(up(loop.start_mm)) {
+    window_.start(last_mm_);
+  }
+
+  /// One tick at `seen_mm`, the encoder's position. Returns the force that is sent, up.
+  double step(double seen_mm) {
+    const DeviceVec<Real> at_mm = up(seen_mm), moved_mm = at_mm - last_mm_;
+    last_mm_ = at_mm;
+    ledger_.move(sent_n_, moved_mm, 1);
+    window_.take(at_mm, 1);
+    const bool leaves = dot(sent_n_, moved_mm) > Real(0);
+    const auto spring_n =
+        up(loop_.stiffness_n_per_mm * std::max(0.0, -static_cast<double>(at_mm.y)));
+    const auto limited = [&](DeviceVec<Real> force_n, ThermalState<N>& heat) {
+      return loop_.limits ? limited_force(limits_, heat, force_n, sent_n_, leaves) : force_n;
+    };
+    ThermalState<N> heated = thermal_;
+    const auto limited_n = limited(spring_n, heated);
+    const auto steady_n =
+        stabiliser_.step({limited_n, sent_n_, moved_mm, 1, window_.velocity(velocity_),
+                          ledger_.total_mj(), spring_n.y > Real(0)},
+                         state_);
+    sent_n_ = steady_n == limited_n ? limited_n : limited(steady_n, thermal_);
+    if (steady_n == limited_n) thermal_ = heated;
+    const ForceParts<N> parts{.contact = true,
+                              .spring = spring_n,
+                              .limits = limited_n - spring_n + (sent_n_ - steady_n),
+                              .stabiliser = steady_n - limited_n};
+    ledger_.split(parts);
+    ledger_.send(parts);
+    return static_cast<double>(sent_n_.y);
+  }
+
+  [[nodiscard]] double port_mj() const { return mj(ledger_.total_mj()); }
+  [[nodiscard]] double port_minimum_mj() const { return mj(ledger_.lowest_mj()); }
+  /// Of `passivity`; 0 for a stabiliser without an account.
+  [[nodiscard]] double account_mj() const {
+    if constexpr (requires(typename Stabiliser::State state) { state.account_mj; }) {
+      return mj(state_.account_mj);
+    } else {
+      return 0;
+    }
+  }
+
+ private:
+  static DeviceVec<Real> up(double y) { return {Real(0), static_cast<Real>(y), Real(0)}; }
+  static double mj(typename N::Energy energy) {
     return N::kIsFixed ? static_cast<double>(energy) / kEnergyStepsPerMj
                        : static_cast<double>(energy);
-  };
-  const ForceLimits<N> limits{.peak_n = Real(3.3),
-                              .continuous_n = Real(0.88),
-                              .slew_n_per_tick = Real(500 / loop.rate_hz),
-                              .thermal_per_tick = typename N::Ratio(0.1 / loop.rate_hz)};
-  const VelocityPlan<N> velocity{
-      .rate_hz = static_cast<std::int32_t>(loop.rate_hz),
-      .stride = std::max(1, static_cast<std::int32_t>(loop.rate_hz) / 1000),
-      .noise_mm = Real(loop.quantum_mm / 2)};
+  }
+
+  const PortLoop& loop_;
+  const Stabiliser& stabiliser_;
+  ForceLimits<N> limits_;
+  VelocityPlan<N> velocity_;
+  ThermalState<N> thermal_;
+  EnergyLedger<N> ledger_;
+  VelocityWindow<N> window_;
+  typename Stabiliser::State state_;
+  DeviceVec<Real> sent_n_{}, last_mm_;
+};
+
+/// Runs the loop; the device between two ticks by its exact solution.
+template <class N, class Stabiliser>
+[[nodiscard]] PortLoopRun run_port_loop(const PortLoop& loop, const Stabiliser& stabiliser) {
   const double period_s = 1 / loop.rate_hz, m = loop.mass_kg, b = loop.damping_ns_per_m;
   const double decay = std::exp(-b / m * period_s);
   const auto ticks = static_cast<int>(std::lround(loop.seconds * loop.rate_hz));
 
   PortLoopRun run;
-  ThermalState<N> thermal;
-  EnergyLedger<N> ledger;
-  VelocityWindow<N> window;
-  typename Stabiliser::State state;
-  DeviceVec<Real> sent_n{}, last_mm = up(loop.start_mm);
-  window.start(last_mm);
+  PortServo<N, Stabiliser> servo(loop, stabiliser);
   double y_mm = loop.start_mm, v_mm_per_s = 0;
   for (int tick = 0; tick < ticks; ++tick) {
-    const double seen =
+    const double seen_mm =
         loop.quantum_mm > 0 ? std::floor(y_mm / loop.quantum_mm) * loop.quantum_mm : y_mm;
-    const DeviceVec<Real> at_mm = up(seen), moved_mm = at_mm - last_mm;
-    last_mm = at_mm;
-    ledger.move(sent_n, moved_mm, 1);
-    window.take(at_mm, 1);
-    const bool leaves = dot(sent_n, moved_mm) > Real(0);
-    const auto spring_n =
-        up(loop.stiffness_n_per_mm * std::max(0.0, -static_cast<double>(at_mm.y)));
-    const auto limited = [&](DeviceVec<Real> force_n, ThermalState<N>& heat) {
-      return loop.limits ? limited_force(limits, heat, force_n, sent_n, leaves) : force_n;
-    };
-    ThermalState<N> heated = thermal;
-    const auto limited_n = limited(spring_n, heated);
-    const auto steady_n =
-        stabiliser.step({limited_n, sent_n, moved_mm, 1, window.velocity(velocity),
-                         ledger.total_mj(), spring_n.y > Real(0)},
-                        state);
-    sent_n = steady_n == limited_n ? limited_n : limited(steady_n, thermal);
-    if (steady_n == limited_n) thermal = heated;
-    const ForceParts<N> parts{.contact = true,
-                              .spring = spring_n,
-                              .limits = limited_n - spring_n + (sent_n - steady_n),
-                              .stabiliser = steady_n - limited_n};
-    ledger.split(parts);
-    ledger.send(parts);
-
+    run.force_n.push_back(servo.step(seen_mm));
     run.at_mm.push_back(y_mm);
-    run.force_n.push_back(static_cast<double>(sent_n.y));
     run.peak_n = std::max(run.peak_n, std::abs(run.force_n.back()));
-    if constexpr (requires { state.account_mj; }) {
-      run.lowest_account_mj = std::min(run.lowest_account_mj, mj(state.account_mj));
-    }
-    run.least_total_mj = std::min(run.least_total_mj, mj(ledger.total_mj()) + run.damped_mj);
+    run.lowest_account_mj = std::min(run.lowest_account_mj, servo.account_mj());
+    run.least_total_mj = std::min(run.least_total_mj, servo.port_mj() + run.damped_mj);
     run.diverged = std::abs(y_mm) > loop.longest_mm;
     if (run.diverged) break;
 
@@ -143,8 +175,8 @@ template <class N, class Stabiliser>
     y_mm += moved;
     run.damped_mj += force_n * moved + m / 2000 * (v * v - v_mm_per_s * v_mm_per_s);
   }
-  run.port_mj = mj(ledger.total_mj());
-  run.port_minimum_mj = mj(ledger.lowest_mj());
+  run.port_mj = servo.port_mj();
+  run.port_minimum_mj = servo.port_minimum_mj();
   return run;
 }
 
