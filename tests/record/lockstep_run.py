@@ -8,6 +8,13 @@ import subprocess
 import time
 import zlib
 
+CRC32C = []
+for index in range(256):
+    value = index
+    for _ in range(8):
+        value = value >> 1 ^ (0x82F63B78 if value & 1 else 0)
+    CRC32C.append(value)
+
 
 def sealed(manifest):
     """The text of a manifest with its checksum, as a recorder writes it."""
@@ -18,9 +25,7 @@ def sealed(manifest):
 def crc32c(data):
     crc = 0xFFFFFFFF
     for byte in data:
-        crc ^= byte
-        for _ in range(8):
-            crc = crc >> 1 ^ (0x82F63B78 if crc & 1 else 0)
+        crc = crc >> 8 ^ CRC32C[(crc ^ byte) & 0xFF]
     return crc ^ 0xFFFFFFFF
 
 

@@ -12,6 +12,7 @@
 #include "record/input_rows.hpp"
 #include "shared/numeric/energy_source.hpp"
 #include "shared/segment/connection.hpp"
+#include "shared/segment/replica_writer.hpp"
 #include "tests/segment/segment_support.hpp"
 #include "tests/support/temporary_folder.hpp"
 
@@ -63,6 +64,23 @@ template <class Visit>
 void for_each_input(const std::filesystem::path& folder, Tick last, std::size_t arms, Visit visit) {
   InputReader reader(folder, last, arms);
   for (auto tick = reader.next(); !tick.empty(); tick = reader.next()) visit(tick);
+}
+
+/// A run of another machine, with a volume of one brick.
+[[nodiscard]] inline MirrorSpec mirror_spec(std::uint32_t arms = 1) {
+  VolumeDescriptor volume{};
+  volume.nx = volume.ny = volume.nz = 8;
+  volume.log2_brick = kBrickLog2;
+  volume.bits_per_voxel = 16;
+  volume.bricks_x = volume.bricks_y = volume.bricks_z = volume.brick_count = 1;
+  for (double& mm : volume.spacing_mm) mm = 0.1;
+  volume.orientation[3] = 1;
+  MirrorSpec spec;
+  spec.arms = arms;
+  spec.session_id = 1;
+  spec.tick_ns = 1'000'000;
+  spec.volumes = {volume};
+  return spec;
 }
 
 inline void publish_tick(SegmentWriter& writer, const TickRecord& record) {

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "record/recorder.hpp"
 
-#include "shared/segment/replica_writer.hpp"
 #include "tests/record/record_support.hpp"
 
 using namespace kerf;
@@ -72,18 +71,7 @@ TEST_CASE("ticks overwritten before the recorder came are not its loss") {
 }
 
 TEST_CASE("of another machine's run a recorder takes what came, and counts what did not as lost") {
-  VolumeDescriptor volume{};
-  volume.nx = volume.ny = volume.nz = 8;
-  volume.log2_brick = kBrickLog2;
-  volume.bits_per_voxel = 16;
-  volume.bricks_x = volume.bricks_y = volume.bricks_z = volume.brick_count = 1;
-  for (double& mm : volume.spacing_mm) mm = 0.1;
-  volume.orientation[3] = 1;
-  MirrorSpec spec;
-  spec.session_id = 1;
-  spec.tick_ns = 1'000'000;
-  spec.volumes = {volume};
-  ReplicaWriter mirror = ReplicaWriter::create(spec);
+  ReplicaWriter mirror = ReplicaWriter::create(mirror_spec());
   const auto come = [&mirror](std::uint64_t index) {
     mirror.put_record(index, made_up_tick(index + 1, 1000));
   };

@@ -17,7 +17,6 @@
 #include "record/run/recorder_run.hpp"
 #include "record/run/tick_window.hpp"
 #include "shared/posix/report_tool.hpp"
-#include "shared/segment/replica_writer.hpp"
 #include "shared/segment/server.hpp"
 #include "tests/json.hpp"
 #include "tests/record/record_support.hpp"
@@ -120,19 +119,7 @@ TEST_CASE("two arms are two logs of the same rows, and a gap in either is a gap 
 }
 
 TEST_CASE("a tick of which another machine brought one arm only is in no log") {
-  VolumeDescriptor volume{};
-  volume.nx = volume.ny = volume.nz = 8;
-  volume.log2_brick = kBrickLog2;
-  volume.bits_per_voxel = 16;
-  volume.bricks_x = volume.bricks_y = volume.bricks_z = volume.brick_count = 1;
-  for (double& mm : volume.spacing_mm) mm = 0.1;
-  volume.orientation[3] = 1;
-  MirrorSpec spec;
-  spec.session_id = 1;
-  spec.tick_ns = 1'000'000;
-  spec.arms = 2;
-  spec.volumes = {volume};
-  ReplicaWriter mirror = ReplicaWriter::create(spec);
+  ReplicaWriter mirror = ReplicaWriter::create(mirror_spec(2));
   for (std::uint64_t index = 20; index < 30; ++index) {
     const TickRecord first = made_up_tick(index + 1, 1000);
     if (index != 20 && index != 24) mirror.put_record(index, second_tick(first), 1);

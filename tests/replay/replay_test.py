@@ -20,22 +20,9 @@ import unittest
 ROOT, BIN, LIBM = (pathlib.Path(sys.argv.pop(1)).resolve() for _ in range(3))
 sys.path[:0] = [str(ROOT / "tests/record"), str(ROOT / "tests/support")]
 import lack
-from lockstep_run import record
+from lockstep_run import crc32c, record
 
 HEADER = 4096  # bytes before the first row
-CRC32C = []
-for index in range(256):
-    value = index
-    for _ in range(8):
-        value = value >> 1 ^ (0x82F63B78 if value & 1 else 0)
-    CRC32C.append(value)
-
-
-def crc32c(data):
-    crc = 0xFFFFFFFF
-    for byte in data:
-        crc = crc >> 8 ^ CRC32C[(crc ^ byte) & 0xFF]
-    return crc ^ 0xFFFFFFFF
 
 
 def replay(log, *options, code=0, libm=None):

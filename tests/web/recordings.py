@@ -11,7 +11,7 @@ import subprocess
 import sys
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / 'record'))
-from lockstep_run import record  # noqa: E402
+from lockstep_run import crc32c, record  # noqa: E402
 
 HEADER, ROW = 4096, 496  # bytes before the first row, and of one
 
@@ -20,15 +20,6 @@ def demo(root, programs, to, scene, seconds):
     """A run of ./kerf demo; its recording is in `to`/log."""
     subprocess.run([root / 'kerf', 'demo', '--headless', '--virtual', '--seconds', str(seconds), '--scene', scene, '--out', to], check=True,
                    stdout=subprocess.DEVNULL, env=os.environ | {'KERF_BIN': str(programs)})
-
-
-def crc32c(data):
-    crc = 0xFFFFFFFF
-    for byte in data:
-        crc ^= byte
-        for _ in range(8):
-            crc = crc >> 1 ^ (0x82F63B78 if crc & 1 else 0)
-    return crc ^ 0xFFFFFFFF
 
 
 class Recordings:
