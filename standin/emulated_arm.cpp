@@ -3,10 +3,12 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <chrono>
 #include <cmath>
 #include <stdexcept>
 #include <string>
 #include <system_error>
+#include <thread>
 #include <utility>
 
 #include <poll.h>
@@ -47,12 +49,14 @@ EmulatedArm::EmulatedArm(const Settings& settings, const DeviceSettings& device,
   }
 }
 
-EmulatedArm::EmulatedArm(const Settings& settings, const Pose& still, Ledger& ledger) noexcept
+EmulatedArm::EmulatedArm(const Settings& settings, const DeviceSettings& device, const Pose& still,
+                         Ledger& ledger) noexcept
     : ledger_(ledger),
       closed_(true),
       is_still_(true),
       hand_waits_(settings.hand_waits),
-      lockstep_(settings.lockstep) {
+      lockstep_(settings.lockstep),
+      report_hz_(device.rate_hz) {
   history_[newest_] = still;
   known_ = 1;
 }
@@ -161,7 +165,10 @@ void EmulatedArm::take_packet(std::span<const std::uint8_t> bytes) noexcept {
 }
 
 void EmulatedArm::command(DeviceVec<double> force_n, bool on, bool ready) noexcept {
-  if (closed_) return;
+  if (closed_) {
+    if (lockstep_) std::this_thread::sleep_for(std::chrono::duration<double>(1 / report_hz_));
+    return;
+  }
   CartesianCommand command;
   command.force_mn = {cartesian::packed_n(force_n.x), cartesian::packed_n(force_n.y),
                       cartesian::packed_n(force_n.z)};
@@ -180,6 +187,11 @@ void EmulatedArm::command(DeviceVec<double> force_n, bool on, bool ready) noexce
   if (!lockstep_) return;
   ++silent_ticks_;
   static_cast<void>(take(kPatienceMs));
+}
+
+void EmulatedArm::count_command(double wanted_n) noexcept {
+  if (closed_ && !is_still_) return;
+  ledger_.record_force_n(wanted_n);
 }
 
 const Pose* EmulatedArm::oldest_within(double window_s) const noexcept {

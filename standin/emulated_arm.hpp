@@ -48,15 +48,19 @@ class EmulatedArm {
   EmulatedArm(const Settings& settings, const DeviceSettings& device, Ledger& ledger,
               Follow follow = {});
   /// No arm, but one pose for ever; commands go nowhere.
-  EmulatedArm(const Settings& settings, const Pose& still, Ledger& ledger) noexcept;
+  EmulatedArm(const Settings& settings, const DeviceSettings& device, const Pose& still,
+              Ledger& ledger) noexcept;
   EmulatedArm(const EmulatedArm&) = delete;
   EmulatedArm& operator=(const EmulatedArm&) = delete;
   ~EmulatedArm();
 
   /// Takes in the reports that wait. Never waits.
   void refresh() noexcept;
-  /// Sends a force in N; one that is not finite is 0.
+  /// Sends a force in N; one that is not finite is 0. In lock-step without an emulator that has the
+  /// next tick, waits for as long as a tick of the device lasts.
   void command(DeviceVec<double> force_n, bool on, bool ready) noexcept;
+  /// Counts a force that the program commands, in N; none after the emulator has ended.
+  void count_command(double wanted_n) noexcept;
 
   [[nodiscard]] const Pose& pose() const noexcept { return history_[newest_]; }
   /// Mean velocity over the poses of the last `window_s`, mm/s; empty with fewer than two of them.

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <cstdio>
 #include <deque>
 #include <exception>
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "standin/claim.hpp"
 #include "standin/ledger.hpp"
@@ -16,9 +16,9 @@
 namespace kerf::standin {
 
 /// Prints one line on the standard error, as the vendors' libraries have no other place for it.
-inline void complain(const std::string& library, const std::string& line) noexcept {
-  std::fprintf(stderr, "kerf stand-in %s: %s\n", library.c_str(), line.c_str());
-}
+/// Control characters and bytes that are no UTF-8, which a program's name of a device may have, are
+/// written as in C.
+void complain(const std::string& library, std::string_view line) noexcept;
 
 /// A device that the library may open: its settings, its counts, and the right to use it.
 struct Device {

@@ -152,15 +152,27 @@ void read(std::string_view whole, Settings& settings) {
   }
 }
 
+/// The name of device `number` of its kind, from 1 on, or of the next number whose name no device
+/// of the kind has. ./kerf stand-in gives the same ones.
+std::string free_name(const Settings& settings, Personality kind, std::size_t number) {
+  const auto is_taken = [&](const std::string& name) {
+    return std::ranges::any_of(settings.devices, [&](const DeviceSettings& device) {
+      return device.kind == kind && device.name == name;
+    });
+  };
+  const std::string first(kind == Personality::touch ? kDefaultDevice : kDefaultOmega);
+  for (;; ++number) {
+    std::string name = number == 1 ? first : first + ' ' + std::to_string(number);
+    if (!is_taken(name)) return name;
+  }
+}
+
 /// Gives names to devices without one, and checks what holds between devices of a kind.
 void finish(Settings& settings) {
-  std::array<int, kPersonalityWords.size()> numbers{};
+  std::array<std::size_t, kPersonalityWords.size()> numbers{};
   for (DeviceSettings& device : settings.devices) {
-    const int number = ++numbers[static_cast<std::size_t>(device.kind)];
-    if (device.name.empty()) {
-      device.name = kDefaultDevice;
-      if (number > 1) device.name += ' ' + std::to_string(number);
-    }
+    const std::size_t number = ++numbers[static_cast<std::size_t>(device.kind)];
+    if (device.name.empty()) device.name = free_name(settings, device.kind, number);
     for (const DeviceSettings& other : settings.devices) {
       if (&other == &device) break;
       if (other.kind != device.kind) continue;

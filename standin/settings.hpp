@@ -21,6 +21,7 @@ inline constexpr std::size_t kMostDevices = 4;
 
 /// The name of HD's default device.
 inline constexpr std::string_view kDefaultDevice = "Default Device";
+inline constexpr std::string_view kDefaultOmega = "omega.3";
 
 /// One emulated device.
 struct DeviceSettings {

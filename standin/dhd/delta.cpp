@@ -99,7 +99,7 @@ int Delta::set_force(DeviceVec<double> force_n) noexcept {
   }
   const double wanted_n = length_of(force_n);
   const bool is_force = wanted_n > kNothingN;
-  ledger_.record_force_n(wanted_n);
+  arm_.count_command(wanted_n);
   if (mode_ == Mode::idle && !settings_.force_needs_enable) {
     set_mode(Mode::force, Cause::none);
     enabled_by_force_ = true;
@@ -212,7 +212,7 @@ void Delta::step_regulator(double dt_s) noexcept {
   }
   const double peak_n = force_figures(Personality::omega).peak_n;
   const double wanted_n = length_of(force_n);
-  ledger_.record_force_n(wanted_n);
+  arm_.count_command(wanted_n);
   if (wanted_n > peak_n) {
     if (!regulates_position) ledger_.add(Row::excess);  // the program's own force, not a spring's
     force_n = force_n * (peak_n / wanted_n);

@@ -35,7 +35,7 @@ Touch::Touch(const standin::Settings& settings, standin::Device& device, ErrorSt
       errors_(errors),
       handle_(handle),
       serial_("KERF" + std::to_string(device.number)),
-      arm_(is_locked_out ? standin::EmulatedArm(settings, pose_of_zeros(), ledger_)
+      arm_(is_locked_out ? standin::EmulatedArm(settings, device.settings, pose_of_zeros(), ledger_)
                          : standin::EmulatedArm(
                                settings, device.settings, ledger_,
                                [this](standin::Pose& now, double dt_s) { follow(now, dt_s); })),
@@ -108,7 +108,7 @@ void Touch::end_frame() noexcept {
   ledger_.add(Row::frames);
   last_force_n_ = wanted_force();
   const double wanted_n = standin::length_of(last_force_n_);
-  ledger_.record_force_n(wanted_n);
+  arm_.count_command(wanted_n);
   if (!force_output_ && wanted_n > kNothingN) ledger_.add(Row::output_off);
   output_n_ = force_output_ ? limited(last_force_n_) : DeviceVec<double>{};
   if (!runs_) send();

@@ -6,7 +6,7 @@ import sys
 import unittest
 import xml.etree.ElementTree
 
-from devices_case import DHD, HD, Devices
+from devices_case import DHD, HD, PYTHON, Devices
 from stand_in_case import ROOT, Case
 
 TOUCHES = ["--device", "touch", "--vendor-name", "Left", "--device", "touch", "--vendor-name", "Right"]
@@ -217,6 +217,18 @@ class Names(Case):
 
 
 class BadInput(Case):
+    def test_a_name_that_is_no_text_is_told_in_plain_characters(self):
+        program = self.file("name.py", """
+import ctypes
+hd = ctypes.CDLL("libHD.so")
+hd.hdInitDevice.argtypes = [ctypes.c_char_p]
+for name in b"L\\xff\\n", b"\\x1b[31m", b"\\xed\\xa0\\x80", b"\\xc0\\xaf", b"\\xe2\\x82", "Z\u00e4hne \U0001f9b7".encode():
+    hd.hdInitDevice(name)
+""")
+        _, _, said = self.run_command(*PYTHON, program)
+        for name in (r"L\xff\n", r"\x1b[31m", r"\xed\xa0\x80", r"\xc0\xaf", r"\xe2\x82", "Z\u00e4hne \U0001f9b7"):
+            self.assertIn(f"kerf stand-in libHD: {name}: no such device; open NULL", said)
+
     def test_devices_that_cannot_be_together_are_one_line(self):
         for options, word in ((["--device", "touch"] * 5, "at most 4 devices"),
                               (["--vendor-name", "L", "--device", "touch", "--device", "touch"], "--vendor-name L: two devices"),

@@ -70,11 +70,26 @@ TEST_CASE("each socket begins a device, with the keys behind it as its own") {
       std::tie(settings.devices[0], settings.devices[1], settings.devices[2], settings.devices[3]);
   CHECK((a.socket == "/a" && a.name == "Left Device" && a.ledger == "/la"));
   CHECK((b.socket == "/b" && b.name == "Default Device 2" && b.ledger == "/lb"));
-  CHECK((c.kind == kerf::Personality::omega && c.rate_hz == 4000 && c.name == "Default Device"));
-  CHECK((d.kind == kerf::Personality::omega && d.rate_hz == 1000 && d.name == "Default Device 2"));
+  CHECK((c.kind == kerf::Personality::omega && c.rate_hz == 4000 && c.name == "omega.3"));
+  CHECK((d.kind == kerf::Personality::omega && d.rate_hz == 1000 && d.name == "omega.3 2"));
   CHECK(settings.ledger == "/l");
   CHECK(settings.lockstep);
   CHECK(settings.drop_on_stop);
+}
+
+TEST_CASE("a device without a name gets the next that no device of its kind has") {
+  const auto names = [](std::string_view text) {
+    std::string all;
+    for (const auto& device : standin::parse_settings(text).devices) all += device.name + ", ";
+    return all;
+  };
+  CHECK(names("socket:a,name=Default Device 2,socket:b") == "Default Device 2, Default Device 3, ");
+  CHECK(names("socket:a,socket:b,name=Default Device") == "Default Device 2, Default Device, ");
+  CHECK(names("socket:a,socket:b,socket:c,name=Default Device 2") ==
+        "Default Device, Default Device 3, Default Device 2, ");
+  CHECK(names("socket:a,name=omega.3,socket:b,device=omega") == "omega.3, omega.3, ");
+  CHECK(names("socket:a,device=omega,name=omega.3 2,socket:b,device=omega") ==
+        "omega.3 2, omega.3 3, ");
 }
 
 TEST_CASE("devices that one program cannot have are refused by the part that says so") {
@@ -85,7 +100,7 @@ TEST_CASE("devices that one program cannot have are refused by the part that say
       "KERF_STAND_IN: 'name=L'; two devices of a kind have it; give each its own";
   CHECK(refusal_of("socket:a,name=L,socket:b,name=L") == twice);
   CHECK(refusal_of("socket:a,name=L,socket:b,device=omega,name=L") == "accepted");
-  CHECK(refusal_of("socket:a,socket:b,name=Default Device") != "accepted");
+  CHECK(refusal_of("socket:a,name=L,socket:b,name=R,socket:c,name=L") == twice);
   CHECK(refusal_of("socket:a,rate=500,socket:b,rate=1000") ==
         "KERF_STAND_IN: 'rate=1000'; one servo thread serves all of a program");
   CHECK(refusal_of("socket:a,device=omega,rate=500,socket:b,device=omega") == "accepted");

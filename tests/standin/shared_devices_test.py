@@ -54,6 +54,26 @@ dhd.dhdClose(0)
 assert asked("dhd.dhdClose(0)") == "2 1 0 0 -1 -1".split()
 dhd.dhdClose(1)
 """
+# A locked-out Touch ("pose") has no emulator to wait for: a tick of it lasts as long as one of the device.
+LOCKED_OUT = HD + """
+import time
+ask = '''
+import sys, time
+exec(sys.stdin.read())
+assert hd.hdInitDevice(None) == 0
+hd.hdStartScheduler()
+began = time.monotonic()
+ticks(300, lambda: None)
+took = time.monotonic() - began
+hd.hdStopScheduler()
+print(took)
+'''
+hd.hdInitDevice(None)
+done = subprocess.run([sys.executable, "-c", ask], input=sys.argv[2], capture_output=True, text=True)
+hd.hdDisableDevice(0)
+assert done.returncode == 0, done.stderr
+open(sys.argv[1], "w").write(done.stdout)
+"""
 # A child by fork has all open files of its parent, and sleeps while the parent closes and opens its devices.
 FORKED = HD + DHD.replace("def position(", "def position_m(") + """
 def child(work):
@@ -130,6 +150,11 @@ class Processes(Devices):
                          (0, {("omega omega.3 2", "left_open")}), said)  # the one that was killed
         self.assertEqual([(one["of"], one["what"], one["count"]) for one in report["notes"]], [("omega omega.3", "in_use", 2)])
         self.assertIn("note: omega omega.3: 2 times that a program", said)
+
+    def test_a_tick_of_a_touch_that_is_locked_out_waits(self):
+        out = str(self.folder / "out.json")
+        _, _, got, said = self.run_program(LOCKED_OUT, out, HD, options=["--switch", "in-use=pose"])
+        self.assertGreaterEqual(got, 0.299, said)  # of 1000 a second
 
     def test_a_child_by_fork_keeps_no_device_that_its_parent_has_closed(self):
         code, report, _, said = self.run_program(FORKED, options=["--device", "touch", "--device", "omega"])

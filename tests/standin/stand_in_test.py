@@ -190,6 +190,29 @@ finally:
         found = set(self.misuse(json.loads(report.read_text())))
         self.assertEqual((found - {"stalls"}, runs.exists(), by.read_text()), (set(), False, "15"))  # the machine may be busy
 
+    def test_frames_after_the_end_of_the_devices_time_are_no_commands(self):
+        program = self.file("longer.py", """
+import ctypes, signal
+signal.signal(signal.SIGINT, signal.SIG_IGN)
+hd = ctypes.CDLL("libHD.so")
+hd.hdScheduleAsynchronous.restype = ctypes.c_ulong
+hd.hdInitDevice(None)
+left = [700]
+def tick(_data):
+    hd.hdBeginFrame(0)
+    hd.hdEndFrame(0)
+    left[0] -= 1
+    return 1 if left[0] else 0
+callback = ctypes.CFUNCTYPE(ctypes.c_uint, ctypes.c_void_p)(tick)
+hd.hdStartScheduler()
+hd.hdWaitForCompletion(ctypes.c_ulong(hd.hdScheduleAsynchronous(callback, None, 1)), 1)
+hd.hdStopScheduler()
+hd.hdDisableDevice(0)
+""")
+        _, report, said = self.run_command("/usr/bin/python3", "-B", program, options=["--seconds", "0.5"])
+        self.assertEqual(report["deadlines"]["ticks"], 700, said)
+        self.assertLessEqual(report["force"]["commands"], 501, said)
+
     def test_a_program_for_another_device_is_told(self):
         code, report, _, said = self.run_client("hd_client.py", "spring", 10, ["--device", "omega"])
         self.assertEqual((code, self.misuse(report)), (1, ["not_opened"]))
