@@ -260,17 +260,49 @@ void check_columns(const MapSpec& map) {
   throw HilError("no column of this map can exist: " + why);
 }
 
+/// The axes of a picture by the text of --map. Throws HilError.
+std::array<std::size_t, 2> mapped_axes(const std::string& map) {
+  const std::size_t comma = map.find(',');
+  if (comma == std::string::npos) {
+    throw HilError("--map: " + map + ": two axes make a map; give such as damping,stiffness");
+  }
+  const std::array<std::size_t, 2> mapped{axis_named("--map", map.substr(0, comma)),
+                                          axis_named("--map", map.substr(comma + 1))};
+  if (mapped[0] == mapped[1]) throw HilError("--map: " + map + ": the same axis twice; give two");
+  return mapped;
+}
+
+/// Throws HilError for a law that cannot run in the loop of the map, one axis or the whole arm.
+void check_laws(const MapSpec& spec) {
+  for (const std::string& law : spec.table[index_of(AxisId::law)]) {
+    if (!spec.arm && law == "paper") {
+      throw HilError("--law: paper is a force of the whole arm; add --arm, or leave it out");
+    }
+    if (law == "paper" && spec.table[index_of(AxisId::damping)] != AxisValues{"0"}) {
+      throw HilError("--law: paper has no damping; add --damping 0");
+    }
+    if (!spec.arm || (law != "linear" && law != "two_sided")) continue;
+    throw HilError("--law: " + law + " is a wall of one axis alone; leave it or --arm out");
+  }
+}
+
+/// Throws HilError for a low-pass with an estimator that has none behind it.
+void check_filters(const MapSpec& spec) {
+  for (const Assignment& values : spec.columns()) {
+    const std::string estimator = value_of(values, AxisId::estimator);
+    if (value_of(values, AxisId::filter) == "0" || estimator == "difference") continue;
+    throw HilError(
+        "--filter: " + estimator +
+        (estimator.starts_with("difference/")
+             ? " sets its low-pass itself; leave one of the two out"
+             : " has no low-pass behind it; add --estimator difference, or leave it out"));
+  }
+}
+
 MapSpec Command::spec() const {
   MapSpec spec;
-  const std::size_t comma = map_.find(',');
-  if (comma == std::string::npos) {
-    throw HilError("--map: " + map_ + ": two axes make a map; give such as damping,stiffness");
-  }
-  spec.mapped = {axis_named("--map", map_.substr(0, comma)),
-                 axis_named("--map", map_.substr(comma + 1))};
-  if (spec.mapped[0] == spec.mapped[1]) {
-    throw HilError("--map: " + map_ + ": the same axis twice; give two");
-  }
+  spec.mapped = mapped_axes(map_);
+  spec.arm = arm_;
   std::array<std::string, kAxisCount> texts = axes_;
   for (const AxisId axis : {AxisId::loop, AxisId::quantum, AxisId::limits}) {
     if (!arm_ || texts[index_of(axis)].empty()) continue;
@@ -291,16 +323,7 @@ MapSpec Command::spec() const {
   for (std::size_t i = 0; i < kAxisCount; ++i) {
     if (!texts[i].empty()) spec.table[i] = axis_values(static_cast<AxisId>(i), texts[i]);
   }
-  for (const std::string& law : spec.table[index_of(AxisId::law)]) {
-    if (!arm_ && law == "paper") {
-      throw HilError("--law: paper is a force of the whole arm; add --arm, or leave it out");
-    }
-    if (law == "paper" && spec.table[index_of(AxisId::damping)] != AxisValues{"0"}) {
-      throw HilError("--law: paper has no damping; add --damping 0");
-    }
-    if (!arm_ || (law != "linear" && law != "two_sided")) continue;
-    throw HilError("--law: " + law + " is a wall of one axis alone; leave it or --arm out");
-  }
+  check_laws(spec);
   for (const std::size_t axis : spec.mapped) {
     if (axis == kAxisCount || !spec.table[axis].empty()) continue;
     throw HilError(std::string("--map: the axis ") + axis_kinds()[axis].name +
@@ -309,16 +332,7 @@ MapSpec Command::spec() const {
   spec.stiffness_n_per_mm = stiffness_values(!stiffness_.empty() ? stiffness_
                                              : quick_            ? "0.05:50:25"
                                                                  : "0.05:50:40");
-  for (const Assignment& values : spec.columns()) {
-    const std::string estimator = value_of(values, AxisId::estimator);
-    if (value_of(values, AxisId::filter) == "0" || estimator == "difference") continue;
-    throw HilError(
-        "--filter: " + estimator +
-        (estimator.starts_with("difference/")
-             ? " sets its low-pass itself; leave one of the two out"
-             : " has no low-pass behind it; add --estimator difference, or leave it out"));
-  }
-  spec.arm = arm_;
+  check_filters(spec);
   // No verdict depends on a shorter limit: the run that decides it is always followed.
   constexpr double kCurveS = 3;
   spec.seconds = portraits_.empty() ? std::max(seconds_, kLimitS)
