@@ -183,3 +183,55 @@ TEST_CASE("a file has the normals of the gradient that was chosen") {
   CHECK(written(GradientFilter::central) != written(GradientFilter::adaptive));
   CHECK(written(GradientFilter::farid5) != written(GradientFilter::corners));
 }
+
+TEST_CASE(
+    "after cuts in unequal voxels a picture is one made anew, and differs in its marked tiles "
+    "alone") {
+  if (!have_gl()) return;
+  const View view = look_at({9, 14, 17}, {}, 15, 35);
+  const RenderTarget before(kTestSize), after(kTestSize);
+  for (const glm::dvec3& edges_mm : {glm::dvec3(0.2, 0.2, 0.5), glm::dvec3(1.1, 0.2, 0.3)}) {
+    const auto count = [](double edge_mm) { return static_cast<int>(10.0 / edge_mm); };
+    const VoxelGrid grid{count(edges_mm.x), count(edges_mm.y), count(edges_mm.z)};
+    for (const std::string_view kind : renderer_kinds()) {
+      CAPTURE(std::string(kind));
+      CAPTURE(edges_mm.x);
+      TestVolume volume(grid, centred(grid, edges_mm), ball({}, 4.2, 0.5));
+      const SceneView scene = scene_of({&volume});
+      const VolumeContent content = volume.content();
+      const auto renderer = make_renderer(kind, scene, {&content, 1});
+      Drawn last = draw(*renderer, view, before);
+      std::mt19937 random(5);
+      int changed = 0, kept = 0;
+      for (int cut = 0; cut < 6; ++cut) {
+        const VoxelBox box = fill_random_box(volume, cut % 3 == 2 ? 60000 : 0, random);
+        renderer->update(0, volume.density, changed_in(volume.view.bricks, box));
+        if (renderer->translucent()) {
+          before.bind();  // rays end at nothing
+          glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
+        }
+        RedrawTiles tiles(kTestSize);
+        renderer->mark_redraw(0, {volume.view, view, before}, tiles);
+        renderer->forget_changes();
+        const Drawn now = draw(*renderer, view, after);
+        const Drawn anew = draw(*make_renderer(kind, scene, {&content, 1}), view, after);
+        CHECK(now.rgb == anew.rgb);
+        int missed = 0;
+        for_each_pixel(view, [&](std::size_t at, const PixelRay&) {
+          const auto x = static_cast<int>(at) % kTestSize.width;
+          const int up = kTestSize.height - 1 - static_cast<int>(at) / kTestSize.width;
+          const bool marked = tiles.marked(x / RedrawTiles::kEdge, up / RedrawTiles::kEdge);
+          const bool differs =
+              !std::equal(&now.rgb[3 * at], &now.rgb[3 * at] + 3, &last.rgb[3 * at]);
+          missed += differs && !marked ? 1 : 0;
+          changed += differs ? 1 : 0;
+          kept += marked ? 0 : 1;
+        });
+        CHECK(missed == 0);
+        last = draw(*renderer, view, before);
+      }
+      CHECK(changed > 100);
+      CHECK(kept > 300);
+    }
+  }
+}
