@@ -62,7 +62,8 @@ def is_turned_by_mouse_fingers_and_keys(case):
 
     pictures = [moves('a drag', lambda: page.drag([(x, y), (x + 40, y), (x + 60, y - 20)])),
                 moves('a drag with shift', lambda: page.drag([(x, y), (x + 40, y)], modifiers=8)),
-                moves('the wheel', lambda: page.mouse('mouseWheel', x, y, deltaX=0, deltaY=-200))]
+                moves('the wheel', lambda: (page.evaluate("document.getElementById('picture').focus()"),
+                                            page.mouse('mouseWheel', x, y, deltaX=0, deltaY=-200)))]
     page.size(WIDTH, HEIGHT, touch=True)
 
     def pinch():

@@ -18,8 +18,7 @@ from served import served  # noqa: E402
 LEFT, RIGHT, MIDDLE = 1, 2, 4
 NAMES = {LEFT: 'left', RIGHT: 'right', MIDDLE: 'middle'}
 PINCHES = 100
-REMOVED = """parseFloat([...document.querySelectorAll('#run-figures dt')].find(e => e.textContent === 'density removed')
-  ?.nextSibling.textContent ?? 'NaN')"""
+REMOVED = 'parseFloat(document.body.dataset.removedMm3)'
 PRESSED = """globalThis.pressedAt = []; globalThis.held = false;
   Worker.prototype.postMessage = (f => function (message, ...more) {
     if ('lead' in message || 'release' in message) held = message.lead?.[2] === true;

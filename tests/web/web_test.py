@@ -74,7 +74,7 @@ def cuts_by_a_pointer(page, address, touch):
     check(page.until("document.body?.dataset.run === 'runs' && document.body.dataset.state === 'live'", 120), 'the tab has a run')
     x, y, width, height = page.box('#picture')
     middle = x + width / 2, y + height / 2
-    figure = "parseFloat([...document.querySelectorAll('#run-figures dt')].find(e => e.textContent === 'density removed')?.nextSibling.textContent)"
+    figure = 'parseFloat(document.body.dataset.removedMm3)'
     led = "document.body.dataset.handLed === 'true'"
     check(page.until(led, 90), 'the hand waits to be led')
     before = page.evaluate(figure)

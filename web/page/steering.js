@@ -13,6 +13,8 @@ const kStillMs = 1000;      // a mouse that hovers so long without a move has le
 // events that came meanwhile, with the second finger's among them, are taken between the two timers.
 const kAloneMs = 120, kLastTurnMs = 10;
 
+const sizeOf = ({clientWidth, clientHeight}) => `${clientWidth} x ${clientHeight}`;
+
 /** What is held down belongs to the tool or to the camera from the first button or finger to the last one that goes up. A
  * press is the tool's: it ends with its button, with a view that moves (shift, another button, a second finger, keys), and
  * when its end may not be told (capture lost, cancelled, page out of focus or hidden). Then it is to be pressed anew. */
@@ -21,6 +23,7 @@ export class Steering {
   constructor(page, worker) {
     Object.assign(this, {page, worker, on: false, fingersPress: true, at: null, presses: false, depth: null,
       pressedIn: '',   // the view in which the press began
+      atIn: '',        // the size of the picture in which `at` is a pixel
       alone: 0,        // counts the fingers that came alone
       leader: null});  // {type, heldDown, atMs}: the kind of pointer that leads the tool
     this.owner = {};   // of what is held down, by kind of pointer: 'tool', 'camera'; none: nothing is
@@ -99,19 +102,36 @@ export class Steering {
   }
   wheel(event) {
     if (event.ctrlKey || event.shiftKey) return this.presses && this.spend();
-    if (this.depth === null) return;
+    if (this.depth === null || !this.page.stage.entered) return;
     event.preventDefault();
     event.stopPropagation();
     const pixels = event.deltaMode === 0 ? event.deltaY : event.deltaY * 33;
     this.send(-pixels / kWheelPixels * kWheelMm * this.scale());
   }
   follow(event, presses) {
-    this.at = [event.offsetX, event.offsetY];
+    this.leadTo([event.offsetX, event.offsetY]);
     if (!presses) this.pressedIn = '';
     const ends = this.presses && !presses;
     this.presses = presses;
     this.leader = {type: event.pointerType, heldDown: (event.buttons & 1) !== 0, atMs: performance.now()};
     if (!this.send() && ends) this.letGo();
+  }
+  /** So many mm to the right, up and deeper from where it leads, or else from where the tool is; `heldDown`: a key still is. */
+  leadByKeys([right, up, deeper], heldDown) {
+    if (this.leader && this.leader.type !== 'keys' && (this.leader.type === 'touch' || this.leader.heldDown)) return;
+    const seen = this.seenTool();
+    if (!seen) return this.letGo();
+    const {pixel, pixelsPerMm} = seen;
+    const [x, y] = this.at ?? pixel;
+    const {clientWidth: wide, clientHeight: high} = this.page.stage.canvas;
+    this.leadTo([clamp(x + right * pixelsPerMm, 0, wide), clamp(y - up * pixelsPerMm, 0, high)]);
+    this.presses = this.owner.keys === 'tool';
+    if (!this.presses) this.pressedIn = '';
+    this.leader = {type: 'keys', heldDown, atMs: performance.now()};
+    this.send(deeper);
+  }
+  leadTo(pixel) {
+    Object.assign(this, {at: pixel, atIn: sizeOf(this.page.stage.canvas)});
   }
   /** What is held down, by this kind of pointer or all, is the tool's no more. */
   spend(kind = null) {
@@ -129,14 +149,26 @@ export class Steering {
   scale() {
     return this.page.heldNow()?.sceneJson?.device?.workspace_scale ?? 1;
   }
+  /** Where the tool is in the picture, and how many pixels a mm has there; null: it is not seen. */
+  seenTool() {
+    const {stage, now} = this.page;
+    if (!stage.scene || !now.record || !Number.isFinite(now.record.position_mm[0])) return null;
+    const {clientWidth: wide, clientHeight: high} = stage.canvas;
+    const [view] = stage.views(wide, high);
+    const [x, y, z] = transform(view.eyeFromWorld, add(now.record.position_mm, now.record.proxy_offset_mm));
+    if (!(z < 0)) return null;
+    const pixelsPerMm = high / (2 * view.tanHalfHeight * -z);
+    return {pixel: [wide / 2 + x * pixelsPerMm, high / 2 - y * pixelsPerMm], pixelsPerMm};
+  }
   /** The target of the hand for where the pointer is, and so much deeper than before. Returns whether there is one. */
   send(deeperMm = 0) {
     const {stage, now} = this.page;
     if (!this.at || !stage.scene || !now.record || !Number.isFinite(now.record.position_mm[0])) return false;
     const {clientWidth: wide, clientHeight: high} = stage.canvas;
+    if (this.atIn !== sizeOf(stage.canvas)) return this.spend(), true;  // what is there now, nobody pointed at
     const [view] = stage.views(wide, high);
     if (this.presses) {
-      const seenIn = [wide, high, ...view.eyeFromWorld].join();
+      const seenIn = view.eyeFromWorld.join();
       this.pressedIn ||= seenIn;
       if (this.pressedIn !== seenIn) return this.spend(), true;  // else the goal would go through the tooth with the view
     }

@@ -46,6 +46,10 @@ const kControls = `<legend>This run, in your browser</legend>
   <p id="run-state" role="status"></p>
   <dl id="run-figures"></dl>`;
 
+const kHow = element('how').textContent;
+const kHowMine = 'Arrow keys lead the tool, page up and page down take it deeper and back, the space bar pushes and cuts. ' +
+  'W, A, S and D turn the view, shift and arrow keys move it, plus and minus zoom.';
+
 function addControls() {
   const fields = document.createElement('fieldset');
   fields.id = 'run';
@@ -64,6 +68,7 @@ function addControls() {
   const keys = element('keys');
   keys.insertAdjacentHTML('afterbegin', `<dt>hand yours: pointer, one finger</dt><dd>lead the tool</dd>
     <dt>press</dt><dd>push and cut</dd><dt>wheel</dt><dd>tool nearer, farther</dd>
+    <dt>arrows, page up and down</dt><dd>lead the tool</dd><dt>space</dt><dd>push and cut</dd>
     <dt>right or shift drag, two fingers</dt><dd>the view, as below</dd>`);
 }
 
@@ -139,6 +144,7 @@ async function start(event) {
   state.replays = false;
   const {name, hand} = scenes.find(one => one.name === element('scene').value);
   const mine = isMine();
+  element('how').textContent = mine ? kHowMine : kHow;
   element('finger-row').style.display = mine && matchMedia('(any-pointer: coarse)').matches ? '' : 'none';
   element('run-state').textContent = 'loading the scene';
   document.body.dataset.run = 'loading';
@@ -175,11 +181,11 @@ function failed(text) {
 // -- What the worker says
 
 function showFacts(facts) {
+  document.body.dataset.removedMm3 = facts.removed_density_mm3.toFixed(3);  // the panel shows it, by material
   const number = (value, digits, unit) => `${value.toFixed(digits)} ${unit}`;
   const rows = [['servo time', number(facts.armed_ticks / facts.rate_hz, 1, 's')],
     ['times real time', facts.times_real_time.toFixed(2)],
     ['a tick takes', number(facts.us_a_tick, 0, 'µs')],
-    ['density removed', number(facts.removed_density_mm3, 3, 'mm³')],
     ['energy taken', number(facts.absorbed_mj, 2, 'mJ')],
     ...Object.entries(facts.energy_mj).filter(([, mj]) => Math.abs(mj) >= 0.005).map(([name, mj]) => [`· ${name}`, number(mj, 2, 'mJ')]),
     ['output hash', facts.output_hash]];
@@ -242,11 +248,12 @@ const says = {
 async function begin() {
   TabSocket.worker = state.worker;
   globalThis.WebSocket = TabSocket;
-  const {Steering} = await import('./steering.js');
+  const [{Steering}, {KeySteering}] = await Promise.all([import('./steering.js'), import('./key_steering.js')]);
   state.page = await import('./kerf.js');
   if (address.refused) refuse(address.refused);  // the link has said since that it waits
   if (!state.page.stage) return;
   state.steering = new Steering(state.page, state.worker);
+  new KeySteering(state.steering, element('picture'));
   state.steering.start(isMine() && !state.replays);
 }
 

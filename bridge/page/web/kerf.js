@@ -17,7 +17,8 @@ const element = id => document.getElementById(id);
 
 const plot = new Plot(element('plot'));
 const now = {record: null, second: null, frame: null, ended: false, newRun: 0, earlier: null, takenNs: null, lost: false,
-  beatMs: 0};  // the servo's last sign of life, by performance.now()
+  beatMs: 0,   // the servo's last sign of life, by performance.now()
+  wheelMs: -Infinity};  // a wheel over the picture that was not its own
 let stage = null, scene = null, held = null;
 // For a page around this one, as web/page/try.js.
 export {link, now, stage};
@@ -179,7 +180,7 @@ reset.addEventListener('click', () => {
 if (stage) {
   const toggled = id => element(id).click();
   listen(stage, {r: () => stage.home(), v: () => look.nextRenderer(), c: () => toggled('clip'),
-    t: () => toggled('stereo')});
+    t: () => toggled('stereo')}, () => now.wheelMs = performance.now());
 }
 // A token in the address has done its work once the page is here: a cookie holds it.
 if (location.search) history.replaceState(null, '', location.pathname + location.hash);

@@ -9,6 +9,7 @@ import {mainVolume} from './scene.js';
 import {defaultOpacity} from './transfer_function.js';
 
 const kNewRunMs = 4000;
+const kHintMs = 3000;
 const element = id => document.getElementById(id);
 
 /** A time as a person says it. */
@@ -43,7 +44,7 @@ const ofSecond = news => news && {...news, text: `Second arm: ${news.text}`};
 
 /** What is to be said large over the picture: {text, old, alarm}; null where there is nothing. `old`: by
  * how much the picture is, from `silentMs` since the servo's last sign of life. */
-export function bannerOf({record, second, frame, takenNs, ended, newRun, lost}, silentMs) {
+export function bannerOf({record, second, frame, takenNs, ended, newRun, lost, wheelMs}, silentMs) {
   const old = ` This picture is ${spanText(silentMs)} old.`;
   if (lost && takenNs !== null && !ended) return {text: 'No news from the bridge.', old, alarm: true};
   if (ended) {
@@ -58,6 +59,7 @@ export function bannerOf({record, second, frame, takenNs, ended, newRun, lost}, 
   const advice = adviceOf(record) ?? ofSecond(adviceOf(second));
   if (advice) return advice;
   if (newRun && performance.now() - newRun < kNewRunMs) return {text: 'A new run has begun.', alarm: false};
+  if (performance.now() - wheelMs < kHintMs) return {text: 'Click into the picture: then the wheel is its own.', alarm: false};
   return null;
 }
 

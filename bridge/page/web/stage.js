@@ -36,6 +36,7 @@ export class Stage {
     this.stale = true;
     this.hands = [];  // of each arm; null: it is not known where
     this.drawn = [];  // those of the last picture
+    this.entered = false;  // by a click or by key: the wheel is its own then, else it scrolls the page around it
     this.wanted = null;   // the view that the next scene begins with; null: its first one
     this.firstView = '';  // as the address has it
     canvas.addEventListener('webglcontextlost', event => {
@@ -241,12 +242,14 @@ export class Stage {
 const kKeyStep = 0.03;     // of the picture's height
 const kWheelPixels = 100;  // of a step
 
-/** Moves the camera of a stage; `on` has what other keys do, by key. */
-export function listen(stage, on) {
+/** Moves the camera of a stage; `on` has what other keys do, by key. `unheard` is called for a wheel that is not the picture's. */
+export function listen(stage, on, unheard) {
   const {canvas, camera} = stage;
   const pointers = new Map();
   const high = () => Math.max(canvas.clientHeight, 1);
 
+  for (const kind of ['pointerdown', 'focus']) canvas.addEventListener(kind, () => stage.entered = true);
+  for (const from of [canvas, window]) from.addEventListener('blur', () => stage.entered = false);
   canvas.addEventListener('pointerdown', event => {
     canvas.setPointerCapture(event.pointerId);
     pointers.set(event.pointerId, {x: event.clientX, y: event.clientY});
@@ -273,6 +276,7 @@ export function listen(stage, on) {
     stage.touch();
   });
   canvas.addEventListener('wheel', event => {
+    if (!stage.entered) return unheard();
     event.preventDefault();
     if (!stage.scene) return;
     const pixels = event.deltaMode === 0 ? event.deltaY : event.deltaY * 33;
@@ -284,6 +288,8 @@ export function listen(stage, on) {
     const move = (right, up) => event.shiftKey ? camera.pan(right, up) : camera.orbit(right, up);
     const moves = {ArrowLeft: () => move(-kKeyStep, 0), ArrowRight: () => move(kKeyStep, 0),
       ArrowUp: () => move(0, kKeyStep), ArrowDown: () => move(0, -kKeyStep),
+      a: () => camera.orbit(-kKeyStep, 0), d: () => camera.orbit(kKeyStep, 0),
+      w: () => camera.orbit(0, kKeyStep), s: () => camera.orbit(0, -kKeyStep),
       '+': () => camera.zoom(1), '=': () => camera.zoom(1), '-': () => camera.zoom(-1), ...on};
     const known = moves[event.key];
     if (!known) return;

@@ -2,7 +2,7 @@
 // The camera and what moves it: pointer, two fingers, wheel and keys over the picture.
 import assert from 'node:assert/strict';
 import test from 'node:test';
-import {Element} from './fake_page.mjs';
+import {Element, openPage, view} from './fake_page.mjs';
 import {ballScene, drawnAt, kDegree, near, seenAt} from './figures.mjs';
 import {clipFromEye, eyeViews, OrbitCamera, screenBounds, shownInEye} from './camera.js';
 
@@ -70,14 +70,16 @@ test('bounds on the screen hold all corners, from the lowest row, with a pixel o
 
 // -- What moves it
 
+openPage('<body></body>');
 const {listen} = await import('./stage.js');
 function rig() {
   const parent = new Element('section'), canvas = Object.assign(new Element('canvas'), {clientWidth: 800, clientHeight: 600});
   parent.append(canvas);
   const stage = {canvas, camera: camera(), scene: {}, touched: 0, touch() { ++this.touched; }};
   const keys = [];
-  listen(stage, {r: () => keys.push('r')});
-  return {canvas, stage, keys, camera: stage.camera};
+  const unheard = [];
+  listen(stage, {r: () => keys.push('r')}, () => unheard.push('wheel'));
+  return {canvas, stage, keys, unheard, camera: stage.camera};
 }
 
 test('a drag to the right turns the scene to the right, a drag up shows it from below', () => {
@@ -122,8 +124,23 @@ test('two fingers apart are nearer, by the ratio of their distances; together th
   near(one.distance, distance / 2, 1e-9);
 });
 
+test('the wheel is the page\'s own until the picture was clicked, and again while another page has the focus', () => {
+  const {canvas, camera: one, unheard} = rig();
+  const click = () => canvas.fire('pointerdown', {pointerId: 1}), leaves = [() => {}, () => canvas.fire('blur'), () => view.fire('blur')];
+  for (const leave of leaves) {
+    leave();
+    const was = one.distance;
+    assert.ok(!canvas.fire('wheel', {deltaY: -200}).prevented);
+    assert.deepEqual([one.distance, unheard.splice(0).length], [was, 1]);
+    leave === leaves[0] ? click() : canvas.focus();
+    assert.ok(canvas.fire('wheel', {deltaY: -200}).prevented);
+    assert.ok(one.distance < was);
+  }
+});
+
 test('the wheel: away from the user is nearer by a tenth each 100 pixels or 3 lines', () => {
   const {canvas, camera: one} = rig();
+  canvas.focus();
   const {distance} = one;
   assert.ok(canvas.fire('wheel', {deltaY: -200}).prevented);
   near(one.distance, distance * 0.81, 1e-9);

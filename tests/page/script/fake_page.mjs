@@ -39,7 +39,10 @@ export class Element {
   }
   get nextElementSibling() { return this.parentElement.children[this.parentElement.children.indexOf(this) + 1]; }
   querySelector(tag) { return this.querySelectorAll(tag)[0] ?? null; }
-  focus() {}
+  focus() {
+    document.activeElement = this;
+    this.fire('focus');
+  }
   select() {}
   get firstChild() { return this.children[0]; }
   get lastChild() { return this.children.at(-1); }
@@ -71,8 +74,8 @@ export class Element {
       deltaMode: 0, stopped: false, prevented: false, ...values,
       preventDefault() { event.prevented = true; }, stopPropagation() { event.stopped = true; }};
     const path = [];
-    for (let at = this; at; at = at.parentElement) path.push(at);
-    if (this !== view) path.push(view);
+    for (let at = this; at && (at === this || kind !== 'blur'); at = at.parentElement) path.push(at);
+    if (this !== view && kind !== 'blur') path.push(view);
     const run = (one, capture) => {
       if (event.stopped && one !== run.at) return;
       run.at = one;

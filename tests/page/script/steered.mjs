@@ -15,7 +15,7 @@ export function rig({scale = 1, tool = [0, 0, 0]} = {}) {
   const camera = new OrbitCamera();
   camera.frame(ballScene().corners, 4 / 3);
   Object.assign(camera, {yaw: 0, pitch: 0, target: [0, 0, 0], distance: 60});
-  const stage = {canvas, scene: {}, views: (wide, high) => [camera.view(wide / high, 55)], moved: 0};
+  const stage = {canvas, scene: {}, entered: true, views: (wide, high) => [camera.view(wide / high, 55)], moved: 0};
   canvas.addEventListener('pointermove', () => ++stage.moved);
   canvas.addEventListener('wheel', () => ++stage.moved);
   const sent = [];

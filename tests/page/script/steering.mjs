@@ -45,6 +45,15 @@ test('a notch of the wheel to the user takes the tool 0.25 mm nearer to the eye'
   near(goal(), [0, 0, -0.75], 1e-9, 'lines of 33 pixels');
 });
 
+test('a wheel over a picture that was not clicked takes the tool nowhere', () => {
+  const {fire, sent, stage} = rig();
+  fire('pointermove', 400, 300);
+  stage.entered = false;
+  const before = sent.length;
+  assert.ok(!fire('wheel', 400, 300, {deltaY: 100}).prevented);
+  assert.equal(sent.length, before);
+});
+
 test('the goal is never more than 15 mm behind the tool, and all lengths grow with the scene\'s scale', () => {
   const {fire, goal} = rig();
   fire('pointermove', 400, 300);
@@ -137,6 +146,16 @@ test('nothing is led before there is a tool, behind the eye, or while the hand i
   script.fire('pointermove', 400, 300);
   assert.deepEqual(script.sent, []);
   assert.equal(script.stage.moved, 1);
+});
+
+test('another size of the picture lets go: the pointer is over another place until it moves', () => {
+  const {fire, canvas, sent, goal} = rig();
+  fire('pointermove', 500, 300);
+  canvas.clientWidth = 400;
+  pass(80);
+  assert.deepEqual(sent.at(-1), {release: true});
+  fire('pointermove', 250, 300);
+  assert.ok(goal()[0] > 0, 'it leads again');
 });
 
 test('the place of the tool is that of its proxy: the depth of the goal is that of what is seen', () => {
