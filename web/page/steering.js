@@ -168,7 +168,7 @@ export class Steering {
     if (this.atIn !== sizeOf(stage.canvas)) return this.spend(), true;  // what is there now, nobody pointed at
     const [view] = stage.views(wide, high);
     if (this.presses) {
-      const seenIn = view.eyeFromWorld.join();
+      const seenIn = [this.atIn, ...view.eyeFromWorld].join();
       this.pressedIn ||= seenIn;
       if (this.pressedIn !== seenIn) return this.spend(), true;  // else the goal would go through the tooth with the view
     }

@@ -156,6 +156,13 @@ const gestures = {
     user.sees(false, 300);
     user.up(kLeft);
   },
+  'the picture gets another size in a press, and the pointer moves before that is seen': user => {
+    user.down(kLeft);
+    user.canvas.clientWidth = 700;
+    user.move(410, 300);
+    user.sees(false, 300);
+    user.up(kLeft);
+  },
   'another scene begins in a press': user => {
     user.down(kLeft);
     user.steering.start(true);
