@@ -101,14 +101,28 @@ void check_inputs(std::size_t arms, Findings& findings) {
   }
 }
 
+std::vector<std::string> without_checksum(const Findings& findings) {
+  std::vector<std::string> names;
+  for (const std::string& name : names_of_files(findings.folder())) {
+    if (std::ranges::find(findings.files(), name, &Json::Member::key) != findings.files().end()) {
+      continue;
+    }
+    std::string top = one_line(name.substr(0, name.find('/')));
+    if (std::ranges::find(names, top) == names.end()) names.push_back(std::move(top));
+  }
+  return names;
+}
+
 }  // namespace
 
-void check_files(const SceneFacts& scene, std::size_t arms, bool is_final, Findings& findings) {
+std::vector<std::string> check_files(const SceneFacts& scene, std::size_t arms, bool is_final,
+                                     Findings& findings) {
   check_listed_files(scene, is_final, findings);
   check_other_logs(arms, findings);
   for (std::size_t v = 0; v < scene.volumes.size(); ++v)
     check_volume(scene.volumes[v], v, findings);
   check_inputs(arms, findings);
+  return without_checksum(findings);
 }
 
 }  // namespace kerf

@@ -73,7 +73,7 @@ class Check {
     }
   }
 
-  void files() { check_files(scene_, logs_.size(), is_final(), findings_); }
+  void files() { out_.without_checksum = check_files(scene_, logs_.size(), is_final(), findings_); }
 
   void manifest_text() { findings_.check_manifest_text(); }
 

@@ -25,6 +25,8 @@ struct CheckedRecording {
   std::vector<std::string> problems;
   bool in_manifest = false;   ///< one of them is in manifest.json, which can be made again
   bool rows_readable = true;  ///< up to the end of the range
+  /// Files and folders of which the manifest has no checksum; of `CheckDepth::files`.
+  std::vector<std::string> without_checksum;
 };
 
 /// Compares all that a recording says twice, and all checksums.

@@ -39,7 +39,13 @@ int run_check(const std::filesystem::path& folder, bool repair) {
   }
   const CheckedRecording checked = check_recording(folder, {}, CheckDepth::files);
   if (checked.problems.empty()) {
-    std::cout << folder.string() << ": all files agree, and all checksums are right\n";
+    std::cout << folder.string() << ": all files agree, and all checksums are right";
+    const char* before = "; manifest.json has none of ";
+    for (const std::string& name : checked.without_checksum) {
+      std::cout << before << name;
+      before = ", ";
+    }
+    std::cout << '\n';
   }
   return report_problems(checked);
 }
