@@ -124,6 +124,22 @@ TEST_CASE("a drift after a swing turns no more") {
   }
 }
 
+TEST_CASE("where the tip begins does not count: its first motion is no turn") {
+  constexpr double kHalf = kLimit / 2;
+  for (const double side : {-1.0, 1.0}) {
+    CAPTURE(side);
+    LimitCycleDetector detector({.limit = kLimit, .first = kLimit, .settled = kSettled}, 0.05, 1);
+    for (std::int64_t tick = 0;; ++tick) {
+      const double t = double(tick);  // a turn in the first half, two are a swing
+      const double tip_mm =
+          t < kHalf ? side * (4 + std::abs(1 - 2 * t / kHalf)) : side * 5 + square(tick, 30);
+      if (detector.take(tip_mm, 0, false)) break;
+    }
+    CHECK_FALSE(detector.verdict().swings);
+    CHECK(detector.verdict().undecided);
+  }
+}
+
 TEST_CASE("where the energy begins does not count, in a run of any length, and at rest") {
   for (const double offset_mj : {-100.0, 0.0, 100.0}) {
     CAPTURE(offset_mj);
