@@ -263,7 +263,11 @@ if (why) {
 } else {
   state.worker = new Worker(new URL('worker.js', import.meta.url), {type: 'module'});
   state.worker.onerror = () => refuse('The worker of this page did not start: a browser with modules in workers is needed.');
-  state.worker.onmessage = ({data}) => Object.keys(data).forEach(kind => says[kind]?.(data));
+  state.worker.onmessage = ({data}) => {
+    // Of a run that was on its way as the address was refused.
+    if (address.refused && state.ready && !('reads' in data || 'refused' in data)) return;
+    Object.keys(data).forEach(kind => says[kind]?.(data));
+  };
   const tellHidden = () => state.worker.postMessage({pause: document.hidden});
   document.addEventListener('visibilitychange', tellHidden);
   if (document.hidden) tellHidden();

@@ -185,7 +185,9 @@ if (stage) {
 // A token in the address has done its work once the page is here: a cookie holds it.
 if (location.search) history.replaceState(null, '', location.pathname + location.hash);
 address.refusers.push(() => missing(trouble));
-address.hearers.push(values => look.take(values));
+address.hearers.push(values => {
+  element('copied').textContent = look.take(values);
+});
 address.parts.push(() => look.pairs());
 address.start();
 element('copy').addEventListener('click', () => copyLink(element('link'), element('copied'),

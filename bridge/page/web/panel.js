@@ -215,7 +215,7 @@ export class LookControls {
     element('home').addEventListener('click', () => stage?.home());
   }
 
-  /** The look of an address: what it does not name is as at the start. */
+  /** The look of an address: what it does not name is as at the start. Returns what is wrong with it in this scene; ''. */
   take({show = [], iso = null, opacity = {}, clip = null, stereo = false, view = null}) {
     const {axis, at} = clip ?? {axis: 2, at: 0.5};
     element('clip').checked = clip !== null;
@@ -224,8 +224,8 @@ export class LookControls {
     element('plane').hidden = clip === null;
     element('stereo').checked = stereo;
     this.stage?.setLook({kinds: show, iso, opacities: opacity, clip: {on: clip !== null, axis, at}, stereo});
-    if (this.scene) this.begin(this.scene);
     this.stage?.showFrom(view && viewOf(view));
+    return this.scene ? this.build(this.scene) : '';
   }
   /** The look as pairs of an address. */
   pairs() {
@@ -237,16 +237,18 @@ export class LookControls {
     return Object.entries(all).filter(([, text]) => text !== '').map(([name, text]) => [name, String(text)]);
   }
 
-  /** Of a scene that is shown from now on. Returns what is wrong with its look; ''. */
+  /** Of a scene that is shown from now on; opacities of what it lacks are left out. Returns what is wrong with the look; ''. */
   begin(scene) {
+    const why = this.build(scene), has = ([name]) => scene.materials.some(material => material.name === name);
+    if (why) this.stage.setLook({opacities: Object.fromEntries(Object.entries(this.stage.look.opacities).filter(has))});
+    return why;
+  }
+  build(scene) {
     this.scene = scene;
     if (!this.stage) return '';
     const {look} = this.stage;
     const names = scene.materials.slice(1).map(({name}) => name);
-    const strange = Object.keys(look.opacities).filter(name => !names.includes(name));
-    if (strange.length > 0) {
-      this.stage.setLook({opacities: Object.fromEntries(Object.entries(look.opacities).filter(([name]) => names.includes(name)))});
-    }
+    const strange = Object.keys(look.opacities).find(name => !names.includes(name));
     const choices = scene.volumes.map(({name}, v) => {
       const row = document.createElement('label'), choice = document.createElement('select');
       choice.id = v === 0 ? 'renderer' : `renderer${v}`;
@@ -268,7 +270,7 @@ export class LookControls {
         this.stage.setLook({opacities: {...this.stage.look.opacities, [name]: Number(opacityAt(at).toFixed(3))}}));
     }).slice(1));
     this.show();
-    return strange.length > 0 ? `opacity of ${strange[0]}: no such material here; there are ${names.join(', ')}` : '';
+    return strange !== undefined ? `opacity of ${strange}: no such material here; there are ${names.join(', ')}` : '';
   }
 
   chosen() {

@@ -68,6 +68,9 @@ test('an address that is right begins its run, at once or once it is corrected',
 test('a refused address ends the run, a control begins one', async () => {
   await goTo('#pace=abc');
   assert.deepEqual(asked(), ['close']);
+  for (const late of [{opened: 1900}, {failed: 'no memory'}, {facts: {}}]) says(late);
+  assert.equal(document.body.dataset.run, 'refused', 'a run that was on its way is none');
+  assert.match(element('run-state').textContent, /^address: pace=abc/);
   await choose('hand', 'mine');
   assert.equal(asked().length, 1);
   assert.equal(element('missing').hidden, true);
@@ -114,7 +117,11 @@ test('the look goes into the address and comes from it', async () => {
   await goTo('#scene=torus&hand=mine&clip=y:0.25&show=blend&opacity=enamel:0.5,gold:1');
   assert.deepEqual([element('clip').checked, element('place').value, element('plane').hidden, element('renderer').value],
     [true, 0.25, false, 'blend']);
-  assert.deepEqual(stage.look.opacities, {enamel: 0.5}, 'what the scene lacks is left out');
+  assert.equal(element('copied').textContent, 'opacity of gold: no such material here; there are enamel, dentine');
+  says({down: hello(3, 5_000_000_000n, 78n)});
+  const next = new Bridge(78n);
+  says({down: next.frame([[0, sceneBlock()], [1, densities(65535)], [2, densities(40000)]], {tick: 1, atNs: 5_000_000_000n})});
+  assert.deepEqual(stage.look.opacities, {enamel: 0.5}, 'what the next scene lacks is left out');
   pass(600);
   assert.equal(location.hash, '#scene=torus&hand=mine&show=blend&opacity=enamel:0.5&clip=y:0.25');
 });
