@@ -105,7 +105,7 @@ class ForceCurves {
                              std::size_t arm) {
   const Manifest manifest = read_facts(folder);
   require_arm(folder, manifest, arm);
-  TickLogReader log(folder / tick_log_name(arm));
+  TickLogReader log = std::move(open_logs(folder, manifest.arms)[arm]);
   if (log.rows() == 0) {
     throw RecordError((folder / tick_log_name(arm)).string() + ": 0 rows; nothing to plot");
   }

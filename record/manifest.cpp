@@ -78,6 +78,13 @@ std::string way_to_manifest(const std::filesystem::path& folder) {
 
 }  // namespace
 
+std::vector<TickLogReader> open_logs(const std::filesystem::path& folder, std::size_t arms) {
+  std::vector<TickLogReader> logs;
+  for (std::size_t arm = 0; arm < arms; ++arm) logs.emplace_back(folder / tick_log_name(arm));
+  for (const TickLogReader& log : logs) logs.front().end_at(log.rows());
+  return logs;
+}
+
 std::vector<std::filesystem::path> recording_files(const std::filesystem::path& folder) {
   std::vector<std::filesystem::path> files{folder / kManifestName, folder / kSceneName,
                                            folder / kClockName};

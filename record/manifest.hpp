@@ -18,6 +18,7 @@
 namespace kerf {
 
 class Json;
+class TickLogReader;
 
 /// Ticks that were published but not recorded, because the recorder paused for longer than the ring
 /// lasts.
@@ -57,6 +58,11 @@ inline constexpr std::string_view kUnknownEnd = "unknown";
 [[nodiscard]] inline std::string_view tick_log_name(std::size_t arm) noexcept {
   return arm == 0 ? kTickLogName : "ticks-2.npy";
 }
+
+/// The logs of all arms. If one of them was torn by a power cut, the first ends with the ticks that
+/// all have. Throws `RecordError`.
+[[nodiscard]] std::vector<TickLogReader> open_logs(const std::filesystem::path& folder,
+                                                   std::size_t arms);
 
 /// The files of a recording, which no other output may overwrite.
 [[nodiscard]] std::vector<std::filesystem::path> recording_files(

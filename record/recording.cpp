@@ -10,6 +10,7 @@
 #include <string_view>
 #include <system_error>
 
+#include "record/scene_facts.hpp"
 #include "record/tick_log.hpp"
 #include "record/tick_text.hpp"
 #include "shared/posix/atomic_file.hpp"
@@ -104,9 +105,9 @@ void require_arm(const std::filesystem::path& folder, const Manifest& manifest, 
 
 void for_each_tick(const std::filesystem::path& folder, const Manifest& manifest, TickRange range,
                    const std::function<void(const TickRecord&, const TickRecord*)>& visit) {
-  TickLogReader log(folder / tick_log_name(0));
-  std::optional<TickLogReader> second;
-  if (manifest.arms > 1) second.emplace(folder / tick_log_name(1));
+  std::vector<TickLogReader> logs = open_logs(folder, manifest.arms);
+  TickLogReader& log = logs.front();
+  TickLogReader* const second = logs.size() > 1 ? &logs.back() : nullptr;
   std::vector<TickRecord> chunk(second ? TickLogReader::kChunkRows : 0);
   std::uint64_t row = second && range.from != 0 ? log.row_of(range.from) : 0;
   std::uint64_t begin = row;  // of `chunk`, in rows
@@ -167,9 +168,10 @@ std::string to_json(const RecordSummary& summary, std::string_view date) {
 void export_csv(const std::filesystem::path& folder, const std::filesystem::path& csv,
                 TickRange range, std::size_t arm) {
   check_outputs(recording_files(folder), {{"--csv", csv, ".csv"}});
-  if (arm != 0) require_arm(folder, read_manifest(folder), arm);
+  const Manifest manifest = read_facts(folder);
+  require_arm(folder, manifest, arm);
   AtomicFile file(csv);
-  TickLogReader log(folder / tick_log_name(arm));
+  TickLogReader log = std::move(open_logs(folder, manifest.arms)[arm]);
   std::string line;
   const auto end_line = [&] {
     line.back() = '\n';  // the last comma

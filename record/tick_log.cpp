@@ -174,6 +174,7 @@ TickLogReader::TickLogReader(std::filesystem::path path) : path_(std::move(path)
                            ": missing, or cut in its header, and " + later +
                            " is there; copy the recording again");
   }
+  leave_out_torn_rows();
 }
 
 bool TickLogReader::add_part(const std::filesystem::path& path) {
@@ -194,6 +195,30 @@ bool TickLogReader::add_part(const std::filesystem::path& path) {
   file_ = std::move(file);
   open_ = parts_.size() - 1;
   return true;
+}
+
+void TickLogReader::leave_out_torn_rows() {
+  const Part& last = parts_.back();
+  std::vector<TickRecord> chunk;
+  std::uint64_t rows = last.rows;
+  while (rows > last.counted) {
+    chunk.resize(
+        static_cast<std::size_t>(std::min<std::uint64_t>(kChunkRows, rows - last.counted)));
+    if (!read_raw(last.first + rows - chunk.size(), chunk)) return;  // its reader says so
+    const auto sound = std::find_if(chunk.rbegin(), chunk.rend(),
+                                    [](const TickRecord& row) { return why_unsound(row).empty(); });
+    rows -= static_cast<std::uint64_t>(sound - chunk.rbegin());
+    if (sound != chunk.rend()) break;
+  }
+  end_at(last.first + rows);
+}
+
+void TickLogReader::end_at(std::uint64_t rows) {
+  Part& last = parts_.back();
+  if (rows >= rows_ || rows < last.first + last.counted) return;
+  last.bytes_left += (rows_ - rows) * sizeof(TickRecord);
+  last.rows = rows - last.first;
+  rows_ = rows;
 }
 
 bool TickLogReader::read_raw(std::uint64_t first, std::span<TickRecord> rows) {

@@ -39,7 +39,7 @@ class DamagedRecording : public RecordError {
 /// ticks.npy.0002, ticks.npy.0003 and so on.
 ///
 /// The column table is generated from `layout_table.hpp`. The row count in the header is updated at
-/// every `sync`; later rows are complete, too.
+/// every `sync`; later rows are complete, too, but after a power cut the last of them may be torn.
 inline constexpr std::size_t kTickLogHeaderBytes = 4096;
 
 /// The header of a log of `rows` rows: exactly `kTickLogHeaderBytes`.
@@ -106,15 +106,19 @@ class TickLogReader {
     std::uint64_t first = 0;       ///< row
     std::uint64_t rows = 0;        ///< that are complete
     std::uint64_t counted = 0;     ///< rows by its header
-    std::uint64_t bytes_left = 0;  ///< behind its last complete row: less than a row has
+    std::uint64_t bytes_left = 0;  ///< behind its last sound row, left out
   };
 
   static constexpr std::size_t kChunkRows = 1024;  ///< that `for_each` reads at a time
 
   /// Throws `RecordError` if a file has another layout, the first ends in its header, or one before
   /// the last is missing. A file that is truncated after the header, at any byte, has its complete
-  /// rows.
+  /// rows. Rows beyond the count of the header of the last file are left out from that one on which
+  /// no sound row follows: a power cut leaves zeros, or half of what was written.
   explicit TickLogReader(std::filesystem::path path);
+
+  /// Ends the log before row `rows`, if the headers do not count that row.
+  void end_at(std::uint64_t rows);
 
   /// Complete rows in the files, also those beyond the count of the header.
   [[nodiscard]] std::uint64_t rows() const noexcept { return rows_; }
@@ -142,6 +146,8 @@ class TickLogReader {
   /// Opens a file of the log, whose rows are then known. False, and it is none, if it ends in its
   /// header.
   [[nodiscard]] bool add_part(const std::filesystem::path& path);
+  /// Ends the log behind the last row that is counted or sound.
+  void leave_out_torn_rows();
   /// Reads rows as they are; false if a file cannot be read.
   [[nodiscard]] bool read_raw(std::uint64_t first, std::span<TickRecord> rows);
 

@@ -214,6 +214,7 @@ int run_replay(const ReplayOptions& options, const std::atomic<bool>& stop) {
   check_outputs(recording_files(options.folder),
                 {{"--report", options.report, ".json"}, {"--plot", options.plot, ".svg"}});
   const CheckedRecording checked = check_recording(options.folder, {.until = options.until});
+  for (const std::string& note : checked.notes) std::cerr << "kerf-replay: " << note << '\n';
   if (checked.problems.empty()) return replay_checked(options, checked, stop);
   try {
     static_cast<void>(replay_checked(options, checked, stop));

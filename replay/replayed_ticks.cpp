@@ -34,14 +34,14 @@ std::string gap_text(Tick last, Tick next) {
   return ticks + " not recorded; what the servo was given there is unknown";
 }
 
-RecordedTicks::RecordedTicks(const std::filesystem::path& folder, std::size_t arms) {
+RecordedTicks::RecordedTicks(const std::filesystem::path& folder, std::size_t arms)
+    : logs_(open_logs(folder, arms)) {
   for (std::size_t arm = 0; arm < arms; ++arm) {
-    const std::filesystem::path path = folder / tick_log_name(arm);
-    logs_.emplace_back(path);
     if (logs_[arm].rows() >= rows()) continue;
-    throw DamagedRecording(path.string() + ": " + std::to_string(logs_[arm].rows()) +
-                           " rows, and " + std::string(kTickLogName) + " has " +
-                           std::to_string(rows()) + "; copy the recording again");
+    throw DamagedRecording((folder / tick_log_name(arm)).string() + ": " +
+                           std::to_string(logs_[arm].rows()) + " rows, and " +
+                           std::string(kTickLogName) + " has " + std::to_string(rows()) +
+                           "; copy the recording again");
   }
 }
 

@@ -71,14 +71,32 @@ def _crc32c(rows, first):
     return ~crc
 
 
+def _is_sound(rows):
+    """Of each row whether it can be one that was recorded: its checksum, and seq against tick."""
+    tick, seq = rows["tick"], rows["seq"]
+    return _crc32c(rows, 8) == rows["crc32c"], (seq >= 2) & (seq % 2 == 0) & (seq // 2 <= tick)
+
+
+def sound_end(rows, counted):
+    """Where a log ends that a power cut tore: behind its last sound row, or behind those that the header counts."""
+    end = len(rows)
+    while end > counted:
+        first = max(counted, end - CHUNK)
+        crc, of_tick = _is_sound(rows[first:end])
+        sound = np.flatnonzero(crc & of_tick)
+        if len(sound):
+            return first + int(sound[-1]) + 1
+        end = first
+    return end
+
+
 def _row_problems(file, rows):
     """The first row that is damaged, or cannot follow the one before it."""
     last = None
     for first in range(0, len(rows), CHUNK):
         part = rows[first:first + CHUNK]
-        crc = _crc32c(part, 8) == part["crc32c"]
+        crc, of_tick = _is_sound(part)
         tick, seq = part["tick"], part["seq"]
-        of_tick = (seq >= 2) & (seq % 2 == 0) & (seq // 2 <= tick)
         rests = tick - seq // 2  # ticks of a watched replay without a record
         before = (np.r_[seq[:1] if last is None else last[0], seq[:-1]], np.r_[rests[:1] if last is None else last[1], rests[:-1]])
         follows = (seq > before[0]) & (rests >= before[1])

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 import json
 import pathlib
+import warnings
 
 import numpy as np
 
-from .check import HEADER_BYTES, header_of, opened, parts_of, problems
+from .check import HEADER_BYTES, header_of, opened, parts_of, problems, sound_end
 from .layout import CLOCK, STARTED, TICK
 
 
@@ -31,9 +32,21 @@ def _rows_of(file, kind=TICK):
     return np.memmap(file, kind, "r", offset, rows) if rows else np.empty(0, kind)
 
 
-def _all_rows_of(file):
-    rows = [_rows_of(path) for path in parts_of(file)]
-    return rows[0] if len(rows) == 1 else np.concatenate(rows)
+def _counted_by(file):
+    with opened(file) as head:
+        np.lib.format.read_magic(head)
+        return np.lib.format.read_array_header_1_0(head)[0][0]
+
+
+def _all_rows_of(file, as_it_is):
+    """The rows, and how many of them may not be left out: the headers count them."""
+    parts = parts_of(file)
+    rows = [_rows_of(path) for path in parts]
+    counted = _counted_by(parts[-1])
+    before = sum(map(len, rows[:-1]))
+    if not as_it_is:
+        rows[-1] = rows[-1][:sound_end(rows[-1], counted)]
+    return rows[0] if len(rows) == 1 else np.concatenate(rows), before + counted
 
 
 def _no_json(word):
@@ -70,22 +83,36 @@ class Log:
     ticks: one row for each tick, read from the disk as it is used; of a log that was split, from memory. second: of a run with
     two devices the second's rows, row i of the same tick as row i of ticks; else None. scene, manifest: as dictionaries. clock:
     readings of CLOCK_MONOTONIC and UTC at one moment; None in logs of earlier versions. Reads all rows once and compares what
-    `kerf record info` does; what is damaged raises ValueError. check=False opens a long log at once, as it is."""
+    `kerf record info` does; what is damaged raises ValueError, and what a power cut tore behind the
+    rows that the header counts is left out with a warning. check=False opens a long log at once, as it is."""
 
     def __init__(self, folder, check=True):
         folder = pathlib.Path(folder)
         try:
-            self.ticks = _all_rows_of(folder / "ticks.npy")
+            self.ticks, counted = _all_rows_of(folder / "ticks.npy", not check)
             self.manifest = _words_of(folder / "manifest.json")
             self.scene = _words_of(folder / "scene.json")
             self.clock = _rows_of(folder / "clock.npy", CLOCK) if "clock" in self.manifest else None
-            self.second = _all_rows_of(folder / "ticks-2.npy") if self.manifest.get("arms") == 2 else None
+            self.second = _all_rows_of(folder / "ticks-2.npy", not check)[0] if self.manifest.get("arms") == 2 else None
         except OSError as error:
             below = folder / "log"  # of --out of a demo
             way = below if (below / "ticks.npy").is_file() else "the folder of a recording"
             raise ValueError(f"{error.filename}: {error.strerror}; give {way}") from None
         if check:
+            if self.second is not None and counted <= len(self.second) < len(self.ticks):  # torn by a power cut
+                self.ticks = self.ticks[:len(self.second)]
             self._check(folder)
+            for rows, name in ((self.ticks, "ticks.npy"), (self.second, "ticks-2.npy")):
+                if rows is not None:
+                    self._tell_torn(rows, folder / name)
+
+    def _tell_torn(self, rows, file):
+        parts = parts_of(file)
+        own = len(rows) - sum((part.stat().st_size - 4096) // TICK.itemsize for part in parts[:-1])
+        left = parts[-1].stat().st_size - 4096 - own * TICK.itemsize
+        if left >= TICK.itemsize:
+            warnings.warn(f"{parts[-1]}: {left} bytes behind its {own} rows are left out, since they are torn and the recorder had not counted "
+                          "them; the rows before are sound", stacklevel=3)
 
     def _check(self, folder):
         logs = [self.ticks] if self.second is None else [self.ticks, self.second]

@@ -36,10 +36,10 @@ class Check {
     check_scene();
     check_clock();
     check_end();
-    for (std::size_t arm = 0; arm < out_.manifest.arms; ++arm) {
-      logs_.emplace_back(folder_ / tick_log_name(arm));
-      check_parts(logs_.back(), arm);
-      check_size(logs_.back(), arm);
+    logs_ = open_logs(folder_, out_.manifest.arms);
+    for (std::size_t arm = 0; arm < logs_.size(); ++arm) {
+      check_parts(logs_[arm], arm);
+      check_size(logs_[arm], arm);
     }
   }
 
@@ -205,6 +205,11 @@ class Check {
                                 std::to_string(part.rows));
       } else if (is_final() && part.bytes_left != 0) {
         findings_.add(file, std::to_string(part.bytes_left) + " bytes behind its last row");
+      } else if (part.bytes_left >= sizeof(TickRecord)) {
+        out_.notes.push_back(part.path.string() + ": " + std::to_string(part.bytes_left) +
+                             " bytes behind its " + std::to_string(part.rows) +
+                             " rows are left out, since they are torn and the recorder had not "
+                             "counted them; the rows before are sound");
       }
     }
     if (is_cut_) return;

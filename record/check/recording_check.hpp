@@ -23,6 +23,8 @@ struct CheckedRecording {
   ArmSummaries summaries;  ///< of the rows in the range, up to the first one that is damaged
   /// One line each: "place: value; remedy".
   std::vector<std::string> problems;
+  /// Likewise, of what a power cut took: no contradiction.
+  std::vector<std::string> notes;
   bool in_manifest = false;   ///< one of them is in manifest.json, which can be made again
   bool rows_readable = true;  ///< up to the end of the range
   /// Files and folders of which the manifest has no checksum; of `CheckDepth::files`.
@@ -35,7 +37,7 @@ struct CheckedRecording {
 /// losses and figures, the manifest has the rest, under its own checksum. Losses and figures are
 /// compared if `range` is the whole recording. A recorder that was killed, or that still runs,
 /// leaves fewer rows in the manifest than in the log, and possibly a part of a row: that is no
-/// problem.
+/// problem. Nor are torn rows which the header of such a log does not count: they get a note.
 ///
 /// Throws `DamagedRecording` if nothing can be compared: manifest or log are lost, or have another
 /// form; `RecordError` if the folder holds no recording.

@@ -298,10 +298,7 @@ void export_hdf5(const std::filesystem::path& folder, const std::filesystem::pat
     throw RecordError(hdf5.string() + ": HDF5 is no stream; give the name of a file");
   }
   const Manifest manifest = read_facts(folder);
-  std::vector<TickLogReader> logs;
-  for (std::size_t arm = 0; arm < manifest.arms; ++arm) {
-    logs.emplace_back(folder / tick_log_name(arm));
-  }
+  std::vector<TickLogReader> logs = open_logs(folder, manifest.arms);
   H5dont_atexit();  // after a full disk its clean-up at exit crashes (1.10.8)
   H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);  // else it prints its own stack
   AtomicFile file(hdf5);

@@ -74,6 +74,11 @@ began, and each tick is one tick's length later, however long it took. Logs of e
 what stands there and what to do. `info`, `plot`, `export` and `./kerf replay` compare the same, but for the files in `volumes/` and
 `inputs/`. A row that is damaged or out of order ends what they read; an export then writes nothing.
 
+A power cut leaves zeros, or half of what was written, behind the rows that the header counts. In a log that its recorder did not end, what
+is torn there is left out, as far as no sound row follows: one line says how many bytes and where, and all of these work with the rows before
+it (`kerf_reader` warns; `np.load` reads the counted rows alone). With two devices it ends with the ticks that both have. A damaged row that
+is counted, or has a sound one behind it, stays an error.
+
 A folder with a file `ticks.npy` is a recording. Whatever is wrong in it, a file that is lost, damaged, of another form or against
 another one, ends all of these with exit code 1. They end with 2 for a folder that is none, for wrong arguments, and where the rights to
 read or write are missing.
@@ -94,7 +99,7 @@ its own row, by the next one, or by the losses in the manifest.
 `np.load` compares nothing. It does not see rows that are damaged, doubled, exchanged or of another run, nor a manifest of another log;
 `kerf_reader.Log` compares what `info` does and raises `ValueError`, but for `config_hash` and the figures of the summary, for which it
 has the two CRC-32. What no reader can tell: in a log whose recorder was killed, rows that are
-missing behind the count of the header, which are cut off, or lost ticks; and in logs of earlier versions, which have no `crc32`, the
+missing behind the count of the header, which are cut off or torn, or lost ticks; and in logs of earlier versions, which have no `crc32`, the
 facts that only the manifest has.
 
 A `manifest.json` that is lost or wrong is made anew by `./kerf record check DIR/log --repair` from scene and rows; the old one stays as

@@ -59,8 +59,7 @@ const char* read_into(std::string& content, const std::filesystem::path& path,
 std::vector<std::uint64_t> counts_of_rows(const std::filesystem::path& folder,
                                           const Manifest& manifest) {
   std::vector<std::uint64_t> counts;
-  for (std::size_t arm = 0; arm < manifest.arms; ++arm) {
-    const TickLogReader log(folder / tick_log_name(arm));
+  for (const TickLogReader& log : open_logs(folder, manifest.arms)) {
     counts.push_back(std::max(log.rows(), log.counted()));
   }
   return counts;

@@ -22,8 +22,9 @@
 namespace kerf {
 namespace {
 
-/// Prints the problems of a recording, a line each. The exit code: 1 if there are any, else 0.
+/// Prints notes and problems of a recording, a line each. The exit code: 1 with problems, else 0.
 int report_problems(const CheckedRecording& checked) {
+  for (const std::string& note : checked.notes) std::cerr << "kerf-record: " << note << '\n';
   for (const std::string& problem : checked.problems) {
     std::cerr << "kerf-record: " << problem << '\n';
   }

@@ -74,6 +74,49 @@ TEST_CASE(
   CHECK(TickLogReader(folder / "ticks.npy").rows() == 15);
 }
 
+TEST_CASE(
+    "rows that a power cut tore end a log behind its sound rows; one among sound rows does not") {
+  const RuntimeFolder folder;
+  const std::filesystem::path path = folder / "ticks.npy";
+  constexpr std::uint64_t kCounted = 10, kSound = 1500, kTorn = 1100;  // of more than a chunk
+  {
+    TickLogWriter log(path);
+    for (std::uint64_t i = 0; i < kCounted; ++i) log.append(row(i));
+    log.sync();
+    for (std::uint64_t i = kCounted; i < kSound; ++i) log.append(row(i));
+    log.flush();
+  }
+  const auto end_of = [](std::uint64_t rows) {
+    return kTickLogHeaderBytes + rows * sizeof(TickRecord);
+  };
+  const auto zero = [&](std::uint64_t from, std::uint64_t bytes) {
+    std::fstream file(path, std::ios::binary | std::ios::in | std::ios::out);
+    file.seekp(static_cast<std::streamoff>(from));
+    file << std::string(bytes, '\0');
+  };
+  zero(end_of(kSound) - 100, 100 + kTorn * sizeof(TickRecord) + 7);
+  {
+    TickLogReader log(path);
+    CHECK(log.rows() == kSound - 1);
+    CHECK(log.parts()[0].bytes_left == (kTorn + 1) * sizeof(TickRecord) + 7);
+    std::uint64_t rows = 0;
+    log.for_each([&](const TickRecord&) { ++rows; });
+    CHECK(rows == kSound - 1);
+    log.end_at(kCounted - 1);  // which is counted
+    CHECK(log.rows() == kSound - 1);
+    log.end_at(kCounted);
+    CHECK(log.rows() == kCounted);
+  }
+  zero(end_of(700), 3);  // a row among sound ones
+  CHECK(error_of([&] {
+          TickLogReader(path).for_each([](const TickRecord&) {});
+        }).find("row 700 has seq 0") != std::string::npos);
+  zero(end_of(kCounted - 1), end_of(kSound + kTorn) - end_of(kCounted - 1));
+  CHECK(TickLogReader(path).rows() == kCounted);  // none is sound, and those are counted
+  { TickLogWriter log(path, TickLogWriter::Begin::after_last, kCounted - 1); }
+  CHECK(std::filesystem::file_size(path) == end_of(kCounted - 1));
+}
+
 TEST_CASE("a recording is never overwritten") {
   const RuntimeFolder folder;
   write_rows(folder / "ticks.npy", 3);
@@ -161,6 +204,7 @@ TEST_CASE("a tick of a log of 11 GB is found, and its row read, without the rows
   }
   // Rows of zeros on no block of the disk, and a last one.
   std::filesystem::resize_file(path, kTickLogHeaderBytes + (kRows - 1) * sizeof(TickRecord));
+  std::fstream(path, std::ios::binary | std::ios::in | std::ios::out) << tick_log_header(kRows - 1);
   {
     TickLogWriter log(path, TickLogWriter::Begin::after_last);
     TickRecord last = made_up_tick(kRows, 2);

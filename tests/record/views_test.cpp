@@ -164,7 +164,7 @@ TEST_CASE("views of a folder that is no recording are refused and leave no file"
   std::filesystem::create_directories(folder / "empty");
   CHECK(error_of([&] { static_cast<void>(summarise(folder / "empty")); }).find("manifest.json") !=
         std::string::npos);
-  CHECK(error_of([&] { export_csv(folder / "empty", folder / "x.csv"); }).find("ticks.npy") !=
+  CHECK(error_of([&] { export_csv(folder / "empty", folder / "x.csv"); }).find("manifest.json") !=
         std::string::npos);
   CHECK(!std::filesystem::exists(folder / "x.csv"));
   for (const char* const text : {"", "{}", R"({"tick_ns":0,"end_reason":"","volumes":[]})", "[1"}) {
