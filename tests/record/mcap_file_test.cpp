@@ -123,6 +123,22 @@ TEST_CASE("the footer of an MCAP leads to its summary, whose checksum is right")
     const auto statistics = std::ranges::find(records, 0x0b, &Record::opcode);
     REQUIRE(statistics != records.end());
     CHECK(number_at<std::uint64_t>(statistics->content, 0) == messages);
+
+    // One group after the other, each with its offset record behind the last of them.
+    const auto offsets = number_at<std::uint64_t>(footer, 17);
+    std::uint64_t begin = summary;
+    for (const Record& group : records_of(file, offsets, file.size() - kMagicBytes)) {
+      if (group.opcode == 0x02) break;
+      REQUIRE(group.opcode == 0x0e);
+      REQUIRE(number_at<std::uint64_t>(group.content, 1) == begin);
+      const auto end = begin + number_at<std::uint64_t>(group.content, 9);
+      REQUIRE(end <= offsets);
+      for (const Record& record : records_of(file, begin, end)) {
+        CHECK(record.opcode == number_at<std::uint8_t>(group.content, 0));
+      }
+      begin = end;
+    }
+    CHECK(begin == offsets);
   }
 }
 
