@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "record/check/file_check.hpp"
-
 #include <algorithm>
 #include <filesystem>
 #include <optional>
@@ -10,9 +8,11 @@
 #include <utility>
 #include <vector>
 
+#include "record/check/findings.hpp"
 #include "record/input_rows.hpp"
 #include "record/kept_volumes.hpp"
 #include "record/manifest_seal.hpp"
+#include "record/scene_facts.hpp"
 #include "record/tick_log.hpp"
 #include "shared/text/text.hpp"
 #include "shared/volume/checksum.hpp"

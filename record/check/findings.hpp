@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
 #include <string>
 #include <string_view>
@@ -11,6 +12,8 @@
 #include "shared/text/json.hpp"
 
 namespace kerf {
+
+struct SceneFacts;
 
 /// What is wrong in a recording, as it is found: lines "place: value; remedy". Knows the manifest,
 /// with which most is compared.
@@ -59,5 +62,12 @@ class Findings {
   std::vector<std::string> problems_;
   bool in_manifest_ = false;
 };
+
+/// Compares the files beside log and scene: those that the manifest lists with their checksums, the
+/// volumes of `scene` with their hashes, the inputs of the ticks before the log with their length.
+/// Names those that no recording has. `is_final`: a recorder ended it, so the manifest lists all.
+/// Returns the files, and folders with files, of which the manifest has no checksum.
+[[nodiscard]] std::vector<std::string> check_files(const SceneFacts& scene, std::size_t arms,
+                                                   bool is_final, Findings& findings);
 
 }  // namespace kerf

@@ -8,7 +8,6 @@
 #include <system_error>
 #include <utility>
 
-#include "record/check/file_check.hpp"
 #include "record/check/findings.hpp"
 #include "record/kept_volumes.hpp"
 #include "record/losses_of_rows.hpp"
@@ -259,7 +258,7 @@ class Check {
           if (tick[0].tick == range_.until) return;
         }
       }
-      if (count == 0 && problem.empty()) return;  // the end of the shorter log, told by its size
+      if (count == 0 && problem.empty()) return;  // the shorter log ends; its size says so
       if (!problem.empty()) {
         findings_.add_line(problem);
         out_.rows_readable = false;

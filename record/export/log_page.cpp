@@ -99,7 +99,7 @@ its own row, by the next one, or by the losses in the manifest.
 `np.load` compares nothing. It does not see rows that are damaged, doubled, exchanged or of another run, nor a manifest of another log;
 `kerf_reader.Log` compares what `info` does and raises `ValueError`, but for `config_hash` and the figures of the summary, for which it
 has the two CRC-32. What no reader can tell: in a log whose recorder was killed, rows that are
-missing behind the count of the header, which are cut off or torn, or lost ticks; and in logs of earlier versions, which have no `crc32`, the
+missing behind the count of the header, which are cut off or torn, or lost ticks, and that the logs of its two devices were exchanged; and in logs of earlier versions, which have no `crc32`, the
 facts that only the manifest has.
 
 A `manifest.json` that is lost or wrong is made anew by `./kerf record check DIR/log --repair` from scene and rows; the old one stays as

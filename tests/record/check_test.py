@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A recording that contradicts itself is told, by every reader alike; a lost manifest is made again.
+"""What a recording contradicts itself in is named, by every reader alike; a lost manifest is made again.
 
     check_test.py ROOT BIN [EDITS [SEED]] [TEST]"""
 import json

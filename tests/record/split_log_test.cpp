@@ -102,7 +102,7 @@ TEST_CASE("a log that was split goes on behind any of its rows") {
   CHECK(sound_rows(path) == kRows);
 }
 
-TEST_CASE("files of a log that are missing or of another one are told") {
+TEST_CASE("files of a log that are missing or of another one are named") {
   const RuntimeFolder folder;
   const std::filesystem::path path = folder / "ticks.npy";
   write_until(path, 3500, kNew);

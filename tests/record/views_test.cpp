@@ -311,7 +311,7 @@ TEST_CASE("a plot and a table leave the recording that they are made from") {
   CHECK_NOTHROW(export_csv(folder / "log", folder / "log/ticks.csv"));  // beside it is fine
 }
 
-TEST_CASE("a place that cannot be written is told before anything is drawn") {
+TEST_CASE("a place that cannot be written is refused before anything is drawn") {
   const RuntimeFolder folder;
   CHECK_THROWS_WITH_AS(plot_forces(folder / "no recording", folder / "none/a.svg"),
                        doctest::Contains("none/a.svg: cannot be written"), FileError);
