@@ -66,6 +66,19 @@ void for_each_figure(Summary& s, Visit visit) {
   return has_all ? std::optional(out) : std::nullopt;
 }
 
+/// The checksum of the first row of each arm's log, by which they are told from each other and from
+/// those of another run. Of a row that is unsound there is none.
+[[nodiscard]] Json first_rows(const std::filesystem::path& folder, std::size_t arms) {
+  Json list = Json::List{};
+  for (TickLogReader& log : open_logs(folder, arms)) {
+    std::array<TickRecord, 1> row;
+    std::string problem;
+    if (log.read(0, row, problem) == 0) break;
+    list.push_back(row[0].crc32c);
+  }
+  return list;
+}
+
 /// The remedy for a manifest that is not there.
 std::string way_to_manifest(const std::filesystem::path& folder) {
   std::error_code fault;
@@ -136,6 +149,11 @@ void write_with_end(const std::filesystem::path& folder, Json manifest, const Re
                     const Json* files) {
   manifest["parts"] = files_of_log(folder / kTickLogName);
   manifest["rows"] = rows;
+  if (rows > 0) {
+    const bool names_arms = manifest.contains("arms");
+    manifest["first_rows"] =
+        first_rows(folder, names_arms ? manifest.at("arms").get<std::size_t>() : 1);
+  }
   manifest["lost_ticks"] = losses.lost;
   manifest["missed_before_start"] = losses.missed_before_start;
   manifest["gaps"] = Json::List{};
@@ -249,6 +267,10 @@ Manifest read_manifest(const std::filesystem::path& folder) {
   });
   members.take_if_there("parts", "a number of files above 0", [&](const Json& member) {
     return (out.parts = member.get<std::size_t>()) > 0;
+  });
+  members.take_if_there("first_rows", "a list of checksums", [&](const Json& list) {
+    for (const Json& checksum : list) out.first_rows.push_back(checksum.get<std::uint32_t>());
+    return out.first_rows.size() <= kMaxArms;
   });
   members.take_if_there("repaired_by", "a text", [&](const Json& member) {
     out.repaired_by = member.get<std::string>();

@@ -107,8 +107,9 @@ struct Manifest {
   std::vector<double> voxel_mm3;  ///< per volume
   std::string session_id;         ///< of the run, as 16 hexadecimal digits
   std::string end_reason;
-  bool has_clock = false;   ///< names clock.npy: log_clock.hpp
-  std::size_t parts = 1;    ///< files of the log that had begun when it was written
+  bool has_clock = false;                 ///< names clock.npy: log_clock.hpp
+  std::size_t parts = 1;                  ///< files of the log that had begun when it was written
+  std::vector<std::uint32_t> first_rows;  ///< of each arm's log the checksum of its first row
   std::string repaired_by;  ///< version of kerf that made it anew; empty: as its recorder wrote it
   RecordLosses losses;      ///< until the last loss that the recorder wrote down
   ArmSummaries summaries;   ///< of all rows

@@ -136,6 +136,13 @@ def _size_problems(file, rows, manifest):
         yield f"{file}: {len(rows)} rows, and {manifest['rows']} by manifest.json; copy the recording again"
 
 
+def _first_row_problem(file, rows, manifest, arm):
+    """Of a damaged row the other checks say it."""
+    known = manifest.get("first_rows", [])
+    if arm < len(known) and len(rows) and all(map(np.all, _is_sound(rows[:1]))) and rows["crc32c"][0] != known[arm]:
+        yield f"{file}: does not begin with the row that its recorder wrote first; copy the recording again"
+
+
 def _loss_problems(file, rows, manifest):
     if not len(rows):
         return
@@ -171,11 +178,12 @@ def _member_problems(file, manifest):
              "session_id": ("a text", is_text), "lost_ticks": ("a number of ticks", _is_count),
              "missed_before_start": ("a number of ticks", _is_count), "gaps": ("a list of gaps with first_index and count", are_gaps),
              "start_ns": ("a time in ns", _is_count), "parts": ("a number of files above 0", lambda value: _is_count(value, 1)), "repaired_by": ("a text", is_text),
+             "first_rows": ("a list of checksums", lambda value: isinstance(value, list) and len(value) <= 2 and all(_is_count(one) and one < 1 << 32 for one in value)),
              "arms": ("1 or 2, which this version knows", lambda value: type(value) is int and value in (1, 2)),
              "volumes": ("a list of volumes with a spacing_mm above 0",
                          lambda volumes: isinstance(volumes, list) and volumes and all(map(_is_voxel, volumes)))}
     for key, (kind, fits) in kinds.items():
-        optional = key in ("start_ns", "arms", "parts", "repaired_by")  # logs of earlier versions, or of one arm, lack them
+        optional = key in ("start_ns", "arms", "parts", "first_rows", "repaired_by")  # logs of earlier versions, or of one arm, lack them
         if not fits(manifest[key]) if key in manifest else not optional:
             shown = json.dumps(manifest[key], separators=(",", ":"))[:60] if key in manifest else "missing"
             yield f"{file}: {key} is {shown}, and not {kind}; copy the recording again"
@@ -246,6 +254,7 @@ def problems(folder, manifest, scene, logs, clock):
     for arm, rows in enumerate(logs):
         path = folder / ("ticks.npy", "ticks-2.npy")[arm]
         yield from _size_problems(path, rows, manifest)
+        yield from _first_row_problem(path, rows, manifest, arm)
         yield from _row_problems(path, rows)
     if len(logs) > 1:
         both = min(map(len, logs))

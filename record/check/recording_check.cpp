@@ -38,6 +38,7 @@ class Check {
     logs_ = open_logs(folder_, out_.manifest.arms);
     for (std::size_t arm = 0; arm < logs_.size(); ++arm) {
       check_parts(logs_[arm], arm);
+      check_first_row(logs_[arm], arm);
       check_size(logs_[arm], arm);
     }
   }
@@ -175,6 +176,15 @@ class Check {
     } else if (files > read && is_final()) {
       findings_.add(part_of_log(name, read + 1), "cut in its header");
     }
+  }
+
+  /// Whether it is the log that the recorder began, and not that of the other arm or another run.
+  void check_first_row(TickLogReader& log, std::size_t arm) {
+    std::array<TickRecord, 1> row;
+    std::string problem;  // of an unsound row, which is found with the others
+    if (arm >= out_.manifest.first_rows.size() || log.read(0, row, problem) == 0) return;
+    if (row[0].crc32c == out_.manifest.first_rows[arm]) return;
+    findings_.add(tick_log_name(arm), "does not begin with the row that its recorder wrote first");
   }
 
   /// What the manifest says of the end, which its figures say too.

@@ -90,6 +90,7 @@ read or write are missing.
 | content of the volumes | `volumes/` | `density_hash` of the scene, `initial_hash` |
 | all else, as session, versions, end | `manifest.json` | `crc32`, its last member: zlib's CRC-32 of all bytes before the comma in front of it |
 | bytes of the other files | themselves | `files` of the manifest: their CRC-32, of each since it was whole |
+| which log is which arm's | the first row of each | `first_rows` of the manifest: their `crc32c` |
 | which files there are | the folder | `parts` of the manifest: files of the log that had begun; `files` |
 
 `crc32c` covers all of a row but `seq`. In a run `seq` is twice `tick`; only in a log of a watched replay, which rests at ticks without a
@@ -99,7 +100,7 @@ its own row, by the next one, or by the losses in the manifest.
 `np.load` compares nothing. It does not see rows that are damaged, doubled, exchanged or of another run, nor a manifest of another log;
 `kerf_reader.Log` compares what `info` does and raises `ValueError`, but for `config_hash` and the figures of the summary, for which it
 has the two CRC-32. What no reader can tell: in a log whose recorder was killed, rows that are
-missing behind the count of the header, which are cut off or torn, or lost ticks, and that the logs of its two devices were exchanged; and in logs of earlier versions, which have no `crc32`, the
+missing behind the count of the header, which are cut off or torn, or lost ticks; and in logs of earlier versions, which have no `crc32`, the
 facts that only the manifest has.
 
 A `manifest.json` that is lost or wrong is made anew by `./kerf record check DIR/log --repair` from scene and rows; the old one stays as

@@ -94,11 +94,13 @@ class Recording {
   [[nodiscard]] const Recorder& recorder() const noexcept { return recorder_; }
 
  private:
-  /// Whether the manifest lacks files that have begun since it was written.
+  /// Whether the manifest lacks files, or first rows, that have begun since it was written.
   [[nodiscard]] bool has_new_files() {
     const bool has_volumes = volumes_.done();
     const std::size_t parts = logs_.parts();
+    const bool has_rows = logs_.synced() > 0;
     return std::exchange(lists_volumes_, has_volumes) != has_volumes ||
+           std::exchange(lists_rows_, has_rows) != has_rows ||
            std::exchange(listed_parts_, parts) != parts;
   }
 
@@ -123,7 +125,7 @@ class Recording {
   bool whole_;  ///< all rows went through `logs_`
   std::optional<TickLead> lead_;
   StartingVolumes volumes_;
-  bool lists_volumes_ = false;  ///< in the manifest
+  bool lists_volumes_ = false, lists_rows_ = false;  ///< in the manifest
   std::size_t listed_parts_ = 1;
 };
 

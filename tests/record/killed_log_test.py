@@ -96,6 +96,14 @@ class TestKilledLog(unittest.TestCase):
             shutil.copy(self.whole / "clock.npy", log / "clock.npy")
             self.assert_told(log, "clock.npy: its checksum is ")
 
+    def test_logs_of_two_arms_that_are_exchanged_are_told_by_all(self):
+        folder = pathlib.Path(tempfile.mkdtemp(dir=self.folder))
+        log = record_killed(ROOT, BIN, folder, ROOT / "scenes/two_arms.toml", TWO, synced=True)
+        (log / "ticks.npy").rename(log / "one.npy")
+        (log / "ticks-2.npy").rename(log / "ticks.npy")
+        (log / "one.npy").rename(log / "ticks-2.npy")
+        self.assert_told(log, "ticks.npy: does not begin with the row that its recorder wrote first")
+
     def test_a_recorder_may_be_killed_between_clock_and_manifest(self):
         log = self.copy(self.log)
         pairs = [(0, 10**18), (60 * 10**9, 10**18 + 60 * 10**9), (120 * 10**9, 10**18 + 120 * 10**9)]

@@ -73,9 +73,9 @@ def record(root, programs, folder, scene, seconds, *options, flight=False, fault
     return json.loads(report.read_text())
 
 
-def record_killed(root, programs, folder, scene, hands, *recorder, parts=1, rows=1500):
+def record_killed(root, programs, folder, scene, hands, *recorder, parts=1, rows=1500, synced=False):
     """The log, `folder`/log, of a recorder that is killed in a run, after its manifest has the volumes, its log at least so many files and
-    that one some rows. hands: of an Omni, or of an Omni and a Touch, each with options of its emulator."""
+    that one some rows, and these are in the manifest if `synced`. hands: of an Omni, or of an Omni and a Touch, each with options of its emulator."""
     name, log = f"killed-{folder.name}", folder / "log"
     os.mkfifo(lead := folder / "lead")
     quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
@@ -96,7 +96,7 @@ def record_killed(root, programs, folder, scene, hands, *recorder, parts=1, rows
                 lists = json.loads((log / "manifest.json").read_text())
                 if last.stat().st_size > 4096 + 496 * rows and len(lists["files"]) > 2:
                     others[-1].send_signal(signal.SIGSTOP)  # the run: the recorder writes down what there is
-                    if lists["parts"] == len(list(log.glob("ticks.npy*"))):
+                    if lists["parts"] == len(list(log.glob("ticks.npy*"))) and ("first_rows" in lists or not synced):
                         break
             except (OSError, ValueError):
                 pass
