@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <fstream>
 #include <vector>
 
 #include "record/recording.hpp"
@@ -6,6 +7,7 @@
 #include "record/tick_log_writer.hpp"
 #include "shared/segment/server.hpp"
 #include "shared/text/command_line.hpp"
+#include "shared/text/json.hpp"
 #include "tests/record/record_support.hpp"
 
 using namespace kerf;
@@ -119,6 +121,21 @@ TEST_CASE("files of a log that are missing or of another one are named") {
   std::filesystem::remove(path);
   CHECK(error_of([&] { write_until(path, 1, kNew); }) ==
         part_of_log(path, 2).string() + ": of a recording; choose another --out");
+}
+
+TEST_CASE("files that are taken away or damaged do not end their recorder") {
+  const RuntimeFolder folder;
+  const std::filesystem::path path = folder / kTickLogName;
+  write_until(path, kRows, kNew);
+  const NoiseVolume volume({8, 8, 8});
+  const SegmentWriter writer = SegmentWriter::create(spec_of(volume));
+  const SegmentReader reader = SegmentReader::map(writer.fd());
+  std::filesystem::remove(part_of_log(path, 2));
+  std::fstream(path, std::ios::in | std::ios::out | std::ios::binary) << "no header";
+  const Json files = Json::Members{};
+  CHECK_NOTHROW(write_manifest(folder / ".", reader.info(), {}, kRows, kStillRunning, {}, &files));
+  const Json manifest = Json::parse(text_in(folder / kManifestName));
+  CHECK(manifest.at("first_rows").at(0).get<std::uint32_t>() == row(0).crc32c);
 }
 
 TEST_CASE("a file that cannot be begun is named, and the rows before it stay") {
