@@ -182,7 +182,10 @@ bool TickLogReader::add_part(const std::filesystem::path& path) {
   std::string header(kTickLogHeaderBytes, '\0');
   file.read(header.data(), static_cast<std::streamsize>(header.size()));
   header.resize(static_cast<std::size_t>(file.gcount()));
-  if (!parts_.empty() && header.size() < kTickLogHeaderBytes) return false;
+  // Zeros: of a power cut before the header was on the disk, which is before any row.
+  const bool has_header =
+      header.size() == kTickLogHeaderBytes && header.find_first_not_of('\0') != std::string::npos;
+  if (!parts_.empty() && !has_header) return false;
   const std::uint64_t counted = rows_of(header, path.string());
   file.clear();
   file.seekg(0, std::ios::end);

@@ -86,6 +86,7 @@ void TickLogWriter::begin_part() {
   if (const int before = std::exchange(fd_, next); before != lock_) close(before);
   first_ = written_;
   write_header();
+  if (fdatasync(fd_) != 0) fail(errno);  // on the disk before any row
 }
 
 void TickLogWriter::append(const TickRecord& record) {

@@ -123,6 +123,17 @@ TEST_CASE("files of a log that are missing or of another one are named") {
         part_of_log(path, 2).string() + ": of a recording; choose another --out");
 }
 
+TEST_CASE("a power cut as a file of a log begins leaves the files before it") {
+  const RuntimeFolder folder;
+  const std::filesystem::path path = folder / kTickLogName;
+  write_until(path, 2 * kRowsAPart, kNew);
+  for (const std::size_t zeros : {std::size_t{0}, kTickLogHeaderBytes, 2 * kTickLogHeaderBytes}) {
+    CAPTURE(zeros);
+    std::ofstream(part_of_log(path, 3), std::ios::binary) << std::string(zeros, '\0');
+    CHECK(sound_rows(path) == 2 * kRowsAPart);
+  }
+}
+
 TEST_CASE("files that are taken away or damaged do not end their recorder") {
   const RuntimeFolder folder;
   const std::filesystem::path path = folder / kTickLogName;
