@@ -113,8 +113,8 @@ class TickLogReader {
 
   /// Throws `RecordError` if a file has another layout, the first ends in its header, or one before
   /// the last is missing. A file that is truncated after the header, at any byte, has its complete
-  /// rows. Rows beyond the count of the header of the last file are left out from that one on which
-  /// no sound row follows: a power cut leaves zeros, or half of what was written.
+  /// rows. Of the rows beyond the count of the last file's header, those behind the last sound one
+  /// are left out: a power cut leaves zeros, or half of what was written.
   explicit TickLogReader(std::filesystem::path path);
 
   /// Ends the log before row `rows`, if the headers do not count that row.

@@ -23,7 +23,7 @@ struct CheckedRecording {
   ArmSummaries summaries;  ///< of the rows in the range, up to the first one that is damaged
   /// One line each: "place: value; remedy".
   std::vector<std::string> problems;
-  /// Likewise, of what a power cut took: no contradiction.
+  /// Lines of what a power cut took, which is no contradiction.
   std::vector<std::string> notes;
   bool in_manifest = false;   ///< one of them is in manifest.json, which can be made again
   bool rows_readable = true;  ///< up to the end of the range

@@ -72,10 +72,11 @@ began, and each tick is one tick's length later, however long it took. Logs of e
 
 `./kerf record check DIR/log` compares all that the files say twice, and all checksums, and says of each contradiction where it is,
 what stands there and what to do. `info`, `plot`, `export` and `./kerf replay` compare the same, but for the files in `volumes/` and
-`inputs/`. A row that is damaged or out of order ends what they read; an export then writes nothing.
+`inputs/`. A row that is damaged or out of order ends what they read; an export then writes nothing. `info` of a log above 256 MB
+shows the recorder's figures at once, reads no row, and says so; `info --scan` reads all.
 
 A power cut leaves zeros, or half of what was written, behind the rows that the header counts. In a log that its recorder did not end, what
-is torn there is left out, as far as no sound row follows: one line says how many bytes and where, and all of these work with the rows before
+is torn there is left out if no sound row follows it: one line says how many bytes and where, and all of these work with the rows before
 it (`kerf_reader` warns; `np.load` reads the counted rows alone). With two devices it ends with the ticks that both have. A damaged row that
 is counted, or has a sound one behind it, stays an error.
 

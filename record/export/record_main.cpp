@@ -108,7 +108,8 @@ class InfoCommand : public ReadingCommand {
   [[nodiscard]] int run() const {
     check_range();
     check_outputs(recording_files(folder_), {{"--report", report_, ".json"}});
-    const CheckedRecording checked = this->checked(depth());
+    const CheckDepth depth = this->depth();
+    const CheckedRecording checked = this->checked(depth);
     if (!checked.rows_readable) return report_problems(checked);
     const ArmSummaries& figures =
         checked.summaries.empty() ? checked.manifest.summaries : checked.summaries;
@@ -117,6 +118,10 @@ class InfoCommand : public ReadingCommand {
     const std::string date = first_date(clock);
     if (const std::string& by = checked.manifest.repaired_by; !by.empty()) {
       std::cout << "manifest            made anew by kerf " << one_line(by) << '\n';
+    }
+    if (depth == CheckDepth::facts) {
+      std::cout
+          << "figures             as the recorder counted; no row was read, --scan reads all\n";
     }
     if (checked.manifest.arms > 1) std::cout << "arm                 " << arm() + 1 << " of 2\n";
     std::cout << "date                " << shown(date, clock) << '\n' << to_text(summary);

@@ -211,6 +211,20 @@ class TestCheck(unittest.TestCase):
         for change in ({"tick_ns": 9000000}, {"volumes": [{**self.manifest["volumes"][0], "spacing_mm": [0.925] * 3}]}):
             self.assertEqual(run("kerf-record", "info", self.with_manifest(lambda manifest: manifest.update(change)))[1], was)
 
+    def test_info_of_a_large_log_says_that_it_reads_no_row(self):
+        """Of holes: of a log above 256 MB the header counts as many rows as the file has."""
+        rows = (1 << 28) // ROW + 1
+        log = self.with_manifest(lambda manifest: manifest.update(rows=rows, summary={**manifest["summary"], "rows": rows}))
+        header = self.rows[:HEADER].replace(b"(%d,)" % ((len(self.rows) - HEADER) // ROW), b"(%d,)" % rows)
+        header = header[:-1].rstrip().ljust(HEADER - 1) + b"\n"
+        with open(log / "ticks.npy", "r+b") as file:
+            file.write(header)
+            file.truncate(HEADER + rows * ROW)
+        said = "no row was read, --scan reads all"
+        self.assertIn(said, run("kerf-record", "info", log)[1])
+        self.assertNotIn(said, run("kerf-record", "info", log, "--scan")[1])
+        self.assertNotIn(said, run("kerf-record", "info", self.log)[1])
+
     def test_rows_that_are_damaged_doubled_exchanged_or_appended_are_told_by_all(self):
         rows, at = self.rows, HEADER + 700 * ROW
         flipped = bytearray(rows)
