@@ -109,9 +109,9 @@ std::string value_text(std::string_view type, const std::byte* at) {
 
 std::optional<TickDifference> first_difference(const TickRecord& recorded,
                                                const TickRecord& replayed) {
-  if (std::memcmp(&recorded, &replayed, sizeof recorded) == 0) return std::nullopt;  // as most are
   const auto* const a = reinterpret_cast<const std::byte*>(&recorded);
   const auto* const b = reinterpret_cast<const std::byte*>(&replayed);
+  if (std::memcmp(a, b, sizeof recorded) == 0) return std::nullopt;  // as most are
   for (const auto& [stage, name] : kFields) {
     const LayoutField& field = layout_of(name);
     const std::uint32_t bytes = type_bytes(field.type);

@@ -261,8 +261,8 @@ int watch_replay(const ReplayOptions& options, RecordedTicks& log, const std::at
       .run(server, from > 1 ? from : 0, stop, *run.steps);
   run.segment->set_lifecycle(Lifecycle::clean_end);
   if (watched.last_tick() == rows) return 0;
-  std::printf("tick %llu is not in the recording; it was shown until there\n",
-              static_cast<unsigned long long>(watched.last_tick() + 1));
+  const unsigned long long next = watched.last_tick() + 1;
+  std::printf("tick %llu is not in the recording; it was shown until there\n", next);
   return 1;
 }
 
