@@ -32,6 +32,7 @@ with tempfile.TemporaryDirectory() as temporary:
             shutil.copy(file, folder)
     (folder / "package.json").write_text('{"type": "module"}')
     subprocess.run(["cmake", f"-DOUTPUT={folder / 'constants.js'}", f"-DROOT={ROOT}", "-P", ROOT / "bridge/page/constants.cmake"], check=True)
+    subprocess.run(["cmake", f"-DOUTPUT={folder / 'scene_texts.js'}", f"-DROOT={ROOT}", "-P", ROOT / "web/scene_texts.cmake"], check=True)
     # A shader is never compiled here.
     (folder / "shaders.js").write_text("export const head = '', shaders = new Proxy({}, {get: () => ({vertex: '', fragment: ''})});")
     names = sys.argv[1:] or sorted(file.stem for file in folder.glob("*.mjs") if file.stem not in HELPERS)

@@ -5,6 +5,8 @@
 export class TabSocket {
   static OPEN = 1;
   static CLOSED = 3;
+  /** Nothing is connected here: what link.js says is of the tab. */
+  static words = {connects: 'waiting for the servo', waits: 'waiting for the servo', silent: 'The servo of this tab is silent.'};
   static worker = null;  // set before the first one
   static current = null;
 

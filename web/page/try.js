@@ -5,25 +5,34 @@
 // In the address behind #, and written there as the controls change: scene=NAME, hand=script or mine, seconds=S (then it ends
 // and its hashes stand here), pace=0 (as fast as it can), set=KEY=VALUE (may be given often); and the look (address.js).
 import {address} from './address.js';
+import {missing} from './missing.js';
 import {ReplayControls} from './replay.js';
 import {controlKeys, runKeys, runPairs} from './run_keys.js';
+import {texts} from './scene_texts.js';
 import {scenes} from './scenes.js';
 import {TabSocket} from './tab_socket.js';
 
 const element = id => document.getElementById(id);
 const state = {ready: false, replays: false, asked: 0, page: null, steering: null, worker: null, shown: null, replay: null,
-  sets: new Map(), seconds: 0, pace: 1};  // sets: what differs from the scene's own values, by key
+  told: {text: 'loading', trouble: false}, sets: new Map(), seconds: 0, pace: 1};  // sets: what differs from the scene's own values, by key
 
+/** What the link does not know: there is no run, or not yet. It speaks again with the hello of the next one. */
+function tell(text, trouble = false) {
+  state.told = {text, trouble};
+  state.page?.link.expectHello();
+  element('state').textContent = text;
+  element('state').classList.toggle('trouble', trouble);
+  document.body.dataset.state = trouble ? 'trouble' : text;
+}
+/** Without what is lacking nothing will ever run. */
 function refuse(text) {
-  const line = element('missing');
-  Object.assign(line, {hidden: false, textContent: text});
-  element('state').textContent = 'not started';
-  document.body.dataset.state = 'trouble';
+  missing('page', text);
+  tell('not started', true);
 }
 
 /** Why this browser cannot run kerf; '' where it can. */
 function lack() {
-  if (typeof WebAssembly !== 'object') return 'This browser has no WebAssembly, or it is switched off; use a newer one.';
+  if (typeof WebAssembly !== 'object') return 'This browser has no WebAssembly, or it is switched off: use a newer one, or switch it on for this page.';
   if (typeof Worker !== 'function') return 'This browser has no workers; use a newer one.';
   if (typeof BigInt !== 'function' || typeof WebAssembly.Global !== 'function') return 'This browser is too old; use a newer one.';
   return '';
@@ -87,21 +96,14 @@ function take({scene = 'phantom', hand = 'script', set = [], seconds = 0, pace =
 }
 /** Nothing runs then. */
 function refuseAddress(why) {
-  element('missing').hidden = !why;
+  missing('address', why);
   if (!why) return;
   ask();
   state.worker.postMessage({close: true});
-  state.page?.link.expectHello();
   state.steering?.start(false);
   failed(why);
-  refuse(why);
+  tell('not started', true);
   document.body.dataset.run = 'refused';
-}
-
-async function textOf(path) {
-  const answer = await fetch(path);
-  if (!answer.ok) throw new Error(`${path}: ${answer.status}; serve the whole folder`);
-  return answer.text();
 }
 
 /** The sliders show what the run has, until they are moved. */
@@ -129,7 +131,7 @@ function ask() {
 }
 
 /** Before the module is there nothing is sent: the controls are read once it is. */
-async function start(event) {
+function start(event) {
   const {target} = event ?? {};
   if (target && address.refused) address.refuse('');
   if (target?.id === 'scene') {
@@ -139,7 +141,7 @@ async function start(event) {
     state.sets.set(controlKeys[target.id], target.value);
   }
   if (!state.ready || address.refused) return;
-  const isNewest = ask();
+  ask();
   state.replay.close();
   state.replays = false;
   const {name, hand} = scenes.find(one => one.name === element('scene').value);
@@ -148,18 +150,14 @@ async function start(event) {
   element('finger-row').style.display = mine && matchMedia('(any-pointer: coarse)').matches ? '' : 'none';
   element('run-state').textContent = 'loading the scene';
   document.body.dataset.run = 'loading';
-  try {
-    const [scene, script] = await Promise.all([textOf(`scenes/${name}.toml`), mine ? '' : textOf(`scenes/hands/${hand}.toml`)]);
-    if (!isNewest()) return;
-    state.steering?.start(mine);
-    state.page?.link.expectHello();
-    state.worker.postMessage({
-      open: {name: `scenes/${name}.toml`, scene, hand: script, pedal: mine,
-        settings: [...state.sets].map(([key, value]) => `${key}=${value}`)},
-      pace: state.pace, seconds: state.seconds});
-  } catch (problem) {
-    if (isNewest()) failed(problem.message);
-  }
+  missing('run', '');
+  tell('loading the scene');
+  state.steering?.start(mine);
+  const path = `scenes/${name}.toml`;
+  state.worker.postMessage({
+    open: {name: path, scene: texts[path], hand: mine ? '' : texts[`scenes/hands/${hand}.toml`], pedal: mine,
+      settings: [...state.sets].map(([key, value]) => `${key}=${value}`)},
+    pace: state.pace, seconds: state.seconds});
 }
 
 /** What was dropped is no recording: the run goes on, or begins now, if the drop came before it. */
@@ -174,6 +172,8 @@ function failed(text) {
   state.replay.close();
   state.replays = false;
   element('run-state').textContent = text;
+  if (!address.refused) missing('run', text);
+  tell('the run has failed', true);
   document.body.dataset.run = 'failed';
   element('run-figures').replaceChildren();
 }
@@ -232,7 +232,8 @@ const says = {
   reads: ({reads: folder}) => {
     if (address.refused) address.refuse('');
     state.replays = true;
-    state.page?.link.expectHello();
+    missing('run', '');
+    tell('loading the recording');
     state.steering?.start(false);
     state.replay.begin(folder);
     element('finger-row').style.display = 'none';
@@ -250,7 +251,7 @@ async function begin() {
   globalThis.WebSocket = TabSocket;
   const [{Steering}, {KeySteering}] = await Promise.all([import('./steering.js'), import('./key_steering.js')]);
   state.page = await import('./kerf.js');
-  if (address.refused) refuse(address.refused);  // the link has said since that it waits
+  if (!state.page.link.greeted) tell(state.told.text, state.told.trouble);  // the link has said since that it waits
   if (!state.page.stage) return;
   state.steering = new Steering(state.page, state.worker);
   new KeySteering(state.steering, element('picture'));
@@ -262,7 +263,8 @@ if (why) {
   refuse(why);
 } else {
   state.worker = new Worker(new URL('worker.js', import.meta.url), {type: 'module'});
-  state.worker.onerror = () => refuse('The worker of this page did not start: a browser with modules in workers is needed.');
+  state.worker.onerror = ({message}) => state.ready ? failed(`the servo of this tab has ended (${message}); load the page again`) :
+    refuse(`The servo of this tab did not start. ${whyNotStarted()} If all of that is so, use a newer browser: this one has no modules in workers.`);
   state.worker.onmessage = ({data}) => {
     // Of a run that was on its way as the address was refused.
     if (address.refused && state.ready && !('reads' in data || 'refused' in data)) return;
@@ -275,5 +277,5 @@ if (why) {
   Object.assign(address, {keys: {...runKeys, ...address.keys}, parts: [() => runPairs(run()), ...address.parts],
     hearers: [take, ...address.hearers], refusers: [refuseAddress, ...address.refusers]});
   address.read();
-  begin().catch(problem => refuse(`${problem.message}; load the page again`));
+  begin().catch(problem => refuse(whyNotStarted(problem)));
 }

@@ -168,13 +168,35 @@ onmessage = ({data}) => {
   if (kerf || ['open', 'join', 'pause'].includes(kind)) attempt(() => takes[kind](data));
 };
 
+async function moduleBytes() {
+  let answer, bytes;
+  try {
+    answer = await fetch(new URL('kerf.wasm', import.meta.url));
+    bytes = await answer.arrayBuffer();
+  } catch {
+    throw new Error("kerf.wasm: did not come, since the network or its server is not reached, or a policy's connect-src forbids it; " +
+      'load the page again once it can');
+  }
+  if (!answer.ok) throw new Error(`kerf.wasm: ${answer.status}; serve the whole folder`);
+  if (String(new Uint8Array(bytes.slice(0, 4))) !== '0,97,115,109') {
+    throw new Error('kerf.wasm: something else came in its place; serve the whole folder');
+  }
+  return bytes;
+}
+async function compile(bytes) {
+  if (!WebAssembly.validate(bytes)) throw new Error('This browser runs no WebAssembly with SIMD; use a newer one.');
+  try {
+    return await WebAssembly.compile(bytes);
+  } catch (problem) {
+    if (problem instanceof RangeError) throw new Error('memory: none is left to compile kerf.wasm; close other tabs, then load the page again');
+    // It is sound, as was seen before.
+    throw new Error("A policy (Content-Security-Policy) forbids WebAssembly here; have the server add 'wasm-unsafe-eval' to its script-src.");
+  }
+}
+
 async function begin() {
   try {
-    const answer = await fetch(new URL('kerf.wasm', import.meta.url));
-    if (!answer.ok) throw new Error(`kerf.wasm: ${answer.status}; serve the whole folder`);
-    const bytes = await answer.arrayBuffer();
-    if (!WebAssembly.validate(bytes)) throw new Error('This browser runs no WebAssembly with SIMD; use a newer one.');
-    compiled = await WebAssembly.compile(bytes);
+    compiled = await compile(await moduleBytes());
     postMessage({ready: true});
     turn();
   } catch (problem) {

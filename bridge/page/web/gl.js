@@ -6,7 +6,8 @@ import {head, shaders} from './shaders.js';
 export function contextOf(canvas) {
   const gl = canvas.getContext('webgl2', {alpha: false, antialias: false, depth: false,
     powerPreference: 'high-performance'});
-  if (!gl) throw new Error('This browser has no WebGL 2, or it is switched off.');
+  if (!gl) throw new Error('This browser has no WebGL 2, or it is switched off: use a newer one, or switch on graphics ' +
+    'acceleration in its settings.');
   enableExtensions(gl);
   return gl;
 }

@@ -3,6 +3,7 @@
 import {address, copyLink} from './address.js';
 import {CommandKind, kLastOfPass, kMayCommand, kRunEnded, kTwoArms, records, ReplyStatus} from './constants.js';
 import {Link} from './link.js';
+import {missing} from './missing.js';
 import {bannerOf, isStale, LookControls, Plot, showBanner, showFigures} from './panel.js';
 import {materialOf, solidFrom, sceneView} from './scene.js';
 import {listen, Stage} from './stage.js';
@@ -24,15 +25,6 @@ let stage = null, scene = null, held = null;
 export {link, now, stage};
 export const heldNow = () => held;
 
-let trouble = '';
-/** Why there is no picture; ''. */
-function missing(why) {
-  trouble = why;
-  const text = address.refused || trouble;
-  element('missing').hidden = text === '';
-  element('missing').textContent = text;
-  element('picture').classList.toggle('gone', text !== '');
-}
 const link = new Link({
   state(text, trouble) {
     if (trouble) now.lost = true;
@@ -89,9 +81,9 @@ const link = new Link({
 
 // After the link, so that the volumes are on their way meanwhile.
 try {
-  stage = new Stage(element('picture'), missing);
+  stage = new Stage(element('picture'), why => missing('picture', why));
 } catch (problem) {
-  missing(`${problem.message} The figures are shown without a picture.`);
+  missing('picture', `${problem.message} The figures are shown without a picture.`);
 }
 const look = new LookControls(stage);
 
@@ -184,7 +176,7 @@ if (stage) {
 }
 // A token in the address has done its work once the page is here: a cookie holds it.
 if (location.search) history.replaceState(null, '', location.pathname + location.hash);
-address.refusers.push(() => missing(trouble));
+address.refusers.push(why => missing('address', why));
 address.hearers.push(values => {
   element('copied').textContent = look.take(values);
 });

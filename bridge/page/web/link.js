@@ -8,6 +8,9 @@ const kSilenceMs = 3000;     // a bridge that is there sends sixty signs of life
 const kFirstPauseMs = 250, kLongestPauseMs = 5000;
 const kOffsetSpanMs = 10000;
 
+/** A page around this one has its own, as `words` of what takes the place of the socket. */
+const kWords = {connects: 'connecting', waits: 'connected; the bridge has no controller yet', gone: 'The bridge is not reached.',
+  silent: 'The bridge is silent.'};
 const kRefusals = {
   [CloseCode.no_token]: 'No access: open the address as the bridge prints it, with its token.',
   [CloseCode.too_slow]: 'This page was too slow to answer.',
@@ -42,6 +45,7 @@ export class Link {
   /** `on`: hello(held, sameRun), frame(held, frame), records(message), reply(message), state(text, trouble). */
   constructor(on) {
     this.on = on;
+    this.words = {...kWords, ...WebSocket.words};
     this.held = null;
     this.sequence = 0;
     this.pause = kFirstPauseMs;
@@ -52,7 +56,7 @@ export class Link {
 
   join() {
     this.greeted = false;
-    this.on.state('connecting', false);
+    this.on.state(this.words.connects, false);
     this.heard = performance.now();
     const address = new URL('bridge', location.href);  // below the page's folder, whatever a proxy adds before it
     address.protocol = address.protocol.replace('http', 'ws');
@@ -63,7 +67,7 @@ export class Link {
     socket.onclose = ({code}) => this.lost(socket, kRefusals[code], code !== CloseCode.no_token);
     socket.onopen = () => {
       this.heard = performance.now();
-      this.on.state('connected; the bridge has no controller yet', false);
+      this.on.state(this.words.waits, false);
     };
   }
 
@@ -75,7 +79,7 @@ export class Link {
     this.clock = new ClockOffset();  // the machine may be another now
     if (!again) return this.on.state(why, true);
     const next = Math.ceil(this.pause / 1000);
-    this.on.state(`${why ?? 'The bridge is not reached.'} Trying again in ${next} s.`, true);
+    this.on.state(`${why ?? this.words.gone} Trying again in ${next} s.`, true);
     setTimeout(() => this.join(), this.pause);
     this.pause = Math.min(this.pause * 1.6, kLongestPauseMs);
   }
@@ -85,7 +89,7 @@ export class Link {
     if (!socket || performance.now() - this.heard < kSilenceMs) return;
     // An open one without a hello waits for a controller.
     if (socket.readyState === WebSocket.OPEN && !this.greeted) return;
-    this.lost(socket, 'The bridge is silent.');
+    this.lost(socket, this.words.silent);
   }
 
   take(socket, data) {

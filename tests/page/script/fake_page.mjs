@@ -178,7 +178,7 @@ export function documentOf(html) {
     getElementById: id => body.all().find(one => one.id === id) ?? null,
     querySelector: () => body.all().find(one => one.type === 'radio' && one.checked),
     querySelectorAll: () => body.all().filter(one => one.name === 'axis'),
-    createElement: tag => new Element(tag)};
+    createElement: tag => Object.assign(new Element(tag), tag === 'script' ? {noModule: false} : {})};
 }
 
 /** Makes this process a browser that has opened `html`. The picture is 800 x 600. */

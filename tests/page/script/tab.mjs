@@ -3,8 +3,11 @@
 import assert from 'node:assert/strict';
 import fs from 'node:fs';
 import test from 'node:test';
+import vm from 'node:vm';
 import {Bridge, densities, hello, records, sceneBlock} from './bridge_end.mjs';
 import {openPage, pass, view} from './fake_page.mjs';
+import {texts} from './scene_texts.js';
+import {scenes} from './scenes.js';
 
 const document = openPage(fs.readFileSync('index.html', 'utf8'));
 const element = id => document.getElementById(id);
@@ -14,7 +17,8 @@ give('Worker', class {
   constructor() { globalThis.worker = this; }
   postMessage(message) { sent.push(message); }
 });
-give('fetch', async path => ({ok: true, text: async () => `text of ${path}`}));
+give('fetch', async () => { throw new TypeError('Failed to fetch'); });  // the network is gone: scenes are here
+vm.runInThisContext(fs.readFileSync('start.js', 'utf8'));
 give('matchMedia', () => ({matches: false}));
 
 const settled = () => new Promise(done => setImmediate(() => setImmediate(done)));
@@ -36,6 +40,7 @@ location.hash = '#scene=nosuch';
 await import('./try.js');
 await import('./kerf.js');
 await settled();
+const saidFirst = [element('state').textContent, element('missing').textContent];
 says({ready: true});
 await settled();
 
@@ -54,14 +59,14 @@ test('an address that is refused says so, and nothing runs', async () => {
 
 test('an address that is right begins its run, at once or once it is corrected', async () => {
   await goTo('#scene=touch&hand=mine&set=force.stiffness_n_per_mm=0.6&seconds=3&pace=0');
-  assert.deepEqual(asked(), [{scene: 'text of scenes/touch.toml', hand: '', settings: ['force.stiffness_n_per_mm=0.6'], pedal: true,
+  assert.deepEqual(asked(), [{scene: texts['scenes/touch.toml'], hand: '', settings: ['force.stiffness_n_per_mm=0.6'], pedal: true,
     pace: 0, seconds: 3}]);
   assert.equal(element('missing').hidden, true);
   assert.deepEqual([element('scene').value, element('hand').value], ['touch', 'mine']);
   await goTo('#scene=touch&hand=mine&set=force.stiffness_n_per_mm=0.6&seconds=3&pace=0&iso=0.5');
   assert.deepEqual(asked(), [], 'the look alone is another one');
   await goTo('');
-  assert.deepEqual(asked(), [{scene: 'text of scenes/phantom.toml', hand: 'text of scenes/hands/cut_cavity.toml', settings: [],
+  assert.deepEqual(asked(), [{scene: texts['scenes/phantom.toml'], hand: texts['scenes/hands/cut_cavity.toml'], settings: [],
     pedal: false, pace: 1, seconds: 0}]);
 });
 
@@ -136,4 +141,48 @@ test('a view that came with another scene is there once the scene is, one that w
   await choose('scene', 'touch');
   stage.setScene({...stage.scene, corners: other.map(corner => corner.map(value => value + 1))});
   assert.equal(stage.viewText, '', 'chosen by hand: the first view');
+});
+
+test('each scene of the list is inside of the page, with its hand', () => {
+  for (const {name, hand} of scenes) {
+    for (const path of [`scenes/${name}.toml`, `scenes/hands/${hand}.toml`]) assert.match(texts[path] ?? '', /^\w+ = /m, path);
+  }
+});
+
+test('while a scene loads the page says so, not that a bridge has no controller', async () => {
+  await choose('scene', 'touch');
+  assert.deepEqual([element('state').textContent, document.body.dataset.state], ['loading the scene', 'loading the scene']);
+  pass(10_000);
+  assert.equal(element('state').textContent, 'loading the scene', 'a load is no silence');
+});
+
+test('a servo that is silent is none of a bridge', () => {
+  says({down: hello(3, 5_000_000_000n, 80n)});
+  pass(3500);
+  assert.match(element('state').textContent, /^The servo of this tab is silent\. Trying again in 1 s\.$/);
+  pass(1000);
+  assert.equal(element('state').textContent, 'waiting for the servo');
+});
+
+test('a scene that fails says why in place of the picture, until the next one begins', async () => {
+  says({down: hello(3, 5_000_000_000n, 79n)});
+  says({down: new Bridge(79n).frame([[0, sceneBlock()], [1, densities(65535)], [2, densities(40000)]], {tick: 1, atNs: 5_000_000_000n})});
+  assert.equal(element('state').textContent, 'live');
+  says({failed: 'scenes/touch.toml: force.stiffness_n_per_mm: 1000: from 0 to 100'});
+  const shown = () => [element('state').textContent, element('state').classList.contains('trouble'), document.body.dataset.state,
+    element('missing').hidden ? '' : element('missing').textContent];
+  const wanted = ['the run has failed', true, 'trouble', 'scenes/touch.toml: force.stiffness_n_per_mm: 1000: from 0 to 100'];
+  assert.deepEqual(shown(), wanted);
+  pass(10_000);
+  assert.deepEqual(shown(), wanted, 'its silence is none of a bridge');
+  await choose('scene', 'torus');
+  assert.deepEqual(shown(), ['loading the scene', false, 'loading the scene', '']);
+  says({failed: 'no memory'});
+  says({reads: 'log'});
+  assert.deepEqual(shown(), ['loading the recording', false, 'loading the recording', '']);
+});
+
+test('a servo that ends in a run is told as that', () => {
+  globalThis.worker.onerror({message: 'Uncaught x'});
+  assert.match(element('missing').textContent, /^the servo of this tab has ended \(Uncaught x\); load the page again$/);
 });
