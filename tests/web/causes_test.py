@@ -37,6 +37,7 @@ class Server(Quiet):
     added, without, sandbox = {}, (), ''
 
     def end_headers(self):
+        self.send_header('Cache-Control', 'no-store')  # what a case takes away is gone, in a worker too
         for name, value in Server.added.items():
             self.send_header(name, value)
         super().end_headers()
@@ -141,7 +142,6 @@ def main():
     address = f'http://127.0.0.1:{server.server_address[1]}'
     with tempfile.TemporaryDirectory() as profile:
         page = Page(chromium, profile, ['--disable-features=IsolateSandboxedIframes'])  # a frame there is one of the page's process
-        page.call('Network.setCacheDisabled', cacheDisabled=True)
         try:
             page.size(1280, 800)
             says(page, f'file://{folder}/index.html', 'a file', ('opened as a file', 'python3 -m http.server'))

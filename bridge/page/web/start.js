@@ -27,7 +27,8 @@
       return 'The policy (Content-Security-Policy) of this page forbids ' + forbidden + '. Have the server allow it: ' +
         "script-src 'self' 'wasm-unsafe-eval'; worker-src 'self'; connect-src 'self'.";
     }
-    var files = lost.length ? 'Of this page there did not come: ' + lost.join(', ') + ', or a module of it. ' : 'A part of this page did not come. ';
+    var names = lost.slice(0, 3).join(', ') + (lost.length > 3 ? ' and ' + (lost.length - 3) + ' more' : '');
+    var files = names ? 'Of this page there did not come: ' + names + ', or a module of it. ' : 'A part of this page did not come. ';
     if (navigator.onLine === false) return files + 'This machine is offline; load the page again once it has a network.';
     return files + 'Load the page again once its server is reached; have it serve the whole folder, .js as text/javascript.';
   }

@@ -79,6 +79,8 @@ test('files that did not come are named, offline or not', () => {
   lose('mesh.js', 'link');
   lose('mesh.js', 'link');
   assert.match(said(), /did not come: math.js, try.js, mesh.js, or a module of it\. Load the page again.*whole folder, \.js as text\/javascript/);
+  lose('gl.js', 'link');
+  assert.match(said(), /did not come: math.js, try.js, mesh.js and 1 more, or a module/);
   open({onLine: false});
   lose('try.js');
   assert.match(said(), /did not come: try.js, or a module of it\. This machine is offline/);
