@@ -46,6 +46,8 @@ void PointerHand::step(const WindowInput& input, bool over_panel, const View& vi
   pedal_ = by_pointer || held.press;
   press_mm_ = glm::dvec3(0.0);
   const SeenPoint tool = seen_at(view, size, tool_mm);
+  const bool same_view = std::exchange(view_, view) == view;
+  if (tool.depth_mm <= 0.0 || input.left) under_pointer_ = false;
   if (tool.depth_mm <= 0.0) return;  // a tool behind the eye is not led
   const bool acts = input.free_right != 0.0 || input.free_up != 0.0 || input.wheel != 0.0 ||
                     input.pointer.down || held.deeper != 0.0;
@@ -56,14 +58,19 @@ void PointerHand::step(const WindowInput& input, bool over_panel, const View& vi
   const double scale = device.scale;
   const double held_mm = kHeldMmPerS * scale * frame_s;
   const double mm_per_pixel = 2.0 * view.tan_half_height * seen.depth_mm / size.height;
-  seen.pixel += glm::dvec2(held.right, -held.up) * (held_mm / mm_per_pixel);
+  const glm::dvec2 by_keys = glm::dvec2(held.right, -held.up) * (held_mm / mm_per_pixel);
+  seen.pixel += by_keys;
+  const glm::dvec2 pointer(input.pointer.x, input.pointer.y);
   if (points && !under_pointer_) {
-    seen.pixel = {input.pointer.x, input.pointer.y};
+    seen.pixel = pointer;
+  } else if (points && same_view && !moves_view(input)) {
+    seen.pixel = pointer + beside_ + by_keys;
   } else if (points) {
     seen.pixel += glm::dvec2(input.free_right + input.drag_right, -input.free_up - input.drag_up) *
                   static_cast<double>(size.height);
   }
   under_pointer_ = points;
+  beside_ = seen.pixel - pointer;
   const double by_mm = (points ? input.wheel * kWheelMm * scale : 0.0) + held.deeper * held_mm;
   const double least_mm = 2.0 * view.near_mm;
   const double most_mm = std::max(seen.depth_mm, tool.depth_mm + kMostAheadMm * scale);

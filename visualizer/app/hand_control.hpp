@@ -26,7 +26,9 @@ namespace kerf {
 /// the eye, and along the ray from the eye with wheel, keys and sticks; while the left button is
 /// down it lies `kPressMm` deeper. It stands under the pointer, at the tool's own depth, when the
 /// pointer, its wheel or its button is first used, when the pointer comes from outside or from a
-/// panel, and again on `come`. A camera that turns or moves leaves it where it is.
+/// panel, and again on `come`. From then on it keeps its distance in the picture from the pointer,
+/// which only sticks, keys and another view change: a camera that turns or moves leaves it where it
+/// is.
 ///
 /// The pedal is down while the left button, the space bar, or a pad's or SpaceMouse's button is. A
 /// press of button or bar ends when the pointer is no longer over the window or comes over a panel,
@@ -67,6 +69,8 @@ class PointerHand {
   glm::dvec3 press_mm_{0.0};
   glm::dvec2 tilt_rad_{0.0};
   bool under_pointer_ = false;  ///< since the pointer came
+  glm::dvec2 beside_{0.0};  ///< from the pointer to the goal, in pixels; sticks and views do that
+  View view_;               ///< of the last frame
   bool leads_ = false, by_pad_ = false;
   bool pedal_ = false;
   bool spent_ = false;  ///< the press that is held has ended

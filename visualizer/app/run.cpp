@@ -145,9 +145,8 @@ class WindowSound {
 /// False when the user wants to leave.
 bool step(WindowRun& run, Window& window, WindowSound& sound) {
   const auto begin = Clock::now();
-  const PictureSize size = window.size();
   const WindowInput input = window.poll();
-  const auto [quit, drawn, leads_hand] = run.step(input, size, begin);
+  const auto [quit, drawn, leads_hand] = run.step(input, input.size, begin);
   sound.step(input, run, begin);
   window.show_pointer(!leads_hand);
   if (drawn != nullptr) window.present(*drawn);

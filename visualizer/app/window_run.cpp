@@ -33,7 +33,7 @@ void move_camera_around(OrbitCamera& camera, const glm::dvec3& goal_mm, const Wi
     camera.orbit_about(goal_mm, input.turn_right, input.turn_up);
   }
   camera.pan(input.move_right, input.move_up);
-  if (input.zoom != 0.0) camera.zoom(input.zoom);
+  if (input.zoom != 0.0) camera.zoom_about(goal_mm, input.zoom);
 }
 
 }  // namespace
@@ -232,7 +232,11 @@ void WindowRun::lead_hand(const WindowInput& input, bool over_panel, OverlayFigu
   if (const auto news = space_mouse_->step(seen.held)) notices_.say({*news, true}, now);
   if (!input.visible) seen.held = {};  // no pad presses what its user cannot see
   const auto held = session().latest() ? hand_of(*session().latest()) : std::nullopt;
-  if (!held || !hand_link_->leads()) return;
+  const bool resized = std::exchange(led_in_, size) != size;
+  if (!held || !hand_link_->leads()) {
+    hand_.come();  // what the pointer does meanwhile is not followed
+    return;
+  }
   const SceneView& scene = session().scene();
   const View view = picture().middle_view(size);
   const PictureSize eye = picture().eye_size(size);
@@ -242,7 +246,9 @@ void WindowRun::lead_hand(const WindowInput& input, bool over_panel, OverlayFigu
   const bool crossed = std::exchange(in_second_eye_, in_second) != in_second;
   const bool in_stereo = picture().settings().stereo.on;
   const bool switched = std::exchange(in_stereo_, in_stereo) != in_stereo;
-  if (crossed && !switched) hand_.come();  // a jump is no motion; nor is another way of seeing
+  // A jump is no motion; nor is another way of seeing. What lay under the pointer lies elsewhere in
+  // a window of another size.
+  if (resized || (crossed && !switched)) hand_.come();
   hand_.step(seen, over_panel, view, eye, held->tip_mm, scene.device,
              std::min(frame_s, kLongestFrameS));
   time_the_tool(input, held->tip_mm, now);

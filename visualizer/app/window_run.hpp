@@ -154,6 +154,7 @@ class WindowRun {
   std::optional<std::pair<Clock::time_point, glm::dvec3>> followed_since_;
   bool pointer_leads_ = false, tool_follows_ = false;
   bool in_second_eye_ = false, in_stereo_ = false;
+  PictureSize led_in_;  ///< the window's size at the last step of the hand
   double told_left_s_ = std::numeric_limits<double>::infinity();  ///< of the run
   bool press_is_hands_ = false;    ///< the left button went down over the picture
   bool led_ = false;               ///< the last frame sent a target

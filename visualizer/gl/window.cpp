@@ -94,6 +94,13 @@ void add_gamepad(HeldControls& held) {
 
 }  // namespace
 
+glm::dvec2 pixels_per_unit(PictureSize pixels, PictureSize units) noexcept {
+  const auto along = [](int of_picture, int of_cursor) {
+    return of_picture > 0 && of_cursor > 0 ? static_cast<double>(of_picture) / of_cursor : 1.0;
+  };
+  return {along(pixels.width, units.width), along(pixels.height, units.height)};
+}
+
 bool Window::has_screen() {
   const auto is_set = [](const char* name) {
     const char* const value = std::getenv(name);
@@ -179,13 +186,12 @@ WindowInput Window::poll() {
         "kerf-visualizer again on another screen or with --headless --out DIR");
   }
   input_.close = glfwWindowShouldClose(handle_) == GLFW_TRUE;
-  int width = 0;
-  int height = 0;
-  glfwGetWindowSize(handle_, &width, &height);
-  if (width > 0 && height > 0) {  // a pixel may be less than a unit of the cursor
-    input_.pointer.x = cursor_x_ * size().width / width;
-    input_.pointer.y = cursor_y_ * size().height / height;
-  }
+  PictureSize units;
+  glfwGetWindowSize(handle_, &units.width, &units.height);
+  input_.size = size();
+  const glm::dvec2 scale = pixels_per_unit(input_.size, units);
+  input_.pointer.x = cursor_x_ * scale.x;
+  input_.pointer.y = cursor_y_ * scale.y;
   const bool seen = is_seen();
   input_.visible = seen;
   if (!seen) let_go();

@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include <glm/glm.hpp>
+
 #include "visualizer/gl/context.hpp"
 #include "visualizer/gl/target.hpp"
 #include "visualizer/scene/pixel_rect.hpp"
@@ -40,12 +42,17 @@ struct WindowInput {
   bool hovers = false;     ///< the pointer is over the window, and nothing lies between
   bool left = false;       ///< it was elsewhere in between, or the window was not visible
   bool visible = true;     ///< neither minimised nor taken off the screen
+  PictureSize size;        ///< as `Window::size`, at the end; `pointer` is in its pixels
   Pointer pointer;         ///< at the end; down if it was so at any time
   std::vector<char> keys;  ///< lower-case letters and digits as printed on them
   double density = 1.0;    ///< of the display, over that of 96 dots per inch
   bool exposed = false;    ///< what the window showed is lost: `present` again
   bool close = false;
 };
+
+/// How many pixels of a window's picture lie in one unit of its cursor, along each side: screens of
+/// high density count in larger units than pixels. 1 for a window without a side.
+[[nodiscard]] glm::dvec2 pixels_per_unit(PictureSize pixels, PictureSize units) noexcept;
 
 /// A window on the screen with its own context; what it shows is drawn off the screen and copied.
 class Window final : public GlContext {

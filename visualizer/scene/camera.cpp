@@ -90,6 +90,12 @@ void OrbitCamera::zoom(double steps) {
                             kFarthest * radius_mm_);
 }
 
+void OrbitCamera::zoom_about(const glm::dvec3& pivot_mm, double steps) {
+  const double before_mm = distance_mm_;
+  zoom(steps);
+  target_mm_ = pivot_mm + (target_mm_ - pivot_mm) * (distance_mm_ / before_mm);
+}
+
 glm::dmat3 OrbitCamera::eye_axes() const {
   const glm::dvec3 backward{std::cos(pitch_rad_) * std::sin(yaw_rad_), std::sin(pitch_rad_),
                             std::cos(pitch_rad_) * std::cos(yaw_rad_)};

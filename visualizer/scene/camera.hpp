@@ -60,6 +60,8 @@ class OrbitCamera {
   /// Steps of the wheel: positive is nearer, down to 1/50 and up to 20 times the radius of what is
   /// framed.
   void zoom(double steps);
+  /// The same about a point in world mm, which stays where it is in the picture.
+  void zoom_about(const glm::dvec3& pivot_mm, double steps);
 
   /// The near and far planes hold all that is within `reach_mm` of the centre of what is framed:
   /// the middle of the box around it.

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <utility>
 #include <vector>
 
 #include <doctest/doctest.h>
@@ -112,6 +113,74 @@ TEST_CASE("it moves with the pointer, and goes deeper by the wheel under it") {
   moved.wheel = -1e6;
   bench.frame(moved);
   CHECK(bench.goal().depth_mm == doctest::Approx(2.0 * bench.view().near_mm));
+}
+
+TEST_CASE("motions that no frame was told of leave it under the pointer all the same") {
+  Bench bench;
+  bench.frame(at(120, 80));
+  WindowInput later = at(180, 110);  // another program had the window meanwhile, or it hung
+  bench.frame(later);
+  CHECK(near(bench.goal().pixel, {180, 110}));
+  later = at(90, 60);
+  later.left = true;  // out and in again within a frame
+  bench.frame(later);
+  CHECK(near(bench.goal().pixel, {90, 60}));
+  const glm::dvec3 tool_mm = std::exchange(bench.tool_mm, {0.0, 1e4, 1e4});  // behind the eye
+  bench.frame(at(50, 50));
+  bench.tool_mm = tool_mm;
+  bench.frame(at(60, 70));
+  CHECK(near(bench.goal().pixel, {60, 70}));
+}
+
+TEST_CASE("what keys and views put between pointer and goal stays, and a turn at its end is none") {
+  Bench bench;
+  bench.frame(at(120, 80));
+  bench.camera.orbit(0.0, 10.0);  // as high as it goes
+  WindowInput turned = at(120, 80);
+  turned.turn_up = 10.0;
+  bench.frame(turned);
+  const glm::dvec3 before = *bench.hand.goal_mm();
+  const glm::dvec2 seen = bench.goal().pixel;
+  turned = at(120, 50);
+  turned.turn_up = 0.1;  // the view is the same one
+  bench.frame(turned);
+  CHECK(glm::length(*bench.hand.goal_mm() - before) < 1e-9);
+  bench.frame(at(130, 60));
+  CHECK(near(bench.goal().pixel, seen + glm::dvec2(10, 10)));
+  WindowInput stick = at(130, 60);
+  stick.held.right = 1.0;
+  bench.frame(stick);
+  const glm::dvec2 pushed = bench.goal().pixel;
+  CHECK(pushed.x > seen.x + 10.5);
+  bench.frame(at(140, 60));
+  CHECK(near(bench.goal().pixel, pushed + glm::dvec2(10, 0)));
+}
+
+TEST_CASE("a zoom about the goal leaves it under the pointer, and the hand where it is") {
+  for (const double steps : {3.0, -2.0, 1e6}) {
+    Bench bench;
+    bench.frame(at(120, 80));
+    const glm::dvec3 before = *bench.hand.goal_mm();
+    const double distance_mm = bench.camera.distance_mm();
+    bench.camera.zoom_about(before, steps);
+    CHECK((bench.camera.distance_mm() < distance_mm) == (steps > 0.0));
+    CHECK(near(bench.goal().pixel, {120, 80}));
+    if (steps == 1e6) continue;  // nearer than a goal may be: the next frame pushes it away
+    WindowInput zoomed = at(120, 80);
+    zoomed.zoom = steps;
+    bench.frame(zoomed);
+    CHECK(glm::length(*bench.hand.goal_mm() - before) < 1e-9);
+    bench.frame(at(150, 95));
+    CHECK(near(bench.goal().pixel, {150, 95}));
+  }
+}
+
+TEST_CASE("a cursor's units are the picture's pixels times the scale of the screen") {
+  CHECK(pixels_per_unit({640, 480}, {640, 480}) == glm::dvec2(1.0));
+  CHECK(pixels_per_unit({1280, 960}, {640, 480}) == glm::dvec2(2.0));
+  CHECK(pixels_per_unit({960, 480}, {640, 480}) == glm::dvec2(1.5, 1.0));
+  CHECK(pixels_per_unit({0, 0}, {640, 480}) == glm::dvec2(1.0));  // minimised
+  CHECK(pixels_per_unit({640, 480}, {0, 0}) == glm::dvec2(1.0));
 }
 
 TEST_CASE("the left button presses along the ray while it is down") {

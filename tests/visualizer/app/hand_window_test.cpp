@@ -249,6 +249,45 @@ TEST_CASE(
   act("keyup space");
 }
 
+TEST_CASE("the hand is at the pointer after every resize and zoom") {
+  if (!have("Xvfb") || !have("xdotool")) return;
+  Bench bench;
+  const auto place = [] {
+    std::array<float, 3> last{}, now{};
+    CHECK(eventually(
+        [&] {
+          last = now;
+          act("sleep 0.2");
+          const kerf::TickRecord tick = Bench::tick();
+          for (std::size_t i = 0; i < 3; ++i) now[i] = static_cast<float>(tick.position_mm[i]);
+          return std::hypot(now[0] - last[0], now[1] - last[1], now[2] - last[2]) < 0.01F;
+        },
+        20s));
+    return now;
+  };
+  // What brings the hand to the pointer moves it no more.
+  const auto check_at_pointer = [&] {
+    const auto before = place();
+    act("key g");
+    const auto after = place();
+    for (std::size_t i = 0; i < 3; ++i) CHECK(std::abs(after[i] - before[i]) < 0.1F);
+  };
+  const std::string sized = "search --name 'kerf: test' windowsize ";
+  act(sized + "640 480 sleep 0.5 mousemove 500 60 sleep 0.2 mousemove 510 100");
+  check_at_pointer();
+  const std::string wheel = "keydown ctrl click --repeat ";
+  for (const std::string& way :
+       {sized + "1280 960", std::string("mousemove 600 330"),
+        sized + "640 480 sleep 0.5 mousemove 460 140", sized + "640 240",
+        "mousemove 330 110 sleep 0.3 " + sized + "480 360", sized + "900 700",
+        "mousemove 560 200 sleep 0.3 " + wheel + "4 4 keyup ctrl", wheel + "7 5 keyup ctrl",
+        std::string("mousemove 1100 800 mousemove 500 220")}) {
+    CAPTURE(way);
+    act(way + " sleep 0.7");
+    check_at_pointer();
+  }
+}
+
 TEST_CASE("z takes back one press, shift and z makes it again, though the bur never leaves") {
   if (!have("Xvfb") || !have("xdotool")) return;
   Bench bench;

@@ -131,7 +131,7 @@ Screen::Screen() {
     const std::string to = std::to_string(ready[1]);
     const int quiet = open("/dev/null", O_WRONLY);
     dup2(quiet, STDERR_FILENO);
-    execlp("Xvfb", "Xvfb", "-displayfd", to.c_str(), "-screen", "0", "800x600x24", "-nolisten",
+    execlp("Xvfb", "Xvfb", "-displayfd", to.c_str(), "-screen", "0", "1280x960x24", "-nolisten",
            "tcp", static_cast<char*>(nullptr));
     _exit(127);
   }
