@@ -30,9 +30,10 @@ AxisTaps axis_taps(std::span<const float> smooth, std::span<const float> slope) 
   AxisTaps taps;
   taps.reach = static_cast<std::int32_t>(smooth.size()) / 2;
   taps.smooth_sum = taps.slope_sum = 0.0F;
+  const std::int32_t first = AxisTaps::kMiddle - taps.reach;
   for (std::size_t i = 0; i < smooth.size(); ++i) {
     const std::int32_t at = static_cast<std::int32_t>(i) - taps.reach;
-    const auto place = static_cast<std::size_t>(AxisTaps::kMiddle + at);
+    const std::size_t place = static_cast<std::size_t>(first) + i;
     taps.smooth[place] = smooth[i];
     taps.slope[place] = slope[i];
     taps.smooth_sum += smooth[i];
