@@ -95,7 +95,10 @@ std::string way_to_manifest(const std::filesystem::path& folder) {
 std::vector<TickLogReader> open_logs(const std::filesystem::path& folder, std::size_t arms) {
   std::vector<TickLogReader> logs;
   for (std::size_t arm = 0; arm < arms; ++arm) logs.emplace_back(folder / tick_log_name(arm));
-  for (const TickLogReader& log : logs) logs.front().end_at(log.rows());
+  for (TickLogReader& log : logs) {
+    logs.front().end_at(std::max(log.rows(), logs.front().counted()));
+  }
+  for (TickLogReader& log : logs) log.end_at(logs.front().rows());
   return logs;
 }
 

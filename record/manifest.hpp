@@ -59,8 +59,9 @@ inline constexpr std::string_view kUnknownEnd = "unknown";
   return arm == 0 ? kTickLogName : "ticks-2.npy";
 }
 
-/// The logs of all arms. If one of them was torn by a power cut, the first ends with the ticks that
-/// all have. Throws `RecordError`.
+/// The logs of all arms. They end with the ticks that all have, but for rows that the header of the
+/// first counts: if the second has fewer, that is an error which those who read it report. Throws
+/// `RecordError`.
 [[nodiscard]] std::vector<TickLogReader> open_logs(const std::filesystem::path& folder,
                                                    std::size_t arms);
 

@@ -201,7 +201,7 @@ bool TickLogReader::add_part(const std::filesystem::path& path) {
 }
 
 void TickLogReader::leave_out_torn_rows() {
-  const Part& last = parts_.back();
+  Part& last = parts_.back();
   std::vector<TickRecord> chunk;
   std::uint64_t rows = last.rows;
   while (rows > last.counted) {
@@ -213,15 +213,13 @@ void TickLogReader::leave_out_torn_rows() {
     rows -= static_cast<std::uint64_t>(sound - chunk.rbegin());
     if (sound != chunk.rend()) break;
   }
-  end_at(last.first + rows);
+  last.bytes_left += (last.rows - rows) * sizeof(TickRecord);
+  last.rows = rows;
+  rows_ = last.first + rows;
 }
 
 void TickLogReader::end_at(std::uint64_t rows) {
-  Part& last = parts_.back();
-  if (rows >= rows_ || rows < last.first + last.counted) return;
-  last.bytes_left += (rows_ - rows) * sizeof(TickRecord);
-  last.rows = rows - last.first;
-  rows_ = rows;
+  rows_ = std::min(rows_, rows);
 }
 
 bool TickLogReader::read_raw(std::uint64_t first, std::span<TickRecord> rows) {

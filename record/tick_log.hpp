@@ -117,11 +117,16 @@ class TickLogReader {
   /// are left out: a power cut leaves zeros, or half of what was written.
   explicit TickLogReader(std::filesystem::path path);
 
-  /// Ends the log before row `rows`, if the headers do not count that row.
+  /// Ends the log before row `rows`, although its files go on.
   void end_at(std::uint64_t rows);
 
-  /// Complete rows in the files, also those beyond the count of the header.
+  /// Rows to be read: the complete ones in the files, also those beyond the count of the header, up
+  /// to `end_at`.
   [[nodiscard]] std::uint64_t rows() const noexcept { return rows_; }
+  /// The complete ones in the files.
+  [[nodiscard]] std::uint64_t rows_in_files() const noexcept {
+    return parts_.back().first + parts_.back().rows;
+  }
   /// Rows by the headers: more than `rows()` if a file was truncated.
   [[nodiscard]] std::uint64_t counted() const noexcept { return counted_; }
   [[nodiscard]] std::span<const Part> parts() const noexcept { return parts_; }

@@ -99,12 +99,15 @@ class Log:
             way = below if (below / "ticks.npy").is_file() else "the folder of a recording"
             raise ValueError(f"{error.filename}: {error.strerror}; give {way}") from None
         if check:
-            if self.second is not None and counted <= len(self.second) < len(self.ticks):  # torn by a power cut
-                self.ticks = self.ticks[:len(self.second)]
             self._check(folder)
             for rows, name in ((self.ticks, "ticks.npy"), (self.second, "ticks-2.npy")):
                 if rows is not None:
                     self._tell_torn(rows, folder / name)
+            if self.second is not None:  # of a recorder that was killed they end with the ticks that both have
+                both = min(len(self.ticks), len(self.second))
+                if both < counted:
+                    raise ValueError(f"{folder / 'ticks-2.npy'}: {both} rows, and ticks.npy has {len(self.ticks)}; copy the recording again")
+                self.ticks, self.second = self.ticks[:both], self.second[:both]
 
     def _tell_torn(self, rows, file):
         parts = parts_of(file)

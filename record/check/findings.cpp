@@ -2,8 +2,11 @@
 #include "record/check/findings.hpp"
 
 #include <algorithm>
+#include <span>
 #include <utility>
 
+#include "record/log_clock.hpp"
+#include "shared/posix/atomic_file.hpp"
 #include "shared/text/text.hpp"
 
 namespace kerf {
@@ -65,6 +68,12 @@ void Findings::check_manifest_text() {
   if (seal_ == Seal::broken || (seal_ == Seal::none && json_.contains("files"))) {
     add_to_manifest("its checksum is wrong: it was changed after the recorder wrote it");
   }
+}
+
+std::string checksum_before_last_row(const std::filesystem::path& folder, const LogClock& clock) {
+  const std::span<const ClockPair> rows = clock.pairs();
+  if (rows.size() < 2 || text_in(folder / kClockName) != clock_bytes(rows)) return "none";
+  return crc32_of_bytes(clock_bytes(rows.first(rows.size() - 1)));
 }
 
 }  // namespace kerf

@@ -63,6 +63,11 @@ class Findings {
   bool in_manifest_ = false;
 };
 
+/// The checksum that clock.npy, from which `clock` was read, had before its last row; "none" if
+/// that is its first, or the file is not as a recorder writes it.
+[[nodiscard]] std::string checksum_before_last_row(const std::filesystem::path& folder,
+                                                   const LogClock& clock);
+
 /// Compares the files beside log and scene: those that the manifest lists with their checksums, the
 /// volumes of `scene` with their hashes, the inputs of the ticks before the log with their length.
 /// Names those that no recording has. `is_final`: a recorder ended it, so the manifest lists all.

@@ -154,10 +154,8 @@ class Check {
       return;
     }
     // The recorder writes the row first, and then its checksum.
-    const std::span<const ClockPair> rows = clock.pairs();
     const bool is_a_row_ahead =
-        !is_final() && rows.size() > 1 && text_in(folder_ / kClockName) == clock_bytes(rows) &&
-        findings_.lists(kClockName, crc32_of_bytes(clock_bytes(rows.first(rows.size() - 1))));
+        !is_final() && findings_.lists(kClockName, checksum_before_last_row(folder_, clock));
     if (!is_a_row_ahead) findings_.compare_file(std::string(kClockName));
   }
 
@@ -222,24 +220,24 @@ class Check {
       }
     }
     if (is_cut_) return;
-    if (arm > 0 && log.rows() < logs_.front().rows()) {
-      findings_.add(name, std::to_string(log.rows()) + " rows, and " + std::string(kTickLogName) +
+    const std::uint64_t rows = log.rows_in_files();
+    if (arm > 0 && rows < logs_.front().rows()) {
+      findings_.add(name, std::to_string(rows) + " rows, and " + std::string(kTickLogName) +
                               " has " + std::to_string(logs_.front().rows()));
     }
     if (!json().contains("rows")) return;
     if (is_final()) {
-      findings_.compare(json(), "rows", "rows", log.rows(), name);
+      findings_.compare(json(), "rows", "rows", rows, name);
       return;
     }
     try {
-      if (json().at("rows").get<std::uint64_t>() <= log.rows() ||
-          out_.manifest.end_reason == kNoRoom) {
+      if (json().at("rows").get<std::uint64_t>() <= rows || out_.manifest.end_reason == kNoRoom) {
         return;
       }
     } catch (const JsonError&) {  // NOLINT(bugprone-empty-catch): it is no number of rows
     }
     findings_.add_to_manifest("rows is " + shown(json().at("rows")) + ", and " + std::string(name) +
-                              " has " + std::to_string(log.rows()));
+                              " has " + std::to_string(rows));
   }
 
   /// Calls `visit` with the rows of each tick in the range, of all arms, up to the first that is

@@ -56,7 +56,8 @@ struct CheckedRecording {
 /// Writes manifest.json anew from scene and rows. What only the old one said (session, versions,
 /// how the run ended) is unknown then: nothing proves it. The old one is kept as manifest-old.json,
 /// and if there is one of that name, it stays. Throws `RecordError` if scene.json or the log cannot
-/// be read, `FileError` if the folder cannot be written.
+/// be read, or a checksum in the old one is not that of its file: a new one would hide the change;
+/// `FileError` if the folder cannot be written.
 void repair_manifest(const std::filesystem::path& folder);
 
 }  // namespace kerf

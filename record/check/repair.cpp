@@ -3,11 +3,14 @@
 #include <span>
 #include <string>
 #include <system_error>
+#include <utility>
 #include <vector>
 
+#include "record/check/old_manifest.hpp"
 #include "record/check/recording_check.hpp"
 #include "record/kept_volumes.hpp"
 #include "record/losses_of_rows.hpp"
+#include "record/manifest_seal.hpp"
 #include "record/recorder.hpp"
 #include "record/scene_facts.hpp"
 #include "shared/posix/atomic_file.hpp"
@@ -22,15 +25,15 @@ namespace fs = std::filesystem;
 
 constexpr std::string_view kOldName = "manifest-old.json";
 
-/// What the rows say, up to the first that is damaged.
+/// What the rows of the ticks that all arms have say, up to the first that is damaged.
 struct RowFacts {
   std::uint64_t rows = 0;
   std::uint64_t start_ns = 0;  ///< 0 in lock-step
   RecordLosses losses;
 };
 
-RowFacts row_facts(const fs::path& path, std::uint32_t tick_ns) {
-  TickLogReader log(path);
+RowFacts row_facts(const fs::path& folder, std::size_t arms, std::uint32_t tick_ns) {
+  TickLogReader log = std::move(open_logs(folder, arms).front());
   std::optional<LossesOfRows> losses;
   RowFacts out;
   out.rows = log.rows();
@@ -77,6 +80,15 @@ Json volumes_of(const fs::path& folder, const SceneFacts& scene) {
   return out;
 }
 
+/// Of the files that are the recording's by its scene and rows.
+Json checksums(const fs::path& folder, const SceneFacts& scene, std::uint64_t missed) {
+  Json files = Json::Members{};
+  for (const std::string& name : names_of_files(folder)) {
+    if (may_have_file(scene, name, missed)) files[name] = crc32_of_file(folder / name);
+  }
+  return files;
+}
+
 }  // namespace
 
 bool has_wrong_manifest(const fs::path& folder) {
@@ -100,6 +112,9 @@ void repair_manifest(const fs::path& folder) {
         ": has no rate, device or volumes, so no manifest can be made of it; copy the "
         "recording again");
   }
+  if (const std::string line = contradiction_to_manifest(folder, scene); !line.empty()) {
+    throw DamagedRecording(line);
+  }
   // What only the old one said is not proved: its own checksum is wrong.
   Json manifest = Json::Members{};
   manifest["session_id"] = "0000000000000000";  // of no run
@@ -110,14 +125,12 @@ void repair_manifest(const fs::path& folder) {
   std::error_code none;
   if (fs::exists(folder / kClockName, none)) manifest["clock"] = kClockName;
   manifest["volumes"] = volumes_of(folder, scene);
-  if (*scene.arms > 1) {
-    manifest["arms"] = *scene.arms;
-    static_cast<void>(TickLogReader(folder / tick_log_name(1)));  // else it is not whole
-  }
-  const RowFacts facts = row_facts(folder / kTickLogName, *scene.tick_ns);
+  if (*scene.arms > 1) manifest["arms"] = *scene.arms;
+  const RowFacts facts = row_facts(folder, *scene.arms, *scene.tick_ns);
   manifest["start_ns"] = facts.start_ns;
   keep_old(folder);
-  write_with_end(folder, std::move(manifest), facts.losses, facts.rows, kUnknownEnd, {});
+  const Json files = checksums(folder, scene, facts.losses.missed_before_start);
+  write_with_end(folder, std::move(manifest), facts.losses, facts.rows, kUnknownEnd, {}, &files);
 }
 
 }  // namespace kerf

@@ -77,8 +77,9 @@ shows the recorder's figures at once, reads no row, and says so; `info --scan` r
 
 A power cut leaves zeros, or half of what was written, behind the rows that the header counts. In a log that its recorder did not end, what
 is torn there is left out if no sound row follows it: one line says how many bytes and where, and all of these work with the rows before
-it (`kerf_reader` warns; `np.load` reads the counted rows alone). With two devices it ends with the ticks that both have. A damaged row that
-is counted, or has a sound one behind it, stays an error.
+it (`kerf_reader` warns; `np.load` reads the counted rows alone). With two devices both logs end, for all of these, with the ticks that both
+have. A damaged row that is counted, or has a sound one behind it, stays an error, as are ticks that the first header counts and the second
+log lacks.
 
 A folder with a file `ticks.npy` is a recording. Whatever is wrong in it, a file that is lost, damaged, of another form or against
 another one, ends all of these with exit code 1. They end with 2 for a folder that is none, for wrong arguments, and where the rights to
@@ -100,13 +101,21 @@ its own row, by the next one, or by the losses in the manifest.
 
 `np.load` compares nothing. It does not see rows that are damaged, doubled, exchanged or of another run, nor a manifest of another log;
 `kerf_reader.Log` compares what `info` does and raises `ValueError`, but for `config_hash` and the figures of the summary, for which it
-has the two CRC-32. What no reader can tell: in a log whose recorder was killed, rows that are
-missing behind the count of the header, which are cut off or torn, or lost ticks; and in logs of earlier versions, which have no `crc32`, the
-facts that only the manifest has.
+has the two CRC-32. What no reader can tell, and a replay alone may show:
+
+* in a log whose recorder was killed, rows that are missing behind the count of the header, which are cut off or torn, or lost ticks;
+* in such a log in lock-step, rows of another run of the same scene: time is virtual, so their first rows may be the same, and all checksums
+  of a file of rows are its own;
+* exchanged logs of two arms whose recorder was killed before the manifest had `first_rows`, which are there once the first 200 ms are synced;
+* in logs of earlier versions, which have no `crc32`, the facts that only the manifest has;
+* all that only a lost manifest said, after it was made anew.
 
 A `manifest.json` that is lost or wrong is made anew by `./kerf record check DIR/log --repair` from scene and rows; the old one stays as
 `manifest-old.json`. What only that said (session, versions, how the run ended) is unknown then, since nothing proves it, and `info` says
-who made the manifest anew.
+who made the manifest anew. If a checksum that can still be read in the wrong one (`files`, `first_rows`, `config_hash`) is not that of its
+file, the file was changed, too: one line names it, and all stays as it is. With the manifest lost altogether, or no JSON, nothing is left
+to compare with: the new one has the checksums of the files as they are now. It proves what scene and rows prove, `density_hash` and the
+`crc32c` of each row, but not that scene, clock, log of each arm and inputs are those of the run. It lists no file that no recording has.
 
 A recorder writes the manifest again when the volumes are on the disk, a file of the log begins or `clock.npy` gets a row, so a log whose
 recorder was killed is compared like any other. `check` also names each file in `volumes/`, `inputs/` or with the name of a log that is

@@ -19,7 +19,7 @@ ROOT, BIN = (pathlib.Path(sys.argv.pop(1)).resolve() for _ in range(2))
 EDITS = int(sys.argv.pop(1)) if len(sys.argv) > 1 and sys.argv[1].isdigit() else 200
 SEED = int(sys.argv.pop(1)) if len(sys.argv) > 1 and sys.argv[1].isdigit() else 68
 sys.path[:0] = [str(ROOT / "tests/record"), str(ROOT / "python")]
-from lockstep_run import record, sealed
+from lockstep_run import record, sealed, set_clock
 try:
     import kerf_reader
 except ImportError:
@@ -356,6 +356,70 @@ class TestCheck(unittest.TestCase):
                 self.assertEqual(code, 1)
                 self.assertNotIn("made anew", said + wrong)
                 self.assertEqual((log / "manifest.json").read_bytes(), before)
+
+    def test_a_repair_hides_no_change_that_the_old_manifest_tells(self):
+        def scene(log):
+            text = (log / "scene.json").read_text()
+            (log / "scene.json").write_text(text.replace('"stiffness_n_per_mm":', '"stiffness_n_per_mm":1'))
+
+        def clock(log):
+            before = (log / "manifest.json").read_text()
+            set_clock(log, (0, 10**18))
+            (log / "manifest.json").write_text(before)
+
+        def volume(log):
+            path = next((log / "volumes").iterdir())
+            path.write_bytes(path.read_bytes()[:4] + b"\1" + path.read_bytes()[5:])  # the date in the header of gzip
+
+        def lost_clock(log):
+            (log / "clock.npy").unlink()
+
+        def rows(log):
+            (log / "ticks.npy").write_bytes((self.flight / "ticks.npy").read_bytes())
+
+        for change, name in ((scene, "scene.json"), (clock, "clock.npy"), (volume, "volumes/"), (lost_clock, "clock.npy"), (rows, "ticks.npy")):
+            for damage in (('"compiler": "', '"compiler": "b'), ('"tick_ns": ', '"tick_ns": -'), ('"session_id": "', '"session_id": "x')):
+                with self.subTest(change=change.__name__, damage=damage):
+                    log = self.copy()
+                    change(log)
+                    path = log / "manifest.json"
+                    path.write_text(path.read_text().replace(*damage, 1))
+                    was = path.read_bytes()
+                    code, said, wrong = check(log, "--repair")
+                    self.assertEqual((code, said), (1, ""))
+                    self.assertRegex(wrong, rf"^kerf-record: {log}/{name}[^\n]*(checksum|begin)[^\n]*, so no manifest is made anew; copy the recording again\n$")
+                    self.assertEqual((path.read_bytes(), (log / "manifest-old.json").exists()), (was, False))
+
+    def test_a_wrong_scene_is_not_repaired_in_a_log_without_its_checksum(self):
+        log = self.with_manifest(lambda manifest: manifest.pop("files"), seal=False)  # of an earlier version
+        text = (log / "scene.json").read_text()
+        (log / "scene.json").write_text(text.replace('"stiffness_n_per_mm":', '"stiffness_n_per_mm":1'))
+        (log / "manifest.json").write_text((log / "manifest.json").read_text().replace('"tick_ns": ', '"tick_ns": 1', 1))
+        code, said, wrong = check(log, "--repair")
+        self.assertEqual((code, said, wrong.count("\n")), (1, "", 1), wrong)
+        self.assertIn("scene.json: its config_hash is ", wrong)
+
+    def test_a_checksum_of_another_form_and_a_wrong_config_hash_are_repaired(self):
+        for change in (lambda manifest: manifest["files"].update({"scene.json": "0000000g"}), lambda manifest: manifest["files"].update({"scene.json": 7}),
+                       lambda manifest: manifest["files"].update({"../scene.json": "00000000", "notes.txt": "00000000"}),
+                       lambda manifest: manifest.update(files=[]), lambda manifest: manifest.update(first_rows="x"),
+                       lambda manifest: manifest.update(first_rows=[-1]), lambda manifest: manifest.update(config_hash="00" * 8)):
+            log = self.with_manifest(change, seal=False)
+            code, said, wrong = check(log, "--repair")
+            self.assertEqual((code, "made anew" in said, wrong), (0, True, ""), said)
+
+    def test_a_repair_lists_no_file_that_no_recording_has(self):
+        for of, names in ((self.log, ("volumes/notes.txt", "inputs/000000000001.npy.gz", "inputs-2/000000000001.npy.gz", "volumes/0123456789abcdef.npy.gz")),
+                          (self.flight, ("inputs/notes.txt", "inputs/000000000002.npy.gz", "inputs/000001048577.npy.gz"))):
+            for name in names:
+                log = self.copy(of)
+                (log / "manifest.json").unlink()
+                (log / name).parent.mkdir(exist_ok=True)
+                (log / name).write_bytes(b"notes")
+                code, said, wrong = check(log, "--repair")
+                self.assertEqual((code, "made anew" in said), (1, True), said)
+                self.assertEqual(wrong, f"kerf-record: {log / name}: manifest.json does not list it; remove it\n")
+                self.assertNotIn(name, json.loads((log / "manifest.json").read_text())["files"])
 
     def test_a_part_of_a_log_behind_lost_ones_is_told(self):
         for log in (self.copy(), self.killed()[0]):

@@ -103,6 +103,11 @@ class TestKilledLog(unittest.TestCase):
         (log / "ticks-2.npy").rename(log / "ticks.npy")
         (log / "one.npy").rename(log / "ticks-2.npy")
         self.assert_told(log, "ticks.npy: does not begin with the row that its recorder wrote first")
+        path = log / "manifest.json"
+        path.write_text(path.read_text().replace('"compiler": "', '"compiler": "b', 1))
+        code, said, wrong = run("kerf-record", "check", log, "--repair")
+        self.assertEqual((code, said, wrong.count("\n")), (1, "", 1), wrong)
+        self.assertIn("ticks.npy: does not begin with the row that manifest.json has the checksum of, so no manifest is made anew; copy", wrong)
 
     def test_a_recorder_may_be_killed_between_clock_and_manifest(self):
         log = self.copy(self.log)
@@ -169,9 +174,9 @@ class TestKilledLog(unittest.TestCase):
                 log, left = self.torn(of, tears)
                 first = next(iter(left))
                 rows = min(left.values()) + sum((path.stat().st_size - HEADER) // ROW for path in log.glob("ticks.npy*") if path < first)
-                said = [f"{path}: {path.stat().st_size - HEADER - min(own, rows) * ROW} bytes behind its {min(own, rows)} rows are left out"
-                        for path, own in left.items() if path.stat().st_size - HEADER >= (own + 1) * ROW or path == first and own > rows] \
-                    if of != self.split else [f"{first}: {5 * ROW + 1234} bytes behind its {left[first]} rows are left out"]
+                said = [f"{path}: {path.stat().st_size - HEADER - own * ROW} bytes behind its {own} rows are left out, since they are torn"
+                        for path, own in left.items() if path.stat().st_size - HEADER >= (own + 1) * ROW]
+                self.assertEqual([line.split(": ")[0] for line in said], [str(path) for path in left if path.name.split(".npy")[0] + ".npy" in tears])
                 csv, mcap = log.parent / "out.csv", log.parent / "out.mcap"
                 for program, *arguments in (("kerf-record", "check", log), ("kerf-record", "info", log), ("kerf-record", "export", log, "--csv", csv),
                                             ("kerf-record", "export", log, "--mcap", mcap), ("kerf-replay", log),
@@ -187,11 +192,33 @@ class TestKilledLog(unittest.TestCase):
                     if program == "kerf-replay":
                         self.assertIn(f"{rows} ticks, each equal", out)
                 self.assertEqual(len(csv.read_text().splitlines()), 1 + rows)
+                if of == self.two:
+                    self.assertEqual(run("kerf-record", "export", log, "--csv", csv, "--arm", "2")[0], 0)
+                    self.assertEqual(len(csv.read_text().splitlines()), 1 + rows)
+                    self.assertRegex(run("kerf-record", "info", log, "--arm", "2")[1], rf"\nrows +{rows}\n")
                 if kerf_reader:
                     with warnings.catch_warnings(record=True) as warned:
                         warnings.simplefilter("always")
-                        self.assertEqual(len(kerf_reader.Log(log)), rows)
+                        read = kerf_reader.Log(log)
+                    self.assertEqual([len(arm) for arm in (read.ticks, read.second) if arm is not None], [rows] * (1 + (of == self.two)))
                     self.assertEqual([line in str(warning.message) for line, warning in zip(said, warned)], [True] * len(said))
+
+    def test_a_manifest_made_anew_counts_the_ticks_that_both_arms_have(self):
+        for torn in ("ticks.npy", "ticks-2.npy"):
+            log, left = self.torn(self.two, {torn: 100 * ROW})
+            (log / "manifest.json").unlink()
+            code, said, wrong = run("kerf-record", "check", log, "--repair")
+            self.assertEqual((code, "made anew" in said, wrong.count("\n")), (0, True, 1), wrong)
+            self.assertEqual(json.loads((log / "manifest.json").read_text())["rows"], min(left.values()))
+            self.assertEqual(check(log)[0], 0)
+
+    def test_a_second_arm_without_ticks_that_the_first_counts_is_an_error(self):
+        log, left = self.torn(self.two, {"ticks-2.npy": 301 * ROW})
+        second = log / "ticks-2.npy"
+        data = second.read_bytes()
+        begin, _ = data[:HEADER].split(b"'shape': (")
+        second.write_bytes((begin + b"'shape': (10,), }").ljust(HEADER - 1) + b"\n" + data[HEADER:])
+        self.assert_told(log, f"{second}: {left[second]} rows, and ticks.npy has ")
 
     def test_a_row_that_is_damaged_among_sound_ones_stays_an_error(self):
         for of in (self.log, self.two):

@@ -102,10 +102,11 @@ TEST_CASE(
     std::uint64_t rows = 0;
     log.for_each([&](const TickRecord&) { ++rows; });
     CHECK(rows == kSound - 1);
-    log.end_at(kCounted - 1);  // which is counted
-    CHECK(log.rows() == kSound - 1);
     log.end_at(kCounted);
+    log.end_at(kSound);
     CHECK(log.rows() == kCounted);
+    CHECK(log.rows_in_files() == kSound - 1);
+    CHECK(log.parts()[0].bytes_left == (kTorn + 1) * sizeof(TickRecord) + 7);
   }
   zero(end_of(700), 3);  // a row among sound ones
   CHECK(error_of([&] {
