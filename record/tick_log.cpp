@@ -161,9 +161,10 @@ std::string part_behind(const std::filesystem::path& path, std::size_t part) {
 
 TickLogReader::TickLogReader(std::filesystem::path path) : path_(std::move(path)) {
   static_cast<void>(add_part(path_));
-  const auto is_there = [&](std::size_t part) {
+  const auto is_there = [&](std::size_t part) {  // a folder, a pipe or a dangling link, too
     std::error_code fault;
-    return std::filesystem::is_regular_file(part_of_log(path_, part), fault);
+    return std::filesystem::symlink_status(part_of_log(path_, part), fault).type() !=
+           std::filesystem::file_type::not_found;
   };
   // The last one has no header yet if its recorder was killed as it began it.
   std::size_t part = 2;

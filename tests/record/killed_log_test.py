@@ -3,6 +3,7 @@
 
     killed_log_test.py ROOT BIN [TEST]"""
 import json
+import os
 import pathlib
 import shutil
 import subprocess
@@ -248,6 +249,19 @@ class TestKilledLog(unittest.TestCase):
                     self.assertRegex(said, rf"^kerf-record: {log / name}: .*; remove it\n$")
                     if kerf_reader:  # as info it reads no such file
                         self.assertEqual((run("kerf-record", "info", log)[0], len(kerf_reader.Log(log)) > 1000), (0, True))
+
+    def test_what_stands_in_place_of_a_file_of_a_log_is_told_in_one_line(self):
+        for of, name in ((self.whole, "ticks.npy.0002"), (self.whole, "ticks.npy.0003"), (self.whole, "ticks.npy.0004"), (self.split, "ticks.npy.0003"),
+                         (self.log, "ticks.npy.0002"), (self.two, "ticks-2.npy.0002")):
+            for make, words in ((pathlib.Path.mkdir, "no regular file; copy"), (os.mkfifo, "no regular file; copy"),
+                                (lambda path: path.symlink_to("nowhere"), "cannot be read; copy")):
+                with self.subTest(of=of.parent.name, name=name, words=words):
+                    log = self.copy(of)
+                    (log / name).unlink(missing_ok=True)
+                    make(log / name)
+                    for program, *arguments in (("kerf-record", "check", log), ("kerf-record", "info", log), ("kerf-replay", log)):
+                        code, _, said = run(program, *arguments)
+                        self.assertEqual((code, said), (1, f"{program}: {log / name}: {words} the recording again\n"))
 
     def test_each_byte_of_a_header_is_compared_by_all(self):
         rows = (self.whole / "ticks.npy").read_bytes()
