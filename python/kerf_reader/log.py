@@ -1,128 +1,69 @@
 # SPDX-License-Identifier: Apache-2.0
-import json
 import pathlib
 import warnings
 
 import numpy as np
 
-from .check import HEADER_BYTES, header_of, opened, parts_of, problems, sound_end
-from .layout import CLOCK, STARTED, TICK
+from .check import problems
+from .files import HEADER_BYTES, TickLog, bytes_of, counted_by, end_together, words_of
+from .layout import CLOCK, STARTED
 
 
-def _rows_of(file, kind=TICK):
-    """All complete rows, also those that the header of a recorder that was killed does not count."""
-    with opened(file) as head:
-        size = file.stat().st_size
-        try:
-            np.lib.format.read_magic(head)
-            shape, _, dtype = np.lib.format.read_array_header_1_0(head)
-            rows = (size - head.tell()) // max(dtype.itemsize, 1)
-            if rows < np.prod(shape, dtype=object):
-                raise ValueError
-            offset = head.tell()
-        except OSError:
-            raise
-        except Exception:  # each release of NumPy has its own, of which some are of its parser
-            what = "is empty" if size == 0 else f"{size} bytes are no table of NumPy, or the file was cut"
-            raise ValueError(f"{file}: {what}; record it again, or give the folder of another recording") from None
-        head.seek(0)
-        is_ours = len(shape) == 1 and head.read(HEADER_BYTES[kind]) == header_of(kind, shape[0])
-    if not is_ours:
-        raise ValueError(f"{file}: no ticks of this version of kerf; give the folder of a recording, or use its kerf_reader")
-    return np.memmap(file, kind, "r", offset, rows) if rows else np.empty(0, kind)
+def _clock_of(file, text):
+    size = HEADER_BYTES[CLOCK]
+    counted_by(file, CLOCK, text[:size], len(text))
+    return np.frombuffer(text, CLOCK, (len(text) - size) // CLOCK.itemsize, size)
 
 
-def _counted_by(file):
-    with opened(file) as head:
-        np.lib.format.read_magic(head)
-        return np.lib.format.read_array_header_1_0(head)[0][0]
-
-
-def _all_rows_of(file, as_it_is):
-    """The rows, and how many of them may not be left out: the headers count them."""
-    parts = parts_of(file)
-    rows = [_rows_of(path) for path in parts]
-    counted = _counted_by(parts[-1])
-    before = sum(map(len, rows[:-1]))
-    if not as_it_is:
-        rows[-1] = rows[-1][:sound_end(rows[-1], counted)]
-    return rows[0] if len(rows) == 1 else np.concatenate(rows), before + counted
-
-
-def _no_json(word):
-    raise ValueError(f"{word} is no JSON")
-
-
-def _words_of(file):
-    with opened(file) as bytes_of:
-        text = bytes_of.read()
-    twice = []
-
-    def members(pairs):
-        words = {}
-        for name, value in pairs:
-            if name in words:
-                twice.append(name)
-            words[name] = value
-        return words
-
-    try:
-        words = json.loads(text.decode(), object_pairs_hook=members, parse_constant=_no_json)
-    except (ValueError, RecursionError):
-        raise ValueError(f"{file}: no JSON, or the file was cut; give the folder of another recording") from None
-    if twice:
-        raise ValueError(f'{file}: "{twice[0]}" stands twice in it; copy the recording again')
-    if not isinstance(words, dict):
-        raise ValueError(f"{file}: no table of names and values; give the folder of another recording")
-    return words
+def _remedy(folder, error):
+    if isinstance(error, PermissionError):
+        return "check its rights"
+    if any((folder / name).exists() for name in ("ticks.npy", "manifest.json")):
+        return "copy the recording again"
+    below = folder / "log"  # of --out of a demo
+    return f"give {below if (below / 'ticks.npy').is_file() else 'the folder of a recording'}"
 
 
 class Log:
     """What kerf-recorder wrote into `folder`; docs/log.md tells each column.
 
     ticks: one row for each tick, read from the disk as it is used; of a log that was split, from memory. second: of a run with
-    two devices the second's rows, row i of the same tick as row i of ticks; else None. scene, manifest: as dictionaries. clock:
-    readings of CLOCK_MONOTONIC and UTC at one moment; None in logs of earlier versions. Reads all rows once and compares what
-    `kerf record info` does; what is damaged raises ValueError, and what a power cut tore behind the
-    rows that the header counts is left out with a warning. check=False opens a long log at once, as it is."""
+    two devices the second's rows, row i of the same tick as row i of ticks, and as many; else None. scene, manifest: as
+    dictionaries. clock: readings of CLOCK_MONOTONIC and UTC at one moment; None in logs of earlier versions. Reads all rows once
+    and compares what `kerf record info` does; what is damaged raises ValueError, and what a power cut tore behind the rows that
+    the header counts is left out with a warning. A log that still grows is read as it is at this moment. check=False opens a
+    long log at once, as it is: its arms may differ in length."""
 
     def __init__(self, folder, check=True):
         folder = pathlib.Path(folder)
         try:
-            self.ticks, counted = _all_rows_of(folder / "ticks.npy", not check)
-            self.manifest = _words_of(folder / "manifest.json")
-            self.scene = _words_of(folder / "scene.json")
-            self.clock = _rows_of(folder / "clock.npy", CLOCK) if "clock" in self.manifest else None
-            self.second = _all_rows_of(folder / "ticks-2.npy", not check)[0] if self.manifest.get("arms") == 2 else None
+            (folder / "ticks.npy").stat()  # what is no recording is told so
+            # The manifest first, and the second arm last: what a recorder wrote down is there when the next is read.
+            texts = {name: bytes_of(folder / name) for name in ("manifest.json", "scene.json")}
+            self.manifest, self.scene = (words_of(folder / name, text) for name, text in texts.items())
+            clock = folder / "clock.npy"
+            self.clock = None
+            if "clock" in self.manifest or clock.exists():
+                texts["clock.npy"] = bytes_of(clock)
+                self.clock = _clock_of(clock, texts["clock.npy"])
+            names = ("ticks.npy", "ticks-2.npy")[:2 if self.manifest.get("arms") == 2 else 1]
+            logs = [TickLog(folder / name, check) for name in names]
         except OSError as error:
-            below = folder / "log"  # of --out of a demo
-            way = below if (below / "ticks.npy").is_file() else "the folder of a recording"
-            raise ValueError(f"{error.filename}: {error.strerror}; give {way}") from None
+            raise ValueError(f"{error.filename}: {error.strerror}; {_remedy(folder, error)}") from None
         if check:
-            self._check(folder)
-            for rows, name in ((self.ticks, "ticks.npy"), (self.second, "ticks-2.npy")):
-                if rows is not None:
-                    self._tell_torn(rows, folder / name)
-            if self.second is not None:  # of a recorder that was killed they end with the ticks that both have
-                both = min(len(self.ticks), len(self.second))
-                if both < counted:
-                    raise ValueError(f"{folder / 'ticks-2.npy'}: {both} rows, and ticks.npy has {len(self.ticks)}; copy the recording again")
-                self.ticks, self.second = self.ticks[:both], self.second[:both]
+            end_together(logs)
+            self._check(folder, logs, texts)
+        self.ticks = logs[0].rows
+        self.second = None if len(logs) == 1 else logs[1].rows
+        for log in logs if check else ():
+            if log.torn:
+                path, left, rows = log.torn
+                warnings.warn(f"{path}: {left} bytes behind its {rows} rows are left out, since they are torn and the recorder had not "
+                              "counted them; the rows before are sound", stacklevel=2)
 
-    def _tell_torn(self, rows, file):
-        parts = parts_of(file)
-        own = len(rows) - sum((part.stat().st_size - 4096) // TICK.itemsize for part in parts[:-1])
-        left = parts[-1].stat().st_size - 4096 - own * TICK.itemsize
-        if left >= TICK.itemsize:
-            warnings.warn(f"{parts[-1]}: {left} bytes behind its {own} rows are left out, since they are torn and the recorder had not counted "
-                          "them; the rows before are sound", stacklevel=3)
-
-    def _check(self, folder):
-        logs = [self.ticks] if self.second is None else [self.ticks, self.second]
+    def _check(self, folder, logs, texts):
         try:
-            found = next(problems(folder, self.manifest, self.scene, logs, self.clock), None)
-        except OSError as error:
-            found = f"{error.filename}: {error.strerror}; copy the recording again"
+            found = next(problems(folder, self.manifest, self.scene, logs, self.clock, texts), None)
         except (ArithmeticError, AttributeError, KeyError, RecursionError, TypeError):  # another shape than that of any recorder
             found = f"{folder}: manifest.json and scene.json are not those of a recording; give the folder of another one"
         if found:

@@ -86,14 +86,18 @@ cp -r "$work/log" "$work/empty"
 PYTHONPATH=$root/python "$python" - "$work" <<'PY'
 import sys
 import numpy as np
-from kerf_reader.check import _crc32c
+from kerf_reader.rows import crc32c
 for name in ("free", "idle"):
-    rows = np.load(f"{sys.argv[1]}/{name}/ticks.npy")
+    path = f"{sys.argv[1]}/{name}/ticks.npy"
+    with open(path, "rb") as log:
+        header = log.read(4096)  # np.save writes another one
+    rows = np.load(path)
     rows["commanded_force_n"] = 0
     if name == "idle":
         rows["velocity_mm_per_s"] = np.nan
-    rows["crc32c"] = _crc32c(rows, 8)
-    np.save(f"{sys.argv[1]}/{name}/ticks.npy", rows)
+    rows["crc32c"] = crc32c(rows, 8)
+    with open(path, "wb") as log:
+        log.write(header + rows.tobytes())
 PY
 truncate -s -100 "$work/cut/ticks.npy"
 : >"$work/empty/ticks.npy"

@@ -114,7 +114,7 @@ pathlib.Path("log/scene.json").write_bytes(of_log)
 os.mkdir("empty")
 refused(lambda: Log("empty"), ValueError, ["empty/ticks.npy: No such file", "give the folder"])
 whole = pathlib.Path("log/ticks.npy").read_bytes()
-pathlib.Path("log/manifest.json").rename("manifest.json")
+pathlib.Path("log/manifest.json").rename("kept.json")
 refused(lambda: Log("."), ValueError, ["ticks.npy: No such file", "; give log"])
 for text, why in (("{", "no JSON"), ("3", "no table"), ("[]", "no table"), ("{}", "tick_ns"), ('{"tick_ns": "1"}', "tick_ns"),
                   ('{"tick_ns": 0}', "tick_ns"), ('{"tick_ns": true}', "tick_ns")):

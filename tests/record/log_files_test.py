@@ -12,6 +12,7 @@ import sys
 import tempfile
 import time
 import unittest
+import warnings
 
 import numpy as np
 
@@ -72,6 +73,34 @@ class TestLogFiles(unittest.TestCase):
         self.assertGreater(len(rows), len(np.load(ticks, mmap_mode="r")))
         self.assertEqual(rows["tick"].tolist(), list(range(int(rows["tick"][0]), int(rows["tick"][-1]) + 1)))
         self.assertTrue(Log(log).ticks.tobytes() == rows.tobytes())
+
+    def test_a_log_that_grows_is_read_without_a_word(self):
+        quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "env": os.environ | {"XDG_RUNTIME_DIR": str(self.folder)}}
+        log, ports, programs = self.folder / "log", [], []
+        for number, (hand, *options) in enumerate((["cut_cavity.toml"], ["groove.toml", "--personality", "touch"])):
+            device = self.folder / f"device-{number}"
+            ports += ["--port", f"socket:{device}"]
+            programs.append(subprocess.Popen([BIN / "kerf-emulator", "--socket", device, "--hand", ROOT / "scenes/hands" / hand, *options], **quiet))
+        programs.append(recorder := subprocess.Popen([BIN / "kerf-recorder", "--name", "grows", "--out", log, "--split", "1s"], **quiet))
+        try:
+            while not all((self.folder / f"device-{number}").exists() for number in (0, 1)):
+                time.sleep(0.02)
+            programs.append(subprocess.Popen([BIN / "kerf-controller", "--scene", ROOT / "scenes/two_arms.toml", "--name", "grows", *ports,
+                                              "--seconds", "3", "--torque-scale", "0.05,0.05,0.05,1,1,1"], **quiet))
+            while not (log / "manifest.json").exists():
+                time.sleep(0.005)
+            lengths = []
+            with warnings.catch_warnings():
+                warnings.simplefilter("error")
+                while recorder.poll() is None:
+                    read = Log(log)
+                    self.assertEqual(read["tick"].tolist(), read.second["tick"].tolist())
+                    lengths.append(len(read))
+        finally:
+            for program in programs:
+                program.terminate()
+                program.wait()
+        self.assertEqual((lengths, len(set(lengths)) > 1), (sorted(lengths), True))
 
     def test_a_split_log_is_read_as_one(self):
         record(ROOT, BIN, self.folder, ROOT / "scenes/touch.toml", 4, recorder=("--split", "1s"))

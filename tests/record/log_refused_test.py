@@ -12,6 +12,8 @@ import subprocess
 import sys
 import tempfile
 import unittest
+import zlib
+from unittest import mock
 
 ROOT, BIN = (pathlib.Path(sys.argv.pop(1)).resolve() for _ in range(2))
 sys.path[:0] = [str(ROOT / "tests/record"), str(ROOT / "python")]
@@ -91,6 +93,64 @@ class TestLogRefused(unittest.TestCase):
                 self.assertEqual(subprocess.run([BIN / "kerf-record", "info", log], capture_output=True).returncode, 1)
                 with self.assertRaisesRegex(ValueError, f"ticks.npy: .*{reader}"):
                     Log(log)
+
+    def test_takes_and_refuses_texts_as_the_programs_do(self):
+        def manifest(change):
+            def on(log):
+                text = change((log / "manifest.json").read_bytes().rpartition(b',\n  "crc32"')[0])
+                (log / "manifest.json").write_bytes(text + b',\n  "crc32": "%08x"\n}\n' % zlib.crc32(text))
+            return on
+
+        def put(text):
+            return manifest(lambda before: before.replace(b'  "lost_ticks"', b'  "other": ' + text + b',\n  "lost_ticks"', 1))
+
+        def scene(change):
+            def on(log):
+                path = log / "scene.json"
+                path.write_bytes(change(path.read_bytes()))
+                words = json.loads((log / "manifest.json").read_text())
+                words["files"]["scene.json"] = f"{zlib.crc32(path.read_bytes()):08x}"
+                (log / "manifest.json").write_text(sealed(words))
+            return on
+
+        def without_clock(log):
+            (log / "manifest.json").write_text(sealed({key: value for key, value in self.manifest.items() if key != "clock"}))
+
+        rows, mark = b'"rows": %d' % self.manifest["rows"], b"\xef\xbb\xbf"
+        for what, change, code in (
+                ("rows as a fraction", manifest(lambda text: text.replace(rows, rows + b".0")), 1), ("1e400", put(b"1e400"), 1),
+                ("10^400", put(b"1" + b"0" * 400), 1), ("10^300", put(b"1" + b"0" * 300), 0), ("half a pair", put(b'"\\ud800"'), 1),
+                ("a pair", put(b'"\\ud83d\\ude00"'), 0), ("64 levels", put(b"[" * 63 + b"]" * 63), 0), ("65", put(b"[" * 64 + b"]" * 64), 1),
+                ("a mark", manifest(lambda text: mark + text), 0), ("two marks", manifest(lambda text: mark * 2 + text), 1),
+                ("a mark in the scene", scene(lambda text: mark + text), 0), ("a zero behind it", scene(lambda text: text + b"\0"), 0),
+                ("a zero in it", scene(lambda text: text[:50] + b"\0" + text[50:]), 1), ("1e400 in it", scene(lambda text: b'{"a":1e400,' + text[1:]), 1),
+                ("lost_ticks", manifest(lambda text: text.replace(b'"lost_ticks": 0', b'"lost_ticks": 3')), 1), ("no clock", without_clock, 0)):
+            change(log := self.copy())
+            with self.subTest(what):
+                self.assertEqual(subprocess.run([BIN / "kerf-record", "info", log], capture_output=True).returncode, code)
+                if code:
+                    self.assertRaises(ValueError, Log, log)
+                else:
+                    self.assertEqual(len(Log(log).utc), self.manifest["rows"])
+
+    def test_names_the_remedy_for_a_file_that_is_lost(self):
+        for name in ("manifest.json", "scene.json", "clock.npy", "ticks-2.npy"):
+            (log := self.copy()).joinpath(name).unlink(missing_ok=True)
+            if name == "ticks-2.npy":
+                (log / "manifest.json").write_text(sealed({**self.manifest, "arms": 2}))
+            with self.subTest(name), self.assertRaises(ValueError) as raised:
+                Log(log)
+            self.assertEqual(str(raised.exception), f"{log / name}: No such file or directory; copy the recording again")
+        for folder, way in ((log.parent, f"give {log}"), (log.parent / "none", "give the folder of a recording")):
+            with self.assertRaisesRegex(ValueError, f"ticks.npy: No such file or directory; {way}$"):
+                Log(folder)
+
+    def test_reads_a_header_again_that_is_written_meanwhile(self):
+        count = (len(self.rows) - HEADER) // 496
+        for half in (self.rows[:HEADER].replace(b"(%d," % count, b"(%d," % (9 * 10**len(str(count)))), self.rows[:100].ljust(HEADER, b"\0")):
+            with mock.patch("os.pread", side_effect=[half[:HEADER], self.rows[:HEADER]]) as reads:
+                self.assertEqual(len(Log(self.log)), count)
+            self.assertEqual(reads.call_count, 2)
 
     def test_takes_parts_by_number(self):
         log = self.copy()
