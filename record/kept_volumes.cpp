@@ -50,6 +50,7 @@ std::string volume_header(const VoxelGrid& grid, std::size_t voxel_bytes) {
 std::optional<VolumeContent> read_starting_volume(const fs::path& folder, std::string_view hash,
                                                   const VoxelGrid& grid) {
   const fs::path path = density_path(folder, hash);
+  require_rights(path);
   std::error_code fault;
   if (!is_volume_hash(hash) || !fs::is_regular_file(path, fault)) return std::nullopt;
   VolumeContent out;

@@ -2,10 +2,15 @@
 #include "record/packed_npy.hpp"
 
 #include <algorithm>
+#include <cerrno>
+#include <string>
 #include <system_error>
 
+#include <unistd.h>
 #include <zlib.h>
 
+#include "record/tick_log.hpp"
+#include "shared/posix/error_text.hpp"
 #include "shared/posix/gzip_writer.hpp"
 
 namespace kerf {
@@ -16,6 +21,15 @@ gzFile handle(void* file) noexcept {
 }
 
 }  // namespace
+
+void require_rights(const std::filesystem::path& path) {
+  if (access(path.c_str(), R_OK) == 0 || errno != EACCES) return;
+  std::string why = access_error(path);
+  if (why.empty()) {
+    why = ": cannot be read (" + std::generic_category().message(EACCES) + "); check its rights";
+  }
+  throw RecordError(path.string() + why);
+}
 
 void write_packed_npy(AtomicFile& file, std::string_view header,
                       std::span<const std::byte> content) {
@@ -32,6 +46,7 @@ void PackedNpyReader::Close::operator()(void* file) const noexcept {
 }
 
 PackedNpyReader::PackedNpyReader(const std::filesystem::path& path, std::string_view header) {
+  require_rights(path);
   std::error_code fault;
   if (!std::filesystem::is_regular_file(path, fault)) return;  // opening a pipe would block
   file_.reset(gzopen(path.c_str(), "rb"));

@@ -14,6 +14,9 @@
 
 namespace kerf {
 
+/// Throws `RecordError` if the right to read a file or folder of a recording is missing.
+void require_rights(const std::filesystem::path& path);
+
 /// No such file with `bytes` of content is larger: what deflate cannot pack it stores, with 5 bytes
 /// for each 16 KiB; header and gzip need less than a page.
 [[nodiscard]] constexpr std::uintmax_t most_packed_bytes(std::uintmax_t bytes) noexcept {

@@ -12,6 +12,7 @@
 #include "record/input_rows.hpp"
 #include "record/kept_volumes.hpp"
 #include "record/manifest_seal.hpp"
+#include "record/packed_npy.hpp"
 #include "record/scene_facts.hpp"
 #include "record/tick_log.hpp"
 #include "shared/text/text.hpp"
@@ -79,7 +80,7 @@ void check_volume(const SceneFacts::Volume& volume, std::size_t number, Findings
   std::optional<VolumeContent> content;
   try {
     content = read_starting_volume(findings.folder(), volume.density_hash, {nx, ny, nz});
-  } catch (const RecordError& error) {
+  } catch (const DamagedRecording& error) {
     findings.add_line(error.what());
   }
   const Json& volumes = findings.json().at("volumes");
@@ -96,7 +97,7 @@ void check_inputs(std::size_t arms, Findings& findings) {
     InputReader inputs(findings.folder(), findings.manifest().losses.missed_before_start, arms);
     while (!inputs.next().empty()) {
     }
-  } catch (const RecordError& error) {
+  } catch (const DamagedRecording& error) {
     findings.add_line(error.what());
   }
 }
@@ -117,6 +118,9 @@ std::vector<std::string> without_checksum(const Findings& findings) {
 
 std::vector<std::string> check_files(const SceneFacts& scene, std::size_t arms, bool is_final,
                                      Findings& findings) {
+  for (const std::string_view below : {inputs_name(0), inputs_name(1), kVolumesName}) {
+    require_rights(findings.folder() / below);  // else its files are not known
+  }
   check_listed_files(scene, is_final, findings);
   check_other_logs(arms, findings);
   for (std::size_t v = 0; v < scene.volumes.size(); ++v)

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "record/log_clock.hpp"
+#include "record/packed_npy.hpp"
 #include "shared/posix/atomic_file.hpp"
 #include "shared/text/text.hpp"
 
@@ -52,6 +53,7 @@ bool Findings::lists(std::string_view name, std::string_view checksum) const {
 void Findings::compare_file(const std::string& name) {
   const auto listed = std::ranges::find(files_, name, &Json::Member::key);
   if (listed == files_.end()) return;
+  require_rights(folder_ / name);
   const std::string is = crc32_of_file(folder_ / name);
   if (is.empty()) {
     add(one_line(name), "cannot be read, and manifest.json has its checksum");

@@ -12,6 +12,7 @@
 #include "record/input_rows.hpp"
 #include "record/kept_volumes.hpp"
 #include "record/manifest_seal.hpp"
+#include "record/packed_npy.hpp"
 #include "record/tick_log.hpp"
 #include "shared/text/json.hpp"
 #include "shared/text/text.hpp"
@@ -68,6 +69,7 @@ std::string contradiction_to_files(const fs::path& folder, const SceneFacts& sce
   for (const auto& [name, listed] : *files) {
     if (!may_have_file(scene, name, UINT64_MAX) || !listed.is_text()) continue;
     const auto checksum = listed.get<std::string>();
+    require_rights(folder / name);
     const std::string is = crc32_of_file(folder / name);
     if (!is_hex(checksum, 8) || checksum == is) continue;
     if (is.empty()) {

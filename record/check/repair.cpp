@@ -73,7 +73,7 @@ Json volumes_of(const fs::path& folder, const SceneFacts& scene) {
     try {
       const auto content = read_starting_volume(folder, volume.density_hash, {nx, ny, nz});
       if (content) one["initial_hash"] = hex64(density_hash(content->density));
-    } catch (const RecordError&) {  // NOLINT(bugprone-empty-catch): the check reports it
+    } catch (const DamagedRecording&) {  // NOLINT(bugprone-empty-catch): the check reports it
     }
     out.push_back(std::move(one));
   }

@@ -421,6 +421,25 @@ class TestCheck(unittest.TestCase):
                 self.assertEqual(wrong, f"kerf-record: {log / name}: manifest.json does not list it; remove it\n")
                 self.assertNotIn(name, json.loads((log / "manifest.json").read_text())["files"])
 
+    def test_missing_rights_end_a_check_with_2(self):
+        user = ["setpriv", "--reuid", "65534", "--clear-groups"]
+        if os.geteuid() or subprocess.run([*user, BIN / "kerf-record", "--help"], capture_output=True).returncode:
+            self.skipTest("no right to be another user")
+        self.folder.chmod(0o755)
+        for name in ("volumes", "volumes/*", "inputs", "inputs/*"):
+            for rights in (0, 0o444):
+                log = self.copy(self.flight)
+                log.parent.chmod(0o755)
+                path = min(log.glob(name))
+                if rights and path.is_file():
+                    continue
+                path.chmod(rights)
+                for program, *arguments in (("kerf-record", "check", log), ("kerf-replay", log)):
+                    with self.subTest(name=name, rights=rights, program=program):
+                        done = subprocess.run([*user, BIN / program, *arguments], capture_output=True, text=True, timeout=120)
+                        self.assertEqual((done.returncode, done.stderr.count("\n")), (2, 1), done.stderr)
+                        self.assertRegex(done.stderr, rf"^{program}: {path}[^ ]*: cannot be (read|reached) \(Permission denied\); check ")
+
     def test_a_part_of_a_log_behind_lost_ones_is_told(self):
         for log in (self.copy(), self.killed()[0]):
             shutil.copy(log / "ticks.npy", log / "ticks.npy.0004")
