@@ -33,7 +33,14 @@ struct RowFacts {
 };
 
 RowFacts row_facts(const fs::path& folder, std::size_t arms, std::uint32_t tick_ns) {
-  TickLogReader log = std::move(open_logs(folder, arms).front());
+  std::vector<TickLogReader> logs = open_logs(folder, arms);
+  TickLogReader& log = logs.front();
+  if (logs.back().rows() < log.rows()) {  // which the first one counts
+    throw DamagedRecording((folder / tick_log_name(arms - 1)).string() + ": " +
+                           std::to_string(logs.back().rows()) + " rows, and " +
+                           std::string(kTickLogName) + " has " + std::to_string(log.rows()) +
+                           ", so no manifest is made anew; copy the recording again");
+  }
   std::optional<LossesOfRows> losses;
   RowFacts out;
   out.rows = log.rows();

@@ -221,6 +221,10 @@ class TestKilledLog(unittest.TestCase):
         begin, _ = data[:HEADER].split(b"'shape': (")
         second.write_bytes((begin + b"'shape': (10,), }").ljust(HEADER - 1) + b"\n" + data[HEADER:])
         self.assert_told(log, f"{second}: {left[second]} rows, and ticks.npy has ")
+        (log / "manifest.json").unlink()
+        code, said, wrong = run("kerf-record", "check", log, "--repair")
+        self.assertEqual((code, said, wrong.count("\n"), (log / "manifest.json").exists()), (1, "", 1, False), wrong)
+        self.assertIn(f"{second}: {left[second]} rows, and ticks.npy has ", wrong)
 
     def test_a_row_that_is_damaged_among_sound_ones_stays_an_error(self):
         for of in (self.log, self.two):

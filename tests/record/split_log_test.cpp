@@ -158,6 +158,9 @@ TEST_CASE("a file that cannot be begun is named, and the rows before it stay") {
           while (log.rows() < kRows) log.append(row(log.rows()));
         }) == part_of_log(path, 2).string() +
                   ": cannot be written (Is a directory); make room or choose another --out");
+  CHECK(error_of([&] { const TickLogReader read(path); }) ==
+        part_of_log(path, 2).string() + ": no regular file; copy the recording again");
+  std::filesystem::remove(part_of_log(path, 2));
   CHECK(rows_of_parts(path) == Counts{1000});
   CHECK(sound_rows(path) == 1000);
 }
