@@ -121,6 +121,7 @@ REPORTS = [
         ("rows, lost_ticks, missed_before_start, end_reason", "", "as above; `end_reason` is `running` until the end, `no room` if the disk was full, `unknown` if the manifest was made anew. Such a one has "
          "`repaired_by`, the version of kerf that made it, no versions of controller and recorder, and 0 for `session_id`"),
         ("parts", "", "files of the log of each device that had begun; above 1 with `--split`"),
+        ("first_rows", "", "`crc32c` of the first row of each device's log; missing before a row is on the disk"),
         ("gaps", "", "each with `first_index` and `count`"),
         ("arms", "", "2: the run had two devices, and there is `ticks-2.npy`; missing with one"),
         ("summary, summary_2", "", "what `record info` shows, of all rows, of the first and the second device; missing if the recorder was killed before"),
