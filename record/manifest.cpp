@@ -9,6 +9,7 @@
 #include <system_error>
 #include <utility>
 
+#include "record/input_rows.hpp"
 #include "record/manifest_seal.hpp"
 #include "record/tick_log.hpp"
 #include "shared/posix/atomic_file.hpp"
@@ -66,8 +67,8 @@ void for_each_figure(Summary& s, Visit visit) {
   return has_all ? std::optional(out) : std::nullopt;
 }
 
-/// The checksum of the first row of each arm's log, by which they are told from each other. None of
-/// a row that cannot be read or is unsound: a recorder goes on whatever was done to its files.
+/// The checksum of the first row of each arm's log, which tells the logs apart. None of a row that
+/// cannot be read or is unsound: a recorder goes on whatever was done to its files.
 [[nodiscard]] Json first_rows(const std::filesystem::path& folder, std::size_t arms) {
   Json list = Json::List{};
   for (std::size_t arm = 0; arm < arms; ++arm) {
@@ -232,6 +233,18 @@ RecordGap gap_of(const Json& json) {
   return {json.at("first_index").get<std::uint64_t>(), json.at("count").get<std::uint64_t>()};
 }
 
+/// Of a member "files" of another kind nothing is known; the check names it.
+bool lists_inputs(const Json& manifest) {
+  try {
+    return manifest.contains("files") &&
+           std::ranges::any_of(manifest.at("files").members(), [](const Json::Member& file) {
+             return file.key.starts_with(std::string(kInputsName) + "/");
+           });
+  } catch (const JsonError&) {
+    return false;
+  }
+}
+
 double voxel_of(const Json& volume) {
   const auto mm = volume.at("spacing_mm").get<std::array<double, 3>>();
   return mm[0] * mm[1] * mm[2];
@@ -261,6 +274,7 @@ Manifest read_manifest(const std::filesystem::path& folder) {
     return true;
   });
   out.has_clock = json.contains("clock");
+  out.has_inputs = lists_inputs(json);
   members.take_if_there("start_ns", "a time in ns", [](const Json& member) {
     static_cast<void>(member.get<std::uint64_t>());
     return true;

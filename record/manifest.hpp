@@ -109,6 +109,7 @@ struct Manifest {
   std::string session_id;         ///< of the run, as 16 hexadecimal digits
   std::string end_reason;
   bool has_clock = false;                 ///< names clock.npy: log_clock.hpp
+  bool has_inputs = false;                ///< lists inputs of the ticks before the log
   std::size_t parts = 1;                  ///< files of the log that had begun when it was written
   std::vector<std::uint32_t> first_rows;  ///< of each arm's log the checksum of its first row
   std::string repaired_by;  ///< version of kerf that made it anew; empty: as its recorder wrote it

@@ -203,6 +203,11 @@ void check_begins_at_first_tick(const std::filesystem::path& folder, const Manif
   if (missed == 0) return;
   std::error_code none;
   if (!std::filesystem::is_directory(folder / kInputsName, none)) {
+    if (manifest.has_inputs) {
+      throw DamagedRecording((folder / kInputsName).string() +
+                             ": missing, and manifest.json lists its files; copy the recording "
+                             "again");
+    }
     throw RecordError(
         folder.string() + ": the first " +
         (missed == 1 ? "tick of the run is" : ticks_text(missed) + " of the run are") +

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "record/check/old_manifest.hpp"
-
 #include <algorithm>
 #include <array>
 #include <charconv>
@@ -9,6 +7,7 @@
 #include <vector>
 
 #include "record/check/findings.hpp"
+#include "record/check/repair.hpp"
 #include "record/input_rows.hpp"
 #include "record/kept_volumes.hpp"
 #include "record/manifest_seal.hpp"
@@ -50,7 +49,7 @@ bool is_hex(std::string_view text, std::size_t digits) {
          text.find_first_not_of("0123456789abcdef") == std::string_view::npos;
 }
 
-std::string told(const fs::path& file, const std::string& what) {
+std::string refusal(const fs::path& file, const std::string& what) {
   return file.string() + ": " + what + ", so no manifest is made anew; copy the recording again";
 }
 
@@ -73,11 +72,11 @@ std::string contradiction_to_files(const fs::path& folder, const SceneFacts& sce
     const std::string is = crc32_of_file(folder / name);
     if (!is_hex(checksum, 8) || checksum == is) continue;
     if (is.empty()) {
-      return told(folder / name, "cannot be read, and manifest.json has its checksum");
+      return refusal(folder / name, "cannot be read, and manifest.json has its checksum");
     }
     if (name == kClockName && is_clock_ahead(folder, manifest, checksum)) continue;
-    return told(folder / name,
-                "its checksum is " + is + ", and \"" + checksum + "\" in manifest.json");
+    return refusal(folder / name,
+                   "its checksum is " + is + ", and \"" + checksum + "\" in manifest.json");
   }
   return {};
 }
@@ -92,8 +91,8 @@ std::string contradiction_to_first_rows(const fs::path& folder, std::size_t arms
     std::array<TickRecord, 1> row;
     std::string problem;  // of an unsound row, which the check finds
     if (logs[arm].read(0, row, problem) == 0 || row[0].crc32c == (*first_rows)[arm]) continue;
-    return told(folder / tick_log_name(arm),
-                "does not begin with the row that manifest.json has the checksum of");
+    return refusal(folder / tick_log_name(arm),
+                   "does not begin with the row that manifest.json has the checksum of");
   }
   return {};
 }
@@ -106,8 +105,8 @@ std::string contradiction_to_config_hash(const fs::path& folder, const SceneFact
   const auto of_scene =
       member(manifest, "files", [&](const Json& m) { return text(m.at(kSceneName)); });
   if (of_scene == crc32_of_file(folder / kSceneName)) return {};
-  return told(folder / kSceneName, "its config_hash is \"" + scene.config_hash + "\", and \"" +
-                                       *hash + "\" in manifest.json");
+  return refusal(folder / kSceneName, "its config_hash is \"" + scene.config_hash + "\", and \"" +
+                                          *hash + "\" in manifest.json");
 }
 
 }  // namespace

@@ -279,8 +279,8 @@ class Check {
   void check_time(const TickRecord& row) {
     const bool is_lockstep =
         json().contains("start_ns") && json().at("start_ns").canonical() == "0";
-    if (!is_lockstep || time_told_ || row.start_ns == row.tick * out_.manifest.tick_ns) return;
-    time_told_ = true;
+    if (!is_lockstep || time_reported_ || row.start_ns == row.tick * out_.manifest.tick_ns) return;
+    time_reported_ = true;
     findings_.add_to_manifest("start_ns is 0, as in lock-step, and tick " +
                               std::to_string(row.tick) + " began at " +
                               std::to_string(row.start_ns) + " ns");
@@ -311,7 +311,7 @@ class Check {
   CheckedRecording out_;
   SceneFacts scene_;
   std::vector<TickLogReader> logs_;  ///< by arm
-  bool is_cut_ = false, time_told_ = false;
+  bool is_cut_ = false, time_reported_ = false;
 };
 
 }  // namespace

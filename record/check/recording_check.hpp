@@ -49,15 +49,4 @@ struct CheckedRecording {
 [[nodiscard]] RecordSummary summarise(const std::filesystem::path& folder, TickRange range = {},
                                       std::size_t arm = 0);
 
-/// Whether the manifest is lost, or to blame for what is wrong. Throws `RecordError` if the folder
-/// is no recording.
-[[nodiscard]] bool has_wrong_manifest(const std::filesystem::path& folder);
-
-/// Writes manifest.json anew from scene and rows. What only the old one said (session, versions,
-/// how the run ended) is unknown then: nothing proves it. The old one is kept as manifest-old.json,
-/// and if there is one of that name, it stays. Throws `RecordError` if scene.json or the log cannot
-/// be read, or a checksum in the old one is not that of its file: a new one would hide the change;
-/// `FileError` if the folder cannot be written.
-void repair_manifest(const std::filesystem::path& folder);
-
 }  // namespace kerf

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "record/check/repair.hpp"
+
 #include <optional>
 #include <span>
 #include <string>
@@ -6,7 +8,6 @@
 #include <utility>
 #include <vector>
 
-#include "record/check/old_manifest.hpp"
 #include "record/check/recording_check.hpp"
 #include "record/kept_volumes.hpp"
 #include "record/losses_of_rows.hpp"

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "record/check/recording_check.hpp"
+#include "record/check/repair.hpp"
 #include "record/export/hdf5_export.hpp"
 #include "record/export/live_json.hpp"
 #include "record/export/log_page.hpp"
