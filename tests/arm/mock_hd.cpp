@@ -23,10 +23,10 @@ using kerf::mock::Pose;
 using kerf::mock::Record;
 
 using Callback = std::uint32_t (*)(void*);
-struct ErrorInfo {
-  std::uint32_t code = 0;
-  int internal = 0;
-  std::uint32_t device = 0;
+struct ErrorInfo {  // of C, as the library's
+  std::uint32_t code;
+  int internal;
+  std::uint32_t device;
 };
 
 constexpr std::uint32_t kNoDevice = 0xffffffff;
@@ -140,10 +140,10 @@ void get_vector(std::uint32_t what, T* out) {
   const Pose& pose = hd.pose();
   const bool unset = hd.tick <= hd.behaviour.number("unset", 2);
   if (what == 0x2052) {  // transform, by columns
-    for (int i = 0; i < 16; ++i) out[i] = 0;
+    std::fill_n(out, 16, T{0});
     if (unset) return;
-    for (int row = 0; row < 3; ++row) {
-      for (int column = 0; column < 3; ++column) {
+    for (std::size_t row = 0; row < 3; ++row) {
+      for (std::size_t column = 0; column < 3; ++column) {
         out[4 * column + row] = static_cast<T>(pose.rotation[3 * row + column]);
       }
       out[12 + row] = static_cast<T>(pose.position[row]);
@@ -152,10 +152,10 @@ void get_vector(std::uint32_t what, T* out) {
     if (hd.tick == hd.behaviour.number("nan", -1)) out[12] = std::numeric_limits<T>::quiet_NaN();
     if (hd.tick == hd.behaviour.number("hang_callback", -1)) kerf::mock::hang();
   } else if (what == 0x2050) {  // position
-    for (int i = 0; i < 3; ++i) out[i] = unset ? T{0} : static_cast<T>(pose.position[i]);
+    for (std::size_t i = 0; i < 3; ++i) out[i] = unset ? T{0} : static_cast<T>(pose.position[i]);
   } else if (what == 0x2700) {  // force
     const auto& force = hd.in_frame ? hd.force : hd.last_force;
-    for (int i = 0; i < 3; ++i) out[i] = static_cast<T>(force[i]);
+    for (std::size_t i = 0; i < 3; ++i) out[i] = static_cast<T>(force[i]);
   } else if (what == 0x2600 || what == 0x2601) {
     out[0] = 1000;
   } else if (what == 0x2603 || what == 0x2604) {  // nominal force, continuous force
@@ -170,7 +170,7 @@ void set_vector(std::uint32_t what, const T* in) {
   Library& hd = library();
   if (what != 0x2700) return hd.fail(kInvalidEnum);
   if (!hd.in_frame) return hd.fail(kFrameError);
-  for (int i = 0; i < 3; ++i) hd.force[i] = in[i];
+  for (std::size_t i = 0; i < 3; ++i) hd.force[i] = in[i];
 }
 
 }  // namespace
@@ -182,10 +182,7 @@ void kerf_mock_tick(int ticks) {
   for (int i = 0; i < ticks && library().running; ++i) library().step();
 }
 int kerf_mock_lines(const char** out, int room) {
-  static std::vector<std::string> lines;
-  lines = library().record.lines();
-  for (int i = 0; i < room && i < static_cast<int>(lines.size()); ++i) out[i] = lines[i].c_str();
-  return static_cast<int>(lines.size());
+  return library().record.give_lines(out, room);
 }
 void kerf_mock_pose(const double* position, const double* rotation, int buttons, int docked) {
   Pose pose{.tick = library().tick, .buttons = buttons, .docked = docked != 0};

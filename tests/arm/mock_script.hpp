@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <csignal>
 #include <cstdarg>
@@ -117,15 +118,19 @@ class Record {
     const std::string line = std::to_string(monotonic_ns()) + ' ' + text + '\n';
     if (fd_ >= 0 && write(fd_, line.data(), line.size()) < 0) std::abort();
   }
-  /// All lines so far, without their times.
-  [[nodiscard]] std::vector<std::string> lines() {
+  /// All lines so far, without their times: at most `room` into `out`, valid until the next call.
+  /// Returns their number.
+  int give_lines(const char** out, int room) {
     const std::lock_guard guard(mutex_);
-    return lines_;
+    given_ = lines_;
+    const std::size_t most = std::min(given_.size(), static_cast<std::size_t>(std::max(room, 0)));
+    for (std::size_t i = 0; i < most; ++i) out[i] = given_[i].c_str();
+    return static_cast<int>(given_.size());
   }
 
  private:
   std::mutex mutex_;
-  std::vector<std::string> lines_;
+  std::vector<std::string> lines_, given_;
   int fd_ = -1;
 };
 

@@ -57,7 +57,7 @@ struct PressedFalcon {
 }  // namespace
 
 TEST_CASE("every pair of scripts with faults is in one part, and each script with the signal") {
-  for (const std::size_t parts : {1, 2, 3, 7, 40}) {
+  for (const std::size_t parts : {1U, 2U, 3U, 7U, 40U}) {
     std::map<std::string, int> count;
     for (std::size_t part = 1; part <= parts; ++part) {
       for (const NamedScript& pair : pairs_of(kScripts, {part, parts})) ++count[pair.name];

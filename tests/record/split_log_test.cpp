@@ -86,7 +86,7 @@ TEST_CASE("a log that was split goes on behind any of its rows") {
   write_until(path, 3200, kAfter);
   CHECK(rows_of_parts(path) == Counts{1000, 1000, 1000, 200});
   CHECK(sound_rows(path) == 3200);
-  for (const std::uint64_t keep : {2500, 2000, 1999, 1001, 1000, 7, 0}) {
+  for (const std::uint64_t keep : {2500U, 2000U, 1999U, 1001U, 1000U, 7U, 0U}) {
     CAPTURE(keep);
     write_until(path, keep, kAfter, keep);
     CHECK(sound_rows(path) == keep);
