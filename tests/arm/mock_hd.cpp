@@ -32,7 +32,8 @@ struct ErrorInfo {  // of C, as the library's
 constexpr std::uint32_t kNoDevice = 0xffffffff;
 constexpr std::uint32_t kInvalidEnum = 0x100, kInvalidType = 0x103, kBadHandle = 0x104;
 constexpr std::uint32_t kAlreadyOpen = 0x301;
-constexpr std::uint32_t kIllegalBegin = 0x400, kIllegalEnd = 0x401, kFrameError = 0x402;
+[[maybe_unused]] constexpr std::uint32_t kIllegalBegin = 0x400, kIllegalEnd = 0x401,
+                                         kFrameError = 0x402;
 
 struct Entry {
   unsigned long handle = 0;
