@@ -16,7 +16,7 @@ import sys
 import time
 
 import options as demo_options
-from options import BUSES, Refusal
+from options import BUSES, PICTURE_SIZE, Refusal
 from out_folder import OutFolder
 from processes import END, Processes, complain, crashed, exit_code, say, terminate
 
@@ -136,7 +136,7 @@ class Demo:
         hand = ["--hand", options.hand] if options.hand else []
         self.controller = self.emulator = self.processes.start("lab", [
             "two-machines", "--scene", self.scene, "--device", options.device, *hand, "--seconds", options.seconds,
-            "--size", options.size, *options.link, *["--headless"] * options.headless, *words,
+            *(["--size", options.size] if options.size else []), *options.link, *["--headless"] * options.headless, *words,
             *(["--out", self.results] if self.out else [])])  # it speaks for itself
         code = self.controller.wait()
         if code == 77 or code == 2:
@@ -288,7 +288,7 @@ class Demo:
     def start_pictures(self, rate_hz):
         """A window, and pictures without one; one of them makes the video."""
         options, processes = self.options, self.processes
-        common = ["--name", self.name, "--size", options.size, *options.look]
+        common = ["--name", self.name, *options.look]
         record = ["--record", options.record] if options.record else []
         if not options.headless:
             led = ["--hand-socket", processes.path("hand")] if options.mouse else []
@@ -296,14 +296,14 @@ class Demo:
             # Where the path that a line shows leads to at once, and after the run.
             keys_out = ["--out", self.options.out] if self.out else []  # else the window's keys write to the current folder
             self.window = processes.start("visualizer", [
-                *common, *record, *led, *keys_out, "--attached", processes.path("window-shows"),
+                *common, *(["--size", options.size] if options.size else []), *record, *led, *keys_out, "--attached", processes.path("window-shows"),
                 "--choice", processes.path("choice"), "--open-in", os.path.dirname(self.scene) or "."],
                 out="window.log", log="window.log")
             record = []
         if options.headless or self.out:
             every = int(float(options.seconds) * rate_hz / FRAMES) or 1
             self.pictures = processes.start("visualizer", [
-                *common[:2], "--headless", "--frames", FRAMES, *common[2:], *record,
+                *common[:2], "--headless", "--size", options.size or PICTURE_SIZE, "--frames", FRAMES, *common[2:], *record,
                 *(["--sheet", options.sheet] if options.sheet else []), *self.lead, "--every-ticks", every, "--out", self.results,
                 "--attached", processes.path("painter-shows"), "--report", os.path.join(self.results, "visualizer.json")],
                 out="visualizer.log", log="visualizer.log")

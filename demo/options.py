@@ -12,6 +12,7 @@ import tomllib
 BUSES = {"omni": ("fw", "fw1"), "falcon": ("usb", "usb"), "woodenhaptics": ("hid", "hidraw0"),  # word of --port, its node
          "inverse3": ("ws", ""), "touch": ("arm", ""), "omega": ("arm", "")}  # no node: a service or a library of the vendor
 STAND_INS = {"touch": "libHD.so", "omega": "libdrd.so.3"}  # kerf's own in place of the vendor's library
+PICTURE_SIZE, WINDOW_SIZE = "640x480", "1280x800"  # if none is given; a window's on a screen of 96 dots per inch
 FLAGS = ("--headless", "--serve", "--stereo", "--voxel-tool", "--mute", "--colour-blind", "--virtual", "--two-machines")
 OF_SCENE = ("--scene", "--volume", "--spacing", "--override-spacing", "--window", "--set")
 OF_LINK = {"--loss": (50, 1), "--delay-ms": (2000, 20), "--mbit": (100000, 4)}  # of two machines: the most of each, a bad one
@@ -33,7 +34,7 @@ class Options:
     seconds: str = ""
     rate: str = ""
     out: str = ""
-    size: str = "640x480"
+    size: str = ""  # of the pictures; none: PICTURE_SIZE, and a window takes what suits its screen
     device: str = ""  # by choose_devices
     second: str = ""  # the other device of a scene with two; by choose_devices
     port: str = ""  # by choose_port
@@ -158,7 +159,7 @@ def log_bytes_per_s(options, rate_hz):
 def growth(options, rate_hz):
     """Lines that say beforehand how large files become: a raw video, the log of more than a minute."""
     lines, seconds = [], float(options.seconds)
-    width, height = map(int, options.size.split("x"))
+    width, height = map(int, (options.size or (PICTURE_SIZE if options.headless else WINDOW_SIZE)).split("x"))
     is_stream = os.path.exists(options.record) and not os.path.isfile(options.record)
     if options.record and not is_compressed(options.record) and not is_stream:
         way = "a name that ends in .mp4 compresses it" if shutil.which("ffmpeg") else "ffmpeg would compress it, apt-get install ffmpeg"
@@ -223,7 +224,7 @@ def check(options):
         raise Refusal(f"--seconds {options.seconds}: not a positive number of seconds; take 10")
     if is_compressed(options.record) and not shutil.which("ffmpeg"):
         raise Refusal(f"--record {options.record}: no ffmpeg to compress it; apt-get install ffmpeg, or name a .y4m")
-    size = re.fullmatch(r"([1-9][0-9]{0,4})x([1-9][0-9]{0,4})", options.size)
+    size = re.fullmatch(r"([1-9][0-9]{0,4})x([1-9][0-9]{0,4})", options.size or PICTURE_SIZE)
     if not size or int(size[1]) > 8192 or int(size[2]) > 8192:
         raise Refusal(f"--size {options.size}: not WIDTHxHEIGHT in pixels, 1 to 8192 each; take 640x480")
     if options.device not in BUSES:

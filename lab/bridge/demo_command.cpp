@@ -74,7 +74,7 @@ struct DemoOptions {
   std::string device = "omni";
   std::string hand;  ///< script of the hand; empty: the scene's
   double seconds = 10;
-  std::string size = "640x480";
+  std::string size;       ///< of the pictures; empty: 640x480, or what suits a window's screen
   std::string out;        ///< folder of the results; empty: none are kept
   bool headless = false;  ///< no window, though there is a display
   std::vector<std::string> controller_words, visualizer_words;  ///< more options of the programs
@@ -134,8 +134,6 @@ class Demo {
     std::vector<std::string> words{program_beside("visualizer"),
                                    "--name",
                                    kFarName,
-                                   "--size",
-                                   options_.size,
                                    "--wait",
                                    "30",
                                    "--attached",
@@ -144,6 +142,9 @@ class Demo {
                                    results_};
     std::ranges::copy(options_.visualizer_words, std::back_inserter(words));
     window_ = has_display() && !options_.headless;
+    if (!window_ || !options_.size.empty()) {
+      words.insert(words.end(), {"--size", options_.size.empty() ? "640x480" : options_.size});
+    }
     if (!window_) {
       const auto every = static_cast<long>(options_.seconds * rate_hz() / kPictures);
       for (const std::string& word :
@@ -292,7 +293,9 @@ DemoCommand::DemoCommand(Arguments& program)
   app_.option("--mbit", mbit_, "rate of the link, Mbit/s; 0: no bound")
       .within(0, 100'000)
       .shows_default();
-  app_.option("--size", demo_.size, "of the pictures").shown_as("WxH [640x480]");
+  app_.option("--size", demo_.size,
+              "of the pictures (default: 640x480; a window: what suits its screen)")
+      .shown_as("WxH");
   app_.option("--out", demo_.out, "keep pictures, report, log and final volume in this folder")
       .shown_as("DIR");
   app_.flag("--headless", demo_.headless, "no window, though there is a display");

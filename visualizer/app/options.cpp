@@ -165,7 +165,10 @@ std::optional<VisualizerOptions> parse_options(int argc, const char* const* argv
   app.footer(footer());
   app.option("--name", options.name, "the controller's name").shows_default();
   const Option sized =
-      app.option("--size", size, "width and height in pixels").shown_as("WxH").shows_default();
+      app.option("--size", size,
+                 "width and height in pixels (default: 800x600; a window: 1280x800 at 96 dots per "
+                 "inch, as far as the screen has room)")
+          .shown_as("WxH");
   const Option renderer = declare_look(app, options, gradient);
   const Option headless =
       app.flag("--headless", options.headless, "no window: pictures into --out");
@@ -199,6 +202,7 @@ std::optional<VisualizerOptions> parse_options(int argc, const char* const* argv
                           " has no pointer that could lead a hand; give one of the two");
   }
   options.size = parse_size(size);
+  options.size_is_given = sized.given();
   options.renderer_is_given = renderer.given();
   check_renderers(options.settings.renderer);
   options.settings.gradient = gradient_named(gradient);

@@ -19,6 +19,7 @@ struct VisualizerOptions {
   ViewSettings settings;            ///< at first; its opacities are those of `transfer`
   bool renderer_is_given = true;    ///< else `take_default_renderer`
   PictureSize size{800, 600};
+  bool size_is_given = true;          ///< else a window takes what suits its screen
   std::optional<double> panel_scale;  ///< of the panels' letters; none: the display's density
   bool headless = false;
   std::uint32_t frames = 10;  ///< headless: this many pictures; beside a video none by default

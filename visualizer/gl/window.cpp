@@ -109,7 +109,7 @@ bool Window::has_screen() {
   return is_set("DISPLAY") || is_set("WAYLAND_DISPLAY");
 }
 
-Window::Window(PictureSize size, Visibility visibility) {
+Window::Window(std::optional<PictureSize> asked, Visibility visibility) {
   if (glfwInit() != GLFW_TRUE) fail("the screen cannot be opened");
   glfwWindowHint(GLFW_CONTEXT_VERSION_MAJOR, 4);
   glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 5);
@@ -117,7 +117,9 @@ Window::Window(PictureSize size, Visibility visibility) {
   glfwWindowHint(GLFW_DEPTH_BITS, 0);
   glfwWindowHint(GLFW_CONTEXT_ROBUSTNESS, GLFW_LOSE_CONTEXT_ON_RESET);
   glfwWindowHint(GLFW_OPENGL_DEBUG_CONTEXT, gl_faults_are_reported() ? GLFW_TRUE : GLFW_FALSE);
-  glfwWindowHint(GLFW_VISIBLE, visibility == Visibility::shown ? GLFW_TRUE : GLFW_FALSE);
+  glfwWindowHint(GLFW_VISIBLE, GLFW_FALSE);  // until it has its size
+  glfwWindowHint(GLFW_SCALE_TO_MONITOR, asked ? GLFW_FALSE : GLFW_TRUE);
+  const PictureSize size = asked.value_or(kSuitableSize);
   handle_ = glfwCreateWindow(size.width, size.height, "kerf", nullptr, nullptr);
   if (handle_ == nullptr) {
     try {
@@ -138,6 +140,21 @@ Window::Window(PictureSize size, Visibility visibility) {
   outlive_the_screen();
   watch_for_faults();
   glfwSwapInterval(1);
+  if (!asked) fit();
+  if (visibility == Visibility::shown) glfwShowWindow(handle_);
+}
+
+void Window::fit() {
+  GLFWmonitor* const screen = glfwGetPrimaryMonitor();
+  if (screen == nullptr) return;
+  int wide = 0, high = 0, left = 0, top = 0, right = 0, bottom = 0;
+  glfwGetMonitorWorkarea(screen, nullptr, nullptr, &wide, &high);
+  glfwGetWindowFrameSize(handle_, &left, &top, &right, &bottom);
+  PictureSize now;
+  glfwGetWindowSize(handle_, &now.width, &now.height);
+  const PictureSize most{std::max(wide - left - right, 1), std::max(high - top - bottom, 1)};
+  if (now.width <= most.width && now.height <= most.height) return;
+  glfwSetWindowSize(handle_, std::min(now.width, most.width), std::min(now.height, most.height));
 }
 
 Window::~Window() {

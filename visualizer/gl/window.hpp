@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -54,6 +55,10 @@ struct WindowInput {
 /// high density count in larger units than pixels. 1 for a window without a side.
 [[nodiscard]] glm::dvec2 pixels_per_unit(PictureSize pixels, PictureSize units) noexcept;
 
+/// What a window takes that is given no size: room for all panels beside a tooth, in units of 96
+/// dots per inch.
+inline constexpr PictureSize kSuitableSize{1280, 800};
+
 /// A window on the screen with its own context; what it shows is drawn off the screen and copied.
 class Window final : public GlContext {
  public:
@@ -62,8 +67,10 @@ class Window final : public GlContext {
   /// Whether the environment names a screen.
   [[nodiscard]] static bool has_screen();
 
-  /// Throws VisualizerError if the screen gives no window or no 4.5 core context.
-  Window(PictureSize size, Visibility visibility);
+  /// Without a size, takes `kSuitableSize` at the scale of its screen, or as much of it as the
+  /// screen has room for beside the desktop's bars and the window's frame. Throws VisualizerError
+  /// if the screen gives no window or no 4.5 core context.
+  Window(std::optional<PictureSize> size, Visibility visibility);
   ~Window() override;
 
   [[nodiscard]] ContextKind kind() const noexcept override { return ContextKind::window; }
@@ -80,6 +87,8 @@ class Window final : public GlContext {
   [[nodiscard]] WindowInput poll();
 
  private:
+  /// No larger than the screen has room for.
+  void fit();
   /// False while it is minimised or taken off the screen.
   [[nodiscard]] bool is_seen() const;
   /// Whether the pointer is over the part of the window that is seen.

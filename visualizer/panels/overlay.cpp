@@ -15,6 +15,7 @@
 
 #include "shared/text/text.hpp"
 #include "visualizer/panels/figure_panels.hpp"
+#include "visualizer/panels/panel_font.hpp"
 #include "visualizer/scene/visualizer_error.hpp"
 
 namespace kerf {
@@ -132,11 +133,7 @@ void Overlay::begin_frame(const OverlayFigures& figures, PictureSize size) {
   const float letters = letters_for(figures.scale, size);
   if (letters != letters_) {
     letters_ = letters;
-    ImFontAtlas& fonts = *ImGui::GetIO().Fonts;
-    fonts.Clear();
-    ImFontConfig plain;
-    plain.SizePixels = letters;
-    fonts.AddFontDefault(&plain);
+    load_panel_font(*ImGui::GetIO().Fonts, letters);
     ImGui_ImplOpenGL3_DestroyFontsTexture();
     ImGui_ImplOpenGL3_CreateFontsTexture();
     ImGui::GetStyle() = style_for(letters / kPlainLetters);

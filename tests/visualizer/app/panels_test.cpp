@@ -239,7 +239,7 @@ TEST_CASE("each page of the keys covers at most a quarter, and all keys have the
     figures.help = 1;
     static_cast<void>(covered(overlay, figures, kPlain));
     const int pages = overlay.help_pages();
-    CHECK(pages == 3);
+    CHECK(pages == (leads ? 3 : 2));
     std::vector<std::vector<std::uint8_t>> seen;
     for (; figures.help <= pages; ++figures.help) {
       CAPTURE(figures.help);
@@ -263,4 +263,21 @@ TEST_CASE("a display of twice the density has panels of twice the size, where th
   const double small = covered(overlay, figures, kPlain);
   figures.scale = 1.0;
   CHECK(covered(overlay, figures, kPlain) == small);
+}
+
+TEST_CASE("letters are drawn for their size, and are not those of a smaller one enlarged") {
+  const auto context = make_headless_context();
+  Overlay overlay;
+  OverlayFigures figures;
+  figures.scale = 2.0;
+  constexpr PictureSize kTwice{2 * kPlain.width, 2 * kPlain.height};
+  std::vector<std::uint8_t> rgb;
+  static_cast<void>(covered(overlay, figures, kTwice, &rgb));
+  // On the dark ground of a panel: one of squares has no pixel between ground and letter.
+  int whole = 0, partly = 0;
+  for (std::size_t i = 0; i < rgb.size(); i += 3) {
+    whole += rgb[i] > 160 && rgb[i] < 255 ? 1 : 0;
+    partly += rgb[i] > 110 && rgb[i] <= 160 ? 1 : 0;
+  }
+  CHECK(partly > whole / 10);
 }

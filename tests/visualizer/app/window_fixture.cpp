@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <csignal>
+#include <cstdio>
 #include <cstdlib>
 #include <fstream>
 #include <thread>
@@ -16,6 +17,8 @@
 #include "visualizer/picture/image_files.hpp"
 // After all others: it defines plain words.
 #include <X11/Xlib.h>
+// After Xlib.
+#include <X11/Xatom.h>
 #include <X11/Xutil.h>
 
 namespace kerf::test {
@@ -123,7 +126,7 @@ bool have(const char* program) {
   return false;
 }
 
-Screen::Screen() {
+Screen::Screen(const std::string& size) {
   int ready[2];
   REQUIRE(pipe(ready) == 0);
   server_ = fork();
@@ -131,7 +134,8 @@ Screen::Screen() {
     const std::string to = std::to_string(ready[1]);
     const int quiet = open("/dev/null", O_WRONLY);
     dup2(quiet, STDERR_FILENO);
-    execlp("Xvfb", "Xvfb", "-displayfd", to.c_str(), "-screen", "0", "1280x960x24", "-nolisten",
+    const std::string pixels = size + "x24";
+    execlp("Xvfb", "Xvfb", "-displayfd", to.c_str(), "-screen", "0", pixels.c_str(), "-nolisten",
            "tcp", static_cast<char*>(nullptr));
     _exit(127);
   }
@@ -209,6 +213,35 @@ void OtherWindow::take_focus() const {
   Display* const display = static_cast<Display*>(display_);
   XSetInputFocus(display, window_, RevertToNone, CurrentTime);
   XSync(display, False);
+}
+
+DisplayDensity::DisplayDensity(int dots_per_inch) {
+  Display* const display = XOpenDisplay(nullptr);
+  REQUIRE(display != nullptr);
+  display_ = display;
+  const std::string text = "Xft.dpi:\t" + std::to_string(dots_per_inch) + "\n";
+  XChangeProperty(display, DefaultRootWindow(display), XA_RESOURCE_MANAGER, XA_STRING, 8,
+                  PropModeReplace, reinterpret_cast<const unsigned char*>(text.data()),
+                  static_cast<int>(text.size()));
+  XSync(display, False);
+}
+
+DisplayDensity::~DisplayDensity() {
+  XCloseDisplay(static_cast<Display*>(display_));
+}
+
+PictureSize seen_size() {
+  FILE* const told = popen(
+      "xdotool search --sync --onlyvisible --name 'kerf: test' getwindowgeometry --shell", "r");
+  REQUIRE(told != nullptr);
+  PictureSize size{0, 0};
+  std::array<char, 128> line{};
+  while (std::fgets(line.data(), line.size(), told) != nullptr) {
+    std::sscanf(line.data(), "WIDTH=%d", &size.width);
+    std::sscanf(line.data(), "HEIGHT=%d", &size.height);
+  }
+  CHECK(pclose(told) == 0);
+  return size;
 }
 
 void act(const std::string& events) {

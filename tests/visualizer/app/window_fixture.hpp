@@ -23,7 +23,7 @@ namespace kerf::test {
 /// A screen that nobody sees, and a private folder.
 class Screen {
  public:
-  Screen();
+  explicit Screen(const std::string& size = "1280x960");
   ~Screen();
   Screen(const Screen&) = delete;
   Screen& operator=(const Screen&) = delete;
@@ -77,6 +77,21 @@ class OtherWindow {
   void* display_;
   unsigned long window_;
 };
+
+/// As a desktop tells its programs how dense its display is, while this lives.
+class DisplayDensity {
+ public:
+  explicit DisplayDensity(int dots_per_inch);
+  ~DisplayDensity();
+  DisplayDensity(const DisplayDensity&) = delete;
+  DisplayDensity& operator=(const DisplayDensity&) = delete;
+
+ private:
+  void* display_;
+};
+
+/// Of the window on the screen that DISPLAY names, once there is one.
+[[nodiscard]] PictureSize seen_size();
 
 /// Real events at the screen that DISPLAY names, and the time in which a window shows what they do.
 void act(const std::string& events);

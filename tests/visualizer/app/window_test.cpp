@@ -7,6 +7,7 @@
 
 #include <doctest/doctest.h>
 
+#include "tests/support/process.hpp"
 #include "tests/visualizer/app/window_fixture.hpp"
 #include "visualizer/picture/image_files.hpp"
 #include "visualizer/scene/appearance.hpp"
@@ -44,6 +45,25 @@ void click(const std::string& at) {
 }
 
 }  // namespace
+
+TEST_CASE("a window without a size has room for its panels, at its screen's scale, or fills it") {
+  if (!have("Xvfb") || !have("xdotool")) return;
+  struct Case {
+    const char* screen;
+    int dots_per_inch;
+    PictureSize size;
+  };
+  for (const Case& one : {Case{"1280x960", 96, {1280, 800}}, Case{"1024x600", 96, {1024, 600}},
+                          Case{"2600x1300", 144, {1920, 1200}}}) {
+    CAPTURE(std::string(one.screen));
+    const Screen screen(one.screen);
+    const DisplayDensity density(one.dots_per_inch);
+    const Controller controller;
+    Process window({KERF_TEST_BIN "/kerf-visualizer", "--name", "test", "--mute"},
+                   screen.folder / "said");
+    CHECK(seen_size() == one.size);
+  }
+}
 
 TEST_CASE("keys and mouse work the window") {
   if (!have("Xvfb") || !have("xdotool")) return;
