@@ -114,7 +114,8 @@ class Pen {
 }  // namespace
 
 void write_contact_sheet(const std::filesystem::path& file, const SceneView& scene,
-                         std::span<const VolumeContent> contents, const Hands& hands) {
+                         std::span<const VolumeContent> contents, const Hands& hands,
+                         const std::optional<CameraPose>& seen_from) {
   constexpr int kMarginPx = 10;
   constexpr double kAspect = static_cast<double>(kTile.width) / kTile.height;
   constexpr double kNearer = 1.5;  // one tooth does not fill its box
@@ -122,8 +123,12 @@ void write_contact_sheet(const std::filesystem::path& file, const SceneView& sce
   constexpr double kReach = 3.0;   // radii of what is framed: room for the tool
   OrbitCamera camera;
   camera.frame(scene.corners(), kAspect);
-  if (scene.volumes.size() == 1) camera.zoom(kNearer);
-  camera.pan(0.0, -kLower);
+  if (seen_from) {
+    camera.look(*seen_from);
+  } else {
+    if (scene.volumes.size() == 1) camera.zoom(kNearer);
+    camera.pan(0.0, -kLower);
+  }
   const View view = camera.view(kAspect, kReach * camera.radius_mm());
   const RenderTarget target({kFiner * kTile.width, kFiner * kTile.height});
 
@@ -175,12 +180,15 @@ class FrameTaker {
       : picture_(picture),
         target_(options.size),
         report_(report),
-        scale_(options.panel_scale.value_or(1.0)) {}
+        scale_(options.panel_scale.value_or(1.0)),
+        panels_(options.panels) {}
 
   void draw(Session& session) {
     figures_ = overlay_figures(session);
     figures_.score = picture_.score(session);
     figures_.scale = scale_;
+    figures_.hidden = !panels_;
+    if (!panels_) figures_.banner.clear();  // nothing lies over what is measured
     draw_measured(picture_, session, figures_, target_, report_);
   }
   [[nodiscard]] const RenderTarget& target() const noexcept { return target_; }
@@ -195,6 +203,7 @@ class FrameTaker {
   RenderTarget target_;
   FrameReport& report_;
   double scale_;
+  bool panels_;
   OverlayFigures figures_;
 };
 
@@ -256,7 +265,7 @@ void keep_results(const VisualizerOptions& options, Session& session, Picture& p
   if (options.mesh) export_surface(*options.mesh, session.scene(), session.contents());
   if (options.sheet) {
     write_contact_sheet(*options.sheet, picture.shown_scene(), session.contents(),
-                        hands_of(session));
+                        hands_of(session), options.settings.camera);
   }
   report.bricks_uploaded = picture.bricks_uploaded();
   report.clean_end = session.ended_cleanly();

@@ -56,9 +56,10 @@ class FrameSchedule {
 };
 
 /// Writes a PNG with one moment of a session, volumes and tool, as every renderer draws it, each
-/// with its name. Needs a current GL context. Throws FileError, and VisualizerError if a
-/// renderer cannot show the volumes.
+/// with its name; `seen_from`, or as the whole of it fills a tile. Needs a current GL context.
+/// Throws FileError, and VisualizerError if a renderer cannot show the volumes.
 void write_contact_sheet(const std::filesystem::path& file, const SceneView& scene,
-                         std::span<const VolumeContent> contents, const Hands& hands);
+                         std::span<const VolumeContent> contents, const Hands& hands,
+                         const std::optional<CameraPose>& seen_from = {});
 
 }  // namespace kerf

@@ -12,6 +12,7 @@
 #include "visualizer/panels/key_table.hpp"
 #include "visualizer/render/renderer.hpp"
 #include "visualizer/scene/appearance.hpp"
+#include "visualizer/scene/camera_pose.hpp"
 #include "visualizer/scene/visualizer_error.hpp"
 
 namespace kerf {
@@ -36,15 +37,26 @@ std::string footer() {
   return text.str();
 }
 
-/// The view settings at first; `gradient` by its name. Returns --renderer.
-Option declare_look(Arguments& app, VisualizerOptions& o, std::string& gradient) {
+/// Options that are words at first.
+struct Words {
+  std::string size = "800x600", gradient{name_of(kDefaultGradient)}, panels = "on";
+  std::optional<std::string> camera;
+};
+
+/// The view settings at first. Returns --renderer.
+Option declare_look(Arguments& app, VisualizerOptions& o, Words& words) {
   const Option renderer =
       app.option("--renderer", o.settings.renderer,
                  "how volumes are drawn: " + listed(renderer_kinds()) +
                      "; with commas one for each volume, such as surface,blend (default: iso, or "
                      "cast if OpenGL draws on the processor)")
           .shown_as("KIND[,KIND...]");
-  app.option("--gradient", gradient,
+  app.option(
+         "--camera", words.camera,
+         "where pictures are seen from: EYE,TARGET,UP, nine numbers (x,y,z in mm; UP is upright "
+         "in the picture), or a file as n in the window writes it (default: all volumes)")
+      .shown_as("CAMERA");
+  app.option("--gradient", words.gradient,
              "what volumes are shaded from: central (two voxels), corners (2x2x2 means), farid5 "
              "(5x5x5 voxels) or adaptive (15x15x15 but at edges)")
       .shows_default();
@@ -58,6 +70,10 @@ Option declare_look(Arguments& app, VisualizerOptions& o, std::string& gradient)
   app.flag("--colour-blind", o.settings.colour_blind,
            "materials in Okabe and Ito's colours, which any colour vision tells apart; in the "
            "window y");
+  app.option("--panels", words.panels,
+             "off: headless without panels and banner; a window begins as h leaves it")
+      .one_of({"on", "off"})
+      .shows_default();
   app.option("--panel-scale", o.panel_scale,
              "size of the panels, as far as the picture has room for it (default: the display's, "
              "headless 1)")
@@ -158,18 +174,17 @@ PictureSize parse_size(const std::string& text) {
 
 std::optional<VisualizerOptions> parse_options(int argc, const char* const* argv) {
   VisualizerOptions options;
-  std::string size = "800x600";
-  std::string gradient(name_of(options.settings.gradient));
+  Words words;
   CommandLine app("Shows what a kerf-controller feels and mills, in a window or as PNG pictures.",
                   "kerf-visualizer", "kerf-visualizer " KERF_VERSION);
   app.footer(footer());
   app.option("--name", options.name, "the controller's name").shows_default();
   const Option sized =
-      app.option("--size", size,
+      app.option("--size", words.size,
                  "width and height in pixels (default: 800x600; a window: 1280x800 at 96 dots per "
                  "inch, as far as the screen has room)")
           .shown_as("WxH");
-  const Option renderer = declare_look(app, options, gradient);
+  const Option renderer = declare_look(app, options, words);
   const Option headless =
       app.flag("--headless", options.headless, "no window: pictures into --out");
   const Option frames = app.option("--frames", options.frames, "headless: number of pictures")
@@ -195,17 +210,22 @@ std::optional<VisualizerOptions> parse_options(int argc, const char* const* argv
     throw VisualizerError(problem.what());
   }
   if (record.given() && !frames.given()) options.frames = 0;
-  if (options.bench && !sized.given()) size = kBenchSize;
+  if (options.bench && !sized.given()) words.size = kBenchSize;
   if (options.hand_socket && (options.headless || options.bench)) {
     throw VisualizerError(std::string("--hand-socket: ") +
                           (options.headless ? "--headless" : "--bench") +
                           " has no pointer that could lead a hand; give one of the two");
   }
-  options.size = parse_size(size);
+  options.size = parse_size(words.size);
   options.size_is_given = sized.given();
+  options.panels = words.panels == "on";
   options.renderer_is_given = renderer.given();
   check_renderers(options.settings.renderer);
-  options.settings.gradient = gradient_named(gradient);
+  options.settings.gradient = gradient_named(words.gradient);
+  if (words.camera) {
+    options.settings.camera = read_camera(*words.camera);
+    if (is_camera_file(*words.camera)) options.camera_file = *words.camera;
+  }
   if (options.transfer) options.settings.opacities = read_transfer(*options.transfer);
   return options;
 }

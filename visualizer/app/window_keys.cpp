@@ -151,6 +151,7 @@ bool WindowKeys::apply(const WindowInput& input, Session& session, Picture& pict
     if (key == 's') screenshot = true;
     if (key == 'e') mesh = true;
     if (key == 'w') write = true;
+    if (key == 'n') note = true;
     if (key == 'm') film = !film;
     if (key == 'h') {  // panels, the keys page by page, none
       const bool next = !hidden && help < help_pages;
@@ -227,6 +228,15 @@ Notice write_opacities(const VisualizerOptions& options, const Picture& picture)
     const std::filesystem::path file =
         options.transfer ? *options.transfer : unused_file(options.out, ".toml");
     write_transfer(file, picture.opacities());
+    return file;
+  });
+}
+
+Notice write_view(const VisualizerOptions& options, const Picture& picture) {
+  return write_for_user("view", [&] {
+    const std::filesystem::path file =
+        options.camera_file ? *options.camera_file : unused_file(options.out, "-camera.toml");
+    write_camera(file, picture.camera().pose());
     return file;
   });
 }

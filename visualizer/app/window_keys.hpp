@@ -38,6 +38,7 @@ struct WindowKeys {
   bool screenshot = false;
   bool mesh = false;       ///< export the surface
   bool write = false;      ///< write the opacities
+  bool note = false;       ///< write the camera
   bool film = false;       ///< begin a film, or end it
   bool come = false;       ///< the hand comes to the pointer
   bool park = false;       ///< it brings the stylus to rest and back
@@ -66,6 +67,9 @@ struct WindowKeys {
 
 /// Where --transfer read them, or in a new file.
 [[nodiscard]] Notice write_opacities(const VisualizerOptions& options, const Picture& picture);
+
+/// Where --camera read it, or in a new file.
+[[nodiscard]] Notice write_view(const VisualizerOptions& options, const Picture& picture);
 
 /// To the file of --export, or to a new one.
 [[nodiscard]] Notice export_mesh(const VisualizerOptions& options, const Session& session);

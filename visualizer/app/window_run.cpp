@@ -87,6 +87,7 @@ WindowRun::WindowRun(const VisualizerOptions& options, Session first, const GlCo
               .attach_ms = first.attach_ms()},
       aspect_(static_cast<double>(options.size.width) / options.size.height),
       followed_(options, std::move(first), aspect_) {
+  keys_.hidden = !options.panels;
   if (options.hand_socket) {
     hand_link_.emplace(*options.hand_socket);
     space_mouse_.emplace();
@@ -330,6 +331,7 @@ Redrawn WindowRun::draw(PictureSize size, const WindowInput& input, Clock::time_
   if (std::exchange(keys_.write, false) || std::exchange(figures.controls->write, false)) {
     notices_.say(write_opacities(options_, picture()), now);
   }
+  if (std::exchange(keys_.note, false)) notices_.say(write_view(options_, picture()), now);
   const bool is_kept = film_ || keys_.screenshot;  // a file holds no coarse part
   picture().set_most_pixels(is_kept ? std::numeric_limits<double>::infinity()
                                     : fixed_pixels_.value_or(pace_.most_pixels()));

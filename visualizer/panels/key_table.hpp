@@ -36,6 +36,7 @@ inline constexpr auto kKeys = std::to_array<KeyHelp>({
     {"m", "movie: begin, end"},
     {"a", "sound: off, on"},
     {"w", "write the opacities"},
+    {"n", "note the view: a file"},
     {"e", "export the surface"},
     {"h", "keys, no panels, panels"},
     {"q", "quit"},

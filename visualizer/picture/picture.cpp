@@ -244,6 +244,7 @@ glm::dvec4 Picture::clip_plane() const {
 
 void Picture::reset_camera(double aspect) {
   camera_.frame(scene_.corners(), settings_.stereo.on ? 0.5 * aspect : aspect);
+  if (settings_.camera) camera_.look(*settings_.camera);
 }
 
 void Picture::update(const Session& session) {

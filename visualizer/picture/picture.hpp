@@ -73,6 +73,7 @@ class Picture {
   [[nodiscard]] ClipPlane moved(const ClipPlane& plane, double mm) const;
 
   [[nodiscard]] OrbitCamera& camera() noexcept { return camera_; }
+  [[nodiscard]] const OrbitCamera& camera() const noexcept { return camera_; }
   /// What one eye of a picture of `size` sees; of two, the one in their middle would.
   [[nodiscard]] View middle_view(PictureSize size) const;
   /// Of one eye in a picture of `size`.

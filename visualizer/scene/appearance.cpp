@@ -4,18 +4,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
-#include <iterator>
 #include <sstream>
 #include <string>
-#include <system_error>
 #include <vector>
 
 #include "shared/posix/atomic_file.hpp"
-#include "shared/posix/error_text.hpp"
 #include "shared/text/json.hpp"
 #include "shared/text/text.hpp"
 #include "shared/text/toml.hpp"
+#include "visualizer/scene/view_file.hpp"
 #include "visualizer/scene/visualizer_error.hpp"
 
 namespace kerf {
@@ -134,27 +131,11 @@ Palette make_palette(std::span<const MaterialView> materials) {
   return palette;
 }
 
-namespace {
-
-[[noreturn]] void refuse(const std::string& name, std::size_t line, const std::string& problem) {
-  throw VisualizerError(name + ":" + std::to_string(line) + ": " + one_line(problem));
-}
-
-TomlNode parse_file(std::string_view text, const std::string& name) {
-  try {
-    return parse_toml(text);
-  } catch (const TomlError& error) {
-    refuse(name, error.line, error.what());
-  }
-}
-
-}  // namespace
-
 Opacities parse_transfer(std::string_view text, const std::string& name) {
-  const TomlNode file = parse_file(text, name);
+  const TomlNode file = parse_view_file(text, name);
   for (const TomlNode& entry : file.entries) {
     if (entry.key == "opacity" && entry.form == TomlNode::Form::table) continue;
-    refuse(name, entry.key_line, entry.key + " is not known here; known is the table [opacity]");
+    refuse_in(name, entry.key_line, entry.key + " is not known here; known is the table [opacity]");
   }
   Opacities opacities;
   const TomlNode* table = file.find("opacity");
@@ -162,9 +143,9 @@ Opacities parse_transfer(std::string_view text, const std::string& name) {
   for (const TomlNode& entry : table->entries) {
     const double opacity = entry.number().value_or(-1.0);
     if (!(opacity >= 0.0 && opacity <= 1.0)) {
-      refuse(name, entry.line,
-             "opacity." + entry.key + " = " + entry.shown +
-                 " is no opacity; give a number from 0 to 1");
+      refuse_in(name, entry.line,
+                "opacity." + entry.key + " = " + entry.shown +
+                    " is no opacity; give a number from 0 to 1");
     }
     opacities[entry.key] = opacity;
   }
@@ -172,28 +153,9 @@ Opacities parse_transfer(std::string_view text, const std::string& name) {
 }
 
 Opacities read_transfer(const std::filesystem::path& file) {
-  constexpr std::uintmax_t kLargest = 1 << 16;
-  std::error_code fault;
-  if (std::filesystem::is_directory(file, fault)) {
-    throw VisualizerError(file.string() + ": is a folder; name a file in it");
-  }
-  if (const std::string why = access_error(file); !why.empty()) {
-    throw VisualizerError(file.string() + why);
-  }
-  if (!std::filesystem::is_regular_file(file, fault)) {
-    const bool there = std::filesystem::exists(file, fault);
-    throw VisualizerError(file.string() + (there ? ": is no regular file" : ": no such file") +
-                          "; name a transfer function, as w in the window writes it");
-  }
-  const std::uintmax_t size = std::filesystem::file_size(file, fault);
-  if (fault || size > kLargest) {
-    throw VisualizerError(file.string() +
-                          ": no transfer function, it is larger than 64 KiB; name another file");
-  }
-  std::ifstream stream(file, std::ios::binary);
-  const std::string text{std::istreambuf_iterator<char>(stream), {}};
-  if (!stream) throw VisualizerError(file.string() + ": cannot be read; check its permissions");
-  return parse_transfer(text, file.string());
+  return parse_transfer(read_view_file(file, "transfer function",
+                                       "name a transfer function, as w in the window writes it"),
+                        file.string());
 }
 
 void write_transfer(const std::filesystem::path& file, const Opacities& opacities) {

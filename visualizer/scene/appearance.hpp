@@ -12,6 +12,7 @@
 
 #include <glm/glm.hpp>
 
+#include "visualizer/scene/camera_pose.hpp"
 #include "visualizer/scene/gradient.hpp"
 #include "visualizer/scene/scene_view.hpp"
 
@@ -47,7 +48,8 @@ struct ViewSettings {
   GradientFilter gradient = kDefaultGradient;
   ClipPlane clip{};
   Stereo stereo{};
-  bool voxel_tool = false;    ///< the tool is a volume, not a mesh
+  std::optional<CameraPose> camera{};  ///< at first, and of a reset; none: all volumes are framed
+  bool voxel_tool = false;             ///< the tool is a volume, not a mesh
   bool colour_blind = false;  ///< materials in colours that any colour vision distinguishes
   friend bool operator==(const ViewSettings&, const ViewSettings&) noexcept = default;
 };

@@ -57,6 +57,7 @@ void OrbitCamera::frame(std::span<const glm::dvec3> corners, double aspect) {
   radius_mm_ = 0.0;
   yaw_rad_ = kHomeYawRad;
   pitch_rad_ = kHomePitchRad;
+  roll_rad_ = 0.0;
   distance_mm_ = 0.0;
   const double half = std::tan(kHalfHeightRad) / kMargin;
   const glm::dmat3 axes = eye_axes();
@@ -69,7 +70,33 @@ void OrbitCamera::frame(std::span<const glm::dvec3> corners, double aspect) {
   }
 }
 
+void OrbitCamera::look(const CameraPose& pose) {
+  constexpr double kUpright = 1e-9;  // the horizontal part of a view from which yaw is known
+  const glm::dvec3 away = pose.eye_mm - pose.target_mm;
+  const glm::dvec3 backward = glm::normalize(away);
+  const glm::dvec3 level = std::hypot(backward.x, backward.z) > kUpright ? backward
+                           : backward.y > 0.0                            ? -pose.up
+                                                                         : pose.up;
+  target_mm_ = pose.target_mm;
+  distance_mm_ = glm::length(away);
+  yaw_rad_ = std::atan2(level.x, level.z);
+  pitch_rad_ = std::asin(std::clamp(backward.y, -1.0, 1.0));
+  roll_rad_ = 0.0;
+  const glm::dvec3 up = eye_axes() * pose.up;
+  roll_rad_ = std::atan2(-up.x, up.y);
+}
+
+CameraPose OrbitCamera::pose() const {
+  const glm::dmat3 axes = eye_axes();
+  return {target_mm_ + glm::dvec3(0.0, 0.0, distance_mm_) * axes, target_mm_,
+          glm::dvec3(0.0, 1.0, 0.0) * axes};
+}
+
 void OrbitCamera::orbit(double right, double up) {
+  const double sine = std::sin(roll_rad_), cosine = std::cos(roll_rad_);
+  const double level = cosine * right - sine * up;
+  up = sine * right + cosine * up;
+  right = level;
   yaw_rad_ = std::remainder(yaw_rad_ - right * kDragRad, 2.0 * std::numbers::pi);
   pitch_rad_ = std::clamp(pitch_rad_ - up * kDragRad, -kMaxPitchRad, kMaxPitchRad);
 }
@@ -86,8 +113,9 @@ void OrbitCamera::pan(double right, double up) {
 }
 
 void OrbitCamera::zoom(double steps) {
-  distance_mm_ = std::clamp(distance_mm_ * std::pow(kZoomStep, steps), kNearest * radius_mm_,
-                            kFarthest * radius_mm_);
+  distance_mm_ = std::clamp(distance_mm_ * std::pow(kZoomStep, steps),
+                            std::min(kNearest * radius_mm_, distance_mm_),
+                            std::max(kFarthest * radius_mm_, distance_mm_));
 }
 
 void OrbitCamera::zoom_about(const glm::dvec3& pivot_mm, double steps) {
@@ -99,8 +127,11 @@ void OrbitCamera::zoom_about(const glm::dvec3& pivot_mm, double steps) {
 glm::dmat3 OrbitCamera::eye_axes() const {
   const glm::dvec3 backward{std::cos(pitch_rad_) * std::sin(yaw_rad_), std::sin(pitch_rad_),
                             std::cos(pitch_rad_) * std::cos(yaw_rad_)};
-  const glm::dvec3 right{std::cos(yaw_rad_), 0.0, -std::sin(yaw_rad_)};
-  return glm::transpose(glm::dmat3(right, glm::cross(backward, right), backward));
+  const glm::dvec3 level{std::cos(yaw_rad_), 0.0, -std::sin(yaw_rad_)};
+  const glm::dvec3 upright = glm::cross(backward, level);
+  const double sine = std::sin(roll_rad_), cosine = std::cos(roll_rad_);
+  return glm::transpose(
+      glm::dmat3(cosine * level + sine * upright, cosine * upright - sine * level, backward));
 }
 
 View OrbitCamera::view(double aspect, double reach_mm) const {

@@ -7,6 +7,7 @@
 
 #include <glm/glm.hpp>
 
+#include "visualizer/scene/camera_pose.hpp"
 #include "visualizer/scene/pixel_rect.hpp"
 
 namespace kerf {
@@ -46,11 +47,17 @@ struct View {
 };
 
 /// Turns about a point. Yaw 0 looks from +z (the user); pitch is the height above the horizon.
+/// World y is upright in the picture unless a pose has rolled it.
 class OrbitCamera {
  public:
   /// Shows what is in one or more boxes, by all their corners, from above and in front, in a
   /// picture of `aspect` (width over height).
   void frame(std::span<const glm::dvec3> corners, double aspect);
+
+  /// From a pose that has no `problem_with`; near and far go on from what was framed.
+  void look(const CameraPose& pose);
+  /// The present one; `up` is of length 1 and square to the view.
+  [[nodiscard]] CameraPose pose() const;
 
   /// Drags of the pointer, in fractions of the picture's height.
   void orbit(double right, double up);
@@ -58,7 +65,7 @@ class OrbitCamera {
   void orbit_about(const glm::dvec3& pivot_mm, double right, double up);
   void pan(double right, double up);
   /// Steps of the wheel: positive is nearer, down to 1/50 and up to 20 times the radius of what is
-  /// framed.
+  /// framed. A pose may lie beyond: from there no farther.
   void zoom(double steps);
   /// The same about a point in world mm, which stays where it is in the picture.
   void zoom_about(const glm::dvec3& pivot_mm, double steps);
@@ -80,6 +87,7 @@ class OrbitCamera {
   double distance_mm_ = 4.0;
   double yaw_rad_ = 0.0;
   double pitch_rad_ = 0.0;
+  double roll_rad_ = 0.0;  ///< of the picture about its middle, counter-clockwise as it is seen
 };
 
 /// Where a point in world mm is seen: in pixels of a picture from its upper left corner, and how

@@ -112,8 +112,8 @@ Of a `[[fault]]`. A key that its kind does not have is refused:
 
 
 def opacities(root):
-    file, view = Source(root, "visualizer/scene/appearance.cpp"), Source(root, "visualizer/scene/appearance.cpp")
-    same(f"{file.path}: tables", ["opacity"], set(re.findall(r'entry\.key == "(\w+)"', file.text)))
+    file, view = Source(root, "visualizer/scene/view_file.cpp"), Source(root, "visualizer/scene/appearance.cpp")
+    same(f"{view.path}: tables", ["opacity"], set(re.findall(r'entry\.key == "(\w+)"', view.text)))
     return f"""## Opacities
 
 `--transfer FILE` of `./kerf demo` and `./kerf visualizer`; `w` in the window writes such a file. At most {file.number('kLargest') // 1024} KiB.
@@ -129,15 +129,37 @@ ratios; a scene of one material has {view.number('kSoftestOpacity'):g}.
 """
 
 
+def camera(root):
+    file, pose = Source(root, "visualizer/scene/view_file.cpp"), Source(root, "visualizer/scene/camera_pose.cpp")
+    most = Source(root, "visualizer/scene/camera_pose.hpp").number("kFarthestMm")
+    rows = [(f"`{key}`", f"three numbers, {-most:g} to {most:g}", "needed", meaning) for key, meaning in (
+        ("eye_mm", "where the camera stands, in the scene's world"),
+        ("target_mm", "what is in the middle of the picture, and what a drag turns about; not at the eye"),
+        ("up", f"a direction that is upright in the picture; {pose.number('kLeastSine'):g} rad or more beside the view"))]
+    same(f"{pose.path}: keys", [row[0].strip("`") for row in rows], re.findall(r'\{+"(\w+)", &pose', pose.text))
+    return f"""## Camera
+
+`--camera FILE` of `./kerf demo` and `./kerf visualizer`; `n` in the window writes such a file. At most {file.number('kLargest') // 1024} KiB.
+
+    [camera]
+    eye_mm = [12.5, 40, 33]
+    target_mm = [0, 4, 0]
+    up = [0, 1, 0]
+
+{table(("key", "values", "default", "meaning"), rows)}
+"""
+
+
 def page(root, programs):
     same("kerf-emulator --help", ["--fault", "--hand"],
          {option for option in ("--fault", "--hand") if option + " " in programs.help("kerf-emulator")})
     same("kerf-lab faults --help", ["--scripts"], {o for o in ["--scripts"] if o in programs.help("kerf-lab", "faults")})
-    return f"""# Hand, fault and opacity files
+    return f"""# Hand, fault, opacity and camera files
 
 Each is TOML. A key that is unknown, of a wrong type or out of its range is refused with file, line and way out. A hand or
 fault file has at most 1 MiB.
 
 {hand(root)}
 {faults(root)}
-{opacities(root)}"""
+{opacities(root)}
+{camera(root)}"""

@@ -63,6 +63,18 @@ TEST_CASE("the gradient and a tool of voxels are part of the first look") {
   CHECK(settings.voxel_tool);
 }
 
+TEST_CASE("camera and panels are part of the first look") {
+  CHECK_FALSE(parse({})->settings.camera);
+  CHECK(parse({})->panels);
+  CHECK_FALSE(parse({"--panels", "off"})->panels);
+  CHECK_THROWS_AS(parse({"--panels", "none"}), VisualizerError);
+  const auto options = parse({"--camera", "-1,2,3,-4,5,6,0,1,0"});
+  CHECK(options->settings.camera == CameraPose{{-1, 2, 3}, {-4, 5, 6}, {0, 1, 0}});
+  CHECK_FALSE(options->camera_file);
+  CHECK_THROWS_WITH_AS(parse({"--camera", "nowhere"}),
+                       doctest::Contains("nowhere: no such file; name a camera"), VisualizerError);
+}
+
 TEST_CASE("each volume may have a renderer of its own, and one kind of them looks into volumes") {
   CHECK(parse({"--renderer", "surface,blend"})->settings.renderer == "surface,blend");
   CHECK_THROWS_WITH_AS(parse({"--renderer", "surface,"}),

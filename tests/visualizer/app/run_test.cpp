@@ -25,8 +25,11 @@
 #include "tests/json.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/visualizer/render/rgb_picture.hpp"
+#include "visualizer/app/window_run.hpp"
 #include "visualizer/gl/context.hpp"
+#include "visualizer/picture/picture.hpp"
 #include "visualizer/render/renderer.hpp"
+#include "visualizer/scene/camera_pose.hpp"
 #include "visualizer/scene/session.hpp"
 #include "visualizer/scene/visualizer_error.hpp"
 
@@ -127,6 +130,22 @@ class GrooveController {
   SegmentWriter writer_;
   std::optional<SegmentServer> server_;
 };
+
+/// Of a user who presses them in one frame.
+WindowInput pressing(std::string keys) {
+  WindowInput input;
+  input.keys = {keys.begin(), keys.end()};
+  return input;
+}
+
+/// Of a drag and a turn of the wheel.
+WindowInput moving(double right, double up, double wheel) {
+  WindowInput input;
+  input.drag_right = right;
+  input.drag_up = up;
+  input.wheel = wheel;
+  return input;
+}
 
 /// A busy machine may take long over a picture; a minute is not busy but broken.
 bool appears(const fs::path& file) {
@@ -347,6 +366,122 @@ TEST_CASE("a sheet at the end of a headless run shows the opacities of --transfe
     CHECK(sheets.back().substr(1, 3) == "PNG");
   }
   CHECK(sheets[0] != sheets[1]);
+}
+
+TEST_CASE("n writes the window's view, and a headless run from there shows the same picture") {
+  if (!have_gl()) return;
+  const Place place;
+  GrooveController miller;
+  miller.run_to(60);
+  VisualizerOptions options = place.options();
+  options.out = place / "window";
+  options.size = {320, 240};
+  options.panels = false;
+  options.renderer_is_given = true;
+  std::vector<fs::path> shots;
+  {
+    const auto context = make_headless_context();
+    WindowRun run(options, Session("test"), *context);
+    auto now = WindowRun::Clock::now();
+    const auto step = [&](const WindowInput& input) {
+      now += std::chrono::seconds(1);
+      static_cast<void>(run.step(input, options.size, now));
+    };
+    step({});
+    step(pressing("s"));
+    step(moving(0.2, -0.1, 2.0));
+    step(pressing("sn"));
+    CHECK(run.end() == 0);
+  }
+  miller.say(Lifecycle::clean_end);
+  // A window keeps its banners, which lie below the middle.
+  const auto upper_half = [](const fs::path& file) {
+    std::vector<std::uint8_t> rgb = test::read_png(file).value().rgb;
+    rgb.resize(rgb.size() / 2);
+    return rgb;
+  };
+  const auto picture_of = [&](const char* name, const std::string& camera) {
+    VisualizerOptions still = place.options();
+    still.size = options.size;
+    still.out = place / name;
+    still.frames = 1;
+    still.panels = false;
+    still.sheet = place / (std::string(name) + ".png");
+    if (!camera.empty()) still.settings.camera = read_camera(camera);
+    CHECK(run_headless(still) == 0);
+    return upper_half(still.out / "frame-0001.png");
+  };
+  const auto shot = [&](const char* name) { return upper_half(options.out / name); };
+  const std::string camera = (options.out / "kerf-0001-camera.toml").string();
+  CHECK(picture_of("first", "") == shot("kerf-0001.png"));
+  // The file has six digits after the point.
+  const std::vector<std::uint8_t> moved = picture_of("moved", camera);
+  const std::vector<std::uint8_t> seen = shot("kerf-0002.png");
+  REQUIRE(moved.size() == seen.size());
+  int most = 0;
+  for (std::size_t i = 0; i < moved.size(); ++i)
+    most = std::max(most, std::abs(moved[i] - seen[i]));
+  CHECK(most <= 1);
+  CHECK(shot("kerf-0001.png") != shot("kerf-0002.png"));
+  CHECK(test::text_of(place / "first.png") != test::text_of(place / "moved.png"));  // sheets
+}
+
+TEST_CASE("r goes back to the camera that was given, and n writes to its file") {
+  if (!have_gl()) return;
+  const Place place;
+  GrooveController miller;
+  miller.run_to(20);
+  VisualizerOptions options = place.options();
+  const CameraPose given{{3, 90, 60}, {16, 16, 16}, {0.5, 1, 0}};
+  options.camera_file = place / "camera.toml";
+  options.settings.camera = given;
+  const auto context = make_headless_context();
+  WindowRun run(options, Session("test"), *context);
+  auto now = WindowRun::Clock::now();
+  const auto step = [&](const WindowInput& input) {
+    now += std::chrono::seconds(1);
+    static_cast<void>(run.step(input, options.size, now));
+    return run.picture().camera().pose();
+  };
+  const auto is_given = [&](const CameraPose& pose) {
+    return glm::length(pose.eye_mm - given.eye_mm) + glm::length(pose.target_mm - given.target_mm) <
+           1e-9;
+  };
+  CHECK(is_given(step({})));
+  const CameraPose moved = step(moving(0.3, 0.1, -1.0));
+  CHECK_FALSE(is_given(moved));
+  step(pressing("n"));
+  const CameraPose kept = read_camera(options.camera_file->string());
+  CHECK(glm::length(kept.eye_mm - moved.eye_mm) < 2e-6);
+  CHECK(glm::length(kept.up - moved.up) < 2e-6);
+  CHECK(is_given(step(pressing("r"))));
+}
+
+TEST_CASE("a camera inside of the body, or far off, makes a picture by every renderer") {
+  if (!have_gl()) return;
+  const Place place;
+  GrooveController miller;
+  miller.run_to(20);
+  const Session session("test");
+  const auto context = make_headless_context();
+  for (const auto kind : renderer_kinds()) {
+    CAPTURE(kind);
+    for (const CameraPose& pose : {CameraPose{{16, 10, 16}, {16, 10, 0}, {0, 1, 0}},
+                                   CameraPose{{16, 20, 16}, {40, 30, 3}, {0, 1, 0}},
+                                   CameraPose{{1e5, 1e5, 1e5}, {0, 0, 0}, {0, 1, 0}},
+                                   CameraPose{{16, 31, 16}, {16, 31 + 1e-6, 16}, {1, 0, 0}}}) {
+      ViewSettings settings;
+      settings.renderer = kind;
+      settings.camera = pose;
+      Picture picture(session, settings, 4.0 / 3.0);
+      const RenderTarget target({96, 72});
+      OverlayFigures figures;
+      figures.hidden = true;
+      static_cast<void>(picture.draw(session, figures, target));
+      CHECK(glGetError() == GL_NO_ERROR);
+      CHECK(target.read_rgb().size() == 96 * 72 * 3);
+    }
+  }
 }
 
 TEST_CASE("a core that is not there is refused, also beside one that is") {

@@ -3,13 +3,18 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
+#include <string_view>
 #include <vector>
 
 #include <doctest/doctest.h>
 #include <rapidcheck.h>
 
+#include "tests/support/temporary_folder.hpp"
 #include "tests/visualizer/gl/gl_fixture.hpp"
 #include "visualizer/render/renderer.hpp"
+#include "visualizer/scene/camera_pose.hpp"
+#include "visualizer/scene/visualizer_error.hpp"
 
 using namespace kerf;
 using namespace kerf::test;
@@ -116,6 +121,124 @@ TEST_CASE("dragging to the right moves what is in the middle to the right") {
   const glm::dvec3 front(glm::transpose(glm::dmat3(before.eye_from_world)) * glm::dvec3(0, 0, 3));
   CHECK(ndc(view, front).x > 0.0);  // the point that was in front has gone right
   CHECK(ndc(view, towards_eye).x == doctest::Approx(0.0));
+}
+
+TEST_CASE("a pose is looked at from its eye: the target in the middle, up upright, at any roll") {
+  CHECK(rc::check([] {
+    const auto mm = [] { return *rc::gen::inRange(-900, 900) * 0.1; };
+    CameraPose pose{{mm(), mm(), mm()}, {mm(), mm(), mm()}, {mm(), mm(), mm()}};
+    if (*rc::gen::inRange(0, 3) == 0) pose.target_mm = pose.eye_mm - glm::dvec3(0.0, 7.0, 0.0);
+    RC_PRE(problem_with(pose).empty());
+    OrbitCamera camera;
+    camera.frame(box({-5, -5, -5}, {5, 9, 5}), 1.5);
+    camera.look(pose);
+    const View view = camera.view(1.5, 20.0);
+    // By the columns of a matrix that looks from one point to another, not by angles.
+    const glm::dvec3 forward = glm::normalize(pose.target_mm - pose.eye_mm);
+    const glm::dvec3 right = glm::normalize(glm::cross(forward, pose.up));
+    for (const glm::dvec3& at : {glm::dvec3(3, -8, 4), pose.target_mm, pose.eye_mm}) {
+      const glm::dvec3 from_eye = at - pose.eye_mm;
+      const glm::dvec3 wanted(glm::dot(right, from_eye),
+                              glm::dot(glm::cross(right, forward), from_eye),
+                              -glm::dot(forward, from_eye));
+      const glm::dvec3 seen(view.eye_from_world * glm::dvec4(at, 1.0));
+      RC_ASSERT(glm::length(seen - wanted) < 1e-6);
+    }
+    RC_ASSERT(view.near_mm > 0.0);
+    RC_ASSERT(view.far_mm > view.near_mm);
+    const CameraPose back = camera.pose();
+    RC_ASSERT(glm::length(back.eye_mm - pose.eye_mm) < 1e-6);
+    RC_ASSERT(glm::length(back.target_mm - pose.target_mm) < 1e-6);
+    RC_ASSERT(std::abs(glm::dot(back.up, right)) < 1e-9);
+  }));
+}
+
+TEST_CASE("a rolled picture follows a drag, and a wheel turns no camera far off round to near") {
+  OrbitCamera camera;
+  camera.frame(box({-5, -5, -5}, {5, 5, 5}), 1.0);
+  camera.look({{0, 0, 40}, {0, 0, 0}, {1, 0, 0}});  // lies on its side: +x is up
+  camera.orbit(0.05, 0.0);
+  CHECK(ndc(camera.view(1.0, 9.0), {0, 0, 3}).x > 0.01);  // what was in front went right
+  CHECK(ndc(camera.view(1.0, 9.0), {0, 0, 3}).y == doctest::Approx(0.0));
+  camera.look({{0, 0, 5000}, {0, 0, 0}, {0, 1, 0}});
+  camera.zoom(-3.0);
+  CHECK(camera.distance_mm() == doctest::Approx(5000.0));
+  camera.zoom(1.0);
+  CHECK(camera.distance_mm() == doctest::Approx(4500.0));
+}
+
+TEST_CASE("a camera is nine numbers or a file, and each mistake is one line") {
+  const CameraPose pose{{12.5, -40, 33}, {0, 1e-3, 0}, {0, 0, -2}};
+  CHECK(read_camera("12.5,-40,33,0,1e-3,0,0,0,-2") == pose);
+  CHECK(parse_camera("[camera]\neye_mm = [12.5, -40, 33]\nup = [0, 0, -2]\n"
+                     "target_mm = [0, 0.001, 0]\n",
+                     "c") == pose);
+  const TemporaryFolder folder;
+  write_camera(folder / "a,b.toml", pose);
+  CHECK(read_camera((folder / "a,b.toml").string()) == pose);
+
+  const auto numbers = [](const char* text, const char* wanted) {
+    CAPTURE(text);
+    try {
+      static_cast<void>(read_camera(text));
+      FAIL("is taken");
+    } catch (const VisualizerError& problem) {
+      const std::string line = problem.what();
+      CHECK(line.substr(0, line.find("; give EYE")) == wanted);
+      CHECK(line.find('\n') == line.npos);
+    }
+  };
+  numbers("1,2,3", "--camera: 3 numbers");
+  numbers("1,2,3,4,5,6,7,8,9,10", "--camera: 10 numbers");
+  numbers("1,2,3,4,5,6,7,8,", "--camera: '' is no number");
+  numbers("1,2,3,4,5,6,7,8,up\n", "--camera: 'up\\n' is no number");
+  numbers("nan,2,3,4,5,6,7,8,9", "--camera: 'nan' is no number");
+  numbers("1,2,3,4,5,6,7,8,inf", "--camera: 'inf' is no number");
+  numbers("1,2,3,1,2,3,0,1,0", "--camera: EYE and TARGET are both at 1,2,3; move one of them");
+  numbers("1,2,3,1,2,4,0,0,0", "--camera: UP 0,0,0 has no direction; give one, such as 0,1,0");
+  numbers("0,9,0,0,0,0,0,-1,0",
+          "--camera: UP 0,-1,0 is along the view; give another direction, such as 0,0,1");
+  numbers("1,2,3,2,4,6,0.333333,0.666667,1",
+          "--camera: UP 0.333333,0.666667,1 is along the view; give another direction, such as "
+          "1,0,0");
+  numbers("1e6,2,3,4,5,6,7,8,9",
+          "--camera: EYE 1e+06,2,3 is beyond 1e+05 mm; give smaller numbers");
+
+  const auto file = [](const char* text, const char* wanted) {
+    CAPTURE(text);
+    CHECK_THROWS_WITH_AS(static_cast<void>(parse_camera(text, "c")), wanted, VisualizerError);
+  };
+  file("", "c: there is no table [camera]; write one");
+  file("[opacity]\nbone = 1\n", "c:1: opacity is not known here; known is the table [camera]");
+  file("[camera]\nfov = 3\n",
+       "c:2: camera.fov is not known here; known are eye_mm, target_mm and up");
+  file("[camera]\neye_mm = [1, 2]\n",
+       "c:2: camera.eye_mm = [1, 2] is not three numbers; give [x, y, z]");
+  file("[camera]\neye_mm = 1\n", "c:2: camera.eye_mm = 1 is not three numbers; give [x, y, z]");
+  file("[camera]\neye_mm = [1, 2, 'z']\n",
+       "c:2: camera.eye_mm = [1, 2, \"z\"] is not three numbers; give [x, y, z]");
+  file("\n[camera]\neye_mm = [1, 2, 3]\nup = [0, 1, 0]\n",
+       "c:2: camera has no target_mm; give [x, y, z]");
+  file("[camera]\neye_mm = [nan, 2, 3]\ntarget_mm = [0, 0, 0]\nup = [0, 1, 0]\n",
+       "c:1: EYE nan,2,3 is beyond 1e+05 mm; give smaller numbers");
+  file("[camera]\neye_mm = [1, 2, 3]\ntarget_mm = [1, 2, 3]\nup = [0, 1, 0]\n",
+       "c:1: EYE and TARGET are both at 1,2,3; move one of them");
+  CHECK_THROWS_WITH_AS(static_cast<void>(read_camera("nowhere.toml")),
+                       "nowhere.toml: no such file; name a camera, as n in the window writes it, "
+                       "or give nine numbers, EYE,TARGET,UP",
+                       VisualizerError);
+}
+
+TEST_CASE("whatever a camera's file holds, it gives a camera that can be looked from or one line") {
+  CHECK(rc::check([](const std::string& text) {
+    for (const std::string& whole : {text, "[camera]\nup = [" + text}) {
+      try {
+        RC_ASSERT(problem_with(parse_camera(whole, "c")).empty());
+      } catch (const VisualizerError& problem) {
+        RC_ASSERT(std::string_view(problem.what()).find('\n') == std::string_view::npos);
+      }
+    }
+  }));
 }
 
 namespace {
