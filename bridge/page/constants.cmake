@@ -83,8 +83,6 @@ constants(visualizer/scene/appearance.cpp kEmptyShare kHighestAir kWholeSoftest 
 list_constant(visualizer/scene/appearance.cpp kIvory "kIvory")
 constants(visualizer/render/volume_textures.cpp kMaterialReach)
 constants(visualizer/cast/cast_kernels.hpp kLongestTapVox)
-take(visualizer/render/iso_renderer.hpp "step_vox = ([^;]+);" "step of iso")
-string(APPEND text "export const kIsoStepVox = ${value};\n")
 take(visualizer/render/translucent_renderers.hpp "step_vox = ([^;]+);" "step of blend")
 string(APPEND text "export const kBlendStepVox = ${value};\n")
 constants(visualizer/compose/tool_painter.cpp kSides kCreaseDegrees kNeckPerRadius kShankPerRadius kNeckRadii

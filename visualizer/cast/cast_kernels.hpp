@@ -40,7 +40,7 @@ struct CastVolumeJob {
   const std::uint32_t* density = nullptr;  ///< `PairedRows`
   const std::uint16_t* labels = nullptr;   ///< `PairedRows`, or none
   CastGradient gradient;
-  const std::uint8_t* active = nullptr;  ///< of each macrocell: not 0 if it may show anything
+  const std::uint8_t* active = nullptr;  ///< of each macrocell: `Macrocells::active`
   const CastBlock* blocks = nullptr;     ///< `MacrocellDepthRange`: rows of the picture's blocks
   std::int32_t row = 0, plane = 0;       ///< of density and labels, in entries
   std::int32_t cell_row = 0, cell_plane = 0;
@@ -80,7 +80,6 @@ struct CastJob {
   int volume_count = 0;
   CastEye eye;
   CastPixels pixels;
-  float step_vox = 0.75F;                                   ///< iso: along the ray
   float step_mm = 0.1F;                                     ///< blend: along the view axis
   float key_light[3] = {}, fill_light[3] = {}, up[3] = {};  ///< unit vectors in eye space
 };

@@ -68,7 +68,6 @@ void Caster::draw(const View& view, std::span<const PixelRect> parts, CastPictur
   job.pixels = {picture.rgba.data(), picture.depth.data(),
                 normals.empty() ? nullptr : normals.data(),
                 end_depth.empty() ? nullptr : end_depth.data()};
-  job.step_vox = options_.step_vox;
   job.step_mm = options_.step_vox * static_cast<float>(shortest_mm);
   put(job.key_light, glm::normalize(glm::dvec3(-0.45, 0.75, 0.70)));  // lighting.frag
   put(job.fill_light, glm::normalize(glm::dvec3(0.80, 0.05, 0.45)));

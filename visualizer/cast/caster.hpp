@@ -60,9 +60,8 @@ class Caster {
  public:
   struct Options {
     CastMode mode = CastMode::iso;
-    /// Iso: along the ray, so that a wall of one voxel, antialiased over two, is never stepped
-    /// over. Blend: along the view axis, in the shortest voxel edge of all volumes.
-    float step_vox = 0.75F;
+    /// Of blend, along the view axis, in the shortest voxel edge of all volumes.
+    float step_vox = 1.0F;
     const CastKernels* kernels = cast_kernels()[0];
   };
 

@@ -20,20 +20,30 @@ Macrocells::Macrocells(VoxelGrid volume, std::span<const Density> density, Densi
 }
 
 bool Macrocells::update_cell(VoxelIndex cell, std::span<const Density> density) {
+  const std::int32_t half = edge_ / 2;
   const VoxelIndex lo{cell.x * edge_ - 1, cell.y * edge_ - 1, cell.z * edge_ - 1};
   const VoxelBox box =
       VoxelBox{lo, {lo.x + edge_ + 1, lo.y + edge_ + 1, lo.z + edge_ + 1}}.clipped(volume_.box());
-  Density highest = 0;
+  // A voxel in the middle belongs to the octants on both sides of it.
+  const std::int32_t low_end = std::min(lo.x + half + 1, box.hi.x);
+  const std::int32_t high_begin = std::min(lo.x + half, box.hi.x);
+  unsigned octants = 0;
   for (std::int32_t z = box.lo.z; z < box.hi.z; ++z) {
     for (std::int32_t y = box.lo.y; y < box.hi.y; ++y) {
-      const auto row = density.subspan(volume_.index(box.lo.x, y, z),
-                                       static_cast<std::size_t>(box.hi.x - box.lo.x));
-      for (const Density d : row) highest = std::max(highest, d);
+      const Density* const row = density.data() + volume_.index(0, y, z);
+      Density low = 0;
+      Density high = 0;
+      for (std::int32_t x = box.lo.x; x < low_end; ++x) low = std::max(low, row[x]);
+      for (std::int32_t x = high_begin; x < box.hi.x; ++x) high = std::max(high, row[x]);
+      const unsigned along_x = (low >= iso_ ? 1U : 0U) | (high >= iso_ ? 2U : 0U);
+      const unsigned along_y =
+          (y <= lo.y + half ? along_x : 0U) | (y >= lo.y + half ? along_x << 2 : 0U);
+      octants |= (z <= lo.z + half ? along_y : 0U) | (z >= lo.z + half ? along_y << 4 : 0U);
     }
   }
   const std::size_t at = grid_.index(cell.x, cell.y, cell.z);
   const std::uint8_t before = active_[at];
-  active_[at] = highest >= iso_ ? 1 : 0;
+  active_[at] = static_cast<std::uint8_t>(octants);
   return active_[at] != before;
 }
 

@@ -13,27 +13,29 @@
 namespace kerf {
 
 /// Which cells of e^3 voxel edges have a density of iso or more, so that rays pass over those that
-/// cannot hold the iso-surface.
+/// cannot hold the iso-surface; and which octants of these do.
 ///
 /// Air surrounds the volume: its surface is closed at the border too. Cell (i, j, k) spans voxel
 /// coordinates ei-1 to ei+e-1 on each axis with both ends, so its highest density bounds every
-/// trilinear sample in the cell. A changed brick (voxels 8b to 8b+7) touches cells 8b/e to
-/// 8(b+1)/e.
+/// trilinear sample in the cell; likewise its octants, of e/2 voxel edges. Those of cells of two
+/// are the cells of eight voxels in which a trilinear sample lies. A changed brick (voxels 8b to
+/// 8b+7) touches cells 8b/e to 8(b+1)/e.
 class Macrocells {
  public:
   static constexpr std::int32_t kEdge = 8;
 
-  /// `edge` divides that of a brick.
+  /// `edge` is even and divides that of a brick.
   Macrocells(VoxelGrid volume, std::span<const Density> density, Density iso,
              std::int32_t edge = kEdge);
 
   /// Computes again the cells that touch bricks of `changed`. Returns the smallest box around the
-  /// cells that became active or inactive.
+  /// cells of which an octant became active or inactive.
   VoxelBox update_bricks(const BrickGrid& bricks, const ChangedBricks& changed,
                          std::span<const Density> density);
 
   [[nodiscard]] const VoxelGrid& grid() const noexcept { return grid_; }
-  /// 1 if a sample may reach iso.
+  /// 0 if no sample reaches iso; else bit x + 2y + 4z of each octant (0 or 1 along each axis) in
+  /// which one may.
   [[nodiscard]] std::span<const std::uint8_t> active() const noexcept { return active_; }
 
   /// Faces between an active cell and an inactive one or the outside, `{x, y, z, face}` with face

@@ -21,7 +21,6 @@ std::vector<CastContent> cast_contents(const SceneView& scene,
 Caster::Options cast_options(CastMode mode) {
   Caster::Options options;
   options.mode = mode;
-  if (mode == CastMode::blend) options.step_vox = 1.0F;
   return options;
 }
 

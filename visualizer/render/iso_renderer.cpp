@@ -7,8 +7,9 @@ namespace kerf {
 
 namespace {
 
-constexpr GLuint kEntryUnit = 4;  // after the textures of VolumeOnGpu
-constexpr GLuint kPaletteUnit = 5;
+constexpr GLuint kEntryUnit = 5;  // after the textures of VolumeOnGpu
+constexpr GLuint kPaletteUnit = 6;
+constexpr std::int32_t kFineCellVox = 2;
 
 constexpr TexelFormat kGradientTexel{GL_RGBA16, GL_RGBA, GL_UNSIGNED_SHORT, GL_LINEAR};
 
@@ -18,6 +19,8 @@ VolumeOnGpu::VolumeOnGpu(const VolumeView& volume, const VolumeContent& content,
                          int max_texture_size, bool skip_empty, GradientFilter gradient)
     : solid_(volume, content, max_texture_size),
       cells_(volume, content.density, skip_empty ? volume.iso : Density{0}),
+      fine_cells_(volume.bricks, content.density, skip_empty ? volume.iso : Density{0},
+                  kFineCellVox),
       gradient_(GradientPlan(gradient, volume.edges_mm()), volume.bricks.grid, content.density),
       gradient_texture_(volume.bricks.grid, kGradientTexel, GradientRows::kNone.data()) {
   gradient_texture_.upload_from(gradient_.data(), volume.bricks.grid.box(), kBorder);
@@ -31,6 +34,7 @@ void VolumeOnGpu::update_bricks(std::span<const Density> density, const ChangedB
     if (!around.empty()) gradient_texture_.upload_from(gradient_.data(), around, kBorder);
   }
   cells_.update_bricks(density, changed);
+  fine_cells_.update_bricks(density, changed);
 }
 
 void VolumeOnGpu::set_transform(const glm::dmat4& world_from_voxel) {
@@ -41,7 +45,8 @@ void VolumeOnGpu::set_transform(const glm::dmat4& world_from_voxel) {
 void VolumeOnGpu::bind(const GlProgram& program, const View& view) const {
   solid_.bind(program, view);
   cells_.bind(2);
-  gradient_texture_.bind(3);
+  fine_cells_.bind(3);
+  gradient_texture_.bind(4);
   program.set("u_gradient_scale",
               gradient_.plan().per_edge * glm::vec3(texels_of(solid_.bricks().grid)));
 }
@@ -59,9 +64,9 @@ IsoRenderer::IsoRenderer(const SceneView& scene, std::span<const VolumeContent> 
   }
   SolidOnGpu::set_units(cast_program_, static_cast<int>(kPaletteUnit));
   cast_program_.set("u_active_cell", 2);
-  cast_program_.set("u_gradient", 3);
+  cast_program_.set("u_fine_cell", 3);
+  cast_program_.set("u_gradient", 4);
   cast_program_.set("u_entry_mm", static_cast<int>(kEntryUnit));
-  cast_program_.set("u_step_vox", options.step_vox);
 }
 
 void IsoRenderer::draw(const View& view, const RenderTarget& target) {

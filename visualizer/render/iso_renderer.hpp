@@ -28,7 +28,7 @@ class VolumeOnGpu {
   /// See `Renderer::set_transform`.
   void set_transform(const glm::dmat4& world_from_voxel);
 
-  /// Binds what `SolidOnGpu` binds, active cells on unit 2 and the gradient on 3.
+  /// Binds what `SolidOnGpu` binds, active cells on unit 2, fine cells on 3 and the gradient on 4.
   void bind(const GlProgram& program, const View& view) const;
 
   [[nodiscard]] const CellsOnGpu& cells() const noexcept { return cells_; }
@@ -37,6 +37,7 @@ class VolumeOnGpu {
  private:
   SolidOnGpu solid_;
   CellsOnGpu cells_;
+  CellTexture fine_cells_;  ///< of two voxel edges: their octants are the cells of eight voxels
   GradientRows gradient_;
   VoxelTexture gradient_texture_;
 };
@@ -44,13 +45,13 @@ class VolumeOnGpu {
 /// Iso-surfaces by ray casting in a fragment shader.
 ///
 /// Per volume two passes. The first draws the faces between active and empty macrocells and keeps,
-/// per pixel, where its ray first meets an active cell; the second casts the ray from there. So
-/// pixels beside the volume cost nothing, and rays begin at most a cell before the surface.
+/// per pixel, where its ray first meets an active cell; the second casts the ray from there, into
+/// each cell of eight voxels that may hold the surface (iso.frag). So pixels beside the volume cost
+/// nothing, and no part of the surface is too thin to be met.
 class IsoRenderer final : public Renderer {
  public:
   struct Options {
-    bool skip_empty = true;  ///< false: sample every ray from end to end, for comparison
-    float step_vox = 0.75F;  ///< a wall of one voxel, antialiased over two, is never stepped over
+    bool skip_empty = true;  ///< false: look into all cells on a ray, for comparison
     std::string_view light = "lighting.frag";  ///< or normals.frag, for measurements
   };
 

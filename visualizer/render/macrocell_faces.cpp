@@ -55,48 +55,58 @@ VoxelBox CellFaces::active_box() const {
   return box;
 }
 
+CellTexture::CellTexture(const BrickGrid& bricks, std::span<const Density> density,
+                         Density threshold, std::int32_t edge)
+    : bricks_(bricks), cells_(bricks.grid, density, threshold, edge) {
+  const VoxelGrid& n = cells_.grid();
+  glTextureStorage3D(texture_.id(), 1, GL_R8UI, n.nx, n.ny, n.nz);
+  read_nearest(texture_.id());
+  upload(n.box());
+}
+
+VoxelBox CellTexture::update_bricks(std::span<const Density> density,
+                                    const ChangedBricks& changed) {
+  const VoxelBox flipped = cells_.update_bricks(bricks_, changed, density);
+  if (!flipped.empty()) upload(flipped);
+  return flipped;
+}
+
+void CellTexture::upload(const VoxelBox& cells) {
+  const VoxelGrid& grid = cells_.grid();
+  const VoxelIndex n = cells.extent();
+  glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
+  glPixelStorei(GL_UNPACK_ROW_LENGTH, grid.nx);
+  glPixelStorei(GL_UNPACK_IMAGE_HEIGHT, grid.ny);
+  glTextureSubImage3D(texture_.id(), 0, cells.lo.x, cells.lo.y, cells.lo.z, n.x, n.y, n.z,
+                      GL_RED_INTEGER, GL_UNSIGNED_BYTE,
+                      &cells_.active()[grid.index(cells.lo.x, cells.lo.y, cells.lo.z)]);
+  glPixelStorei(GL_UNPACK_ROW_LENGTH, 0);  // others upload too
+  glPixelStorei(GL_UNPACK_IMAGE_HEIGHT, 0);
+}
+
 CellsOnGpu::CellsOnGpu(const VolumeView& volume, std::span<const Density> density,
                        Density threshold)
-    : bricks_(volume.bricks), cells_(volume.bricks.grid, density, threshold), faces_(cells_) {
+    : cells_(volume.bricks, density, threshold), faces_(cells_.cells()) {
   set_transform(volume.world_from_voxel);
-  const VoxelGrid& n = cells_.grid();
-  glTextureStorage3D(active_.id(), 1, GL_R8UI, n.nx, n.ny, n.nz);
-  read_nearest(active_.id());
   glVertexArrayVertexBuffer(face_array_.id(), 0, face_buffer_.id(), 0, sizeof(CellFaces::Face));
   glEnableVertexArrayAttrib(face_array_.id(), 0);
   glVertexArrayAttribIFormat(face_array_.id(), 0, 4, GL_UNSIGNED_SHORT, 0);
   glVertexArrayBindingDivisor(face_array_.id(), 0, 1);
-  glNamedBufferStorage(face_buffer_.id(),
-                       static_cast<GLsizeiptr>(CellFaces::most(n) * sizeof(CellFaces::Face)),
+  const std::size_t most = CellFaces::most(cells_.cells().grid());
+  glNamedBufferStorage(face_buffer_.id(), static_cast<GLsizeiptr>(most * sizeof(CellFaces::Face)),
                        nullptr, GL_DYNAMIC_STORAGE_BIT);
-  upload_active(n.box());
   upload_faces(std::array{CellFaces::Run{0, faces_.all().size()}});
 }
 
 void CellsOnGpu::update_bricks(std::span<const Density> density, const ChangedBricks& changed) {
-  const VoxelBox flipped = cells_.update_bricks(bricks_, changed, density);
-  if (flipped.empty()) return;
-  upload_active(flipped);
-  upload_faces(faces_.update(cells_, flipped));
+  const VoxelBox flipped = cells_.update_bricks(density, changed);
+  if (!flipped.empty()) upload_faces(faces_.update(cells_.cells(), flipped));
 }
 
 void CellsOnGpu::set_transform(const glm::dmat4& world_from_voxel) {
   // Cell i begins at voxel 8i - 1.
   world_from_cell_ =
       glm::scale(glm::translate(world_from_voxel, glm::dvec3(-1.0)), glm::dvec3(Macrocells::kEdge));
-}
-
-void CellsOnGpu::upload_active(const VoxelBox& cells) {
-  const VoxelGrid& grid = cells_.grid();
-  const VoxelIndex n = cells.extent();
-  glPixelStorei(GL_UNPACK_ALIGNMENT, 1);
-  glPixelStorei(GL_UNPACK_ROW_LENGTH, grid.nx);
-  glPixelStorei(GL_UNPACK_IMAGE_HEIGHT, grid.ny);
-  glTextureSubImage3D(active_.id(), 0, cells.lo.x, cells.lo.y, cells.lo.z, n.x, n.y, n.z,
-                      GL_RED_INTEGER, GL_UNSIGNED_BYTE,
-                      &cells_.active()[grid.index(cells.lo.x, cells.lo.y, cells.lo.z)]);
-  glPixelStorei(GL_UNPACK_ROW_LENGTH, 0);  // others upload too
-  glPixelStorei(GL_UNPACK_IMAGE_HEIGHT, 0);
 }
 
 void CellsOnGpu::upload_faces(std::span<const CellFaces::Run> runs) {

@@ -48,6 +48,28 @@ class CellFaces {
   std::vector<Face> faces_;
 };
 
+/// The macrocells of one volume as a texture, `Macrocells::active`; whole once, then only what
+/// changed.
+class CellTexture {
+ public:
+  /// Cells of `edge` voxel edges that hold a density of at least `threshold` are active.
+  CellTexture(const BrickGrid& bricks, std::span<const Density> density, Density threshold,
+              std::int32_t edge = Macrocells::kEdge);
+
+  /// Bricks `changed` of `density` (the whole volume) differ. As `Macrocells::update_bricks`.
+  VoxelBox update_bricks(std::span<const Density> density, const ChangedBricks& changed);
+
+  void bind(GLuint unit) const { glBindTextureUnit(unit, texture_.id()); }
+  [[nodiscard]] const Macrocells& cells() const noexcept { return cells_; }
+
+ private:
+  void upload(const VoxelBox& cells);
+
+  BrickGrid bricks_;
+  Macrocells cells_;
+  GlTexture3D texture_ = GlTexture3D::create();
+};
+
 /// The macrocells of one volume on the GPU: which are active, and the faces around those; whole
 /// once, then only what changed.
 class CellsOnGpu {
@@ -61,8 +83,8 @@ class CellsOnGpu {
   /// See `Renderer::set_transform`.
   void set_transform(const glm::dmat4& world_from_voxel);
 
-  /// The texture: 1 in active cells.
-  void bind(GLuint unit) const { glBindTextureUnit(unit, active_.id()); }
+  /// The texture: not 0 in active cells.
+  void bind(GLuint unit) const { cells_.bind(unit); }
   /// Draws the faces around the active cells with the program in use; attribute 0 is a face.
   void draw_faces() const;
 
@@ -71,15 +93,12 @@ class CellsOnGpu {
   [[nodiscard]] const VoxelBox& active_box() const noexcept { return active_box_; }
 
  private:
-  void upload_active(const VoxelBox& cells);
   void upload_faces(std::span<const CellFaces::Run> runs);
 
-  BrickGrid bricks_;
   glm::dmat4 world_from_cell_{1.0};
-  Macrocells cells_;
+  CellTexture cells_;
   CellFaces faces_;
   VoxelBox active_box_;
-  GlTexture3D active_ = GlTexture3D::create();
   GlBuffer face_buffer_ = GlBuffer::create();
   GlVertexArray face_array_ = GlVertexArray::create();
 };

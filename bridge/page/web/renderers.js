@@ -2,7 +2,7 @@
 // Volumes cast ray by ray: where rays enter them, surfaces, and looks inside, as the renderers of
 // visualizer/render.
 import {clipFromEye, shownInEye} from './camera.js';
-import {kBlendStepVox, kIsoStepVox} from './constants.js';
+import {kBlendStepVox} from './constants.js';
 import {bind, cover, Program} from './gl.js';
 import {affineInverse, multiply, turn} from './math.js';
 import {leastExtinction} from './transfer_function.js';
@@ -49,8 +49,8 @@ export class IsoCaster {
     this.gl = gl;
     this.iso = new Program(gl, 'iso');
     this.iso.use();
-    this.iso.setInts({u_density: 0, u_label: 1, u_active_cell: 2, u_entry_mm: 4, u_palette: 5});
-    this.iso.set({u_step_vox: kIsoStepVox});
+    this.iso.setInts({u_density: 0, u_label: 1, u_active_cell: 2, u_fine_cell: 3, u_entry_mm: 4,
+      u_palette: 5});
   }
   draw(eye, volume, view, part, palette) {
     const {gl} = this;

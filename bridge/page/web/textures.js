@@ -3,7 +3,7 @@
 import {bind, texture} from './gl.js';
 import {scaled, translated} from './math.js';
 import {gradientTexels, MaterialTexels, transferFunction} from './transfer_function.js';
-import {Macrocells} from './volume.js';
+import {FineCells, Macrocells} from './volume.js';
 
 /** A texel for each voxel inside a border of air one voxel thick. */
 class VoxelTexture {
@@ -85,8 +85,8 @@ class CellsOnGpu {
     gl.vertexAttribDivisor(0, 1);
     gl.bindVertexArray(null);
   }
-  update(bricks) {
-    if (!this.cells.update(bricks)) return;
+  update(touched) {
+    if (!this.cells.update(touched)) return;
     const {gl} = this;
     gl.bindTexture(gl.TEXTURE_3D, this.texture);
     gl.texSubImage3D(gl.TEXTURE_3D, 0, 0, 0, 0, ...this.cells.grid, gl.RED_INTEGER, gl.UNSIGNED_BYTE,
@@ -108,6 +108,30 @@ class CellsOnGpu {
   }
 }
 
+/** `FineCells` as a texture. */
+class FineCellsOnGpu {
+  constructor(gl, view, cells) {
+    this.gl = gl;
+    this.cells = new FineCells(view.volume, cells);
+    this.texture = texture(gl, gl.TEXTURE_3D, gl.R8UI, gl.NEAREST, this.cells.grid);
+  }
+  update(touched) {
+    const box = this.cells.update(touched);
+    if (!box) return;
+    const {gl, cells: {grid, octants}} = this, {low, high} = box;
+    gl.bindTexture(gl.TEXTURE_3D, this.texture);
+    gl.pixelStorei(gl.UNPACK_ROW_LENGTH, grid[0]);
+    gl.pixelStorei(gl.UNPACK_IMAGE_HEIGHT, grid[1]);
+    gl.texSubImage3D(gl.TEXTURE_3D, 0, ...low, ...high.map((n, axis) => n - low[axis]), gl.RED_INTEGER,
+      gl.UNSIGNED_BYTE, octants.subarray((low[2] * grid[1] + low[1]) * grid[0] + low[0]));
+    gl.pixelStorei(gl.UNPACK_ROW_LENGTH, 0);
+    gl.pixelStorei(gl.UNPACK_IMAGE_HEIGHT, 0);
+  }
+  free() {
+    this.gl.deleteTexture(this.texture);
+  }
+}
+
 /** What both renderers have of a volume; `take` uploads what came since. */
 class VolumeOnGpu {
   constructor(gl, view, threshold) {
@@ -124,8 +148,11 @@ class VolumeOnGpu {
     if (bricks.length === 0) return bricks;
     this.gl.pixelStorei(this.gl.UNPACK_ALIGNMENT, 1);
     for (const {low, high} of boxesOf(this.volume, bricks)) this.upload(low, high);
-    this.cells.update(bricks);
+    this.updateCells(this.cells.cells.touched(bricks));
     return bricks;
+  }
+  updateCells(touched) {
+    this.cells.update(touched);
   }
   free() {
     this.volume.forget(this.stale);
@@ -137,6 +164,7 @@ class VolumeOnGpu {
 export class SolidOnGpu extends VolumeOnGpu {
   constructor(gl, view) {
     super(gl, view, view.iso);
+    this.fineCells = new FineCellsOnGpu(gl, view, this.cells.cells);
     this.density = new VoxelTexture(gl, this.volume.size, gl.RG8, gl.RG, gl.LINEAR);
     const labelled = this.volume.labels ? this.volume.size : [0, 0, 0];
     this.labels = new VoxelTexture(gl, labelled, gl.R8UI, gl.RED_INTEGER, gl.NEAREST);
@@ -145,13 +173,19 @@ export class SolidOnGpu extends VolumeOnGpu {
     this.density.uploadFrom(low, high, new Uint8Array(this.volume.density.buffer), 2);
     if (this.volume.labels) this.labels.uploadFrom(low, high, this.volume.labels, 1);
   }
+  updateCells(touched) {
+    super.updateCells(touched);
+    this.fineCells.update(touched);
+  }
   bind() {
     bind(this.gl, 0, this.gl.TEXTURE_3D, this.density.texture);
     bind(this.gl, 1, this.gl.TEXTURE_3D, this.labels.texture);
     bind(this.gl, 2, this.gl.TEXTURE_3D, this.cells.texture);
+    bind(this.gl, 3, this.gl.TEXTURE_3D, this.fineCells.texture);
   }
   free() {
     super.free();
+    this.fineCells.free();
     this.density.free();
     this.labels.free();
   }

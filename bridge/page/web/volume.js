@@ -138,9 +138,8 @@ export class Macrocells {
     return (z * this.grid[1] + y) * this.grid[0] + x;
   }
 
-  /** Takes up changed bricks: each touches its own cell and the next one on each axis. True where
-   * a cell became active or inactive. */
-  update(bricks) {
+  /** The cells that touch these bricks: each its own and the next one on each axis. */
+  touched(bricks) {
     const touched = new Set();
     const [gx, gy, gz] = this.grid;
     for (const id of bricks) {
@@ -151,9 +150,19 @@ export class Macrocells {
         }
       }
     }
+    return touched;
+  }
+
+  at(cell) {
+    const [gx, gy] = this.grid;
+    return [cell % gx, Math.floor(cell / gx) % gy, Math.floor(cell / gx / gy)];
+  }
+
+  /** Computes the `touched` cells again. True where a cell became active or inactive. */
+  update(touched) {
     let flipped = false;
     for (const cell of touched) {
-      const now = this.reaches(cell % gx, Math.floor(cell / gx) % gy, Math.floor(cell / gx / gy));
+      const now = this.reaches(...this.at(cell));
       flipped ||= now !== this.active[cell];
       this.active[cell] = now;
     }
@@ -196,3 +205,60 @@ export class Macrocells {
     return new Uint16Array(faces);
   }
 }
+
+const kFineEdge = 2;  // voxel edges of a fine cell, which spans voxels 2i - 1 to 2i + 1
+
+/** Of cells of two voxel edges, a bit x + 2y + 4z for each octant that may hold a density of the threshold
+ * of `cells`, which are larger: as visualizer/cast/macrocells. */
+export class FineCells {
+  constructor(volume, cells) {
+    this.volume = volume;
+    this.cells = cells;
+    this.grid = volume.size.map(n => Math.floor(n / kFineEdge) + 1);
+    this.octants = new Uint8Array(this.grid[0] * this.grid[1] * this.grid[2]);
+  }
+
+  /** Computes those within the `touched` larger cells again. Returns the box around them, or null. */
+  update(touched) {
+    const box = {low: [...this.grid], high: [0, 0, 0]};
+    const per = kCellEdge / kFineEdge;
+    for (const cell of touched) {
+      const low = this.cells.at(cell).map(n => n * per);
+      const high = low.map((n, axis) => Math.min(n + per, this.grid[axis]));
+      this.fill(low, high, this.cells.active[cell] !== 0);
+      box.low = box.low.map((n, axis) => Math.min(n, low[axis]));
+      box.high = box.high.map((n, axis) => Math.max(n, high[axis]));
+    }
+    return touched.size > 0 ? box : null;
+  }
+
+  fill(low, high, active) {
+    const [gx, gy] = this.grid;
+    for (let z = low[2]; z < high[2]; ++z) {
+      for (let y = low[1]; y < high[1]; ++y) {
+        const row = (z * gy + y) * gx;
+        for (let x = low[0]; x < high[0]; ++x) this.octants[row + x] = active ? this.octantsOf(x, y, z) : 0;
+      }
+    }
+  }
+
+  octantsOf(i, j, k) {
+    const {size: [nx, ny, nz], density} = this.volume, {threshold} = this.cells;
+    const first = n => Math.max(2 * n - 1, 0), end = (n, most) => Math.min(2 * n + 2, most);
+    let octants = 0;
+    for (let z = first(k); z < end(k, nz); ++z) {
+      for (let y = first(j); y < end(j, ny); ++y) {
+        const row = (z * ny + y) * nx;
+        for (let x = first(i); x < end(i, nx); ++x) {
+          if (density[row + x] < threshold) continue;
+          // A voxel in the middle belongs to the octants on both sides of it.
+          octants |= kSides[x - 2 * i + 1] & kSides[y - 2 * j + 4] & kSides[z - 2 * k + 7];
+        }
+      }
+    }
+    return octants;
+  }
+}
+
+// The octants that a voxel on the low side, in the middle, on the high side of each axis belongs to.
+const kSides = [0x55, 0xff, 0xaa, 0x33, 0xff, 0xcc, 0x0f, 0xff, 0xf0];

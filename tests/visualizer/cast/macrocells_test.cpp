@@ -52,7 +52,7 @@ double sample(const VoxelGrid& grid, const std::vector<Density>& density,
 
 }  // namespace
 
-TEST_CASE("a sample that reaches iso lies in an active cell, in and around the volume") {
+TEST_CASE("a sample that reaches iso lies in an active octant, in and around the volume") {
   CHECK(rc::check([] {
     const VoxelGrid grid = random_grid();
     const auto density = random_density(grid);
@@ -65,9 +65,28 @@ TEST_CASE("a sample that reaches iso lies in an active cell, in and around the v
     const auto cell = [&](double v) { return static_cast<std::int32_t>((v + 1.0) / edge); };
     const VoxelIndex index{cell(at[0]), cell(at[1]), cell(at[2])};
     RC_ASSERT(cells.grid().contains(index));
-    const bool active = cells.active()[cells.grid().index(index.x, index.y, index.z)] != 0;
-    RC_ASSERT(active || sample(grid, density, at) < iso);
+    const auto half = [&](double v) { return static_cast<unsigned>((v + 1.0) * 2.0 / edge) & 1U; };
+    const unsigned octant = half(at[0]) + 2 * half(at[1]) + 4 * half(at[2]);
+    const unsigned octants = cells.active()[cells.grid().index(index.x, index.y, index.z)];
+    RC_ASSERT((octants >> octant & 1U) != 0 || sample(grid, density, at) < iso);
   }));
+}
+
+TEST_CASE("an octant without a voxel of iso is none") {
+  const VoxelGrid grid{9, 9, 9};
+  std::vector<Density> density(grid.voxel_count());
+  density[grid.index(3, 4, 5)] = 60'000;  // coordinates 4, 5, 6 from the border
+  const Macrocells cells(grid, density, 60'000, 2);
+  for_each_voxel(cells.grid().box(), [&](int x, int y, int z) {
+    unsigned wanted = 0;
+    for (int octant = 0; octant < 8; ++octant) {
+      const VoxelIndex low{2 * x + (octant & 1), 2 * y + (octant >> 1 & 1), 2 * z + (octant >> 2)};
+      const bool holds =
+          (low.x == 3 || low.x == 4) && (low.y == 4 || low.y == 5) && (low.z == 5 || low.z == 6);
+      wanted |= holds ? 1U << octant : 0U;
+    }
+    CHECK(unsigned{cells.active()[cells.grid().index(x, y, z)]} == wanted);
+  });
 }
 
 TEST_CASE("cells kept up by changed bricks equal cells made anew") {

@@ -16,7 +16,6 @@ struct Avx512 {
   using I = std::int32_t __attribute__((vector_size(64)));
   using M = __mmask16;
   static constexpr int kWide = 4, kHigh = 4;
-  static constexpr int kAhead = 3;  ///< samples of a ray at once: more would not stay in registers
 
   static F set(float a) noexcept { return _mm512_set1_ps(a); }
   static F lane_x() noexcept {

@@ -16,7 +16,6 @@ struct Avx2 {
   using I = std::int32_t __attribute__((vector_size(32)));
   using M = __m256;  ///< all bits or none
   static constexpr int kWide = 4, kHigh = 2;
-  static constexpr int kAhead = 2;  ///< samples of a ray at once: more would not stay in registers
 
   static F set(float a) noexcept { return _mm256_set1_ps(a); }
   static F lane_x() noexcept { return _mm256_setr_ps(0, 1, 2, 3, 0, 1, 2, 3); }
@@ -112,6 +111,7 @@ struct Twice {
   struct I {
     typename Half::I low, high;
     friend I operator+(I a, I b) noexcept { return {a.low + b.low, a.high + b.high}; }
+    friend I operator&(I a, I b) noexcept { return {a.low & b.low, a.high & b.high}; }
     friend I operator|(I a, I b) noexcept { return {a.low | b.low, a.high | b.high}; }
     friend I operator+(I a, int b) noexcept { return {a.low + b, a.high + b}; }
     friend I operator-(I a, int b) noexcept { return {a.low - b, a.high - b}; }
@@ -126,7 +126,6 @@ struct Twice {
   };
   static constexpr int kWide = Half::kWide, kHigh = 2 * Half::kHigh;
   static constexpr int kLanes = Half::kWide * Half::kHigh;  ///< of a half
-  static constexpr int kAhead = Half::kAhead;
 
   static F set(float a) noexcept { return {Half::set(a), Half::set(a)}; }
   static F lane_x() noexcept { return {Half::lane_x(), Half::lane_x()}; }

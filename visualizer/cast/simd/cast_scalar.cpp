@@ -15,7 +15,6 @@ struct Simd {
   using I = std::int32_t;
   using M = bool;
   static constexpr int kWide = 1, kHigh = 1;
-  static constexpr int kAhead = 1;  ///< samples of a ray at once: more would not stay in registers
 
   static F set(float a) noexcept { return a; }
   static F lane_x() noexcept { return 0.0F; }

@@ -212,7 +212,7 @@ inline WalkedPart begin_walks(const CastJob& job, const Packet& packet, const Sh
     walk.front_k = never;
     walk.front = never;
     if (!is_met(volume.blocks[packet.block])) continue;
-    walk.rays = rays_through(job, volume, volume.blocks[packet.block], part, eye);
+    walk.rays = rays_through(volume, volume.blocks[packet.block], part, eye);
     const M meets = Simd::less(walk.rays.begin_mm, walk.rays.end_mm);
     walk.exit_k = Simd::select(meets, whole(walk.rays.begin_mm / Simd::set(job.step_mm)), never);
     walked.first_k = Simd::min(walked.first_k, walk.exit_k);

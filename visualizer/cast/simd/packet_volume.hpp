@@ -116,7 +116,7 @@ struct VolumeRays {
   Vec3 origin, direction;
   Vec3 inverse;        ///< of the direction
   F begin_mm, end_mm;  ///< in the volume's box; none if begin is beyond end
-  F step_mm, steps_per_mm;
+  F mm_per_edge;
 };
 
 inline bool is_met(const CastBlock& block) {
@@ -142,14 +142,12 @@ inline void clip_to(const float (&size)[3], VolumeRays& rays) {
   clip_to(size[2], rays.origin.z, rays.direction.z, rays.inverse.z, rays.begin_mm, rays.end_mm);
 }
 
-inline VolumeRays rays_through(const CastJob& job, const CastVolumeJob& volume,
-                               const CastBlock& block, const Shown& shown, Vec3 eye) {
+inline VolumeRays rays_through(const CastVolumeJob& volume, const CastBlock& block,
+                               const Shown& shown, Vec3 eye) {
   VolumeRays rays;
   rays.origin = vec3(volume.origin);
   rays.direction = transformed(volume.from_eye, eye);
-  const F edges_per_mm = Simd::sqrt(dot(rays.direction, rays.direction));
-  rays.step_mm = Simd::set(job.step_vox) / edges_per_mm;
-  rays.steps_per_mm = edges_per_mm / Simd::set(job.step_vox);
+  rays.mm_per_edge = Simd::set(1.0F) / Simd::sqrt(dot(rays.direction, rays.direction));
   rays.begin_mm = Simd::max(Simd::set(block.begin_mm), shown.begin_mm);
   rays.end_mm = Simd::min(Simd::set(block.end_mm), shown.end_mm);
   clip_to(volume.last, rays);
