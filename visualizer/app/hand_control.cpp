@@ -49,8 +49,8 @@ void PointerHand::step(const WindowInput& input, bool over_panel, const View& vi
   const bool same_view = std::exchange(view_, view) == view;
   if (tool.depth_mm <= 0.0 || input.left) under_pointer_ = false;
   if (tool.depth_mm <= 0.0) return;  // a tool behind the eye is not led
-  const bool acts = input.free_right != 0.0 || input.free_up != 0.0 || input.wheel != 0.0 ||
-                    input.pointer.down || held.deeper != 0.0;
+  const bool acts = input.came || input.free_right != 0.0 || input.free_up != 0.0 ||
+                    input.wheel != 0.0 || input.pointer.down || held.deeper != 0.0;
   if (!goal_mm_ && ((points && acts) || held.by_pad)) goal_mm_ = tool_mm;
   if (!goal_mm_) return;
   SeenPoint seen = seen_at(view, size, *goal_mm_);

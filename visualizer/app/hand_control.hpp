@@ -25,10 +25,10 @@ namespace kerf {
 /// The goal is a point of the world. It moves with the pointer in the plane through it that faces
 /// the eye, and along the ray from the eye with wheel, keys and sticks; while the left button is
 /// down it lies `kPressMm` deeper. It stands under the pointer, at the tool's own depth, when the
-/// pointer, its wheel or its button is first used, when the pointer comes from outside or from a
-/// panel, and again on `come`. From then on it keeps its distance in the picture from the pointer,
-/// which only sticks, keys and another view change: a camera that turns or moves leaves it where it
-/// is.
+/// pointer, its wheel or its button is first used (not by a pointer that lay where the window
+/// opened), when the pointer comes from outside or from a panel, and again on `come`. From then on
+/// it keeps its distance in the picture from the pointer, which only sticks, keys and another view
+/// change: a camera that turns or moves leaves it where it is.
 ///
 /// The pedal is down while the left button, the space bar, or a pad's or SpaceMouse's button is. A
 /// press of button or bar ends when the pointer is no longer over the window or comes over a panel,

@@ -67,14 +67,14 @@ void undo_all(std::optional<Notices::Clock::time_point>& asked, Session& session
   }
 }
 
+constexpr std::uint32_t kRestores = kFlagReset | kFlagUndo | kFlagRedo;
+
 void undo_stroke(Session& session, Notices& notices, Notices::Clock::time_point now) {
   const auto& newest = session.latest();
   if (!newest || (newest->flags & kFlagUndoable) == 0) {
-    notices.say({"undo: there is no stroke to take back: none, 20 are undone, or one was longer "
-                 "than can be "
-                 "kept, at most 12 MiB of voxels; u, u undoes all cuts",
-                 true},
-                now);
+    const std::vector<double> removed_mm3 = session.removed_by_material_mm3();
+    const bool removed = std::ranges::any_of(removed_mm3, [](double mm3) { return mm3 > 0.0; });
+    notices.say({no_undo(newest, removed, session.cut_before()), true}, now);
   } else if (session.undo()) {
     notices.say({"the last stroke is undone; shift and z cuts it again"}, now);
   } else {
@@ -84,7 +84,10 @@ void undo_stroke(Session& session, Notices& notices, Notices::Clock::time_point 
 
 void redo_stroke(Session& session, Notices& notices, Notices::Clock::time_point now) {
   const auto& newest = session.latest();
-  if (!newest || (newest->flags & kFlagRedoable) == 0) {
+  if (newest && (newest->flags & kRestores) != 0) {
+    notices.say({"redo: what was asked before is still being done; press shift and z again", true},
+                now);
+  } else if (!newest || (newest->flags & kFlagRedoable) == 0) {
     notices.say({"redo: no stroke was undone since the last cut", true}, now);
   } else if (session.redo()) {
     notices.say({"the stroke is cut again"}, now);
@@ -103,6 +106,24 @@ void mark_tick(Session& session, Notices& notices, Notices::Clock::time_point no
 }
 
 }  // namespace
+
+std::string no_undo(const std::optional<TickRecord>& newest, bool removed, bool cut_before) {
+  const std::uint32_t flags = newest ? newest->flags : 0;
+  if ((flags & kRestores) != 0) {
+    return "undo: what was asked before is still being done; press z again";
+  }
+  if ((flags & kFlagRedoable) != 0) {  // some are undone, and none is kept from before them
+    return removed ? "undo: older strokes are not kept: 20 are, with at most 12 MiB of voxels; "
+                     "u, u undoes all cuts"
+                   : "undo: all strokes are undone; shift and z cuts the last one again";
+  }
+  if (removed) {  // a stroke that fits could be undone
+    return "undo: the last stroke is too long to be kept, above 12 MiB of voxels; u, u undoes all "
+           "cuts";
+  }
+  return cut_before ? "undo: no stroke since this window joined; u, u undoes all cuts"
+                    : "undo: nothing has been cut";
+}
 
 std::string no_such_tool(std::size_t index, std::size_t tools) {
   const std::string last =

@@ -22,6 +22,12 @@ void change_view(Picture& picture, const Session& session, const ViewSettings& s
 /// Message to a user who asks for tool `index`, counted from 0, of a scene that has `tools`.
 [[nodiscard]] std::string no_such_tool(std::size_t index, std::size_t tools);
 
+/// Message to a user whose undo a controller refuses that has `newest` as its newest tick: the one
+/// reason that is true. `removed`: something is removed now; `cut_before`: something was cut before
+/// this window joined, so that what is removed is unknown.
+[[nodiscard]] std::string no_undo(const std::optional<TickRecord>& newest, bool removed,
+                                  bool cut_before);
+
 /// Asks the controller for a tool, counted from 0; a message if nothing came of it.
 void take_tool(std::size_t index, Session& session, Notices& notices,
                Notices::Clock::time_point now);

@@ -188,6 +188,7 @@ void Window::present(const RenderTarget& target) {
   glBlitNamedFramebuffer(target.framebuffer(), 0, 0, 0, size.width, size.height, 0, 0, size.width,
                          size.height, GL_COLOR_BUFFER_BIT, GL_NEAREST);
   glfwSwapBuffers(handle_);
+  has_shown_ = true;
 }
 
 void Window::show_pointer(bool shown) {
@@ -265,7 +266,10 @@ void Window::on_cursor(GLFWwindow* handle, double x, double y) {
   Window& window = window_of(handle);
   const double right = x - std::exchange(window.cursor_x_, x);
   const double up = std::exchange(window.cursor_y_, y) - y;
-  if (!std::exchange(window.cursor_known_, true)) return;  // it came from elsewhere
+  if (!std::exchange(window.cursor_known_, true)) {  // it came from elsewhere
+    window.input_.came = window.has_shown_;          // else the window came to it
+    return;
+  }
   int width = 0;
   int height = 0;
   glfwGetWindowSize(handle, &width, &height);

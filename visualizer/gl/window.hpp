@@ -41,6 +41,7 @@ struct WindowInput {
   bool of_view = false;    ///< the right or the middle button was down, or shift with the left one
   HeldControls held;       ///< now
   bool hovers = false;     ///< the pointer is over the window, and nothing lies between
+  bool came = false;       ///< it came over the window, which showed a picture already
   bool left = false;       ///< it was elsewhere in between, or the window was not visible
   bool visible = true;     ///< neither minimised nor taken off the screen
   PictureSize size;        ///< as `Window::size`, at the end; `pointer` is in its pixels
@@ -111,6 +112,7 @@ class Window final : public GlContext {
   std::array<bool, 3> down_{};  ///< buttons, by GLFW's numbers
   bool pedal_ = false;          ///< the space bar is down
   bool pointer_shown_ = true;
+  bool has_shown_ = false;  ///< a picture
 };
 
 }  // namespace kerf

@@ -95,8 +95,6 @@ constexpr ImGuiWindowFlags kTouched =
     ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoNavInputs;
 constexpr ImGuiSliderFlags kDragOnly = ImGuiSliderFlags_NoInput | ImGuiSliderFlags_AlwaysClamp;
 
-constexpr std::size_t kMostLetters = 12;  // letters
-
 void choose_gradient(ViewSettings& settings) {
   auto chosen = static_cast<std::size_t>(settings.gradient);
   if (ImGui::BeginCombo("gradient", kGradientNames[chosen].data())) {
@@ -134,12 +132,25 @@ void draw_side(const Silhouette& side, ImVec2 corner, ImVec2 size) {
 
 constexpr float kSideWide = 38.0F, kSideHigh = 13.0F;
 
+/// Of a list that holds the longest of the names, or as much of it as `most` allows.
+float width_of_tools(const std::vector<ToolChoice>& tools, float least, float most) {
+  float words = 0.0F;
+  for (const ToolChoice& tool : tools) {
+    words = std::max(words, ImGui::CalcTextSize(tool.text.c_str()).x);
+  }
+  const float around = ImGui::GetFrameHeight() + 2.0F * ImGui::GetStyle().FramePadding.x;
+  return std::clamp(words + around, least, std::max(least, most));
+}
+
 /// The picture of the one in the hand stands in place of a label.
-void choose_tool(ViewControls& controls) {
+void choose_tool(ViewControls& controls, float least_wide, float most_wide) {
   if (controls.tools.size() < 2 || controls.tool >= controls.tools.size()) return;
   const std::size_t held = controls.tool;
   const ImVec2 picture{kSideWide * unit_px(), kSideHigh * unit_px()};
-  if (ImGui::BeginCombo("##tool", controls.tools[held].text.c_str())) {
+  const float wide = width_of_tools(controls.tools, least_wide, most_wide);
+  const float words = wide - ImGui::GetFrameHeight() - 2.0F * ImGui::GetStyle().FramePadding.x;
+  ImGui::SetNextItemWidth(wide);
+  if (ImGui::BeginCombo("##tool", shortened(controls.tools[held].text, words).c_str())) {
     for (std::size_t i = 0; i < controls.tools.size(); ++i) {
       ImGui::PushID(static_cast<int>(i));  // two may have one name
       if (ImGui::Selectable("##this", i == held, 0, {0.0F, picture.y})) controls.tool = i;
@@ -165,7 +176,7 @@ void choose_renderers(ViewControls& controls) {
   for (std::size_t v = 0; v < count; ++v) {
     ImGui::PushID(static_cast<int>(v));
     const std::string label =
-        count == 1 ? "renderer" : shortened(controls.volumes[v], kMostLetters);
+        count == 1 ? "renderer" : shortened(controls.volumes[v], kWidestName * unit_px());
     if (ImGui::BeginCombo(label.c_str(), now[v].c_str())) {
       for (const std::string_view kind : renderer_kinds()) {
         const std::string name(kind);
@@ -185,7 +196,7 @@ void choose_opacities(ViewControls& controls) {
   controls.write = ImGui::SmallButton("write");
   for (const auto& [material, opacity] : controls.opacities) {
     auto value = static_cast<float>(opacity);
-    const std::string label = shortened(material, kMostLetters) + "##" + material;
+    const std::string label = shortened(material, kWidestName * unit_px()) + "##" + material;
     if (ImGui::SliderFloat(label.c_str(), &value, 0.0F, 1.0F, "%.3f",
                            kDragOnly | ImGuiSliderFlags_Logarithmic)) {
       settings.opacities[material] = rounded_to(0.001, static_cast<double>(value));
@@ -213,17 +224,20 @@ float SettingsPanel::least_high() {
   return 48.0F * unit_px();
 }
 
-float SettingsPanel::draw(ViewControls& controls, float height, float most_high, float most_area) {
+float SettingsPanel::draw(ViewControls& controls, PictureSize size, float most_high,
+                          float most_area) {
+  constexpr float kPlain = 130.0F, kOfWidth = 0.27F;  // lists; that of the tools in a wide picture
   const float gap = panel_gap();
   const float wide = wide_ > 0.0F ? wide_ : 215.0F * unit_px();
   const float high = std::max(std::min(most_area / wide, most_high), least_high());
-  ImGui::SetNextWindowPos(ImVec2(gap, height - gap), 0, ImVec2(0.0F, 1.0F));
+  ImGui::SetNextWindowPos(ImVec2(gap, static_cast<float>(size.height) - gap), 0,
+                          ImVec2(0.0F, 1.0F));
   ImGui::SetNextWindowSizeConstraints(ImVec2(0.0F, 0.0F),
                                       ImVec2(std::numeric_limits<float>::max(), high));
   ImGui::Begin("look", nullptr, kTouched);
   ViewSettings& settings = controls.settings;
-  ImGui::PushItemWidth(130.0F * unit_px());
-  choose_tool(controls);
+  ImGui::PushItemWidth(kPlain * unit_px());
+  choose_tool(controls, kPlain * unit_px(), kOfWidth * static_cast<float>(size.width));
   choose_renderers(controls);
   choose_gradient(settings);
   if (controls.has_iso) choose_iso(controls);

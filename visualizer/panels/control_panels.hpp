@@ -60,9 +60,9 @@ struct ViewControls {
 class SettingsPanel {
  public:
   /// Between ImGui::NewFrame and ImGui::Render. Takes the mouse's changes over into `controls`.
-  /// Returns the x at which the panel ends, in pixels, in a picture `height` pixels high. Where the
-  /// controls need more than `most_high` pixels or `most_area` square pixels, the panel scrolls.
-  float draw(ViewControls& controls, float height, float most_high, float most_area);
+  /// Returns the x at which the panel ends, in pixels, in a picture of `size`. Where the controls
+  /// need more than `most_high` pixels or `most_area` square pixels, the panel scrolls.
+  float draw(ViewControls& controls, PictureSize size, float most_high, float most_area);
   /// Of a panel that is of use.
   [[nodiscard]] static float least_high();
 

@@ -41,6 +41,23 @@ ImVec2 size_of_row(const std::vector<KeyHelp>& keys) {
 
 }  // namespace
 
+std::string shortened(const std::string& name, float most_wide) {
+  const auto fits = [&](const std::string& text) {
+    return ImGui::CalcTextSize(text.c_str()).x <= most_wide;
+  };
+  if (fits(name)) return name;
+  const auto continues = [&](std::size_t at) {  // a letter of several bytes
+    return (static_cast<unsigned char>(name[at]) & 0xc0U) == 0x80U;
+  };
+  std::size_t kept = 0;
+  for (std::size_t at = 1; at < name.size(); ++at) {
+    if (continues(at)) continue;
+    if (!fits(name.substr(0, at) + "..")) break;
+    kept = at;
+  }
+  return name.substr(0, kept) + "..";
+}
+
 float width_of_slices(const SliceViews& slices) {
   auto wide = static_cast<float>(slices.side);
   for (const char* name : kSliceNames) wide = std::max(wide, ImGui::CalcTextSize(name).x);
@@ -165,11 +182,11 @@ const ImVec4 kAlert{1.0F, 0.62F, 0.25F, 1.0F};  // the last, light enough for le
 // Smaller peaks do not fill a plot: noise stays small.
 constexpr double kLeastFullForceN = 0.5;
 constexpr double kLeastFullDepthMm = 0.1;
-constexpr float kWide = 170.0F;
+constexpr float kWide = 150.0F;
 constexpr double kOldMs = 250.0;  // later than this a picture no longer follows the hand
 // What keeps it small with any scene.
-constexpr std::size_t kMostMaterials = 4, kMostBesideSecond = 2, kFewMaterials = 3, kMostLabel = 16,
-                      kMostName = 12;
+constexpr std::size_t kMostMaterials = 4, kMostBesideSecond = 2, kFewMaterials = 3;
+constexpr float kWidestLabel = 112.0F;
 
 void force_bar(const OverlayFigures& figures) {
   const double fraction = std::clamp(figures.force_n / figures.full_force_n, 0.0, 1.0);
@@ -222,7 +239,8 @@ void material_rows(const OverlayFigures& figures) {
         ImGui::GetColorU32(ImVec4(material.red, material.green, material.blue, 1.0F)));
     ImGui::Dummy({side, side});
     ImGui::SameLine(0.0F, 0.0F);
-    ImGui::TextColored(kLabelColour, "%s", shortened(material.name, kMostName).c_str());
+    ImGui::TextColored(kLabelColour, "%s",
+                       shortened(material.name, kWidestName * unit_px()).c_str());
     ImGui::TableNextColumn();
     ImGui::TextColored(kValueColour, "%.2f mm3", material.removed_mm3);
   }
@@ -235,8 +253,9 @@ void material_rows(const OverlayFigures& figures) {
 /// The second arm: its force, and below it tool and state.
 void second_arm_rows(const SecondArmFigures& second) {
   panel_row("second arm", "%.2f N", second.force_n);
-  panel_row(shortened(second.tool, kMostName).c_str(), "%s",
-            shortened(second.state, kMostName).c_str(), second.alarm ? kAlert : kValueColour);
+  panel_row(shortened(second.tool, kWidestName * unit_px()).c_str(), "%s",
+            shortened(second.state, kWidestName * unit_px()).c_str(),
+            second.alarm ? kAlert : kValueColour);
 }
 
 }  // namespace
@@ -260,7 +279,7 @@ ImVec2 draw_figures(const OverlayFigures& figures) {
   if (ImGui::BeginTable("rows", 2)) {
     const bool listed = figures.controls && figures.controls->tools.size() > 1;
     if (!figures.tool.empty() && !listed) {
-      panel_row("tool", "%s", shortened(figures.tool, kMostName).c_str());
+      panel_row("tool", "%s", shortened(figures.tool, kWidestName * unit_px()).c_str());
     }
     if (figures.second) second_arm_rows(*figures.second);
     panel_row(figures.score_is_partial ? "since joining" : "removed", "%.2f mm3",
@@ -272,8 +291,8 @@ ImVec2 draw_figures(const OverlayFigures& figures) {
     if (!plots) material_rows(figures);
     if (!figures.forbidden.empty()) {
       const bool touched = figures.forbidden_ms > 0.0;
-      panel_row(shortened("touched " + figures.forbidden, kMostLabel).c_str(), "%.0f ms",
-                figures.forbidden_ms, touched ? kAlert : kValueColour);
+      panel_row(shortened("touched " + figures.forbidden, kWidestLabel * unit_px()).c_str(),
+                "%.0f ms", figures.forbidden_ms, touched ? kAlert : kValueColour);
     }
     const bool has_room = figures.score.size() <= kFewMaterials && !figures.second;
     const bool rates = !figures.slices && !plots && has_room;
@@ -289,7 +308,10 @@ ImVec2 draw_figures(const OverlayFigures& figures) {
     }
     ImGui::EndTable();
   }
-  if (figures.controls) ImGui::TextColored(kLabelColour, "h: all keys");
+  if (figures.controls) {
+    ImGui::TextColored(kLabelColour,
+                       figures.leads_hand ? "left button: press; h: keys" : "h: all keys");
+  }
   if (plots) {
     curve("force, 5 s, peak", "%.2f N", figures.plot, &ForcePlot::Point::force_n, kLeastFullForceN,
           kCalm);

@@ -35,10 +35,12 @@ inline constexpr float kPlainLetters = 13.0F;
   return 12.0F * unit_px();
 }
 
-/// A name of the scene, which may be of any length, in at most `most` letters.
-[[nodiscard]] inline std::string shortened(const std::string& name, std::size_t most) {
-  return name.size() <= most ? name : name.substr(0, most - 2) + "..";
-}
+/// Of a name among figures or beside a control, in pixels of such a display.
+inline constexpr float kWidestName = 86.0F;
+
+/// A name of the scene, which may be of any length: all of it, or its beginning and two dots,
+/// within `most_wide` pixels. No letter is cut.
+[[nodiscard]] std::string shortened(const std::string& name, float most_wide);
 
 /// One line of a table with two columns.
 template <class Value>

@@ -177,7 +177,7 @@ void Overlay::lay_out(OverlayFigures& figures, PictureSize size) {
       draw_slices(*figures.slices, reinterpret_cast<ImTextureID>(texture), all);
     }
     if (figures.controls && below >= SettingsPanel::least_high()) {
-      controls_x = settings_panel_.draw(*figures.controls, all.y, below, room);
+      controls_x = settings_panel_.draw(*figures.controls, size, below, room);
     }
   }
   if (figures.hand) draw_hand_mark(*figures.hand, figures.force_n / figures.full_force_n);

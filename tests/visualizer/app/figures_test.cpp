@@ -64,6 +64,28 @@ TEST_CASE("a panel that is asked for brings the hidden ones back") {
   CHECK_FALSE(keys.hidden);
 }
 
+TEST_CASE("an undo that is not possible is refused with the one reason that holds") {
+  const auto at = [](std::uint32_t flags) {
+    TickRecord tick{};
+    tick.flags = flags;
+    return std::optional(tick);
+  };
+  constexpr bool kRemoved = true, kCutBefore = true;
+  const auto has = [](const std::string& reason, const char* words) {
+    CAPTURE(reason);
+    CHECK(reason.find(words) != std::string::npos);
+  };
+  has(no_undo(std::nullopt, false, false), "nothing has been cut");
+  has(no_undo(at(0), false, false), "nothing has been cut");
+  has(no_undo(at(kFlagRedoable), false, false), "all strokes are undone; shift and z");
+  has(no_undo(at(kFlagRedoable), kRemoved, false), "older strokes are not kept: 20 are");
+  has(no_undo(at(0), kRemoved, false), "the last stroke is too long to be kept, above 12 MiB");
+  has(no_undo(at(0), false, kCutBefore), "no stroke since this window joined");
+  for (const std::uint32_t running : {kFlagReset, kFlagUndo, kFlagRedo}) {
+    has(no_undo(at(running), kRemoved, false), "still being done; press z again");
+  }
+}
+
 TEST_CASE("a tool that a scene lacks is told with the keys that it has") {
   CHECK(no_such_tool(6, 3) == "tool 7: the scene has 3; press 1 to 3");
   CHECK(no_such_tool(1, 1) == "tool 2: the scene has 1; press 1");

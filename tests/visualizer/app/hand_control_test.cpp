@@ -78,6 +78,18 @@ TEST_CASE("nobody leads before the pointer moves; then the goal is under it, at 
   CHECK(target.tip_mm.z == doctest::Approx((goal.z - 3.0) / 2.0));
 }
 
+TEST_CASE("a pointer that jumps into the window leads at once") {
+  Bench bench;
+  WindowInput jumped = at(120, 80);
+  jumped.free_up = 0.0;
+  jumped.came = true;
+  bench.frame(jumped, true);  // onto a panel
+  CHECK_FALSE(bench.hand.leads());
+  bench.frame(jumped);
+  CHECK(bench.hand.leads());
+  CHECK(near(bench.goal().pixel, {120, 80}));
+}
+
 TEST_CASE("who turns the wheel or presses before the pointer moved leads too") {
   for (const int use : {0, 1, 2}) {
     CAPTURE(use);

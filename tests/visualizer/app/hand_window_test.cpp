@@ -89,6 +89,23 @@ struct Bench {
     REQUIRE(session.latest());
     return *session.latest();
   }
+  /// Where the tip comes to rest, in mm.
+  static std::array<float, 3> place() {
+    std::array<float, 3> last{}, now{};
+    CHECK(eventually(
+        [&] {
+          last = now;
+          act("sleep 0.2");
+          const kerf::TickRecord at = tick();
+          for (std::size_t i = 0; i < 3; ++i) now[i] = static_cast<float>(at.position_mm[i]);
+          return apart_mm(last, now) < 0.01F;
+        },
+        20s));
+    return now;
+  }
+  static float apart_mm(const std::array<float, 3>& a, const std::array<float, 3>& b) {
+    return std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
+  }
   static bool pressed() { return (tick().flags & kerf::kFlagButton1) != 0; }
   /// Holds the left button over this pixel until the bur cuts there, 5 mm deeper than the tip's
   /// start; the button stays down. A busy machine may latch a fault, which parking clears, or show
@@ -249,28 +266,32 @@ TEST_CASE(
   act("keyup space");
 }
 
+TEST_CASE(
+    "a pointer that jumps into the window leads at once, and one that it opened under does not") {
+  if (!have("Xvfb") || !have("xdotool")) return;
+  Bench bench;  // the pointer lies in the middle of the screen, beside the window
+  const OtherWindow another({1200, 900, 40, 40});  // the pointer stays while the window is gone
+  const auto start = Bench::place();
+  act("mousemove 360 200");
+  CHECK(eventually([&] { return Bench::apart_mm(start, Bench::place()) > 1.0F; }, 10s));
+  bench.window.reset();
+  CHECK(eventually([&] { return Bench::apart_mm(start, Bench::place()) < 1.0F; }, 20s));
+  bench.window.emplace(bench.arguments(), bench.screen.folder / "second.log");
+  REQUIRE(Bench::said(*bench.window, "the hand is yours"));
+  act("sleep 1");
+  CHECK(Bench::apart_mm(start, Bench::place()) < 1.0F);
+  act("mousemove_relative 4 0");
+  CHECK(eventually([&] { return Bench::apart_mm(start, Bench::place()) > 1.0F; }, 10s));
+}
+
 TEST_CASE("the hand is at the pointer after every resize and zoom") {
   if (!have("Xvfb") || !have("xdotool")) return;
   Bench bench;
-  const auto place = [] {
-    std::array<float, 3> last{}, now{};
-    CHECK(eventually(
-        [&] {
-          last = now;
-          act("sleep 0.2");
-          const kerf::TickRecord tick = Bench::tick();
-          for (std::size_t i = 0; i < 3; ++i) now[i] = static_cast<float>(tick.position_mm[i]);
-          return std::hypot(now[0] - last[0], now[1] - last[1], now[2] - last[2]) < 0.01F;
-        },
-        20s));
-    return now;
-  };
   // What brings the hand to the pointer moves it no more.
   const auto check_at_pointer = [&] {
-    const auto before = place();
+    const auto before = Bench::place();
     act("key g");
-    const auto after = place();
-    for (std::size_t i = 0; i < 3; ++i) CHECK(std::abs(after[i] - before[i]) < 0.1F);
+    CHECK(Bench::apart_mm(before, Bench::place()) < 0.1F);
   };
   const std::string sized = "search --name 'kerf: test' windowsize ";
   act(sized + "640 480 sleep 0.5 mousemove 500 60 sleep 0.2 mousemove 510 100");

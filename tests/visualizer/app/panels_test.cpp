@@ -172,6 +172,38 @@ TEST_CASE("slices are as large as a third of the window holds, and none are too 
   }
 }
 
+TEST_CASE("slices and the letters above them are shown whole at every size and density") {
+  const auto context = make_headless_context();
+  Overlay overlay;
+  for (const PictureSize size : {kPlain, PictureSize{800, 600}, PictureSize{1280, 800},
+                                 PictureSize{1280, 960}, PictureSize{1920, 1080}}) {
+    for (const double scale : {1.0, 1.25, 1.5, 2.0}) {
+      CAPTURE(size.width);
+      CAPTURE(scale);
+      OverlayFigures figures;
+      figures.scale = scale;
+      const int side = slice_side(size, scale);
+      figures.slices = grey_slices(side);
+      std::vector<std::uint8_t> rgb;
+      static_cast<void>(covered(overlay, figures, size, &rgb));
+      int whole_rows = 0, letters = 0;  // rows of a slice; pixels of letters above, below, between
+      for (int y = 0; y < size.height; ++y) {
+        int grey = 0, light = 0;
+        for (int x = size.width / 2; x < size.width; ++x) {
+          const int red = rgb[static_cast<std::size_t>(3 * (y * size.width + x))];
+          grey += red == 128 ? 1 : 0;
+          light += red > 150 && red < 255 ? 1 : 0;
+        }
+        whole_rows += grey >= side - 4 ? 1 : 0;
+        letters += grey < side / 2 ? light : 0;
+      }
+      CHECK(whole_rows >= 3 * side - 9);  // but those of the tip's lines
+      const double font = 13.0 * std::min(scale, std::min(size.width / 640.0, size.height / 480.0));
+      CHECK(letters > 1.5 * font * font);
+    }
+  }
+}
+
 TEST_CASE("beside slices and a spindle the score counts every material") {
   const auto context = make_headless_context();
   Overlay overlay;
@@ -263,6 +295,48 @@ TEST_CASE("a display of twice the density has panels of twice the size, where th
   const double small = covered(overlay, figures, kPlain);
   figures.scale = 1.0;
   CHECK(covered(overlay, figures, kPlain) == small);
+}
+
+TEST_CASE("names of tools are shown to their last letter, in the list and the figures") {
+  const auto context = make_headless_context();
+  Overlay overlay;
+  const Silhouette side{{0.0, -0.2, 0.2}, {1.0, -1.0, 1.0}, {4.0, -0.5, 0.5}};
+  for (const PictureSize size : {kPlain, PictureSize{2 * kPlain.width, 2 * kPlain.height}}) {
+    for (const double scale : {1.0, 2.0}) {
+      for (const std::size_t tools : {1, 2}) {
+        CAPTURE(size.width);
+        CAPTURE(scale);
+        CAPTURE(tools);
+        const auto shown = [&](const std::string& name) {  // O, C: the end alone is another one
+          OverlayFigures figures;
+          figures.scale = scale;
+          figures.tool = name;
+          figures.controls.emplace();
+          for (std::size_t i = 0; i < tools; ++i) {
+            figures.controls->tools.push_back({"1.0 mm " + name, side});
+          }
+          std::vector<std::uint8_t> picture;
+          static_cast<void>(covered(overlay, figures, size, &picture));
+          return picture;
+        };
+        for (const std::string name : {"inverted con", "fissure 01"}) {
+          CHECK(shown(name + "O") != shown(name + "C"));
+        }
+      }
+    }
+  }
+}
+
+TEST_CASE("while the hand is led the panel says how to press") {
+  const auto context = make_headless_context();
+  Overlay overlay;
+  OverlayFigures figures;
+  figures.controls.emplace();
+  std::vector<std::uint8_t> watches, leads;
+  static_cast<void>(covered(overlay, figures, kPlain, &watches));
+  figures.leads_hand = true;
+  static_cast<void>(covered(overlay, figures, kPlain, &leads));
+  CHECK(leads != watches);
 }
 
 TEST_CASE("letters are drawn for their size, and are not those of a smaller one enlarged") {
