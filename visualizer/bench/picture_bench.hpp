@@ -12,7 +12,7 @@
 #include <glm/glm.hpp>
 
 #include "shared/volume/voxel_grid.hpp"
-#include "visualizer/scene/gradient.hpp"
+#include "visualizer/scene/gradient_plan.hpp"
 #include "visualizer/scene/pixel_rect.hpp"
 
 namespace kerf {

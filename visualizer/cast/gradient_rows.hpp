@@ -9,7 +9,7 @@
 
 #include "shared/volume/voxel_grid.hpp"
 #include "visualizer/cast/cast_kernels.hpp"
-#include "visualizer/scene/gradient.hpp"
+#include "visualizer/scene/gradient_plan.hpp"
 
 namespace kerf {
 

@@ -11,7 +11,7 @@
 #include "visualizer/gl/program.hpp"
 #include "visualizer/scene/appearance.hpp"
 #include "visualizer/scene/camera.hpp"
-#include "visualizer/scene/gradient.hpp"
+#include "visualizer/scene/gradient_plan.hpp"
 #include "visualizer/scene/scene_view.hpp"
 
 namespace kerf {

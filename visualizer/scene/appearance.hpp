@@ -13,7 +13,7 @@
 #include <glm/glm.hpp>
 
 #include "visualizer/scene/camera_pose.hpp"
-#include "visualizer/scene/gradient.hpp"
+#include "visualizer/scene/gradient_plan.hpp"
 #include "visualizer/scene/scene_view.hpp"
 
 namespace kerf {

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 
-#include "visualizer/scene/gradient.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+
+#include "visualizer/scene/gradient_plan.hpp"
 
 namespace kerf {
 
@@ -159,11 +159,14 @@ float agreement(const glm::vec3& a, const glm::vec3& b, float agree, float diffe
   return std::clamp((cosine - differ) / (agree - differ), 0.0F, 1.0F);
 }
 
+constexpr float kAdaptedAgree = 0.985F;   // cosine of 10 degrees
+constexpr float kAdaptedDiffer = 0.940F;  // of 20
+
 /// The direction of `wide` where it hardly differs from that of `narrow`: steps of voxels turn the
 /// narrow one by 9 degrees at 99 of 100 points and the wide one by 2, an edge turns one farther.
 /// Length and all else is the narrow one's.
 glm::vec3 adapted(const glm::vec3& narrow, const glm::vec3& wide) {
-  const float part = agreement(narrow, wide, 0.985F, 0.940F);  // cosines of 10 and 20 degrees
+  const float part = agreement(narrow, wide, kAdaptedAgree, kAdaptedDiffer);
   return part == 0.0F ? narrow : turned(narrow, wide, part);
 }
 

@@ -4,7 +4,9 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <string_view>
+#include <vector>
 
 #include <glm/glm.hpp>
 
@@ -72,6 +74,12 @@ struct GradientPlan {
   VoxelIndex cell{1, 1, 1};     ///< adaptive: voxels of a cell, by axis
   glm::vec3 per_edge{1.0F};     ///< times this, a gradient is one per voxel edge
 };
+
+/// Fills `gradients` for the voxels of `box` out of a whole volume, x fastest, with air around it.
+/// The gradient of a voxel has the same bits whatever the box.
+void fill_gradients(const GradientPlan& plan, const VoxelGrid& grid,
+                    std::span<const Density> density, const VoxelBox& box,
+                    std::vector<glm::vec3>& gradients);
 
 /// `box` larger by as many voxels on both sides.
 [[nodiscard]] constexpr VoxelBox grown(const VoxelBox& box, const VoxelIndex& by) noexcept {

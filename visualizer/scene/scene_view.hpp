@@ -15,7 +15,7 @@
 #include "shared/segment/reader.hpp"
 #include "shared/volume/brick_grid.hpp"
 #include "visualizer/scene/camera.hpp"
-#include "visualizer/scene/gradient.hpp"
+#include "visualizer/scene/gradient_plan.hpp"
 
 namespace kerf {
 

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "visualizer/scene/gradient.hpp"
-
 #include <cmath>
 #include <string>
 
 #include <doctest/doctest.h>
 #include <rapidcheck.h>
 
+#include "visualizer/scene/gradient_plan.hpp"
 #include "visualizer/scene/visualizer_error.hpp"
 
 using namespace kerf;
