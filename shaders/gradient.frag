@@ -6,10 +6,17 @@
 
 uniform sampler3D u_density;   // 0..1, inside a border of air one voxel thick
 uniform vec3 u_texels;         // its extent
+uniform bool u_has_cells;      // unequal edges; then:
+uniform sampler3D u_cell_gradient;  // of each cell (bridge/page/web/cell_gradients.js)
+uniform vec3 u_cell_scale;     // from texture coordinates of u_density to those of u_cell_gradient
+uniform vec3 u_cell_shift;
+uniform vec3 u_per_edge;       // edges of a voxel by the longest
+uniform vec3 u_fine;           // 1 along axes where cells have several voxels
 
 float density_of(vec4 texel);
+vec3 followed(vec3 voxel, vec3 cell, vec3 fine, vec3 per_edge);
 
-// A browser stores no gradient for this: from the eight corners of a cube, differences along one
+// For cubes a browser stores no gradient: from the eight corners of a cube, differences along one
 // axis, means along the others. Farther corners leave the two voxels over which a border is
 // antialiased, and draw terraces.
 vec3 gradient_at(vec3 p) {
@@ -20,7 +27,10 @@ vec3 gradient_at(vec3 p) {
     vec3 side = vec3((corner & 1) * 2 - 1, (corner & 2) - 1, (corner & 4) / 2 - 1);
     sum += side * density_of(texture(u_density, p + side * d));
   }
-  return sum * u_texels;
+  if (!u_has_cells) return sum * u_texels;
+  // A step from air to full density over two edges is 1 in each of four pairs of corners.
+  vec3 cell = textureLod(u_cell_gradient, p * u_cell_scale + u_cell_shift, 0.0).xyz;
+  return followed(0.25 * sum, cell, u_fine, u_per_edge) * u_per_edge * u_texels;
 }
 
 #else

@@ -62,10 +62,37 @@ float beginning_between(int v, float front, float back) {
 // Whether this extinction over a voxel edge counts as something that is seen.
 bool is_seen(float extinction) { return extinction >= u_least_extinction; }
 
+#ifdef KERF_HAS_CELLS  // by a browser, if a volume has unequal edges: one bool for each, as KERF_HAS_LABELS
+
+const bool kHasCells[KERF_VOLUMES] = KERF_HAS_CELLS;
+uniform sampler3D u_cell_gradient[KERF_VOLUMES];  // of each cell (bridge/page/web/cell_gradients.js)
+uniform vec3 u_cell_scale[KERF_VOLUMES];          // from texture coordinates of u_voxel to its own
+uniform vec3 u_cell_shift[KERF_VOLUMES];
+uniform vec3 u_per_edge[KERF_VOLUMES];            // edges of a voxel by the longest
+uniform vec3 u_fine[KERF_VOLUMES];                // 1 along axes where cells have several voxels
+
+vec3 followed(vec3 voxel, vec3 cell, vec3 fine, vec3 per_edge);
+
+// Per longest edge; `voxel` is per voxel edge.
+vec3 gradient_of(int v, vec3 voxel, vec3 p) {
+  if (!kHasCells[v]) return voxel;
+  vec3 at = p * u_cell_scale[v] + u_cell_shift[v];
+  vec3 cell = vec3(0.0);
+#define TAKE_CELL_GRADIENT(i) if (v == i) cell = textureLod(u_cell_gradient[i], at, 0.0).xyz;
+  KERF_EACH_VOLUME(TAKE_CELL_GRADIENT)
+  return followed(voxel, cell, u_fine[v], u_per_edge[v]);
+}
+
+#else
+
+vec3 gradient_of(int v, vec3 voxel, vec3 p) { return voxel; }
+
+#endif
+
 // Linear colour, lit, of what is at p, and -log2 of the transparency over one edge of it: times a
 // presence and a length in voxel edges that is exact, (1 - a)^(p s / s0) = 2^(-p s / s0 * this).
 vec4 material_of(int v, vec4 voxel, vec3 p, vec3 to_eye) {
-  vec3 gradient = (voxel.rgb * 255.0 - 128.0) / 127.0;
+  vec3 gradient = gradient_of(v, (voxel.rgb * 255.0 - 128.0) / 127.0, p);
   vec4 material = kHasLabels[v] ? material_by_label(v, p)
                                 : material_by_density(v, p, gradient, voxel.a);
 

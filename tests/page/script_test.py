@@ -27,7 +27,8 @@ if not shutil.which("node"):
     sys.exit(77)
 with tempfile.TemporaryDirectory() as temporary:
     folder = pathlib.Path(temporary)
-    for place in ("bridge/page/web/*.js", "bridge/page/web/index.html", "web/page/*.js", "tests/page/script/*.mjs"):
+    for place in ("bridge/page/web/*.js", "bridge/page/web/index.html", "web/page/*.js", "tests/page/script/*.mjs",
+                  "tests/visualizer/view/cell_gradients.json"):
         for file in ROOT.glob(place):
             shutil.copy(file, folder)
     (folder / "package.json").write_text('{"type": "module"}')

@@ -4,8 +4,8 @@
 # before what uses it, so prototypes go; a uniform that several files declare stays once.
 # cmake -DOUTPUT=FILE -DSHADERS=FOLDER -P web_shaders.cmake
 cmake_minimum_required(VERSION 3.25)
-set(iso screen.vert lighting.frag ray.frag volume_sample.frag gradient.frag iso.frag)
-set(blend screen.vert lighting.frag ray.frag translucent_sample.frag blend.frag)
+set(iso screen.vert lighting.frag ray.frag volume_sample.frag followed.frag gradient.frag iso.frag)
+set(blend screen.vert lighting.frag ray.frag followed.frag translucent_sample.frag blend.frag)
 set(layer screen.vert lighting.frag composite.frag)
 set(cell_faces cell_faces.vert cell_faces.frag)
 set(mesh mesh.vert lighting.frag mesh.frag)

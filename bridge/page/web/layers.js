@@ -2,10 +2,11 @@
 // The picture of a scene for one or two eyes: backdrop, volumes, tool, force arrow, in the order and
 // with the layers of visualizer/compose.
 import {clippedRect, grownRect, isEmptyRect, screenBounds, unitedRect} from './camera.js';
-import {kLongestTapVox, kPaletteWidth} from './constants.js';
+import {cellPlan} from './cell_gradients.js';
+import {kPaletteWidth} from './constants.js';
 import {bind, cover, Program, requireNoError, Target, texture} from './gl.js';
 import {boxCorners} from './math.js';
-import {BlendCaster, Entries, IsoCaster, kUnitsPerVolume} from './renderers.js';
+import {BlendCaster, Entries, IsoCaster, mostBlended} from './renderers.js';
 import {SolidOnGpu, TranslucentOnGpu} from './textures.js';
 import {HandPainter, sameHand, toolBounds} from './tool.js';
 import {palette} from './transfer_function.js';
@@ -39,8 +40,7 @@ export class Painter {
     Object.assign(this, {gl, scene, eyes: [], volumes: []});
     const isBlend = scene.volumes.map((_, v) => kindOf(v) === 'blend');
     this.blended = isBlend.filter(blend => blend).length;
-    const units = gl.getParameter(gl.MAX_TEXTURE_IMAGE_UNITS);
-    const most = Math.floor((units - 3) / kUnitsPerVolume);
+    const most = mostBlended(gl, scene.volumes.some(({edges}, v) => isBlend[v] && cellPlan(edges)));
     if (this.blended > most) {
       throw new Error(`${this.blended} volumes, and this browser has texture units for ${most}; take iso`);
     }
@@ -110,8 +110,9 @@ export class Painter {
           high[axis] = Math.max(high[axis], brick.high[axis]);
         }
       }
-      const reach = kLongestTapVox + 1;  // of the shading of a surface
-      boxes.push(boxCorners(low.map(n => n - reach), high.map(n => n + reach), one.view.worldFromVoxel));
+      const reach = one.shadingReach;
+      boxes.push(boxCorners(low.map((n, axis) => n - reach[axis]), high.map((n, axis) => n + reach[axis]),
+        one.view.worldFromVoxel));
     }
     return boxes;
   }

@@ -7,7 +7,12 @@ import {bind, cover, Program} from './gl.js';
 import {affineInverse, multiply, turn} from './math.js';
 import {leastExtinction} from './transfer_function.js';
 
-export const kUnitsPerVolume = 3;  // texture units of a volume that is looked into
+const kUnitsPerVolume = 3;  // texture units of a volume that is looked into, without its cells
+const kUnitsBeside = 3;
+
+/** How many volumes can be looked into at once, if some of them have cells. */
+export const mostBlended = (gl, cells) =>
+  Math.floor((gl.getParameter(gl.MAX_TEXTURE_IMAGE_UNITS) - kUnitsBeside) / (kUnitsPerVolume + (cells ? 1 : 0)));
 
 /** What both ray casters read of a view. */
 function viewUniforms(view) {
@@ -50,7 +55,7 @@ export class IsoCaster {
     this.iso = new Program(gl, 'iso');
     this.iso.use();
     this.iso.setInts({u_density: 0, u_label: 1, u_active_cell: 2, u_fine_cell: 3, u_entry_mm: 4,
-      u_palette: 5});
+      u_palette: 5, u_cell_gradient: 6});
   }
   draw(eye, volume, view, part, palette) {
     const {gl} = this;
@@ -61,7 +66,8 @@ export class IsoCaster {
     this.iso.use();
     this.iso.set({...viewUniforms(view), u_iso: volume.view.iso / 65535, u_texels: volume.texels,
       u_texture_from_eye: affineInverse(multiply(view.eyeFromWorld, volume.worldFromTexture))});
-    this.iso.setInts({u_has_labels: volume.volume.labels ? 1 : 0});
+    this.iso.setInts({u_has_labels: volume.volume.labels ? 1 : 0, u_has_cells: volume.gradients ? 1 : 0});
+    if (volume.gradients) this.iso.set(volume.gradients.uniforms());
     cover(gl);
   }
   free() {
@@ -74,13 +80,16 @@ export class BlendCaster {
   constructor(gl, volumes) {
     Object.assign(this, {gl, volumes});
     const each = volumes.map((_, v) => `f(${v})`).join(' ');
-    const labelled = volumes.map(({volume}) => volume.labels !== null).join(', ');
-    this.cast = new Program(gl, 'blend', `#define KERF_VOLUMES ${volumes.length}\n` +
-      `#define KERF_EACH_VOLUME(f) ${each}\n#define KERF_HAS_LABELS bool[](${labelled})\n`);
+    const bools = of => `bool[](${volumes.map(of).join(', ')})`;
+    const cells = volumes.some(({gradients}) => gradients) ?
+      `#define KERF_HAS_CELLS ${bools(({gradients}) => gradients !== null)}\n` : '';
+    this.cast = new Program(gl, 'blend', `#define KERF_VOLUMES ${volumes.length}\n#define KERF_EACH_VOLUME(f) ${each}\n` +
+      `#define KERF_HAS_LABELS ${bools(({volume}) => volume.labels !== null)}\n${cells}`);
     this.layer = new Program(gl, 'layer');
     this.layer.use();
     this.layer.setInts({u_colour: 0, u_depth: 1});
     this.unit = kUnitsPerVolume * volumes.length;
+    this.cellsUnit = this.unit + kUnitsBeside;
     const edge = Math.min(...volumes.map(({view}) => view.edge));
     this.cast.use();
     this.cast.setInts({u_by_density: this.unit, u_entry_mm: this.unit + 1, u_opaque_depth: this.unit + 2});
@@ -91,6 +100,9 @@ export class BlendCaster {
         [`u_active_cell[${v}]`]: first + 2});
       this.cast.set({[`u_texels[${v}]`]: volume.texels, [`u_edge_mm[${v}]`]: volume.view.edge,
         [`u_fade[${v}]`]: [volume.transfer.empty, volume.transfer.full]});
+      if (!volume.gradients) return;
+      this.cast.setInts({[`u_cell_gradient[${v}]`]: this.cellsUnit + v});
+      for (const [name, value] of Object.entries(volume.gradients.uniforms())) this.cast.set({[`${name}[${v}]`]: value});
     });
   }
   /** After the entries of each volume, into the stage. */
@@ -103,9 +115,11 @@ export class BlendCaster {
     this.cast.use();
     this.volumes.forEach((volume, v) => {
       volume.bind(kUnitsPerVolume * v);
+      if (volume.gradients) bind(gl, this.cellsUnit + v, gl.TEXTURE_3D, volume.gradients.texture);
       const textureFromEye = affineInverse(multiply(view.eyeFromWorld, volume.worldFromTexture));
-      // A gradient per voxel edge goes to the eye's millimetres by the transposed Jacobian.
-      const turned = [0, 1, 2].flatMap(c => [0, 1, 2].map(r => textureFromEye[4 * r + c] * volume.texels[c]));
+      // A gradient per voxel edge, or per longest one, goes to the eye's millimetres by the transposed Jacobian.
+      const perTexture = volume.texels.map((n, axis) => n * (volume.gradients?.perEdge[axis] ?? 1));
+      const turned = [0, 1, 2].flatMap(c => [0, 1, 2].map(r => textureFromEye[4 * r + c] * perTexture[c]));
       this.cast.set({[`u_texture_from_eye[${v}]`]: textureFromEye, [`u_eye_from_gradient[${v}]`]: turned});
     });
     bind(gl, unit, gl.TEXTURE_2D, byDensity);

@@ -7,13 +7,14 @@ const kFull = 65535;
 function volumeView(volume, text) {
   const {origin_mm, orientation, spacing_mm, iso} = volume.descriptor;
   const worldFromVoxel = scaled(rigid(origin_mm, orientation), spacing_mm);
+  const edges = [0, 1, 2].map(i => length(column(worldFromVoxel, i)));
   const high = volume.size.map(n => n - 0.5);
   const corners = boxCorners([-0.5, -0.5, -0.5], high, worldFromVoxel);
   return {volume, name: text?.name ?? '', solid: text?.solid ?? true, worldFromVoxel, corners,
     // Iso 0 would make the air around a volume solid.
     iso: Math.min(Math.max(iso, 1), kFull),
     radius: 0.5 * length(subtract(corners[7], corners[0])),
-    edge: Math.min(...[0, 1, 2].map(i => length(column(worldFromVoxel, i)))),
+    edges, edge: Math.min(...edges),
     voxelMm3: Math.abs(determinant(worldFromVoxel))};
 }
 

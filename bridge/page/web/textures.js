@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Volumes on the GPU: uploaded by boxes of changed bricks.
+import {CellGradients, cellPlan, joined} from './cell_gradients.js';
+import {kLongestTapVox} from './constants.js';
 import {bind, texture} from './gl.js';
 import {scaled, translated} from './math.js';
 import {gradientTexels, MaterialTexels, transferFunction} from './transfer_function.js';
@@ -132,6 +134,42 @@ class FineCellsOnGpu {
   }
 }
 
+/** The gradients of the cells of a volume with unequal edges as a texture. */
+class CellGradientsOnGpu {
+  constructor(gl, volume, plan) {
+    this.gl = gl;
+    this.cells = new CellGradients(volume, plan);
+    this.size = this.cells.grid.map(n => n + 2);
+    this.texture = texture(gl, gl.TEXTURE_3D, gl.RGBA16F, gl.LINEAR, this.size);
+  }
+  /** After the voxels of these boxes have changed. */
+  update(boxes) {
+    const {gl, cells} = this;
+    gl.bindTexture(gl.TEXTURE_3D, this.texture);
+    for (const box of joined(boxes.map(one => cells.update(one)))) {
+      cells.blocks(box, (low, high, gradients) => {
+        const size = high.map((n, axis) => n - low[axis]);
+        gl.texSubImage3D(gl.TEXTURE_3D, 0, low[0] + 1, low[1] + 1, low[2] + 1, ...size, gl.RGBA, gl.FLOAT,
+          gradients ?? new Float32Array(4 * size[0] * size[1] * size[2]));
+      });
+    }
+  }
+  get perEdge() {
+    return this.cells.plan.perEdge;
+  }
+  /** From texture coordinates of the voxels, inside of their border of one, to those of the cells. */
+  uniforms() {
+    const {cell, perEdge} = this.cells.plan;
+    const texels = this.cells.volume.size.map(n => n + 2);
+    return {u_cell_scale: texels.map((n, axis) => n / (cell[axis] * this.size[axis])),
+      u_cell_shift: cell.map((n, axis) => (1 - 1 / n) / this.size[axis]),
+      u_per_edge: perEdge, u_fine: cell.map(n => n > 1 ? 1 : 0)};
+  }
+  free() {
+    this.gl.deleteTexture(this.texture);
+  }
+}
+
 /** What both renderers have of a volume; `take` uploads what came since. */
 class VolumeOnGpu {
   constructor(gl, view, threshold) {
@@ -139,6 +177,10 @@ class VolumeOnGpu {
     this.texels = this.volume.size.map(n => n + 2);
     this.worldFromTexture = scaled(translated(view.worldFromVoxel, [-1.5, -1.5, -1.5]), this.texels);
     this.cells = new CellsOnGpu(gl, view, threshold);
+    const plan = cellPlan(view.edges);
+    this.gradients = plan && new CellGradientsOnGpu(gl, this.volume, plan);  // null: of cubes
+    /** Voxels, by axis, over which a changed one is seen in the shading of a surface. */
+    this.shadingReach = [0, 1, 2].map(axis => Math.max(kLongestTapVox, plan?.reach[axis] ?? 0) + 1);
     this.stale = this.volume.follow();
   }
   /** Takes up what changed; returns those bricks. */
@@ -147,7 +189,9 @@ class VolumeOnGpu {
     this.stale.clear();
     if (bricks.length === 0) return bricks;
     this.gl.pixelStorei(this.gl.UNPACK_ALIGNMENT, 1);
-    for (const {low, high} of boxesOf(this.volume, bricks)) this.upload(low, high);
+    const boxes = boxesOf(this.volume, bricks);
+    for (const {low, high} of boxes) this.upload(low, high);
+    this.gradients?.update(boxes);
     this.updateCells(this.cells.cells.touched(bricks));
     return bricks;
   }
@@ -157,6 +201,7 @@ class VolumeOnGpu {
   free() {
     this.volume.forget(this.stale);
     this.cells.free();
+    this.gradients?.free();
   }
 }
 
@@ -182,6 +227,7 @@ export class SolidOnGpu extends VolumeOnGpu {
     bind(this.gl, 1, this.gl.TEXTURE_3D, this.labels.texture);
     bind(this.gl, 2, this.gl.TEXTURE_3D, this.cells.texture);
     bind(this.gl, 3, this.gl.TEXTURE_3D, this.fineCells.texture);
+    bind(this.gl, 6, this.gl.TEXTURE_3D, this.gradients?.texture ?? null);
   }
   free() {
     super.free();
