@@ -17,7 +17,6 @@ uniform sampler2DArray u_entry_mm;               // layer v: the first active ce
 uniform sampler2D u_opaque_depth;                // of the window; rays end there
 uniform mat4 u_texture_from_eye[KERF_VOLUMES];   // mm to texture coordinates
 uniform vec3 u_texels[KERF_VOLUMES];
-uniform float u_edge_mm[KERF_VOLUMES];           // the length to which opacities refer
 uniform float u_step_mm;                         // along the view axis
 uniform float u_near_mm;
 uniform float u_far_mm;
@@ -146,7 +145,7 @@ void main() {
         vec3 middle = at(line[v], 0.5 * (from_mm + to_mm));                                 \
         vec4 material = material_of(v, 0.5 * (front + voxel[v]), middle, to_eye);           \
         float extinction = presence * material.a;                                           \
-        here += extinction / u_edge_mm[v] * vec4(material.rgb, 1.0);                        \
+        here += extinction * vec4(material.rgb, 1.0);                                       \
         float begins_mm = mix(from_mm, to_mm, beginning_between(v, front.a, voxel[v].a));   \
         if (is_seen(extinction)) depth_mm = min(depth_mm, begins_mm);                       \
       }

@@ -18,6 +18,7 @@ uniform sampler2DArray u_entry_mm;  // where the ray meets the first active cell
 uniform mat4 u_texture_from_eye;   // mm to texture coordinates
 uniform sampler3D u_density;
 uniform vec3 u_texels;             // extent of the volume's textures
+uniform vec3 u_edges_mm;           // of a voxel
 uniform vec3 u_up_eye;             // world up
 uniform float u_near_mm;
 uniform float u_far_mm;
@@ -102,14 +103,20 @@ float first_root(vec4 g) {
   return s;
 }
 
-// 1 in the open, less where the neighbourhood along the normal is solid: cavities read as such.
-float ao_factor_at(vec3 p, vec3 inward_texture) {
-  const vec3 kReachVox = vec3(2.5, 6.0, 12.0);
-  const vec3 kWeight = vec3(0.30, 0.30, 0.25);
-  vec3 solid = vec3(density_at(p - kReachVox.x * inward_texture),
-                    density_at(p - kReachVox.y * inward_texture),
-                    density_at(p - kReachVox.z * inward_texture));
-  return 1.0 - dot(clamp(solid / u_iso, 0.0, 1.0), kWeight);
+// 1 in the open, less where the neighbourhood along the normal is solid: cavities read as such. Where
+// it samples, and why: kOcclusionTapsMm (visualizer/cast/cast_kernels.hpp).
+float ao_factor_at(vec3 p, vec3 inward_per_mm) {
+  const vec3 kTapsMm = vec3(0.3125, 0.75, 1.5);
+  const vec3 kWeights = vec3(0.30, 0.30, 0.25);
+  const float kClearVox = 2.5;
+  const float kMostTapVox = 64.0;
+  vec3 edges_per_mm = inward_per_mm * u_texels;
+  float clear_mm = kClearVox * length(edges_per_mm * u_edges_mm * u_edges_mm);
+  vec2 clear = clamp(3.0 * kTapsMm.xy / clear_mm - 2.0, 0.0, 1.0);
+  vec3 tap = min(vec3(kTapsMm.xy, max(kTapsMm.z, clear_mm)), kMostTapVox / length(edges_per_mm));
+  vec3 solid = vec3(density_at(p - tap.x * inward_per_mm), density_at(p - tap.y * inward_per_mm),
+                    density_at(p - tap.z * inward_per_mm));
+  return 1.0 - dot(clamp(solid / u_iso, 0.0, 1.0), kWeights * vec3(clear, 1.0));
 }
 
 void main() {
@@ -163,14 +170,14 @@ void main() {
   vec3 slope = transpose(mat3(u_texture_from_eye)) * gradient_at(p);
   vec3 normal = dot(slope, slope) > 0.0 ? -normalize(slope) : to_eye;
   if (dot(normal, to_eye) < 0.0) normal = normalize(normal - 1.02 * dot(normal, to_eye) * to_eye);
-  vec3 inward = mat3(u_texture_from_eye) * -normal;
-  inward /= length(inward * u_texels);  // one voxel edge
+  vec3 inward_per_mm = mat3(u_texture_from_eye) * -normal;
+  vec3 inward = inward_per_mm / length(inward_per_mm * u_texels);  // one voxel edge
   if (on_face) {
     normal = section_normal();
     inward = vec3(0.0);  // no border: it shows what lies in the plane
   }
 
-  float ao_factor = on_face ? 1.0 : ao_factor_at(p, inward);
+  float ao_factor = on_face ? 1.0 : ao_factor_at(p, inward_per_mm);
   vec3 colour = lit(material_at(p, inward), normal, to_eye, u_up_eye, ao_factor);
   o_colour = vec4(srgb(colour), 1.0);
   gl_FragDepth = window_depth(hit_mm, u_near_mm, u_far_mm);

@@ -8,7 +8,6 @@ layout(location = 1) out float o_depth;
 
 uniform sampler2D u_opaque_depth;        // of the window
 uniform mat4 u_texture_from_eye[1];      // mm to texture coordinates
-uniform float u_edge_mm[1];              // the length to which opacities refer
 uniform float u_step_mm;                 // between slices
 uniform float u_near_mm;
 uniform float u_far_mm;
@@ -43,8 +42,8 @@ void main() {
   vec3 middle = origin + 0.5 * (from_mm + to_mm) * direction;
   vec4 material = material_of(0, 0.5 * (front + back), middle, -normalize(eye_direction));
   float extinction = presence * material.a;
-  float length_edges = (to_mm - from_mm) * length(eye_direction) / u_edge_mm[0];
-  o_colour = (1.0 - exp2(-extinction * length_edges)) * vec4(material.rgb, 1.0);
+  float length_mm = (to_mm - from_mm) * length(eye_direction);
+  o_colour = (1.0 - exp2(-extinction * length_mm)) * vec4(material.rgb, 1.0);
   float depth_mm = mix(from_mm, to_mm, beginning_between(0, front.a, back.a));
   o_depth = is_seen(extinction) ? window_depth(depth_mm, u_near_mm, u_far_mm) : 1.0;
 }

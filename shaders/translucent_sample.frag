@@ -6,13 +6,15 @@
 // the choice is left.
 
 uniform sampler3D u_voxel[KERF_VOLUMES];     // gradient (128 + 127 g in 8 bits) and density
-uniform sampler3D u_material[KERF_VOLUMES];  // linear colour, opacity over one voxel edge
+uniform sampler3D u_material[KERF_VOLUMES];  // linear colour, opacity over 1/8 mm
 uniform sampler2D u_by_density;              // the same by density, row v for volume v
 uniform vec3 u_texels[KERF_VOLUMES];
 uniform vec2 u_fade[KERF_VOLUMES];           // densities where a material begins and where it is whole
 uniform mat3 u_eye_from_gradient[KERF_VOLUMES];
-uniform float u_least_extinction;            // per voxel edge; less makes no difference
+uniform float u_least_extinction;            // per mm; less makes no difference
 uniform vec3 u_up_eye;                       // world up
+
+const float kOpacityMm = 0.125;  // s0, over which opacities hold
 
 const bool kHasLabels[KERF_VOLUMES] = KERF_HAS_LABELS;
 
@@ -59,7 +61,7 @@ float beginning_between(int v, float front, float back) {
   return front < u_fade[v].x ? clamp((u_fade[v].x - front) / (back - front), 0.0, 1.0) : 0.0;
 }
 
-// Whether this extinction over a voxel edge counts as something that is seen.
+// Whether this extinction per mm counts as something that is seen.
 bool is_seen(float extinction) { return extinction >= u_least_extinction; }
 
 #ifdef KERF_HAS_CELLS  // by a browser, if a volume has unequal edges: one bool for each, as KERF_HAS_LABELS
@@ -89,8 +91,8 @@ vec3 gradient_of(int v, vec3 voxel, vec3 p) { return voxel; }
 
 #endif
 
-// Linear colour, lit, of what is at p, and -log2 of the transparency over one edge of it: times a
-// presence and a length in voxel edges that is exact, (1 - a)^(p s / s0) = 2^(-p s / s0 * this).
+// Linear colour, lit, of what is at p, and -log2 of the transparency of a mm of it: times a presence
+// and a length that is exact, (1 - a)^(p s / s0) = 2^(-p s * this).
 vec4 material_of(int v, vec4 voxel, vec3 p, vec3 to_eye) {
   vec3 gradient = gradient_of(v, (voxel.rgb * 255.0 - 128.0) / 127.0, p);
   vec4 material = kHasLabels[v] ? material_by_label(v, p)
@@ -105,5 +107,5 @@ vec4 material_of(int v, vec4 voxel, vec3 p, vec3 to_eye) {
   if (dot(normal, to_eye) < 0.0) normal = -normal;
   float surface = smoothstep(kSurface.x, kSurface.y, length(gradient));
   vec3 colour = mix(kInside * material.rgb, lit(material.rgb, normal, to_eye, u_up_eye, 1.0), surface);
-  return vec4(colour, -log2(1.0 - min(material.a, 0.996)));
+  return vec4(colour, -log2(1.0 - min(material.a, 0.996)) / kOpacityMm);
 }

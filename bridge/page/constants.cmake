@@ -77,7 +77,7 @@ codes(shared/segment/log_columns.cpp kPhases kPhases)
 constants(visualizer/scene/camera.cpp kHalfHeightRad kHomeYawRad kHomePitchRad kMaxPitchRad kZoomStep
   kMargin kNearest kFarthest kNearPlane)
 constants(visualizer/scene/camera.hpp kEyesPerConvergence)
-constants(visualizer/scene/appearance.hpp kPaletteWidth kLeastOpacity)
+constants(visualizer/scene/appearance.hpp kPaletteWidth kLeastOpacity kOpacityMm)
 constants(visualizer/scene/appearance.cpp kEmptyShare kHighestAir kWholeSoftest kHalfBand
   kHardestOpacity kSoftestOpacity)
 list_constant(visualizer/scene/appearance.cpp kIvory "kIvory")
@@ -85,7 +85,8 @@ constants(visualizer/render/volume_textures.cpp kMaterialReach)
 constants(visualizer/scene/gradient_plan.hpp kMiddle)
 constants(visualizer/scene/gradient_plan.cpp kNarrowPerLongest kWidePerShortest kWidePerLongest kCubic kMostInCell)
 constants(visualizer/scene/gradient.cpp kAdaptedAgree kAdaptedDiffer)
-constants(visualizer/cast/cast_kernels.hpp kLongestTapVox)
+constants(visualizer/cast/cast_kernels.hpp kClearVox kMostTapVox)
+list_constant(visualizer/cast/cast_kernels.hpp kOcclusionTapsMm "kOcclusionTapsMm.kOcclusionTaps. = ")
 take(visualizer/render/translucent_renderers.hpp "step_vox = ([^;]+);" "step of blend")
 string(APPEND text "export const kBlendStepVox = ${value};\n")
 constants(visualizer/compose/tool_painter.cpp kSides kCreaseDegrees kNeckPerRadius kShankPerRadius kNeckRadii

@@ -44,11 +44,11 @@ struct CastVolumeJob {
   const CastBlock* blocks = nullptr;     ///< `MacrocellDepthRange`: rows of the picture's blocks
   std::int32_t row = 0, plane = 0;       ///< of density and labels, in entries
   std::int32_t cell_row = 0, cell_plane = 0;
-  float last[3] = {};         ///< a hair before the far side of the border
-  float origin[3] = {};       ///< the eye
-  float from_eye[3][3] = {};  ///< [to][from]: mm of eye space to voxel edges
-  float edge_mm = 1.0F;       ///< the shortest: opacities of blend hold over it
-  /// 256 x linear RGB and, for blend, extinction: -log2 of the transparency over an edge.
+  float last[3] = {};          ///< a hair before the far side of the border
+  float origin[3] = {};        ///< the eye
+  float from_eye[3][3] = {};   ///< [to][from]: mm of eye space to voxel edges
+  float square_edges[3] = {};  ///< mm^2 of a voxel, by axis
+  /// 256 x linear RGB and, for blend, extinction: -log2 of the transparency of a mm.
   const float* by_density = nullptr;
   const float* by_label = nullptr;
   float settled = 1.0F;             ///< from this density on `by_density` stays what it is
@@ -119,10 +119,26 @@ struct RayFootprint {
 inline constexpr std::uint8_t kChangedAlong = 1;  ///< a ray that crosses the cell may have changed
 inline constexpr std::uint8_t kChangedAtEnd = 2;  ///< a ray that ends in the cell may have changed
 
-/// Where the shading of a surface point samples the volume, in voxel edges along its outward
-/// normal: on both sides for the material, and outside for ambient occlusion (iso.frag).
-inline constexpr float kShadingTapsVox[] = {-2.5F, -1.25F, 1.25F, 2.5F, 6.0F, 12.0F};
-inline constexpr float kLongestTapVox = 12.0F;
+/// Where the shading of a surface point samples the volume for its material, in voxel edges along
+/// its outward normal: the border that these pass is some voxels wide.
+inline constexpr float kMaterialTapsVox[] = {-2.5F, -1.25F, 1.25F};
+
+/// Where it samples for ambient occlusion, outwards in mm, so that a body looks the same in any
+/// voxels. In those of 1/8 mm, as the default scene has them, these are 2.5, 6 and 12 edges.
+///
+/// The border of the surface itself must not darken it. A body that fills voxels in part, and is
+/// interpolated between them, has a border with a standard deviation of half a voxel, whatever its
+/// direction (a mean over one voxel and a tent over two: 1/12 + 1/6 = 1/4); it ends before 2.5
+/// extents of a voxel along the normal. Nor do the voxels hold a gap narrower than that. So a tap
+/// nearer than `kClearVox` extents loses weight, and has none at 2/3 of it, where the border is 3
+/// deviations away; the longest is moved out, so that coarse voxels are shaded too.
+inline constexpr int kOcclusionTaps = 3;
+inline constexpr float kOcclusionTapsMm[kOcclusionTaps] = {0.3125F, 0.75F, 1.5F};
+inline constexpr float kOcclusionWeights[kOcclusionTaps] = {0.30F, 0.30F, 0.25F};
+inline constexpr float kClearVox = 2.5F;
+/// No tap is farther away than this, so that the voxels that a change can darken stay few: it
+/// shortens taps in voxels below 0.024 mm, and oblique ones if edges differ by more than 50 : 1.
+inline constexpr float kMostTapVox = 64.0F;
 
 /// Input of the kernels that test rays against the changed cells of a volume (`ChangedCells`):
 /// plain pointers, as in `CastVolumeJob`. Positions are in voxel edges from the lowest corner of
@@ -143,12 +159,15 @@ struct RedrawJob {
   const float* depth = nullptr;
   PixelRect window;
 
-  /// Of a volume whose surfaces sample it along their normals (`kShadingTapsVox`); else null.
+  /// Of a volume whose surfaces sample it along their normals (`kOcclusionTapsMm`); else null.
   CastGradient gradient;
-  float border[3] = {};      ///< position of the border's first voxel, (-1, -1, -1)
-  float centre_mm[3] = {};   ///< of the marked cells, in eye space
-  float half_mm[3][3] = {};  ///< half their edges, in eye space: [axis of the volume]
-  float edge_mm = 1.0F;      ///< of a voxel, the longest
+  float border[3] = {};        ///< position of the border's first voxel, (-1, -1, -1)
+  float centre_mm[3] = {};     ///< of the marked cells, in eye space
+  float half_mm[3][3] = {};    ///< half their edges, in eye space: [axis of the volume]
+  float edge_mm = 1.0F;        ///< of a voxel, the longest
+  float square_edges[3] = {};  ///< mm^2 of a voxel, by axis
+  float tap_reach[3] = {};     ///< voxel edges that the samples of one direction reach, by axis
+  float least_slope = 0.0F;    ///< per edge; the normal of a lower one is not known well enough
 };
 
 }  // namespace kerf

@@ -61,7 +61,9 @@ CastVolume::CastVolume(const VolumeView& volume, const CastContent& content, Cas
 void CastVolume::set_materials(const Palette& materials) {
   transfer_.materials = materials;
   for (auto& row : transfer_.materials) {
-    for (glm::vec4& material : row) material.w = -std::log2(1.0F - std::min(material.w, kMost));
+    for (glm::vec4& material : row) {
+      material.w = -std::log2(1.0F - std::min(material.w, kMost)) / static_cast<float>(kOpacityMm);
+    }
   }
   const auto& by_density = transfer_.materials[0];
   std::size_t first = by_density.size() - 1;
@@ -164,11 +166,14 @@ CastVolumeJob CastVolume::job(const View& view, std::int32_t width, std::int32_t
   job.settled = settled_;
   job.empty = static_cast<float>(transfer_.empty);
   job.full = static_cast<float>(transfer_.full);
-  job.edge_mm = static_cast<float>(edge_mm());
   job.iso = iso_;
   std::copy_n(job.gradient.last, 3, job.last);
   put(job.origin, glm::dvec3(voxel_from_eye[3]));
   put(job.from_eye, glm::dmat3(voxel_from_eye));
+  for (int axis = 0; axis < 3; ++axis) {
+    const glm::dvec3 edge(world_from_voxel_[axis]);
+    job.square_edges[axis] = static_cast<float>(glm::dot(edge, edge));
+  }
   return job;
 }
 

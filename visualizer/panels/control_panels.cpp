@@ -191,7 +191,7 @@ void choose_renderers(ViewControls& controls) {
 
 void choose_opacities(ViewControls& controls) {
   ViewSettings& settings = controls.settings;
-  ImGui::TextColored(kLabelColour, "opacity of a voxel");
+  ImGui::TextColored(kLabelColour, "opacity of 1/8 mm");
   ImGui::SameLine();
   controls.write = ImGui::SmallButton("write");
   for (const auto& [material, opacity] : controls.opacities) {

@@ -13,6 +13,7 @@
 
 #include "visualizer/cast/cast_volume.hpp"
 #include "visualizer/scene/camera.hpp"
+#include "visualizer/surface/vertex_shading.hpp"
 
 namespace kerf {
 
@@ -335,12 +336,20 @@ void put_gradient(RedrawJob& job, const GradientRows& gradient, const ChangedCel
   const glm::dmat4 eye_from_voxel = kept.view.eye_from_world * kept.volume.world_from_voxel;
   const glm::dvec3 half = 0.5 * (cells.high() - cells.low());
   put(job.centre_mm, glm::dvec3(eye_from_voxel * glm::dvec4(cells.low() + half, 1.0)));
-  double edge_mm = 0.0;
   for (int axis = 0; axis < 3; ++axis) {
     put(job.half_mm[axis], half[axis] * glm::dvec3(eye_from_voxel[axis]));
-    edge_mm = std::max(edge_mm, glm::length(glm::dvec3(eye_from_voxel[axis])));
   }
-  job.edge_mm = static_cast<float>(edge_mm);
+  const glm::dvec3 edges_mm = kept.volume.edges_mm();
+  const glm::dvec3 reach = VertexShading::tap_reach_vox(edges_mm);
+  job.edge_mm = static_cast<float>(std::max({edges_mm.x, edges_mm.y, edges_mm.z}));
+  put(job.square_edges, edges_mm * edges_mm);
+  put(job.tap_reach, reach);
+  // A texture unit may filter with 8 bits of weight. The gradient changes by 0.56 per edge at most
+  // (farid5), so on a slope of 0.15 the normal of a shader is off by less than 1/24, half a voxel
+  // at a sample twelve voxels away; farther ones need a steeper slope.
+  const double farthest =
+      std::min(std::max({reach.x, reach.y, reach.z, 12.0}), double{kMostTapVox});
+  job.least_slope = static_cast<float>(0.15 * farthest / 12.0);
 }
 
 /// Marks the tiles of `within` that are not marked yet and for which `changes` holds.
@@ -360,9 +369,11 @@ void mark_rays(std::span<const VoxelBox> changed, const RayFootprint& footprint,
   const VoxelBox all_changed = united(changed);
   if (changed.size() > kMaxBoxes) changed = {&all_changed, 1};
   const CastKernels& kernels = *cast_kernels()[0];
-  const double taps_vox = shading != nullptr ? kLongestTapVox : 0.0;
+  const glm::dvec3 taps_vox =
+      shading != nullptr ? VertexShading::tap_reach_vox(kept.volume.edges_mm()) : glm::dvec3(0.0);
   // The pixels whose rays may pass a box in voxel coordinates, or `vox` beside it.
-  const auto pixels_around = [&](const glm::dvec3& low, const glm::dvec3& high, double vox) {
+  const auto pixels_around = [&](const glm::dvec3& low, const glm::dvec3& high,
+                                 const glm::dvec3& vox) {
     return screen_bounds(box_corners(low - vox, high + vox, kept.volume.world_from_voxel),
                          kept.view, kept.target.size());
   };
@@ -377,7 +388,7 @@ void mark_rays(std::span<const VoxelBox> changed, const RayFootprint& footprint,
       continue;
     }
     const ChangedCells cells(together, footprint);
-    const PixelRect passing = tiles.tiles_of(pixels_around(cells.low(), cells.high(), 0.0));
+    const PixelRect passing = tiles.tiles_of(pixels_around(cells.low(), cells.high(), {}));
     const PixelRect all = tiles.tiles_of(pixels_around(cells.low(), cells.high(), taps_vox));
     if (all.empty()) continue;
     RedrawJob job = redraw_job(cells, kept);

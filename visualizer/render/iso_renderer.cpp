@@ -17,7 +17,8 @@ constexpr TexelFormat kGradientTexel{GL_RGBA16, GL_RGBA, GL_UNSIGNED_SHORT, GL_L
 
 VolumeOnGpu::VolumeOnGpu(const VolumeView& volume, const VolumeContent& content,
                          int max_texture_size, bool skip_empty, GradientFilter gradient)
-    : solid_(volume, content, max_texture_size),
+    : edges_mm_(volume.edges_mm()),
+      solid_(volume, content, max_texture_size),
       cells_(volume, content.density, skip_empty ? volume.iso : Density{0}),
       fine_cells_(volume.bricks, content.density, skip_empty ? volume.iso : Density{0},
                   kFineCellVox),
@@ -47,6 +48,7 @@ void VolumeOnGpu::bind(const GlProgram& program, const View& view) const {
   cells_.bind(2);
   fine_cells_.bind(3);
   gradient_texture_.bind(4);
+  program.set("u_edges_mm", edges_mm_);
   program.set("u_gradient_scale",
               gradient_.plan().per_edge * glm::vec3(texels_of(solid_.bricks().grid)));
 }

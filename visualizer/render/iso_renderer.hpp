@@ -35,6 +35,7 @@ class VolumeOnGpu {
   [[nodiscard]] const GradientRows& gradient() const noexcept { return gradient_; }
 
  private:
+  glm::vec3 edges_mm_;  ///< of a voxel
   SolidOnGpu solid_;
   CellsOnGpu cells_;
   CellTexture fine_cells_;  ///< of two voxel edges: their octants are the cells of eight voxels

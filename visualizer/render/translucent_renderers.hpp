@@ -15,7 +15,7 @@ namespace kerf {
 ///
 /// Draw opaque things first: rays end at the depth that `target` has, so what lies inside or behind
 /// shines through. Volumes that intersect mix along one ray. The depth written is that of the
-/// first sample with an opacity of `kLeastOpacity` per voxel edge; what never reaches it is not
+/// first sample with an opacity of `kLeastOpacity`; what never reaches it is not
 /// drawn.
 class BlendRenderer final : public Renderer {
  public:

@@ -144,9 +144,9 @@ void TranslucentVolumes::set_constants(const GlProgram& program) const {
     program.set(element("u_texels", v), glm::vec3(volume.texels()));
     const TransferFunction& transfer = volume.transfer();
     program.set(element("u_fade", v), glm::vec2(transfer.empty, transfer.full));
-    program.set(element("u_edge_mm", v), static_cast<float>(volume.edge_mm()));
   }
-  program.set("u_least_extinction", static_cast<float>(-std::log2(1.0 - kLeastOpacity)));
+  program.set("u_least_extinction",
+              static_cast<float>(-std::log2(1.0 - kLeastOpacity) / kOpacityMm));
   program.set("u_by_density", static_cast<int>(free_unit()) - 1);
 }
 

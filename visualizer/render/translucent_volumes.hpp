@@ -43,7 +43,7 @@ class TranslucentVolume {
   [[nodiscard]] const glm::dmat4& world_from_texture() const noexcept {
     return world_from_texture_;
   }
-  /// s0 of the transfer function in mm: the shortest edge of a voxel.
+  /// The shortest edge of a voxel.
   [[nodiscard]] double edge_mm() const noexcept { return edge_mm_; }
   [[nodiscard]] const GradientPlan& gradient() const noexcept { return gradient_; }
   [[nodiscard]] const CellsOnGpu& cells() const noexcept { return cells_; }

@@ -79,7 +79,7 @@ void fill_gradient_texels(const GradientPlan& plan, const VoxelGrid& grid,
                           std::span<const Density> density, const VoxelBox& box,
                           std::vector<GradientTexel>& texels);
 
-/// Linear colour of the material and its opacity over one voxel edge, 8 bits each.
+/// Linear colour of the material and its opacity over `kOpacityMm`, 8 bits each.
 struct MaterialTexel {
   std::uint8_t r, g, b, opacity;
 

@@ -30,7 +30,7 @@ double softest_iso(std::span<const MaterialView> materials) {
 }
 
 constexpr double kHalfBand = 0.03;  // density; CT noise of dentin is about 0.015
-// Per voxel edge. Enamel lets what is below shine through; behind a millimetre of dentin little
+// Over `kOpacityMm`. Enamel lets what is below shine through; behind a millimetre of dentin little
 // does.
 constexpr double kHardestOpacity = 0.10;
 constexpr double kSoftestOpacity = 0.40;
@@ -160,8 +160,7 @@ Opacities read_transfer(const std::filesystem::path& file) {
 
 void write_transfer(const std::filesystem::path& file, const Opacities& opacities) {
   std::ostringstream text;
-  text
-      << "# Opacity over one voxel edge, by material: kerf-visualizer --transfer FILE\n[opacity]\n";
+  text << "# Opacity over 1/8 mm, by material: kerf-visualizer --transfer FILE\n[opacity]\n";
   for (const auto& [material, opacity] : opacities) {
     // A quoted key of TOML is a string of JSON; toml++ itself leaves quotes in keys as they are.
     text << Json(material).canonical() << " = " << opacity << "\n";

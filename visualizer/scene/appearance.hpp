@@ -37,7 +37,11 @@ struct Stereo {
   friend bool operator==(const Stereo&, const Stereo&) noexcept = default;
 };
 
-/// Opacity over one voxel edge, 0..1, by the name of the material.
+/// The length over which the opacity of a material holds, so that a body looks the same in any
+/// voxels: an edge of the voxels of the default scene.
+inline constexpr double kOpacityMm = 0.125;
+
+/// Opacity over `kOpacityMm`, 0..1, by the name of the material.
 using Opacities = std::map<std::string, double>;
 
 /// How the volumes are shown: what a user may change while they are looked at.
@@ -59,8 +63,8 @@ inline constexpr int kPaletteWidth = 256;  ///< entries of a row
 /// Linear colours in two rows: by density (entry i is density i/255; adjoining materials blend over
 /// a narrow band, so that their border is smooth on a cut), then by label. Material 0 is "none" and
 /// colours nothing; without others everything is ivory. The fourth component is the opacity of the
-/// material over one voxel edge, for the translucent renderers: its own, or else the softer, the
-/// more opaque.
+/// material over `kOpacityMm`, for the translucent renderers: its own, or else the softer, the more
+/// opaque.
 using Palette = std::array<std::array<glm::vec4, kPaletteWidth>, 2>;
 [[nodiscard]] Palette make_palette(std::span<const MaterialView> materials);
 
@@ -74,9 +78,9 @@ using Palette = std::array<std::array<glm::vec4, kPaletteWidth>, 2>;
 ///
 ///     1 - (1 - a)^(p * s / s0),   p = clamp((d - empty) / (full - empty), 0, 1)
 ///
-/// over a length s, where a is the material's opacity over s0, one voxel edge (the shortest, if
-/// they differ). The exponent makes the picture independent of the step; p lets a border fade
-/// in, and material that is milled away fade out.
+/// over a length s, where a is the material's opacity over s0 = `kOpacityMm` (Beer and Lambert).
+/// The exponent makes the picture independent of the step; p lets a border fade in, and material
+/// that is milled away fade out.
 struct TransferFunction {
   /// Linear colour, and a as the fourth component: row 0 by density (entry i is density i/255), row
   /// 1 by label.
@@ -90,7 +94,7 @@ struct TransferFunction {
   [[nodiscard]] Density lowest_seen() const noexcept;
 };
 
-/// The least opacity over one voxel edge that counts as something: less makes no difference on a
+/// The least opacity over `kOpacityMm` that counts as something: less makes no difference on a
 /// screen. The first sample that reaches it gives the depth of a pixel.
 inline constexpr double kLeastOpacity = 1.0 / 255.0;
 
@@ -110,7 +114,7 @@ inline constexpr double kLeastOpacity = 1.0 / 255.0;
 
 /// The transfer function as a user keeps it, in TOML:
 ///
-///     [opacity]      # over one voxel edge, 0..1, by material; those left out keep their own
+///     [opacity]      # over 1/8 mm, 0..1, by material; those left out keep their own
 ///     enamel = 0.1
 ///
 /// Every mistake is a VisualizerError of one line: `name`, line, value, way out.

@@ -71,7 +71,7 @@ struct MaterialView {
   std::string name;
   double iso = 0.0;
   glm::dvec3 colour{0.9, 0.87, 0.8};  ///< linear RGB
-  std::optional<double> opacity{};    ///< over one voxel edge, 0..1; none: by its hardness
+  std::optional<double> opacity{};    ///< over `kOpacityMm`, 0..1; none: by its hardness
   bool forbidden = false;             ///< never cut, and reported when it is pressed
 };
 

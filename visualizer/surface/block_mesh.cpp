@@ -308,8 +308,13 @@ std::uint16_t unit16(float fraction) {
 }
 
 /// From what the vertex holds, not from what it was made of: to do it again gives the same bits.
+glm::vec3 normal_of(const SurfaceVertex& vertex) {
+  return {vertex.normal[0], vertex.normal[1], vertex.normal[2]};
+}
+
+/// As VertexShading takes it; of `normal_of`.
 FinePoint inward_of(const SurfaceVertex& vertex, const glm::vec3& inverse_square_spacing) {
-  glm::vec3 along(vertex.normal[0], vertex.normal[1], vertex.normal[2]);
+  glm::vec3 along = normal_of(vertex);
   float length = kNormalLength;
   if (inverse_square_spacing != glm::vec3(1.0F)) {
     along *= inverse_square_spacing;
@@ -358,7 +363,7 @@ void dress(SurfaceVertex& vertex, const SurfaceSource& source, VoxelIndex start,
   const FinePoint inward = inward_of(vertex, source.inverse_square_spacing);
   const glm::vec3 colour = source.shading->colour(source.volume, at, inward);
   vertex.colour = {unit16(colour.r), unit16(colour.g), unit16(colour.b)};
-  vertex.ao_factor = unit16(source.shading->ao_factor(source.volume, at, inward));
+  vertex.ao_factor = unit16(source.shading->ao_factor(source.volume, at, normal_of(vertex)));
 }
 
 }  // namespace
@@ -432,15 +437,16 @@ VoxelBox coloured_around(const VoxelBox& changed, const GradientRows& gradient) 
   return gradient.plan().around(changed).grown(1);  // a vertex lies between two voxels
 }
 
-VoxelBox shaded_around(const VoxelBox& changed, const GradientRows& gradient) {
-  return coloured_around(changed, gradient).united(changed.grown(VertexShading::kAoReachVox));
+VoxelBox shaded_around(const VoxelBox& changed, const SurfaceSource& source) {
+  return coloured_around(changed, *source.gradient)
+      .united(grown(changed, source.shading->ao_reach()));
 }
 
 ChangedMeshCells update_shading(const SurfaceSource& source, VoxelIndex block,
                                 const VoxelBox& changed, BlockMesh& mesh) {
   const VoxelIndex start = block_start(block);
   const VoxelBox colours = coloured_around(changed, *source.gradient);
-  const VoxelBox all = shaded_around(changed, *source.gradient);
+  const VoxelBox all = shaded_around(changed, source);
   std::optional<Neighbourhood> near;
   ChangedMeshCells cells;
   for (SurfaceVertex& vertex : mesh.vertices) {
@@ -452,9 +458,9 @@ ChangedMeshCells update_shading(const SurfaceSource& source, VoxelIndex block,
       if (!near) near.emplace(source.volume, start);
       dress(vertex, source, start, *near);
     } else {
-      const FinePoint inward = inward_of(vertex, source.inverse_square_spacing);
-      if (!VertexShading::ao_depends_on(changed, at, inward)) continue;
-      vertex.ao_factor = unit16(source.shading->ao_factor(source.volume, at, inward));
+      const glm::vec3 normal = normal_of(vertex);
+      if (!source.shading->ao_depends_on(changed, at, normal)) continue;
+      vertex.ao_factor = unit16(source.shading->ao_factor(source.volume, at, normal));
     }
     if (vertex != before) cells.add(vertex);
   }

@@ -119,7 +119,7 @@ class ChangedMeshCells {
 
 /// The voxels around a change on which the colour, or the whole look, of a vertex depends.
 [[nodiscard]] VoxelBox coloured_around(const VoxelBox& changed, const GradientRows& gradient);
-[[nodiscard]] VoxelBox shaded_around(const VoxelBox& changed, const GradientRows& gradient);
+[[nodiscard]] VoxelBox shaded_around(const VoxelBox& changed, const SurfaceSource& source);
 
 /// Brings the mesh of a block up to date after a change of densities in `changed` that touches none
 /// of the block's own voxels: positions stay, and the vertices that depend on `changed` are

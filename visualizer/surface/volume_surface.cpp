@@ -46,7 +46,7 @@ VolumeSurface::VolumeSurface(const VolumeView& volume, const std::vector<Materia
       blocks_(block_grid(volume.bricks.grid)),
       iso_(std::max(volume.iso, Density{1})),
       inverse_square_spacing_(inverse_square_spacing(volume.world_from_voxel)),
-      shading_(materials, iso_),
+      shading_(materials, iso_, volume.edges_mm()),
       gradient_(GradientPlan(gradient, volume.edges_mm()), bricks_.grid, density),
       labels_(labels.begin(), labels.end()),
       meshes_(blocks_.voxel_count()),
@@ -82,6 +82,7 @@ void VolumeSurface::mark(const VoxelBox& blocks, Work work) {
 
 std::span<const std::uint32_t> VolumeSurface::update(std::span<const Density> density,
                                                      const ChangedBricks& changed) {
+  const SurfaceSource from = source(density);
   VoxelBox all;
   for (const ChangedBrick& brick : changed) {
     const VoxelBox box = ChangedBricks::bounds(brick, bricks_);
@@ -89,12 +90,11 @@ std::span<const std::uint32_t> VolumeSurface::update(std::span<const Density> de
     all = all.united(box);
     gradient_.update(box, density);
     mark(blocks_on(box), Work::mesh);
-    mark(blocks_on(shaded_around(box, gradient_)), Work::shading);
+    mark(blocks_on(shaded_around(box, from)), Work::shading);
   }
   std::sort(marked_.begin(), marked_.end());
   different_.clear();
   changed_triangles_.clear();
-  const SurfaceSource from = source(density);
   for (const std::uint32_t id : marked_) {
     BlockMesh& mesh = meshes_[id];
     const Work work = std::exchange(work_[id], Work::none);

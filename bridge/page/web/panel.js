@@ -263,7 +263,7 @@ export class LookControls {
     element('isos').replaceChildren(slider('iso', 'iso', kIsoRange, kIsoStep, look.iso ?? own,
       value => value.toFixed(2), iso => this.stage.setLook({iso})));
     const legend = document.createElement('p');
-    legend.textContent = 'opacity of a voxel';
+    legend.textContent = 'opacity of 1/8 mm';
     element('opacities').replaceChildren(legend, ...scene.materials.map(({name}, m) => {
       const share = shareOf(look.opacities[name] ?? defaultOpacity(scene.materials, m));
       return slider(`opacity${m}`, name, [0, 1], 0.01, share, at => opacityAt(at).toFixed(3), at =>

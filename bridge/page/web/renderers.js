@@ -65,6 +65,7 @@ export class IsoCaster {
     bind(gl, 5, gl.TEXTURE_2D, palette);
     this.iso.use();
     this.iso.set({...viewUniforms(view), u_iso: volume.view.iso / 65535, u_texels: volume.texels,
+      u_edges_mm: volume.view.edges,
       u_texture_from_eye: affineInverse(multiply(view.eyeFromWorld, volume.worldFromTexture))});
     this.iso.setInts({u_has_labels: volume.volume.labels ? 1 : 0, u_has_cells: volume.gradients ? 1 : 0});
     if (volume.gradients) this.iso.set(volume.gradients.uniforms());
@@ -98,7 +99,7 @@ export class BlendCaster {
       const first = kUnitsPerVolume * v;
       this.cast.setInts({[`u_voxel[${v}]`]: first, [`u_material[${v}]`]: first + 1,
         [`u_active_cell[${v}]`]: first + 2});
-      this.cast.set({[`u_texels[${v}]`]: volume.texels, [`u_edge_mm[${v}]`]: volume.view.edge,
+      this.cast.set({[`u_texels[${v}]`]: volume.texels,
         [`u_fade[${v}]`]: [volume.transfer.empty, volume.transfer.full]});
       if (!volume.gradients) return;
       this.cast.setInts({[`u_cell_gradient[${v}]`]: this.cellsUnit + v});

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Volumes on the GPU: uploaded by boxes of changed bricks.
 import {CellGradients, cellPlan, joined} from './cell_gradients.js';
-import {kLongestTapVox} from './constants.js';
+import {kClearVox, kMostTapVox, kOcclusionTapsMm} from './constants.js';
 import {bind, texture} from './gl.js';
 import {scaled, translated} from './math.js';
 import {gradientTexels, MaterialTexels, transferFunction} from './transfer_function.js';
@@ -179,8 +179,10 @@ class VolumeOnGpu {
     this.cells = new CellsOnGpu(gl, view, threshold);
     const plan = cellPlan(view.edges);
     this.gradients = plan && new CellGradientsOnGpu(gl, this.volume, plan);  // null: of cubes
+    const tapMm = Math.max(...kOcclusionTapsMm, kClearVox * Math.max(...view.edges));
     /** Voxels, by axis, over which a changed one is seen in the shading of a surface. */
-    this.shadingReach = [0, 1, 2].map(axis => Math.max(kLongestTapVox, plan?.reach[axis] ?? 0) + 1);
+    this.shadingReach = view.edges.map((edge, axis) =>
+      Math.max(Math.min(tapMm / edge, kMostTapVox), plan?.reach[axis] ?? 0) + 1);
     this.stale = this.volume.follow();
   }
   /** Takes up what changed; returns those bricks. */

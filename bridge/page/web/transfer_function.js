@@ -2,7 +2,7 @@
 // What voxels look like: palette, transfer function and texels of visualizer/scene/appearance and
 // visualizer/render/volume_textures.
 import {kEmptyShare, kHalfBand, kHardestOpacity, kHighestAir, kIvory, kLeastOpacity, kMaterialReach,
-  kPaletteWidth, kSoftestOpacity, kWholeSoftest} from './constants.js';
+  kOpacityMm, kPaletteWidth, kSoftestOpacity, kWholeSoftest} from './constants.js';
 import {clamp, mix} from './math.js';
 
 const kFull = 65535;
@@ -70,7 +70,7 @@ export function transferFunction(view, materials) {
     lowestSeen: Math.max(1, Math.floor(Math.max(0, empty - 0.5 / 255) * kFull))};
 }
 
-export const leastExtinction = -Math.log2(1 - kLeastOpacity);
+export const leastExtinction = -Math.log2(1 - kLeastOpacity) / kOpacityMm;  // per mm
 
 const densityByte = density => Math.floor((density * 255 + 32767) / kFull);
 

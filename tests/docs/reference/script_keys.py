@@ -122,7 +122,7 @@ def opacities(root):
     enamel = 0.1
 
 {table(("key", "values", "default", "meaning"), [("the name of a material of the scene", "0 to 1",
-       "the scene's, else below", "opacity over one voxel edge (the shortest), for `blend`, `slices` and `cast-blend`")])}
+       "the scene's, else below", "opacity over 1/8 mm, for `blend`, `slices` and `cast-blend`")])}
 
 By default the softest material has {view.number('kSoftestOpacity'):g} and the hardest {view.number('kHardestOpacity'):g}, those between them in equal
 ratios; a scene of one material has {view.number('kSoftestOpacity'):g}.

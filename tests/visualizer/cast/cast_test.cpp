@@ -45,10 +45,12 @@ Cast cast(Caster& caster, const View& view) {
   return cast;
 }
 
-/// Translucent: a tenth and a third of opacity over a voxel edge.
+constexpr double kOpacity = 0.1;
+
+/// Translucent, by density and by label.
 TransferFunction transfer(std::span<const MaterialView> materials = {}) {
   TransferFunction made{.materials = make_palette(materials), .empty = 0.2, .full = 0.5};
-  for (glm::vec4& material : made.materials[0]) material.w = 0.1F;
+  for (glm::vec4& material : made.materials[0]) material.w = static_cast<float>(kOpacity);
   for (glm::vec4& material : made.materials[1]) material.w = 0.33F;
   return made;
 }
@@ -223,8 +225,8 @@ TEST_CASE("a rectangle has the pixels of the whole picture and touches no other"
 
 TEST_CASE("the opacity of blend hardly depends on the step") {
   const VoxelGrid grid{40, 40, 40};
-  const TestVolume volume(grid, centred(grid, glm::dvec3(0.25)), ball({}, 4.0, 2.0));
-  const View view = look_at({9, 14, 17}, {}, 15, 35);
+  const TestVolume volume(grid, centred(grid, glm::dvec3(kOpacityMm)), ball({}, 2.0, 1.0));
+  const View view = look_at({4.5, 7, 8.5}, {}, 7.5, 17.5);
   const auto drawn = [&](float step_vox) {
     Caster caster = caster_of({&volume}, blending(step_vox));
     return cast(caster, view).picture;
@@ -266,8 +268,8 @@ TEST_CASE(
       for (int x = 0; x < kSize.width; ++x) {
         const glm::dvec3 along = pixel_ray(view, kSize, x, y).direction;
         if (std::max(std::abs(along.x), std::abs(along.y)) * end_mm > kSafeMm) continue;
-        const double edges = (end_mm - begin_mm) * glm::length(along) / kEdgeMm;
-        const double opacity = std::min((1.0 - std::pow(1.0 - 0.1, edges)) / 0.98, 1.0);
+        const double lengths = (end_mm - begin_mm) * glm::length(along) / kOpacityMm;
+        const double opacity = std::min((1.0 - std::pow(1.0 - kOpacity, lengths)) / 0.98, 1.0);
         const auto at = static_cast<std::size_t>((kSize.height - 1 - y) * kSize.width + x);
         wrong += std::abs((drawn.picture.rgba[at] >> 24) - 255.0 * opacity) > 1.0 ? 1 : 0;
         wrong += std::abs(eye_distance_mm(static_cast<double>(drawn.picture.depth[at]), view) -

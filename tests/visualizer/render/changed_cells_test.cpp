@@ -79,6 +79,9 @@ RedrawJob job_of(const LoadedScene& scene, const ChangedCells& cells) {
   for (int axis = 0; axis < 3; ++axis) {
     put(job.half_mm[axis], half[axis] * glm::dvec3(eye_from_cell[axis]));
   }
+  put(job.square_edges, glm::dvec3(1.0));
+  put(job.tap_reach, VertexShading::tap_reach_vox(glm::dvec3(1.0)));
+  job.least_slope = 0.15F;
   return job;
 }
 

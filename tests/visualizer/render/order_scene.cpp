@@ -105,17 +105,13 @@ double TwoBodies::transparency(std::size_t v, const PixelRay& ray, double from_m
                                double to_mm) const {
   const TransferFunction look = make_transfer_function(scene.materials, volumes[v].view.iso, true);
   const double opacity = static_cast<double>(look.materials[1][labels[v].front()].a);
-  double edge_mm = 1e9;
-  for (int axis = 0; axis < 3; ++axis) {
-    edge_mm = std::min(edge_mm, glm::length(scene.volumes[v].world_from_voxel[axis]));
-  }
   constexpr double kStepMm = 0.02;
-  double edges = 0.0;
+  double lengths = 0.0;
   for (double at_mm = from_mm; at_mm < to_mm; at_mm += kStepMm) {
     const double fraction = share_at(bodies[v](ray.origin_mm + at_mm * ray.direction));
-    edges += look.presence(fraction) * kStepMm * glm::length(ray.direction) / edge_mm;
+    lengths += look.presence(fraction) * kStepMm * glm::length(ray.direction) / kOpacityMm;
   }
-  return std::pow(1.0 - opacity, edges);
+  return std::pow(1.0 - opacity, lengths);
 }
 
 std::vector<Nearest> nearest_bodies(const std::vector<Distance>& bodies,

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <span>
+#include <vector>
 
 #include <doctest/doctest.h>
 #include <glm/gtc/matrix_transform.hpp>
@@ -28,16 +30,17 @@ TestVolume solid_block(double spacing_mm) {
 }
 
 /// What a `solid_block` leaves of a light on the z axis at `light_mm`, seen from +z, by the
-/// transfer function: (1 - a)^(length / s0), the fading border with its exact integral.
-double transparency(const TestVolume& block, double light_mm) {
-  const TransferFunction transfer = make_transfer_function({}, block.view.iso, false);
+/// transfer function: (1 - a)^(length / kOpacityMm), the fading border with its exact integral.
+double transparency(const TestVolume& block, double light_mm,
+                    std::span<const MaterialView> materials = {}) {
+  const TransferFunction transfer = make_transfer_function(materials, block.view.iso, false);
   const double edge_mm = block.view.world_from_voxel[0][0];
   const double opacity = static_cast<double>(transfer.materials[0][255].a);
   // From the centre of the last voxels the density falls to zero over one edge.
   const double last_centre_mm = 0.5 * (kBlockMm - edge_mm);
   const double border_edges = 1.0 - 0.5 * (transfer.empty + transfer.full);
-  const double edges = (last_centre_mm - light_mm) / edge_mm + border_edges;
-  return std::pow(1.0 - opacity, edges);
+  const double length_mm = last_centre_mm - light_mm + border_edges * edge_mm;
+  return std::pow(1.0 - opacity, length_mm / kOpacityMm);
 }
 
 /// The fraction of the light behind that a picture shows: from 98 % on, opacity counts as all.
@@ -70,7 +73,12 @@ TEST_CASE("the picture converges with the step, and the default step is near the
   const VolumeContent content = volume.content();
   const RenderTarget target(kTestSize);
   const auto picture = [&](float step_vox) {
-    BlendRenderer renderer(scene_of({&volume}), {&content, 1}, {.step_vox = step_vox});
+    SceneView scene = scene_of({&volume});
+    // Over its voxels as opaque as the softest material is over those of the default scene.
+    const double edges = volume.view.edges_mm().x / kOpacityMm;
+    scene.materials = {{.name = "none"}, {.name = "soft"}};
+    scene.materials[1].opacity = 1.0 - std::pow(0.6, 1.0 / edges);
+    BlendRenderer renderer(scene, {&content, 1}, {.step_vox = step_vox});
     return draw(renderer, look_at({14, 9, 20}, {}, 10, 40), target);
   };
   const Drawn exact = picture(1.0F / 16.0F);
@@ -102,12 +110,16 @@ TEST_CASE("an opaque thing inside is dimmed by what lies before it, and by nothi
 TEST_CASE("where two volumes intersect both dim, whatever their order and voxel size") {
   if (!have_gl()) return;
   const TestVolume fine = solid_block(0.25), coarse = solid_block(0.5);
-  const double expected = shown(transparency(fine, 0.0) * transparency(coarse, 0.0));
+  const std::vector<MaterialView> faint{{.name = "none"}, {.name = "faint", .opacity = 0.05}};
+  const double expected = shown(transparency(fine, 0.0, faint) * transparency(coarse, 0.0, faint));
+  CHECK(expected > 0.1);
   for (const bool swapped : {false, true}) {
     const TestVolume& first = swapped ? coarse : fine;
     const TestVolume& second = swapped ? fine : coarse;
     const std::array<VolumeContent, 2> contents{first.content(), second.content()};
-    BlendRenderer renderer(scene_of({&first, &second}), contents);
+    SceneView scene = scene_of({&first, &second});
+    scene.materials = faint;
+    BlendRenderer renderer(scene, contents);
     CHECK(seen_through(renderer, kBlockView, 30.0) == doctest::Approx(expected).epsilon(0.03));
   }
 }

@@ -185,18 +185,29 @@ TEST_CASE("a file has the normals of the gradient that was chosen") {
 }
 
 TEST_CASE(
-    "after cuts in unequal voxels a picture is one made anew, and differs in its marked tiles "
+    "after cuts in voxels of any size a picture is one made anew, and differs in its marked tiles "
     "alone") {
   if (!have_gl()) return;
-  const View view = look_at({9, 14, 17}, {}, 15, 35);
+  struct Case {
+    glm::dvec3 edges_mm;
+    double side_mm;     ///< of the volume, along x and y
+    bool far_reaching;  ///< ambient occlusion joins all that is seen
+  };
   const RenderTarget before(kTestSize), after(kTestSize);
-  for (const glm::dvec3& edges_mm : {glm::dvec3(0.2, 0.2, 0.5), glm::dvec3(1.1, 0.2, 0.3)}) {
-    const auto count = [](double edge_mm) { return static_cast<int>(10.0 / edge_mm); };
+  for (const auto& [edges_mm, side_mm, far_reaching] :
+       {Case{{0.2, 0.2, 0.5}, 10.0, false}, Case{{1.1, 0.2, 0.3}, 10.0, false},
+        Case{{0.1, 0.1, 0.1}, 5.0, false}, Case{{0.1, 0.1, 0.5}, 5.0, false},
+        Case{{0.02, 0.02, 0.02}, 1.0, true}, Case{{0.02, 0.02, 2.0}, 1.0, true}}) {
+    const auto count = [side = side_mm](double edge_mm) {
+      return std::max(static_cast<int>(side / edge_mm), 3);
+    };
     const VoxelGrid grid{count(edges_mm.x), count(edges_mm.y), count(edges_mm.z)};
+    const View view =
+        look_at(0.1 * side_mm * glm::dvec3(9, 14, 17), {}, 1.5 * side_mm, 3.5 * side_mm);
     for (const std::string_view kind : renderer_kinds()) {
       CAPTURE(std::string(kind));
       CAPTURE(edges_mm.x);
-      TestVolume volume(grid, centred(grid, edges_mm), ball({}, 4.2, 0.5));
+      TestVolume volume(grid, centred(grid, edges_mm), ball({}, 0.42 * side_mm, 0.05 * side_mm));
       const SceneView scene = scene_of({&volume});
       const VolumeContent content = volume.content();
       const auto renderer = make_renderer(kind, scene, {&content, 1});
@@ -231,7 +242,7 @@ TEST_CASE(
         last = draw(*renderer, view, before);
       }
       CHECK(changed > 100);
-      CHECK(kept > 300);
+      if (!far_reaching) CHECK(kept > 300);
     }
   }
 }

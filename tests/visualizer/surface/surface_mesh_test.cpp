@@ -216,10 +216,10 @@ TEST_CASE("iso at both ends of its range") {
 
 TEST_CASE("a vertex has the colour of the label below it, and is darker in a cavity") {
   const VoxelGrid grid{48, 48, 48};
-  const TestVolume volume(grid, centred(grid, glm::dvec3(0.25)), [](glm::dvec3 at) {
-    // A ball with a narrow well from above.
-    const double well = 0.6 - std::hypot(at.x, at.z);
-    return std::min(ball({}, 4.5, 0.5)(at), at.y > 0.0 ? 0.5 - well / 0.5 : 1.0);
+  const TestVolume volume(grid, centred(grid, glm::dvec3(0.125)), [](glm::dvec3 at) {
+    // A ball with a well from above, which two of the samples of ambient occlusion cross.
+    const double well = 0.3 - std::hypot(at.x, at.z);
+    return std::min(ball({}, 2.25, 0.25)(at), at.y > 0.0 ? 0.5 - well / 0.25 : 1.0);
   });
   std::vector<Label> labels;
   for (std::size_t i = 0; i < volume.density.size(); ++i) {
@@ -237,10 +237,10 @@ TEST_CASE("a vertex has the colour of the label below it, and is darker in a cav
           glm::dvec4(glm::dvec3(fine_place(vertex, block_start(surface.block(id)))) /
                          double{kFinePerVoxel},
                      1));
-      if (at.z < -0.75) CHECK(vertex.colour == std::array<std::uint16_t, 3>{65535, 0, 0});
-      if (at.z > 0.75) CHECK(vertex.colour == std::array<std::uint16_t, 3>{0, 65535, 0});
-      if (at.y < -4.0) open = std::max(open, vertex.ao_factor / 65535.0);
-      if (std::hypot(at.x, at.z) < 0.7 && std::abs(at.y - 1.0) < 0.5) {
+      if (at.z < -0.375) CHECK(vertex.colour == std::array<std::uint16_t, 3>{65535, 0, 0});
+      if (at.z > 0.375) CHECK(vertex.colour == std::array<std::uint16_t, 3>{0, 65535, 0});
+      if (at.y < -2.0) open = std::max(open, vertex.ao_factor / 65535.0);
+      if (std::hypot(at.x, at.z) < 0.35 && std::abs(at.y - 0.5) < 0.25) {
         deep = std::min(deep, vertex.ao_factor / 65535.0);
       }
     }

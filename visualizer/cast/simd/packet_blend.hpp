@@ -10,7 +10,7 @@
 // One ray goes through all volumes together, so they mix where they intersect. It is cut into
 // pieces at whole multiples of the step along the view axis, whatever was skipped: skipping changes
 // the time, never the picture. Over a length s a sample of opacity a has 1 - (1 - a)^(p s / s0): p
-// says how much of the material is there, s0 is a voxel edge.
+// says how much of the material is there, s0 is `kOpacityMm`.
 
 namespace kerf {
 namespace {
@@ -88,10 +88,10 @@ inline Material lit_material(const CastJob& job, const CastVolumeJob& volume, Ve
   return {select(lights, bright, dim), material.extinction};
 }
 
-constexpr float kOpaque = 0.98F;                // what lies behind adds two hundredths at most
-constexpr float kNoticeable = 1.0F / 32;        // pieces below have no light of their own
-constexpr float kLeastExtinction = 0.0056684F;  // -log2(1 - 1/255): less is not seen
-constexpr float kNever = 1e9F;                  // steps
+constexpr float kOpaque = 0.98F;               // what lies behind adds two hundredths at most
+constexpr float kNoticeable = 1.0F / 32;       // pieces below have no light of their own
+constexpr float kLeastExtinction = 0.045347F;  // per mm, of `kLeastOpacity`: less is not seen
+constexpr float kNever = 1e9F;                 // steps
 
 /// The rays' way through one volume.
 struct Walk {
@@ -169,11 +169,10 @@ inline void add_piece(const CastJob& job, const CastVolumeJob& volume, Walk& wal
   const Vec3 middle = walk.rays.origin + (half * (from_mm + to_mm)) * walk.rays.direction;
   const Material material =
       lit_material(job, volume, middle, half * (front + back), vectors, there, noticeable);
-  const F extinction = Simd::select(there, material.extinction * presence, zero);
-  const F per_mm = extinction * Simd::set(1.0F / volume.edge_mm);
+  const F per_mm = Simd::select(there, material.extinction * presence, zero);
   glow = {glow.rgb + per_mm * material.rgb, glow.per_mm + per_mm};
   // Two volumes may begin in one piece; later pieces are farther away.
-  const M seen = Simd::but_not(there, Simd::less(extinction, Simd::set(kLeastExtinction)));
+  const M seen = Simd::but_not(there, Simd::less(per_mm, Simd::set(kLeastExtinction)));
   const M first = Simd::both(seen, Simd::less(from_mm, sum.depth_mm));
   if (!Simd::any(first)) return;
   const F empty = Simd::set(volume.empty);

@@ -50,14 +50,15 @@ inline void iso_packet(const CastJob& job, const Packet& packet) {
     F ao_factor = ao_factor_at(volume, at);
     const M on_face = Simd::both(begins[v], Simd::less(Simd::set(job.eye.near_mm), part.begin_mm));
     if (Simd::any(on_face)) {
-      at.normal = select(on_face, vec3(job.key_light), at.normal);  // section_normal
-      at.inward = select(on_face, Vec3{}, at.inward);  // no border: it shows what lies in the plane
+      Facing& facing = at.facing;
+      facing.normal = select(on_face, vec3(job.key_light), facing.normal);  // section_normal
+      facing.inward = select(on_face, Vec3{}, facing.inward);  // no border: what lies in the plane
       ao_factor = Simd::select(on_face, Simd::set(1.0F), ao_factor);
     }
     const Vec3 albedo = material_at(volume, at, found[v]);
-    const Vec3 shown = lit(job, albedo, at.normal, vectors, ao_factor);
+    const Vec3 shown = lit(job, albedo, at.facing.normal, vectors, ao_factor);
     colour = select(found[v], shown, colour);
-    normal = select(found[v], at.normal, normal);
+    normal = select(found[v], at.facing.normal, normal);
   }
   const F depth = Simd::set(job.eye.depth_far) - Simd::set(job.eye.depth_slope) / nearest_mm;
   put(packet, Simd::select(any_found, srgb_bytes(colour, Simd::set(1.0F)), I{}), job.pixels.rgba);

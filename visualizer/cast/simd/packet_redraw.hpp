@@ -104,15 +104,18 @@ inline bool packet_shading_touches(const RedrawJob& job, const Packet& packet) {
   const Ends ends = ends_of(job, packet);
   const Vec3 p = vec3(job.origin) + ends.t * transformed(job.from_eye, eye);
   const Vec3 off = outside_by(job, p);
-  const F reach = Simd::set(kLongestTapVox);
-  M near = Simd::both(ends.there, Simd::less(dot(off, off), reach * reach));
+  const Vec3 part{off.x * Simd::set(1.0F / job.tap_reach[0]),
+                  off.y * Simd::set(1.0F / job.tap_reach[1]),
+                  off.z * Simd::set(1.0F / job.tap_reach[2])};
+  M near = Simd::both(ends.there, Simd::less(dot(part, part), Simd::set(1.0F)));
+  near = Simd::both(near, Simd::less(dot(off, off), Simd::set(kMostTapVox * kMostTapVox)));
   if (!Simd::any(near)) return false;
   // Normals are turned towards the eye, so samples lie before the point, or a little behind it.
   // Both sides of the comparison have one factor, that of the ray.
   const F length_2 = dot(eye, eye);
   F nearest = dot(vec3(job.centre_mm), eye);
   for (const auto& half : job.half_mm) nearest = nearest - absolute(dot(vec3(half), eye));
-  const F behind = Simd::set(-kShadingTapsVox[0] * job.edge_mm) * Simd::sqrt(length_2);
+  const F behind = Simd::set(-kMaterialTapsVox[0] * job.edge_mm) * Simd::sqrt(length_2);
   near = Simd::but_not(near, Simd::less(ends.t * length_2 + behind, nearest));
   if (!Simd::any(near)) return false;
 
@@ -121,17 +124,20 @@ inline bool packet_shading_touches(const RedrawJob& job, const Packet& packet) {
   const M on_face = Simd::both(Simd::less(Simd::set(job.eye.near_mm), shown_from_mm),
                                Simd::less(ends.t, Simd::set(1.0001F) * shown_from_mm));
   const Vec3 gradient = gradient_at(job.gradient, p - vec3(job.border));
-  // A texture unit may filter with 8 bits of weight. The gradient changes by 0.56 per edge at most
-  // (farid5), so on this steep a slope the normal of a shader is off by less than 1/24, half a
-  // voxel at the farthest sample.
-  const F least_slope = Simd::set(0.15F);
+  const F least_slope = Simd::set(job.least_slope);
   M known = Simd::but_not(near, on_face);
   known = Simd::but_not(known, Simd::less(dot(gradient, gradient), least_slope * least_slope));
   if (Simd::any(Simd::but_not(near, known))) return true;
-  const Vec3 inward =
-      facing_of(job.from_eye, per_edge(job.gradient, gradient), -normalized(eye)).inward;
-  for (const float reach_vox : kShadingTapsVox) {
-    if (any_marked(job, p - Simd::set(reach_vox) * inward, known, kChangedAlong)) return true;
+  const Facing facing =
+      facing_of(job.from_eye, job.square_edges, per_edge(job.gradient, gradient), -normalized(eye));
+  const auto changed_at = [&](F vox) {
+    return any_marked(job, p - vox * facing.inward, known, kChangedAlong);
+  };
+  for (const float vox : kMaterialTapsVox) {
+    if (changed_at(Simd::set(vox))) return true;
+  }
+  for (int i = 0; i < kOcclusionTaps; ++i) {
+    if (changed_at(occlusion_tap(facing, i).vox)) return true;
   }
   return false;
 }

@@ -268,11 +268,15 @@ inline Labelled by_labels(const CastVolumeJob& volume, Vec3 p, M needed) {
 
 /// Which way an iso-surface faces.
 struct Facing {
-  Vec3 inward;  ///< one voxel edge long
-  Vec3 normal;  ///< eye space, towards the eye
+  Vec3 inward;     ///< one voxel edge long
+  Vec3 normal;     ///< eye space, towards the eye
+  F edges_per_mm;  ///< of `inward`
+  F voxel_mm;      ///< extent of a voxel along the normal
 };
 
-inline Facing facing_of(const float (&voxel_from_eye)[3][3], Vec3 gradient, Vec3 to_eye) {
+/// `square_edges` in mm^2, by axis.
+inline Facing facing_of(const float (&voxel_from_eye)[3][3], const float (&square_edges)[3],
+                        Vec3 gradient, Vec3 to_eye) {
   // A gradient in voxel edges goes to the eye's millimetres by the transposed Jacobian.
   const Vec3 slope = transformed_back(voxel_from_eye, gradient);
   const F zero = Simd::set(0.0F);
@@ -280,21 +284,43 @@ inline Facing facing_of(const float (&voxel_from_eye)[3][3], Vec3 gradient, Vec3
   const F facing = dot(normal, to_eye);
   const Vec3 turned = normalized(normal - (Simd::set(1.02F) * facing) * to_eye);
   normal = select(Simd::less(facing, zero), turned, normal);
-  return {normalized(transformed(voxel_from_eye, -normal)), normal};
+  const Vec3 per_mm = transformed(voxel_from_eye, -normal);
+  const F edges_per_mm = Simd::sqrt(dot(per_mm, per_mm));
+  const Vec3 edges{Simd::set(square_edges[0]) * per_mm.x, Simd::set(square_edges[1]) * per_mm.y,
+                   Simd::set(square_edges[2]) * per_mm.z};
+  return {(Simd::set(1.0F) / edges_per_mm) * per_mm, normal, edges_per_mm,
+          Simd::sqrt(dot(edges, edges))};
+}
+
+/// A sample of ambient occlusion: how many voxel edges outwards, and its weight.
+struct OcclusionTap {
+  F vox, weight;
+};
+
+/// `kOcclusionTapsMm` has the reasons.
+inline OcclusionTap occlusion_tap(const Facing& facing, int i) {
+  const F length_mm = Simd::set(kOcclusionTapsMm[i]);
+  const F clear_mm = Simd::set(kClearVox) * facing.voxel_mm;
+  const F most_vox = Simd::set(kMostTapVox);
+  const F weight = Simd::set(kOcclusionWeights[i]);
+  if (i + 1 == kOcclusionTaps) {
+    return {Simd::min(Simd::max(length_mm, clear_mm) * facing.edges_per_mm, most_vox), weight};
+  }
+  const F clear = clamped(Simd::set(3.0F) * length_mm / clear_mm - Simd::set(2.0F));
+  return {Simd::min(length_mm * facing.edges_per_mm, most_vox), weight * clear};
 }
 
 /// A point of an iso-surface.
 struct SurfacePoint {
   Vec3 position;  ///< voxel edges
-  Vec3 inward, normal;
+  Facing facing;
 };
 
 inline SurfacePoint surface_point(const CastVolumeJob& volume, const VolumeRays& rays, F t,
                                   Vec3 to_eye) {
   const Vec3 p = rays.origin + t * rays.direction;
-  const Facing facing = facing_of(
-      volume.from_eye, per_edge(volume.gradient, gradient_at(volume.gradient, p)), to_eye);
-  return {p, facing.inward, facing.normal};
+  return {p, facing_of(volume.from_eye, volume.square_edges,
+                       per_edge(volume.gradient, gradient_at(volume.gradient, p)), to_eye)};
 }
 
 /// The mean of the labels over 3.5 voxels: in a clip plane their borders are steps of voxels.
@@ -320,13 +346,14 @@ inline Vec3 material_at(const CastVolumeJob& volume, const SurfacePoint& at, M n
   const F depth_vox = Simd::set(1.25F);
   const F full_depth_vox = Simd::set(2.5F);
   const F coat_density = Simd::set(0.14F);
-  const Vec3 below = at.position + depth_vox * at.inward;
+  const Vec3 inward = at.facing.inward;
+  const Vec3 below = at.position + depth_vox * inward;
   Vec3 colour{};
   M plain = needed;
   if (volume.labels != nullptr) {
     Labelled labelled = by_labels(volume, below, needed);
-    const Vec3 above = at.position - depth_vox * at.inward;
-    const M on_face = Simd::both(needed, Simd::equal(dot(at.inward, at.inward), Simd::set(0.0F)));
+    const Vec3 above = at.position - depth_vox * inward;
+    const M on_face = Simd::both(needed, Simd::equal(dot(inward, inward), Simd::set(0.0F)));
     if (Simd::any(on_face)) {
       const Labelled around = by_labels_around(volume, at.position, on_face);
       labelled = {select(on_face, around.mean, labelled.mean),
@@ -347,18 +374,20 @@ inline Vec3 material_at(const CastVolumeJob& volume, const SurfacePoint& at, M n
     if (!Simd::any(plain)) return colour;
   }
   const F density = Simd::max(density_at(volume, below),
-                              density_at(volume, at.position + full_depth_vox * at.inward));
+                              density_at(volume, at.position + full_depth_vox * inward));
   return select(plain, by_density(volume, density).rgb, colour);
 }
 
 /// 1 in the open, less where the neighbourhood along the normal is solid: cavities read as such.
 inline F ao_factor_at(const CastVolumeJob& volume, const SurfacePoint& at) {
   const F per_iso = Simd::set(1.0F / volume.iso);
-  const auto solid = [&](float reach_vox) {
-    return clamped(density_at(volume, at.position - Simd::set(reach_vox) * at.inward) * per_iso);
-  };
-  return Simd::set(1.0F) - (Simd::set(0.30F) * solid(2.5F) + Simd::set(0.30F) * solid(6.0F) +
-                            Simd::set(0.25F) * solid(12.0F));
+  F solid{};
+  for (int i = 0; i < kOcclusionTaps; ++i) {
+    const OcclusionTap tap = occlusion_tap(at.facing, i);
+    const F density = density_at(volume, at.position - tap.vox * at.facing.inward);
+    solid = solid + tap.weight * clamped(density * per_iso);
+  }
+  return Simd::set(1.0F) - solid;
 }
 
 }  // namespace
