@@ -16,7 +16,8 @@ PICTURE_SIZE, WINDOW_SIZE = "640x480", "1280x800"  # if none is given; a window'
 FLAGS = ("--headless", "--serve", "--stereo", "--voxel-tool", "--mute", "--colour-blind", "--virtual", "--two-machines")
 OF_SCENE = ("--scene", "--volume", "--spacing", "--override-spacing", "--window", "--set")
 OF_LINK = {"--loss": (50, 1), "--delay-ms": (2000, 20), "--mbit": (100000, 4)}  # of two machines: the most of each, a bad one
-WITH_VALUE = (*OF_SCENE, *OF_LINK, "--hand", "--seconds", "--rate", "--out", "--size", "--renderer", "--camera", "--gradient", "--panels", "--panel-scale",
+WITH_VALUE = (*OF_SCENE, *OF_LINK, "--hand", "--seconds", "--rate", "--out", "--size", "--renderer", "--camera", "--aov",
+              "--gradient", "--panels", "--panel-scale",
               "--device", "--port", "--library", "--sheet", "--transfer", "--record", "--listen", "--name")
 
 
@@ -79,7 +80,7 @@ def parse(words):
         value = words.pop(0)
         if name not in OF_SCENE or name == "--set":
             options.again += [name, value]
-        if name in ("--renderer", "--camera", "--gradient", "--transfer", "--panels", "--panel-scale"):
+        if name in ("--renderer", "--camera", "--aov", "--gradient", "--transfer", "--panels", "--panel-scale"):
             options.look += [name, value]
         elif name in OF_SCENE and name != "--scene":
             options.volume += [name, value]
@@ -87,7 +88,7 @@ def parse(words):
             options.link += [name, value]
         else:
             setattr(options, name[2:], value)
-    options.headless = options.headless or bool(options.sheet)
+    options.headless = options.headless or bool(options.sheet) or "--aov" in given
     return options
 
 

@@ -20,7 +20,7 @@ from options import Refusal
 OWN = ".kerf-demo"
 KIB_AT_LEAST = 16384  # pictures, plot and volume; the log comes on top
 RESERVE_BYTES = 65536  # for the list of the results, even on a disk that is full by then
-BY_KEYS = re.compile(r"kerf-[0-9]{4}\.(png|y4m|mp4|toml|ply)")  # names that the window's keys give
+BY_KEYS = re.compile(r"kerf-[0-9]{4}(\.(png|y4m|mp4|toml|ply)|-camera\.toml)")  # names that the window's keys give
 KINDS = ((stat.S_ISREG, "f"), (stat.S_ISLNK, "l"), (stat.S_ISFIFO, "p"), (stat.S_ISSOCK, "s"), (stat.S_ISBLK, "b"),
          (stat.S_ISCHR, "c"))
 
@@ -183,7 +183,7 @@ class OutFolder:
         except OSError:
             raise self.refusal("cannot be written; name another folder") from None
         frames = [name for name in names if re.fullmatch(r"frame-.*\.png", name)]
-        kept = [name for name in names if name not in frames]
+        kept = [name for name in names if not re.fullmatch(r"frame-.*\.(png|npy)", name)]
         kept += [line.split(" ", 3)[3] for line in self.written_by_keys()]
         return f"kept in {self.name}: {' '.join(kept)}, {len(frames)} frame{'s' if len(frames) != 1 else ''}", True
 

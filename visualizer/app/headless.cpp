@@ -300,6 +300,8 @@ int run_headless(const VisualizerOptions& asked) {
   report.late_join_ms = since_attached.wall_ms();
   forget_frames(report);
 
+  std::optional<SeenBodies> bodies;
+  if (options.aov.any()) bodies.emplace(session, picture, options.size, options.aov);
   std::optional<Film> film;
   if (options.record) begin_recording(options, options.size, film);
   FrameSchedule schedule(options.frames, options.every_ticks.value_or(ticks_between(
@@ -313,6 +315,7 @@ int run_headless(const VisualizerOptions& asked) {
            (options.seconds && since_attached.wall_ms() >= *options.seconds * kMsPerS);
     session.poll();
     picture.update(session);
+    if (bodies) bodies->update(session);
     const auto ticks = session.ticks_since_armed();
     const bool filmed = film && ticks && film->due(session.servo_s());
     if (filmed || (over ? schedule.final_due(ticks) : schedule.due(ticks))) taker.draw(session);
@@ -321,7 +324,9 @@ int run_headless(const VisualizerOptions& asked) {
       if (problem) std::fprintf(stderr, "kerf-visualizer: %s\n", escaped(*problem).c_str());
     }
     while (over ? schedule.final_due(ticks) : schedule.due(ticks)) {
-      taker.write(session, frame_file(options.out, schedule.take(ticks)));
+      const std::filesystem::path file = frame_file(options.out, schedule.take(ticks));
+      taker.write(session, file);
+      if (bodies) write_seen(bodies->draw(session, picture), options.size, file);
       if (!over) break;  // late pictures show the present, each its own
     }
     if (over) continue;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "visualizer/app/options.hpp"
 
+#include <array>
 #include <charconv>
 #include <iomanip>
 #include <iostream>
@@ -39,6 +40,7 @@ std::string footer() {
 
 /// Options that are words at first.
 struct Words {
+  std::optional<std::string> aov;
   std::string size = "800x600", gradient{name_of(kDefaultGradient)}, panels = "on";
   std::optional<std::string> camera;
 };
@@ -141,6 +143,28 @@ void declare_files(Arguments& app, VisualizerOptions& o, const Option& headless)
   app.option("--report", o.report, "write times and counts to this JSON file").shown_as("FILE");
 }
 
+/// What --aov asks for, of pictures with these settings.
+AovChoice aov_of(const std::string& text, const ViewSettings& settings) {
+  const auto refused = [](const std::string& problem) {
+    return VisualizerError("--aov: " + problem);
+  };
+  AovChoice choice;
+  std::istringstream words(text);
+  for (std::string word; std::getline(words, word, ',');) {
+    constexpr std::array<std::string_view, 2> kKnown{"depth", "normal"};
+    if (word != kKnown[0] && word != kKnown[1])
+      throw refused(one_line(word) + unknown_word(word, kKnown));
+    (word == kKnown[0] ? choice.depth : choice.normal) = true;
+  }
+  if (settings.stereo.on) throw refused("--stereo has two pictures in one; leave one of both out");
+  std::istringstream kinds(settings.renderer);
+  for (std::string kind; choice.normal && std::getline(kinds, kind, ',');) {
+    if (!is_translucent(kind)) continue;
+    throw refused("normal: " + kind + " shows many depths in one pixel; take iso, surface or cast");
+  }
+  return choice;
+}
+
 void declare_bench(Arguments& app, VisualizerOptions& o) {
   const Option bench = app.flag(
       "--bench", o.bench, "time every renderer, without a controller (512x512 unless --size)");
@@ -193,6 +217,12 @@ std::optional<VisualizerOptions> parse_options(int argc, const char* const* argv
   app.option("--every-ticks", options.every_ticks,
              "headless: servo ticks between pictures (default: one second)")
       .within(1.0, 0x1p40);
+  const Option aov =
+      app.option("--aov", words.aov,
+                 "headless: beside each picture as arrays of NumPy, depth (mm along the view) and "
+                 "normal (of length 1, in the scene's axes); with a comma both")
+          .shown_as("WHAT[,WHAT]")
+          .needs(headless);
   app.option("--out", options.out, "folder for pictures and screenshots")
       .shown_as("DIR")
       .shows_default();
@@ -209,7 +239,7 @@ std::optional<VisualizerOptions> parse_options(int argc, const char* const* argv
   } catch (const UsageError& problem) {
     throw VisualizerError(problem.what());
   }
-  if (record.given() && !frames.given()) options.frames = 0;
+  if (record.given() && !frames.given() && !aov.given()) options.frames = 0;
   if (options.bench && !sized.given()) words.size = kBenchSize;
   if (options.hand_socket && (options.headless || options.bench)) {
     throw VisualizerError(std::string("--hand-socket: ") +
@@ -221,6 +251,7 @@ std::optional<VisualizerOptions> parse_options(int argc, const char* const* argv
   options.panels = words.panels == "on";
   options.renderer_is_given = renderer.given();
   check_renderers(options.settings.renderer);
+  if (words.aov) options.aov = aov_of(*words.aov, options.settings);
   options.settings.gradient = gradient_named(words.gradient);
   if (words.camera) {
     options.settings.camera = read_camera(*words.camera);

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "shared/segment/command.hpp"
+#include "visualizer/picture/seen_bodies.hpp"
 #include "visualizer/scene/appearance.hpp"
 #include "visualizer/scene/pixel_rect.hpp"
 
@@ -41,6 +42,7 @@ struct VisualizerOptions {
   std::optional<std::filesystem::path> transfer;  ///< opacities, TOML
   std::vector<int> cpus;                          ///< empty: all but the last one
   std::optional<std::filesystem::path> mesh;      ///< --export: .stl or .ply
+  AovChoice aov;                                  ///< headless: beside each picture
   std::optional<std::filesystem::path> sheet;     ///< headless: the final state by every renderer
   std::optional<std::filesystem::path> report;
   bool bench = false;                            ///< no controller: what pictures cost here

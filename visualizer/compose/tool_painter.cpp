@@ -198,6 +198,10 @@ void GpuMesh::draw() const {
   glDrawElements(GL_TRIANGLES, indices_, GL_UNSIGNED_INT, nullptr);
 }
 
+MeshPainter::MeshPainter(std::string_view light)
+    : plain_({"mesh.vert", "mesh.frag", light}, "#define KERF_METAL 0\n"),
+      metal_({"mesh.vert", "mesh.frag", light}, "#define KERF_METAL 1\n") {}
+
 void MeshPainter::use_program(const glm::dmat4& world_from_mesh, const Paint& paint, float opacity,
                               const View& view) {
   const GlProgram& program = paint.metal ? metal_ : plain_;
@@ -290,7 +294,9 @@ Hands hands_of(const Session& session) {
   return hands;
 }
 
-HandPainter::HandPainter(const SceneView& scene, double scale_mm) : scale_mm_(scale_mm) {
+HandPainter::HandPainter(const SceneView& scene, double scale_mm)
+    : scale_mm_(scale_mm), steel_(kSteel), painter_(light_of(scene)) {
+  steel_.metal = !scene.normals;
   for (const ToolView& tool : scene.tools) {
     const Mesh mesh = tool_mesh(tool);
     glm::dvec3 low(std::numeric_limits<double>::max()), high(-low);
@@ -313,7 +319,7 @@ HandPainter::Arrow HandPainter::arrow_of(const Hand& hand) const {
 
 void HandPainter::draw_tool(const Hand& hand, const View& view, const RenderTarget& target) {
   if (hand.tool >= tools_.size()) return;
-  painter_.draw(tools_[hand.tool].mesh, pose_of(hand), kSteel, view, target);
+  painter_.draw(tools_[hand.tool].mesh, pose_of(hand), steel_, view, target);
 }
 
 void HandPainter::draw_force(const Hand& hand, const View& view, const RenderTarget& target) {

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <string_view>
 #include <vector>
 
 #include <glm/glm.hpp>
@@ -76,6 +77,9 @@ struct Paint {
 /// Draws meshes over the volumes, with true depth (the paper's equation (1)).
 class MeshPainter {
  public:
+  /// `light`: "plain_normals.frag" draws normals, as paint without metal.
+  explicit MeshPainter(std::string_view light = "lighting.frag");
+
   /// `world_from_mesh` may scale; hidden behind anything nearer that is in `target`.
   void draw(const GpuMesh& mesh, const glm::dmat4& world_from_mesh, const Paint& paint,
             const View& view, const RenderTarget& target);
@@ -89,8 +93,7 @@ class MeshPainter {
   void use_program(const glm::dmat4& world_from_mesh, const Paint& paint, float opacity,
                    const View& view);
 
-  GlProgram plain_{{"mesh.vert", "mesh.frag", "lighting.frag"}, "#define KERF_METAL 0\n"};
-  GlProgram metal_{{"mesh.vert", "mesh.frag", "lighting.frag"}, "#define KERF_METAL 1\n"};
+  GlProgram plain_, metal_;
   GpuMesh cylinder_{unit_cylinder()};
   GpuMesh cone_{unit_cone()};
 };
@@ -142,6 +145,7 @@ class HandPainter {
 
   std::vector<Tool> tools_;
   double scale_mm_;
+  Paint steel_;
   MeshPainter painter_;
 };
 

@@ -17,6 +17,19 @@ void flip_rows(std::vector<T>& picture, std::size_t row, std::size_t rows) {
   }
 }
 
+/// RGB of each pixel, the first row at the top.
+template <class T>
+std::vector<T> read_colours(const GlFramebuffer& from, PictureSize size, GLenum type) {
+  const auto row = static_cast<std::size_t>(size.width) * 3;
+  const auto rows = static_cast<std::size_t>(size.height);
+  std::vector<T> rgb(row * rows);
+  glBindFramebuffer(GL_READ_FRAMEBUFFER, from.id());
+  glPixelStorei(GL_PACK_ALIGNMENT, 1);
+  glReadPixels(0, 0, size.width, size.height, GL_RGB, type, rgb.data());
+  flip_rows(rgb, row, rows);
+  return rgb;
+}
+
 void copy_texture(const GlTexture2D& from, const GlTexture2D& to, const PixelRect& r, int right) {
   if (r.empty()) return;
   glCopyImageSubData(from.id(), GL_TEXTURE_2D, 0, r.x0, r.y0, 0, to.id(), GL_TEXTURE_2D, 0,
@@ -25,8 +38,8 @@ void copy_texture(const GlTexture2D& from, const GlTexture2D& to, const PixelRec
 
 }  // namespace
 
-RenderTarget::RenderTarget(PictureSize size) : size_(size) {
-  glTextureStorage2D(colour_.id(), 1, GL_RGBA8, size.width, size.height);
+RenderTarget::RenderTarget(PictureSize size, GLenum colour) : size_(size) {
+  glTextureStorage2D(colour_.id(), 1, colour, size.width, size.height);
   glTextureParameteri(colour_.id(), GL_TEXTURE_MIN_FILTER, GL_LINEAR);
   glTextureParameteri(colour_.id(), GL_TEXTURE_WRAP_S, GL_CLAMP_TO_EDGE);
   glTextureParameteri(colour_.id(), GL_TEXTURE_WRAP_T, GL_CLAMP_TO_EDGE);
@@ -76,14 +89,11 @@ void RenderTarget::enlarge(const RenderTarget& from, std::span<const PixelRect> 
 }
 
 std::vector<std::uint8_t> RenderTarget::read_rgb() const {
-  const auto row = static_cast<std::size_t>(size_.width) * 3;
-  const auto rows = static_cast<std::size_t>(size_.height);
-  std::vector<std::uint8_t> rgb(row * rows);
-  glBindFramebuffer(GL_READ_FRAMEBUFFER, framebuffer_.id());
-  glPixelStorei(GL_PACK_ALIGNMENT, 1);
-  glReadPixels(0, 0, size_.width, size_.height, GL_RGB, GL_UNSIGNED_BYTE, rgb.data());
-  flip_rows(rgb, row, rows);
-  return rgb;
+  return read_colours<std::uint8_t>(framebuffer_, size_, GL_UNSIGNED_BYTE);
+}
+
+std::vector<float> RenderTarget::read_floats() const {
+  return read_colours<float>(framebuffer_, size_, GL_FLOAT);
 }
 
 std::vector<float> RenderTarget::read_depth() const {

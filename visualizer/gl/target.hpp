@@ -10,10 +10,10 @@
 
 namespace kerf {
 
-/// An off-screen picture: RGBA8 colour and 32-bit float depth.
+/// An off-screen picture: RGBA8 colour, or GL_RGBA32F, and 32-bit float depth.
 class RenderTarget {
  public:
-  explicit RenderTarget(PictureSize size);
+  explicit RenderTarget(PictureSize size, GLenum colour = GL_RGBA8);
 
   [[nodiscard]] PictureSize size() const noexcept { return size_; }
   [[nodiscard]] GLuint colour_texture() const noexcept { return colour_.id(); }
@@ -58,6 +58,8 @@ class RenderTarget {
   void enlarge(const RenderTarget& from, std::span<const PixelRect> parts) const;
   /// RGB, 3 bytes per pixel, first row at the top. Waits until the picture is complete.
   [[nodiscard]] std::vector<std::uint8_t> read_rgb() const;
+  /// The same of a target of floats, as they are.
+  [[nodiscard]] std::vector<float> read_floats() const;
   /// Window depth 0..1, first row at the top.
   [[nodiscard]] std::vector<float> read_depth() const;
   /// Window depth 0..1 of `part`, which lies inside the picture; first row at the bottom.

@@ -3,6 +3,7 @@
 #include "visualizer/picture/image_files.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cerrno>
 #include <climits>
 #include <cmath>
@@ -42,6 +43,23 @@ void write_png(const std::filesystem::path& path, PictureSize size,
     throw VisualizerError(path.string() + ": " + image.message);
   }
   bytes.resize(length);
+  write_new_file(path, bytes);
+}
+
+void write_npy(const std::filesystem::path& path, PictureSize size, int channels,
+               std::span<const float> values) {
+  static_assert(std::endian::native == std::endian::little);
+  std::string head = "{'descr': '<f4', 'fortran_order': False, 'shape': (" +
+                     std::to_string(size.height) + ", " + std::to_string(size.width) +
+                     (channels > 1 ? ", " + std::to_string(channels) : "") + "), }";
+  constexpr std::size_t kBefore = 10, kAligned = 64;  // magic, version, length of what follows
+  const std::size_t whole = (kBefore + head.size() + 1 + kAligned - 1) / kAligned * kAligned;
+  head.resize(whole - kBefore - 1, ' ');
+  head += '\n';
+  std::string bytes("\x93NUMPY\x01\x00", 8);
+  bytes += {static_cast<char>(head.size() & 0xff), static_cast<char>(head.size() >> 8)};
+  bytes += head;
+  bytes.append(reinterpret_cast<const char*>(values.data()), values.size_bytes());
   write_new_file(path, bytes);
 }
 

@@ -19,6 +19,12 @@ namespace kerf {
 void write_png(const std::filesystem::path& path, PictureSize size,
                std::span<const std::uint8_t> rgb);
 
+/// An array of NumPy (format 1.0, little-endian float32, C order), as one new file: (height,
+/// width), or (height, width, channels) if there is more than one. The first row is at the top.
+/// Throws FileError.
+void write_npy(const std::filesystem::path& path, PictureSize size, int channels,
+               std::span<const float> values);
+
 /// Makes the folder, and its parents, if it is missing. Throws VisualizerError.
 void make_folder(const std::filesystem::path& folder);
 

@@ -35,6 +35,7 @@ CastRenderer::CastRenderer(const SceneView& scene, std::span<const VolumeContent
                            CastMode mode)
     : Renderer(scene.volumes.size()),
       mode_(mode),
+      normals_(scene.normals && mode == CastMode::iso),
       caster_(scene, cast_contents(scene, contents), cast_options(mode)) {
   program_.set("u_colour", 0);
   program_.set("u_depth", 1);
@@ -45,10 +46,11 @@ void CastRenderer::set_opacities(std::span<const MaterialView> materials,
   caster_.set_materials(make_palette(materials));
 }
 
-CastRenderer::Frame::Frame(PictureSize size) {
+CastRenderer::Frame::Frame(PictureSize size, bool has_normals) {
   picture.resize(size.width, size.height);
   end_depth.resize(picture.depth.size());
-  glTextureStorage2D(colour.id(), 1, GL_RGBA8, size.width, size.height);
+  if (has_normals) normals.resize(3 * picture.depth.size());
+  glTextureStorage2D(colour.id(), 1, has_normals ? GL_RGB32F : GL_RGBA8, size.width, size.height);
   glTextureStorage2D(depth.id(), 1, GL_R32F, size.width, size.height);
   for (const GlTexture2D* texture : {&colour, &depth}) read_nearest(texture->id());
 }
@@ -59,7 +61,7 @@ CastRenderer::Frame& CastRenderer::frame_of(PictureSize size) {
     if (PictureSize{frame.picture.width, frame.picture.height} == size) return frame;
   }
   if (frames_.size() == kMost) frames_.pop_front();
-  return frames_.emplace_back(size);
+  return frames_.emplace_back(size, normals_);
 }
 
 void CastRenderer::draw(const View& view, const RenderTarget& target) {
@@ -71,7 +73,8 @@ void CastRenderer::draw(const View& view, const RenderTarget& target) {
   const bool ends_at_target = mode_ == CastMode::blend;
   if (ends_at_target) read_end_depth(frame, target, drawn);
   caster_.draw(view, parts_, frame.picture,
-               ends_at_target ? std::span<const float>(frame.end_depth) : std::span<float>());
+               ends_at_target ? std::span<const float>(frame.end_depth) : std::span<float>(),
+               frame.normals);
   upload(frame, drawn);
   show(frame, target);
 }
@@ -101,8 +104,13 @@ void CastRenderer::upload(const Frame& frame, const PixelRect& rect) {
   const GLsizei high = rect.y1 - rect.y0;
   glPixelStorei(GL_UNPACK_ALIGNMENT, 4);
   glPixelStorei(GL_UNPACK_ROW_LENGTH, picture.width);
-  glTextureSubImage2D(frame.colour.id(), 0, rect.x0, rect.y0, wide, high, GL_RGBA, GL_UNSIGNED_BYTE,
-                      picture.rgba.data() + first);
+  if (frame.normals.empty()) {
+    glTextureSubImage2D(frame.colour.id(), 0, rect.x0, rect.y0, wide, high, GL_RGBA,
+                        GL_UNSIGNED_BYTE, picture.rgba.data() + first);
+  } else {
+    glTextureSubImage2D(frame.colour.id(), 0, rect.x0, rect.y0, wide, high, GL_RGB, GL_FLOAT,
+                        frame.normals.data() + 3 * first);
+  }
   glTextureSubImage2D(frame.depth.id(), 0, rect.x0, rect.y0, wide, high, GL_RED, GL_FLOAT,
                       picture.depth.data() + first);
   glPixelStorei(GL_UNPACK_ROW_LENGTH, 0);

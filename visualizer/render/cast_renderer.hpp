@@ -14,7 +14,8 @@ namespace kerf {
 /// anything, are cast.
 ///
 /// Iso goes under the depth test of the target. Blend ends its rays at what is in the target, lies
-/// over it, and sets depth where enough of it has gathered to hide what comes later.
+/// over it, and sets depth where enough of it has gathered to hide what comes later. With
+/// `SceneView::normals` iso hands over its normals in place of its colours.
 class CastRenderer final : public Renderer {
  public:
   CastRenderer(const SceneView& scene, std::span<const VolumeContent> contents, CastMode mode);
@@ -37,8 +38,9 @@ class CastRenderer final : public Renderer {
   }
   /// The picture on both sides.
   struct Frame {
-    explicit Frame(PictureSize size);
+    Frame(PictureSize size, bool normals);
     CastPicture picture;
+    std::vector<float> normals;  ///< three of each pixel, or none
     std::vector<float> end_depth;
     GlTexture2D colour = GlTexture2D::create();
     GlTexture2D depth = GlTexture2D::create();
@@ -53,6 +55,7 @@ class CastRenderer final : public Renderer {
   void show(const Frame& frame, const RenderTarget& target);
 
   CastMode mode_;
+  bool normals_;
   Caster caster_;
   GlProgram program_{"screen.vert", "cast.frag"};
   std::list<Frame> frames_;       ///< two at most: finely and coarsely drawn parts take turns

@@ -57,7 +57,7 @@ class IsoRenderer final : public Renderer {
   };
 
   IsoRenderer(const SceneView& scene, std::span<const VolumeContent> contents)
-      : IsoRenderer(scene, contents, Options{}) {}
+      : IsoRenderer(scene, contents, Options{.light = light_of(scene)}) {}
   IsoRenderer(const SceneView& scene, std::span<const VolumeContent> contents, Options options);
 
   void set_transform(std::size_t volume, const glm::dmat4& world_from_voxel) override {

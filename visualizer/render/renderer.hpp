@@ -70,6 +70,11 @@ class Renderer {
   std::vector<ChangedBricks> changed_;  ///< by volume
 };
 
+/// The shader of lights for what is made of `scene`: `SceneView::normals` takes their place.
+[[nodiscard]] constexpr std::string_view light_of(const SceneView& scene) noexcept {
+  return scene.normals ? "plain_normals.frag" : "lighting.frag";
+}
+
 /// `kind` as on the command line; throws VisualizerError for an unknown one and names the known.
 [[nodiscard]] std::unique_ptr<Renderer> make_renderer(std::string_view kind, const SceneView& scene,
                                                       std::span<const VolumeContent> contents);

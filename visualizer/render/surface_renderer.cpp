@@ -50,7 +50,8 @@ std::vector<PixelRect> parts_of(const SolidOnGpu& volume, const View& view,
 }  // namespace
 
 ClipCaps::ClipCaps(const SceneView& scene, std::span<const VolumeContent> contents)
-    : palette_(palette_texture(scene.materials)) {
+    : program_({"screen.vert", "clip_cap.frag", "volume_sample.frag", "ray.frag", light_of(scene)}),
+      palette_(palette_texture(scene.materials)) {
   const int limit = query_gl_driver().max_texture_size_3d;
   volumes_.reserve(scene.volumes.size());
   for (std::size_t v = 0; v < scene.volumes.size(); ++v) {
@@ -73,7 +74,9 @@ void ClipCaps::draw(const View& view, const RenderTarget& target) const {
 }
 
 SurfaceRenderer::SurfaceRenderer(const SceneView& scene, std::span<const VolumeContent> contents)
-    : Renderer(scene.volumes.size()), scene_(scene) {
+    : Renderer(scene.volumes.size()),
+      scene_(scene),
+      program_({"surface.vert", "surface.frag", light_of(scene)}) {
   volumes_.reserve(scene.volumes.size());
   for (std::size_t i = 0; i < scene.volumes.size(); ++i) {
     const VolumeView& view = scene.volumes[i];

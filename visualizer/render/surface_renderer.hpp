@@ -26,8 +26,7 @@ class ClipCaps {
   void draw(const View& view, const RenderTarget& target) const;
 
  private:
-  GlProgram program_{"screen.vert", "clip_cap.frag", "volume_sample.frag", "ray.frag",
-                     "lighting.frag"};
+  GlProgram program_;
   GlTexture2D palette_;
   std::vector<SolidOnGpu> volumes_;
 };
@@ -62,7 +61,7 @@ class SurfaceRenderer final : public Renderer {
               const ChangedBricks& changed) override;
 
   SceneView scene_;  ///< its volumes where they are now
-  GlProgram program_{"surface.vert", "surface.frag", "lighting.frag"};
+  GlProgram program_;
   std::vector<Volume> volumes_;
   std::optional<ClipCaps> caps_;  ///< while volumes are cut open
 };

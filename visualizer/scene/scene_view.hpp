@@ -94,6 +94,7 @@ struct SceneView {
   std::size_t arms = 1;                        ///< each with a tool of its own in the hand
   GradientFilter gradient = kDefaultGradient;  ///< by which its volumes are shaded
   bool voxel_tool = false;                     ///< the tool of each arm is one volume more
+  bool normals = false;                        ///< colours are normals in eye space (`SeenBodies`)
   bool has_spindle = false;                    ///< force cuts, and something turns the tool
 
   /// Of the boxes of all volumes.
