@@ -160,9 +160,11 @@ asio::awaitable<void> dial(WebSocket& ws, const BridgeAddress& address, Certific
   throw BridgeError("closed the connection");
 }
 
-constexpr std::int64_t kSilenceNs = 2 * kNsPerSecond;    // of a run, which sends at 60 Hz
-constexpr std::int64_t kLongWaitNs = 10 * kNsPerSecond;  // for a run: the server has none
-constexpr std::int64_t kSayWaitNs = kNsPerSecond;        // before that is reported
+// Of a server that has had a run, which sends at 60 Hz also once that has ended.
+constexpr std::int64_t kSilenceNs = 2 * kNsPerSecond;
+constexpr std::int64_t kLongWaitNs =
+    10 * kNsPerSecond;                             // for the first run: until then it is still
+constexpr std::int64_t kSayWaitNs = kNsPerSecond;  // before that is reported
 constexpr const char* kNoRun = "has no controller yet";
 constexpr const char* kEndless = "answers without end; is it a kerf-bridge serve?";
 constexpr auto kFirstPause = 50ms, kLongestPause = 800ms;  // between two tries
@@ -388,7 +390,7 @@ class Joiner {
       }
       const bool running = greeted_ && !mirror_.ended();
       if (running && mirror_.joined()) age_.record(now_ns - mirror_.taken_ns());
-      if (link_ == nullptr || now_ns - heard_ns_ < (running ? kSilenceNs : kLongWaitNs)) continue;
+      if (link_ == nullptr || now_ns - heard_ns_ < (greeted_ ? kSilenceNs : kLongWaitNs)) continue;
       why_closed_ =
           connected_ && !greeted_
               ? kNoRun

@@ -87,6 +87,7 @@ class Demo {
       : folder_(std::move(folder)),
         results_(options.out.empty() ? folder_ / "results" : std::filesystem::path(options.out)),
         options_(options),
+        link_(link),
         networks_(link),
         files_(folder_) {
     std::filesystem::create_directories(results_);
@@ -207,7 +208,7 @@ class Demo {
     const int code = *controller_->ended();
     if (broken_.empty() && code > 128) broken_ = end_of("kerf-controller", *controller_);
     if (!broken_.empty()) return 1;
-    if (window_) visualizer_->signal(SIGTERM);
+    if (window_ || !has_joined()) visualizer_->signal(SIGTERM);
     let_end(*visualizer_, seconds(20));
     join_->signal(SIGTERM);
     let_end(*join_, seconds(5));
@@ -223,6 +224,13 @@ class Demo {
       out << "two machines: " << broken_ << '\n';
       return;
     }
+    if (!has_joined()) {
+      out << format(
+          "two machines: no picture came over the link of --loss %g --delay-ms %g --mbit %g in the "
+          "%g s of the run; give it a longer one (--seconds) or a better link\n",
+          100 * link_.loss, link_.delay_ms, link_.mbit, options_.seconds);
+      return;
+    }
     if (visualizer_->ended() != 0) out << visualizer_->last_line() << '\n';
     if (window_) return;
     const std::string text = text_in(results_ / "visualizer.json");
@@ -233,11 +241,12 @@ class Demo {
                   report.at("frames").get<int>(), wall_ms > 0 ? 1e3 / wall_ms : 0.0);
   }
 
-  [[nodiscard]] bool has_picture() {
-    return text_in(at("far.log")).find("joined") != std::string::npos && visualizer_->ended() == 0;
-  }
+  [[nodiscard]] bool has_picture() { return has_joined() && visualizer_->ended() == 0; }
 
  private:
+  [[nodiscard]] bool has_joined() const {
+    return text_in(at("far.log")).find("joined") != std::string::npos;
+  }
   [[nodiscard]] std::string at(const char* name) const { return folder_ / name; }
   [[nodiscard]] double rate_hz() const {
     const double told_hz = std::strtod(value_in(told_, "rate_hz").c_str(), nullptr);
@@ -253,6 +262,7 @@ class Demo {
 
   std::filesystem::path folder_, results_;
   const DemoOptions& options_;
+  LinkSettings link_;
   TwoNetworks networks_;
   BridgeFiles files_;
   std::string told_;

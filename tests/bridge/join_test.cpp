@@ -2,14 +2,22 @@
 // What `join` says where it cannot work: one line, at once.
 #include "bridge/join/join.hpp"
 
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
 #include <fstream>
 #include <memory>
 #include <ostream>
 #include <string>
+#include <thread>
 
 #include <doctest/doctest.h>
+#include <netinet/in.h>
+#include <poll.h>
+#include <sys/socket.h>
 
 #include "bridge/net/address.hpp"
+#include "shared/segment/connection.hpp"
 #include "tests/bridge/join_words.hpp"
 #include "tests/bridge/local_port.hpp"
 #include "tests/bridge/server_bench.hpp"
@@ -19,6 +27,55 @@ using namespace kerf::bridge;
 using namespace kerf::test;
 
 namespace fs = std::filesystem;
+
+namespace {
+
+/// Passes the bytes of the first client to a port and back, until it freezes: then both ends stay
+/// connected and hear nothing.
+class Relay {
+ public:
+  explicit Relay(std::uint16_t to) {
+    listen(port_.fd(), 8);
+    thread_ = std::thread([this, to] { pass(to); });
+  }
+  ~Relay() {
+    end_ = true;
+    thread_.join();
+  }
+  Relay(const Relay&) = delete;
+  Relay& operator=(const Relay&) = delete;
+  void freeze() { frozen_ = true; }
+  [[nodiscard]] std::string place() const { return port_.place(); }
+
+ private:
+  void pass(std::uint16_t to) const {
+    const OwnedFd client(accept4(port_.fd(), nullptr, nullptr, SOCK_CLOEXEC));
+    const OwnedFd server(socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
+    sockaddr_in at{};
+    at.sin_family = AF_INET;
+    at.sin_port = htons(to);
+    at.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    REQUIRE(connect(server.get(), reinterpret_cast<const sockaddr*>(&at), sizeof at) == 0);
+    pollfd ends[] = {{client.get(), POLLIN, 0}, {server.get(), POLLIN, 0}};
+    while (!end_) {
+      constexpr int kPauseMs = 10;
+      poll(ends, frozen_ ? 0 : 2, kPauseMs);
+      for (int i = 0; i < 2 && !frozen_; ++i) {
+        char bytes[4096];
+        if ((ends[i].revents & POLLIN) == 0) continue;
+        const ssize_t count = recv(ends[i].fd, bytes, sizeof bytes, 0);
+        if (count <= 0) return;
+        send(ends[1 - i].fd, bytes, static_cast<std::size_t>(count), MSG_NOSIGNAL);
+      }
+    }
+  }
+
+  LocalPort port_;
+  std::atomic<bool> frozen_{false}, end_{false};
+  std::thread thread_;
+};
+
+}  // namespace
 
 TEST_SUITE_BEGIN("network");
 
@@ -94,6 +151,27 @@ TEST_CASE("a token that a restarted bridge does not know ends the join, also aft
   }
   CHECK(restarted);
   CHECK(end == place + ": the token is not one of its own; take the wss:// address it prints");
+}
+
+TEST_CASE("between two runs a link that is silent for 2 s is given up too") {
+  auto controller = std::make_unique<TestController>();
+  const TestBridge bridge;
+  Relay relay(bridge.port());
+  JoinOptions options;
+  options.name = "join-test";
+  options.address = "ws://" + relay.place() + "/?token=" + kLook;
+  std::atomic<bool> stop{false};
+  std::string all;
+  OnWords words([&](const std::string& said) {
+    all = said;
+    if (said.find("joined ") != std::string::npos) controller.reset();
+    if (said.find("the run has ended") != std::string::npos) relay.freeze();
+    stop = said.find("silent") != std::string::npos || said.find("again in") != std::string::npos;
+  });
+  std::ostream said(&words);
+  CHECK(run_join(options, stop, said) == 0);
+  CHECK(all.find("the run has ended; waiting for the next") != std::string::npos);
+  CHECK(all.find(": silent for 2 s; trying again") != std::string::npos);
 }
 
 TEST_SUITE_END();

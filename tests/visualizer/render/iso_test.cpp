@@ -55,6 +55,39 @@ TEST_CASE("with the eye inside the volume's box the hollow around it is seen who
   CHECK(worst_mm < 0.25 * 0.25);
 }
 
+TEST_CASE("voxels of the iso density alone, such as full ones at 1, look alike by each renderer") {
+  if (!have_gl()) return;
+  const VoxelGrid grid{24, 24, 24};
+  struct Body {
+    double full;
+    glm::dvec3 half_mm;
+  };
+  for (const Body& body : {Body{1.0, glm::dvec3(2.0)}, Body{0.6, glm::dvec3(2.0)},
+                           Body{1.0, {2.0, 0.1, 2.0}}}) {  // the last one is a layer of voxels
+    TestVolume volume(grid, centred(grid, glm::dvec3(0.25)), [&](glm::dvec3 at) {
+      const glm::dvec3 from = glm::abs(at - glm::dvec3(0.13));
+      return glm::all(glm::lessThan(from, body.half_mm)) ? body.full : 0.0;
+    });
+    volume.view.iso = *std::max_element(volume.density.begin(), volume.density.end());
+    const VolumeContent content = volume.content();
+    const View view = look_at({4, 6, 9}, {}, 2, 30);
+    const RenderTarget target(kTestSize);
+    const auto seen_by = [&](const char* kind) {
+      const auto renderer = make_renderer(kind, scene_of({&volume}), {&content, 1});
+      const std::vector<float> depth = draw(*renderer, view, target).depth;
+      return std::count_if(depth.begin(), depth.end(), [](float one) { return one < 1.0F; });
+    };
+    const auto by_surface = seen_by("surface");
+    CHECK(by_surface > 500);
+    for (const char* kind : {"iso", "cast"}) {
+      CAPTURE(kind);
+      CAPTURE(body.full);
+      CAPTURE(body.half_mm.y);
+      CHECK(std::abs(seen_by(kind) - by_surface) <= by_surface / 50);
+    }
+  }
+}
+
 TEST_CASE("a volume that is solid up to its border is closed there") {
   if (!have_gl()) return;
   const VoxelGrid grid{16, 16, 16};
