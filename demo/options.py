@@ -13,7 +13,7 @@ BUSES = {"omni": ("fw", "fw1"), "falcon": ("usb", "usb"), "woodenhaptics": ("hid
          "inverse3": ("ws", ""), "touch": ("arm", ""), "omega": ("arm", "")}  # no node: a service or a library of the vendor
 STAND_INS = {"touch": "libHD.so", "omega": "libdrd.so.3"}  # kerf's own in place of the vendor's library
 PICTURE_SIZE, WINDOW_SIZE = "640x480", "1280x800"  # if none is given; a window's on a screen of 96 dots per inch
-FLAGS = ("--headless", "--serve", "--stereo", "--voxel-tool", "--mute", "--colour-blind", "--virtual", "--two-machines")
+FLAGS = ("--headless", "--serve", "--stereo", "--voxel-tool", "--mute", "--colour-blind", "--present", "--follow-view", "--virtual", "--two-machines")
 OF_SCENE = ("--scene", "--volume", "--spacing", "--override-spacing", "--window", "--set")
 OF_LINK = {"--loss": (50, 1), "--delay-ms": (2000, 20), "--mbit": (100000, 4)}  # of two machines: the most of each, a bad one
 WITH_VALUE = (*OF_SCENE, *OF_LINK, "--hand", "--seconds", "--rate", "--out", "--size", "--renderer", "--camera", "--aov",

@@ -31,6 +31,7 @@ bool TabViewer::take(std::span<const std::byte> message) {
   if (const auto* ack = std::get_if<bridge::AckMessage>(&*parsed)) {
     return stream_->acked(*ack, monotonic_ns());
   }
+  if (std::holds_alternative<bridge::ViewMessage>(*parsed)) return true;  // nobody follows in a tab
   const auto& command = std::get<bridge::CommandMessage>(*parsed);
   // Of a page that has not yet heard that this is a run without commands.
   constexpr auto kRefused = static_cast<std::uint32_t>(ReplyStatus::refused);

@@ -206,7 +206,8 @@ class Joiner {
         stop_(stop),
         out_(out),
         mirror_(options.name, options.most_mib << 20,
-                [this](const Command& command) { return remote_.request(command); }) {}
+                [this](const Command& command) { return remote_.request(command); }),
+        views_(options.name) {}
 
   int run() {
     std::exception_ptr failure;
@@ -272,6 +273,8 @@ class Joiner {
         lost(why_closed_.empty() ? last_error() : why_closed_);
       }
       remote_.set_link(RemoteCommand::Link::down);
+      presenter_.reset();
+      presents_ = false;
       if (joins_ != joins_before) pause = kFirstPause;
       asio::steady_timer timer(io_, pause);
       ErrorCode ignored;
@@ -311,6 +314,10 @@ class Joiner {
         co_await ws.async_write(asio::buffer(&*ack, sizeof *ack), quiet(error));
         throw_if(error);
       }
+      if (const auto view = news_of_views()) {
+        co_await ws.async_write(asio::buffer(&*view, sizeof *view), quiet(error));
+        throw_if(error);
+      }
       if (const auto command = remote_.take()) {
         co_await ws.async_write(asio::buffer(&*command, sizeof *command), quiet(error));
         throw_if(error);
@@ -331,6 +338,7 @@ class Joiner {
         if (greeted_ || waited_ns > kNsPerSecond / 2) since_ns_ = heard_ns_;
         remote_.set_link((hello.flags & kMayCommand) != 0 ? RemoteCommand::Link::open
                                                           : RemoteCommand::Link::read_only);
+        may_command_ = (hello.flags & kMayCommand) != 0;
         if (session_ != 0 && session_ != hello.session) say("a new run");
         session_ = hello.session;
         greeted_ = true;
@@ -350,9 +358,46 @@ class Joiner {
       case kReplyMagic:
         remote_.answer(parse_reply(message));
         return std::nullopt;
+      case kViewMagic:
+        take_view(parse_view(message));
+        return std::nullopt;
       default:
         throw WireError("message: of no kind that is known here; use programs of one build");
     }
+  }
+
+  /// The presenter on the far side is this machine's too, for all who follow here.
+  void take_view(const ViewMessage& message) {
+    if (message.presenter != static_cast<std::uint32_t>(Presenter::another)) {
+      presenter_.reset();
+      return;
+    }
+    if (!is_valid(view_in(message))) {
+      say_view("presents a view that is none; it is left out");
+      return;
+    }
+    try {
+      if (!presenter_) presenter_.emplace(name_);
+      presenter_->show(view_in(message));
+    } catch (const SegmentError& problem) {
+      say_view(problem.what());
+    }
+  }
+  /// What a presenter of this machine has to tell the far side.
+  std::optional<ViewMessage> news_of_views() {
+    if (!greeted_ || presenter_) return std::nullopt;  // the presenter is on the far side
+    views_.poll();
+    const bool presents = views_.presented();
+    const bool changed = presents != presents_ || (presents && views_.count() != view_count_);
+    if (!changed) return std::nullopt;
+    presents_ = presents;
+    view_count_ = views_.count();
+    if (presents && !may_command_) say_view("takes no view of a token that may not command");
+    const Presenter who = presents ? Presenter::another : Presenter::nobody;
+    return view_message(who, views_.view());
+  }
+  void say_view(const std::string& line) {
+    if (std::exchange(last_of_views_, line) != line) say(place() + line);
   }
 
   void report_joined() {
@@ -421,6 +466,11 @@ class Joiner {
   std::ostream& out_;
   RemoteCommand remote_;
   Mirror mirror_;
+  ViewFollower views_;
+  std::optional<ViewPresenter> presenter_;  // on behalf of one on the far side
+  bool presents_ = false, may_command_ = false;
+  std::uint64_t view_count_ = 0;
+  std::string last_of_views_;
 
   beast::tcp_stream* link_ = nullptr;  // of the open connection
   bool connected_ = false, greeted_ = false;

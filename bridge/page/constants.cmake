@@ -65,7 +65,7 @@ record(DirtyRecord)
 string(APPEND text "};\n")
 
 constants(bridge/wire/messages.hpp kProtocol kMaxRawBytes kHelloMagic kFrameMagic kRecordsMagic kReplyMagic
-  kAckMagic kCommandMagic kMayCommand kTwoArms kPacked kLastOfPass kRunEnded)
+  kAckMagic kCommandMagic kViewMagic kMayCommand kTwoArms kPacked kLastOfPass kRunEnded)
 enumeration(bridge/wire/messages.hpp CloseCode)
 constants(shared/segment/layout.hpp kFlagContact kFlagDeviceFault kFlagForbidden kFlagRefused kFlagShaft)
 enumeration(shared/segment/layout.hpp Lifecycle)

@@ -76,8 +76,7 @@ tcp::acceptor listen_at(asio::io_context& io, const ServerSetup& setup) {
 }  // namespace
 
 Server::Impl::Impl(ServerSetup setup)
-    : setup_(std::move(setup)), acceptor_(listen_at(io_, setup_)) {
-  static_cast<void>(segment_socket(setup_.name));  // refuses a name that cannot exist
+    : setup_(std::move(setup)), acceptor_(listen_at(io_, setup_)), views_(setup_.name) {
   if (setup_.public_url) setup_.host_names.push_back(setup_.public_url->host);
   if (setup_.tls) tls_.emplace(context_of(setup_.tls));
   const std::string why = why_no_bbr(acceptor_.native_handle());
@@ -184,6 +183,7 @@ void Server::Impl::on_clock() {
   if (restart) bbr_restarted_ns_ = now_ns;
   ended_ = connection_ == nullptr || !connection_->alive();
   if (snapshot_ && !viewers_.empty()) snapshot_->update(now_ns, ended_);
+  watch_views();
   for (const std::shared_ptr<Viewer>& viewer : viewers_) {
     if (viewer->stream) {
       viewer->stream->note_changes();

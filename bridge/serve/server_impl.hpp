@@ -25,6 +25,7 @@
 #include "bridge/serve/server.hpp"
 #include "bridge/stream/stream.hpp"
 #include "shared/segment/connection.hpp"
+#include "shared/segment/presented_view.hpp"
 
 namespace kerf::bridge {
 
@@ -40,6 +41,7 @@ struct Viewer {
   std::unique_ptr<Stream> stream;
   std::optional<FoxgloveSession> foxglove;
   std::deque<ReplyMessage> replies;
+  std::uint64_t view_sent = 0;  ///< the last `view_changes_` that it was sent
   std::int64_t heard_ns = 0;
   std::int64_t measured_ns = 0;      ///< when the round trip was last read
   int message_credit = 0;            ///< messages that the viewer may still send
@@ -119,6 +121,13 @@ class Server::Impl {
   [[nodiscard]] bool handle_message(const std::shared_ptr<Viewer>& viewer, bool is_binary,
                                     std::span<const std::byte> message);
   void command(const std::shared_ptr<Viewer>& viewer, const CommandMessage& message);
+
+  // server_views.cpp
+  /// A viewer presents its view, or no longer.
+  void take_view(const std::shared_ptr<Viewer>& viewer, const ViewMessage& message);
+  /// Each clock tick: follows who presents the controller's views.
+  void watch_views();
+  [[nodiscard]] ViewMessage view_for(const Viewer& viewer) const;
   static void answer(Viewer& viewer, std::uint32_t sequence, const Reply& reply);
   void open_stream(Viewer& viewer);
   [[nodiscard]] bool next_of_foxglove(Viewer& viewer, FoxgloveMessage& out);
@@ -143,6 +152,12 @@ class Server::Impl {
   std::string said_;
 
   std::list<std::shared_ptr<Viewer>> viewers_;
+
+  ViewFollower views_;
+  std::uint64_t view_changes_ = 0, view_count_ = 0;
+  bool presented_ = false;
+  std::optional<ViewPresenter> presenter_;  ///< on behalf of `presenting_`
+  std::weak_ptr<Viewer> presenting_;
 };
 
 /// One of the limited slots for connections that are not viewers yet. The stream outlives it.

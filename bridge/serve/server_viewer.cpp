@@ -133,6 +133,10 @@ asio::awaitable<void> Server::Impl::write_viewer(std::shared_ptr<Viewer> viewer)
       const ReplyMessage reply = viewer->replies.front();
       viewer->replies.pop_front();
       co_await viewer->ws->async_write(asio::buffer(&reply, sizeof reply), quiet(error));
+    } else if (viewer->stream && viewer->view_sent != view_changes_) {
+      const ViewMessage view = view_for(*viewer);
+      viewer->view_sent = view_changes_;
+      co_await viewer->ws->async_write(asio::buffer(&view, sizeof view), quiet(error));
     } else if (viewer->stream && viewer->stream->next(monotonic_ns(), out)) {
       ++viewer->message_credit;
       viewer->byte_credit += kMessageBytes;
@@ -201,6 +205,10 @@ bool Server::Impl::handle_message(const std::shared_ptr<Viewer>& viewer, bool is
   if (!up) return false;
   if (const auto* const wish = std::get_if<CommandMessage>(&*up)) {
     command(viewer, *wish);
+    return true;
+  }
+  if (const auto* const view = std::get_if<ViewMessage>(&*up)) {
+    take_view(viewer, *view);
     return true;
   }
   if (!viewer->stream) return true;  // the run has just ended

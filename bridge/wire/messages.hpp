@@ -4,19 +4,22 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <iterator>
 #include <span>
 #include <vector>
 
 #include "shared/segment/layout.hpp"
+#include "shared/segment/presented_view.hpp"
 
 namespace kerf::bridge {
 
 /// The protocol between a bridge and its viewers, version 1, byte by byte.
 ///
 ///     server to viewer   HelloMessage (first, and again for a new run), FrameHead + blocks,
-///                        RecordsHead + records, ReplyMessage
-///     viewer to server   AckMessage (for each frame, once it is applied), CommandMessage
+///                        RecordsHead + records, ReplyMessage, ViewMessage
+///     viewer to server   AckMessage (for each frame, once it is applied), CommandMessage,
+///     ViewMessage
 ///
 /// Each is one binary WebSocket message of at most `kMaxMessageBytes`, little-endian, naturally
 /// aligned. Times are CLOCK_MONOTONIC of the server's machine, in ns.
@@ -44,6 +47,8 @@ inline constexpr std::uint32_t kRecordsMagic = magic("KBS1");
 inline constexpr std::uint32_t kReplyMagic = magic("KBR1");
 inline constexpr std::uint32_t kAckMagic = magic("KBA1");
 inline constexpr std::uint32_t kCommandMagic = magic("KBC1");
+
+inline constexpr std::uint32_t kViewMagic = magic("KBV1");
 
 inline constexpr std::uint32_t kMayCommand = 1;  ///< HelloMessage::flags
 inline constexpr std::uint32_t kTwoArms = 2;  ///< HelloMessage::flags: Ring::pairs instead of ticks
@@ -152,6 +157,37 @@ struct CommandMessage {
   std::uint32_t sequence;  ///< chosen by the viewer; the reply repeats it
 };
 static_assert(sizeof(CommandMessage) == 16);
+
+/// The view that one viewer presents to those who follow it (shared/segment/presented_view.hpp).
+/// From the server when it changes, and to a viewer that comes later; none before anybody has
+/// presented. From a viewer with the right to command: its own view, or that it presents no longer.
+struct ViewMessage {
+  std::uint32_t magic;
+  std::uint32_t presenter;  ///< 0 nobody, 1 another viewer, 2 the receiver; of a viewer: 1 itself,
+                            ///< 0 no longer
+  double eye_mm[3];         ///< in the world; the last one if nobody presents
+  double target_mm[3];      ///< the middle of the picture
+  double up[3];             ///< upright in the picture
+};
+static_assert(sizeof(ViewMessage) == 80);
+enum class Presenter : std::uint32_t { nobody = 0, another = 1, receiver = 2 };
+
+[[nodiscard]] inline ViewMessage view_message(Presenter who, const PresentedView& view) noexcept {
+  ViewMessage message{kViewMagic, static_cast<std::uint32_t>(who), {}, {}, {}};
+  static_assert(sizeof message == offsetof(ViewMessage, eye_mm) + sizeof view);
+  std::memcpy(message.eye_mm, view.eye_mm, sizeof message.eye_mm);
+  std::memcpy(message.target_mm, view.target_mm, sizeof message.target_mm);
+  std::memcpy(message.up, view.up, sizeof message.up);
+  return message;
+}
+/// It may be none (`is_valid`).
+[[nodiscard]] inline PresentedView view_in(const ViewMessage& message) noexcept {
+  PresentedView view;
+  std::memcpy(view.eye_mm, message.eye_mm, sizeof view.eye_mm);
+  std::memcpy(view.target_mm, message.target_mm, sizeof view.target_mm);
+  std::memcpy(view.up, message.up, sizeof view.up);
+  return view;
+}
 
 /// Contribution of one held block to the set hash, which is the sum of all contributions mod 2^64.
 /// So the order of blocks does not matter, and a new version of a block changes one term. Different

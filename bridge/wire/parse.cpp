@@ -155,16 +155,26 @@ ReplyMessage parse_reply(Bytes message) {
   return reply;
 }
 
+ViewMessage parse_view(Bytes message) {
+  const auto view = head_of<ViewMessage>(message, kViewMagic);
+  require(message.size() == sizeof view, "size", message.size(), "80");
+  return view;
+}
+
 std::uint32_t magic_of(Bytes message) noexcept {
   return message.size() < sizeof(std::uint32_t) ? 0 : value_at<std::uint32_t>(message, 0);
 }
 
-std::optional<std::variant<AckMessage, CommandMessage>> parse_up(Bytes message) noexcept {
+std::optional<std::variant<AckMessage, CommandMessage, ViewMessage>> parse_up(
+    Bytes message) noexcept {
   if (magic_of(message) == kAckMagic && message.size() == sizeof(AckMessage)) {
     return value_at<AckMessage>(message, 0);
   }
   if (magic_of(message) == kCommandMagic && message.size() == sizeof(CommandMessage)) {
     return value_at<CommandMessage>(message, 0);
+  }
+  if (magic_of(message) == kViewMagic && message.size() == sizeof(ViewMessage)) {
+    return value_at<ViewMessage>(message, 0);
   }
   return std::nullopt;
 }

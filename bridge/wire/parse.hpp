@@ -70,11 +70,14 @@ struct ParsedRecords {
 /// Viewer's side. Throws `WireError`.
 [[nodiscard]] ReplyMessage parse_reply(std::span<const std::byte> message);
 
+/// Viewer's side. The view may be none (`is_valid`). Throws `WireError`.
+[[nodiscard]] ViewMessage parse_view(std::span<const std::byte> message);
+
 /// First word of a message; 0 if it is shorter.
 [[nodiscard]] std::uint32_t magic_of(std::span<const std::byte> message) noexcept;
 
-/// Server's side: a viewer's message; nullopt if it is neither.
-[[nodiscard]] std::optional<std::variant<AckMessage, CommandMessage>> parse_up(
+/// Server's side: a viewer's message; nullopt if it is none. A view may be none (`is_valid`).
+[[nodiscard]] std::optional<std::variant<AckMessage, CommandMessage, ViewMessage>> parse_up(
     std::span<const std::byte> message) noexcept;
 
 }  // namespace kerf::bridge

@@ -30,6 +30,7 @@ struct FarSide {
   std::vector<DirtyRecord> dirty;
   std::uint32_t widest_stride = 0;
   std::vector<bridge::ReplyMessage> replies;
+  std::vector<bridge::ViewMessage> views;
 
   /// True where the message was a frame, which is to be acknowledged.
   bool take(std::span<const std::byte> message) {
@@ -46,6 +47,9 @@ struct FarSide {
         return true;
       case bridge::kRecordsMagic:
         take_records(message);
+        return false;
+      case bridge::kViewMagic:
+        views.push_back(bridge::parse_view(message));
         return false;
       default:
         replies.push_back(bridge::parse_reply(message));

@@ -3,11 +3,13 @@
 #include "bridge/join/join.hpp"
 
 #include <atomic>
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <fstream>
 #include <memory>
 #include <ostream>
+#include <sstream>
 #include <string>
 #include <thread>
 
@@ -18,6 +20,7 @@
 
 #include "bridge/net/address.hpp"
 #include "shared/segment/connection.hpp"
+#include "shared/segment/presented_view.hpp"
 #include "tests/bridge/join_words.hpp"
 #include "tests/bridge/local_port.hpp"
 #include "tests/bridge/server_bench.hpp"
@@ -151,6 +154,46 @@ TEST_CASE("a token that a restarted bridge does not know ends the join, also aft
   }
   CHECK(restarted);
   CHECK(end == place + ": the token is not one of its own; take the wss:// address it prints");
+}
+
+TEST_CASE("a view that is presented on one machine is presented on the other, in both directions") {
+  const TestController controller;
+  const TestBridge bridge;
+  JoinOptions options;
+  options.name = "join-test";
+  options.address = "ws://127.0.0.1:" + std::to_string(bridge.port()) + "/?token=" + kCommand;
+  std::atomic<bool> stop{false};
+  std::ostringstream said;
+  std::thread join([&] { run_join(options, stop, said); });
+  const PresentedView one{{9, 8, 7}, {1, 2, 3}, {0, 1, 0}}, two{{5, 8, 7}, {1, 2, 3}, {0, 1, 0}};
+  const auto reaches = [](const char* name, bool presented, const PresentedView& view) {
+    ViewFollower follower(name);
+    for (int tries = 0; tries < 2000; ++tries) {
+      follower.poll();
+      if (follower.presented() == presented && (!presented || follower.view() == view)) return true;
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+    return false;
+  };
+  {
+    ViewPresenter near("bridge-test");
+    near.show(one);
+    CHECK(reaches("join-test", true, one));
+    near.show(two);
+    CHECK(reaches("join-test", true, two));
+    CHECK_THROWS_AS(ViewPresenter("join-test"), SegmentError);  // one presents, wherever it is
+  }
+  CHECK(reaches("join-test", false, two));
+  {
+    ViewPresenter far("join-test");
+    far.show(one);
+    CHECK(reaches("bridge-test", true, one));
+    far.show(two);
+    CHECK(reaches("bridge-test", true, two));
+  }
+  CHECK(reaches("bridge-test", false, two));
+  stop = true;
+  join.join();
 }
 
 TEST_CASE("between two runs a link that is silent for 2 s is given up too") {

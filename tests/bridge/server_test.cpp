@@ -380,6 +380,50 @@ TEST_CASE("only who may command reaches the controller, and with what is valid")
   CHECK(!controller.server.take_command().has_value());
 }
 
+TEST_CASE("one viewer with the right to command presents its view to all others, here and there") {
+  const TestController controller;
+  const TestBridge bridge;
+  TestViewer looker(bridge.port()), teacher(bridge.port(), kCommand);
+  REQUIRE(looker.until_whole());
+  REQUIRE(teacher.until_whole());
+  const auto hears = [](TestViewer& viewer, Presenter presenter) {
+    const std::size_t before = viewer.far.views.size();
+    REQUIRE(viewer.follow([&] { return viewer.far.views.size() > before; }));
+    CHECK(viewer.far.views.back().presenter == static_cast<std::uint32_t>(presenter));
+    return view_in(viewer.far.views.back());
+  };
+  const auto presents = [](TestViewer& viewer, const PresentedView& view,
+                           Presenter who = Presenter::another) {
+    viewer.client.send_value(view_message(who, view));
+  };
+  const PresentedView first{{9, 8, 7}, {1, 2, 3}, {0, 1, 0}},
+      second{{5, 8, 7}, {1, 2, 3}, {0, 1, 0}};
+  CHECK(looker.far.views.empty());
+  presents(looker, second);                              // has no right to
+  presents(teacher, {{1, 2, 3}, {1, 2, 3}, {0, 1, 0}});  // is none
+  presents(teacher, first);
+  CHECK(hears(looker, Presenter::another) == first);
+  CHECK(hears(teacher, Presenter::receiver) == first);
+  ViewFollower local("bridge-test");
+  local.poll();
+  CHECK(local.presented());
+  CHECK(local.view() == first);
+  CHECK_THROWS_AS(ViewPresenter("bridge-test"), SegmentError);
+  std::optional<TestViewer> other(std::in_place, bridge.port(), kCommand);
+  CHECK(hears(*other, Presenter::another) == first);  // who comes later
+  presents(*other, second);
+  CHECK(hears(*other, Presenter::another) == first);  // one presents
+  presents(teacher, first, Presenter::nobody);
+  CHECK(hears(looker, Presenter::nobody) == first);
+  presents(*other, second);
+  CHECK(hears(looker, Presenter::another) == second);
+  other.reset();
+  CHECK(hears(looker, Presenter::nobody) == second);
+  ViewPresenter window("bridge-test");
+  window.show(first);
+  CHECK(hears(looker, Presenter::another) == first);
+}
+
 TEST_CASE(
     "a command for the second arm reaches the controller as such, for a third one it is refused") {
   TestController controller(1, 2);

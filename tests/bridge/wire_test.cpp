@@ -236,6 +236,18 @@ TEST_CASE("a server takes acks and commands of the right size and nothing else")
   CHECK(std::get<CommandMessage>(*up).argument == 2);
 }
 
+TEST_CASE("a view has 80 bytes in both directions") {
+  Message message;
+  append(message, view_message(Presenter::another, {{1, 2, 3}, {4, 5, 6}, {0, 1, 0}}));
+  const auto up = parse_up(message);
+  REQUIRE(up.has_value());
+  CHECK(view_in(std::get<ViewMessage>(*up)).target_mm[2] == 6);
+  CHECK(parse_view(message).presenter == 1);
+  message.pop_back();
+  CHECK(!parse_up(message).has_value());
+  CHECK_THROWS_AS(static_cast<void>(parse_view(message)), WireError);
+}
+
 TEST_CASE("random bytes are refused, not obeyed") {
   FrameParser parser(small_run());
   std::array<std::byte, kMaxRawBytes> scratch;

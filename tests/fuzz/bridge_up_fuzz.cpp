@@ -59,6 +59,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     if (!said) continue;
     if (const auto* const ack = std::get_if<AckMessage>(&*said)) {
       if (!stream.acked(*ack, now_ns)) return 0;  // such a viewer is closed
+    } else if (const auto* const view = std::get_if<ViewMessage>(&*said)) {
+      static_cast<void>(is_valid(view_in(*view)));
     } else {
       const auto& wish = std::get<CommandMessage>(*said);
       Command command;

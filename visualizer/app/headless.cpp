@@ -27,6 +27,7 @@
 #include "shared/posix/tick_lead.hpp"
 #include "shared/text/text.hpp"
 #include "visualizer/app/run.hpp"
+#include "visualizer/app/shared_view.hpp"
 #include "visualizer/compose/picture_layers.hpp"
 #include "visualizer/gl/context.hpp"
 #include "visualizer/picture/image_files.hpp"
@@ -300,6 +301,7 @@ int run_headless(const VisualizerOptions& asked) {
   report.late_join_ms = since_attached.wall_ms();
   forget_frames(report);
 
+  SharedView shared(options);
   std::optional<SeenBodies> bodies;
   if (options.aov.any()) bodies.emplace(session, picture, options.size, options.aov);
   std::optional<Film> film;
@@ -316,6 +318,9 @@ int run_headless(const VisualizerOptions& asked) {
     session.poll();
     picture.update(session);
     if (bodies) bodies->update(session);
+    if (const auto news = shared.step(picture.camera(), 0)) {
+      std::fprintf(stderr, "kerf-visualizer: %s\n", news->text.c_str());
+    }
     const auto ticks = session.ticks_since_armed();
     const bool filmed = film && ticks && film->due(session.servo_s());
     if (filmed || (over ? schedule.final_due(ticks) : schedule.due(ticks))) taker.draw(session);

@@ -58,6 +58,13 @@ Option declare_look(Arguments& app, VisualizerOptions& o, Words& words) {
          "where pictures are seen from: EYE,TARGET,UP, nine numbers (x,y,z in mm; UP is upright "
          "in the picture), or a file as n in the window writes it (default: all volumes)")
       .shown_as("CAMERA");
+  const Option present =
+      app.flag("--present", o.present,
+               "shows this view to all viewers of the controller that follow it: one presents");
+  app.flag("--follow-view", o.follow_view,
+           "shows the view that another viewer or a page presents, until it is moved; r follows it "
+           "again")
+      .excludes(present);
   app.option("--gradient", words.gradient,
              "what volumes are shaded from: central (two voxels), corners (2x2x2 means), farid5 "
              "(5x5x5 voxels) or adaptive (15x15x15 but at edges)")

@@ -64,6 +64,7 @@ void FollowedSession::attach_again(double aspect, Clock::time_point now) {
   }
   picture_.reset();  // before the new one: one overlay at a time
   picture_.emplace(session_, settings, aspect);
+  ++runs_;
 }
 
 void FramePace::learn(double pixels, PictureSize size, double ms) noexcept {
@@ -86,7 +87,8 @@ WindowRun::WindowRun(const VisualizerOptions& options, Session first, const GlCo
               .context = to_string(context.kind()),
               .attach_ms = first.attach_ms()},
       aspect_(static_cast<double>(options.size.width) / options.size.height),
-      followed_(options, std::move(first), aspect_) {
+      followed_(options, std::move(first), aspect_),
+      shared_view_(options) {
   keys_.hidden = !options.panels;
   if (options.hand_socket) {
     hand_link_.emplace(*options.hand_socket);
@@ -324,6 +326,12 @@ Redrawn WindowRun::draw(PictureSize size, const WindowInput& input, Clock::time_
   if (figures.controls->tool != held) {
     take_tool(figures.controls->tool, session(), notices_, now);
     figures.controls->tool = held;  // until the controller has changed it
+  }
+  if (input.keys.end() != std::find(input.keys.begin(), input.keys.end(), 'r')) {
+    shared_view_.follow_again();
+  }
+  if (const auto news = shared_view_.step(picture().camera(), followed_.runs())) {
+    notices_.say(*news, now);
   }
   const std::string drawn_by = picture().settings().renderer;
   change_view(picture(), session(), figures.controls->settings, notices_, now);

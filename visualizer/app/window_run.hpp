@@ -11,6 +11,7 @@
 
 #include "visualizer/app/hand_control.hpp"
 #include "visualizer/app/options.hpp"
+#include "visualizer/app/shared_view.hpp"
 #include "visualizer/app/window_keys.hpp"
 #include "visualizer/gl/context.hpp"
 #include "visualizer/gl/target.hpp"
@@ -38,6 +39,9 @@ class FollowedSession {
     return earlier_bricks_ + picture_->bricks_uploaded();
   }
 
+  /// Of those that were shown so far, from 1.
+  [[nodiscard]] std::uint64_t runs() const noexcept { return runs_; }
+
   /// Brings both up to the present.
   void update(double aspect, Clock::time_point now);
 
@@ -47,7 +51,7 @@ class FollowedSession {
   const VisualizerOptions& options_;
   Session session_;
   std::optional<Picture> picture_;
-  std::uint64_t earlier_bricks_ = 0;
+  std::uint64_t earlier_bricks_ = 0, runs_ = 1;
   Clock::time_point next_attach_{};
 };
 
@@ -130,6 +134,7 @@ class WindowRun {
   double aspect_;
   double density_ = 1.0;  ///< of the display
   FollowedSession followed_;
+  SharedView shared_view_;
   FramePace pace_;
   std::optional<double> fixed_pixels_;
   /// Began the last frame after which all was shown as finely as it will be.

@@ -20,14 +20,16 @@ export function shownInEye(view) {
     [0, 1, 2, 3].reduce((sum, r) => sum + view.shown[r] * back[4 * c + r], 0));
 }
 
-/** Turns about a point. Yaw 0 looks from +z, pitch is the height above the horizon. */
+/** Turns about a point. Yaw 0 looks from +z, pitch is the height above the horizon; a presented view may be rolled. */
 export class OrbitCamera {
+  roll = 0;
   /** Shows boxes with these corners, from above and in front. */
   frame(corners, aspect) {
     const low = [0, 1, 2].map(i => Math.min(...corners.map(c => c[i])));
     const high = [0, 1, 2].map(i => Math.max(...corners.map(c => c[i])));
     this.centre = times(low.map((value, i) => value + high[i]), 0.5);
     this.target = this.centre;
+    this.roll = 0;
     this.yaw = kHomeYawRad;
     this.pitch = kHomePitchRad;
     this.radius = Math.max(...corners.map(c => length(subtract(c, this.centre))));
@@ -43,12 +45,30 @@ export class OrbitCamera {
 
   /** From here; as near and as far as the wheel goes. */
   look({yaw, pitch, distance, target}) {
-    Object.assign(this, {yaw, pitch: clamp(pitch, -kMaxPitchRad, kMaxPitchRad), target});
+    Object.assign(this, {roll: 0, yaw, pitch: clamp(pitch, -kMaxPitchRad, kMaxPitchRad), target});
     this.distance = clamp(distance, kNearest * this.radius, kFarthest * this.radius);
+  }
+
+  /** From `eye`, with `target` in the middle and `up` upright: as OrbitCamera::look of visualizer/scene/camera. */
+  lookFrom({eye, target, up}) {
+    const away = subtract(eye, target);
+    this.distance = length(away);
+    const backward = times(away, 1 / this.distance);
+    const level = Math.hypot(backward[0], backward[2]) > 1e-9 ? backward : times(up, backward[1] > 0 ? -1 : 1);
+    Object.assign(this, {roll: 0, target: [...target], yaw: Math.atan2(level[0], level[2]),
+      pitch: Math.asin(clamp(backward[1], -1, 1))});
+    const [x, y] = this.axes();
+    this.roll = Math.atan2(-dot(x, up), dot(y, up));
+  }
+  pose() {
+    const [, up, backward] = this.axes();
+    return {eye: this.target.map((at, i) => at + this.distance * backward[i]), target: [...this.target], up};
   }
 
   /** Drags, in heights of the picture. */
   orbit(right, up) {
+    const [sine, cosine] = [Math.sin(this.roll), Math.cos(this.roll)];
+    [right, up] = [cosine * right - sine * up, sine * right + cosine * up];
     this.yaw -= right * Math.PI;
     this.pitch = clamp(this.pitch - up * Math.PI, -kMaxPitchRad, kMaxPitchRad);
   }
@@ -59,16 +79,18 @@ export class OrbitCamera {
   }
   /** Steps of the wheel; positive is nearer. */
   zoom(steps) {
-    this.distance = clamp(this.distance * kZoomStep ** steps, kNearest * this.radius,
-      kFarthest * this.radius);
+    this.distance = clamp(this.distance * kZoomStep ** steps, Math.min(kNearest * this.radius, this.distance),
+      Math.max(kFarthest * this.radius, this.distance));
   }
 
   /** Right, up and backward. */
   axes() {
     const backward = [Math.cos(this.pitch) * Math.sin(this.yaw), Math.sin(this.pitch),
       Math.cos(this.pitch) * Math.cos(this.yaw)];
-    const right = [Math.cos(this.yaw), 0, -Math.sin(this.yaw)];
-    return [right, cross(backward, right), backward];
+    const level = [Math.cos(this.yaw), 0, -Math.sin(this.yaw)], upright = cross(backward, level);
+    const [sine, cosine] = [Math.sin(this.roll), Math.cos(this.roll)];
+    return [level.map((value, i) => cosine * value + sine * upright[i]),
+      upright.map((value, i) => cosine * value - sine * level[i]), backward];
   }
 
   /** Near and far plane hold all within `reach` of the centre of what is framed. */

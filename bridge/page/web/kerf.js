@@ -8,6 +8,7 @@ import {bannerOf, isStale, LookControls, Plot, showBanner, showFigures} from './
 import {materialOf, solidFrom, sceneView} from './scene.js';
 import {listen, Stage} from './stage.js';
 import {handOf} from './tool.js';
+import {SharedView} from './views.js';
 import {recordAt} from './wire.js';
 
 const kFiguresMs = 200;
@@ -42,6 +43,7 @@ const link = new Link({
     }
     held = news;
     element('teaching').hidden = !(held.hello.flags & kMayCommand);
+    element('presents').hidden = 'scene' in address.keys;  // in a tab there is nobody to follow
     this.state('joining', false);
   },
   frame(news, frame) {
@@ -72,6 +74,10 @@ const link = new Link({
     }
     if (stage) stage.hands = now.second ? [handOf(now.record), handOf(now.second)] : [handOf(now.record)];
   },
+  view(message) {
+    views?.take(message);
+    element('follows').hidden = !views?.known;
+  },
   reply({sequence, status}) {
     const answer = {[ReplyStatus.accepted]: 'done', [ReplyStatus.busy]: 'busy, try again'}[status] ?? 'refused';
     element('reply').textContent = `${wishes.get(sequence) ?? 'command'}: ${answer}`;
@@ -86,6 +92,8 @@ try {
   missing('picture', `${problem.message} The figures are shown without a picture.`);
 }
 const look = new LookControls(stage);
+const views = stage && new SharedView(stage, {send: view => link.sendView(view), follow: element('follow'),
+  present: element('present'), say: text => element('presenter').textContent = text});
 
 /** All of a run's volumes are here. */
 function begin() {

@@ -2,7 +2,7 @@
 // The talk with the bridge: joins, acknowledges what it applied, joins again after silence.
 import {Held} from './brick_store.js';
 import {CloseCode} from './constants.js';
-import {ack, command, read} from './wire.js';
+import {ack, command, presentedView, read} from './wire.js';
 
 const kSilenceMs = 3000;     // a bridge that is there sends sixty signs of life a second
 const kFirstPauseMs = 250, kLongestPauseMs = 5000;
@@ -42,7 +42,7 @@ class ClockOffset {
 }
 
 export class Link {
-  /** `on`: hello(held, sameRun), frame(held, frame), records(message), reply(message), state(text, trouble). */
+  /** `on`: hello(held, sameRun), frame(held, frame), records(message), reply(message), view(message), state(text, trouble). */
   constructor(on) {
     this.on = on;
     this.words = {...kWords, ...WebSocket.words};
@@ -127,6 +127,10 @@ export class Link {
     this.on.reply(message);
   }
 
+  view(message) {
+    this.on.view(message);
+  }
+
   /** Another run is loaded behind the same socket: until its hello, silence is none. */
   expectHello() {
     this.greeted = false;
@@ -137,5 +141,10 @@ export class Link {
     if (this.socket?.readyState !== WebSocket.OPEN) return 0;
     this.socket.send(command(kind, argument, ++this.sequence, arm));
     return this.sequence;
+  }
+
+  /** The view that is presented from here; null: no longer. */
+  sendView(view) {
+    if (this.socket?.readyState === WebSocket.OPEN) this.socket.send(presentedView(view));
   }
 }

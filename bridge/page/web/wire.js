@@ -2,7 +2,7 @@
 // The messages of bridge/wire/messages.hpp, field by field in their order, and the records of the
 // segment by the program's own layout table.
 import {kAckMagic, kCommandMagic, kFrameMagic, kHelloMagic, kMaxRawBytes, kPacked, kProtocol,
-  kRecordsMagic, kReplyMagic, records} from './constants.js';
+  kRecordsMagic, kReplyMagic, kViewMagic, records} from './constants.js';
 
 /**
  * Decodes one LZ4 block into all of `out`. Throws where the block is not one of exactly that
@@ -139,6 +139,10 @@ const kReaders = {
     return message;
   },
   [kReplyMagic]: cursor => ({kind: 'reply', ...cursor.all(kReply)}),
+  [kViewMagic](cursor) {
+    const presenter = cursor.next('u32'), three = () => [0, 1, 2].map(() => cursor.next('f64'));
+    return {kind: 'view', presenter, eye: three(), target: three(), up: three()};
+  },
 };
 
 /** What a message says, by `kind`; throws for what is none of version 1. */
@@ -163,3 +167,10 @@ export const ack = (session, frame) => message(24, [kAckMagic, 0, session, frame
 /** Of an arm: 0 the first, 1 the second. */
 export const command = (kind, argument, sequence, arm = 0) =>
   message(16, [kCommandMagic, kind + 0x10000 * arm, argument, sequence]);
+/** Of who presents it; null: presents no longer. */
+export function presentedView(view) {
+  const data = new DataView(message(80, [kViewMagic, view ? 1 : 0]));
+  [...view?.eye ?? [0, 0, 1], ...view?.target ?? [0, 0, 0], ...view?.up ?? [0, 1, 0]].forEach((value, i) =>
+    data.setFloat64(8 + 8 * i, value, true));
+  return data.buffer;
+}

@@ -251,7 +251,7 @@ def bridge(root):
     def messages():
         rows = re.findall(r'(k\w+)Magic = magic\("(\w{4})"\)', file.text)
         structs = dict(zip([row[0] for row in rows], ["HelloMessage", "FrameHead", "RecordsHead", "ReplyMessage", "AckMessage",
-                                                      "CommandMessage"]))
+                                                      "CommandMessage", "ViewMessage"]))
         # `BlockPlane` is part of the numbering of blocks, not of a message.
         same(file.path, structs.values(), set(re.findall(r"^struct (\w+) \{", file.text, re.M)) - {"BlockPlane"})
         for kind, mark in rows:
@@ -277,8 +277,8 @@ and token.
 * **Packed** means: the payload is one block of LZ4 (the block format, without a frame around it), `payload_bytes` long, of which
   `raw_bytes` come out: `lz4.block.decompress(payload, uncompressed_size=raw_bytes)` in Python. Else both lengths are equal.
 
-The server says hello first, and again for a new run; then frames, records and replies. The viewer sends an
-acknowledgement for each frame that it has applied, and commands. What follows a head:
+The server says hello first, and again for a new run; then frames, records, replies and views. The viewer sends an
+acknowledgement for each frame that it has applied, commands, and its view where it presents it. What follows a head:
 
 * hello: the volumes' `VolumeDescriptor` ([segment](segment.md)). `off_labels` is 1 where there are labels; the other
   offsets are 0. Flags: {file.number('kMayCommand')} this viewer may send commands, {file.number('kTwoArms')} the run has two arms.
@@ -290,6 +290,8 @@ acknowledgement for each frame that it has applied, and commands. What follows a
   `first + i * stride`. Flag {file.number('kPacked')}: packed. A run of two arms has `ring` 2 in place of 0: each is the first arm's
   record of a tick and, behind it, the second's.
 * command: `kind` {kinds}.
+* view: of a viewer with the right to command, up to 60 a second, and to all viewers when it changes. One presents; another one gets
+  the view of the first. A view that is not finite, beyond 1e5, with the eye at its target or up along the view is left out.
 * reply: `status` {replies.replace('`kCommandSlots`', str(command.number('kCommandSlots')))}.
 
 `set_hash` is the sum of `block_hash` over all blocks that the viewer holds, mod 2^64; `session` is that of the hello:

@@ -457,6 +457,63 @@ TEST_CASE("r goes back to the camera that was given, and n writes to its file") 
   CHECK(is_given(step(pressing("r"))));
 }
 
+TEST_CASE("a window follows the presented view until its user moves it, and r follows again") {
+  if (!have_gl()) return;
+  const Place place;
+  GrooveController miller;
+  miller.run_to(20);
+  VisualizerOptions options = place.options();
+  const auto context = make_headless_context();
+  auto now = WindowRun::Clock::now();
+  const auto step = [&](WindowRun& run, const WindowInput& input) {
+    now += std::chrono::seconds(1);
+    static_cast<void>(run.step(input, options.size, now));
+    return run.picture().camera().pose();
+  };
+  const auto alike = [](const CameraPose& a, const CameraPose& b) {
+    return glm::length(a.eye_mm - b.eye_mm) + glm::length(a.target_mm - b.target_mm) < 1e-9;
+  };
+  {
+    options.follow_view = true;
+    WindowRun follower(options, Session("test"), *context);
+    const CameraPose home = step(follower, {});
+    std::optional<ViewPresenter> presenter(std::in_place, "test");
+    const auto present = [&](double x) {
+      presenter->show({{x, 50, 60}, {16, 16, 16}, {0, 1, 0.2}});
+      return CameraPose{{x, 50, 60}, {16, 16, 16}, {0, 1, 0.2}};
+    };
+    const CameraPose first = present(1);
+    CHECK_FALSE(alike(first, home));
+    CHECK(alike(step(follower, {}), first));
+    const CameraPose second = present(20);
+    CHECK(alike(step(follower, {}), second));
+    const CameraPose own = step(follower, moving(0.1, 0.0, 0.0));
+    CHECK_FALSE(alike(own, second));
+    const CameraPose third = present(30);
+    CHECK(alike(step(follower, {}), own));
+    CHECK(alike(step(follower, pressing("r")), third));
+    VisualizerOptions another = options;
+    another.follow_view = false;
+    another.present = true;
+    CHECK_THROWS_WITH_AS(SharedView{another}, doctest::Contains("--present: process "),
+                         SegmentError);
+    presenter.reset();
+    CHECK(alike(step(follower, {}), third));  // the last view stays
+    CHECK(alike(step(follower, {}), third));
+  }
+  options.follow_view = false;
+  options.present = true;
+  WindowRun presents(options, Session("test"), *context);
+  ViewFollower seen("test");
+  const CameraPose moved = step(presents, moving(0.2, -0.1, 3.0));
+  seen.poll();
+  REQUIRE(seen.presented());
+  for (int i = 0; i < 3; ++i) {
+    CHECK(seen.view().eye_mm[i] == moved.eye_mm[i]);
+    CHECK(seen.view().up[i] == moved.up[i]);
+  }
+}
+
 TEST_CASE("a camera inside of the body, or far off, makes a picture by every renderer") {
   if (!have_gl()) return;
   const Place place;
