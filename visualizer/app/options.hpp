@@ -24,7 +24,7 @@ struct VisualizerOptions {
   std::optional<double> panel_scale;  ///< of the panels' letters; none: the display's density
   bool panels = true;                 ///< at first; headless: all the time
   std::optional<std::filesystem::path> camera_file;  ///< of --camera; none: it gave numbers, or no
-  bool present = false, follow_view = false;  ///< one of both at most
+  bool present = false, follow_view = false;         ///< one of both at most
   bool headless = false;
   std::uint32_t frames = 10;  ///< headless: this many pictures; beside a video none by default
   std::optional<std::uint64_t> every_ticks;  ///< headless: default once a second of servo time
