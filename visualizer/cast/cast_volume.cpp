@@ -81,9 +81,7 @@ std::optional<BoxCorners> CastVolume::body() const {
 
 void CastVolume::update_bricks(std::span<const Density> density, const ChangedBricks& changed) {
   for (const ChangedBrick& brick : changed) density_.copy(bricks_.voxels(brick.id), density);
-  for (const ChangedBrick& brick : changed) {
-    gradient_.update(ChangedBricks::bounds(brick, bricks_), density);
-  }
+  gradient_.update(changed, density);
   const VoxelBox flipped = cells_.update_bricks(bricks_, changed, density);
   if (!flipped.empty()) take_cells(flipped);
 }

@@ -51,11 +51,11 @@ void GradientRows::fill(const VoxelBox& box, std::span<const Density> density,
   }
 }
 
-VoxelBox GradientRows::update(const VoxelBox& box, std::span<const Density> density) {
-  if (box.empty()) return {};
-  const VoxelBox around = plan_.around(box).clipped(grid_.box());
-  fill(around, density, gradients_);
-  return around;
+std::vector<VoxelBox> GradientRows::update(const ChangedBricks& changed,
+                                           std::span<const Density> density) {
+  std::vector<VoxelBox> boxes = plan_.around(changed, BrickGrid::of(grid_));
+  for (const VoxelBox& box : boxes) fill(box, density, gradients_);
+  return boxes;
 }
 
 glm::vec3 GradientRows::at(const VoxelIndex& voxel) const noexcept {

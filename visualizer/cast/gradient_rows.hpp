@@ -28,9 +28,9 @@ class GradientRows {
   /// What a volume of this extent takes.
   [[nodiscard]] static std::size_t entry_count(const VoxelGrid& grid) noexcept;
 
-  /// Call after the voxels of `box` have changed in `density`, which is all of the volume. Returns
-  /// the voxels whose gradients may have.
-  VoxelBox update(const VoxelBox& box, std::span<const Density> density);
+  /// Call after voxels have `changed` in `density`, which is all of the volume. Returns the voxels
+  /// whose gradients may have.
+  std::vector<VoxelBox> update(const ChangedBricks& changed, std::span<const Density> density);
 
   [[nodiscard]] const GradientPlan& plan() const noexcept { return plan_; }
   /// Of a voxel, or of the border.

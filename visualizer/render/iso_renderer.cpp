@@ -29,10 +29,8 @@ VolumeOnGpu::VolumeOnGpu(const VolumeView& volume, const VolumeContent& content,
 
 void VolumeOnGpu::update_bricks(std::span<const Density> density, const ChangedBricks& changed) {
   solid_.update_bricks(density, changed);
-  for (const ChangedBrick& brick : changed) {
-    const VoxelBox around =
-        gradient_.update(ChangedBricks::bounds(brick, solid_.bricks()), density);
-    if (!around.empty()) gradient_texture_.upload_from(gradient_.data(), around, kBorder);
+  for (const VoxelBox& around : gradient_.update(changed, density)) {
+    gradient_texture_.upload_from(gradient_.data(), around, kBorder);
   }
   cells_.update_bricks(density, changed);
   fine_cells_.update_bricks(density, changed);

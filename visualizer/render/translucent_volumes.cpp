@@ -65,11 +65,9 @@ void TranslucentVolume::upload(std::span<const Density> density, const VoxelBox&
 
 void TranslucentVolume::update_bricks(std::span<const Density> density,
                                       const ChangedBricks& changed) {
+  for (const VoxelBox& box : gradient_.around(changed, bricks_)) upload(density, box);
   for (const ChangedBrick& one : changed) {
-    const VoxelBox box = ChangedBricks::bounds(one, bricks_);
-    if (box.empty()) continue;
-    upload(density, gradient_.around(box).clipped(bricks_.grid.box()));
-    if (!material_texels_) continue;
+    if (!material_texels_) break;
     const VoxelBox brick = bricks_.voxels(one.id);
     // A voxel without a label has the material of its density.
     materials_.upload(material_texels_->of(brick, density).data(), brick);

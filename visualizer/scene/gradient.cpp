@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 
 #include "visualizer/scene/gradient_plan.hpp"
 
@@ -18,6 +19,47 @@ struct Field {
   }
   VoxelIndex n;
   std::vector<float> values;
+};
+
+/// Of a row along x, from `first` to before `end`, or nothing.
+struct RowPart {
+  std::int32_t first = std::numeric_limits<std::int32_t>::max(), end = 0;
+  void add(const RowPart& other) noexcept {
+    first = std::min(first, other.first);
+    end = std::max(end, other.end);
+  }
+};
+
+/// The part of each row of a box that is wanted.
+class Wanted {
+ public:
+  explicit Wanted(const VoxelIndex& extent, const RowPart& each = {})
+      : n(extent), rows_(VoxelGrid{1, n.y, n.z}.voxel_count(), each) {}
+  static Wanted all(const VoxelIndex& extent) { return Wanted(extent, {0, extent.x}); }
+
+  [[nodiscard]] RowPart& row(std::int32_t y, std::int32_t z) noexcept {
+    return rows_[static_cast<std::size_t>(z * n.y + y)];
+  }
+  [[nodiscard]] const RowPart& row(std::int32_t y, std::int32_t z) const noexcept {
+    return rows_[static_cast<std::size_t>(z * n.y + y)];
+  }
+  /// What taps along y or z read for it, of a box that is larger by their reach at both ends.
+  [[nodiscard]] Wanted read_along_y(std::int32_t reach) const { return read(reach, 0); }
+  [[nodiscard]] Wanted read_along_z(std::int32_t reach) const { return read(0, reach); }
+
+  const VoxelIndex n;
+
+ private:
+  [[nodiscard]] Wanted read(std::int32_t along_y, std::int32_t along_z) const {
+    Wanted more({n.x, n.y + 2 * along_y, n.z + 2 * along_z});
+    for_each_voxel({{0, 0, 0}, {1, n.y, n.z}}, [&](int, int y, int z) {
+      for (std::int32_t j = 0; j <= 2 * along_y; ++j) more.row(y + j, z).add(row(y, z));
+      for (std::int32_t k = 1; k <= 2 * along_z; ++k) more.row(y, z + k).add(row(y, z));
+    });
+    return more;
+  }
+
+  std::vector<RowPart> rows_;
 };
 
 /// A volume, and how many of its voxels make a cell along each axis.
@@ -79,22 +121,22 @@ Field means(const Cells& cells, const VoxelBox& box) {
 
 using Taps = std::array<float, 2 * AxisTaps::kMiddle + 1>;
 
-/// Taps along one axis, which becomes shorter by their reach at both ends. `kKnown` is this reach,
-/// so that a compiler unrolls the sum, or 0.
+/// Taps along one axis, which becomes shorter by their reach at both ends; zeros where nothing is
+/// wanted. `kKnown` is this reach, so that a compiler unrolls the sum, or 0.
 template <int kAxis, int kKnown>
-Field filtered(Field& from, const Taps& all_taps, std::int32_t any_reach) {
+Field filtered(Field& from, const Taps& all_taps, std::int32_t any_reach, const Wanted& wanted) {
   const Taps own = all_taps;  // which no result overwrites: they stay in registers
   const float* const taps = own.data() + AxisTaps::kMiddle;
   const std::int32_t reach = kKnown > 0 ? kKnown : any_reach;
-  VoxelIndex n = from.n;
-  (kAxis == 0 ? n.x : kAxis == 1 ? n.y : n.z) -= 2 * reach;
+  const VoxelIndex& n = wanted.n;
   Field to(n);
   const std::ptrdiff_t stride = kAxis == 0 ? 1 : kAxis == 1 ? from.n.x : from.n.x * from.n.y;
   for (std::int32_t z = 0; z < n.z; ++z) {
     for (std::int32_t y = 0; y < n.y; ++y) {
       const float* const in = from.row(y, z) + reach * stride;
       float* const out = to.row(y, z);
-      for (std::int32_t x = 0; x < n.x; ++x) {
+      const auto [first, end] = wanted.row(y, z);
+      for (std::int32_t x = first; x < end; ++x) {
         float sum = taps[0] * in[x];
         for (std::int32_t i = 1; i <= reach; ++i) {
           sum += taps[i] * in[x + i * stride] + taps[-i] * in[x - i * stride];
@@ -108,10 +150,10 @@ Field filtered(Field& from, const Taps& all_taps, std::int32_t any_reach) {
 
 /// The same; farid5 and the wide filter of cubes are what most volumes have.
 template <int kAxis>
-Field filtered(Field& from, const Taps& taps, std::int32_t reach) {
-  if (reach == 2) return filtered<kAxis, 2>(from, taps, reach);
-  if (reach == 7) return filtered<kAxis, 7>(from, taps, reach);
-  return filtered<kAxis, 0>(from, taps, reach);
+Field filtered(Field& from, const Taps& taps, std::int32_t reach, const Wanted& wanted) {
+  if (reach == 2) return filtered<kAxis, 2>(from, taps, reach, wanted);
+  if (reach == 7) return filtered<kAxis, 7>(from, taps, reach, wanted);
+  return filtered<kAxis, 0>(from, taps, reach, wanted);
 }
 
 /// One part of the gradient of each voxel, or cell.
@@ -129,17 +171,26 @@ float scale_of(const AxisTaps& slope, const AxisTaps& smooth, const AxisTaps& ot
   return 1.0F / (0.5F * slope.slope_sum * smooth.smooth_sum * other.smooth_sum * kFull);
 }
 
-Parts parts_of(const FilterTaps& taps, const Cells& cells, const VoxelBox& box) {
+/// Of the voxels that are `wanted` in a box, or cells.
+Parts parts_of(const FilterTaps& taps, const Cells& cells, const VoxelBox& box,
+               const Wanted& wanted) {
   const auto& [x, y, z] = taps;
   Field all = means(cells, grown(box, {x.reach, y.reach, z.reach}));
-  Field slope_x = filtered<0>(all, x.slope, x.reach);
-  Field smooth_x = filtered<0>(all, x.smooth, x.reach);
-  Field slope_x_smooth_y = filtered<1>(slope_x, y.smooth, y.reach);
-  Field slope_y = filtered<1>(smooth_x, y.slope, y.reach);
-  Field smooth_xy = filtered<1>(smooth_x, y.smooth, y.reach);
-  return {filtered<2>(slope_x_smooth_y, z.smooth, z.reach), filtered<2>(slope_y, z.smooth, z.reach),
-          filtered<2>(smooth_xy, z.slope, z.reach),
+  const Wanted along_z = wanted.read_along_z(z.reach);
+  const Wanted along_y = along_z.read_along_y(y.reach);
+  Field slope_x = filtered<0>(all, x.slope, x.reach, along_y);
+  Field smooth_x = filtered<0>(all, x.smooth, x.reach, along_y);
+  Field slope_x_smooth_y = filtered<1>(slope_x, y.smooth, y.reach, along_z);
+  Field slope_y = filtered<1>(smooth_x, y.slope, y.reach, along_z);
+  Field smooth_xy = filtered<1>(smooth_x, y.smooth, y.reach, along_z);
+  return {filtered<2>(slope_x_smooth_y, z.smooth, z.reach, wanted),
+          filtered<2>(slope_y, z.smooth, z.reach, wanted),
+          filtered<2>(smooth_xy, z.slope, z.reach, wanted),
           glm::vec3(scale_of(x, y, z), scale_of(y, z, x), scale_of(z, x, y))};
+}
+
+Parts parts_of(const FilterTaps& taps, const Cells& cells, const VoxelBox& box) {
+  return parts_of(taps, cells, box, Wanted::all(box.extent()));
 }
 
 /// `part` of the direction of `other`, the rest of it that of `own`, and the length of `own`.
@@ -171,32 +222,31 @@ glm::vec3 adapted(const glm::vec3& narrow, const glm::vec3& wide) {
 }
 
 /// `adapted` of each cell of a box. The wide filter costs five times as much as the narrow one, and
-/// is taken where that finds anything.
-std::vector<glm::vec3> adapted_cells(const GradientPlan& plan, const Cells& cells,
-                                     const VoxelBox& box) {
+/// is taken where that finds anything: `adapted` is the narrow one's elsewhere.
+void fill_adapted(const GradientPlan& plan, const Cells& cells, const VoxelBox& box,
+                  std::vector<glm::vec3>& made) {
   const glm::vec3 per_cell = plan.per_edge * glm::vec3(cells.size.x, cells.size.y, cells.size.z);
   Parts narrow = parts_of(plan.narrow, cells, box);
   narrow.scale /= per_cell;
-  std::vector<glm::vec3> made(narrow.x.values.size());
-  VoxelBox sloped;
-  std::size_t i = 0;
-  for_each_voxel(box, [&](int x, int y, int z) {
-    made[i] = narrow.at(i);
-    if (made[i] != glm::vec3(0.0F)) sloped = sloped.with({x, y, z});
-    ++i;
-  });
-  if (sloped.empty()) return made;
-  Parts wide = parts_of(plan.wide, cells, sloped);
-  wide.scale /= per_cell;
+  made.resize(narrow.x.values.size());
   const VoxelIndex extent = box.extent();
-  const VoxelGrid of_box{extent.x, extent.y, extent.z};
-  i = 0;
-  for_each_voxel(sloped, [&](int x, int y, int z) {
-    glm::vec3& one = made[of_box.index(x - box.lo.x, y - box.lo.y, z - box.lo.z)];
-    one = adapted(one, wide.at(i));
+  Wanted sloped(extent);
+  bool any = false;
+  std::size_t i = 0;
+  for_each_voxel({{0, 0, 0}, extent}, [&](int x, int y, int z) {
+    made[i] = narrow.at(i);
+    if (made[i] != glm::vec3(0.0F)) {
+      sloped.row(y, z).add({x, x + 1});
+      any = true;
+    }
     ++i;
   });
-  return made;
+  if (!any) return;
+  Parts wide = parts_of(plan.wide, cells, box, sloped);
+  wide.scale /= per_cell;
+  for (i = 0; i < made.size(); ++i) {
+    if (made[i] != glm::vec3(0.0F)) made[i] = adapted(made[i], wide.at(i));
+  }
 }
 
 /// Where a voxel lies between the centres of two cells along one axis.
@@ -223,7 +273,7 @@ class CellGradients {
     };
     const VoxelIndex end = at(last);
     box_ = {at(voxels.lo), {end.x + 2, end.y + 2, end.z + 2}};
-    made_ = adapted_cells(plan, cells, box_);
+    fill_adapted(plan, cells, box_, made_);
   }
 
   [[nodiscard]] glm::vec3 at(int x, int y, int z) const {
@@ -262,23 +312,21 @@ glm::vec3 followed(const glm::vec3& voxel, const glm::vec3& cell, const glm::vec
   return glm::mix(direction * shrunk, cell, part);
 }
 
-template <class Put>
-void fill(const GradientPlan& plan, const Cells& cells, const VoxelBox& box, const Put& put) {
+/// Of the voxels of a box.
+void fill_block(const GradientPlan& plan, const Cells& cells, const VoxelBox& box,
+                std::vector<glm::vec3>& made) {
   if (plan.filter == GradientFilter::adaptive && !plan.has_cells()) {
-    const std::vector<glm::vec3> made = adapted_cells(plan, cells, box);
-    for (std::size_t i = 0; i < made.size(); ++i) put(i, made[i]);
-    return;
+    return fill_adapted(plan, cells, box, made);
   }
   const Parts voxel = parts_of(plan.voxel, {cells.grid, cells.density, {1, 1, 1}}, box);
-  if (!plan.has_cells()) {
-    for (std::size_t i = 0; i < voxel.x.values.size(); ++i) put(i, voxel.at(i));
-    return;
-  }
+  made.resize(voxel.x.values.size());
+  for (std::size_t i = 0; i < made.size(); ++i) made[i] = voxel.at(i);
+  if (!plan.has_cells()) return;
   const CellGradients between(plan, cells, box);
   const glm::vec3 fine(cells.size.x > 1, cells.size.y > 1, cells.size.z > 1);
   std::size_t i = 0;
   for_each_voxel(box, [&](int x, int y, int z) {
-    put(i, followed(voxel.at(i), between.at(x, y, z), fine, plan.per_edge));
+    made[i] = followed(made[i], between.at(x, y, z), fine, plan.per_edge);
     ++i;
   });
 }
@@ -307,6 +355,7 @@ void fill_gradients(const GradientPlan& plan, const VoxelGrid& grid,
   // Block by block: most of a volume is air, or solid, and has none.
   constexpr std::int32_t kEdge = 32;
   const Cells cells{grid, density, plan.cell};
+  std::vector<glm::vec3> made;
   const VoxelIndex edge{kEdge * plan.cell.x, kEdge * plan.cell.y, kEdge * plan.cell.z};
   const VoxelIndex n = box.extent();
   const VoxelGrid of_box{n.x, n.y, n.z};
@@ -320,12 +369,14 @@ void fill_gradients(const GradientPlan& plan, const VoxelGrid& grid,
         VoxelBox{lo, {lo.x + edge.x, lo.y + edge.y, lo.z + edge.z}}.clipped(of_box.box());
     const VoxelBox voxels = part.moved(box.lo);
     if (is_flat(cells, plan.around(voxels))) return;
-    const VoxelIndex m = part.extent();
-    fill(plan, cells, voxels, [&](std::size_t at, const glm::vec3& gradient) {
-      const auto index = static_cast<std::int32_t>(at);
-      gradients[of_box.index(lo.x + index % m.x, lo.y + index / m.x % m.y,
-                             lo.z + index / m.x / m.y)] = gradient;
-    });
+    fill_block(plan, cells, voxels, made);
+    const glm::vec3* from = made.data();
+    const std::int32_t wide = part.hi.x - lo.x;
+    for (std::int32_t z = lo.z; z < part.hi.z; ++z) {
+      for (std::int32_t y = lo.y; y < part.hi.y; ++y, from += wide) {
+        std::copy_n(from, wide, &gradients[of_box.index(lo.x, y, z)]);
+      }
+    }
   });
 }
 

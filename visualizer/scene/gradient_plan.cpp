@@ -151,4 +151,42 @@ VoxelBox GradientPlan::around(const VoxelBox& box) const noexcept {
   return grown(box, reach());
 }
 
+namespace {
+
+/// The boxes, two as one if that has at most 64^3 voxels and no more than they have together.
+std::vector<VoxelBox> merged(const std::vector<VoxelBox>& all) {
+  constexpr std::size_t kMostVoxels = std::size_t{64} * 64 * 64;
+  constexpr std::ptrdiff_t kLookBack = 32;  // boxes: the bricks of two cuts take turns
+  const auto voxels = [](const VoxelBox& box) {
+    const VoxelIndex n = box.extent();
+    return VoxelGrid{n.x, n.y, n.z}.voxel_count();
+  };
+  std::vector<VoxelBox> boxes;
+  for (const VoxelBox& box : all) {
+    const auto first = boxes.end() - std::min(kLookBack, std::ssize(boxes));
+    const auto with = std::find_if(first, boxes.end(), [&](const VoxelBox& other) {
+      const std::size_t together = voxels(box.united(other));
+      return together <= kMostVoxels && together <= voxels(box) + voxels(other);
+    });
+    if (with != boxes.end()) {
+      *with = with->united(box);
+    } else {
+      boxes.push_back(box);
+    }
+  }
+  return boxes;
+}
+
+}  // namespace
+
+std::vector<VoxelBox> GradientPlan::around(const ChangedBricks& changed,
+                                           const BrickGrid& bricks) const {
+  std::vector<VoxelBox> boxes;
+  for (const ChangedBrick& brick : changed) {
+    const VoxelBox box = ChangedBricks::bounds(brick, bricks);
+    if (!box.empty()) boxes.push_back(around(box).clipped(bricks.grid.box()));
+  }
+  return merged(merged(boxes));  // layers of bricks, then all
+}
+
 }  // namespace kerf

@@ -10,6 +10,8 @@
 
 #include <glm/glm.hpp>
 
+#include "shared/volume/brick_grid.hpp"
+#include "shared/volume/changed_bricks.hpp"
 #include "shared/volume/voxel_grid.hpp"
 
 namespace kerf {
@@ -67,6 +69,11 @@ struct GradientPlan {
   [[nodiscard]] VoxelIndex reach() const noexcept;
   /// The voxels whose gradient depends on one in `box`.
   [[nodiscard]] VoxelBox around(const VoxelBox& box) const noexcept;
+  /// The voxels of the volume whose gradient depends on a changed one, in boxes that may overlap.
+  /// Bricks side by side share most of what is around them: what is around several is one box if
+  /// that has no more voxels than theirs, and no more than 64^3.
+  [[nodiscard]] std::vector<VoxelBox> around(const ChangedBricks& changed,
+                                             const BrickGrid& bricks) const;
 
   GradientFilter filter;
   FilterTaps voxel{};           ///< of the voxels; adaptive: used if there are cells

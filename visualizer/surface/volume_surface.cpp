@@ -82,13 +82,13 @@ void VolumeSurface::mark(const VoxelBox& blocks, Work work) {
 
 std::span<const std::uint32_t> VolumeSurface::update(std::span<const Density> density,
                                                      const ChangedBricks& changed) {
+  gradient_.update(changed, density);
   const SurfaceSource from = source(density);
   VoxelBox all;
   for (const ChangedBrick& brick : changed) {
     const VoxelBox box = ChangedBricks::bounds(brick, bricks_);
     if (box.empty()) continue;
     all = all.united(box);
-    gradient_.update(box, density);
     mark(blocks_on(box), Work::mesh);
     mark(blocks_on(shaded_around(box, from)), Work::shading);
   }

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <cmath>
 #include <string>
 
@@ -104,6 +105,74 @@ TEST_CASE("a gradient depends on no voxel beyond its reach") {
     }
     CHECK(reached == VoxelBox{{7, 7, 7}, {8, 8, 8}}.grown(GradientPlan(kind).voxel[0].reach));
   }
+}
+
+namespace {
+
+/// A change of the voxels of a volume that `is` true for.
+template <class Is>
+ChangedBricks changed_where(const BrickGrid& bricks, const Is& is) {
+  std::vector<Density> before(bricks.grid.voxel_count()), after;
+  for_each_voxel(bricks.grid.box(),
+                 [&](int x, int y, int z) { after.push_back(is(x, y, z) ? 1 : 0); });
+  return changed_between(bricks, before, after);
+}
+
+std::size_t voxels_of(const VoxelBox& box) {
+  const VoxelIndex n = box.extent();
+  return VoxelGrid{n.x, n.y, n.z}.voxel_count();
+}
+
+}  // namespace
+
+TEST_CASE("what is around a cut is filtered once, not once for each of its bricks") {
+  const BrickGrid bricks = BrickGrid::of({96, 96, 96});
+  const GradientPlan plan(GradientFilter::adaptive);
+  const auto ball = [](int cx, int cy, int cz) {
+    return [=](int x, int y, int z) {
+      const glm::ivec3 off(2 * x - cx, 2 * y - cy, 2 * z - cz);  // in half edges
+      return off.x * off.x + off.y * off.y + off.z * off.z < 16 * 16;
+    };
+  };
+  // 16 voxels across, in 20 bricks.
+  const auto one = changed_where(bricks, ball(83, 83, 83));
+  CHECK(one.size() == 20);
+  const auto around_one = plan.around(one, bricks);
+  REQUIRE(around_one.size() == 1);
+  CHECK(around_one[0] == plan.around(one.bounds(bricks)));
+  CHECK(around_one[0].extent() == VoxelIndex{30, 30, 30});
+  // Two tools, whose bricks take turns.
+  const auto left = ball(31, 61, 61), right = ball(151, 61, 61);
+  const auto two =
+      changed_where(bricks, [&](int x, int y, int z) { return left(x, y, z) || right(x, y, z); });
+  CHECK(plan.around(two, bricks).size() == 2);
+  const auto all = changed_where(bricks, [](int, int, int) { return true; });
+  for (const VoxelBox& box : plan.around(all, bricks)) CHECK(voxels_of(box) <= 64 * 64 * 64);
+  CHECK(plan.around(ChangedBricks{}, bricks).empty());
+}
+
+TEST_CASE(
+    "the boxes around a change hold all that it reaches, and no more than one for each brick") {
+  CHECK(rc::check([] {
+    const BrickGrid bricks = BrickGrid::of({*rc::gen::inRange(1, 40), 33, 25});
+    const GradientPlan plan(*rc::gen::element(GradientFilter::central, GradientFilter::adaptive));
+    const int every = *rc::gen::element(1, 7, 400, 3000);
+    const int seed = *rc::gen::inRange(0, 1000);
+    const auto changed = changed_where(bricks, [&](int x, int y, int z) {
+      return (x * 7919 + y * 104'729 + z * 1299 + seed) % every == 0;
+    });
+    const auto boxes = plan.around(changed, bricks);
+    std::size_t each = 0, together = 0;
+    for (const VoxelBox& box : boxes) together += voxels_of(box);
+    for (const ChangedBrick& brick : changed) {
+      const VoxelBox reached =
+          plan.around(ChangedBricks::bounds(brick, bricks)).clipped(bricks.grid.box());
+      each += voxels_of(reached);
+      RC_ASSERT(std::any_of(boxes.begin(), boxes.end(),
+                            [&](const VoxelBox& box) { return box.united(reached) == box; }));
+    }
+    RC_ASSERT(together <= each);
+  }));
 }
 
 TEST_CASE("the adaptive gradient keeps an edge as sharp as farid5, and its length everywhere") {
