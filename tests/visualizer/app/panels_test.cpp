@@ -303,7 +303,7 @@ TEST_CASE("names of tools are shown to their last letter, in the list and the fi
   const Silhouette side{{0.0, -0.2, 0.2}, {1.0, -1.0, 1.0}, {4.0, -0.5, 0.5}};
   for (const PictureSize size : {kPlain, PictureSize{2 * kPlain.width, 2 * kPlain.height}}) {
     for (const double scale : {1.0, 2.0}) {
-      for (const std::size_t tools : {1, 2}) {
+      for (const std::size_t tools : {1U, 2U}) {
         CAPTURE(size.width);
         CAPTURE(scale);
         CAPTURE(tools);
