@@ -130,7 +130,7 @@ class Demo:
         """`kerf-lab two-machines` makes the networks and starts all parts on them."""
         options = self.options
         words = [f"--controller-word={word}" for word in [*options.volume, *(["--rate", options.rate] if options.rate else [])]]
-        look = [*options.look, *(["--record", options.record] if options.record else []),
+        look = [*options.look, *options.screen, *(["--record", options.record] if options.record else []),
                 *(["--sheet", options.sheet] if options.sheet else [])]
         words += [f"--visualizer-word={word}" for word in look]
         hand = ["--hand", options.hand] if options.hand else []
@@ -296,7 +296,7 @@ class Demo:
             # Where the path that a line shows leads to at once, and after the run.
             keys_out = ["--out", self.options.out] if self.out else []  # else the window's keys write to the current folder
             self.window = processes.start("visualizer", [
-                *common, *(["--size", options.size] if options.size else []), *record, *led, *keys_out, "--attached", processes.path("window-shows"),
+                *common, *(["--size", options.size] if options.size else []), *options.screen, *record, *led, *keys_out, "--attached", processes.path("window-shows"),
                 "--choice", processes.path("choice"), "--open-in", os.path.dirname(self.scene) or "."],
                 out="window.log", log="window.log")
             record = []

@@ -13,11 +13,11 @@ BUSES = {"omni": ("fw", "fw1"), "falcon": ("usb", "usb"), "woodenhaptics": ("hid
          "inverse3": ("ws", ""), "touch": ("arm", ""), "omega": ("arm", "")}  # no node: a service or a library of the vendor
 STAND_INS = {"touch": "libHD.so", "omega": "libdrd.so.3"}  # kerf's own in place of the vendor's library
 PICTURE_SIZE, WINDOW_SIZE = "640x480", "1280x800"  # if none is given; a window's on a screen of 96 dots per inch
-FLAGS = ("--headless", "--serve", "--stereo", "--voxel-tool", "--mute", "--colour-blind", "--present", "--follow-view", "--virtual", "--two-machines")
+FLAGS = ("--headless", "--full-screen", "--serve", "--stereo", "--voxel-tool", "--mute", "--colour-blind", "--present", "--follow-view", "--virtual", "--two-machines")
 OF_SCENE = ("--scene", "--volume", "--spacing", "--override-spacing", "--window", "--set")
 OF_LINK = {"--loss": (50, 1), "--delay-ms": (2000, 20), "--mbit": (100000, 4)}  # of two machines: the most of each, a bad one
 WITH_VALUE = (*OF_SCENE, *OF_LINK, "--hand", "--seconds", "--rate", "--out", "--size", "--renderer", "--camera", "--aov",
-              "--gradient", "--panels", "--panel-scale",
+              "--gradient", "--panels", "--panel-scale", "--monitor",
               "--device", "--port", "--library", "--sheet", "--transfer", "--record", "--listen", "--name")
 
 
@@ -30,6 +30,7 @@ class Options:
     scene: str = ""
     volume: list = dataclasses.field(default_factory=list)  # those of OF_SCENE, for the controller
     look: list = dataclasses.field(default_factory=list)  # for the visualizer
+    screen: list = dataclasses.field(default_factory=list)  # for its window alone
     again: list = dataclasses.field(default_factory=list)  # all but the scene: for the next demo of the same window
     hand: str = ""
     seconds: str = ""
@@ -68,7 +69,7 @@ def parse(words):
             if name in ("--headless", "--serve", "--virtual", "--two-machines"):
                 setattr(options, name[2:].replace("-", "_"), True)
             else:
-                options.look.append(name)
+                (options.screen if name == "--full-screen" else options.look).append(name)
             continue
         if name not in WITH_VALUE:
             raise Refusal(f"{name}: unknown; see ./kerf demo --help")
@@ -82,6 +83,8 @@ def parse(words):
             options.again += [name, value]
         if name in ("--renderer", "--camera", "--aov", "--gradient", "--transfer", "--panels", "--panel-scale"):
             options.look += [name, value]
+        elif name == "--monitor":
+            options.screen += [name, value]
         elif name in OF_SCENE and name != "--scene":
             options.volume += [name, value]
         elif name in OF_LINK:
@@ -215,6 +218,8 @@ def check(options):
             raise Refusal("--hand mouse: --headless and --sheet have no window to point at; leave one of them out")
         if not has_display():
             raise Refusal("--hand mouse: no display; set DISPLAY, or leave it out: a script is the hand then")
+    if options.screen and options.headless:
+        raise Refusal(f"{options.screen[0]}: --headless and --sheet have no window; leave one of them out")
     if options.name and not re.fullmatch(r"[A-Za-z0-9_-][A-Za-z0-9._-]{0,63}", options.name):
         raise Refusal(f"--name {options.name}: no name of a controller; use 1 to 64 letters, digits, '.', '_' or '-'")
     if options.name and runs(options.name):

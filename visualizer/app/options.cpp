@@ -112,6 +112,12 @@ void declare_run(Arguments& app, VisualizerOptions& o) {
              "the pointer, keys or a gamepad lead the hand of a kerf-emulator that has this "
              "--hand-socket; in a window")
       .shown_as("PATH");
+  app.flag("--full-screen", o.full_screen, "the window fills its monitor; in the window F11");
+  app.option("--monitor", o.monitor,
+             "in a window: where it opens, counted from 1; an unknown one is refused with those "
+             "that there are")
+      .within(1, 64)
+      .shown_as("N");
   app.flag("--mute", o.mute, "no sound in the window, until a is pressed");
   app.option("--attached", o.attached,
              "make this empty file once the controller is shown: a short run may begin")
@@ -248,10 +254,16 @@ std::optional<VisualizerOptions> parse_options(int argc, const char* const* argv
   }
   if (record.given() && !frames.given() && !aov.given()) options.frames = 0;
   if (options.bench && !sized.given()) words.size = kBenchSize;
-  if (options.hand_socket && (options.headless || options.bench)) {
-    throw VisualizerError(std::string("--hand-socket: ") +
-                          (options.headless ? "--headless" : "--bench") +
-                          " has no pointer that could lead a hand; give one of the two");
+  if (options.headless || options.bench) {
+    const std::string without = options.headless ? "--headless" : "--bench";
+    if (options.hand_socket) {
+      throw VisualizerError("--hand-socket: " + without +
+                            " has no pointer that could lead a hand; give one of the two");
+    }
+    if (options.full_screen || options.monitor > 0) {
+      throw VisualizerError((options.full_screen ? "--full-screen: " : "--monitor: ") + without +
+                            " has no window; give one of the two");
+    }
   }
   options.size = parse_size(words.size);
   options.size_is_given = sized.given();

@@ -20,7 +20,9 @@ struct VisualizerOptions {
   ViewSettings settings;            ///< at first; its opacities are those of `transfer`
   bool renderer_is_given = true;    ///< else `take_default_renderer`
   PictureSize size{800, 600};
-  bool size_is_given = true;          ///< else a window takes what suits its screen
+  bool size_is_given = true;  ///< else a window takes what suits its screen
+  bool full_screen = false;
+  int monitor = 0;                    ///< of the window, counted from 1; 0: none is chosen
   std::optional<double> panel_scale;  ///< of the panels' letters; none: the display's density
   bool panels = true;                 ///< at first; headless: all the time
   std::optional<std::filesystem::path> camera_file;  ///< of --camera; none: it gave numbers, or no

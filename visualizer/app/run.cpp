@@ -162,7 +162,9 @@ int run_window(const VisualizerOptions& asked) {
   WindowSound sound(options.mute);  // before any thread
   Session session = attach(options);
   const Stopwatch since_attached;
-  Window window(options.size_is_given ? std::optional(options.size) : std::nullopt,
+  Window window({.size = options.size_is_given ? std::optional(options.size) : std::nullopt,
+                 .full_screen = options.full_screen,
+                 .monitor = options.monitor > 0 ? std::optional(options.monitor) : std::nullopt},
                 Window::Visibility::shown);
   options.size = window.size();
   window.set_title("kerf: " + options.name);

@@ -172,7 +172,8 @@ std::unique_ptr<EglContext> best_egl_context() {
 std::unique_ptr<GlContext> make_headless_context() {
   if (auto egl = best_egl_context()) return egl;
   if (Window::has_screen()) {
-    return std::make_unique<Window>(PictureSize{1, 1}, Window::Visibility::hidden);
+    return std::make_unique<Window>(WindowPlace{.size = PictureSize{1, 1}},
+                                    Window::Visibility::hidden);
   }
   throw VisualizerError(
       "OpenGL: no 4.5 core context on EGL surfaceless or EGL device, and no screen; install a "

@@ -41,6 +41,37 @@ void outlive_the_screen() {
       display, [](Display*, void*) { g_screen_is_gone = true; }, nullptr);
 }
 
+std::vector<GLFWmonitor*> all_monitors() {
+  int count = 0;
+  GLFWmonitor** const first = glfwGetMonitors(&count);
+  return {first, first + count};
+}
+
+/// On the desktop, from its upper left corner.
+PixelRect area_of(GLFWmonitor* monitor) {
+  int x = 0, y = 0;
+  glfwGetMonitorPos(monitor, &x, &y);
+  const GLFWvidmode* const mode = glfwGetVideoMode(monitor);
+  return mode != nullptr ? PixelRect{x, y, x + mode->width, y + mode->height} : PixelRect{};
+}
+
+/// Counted from 1.
+GLFWmonitor* monitor_named(int number) {
+  const std::vector<GLFWmonitor*> monitors = all_monitors();
+  if (number >= 1 && static_cast<std::size_t>(number) <= monitors.size()) {
+    return monitors[static_cast<std::size_t>(number) - 1];
+  }
+  std::string there;
+  for (std::size_t i = 0; i < monitors.size(); ++i) {
+    const PixelRect area = area_of(monitors[i]);
+    there += (i > 0 ? ", " : "") + std::to_string(i + 1) + " (" + glfwGetMonitorName(monitors[i]) +
+             ", " + std::to_string(area.x1 - area.x0) + "x" + std::to_string(area.y1 - area.y0) +
+             ")";
+  }
+  throw VisualizerError("--monitor: " + std::to_string(number) + " is not there; " +
+                        (there.empty() ? "this screen has none" : "take " + there));
+}
+
 /// A lower-case letter or a digit: what is printed on the key, or, if that is another sign (of
 /// other scripts, or the upper row of a French keyboard), what an American one has in its place. 0
 /// for any other key.
@@ -109,7 +140,19 @@ bool Window::has_screen() {
   return is_set("DISPLAY") || is_set("WAYLAND_DISPLAY");
 }
 
-Window::Window(std::optional<PictureSize> asked, Visibility visibility) {
+std::size_t monitor_of(const PixelRect& window, std::span<const PixelRect> monitors) {
+  std::size_t best = 0;
+  std::int64_t most = 0;
+  for (std::size_t i = 0; i < monitors.size(); ++i) {
+    const std::int64_t shown = window.clipped(monitors[i]).area();
+    if (shown <= most) continue;
+    best = i;
+    most = shown;
+  }
+  return best;
+}
+
+Window::Window(const WindowPlace& place, Visibility visibility) {
   if (glfwInit() != GLFW_TRUE) fail("the screen cannot be opened");
   glfwWindowHint(GLFW_CONTEXT_VERSION_MAJOR, 4);
   glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 5);
@@ -118,8 +161,18 @@ Window::Window(std::optional<PictureSize> asked, Visibility visibility) {
   glfwWindowHint(GLFW_CONTEXT_ROBUSTNESS, GLFW_LOSE_CONTEXT_ON_RESET);
   glfwWindowHint(GLFW_OPENGL_DEBUG_CONTEXT, gl_faults_are_reported() ? GLFW_TRUE : GLFW_FALSE);
   glfwWindowHint(GLFW_VISIBLE, GLFW_FALSE);  // until it has its size
-  glfwWindowHint(GLFW_SCALE_TO_MONITOR, asked ? GLFW_FALSE : GLFW_TRUE);
-  const PictureSize size = asked.value_or(kSuitableSize);
+  glfwWindowHint(GLFW_SCALE_TO_MONITOR, place.size ? GLFW_FALSE : GLFW_TRUE);
+  glfwWindowHint(GLFW_AUTO_ICONIFY, GLFW_FALSE);  // who looks at another monitor goes on seeing it
+  GLFWmonitor* monitor = glfwGetPrimaryMonitor();
+  if (place.monitor) {
+    try {
+      monitor = monitor_named(*place.monitor);
+    } catch (...) {
+      glfwTerminate();
+      throw;
+    }
+  }
+  const PictureSize size = place.size.value_or(kSuitableSize);
   handle_ = glfwCreateWindow(size.width, size.height, "kerf", nullptr, nullptr);
   if (handle_ == nullptr) {
     try {
@@ -136,25 +189,74 @@ Window::Window(std::optional<PictureSize> asked, Visibility visibility) {
   glfwSetMouseButtonCallback(handle_, on_button);
   glfwSetScrollCallback(handle_, on_scroll);
   glfwSetWindowRefreshCallback(handle_, on_exposed);
+  glfwSetWindowPosCallback(handle_, on_moved);
+  glfwSetWindowSizeCallback(handle_, on_resized);
   glfwMakeContextCurrent(handle_);
   outlive_the_screen();
   watch_for_faults();
   glfwSwapInterval(1);
-  if (!asked) fit();
-  if (visibility == Visibility::shown) glfwShowWindow(handle_);
+  if (!place.size || place.monitor) fit(monitor, place.monitor.has_value());
+  if (visibility == Visibility::hidden) return;
+  if (place.full_screen) {
+    fill(monitor);
+  } else {
+    glfwShowWindow(handle_);
+  }
 }
 
-void Window::fit() {
-  GLFWmonitor* const screen = glfwGetPrimaryMonitor();
-  if (screen == nullptr) return;
-  int wide = 0, high = 0, left = 0, top = 0, right = 0, bottom = 0;
-  glfwGetMonitorWorkarea(screen, nullptr, nullptr, &wide, &high);
+void Window::fit(GLFWmonitor* monitor, bool moves) {
+  if (monitor == nullptr) return;
+  int x = 0, y = 0, wide = 0, high = 0, left = 0, top = 0, right = 0, bottom = 0;
+  glfwGetMonitorWorkarea(monitor, &x, &y, &wide, &high);
   glfwGetWindowFrameSize(handle_, &left, &top, &right, &bottom);
   PictureSize now;
   glfwGetWindowSize(handle_, &now.width, &now.height);
   const PictureSize most{std::max(wide - left - right, 1), std::max(high - top - bottom, 1)};
-  if (now.width <= most.width && now.height <= most.height) return;
-  glfwSetWindowSize(handle_, std::min(now.width, most.width), std::min(now.height, most.height));
+  const PictureSize fits{std::min(now.width, most.width), std::min(now.height, most.height)};
+  if (fits != now) glfwSetWindowSize(handle_, fits.width, fits.height);
+  if (!moves) return;
+  glfwSetWindowPos(handle_, x + left + (most.width - fits.width) / 2,
+                   y + top + (most.height - fits.height) / 2);
+}
+
+void Window::fill(GLFWmonitor* monitor) {
+  const GLFWvidmode* const mode = monitor != nullptr ? glfwGetVideoMode(monitor) : nullptr;
+  if (mode == nullptr) return;
+  int x = 0, y = 0, wide = 0, high = 0;
+  glfwGetWindowPos(handle_, &x, &y);
+  glfwGetWindowSize(handle_, &wide, &high);
+  before_ = {x, y, x + wide, y + high};
+  full_screen_ = true;
+  glfwSetWindowMonitor(handle_, monitor, 0, 0, mode->width, mode->height, mode->refreshRate);
+}
+
+void Window::leave_full_screen() {
+  full_screen_ = false;
+  glfwSetWindowMonitor(handle_, nullptr, before_.x0, before_.y0, before_.x1 - before_.x0,
+                       before_.y1 - before_.y0, GLFW_DONT_CARE);
+}
+
+void Window::set_full_screen(bool full) {
+  if (full == full_screen_) return;
+  if (!full) return leave_full_screen();
+  const std::vector<GLFWmonitor*> monitors = all_monitors();
+  if (monitors.empty()) return;
+  std::vector<PixelRect> areas;
+  for (GLFWmonitor* const monitor : monitors) areas.push_back(area_of(monitor));
+  int x = 0, y = 0, wide = 0, high = 0;
+  glfwGetWindowPos(handle_, &x, &y);
+  glfwGetWindowSize(handle_, &wide, &high);
+  fill(monitors[monitor_of({x, y, x + wide, y + high}, areas)]);
+}
+
+void Window::follow_screen() {
+  if (std::exchange(f11_, false)) set_full_screen(!full_screen_);
+  if (full_screen_ && glfwGetWindowMonitor(handle_) == nullptr) {  // unplugged
+    leave_full_screen();
+    fit(glfwGetPrimaryMonitor(), true);
+  }
+  if (!std::exchange(moved_, false) || !cursor_known_) return;
+  glfwGetCursorPos(handle_, &cursor_x_, &cursor_y_);
 }
 
 Window::~Window() {
@@ -181,6 +283,14 @@ void Window::on_exposed(GLFWwindow* handle) {
   window_of(handle).input_.exposed = true;
 }
 
+void Window::on_moved(GLFWwindow* handle, int /*x*/, int /*y*/) {
+  window_of(handle).moved_ = true;
+}
+
+void Window::on_resized(GLFWwindow* handle, int /*width*/, int /*height*/) {
+  window_of(handle).moved_ = true;
+}
+
 void Window::present(const RenderTarget& target) {
   const PictureSize size = target.size();
   glBindFramebuffer(GL_DRAW_FRAMEBUFFER, 0);  // Mesa takes a new size over from a bound window only
@@ -198,6 +308,7 @@ void Window::show_pointer(bool shown) {
 
 WindowInput Window::poll() {
   glfwPollEvents();
+  if (!g_screen_is_gone) follow_screen();
   if (g_screen_is_gone) {
     throw VisualizerError(
         "window: the X server is gone; the controller goes on, so start "
@@ -254,6 +365,7 @@ void Window::on_key(GLFWwindow* handle, int key, int scancode, int action, int m
   Window& window = window_of(handle);
   if (key == GLFW_KEY_SPACE && action != GLFW_REPEAT) window.pedal_ = action == GLFW_PRESS;
   if (action != GLFW_PRESS) return;
+  window.f11_ = window.f11_ != (key == GLFW_KEY_F11);
   const bool shift = key == GLFW_KEY_LEFT_SHIFT || key == GLFW_KEY_RIGHT_SHIFT;
   if (shift && window.down_[GLFW_MOUSE_BUTTON_LEFT]) window.input_.of_view = true;
   const char letter = letter_of(key, scancode);

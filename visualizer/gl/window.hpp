@@ -2,8 +2,10 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -13,6 +15,7 @@
 #include "visualizer/gl/target.hpp"
 #include "visualizer/scene/pixel_rect.hpp"
 
+struct GLFWmonitor;
 struct GLFWwindow;
 
 namespace kerf {
@@ -60,6 +63,18 @@ struct WindowInput {
 /// dots per inch.
 inline constexpr PictureSize kSuitableSize{1280, 800};
 
+/// How a window opens.
+struct WindowPlace {
+  /// Without one: `kSuitableSize` at the scale of its monitor, or as much of it as there is room
+  /// for beside the desktop's bars and the window's frame.
+  std::optional<PictureSize> size{};
+  bool full_screen = false;      ///< `size` is what it has after that
+  std::optional<int> monitor{};  ///< counted from 1; none: where the desktop puts it
+};
+
+/// The one of `monitors` that shows most of `window`; the first if none does.
+[[nodiscard]] std::size_t monitor_of(const PixelRect& window, std::span<const PixelRect> monitors);
+
 /// A window on the screen with its own context; what it shows is drawn off the screen and copied.
 class Window final : public GlContext {
  public:
@@ -68,10 +83,9 @@ class Window final : public GlContext {
   /// Whether the environment names a screen.
   [[nodiscard]] static bool has_screen();
 
-  /// Without a size, takes `kSuitableSize` at the scale of its screen, or as much of it as the
-  /// screen has room for beside the desktop's bars and the window's frame. Throws VisualizerError
-  /// if the screen gives no window or no 4.5 core context.
-  Window(std::optional<PictureSize> size, Visibility visibility);
+  /// Throws VisualizerError if the screen gives no window or no 4.5 core context, or has no such
+  /// monitor.
+  Window(const WindowPlace& place, Visibility visibility);
   ~Window() override;
 
   [[nodiscard]] ContextKind kind() const noexcept override { return ContextKind::window; }
@@ -80,6 +94,9 @@ class Window final : public GlContext {
   void set_title(const std::string& title);
   /// Asks the screen for another size, which `size` returns once the screen has given it.
   void resize(PictureSize size);
+  /// F11 does so too, on the monitor that shows most of the window. A monitor that is unplugged
+  /// leaves a window on another one.
+  void set_full_screen(bool full);
   /// Shows `target`, which has the window's size; waits for the screen's refresh if it can.
   void present(const RenderTarget& target);
   /// Whether the pointer is seen over it.
@@ -88,8 +105,14 @@ class Window final : public GlContext {
   [[nodiscard]] WindowInput poll();
 
  private:
-  /// No larger than the screen has room for.
-  void fit();
+  /// Nowhere, if no monitor is plugged in.
+  void fill(GLFWmonitor* monitor);
+  /// No larger than the monitor has room for; in its middle if `moves`.
+  void fit(GLFWmonitor* monitor, bool moves);
+  /// Becomes the window that it was before it filled a monitor.
+  void leave_full_screen();
+  /// After events: F11, a monitor that went away, a pointer that rests while the window moves.
+  void follow_screen();
   /// False while it is minimised or taken off the screen.
   [[nodiscard]] bool is_seen() const;
   /// Whether the pointer is over the part of the window that is seen.
@@ -103,6 +126,8 @@ class Window final : public GlContext {
   static void on_button(GLFWwindow* handle, int button, int action, int mods);
   static void on_scroll(GLFWwindow* handle, double x, double y);
   static void on_exposed(GLFWwindow* handle);
+  static void on_moved(GLFWwindow* handle, int x, int y);
+  static void on_resized(GLFWwindow* handle, int width, int height);
 
   GLFWwindow* handle_ = nullptr;
   WindowInput input_;
@@ -113,6 +138,10 @@ class Window final : public GlContext {
   bool pedal_ = false;          ///< the space bar is down
   bool pointer_shown_ = true;
   bool has_shown_ = false;  ///< a picture
+  bool f11_ = false;        ///< pressed since the last `poll`
+  bool moved_ = false;      ///< the window, or its edges
+  bool full_screen_ = false;
+  PixelRect before_;  ///< it filled a monitor: from the upper left corner of the desktop
 };
 
 }  // namespace kerf

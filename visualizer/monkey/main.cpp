@@ -88,7 +88,8 @@ int run(const MonkeyOptions& options) {
   kerf::report_gl_faults([](const std::string& text) { g_gl_fault = "OpenGL: " + text; });
   constexpr kerf::PictureSize kWindow{640, 480};
   const std::unique_ptr<kerf::GlContext> context =
-      options.window ? std::make_unique<kerf::Window>(kWindow, kerf::Window::Visibility::shown)
+      options.window ? std::make_unique<kerf::Window>(kerf::WindowPlace{.size = kWindow},
+                                                      kerf::Window::Visibility::shown)
                      : kerf::make_headless_context();
   const kerf::Stopwatch watch;
   Monkey::Count count;

@@ -38,6 +38,7 @@ inline constexpr auto kKeys = std::to_array<KeyHelp>({
     {"w", "write the opacities"},
     {"n", "note the view: a file"},
     {"e", "export the surface"},
+    {"F11", "full screen; window"},
     {"h", "keys, no panels, panels"},
     {"q", "quit"},
 });

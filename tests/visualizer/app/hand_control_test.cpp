@@ -187,6 +187,16 @@ TEST_CASE("a zoom about the goal leaves it under the pointer, and the hand where
   }
 }
 
+TEST_CASE("a window fills the monitor that shows most of it") {
+  const std::array<PixelRect, 3> monitors{
+      PixelRect{0, 0, 1920, 1080}, {1920, 0, 3840, 1080}, {0, 1080, 800, 1680}};
+  CHECK(monitor_of({100, 100, 1380, 900}, monitors) == 0);
+  CHECK(monitor_of({1500, 100, 2780, 900}, monitors) == 1);
+  CHECK(monitor_of({100, 900, 700, 1400}, monitors) == 2);
+  CHECK(monitor_of({-900, -900, -100, -100}, monitors) == 0);  // on one that is gone
+  CHECK(monitor_of({0, 0, 10, 10}, {}) == 0);
+}
+
 TEST_CASE("a cursor's units are the picture's pixels times the scale of the screen") {
   CHECK(pixels_per_unit({640, 480}, {640, 480}) == glm::dvec2(1.0));
   CHECK(pixels_per_unit({1280, 960}, {640, 480}) == glm::dvec2(2.0));

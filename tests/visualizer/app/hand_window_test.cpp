@@ -284,7 +284,7 @@ TEST_CASE(
   CHECK(eventually([&] { return Bench::apart_mm(start, Bench::place()) > 1.0F; }, 10s));
 }
 
-TEST_CASE("the hand is at the pointer after every resize and zoom") {
+TEST_CASE("the hand is at the pointer after every resize, zoom, move and full screen") {
   if (!have("Xvfb") || !have("xdotool")) return;
   Bench bench;
   // What brings the hand to the pointer moves it no more.
@@ -302,7 +302,11 @@ TEST_CASE("the hand is at the pointer after every resize and zoom") {
         sized + "640 480 sleep 0.5 mousemove 460 140", sized + "640 240",
         "mousemove 330 110 sleep 0.3 " + sized + "480 360", sized + "900 700",
         "mousemove 560 200 sleep 0.3 " + wheel + "4 4 keyup ctrl", wheel + "7 5 keyup ctrl",
-        std::string("mousemove 1100 800 mousemove 500 220")}) {
+        std::string("mousemove 1100 800 mousemove 500 220"),
+        "mousemove 700 400 sleep 0.3 " + sized + "480 360 windowmove 500 300 sleep 0.5",
+        std::string("key F11"), std::string("mousemove 800 420 sleep 0.3 key F11"),
+        std::string("key F11 sleep 0.7 mousemove 200 700 sleep 0.3 key F11 sleep 0.5 "
+                    "mousemove 760 450")}) {
     CAPTURE(way);
     act(way + " sleep 0.7");
     check_at_pointer();

@@ -39,6 +39,21 @@ TEST_CASE("the command line of the demo is understood") {
   CHECK(options->cpus == std::vector<int>{0, 1});
 }
 
+TEST_CASE("full screen and a monitor are a window's") {
+  const auto options = parse({"--full-screen", "--monitor", "2"});
+  REQUIRE(options);
+  CHECK(options->full_screen);
+  CHECK(options->monitor == 2);
+  CHECK_FALSE(parse({})->full_screen);
+  CHECK_FALSE(parse({})->size_is_given);
+  CHECK(parse({"--size", "640x480"})->size_is_given);
+  CHECK_THROWS_WITH_AS(parse({"--full-screen", "--headless"}),
+                       "--full-screen: --headless has no window; give one of the two",
+                       VisualizerError);
+  CHECK_THROWS_WITH_AS(parse({"--monitor", "2", "--bench"}),
+                       "--monitor: --bench has no window; give one of the two", VisualizerError);
+}
+
 TEST_CASE("a size that is none is refused with the limits") {
   for (const char* text : {"", "x", "640", "640x", "x480", "0x10", "640x480x2", "-1x5", "8193x1",
                            "64 x64", "99999999999x1"}) {

@@ -57,7 +57,7 @@ TEST_CASE("before a hand that is still most frames of a window draw nothing") {
 TEST_CASE("a GL error in a window fails the test that makes it" * doctest::should_fail()) {
   if (!have("Xvfb")) FAIL("no screen: nothing to see, and this test has to fail");
   const Screen screen;
-  const Window window(PictureSize{64, 64}, Window::Visibility::hidden);
+  const Window window({.size = PictureSize{64, 64}}, Window::Visibility::hidden);
   glEnable(GL_INVALID_ENUM);
 }
 

@@ -230,18 +230,35 @@ DisplayDensity::~DisplayDensity() {
   XCloseDisplay(static_cast<Display*>(display_));
 }
 
-PictureSize seen_size() {
+namespace {
+
+/// X, Y, WIDTH, HEIGHT.
+std::array<int, 4> geometry() {
   FILE* const told = popen(
       "xdotool search --sync --onlyvisible --name 'kerf: test' getwindowgeometry --shell", "r");
   REQUIRE(told != nullptr);
-  PictureSize size{0, 0};
+  std::array<int, 4> all{};
   std::array<char, 128> line{};
   while (std::fgets(line.data(), line.size(), told) != nullptr) {
-    std::sscanf(line.data(), "WIDTH=%d", &size.width);
-    std::sscanf(line.data(), "HEIGHT=%d", &size.height);
+    std::sscanf(line.data(), "X=%d", &all[0]);
+    std::sscanf(line.data(), "Y=%d", &all[1]);
+    std::sscanf(line.data(), "WIDTH=%d", &all[2]);
+    std::sscanf(line.data(), "HEIGHT=%d", &all[3]);
   }
   CHECK(pclose(told) == 0);
-  return size;
+  return all;
+}
+
+}  // namespace
+
+PictureSize seen_size() {
+  const auto all = geometry();
+  return {all[2], all[3]};
+}
+
+std::array<int, 2> seen_place() {
+  const auto all = geometry();
+  return {all[0], all[1]};
 }
 
 void act(const std::string& events) {

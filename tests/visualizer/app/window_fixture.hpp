@@ -92,6 +92,8 @@ class DisplayDensity {
 
 /// Of the window on the screen that DISPLAY names, once there is one.
 [[nodiscard]] PictureSize seen_size();
+/// Where its upper left corner is.
+[[nodiscard]] std::array<int, 2> seen_place();
 
 /// Real events at the screen that DISPLAY names, and the time in which a window shows what they do.
 void act(const std::string& events);

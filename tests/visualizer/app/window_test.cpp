@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <array>
+#include <chrono>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -62,6 +64,50 @@ TEST_CASE("a window without a size has room for its panels, at its screen's scal
     Process window({KERF_TEST_BIN "/kerf-visualizer", "--name", "test", "--mute"},
                    screen.folder / "said");
     CHECK(seen_size() == one.size);
+  }
+}
+
+TEST_CASE("F11 and --full-screen fill the monitor, F11 gives the window back where it was") {
+  if (!have("Xvfb") || !have("xdotool")) return;
+  const Screen screen;
+  const Controller controller;
+  std::vector<std::string> words{
+      KERF_TEST_BIN "/kerf-visualizer", "--name", "test", "--mute", "--size", "480x360"};
+  const std::string find = "search --name 'kerf: test' ";
+  constexpr PictureSize kWindow{480, 360}, kScreen{1280, 960};
+  const auto becomes = [](PictureSize size) {
+    return eventually([&] { return seen_size() == size; }, std::chrono::seconds(20));
+  };
+  SUBCASE("by the key") {
+    Process window(words, screen.folder / "said");
+    CHECK(seen_size() == kWindow);
+    act(find + "windowmove 300 200 sleep 0.5 mousemove 500 400");
+    for (int times = 0; times < 2; ++times) {
+      act("key F11");
+      CHECK(becomes(kScreen));
+      act("key F11");
+      CHECK(becomes(kWindow));
+    }
+    CHECK(seen_place() == std::array{300, 200});
+    act("key q");
+    CHECK(window.wait() == 0);
+  }
+  SUBCASE("by the option") {
+    words.insert(words.end(), {"--full-screen", "--monitor", "1"});
+    Process window(words, screen.folder / "said");
+    CHECK(becomes(kScreen));
+    act("mousemove 500 400 key F11");
+    CHECK(becomes(kWindow));
+    CHECK(seen_place() == std::array{400, 300});  // in the middle
+    act("key q");
+    CHECK(window.wait() == 0);
+  }
+  SUBCASE("a monitor that is not there is refused with those that are") {
+    words.insert(words.end(), {"--monitor", "7"});
+    Process window(words, screen.folder / "said");
+    CHECK(window.wait() == 2);
+    CHECK(window.output() ==
+          "kerf-visualizer: --monitor: 7 is not there; take 1 (screen, 1280x960)\n");
   }
 }
 
