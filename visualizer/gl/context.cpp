@@ -46,13 +46,44 @@ GlDriver query_gl_driver() {
   return driver;
 }
 
+bool has_newest_gl() {
+  constexpr int kNewest = 45;
+  return epoxy_gl_version() >= kNewest;
+}
+
+std::string missing_extensions() {
+  if (has_newest_gl()) return {};
+  // Of objects without binding them, their storage, copies between them, and uniforms.
+  constexpr std::array kNeeded{"GL_ARB_direct_state_access", "GL_ARB_texture_storage",
+                               "GL_ARB_copy_image", "GL_ARB_separate_shader_objects",
+                               "GL_ARB_vertex_attrib_binding"};
+  std::string missing;
+  for (const char* name : kNeeded) {
+    if (!epoxy_has_gl_extension(name)) missing += (missing.empty() ? "" : ", ") + std::string(name);
+  }
+  return missing;
+}
+
+std::string found_gl(const std::string& missing) {
+  const GlDriver driver = query_gl_driver();
+  return driver.version + " (" + driver.renderer + ")" +
+         (missing.empty() ? "" : " without " + missing);
+}
+
+std::string gl_is_too_old(const std::string& place, const std::string& found) {
+  return place + ": the driver has OpenGL " + found +
+         ", and 4.5 is needed, or 3.3 with the extensions of docs/window.md; a browser needs "
+         "neither: ./kerf demo --serve";
+}
+
 namespace {
 
 /// A context on a display of EGL, without a surface.
 class EglContext final : public GlContext {
  public:
-  /// Null if the platform gives no 4.5 core context.
-  static std::unique_ptr<EglContext> make(EGLenum platform, void* native, ContextKind kind);
+  /// Null if the platform gives no context that can draw; `found` is what the first of them had.
+  static std::unique_ptr<EglContext> make(EGLenum platform, void* native, ContextKind kind,
+                                          std::string& found);
   ~EglContext() override;
 
   [[nodiscard]] ContextKind kind() const noexcept override { return kind_; }
@@ -60,7 +91,8 @@ class EglContext final : public GlContext {
 
  private:
   EglContext(EGLDisplay display, ContextKind kind) : display_(display), kind_(kind) {}
-  bool create();
+  bool create(std::string& found);
+  [[nodiscard]] EGLContext create(EGLConfig config, GlVersion version, bool tells_of_loss) const;
 
   EGLDisplay display_;
   EGLContext context_ = EGL_NO_CONTEXT;
@@ -71,11 +103,12 @@ bool has_extension(const char* list, std::string_view name) {
   return list != nullptr && std::string_view(list).find(name) != std::string_view::npos;
 }
 
-std::unique_ptr<EglContext> EglContext::make(EGLenum platform, void* native, ContextKind kind) {
+std::unique_ptr<EglContext> EglContext::make(EGLenum platform, void* native, ContextKind kind,
+                                             std::string& found) {
   const EGLDisplay display = eglGetPlatformDisplayEXT(platform, native, nullptr);
   if (display == EGL_NO_DISPLAY) return nullptr;
   std::unique_ptr<EglContext> made(new EglContext(display, kind));
-  return made->create() ? std::move(made) : nullptr;
+  return made->create(found) ? std::move(made) : nullptr;
 }
 
 EglContext::~EglContext() {
@@ -85,7 +118,23 @@ EglContext::~EglContext() {
   // The display stays: the whole process shares it, and the next context takes it again.
 }
 
-bool EglContext::create() {
+EGLContext EglContext::create(EGLConfig config, GlVersion version, bool tells_of_loss) const {
+  std::vector<EGLint> attributes{
+      EGL_CONTEXT_MAJOR_VERSION,       version.major,
+      EGL_CONTEXT_MINOR_VERSION,       version.minor,
+      EGL_CONTEXT_OPENGL_PROFILE_MASK, EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT};
+  if (tells_of_loss) {
+    attributes.insert(attributes.end(),
+                      {EGL_CONTEXT_OPENGL_RESET_NOTIFICATION_STRATEGY, EGL_LOSE_CONTEXT_ON_RESET});
+  }
+  if (gl_faults_are_reported()) {
+    attributes.insert(attributes.end(), {EGL_CONTEXT_OPENGL_DEBUG, EGL_TRUE});
+  }
+  attributes.push_back(EGL_NONE);
+  return eglCreateContext(display_, config, EGL_NO_CONTEXT, attributes.data());
+}
+
+bool EglContext::create(std::string& found) {
   EGLint major = 0;
   EGLint minor = 0;
   if (eglInitialize(display_, &major, &minor) != EGL_TRUE) return false;
@@ -96,30 +145,26 @@ bool EglContext::create() {
   constexpr std::array<EGLint, 5> kConfig{EGL_SURFACE_TYPE, 0, EGL_RENDERABLE_TYPE, EGL_OPENGL_BIT,
                                           EGL_NONE};
   EGLConfig config = nullptr;
-  EGLint found = 0;
-  if (eglChooseConfig(display_, kConfig.data(), &config, 1, &found) != EGL_TRUE || found == 0) {
+  EGLint configs = 0;
+  if (eglChooseConfig(display_, kConfig.data(), &config, 1, &configs) != EGL_TRUE || configs == 0) {
     return false;
   }
-  // Not every driver can report that it lost a context.
-  for (const bool tells_of_loss : {true, false}) {
-    std::vector<EGLint> attributes{
-        EGL_CONTEXT_MAJOR_VERSION,       4,
-        EGL_CONTEXT_MINOR_VERSION,       5,
-        EGL_CONTEXT_OPENGL_PROFILE_MASK, EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT};
-    if (tells_of_loss) {
-      attributes.insert(attributes.end(), {EGL_CONTEXT_OPENGL_RESET_NOTIFICATION_STRATEGY,
-                                           EGL_LOSE_CONTEXT_ON_RESET});
+  for (const GlVersion version : kAskedVersions) {
+    // Not every driver can report that it lost a context.
+    for (const bool tells_of_loss : {true, false}) {
+      if (context_ == EGL_NO_CONTEXT) context_ = create(config, version, tells_of_loss);
     }
-    if (gl_faults_are_reported()) {
-      attributes.insert(attributes.end(), {EGL_CONTEXT_OPENGL_DEBUG, EGL_TRUE});
-    }
-    attributes.push_back(EGL_NONE);
-    context_ = eglCreateContext(display_, config, EGL_NO_CONTEXT, attributes.data());
-    if (context_ != EGL_NO_CONTEXT) break;
   }
+  const bool draws = context_ != EGL_NO_CONTEXT;
+  if (!draws) context_ = eglCreateContext(display_, config, EGL_NO_CONTEXT, nullptr);
   if (context_ == EGL_NO_CONTEXT) return false;
   make_current();
   if (eglGetCurrentContext() != context_) return false;
+  const std::string missing = draws ? missing_extensions() : "";
+  if (!draws || !missing.empty()) {
+    if (found.empty()) found = found_gl(missing);
+    return false;
+  }
   watch_for_faults();
   return true;
 }
@@ -140,12 +185,12 @@ void GLAPIENTRY on_gl_message(GLenum, GLenum type, GLuint, GLenum severity, GLsi
 }
 
 /// The best of what EGL offers, current; null if it offers nothing.
-std::unique_ptr<EglContext> best_egl_context() {
+std::unique_ptr<EglContext> best_egl_context(std::string& found) {
   const char* const client = eglQueryString(EGL_NO_DISPLAY, EGL_EXTENSIONS);
   std::unique_ptr<EglContext> best;
   if (has_extension(client, "EGL_MESA_platform_surfaceless")) {
     best = EglContext::make(EGL_PLATFORM_SURFACELESS_MESA, EGL_DEFAULT_DISPLAY,
-                            ContextKind::egl_surfaceless);
+                            ContextKind::egl_surfaceless, found);
     if (best != nullptr && !query_gl_driver().software) return best;
   }
   if (!has_extension(client, "EGL_EXT_platform_device")) return best;
@@ -157,7 +202,7 @@ std::unique_ptr<EglContext> best_egl_context() {
     const EGLDeviceEXT device = devices[static_cast<std::size_t>(i)];
     if (best != nullptr && is_software_device(device)) continue;  // no better than what is there
     // NOLINTNEXTLINE(clang-analyzer-cplusplus.NewDeleteLeaks): `best` owns it, or it goes below
-    auto other = EglContext::make(EGL_PLATFORM_DEVICE_EXT, device, ContextKind::egl_device);
+    auto other = EglContext::make(EGL_PLATFORM_DEVICE_EXT, device, ContextKind::egl_device, found);
     if (other == nullptr) continue;
     const bool software = query_gl_driver().software;
     if (best == nullptr || !software) best = std::move(other);
@@ -170,17 +215,21 @@ std::unique_ptr<EglContext> best_egl_context() {
 }  // namespace
 
 std::unique_ptr<GlContext> make_headless_context() {
-  if (auto egl = best_egl_context()) return egl;
+  std::string found;
+  if (auto egl = best_egl_context(found)) return egl;
   if (Window::has_screen()) {
     return std::make_unique<Window>(WindowPlace{.size = PictureSize{1, 1}},
                                     Window::Visibility::hidden);
   }
+  if (!found.empty()) throw VisualizerError(gl_is_too_old("OpenGL", found));
   throw VisualizerError(
-      "OpenGL: no 4.5 core context on EGL surfaceless or EGL device, and no screen; install a "
-      "driver (Debian: libegl1 libgl1-mesa-dri)");
+      "OpenGL: no context on EGL surfaceless or EGL device, and no screen; install a driver "
+      "(Debian: libegl1 libgl1-mesa-dri)");
 }
 
 void throw_if_context_is_lost() {
+  static const bool kTells = has_newest_gl() || epoxy_has_gl_extension("GL_KHR_robustness");
+  if (!kTells) return;
   const GLenum status = glGetGraphicsResetStatus();
   if (status == GL_NO_ERROR) return;
   const char* const whose = status == GL_GUILTY_CONTEXT_RESET     ? "by this program"

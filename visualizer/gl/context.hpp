@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <string>
@@ -24,7 +25,27 @@ struct GlDriver {
 /// Whether a GL_RENDERER draws on the processor.
 [[nodiscard]] bool is_software_gl(std::string_view renderer);
 
-/// An OpenGL 4.5 core context, current on the thread that made it until it goes. One at a time.
+/// A version of OpenGL.
+struct GlVersion {
+  int major = 0, minor = 0;
+};
+/// What contexts are asked for, one after the other: 4.5, which has all that is used, and the
+/// oldest that may have it by extensions.
+inline constexpr std::array kAskedVersions{GlVersion{4, 5}, GlVersion{3, 3}};
+
+/// Whether the current context is 4.5 or newer.
+[[nodiscard]] bool has_newest_gl();
+/// The extensions that the current context lacks of those that every picture needs, with commas;
+/// empty: none, or it is 4.5 or newer.
+[[nodiscard]] std::string missing_extensions();
+
+/// The current context's version and driver, for a message; `missing` as above.
+[[nodiscard]] std::string found_gl(const std::string& missing);
+/// Message where nothing but `found` is to be had; it begins with `place`.
+[[nodiscard]] std::string gl_is_too_old(const std::string& place, const std::string& found);
+
+/// A core context of OpenGL 4.5, or of 3.3 with the extensions that every picture needs, current on
+/// the thread that made it until it goes. One at a time.
 class GlContext {
  public:
   GlContext() = default;

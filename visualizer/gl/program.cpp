@@ -6,6 +6,7 @@
 #include <glm/gtc/matrix_inverse.hpp>
 #include <glm/gtc/type_ptr.hpp>
 
+#include "visualizer/gl/context.hpp"
 #include "visualizer/scene/visualizer_error.hpp"
 
 namespace kerf {
@@ -26,7 +27,8 @@ std::string_view shader_text(std::string_view file) {
 void attach_stage(GLuint program, std::string_view file, std::string_view defines) {
   const std::string_view text = shader_text(file);
   const std::size_t below_version = text.find('\n', text.find("#version")) + 1;
-  std::string source(text.substr(0, below_version));
+  // Nothing in the shaders is newer than 3.30.
+  std::string source(has_newest_gl() ? text.substr(0, below_version) : "#version 330 core\n");
   source += defines;
   source += text.substr(below_version);
   const GLuint shader =

@@ -9,9 +9,12 @@
 #include <utility>
 
 #include <GLFW/glfw3.h>
-#include <epoxy/glx.h>
+#include <X11/Xlib.h>
 
 #include "visualizer/scene/visualizer_error.hpp"
+
+// A GLFW that is built for Wayland alone lacks it.
+extern "C" __attribute__((weak)) Display* glfwGetX11Display();
 
 namespace kerf {
 
@@ -34,7 +37,7 @@ bool g_screen_is_gone = false;
 /// Xlib would print two lines of its own and end the process, wherever that stands. Without them
 /// its calls fail from then on, and `Window::poll` has the word.
 void outlive_the_screen() {
-  Display* const display = glXGetCurrentDisplay();
+  Display* const display = glfwGetX11Display != nullptr ? glfwGetX11Display() : nullptr;
   if (display == nullptr) return;  // a screen without X
   XSetIOErrorHandler([](Display*) { return 0; });
   XSetIOErrorExitHandler(
@@ -70,6 +73,46 @@ GLFWmonitor* monitor_named(int number) {
   }
   throw VisualizerError("--monitor: " + std::to_string(number) + " is not there; " +
                         (there.empty() ? "this screen has none" : "take " + there));
+}
+
+/// By the interface that the screen's system has by itself (GLX in X), or, where that has no
+/// context, by EGL: some remote desktops have no GLX. The context is current.
+GLFWwindow* make_window(PictureSize size) {
+  constexpr std::array kInterfaces{GLFW_NATIVE_CONTEXT_API, GLFW_EGL_CONTEXT_API};
+  const auto make = [&] {
+    GLFWwindow* const made = glfwCreateWindow(size.width, size.height, "kerf", nullptr, nullptr);
+    if (made != nullptr) glfwMakeContextCurrent(made);
+    return made;
+  };
+  std::string found;
+  const auto reject = [&](GLFWwindow* made, const std::string& missing) {
+    found = found_gl(missing);
+    glfwDestroyWindow(made);
+  };
+  glfwWindowHint(GLFW_OPENGL_PROFILE, GLFW_OPENGL_CORE_PROFILE);
+  for (const GlVersion version : kAskedVersions) {
+    glfwWindowHint(GLFW_CONTEXT_VERSION_MAJOR, version.major);
+    glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, version.minor);
+    for (const int interface : kInterfaces) {
+      glfwWindowHint(GLFW_CONTEXT_CREATION_API, interface);
+      GLFWwindow* const made = make();
+      if (made == nullptr) continue;
+      const std::string missing = missing_extensions();
+      if (missing.empty()) return made;
+      reject(made, missing);
+    }
+  }
+  // Whatever there is: its version is the user's answer.
+  glfwWindowHint(GLFW_OPENGL_PROFILE, GLFW_OPENGL_ANY_PROFILE);
+  glfwWindowHint(GLFW_CONTEXT_VERSION_MAJOR, 1);
+  glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 0);
+  for (const int interface : kInterfaces) {
+    glfwWindowHint(GLFW_CONTEXT_CREATION_API, interface);
+    if (!found.empty()) break;
+    if (GLFWwindow* const made = make()) reject(made, {});
+  }
+  if (!found.empty()) throw VisualizerError(gl_is_too_old("window", found));
+  fail("neither GLX nor EGL has an OpenGL context");
 }
 
 /// A lower-case letter or a digit: what is printed on the key, or, if that is another sign (of
@@ -154,9 +197,6 @@ std::size_t monitor_of(const PixelRect& window, std::span<const PixelRect> monit
 
 Window::Window(const WindowPlace& place, Visibility visibility) {
   if (glfwInit() != GLFW_TRUE) fail("the screen cannot be opened");
-  glfwWindowHint(GLFW_CONTEXT_VERSION_MAJOR, 4);
-  glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 5);
-  glfwWindowHint(GLFW_OPENGL_PROFILE, GLFW_OPENGL_CORE_PROFILE);
   glfwWindowHint(GLFW_DEPTH_BITS, 0);
   glfwWindowHint(GLFW_CONTEXT_ROBUSTNESS, GLFW_LOSE_CONTEXT_ON_RESET);
   glfwWindowHint(GLFW_OPENGL_DEBUG_CONTEXT, gl_faults_are_reported() ? GLFW_TRUE : GLFW_FALSE);
@@ -173,14 +213,11 @@ Window::Window(const WindowPlace& place, Visibility visibility) {
     }
   }
   const PictureSize size = place.size.value_or(kSuitableSize);
-  handle_ = glfwCreateWindow(size.width, size.height, "kerf", nullptr, nullptr);
-  if (handle_ == nullptr) {
-    try {
-      fail("no OpenGL 4.5 core context");
-    } catch (...) {
-      glfwTerminate();
-      throw;
-    }
+  try {
+    handle_ = make_window(size);
+  } catch (...) {
+    glfwTerminate();
+    throw;
   }
   glfwSetWindowUserPointer(handle_, this);
   glfwSetKeyCallback(handle_, on_key);
@@ -191,7 +228,6 @@ Window::Window(const WindowPlace& place, Visibility visibility) {
   glfwSetWindowRefreshCallback(handle_, on_exposed);
   glfwSetWindowPosCallback(handle_, on_moved);
   glfwSetWindowSizeCallback(handle_, on_resized);
-  glfwMakeContextCurrent(handle_);
   outlive_the_screen();
   watch_for_faults();
   glfwSwapInterval(1);

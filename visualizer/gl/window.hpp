@@ -83,8 +83,8 @@ class Window final : public GlContext {
   /// Whether the environment names a screen.
   [[nodiscard]] static bool has_screen();
 
-  /// Throws VisualizerError if the screen gives no window or no 4.5 core context, or has no such
-  /// monitor.
+  /// Throws VisualizerError if the screen gives no window or no context that can draw, or has
+  /// no such monitor.
   Window(const WindowPlace& place, Visibility visibility);
   ~Window() override;
 

@@ -118,7 +118,7 @@ int slice_side(PictureSize size, double scale) {
 Overlay::Overlay() {
   ImGui::CreateContext();
   ImGui::GetIO().IniFilename = nullptr;  // leaves no file behind
-  if (!ImGui_ImplOpenGL3_Init("#version 450 core")) {
+  if (!ImGui_ImplOpenGL3_Init("#version 330 core")) {
     ImGui::DestroyContext();
     throw VisualizerError("overlay: Dear ImGui finds no OpenGL functions; install libgl1");
   }

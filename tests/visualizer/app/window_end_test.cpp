@@ -2,6 +2,7 @@
 // A window while nothing happens, and when what it stands on goes away.
 #include <chrono>
 #include <csignal>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <future>
@@ -81,14 +82,14 @@ TEST_CASE("a window whose GL context is lost ends with one line") {
 
 TEST_CASE("when the X server dies the window ends with one line, and the controller goes on") {
   if (!have("Xvfb") || !have("xdotool")) return;
-  for (const int signal : {SIGTERM, SIGKILL}) {
+  for (const int signal : {SIGTERM, SIGKILL, -SIGKILL}) {  // below 0: without GLX
     CAPTURE(signal);
-    Screen screen;
+    Screen screen("1280x960", signal > 0);
     Controller controller;
     Process window({KERF_TEST_BIN "/kerf-visualizer", "--name", "test", "--mute"},
                    screen.folder / "said");
     act("search --sync --onlyvisible --name 'kerf: test'");
-    screen.end(signal);
+    screen.end(std::abs(signal));
     CHECK(window.wait() == 2);
     CHECK(window.output() ==
           "kerf-visualizer: window: the X server is gone; the controller goes on, so start "

@@ -8,6 +8,7 @@
 #include <fstream>
 #include <thread>
 
+#include <dlfcn.h>
 #include <doctest/doctest.h>
 #include <fcntl.h>
 #include <sys/wait.h>
@@ -126,7 +127,7 @@ bool have(const char* program) {
   return false;
 }
 
-Screen::Screen(const std::string& size) {
+Screen::Screen(const std::string& size, bool has_glx) {
   int ready[2];
   REQUIRE(pipe(ready) == 0);
   server_ = fork();
@@ -136,7 +137,7 @@ Screen::Screen(const std::string& size) {
     dup2(quiet, STDERR_FILENO);
     const std::string pixels = size + "x24";
     execlp("Xvfb", "Xvfb", "-displayfd", to.c_str(), "-screen", "0", pixels.c_str(), "-nolisten",
-           "tcp", static_cast<char*>(nullptr));
+           "tcp", has_glx ? "+extension" : "-extension", "GLX", static_cast<char*>(nullptr));
     _exit(127);
   }
   close(ready[1]);
@@ -228,6 +229,65 @@ DisplayDensity::DisplayDensity(int dots_per_inch) {
 
 DisplayDensity::~DisplayDensity() {
   XCloseDisplay(static_cast<Display*>(display_));
+}
+
+namespace {
+
+// As in X11/extensions/Xrandr.h, as far as they are used.
+struct RandrResources {
+  Time timestamp, configured;
+  int crtc_count;
+  XID* crtcs;
+};
+struct RandrCrtc {
+  Time timestamp;
+  int x, y;
+  unsigned width, height;
+  XID mode;
+  unsigned short rotation;
+  int output_count;
+  XID* outputs;
+};
+
+template <class Function>
+Function* randr(void* library, const char* name) {
+  void* const found = dlsym(library, name);
+  REQUIRE(found != nullptr);
+  return reinterpret_cast<Function*>(found);
+}
+
+void set_crtc(void* library, Display* display, RandrResources* resources, const RandrCrtc& to) {
+  const auto set =
+      randr<int(Display*, RandrResources*, XID, Time, int, int, XID, unsigned short, XID*, int)>(
+          library, "XRRSetCrtcConfig");
+  CHECK(set(display, resources, resources->crtcs[0], CurrentTime, to.x, to.y, to.mode, to.rotation,
+            to.outputs, to.output_count) == 0);
+  XSync(display, False);
+}
+
+}  // namespace
+
+UnpluggedMonitor::UnpluggedMonitor()
+    : library_(dlopen("libXrandr.so.2", RTLD_NOW)), display_(XOpenDisplay(nullptr)) {
+  REQUIRE(library_ != nullptr);
+  REQUIRE(display_ != nullptr);
+  auto* const display = static_cast<Display*>(display_);
+  auto* const resources = randr<RandrResources*(Display*, ::Window)>(
+      library_, "XRRGetScreenResources")(display, DefaultRootWindow(display));
+  REQUIRE(resources != nullptr);
+  resources_ = resources;
+  before_ = randr<RandrCrtc*(Display*, RandrResources*, XID)>(library_, "XRRGetCrtcInfo")(
+      display, resources, resources->crtcs[0]);
+  RandrCrtc none{};
+  none.rotation = 1;  // as it is
+  set_crtc(library_, display, resources, none);
+}
+
+UnpluggedMonitor::~UnpluggedMonitor() {
+  auto* const display = static_cast<Display*>(display_);
+  set_crtc(library_, display, static_cast<RandrResources*>(resources_),
+           *static_cast<RandrCrtc*>(before_));
+  XCloseDisplay(display);
 }
 
 namespace {

@@ -23,7 +23,7 @@ namespace kerf::test {
 /// A screen that nobody sees, and a private folder.
 class Screen {
  public:
-  explicit Screen(const std::string& size = "1280x960");
+  explicit Screen(const std::string& size = "1280x960", bool has_glx = true);
   ~Screen();
   Screen(const Screen&) = delete;
   Screen& operator=(const Screen&) = delete;
@@ -88,6 +88,22 @@ class DisplayDensity {
 
  private:
   void* display_;
+};
+
+/// The one monitor of the screen is unplugged while this lives, by RandR, whose library comes with
+/// GLFW and whose headers do not.
+class UnpluggedMonitor {
+ public:
+  UnpluggedMonitor();
+  ~UnpluggedMonitor();
+  UnpluggedMonitor(const UnpluggedMonitor&) = delete;
+  UnpluggedMonitor& operator=(const UnpluggedMonitor&) = delete;
+
+ private:
+  void* library_;
+  void* display_;
+  void* resources_;
+  void* before_;
 };
 
 /// Of the window on the screen that DISPLAY names, once there is one.

@@ -102,6 +102,22 @@ TEST_CASE("F11 and --full-screen fill the monitor, F11 gives the window back whe
     act("key q");
     CHECK(window.wait() == 0);
   }
+  SUBCASE("a monitor that is unplugged leaves a window, which fills it again once it is back") {
+    words.emplace_back("--full-screen");
+    Process window(words, screen.folder / "said");
+    CHECK(becomes(kScreen));
+    act("mousemove 100 100");
+    {
+      const UnpluggedMonitor unplugged;
+      CHECK(becomes(kWindow));
+      act("key F11");  // there is none to fill
+      CHECK(seen_size() == kWindow);
+    }
+    act("sleep 0.5 key F11");
+    CHECK(becomes(kScreen));
+    act("key q");
+    CHECK(window.wait() == 0);
+  }
   SUBCASE("a monitor that is not there is refused with those that are") {
     words.insert(words.end(), {"--monitor", "7"});
     Process window(words, screen.folder / "said");
