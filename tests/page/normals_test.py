@@ -10,22 +10,13 @@ import subprocess
 import sys
 import tempfile
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / 'tests/web'))
-from browser import Page, find_chromium  # noqa: E402
-from served import served  # noqa: E402
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / 'web'))
+from tab import ROOT, check, exit_code  # noqa: E402
 
 # Those of the visualizer's own test, at 99 of 100 points.
 MOST_DEGREES, MOST_OF_BINARY = 3.0, 3.75
 RATIOS = [(1, 1, 2), (2, 1, 1), (1, 2, 1), (1, 1, 5), (1, 5, 1), (5, 1, 1), (1, 1, 10), (1, 10, 1), (10, 1, 1), (1, 10, 10)]
 FEW = [(1, 1, 1.5), (1, 3.7, 1), (1, 2, 8), (10, 1, 1), (1, 10, 10)]
-failures = []
-
-
-def check(holds, what):
-    print(('ok    ' if holds else 'FAILS ') + what, flush=True)
-    if not holds:
-        failures.append(what)
 
 
 def make_folder(folder):
@@ -96,27 +87,15 @@ CASES = [balls_have_their_normals, a_trench_within_a_thick_slice_has_walls, cuts
          the_longest_voxels_are_drawn, print_all]
 
 
-def main():
-    chromium = find_chromium()
-    if not chromium:
-        print('skipped: no browser; apt-get install chromium')
-        return 77
-    with tempfile.TemporaryDirectory() as profile, tempfile.TemporaryDirectory() as made:
-        folder = pathlib.Path(made)
-        make_folder(folder)
-        with served(folder) as address:
-            page = Page(chromium, profile)
-            try:
-                page.go(address + '/index.html')
-                page.until("document.title === 'normals'")
-                bodies = Bodies(page)
-                for case in CASES:
-                    if case.__name__ in sys.argv[1:] or (len(sys.argv) == 1 and case is not print_all):
-                        case(bodies)
-            finally:
-                page.close()
-    return 1 if failures else 0
+def all_cases(page, address):
+    page.go(address + '/index.html')
+    page.until("document.title === 'normals'")
+    for case in CASES:
+        if case.__name__ in sys.argv[1:] or (len(sys.argv) == 1 and case is not print_all):
+            case(Bodies(page))
 
 
 if __name__ == '__main__':
-    sys.exit(main())
+    with tempfile.TemporaryDirectory() as made:
+        make_folder(pathlib.Path(made))
+        sys.exit(exit_code(pathlib.Path(made), all_cases, needs=()))

@@ -1,35 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
 """The page where it cannot run, in headless Chromium: each time it says the cause and the cure.
 
-    causes_test.py ROOT PAGE-FOLDER [--pictures FOLDER]
+    causes_test.py PAGE-FOLDER [--pictures FOLDER]
 
 PAGE-FOLDER is what ./kerf page wrote. Exit code 77: skipped, for want of it or of a browser."""
 import contextlib
-import functools
-import http.server
-import pathlib
 import sys
-import tempfile
-import threading
 import time
 
-root, folder = (pathlib.Path(word).resolve() for word in sys.argv[1:3])
-pictures = pathlib.Path(sys.argv[4]) if sys.argv[3:4] == ['--pictures'] else None
-sys.path.insert(0, str(root / 'tests/page'))
-from browser import Page, find_chromium  # noqa: E402
-from served import Quiet  # noqa: E402
+from served import Quiet
+from tab import RUNS, arguments, check, exit_code, keep
 
 TOLD = "document.querySelector('#missing:not([hidden]), noscript p')?.innerText"
 STATE = "document.getElementById('state')?.textContent"
-RUNS = "document.body?.dataset.run === 'runs' && document.body.dataset.state === 'live'"
 WASM = "script-src 'self' 'wasm-unsafe-eval'"
-failures = []
-
-
-def check(holds, what):
-    print(('ok    ' if holds else 'FAILS ') + what, flush=True)
-    if not holds:
-        failures.append(what)
 
 
 class Server(Quiet):
@@ -74,9 +58,7 @@ def says(page, address, what, words):
     time.sleep(0.5)
     told = told and page.evaluate(TOLD)
     check(told and all(word in told for word in words), f'{what}: {told}')
-    if pictures:
-        pictures.mkdir(parents=True, exist_ok=True)
-        (pictures / f"{what.replace(' ', '-')}.png").write_bytes(page.picture())
+    keep(page, what.replace(' ', '-'))
 
 
 def text_in_the_frame(page):
@@ -131,36 +113,22 @@ def offline_in_a_run(page, address):
     check(page.evaluate(STATE) == 'the run has failed', f'and goes on saying so: {page.evaluate(STATE)}')
 
 
-def main():
-    chromium = find_chromium()
-    for there, name in ((chromium, 'chromium'), ((folder / 'kerf.wasm').exists(), f'{folder}/kerf.wasm')):
-        if not there:
-            print(f'skipped: no {name}')
-            return 77
-    server = http.server.ThreadingHTTPServer(('127.0.0.1', 0), functools.partial(Server, directory=folder))
-    threading.Thread(target=server.serve_forever, daemon=True).start()
-    address = f'http://127.0.0.1:{server.server_address[1]}'
-    with tempfile.TemporaryDirectory() as profile:
-        page = Page(chromium, profile, ['--disable-features=IsolateSandboxedIframes'])  # a frame there is one of the page's process
-        try:
-            page.size(1280, 800)
-            says(page, f'file://{folder}/index.html', 'a file', ('opened as a file', 'python3 -m http.server'))
-            for name in ('try.js', 'kerf.js', 'math.js', 'scenes.js'):
-                with serving(without=(name,)):
-                    says(page, address, f'without {name}', ('did not come', 'whole folder'))
-            for name in ('worker.js', 'kerf_module.js'):
-                with serving(without=(name,)):
-                    says(page, address, f'without {name}', ('servo of this tab did not start', 'whole folder'))
-            with serving(without=('kerf.wasm',)):
-                says(page, address, 'without kerf.wasm', ('kerf.wasm: 404', 'whole folder'))
-            for sandbox, how in (('', {}), ('allow-scripts', {}), ('allow-scripts', {'added': {'Access-Control-Allow-Origin': '*'}})):
-                says_in_a_frame(page, address, sandbox, ('sandbox', 'allow-same-origin'), **how)
-            policies(page, address)
-            offline_in_a_run(page, address)
-        finally:
-            page.close()
-            server.shutdown()
-    return 1 if failures else 0
+def all_causes(page, address):
+    says(page, f'file://{folder}/index.html', 'a file', ('opened as a file', 'python3 -m http.server'))
+    for name in ('try.js', 'kerf.js', 'math.js', 'scenes.js'):
+        with serving(without=(name,)):
+            says(page, address, f'without {name}', ('did not come', 'whole folder'))
+    for name in ('worker.js', 'kerf_module.js'):
+        with serving(without=(name,)):
+            says(page, address, f'without {name}', ('servo of this tab did not start', 'whole folder'))
+    with serving(without=('kerf.wasm',)):
+        says(page, address, 'without kerf.wasm', ('kerf.wasm: 404', 'whole folder'))
+    for sandbox, how in (('', {}), ('allow-scripts', {}), ('allow-scripts', {'added': {'Access-Control-Allow-Origin': '*'}})):
+        says_in_a_frame(page, address, sandbox, ('sandbox', 'allow-same-origin'), **how)
+    policies(page, address)
+    offline_in_a_run(page, address)
 
 
-sys.exit(main())
+folder, = arguments(__doc__, 'PAGE-FOLDER')
+# A frame of another site is then one of the page's process.
+sys.exit(exit_code(folder, all_causes, handler=Server, flags=['--disable-features=IsolateSandboxedIframes']))

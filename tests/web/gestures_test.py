@@ -1,24 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """What is cut is what was pressed: gestures of mouse and fingers on the real page in headless Chromium.
 
-    gestures_test.py ROOT PAGE-FOLDER
+    gestures_test.py PAGE-FOLDER
 
 PAGE-FOLDER is what ./kerf page wrote. Exit code 77: skipped, for want of it or of a browser."""
-import pathlib
 import random
 import sys
-import tempfile
 import time
 
-root, folder = (pathlib.Path(word).resolve() for word in sys.argv[1:3])
-sys.path.insert(0, str(root / 'tests/page'))
-from browser import Page, find_chromium  # noqa: E402
-from served import served  # noqa: E402
+from tab import HIDE, IS_LED, REMOVED, arguments, check, exit_code
 
 LEFT, RIGHT, MIDDLE = 1, 2, 4
 NAMES = {LEFT: 'left', RIGHT: 'right', MIDDLE: 'middle'}
 PINCHES = 100
-REMOVED = 'parseFloat(document.body.dataset.removedMm3)'
 PRESSED = """globalThis.pressedAt = []; globalThis.held = false;
   Worker.prototype.postMessage = (f => function (message, ...more) {
     if ('lead' in message || 'release' in message) held = message.lead?.[2] === true;
@@ -26,13 +20,6 @@ PRESSED = """globalThis.pressedAt = []; globalThis.held = false;
     return f.call(this, message, ...more);
   })(Worker.prototype.postMessage);"""
 SHIFT = 8  # of the protocol's modifiers
-failures = []
-
-
-def check(holds, what):
-    print(('ok    ' if holds else 'FAILS ') + what, flush=True)
-    if not holds:
-        failures.append(what)
 
 
 class User:
@@ -84,7 +71,6 @@ class User:
 
 
 LOSE = "document.getElementById('picture').releasePointerCapture(1)"  # a browser tells it with the next event
-HIDE = "Object.defineProperty(document, 'hidden', {value: %s, configurable: true}); document.dispatchEvent(new Event('visibilitychange'))"
 # What ends a press while the left button stays down, and what is to be undone then.
 ENDS = {
     'the right button goes down': (lambda user: user.down(RIGHT), lambda user: user.up(RIGHT)),
@@ -182,28 +168,16 @@ def pinches_cut_nothing(user):
     check(cut == 0 and presses == 0, f'they cut nothing ({cut:.3f} mm3, pressed in {presses} messages)')
 
 
-def main():
-    chromium = find_chromium()
-    for there, name in ((chromium, 'chromium'), ((folder / 'kerf.wasm').exists(), f'{folder}/kerf.wasm')):
-        if not there:
-            print(f'skipped: no {name}')
-            return 77
-    with tempfile.TemporaryDirectory() as profile, served(folder) as address:
-        page = Page(chromium, profile)
-        try:
-            page.call('Page.addScriptToEvaluateOnNewDocument', source=PRESSED)
-            page.size(1280, 800)
-            page.go(f'{address}/#scene=phantom&hand=mine')
-            waits = page.until("document.body?.dataset.run === 'runs' && document.body.dataset.handLed === 'true'", 120)
-            check(waits, 'the hand waits to be led')
-            if waits:
-                user = User(page)
-                mouse_cuts_what_it_presses(user)
-                finger_cuts_what_it_presses(user)
-                pinches_cut_nothing(user)
-        finally:
-            page.close()
-    return 1 if failures else 0
+def all_gestures(page, address):
+    page.call('Page.addScriptToEvaluateOnNewDocument', source=PRESSED)
+    page.go(f'{address}/#scene=phantom&hand=mine')
+    waits = page.until(IS_LED, 120)
+    check(waits, 'the hand waits to be led')
+    if waits:
+        user = User(page)
+        mouse_cuts_what_it_presses(user)
+        finger_cuts_what_it_presses(user)
+        pinches_cut_nothing(user)
 
 
-sys.exit(main())
+sys.exit(exit_code(*arguments(__doc__, 'PAGE-FOLDER'), all_gestures))

@@ -1,19 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Mouse and finger at once, and a page in the background, in headless Chromium.
 
-    pointers_test.py ROOT PAGE-FOLDER
+    pointers_test.py PAGE-FOLDER
 
 PAGE-FOLDER is what ./kerf page wrote. Exit code 77: skipped, for want of it or of a browser."""
 import math
-import pathlib
 import sys
-import tempfile
 import time
 
-root, folder = (pathlib.Path(word).resolve() for word in sys.argv[1:3])
-sys.path.insert(0, str(root / 'tests/page'))
-from browser import Page, find_chromium  # noqa: E402
-from served import served  # noqa: E402
+from tab import HIDE, IS_LED, arguments, check, exit_code
 
 # What the page asks of its worker: the names of the messages, and where the tool shall go.
 LISTEN = """globalThis.asked = [];
@@ -22,13 +17,6 @@ LISTEN = """globalThis.asked = [];
     else if ('release' in message) asked.push('release');
     return f.call(this, message, ...more);
   })(Worker.prototype.postMessage);"""
-failures = []
-
-
-def check(holds, what):
-    print(('ok    ' if holds else 'FAILS ') + what, flush=True)
-    if not holds:
-        failures.append(what)
 
 
 def asked(page):
@@ -86,14 +74,13 @@ def first_pointer_leads(page):
 
 
 def stands_still_when_hidden(page):
-    hide = "Object.defineProperty(document, 'hidden', {value: %s, configurable: true}); document.dispatchEvent(new Event('visibilitychange'))"
     seconds = "parseFloat([...document.querySelectorAll('#run-figures dt')].find(e => e.textContent === 'servo time')?.nextSibling.textContent ?? '-1')"
-    page.evaluate(hide % 'true')
+    page.evaluate(HIDE % 'true')
     time.sleep(0.6)  # what was under way
     before = page.evaluate(seconds)
     time.sleep(4)
     check(page.evaluate(seconds) == before, 'a run in the background stands still')
-    page.evaluate(hide % 'false')
+    page.evaluate(HIDE % 'false')
     began = time.monotonic()
     check(page.until(f'{seconds} > {before}', 30), 'and goes on')
     # No faster than the clock, but for the last figure's 0.2 s and its rounding.
@@ -101,27 +88,15 @@ def stands_still_when_hidden(page):
     check(gone <= time.monotonic() - began + 0.5, f'without a burst: {gone:.1f} s')
 
 
-def main():
-    chromium = find_chromium()
-    for there, name in ((chromium, 'chromium'), ((folder / 'kerf.wasm').exists(), f'{folder}/kerf.wasm')):
-        if not there:
-            print(f'skipped: no {name}')
-            return 77
-    with tempfile.TemporaryDirectory() as profile, served(folder) as address:
-        page = Page(chromium, profile)
-        try:
-            page.call('Page.addScriptToEvaluateOnNewDocument', source=LISTEN)
-            page.size(1280, 800)
-            page.call('Emulation.setTouchEmulationEnabled', enabled=True)
-            page.go(f'{address}/#scene=touch&hand=mine')
-            waits = page.until("document.body?.dataset.run === 'runs' && document.body.dataset.handLed === 'true'", 120)
-            check(waits, 'the hand waits to be led')
-            if waits:  # else the page has nothing of what the others look at
-                first_pointer_leads(page)
-                stands_still_when_hidden(page)
-        finally:
-            page.close()
-    return 1 if failures else 0
+def two_pointers(page, address):
+    page.call('Page.addScriptToEvaluateOnNewDocument', source=LISTEN)
+    page.call('Emulation.setTouchEmulationEnabled', enabled=True)
+    page.go(f'{address}/#scene=touch&hand=mine')
+    waits = page.until(IS_LED, 120)
+    check(waits, 'the hand waits to be led')
+    if waits:  # else the page has nothing of what the others look at
+        first_pointer_leads(page)
+        stands_still_when_hidden(page)
 
 
-sys.exit(main())
+sys.exit(exit_code(*arguments(__doc__, 'PAGE-FOLDER'), two_pointers))

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Recordings replayed by the module of a browser's tab, under Node, beside kerf-replay.
 
-    replay_module_test.py ROOT BIN-FOLDER PAGE-FOLDER
+    replay_module_test.py BIN-FOLDER PAGE-FOLDER
 
 PAGE-FOLDER is what ./kerf page wrote. Exit code 77: skipped, for want of it or of Node."""
 import json
@@ -13,19 +13,13 @@ import sys
 import tempfile
 
 from recordings import demo, flight_recording, make_recordings, Recordings, replayed_by_kerf
+from tab import ROOT, arguments, check, failures
 
-root, programs, folder = (pathlib.Path(word).resolve() for word in sys.argv[1:4])
-failures = []
-
-
-def check(holds, what):
-    print(('ok    ' if holds else 'FAILS ') + what, flush=True)
-    if not holds:
-        failures.append(what)
+programs, folder = arguments(__doc__, 'BIN-FOLDER', 'PAGE-FOLDER')
 
 
 def replayed_in_node(work, names, most=1 << 30, options=()):
-    run = subprocess.run(['node', *options, '--experimental-default-type=module', root / 'tests/web/replay_module.js', folder / 'kerf.wasm', str(most),
+    run = subprocess.run(['node', *options, '--experimental-default-type=module', ROOT / 'tests/web/replay_module.js', folder / 'kerf.wasm', str(most),
                           *(work / name for name in names)], capture_output=True, text=True, check=False)
     lines = run.stdout.splitlines()
     if len(lines) != len(names):
@@ -130,7 +124,7 @@ const found = (block, size) => {
 console.log(JSON.stringify([found([0x20, 7, 8], 2), found([0x10, 7, 1, 0, 0x10, 8], 6), found([0x50, 7, 8], 5), found([0xf0], 15),
   found([0x10, 7, 1], 5), found([0x20, 7, 8], 2 ** 40)]));
 """
-    run = subprocess.run(['node', '--experimental-default-type=module', '--input-type=module', '-e', script, root / 'web/page/mcap_log.js'], capture_output=True, text=True, check=False)
+    run = subprocess.run(['node', '--experimental-default-type=module', '--input-type=module', '-e', script, ROOT / 'web/page/mcap_log.js'], capture_output=True, text=True, check=False)
     found = json.loads(run.stdout) if run.stdout else run.stderr
     check(found == ['7,8', '7,7,7,7,7,8', *4 * ['refused']], f'blocks of LZ4: {found}')
 
@@ -142,10 +136,10 @@ def main():
             return 77
     with tempfile.TemporaryDirectory() as temporary:
         work = pathlib.Path(temporary)
-        demo(root, programs, work / 'demo', 'phantom', 2)
-        demo(root, programs, work / 'arms', 'two_arms', 1)
+        demo(ROOT, programs, work / 'demo', 'phantom', 2)
+        demo(ROOT, programs, work / 'arms', 'two_arms', 1)
         (work / 'arms/log').rename(work / 'two-arms')
-        names = make_recordings(work, work / 'demo/log').names + ['two-arms'] + flight_recording(root, programs, work)
+        names = make_recordings(work, work / 'demo/log').names + ['two-arms'] + flight_recording(ROOT, programs, work)
         kerf = tells_the_same(work, names)
         report = json.loads((work / 'demo/report.json').read_text())
         check(kerf['whole']['output_hash'] == report['output_hash'], 'the run had that hash, too')

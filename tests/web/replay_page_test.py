@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Recordings dropped on kerf's page in headless Chromium, beside kerf-replay.
 
-    replay_page_test.py ROOT BIN-FOLDER PAGE-FOLDER [--pictures FOLDER]
+    replay_page_test.py BIN-FOLDER PAGE-FOLDER [--pictures FOLDER]
 
 PAGE-FOLDER is what ./kerf page wrote. Exit code 77: skipped, for want of it or of a browser."""
 import json
@@ -12,23 +12,10 @@ import tempfile
 import time
 
 from recordings import demo, make_recordings, replayed_by_kerf
-from served import served
+from tab import HIDE, ROOT, RUNS, arguments, check, exit_code, keep
 
-root, programs, folder = (pathlib.Path(word).resolve() for word in sys.argv[1:4])
-pictures = pathlib.Path(sys.argv[5]) if sys.argv[4:5] == ['--pictures'] else None
-sys.path.insert(0, str(root / 'tests/page'))
-from browser import Page, find_chromium  # noqa: E402
-
+programs, folder = arguments(__doc__, 'BIN-FOLDER', 'PAGE-FOLDER')
 WRONG = ('cut-in-the-header', 'other-byte-order', 'missing-start', 'other-scene', 'cut-volume', 'huge-volume')
-failures = []
-
-
-def check(holds, what):
-    print(('ok    ' if holds else 'FAILS ') + what, flush=True)
-    if not holds:
-        failures.append(what)
-
-
 TICK, FOUND, RESTS = (f'document.body.dataset.{name}' for name in ('replayTick', 'replayFound', 'replayState'))
 STATE_LINE = "document.getElementById('run-state').textContent"
 
@@ -48,12 +35,8 @@ def choose(page, selector, files):
 
 
 def take_picture(page, name):
-    if not pictures:
-        return
     page.evaluate("document.getElementById('run').scrollIntoView()")
-    time.sleep(2)
-    pictures.mkdir(parents=True, exist_ok=True)
-    (pictures / f'{name}.png').write_bytes(page.picture())
+    keep(page, name, 2)
 
 
 def rests_at(page, tick, seconds=60):
@@ -102,15 +85,14 @@ def replays_a_folder(page, work, kerf):
 
 def stands_still_when_hidden(page):
     """A page in the background gives the worker no turn to make up for."""
-    hide = "Object.defineProperty(document, 'hidden', {value: %s, configurable: true}); document.dispatchEvent(new Event('visibilitychange'))"
     page.press('#replay-play')
     page.until(f"{RESTS} === 'plays'", 30)
-    page.evaluate(hide % 'true')
+    page.evaluate(HIDE % 'true')
     time.sleep(0.5)  # what was under way
     before = int(page.evaluate(TICK))
     time.sleep(3)
     check(int(page.evaluate(TICK)) == before, 'a replay in the background stands still')
-    page.evaluate(hide % 'false')
+    page.evaluate(HIDE % 'false')
     page.until(f"Number({TICK}) > {before}", 30)
     after = int(page.evaluate(TICK))
     # An eighth of real time: 3 s are 375 ticks, which a burst would make up for at once.
@@ -167,33 +149,22 @@ def replays_files_on_a_phone(page, address, work, kerf):
                      "document.body.dataset.timesRealTime > 0", 120), 'a run of its own again')
 
 
-def main():
-    chromium = find_chromium()
-    for there, name in ((chromium, 'chromium'), ((folder / 'kerf.wasm').exists(), f'{folder}/kerf.wasm')):
-        if not there:
-            print(f'skipped: no {name}')
-            return 77
-    with tempfile.TemporaryDirectory() as temporary, served(folder) as address:
+def all_recordings(page, address):
+    with tempfile.TemporaryDirectory() as temporary:
         work = pathlib.Path(temporary)
-        demo(root, programs, work / 'demo', 'phantom', 2)
+        demo(ROOT, programs, work / 'demo', 'phantom', 2)
         make_recordings(work, work / 'demo/log')
         subprocess.run([programs / 'kerf-record', 'export', work / 'whole', '--mcap', work / 'whole.mcap'], check=True, stdout=subprocess.DEVNULL)
         (work / 'picture.png').write_bytes(b'\x89PNG')
         kerf = replayed_by_kerf(programs, work, ('whole', 'another-report', *WRONG))
-        page = Page(chromium, work / 'profile')
-        try:
-            page.size(1280, 800)
-            page.go(f'{address}/#scene=touch')
-            check(page.until("document.body?.dataset.run === 'runs' && document.body.dataset.state === 'live'", 120), 'the tab has a run')
-            replays_a_folder(page, work, kerf)
-            stands_still_when_hidden(page)
-            finds_a_difference(page, work, kerf)
-            replays_a_file(page, work, kerf)
-            says_what_is_wrong(page, work, kerf)
-            replays_files_on_a_phone(page, address, work, kerf)
-        finally:
-            page.close()
-    return 1 if failures else 0
+        page.go(f'{address}/#scene=touch')
+        check(page.until(RUNS, 120), 'the tab has a run')
+        replays_a_folder(page, work, kerf)
+        stands_still_when_hidden(page)
+        finds_a_difference(page, work, kerf)
+        replays_a_file(page, work, kerf)
+        says_what_is_wrong(page, work, kerf)
+        replays_files_on_a_phone(page, address, work, kerf)
 
 
-sys.exit(main())
+sys.exit(exit_code(folder, all_recordings))

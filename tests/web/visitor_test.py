@@ -1,38 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """A visitor with a link, a keyboard alone, or a page around the page, in headless Chromium.
 
-    visitor_test.py ROOT PAGE-FOLDER [--pictures FOLDER]
+    visitor_test.py PAGE-FOLDER [--pictures FOLDER]
 
 PAGE-FOLDER is what ./kerf page wrote. Exit code 77: skipped, for want of it or of a browser."""
-import pathlib
 import sys
-import tempfile
 import time
 
-root, folder = (pathlib.Path(word).resolve() for word in sys.argv[1:3])
-pictures = pathlib.Path(sys.argv[4]) if sys.argv[3:4] == ['--pictures'] else None
-sys.path.insert(0, str(root / 'tests/page'))
-from browser import Page, find_chromium  # noqa: E402
-from served import served  # noqa: E402
+from tab import IS_LED, REMOVED, RUNS, arguments, check, exit_code, keep
 
-REMOVED = 'parseFloat(document.body.dataset.removedMm3)'
-RUNS = "document.body?.dataset.run === 'runs' && document.body.dataset.state === 'live'"
 MISSING = "document.getElementById('missing')"
 SMALL = """[...document.querySelectorAll('button, select, input, summary, a')].filter(e => e.checkVisibility()).map(e =>
   [e.id || e.tagName, e.getBoundingClientRect()]).filter(([, r]) => r.width < 24 || r.height < 24).map(([name, r]) => `${name} ${r.width} x ${r.height}`)"""
-failures = []
-
-
-def check(holds, what):
-    print(('ok    ' if holds else 'FAILS ') + what, flush=True)
-    if not holds:
-        failures.append(what)
-
-
-def keep(page, name):
-    if pictures:
-        pictures.mkdir(parents=True, exist_ok=True)
-        (pictures / f'{name}.png').write_bytes(page.picture())
 
 
 def link_shows_what_it_says(page, address):
@@ -62,7 +41,7 @@ def link_shows_what_it_says(page, address):
 def keys_alone_cut(page, address):
     page.go('about:blank')
     page.go(f'{address}/#scene=phantom&hand=mine')
-    check(page.until(f"{RUNS} && document.body.dataset.handLed === 'true'", 120), 'the hand waits to be led')
+    check(page.until(IS_LED, 120), 'the hand waits to be led')
     for _ in range(2):  # the picture is the first thing of the page
         if page.evaluate('document.activeElement.id') != 'picture':
             page.key('Tab', code='Tab')
@@ -136,24 +115,12 @@ def is_described(page, address):
     check(page.evaluate("fetch(document.querySelector('meta[property=\"og:image\"]').content).then(a => a.ok)"), 'its picture is there')
 
 
-def main():
-    chromium = find_chromium()
-    for there, name in ((chromium, 'chromium'), ((folder / 'kerf.wasm').exists(), f'{folder}/kerf.wasm')):
-        if not there:
-            print(f'skipped: no {name}')
-            return 77
-    with tempfile.TemporaryDirectory() as profile, served(folder) as address:
-        page = Page(chromium, profile)
-        try:
-            page.size(1280, 800)
-            link_shows_what_it_says(page, address)
-            keys_alone_cut(page, address)
-            is_large_enough(page)
-            leaves_the_wheel_to_a_page_around_it(page, address)
-            is_described(page, address)
-        finally:
-            page.close()
-    return 1 if failures else 0
+def all_visits(page, address):
+    link_shows_what_it_says(page, address)
+    keys_alone_cut(page, address)
+    is_large_enough(page)
+    leaves_the_wheel_to_a_page_around_it(page, address)
+    is_described(page, address)
 
 
-sys.exit(main())
+sys.exit(exit_code(*arguments(__doc__, 'PAGE-FOLDER'), all_visits))

@@ -1,47 +1,35 @@
 # SPDX-License-Identifier: Apache-2.0
 """kerf in a browser's tab beside kerf itself: the module under Node, then the page in headless Chromium with real pointers.
 
-    web_test.py ROOT BIN-FOLDER PAGE-FOLDER [--pictures FOLDER]
+    web_test.py BIN-FOLDER PAGE-FOLDER [--pictures FOLDER]
 
 PAGE-FOLDER is what ./kerf page wrote. Exit code 77: skipped, for want of it, of Node or of a browser."""
 import json
 import os
 import pathlib
-import shutil
 import subprocess
 import sys
 import tempfile
 import time
 
-from served import served
+from tab import DESKTOP, IS_LED, PHONE, REMOVED, ROOT, RUNS, arguments, check, exit_code, keep
 
-root, programs, folder = (pathlib.Path(word).resolve() for word in sys.argv[1:4])
-pictures = pathlib.Path(sys.argv[5]) if sys.argv[4:5] == ['--pictures'] else None
-sys.path.insert(0, str(root / 'tests/page'))
-from browser import Page, find_chromium  # noqa: E402
-
+programs, folder = arguments(__doc__, 'BIN-FOLDER', 'PAGE-FOLDER')
 SECONDS = 2
 SCENES = {'phantom': 'cut_cavity', 'touch': 'touch'}
-failures = []
-
-
-def check(holds, what):
-    print(('ok    ' if holds else 'FAILS ') + what, flush=True)
-    if not holds:
-        failures.append(what)
 
 
 def native(scene, seconds, *more):
     """output_hash and volume_hash of ./kerf demo --virtual."""
     with tempfile.TemporaryDirectory() as out:
-        subprocess.run([root / 'kerf', 'demo', '--headless', '--virtual', '--seconds', str(seconds), '--scene', scene,
+        subprocess.run([ROOT / 'kerf', 'demo', '--headless', '--virtual', '--seconds', str(seconds), '--scene', scene,
                         '--out', out + '/run', *more], check=True, stdout=subprocess.DEVNULL, env=os.environ | {'KERF_BIN': str(programs)})
         report = json.loads(pathlib.Path(out, 'run/report.json').read_text())
     return report['output_hash'], report['volume_hash']
 
 
 def in_node(script, *words):
-    run = subprocess.run(['node', '--experimental-default-type=module', root / 'tests/web' / script, folder / 'kerf.wasm', root, *words],
+    run = subprocess.run(['node', '--experimental-default-type=module', ROOT / 'tests/web' / script, folder / 'kerf.wasm', ROOT, *words],
                          capture_output=True, text=True, check=False)
     if run.returncode:
         raise RuntimeError(run.stderr)
@@ -68,19 +56,17 @@ def has_the_bits_of_kerf(page, address, known):
 
 
 def cuts_by_a_pointer(page, address, touch):
-    page.size(*((390, 844, True) if touch else (1280, 800)))
+    page.size(*(PHONE if touch else DESKTOP), touch)
     page.go('about:blank')
     page.go(f'{address}/#scene=phantom&hand=mine')
-    check(page.until("document.body?.dataset.run === 'runs' && document.body.dataset.state === 'live'", 120), 'the tab has a run')
+    check(page.until(RUNS, 120), 'the tab has a run')
     x, y, width, height = page.box('#picture')
     middle = x + width / 2, y + height / 2
-    figure = 'parseFloat(document.body.dataset.removedMm3)'
-    led = "document.body.dataset.handLed === 'true'"
-    check(page.until(led, 90), 'the hand waits to be led')
-    before = page.evaluate(figure)
+    check(page.until(IS_LED, 90), 'the hand waits to be led')
+    before = page.evaluate(REMOVED)
     end = time.monotonic() + 60
     at, down = 0, False
-    while time.monotonic() < end and not page.evaluate(figure) > before + 0.05:
+    while time.monotonic() < end and not page.evaluate(REMOVED) > before + 0.05:
         at += 1
         place = (middle[0] + 12 * ((at % 9) - 4) / 4, middle[1] + 10 * ((at % 5) - 2) / 2)
         if touch:
@@ -91,21 +77,18 @@ def cuts_by_a_pointer(page, address, touch):
             page.mouse('mousePressed', *place, button='left', buttons=1, clickCount=1)
         down = True
         time.sleep(0.03)
-    removed = page.evaluate(figure)
+    removed = page.evaluate(REMOVED)
     if touch:
         page.touch('touchEnd')
     else:
         page.mouse('mouseReleased', *middle, button='left')
     name = 'a finger' if touch else 'the mouse'
     check(removed > before, f'{name} cuts: {removed:.3f} mm3')
-    if pictures:
-        time.sleep(2)
-        pictures.mkdir(parents=True, exist_ok=True)
-        (pictures / f'{"phone" if touch else "desktop"}.png').write_bytes(page.picture())
+    keep(page, 'phone' if touch else 'desktop', 2)
 
 
 def says_what_is_wrong(page, address):
-    page.size(1280, 800)
+    page.size(*DESKTOP)
     page.go('about:blank')
     page.go(f'{address}/#scene=touch&set=force.stiffness_n_per_mm%3D1000')
     check(page.until("document.body?.dataset.run === 'failed'", 60), 'a value out of range ends the run')
@@ -128,29 +111,17 @@ def says_what_is_wrong(page, address):
                   'the run goes on without a picture')
 
 
-def main():
-    chromium = find_chromium()
-    for there, name in ((chromium, 'chromium'), (shutil.which('node'), 'node'), ((folder / 'kerf.wasm').exists(), f'{folder}/kerf.wasm')):
-        if not there:
-            print(f'skipped: no {name}')
-            return 77
+def all_of_it(page, address):
     known = {scene: native(scene, SECONDS) for scene in SCENES}
     for scene, hand in SCENES.items():
         run = in_node('run_module.js', f'{scene}.toml', f'hands/{hand}.toml', str(SECONDS))
         check((run['output_hash'], run['volume_hash']) == known[scene],
               f'{scene} under Node: {run["output_hash"]} {run["volume_hash"]}; {run["times_real_time"]:.2f} times real time')
     has_one_arm()
-    with tempfile.TemporaryDirectory() as profile, served(folder) as address:
-        page = Page(chromium, profile)
-        try:
-            page.size(1280, 800)
-            has_the_bits_of_kerf(page, address, known['phantom'])
-            cuts_by_a_pointer(page, address, touch=False)
-            cuts_by_a_pointer(page, address, touch=True)
-            says_what_is_wrong(page, address)
-        finally:
-            page.close()
-    return 1 if failures else 0
+    has_the_bits_of_kerf(page, address, known['phantom'])
+    cuts_by_a_pointer(page, address, touch=False)
+    cuts_by_a_pointer(page, address, touch=True)
+    says_what_is_wrong(page, address)
 
 
-sys.exit(main())
+sys.exit(exit_code(folder, all_of_it, needs=('kerf.wasm', 'node')))
