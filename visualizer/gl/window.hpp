@@ -105,6 +105,8 @@ class Window final : public GlContext {
   [[nodiscard]] WindowInput poll();
 
  private:
+  /// Throws VisualizerError, with the monitors that there are, if it is none of them.
+  [[nodiscard]] static GLFWmonitor* numbered_monitor(int number);
   /// Nowhere, if no monitor is plugged in.
   void fill(GLFWmonitor* monitor);
   /// No larger than the monitor has room for; in its middle if `moves`.
