@@ -73,7 +73,7 @@ class Ball {
     volume.grid = kGrid;
     volume.density = density_;
     volume.iso = 32768;
-    for (int i = 0; i < 3; ++i) {
+    for (std::size_t i = 0; i < 3; ++i) {
       volume.spacing_mm[i] = kEdgeMm;
       volume.origin_mm[i] = kBallMm[i] - kMiddle * kEdgeMm;
       volume.orientation[i] = 0.5;
