@@ -11,6 +11,7 @@ uniform sampler2D u_by_density;              // the same by density, row v for v
 uniform vec3 u_texels[KERF_VOLUMES];
 uniform vec2 u_fade[KERF_VOLUMES];           // densities where a material begins and where it is whole
 uniform mat3 u_eye_from_gradient[KERF_VOLUMES];
+uniform float u_surface_mm[KERF_VOLUMES];    // depth to which a gradient shows a surface
 uniform float u_least_extinction;            // per mm; less makes no difference
 uniform vec3 u_up_eye;                       // world up
 
@@ -91,6 +92,14 @@ vec3 gradient_of(int v, vec3 voxel, vec3 p) { return voxel; }
 
 #endif
 
+// The weight of the light on a surface: visualizer/scene/appearance.hpp has the reason (kLitMm).
+float lit_part(int v, float extinction, float facing) {
+  const float kLitMm = 0.4634;
+  const float kLeastFacing = 0.2;  // a ray that grazes leaves the border before it is in deeper
+  float per_mm = max(extinction, u_least_extinction) / max(facing, kLeastFacing);
+  return (1.0 - exp2(-per_mm * kLitMm)) / (1.0 - exp2(-per_mm * u_surface_mm[v]));
+}
+
 // Linear colour, lit, of what is at p, and -log2 of the transparency of a mm of it: times a presence
 // and a length that is exact, (1 - a)^(p s / s0) = 2^(-p s * this).
 vec4 material_of(int v, vec4 voxel, vec3 p, vec3 to_eye) {
@@ -105,7 +114,9 @@ vec4 material_of(int v, vec4 voxel, vec3 p, vec3 to_eye) {
   vec3 slope = u_eye_from_gradient[v] * gradient;
   vec3 normal = dot(slope, slope) > 0.0 ? -normalize(slope) : to_eye;
   if (dot(normal, to_eye) < 0.0) normal = -normal;
-  float surface = smoothstep(kSurface.x, kSurface.y, length(gradient));
+  float extinction = -log2(1.0 - min(material.a, 0.996)) / kOpacityMm;
+  float surface = smoothstep(kSurface.x, kSurface.y, length(gradient)) *
+                  lit_part(v, extinction, dot(normal, to_eye));
   vec3 colour = mix(kInside * material.rgb, lit(material.rgb, normal, to_eye, u_up_eye, 1.0), surface);
-  return vec4(colour, -log2(1.0 - min(material.a, 0.996)) / kOpacityMm);
+  return vec4(colour, extinction);
 }

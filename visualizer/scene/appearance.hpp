@@ -41,6 +41,16 @@ struct Stereo {
 /// voxels: an edge of the voxels of the default scene.
 inline constexpr double kOpacityMm = 0.125;
 
+/// How deep light from outside goes below a surface: what the default look shows of it, 3.7 voxel
+/// edges of the default scene. By its gradient a surface goes as deep as `GradientPlan::surface_mm`
+/// says, which depends on the voxels. So the translucent renderers weight the light with
+///
+///     (1 - 2^(-m kLitMm / c)) / (1 - 2^(-m surface_mm / c)),
+///
+/// m the extinction per mm, c the cosine between ray and normal: what a ray sees of a lit layer as
+/// thick as `kLitMm`, by what it sees of the one that is there.
+inline constexpr double kLitMm = 0.4634;
+
 /// Opacity over `kOpacityMm`, 0..1, by the name of the material.
 using Opacities = std::map<std::string, double>;
 

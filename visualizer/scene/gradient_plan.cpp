@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <span>
 #include <string>
 #include <vector>
@@ -95,6 +96,24 @@ FilterTaps voxel_taps(GradientFilter filter) {
   return on_all_axes(farid5());
 }
 
+/// Standard deviation, in edges, of the smoothing whose derivative the slope is.
+double spread_of(const AxisTaps& taps) {
+  double third = 0.0;
+  for (std::int32_t i = -taps.reach; i <= taps.reach; ++i) {
+    const float slope = taps.slope[static_cast<std::size_t>(AxisTaps::kMiddle + i)];
+    third += static_cast<double>(i * i * i) * static_cast<double>(slope);
+  }
+  return std::sqrt(third / (3.0 * static_cast<double>(taps.slope_sum)));
+}
+
+/// `GradientPlan::surface_mm` in edges. A step that is blurred as a Gaussian blurs has the slope
+/// 2 / (sqrt(2 pi) s) exp(-z^2 / (2 s^2)) over two edges; of s^2, 1/4 is the border's own.
+double surface_depth(double spread) {
+  const double s = std::hypot(spread, 0.5);
+  const double steepest = 2.0 / (std::sqrt(2.0 * std::numbers::pi) * s);
+  return s * std::sqrt(2.0 * std::log(std::max(steepest / kSurfaceSlope, 1.0)));
+}
+
 std::int32_t& part(VoxelIndex& index, int axis) {
   return axis == 0 ? index.x : axis == 1 ? index.y : index.z;
 }
@@ -111,15 +130,18 @@ GradientFilter gradient_named(std::string_view name) {
 
 GradientPlan::GradientPlan(GradientFilter of, const glm::dvec3& edges_mm)
     : filter(of), voxel(voxel_taps(of)) {
-  if (filter != GradientFilter::adaptive) return;
   const double longest = std::max({edges_mm.x, edges_mm.y, edges_mm.z});
+  surface_mm = surface_depth(spread_of(voxel.front())) * longest;
+  if (filter != GradientFilter::adaptive) return;
   const double shortest = std::min({edges_mm.x, edges_mm.y, edges_mm.z});
   if (longest < kCubic * shortest) {
     narrow = voxel;
     wide = on_all_axes(wide15());
+    surface_mm = surface_depth(spread_of(wide.front())) * longest;
     return;
   }
   const double wide_mm = std::max(kWidePerShortest * shortest, kWidePerLongest * longest);
+  surface_mm = surface_depth(wide_mm / longest) * longest;
   for (int axis = 0; axis < 3; ++axis) {
     // The hundredth is for edges that were rounded.
     const double fit = std::min(longest / edges_mm[axis] + 0.01, double{kMostInCell});

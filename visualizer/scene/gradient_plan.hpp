@@ -51,6 +51,10 @@ struct AxisTaps {
 };
 using FilterTaps = std::array<AxisTaps, 3>;  ///< by axis
 
+/// From this gradient on a sample inside a volume is lit as a surface by more than half
+/// (translucent_sample.frag), in units of `GradientPlan`.
+inline constexpr double kSurfaceSlope = 0.12;
+
 /// How the gradients of one volume are computed. A gradient is counted in units of a step from air
 /// to full density over two edges: of the voxel along each axis, or, by `adaptive`, of the longest
 /// one along all axes, so that what lies between two voxels is the mean of their directions.
@@ -80,6 +84,8 @@ struct GradientPlan {
   FilterTaps narrow{}, wide{};  ///< adaptive: of the cells
   VoxelIndex cell{1, 1, 1};     ///< adaptive: voxels of a cell, by axis
   glm::vec3 per_edge{1.0F};     ///< times this, a gradient is one per voxel edge
+  /// How deep below a surface, a step from air to full density, the gradient is `kSurfaceSlope`.
+  double surface_mm = 0.0;
 };
 
 /// Fills `gradients` for the voxels of `box` out of a whole volume, x fastest, with air around it.

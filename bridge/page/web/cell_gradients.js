@@ -2,8 +2,8 @@
 // Gradients of voxels with unequal edges, as `adaptive` of visualizer/scene/gradient: the voxels are
 // gathered into cells that are nearly cubes, and these filtered by mm. The shader takes for a point
 // what lies between the centres of cells (followed.frag).
-import {kAdaptedAgree, kAdaptedDiffer, kCubic, kMiddle, kMostInCell, kNarrowPerLongest, kWidePerLongest,
-  kWidePerShortest} from './constants.js';
+import {kAdaptedAgree, kAdaptedDiffer, kCubic, kMiddle, kMostInCell, kNarrowPerLongest, kSurfaceSlope,
+  kWidePerLongest, kWidePerShortest} from './constants.js';
 import {clamp} from './math.js';
 
 const kFull = 65535;
@@ -30,13 +30,24 @@ function spline(spread) {
   return taps;
 }
 
+const wideMmOf = (longest, shortest) => Math.max(kWidePerShortest * shortest, kWidePerLongest * longest);
+
+/** As `GradientPlan::surface_mm`, of voxels with these edges. */
+export function surfaceMm(edges) {
+  const longest = largest(edges), shortest = Math.min(...edges);
+  // The difference over two edges, by which cubes are shaded, is a mean of slopes that spread by the root of 1/3.
+  const spread = longest < kCubic * shortest ? Math.sqrt(1 / 3) : wideMmOf(longest, shortest) / longest;
+  const s = Math.hypot(spread, 0.5), steepest = 2 / (Math.sqrt(2 * Math.PI) * s);
+  return s * Math.sqrt(2 * Math.log(Math.max(steepest / kSurfaceSlope, 1))) * longest;
+}
+
 /** As `GradientPlan` of C++, of the edges of a voxel: {cell, perEdge, narrow, wide, reachCells, reach}. Null for cubes:
  * their gradient is that of the shader alone. */
 export function cellPlan(edges) {
   const longest = largest(edges), shortest = Math.min(...edges);
   if (longest < kCubic * shortest) return null;
   const cell = edges.map(edge => Math.trunc(Math.min(longest / edge + 0.01, kMostInCell)));
-  const wideMm = Math.max(kWidePerShortest * shortest, kWidePerLongest * longest);
+  const wideMm = wideMmOf(longest, shortest);
   const cellMm = edges.map((edge, axis) => cell[axis] * edge);
   const narrow = cellMm.map(mm => spline(kNarrowPerLongest * longest / mm));
   const wide = cellMm.map(mm => spline(wideMm / mm));

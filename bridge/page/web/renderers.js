@@ -2,6 +2,7 @@
 // Volumes cast ray by ray: where rays enter them, surfaces, and looks inside, as the renderers of
 // visualizer/render.
 import {clipFromEye, shownInEye} from './camera.js';
+import {surfaceMm} from './cell_gradients.js';
 import {kBlendStepVox} from './constants.js';
 import {bind, cover, Program} from './gl.js';
 import {affineInverse, multiply, turn} from './math.js';
@@ -100,6 +101,7 @@ export class BlendCaster {
       this.cast.setInts({[`u_voxel[${v}]`]: first, [`u_material[${v}]`]: first + 1,
         [`u_active_cell[${v}]`]: first + 2});
       this.cast.set({[`u_texels[${v}]`]: volume.texels,
+        [`u_surface_mm[${v}]`]: surfaceMm(volume.view.edges),
         [`u_fade[${v}]`]: [volume.transfer.empty, volume.transfer.full]});
       if (!volume.gradients) return;
       this.cast.setInts({[`u_cell_gradient[${v}]`]: this.cellsUnit + v});

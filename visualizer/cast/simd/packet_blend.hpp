@@ -15,7 +15,13 @@
 namespace kerf {
 namespace {
 
-constexpr float kInside = 0.62F;  // inside, light comes from everywhere
+constexpr float kInside = 0.62F;               // inside, light comes from everywhere
+constexpr float kOpaque = 0.98F;               // what lies behind adds two hundredths at most
+constexpr float kNoticeable = 1.0F / 32;       // pieces below have no light of their own
+constexpr float kLeastExtinction = 0.045347F;  // per mm, of `kLeastOpacity`: less is not seen
+constexpr float kLit = 0.4634F;                // mm: `kLitMm`
+constexpr float kLeastFacing = 0.2F;  // a ray that grazes leaves the border before it is in deeper
+constexpr float kNever = 1e9F;        // steps
 
 /// p on the mean over a piece; 0 in lanes that are not on. The density runs straight between its
 /// ends, so the ramp is integrated exactly: sampled, a border thinner than the step would leave
@@ -40,6 +46,17 @@ inline F presence_between(const CastVolumeJob& volume, F front, F back, M on) {
   const M steep = Simd::less(Simd::set(1e-4F), change * change);
   return Simd::select(on_ramp, Simd::select(steep, integral / change, half * (ramp_x + ramp_y)),
                       plain);
+}
+
+/// The weight of the light on a surface; `appearance.hpp` has the reason (`kLitMm`).
+inline F lit_part(const CastVolumeJob& volume, F extinction, F facing) {
+  const F one = Simd::set(1.0F);
+  const F per_mm = Simd::max(extinction, Simd::set(kLeastExtinction)) /
+                   Simd::max(facing, Simd::set(kLeastFacing));
+  const auto seen_of = [&](float mm) {
+    return one - exp2_of(-Simd::min(per_mm * Simd::set(mm), Simd::set(100.0F)));
+  };
+  return seen_of(kLit) / seen_of(volume.surface_mm);
 }
 
 /// The material in the middle of a piece, lit.
@@ -83,15 +100,11 @@ inline Material lit_material(const CastJob& job, const CastVolumeJob& volume, Ve
   const Vec3 unit =
       -normalized(transformed_back(volume.from_eye, per_edge(volume.gradient, gradient)));
   const Vec3 normal = select(Simd::less(dot(unit, vectors.to_eye), zero), -unit, unit);
-  const F surface = x * x * (Simd::set(3.0F) - Simd::set(2.0F) * x);
+  const F surface = x * x * (Simd::set(3.0F) - Simd::set(2.0F) * x) *
+                    lit_part(volume, material.extinction, dot(normal, vectors.to_eye));
   const Vec3 bright = mix(dim, lit(job, material.rgb, normal, vectors, Simd::set(1.0F)), surface);
   return {select(lights, bright, dim), material.extinction};
 }
-
-constexpr float kOpaque = 0.98F;               // what lies behind adds two hundredths at most
-constexpr float kNoticeable = 1.0F / 32;       // pieces below have no light of their own
-constexpr float kLeastExtinction = 0.045347F;  // per mm, of `kLeastOpacity`: less is not seen
-constexpr float kNever = 1e9F;                 // steps
 
 /// The rays' way through one volume.
 struct Walk {
