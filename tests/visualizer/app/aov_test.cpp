@@ -75,7 +75,7 @@ class Ball {
     volume.iso = 32768;
     for (std::size_t i = 0; i < 3; ++i) {
       volume.spacing_mm[i] = kEdgeMm;
-      volume.origin_mm[i] = kBallMm[i] - kMiddle * kEdgeMm;
+      volume.origin_mm[i] = kBallMm[static_cast<int>(i)] - kMiddle * kEdgeMm;
       volume.orientation[i] = 0.5;
     }
     volume.orientation[3] = 0.5;
