@@ -152,7 +152,9 @@ void main() {
       if (!solid) t = max(within.y, t + ahead_mm);
     }
     if (solid) {
-      float from_mm = max(within.x, shown.x);
+      // The ray goes on at t, which may lie just before the cell: what is solid where the ray is
+      // shown from is a face.
+      float from_mm = max(min(within.x, t), shown.x);
       float span_mm = min(within.y, end_mm) - from_mm;
       vec3 p = origin + from_mm * direction - vec3(cell);
       float s = first_root(cubic_along(cell, p, span_mm * direction));

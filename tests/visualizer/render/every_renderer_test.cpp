@@ -105,6 +105,46 @@ TEST_CASE("iso, surface and cast show the same face in the clip plane, also afte
   }
 }
 
+TEST_CASE("a face through one material has one colour, whichever cells a ray begins in") {
+  if (!have_gl()) return;
+  const VoxelGrid grid{40, 36, 44};
+  const TestVolume volume(grid, centred(grid, {0.2, 0.25, 0.15}), [](glm::dvec3) { return 1.0; });
+  const VolumeContent content = volume.content();
+  const PictureSize size{320, 320};
+  View view = look_at({9, 12, 30}, {}, 20, 45);
+  for (const char* kind : {"iso", "surface", "cast"}) {
+    CAPTURE(std::string(kind));
+    const auto renderer = make_renderer(kind, scene_of({&volume}), {&content, 1});
+    renderer->set_cut_open(true, {&content, 1});
+    for (double at_mm = -1.0; at_mm <= 1.0; at_mm += 0.25) {
+      CAPTURE(at_mm);
+      view.clip_plane = {0.0, -0.6, -0.8, at_mm};
+      const Drawn drawn = draw(*renderer, view, RenderTarget(size));
+      std::vector<std::size_t> face;
+      for (int y = 0; y < size.height; ++y) {
+        for (int x = 0; x < size.width; ++x) {
+          const auto at = static_cast<std::size_t>(y * size.width + x);
+          const PixelRay ray = pixel_ray(view, size, x, y);
+          const double mm = eye_distance_mm(static_cast<double>(drawn.depth[at]), view);
+          const glm::dvec4 hit(ray.origin_mm + mm * ray.direction, 1.0);
+          // Not where the surface of the body is that near.
+          const bool inside = std::abs(hit.x) < 3.7 && std::abs(hit.y) < 4.1 && std::abs(hit.z) < 3;
+          if (inside && std::abs(glm::dot(view.clip_plane, hit)) < 1e-3) face.push_back(at);
+        }
+      }
+      REQUIRE(face.size() > 5000);
+      const std::size_t middle = face[face.size() / 2];
+      int others = 0;
+      for (const std::size_t at : face) {
+        for (std::size_t c = 0; c < 3; ++c) {
+          if (std::abs(drawn.rgb[3 * at + c] - drawn.rgb[3 * middle + c]) > 3) ++others;
+        }
+      }
+      CHECK(others == 0);
+    }
+  }
+}
+
 TEST_CASE("a face in the clip plane has the colour of what lies in it, not behind it") {
   if (!have_gl()) return;
   const VoxelGrid grid{32, 32, 32};

@@ -163,7 +163,9 @@ inline Hit first_crossing(const CastVolumeJob& volume, const VolumeRays& rays, F
     const CellAround around = cell_around(volume, rays, t + ahead_mm);
     const M solid = Simd::both(alive, around.solid);
     if (Simd::any(solid)) {
-      const F from_mm = Simd::max(around.from_mm, shown_from_mm);
+      // The ray goes on at t, which may lie just before the cell: what is solid where the ray is
+      // shown from is a face.
+      const F from_mm = Simd::max(Simd::min(around.from_mm, t), shown_from_mm);
       const F span_mm = Simd::min(around.to_mm, rays.end_mm) - from_mm;
       const Vec3 p = rays.origin + from_mm * rays.direction - around.low;
       const Root root =
