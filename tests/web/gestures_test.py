@@ -19,6 +19,10 @@ PRESSED = """globalThis.pressedAt = []; globalThis.held = false;
     if (held) pressedAt.push(performance.now());
     return f.call(this, message, ...more);
   })(Worker.prototype.postMessage);"""
+CAPTURED = """globalThis.captured = false;
+  for (const kind of ['gotpointercapture', 'lostpointercapture']) {
+    document.addEventListener(kind, () => captured = kind === 'gotpointercapture', true);
+  }"""
 SHIFT = 8  # of the protocol's modifiers
 
 
@@ -32,7 +36,9 @@ class User:
 
     def move(self, right, down, **more):
         self.at = (self.middle[0] + right, self.middle[1] + down)
-        self.page.mouse('mouseMoved', *self.at, buttons=self.buttons, **more)
+        # A motion names the first button that is held, as the browser's own do: one that names none ends the capture.
+        button = next((name for bit, name in NAMES.items() if self.buttons & bit), 'none')
+        self.page.mouse('mouseMoved', *self.at, button=button, buttons=self.buttons, **more)
 
     def down(self, button, **more):
         self.buttons |= button
@@ -70,14 +76,22 @@ class User:
         check(after > before + 0.01, f'{what}: cuts ({before} and {after} mm3)')
 
 
-LOSE = "document.getElementById('picture').releasePointerCapture(1)"  # a browser tells it with the next event
+LOSE = "document.getElementById('picture').releasePointerCapture(1)"
+
+
+def loses_capture(user):
+    user.page.evaluate(LOSE)
+    user.move(5, 0)  # a browser tells with the next event that a capture is lost
+    check(user.page.until('!captured'), 'the page hears that the capture is lost')
+
+
 # What ends a press while the left button stays down, and what is to be undone then.
 ENDS = {
     'the right button goes down': (lambda user: user.down(RIGHT), lambda user: user.up(RIGHT)),
     'the middle button goes down and up': (lambda user: (user.down(MIDDLE), user.up(MIDDLE)), None),
     'shift goes down': (lambda user: user.key('keyDown'), lambda user: user.key('keyUp')),
     'a motion with shift': (lambda user: user.move(6, 0, modifiers=SHIFT), None),
-    'the capture is lost': (lambda user: (user.move(4, 0), user.page.evaluate(LOSE), user.move(5, 0)), None),
+    'the capture is lost': (loses_capture, None),
     'the page is out of focus': (lambda user: user.page.evaluate("dispatchEvent(new Event('blur'))"), None),
     'the page is hidden and seen again': (lambda user: user.page.evaluate(HIDE % 'true' + ';' + HIDE % 'false'), None),
     'the wheel with ctrl': (lambda user: user.page.mouse('mouseWheel', *user.at, deltaX=0, deltaY=1, modifiers=2), None),
@@ -97,7 +111,11 @@ def mouse_cuts_what_it_presses(user):
         user.move(0, 0)
         user.down(LEFT)
         user.cuts('the left button again')
+        user.move(2, 0)  # a browser captures with the next event
+        check(user.page.until('captured && held'), 'the left button again: is captured, and presses')
         end(user)
+        if end is not loses_capture:
+            check(user.page.evaluate('captured'), f'{name}: is still captured')
         user.rests(name)
         user.move(3, 3)
         user.rests(f'{name}, and the mouse moves', 0.3)
@@ -169,7 +187,7 @@ def pinches_cut_nothing(user):
 
 
 def all_gestures(page, address):
-    page.call('Page.addScriptToEvaluateOnNewDocument', source=PRESSED)
+    page.call('Page.addScriptToEvaluateOnNewDocument', source=PRESSED + CAPTURED)
     page.go(f'{address}/#scene=phantom&hand=mine')
     waits = page.until(IS_LED, 120)
     check(waits, 'the hand waits to be led')
