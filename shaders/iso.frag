@@ -152,9 +152,9 @@ void main() {
       if (!solid) t = max(within.y, t + ahead_mm);
     }
     if (solid) {
-      // The ray goes on at t, which may lie just before the cell: what is solid where the ray is
-      // shown from is a face.
-      float from_mm = max(min(within.x, t), shown.x);
+      // A cell that begins just ahead of where the ray is shown from holds that point, too: what is
+      // solid there is a face. Twice, since both are rounded.
+      float from_mm = within.x < shown.x + 2.0 * ahead_mm ? shown.x : within.x;
       float span_mm = min(within.y, end_mm) - from_mm;
       vec3 p = origin + from_mm * direction - vec3(cell);
       float s = first_root(cubic_along(cell, p, span_mm * direction));

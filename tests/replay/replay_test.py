@@ -184,7 +184,7 @@ class TestReplay(unittest.TestCase):
         inputs.unlink()
         self.assertIn("inputs from tick 1 on are missing", replay(kept, code=1))
         (kept / "inputs").rmdir()
-        self.assertIn(f"the first {before} ticks of the run are not in it", replay(kept, code=1))
+        self.assertIn("inputs: missing, and manifest.json lists its files", replay(kept, code=1))
 
     def test_the_scene_file_may_have_gone(self):
         text = self.scene.read_text()

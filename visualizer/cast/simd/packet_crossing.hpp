@@ -163,9 +163,11 @@ inline Hit first_crossing(const CastVolumeJob& volume, const VolumeRays& rays, F
     const CellAround around = cell_around(volume, rays, t + ahead_mm);
     const M solid = Simd::both(alive, around.solid);
     if (Simd::any(solid)) {
-      // The ray goes on at t, which may lie just before the cell: what is solid where the ray is
-      // shown from is a face.
-      const F from_mm = Simd::max(Simd::min(around.from_mm, t), shown_from_mm);
+      // A cell that begins just ahead of where the ray is shown from holds that point, too: what is
+      // solid there is a face. Twice, since both are rounded.
+      const F from_mm =
+          Simd::select(Simd::less(around.from_mm, shown_from_mm + (ahead_mm + ahead_mm)),
+                       shown_from_mm, around.from_mm);
       const F span_mm = Simd::min(around.to_mm, rays.end_mm) - from_mm;
       const Vec3 p = rays.origin + from_mm * rays.direction - around.low;
       const Root root =
