@@ -88,7 +88,7 @@ path __weakly_canonical(const path& name, error_code* error) {
 }
 
 /// The worker answers for each file by its name and has no list of them: a folder is one that
-/// cannot be read. So a part that is missing in the middle of a split log is not seen here.
+/// cannot be read. A part that is missing in the middle of a split log is seen in log_files.js.
 directory_iterator::directory_iterator(const path& /*name*/, error_code* error,
                                        directory_options /*options*/) {
   if (error != nullptr) *error = error_code(ENOTSUP, generic_category());

@@ -89,12 +89,27 @@ async function unpacked(bytes, most, name) {
   return out;
 }
 
+/** Throws if a file of a log is there behind a number that is missing: the module asks for one after the other. */
+function checkParts(folder, files) {
+  for (const log of ['ticks.npy', 'ticks-2.npy']) {
+    const nameOf = number => `${log}.${String(number).padStart(4, '0')}`;
+    const numbers = [...files.keys()].filter(place => place.startsWith(`${log}.`)).map(place => Number(place.slice(log.length + 1)));
+    let missing = 2;
+    while (files.has(nameOf(missing))) ++missing;
+    const later = Math.min(...numbers.filter(number => number > missing && files.has(nameOf(number))));
+    if (later !== Infinity) {
+      throw new Error(`${folder}/${nameOf(missing)}: missing, or cut in its header, and ${nameOf(later)} is there; copy the recording again`);
+    }
+  }
+}
+
 /**
  * The recording ready to be read: {folder, files: Map of path to {size, read}}. `bytesOf` a file gives all of it as
  * Uint8Array, `piecesOf` gives {size, read}. Throws as `findRecording`.
  */
 export async function readyRecording(dropped, bytesOf, piecesOf, most = kMostUnpacked) {
   const {folder, files, mcap} = findRecording(dropped);
+  if (!mcap) checkParts(folder, files);
   const ready = new Map();
   let left = most;
   for (const [place, file] of mcap ? ofMcap(mcap, piecesOf) : files) {
