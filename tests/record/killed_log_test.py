@@ -2,6 +2,7 @@
 """Logs of recorders that were killed: what belongs to them is known all the same, and what does not is named.
 
     killed_log_test.py ROOT BIN [TEST]"""
+import itertools
 import json
 import os
 import pathlib
@@ -147,9 +148,9 @@ class TestKilledLog(unittest.TestCase):
             (log / "ticks.npy.0004").write_bytes(b"x" * length)
             self.assert_told(log, f"{log / 'ticks.npy.0004'}: no file of this log, which has 3; ")
 
-    def torn(self, of, tears, damaged=None):
-        """A copy whose last files count 300 rows less than they have, and lost their last bytes to a power cut: {file: bytes}. The row of
-        this number from the end on is damaged. Returns the log, and how many rows of each file are left."""
+    def torn(self, of, tears, damaged=None, counted=True):
+        """A copy whose last files count 300 rows less than they have, as manifest.json does if `counted`, and lost their last bytes to a power
+        cut: {file: bytes}. The row of this number from the end on is damaged. Returns the log, and how many rows of each file are left."""
         log, left = self.copy(of), {}
         files = {name: sorted(log.glob(f"{name}*"))[-1] for name in ("ticks.npy", "ticks-2.npy") if (log / name).exists()}
         # A recorder may be killed between the rows of two arms.
@@ -165,14 +166,20 @@ class TestKilledLog(unittest.TestCase):
                 data[HEADER + (rows - damaged) * ROW + 50] ^= 1
             last.write_bytes(data)
             left[last] = rows - -(-size // ROW)
+        # Rows are on the disk before a header counts them, and the headers before manifest.json does.
+        manifest = json.loads((log / "manifest.json").read_text())
+        before = sum((path.stat().st_size - HEADER) // ROW for path in sorted(log.glob("ticks.npy*"))[:-1])
+        manifest["rows"] = before + max(rows - 300, 10) if counted else 0
+        (log / "manifest.json").write_text(sealed(manifest))
         return log, left
 
     def test_what_a_power_cut_tore_is_left_out(self):
         size = 250 * ROW - 77
-        for of, tears in ((self.log, {"ticks.npy": size}), (self.split, {"ticks.npy": 5 * ROW}), (self.two, {"ticks.npy": size}),
-                          (self.two, {"ticks-2.npy": size}), (self.two, {"ticks.npy": 3 * ROW, "ticks-2.npy": size})):
-            with self.subTest(of=of.parent.name, tears=tears):
-                log, left = self.torn(of, tears)
+        cases = ((self.log, {"ticks.npy": size}), (self.split, {"ticks.npy": 5 * ROW}), (self.two, {"ticks.npy": size}),
+                 (self.two, {"ticks-2.npy": size}), (self.two, {"ticks.npy": 3 * ROW, "ticks-2.npy": size}))
+        for (of, tears), counted in itertools.product(cases, (False, True)):
+            with self.subTest(of=of.parent.name, tears=tears, counted=counted):
+                log, left = self.torn(of, tears, counted=counted)
                 first = next(iter(left))
                 rows = min(left.values()) + sum((path.stat().st_size - HEADER) // ROW for path in log.glob("ticks.npy*") if path < first)
                 said = [f"{path}: {path.stat().st_size - HEADER - own * ROW} bytes behind its {own} rows are left out, since they are torn"
@@ -214,7 +221,7 @@ class TestKilledLog(unittest.TestCase):
             self.assertEqual(check(log)[0], 0)
 
     def test_a_second_arm_without_ticks_that_the_first_counts_is_an_error(self):
-        log, left = self.torn(self.two, {"ticks-2.npy": 301 * ROW})
+        log, left = self.torn(self.two, {"ticks-2.npy": 301 * ROW}, counted=False)
         second = log / "ticks-2.npy"
         data = second.read_bytes()
         begin, _ = data[:HEADER].split(b"'shape': (")
