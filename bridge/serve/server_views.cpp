@@ -21,7 +21,7 @@ void Server::Impl::take_view(const std::shared_ptr<Viewer>& viewer, const ViewMe
     return;
   }
   if (!is_presenter) {
-    viewer->view_sent = 0;  // is told who presents, also if it is another one
+    viewer->view_sent = 0;  // the next message says who presents, also if it is another one
     if (presenter_) return;
     try {
       presenter_.emplace(setup_.name);

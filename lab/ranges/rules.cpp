@@ -64,7 +64,7 @@ Rules::Rules(const LoadedScene& scene, std::uint64_t most_samples)
       legs_(scene.device.personality == Personality::falcon),
       motor_end_(device_parts::motor_count_end(scene.device.personality)),
       zero_ticks_(static_cast<std::size_t>(20.0 * scene.servo.rate_hz / 1000)) {
-  // The place is told in the scene: two roundings of the loop's numbers, and the offset's.
+  // The place is in the axes of the scene: two roundings of the loop's numbers, and the offset's.
   const auto& offset = scene.device.offset_mm;
   const double farthest =
       std::max({std::abs(offset[0]), std::abs(offset[1]), std::abs(offset[2])}) + 500 * scale_;

@@ -37,7 +37,7 @@ class Log:
     def __init__(self, folder, check=True):
         folder = pathlib.Path(folder)
         try:
-            (folder / "ticks.npy").stat()  # what is no recording is told so
+            (folder / "ticks.npy").stat()  # a folder that is no recording: its error names this file
             # The manifest first, and the second arm last: what a recorder wrote down is there when the next is read.
             texts = {name: bytes_of(folder / name) for name in ("manifest.json", "scene.json")}
             self.manifest, self.scene = (words_of(folder / name, text) for name, text in texts.items())

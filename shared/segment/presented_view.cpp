@@ -12,6 +12,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "shared/numeric/fnv1a.hpp"
 #include "shared/posix/error_text.hpp"
 #include "shared/segment/layout.hpp"
 
@@ -26,18 +27,12 @@ struct ViewRecord {
   std::uint64_t pid = 0;
   std::uint64_t count = 0;  ///< of views, from 1
   PresentedView view;
-  std::uint64_t hash = 0;
+  std::uint64_t hash = 0;  ///< FNV-1a of what lies before it
 };
 static_assert(sizeof(ViewRecord) == 104);
 
-/// FNV-1a of what lies before it.
 std::uint64_t hash_of(const ViewRecord& record) noexcept {
-  const auto* const bytes = reinterpret_cast<const unsigned char*>(&record);
-  std::uint64_t hash = 0xcbf2'9ce4'8422'2325;
-  for (std::size_t i = 0; i < offsetof(ViewRecord, hash); ++i) {
-    hash = (hash ^ bytes[i]) * 0x0000'0100'0000'01b3;
-  }
-  return hash;
+  return fnv1a({reinterpret_cast<const char*>(&record), offsetof(ViewRecord, hash)});
 }
 
 std::string view_file(std::string_view name) {
@@ -65,16 +60,19 @@ bool read_record(int file, ViewRecord& record) noexcept {
 
 }  // namespace
 
-bool is_valid(const PresentedView& view) noexcept {
-  constexpr double kFarthestMm = 1e5, kNearestMm = 1e-6, kLeastSine = 1e-5;
-  double away[3], cross[3], far_2 = 0.0, up_2 = 0.0, cross_2 = 0.0;
-  for (const auto* const place : {&view.eye_mm, &view.target_mm, &view.up}) {
+ViewProblem problem_in(const PresentedView& view) noexcept {
+  // Places are written to a millionth of a mm; directions of six digits are off by up to 1e-6 of
+  // their length.
+  constexpr double kNearestMm = 1e-6, kLeastSine = 1e-5;
+  const auto is_far = [](const double(&place)[3]) {
     // A NaN is within nothing.
-    if (!std::all_of(std::begin(*place), std::end(*place),
-                     [](double v) { return std::abs(v) <= kFarthestMm; })) {
-      return false;
-    }
-  }
+    return !std::all_of(std::begin(place), std::end(place),
+                        [](double v) { return std::abs(v) <= kFarthestViewMm; });
+  };
+  if (is_far(view.eye_mm)) return ViewProblem::eye_far;
+  if (is_far(view.target_mm)) return ViewProblem::target_far;
+  if (is_far(view.up)) return ViewProblem::up_far;
+  double away[3], far_2 = 0.0, up_2 = 0.0, cross_2 = 0.0;
   for (int i = 0; i < 3; ++i) {
     away[i] = view.eye_mm[i] - view.target_mm[i];
     far_2 += away[i] * away[i];
@@ -82,11 +80,13 @@ bool is_valid(const PresentedView& view) noexcept {
   }
   for (int i = 0; i < 3; ++i) {
     const int j = (i + 1) % 3, k = (i + 2) % 3;
-    cross[i] = away[j] * view.up[k] - away[k] * view.up[j];
-    cross_2 += cross[i] * cross[i];
+    const double cross = away[j] * view.up[k] - away[k] * view.up[j];
+    cross_2 += cross * cross;
   }
-  return far_2 >= kNearestMm * kNearestMm && up_2 > 0.0 &&
-         cross_2 >= kLeastSine * kLeastSine * far_2 * up_2;
+  if (!(far_2 >= kNearestMm * kNearestMm)) return ViewProblem::eye_at_target;
+  if (!(up_2 > 0.0)) return ViewProblem::up_zero;
+  if (!(cross_2 >= kLeastSine * kLeastSine * far_2 * up_2)) return ViewProblem::up_along_view;
+  return ViewProblem::none;
 }
 
 ViewPresenter::ViewPresenter(std::string_view name) : path_(view_file(name)) {

@@ -22,10 +22,25 @@ struct PresentedView {
 };
 static_assert(sizeof(PresentedView) == 72);
 
-/// True if all of it is finite and within 1e5, the eye is not at the target, and `up` is not along
-/// the view: what --camera takes (visualizer/scene/camera_pose.hpp). Others' views are checked by
-/// this before they are used or passed on.
-[[nodiscard]] bool is_valid(const PresentedView& view) noexcept;
+/// Farther off, a float of the shaders steps by more than 1/128 mm.
+inline constexpr double kFarthestViewMm = 1e5;
+
+/// What makes a view none.
+enum class ViewProblem {
+  none,
+  eye_far,     ///< beyond `kFarthestViewMm`, or not finite
+  target_far,  ///< as well
+  up_far,      ///< as well
+  eye_at_target,
+  up_zero,
+  up_along_view
+};
+/// The first of them. What --camera takes has none (visualizer/scene/camera_pose.hpp).
+[[nodiscard]] ViewProblem problem_in(const PresentedView& view) noexcept;
+/// True if there is none. Others' views are checked by this before they are used or passed on.
+[[nodiscard]] inline bool is_valid(const PresentedView& view) noexcept {
+  return problem_in(view) == ViewProblem::none;
+}
 
 /// The one presenter of a controller's views, until it is destroyed or its process ends. One
 /// thread.

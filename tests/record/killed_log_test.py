@@ -7,33 +7,14 @@ import json
 import os
 import pathlib
 import shutil
-import subprocess
-import sys
 import tempfile
 import unittest
 import warnings
-import zlib
 
-ROOT, BIN = (pathlib.Path(sys.argv.pop(1)).resolve() for _ in range(2))
-sys.path[:0] = [str(ROOT / "tests/record"), str(ROOT / "python")]
 from lockstep_run import record, record_killed, sealed, set_clock
-try:
-    import kerf_reader
-except ImportError:
-    kerf_reader = None  # no NumPy
+from recordings import BIN, HEADER, ROOT, ROW, check, kerf_reader, run
 
-HEADER, ROW = 4096, 496
 TOUCH, TWO = {"touch.toml": []}, {"cut_cavity.toml": [], "groove.toml": ["--personality", "touch"]}
-
-
-def run(program, *arguments):
-    """Exit code, standard output, standard error."""
-    done = subprocess.run([BIN / program, *arguments], capture_output=True, text=True, timeout=120)
-    return done.returncode, done.stdout, done.stderr
-
-
-def check(log):
-    return run("kerf-record", "check", log)
 
 
 class TestKilledLog(unittest.TestCase):
@@ -58,7 +39,7 @@ class TestKilledLog(unittest.TestCase):
         shutil.copytree(of, copy)
         return copy
 
-    def assert_told(self, log, words, by=("check", "info", "replay", "reader")):
+    def assert_said(self, log, words, by=("check", "info", "replay", "reader")):
         """By each of them, with exit code 1."""
         commands = {"check": ("kerf-record", "check", log), "info": ("kerf-record", "info", log), "replay": ("kerf-replay", log)}
         for name in by:
@@ -90,21 +71,21 @@ class TestKilledLog(unittest.TestCase):
                 data = bytearray((log / "volumes" / name).read_bytes())
                 data[at] ^= 1
                 (log / "volumes" / name).write_bytes(data)
-                self.assert_told(log, f"volumes/{name}: its checksum is ", by=["check"])
+                self.assert_said(log, f"volumes/{name}: its checksum is ", by=["check"])
 
-    def test_the_clock_of_another_run_is_told_by_all(self):
+    def test_the_clock_of_another_run_is_reported_by_all(self):
         for log in (self.log, self.split):
             log = self.copy(log)
             shutil.copy(self.whole / "clock.npy", log / "clock.npy")
-            self.assert_told(log, "clock.npy: its checksum is ")
+            self.assert_said(log, "clock.npy: its checksum is ")
 
-    def test_logs_of_two_arms_that_are_exchanged_are_told_by_all(self):
+    def test_logs_of_two_arms_that_are_exchanged_are_reported_by_all(self):
         folder = pathlib.Path(tempfile.mkdtemp(dir=self.folder))
         log = record_killed(ROOT, BIN, folder, ROOT / "scenes/two_arms.toml", TWO, synced=True)
         (log / "ticks.npy").rename(log / "one.npy")
         (log / "ticks-2.npy").rename(log / "ticks.npy")
         (log / "one.npy").rename(log / "ticks-2.npy")
-        self.assert_told(log, "ticks.npy: does not begin with the row that its recorder wrote first")
+        self.assert_said(log, "ticks.npy: does not begin with the row that its recorder wrote first")
         path = log / "manifest.json"
         path.write_text(path.read_text().replace('"compiler": "', '"compiler": "b', 1))
         code, said, wrong = run("kerf-record", "check", log, "--repair")
@@ -122,14 +103,14 @@ class TestKilledLog(unittest.TestCase):
             self.assertEqual(check(log)[0], code, check(log))
             if kerf_reader and code == 0:
                 kerf_reader.Log(log)
-        self.assert_told(log, "clock.npy: its checksum is ")
+        self.assert_said(log, "clock.npy: its checksum is ")
 
-    def test_a_last_file_of_a_log_that_is_lost_is_told_by_all(self):
+    def test_a_last_file_of_a_log_that_is_lost_is_reported_by_all(self):
         for of in (self.split, self.whole):
             log = self.copy(of)
             files = sorted(log.glob("ticks.npy.*"))
             files[-1].unlink()
-            self.assert_told(log, f"{files[-1]}: missing, and the recorder had begun {len(files) + 1} files of this log; copy")
+            self.assert_said(log, f"{files[-1]}: missing, and the recorder had begun {len(files) + 1} files of this log; copy")
 
     def test_a_last_file_that_is_cut_in_its_header(self):
         for length in (0, 100, HEADER - 1):
@@ -143,10 +124,10 @@ class TestKilledLog(unittest.TestCase):
             log = self.copy(self.whole)
             last = log / "ticks.npy.0003"
             last.write_bytes(last.read_bytes()[:length])
-            self.assert_told(log, f"{last}: cut in its header; copy")
+            self.assert_said(log, f"{last}: cut in its header; copy")
             log = self.copy(self.whole)
             (log / "ticks.npy.0004").write_bytes(b"x" * length)
-            self.assert_told(log, f"{log / 'ticks.npy.0004'}: no file of this log, which has 3; ")
+            self.assert_said(log, f"{log / 'ticks.npy.0004'}: no file of this log, which has 3; ")
 
     def torn(self, of, tears, damaged=None, counted=True):
         """A copy whose last files count 300 rows less than they have, as manifest.json does if `counted`, and lost their last bytes to a power
@@ -226,7 +207,7 @@ class TestKilledLog(unittest.TestCase):
         data = second.read_bytes()
         begin, _ = data[:HEADER].split(b"'shape': (")
         second.write_bytes((begin + b"'shape': (10,), }").ljust(HEADER - 1) + b"\n" + data[HEADER:])
-        self.assert_told(log, f"{second}: {left[second]} rows, and ticks.npy has ")
+        self.assert_said(log, f"{second}: {left[second]} rows, and ticks.npy has ")
         (log / "manifest.json").unlink()
         code, said, wrong = run("kerf-record", "check", log, "--repair")
         self.assertEqual((code, said, wrong.count("\n"), (log / "manifest.json").exists()), (1, "", 1, False), wrong)
@@ -235,25 +216,25 @@ class TestKilledLog(unittest.TestCase):
     def test_a_row_that_is_damaged_among_sound_ones_stays_an_error(self):
         for of in (self.log, self.two):
             log, _ = self.torn(of, {}, damaged=200)
-            self.assert_told(log, " has a wrong checksum; copy it again")
+            self.assert_said(log, " has a wrong checksum; copy it again")
             log, _ = self.torn(of, {"ticks.npy": 100 * ROW, "ticks-2.npy": 100 * ROW}, damaged=200)
-            self.assert_told(log, " has a wrong checksum; copy it again")
+            self.assert_said(log, " has a wrong checksum; copy it again")
             log, left = self.torn(of, {"ticks.npy": 301 * ROW})  # one of them was on the disk
-            self.assert_told(log, " has a wrong checksum; copy it again")
+            self.assert_said(log, " has a wrong checksum; copy it again")
 
-    def test_lost_ticks_among_counted_rows_are_told_by_all(self):
+    def test_lost_ticks_among_counted_rows_are_reported_by_all(self):
         log = self.copy(self.split)
         for name, rows, lost in (("ticks.npy.0002", 990, 10), ("ticks.npy.0003", 50, 0)):
             data = (log / name).read_bytes()
             head = data[:HEADER].split(b"'shape': (")[0] + b"'shape': (%d,), }" % rows
             (log / name).write_bytes(head.ljust(HEADER - 1) + b"\n" + data[HEADER:len(data) - lost * ROW])
-        self.assert_told(log, "manifest.json: gaps lacks 10 records from index 1990, which are in no row", by=["check", "info", "reader"])
+        self.assert_said(log, "manifest.json: gaps lacks 10 records from index 1990, which are in no row", by=["check", "info", "reader"])
 
     def test_a_log_that_ended_has_no_torn_rows(self):
         log = self.copy(self.whole)
         last = log / "ticks.npy.0003"
         last.write_bytes(last.read_bytes() + bytes(3 * ROW))
-        self.assert_told(log, f"{last}: {3 * ROW} bytes behind its last row; copy")
+        self.assert_said(log, f"{last}: {3 * ROW} bytes behind its last row; copy")
 
     def test_files_that_no_recording_has_are_named(self):
         for of in (self.log, self.split, self.two, self.whole):
@@ -269,7 +250,7 @@ class TestKilledLog(unittest.TestCase):
                     if kerf_reader:  # as info it reads no such file
                         self.assertEqual((run("kerf-record", "info", log)[0], len(kerf_reader.Log(log)) > 1000), (0, True))
 
-    def test_what_stands_in_place_of_a_file_of_a_log_is_told_in_one_line(self):
+    def test_what_stands_in_place_of_a_file_of_a_log_is_reported_in_one_line(self):
         for of, name in ((self.whole, "ticks.npy.0002"), (self.whole, "ticks.npy.0003"), (self.whole, "ticks.npy.0004"), (self.split, "ticks.npy.0003"),
                          (self.log, "ticks.npy.0002"), (self.two, "ticks-2.npy.0002")):
             for make, words in ((pathlib.Path.mkdir, "no regular file; copy"), (os.mkfifo, "no regular file; copy"),
@@ -287,7 +268,7 @@ class TestKilledLog(unittest.TestCase):
         for at in (0, 6, 7, 8, 9, 30, 2000, HEADER - 20, HEADER - 1):
             log = self.copy(self.whole)
             (log / "ticks.npy").write_bytes(rows[:at] + bytes([rows[at] ^ 2]) + rows[at + 1:])
-            self.assert_told(log, f"{log / 'ticks.npy'}: ")
+            self.assert_said(log, f"{log / 'ticks.npy'}: ")
 
 
 if __name__ == "__main__":

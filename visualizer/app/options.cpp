@@ -7,6 +7,7 @@
 #include <iostream>
 #include <sstream>
 #include <string_view>
+#include <utility>
 
 #include "shared/text/command_line.hpp"
 #include "shared/text/text.hpp"
@@ -167,7 +168,9 @@ AovChoice aov_of(const std::string& text, const ViewSettings& settings) {
     constexpr std::array<std::string_view, 2> kKnown{"depth", "normal"};
     if (word != kKnown[0] && word != kKnown[1])
       throw refused(one_line(word) + unknown_word(word, kKnown));
-    (word == kKnown[0] ? choice.depth : choice.normal) = true;
+    if (std::exchange(word == kKnown[0] ? choice.depth : choice.normal, true)) {
+      throw refused(word + " is there twice; leave one out");
+    }
   }
   if (settings.stereo.on) throw refused("--stereo has two pictures in one; leave one of both out");
   std::istringstream kinds(settings.renderer);

@@ -6,25 +6,6 @@
 
 namespace kerf {
 
-namespace {
-
-PresentedView presented(const CameraPose& pose) {
-  PresentedView view;
-  for (int i = 0; i < 3; ++i) {
-    view.eye_mm[i] = pose.eye_mm[i];
-    view.target_mm[i] = pose.target_mm[i];
-    view.up[i] = pose.up[i];
-  }
-  return view;
-}
-
-CameraPose pose_of(const PresentedView& view) {
-  const auto vector = [](const double(&v)[3]) { return glm::dvec3(v[0], v[1], v[2]); };
-  return {vector(view.eye_mm), vector(view.target_mm), vector(view.up)};
-}
-
-}  // namespace
-
 SharedView::SharedView(const VisualizerOptions& options) {
   if (options.present) presenter_.emplace(options.name);
   if (options.follow_view) follower_.emplace(options.name);

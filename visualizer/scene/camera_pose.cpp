@@ -19,8 +19,6 @@ namespace kerf {
 
 namespace {
 
-// Directions that are written with six digits are off by up to 1e-6 of their length.
-constexpr double kLeastSine = 1e-5;
 constexpr double kStepsPerMm = 1e6;  // of a written file; no two places lie nearer
 
 constexpr const char* kNine =
@@ -28,15 +26,6 @@ constexpr const char* kNine =
 
 std::string written(const glm::dvec3& v) {
   return number_text(v.x) + "," + number_text(v.y) + "," + number_text(v.z);
-}
-
-bool is_finite(const glm::dvec3& v) {
-  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
-}
-
-bool is_within(const glm::dvec3& v) {
-  constexpr double kMost = CameraPose::kFarthestMm;
-  return std::abs(v.x) <= kMost && std::abs(v.y) <= kMost && std::abs(v.z) <= kMost;
 }
 
 /// Of the axis that is farthest from `direction`.
@@ -48,26 +37,43 @@ std::string other_axis(const glm::dvec3& direction) {
 
 }  // namespace
 
+PresentedView presented(const CameraPose& pose) {
+  PresentedView view;
+  for (int i = 0; i < 3; ++i) {
+    view.eye_mm[i] = pose.eye_mm[i];
+    view.target_mm[i] = pose.target_mm[i];
+    view.up[i] = pose.up[i];
+  }
+  return view;
+}
+
+CameraPose pose_of(const PresentedView& view) {
+  const auto vector = [](const double(&v)[3]) { return glm::dvec3(v[0], v[1], v[2]); };
+  return {vector(view.eye_mm), vector(view.target_mm), vector(view.up)};
+}
+
 std::string problem_with(const CameraPose& pose) {
-  using Named = std::pair<const char*, glm::dvec3>;
-  for (const auto& [name, place] :
-       {Named{"EYE", pose.eye_mm}, Named{"TARGET", pose.target_mm}, Named{"UP", pose.up}}) {
-    if (is_finite(place) && is_within(place)) continue;
-    return std::string(name) + " " + written(place) + " is beyond " +
-           number_text(CameraPose::kFarthestMm) + " mm; give smaller numbers";
-  }
-  const glm::dvec3 view = pose.target_mm - pose.eye_mm;
-  if (!(glm::length(view) * kStepsPerMm >= 1.0)) {
-    return "EYE and TARGET are both at " + written(pose.eye_mm) + "; move one of them";
-  }
-  const double long_up = glm::length(pose.up);
-  if (!(long_up > 0.0)) {
-    return "UP " + written(pose.up) + " has no direction; give one, such as " + other_axis(view);
-  }
-  const double sine = glm::length(glm::cross(glm::normalize(view), pose.up / long_up));
-  if (!(sine >= kLeastSine)) {
-    return "UP " + written(pose.up) + " is along the view; give another direction, such as " +
-           other_axis(view);
+  const auto far = [](const char* name, const glm::dvec3& place) {
+    return std::string(name) + " " + written(place) + " is beyond " + number_text(kFarthestViewMm) +
+           " mm; give smaller numbers";
+  };
+  const std::string up = "UP " + written(pose.up);
+  const auto such_as = [&] { return ", such as " + other_axis(pose.target_mm - pose.eye_mm); };
+  switch (problem_in(presented(pose))) {
+    case ViewProblem::none:
+      break;
+    case ViewProblem::eye_far:
+      return far("EYE", pose.eye_mm);
+    case ViewProblem::target_far:
+      return far("TARGET", pose.target_mm);
+    case ViewProblem::up_far:
+      return far("UP", pose.up);
+    case ViewProblem::eye_at_target:
+      return "EYE and TARGET are both at " + written(pose.eye_mm) + "; move one of them";
+    case ViewProblem::up_zero:
+      return up + " has no direction; give one" + such_as();
+    case ViewProblem::up_along_view:
+      return up + " is along the view; give another direction" + such_as();
   }
   return {};
 }

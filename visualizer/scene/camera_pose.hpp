@@ -7,15 +7,14 @@
 
 #include <glm/glm.hpp>
 
+#include "shared/segment/presented_view.hpp"
+
 namespace kerf {
 
 /// Where a picture is seen from, as users write it: the eye, the point in the middle of the
 /// picture, which the camera turns about, and a direction that is upright in the picture. World
 /// mm; `up` may have any length.
 struct CameraPose {
-  /// Farther off, a float of the shaders steps by more than 1/128 mm.
-  static constexpr double kFarthestMm = 1e5;
-
   glm::dvec3 eye_mm{0.0, 0.0, 1.0};
   glm::dvec3 target_mm{0.0};
   glm::dvec3 up{0.0, 1.0, 0.0};
@@ -23,8 +22,11 @@ struct CameraPose {
   friend bool operator==(const CameraPose&, const CameraPose&) noexcept = default;
 };
 
-/// What of it is no camera, and the way out, as `value; way out`; empty for one that is: finite,
-/// within `kFarthestMm`, with an eye beside the target and an `up` that is not along the view.
+/// A pose as viewers present it, and back.
+[[nodiscard]] PresentedView presented(const CameraPose& pose);
+[[nodiscard]] CameraPose pose_of(const PresentedView& view);
+
+/// What makes it none (`problem_in`), and the way out, as `value; way out`; empty for a camera.
 [[nodiscard]] std::string problem_with(const CameraPose& pose);
 
 /// Nine numbers with commas between: EYE,TARGET,UP. Throws VisualizerError.

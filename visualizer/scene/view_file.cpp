@@ -3,7 +3,7 @@
 
 #include <cstdint>
 #include <fstream>
-#include <iterator>
+#include <ios>
 #include <system_error>
 
 #include "shared/posix/error_text.hpp"
@@ -33,8 +33,9 @@ std::string read_view_file(const std::filesystem::path& file, const std::string&
                           ", it is larger than 64 KiB; name another file");
   }
   std::ifstream stream(file, std::ios::binary);
-  std::string text{std::istreambuf_iterator<char>(stream), {}};
-  if (!stream) throw VisualizerError(file.string() + ": cannot be read; check its permissions");
+  std::string text(size, '\0');
+  if (!stream.read(text.data(), static_cast<std::streamsize>(size)))
+    throw VisualizerError(file.string() + ": cannot be read; check its permissions");
   return text;
 }
 

@@ -16,7 +16,7 @@ export class KeySteering {
     }, {capture: true});
     before('keydown', event => this.down(event));
     before('keyup', ({key}) => this.up(key));
-    // The ends of what is held down are told to another then.
+    // Another element hears of the ends of what is held down then.
     canvas.addEventListener('blur', () => this.forget());
     addEventListener('blur', () => this.forget());
     addEventListener('keydown', ({key}) => key === 'Shift' && this.forget());

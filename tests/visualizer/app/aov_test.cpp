@@ -205,6 +205,7 @@ TEST_CASE("depths and normals are of headless pictures, and normals of surfaces"
   };
   refused({"--headless", "--aov", "depht"},
           "--aov: depht is unknown; did you mean depth? known: depth, normal");
+  refused({"--headless", "--aov", "depth,depth"}, "--aov: depth is there twice; leave one out");
   refused({"--headless", "--aov", "normal", "--renderer", "iso,blend"},
           "--aov: normal: blend shows many depths in one pixel; take iso, surface or cast");
   refused({"--headless", "--aov", "depth", "--stereo"},

@@ -116,16 +116,21 @@ std::vector<int> levels_apart(const Body& body, const Drawn& a, const Drawn& b) 
   return levels;
 }
 
+std::vector<TestVolume> stored_in_each_size(const Body& body) {
+  std::vector<TestVolume> volumes;
+  for (const glm::dvec3& edges_mm : kEdgesMm) {
+    volumes.push_back(stored(body.inside, body.half_mm, edges_mm));
+  }
+  return volumes;
+}
+
 }  // namespace
 
 TEST_CASE("a surface looks the same in voxels of 0.1 mm, of 0.5 mm and of 5 : 1") {
   if (!have_gl()) return;
   for (const Body& body : bodies()) {
     CAPTURE(std::string(body.name));
-    std::vector<TestVolume> volumes;
-    for (const glm::dvec3& edges_mm : kEdgesMm) {
-      volumes.push_back(stored(body.inside, body.half_mm, edges_mm));
-    }
+    const std::vector<TestVolume> volumes = stored_in_each_size(body);
     for (const std::string_view kind : {"iso", "surface", "cast"}) {
       CAPTURE(std::string(kind));
       const auto drawn = [&](const TestVolume& volume) {
@@ -155,10 +160,7 @@ TEST_CASE("what is translucent looks nearly the same in voxels of any size") {
        {ball_body(), gap_body("wide gap", 2.2, look_at({0.9, 0, 2.4}, {-1.1, 0, 0.2}, 0.2, 20))}) {
     const bool ball = body.name == std::string("ball");
     CAPTURE(std::string(body.name));
-    std::vector<TestVolume> volumes;
-    for (const glm::dvec3& edges_mm : kEdgesMm) {
-      volumes.push_back(stored(body.inside, body.half_mm, edges_mm));
-    }
+    const std::vector<TestVolume> volumes = stored_in_each_size(body);
     for (const double opacity : {0.4, 0.1, 0.02}) {
       for (const std::string_view kind : {"blend", "slices", "cast-blend"}) {
         CAPTURE(opacity);
