@@ -53,7 +53,7 @@ assert kerf_reader.__file__.startswith(home.name)
 began = time.time()
 quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
 emulator = subprocess.Popen([programs / "kerf-emulator", "--socket", "socket", "--hand", root / "scenes/hands/touch.toml"], **quiet)
-recorder = subprocess.Popen([programs / "kerf-recorder", "--name", "reader", "--out", "log"], **quiet)
+recorder = subprocess.Popen([programs / "kerf-recorder", "--wait", "300", "--name", "reader", "--out", "log"], **quiet)
 while not os.path.exists("socket"):
     time.sleep(0.02)
 controller = subprocess.Popen([programs / "kerf-controller", "--scene", root / "scenes/wall.toml", "--name", "reader", "--port",

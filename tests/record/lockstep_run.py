@@ -57,7 +57,7 @@ def record(root, programs, folder, scene, seconds, *options, flight=False, fault
     for out, own in recorders.items():
         os.mkfifo(lead := folder / f"lead-{out}")
         leads += ["--until", lead]
-        others.append(subprocess.Popen([programs / "kerf-recorder", "--name", name, "--out", folder / out, "--lead", lead, *own],
+        others.append(subprocess.Popen([programs / "kerf-recorder", "--wait", "300", "--name", name, "--out", folder / out, "--lead", lead, *own],
                                        stdout=subprocess.DEVNULL))
     others.append(subprocess.Popen([programs / "kerf-emulator", "--lockstep", "--rate", "1000", "--socket", device, "--hand",
                                     root / "scenes/hands/touch.toml", *(["--fault", fault] if fault else [])],
@@ -79,7 +79,7 @@ def record_killed(root, programs, folder, scene, hands, *recorder, parts=1, rows
     name, log = f"killed-{folder.name}", folder / "log"
     os.mkfifo(lead := folder / "lead")
     quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-    others = [subprocess.Popen([programs / "kerf-recorder", "--name", name, "--out", log, "--lead", lead, *recorder], **quiet)]
+    others = [subprocess.Popen([programs / "kerf-recorder", "--wait", "300", "--name", name, "--out", log, "--lead", lead, *recorder], **quiet)]
     ports = []
     for number, hand in enumerate(hands):
         device = folder / f"device-{number}"

@@ -54,7 +54,7 @@ class TestLogFiles(unittest.TestCase):
         device, log = self.folder / "device", self.folder / "log"
         ticks = log / "ticks.npy"
         programs = [subprocess.Popen([BIN / "kerf-emulator", "--socket", device, "--hand", ROOT / "scenes/hands/touch.toml"], **quiet),
-                    recorder := subprocess.Popen([BIN / "kerf-recorder", "--name", "killed", "--out", log], **quiet)]
+                    recorder := subprocess.Popen([BIN / "kerf-recorder", "--wait", "300", "--name", "killed", "--out", log], **quiet)]
         try:
             while not device.exists():
                 time.sleep(0.02)
@@ -81,7 +81,7 @@ class TestLogFiles(unittest.TestCase):
             device = self.folder / f"device-{number}"
             ports += ["--port", f"socket:{device}"]
             programs.append(subprocess.Popen([BIN / "kerf-emulator", "--socket", device, "--hand", ROOT / "scenes/hands" / hand, *options], **quiet))
-        programs.append(recorder := subprocess.Popen([BIN / "kerf-recorder", "--name", "grows", "--out", log, "--split", "1s"], **quiet))
+        programs.append(recorder := subprocess.Popen([BIN / "kerf-recorder", "--wait", "300", "--name", "grows", "--out", log, "--split", "1s"], **quiet))
         try:
             while not all((self.folder / f"device-{number}").exists() for number in (0, 1)):
                 time.sleep(0.02)

@@ -402,7 +402,7 @@ class TestReplay(unittest.TestCase):
         name, watched, told = self.watch(self.log)
         told(" ", "paused")
         out = self.run_folder / "seen"
-        recorder = subprocess.Popen([BIN / "kerf-recorder", "--name", name, "--out", out], stdout=subprocess.DEVNULL)
+        recorder = subprocess.Popen([BIN / "kerf-recorder", "--wait", "300", "--name", name, "--out", out], stdout=subprocess.DEVNULL)
         while not (out / "manifest.json").exists():
             time.sleep(0.01)
         self.assertIn("tick 1000 of", told("1000g", "tick"))
