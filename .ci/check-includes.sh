@@ -31,7 +31,7 @@ standin standin/hd standin/dhd standin/wheel
 
 lab/run lab/rig lab/accuracy lab/bench lab/stability lab/contact lab/safety lab/ranges lab/commands lab/bridge lab
 
-visualizer/scene visualizer/sound visualizer/gl visualizer/cast visualizer/cast/simd visualizer/surface
+visualizer/scene visualizer/scene/simd visualizer/sound visualizer/gl visualizer/cast visualizer/cast/simd visualizer/surface
 visualizer/redraw visualizer/render visualizer/compose visualizer/panels visualizer/picture visualizer/app visualizer/bench visualizer/monkey
 
 bridge/wire bridge/stream bridge/foxglove bridge/igtl bridge/page bridge/net bridge/join bridge/serve bridge

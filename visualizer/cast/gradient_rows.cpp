@@ -30,17 +30,15 @@ GradientRows::GradientRows(const GradientPlan& plan, const VoxelGrid& grid,
   const auto layers = static_cast<std::uint32_t>((grid.nz + kThick - 1) / kThick);
   TilePool().run(layers, [&](std::uint32_t layer) {
     const auto z = static_cast<std::int32_t>(layer) * kThick;
-    std::vector<glm::vec3> gradients;
-    fill(VoxelBox{{0, 0, z}, {grid.nx, grid.ny, z + kThick}}.clipped(grid.box()), density,
-         gradients);
+    Work work;
+    fill(VoxelBox{{0, 0, z}, {grid.nx, grid.ny, z + kThick}}.clipped(grid.box()), density, work);
   });
 }
 
-void GradientRows::fill(const VoxelBox& box, std::span<const Density> density,
-                        std::vector<glm::vec3>& gradients) {
-  fill_gradients(plan_, grid_, density, box, gradients);
+void GradientRows::fill(const VoxelBox& box, std::span<const Density> density, Work& work) {
+  fill_gradients(plan_, grid_, density, box, work.gradients, work.filters);
   const CastGradient rows = view();
-  const glm::vec3* from = gradients.data();
+  const glm::vec3* from = work.gradients.data();
   const std::int32_t wide = box.hi.x - box.lo.x;
   for (std::int32_t z = box.lo.z; z < box.hi.z; ++z) {
     for (std::int32_t y = box.lo.y; y < box.hi.y; ++y, from += wide) {
@@ -54,7 +52,7 @@ void GradientRows::fill(const VoxelBox& box, std::span<const Density> density,
 std::vector<VoxelBox> GradientRows::update(const ChangedBricks& changed,
                                            std::span<const Density> density) {
   std::vector<VoxelBox> boxes = plan_.around(changed, BrickGrid::of(grid_));
-  for (const VoxelBox& box : boxes) fill(box, density, gradients_);
+  for (const VoxelBox& box : boxes) fill(box, density, work_);
   return boxes;
 }
 

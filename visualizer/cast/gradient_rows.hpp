@@ -40,13 +40,16 @@ class GradientRows {
   [[nodiscard]] const Entry* data() const noexcept { return entries_.data(); }
 
  private:
-  void fill(const VoxelBox& box, std::span<const Density> density,
-            std::vector<glm::vec3>& gradients);
+  struct Work {
+    std::vector<glm::vec3> gradients;  ///< of the last box
+    GradientWork filters;
+  };
+  void fill(const VoxelBox& box, std::span<const Density> density, Work& work);
 
   GradientPlan plan_;
   VoxelGrid grid_;
   std::vector<Entry> entries_;
-  std::vector<glm::vec3> gradients_;  ///< of the last box
+  Work work_;
 };
 
 }  // namespace kerf

@@ -11,14 +11,43 @@ namespace kerf {
 
 namespace {
 
-/// A box of numbers, x fastest.
+/// The fields of one block, in the memory of those before.
+class FieldMemory {
+ public:
+  explicit FieldMemory(std::vector<std::vector<float>>& fields) : fields_(fields) {}
+
+  /// Not set to anything.
+  [[nodiscard]] float* take(std::size_t count) {
+    if (taken_ == fields_.size()) fields_.emplace_back();
+    std::vector<float>& field = fields_[taken_++];
+    if (field.size() < count) field.resize(count);
+    return field.data();
+  }
+
+ private:
+  std::vector<std::vector<float>>& fields_;
+  std::size_t taken_ = 0;
+};
+
+constexpr std::int32_t whole_lanes(std::int32_t count) {
+  return (count + kFilterLanes - 1) / kFilterLanes * kFilterLanes;
+}
+
+/// A box of numbers, x fastest, in rows as the kernels take them.
 struct Field {
-  explicit Field(VoxelIndex extent) : n(extent), values(VoxelGrid{n.x, n.y, n.z}.voxel_count()) {}
-  [[nodiscard]] float* row(std::int32_t y, std::int32_t z) noexcept {
-    return values.data() + static_cast<std::ptrdiff_t>(z * n.y + y) * n.x;
+  Field(FieldMemory& memory, VoxelIndex extent)
+      : n(extent),
+        pitch(whole_lanes(n.x)),
+        // A row of fewer numbers that begins within the last one may end behind it.
+        size(VoxelGrid{static_cast<std::int32_t>(pitch), n.y, n.z}.voxel_count() + kFilterLanes),
+        first(memory.take(size)) {}
+  [[nodiscard]] float* row(std::int32_t y, std::int32_t z) const noexcept {
+    return first + static_cast<std::ptrdiff_t>(z * n.y + y) * pitch;
   }
   VoxelIndex n;
-  std::vector<float> values;
+  std::ptrdiff_t pitch;
+  std::size_t size;
+  float* first;
 };
 
 /// Of a row along x, from `first` to before `end`, or nothing.
@@ -28,6 +57,12 @@ struct RowPart {
     first = std::min(first, other.first);
     end = std::max(end, other.end);
   }
+  /// That much and more, in whole steps of the kernels.
+  [[nodiscard]] RowPart in_lanes() const noexcept {
+    if (first >= end) return {0, 0};
+    return {first / kFilterLanes * kFilterLanes, whole_lanes(end)};
+  }
+  friend bool operator==(const RowPart&, const RowPart&) = default;
 };
 
 /// The part of each row of a box that is wanted.
@@ -75,9 +110,10 @@ struct Cells {
 };
 
 /// The densities of a box, zeros outside the volume.
-Field densities(const Cells& cells, const VoxelBox& box) {
-  Field field(box.extent());
+Field densities(const Cells& cells, const VoxelBox& box, FieldMemory& memory) {
+  const Field field(memory, box.extent());
   const VoxelBox inside = box.clipped(cells.grid.box());
+  if (inside != box) std::fill_n(field.first, field.size, 0.0F);
   for (std::int32_t z = inside.lo.z; z < inside.hi.z; ++z) {
     for (std::int32_t y = inside.lo.y; y < inside.hi.y; ++y) {
       const Density* const from = cells.density.data() + cells.grid.index(inside.lo.x, y, z);
@@ -89,9 +125,9 @@ Field densities(const Cells& cells, const VoxelBox& box) {
 }
 
 /// The mean density of the cells of a box. The sums are whole numbers, so their order is free.
-Field means(const Cells& cells, const VoxelBox& box) {
-  if (cells.size == VoxelIndex{1, 1, 1}) return densities(cells, box);
-  Field field(box.extent());
+Field means(const Cells& cells, const VoxelBox& box, FieldMemory& memory) {
+  if (cells.size == VoxelIndex{1, 1, 1}) return densities(cells, box, memory);
+  const Field field(memory, box.extent());
   const VoxelBox all = cells.voxels(box);
   const VoxelBox inside = all.clipped(cells.grid.box());
   std::vector<std::uint32_t> sums;
@@ -121,47 +157,45 @@ Field means(const Cells& cells, const VoxelBox& box) {
 
 using Taps = std::array<float, 2 * AxisTaps::kMiddle + 1>;
 
-/// Taps along one axis, which becomes shorter by their reach at both ends; zeros where nothing is
-/// wanted. `kKnown` is this reach, so that a compiler unrolls the sum, or 0.
-template <int kAxis, int kKnown>
-Field filtered(Field& from, const Taps& all_taps, std::int32_t any_reach, const Wanted& wanted) {
-  const Taps own = all_taps;  // which no result overwrites: they stay in registers
-  const float* const taps = own.data() + AxisTaps::kMiddle;
-  const std::int32_t reach = kKnown > 0 ? kKnown : any_reach;
-  const VoxelIndex& n = wanted.n;
-  Field to(n);
-  const std::ptrdiff_t stride = kAxis == 0 ? 1 : kAxis == 1 ? from.n.x : from.n.x * from.n.y;
-  for (std::int32_t z = 0; z < n.z; ++z) {
-    for (std::int32_t y = 0; y < n.y; ++y) {
-      const float* const in = from.row(y, z) + reach * stride;
-      float* const out = to.row(y, z);
-      const auto [first, end] = wanted.row(y, z);
-      for (std::int32_t x = first; x < end; ++x) {
-        float sum = taps[0] * in[x];
-        for (std::int32_t i = 1; i <= reach; ++i) {
-          sum += taps[i] * in[x + i * stride] + taps[-i] * in[x - i * stride];
-        }
-        out[x] = sum;
+/// Where to compute, and how.
+struct Filtering {
+  const FilterKernels& kernels;
+  FieldMemory& memory;
+
+  /// Taps along one axis of a field; what is wanted of a row of the result begins at `from`.
+  template <int kAxis>
+  [[nodiscard]] Field along(const Field& in, const VoxelIndex& from, const Taps& taps,
+                            std::int32_t reach, const Wanted& wanted) const {
+    const VoxelIndex& n = wanted.n;
+    const Field to(memory, n);
+    FilterRows rows;
+    rows.taps = taps.data() + AxisTaps::kMiddle;
+    rows.reach = reach;
+    rows.stride = kAxis == 0 ? 1 : kAxis == 1 ? in.pitch : in.pitch * in.n.y;
+    rows.in_pitch = in.pitch;
+    rows.out_pitch = to.pitch;
+    for (std::int32_t z = 0; z < n.z; ++z) {
+      for (std::int32_t y = 0; y < n.y; y += rows.rows) {
+        const RowPart part = wanted.row(y, z).in_lanes();
+        rows.rows = 1;  // and those after it that are alike
+        while (y + rows.rows < n.y && wanted.row(y + rows.rows, z).in_lanes() == part) ++rows.rows;
+        rows.in = in.row(y + from.y, z + from.z) + from.x + part.first;
+        rows.out = to.row(y, z) + part.first;
+        rows.count = part.end - part.first;
+        kernels.sum(rows);
       }
     }
+    return to;
   }
-  return to;
-}
-
-/// The same; farid5 and the wide filter of cubes are what most volumes have.
-template <int kAxis>
-Field filtered(Field& from, const Taps& taps, std::int32_t reach, const Wanted& wanted) {
-  if (reach == 2) return filtered<kAxis, 2>(from, taps, reach, wanted);
-  if (reach == 7) return filtered<kAxis, 7>(from, taps, reach, wanted);
-  return filtered<kAxis, 0>(from, taps, reach, wanted);
-}
+};
 
 /// One part of the gradient of each voxel, or cell.
 struct Parts {
   Field x, y, z;
   glm::vec3 scale;
-  [[nodiscard]] glm::vec3 at(std::size_t i) const {
-    return scale * glm::vec3(x.values[i], y.values[i], z.values[i]);
+
+  [[nodiscard]] glm::vec3 at(int i, int j, int k) const {
+    return scale * glm::vec3(x.row(j, k)[i], y.row(j, k)[i], z.row(j, k)[i]);
   }
 };
 
@@ -171,34 +205,28 @@ float scale_of(const AxisTaps& slope, const AxisTaps& smooth, const AxisTaps& ot
   return 1.0F / (0.5F * slope.slope_sum * smooth.smooth_sum * other.smooth_sum * kFull);
 }
 
-/// Of the voxels that are `wanted` in a box, or cells.
-Parts parts_of(const FilterTaps& taps, const Cells& cells, const VoxelBox& box,
-               const Wanted& wanted) {
+/// Of the voxels of a box, or cells, that are `wanted`. `all` are the densities of a box that is
+/// larger by `margin` on both sides, no less than the taps reach.
+Parts parts_of(const FilterTaps& taps, const Field& all, const VoxelIndex& margin,
+               const Wanted& wanted, const Filtering& by) {
   const auto& [x, y, z] = taps;
-  Field all = means(cells, grown(box, {x.reach, y.reach, z.reach}));
   const Wanted along_z = wanted.read_along_z(z.reach);
   const Wanted along_y = along_z.read_along_y(y.reach);
-  Field slope_x = filtered<0>(all, x.slope, x.reach, along_y);
-  Field smooth_x = filtered<0>(all, x.smooth, x.reach, along_y);
-  Field slope_x_smooth_y = filtered<1>(slope_x, y.smooth, y.reach, along_z);
-  Field slope_y = filtered<1>(smooth_x, y.slope, y.reach, along_z);
-  Field smooth_xy = filtered<1>(smooth_x, y.smooth, y.reach, along_z);
-  return {filtered<2>(slope_x_smooth_y, z.smooth, z.reach, wanted),
-          filtered<2>(slope_y, z.smooth, z.reach, wanted),
-          filtered<2>(smooth_xy, z.slope, z.reach, wanted),
+  const VoxelIndex in_all{margin.x, margin.y - y.reach, margin.z - z.reach};
+  const VoxelIndex in_y{0, y.reach, 0}, in_z{0, 0, z.reach};
+  const Field slope_x = by.along<0>(all, in_all, x.slope, x.reach, along_y);
+  const Field smooth_x = by.along<0>(all, in_all, x.smooth, x.reach, along_y);
+  const Field slope_x_smooth_y = by.along<1>(slope_x, in_y, y.smooth, y.reach, along_z);
+  const Field slope_y = by.along<1>(smooth_x, in_y, y.slope, y.reach, along_z);
+  const Field smooth_xy = by.along<1>(smooth_x, in_y, y.smooth, y.reach, along_z);
+  return {by.along<2>(slope_x_smooth_y, in_z, z.smooth, z.reach, wanted),
+          by.along<2>(slope_y, in_z, z.smooth, z.reach, wanted),
+          by.along<2>(smooth_xy, in_z, z.slope, z.reach, wanted),
           glm::vec3(scale_of(x, y, z), scale_of(y, z, x), scale_of(z, x, y))};
 }
 
-Parts parts_of(const FilterTaps& taps, const Cells& cells, const VoxelBox& box) {
-  return parts_of(taps, cells, box, Wanted::all(box.extent()));
-}
-
-/// `part` of the direction of `other`, the rest of it that of `own`, and the length of `own`.
-glm::vec3 turned(const glm::vec3& own, const glm::vec3& other, float part) {
-  const float length = std::sqrt(glm::dot(own, own));
-  const float other_length = std::sqrt(glm::dot(other, other));
-  const glm::vec3 mixed = glm::mix(own, other * (length / other_length), part);
-  return mixed * (length / std::sqrt(glm::dot(mixed, mixed)));
+VoxelIndex reach_of(const FilterTaps& taps) {
+  return {taps[0].reach, taps[1].reach, taps[2].reach};
 }
 
 /// 1 where the cosine between two vectors is `agree` or more, 0 where it is `differ` or less; 0 for
@@ -210,43 +238,74 @@ float agreement(const glm::vec3& a, const glm::vec3& b, float agree, float diffe
   return std::clamp((cosine - differ) / (agree - differ), 0.0F, 1.0F);
 }
 
-constexpr float kAdaptedAgree = 0.985F;   // cosine of 10 degrees
-constexpr float kAdaptedDiffer = 0.940F;  // of 20
+/// Where the gradients of a box go: rows of a larger one.
+struct Made {
+  glm::vec3* first;
+  std::ptrdiff_t row, plane;
+  [[nodiscard]] glm::vec3* at(std::int32_t y, std::int32_t z) const {
+    return first + z * plane + y * row;
+  }
+};
 
-/// The direction of `wide` where it hardly differs from that of `narrow`: steps of voxels turn the
-/// narrow one by 9 degrees at 99 of 100 points and the wide one by 2, an edge turns one farther.
-/// Length and all else is the narrow one's.
-glm::vec3 adapted(const glm::vec3& narrow, const glm::vec3& wide) {
-  const float part = agreement(narrow, wide, kAdaptedAgree, kAdaptedDiffer);
-  return part == 0.0F ? narrow : turned(narrow, wide, part);
+/// The part of a row where the gradient is not zero.
+RowPart sloped(const Parts& parts, std::int32_t j, std::int32_t k) {
+  const float* const x = parts.x.row(j, k);
+  const float* const y = parts.y.row(j, k);
+  const float* const z = parts.z.row(j, k);
+  const auto flat = [&](std::int32_t i) { return x[i] == 0.0F && y[i] == 0.0F && z[i] == 0.0F; };
+  RowPart part{0, parts.x.n.x};
+  while (part.first < part.end && flat(part.first)) ++part.first;
+  while (part.first < part.end && flat(part.end - 1)) --part.end;
+  return part.first < part.end ? part : RowPart{};
 }
 
-/// `adapted` of each cell of a box. The wide filter costs five times as much as the narrow one, and
-/// is taken where that finds anything: `adapted` is the narrow one's elsewhere.
+/// The adaptive gradient of each cell of a box. The wide filter costs five times as much as the
+/// narrow one, and is taken where that finds anything: the narrow one's is kept elsewhere.
 void fill_adapted(const GradientPlan& plan, const Cells& cells, const VoxelBox& box,
-                  std::vector<glm::vec3>& made) {
+                  const Filtering& by, const Made& made) {
   const glm::vec3 per_cell = plan.per_edge * glm::vec3(cells.size.x, cells.size.y, cells.size.z);
-  Parts narrow = parts_of(plan.narrow, cells, box);
+  const VoxelIndex margin = reach_of(plan.wide);
+  const Field all = means(cells, grown(box, margin), by.memory);
+  const VoxelIndex n = box.extent();
+  Parts narrow = parts_of(plan.narrow, all, margin, Wanted::all(n), by);
   narrow.scale /= per_cell;
-  made.resize(narrow.x.values.size());
-  const VoxelIndex extent = box.extent();
-  Wanted sloped(extent);
+  Wanted some(n);
   bool any = false;
-  std::size_t i = 0;
-  for_each_voxel({{0, 0, 0}, extent}, [&](int x, int y, int z) {
-    made[i] = narrow.at(i);
-    if (made[i] != glm::vec3(0.0F)) {
-      sloped.row(y, z).add({x, x + 1});
-      any = true;
-    }
-    ++i;
+  for_each_voxel({{0, 0, 0}, {1, n.y, n.z}}, [&](int, int y, int z) {
+    some.row(y, z) = sloped(narrow, y, z);
+    any = any || some.row(y, z).first < some.row(y, z).end;
   });
-  if (!any) return;
-  Parts wide = parts_of(plan.wide, cells, box, sloped);
-  wide.scale /= per_cell;
-  for (i = 0; i < made.size(); ++i) {
-    if (made[i] != glm::vec3(0.0F)) made[i] = adapted(made[i], wide.at(i));
+  if (!any) {
+    for_each_voxel({{0, 0, 0}, {1, n.y, n.z}},
+                   [&](int, int y, int z) { std::fill_n(made.at(y, z), n.x, glm::vec3(0.0F)); });
+    return;
   }
+  Parts wide = parts_of(plan.wide, all, margin, some, by);
+  wide.scale /= per_cell;
+  AdaptedRow row;
+  for (int axis = 0; axis < 3; ++axis) {
+    row.narrow_scale[axis] = narrow.scale[axis];
+    row.wide_scale[axis] = wide.scale[axis];
+  }
+  for_each_voxel({{0, 0, 0}, {1, n.y, n.z}}, [&](int, int y, int z) {
+    const RowPart part = some.row(y, z).in_lanes();
+    const Field* const from[3] = {&narrow.x, &narrow.y, &narrow.z};
+    const Field* const other[3] = {&wide.x, &wide.y, &wide.z};
+    for (int axis = 0; axis < 3; ++axis) {
+      row.narrow[axis] = from[axis]->row(y, z) + part.first;
+      row.wide[axis] = other[axis]->row(y, z) + part.first;
+    }
+    row.count = part.end - part.first;
+    by.kernels.adapt(row);
+    glm::vec3* const to = made.at(y, z);
+    const std::int32_t end = std::min(part.end, n.x);
+    std::fill_n(to, part.first, glm::vec3(0.0F));
+    for (std::int32_t i = part.first; i < end; ++i) {
+      const std::int32_t at = i - part.first;
+      to[i] = glm::vec3(row.narrow[0][at], row.narrow[1][at], row.narrow[2][at]);
+    }
+    std::fill_n(to + end, n.x - end, glm::vec3(0.0F));
+  });
 }
 
 /// Where a voxel lies between the centres of two cells along one axis.
@@ -264,7 +323,8 @@ struct BetweenCells {
 /// The gradients of cells, between their centres.
 class CellGradients {
  public:
-  CellGradients(const GradientPlan& plan, const Cells& cells, const VoxelBox& voxels)
+  CellGradients(const GradientPlan& plan, const Cells& cells, const VoxelBox& voxels,
+                const Filtering& by)
       : size_(cells.size) {
     const VoxelIndex last{voxels.hi.x - 1, voxels.hi.y - 1, voxels.hi.z - 1};
     const auto at = [&](const VoxelIndex& v) {
@@ -273,7 +333,9 @@ class CellGradients {
     };
     const VoxelIndex end = at(last);
     box_ = {at(voxels.lo), {end.x + 2, end.y + 2, end.z + 2}};
-    fill_adapted(plan, cells, box_, made_);
+    const VoxelIndex n = box_.extent();
+    made_.resize(VoxelGrid{n.x, n.y, n.z}.voxel_count());
+    fill_adapted(plan, cells, box_, by, {made_.data(), n.x, std::ptrdiff_t{n.x} * n.y});
   }
 
   [[nodiscard]] glm::vec3 at(int x, int y, int z) const {
@@ -314,20 +376,21 @@ glm::vec3 followed(const glm::vec3& voxel, const glm::vec3& cell, const glm::vec
 
 /// Of the voxels of a box.
 void fill_block(const GradientPlan& plan, const Cells& cells, const VoxelBox& box,
-                std::vector<glm::vec3>& made) {
+                const Filtering& by, const Made& made) {
   if (plan.filter == GradientFilter::adaptive && !plan.has_cells()) {
-    return fill_adapted(plan, cells, box, made);
+    return fill_adapted(plan, cells, box, by, made);
   }
-  const Parts voxel = parts_of(plan.voxel, {cells.grid, cells.density, {1, 1, 1}}, box);
-  made.resize(voxel.x.values.size());
-  for (std::size_t i = 0; i < made.size(); ++i) made[i] = voxel.at(i);
+  const VoxelIndex margin = reach_of(plan.voxel), n = box.extent();
+  const Field all = densities(cells, grown(box, margin), by.memory);
+  const Parts voxel = parts_of(plan.voxel, all, margin, Wanted::all(n), by);
+  for_each_voxel({{0, 0, 0}, n},
+                 [&](int x, int y, int z) { made.at(y, z)[x] = voxel.at(x, y, z); });
   if (!plan.has_cells()) return;
-  const CellGradients between(plan, cells, box);
+  const CellGradients between(plan, cells, box, by);
   const glm::vec3 fine(cells.size.x > 1, cells.size.y > 1, cells.size.z > 1);
-  std::size_t i = 0;
-  for_each_voxel(box, [&](int x, int y, int z) {
-    made[i] = followed(made[i], between.at(x, y, z), fine, plan.per_edge);
-    ++i;
+  for_each_voxel({{0, 0, 0}, n}, [&](int x, int y, int z) {
+    glm::vec3& at = made.at(y, z)[x];
+    at = followed(at, between.at(box.lo.x + x, box.lo.y + y, box.lo.z + z), fine, plan.per_edge);
   });
 }
 
@@ -351,11 +414,10 @@ bool is_flat(const Cells& cells, const VoxelBox& box) {
 
 void fill_gradients(const GradientPlan& plan, const VoxelGrid& grid,
                     std::span<const Density> density, const VoxelBox& box,
-                    std::vector<glm::vec3>& gradients) {
+                    std::vector<glm::vec3>& gradients, GradientWork& work) {
   // Block by block: most of a volume is air, or solid, and has none.
   constexpr std::int32_t kEdge = 32;
   const Cells cells{grid, density, plan.cell};
-  std::vector<glm::vec3> made;
   const VoxelIndex edge{kEdge * plan.cell.x, kEdge * plan.cell.y, kEdge * plan.cell.z};
   const VoxelIndex n = box.extent();
   const VoxelGrid of_box{n.x, n.y, n.z};
@@ -369,14 +431,9 @@ void fill_gradients(const GradientPlan& plan, const VoxelGrid& grid,
         VoxelBox{lo, {lo.x + edge.x, lo.y + edge.y, lo.z + edge.z}}.clipped(of_box.box());
     const VoxelBox voxels = part.moved(box.lo);
     if (is_flat(cells, plan.around(voxels))) return;
-    fill_block(plan, cells, voxels, made);
-    const glm::vec3* from = made.data();
-    const std::int32_t wide = part.hi.x - lo.x;
-    for (std::int32_t z = lo.z; z < part.hi.z; ++z) {
-      for (std::int32_t y = lo.y; y < part.hi.y; ++y, from += wide) {
-        std::copy_n(from, wide, &gradients[of_box.index(lo.x, y, z)]);
-      }
-    }
+    FieldMemory memory(work.fields);
+    fill_block(plan, cells, voxels, {*work.kernels, memory},
+               {&gradients[of_box.index(lo.x, lo.y, lo.z)], n.x, std::ptrdiff_t{n.x} * n.y});
   });
 }
 

@@ -13,6 +13,7 @@
 #include "shared/volume/brick_grid.hpp"
 #include "shared/volume/changed_bricks.hpp"
 #include "shared/volume/voxel_grid.hpp"
+#include "visualizer/scene/filter_kernels.hpp"
 
 namespace kerf {
 
@@ -88,11 +89,25 @@ struct GradientPlan {
   double surface_mm = 0.0;
 };
 
+/// What `fill_gradients` computes with; a caller that keeps it allocates once.
+struct GradientWork {
+  const FilterKernels* kernels = filter_kernels()[0];
+  std::vector<std::vector<float>> fields;
+};
+
 /// Fills `gradients` for the voxels of `box` out of a whole volume, x fastest, with air around it.
-/// The gradient of a voxel has the same bits whatever the box.
+/// The gradient of a voxel has the same bits whatever the box, and by all kernels.
 void fill_gradients(const GradientPlan& plan, const VoxelGrid& grid,
                     std::span<const Density> density, const VoxelBox& box,
-                    std::vector<glm::vec3>& gradients);
+                    std::vector<glm::vec3>& gradients, GradientWork& work);
+
+/// The same, once.
+inline void fill_gradients(const GradientPlan& plan, const VoxelGrid& grid,
+                           std::span<const Density> density, const VoxelBox& box,
+                           std::vector<glm::vec3>& gradients) {
+  GradientWork work;
+  fill_gradients(plan, grid, density, box, gradients, work);
+}
 
 /// `box` larger by as many voxels on both sides.
 [[nodiscard]] constexpr VoxelBox grown(const VoxelBox& box, const VoxelIndex& by) noexcept {
