@@ -63,7 +63,8 @@ bool read_record(int file, ViewRecord& record) noexcept {
 ViewProblem problem_in(const PresentedView& view) noexcept {
   // Places are written to a millionth of a mm; directions of six digits are off by up to 1e-6 of
   // their length.
-  constexpr double kNearestMm = 1e-6, kLeastSine = 1e-5;
+  constexpr double kNearestMm = 1e-6;
+  constexpr double kLeastSine = 1e-5;
   const auto is_far = [](const double(&place)[3]) {
     // A NaN is within nothing.
     return !std::all_of(std::begin(place), std::end(place),

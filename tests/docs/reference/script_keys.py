@@ -131,11 +131,12 @@ ratios; a scene of one material has {view.number('kSoftestOpacity'):g}.
 
 def camera(root):
     file, pose = Source(root, "visualizer/scene/view_file.cpp"), Source(root, "visualizer/scene/camera_pose.cpp")
-    most = Source(root, "visualizer/scene/camera_pose.hpp").number("kFarthestMm")
+    rule = Source(root, "shared/segment/presented_view.cpp")
+    most = Source(root, "shared/segment/presented_view.hpp").number("kFarthestViewMm")
     rows = [(f"`{key}`", f"three numbers, {-most:g} to {most:g}", "needed", meaning) for key, meaning in (
         ("eye_mm", "where the camera stands, in the scene's world"),
         ("target_mm", "what is in the middle of the picture, and what a drag turns about; not at the eye"),
-        ("up", f"a direction that is upright in the picture; {pose.number('kLeastSine'):g} rad or more beside the view"))]
+        ("up", f"a direction that is upright in the picture; {rule.number('kLeastSine'):g} rad or more beside the view"))]
     same(f"{pose.path}: keys", [row[0].strip("`") for row in rows], re.findall(r'\{+"(\w+)", &pose', pose.text))
     return f"""## Camera
 
