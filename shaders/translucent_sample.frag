@@ -11,7 +11,7 @@ uniform sampler2D u_by_density;              // the same by density, row v for v
 uniform vec3 u_texels[KERF_VOLUMES];
 uniform vec2 u_fade[KERF_VOLUMES];           // densities where a material begins and where it is whole
 uniform mat3 u_eye_from_gradient[KERF_VOLUMES];
-uniform float u_surface_mm[KERF_VOLUMES];    // depth to which a gradient shows a surface
+uniform float u_surface_mm[KERF_VOLUMES];    // thickness of the layer that is lit by its gradient
 uniform float u_least_extinction;            // per mm; less makes no difference
 uniform vec3 u_up_eye;                       // world up
 
@@ -94,7 +94,7 @@ vec3 gradient_of(int v, vec3 voxel, vec3 p) { return voxel; }
 
 // The weight of the light on a surface: visualizer/scene/appearance.hpp has the reason (kLitMm).
 float lit_part(int v, float extinction, float facing) {
-  const float kLitMm = 0.4634;
+  const float kLitMm = 0.2692;
   const float kLeastFacing = 0.2;  // a ray that grazes leaves the border before it is in deeper
   float per_mm = max(extinction, u_least_extinction) / max(facing, kLeastFacing);
   return (1.0 - exp2(-per_mm * kLitMm)) / (1.0 - exp2(-per_mm * u_surface_mm[v]));

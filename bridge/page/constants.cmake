@@ -78,7 +78,7 @@ constants(visualizer/scene/camera.cpp kHalfHeightRad kHomeYawRad kHomePitchRad k
   kMargin kNearest kFarthest kNearPlane)
 constants(visualizer/scene/camera.hpp kEyesPerConvergence)
 constants(visualizer/scene/appearance.hpp kPaletteWidth kLeastOpacity kOpacityMm)
-constants(visualizer/scene/appearance.cpp kEmptyShare kHighestAir kWholeSoftest kHalfBand
+constants(visualizer/scene/appearance.cpp kEmptyShare kBorderEdges kHighestAir kWholeSoftest kHalfBand
   kHardestOpacity kSoftestOpacity)
 list_constant(visualizer/scene/appearance.cpp kIvory "kIvory")
 constants(visualizer/render/volume_textures.cpp kMaterialReach)

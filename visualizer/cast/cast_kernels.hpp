@@ -53,7 +53,7 @@ struct CastVolumeJob {
   const float* by_label = nullptr;
   float settled = 1.0F;             ///< from this density on `by_density` stays what it is
   float empty = 0.0F, full = 1.0F;  ///< blend: densities of presence 0 and 1
-  float surface_mm = 1.0F;          ///< blend: `GradientPlan::surface_mm`
+  float surface_mm = 1.0F;          ///< blend: thickness of a lit layer (`kLitMm`)
   float iso = 0.5F;                 ///< 0..1
 };
 

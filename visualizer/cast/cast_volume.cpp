@@ -164,7 +164,7 @@ CastVolumeJob CastVolume::job(const View& view, std::int32_t width, std::int32_t
   job.settled = settled_;
   job.empty = static_cast<float>(transfer_.empty);
   job.full = static_cast<float>(transfer_.full);
-  job.surface_mm = static_cast<float>(gradient_.plan().surface_mm);
+  job.surface_mm = static_cast<float>(gradient_.plan().surface_mm + transfer_.border_mm);
   job.iso = iso_;
   std::copy_n(job.gradient.last, 3, job.last);
   put(job.origin, glm::dvec3(voxel_from_eye[3]));

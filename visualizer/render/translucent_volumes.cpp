@@ -142,7 +142,8 @@ void TranslucentVolumes::set_constants(const GlProgram& program) const {
     program.set(element("u_texels", v), glm::vec3(volume.texels()));
     const TransferFunction& transfer = volume.transfer();
     program.set(element("u_fade", v), glm::vec2(transfer.empty, transfer.full));
-    program.set(element("u_surface_mm", v), static_cast<float>(volume.gradient().surface_mm));
+    program.set(element("u_surface_mm", v),
+                static_cast<float>(volume.gradient().surface_mm + transfer.border_mm));
   }
   program.set("u_least_extinction",
               static_cast<float>(-std::log2(1.0 - kLeastOpacity) / kOpacityMm));

@@ -19,10 +19,18 @@ namespace kerf {
 
 namespace {
 
-constexpr double kEmptyShare = 0.4;  // the ramp begins at this share of the way from air to its end
+// The ramp begins at this share of the way from air to its end; nearer to that in voxels whose edge
+// is longer than `kOpacityMm` (TransferFunction).
+constexpr double kEmptyShare = 0.4;
 constexpr double kHighestAir = 0.75;   // of the density where it ends: else hardly a ramp is left
 constexpr double kWholeSoftest = 2.0;  // an iso density is half-way up to a material
+// What a ramp that begins at air shows outside of a surface, in edges: half of the way on which the
+// density of a border rises to half of full. Voxels as full as the body fills them, and
+// interpolation between them, blur a border by half an edge (1/12 + 1/6 = 1/4), so it rises by 2 /
+// sqrt(2 pi) = 0.80 per edge.
+constexpr double kBorderEdges = 0.5 * 0.5 / 0.80;
 constexpr double kEightBits = 255.0;
+constexpr double kLeastRamp = 1.0 / kDensityMax;  // a step of the density: no division by 0
 
 double softest_iso(std::span<const MaterialView> materials) {
   const auto softer = [](const MaterialView& a, const MaterialView& b) { return a.iso < b.iso; };
@@ -66,21 +74,29 @@ Density TransferFunction::lowest_seen() const noexcept {
 }
 
 TransferFunction make_transfer_function(std::span<const MaterialView> materials, Density iso,
-                                        bool has_labels, Density air) {
+                                        bool has_labels, Density air, double longest_mm) {
   TransferFunction made{.materials = make_palette(materials)};
   made.full = has_labels && materials.size() > 1 ? kWholeSoftest * softest_iso(materials)
                                                  : iso / kDensityMax;
   made.full = std::clamp(made.full, 2.0 / kEightBits, 1.0);
   const double empty_of_all = std::min(air / kDensityMax, kHighestAir * made.full);
-  made.empty = empty_of_all + kEmptyShare * (made.full - empty_of_all);
+  const double shorter = has_labels ? 1.0 : std::max(longest_mm / kOpacityMm, 1.0);
+  const double ramp = (1.0 - kEmptyShare) / shorter;
+  made.empty = made.full - std::max(ramp * (made.full - empty_of_all), kLeastRamp);
+  made.border_mm = kBorderEdges * ramp * longest_mm;
   return made;
 }
 
 TransferFunction make_transfer_function(const SceneView& scene, std::size_t volume,
                                         const VolumeContent& content) {
   const Density iso = scene.volumes[volume].iso;
-  if (!content.labels.empty()) return make_transfer_function(scene.materials, iso, true);
-  return make_transfer_function(scene.materials, iso, false, air_level(content.density, iso));
+  const glm::dvec3 edges_mm = scene.volumes[volume].edges_mm();
+  const double longest_mm = std::max({edges_mm.x, edges_mm.y, edges_mm.z});
+  if (!content.labels.empty()) {
+    return make_transfer_function(scene.materials, iso, true, 0, longest_mm);
+  }
+  return make_transfer_function(scene.materials, iso, false, air_level(content.density, iso),
+                                longest_mm);
 }
 
 Density air_level(std::span<const Density> density, Density iso) {

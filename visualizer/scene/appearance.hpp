@@ -41,15 +41,17 @@ struct Stereo {
 /// voxels: an edge of the voxels of the default scene.
 inline constexpr double kOpacityMm = 0.125;
 
-/// How deep light from outside goes below a surface: what the default look shows of it, 3.7 voxel
-/// edges of the default scene. By its gradient a surface goes as deep as `GradientPlan::surface_mm`
-/// says, which depends on the voxels. So the translucent renderers weight the light with
+/// How deep light from outside goes: what the default look shows of it, 2.0 voxel edges of the
+/// default scene below a surface and 0.2 of the border before it. By its gradient a lit layer is as
+/// thick as `GradientPlan::surface_mm` and `TransferFunction::border_mm` say, which depend on the
+/// voxels. So the translucent renderers weight the light with
 ///
-///     (1 - 2^(-m kLitMm / c)) / (1 - 2^(-m surface_mm / c)),
+///     (1 - 2^(-m kLitMm / c)) / (1 - 2^(-m (surface_mm + border_mm) / c)),
 ///
 /// m the extinction per mm, c the cosine between ray and normal: what a ray sees of a lit layer as
-/// thick as `kLitMm`, by what it sees of the one that is there.
-inline constexpr double kLitMm = 0.4634;
+/// thick as `kLitMm`, by what it sees of the one that is there. That one stays two edges thick: on
+/// a surface whose radius is a few edges its normals turn within it.
+inline constexpr double kLitMm = 0.2692;
 
 /// Opacity over `kOpacityMm`, 0..1, by the name of the material.
 using Opacities = std::map<std::string, double>;
@@ -91,12 +93,20 @@ using Palette = std::array<std::array<glm::vec4, kPaletteWidth>, 2>;
 /// over a length s, where a is the material's opacity over s0 = `kOpacityMm` (Beer and Lambert).
 /// The exponent makes the picture independent of the step; p lets a border fade in, and material
 /// that is milled away fade out.
+///
+/// A border is a ramp of density as wide as a voxel, so what p shows of it outside of the surface
+/// (`border_mm`) grows with the voxels: with one ramp of p, a plate of 3 mm in voxels of 0.5 mm
+/// would be 5 % more opaque than in those of 0.125. So in a volume without labels, whose surface is
+/// where p is 1, the ramp of p is shorter by as much as the longest edge is longer than
+/// `kOpacityMm`. With labels p begins below all surfaces, and each material's border remains as
+/// wide as the voxels.
 struct TransferFunction {
   /// Linear colour, and a as the fourth component: row 0 by density (entry i is density i/255), row
   /// 1 by label.
   Palette materials{};
-  double empty = 0.0;  ///< density up to which nothing is seen
-  double full = 1.0;   ///< density from which the material is seen whole
+  double empty = 0.0;      ///< density up to which nothing is seen
+  double full = 1.0;       ///< density from which the material is seen whole
+  double border_mm = 0.0;  ///< of the material, what the ramp shows outside of a surface
 
   /// p of a density.
   [[nodiscard]] double presence(double density) const noexcept;
@@ -110,10 +120,10 @@ inline constexpr double kLeastOpacity = 1.0 / 255.0;
 
 /// Made from materials: the softer, the more opaque, so that dentin shows under enamel and pulp
 /// in a cut. A volume with labels fades in up to its softest material; one without from `air` on,
-/// up to `iso`, because air and noise have densities too.
+/// up to `iso`, because air and noise have densities too. `longest_mm`: edge of a voxel.
 [[nodiscard]] TransferFunction make_transfer_function(std::span<const MaterialView> materials,
-                                                      Density iso, bool has_labels,
-                                                      Density air = 0);
+                                                      Density iso, bool has_labels, Density air = 0,
+                                                      double longest_mm = kOpacityMm);
 /// That of one volume of a scene, whose air is what most of it has below the iso density.
 [[nodiscard]] TransferFunction make_transfer_function(const SceneView& scene, std::size_t volume,
                                                       const VolumeContent& content);

@@ -137,11 +137,11 @@ GradientPlan::GradientPlan(GradientFilter of, const glm::dvec3& edges_mm)
   if (longest < kCubic * shortest) {
     narrow = voxel;
     wide = on_all_axes(wide15());
-    surface_mm = surface_depth(spread_of(wide.front())) * longest;
+    surface_mm = surface_depth(spread_of(narrow.front())) * longest;
     return;
   }
   const double wide_mm = std::max(kWidePerShortest * shortest, kWidePerLongest * longest);
-  surface_mm = surface_depth(wide_mm / longest) * longest;
+  surface_mm = surface_depth(kNarrowPerLongest) * longest;
   for (int axis = 0; axis < 3; ++axis) {
     // The hundredth is for edges that were rounded.
     const double fit = std::min(longest / edges_mm[axis] + 0.01, double{kMostInCell});

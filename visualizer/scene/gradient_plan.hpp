@@ -85,7 +85,8 @@ struct GradientPlan {
   FilterTaps narrow{}, wide{};  ///< adaptive: of the cells
   VoxelIndex cell{1, 1, 1};     ///< adaptive: voxels of a cell, by axis
   glm::vec3 per_edge{1.0F};     ///< times this, a gradient is one per voxel edge
-  /// How deep below a surface, a step from air to full density, the gradient is `kSurfaceSlope`.
+  /// How deep below a surface, a step from air to full density, the gradient is `kSurfaceSlope`: by
+  /// `adaptive` that of the narrow filter, whose length it has.
   double surface_mm = 0.0;
 };
 

@@ -30,13 +30,11 @@ function spline(spread) {
   return taps;
 }
 
-const wideMmOf = (longest, shortest) => Math.max(kWidePerShortest * shortest, kWidePerLongest * longest);
-
 /** As `GradientPlan::surface_mm`, of voxels with these edges. */
 export function surfaceMm(edges) {
   const longest = largest(edges), shortest = Math.min(...edges);
   // The difference over two edges, by which cubes are shaded, is a mean of slopes that spread by the root of 1/3.
-  const spread = longest < kCubic * shortest ? Math.sqrt(1 / 3) : wideMmOf(longest, shortest) / longest;
+  const spread = longest < kCubic * shortest ? Math.sqrt(1 / 3) : kNarrowPerLongest;
   const s = Math.hypot(spread, 0.5), steepest = 2 / (Math.sqrt(2 * Math.PI) * s);
   return s * Math.sqrt(2 * Math.log(Math.max(steepest / kSurfaceSlope, 1))) * longest;
 }
@@ -47,7 +45,7 @@ export function cellPlan(edges) {
   const longest = largest(edges), shortest = Math.min(...edges);
   if (longest < kCubic * shortest) return null;
   const cell = edges.map(edge => Math.trunc(Math.min(longest / edge + 0.01, kMostInCell)));
-  const wideMm = wideMmOf(longest, shortest);
+  const wideMm = Math.max(kWidePerShortest * shortest, kWidePerLongest * longest);
   const cellMm = edges.map((edge, axis) => cell[axis] * edge);
   const narrow = cellMm.map(mm => spline(kNarrowPerLongest * longest / mm));
   const wide = cellMm.map(mm => spline(wideMm / mm));

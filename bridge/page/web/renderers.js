@@ -101,7 +101,7 @@ export class BlendCaster {
       this.cast.setInts({[`u_voxel[${v}]`]: first, [`u_material[${v}]`]: first + 1,
         [`u_active_cell[${v}]`]: first + 2});
       this.cast.set({[`u_texels[${v}]`]: volume.texels,
-        [`u_surface_mm[${v}]`]: surfaceMm(volume.view.edges),
+        [`u_surface_mm[${v}]`]: surfaceMm(volume.view.edges) + volume.transfer.borderMm,
         [`u_fade[${v}]`]: [volume.transfer.empty, volume.transfer.full]});
       if (!volume.gradients) return;
       this.cast.setInts({[`u_cell_gradient[${v}]`]: this.cellsUnit + v});

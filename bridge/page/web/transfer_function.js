@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // What voxels look like: palette, transfer function and texels of visualizer/scene/appearance and
 // visualizer/render/volume_textures.
-import {kEmptyShare, kHalfBand, kHardestOpacity, kHighestAir, kIvory, kLeastOpacity, kMaterialReach,
+import {kBorderEdges, kEmptyShare, kHalfBand, kHardestOpacity, kHighestAir, kIvory, kLeastOpacity, kMaterialReach,
   kOpacityMm, kPaletteWidth, kSoftestOpacity, kWholeSoftest} from './constants.js';
 import {clamp, mix} from './math.js';
 
@@ -57,7 +57,8 @@ function airLevel(density, iso) {
   return median << 8;
 }
 
-/** Densities (0..1) from which something is seen and from which all of it, and the lowest seen. */
+/** As `make_transfer_function`: densities (0..1) from which something is seen and from which all of it, how much of the
+ * material that shows outside of a surface, and the lowest density seen. */
 export function transferFunction(view, materials) {
   const {labels, density} = view.volume;
   const softest = Math.min(...materials.slice(1).map(one => one.iso));
@@ -65,8 +66,10 @@ export function transferFunction(view, materials) {
   let full = labels && materials.length > 1 ? kWholeSoftest * softest : view.iso / kFull;
   full = clamp(full, 2 / 255, 1);
   const emptyOfAll = Math.min(air / kFull, kHighestAir * full);
-  const empty = emptyOfAll + kEmptyShare * (full - emptyOfAll);
-  return {empty, full,
+  const longest = Math.max(...view.edges);
+  const ramp = (1 - kEmptyShare) / (labels ? 1 : Math.max(longest / kOpacityMm, 1));
+  const empty = full - Math.max(ramp * (full - emptyOfAll), 1 / kFull);
+  return {empty, full, borderMm: kBorderEdges * ramp * longest,
     lowestSeen: Math.max(1, Math.floor(Math.max(0, empty - 0.5 / 255) * kFull))};
 }
 

@@ -59,6 +59,26 @@ TEST_CASE("a CT whose air is far from black is seen through its air, not as a bl
   CHECK(make_transfer_function(kTooth, kIso, false).presence(kAir / kDensityMax) > 0.3);
 }
 
+TEST_CASE("what a border shows outside of a surface is no thicker in coarser voxels") {
+  const auto of = [](double longest_mm) {
+    return make_transfer_function(kTooth, 29491, false, 0, longest_mm);
+  };
+  const TransferFunction usual = of(kOpacityMm);
+  CHECK(usual.empty == make_transfer_function(kTooth, 29491, false).empty);
+  for (const double longest_mm : {0.25, 0.5, 3.0}) {
+    CAPTURE(longest_mm);
+    const TransferFunction coarse = of(longest_mm);
+    // A ramp of presence on the same way of a border that is as much wider.
+    CHECK((coarse.full - coarse.empty) * longest_mm ==
+          doctest::Approx((usual.full - usual.empty) * kOpacityMm));
+    CHECK(coarse.border_mm == doctest::Approx(usual.border_mm));
+    CHECK(coarse.full == usual.full);
+  }
+  CHECK(of(0.05).empty == usual.empty);  // no wider than down to air
+  const TransferFunction endless = of(1e12);
+  CHECK(static_cast<float>(endless.empty) < static_cast<float>(endless.full));
+}
+
 TEST_CASE("air is 0 where nothing is below iso, and leaves a ramp where all is just below") {
   const std::vector<Density> full(100, 65535);
   CHECK(air_level(full, 30'000) == 0);

@@ -223,6 +223,37 @@ TEST_CASE("the adaptive gradient keeps an edge as sharp as farid5, and its lengt
   for (int y = 10; y < 20; ++y) CHECK(angle({19, y, 10}) < 12.0F);  // along a face to its edge
 }
 
+TEST_CASE("a gradient shows a surface as deep as its plan says") {
+  for (const GradientFilter kind : kAll) {
+    for (const glm::dvec3& edges_mm : {glm::dvec3(0.2), glm::dvec3(0.1, 0.1, 0.3)}) {
+      const GradientPlan plan(kind, edges_mm);
+      if (kind != GradientFilter::adaptive && edges_mm.x != edges_mm.z) continue;
+      CAPTURE(name_of(kind));
+      CAPTURE(edges_mm.z);
+      constexpr VoxelGrid kGrid{45, 45, 40};  // far from the air beside it
+      // The mean over places of the surface between two voxels, which a picture shows.
+      constexpr int kPlaces = 10;
+      double deep_mm = 0.0;
+      for (int place = 0; place < kPlaces; ++place) {
+        const double surface = 20.0 + static_cast<double>(place) / kPlaces;  // solid beyond it
+        std::vector<Density> density;
+        for_each_voxel(kGrid.box(), [&](int, int, int z) {
+          const double filled = std::clamp(z + 0.5 - surface, 0.0, 1.0);
+          density.push_back(static_cast<Density>(filled * kDensityMax));
+        });
+        std::vector<glm::vec3> made;
+        fill_gradients(plan, kGrid, density, {{22, 22, 0}, {23, 23, 40}}, made);
+        std::size_t z = 20;
+        while (glm::length(made[z + 1]) > kSurfaceSlope) ++z;
+        const double here = glm::length(made[z]), next = glm::length(made[z + 1]);
+        const double at = static_cast<double>(z) + (here - kSurfaceSlope) / (here - next);
+        deep_mm += (at - surface) * edges_mm.z / kPlaces;
+      }
+      CHECK(deep_mm == doctest::Approx(plan.surface_mm).epsilon(0.1));
+    }
+  }
+}
+
 TEST_CASE("a gradient has a name, and an unknown one is refused") {
   for (const GradientFilter kind : kAll) {
     CHECK(gradient_named(kGradientNames[static_cast<std::size_t>(kind)]) == kind);

@@ -19,7 +19,7 @@ constexpr float kInside = 0.62F;               // inside, light comes from every
 constexpr float kOpaque = 0.98F;               // what lies behind adds two hundredths at most
 constexpr float kNoticeable = 1.0F / 32;       // pieces below have no light of their own
 constexpr float kLeastExtinction = 0.045347F;  // per mm, of `kLeastOpacity`: less is not seen
-constexpr float kLit = 0.4634F;                // mm: `kLitMm`
+constexpr float kLit = 0.2692F;                // mm: `kLitMm`
 constexpr float kLeastFacing = 0.2F;  // a ray that grazes leaves the border before it is in deeper
 constexpr float kNever = 1e9F;        // steps
 
