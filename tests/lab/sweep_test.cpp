@@ -79,7 +79,9 @@ std::map<std::string, std::string> row_of(const std::string& table, int row) {
 int processes_of(const std::filesystem::path& folder) {
   int count = 0;
   for (const auto& process : std::filesystem::directory_iterator("/proc")) {
-    const std::string line = text_of(process.path() / "cmdline");
+    std::ifstream file(process.path() / "cmdline");
+    std::string line;
+    std::getline(file, line);  // of one that has just ended: nothing
     if (line.find(folder.string()) != std::string::npos) ++count;
   }
   return count;
