@@ -1,8 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <cstddef>
 #include <iostream>
-#include <span>
-#include <string_view>
 
 #include "bridge/join/join.hpp"
 #include "bridge/net/address.hpp"
@@ -78,20 +75,7 @@ void add_join(CommandLine& app, JoinOptions& options) {
       .shows_default();
 }
 
-/// Refuses a command and an option of earlier versions; the message names what replaces them.
-void refuse_former(std::span<const char* const> words) {
-  if (words.size() > 1 && std::string_view(words[1]) == "make-identity") {
-    throw BridgeError("make-identity is gone; make PEM files with openssl: docs/second-machine.md");
-  }
-  for (const std::string_view word : words) {
-    if (word == "--identity" || word.starts_with("--identity=")) {
-      throw BridgeError("--identity is gone; give --cert FOLDER/cert.pem --key FOLDER/key.pem");
-    }
-  }
-}
-
 int run(int argc, char** argv) {
-  refuse_former({argv, static_cast<std::size_t>(argc)});
   ServeOptions serve_options;
   JoinOptions join_options;
   CommandLine app("Carries the picture of a kerf-controller to other machines.", "kerf-bridge",
