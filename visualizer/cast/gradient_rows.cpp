@@ -37,14 +37,12 @@ GradientRows::GradientRows(const GradientPlan& plan, const VoxelGrid& grid,
 
 void GradientRows::fill(const VoxelBox& box, std::span<const Density> density, Work& work) {
   fill_gradients(plan_, grid_, density, box, work.gradients, work.filters);
-  const CastGradient rows = view();
   const glm::vec3* from = work.gradients.data();
   const std::int32_t wide = box.hi.x - box.lo.x;
   for (std::int32_t z = box.lo.z; z < box.hi.z; ++z) {
     for (std::int32_t y = box.lo.y; y < box.hi.y; ++y, from += wide) {
-      const std::ptrdiff_t at =
-          std::ptrdiff_t{z + 1} * rows.plane + std::ptrdiff_t{y + 1} * rows.row + box.lo.x + 1;
-      std::transform(from, from + wide, entries_.begin() + at, entry_of);
+      const auto to = entries_.begin() + static_cast<std::ptrdiff_t>(place({box.lo.x, y, z}));
+      std::transform(from, from + wide, to, entry_of);
     }
   }
 }
@@ -56,11 +54,14 @@ std::vector<VoxelBox> GradientRows::update(const ChangedBricks& changed,
   return boxes;
 }
 
+std::size_t GradientRows::place(const VoxelIndex& voxel) const noexcept {
+  const auto row = static_cast<std::ptrdiff_t>(grid_.nx) + 2;
+  const std::ptrdiff_t plane = row * (grid_.ny + 2);
+  return static_cast<std::size_t>((voxel.z + 1) * plane + (voxel.y + 1) * row + voxel.x + 1);
+}
+
 glm::vec3 GradientRows::at(const VoxelIndex& voxel) const noexcept {
-  const CastGradient rows = view();
-  const Entry& entry =
-      entries_[static_cast<std::size_t>(std::ptrdiff_t{voxel.z + 1} * rows.plane +
-                                        std::ptrdiff_t{voxel.y + 1} * rows.row + voxel.x + 1)];
+  const Entry& entry = entries_[place(voxel)];
   return (glm::vec3(entry[0], entry[1], entry[2]) - 32768.0F) * (1.0F / 32767.0F);
 }
 

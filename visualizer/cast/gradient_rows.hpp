@@ -45,6 +45,8 @@ class GradientRows {
     GradientWork filters;
   };
   void fill(const VoxelBox& box, std::span<const Density> density, Work& work);
+  /// In `entries_`, of a voxel or of the border.
+  [[nodiscard]] std::size_t place(const VoxelIndex& voxel) const noexcept;
 
   GradientPlan plan_;
   VoxelGrid grid_;
